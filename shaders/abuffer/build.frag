@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Links what falls on a texel into its list, and adds it to the voxels that it touches.
-// Hu, Huang, Zhang, Yuan, Li. Ray Tracing via GPU Rasterization. 2014, section 3.1.
+// Links each fragment into its texel's list, and adds it to the voxels that it touches. Hu, Huang, Zhang, Yuan, Li. Ray
+// Tracing via GPU Rasterization. 2014, section 3.1.
 // Defines: those of raster/fragment.glsl; ALL_IMAGES, of raster/draw.geom, always.
 
 #include "abuffer/layout.h"
@@ -8,7 +8,7 @@
 #include "raster/face.glsl"
 #include "raster/fragment.glsl"
 
-uniform uint nodes_max;         // that there is room for
+uniform uint nodes_max;         // capacity
 uniform uint voxels_along;      // a side of the grid
 uniform float voxels_per_cell;
 uniform bool has_subvoxels;
@@ -16,7 +16,7 @@ uniform bool has_subvoxels;
 layout(binding = IMAGE_ABUFFER_HEADS, r32ui) uniform uimageBuffer heads;
 layout(binding = IMAGE_ABUFFER_NODES, rgba32ui) writeonly uniform uimageBuffer nodes;
 layout(binding = IMAGE_ABUFFER_SUMS, r32i) uniform iimageBuffer sums;
-layout(binding = IMAGE_ABUFFER_SUBVOXELS, r32ui) uniform uimageBuffer subvoxels; // six a voxel
+layout(binding = IMAGE_ABUFFER_SUBVOXELS, r32ui) uniform uimageBuffer subvoxels; // six per voxel
 layout(std430, binding = BIND_ABUFFER_BUILD_COUNTS) buffer build_block { abuffer_build_counts build; };
 
 uint texel_in_tiles()
@@ -25,7 +25,7 @@ uint texel_in_tiles()
     return ABUFFER_TEXEL(ABUFFER_TILES_ALONG(texels_along), uint(gl_Layer), place.x, place.y);
 }
 
-// Whether there was room. Without, this one is only counted, as all is drawn once more.
+// False if the list is full: the fragment is only counted, and everything is drawn once more.
 bool link(float depth_cells, uint bits)
 {
     uint node = atomicAdd(build.nodes, 1u);
@@ -39,7 +39,7 @@ bool link(float depth_cells, uint bits)
     return true;
 }
 
-// Of voxels along depth, u and v: how far it is from one to the next, in texels of the sums.
+// The stride between voxels along depth, u and v, in texels of the sums.
 ivec3 strides()
 {
     int along = int(voxels_along), square_ = along * along;
@@ -47,7 +47,7 @@ ivec3 strides()
     return 4 * s;
 }
 
-// Nothing of a patch is lost to rounding; and one that ends where a voxel does, does not touch the next one. Sides of
+// Rounding loses no part of a patch, and a patch that ends at a voxel's side does not touch the next voxel. Sides of
 // voxels and subvoxels lie at least 1 / 512 of a cell from those of texels, if they do not coincide.
 const float DEPTH_MARGIN_CELLS = 1.0 / 64.0;
 const float HALF_TEXEL = 0.5 - 1.0 / 1024.0;
@@ -58,8 +58,8 @@ ivec3 turned(ivec3 duv)
     return gl_Layer == 0 ? duv : gl_Layer == 1 ? duv.zxy : duv.yzx;
 }
 
-// Of the subvoxels from the first to the last those that are in one half of a voxel, as bits of a word; `half_`: of the
-// grid, so many along z as there are pairs of subvoxels.
+// The subvoxels from the first to the last that are in one half of a voxel, as bits of a word; `half_`: its number in
+// the grid, where halves are stacked along z.
 uint subvoxels_between(ivec3 first, ivec3 last, ivec3 half_)
 {
     ivec3 lower = half_ * ivec3(4, 4, 2);
@@ -68,9 +68,8 @@ uint subvoxels_between(ivec3 first, ivec3 last, ivec3 half_)
     return (x * 0x1111u & y) * (from.z == to.z ? 1u << 16u * from.z : 0x10001u);
 }
 
-// The patch of a surface that is seen through a texel, and reaches from one depth to the other: mostly in one half of a
-// voxel, or in two. A load is cheaper than an atomic, and mostly the bits are there.
-// `looks_along`: the axis that its normal leans to most.
+// The patch of a surface behind a texel, from one depth to the other: usually in one or two halves of a voxel. A load
+// is cheaper than an atomic, and the bits are usually set already. `looks_along`: its normal's dominant axis.
 void mark(float least_cells, float greatest_cells, int bits, int looks_along)
 {
     float subvoxels_per_cell = 4.0 * voxels_per_cell;
@@ -94,7 +93,7 @@ void mark(float least_cells, float greatest_cells, int bits, int looks_along)
     } while (half_.z <= half_last.z);
 }
 
-// A unit normal's components along depth, u and v, to the voxel that the texel's middle is in at this depth.
+// Adds a unit normal's components along depth, u and v, to the voxel of the texel's centre at this depth.
 void add_normal(float depth_cells, vec3 normal_duv)
 {
     ivec3 voxel = ivec3(vec3(depth_cells, gl_FragCoord.xy) * voxels_per_cell), step_ = strides();
@@ -110,8 +109,8 @@ void add_normal(float depth_cells, vec3 normal_duv)
         imageAtomicAdd(sums, at + v, units.z);
 }
 
-// Of what leans to this image's axis: in others it has no more samples, nor such that tell more. `leaves`: it looks
-// towards greater depths.
+// For surfaces that lean to this image's axis: other images sample them no better. `leaves`: the outside faces greater
+// depths.
 int sum_bits(uint face, bool closed, bool leaves)
 {
     uint looks = (leaves ? ABUFFER_SUM_UP : ABUFFER_SUM_DOWN) << gl_Layer;
@@ -132,12 +131,12 @@ void main()
         discard;
     uint face = primitive.w;
     float depth_cells = triangle_depth_cells();
-    // What the rasteriser says covers the texel it also says faces so: of a closed surface as many fragments of a
-    // texel lead in as out.
+    // The facing is the rasteriser's own, as the coverage is: a closed surface has as many entering as leaving
+    // fragments in a texel.
     bool leaves = gl_FrontFacing;
     if (!link(depth_cells, face & (FACE_NORMAL_MASK | FACE_CLOSED) | (leaves ? ABUFFER_NODE_LEAVES : 0u)))
         return;
-    // The plane through all of the texel; where it is so steep that this is far, no farther than the triangle reaches.
+    // The plane's range of depth in the texel; if it is steep, no farther than the triangle reaches.
     float reach = 0.5 * (abs(plane.x) + abs(plane.y)), least_cells = depth_cells - reach, most_cells = depth_cells + reach;
     if ((face & FACE_STEEP << gl_Layer) != 0u) {
         least_cells = max(least_cells, depths.y);
@@ -151,9 +150,9 @@ void main()
     }
 }
 #else
-// How far a sphere's surface goes through the texel's square, from where its middle's line crosses it: outwards from the
-// sphere's middle no farther than its tangent, nor than where the square comes nearest to the middle; inwards to its rim
-// at most, if that is in the square.
+// The range of a sphere's surface in the texel's square, from its intersection with the line through the texel's
+// centre: outwards, it is bounded by the tangent plane and by the square's point nearest to the sphere's centre;
+// inwards by the rim, if that is in the square.
 void reach_of(sphere_chord c, vec3 normal, int side, float depth_cells, out float least_cells,
               out float most_cells)
 {

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MIT
-// A texel of an A-buffer: the samples of its column, and of how many bodies a point of it is inside.
+// A texel of an A-buffer: the samples of its column, and the winding at a point of it (the number of bodies around the
+// point).
 //
-// A sample is taken for the plane through it, as far as its texel goes: a depth alone would make steps of every slope.
+// A sample stands for the plane through it, within its texel: a depth alone would turn every slope into steps.
 //
-// Define: ABUFFER_COUNT_STEPS crossings are not samples but, for the benchmark, what the walk did: blocks of voxels looked
-// at in place of the distance, samples looked at in that of the primitive, texels in that of the instance.
+// Define: ABUFFER_COUNT_STEPS for the benchmark, intersections hold counts and not samples: visited blocks of voxels in
+// place of the distance, visited samples in place of the primitive, visited texels in place of the instance.
 #include "abuffer/layout.h"
 #include "raster/layout.h"
 #include "shared/bindings.h"
@@ -18,18 +19,19 @@ uvec3 abuffer_counts = uvec3(0u);
 #endif
 
 layout(binding = UNIT_TRACER_0) uniform usamplerBuffer abuffer_texels;
-layout(binding = UNIT_TRACER_1) uniform usamplerBuffer abuffer_samples; // two a texel
+layout(binding = UNIT_TRACER_1) uniform usamplerBuffer abuffer_samples; // two per texel
 
 uniform int abuffer_resolution;
 
-// How far beyond its texel a sample's plane still counts, in cells: what neighbours' planes may leave open between
-// them where a surface bends.
+// The extension of a sample's plane beyond its texel, in cells: it closes the gaps between neighbours' planes on a
+// curved surface.
 const float SLACK = 0.05;
-// How far a plane leaves its sample's depth within its texel and the slack, in cells. Steeper ones are cut off there.
+// The maximum deviation of a plane from its sample's depth within its texel and the slack, in cells. Steeper planes are
+// cut off there.
 const float SPAN = (1.0 + 2.0 * SLACK) / AXES_OVERLAP;
 
 struct column {
-    int first, end; // of its samples
+    int first, end;
 };
 
 column column_at(int axis, ivec2 texel)
@@ -41,7 +43,6 @@ column column_at(int axis, ivec2 texel)
     return column(int(words.x), int(words.x + words.y));
 }
 
-// The texel that a point of the image is in.
 ivec2 texel_of(vec2 p)
 {
     return clamp(ivec2(p), ivec2(0), ivec2(abuffer_resolution - 1));
@@ -50,7 +51,7 @@ ivec2 texel_of(vec2 p)
 struct column_sample {
     float depth;
     vec3 normal; // u v depth, of any length
-    int step_;   // what a way through it, towards greater depths, adds to the winding
+    int step_;   // the change of the winding behind it, towards greater depths
     int behind;  // winding there
 };
 
@@ -80,21 +81,21 @@ column_sample sample_of(uvec2 words, int axis)
     return s;
 }
 
-// Of the sample's plane, so far from the texel's middle.
+// The depth of the sample's plane at an offset from the texel's centre.
 float plane_depth(column_sample s, vec2 from_middle)
 {
     float shift = -dot(s.normal.xy, from_middle) / s.normal.z;
-    // Written so that what is no number is something too.
+    // Written so that NaN has a defined result.
     return s.depth + (shift < SPAN ? shift > -SPAN ? shift : -SPAN : SPAN);
 }
 
-// A column's samples from a depth on, one after the other.
+// The samples of a column from a depth on, in order.
 struct column_scan {
     int next, end;
-    int bound; // the first is not behind this one
+    int bound; // the first one's index is at most this
 };
 
-// Bisection leaves so many before the first: they are as soon passed as found.
+// Bisection stops at this many samples before the first: a linear search is as fast there.
 const int PASSED = 4;
 
 column_scan scan_of(column c)
@@ -102,8 +103,8 @@ column_scan scan_of(column c)
     return column_scan(c.first, c.end, c.end);
 }
 
-// One round of a loop that goes on while next < end: whether it came to a sample, which `words` are those of. Bisection is
-// rounds of the same loop, so that columns which need none do not wait for code that they skip.
+// One round of a loop that runs while next < end; true: it reached a sample, whose words are in `words`. Bisection runs
+// as rounds of the same loop, so that columns without it do not wait for code that they skip.
 bool scan(inout column_scan c, float least_, out int index, out uvec2 words)
 {
     ABUFFER_COUNT(z);
@@ -121,8 +122,8 @@ bool scan(inout column_scan c, float least_, out int index, out uvec2 words)
     return !is_far && index < c.end && depth_of(words) >= least_;
 }
 
-// The same, one sample a round. For loops whose rounds hang on what was found before: with two a round llvmpipe gave a few
-// rays in ten thousand another answer where the column began at an odd place, and where it begins is chance.
+// The same, one sample per round. For loops whose rounds depend on earlier results: with two per round llvmpipe
+// answered a few rays in ten thousand differently if the column began at an odd index, and where it begins is chance.
 bool scan_singly(inout column_scan c, float least_, out int index, out uvec2 words)
 {
     bool is_far = c.bound - c.next > PASSED;
@@ -134,7 +135,7 @@ bool scan_singly(inout column_scan c, float least_, out int index, out uvec2 wor
     return !is_far && !is_before && index < c.end;
 }
 
-// Of how many bodies a point of the image is inside.
+// The winding at a point of the image: the number of bodies around it.
 int winding_at(int axis, vec3 p)
 {
     ivec2 texel = texel_of(p.xy);

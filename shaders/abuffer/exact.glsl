@@ -1,26 +1,26 @@
 // SPDX-License-Identifier: MIT
-// From the plane that a ray crosses to the surface: the triangle that the sample is of, or one beside it.
+// From the intersected plane to the surface: the sample's triangle, or one beside it.
 //
-// A sample's plane goes on as far as its texel does, its triangle may not. What follows beyond the edge is mostly seen by
-// the texels around the crossing; where it is not, as triangles are smaller than texels, the plane stands for it.
+// A sample's plane covers its whole texel, its triangle may not. The surface beyond the edge is usually sampled by the
+// texels around the intersection; if it is not, as triangles are smaller than texels, the plane stands for it.
 #include "abuffer/planes.glsl"
 
 #if !defined ANY_HIT && !defined ABUFFER_STEPS
 
-// How far beyond its texel a sample's plane is looked at, in cells. Where surfaces bend by more than SLACK, rays would
-// pass between planes; what is found is held against triangles, so it may be looked for farther away.
+// How far beyond its texel a sample's plane is tested, in cells. Where surfaces bend by more than SLACK, rays would
+// pass between planes; intersections are verified with triangles, so the search may reach farther.
 const float BEYOND = 0.25;
-// In cells: what is behind a crossing by no more is the same one.
+// In cells: intersections no farther apart are the same one.
 const float AGAIN = 1e-3;
-// Cells of depth in which samples of texels side by side are of one surface, in the image that it leans to.
+// In cells of depth: samples of adjacent texels no farther apart are of one surface, in the image that it leans to.
 const float BESIDE = 3.0;
-// How far behind the plane's crossing, in cells, that of a triangle beside it may be.
+// How far behind the plane's intersection that of an adjacent triangle may be, in cells.
 const float BESIDE_BEHIND = 4.0;
 
 // The line of a ray, and a triangle of the same instance.
 struct line_crossing {
     vec3 v0, v1, v2; // from the ray's origin
-    vec3 weights;    // of the vertices where the line crosses the triangle's plane
+    vec3 weights;    // barycentric, where the line intersects the triangle's plane
     float distance;  // there
     bool from_behind;
 };
@@ -47,24 +47,24 @@ bool has_corner(line_crossing c, vec3 v)
     return c.v0 == v || c.v1 == v || c.v2 == v;
 }
 
-// The edge beyond which the line passes the one is an edge of the other, too.
+// Whether the edge beyond which the line passes the one triangle is an edge of the other, too.
 bool is_beyond_edge_of(line_crossing c, line_crossing other)
 {
     bvec3 has = bvec3(has_corner(other, c.v0), has_corner(other, c.v1), has_corner(other, c.v2));
     return c.weights.x < 0.0 && has.y && has.z || c.weights.y < 0.0 && has.z && has.x || c.weights.z < 0.0 && has.x && has.y;
 }
 
-// Samples around a place of an image, in four columns, one behind the other, from the nearest on.
+// The samples around a point of an image, column by column of the four nearest ones.
 struct samples_beside {
     int axis;
     vec3 p;
-    int columns; // that were begun
+    int columns; // columns begun so far
     column_scan column;
     uint first_id, end_id; // of the instance
-    uvec3 seen;            // ids: that of the sample which was found, the last one and that before
+    uvec3 seen;            // ids: of the intersected sample, of the last one and of the one before
 };
 
-// The texel that the place is in, the nearer one beside it, the other, that between them.
+// The texel of the point, its nearer neighbour, the other neighbour, the diagonal one.
 ivec2 texel_beside(vec2 p, int k)
 {
     vec2 from_middle = fract(p) - 0.5;
@@ -73,13 +73,13 @@ ivec2 texel_beside(vec2 p, int k)
     return texel_of(p + vec2(along_u ? sign(from_middle.x) : 0.0, along_v ? sign(from_middle.y) : 0.0));
 }
 
-// The next sample that may be of the same surface, of a triangle that is not seen yet; false: there is none.
+// The next sample that may be of the same surface, of a triangle that was not tested yet; false: there is none.
 bool next_beside(inout samples_beside b, out int index, out uint id)
 {
     bool is_new = false;
     index = 0;
     id = 0u;
-    // After the fourth there is none: who began a fifth would see the first again, and never come to an end.
+    // After the fourth there is none: a fifth would be the first again, and the loop endless.
     while (!is_new && (b.columns < 4 || b.column.next < b.column.end)) {
         if (b.column.next >= b.column.end) {
             b.column = scan_of(column_at(b.axis, texel_beside(b.p.xy, b.columns)));
@@ -96,10 +96,10 @@ bool next_beside(inout samples_beside b, out int index, out uint id)
     return is_new;
 }
 
-// The sample that was found, to that of the triangle which the ray meets there, before `limit`. False: it meets none.
+// Replaces the intersected sample by that of the triangle that the ray hits there, before `limit`. False: it hits none.
 //
-// It passes where it is beyond an edge behind which the surface turns back, or where it met the next triangle before it
-// began. Where nothing beside it tells so, the plane of a sample stands for its texel.
+// A ray passes beyond an edge behind which the surface turns back, or if it would hit the next triangle before its
+// begin. Without such evidence from neighbours, a sample's plane stands for its texel.
 bool settle(trace_ray r, voxel_walk w, float limit, inout abuffer_found found)
 {
     int index = found.sample_index;
@@ -146,9 +146,9 @@ bool settle(trace_ray r, voxel_walk w, float limit, inout abuffer_found found)
 
 #ifndef ABUFFER_STEPS
 
-const int PASSES_MAX = 8; // then what is found is taken as it is
+const int PASSES_MAX = 8; // then the sample's plane is the answer
 
-// What of the ray's way is left.
+// The rest of the ray.
 void search_voxels(trace_ray r, inout voxel_walk w, inout abuffer_found found)
 {
     while (w.s < w.s_end) {
@@ -178,7 +178,7 @@ void walk_planes(trace_ray r, inout voxel_walk w, inout abuffer_found found)
         float s = w.s_limit;
         goes_on = found.sample_index >= 0 && !settle(r, w, limit, found) && ++passes < PASSES_MAX;
         if (goes_on) {
-            // A plane that goes on beyond its texel may have hidden that of the next texel, at the same place.
+            // A plane that is extended beyond its texel may have hidden that of the next texel at the same point.
             w.s_behind = found.is_within ? s + AGAIN : w.s_behind;
             w.beyond = found.is_within ? BEYOND : SLACK;
             w.s = s > w.s_least ? s : w.s_least;

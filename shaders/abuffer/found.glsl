@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// What a walk through A-buffers does with the samples that a ray crosses.
+// What a traversal of A-buffers does with the samples that a ray intersects.
 //
-// Defines: those of trace.comp.
+// Defines: those of trace/wave.comp.
 #include "shared/hit.h"
 #include "common/crossed.glsl"
 #include "abuffer/sample_primitive.glsl"
@@ -17,18 +17,18 @@ struct abuffer_found {
 #endif
 #else
     int sample_index; // -1: none
-    bool is_within;   // where its texel is, and no more than SLACK beside it
+    bool is_within;   // in its texel, or at most SLACK beside it
 #endif
 };
 
 #if defined ANY_HIT && !defined HAS_TRANSLUCENT
-#define ANYTHING_ENDS // the first crossing is the answer, wherever it is
+#define ANYTHING_ENDS // the first intersection is the answer, wherever it is
 #endif
 
 #ifdef ANY_HIT
 
-// The ray crosses a sample at a distance between its t_min and found.end. `side` is positive where the ray comes from
-// behind; `near` is a cell, as a distance.
+// Records an intersection with a sample at a distance between t_min and found.end. `side` is positive if the ray comes
+// from behind; `near` is a cell, as a distance.
 void offer_sample(trace_ray r, inout abuffer_found found, int sample_index, float distance_, float side, float near)
 {
 #ifdef HAS_TRANSLUCENT
@@ -68,7 +68,7 @@ abuffer_found found_of(trace_ray r, candidate best)
 
 #endif
 
-// At `s` of the walk.
+// The same at `s` of the traversal.
 void offer_at(trace_ray r, inout voxel_walk w, inout abuffer_found found, int sample_index, float s, float side)
 {
     offer_sample(r, found, sample_index, (s + w.ray.begin) / w.ray.scale, side, 1.0 / w.ray.scale);

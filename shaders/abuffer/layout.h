@@ -1,40 +1,40 @@
 /* SPDX-License-Identifier: MIT */
 /* clang-format off */
-/* Voxels and A-buffers on the device: what the build (abuffer/build.frag, abuffer/resolve.comp, abuffer/voxels.comp)
- * writes and the walk reads. Hu, Huang, Zhang, Yuan, Li. Ray Tracing via GPU Rasterization. 2014.
+/* Voxels and A-buffers on the device: the build (abuffer/build.frag, abuffer/resolve.comp, abuffer/voxels.comp) writes
+ * them and the traversal reads them. Hu, Huang, Zhang, Yuan, Li. Ray Tracing via GPU Rasterization. 2014.
  *
- * The structure is a cube of N x N x N cells of one size over a box of the world. It has three A-buffers, one an axis:
+ * The structure is a cube of N x N x N cells of one size over a box of the world. It has three A-buffers, one per axis:
  * image a looks along axis a (0 x, 1 y, 2 z) towards greater values; a texel's u runs along axis (a + 1) % 3 and its v
- * along axis (a + 2) % 3. Places are in cells from the cube's lower corner: p_cell = (p_world - lower) / cell; texel
- * (u, v) covers [u, u + 1) x [v, v + 1) and was sampled at its middle. Every triangle is in all three images, so a
+ * along axis (a + 2) % 3. Points are in cells from the cube's lower corner: p_cell = (p_world - lower) / cell; texel
+ * (u, v) covers [u, u + 1) x [v, v + 1) and is sampled at its centre. Every triangle is in all three images, so a
  * texel's samples are all surfaces along its line.
  *
  * Over the same cube lies a grid of V x V x V voxels, V a power of two, each N / V cells wide.
  *
- *   texels      RG32UI, one a texel, image after image, each in tiles (ABUFFER_TEXEL): first sample, number of samples
- *   samples     RG32UI, one a sample; those of a texel lie together and ascend in depth, of equal depths in the order of
- *               instances and primitives
- *               for an even number there is room, as the walk reads two a texel, RGBA32UI
+ *   texels      RG32UI, one per texel, image after image, each in tiles (ABUFFER_TEXEL): first sample, number of samples
+ *   samples     RG32UI, one per sample; those of a texel are contiguous and ascend in depth, at equal depths in the
+ *               order of instances and primitives; padded to an even number, as the traversal reads two per texel,
+ *               RGBA32UI
  *                 x  depth (float, cells)
  *                 y  bits 0..11, 12..23 geometric normal, octahedral snorm, world space, to the outside (winding);
- *                    24..30 winding behind it: of how many bodies a point between it and the next sample is inside, plus
- *                    ABUFFER_WINDING_ZERO; 31: it bounds a body (others leave the winding as it is)
- *   ids         R32UI, one a sample: what it is of; the instance and the primitive are found by `drawn`
- *   drawn       RGBA32UI, one an instance that was drawn: first id; what is added to a primitive's scene-wide number to
- *               make its id; the instance; DRAWN_* (raster/layout.h). First ids ascend
- *   voxels      RGBA32UI, ABUFFER_BLOCK_TEXELS a block of 4 x 4 x 4 voxels, blocks row after row
- *                 0     which hold something (raster/layout.h)
- *                 1, 2  4 bits a voxel, ABUFFER_VOXEL_*: voxel i in texel 1 + i / 32, component i / 8 % 4, bits 4 (i % 8)
- *   subvoxels   RG32UI, three a voxel, x fastest: in which of 4 x 4 x 4 parts of it the squares of samples' planes are that
- *               texels show, of samples in the images that they lean to; one texel for those that look along x most, one
- *               for y, one for z: bit x + 4 y + 16 z. Where subvoxels would be smaller than texels, or V is more than
+ *                    24..30 winding behind it: the number of bodies around a point between it and the next sample, plus
+ *                    ABUFFER_WINDING_ZERO; 31: it bounds a body (others do not change the winding)
+ *   ids         R32UI, one per sample: `drawn` maps it to the instance and the primitive
+ *   drawn       RGBA32UI, one per drawn instance: first id; id minus the primitive's scene-wide number; the instance;
+ *               DRAWN_* (raster/layout.h). First ids ascend
+ *   voxels      RGBA32UI, ABUFFER_BLOCK_TEXELS per block of 4 x 4 x 4 voxels, blocks row after row
+ *                 0     the occupied ones (raster/layout.h)
+ *                 1, 2  4 bits per voxel, ABUFFER_VOXEL_*: voxel i in texel 1 + i / 32, component i / 8 % 4, bits 4 (i % 8)
+ *   subvoxels   RG32UI, three per voxel, x fastest: the ones of its 4 x 4 x 4 parts that the planes of samples touch
+ *               within their texels, of samples in the images that they lean to; one texel for those of image x, one for
+ *               y, one for z: bit x + 4 y + 16 z. If subvoxels would be smaller than texels, or V is more than
  *               ABUFFER_SUBVOXELS_VOXELS_MAX, three for all voxels, all bits set
  *
- * While it is built, in R32I texels (image atomics), four a voxel, x fastest:
- *   sums        0..2  sum of the geometric normals of the samples in it, ABUFFER_NORMAL_UNIT for 1: their direction is
- *                     that of the average. Of each sample once: that of the image which its normal leans to most
- *               3     ABUFFER_SUM_* bits: of samples in the images that they lean to, in each voxel that the square of
- *                     plane touches which is seen through their texel */
+ * While it is built, in R32I texels (image atomics), four per voxel, x fastest:
+ *   sums        0..2  sum of the geometric normals of the samples in it, ABUFFER_NORMAL_UNIT for 1: it has the average's
+ *                     direction. Each sample counts once: in the image of its normal's dominant axis
+ *               3     ABUFFER_SUM_* bits: of samples in the images that they lean to, in each voxel that a sample's plane
+ *                     touches within its texel */
 /* clang-format on */
 #ifndef FARLIGHT_SHADERS_ABUFFER_LAYOUT_H
 #define FARLIGHT_SHADERS_ABUFFER_LAYOUT_H
@@ -42,9 +42,9 @@
 #include "shared/bindings.h"
 #include "shared/types.h"
 
-/* Images lie in tiles of 8 x 8 texels, row after row, the last ones of a row and of an image padded by empty
- * texels. In a tile 4 x 8 texels lie before the other 4 x 8, and 4 x 2 fill a line of most caches: whichever way a
- * ray goes it finds what it reads next near what it has read. */
+/* Images lie in tiles of 8 x 8 texels, row after row; the last ones of a row and of an image are padded by empty
+ * texels. In a tile the left 4 x 8 texels come before the right 4 x 8, and 4 x 2 fill a line of most caches: in
+ * any direction, the texels that a ray reads next are near those that it has read. */
 #define ABUFFER_TILE_TEXELS 64u
 #define ABUFFER_TILES_ALONG(resolution) (((resolution) + 7u) >> 3)
 /* The number of texel (u, v) of image `axis`; all are uint. */
@@ -53,35 +53,34 @@
      ((u)&3u))
 
 #define ABUFFER_NORMAL_UNIT 127
-/* Times 2 to the axis: some sample leans to it as much as to any, or almost (AXES_OVERLAP). */
+/* Shifted by the axis: some sample leans to it as much as to any, or almost (AXES_OVERLAP). */
 #define ABUFFER_SUM_LEANS 1u
-/* Times 2 to the axis: some sample is so steep in that image that its depths say little. */
+/* Shifted by the axis: some sample is so steep in that image that its depth says little. */
 #define ABUFFER_SUM_STEEP 8u
 #define ABUFFER_SUM_OPEN 64u           /* some sample bounds no body */
-#define ABUFFER_SUM_UP 128u            /* times 2 to the axis: some sample leans to it and looks up it, .. */
-#define ABUFFER_SUM_DOWN 1024u         /* .. or down: where both do, a body's sides are near each other */
-#define ABUFFER_STEEP FACE_STEEP_BELOW /* component of a unit normal along the axis below which it is */
+#define ABUFFER_SUM_UP 128u            /* shifted by the axis: some sample leans to it and faces up it, .. */
+#define ABUFFER_SUM_DOWN 1024u         /* .. or down: if both do, a body's sides are near each other */
+#define ABUFFER_STEEP FACE_STEEP_BELOW /* of a unit normal's component along the axis: it is steep below */
 
 #define ABUFFER_BLOCK_TEXELS 3
 #define ABUFFER_SUBVOXELS_VOXELS_MAX 128 /* 48 MiB of them */
-/* In which images the walk looks, bits 0..2; it does by winding where ABUFFER_VOXEL_BODY is set, and by the
- * samples' planes alone where it is not. A voxel of bodies whose samples can all be seen in the image that the
- * average normal leans to most (none is steep there) is looked for in that one, by winding. Where samples look
- * both ways along an axis winding is no help: a ray may pass both sides of a body between two places that it is
- * asked of. */
+/* The images that the traversal searches, bits 0..2; by winding if ABUFFER_VOXEL_BODY is set, else by the samples'
+ * planes alone. A voxel of bodies whose samples are all visible in the image of the average normal's dominant axis
+ * (none is steep there) is searched in that image, by winding. If samples face both ways along an axis, winding
+ * does not help: a ray may pass both sides of a body between two points at which the winding is looked up. */
 #define ABUFFER_VOXEL_IMAGES 7u
 #define ABUFFER_VOXEL_BODY 8u
 
 #define ABUFFER_WINDING_SHIFT 24u
 #define ABUFFER_WINDING_MASK 0x7fu
-#define ABUFFER_WINDING_ZERO 64 /* deeper than 63 inside or outside counts as that */
+#define ABUFFER_WINDING_ZERO 64 /* counts beyond 63 inside or outside are clamped */
 #define ABUFFER_SAMPLE_BODY 0x80000000u
 
 /* clang-format off */
-/* What the passes that build A-buffers leave to each other and to the host.
+/* Data between the passes that build A-buffers, and for the host.
  *
- *   heads     R32UI, one a texel: the node that was linked last, plus 1; 0: none
- *   nodes     RGBA32UI, one a fragment: the node that was there before it, plus 1; depth (float, cells); bits of
+ *   heads     R32UI, one per texel: the last linked node, plus 1; 0: none
+ *   nodes     RGBA32UI, one per fragment: the previous node of the texel, plus 1; depth (float, cells); bits of
  *             ABUFFER_NODE_*; id
  *   occupied  R32UI: texels that have nodes
  *   longer    R32UI: texels with more than ABUFFER_FOUR, from the first place on; with more than ABUFFER_EIGHT, from
@@ -90,30 +89,29 @@
 /* clang-format on */
 
 #define ABUFFER_NODE_NORMAL FACE_NORMAL_MASK
-#define ABUFFER_NODE_LEAVES 0x01000000u /* its outside looks towards greater depths */
+#define ABUFFER_NODE_LEAVES 0x01000000u /* its outside faces greater depths */
 #define ABUFFER_NODE_CLOSED FACE_CLOSED
 
 /* Counted while they are built. */
 struct abuffer_build_counts {
-    uint nodes;    /* all fragments, also where there was no room for them */
-    uint wraps;    /* times that this came to 2^32 */
-    uint occupied; /* texels with any */
-    uint samples;  /* that have a place */
+    uint nodes;    /* all fragments, also those beyond the capacity */
+    uint wraps;    /* overflows of `nodes`: times that it reached 2^32 */
+    uint occupied; /* texels with fragments */
+    uint samples;  /* with a place in the output */
     uint depth_max;
     uint up_to_eight, beyond_eight; /* texels with more than ABUFFER_FOUR fragments */
-    uint deep;                      /* with more than ABUFFER_LIST_MAX: these are left to the host */
+    uint deep;                      /* with more than ABUFFER_LIST_MAX: the host sorts these */
     uint pad0, pad1, pad2, pad3;
 };
 SHARED_SIZE(abuffer_build_counts, 48)
 
-/* Texels that one invocation looks at to see what is occupied, at most 32: drivers rasterise in small squares,
- * too, so nodes of these lie near each other. */
+/* Texels that one invocation of occupied.comp tests, at most 32: drivers rasterise in small squares, too, so the
+ * nodes of these texels are near each other. */
 #define ABUFFER_OCCUPIED_TEXELS 32u
-/* Lists that resolve.comp sorts as it takes them: most have no more than four. */
+/* Lists of this length or less are sorted by resolve.comp as it reads them: most are. */
 #define ABUFFER_FOUR 4u
 #define ABUFFER_EIGHT 8u
-/* Software GL ends the loops of an invocation after 65,535 rounds: a heap of as many
- * takes about 25,000. */
+/* Software GL ends the loops of an invocation after 65,535 rounds: a heap of this size takes about 25,000. */
 #define ABUFFER_LIST_MAX 1024u
 
 /* Binding points. */

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The list of a texel's nodes.
+// Reads the list of a texel's nodes.
 #include "abuffer/layout.h"
 #include "shared/bindings.h"
 
@@ -18,7 +18,7 @@ uint next_of(uint node)
     return texelFetch(nodes, int(node) - 1).x;
 }
 
-// Depth, id and bits of the node, and on to the next; ABUFFER_NO_DEPTH at the list's end.
+// Returns depth, id and bits of the node and advances to the next; ABUFFER_NO_DEPTH at the list's end.
 uvec3 take(inout uint node)
 {
     if (node == 0u)

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Which texels have lists, in their order: what is beside each other in an image lies together in what is made of it.
+// Lists the texels that have fragments, in image order, so that neighbours of an image are neighbours in the output.
 
 #include "abuffer/layout.h"
 #include "shared/bindings.h"

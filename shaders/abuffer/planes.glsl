@@ -1,20 +1,20 @@
 // SPDX-License-Identifier: MIT
-// Linear search by 2D DDA: the texels of one image that a part of a ray passes, one after the other, and in each of them
-// the samples whose planes the ray crosses there.
+// Linear search by 2D DDA: the texels of one image along a part of a ray, in order, and in each of them the samples
+// whose planes the ray intersects there.
 #include "abuffer/found.glsl"
 
-// A ray that begins on a surface may begin a little beyond a neighbour's plane, and would at once hit what it leaves. So
-// near its origin a ray does not cross planes that pass the origin as near as this. From behind, which is how a ray that
-// goes away outside meets what it leaves, that is generous. From the front, which is how it meets another wall in a
-// corner, and how a ray that was refracted meets what it has entered by, it is what a surface needs that bends inwards by
-// a radius of two to three cells, as the inner side of a handle does: from a neighbour's middle, 0.78 cells beyond at
-// most, to the origin it falls by 0.78^2 / (2 * 2.5). So what is crossed steeply may be nearer than what is met along the
-// surface: in a corner rays meet the wall beside which they begin, but for the last tenth of a cell.
+// A ray that begins on a surface may begin a little beyond a neighbour's plane, and would at once hit the surface that
+// it leaves. So near its origin a ray ignores planes that pass the origin within this distance. From behind, as a ray
+// that leaves a body would hit its own surface, the distance is generous. From the front, as a ray in a corner hits the
+// other wall, and a refracted ray its own surface, it suffices for a concave surface with a curvature radius of two to
+// three cells, as the inner side of a handle: from a neighbour's centre, at most 0.78 cells away, to the origin it
+// falls by 0.78^2 / (2 * 2.5). A plane that is hit steeply may be nearer than one at a grazing angle: in a corner rays
+// hit the wall beside their origin, but for the last tenth of a cell.
 const float OWN_WAY = 1.5;
-const float OWN_BEHIND = 0.5, OWN_BEFORE = 0.12, OWN_RISE = 0.05; // the rise is for a cell of way
+const float OWN_BEHIND = 0.5, OWN_BEFORE = 0.12, OWN_RISE = 0.05; // the rise is per cell of the ray's length
 
-// Where a ray (o, d in the image) crosses a sample's plane; whether that is not the plane which it begins on. `side` is
-// positive where it comes from behind.
+// Intersects a ray (o, d in the image) with a sample's plane; false: it begins on this plane. `side` is positive if it
+// comes from behind.
 bool cross_plane(vec3 o, vec3 d, float s_least, ivec2 texel, column_sample p, out float s, out float side)
 {
     float height = dot(p.normal, vec3(vec2(texel) + 0.5, p.depth) - o);
@@ -24,15 +24,15 @@ bool cross_plane(vec3 o, vec3 d, float s_least, ivec2 texel, column_sample p, ou
     return way > 0.0 && !(way < OWN_WAY && height * height < own * own * dot(p.normal, p.normal));
 }
 
-// Some surfaces are in several images, and are looked for in those that show them.
+// Some surfaces are in several images, and are searched in those that show them.
 bool leans(column_sample p)
 {
     vec3 size = abs(p.normal);
     return size.z >= AXES_OVERLAP * greatest(size);
 }
 
-// The part [s_in, s_out] of the ray. `only_leaning`: what does not lean to this axis is looked for in another image.
-// Whether anything was crossed.
+// Searches the part [s_in, s_out] of the ray. `only_leaning`: surfaces that do not lean to this axis are searched in
+// another image. True: an intersection was found.
 bool search_image(trace_ray r, inout voxel_walk w, inout abuffer_found found, int axis, bool only_leaning, float s_in,
                   float s_out)
 {
@@ -79,7 +79,7 @@ bool search_image(trace_ray r, inout voxel_walk w, inout abuffer_found found, in
     return any_crossed;
 }
 
-// All images that a voxel names, one behind the other; what is found in one ends the search in the next there.
+// All images that a voxel names, in order; an intersection in one ends the search in the next there.
 void search_planes(trace_ray r, inout voxel_walk w, inout abuffer_found found, found_voxel here)
 {
     uint images = here.what & ABUFFER_VOXEL_IMAGES;

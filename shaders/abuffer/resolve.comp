@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: MIT
-// From lists to runs: the nodes of a texel together and sorted, with the winding behind each.
-// Paper, section 3.1: the second pass. A list of up to four is sorted as it is taken; longer ones get their places, and
-// are listed for who does them.
-// Define: RESOLVE_EIGHT  lists of five to eight, which were listed so, are sorted
+// From lists to runs: the nodes of a texel become contiguous and sorted, with the winding behind each. Paper, section
+// 3.1: the second pass. A list of up to four is sorted as it is read; longer ones get their places, and are listed for
+// later passes. Define: RESOLVE_EIGHT sorts the listed ones of five to eight
 
 #include "common/dispatch.glsl"
 #include "abuffer/list.glsl"
@@ -39,7 +38,7 @@ void finish(run r, uint i, uvec3 item, inout int winding)
 }
 
 #ifndef RESOLVE_EIGHT
-// The list is longer than what was taken of it: counts the rest, as far as it may be gone over.
+// The list is longer than what was read of it: counts the rest, up to the limit.
 uint count_rest(uint node, uint count)
 {
     for (; node != 0u && count <= ABUFFER_LIST_MAX; count++)
@@ -47,7 +46,7 @@ uint count_rest(uint node, uint count)
     return count;
 }
 
-// Who does a list that is not done here. Lists up to eight from the first place on, longer ones from the last back.
+// Lists a texel for a later pass: lists of up to eight from the first place on, longer ones from the last back.
 void list_longer(uint texel, uint count)
 {
     if (count > ABUFFER_LIST_MAX)
@@ -72,7 +71,7 @@ void main()
         if (count > ABUFFER_LIST_MAX)
             return;
     }
-    if (count > build.depth_max) // rarely; the atomic is dear
+    if (count > build.depth_max) // rare, so the atomic's cost does not matter
         atomicMax(build.depth_max, count);
     run r = run(atomicAdd(build.samples, count), count);
     imageStore(texels, int(texel), uvec4(r.first, count, 0u, 0u));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// From a sample to the primitive that it is of, and to the place on that.
+// From a sample to its primitive, and to the point on it.
 #include "abuffer/layout.h"
 #include "raster/layout.h"
 #include "shared/bindings.h"
@@ -11,7 +11,7 @@ layout(binding = UNIT_TRACER_4) uniform usamplerBuffer abuffer_drawn;
 
 uniform int abuffer_drawn_count;
 
-// Which of the drawn instances a primitive with this id is of: the last whose first id is not greater.
+// The drawn instance of a primitive's id: the last whose first id is not greater.
 int drawn_of(uint id)
 {
     int first = 0, end = abuffer_drawn_count - 1;
@@ -40,7 +40,8 @@ bool is_of_spheres(candidate c)
 #endif
 }
 
-// Of the place on a triangle that is nearest to the crossing, or almost: a sample's plane goes on beyond its primitive.
+// Barycentrics of the triangle's point nearest to the intersection, approximately: a sample's plane extends beyond its
+// primitive.
 vec2 nearest_barycentrics(candidate c, vec3 origin_world, vec3 direction_world)
 {
     if (is_of_spheres(c))

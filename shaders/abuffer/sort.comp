@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// From lists to runs, those that are longer than resolve.comp does.
+// From lists to runs: those too long for resolve.comp.
 
 #define SORT_ITEM uvec3
 #include "common/dispatch.glsl"

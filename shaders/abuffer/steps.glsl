@@ -1,45 +1,45 @@
 // SPDX-License-Identifier: MIT
 // Linear search by a few steps, ABUFFER_STEPS of them, and between two steps binary search: paper, section 3.2. There
-// the steps are those of a voxel; here of each subvoxel that holds something. Steps as long as voxels pass much of what is
-// thin twice, and much of an open room's walls beside where they look.
+// the steps are those of a voxel; here of each subvoxel that holds something. Steps as long as voxels pass many thin
+// bodies twice in one step, and miss parts of an open room's walls between two columns.
 //
-// Inside or outside is decided by a column's samples: how many bodies a point is in is what the samples before it say
-// together. Where that is something else at a step's end than at its begin, a surface was passed. What is passed twice in
-// a step is not seen.
+// A column's samples decide what is inside: the winding at a point is the sum over the samples before it. If it differs
+// between a step's begin and end, a surface was passed. A surface that is passed twice in a step is missed.
 //
-// Open surfaces have no inside. Of them the planes of the samples in the column at a step's end are taken to go on over
-// the step: one that is crossed there counts if there is a sample of it at the crossing.
+// Open surfaces have no inside. The planes of their samples in the column at a step's end are extended over the step:
+// an intersection counts if there is a sample of the surface at it.
 #include "abuffer/planes.glsl"
 
 #ifdef ABUFFER_STEPS
 
 const int BISECTIONS_MAX = 8;
-// From column to column towards where a plane is crossed: a curved surface is met after two or three.
+// Iterations from column to column towards the plane's intersection: on a curved surface it converges after two or
+// three.
 const int FOLLOWS_MAX = 4;
-const float FOLLOW_REACH = 8.0; // cells of depth in which a column's samples are of the surface that is followed
-const float FOLLOW_ALONG = 4.0; // beyond a step, of an open surface
-// Cells from a ray's origin within which it is looked for more closely what it meets.
+const float FOLLOW_REACH = 8.0; // in cells of depth: a column's samples no farther away are of the same surface
+const float FOLLOW_ALONG = 4.0; // extension of an open surface beyond a step
+// In cells from a ray's origin: within them the search is finer.
 const float NEAR_ORIGIN = 4.0;
 
-// Where a ray is among the steps of a subvoxel.
+// A ray's state in the steps of a subvoxel.
 struct step_walk {
     found_voxel here; // `what` 0: past it
     float size;       // of its steps
-    int next;         // step of the subvoxel; 0: what is known at its begin
-    uint images;      // in which it looks yet at this step; 0: not yet at it
-    // Of how many bodies the ray is inside, where it was last looked.
+    int next;         // step of the subvoxel; 0: its begin
+    uint images;      // images not yet searched at this step; 0: the step is not begun
+    // The winding at the last point looked up.
     int winding;
     bool is_known;
-    // Of the step that was looked at last.
+    // The last step that was searched.
     int axis;
     float lo, hi;
-    float s; // about where something is passed
+    float s; // estimate of the passed surface's position
     bool by_winding, only_leaning;
     int winding_lo;
 };
 
-// In the image that the voxel names; of several in that which the ray runs along most: there it crosses fewest texels, and
-// what it meets is not seen from beside.
+// The image that the voxel names; of several the one along the ray's dominant axis: there it crosses the fewest texels,
+// and sees no surface edge-on.
 int image_of(uint what, vec3 d)
 {
     vec3 along = abs(d);
@@ -53,8 +53,8 @@ vec3 place_in_image(voxel_walk w, int axis, float s)
     return in_image(w.ray.o + s * w.ray.d, axis);
 }
 
-// A ray that begins on a surface is on the side of it to which it goes, whatever of the two its origin was rounded to. One
-// that goes along the surface is on the side where it is a little farther on: a sample's normal is not that of the place.
+// A ray that begins on a surface is on the side that its direction points to, whichever side its origin was rounded to.
+// A ray along the surface is on the side of a point a little farther on: a sample's normal is not that of the origin.
 const float OWN_ALONG = 0.15;
 
 int winding_at_origin(voxel_walk w, uint what)
@@ -64,7 +64,7 @@ int winding_at_origin(voxel_walk w, uint what)
     bool is_own = false, goes_along = false;
     int own_axis = image_of(what, w.ray.d);
     uint images = what & ABUFFER_VOXEL_IMAGES;
-    // All of them: in a corner one shows the other wall, which may be near too.
+    // All images: in a corner one of them shows the other wall, which may be near too.
     do {
         int axis = findLSB(images);
         vec3 p = place_in_image(w, axis, w.s_least), d = in_image(w.ray.d, axis);
@@ -93,8 +93,8 @@ int winding_at_origin(voxel_walk w, uint what)
     return is_own && !goes_along ? own_winding : there;
 }
 
-// Where the ray crosses a surface near s, by the plane of a sample there, then by that of a sample where it crosses this
-// one, and so on until the crossing is in the sample's own texel.
+// Intersects the ray with a surface near s: with the plane of a sample there, then with that of a sample at this
+// intersection, and so on until the intersection is in the sample's own texel.
 bool follow(trace_ray r, inout voxel_walk w, inout abuffer_found found, step_walk t)
 {
     int axis = t.axis;
@@ -152,7 +152,7 @@ int nearest_sample(int axis, vec3 p)
     return nearest;
 }
 
-// The winding is another between lo and hi, but no plane is crossed near hi.
+// The winding differs between lo and hi, but no plane is intersected near hi.
 void search_passage(trace_ray r, inout voxel_walk w, inout abuffer_found found, int axis, float lo, float hi,
                     int winding_lo)
 {
@@ -164,7 +164,7 @@ void search_passage(trace_ray r, inout voxel_walk w, inout abuffer_found found, 
         lo = is_far && is_before ? middle : lo;
         hi = !is_far || is_before ? hi : middle;
     } while (++i < BISECTIONS_MAX && hi - lo > 1.0);
-    // Where it was passed at a texel's border and no plane was crossed, it is steep here and another image shows it.
+    // If it was passed at a texel's border and no plane was intersected, it is steep here and another image shows it.
     bool crossed = false;
     int other = 0;
     do {
@@ -181,17 +181,17 @@ void search_passage(trace_ray r, inout voxel_walk w, inout abuffer_found found, 
 
 #endif
 
-// The next step of the subvoxel. Whether something may be passed there.
+// The next step of the subvoxel. True: a surface may be passed there:
 //
-// In a body the samples of the column at its end say how many bodies it is in; of an open surface the plane of one of them
-// may be crossed within the step or not far from it.
+// that of a body if the winding changes, an open one if the plane of a sample at the step's end is intersected within
+// the step or not far from it.
 bool look(inout voxel_walk w, inout step_walk t)
 {
     bool is_body = (t.here.what & ABUFFER_VOXEL_BODY) != 0u;
     t.lo = t.here.s_in + float(t.next - 1) * t.size;
     t.hi = t.here.s_in + float(t.next) * t.size;
-    // All images that a voxel names only near where the ray begins: along what stands on a surface light would leak.
-    // Farther on the one that the ray runs along most, which shows most of what it meets.
+    // All images that a voxel names only near the ray's origin: else light would leak along bodies that stand on a
+    // surface. Farther on the one along the ray's dominant axis, which shows most of what it hits.
     t.only_leaning = !is_body && t.lo <= w.s_least + NEAR_ORIGIN;
     if (t.images == 0u)
         t.images = t.only_leaning ? t.here.what & ABUFFER_VOXEL_IMAGES : 1u << image_of(t.here.what, w.ray.d);
@@ -226,14 +226,14 @@ bool look(inout voxel_walk w, inout step_walk t)
     t.winding = is_body && (t.next == 0 || is_past_own) ? winding : t.winding;
     t.is_known = is_body;
     t.s = is_body ? t.hi : nearest;
-    // Past the voxel, or on.
+
     t.images &= t.images - 1u;
     t.next += t.images == 0u ? 1 : 0;
     t.here.what = t.next <= ABUFFER_STEPS ? t.here.what : 0u;
     return is_body ? differs : nearest < w.s_limit;
 }
 
-// What a step said may be passed.
+// Settles a surface that a step may have passed.
 void pass(trace_ray r, inout voxel_walk w, inout abuffer_found found, inout step_walk t)
 {
 #ifdef ANYTHING_ENDS
@@ -245,11 +245,11 @@ void pass(trace_ray r, inout voxel_walk w, inout abuffer_found found, inout step
     if (!follow(r, w, found, t) && t.by_winding)
         search_passage(r, w, found, t.axis, t.lo, t.hi, t.winding_lo);
 #endif
-    // Another image may show something nearer.
+    // Another image may have a nearer intersection.
     t.here.what = w.s_limit < t.lo || (t.by_winding && w.s_limit < t.hi) ? 0u : t.here.what;
 }
 
-// Up to the next voxel that holds something, at most one step.
+// On to the next occupied voxel, at most one step.
 void step_to_voxel(inout voxel_walk w, inout step_walk t)
 {
     step_on(w, t.here);
@@ -267,7 +267,7 @@ void walk_steps(trace_ray r, inout voxel_walk w, inout abuffer_found found)
     t.next = 0;
     t.size = 0.0;
     t.images = 0u;
-    // All is outside of what is beyond the voxels.
+    // Everything beyond the voxels is outside.
     t.winding = 0;
     t.is_known = w.s > w.s_least;
     if (!t.is_known && w.s < w.s_end) {
@@ -280,8 +280,8 @@ void walk_steps(trace_ray r, inout voxel_walk w, inout abuffer_found found)
             t.next = 1;
         }
     }
-    // Software GL runs all of a loop's body in every round, whatever of it is needed. So what is rarely so, that something
-    // is passed, is out of the loop of what each step needs.
+    // Software GL runs a loop's whole body in every round. So the rare case, a passed surface, is settled outside the
+    // loop over steps.
     do {
         bool passes = false;
         do {

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
-// From the crossings of a closest-hit wave to hits: the second half of the walk through A-buffers, in the place of
-// surface.comp. A sample's own primitive tells what is there, at its place nearest to the crossing.
+// From the intersections of a closest-hit wave to hits: the second half of A-buffer tracing, in place of
+// trace/surface.comp. A hit is the sample's own primitive at its point nearest to the intersection.
 //
 // Defines: HAS_SPHERES, HAS_DISCS as the scene has them.
 #include "common/dispatch.glsl"
 #include "abuffer/sample_primitive.glsl"
 
 layout(binding = UNIT_RAYS) uniform samplerBuffer rays; // two texels each
-layout(binding = IMAGE_HITS, rgba32ui) uniform uimageBuffer hits; // three texels each; a crossing is the first
+layout(binding = IMAGE_HITS, rgba32ui) uniform uimageBuffer hits; // three texels each; an intersection is the first
 
 uniform uint first_ray; // of this dispatch
 uniform uint ray_count; // where it ends

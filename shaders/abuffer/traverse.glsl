@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-// The walk through voxels and A-buffers (abuffer/layout.h). Hu, Huang, Zhang, Yuan, Li. Ray Tracing via GPU Rasterization.
-// 2014.
+// The traversal of voxels and A-buffers (abuffer/layout.h). Hu, Huang, Zhang, Yuan, Li. Ray Tracing via GPU
+// Rasterization. 2014.
 //
-// The host (trace/abuffer/trace.c) sets, besides the defines of trace.comp, those that the files included here name.
+// The host (trace/abuffer/trace.c) sets, besides the defines of trace/wave.comp, those that the files included here
+// name.
 //
-// Defines: ABUFFER_STEPS the search is by so many steps a subvoxel (abuffer/steps.glsl), else by 2D DDA
-// (abuffer/planes.glsl), and what it finds is held against triangles (abuffer/exact.glsl); ABUFFER_EMPTY there is nothing
-// to be found.
+// Defines: ABUFFER_STEPS the search is by this number of steps per subvoxel (abuffer/steps.glsl), else by 2D DDA
+// (abuffer/planes.glsl), verified with triangles (abuffer/exact.glsl); ABUFFER_EMPTY the scene has no samples.
 #include "abuffer/exact.glsl"
 #include "abuffer/steps.glsl"
 
@@ -23,7 +23,7 @@ void walk_ray(trace_ray r, inout abuffer_found found)
 #endif
 }
 
-// What trace.comp calls.
+// Called by trace/wave.comp.
 #ifdef ANY_HIT
 
 bool trace_any(trace_ray r, inout vec3 taken)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// From what was summed of each voxel's samples to what a ray has to know of it (abuffer/layout.h); then raster/reach.comp
-// says how far it is empty around blocks that hold nothing. One invocation a block.
+// From the sums of each voxel's samples to the voxel as rays read it (abuffer/layout.h); then raster/reach.comp adds
+// the empty space around empty blocks. One invocation per block.
 #include "abuffer/layout.h"
 #include "shared/bindings.h"
 #include "common/dispatch.glsl"
@@ -12,7 +12,7 @@ uniform uint first_item, end_item; // of the blocks
 
 layout(binding = UNIT_TRACER_0) uniform isamplerBuffer sums; // a voxel's four as one texel
 
-// ABUFFER_VOXEL_*; 0: it holds nothing.
+// ABUFFER_VOXEL_*; 0: it is empty.
 uint judged(ivec4 sum)
 {
     uint bits = uint(sum.w), leaned = bits & ABUFFER_VOXEL_IMAGES;
@@ -20,7 +20,7 @@ uint judged(ivec4 sum)
         return 0u;
     vec3 average = abs(vec3(sum.xyz));
     uint first = average.x >= average.y && average.x >= average.z ? 0u : average.y >= average.z ? 1u : 2u;
-    // Opposite normals, of a thin body's sides, say nothing together.
+    // Opposite normals of a thin body's sides cancel out.
     first = bitCount(leaned) == 1 ? uint(findLSB(leaned)) : first;
     bool shows_all = (bits & ABUFFER_SUM_STEEP << first) == 0u;
     bool is_thin = (bits / ABUFFER_SUM_UP & bits / ABUFFER_SUM_DOWN & 7u) != 0u;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The walk through the voxels, from one that holds something to the next: a block of 4 x 4 x 4 tells which of its own do,
-// and how far it is empty around it where none does; and a voxel, in which of its 4 x 4 x 4 subvoxels something is.
+// The traversal of the voxels, from one occupied one to the next: a block of 4 x 4 x 4 knows which of its voxels are
+// occupied, or, if none is, how far it is empty around it; and a voxel knows its occupied ones of 4 x 4 x 4 subvoxels.
 #include "abuffer/column.glsl"
 #include "raster/blocks.glsl"
 
@@ -20,8 +20,8 @@ struct voxel_walk {
     int octant_shift;
     float s, s_end;
     float s_least, s_limit; // between which a crossing counts
-    float s_behind;         // and behind which, where the ray goes on from one that was none
-    float beyond;           // how far beyond its texel a sample's plane is met, in cells
+    float s_behind;         // and behind which, if the ray continues from a rejected one
+    float beyond;           // extension of a sample's plane beyond its texel, in cells
 };
 
 // A voxel to be searched, and a part of the ray in it.
@@ -40,7 +40,7 @@ void begin_walk(trace_ray r, float end, out voxel_walk w)
 {
     float along = float(abuffer_grid << 4), subvoxels_a_cell = along / float(abuffer_resolution);
     w.ray = cell_ray_of(r, abuffer_place, float(abuffer_resolution));
-    // Its origin is where it begins, unless that is far away.
+    // Its origin is the ray's, unless that is far away.
     float s_begin = w.ray.begin > 0.0 ? 0.0 : r.t_min * w.ray.scale;
     w.ray.o += s_begin * w.ray.d;
     w.ray.begin += s_begin;
@@ -75,7 +75,7 @@ int subvoxels_at(uvec3 voxel)
     return abuffer_has_subvoxels ? 3 * ((p.z * along + p.y) * along + p.x) : 0;
 }
 
-// What is known of one that holds something. `b`: its place in the block.
+// The bits of an occupied voxel. `b`: its place in the block.
 uint what_of(int block, uvec3 b)
 {
     uint i = b.x | b.y << 2 | b.z << 4;
@@ -84,7 +84,7 @@ uint what_of(int block, uvec3 b)
     return ((i & 8u) == 0u ? two.x : two.y) >> 4u * (i & 7u) & 15u;
 }
 
-// Past a subvoxel that holds something, which is `found`, or as far as nothing does.
+// Past an occupied subvoxel, which becomes `found`, or past the empty space.
 void step_on(inout voxel_walk w, inout found_voxel found)
 {
     ABUFFER_COUNT(x);
@@ -116,7 +116,7 @@ void step_on(inout voxel_walk w, inout found_voxel found)
     s_out = s_out > w.s ? s_out : w.s;
     if (is_found)
         found = found_voxel(what_of(block, b), w.s, s_out);
-    // Where one image does not show all of a voxel, in those that show best what is in the subvoxel.
+    // If one image does not show all of a voxel, the images that show the subvoxel's surfaces best.
     uvec3 shown = (p.z < 2u ? uvec3(in_x.x, in_y.x, in_z.x) : uvec3(in_x.y, in_y.y, in_z.y)) >> bit & 1u;
     uint best = shown.x | shown.y << 1 | shown.z << 2;
     if (is_found && bitCount(found.what & ABUFFER_VOXEL_IMAGES) > 1)
@@ -127,7 +127,7 @@ void step_on(inout voxel_walk w, inout found_voxel found)
     w.s = any(greaterThanEqual(next, ivec3(abuffer_grid << 4))) ? 1e30 : w.s;
 }
 
-// To the next subvoxel that holds something, if one does.
+// To the next occupied subvoxel, if there is one.
 found_voxel next_voxel(inout voxel_walk w)
 {
     found_voxel found = found_voxel(0u, 0.0, 0.0);

@@ -2,23 +2,23 @@
 // Rays against the bound of an element: spheres (BVH_SPHERES), boxes in floats, or boxes on the tree's grid
 // (BVH_PACKED), whose cells are then the unit of the ray too. All tests only ever err towards a hit.
 //
-// Rounding, with u = 2^-24. A box's plane b is crossed at b i - o i, i = 1 / d: the reciprocal errs by 1 u (2.5 u
-// on hardware), each product by 1 u, the difference by 1 u, which moves the plane by at most 5 u (|b| + |o|). The
-// intersection of the primitive itself errs by about as much (corners are taken relative to the origin), and a
-// sphere's distance from the line by less than 8 u of the same. The part of b is in the bounds: the builder pads
-// them by BVH_PAD_RELATIVE = 8 u of their magnitude, and on a grid by 8 u of its cells. The part of o is the slack of
-// the ray: OBJECT_SLACK |o| with 16 u, on a grid of |o| + |the grid's corner|, which it is taken relative to. In the
-// top tree the ray is yet to be taken to an object's space, which rounds again, by some 6 u |o| in that space, and so
-// by that times the matrix's condition in this one: WORLD_SLACK is 128 u, for conditions up to 20.
+// Rounding, with u = 2^-24. A box's plane b is crossed at b i - o i, i = 1 / d: the reciprocal errs by 1 u (2.5 u on
+// hardware), each product by 1 u, the difference by 1 u, which moves the plane by at most 5 u (|b| + |o|). The
+// intersection of the primitive itself errs by about as much (corners are taken relative to the origin), and a sphere's
+// distance from the line by less than 8 u of the same. The part of b is in the bounds: the builder pads them by
+// BVH_PAD_RELATIVE = 8 u of their magnitude, and on a grid by 8 u of its cells. The part of o is the slack of the ray:
+// OBJECT_SLACK |o| with 16 u, on a grid of |o| + |the grid's corner|, to which it is relative. In the top tree the ray
+// will be transformed to an object's space, which rounds again, by some 6 u |o| in that space, and so by that times the
+// matrix's condition in this one: WORLD_SLACK is 128 u, for conditions up to 20.
 const float OBJECT_SLACK = 9.5367431640625e-7;  // 2^-20
 const float WORLD_SLACK = 7.62939453125e-6;     // 2^-17
 
-// The lesser and the greater of two, the second where one is no number. min() and max() promise to return the other one
-// there, for which software GL pays with two more instructions in the chain that a step of the walk waits for.
+// The minimum and the maximum of two; the second if one is NaN. min() and max() promise the other one then, which costs
+// software GL two more instructions in the critical chain of a traversal step.
 #define LESSER(a, b) ((a) < (b) ? (a) : (b))
 #define GREATER(a, b) ((a) > (b) ? (a) : (b))
 
-// Where the walked tree's grid lies; without one: 0 and 1.
+// The grid of the traversed tree; without one: 0 and 1.
 struct tree_grid {
     vec3 lower;
     vec3 cells_per_unit;
@@ -33,7 +33,7 @@ struct bound_ray {
     float slack;
 };
 
-// Hit if the line passes the sphere, and the sphere is not all behind t_min nor beyond t_max.
+// Hit if the line intersects the sphere, and the sphere is not entirely before t_min nor beyond t_max.
 bool sphere_is_hit(bound_ray r, vec4 centre_radius, float t_min, float t_max)
 {
     vec3 to_centre = centre_radius.xyz - r.origin;
@@ -41,12 +41,12 @@ bool sphere_is_hit(bound_ray r, vec4 centre_radius, float t_min, float t_max)
     vec3 from_line = to_centre - closest * r.direction;
     float squared_half_chord = square(centre_radius.w + r.slack) - dot(from_line, from_line);
     float outside = max(closest - t_max, t_min - closest);
-    // negated so that what is not a number counts as a hit
+    // negated so that NaN counts as a hit
     return !(squared_half_chord < 0.0) &&
            !(outside > 0.0 && outside * outside > squared_half_chord * r.inverse_square) && t_min < t_max;
 }
 
-// All rays that are walked together: each has its own test.
+// All rays of the packet: each has its own test.
 struct bundle {
     bound_ray rays[RAYS_TOGETHER];
     uint octant;
@@ -67,12 +67,12 @@ bundle bundle_of(object_ray o[RAYS_TOGETHER], bool alive[RAYS_TOGETHER], int lea
 
 #else
 
-// Where rays cross the planes of boxes, as an interval that holds for all rays that are walked together: the test of
-// eight costs that of two. Wald, Boulos, Shirley, Ray Tracing Deformable Scenes Using Dynamic Bounding Volume
-// Hierarchies, ACM TOG 2007, section 4.2 (interval arithmetic). A plane at p is crossed at (p - c) i - e, with c the
-// leading ray's origin, i of a ray between the least and the greatest inverse direction, e how far the ray's own
-// origin is off c; e and the slack are in the offsets. Along an axis where not all go the same way nothing is known:
-// scales are 0 there, and offsets beyond everything. One ray has no interval: its least and greatest are one.
+// Where rays intersect the planes of boxes, as an interval that holds for all rays of the packet: the test of eight
+// costs that of two. Wald, Boulos, Shirley, Ray Tracing Deformable Scenes Using Dynamic Bounding Volume Hierarchies,
+// ACM TOG 2007, section 4.2 (interval arithmetic). A plane at p is crossed at (p - c) i - e, with c the leading ray's
+// origin, i of a ray between the minimum and the maximum inverse direction, e how far the ray's own origin is off c; e
+// and the slack are in the offsets. Along an axis where the rays' directions differ in sign nothing is culled: scales
+// are 0 there, and offsets beyond everything. One ray has no interval: its minimum and maximum are equal.
 struct bundle {
     vec3 scale_least, near_offset_least, far_offset_least;
 #if RAYS_TOGETHER > 1
@@ -88,8 +88,8 @@ bundle bundle_of(object_ray o[RAYS_TOGETHER], bool alive[RAYS_TOGETHER], int lea
     vec3 scale[RAYS_TOGETHER], origin[RAYS_TOGETHER], slacks[RAYS_TOGETHER];
     vec3 centre = vec3(0.0), scale_leading = vec3(0.0);
     for (int k = 0; k < RAYS_TOGETHER; k++) {
-        // A component of zero would give infinite times zero. The replacement moves the ray sideways by 1e-12 of its
-        // way, which is far below the slack.
+        // A component of zero would give infinity times zero. The replacement moves the ray sideways by 1e-12 of its
+        // length, far below the slack.
         vec3 d = o[k].direction * grid.cells_per_unit;
         float smallest = 1e-12 * greatest(abs(d));
         scale[k] = 1.0 / mix(d, vec3(smallest), lessThan(abs(d), vec3(smallest)));
@@ -128,7 +128,7 @@ bundle bundle_of(object_ray o[RAYS_TOGETHER], bool alive[RAYS_TOGETHER], int lea
     return b;
 }
 
-// `near`, `far`: the corners that rays of the bundle's octant reach first and last.
+// `near`, `far`: the corners that rays of the packet's octant reach first and last.
 bool box_is_hit(bundle b, vec3 near, vec3 far, float t_min, float t_max)
 {
     vec3 enter = near * b.scale_least - b.near_offset_least;
@@ -139,7 +139,7 @@ bool box_is_hit(bundle b, vec3 near, vec3 far, float t_min, float t_max)
     enter = mix(enter_other, enter, lessThan(enter, enter_other));
     leave = mix(leave_other, leave, greaterThan(leave, leave_other));
 #endif
-    // What is not a number is passed over or, at last, counts as a hit: whence the negation.
+    // NaN is ignored or, in the last comparison, counts as a hit: hence the negation.
     float enter_xy = GREATER(enter.x, enter.y), enter_z = GREATER(enter.z, t_min);
     float leave_xy = LESSER(leave.x, leave.y), leave_z = LESSER(leave.z, t_max);
     return !(GREATER(enter_xy, enter_z) > LESSER(leave_xy, leave_z));

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// How coherent a wave is: of a sample of groups of consecutive rays, the rays that are alive and the walks that it would
-// be good to make of them: as bvh/traverse.glsl does, but none of rays so far apart that each meets leaves of its own.
-// One invocation a group.
+// The coherence of a wave: in a sample of groups of consecutive rays, the number of live rays and of the packets that
+// would be best for them: as bvh/traverse.glsl forms them, but none of rays so far apart that each meets leaves of its
+// own. One invocation per group.
 //
 // Defines: RAYS_TOGETHER, the rays of a group.
 #include "shared/bindings.h"
@@ -14,9 +14,9 @@ layout(std430, binding = BIND_TRACER_0) buffer count_block { uint alive_count, w
 uniform uint group_count;
 uniform uint group_stride;    // rays from one group to the next
 uniform vec3 scene_centre;
-uniform float width_together; // no farther apart at the scene's centre; 0: any
+uniform float width_together; // maximum distance at the scene's centre; 0: any
 
-// How far apart two rays are once they have come as far as the scene's centre.
+// The distance of two rays at the distance of the scene's centre.
 bool stay_close(vec3 origin_a, vec3 direction_a, vec3 origin_b, vec3 direction_b)
 {
     float far = length(scene_centre - origin_a);

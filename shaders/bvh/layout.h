@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What the tracer `bvh` keeps on the device. Two levels: one tree over the primitives of each geometry, one top
- * tree over the instances; both of the same elements, walked by links alone (no stack).
+/* The structure of the tracer `bvh` on the device. Two levels: one tree over the primitives of each geometry, one
+ * top tree over the instances; both of the same elements, traversed by links alone (no stack).
  *
  * A tree of n elements is stored BVH_OCTANTS times, once for each sign of a direction's components, each time in
  * the depth-first order that meets nearer children first. So the element that follows a hit is the next one, and
@@ -9,8 +9,9 @@
  *
  * Two forms of element. Packed: boxes on a grid of 65536 cells an axis that spans the tree, one texel. Whole:
  * boxes or spheres in floats, two texels; for spheres, and for a scene with a tree that has more detail than its
- * grid. Why so: measured on software GL with 146K triangles, a step of the walk costs its texel fetches more than
- * its arithmetic; elements of 32 bytes with links of 8 beside them, stored once, took three fetches a step. */
+ * grid. Why so: measured on software GL with 146K triangles, a traversal step is bound by its texel fetches and
+ * not by its arithmetic; elements of 32 bytes with links of 8 beside them, stored once, took three fetches a step.
+ */
 #ifndef FARLIGHT_SHADERS_BVH_LAYOUT_H
 #define FARLIGHT_SHADERS_BVH_LAYOUT_H
 #include "shared/types.h"
@@ -47,7 +48,7 @@ SHARED_SIZE(bvh_element, 32)
 #define BVH_LEAF_FIRST_MASK 0x07ffffffu
 #define BVH_LEAF_MAX 8u /* primitives */
 
-/* The other half of a transform element: what entering an instance does. Texels of an RGBA32UI buffer. */
+/* The other half of a transform element: the data for entering an instance. Texels of an RGBA32UI buffer. */
 struct bvh_transform {
     vec4 object_from_world[3];
     float grid_lower_x, grid_lower_y, grid_lower_z; /* object space; packed elements count cells from here */
@@ -61,17 +62,16 @@ struct bvh_transform {
 SHARED_SIZE(bvh_transform, 96)
 #define BVH_TRANSFORM_TEXELS 6
 
-/* Primitives in the order of the leaves, fetched without an index in between. RGBA32UI, though most are floats: a
- * small integer is no float that a driver has to keep. Texels:
- *   triangle  3 texels: corners; w of the first: bits of the primitive's number in its geometry
- *   sphere    2 texels: centre and radius; x of the second: bits of the number
- * Triangles of a geometry that deforms come twice: all as the shutter opens, then all as it closes. */
+/* Primitives in the order of the leaves, fetched without an index. RGBA32UI, though most words are floats: a
+ * driver may flush a small integer, which is a denormal as a float. Texels: triangle  3 texels: corners; w of the
+ * first: bits of the primitive's number in its geometry sphere    2 texels: centre and radius; x of the second:
+ * bits of the number Triangles of a geometry that deforms come twice: all as the shutter opens, then all as it
+ * closes. */
 #define BVH_TRIANGLE_TEXELS 3u
 #define BVH_SPHERE_TEXELS 2u
 
-/* What the refit of a deformed geometry's tree (shaders/bvh/refit_bounds.comp) has to know of an element besides
- * where its primitives are now. Texels of an RGBA32UI buffer, elements by their height above the leaves below
- * them. */
+/* An element as the refit of a deformed geometry's tree (shaders/bvh/refit_bounds.comp) reads it. Texels of an
+ * RGBA32UI buffer, elements in the order of their height above the leaves. */
 struct bvh_refit_record {
     uint element; /* by the order of octant 0, in which a node's children follow it */
     uint size;    /* elements of its subtree, itself included */

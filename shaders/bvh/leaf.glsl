@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A leaf's primitives against the rays that are walked together.
+// A leaf's primitives against the rays of a packet.
 #include "bvh/layout.h"
 #include "common/candidate.glsl"
 
@@ -10,29 +10,29 @@ layout(binding = UNIT_TRACER_2) uniform usamplerBuffer bvh_primitives;
 #endif
 
 #ifdef ANY_HIT
-#define answer vec3 // what was taken of the light
+#define answer vec3 // the optical depth
 #else
 #define answer candidate
 #endif
 
-// What is known of the instance that is walked.
+// The state of the traversed instance.
 struct entered_instance {
-    uint index; // NOT_INSIDE: the top tree is walked
+    uint index; // NOT_INSIDE: the top tree is traversed
     uint first_texel;
     uint first_primitive;
 #ifdef BVH_DEFORMS_IN_SHUTTER
-    uint close_texels; // as bvh_transform has it
+    uint close_texels; // as in bvh_transform
 #endif
 };
 
-// Put out: no bound and no primitive is hit by it any more.
+// Ends a ray: it hits no bound and no primitive any more.
 void put_out(inout trace_ray r)
 {
     r.t_min = 3e38;
     r.t_max = -1.0;
 }
 
-// The end of what is left of a ray; before its beginning where it is out.
+// The end of a ray; before its begin if it has ended.
 float end_of(trace_ray r, answer found)
 {
 #ifdef ANY_HIT
@@ -43,8 +43,8 @@ float end_of(trace_ray r, answer found)
 }
 
 #if defined BVH_DEFORMS && !defined ANY_HIT
-// Of surfaces at one distance the one with lower numbers is met first; a disc before all, and nothing at the ray's end
-// (both have numbers that wrap to 0).
+// Of surfaces at one distance the one with lower numbers counts; a disc before all, and nothing at the ray's end (both
+// have numbers that wrap to 0).
 bool is_before(candidate a, candidate b)
 {
     bool has_lower_numbers = a.instance_index == b.instance_index ? a.primitive + 1u < b.primitive + 1u
@@ -53,7 +53,7 @@ bool is_before(candidate a, candidate b)
 }
 #endif
 
-// A candidate against its ray; a ray of which nothing is left is put out.
+// Offers a candidate to its ray; a shadow ray without transmittance ends.
 void offer(inout trace_ray r, candidate c, inout answer found)
 {
 #ifdef ANY_HIT
@@ -69,16 +69,16 @@ void offer(inout trace_ray r, candidate c, inout answer found)
 #endif
 }
 
-// Where materials have to be asked, what the rays found on a primitive is noted first, and the walk comes out of its inner
-// loops to settle it. Software GL runs the code that asks (textures and all) each time that it comes by, hit or no hit: in
-// the loop over primitives shadow rays took eight times as long.
+// If materials must be evaluated, the rays' intersections with a primitive are noted first, and the traversal leaves
+// its inner loops to settle them. Software GL runs the evaluating code (textures included) at every visit, hit or no
+// hit: in the loop over primitives shadow rays took eight times as long.
 struct noted_hits {
     vec2 distances; // triangles have the first alone
     vec2 barycentrics;
 };
 
 struct noted_primitive {
-    uint bits; // two a ray; 0: nothing is noted
+    uint bits; // two per ray; 0: none is noted
     candidate common_part;
     noted_hits hits[RAYS_TOGETHER];
 };
@@ -131,9 +131,9 @@ void settle(inout noted_primitive noted, inout trace_ray r[RAYS_TOGETHER], inout
 #define ORIGINS_DIFFER
 #endif
 
-// Rays in an instance's space, as triangles are tested against them: relative to the leading ray's origin, so that
-// what hangs on the origin alone is computed once for all. The leading ray is that of the walk, done or not: how a
-// triangle's distance rounds must not hang on what was met before.
+// Rays in an instance's space, as triangles are tested against them: relative to the leading ray's origin, so that what
+// depends on the origin alone is computed once for all. The leading ray is the packet's, finished or not: the rounding
+// of a triangle's distance must not depend on earlier hits.
 struct relative_rays {
     vec3 centre;
     vec3 direction[RAYS_TOGETHER];
@@ -159,7 +159,7 @@ relative_rays relative_to(vec3 centre, object_ray o[RAYS_TOGETHER])
 
 #ifdef BVH_DEFORMS_IN_SHUTTER
 
-// The corners as they are at the ray's own time: nothing of a triangle is the same for several rays.
+// The corners at the ray's own time: rays share no computation of such a triangle.
 void test_triangle(uint i, entered_instance inside, object_ray o[RAYS_TOGETHER], relative_rays rays,
                    inout trace_ray r[RAYS_TOGETHER], inout answer found[RAYS_TOGETHER], inout noted_primitive noted)
 {
@@ -168,7 +168,7 @@ void test_triangle(uint i, entered_instance inside, object_ray o[RAYS_TOGETHER],
     vec3 v0 = uintBitsToFloat(first.xyz);
     vec3 v1 = uintBitsToFloat(texelFetch(bvh_primitives, texel + 1).xyz);
     vec3 v2 = uintBitsToFloat(texelFetch(bvh_primitives, texel + 2).xyz);
-    // Straight from the one to the other: those that stay have a way of zero, which adds nothing.
+    // Linear motion: the offset of a triangle that does not move is zero.
     vec3 way0 = uintBitsToFloat(texelFetch(bvh_primitives, close).xyz) - v0;
     vec3 way1 = uintBitsToFloat(texelFetch(bvh_primitives, close + 1).xyz) - v1;
     vec3 way2 = uintBitsToFloat(texelFetch(bvh_primitives, close + 2).xyz) - v2;
@@ -253,7 +253,8 @@ void test_sphere(uint i, entered_instance inside, object_ray o[RAYS_TOGETHER], i
 }
 #endif
 
-// From `primitive` of the leaf on, which comes back as the next one. False: the leaf is not done, as something is noted.
+// Tests the leaf from `primitive` on, and returns the next one in it. False: the leaf is not finished, as an
+// intersection is noted.
 bool test_leaf(uint leaf, inout uint primitive, entered_instance inside, object_ray o[RAYS_TOGETHER], relative_rays rays,
                inout trace_ray r[RAYS_TOGETHER], inout answer found[RAYS_TOGETHER], inout noted_primitive noted)
 {

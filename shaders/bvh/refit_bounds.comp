@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
-// Boxes of a tree whose triangles have moved, bottom-up: one dispatch for the leaves, which writes their triangles where the
-// walk reads them too, then one for each step above them (trace/bvh/build_refit.c). Order and links of the tree stay.
+// Boxes of a tree whose triangles have moved, bottom-up: one dispatch for the leaves, which writes their triangles
+// where the traversal reads them too, then one for each level above them (trace/bvh/build_refit.c). Order and links of
+// the tree stay.
 //
-// What is written is a storage buffer: measured on software GL, that takes 0.7 of the time of an image.
+// The output is a storage buffer: measured on software GL, it takes 0.7 of the time of an image.
 //
 // Defines: REFIT_LEAVES for the leaves' pass, REFIT_CLOSE where their triangles move while the shutter is open.
 #include "bvh/layout.h"
@@ -19,7 +20,7 @@ const float FAR = 3.402823466e38;
 
 struct box {
     vec3 lower, upper;
-    vec2 surfaces; // of all boxes below it, of each triangle's own
+    vec2 surfaces; // of all boxes below it; of each triangle's own
 };
 
 box empty_box()
@@ -33,7 +34,7 @@ float surface_of(box b)
     return extent.x >= 0.0 ? extent.x * extent.y + extent.y * extent.z + extent.z * extent.x : 0.0;
 }
 
-// What is no number is left out.
+// NaN is left out.
 void include(inout box b, vec3 lower, vec3 upper)
 {
     b.lower = mix(b.lower, lower, lessThan(lower, b.lower));
@@ -106,7 +107,7 @@ void refit(uvec4 record)
 
 #endif
 
-// A round for each of `each` records; most passes have one.
+// One round per record; most passes have one.
 uniform uint each;
 
 void main()

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// From boxes (refit_bounds.comp) to elements as the walk reads them, in all octants' copies. The C twin is
+// From boxes (refit_bounds.comp) to elements as the traversal reads them, in all octants' copies. The C twin is
 // bvh_write_element() in trace/bvh/build_element.c.
 //
 // Defines: BVH_PACKED, BVH_SPHERES as in traverse.glsl, one of them or none.
@@ -17,12 +17,12 @@ uniform vec3 grid_lower, cells_per_unit;
 
 const float PAD_RELATIVE = 4.76837158203125e-7; // 2^-21, the builder's BVH_PAD_RELATIVE
 const float PAD_LEAST = 1.17549435e-38;
-// The builder's GRID_PAD, which is computed in doubles, and what floats round on coordinates of up to 65535 cells: 4 units
-// in the last place.
+// The builder's GRID_PAD, which is computed in doubles, and the rounding error of floats on coordinates of up to 65535
+// cells: 4 units in the last place.
 const float GRID_PAD = 0.0625;
 const float CELLS = float(BVH_GRID_CELLS);
 
-// Written so that what is no number makes the box larger.
+// Written so that NaN makes the box larger.
 uint cell_below(float x)
 {
     return x > 0.0 ? uint(min(x, CELLS)) : 0u;

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: MIT
-// Which rays are walked together.
+// Which rays form a packet.
 
 uint octant_of(vec3 direction)
 {
     return (direction.x < 0.0 ? 1u : 0u) | (direction.y < 0.0 ? 2u : 0u) | (direction.z < 0.0 ? 4u : 0u);
 }
 
-uniform float bvh_reach_together;             // no farther apart do they begin; world space
-const float SQUARED_COSINE_TOGETHER = 0.998;  // of the greatest angle between them: 2.6 degrees
+uniform float bvh_reach_together;             // maximum distance of their origins; world space
+const float SQUARED_COSINE_TOGETHER = 0.998;  // of the maximum angle between them: 2.6 degrees
 
-// Do two rays go the same way? Those that do not have no interval that would keep them out of anything.
+// Do two rays have similar directions? Others have no interval that would cull anything.
 bool go_together(vec3 origin_a, vec3 direction_a, vec3 origin_b, vec3 direction_b)
 {
     vec3 apart = origin_b - origin_a;

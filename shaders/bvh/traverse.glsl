@@ -1,31 +1,31 @@
 // SPDX-License-Identifier: MIT
-// Stackless traversal of a two-level bounding volume tree by baked links; layout and octants: bvh/layout.h.
-// 'Stackless traversal of a sphere BVH', sections 4 (links), 5 (rays together) and 6 (transform elements).
+// Stackless traversal of a two-level bounding volume tree by baked links; layout and octants: bvh/layout.h. 'Stackless
+// traversal of a sphere BVH', sections 4 (links), 5 (packets) and 6 (transform elements).
 //
 // The host (trace/bvh/tracer.c) sets, besides the defines of trace.comp:
 //   BVH_SPHERES  bounds are spheres, not boxes
 //   BVH_PACKED   boxes are on a grid
 //   BVH_PLAIN    the paper's form, for comparison: elements in a storage buffer, one order for all directions
-//   BVH_ONE_INSTANCE  there is one: no top tree is walked
+//   BVH_ONE_INSTANCE there is one instance: no top tree is traversed
 //   SHARED_ORIGIN     all rays of the wave begin at one point
-//   BVH_DEFORMS       there are meshes that deform, whose trees too may have come about in several ways
+//   BVH_DEFORMS       there are meshes that deform, whose trees may have several histories
 //   BVH_DEFORMS_IN_SHUTTER  and some do while the shutter is open
 //
-// With HAS_MOTION every ray enters an instance as that is at the ray's own time, and leaves hold what they hold at any.
+// With HAS_MOTION every ray enters an instance at the ray's own time, and leaves bound all times.
 //
-// RAYS_TOGETHER rays walk as one: an element is entered when any of them may hit its bound, a primitive is fetched
-// once and tested against all. The octant is that of the first live ray; the others' answers are right
-// whatever the order, only less is pruned.
+// RAYS_TOGETHER rays form a packet: an element is entered when any of them may hit its bound, a primitive is fetched
+// once and tested against all. The octant is that of the first live ray; the others' answers are right whatever the
+// order, only less is pruned.
 //
-// Answers do not depend on the top tree: one that was refitted and one that was built anew give the same to the bit.
-// What is found on a primitive depends on the ray and the walk's leading one alone (leaf.glsl); of instances at one
-// distance the first by number is met (favour_instance), within one the first in the order of its tree, which is that
-// of its shape (with BVH_DEFORMS: the first by number, is_before); what is taken of light is summed up exactly (taken_by).
+// Answers do not depend on the top tree: a refitted and a rebuilt one give the same to the bit. The intersection with a
+// primitive depends on the ray and the packet's leading ray alone (leaf.glsl); of instances at one distance the first
+// by number is hit (favour_instance), within one the first in the order of its tree, which is that of its shape (with
+// BVH_DEFORMS: the first by number, is_before); optical depths are summed exactly (taken_by).
 //
 // Three loops in one another: elements until a leaf, leaves until an instance is entered or left, instances. All
-// invocations of a SIMD group first find their leaf, then all test primitives (the paper's PROCESSGEOMETRY):
-// software GL runs the code of both sides of a branch for the whole group, so leaf code in the inner loop would
-// be paid for at each element.
+// invocations of a SIMD group first find their leaf, then all test primitives (the paper's PROCESSGEOMETRY): software
+// GL runs the code of both sides of a branch for the whole group, so leaf code in the inner loop would be paid for at
+// each element.
 #include "bvh/layout.h"
 #include "bvh/bounds.glsl"
 #include "bvh/leaf.glsl"
@@ -41,7 +41,7 @@ layout(binding = UNIT_TRACER_1) uniform usamplerBuffer bvh_transforms;
 #ifdef BVH_ONE_INSTANCE
 uniform uint bvh_instance;
 #else
-uniform uint bvh_top_count; // elements of the top tree; 0: nothing there
+uniform uint bvh_top_count; // elements of the top tree; 0: it is empty
 #endif
 #ifdef BVH_PACKED
 uniform vec3 bvh_top_grid_lower;
@@ -52,10 +52,10 @@ uniform vec3 bvh_top_cells_per_unit;
 #define NO_GRID tree_grid(vec3(0.0), vec3(1.0))
 
 struct walk_state {
-    uint first;   // the walked tree's copy for the octant
+    uint first;   // the traversed tree's copy for the octant
     uint end;     // its number of elements
     uint element; // next one, counted from the first
-    uint leaf;    // that is being tested, 0: none
+    uint leaf;    // the current one, 0: none
     uint primitive; // the next one in it
 };
 
@@ -71,14 +71,14 @@ void begin_tree(inout walk_state walk, uint first_element, uint element_count, u
     walk.leaf = walk.primitive = 0u;
 }
 
-// Before which and after which distance no ray has anything to find.
+// The range of distances in which some ray may still hit something.
 struct distances_left {
     float t_min, t_max;
 };
 
-// How much farther than the closest hit so far an element may begin: a distance is not as exact as a bound where the ray
-// grazes a triangle, and whether one just nearer is found must not depend on the order. 2^-14 holds where the cosine
-// between ray and normal is above some 0.005; below, of two surfaces that close together, either may be met.
+// An element may begin this much farther than the closest hit so far: a distance is less exact than a bound if the ray
+// grazes a triangle, and finding a slightly nearer one must not depend on the order. 2^-14 suffices if the cosine
+// between ray and normal is above some 0.005; below, of two surfaces this close together, either may be hit.
 const float PRUNE_SLACK = 1.00006103515625;
 
 distances_left left_of(trace_ray r[RAYS_TOGETHER], answer found[RAYS_TOGETHER])
@@ -94,7 +94,7 @@ distances_left left_of(trace_ray r[RAYS_TOGETHER], answer found[RAYS_TOGETHER])
     return left;
 }
 
-// The inner loop: on to the next leaf whose bound some ray may hit. Returns its link, 0: the tree is done.
+// The inner loop: on to the next leaf whose bound some ray may hit. Returns its link, 0: the tree is finished.
 uint next_leaf(inout walk_state walk, bundle b, distances_left left, trace_ray r[RAYS_TOGETHER],
                answer found[RAYS_TOGETHER])
 {
@@ -142,7 +142,7 @@ bool is_alive_any(trace_ray r[RAYS_TOGETHER])
     return alive;
 }
 
-// The first of those that walk: it leads to the end, also when it is done.
+// The first active ray: it leads to the end, also when it is finished.
 int leading_of(trace_ray r[RAYS_TOGETHER])
 {
     int leading = 0;
@@ -151,7 +151,7 @@ int leading_of(trace_ray r[RAYS_TOGETHER])
     return r[0].t_max > r[0].t_min ? 0 : leading;
 }
 
-// Enters a tree with all rays that are still alive: what it needs of them in its space.
+// Enters a tree with all live rays: computes their bounds in its space.
 void enter_tree(object_ray o[RAYS_TOGETHER], trace_ray r[RAYS_TOGETHER], int leading, tree_grid grid, float slack,
                 out bundle b, out relative_rays rays)
 {
@@ -165,7 +165,7 @@ void enter_tree(object_ray o[RAYS_TOGETHER], trace_ray r[RAYS_TOGETHER], int lea
     rays = relative_to(centre, o);
 }
 
-// A transform element: the rays go on in the instance's space, wherever the instance lies.
+// A transform element: the rays continue in the instance's space.
 void enter_instance(uint instance_index, trace_ray r[RAYS_TOGETHER], int leading, out entered_instance inside,
                     out object_ray o[RAYS_TOGETHER], out walk_state walk, out bundle b, out relative_rays rays)
 {
@@ -198,11 +198,11 @@ void enter_instance(uint instance_index, trace_ray r[RAYS_TOGETHER], int leading
     begin_tree(walk, tree.x, tree.y, b.octant);
 }
 
-// A link that no leaf has: something is noted, and the leaf that is being tested not done.
+// A link that no leaf has: an intersection is noted, and the current leaf not finished.
 #define LEAF_NOTED 1u
 
-// All leaves on the way of the tree that is walked, up to an instance, whose link is returned; 0: the tree is done; or up to
-// something to be settled.
+// Traverses the current tree's leaves up to an instance, whose link is returned; 0: the tree is finished; or up to an
+// intersection that must be settled.
 uint test_leaves(inout walk_state walk, bundle b, entered_instance inside, object_ray o[RAYS_TOGETHER],
                  relative_rays rays, inout trace_ray r[RAYS_TOGETHER], inout answer found[RAYS_TOGETHER],
                  inout noted_primitive noted)
@@ -243,8 +243,8 @@ void settle_and_go_on(inout walk_state walk, inout noted_primitive noted, inout 
 
 #if !defined ANY_HIT && !defined BVH_DEFORMS
 #define FAVOUR_INSTANCES
-// While the walk is in an instance, what was found in one with a higher number is one step of a float farther away, so that
-// what lies at the same distance here comes before it. (Discs and what is not there have a number that wraps to 0.)
+// Inside an instance, a hit in one with a higher number counts as one float step farther away, so that a hit at the
+// same distance here comes before it. (Discs and misses have a number that wraps to 0.)
 void favour_instance(uint instance_index, int step_, inout answer found[RAYS_TOGETHER])
 {
     for (int k = 0; k < RAYS_TOGETHER; k++) {
@@ -277,7 +277,7 @@ void trace_together(inout trace_ray r[RAYS_TOGETHER], inout answer found[RAYS_TO
 
 #else
 
-// All instances on the way. True: something is to be settled before it goes on.
+// All instances along the rays. True: an intersection must be settled before the traversal continues.
 bool walk_instances(inout walk_state walk, inout walk_state world_walk, inout bundle b, bundle world_bundle, int leading,
                     inout entered_instance inside, inout object_ray o[RAYS_TOGETHER], inout relative_rays rays,
                     inout trace_ray r[RAYS_TOGETHER], inout answer found[RAYS_TOGETHER], inout noted_primitive noted)
@@ -295,7 +295,7 @@ bool walk_instances(inout walk_state walk, inout walk_state world_walk, inout bu
 #endif
             enter_instance(leaf & BVH_LEAF_FIRST_MASK, r, leading, inside, o, walk, b, rays);
         } else {
-            // The tree is done. Out of an instance the world's bundle comes back as it was.
+            // The tree is finished. Leaving an instance restores the world's packet.
             bool all_done = inside.index == NOT_INSIDE;
 #ifdef ANY_HIT
             all_done = all_done || !is_alive_any(r);
@@ -349,7 +349,7 @@ void trace_together(inout trace_ray r[RAYS_TOGETHER], inout answer found[RAYS_TO
 
 #endif
 
-// What trace.comp calls.
+// Called by trace/wave.comp.
 #if RAYS_TOGETHER == 1
 
 #ifdef ANY_HIT
@@ -379,7 +379,7 @@ void trace_closest(trace_ray r, inout candidate best)
 #define TRACE_GROUP trace_closest_together
 #endif
 
-// In each walk all that go the way of the first one left; that one in any case, also if its way is no number.
+// Each packet has all remaining rays with a direction similar to the first one's; the first in any case, NaN included.
 void TRACE_GROUP(trace_ray r[RAYS_TOGETHER], inout answer found[RAYS_TOGETHER])
 {
     uint waiting = 0u;

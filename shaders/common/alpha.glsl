@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Surfaces that are not all there: what a tracer asks about a candidate before it counts.
-// EVEN_ALPHA: no such material has a texture or vertex colours, and the place on it does not matter.
-// Compiled to constants where the scene has no such material (HAS_CUTOUT, HAS_TRANSLUCENT not defined).
+// Cutouts and translucent surfaces: a tracer evaluates a candidate's alpha before it counts. EVEN_ALPHA: no such
+// material has a texture or vertex colours, so the point on the surface does not matter. Compiled to constants where
+// the scene has no such material (HAS_CUTOUT, HAS_TRANSLUCENT not defined).
 #include "common/surface.glsl"
 
 uint material_index_of(candidate found)
@@ -15,7 +15,7 @@ uint material_index_of(candidate found)
     return texelFetch(triangles, int(found.primitive)).w & HIT_MATERIAL_MASK;
 }
 
-// What alpha and tint depend on, of any kind of primitive.
+// The inputs of alpha and tint, for any kind of primitive.
 struct surface_point {
     vec4 uv01;
     vec4 colour;
@@ -69,8 +69,8 @@ bool is_cut_out(candidate found, vec3 origin_world, vec3 direction_world, float 
 #endif
 }
 
-// What of a shadow ray's light passes the surface: 0 where it is opaque, 1 where it is cut away; the base
-// colour tints what is transmitted, and what alpha blending leaves open passes as it is.
+// The transmittance of the surface for a shadow ray: 0 if it is opaque, 1 if it is cut away; the base colour tints
+// transmitted light, and the share that alpha blending leaves open passes untinted.
 vec3 transmittance_of(candidate found, vec3 origin_world, vec3 direction_world, float time)
 {
 #if defined HAS_CUTOUT || defined HAS_TRANSLUCENT
@@ -84,7 +84,7 @@ vec3 transmittance_of(candidate found, vec3 origin_world, vec3 direction_world, 
     if (is_mask && colour.a < m.alpha_cutoff)
         return vec3(1.0);
     vec3 through = vec3(0.0);
-#ifdef HAS_TRANSMISSION // else only alpha is of interest, and no colour is decoded
+#ifdef HAS_TRANSMISSION // else only alpha is needed, and no colour is decoded
     float transmission = m.transmission * (1.0 - m.metallic);
 #ifndef EVEN_ALPHA
     if (transmission > 0.0 && m.texture_transmission != 0u)

@@ -3,8 +3,8 @@
 
 #include "common/math.glsl"
 
-// A light has no extent in a perfect mirror, so its highlight is given that of this perceptual roughness at
-// least: a point a pixel or two wide instead of one that no ray ever meets.
+// A light has no extent in a perfect mirror, so its highlight is widened to this perceptual roughness: a point of a
+// pixel or two instead of one that no ray ever hits.
 const float ROUGHNESS_MIN_LIGHT = 0.08;
 
 // Share that a smooth boundary reflects, unpolarised; eta = index behind / index before. 1 at total internal

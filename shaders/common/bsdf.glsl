@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What a surface does with light, for estimators that choose directions by it and weigh them by how probable they were:
-// bsdf_evaluate() and bsdf_choose() are of one model, and bsdf_evaluate() knows how probable bsdf_choose() makes a
+// The BSDF for estimators that sample directions from it and weigh them by their probability density: bsdf_evaluate()
+// and bsdf_choose() implement one model, and bsdf_evaluate() returns the density with which bsdf_choose() samples a
 // direction.
 //
 //   scattered   Lambert, diminished by the boundary both ways, as in brdf() of common/scattering.glsl
@@ -9,15 +9,15 @@
 //   refracted   GGX facets as windows
 //
 // The last two may be stretched along a grain. Where they are smooth they are a mirror and a window, which nothing but
-// bsdf_choose() finds. Radiance is that of the other side divided by the square of its index, so that a window neither
-// dims nor brightens what is seen through it.
+// bsdf_choose() finds. Radiance on the other side is divided by the square of the index, so that a window neither dims
+// nor brightens the view through it.
 //
 // Defines: those of common/material.glsl; HAS_ANISOTROPY some material has a grain; WARD.
 
 #include "common/facets.glsl"
 #include "common/scattering.glsl"
 
-// How much more there is to a lobe than what is seen of it at this angle: chances are no less than this.
+// The minimum probability of a lobe, as its mean may exceed its value at this angle.
 const float LOBE_CHANCE_MIN = 1e-3;
 
 struct bsdf {
@@ -27,9 +27,9 @@ struct bsdf {
     bool rough;             // else mirror and window are smooth
     bool leaves;            // the ray comes from inside of glass
     float eta;              // index behind / index before
-    vec3 scattered;         // as in struct split, divided by pi and what enters in the mean
+    vec3 scattered;         // as in struct split, divided by pi and the mean share that enters
     float scattered_chance; // of choosing that lobe
-    float mirror_chance;    // WARD: of choosing the mirror where it was not that one
+    float mirror_chance;    // WARD: of choosing the mirror otherwise
 };
 
 // KHR_materials_anisotropy: facets are as rough as the material says across the grain, and up to fully rough along it.
@@ -40,7 +40,7 @@ vec2 facet_alpha(float roughness, float anisotropy)
 }
 
 #ifdef HAS_ANISOTROPY
-// Along the material's grain; a place that knows no tangent has one of its own.
+// Along the material's grain; a point without a tangent gets an arbitrary one.
 vec3 grain_of(hit h, surface s, material m)
 {
     vec3 x, y;
@@ -68,8 +68,8 @@ vec3 bsdf_world(bsdf b, vec3 local)
     return local.x * b.x + local.y * b.y + local.z * b.z;
 }
 
-// Share that the boundary mirrors and keeps from what is scattered, and its mean. Ward's facets do not hide each other at
-// grazing angles, so Fresnel's rise there does not fade as it does with GGX's.
+// The share that the boundary reflects and so withholds from scattering, and its mean. Ward's facets do not hide each
+// other at grazing angles, so Fresnel's rise there does not fade as it does with GGX's.
 float boundary_share(float cosine, float ior, float roughness)
 {
 #ifdef WARD
@@ -116,7 +116,7 @@ bsdf bsdf_of(surface s, split parts, vec3 view, float NoV, vec3 along, float ani
     return b;
 }
 
-// What a facet mirrors and lets through.
+// The reflectance and transmittance of a facet.
 void facet_parts(bsdf b, surface s, float VoH, out vec3 mirror, out vec3 window)
 {
     float dielectric = fresnel_dielectric(VoH, b.eta);
@@ -125,8 +125,8 @@ void facet_parts(bsdf b, surface s, float VoH, out vec3 mirror, out vec3 window)
     window = (b.leaves ? vec3(1.0) : s.base) * ((1.0 - dielectric) * (1.0 - s.metallic) * s.transmission);
 }
 
-// How often the mirror is chosen and not the window. Ward's lobe has other facets than the window, so it is chosen
-// before there is a facet.
+// The probability of choosing the mirror over the window. Ward's lobe has other facets than the window, so it is chosen
+// before the facet.
 float facet_mirror_chance(bsdf b, vec3 mirror, vec3 window)
 {
 #ifdef WARD
@@ -137,8 +137,8 @@ float facet_mirror_chance(bsdf b, vec3 mirror, vec3 window)
 #endif
 }
 
-// Of light that goes to the eye the share that came from a direction on the same side (unit), per steradian, times the
-// cosine; and the probability per steradian with which bsdf_choose() finds it. A smooth mirror is left out of both.
+// The reflectance from a direction on the same side (unit) to the eye, per steradian, times the cosine; and the
+// probability per steradian with which bsdf_choose() samples it. A smooth mirror is left out of both.
 vec3 bsdf_evaluate(bsdf b, surface s, vec3 light_world, out float probability)
 {
     vec3 light = bsdf_local(b, light_world);
@@ -171,8 +171,8 @@ vec3 bsdf_evaluate(bsdf b, surface s, vec3 light_world, out float probability)
 
 struct bsdf_choice {
     vec3 direction;    // unit, world space
-    vec3 weight;       // of what comes from there: reflectance times cosine / probability; 0: there is no ray
-    float probability; // per steradian; 0: it cannot be said (smooth, or through a window)
+    vec3 weight;       // of the radiance along it: reflectance times cosine / probability; 0: there is no ray
+    float probability; // per steradian; 0: undefined (smooth, or through a window)
     uint lobe;         // BSDF_*
 };
 

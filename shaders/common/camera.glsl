@@ -43,7 +43,7 @@ vec3 view_from_world_point(vec3 p)
            d.z * vec3(frame.world_from_view[2].x, frame.world_from_view[2].y, frame.world_from_view[2].z);
 }
 
-// The ray through a place of the picture, in pixels from its top left, from the middle of the lens; unit direction,
+// The ray through a point of the picture, in pixels from its top left, from the centre of the lens; unit direction,
 // t_min at the near plane.
 void camera_ray_through(vec2 picture_place, out vec3 origin, out vec3 direction, out float t_min)
 {
@@ -80,8 +80,8 @@ vec2 disc_from_square(vec2 u)
     return radius * vec2(cos(angle), sin(angle));
 }
 
-// Through a thin lens, which leads all rays of one place of the picture through one point of the plane in focus
-// (Cook, Porter, Carpenter. Distributed Ray Tracing. 1984). `on_lens`: where they meet it, on the unit disc.
+// Through a thin lens, which leads all rays of one point of the picture through one point of the plane in focus (Cook,
+// Porter, Carpenter. Distributed Ray Tracing. 1984). `on_lens`: where they meet it, on the unit disc.
 void camera_ray_lens(vec2 picture_place, vec2 on_lens, out vec3 origin, out vec3 direction, out float t_min)
 {
     vec2 place = picture_place / vec2(frame.width, frame.height) * 2.0 - 1.0;
@@ -102,7 +102,7 @@ float filter_place(int i)
     return frame.filter_places[i >> 2][i & 3];
 }
 
-// Where a sample lies about its pixel's centre, in pixels: server/render/pixel_filter.h.
+// The offset of a sample from its pixel's centre, in pixels: server/render/pixel_filter.h.
 float filter_offset(float number)
 {
     float side = 2.0 * number - 1.0, at = sqrt(1.0 - abs(side)) * 64.0;

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-// What every exact traverse.glsl does with a primitive that its structure leads to.
+// Tests a primitive that an exact tracer's structure leads to.
 #include "common/alpha.glsl"
 #include "common/intersect.glsl"
 
-// A ray on its way through a structure. World space; `t_max` shrinks to the closest hit so far.
+// A ray during traversal. World space; `t_max` shrinks to the closest hit so far.
 struct trace_ray {
     vec3 origin;
     vec3 direction;
@@ -14,7 +14,7 @@ struct trace_ray {
 #endif
 };
 
-// Where nothing moves no ray carries its time along.
+// Without motion rays carry no time.
 float time_of(trace_ray r)
 {
 #ifdef HAS_MOTION
@@ -41,7 +41,7 @@ candidate candidate_none(float t_max)
     return candidate(t_max, HIT_NO_PRIMITIVE, HIT_NO_PRIMITIVE, vec2(0.0));
 }
 
-// Closest hit: takes the candidate if it is nearer than the best and there.
+// Closest hit: accepts the candidate if it is nearer than the best and not cut away.
 void offer_closest(trace_ray r, candidate found, inout candidate best)
 {
     if (found.distance > r.t_min && found.distance < best.distance &&
@@ -49,12 +49,12 @@ void offer_closest(trace_ray r, candidate found, inout candidate best)
         best = found;
 }
 
-// What surfaces have taken of a shadow ray's light, of each channel: -log2 of the transmittance in steps of 2^-19,
-// as whole numbers in floats. Their sums are exact, so the answer does not hang on the order of the surfaces either,
-// as a product of floats would.
+// The optical depth of a shadow ray so far, per channel: -log2 of the transmittance in steps of 2^-19, as whole numbers
+// in floats. Their sums are exact, so the answer does not depend on the order of the surfaces, as a product of floats
+// would.
 const float TAKEN_STEPS = 524288.0;
-const float TAKEN_ALL = 8388607.0;   // no more is kept: twice as much is a whole number of a float still
-const float TAKEN_BLACK = 4715632.0; // what the 8-bit answer rounds to black: transmittance 0.5 / 255
+const float TAKEN_ALL = 8388607.0;   // the maximum: twice as much is still a whole number in a float
+const float TAKEN_BLACK = 4715632.0; // the 8-bit answer rounds to black: transmittance 0.5 / 255
 
 vec3 taken_by(vec3 transmittance)
 {
@@ -75,8 +75,8 @@ vec3 transmittance_left(vec3 taken)
 #endif
 }
 
-// Any hit: true when nothing of the light is left and the ray is done. A surface counts once for each time that
-// the ray crosses it, so no primitive may be offered twice to one ray.
+// Any hit: true if no light is left and the ray is finished. A surface counts once for each intersection, so no
+// primitive may be offered twice to one ray.
 bool offer_any(trace_ray r, candidate found, inout vec3 taken)
 {
     if (!(found.distance > r.t_min && found.distance < r.t_max))
@@ -105,7 +105,7 @@ bool cross_triangle(trace_ray r, object_ray o, uint primitive, uint instance_ind
                               found.barycentrics);
 }
 
-// The triangle or sphere against the ray in the instance's space `o`.
+// Tests the triangle or sphere against the ray in the instance's space `o`.
 void visit_triangle_closest(trace_ray r, object_ray o, uint primitive, uint instance_index, inout candidate best)
 {
     candidate found;

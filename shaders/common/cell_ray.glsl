@@ -1,22 +1,22 @@
 // SPDX-License-Identifier: MIT
-// A ray among the cells of a cube that was sampled along three axes.
+// A ray in the cells of a cube that is sampled along three axes.
 //
-// In the cube it is p(s) = o + s d, in cells, and the greatest component of d is 1 (or -1), so `s` too counts cells,
-// along the axis that the ray runs along most. In an image the components are u, v, depth.
+// In the cube it is p(s) = o + s d, in cells, and the largest component of d is 1 (or -1), so `s` too counts cells,
+// along the ray's dominant axis. In an image the components are u, v, depth.
 #include "common/candidate.glsl"
 
-// A ray's component where it has none: it moves by less than a thousandth of a cell on its way through a cube, and
-// no quotient is infinite.
+// Replaces a direction's zero component: the ray moves by less than a thousandth of a cell through a cube, and no
+// quotient is infinite.
 const float CELL_RAY_LEAST_SLOPE = 1e-8;
 
-// From so far away, in cells, floats round places by more than what planes are told apart by: a ray that comes from
-// farther is taken to begin nearer, or it would step and cross a little beside itself.
+// At this distance, in cells, floats round positions by more than the distance of distinct planes: the origin of a ray
+// from farther away is moved nearer, or its steps and intersections would be off.
 const float CELL_RAY_FAR = 16384.0;
 
 struct cell_ray {
     vec3 o, d;
-    float scale; // s of a distance; 0: the direction is no direction, and the ray goes nowhere
-    float begin; // s of the ray where it is taken to begin; less than where it comes to the cube by its length or more
+    float scale; // s per distance; 0: the direction is invalid, and the ray hits nothing
+    float begin; // s of the moved origin; smaller than that of the cube's entry by the cube's length or more
 };
 
 vec3 without_zeros(vec3 d)
@@ -33,7 +33,7 @@ cell_ray cell_ray_of(trace_ray r, vec4 place, float cells)
     float length_ = greatest(size);
     cell_ray c;
     c.scale = length_ / place.w;
-    // Written so that what is no number, or too small or large for its inverse to be one, goes nowhere.
+    // Written so that a direction that is NaN, or too small or large for a finite inverse, hits nothing.
     vec3 away = abs(r.origin);
     bool is_direction = length_ > 1e-30 && size.x + size.y + size.z < 1e30 && away.x + away.y + away.z < 1e30;
     c.scale = is_direction ? c.scale : 0.0;
@@ -47,7 +47,7 @@ cell_ray cell_ray_of(trace_ray r, vec4 place, float cells)
     return c;
 }
 
-// Where [lower, upper] of the ray is inside a box; all of it behind the other where it is not.
+// Clips [lower, upper] of the ray to a box; lower > upper if it misses.
 void clip(inout float s_first, inout float s_end, vec3 o, vec3 inverse, vec3 lower, vec3 upper)
 {
     vec3 a = (lower - o) * inverse, b = (upper - o) * inverse;

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
-// Translucent surfaces that a shadow ray has crossed, where these are stored as samples: one surface may have several
-// near each other, and takes of the light once.
+// Translucent surfaces that a shadow ray has intersected, if they are stored as samples: one surface may have several
+// samples near each other, and must attenuate the light once.
 #include "shared/hit.h"
 #include "common/candidate.glsl"
 
-// The last of them, to tell one that two samples have from two: distances, greater than 0 where the ray came from behind,
-// and materials.
+// The last ones, to distinguish one surface with two samples from two surfaces: distances, positive if the ray came
+// from behind, and materials.
 struct crossed_surfaces {
     vec4 distances;
     uvec4 materials;
@@ -16,9 +16,9 @@ crossed_surfaces crossed_nothing()
     return crossed_surfaces(vec4(1e30), uvec4(HIT_NO_PRIMITIVE));
 }
 
-// One that lets `through` of the light pass is crossed at a distance; `side` is positive where the ray comes from behind.
-// Samples of one surface overlap by the slack, and where images meet by up to a cell: `near`. Adds what it takes to
-// `taken`, if it is not one of the last, or lets nothing pass.
+// A surface that transmits `through` of the light is intersected at a distance; `side` is positive if the ray comes
+// from behind. Samples of one surface overlap by the slack, and where images meet by up to a cell: `near`. Adds its
+// optical depth to `taken`, if it is not one of the last, or is opaque.
 void cross_surface(inout crossed_surfaces crossed, inout vec3 taken, uint material_index, float distance_, float side,
                    float near, vec3 through)
 {

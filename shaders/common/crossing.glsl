@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: MIT
-// Where a ray crosses the one triangle that it is known to cross.
+// Where a ray intersects the one triangle that it is known to hit.
 //
-// A rasteriser, and a walk that takes triangles relative to another point than the ray's origin, decide by their own
-// rounding which triangle is met, so at an edge the exact test may just miss it: the place is then moved to the nearest
-// of the triangle's own.
+// A rasteriser, and a traversal that tests triangles relative to another point than the ray's origin, decide by their
+// own rounding which triangle is hit, so at an edge the exact test may just miss it: the point is then moved to the
+// nearest one of the triangle.
 #include "common/intersect.glsl"
 #include "common/surface.glsl"
 
-// Of the vertices, from the ray's origin, where the ray's line crosses their plane; their sum is not made 1.
+// Barycentric weights of the vertices (relative to the ray's origin) at the intersection of the ray's line with their
+// plane; not normalised.
 vec3 edge_weights(vec3 direction, vec3 v0, vec3 v1, vec3 v2)
 {
     return vec3(dot(cross(v2 - v1, v2 + v1), direction), dot(cross(v0 - v2, v0 + v2), direction),

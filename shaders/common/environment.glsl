@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What lies infinitely far away, as the frame's uniforms describe it.
+// The environment infinitely far away, from the frame's uniforms.
 // Defines: HAS_ENVIRONMENT_IMAGE its kind is ENVIRONMENT_IMAGE.
 
 #include "shared/bindings.h"
@@ -15,8 +15,8 @@ vec3 environment_sky(float up)
     return mix(vec3(SKY_HORIZON), vec3(SKY_ZENITH), up);
 }
 
-// Where on an equirectangular image a direction is, 0..1: rows from +y down, the middle column is -z; turned by w of the
-// colour about +y.
+// The point of a direction on an equirectangular image, 0..1: rows from +y down, the middle column is -z; turned by w
+// of the colour about +y.
 vec2 environment_place(vec3 direction)
 {
     float c = cos(frame.environment_colour.w), s = sin(frame.environment_colour.w);
@@ -62,9 +62,9 @@ vec3 environment_radiance(vec3 direction)
     return frame.environment_kind == ENVIRONMENT_CONSTANT ? frame.environment_colour.rgb : vec3(0.0);
 }
 
-// Irradiance / pi on a surface that looks along n: what a white Lambert surface sends out. Ramamoorthi and
-// Hanrahan. An Efficient Representation for Irradiance Environment Maps. 2001; the constants of their
-// equation 13 are folded into the coefficients.
+// Irradiance / pi on a surface with the normal n: the radiance of a white Lambert surface. Ramamoorthi and Hanrahan. An
+// Efficient Representation for Irradiance Environment Maps. 2001; the constants of their equation 13 are folded into
+// the coefficients.
 vec3 environment_irradiance(vec3 n)
 {
     vec3 sum = frame.irradiance[0].rgb + frame.irradiance[1].rgb * n.y + frame.irradiance[2].rgb * n.z +

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// A direction from which the environment shines, as probable as it is bright there: per cell of a table over the
-// directions, rows from +y down, made by server/render/environment_choice.c. One of one colour is as bright from
-// everywhere, so there what the surface makes of it is followed: the cosine.
+// Samples a direction of the environment in proportion to its radiance: per cell of a table over the directions, rows
+// from +y down, made by server/render/environment_choice.c. An environment of one colour is equally bright everywhere,
+// so it is sampled by the cosine.
 //
 // The table: rows + 1 sums up to each row, then for each row columns + 1 sums up to each column, as shares of all.
 //
@@ -13,7 +13,7 @@
 layout(binding = UNIT_SHADE_ENVIRONMENT) uniform samplerBuffer environment_table;
 uniform uint environment_rows, environment_columns;
 
-// The last of `count` cells whose sum begins at or below u, and how far u is into it.
+// The last of `count` cells whose sum begins at or below u, and the position of u in it, 0..1.
 uint environment_cell(uint first, uint count, float u, out float rest, out float share)
 {
     uint low = 0u, high = count;
@@ -64,7 +64,7 @@ vec3 environment_choose(vec3 normal, vec2 u, out float probability)
 #endif
 }
 
-// Of a direction that was found another way.
+// The probability density of a direction that another technique sampled.
 float environment_probability(vec3 normal, vec3 direction)
 {
 #ifdef HAS_ENVIRONMENT_TABLE

@@ -17,7 +17,7 @@ layout(binding = UNIT_INSTANCES) uniform usamplerBuffer instances;
 layout(binding = UNIT_GEOMETRIES) uniform usamplerBuffer geometries;
 layout(std430, binding = BIND_DISCS) readonly buffer disc_block { disc discs[]; };
 
-// What of a struct is not used is not fetched.
+// Unused members of a struct are not fetched.
 instance instance_at(uint index)
 {
     int texel = int(index) * INSTANCE_TEXELS;

@@ -25,9 +25,9 @@ bool intersect_triangle(vec3 direction, vec3 v0, vec3 v1, vec3 v2, out float dis
     return true;
 }
 
-// Where the ray's line enters and leaves a sphere. The discriminant is taken from the distance of the closest
-// point, which loses nothing where the sphere is small or far, and the roots by the form without cancellation.
-// Haines, Guenther, Akenine-Moeller, Precision Improvements for Ray/Sphere Intersection, Ray Tracing Gems, ch. 7.
+// The intersections of the ray's line with a sphere. The discriminant is computed from the distance of the closest
+// point, which loses nothing where the sphere is small or far, and the roots by the form without cancellation. Haines,
+// Guenther, Akenine-Moeller, Precision Improvements for Ray/Sphere Intersection, Ray Tracing Gems, ch. 7.
 bool intersect_sphere(vec3 origin, vec3 direction, vec3 centre, float radius, out vec2 distances)
 {
     vec3 f = origin - centre;

@@ -18,10 +18,10 @@ light light_at(uint index)
 struct light_sample {
     vec3 direction;  // unit, towards the light
     float distance_; // to the point that was chosen on it
-    vec3 irradiance; // of a surface that faces it, if nothing lies between; 0: it does not shine here
+    vec3 irradiance; // of a surface that faces it, without shadows; 0: no light arrives
 };
 
-// KHR_lights_punctual: inverse square, brought to 0 at the range.
+// KHR_lights_punctual: inverse square, fading to 0 at the range.
 float light_falloff(float distance_, float range)
 {
     float window = 1.0;
@@ -75,9 +75,8 @@ light_sample light_sample_sphere(light l, vec3 position, vec2 u)
     return light_sample(direction, reach, l.colour.rgb * (TWO_PI * one_minus_cos_max));
 }
 
-
-// Where a ray (unit direction) meets a light that has an extent, on the side that shines; -1: nowhere. `probability`:
-// per steradian, with which light_sample_at() finds that direction from the ray's origin.
+// The distance at which a ray (unit direction) hits an area light on its emitting side; -1: it misses. `probability`:
+// the density per steradian with which light_sample_at() samples that direction from the ray's origin.
 float light_meet(light l, vec3 origin, vec3 direction, out float probability)
 {
     vec3 to_middle = l.position_kind.xyz - origin;
@@ -103,18 +102,18 @@ float light_meet(light l, vec3 origin, vec3 direction, out float probability)
     return along - sqrt(inside);
 }
 
-// The same of the direction of a sample; 0: nothing but light_sample_at() finds it, as the light has no extent.
+// The density of a sample's direction; 0: the light has no extent, and only light_sample_at() finds it.
 float light_probability(light l, light_sample lamp)
 {
     int kind = int(l.position_kind.w);
     if (kind != LIGHT_KIND_RECTANGLE && kind != LIGHT_KIND_SPHERE)
         return 0.0;
     float shining = greatest(l.colour.rgb), arriving = greatest(lamp.irradiance);
-    return arriving > 0.0 ? shining / arriving : 0.0; // irradiance is radiance by it
+    return arriving > 0.0 ? shining / arriving : 0.0; // radiance times this is irradiance
 }
 #endif
 
-// `u`: two numbers in [0, 1) that choose the point of a light that has an extent.
+// `u`: two numbers in [0, 1) that choose the point of an area light.
 light_sample light_sample_at(uint index, vec3 position, vec2 u)
 {
     light l = light_at(index);

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
-// One light of all, by what each is likely to bring.
+// Chooses one of all lights by an estimate of its contribution.
 // Defines: those of common/light.glsl and common/scattering.glsl.
 
 #include "common/light.glsl"
 #include "common/scattering.glsl"
 
-// Of a surface, what its lights are weighed by.
+// The properties of a surface that weigh its lights.
 struct light_receiver {
     vec3 position, normal, view;
     float scattered, mirrored; // reflectances
@@ -14,13 +14,13 @@ struct light_receiver {
 
 light_receiver light_receiver_of(surface s, split parts, vec3 position, vec3 view, float NoV)
 {
-    // A mirror that is seen at a slant is dim at its own angle, but not at every facet's: never 0.
+    // A slanted mirror is dim at its own angle, but not at that of every facet: never 0.
     return light_receiver(position, s.normal, view, greatest(parts.scattered) * INVERSE_PI,
                           (greatest(parts.mirror) + 1e-3) * 0.25 / max(NoV, 0.1),
                           square(max(s.roughness, ROUGHNESS_MIN_LIGHT)));
 }
 
-// About how much of a light goes to the eye if nothing is in the way: more than 0 wherever any of it does.
+// An estimate of a light's unshadowed radiance at the eye: positive wherever the true one is.
 float light_estimate(uint index, light_receiver r)
 {
     light l = light_at(index);
@@ -35,7 +35,7 @@ float light_estimate(uint index, light_receiver r)
     if (kind == LIGHT_KIND_SPOT)
         power *= light_cone(l, direction);
 #ifdef HAS_AREA_LIGHTS
-    // Points of it are so far off its middle, as a share of the distance.
+    // The distance of its points from its centre, as a share of the distance to the light.
     if (kind == LIGHT_KIND_RECTANGLE) {
         float radius = length(l.half_u_inner.xyz) + length(l.half_v_outer.xyz);
         power *= max(-dot(l.direction_range.xyz, direction), 0.0) * radius * radius;
@@ -45,21 +45,21 @@ float light_estimate(uint index, light_receiver r)
         reach = l.colour.w * inverse;
     }
 #endif
-    // The highlight of GGX, as wide as the lamp makes it (Karis. Real Shading in Unreal Engine 4. 2013).
+    // The highlight of GGX, widened by the light's extent (Karis. Real Shading in Unreal Engine 4. 2013).
     float NoH = max(dot(r.normal, normalize(direction + r.view)), 0.0), alpha = r.alpha + 0.5 * reach;
     float wide = alpha * alpha, spread = 1.0 + NoH * NoH * (wide - 1.0) + 1e-6;
     float highlight = r.mirrored * wide / (PI * spread * spread);
     return cosine + reach > 0.0 ? power * (r.scattered * min(cosine + reach, 1.0) + highlight) : 0.0;
 }
 
-// One of all lights, as probable as its estimate is a share of their sum. `number` in [0, 1) chooses it and comes back
-// stretched to [0, 1) again. Probability 0: none shines here.
+// Chooses a light with a probability in proportion to its estimate. `number` in [0, 1) chooses it and comes back
+// stretched to [0, 1) again. Probability 0: no light arrives here.
 uint light_choose(light_receiver r, uint light_count, inout float number, out float probability, out float sum)
 {
     uint chosen = 0u;
     float own = 0.0;
     sum = 0.0;
-    // Each light takes the lower end of what is left of the interval from those before it.
+    // Each light gets the lower end of the interval that the ones before it have left.
     for (uint i = 0u; i < light_count; i++) {
         float estimate = light_estimate(i, r);
         sum += estimate;

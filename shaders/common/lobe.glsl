@@ -1,20 +1,20 @@
 // SPDX-License-Identifier: MIT
-// One ray for all that a surface mirrors and refracts: a facet as the view meets them, and what it does.
+// One ray for all reflection and refraction of a surface: chooses a visible facet, and whether it reflects or refracts.
 //
-// Facets are distributed as in brdf(): GGX, each a smooth mirror or window by Fresnel's equations (metal: Schlick), with
-// the alpha that glTF has, the square of the roughness. Where the surface is smooth, the ray goes where and weighs what
-// whitted's do in the mean.
+// Facets are distributed as in brdf(): GGX, each a smooth mirror or window by Fresnel's equations (metal: Schlick),
+// with the alpha that glTF has, the square of the roughness. On a smooth surface, the ray's direction and mean weight
+// are those of whitted.
 
 #include "common/facets.glsl"
 #include "common/scattering.glsl"
 
 struct lobe {
     vec3 direction; // unit
-    vec3 weight;    // of what comes from there; 0: there is no ray
+    vec3 weight;    // of the radiance along it; 0: there is no ray
 };
 
-// Of the facets that the view sees the share that the light reaches. Heitz. Understanding the Masking-Shadowing
-// Function. 2014: height-correlated as in V_SmithGGXCorrelated() on the view's side, on the other independent.
+// The lit share of the visible facets. Heitz. Understanding the Masking-Shadowing Function. 2014: height-correlated as
+// in V_SmithGGXCorrelated() on the view's side, independent on the other.
 float lit_share(float NoV, float NoL, float alpha)
 {
     float a2 = alpha * alpha, v = sqrt(a2 + (1.0 - a2) * NoV * NoV), l = sqrt(a2 + (1.0 - a2) * NoL * NoL);

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-// From a hit to what its surface is made of: textures, normal and bump maps applied.
+// From a hit to its surface's material: textures, normal and bump maps applied.
 //
-// A back face of an opaque material is shaded as if it were two-sided, double_sided or not: a model with a hole
-// in it would surprise more than one whose inside is visible. Only glass tells its sides apart.
+// A back face of an opaque material is shaded as if it were two-sided, double_sided or not: a model with a hole in it
+// would surprise more than one whose inside is visible. Only glass distinguishes its sides.
 //
-// Software GL runs both sides of every branch, so what the scene does not have is left out by defines, and all
+// Software GL runs both sides of every branch, so features that the scene lacks are left out by defines, and all
 // textures of a material are sampled in one place, in a loop.
 //
 // Defines: HAS_TEXTURES some material has a texture; HAS_BUMP one of them is a bump map; HAS_SPHERES; HAS_SAMPLED the
@@ -19,7 +19,7 @@ struct surface {
     vec3 geometric; // unit normals, world space, on the viewer's side
     vec3 normal;    // shading; may lean away from the viewer
     vec3 base;
-    float alpha;    // share of the ray that the surface takes; 1 unless it is blended
+    float alpha;    // opacity; 1 unless it is blended
     vec3 emission;
     float metallic, roughness, transmission, ior, occlusion;
     bool unlit;
@@ -27,7 +27,7 @@ struct surface {
 };
 
 #ifdef HAS_BUMP
-// How fast the position runs along the texture coordinates of a slot, world space, around a hit.
+// The derivatives of the position by the texture coordinates of a slot, world space, at a hit.
 bool surface_derivatives(hit h, texture_slot slot, out vec3 along_u, out vec3 along_v)
 {
     along_u = along_v = vec3(0.0);
@@ -119,8 +119,8 @@ bool is_textured(material m)
             m.texture_emission | m.texture_transmission) != 0u;
 }
 
-// The width of a ray in texture coordinates where it hits; 0 where that is not known. A slanted surface is seen
-// under an ellipse; the mean of its axes blurs less than the longer one and flickers less than the shorter.
+// The footprint of a ray in texture coordinates; 0 if it is not known. On a slanted surface it is an ellipse; the mean
+// of its axes blurs less than the longer one and flickers less than the shorter.
 float footprint_of(hit h, material m, vec3 geometric, vec3 direction, float width)
 {
     if (!is_textured(m) || h.primitive == HIT_NO_PRIMITIVE || h.instance == HIT_NO_PRIMITIVE ||
@@ -139,7 +139,7 @@ vec4 sample_use(texture_slot slot, vec4 uv01, float footprint_uv)
     return sample_level(info, clamp(int(level + 0.5), 0, last), slot_texcoords(slot, uv01));
 }
 
-// Puts the inputs that come from textures in their place; normal maps included.
+// Replaces the inputs that have textures, normal maps included.
 void apply_textures(inout surface s, inout vec4 colour, hit h, material m, vec4 uv01, float footprint_uv)
 {
     const int BASE_COLOUR = 0, NORMAL = 1, METALLIC_ROUGHNESS = 2, OCCLUSION = 3, EMISSION = 4, TRANSMISSION = 5;
@@ -148,7 +148,7 @@ void apply_textures(inout surface s, inout vec4 colour, hit h, material m, vec4 
     uint used = 0u;
     for (int i = 0; i < 6; i++)
         used |= uses[i] != 0u ? 1u << i : 0u;
-    while (used != 0u) { // not a loop over all: software GL would sample for those that are not there
+    while (used != 0u) { // not a loop over all: software GL would sample for the missing ones, too
         int i = findLSB(used);
         used &= used - 1u;
         texture_slot slot = texture_slots[uses[i]];
@@ -173,7 +173,7 @@ void apply_textures(inout surface s, inout vec4 colour, hit h, material m, vec4 
 #endif
 
 #ifdef HAS_SAMPLED
-// What textures and vertex colours gave when the sample was taken, in their place.
+// The sample's values of textures and vertex colours, in their place.
 void apply_sample(inout surface s, inout vec4 colour, uvec4 words)
 {
     surface_sample stored = unpack_sample(words);

@@ -10,7 +10,7 @@ float square(float x)
     return x * x;
 }
 
-// atan(y, x), and 0 where both are 0: there GLSL leaves it open, and some drivers make it no number.
+// atan(y, x), and 0 if both are 0: GLSL leaves this undefined, and some drivers return NaN.
 float azimuth(float y, float x)
 {
     return x == 0.0 && y == 0.0 ? 0.0 : atan(y, x);
@@ -72,7 +72,7 @@ vec3 unpack_unit_24(uint bits)
 }
 
 // struct hit's tangent: x 16 bits, y 15 bits, lowest bit set where the handedness is negative.
-// packSnorm2x16 puts y in the upper half; here x is the upper half and y's lowest bit makes room.
+// packSnorm2x16 puts y in the upper half; here x is the upper half and y's lowest bit is free.
 uint pack_tangent(vec3 unit, float handedness)
 {
     uint bits = packSnorm2x16(octahedral_from_unit(unit).yx);
@@ -119,9 +119,9 @@ vec3 in_image(vec3 p, int axis)
     return axis == 0 ? p.yzx : axis == 1 ? p.zxy : p;
 }
 
-// Moves a point off its surface, to the side the unit normal points to, by about as much as its coordinates
-// are uncertain: integer steps of the last places far from the origin, a fixed way near it.
-// Waechter and Binder, A Fast and Robust Method for Avoiding Self-Intersection, Ray Tracing Gems, chapter 6.
+// Moves a point off its surface, to the side the unit normal points to, by about the uncertainty of its coordinates:
+// steps in the last places far from the origin, a fixed distance near it. Waechter and Binder, A Fast and Robust Method
+// for Avoiding Self-Intersection, Ray Tracing Gems, chapter 6.
 vec3 offset_ray_origin(vec3 point, vec3 normal)
 {
     const float near_origin = 1.0 / 32.0;

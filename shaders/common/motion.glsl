@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: MIT
-// Where things are at a time: 0 where the shutter opens, 1 where it closes.
+// Positions at a time: 0 when the shutter opens, 1 when it closes.
 //
-// Defines: HAS_MOTION if something moves meanwhile; without it all of this is as the shutter opens, whatever the time.
+// Defines: HAS_MOTION if something moves meanwhile; without it everything is as the shutter opens, whatever the time.
 #include "common/geometry.glsl"
 #include "common/math.glsl"
 
 #ifdef HAS_MOTION
 
-layout(binding = UNIT_MOTIONS) uniform samplerBuffer motions; // three texels a pose
+layout(binding = UNIT_MOTIONS) uniform samplerBuffer motions; // three texels per pose
 
-// Entry by entry between the two poses, at even distances, that the time lies between.
+// Interpolates each entry between the two poses around the time; poses are evenly spaced.
 void world_from_object_at(uint first_texel, uint pose_count, float time, out vec4 rows[3])
 {
     float place = clamp(time, 0.0, 1.0) * float(pose_count - 1u);
@@ -19,8 +19,8 @@ void world_from_object_at(uint first_texel, uint pose_count, float time, out vec
         rows[row] = mix(texelFetch(motions, texel + row), texelFetch(motions, texel + 3 + row), place - before);
 }
 
-// The inverse of an affine transform; its determinant's sign. Divided by their greatest entry first, products of very
-// small or large ones stay numbers. Where it is flat the inverse is not a number, and no ray hits anything.
+// The inverse of an affine transform, and its determinant's sign. Entries are divided by the largest one first, so that
+// products of very small or large ones stay finite. The inverse of a singular one is NaN, and no ray hits anything.
 float invert(vec4 m[3], out vec4 inverse[3])
 {
     float greatest_entry = greatest(max(abs(m[0].xyz), max(abs(m[1].xyz), abs(m[2].xyz))));
@@ -73,7 +73,7 @@ vec3 position_at_time(uint vertex, uint close_offset, float time)
     return position;
 }
 
-// Unit where it lies between two.
+// Normalised between two.
 vec3 normal_at_time(uint vertex, uint close_offset, float time)
 {
     vec3 normal = texelFetch(normals, int(vertex)).xyz;

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: MIT
-// Rays that ask how open a place is: ambient occlusion. Their mean over many is the cosine-weighted share of the
-// directions above a surface in which nothing is near.
+// Ambient occlusion rays. Their mean is the cosine-weighted share of the directions above a surface in which nothing is
+// near.
 //
-// How far a ray looks is a choice like its direction: with u uniform, reach * (1 - u^(1 / falloff)) is beyond t as often
-// as (1 - t / reach)^falloff. So what is met at t counts that much in the mean, though all that is asked of each ray is
-// whether it meets anything.
+// A ray's length is random like its direction: with u uniform, reach * (1 - u^(1 / falloff)) exceeds t with probability
+// (1 - t / reach)^falloff. So an occluder at t has this weight in the mean, though each ray only reports whether it
+// hits anything.
 
 #include "common/math.glsl"
 
-// `u`: three numbers in [0, 1). Cosine-weighted about the shading normal; what would go below the surface itself is
+// `u`: three numbers in [0, 1). Cosine-weighted about the shading normal; directions below the surface itself are
 // mirrored at it. `geometric`, `normal`: unit, on one side.
 vec3 occlusion_direction(vec3 geometric, vec3 normal, vec2 u)
 {

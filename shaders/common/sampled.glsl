@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// A place on a surface as a sampled tracer stores it: the four words of shared/surface_sample.h. They are written
-// when a sample is taken, and read where it is shaded or where a shadow ray asks for alpha and tint. Shares are what
-// the material's own values are multiplied by.
+// A place on a surface as a sampled tracer stores it: the four words of shared/surface_sample.h. They are written when
+// a surface is sampled, and read when a hit is shaded or a shadow ray needs alpha and tint. Shares are factors of the
+// material's own values.
 #include "shared/surface_sample.h"
 #include "common/colour.glsl"
 #include "common/math.glsl"
@@ -38,7 +38,6 @@ uvec4 pack_sample(surface_sample s)
                      sample_bits(emission.b, 27u, 5u));
 }
 
-// The parts, for those that need no others.
 vec4 sample_base_colour(uvec4 words)
 {
     vec4 colour = unpackUnorm4x8(words.x);

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-// What a surface does with light: how much of what arrives along the view it mirrors, scatters and refracts, and
-// its reflectance from a lamp to the eye.
+// How a surface scatters light: the shares of the light along the view that it reflects, scatters and refracts, and its
+// reflectance from a light to the eye.
 //
-// A dielectric reflects by Fresnel's equations, a metal by Schlick's approximation. A rough surface has no one
-// mirror direction, and one ray cannot blur: as the roughness grows, its mirror ray is faded out and what it
-// carried is replaced by the irradiance about that direction, and Fresnel's rise at grazing angles is faded out
-// too. What is reflected, refracted and scattered never adds up to more than what arrives, be it from all around
-// (struct split) or from a lamp (brdf); tests/accuracy/shading_energy.c holds both to it.
+// A dielectric reflects by Fresnel's equations, a metal by Schlick's approximation. A rough surface has no one mirror
+// direction, and one ray cannot blur: as the roughness grows, its mirror ray is faded out and what it carried is
+// replaced by the irradiance about that direction, and Fresnel's rise at grazing angles is faded out too. What is
+// reflected, refracted and scattered never adds up to more than what arrives, be it from all around (struct split) or
+// from a light (brdf); tests/accuracy/shading_energy.c holds both to it.
 //
 // Defines: those of common/material.glsl.
 
@@ -16,7 +16,7 @@
 // Roughness at which the mirror ray begins to fade and at which it is gone.
 const float MIRROR_ROUGHNESS_SHARP = 0.1, MIRROR_ROUGHNESS_GONE = 0.5;
 
-// How a surface splits what arrives along the view.
+// How a surface splits the light along the view.
 struct split {
     vec3 mirror;      // Fresnel reflectance
     vec3 scattered;   // Lambert's albedo times what is not mirrored
@@ -27,7 +27,7 @@ struct split {
 split split_light(surface s, float NoV)
 {
     bool leaves = s.inside && s.transmission > 0.0;
-    // Total reflection is no matter of roughness.
+    // Total reflection does not depend on roughness.
     float dielectric = leaves ? fresnel_rough_dielectric(NoV, 1.0 / s.ior, s.roughness * (1.0 - s.transmission))
                               : fresnel_rough_dielectric(NoV, s.ior, s.roughness);
     vec3 metal = mix(fresnel_schlick(s.base, NoV), s.base, s.roughness);
@@ -49,14 +49,14 @@ vec3 mirror_direction(surface s, vec3 direction)
     return dot(mirrored, s.geometric) > 0.0 ? mirrored : reflect(direction, s.geometric);
 }
 
-// Share of the irradiance from a direction (of a lamp, unit) that goes to the eye, per steradian; without the
-// cosine. 0 from below the horizon, and for glass seen from inside, where no lamp is asked. The same when light
-// and view change places. `parts`: of the same surface and NoV.
+// Share of the irradiance from a direction (of a light, unit) that goes to the eye, per steradian; without the cosine.
+// 0 from below the horizon, and for glass seen from inside, where no light is sampled. Reciprocal. `parts`: of the same
+// surface and NoV.
 //
-// What is mirrored: Cook and Torrance 1982 with GGX. What is scattered went through the boundary twice and is
-// diminished both times: Shirley et al. A Practitioners' Assessment of Light Reflection Models. 1997, with our
-// reflectance in the place of Schlick's. (1 - F) of the half-way vector alone, as often seen, would give out up
-// to 1.7 of what arrives at grazing angles.
+// What is mirrored: Cook and Torrance 1982 with GGX. Scattered light passed the boundary twice and is diminished both
+// times: Shirley et al. A Practitioners' Assessment of Light Reflection Models. 1997, with our reflectance in the place
+// of Schlick's. (1 - F) of the half-way vector alone, as often seen, would give out up to 1.7 of what arrives at
+// grazing angles.
 vec3 brdf(surface s, split parts, vec3 view, float NoV, vec3 light)
 {
     float NoL = dot(s.normal, light);

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: MIT
-// The numbers that a sample chooses by: Owen-scrambled Sobol points. server/render/sequence.c is the same for the
-// host.
+// The random numbers of a sample: Owen-scrambled Sobol points. server/render/sequence.c is the same for the host.
 //
 // Each choice (a dimension: SEQUENCE_* of shared/frame.h) has one or two numbers of a sequence of its own for each
-// pixel and seed, so that choices do not follow each other and pixels do not resemble each other. The numbers of
-// the samples 0 .. 2^k - 1, and of any aligned 2^k after them, are stratified as those of a (0, 2)-sequence are:
-// one in each of 2^k intervals, and as pairs one in each 2^a x 2^(k-a) cell; so the error of a mean of n of them
-// falls as fast as n^-1.5 where what they choose is smooth.
+// pixel and seed, so that choices do not follow each other and pixels do not resemble each other. The numbers of the
+// samples 0 .. 2^k - 1, and of any aligned 2^k after them, are stratified as those of a (0, 2)-sequence are: one in
+// each of 2^k intervals, and as pairs one in each 2^a x 2^(k-a) cell; so the error of a mean of n of them falls as fast
+// as n^-1.5 where what they choose is smooth.
 //
 // Burley. Practical Hash-based Owen Scrambling. JCGT 2020: a hash in which no bit depends on a higher one scrambles
 // reversed bits as Owen's tree does, and shuffles the order of the samples so that dimensions may be padded.
@@ -48,7 +47,7 @@ float unit_from_bits(uint v)
     return float(v >> 8) * (1.0 / 16777216.0);
 }
 
-// What the functions below want of a pixel, or of anything else that is to have numbers of its own.
+// The seed of a pixel, or of anything else with its own numbers, for the functions below.
 uint sequence_seed(uint number, uint seed)
 {
     return hash_u32(number + hash_u32(seed));
@@ -78,8 +77,8 @@ vec2 sequence_pair(uint pixel_seed, uint dimension, uint index)
 }
 
 // Likewise, with the samples of each group of 2^group_shift in an order in which neighbours have first numbers close
-// together, up to the halves, quarters and so on of the interval being swapped: what they choose is alike, and rays side by
-// side go the same way. Not for more than one choice of a wave, as two in order would go hand in hand.
+// together, up to the halves, quarters and so on of the interval being swapped: what they choose is alike, and rays
+// side by side go the same way. Not for more than one choice of a wave, as two such orders would be correlated.
 vec2 sequence_pair_sorted(uint pixel_seed, uint dimension, uint index, uint group_shift)
 {
     uint own = hash_u32(pixel_seed + dimension * 0x9e3779b9u), mask = (1u << group_shift) - 1u;

@@ -2,12 +2,12 @@
 // Sorts a run in place: by insertion where its items come nearly in order, as those of things drawn front to back do,
 // else as a heap. No loop here runs more than a few rounds for each item and each doubling of their number: software GL
 // ends an invocation's loops after 65,535 rounds.
-// Who includes it defines before: SORT_ITEM, a type; struct run with a member `count`; SORT_ITEM load(run, uint), void
-// store(run, uint, SORT_ITEM), bool before(SORT_ITEM, SORT_ITEM).
+// The including file defines before: SORT_ITEM, a type; struct run with a member `count`; SORT_ITEM load(run, uint),
+// void store(run, uint, SORT_ITEM), bool before(SORT_ITEM, SORT_ITEM).
 
 const uint MOVES_EACH = 4u; // an item: more than the heap is worth
 
-// Whether it was done: false leaves them in another order.
+// False: it gave up, and the items are partly sorted.
 bool insert_all(run r)
 {
     uint moves = MOVES_EACH * r.count;
@@ -29,7 +29,7 @@ bool insert_all(run r)
     return true;
 }
 
-// Down from `at` to where what is below it comes before it.
+// Sifts the item at `at` down the heap.
 void sift(run r, uint at, uint count)
 {
     SORT_ITEM own = load(r, at);

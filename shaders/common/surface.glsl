@@ -6,7 +6,7 @@
 #include "common/motion.glsl"
 #include "common/texture.glsl"
 
-// What is known of a ray before it is decided that it hits.
+// A possible hit of a ray.
 struct candidate {
     float distance;     // in lengths of the direction
     uint primitive;     // scene-wide triangle or sphere, or disc; HIT_NO_PRIMITIVE: nothing yet
@@ -55,8 +55,8 @@ vec4 disc_texcoords(disc d, vec3 position_world)
     return vec4(uv, uv);
 }
 
-// Where a triangle's texture runs: tangent along u and the handedness of the frame, for meshes that bring no
-// tangents. v grows downwards in an image while a normal map's green points up, hence the sign.
+// A triangle's tangent along u and the handedness of the frame, for meshes without tangents. v grows downwards in an
+// image while a normal map's green points up, hence the sign.
 bool texture_tangent(uvec4 triangle, vec3 corners[3], bool second, vec3 normal_object, out vec4 tangent_object)
 {
     vec3 e1 = corners[1] - corners[0], e2 = corners[2] - corners[0];
@@ -98,8 +98,8 @@ bool triangle_tangent(uvec4 triangle, vec3 corners[3], geometry g, float time, v
     return texture_tangent(triangle, corners, second, normal_object, tangent_object);
 }
 
-// The interpolated normal, mirrored at the surface where it points to the wrong side of it: a normal that is
-// turned round becomes its opposite, one that is only a little beyond the horizon moves only a little.
+// The interpolated normal, mirrored at the surface where it points to the wrong side of it: a reversed normal becomes
+// its opposite, one slightly below the horizon moves slightly.
 vec3 same_hemisphere(vec3 shading, vec3 geometric)
 {
     float cosine = dot(shading, geometric);
@@ -219,7 +219,7 @@ hit surface_of(candidate found, vec3 origin_world, vec3 direction_world, float t
                             direction_world, time);
 }
 
-// How far texture coordinates of set 0 run per metre of a triangle: for the level of detail of a footprint.
+// The length of texture coordinates of set 0 per metre of a triangle: for the level of detail of a footprint.
 float texcoords_per_metre(uint instance_index, uint primitive)
 {
     instance i = instance_at(instance_index);

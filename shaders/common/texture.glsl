@@ -18,7 +18,7 @@ float wrap_coordinate(float u, uint mode)
     return mode == 0u ? repeated : mode == 1u ? clamp(u, 0.0, 1.0) : turned;
 }
 
-// Of a texel at most one beyond the edge. Beyond a mirrored edge lies the edge itself once more.
+// For a texel at most one beyond the edge. Beyond a mirrored edge lies the edge itself once more.
 int wrap_neighbour(int i, int size, uint mode)
 {
     int repeated = i < 0 ? i + size : i >= size ? i - size : i;
@@ -51,8 +51,8 @@ vec4 fetch_texel(texture_info info, texture_level level, ivec2 at)
     return texel;
 }
 
-// The loops here have counts that the compiler cannot know: unrolled and put in wherever a texture is sampled,
-// the fetches made a software GL's compiler take seconds.
+// The loops here have counts that the compiler cannot know: unrolled and inlined wherever a texture is sampled, the
+// fetches took software GL's compiler seconds.
 vec4 sample_level(texture_info info, int level_number, vec2 uv)
 {
     texture_level level = find_level(info, level_number);
@@ -104,8 +104,8 @@ float slot_level(texture_slot slot, float footprint_uv)
     return texels_wide > 1.0 ? log2(texels_wide) : 0.0;
 }
 
-// A material's input: `slot_index` is one of its texture_* fields and not 0.
-// `footprint_uv`: how wide the ray is there, in texture coordinates; 0: as fine as the texture is.
+// A material's input: `slot_index` is one of its texture_* fields and not 0. `footprint_uv`: the ray's width in texture
+// coordinates; 0: the texture's full detail.
 vec4 sample_slot(uint slot_index, vec4 uv01, float footprint_uv)
 {
     texture_slot slot = texture_slots[slot_index];

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// From linear light to what a screen shows.
+// From linear light to display values.
 #include "common/colour.glsl"
 
 #define TONE_MAP_NEUTRAL 0u

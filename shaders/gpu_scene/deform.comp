@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Vertices of one mesh that changes its shape: morph targets, then joints, as glTF 2.0 has them (sections 3.7.2.2 and
-// 3.7.3). One invocation a vertex; from the mesh at rest into the scene's vertices, in place. The host's twin is
+// 3.7.3). One invocation per vertex; from the mesh at rest into the scene's vertices, in place. The host's twin is
 // scene_deform() of server/scene/deform.c.
 //
 // The host (gpu_scene/deform.c) sets the defines:
@@ -40,7 +40,7 @@ uniform uint target_arrays; // 1: positions, 2: normals, 4: tangents
 
 const float FLOAT_MAX = 3.402823466e38;
 
-// Sums beyond the numbers are nothing: no tracer can be asked to bound them.
+// Sums that overflow become 0: no tracer could bound them.
 vec3 finite_or_zero(vec3 v)
 {
     bvec3 fine = lessThanEqual(abs(v), vec3(FLOAT_MAX));
@@ -68,7 +68,7 @@ bool blend(uint vertex, out vec4 rows[3])
     return sum > 0.0;
 }
 
-// What has no direction stays as it is. (The square of small numbers would be none.)
+// A vector without a direction stays as it is. (The squares of small components would underflow.)
 vec3 unit_or_same(vec3 v)
 {
     float scale = greatest(abs(v));

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-// Where a primitive lies under the middle of a texel. For the lists only its depth and its id are noted: of what it is
-// made is found out once for each sample that stays (sample.comp). Peeling writes the paper's two targets in each pass.
+// The point of a primitive at the centre of a texel. Lists hold only its depth and id: the material is evaluated once
+// for each kept sample (sample.comp). Peeling writes the paper's two targets in each pass.
 // Defines:
 //   those of raster/fragment.glsl
-//   BUILD_PASS      0: each texel's fragments are noted; 1: they are counted only; 2: of those behind the layer
-//                   before, the nearest is kept (depth peeling)
+//   BUILD_PASS 0: each texel's fragments are listed; 1: they are counted only; 2: the nearest of those behind the
+//     previous layer is kept (depth peeling)
 //   with BUILD_PASS 2 those of ldc/sample.glsl
 
 #include "ldc/layout.h"
@@ -24,7 +24,7 @@ layout(binding = IMAGE_LDC_COUNTS, r32ui) uniform uimageBuffer counts;
 #if BUILD_PASS == 0
 uniform uint texel_count;
 uniform uint slots;         // fragments of a texel that have a slot
-uniform uint fragments_max; // that there is room for without
+uniform uint fragments_max; // capacity without
 layout(binding = IMAGE_LDC_ORDERED, rg32ui) writeonly uniform uimageBuffer ordered;
 layout(binding = IMAGE_LDC_FRAGMENTS, rgba32ui) writeonly uniform uimageBuffer fragments;
 layout(std430, binding = BIND_LDC_BUILD_COUNTS) buffer build_block { ldc_build_counts build; };
@@ -49,7 +49,7 @@ void record(float depth_cells)
     imageAtomicAdd(counts, int(texel_number()), 1u);
 }
 #else
-// Of several records of one fragment the nearest counts; none may be there.
+// The nearest of several records of one fragment; there may be none.
 float nearest_cells = LDC_NO_DEPTH;
 
 void record(float depth_cells)
@@ -80,7 +80,7 @@ void main()
     finish();
 }
 #else
-// What leans more to another axis is in that one's image.
+// A surface that leans more to another axis is in that image.
 void main()
 {
     sphere_chord chord = chord_of_sphere();

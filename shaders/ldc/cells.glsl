@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-// The walk through a cube's cells, all three images at once: from the first cell on the ray's way that a sample's plane
-// passes to the next, so that what is found first is, up to a cell, the nearest. How cells are found is in ldc/layout.h
-// (Cells): a node of 16 x 16 x 16 cells knows how far it is empty around it, which of its 64 blocks of 4 x 4 x 4
-// hold something, and a block knows that of each cell.
+// The traversal of a cube's cells, all three images at once: from one cell along the ray that a sample's plane passes
+// to the next, so that the first intersection is, up to a cell, the nearest. Cells are described in ldc/layout.h: a
+// node of 16 x 16 x 16 cells knows how far it is empty around it and which of its 64 blocks of 4 x 4 x 4 are occupied,
+// and a block knows its occupied cells.
 #include "ldc/found.glsl"
 #include "raster/blocks.glsl"
 
@@ -13,9 +13,9 @@ layout(binding = UNIT_TRACER_4) uniform usamplerBuffer ldc_nodes; // and blocks
 layout(binding = UNIT_TRACER_5) uniform usamplerBuffer ldc_entries;
 
 uniform int ldc_grid[LDC_CUBES]; // nodes along a side
-uniform vec3 ldc_lower[LDC_CUBES], ldc_upper[LDC_CUBES]; // of the cells that hold something
+uniform vec3 ldc_lower[LDC_CUBES], ldc_upper[LDC_CUBES]; // of the occupied cells
 
-// Axes are turned as raster/blocks.glsl says.
+// Axes are mirrored as in raster/blocks.glsl.
 struct cell_walk {
     vec3 o, d, inverse;
     ivec3 flip;  // -1: turned
@@ -24,22 +24,22 @@ struct cell_walk {
     float s_least, s_limit; // between which a crossing counts
     float begin, scale; // cell_ray's
     int cube, grid, first_node, octant_shift;
-    int at, shift; // texel of what it is in; log2 of the size of its parts: 2 a node, 0 a block
+    int at, shift; // texel of the current node or block; log2 of the size of its parts: 2 in a node, 0 in a block
 };
 
 // A cell to be tested.
 struct found_cell {
-    ivec3 cell; // as the walk has it
+    ivec3 cell; // mirrored
     uint entry; // LDC_ENTRY_NONE: there is none
 };
 
-// Not turned.
+// Not mirrored.
 ivec3 cube_cell(cell_walk w, ivec3 cell)
 {
     return turned(cell, w.flip, w.grid << LDC_NODE_SHIFT);
 }
 
-// Where what the ray is in lies, a node or a block of it.
+// The lower corner of the node or block that the ray is in.
 int node_at(cell_walk w, ivec3 cell)
 {
     ivec3 n = cube_cell(w, cell) >> LDC_NODE_SHIFT;
@@ -76,8 +76,8 @@ void begin_cells(trace_ray r, float end, int pass, out cell_walk w)
     w.shift = 2;
 }
 
-// Looks at one of 64 parts of what the ray is in, a node or a block, and goes into it or past it; past a cell that a plane
-// passes too, which is `found`.
+// Tests one of 64 parts of the current node or block, and enters it or passes it; an occupied cell becomes `found` and
+// is passed.
 void step_on(inout cell_walk w, inout found_cell found, bvec3 down)
 {
         LDC_COUNT(x);
@@ -94,7 +94,7 @@ void step_on(inout cell_walk w, inout found_cell found, bvec3 down)
         } else {
             found.cell = w.cell;
             found.entry = is_set ? words.z + rank : LDC_ENTRY_NONE;
-            // As far as the parts ahead are empty.
+            // Past the empty parts ahead.
             int parts = parts_to_pass(words.xy, b & 3u, down);
             ivec3 border = ((w.cell >> w.shift) + parts) << w.shift, end = ((w.cell >> (w.shift + 2)) + 1) << (w.shift + 2);
             border = min(border, end);
@@ -114,9 +114,9 @@ void step_on(inout cell_walk w, inout found_cell found, bvec3 down)
         }
 }
 
-// Up to two steps towards the next cell that a plane passes. In a SIMD group all wait for the one that has most to do, so
-// it is looked often whether there is something to test: with four steps rays are a seventh slower, with one a tenth, with
-// a loop up to the next cell a fifth.
+// Up to two steps towards the next occupied cell. The lanes of a SIMD group wait for the slowest, so cells are tested
+// after few steps: with four steps rays are a seventh slower, with one a tenth, with a loop up to the next cell a
+// fifth.
 found_cell next_cell(inout cell_walk w)
 {
     found_cell found = found_cell(ivec3(0), LDC_ENTRY_NONE);

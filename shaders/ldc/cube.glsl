@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: MIT
-// A ray among the cells of a cube, and where it crosses a sample.
+// A ray among the cells of a cube, and its intersections with samples.
 //
-// A wave's cubes are walked one behind the other; `ldc_cubes` of them there are, of which each has a lower corner, a
-// size of cell and places in the buffers of its own.
+// The cubes of a scene, `ldc_cubes` of them, are traversed in order; each has its own lower corner, cell size and
+// places in the buffers.
 //
 // Rays in a cube are those of common/cell_ray.glsl.
 //
-// Defines: LDC_CUBES 1 or 2; LDC_TOLERANCE a hit is where the ray comes as near to a sample's depth, else where it
-// crosses the sample's plane; LDC_COUNT_STEPS crossings are not samples but, for the benchmark, what the walk did: nodes,
-// blocks and texels looked at in place of the distance, samples tested in that of the primitive, texels or cells whose
-// samples were in that of the instance.
+// Defines: LDC_CUBES 1 or 2; LDC_TOLERANCE a hit is where the ray comes this near to a sample's depth, else where it
+// intersects the sample's plane; LDC_COUNT_STEPS for the benchmark, intersections hold counts and not samples: visited
+// nodes, blocks and texels in place of the distance, tested samples in place of the primitive, texels or cells with
+// tested samples in place of the instance.
 #include "shared/bindings.h"
 #include "common/cell_ray.glsl"
 #include "ldc/plane.glsl"
@@ -34,7 +34,7 @@ uniform int ldc_first_node[LDC_CUBES];
 uniform float ldc_tolerance[LDC_CUBES]; // cells
 #endif
 
-// A uniform of one number for all of a SIMD group is read once, one of each's own lane by lane.
+// A uniform with one index for a whole SIMD group is read once, with an index per lane lane by lane.
 #if LDC_CUBES == 1
 #define CUBE(number) 0
 #else
@@ -46,18 +46,15 @@ cell_ray cube_ray_of(trace_ray r, int cube)
     return cell_ray_of(r, ldc_place[CUBE(cube)], float(ldc_resolution[CUBE(cube)]));
 }
 
-// ---- samples ----
-
-// A ray that begins on a surface may begin a little beyond a neighbour's plane, and would at once hit what it leaves. So
-// near its origin a ray does not cross planes that pass the origin as near as this. From behind, which is how a ray that
-// goes away outside meets what it leaves, that is generous; from the front, which is how it meets another wall in a
-// corner, and how a ray that was refracted meets what it has entered by, it is what a surface needs that bends by a
-// radius of six cells: 1.5^2 / (2 * 6).
+// A ray that begins on a surface may begin a little beyond a neighbour's plane, and would at once hit the surface that
+// it leaves. So near its origin a ray ignores planes that pass the origin within this distance. From behind, as a ray
+// that leaves a body would hit its own surface, the distance is generous. From the front, as a ray in a corner hits the
+// other wall, and a refracted ray its own surface, it suffices for a curvature radius of six cells: 1.5^2 / (2 * 6).
 const float LDC_OWN_WAY = 1.5;
 const float LDC_OWN_BEHIND = 0.5, LDC_OWN_BEFORE = 0.2;
 
-// Where the ray (o, d in the image) crosses a sample of a texel, if it does so there. `normal` may have any length;
-// `side` is positive where the ray comes from behind.
+// Intersects the ray (o, d in the image) with a sample of a texel, within the texel. `normal` may have any length;
+// `side` is positive if the ray comes from behind.
 bool cross_sample(vec3 o, vec3 d, int cube, vec2 texel, float depth, vec3 normal, out float s, out float side)
 {
     LDC_COUNT(z);
@@ -65,7 +62,7 @@ bool cross_sample(vec3 o, vec3 d, int cube, vec2 texel, float depth, vec3 normal
     float height = dot(normal, to_sample);
     side = dot(normal, d);
 #ifdef LDC_TOLERANCE
-    // Where on its way through the texel it comes nearest to the sample's depth.
+    // The point of the ray in the texel that is nearest to the sample's depth.
     vec2 inverse = 1.0 / d.xy;
     vec2 a = (to_sample.xy - 0.5) * inverse, b = (to_sample.xy + 0.5) * inverse;
     vec2 near = min(a, b), far = max(a, b);

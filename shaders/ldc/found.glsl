@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// What a walk through cubes does with the samples that a ray crosses.
+// What a traversal of cubes does with the samples that a ray intersects.
 //
-// Defines: those of trace.comp.
+// Defines: those of trace/wave.comp.
 #include "shared/hit.h"
 #include "common/crossed.glsl"
 #include "common/sampled.glsl"
@@ -23,8 +23,8 @@ struct ldc_found {
 #ifdef ANY_HIT
 
 #ifdef HAS_TRANSLUCENT
-// What of a shadow ray's light passes a sample: transmittance_of() of common/alpha.glsl. What a mask cuts away has no
-// samples.
+// The transmittance of a sample for a shadow ray: transmittance_of() of common/alpha.glsl. Surfaces that a mask cuts
+// away have no samples.
 vec3 transmittance_of_sample(uvec4 words)
 {
     material m = materials[sample_material(words)];
@@ -39,7 +39,7 @@ vec3 transmittance_of_sample(uvec4 words)
 }
 #endif
 
-// The ray crosses a sample at a distance between its t_min and found.end. `near` is a cell, as a distance.
+// Records an intersection with a sample at a distance between t_min and found.end. `near` is a cell, as a distance.
 void offer_sample(inout ldc_found found, uint sample_index, float distance_, float side, float near)
 {
 #ifdef HAS_TRANSLUCENT

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// How many texels have how many fragments; 255 stands for more too.
+// The histogram of fragments per texel; the last bin is 255 and more.
 
 #include "ldc/layout.h"
 #include "shared/bindings.h"

@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: MIT
-// The walk image by image: a DDA through an image's nodes, from large to small where the ray's own depths meet what the
-// node holds and on to the next where they do not. Paper, section 1.4.
+// The traversal image by image: a DDA through an image's nodes, into the children where the ray's depths meet the
+// node's range and on to the next node where they do not. Paper, section 1.4.
 //
-// Image after image, that of the axis that the ray runs along most first, whose texels it crosses fewest of; what is
-// found in one ends the ray in the next.
+// The image of the ray's dominant axis comes first, as the ray crosses fewest of its texels; an intersection in one
+// image ends the ray in the next.
 //
 // Defines: LDC_LEVEL_BITS nodes have 2^bits x 2^bits children; LDC_BLOCKS there is one level, else up to a single node;
-// LDC_LAYERS_TOGETHER 1 or 4 of a texel's samples are tested at once.
+// LDC_LAYERS_TOGETHER 1 or 4: the number of a texel's samples that are tested at once.
 #include "ldc/found.glsl"
 
 #ifndef LDC_CELLS
 
-layout(binding = UNIT_TRACER_4) uniform samplerBuffer ldc_ranges; // of nodes: least and greatest depth
+layout(binding = UNIT_TRACER_4) uniform samplerBuffer ldc_ranges; // of nodes: minimum and maximum depth
 
 uniform int ldc_top[LDC_CUBES]; // the top level; 0 are the texels
 #ifdef LDC_BLOCKS
@@ -29,7 +29,7 @@ struct image_walk {
     int cube, axis;
 };
 
-// Image number `pass` of all cubes for a ray: one that is not looked at has s >= s_end.
+// Image number `pass` of all cubes for a ray; if the ray does not enter it, s >= s_end.
 void begin_image(trace_ray r, float end, int pass, out image_walk w)
 {
     w.cube = pass / 3;
@@ -65,7 +65,7 @@ int node_index(image_walk w, ivec2 node)
     int row = ldc_row[CUBE(w.cube)];
     return ldc_first_node[CUBE(w.cube)] + (w.axis * row + node.y) * row + node.x;
 #else
-    // Levels from the top on, each with all nodes that a square of so many levels has.
+    // The first node of a level; levels are stored from the top on, each with all nodes of its square.
     int bits = LDC_LEVEL_BITS * (top - w.level);
 #if LDC_LEVEL_BITS == 1
     const int levels = 0x55555555, image_shift = 2;
@@ -80,7 +80,7 @@ int node_index(image_walk w, ivec2 node)
 #endif
 }
 
-// Where the ray leaves the node of a level that it is in, and by which side.
+// Where the ray leaves its current node of a level, and by which side.
 float node_exit(image_walk w, int shift, out bool by_u)
 {
     ivec2 first = w.texel >> shift << shift, last = first + ((1 << shift) - 1);
@@ -90,7 +90,7 @@ float node_exit(image_walk w, int shift, out bool by_u)
     return by_u ? exits.x : exits.y;
 }
 
-// Out of that node, in whole numbers, so that each step goes on.
+// Out of that node, in integers, so that each step advances.
 void leave_node(inout image_walk w, int shift, float s_out, bool by_u)
 {
     ivec2 first = w.texel >> shift << shift, last = first + ((1 << shift) - 1);
@@ -105,10 +105,10 @@ void leave_node(inout image_walk w, int shift, float s_out, bool by_u)
     w.s = uint(next.x) >= resolution || uint(next.y) >= resolution ? 1e30 : w.s;
 }
 
-// How often, before it is looked whether there is something to test: in a SIMD group all wait for the one that has most to do.
+// Rounds before a test for samples: the lanes of a SIMD group wait for the slowest.
 const int IMAGE_ROUNDS = 4;
 
-// On towards the next texel that the ray may hit something in, for some rounds. True: it is there.
+// On towards the next texel in which the ray may hit something, for some rounds. True: it was reached.
 bool next_texel(inout image_walk w, out uvec4 words, out float z_least, out float z_greatest)
 {
     words = uvec4(0u);
@@ -155,7 +155,7 @@ void test_sample(inout image_walk w, uint sample_index, float depth, uint normal
     }
 }
 
-// The samples of the texel that the ray is in between two depths, which it then leaves.
+// Tests the samples of the current texel between two depths, and leaves the texel.
 void test_texel(inout image_walk w, uvec4 words, float z_least, float z_greatest, inout ldc_found found)
 {
     uint count = words.y & LDC_TEXEL_COUNT_MASK;

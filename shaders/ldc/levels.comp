@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: MIT
 // Ranges of depth over blocks of texels of an image, of all its layers: one level from the one below (paper, section
-// 1.3). What a ray's depths do not meet there, it does not meet in the block: a range holds the planes of its samples
-// wherever they count, not only the samples.
+// 1.3). A ray whose depths do not meet the range hits nothing in the block: a range covers the extended planes of its
+// samples, not only the samples.
 //
-// Defines: LDC_FROM_TEXELS the level below is the texels; LDC_LEVEL_BITS.
+// Defines: LDC_FROM_TEXELS the level below is that of the texels; LDC_LEVEL_BITS.
 #include "ldc/layout.h"
 #include "shared/bindings.h"
 #include "common/dispatch.glsl"
 #include "ldc/plane.glsl"
 
 #ifdef LDC_FROM_TEXELS
-// Of a texel's samples: of more, as far as a plane may go. Software GL ends an invocation's loops after 65,535 rounds,
-// and the largest block has 1,024 texels.
+// The number of a texel's samples whose planes are evaluated; with more, the maximum deviation is assumed. Software GL
+// ends an invocation's loops after 65,535 rounds, and the largest block has 1,024 texels.
 const uint PLANES_MAX = 32u;
 
 layout(binding = UNIT_TRACER_0) uniform usamplerBuffer ldc_texels;
@@ -22,7 +22,7 @@ layout(binding = UNIT_TRACER_0) uniform samplerBuffer ranges_below;
 layout(binding = IMAGE_LDC_NODES, rg32f) writeonly uniform imageBuffer ranges;
 
 uniform uint first_below, row_below, width_below, image_below; // where an image's level below begins; row and image are
-uniform uint first_here, row_here, width_here, image_here;     // steps, width is how many there are in a row
+uniform uint first_here, row_here, width_here, image_here;     // strides; width: nodes in a row
 
 vec2 range_below(uint axis, uvec2 place)
 {

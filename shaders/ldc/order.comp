@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Fragments that there was no slot for, which came in any order, to their texels' places.
+// Moves the fragments without a slot, which came in any order, to their texels' places.
 
 #include "ldc/layout.h"
 #include "shared/bindings.h"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// From the fragments of texels to their samples: sorted by depth and id, the first of coincident ones, the nearest of
-// more than may be kept. Writes texels and quads, and what sample.comp needs to know of each sample.
-// Define: PEELED  they are sorted already, each once, and samples already
+// From the fragments of texels to their samples: sorted by depth and id, without duplicates, the nearest if there are
+// more than the limit. Writes texels and quads, and the input of sample.comp. Define: PEELED they are sorted and
+// distinct, and samples already
 
 #include "ldc/layout.h"
 #include "common/dispatch.glsl"
@@ -31,8 +31,8 @@ void in_order(inout uvec2 a, inout uvec2 b)
     a = least;
 }
 
-// The first four in registers, the rest by insertion: most texels have few, and where there are many they often come
-// in some order. Whether some may coincide.
+// The first four in registers, the rest by insertion: most texels have few, and many often come nearly in order. True:
+// some may coincide.
 bool sort(run r)
 {
     const uvec2 NONE = uvec2(0xffffffffu);
@@ -53,7 +53,7 @@ bool sort(run r)
             store(r, 3u, d);
         coincide = a.x == b.x || r.count > 2u && b.x == c.x || r.count > 3u && c.x == d.x;
     }
-    if (r.count > LDC_PACK_SORTS) // sort.comp has done it
+    if (r.count > LDC_PACK_SORTS) // sorted by sort.comp
         return true;
     for (uint i = 4u; i < r.count; i++) {
         uvec2 moved = load(r, i);
@@ -71,7 +71,7 @@ bool sort(run r)
     return coincide;
 }
 
-// Of sorted ones, of which some may coincide.
+// The number of distinct ones among sorted ones.
 uint count_kept(run r, bool coincide)
 {
     uint kept = coincide ? 0u : r.count < layers_max ? r.count : layers_max, last = LDC_NO_DEPTH_BITS;

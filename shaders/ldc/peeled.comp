@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Notes a layer that was peeled off the scene with its texels, behind those before it.
+// Appends a peeled layer of the scene to its texels' records.
 
 #include "ldc/layout.h"
 #include "shared/bindings.h"

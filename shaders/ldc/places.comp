@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Which texels have fragments, how many those are in all, and where those lie that there are no slots for.
+// Lists the texels that have fragments, counts these, and places those without a slot.
 
 #include "ldc/layout.h"
 #include "shared/bindings.h"
@@ -38,7 +38,7 @@ void main()
         atomicAdd(build.fragments_wraps, 1u);
     atomicAdd(build.samples_max, kept);
     atomicAdd(build.quads_max, quads);
-    if (most > build.layers_needed) // rarely; the atomic is dear
+    if (most > build.layers_needed) // rare, so the atomic's cost does not matter
         atomicMax(build.layers_needed, most);
     uint at = atomicAdd(build.occupied, filled), place = deep > 0u ? atomicAdd(build.places, deep) : 0u;
     uint row = first / texels_along, u = first - row * texels_along, axis = row / texels_along;

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: MIT
-// The plane of a sample, and how far it goes.
+// The plane of a sample and its extent.
 #include "ldc/layout.h"
 #include "common/math.glsl"
 
-// How far beyond its texel a sample's plane still counts, in cells: what neighbours' planes may leave open between
-// them where a surface bends.
+// The extension of a sample's plane beyond its texel, in cells: it closes the gaps between neighbours' planes on a
+// curved surface.
 const float LDC_SLACK = 0.05;
-// How far a plane may leave its sample's depth within its texel and the slack: half a cell and the slack along u, as far
-// along v, with the greatest slope, 1 / AXES_OVERLAP.
+// The maximum deviation of a plane from its sample's depth within its texel and the slack: half a cell and the slack
+// along u, the same along v, at the maximum slope, 1 / AXES_OVERLAP.
 const float LDC_SPAN = (1.0 + 2.0 * LDC_SLACK) / AXES_OVERLAP;
-// What depths and places round, in cells: some units in the last place of 4096.
+// The rounding error of depths and positions, in cells: some units in the last place of 4096.
 const float LDC_ROUNDING = 0.002;
 
 // Not unit: for ratios.
@@ -22,7 +22,7 @@ vec3 direction_from_octahedral(uint bits)
     return v;
 }
 
-// How far the plane of a sample of an axis's image leaves the sample's depth.
+// The deviation of the plane of a sample in an axis's image from the sample's depth.
 float plane_reach(uint normal_bits, int axis)
 {
     vec3 normal = abs(in_image(direction_from_octahedral(normal_bits), axis));

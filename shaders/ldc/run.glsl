@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A texel's fragments where they lie in `ordered`: those with slots, then those without. The host binds counts, places,
-// occupied and ordered, and sets the uniforms below.
+// A texel's fragments in `ordered`: those with slots, then those without. The host binds counts, places, occupied and
+// ordered, and sets the uniforms below.
 #include "ldc/layout.h"
 #include "shared/bindings.h"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Of what the surface is made at each sample that the lists of fragments gave.
+// The surface's material at each sample that the lists of fragments gave.
 // Defines: those of ldc/sample.glsl.
 
 #include "common/dispatch.glsl"
@@ -13,7 +13,7 @@ layout(binding = UNIT_LDC_DRAWN) uniform usamplerBuffer drawn;
 layout(binding = IMAGE_LDC_GEOMETRY, rg32ui) writeonly uniform uimageBuffer geometry_out;
 layout(binding = IMAGE_LDC_SURFACE, rgba32ui) writeonly uniform uimageBuffer surface_out;
 
-// The entry of `drawn` that an id belongs to.
+// The entry of `drawn` of an id.
 uvec4 drawn_of(uint id)
 {
     uint first = 0u, count = drawn_count;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Of what the surface is made at a point of a primitive: the words of ldc/layout.h. Textures are applied over the size
-// of a cell, as common/material.glsl applies them; what the material itself says is not.
+// The surface's material at a point of a primitive: the words of shared/surface_sample.h. Textures are applied,
+// filtered to the size of a cell, as in common/material.glsl; the material's own factors are not.
 // Defines: those of common/material.glsl; HAS_COLOURS: some mesh has vertex colours.
 
 #include "ldc/layout.h"
@@ -13,7 +13,7 @@ float cross_2d(vec2 a, vec2 b)
     return a.x * b.y - a.y * b.x;
 }
 
-// Of a primitive under the middle of a texel.
+// The point of a primitive at the centre of a texel.
 struct point {
     uint instance_index, primitive;
     uint flags; // DRAWN_*
@@ -28,7 +28,7 @@ point make_point(uint instance_index, uint primitive, uint flags, int axis, vec2
                  depth_cells);
 }
 
-// A triangle's corners, in cells, and where in it the point is.
+// A triangle's corners, in cells, and the barycentrics of the point.
 struct placed_triangle {
     uvec4 vertices; // and the material
     vec4 world_from_object[3];
@@ -36,7 +36,7 @@ struct placed_triangle {
     vec2 barycentrics;
 };
 
-// Edges as they are drawn lie a little elsewhere than exact ones: the point is taken into the triangle.
+// Drawn edges differ a little from exact ones: the point is clamped to the triangle.
 placed_triangle place_triangle(point p)
 {
     placed_triangle t;
@@ -58,7 +58,7 @@ placed_triangle place_triangle(point p)
 }
 
 #if !defined HAS_TEXTURES && !defined HAS_BUMP
-// What surface_triangle() of common/surface.glsl finds, with half of its fetches: no texture coordinates, no tangent.
+// As surface_triangle() of common/surface.glsl with half of its fetches: no texture coordinates, no tangent.
 struct plain_surface {
     vec3 geometric, shading;
     uint material_index;
@@ -79,7 +79,7 @@ plain_surface plain_triangle(point p)
         vec4 rows[3] = t.world_from_object;
         float most = greatest(max(abs(rows[0].xyz), max(abs(rows[1].xyz), abs(rows[2].xyz))));
         vec3 r0 = rows[0].xyz / most, r1 = rows[1].xyz / most, r2 = rows[2].xyz / most;
-        // Cofactors: the inverse, transposed, but for the determinant, of which only the sign is of account.
+        // Cofactors: the transposed inverse but for the determinant, of which only the sign matters.
         vec3 interpolated = side * vec3(dot(cross(r1, r2), sum), dot(cross(r2, r0), sum), dot(cross(r0, r1), sum));
         float squared = dot(interpolated, interpolated);
         if (squared > 0.0)
@@ -120,7 +120,7 @@ uvec4 words_of(surface s, vec4 colour, uint material_index)
 #if defined HAS_TEXTURES || defined HAS_COLOURS
     stored.base_colour = colour;
 #else
-    stored.base_colour = vec4(1.0); // known to the compiler
+    stored.base_colour = vec4(1.0); // a constant for the compiler
 #endif
     stored.normal = s.normal;
     stored.material = material_index;
@@ -158,7 +158,7 @@ void describe(point p, out uvec2 geometry_words, out uvec4 surface_words)
 #endif
     geometry_words = uvec2(floatBitsToUint(p.depth_cells), h.normal_geometric);
     surface_words = words_of(s, colour, h.material);
-#else // nothing is packed to be unpacked
+#else // packing and unpacking would be wasted
     plain_surface found = plain_triangle(p);
     s.normal = found.shading;
     geometry_words = uvec2(floatBitsToUint(p.depth_cells), pack_unit(found.geometric));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Sorts the fragments of texels that have many (pack.comp does the others).
+// Sorts the fragments of texels that have many (pack.comp sorts the others).
 
 #define SORT_ITEM uvec2
 #include "common/dispatch.glsl"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// From the crossings of a closest-hit wave to hits: the second half of the walk through layered depth cubes, in the
-// place of surface.comp. What a sample holds of its surface goes into the hit as it is; discs, which no cube holds,
-// become what they are everywhere.
+// From the intersections of a closest-hit wave to hits: the second half of tracing layered depth cubes, in place of
+// trace/surface.comp. A sample's words are copied into the hit; discs, which no cube holds, become hits as for every
+// tracer.
 //
 // Defines: HAS_DISCS as the scene has them.
 #include "common/dispatch.glsl"
@@ -11,7 +11,7 @@
 layout(binding = UNIT_RAYS) uniform samplerBuffer rays; // two texels each
 layout(binding = UNIT_TRACER_0) uniform usamplerBuffer sample_geometry;
 layout(binding = UNIT_TRACER_1) uniform usamplerBuffer sample_surfaces;
-layout(binding = IMAGE_HITS, rgba32ui) uniform uimageBuffer hits; // three texels each; a crossing is the first
+layout(binding = IMAGE_HITS, rgba32ui) uniform uimageBuffer hits; // three texels each; an intersection is the first
 
 uniform uint first_ray; // of this dispatch
 uniform uint ray_count; // where it ends

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
-// The walk through layered depth cubes (ldc/layout.h). Bürger, Hertel, Krüger, Westermann. GPU Rendering of Secondary
+// The traversal of layered depth cubes (ldc/layout.h). Bürger, Hertel, Krüger, Westermann. GPU Rendering of Secondary
 // Effects. 2007.
 //
-// The host (trace/ldc/trace.c) sets, besides the defines of trace.comp, those that the files included here name.
+// The host (trace/ldc/trace.c) sets, besides the defines of trace/wave.comp, those that the files included here name.
 //
-// RAYS_TOGETHER rays are one invocation's, one behind the other: fewer invocations, each with more to do. (Rays that go on
-// with the next as soon as they are done, each at its own, were slower still: what begins a ray was then run each round.)
+// One invocation traces RAYS_TOGETHER rays in sequence: fewer invocations, each with more work. (Letting each
+// invocation begin its next ray as soon as one is finished was slower: the code that begins a ray then ran each round.)
 //
-// Define: LDC_CELLS the walk is that of ldc/cells.glsl, else that of ldc/images.glsl.
+// Define: LDC_CELLS the traversal is that of ldc/cells.glsl, else that of ldc/images.glsl.
 #include "ldc/cells.glsl"
 #include "ldc/images.glsl"
 
@@ -71,7 +71,7 @@ void walk_rays(trace_ray rays_[RAYS_TOGETHER], inout answer answers[RAYS_TOGETHE
     }
 }
 
-// What trace.comp calls.
+// Called by trace/wave.comp.
 #if RAYS_TOGETHER > 1
 
 #ifdef ANY_HIT

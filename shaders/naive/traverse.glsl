@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Every primitive of every instance for every ray: the plain truth that the structures are compared with.
-// Keep it as simple as can be.
+// Tests every primitive of every instance for every ray: the ground truth for the structures. Keep it as simple as
+// possible.
 #include "common/candidate.glsl"
 
 uniform uint instance_count;

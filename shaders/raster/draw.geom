@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Sends a triangle to the image whose axis its normal leans to most, or to those where images overlap, with its plane
-// in cells; a sphere to all three, as the square round it.
-// Burger, Hertel, Kruger, Westermann. GPU Rendering of Secondary Effects. 2007, figure 5.
+// in cells; a sphere to all three, as its bounding square. Burger, Hertel, Kruger, Westermann. GPU Rendering of
+// Secondary Effects. 2007, figure 5.
 // Defines:
 //   PRIMITIVE_KIND  0 triangles, 1 spheres
 //   HAS_CUTOUT      triangles may have holes
@@ -56,7 +56,7 @@ vec3 place_in_cells(vec4 world_from_object[3], vec3 object)
     return (affine_point(world_from_object, object) - lower_world) / cell_world;
 }
 
-// What lies on the sides of the cube stays in it, to rounding.
+// Geometry on the sides of the cube stays in it despite rounding.
 float clip_depth(float depth_cells)
 {
     return 0.0005 + 0.999 * depth_cells / resolution;
@@ -70,7 +70,7 @@ void emit(vec2 uv_cells, float depth_cells, int axis)
 }
 
 #if PRIMITIVE_KIND == 0
-// Of a texel: more than a rasteriser rounds corners by.
+// In texels: more than a rasteriser's rounding of corners.
 const float SNAP_CELLS = 1.0 / 32.0;
 
 float cross_2d(vec2 a, vec2 b)
@@ -78,8 +78,8 @@ float cross_2d(vec2 a, vec2 b)
     return a.x * b.y - a.y * b.x;
 }
 
-// Whether a triangle may have the middle of a texel under it. Most small ones have none, and a rasteriser takes ten
-// times as long to find that out.
+// Whether a triangle may cover the centre of a texel. Most small ones cover none, and a rasteriser takes ten times as
+// long to find out.
 bool may_cover(vec2 a, vec2 b, vec2 c)
 {
     vec2 lower = ceil(min(a, min(b, c)) - (0.5 + SNAP_CELLS)), upper = floor(max(a, max(b, c)) - (0.5 - SNAP_CELLS));
@@ -94,7 +94,7 @@ bool may_cover(vec2 a, vec2 b, vec2 c)
            side * cross_2d(ca, middle - c) >= -SNAP_CELLS * (abs(ca.x) + abs(ca.y));
 }
 
-// What of a plane is so steep that slopes say nothing: far from where it passes more cells than there are.
+// Slopes beyond this say nothing: such a plane passes more cells in a texel than the cube has.
 const float SLOPE_MAX = 65536.0;
 
 // Slopes of the depth along u and v.
@@ -109,7 +109,7 @@ vec2 slopes_of(vec3 normal, int axis, int u, int v)
 }
 
 #ifdef ALL_IMAGES
-// Of a normal of any length, which for a needle may be none: that one is steep everywhere.
+// The normal may have any length; a needle's may be zero: it counts as steep everywhere.
 uint face_of_triangle(vec3 normal)
 {
     float most = greatest(abs(normal));
@@ -125,7 +125,7 @@ void main()
     uvec4 triangle = texelFetch(triangles, int(primitive_in[0].z));
     int second = 1;
 #ifdef ALL_IMAGES
-    if ((primitive_in[0].w & DRAWN_MIRRORED) != 0u) { // the outside is on the left of its edges
+    if ((primitive_in[0].w & DRAWN_MIRRORED) != 0u) { // the outside is to the left of its edges
         triangle.yz = triangle.zy;
         second = 2;
     }
@@ -137,7 +137,7 @@ void main()
     vec3 lean = abs(normal), lower = min(corners[0], min(corners[1], corners[2])),
          upper = max(corners[0], max(corners[1], corners[2]));
 #ifdef ALL_IMAGES
-    // What has no area to rounding may have one to the rasteriser, and a body its whole surface.
+    // A triangle whose area rounds to zero may have one in the rasteriser, and a body needs its whole surface.
     uint face = face_of_triangle(normal);
     int most = axis_of(lean);
 #else
@@ -171,8 +171,8 @@ void main()
     }
 }
 #else
-// The square is a little larger than the sphere, so that rounding does not cut the sphere's rim. Its depth is of no
-// account, only that it is in the cube.
+// The square is a little larger than the sphere, so that rounding does not cut the sphere's rim. Its depth does not
+// matter, if only it is in the cube.
 const float SQUARE_MARGIN = 1.0001;
 
 void main()

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Primitives of instances on their way into images along the axes, a vertex each: which one it is. The geometry shader
-// fetches the rest, once. The one attribute advances with the instance.
+// Primitives of instances that are drawn into images along the axes, one vertex each: the primitive's number. The
+// geometry shader fetches the rest, once. The one attribute advances with the instance.
 
 layout(location = 0) in uvec4 drawn; // raster/layout.h
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-// How a surface lies to the axes: FACE_* bits of raster/layout.h.
+// A surface's orientation to the axes: FACE_* bits of raster/layout.h.
 #include "raster/layout.h"
 #include "common/math.glsl"
 
-// `unit` looks to the outside.
+// `unit` points to the outside.
 uint face_of(vec3 unit)
 {
     vec3 lean = abs(unit);
@@ -16,7 +16,7 @@ uint face_of(vec3 unit)
     return face;
 }
 
-// The axis that it leans to most, of equal ones the first.
+// The dominant axis, of equal ones the first.
 int axis_of(vec3 lean)
 {
     return lean.x >= lean.y && lean.x >= lean.z ? 0 : lean.y >= lean.z ? 1 : 2;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Where a primitive lies under the middle of a texel of the images along the axes: what raster/draw.geom gives to a
-// fragment shader.
+// The point of a primitive at the centre of a texel of the images along the axes, from the outputs of raster/draw.geom.
 // Defines: PRIMITIVE_KIND 0 triangles, 1 spheres; HAS_CUTOUT: they may have holes; HAS_SPHERES with PRIMITIVE_KIND 1.
 #include "shared/bindings.h"
 #include "common/alpha.glsl"
@@ -22,7 +21,7 @@ uint texel_number()
     return (uint(gl_Layer) * texels_along + uint(gl_FragCoord.y)) * texels_along + uint(gl_FragCoord.x);
 }
 
-// Depths of what lies on the sides of the cube may be rounded out of it.
+// Depths of geometry on the sides of the cube may be rounded out of it.
 float depth_in_cube(float depth_cells)
 {
     return min(max(depth_cells, 0.0), float(texels_along));
@@ -44,16 +43,16 @@ float triangle_depth_cells()
     precise float along_u = (gl_FragCoord.x - plane.z) * plane.x;
     precise float along_v = (gl_FragCoord.y - plane.w) * plane.y;
     precise float depth_cells = depths.x + along_u + along_v;
-    // Not behind nor before the triangle, where it is thin and its plane uncertain; and on the cube.
+    // Clamped to the triangle's range, as the plane of a thin one is uncertain, and to the cube.
     depth_cells = min(max(depth_cells, depths.y), depths.z);
     return depth_in_cube(depth_cells);
 }
 #else
-// The line along the axis through the texel's middle, and where it crosses the sphere.
+// The line along the axis through the texel's centre, and its intersections with the sphere.
 struct sphere_chord {
-    vec3 origin, direction; // world space; depths are in cells, and so long is the direction
+    vec3 origin, direction; // world space; a cell long, as depths are in cells
     vec4 rows[3];           // object_from_world
-    float nearest, half_chord; // cells; not >= 0: the line passes the sphere
+    float nearest, half_chord; // cells; not >= 0: the line misses the sphere
     vec3 closest, step_object; // from its centre, object space
 };
 
@@ -83,7 +82,7 @@ sphere_chord chord_of_sphere()
     return c;
 }
 
-// side 0: where the line enters; 1: where it leaves. The normal is of any length.
+// side 0: where the line enters; 1: where it leaves. The normal may have any length.
 float crossing_of(sphere_chord c, int side, out vec3 normal_world)
 {
     precise float reach = side == 0 ? -c.half_chord : c.half_chord;

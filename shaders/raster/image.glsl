@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Which of the images along the axes a surface is in, where it is not in all.
+// The images along the axes that a surface is in, if it is not in all.
 #include "raster/layout.h"
 
-uniform float overlap; // AXES_OVERLAP, or 1: one image a triangle
+uniform float overlap; // AXES_OVERLAP, or 1: one image per triangle
 
 // `lean`: absolute values of its normal's components.
 bool is_in_image(vec3 lean, int axis)

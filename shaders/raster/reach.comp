@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
-// How far it is empty around the empty blocks of a grid (raster/layout.h). One invocation a block.
-//
-// Defines, one a pass, in this order: REACH_X, REACH_Y, REACH_Z.
+// The size of the empty space around the empty blocks of a grid (raster/layout.h). One invocation per block. Defines,
+// one per pass, in this order: REACH_X, REACH_Y, REACH_Z.
 #include "raster/layout.h"
 #include "common/dispatch.glsl"
 
@@ -10,9 +9,9 @@ layout(binding = IMAGE_BLOCKS, rgba32ui) uniform uimageBuffer blocks;
 uniform int first_texel, block_texels, grid; // the grid's first texel; of a block; blocks along a side
 uniform uint first_item, end_item;           // of the blocks
 
-// How many blocks from this one on, one way along an axis, are empty, squares, cubes of them: the largest number that
-// each of as many rows, squares beside it has. Of up to four octants at once, whose 4 bits are from `shift` on. A block's
-// own words are written by no other invocation.
+// The number of empty blocks from this one on in one direction of an axis; then of empty squares, then of cubes: the
+// largest n for which n adjacent rows (squares) are empty over n. For up to four octants at once, whose 4 bits begin at
+// `shift`. A block's own words are written by no other invocation.
 uint reach(int at, int left, int step_, uint shift)
 {
     uvec4 counts = uvec4(BLOCK_REACH_MAX);

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: MIT
-// Ambient occlusion: the rays that a hit asks how open it is.
+// Ambient occlusion rays of each hit.
 //
-//   radiance    none, but how much of the pixel is covered
+//   radiance none, only the pixel's coverage
 //   shadow rays as many as the frame says for a sample, in batches
 //   child       straight on (alpha blending)
 //
-// The rays of all samples of a pixel, and all rays of a sample, are points of one sequence: they are stratified together.
+// The rays of all samples of a pixel, and all rays of a sample, are points of one sequence: they are stratified
+// together.
 //
 // Defines: those of common/material.glsl and render/shade.glsl.
 
@@ -15,7 +16,7 @@
 uniform uint first_ray, batch_rays; // of shadow_rays_a_hit
 uniform float reach, falloff;       // metres; see common/occlusion.glsl
 
-// What is left of a ray that goes on through blended surfaces ends when it carries less than this.
+// The minimum weight with which a ray continues through blended surfaces.
 const float WEIGHT_MIN = 1.0 / 1024.0;
 
 uint ask_for_openness(uint j, path p, surface s, float weight, float distance_)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// First of three passes that give children their places: how many children and shadow rays each block of
-// COMPACT_BLOCK hits has. One invocation a block: no shared memory, which is slow on software GL.
+// First of three passes that give children their places: counts the children and shadow rays of each block of
+// COMPACT_BLOCK hits. One invocation per block: no shared memory, which is slow on software GL.
 
 #include "shared/path.h"
 #include "common/dispatch.glsl"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Third: the children go to their places as rays and paths of the next wave, in the order of their parents. The
-// host has made sure that there is room.
+// Third: the children go to their places as rays and paths of the next wave, in the order of their parents. The host
+// has reserved the space.
 // Defines: HAS_TIMES something moves: rays have a time.
 
 #include "shared/path.h"
@@ -10,7 +10,7 @@
 layout(local_size_x = 64) in;
 
 uniform uint hit_count;
-uniform uint children_a_hit; // room for so many
+uniform uint children_a_hit; // capacity
 
 layout(std430, binding = BIND_CHILD_COUNTS) readonly buffer count_block { uint child_counts[]; };
 layout(std430, binding = BIND_BLOCK_OFFSETS) readonly buffer offset_block { uvec2 block_offsets[]; };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The mean of a pixel's samples, and what a screen shows of it.
+// The mean of a pixel's samples, and its display value.
 #include "common/camera.glsl"
 #include "common/tonemap.glsl"
 

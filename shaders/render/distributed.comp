@@ -1,29 +1,26 @@
 // SPDX-License-Identifier: MIT
-// What each hit of a wave sends towards the eye, and the rays that it asks for: Cook, Porter, Carpenter. Distributed
-// Ray Tracing. 1984. Of all that a hit could ask for one of each kind is chosen, and weighs as much more as it was
-// unlikely, so the mean of the samples is right however few rays each has.
+// The radiance of each hit of a wave towards the eye, and its rays: Cook, Porter, Carpenter. Distributed Ray Tracing.
+// 1984. Of each kind of ray that a hit could emit one is chosen, weighted by the inverse of its probability, so the
+// mean of the samples is right however few rays each has.
 //
 //   radiance    emission, and a constant ambient term as in whitted.comp
 //   shadow ray  one, to one point of one light
 //   child       at most one: straight on (alpha blending), mirrored or refracted, in a direction that a facet of the
 //               rough surface sends it
 //
-// Defines: those of common/material.glsl, common/light.glsl, common/environment.glsl and
-// render/shade.glsl.
+// Defines: those of common/material.glsl, common/light.glsl, common/environment.glsl and render/shade.glsl.
 
 #include "common/environment.glsl"
 #include "common/light_choice.glsl"
 #include "common/lobe.glsl"
 #include "render/shade.glsl"
 
-// A child that would carry less than this to its pixel is followed only as often as its weight is of it, with this
-// weight.
+// A child with a lower weight than this is traced with the probability weight / this, and then has this weight.
 const float ROULETTE = 1.0 / 4.0;
 
-// How rough the mirrors and windows were that a path has met: what it sees from there is blurred by them. A lamp's
-// highlight on a smooth surface, which is as bright as it is narrow, is therefore widened to that; else one ray in
-// thousands would meet it, as a spark. Kaplanyan, Dachsbacher. Path Space Regularization for Holistic and Robust Light
-// Transport. 2013.
+// The roughness of the mirrors and windows that a path has met: they blur what it sees. A light's highlight on a smooth
+// surface, which is as bright as it is narrow, is widened to it; else one ray in thousands would hit it, as a firefly.
+// Kaplanyan, Dachsbacher. Path Space Regularization for Holistic and Robust Light Transport. 2013.
 float path_roughness(path p)
 {
     return float(p.flags >> PATH_ROUGHNESS_SHIFT) / 65535.0;
@@ -34,7 +31,7 @@ void add_lobe(uint j, path p, surface s, float NoV, float distance_, vec3 direct
     lobe chosen = lobe_choose(s, NoV, direction, choice, u);
     vec3 carried = weight * chosen.weight;
     float survival = greatest(carried) / ROULETTE;
-    if (!(choice < survival)) // not a number: likewise
+    if (!(choice < survival)) // also if it is NaN
         return;
     uint roughness = uint(max(path_roughness(p), s.roughness) * 65535.0 + 0.5);
     p.flags = p.flags & (1u << PATH_ROUGHNESS_SHIFT) - 1u | roughness << PATH_ROUGHNESS_SHIFT;

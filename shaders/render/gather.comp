@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Adds a wave's radiance and the light that its shadow rays let through to the samples of the slice. The paths of a
-// sample lie side by side; the first of them adds for all, in their order, so no two invocations share a sample and
-// the sum is the same to the bit every time. Shadow rays come in batches: each is added to its path's radiance, and the
-// last to the samples, so it does not matter how many there were.
+// sample lie side by side; the first of them adds for all, in their order, so no two invocations share a sample and the
+// sum is the same to the bit every time. Shadow rays come in batches: each batch is added to its path's radiance, and
+// the last to the samples, so their number does not matter.
 // Defines: GREY of what a shadow ray lets through, the mean of the channels counts.
 
 #include "shared/path.h"
@@ -21,8 +21,8 @@ layout(std430, binding = BIND_VISIBILITY) readonly buffer visibility_block { uin
 layout(std430, binding = BIND_LIGHT_SAMPLES) readonly buffer sample_block { vec4 light_samples[]; };
 layout(std430, binding = BIND_SLICE_SUMS) buffer sum_block { vec4 slice_sums[]; };
 
-// The greatest radiance that reaches a pixel: half floats hold 65504, and what is brighter is white at any
-// exposure of a scene lit for the eye. Also what is not a number must not spread.
+// The maximum radiance of a pixel: half floats hold 65504, and brighter values are white at any exposure of a scene lit
+// for the eye. NaN must not spread either.
 const float RADIANCE_MAX = 1e9;
 
 vec4 finite(vec4 v)

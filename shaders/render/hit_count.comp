@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// How many paths of each block of COMPACT_BLOCK hit something. First of three passes (then compact_scan.comp and
-// hit_list.comp) that list the hits, so that shading runs on those alone: software GL would run all of it for a
-// path that left the scene too.
+// Counts the paths of each block of COMPACT_BLOCK that hit something. First of three passes (then compact_scan.comp and
+// hit_list.comp) that list the hits, so that shading runs on those alone: software GL would run all of it for paths
+// that left the scene, too.
 
 #include "shared/hit.h"
 #include "shared/path.h"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What layers say of each sample of a slice: of the surface that its ray met first, whether or not it lets light
-// through. Of a sample that met nothing, and in layers of the first sample of all others, they are 0.
+// The layers of each sample of a slice: those of the first surface that its ray hit, opaque or not. They are 0 for a
+// sample that hit nothing, and, in layers of the first sample only, for all others.
 //
 // Defines: NEEDS_SURFACE albedo or normal are among them; those of common/material.glsl.
 
@@ -21,7 +21,7 @@ void put(uint layer_bit, uint k, vec4 value)
 
 uint node_of(hit h)
 {
-    // Discs stand below no node; which one a stored sample is of is not stored.
+    // Discs belong to no node; a stored sample does not hold its node.
     return h.instance == HIT_NO_PRIMITIVE ? 0u : instance_at(h.instance).node;
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The rays that the layer `ao` asks from each hit of a slice; those of the integrator of that name at first hits, so
-// that the two agree.
+// The rays of the layer `ao` for each hit of a slice: those of the integrator `ao` at first hits, so that the two
+// agree.
 //
 // Defines: those of common/material.glsl and render/shade.glsl.
 

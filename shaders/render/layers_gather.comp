@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Adds what the rays of layers_ao.comp let through to the layer's samples, those of a sample in their order.
+// Adds the transmittances of the rays of layers_ao.comp to the layer's samples, those of a sample in their order.
 
 #include "shared/layers.h"
 #include "common/dispatch.glsl"
@@ -21,7 +21,7 @@ void main()
         return;
     uint place = plane * ray_count + hit_list[j];
     float open_share = layer_sums[place].r; // ray by ray, so that it is the same however they are batched
-    for (uint i = 0u; i < batch_rays; i++) { // what has a colour lets its mean through
+    for (uint i = 0u; i < batch_rays; i++) { // the mean of a coloured transmittance
         vec3 through = unpackUnorm4x8(visibility[i * hit_count + j]).rgb;
         open_share += dot(through, vec3(1.0 / 3.0)) / float(all_rays);
     }

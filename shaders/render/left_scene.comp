@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// What the paths that left the scene bring home: the environment.
-// Defines: those of common/environment.glsl; OPEN it is 1 everywhere, whatever the environment;
-// SHARES paths say how much of it counts, and which lamp they met; HAS_AREA_LIGHTS with SHARES: there are lamps to meet.
+// The radiance of paths that left the scene: the environment.
+// Defines: those of common/environment.glsl; OPEN it is 1 everywhere, whatever the environment; SHARES paths say how
+// much of it counts, and which light they hit; HAS_AREA_LIGHTS with SHARES: there are area lights.
 
 #include "shared/path.h"
 #include "shared/ray.h"

@@ -1,23 +1,23 @@
 // SPDX-License-Identifier: MIT
-// What each hit of a wave sends towards the eye, and the rays that it asks for: Kajiya. The Rendering Equation. 1986,
-// by paths from the eye. There is no ambient term: what arrives, arrives over bounces.
+// The radiance of each hit of a wave towards the eye, and its rays: Kajiya. The Rendering Equation. 1986, by paths from
+// the eye. There is no ambient term: all light arrives over bounces.
 //
-//   radiance    emission; the lamp that the ray met on its way
+//   radiance    emission; the area light that the ray hit on its way
 //   shadow rays one to one point of one light, and one to the environment. Two, as nothing tells before they are traced
 //               which of them is in the shadow: chosen between, one would often be wasted
 //   child       at most one: straight on (alpha blending), scattered, mirrored or refracted
 //
-// Light that has an extent is found by shadow rays and by children, which cost nothing more: rectangles, spheres and the
-// environment are met by them as they go on. What both find is weighed by how probable each was to find it: Veach,
+// Light with an extent is found by shadow rays and by children, at no extra cost: rectangles, spheres and the
+// environment are met by them as they go on. Light that both find is weighted by multiple importance sampling: Veach,
 // Guibas. Optimally Combining Sampling Techniques for Monte Carlo Rendering. 1995, with the power heuristic. The last
-// hits of a path have no child; there shadow rays bring everything. Straight rays from the eye meet no lamp.
+// hits of a path have no child; there shadow rays bring everything. Straight rays from the eye hit no area light.
 //
-// Glass. Shadow rays go straight through it, tinted (common/alpha.glsl), smooth or not; so a lamp behind a pane lights a
-// room without waiting for a path to find it. The rays that go on have to find the same light for both ways to be weighed:
-// where one from a place that asked for light meets glass, a shadow ray goes straight on in its place, with its share. Its
-// child, which is bent, would bring that light once more: it brings none until it was scattered, or mirrored outside
-// (PATH_COVERED), but for what emissive surfaces send. Paths from the eye, or a mirror, see everything through glass.
-// Surfaces of glass ask for no light from inside.
+// Glass. Shadow rays go straight through it, tinted (common/alpha.glsl), smooth or not; so a light behind a pane lights
+// a room without waiting for a path to find it. The rays that go on have to find the same light for both ways to be
+// weighed: where one from a place that asked for light meets glass, a shadow ray goes straight on in its place, with
+// its share. Its child, which is bent, would bring that light once more: it brings none until it was scattered, or
+// mirrored outside (PATH_COVERED), but for what emissive surfaces send. Paths from the eye, or a mirror, see everything
+// through glass. Surfaces of glass ask for no light from inside.
 //
 // Defines: those of common/bsdf.glsl, common/light.glsl, common/environment_choice.glsl and render/shade.glsl.
 
@@ -26,12 +26,13 @@
 #include "common/light_choice.glsl"
 #include "render/shade.glsl"
 
-// From this bounce on a path ends as often as its weight is below 1, and weighs 1 where it does not.
+// Russian roulette begins at this bounce: a path with a weight below 1 survives with that probability, and then has the
+// weight 1.
 const uint ROULETTE_BOUNCES = 3u;
 
 uniform uint asks_lights, asks_environment; // 1: there are some; their shadow rays come in this order
 
-// Share of what a technique finds that is left to it, beside another that might have found it.
+// The weight of a technique, beside another that might have found the same light.
 float heuristic(float own, float other)
 {
     float ratio = other / own;
@@ -89,8 +90,8 @@ bool ask_for_environment(eye_hit e, uint place, uint seed, uint index)
 }
 
 #ifdef HAS_AREA_LIGHTS
-// One of the lights that the ray of a child will meet if nothing is in the way, and what of it counts. `found`: how
-// probable its direction was per steradian; 0: nothing else might have found them.
+// Chooses one of the lights that a child's ray will hit if nothing is in the way, and its weight. `found`: the
+// probability density of its direction per steradian; 0: no other technique finds them.
 void meet_lamps(inout path p, eye_hit e, vec3 origin, vec3 direction, float found, float choice)
 {
     float sum = 0.0;
@@ -102,7 +103,7 @@ void meet_lamps(inout path p, eye_hit e, vec3 origin, vec3 direction, float foun
         if (found > 0.0 && e.all_lights > 0.0)
             share = heuristic(found, probability * light_estimate(i, e.receiver) / e.all_lights);
         float size = share * greatest(l.colour.rgb);
-        if (!(size > 0.0)) // brings nothing, and would be divided by
+        if (!(size > 0.0)) // no contribution, and a divisor
             continue;
         sum += size;
         if (!(size > choice * sum)) {
@@ -118,7 +119,7 @@ void meet_lamps(inout path p, eye_hit e, vec3 origin, vec3 direction, float foun
 }
 #endif
 
-// The light that the ray was to find behind glass, straight on. Returns how many of its shadow rays are alive.
+// The light behind glass straight on, which the ray was to find. Returns the number of its live shadow rays.
 uint ask_straight_on(eye_hit e, vec3 direction, vec3 through)
 {
     uint place = e.j, alive = 0u;
@@ -161,7 +162,7 @@ void ask_nothing(uint j)
         no_shadow_ray(i * hit_count + j);
 }
 
-// The child that the surface sends on.
+// The child that the surface emits.
 void go_on(eye_hit e, uint seed, uint index, bool asked, float choice)
 {
     path p = e.p;
@@ -171,11 +172,11 @@ void go_on(eye_hit e, uint seed, uint index, bool asked, float choice)
     float survival = 1.0, end = sequence_number(seed, numbers_of(SEQUENCE_PATH_END), index);
     if ((p.flags & PATH_BOUNCES_MASK) >= ROULETTE_BOUNCES)
         survival = min(greatest(carried), 1.0);
-    if (!(end < survival)) // not a number: likewise
+    if (!(end < survival)) // also if it is NaN
         return;
     bool of_glass = chosen.lobe == BSDF_REFRACTED || e.b.leaves && chosen.lobe == BSDF_MIRRORED;
     bool covered = of_glass && (p.flags & (PATH_ASKED | PATH_COVERED)) != 0u;
-    // What shadow rays might have found.
+    // The density with which shadow rays sample it.
     float found = asked && !of_glass ? chosen.probability : 0.0;
     p.flags &= ~(PATH_ASKED | PATH_COVERED);
     p.flags |= (found > 0.0 ? PATH_ASKED : 0u) | (covered ? PATH_COVERED : 0u);
@@ -193,7 +194,7 @@ void go_on(eye_hit e, uint seed, uint index, bool asked, float choice)
     add_child(e.j, p, e.s, e.distance_, chosen.direction, carried / survival, false);
 }
 
-// The lamp that the ray met before it hit.
+// The area light that the ray hit before the surface.
 vec3 met_lamp(path p, float distance_)
 {
 #ifdef HAS_AREA_LIGHTS

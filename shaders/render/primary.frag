@@ -12,7 +12,7 @@ uniform uint first_primitive;
 layout(location = 0) out uvec2 visible;
 
 #if PRIMITIVE_KIND == 1
-// As clip_from_world_point() has it.
+// As clip_from_world_point() computes it.
 float depth_of(float distance_, vec3 direction)
 {
     vec3 axis = world_from_view_vector(vec3(0.0, 0.0, -1.0));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Primitives of one instance, pulled from the scene's texel buffers by the number of the vertex; there are no
-// vertex attributes. PRIMITIVE_KIND: 0 triangles, 1 spheres as the boxes round them, 2 discs as squares.
+// Primitives of one instance, fetched from the scene's texel buffers by the vertex number; there are no vertex
+// attributes. PRIMITIVE_KIND: 0 triangles, 1 spheres as their bounding boxes, 2 discs as squares.
 
 #include "common/camera.glsl"
 #include "common/geometry.glsl"

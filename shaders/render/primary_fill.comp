@@ -32,7 +32,7 @@ void main()
 #endif
     else
         found = candidate_triangle(instance_index, primitive, origin, direction, 0.0);
-    // Two compilations of one test may round apart at a rim: a hit stays a hit.
+    // Two compilations of one test may round differently at a rim: a hit stays a hit.
     found.distance = max(found.distance, rays[k].origin_t_min.w);
     hits[k] = surface_of(found, origin, direction, 0.0);
 }

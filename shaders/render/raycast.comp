@@ -2,12 +2,12 @@
 // All surfaces along a ray, blended front to back: Levoy. Display of Surfaces from Volume Data. 1988, with surfaces for
 // samples. What each hit of a wave sends towards the eye:
 //
-//   radiance    emission, the light of every lamp as if nothing were in the way, and the environment's irradiance, also
+//   radiance    emission, the light of every source without shadows, and the environment's irradiance, also
 //               in place of what a mirror would show; times how opaque the surface is
 //   child       straight on, with what is left
 //
-// Blended surfaces and glass are as opaque as they are: alpha, and what is not transmitted; what goes through glass is
-// tinted as shadow rays are. All others are made translucent: `layer_opacity`.
+// The opacity of blended surfaces is alpha, that of glass the share that it does not transmit; light through glass is
+// tinted as shadow rays are. All other surfaces are made translucent: `layer_opacity`.
 //
 // Defines: those of common/material.glsl, common/light.glsl and common/environment.glsl.
 
@@ -18,7 +18,7 @@
 
 uniform float layer_opacity; // 0..1
 
-// A ray ends when less than this is left of it: a third of a step of an 8-bit picture.
+// The minimum weight of a ray: a third of a step of an 8-bit picture.
 const float WEIGHT_MIN = 1.0 / 1024.0;
 
 vec3 lit(path p, surface s, vec3 direction, float distance_)
@@ -27,11 +27,11 @@ vec3 lit(path p, surface s, vec3 direction, float distance_)
     float NoV = clamp(dot(s.normal, view), 1e-4, 1.0); // a shading normal may lean away
     split parts = split_light(s, NoV);
     vec3 origin = off_surface(s, distance_, s.geometric);
-    vec3 mirror = parts.mirror + parts.refracted; // as if what is behind glass were as bright as what is before it
+    vec3 mirror = parts.mirror + parts.refracted; // as if the scene were as bright behind glass as before it
     vec3 sum = s.emission + s.occlusion * (parts.scattered * environment_irradiance(s.normal) +
                                            mirror * environment_irradiance(mirror_direction(s, direction)));
     if (s.inside && s.transmission > 0.0)
-        return sum; // glass asks for no lamps from inside
+        return sum; // glass samples no lights from inside
 #ifdef HAS_AREA_LIGHTS
     uint seed = path_seed(p), sample_ = path_sample(p);
 #endif
@@ -65,7 +65,7 @@ void main()
         through = vec3(1.0 - layer_opacity);
     }
     vec3 rest = weight * through;
-    bool goes_on = greatest(rest) >= WEIGHT_MIN; // not if it is not a number
+    bool goes_on = greatest(rest) >= WEIGHT_MIN; // not if it is NaN
     if (goes_on)
         add_child(j, p, s, h.distance, direction, rest, true);
     radiance[k] = vec4(weight * opacity * (s.unlit ? s.base : lit(p, s, direction, h.distance)),

@@ -2,7 +2,7 @@
 // From sums of samples to pixels of the output's format, rows from the top. Linear formats are premultiplied by
 // alpha, RGBA8 is straight, tone-mapped and sRGB. Attachments: depth as it is, normals as unit vectors in 8 bits.
 
-// The host sets the define FORMAT to one of those below: software GL would go through all of them for each pixel.
+// The host sets the define FORMAT to one of those below: software GL would run all of them for each pixel.
 
 #include "shared/path.h"
 #include "common/dispatch.glsl"

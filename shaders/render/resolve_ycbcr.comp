@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // From sums of samples to Y'CbCr 4:2:0 in the rows that server/base/ycbcr.h describes: of the very RGBA8 that
-// resolve.comp gives, so that pictures look alike whoever converts them. An item is 8 columns of two rows: two
-// words of luma in each, and one of Cb and of Cr.
+// resolve.comp gives, so that pictures look alike in every conversion. An item is 8 columns of two rows: two words of
+// luma in each, and one of Cb and of Cr.
 
 #include "shared/path.h"
 #include "common/dispatch.glsl"
@@ -9,19 +9,19 @@
 
 #define YCBCR_VIDEO 1u // enum ycbcr
 
-uniform uint row_count; // of the band that the picture has; an odd last one stands for two
+uniform uint row_count; // of the band in the picture; an odd last one stands for two
 uniform uint ycbcr;
 
 layout(std430, binding = BIND_RESOLVED) writeonly buffer resolved_block { uint resolved[]; };
 
-// Red, green and blue as codes of 8 bits, 0 .. 255. Beyond the picture lies what is at its edge.
+// Red, green and blue as codes of 8 bits, 0 .. 255. Beyond the picture its edge is repeated.
 vec3 codes_of_pixel(uint x, uint y)
 {
     uvec2 pixel = min(uvec2(x, y), uvec2(frame.width, row_count) - 1u);
     return round(display_of_linear(linear_of_sum(sum_of_pixel(pixel))).rgb * 255.0);
 }
 
-// Numbers from 0 on, of which the first is the lowest byte.
+// Packs four codes, the first in the lowest byte.
 uint word_of(vec4 codes)
 {
     uvec4 bytes = uvec4(min(codes + 0.5, vec4(255.0)));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What the integrators' shading passes share: a hit of the wave in, and what it asks for out: shadow rays with the
-// light that they bring if nothing is in the way, and children. Hits are in the order of the list, j is the place in it.
+// Shared by the integrators' shading passes: a hit of the wave in; its children and shadow rays out, with the light
+// that these bring if nothing is in the way. Hits are in the order of the list, j is the place in it.
 //
 // Defines: HAS_TIMES something moves: rays have a time.
 
@@ -17,7 +17,7 @@ uniform uint hit_count;
 uniform uint first_slot; // of the slice
 uniform uint wave_number;
 uniform uint last_wave;  // 1: no children
-uniform uint children_a_hit; // room for so many
+uniform uint children_a_hit; // capacity
 uniform uint shadow_rays_a_hit;
 
 layout(binding = UNIT_RAYS) uniform samplerBuffer rays; // in texels: software GL fetches those faster
@@ -33,8 +33,8 @@ layout(std430, binding = BIND_LIGHT_SAMPLES) writeonly buffer sample_block { vec
 layout(std430, binding = BIND_RAY_TIMES) writeonly buffer time_block { float shadow_times[]; };
 #endif
 
-// Rays start this share of their place's coordinates (and of the way to it) off the surface: some hundred times
-// what rounding may be off.
+// Rays start off the surface by this share of their origin's coordinates (and of the distance to it): some hundred
+// times the rounding error.
 const float OFFSET = 1.0 / 65536.0;
 const float FAR = 1e30;
 
@@ -59,7 +59,7 @@ path path_at(uint k)
                 c.x, uintBitsToFloat(c.y), uintBitsToFloat(c.z), uintBitsToFloat(c.w));
 }
 
-// Of which pixel and sample a path is: for common/sequence.glsl.
+// The pixel and sample of a path, for common/sequence.glsl.
 uint path_seed(path p)
 {
     uvec2 pixel = pixel_of_slot(first_slot + (p.sample_slot >> frame.sample_shift));
@@ -78,7 +78,7 @@ vec3 off_surface(surface s, float distance_, vec3 side)
 
 uint child_count = 0u;
 
-// One that leads nowhere, has no direction or is beyond the depth is left out. What is not an argument is the parent's.
+// A child without weight or direction, or beyond the depth, is left out. All else is the parent's.
 void add_child(uint j, path parent, surface s, float distance_, vec3 direction, vec3 weight, bool straight)
 {
     uint bounces = (parent.flags & PATH_BOUNCES_MASK) + (straight ? 0u : 1u);
@@ -107,7 +107,7 @@ void add_child(uint j, path parent, surface s, float distance_, vec3 direction, 
 
 void no_shadow_ray(uint place)
 {
-    if (shadow_rays_a_hit == 0u) // nor room for one
+    if (shadow_rays_a_hit == 0u) // nor a place for one
         return;
     shadow_rays[place] = ray(vec4(0.0), vec4(0.0, 0.0, 1.0, -1.0));
     light_samples[place] = vec4(0.0); // a dead ray meets nothing, and so lets everything through
@@ -116,14 +116,14 @@ void no_shadow_ray(uint place)
 #endif
 }
 
-// `arriving`: what reaches the eye if the ray reaches the lamp. False if that is nothing.
+// `arriving`: the radiance at the eye if the ray reaches the light. False if it is zero.
 bool add_shadow_ray(uint place, path p, vec3 origin, vec3 direction, float distance_, vec3 arriving)
 {
-    if (!(greatest(arriving) > 0.0)) { // not a number: likewise
+    if (!(greatest(arriving) > 0.0)) { // also if it is NaN
         no_shadow_ray(place);
         return false;
     }
-    // Short of the lamp, as a model may have a surface just there.
+    // Short of the light, as a model may have a surface at its position.
     shadow_rays[place] = ray(vec4(origin, 0.0), vec4(direction, distance_ * (1.0 - 4.0 * OFFSET)));
     light_samples[place] = vec4(arriving, 0.0);
 #ifdef HAS_TIMES
@@ -132,7 +132,7 @@ bool add_shadow_ray(uint place, path p, vec3 origin, vec3 direction, float dista
     return true;
 }
 
-// `first`: of the batches of shadow rays of the wave, with which the children come.
+// `first`: the first batch of the wave's shadow rays, which also emits the children.
 void note_children(uint j, bool first, uint shadow_rays_alive)
 {
     child_counts[j] = (first ? child_count : child_counts[j]) + (shadow_rays_alive << 2);

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-// What each hit of a wave sends towards the eye, and the rays that it asks for.
+// The radiance of each hit of a wave towards the eye, and its rays.
 //
 //   radiance    emission, and a constant ambient term in Whitted's sense: the environment's irradiance, not
 //               shadowed but for the occlusion texture
-//   shadow rays one to every light, with the light that arrives if nothing is in the way
+//   shadow rays one to every light, with its unshadowed radiance
 //   children    straight on (alpha blending), mirrored, refracted
 //
 // Defines: those of common/material.glsl, common/light.glsl and common/environment.glsl.
@@ -17,17 +17,17 @@
 
 uniform uint first_ray, batch_rays; // a light each
 
-// A path that carries less than this to its pixel ends: a third of a step of an 8-bit picture.
+// The minimum weight of a path: a third of a step of an 8-bit picture.
 const float WEIGHT_MIN = 1.0 / 1024.0;
 
 void add_child_of_weight(uint j, path parent, surface s, float distance_, vec3 direction, vec3 weight, bool straight)
 {
-    // not a < that ends it: what is not a number ends here as well
+    // not `<`: NaN ends here as well
     if (greatest(weight) >= WEIGHT_MIN)
         add_child(j, parent, s, distance_, direction, weight, straight);
 }
 
-// Returns how many of the batch's shadow rays are alive.
+// Returns the number of the batch's live shadow rays.
 uint ask_for_lights(uint j, path parent, surface s, split parts, vec3 view, float NoV, vec3 weight,
                     float distance_)
 {
@@ -64,7 +64,7 @@ vec3 shade(uint j, path p, surface s, split parts, ray r, float distance_, vec3 
         return weight * s.base;
     vec3 mirrored = mirror_direction(s, direction);
     vec3 bent = refract(direction, s.normal, s.inside ? s.ior : 1.0 / s.ior);
-    // Not so where it is totally reflected, or where a tilted normal would send it back: it is mirrored then.
+    // If it is totally reflected, or a tilted normal would send it back, it is mirrored.
     bool through = dot(bent, s.geometric) < 0.0;
     vec3 mirror = parts.mirror + (through ? vec3(0.0) : parts.refracted);
     add_child_of_weight(j, p, s, distance_, mirrored, weight * mirror * parts.mirror_ray, false);

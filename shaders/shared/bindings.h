@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Binding points that more than one room uses. What a tracer binds for itself is in its layout.h, in terms of the
- * points that are reserved here for the tracer in use. */
+/* Binding points that more than one room uses. A tracer's own are in its layout.h, in terms of the points that are
+ * reserved here for the tracer in use. */
 #ifndef FARLIGHT_SHARED_BINDINGS_H
 #define FARLIGHT_SHARED_BINDINGS_H
 
@@ -70,6 +70,6 @@
 #define UNIT_MOTIONS 21
 #define UNIT_TRACER_6 23
 #define UNIT_TRACER_7 24
-#define UNIT_RAY_TIMES 22 /* R32F, one a ray: 0 the shutter opens .. 1 it closes */
+#define UNIT_RAY_TIMES 22 /* R32F, one per ray: 0 the shutter opens .. 1 it closes */
 
 #endif

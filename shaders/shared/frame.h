@@ -5,23 +5,23 @@
 
 #define UNIFORM_FRAME 0 /* binding of the uniform block below */
 
-/* What every pass of a frame may know; a std140 block. The order of the pixels is that of `slots`: 8x8 tiles row
+/* The uniforms of every pass of a frame; a std140 block. The order of the pixels is that of `slots`: 8x8 tiles row
  * by row, Morton order inside a tile; tiles at the right and lower edge may stick out of the picture. */
 struct frame_uniforms {
     vec4 world_from_view[3]; /* rows; rigid; looks along -z, y up */
     vec4 extent_near;        /* xy: half width and half height of the view at distance 1 (perspective) or of
                                 the view itself (orthographic), z: near distance, w: 1 if orthographic */
-    vec4 jitter_pixel;       /* xy: where in each pixel this sample lies, from the pixel's top left, where all
-                                pixels have it in one place; z: far distance of an orthographic view;
+    vec4 jitter_pixel;       /* xy: the position of this sample from each pixel's top left, if it is the same
+                                in all pixels; z: far distance of an orthographic view;
                                 w: width of a sample in pixels */
-    vec4 lens; /* x: radius, 0: a pinhole; y: distance along the view of what is in focus; z, w unused */
-    vec4 environment_colour; /* radiance, or what the image is multiplied by; w: rotation about +y, radians */
+    vec4 lens; /* x: radius, 0: a pinhole; y: distance of the plane in focus along the view; z, w unused */
+    vec4 environment_colour; /* radiance, or the image's factor; w: rotation about +y, radians */
     vec4 irradiance[9];      /* rgb: of the environment, divided by pi: harmonics of a world-space normal */
     vec4 filter_places[17];  /* of the pixel filter, see server/render/pixel_filter.h */
     uint width, height;      /* pixels */
     uint tiles_across;
-    uint sample_index;     /* the first of those in hand */
-    uint sample_shift;     /* 2 to its power samples of each pixel are in hand, side by side */
+    uint sample_index;     /* the first of the current ones */
+    uint sample_shift;     /* 2 to its power samples of each pixel are traced together, adjacent in a wave */
     uint environment_kind; /* ENVIRONMENT_* */
     uint light_count;
     uint depth; /* bounces after the first hit */
@@ -44,17 +44,17 @@ SHARED_SIZE(frame_uniforms, 576)
 #define SEQUENCE_WAVE 3u
 #define SEQUENCE_WAVE_SIZE 4u
 #define SEQUENCE_LIGHT 0u          /* 2: which light and where on it */
-#define SEQUENCE_LOBE 1u           /* 1: what the surface does with the ray */
+#define SEQUENCE_LOBE 1u           /* 1: the lobe of the surface */
 #define SEQUENCE_LOBE_DIRECTION 2u /* 2 */
-#define SEQUENCE_PATH 0x8000u      /* integrator path has waves of its own from here on, of so many: */
+#define SEQUENCE_PATH 0x8000u      /* integrator path has waves of its own from here on; their number: */
 #define SEQUENCE_PATH_SIZE 8u
 #define SEQUENCE_PATH_LIGHT 0u       /* 2: which light and where on it */
 #define SEQUENCE_PATH_ENVIRONMENT 1u /* 2 */
-#define SEQUENCE_PATH_LOBE 2u        /* 1: what the surface does with the ray */
+#define SEQUENCE_PATH_LOBE 2u        /* 1: the lobe of the surface */
 #define SEQUENCE_PATH_DIRECTION 3u   /* 2 */
-#define SEQUENCE_PATH_END 4u         /* 1: whether it goes on */
-#define SEQUENCE_PATH_LAMP 5u        /* 1: which of the lamps that it meets counts */
-#define SEQUENCE_PATH_PASS 6u        /* 1: glass: whose light is asked for */
+#define SEQUENCE_PATH_END 4u         /* 1: Russian roulette */
+#define SEQUENCE_PATH_LAMP 5u        /* 1: chooses among the lights that it hits */
+#define SEQUENCE_PATH_PASS 6u        /* 1: glass: which light is sampled */
 #define SEQUENCE_EVERY_LIGHT                                                                                      \
     0x10000u /* plus wave number * 0x10000 + light number, 2: for every light at every hit */
 

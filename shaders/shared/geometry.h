@@ -11,8 +11,8 @@ struct instance {
     uint geometry; /* index into the geometries */
     uint node;     /* the client's node id */
     uint flags;    /* INSTANCE_* */
-    uint motion;   /* where its matrices over the shutter's time begin in `motions`, plus 1; 0: it stands still.
-                      Those above are the first of them then */
+    uint motion;   /* index of its first matrix over the shutter's time in `motions`, plus 1; 0: it stands still.
+                      The matrices above are then the first of them */
 };
 SHARED_SIZE(instance, 112)
 #define INSTANCE_TEXELS 7       /* RGBA32UI */
@@ -29,7 +29,8 @@ struct geometry {
     uint first_vertex; /* meshes; indices in `triangles` are already scene-wide */
     uint vertex_count;
     uint flags;        /* GEOMETRY_HAS_* */
-    uint close_offset; /* from a vertex as the shutter opens to the same one as it closes; 0: the shape stays */
+    uint close_offset; /* from a vertex as the shutter opens to the same one as it closes; 0: the shape does not
+                          change */
     uint pad0;
 };
 SHARED_SIZE(geometry, 32)
@@ -53,7 +54,7 @@ SHARED_SIZE(geometry, 32)
  *   colours     RGBA8     unorm, linear
  *   spheres     RGBA32F   centre xyz, radius, object space
  *   sphere_materials R32UI
- *   motions     RGBA32F   world_from_object of moving instances, 3 texels a pose; between poses entry by entry
+ *   motions     RGBA32F   world_from_object of moving instances, 3 texels per pose; between poses entry by entry
  * Vertex attributes that no mesh has keep an empty buffer; those that a mesh lacks are zero there and not read. */
 
 /* Geometry outside every tree (the paper's PERFORMGLOBALGEOMETRYTESTS), world space. */

@@ -17,8 +17,8 @@ struct hit {
     uint colour;           /* vertex colour times what a sampled tracer stored, unorm 4x8, linear */
 };
 SHARED_SIZE(hit, 48)
-/* A crossing is a hit of which only the first four words are known yet: distance (< 0: a miss), 0, primitive (of a
- * disc its number; HIT_NO_PRIMITIVE: a miss), instance. */
+/* An intersection is a hit of which only the first four words are known yet: distance (< 0: a miss), 0, primitive
+ * (of a disc its number; HIT_NO_PRIMITIVE: a miss), instance. */
 
 #define HIT_MATERIAL_MASK 0x00ffffffu
 #define HIT_BACK_FACE 0x01000000u /* the ray came from inside */

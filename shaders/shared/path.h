@@ -4,7 +4,7 @@
 #include "shared/bindings.h"
 #include "shared/types.h"
 
-/* What belongs to ray k of a closest-hit wave beside the ray itself.
+/* The path of ray k of a closest-hit wave: its state besides the ray itself.
  *
  * A slice holds one sample of each of its pixels, or several (frame.sample_shift), those of a pixel side by side.
  * The paths of a wave are in the order of their samples, and those of one sample lie side by side: children take
@@ -17,19 +17,19 @@ struct path {
     float cone_width, cone_spread;      /* ray cone: width at the origin, growth per unit of length */
     uint flags;                         /* PATH_* */
     float time;                         /* 0: the shutter opens .. 1: it closes */
-    /* integrator path: what the ray brings beside what it hits, as shares of what the light has */
-    uint lamp;           /* number of the light that it meets, plus 1; 0: none counts */
-    float lamp_distance; /* where, if nothing is hit before */
+    /* integrator path: the weights of lights that the ray hits, as shares of their radiance */
+    uint lamp;           /* number of the light that it hits, plus 1; 0: none counts */
+    float lamp_distance; /* its distance, if nothing is hit before */
     float lamp_share, environment_share;
 };
 SHARED_SIZE(path, 48)
 #define PATH_TEXELS 3 /* RGBA32UI */
 #define PATH_BOUNCES_MASK 0xffu
-/* Bits 16..31: distributed: of what it was mirrored and refracted by, 65535: 1. */
+/* Bits 16..31: distributed: roughness of the surfaces that reflected or refracted it, 65535: 1. */
 #define PATH_ROUGHNESS_SHIFT 16u
-#define PATH_STRAIGHT 0x100u /* nothing but alpha lies between it and the eye: counts for the picture's alpha */
-#define PATH_ASKED 0x200u    /* path: where it comes from has asked for the light of lamps and environment */
-#define PATH_COVERED 0x400u  /* path: such a place has had that light already, through the glass that it is in */
+#define PATH_STRAIGHT 0x100u /* only blended surfaces lie before it: counts for the picture's alpha */
+#define PATH_ASKED 0x200u    /* path: its origin has sampled lights and environment */
+#define PATH_COVERED 0x400u  /* path: such an origin has sampled that light already, through the current glass */
 
 /* A ray of the next wave at its parent's place, before it is moved to its own. */
 struct child {
@@ -53,20 +53,20 @@ SHARED_SIZE(child, 80)
 #define VISIBLE_NOTHING 0u
 #define VISIBLE_DISC 0xffffffffu
 
-#define HIT_PLACE_NONE 0xffffffffu /* in place of a place in the list of hits: the path left the scene */
+#define HIT_PLACE_NONE 0xffffffffu /* in place of a list index: the path left the scene */
 
 /* Storage buffers of the passes of a wave. */
 #define BIND_PATHS BIND_PASS_0
-#define BIND_RADIANCE BIND_PASS_1         /* vec4 a path: what it adds to its pixel, coverage in w */
-#define BIND_CHILDREN BIND_PASS_2         /* struct child, as many a hit as the integrator says */
-#define BIND_CHILD_COUNTS BIND_PASS_3     /* uint a hit: children, and times 4 shadow rays */
-#define BIND_LIGHT_SAMPLES BIND_PASS_4    /* vec4 a shadow ray: what arrives if nothing is in the way */
+#define BIND_RADIANCE BIND_PASS_1         /* vec4 per path: its contribution to the pixel, coverage in w */
+#define BIND_CHILDREN BIND_PASS_2         /* struct child, the integrator's number per hit */
+#define BIND_CHILD_COUNTS BIND_PASS_3     /* uint per hit: children, plus 4 times the shadow rays */
+#define BIND_LIGHT_SAMPLES BIND_PASS_4    /* vec4 per shadow ray: its contribution if nothing is in the way */
 #define BIND_SHADOW_RAYS BIND_VISIBILITY  /* struct ray; no pass both makes them and reads the answers */
-#define BIND_HIT_LIST BIND_WAVE           /* uint a hit: its path; in order */
-#define BIND_HIT_PLACES BIND_CHILD_COUNTS /* uint a path: its place in the list; where children are not used */
-#define BIND_SLICE_SUMS BIND_PASS_2       /* vec4 a sample of the slice; where children are not used */
-#define BIND_BLOCK_OFFSETS BIND_PASS_4    /* uvec2 a block of COMPACT_BLOCK; where light samples are not used */
-#define BIND_ACCUMULATION BIND_PASS_0     /* vec4 a pixel slot of the picture's band; sum of the samples */
+#define BIND_HIT_LIST BIND_WAVE           /* uint per hit: its path; in order */
+#define BIND_HIT_PLACES BIND_CHILD_COUNTS /* uint per path: its place in the list; where children are not used */
+#define BIND_SLICE_SUMS BIND_PASS_2       /* vec4 per sample of the slice; where children are not used */
+#define BIND_BLOCK_OFFSETS BIND_PASS_4    /* uvec2 per block of COMPACT_BLOCK; where light samples are not used */
+#define BIND_ACCUMULATION BIND_PASS_0     /* vec4 per pixel slot of the picture's band; sum of the samples */
 #define BIND_RESOLVED BIND_PASS_1         /* pixels of the output's format, rows from the top */
 
 #endif

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* What lets one file declare a struct for C and for GLSL. Only vec4, uvec4, float and uint stand in shared
- * structs, vec4s at multiples of 16 bytes, sizes multiples of 16, so that std430 and C agree. SHARED_SIZE brings
- * its own semicolon: GLSL 4.50 has no empty declarations. */
+/* Macros with which one file declares a struct for C and for GLSL. Only vec4, uvec4, float and uint stand in
+ * shared structs, vec4s at multiples of 16 bytes, sizes multiples of 16, so that std430 and C agree. SHARED_SIZE
+ * brings its own semicolon: GLSL 4.50 has no empty declarations. */
 #ifndef FARLIGHT_SHARED_TYPES_H
 #define FARLIGHT_SHARED_TYPES_H
 

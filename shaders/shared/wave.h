@@ -3,7 +3,7 @@
 #define FARLIGHT_SHARED_WAVE_H
 #include "shared/types.h"
 
-/* How many rays a wave holds; counted on the device by those who append, read by the host after a pass. */
+/* The number of rays of a wave; counted on the device by the passes that append, read by the host after a pass. */
 struct wave_state {
     uint ray_count; /* may exceed the capacity: then the wave has overflowed */
     uint capacity;
@@ -11,9 +11,9 @@ struct wave_state {
 };
 SHARED_SIZE(wave_state, 16)
 
-/* How many rays of a wave there are, where only the device knows (trace/wave.h), and the work groups that a
- * dispatch with one invocation a ray needs at 64 a group, over two axes as common/dispatch.glsl counts them. The
- * last three words are what an indirect dispatch reads. */
+/* The number of rays of a wave, if only the device knows it (trace/wave.h), and the work groups of a dispatch with
+ * one invocation per ray and 64 per group, over two axes as common/dispatch.glsl counts them. The last three words
+ * are the arguments of an indirect dispatch. */
 struct wave_counts {
     uint ray_count;
     uint groups_x, groups_y, groups_z;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// From the crossings of a closest-hit wave to hits: the second half of every exact tracer. Apart from the walk, whose
-// program stays small by it; and the walk need not carry barycentrics along.
+// From the intersections of a closest-hit wave to hits: the second half of every exact tracer. It is apart from the
+// traversal, whose program stays small, and which need not carry barycentrics.
 //
 // Defines: HAS_SPHERES, HAS_MOTION as the scene has them.
 #include "common/dispatch.glsl"
@@ -10,7 +10,7 @@ layout(binding = UNIT_RAYS) uniform samplerBuffer rays; // two texels each
 #ifdef HAS_MOTION
 layout(binding = UNIT_RAY_TIMES) uniform samplerBuffer ray_times;
 #endif
-layout(binding = IMAGE_HITS, rgba32ui) uniform uimageBuffer hits; // three texels each; a crossing is the first
+layout(binding = IMAGE_HITS, rgba32ui) uniform uimageBuffer hits; // three texels each; an intersection is the first
 
 uniform uint first_ray; // of this dispatch
 uniform uint ray_count; // where it ends

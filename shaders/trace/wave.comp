@@ -2,7 +2,7 @@
 // One wave of rays through one acceleration structure: the entry point of every <tracer>/traverse.glsl.
 //
 // The host (trace/program.c) sets the defines:
-//   TRAVERSE             "bvh/traverse.glsl", the structure's walk
+//   TRAVERSE             "bvh/traverse.glsl", the structure's traversal
 //   TRACER_BVH, TRACER_NAIVE, ..  and others of the tracer's own choice
 //   ANY_HIT              the wave asks for transmittance, not for the closest surface
 //   HAS_SPHERES          some geometry is made of spheres
@@ -12,7 +12,7 @@
 //   HAS_TRANSLUCENT      some material lets shadow rays pass
 //   HAS_TRANSMISSION     and tints them on the way
 //   EVEN_ALPHA           none of these has a texture or vertex colours
-//   RAYS_TOGETHER        how many consecutive rays one invocation walks together: 1, 2, 3, 4, 8
+//   RAYS_TOGETHER        how many consecutive rays one invocation traverses as a packet: 1, 2, 3, 4, 8
 //
 // A traverse.glsl defines one of these, for ANY_HIT or not, and for RAYS_TOGETHER 1 or more:
 //   void trace_closest(trace_ray r, inout candidate best);
@@ -20,16 +20,15 @@
 //   void trace_closest_together(trace_ray r[RAYS_TOGETHER], inout candidate best[RAYS_TOGETHER]);
 //   void trace_any_together(trace_ray r[RAYS_TOGETHER], inout vec3 taken[RAYS_TOGETHER]);
 // It does not include this file; it includes common/candidate.glsl, whose visit_* and offer_* functions take a
-// primitive against a ray with cutouts and tints accounted for. A walk that intersects by its own means calls
+// primitive against a ray with cutouts and tints accounted for. A traversal that intersects by its own means calls
 // offer_closest / offer_any with what it found, or where the scene has neither cutouts nor translucent surfaces
 // (no define) may compare distances itself. `best.distance` starts at the ray's end, or at the nearest disc.
-// `taken` is what offer_any adds to; trace_any returns true, and may stop, once offer_any did: nothing is left of the
-// light.
+// `taken` is what offer_any adds to; trace_any returns true, and may stop, once offer_any did: no light is left.
 //
-// This file handles all else: discs, dead rays (t_max <= t_min), rays beyond the wave's end, and writing the
-// answer: a visibility, or a crossing (shared/hit.h) of which surface.comp makes a hit. Of rays walked together some
-// may be dead: they have t_max = -1 and t_min = 0, direction (1 0 0) and can hit nothing, so a walk must not take
-// from ray 0 what another needs. Groups in which all are dead do not reach it.
+// This file handles all else: discs, dead rays (t_max <= t_min), rays beyond the wave's end, and writing the answer: a
+// visibility, or an intersection (shared/hit.h) of which surface.comp makes a hit. Some rays of a packet may be dead:
+// they have t_max = -1 and t_min = 0, direction (1 0 0) and can hit nothing, so a traversal must not rely on ray 0 for
+// the others. Groups in which all are dead do not reach it.
 #include "shared/bindings.h"
 #include "shared/ray.h"
 #include "common/dispatch.glsl"
@@ -100,7 +99,7 @@ bool discs_any(trace_ray r, inout vec3 taken)
     return false;
 }
 
-// A dead ray is stopped by nothing.
+// Nothing stops a dead ray.
 void store_visibility(uint ray_index, vec3 taken)
 {
     vec3 left = transmittance_left(taken);
@@ -156,10 +155,10 @@ void main()
 
 #else
 
-// What is done ray by ray is done in a loop that picks its ray by comparing numbers: indexing the arrays by the
-// loop's number would have the compiler lay all of it (discs, textures, surfaces) out RAYS_TOGETHER times.
+// Work per ray runs in a loop that selects its ray by comparing indices: indexing the arrays by the loop's counter
+// would make the compiler unroll all of it (discs, textures, surfaces) RAYS_TOGETHER times.
 #ifdef ANY_HIT
-#define found_type vec3 // taken of the light
+#define found_type vec3 // optical depths
 #else
 #define found_type candidate
 #endif
@@ -179,7 +178,7 @@ void look_at_discs(inout trace_ray r[RAYS_TOGETHER], inout found_type found[RAYS
 #ifdef ANY_HIT
             if (discs_any(r_i, found_i)) {
                 found_i = vec3(TAKEN_ALL);
-                r_i.t_max = -1.0; // nothing is left to find
+                r_i.t_max = -1.0; // nothing can be hit any more
                 r_i.t_min = 0.0;
             }
 #else
