@@ -279,7 +279,7 @@ $(B)/tests/unit/fault_tests: TEST_LIBS += $(SERVING_WRAP) -Wl,--wrap=malloc,--wr
 $(B)/tests/unit/corpus_tests: $(KEPT_OBJ) $(SERVING_OBJ) $(READERS_OBJ)
 $(B)/tests/unit/corpus_tests: TEST_LIBS += $(SERVING_WRAP) $(READERS_LIBS) -lstdc++
 # What the daemon encodes is decoded by the library itself.
-$(B)/tests/unit/media_tests: $(patsubst %,$(B)/client/viewer/%.o,camera decode heat hud input metrics paint pixmap replay settings tour window)
+$(B)/tests/unit/media_tests: $(patsubst %,$(B)/client/viewer/%.o,camera decode heat hud input metrics paint panel pixmap replay settings tour window)
 $(B)/tests/unit/media_tests: TEST_LIBS += $(VIEWER_LIBS) -Wl,--wrap=libav_load
 $(B)/tests/unit/unit_tests: $(B)/client/import/closed.o $(MODEL_OBJ) $(RIVAL_OBJ) $(if $(filter 1,$(EMBREE)),$(CONTEST_OBJ))
 $(B)/tests/bench/bench_tracers: $(CONTEST_OBJ) $(B)/tests/bench/bench_options.o

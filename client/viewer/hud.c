@@ -430,6 +430,43 @@ static void draw_status(struct layout *layout)
     }
 }
 
+/* The settings of the tracer, below `top`; the chosen one with what it means. */
+static void draw_panel(struct layout *layout, double top)
+{
+    const struct hud_state *state = layout->state;
+    const struct settings *settings = state->settings;
+    const double s = layout->scale, line = LINE * s, inner = PADDING * s;
+    const size_t count = panel_setting_count(settings->tracer);
+    const struct field_desc *chosen = panel_setting(settings->tracer, settings->setting);
+    char value[40], doc[HUD_TEXT_MAX];
+    double names = 0, values = 0;
+    snprintf(doc, sizeof(doc), "%s", chosen ? chosen->doc : "this tracer has no settings");
+    for (size_t i = 0; i < count; i++) {
+        const struct field_desc *setting = panel_setting(settings->tracer, i);
+        panel_value(setting, &settings->tracers, value, sizeof(value));
+        names = fmax(names, text_width(layout, HUD_PLAIN, setting->name));
+        values = fmax(values, text_width(layout, HUD_BOLD, value));
+    }
+    names += 12 * s;
+    const double width =
+        fmin(fmax(names + values, text_width(layout, HUD_PLAIN, doc)) + 2 * inner, state->width - 2 * MARGIN * s);
+    const double x = MARGIN * s, height = line * (double)(count + 1) + 2 * inner + 3 * s;
+    const double y = fmax(0, fmin(top + MARGIN * s, state->height - height));
+    box(layout, x, y, width, height, panel);
+    for (size_t i = 0; i < count; i++) {
+        const struct field_desc *setting = panel_setting(settings->tracer, i);
+        const bool is_chosen = i == settings->setting;
+        panel_value(setting, &settings->tracers, value, sizeof(value));
+        text(layout, x + inner, y + inner + line * (double)i, HUD_PLAIN, is_chosen ? accent : faint, "%s",
+             setting->name);
+        text(layout, x + inner + names, y + inner + line * (double)i, is_chosen ? HUD_BOLD : HUD_PLAIN, ink, "%s",
+             value);
+    }
+    while (doc[0] != '\0' && text_width(layout, HUD_PLAIN, doc) > width - 2 * inner)
+        doc[strlen(doc) - 1] = '\0';
+    text(layout, x + inner, y + inner + line * (double)count + 3 * s, HUD_PLAIN, faint, "%s", doc);
+}
+
 static void draw_notice(struct layout *layout, double bottom)
 {
     const struct hud_state *state = layout->state;
@@ -449,10 +486,11 @@ void hud_layout(struct hud *hud, const struct hud_state *state, hud_measure *mea
                             .scale = state->scale,
                             .line = LINE * state->scale};
     const enum overlay_mode overlay = state->settings->overlay;
-    double bottom = state->height - MARGIN * state->scale;
+    double bottom = state->height - MARGIN * state->scale, top = 0;
     hud->count = 0;
     if (state->status != HUD_LOADING && overlay != OVERLAY_NONE) {
         const struct corner corner = draw_scene(&layout);
+        top = corner.bottom;
         const double figures = draw_figures(&layout, corner.right);
         const size_t before = hud->count;
         if (overlay == OVERLAY_ALL)
@@ -462,6 +500,8 @@ void hud_layout(struct hud *hud, const struct hud_state *state, hud_measure *mea
     }
     if (overlay != OVERLAY_NONE)
         bottom = draw_legend(&layout, bottom);
+    if (state->settings->panel)
+        draw_panel(&layout, top);
     if (state->notice[0] != '\0')
         draw_notice(&layout, bottom);
     if (state->status != HUD_LIVE)

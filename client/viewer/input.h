@@ -63,6 +63,9 @@ enum action {
     ACTION_COARSER,
     ACTION_FINER,
     ACTION_ERROR_MAP,
+    ACTION_PANEL,
+    ACTION_UP,
+    ACTION_DOWN,
 };
 
 /* One line of the list of keys; those with action NONE are held down or of the mouse. */

@@ -17,6 +17,28 @@ static bool is_for_everybody(enum protocol_tracer tracer)
     return desc && !desc->is_for_tests;
 }
 
+/* What only the panel listens to, while it is shown. */
+static enum settings_change act_on_panel(struct settings *settings, enum action action)
+{
+    const size_t count = panel_setting_count(settings->tracer);
+    if (count == 0)
+        return SETTINGS_SAME;
+    switch (action) {
+    case ACTION_UP:
+    case ACTION_DOWN:
+        settings->setting = (settings->setting + (action == ACTION_DOWN ? 1 : count - 1)) % count;
+        return SETTINGS_DRAWN;
+    case ACTION_STEP_BACK:
+    case ACTION_STEP_ON:
+        return panel_change(panel_setting(settings->tracer, settings->setting), &settings->tracers,
+                            action == ACTION_STEP_ON ? 1 : -1)
+                   ? SETTINGS_VIEW
+                   : SETTINGS_SAME;
+    default:
+        return SETTINGS_SAME;
+    }
+}
+
 /* What the daemon has to be told of. */
 static bool change_view(struct settings *settings, enum action action)
 {
@@ -28,6 +50,7 @@ static bool change_view(struct settings *settings, enum action action)
             settings->tracer = (enum protocol_tracer)around(
                 (int)settings->tracer, action == ACTION_NEXT_TRACER ? 1 : -1, PROTOCOL_TRACER_COUNT);
         while (!is_for_everybody(settings->tracer));
+        settings->setting = 0;
         return true;
     case ACTION_NEXT_INTEGRATOR:
     case ACTION_PREVIOUS_INTEGRATOR:
@@ -54,9 +77,19 @@ static bool change_view(struct settings *settings, enum action action)
     }
 }
 
+bool settings_is_of_panel(enum action action)
+{
+    return action == ACTION_UP || action == ACTION_DOWN || action == ACTION_STEP_BACK || action == ACTION_STEP_ON;
+}
+
 enum settings_change settings_act(struct settings *settings, enum action action)
 {
+    if (settings->panel && settings_is_of_panel(action))
+        return act_on_panel(settings, action);
     switch (action) {
+    case ACTION_PANEL:
+        settings->panel = !settings->panel;
+        return SETTINGS_DRAWN;
     case ACTION_ERROR_MAP:
         settings->error_map = !settings->error_map;
         return SETTINGS_DRAWN;

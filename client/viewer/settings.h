@@ -4,6 +4,7 @@
 #define FARLIGHT_CLIENT_VIEWER_SETTINGS_H
 
 #include "viewer/input.h"
+#include "viewer/panel.h"
 
 enum overlay_mode { OVERLAY_ALL, OVERLAY_FIGURES, OVERLAY_NONE, OVERLAY_MODE_COUNT };
 
@@ -11,8 +12,11 @@ struct settings {
     enum protocol_tracer tracer;
     enum protocol_integrator integrator;
     enum protocol_tone_map tone_map;
-    int exposure_thirds; /* of a stop, added to that of the command line */
-    int coarser;         /* pixels along an edge are divided by 2 to this power */
+    int exposure_thirds;            /* of a stop, added to that of the command line */
+    int coarser;                    /* pixels along an edge are divided by 2 to this power */
+    struct tracer_settings tracers; /* their settings */
+    bool panel;                     /* lists those of the tracer .. */
+    size_t setting;                 /* .. of which this one is chosen */
     bool error_map, help;
     enum overlay_mode overlay;
 };
@@ -24,6 +28,8 @@ enum settings_change {
     SETTINGS_DRAWN, /* the overlay is another */
     SETTINGS_VIEW   /* the daemon has to be told */
 };
+/* Whether a panel that is shown takes the key for itself. */
+bool settings_is_of_panel(enum action action);
 enum settings_change settings_act(struct settings *settings, enum action action);
 
 #endif

@@ -214,6 +214,7 @@ bool viewer_run(const struct viewer_options *options, struct fl_error *error)
     viewer->settings = (struct settings){.tracer = options->view.tracer,
                                          .integrator = options->view.integrator,
                                          .tone_map = options->view.tone_map,
+                                         .tracers = options->view.settings,
                                          .coarser = (int)options->coarser};
     const bool opened = open_viewer(viewer, error);
     const bool done = opened && run(viewer);

@@ -112,7 +112,15 @@ static void act_on_scene(struct viewer *viewer, enum action action)
 
 static void act(struct viewer *viewer, enum action action)
 {
+    const struct settings before = viewer->settings;
+    const bool is_of_panel = before.panel && settings_is_of_panel(action);
     const enum settings_change change = settings_act(&viewer->settings, action);
+    struct setting_fault fault;
+    if (change == SETTINGS_VIEW && !tracer_settings_check(&viewer->settings.tracers, "--", &fault)) {
+        viewer->settings = before;
+        viewer_say(viewer, "%s: %s", fault.field, fault.text);
+        return;
+    }
     viewer->must_show |= change == SETTINGS_VIEW;
     viewer->must_draw = true;
     viewer->has_heat = viewer->has_heat && viewer->settings.error_map;
@@ -124,7 +132,7 @@ static void act(struct viewer *viewer, enum action action)
         screenshot(viewer);
     else if (action == ACTION_FULL_SCREEN && viewer->window)
         window_toggle_full_screen(viewer->window);
-    else if (session_scene(viewer->session))
+    else if (!is_of_panel && session_scene(viewer->session))
         act_on_scene(viewer, action);
 }
 

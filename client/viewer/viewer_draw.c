@@ -109,6 +109,26 @@ static json_t *vector_json(const double vector[3])
     return json_pack("[f,f,f]", vector[0], vector[1], vector[2]);
 }
 
+static json_t *settings_json(const struct settings *settings)
+{
+    json_t *object = json_object();
+    const struct field_desc *setting;
+    char value[40];
+    for (size_t i = 0; (setting = panel_setting(settings->tracer, i)) != NULL; i++) {
+        panel_value(setting, &settings->tracers, value, sizeof(value));
+        json_object_set_new(object, setting->name, json_string(value));
+    }
+    return object;
+}
+
+static json_t *structure_json(const struct viewer *viewer)
+{
+    json_t *list = json_array();
+    for (size_t i = 0; i < viewer->structure_count; i++)
+        json_array_append_new(list, json_string(viewer->structure[i]));
+    return list;
+}
+
 void viewer_print_state(struct viewer *viewer, const char *name)
 {
     static const char *const statuses[] = {"loading", "live", "lost"};
@@ -118,9 +138,7 @@ void viewer_print_state(struct viewer *viewer, const char *name)
     metrics_summarise(&viewer->metrics, state.now_ns, &summary);
     json_t *line = json_pack(
         "{s:s, s:s, s:s, s:s, s:s, s:s, s:f, s:i, s:i, s:b, s:i, s:i, s:I, s:i, s:I, s:s, s:s, s:f, s:b, s:o, "
-        "s:o, "
-        "s:f, "
-        "s:f, s:f}",
+        "s:o, s:o, s:o, s:f, s:f, s:f}",
         "state", name, "status", statuses[state.status], "tracer", protocol_tracer_text(viewer->frame.tracer),
         "integrator", protocol_integrator_text(viewer->frame.integrator), "tone_map",
         protocol_tone_map_text(viewer->settings.tone_map), "encoding",
@@ -130,8 +148,9 @@ void viewer_print_state(struct viewer *viewer, const char *name)
         (json_int_t)viewer->frames, "times_live", (int)viewer->times_live, "revision", (json_int_t)state.revision,
         "camera", state.camera, "clip", state.clip, "time_s", (double)viewer->frame.time_s, "playing",
         (int)viewer->tour.playing, "eye", vector_json(viewer->camera.eye), "look_at",
-        vector_json(viewer->camera.look_at), "fov_y", viewer->camera.fov_y, "frames_per_second",
-        summary.frames_per_second, "latency_s", summary.latency_s);
+        vector_json(viewer->camera.look_at), "settings", settings_json(&viewer->settings), "structure",
+        structure_json(viewer), "fov_y", viewer->camera.fov_y, "frames_per_second", summary.frames_per_second,
+        "latency_s", summary.latency_s);
     if (line && viewer->has_heat)
         json_object_set_new(line, "errors",
                             json_pack("{s:f, s:f, s:f}", "mean", viewer->heat_figures.mean, "greatest",

@@ -45,6 +45,7 @@ static void fill_probe(const struct viewer *viewer, struct message_render *job)
     job->samples = 1;
     job->depth = 0;
     job->tracer = viewer->settings.tracer;
+    job->settings = viewer->settings.tracers;
     job->integrator = PROTOCOL_INTEGRATOR_WHITTED;
     job->aperture = job->shutter = 0;
     job->layers = 1u << PROTOCOL_LAYER_POSITION;

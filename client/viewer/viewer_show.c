@@ -47,6 +47,7 @@ static void show(struct viewer *viewer)
     choose_encodings(viewer, &view);
     view.tracer = settings->tracer;
     view.integrator = settings->integrator;
+    view.settings = settings->tracers;
     view.tone_map = settings->tone_map;
     view.exposure_stops += (float)settings->exposure_thirds / 3;
     /* Else most of the "truth" would be the rasteriser's. */

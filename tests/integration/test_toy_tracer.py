@@ -84,8 +84,10 @@ class AddedTracer(Case):
         result = farlight("view", bundled_scenes() / "teapot.glb", "--replay", self.folder / "replay.json", "--headless",
                           "--size", "64x48", "--samples", "1", "--tracer", "abuffer", "--abuffer-resolution", "64")
         self.expect(result, 0)
-        states = {state["state"]: state["tracer"] for state in map(json.loads, result.stdout.splitlines())}
-        self.assertEqual(states, {"before": "abuffer", "after": "toy"})
+        states = {state["state"]: state for state in map(json.loads, result.stdout.splitlines())}
+        self.assertEqual({name: state["tracer"] for name, state in states.items()}, {"before": "abuffer", "after": "toy"})
+        self.assertEqual(states["after"]["settings"], {"toy_batch": "4096", "toy_order": "forward"})
+        self.assertRegex(states["after"]["structure"][0], r"^instances looked at \d+$")
 
     def test_it_keeps_what_every_tracer_promises(self):
         result = subprocess.run([TOY / "tests/tracers/test_contract", "toy"], stdout=subprocess.PIPE, text=True, check=False)

@@ -154,6 +154,22 @@ class WithoutAWindow(Viewer):
         means = [sum(map(sum, read_png(self.folder / name)[2])) for name in ("first.png", "brighter.png")]
         self.assertGreater(means[1], means[0] * 1.1)
 
+    def test_the_panel_changes_the_settings_of_the_tracer(self):
+        states = self.replay([{"key": "p"}, rest(), {"state": "before"}, {"screenshot": "panel.png"}, {"key": "right"}, rest(),
+                              {"state": "finer"}, {"key": "down"}, {"key": "down"}, {"key": "right"}, rest(),
+                              {"state": "peeled"}, {"key": "down"}, {"key": "up"}, {"key": "up"}, {"key": "right"}, rest(),
+                              {"state": "refused"}, {"key": "t"}, rest(), {"state": "abuffer"}],
+                             "--tracer", "ldc", "--ldc-resolution", "64", "--ldc-levels", "cells")
+        said = {name: state["settings"] for name, state in states.items()}
+        self.assertEqual([said[name]["ldc_resolution"] for name in ("before", "finer", "peeled")], ["64", "128", "128"])
+        for name, resolution in (("before", "resolution 64,"), ("finer", "resolution 128,")):
+            self.assertIn(resolution, states[name]["structure"][0])
+        self.assertEqual([said["before"]["ldc_build"], said["peeled"]["ldc_build"]], ["auto", "peel"])
+        # A tolerance needs other levels than cells.
+        self.assertEqual(said["refused"]["ldc_tolerance"], "0")
+        self.assertIn("ldc-tolerance", states["refused"]["notice"])
+        self.assertIn("abuffer_resolution", said["abuffer"])
+
     def test_the_error_map_is_black_where_the_tracer_is_exact(self):
         states = self.replay([{"key": "x"}, rest(4), {"state": "bvh"}, *HIDE, {"screenshot": "bvh.png"}, {"key": "x"},
                               rest(4), {"state": "off"}, {"key": "x"}, {"key": "t"}, {"key": "t"}, rest(4),

@@ -47,7 +47,7 @@ MAY_INCLUDE = {
     "client/output": ("protocol", "protocol/common", "client/helper"),
     "client/video": ("protocol", "protocol/pixels", "client/helper", "client/lib"),  # of lib: rate
     "client/cli": ("protocol", "protocol/common", "protocol/sealed", "client/lib"),
-    "client/viewer": ("protocol/common", "client/lib", "client/cli"),  # the command line is parsed as that of render
+    "client/viewer": ("protocol", "protocol/common", "client/lib", "client/cli"),  # the command line is parsed as that of render
 }
 # Files that every room may include.
 FOR_EVERYBODY = re.compile(r"^protocol/(version\.h|(words|tracers)\.(h|def))$")

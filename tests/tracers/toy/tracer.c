@@ -24,8 +24,14 @@ static void toy_destroy(struct tracer *tracer)
 static enum tracer_progress toy_update(struct tracer *tracer, struct gpu_scene *scene,
                                        const struct tracer_update *update, struct error *error)
 {
-    (void)tracer, (void)scene, (void)update, (void)error;
+    (void)update, (void)error;
+    tracer->stats.nodes = scene->instance_count;
     return TRACER_DONE;
+}
+
+static void toy_tell(const struct tracer *tracer, struct structure_rows *rows)
+{
+    structure_number(rows, "instances_looked_at", tracer->stats.nodes);
 }
 
 static bool toy_trace_range(struct tracer *tracer, struct gpu_scene *scene, struct trace_state *state,
@@ -48,5 +54,6 @@ const struct tracer_impl tracer_toy_impl = {
     .create = toy_create,
     .destroy = toy_destroy,
     .update = toy_update,
+    .tell = toy_tell,
     .trace_range = toy_trace_range,
 };

@@ -282,6 +282,68 @@ TEST(a_clip_plays_pauses_and_begins_again_at_its_end)
     assert_int_equal(tour_clip(&tour, -1), 1);
 }
 
+/* What the panel says of a setting of `ldc`. */
+static const char *panel_says(const struct settings *settings, const char *name)
+{
+    static char text[40];
+    const struct field_desc *setting;
+    for (size_t i = 0; (setting = panel_setting(PROTOCOL_TRACER_LDC, i)) != NULL; i++)
+        if (strcmp(setting->name, name) == 0)
+            panel_value(setting, &settings->tracers, text, sizeof(text));
+    return text;
+}
+
+static void choose(struct settings *settings, const char *name)
+{
+    settings->setting = 0;
+    while (strcmp(panel_setting(settings->tracer, settings->setting)->name, name) != 0)
+        settings_act(settings, ACTION_DOWN);
+}
+
+TEST(the_panel_changes_settings_of_every_kind_within_their_ranges)
+{
+    struct settings settings = {.tracer = PROTOCOL_TRACER_LDC, .tracers.ldc.resolution = 1000};
+    assert_int_equal(settings_act(&settings, ACTION_STEP_ON), SETTINGS_SAME); /* there is no panel yet */
+    assert_int_equal(settings_act(&settings, ACTION_PANEL), SETTINGS_DRAWN);
+    choose(&settings, "ldc_resolution");
+    assert_int_equal(settings_act(&settings, ACTION_STEP_ON), SETTINGS_VIEW);
+    assert_string_equal(panel_says(&settings, "ldc_resolution"), "2000");
+    for (int i = 0; i < 20; i++)
+        settings_act(&settings, ACTION_STEP_ON);
+    assert_string_equal(panel_says(&settings, "ldc_resolution"), "4096");
+    assert_int_equal(settings_act(&settings, ACTION_STEP_ON), SETTINGS_SAME);
+    for (int i = 0; i < 20; i++)
+        settings_act(&settings, ACTION_STEP_BACK);
+    assert_string_equal(panel_says(&settings, "ldc_resolution"), "16");
+    choose(&settings, "ldc_tolerance");
+    assert_int_equal(settings_act(&settings, ACTION_STEP_BACK), SETTINGS_SAME);
+    settings_act(&settings, ACTION_STEP_ON);
+    settings_act(&settings, ACTION_STEP_ON);
+    assert_string_equal(panel_says(&settings, "ldc_tolerance"), "0.002");
+    for (int i = 0; i < 3; i++)
+        settings_act(&settings, ACTION_STEP_BACK);
+    assert_string_equal(panel_says(&settings, "ldc_tolerance"), "0");
+    choose(&settings, "ldc_block"); /* 2, 4, 8, 16, 32; zero stands for 8 */
+    settings_act(&settings, ACTION_STEP_ON);
+    assert_string_equal(panel_says(&settings, "ldc_block"), "16");
+    settings_act(&settings, ACTION_STEP_ON);
+    settings_act(&settings, ACTION_STEP_ON);
+    assert_string_equal(panel_says(&settings, "ldc_block"), "2");
+    choose(&settings, "ldc_rays"); /* auto, 1, 4 */
+    settings_act(&settings, ACTION_STEP_BACK);
+    assert_string_equal(panel_says(&settings, "ldc_rays"), "4");
+    settings_act(&settings, ACTION_STEP_ON);
+    assert_string_equal(panel_says(&settings, "ldc_rays"), "auto");
+    choose(&settings, "ldc_images");
+    settings_act(&settings, ACTION_STEP_ON);
+    assert_string_equal(panel_says(&settings, "ldc_images"), "one");
+    settings_act(&settings, ACTION_STEP_ON);
+    assert_string_equal(panel_says(&settings, "ldc_images"), "overlap");
+    settings.tracer = PROTOCOL_TRACER_REFERENCE; /* which has none */
+    assert_int_equal(settings_act(&settings, ACTION_DOWN), SETTINGS_SAME);
+    assert_int_equal(settings_act(&settings, ACTION_STEP_ON), SETTINGS_SAME);
+}
+
 TEST(keys_switch_and_come_back)
 {
     struct settings settings = {.tracer = PROTOCOL_TRACER_BVH};

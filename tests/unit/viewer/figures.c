@@ -255,6 +255,13 @@ TEST(in_a_small_window_there_is_less)
     hud_layout(&hud, &shown, measure, NULL);
     check_within(&shown);
     assert_true(tells("resolve") && tells("full screen"));
+    for (double height = 60; height < 480; height += 60) {
+        shown = some_state(300, height);
+        settings.tracer = PROTOCOL_TRACER_LDC;
+        settings.panel = true;
+        hud_layout(&hud, &shown, measure, NULL);
+        assert_true(tells("ldc_resolution"));
+    }
 }
 
 TEST(what_is_not_wanted_is_not_drawn_but_a_loss_is)
