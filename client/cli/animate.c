@@ -161,7 +161,7 @@ static bool complete(struct animation *animation)
                          "cannot be combined with --camera; it can begin at --eye and --look-at") == 0;
     if (has_keys)
         return complete_keys(animation);
-    /* Frames of a camera that stands still would all be alike, where nothing else moves. */
+    /* All frames would be alike if neither the camera nor anything else moves. */
     job->is_orbit = job->is_orbit || (!job->camera && !job->script && job->clip_count == 0);
     if (job->is_orbit)
         job->options.camera_path = PROTOCOL_CAMERA_ORBIT;
@@ -176,7 +176,7 @@ static bool begin(struct animation *animation)
     return begun;
 }
 
-/* For the script, what only animations have. */
+/* The script's members that only animations have. */
 static error_t set_series(void *user, const char *name, const char *value)
 {
     struct animation *animation = user;
@@ -186,7 +186,7 @@ static error_t set_series(void *user, const char *name, const char *value)
     return ARGP_ERR_UNKNOWN;
 }
 
-/* The script says what the command line does not. `typed` was read from the command line alone. */
+/* The script sets options that the command line does not. `typed` was read from the command line alone. */
 static bool apply_script(struct animation *animation, const struct animation *typed)
 {
     const struct cli_job *job = &typed->job;
@@ -222,7 +222,7 @@ static bool read_all(struct animation *animation, int argc, char **argv)
         *animation = typed;
         return good;
     }
-    /* The command line once more, over the script. */
+    /* The command line again, over the script. */
     good = begin(animation) && apply_script(animation, &typed);
     const char *model = !typed.job.scene ? animation->job.model : NULL; /* which --scene replaces */
     animation->job.model = NULL;

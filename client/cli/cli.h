@@ -37,17 +37,17 @@ int cli_complete(int argc, char **argv); /* for the shell: values of an option *
 
 /* ---- key.c ---- */
 
-/* The key file for a daemon: what --key says, else FARLIGHT_KEY where the address is one of TCP. NULL: none. */
+/* The key file for a daemon: that of --key, else, for a TCP address, of FARLIGHT_KEY. NULL: none. */
 const char *cli_key_file(const char *server, const char *given);
 
 /* ---- talk.c: what people read ---- */
 
 /* "farlight: FIELD: TEXT (REMEDY)"; returns the exit status that belongs to the error. */
 int cli_report(const struct fl_error *error);
-int cli_trouble(const struct fl_error *error); /* likewise, of `compare` (compare.c): 2 where others say 1 */
+int cli_trouble(const struct fl_error *error); /* likewise, of `compare` (compare.c): 2 where others return 1 */
 /* A note about a model: warnings always, plain information only if `chatty`. */
 void cli_note(const struct fl_note *note, bool chatty);
-/* On standard output; names come from people and files and are made harmless for a terminal. */
+/* On standard output; control characters in names are made harmless for a terminal. */
 void cli_print_name(const char *name);
 bool cli_is_terminal(int fd); /* one that can move its cursor */
 
@@ -77,20 +77,21 @@ enum cli_image cli_image_by_name(const char *name);
 enum cli_image cli_image_by_path(const char *path);
 const char *cli_image_name(enum cli_image image);
 bool cli_image_is_video(enum cli_image image);
-/* Whether a file can be made at `path`, without making it. `folder` gets its folder. */
+/* Whether a file can be created at `path`, without creating it. `folder` gets its folder. */
 bool cli_check_output(const char *path, char *folder, size_t folder_bytes, struct fl_error *error);
-/* Whether writing to `path`, named by `option`, leaves the inputs alone; NULL among them is skipped. */
+/* Whether writing to `path`, named by `option`, overwrites none of the inputs; NULL among them is skipped. */
 bool cli_check_not_input(const char *path, const char *option, const char *const *inputs, size_t count,
                          struct fl_error *error);
-/* Whether a comparison of the inputs can write its picture: PNG or JPEG, and none of them. NULL: it need not. */
+/* Whether a comparison of the inputs can write its picture to the path: PNG or JPEG, and not one of them. NULL:
+ * there is no picture. */
 bool cli_check_error_picture(const char *picture, const char *const *inputs, size_t count, struct fl_error *error);
 /* Whether `path` is a file that can be read. */
 bool cli_check_input(const char *path, struct fl_error *error);
-/* A folder in $TMPDIR for a file that goes on to standard output. */
+/* A folder in $TMPDIR for a file that is then copied to standard output. */
 bool cli_temporary_folder(char *folder, size_t folder_bytes, struct fl_error *error);
 bool cli_copy_to_stdout(const char *path, struct fl_error *error);
 
-/* ---- progress.c: how far it is, on standard error ---- */
+/* ---- progress.c: progress on standard error ---- */
 
 struct cli_progress {
     bool silent, bar; /* a bar is drawn over and over on one line */
@@ -104,17 +105,17 @@ void cli_progress_import(struct cli_progress *progress, uint64_t done_bytes, uin
                          const char *what);
 /* From the first call on frames are counted. */
 void cli_progress_frames(struct cli_progress *progress, uint32_t done, uint32_t total);
-/* `done` of `total` steps of unlike length are done; `what` is being done now. Without a terminal a line each,
- * once it has taken a second. */
+/* `done` of `total` steps of different length are finished; `what` is the current one. Without a terminal one line
+ * per step, once it has taken a second. */
 void cli_progress_step(struct cli_progress *progress, uint32_t done, uint32_t total, const char *what);
-/* A picture that is refined has `held` samples a pixel; `total` 0: there is no end but an interruption. */
+/* A progressive picture has `held` samples per pixel; `total` 0: only an interruption ends it. */
 void cli_progress_samples(struct cli_progress *progress, uint32_t held, uint32_t total);
-/* Removes the bar, so that something else can be written. */
+/* Removes the bar, so that other output can be written. */
 void cli_progress_clear(struct cli_progress *progress);
-/* The last bar of what is done stays; any other is removed. */
+/* The bar of a finished command stays; any other is removed. */
 void cli_progress_end(struct cli_progress *progress, bool done);
 
-/* ---- job_options.c, job_fields.c: what render and animate have in common ---- */
+/* ---- job_options.c, job_fields.c: options that render and animate share ---- */
 
 enum cli_timings_form { CLI_TIMINGS_NONE, CLI_TIMINGS_TABLE, CLI_TIMINGS_JSON };
 
@@ -125,16 +126,16 @@ struct cli_output {
     enum cli_image image;
 };
 
-/* Of an animation: which frames, and what happens when something goes wrong. */
+/* Options of an animation: its frames, and the reaction to errors. */
 struct cli_series {
     bool has_range;
     struct fl_frame_run range;
     uint32_t shard_part, shard_parts; /* 0 parts: all frames */
-    bool resume;                      /* frames whose files are there are left alone */
+    bool resume;                      /* frames whose files exist are not rendered again */
     unsigned retries;                 /* in a row, without a frame between them */
     double orbit_degrees;
     double orbit_seconds; /* for these degrees; 0: the range */
-    float *dolly_times;   /* two keys of the camera's way, the second one at: */
+    float *dolly_times;   /* two keys of the camera's path, the second one at: */
     double dolly_seconds; /* 0: the last frame */
 };
 
@@ -150,19 +151,20 @@ struct cli_clip {
 struct fl_json;
 struct fl_json_place;
 
-/* A value that the script changes over time, or sets. */
+/* A value that the script animates, or sets. */
 struct cli_channel {
-    struct fl_channel channel; /* its object is found once the scene is there */
+    struct fl_channel channel; /* its object is looked up once the scene is loaded */
     enum protocol_object_kind kind;
     const char *target;                /* name or number; NULL: the view */
     const struct fl_json_place *place; /* in the script, for people */
 };
 
 struct cli_job {
-    const char *scene; /* one that is up at the server, in place of the model */
+    const char *scene; /* a shared scene of the server, in place of the model */
     const char *model, *server, *key_file, *environment, *output, *camera, *keys_file, *trace_file;
     enum cli_image image;
-    struct cli_output outputs[CLI_OUTPUTS_MAX]; /* where the pictures go: `output`, or several of a script */
+    struct cli_output
+        outputs[CLI_OUTPUTS_MAX]; /* destinations of the pictures: `output`, or several of a script */
     size_t output_count;
     struct cli_series series;
     const char *script; /* path; NULL: none */
@@ -175,17 +177,17 @@ struct cli_job {
     bool clip_once;      /* of the command line's clips, as is: */
     double clip_start_s; /* time at which they begin */
     double clip_speed;
-    double time_s;         /* of `render`: the moment of the clips that is shown */
-    bool progressive;      /* of `render`: the picture is written again and again, with more samples */
+    double time_s;         /* of `render`: the time of the clips */
+    bool progressive;      /* of `render`: the picture is written repeatedly, with more samples */
     bool endless;          /* likewise, until it is interrupted */
     uint32_t pass_samples; /* more each time; 0: as many as there are */
-    bool lens_changes;     /* clips open it: the integrator must know lenses */
+    bool lens_changes;     /* opened by clips: the integrator must support lenses */
     bool lossless;         /* of a video */
     bool has_aperture, has_focus;
     bool has_eye, has_look_at, has_up, has_fov; /* in `key` */
     bool float_pixels, half_pixels, has_encoding, has_primary, has_quality, has_integrator, quiet, is_orbit;
     bool has_samples;
-    char depth_field[24];  /* what said how deep, for people; empty: nothing */
+    char depth_field[24];  /* the option that set the depth, for messages; empty: none */
     unsigned file_quality; /* of JPEG files; 0: default */
     enum cli_timings_form timings;
     struct record_camera_key key;
@@ -195,9 +197,10 @@ struct cli_job {
 
 /* A child parser; its input is a struct cli_job. */
 const struct argp *cli_job_argp(void);
-/* Likewise, without what says where the picture goes, which tracer makes it and how its first hits are found. */
+/* Likewise, without the options of output, tracer and first hits. */
 const struct argp *cli_picture_argp(void);
-/* Likewise for a window, without what is of files; samples, integrator and encoding have other defaults there. */
+/* Likewise for a window, without the options of files; samples, integrator and encoding have other defaults there.
+ * */
 const struct argp *cli_view_argp(void);
 /* The defaults, then FARLIGHT_*; before the command line is read. */
 bool cli_job_begin(struct cli_job *job, struct message_render defaults);
@@ -206,23 +209,23 @@ error_t cli_job_set(struct cli_job *job, const char *option, const char *value);
 /* Sets the job's error and returns EINVAL. */
 error_t cli_usage(struct cli_job *job, const char *field, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
-/* After the command line: what depends on several options. `is_series`: output is a pattern. */
+/* After the command line: settings that depend on several options. `is_series`: output is a pattern. */
 bool cli_job_complete(struct cli_job *job, bool is_series);
 /* The same for a window: there is no output. */
 bool cli_job_complete_view(struct cli_job *job);
 
-/* What can only be said once the scene is there: clips, what the script keys, the range of frames where none is
- * given, and what goes by it. For each scene anew. */
+/* Settings that depend on the loaded scene: clips, the objects of the script's keys, the default range of frames,
+ * and what follows from it. Call it for each scene. */
 bool cli_settle(struct cli_job *job, struct fl_scene *scene, bool is_series, struct fl_error *error);
 bool cli_writes_to_stdout(const struct cli_job *job);
 
-/* ---- loading.c: from what the command line named to a scene on a daemon ---- */
+/* ---- loading.c: loads the command line's scene into a daemon ---- */
 
-/* `job` and `progress`, and how the scene is shared, are the caller's; the rest is zero at first. */
+/* `job`, `progress` and the sharing of the scene are the caller's; the rest is initially zero. */
 struct cli_loading {
     const struct cli_job *job;
     struct cli_progress *progress;
-    bool again; /* what there is to say about the model has been said */
+    bool again; /* the notes about the model have been printed */
     enum protocol_sharing sharing;
     const char *scene_name;              /* NULL: the model's file name */
     const char *const *daemon_arguments; /* of a private one; NULL: none */
@@ -233,36 +236,37 @@ struct cli_loading {
     uint64_t import_begin_ns, connect_begin_ns; /* monotonic clock */
 };
 
-/* Checks that the files are there, starts the importer and the way to the daemon. */
+/* Checks that the files exist, starts the importer and the connection to the daemon. */
 bool cli_loading_begin(struct cli_loading *loading, struct fl_error *error);
 /* Waits for the scene. */
 bool cli_loading_end(struct cli_loading *loading, struct fl_error *error);
 void cli_loading_close(struct cli_loading *loading);
-/* Sets the job's camera where the command line leaves it to the model. */
+/* Sets the job's camera if the command line leaves it to the model. */
 bool cli_choose_camera(struct cli_job *job, const struct fl_scene *scene, struct fl_error *error);
 
-/* ---- retry.c: daemons that are lost, and may come back ---- */
+/* ---- retry.c: lost daemons that may come back ---- */
 
 bool cli_daemon_is_lost(const struct fl_error *error);
-/* Before the next try after so many failures in a row, at least 1: twice as long each time, within bounds. */
+/* The pause before the next try after this number of failures in a row, at least 1: it doubles each time, within
+ * bounds. */
 uint32_t cli_retry_pause_ms(unsigned failures, uint32_t least_ms);
 bool cli_retry_wait(uint32_t pause_ms, struct fl_error *error); /* false: interrupted */
 
-/* ---- daemon.c: of commands that only ask a daemon ---- */
+/* ---- daemon.c: commands that only query a daemon ---- */
 
 struct cli_daemon {
     const char *server, *key_file; /* as typed */
 };
 /* --server and --key: a child parser; its input is a struct cli_daemon. */
 extern const struct argp cli_daemon_argp;
-/* Interruptible from then on. Where nothing was typed FARLIGHT_SERVER counts; where that names none either, a
- * private daemon is started, or (`must_be_named`) it is FL_ERROR_ARGUMENT. */
+/* Interruptible from then on. Without --server FARLIGHT_SERVER counts; if neither names a daemon, a private one is
+ * started, or (`must_be_named`) it is FL_ERROR_ARGUMENT. */
 struct fl_connection *cli_daemon_connect(const struct cli_daemon *daemon, const char *name, bool must_be_named,
                                          struct fl_error *error);
 
-/* ---- wave_table.c: what came of comparing the waves of a frame ---- */
+/* ---- wave_table.c: results of comparing the waves of a frame ---- */
 
-/* Tables and what their columns mean, on standard output. */
+/* Tables with a legend of their columns, on standard output. */
 void cli_print_waves(const struct fl_frame *frame, enum protocol_tracer reference, double far_share);
 json_t *cli_waves_json(const struct fl_frame *frame);      /* an object a wave and kind of ray */
 json_t *cli_wave_total_json(const struct fl_frame *frame); /* all of them together */
@@ -281,7 +285,7 @@ struct cli_warned {
     char names[CLI_WARNED_MAX][FL_STRUCTURE_NAME_BYTES];
     size_t count;
 };
-/* On standard error, what the picture lacks; each row's once. */
+/* Warns on standard error about what the picture lacks, once per row. */
 void cli_structure_warn(const struct fl_frame *frame, struct cli_warned *warned, struct cli_progress *progress);
 
 /* ---- timings.c ---- */

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What is compared is decided by the command line: two image files, or with --tracers two tracers. */
+/* The command line decides what is compared: two image files, or with --tracers two tracers. */
 #include "cli/cli.h"
 #include "cli/comparison.h"
 #include "lib/text.h"
@@ -36,7 +36,7 @@ static const struct argp_option options[] = {
     {"json", KEY_JSON, NULL, 0, "Print one JSON object on one line", 0},
     {0}};
 
-/* An error of what a function of the library read gets the option's name. */
+/* An error of a value that the library parsed gets the option's name. */
 static error_t name_field(struct comparing *comparing, const char *field)
 {
     snprintf(comparing->job.error.field, sizeof(comparing->job.error.field), "%s", field);
@@ -96,7 +96,7 @@ static error_t parse(int key, char *value, struct argp_state *state)
     }
 }
 
-/* As of cmp and diff: 1 is an answer, so what brought no answer is 2. */
+/* As with cmp and diff: 1 is an answer, so errors are 2. */
 int cli_trouble(const struct fl_error *error)
 {
     const int status = cli_report(error);
@@ -145,7 +145,7 @@ static int compare_images(struct comparing *comparing)
     return cli_limits_hold(&comparing->limits, &comparison) ? CLI_DONE : CLI_FAILED;
 }
 
-/* Abbreviations count, as everywhere; "--tracer", too, for what is named are tracers. */
+/* Abbreviations count, as everywhere; so does "--tracer". */
 static bool is_about_tracers(int argc, char **argv)
 {
     static const char option[] = "--tracers";

@@ -160,7 +160,7 @@ static error_t parse(int key, char *value, struct argp_state *state)
     }
 }
 
-/* The pictures are EXR files of 32-bit floats, whatever is asked for besides. */
+/* The pictures are EXR files of 32-bit floats, whatever the other options. */
 static bool complete(struct tracer_comparison *comparison)
 {
     struct cli_job *job = &comparison->job;

@@ -110,7 +110,7 @@ static bool holds(const struct cli_limit *limit, const struct fl_comparison *com
     return figures[limit->figure].less_fails ? value >= limit->value : value <= limit->value;
 }
 
-/* Whether pixels that are not finite are nobody's business but ours. */
+/* Whether no limit is set for pixels that are not finite. */
 static bool has_stray_pixels(const struct cli_limits *limits, const struct fl_comparison *comparison)
 {
     for (size_t i = 0; i < limits->count; i++)

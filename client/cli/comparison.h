@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The figures of a comparison of two images: printed, as JSON, and held against limits. */
+/* The figures of a comparison of two images: printed, as JSON, and checked against limits. */
 #ifndef FARLIGHT_CLIENT_CLI_COMPARISON_H
 #define FARLIGHT_CLIENT_CLI_COMPARISON_H
 
@@ -8,12 +8,12 @@
 #include <jansson.h>
 #include <stdio.h>
 
-/* Of most a greater value is worse; of PSNR and SSIM a smaller one. */
+/* For most a greater value is worse; for PSNR and SSIM a smaller one. */
 enum cli_figure {
     CLI_FIGURE_PSNR,        /* dB */
     CLI_FIGURE_MEAN,        /* mean error */
     CLI_FIGURE_RMS,         /* root mean square error */
-    CLI_FIGURE_MAX,         /* greatest error; what a limit without a name is about */
+    CLI_FIGURE_MAX,         /* maximum error; the figure of a limit without a name */
     CLI_FIGURE_BEYOND,      /* share of the pixels beyond the threshold */
     CLI_FIGURE_SSIM,        /* structural similarity */
     CLI_FIGURE_BUTTERAUGLI, /* 3-norm */
@@ -38,13 +38,14 @@ struct cli_limits {
 bool cli_share_parse(const char *text, double *share, struct fl_error *error);
 /* Adds "FIGURE=VALUE" or "VALUE"; shares may end in '%'. False: *error says what is wrong, its field empty. */
 bool cli_limits_add(struct cli_limits *limits, const char *text, struct fl_error *error);
-/* Whether nothing is worse than its limit. A figure that was not measured is; and where there are limits but none
- * for pixels that are not finite, so is any such pixel: the other figures know nothing of it. */
+/* Whether no figure exceeds its limit. A figure that was not measured does; and if there are limits but none for
+ * pixels that are not finite, so does any such pixel: the other figures do not count it. */
 bool cli_limits_hold(const struct cli_limits *limits, const struct fl_comparison *comparison);
 
-/* A line a figure, and one for each limit that does not hold. */
+/* One line per figure, and one for each limit that is exceeded. */
 void cli_comparison_print(FILE *out, const struct fl_comparison *comparison, const struct cli_limits *limits);
-/* The same as an object; what was not measured, and PSNR without any error, is null. NULL: out of memory. */
+/* The same as an object; figures that were not measured, and PSNR without any error, are null. NULL: out of
+ * memory. */
 json_t *cli_comparison_json(const struct fl_comparison *comparison, const struct cli_limits *limits);
 
 #endif

@@ -45,7 +45,7 @@ bool cli_image_is_video(enum cli_image image)
     return image >= CLI_IMAGE_MP4 && image < CLI_IMAGE_COUNT;
 }
 
-/* Rights, read-only file systems, quotas: only an attempt tells. */
+/* Rights, read-only file systems, quotas: only an attempt shows them. */
 static bool try_folder(const char *path, const char *folder, struct fl_error *error)
 {
     char probe[4200];

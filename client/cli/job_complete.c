@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What depends on several options: defaults that follow from others, and what cannot go together. */
+/* Settings that depend on several options: derived defaults, and invalid combinations. */
 #include "cli/cli.h"
 
 #include <string.h>
@@ -60,7 +60,7 @@ static bool is_linear(enum cli_image image)
     return image == CLI_IMAGE_EXR || image == CLI_IMAGE_HDR;
 }
 
-/* Of all formats only EXR has channels by name; what they hold is more than half floats can. */
+/* Of all formats only EXR has named channels; half floats are not precise enough for their contents. */
 static bool complete_layers(struct cli_job *job)
 {
     struct message_render *wanted = &job->options;
@@ -197,8 +197,8 @@ static bool complete_camera(struct cli_job *job)
     return true;
 }
 
-/* Lenses, shutters and several samples are what the integrator distributed is for; one sharp sample has nothing to
- * choose, and whitted makes no noise. */
+/* Lenses, shutters and several samples need the integrator distributed; one sharp sample needs no random choices,
+ * and whitted makes no noise. */
 static void complete_integrator(struct cli_job *job)
 {
     const struct message_render *wanted = &job->options;
@@ -208,8 +208,8 @@ static void complete_integrator(struct cli_job *job)
         job->options.integrator = spreads ? PROTOCOL_INTEGRATOR_DISTRIBUTED : PROTOCOL_INTEGRATOR_WHITTED;
 }
 
-/* What is chosen by chance is seen as noise in one sample. Pictures that are refined without an end have no
- * number. */
+/* Random choices show as noise in one sample. Pictures that are refined without an end have no number of samples.
+ * */
 static void complete_samples(struct cli_job *job)
 {
     struct message_render *wanted = &job->options;
@@ -228,7 +228,7 @@ static bool complete_tracer(struct cli_job *job)
         cli_usage(job, fault.field, "%s", fault.text);
         return fl_error_remedy(&job->error, "%s", fault.remedy);
     }
-    /* Else most of the "truth" would be the rasteriser's. */
+    /* Else most of the reference would be the rasteriser's. */
     if (!job->has_primary && wanted->tracer == PROTOCOL_TRACER_REFERENCE)
         wanted->primary = PROTOCOL_PRIMARY_TRACE;
     return true;
@@ -255,7 +255,7 @@ static bool complete_clips(struct cli_job *job)
     return true;
 }
 
-/* What is up already cannot be given another light, and only a daemon that others can reach has it. */
+/* A shared scene cannot be given another environment, and only a daemon with an address has one. */
 static bool complete_scene(struct cli_job *job)
 {
     if (!job->scene)
@@ -285,7 +285,7 @@ bool cli_job_complete_view(struct cli_job *job)
     struct message_render *wanted = &job->options;
     if (!complete_scene(job))
         return false;
-    /* What makes no noise is the better one while it moves. */
+    /* An integrator without noise is better while the camera moves. */
     if (!job->has_integrator && (wanted->aperture > 0 || wanted->shutter > 0))
         wanted->integrator = PROTOCOL_INTEGRATOR_DISTRIBUTED;
     if (wanted->encoding == PROTOCOL_ENCODING_ZSTD && wanted->quality > 19)

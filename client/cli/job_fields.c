@@ -11,7 +11,7 @@
 #define FIELDS_MAX 96
 #define GIVEN(member) offsetof(struct cli_job, member)
 
-/* Options that are no tracer's. A doc that does not end in a bracket gets what is allowed and the default. */
+/* Options that are no tracer's. A doc that does not end in a bracket gets the allowed values and the default. */
 static const struct row {
     const char *option, *field, *argument, *doc;
     int group;
@@ -192,8 +192,8 @@ static error_t name_error(struct cli_job *job, const char *name)
     return EINVAL;
 }
 
-/* Where an option was given. What is typed on the command line overrules a script, and that the environment; in
- * one place the two names of one thing must agree. */
+/* The source of an option. The command line overrides a script, and that the environment; within one source the
+ * two names of one setting must agree. */
 static bool is_same_place(const char *name, const char *other)
 {
     static const char environment[] = "FARLIGHT_";

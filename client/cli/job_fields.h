@@ -14,7 +14,7 @@ enum cli_group {
     CLI_GROUP_CLIPS,
     CLI_GROUP_METHOD,
     CLI_GROUP_LIGHT,
-    CLI_GROUP_TRACERS, /* from here on one a tracer */
+    CLI_GROUP_TRACERS, /* from here on one per tracer */
     CLI_GROUP_EXPERIMENTS = 100,
     CLI_GROUP_TALK
 };
@@ -33,9 +33,9 @@ struct cli_field {
 size_t cli_field_count(void);
 const struct cli_field *cli_field_at(size_t index);
 const struct cli_field *cli_field_find(const char *option); /* NULL: there is none */
-/* As typed; `name` is the option's for people. 0 or EINVAL with the job's error set. */
+/* Sets the field from text; `name` is the option's for messages. 0 or EINVAL with the job's error set. */
 error_t cli_field_set(struct cli_job *job, const struct cli_field *option, const char *name, const char *value);
-/* Why a value is not in an enumeration: "unknown tone map 'x'", and which are known; EINVAL. */
+/* Reports a value that is not in an enumeration: "unknown tone map 'x'", with the known ones; EINVAL. */
 error_t cli_unknown_value(struct cli_job *job, const char *name, const char *enum_name, const char *value);
 
 #endif

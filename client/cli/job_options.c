@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What render, animate, view and compare have in common: the options that are fields of `render` (job_fields.h),
- * and those that are more than a field. */
+/* Options of render, animate, view and compare: those that are fields of `render` (job_fields.h), and those that
+ * are more than a field. */
 #include "cli/job_fields.h"
 #include "lib/text.h"
 
@@ -235,7 +235,7 @@ static void add_option(const struct argp_option *option)
         options[count] = *option;
 }
 
-/* "Tracer ldc, layered depth cubes: .." over the settings that everybody may want. */
+/* "Tracer ldc, layered depth cubes: .." above the settings that are no experiments. */
 static void add_tracer_headers(void)
 {
     static char titles[PROTOCOL_TRACER_COUNT][200];

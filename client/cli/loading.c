@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* From what the command line named to a scene on a daemon. */
+/* Loads the command line's scene into a daemon. */
 #include "cli/cli.h"
 #include "protocol/common/clock.h"
 
@@ -85,7 +85,7 @@ void cli_loading_close(struct cli_loading *loading)
     loading->connection = NULL;
 }
 
-/* By name or number; without either the model's first camera, unless keys or an orbit say where to look. */
+/* By name or number; without either the model's first camera, unless keys or an orbit set the view. */
 bool cli_choose_camera(struct cli_job *job, const struct fl_scene *scene, struct fl_error *error)
 {
     struct message_render *options = &job->options;

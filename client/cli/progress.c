@@ -38,7 +38,7 @@ void cli_progress_end(struct cli_progress *progress, bool done)
     progress->drawn = false;
 }
 
-/* Whether enough time has passed since something was shown. */
+/* Whether enough time has passed since the last output. */
 static bool is_due(struct cli_progress *progress, bool always)
 {
     const uint64_t now = monotonic_now_ns();
@@ -48,7 +48,7 @@ static bool is_due(struct cli_progress *progress, bool always)
     return true;
 }
 
-/* `what` of our own importer, but the importer is not trusted: only plain characters are shown. */
+/* `what` comes from our importer, which is not trusted: only plain characters are shown. */
 void cli_progress_import(struct cli_progress *progress, uint64_t done_bytes, uint64_t total_bytes,
                          const char *what)
 {

@@ -10,7 +10,7 @@
 
 bool cli_daemon_is_lost(const struct fl_error *error)
 {
-    /* What it says of its own state, it may say otherwise later, or another one at the same address. */
+    /* Errors about the daemon's own state may be gone later, or with another daemon at the same address. */
     const bool is_passing = error->retryable || error->server_code == PROTOCOL_ERROR_SHUTTING_DOWN ||
                             error->server_code == PROTOCOL_ERROR_DEVICE_LOST ||
                             error->server_code == PROTOCOL_ERROR_BUSY;

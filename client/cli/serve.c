@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Puts a scene up for others: on a daemon of its own, which listens where it is told to and ends with the command,
- * or on one that runs already. */
+/* Shares a scene: on a daemon of its own, which listens on the given addresses and ends with the command, or on a
+ * running one. */
 #include "cli/cli.h"
 
 #include <errno.h>
@@ -26,7 +26,7 @@ struct serving {
     const char *words[DAEMON_WORDS_MAX + 1]; /* the daemon's arguments, and a NULL */
     size_t word_count;
     char usual_address[300];
-    char folder[64]; /* made for the socket there; empty: there is none */
+    char folder[64]; /* created for the socket in it; empty: there is none */
 };
 
 static const struct argp_option options[] = {
@@ -51,7 +51,7 @@ static error_t add_word(struct serving *serving, const char *word)
     return 0;
 }
 
-/* In order, so that what is behind -- can be told from what is before. */
+/* In order, so that arguments behind -- are distinguished from those before it. */
 static error_t take_argument(struct serving *serving, char *value, const struct argp_state *state)
 {
     if (state->quoted > 0 && state->next > state->quoted)
@@ -97,8 +97,8 @@ static error_t parse(int key, char *value, struct argp_state *state)
 
 /* ---- the daemon's command line ---- */
 
-/* Where only its owner comes: everybody may write to the folder of temporary files, so that what is listened to
- * there is in a folder of mode 0700. NULL: there is none; the error is set. */
+/* A folder for the socket that only its owner can enter: anyone may write to the folder of temporary files, so the
+ * socket goes into a subfolder of mode 0700. NULL: it failed; the error is set. */
 static const char *usual_address(struct serving *serving)
 {
     const char *folder = getenv("XDG_RUNTIME_DIR");
@@ -117,7 +117,7 @@ static const char *usual_address(struct serving *serving)
     return serving->usual_address;
 }
 
-/* The daemon takes its socket away, if it can. */
+/* The daemon removes its socket, if it can. */
 static void remove_folder(const struct serving *serving)
 {
     if (serving->folder[0] == '\0')
@@ -126,7 +126,7 @@ static void remove_folder(const struct serving *serving)
     rmdir(serving->folder);
 }
 
-/* What was typed for it comes last: the later of two options counts. */
+/* The user's arguments for it come last: the later of two options counts. */
 static bool complete_daemon(struct serving *serving)
 {
     const char *typed[DAEMON_WORDS_MAX];
@@ -140,7 +140,7 @@ static bool complete_daemon(struct serving *serving)
         status = add_word(serving, "--listen") != 0 ? EINVAL : add_word(serving, serving->listens[i]);
     if (serving->job.key_file && status == 0)
         status = add_word(serving, "--key-file") != 0 ? EINVAL : add_word(serving, serving->job.key_file);
-    /* It writes to nobody but us, who show its last line when it fails. */
+    /* Its output goes to us, and its last line is shown if it fails. */
     if (status == 0)
         status = add_word(serving, "--log-level") != 0 ? EINVAL : add_word(serving, "error");
     for (size_t i = 0; i < typed_count && status == 0; i++)
@@ -186,7 +186,7 @@ static void print_word(const char *word)
     putchar('\'');
 }
 
-/* Where everything is listened to, others need this host's name. */
+/* If it listens on all addresses, others need this host's name. */
 static void print_address(const char *address)
 {
     static const char *const all[] = {"tcp:0.0.0.0:", "tcp:[::]:"};
@@ -242,7 +242,7 @@ static const char *base_name(const char *path)
     return slash ? slash + 1 : path;
 }
 
-/* Until it is told to end, which is the good end, or the daemon is lost. */
+/* Serves until it is interrupted, which is success, or the daemon is lost. */
 static bool stay(struct fl_connection *connection, struct fl_error *error)
 {
     while (fl_connection_wait(connection, WAIT_MS, error))
@@ -268,7 +268,7 @@ static bool load_again(struct cli_loading *loading, const struct cli_job *job, s
     return cli_loading_begin(loading, error) && cli_loading_end(loading, error);
 }
 
-/* A daemon that was there all the time has the scene still; another one is given it, under the same name. */
+/* A daemon that kept running still has the scene; a new one gets it under the same name. */
 static bool come_back(const struct serving *serving, struct cli_loading *loading, struct fl_error *error)
 {
     struct cli_job attaching = serving->job;
@@ -281,7 +281,7 @@ static bool come_back(const struct serving *serving, struct cli_loading *loading
     return load_again(loading, &serving->job, error);
 }
 
-/* A daemon of one's own is not lost but has failed. */
+/* A private daemon is not lost: it has failed. */
 static bool recover(const struct serving *serving, struct cli_loading *loading, struct fl_error *error)
 {
     unsigned failures = 0;
@@ -305,7 +305,7 @@ static bool recover(const struct serving *serving, struct cli_loading *loading, 
     return false;
 }
 
-/* Until it is told to end, which is the good end, or the daemon is gone for good. */
+/* Serves until it is interrupted, which is success, or the daemon is gone for good. */
 static bool stay_and_recover(const struct serving *serving, struct cli_loading *loading, struct fl_error *error)
 {
     while (!stay(loading->connection, error))

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* From a model to pictures: the scene handed over, frames taken and written. An animation survives the loss of its
- * daemon: the scene is loaded again, and the first frame that is not written is the next one. */
+/* From a model to pictures: loads the scene, fetches frames and writes them. An animation survives the loss of its
+ * daemon: the scene is loaded again, and the first unwritten frame is the next one. */
 #include "cli/sink.h"
 #include "cli/trace_file.h"
 #include "protocol/common/clock.h"
@@ -21,10 +21,10 @@ struct session {
     bool sinks_started, sink_failed;
     struct cli_loading loading;
     struct fl_job *rendering;
-    bool was_loaded; /* the daemon was there and took the scene, at least once */
+    bool was_loaded; /* the daemon has accepted the scene at least once */
     bool has_set;    /* which frames are wanted is known */
     struct fl_frame_set set;
-    size_t run;        /* of the set, the one that is being rendered */
+    size_t run;        /* the current one of the set */
     bool begun;        /* of this run a frame has been written */
     uint64_t next;     /* once begun: its first frame that has not */
     uint32_t done;     /* frames written */
@@ -59,8 +59,8 @@ static bool start_sinks(struct session *session, struct fl_error *error)
     return !session->sink_failed;
 }
 
-/* The importer loads its libraries beside the daemon's start, and the exporter beside the importer: once the scene
- * is there the daemon wants all processors. */
+/* The importer loads its libraries while the daemon starts, and the exporter while the importer runs: once the
+ * scene is loaded the daemon uses all processors. */
 static bool load_scene(struct session *session, struct fl_error *error)
 {
     struct cli_loading *loading = &session->loading;
@@ -156,7 +156,7 @@ static bool take_frames(struct session *session, const struct fl_frame_run *run,
         fl_frame_destroy(frame);
         if (!written)
             return false;
-        /* The file before is complete by now; this one is being written. */
+        /* The previous file is complete; this one is being written. */
         if (session->done > 0)
             show_progress(session);
         session->next = next;
@@ -167,9 +167,8 @@ static bool take_frames(struct session *session, const struct fl_frame_run *run,
     return error->code == FL_ERROR_NONE;
 }
 
-/* Of the next pass: without a number given, as many as there are already, so that little is spent on writing
- * files; where there is no end, no more than before once a pass takes long, so that the picture does not stand
- * still. */
+/* The samples of the next pass: if it is not given, the number so far, so that little time is spent on writing
+ * files; without an end, no more than before once a pass takes long, so that the picture keeps changing. */
 static uint32_t pass_samples(const struct cli_job *job, uint32_t held, uint32_t total, uint32_t last,
                              uint64_t last_ns)
 {
@@ -180,7 +179,7 @@ static uint32_t pass_samples(const struct cli_job *job, uint32_t held, uint32_t 
     return samples < total - held ? samples : total - held;
 }
 
-/* After an interruption: the file that is being written gets complete. False: that was not meant to be the end. */
+/* After an interruption: completes the file that is being written. False: the interruption is an error. */
 static bool end_passes(struct session *session, uint32_t held, struct fl_error *error)
 {
     const struct cli_job *job = session->job;
@@ -200,7 +199,7 @@ static bool end_passes(struct session *session, uint32_t held, struct fl_error *
     return job->endless;
 }
 
-/* One picture with more and more samples: a job for each pass, which the daemon adds to those before. */
+/* A progressive picture: one job per pass, whose samples the daemon adds to the previous ones. */
 static bool render_passes(struct session *session, struct fl_error *error)
 {
     const struct cli_job *job = session->job;
@@ -257,7 +256,7 @@ static bool render(struct session *session, struct fl_error *error)
 
 static void close_connection(struct session *session)
 {
-    /* After an interruption the daemon is still told in order. */
+    /* After an interruption the daemon still gets a proper end. */
     if (session->loading.connection)
         fl_connection_set_interrupt(session->loading.connection, 0);
     fl_render_destroy(session->rendering);
@@ -265,7 +264,7 @@ static void close_connection(struct session *session)
     cli_loading_close(&session->loading);
 }
 
-/* Of a daemon that was there once: one that never was is a mistake in its address. */
+/* Only if the daemon was reached before: otherwise the address is probably wrong. */
 static bool is_lost(const struct session *session, const struct fl_error *error)
 {
     if (!session->is_series || !session->was_loaded || session->sink_failed)
@@ -284,7 +283,7 @@ static bool pause_before_retry(const struct session *session, uint32_t least_ms,
     return cli_retry_wait(pause_ms, error);
 }
 
-/* Whether the session goes on after this error, which is told. */
+/* Reports the error; true: the session continues after it. */
 static bool recover(struct session *session, struct fl_error *error)
 {
     if (!is_lost(session, error) || session->failures >= session->job->series.retries)
@@ -349,7 +348,7 @@ int cli_run_job(struct cli_job *job, bool is_series)
     close_session(&session);
     cli_trace_span(session.trace, CLI_TRACE_COMMAND, is_series ? "animate" : "render", -1, session.begin_ns,
                    monotonic_now_ns() - session.begin_ns);
-    /* An interruption or failure before it is what the command ended for. */
+    /* An earlier interruption or failure is the command's result. */
     if (!cli_trace_file_destroy(session.trace, done ? &error : NULL))
         done = false;
     return done ? CLI_DONE : cli_report(&error);

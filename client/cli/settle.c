@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What can only be said once the scene is there. */
+/* Settings that depend on the loaded scene. */
 #include "cli/cli.h"
 #include "lib/json_text.h"
 
@@ -11,7 +11,7 @@
 #define RADIANS_PER_DEGREE 0.017453292519943295
 #define FRAME_MAX 10000000u
 
-/* An error of a script's value is told as the script's. */
+/* An error in a script's value names the script. */
 static bool in_script(const struct cli_job *job, unsigned line, const char *path, struct fl_error *error)
 {
     const struct fl_error why = *error;
@@ -30,7 +30,7 @@ static bool in_script_at(const struct cli_job *job, const struct fl_json_place *
 
 /* ---- clips ---- */
 
-/* *longest_s: how long they take once, at their speeds. */
+/* *longest_s: the maximum duration of one pass at their speeds. */
 static bool settle_clips(struct cli_job *job, struct fl_scene *scene, double *longest_s, struct fl_error *error)
 {
     for (size_t i = 0; i < job->clip_count; i++) {
@@ -39,7 +39,7 @@ static bool settle_clips(struct cli_job *job, struct fl_scene *scene, double *lo
         const struct fl_clip_info *info = NULL;
         if (!fl_scene_find_clip(scene, clip->which, &use->clip, &info, error))
             return clip->line > 0 ? in_script(job, clip->line, "clips", error) : false;
-        /* What is rendered has its first frame at time 0. */
+        /* The first rendered frame is at time 0. */
         use->start_s = (float)((double)clip->start_s - job->time_s);
         use->speed = clip->speed;
         use->loop = clip->loop ? 1 : 0;
@@ -64,7 +64,7 @@ static bool settle_target(const struct cli_channel *given, struct fl_scene *scen
         error, "give a point light of a glTF file \"extras\": {\"radius\": 0.1}, which makes it a sphere");
 }
 
-/* The script's values, as a clip of our own that is played last. */
+/* The script's values, as an own clip that is played last. */
 static bool settle_channels(struct cli_job *job, struct fl_scene *scene, struct fl_error *error)
 {
     struct record_clip_use *use = &job->clip_uses[job->clip_count];
@@ -97,8 +97,8 @@ static double last_key_s(const struct cli_job *job)
     return fmax(last_s, job->series.dolly_seconds);
 }
 
-/* Without a range: once through the clips, or through the script's keys. A clip that begins again does so one
- * frame after the last. */
+/* Without a range: one pass of the clips, or of the script's keys. A repeated clip begins again one frame after
+ * the last. */
 static bool choose_range(struct cli_job *job, double clips_s, struct fl_error *error)
 {
     struct cli_series *series = &job->series;
@@ -126,8 +126,8 @@ static bool choose_range(struct cli_job *job, double clips_s, struct fl_error *e
     return true;
 }
 
-/* What lasts as long as the range. An orbit ends one frame after the last, so that a full turn repeats without a
- * doubled frame; a dolly arrives with the last. */
+/* Motions that last as long as the range. An orbit ends one frame after the last, so that a full turn repeats
+ * without a doubled frame; a dolly arrives with the last. */
 static void settle_camera(struct cli_job *job)
 {
     struct message_render *wanted = &job->options;

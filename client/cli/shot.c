@@ -213,7 +213,7 @@ static bool apply_members(const struct shot_reader *reader, const struct shot_va
                           "\"output\" and \"outputs\" cannot be combined");
     if ((output.value && !apply_output(reader, &output)) || (outputs.value && !apply_outputs(reader, &outputs)))
         return false;
-    /* All of the file has been read, so that every mistake in it is told. */
+    /* All of the file has been read, so that every mistake in it is reported. */
     if (given->output) {
         job->output_count = 0;
         job->image = CLI_IMAGE_UNKNOWN; /* of the file's outputs */

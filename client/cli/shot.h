@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* A request file: what `animate` is to render, as JSON; farlight-shot(5) and shot.schema.json say what may stand
- * in it. A mistake is FL_ERROR_ARGUMENT with the file as its field; the text begins with the line and the way to
- * the value ("line 12: camera.eye: ..."), and there is a remedy. */
+/* A shot file: the request of `animate` as JSON; farlight-shot(5) and shot.schema.json describe it. A mistake is
+ * FL_ERROR_ARGUMENT with the file as its field; the text begins with the line and the path of the value ("line 12:
+ * camera.eye: ..."), and there is a remedy. */
 #ifndef FARLIGHT_CLIENT_CLI_SHOT_H
 #define FARLIGHT_CLIENT_CLI_SHOT_H
 
@@ -10,13 +10,13 @@
 
 struct cli_shot {
     const char *path;
-    char folder[4096]; /* the file's: what it names is sought from there */
+    char folder[4096]; /* the file's: its paths are relative to this folder */
     struct fl_json json;
     void **owned; /* strings and numbers that the job refers to */
     size_t owned_count, owned_capacity;
 };
 
-/* What the command line says itself and the file is not asked for. */
+/* Options that the command line sets and the file therefore does not. */
 struct cli_shot_given {
     bool camera, clips, output, model, aperture, focus, up, fov;
 };
@@ -25,8 +25,8 @@ struct cli_shot_given {
 typedef error_t cli_shot_set(void *user, const char *option, const char *value);
 
 bool cli_shot_load(struct cli_shot *shot, const char *path, struct fl_error *error);
-/* Sets in `job` what the file says, as options of the command line would; `set` is asked first. The job refers to
- * the shot from then on. */
+/* Applies the file to `job`, as options of the command line would; `set` has precedence. The job refers to the
+ * shot from then on. */
 bool cli_shot_apply(struct cli_shot *shot, struct cli_job *job, const struct cli_shot_given *given,
                     cli_shot_set *set, void *user);
 void cli_shot_finish(struct cli_shot *shot);

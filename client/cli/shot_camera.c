@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The camera of a request file: one of the model's, or eye, look_at, up and fov, each of them still or keyed; an
- * orbit or a dolly; the lens. */
+/* The camera of a shot file: one of the model's, or eye, look_at, up and fov, each constant or keyed; an orbit or
+ * a dolly; the lens. */
 #include "cli/shot_read.h"
 
 #include <string.h>
@@ -57,7 +57,7 @@ static bool read_orbit(const struct shot_reader *reader, const struct shot_value
            (!seconds.value || shot_number(reader, &seconds, 1e-3, 1e6, &series->orbit_seconds));
 }
 
-/* Where it ends: a place, or so much nearer to what is looked at. */
+/* The end of a dolly: a point, or a share of the distance to the target. */
 static bool dolly_end(const struct shot_reader *reader, const struct shot_value *at, float to[3])
 {
     const struct record_camera_key *key = &reader->job->key;
@@ -90,7 +90,7 @@ static bool dolly_end(const struct shot_reader *reader, const struct shot_value 
     return true;
 }
 
-/* Two keys of the eye; when the second one is, may only be known with the range of frames. */
+/* Two keys of the eye; the time of the second may depend on the range of frames. */
 static bool read_dolly(const struct shot_reader *reader, const struct shot_value *at)
 {
     static const char *const known[] = {"to", "by", "seconds", "ease", NULL};
@@ -110,7 +110,7 @@ static bool read_dolly(const struct shot_reader *reader, const struct shot_value
     times[1] = 1; /* until it is settled */
     const bool eases = json_is_true(ease.value);
     const size_t parts =
-        eases ? 3 : 1; /* of a Bezier key: before, itself, after, all alike: it stands still there */
+        eases ? 3 : 1; /* a Bezier key: before, itself, after, all equal: the velocity is zero there */
     for (size_t i = 0; i < parts; i++) {
         memcpy(values[i], reader->job->key.eye_world, sizeof(*values));
         memcpy(values[parts + i], to, sizeof(*values));
@@ -175,7 +175,7 @@ static bool read_place(const struct shot_reader *reader, const struct shot_value
     return (!orbit.value || read_orbit(reader, &orbit)) && (!dolly.value || read_dolly(reader, &dolly));
 }
 
-/* What the command line says instead; all of the file has been read, so that every mistake in it is told. */
+/* The command line's values instead; all of the file has been read, so that every mistake in it is reported. */
 static void override(const struct shot_reader *reader, const struct cli_job *before)
 {
     struct cli_job *job = reader->job;

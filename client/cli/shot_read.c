@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Reading a request file: members, names, paths, and mistakes told with their line. */
+/* Reading a shot file: members, names, paths, and mistakes with their line. */
 #include "cli/shot_read.h"
 
 #include <math.h>
@@ -45,7 +45,7 @@ bool shot_wrong(const struct shot_reader *reader, const struct shot_value *at, c
 
 /* ---- members ---- */
 
-/* Number of letters to change, put in or leave out (Levenshtein 1965). */
+/* Number of letters to change, insert or delete (Levenshtein 1965). */
 static unsigned distance(const char *a, const char *b)
 {
     unsigned row[32];

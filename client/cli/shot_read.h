@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What the readers of a request file share. All but the first return false with the job's error set. */
+/* Shared by the readers of a shot file. All but the first return false with the job's error set. */
 #ifndef FARLIGHT_CLIENT_CLI_SHOT_READ_H
 #define FARLIGHT_CLIENT_CLI_SHOT_READ_H
 
@@ -13,7 +13,7 @@ struct shot_reader {
     void *user;
 };
 
-/* A value and where it stands. `value` is NULL where it is missing. */
+/* A value and its place. `value` is NULL if it is missing. */
 struct shot_value {
     struct fl_json_place place;
     const json_t *value;
@@ -31,14 +31,14 @@ bool shot_is_array(const struct shot_reader *reader, const struct shot_value *at
 /* A number in [least, greatest]. */
 bool shot_number(const struct shot_reader *reader, const struct shot_value *at, double least, double greatest,
                  double *number);
-/* A name, or a whole number that is then written out: "Lamp", "0". Lives as long as the shot. */
+/* A name, or a whole number as text: "Lamp", "0". Lives as long as the shot. */
 bool shot_name(const struct shot_reader *reader, const struct shot_value *at, const char **name);
-/* A path, sought from the file's folder. Likewise. */
+/* A path relative to the file's folder. Lives as long as the shot. */
 bool shot_path(const struct shot_reader *reader, const struct shot_value *at, const char **path);
 /* Memory that lives as long as the shot. */
 void *shot_allocate(const struct shot_reader *reader, size_t count, size_t item_bytes);
 
-/* ---- shot_value.c: one value, or one that changes ---- */
+/* ---- shot_value.c: constant and keyed values ---- */
 
 enum shot_kind {
     SHOT_NUMBERS,
@@ -54,7 +54,7 @@ struct shot_property {
     enum shot_kind kind;
     unsigned width; /* numbers of a value, as they are written */
     double least, greatest;
-    double scale; /* from what is written to what the protocol has */
+    double scale; /* from the file's unit to the protocol's */
     const char *example;
 };
 /* Whether it is {"times": .., "values": ..}. */
@@ -62,14 +62,14 @@ bool shot_is_keyed(const struct shot_value *at);
 /* A single value is one key at time 0. The channel has no object yet. */
 bool shot_channel(const struct shot_reader *reader, const struct shot_value *at,
                   const struct shot_property *property, struct fl_channel *channel);
-/* Appends it to the job's. `target`: NULL for the view; `at` is what an unknown name is told by. */
+/* Appends it to the job's. `target`: NULL for the view; `at` locates an unknown name. */
 bool shot_add_channel(const struct shot_reader *reader, const struct shot_value *at,
                       const struct fl_channel *channel, enum protocol_object_kind kind, const char *target);
 
 /* ---- shot_settings.c ---- */
 
 #define SHOT_SETTINGS_MAX 96
-/* Into `names`, which has room for SHOT_SETTINGS_MAX. Returns how many there are. */
+/* Writes at most SHOT_SETTINGS_MAX to `names`; returns their number. */
 size_t shot_setting_names(const char **names);
 /* Those that the file's object has. */
 bool shot_settings(const struct shot_reader *reader, const struct shot_value *root);

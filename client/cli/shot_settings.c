@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Members of a request file that the command line has, too: each is set as if it had been typed. */
+/* Members of a shot file that are also options: each is set as if it had been typed. */
 #include "cli/shot_read.h"
 
 #include "cli/job_fields.h"

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A value of a request file that changes over time: {"times": [..], "values": [..], "interpolation": "..",
- * "handles": [[before, after], ..]}. */
+/* A keyed value of a shot file: {"times": [..], "values": [..], "interpolation": "..", "handles": [[before,
+ * after], ..]}. */
 #include "cli/shot_read.h"
 
 #include <math.h>
@@ -11,12 +11,12 @@
 #define KEYS_MAX 65536u
 #define CHANNELS_MAX 4096u
 #define TIME_MAX_S 1e6
-/* Rotations in degrees are cut into steps below this, so that the shorter arc is the one that was meant. */
+/* Rotations in degrees are cut into steps below this, so that the shorter arc is the intended one. */
 #define STEP_DEGREES 60.0
 #define DEGREES_MAX 3.6e6
 #define RADIANS_PER_DEGREE 0.017453292519943295
 
-/* A property's keys as they are read; `numbers` is the protocol's count for a value. */
+/* A property's keys as they are read; `numbers` is the protocol's count per value. */
 struct keys {
     const struct shot_property *property;
     enum protocol_interpolation interpolation;
@@ -61,7 +61,7 @@ static bool read_scaled(const struct shot_reader *reader, const struct shot_valu
     return true;
 }
 
-/* The numbers as they stand, scaled: property->width of them. */
+/* The file's numbers, scaled: property->width of them. */
 static bool read_plain(const struct shot_reader *reader, const struct shot_value *at,
                        const struct shot_property *property, float value[4])
 {
@@ -94,7 +94,7 @@ static bool read_plain(const struct shot_reader *reader, const struct shot_value
     return true;
 }
 
-/* Turned about x, then about y, then about z, each of the axes that stand still. */
+/* Rotated about x, then y, then z, each a fixed axis. */
 static void quaternion_of_angles(const double degrees[3], float quaternion[4])
 {
     double c[3], s[3];
@@ -185,7 +185,7 @@ static bool read_times(const struct shot_reader *reader, const struct shot_value
     return true;
 }
 
-/* What stands at a key for a spline: before it, itself, after it. Without handles it stands still there. */
+/* The values of a spline's key: before it, itself, after it. Without handles the velocity is zero there. */
 static bool read_spline_key(const struct shot_reader *reader, const struct shot_value *handles, size_t i,
                             struct keys *keys, const float value[4])
 {
@@ -213,7 +213,7 @@ static bool read_spline_key(const struct shot_reader *reader, const struct shot_
         if (!read_plain(reader, &at, &property, side))
             return false;
         if (!is_bezier && property.kind == SHOT_COLOUR && json_array_size(at.value) == 3)
-            side[3] = 0; /* an alpha that is not said does not change */
+            side[3] = 0; /* a missing alpha does not change */
         memcpy(out + keys->numbers * 2 * k, side, bytes);
     }
     return true;
@@ -251,7 +251,7 @@ static bool read_angles(const struct shot_reader *reader, const struct shot_valu
         double most = 0;
         for (unsigned k = 0; k < 3 && i > 0; k++)
             most = fmax(most, fabs((double)degrees[i][k] - (double)degrees[i - 1][k]));
-        /* Where the fourth number would be: steps from the key before. */
+        /* In place of the fourth number: steps from the previous key. */
         degrees[i][3] =
             keys->interpolation == PROTOCOL_INTERPOLATION_STEP ? 1 : (float)(floor(most / STEP_DEGREES) + 1);
         total += i > 0 ? (size_t)degrees[i][3] : 0;
@@ -338,8 +338,8 @@ bool shot_channel(const struct shot_reader *reader, const struct shot_value *at,
     return true;
 }
 
-/* A copy that lives as long as the shot; NULL: out of memory. Lines are only counted where one must be told: that
- * takes a walk through the file. */
+/* A copy that lives as long as the shot; NULL: out of memory. Lines are only counted for a message, as that scans
+ * the file. */
 static const struct fl_json_place *keep_place(const struct shot_reader *reader, const struct fl_json_place *place)
 {
     struct fl_json_place *kept = shot_allocate(reader, 1, sizeof(*kept));

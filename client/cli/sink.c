@@ -43,7 +43,7 @@ static bool prepare(struct cli_sink *sink, struct fl_error *error)
         snprintf(error->field, sizeof(error->field), "--output");
         return false;
     }
-    /* The greatest number that a frame can have: its path is the longest. */
+    /* The highest possible frame number: it gives the longest path. */
     if (!fl_pattern_path(&sink->pattern, 10000000, sink->path, sizeof(sink->path)))
         return fl_error_set(error, FL_ERROR_ARGUMENT, "--output", "the path of a frame is too long");
     return cli_check_output(sink->path, sink->folder, sizeof(sink->folder), error);
@@ -105,7 +105,7 @@ static bool start(struct cli_sink *sink, struct fl_error *error)
     if (cli_image_is_video(sink->output.image))
         return start_video(sink, error);
     const struct cli_job *job = sink->job;
-    /* An interruption is how progressive pictures end: a file that has begun is finished. */
+    /* An interruption is the normal end of progressive pictures: a file that has begun is finished. */
     const struct fl_exporter_options options = {.folder = sink->folder,
                                                 .model = job->model ? job->model : job->scene,
                                                 .frames_per_second =

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Where a job's frames go: image files, one for all or one for each frame, or a video. */
+/* The destinations of a job's frames: image files, one for all or one per frame, or a video. */
 #ifndef FARLIGHT_CLIENT_CLI_SINK_H
 #define FARLIGHT_CLIENT_CLI_SINK_H
 
@@ -11,7 +11,7 @@ struct cli_sink {
     struct cli_output output;
     bool is_series, to_stdout;
     struct fl_pattern pattern;     /* of a series */
-    char folder[4096], path[4352]; /* where the image goes; of a series, for each frame anew */
+    char folder[4096], path[4352]; /* the image's path; of a series, that of the current frame */
     bool has_temporary;            /* `folder` is to be removed */
     struct fl_exporter *exporter;  /* of images */
     struct fl_video *video;
@@ -25,17 +25,17 @@ struct cli_sinks {
     size_t count;
 };
 
-/* Everything that can be known to fail before anything is rendered. */
+/* Finds every failure that can be found before rendering. */
 bool cli_sinks_prepare(struct cli_sinks *sinks, const struct cli_job *job, bool is_series, struct fl_error *error);
 /* Starts the programs that write. */
 bool cli_sinks_start(struct cli_sinks *sinks, struct fl_error *error);
-/* Whether the frame's picture is there already, complete and of the wanted size, in every sink. */
+/* Whether the frame's picture already exists, complete and of the wanted size, in every sink. */
 bool cli_sinks_have(struct cli_sinks *sinks, uint32_t frame);
-/* Hands the frame over; the files of the frame before are complete when this returns true. */
+/* Passes the frame on; the files of the previous frame are complete when this returns true. */
 bool cli_sinks_write(struct cli_sinks *sinks, const struct fl_frame *frame, struct fl_error *error);
 /* Waits until all is written. */
 bool cli_sinks_finish(struct cli_sinks *sinks, struct fl_error *error);
-/* Ends the programs; what is not complete is removed. */
+/* Ends the programs; incomplete files are removed. */
 void cli_sinks_close(struct cli_sinks *sinks);
 
 #endif

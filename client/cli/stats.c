@@ -142,7 +142,7 @@ static double mb(uint64_t bytes)
     return (double)bytes * 1e-6;
 }
 
-/* The daemon's and other clients' words, made harmless for a terminal. */
+/* Texts of the daemon and of other clients, made harmless for a terminal. */
 static const char *plain(const char *text, char out[130])
 {
     size_t length = 0;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What a tracer says of its structure, for people and for scripts. The words are the tracer's. */
+/* A tracer's description of its structure, for people and for scripts. The words are the tracer's. */
 #include "cli/cli.h"
 
 #include <stdio.h>

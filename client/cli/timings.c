@@ -220,7 +220,7 @@ static void print_row(const struct cli_timings *timings, const char *indent, con
     fputc('\n', timings->out);
 }
 
-/* Of a structure without parts, the row above says the same. */
+/* For a structure without parts the row above says the same. */
 static void print_part_rows(const struct cli_timings *timings)
 {
     for (unsigned i = 0; i < PARTS_SHOWN; i++)

@@ -28,7 +28,7 @@ static const struct {
     [CLI_TRACE_OUTPUT] = {2, "output, CPU"}, [CLI_TRACE_GPU] = {2, "render, GPU"},
 };
 
-/* What is there can be looked at while the command runs, and survives a crash. */
+/* The file can be read while the command runs, and survives a crash. */
 static void flush(struct cli_trace_file *file)
 {
     if (fflush(file->out) != 0 && file->failure == 0)
@@ -142,7 +142,7 @@ void cli_trace_import(struct cli_trace_file *file, const struct fl_import_stats 
 struct cli_trace_file *cli_trace_file_create(const char *path, struct fl_error *error)
 {
     struct cli_trace_file *file = calloc(1, sizeof(*file));
-    /* Not blocking: a FIFO without a reader is an error and no endless wait. */
+    /* Non-blocking: a FIFO without a reader is an error instead of an endless wait. */
     const int fd = open(path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NONBLOCK | O_NOCTTY, 0666);
     if (!file || fd < 0 || !(file->out = fdopen(fd, "w"))) {
         fl_error_set(error, FL_ERROR_FILE, path, "the trace file cannot be written: %s", strerror(errno));

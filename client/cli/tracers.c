@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* farlight tracers: every tracer and its settings, for people, for scripts, and for what the build makes of them:
- * the manual and the schema of shot files. farlight complete: for the shell. */
+/* farlight tracers: every tracer and its settings, for people, for scripts, and for the build, which makes the
+ * manual and the schema of shot files of them. farlight complete: for the shell. */
 #include "cli/job_fields.h"
 
 #include <stdio.h>
@@ -157,7 +157,7 @@ static json_t *member_json(const struct cli_field *member)
     return object;
 }
 
-/* Members for the object `properties`, a line each. */
+/* Members of the object `properties`, one per line. */
 static void print_schema(void)
 {
     for (size_t i = 0; i < cli_field_count(); i++) {

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
-/* What came of comparing the waves of a frame, for people and as JSON. */
+/* The results of comparing the waves of a frame, for people and as JSON. */
 #include "cli/cli.h"
 
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
 
-/* Never rounded up: 100 is said of all and nothing less. */
+/* Never rounded up: 100 means all. */
 static double percent(const struct record_wave_comparison *wave)
 {
     return floor(fl_wave_agreement(wave) * 1e6) / 1e4;

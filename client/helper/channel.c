@@ -14,7 +14,7 @@
 
 /* ---- answers ---- */
 
-/* The longest beginning that fits and does not end within a UTF-8 character. */
+/* The longest prefix that fits and does not cut a UTF-8 character. */
 static void copy_text(char *out, size_t out_bytes, const char *text)
 {
     size_t length = strlen(text);
@@ -71,7 +71,7 @@ bool channel_send_failure(const struct channel *channel, uint32_t request, const
 
 /* ---- the stream ---- */
 
-/* Reads what is there; 0 at its end, -1 on failure. */
+/* Reads the available bytes; 0 at the end, -1 on failure. */
 static int read_more(struct channel *channel)
 {
     memmove(channel->buffer, channel->buffer + channel->start, channel->end - channel->start);

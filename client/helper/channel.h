@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The conversation of a helper program with the program that started it: messages in, answers out. */
+/* A helper program's channel to the program that started it: messages in, answers out. */
 #ifndef FARLIGHT_CLIENT_HELPER_CHANNEL_H
 #define FARLIGHT_CLIENT_HELPER_CHANNEL_H
 
@@ -9,7 +9,7 @@
 struct channel {
     int fd;              /* connected stream socket */
     const char *program; /* for standard error */
-    /* Called for each message; what it points at lives as long as the call. False: it does not belong here. */
+    /* Called for each message, which is valid during the call. False: the message is not allowed here. */
     bool (*handle)(void *user, uint32_t request, const struct message *message);
     void *user;
     uint8_t *buffer; /* from here on: channel_run's */
@@ -17,12 +17,12 @@ struct channel {
     struct scratch scratch;
 };
 
-/* Hands over one message after the other until the other side ends. False, with a line on standard error: it broke
- * the protocol, or there is no memory. */
+/* Passes each message on until the other side closes. False, with a line on standard error: it broke the protocol,
+ * or there is no memory. */
 bool channel_run(struct channel *channel);
-/* Blocks until the kernel has it. False: nobody is there any more. */
+/* Blocks until the kernel has it. False: the other side has closed. */
 bool channel_send(const struct channel *channel, uint32_t request, const struct message *message);
-/* Answers with an error. The texts are shortened to what a message holds; `remedy` may be NULL. */
+/* Answers with an error. The texts are shortened to fit into a message; `remedy` may be NULL. */
 bool channel_send_failure(const struct channel *channel, uint32_t request, const char *field, const char *reason,
                           const char *remedy);
 

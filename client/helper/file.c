@@ -34,7 +34,7 @@ static int write_all(int fd, const uint8_t *bytes, size_t count)
     return 0;
 }
 
-/* The name under which a file is being written: a program that is ended meanwhile takes it away. */
+/* The temporary name of the file that is being written: a signal handler removes it if the program is ended. */
 static char unfinished[4200];
 static volatile sig_atomic_t is_unfinished;
 
@@ -67,7 +67,7 @@ int file_begin(const char *path, char *reason, size_t reason_bytes)
         fail(reason, reason_bytes, ENAMETOOLONG);
         return -1;
     }
-    /* A folder of that name would only be in the way of the rename. */
+    /* A folder of that name would make the rename fail. */
     struct stat status;
     if (stat(path, &status) == 0 && S_ISDIR(status.st_mode)) {
         fail(reason, reason_bytes, EISDIR);
@@ -80,7 +80,7 @@ int file_begin(const char *path, char *reason, size_t reason_bytes)
         fail(reason, reason_bytes, errno);
         return -1;
     }
-    /* mkostemp lets nobody else in; this is an ordinary file. */
+    /* mkostemp gives rights to the owner alone; this is an ordinary file. */
     const mode_t mask = umask(0);
     umask(mask);
     if (fchmod(fd, 0666 & ~mask) == 0)
@@ -98,7 +98,7 @@ const char *file_temporary_name(void)
 
 bool file_finish(int fd, const char *path, char *reason, size_t reason_bytes)
 {
-    /* Some file systems say only now that they were full. */
+    /* Some file systems report only now that they were full. */
     int failure = close(fd) < 0 ? errno : 0;
     if (failure == 0 && rename(unfinished, path) < 0)
         failure = errno;
@@ -143,7 +143,7 @@ int file_open(const char *path, char *reason, size_t reason_bytes)
     return -1;
 }
 
-/* Until `capacity` bytes are there or the file ends; *count is what came. */
+/* Reads until `capacity` bytes or the file's end; *count is the number of bytes read. */
 static bool read_up_to(int fd, uint8_t *bytes, size_t capacity, size_t *count)
 {
     *count = 0;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Files in one piece: one that is written appears complete or not at all. */
+/* Atomic files: a written file appears complete or not at all. */
 #ifndef FARLIGHT_CLIENT_HELPER_FILE_H
 #define FARLIGHT_CLIENT_HELPER_FILE_H
 
@@ -14,24 +14,25 @@ extern "C" {
 /* Writes under a temporary name in the path's folder and renames; on failure nothing is left and `reason` says
  * why. An existing file is replaced. One at a time. */
 bool file_write(const char *path, const uint8_t *bytes, size_t count, char *reason, size_t reason_bytes);
-/* The same piece by piece. An empty file under a temporary name, open for reading and writing; -1, with `reason`.
+/* The same in steps. Returns an empty file under a temporary name, open for reading and writing; -1, with
+ * `reason`.
  */
 int file_begin(const char *path, char *reason, size_t reason_bytes);
-/* Without its folder; of the file that was begun last. */
+/* The temporary name, without its folder, of the last file that was begun. */
 const char *file_temporary_name(void);
 /* Closes and renames it; on failure nothing is left and `reason` says why. */
 bool file_finish(int fd, const char *path, char *reason, size_t reason_bytes);
 /* Closes it and takes it away. */
 void file_abandon(int fd);
 
-/* How large a file may become: 64 GiB, or a limit of the process that is less (the sandbox would set ours over
- * it).
+/* The maximum size of a file: 64 GiB, or the process's own limit if that is lower (the sandbox would raise it to
+ * ours).
  */
 uint64_t file_bytes_limit(void);
 /* From now on SIGTERM ends the program without leaving a temporary file behind. */
 void file_clean_up_on_end(void);
 
-/* Opens an ordinary file for reading; -1, with `reason`, for anything else: a FIFO holds nobody. */
+/* Opens an ordinary file for reading; -1, with `reason`, for anything else: opening a FIFO does not block. */
 int file_open(const char *path, char *reason, size_t reason_bytes);
 /* Reads all of it. *bytes is malloc'ed. */
 bool file_read(int fd, size_t greatest_bytes, uint8_t **bytes, size_t *count, char *reason, size_t reason_bytes);

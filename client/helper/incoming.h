@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A frame that comes in as frame_begin, frame_data and frame_end. */
+/* A frame that arrives as frame_begin, frame_data and frame_end. */
 #ifndef FARLIGHT_CLIENT_HELPER_INCOMING_H
 #define FARLIGHT_CLIENT_HELPER_INCOMING_H
 
@@ -13,10 +13,10 @@ struct incoming {
     uint64_t received_bytes;
 };
 
-/* False: the sender breaks the protocol: a frame has begun already, is encoded, or has another number of bytes
- * than its size, format and layers say. With `keep`, `pixels` is NULL afterwards only where there is no memory. */
+/* False: the sender breaks the protocol: a frame has begun already, is encoded, or its number of bytes contradicts
+ * its size, format and layers. With `keep`, `pixels` is then NULL only if there is no memory. */
 bool incoming_begin(struct incoming *incoming, const struct message_frame_begin *begin, bool keep);
-/* False: not the next bytes of a frame that has begun, or more than it has. */
+/* False: these are not the next bytes of the current frame, or exceed it. */
 bool incoming_take(struct incoming *incoming, const struct message_frame_data *data);
 bool incoming_is_whole(const struct incoming *incoming);
 /* Makes it zero. */

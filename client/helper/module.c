@@ -6,7 +6,7 @@
 
 void *module_load(const char *file, const char *symbol, char *reason, size_t reason_bytes)
 {
-    /* Lazily: most of what the libraries call each other for is never reached. */
+    /* Lazily: most of the libraries' functions are never called. */
     void *module = dlopen(file, RTLD_LAZY | RTLD_LOCAL);
     void *found = module ? dlsym(module, symbol) : NULL;
     if (!found)

@@ -21,7 +21,7 @@
 #ifndef LANDLOCK_ACCESS_FS_IOCTL_DEV
 #define LANDLOCK_ACCESS_FS_IOCTL_DEV (1ULL << 15)
 #endif
-/* The sanitizers map terabytes of shadow memory and trace themselves when they look for leaks. */
+/* The sanitizers map terabytes of shadow memory, and ptrace themselves to find leaks. */
 #if defined(__SANITIZE_ADDRESS__)
 #define SANITIZED 1
 #elif defined(__has_feature)
@@ -57,7 +57,7 @@ static bool set_limits(const struct sandbox_options *options)
         return false;
     if (options->cpu_seconds != 0 && !set_limit(RLIMIT_CPU, options->cpu_seconds))
         return false;
-    signal(SIGXFSZ, SIG_IGN); /* writing beyond the limit then fails instead of killing */
+    signal(SIGXFSZ, SIG_IGN); /* a write beyond the limit then fails instead of ending the process */
     /* A sanitizer's report goes to stderr, which may be a file. */
     return set_limit(RLIMIT_CORE, 0) && (SANITIZED || set_limit(RLIMIT_FSIZE, options->file_bytes));
 }
@@ -77,7 +77,7 @@ static uint64_t rights_of_abi(long abi)
     return rights;
 }
 
-/* A folder that is not there gives no rights and is no fault: opening files in it will say so. */
+/* A missing folder gives no rights and is no error here: opening files in it reports it. */
 static bool allow_folder(int ruleset, const char *folder, uint64_t rights)
 {
     struct landlock_path_beneath_attr rule = {.allowed_access = rights};
@@ -93,7 +93,7 @@ static bool allow_folder(int ruleset, const char *folder, uint64_t rights)
 
 static bool allow_folders(int ruleset, const struct sandbox_options *options, uint64_t handled)
 {
-    /* What the dynamic linker, the C library and the image readers' plug-in search may still open. */
+    /* Paths that the dynamic linker, the C library and the image readers' plug-in search may still open. */
     static const char *const system_folders[] = {"/usr/lib", "/usr/lib64", "/lib", "/lib64",
                                                  "/sys/devices/system/cpu"};
     const uint64_t read_rights = LANDLOCK_ACCESS_FS_READ_FILE | LANDLOCK_ACCESS_FS_READ_DIR;
@@ -161,7 +161,7 @@ static bool allow_calls(scmp_filter_ctx filter, const char *const *names, size_t
     for (size_t i = 0; i < count; i++) {
         int number = seccomp_syscall_resolve_name(names[i]);
 
-        /* Not every architecture and libseccomp knows every name. */
+        /* Not every architecture and version of libseccomp knows every name. */
         if (number != __NR_SCMP_ERROR && number >= 0 && seccomp_rule_add(filter, SCMP_ACT_ALLOW, number, 0) != 0)
             return false;
     }
@@ -175,7 +175,7 @@ static bool allow_with_argument(scmp_filter_ctx filter, int number, unsigned arg
     return seccomp_rule_add_array(filter, SCMP_ACT_ALLOW, number, 1, &is_value) == 0;
 }
 
-/* fcntl and ioctl only for what a reader of files asks, so that no descriptor can be made to do more. */
+/* fcntl and ioctl only with the requests of a reader of files, so that no descriptor gains abilities. */
 static bool allow_arguments(scmp_filter_ctx filter)
 {
     static const unsigned fcntl_commands[] = {F_GETFD, F_SETFD, F_GETFL, F_SETFL, F_DUPFD_CLOEXEC};
@@ -191,8 +191,8 @@ static bool allow_arguments(scmp_filter_ctx filter)
     return allow_with_argument(filter, SCMP_SYS(prlimit64), 2, 0);
 }
 
-/* Other calls fail with EPERM instead of ending the process: a library that asks for something odd then
- * takes its own way out, and the import ends with a message. */
+/* Other calls fail with EPERM instead of ending the process: a library that makes an unusual call then handles the
+ * error, and the import ends with a message. */
 static bool enter_seccomp(const struct sandbox_options *options)
 {
     scmp_filter_ctx filter = seccomp_init(SCMP_ACT_ERRNO(EPERM));
@@ -200,7 +200,7 @@ static bool enter_seccomp(const struct sandbox_options *options)
 
     if (!filter)
         return false;
-    /* Libraries may have started threads before main(): the filter is for them, too. Landlock cannot be. */
+    /* Libraries may have started threads before main(): the filter applies to them, too. Landlock cannot. */
     entered = seccomp_attr_set(filter, SCMP_FLTATR_CTL_TSYNC, 1) == 0 &&
               allow_calls(filter, allowed_calls, sizeof(allowed_calls) / sizeof(allowed_calls[0])) &&
               allow_arguments(filter);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Takes a helper program's rights away before it reads what may be hostile: files beneath the named
+/* Drops a helper program's rights before it reads hostile input: files beneath the named
  * folders only (Landlock), few system calls (seccomp), bounded memory, time and file sizes, no new
  * privileges. Cannot be undone. Also used by farlight-export.
  *
@@ -16,21 +16,21 @@
 extern "C" {
 #endif
 
-/* Zero is the tightest: no file may be read or written but those that are already open. */
+/* Zero is the strictest: only files that are already open can be read or written. */
 struct sandbox_options {
-    const char *const *read_folders; /* everything beneath them may be read; NULL entries are skipped */
+    const char *const *read_folders; /* folders whose contents may be read; NULL entries are skipped */
     size_t read_folder_count;
-    const char *const *write_folders; /* files may be made, written and read beneath them */
+    const char *const *write_folders; /* folders in which files may be created, written and read */
     size_t write_folder_count;
     bool allow_rename;            /* rename and unlink beneath the write folders */
     uint64_t address_space_bytes; /* 0: 8 GiB */
     uint32_t cpu_seconds;         /* 0: unlimited */
-    uint64_t file_bytes;          /* greatest size of a written file; 0: files cannot grow at all */
+    uint64_t file_bytes;          /* maximum size of a written file; 0: files cannot grow at all */
 };
 
-/* False, with `reason` set, if a protection that every supported kernel has cannot be had (limits, no new
- * privileges, system call filter): then nothing may be parsed. Where the kernel merely lacks Landlock the
- * answer is true and `reason` says so; else `reason` is empty. */
+/* False, with `reason` set, if a protection that every supported kernel has (limits, no new privileges, system
+ * call filter) fails: then nothing may be parsed. If the kernel merely lacks Landlock, the result is true and
+ * `reason` says so; else `reason` is empty. */
 bool sandbox_enter(const struct sandbox_options *options, char *reason, size_t reason_bytes);
 
 #ifdef __cplusplus

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Skins, clips and channels of the growing scene. */
+/* Skins, clips and channels of the scene under construction. */
 #include "model.h"
 
 #include <math.h>

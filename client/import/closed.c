@@ -5,8 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* The finaliser of splitmix64 (Steele, Lea and Flood: Fast splittable pseudorandom number generators. 2014): one
- * to one, and every bit of the result depends on every bit given. */
+/* The finaliser of splitmix64 (Steele, Lea and Flood: Fast splittable pseudorandom number generators. 2014): a
+ * bijection in which every bit of the result depends on every bit of the input. */
 static uint64_t mix(uint64_t bits)
 {
     bits = (bits ^ bits >> 30) * 0xbf58476d1ce4e5b9u;
@@ -19,7 +19,7 @@ static uint64_t mix_two(uint64_t first, uint64_t second)
     return mix(mix(first + 0x9e3779b97f4a7c15u) + second);
 }
 
-/* A place's 64-bit name. Two places may share one by chance, at 10 million vertices once in some 100,000 meshes;
+/* The 64-bit hash of a position. Two positions may collide, at 10 million vertices once in some 100,000 meshes;
  * that cannot open a closed mesh, and hardly close an open one. */
 static uint64_t place_of(const float *position)
 {
@@ -33,7 +33,7 @@ static uint64_t place_of(const float *position)
     return mix_two(bits[0] | (uint64_t)bits[1] << 32, bits[2]);
 }
 
-/* A number for the edge, and minus that number for the edge the other way; 0 for one without length. */
+/* A hash of the edge, and its negative for the reversed edge; 0 for one without length. */
 static uint64_t edge_of(uint64_t from, uint64_t to)
 {
     if (from == to)
@@ -52,9 +52,8 @@ static bool degenerate(const uint64_t places[3])
     return places[0] == places[1] || places[1] == places[2] || places[2] == places[0];
 }
 
-/* The edges' numbers add up to 0 where each is run along as often one way as the other, and else, but for one
- * chance in 2^64, to something else. So no edge need be remembered. (The edges of a degenerate triangle add up to
- * 0.) */
+/* The edges' hashes add up to 0 if each edge occurs equally often in both directions, and otherwise, but for one
+ * chance in 2^64, they do not. So no edge need be stored. (The edges of a degenerate triangle add up to 0.) */
 static bool edges_paired(const float *positions, const uint32_t *indices, uint32_t triangle_count)
 {
     uint64_t sum = 0;
@@ -68,8 +67,7 @@ static bool edges_paired(const float *positions, const uint32_t *indices, uint32
     return sum == 0;
 }
 
-/* The same whichever corner comes first, in the lowest bit which way round they run; never 0, which stands for an
- * empty slot. */
+/* A hash independent of the first corner; the lowest bit is the orientation. Never 0, which is an empty slot. */
 static uint64_t triangle_of(const uint64_t places[3])
 {
     bool turned = (places[0] < places[1]) ^ (places[1] < places[2]) ^ (places[2] < places[0]);
@@ -77,7 +75,8 @@ static uint64_t triangle_of(const uint64_t places[3])
     return ((mix(places[0]) + mix(places[1]) + mix(places[2])) & ~(uint64_t)1) | 2 | turned;
 }
 
-/* False: it is there the other way round. The table's size is a power of two and greater than what is put into it.
+/* False: it is in the table with the other orientation. The table's size is a power of two and greater than the
+ * number of triangles.
  */
 static bool put(uint64_t *table, uint64_t mask, uint64_t triangle)
 {
@@ -90,7 +89,7 @@ static bool put(uint64_t *table, uint64_t mask, uint64_t triangle)
     return true;
 }
 
-/* There are triangles, and none that is there both ways round. */
+/* There are triangles, and none with both orientations. */
 static bool no_sheets(const float *positions, const uint32_t *indices, uint32_t triangle_count)
 {
     uint64_t slots = 16;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Reads the model file and what it refers to. What a model names is opened beneath the model's own folder and
- * nowhere else, must be a regular file, and is read whole into memory. */
+/* Reads the model file and the files that it refers to. These are opened beneath the model's own folder and
+ * nowhere else, must be regular files, and are read completely into memory. */
 #ifndef FARLIGHT_IMPORT_FILES_H
 #define FARLIGHT_IMPORT_FILES_H
 

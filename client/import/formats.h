@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* The readers of the formats: bytes of the model file to edits of the scene. Each returns false, with the scene
- * failed, if the model cannot be used; what can merely not be shown becomes a note. None throws, none reads a file
- * but through `files`, and every index, count and number of the input is checked before it is used. */
+ * failed, if the model cannot be used; parts that merely cannot be shown become notes. None throws, none reads a
+ * file but through `files`, and every index, count and number of the input is checked before it is used. */
 #ifndef FARLIGHT_IMPORT_FORMATS_H
 #define FARLIGHT_IMPORT_FORMATS_H
 

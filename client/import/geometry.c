@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Meshes and sphere sets of the growing scene: checked as the server will check them. */
+/* Meshes and sphere sets of the scene under construction, checked as the server will check them. */
 #include "closed.h"
 #include "model.h"
 
@@ -34,7 +34,7 @@ static bool all_finite(const float *values, size_t count)
     return sum == 0;
 }
 
-/* What is not finite and only shades becomes 0. */
+/* Shading data that is not finite becomes 0. */
 static void mend(struct import_scene *scene, const char *where, float *values, size_t count, const char *what)
 {
     if (!values || all_finite(values, count))
@@ -59,7 +59,7 @@ static bool ranges_valid(const struct record_material_range *ranges, uint32_t co
     return count <= IMPORT_RANGES_MAX;
 }
 
-/* Neighbours of one material become one range; empty ones go. */
+/* Merges neighbouring ranges of one material and removes empty ones. */
 static uint32_t ranges_merge(struct record_material_range *ranges, uint32_t count)
 {
     uint32_t kept = 0;
@@ -96,7 +96,8 @@ static uint32_t keep_whole(struct import_mesh *mesh, uint32_t from, uint32_t to,
     return kept;
 }
 
-/* Triangles with a corner that is NaN or infinite go; such corners become 0, so that nobody stumbles over them. */
+/* Removes triangles with a corner that is NaN or infinite; such corners become 0, so that later code can rely on
+ * finite ones. */
 static void drop_broken(struct import_scene *scene, const char *where, struct import_mesh *mesh)
 {
     uint32_t at = 0, kept = 0;

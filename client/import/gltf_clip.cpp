@@ -15,7 +15,7 @@ namespace
 constexpr size_t keys_max = 1u << 24;
 constexpr float value_max = 1e12f;
 
-// Times of one accessor as they go on, and which keys of the file they are.
+// The ascending times of one accessor, and their keys in the file.
 struct key_times {
     std::vector<float> times;
     std::vector<uint32_t> kept;
@@ -45,7 +45,7 @@ struct target {
     int type;          // of the accessor of values
 };
 
-// False: the channel is to be left out; a note says why where the file is at fault.
+// False: leave the channel out; a note says why if the file is at fault.
 bool find_target(builder &b, const tinygltf::AnimationChannel &channel, target &found)
 {
     reader &r = b.r;
@@ -95,8 +95,8 @@ bool find_interpolation(const std::string &name, protocol_interpolation &found)
 
 // ---- keys
 
-// Ascending times: of equal ones the last is moved by as little as possible, so that a leap stays one, and those
-// between it and the first go, as do earlier times.
+// Makes times ascend: the last of equal ones is moved by as little as possible, so that a jump stays one, and
+// those between it and the first are removed, as are times that go back.
 key_times read_times(builder &b, int accessor, const std::string &where)
 {
     key_times result;
@@ -147,7 +147,7 @@ bool all_usable(const std::vector<float> &values)
     return std::all_of(values.begin(), values.end(), [](float value) { return std::fabs(value) <= value_max; });
 }
 
-// Rotations that are none at all become the identity.
+// Invalid rotations become the identity.
 void mend_rotations(std::vector<float> &values, size_t parts)
 {
     for (size_t at = parts == 3 ? 4 : 0; at < values.size(); at += 4 * parts) {
@@ -278,7 +278,7 @@ void add_channel(builder &b, size_t index)
         seen |= 1u << to.path;
 }
 
-// What a clip leaves alone of a node that it moves is said, too, so that nobody has to take a matrix apart.
+// The parts of a node's transform that a clip does not change are sent, too, so that no matrix need be decomposed.
 void add_constants(builder &b, int node, unsigned seen)
 {
     const unsigned moved = 1u << PROTOCOL_CHANNEL_NODE_TRANSLATION | 1u << PROTOCOL_CHANNEL_NODE_ROTATION |

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// From bytes to tinygltf's structures: what would hurt the parser is found before it is called.
+// From bytes to tinygltf's structures: input that would harm the parser is rejected before it is called.
 #include "gltf.hpp"
 
 #include <algorithm>
@@ -18,7 +18,7 @@ uint32_t u32_at(const unsigned char *bytes)
     return uint32_t(bytes[0]) | uint32_t(bytes[1]) << 8 | uint32_t(bytes[2]) << 16 | uint32_t(bytes[3]) << 24;
 }
 
-// A parser that descends needs stack for every level: the depth is counted first, without one.
+// A recursive parser needs stack for every level: the depth is counted first, without recursion.
 void check_json_depth(reader &r, const unsigned char *json, size_t size_bytes)
 {
     size_t depth = 0;

@@ -75,7 +75,7 @@ void want_image(reader &r, images &all, int image, bool colour)
     all.jobs.push_back(job);
 }
 
-// What cannot be decoded is shown in a colour that nobody chose.
+// An image that cannot be decoded is shown in a conspicuous colour.
 void take_images(reader &r, images &all)
 {
     texture_decode(all.jobs.data(), all.jobs.size());
@@ -277,7 +277,7 @@ void anisotropy(const building &b)
                     "a texture of anisotropy is not shown; its strength and rotation are the same everywhere");
 }
 
-// The old model, approximately: what reflects more than a dielectric's 4 % is taken for metal.
+// The old model, approximately: reflection above a dielectric's 4 % counts as metal.
 void specular_glossiness(const building &b)
 {
     const tinygltf::Value *old = extension(b.source.extensions, "KHR_materials_pbrSpecularGlossiness");
@@ -290,7 +290,7 @@ void specular_glossiness(const building &b)
         specular = {1, 1, 1};
     const bool textured = source_of(*old, "specularGlossinessTexture").index >= 0;
     const double strongest = std::max({specular[0], specular[1], specular[2]});
-    // A factor beside a texture is nearly always 1 and says nothing: dielectric is the better guess then.
+    // A factor with a texture is nearly always 1 and says nothing: dielectric is the better guess then.
     const double metallic = textured ? 0 : std::min(std::max((strongest - 0.04) / 0.96, 0.0), 1.0);
 
     for (size_t c = 0; c < 3; c++)

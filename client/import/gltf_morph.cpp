@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Morph targets: what they add to the vertices, and by default how much of each.
+// Morph targets: their offsets, and their default weights.
 #include "gltf.hpp"
 
 #include <algorithm>
@@ -53,7 +53,7 @@ size_t read_targets(reader &r, const std::vector<morph_lot> &lots, import_mesh &
     mesh.target_count = uint32_t(std::min<size_t>(count, IMPORT_TARGETS_MAX));
     for (size_t which = 0; which < 3 && mesh.target_count > 0; which++) {
         const bool has_base = which == 0 || (which == 1 ? mesh.normals : mesh.tangents);
-        // Positions are always there, if only as zeros; the others want something to be added to.
+        // Positions are always present, if only as zeros; the others need a base attribute.
         if (which > 0 && (!has_base || !any_has(lots, names[which])))
             continue;
         const uint64_t vectors = uint64_t(mesh.vertex_count) * mesh.target_count;

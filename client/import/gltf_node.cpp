@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The hierarchy: transforms, and what hangs at a node. Nothing here descends by calling itself.
+// The hierarchy: transforms, and the objects of nodes. Nothing here is recursive.
 #include "gltf.hpp"
 
 #include <algorithm>

@@ -42,7 +42,7 @@ std::vector<influence_set> read_sets(reader &r, const tinygltf::Primitive &primi
     }
 }
 
-// What moves a vertex, at most as many as may be.
+// The influences of a vertex, up to the limit.
 void collect(reader &r, const std::vector<influence_set> &sets, size_t vertex, std::vector<influence> &found,
              const std::string &where)
 {

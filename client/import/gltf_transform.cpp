@@ -110,7 +110,7 @@ parts decompose(reader &r, const matrix &m, const std::string &where)
     }
     const double mirror = dot(cross(axes[0], axes[1]), axes[2]) < 0 ? -1 : 1;
     scales[0] *= mirror;
-    // A column without length says nothing: it follows from the others.
+    // A column without length is derived from the others.
     vector3 x = scales[0] != 0  ? scaled(axes[0], 1 / scales[0])
                 : scales[1] > 0 ? any_perpendicular(scaled(axes[1], 1 / scales[1]))
                 : scales[2] > 0 ? any_perpendicular(scaled(axes[2], 1 / scales[2]))

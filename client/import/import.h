@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What a model file becomes: a growing list of edits (the protocol's own messages) and the bytes that they
- * name. The format readers (gltf.cpp, obj.cpp, nff.c) add to it, send.c speaks it.
+/* The result of an import: a growing list of edits (the protocol's own messages) and the bytes that they refer to.
+ * The format readers (gltf.cpp, obj.cpp, nff.c) add to it, send.c speaks it.
  *
  * Everything that is added is checked here once more, whatever the reader promised: counts, indices, finite
  * numbers, ranges of the protocol. The first failure is kept in the scene; later calls do nothing more.
@@ -80,7 +80,7 @@ void import_scene_finish(struct import_scene *scene);
 bool import_fail(struct import_scene *scene, const char *where, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
 
-/* Something a person should know. The same text again only counts. */
+/* A note for the user. A repeated text is only counted. */
 void import_note(struct import_scene *scene, enum protocol_severity severity, const char *where,
                  const char *format, ...) __attribute__((format(printf, 4, 5)));
 
@@ -111,7 +111,7 @@ bool import_add_clip(struct import_scene *scene, uint32_t clip, const char *name
 /* The clip may be added before or after its channels; that all of it lies within the clip's floats and that times
  * ascend is the caller's promise. */
 uint32_t import_add_channel(struct import_scene *scene, const struct message_set_channel *channel);
-/* Tells people of a clip; `clip` 0: nothing of it can be played. */
+/* Announces a clip to the user; `clip` 0: it cannot be played. */
 void import_list_clip(struct import_scene *scene, uint32_t clip, const char *name, uint32_t channels,
                       double duration_s);
 

@@ -109,8 +109,8 @@ static void silence_libraries(void)
 #endif
 }
 
-/* Somebody waits for the end of this process: it owes nothing to anybody any more, so memory is not given back
- * piece by piece and the destructors of some hundred libraries do not run. The leak checker wants both. */
+/* The parent waits for the end of this process, so memory is not freed and the destructors of some hundred
+ * libraries do not run. The leak checker needs both. */
 static void leave_at_once(int status)
 {
 #if !defined(__SANITIZE_ADDRESS__)

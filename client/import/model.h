@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Between the files that make up the growing scene; the format readers use import.h. */
+/* Internals of the scene under construction; the format readers use import.h. */
 #ifndef FARLIGHT_IMPORT_MODEL_H
 #define FARLIGHT_IMPORT_MODEL_H
 

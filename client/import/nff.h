@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The parts of the NFF reader: nff.c reads statements, nff_shapes.c makes triangles of them. */
+/* The parts of the NFF reader: nff.c parses statements, nff_shapes.c triangulates them. */
 #ifndef FARLIGHT_IMPORT_NFF_H
 #define FARLIGHT_IMPORT_NFF_H
 
@@ -8,7 +8,7 @@
 #define NFF_CONE_SEGMENTS 32
 #define NFF_TRIANGLES_MAX (1u << 27)
 
-/* What grows while the file is read. Arrays are malloc'd. */
+/* Arrays that grow while the file is read; malloc'd. */
 struct nff_shapes {
     struct import_scene *scene;
     float *positions, *normals;

@@ -141,8 +141,8 @@ static bool receive(struct sender *sender)
 
 /* ---- what goes out ---- */
 
-/* Waits until something could be sent (if there is something) or has been received. Reading while sending keeps
- * two full sockets from waiting for each other. */
+/* Waits until bytes could be sent (if there are some) or have been received. Reading while sending keeps two full
+ * sockets from waiting for each other. */
 static bool exchange(struct sender *sender)
 {
     struct pollfd poller = {.fd = sender->socket, .events = POLLIN};

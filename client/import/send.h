@@ -21,7 +21,7 @@ struct sender {
     bool answered;
     bool *needed; /* of the lot that is offered */
     uint32_t offered;
-    bool gone; /* the peer has hung up: nobody is there to be told anything */
+    bool gone; /* the peer has hung up: no error can be sent */
     struct import_scene *scene;
 };
 

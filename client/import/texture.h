@@ -34,13 +34,13 @@ struct texture_reader {
 };
 extern const struct texture_reader texture_reader __attribute__((visibility("default")));
 
-/* Loads the module. Where it cannot be loaded, or was not, that is the reason of every image. */
+/* Loads the module. If it was not loaded, or could not be, that is the reason of every image. */
 void texture_load(void);
 
 /* As the module's. */
 void texture_decode(struct texture_job *jobs, size_t count);
 void texture_decode_environment(struct texture_job *job);
-/* What stands for an image that cannot be had: 2x2 texels, magenta and black. NULL: out of memory. */
+/* The replacement of a missing image: 2x2 texels, magenta and black. NULL: out of memory. */
 unsigned char *texture_marker(void);
 
 #ifdef __cplusplus

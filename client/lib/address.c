@@ -12,7 +12,7 @@
 #include <sys/un.h>
 #include <unistd.h>
 
-/* connect() with a deadline, on a non-blocking socket. 0, or an errno value, or -1 with *error set. */
+/* connect() with a deadline, on a non-blocking socket. Returns 0, or an errno value, or -1 with *error set. */
 static int connect_by(int fd, const struct sockaddr *address, socklen_t address_bytes, uint64_t deadline_ns,
                       int interrupt_fd, struct fl_error *error)
 {
@@ -62,7 +62,7 @@ static int connect_unix(const char *address, const char *path, uint64_t deadline
     return refuse(address, failure, error);
 }
 
-/* "HOST:PORT" or "[HOST]:PORT" into its halves. */
+/* Splits "HOST:PORT" or "[HOST]:PORT". */
 static bool split_host(const char *text, char *host, size_t host_bytes, const char **port)
 {
     const char *colon = strrchr(text, ':');

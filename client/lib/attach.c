@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Scenes that are there: listed, come to, described; and what is heard of them. */
+/* Existing scenes: listed, attached to, described; and their notifications. */
 #include "lib/scene.h"
 #include "lib/text.h"
 #include "protocol/common/clock.h"
@@ -87,7 +87,7 @@ static bool learn_clips(struct fl_catalogue *catalogue, const struct message_sce
     for (size_t i = 0; i < catalogue->clip_count; i++) {
         const struct record_clip_entry *from = &description->clips[i];
         struct fl_clip_info *clip = &catalogue->clips[i];
-        clip->clip = from->channels > 0 ? from->clip : 0; /* without channels nothing of it can be played */
+        clip->clip = from->channels > 0 ? from->clip : 0; /* a clip without channels cannot be played */
         clip->channels = from->channels;
         clip->duration_s = from->duration_s;
         snprintf(clip->name, sizeof(clip->name), "%s", from->name);
@@ -95,7 +95,8 @@ static bool learn_clips(struct fl_catalogue *catalogue, const struct message_sce
     return true;
 }
 
-/* What others make later is not known here: numbers of one's own begin far from theirs, each client elsewhere. */
+/* Objects that other clients create later are unknown here: own identifiers begin far from theirs, at a different
+ * number in each client. */
 static bool choose_new_ids(struct fl_catalogue *catalogue)
 {
     uint32_t chance;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Bytes between two descriptors and a daemon's socket: the far end of an ssh connection. */
+/* Copies bytes between two descriptors and a daemon's socket: the far end of an ssh connection. */
 #include "lib/connection.h"
 #include "protocol/common/clock.h"
 
@@ -63,7 +63,7 @@ static bool drain(struct direction *way, short revents, struct fl_error *error)
 static bool carry(struct direction *up, struct direction *down, struct fl_error *error)
 {
     struct direction *const ways[2] = {up, down};
-    /* The daemon closes once it has been told that nothing more comes: `down` ends last. */
+    /* The daemon closes after the end of its input: `down` ends last. */
     while (!down->closed) {
         struct pollfd polled[4];
         for (unsigned i = 0; i < 2; i++) {

@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* What a hostile model can make us remember: 12 MiB of each list, 32 MiB of names, 9 MiB of clips. */
+/* Limits for hostile models: 12 MiB of each list, 32 MiB of names, 9 MiB of clips. */
 #define ENTRIES_MAX (1u << 20)
 #define TEXT_BYTES_MAX (32u << 20)
 #define CLIPS_MAX 65536u
@@ -27,7 +27,7 @@ bool fl_grow(void **items, size_t *capacity, size_t count, size_t item_bytes, st
 
 /* ---- remembering ---- */
 
-/* Where the name begins from now on; 0, the empty name, when there is no room for more. */
+/* The offset of the stored name; 0, the empty name, if the limit is reached. */
 static bool keep_text(struct fl_catalogue *catalogue, const char *name, uint32_t *place, struct fl_error *error)
 {
     const size_t length = strlen(name) + 1;
@@ -152,7 +152,7 @@ void fl_catalogue_finish(struct fl_catalogue *catalogue)
 
 /* ---- finding ---- */
 
-/* What there is, as far as it fits: "it has 3 clips: 'Run', 'Survey', 'Walk'". */
+/* Lists the names, as far as they fit: "it has 3 clips: 'Run', 'Survey', 'Walk'". */
 struct listing {
     char text[sizeof((struct fl_error *)0)->remedy];
     size_t used, listed;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What an import made, by name: remembered while its messages pass, asked by those who write scripts. Knows no
- * I/O. The importer is not trusted: memory is bounded, what comes beyond is only counted. */
+/* The names of an import's objects, recorded from its messages, for scripts that refer to them. Does no I/O. The
+ * importer is not trusted: memory is bounded, names beyond the limit are only counted. */
 #ifndef FARLIGHT_CLIENT_LIB_CATALOGUE_H
 #define FARLIGHT_CLIENT_LIB_CATALOGUE_H
 
@@ -26,7 +26,7 @@ struct fl_catalogue {
         size_t count, capacity;
         uint64_t left_out;
     } lists[FL_CATALOGUE_LIST_COUNT];
-    char *text; /* names behind each other, each with its NUL */
+    char *text; /* names in sequence, each with its NUL */
     size_t text_bytes, text_capacity;
     struct fl_clip_info *clips;
     size_t clip_count, clip_capacity;

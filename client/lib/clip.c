@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A clip of the client's own: one blob of times and values, and one transaction. */
+/* A clip that the client creates: one blob of times and values, and one transaction. */
 #include "lib/scene.h"
 #include "lib/text.h"
 #include "protocol/common/blob_hash.h"
@@ -10,7 +10,7 @@
 
 #define ANSWER_NS 60000000000ull
 #define PIECE_BYTES 262144u
-/* 256 MiB: far beyond what anyone types, far below what sizes can hold. */
+/* 256 MiB: far above any real clip, far below the range of sizes. */
 #define NUMBERS_MAX (1u << 26)
 
 struct clip {
@@ -55,7 +55,7 @@ static bool gather(struct clip *clip, const struct fl_channel *channels, size_t 
     return true;
 }
 
-/* All pieces of a blob carry one request, which is answered once. */
+/* All chunks of a blob carry one request, which is answered once. */
 static bool send_blob(const struct clip *clip, uint64_t deadline_ns, struct fl_error *error)
 {
     struct fl_connection *connection = clip->scene->connection;
@@ -125,7 +125,8 @@ static bool send_channels(const struct clip *clip, uint32_t request, uint32_t id
     return true;
 }
 
-/* Of a clip that is there now. Where there is no memory to remember it, it stays in a scene of others'. */
+/* Remembers a clip that was added. If there is no memory for that, it stays in the scene even if that belongs to
+ * others. */
 static bool take_note(struct fl_scene *scene, uint32_t id, uint64_t revision)
 {
     if (revision > scene->revision)

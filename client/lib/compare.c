@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The image program as a judge: two files in, figures and a picture of the errors out. */
+/* Compares images with the exporter program: two files in, figures and a picture of the errors out. */
 #include "lib/connection.h"
 #include "lib/text.h"
 #include "protocol/common/clock.h"
@@ -22,7 +22,7 @@ struct judge {
 
 /* ---- start ---- */
 
-/* The protocol's texts are UTF-8; a path that is not could not be meant by what arrives. */
+/* The protocol's texts are UTF-8: another path would not arrive unchanged. */
 static bool check_path(const char *path, struct fl_error *error)
 {
     char plain[4097];
@@ -134,7 +134,7 @@ static void take(struct fl_comparison *to, const struct message_images_compared 
     to->picture_height = from->picture_height;
 }
 
-/* Counts that are not possible could not be shares, nor places be looked at. */
+/* Impossible counts would give impossible shares and positions. */
 static bool is_sound(const struct message_images_compared *answer)
 {
     const uint64_t pixels = (uint64_t)answer->width * answer->height;
@@ -197,7 +197,7 @@ bool fl_compare(const struct fl_compare_options *options, struct fl_comparison *
                                                                       : FL_THRESHOLD_DEFAULT};
     const bool done = start(&judge, error) && send_request(&judge, error) && receive(&judge, comparison, error);
     fl_stream_finish(&judge.stream);
-    /* It may be busy with a picture that nobody waits for; ended by a signal it takes unfinished files away. */
+    /* It may be busy with a picture that is no longer wanted; on a signal it removes unfinished files. */
     fl_process_end(&judge.process, done ? 5000 : 0);
     return done;
 }

@@ -17,7 +17,7 @@
 
 bool fl_connection_break(struct fl_connection *connection, struct fl_error *error)
 {
-    /* An interrupted or late call leaves the stream as it was: what follows may still be said. */
+    /* An interrupted or late call leaves the stream intact: later messages can still be sent. */
     if (error->code == FL_ERROR_INTERRUPTED || error->code == FL_ERROR_TIMEOUT)
         return false;
     if (connection->process.pid > 0 && error->code == FL_ERROR_CONNECTION) {
@@ -58,7 +58,7 @@ uint32_t fl_connection_next_request(struct fl_connection *connection)
     return connection->last_request;
 }
 
-/* The peer has ended its side without a goodbye. */
+/* The peer has closed its side without a goodbye. */
 static bool fail_ended(struct fl_connection *connection, struct fl_error *error)
 {
     const char *how = "";
@@ -118,7 +118,7 @@ bool fl_connection_send(struct fl_connection *connection, uint32_t request, uint
 {
     if (!fl_connection_check(connection, error))
         return false;
-    /* Who sends and asks for nothing gets on as well once the daemon reads again. */
+    /* A client that only sends continues once the daemon reads again. */
     if (!fl_stream_has_room(&connection->stream) && !fl_stream_transfer(&connection->stream, error))
         return fl_connection_break(connection, error);
     if (!fl_connection_push_late(connection, error))
@@ -127,14 +127,14 @@ bool fl_connection_send(struct fl_connection *connection, uint32_t request, uint
         return fl_error_set(error, FL_ERROR_TIMEOUT, "", "the daemon reads no more messages");
     if (!fl_stream_push(&connection->stream, request, channel, message, error))
         return false;
-    /* While the daemon takes nothing we go on reading, so that both cannot wait for each other. What is read
-     * stays in the buffer; once that is full the message may stay in ours. */
+    /* While the daemon reads nothing we continue to read, so that the two cannot wait for each other. Received
+     * messages stay in the buffer; once that is full the message may stay in ours. */
     if (!fl_stream_transfer(&connection->stream, error))
         return fl_connection_break(connection, error);
     return true;
 }
 
-/* What belongs to a job or a view may come at any time, also while something else is waited for. */
+/* Messages of a job or a view may arrive at any time, also while another answer is awaited. */
 static int consume_frames(struct fl_connection *connection, const struct framing_header *header,
                           const struct message *message, struct fl_error *error)
 {
@@ -240,7 +240,7 @@ bool fl_connection_answer(struct fl_connection *connection, uint32_t request, en
 {
     while (fl_connection_receive(connection, received, deadline_ns, error)) {
         if (received->header.request != request)
-            continue; /* a late answer to something given up, or a frame of a cancelled job */
+            continue; /* a late answer to an abandoned request, or a frame of a cancelled job */
         if (received->message.type == MESSAGE_ERROR)
             return fl_error_from_message(error, &received->message.error);
         if (received->message.type == expected)
@@ -315,7 +315,7 @@ static bool shake_hands(struct fl_connection *connection, const char *name, uint
     }
 }
 
-/* `farlight bridge` on the other host. A host that begins with '-' would be an option of ssh's. */
+/* `farlight bridge` on the other host. A host that begins with '-' would be an option of ssh. */
 static bool start_ssh(struct fl_connection *connection, const char *where, int *fd, struct fl_error *error)
 {
     char host[256], socket_address[300];
@@ -323,7 +323,7 @@ static bool start_ssh(struct fl_connection *connection, const char *where, int *
     const char *path = where[host_bytes] == ':' ? where + host_bytes + 1 : DEFAULT_REMOTE_SOCKET;
     if (host_bytes == 0 || host_bytes >= sizeof(host) || where[0] == '-' || *path == '\0')
         return fl_error_set(error, FL_ERROR_ARGUMENT, connection->address, "is not ssh:HOST[:SOCKET]");
-    /* ssh hands its words to a shell over there. */
+    /* ssh passes its words to a shell on the remote host. */
     const char *harmless = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789/._-+@%,=";
     if (path[strspn(path, harmless)] != '\0' ||
         snprintf(socket_address, sizeof(socket_address), "unix:%s", path) >= (int)sizeof(socket_address))
@@ -356,7 +356,7 @@ static bool open_stream(struct fl_connection *connection, const struct fl_connec
     return fl_stream_init(&connection->stream, fd, MESSAGE_FROM_SERVER, "the daemon", error);
 }
 
-/* The key is read first: without it nobody need be asked. */
+/* The key is read first: without it there is no need to connect. */
 static bool open_link(struct fl_connection *connection, const struct fl_connect_options *options,
                       uint64_t deadline_ns, struct fl_error *error)
 {

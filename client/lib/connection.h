@@ -10,7 +10,7 @@
 /* The channel of blob data; jobs have those above. */
 #define FL_UPLOAD_CHANNEL 1u
 
-/* A message without texts or arrays that had no room. */
+/* A message without texts or arrays that did not fit into the buffer. */
 struct fl_late {
     struct fl_late *next;
     uint32_t request;
@@ -28,49 +28,49 @@ struct fl_connection {
     struct fl_job *job;               /* the one that runs */
     struct fl_view *view;             /* likewise */
     struct fl_scene *scenes;          /* all that are there */
-    struct fl_late *late, **late_end; /* owned: go before everything else as soon as there is room */
+    struct fl_late *late, **late_end; /* owned: sent before everything else as soon as the buffer has space */
     bool read_only;                   /* the daemon lets it change nothing */
     bool can_h264;                    /* this client and the daemon */
-    struct fl_error broken;           /* why nothing works any more; code NONE: it does */
+    struct fl_error broken;           /* why the connection is broken; code NONE: it works */
     struct message_stats_reply stats; /* the last answer */
     uint64_t start_ns;
     bool local;
     char address[300];
 };
 
-/* An answer or a frame's message that came in; the views live until the next call on the connection. */
+/* A received answer or message of a frame; valid until the next call on the connection. */
 struct fl_received {
     struct framing_header header;
     struct message message;
 };
 
-/* Marks the connection as unusable, for reasons of the stream or the peer; adds what is known about a daemon
- * that was our child. Returns false. */
+/* Marks the connection as unusable, for reasons of the stream or the peer; adds what is known about a private
+ * daemon's end. Returns false. */
 bool fl_connection_break(struct fl_connection *connection, struct fl_error *error);
-/* False, with the reason, when the connection is broken. */
+/* False, with the reason, if the connection is broken. */
 bool fl_connection_check(const struct fl_connection *connection, struct fl_error *error);
 uint32_t fl_connection_next_request(struct fl_connection *connection);
 
 /* Sends one message and waits until the kernel has it. */
 bool fl_connection_send(struct fl_connection *connection, uint32_t request, uint32_t channel,
                         const struct message *message, struct fl_error *error);
-/* For what gives something back, which nobody can try again: sent now, or as soon as there is room. The message
- * has no texts and no arrays. Where there is no memory for that, the connection is broken, as its end gives all
- * back. */
+/* For messages that release something, which cannot be retried: sent now, or as soon as the buffer has space. The
+ * message has no texts and no arrays. If there is no memory for it, the connection is marked as broken, as its end
+ * releases everything. */
 void fl_connection_send_late(struct fl_connection *connection, uint32_t request, const struct message *message);
-/* Hands what was late to the stream as far as there is room. False: the connection is broken. */
+/* Moves delayed messages to the stream as far as they fit. False: the connection is broken. */
 bool fl_connection_push_late(struct fl_connection *connection, struct fl_error *error);
-/* Deals with what concerns the connection itself (ping, credit for uploads, blocked, scene_changed, goodbye, an
- * error of request 0), its job or its view: 1: it was that; 0: it is for the caller; -1: the connection is broken,
- * *error says why. */
+/* Handles messages for the connection itself (ping, credit for uploads, blocked, scene_changed, goodbye, an error
+ * of request 0), its job or its view: 1: handled; 0: it is for the caller; -1: the connection is broken, *error
+ * says why. */
 int fl_connection_consume(struct fl_connection *connection, const struct framing_header *header,
                           const struct message *message, struct fl_error *error);
 enum fl_step {
     FL_STEP_MESSAGE, /* for the caller */
-    FL_STEP_SERVED,  /* something came or went, or a message was for the connection, its job or its view */
+    FL_STEP_SERVED,  /* bytes came or went, or a message was for the connection, its job or its view */
     FL_STEP_FAILED
 };
-/* One message, or one round of waiting where there is none. */
+/* One message, or one round of waiting if there is none. */
 enum fl_step fl_connection_step(struct fl_connection *connection, struct fl_received *received,
                                 uint64_t deadline_ns, struct fl_error *error);
 /* The next message that is for the caller. */
@@ -83,16 +83,16 @@ bool fl_connection_wait_upload(struct fl_connection *connection, uint32_t reques
 /* The answer to `request`; other messages are dropped. An ERROR is FL_ERROR_REFUSED. */
 bool fl_connection_answer(struct fl_connection *connection, uint32_t request, enum message_type expected,
                           struct fl_received *received, uint64_t deadline_ns, struct fl_error *error);
-/* After so long a client says something, lest it be sent away for its silence; and it hears then whether the
- * daemon lives still. */
+/* After this time a client sends something, as the daemon disconnects silent clients; and it notices if the daemon
+ * is gone. */
 uint64_t fl_connection_silence_ns(const struct fl_connection *connection);
 /* The daemon's error as ours; returns false. */
 bool fl_error_from_message(struct fl_error *error, const struct message_error *message);
 
-/* ---- what a connection has besides (job.c, view.c, attach.c) ---- */
+/* ---- job.c, view.c, attach.c ---- */
 
-/* Whether a message was the job's or the view's, as fl_connection_consume: they keep what came whole until they
- * are asked for it. */
+/* Whether a message was the job's or the view's, as fl_connection_consume: complete frames are kept until the
+ * caller fetches them. */
 int fl_job_take(struct fl_job *job, const struct framing_header *header, const struct message *message,
                 struct fl_error *error);
 int fl_view_take(struct fl_view *view, const struct framing_header *header, const struct message *message,

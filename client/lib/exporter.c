@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The exporter program as seen from here: frames go in, one answer a file comes back. */
+/* The client's side of the exporter program: frames go in, one answer per file comes back. */
 #include "lib/helper.h"
 #include "lib/text.h"
 
@@ -9,7 +9,7 @@
 
 struct fl_exporter {
     struct fl_helper helper;
-    bool waiting; /* the answer for the last request has not come */
+    bool waiting; /* the answer to the last request has not arrived */
     char model[4096];
     char path[160]; /* of the request, or its end */
 };

@@ -79,7 +79,7 @@ struct fl_connect_options {
     /* "unix:PATH", "tcp:HOST:PORT" or "ssh:HOST[:SOCKET]"; NULL: a private daemon over a socketpair, which
      * ends with the connection. ssh runs `farlight bridge unix:SOCKET` on HOST and speaks through it. */
     const char *server;
-    const char *name; /* how the client calls itself in the daemon's statistics; NULL: "libfarlight" */
+    const char *name; /* the client's name in the daemon's statistics; NULL: "libfarlight" */
     /* File of the 32 random bytes that the daemon has as well, mode 0600: the connection is sealed with it, and
      * fails if the daemon does not have it. TCP beyond loopback needs it; NULL: nothing is sealed. Of no effect
      * for a private daemon. */
@@ -103,13 +103,13 @@ FL_API bool fl_connection_is_local(const struct fl_connection *connection);
 FL_API bool fl_connection_can_h264(const struct fl_connection *connection);
 FL_API const char *fl_connection_address(const struct fl_connection *connection);
 
-/* Where a private daemon listens besides, as `--listen` among its arguments says, with the port that was chosen.
+/* An address on which a private daemon also listens (`--listen` among its arguments), with the port that it chose.
  * False: there is no address of that index. */
 FL_API bool fl_connection_listens_at(const struct fl_connection *connection, size_t index, char *address,
                                      size_t address_bytes);
-/* Serves the connection for so long, as every call does while it waits: changes of scenes are heard of, the
- * daemon's pings answered; and says enough for the daemon not to end it. False: it was interrupted, or the daemon
- * is gone. */
+/* Serves the connection for this long, as every call does while it waits: it receives changes of scenes, answers
+ * the daemon's pings, and sends enough that the daemon does not disconnect it. False: it was interrupted, or the
+ * daemon is gone. */
 FL_API bool fl_connection_wait(struct fl_connection *connection, unsigned timeout_ms, struct fl_error *error);
 
 FL_API bool fl_ping(struct fl_connection *connection, uint64_t *round_trip_ns, struct fl_error *error);
@@ -118,11 +118,10 @@ FL_API bool fl_connection_is_read_only(const struct fl_connection *connection);
 
 struct fl_limit {
     const char *name, *what; /* what it limits, in words; static */
-    uint64_t value;          /* in the unit that its name or `what` says; 0: the daemon told none */
+    uint64_t value;          /* in the unit of its name or `what`; 0: the daemon has none */
 };
 
-/* What the daemon allows, as it told when the connection was made; in the protocol's order. False: there is no
- * limit of that index. */
+/* The daemon's limits, from the handshake, in the protocol's order. False: there is no limit of that index. */
 FL_API bool fl_connection_limit(const struct fl_connection *connection, size_t index, struct fl_limit *limit);
 /* *reply is valid until the next call on the connection. */
 FL_API bool fl_stats(struct fl_connection *connection, const struct message_stats_reply **reply,
@@ -137,15 +136,15 @@ struct fl_camera_info {
     char name[129]; /* the node's name, or the camera's where the node has none */
 };
 
-/* What an import told and cost. Times of the importer overlap with those of the upload. */
+/* The notes, counts and costs of an import. Times of the importer overlap with those of the upload. */
 struct fl_import_stats {
     uint64_t read_bytes, read_ns, parse_ns, hash_ns; /* of the model's files, as the importer measured */
     uint64_t import_ns;                              /* the importer's life */
     uint64_t load_ns;                                /* all of it, as the caller waited */
     uint64_t offered_bytes;                          /* of the blobs that the scene uses */
     uint64_t uploaded_bytes;                         /* of those that the daemon did not have */
-    uint64_t upload_ns;                              /* from the first of them sent to the last one taken */
-    uint64_t commit_ns;                              /* from commit to the answer: the daemon's work */
+    uint64_t upload_ns; /* from sending the first to the acknowledgement of the last */
+    uint64_t commit_ns; /* from commit to the answer: the daemon's work */
     uint64_t revision;
 };
 
@@ -172,17 +171,17 @@ struct fl_load_options {
                                       `environment` and `timeout_ms` are those given at its start */
 };
 
-/* The options' strings must live until the load. An importer that is not loaded is to be destroyed. */
+/* The options' strings must live until the load. Destroy an importer that is not loaded. */
 FL_API struct fl_import *fl_import_start(const struct fl_load_options *options, struct fl_error *error);
 FL_API void fl_import_destroy(struct fl_import *started);
 
-/* Runs the importer and hands its edits to the daemon. */
+/* Runs the importer and passes its edits to the daemon. */
 FL_API struct fl_scene *fl_scene_load(struct fl_connection *connection, const struct fl_load_options *options,
                                       struct fl_error *error);
 FL_API void fl_scene_destroy(struct fl_scene *scene); /* lets go of it on the daemon, too */
 
-/* Comes to a scene that is there; what it holds (cameras, clips) is asked for at once and known as of a loaded
- * one. Objects that are known by name only from an import (materials, lights) are not. */
+/* Attaches to an existing scene; its cameras and clips are requested at once and known as those of a loaded one.
+ * Materials and lights, whose names only an import tells, are not. */
 FL_API struct fl_scene *fl_scene_attach(struct fl_connection *connection, const char *name,
                                         struct fl_error *error);
 /* The scenes that may be attached to. *list is malloc'ed, for free(). */
@@ -200,17 +199,17 @@ struct fl_scene_bounds {
     uint64_t revision, triangles, spheres;
 };
 FL_API bool fl_scene_get_bounds(struct fl_scene *scene, struct fl_scene_bounds *bounds, struct fl_error *error);
-/* The greatest revision that the daemon has told of: by an edit of one's own, or by another client's. */
+/* The highest revision that the daemon has reported, of an own edit or another client's. */
 FL_API uint64_t fl_scene_revision(const struct fl_scene *scene);
 FL_API const struct fl_import_stats *fl_scene_import_stats(const struct fl_scene *scene);
 FL_API size_t fl_scene_camera_count(const struct fl_scene *scene);
 FL_API const struct fl_camera_info *fl_scene_camera(const struct fl_scene *scene, size_t index);
-/* `which` is a camera's name, or its number counted from 0; a name goes before a number. */
+/* `which` is a camera's name, or its number counted from 0; a name has precedence over a number. */
 FL_API bool fl_scene_find_camera(const struct fl_scene *scene, const char *which, uint32_t *node,
                                  struct fl_error *error);
 
 struct fl_clip_info {
-    uint32_t clip; /* its identifier; 0: nothing of it can be played */
+    uint32_t clip; /* its identifier; 0: it cannot be played */
     uint32_t channels;
     float duration_s; /* time of its last key */
     char name[129];
@@ -218,22 +217,22 @@ struct fl_clip_info {
 FL_API size_t fl_scene_clip_count(const struct fl_scene *scene); /* at most 65536 are remembered */
 /* NULL beyond the last; valid until the scene is destroyed. */
 FL_API const struct fl_clip_info *fl_scene_clip(const struct fl_scene *scene, size_t index);
-/* `which` is a clip's name, or its number counted from 0; a name goes before a number. *info (may be NULL) as of
- * fl_scene_clip. FL_ERROR_ARGUMENT, field "--clip": no such clip, or nothing of it can be played; the remedy lists
- * what there is, as far as it fits. */
+/* `which` is a clip's name, or its number counted from 0; a name has precedence over a number. *info (may be NULL)
+ * as of fl_scene_clip. FL_ERROR_ARGUMENT, field "--clip": there is no such clip, or it cannot be played; the
+ * remedy lists the clips, as far as they fit. */
 FL_API bool fl_scene_find_clip(const struct fl_scene *scene, const char *which, uint32_t *clip,
                                const struct fl_clip_info **info, struct fl_error *error);
 
 /* The identifier of a node, a material or a light. `which` is its name, or its number counted from 0 in the order
- * of the import; a name goes before a number, and of several of one name the first is meant. A light is known by
- * its own name and by those of the nodes that show it. The first 1 Mi of each kind are remembered.
- * FL_ERROR_ARGUMENT, field "node", "material" or "light": there is none, and the remedy lists what there is, as
- * far as it fits; other kinds are not known by name. */
+ * of the import; a name has precedence over a number, and the first of several with one name counts. A light is
+ * known by its own name and by those of the nodes that show it. The first 1 Mi of each kind are remembered.
+ * FL_ERROR_ARGUMENT, field "node", "material" or "light": there is none, and the remedy lists the names, as far as
+ * they fit; other kinds are not known by name. */
 FL_API bool fl_scene_find_object(const struct fl_scene *scene, enum protocol_object_kind kind, const char *which,
                                  uint32_t *id, struct fl_error *error);
-/* Whether a light that was found so has a size that can change: a rectangle or a sphere. */
+/* Whether such a light has a size that can change: a rectangle or a sphere. */
 FL_API bool fl_scene_light_has_size(const struct fl_scene *scene, uint32_t light);
-/* An identifier that nothing in the scene has, for an edit of one's own: another one at each call; 0: none left.
+/* An unused identifier for an edit of the caller's, a new one at each call; 0: none left.
  */
 FL_API uint32_t fl_scene_new_id(struct fl_scene *scene, enum protocol_object_kind kind);
 
@@ -244,14 +243,14 @@ struct fl_channel {
     enum protocol_interpolation interpolation;
     uint32_t width, key_count; /* as of set_channel in messages.def */
     const float *times;        /* seconds, ascending */
-    const float *values;       /* width numbers a key, three times that for cubic spline and bezier */
+    const float *values;       /* width numbers per key, three times that for cubic spline and bezier */
 };
-/* Adds a clip of one's own to the scene, for jobs that are started from then on; *clip is its identifier. Sends
- * what the daemon does not have yet, and waits until the edit is applied. */
+/* Adds a clip of the caller's to the scene, for jobs that are started later; *clip is its identifier. Uploads its
+ * data if the daemon lacks it, and waits until the edit is applied. */
 FL_API bool fl_scene_add_clip(struct fl_scene *scene, const char *name, const struct fl_channel *channels,
                               size_t channel_count, uint32_t *clip, struct fl_error *error);
 
-/* What a model file holds, without a daemon. */
+/* The contents of a model file, without a daemon. */
 struct fl_model_note {
     enum protocol_severity severity;
     char where[257];
@@ -332,7 +331,7 @@ struct fl_structure_part {
     uint32_t number;
     char name[FL_STRUCTURE_NAME_BYTES]; /* empty: the structure has no parts */
     char text[512];                     /* "resolution 128, cell 1.2 mm" */
-    bool is_kept;                       /* from frame to frame, unless it has to be built again */
+    bool is_kept;                       /* from frame to frame, unless it is rebuilt */
     bool built;                         /* for this frame */
 };
 /* The part whose rows begin at *at (0: the first), which moves behind them; false: there is none. */
@@ -354,8 +353,8 @@ FL_API void fl_render_destroy(struct fl_job *job); /* cancels what still runs */
 
 /* ---- views: pictures that follow a camera ---------------------------------------------------------- */
 
-/* One per connection, beside at most one job of fl_render_start. Its frames come when there is something to show;
- * between calls they wait in the socket. */
+/* One per connection, beside at most one job of fl_render_start. Its frames arrive when there is something to
+ * show; between calls they wait in the socket. */
 struct fl_view;
 
 enum fl_attachment { FL_ATTACH_DEPTH = 1, FL_ATTACH_NORMALS = 2 }; /* bits */
@@ -377,26 +376,25 @@ struct fl_view_camera {
 
 FL_API struct fl_view *fl_view_start(struct fl_scene *scene, const struct message_render *options,
                                      struct fl_error *error);
-/* From now on it shows something else (size, tracer, integrator, exposure ..); camera and frame numbers go on. */
+/* Changes what it shows (size, tracer, integrator, exposure ..); camera and frame numbers continue. */
 FL_API bool fl_view_change(struct fl_view *view, const struct message_render *options, struct fl_error *error);
-/* Sends it and returns; *command (may be NULL) is the number by which frames name it. */
+/* Sends it and returns; *command (may be NULL) is its number in frames. */
 FL_API bool fl_view_look(struct fl_view *view, const struct fl_view_camera *camera, uint64_t *command,
                          struct fl_error *error);
-/* The next frame that has come whole; waits at most timeout_ms for it, 0: not at all. NULL with error->code
- * FL_ERROR_NONE: none so far. The caller destroys it. A frame in H.264 comes undecoded: `encoded` instead of
- * `pixels`. */
+/* The next complete frame; waits at most timeout_ms for it, 0: not at all. NULL with error->code FL_ERROR_NONE:
+ * none so far. The caller destroys it. A frame in H.264 comes undecoded: `encoded` instead of `pixels`. */
 FL_API struct fl_frame *fl_view_next(struct fl_view *view, unsigned timeout_ms, struct fl_error *error);
-/* The caller could not decode a frame: the next one shall stand alone. */
+/* Reports that the caller could not decode a frame: the next one will be a key frame. */
 FL_API bool fl_view_want_key_frame(struct fl_view *view, struct fl_error *error);
 FL_API void fl_view_destroy(struct fl_view *view);
-/* For a poll of one's own: readable when something may have come. It stays the connection's. */
+/* For the caller's own poll(): readable when something may have arrived. The connection keeps it. */
 FL_API int fl_connection_fd(const struct fl_connection *connection);
 
-/* Rays of which both tracers said the same, as a share of those that are on no edge; 1 without rays. What shading
- * makes of it does not matter. */
+/* The share of rays on which both tracers agree, of those that are on no edge; 1 without rays. Shading does not
+ * matter. */
 FL_API double fl_wave_agreement(const struct record_wave_comparison *comparison);
-/* Counts and times of several waves added up, greatest errors as the greatest; medians and percentiles, which
- * cannot be added, are 0. `into` may be all zero. */
+/* Sums of the counts and times of several waves, and their maximum errors; medians and percentiles, which cannot
+ * be added, are 0. `into` may be all zero. */
 FL_API void fl_wave_add(struct record_wave_comparison *into, const struct record_wave_comparison *from);
 
 FL_API uint32_t fl_bytes_per_pixel(enum protocol_pixel_format format);
@@ -412,7 +410,7 @@ FL_API bool fl_camera_keys_load(const char *path, struct record_camera_key **key
 struct fl_exporter;
 
 struct fl_exporter_options {
-    const char *folder;      /* where the files will be: the program can write nowhere else */
+    const char *folder;      /* the folder of the files: the program can write nowhere else */
     const char *model;       /* named in the files; may be NULL */
     float frames_per_second; /* named in EXR files; 0: unknown */
     int interrupt_fd;
@@ -420,8 +418,8 @@ struct fl_exporter_options {
 struct fl_export_options {
     const char *path;
     const char *format; /* "png", "jpeg", "exr", "hdr" where the path's ending does not say; may be NULL */
-    bool half; /* EXR: half floats; of layers where they suffice: never distances, places, numbers of objects */
-    unsigned quality; /* JPEG; 0: 95 */
+    bool half;          /* EXR: half floats; layers of distances, positions and object numbers stay 32-bit */
+    unsigned quality;   /* JPEG; 0: 95 */
 };
 
 FL_API struct fl_exporter *fl_exporter_start(const struct fl_exporter_options *options, struct fl_error *error);
@@ -453,18 +451,18 @@ struct fl_video_options {
 struct fl_video_info {
     char encoder[33];       /* libavcodec's name: "libx264"; known from the start on */
     uint32_t frames;        /* this and what follows: once fl_video_finish has returned true */
-    uint32_t width, height; /* even, unless lossless: an odd picture repeats its last column, its last row */
+    uint32_t width, height; /* even, unless lossless: an odd picture repeats its last column or row */
     uint64_t size_bytes;
 };
 
 /* Fails early: when this returns, the folder can be written to and there is an encoder. The video is 8-bit 4:2:0,
  * tagged as what it is: primaries and matrix of BT.709, the transfer curve of sRGB, limited range; lossless: RGB.
- * What is transparent lies over black. The same frames and options make the same file on the same machine (x264
- * encodes a little differently with another number of processors). */
+ * Transparent pixels are composited over black. The same frames and options make the same file on the same machine
+ * (x264 encodes a little differently with another number of processors). */
 FL_API struct fl_video *fl_video_start(const struct fl_video_options *options, struct fl_error *error);
 /* Hands the frame over and returns; the frame may be destroyed at once. Frames are shown in the order in which
- * they come, whatever their numbers. What the program cannot do with a frame is told by a later call of this or by
- * fl_video_finish; then nothing is left of the video, and nothing can be written any more. */
+ * they come, whatever their numbers. A frame that fails in the program is reported by a later call of this or by
+ * fl_video_finish; the video is then removed, and no frame can be written any more. */
 FL_API bool fl_video_write(struct fl_video *video, const struct fl_frame *frame, struct fl_error *error);
 /* Makes the file complete: it appears under its name, in place of one that was there. At least one frame must have
  * been written. After FL_ERROR_INTERRUPTED from fl_video_write (and with fl_video_set_interrupt, since the
@@ -474,7 +472,7 @@ FL_API bool fl_video_finish(struct fl_video *video, struct fl_error *error);
 FL_API const struct fl_video_info *fl_video_info(const struct fl_video *video);
 /* From now on; 0: nothing interrupts. */
 FL_API void fl_video_set_interrupt(struct fl_video *video, int interrupt_fd);
-/* Ends the program; of a video that was not finished nothing is left. */
+/* Ends the program; an unfinished video is removed. */
 FL_API void fl_video_destroy(struct fl_video *video);
 
 /* ---- raw video ----------------------------------------------------------------------------------- */
@@ -499,9 +497,9 @@ struct fl_y4m_options {
  * transfer curve, so a tool must be told (ffmpeg: -colorspace bt709 -color_primaries bt709 -color_trc
  * iec61966-2-1). */
 FL_API struct fl_y4m *fl_y4m_begin(const struct fl_y4m_options *options, struct fl_error *error);
-/* Writes the whole frame; pixel format rgba8, all of one size; what is transparent lies over black. A reader that
- * has gone away is FL_ERROR_FILE, "Broken pipe", without a signal. After a failure on the way the stream ends
- * within a frame and takes no more. */
+/* Writes the whole frame; pixel format rgba8, all of one size; transparent pixels are composited over black. A
+ * reader that has closed is FL_ERROR_FILE, "Broken pipe", without a signal. After a failure on the way the stream
+ * ends within a frame and takes no more. */
 FL_API bool fl_y4m_write(struct fl_y4m *y4m, const struct fl_frame *frame, struct fl_error *error);
 /* The stream needs no end of its own: this frees memory. */
 FL_API void fl_y4m_end(struct fl_y4m *y4m);
@@ -522,12 +520,12 @@ struct fl_compare_options {
     const char *picture_format; /* "png" or "jpeg" where the path's ending does not say; may be NULL */
     enum protocol_comparison_layout layout;
     const char *label_a, *label_b; /* over the pictures of the layout `side`; NULL: the files' names */
-    float heat_top;                /* the error with the brightest colour; 0: the greatest error, at most 1 */
+    float heat_top;                /* the error with the brightest colour; 0: the maximum error, at most 1 */
     unsigned timeout_ms;           /* 0: 10 minutes */
     int interrupt_fd;              /* as of fl_connect_options */
 };
 
-/* How far two images are apart. An error is the difference of one channel of one pixel, without sign, in units of
+/* The difference of two images. An error is the difference of one channel of one pixel, without sign, in units of
  * `space`: linear light where both files are linear (EXR, HDR), else what a screen shows, 0 to 1. Alpha counts as
  * a channel. Pixels with NaN or infinity in either file count as beyond and are left out of everything else. */
 struct fl_comparison {
@@ -556,13 +554,13 @@ struct fl_comparison {
     double butteraugli, butteraugli_greatest; /* 3-norm over the picture; the greatest */
     uint64_t visible;                         /* pixels with a distance above 1 */
     /* The picture: black is no error, the brightest colour `heat_top` and above, in between by the square root of
-     * the error (of a pixel's channels the greatest); pixels that are not finite are magenta. */
+     * the error (the maximum of a pixel's channels); pixels that are not finite are magenta. */
     double heat_top;
     uint32_t picture_width, picture_height; /* 0: none */
 };
 
-/* The picture is there, complete, when this returns true. Fails with FL_ERROR_FILE where a file cannot be read or
- * written or the two cannot be compared; `field` names the file at fault. */
+/* The picture is complete when this returns true. Fails with FL_ERROR_FILE where a file cannot be read or written
+ * or the two cannot be compared; `field` names the file at fault. */
 FL_API bool fl_compare(const struct fl_compare_options *options, struct fl_comparison *comparison,
                        struct fl_error *error);
 

@@ -10,7 +10,7 @@
 #include <xxhash.h>
 #include <zstd.h>
 
-/* What a JPEG may take besides the worst case of its pixels: tables and markers. */
+/* The size of a JPEG beyond the worst case of its pixels: tables and markers. */
 #define JPEG_EXTRA_BYTES 65536u
 #define H264_EXTRA_BYTES 65536u /* likewise */
 #define ATTACHMENT_PIXEL_BYTES 4u
@@ -20,7 +20,7 @@ uint32_t fl_bytes_per_pixel(enum protocol_pixel_format format)
     return (unsigned)format < PROTOCOL_PIXEL_FORMAT_COUNT ? protocol_pixel_format_bytes(format) : 0;
 }
 
-/* Of all layers together; 0: more than there can be. */
+/* Bytes of all layers together; 0: more than a size_t holds. */
 static size_t pixels_bytes_of(const struct message_frame_begin *begin)
 {
     const uint64_t layers = (uint64_t)__builtin_popcount(begin->layers); /* at most 7, of 8192 x 8192 x 16 bytes */
@@ -51,7 +51,7 @@ void fl_assembly_finish(struct fl_assembly *assembly)
     assembly->encoded = NULL;
 }
 
-/* The most bytes that a picture can honestly take. */
+/* The maximum size of a correctly encoded picture. */
 static uint64_t encoded_bytes_max(const struct message_frame_begin *begin, size_t pixels_bytes)
 {
     switch (begin->encoding) {
@@ -62,14 +62,14 @@ static uint64_t encoded_bytes_max(const struct message_frame_begin *begin, size_
         return ZSTD_compressBound(pixels_bytes);
     case PROTOCOL_ENCODING_JPEG:
         return tjBufSize((int)begin->width, (int)begin->height, TJSAMP_444) + JPEG_EXTRA_BYTES;
-    case PROTOCOL_ENCODING_H264: /* not even its uncompressed blocks take more than the pixels */
+    case PROTOCOL_ENCODING_H264: /* even its uncompressed blocks are no larger than the pixels */
         return pixels_bytes + H264_EXTRA_BYTES;
     default:
         return 0;
     }
 }
 
-/* Sizes of what is attached fit to what there is; `most` is what one can take. */
+/* Whether the sizes of attachments match the flags; `most` is the maximum of one. */
 static bool check_attachments(const struct fl_assembly *assembly, const struct message_frame_begin *begin,
                               struct fl_error *error)
 {
@@ -205,7 +205,7 @@ bool fl_assembly_data(struct fl_assembly *assembly, const struct message_frame_d
     return true;
 }
 
-/* Of the encoded bytes, those of the pixels. */
+/* The pixels' share of the encoded bytes. */
 static size_t picture_bytes(const struct fl_assembly *assembly)
 {
     return (size_t)(assembly->encoded_bytes - assembly->depth_bytes - assembly->normal_bytes);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Messages to a frame: everything that a daemon says about one is checked here. No I/O. */
+/* From messages to a frame: every statement of a daemon about one is checked here. No I/O. */
 #ifndef FARLIGHT_CLIENT_LIB_FRAME_H
 #define FARLIGHT_CLIENT_LIB_FRAME_H
 
@@ -12,7 +12,7 @@ struct fl_frame_expected {
     enum protocol_encoding encoding;
     unsigned layers; /* set of them, at least one; see struct fl_frame */
     unsigned attachments;
-    /* Of a view: frames may be smaller and leave out numbers, and those at rest have another encoding. */
+    /* Of a view: frames may be smaller and skip numbers, and those at rest have another encoding. */
     bool is_view;
     enum protocol_encoding still_encoding;
 };
@@ -25,8 +25,8 @@ struct fl_assembly {
     uint64_t depth_bytes, normal_bytes; /* the last ones of encoded_bytes, in that order */
 };
 
-/* Each returns false on what is not allowed; the assembly must then be finished. `number` is the frame's; of a
- * view the least that it may have. */
+/* Each returns false on what is not allowed; the assembly must then be finished. `number` is the frame's; for a
+ * view its minimum. */
 bool fl_assembly_begin(struct fl_assembly *assembly, const struct message_frame_begin *begin, uint32_t number,
                        uint64_t now_ns, struct fl_error *error);
 bool fl_assembly_data(struct fl_assembly *assembly, const struct message_frame_data *data, struct fl_error *error);
@@ -35,20 +35,20 @@ struct fl_frame *fl_assembly_end(struct fl_assembly *assembly, const struct mess
                                  uint64_t now_ns, struct fl_error *error);
 void fl_assembly_finish(struct fl_assembly *assembly);
 
-/* Frames that came whole and wait for being asked for; the daemon's credit is their limit. */
+/* Complete frames that wait for the caller; the daemon's credit is their limit. */
 struct fl_frame_queue {
     struct fl_frame **frames; /* a ring */
     size_t first, count, capacity;
 };
 
 bool fl_frame_queue_init(struct fl_frame_queue *queue, size_t capacity, struct fl_error *error);
-/* Takes the frame over, also when it fails: more came than credit was given for. */
+/* Takes the frame over, also on failure: more frames arrived than credit was given for. */
 bool fl_frame_queue_push(struct fl_frame_queue *queue, struct fl_frame *frame, struct fl_error *error);
 struct fl_frame *fl_frame_queue_pop(struct fl_frame_queue *queue); /* NULL: there is none */
 void fl_frame_queue_clear(struct fl_frame_queue *queue);
 void fl_frame_queue_finish(struct fl_frame_queue *queue);
 
-/* Of a picture: what comes where nothing was said of layers. */
+/* The layers of a picture without a choice of layers. */
 #define FL_LAYERS_PICTURE (1u << PROTOCOL_LAYER_BEAUTY)
 
 #endif

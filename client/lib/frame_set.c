@@ -47,7 +47,7 @@ bool fl_frame_run_shard(const struct fl_frame_run *range, uint32_t part, uint32_
     const uint64_t step = (uint64_t)range->step * parts;
     run->first = range->first + (uint32_t)(begin * range->step);
     run->last = range->first + (uint32_t)(last * range->step);
-    /* One frame needs no step, and several have one that lies within the range. */
+    /* One frame needs no step, and the step of several lies within the range. */
     run->step = run->first == run->last ? 1 : (uint32_t)step;
     return true;
 }

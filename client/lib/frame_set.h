@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Which frames of an animation are to be rendered: of a range one part of several, and of that what is not there
- * yet. Nothing here knows files or daemons. Any thread. */
+/* The frames of an animation to be rendered: one part of a range, and of that the missing frames. Does no I/O. Any
+ * thread. */
 #ifndef FARLIGHT_CLIENT_LIB_FRAME_SET_H
 #define FARLIGHT_CLIENT_LIB_FRAME_SET_H
 
@@ -22,11 +22,12 @@ bool fl_text_shard(const char *text, uint32_t *part, uint32_t *parts, struct fl_
 
 /* The step is at least 1; `last` may lie between two frames. */
 uint32_t fl_frame_run_count(const struct fl_frame_run *run);
-/* Of the range every `parts`-th frame, beginning with the `part`-th (from 1); so that all parts take about as
- * long, and together they are the range. False: nothing falls to this part. */
+/* Every `parts`-th frame of the range, beginning with the `part`-th (from 1): all parts take about equally long,
+ * and together they are the range. False: this part is empty. */
 bool fl_frame_run_shard(const struct fl_frame_run *range, uint32_t part, uint32_t parts, struct fl_frame_run *run);
 
-/* The frames of `range` that `is_there` (NULL: none is) does not know, as few runs. False: no memory. */
+/* The frames of `range` for which `is_there` is false (NULL: all), in as few runs as possible. False: no memory.
+ * */
 bool fl_frame_set_missing(const struct fl_frame_run *range, bool (*is_there)(void *user, uint32_t frame),
                           void *user, struct fl_frame_set *set, struct fl_error *error);
 void fl_frame_set_finish(struct fl_frame_set *set);

@@ -5,7 +5,7 @@
 #include <stdio.h>
 #include <string.h>
 
-/* A file on a slow disk may take long; a program that hangs must not hold us for ever. */
+/* A file on a slow disk may take long; a program that hangs must not block us for ever. */
 #define ANSWER_NS 300000000000ull
 #define PIECE_BYTES 262144u
 

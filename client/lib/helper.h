@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A helper program that takes frames: what the image writer and the video writer have in common as seen from here.
+/* A helper program that receives frames: shared by the client's sides of the image writer and the video writer.
  */
 #ifndef FARLIGHT_CLIENT_LIB_HELPER_H
 #define FARLIGHT_CLIENT_LIB_HELPER_H
@@ -19,21 +19,21 @@ struct fl_helper {
 /* `program`, `what` and `interrupt_fd` are set by the caller. fl_helper_finish must follow, also after a failure.
  */
 bool fl_helper_start(struct fl_helper *helper, const char *const *arguments, struct fl_error *error);
-/* Closes the socket, upon which the program ends; killed when it does not. */
+/* Closes the socket, which ends the program; kills it if it does not end. */
 void fl_helper_finish(struct fl_helper *helper);
 
-/* Puts the message behind what waits to be written. */
+/* Appends the message to the queue. */
 bool fl_helper_send(struct fl_helper *helper, const struct message *message, struct fl_error *error);
 /* The same for a whole frame, raw. */
 bool fl_helper_send_frame(struct fl_helper *helper, const struct fl_frame *frame, struct fl_error *error);
-/* Until the kernel has everything: what lies in our buffer must reach the program while we do other things. */
+/* Waits until the kernel has everything: the program must get it while we do other things. */
 bool fl_helper_flush(struct fl_helper *helper, struct fl_error *error);
-/* The next answer to the present request that is there already. */
+/* The next answer to the current request, if it has arrived. */
 enum fl_stream_result fl_helper_poll(struct fl_helper *helper, struct message *message, struct fl_error *error);
-/* Waits for the next answer to the present request. */
+/* Waits for the next answer to the current request. */
 bool fl_helper_receive(struct fl_helper *helper, struct message *message, struct fl_error *error);
 
-/* The path, or its end where it is long: names the file at fault. */
+/* The path, or the end of a long one: names the file at fault. */
 void fl_shorten_path(const char *path, char *out, size_t out_bytes);
 
 #endif

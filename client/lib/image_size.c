@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Formats: PNG (W3C, 3rd edition, 11.2.2), JPEG (ITU-T T.81, B.2.2), OpenEXR ("File Layout"), Radiance HDR (Ward,
- * "Radiance File Formats"). What is read is not trusted: every position is checked against the bytes there are. */
+ * "Radiance File Formats"). The input is not trusted: every position is checked against the number of bytes. */
 #include "lib/image_size.h"
 
 #include <errno.h>
@@ -144,14 +144,14 @@ static bool exr_attributes(const struct head *head, struct exr_header *header)
     return at < head->count && header->has_window && header->has_compression;
 }
 
-/* The last chunk of the table must end within the file: it is written last, and the table at the very end. */
+/* The table's last chunk must end within the file: it is written last, but for the table itself. */
 static bool exr_size(const struct head *head, uint32_t *width, uint32_t *height)
 {
     struct exr_header header = {0};
     uint8_t word[8];
     if (head->count < 9 || little_endian(head->bytes, 4) != 0x01312f76)
         return false;
-    /* Version 2; tiles, deep data or several parts are not from here. */
+    /* Version 2; our files have no tiles, deep data or several parts. */
     if ((little_endian(head->bytes + 4, 4) & ~0x400ull) != 2 || !exr_attributes(head, &header))
         return false;
     const uint64_t chunks = ((uint64_t)header.height + header.lines - 1) / header.lines;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Whether an image file is there and how large its picture is, from its first and last bytes. */
+/* Whether an image file exists, and the size of its picture, from its first and last bytes. */
 #ifndef FARLIGHT_CLIENT_LIB_IMAGE_SIZE_H
 #define FARLIGHT_CLIENT_LIB_IMAGE_SIZE_H
 

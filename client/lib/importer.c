@@ -10,7 +10,7 @@
 #include <unistd.h>
 
 #define DEFAULT_TIMEOUT_MS 600000u
-/* Further cameras cannot be chosen by name; bounds the work that a hostile model can cause here. */
+/* Further cameras cannot be chosen by name; this bounds the work that a hostile model can cause. */
 #define CAMERAS_MAX 4096u
 
 /* Named here, before a program is started for it. */
@@ -144,7 +144,7 @@ bool fl_importer_explain(struct fl_importer *importer, struct fl_error *error)
                         words[0] != '\0' ? ": " : "", words);
 }
 
-/* Nodes without a name are known by their camera's. */
+/* Nodes without a name have their camera's. */
 static void complete_names(struct fl_importer *importer)
 {
     for (size_t i = 0; i < importer->camera_count; i++) {
@@ -159,7 +159,7 @@ static void complete_names(struct fl_importer *importer)
 void fl_importer_stop(struct fl_importer *importer)
 {
     fl_stream_finish(&importer->stream);
-    /* Once it is done it has no more to do than to end. */
+    /* After `done` it only has to end. */
     if (importer->process.pid > 0 && (!importer->done || !fl_process_has_ended(&importer->process, 100)))
         fl_process_kill(&importer->process);
     fl_process_end(&importer->process, 2000);

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The importer program as seen from here: started, listened to, ended. Knows no daemon. */
+/* The client's side of the importer program: starts it, receives its messages, ends it. Independent of the daemon.
+ * */
 #ifndef FARLIGHT_CLIENT_LIB_IMPORTER_H
 #define FARLIGHT_CLIENT_LIB_IMPORTER_H
 
@@ -7,7 +8,7 @@
 #include "lib/process.h"
 #include "lib/stream.h"
 
-/* The name that a camera object has, until the end shows which nodes have none of their own. */
+/* A camera object's name, until the end of the import shows which nodes have no name of their own. */
 struct fl_camera_object {
     uint32_t camera;
     char name[129];
@@ -29,12 +30,12 @@ struct fl_importer {
     struct fl_error complaint; /* of its last note of severity error */
 };
 
-/* Starts the program; it begins to read at once and waits for answers only where it needs some. */
+/* Starts the program; it begins to read at once and waits only for the answers that it needs. */
 bool fl_importer_start(struct fl_importer *importer, const struct fl_load_options *options,
                        struct fl_error *error);
-/* Remembers what concerns us: cameras, clips, names; notes and progress go to the options' callbacks. */
+/* Records cameras, clips and names; notes and progress go to the options' callbacks. */
 bool fl_importer_observe(struct fl_importer *importer, const struct message *message, struct fl_error *error);
-/* Why it ended without `done`: its own complaint, else how it ended. Returns false. */
+/* Sets the error of a program that ended without `done`: its own message, else its exit status. Returns false. */
 bool fl_importer_explain(struct fl_importer *importer, struct fl_error *error);
 /* Ends the program (at once unless it is done) and completes names and stats. */
 void fl_importer_stop(struct fl_importer *importer);

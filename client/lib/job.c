@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A batch job: started, its frames taken one after the other, ended. */
+/* A batch job: started, its frames fetched in order, ended. */
 #include "lib/frame.h"
 #include "lib/scene.h"
 #include "protocol/common/clock.h"
@@ -13,9 +13,9 @@ struct fl_job {
     struct fl_connection *connection;
     uint32_t request, channel;
     uint64_t credit;     /* frames that the daemon may have sent by now */
-    uint64_t next_frame; /* 64 bits: one step beyond the last cannot wrap */
+    uint64_t next_frame; /* 64 bits: one step beyond the last frame cannot wrap */
     uint32_t last_frame, frame_step;
-    bool answered;           /* the daemon has given its one answer: nothing more comes */
+    bool answered;           /* the daemon has sent its only answer: nothing more follows */
     struct fl_error failure; /* why it ended early; code NONE: it did not */
     struct fl_assembly assembly;
     struct fl_frame_queue done; /* that nobody has asked for yet */
@@ -75,7 +75,7 @@ struct fl_job *fl_render_start(struct fl_scene *scene, const struct message_rend
     return job;
 }
 
-/* One more frame may come for the one that was taken. */
+/* Gives credit for the frame that was fetched. */
 static bool grant(struct fl_job *job, struct fl_error *error)
 {
     struct message credit = {.type = MESSAGE_CREDIT};
@@ -126,7 +126,7 @@ int fl_job_take(struct fl_job *job, const struct framing_header *header, const s
     struct fl_error why = {0};
     if (header->request != job->request)
         return 0;
-    /* What still comes of a job that was given up is dropped. */
+    /* Remaining messages of an abandoned job are dropped. */
     if (job->answered || job->failure.code != FL_ERROR_NONE || take(job, message, &why))
         return 1;
     fl_assembly_finish(&job->assembly);
@@ -149,7 +149,7 @@ struct fl_frame *fl_render_poll(struct fl_job *job, unsigned timeout_ms, bool *d
             fl_connection_step(job->connection, &ignored, deadline_ns, error) == FL_STEP_FAILED) {
             if (error->code == FL_ERROR_TIMEOUT)
                 *error = (struct fl_error){0};
-            return NULL; /* a frame that has begun is kept: neither is an end */
+            return NULL; /* a frame that has begun is kept: neither ends the job */
         }
     }
     struct fl_frame *frame = fl_frame_queue_pop(&job->done);
@@ -184,7 +184,7 @@ bool fl_render_cancel(struct fl_job *job, struct fl_error *error)
     const uint32_t request = fl_connection_next_request(connection);
     const uint64_t deadline_ns = monotonic_now_ns() + CANCEL_NS;
     struct fl_received received;
-    job->answered = true; /* whatever still comes is dropped by request */
+    job->answered = true; /* remaining messages are dropped by their request */
     fl_connection_send_late(connection, request, &cancel);
     return fl_connection_answer(connection, request, MESSAGE_OK, &received, deadline_ns, error);
 }

@@ -38,7 +38,7 @@ void fl_json_finish(struct fl_json *json)
 
 /* ---- where things stand ---- */
 
-/* The text is known to be JSON: what is searched here only has to find its way. It is bounded all the same. */
+/* The text is known to be valid JSON: the scan only has to follow its structure. It is bounded all the same. */
 struct scan {
     const char *at, *end;
 };
@@ -57,7 +57,7 @@ static void skip_string(struct scan *scan)
     scan->at += scan->at < scan->end ? 1 : 0;
 }
 
-/* Up to the comma or bracket behind the value. */
+/* Skips to the comma or bracket behind the value. */
 static void skip_value(struct scan *scan)
 {
     size_t depth = 0;
@@ -89,7 +89,7 @@ static bool is_key(const char *begin, const char *end, const char *key)
     return equal;
 }
 
-/* Moves to the next comma's other side; false at the end of the array or object. */
+/* Moves past the next comma; false at the end of the array or object. */
 static bool next_entry(struct scan *scan)
 {
     skip_value(scan);
@@ -100,7 +100,7 @@ static bool next_entry(struct scan *scan)
     return true;
 }
 
-/* From the value at `scan` to the member or element; *found is where it is said to begin. */
+/* From the value at `scan` to the member or element; *found is the start of its key or element. */
 static bool descend(struct scan *scan, const struct fl_json_place *place, const char **found)
 {
     const char open = place->key ? '{' : '[';
@@ -132,7 +132,7 @@ static bool descend(struct scan *scan, const struct fl_json_place *place, const 
     return false;
 }
 
-/* False: the place, or one around it, is not there; *found is the last that is. */
+/* False: the place, or one around it, does not exist; *found is the innermost existing one. */
 static bool find(struct scan *scan, const struct fl_json_place *place, const char **found)
 {
     if (!place) {

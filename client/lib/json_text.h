@@ -18,7 +18,7 @@ struct fl_json {
 bool fl_json_load(struct fl_json *json, const char *path, size_t max_bytes, struct fl_error *error);
 void fl_json_finish(struct fl_json *json);
 
-/* One step on the way from the root to a value: a member of an object or an element of an array. NULL: the root.
+/* One step on the path from the root to a value: a member of an object or an element of an array. NULL: the root.
  */
 struct fl_json_place {
     const struct fl_json_place *outer;
@@ -26,8 +26,7 @@ struct fl_json_place {
     size_t index;
 };
 
-/* The line, counted from 1, in which the member's key or the element begins; of what is not there, that of the
- * innermost place that is. */
+/* The line, from 1, of the member's key or the element; of a missing one, that of the innermost existing place. */
 unsigned fl_json_line(const struct fl_json *json, const struct fl_json_place *place);
 /* "lights[2].colour"; cut off where it does not fit. Empty for the root. */
 void fl_json_path(const struct fl_json_place *place, char *path, size_t path_bytes);

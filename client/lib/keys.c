@@ -26,7 +26,7 @@ static bool wrong(const struct place *place, const char *field, const char *what
                         fl_json_line(place->json, &at), place->key, field, what);
 }
 
-/* Missing values keep their default; `needed` ones may not be missing. */
+/* Missing values keep their default; `needed` ones must be present. */
 static bool read_number(const struct place *place, const json_t *object, const char *field, bool needed,
                         double least, double greatest, double *value)
 {

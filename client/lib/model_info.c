@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What is in a model: the importer runs as for a daemon, and is answered here. No bulk data is asked for. */
+/* The contents of a model: the importer runs as for a daemon, and is answered here. No bulk data is requested. */
 #include "lib/importer.h"
 #include "lib/relay.h"
 
@@ -74,7 +74,7 @@ static bool list(struct listing *listing, const struct message *message, struct 
     return true;
 }
 
-/* What a daemon that already has everything would say. */
+/* The answer of a daemon that already has all blobs. */
 static bool answer(struct listing *listing, const struct frame *frame, const struct message *message,
                    struct fl_error *error)
 {

@@ -58,7 +58,8 @@ static bool wire(posix_spawn_file_actions_t *actions, enum fl_wiring wiring, int
     if (wiring == FL_WIRING_STANDARD)
         return posix_spawn_file_actions_adddup2(actions, socket_fd, STDIN_FILENO) == 0 &&
                posix_spawn_file_actions_adddup2(actions, socket_fd, STDOUT_FILENO) == 0;
-    /* The talk goes first to where it cannot be overwritten: our descriptors may be 0..3 themselves. */
+    /* The log's descriptor is moved first to where it cannot be overwritten: our descriptors may be 0..3
+     * themselves. */
     return posix_spawn_file_actions_adddup2(actions, talk_fd, STDOUT_FILENO) == 0 &&
            posix_spawn_file_actions_adddup2(actions, talk_fd, STDERR_FILENO) == 0 &&
            posix_spawn_file_actions_adddup2(actions, socket_fd, CHILD_SOCKET) == 0 &&
@@ -66,7 +67,7 @@ static bool wire(posix_spawn_file_actions_t *actions, enum fl_wiring wiring, int
 }
 
 /* The child starts with default signals and, unless it may need the terminal, in a process group of its own: a
- * Ctrl-C is for us, and we end the child in order. */
+ * Ctrl-C is for us, and we end the child properly. */
 static bool set_attributes(posix_spawnattr_t *attributes, enum fl_wiring wiring)
 {
     sigset_t none, reset;
@@ -104,7 +105,7 @@ static int spawn(struct fl_process *process, const char *path, char *const *argv
     return failure;
 }
 
-/* Moves a descriptor above those that the child's are made of. */
+/* Moves a descriptor above those that become the child's. */
 static int lift(int fd)
 {
     if (fd < 0 || fd > CHILD_SOCKET)
@@ -118,7 +119,8 @@ static size_t fill_arguments(char *argv[ARGUMENTS_MAX], const char *path, enum f
                              const char *const *arguments)
 {
     size_t count = 0;
-    argv[count++] = (char *)(uintptr_t)path; /* exec takes char *const * for history's sake and writes nothing */
+    argv[count++] =
+        (char *)(uintptr_t)path; /* exec takes char *const * for historical reasons and writes nothing */
     if (wiring == FL_WIRING_DESCRIPTOR) {
         argv[count++] = (char *)(uintptr_t) "--fd";
         argv[count++] = (char *)(uintptr_t) "3";
@@ -177,7 +179,7 @@ bool fl_process_has_ended(const struct fl_process *process, unsigned timeout_ms)
         const uint64_t now_ns = monotonic_now_ns();
         if (ended || now_ns >= deadline_ns)
             break;
-        /* Without a pidfd (an old kernel) this is a look every 5 ms. */
+        /* Without a pidfd (an old kernel) this polls every 5 ms. */
         struct pollfd polled = {.fd = fd, .events = POLLIN};
         const int left_ms = (int)((deadline_ns - now_ns) / 1000000) + 1;
         poll(&polled, 1, fd >= 0 || left_ms < 5 ? left_ms : 5);
@@ -211,7 +213,7 @@ int fl_process_end(struct fl_process *process, unsigned grace_ms)
     return status;
 }
 
-/* The last line of the child's talk that says something. */
+/* The last non-empty line of the child's log. */
 static void last_line(int fd, char *line, size_t line_bytes)
 {
     char tail[2048];

@@ -8,7 +8,7 @@
 #include <sys/types.h>
 
 enum fl_wiring {
-    FL_WIRING_DESCRIPTOR, /* the socket is descriptor 3 ("--fd 3" is put first); the program's talk is kept */
+    FL_WIRING_DESCRIPTOR, /* the socket is descriptor 3 ("--fd 3" comes first); the program's output is logged */
     FL_WIRING_STANDARD,   /* the socket is standard input and output; the program talks to our standard error and
                              may ask the terminal for a passphrase */
 };
@@ -19,24 +19,23 @@ struct fl_process {
     char name[32];
 };
 
-/* Where a helper program lies: $FARLIGHT_LIBEXEC, the folder of the running program, PATH. */
+/* The path of a helper program: searched in $FARLIGHT_LIBEXEC, the folder of the running program, PATH. */
 bool fl_find_program(const char *name, char *path, size_t path_bytes, struct fl_error *error);
 
 /* Starts `name` with `arguments` (NULL-terminated; without the program's name). *socket_fd is our end. */
 bool fl_process_start(struct fl_process *process, const char *name, enum fl_wiring wiring,
                       const char *const *arguments, int *socket_fd, struct fl_error *error);
-/* Waits until the program ends by itself, asks it to after `grace_ms`, kills it 2 s later. Its wait status;
- * 0 where there is none. Closes nothing but the talk: `fl_process_last_words` comes first. */
+/* Waits until the program ends by itself, sends SIGTERM after `grace_ms`, kills it 2 s later. Returns its wait
+ * status; 0 if there is none. Closes the log: call `fl_process_last_words` before. */
 int fl_process_end(struct fl_process *process, unsigned grace_ms);
-/* Whether it has ended, after waiting so long for it; it is not reaped. */
+/* Whether it has ended, after waiting this long for it; it is not reaped. */
 bool fl_process_has_ended(const struct fl_process *process, unsigned timeout_ms);
 void fl_process_kill(struct fl_process *process); /* at once; fl_process_end must follow */
-/* Waits up to `grace_ms` for its end, then puts how it ended and the last line that it wrote into `text`:
- * "farlightd was ended by signal 11: ..."; still running: its last line alone. */
+/* Waits up to `grace_ms` for its end, then writes how it ended and its last line into `text`: "farlightd was ended
+ * by signal 11: ..."; still running: its last line alone. */
 void fl_process_last_words(struct fl_process *process, unsigned grace_ms, char *text, size_t text_bytes);
 
-/* The line of its talk, counted from 0 among those that begin with `start`: what follows that. False: there is
- * none.
+/* The rest of the log's line with this index among those that begin with `start`. False: there is none.
  */
 bool fl_process_find_line(const struct fl_process *process, const char *start, size_t index, char *text,
                           size_t text_bytes);

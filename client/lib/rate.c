@@ -4,7 +4,7 @@
 #include <math.h>
 #include <stdbool.h>
 
-/* NTSC rates have these whole numbers as nominal ones; 23.98 for 24000/1001 is off by 1.7e-4 of it. */
+/* These whole numbers are nominal NTSC rates; 23.98 for 24000/1001 is off by 1.7e-4 of it. */
 static bool is_ntsc(double rate, uint32_t *nominal)
 {
     static const uint32_t known[] = {24, 30, 48, 60, 120, 240};
@@ -32,7 +32,7 @@ void fl_rate_exact(float frames_per_second, uint32_t *numerator, uint32_t *denom
         if (*numerator > 0 && (float)((double)*numerator / *denominator) == (float)rate)
             return;
     }
-    /* As near as thousandths come: no float with few digits gets here. */
+    /* The nearest thousandth: only floats with many digits get here. */
     *numerator = (uint32_t)lround(rate * *denominator);
     *numerator += *numerator == 0;
 }

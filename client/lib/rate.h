@@ -4,9 +4,9 @@
 
 #include <stdint.h>
 
-/* The frame rate that is meant: a whole number; N * 1000 / 1001 for what people write as 23.976, 29.97 and so on
- * (NTSC, SMPTE ST 12); else the fraction with the least denominator that is the number as a float. A positive
- * finite rate up to 100,000 is expected; less than one frame in 1,000 seconds counts as that. In lowest terms. */
+/* The exact frame rate of a number: a whole number; N * 1000 / 1001 for 23.976, 29.97 and so on (NTSC, SMPTE ST
+ * 12); else the fraction with the smallest denominator that equals the number as a float. A positive finite rate
+ * up to 100,000 is expected; less than one frame in 1,000 seconds counts as that. In lowest terms. */
 void fl_rate_exact(float frames_per_second, uint32_t *numerator, uint32_t *denominator);
 
 #endif

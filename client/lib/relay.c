@@ -2,7 +2,7 @@
 #include "lib/relay.h"
 
 #define IMPORTER_SCENE 1u
-/* Requests may be begun out of order by as much as any daemon lets be in flight. */
+/* Requests may begin out of order within the maximum number in flight of any daemon. */
 #define REQUEST_AHEAD_MAX 1024u
 
 static enum fl_relay_verdict kind_of(enum message_type type)

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What an importer may say to a daemon, decided without any I/O.
+/* The messages that an importer may send to a daemon, decided without any I/O.
  *
  * The importer is a separate, distrusted program: it may offer and send blobs and edit the one scene that is
  * being loaded, nothing else. Its requests are numbered from 1 upwards; the daemon sees them shifted by
@@ -26,9 +26,9 @@ enum fl_relay_verdict {
 /* May change message->edit_begin.scene to the daemon's number. */
 enum fl_relay_verdict fl_relay_from_importer(struct fl_relay *relay, const struct framing_header *header,
                                              struct message *message, uint32_t *request, struct fl_error *error);
-/* Whether a message of the daemon's answers the importer, and the request as the importer knows it. */
+/* Whether a message of the daemon answers the importer, and the importer's own number of the request. */
 bool fl_relay_from_daemon(const struct fl_relay *relay, const struct framing_header *header, uint32_t *request);
-/* The daemon's total for the upload channel as the importer counts it. */
+/* The daemon's total for the upload channel in the importer's count. */
 uint64_t fl_relay_credit(const struct fl_relay *relay, uint64_t daemon_total);
 
 #endif

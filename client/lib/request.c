@@ -29,12 +29,13 @@ bool fl_stats(struct fl_connection *connection, const struct message_stats_reply
         !fl_connection_answer(connection, request, MESSAGE_STATS_REPLY, &received, monotonic_now_ns() + ANSWER_NS,
                               error))
         return false;
-    connection->stats = received.message.stats_reply; /* its strings and arrays stay in the stream's scratch */
+    connection->stats =
+        received.message.stats_reply; /* its strings and arrays stay in the stream's scratch buffer */
     *reply = &connection->stats;
     return true;
 }
 
-/* Until that time; what comes meanwhile is nobody's any more. */
+/* Drains the connection until that time; messages that arrive meanwhile are dropped. */
 static bool listen_until(struct fl_connection *connection, uint64_t end_ns, struct fl_error *error)
 {
     struct fl_received dropped;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A model's way to the daemon: the importer's messages are looked at, then passed on. */
+/* Loads a model into the daemon: the importer's messages are checked, then passed on. */
 #include "lib/scene.h"
 #include "lib/importer.h"
 #include "lib/relay.h"
@@ -15,7 +15,7 @@ struct load {
     struct fl_connection *connection;
     struct fl_importer *importer;
     struct fl_relay relay;
-    uint64_t credit_passed;   /* the upload credit that the importer was told of */
+    uint64_t credit_passed;   /* the upload credit that the importer was given */
     uint64_t upload_begin_ns; /* 0: nothing was sent */
     uint64_t commit_begin_ns; /* 0: no commit is waiting for its answer */
     uint32_t commit_request;  /* as the daemon knows it */
@@ -61,7 +61,7 @@ static bool pass_on(struct load *load, const struct frame *frame, struct message
     return true;
 }
 
-/* As many as the daemon's side has room for. */
+/* As many as the daemon's side can queue. */
 static bool drain_importer(struct load *load, struct fl_error *error)
 {
     if (!fl_connection_push_late(load->connection, error))
@@ -134,8 +134,8 @@ static bool drain_daemon(struct load *load, struct fl_error *error)
 
 /* ---- both ---- */
 
-/* An importer may read and think for longer than the daemon bears a client that says nothing. The number is one
- * that the importer's requests do not reach; the answer is dropped. */
+/* An importer may read and compute longer than the daemon's timeout for silent clients. The ping's number is out
+ * of the range of the importer's requests; its answer is dropped. */
 static bool ping_in_time(struct load *load, struct fl_error *error)
 {
     struct message ping = {.type = MESSAGE_PING};
@@ -186,7 +186,7 @@ static bool relay_all(struct load *load, struct fl_error *error)
             fl_error_set(error, FL_ERROR_CONNECTION, "", "the daemon closed the connection");
             return fl_connection_break(load->connection, error);
         }
-        /* What it said last may wait for room towards the daemon. */
+        /* Its last messages may wait for space towards the daemon. */
         if (importer->ended && fl_stream_has_room(daemon)) {
             if (load->refusal.code == FL_ERROR_NONE)
                 return fl_importer_explain(load->importer, error);
@@ -223,7 +223,7 @@ static bool open_scene(struct fl_connection *connection, uint32_t scene, const s
            fl_connection_answer(connection, request, MESSAGE_OK, &received, monotonic_now_ns() + ANSWER_NS, error);
 }
 
-/* The importer reads the file while the daemon makes room for the scene. */
+/* The importer reads the file while the daemon creates the scene. */
 static bool load_with(struct fl_importer *importer, struct fl_scene *scene, struct fl_error *error)
 {
     struct fl_connection *connection = scene->connection;
@@ -262,7 +262,7 @@ void fl_import_destroy(struct fl_import *started)
     free(started);
 }
 
-/* What was given at the start stays; who is told may only be known now. */
+/* Options of the start stay; only the callbacks may be set now. */
 static void adopt_callbacks(struct fl_importer *importer, const struct fl_load_options *options)
 {
     importer->options.note = options->note;
@@ -327,7 +327,7 @@ struct fl_scene *fl_scene_load(struct fl_connection *connection, const struct fl
     return scene;
 }
 
-/* Clips that were added to a scene of others'. */
+/* Removes own clips from a scene of others. */
 static void take_clips_away(const struct fl_scene *scene)
 {
     struct message begin = {.type = MESSAGE_EDIT_BEGIN}, remove = {.type = MESSAGE_REMOVE},
@@ -343,7 +343,7 @@ static void take_clips_away(const struct fl_scene *scene)
     fl_connection_send_late(scene->connection, request, &commit);
 }
 
-/* Answers are not waited for: they are dropped when they come. */
+/* Does not wait for answers: they are dropped on arrival. */
 void fl_scene_destroy(struct fl_scene *scene)
 {
     if (!scene)

@@ -10,7 +10,7 @@ struct fl_scene {
     struct fl_connection *connection;
     uint32_t scene;
     uint64_t revision; /* the greatest that was told of */
-    uint32_t *clips;   /* of one's own, in a scene of others': they are taken away in the end */
+    uint32_t *clips;   /* own ones in a scene of others: removed at the end */
     size_t clip_count, clip_capacity;
     bool attached;
     struct fl_import_stats stats;
@@ -19,7 +19,7 @@ struct fl_scene {
     struct fl_catalogue catalogue;
 };
 
-/* A scene of the connection's with a number of its own; nothing is told to the daemon. NULL: out of memory. */
+/* A new scene of the connection, with its own number; nothing is sent. NULL: out of memory. */
 struct fl_scene *fl_scene_create(struct fl_connection *connection, struct fl_error *error);
 
 #endif

@@ -64,7 +64,7 @@ bool fl_stream_has_room(const struct fl_stream *stream)
     return FL_STREAM_BUFFER_BYTES - (stream->out_end - stream->out_start) >= FRAMING_MESSAGE_MAX_BYTES;
 }
 
-/* Makes the free space of a buffer one piece. */
+/* Makes the free space of a buffer contiguous. */
 static void compact(uint8_t *data, size_t *start, size_t *end)
 {
     if (*start == 0)
@@ -105,7 +105,7 @@ static bool has_space_to_read(const struct fl_stream *stream)
     return stream->in_end - stream->in_start < FL_STREAM_BUFFER_BYTES;
 }
 
-/* Before the daemon has answered, what is to be sealed has to wait for that. */
+/* Bytes to be sealed wait for the daemon's answer to the handshake. */
 static bool has_something_to_write(const struct fl_stream *stream)
 {
     size_t bytes = 0;
@@ -131,7 +131,7 @@ static bool lost(const struct fl_stream *stream, int number, struct fl_error *er
                         strerror(number));
 }
 
-/* What goes to the descriptor next; NULL: nothing. */
+/* The next bytes for the descriptor; NULL: none. */
 static const uint8_t *next_bytes(struct fl_stream *stream, size_t *bytes)
 {
     *bytes = stream->out_end - stream->out_start;
@@ -170,7 +170,7 @@ bool fl_stream_write(struct fl_stream *stream, struct fl_error *error)
         } else if (errno == EAGAIN || errno == EWOULDBLOCK) {
             return true;
         } else if (errno == EPIPE || errno == ECONNRESET) {
-            /* Its last words may still lie in our receive buffer: they are read before the loss is reported. */
+            /* Its last messages may still be in our receive buffer: they are read before the loss is reported. */
             drop_output(stream);
             return true;
         } else if (errno != EINTR) {
@@ -208,7 +208,7 @@ static bool tell_broken_seal(const struct fl_stream *stream, const struct decode
                         why->field, why->text);
 }
 
-/* What the link has goes to the buffer of messages as far as there is room. */
+/* Moves opened bytes from the link to the message buffer as far as they fit. */
 static bool open_records(struct fl_stream *stream, struct fl_error *error)
 {
     struct decode_error why = {0};
@@ -226,7 +226,7 @@ static bool open_records(struct fl_stream *stream, struct fl_error *error)
     return result != SEALED_FATAL || tell_broken_seal(stream, &why, error);
 }
 
-/* Bytes that came to where they were to come. */
+/* Accepts received bytes: opens them if the stream is sealed. */
 static bool take(struct fl_stream *stream, size_t bytes, struct fl_error *error)
 {
     if (!stream->link) {
@@ -283,7 +283,7 @@ enum fl_stream_result fl_stream_next(struct fl_stream *stream, struct frame *fra
         if (result == FRAMING_FATAL)
             return broken(stream, &why, error);
         if (result == FRAMING_NEED_MORE && stream->link && sealed_link_has_record(stream->link)) {
-            /* It had no room before; the descriptor will not speak of it again. */
+            /* It had no space before, and poll() will not report these bytes again. */
             compact(stream->in, &stream->in_start, &stream->in_end);
             if (!open_records(stream, error))
                 return FL_STREAM_ERROR;
@@ -304,7 +304,7 @@ enum fl_stream_result fl_stream_next(struct fl_stream *stream, struct frame *fra
     return FL_STREAM_MESSAGE;
 }
 
-/* Rounded up, so that a deadline has passed when poll says so. */
+/* Rounded up, so that the deadline has passed when poll() returns. */
 static int milliseconds_until(uint64_t deadline_ns)
 {
     if (deadline_ns == UINT64_MAX)
@@ -321,7 +321,7 @@ bool fl_wait(struct pollfd *polled, size_t count, int interrupt_fd, uint64_t dea
         for (size_t i = 0; i < count; i++) {
             all[i] = polled[i];
             if (polled[i].events == 0)
-                all[i].fd = -1; /* else a peer that hung up would make this a busy loop */
+                all[i].fd = -1; /* else a peer that has hung up would cause a busy loop */
         }
         all[count] = (struct pollfd){.fd = interrupt_fd > 0 ? interrupt_fd : -1, .events = POLLIN};
         const int ready = poll(all, (nfds_t)count + 1, milliseconds_until(deadline_ns));

@@ -12,53 +12,53 @@
 struct sealed_key;
 struct sealed_link;
 
-/* Two of the greatest messages: one can be completed while the other is looked at. */
+/* Two maximum messages: one can be completed while the other is processed. */
 #define FL_STREAM_BUFFER_BYTES (2u * FRAMING_MESSAGE_MAX_BYTES)
 
 struct fl_stream {
     int fd;                           /* owned; -1: none */
-    uint32_t accept;                  /* bits of enum message_from: who may have sent what comes in */
+    uint32_t accept;                  /* bits of enum message_from: the allowed senders of received messages */
     const char *peer;                 /* for error texts: "the daemon"; static */
     bool ended;                       /* the peer will send nothing more */
     uint8_t *in, *out, *scratch_data; /* FL_STREAM_BUFFER_BYTES, the same, SCRATCH_BYTES */
     size_t in_start, in_end, out_start, out_end;
     struct scratch scratch;
     struct sealed_link *link; /* between these buffers and the descriptor; NULL: the connection is not sealed */
-    bool is_last;             /* nothing is pushed any more: once all is sealed, so is the end */
+    bool is_last;             /* no more messages follow: the end is sealed after them */
 };
 
 /* Takes the descriptor over (also on failure) and makes it non-blocking. */
 bool fl_stream_init(struct fl_stream *stream, int fd, uint32_t accept, const char *peer, struct fl_error *error);
 void fl_stream_finish(struct fl_stream *stream);
-/* Before anything else is sent: it goes through a sealed connection, which fl_stream_transfer() begins. */
+/* Call it before anything is sent: makes the connection a sealed one, whose handshake fl_stream_transfer() begins.
+ * */
 bool fl_stream_seal(struct fl_stream *stream, const struct sealed_key *key, struct fl_error *error);
-/* It has come from somebody who has the key that its end is here, and nothing is missing. True where nothing is
- * sealed. */
+/* Whether a holder of the key has sent the end of the stream, so that nothing is missing. True without a seal. */
 bool fl_stream_is_whole(const struct fl_stream *stream);
 
-/* Whether any message fits behind what waits to be written. */
+/* Whether a message of any size fits into the send buffer. */
 bool fl_stream_has_room(const struct fl_stream *stream);
 bool fl_stream_has_output(const struct fl_stream *stream);
-/* Puts a message behind what waits; there must be room. */
+/* Appends a message to the send buffer; it must fit. */
 bool fl_stream_push(struct fl_stream *stream, uint32_t request, uint32_t channel, const struct message *message,
                     struct fl_error *error);
-/* The same for a payload as it came; header->payload_bytes says its size. */
+/* The same for an encoded payload; header->payload_bytes says its size. */
 void fl_stream_push_payload(struct fl_stream *stream, const struct framing_header *header, const uint8_t *payload);
 
 /* poll()'s events for the stream's present state; 0 when there is nothing to wait for. */
 short fl_stream_events(const struct fl_stream *stream);
-/* Writes as far as it goes without blocking; what came in stays where it is. False: the peer is lost. */
+/* Writes as much as possible without blocking; received bytes stay in place. False: the peer is lost. */
 bool fl_stream_write(struct fl_stream *stream, struct fl_error *error);
-/* Writes and reads as far as it goes without blocking. False: the peer is lost. The end of its bytes is no
+/* Writes and reads as much as possible without blocking. False: the peer is lost. The end of its bytes is no
  * failure: see `ended`. */
 bool fl_stream_transfer(struct fl_stream *stream, struct fl_error *error);
 
 enum fl_stream_result { FL_STREAM_MESSAGE, FL_STREAM_NOTHING, FL_STREAM_ERROR };
-/* The next message that has come in whole; unknown ignorable ones are skipped. `frame` and `message` (may be
- * NULL: not decoded) are valid until the next call. NOTHING with `ended`: half a message at most remains. */
+/* The next complete message; unknown ignorable ones are skipped. `frame` and `message` (may be NULL: not decoded)
+ * are valid until the next call. NOTHING with `ended`: half a message at most remains. */
 enum fl_stream_result fl_stream_next(struct fl_stream *stream, struct frame *frame, struct message *message,
                                      struct fl_error *error);
-/* Whether an incomplete message lies in the buffer. */
+/* Whether the buffer holds an incomplete message. */
 bool fl_stream_has_remains(const struct fl_stream *stream);
 
 /* poll() until something is ready, the deadline passes (UINT64_MAX: never) or the interrupt descriptor (0: none)

@@ -5,7 +5,7 @@
 #include <stdio.h>
 #include <string.h>
 
-/* What a daemon sends must not control a terminal. */
+/* Text from a daemon must not control the terminal. */
 static char printable(char c)
 {
     return (unsigned char)c < 0x20 || c == 0x7f ? '?' : c;

@@ -47,7 +47,7 @@ bool fl_text_integer(const char *text, uint64_t least, uint64_t greatest, uint64
     return true;
 }
 
-/* strtod with a point, whatever the program's locale says. */
+/* strtod with a decimal point in every locale. */
 static double read_real(const char *text, char **end)
 {
     const locale_t plain = newlocale(LC_ALL_MASK, "C", (locale_t)0);
@@ -133,7 +133,7 @@ bool fl_text_range(const char *text, uint32_t *first, uint32_t *last, uint32_t *
     return true;
 }
 
-/* Bytes of the UTF-8 character at `text`; 0: none. */
+/* Length of the UTF-8 character at `text`; 0: none. */
 static size_t utf8_length(const unsigned char *text)
 {
     const unsigned char c = text[0];
@@ -165,7 +165,8 @@ void fl_text_utf8(const char *text, char *out, size_t out_bytes)
     out[used] = '\0';
 }
 
-/* What stands at a '%': 0 on nonsense, 1 for "%%", else the length of "%d" or "%0Nd" and its *digits. */
+/* The length of the conversion at a '%': 0 if it is invalid, 1 for "%%", else that of "%d" or "%0Nd" with its
+ * *digits. */
 static size_t read_conversion(const char *at, unsigned *digits)
 {
     if (at[1] == '%')

@@ -20,7 +20,7 @@ bool fl_text_vector(const char *text, float vector[3], struct fl_error *error);
 /* "A", "A-B" or "A-B:STEP"; A <= B, STEP >= 1. */
 bool fl_text_range(const char *text, uint32_t *first, uint32_t *last, uint32_t *step, struct fl_error *error);
 
-/* As much of `text` as is UTF-8 and fits, without cutting a character; what is not becomes '?'. */
+/* Copies as much of `text` as fits, without cutting a character; bytes that are not UTF-8 become '?'. */
 void fl_text_utf8(const char *text, char *out, size_t out_bytes);
 
 /* A file name with a place for the frame's number: "%d" or "%0Nd" (N digits, 1..9, filled with zeros) once,

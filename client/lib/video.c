@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The video writer as seen from here: frames go in, an answer at the beginning and one at the end come back. */
+/* The client's side of the video writer: frames go in, an answer at the beginning and one at the end come back. */
 #include "lib/helper.h"
 #include "lib/text.h"
 
@@ -15,7 +15,7 @@ struct fl_video {
     char temporary[65]; /* name of the unfinished file in the folder; empty: none */
     uint32_t frames;    /* sent whole */
     bool ending;        /* video_end is sent */
-    bool answered;      /* the writer has said its last: nothing more can be sent */
+    bool answered;      /* the writer has ended: nothing more can be sent */
     struct fl_video_info info;
 };
 
@@ -30,7 +30,7 @@ static bool take_failure(struct fl_video *video, const struct message *message, 
         return fl_error_set(error, FL_ERROR_PROTOCOL, video->helper.program,
                             "the answer to a video has the wrong type: %s", message_type_text(message->type));
     fl_error_from_message(&why, &message->error);
-    /* The caller named a file, an option or a frame; it is the file that does not come about. */
+    /* Whichever field the writer names, the caller learns that the file is not written. */
     fl_error_set(error, FL_ERROR_FILE, video->path, "%s", why.text);
     return fl_error_remedy(error, "%s", why.remedy);
 }
@@ -54,7 +54,7 @@ static bool await_begun(struct fl_video *video, struct fl_error *error)
     return true;
 }
 
-/* Before anything more is sent: the writer may have failed with what it has. */
+/* Checks for an answer before anything is sent: the writer may have failed already. */
 static bool check(struct fl_video *video, struct fl_error *error)
 {
     struct message message;
@@ -68,7 +68,7 @@ static bool check(struct fl_video *video, struct fl_error *error)
 
 /* ---- beginning ---- */
 
-/* The one folder that the writer may write to. */
+/* The only folder that the writer may write to. */
 static bool set_folder(struct fl_video *video, const char *path, struct fl_error *error)
 {
     const char *slash = strrchr(path, '/');
@@ -80,7 +80,8 @@ static bool set_folder(struct fl_video *video, const char *path, struct fl_error
     return true;
 }
 
-/* What no message can hold is named after the message's field, which has the option's name. Returns false. */
+/* A value that no message can hold is reported with the message's field, which has the option's name. Returns
+ * false. */
 static bool name_option(struct fl_error *error)
 {
     static const char prefix[] = "video_begin.";
@@ -144,7 +145,7 @@ bool fl_video_write(struct fl_video *video, const struct fl_frame *frame, struct
         return fl_error_set(error, FL_ERROR_ARGUMENT, video->path, "this video has ended");
     if (!check(video, error) || !fl_helper_send_frame(&video->helper, frame, error))
         return false;
-    video->frames++; /* it arrives whole, even if we are interrupted now */
+    video->frames++; /* it arrives complete, even if we are interrupted now */
     return fl_helper_flush(&video->helper, error);
 }
 
@@ -157,7 +158,7 @@ bool fl_video_finish(struct fl_video *video, struct fl_error *error)
         message.video_end.frames = video->frames;
         if (!fl_helper_send(&video->helper, &message, error))
             return false;
-        video->ending = true; /* also if the wait is interrupted: it can be taken up again */
+        video->ending = true; /* also if the wait is interrupted: it can be resumed */
     } else if (video->answered) {
         return check(video, error);
     }
@@ -189,7 +190,7 @@ void fl_video_destroy(struct fl_video *video)
     if (!video)
         return;
     fl_helper_finish(&video->helper);
-    /* The writer takes an unfinished file away itself, unless it was killed. */
+    /* The writer removes an unfinished file itself, unless it was killed. */
     if (video->temporary[0] != '\0') {
         char path[sizeof(video->folder) + sizeof(video->temporary) + 1];
         snprintf(path, sizeof(path), "%s/%s", video->folder, video->temporary);

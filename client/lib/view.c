@@ -10,13 +10,13 @@
 #define DEFAULT_FRAMES_PER_SECOND 60
 #define DEFAULT_SAMPLES 64u
 #define DEFAULT_FRAMES_IN_FLIGHT 4u
-/* Renders that replace one another faster than the daemon answers: more than these wait for it. */
+/* The maximum number of unanswered renders: further ones wait for the daemon. */
 #define ASKED_MAX 8u
 #define ANSWER_NS 30000000000ull
 #define COMMANDS_REMEMBERED 256u /* four seconds of cameras at 60 a second */
 
-/* A render of kind view that the daemon has not answered yet; the newest one holds, frames of those before may
- * still be on their way. */
+/* A render of kind view that the daemon has not answered yet; the newest one counts, frames of earlier ones may
+ * still arrive. */
 struct asked {
     uint32_t request;
     uint64_t change; /* counted from 0 */
@@ -27,7 +27,7 @@ struct fl_view {
     struct fl_connection *connection;
     uint32_t scene, channel;
     uint64_t credit;     /* frames that the daemon may have sent by now */
-    uint32_t next_frame; /* the least number that the next one may have */
+    uint32_t next_frame; /* the minimum number of the next one */
     uint32_t last_frame; /* the last one that came whole .. */
     bool has_frame;      /* .. if there is one */
     bool owes_ack;       /* of that frame, and .. */
@@ -37,7 +37,7 @@ struct fl_view {
     uint64_t changes;
     uint64_t last_command;
     uint64_t command_sent_ns[COMMANDS_REMEMBERED]; /* by number, modulo */
-    struct fl_error failure; /* why a render was refused; told once while an older one goes on */
+    struct fl_error failure; /* why a render was refused; reported once while an older one continues */
     struct fl_assembly assembly;
     uint32_t assembled_request;
     struct fl_frame_queue done; /* that nobody has asked for yet */
@@ -189,12 +189,12 @@ bool fl_view_want_key_frame(struct fl_view *view, struct fl_error *error)
 
 /* ---- coming in ---- */
 
-/* At once, before the frame is decoded: the daemon measures the link with it, not us. */
+/* At once, before the frame is decoded: the daemon measures the link with it, not our decoder. */
 static bool acknowledge(struct fl_view *view, uint32_t frame, bool whole, struct fl_error *error)
 {
     struct message message;
     fill_ack(&message, view, frame, whole);
-    /* Beside an upload there may be none. A later one of the first kind would tell nothing. */
+    /* Not during an upload. A later acknowledgement of the first kind would say nothing. */
     const bool has_room = fl_stream_has_room(&view->connection->stream);
     view->owes_ack = whole ? !has_room : view->owes_ack;
     if (!has_room)
@@ -203,7 +203,7 @@ static bool acknowledge(struct fl_view *view, uint32_t frame, bool whole, struct
            fl_stream_write(&view->connection->stream, error);
 }
 
-/* What found no room before: the daemon may send nothing until it comes. */
+/* Sends acknowledgements that did not fit before: the daemon may wait for them. */
 static bool send_owed(struct fl_view *view, struct fl_error *error)
 {
     struct fl_error ignored;
@@ -250,7 +250,7 @@ static bool take_end(struct fl_view *view, uint64_t change, const struct message
     return fl_frame_queue_push(&view->done, frame, error);
 }
 
-/* The one answer to a render: ok where a newer one took its place. */
+/* The only answer to a render: ok if a newer one replaced it. */
 static bool conclude(struct fl_view *view, size_t index, const struct message *message, struct fl_error *error)
 {
     const bool is_newest = index + 1 == view->asked_count;
@@ -305,7 +305,7 @@ int fl_view_take(struct fl_view *view, const struct framing_header *header, cons
         return 0;
     if (take(view, index, message, &why))
         return 1;
-    /* Without memory for a frame nothing that follows can be told apart from what is broken. */
+    /* Without memory for a frame, its remaining messages would look like a broken protocol. */
     fl_assembly_finish(&view->assembly);
     *error = why;
     return -1;
@@ -332,14 +332,14 @@ struct fl_frame *fl_view_next(struct fl_view *view, unsigned timeout_ms, struct 
     }
     struct fl_frame *frame = fl_frame_queue_pop(&view->done);
     frame->wait_ns = monotonic_now_ns() - begin_ns;
-    /* That the connection is lost is told by the next call. */
+    /* The next call reports a lost connection. */
     struct fl_error ignored;
     view->credit++;
     view->owes_credit = !tell_credit(view, &ignored);
     return frame;
 }
 
-/* The answer is not waited for: what comes until then is dropped. */
+/* Does not wait for the answer: messages until then are dropped. */
 void fl_view_destroy(struct fl_view *view)
 {
     if (!view)

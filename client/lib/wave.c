@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Figures of compared waves. What a daemon says need not add up; nothing here depends on it. */
+/* Figures of compared waves. A daemon's numbers may be inconsistent; nothing here depends on them. */
 #include "lib/farlight.h"
 
 static double larger(double a, double b)

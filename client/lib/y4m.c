@@ -23,7 +23,7 @@ struct fl_y4m {
     struct ycbcr_converter converter;
     uint8_t *frame; /* its line and its planes; NULL: before the first */
     size_t frame_bytes;
-    bool broken;       /* ends within a frame: nothing more makes sense */
+    bool broken;       /* ends within a frame: nothing may follow */
     bool never_blocks; /* an ordinary file */
 };
 
@@ -46,7 +46,7 @@ struct fl_y4m *fl_y4m_begin(const struct fl_y4m_options *options, struct fl_erro
 
 /* ---- bytes ---- */
 
-/* As write(), but nobody gets SIGPIPE: the signal is the thread's own (POSIX), so it can be held back and taken.
+/* As write(), without SIGPIPE: the signal is sent to the thread (POSIX), so it can be blocked and consumed.
  */
 static ssize_t write_quietly(int fd, const uint8_t *bytes, size_t count)
 {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* How far two image files are apart: figures, and a picture of the errors. C++ behind C. */
+/* The difference of two image files: figures, and a picture of the errors. C++ behind C. */
 #ifndef FARLIGHT_CLIENT_OUTPUT_COMPARE_H
 #define FARLIGHT_CLIENT_OUTPUT_COMPARE_H
 
@@ -16,7 +16,7 @@ struct compare_file {
     char reason[160];
 };
 
-/* What the answer's string points to, and why there is none. */
+/* The storage of the answer's string, and the reason of a failure. */
 struct compare_result {
     struct message_images_compared answer;
     char channel_names[256];
@@ -27,7 +27,7 @@ struct compare_result {
 
 /* Where fonts are, for titles; nothing else has to be read after the sandbox is entered. */
 extern const char *const compare_font_folder;
-/* Loads what the libraries load late, while that is still allowed. */
+/* Makes the libraries load their plug-ins while that is still allowed. */
 void compare_prepare(void);
 /* Reads the files, writes the picture that is wanted. False: `field` and `reason` are set, and there is no
  * picture. */

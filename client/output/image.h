@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Pixels and what is known about them to the bytes of an image file, in memory. The one place that knows
- * OpenImageIO; C++ behind C. */
+/* From pixels and their metadata to the bytes of an image file, in memory. The only place that uses OpenImageIO;
+ * C++ behind C. */
 #ifndef FARLIGHT_CLIENT_OUTPUT_IMAGE_H
 #define FARLIGHT_CLIENT_OUTPUT_IMAGE_H
 
@@ -26,7 +26,7 @@ struct image {
     const uint8_t *pixels;
 };
 
-/* Loads what the libraries load late, while that is still allowed. False: a format is missing; its name is in
+/* Makes the libraries load their plug-ins while that is still allowed. False: a format is missing; its name is in
  * `reason`. */
 bool image_prepare(char *reason, size_t reason_bytes);
 /* *file is malloc'ed. False: `reason` says why. */

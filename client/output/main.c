@@ -64,7 +64,7 @@ static error_t parse(int key, char *value, struct argp_state *state)
     }
 }
 
-/* What is wrong with a file is said when somebody asks for it. */
+/* An error of a file is reported by the request that needs it. */
 static void open_files(struct options *options)
 {
     for (size_t i = 0; i < options->serve.file_count; i++) {

@@ -12,14 +12,14 @@
 
 #define TEXT_MAX 512
 
-/* What has come of the file that is being received. */
+/* The state of the picture that is being received. */
 struct request {
     uint32_t number;
     char path[4097], format[17], model[4097];
     bool half, named;
     unsigned quality;
     struct incoming incoming;
-    char reason[TEXT_MAX]; /* why nothing will come of it; empty: nothing yet */
+    char reason[TEXT_MAX]; /* why it fails; empty: it has not failed */
 };
 
 struct exporter {

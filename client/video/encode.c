@@ -16,10 +16,10 @@
 #include <string.h>
 
 #define THREADS_MAX 16
-/* There is nothing to gain from dividing smaller pictures, and libavcodec 59 stores those of one or two rows or
- * columns wrongly in version 3 of FFV1. */
+/* Slices gain nothing in smaller pictures, and libavcodec 59 stores those of one or two rows or columns wrongly in
+ * version 3 of FFV1. */
 #define FFV1_SLICED_EDGE_MIN 64
-#define KEY_FRAME_SECONDS 2 /* how far a player has to go back to begin anywhere */
+#define KEY_FRAME_SECONDS 2 /* distance of key frames: the maximum that a player must go back to seek */
 
 struct video_encoder {
     const struct video_plan *plan;
@@ -35,7 +35,7 @@ struct video_encoder {
 
 /* ---- beginning ---- */
 
-/* Pictures are what a screen shows: sRGB's curve over BT.709's primaries, and the video says so. */
+/* Pictures are display values: sRGB's curve over BT.709's primaries, and the video says so. */
 static void describe_pictures(AVCodecContext *codec, const struct video_plan *plan,
                               const struct video_source *source)
 {
@@ -67,12 +67,12 @@ static void set_quality(AVCodecContext *codec, const struct video_plan *plan, AV
         codec->level = 1;
     } else {
         codec->level = 3;  /* version 3: slices with checksums (RFC 9043) */
-        codec->slices = 4; /* whatever the machine has, so that the file is the same */
+        codec->slices = 4; /* fixed, so that the file does not depend on the machine */
         av_dict_set_int(options, "slicecrc", 1, 0);
     }
 }
 
-/* x264 does not say why it fails; where it was this thread that got no memory, errno does (0 before the call). */
+/* x264 does not say why it fails; if this thread was out of memory, errno does (0 before the call). */
 static bool fail_codec(const struct video_encoder *encoder, int number, struct video_failure *failure)
 {
     const bool no_memory = number == AVERROR(ENOMEM) || (number == AVERROR_EXTERNAL && errno == ENOMEM);
@@ -125,7 +125,7 @@ static bool open_picture(struct video_encoder *encoder, struct video_failure *fa
     return result >= 0 || video_fail_library(failure, "", "a picture", result);
 }
 
-/* What the disk refuses goes before what the library makes of it. */
+/* The disk's error has precedence over the library's. */
 static bool fail_file(const struct video_encoder *encoder, int number, struct video_failure *failure)
 {
     if (encoder->sink.failure == 0)
@@ -208,7 +208,7 @@ static void fill_ycbcr(struct video_encoder *encoder, const uint8_t *pixels)
     ycbcr_convert(&encoder->converter, pixels, &planes);
 }
 
-/* Writes what the encoder has ready; with `picture` NULL all of it. */
+/* Writes the encoder's finished packets; with `picture` NULL all of them. */
 static bool encode(struct video_encoder *encoder, const AVFrame *picture, struct video_failure *failure)
 {
     errno = 0;

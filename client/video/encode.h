@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Frames to the bytes of a video file. The one place that knows libavcodec and libavformat. */
+/* From frames to the bytes of a video file. The only place that uses libavcodec and libavformat. */
 #ifndef FARLIGHT_CLIENT_VIDEO_ENCODE_H
 #define FARLIGHT_CLIENT_VIDEO_ENCODE_H
 
@@ -23,7 +23,7 @@ struct video_plan {
     unsigned quality;      /* 1..51; lossless: without meaning */
     uint32_t rate_numerator, rate_denominator;
 };
-/* Chooses container and encoder. False: what is asked for cannot be had. */
+/* Chooses container and encoder. False: the request cannot be met. */
 bool video_plan(struct video_plan *plan, const struct message_video_begin *wanted, struct video_failure *failure);
 /* Whether the encoder's format has pictures of this size. */
 bool video_plan_allows(const struct video_plan *plan, uint32_t width, uint32_t height,
@@ -47,7 +47,7 @@ bool video_encoder_finish(struct video_encoder *encoder, struct video_failure *f
 void video_encoder_size(const struct video_encoder *encoder, uint32_t *width, uint32_t *height);
 void video_encoder_destroy(struct video_encoder *encoder);
 
-/* From now on what the libraries have to say is kept for failures' texts instead of being printed. */
+/* From now on the libraries' log goes into error texts instead of being printed. */
 void video_keep_log(void);
 
 #endif

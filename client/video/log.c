@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Texts of failures, with what the libraries said last. */
+/* Error texts, with the libraries' last log line. */
 #include "log.h"
 
 #include <libavutil/error.h>

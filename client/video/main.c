@@ -77,7 +77,7 @@ int main(int argc, char **argv)
     argp_err_exit_status = EXIT_USAGE;
     if (argp_parse(&argp, argc, argv, 0, NULL, &options) != 0)
         return EXIT_USAGE;
-    /* A limit on file sizes is an error of write(), not the end. */
+    /* A limit on file sizes makes write() fail instead of ending the process. */
     signal(SIGXFSZ, SIG_IGN);
     file_clean_up_on_end();
     video_keep_log();

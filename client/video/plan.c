@@ -12,7 +12,7 @@
 /* H.264 (ITU-T H.264, table A-1): level 6.2 allows 139,264 macroblocks of 16x16. */
 #define H264_MACROBLOCKS_MAX 139264u
 
-/* In order of preference. No other encoder of the library's is ever used: some open devices. */
+/* In order of preference. No other encoder of the library is ever used: some open devices. */
 static const struct choice {
     const char *codec;   /* as people ask for it */
     const char *encoder; /* as the library calls it */

@@ -11,7 +11,7 @@
 enum state {
     STATE_IDLE,   /* no video */
     STATE_OPEN,   /* frames come */
-    STATE_FAILED, /* frames come and are dropped: the request has its answer */
+    STATE_FAILED, /* further frames are dropped: the request has its answer */
 };
 
 struct session {
@@ -39,7 +39,7 @@ static void drop_video(struct session *session)
     session->fd = -1;
 }
 
-/* Nothing is left of the video but its answer. */
+/* Removes the video and sends its answer. */
 static bool fail(struct session *session, const struct video_failure *failure)
 {
     drop_video(session);
@@ -104,7 +104,7 @@ static bool begin_frame(struct session *session, const struct message_frame_begi
         return true;
     if (!fail(session, &failure))
         return false;
-    /* What follows of this frame is still counted. */
+    /* The rest of this frame is still counted. */
     return incoming_begin(&session->incoming, begin, false);
 }
 

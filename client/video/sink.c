@@ -8,7 +8,7 @@
 
 #define BUFFER_BYTES 65536
 
-/* A place in the file: the writer's, or that of the reader that moves an index to the front. */
+/* A position in the file: the writer's, or that of the reader that moves an index to the front. */
 struct place {
     struct video_sink *sink;
     int64_t at;
@@ -90,7 +90,7 @@ static int close_place(AVFormatContext *format, AVIOContext *io)
     return 0;
 }
 
-/* The muxer reads what it has written, to make room for the index before it. */
+/* The muxer reads its own output to insert the index before it. */
 static int open_again(AVFormatContext *format, AVIOContext **io, const char *url, int flags,
                       AVDictionary **options)
 {

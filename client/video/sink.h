@@ -16,7 +16,7 @@ struct video_sink {
 
 /* Makes *format write to the sink, which must outlive it. False: no memory. */
 bool video_sink_attach(struct video_sink *sink, struct AVFormatContext *format);
-/* Takes it away again, before the format is freed. */
+/* Detaches it again, before the format is freed. */
 void video_sink_detach(struct AVFormatContext *format);
 
 #endif

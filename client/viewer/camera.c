@@ -28,7 +28,7 @@ static double unit(double vector[3])
     return length;
 }
 
-/* About a unit axis, counter-clockwise (Rodrigues). */
+/* Rotates about a unit axis, counter-clockwise (Rodrigues). */
 static void rotate(double vector[3], const double axis[3], double angle)
 {
     double side[3];
@@ -186,7 +186,7 @@ void camera_between(const struct viewer_camera *from, const struct viewer_camera
             made.up[i] = mix(from->up[i], to->up[i], eased);
         }
         made.fov_y = mix(from->fov_y, to->fov_y, eased);
-        /* Half way between opposites there is nothing to look at: the end is shown. */
+        /* Half way between opposite views the direction is undefined: the end is shown. */
         if (unit(made.up) < 1e-3 || camera_distance(&made) < 1e-3 * camera_distance(to))
             made = *to;
     }

@@ -23,12 +23,12 @@ struct decoder *decoder_create(struct fl_error *error)
         free(decoder);
         return NULL;
     }
-    av_log_set_level(AV_LOG_QUIET); /* what a frame lacks is told by the next key frame */
+    av_log_set_level(AV_LOG_QUIET); /* errors of a frame end with the next key frame */
     decoder->context = avcodec_alloc_context3(codec);
     decoder->packet = av_packet_alloc();
     decoder->frame = av_frame_alloc();
     if (decoder->context && decoder->packet && decoder->frame) {
-        /* A frame comes out as soon as it is in: threads of whole frames would keep some back. */
+        /* A frame comes out as soon as it is in: threads per frame would delay some. */
         decoder->context->flags |= AV_CODEC_FLAG_LOW_DELAY;
         decoder->context->thread_type = FF_THREAD_SLICE;
         decoder->context->err_recognition = AV_EF_EXPLODE;
@@ -59,7 +59,7 @@ static bool to_pixels(struct decoder *decoder, struct pixmap *picture, struct fl
     return true;
 }
 
-/* The colours of an H.264 stream come in pairs: an odd edge may be one longer. */
+/* The chroma of an H.264 stream is subsampled by 2: an odd edge may be one longer. */
 static bool is_of_size(const AVFrame *decoded, const struct fl_frame *frame)
 {
     return (uint32_t)decoded->width - frame->width <= 1 && (uint32_t)decoded->height - frame->height <= 1;

@@ -4,7 +4,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-/* Places of the map "inferno" (van der Walt, Smith. 2015), evenly spaced. */
+/* Entries of the map "inferno" (van der Walt, Smith. 2015), evenly spaced. */
 static const uint8_t places[][3] = {{0, 0, 4},     {31, 12, 72},   {85, 15, 109},  {136, 34, 106}, {186, 54, 85},
                                     {227, 89, 51}, {249, 140, 10}, {249, 201, 50}, {252, 255, 164}};
 #define PLACE_COUNT (sizeof(places) / sizeof(places[0]))

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
-/* The errors of a picture as colours, and figures of them. */
+/* The errors of a picture as colours, and their figures. */
 #ifndef FARLIGHT_CLIENT_VIEWER_HEAT_H
 #define FARLIGHT_CLIENT_VIEWER_HEAT_H
 
 #include <stddef.h>
 #include <stdint.h>
 
-/* An error is the difference of what a screen shows, 0 to 1, of a pixel's channels the greatest. */
+/* An error is the difference of display values, 0 to 1, the maximum of a pixel's channels. */
 struct heat_figures {
     double mean, greatest; /* over pixels */
     double beyond;         /* share of the pixels with more than HEAT_BEYOND */

@@ -75,7 +75,7 @@ static bool drag(struct controls *controls, const struct input *input, double he
     else if (controls->dragging[INPUT_RIGHT])
         camera_turn(camera, right * TURN_RADIANS_PER_HEIGHT, -down * TURN_RADIANS_PER_HEIGHT);
     else if (controls->dragging[INPUT_LEFT])
-        /* What is dragged follows the pointer: the eye goes the other way. */
+        /* The dragged scene follows the pointer: the eye moves the other way. */
         camera_orbit(camera, right * ORBIT_RADIANS_PER_HEIGHT, -down * ORBIT_RADIANS_PER_HEIGHT);
     else
         return false;

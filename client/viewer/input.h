@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What people do with mouse and keyboard, and what it means. Knows no window: a real one and a replay both make
- * these. */
+/* Events of mouse and keyboard, and their meaning. Independent of the window: a real one and a replay both create
+ * them. */
 #ifndef FARLIGHT_CLIENT_VIEWER_INPUT_H
 #define FARLIGHT_CLIENT_VIEWER_INPUT_H
 
@@ -31,7 +31,7 @@ struct input {
     char key[16];      /* as the key is labelled, in small letters: "a", "f1", "space", "[" */
     bool shift;        /* held */
     int width, height; /* of a window of another size, pixels */
-    double scale;      /* pixels of the window in one of the desktop's, for text */
+    double scale;      /* pixels of the window per pixel of the desktop, for text */
 };
 
 /* What a key does at once. */
@@ -93,10 +93,10 @@ struct controls {
     bool held[FLY_COUNT], fast;
 };
 
-/* True: the camera was moved by it. `height` of the window, pixels. */
+/* True: it moved the camera. `height` of the window, pixels. */
 bool controls_input(struct controls *controls, const struct input *input, double height,
                     struct viewer_camera *camera);
-/* True: keys that are held moved it during the last `seconds`. */
+/* True: held keys moved it during the last `seconds`. */
 bool controls_fly(struct controls *controls, double seconds, struct viewer_camera *camera);
 
 #endif

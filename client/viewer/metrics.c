@@ -32,7 +32,7 @@ static enum lane lane_of(enum protocol_stage stage)
     }
 }
 
-/* The daemon counts from when the frame was taken up; that ended when it was read back. */
+/* The daemon counts from the frame's begin, which was before its readback. */
 static void add_stages(struct metrics_frame *made, const struct fl_frame *frame)
 {
     uint64_t whole_ns = 0;

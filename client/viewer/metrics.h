@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What the last frames cost and how late they came. Monotonic nanoseconds of this process, but where the daemon's
- * clock is named. No window, no daemon. */
+/* Costs and latencies of the last frames. Monotonic nanoseconds of this process, unless the daemon's clock is
+ * named. Independent of window and daemon. */
 #ifndef FARLIGHT_CLIENT_VIEWER_METRICS_H
 #define FARLIGHT_CLIENT_VIEWER_METRICS_H
 
@@ -8,9 +8,9 @@
 
 #define METRICS_FRAMES 128u
 
-/* Rows of the timeline, in the order of the way of the data. */
+/* Rows of the timeline, in the order of the data's path. */
 enum lane {
-    LANE_INPUT, /* the camera's way to the daemon, and until it is taken up */
+    LANE_INPUT, /* the camera's way to the daemon, and its wait there */
     LANE_SCENE, /* apply, build, upload */
     LANE_PRIMARY,
     LANE_TRACE,
@@ -24,8 +24,8 @@ enum lane {
 };
 extern const char *const lane_names[LANE_COUNT];
 
-/* Of one lane: begins with the first of its work and is as long as all of it, which may have been done in pieces
- * between others. No end: nothing was done. */
+/* The time of one lane: from the begin of its first work, as long as all of it, even if it was interleaved with
+ * others. No end: no work was done. */
 struct span {
     int64_t begin_ns, end_ns; /* before LANE_RECEIVE: of the daemon's clock */
 };
@@ -49,12 +49,12 @@ struct metrics {
 
 /* A frame that came and was decoded at `decoded_ns`; it counts as shown until metrics_show() says when it was. */
 void metrics_add(struct metrics *metrics, const struct fl_frame *frame, uint64_t decoded_ns);
-/* What came since it was called last was shown now. */
+/* Marks the frames since the last call as shown now. */
 void metrics_show(struct metrics *metrics, uint64_t shown_ns);
-/* The frame of so many before the last; NULL: not that many are remembered. */
+/* The frame with this number of frames after it; NULL: it is not remembered. */
 const struct metrics_frame *metrics_frame(const struct metrics *metrics, size_t back);
-/* What is added to the daemon's clock to get ours: as a camera cannot come before it was sent, nor a frame before
- * it was rendered, the middle between the two. */
+/* The offset from the daemon's clock to ours: as a camera cannot arrive before it was sent, nor a frame before it
+ * was rendered, the middle between the two bounds. */
 int64_t metrics_clock_offset_ns(const struct metrics *metrics);
 
 /* A lane of a frame in our clock, with that offset; false: it is empty. */
@@ -63,7 +63,7 @@ bool metrics_span(const struct metrics_frame *frame, enum lane lane, int64_t off
 struct metrics_summary {
     double frames_per_second, bits_per_second; /* over the last second */
     bool has_latency;
-    double latency_s; /* from camera to picture, median of the last second's; else the last one */
+    double latency_s; /* from camera to picture, median of the last second; else the last one */
 };
 void metrics_summarise(const struct metrics *metrics, uint64_t now_ns, struct metrics_summary *summary);
 

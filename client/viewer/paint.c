@@ -11,7 +11,7 @@
 #define FONTS_KEPT 8u
 #define BASELINE 0.77 /* from the top of a line, share of its height */
 
-/* A text as it was drawn once: most of them are the same in the next picture. */
+/* A drawn text: most texts are the same in the next picture. */
 struct drawn_text {
     char text[HUD_TEXT_MAX];
     TTF_Font *font;

@@ -26,7 +26,7 @@ static bool refuse(struct reader *reader, const char *key, const char *what)
                         fl_json_line(&reader->json, place), name, what);
 }
 
-/* *value stays where the event does not have the key. */
+/* *value stays if the event lacks the key. */
 static bool read_number(struct reader *reader, const json_t *event, const char *key, double least, double greatest,
                         double *value)
 {

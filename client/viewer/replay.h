@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A list of timed events in JSON, in place of a person. Knows no window. */
+/* A list of timed events in JSON, in place of a user. Independent of the window. */
 #ifndef FARLIGHT_CLIENT_VIEWER_REPLAY_H
 #define FARLIGHT_CLIENT_VIEWER_REPLAY_H
 
@@ -7,9 +7,10 @@
 
 enum replay_kind {
     REPLAY_INPUT,
-    REPLAY_REST, /* wait until the picture rests, with all samples or `samples` of them, or the map is there */
-    REPLAY_LIVE, /* wait until the scene is there */
-    REPLAY_LOST, /* wait until the connection is lost */
+    REPLAY_REST,       /* wait until the picture is at rest, with all samples or `samples` of them, or the map has
+                          arrived */
+    REPLAY_LIVE,       /* wait until the scene is there */
+    REPLAY_LOST,       /* wait until the connection is lost */
     REPLAY_SCREENSHOT, /* into `path` */
     REPLAY_STATE       /* one line of JSON on standard output */
 };
@@ -35,7 +36,8 @@ struct replay {
  *    {"wheel": 2}, {"key": "t", "shift": true}, {"key": "w", "hold": 0.5},
  *    {"resize": [640, 360]}, {"wait": "rest", "samples": 8, "timeout": 60}, {"wait": "live"}, {"wait": "lost"},
  *    {"screenshot": "a.png"}, {"state": "name"}]
- * "after" is in seconds since the event before was done, default 0. Errors name the file, the line and the event.
+ * "after" is in seconds since the previous event was finished, default 0. Errors name the file, the line and the
+ * event.
  */
 bool replay_load(struct replay *replay, const char *path, struct fl_error *error);
 void replay_finish(struct replay *replay);

@@ -61,7 +61,7 @@ static void on_note(void *user, const struct fl_note *note)
         session->options.note(session->options.user, note);
 }
 
-/* A daemon that was there all the time still has the scene; another one is given it again. */
+/* A daemon that kept running still has the scene; a new one gets it again. */
 static struct fl_scene *come_to_scene(struct session *session, struct fl_error *error)
 {
     const struct session_options *options = &session->options;
@@ -189,7 +189,7 @@ struct session *session_create(const struct session_options *options, struct fl_
     return NULL;
 }
 
-/* Without waiting for a daemon that does not answer: the interruption descriptor is readable by then. */
+/* Does not wait for a daemon that does not answer: the interruption descriptor is already readable. */
 void session_destroy(struct session *session)
 {
     if (!session)
@@ -244,7 +244,7 @@ bool session_can_h264(const struct session *session)
     return fl_connection_can_h264(session->connection);
 }
 
-/* What another try on another connection may mend: all but what this request was refused for. */
+/* Whether a retry on another connection may help: always, unless this request was refused. */
 static bool is_lost(const struct fl_error *error)
 {
     if (error->code == FL_ERROR_REFUSED)
@@ -253,7 +253,7 @@ static bool is_lost(const struct fl_error *error)
     return error->code != FL_ERROR_NONE && error->code != FL_ERROR_ARGUMENT && error->code != FL_ERROR_INTERRUPTED;
 }
 
-/* Notes a loss for the next step; what else went wrong goes to *refusal. */
+/* Records a lost connection for the next step; other errors go to *refusal. */
 static bool fail(struct session *session, const struct fl_error *error, struct fl_error *refusal)
 {
     if (is_lost(error))

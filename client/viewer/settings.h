@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* How the picture is made, as keys change it. Knows no window and no daemon. */
+/* The settings of the picture that keys change. Independent of window and daemon. */
 #ifndef FARLIGHT_CLIENT_VIEWER_SETTINGS_H
 #define FARLIGHT_CLIENT_VIEWER_SETTINGS_H
 

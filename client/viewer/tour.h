@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Through a scene's cameras and clips: which one, and what time it is. Knows no daemon. */
+/* A tour of a scene's cameras and clips: the current one, and the time. Independent of the daemon. */
 #ifndef FARLIGHT_CLIENT_VIEWER_TOUR_H
 #define FARLIGHT_CLIENT_VIEWER_TOUR_H
 
@@ -19,15 +19,15 @@ struct tour {
 };
 
 void tour_begin(struct tour *tour, size_t camera_count, size_t clip_count);
-/* `step` cameras on or back, round and round; TOUR_NONE: there is none. */
+/* `step` cameras forwards or back, cyclic; TOUR_NONE: there is none. */
 int tour_camera(struct tour *tour, int step);
-/* `step` clips on or back; between the last and the first there is none. Begins to play. */
+/* `step` clips forwards or back; between the last and the first no clip is chosen. Starts playing. */
 int tour_clip(struct tour *tour, int step);
 /* Of the clip that was chosen. */
 void tour_set_duration(struct tour *tour, double duration_s);
 void tour_play(struct tour *tour); /* or pauses */
 void tour_change_speed(struct tour *tour, int doublings);
-bool tour_seek(struct tour *tour, double seconds);    /* on or back, and pauses; true: the time is another */
+bool tour_seek(struct tour *tour, double seconds); /* forwards or back, and pauses; true: the time has changed */
 bool tour_advance(struct tour *tour, double seconds); /* true: the time is another */
 
 #endif

@@ -14,7 +14,7 @@
 
 #define NOTICE_NS 4000000000ull
 #define GLIDE_NS 350000000ull
-#define BUSY_WAIT_MS 2u /* while somebody is at it; frames end the wait, input does not */
+#define BUSY_WAIT_MS 2u /* while the user is active; frames end the wait, input does not */
 #define IDLE_WAIT_MS 8u
 #define BUSY_NS 1000000000ull
 #define REDRAW_NS 250000000ull /* figures go on while no frame comes */
@@ -100,7 +100,7 @@ static void take_input(struct viewer *viewer, uint64_t now_ns)
 {
     struct input input;
     while (viewer->window && window_poll(viewer->window, &input))
-        /* A replay is not disturbed but by the end. */
+        /* During a replay all input but the window's closing is ignored. */
         if (!viewer->options->replay || input.kind == INPUT_QUIT || input.kind == INPUT_RESIZE)
             viewer_input(viewer, &input);
     if (viewer->options->replay)
@@ -180,8 +180,8 @@ static bool open_viewer(struct viewer *viewer, struct fl_error *error)
             return false;
         window_size(viewer->window, &viewer->width, &viewer->height, &viewer->scale);
     }
-    /* Not before the window is there: SDL starts programs of the desktop's, whose pipes must not come into the
-     * hands of a daemon that is started meanwhile. */
+    /* Only after the window is open: SDL starts programs of the desktop, whose pipes a daemon that is started
+     * meanwhile must not inherit. */
     viewer->session = session_create(&session, error);
     return viewer->session != NULL;
 }
@@ -189,7 +189,7 @@ static bool open_viewer(struct viewer *viewer, struct fl_error *error)
 static void close_viewer(struct viewer *viewer)
 {
     const uint64_t one = 1;
-    /* Whoever still opens a connection in the other thread gives up. */
+    /* A connection that the other thread is still opening is abandoned. */
     if (write(viewer->options->interrupt_fd, &one, sizeof(one)) < 0)
         errno = 0; /* it is readable already */
     window_destroy(viewer->window);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The viewer: what comes in (people or a replay, frames, losses) and what is shown, in one loop for a window and
- * for none. */
+/* The viewer: one loop over input (user or replay), frames and losses of the connection, with or without a window.
+ * */
 #ifndef FARLIGHT_CLIENT_VIEWER_VIEWER_H
 #define FARLIGHT_CLIENT_VIEWER_VIEWER_H
 
@@ -8,7 +8,7 @@
 
 struct viewer_options {
     const char *server, *key_file, *model, *environment, *scene_name; /* as of session_options */
-    /* As of the command line; width and height are the window's, as of the desktop. */
+    /* From the command line; width and height are the window's, in pixels of the desktop. */
     struct message_render view;
     bool has_encoding, has_still_encoding, has_primary, has_integrator;
     bool always_adapt, never_adapt;
@@ -23,7 +23,7 @@ struct viewer_options {
     void (*note)(void *user, const struct fl_note *note);
 };
 
-/* Until the window is closed, the replay has ended, or something cannot be mended. */
+/* Runs until the window is closed, the replay has ended, or an error is final. */
 bool viewer_run(const struct viewer_options *options, struct fl_error *error);
 
 #endif

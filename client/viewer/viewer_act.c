@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What comes in, from a person or a replay, and what it does. */
+/* Handles events of the user or a replay. */
 #include "viewer/viewer_state.h"
 #include "protocol/common/clock.h"
 
@@ -217,7 +217,7 @@ void viewer_replay(struct viewer *viewer, uint64_t now_ns)
         }
         do_event(viewer, event);
         viewer->replay_next++;
-        /* What took long, such as a screenshot, is not made up for. */
+        /* Time lost in a long operation, such as a screenshot, is not made up for. */
         viewer->replay_ns = event->kind == REPLAY_INPUT ? due_ns : monotonic_now_ns();
     }
     if (viewer->replay_next == viewer->replay.count)

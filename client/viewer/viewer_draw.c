@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What the viewer tells of itself: picture and overlay, screenshots, its state as JSON. */
+/* The viewer's outputs: picture and overlay, screenshots, its state as JSON. */
 #include "viewer/paint.h"
 #include "viewer/snapshot.h"
 #include "viewer/viewer_state.h"

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Jobs beside the view: where cameras are, what is under the pointer, what the reference says. */
+/* Jobs beside the view: the scene's cameras, the point under the pointer, the comparison with the reference. */
 #include "viewer/viewer_state.h"
 #include "protocol/common/clock.h"
 
@@ -37,7 +37,7 @@ void viewer_go(struct viewer *viewer, const struct viewer_camera *camera, uint32
 
 /* ---- asking ---- */
 
-/* One ray through the middle of one pixel, which tells where it ends. */
+/* One ray through the centre of one pixel, which returns its hit point. */
 static void fill_probe(const struct viewer *viewer, struct message_render *job)
 {
     *job = viewer->view;
@@ -163,7 +163,7 @@ static bool met(const struct fl_frame *frame, double place[3])
     return values[3] > 0;
 }
 
-/* Where there is nothing in the middle of the picture, the middle of the scene is as far away as anything. */
+/* If nothing is at the picture's centre, the scene's centre gives the distance. */
 static double distance_from(const struct viewer *viewer, const struct fl_frame *frame)
 {
     double place[3], square = 0;
@@ -270,7 +270,7 @@ static enum errand next_errand(struct viewer *viewer)
 void viewer_errands(struct viewer *viewer)
 {
     struct fl_error refusal = {0};
-    /* An answer for another picture is worth nothing. */
+    /* An answer for another picture is discarded. */
     if (!viewer->settings.error_map || !is_compared(viewer)) {
         viewer->must_draw = viewer->must_draw || viewer->has_heat;
         viewer->has_heat = viewer->heat_refused = false;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The view: what the daemon is told of it, and the frames that come. */
+/* The view: its settings as sent to the daemon, and its frames. */
 #include "viewer/viewer_state.h"
 #include "protocol/common/clock.h"
 
@@ -11,7 +11,7 @@
 #define EDGE_LEAST 16u
 #define FRAMES_AT_ONCE 4u /* then people have their turn */
 
-/* Even edges: the colours of a video come in pairs. */
+/* Even edges: the chroma of a video is subsampled by 2. */
 void viewer_render_size(const struct viewer *viewer, uint32_t *width, uint32_t *height)
 {
     const uint32_t divisor = 1u << viewer->settings.coarser;
@@ -50,7 +50,7 @@ static void show(struct viewer *viewer)
     view.settings = settings->tracers;
     view.tone_map = settings->tone_map;
     view.exposure_stops += (float)settings->exposure_thirds / 3;
-    /* Else most of the "truth" would be the rasteriser's. */
+    /* Else most of the reference would be the rasteriser's. */
     if (!viewer->options->has_primary && settings->tracer == PROTOCOL_TRACER_REFERENCE)
         view.primary = PROTOCOL_PRIMARY_TRACE;
     if (clip && clip->clip != 0) {
@@ -135,7 +135,7 @@ static void take(struct viewer *viewer, struct fl_frame *frame)
     viewer->must_draw = true;
 }
 
-/* A change that the daemon does not carry out is taken back. */
+/* A change that the daemon refuses is reverted. */
 static void refuse(struct viewer *viewer, const struct fl_error *refusal)
 {
     if (viewer->frames == 0) {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Inside of the viewer: what its files share. */
+/* Internals of the viewer, shared by its files. */
 #ifndef FARLIGHT_CLIENT_VIEWER_VIEWER_STATE_H
 #define FARLIGHT_CLIENT_VIEWER_VIEWER_STATE_H
 
@@ -13,7 +13,7 @@
 /* What a job beside the view is asked for. */
 enum errand {
     ERRAND_NONE,
-    ERRAND_HOME,     /* where the command line, the model or the whole scene put the camera */
+    ERRAND_HOME,     /* the initial camera, from the command line, the model or the scene's extent */
     ERRAND_CAMERA,   /* where a camera of the scene is */
     ERRAND_FOCUS,    /* what is under the pointer */
     ERRAND_REFERENCE /* the resting picture, by the reference */
@@ -21,7 +21,7 @@ enum errand {
 
 struct viewer {
     const struct viewer_options *options;
-    struct message_render view; /* of the options, with what only the scene could tell */
+    struct message_render view; /* from the options, completed by the scene */
     struct session *session;
     unsigned times_live;   /* of the session, as of when its view was started */
     struct window *window; /* NULL: headless */
@@ -36,7 +36,7 @@ struct viewer {
 
     struct viewer_camera camera, home;
     bool has_camera, has_home;
-    uint32_t followed; /* node of the camera that was gone to and not left since, for clips to move; 0: none */
+    uint32_t followed; /* node of the camera that the view follows, for clips to move; 0: none */
     struct viewer_camera glide_from, glide_to; /* from .. to, since then; 0: it does not glide */
     uint64_t glide_begin_ns;
 
@@ -79,11 +79,11 @@ struct viewer {
 
 __attribute__((format(printf, 2, 3))) void viewer_say(struct viewer *viewer, const char *format, ...);
 
-/* ---- viewer_show.c: what the daemon is asked for ---- */
+/* ---- viewer_show.c ---- */
 
 void viewer_tell(struct viewer *viewer, uint64_t now_ns); /* of the view and the camera, where they changed */
 void viewer_receive(struct viewer *viewer, unsigned timeout_ms);
-/* The frame shows what was asked for last, and more than `samples` do not come (0: all). */
+/* The frame shows the last request, and will not get more than `samples` samples (0: all). */
 bool viewer_is_at_rest(const struct viewer *viewer, unsigned samples);
 /* The pixels that the daemon renders for the window. */
 void viewer_render_size(const struct viewer *viewer, uint32_t *width, uint32_t *height);
@@ -92,12 +92,12 @@ void viewer_render_size(const struct viewer *viewer, uint32_t *width, uint32_t *
 
 void viewer_errands(struct viewer *viewer);
 void viewer_drop_errands(struct viewer *viewer); /* of a connection that is gone */
-/* Goes there; gently, but for a replay. `node`: of the scene's camera that is there, which is followed from then
- * on while a clip is chosen; 0: none. */
+/* Moves there; gliding, unless in a replay. `node`: the scene's camera there, which the view then follows while a
+ * clip is chosen; 0: none. */
 void viewer_go(struct viewer *viewer, const struct viewer_camera *camera, uint32_t node);
-/* The picture is one through the camera `followed`: `camera` only repeats where the last frame was seen from. */
+/* The picture is seen through the camera `followed`: `camera` only repeats the last frame's. */
 bool viewer_follows(const struct viewer *viewer);
-uint32_t viewer_home_node(const struct viewer *viewer); /* of the camera at home; 0: it is none of the scene's */
+uint32_t viewer_home_node(const struct viewer *viewer); /* of the initial camera; 0: it is none of the scene's */
 
 /* ---- viewer_act.c ---- */
 

@@ -14,7 +14,7 @@ struct window {
     bool wants_drawing, is_full_screen;
 };
 
-/* Without a display SDL draws where nobody looks, also if it was not asked to. */
+/* Without a display SDL draws off-screen, even if that was not requested. */
 static bool is_seen(const char *driver)
 {
     const char *asked = getenv("SDL_VIDEODRIVER");

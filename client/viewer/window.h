@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The window: what happens in it, and what is shown there. */
+/* The window: its events and its display. */
 #ifndef FARLIGHT_CLIENT_VIEWER_WINDOW_H
 #define FARLIGHT_CLIENT_VIEWER_WINDOW_H
 
@@ -10,9 +10,9 @@ struct window;
 
 /* `width` and `height` as of the desktop: on a fine screen it has more pixels. */
 struct window *window_create(const char *title, int width, int height, struct fl_error *error);
-/* The next thing that happened; false: nothing did. */
+/* The next event; false: there is none. */
 bool window_poll(struct window *window, struct input *input);
-/* Whether something asks for drawing again though nothing of ours has changed: it was covered, say. */
+/* Whether the window must be redrawn though nothing of ours has changed, as after it was covered. */
 bool window_wants_drawing(struct window *window);
 void window_size(const struct window *window, int *width, int *height, double *scale); /* as of struct input */
 /* Draws and shows it: waits for the screen. */
