@@ -199,8 +199,8 @@ struct cli_job {
 const struct argp *cli_job_argp(void);
 /* Likewise, without the options of output, tracer and first hits. */
 const struct argp *cli_picture_argp(void);
-/* Likewise for a window, without the options of files; samples, integrator and encoding have other defaults there.
- * */
+/* Likewise for a window, without the options of files; samples, integrator and encoding have other defaults
+ * there. */
 const struct argp *cli_view_argp(void);
 /* The defaults, then FARLIGHT_*; before the command line is read. */
 bool cli_job_begin(struct cli_job *job, struct message_render defaults);

@@ -208,8 +208,8 @@ static void complete_integrator(struct cli_job *job)
         job->options.integrator = spreads ? PROTOCOL_INTEGRATOR_DISTRIBUTED : PROTOCOL_INTEGRATOR_WHITTED;
 }
 
-/* Random choices show as noise in one sample. Pictures that are refined without an end have no number of samples.
- * */
+/* Random choices show as noise in one sample. Pictures that are refined without an end have no number of
+ * samples. */
 static void complete_samples(struct cli_job *job)
 {
     struct message_render *wanted = &job->options;

@@ -26,8 +26,8 @@ uint32_t fl_frame_run_count(const struct fl_frame_run *run);
  * and together they are the range. False: this part is empty. */
 bool fl_frame_run_shard(const struct fl_frame_run *range, uint32_t part, uint32_t parts, struct fl_frame_run *run);
 
-/* The frames of `range` for which `is_there` is false (NULL: all), in as few runs as possible. False: no memory.
- * */
+/* The frames of `range` for which `is_there` is false (NULL: all), in as few runs as possible. False: no
+ * memory. */
 bool fl_frame_set_missing(const struct fl_frame_run *range, bool (*is_there)(void *user, uint32_t frame),
                           void *user, struct fl_frame_set *set, struct fl_error *error);
 void fl_frame_set_finish(struct fl_frame_set *set);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The client's side of the importer program: starts it, receives its messages, ends it. Independent of the daemon.
- * */
+/* The client's side of the importer program: starts it, receives its messages, ends it. Independent of the
+ * daemon. */
 #ifndef FARLIGHT_CLIENT_LIB_IMPORTER_H
 #define FARLIGHT_CLIENT_LIB_IMPORTER_H
 

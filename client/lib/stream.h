@@ -30,8 +30,8 @@ struct fl_stream {
 /* Takes the descriptor over (also on failure) and makes it non-blocking. */
 bool fl_stream_init(struct fl_stream *stream, int fd, uint32_t accept, const char *peer, struct fl_error *error);
 void fl_stream_finish(struct fl_stream *stream);
-/* Call it before anything is sent: makes the connection a sealed one, whose handshake fl_stream_transfer() begins.
- * */
+/* Call it before anything is sent: makes the connection a sealed one, whose handshake fl_stream_transfer()
+ * begins. */
 bool fl_stream_seal(struct fl_stream *stream, const struct sealed_key *key, struct fl_error *error);
 /* Whether a holder of the key has sent the end of the stream, so that nothing is missing. True without a seal. */
 bool fl_stream_is_whole(const struct fl_stream *stream);

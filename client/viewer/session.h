@@ -28,8 +28,8 @@ enum session_state {
 struct session *session_create(const struct session_options *options, struct fl_error *error);
 /* Advances the current state; never waits for long. */
 enum session_state session_step(struct session *session, uint64_t now_ns);
-/* The number of times that it has become live: a new number means a new connection, on which nothing is shown yet.
- * */
+/* The number of times that it has become live: a new number means a new connection, on which nothing is shown
+ * yet. */
 unsigned session_times_live(const struct session *session);
 /* The current activity (valid until the next call) and its progress: 0 to 1, 0 also if it is not known. */
 const char *session_progress(struct session *session, double *share);

@@ -64,7 +64,7 @@ static void begin_showing(struct viewer *viewer)
     if (viewer->times_live == 0 && !settle(viewer, &viewer->failure))
         return;
     viewer->times_live = session_times_live(viewer->session);
-    viewer_drop_errands(viewer);
+    viewer_drop_tasks(viewer);
     viewer->metrics = (struct metrics){0}; /* another daemon has another clock */
     viewer->has_looked = viewer->told_moving = false;
     viewer->frame.command = 0;
@@ -126,7 +126,7 @@ static void serve(struct viewer *viewer, uint64_t now_ns)
         return;
     viewer_tell(viewer, now_ns);
     viewer_receive(viewer, wait_ms);
-    viewer_errands(viewer);
+    viewer_step_tasks(viewer);
 }
 
 static void draw(struct viewer *viewer)

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The viewer: one loop over input (user or replay), frames and losses of the connection, with or without a window.
- * */
+/* The viewer: one loop over input (user or replay), frames and losses of the connection, with or without a
+ * window. */
 #ifndef FARLIGHT_CLIENT_VIEWER_VIEWER_H
 #define FARLIGHT_CLIENT_VIEWER_VIEWER_H
 

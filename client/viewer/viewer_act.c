@@ -42,7 +42,7 @@ static void next_camera(struct viewer *viewer, int step)
         return;
     }
     viewer->camera_node = fl_scene_camera(session_scene(viewer->session), (size_t)camera)->node;
-    viewer->wanted = ERRAND_CAMERA;
+    viewer->wanted = TASK_CAMERA;
 }
 
 static void focus(struct viewer *viewer)
@@ -51,7 +51,7 @@ static void focus(struct viewer *viewer)
         return;
     viewer->focus_x = viewer->pointer_x / viewer->width;
     viewer->focus_y = viewer->pointer_y / viewer->height;
-    viewer->wanted = ERRAND_FOCUS;
+    viewer->wanted = TASK_FOCUS;
 }
 
 static void play(struct viewer *viewer)
@@ -179,8 +179,8 @@ static bool has_come(const struct viewer *viewer, const struct replay_event *eve
     const bool is_live = viewer->times_live > 0 && viewer->times_live == session_times_live(viewer->session);
     switch (event->kind) {
     case REPLAY_REST:
-        return is_live && viewer_is_at_rest(viewer, event->samples) && viewer->errand == ERRAND_NONE &&
-               viewer->wanted == ERRAND_NONE &&
+        return is_live && viewer_is_at_rest(viewer, event->samples) && viewer->task == TASK_NONE &&
+               viewer->wanted == TASK_NONE &&
                (!viewer->settings.error_map || viewer->has_heat || viewer->heat_refused);
     case REPLAY_LIVE:
         return is_live && viewer->has_camera && viewer->frames > 0;

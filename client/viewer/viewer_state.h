@@ -10,13 +10,13 @@
 #include "viewer/viewer.h"
 #include "viewer/window.h"
 
-/* What a job beside the view is asked for. */
-enum errand {
-    ERRAND_NONE,
-    ERRAND_HOME,     /* the initial camera, from the command line, the model or the scene's extent */
-    ERRAND_CAMERA,   /* where a camera of the scene is */
-    ERRAND_FOCUS,    /* what is under the pointer */
-    ERRAND_REFERENCE /* the resting picture, by the reference */
+/* What a job beside the view is for. */
+enum viewer_task {
+    TASK_NONE,
+    TASK_HOME,     /* the initial camera, from the command line, the model or the scene's extent */
+    TASK_CAMERA,   /* where a camera of the scene is */
+    TASK_FOCUS,    /* what is under the pointer */
+    TASK_REFERENCE /* the resting picture, by the reference */
 };
 
 struct viewer {
@@ -55,8 +55,8 @@ struct viewer {
     bool must_draw;
     uint64_t drawn_ns;
 
-    enum errand errand, wanted; /* that is under way; that waits for it */
-    double focus_x, focus_y;    /* shares of the picture */
+    enum viewer_task task, wanted; /* the current one; the next one */
+    double focus_x, focus_y;       /* shares of the picture */
     uint32_t camera_node;
     struct pixmap compared, heat; /* the picture as it was; its errors */
     struct heat_figures heat_figures;
@@ -88,10 +88,10 @@ bool viewer_is_at_rest(const struct viewer *viewer, unsigned samples);
 /* The pixels that the daemon renders for the window. */
 void viewer_render_size(const struct viewer *viewer, uint32_t *width, uint32_t *height);
 
-/* ---- viewer_errands.c ---- */
+/* ---- viewer_tasks.c ---- */
 
-void viewer_errands(struct viewer *viewer);
-void viewer_drop_errands(struct viewer *viewer); /* of a connection that is gone */
+void viewer_step_tasks(struct viewer *viewer);
+void viewer_drop_tasks(struct viewer *viewer); /* of a connection that is gone */
 /* Moves there; gliding, unless in a replay. `node`: the scene's camera there, which the view then follows while a
  * clip is chosen; 0: none. */
 void viewer_go(struct viewer *viewer, const struct viewer_camera *camera, uint32_t node);

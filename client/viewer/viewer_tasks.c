@@ -122,21 +122,21 @@ static void fill_reference(const struct viewer *viewer, struct message_render *j
         use_key(job, key);
 }
 
-static bool ask(struct viewer *viewer, enum errand errand, struct fl_error *refusal)
+static bool ask(struct viewer *viewer, enum viewer_task task, struct fl_error *refusal)
 {
     struct message_render job;
     struct record_camera_key key = {0};
     struct record_clip_use use;
     fill_probe(viewer, &job);
-    switch (errand) {
-    case ERRAND_CAMERA:
+    switch (task) {
+    case TASK_CAMERA:
         use_node(&job, viewer->camera_node);
         break;
-    case ERRAND_FOCUS:
+    case TASK_FOCUS:
         aim(viewer, &key);
         use_key(&job, &key);
         break;
-    case ERRAND_REFERENCE:
+    case TASK_REFERENCE:
         if (!pixmap_copy(&viewer->compared, &viewer->live, refusal))
             return false;
         viewer->heat_command = viewer->command;
@@ -180,15 +180,15 @@ static double distance_from(const struct viewer *viewer, const struct fl_frame *
     return square > 0 ? sqrt(square) : 1;
 }
 
-static void take_camera(struct viewer *viewer, enum errand errand, const struct fl_frame *frame)
+static void take_camera(struct viewer *viewer, enum viewer_task task, const struct fl_frame *frame)
 {
     struct viewer_camera camera;
     camera_from_frame(&camera, frame, distance_from(viewer, frame));
-    if (errand == ERRAND_HOME) {
+    if (task == TASK_HOME) {
         viewer->home = camera;
         viewer->has_home = true;
     }
-    viewer_go(viewer, &camera, errand == ERRAND_HOME ? viewer_home_node(viewer) : viewer->camera_node);
+    viewer_go(viewer, &camera, task == TASK_HOME ? viewer_home_node(viewer) : viewer->camera_node);
 }
 
 static void take_focus(struct viewer *viewer, const struct fl_frame *frame)
@@ -220,26 +220,26 @@ static void take_reference(struct viewer *viewer, struct fl_frame *frame)
 
 static void take(struct viewer *viewer, struct fl_frame *frame)
 {
-    const enum errand errand = viewer->errand;
-    viewer->errand = ERRAND_NONE;
-    if (errand == ERRAND_FOCUS)
+    const enum viewer_task task = viewer->task;
+    viewer->task = TASK_NONE;
+    if (task == TASK_FOCUS)
         take_focus(viewer, frame);
-    else if (errand == ERRAND_REFERENCE)
+    else if (task == TASK_REFERENCE)
         take_reference(viewer, frame);
     else
-        take_camera(viewer, errand, frame);
+        take_camera(viewer, task, frame);
     fl_frame_destroy(frame);
 }
 
-static void refuse(struct viewer *viewer, enum errand errand, const struct fl_error *refusal)
+static void refuse(struct viewer *viewer, enum viewer_task task, const struct fl_error *refusal)
 {
-    viewer->errand = ERRAND_NONE;
+    viewer->task = TASK_NONE;
     if (refusal->code == FL_ERROR_NONE) /* the connection is lost */
         return;
     viewer_say(viewer, "not possible: %s", refusal->text);
-    if (errand == ERRAND_REFERENCE)
+    if (task == TASK_REFERENCE)
         viewer->heat_refused = true;
-    if (errand == ERRAND_HOME && !viewer->has_camera)
+    if (task == TASK_HOME && !viewer->has_camera)
         viewer->failure = *refusal;
 }
 
@@ -251,37 +251,37 @@ static bool is_compared(const struct viewer *viewer)
            viewer->heat_revision == viewer->frame.revision;
 }
 
-static enum errand next_errand(struct viewer *viewer)
+static enum viewer_task next_task(struct viewer *viewer)
 {
-    const enum errand wanted = viewer->wanted;
-    viewer->wanted = ERRAND_NONE;
-    if (wanted != ERRAND_NONE)
+    const enum viewer_task wanted = viewer->wanted;
+    viewer->wanted = TASK_NONE;
+    if (wanted != TASK_NONE)
         return wanted;
-    if (viewer->errand != ERRAND_NONE)
-        return ERRAND_NONE;
+    if (viewer->task != TASK_NONE)
+        return TASK_NONE;
     if (!viewer->has_home)
-        return ERRAND_HOME;
+        return TASK_HOME;
     if (viewer->settings.error_map && !viewer->has_heat && !viewer->heat_refused &&
         viewer_is_at_rest(viewer, COMPARED_SAMPLES))
-        return ERRAND_REFERENCE;
-    return ERRAND_NONE;
+        return TASK_REFERENCE;
+    return TASK_NONE;
 }
 
-void viewer_errands(struct viewer *viewer)
+void viewer_step_tasks(struct viewer *viewer)
 {
     struct fl_error refusal = {0};
     /* An answer for another picture is discarded. */
     if (!viewer->settings.error_map || !is_compared(viewer)) {
         viewer->must_draw = viewer->must_draw || viewer->has_heat;
         viewer->has_heat = viewer->heat_refused = false;
-        if (viewer->errand == ERRAND_REFERENCE) {
+        if (viewer->task == TASK_REFERENCE) {
             session_give_up(viewer->session);
-            viewer->errand = ERRAND_NONE;
+            viewer->task = TASK_NONE;
         }
     }
-    const enum errand next = next_errand(viewer);
-    if (next != ERRAND_NONE) {
-        viewer->errand = next;
+    const enum viewer_task next = next_task(viewer);
+    if (next != TASK_NONE) {
+        viewer->task = next;
         if (!ask(viewer, next, &refusal))
             refuse(viewer, next, &refusal);
     }
@@ -289,11 +289,11 @@ void viewer_errands(struct viewer *viewer)
     if (frame)
         take(viewer, frame);
     else if (refusal.code != FL_ERROR_NONE)
-        refuse(viewer, viewer->errand, &refusal);
+        refuse(viewer, viewer->task, &refusal);
 }
 
-void viewer_drop_errands(struct viewer *viewer)
+void viewer_drop_tasks(struct viewer *viewer)
 {
-    viewer->errand = ERRAND_NONE;
+    viewer->task = TASK_NONE;
     viewer->has_heat = false;
 }
