@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Layers beside a picture's light, against what is known of simple scenes. */
-#include "tests/accuracy/ldc_scenes.h"
+#include "tests/accuracy/sampled_scenes.h"
 
 #include "trace/tracer.h"
 #include "tests/harness/test.h"

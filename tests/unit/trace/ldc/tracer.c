@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* What the tracer `ldc` promises beside its answers: what stands still is built once, what moves alone costs its
  * frame, and it says how large its cells are and what was lost. That its answers are right to the size of a cell
- * is shown by tests/accuracy/ldc_against_reference.c. */
+ * is shown by tests/accuracy/sampled_against_reference.c. */
 #include "tests/unit/trace/tracer_fixture.h"
 
 #include "render/tracer_set.h"

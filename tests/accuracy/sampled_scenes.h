@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Scenes for the tests of sampled tracers: closed shapes over a floor, in mirrors, glass and textures. */
-#ifndef FARLIGHT_TESTS_LDC_SCENES_H
-#define FARLIGHT_TESTS_LDC_SCENES_H
+#ifndef FARLIGHT_TESTS_SAMPLED_SCENES_H
+#define FARLIGHT_TESTS_SAMPLED_SCENES_H
 
 #include "tests/accuracy/render_fixture.h"
 
