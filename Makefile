@@ -52,7 +52,8 @@ SERVER_LOADED_PKGS := libavcodec libavutil
 CLIENT_PKGS := libzstd libsodium libxxhash libturbojpeg jansson
 IMPORT_PKGS := tinygltf tinyobjloader libsodium libseccomp
 TEXTURE_PKGS := OpenImageIO
-EXPORT_PKGS := OpenImageIO libjxl libseccomp
+EXPORT_PKGS := libpng OpenEXR libseccomp
+IMAGES_PKGS := OpenImageIO libjxl
 VIDEO_PKGS := libavformat libavcodec libavutil libseccomp
 VIEWER_PKGS := sdl2 SDL2_ttf libavcodec libswscale libavutil
 TEST_PKGS := cmocka
@@ -83,7 +84,8 @@ IMPORT_C := $(call sources,client/import,c)
 TEXTURE_CXX := client/import/texture.cpp
 IMPORT_CXX := $(filter-out $(TEXTURE_CXX),$(call sources,client/import,cpp))
 EXPORT_C := $(call sources,client/output,c)
-EXPORT_CXX := $(call sources,client/output,cpp)
+IMAGES_CXX := $(call sources,client/output/library,cpp)
+EXPORT_CXX := $(filter-out $(IMAGES_CXX),$(call sources,client/output,cpp))
 VIDEO_C := $(call sources,client/video,c)
 VIEWER_C := $(call sources,client/viewer,c)
 SHADERS := $(patsubst shaders/%,%,$(call sources,shaders,h glsl comp vert geom frag))
@@ -125,7 +127,7 @@ VIEWER_OBJ := $(call obj,$(VIEWER_C) $(addprefix client/cli/,image_path.c interr
 SONAME := libfarlight.so.$(firstword $(subst ., ,$(VERSION)))
 LIB_PIC := $(patsubst %.c,$(B)/pic/%.o,$(LIB_SRC) $(PROTOCOL_SRC) $(SEALED_SRC) $(PIXELS_SRC) $(COMMON_SRC))
 
-MODULES := $(B)/farlight-textures.so
+MODULES := $(B)/farlight-textures.so $(B)/farlight-images.so
 PROGRAMS := $(B)/farlightd $(B)/farlight $(B)/farlight-import $(B)/farlight-export $(B)/farlight-video $(B)/farlight-view
 
 .PHONY: all
@@ -143,7 +145,7 @@ $(B)/server/trace/tracer.o: $(EMBREE_STAMP)
 $(B)/shader_sources.o: INCLUDES = -Iserver
 $(B)/client/%.o: INCLUDES = -Iclient $(CLIENT_CFLAGS)
 $(B)/client/import/%.opp $(B)/client/import/%.o $(B)/pic/client/import/%.opp: INCLUDES = -Iclient $(IMPORT_CFLAGS)
-$(B)/client/output/%.opp $(B)/client/output/%.o: INCLUDES = -Iclient $(EXPORT_CFLAGS)
+$(B)/client/output/%.opp $(B)/client/output/%.o $(B)/pic/client/output/%.opp: INCLUDES = -Iclient $(EXPORT_CFLAGS)
 $(B)/client/video/%.o: INCLUDES = -Iclient $(VIDEO_CFLAGS)
 $(B)/client/viewer/%.o: INCLUDES = -Iclient $(CLIENT_CFLAGS) $(VIEWER_CFLAGS)
 $(B)/tests/%.o: INCLUDES = -Iserver -Ishaders -Iclient $(SERVER_CFLAGS) $(CLIENT_CFLAGS) $(TEST_CFLAGS)
@@ -154,7 +156,7 @@ TEST_CFLAGS = $(eval TEST_CFLAGS := $(call pkg_cflags,$(TEST_PKGS)))$(TEST_CFLAG
 IMPORT_CFLAGS = $(eval IMPORT_CFLAGS := $(patsubst -I%,-isystem %,$(call pkg_cflags,$(IMPORT_PKGS) $(TEXTURE_PKGS))))$(IMPORT_CFLAGS)
 VIDEO_CFLAGS = $(eval VIDEO_CFLAGS := $(patsubst -I%,-isystem %,$(call pkg_cflags,$(VIDEO_PKGS))))$(VIDEO_CFLAGS)
 VIEWER_CFLAGS = $(eval VIEWER_CFLAGS := $(patsubst -I%,-isystem %,$(call pkg_cflags,$(VIEWER_PKGS))))$(VIEWER_CFLAGS)
-EXPORT_CFLAGS = $(eval EXPORT_CFLAGS := $(patsubst -I%,-isystem %,$(call pkg_cflags,$(EXPORT_PKGS))))$(EXPORT_CFLAGS)
+EXPORT_CFLAGS = $(eval EXPORT_CFLAGS := $(patsubst -I%,-isystem %,$(call pkg_cflags,$(EXPORT_PKGS) $(IMAGES_PKGS))))$(EXPORT_CFLAGS)
 
 $(B)/%.o: %.c
 	@mkdir -p $(@D)
@@ -209,8 +211,10 @@ $(B)/farlight-import: $(IMPORT_OBJ) $(PROTOCOL_OBJ) | $(B)/farlight-textures.so
 	$(call say,LINK)$(CXX) $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(IMPORT_LIBS) $(MODULE_PATH) -o $@
 $(B)/farlight-textures.so: $(patsubst %.cpp,$(B)/pic/%.opp,$(TEXTURE_CXX))
 	$(call say,LINK)$(CXX) -shared $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(call pkg_libs,$(TEXTURE_PKGS)) -o $@
-$(B)/farlight-export: $(EXPORT_OBJ) $(PROTOCOL_OBJ)
-	$(call say,LINK)$(CXX) $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(EXPORT_LIBS) -o $@
+$(B)/farlight-export: $(EXPORT_OBJ) $(PROTOCOL_OBJ) | $(B)/farlight-images.so
+	$(call say,LINK)$(CXX) $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(EXPORT_LIBS) $(MODULE_PATH) -o $@
+$(B)/farlight-images.so: $(patsubst %.cpp,$(B)/pic/%.opp,$(IMAGES_CXX))
+	$(call say,LINK)$(CXX) -shared $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(call pkg_libs,$(IMAGES_PKGS)) -o $@
 $(B)/farlight-video: $(VIDEO_OBJ) $(PROTOCOL_OBJ)
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(VIDEO_LIBS) -o $@
 $(B)/farlight-view: $(VIEWER_OBJ) $(LIB_OBJ) $(PROTOCOL_OBJ)
@@ -334,7 +338,7 @@ $(LOSING_DAEMON): $(B)/tests/tools/lost_gpu.o $(B)/server/main.o $(SERVER_OBJ) $
 
 # ---- what people call ------------------------------------------------------------------------------
 BUILD_PACKAGES := gcc g++ make pkg-config libepoxy-dev libegl-dev libgl-dev libcglm-dev libturbojpeg0-dev libzstd-dev \
-    libsodium-dev libxxhash-dev libinih-dev libjansson-dev libseccomp-dev libopenimageio-dev libjxl-dev libtinygltf-dev \
+    libsodium-dev libxxhash-dev libinih-dev libjansson-dev libseccomp-dev libopenimageio-dev libpng-dev libopenexr-dev libjxl-dev libtinygltf-dev \
     libtinyobjloader-dev libembree-dev libavcodec-dev libavformat-dev libavutil-dev libswscale-dev libsdl2-dev libsdl2-ttf-dev fonts-dejavu-core libegl1 libgl1-mesa-dri
 TEST_PACKAGES := libcmocka-dev python3 python3-jsonschema ffmpeg xvfb gnuplot-nox
 LINT_PACKAGES := clang clang-format glslang-tools python3

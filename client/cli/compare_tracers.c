@@ -197,8 +197,10 @@ static bool prepare(struct tracer_comparison *comparison, struct fl_error *error
 
 static bool load(struct tracer_comparison *comparison, struct fl_error *error)
 {
-    const struct fl_exporter_options export = {
-        .folder = comparison->folder, .model = comparison->job.model, .interrupt_fd = cli_interrupt_fd()};
+    const struct fl_exporter_options export = {.folder = comparison->folder,
+                                               .model = comparison->job.model,
+                                               .interrupt_fd = cli_interrupt_fd(),
+                                               .format = "exr"};
     if (!cli_loading_begin(&comparison->loading, error))
         return false;
     comparison->exporter = fl_exporter_start(&export, error);

@@ -110,7 +110,8 @@ static bool start(struct cli_sink *sink, struct fl_error *error)
                                                 .model = job->model ? job->model : job->scene,
                                                 .frames_per_second =
                                                     sink->is_series ? job->options.frames_per_second : 0,
-                                                .interrupt_fd = job->progressive ? 0 : cli_interrupt_fd()};
+                                                .interrupt_fd = job->progressive ? 0 : cli_interrupt_fd(),
+                                                .format = cli_image_name(sink->output.image)};
     sink->exporter = fl_exporter_start(&options, error);
     return sink->exporter != NULL;
 }

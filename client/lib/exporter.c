@@ -26,8 +26,16 @@ struct fl_exporter *fl_exporter_start(const struct fl_exporter_options *options,
     fl_text_utf8(options->model ? options->model : "", exporter->model, sizeof(exporter->model));
     char rate[32];
     snprintf(rate, sizeof(rate), "%.9g", (double)options->frames_per_second);
-    const char *const arguments[] = {"--folder", options->folder, options->frames_per_second > 0 ? "--fps" : NULL,
-                                     rate, NULL};
+    const char *arguments[8] = {"--folder", options->folder};
+    size_t count = 2;
+    if (options->frames_per_second > 0) {
+        arguments[count++] = "--fps";
+        arguments[count++] = rate;
+    }
+    if (options->format) {
+        arguments[count++] = "--format";
+        arguments[count++] = options->format;
+    }
     if (!fl_helper_start(&exporter->helper, arguments, error)) {
         fl_exporter_destroy(exporter);
         return NULL;

@@ -414,6 +414,7 @@ struct fl_exporter_options {
     const char *model;       /* named in the files; may be NULL */
     float frames_per_second; /* named in EXR files; 0: unknown */
     int interrupt_fd;
+    const char *format; /* of all files, as below: some start faster; NULL: any */
 };
 struct fl_export_options {
     const char *path;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The difference of two image files: figures, and a picture of the errors. C++ behind C. */
+/* The difference of two image files: figures, and a picture of the errors. */
 #ifndef FARLIGHT_CLIENT_OUTPUT_COMPARE_H
 #define FARLIGHT_CLIENT_OUTPUT_COMPARE_H
 
@@ -26,9 +26,7 @@ struct compare_result {
 };
 
 /* Where fonts are, for titles; nothing else has to be read after the sandbox is entered. */
-extern const char *const compare_font_folder;
-/* Makes the libraries load their plug-ins while that is still allowed. */
-void compare_prepare(void);
+#define COMPARE_FONT_FOLDER "/usr/share/fonts"
 /* Reads the files, writes the picture that is wanted. False: `field` and `reason` are set, and there is no
  * picture. */
 bool compare_images(const struct message_compare_images *wanted, const struct compare_file *a,

@@ -1,31 +1,37 @@
 // SPDX-License-Identifier: MIT
 #include "image.h"
+#include "exr_encode.hpp"
 #include "layers.hpp"
+#include "library.h"
 #include "metadata.hpp"
+#include "png_encode.h"
 #include "protocol/version.h"
 
-#include <OpenImageIO/filesystem.h>
+#include <Imath/half.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <ctime>
 #include <exception>
-#include <memory>
+#include <string>
 #include <strings.h>
+#include <utility>
+#include <vector>
 
 namespace
 {
 
 struct known_format {
     enum image_format format;
-    const char *plugin; // named, never guessed
     const char *endings[2];
 };
 
-const known_format known[] = {{IMAGE_PNG, "png", {"png", nullptr}},
-                              {IMAGE_JPEG, "jpeg", {"jpg", "jpeg"}},
-                              {IMAGE_EXR, "openexr", {"exr", nullptr}},
-                              {IMAGE_HDR, "hdr", {"hdr", nullptr}}};
+const known_format known[] = {{IMAGE_PNG, {"png", nullptr}},
+                              {IMAGE_JPEG, {"jpg", "jpeg"}},
+                              {IMAGE_EXR, {"exr", nullptr}},
+                              {IMAGE_HDR, {"hdr", nullptr}}};
 
 enum image_format format_by_ending(const char *ending)
 {
@@ -36,156 +42,125 @@ enum image_format format_by_ending(const char *ending)
     return IMAGE_UNKNOWN;
 }
 
-const char *plugin_of(enum image_format format)
+bool fail(char *reason, size_t reason_bytes, const char *text)
 {
-    for (const known_format &each : known)
-        if (each.format == format)
-            return each.plugin;
-    return "";
+    std::snprintf(reason, reason_bytes, "%s", text);
+    return false;
 }
 
-OIIO::TypeDesc stored_type(enum protocol_pixel_format format)
+uint8_t byte_of(float value)
+{
+    return value > 0 ? static_cast<uint8_t>(std::min(value, 1.0f) * 255.0f + 0.5f) : 0; // NaN becomes 0
+}
+
+std::vector<uint8_t> bytes_of(const struct raster &raster)
+{
+    const size_t count = size_t(raster.width) * raster.height * raster.channels;
+    std::vector<uint8_t> bytes(count);
+    if (raster.component_bytes == sizeof(float))
+        std::transform(static_cast<const float *>(raster.pixels),
+                       static_cast<const float *>(raster.pixels) + count, bytes.begin(), byte_of);
+    else
+        std::transform(static_cast<const half *>(raster.pixels), static_cast<const half *>(raster.pixels) + count,
+                       bytes.begin(), byte_of);
+    return bytes;
+}
+
+// What every PNG file of ours says, then `texts`.
+bool write_png(const struct raster &raster, const std::vector<std::pair<std::string, std::string>> &texts,
+               const std::tm *date, uint8_t **file, size_t *file_bytes, char *reason, size_t reason_bytes)
+{
+    std::vector<png_text> all = {{"oiio:ColorSpace", "sRGB"}, {"Software", "farlight " FARLIGHT_VERSION}};
+    std::vector<uint8_t> bytes;
+    if (raster.component_bytes != 1)
+        bytes = bytes_of(raster);
+    for (const auto &each : texts)
+        all.push_back({each.first.c_str(), each.second.c_str()});
+    const struct png png = {raster.width,
+                            raster.height,
+                            raster.channels,
+                            raster.component_bytes == 1 ? static_cast<const uint8_t *>(raster.pixels)
+                                                        : bytes.data(),
+                            all.data(),
+                            all.size(),
+                            date};
+    return png_encode(&png, file, file_bytes, reason, reason_bytes);
+}
+
+bool copy_out(const std::vector<uint8_t> &made, uint8_t **file, size_t *file_bytes, char *reason,
+              size_t reason_bytes)
+{
+    *file = static_cast<uint8_t *>(std::malloc(made.size()));
+    if (!*file)
+        return fail(reason, reason_bytes, "out of memory");
+    std::memcpy(*file, made.data(), made.size());
+    *file_bytes = made.size();
+    return true;
+}
+
+bool write_with_library(const struct library_image &image, uint8_t **file, size_t *file_bytes, char *reason,
+                        size_t reason_bytes)
+{
+    const struct image_library *library = library_loaded(reason, reason_bytes);
+    return library && library->encode(&image, file, file_bytes, reason, reason_bytes);
+}
+
+unsigned component_bytes(enum protocol_pixel_format format)
 {
     switch (format) {
     case PROTOCOL_PIXEL_FORMAT_RGBA16F:
-        return OIIO::TypeDesc::HALF;
+        return 2;
     case PROTOCOL_PIXEL_FORMAT_RGBA32F:
-        return OIIO::TypeDesc::FLOAT;
+        return 4;
     default:
-        return OIIO::TypeDesc::UINT8;
+        return 1;
     }
 }
 
-// What the file's pixels are. JPEG and HDR have no alpha.
-OIIO::ImageSpec make_spec(const struct image &image)
+std::tm now()
 {
-    const bool has_alpha = image.format == IMAGE_PNG || image.format == IMAGE_EXR;
-    OIIO::TypeDesc type = OIIO::TypeDesc::UINT8;
-    if (image.format == IMAGE_EXR)
-        type = image.half ? OIIO::TypeDesc::HALF : OIIO::TypeDesc::FLOAT;
-    else if (image.format == IMAGE_HDR)
-        type = OIIO::TypeDesc::FLOAT;
-    OIIO::ImageSpec spec(static_cast<int>(image.begin->width), static_cast<int>(image.begin->height),
-                         has_alpha ? 4 : 3, type);
-    if (image.format == IMAGE_PNG) {
-        spec.attribute("oiio:UnassociatedAlpha", 1);
-        spec.attribute("oiio:ColorSpace", "sRGB");
-        spec.attribute("png:compressionLevel", 4); // half the time of 6 for 2 % more bytes
-    } else if (image.format == IMAGE_JPEG) {
-        spec.attribute("oiio:ColorSpace", "sRGB");
-        spec.attribute("Compression", "jpeg:" + std::to_string(image.quality));
-    } else {
-        spec.attribute("oiio:ColorSpace", "Linear");
-    }
-    if (image.format == IMAGE_EXR)
-        spec.attribute("compression", "zip");
-    if (has_layers(*image.begin))
-        set_layer_channels(spec, image.begin->layers, image.half);
-    add_metadata(spec, image);
-    return spec;
+    const std::time_t seconds = std::time(nullptr);
+    std::tm parts = {};
+    localtime_r(&seconds, &parts);
+    return parts;
 }
 
-bool fail(char *reason, size_t reason_bytes, const std::string &text)
+std::string date_text(const std::tm &date)
 {
-    std::snprintf(reason, reason_bytes, "%s", text.c_str());
-    return false;
+    char text[32] = "";
+    std::strftime(text, sizeof(text), "%Y:%m:%d %H:%M:%S", &date);
+    return text;
 }
 
-// Radiance files keep comments in their header, which OpenImageIO does not write.
-void insert_comments(std::vector<unsigned char> &file, const struct image &image)
+bool write_frame(const struct image &image, uint8_t **file, size_t *file_bytes, char *reason, size_t reason_bytes)
 {
-    std::string lines;
-    for (const char c : describe(image)) {
-        if (lines.empty() || lines.back() == '\n')
-            lines += "# ";
-        lines += c;
-    }
-    for (size_t i = 0; i < file.size() && i < 64; i++) {
-        if (file[i] != '\n')
-            continue;
-        file.insert(file.begin() + static_cast<std::ptrdiff_t>(i) + 1, lines.begin(), lines.end());
-        return;
-    }
-}
-
-struct pixel_source {
-    OIIO::TypeDesc type;
-    const void *pixels;
-    size_t pixel_bytes;
-    const struct image *layers; // NULL: there are none, and the three above count
-};
-
-bool write_source(OIIO::ImageOutput &output, const struct pixel_source &source)
-{
-    if (source.layers)
-        return write_layers(output, *source.layers);
-    return output.write_image(source.type, source.pixels, static_cast<OIIO::stride_t>(source.pixel_bytes));
-}
-
-bool write_pixels(enum image_format format, const OIIO::ImageSpec &spec, const struct pixel_source &source,
-                  std::vector<unsigned char> &file, std::string &why)
-{
-    const std::unique_ptr<OIIO::ImageOutput> output = OIIO::ImageOutput::create(plugin_of(format));
-    OIIO::Filesystem::IOVecOutput memory(file);
-    if (!output)
-        why = OIIO::geterror();
-    else if (!output->set_ioproxy(&memory))
-        why = "this build of OpenImageIO cannot write it to memory";
-    else if (!output->open(std::string("image.") + plugin_of(format), spec) || !write_source(*output, source) ||
-             !output->close())
-        why = output->geterror();
-    else
-        return true;
-    return false;
-}
-
-bool encode(const struct image &image, std::vector<unsigned char> &file, char *reason, size_t reason_bytes)
-{
-    const OIIO::TypeDesc type = stored_type(image.begin->format);
-    const struct image *layers = has_layers(*image.begin) ? &image : nullptr;
-    std::string why;
-    if (layers && (image.format != IMAGE_EXR || image.begin->format != PROTOCOL_PIXEL_FORMAT_RGBA32F))
+    const struct message_frame_begin &begin = *image.begin;
+    const struct raster raster = {begin.width, begin.height, 4, component_bytes(begin.format), image.pixels};
+    const std::tm date = now();
+    if (has_layers(begin) && (image.format != IMAGE_EXR || begin.format != PROTOCOL_PIXEL_FORMAT_RGBA32F))
         return fail(reason, reason_bytes, "only an EXR file of 32-bit floats can store layers");
-    if (!write_pixels(image.format, make_spec(image), {type, image.pixels, 4 * type.size(), layers}, file, why))
-        return fail(reason, reason_bytes, why);
-    if (image.format == IMAGE_HDR)
-        insert_comments(file, image);
-    return true;
+    if (image.format == IMAGE_EXR)
+        return copy_out(exr_encode(image, date_text(date)), file, file_bytes, reason, reason_bytes);
+    if (image.format != IMAGE_PNG)
+        return write_with_library(
+            {image.format, raster, image.quality, metadata_lines(image).c_str(), date_text(date).c_str()}, file,
+            file_bytes, reason, reason_bytes);
+    const std::vector<metadata_entry> entries = metadata_of(image);
+    std::vector<std::pair<std::string, std::string>> texts;
+    for (const metadata_entry &each : entries)
+        if (!each.text.empty())
+            texts.emplace_back("farlight/" + each.name, each.text);
+    return write_png(raster, texts, &date, file, file_bytes, reason, reason_bytes);
 }
 
-bool encode(const struct plain_image &image, std::vector<unsigned char> &file, char *reason, size_t reason_bytes)
-{
-    OIIO::ImageSpec spec(static_cast<int>(image.width), static_cast<int>(image.height), 3, OIIO::TypeDesc::UINT8);
-    if (image.format != IMAGE_PNG && image.format != IMAGE_JPEG)
-        return fail(reason, reason_bytes, "a picture of errors must be PNG or JPEG");
-    spec.attribute("oiio:ColorSpace", "sRGB");
-    spec.attribute("Compression", "jpeg:95");
-    spec.attribute("png:compressionLevel", 4);
-    spec.attribute("Software", "farlight " FARLIGHT_VERSION);
-    spec.attribute("ImageDescription", image.description);
-    std::string why;
-    return write_pixels(image.format, spec, {OIIO::TypeDesc::FLOAT, image.pixels, 3 * sizeof(float), nullptr},
-                        file, why) ||
-           fail(reason, reason_bytes, why);
-}
-
-template <typename kind_of_image>
-bool encode_to_memory(const kind_of_image &image, uint8_t **file, size_t *file_bytes, char *reason,
-                      size_t reason_bytes)
+// Runs what may throw.
+template <typename function> bool guard(function encode, char *reason, size_t reason_bytes)
 {
     try {
-        std::vector<unsigned char> made;
-        if (!encode(image, made, reason, reason_bytes))
-            return false;
-        *file = static_cast<uint8_t *>(std::malloc(made.size()));
-        if (!*file)
-            return fail(reason, reason_bytes, "out of memory");
-        std::memcpy(*file, made.data(), made.size());
-        *file_bytes = made.size();
+        return encode();
     } catch (const std::exception &exception) {
         return fail(reason, reason_bytes, exception.what());
     }
-    return true;
 }
 
 } // namespace
@@ -199,43 +174,28 @@ enum image_format image_format_of(const char *path, const char *fallback)
     return format != IMAGE_UNKNOWN ? format : format_by_ending(fallback);
 }
 
-bool image_prepare(char *reason, size_t reason_bytes)
+bool image_needs_library(enum image_format format)
 {
-    try {
-        // One thread: the renderer has use for the others, and the sandbox need not allow more.
-        OIIO::attribute("threads", 1);
-        OIIO::attribute("exr_threads", -1);
-        const std::vector<unsigned char> pixels(4 * 4 * 4, 0);
-        struct message_frame_begin begin = {};
-        struct message_frame_end end = {};
-        begin.width = begin.height = begin.samples = 4;
-        begin.layers = 1u << PROTOCOL_LAYER_BEAUTY;
-        begin.fov_y = 1;
-        for (const known_format &each : known) {
-            struct image image = {};
-            image.format = each.format;
-            image.quality = 90;
-            image.model = "";
-            image.begin = &begin;
-            image.end = &end;
-            image.pixels = pixels.data();
-            std::vector<unsigned char> file;
-            if (!encode(image, file, reason, reason_bytes))
-                return false;
-        }
-    } catch (const std::exception &exception) {
-        return fail(reason, reason_bytes, exception.what());
-    }
-    return true;
+    return format != IMAGE_PNG && format != IMAGE_EXR;
 }
 
 bool image_encode(const struct image *image, uint8_t **file, size_t *file_bytes, char *reason, size_t reason_bytes)
 {
-    return encode_to_memory(*image, file, file_bytes, reason, reason_bytes);
+    return guard([=] { return write_frame(*image, file, file_bytes, reason, reason_bytes); }, reason,
+                 reason_bytes);
 }
 
-bool image_encode_plain(const struct plain_image *image, uint8_t **file, size_t *file_bytes, char *reason,
-                        size_t reason_bytes)
+bool image_encode_plain(enum image_format format, const struct raster *raster, const char *description,
+                        uint8_t **file, size_t *file_bytes, char *reason, size_t reason_bytes)
 {
-    return encode_to_memory(*image, file, file_bytes, reason, reason_bytes);
+    if (format == IMAGE_JPEG)
+        return write_with_library({format, *raster, 95, description, ""}, file, file_bytes, reason, reason_bytes);
+    if (format != IMAGE_PNG)
+        return fail(reason, reason_bytes, "a picture of errors must be PNG or JPEG");
+    return guard(
+        [=] {
+            return write_png(*raster, {{"Description", description}}, nullptr, file, file_bytes, reason,
+                             reason_bytes);
+        },
+        reason, reason_bytes);
 }

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* From pixels and their metadata to the bytes of an image file, in memory. The only place that uses OpenImageIO;
- * C++ behind C. */
+/* From pixels and their metadata to the bytes of an image file, in memory. C++ behind C. */
 #ifndef FARLIGHT_CLIENT_OUTPUT_IMAGE_H
 #define FARLIGHT_CLIENT_OUTPUT_IMAGE_H
 
 #include "protocol/messages.h"
+#include "raster.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -14,6 +14,8 @@ enum image_format { IMAGE_UNKNOWN, IMAGE_PNG, IMAGE_JPEG, IMAGE_EXR, IMAGE_HDR }
 
 /* By the path's ending, else by `fallback` ("png", ..). */
 enum image_format image_format_of(const char *path, const char *fallback);
+/* Whether it is written by the module of library.h. */
+bool image_needs_library(enum image_format format);
 
 struct image {
     enum image_format format;
@@ -26,23 +28,12 @@ struct image {
     const uint8_t *pixels;
 };
 
-/* Makes the libraries load their plug-ins while that is still allowed. False: a format is missing; its name is in
- * `reason`. */
-bool image_prepare(char *reason, size_t reason_bytes);
 /* *file is malloc'ed. False: `reason` says why. */
 bool image_encode(const struct image *image, uint8_t **file, size_t *file_bytes, char *reason,
                   size_t reason_bytes);
-
-/* A picture that is no frame. */
-struct plain_image {
-    enum image_format format; /* PNG or JPEG */
-    uint32_t width, height;
-    const float *pixels; /* red, green, blue, sRGB, 0 to 1 */
-    const char *description;
-};
-/* As image_encode. */
-bool image_encode_plain(const struct plain_image *image, uint8_t **file, size_t *file_bytes, char *reason,
-                        size_t reason_bytes);
+/* A picture that is no frame, as PNG or JPEG. */
+bool image_encode_plain(enum image_format format, const struct raster *raster, const char *description,
+                        uint8_t **file, size_t *file_bytes, char *reason, size_t reason_bytes);
 
 #ifdef __cplusplus
 }

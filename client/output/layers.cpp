@@ -1,8 +1,12 @@
 // SPDX-License-Identifier: MIT
 #include "layers.hpp"
 
+#include <Imath/half.h>
+#include <OpenEXR/ImfFrameBuffer.h>
+
 #include <algorithm>
 #include <cstring>
+#include <vector>
 
 namespace
 {
@@ -38,11 +42,16 @@ const layer_channel known[] = {{PROTOCOL_LAYER_BEAUTY, 0, "R", content::colour},
 constexpr float half_max = 65504.0f;
 constexpr int band_rows = 64; // a multiple of the rows that are compressed together
 
-OIIO::TypeDesc type_of(enum content content, bool half)
+Imf::PixelType type_of(enum content content, bool half_floats)
 {
     if (content == content::number)
-        return OIIO::TypeDesc::UINT32;
-    return half && content == content::colour ? OIIO::TypeDesc::HALF : OIIO::TypeDesc::FLOAT;
+        return Imf::UINT;
+    return half_floats && content == content::colour ? Imf::HALF : Imf::FLOAT;
+}
+
+size_t size_of(Imf::PixelType type)
+{
+    return type == Imf::HALF ? sizeof(half) : sizeof(float);
 }
 
 std::vector<layer_channel> channels_of(unsigned layers)
@@ -66,21 +75,33 @@ uint32_t number_of(float value)
     return value >= 0 && value < 4294967040.0f ? static_cast<uint32_t>(value) : 0;
 }
 
-// One channel of one row into pixels that are `pixel_bytes` from each other.
-void put_row(const float *from, size_t width, const layer_channel &channel, bool half, unsigned char *to,
-             size_t pixel_bytes)
+// A component of a pixel as a float; `pixels` are of that format.
+float component(enum protocol_pixel_format format, const void *pixels, size_t index)
 {
-    for (size_t x = 0; x < width; x++, to += pixel_bytes) {
-        float value = from[4 * x + static_cast<size_t>(channel.component)];
+    switch (format) {
+    case PROTOCOL_PIXEL_FORMAT_RGBA16F:
+        return static_cast<const half *>(pixels)[index];
+    case PROTOCOL_PIXEL_FORMAT_RGBA32F:
+        return static_cast<const float *>(pixels)[index];
+    default:
+        return static_cast<float>(static_cast<const uint8_t *>(pixels)[index]) * (1 / 255.0f);
+    }
+}
+
+// One channel of the pixels from `first` on.
+void put_row(const struct image &image, size_t first, const layer_channel &channel, Imf::PixelType type, char *to)
+{
+    for (size_t x = 0; x < image.begin->width; x++, to += size_of(type)) {
+        const float value =
+            component(image.begin->format, image.pixels, 4 * (first + x) + static_cast<size_t>(channel.component));
         const uint32_t number = number_of(value);
-        if (channel.content == content::number) {
+        const half rounded(std::clamp(value, -half_max, half_max)); // as the renderer does for half floats
+        if (type == Imf::UINT)
             std::memcpy(to, &number, sizeof(number));
-        } else if (half && channel.content == content::colour) {
-            value = std::clamp(value, -half_max, half_max); // as the renderer does for half floats
-            OIIO::convert_types(OIIO::TypeDesc::FLOAT, &value, OIIO::TypeDesc::HALF, to, 1);
-        } else {
+        else if (type == Imf::HALF)
+            std::memcpy(to, &rounded, sizeof(rounded));
+        else
             std::memcpy(to, &value, sizeof(value));
-        }
     }
 }
 
@@ -101,44 +122,33 @@ std::string layer_names(unsigned layers)
     return names;
 }
 
-void set_layer_channels(OIIO::ImageSpec &spec, unsigned layers, bool half)
+void add_channels(Imf::ChannelList &channels, unsigned layers, bool half_floats)
 {
-    spec.channelnames.clear();
-    spec.channelformats.clear();
-    spec.alpha_channel = spec.z_channel = -1;
-    for (const layer_channel &channel : channels_of(layers)) {
-        const int index = static_cast<int>(spec.channelnames.size());
-        spec.channelnames.emplace_back(channel.name);
-        spec.channelformats.push_back(type_of(channel.content, half));
-        if (std::strcmp(channel.name, "A") == 0)
-            spec.alpha_channel = index;
-        if (channel.layer == PROTOCOL_LAYER_DEPTH)
-            spec.z_channel = index;
-    }
-    spec.nchannels = static_cast<int>(spec.channelnames.size());
+    for (const layer_channel &channel : channels_of(layers))
+        channels.insert(channel.name, Imf::Channel(type_of(channel.content, half_floats)));
 }
 
-bool write_layers(OIIO::ImageOutput &output, const struct image &image)
+void write_rows(Imf::OutputFile &output, const struct image &image)
 {
     const struct message_frame_begin &begin = *image.begin;
-    const std::vector<layer_channel> channels = channels_of(begin.layers);
-    const size_t width = begin.width, pixel_bytes = output.spec().pixel_bytes(true);
-    std::vector<unsigned char> band(width * pixel_bytes * band_rows);
+    const size_t width = begin.width;
     for (uint32_t top = 0; top < begin.height; top += band_rows) {
-        const uint32_t bottom = std::min(top + band_rows, begin.height);
-        size_t offset = 0;
-        for (size_t i = 0; i < channels.size(); i++) {
-            const size_t rows_above = place_of(channels[i].layer, begin.layers) * begin.height;
-            for (uint32_t y = top; y < bottom; y++) {
-                const uint8_t *from = image.pixels + (rows_above + y) * width * 4 * sizeof(float);
-                put_row(reinterpret_cast<const float *>(from), width, channels[i], image.half,
-                        band.data() + (y - top) * width * pixel_bytes + offset, pixel_bytes);
-            }
-            offset += output.spec().channelformat(static_cast<int>(i)).size();
+        const uint32_t rows = std::min<uint32_t>(band_rows, begin.height - top);
+        Imf::FrameBuffer buffer;
+        std::vector<std::vector<char>> planes;
+        for (const layer_channel &channel : channels_of(begin.layers)) {
+            const Imf::PixelType type = type_of(channel.content, image.half);
+            const size_t row_bytes = width * size_of(type);
+            const size_t first_row = place_of(channel.layer, begin.layers) * begin.height + top;
+            std::vector<char> plane(row_bytes * rows);
+            for (size_t y = 0; y < rows; y++)
+                put_row(image, (first_row + y) * width, channel, type, plane.data() + y * row_bytes);
+            buffer.insert(channel.name,
+                          Imf::Slice::Make(type, plane.data(), Imath::V2i(0, static_cast<int>(top)),
+                                           static_cast<int64_t>(width), rows, size_of(type), row_bytes));
+            planes.push_back(std::move(plane)); // what the slice points to
         }
-        if (!output.write_scanlines(static_cast<int>(top), static_cast<int>(bottom), 0, OIIO::TypeDesc::UNKNOWN,
-                                    band.data()))
-            return false;
+        output.setFrameBuffer(buffer);
+        output.writePixels(static_cast<int>(rows));
     }
-    return true;
 }

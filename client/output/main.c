@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /* farlight-export: takes pictures over a socket that the program that started it has connected already, and
- * writes image files; compares image files. A program of its own so that nothing else links OpenImageIO; it may
- * write beneath one folder, read the files that it was started with, and open nothing else. */
+ * writes image files; compares image files. A program of its own so that nothing else links the libraries of image
+ * files; it may write beneath one folder, read the files that it was started with, and open nothing else. */
 #include "helper/file.h"
 #include "image.h"
+#include "library.h"
 #include "helper/sandbox.h"
 #include "serve.h"
 #include "protocol/version.h"
@@ -12,6 +13,7 @@
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <time.h>
 #include <unistd.h>
 
 #define EXIT_USAGE 2
@@ -20,12 +22,13 @@
 /* The C library looks for it by name, past our hidden visibility. */
 __attribute__((visibility("default"))) const char *argp_program_version = "farlight-export " FARLIGHT_VERSION;
 
-enum { KEY_FD = 0x100, KEY_FOLDER, KEY_FPS, KEY_READ };
+enum { KEY_FD = 0x100, KEY_FOLDER, KEY_FPS, KEY_FORMAT, KEY_READ };
 
 #define READ_MAX 2u
 
 struct options {
     const char *folder;
+    enum image_format format; /* of all files; unknown: any */
     struct compare_file files[READ_MAX];
     struct serve_options serve;
 };
@@ -44,6 +47,11 @@ static error_t parse(int key, char *value, struct argp_state *state)
     }
     case KEY_FOLDER:
         options->folder = value;
+        return 0;
+    case KEY_FORMAT:
+        options->format = image_format_of("", value);
+        if (options->format == IMAGE_UNKNOWN)
+            argp_error(state, "--format: '%s' is no format", value);
         return 0;
     case KEY_READ:
         if (options->serve.file_count == READ_MAX)
@@ -71,14 +79,21 @@ static void open_files(struct options *options)
         struct compare_file *file = &options->files[i];
         file->fd = file_open(file->path, file->reason, sizeof(file->reason));
     }
-    if (options->serve.file_count > 0)
-        compare_prepare();
+}
+
+/* Loads what libraries load late, while that is still allowed. */
+static void prepare(const struct options *options)
+{
+    const bool writes = options->folder != NULL, compares = options->serve.file_count > 0;
+    tzset(); /* for dates */
+    if (compares || (writes && image_needs_library(options->format)))
+        library_load(compares);
 }
 
 static bool enter_sandbox(struct options *options)
 {
     const char *const write_folders[] = {options->folder};
-    const char *const read_folders[] = {options->serve.file_count > 0 ? compare_font_folder : NULL};
+    const char *const read_folders[] = {options->serve.file_count > 0 ? COMPARE_FONT_FOLDER : NULL};
     const bool writes = options->folder != NULL;
     const struct sandbox_options sandbox = {.read_folders = read_folders,
                                             .read_folder_count = 1,
@@ -89,7 +104,8 @@ static bool enter_sandbox(struct options *options)
                                             .address_space_bytes = UINT64_C(16) << 30};
     char reason[TEXT_MAX] = "";
     open_files(options);
-    if (!image_prepare(reason, sizeof(reason)) || !sandbox_enter(&sandbox, reason, sizeof(reason))) {
+    prepare(options);
+    if (!sandbox_enter(&sandbox, reason, sizeof(reason))) {
         fprintf(stderr, "farlight-export: %s\n", reason);
         return false;
     }
@@ -101,6 +117,8 @@ int main(int argc, char **argv)
     static const struct argp_option rows[] = {
         {"fd", KEY_FD, "N", 0, "Connected stream socket to speak over (needed)", 0},
         {"folder", KEY_FOLDER, "DIR", 0, "The one folder that may be written to", 0},
+        {"format", KEY_FORMAT, "NAME", 0,
+         "What is written: png, jpeg, exr or hdr, only (default: any, which takes longer to start)", 0},
         {"read", KEY_READ, "FILE", 0, "An image that may be read and compared; twice", 0},
         {"fps", KEY_FPS, "N", 0, "Frames per second, for the metadata of EXR files", 0},
         {0}};

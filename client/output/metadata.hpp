@@ -5,12 +5,19 @@
 
 #include "image.h"
 
-#include <OpenImageIO/imageio.h>
+#include <string>
+#include <vector>
 
-// Adds the camera, the date and ours ("farlight/..") in the form that the format can carry: EXR keeps types, PNG
-// keeps strings, JPEG and HDR keep one comment.
-void add_metadata(OIIO::ImageSpec &spec, const struct image &image);
-// All of ours as lines "farlight/NAME=VALUE".
-std::string describe(const struct image &image);
+constexpr float degrees_per_radian = 57.29577951f;
+
+struct metadata_entry {
+    std::string name; // after "farlight/"
+    std::string text;
+    bool is_number;
+    float number;
+};
+std::vector<metadata_entry> metadata_of(const struct image &image);
+// All of them as lines "farlight/NAME=VALUE".
+std::string metadata_lines(const struct image &image);
 
 #endif

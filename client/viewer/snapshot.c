@@ -17,7 +17,8 @@ bool snapshot_write(const char *path, const struct pixmap *picture, struct fl_er
                                    .layers = 1u << PROTOCOL_LAYER_BEAUTY,
                                    .pixels = picture->pixels,
                                    .pixels_bytes = (size_t)picture->width * (size_t)picture->height * 4};
-    struct fl_exporter *exporter = fl_exporter_start(&(struct fl_exporter_options){.folder = folder}, error);
+    struct fl_exporter *exporter =
+        fl_exporter_start(&(struct fl_exporter_options){.folder = folder, .format = "png"}, error);
     const bool done =
         exporter &&
         fl_exporter_write(exporter, &frame, &(struct fl_export_options){.path = path, .format = "png"}, error) &&

@@ -44,7 +44,8 @@ MAY_INCLUDE = {
     "client/lib": ("protocol", "protocol/sealed", "protocol/common", "protocol/pixels"),
     "client/helper": ("protocol",),
     "client/import": ("protocol", "protocol/common", "client/helper"),
-    "client/output": ("protocol", "protocol/common", "client/helper"),
+    "client/output": ("protocol", "client/helper"),
+    "client/output/library": ("protocol/common", "client/output"),
     "client/video": ("protocol", "protocol/pixels", "client/helper", "client/lib"),  # of lib: rate
     "client/cli": ("protocol", "protocol/common", "protocol/sealed", "client/lib"),
     "client/viewer": ("protocol", "protocol/common", "client/lib", "client/cli"),  # the command line is parsed as that of render
@@ -70,7 +71,8 @@ RESTRICTED = {
     r"(sys/socket|sys/un|netinet/.*|netdb|arpa/inet)\.h": (BASE, "server/net", "client/lib", "client/helper", "client/import"),
     r"lib(av|sw)": ("client/video", "client/viewer", "server/encode"),
     r"SDL2?/": ("client/viewer",),
-    r"OpenImageIO/": ("client/import", "client/output"),
+    r"OpenImageIO/": ("client/import", "client/output/library"),
+    r"(png\.h|(OpenEXR|Imath)/)": ("client/output",),
     r"tiny_(gltf|obj_loader)": ("client/import",),
     r"(turbojpeg|zstd)\.h": ("server/encode", "client/lib", "protocol/pixels"),
     r"sodium\.h": ("server/session", "protocol/common", "protocol/sealed"),

@@ -210,6 +210,31 @@ TEST(one_exporter_writes_every_format)
     assert_int_equal(count_files(folder), before);
 }
 
+TEST(an_exporter_for_one_format_refuses_those_that_it_did_not_load)
+{
+    if (!find_exporter()) {
+        print_message("skipped: farlight-export is not built\n");
+        skip();
+    }
+    char path[128];
+    uint8_t *pixels = calloc(1, EDGE * EDGE * 16);
+    const struct fl_frame frame = some_frame(PROTOCOL_PIXEL_FORMAT_RGBA8, pixels);
+    struct fl_exporter *exporter =
+        fl_exporter_start(&(struct fl_exporter_options){.folder = folder, .format = "png"}, &error);
+    assert_non_null(exporter);
+    snprintf(path, sizeof(path), "%s/a.jpg", folder);
+    assert_true(fl_exporter_write(exporter, &frame, &(struct fl_export_options){.path = path}, &error));
+    assert_false(fl_exporter_wait(exporter, &error));
+    check_error(FL_ERROR_FILE, "started for other formats");
+    snprintf(path, sizeof(path), "%s/a.png", folder);
+    error = (struct fl_error){0};
+    assert_true(fl_exporter_write(exporter, &frame, &(struct fl_export_options){.path = path}, &error));
+    assert_true(fl_exporter_wait(exporter, &error));
+    unlink(path);
+    free(pixels);
+    fl_exporter_destroy(exporter);
+}
+
 /* ---- layers ---- */
 
 #define LAYER_SET(name) (1u << PROTOCOL_LAYER_##name)

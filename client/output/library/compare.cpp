@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: MIT
-#include "compare.h"
-#include "helper/file.h"
+#include "compare.hpp"
 #include "heat_map.hpp"
-#include "image.h"
 #include "picture.hpp"
 #include "similarity.hpp"
 
@@ -27,6 +25,7 @@ constexpr size_t file_bytes_max = size_t(1) << 31;
 constexpr float sent_max = 3e38f;
 
 struct comparison {
+    const struct library_host &host;
     const struct message_compare_images &wanted;
     struct compare_result &result;
     struct picture a, b;
@@ -47,14 +46,15 @@ bool fail(struct compare_result &result, const char *path, const std::string &re
     return false;
 }
 
-bool read_picture(const struct compare_file &file, struct picture &made, struct compare_result &result)
+bool read_picture(const struct library_host &host, const struct compare_file &file, struct picture &made,
+                  struct compare_result &result)
 {
     char reason[160] = "";
     uint8_t *bytes = nullptr;
     size_t count = 0;
     if (file.fd < 0)
         return fail(result, file.path, file.reason);
-    if (!file_read(file.fd, file_bytes_max, &bytes, &count, reason, sizeof(reason)))
+    if (!host.read(file.fd, file_bytes_max, &bytes, &count, reason, sizeof(reason)))
         return fail(result, file.path, reason);
     const std::unique_ptr<uint8_t, decltype(&std::free)> owner(bytes, std::free);
     std::string why;
@@ -156,18 +156,13 @@ bool write_picture(struct comparison &each, const ImageBuf &screen_a, const Imag
         const ImageBuf heat = shown;
         shown = side_by_side({&screen_a, &screen_b, &heat}, {wanted.label_a, wanted.label_b, scale});
     }
-    uint8_t *file = nullptr;
-    size_t file_bytes = 0;
-    const struct plain_image image = {
-        image_format_of(wanted.picture, wanted.format), static_cast<uint32_t>(shown.spec().width),
-        static_cast<uint32_t>(shown.spec().height), static_cast<const float *>(shown.localpixels()), scale};
-    if (!image_encode_plain(&image, &file, &file_bytes, reason, sizeof(reason)))
-        return fail(each.result, wanted.picture, reason);
-    const bool written = file_write(wanted.picture, file, file_bytes, reason, sizeof(reason));
-    std::free(file);
-    answer.picture_width = image.width;
-    answer.picture_height = image.height;
-    return written || fail(each.result, wanted.picture, reason);
+    const struct raster picture = {static_cast<uint32_t>(shown.spec().width),
+                                   static_cast<uint32_t>(shown.spec().height), 3, sizeof(float),
+                                   shown.localpixels()};
+    answer.picture_width = picture.width;
+    answer.picture_height = picture.height;
+    return each.host.write(&wanted, &picture, scale, reason, sizeof(reason)) ||
+           fail(each.result, wanted.picture, reason);
 }
 
 bool compare(struct comparison &each)
@@ -199,20 +194,15 @@ bool compare(struct comparison &each)
 
 } // namespace
 
-const char *const compare_font_folder = "/usr/share/fonts";
-
-void compare_prepare(void)
-{
-    heat_map_prepare();
-}
-
-bool compare_images(const struct message_compare_images *wanted, const struct compare_file *a,
-                    const struct compare_file *b, struct compare_result *result)
+bool compare_with_library(const struct library_host *host, const struct message_compare_images *wanted,
+                          const struct compare_file *a, const struct compare_file *b,
+                          struct compare_result *result)
 {
     try {
-        struct comparison each = {*wanted, *result, {}, {}, {}};
+        struct comparison each = {*host, *wanted, *result, {}, {}, {}};
         OIIO::attribute("threads", 0); // all processors: nothing else runs meanwhile
-        return read_picture(*a, each.a, *result) && read_picture(*b, each.b, *result) && compare(each);
+        return read_picture(*host, *a, each.a, *result) && read_picture(*host, *b, each.b, *result) &&
+               compare(each);
     } catch (const std::bad_alloc &) {
         return fail(*result, wanted->a, "and the other picture need more memory than is available");
     } catch (const std::exception &exception) {

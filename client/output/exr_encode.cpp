@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: MIT
+#include "exr_encode.hpp"
+#include "layers.hpp"
+#include "metadata.hpp"
+#include "protocol/version.h"
+
+#include <OpenEXR/ImfFloatAttribute.h>
+#include <OpenEXR/ImfIO.h>
+#include <OpenEXR/ImfMatrixAttribute.h>
+#include <OpenEXR/ImfOutputFile.h>
+#include <OpenEXR/ImfRationalAttribute.h>
+#include <OpenEXR/ImfStandardAttributes.h>
+#include <OpenEXR/ImfStringAttribute.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace
+{
+
+// The library seeks back at the end, to fill in where the lines are.
+class memory_stream : public Imf::OStream
+{
+  public:
+    memory_stream() : Imf::OStream("image.exr")
+    {
+    }
+    void write(const char bytes[], int count) override
+    {
+        const size_t end = at + static_cast<size_t>(count);
+        file.resize(std::max(file.size(), end));
+        std::copy_n(bytes, count, file.begin() + static_cast<std::ptrdiff_t>(at));
+        at = end;
+    }
+    uint64_t tellp() override
+    {
+        return at;
+    }
+    void seekp(uint64_t position) override
+    {
+        at = position;
+    }
+    std::vector<uint8_t> file;
+
+  private:
+    size_t at = 0;
+};
+
+// Matrices of EXR stand to the right of row vectors: element [row of the input][column of the output].
+struct matrix {
+    float m[4][4];
+};
+
+matrix multiply(const matrix &a, const matrix &b)
+{
+    matrix product = {};
+    for (int i = 0; i < 4; i++)
+        for (int j = 0; j < 4; j++)
+            for (int k = 0; k < 4; k++)
+                product.m[i][j] += a.m[i][k] * b.m[k][j];
+    return product;
+}
+
+// The inverse of a rotation and translation. The camera looks along -z, y is up.
+matrix world_to_camera(const float world_from_view[12])
+{
+    matrix made = {};
+    for (int axis = 0; axis < 3; axis++) {
+        for (int row = 0; row < 3; row++) {
+            made.m[row][axis] = world_from_view[4 * row + axis];
+            made.m[3][axis] -= world_from_view[4 * row + axis] * world_from_view[4 * row + 3];
+        }
+    }
+    made.m[3][3] = 1;
+    return made;
+}
+
+// Of OpenEXR's worldToNDC: (0,0) is the upper left corner of the picture, (1,1) the lower right one; z is of no
+// meaning and made 1 / distance here.
+matrix camera_to_ndc(const struct message_frame_begin &begin)
+{
+    const float aspect = static_cast<float>(begin.width) / static_cast<float>(begin.height);
+    matrix made = {};
+    if (begin.fov_y > 0) {
+        const float scale = 1 / std::tan(begin.fov_y / 2);
+        made.m[0][0] = scale / aspect / 2;
+        made.m[1][1] = -scale / 2;
+        made.m[2][0] = -0.5f;
+        made.m[2][1] = -0.5f;
+        made.m[2][3] = -1;
+        made.m[3][2] = 1;
+        return made;
+    }
+    const float height = begin.ortho_height > 0 ? begin.ortho_height : 1;
+    made.m[0][0] = 1 / (height * aspect);
+    made.m[1][1] = -1 / height;
+    made.m[2][2] = -1;
+    made.m[3][0] = 0.5f;
+    made.m[3][1] = 0.5f;
+    made.m[3][3] = 1;
+    return made;
+}
+
+void add_camera(Imf::Header &header, const struct message_frame_begin &begin)
+{
+    const matrix to_camera = world_to_camera(begin.world_from_view);
+    const matrix to_ndc = multiply(to_camera, camera_to_ndc(begin));
+    header.insert("worldToCamera", Imf::M44fAttribute(Imath::M44f(to_camera.m)));
+    header.insert("worldToNDC", Imf::M44fAttribute(Imath::M44f(to_ndc.m)));
+    header.insert("fieldOfView", Imf::FloatAttribute(begin.fov_y * degrees_per_radian));
+}
+
+// Rates as people mean them: whole numbers, and the television ones over 1001.
+void add_rate(Imf::Header &header, float frames_per_second)
+{
+    Imf::Rational rate(static_cast<int>(std::lround(static_cast<double>(frames_per_second) * 1000)), 1000);
+    const long television = std::lround(static_cast<double>(frames_per_second) * 1001);
+    const float whole = std::round(frames_per_second);
+    if (std::fabs(frames_per_second - whole) < 1e-4f) {
+        rate = Imf::Rational(static_cast<int>(whole), 1);
+    } else if (television % 1000 == 0) {
+        rate = Imf::Rational(static_cast<int>(television), 1001);
+    }
+    header.insert("framesPerSecond", Imf::RationalAttribute(rate));
+}
+
+Imf::Header make_header(const struct image &image, const std::string &date)
+{
+    Imf::Header header(static_cast<int>(image.begin->width), static_cast<int>(image.begin->height));
+    header.compression() = Imf::ZIP_COMPRESSION;
+    add_channels(header.channels(), image.begin->layers, image.half);
+    header.insert("Software", Imf::StringAttribute("farlight " FARLIGHT_VERSION));
+    Imf::addCapDate(header, date);
+    for (const metadata_entry &each : metadata_of(image)) {
+        const std::string name = "farlight/" + each.name;
+        if (each.is_number)
+            header.insert(name, Imf::FloatAttribute(each.number));
+        else if (!each.text.empty())
+            header.insert(name, Imf::StringAttribute(each.text));
+    }
+    add_camera(header, *image.begin);
+    if (image.frames_per_second > 0 && image.frames_per_second < 1e6f)
+        add_rate(header, image.frames_per_second);
+    return header;
+}
+
+} // namespace
+
+std::vector<uint8_t> exr_encode(const struct image &image, const std::string &date)
+{
+    memory_stream stream;
+    {
+        Imf::OutputFile output(stream, make_header(image, date)); // complete when it is destroyed
+        write_rows(output, image);
+    }
+    return std::move(stream.file);
+}

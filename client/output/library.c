@@ -1,0 +1,23 @@
+/* SPDX-License-Identifier: MIT */
+#include "library.h"
+#include "helper/module.h"
+
+#include <stdio.h>
+
+static const struct image_library *library;
+static char why_none[256] = "cannot be done: this program was started for other formats";
+
+void library_load(bool compares)
+{
+    const struct image_library *found =
+        module_load("farlight-images.so", "image_library", why_none, sizeof(why_none));
+    if (found && found->prepare(compares, why_none, sizeof(why_none)))
+        library = found;
+}
+
+const struct image_library *library_loaded(char *reason, size_t reason_bytes)
+{
+    if (!library)
+        snprintf(reason, reason_bytes, "%s", why_none);
+    return library;
+}

@@ -1,0 +1,53 @@
+/* SPDX-License-Identifier: MIT */
+/* The module that does what needs OpenImageIO and libjxl: it writes JPEG and HDR, and compares images. Their
+ * libraries take a third of a second to load, so that only the runs that need it load it. */
+#ifndef FARLIGHT_CLIENT_OUTPUT_LIBRARY_H
+#define FARLIGHT_CLIENT_OUTPUT_LIBRARY_H
+
+#include "compare.h"
+#include "image.h"
+#include "raster.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+struct library_image {
+    enum image_format format; /* JPEG or HDR */
+    struct raster raster;
+    unsigned quality;        /* JPEG */
+    const char *description; /* lines of text */
+    const char *date;        /* "YYYY:MM:DD hh:mm:ss"; may be empty */
+};
+
+/* What the module needs of the program, for files are the program's. */
+struct library_host {
+    bool (*read)(int fd, size_t greatest_bytes, uint8_t **bytes, size_t *count, char *reason, size_t reason_bytes);
+    /* Writes the picture of errors that the request names. */
+    bool (*write)(const struct message_compare_images *wanted, const struct raster *picture,
+                  const char *description, char *reason, size_t reason_bytes);
+};
+
+/* Exported under the name `image_library`. */
+struct image_library {
+    /* Makes the libraries load their plug-ins while that is still allowed. */
+    bool (*prepare)(bool compares, char *reason, size_t reason_bytes);
+    /* *file is malloc'ed. False: `reason` says why. */
+    bool (*encode)(const struct library_image *image, uint8_t **file, size_t *file_bytes, char *reason,
+                   size_t reason_bytes);
+    /* As compare_images. */
+    bool (*compare)(const struct library_host *host, const struct message_compare_images *wanted,
+                    const struct compare_file *a, const struct compare_file *b, struct compare_result *result);
+};
+extern const struct image_library image_library __attribute__((visibility("default")));
+
+/* Loads the module, to be called before the sandbox is entered; `compares`: not only for writing. */
+void library_load(bool compares);
+/* NULL: `reason` says why. */
+const struct image_library *library_loaded(char *reason, size_t reason_bytes);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

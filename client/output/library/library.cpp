@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: MIT
+#include "output/library.h"
+#include "compare.hpp"
+#include "heat_map.hpp"
+#include "protocol/version.h"
+
+#include <OpenImageIO/filesystem.h>
+#include <OpenImageIO/imageio.h>
+
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <exception>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace
+{
+
+bool fail(char *reason, size_t reason_bytes, const std::string &text)
+{
+    std::snprintf(reason, reason_bytes, "%s", text.c_str());
+    return false;
+}
+
+// Named, never guessed.
+const char *plugin_of(enum image_format format)
+{
+    return format == IMAGE_JPEG ? "jpeg" : "hdr";
+}
+
+OIIO::TypeDesc type_of(const struct raster &raster)
+{
+    return raster.component_bytes == 1   ? OIIO::TypeDesc::UINT8
+           : raster.component_bytes == 2 ? OIIO::TypeDesc::HALF
+                                         : OIIO::TypeDesc::FLOAT;
+}
+
+// What the file's pixels are: neither format has alpha.
+OIIO::ImageSpec make_spec(const struct library_image &image)
+{
+    const bool is_jpeg = image.format == IMAGE_JPEG;
+    OIIO::ImageSpec spec(static_cast<int>(image.raster.width), static_cast<int>(image.raster.height), 3,
+                         is_jpeg ? OIIO::TypeDesc::UINT8 : OIIO::TypeDesc::FLOAT);
+    spec.attribute("oiio:ColorSpace", is_jpeg ? "sRGB" : "Linear");
+    spec.attribute("Software", "farlight " FARLIGHT_VERSION);
+    if (image.date[0] != '\0')
+        spec.attribute("DateTime", image.date);
+    if (is_jpeg) {
+        spec.attribute("Compression", "jpeg:" + std::to_string(image.quality));
+        if (image.description[0] != '\0') // the library stops at an empty one
+            spec.attribute("ImageDescription", image.description);
+    }
+    return spec;
+}
+
+// Radiance files keep comments in their header, which OpenImageIO does not write.
+void insert_comments(std::vector<unsigned char> &file, const char *description)
+{
+    std::string lines;
+    for (const char *at = description; *at != '\0'; at++) {
+        if (lines.empty() || lines.back() == '\n')
+            lines += "# ";
+        lines += *at;
+    }
+    for (size_t i = 0; i < file.size() && i < 64; i++) {
+        if (file[i] != '\n')
+            continue;
+        file.insert(file.begin() + static_cast<std::ptrdiff_t>(i) + 1, lines.begin(), lines.end());
+        return;
+    }
+}
+
+bool write(const struct library_image &image, std::vector<unsigned char> &file, std::string &why)
+{
+    const char *plugin = plugin_of(image.format);
+    const std::unique_ptr<OIIO::ImageOutput> output = OIIO::ImageOutput::create(plugin);
+    OIIO::Filesystem::IOVecOutput memory(file);
+    const size_t pixel_bytes = size_t(image.raster.channels) * image.raster.component_bytes;
+    if (!output)
+        why = OIIO::geterror();
+    else if (!output->set_ioproxy(&memory))
+        why = "this build of OpenImageIO cannot write it to memory";
+    else if (!output->open(std::string("image.") + plugin, make_spec(image)) ||
+             !output->write_image(type_of(image.raster), image.raster.pixels,
+                                  static_cast<OIIO::stride_t>(pixel_bytes)) ||
+             !output->close())
+        why = output->geterror();
+    else
+        return true;
+    return false;
+}
+
+bool encode(const struct library_image *image, uint8_t **file, size_t *file_bytes, char *reason,
+            size_t reason_bytes)
+{
+    try {
+        std::vector<unsigned char> made;
+        std::string why;
+        if (!write(*image, made, why))
+            return fail(reason, reason_bytes, why);
+        if (image->format == IMAGE_HDR)
+            insert_comments(made, image->description);
+        *file = static_cast<uint8_t *>(std::malloc(made.size()));
+        if (!*file)
+            return fail(reason, reason_bytes, "out of memory");
+        std::memcpy(*file, made.data(), made.size());
+        *file_bytes = made.size();
+    } catch (const std::exception &exception) {
+        return fail(reason, reason_bytes, exception.what());
+    }
+    return true;
+}
+
+bool prepare(bool compares, char *reason, size_t reason_bytes)
+{
+    const std::vector<unsigned char> pixels(4 * 4 * 4, 0);
+    // One thread: the renderer has use for the others, and the sandbox need not allow more.
+    OIIO::attribute("threads", 1);
+    OIIO::attribute("exr_threads", -1);
+    for (const enum image_format format : {IMAGE_JPEG, IMAGE_HDR}) {
+        const struct library_image image = {format, {4, 4, 4, 1, pixels.data()}, 90, "", "2026:01:01 00:00:00"};
+        uint8_t *file = nullptr;
+        size_t file_bytes = 0;
+        if (!encode(&image, &file, &file_bytes, reason, reason_bytes))
+            return false;
+        std::free(file);
+    }
+    if (compares)
+        heat_map_prepare();
+    return true;
+}
+
+} // namespace
+
+const struct image_library image_library = {prepare, encode, compare_with_library};
