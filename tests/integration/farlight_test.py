@@ -228,3 +228,19 @@ class Case(unittest.TestCase):
     def leftovers(self):
         """Files in the test's folder, for the promise 'complete or not at all'."""
         return sorted(str(p.relative_to(self.folder)) for p in self.folder.rglob("*") if p.is_file())
+
+
+def private_daemon(**variables):
+    """The environment of a command that starts a daemon of its own, in a OneDaemon too; with more variables."""
+    return {**{name: value for name, value in os.environ.items() if name != "FARLIGHT_SERVER"}, **variables}
+
+
+class OneDaemon(Case):
+    """One daemon for all tests of a class, which commands find by themselves: it starts and compiles once."""
+
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.daemon = cls.enterClassContext(Daemon())
+        os.environ["FARLIGHT_SERVER"] = cls.daemon.address
+        cls.addClassCleanup(os.environ.pop, "FARLIGHT_SERVER")

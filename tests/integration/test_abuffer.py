@@ -5,7 +5,7 @@ import json
 import os
 
 import farlight_test
-from farlight_test import Case, Daemon, bundled_scenes, farlight, frames_of, grid_means
+from farlight_test import Case, OneDaemon, bundled_scenes, farlight, frames_of, grid_means, private_daemon
 
 SIZE = ["--size", "160x120"]
 ABUFFER = ["--tracer", "abuffer"]
@@ -59,11 +59,11 @@ class Options(Case):
                 self.assertIn(f"FARLIGHT_{name}: ", result.stderr)
 
 
-class Pictures(Case):
-    def picture(self, name, *options, scene="teapot.glb"):
+class Pictures(OneDaemon):
+    def picture(self, name, *options, scene="teapot.glb", **more):
         path = self.folder / f"{name}.png"
         result = self.expect(farlight("render", bundled_scenes() / scene, "-o", path, *SIZE, "--integrator", "whitted",
-                                      "--primary", "trace", "--timings=json", *options), 0)
+                                      "--primary", "trace", "--timings=json", *options, **more), 0)
         return path, frames_of(result)[0]
 
     def test_samples_are_shaded_as_the_surfaces_that_they_are_of(self):
@@ -98,11 +98,10 @@ class Pictures(Case):
             self.assertEqual(len(digests), 1, resolution)
 
     def test_two_tracers_of_one_daemon_do_not_mind_each_other(self):
-        alone = {tracer: self.picture("x", "--tracer", tracer)[1]["digest"] for tracer in ("bvh", "abuffer")}
-        with Daemon() as daemon:
-            for tracer in ("bvh", "abuffer", "bvh", "abuffer", "abuffer"):
-                self.assertEqual(self.picture("x", "--tracer", tracer, "--server", daemon.address)[1]["digest"], alone[tracer],
-                                 tracer)
+        alone = {tracer: self.picture("x", "--tracer", tracer, env=private_daemon())[1]["digest"]
+                 for tracer in ("bvh", "abuffer")}
+        for tracer in ("bvh", "abuffer", "bvh", "abuffer", "abuffer"):
+            self.assertEqual(self.picture("x", "--tracer", tracer)[1]["digest"], alone[tracer], tracer)
 
     def test_rasterised_first_hits_show_the_same(self):
         means = [grid_means(self.picture(primary, *ABUFFER, "--samples", "4", "--primary", primary)[0])
@@ -112,7 +111,7 @@ class Pictures(Case):
         self.assertLess(errors[-1], 5)
 
 
-class Lists(Case):
+class Lists(OneDaemon):
     def render(self, *arguments, status=0, **options):
         return self.expect(farlight("render", bundled_scenes() / "teapot.glb", "-o", self.folder / "x.png", *SIZE, *arguments,
                                     **options), status)
@@ -135,7 +134,7 @@ class Lists(Case):
         self.assertRegex(text, r"structure +resolution 128, cell [0-9.]+ m?m, samples \d+, longest list \d+; built for 1 of 1 frame\n")
 
     def test_a_scene_that_needs_more_than_it_may_is_refused_with_the_remedy(self):
-        result = self.render(*ABUFFER, status=1, env={**os.environ, "FARLIGHT_MEMORY_ABUFFER": "1M"})
+        result = self.render(*ABUFFER, status=1, env=private_daemon(FARLIGHT_MEMORY_ABUFFER="1M"))
         for words in ("memory.abuffer", "lower"):
             self.assertIn(words, result.stderr)
         self.assertEqual(self.leftovers(), [])
@@ -146,7 +145,7 @@ class Lists(Case):
         self.assertIn("farlight/structure/cell_metres", farlight_test.exr_attributes(path))
 
 
-class Animations(Case):
+class Animations(OneDaemon):
     def test_what_moves_is_drawn_anew_and_what_stands_still_is_not(self):
         result = self.expect(farlight("animate", bundled_scenes() / "carousel.glb", "--clip", "ride", "--frames", "1-3",
                                       "--fps", "8", "-o", self.folder / "%d.png", *SIZE, *SMALL, "--timings=json"), 0)
@@ -163,7 +162,7 @@ class Animations(Case):
         self.assertEqual(self.leftovers(), [])
 
 
-class Comparison(Case):
+class Comparison(OneDaemon):
     def test_rays_agree_with_the_reference(self):
         """99 % of the rays hit with both or miss with both, as is wanted of closed meshes."""
         result = farlight("compare", bundled_scenes() / "teapot.glb", "--tracers", "abuffer,reference", *SIZE, "--json")

@@ -16,7 +16,7 @@ import subprocess
 import time
 
 import farlight_test
-from farlight_test import BIN, Case, Daemon, SHARED_SCENES, bundled_scenes, farlight, needs_shared_scenes
+from farlight_test import BIN, Case, Daemon, OneDaemon, SHARED_SCENES, bundled_scenes, farlight, needs_shared_scenes
 
 SIZE = ["--size", "96x64"]
 
@@ -104,18 +104,7 @@ class Animations(Case):
         return path
 
 
-class OneDaemon(Animations):
-    """A daemon for all tests of a class, which commands find by themselves: much faster."""
-
-    @classmethod
-    def setUpClass(cls):
-        super().setUpClass()
-        daemon = cls.enterClassContext(Daemon())
-        os.environ["FARLIGHT_SERVER"] = daemon.address
-        cls.addClassCleanup(os.environ.pop, "FARLIGHT_SERVER")
-
-
-class Parts(OneDaemon):
+class Parts(OneDaemon, Animations):
     RANGE = ["--frames", "10-31:3"]  # 10 13 16 19 22 25 28 31
 
     def test_parts_together_are_the_whole_to_the_bit(self):
@@ -286,7 +275,7 @@ class Lost(Animations):
         self.assertEqual(hashes[0], hashes[1])
 
 
-class Videos(OneDaemon):
+class Videos(OneDaemon, Animations):
     def test_a_video_and_images_come_of_one_script(self):
         (self.folder / "f").mkdir()
         script = self.write({"model": str(self.model), "frames": "1-5", "size": [96, 64], "camera": {"orbit": True},
@@ -354,7 +343,7 @@ class Videos(OneDaemon):
         self.assertEqual(self.leftovers(), [])
 
 
-class Scripts(OneDaemon):
+class Scripts(OneDaemon, Animations):
     EYE, LOOK_AT = [2, 1.5, 2.5], [0, 0, 0]
 
     def camera(self, **more):
@@ -448,7 +437,7 @@ class Scripts(OneDaemon):
         self.expect(farlight("animate", "--script", script, "--size", "16x16"), 0)
 
 
-class Clips(OneDaemon):
+class Clips(OneDaemon, Animations):
     """Clips of a small model of our own, and of a real one."""
 
     VIEW = ["--eye", "0,2,7", "--look-at", "0,0.5,0", "--fov", "45"]
@@ -556,7 +545,7 @@ class Clips(OneDaemon):
         self.assertEqual(resumed, whole)
 
 
-class Progressive(OneDaemon):
+class Progressive(OneDaemon, Animations):
     ARGUMENTS = [*SIZE, "--aperture", "0.2"]
 
     def samples(self, path):

@@ -5,17 +5,17 @@ import os
 import pty
 import subprocess
 
-from farlight_test import BIN, TIMEOUT_S, Case, Daemon, bundled_scenes, farlight, read_png
+from farlight_test import BIN, TIMEOUT_S, Case, OneDaemon, bundled_scenes, farlight, private_daemon, read_png
 
 SIZE = ["--size", "80x60"]
 FLAKE = "sphereflake-2.nff"
 
 
-def compare(*arguments, model=FLAKE, tracers="bvh,naive"):
-    return farlight("compare", bundled_scenes() / model, "--tracers", tracers, *SIZE, *arguments)
+def compare(*arguments, model=FLAKE, tracers="bvh,naive", **options):
+    return farlight("compare", bundled_scenes() / model, "--tracers", tracers, *SIZE, *arguments, **options)
 
 
-class Rays(Case):
+class Rays(OneDaemon):
     def test_bvh_and_brute_force_agree_on_every_ray_of_every_wave(self):
         result = self.expect(compare("--json", "--samples", "2", "--fail-above", "agree=100%"), 0)
         report = json.loads(result.stdout)
@@ -64,9 +64,8 @@ class Rays(Case):
         self.assertLessEqual(max(map(len, result.stdout.splitlines())), 110)
 
     def test_a_daemon_of_ones_own_gives_the_same_counts(self):
-        with Daemon() as daemon:
-            there = json.loads(self.expect(compare("--json", "--server", daemon.address), 0).stdout)
-        here = json.loads(self.expect(compare("--json"), 0).stdout)
+        there = json.loads(self.expect(compare("--json"), 0).stdout)
+        here = json.loads(self.expect(compare("--json", env=private_daemon()), 0).stdout)
         for a, b in zip(there["waves"], here["waves"]):
             self.assertEqual([a[k] for k in ("wave", "kind", "rays", "both_hit", "both_missed")],
                              [b[k] for k in ("wave", "kind", "rays", "both_hit", "both_missed")])
@@ -102,7 +101,7 @@ class Talk(Case):
         self.assertEqual(self.compare_on_a_terminal("--quiet"), ("", 0))
 
 
-class Picture(Case):
+class Picture(OneDaemon):
     def test_the_reference_the_tracer_and_the_errors_stand_side_by_side(self):
         path = self.folder / "side.png"
         report = json.loads(self.expect(compare("-o", path, "--json"), 0).stdout)
@@ -120,16 +119,16 @@ class Picture(Case):
         self.assertEqual(self.leftovers(), ["side.png"])
 
     def test_temporary_files_go_away(self):
-        before = {**os.environ, "TMPDIR": str(self.folder)}
+        here = private_daemon(TMPDIR=str(self.folder))
         for arguments, status in (([], 0), (["--tracers", "bvh,reference"], None)):
             result = subprocess.run([BIN / "farlight", "compare", bundled_scenes() / FLAKE, "--tracers", "bvh,naive",
-                                     *SIZE, *arguments], env=before, capture_output=True, check=False, timeout=TIMEOUT_S)
+                                     *SIZE, *arguments], env=here, capture_output=True, check=False, timeout=TIMEOUT_S)
             if status is not None:
                 self.assertEqual(result.returncode, status, result.stderr)
             self.assertEqual(self.leftovers(), [])
 
 
-class Limits(Case):
+class Limits(OneDaemon):
     def test_one_beyond_a_limit_is_1_and_said(self):
         for bounds in ("box", "sphere"):
             self.expect(compare("--bvh-bounds", bounds, "--fail-above", "agree=99.99%", "--fail-above", "psnr=60"), 0)

@@ -4,7 +4,7 @@ refused."""
 import math
 
 import farlight_test
-from farlight_test import Case, Daemon, bundled_scenes, exr_attributes, exr_channels, farlight, frames_of, read_exr
+from farlight_test import Daemon, OneDaemon, bundled_scenes, exr_attributes, exr_channels, farlight, frames_of, read_exr
 
 EYE, LOOK_AT = (0.3, 1.1, 3.1), (0.0, 0.9, 0.0)
 VIEW = ["--size", "48x40", "--eye", ",".join(map(str, EYE)), "--look-at", ",".join(map(str, LOOK_AT)), "--fov", "50"]
@@ -21,7 +21,7 @@ CHANNELS = {
 }
 
 
-class Layers(Case):
+class Layers(OneDaemon):
     def render(self, *options, name="x.exr", scene="cornell.glb", status=0):
         path = self.folder / name
         return path, self.expect(farlight("render", bundled_scenes() / scene, "-o", path, *VIEW, "--timings=json", *options),

@@ -4,7 +4,7 @@ import json
 import os
 
 import farlight_test
-from farlight_test import Case, bundled_scenes, farlight, frames_of, grid_means, read_png
+from farlight_test import Case, OneDaemon, bundled_scenes, farlight, frames_of, grid_means, private_daemon, read_png
 
 SIZE = ["--size", "160x120"]
 LDC = ["--tracer", "ldc"]
@@ -45,7 +45,7 @@ class Options(Case):
         self.assertIn("FARLIGHT_LDC_RESOLUTION", result.stderr)
 
 
-class Pictures(Case):
+class Pictures(OneDaemon):
     def test_samples_are_shaded_as_the_surfaces_that_they_are_of(self):
         """First hits by the tracer itself. Of 255, in the mean over cells of 20 x 15 pixels: half a step where no edge is,
         and what silhouettes, a cell of the cube rough, may move where a mirror or glass repeats them. A wrong colour,
@@ -92,7 +92,7 @@ class Pictures(Case):
         self.assertLess(errors[-1], 10)
 
 
-class Structure(Case):
+class Structure(OneDaemon):
     def render(self, *arguments, **options):
         return self.expect(farlight("render", bundled_scenes() / "teapot.glb", "-o", self.folder / "x.png", *SIZE, *arguments,
                                     **options), 0)
@@ -120,7 +120,7 @@ class Structure(Case):
 
     def test_layers_that_a_limit_takes_away_are_told_with_the_remedy(self):
         result = self.render(*LDC, "--ldc-resolution", "128", "--timings=json",
-                             env={**os.environ, "FARLIGHT_LIMITS_LDC_LAYERS": "1"})
+                             env=private_daemon(FARLIGHT_LIMITS_LDC_LAYERS="1"))
         frame, = frames_of(result)
         said = frame["structure"]
         self.assertEqual(said["static/layers_kept"], 1)
@@ -134,12 +134,12 @@ class Structure(Case):
     def test_memory_is_a_limit_too(self):
         arguments = ["render", bundled_scenes() / "cornell.glb", "-o", self.folder / "x.png", *SIZE, *LDC, "--ldc-resolution",
                      "512", "--timings=json"]
-        result = self.expect(farlight(*arguments, env={**os.environ, "FARLIGHT_MEMORY_LDC": "12M"}), 0)
+        result = self.expect(farlight(*arguments, env=private_daemon(FARLIGHT_MEMORY_LDC="12M")), 0)
         said = frames_of(result)[0]["structure"]
         self.assertLess(said["static/layers_kept"], said["static/layers_needed"])
         self.assertGreater(said["static/samples_lost"], 0)
         self.assertIn("memory.ldc", result.stderr)
-        result = self.expect(farlight(*arguments, env={**os.environ, "FARLIGHT_MEMORY_LDC": "1M"}), 1)
+        result = self.expect(farlight(*arguments, env=private_daemon(FARLIGHT_MEMORY_LDC="1M")), 1)
         self.assertIn("no room for one layer", result.stderr)
         self.assertIn("take a lower resolution, or allow it more memory", result.stderr)
 
@@ -149,7 +149,7 @@ class Structure(Case):
         self.assertIn(b"farlight/structure/static/cell_metres", path.read_bytes()[:65536])
 
 
-class Animations(Case):
+class Animations(OneDaemon):
     def test_what_stands_still_is_sampled_once(self):
         result = self.expect(farlight("animate", bundled_scenes() / "carousel.glb", "--clip", "ride", "--frames", "1-4",
                                       "--fps", "8", "-o", self.folder / "%d.png", *SIZE, *LDC, "--ldc-resolution", "256",
@@ -174,7 +174,7 @@ class Animations(Case):
         self.assertEqual(self.leftovers(), [])
 
 
-class Comparison(Case):
+class Comparison(OneDaemon):
     def test_secondary_rays_agree_with_the_reference(self):
         """99 % of the rays hit with both or miss with both, as is wanted of closed meshes."""
         result = farlight("compare", bundled_scenes() / "teapot.glb", "--tracers", "ldc,reference", *SIZE, "--json")

@@ -12,7 +12,7 @@ import sys
 import time
 
 import farlight_test
-from farlight_test import BIN, Case, Daemon, bundled_scenes, farlight, grid_means, read_png
+from farlight_test import BIN, Case, Daemon, OneDaemon, bundled_scenes, farlight, grid_means, read_png
 
 FIGURES = farlight_test.ROOT / "tests/integration/figures.json"
 # Two of 255 in the mean over a cell of 20 x 15 pixels: what another driver's rounding and rasterisation may move at
@@ -32,7 +32,7 @@ def render_picture(name, output, *more):
                     *options, *more)
 
 
-class Pictures(Case):
+class Pictures(OneDaemon):
     def test_bundled_scenes_look_as_stored(self):
         stored = json.loads(FIGURES.read_text())
         for name in PICTURES:
@@ -93,7 +93,7 @@ class Pictures(Case):
         self.assertEqual(read_png(paths[0])[2], read_png(paths[1])[2])
 
 
-class Outputs(Case):
+class Outputs(OneDaemon):
     def test_every_format_is_written_and_nothing_else(self):
         magics = {"png": b"\x89PNG", "jpg": b"\xff\xd8\xff", "exr": b"\x76\x2f\x31\x01", "hdr": b"#?RADIANCE"}
         for ending, magic in magics.items():
