@@ -17,6 +17,8 @@ import tempfile
 from concurrent.futures import ThreadPoolExecutor
 
 # Of the daemon, and of programs that measure: a name is looked for in both, as those programs have both built in.
+BATCH = 40  # programs in one run of the compiler
+END_OF_FILE = "end_of_file_"  # a name that separates what the preprocessor writes of one file from that of the next
 ROOTS = (pathlib.Path("shaders"), pathlib.Path("tests/bench"))
 # Program -> its stages, and the defines of which it has one combination always.
 TRACERS = [{"TRAVERSE": '"naive/traverse.glsl"', "TRACER_NAIVE": "1", "RAYS_TOGETHER": "1"}] + [
@@ -125,35 +127,47 @@ def run(arguments):
     return done.returncode, done.stdout + done.stderr
 
 
-def complaints_in(log, files_of):
+def complaints_in(log, files_of, programs):
     """Lines of a log, in which `0:12` stands for a file of the stage that was named last and its line."""
-    complaints, files = [], []
+    complaints, files, program = [], [], ""
     for line in log.splitlines():
-        files = files_of.get(line.strip(), files)
+        files, program = files_of.get(line.strip(), files), programs.get(line.strip(), program)
         if re.match("ERROR|WARNING", line):
-            complaints.append(re.sub(r"^(\w+: )(\d+):", lambda m: f"{m[1]}{files[int(m[2])]}:", line))
+            line = re.sub(r"^(\w+: )(\d+):", lambda m: f"{m[1]}{files[int(m[2])] if files else '?'}:", line)
+            complaints.append(f"{program}: {line}")
     return complaints
 
 
-def complaints_of(variant):
-    """What is wrong with one program, whose stages are compiled and linked."""
-    stages, defines = variant
-    complaints, files_of = [], {}
+def stored_blocks(paths):
+    """Of each file the number of storage blocks, once the preprocessor is through with it."""
+    parts = run(["-E", *paths])[1].split(END_OF_FILE)
+    return [len(STORAGE_BLOCK.findall(part)) for part in parts[:len(paths)]]
+
+
+def complaints_of(batch):
+    """What is wrong with these programs. Many in one run: most of the compiler's time is its start. Programs of several
+    stages are linked as well, each by itself."""
+    complaints, files_of, programs = [], {}, {}
     with tempfile.TemporaryDirectory() as folder:
-        for stage in stages:
-            text, names = text_of(stage, defines)
-            path = os.path.join(folder, "stage" + pathlib.Path(stage).suffix)
-            pathlib.Path(path).write_text(text)
-            files_of[path] = names
-            blocks = len(STORAGE_BLOCK.findall(run(["-E", path])[1]))
-            most = STORAGE_BLOCKS_MAX[pathlib.Path(stage).suffix]
+        for number, (stages, defines) in enumerate(batch):
+            shown = " ".join(f"{name}={value}" for name, value in defines.items())
+            for stage in stages:
+                text, names = text_of(stage, defines)
+                path = os.path.join(folder, f"variant{number}" + pathlib.Path(stage).suffix)
+                pathlib.Path(path).write_text(f"{text}\nstruct {END_OF_FILE} {{ int unused; }};\n")
+                files_of[path], programs[path] = names, f"{stages[0]} [{shown}]"
+        for path, blocks in zip(files_of, stored_blocks(files_of)):
+            most = STORAGE_BLOCKS_MAX[pathlib.Path(path).suffix]
             if blocks > most:
-                complaints.append(f"{stage}: {blocks} storage blocks, where {most} are asked of a driver")
-        status, log = run(["-l", *files_of])
-        found = complaints_in(log, files_of)
-        complaints += found if found or status == 0 else [log]
-    shown = " ".join(f"{name}={value}" for name, value in defines.items())
-    return [f"{stages[0]} [{shown}]: {line}" for line in complaints]
+                complaints.append(f"{programs[path]}: {blocks} storage blocks, where {most} are asked of a driver")
+        linked = [[path for path in files_of if path.startswith(os.path.join(folder, f"variant{number}."))]
+                  for number, (stages, _) in enumerate(batch) if len(stages) > 1]
+        alone = [path for path in files_of if not any(path in paths for paths in linked)]
+        for arguments in [*([alone] if alone else []), *(["-l", *paths] for paths in linked)]:
+            status, log = run(arguments)
+            found = complaints_in(log, files_of, programs)
+            complaints += found if found or status == 0 else [log]
+    return complaints
 
 
 def main():
@@ -162,8 +176,9 @@ def main():
                    for path in root.rglob("*." + suffix))
     found = [program for program in found if program not in stages]
     all_variants = [variant for program in found for variant in variants(program)]
+    batches = [all_variants[i:i + BATCH] for i in range(0, len(all_variants), BATCH)]
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        complaints = [line for lines in pool.map(complaints_of, all_variants) for line in lines]
+        complaints = [line for lines in pool.map(complaints_of, batches) for line in lines]
     print("\n".join(complaints), end="\n" if complaints else "")
     print(f"{len(all_variants)} variants of {len(found)} programs, {len(complaints)} complaints", file=sys.stderr)
     return 1 if complaints else 0
