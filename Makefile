@@ -205,14 +205,12 @@ $(B)/farlight: $(CLI_OBJ) $(LIB_OBJ) $(PROTOCOL_OBJ)
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(CLIENT_LIBS) -o $@
 $(B)/helper.a: $(HELPER_OBJ)
 	$(call say,AR)rm -f $@ && $(AR) rcs $@ $^
-# Programs find their modules beside them, or where `make install` puts them.
-MODULE_PATH := -Wl,--enable-new-dtags,-rpath,'$$ORIGIN:$$ORIGIN/../lib/farlight'
 $(B)/farlight-import: $(IMPORT_OBJ) $(PROTOCOL_OBJ) | $(B)/farlight-textures.so
-	$(call say,LINK)$(CXX) $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(IMPORT_LIBS) $(MODULE_PATH) -o $@
+	$(call say,LINK)$(CXX) $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(IMPORT_LIBS) -o $@
 $(B)/farlight-textures.so: $(patsubst %.cpp,$(B)/pic/%.opp,$(TEXTURE_CXX))
 	$(call say,LINK)$(CXX) -shared $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(call pkg_libs,$(TEXTURE_PKGS)) -o $@
 $(B)/farlight-export: $(EXPORT_OBJ) $(PROTOCOL_OBJ) | $(B)/farlight-images.so
-	$(call say,LINK)$(CXX) $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(EXPORT_LIBS) $(MODULE_PATH) -o $@
+	$(call say,LINK)$(CXX) $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(EXPORT_LIBS) -o $@
 $(B)/farlight-images.so: $(patsubst %.cpp,$(B)/pic/%.opp,$(IMAGES_CXX))
 	$(call say,LINK)$(CXX) -shared $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(call pkg_libs,$(IMAGES_PKGS)) -o $@
 $(B)/farlight-video: $(VIDEO_OBJ) $(PROTOCOL_OBJ)

@@ -2,12 +2,39 @@
 #include "module.h"
 
 #include <dlfcn.h>
+#include <limits.h>
+#include <stdbool.h>
 #include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+/* Beside the program, or where it is installed. A run path would do the same, but not under the address sanitizer,
+ * whose dlopen stands before the C library's. */
+static bool find(const char *file, char path[PATH_MAX], char *reason, size_t reason_bytes)
+{
+    static const char *const folders[] = {"", "../lib/farlight/"};
+    char self[PATH_MAX];
+    const ssize_t length = readlink("/proc/self/exe", self, sizeof(self) - 1);
+    self[length > 0 ? length : 0] = '\0';
+    char *slash = strrchr(self, '/');
+    if (slash)
+        slash[1] = '\0';
+    for (size_t i = 0; slash && i < sizeof(folders) / sizeof(folders[0]); i++) {
+        const int written = snprintf(path, PATH_MAX, "%s%s%s", self, folders[i], file);
+        if (written < PATH_MAX && access(path, R_OK) == 0)
+            return true;
+    }
+    snprintf(reason, reason_bytes, "%s is neither beside this program nor in ../lib/farlight", file);
+    return false;
+}
 
 void *module_load(const char *file, const char *symbol, char *reason, size_t reason_bytes)
 {
+    char path[PATH_MAX];
+    if (!find(file, path, reason, reason_bytes))
+        return NULL;
     /* Lazily: most of the libraries' functions are never called. */
-    void *module = dlopen(file, RTLD_LAZY | RTLD_LOCAL);
+    void *module = dlopen(path, RTLD_LAZY | RTLD_LOCAL);
     void *found = module ? dlsym(module, symbol) : NULL;
     if (!found)
         snprintf(reason, reason_bytes, "%s", dlerror());

@@ -6,9 +6,8 @@
 
 #include <stddef.h>
 
-/* Loads the module `file` from where the program's run path says (beside the program, or ../lib/farlight) and
- * returns the address of `symbol` in it; it stays loaded. Call it before the sandbox is entered. NULL: `reason`
- * says why. */
+/* Loads the module `file`, which is beside the program or in ../lib/farlight, and returns the address of `symbol`
+ * in it; it stays loaded. Call it before the sandbox is entered. NULL: `reason` says why. */
 void *module_load(const char *file, const char *symbol, char *reason, size_t reason_bytes);
 
 #endif
