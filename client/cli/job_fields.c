@@ -35,7 +35,7 @@ static const struct row {
     {"tracer", "tracer", "NAME", "What finds intersections ('farlight tracers' explains them)", CLI_GROUP_METHOD,
      0, true},
     {"primary", "primary", "NAME",
-     "First hits: raster, trace (default: raster, but trace for the tracer reference)", CLI_GROUP_METHOD,
+     "How first hits are found (default: raster, but trace for the tracer reference)", CLI_GROUP_METHOD,
      GIVEN(has_primary), true},
     {"encoding", "encoding", "NAME",
      "How pixels travel: raw, zstd, predicted, jpeg (default: raw on this machine, zstd over a network)",
@@ -45,9 +45,7 @@ static const struct row {
      "encoding)",
      CLI_GROUP_METHOD, GIVEN(has_quality), true},
     {"integrator", "integrator", "NAME",
-     "whitted, distributed, raycast, ao, path (default: distributed for several samples, a lens or a shutter, "
-     "else "
-     "whitted)",
+     "Light transport (default: distributed for several samples, a lens or a shutter, else whitted)",
      CLI_GROUP_LIGHT, GIVEN(has_integrator), true},
     {"depth", "depth", "N", "Bounces after the first hit", CLI_GROUP_LIGHT, 0, true},
     {"bounces", "depth", "N", "The same as --depth", CLI_GROUP_LIGHT, 0, true},
@@ -71,14 +69,23 @@ static size_t field_count;
 
 /* ---- the list ---- */
 
-/* "auto (default), box, sphere" */
-static void add_choices(char *out, size_t out_bytes, const struct enum_desc *choices)
+/* "Bounding volume of a node: auto (default), box, sphere". Where `doc` ends in its own default, the names come
+ * before it; where it lists names itself, as not every encoding is one of a batch, nothing is added. */
+static void write_choices(char *out, size_t out_bytes, const struct enum_desc *choices)
 {
+    const char *found = strstr(out, " (default");
+    char usual[160];
+    snprintf(usual, sizeof(usual), "%s", found ? found : "");
+    if (found && memchr(out, ':', (size_t)(found - out)))
+        return;
+    out[found ? (size_t)(found - out) : strlen(out)] = '\0';
     for (size_t i = 0; i < choices->value_count; i++) {
         const size_t used = strlen(out);
         snprintf(out + used, out_bytes - used, "%s%s%s", i > 0 ? ", " : ": ", choices->values[i].text,
-                 choices->values[i].number == 0 ? " (default)" : "");
+                 !found && choices->values[i].number == 0 ? " (default)" : "");
     }
+    const size_t used = strlen(out);
+    snprintf(out + used, out_bytes - used, "%s", usual);
 }
 
 static void write_help(struct cli_field *option, const char *doc)
@@ -92,8 +99,7 @@ static void write_help(struct cli_field *option, const char *doc)
     if (doc[length - 1] == ')' && !field->tracer && field->kind != FIELD_ENUM)
         return;
     if (field->kind == FIELD_ENUM) {
-        if (!strstr(doc, "(default"))
-            add_choices(option->help, sizeof(option->help), field->enumeration);
+        write_choices(option->help, sizeof(option->help), field->enumeration);
     } else if (field->kind == FIELD_INT && strcmp(option->option, "bounces") != 0) {
         snprintf(option->help + used, sizeof(option->help) - used, "%s%s (default %s)",
                  field->numbers ? ": " : ", ", field_allowed_text(field, allowed, sizeof(allowed)),
