@@ -44,14 +44,14 @@ static const struct option options[] = {
     {"server", "listen", START, OPTION_TEXT, AT(listen), "unix:/run/farlight/farlight.sock", 0, 0, "",
      "Addresses to listen at, separated by blanks: unix:/PATH, tcp:HOST:PORT"},
     {"server", "readers", ANYTIME, OPTION_TEXT, AT(readers), "", 0, 0, "",
-     "Users who may only look, over the Unix socket: names or numbers, separated by blanks. They attach to shared "
-     "scenes and render them, and change nothing; but by TCP on loopback, if that is listened to, they come as anybody"},
+     "Read-only users of the Unix socket: names or numbers, separated by blanks. They attach to shared scenes and "
+     "render them, but change nothing. This does not apply to TCP on loopback, where users are not identified"},
     {"server", "insecure", START, OPTION_BOOL, AT(insecure), "no", 0, 1, "",
-     "Let TCP listen beyond loopback without a key: nothing is encrypted and nobody is asked who he is"},
+     "Let TCP listen beyond loopback without a key: nothing is encrypted, no client is authenticated"},
     {"server", "key_file", ANYTIME, OPTION_TEXT, AT(key_file), "", 0, 0, "",
-     "File of a key, as 'farlight key' makes one: whoever has it may come in from everywhere, on a sealed connection"},
+     "File of a key, created by 'farlight key': clients with the key may connect from everywhere, over a sealed link"},
     {"server", "reader_key_file", ANYTIME, OPTION_TEXT, AT(reader_key_file), "", 0, 0, "",
-     "The same for clients who may look, but change nothing"},
+     "The same for read-only clients"},
     {"server", "log_level", ANYTIME, OPTION_LEVEL, AT(log_level), "info", 0, 0, "", "error, warning, info or debug"},
     {"server", "trace_file", START, OPTION_TEXT, AT(trace_file), "", 0, 0, "",
      "File that gets the stages of all frames as trace events, for ui.perfetto.dev or chrome://tracing"},
@@ -70,13 +70,13 @@ static const struct option options[] = {
     {"memory", "blobs", ANYTIME, OPTION_BYTES, AT(limits.blob_bytes), "25%", MIB, 16 * TIB, "bytes",
      "Host memory of all blobs together: vertices, texels and the like"},
     {"memory", "blob_cache", ANYTIME, OPTION_BYTES, AT(limits.blob_cache_bytes), "10%", 0, 16 * TIB, "bytes",
-     "The part of it that is kept for a user's next connection when nobody uses it any more"},
+     "The part of it for blobs that are no longer used, kept for a user's next connection"},
     {"memory", "transactions", ANYTIME, OPTION_BYTES, AT(limits.transaction_bytes), "10%", MIB, 16 * TIB, "bytes",
      "Host memory of one client's edits that wait to be committed"},
     {"memory", "frames", ANYTIME, OPTION_BYTES, AT(limits.frame_bytes), "50%", MIB, 16 * TIB, "bytes",
-     "Host memory that the frames of all jobs may take; a job that may need more has to wait for others to end"},
+     "Host memory of the frames of all jobs; a job that may need more waits for others to end"},
     {"memory", "device", START, OPTION_BYTES, AT(device_bytes), "0", 0, 16 * TIB, "bytes",
-     "Device memory; 0: 70 % of what the device tells it has, of the host's for software GL"},
+     "Device memory; 0: 70 % of the device's own, or of the host's for software GL"},
 #define MEMORY_LIMIT(tracer, doc)                                                                                 \
     {"memory", #tracer, ANYTIME, OPTION_MEBIBYTES, AT(limits.tracers.tracer##_mebibytes), "0", 0, 16 * TIB, "bytes", \
      "The part of the device memory for " doc ". 0: no limit of its own"},
@@ -84,19 +84,19 @@ static const struct option options[] = {
 
     {"limits", "clients", ANYTIME, OPTION_U32, AT(limits.clients), "256", 1, 65536, "", "Connected clients"},
     {"limits", "unauthenticated", ANYTIME, OPTION_U32, AT(limits.unauthenticated), "64", 1, 65536, "",
-     "Connections that have not introduced themselves yet"},
+     "Connections whose handshake is not complete"},
     {"limits", "unauthenticated_per_address", ANYTIME, OPTION_U32, AT(limits.unauthenticated_per_address), "8", 1, 65536, "",
      "The same, from one TCP address"},
     {"limits", "wrong_keys", ANYTIME, OPTION_U32, AT(limits.wrong_keys_a_minute), "5", 1, ATTEMPTS_LIMIT_MAX, "",
-     "Wrong keys from one TCP address within a minute; then no key is heard from there until it is over"},
+     "Wrong keys from one TCP address within a minute; further keys from it are refused until the minute is over"},
     {"limits", "requests", ANYTIME, OPTION_U32, AT(limits.requests_in_flight), "64", 1, 65536, "",
      "Requests of one client in flight"},
     {"limits", "scenes", ANYTIME, OPTION_U32, AT(limits.scenes_per_client), "8", 1, 65536, "", "Open scenes of one client"},
     {"limits", "scene_linger", ANYTIME, OPTION_U32, AT(scene_linger_s), "120", 0, 86400, "s",
-     "How long a kept or shared scene stays when its last client is gone, to be come back to; 0: not at all"},
+     "How long a kept or shared scene lingers after its last client has left; 0: not at all"},
     {"limits", "scenes_lingering", ANYTIME, OPTION_U32, AT(lingering_scenes), "16", 1, 65536, "",
-     "Scenes that stay so, of all clients; of more, who left most loses his oldest. They give way where memory "
-     "for all is full, his own first who needs it"},
+     "Lingering scenes of all clients; beyond it, the user with most of them loses the oldest. They are evicted "
+     "when memory is full, first those of the user whose scene needs it"},
     {"limits", "jobs", ANYTIME, OPTION_U32, AT(limits.jobs_per_client), "4", 1, 65536, "", "Running jobs of one client"},
     {"limits", "blobs", ANYTIME, OPTION_U32, AT(limits.blobs_per_client), "262144", 1, 16777216, "",
      "Blobs that one connection may name"},
@@ -118,24 +118,24 @@ static const struct option options[] = {
     {"limits", "frame_window", ANYTIME, OPTION_BYTES, AT(limits.frame_window_bytes), "64M", MIB, 16 * GIB, "bytes",
      "Rendered frames of one job that may wait to be sent, if that is more than one"},
     {"limits", "trace_file", START, OPTION_BYTES, AT(trace_file_bytes), "256M", KIB, TIB, "bytes",
-     "Size of the trace file; then nothing more is written to it"},
+     "Maximum size of the trace file"},
 
     {"network", "handshake", ANYTIME, OPTION_U32, AT(connection.handshake_ms), "5000", 10, 600000, "ms",
-     "Time for a client to introduce itself"},
+     "Time for a client's handshake"},
     {"network", "wrong_key", ANYTIME, OPTION_U32, AT(connection.wrong_key_ms), "1000", 0, 60000, "ms",
-     "Time until a client with a wrong key is told so"},
+     "Delay before a wrong key is answered"},
     {"network", "progress_grace", ANYTIME, OPTION_U32, AT(connection.progress_grace_ms), "5000", 10, 600000, "ms",
-     "Time that any message may take to come"},
+     "Time in which any message may arrive, whatever its size"},
     {"network", "progress", ANYTIME, OPTION_U32, AT(connection.progress_bytes_per_s), "1024", 1, 1048576, "bytes/s",
-     "Least rate of a message that takes longer"},
+     "Minimum rate of a message that takes longer"},
     {"network", "idle", ANYTIME, OPTION_U32, AT(connection.idle_ms), "120000", 0, 86400000, "ms",
      "Silence after which a client that waits for nothing is disconnected; 0: never"},
     {"network", "queued_soft", ANYTIME, OPTION_BYTES, AT(connection.queued_soft_bytes), "16M", MIB, 16 * GIB, "bytes",
-     "Output waiting for a client from which on nothing more is read from it, .."},
+     "Output waiting for a client beyond which nothing more is read from it, .."},
     {"network", "queued_soft_time", ANYTIME, OPTION_U32, AT(connection.queued_soft_ms), "10000", 10, 600000, "ms",
-     ".. and after so long it is disconnected"},
+     ".. and the time after which it is disconnected"},
     {"network", "queued_hard", ANYTIME, OPTION_BYTES, AT(connection.queued_hard_bytes), "64M", MIB, 16 * GIB, "bytes",
-     "Output waiting for a client at which it is disconnected at once"},
+     "Output waiting for a client beyond which it is disconnected at once"},
 };
 /* clang-format on */
 #define OPTION_COUNT (sizeof options / sizeof options[0])
@@ -291,7 +291,7 @@ void config_keep_start(struct config *next, const struct config *config)
         const struct option *option = &options[i];
         if (option->time == ANYTIME || is_same(config, next, option))
             continue;
-        log_write(LOG_WARNING, "config", "%s.%s is taken at the start only: restart the daemon to change it",
+        log_write(LOG_WARNING, "config", "%s.%s is read at the start only: restart the daemon to change it",
                   option->section, option->key);
         memcpy(slot(next, option), (const char *)config + option->offset, slot_bytes(option));
     }
@@ -450,14 +450,14 @@ static void print_doc(const struct option *option, FILE *stream)
     if (option->type == OPTION_U32 || option->type == OPTION_BYTES || option->type == OPTION_MEBIBYTES)
         snprintf(range, sizeof range, " %" PRIu64 " .. %" PRIu64 "%s%s.", option->min, option->max,
                  option->unit[0] ? " " : "", option->unit);
-    snprintf(text, sizeof text, "%s.%s%s", option->doc, option->time == START ? " Taken at the start only." : "",
+    snprintf(text, sizeof text, "%s.%s%s", option->doc, option->time == START ? " Read at the start only." : "",
              range);
     print_comment(text, stream);
 }
 
 bool config_dump(const struct config *config, FILE *stream)
 {
-    fprintf(stream, "# farlightd %s. What is commented out has its default.\n", FARLIGHT_VERSION);
+    fprintf(stream, "# farlightd %s. Options that are commented out have their defaults.\n", FARLIGHT_VERSION);
     for (size_t i = 0; i < OPTION_COUNT; i++) {
         const struct option *option = &options[i];
         if (i == 0 || strcmp(option->section, options[i - 1].section) != 0)

@@ -12,7 +12,7 @@
 static void print_rules(void)
 {
     printf("# The wire format of farlight, version %u\n\n"
-           "Written from `protocol/messages.def`, `words.def` and `tracers.def` and of `protocol/docs/guide.md`; "
+           "Written from `protocol/messages.def`, `words.def`, `tracers.def` and `protocol/docs/guide.md`; "
            "do not edit.\n\n"
            "All numbers are little-endian. A connection begins with the handshake; after it both sides send\n"
            "messages. Lengths are metres, angles radians unless a field says degrees, colours linear Rec. 709,\n"
@@ -26,8 +26,7 @@ static void print_limits(void)
     static const struct handshake_limits none;
     struct handshake_limit limit;
     unsigned offset = 48;
-    printf("The limits in force at the daemon. What is missing at the end is 0 (not told), what is more is "
-           "skipped.\n\n"
+    printf("The limits of the daemon. Missing ones at the end are 0 (not told), further ones are skipped.\n\n"
            "| offset | type | name | limit |\n| ---: | --- | --- | --- |\n");
     for (size_t i = 0; handshake_limit_at(&none, i, &limit); i++) {
         printf("| %u | u%u | `%s` | %s |\n", offset, 8 * limit.bytes, limit.name, limit.what);
@@ -39,11 +38,11 @@ static void print_limits(void)
 static void print_capabilities(void)
 {
     printf(
-        "Capabilities are bits; others than these are 0 from who does not know them:\n\n"
+        "Capabilities are bits; all others are 0:\n\n"
         "| bit | meaning |\n| ---: | --- |\n"
         "| %d | of a client: it decodes the encoding h264; of a reply: the daemon encodes it, too |\n"
-        "| %d | of a reply: this client may only look, it changes nothing |\n"
-        "| %d | of a reply of version 0: only sealed connections are let in |\n"
+        "| %d | of a reply: this client may only look, and change nothing |\n"
+        "| %d | of a reply of version 0: only sealed connections are accepted |\n"
         "| %d | of a client: frames of views may end unfinished, as `frame_end` says; of a reply: they will |\n\n",
         __builtin_ctzll(HANDSHAKE_CAN_H264), __builtin_ctzll(HANDSHAKE_CAN_READ_ONLY),
         __builtin_ctzll(HANDSHAKE_NEEDS_KEY), __builtin_ctzll(HANDSHAKE_CAN_ABANDON));
@@ -59,7 +58,7 @@ static void print_handshake(void)
            "| 6 | u16 | version_max, not below version_min |\n"
            "| 8 | u64 | capabilities that the client understands |\n"
            "| 16 | 16 bytes | nonce |\n"
-           "| 32 | u8, bytes | name: at most %u bytes of UTF-8 after their number |\n"
+           "| 32 | u8, bytes | name: at most %u bytes of UTF-8 after their count |\n"
            "| | | zeros up to a multiple of 8 |\n\n",
            HANDSHAKE_HELLO_MAX_BYTES, HANDSHAKE_NAME_MAX_BYTES);
     printf("The reply, at most %u bytes:\n\n"
@@ -81,23 +80,22 @@ static void print_handshake(void)
 
 static void print_sealed_messages(void)
 {
-    printf(
-        "## Sealed connections\n\n"
-        "Where the daemon has a key (%u random bytes, the same at both ends), a connection may begin with four\n"
-        "messages that prove it and give the connection keys of its own; over a network it has to. Nobody on\n"
-        "the way can then read or change what is said, repeat it, or cut off the end unnoticed. The handshake\n"
-        "and all that follows travel in records as they would go over an open connection, cut anywhere.\n"
-        "Whether a connection is sealed its first byte says: `S` or, of the handshake, `F`. A daemon that lets\n"
-        "only sealed connections in answers the other handshake with version 0 and bit 2 of the capabilities.\n\n",
-        SEALED_KEY_BYTES);
+    printf("## Sealed connections\n\n"
+           "If the daemon has a key (%u random bytes, the same at both ends), a connection may begin with four\n"
+           "messages that prove it and derive keys for the connection; over a network it must. Then a third\n"
+           "party can neither read nor change the data, repeat it, or cut off its end unnoticed. The bytes of an\n"
+           "open connection, from the handshake on, are sent in records, cut anywhere. The first byte of a\n"
+           "connection is `S` if it is sealed, else the `F` of the handshake. A daemon that accepts only sealed\n"
+           "connections answers an open handshake with version 0 and bit 2 of the capabilities.\n\n",
+           SEALED_KEY_BYTES);
     printf("| message | from | bytes | layout |\n| ---: | --- | ---: | --- |\n"
            "| 1 | client | 72 | `SEAL`, u8 1, u8 version (%u), u16 0, X25519 public key (32), nonce (32) |\n"
            "| 2 | server | 72 | `SEAL`, u8 2, u8 status, u16 0, X25519 public key (32), nonce (32) |\n"
            "| 3 | client | 64 | `SEAL`, u8 3, u8 0, u16 0, header of its stream (24), proof (32) |\n"
            "| 4 | server | 64 | `SEAL`, u8 4, u8 status, u16 0, header of its stream (24), proof (32) |\n\n",
            SEALED_VERSION);
-    printf("Public keys and nonces are random and made for one connection. The client may send records right\n"
-           "behind message 3; what they carry is not looked at before its proof. A status other than 0 ends its\n"
+    printf("Public keys and nonces are random and used for one connection. The client may send records right\n"
+           "after message 3; they are opened only after its proof. A status other than 0 ends its\n"
            "message after 8 bytes, and the connection with it:\n\n| status | meaning |\n| ---: | --- |\n");
     for (enum sealed_status status = SEALED_WRONG_KEY; status <= SEALED_OTHER_VERSION; status++) {
         printf("| %d | %s |\n", (int)status, sealed_status_text(status));
@@ -124,16 +122,17 @@ static void print_sealed_keys(void)
     printf(
         "A record is u32 sealed_bytes and that many bytes: one push of the stream, with those 4 bytes as\n"
         "additional data. It has 1 to %u bytes of plain text, 17 fewer than sealed, and the tag MESSAGE (0). The\n"
-        "last one of a direction, behind the goodbye, has none and the tag FINAL (3). Anything else, a record\n"
-        "that does not open, and one behind the last, end the connection. A daemon waits before it refuses a\n"
-        "wrong key, and hears no keys for a while from an address that has sent too many.\n\n",
+        "last one of a direction, after the goodbye, has none and the tag FINAL (3). Anything else, a record\n"
+        "that does not open, and one after the last, end the connection. A daemon waits before it refuses a\n"
+        "wrong key, and refuses all keys for a while from an address that has sent too many wrong ones.\n\n",
         SEALED_PLAIN_MAX_BYTES);
 }
 
 static void print_sealed_stream(void)
 {
     printf(
-        "What crypto_secretstream_xchacha20poly1305 does, for who has no libsodium (ChaCha20 and Poly1305 of RFC\n"
+        "crypto_secretstream_xchacha20poly1305 in detail, for clients without libsodium (ChaCha20 and Poly1305 of "
+        "RFC\n"
         "8439, HChaCha20 as in XChaCha20): k = HChaCha20 of K and bytes 0 to 15 of the header; n = its bytes 16 "
         "to\n"
         "23; a counter begins at 1. A push has the nonce u32 counter | n and takes, of ChaCha20 with k and it,\n"
@@ -152,9 +151,9 @@ static void print_framing(void)
     printf("## Messages in the stream\n\n"
            "| offset | type | field |\n| ---: | --- | --- |\n"
            "| 0 | u32 | payload_bytes, without the padding |\n"
-           "| 4 | u16 | type; the top bit marks what a peer that does not know it skips |\n"
+           "| 4 | u16 | type; a peer skips an unknown type with the top bit |\n"
            "| 6 | u16 | flags, 0 |\n"
-           "| 8 | u32 | request: chosen by whoever asks, repeated by the answer; 0: none |\n"
+           "| 8 | u32 | request: chosen by the requesting side, repeated by the answer; 0: none |\n"
            "| 12 | u32 | channel |\n"
            "| %u | | payload, then zeros up to a multiple of 8 |\n\n",
            FRAMING_HEADER_BYTES);
@@ -284,30 +283,28 @@ static void print_predicted(void)
 {
     printf(
         "## The encoding `predicted`\n\n"
-        "One frame of Zstandard (RFC 8878). Unpacked it has as many bytes as the pixels, as planes one behind "
-        "the\n"
-        "other, of which there are as many as a pixel has bytes: plane b is for byte b of every pixel, rows from\n"
-        "the top, without gaps. Several layers are one picture of their common height.\n\n"
-        "What a plane has for a byte is that byte less its prediction, modulo 256. The prediction comes of three\n"
-        "bytes of the same plane: left of it (a), above it (b), and left of that (c); what lies outside the\n"
-        "picture is 0:\n\n"
+        "One frame of Zstandard (RFC 8878). Unpacked it has as many bytes as the pixels, in planes, one after\n"
+        "the other: plane b has byte b of every pixel, rows from the top, without gaps. Several layers are one "
+        "picture of their common height.\n\n"
+        "Each byte is stored minus its prediction, modulo 256. The prediction is computed from three bytes of\n"
+        "the same plane: left of it (a), above it (b), and left of that (c); bytes outside the picture are 0:\n\n"
         "    c >= max(a, b): min(a, b)\n"
         "    c <= min(a, b): max(a, b)\n"
         "    else:           a + b - c\n\n"
-        "So a decoder goes through the rows from the top and from left to right, and adds what it finds to the\n"
-        "prediction that it makes of the bytes that it has restored.\n\n");
+        "So a decoder restores the rows from the top and from left to right, and adds each stored byte to the\n"
+        "prediction from the bytes that it has restored.\n\n");
 }
 
 static void print_h264(void)
 {
-    printf(
-        "## The encoding `h264`\n\n"
-        "The frames of a view that have it are one stream, whatever others come between them: an access unit\n"
-        "each, in the byte stream format of ITU-T H.264 annex B, 4:2:0 with 8 bits, colours by BT.709 in the\n"
-        "limited range. Each gives its picture at once, as none needs a later one. A key frame is an IDR\n"
-        "picture with the parameter sets before it; the stream begins with one, one comes where frames change\n"
-        "their size, and otherwise only on request (`want_key_frame` of frame_ack). What is decoded has an even\n"
-        "width and height: where the frame's is odd, its last column or row is one too many.\n\n");
+    printf("## The encoding `h264`\n\n"
+           "The frames of a view with this encoding are one stream, whatever others are between them: an access\n"
+           "unit each, in the byte stream format of ITU-T H.264 annex B, 4:2:0 with 8 bits, colours by BT.709 in "
+           "the\n"
+           "limited range. Each can be decoded at once, as none needs a later one. A key frame is an IDR\n"
+           "picture with the parameter sets before it; the stream begins with one, a change of the frames' size\n"
+           "causes one, and otherwise only a request (`want_key_frame` of frame_ack). The decoded picture has an\n"
+           "even width and height: if the frame's is odd, drop the last column or row.\n\n");
 }
 
 static bool copy_file(const char *path)
