@@ -52,7 +52,7 @@ struct gpu_scene_deform {
 };
 
 void gpu_scene_deform_finish(struct gpu_scene_deform *deform, struct gpu_device *device);
-/* The buffers, for those who count or release them; returns how many. */
+/* Lists the buffers, to count or release them. Returns their number. */
 #define DEFORM_BUFFERS_MAX 9
 size_t gpu_scene_deform_buffers(struct gpu_scene_deform *deform, struct gpu_buffer *buffers[DEFORM_BUFFERS_MAX]);
 

@@ -204,7 +204,7 @@ void gpu_scene_bind(struct gpu_scene *gpu)
 
 uint64_t gpu_scene_device_bytes(const struct gpu_scene *gpu)
 {
-    struct gpu_scene copy = *gpu; /* the list is one for those who change the buffers too */
+    struct gpu_scene copy = *gpu; /* callers that change the buffers use the same list */
     struct gpu_buffer *buffers[BUFFERS_MAX];
     size_t count = list_buffers(&copy, buffers);
     uint64_t bytes = gpu->environment.size_bytes;

@@ -87,17 +87,17 @@ struct gpu_scene {
     struct gpu_texture environment;
     float environment_colour[3], environment_rotation;
     uint64_t geometry_revision, instances_revision, shading_revision, lights_revision; /* of what is there */
-    uint64_t deformed_revision; /* the last one given out; goes on counting when the copy is made anew, as what a
-                                   tracer has kept is told apart by it */
+    uint64_t deformed_revision;    /* the last number given out; continues when the copy is made again, as tracers
+                                      identify kept data by it */
     struct gpu_scene_state *state; /* private to gpu_scene*.c: which parts need not be uploaded again */
 };
 
 void gpu_scene_init(struct gpu_scene *gpu, struct gpu_device *device);
 void gpu_scene_finish(struct gpu_scene *gpu);
-/* Brings the copy to the scene's revision and to where things are in it while the shutter is open (NULL: as they
- * were committed); *changes says what moved. Materials and lights, also where lights are, are those of the first
- * pose; so is which nodes are hidden. What a transform makes flat in some pose is left out. On failure the copy is
- * empty and will be made anew by the next update. */
+/* Brings the copy to the scene's revision and to the poses while the shutter is open (NULL: as committed);
+ * *changes says what changed. Materials, lights and their transforms, and hidden nodes are those of the first
+ * pose. Instances whose transform is singular in some pose are left out. On failure the copy is empty, and the
+ * next update makes it again. */
 bool gpu_scene_update(struct gpu_scene *gpu, const struct scene *scene, const struct scene_motion *motion,
                       struct scene_changes *changes, struct stage_times *times, struct error *error);
 /* Whether an update would change nothing. */

@@ -7,7 +7,7 @@
 #include "render/context.h"
 #include "shared/wave.h"
 
-/* Lists the hits of the wave in hand: context->hit_list, hit_places and hit_count. Waits for the GPU. */
+/* Lists the hits of the current wave: context->hit_list, hit_places and hit_count. Waits for the GPU. */
 bool compact_hits(struct render_context *context, struct error *error);
 /* Counts of item_count items' blocks, made by the program `count` that is in use, become places in
  * context->block_offsets; *state takes the sums. Waits for the GPU. */

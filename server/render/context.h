@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What the passes of one frame share, and the buffers of the wave in hand. */
+/* The state that the passes of one frame share, and the buffers of the current wave. */
 #ifndef FARLIGHT_RENDER_CONTEXT_H
 #define FARLIGHT_RENDER_CONTEXT_H
 
@@ -28,7 +28,7 @@ struct render_context {
     struct environment_choice *environment_choice; /* which the integrator path keeps up */
     struct tracer *tracer;
     struct trace_state *trace_state; /* of the wave in hand, by that tracer */
-    struct comparison *comparison;   /* of the frame in hand; NULL: nothing is compared */
+    struct comparison *comparison;   /* of the current frame; NULL: nothing is compared */
     struct gpu_timer *timer;
     struct frame_request request;
     struct stage_times times;
@@ -40,7 +40,7 @@ struct render_context {
     bool has_filter; /* the uniforms have the places of `filter` */
     enum pixel_filter filter;
     uint32_t wave_capacity; /* rays that the buffers below hold */
-    /* The wave in hand: ray, path and, once traced, hit of each. */
+    /* The current wave: ray, path and, once traced, hit of each. */
     struct gpu_buffer rays, paths, hits;
     struct gpu_buffer ray_times; /* float a ray; empty where nothing moves */
     struct slice slice;          /* in hand */
@@ -48,7 +48,7 @@ struct render_context {
     bool sampled_hits;                      /* but for those of discs, those of the wave are stored samples */
     struct gpu_buffer hit_list, hit_places; /* of those paths that hit something, see compact.h */
     uint32_t hit_count;
-    uint32_t asked;  /* shadow rays of each hit of the wave in hand that are traced already */
+    uint32_t asked;  /* shadow rays of each hit of the current wave that are traced already */
     uint32_t asking; /* and that are made and not traced to the end; 0: none */
     struct gpu_buffer block_offsets, wave_state; /* of the compaction */
     struct gpu_buffer slice_sums;                /* vec4 a sample of the slice: radiance so far, coverage */
@@ -77,14 +77,14 @@ uint64_t context_device_bytes(const struct render_context *context);
  * many. */
 #define CONTEXT_SURFACE_DEFINES 3
 size_t context_surface_defines(const struct render_context *context, struct gpu_define *defines);
-/* Likewise the scene, the frame's uniforms, and rays, hits, paths and hit list of the wave in hand. */
+/* The same, with the scene, the frame's uniforms, and the rays, hits, paths and hit list of the current wave. */
 void context_bind_hits(struct render_context *context);
 /* Of ambient occlusion: rays a sample, and how far they look, metres. */
 uint32_t context_ao_rays(const struct render_context *context);
 float context_ao_distance(const struct render_context *context);
-/* For slices of so many samples and waves of wave_capacity rays. */
+/* Reserves buffers for slices of `samples` samples and waves of wave_capacity rays. */
 bool context_reserve(struct render_context *context, uint32_t slice_samples, struct error *error);
-/* When the rays of the wave in hand are; NULL: nothing moves. */
+/* The times of the current wave's rays; NULL: nothing moves. */
 struct gpu_buffer *context_ray_times(struct render_context *context);
 void context_finish(struct render_context *context);
 

@@ -27,7 +27,7 @@ float environment_float_from_half(uint16_t half)
         return sign ? -value : value;
     }
     if (exponent == 31)
-        return mantissa ? 0.0f : 65504.0f; /* infinity as the greatest half; not a number counts nothing */
+        return mantissa ? 0.0f : 65504.0f; /* infinity becomes the largest half; NaN counts as 0 */
     bits = sign | (exponent + 112) << 23 | mantissa << 13;
     memcpy(&value, &bits, sizeof(value));
     return value;

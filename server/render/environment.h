@@ -21,7 +21,7 @@ struct environment {
     struct gpu_buffer default_lights; /* one struct light */
 };
 
-/* Of an image's texel; infinity is the greatest number that a half holds, and what is not a number is 0. */
+/* Of an image's texel; infinity becomes the largest half, NaN becomes 0. */
 float environment_float_from_half(uint16_t half);
 bool environment_update(struct environment *environment, struct gpu_device *device, const struct scene *scene,
                         const struct gpu_scene *gpu, struct error *error);

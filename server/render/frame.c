@@ -22,7 +22,7 @@ void frame_abandon(struct frame_renderer *renderer)
     frame_end(renderer);
 }
 
-/* Where all pixels have the sample in hand, if each does not have a place of its own. */
+/* The position of the current sample within all pixels, if they share one. */
 static void place_sample(struct frame_renderer *renderer)
 {
     struct frame_uniforms *uniforms = &renderer->work->context.uniforms;
@@ -91,8 +91,8 @@ static bool find_primary(struct frame_renderer *renderer, struct error *error)
     return gpu_check(renderer->device, "primary hits", error);
 }
 
-/* A wave did not fit. Nothing of the slice has reached the picture, so it is done again: as two halves, or, where
- * one pixel's rays alone are too many, with more room. */
+/* A wave did not fit. Nothing of the slice has reached the picture, so it is traced again: as two halves, or, if
+ * the rays of one pixel are too many, with larger buffers. */
 static bool split_slice(struct frame_renderer *renderer, struct error *error)
 {
     struct render_context *context = &renderer->work->context;
@@ -181,7 +181,7 @@ static bool all_resolved(const struct frame_renderer *renderer)
     return renderer->plane == renderer->picture.plane_count;
 }
 
-/* The band before is taken while this one is copied. */
+/* The previous band is fetched while this one is copied. */
 static bool pass_on(struct frame_renderer *renderer, bool has_band, uint32_t plane, uint32_t band,
                     struct error *error)
 {

@@ -54,8 +54,8 @@ struct frame_request {
      * motion and request alike but for `samples` and what is done with the sum (format, tone map, exposure); it
      * adds its samples to those. n frames of k samples hold what one of n x k does, to the bit. */
     bool accumulate;
-    /* With `accumulate`: of `samples` only as many are added as make so many in all, none where they are there
-     * already; 0: all are. */
+    /* With `accumulate`: the limit of accumulated samples; of `samples` only those up to it are added. 0: no
+     * limit. */
     uint32_t samples_most;
     /* Every wave is traced by a second tracer too, primary rays included (`primary` is taken to be PRIMARY_TRACE),
      * and the result has what came of it. The picture is that of `tracer`. */
@@ -108,7 +108,7 @@ void frame_result_finish(struct frame_result *result);
  * 0 where there is none. Valid as long as the pixels; `which` is one of the result's attachments. */
 const uint8_t *frame_result_attachment(const struct frame_result *result, enum attachment which);
 
-/* What a scene has on the device, whoever looks at it: its copy, its light, and each tracer that was asked for. */
+/* The device's resources of a scene that all its viewers share: its copy, its light, and the tracers in use. */
 struct frame_scene;
 
 struct frame_scene *frame_scene_create(struct gpu_device *device, struct error *error);
@@ -117,7 +117,7 @@ uint64_t frame_scene_device_bytes(const struct frame_scene *shared);
 /* For tests: how long a step of bringing a tracer to the scene may take; 0: the least that it can be cut to. */
 void frame_scene_set_step(struct frame_scene *shared, uint64_t step_ns);
 
-/* What one who looks has: the waves and the picture of one frame at a time, and the samples of the last one. */
+/* The resources of one viewer: the waves and the picture of one frame at a time, and the last one's samples. */
 struct frame_renderer;
 
 /* `shared` stays the caller's and outlives the renderer. */

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* How a frame begins: the scene, the tracers and the lights are brought to what it shows, and there is room for
- * all that its steps need. */
+/* The start of a frame: brings the scene, the tracers and the lights to its state, and reserves the buffers of its
+ * steps. */
 #include "render/frame_state.h"
 
 #include "base/clock.h"
@@ -18,7 +18,7 @@
 #define SLICE_RAYS_COMPARED (1u << 14)
 #define SLICE_RAYS_HARDWARE (1u << 18)
 #define WAVE_PER_SLICE 2
-/* Textures of a picture that goes on and on are taken as if it had so many samples. */
+/* The number of samples that texture filtering assumes for a picture that accumulates without an end. */
 #define SAMPLES_GOING_ON 16
 
 static const struct tracer_impl *find_tracer(const struct frame_renderer *renderer, unsigned number,

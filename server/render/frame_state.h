@@ -50,7 +50,7 @@ struct frame_work {
     struct primary primary;
     struct layers layers;
     struct comparison *comparison; /* NULL: the last frame asked for none */
-    /* Bands of the picture on their way to the host, by turns: while one is taken, the next is copied. */
+    /* Two bands of the picture on their way to the host: while one is fetched, the next is copied. */
     struct gpu_readback copies[2];
 };
 
@@ -96,9 +96,9 @@ struct tracer_set *frame_tracers(struct frame_renderer *renderer, const struct t
 /* frame_begin.c. A step of bringing the tracers to the scene; the last one leaves the frame ready for its first
  * sample. */
 bool frame_build(struct frame_renderer *renderer, struct error *error);
-/* frame_begin.c. Lets go of what the frame in hand holds of what is shared. */
+/* frame_begin.c. Releases the shared resources of the current frame. */
 void frame_end(struct frame_renderer *renderer);
-/* frame_begin.c. Room for slices of slices.slice_rays and waves of context.wave_capacity rays. */
+/* frame_begin.c. Reserves buffers for slices of slices.slice_rays and waves of context.wave_capacity rays. */
 bool frame_reserve_waves(struct frame_renderer *renderer, struct error *error);
 
 #endif

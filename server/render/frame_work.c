@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What frames in progress need, handed on from one to the next: of many who look at a scene few have a frame in
- * progress at a time, and between two frames each keeps no more than its picture. */
+/* Resources of frames in progress, passed from one frame to the next: of many viewers of a scene few have a frame
+ * in progress at a time, and between two frames a viewer keeps its picture alone. */
 #include "render/frame_state.h"
 
 #include <stdlib.h>

@@ -135,7 +135,7 @@ static bool gather_ao(struct layers *layers, struct render_context *context, uin
     return program && gpu_check(context->device, "ambient occlusion", error);
 }
 
-/* Whether the slice in hand has anything to add: other samples than the first have only zeros for some. */
+/* Whether the current slice has anything to add: for some layers, samples after the first are zero. */
 static bool adds(const struct render_context *context, enum layer layer)
 {
     return context->uniforms.sample_index == 0 || !layers_of_first_sample(layer);

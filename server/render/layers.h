@@ -12,13 +12,13 @@ struct layers {
     uint32_t wanted;        /* bits, without LAYER_BEAUTY; 0: nothing is done, and no memory is held */
     struct gpu_buffer sums; /* shared/layers.h */
     struct gpu_buffer ao_rays, ao_times, ao_visibility;
-    bool noted;             /* of the slice in hand: what its hits are */
+    bool noted;             /* of the current slice: properties of its hits */
     uint32_t asked;         /* likewise: rays of ao that each hit has been given */
     uint32_t asking;        /* likewise: and that are made and not traced to the end; 0: none */
     uint32_t plane_samples; /* likewise: its samples, so many in each plane of the sums */
 };
 
-/* Room for those that the request asks for, for slices of so many samples and waves of wave_capacity rays. */
+/* Reserves the requested layers, for slices of `samples` samples and waves of wave_capacity rays. */
 bool layers_reserve(struct layers *layers, struct render_context *context, uint32_t slice_samples,
                     struct error *error);
 /* The context has rays and hits of a new slice. */
@@ -26,7 +26,7 @@ void layers_begin_slice(struct layers *layers);
 /* A short part of a slice's work; *done: there is no more. Leaves rays and hits as they are, and
  * the rays that it traces count as shadow rays. Inside no span. */
 bool layers_step(struct layers *layers, struct render_context *context, bool *done, struct error *error);
-/* Adds the slice in hand to the picture, which may be done once it is certain that it is not done again. */
+/* Adds the current slice to the picture. Call it once the slice cannot be repeated. */
 bool layers_accumulate(struct layers *layers, struct picture *picture, struct render_context *context,
                        struct error *error);
 /* Whether the layer holds the first sample of each pixel in place of the mean of all. */

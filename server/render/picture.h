@@ -10,7 +10,7 @@
 struct picture {
     uint32_t width, height;
     uint32_t tiles_across;
-    uint32_t samples;   /* of every pixel that the sums hold, or will when the frame in hand is done */
+    uint32_t samples;   /* samples per pixel in the sums, those of the current frame included */
     uint32_t band_rows; /* pixel rows of every band but the last; a multiple of 8 */
     uint32_t band_count;
     uint32_t layers;            /* bits; each layer is a plane, in the order of their numbers */
@@ -21,14 +21,14 @@ struct picture {
     size_t size_bytes;
 };
 
-/* Makes room for the request's picture and sets it to zero; or, where it holds `samples_before` samples of each
- * pixel that the request's are to be added to, leaves it. */
+/* Reserves the request's picture and clears it; a picture of `samples_before` samples per pixel, to which the
+ * request adds, is kept. */
 bool picture_begin(struct picture *picture, struct render_context *context, uint32_t samples_before,
                    struct error *error);
 uint32_t picture_slot_count(const struct picture *picture);
 /* First slot of the band after the one that `slot` is in. */
 uint32_t picture_band_end(const struct picture *picture, uint32_t slot);
-/* Adds the slice in hand to a plane: of `sums` the slice's samples from first_sum on. */
+/* Adds the current slice to a plane: the slice's samples in `sums` from first_sum on. */
 bool picture_accumulate(struct picture *picture, struct render_context *context, uint32_t plane,
                         struct gpu_buffer *sums, uint32_t first_sum, struct error *error);
 /* resolve.c: band of a plane -> picture->resolved; readback.c: from there to picture->pixels. */

@@ -9,8 +9,8 @@
 
 #include <epoxy/gl.h>
 
-/* Vertices that are drawn at once, in one step of the frame: on software GL they take some ten milliseconds where
- * triangles are small. On a GPU as many as an int numbers, with room to spare. */
+/* Vertices that one step of the frame draws: on software GL they take some ten milliseconds if triangles are
+ * small. On a GPU nearly as many as an int can number. */
 #define DRAW_VERTICES_SOFTWARE (3u << 16)
 #define DRAW_VERTICES_HARDWARE (3u << 24)
 /* Fewer where such a part takes long: larger triangles, other work on the machine. Each part costs something of

@@ -16,14 +16,14 @@ struct slices {
     uint32_t waiting_count;
 };
 
-/* Of `samples` that are left to do how many are done together, as a power of two: as the rays of a pixel walk
- * together, they lie side by side where they are traced. The picture is the same whatever it is. */
+/* How many of the remaining `samples` are traced together, as a power of two: the rays of a pixel form packets, so
+ * they are adjacent in a wave. It does not change the picture. */
 uint32_t slices_sample_shift(const struct slices *slices, uint32_t samples);
 /* The same if slices were large: of a picture of `samples` what follows the first `done`. */
 uint32_t slices_group_shift(uint32_t samples, uint32_t done);
 /* From the first pixel on. */
 void slices_restart(struct slices *slices);
-/* The next slice for so many samples; false: there is none. */
+/* The next slice for that many samples; false: none is left. */
 bool slices_take(struct slices *slices, const struct picture *picture, uint32_t sample_shift, struct slice *slice);
 /* The slice is done again as two halves; false: it is a single pixel. */
 bool slices_split(struct slices *slices, const struct slice *slice);

@@ -8,7 +8,7 @@
 
 enum wave_progress {
     WAVE_FAILED,
-    WAVE_AGAIN,    /* the wave in hand needs more of it: call again */
+    WAVE_AGAIN,    /* the current wave is not finished: call again */
     WAVE_MORE,     /* the context holds the next wave's rays and paths, not yet traced */
     WAVE_DONE,     /* no ray is left */
     WAVE_OVERFLOW, /* the next wave is larger than its capacity: the slice must be done again, in parts */

@@ -36,7 +36,7 @@
 #define WAVE_TURNED_DEGREES 5.0
 
 /* Errors by size, in bins of the float's upper bits: seven of the mantissa, so that a percentile is true to 0.4 %
- * however many errors there are. Below 2^-48 counts as 0, from 2^16 on as the greatest. */
+ * however many errors there are. Below 2^-48 counts as 0, from 2^16 on as the maximum. */
 #define ERROR_BINS (64 * 128 + 2)
 #define ERROR_GREATEST 1e30f /* in place of greater ones, and of what is no number */
 struct error_histogram {
@@ -47,7 +47,7 @@ struct error_histogram {
 
 void error_histogram_add(struct error_histogram *histogram, float error);
 void error_histogram_merge(struct error_histogram *into, const struct error_histogram *from);
-/* The least value that at least `share` (0 to 1) of the errors do not exceed; 0 without errors. */
+/* The smallest value that at least `share` (0 to 1) of the errors do not exceed; 0 without errors. */
 float error_histogram_percentile(const struct error_histogram *histogram, double share);
 
 /* What has been counted of one wave and kind; all-zero is empty. Large: keep it on the heap. */
@@ -96,8 +96,8 @@ struct wave_answers {
     const uint *first_visibility, *second_visibility;
 };
 
-/* Adds all rays. Returns how many are suspects, with their indices in `suspects` (room for `count`), ascending:
- * their answers differ, and each must be settled. */
+/* Adds all rays. Returns the number of suspects, whose answers differ, with their indices in `suspects` (capacity
+ * `count`), ascending: each must be settled. */
 uint32_t wave_compare(struct wave_tally *tally, const struct wave_compare_settings *settings,
                       const struct wave_answers *answers, uint32_t *suspects);
 /* The corners of a cube of a few rounding steps about the origin, with the same direction. */

@@ -30,7 +30,7 @@ bool comparison_prepare(struct comparison *comparison, const struct wave *wave, 
 /* The wave has been traced, in first_ns, and its buffers hold the answers. The scene is bound. */
 bool comparison_wave(struct comparison *comparison, const struct wave *wave, enum ray_kind kind,
                      uint32_t wave_number, uint64_t first_ns, struct error *error);
-/* The slice in hand has reached the picture, and what was counted of it counts; or it is done again in parts. */
+/* The current slice has reached the picture, and its counts are kept; or it is split and traced again. */
 bool comparison_keep_slice(struct comparison *comparison, struct error *error);
 void comparison_drop_slice(struct comparison *comparison);
 /* The figures of the frame, ascending by wave and kind; malloc'ed, the caller's. */

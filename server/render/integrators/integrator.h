@@ -13,7 +13,7 @@ struct integrator {
     uint32_t children_a_hit; /* at most */
     uint32_t shadow_waves;   /* how many waves of shadow rays the buffers hold; no more are traced at once */
     uint32_t straight_waves; /* waves beyond the depth that are left to rays which go straight on */
-    uint32_t (*shadow_rays_a_hit)(const struct render_context *context); /* of the frame in hand */
+    uint32_t (*shadow_rays_a_hit)(const struct render_context *context); /* of the current frame */
     /* The rest may be NULL: none. */
     const char *left_scene; /* a define of render/left_scene.comp */
     const char *gather;     /* a define of render/gather.comp */

@@ -11,7 +11,7 @@
 #include <string.h>
 
 #define TASK_PRIMITIVES 4096u /* smaller ranges stay with the thread that has them */
-#define STACK_DEPTH 40 /* the smaller half is walked first: a level at most for each doubling of the range */
+#define STACK_DEPTH 40        /* the smaller half comes first: at most one level for each doubling of the range */
 
 struct range {
     uint32_t node, begin, end;
@@ -25,7 +25,7 @@ struct builder {
     /* ranges that wait for a thread */
     pthread_mutex_t mutex;
     pthread_cond_t changed;
-    struct range *waiting; /* room for every range of at least TASK_PRIMITIVES at once */
+    struct range *waiting; /* capacity for all ranges of at least TASK_PRIMITIVES */
     uint32_t waiting_count;
     unsigned busy;
     bool shared; /* several threads */
@@ -39,7 +39,7 @@ static inline float half_area(const struct bvh_box *box)
     return d[0] * d[1] + d[1] * d[2] + d[2] * d[0];
 }
 
-/* The places of its nodes are free until a range has been split: room for its boxes, of the same size. */
+/* The memory of its nodes is unused until a range is split: it holds its boxes, which have the same size. */
 static struct bvh_box *spare_boxes(const struct builder *builder, const struct range *range)
 {
     static_assert(sizeof(struct bvh_box) == sizeof(struct bvh_binary_node), "a box fits where a node goes");
@@ -158,7 +158,7 @@ static void build_range(struct builder *builder, struct range range)
     }
 }
 
-/* One thread of the builder: takes ranges until none is left and nobody can make another. */
+/* One thread of the builder: processes ranges until none is left and no thread can add one. */
 static void build_thread(void *context, uint32_t thread)
 {
     (void)thread;

@@ -67,8 +67,8 @@ struct bvh_shape {
     const uint32_t *indices;      /* 3 a triangle, in range (the scene has checked it) */
     const float *centres_radii;   /* 4 a sphere */
     uint32_t primitive_count;     /* at least 1 */
-    bool deforms; /* the tree is to be refitted: it gets a plan, and room for where its triangles are as the
-                     shutter closes, behind where they are as it opens */
+    bool deforms; /* the tree will be refitted: it gets a plan, and space for its triangles at shutter close behind
+                     those at shutter open */
 };
 
 /* How a tree is refitted, bottom-up in steps; within a step elements need none of the others. */
@@ -190,7 +190,7 @@ uint32_t bvh_leaf(uint32_t kind, uint32_t first, uint32_t count);
 float bvh_box_area(const float lower[3], const float upper[3]);
 void bvh_pad_box(float lower[3], float upper[3]);
 
-/* A grid over a padded box, with some room to all sides where `room` is set, a share of the box's extent. */
+/* A grid over a padded box, enlarged on all sides by `room`, a share of the box's extent. */
 struct bvh_grid bvh_grid_over(const float lower[3], const float upper[3], float room);
 /* Cells of a padded box, two an axis; rounded outward. False: some of it lies outside of the grid. */
 bool bvh_grid_cells(const struct bvh_grid *grid, const float lower[3], const float upper[3], uint32_t cells[3][2]);

@@ -6,7 +6,7 @@
 
 #include <stdlib.h>
 
-/* An inner node whose surface is at least this share of its nearest kept ancestor's is thrown back: its children
+/* An inner node whose surface is at least this share of its nearest kept ancestor's is removed: its children
  * become that ancestor's. A node with two children saves two tests where it is missed and costs one whenever it is
  * reached, so by the heuristic it pays below one half. Measured at 0.5, 0.6, 0.7, 0.85 and never: boxes hardly
  * care (2 %), spheres lose 10 % where nothing is thrown back, and 0.5 leaves a fifth fewer elements. */
@@ -22,7 +22,7 @@ struct bake {
     uint32_t place_count; /* of the binary tree */
     uint32_t *element;    /* of each binary node; of inner nodes that are thrown back BVH_NONE */
     uint32_t *below;      /* elements of each binary node's subtree */
-    uint32_t waiting_max; /* right children that wait in a walk through the tree, at most */
+    uint32_t waiting_max; /* maximum of right children that wait during a traversal */
     bool failed[BVH_OCTANTS / LANES];
 };
 
@@ -31,7 +31,7 @@ static bool node_is_leaf(const struct bvh_binary_node *node)
     return node->count_axis >> 2 > 0;
 }
 
-/* In depth-first order: who stays, and whose child it becomes. */
+/* In depth-first order: which nodes are kept, and their new parents. */
 static void choose_elements(struct bake *bake, const float *areas)
 {
     struct bvh_baked *baked = bake->baked;

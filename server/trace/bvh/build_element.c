@@ -8,11 +8,12 @@
 
 /* The grid's cells begin this far inside of it, so that rounding outward stays within. */
 #define GRID_INNER 2.0
-/* A box's corners are moved outward by this much of a cell before they are rounded outward: what the walk's
- * arithmetic rounds on coordinates of up to BVH_GRID_CELLS cells (shaders/bvh/bounds.glsl), 2^-24 each, 8 times.
+/* A box's corners are moved outward by this much of a cell before they are rounded outward: the rounding of the
+ * traversal's arithmetic on coordinates of up to BVH_GRID_CELLS cells (shaders/bvh/bounds.glsl), 2^-24 each, 8
+ * times.
  */
 #define GRID_PAD (8.0 * BVH_GRID_CELLS / 16777216.0)
-/* An axis along which a tree has (almost) no extent gets cells of this share of its greatest one. */
+/* An axis along which a tree has (almost) no extent gets cells of this share of its largest one. */
 #define GRID_FLATNESS 0x1p-20
 
 uint32_t bvh_octants(const struct bvh_form *settings)
@@ -73,14 +74,14 @@ struct bvh_bound bvh_bound_of_sphere(const float centre[3], float radius)
 
 /* ---- grid ---- */
 
-/* The greatest float that is not greater. */
+/* The largest float that is not greater. */
 static float float_below(double x)
 {
     float near = (float)x;
     return (double)near > x ? nextafterf(near, -INFINITY) : near;
 }
 
-/* Extents up to twice the greatest float are in use: doubles. */
+/* Extents reach twice the largest float: doubles. */
 struct bvh_grid bvh_grid_over(const float lower[3], const float upper[3], float room)
 {
     struct bvh_grid grid;

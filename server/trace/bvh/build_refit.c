@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: MIT
-/* The order in which a tree's boxes are made anew when its primitives have moved. */
+/* The order in which a tree's boxes are refitted after its primitives have moved. */
 #include "trace/bvh/build.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-/* Heights of fewer elements are walked one element after the other by one invocation: a dispatch each takes
- * longer. */
+/* Levels with fewer elements are refitted by one invocation in sequence: one dispatch for each takes longer. */
 #define STEP_ELEMENTS_MIN 64u
 /* Software GL leaves the loops of an invocation after 65,535 rounds, without a word. */
 #define ROUNDS_MAX 30000u

@@ -36,7 +36,7 @@ bool bvh_top_move(struct bvh_top *top, uint32_t instance, const struct bvh_world
  * `moved` until the next bvh_top_settle. */
 uint32_t bvh_top_refit(struct bvh_top *top);
 void bvh_top_settle(struct bvh_top *top);
-/* So much has moved that a new tree would be much better. */
+/* So many instances have moved that a new tree would be much better. */
 bool bvh_top_is_stale(const struct bvh_top *top);
 
 #endif

@@ -8,11 +8,10 @@
 
 #include <epoxy/gl.h>
 
-/* How many walk together on software GL where that pays. Elsewhere a SIMD group of the hardware walks together
- * already, and several rays an invocation cost registers; not measured there. */
+/* The packet size on software GL where packets pay. On hardware a SIMD group traverses together already, and
+ * several rays per invocation cost registers; not measured there. */
 #define TOGETHER_SOFTWARE 8u
-/* A walk of several rays takes as long as four of single ones (bench_bvh): it pays where it is
- * shared by more than that. */
+/* The traversal of a packet takes as long as four single ones (bench_bvh): it pays with more rays than that. */
 #define RAYS_A_WALK_MIN 5u
 /* Rays that are farther apart than so many leaves, where the scene is, have few leaves in common. Measured: with
  * 871K triangles in 70K pixels (4 leaves) eight camera rays together are 0.9 of one alone, with 590K in 213K (2
@@ -34,7 +33,7 @@ float bvh_reach_together(const struct gpu_scene *scene, const struct wave *wave)
     return wave->origin_spread > reach && !scene->has_motion ? wave->origin_spread : reach;
 }
 
-/* Of a sample of the wave: rays alive, and walks that they would take. */
+/* Of a sample of the wave: live rays, and the traversals that they would need. */
 static bool measure_coherence(struct bvh *bvh, const struct gpu_scene *scene, const struct wave *wave,
                               uint32_t counts[2], struct error *error)
 {

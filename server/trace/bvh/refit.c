@@ -8,7 +8,7 @@
 #include <stdlib.h>
 
 #define TEXEL_BYTES 16u
-#define PART_ALIGNMENT 256u /* the greatest that OpenGL lets a device ask for */
+#define PART_ALIGNMENT 256u /* the maximum that OpenGL lets a device require */
 
 bool bvh_refit_init(struct bvh_refit *refit, struct gpu_device *device, struct bvh_refit_plan *plan,
                     struct error *error)

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Refitting trees of deformed geometries on the device: boxes are made anew bottom-up from where the triangles are
- * now, order and links stay. Based on: Wald, Boulos, Shirley. Ray Tracing Deformable Scenes Using Dynamic Bounding
- * Volume Hierarchies. ACM TOG 2007, section 5. GL thread. */
+/* Refitting of trees of deformed geometries on the device: boxes are computed again bottom-up from the current
+ * triangles; order and links stay. Based on: Wald, Boulos, Shirley. Ray Tracing Deformable Scenes Using Dynamic
+ * Bounding Volume Hierarchies. ACM TOG 2007, section 5. GL thread. */
 #ifndef FARLIGHT_TRACE_BVH_REFIT_H
 #define FARLIGHT_TRACE_BVH_REFIT_H
 
@@ -20,9 +20,9 @@ struct bvh_refit {
     uint32_t step_count;
 };
 
-/* How many times as worn as when it was built a tree may be (struct bvh_tree, wear): beyond, a new one is built. A
- * ray then meets up to so many times the boxes, which takes longer than a frame's share of building does in scenes
- * of any size.
+/* Maximum growth of a tree's wear since its build (struct bvh_tree, wear): beyond it, a new one is built. A ray
+ * then meets up to that many times as many boxes, which costs more than a frame's share of a build in scenes of
+ * any size.
  */
 #define BVH_REFIT_WEAR_MAX 2.0f
 

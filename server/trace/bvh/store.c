@@ -10,8 +10,8 @@
 #define TEXEL_BYTES (4 * sizeof(float))
 #define TOP_CAPACITY_MIN 64u
 #define PART_SLACK 256u
-/* Where more than one in so many of its elements have moved, or more than so many, the top tree goes to the device
- * in one step: a call costs as much as some thousand bytes. */
+/* If more than this share of its elements has moved, or more than this number, the whole top tree is uploaded at
+ * once: a call costs as much as some thousand bytes. */
 #define WRITE_WHOLE 4u
 #define WRITE_RUNS_MAX 64u
 #define UPLOAD_BYTES ((uint64_t)1 << 22) /* at a time */
@@ -62,7 +62,7 @@ uint64_t bvh_store_bytes(const struct bvh_store *store)
     return bytes;
 }
 
-/* ---- room ---- */
+/* ---- memory ---- */
 
 /* What a texel buffer (or a storage buffer, for the plain form's elements) can hold. */
 static bool check_limits(const struct bvh_store *store, uint64_t elements, uint64_t texels, struct error *error)
@@ -117,7 +117,7 @@ static bool resize(struct gpu_device *device, struct gpu_buffer *buffer, size_t 
     return true;
 }
 
-/* Packs the entries behind the top tree's room and leaves `elements` and `texels` behind them for new ones. */
+/* Packs the entries behind the top tree's space and leaves `elements` and `texels` behind them for new ones. */
 static bool pack(struct bvh_store *store, uint32_t top_capacity, uint64_t elements, uint64_t texels,
                  struct error *error)
 {
@@ -169,7 +169,7 @@ static bool entry_is_of(const struct bvh_entry *entry, const struct gpu_scene_ge
            entry->is_mesh == (geometry->mesh != NULL);
 }
 
-/* A node that deforms shows one geometry, which nobody else shows. */
+/* A deforming node shows one geometry, which no other node shows. */
 static uint64_t entry_key(bool is_mesh, uint32_t id, uint32_t node)
 {
     return node != 0 ? (uint64_t)node << 2 | 2 : (uint64_t)id << 2 | is_mesh;
@@ -260,7 +260,7 @@ static void add_entry(struct bvh_store *store, const struct gpu_scene_geometry *
     entry->leaf_extent = tree->leaf_extent;
 }
 
-/* What is left of an array of which so many bytes have been written already; those are given up to the next one.
+/* The rest of an array of which that many bytes are written; surplus bytes count for the next array.
  */
 static bool upload_array(struct bvh_store *store, struct gpu_buffer *buffer, uint64_t first_byte,
                          const void *array, uint64_t bytes, uint64_t *done, uint64_t step_end_ns)
@@ -322,7 +322,7 @@ static bool begin_build(struct bvh_store *store, struct bvh_job *jobs, uint32_t 
            error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the trees of %u geometries", count);
 }
 
-/* Where the trees are done: room for them. */
+/* After the builds: reserves memory for the trees. */
 static bool finish_run(struct bvh_store *store, struct stage_times *times, struct error *error)
 {
     struct bvh_store_build *build = &store->build;

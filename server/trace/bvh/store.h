@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The trees on the device: one for each geometry, kept by (kind, id, revision), behind a room for the top tree.
+/* The trees on the device: one for each geometry, kept by (kind, id, revision), behind a space for the top tree.
  * GL thread. */
 #ifndef FARLIGHT_TRACE_BVH_STORE_H
 #define FARLIGHT_TRACE_BVH_STORE_H
@@ -55,7 +55,7 @@ struct bvh_store {
     bool deforms;            /* some geometry's vertices may move */
     bool deforms_in_shutter; /* and do, while the shutter is open */
     uint32_t top_capacity;   /* elements before the first entry */
-    bool top_lost;           /* the top tree has to be written again; cleared by who does */
+    bool top_lost;           /* the top tree must be written again; cleared by the code that writes it */
     struct gpu_buffer elements, primitives;
     struct gpu_buffer boxes, roots; /* of refits */
     struct bvh_store_build build;
@@ -87,7 +87,7 @@ bool bvh_store_deform(struct bvh_store *store, struct gpu_scene *scene, struct b
 bool bvh_store_rebuild(struct bvh_store *store, const struct gpu_scene *scene, struct bvh_job *jobs,
                        uint32_t *which, uint32_t count, struct bvh_store_report *report, struct stage_times *times,
                        struct error *error);
-/* Room for a top tree of so many elements. */
+/* Reserves a top tree of that many elements. */
 bool bvh_store_reserve_top(struct bvh_store *store, uint32_t element_count, struct error *error);
 /* Writes elements of the top tree: all, or those marked in `moved`. Returns the bytes. */
 uint64_t bvh_store_write_top(struct bvh_store *store, const struct bvh_top *top, bool all);

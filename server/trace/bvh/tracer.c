@@ -14,7 +14,7 @@
 #include <string.h>
 
 #define BUILD_THREADS_MAX 8
-/* A grid that makes boxes so much larger costs more steps than its smaller elements save. */
+/* A grid that enlarges boxes by this factor costs more steps than its smaller elements save. */
 #define GRID_COST_MAX 1.3f
 /* Fills any GPU; more at once only nears the time after which a driver ends a dispatch. */
 #define DISPATCH_RAYS_MAX (1u << 18)
@@ -70,8 +70,8 @@ static void bvh_destroy(struct tracer *tracer)
 
 /* ---- instances ---- */
 
-/* The tree's box in world space, with room for what taking the ray to object space rounds: a few units in the
- * last place of everything that is summed up. Infinite where the sum overflows, which is right. */
+/* The tree's box in world space, padded for the rounding of the ray's transform to object space: a few units in
+ * the last place of all that is summed. Infinite where the sum overflows, which is right. */
 static struct bvh_world_box box_at_pose(const struct bvh_entry *entry, const float *world_from_object)
 {
     struct bvh_world_box box;
@@ -178,7 +178,7 @@ static bool rebuild_top(struct bvh *bvh, const struct gpu_scene *scene, struct e
     return true;
 }
 
-/* Writes the transforms that changed and moves their elements. False: the top tree has to be made anew. */
+/* Writes the changed transforms and moves their elements. False: the top tree must be built again. */
 static bool refit_top(struct bvh *bvh, const struct gpu_scene *scene)
 {
     uint32_t first = scene->instance_count, end = 0; /* of the transforms that changed */
@@ -259,8 +259,8 @@ static bool has_coarse_grid(const struct bvh *bvh)
     return false;
 }
 
-/* A step of it. A scene is walked in one form however it came about: where the trees turn out to need another,
- * all are built again, with boxes in floats or no longer. */
+/* One step of it. All trees of a scene have one form, whatever its history: if another form is needed, all are
+ * built again, with or without boxes in floats. */
 static enum tracer_progress update_geometries(struct bvh *bvh, struct gpu_scene *scene, struct stage_times *times,
                                               struct error *error)
 {

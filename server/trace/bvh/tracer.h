@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The tracer `bvh`: stackless traversal of bounding volume trees by baked links. What is on the device and how it
- * is walked: shaders/bvh/layout.h, shaders/bvh/traverse.glsl. */
+/* The tracer `bvh`: stackless traversal of bounding volume trees by baked links. Layout on the device and
+ * traversal: shaders/bvh/layout.h, shaders/bvh/traverse.glsl. */
 #ifndef FARLIGHT_TRACE_BVH_TRACER_H
 #define FARLIGHT_TRACE_BVH_TRACER_H
 
@@ -31,12 +31,12 @@ struct bvh_state {
     uint32_t rays_together;
 };
 
-/* How far apart rays that are walked together may begin, in world space. Those of a lens, all over it: they meet
- * again where the lens is in focus. */
+/* How far apart the origins of a packet's rays may be, in world space. Those of a lens may be all over it: its
+ * rays meet again in the plane of focus. */
 float bvh_reach_together(const struct gpu_scene *scene, const struct wave *wave);
 
-/* How many rays of the wave walk together: what the options say, else what is faster for a wave as coherent as
- * this one, of which a sample is measured. 0: failed. */
+/* The packet size for the wave: that of the options, else the faster one for the wave's coherence, which is
+ * measured on a sample. 0: failed. */
 uint32_t bvh_rays_together(struct bvh *bvh, const struct gpu_scene *scene, const struct wave *wave,
                            struct error *error);
 

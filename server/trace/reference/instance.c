@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* World coordinates that rays may have at least, else the scene is refused. */
+/* The world coordinates that rays must be able to have; otherwise the scene is refused. */
 #define REACH_MIN 1e9
 
 static bool resize_instances(struct reference *reference, uint32_t count)
@@ -42,8 +42,8 @@ static double determinant(const float *m)
            (double)m[2] * ((double)m[4] * m[9] - (double)m[5] * m[8]);
 }
 
-/* The greatest world coordinate that Embree can take to the instance's space. It computes with coordinates up to
- * 1.844e18 and ends the process at a ray beyond (Debian's is built with its assertions); and it inverts the
+/* The largest world coordinate that Embree can transform to the instance's space. It computes with coordinates up
+ * to 1.844e18 and ends the process at a ray beyond (Debian's is built with its assertions); and it inverts the
  * transform by a determinant in single precision, which must neither vanish nor overflow. 0: it cannot at all. */
 static float reach_of(const struct instance *instance)
 {
@@ -61,8 +61,8 @@ static float reach_of(const struct instance *instance)
     return inverts && reach >= REACH_MIN ? (float)reach : 0.0f;
 }
 
-/* The least size of a + u (b - a) for u in 0 .. 1, 0 if the sign changes: a cubic polynomial by its values at four
- * places, and what it is at its ends and where it turns. */
+/* The minimum magnitude of the determinant of a + u (b - a) for u in 0 .. 1, 0 if the sign changes: a cubic
+ * polynomial, given by four values, examined at its ends and extrema. */
 static double least_determinant(const float *a, const float *b)
 {
     double at[4];

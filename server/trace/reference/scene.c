@@ -2,7 +2,7 @@
 /* Embree's scenes: one for each geometry, kept by (kind, id, revision), and a top scene of instances and discs.
  *
  * All are built in robust mode (watertight edges) and in medium quality: high quality would split triangles in
- * space, and a filter function would then be asked twice about one crossing, and tint it twice. */
+ * space, and a filter function would then be called twice for one intersection, and tint it twice. */
 #include "trace/reference/tracer.h"
 
 #include "base/hashmap.h"
@@ -45,7 +45,7 @@ static uint64_t entry_key(bool is_mesh, uint32_t id, uint32_t node)
     return (uint64_t)(node ? node : id) << 2 | (node ? 2u : 0u) | is_mesh;
 }
 
-/* The array as it lies in its blob, or a copy with room behind it where Embree would read past the end. */
+/* The array in its blob, or a padded copy if Embree would read past the end. */
 static void set_buffer(RTCGeometry geometry, enum RTCBufferType type, enum RTCFormat format,
                        const struct blob *blob, size_t item_bytes, size_t count)
 {
@@ -137,7 +137,7 @@ static bool take_vertices(struct reference_entry *entry, const struct gpu_scene 
     return vertices && scene_deform(scene->scene, pose, node, vertices, NULL, error);
 }
 
-/* Brings what deforms to the poses. Trees are built anew: slow rather than wrong. */
+/* Deforms geometries to the poses. Trees are built again: slow rather than wrong. */
 static bool deform_entries(struct reference *reference, const struct gpu_scene *scene, struct error *error)
 {
     const struct scene_motion *motion = scene->motion;
@@ -327,7 +327,7 @@ static bool make_disc_geometry(struct reference *reference, const struct gpu_sce
     return true;
 }
 
-/* All discs anew where one changed: there are few. `shading`: their materials may let other light pass now. A disc
+/* All discs again if one changed: there are few. `shading`: their materials may let other light pass now. A disc
  * that has got another material differs in gpu_scene's copy too. */
 static bool update_discs(struct reference *reference, const struct gpu_scene *scene, bool shading, bool *changed)
 {

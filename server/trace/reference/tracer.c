@@ -41,8 +41,8 @@ bool reference_check(struct reference *reference, const char *what, struct error
     return error_set(error, kind, NULL, "Embree, %s: %s (error %d)", what, reference->failure_text, (int)code);
 }
 
-/* Embree's memory counts as the device's: it is what this tracer keeps in place of buffers. Asked before (or,
- * `post`, told after) memory is allocated. While it is, the device's thread waits, and nobody changes its books.
+/* Embree's memory counts as the device's: it is what this tracer keeps in place of buffers. Called before (or,
+ * with `post`, after) an allocation. Meanwhile the device's thread waits, so nothing else changes its accounts.
  */
 static bool count_memory(void *context, ssize_t bytes, bool post)
 {

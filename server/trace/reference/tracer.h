@@ -82,13 +82,13 @@ bool reference_check(struct reference *reference, const char *what, struct error
 bool reference_scene_update(struct reference *reference, const struct gpu_scene *scene, unsigned changed,
                             struct error *error);
 void reference_scene_finish(struct reference *reference); /* leaves it empty */
-/* reference_instance.c. `look`: some may have moved, or show what was built anew; *changed is set where they do.
+/* instance.c. `look`: some may have moved, or show rebuilt geometry; *changed is set if so.
  */
 bool reference_update_instances(struct reference *reference, const struct gpu_scene *scene, bool look,
                                 bool *changed, struct error *error);
 void reference_drop_instances(struct reference *reference);
 
-/* reference_walk.c: a wave that lies in `rays` and `times`; crossings or visibilities into `answers`. */
+/* traverse.c: traces the wave in `rays` and `times`; intersections or visibilities go to `answers`. */
 void reference_walk(struct reference *reference, const struct ray_range *rays);
 /* Embree asks these about each candidate on a geometry that has cutouts (closest), or lets light pass (any). */
 void reference_filter_closest(const struct RTCFilterFunctionNArguments *arguments);

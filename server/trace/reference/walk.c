@@ -10,10 +10,10 @@
  *   shadow              13.9   25.0   26.3      9.4   12.9   13.8     7.6    9.5   10.1
  *
  * Sixteen win everywhere. Streams (rtcIntersect1M, 1,024 rays) do 10.3, 6.2 and 4.4 on bounces. With
- * RTC_INTERSECT_CONTEXT_FLAG_COHERENT, which walks rays as a frustum, streams do 21, 14.7 and 10.8 on primary rays
- * and sixteen a call 27 and 17. That is left alone: with it rtcOccluded16 went round in circles on the first scene
- * of tests/tracers, and a ray of a direction near zero changed the answers of others in
- * its packet. What is to be the truth is slow rather than wrong. */
+ * RTC_INTERSECT_CONTEXT_FLAG_COHERENT, which traverses rays as a frustum, streams do 21, 14.7 and 10.8 on primary
+ * rays and sixteen a call 27 and 17. That is left alone: with it rtcOccluded16 went round in circles on the first
+ * scene of tests/tracers, and a ray of a direction near zero changed the answers of others in its packet. The
+ * ground truth is slow rather than wrong. */
 #include "trace/reference/tracer.h"
 
 #include "base/parallel.h"
