@@ -23,12 +23,9 @@ layout(binding = UNIT_TRACER_1) uniform usamplerBuffer abuffer_samples; // two p
 
 uniform int abuffer_resolution;
 
-// The extension of a sample's plane beyond its texel, in cells: it closes the gaps between neighbours' planes on a
-// curved surface.
-const float SLACK = 0.05;
 // The maximum deviation of a plane from its sample's depth within its texel and the slack, in cells. Steeper planes are
 // cut off there.
-const float SPAN = (1.0 + 2.0 * SLACK) / AXES_OVERLAP;
+const float SPAN = (1.0 + 2.0 * ABUFFER_SLACK) / AXES_OVERLAP;
 
 struct column {
     int first, end;

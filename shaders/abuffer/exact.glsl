@@ -7,8 +7,8 @@
 
 #if !defined ANY_HIT && !defined ABUFFER_STEPS
 
-// How far beyond its texel a sample's plane is tested, in cells. Where surfaces bend by more than SLACK, rays would
-// pass between planes; intersections are verified with triangles, so the search may reach farther.
+// How far beyond its texel a sample's plane is tested, in cells. Where surfaces bend by more than ABUFFER_SLACK, rays
+// would pass between planes; intersections are verified with triangles, so the search may reach farther.
 const float BEYOND = 0.25;
 // In cells: intersections no farther apart are the same one.
 const float AGAIN = 1e-3;
@@ -180,7 +180,7 @@ void walk_planes(trace_ray r, inout voxel_walk w, inout abuffer_found found)
         if (goes_on) {
             // A plane that is extended beyond its texel may have hidden that of the next texel at the same point.
             w.s_behind = found.is_within ? s + AGAIN : w.s_behind;
-            w.beyond = found.is_within ? BEYOND : SLACK;
+            w.beyond = found.is_within ? BEYOND : ABUFFER_SLACK;
             w.s = s > w.s_least ? s : w.s_least;
             w.s_end = s_end;
             w.s_limit = s_limit;

@@ -17,7 +17,7 @@ struct abuffer_found {
 #endif
 #else
     int sample_index; // -1: none
-    bool is_within;   // in its texel, or at most SLACK beside it
+    bool is_within;   // in its texel, or at most ABUFFER_SLACK beside it
 #endif
 };
 

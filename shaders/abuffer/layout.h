@@ -52,6 +52,10 @@
     ((((axis) * (tiles_along) + ((v) >> 3)) * (tiles_along) + ((u) >> 3)) << 6 | ((u)&4u) << 3 | ((v)&7u) << 2 |  \
      ((u)&3u))
 
+/* The extension of a sample's plane beyond its texel, in cells: it closes the gaps between neighbours' planes on a
+ * curved surface. */
+#define ABUFFER_SLACK 0.05f
+
 #define ABUFFER_NORMAL_UNIT 127
 /* Shifted by the axis: some sample leans to it as much as to any, or almost (AXES_OVERLAP). */
 #define ABUFFER_SUM_LEANS 1u

@@ -65,7 +65,7 @@ bool search_image(trace_ray r, inout voxel_walk w, inout abuffer_found found, in
                 (!only_leaning || leans(p))) {
                 offer_at(r, w, found, i, s_plane, side);
 #ifndef ANY_HIT
-                found.is_within = from_middle.x <= 0.5 + SLACK && from_middle.y <= 0.5 + SLACK;
+                found.is_within = from_middle.x <= 0.5 + ABUFFER_SLACK && from_middle.y <= 0.5 + ABUFFER_SLACK;
 #endif
                 any_crossed = true;
             }

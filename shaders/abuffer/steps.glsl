@@ -127,7 +127,7 @@ bool follow(trace_ray r, inout voxel_walk w, inout abuffer_found found, step_wal
             }
         } while (c.next < c.end && !is_behind);
         vec2 from_middle = abs(o.xy + nearest * d.xy - vec2(texel) - 0.5);
-        is_there = from_middle.x <= 0.5 + SLACK && from_middle.y <= 0.5 + SLACK;
+        is_there = from_middle.x <= 0.5 + ABUFFER_SLACK && from_middle.y <= 0.5 + ABUFFER_SLACK;
         goes_on = !is_there && nearest > lo && nearest < hi;
         s = nearest;
     } while (goes_on && ++k < FOLLOWS_MAX);

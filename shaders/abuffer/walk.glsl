@@ -54,7 +54,7 @@ void begin_walk(trace_ray r, float end, out voxel_walk w)
     w.s_least = r.t_min * w.ray.scale - w.ray.begin;
     w.s_limit = min(end * w.ray.scale, 1e30) - w.ray.begin;
     w.s_behind = w.s_least;
-    w.beyond = SLACK;
+    w.beyond = ABUFFER_SLACK;
     w.s = w.s_least;
     w.s_end = w.s_limit;
     clip(w.s, w.s_end, w.o, w.inverse, vec3(0.0), vec3(along));

@@ -46,13 +46,6 @@ cell_ray cube_ray_of(trace_ray r, int cube)
     return cell_ray_of(r, ldc_place[CUBE(cube)], float(ldc_resolution[CUBE(cube)]));
 }
 
-// A ray that begins on a surface may begin a little beyond a neighbour's plane, and would at once hit the surface that
-// it leaves. So near its origin a ray ignores planes that pass the origin within this distance. From behind, as a ray
-// that leaves a body would hit its own surface, the distance is generous. From the front, as a ray in a corner hits the
-// other wall, and a refracted ray its own surface, it suffices for a curvature radius of six cells: 1.5^2 / (2 * 6).
-const float LDC_OWN_WAY = 1.5;
-const float LDC_OWN_BEHIND = 0.5, LDC_OWN_BEFORE = 0.2;
-
 // Intersects the ray (o, d in the image) with a sample of a texel, within the texel. `normal` may have any length;
 // `side` is positive if the ray comes from behind.
 bool cross_sample(vec3 o, vec3 d, int cube, vec2 texel, float depth, vec3 normal, out float s, out float side)

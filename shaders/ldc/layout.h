@@ -43,6 +43,18 @@
 #define LDC_TEXEL_QUAD_SHIFT 8u
 #define LDC_QUADS_MAX 0x01000000u /* of all cubes of a tracer */
 
+/* The extension of a sample's plane beyond its texel, in cells: it closes the gaps between neighbours' planes on a
+ * curved surface. */
+#define LDC_SLACK 0.05f
+/* A ray that begins on a surface may begin a little beyond a neighbour's plane, and would at once hit the surface
+ * that it leaves. So near its origin (LDC_OWN_WAY cells) a ray ignores planes that pass the origin within this
+ * distance. From behind, as a ray that leaves a body would hit its own surface, the distance is generous. From the
+ * front, as a ray in a corner hits the other wall, and a refracted ray its own surface, it suffices for a
+ * curvature radius of six cells: 1.5^2 / (2 * 6). */
+#define LDC_OWN_WAY 1.5f
+#define LDC_OWN_BEHIND 0.5f
+#define LDC_OWN_BEFORE 0.2f
+
 /* clang-format off */
 /* Cells: the ones that the plane of a sample of any image passes. The buffer of nodes, RGBA32UI, begins with the nodes,
  * a grid of blocks (raster/layout.h) of 16 x 16 x 16 cells whose parts are 4 x 4 x 4 cells; `z` of an occupied one is

@@ -3,9 +3,6 @@
 #include "ldc/layout.h"
 #include "common/math.glsl"
 
-// The extension of a sample's plane beyond its texel, in cells: it closes the gaps between neighbours' planes on a
-// curved surface.
-const float LDC_SLACK = 0.05;
 // The maximum deviation of a plane from its sample's depth within its texel and the slack: half a cell and the slack
 // along u, the same along v, at the maximum slope, 1 / AXES_OVERLAP.
 const float LDC_SPAN = (1.0 + 2.0 * LDC_SLACK) / AXES_OVERLAP;

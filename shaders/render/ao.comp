@@ -16,9 +16,6 @@
 uniform uint first_ray, batch_rays; // of shadow_rays_a_hit
 uniform float reach, falloff;       // metres; see common/occlusion.glsl
 
-// The minimum weight with which a ray continues through blended surfaces.
-const float WEIGHT_MIN = 1.0 / 1024.0;
-
 uint ask_for_openness(uint j, path p, surface s, float weight, float distance_)
 {
     uint seed = path_seed(p), dimension = SEQUENCE_WAVE + wave_number * SEQUENCE_WAVE_SIZE, alive = 0u;
@@ -50,7 +47,7 @@ void main()
     bool first = first_ray == 0u;
     float weight = p.weight_r * s.alpha, rest = p.weight_r - weight;
     if (first) {
-        if (rest >= WEIGHT_MIN)
+        if (rest >= PATH_WEIGHT_MIN)
             add_child(j, p, s, h.distance, r.direction_t_max.xyz, vec3(rest), true);
         radiance[k] = vec4(vec3(0.0), weight);
     }

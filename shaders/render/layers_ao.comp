@@ -30,7 +30,7 @@ void main()
         vec3 direction = occlusion_direction(s.geometric, s.normal, u);
         float far = occlusion_reach(reach, falloff, sequence_number(seed, SEQUENCE_WAVE + SEQUENCE_LOBE, index));
         uint place = i * hit_count + j;
-        shadow_rays[place] = ray(vec4(origin, 0.0), vec4(direction, far * (1.0 - 4.0 * OFFSET)));
+        shadow_rays[place] = ray(vec4(origin, 0.0), vec4(direction, far * (1.0 - 4.0 * PATH_OFFSET)));
 #ifdef HAS_TIMES
         shadow_times[place] = p.time;
 #endif

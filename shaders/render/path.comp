@@ -112,7 +112,7 @@ void meet_lamps(inout path p, eye_hit e, vec3 origin, vec3 direction, float foun
         }
         choice = choice * sum / size;
         p.lamp = i + 1u;
-        p.lamp_distance = distance_ * (1.0 - 4.0 * OFFSET); // as shadow rays end before it
+        p.lamp_distance = distance_ * (1.0 - 4.0 * PATH_OFFSET); // as shadow rays end before it
         p.lamp_share = share / size;
     }
     p.lamp_share *= sum;

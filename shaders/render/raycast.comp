@@ -18,9 +18,6 @@
 
 uniform float layer_opacity; // 0..1
 
-// The minimum weight of a ray: a third of a step of an 8-bit picture.
-const float WEIGHT_MIN = 1.0 / 1024.0;
-
 vec3 lit(path p, surface s, vec3 direction, float distance_)
 {
     vec3 view = -direction;
@@ -65,7 +62,7 @@ void main()
         through = vec3(1.0 - layer_opacity);
     }
     vec3 rest = weight * through;
-    bool goes_on = greatest(rest) >= WEIGHT_MIN; // not if it is NaN
+    bool goes_on = greatest(rest) >= PATH_WEIGHT_MIN; // not if it is NaN
     if (goes_on)
         add_child(j, p, s, h.distance, direction, rest, true);
     radiance[k] = vec4(weight * opacity * (s.unlit ? s.base : lit(p, s, direction, h.distance)),

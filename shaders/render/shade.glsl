@@ -33,9 +33,6 @@ layout(std430, binding = BIND_LIGHT_SAMPLES) writeonly buffer sample_block { vec
 layout(std430, binding = BIND_RAY_TIMES) writeonly buffer time_block { float shadow_times[]; };
 #endif
 
-// Rays start off the surface by this share of their origin's coordinates (and of the distance to it): some hundred
-// times the rounding error.
-const float OFFSET = 1.0 / 65536.0;
 const float FAR = 1e30;
 
 ray ray_at(uint k)
@@ -73,7 +70,7 @@ uint path_sample(path p)
 
 vec3 off_surface(surface s, float distance_, vec3 side)
 {
-    return s.position + OFFSET * max(greatest(abs(s.position)), distance_) * side;
+    return s.position + PATH_OFFSET * max(greatest(abs(s.position)), distance_) * side;
 }
 
 uint child_count = 0u;
@@ -124,7 +121,7 @@ bool add_shadow_ray(uint place, path p, vec3 origin, vec3 direction, float dista
         return false;
     }
     // Short of the light, as a model may have a surface at its position.
-    shadow_rays[place] = ray(vec4(origin, 0.0), vec4(direction, distance_ * (1.0 - 4.0 * OFFSET)));
+    shadow_rays[place] = ray(vec4(origin, 0.0), vec4(direction, distance_ * (1.0 - 4.0 * PATH_OFFSET)));
     light_samples[place] = vec4(arriving, 0.0);
 #ifdef HAS_TIMES
     shadow_times[place] = p.time;

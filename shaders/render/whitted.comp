@@ -17,13 +17,10 @@
 
 uniform uint first_ray, batch_rays; // a light each
 
-// The minimum weight of a path: a third of a step of an 8-bit picture.
-const float WEIGHT_MIN = 1.0 / 1024.0;
-
 void add_child_of_weight(uint j, path parent, surface s, float distance_, vec3 direction, vec3 weight, bool straight)
 {
     // not `<`: NaN ends here as well
-    if (greatest(weight) >= WEIGHT_MIN)
+    if (greatest(weight) >= PATH_WEIGHT_MIN)
         add_child(j, parent, s, distance_, direction, weight, straight);
 }
 

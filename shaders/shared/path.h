@@ -31,6 +31,13 @@ SHARED_SIZE(path, 48)
 #define PATH_ASKED 0x200u    /* path: its origin has sampled lights and environment */
 #define PATH_COVERED 0x400u  /* path: such an origin has sampled that light already, through the current glass */
 
+/* The minimum weight with which a path of whitted, raycast and ao continues: a third of a step of an 8-bit
+ * picture. */
+#define PATH_WEIGHT_MIN (1.0f / 1024.0f)
+/* Rays start off the surface by this share of their origin's coordinates (and of the distance to it): some hundred
+ * times the rounding error. */
+#define PATH_OFFSET (1.0f / 65536.0f)
+
 /* A ray of the next wave at its parent's place, before it is moved to its own. */
 struct child {
     vec4 origin_t_min;

@@ -191,7 +191,7 @@ TEST(where_all_is_smooth_the_mean_is_whitteds_picture)
     }
     print_message("all: off by %+.1e (standard error %.1e)\n", mean_of(&whole), standard_error_of(&whole));
     /* Student's t with 15 degrees of freedom is beyond 5 in 1 of 6000 cases, of which there are 17. What whitted
-     * cuts off (WEIGHT_MIN) is 1/1024 of what lies there, some 0.5, a few times at most; 1e-3 of it. */
+     * cuts off (PATH_WEIGHT_MIN) is 1/1024 of what lies there, some 0.5, a few times at most; 1e-3 of it. */
     assert_near(mean_of(&whole), 0.0, 5.0 * standard_error_of(&whole) + 1e-3);
     for (int b = 0; b < BLOCKS; b++)
         assert_near(mean_of(&differences[b]), 0.0, 5.0 * standard_error_of(&differences[b]) + 1e-3);

@@ -2,6 +2,8 @@
 /* The integrator `raycast`: parallel layers blend to their closed form, whatever the tracer; lamps shine through.
  */
 #include "tests/accuracy/render_fixture.h"
+
+#include "shared/path.h"
 #include "tests/harness/test.h"
 
 #define PI 3.14159265358979323846
@@ -74,11 +76,11 @@ TEST(layers_are_blended_front_to_back)
             for (size_t o = 0; o < COUNT(opacities); o++) {
                 double opacity = opacities[o] > 0.0f ? (double)opacities[o] : 0.5, left = 1.0, radiance = 0.0;
                 for (uint32_t i = 0; i < LAYERS; i++) {
-                    /* what has less than 1/1024 left before it is not there */
-                    radiance += left >= 1.0 / 1024.0 ? left * opacity * (double)grey_of(i) : 0.0;
-                    left = left >= 1.0 / 1024.0 ? left * (1.0 - opacity) : 0.0;
+                    /* what has less than this left before it is not there */
+                    radiance += left >= (double)PATH_WEIGHT_MIN ? left * opacity * (double)grey_of(i) : 0.0;
+                    left = left >= (double)PATH_WEIGHT_MIN ? left * (1.0 - opacity) : 0.0;
                 }
-                left = left >= 1.0 / 1024.0 ? left : 0.0;
+                left = left >= (double)PATH_WEIGHT_MIN ? left : 0.0;
                 fixture->request.layer_opacity = opacities[o];
                 /* samples keep colours in eight bits of sRGB */
                 assert_pixels(fixture, radiance + (has_environment ? left * (double)0.3f : 0.0),

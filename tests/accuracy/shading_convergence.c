@@ -2,6 +2,8 @@
 /* Lights that have an extent are sampled: what comes out goes to the closed form as the samples grow, at least as
  * fast as independent samples would, and is right in the mean however few they are. */
 #include "tests/accuracy/render_fixture.h"
+
+#include "shared/path.h"
 #include "tests/harness/test.h"
 
 #define PI 3.14159265358979323846
@@ -9,8 +11,8 @@
 enum { PIXELS = 16, SEEDS_MANY = 8, SEEDS_FEW = 2 };
 #define RADIANCE 2.0
 
-/* The eye is 5 above the place, and light is gathered 1 / 65536 of that above it (OFFSET of whitted.comp). */
-static const double place[3] = {0.0, 0.0, 5.0 / 65536.0};
+/* The eye is 5 above the place, and light is gathered that share above it. */
+static const double place[3] = {0.0, 0.0, 5.0 * (double)PATH_OFFSET};
 
 /* A frame in which all pixels see one place on a white plane, each with samples of its own. */
 static void one_place(struct fixture *fixture)

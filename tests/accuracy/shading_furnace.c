@@ -2,15 +2,16 @@
 /* The white furnace: whatever is white and stands in a white world that is equally bright all around is not to be
  * seen. What is lost or made by a normal, a transform or a material shows. */
 #include "tests/accuracy/render_fixture.h"
+
+#include "shared/path.h"
 #include "tests/harness/test.h"
 
 #define PI 3.14159265358979323846
 
-/* Paths that carry less than this end (WEIGHT_MIN of shaders/render/whitted.comp). */
-#define WEIGHT_MIN (1.0 / 1024.0)
+static const double weight_min = (double)PATH_WEIGHT_MIN;
 /* A few roundings at each of up to 32 bounces. */
 #define FLOAT_ERROR 1e-5
-/* Of an angle of incidence: 16-bit normals are 3e-5 off, and rays start 8e-5 (1 / 65536 of the 5 that they came)
+/* Of an angle of incidence: 16-bit normals are 3e-5 off, and rays start 8e-5 (PATH_OFFSET of the 5 that they came)
  * off their surface, which moves the next wall's normal by as much. */
 #define SINE_ERROR 1.5e-4
 
@@ -134,7 +135,7 @@ TEST(white_surfaces_vanish)
             struct range range = picture_range(fixture);
             least = fmin(least, range.least);
             greatest = fmax(greatest, range.greatest);
-            if (!(range.least >= 1.0 - WEIGHT_MIN - FLOAT_ERROR && range.greatest <= 1.0 + FLOAT_ERROR))
+            if (!(range.least >= 1.0 - weight_min - FLOAT_ERROR && range.greatest <= 1.0 + FLOAT_ERROR))
                 fail_msg("%s, %s: %.6f .. %.6f", materials[i].name, shape_names[shape], range.least,
                          range.greatest);
             if (materials[i].roughness == 0.0f)
@@ -160,9 +161,9 @@ TEST(grey_surfaces_do_not_vanish)
  * angle all the way, the same at each wall. `depth` bounces are followed, of paths that carry enough. */
 static double brought_home(double share, uint32_t depth)
 {
-    double arrived = share >= WEIGHT_MIN && depth > 0 ? share : 0.0, inside = 1.0 - share;
-    for (uint32_t bounces = 1; bounces < depth && inside >= WEIGHT_MIN; bounces++) {
-        if (inside * (1.0 - share) >= WEIGHT_MIN)
+    double arrived = share >= weight_min && depth > 0 ? share : 0.0, inside = 1.0 - share;
+    for (uint32_t bounces = 1; bounces < depth && inside >= weight_min; bounces++) {
+        if (inside * (1.0 - share) >= weight_min)
             arrived += inside * (1.0 - share);
         inside *= share;
     }
@@ -206,9 +207,9 @@ TEST(a_clear_glass_sphere_lacks_only_what_is_cut_off)
                 double value = (double)fixture_pixel(&result, x, y)[0];
                 least = fmin(least, value);
                 worst = fmax(worst, fabs(value - expected));
-                /* and a path that carries WEIGHT_MIN but for that may end or not */
-                assert_true(value >= fmin(expected, fmin(nearer, farther)) - WEIGHT_MIN);
-                assert_true(value <= fmax(expected, fmax(nearer, farther)) + WEIGHT_MIN);
+                /* and a path that carries weight_min but for that may end or not */
+                assert_true(value >= fmin(expected, fmin(nearer, farther)) - weight_min);
+                assert_true(value <= fmax(expected, fmax(nearer, farther)) + weight_min);
             }
         frame_result_finish(&result);
         print_message("glass sphere, depth %2u: 1 %+.4f, from what is expected off by %.1e\n", depth, least - 1.0,
@@ -228,7 +229,7 @@ TEST(clear_glass_vanishes_whatever_its_shape)
         struct range range = picture_range(fixture);
         print_message("glass, %-34s 1 %+.4f %+.1e\n", shape_names[shape], range.least - 1.0, range.greatest - 1.0);
         assert_true(range.greatest <= 1.0 + FLOAT_ERROR);
-        assert_true(range.least >= 1.0 - 33.0 * WEIGHT_MIN);
+        assert_true(range.least >= 1.0 - 33.0 * weight_min);
     }
 }
 
@@ -253,7 +254,7 @@ TEST(tilted_normals_lose_no_light)
                 struct range range = picture_range(fixture);
                 least = fmin(least, range.least);
                 greatest = fmax(greatest, range.greatest);
-                if (!(range.least >= 1.0 - 3.0 * WEIGHT_MIN && range.greatest <= 1.0 + FLOAT_ERROR))
+                if (!(range.least >= 1.0 - 3.0 * weight_min && range.greatest <= 1.0 + FLOAT_ERROR))
                     fail_msg("transmission %d, tilt %d, slant %d: %.6f .. %.6f", transmission, tilt, slant,
                              range.least, range.greatest);
             }

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* Smooth glass: what it mirrors, where it sends what it refracts, and how the two go on. */
 #include "tests/accuracy/render_fixture.h"
+
+#include "shared/path.h"
 #include "tests/harness/test.h"
 
 #define PI 3.14159265358979
@@ -118,7 +120,7 @@ TEST(refraction_obeys_snells_law)
  * its walls mirroring the share f each time; so far as the bounces are followed and a path carries enough. */
 static double pane_series(double f, uint32_t depth, bool through)
 {
-    const double weight_min = 1.0 / 1024.0; /* WEIGHT_MIN of whitted.comp */
+    const double weight_min = (double)PATH_WEIGHT_MIN;
     double sum = !through && depth > 0 && f >= weight_min ? f : 0.0, inside = 1.0 - f;
     for (uint32_t bounces = 2; bounces <= depth && inside >= weight_min; bounces++) {
         bool behind = bounces % 2 == 0;

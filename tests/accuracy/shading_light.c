@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* Shading against what can be computed by hand. */
 #include "tests/accuracy/render_fixture.h"
+
+#include "shared/path.h"
 #include "tests/harness/test.h"
 
 #define PI 3.14159265358979
@@ -35,8 +37,8 @@ TEST(point_light_falls_with_the_inverse_square_over_any_distance)
         fixture_light(fixture, LIGHT_POINT, 0.0f, 0.0f, height, 7.0f);
         fixture->request.camera.fov_y = 1e-4f;
         struct frame_result result = fixture_render(fixture);
-        /* gathered 1 / 65536 of the eye's distance above the plane (OFFSET of whitted.comp) */
-        double distance = (double)height - 5.0 / 65536.0, expected = 7.0 / (distance * distance) / PI;
+        /* gathered that share of the eye's distance above the plane */
+        double distance = (double)height - 5.0 * (double)PATH_OFFSET, expected = 7.0 / (distance * distance) / PI;
         assert_near(fixture_pixel(&result, 16, 16)[0], expected, expected * 2e-6); /* some ten roundings */
         frame_result_finish(&result);
     }

@@ -14,9 +14,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* How far beyond its texel a sample's plane goes, cells (abuffer/column.glsl). */
-#define ABUFFER_SLACK 0.05
-
 struct abuffer_sample {
     uint32_t texel; /* of all three images, row after row */
     float depth;    /* cells */
@@ -161,8 +158,8 @@ static inline void abuffer_sum(const struct abuffer_samples *s, int32_t (*sums)[
     middle[iu] = (float)(at->texel % n) + 0.5f;
     middle[iv] = (float)(at->texel / n % n) + 0.5f;
     middle[axis] = at->depth;
-    const float half = 0.5f + (float)ABUFFER_SLACK;
-    const float span = (1 + 2 * (float)ABUFFER_SLACK) / AXES_OVERLAP;
+    const float half = 0.5f + ABUFFER_SLACK;
+    const float span = (1 + 2 * ABUFFER_SLACK) / AXES_OVERLAP;
     float reach = half * (size[iu] + size[iv]) / size[axis];
     reach = reach < span ? reach : span;
     for (uint32_t k = 0; k < 3; k++) {

@@ -5,11 +5,6 @@
 #include "tests/unit/trace/ldc/traversal_fixture.h"
 #include "tests/harness/test.h"
 
-/* ldc/plane.glsl, ldc/cube.glsl */
-#define SLACK 0.05
-#define OWN_WAY 1.5
-#define OWN_BEHIND 0.5
-#define OWN_BEFORE 0.2
 /* Cells: what floats round of places in cubes of some hundred cells, and of rays that begin some hundred away. */
 #define ROUNDING 1e-3
 
@@ -56,12 +51,12 @@ static struct crossing cross(const struct ldc_samples *s, const struct ldc_sampl
         height += normal[k] * to[k];
         slope += normal[k] * d[k];
     }
-    const double along = height / slope, own = slope > 0 ? OWN_BEHIND : OWN_BEFORE;
+    const double along = height / slope, own = slope > 0 ? (double)LDC_OWN_BEHIND : (double)LDC_OWN_BEFORE;
     struct crossing c = {.distance = along * s->cell / size};
     c.beyond = fmax(fabs(along * d[iu] - to[iu]), fabs(along * d[iv] - to[iv])) - 0.5;
     c.is_in_cube = along * d[axis] + o[axis] > 0 && along * d[axis] + o[axis] < n;
-    c.is_own = along < OWN_WAY - ROUNDING && fabs(height) < own - ROUNDING;
-    c.is_surely_not_own = along > OWN_WAY + ROUNDING || fabs(height) > own + ROUNDING;
+    c.is_own = along < (double)LDC_OWN_WAY - ROUNDING && fabs(height) < own - ROUNDING;
+    c.is_surely_not_own = along > (double)LDC_OWN_WAY + ROUNDING || fabs(height) > own + ROUNDING;
     return c;
 }
 
@@ -90,7 +85,7 @@ static struct verdict judge(const struct fixture *fixture, const struct ray *ray
             const double margin = fabs(ROUNDING / cells_of(s, ray, 1));
             if (!(c.distance > t_min - margin && c.distance < t_max + margin))
                 continue;
-            verdict.may_hit = verdict.may_hit || (c.beyond < SLACK + ROUNDING && !c.is_own);
+            verdict.may_hit = verdict.may_hit || (c.beyond < (double)LDC_SLACK + ROUNDING && !c.is_own);
             if (c.beyond < -ROUNDING && c.is_in_cube && c.is_surely_not_own && c.distance > t_min + margin &&
                 c.distance < t_max - margin)
                 verdict.nearest_sure = fmin(verdict.nearest_sure, c.distance);
@@ -117,7 +112,7 @@ static void expect_crossing(const struct fixture *fixture, const struct ray *ray
     const struct crossing c = cross(s, &s->list[index], ray);
     /* A plane that is nearly along the ray multiplies what is rounded. */
     const double wrong = fabs(cells_of(s, ray, hit->distance - c.distance));
-    if (!(c.beyond < SLACK + 0.01 && !c.is_own && wrong < 0.05))
+    if (!(c.beyond < (double)LDC_SLACK + 0.01 && !c.is_own && wrong < 0.05))
         fail_msg("%s: ray %u: sample %u at %g, which is met at %g, %g cells beyond its texel", form, number,
                  hit->primitive, (double)hit->distance, c.distance, c.beyond);
     if (cells_of(s, ray, hit->distance - verdict->nearest_sure) > 0.05)
