@@ -357,7 +357,10 @@ FL_API void fl_render_destroy(struct fl_job *job); /* cancels what still runs */
  * show; between calls they wait in the socket. */
 struct fl_view;
 
-enum fl_attachment { FL_ATTACH_DEPTH = 1, FL_ATTACH_NORMALS = 2 }; /* bits */
+enum fl_attachment { /* bits */
+                     FL_ATTACH_DEPTH = 1 << PROTOCOL_ATTACHMENT_DEPTH,
+                     FL_ATTACH_NORMALS = 1 << PROTOCOL_ATTACHMENT_NORMALS
+};
 
 /* Likewise of a view. Of the fields that only a range of frames has, none is used; `frames_per_second` is the most
  * that is wanted, 60 here; `samples` what a picture gets at most while nothing moves, 64 here; the format is
