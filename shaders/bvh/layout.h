@@ -63,10 +63,10 @@ SHARED_SIZE(bvh_transform, 96)
 #define BVH_TRANSFORM_TEXELS 6
 
 /* Primitives in the order of the leaves, fetched without an index. RGBA32UI, though most words are floats: a
- * driver may flush a small integer, which is a denormal as a float. Texels: triangle  3 texels: corners; w of the
- * first: bits of the primitive's number in its geometry sphere    2 texels: centre and radius; x of the second:
- * bits of the number Triangles of a geometry that deforms come twice: all as the shutter opens, then all as it
- * closes. */
+ * driver may flush a small integer, which is a denormal as a float. Texels:
+ *   triangle  3 texels: corners; w of the first: bits of the primitive's number in its geometry
+ *   sphere    2 texels: centre and radius; x of the second: bits of the number
+ * Triangles of a geometry that deforms come twice: all as the shutter opens, then all as it closes. */
 #define BVH_TRIANGLE_TEXELS 3u
 #define BVH_SPHERE_TEXELS 2u
 

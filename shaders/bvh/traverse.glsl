@@ -6,7 +6,7 @@
 //   BVH_SPHERES  bounds are spheres, not boxes
 //   BVH_PACKED   boxes are on a grid
 //   BVH_PLAIN    the paper's form, for comparison: elements in a storage buffer, one order for all directions
-//   BVH_ONE_INSTANCE there is one instance: no top tree is traversed
+//   BVH_ONE_INSTANCE  there is one instance: no top tree is traversed
 //   SHARED_ORIGIN     all rays of the wave begin at one point
 //   BVH_DEFORMS       there are meshes that deform, whose trees may have several histories
 //   BVH_DEFORMS_IN_SHUTTER  and some do while the shutter is open

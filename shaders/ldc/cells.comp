@@ -2,14 +2,14 @@
 // Finds the cells of a cube that samples' planes pass, and these samples: nodes, blocks and entries of ldc/layout.h.
 //
 // Defines, one of them:
-//   CELLS_LIST records each sample's texel; an item is a texel of the images
+//   CELLS_LIST     records each sample's texel; an item is a texel of the images
 //   CELLS_BLOCKS   marks the blocks that samples are in; an item is a sample
 //   CELLS_PLACE    gives nodes their blocks; an item is a node
 //   CELLS_MARK     marks cells; an item is a sample
 //   CELLS_COUNT    gives blocks their entries; an item is a block
 //   CELLS_FILL     writes the first entry of each cell; an item is a sample
-//   CELLS_FURTHER writes the further entries of cells; an item is such an entry
-//   CELLS_SORT sorts the entries of cells that have several; an item is a further entry
+//   CELLS_FURTHER  writes the further entries of cells; an item is such an entry
+//   CELLS_SORT     sorts the entries of cells that have several; an item is a further entry
 // Then raster/reach.comp adds the empty space around empty nodes.
 #include "ldc/layout.h"
 #include "shared/bindings.h"
