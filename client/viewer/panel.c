@@ -82,7 +82,7 @@ static uint64_t next_of_set(const struct field_desc *setting, uint64_t number, i
     for (size_t i = 0; i < count; i++)
         if (numbers[i] == number)
             at = i;
-    return numbers[(at + count + (size_t)step) % count];
+    return count > 0 ? numbers[(at + count + (size_t)step) % count] : number;
 }
 
 static uint64_t next_in_range(const struct field_desc *setting, uint64_t number, int step)
