@@ -46,7 +46,7 @@ static bool change_view(struct settings *settings, enum action action)
     switch (action) {
     case ACTION_NEXT_TRACER:
     case ACTION_PREVIOUS_TRACER:
-        do /* nobody waits for one that is for tests */
+        do /* tracers for tests are skipped */
             settings->tracer = (enum protocol_tracer)around(
                 (int)settings->tracer, action == ACTION_NEXT_TRACER ? 1 : -1, PROTOCOL_TRACER_COUNT);
         while (!is_for_everybody(settings->tracer));

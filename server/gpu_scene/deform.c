@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Deformed vertices: what the poses say of each node, compared with what its vertices show, and a pass of
- * shaders/gpu_scene/deform.comp over those that differ. Per frame only matrices of joints and weights of targets
- * go up. */
+/* Deformed vertices: compares each node's pose with its current vertices, and runs a pass of
+ * shaders/gpu_scene/deform.comp over those that differ. Per frame only joint matrices and target weights are
+ * uploaded. */
 #include "gpu_scene/deform.h"
 
 #include "gpu/program.h"
@@ -64,15 +64,15 @@ static float *values_of(const struct scene *scene, const struct scene_pose *pose
 static void join(struct deform_box *box, const float lower[3], const float upper[3])
 {
     for (int k = 0; k < 3; k++) {
-        /* What is beyond the numbers may be anywhere; the device puts such a vertex at 0. */
+        /* A vertex that overflows is undefined; the device puts it at 0. */
         bool fine = isfinite(lower[k]) && isfinite(upper[k]);
         box->lower[k] = fminf(box->lower[k], fine ? lower[k] : -FLT_MAX);
         box->upper[k] = fmaxf(box->upper[k], fine ? upper[k] : FLT_MAX);
     }
 }
 
-/* A vertex is the mean of where its joints take it, so it lies among where they take the box of all their
- * vertices; each of which the targets may have moved by as much as they move any. */
+/* A vertex is the weighted mean of its positions under each joint, so it lies in the hull of each joint's
+ * transformed box of its vertices, enlarged by the targets' maximum offset. */
 static void grow_by_pose(struct deform_box *box, const struct scene_mesh *mesh, const struct deform_mesh *rest,
                          const float *values, bool has_skin, uint32_t joint_count)
 {
@@ -160,7 +160,7 @@ static bool same_values(const float *a, const float *b, size_t count)
     return a && b && memcmp(a, b, count * sizeof(*a)) == 0;
 }
 
-/* Takes the poses' values for the use's, and notes the passes that they ask for. */
+/* Copies the poses' values to the use, and lists the passes that they need. */
 static bool update_use(struct work *work, uint32_t use_index, const struct scene_motion *motion,
                        struct scene_changes *changes, struct error *error)
 {

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Meshes that change their shape, on the device: what they are made from, and how they stand. Private to
- * gpu_scene*.c. A node that deforms (scene_node_deforms) has a geometry of its own behind the rigid ones, in the
- * order of node ids; its vertices as the shutter closes lie behind the vertices of all. */
+/* Meshes that change their shape, on the device: their rest shapes and current poses. Private to gpu_scene*.c. A
+ * node that deforms (scene_node_deforms) has a geometry of its own behind the rigid ones, in the order of node
+ * ids; its vertices as the shutter closes lie behind the vertices of all. */
 #ifndef FARLIGHT_GPU_SCENE_DEFORM_H
 #define FARLIGHT_GPU_SCENE_DEFORM_H
 
@@ -34,7 +34,7 @@ struct deform_use {
     uint64_t mesh_revision;
     uint32_t skin;        /* 0: none; the vertices are in the node's space */
     uint32_t value_count; /* of each of these */
-    float *open, *close;  /* of the vertices that are there; NULL: none are yet, or it does not change its shape */
+    float *open, *close;  /* of the current vertices; NULL: there are none yet, or it does not change its shape */
     bool is_placed;       /* they are in the buffers */
     uint64_t revision;    /* gpu_scene_geometry.deformed_revision */
     struct deform_box box;
@@ -58,7 +58,7 @@ size_t gpu_scene_deform_buffers(struct gpu_scene_deform *deform, struct gpu_buff
 
 /* Changes when nodes begin or cease to deform, or another mesh; 0: none does. */
 uint64_t gpu_scene_deform_signature(const struct scene *scene);
-/* Lists the uses; what is known of those that stay is kept. */
+/* Lists the uses; the state of remaining ones is kept. */
 bool gpu_scene_deform_list(struct gpu_scene_deform *deform, const struct scene *scene, struct error *error);
 /* The buffers and boxes of the meshes at rest; nothing is in place afterwards. */
 bool gpu_scene_deform_upload_rest(struct gpu_scene *gpu, const struct scene *scene, struct scene_changes *changes,

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Which nodes deform which meshes, and those meshes at rest: in the buffers of shaders/gpu_scene/deform.comp, and
- * in boxes from which any pose can be bounded without a look at its vertices. */
+/* The nodes that deform meshes, and those meshes at rest: in the buffers of shaders/gpu_scene/deform.comp, and in
+ * boxes that bound any pose without its vertices. */
 #include "gpu_scene/state.h"
 
 #include <float.h>
@@ -92,7 +92,7 @@ static int by_node(const void *a, const void *b)
     return node_a < node_b ? -1 : node_a > node_b;
 }
 
-/* A use that shows the same as before takes over what is known of it; its vertices are no longer in place. */
+/* An unchanged use keeps its state, except that its vertices are no longer in place. */
 static void inherit(struct deform_use *use, struct gpu_scene_deform *old)
 {
     struct deform_use *before = NULL;

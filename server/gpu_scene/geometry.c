@@ -120,7 +120,7 @@ static bool list_geometries(struct gpu_scene *gpu, const struct scene *scene, st
     return ok || error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for %zu geometries", total);
 }
 
-/* Where each geometry's part of the buffers begins. */
+/* The offset of each geometry in the buffers. */
 static struct totals lay_out(struct gpu_scene *gpu)
 {
     struct totals totals = {0};
@@ -197,7 +197,7 @@ static void pack_triangles(const struct gpu_scene *gpu, const struct gpu_scene_g
     }
 }
 
-/* Of what deforms the positions, and normals and tangents where it has some, are the device's to make. */
+/* The device computes positions, and normals and tangents if there are some, of deforming geometry. */
 static void pack_positions(const struct gpu_scene_geometry *geometry, float *out)
 {
     if (geometry->node)
@@ -210,7 +210,7 @@ static void pack_positions(const struct gpu_scene_geometry *geometry, float *out
     }
 }
 
-/* A value that is not finite would spread over everything that it is averaged with. */
+/* A value that is not finite would spread by averaging. */
 static float finite_or_zero(float x)
 {
     return isfinite(x) ? x : 0.0f;
@@ -402,7 +402,7 @@ bool gpu_scene_upload_geometry(struct gpu_scene *gpu, const struct scene *scene,
     return true;
 }
 
-/* What a material asks of the tracers, as it is when the shutter opens. */
+/* The features that a material needs of the tracers, as it is when the shutter opens. */
 static void classify_material(struct gpu_scene *gpu, const struct scene *scene, const struct scene_pose *pose,
                               uint32_t material_id, uint32_t *geometry_flags)
 {

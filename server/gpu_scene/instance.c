@@ -59,7 +59,7 @@ static double determinant(const float m[12])
            (double)m[2] * ((double)m[4] * m[9] - (double)m[5] * m[8]);
 }
 
-/* The instances as they will be, and their matrices over the shutter's time. */
+/* The new instances, and their matrices over the shutter's time. */
 struct fresh {
     struct instance *instances;
     uint32_t count;
@@ -67,7 +67,7 @@ struct fresh {
     uint32_t motion_count;
 };
 
-/* What is shown of one kind, in each of the poses; by node ids. */
+/* The visible instances of one kind, in each of the poses; by node ids. */
 struct posed {
     uint32_t pose_count;
     struct scene_instance *list[MOTION_POSES_MAX];
@@ -93,8 +93,9 @@ static bool posed_init(struct posed *posed, const struct scene *scene, const str
     return true;
 }
 
-/* Where the i-th of the first pose's instances is in each pose; false: it is flat in one of them. What a later
- * pose hides stays where it was last seen: it is there while the shutter is open if it is there when it opens. */
+/* The transform of the first pose's i-th instance in each pose; false: it is singular in one of them. An instance
+ * that a later pose hides stays at its last transform: it is visible while the shutter is open if it is when it
+ * opens. */
 static bool matrices_of(struct posed *posed, size_t i, const float *matrices[MOTION_POSES_MAX])
 {
     const struct scene_instance *first = &posed->list[0][i];
@@ -156,7 +157,8 @@ static bool same_set(const struct gpu_scene *gpu, const struct fresh *fresh)
     return true;
 }
 
-/* Equal ones between two that changed go along if they are so few: a call costs more than their bytes. */
+/* Up to this number of unchanged ones between two changed ones are uploaded with them: a call costs more than
+ * their bytes. */
 #define GAP_INSTANCES_MAX 4u
 
 /* Writes the runs that differ from the mirror. */
@@ -324,7 +326,7 @@ void gpu_scene_instance_bounds(const struct gpu_scene *gpu, uint32_t index, floa
     uint32_t pose_count;
     const float(*poses)[12] = gpu_scene_poses(gpu, instance, &pose_count);
     affine_bounds(lower_world, upper_world, poses[0], geometry->lower, geometry->upper);
-    /* Between two poses a point goes straight from where the one has it to where the other does. */
+    /* Between two poses a point moves linearly. */
     for (uint32_t p = 1; p < pose_count; p++) {
         float low[3], high[3];
         affine_bounds(low, high, poses[p], geometry->lower, geometry->upper);

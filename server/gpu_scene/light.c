@@ -23,7 +23,7 @@ static float length3(const float v[3])
     return sqrtf(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
 }
 
-/* A sphere stays a sphere: its radius takes the mean of an uneven scale. */
+/* A sphere stays a sphere: its radius is scaled by the mean of a non-uniform scale. */
 static float mean_scale(const float m[12])
 {
     double a = (double)m[0] * ((double)m[5] * m[10] - (double)m[6] * m[9]);

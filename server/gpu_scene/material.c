@@ -38,7 +38,7 @@ static bool add_free(struct material_indices *indices, uint32_t index)
     return true;
 }
 
-/* Takes back the indices of materials that are no more. */
+/* Frees the indices of removed materials. */
 static bool drop_stale(struct material_indices *indices, const struct scene *scene)
 {
     size_t cursor = 0, count = 0;

@@ -107,7 +107,7 @@ static bool update_shading(struct gpu_scene *gpu, const struct scene *scene, con
            gpu_scene_upload_materials(gpu, scene, motion, changes, error);
 }
 
-/* `posed`: what poses say something about, now or in the last update, and so may be elsewhere. */
+/* `posed`: the kinds that poses change, now or in the last update. */
 static bool update_parts(struct gpu_scene *gpu, const struct scene *scene, const struct scene_motion *motion,
                          unsigned posed, struct scene_changes *changes, struct error *error)
 {
@@ -119,7 +119,7 @@ static bool update_parts(struct gpu_scene *gpu, const struct scene *scene, const
     bool lights = fresh || gpu->lights_revision != scene->lights_revision || (posed & POSED_LIGHTS);
     if (shading && !update_shading(gpu, scene, motion, shading_edited, changes, error))
         return false;
-    /* Always: it finds by itself whether a shape changed, and where the shapes are now. */
+    /* Always: it detects changed shapes itself. */
     if (!gpu_scene_upload_geometry(gpu, scene, changes, error))
         return false;
     if (geometry && !gpu_scene_upload_discs(gpu, scene, changes, error))

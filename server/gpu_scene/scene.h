@@ -15,8 +15,8 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-/* What can change between two frames, as bits. A tracer says with the same bits what its structure is built from
- * (tracer_impl.depends_on). */
+/* The kinds of change between two frames, as bits. A tracer says with the same bits what its structure is built
+ * from (tracer_impl.depends_on). */
 enum scene_change {
     CHANGED_GEOMETRY = 1 << 0, /* meshes or sphere sets were added, removed or set again */
     CHANGED_DEFORMED =
@@ -89,7 +89,7 @@ struct gpu_scene {
     uint64_t geometry_revision, instances_revision, shading_revision, lights_revision; /* of what is there */
     uint64_t deformed_revision;    /* the last number given out; continues when the copy is made again, as tracers
                                       identify kept data by it */
-    struct gpu_scene_state *state; /* private to gpu_scene*.c: which parts need not be uploaded again */
+    struct gpu_scene_state *state; /* private to gpu_scene/: the parts that need not be uploaded again */
 };
 
 void gpu_scene_init(struct gpu_scene *gpu, struct gpu_device *device);

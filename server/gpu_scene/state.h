@@ -45,21 +45,21 @@ uint64_t gpu_scene_mix(uint64_t x);
 /* Changes when an object of the kind is added, removed or set again; 0 for none. */
 uint64_t gpu_scene_signature(const struct scene *scene, enum object_kind kind);
 
-/* What the device's texel buffers do not hold is refused: "5 `what`; this device's ..." */
+/* More than the device's texel buffers can hold is refused: "5 `what`; this device's ..." */
 bool gpu_scene_check_texels(const struct gpu_scene *gpu, uint64_t count, const char *what, struct error *error);
 
-/* gpu_scene_material.c. Indices first: geometry is packed with them. */
+/* material.c. Indices first: geometry is packed with them. */
 bool gpu_scene_index_materials(struct gpu_scene *gpu, const struct scene *scene, struct error *error);
 uint32_t gpu_scene_material_index(const struct gpu_scene *gpu, uint32_t material_id); /* 0: the default */
 /* What differs from the mirrors. */
 bool gpu_scene_upload_materials(struct gpu_scene *gpu, const struct scene *scene,
                                 const struct scene_motion *motion, struct scene_changes *changes,
                                 struct error *error);
-/* gpu_scene_texture.c. Does nothing where no texture changed. */
+/* texture.c. Does nothing where no texture changed. */
 bool gpu_scene_upload_textures(struct gpu_scene *gpu, const struct scene *scene, struct scene_changes *changes,
                                struct error *error);
 uint32_t gpu_scene_texture_index(const struct gpu_scene *gpu, uint32_t texture_id, bool *found);
-/* gpu_scene_geometry.c */
+/* geometry.c */
 bool gpu_scene_upload_geometry(struct gpu_scene *gpu, const struct scene *scene, struct scene_changes *changes,
                                struct error *error);
 /* Which geometry has cutouts, what the scene has of special materials. */
@@ -67,12 +67,12 @@ void gpu_scene_classify_geometry(struct gpu_scene *gpu, const struct scene *scen
                                  const struct scene_motion *motion);
 /* The table of geometries, where it is stale. */
 bool gpu_scene_upload_geometry_table(struct gpu_scene *gpu, struct scene_changes *changes, struct error *error);
-/* gpu_scene_deform.c. Brings the vertices of what deforms to the first pose and to the last. */
+/* deform.c. Brings the vertices of what deforms to the first pose and to the last. */
 bool gpu_scene_deform(struct gpu_scene *gpu, const struct scene *scene, const struct scene_motion *motion,
                       struct scene_changes *changes, struct error *error);
 /* Whether the vertices of some geometry are others as the shutter closes. */
 bool gpu_scene_any_closes(const struct gpu_scene *gpu);
-/* gpu_scene_instance.c */
+/* instance.c */
 bool gpu_scene_upload_instances(struct gpu_scene *gpu, const struct scene *scene,
                                 const struct scene_motion *motion, struct scene_changes *changes,
                                 struct error *error);
@@ -80,7 +80,7 @@ bool gpu_scene_upload_discs(struct gpu_scene *gpu, const struct scene *scene, st
                             struct error *error);
 /* Of the instances; empty (lower above upper) if there are none. */
 void gpu_scene_all_instance_bounds(const struct gpu_scene *gpu, float lower[3], float upper[3]);
-/* gpu_scene_light.c. As the shutter opens; the bounds too. */
+/* light.c. As the shutter opens; the bounds too. */
 bool gpu_scene_upload_lights(struct gpu_scene *gpu, const struct scene *scene, const struct scene_motion *motion,
                              struct scene_changes *changes, struct error *error);
 

@@ -96,7 +96,7 @@ static float distance_along_view(const struct frame_camera *camera, const float 
     return -((point[0] - m[3]) * m[2] + (point[1] - m[7]) * m[6] + (point[2] - m[11]) * m[10]);
 }
 
-/* Farther along the view than anything in the scene. */
+/* A distance along the view beyond the scene. */
 static float far_distance(const struct frame_camera *camera, const struct gpu_scene *scene, float near)
 {
     float far = near + 1.0f;
@@ -113,7 +113,7 @@ static float far_distance(const struct frame_camera *camera, const struct gpu_sc
     return far * 1.001f;
 }
 
-/* Of the middle of the scene; where that is not in front of the camera, of half the scene's size. */
+/* The distance of the scene's centre; if that is not in front of the camera, half the scene's size. */
 static float focus_distance(const struct frame_camera *camera, const struct gpu_scene *scene)
 {
     float middle[3];

@@ -51,7 +51,7 @@ struct render_context {
     uint32_t asked;  /* shadow rays of each hit of the current wave that are traced already */
     uint32_t asking; /* and that are made and not traced to the end; 0: none */
     struct gpu_buffer block_offsets, wave_state; /* of the compaction */
-    struct gpu_buffer slice_sums;                /* vec4 a sample of the slice: radiance so far, coverage */
+    struct gpu_buffer slice_sums;                /* vec4 per sample of the slice: radiance so far, coverage */
     uint64_t shadow_rays, secondary_rays;        /* of the slice in hand */
     uint32_t span_count;                         /* since the timer was collected */
 };

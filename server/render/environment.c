@@ -11,8 +11,8 @@
 #define PI 3.14159265358979323846
 #define SKY_ROWS 256
 
-/* What one row of an equirectangular image adds up to: it needs no sine or cosine per texel and channel beyond
- * the five functions of the azimuth that the nine harmonics share. */
+/* The sums of one row of an equirectangular image: per texel and channel only the five functions of the azimuth
+ * that the nine harmonics share. */
 struct row_sums {
     double one[3], x[3], z[3], xz[3], xx[3]; /* of colour times 1, sx, sz, sx sz, sx sx; s: unit circle */
 };

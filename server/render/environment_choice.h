@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* How bright the environment is in which direction, as shaders/common/environment_choice.glsl chooses by it. */
+/* The environment's brightness by direction, from which shaders/common/environment_choice.glsl samples. */
 #ifndef FARLIGHT_RENDER_ENVIRONMENT_CHOICE_H
 #define FARLIGHT_RENDER_ENVIRONMENT_CHOICE_H
 

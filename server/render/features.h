@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What a scene makes use of. Software GL runs both sides of every branch of a shader, so what is not there is left
- * out by defines when the shader is compiled. */
+/* The features that a scene uses. Software GL runs both sides of every branch of a shader, so unused features are
+ * left out by defines when the shader is compiled. */
 #ifndef FARLIGHT_RENDER_FEATURES_H
 #define FARLIGHT_RENDER_FEATURES_H
 

@@ -41,7 +41,7 @@ static bool begin_sample(struct frame_renderer *renderer, struct error *error)
     uint32_t left = context->request.samples - renderer->sample;
     context->uniforms.sample_index = renderer->samples_before + renderer->sample;
     context->uniforms.sample_shift = renderer->rasterise ? 0 : slices_sample_shift(&renderer->slices, left);
-    /* One that is added to others has no group of its own. */
+    /* A sample that is added to others has no group of its own. */
     context->uniforms.group_shift =
         context->request.accumulate ? 0 : slices_group_shift(context->request.samples, renderer->sample);
     place_sample(renderer);

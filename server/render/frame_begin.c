@@ -35,7 +35,7 @@ static bool check_request(const struct frame_renderer *renderer, const struct fr
            (!request->compare || find_tracer(renderer, request->compare_with, "compare_with", error));
 }
 
-/* Whether the picture that is kept shows what this frame will, once the scene has been updated. */
+/* Whether the kept picture shows the same as this frame, once the scene has been updated. */
 static bool may_go_on(const struct frame_renderer *renderer, const struct frame_request *request)
 {
     return renderer->kept_samples > 0 && request->samples <= UINT32_MAX - renderer->kept_samples &&
@@ -250,7 +250,7 @@ static bool get_ready(struct frame_renderer *renderer, struct error *error)
     renderer->result.revision = renderer->shared->copy.revision;
     renderer->sample = renderer->plane = renderer->band = renderer->copied = 0;
     renderer->copying = false;
-    /* A picture that has all its samples is only handed out again. */
+    /* A picture that has all its samples is only output again. */
     renderer->phase = request->samples ? PHASE_SAMPLE : PHASE_RESOLVE;
     return request->samples || context_upload_uniforms(context, error);
 }
@@ -324,7 +324,7 @@ static bool begin(struct frame_renderer *renderer, const struct scene *scene, co
     return update_scene(renderer, scene, motion, error) && take_tracers(renderer, error);
 }
 
-/* A first step of each, which may look at the scene's motion. */
+/* The first step of each, which may read the scene's motion. */
 static bool begin_tracers(struct frame_renderer *renderer, struct error *error)
 {
     renderer->built = false;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What renderers share, a renderer's life, and what they hold on the device. */
+/* The resources that renderers share, a renderer's life, and its resources on the device. */
 #include "render/frame_request.h"
 #include "render/frame_state.h"
 

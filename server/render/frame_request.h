@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: MIT */
-/* What a request of a frame may say, and whether two say the same. */
+/* Validation and comparison of frame requests. */
 #ifndef FARLIGHT_RENDER_FRAME_REQUEST_H
 #define FARLIGHT_RENDER_FRAME_REQUEST_H
 
 #include "render/frame.h"
 
-/* The session has checked what a client sent; this is what would go wrong here all the same. Tracers are left out.
+/* Checks what the session's checks of a client's request do not cover. Tracers are left out.
  */
 bool frame_request_check(const struct frame_request *request, struct error *error);
 /* As bits, with that of the beauty where the request names none. */
@@ -19,7 +19,7 @@ uint32_t frame_format_bytes(unsigned format); /* of a pixel */
 uint64_t frame_request_plane_bytes(const struct frame_request *request, enum layer layer, uint32_t rows);
 /* Of the frame's pixels, all planes. */
 uint64_t frame_request_bytes(const struct frame_request *request);
-/* Whether their samples may be added up: they are alike but for their number and for what becomes of the sum. */
+/* Whether their samples may be added up: they are equal but for their number and the use of the sum. */
 bool frame_request_adds_to(const struct frame_request *a, const struct frame_request *b);
 
 #endif

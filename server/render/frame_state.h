@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to frame_renderer.c, frame_begin.c and frame.c: what renderers of a scene share, what each holds, and
- * where its frame is. */
+/* Private to frame_renderer.c, frame_begin.c and frame.c: the shared resources of a scene's renderers, those of
+ * each, and the state of its frame. */
 #ifndef FARLIGHT_RENDER_FRAME_STATE_H
 #define FARLIGHT_RENDER_FRAME_STATE_H
 
@@ -41,7 +41,7 @@ struct frame_scene {
     uint32_t idle_count;
 };
 
-/* What a frame needs while it is in progress, of which nothing is kept. */
+/* The state of a frame while it is in progress, of which nothing is kept. */
 struct frame_work {
     struct frame_work *next; /* idle */
     struct wave_passes passes;

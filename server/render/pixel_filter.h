@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* How samples are spread about a pixel's centre. Ernst, Stamminger, Greiner. Filter Importance Sampling. 2006:
- * they are as dense as the filter is high and all weigh the same, so a pixel needs nothing of its neighbours.
+/* The distribution of samples about a pixel's centre. Ernst, Stamminger, Greiner. Filter Importance Sampling.
+ * 2006: they are as dense as the filter is high and all weigh the same, so a pixel needs nothing of its
+ * neighbours.
  *
  * The filters are products of one function of x and the same of y. Its distribution is kept as places: place i is
  * how far from the centre, in pixels, a share of (i / 64)^2 of one side's samples lies or farther; between places

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The numbers that a sample chooses by, as shaders/common/sequence.glsl makes them, to the bit; what they are and
- * how evenly they are spread stands there. */
+/* The random numbers of a sample, equal to the bit to those of shaders/common/sequence.glsl, which describes
+ * them. */
 #ifndef FARLIGHT_RENDER_SEQUENCE_H
 #define FARLIGHT_RENDER_SEQUENCE_H
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* How a picture's samples are cut into slices, so that waves fit their buffers and others get their turn. */
+/* Cuts a picture's samples into slices, so that waves fit their buffers and other jobs get their turn. */
 #ifndef FARLIGHT_RENDER_SLICES_H
 #define FARLIGHT_RENDER_SLICES_H
 

@@ -5,8 +5,8 @@
 
 #include "trace/tracer.h"
 
-/* When each kind of change last happened to a scene's copy on the device. What a tracer has yet to be told follows
- * from it, whoever owns the tracer and however long it was not in use. */
+/* When each kind of change last happened to a scene's copy on the device. It determines the changes that a tracer
+ * still has to be told, whatever its owner and however long it was not in use. */
 struct change_history {
     uint64_t update_count;               /* of updates that changed something */
     uint64_t last[sizeof(unsigned) * 8]; /* by bit of enum scene_change: the number of the last such update */

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The one place where waves of a frame meet a tracer. */
+/* The only place where waves of a frame are traced. */
 #ifndef FARLIGHT_RENDER_WAVE_TRACE_H
 #define FARLIGHT_RENDER_WAVE_TRACE_H
 
@@ -11,8 +11,8 @@
  * open). Where the frame compares tracers the wave is traced whole, once more with the other, and compared
  * (STAGE_COMPARE).
  *
- * What a step does follows the clock, for what a ray costs differs a hundredfold between tracers, scenes and
- * machines; what the rays find does not depend on it. */
+ * The size of a step follows the clock, as the cost of a ray differs a hundredfold between tracers, scenes and
+ * machines; the results do not depend on it. */
 bool wave_trace(struct render_context *context, enum ray_kind kind, const struct wave *wave, bool *done,
                 struct error *error);
 #endif

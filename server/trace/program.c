@@ -8,7 +8,7 @@
 
 #define OWN_DEFINES_MAX 12
 
-/* All rays at the time 0 see the first pose, which is what a program that knows no motion sees. */
+/* Rays at the time 0 see the first pose, as does a program without motion. */
 static bool has_motion(const struct gpu_scene *scene, const struct wave *wave)
 {
     return scene->has_motion && wave->times;
@@ -42,7 +42,7 @@ const struct gpu_program *trace_program_get(const struct gpu_scene *scene, const
         defines[n++] = (struct gpu_define){"HAS_CUTOUT", "1"};
     if (has_motion(scene, wave))
         defines[n++] = (struct gpu_define){"HAS_MOTION", "1"};
-    /* To a closest hit a translucent surface is one like any other: no second program for it. */
+    /* For closest hits a translucent surface is like any other: no second program for it. */
     if (scene->has_translucent && wave->kind == WAVE_ANY)
         defines[n++] = (struct gpu_define){"HAS_TRANSLUCENT", "1"};
     if (scene->has_transmission && wave->kind == WAVE_ANY)

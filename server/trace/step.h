@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Work that is done in steps, so that others get their turn between two of them and a cancel is served. */
+/* Work in steps, so that other jobs get their turn between two of them and a cancel is served. */
 #ifndef FARLIGHT_TRACE_STEP_H
 #define FARLIGHT_TRACE_STEP_H
 
@@ -8,11 +8,10 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-/* What a step is to take: a cancel is to be answered within 50 ms, and what cannot be cut comes on top. */
+/* The target time of a step: a cancel must be answered within 50 ms, including work that cannot be cut. */
 #define STEP_NS UINT64_C(10000000)
 #define STEP_WITHOUT_END UINT64_MAX
-/* Work that is done by equal items, each costing what it costs, is done in batches of about so long: a step has a
- * few of them. */
+/* Work on items of unknown cost is done in batches of about this time: a step has a few of them. */
 #define STEP_BATCH_NS UINT64_C(4000000)
 
 enum tracer_progress { TRACER_FAILED, TRACER_MORE, TRACER_DONE };
@@ -28,8 +27,8 @@ static inline bool step_is_over(uint64_t step_end_ns)
     return step_end_ns != STEP_WITHOUT_END && clock_now_ns() >= step_end_ns;
 }
 
-/* How many items the next batch is to have, where the last one's `items` took so long. At most twice as many: the
- * next ones may cost more. */
+/* The number of items of the next batch, from the time of the last one's `items`. At most twice as many: the next
+ * ones may cost more. */
 static inline uint32_t step_batch_items(uint32_t items, uint64_t took_ns)
 {
     const uint64_t fitting = items * STEP_BATCH_NS / (took_ns + 1), most = 2 * (uint64_t)items;

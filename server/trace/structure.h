@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What a tracer's structure says of itself: rows in the tracer's own words, which nobody else knows. They reach
- * people and scripts as protocol/messages.def has them (structure_row). */
+/* The description of a tracer's structure: rows in the tracer's own words, on which no other room depends. They
+ * are sent as in protocol/messages.def (structure_row). */
 #ifndef FARLIGHT_TRACE_STRUCTURE_H
 #define FARLIGHT_TRACE_STRUCTURE_H
 
@@ -17,7 +17,7 @@ struct structure_row {
     enum unit unit;
     uint64_t number;   /* the value, of UNIT_NUMBER and UNIT_BUILT */
     float measure;     /* the value, of other units */
-    char warning[256]; /* what the picture lacks for this reason, and the remedy; empty: nothing */
+    char warning[256]; /* what the picture lacks because of this value, and the remedy; empty: nothing */
 };
 
 struct structure_rows {

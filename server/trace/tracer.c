@@ -139,8 +139,8 @@ enum tracer_progress tracer_update_step(struct tracer *tracer, struct gpu_scene 
     if (!good && progress == TRACER_MORE)
         impl->abandon(tracer);
     tracer->updating = good && progress == TRACER_MORE;
-    /* After a failure nothing is known of the structure: the next update makes it anew. In the middle of an update
-     * that has begun with the structure of some revision, this is what the steps go by. */
+    /* After a failure the structure is unknown: the next update rebuilds it. In the middle of an update that has
+     * begun with the structure of some revision, this is what the steps go by. */
     tracer->updated = good && (progress == TRACER_DONE || tracer->updated);
     return good ? progress : TRACER_FAILED;
 }

@@ -26,12 +26,12 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* What only benchmarks and tests choose; zero is the default of each. */
+/* Options of benchmarks and tests alone; zero is the default of each. */
 struct tracer_bench {
     enum { BVH_LAYOUT_FAST, BVH_LAYOUT_PLAIN } bvh_layout; /* plain: sphere links in a storage buffer */
     uint32_t reference_rays;                               /* in a call of Embree; 0: chosen; 1, 4, 8, 16 */
     uint32_t ldc_layers_together;                          /* of a texel, tested at once; 0: chosen; 1, 4 */
-    uint32_t ldc_count_steps;     /* 1: hits say what the traversal did (shaders/ldc/cube.glsl) */
+    uint32_t ldc_count_steps;     /* 1: hits hold counts of the traversal (shaders/ldc/cube.glsl) */
     uint32_t abuffer_count_steps; /* likewise */
     uint32_t baseline_side; /* texels or cells along a side, of a structure of the benchmark's own; 0: its most */
 };
@@ -83,7 +83,7 @@ struct tracer_update {
     /* What to build a structure of a view from; NULL where nothing that the tracer depends on is of a view. Copied
      * by a tracer that needs it after the step. */
     const struct trace_view *view;
-    struct stage_times *times; /* the step's spans are added to it; NULL: nobody asks */
+    struct stage_times *times; /* the step's spans are added to it; may be NULL */
 };
 
 /* The structure that a tracer builds from the rays of one wave, and how far it has come with it. It serves one
@@ -131,8 +131,7 @@ struct tracer_impl {
     /* Drops an update that is not done, and all that was built; the next one is a first one. NULL: an update is
      * always one step. */
     void (*abandon)(struct tracer *tracer);
-    /* Adds what the structure says of itself, as the last update left it: STRUCTURE_ROWS_MAX rows at most. NULL:
-     * nothing. */
+    /* Adds the rows of the structure, as of the last update: STRUCTURE_ROWS_MAX at most. NULL: nothing. */
     void (*tell)(const struct tracer *tracer, struct structure_rows *rows);
     /* Whether the next step of the update would only wait, for threads of the tracer's own. NULL: never. */
     bool (*waits)(struct tracer *tracer);
@@ -172,7 +171,7 @@ struct tracer_impl {
 
 /* The table of what this build has; index is the protocol's tracer number, NULL where it is left out. */
 const struct tracer_impl *tracer_impl_by_number(unsigned number);
-/* The same for who asked for it: where there is none, ERROR_UNSUPPORTED says why and what can be done. */
+/* The same with an error: if there is none, ERROR_UNSUPPORTED says why and what can be done. */
 const struct tracer_impl *tracer_find(unsigned number, const char *field, struct error *error);
 
 /* Whether the tracer can show what moves while the shutter is open, if something does; else ERROR_UNSUPPORTED. */
@@ -202,7 +201,7 @@ bool tracer_update(struct tracer *tracer, struct gpu_scene *scene, const struct 
                    struct error *error);
 /* The next update takes everything as changed. */
 void tracer_outdate(struct tracer *tracer);
-/* What the structure says of itself, as the last update left it. */
+/* The rows of the structure, as of the last update. */
 void tracer_tell(const struct tracer *tracer, struct structure_rows *rows);
 
 /* ---- tracing, resumable ---- */

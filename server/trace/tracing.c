@@ -8,8 +8,8 @@
 
 #include <stdlib.h>
 
-/* The first step of a family of waves; and how many times as many rays as the last one a step may have, which may
- * have been of rays that leave the scene at once. */
+/* The first step of a family of waves; and how many times as many rays as the last one per step may have, which
+ * may have been of rays that leave the scene at once. */
 #define STEP_RAYS_FIRST 4096u
 #define STEP_RAYS_GROWTH 2u
 #define STEP_RAYS_MAX (1u << 30)
@@ -115,8 +115,8 @@ static uint32_t minimum_rays(const struct trace_state *state)
     return state->impl->minimum_rays ? state->impl->minimum_rays : 1;
 }
 
-/* The rays of the next step: of equal steps, none of which has more than the family's. A GPU does not say when a
- * range is done unless it is waited for, and there a wave is a few milliseconds. */
+/* The rays of the next step: of equal steps, none of which has more than the family's. On a GPU the end of a range
+ * is known only by waiting, and a wave takes a few milliseconds. */
 static struct ray_range next_range(const struct trace_state *state, uint64_t step_ns)
 {
     const struct wave *wave = &state->wave;

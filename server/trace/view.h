@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What a structure of a view is built from, beside the scene. */
+/* The input of a view's structure besides the scene. */
 #ifndef FARLIGHT_TRACE_VIEW_H
 #define FARLIGHT_TRACE_VIEW_H
 

@@ -22,7 +22,7 @@ enum wave_kind {
 struct wave {
     enum wave_kind kind;
     unsigned family; /* below WAVE_FAMILIES; 0 where the caller does not tell them apart */
-    /* How many of `rays` are to be traced, at least 1: exactly so many, or where `counts` is set an upper bound.
+    /* The number of `rays` to trace, at least 1; an upper bound if `counts` is set.
      */
     uint32_t ray_count;
     /* NULL, or a buffer that begins with a struct wave_counts (shared/wave.h), written on the device before the

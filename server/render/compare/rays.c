@@ -258,7 +258,7 @@ static bool compare_visibility(struct wave_tally *tally, const struct ray *ray, 
     if (!is_alive(ray) && !first_hit && !second_hit)
         return true;
     bool agree = transmittances_agree(first, second);
-    /* The faintest of veils is lost in rounding: it is there if the reference says so. */
+    /* The faintest translucency is lost in rounding: the reference decides. */
     count_classes(tally, agree ? second_hit : first_hit, second_hit);
     tally->far += !agree && first_hit && second_hit;
     return agree;
@@ -280,8 +280,8 @@ uint32_t wave_compare(struct wave_tally *tally, const struct wave_compare_settin
     return count;
 }
 
-/* How far rounding may move a ray, in steps of the last place: an intersection is a handful of operations on
- * coordinates of that size, and so is a way to another space. */
+/* The error of a ray by rounding, in units of the last place: an intersection is a handful of operations on
+ * coordinates of that size, and so is a change of space. */
 #define MOVE_STEPS 8
 
 void wave_moved_rays(const struct wave_compare_settings *settings, const struct wave_answers *answers,
@@ -292,7 +292,7 @@ void wave_moved_rays(const struct wave_compare_settings *settings, const struct 
     if (answers->first_hits)
         along = fmaxf(answers->first_hits[index].distance, answers->second_hits[index].distance);
     double length = direction_length(ray);
-    /* What stands in a shadow ray's way is in the scene. */
+    /* A shadow ray's occluder is in the scene. */
     double reach = answers->first_hits ? (double)along : fmin((double)along, (double)settings->diagonal / length);
     double size = 0.0;
     for (int i = 0; i < 3; i++) {

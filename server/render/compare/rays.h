@@ -21,7 +21,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* Waves of a frame, and kinds of ray in each; what lies beyond is counted with the last wave. The wire's number.
+/* Waves of a frame, and kinds of ray in each; further waves are counted with the last one. The wire's number.
  */
 #define COMPARED_WAVES_MAX 64
 #define COMPARISONS_MAX (COMPARED_WAVES_MAX * 2)
@@ -50,7 +50,7 @@ void error_histogram_merge(struct error_histogram *into, const struct error_hist
 /* The smallest value that at least `share` (0 to 1) of the errors do not exceed; 0 without errors. */
 float error_histogram_percentile(const struct error_histogram *histogram, double share);
 
-/* What has been counted of one wave and kind; all-zero is empty. Large: keep it on the heap. */
+/* The counts of one wave and kind; all-zero is empty. Large: keep it on the heap. */
 struct wave_tally {
     uint32_t wave;
     enum ray_kind kind;

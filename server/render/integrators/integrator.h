@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Light transport: what a hit sends out and asks for, as a row that wave_passes.h runs. */
+/* Light transport: the passes over hits and their rays, as a row that wave_passes.h runs. */
 #ifndef FARLIGHT_RENDER_INTEGRATORS_INTEGRATOR_H
 #define FARLIGHT_RENDER_INTEGRATORS_INTEGRATOR_H
 

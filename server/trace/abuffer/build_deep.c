@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Texels with so many samples that a loop over them would not come to its end on some devices (ABUFFER_LIST_MAX):
- * there are few if any, and the host sorts them. */
+/* Texels with so many samples that a loop over them would be cut short on some devices (ABUFFER_LIST_MAX): there
+ * are few if any, and the host sorts them. */
 #include "trace/abuffer/build_state.h"
 
 #include <stdlib.h>

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* The pass over the scene: every fragment becomes a node, linked into the list of its texel. Yang, Hensley, Gruen,
- * Thibieroz. Real-Time Concurrent Linked List Construction on the GPU. 2010. Where there is no room for all of
- * them, they are counted, room is made, and the pass is repeated. */
+ * Thibieroz. Real-Time Concurrent Linked List Construction on the GPU. 2010. If not all of them fit, they are
+ * counted, the buffer grows, and the pass is repeated. */
 #include "abuffer/layout.h"
 #include "shared/bindings.h"
 #include "trace/abuffer/build_state.h"
@@ -63,7 +63,7 @@ bool abuffer_texels_allowed(const struct abuffer_task *task, struct error *error
     return error_remedy(error, "take a lower resolution, or raise memory.abuffer");
 }
 
-/* Exactly so many: there is a limit, and buffers that grow take more than they are asked for. */
+/* Exactly this size: there is a limit, and growing buffers reserve more than requested. */
 static bool reserve_nodes(struct abuffer_task *task, uint64_t nodes, struct error *error)
 {
     struct abuffer_builder *builder = task->builder;
@@ -230,7 +230,7 @@ bool abuffer_occupied_run(struct abuffer_task *task, uint32_t first, uint32_t en
     return true;
 }
 
-/* Where lists did not fit: room for all of them, and all over again. */
+/* If lists did not fit: reserves memory for all of them, and repeats the pass. */
 bool abuffer_occupied_end(struct abuffer_task *task, struct error *error)
 {
     abuffer_read_counts(task);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to abuffer_build*.c: what they keep between builds, and what one build is about. */
+/* private to build*.c: what they keep between builds, and what one build is about. */
 #ifndef FARLIGHT_TRACE_ABUFFER_BUILD_STATE_H
 #define FARLIGHT_TRACE_ABUFFER_BUILD_STATE_H
 
@@ -7,7 +7,7 @@
 #include "trace/abuffer/build.h"
 #include "trace/raster/draw.h"
 
-/* What a build does one after the other, each cut into ranges of equal items. */
+/* The stages of a build in order, each cut into ranges of equal items. */
 enum abuffer_stage {
     ABUFFER_CLEAR,    /* chunks of buffers */
     ABUFFER_DRAW,     /* primitives */
@@ -24,7 +24,7 @@ enum abuffer_stage {
 };
 
 struct abuffer_builder;
-struct abuffer_deep; /* abuffer_build_deep.c */
+struct abuffer_deep; /* build_deep.c */
 
 /* A build that has begun; what it works with is the caller's. */
 struct abuffer_task {
@@ -68,26 +68,26 @@ typedef bool abuffer_stage_run(struct abuffer_task *task, uint32_t first, uint32
 typedef uint32_t abuffer_stage_fit(struct abuffer_task *task, uint32_t first, uint32_t items);
 typedef bool abuffer_stage_end(struct abuffer_task *task, struct error *error);
 
-/* abuffer_build_lists.c. Draws the scene into `heads`, `nodes` and the store's sums, and lists the texels that
- * have any. */
+/* build_lists.c. Draws the scene into `heads`, `nodes` and the store's sums, and lists the texels that have
+ * any. */
 abuffer_stage_begin abuffer_clear_begin, abuffer_draw_begin, abuffer_occupied_begin;
 abuffer_stage_run abuffer_clear_run, abuffer_draw_run, abuffer_occupied_run;
 abuffer_stage_fit abuffer_draw_fit;
 abuffer_stage_end abuffer_occupied_end;
-/* abuffer_build_lists.c. Whether the options allow as many texels, empty ones too. */
+/* build_lists.c. Whether the options allow as many texels, empty ones too. */
 bool abuffer_texels_allowed(const struct abuffer_task *task, struct error *error);
-/* abuffer_build_lists.c. Room for the lists of a first pass. */
+/* build_lists.c. Room for the lists of a first pass. */
 bool abuffer_lists_reserve(struct abuffer_task *task, struct error *error);
-/* abuffer_build_runs.c. From lists to the store's texels, samples and ids. */
+/* build_runs.c. From lists to the store's texels, samples and ids. */
 abuffer_stage_begin abuffer_resolve_begin, abuffer_up_to_eight_begin, abuffer_beyond_eight_begin;
 abuffer_stage_run abuffer_resolve_run, abuffer_up_to_eight_run, abuffer_beyond_eight_run;
 abuffer_stage_end abuffer_resolve_end;
-/* abuffer_build_deep.c. Those of texels that have more than the device's passes sort. */
+/* build_deep.c. Those of texels that have more than the device's passes sort. */
 abuffer_stage_begin abuffer_deep_begin;
 abuffer_stage_run abuffer_deep_run;
 void abuffer_deep_end(struct abuffer_task *task); /* also where it has not begun */
 
-/* abuffer_build.c. Reads task->counts back. */
+/* build.c. Reads task->counts back. */
 void abuffer_read_counts(struct abuffer_task *task);
 
 #endif

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The structure of the tracer `abuffer` on the device (shaders/abuffer/layout.h), filled by abuffer_build.c, its
- * voxels by abuffer_trace.c, which also reads it. */
+/* The structure of the tracer `abuffer` on the device (shaders/abuffer/layout.h), filled by build.c, its voxels by
+ * trace.c, which also reads it. */
 #ifndef FARLIGHT_TRACE_ABUFFER_STORE_H
 #define FARLIGHT_TRACE_ABUFFER_STORE_H
 

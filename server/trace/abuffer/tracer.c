@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The tracer `abuffer`: voxels that say where something is, and A-buffers along three axes that say what.
+/* The tracer `abuffer`: voxels that locate surfaces, and A-buffers along three axes that hold them.
  *
  * Hu, Huang, Zhang, Yuan, Li. Ray Tracing via GPU Rasterization. 2014. */
 #include "gpu/timer.h"
@@ -119,7 +119,7 @@ static enum tracer_progress do_step(struct abuffer *abuffer, struct gpu_scene *s
     gpu_timer_begin(abuffer->timer, STAGE_BUILD, 0);
     if (abuffer_build_is_on(abuffer->builder) || begin(abuffer, scene, error))
         progress = abuffer_build_step(abuffer->builder, abuffer->base.step_end_ns, error);
-    glFinish(); /* the time on the CPU's clock is the time until it is there */
+    glFinish(); /* the time on the CPU's clock includes the wait for it */
     gpu_timer_end(abuffer->timer);
     gpu_timer_collect(abuffer->timer, times);
     return progress;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* From a store's `sums` to its `voxels`: which hold something, by which images a ray is to be searched for in
- * each, and how far nothing is (shaders/abuffer/voxels.comp, raster/reach.comp). */
+/* From a store's `sums` to its `voxels`: the occupied ones, the images to search in each, and the empty space
+ * (shaders/abuffer/voxels.comp, raster/reach.comp). */
 #ifndef FARLIGHT_TRACE_ABUFFER_VOXELS_H
 #define FARLIGHT_TRACE_ABUFFER_VOXELS_H
 

@@ -46,8 +46,8 @@ static struct bvh_box *spare_boxes(const struct builder *builder, const struct r
     return (struct bvh_box *)(void *)(builder->tree->nodes + range->node);
 }
 
-/* Returns the first primitive of the right half. Which way one goes is a coin toss, so nothing branches on it:
- * each is written to both places, and only one of them moves on. */
+/* Returns the first primitive of the right half. The side of a primitive is unpredictable, so nothing branches on
+ * it: each is written to both places, and only one of them advances. */
 static uint32_t partition(const struct builder *builder, const struct range *range, const struct bvh_split *split)
 {
     struct bvh_box *boxes = builder->boxes, *boxes_right = spare_boxes(builder, range);

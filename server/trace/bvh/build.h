@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* The builder of bounding volume trees: on the CPU, knows no GL, deterministic for an input whatever the number
- * of threads. Three steps: a binary tree by the surface area heuristic in bins (bvh_build.c, bvh_build_split.c),
- * the throwing back of elements that do not pay and the baking of links (bvh_build_bake.c), many
- * trees at once (bvh_build_jobs.c).
+ * of threads. Three steps: a binary tree by the surface area heuristic in bins (build.c, build_split.c),
+ * the removal of elements that do not pay and the baking of links (build_bake.c), many
+ * trees at once (build_jobs.c).
  *
  * Based on: Wald. On fast Construction of SAH-based Bounding Volume Hierarchies. 2007 (binning);
  * 'Stackless traversal of a sphere BVH, distributed ray tracing', sections 4 and 6: wide nodes, baked links. */
@@ -43,7 +43,7 @@ struct bvh_binary {
     uint32_t primitive_count;
 };
 
-/* What an element test and a primitive test cost, in whatever unit; their ratio was found by measuring. */
+/* The costs of an element test and of a primitive test, in arbitrary units; their ratio was measured. */
 struct bvh_costs {
     float element, primitive;
     uint32_t leaf_max; /* 1 .. BVH_LEAF_MAX */
@@ -79,7 +79,7 @@ struct bvh_refit_step {
 struct bvh_refit_plan {
     uint32_t *corners; /* 4 a triangle, in the tree's order: its vertices and its number in the mesh */
     uint32_t triangle_count;
-    struct bvh_refit_record *records; /* one an element, leaves first */
+    struct bvh_refit_record *records; /* one per element, leaves first */
     uint32_t record_count, leaf_count;
     struct bvh_refit_step *steps; /* above the leaves */
     uint32_t step_count;
@@ -192,7 +192,7 @@ void bvh_pad_box(float lower[3], float upper[3]);
 
 /* A grid over a padded box, enlarged on all sides by `room`, a share of the box's extent. */
 struct bvh_grid bvh_grid_over(const float lower[3], const float upper[3], float room);
-/* Cells of a padded box, two an axis; rounded outward. False: some of it lies outside of the grid. */
+/* Cells of a padded box, two per axis; rounded outward. False: some of it lies outside of the grid. */
 bool bvh_grid_cells(const struct bvh_grid *grid, const float lower[3], const float upper[3], uint32_t cells[3][2]);
 /* Surface of the box that those cells span, as bvh_box_area. */
 float bvh_grid_area(const struct bvh_grid *grid, uint32_t cells[3][2]);

@@ -217,8 +217,8 @@ static void chunk_elements(void *context, uint32_t chunk)
     }
 }
 
-/* What a sample of the elements says of the tree. Of the grid: the mean of each element's own cost, however small
- * it is: where there is detail, there the camera looks. */
+/* Statistics of the tree from a sample of its elements. For the grid: the mean of each element's own cost, however
+ * small it is: the camera looks where there is detail. */
 static void survey(struct work *work)
 {
     const struct bvh_baked *baked = &work->baked;

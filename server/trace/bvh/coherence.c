@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-/* How many rays of a wave walk together. The choice follows the rays and the scene alone, never the clock, so that
- * a picture is the same every time: it is made once for the whole wave, before its first step. */
+/* The packet size of a wave. The choice depends on the rays and the scene alone, never on the clock, so that a
+ * picture is the same every time: it is made once for the whole wave, before its first step. */
 #include "trace/bvh/tracer.h"
 
 #include "gpu/program.h"

@@ -64,7 +64,7 @@ uint64_t bvh_store_bytes(const struct bvh_store *store)
 
 /* ---- memory ---- */
 
-/* What a texel buffer (or a storage buffer, for the plain form's elements) can hold. */
+/* The capacity of a texel buffer (or a storage buffer, for the plain form's elements). */
 static bool check_limits(const struct bvh_store *store, uint64_t elements, uint64_t texels, struct error *error)
 {
     const struct gpu_facts *facts = &store->device->facts;
@@ -481,7 +481,7 @@ bool bvh_store_waits(struct bvh_store *store)
 
 /* ---- top tree ---- */
 
-/* One octant's copy: runs of elements that lie side by side there. */
+/* One octant's copy: runs of adjacent elements. */
 static uint64_t write_top_copy(struct bvh_store *store, const struct bvh_top *top, uint32_t octant,
                                const bool *moved)
 {

@@ -108,7 +108,7 @@ static struct bvh_world_box world_box(const struct bvh_entry *entry, const struc
     return box;
 }
 
-/* What instance i is now. The box is empty where its geometry has no primitives. */
+/* The current instance i. The box is empty if its geometry has no primitives. */
 static struct bvh_transform describe(const struct bvh *bvh, const struct gpu_scene *scene, uint32_t i,
                                      struct bvh_world_box *box)
 {

@@ -18,7 +18,7 @@ struct bvh {
     enum bvh_phase phase;
     struct bvh_store store;
     struct bvh_top top;
-    struct bvh_transform *transforms; /* mirror of the buffer, one an instance of the scene */
+    struct bvh_transform *transforms; /* mirror of the buffer, one per instance of the scene */
     uint32_t transform_count;
     struct gpu_buffer transform_buffer;
     float leaf_extent_world;     /* diagonal of a leaf's box, in the mean over what the instances show */

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* How many layers there is room for: of each texel the nearest are kept. */
+/* The number of layers that fit into memory: the nearest of each texel are kept. */
 #include "ldc/layout.h"
 #include "shared/bindings.h"
 #include "trace/ldc/build_state.h"

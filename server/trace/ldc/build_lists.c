@@ -12,7 +12,7 @@
 /* A fragment that has a slot costs half of what one in the list does, but all texels have as many. */
 #define SLOTS_FIRST 4u
 #define SLOTS_BYTES_MAX ((uint64_t)512 << 20)
-/* Of fragments, those without a slot that are put up with. */
+/* The accepted share of fragments without a slot. */
 #define UNSLOTTED_SHARE 16
 /* Fragments of one texel. Software GL ends the loops of an invocation after 65,535 rounds: a heap of 2048 takes
  * about 50,000, and pack.comp goes over eight texels three times. */

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to ldc_build*.c: what they keep between builds, and what one build is about. */
+/* private to build*.c: what they keep between builds, and what one build is about. */
 #ifndef FARLIGHT_TRACE_LDC_BUILD_STATE_H
 #define FARLIGHT_TRACE_LDC_BUILD_STATE_H
 
@@ -51,27 +51,27 @@ struct ldc_builder {
 
 enum ldc_pass { LDC_PASS_LISTS, LDC_PASS_COUNT, LDC_PASS_PEEL };
 
-/* ldc_build_draw.c. Draws some of what is listed, from task->drawn on, which is 0 as a pass begins; when all is
- * drawn, the unit after this one is `then`, else it is this one again. The framebuffer and the pass's own images
- * are bound already; `set` (may be NULL) sets its uniforms, and is given the task. */
+/* build_draw.c. Draws some of what is listed, from task->drawn on, which is 0 as a pass begins; when all is drawn,
+ * the unit after this one is `then`, else it is this one again. The framebuffer and the pass's own images are
+ * bound already; `set` (may be NULL) sets its uniforms, and is given the task. */
 bool ldc_draw(struct ldc_task *task, enum ldc_pass pass,
               void (*set)(const void *task, const struct gpu_program *program), ldc_unit *then,
               struct error *error);
 
-/* ldc_build_lists.c. This unit and those after it leave the fragments in `ordered`, and what was counted in
+/* build_lists.c. This unit and those after it leave the fragments in `ordered`, and what was counted in
  * task->counts, and go on to ldc_pack; or to ldc_peel, where there are more than lists can hold. */
 bool ldc_lists(struct ldc_task *task, struct error *error);
-/* ldc_build_peel.c. Likewise. */
+/* build_peel.c. Likewise. */
 bool ldc_peel(struct ldc_task *task, struct error *error);
 /* From `counts`: what is occupied, where fragments without slots lie, sums; reads task->counts back. Of a texel no
  * more than `kept` fragments are in `ordered`. */
 bool ldc_give_places(struct ldc_task *task, uint32_t kept, struct error *error);
 
-/* ldc_build_limit.c. Lowers task->layers_max to what fits the options, the layout and the device, if task->counts
- * do not; counts.samples_max and .quads_max follow. Fails where not even one layer fits. */
+/* build_limit.c. Lowers task->layers_max to what fits the options, the layout and the device, if task->counts do
+ * not; counts.samples_max and .quads_max follow. Fails where not even one layer fits. */
 bool ldc_limit(struct ldc_task *task, struct error *error);
 
-/* ldc_build_pack.c. This unit and those after it: from `ordered` to the cube's buffers. */
+/* build_pack.c. This unit and those after it: from `ordered` to the cube's buffers. */
 bool ldc_pack(struct ldc_task *task, struct error *error);
 
 /* What a program that has ldc/sample.glsl needs to know of the scene; ends with {0}. */
@@ -85,7 +85,7 @@ void ldc_sample_defines(const struct ldc_task *task, struct gpu_define defines[L
 #define LDC_ORDERED_BYTES 8
 #define LDC_VISIBLE_BYTES 16
 
-/* ldc_build.c. The compute program, without defines, is made current. */
+/* build.c. The compute program, without defines, is made current. */
 const struct gpu_program *ldc_use(struct gpu_device *device, const char *path, struct error *error);
 /* Binds what ldc/run.glsl reads, and sets its uniforms. */
 void ldc_bind_runs(struct ldc_task *task, const struct gpu_program *program);

@@ -189,7 +189,7 @@ static bool mark_blocks(struct ldc_cells *cells, struct error *error)
     return cells_pass(cells, "CELLS_BLOCKS", cube->sample_count, error);
 }
 
-/* Which texel a sample is in: then passes have samples, and not texels most of which are empty, for items. */
+/* Which texel per sample is in: then passes have samples, and not texels most of which are empty, for items. */
 static bool list_samples(struct ldc_cells *cells, struct error *error)
 {
     struct ldc_store *store = cells->store;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Which cells of a cube samples' planes pass: what a ray that looks at all three images at once skips by, and what
- * it finds samples by. Cells of ldc/layout.h, made by shaders/ldc/cells.comp and raster/reach.comp. */
+/* The cells of a cube that samples' planes pass: a ray in all three images at once skips empty space and finds
+ * samples by them. Cells of ldc/layout.h, made by shaders/ldc/cells.comp and raster/reach.comp. */
 #ifndef FARLIGHT_TRACE_LDC_CELLS_H
 #define FARLIGHT_TRACE_LDC_CELLS_H
 

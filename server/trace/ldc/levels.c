@@ -152,7 +152,7 @@ static enum tracer_progress build_levels(struct ldc_levels *levels, struct error
     return progress;
 }
 
-/* What failed was cells that nobody asked for by name, as there are too many. */
+/* Cells failed that were chosen automatically, as there are too many. */
 static bool may_have_ranges(const struct ldc_levels *levels, const struct error *of_cells)
 {
     return levels->options->ldc.levels == LDC_LEVELS_AUTO && !levels->store->no_cells &&

@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: MIT */
-/* What of a cube can be skipped: least and greatest depth over blocks of an image's texels (the paper's two-level
- * cube, section 1.3) or over all sizes of blocks, a pyramid; or, and that is the default, which cells of all three
- * images together hold something (ldc_cells.h).
+/* The empty space of a cube that rays skip: by minimum and maximum depth over blocks of an image's texels (the
+ * paper's two-level cube, section 1.3) or over all sizes of blocks, a pyramid; or, by default, by the occupied
+ * cells of all three images together (ldc/cells.h).
  *
  * Million reflected rays a second on two cores of software GL, a dragon of 47,000 triangles at a resolution of
  * 1024: blocks of 8 0.15, of 32 0.19, a pyramid of 2 x 2 children 0.25, of 4 x 4 0.29, of 8 x 8 0.26, cells 4.1.
- * Image by image a ray looks at 130 nodes and 54 texels, whose depths it meets and whose planes it passes by; by
- * cells, and that is all images at once, at 16 nodes and blocks and at 3 cells, and it ends with what it meets
- * first. For that cells take 0.2 seconds to build where a pyramid takes 0.02, and 16 bytes for each cell that a
- * sample's plane passes, about two a sample. The paper's test, a tolerance, takes a pyramid: cells are of planes.
+ * Image by image a ray visits 130 nodes and 54 texels, whose depths it meets but whose planes it misses; by cells,
+ * for all images at once, it visits 16 nodes and blocks and 3 cells, and ends with the first intersection. For
+ * that cells take 0.2 seconds to build where a pyramid takes 0.02, and 16 bytes for each cell that a sample's
+ * plane passes, about two per sample. The paper's test, a tolerance, takes a pyramid: cells are of planes.
  */
 #ifndef FARLIGHT_TRACE_LDC_LEVELS_H
 #define FARLIGHT_TRACE_LDC_LEVELS_H

@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Nodes that are not there any more are forgotten when they are more than those that are, and than this. */
+/* Removed nodes are forgotten when they outnumber the existing ones and this number. */
 #define RECORDS_KEPT 1024
 
 /* What is remembered of a node. */

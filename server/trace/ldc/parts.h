@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* Which of a scene's instances are in which cube, where the cubes lie, and which of them must be made anew.
+/* Divides a scene's instances among the cubes, places the cubes, and finds those that must be rebuilt.
  *
- * Dynamic is what deforms, and what has been seen to move, to change its shape or to come back after it was
- * hidden; all else is static. Once dynamic an instance stays so until the scene's geometry is another, for then
- * cubes are built anyhow: what was still on the move stays dynamic, the rest settles. So the static cube is built
- * once more when something begins to move, and then no longer. */
+ * Dynamic are instances that deform, and those that have moved, changed their shape or reappeared; all others are
+ * static. A dynamic instance stays dynamic until the scene's geometry changes, for then cubes are rebuilt anyhow:
+ * instances that still move stay dynamic, the rest become static. So the static cube is rebuilt once when
+ * something begins to move, and then no longer. */
 #ifndef FARLIGHT_TRACE_LDC_PARTS_H
 #define FARLIGHT_TRACE_LDC_PARTS_H
 

@@ -20,7 +20,7 @@ struct ldc_cube {
     float cell_world;    /* metres */
     uint32_t resolution; /* texels along a side of each of the three images; 0: there is no cube */
     uint32_t first_texel, first_sample, sample_count, first_quad, quad_count;
-    /* ldc_levels.c: nodes, entries of cells, and where the cells that have some are */
+    /* levels.c: nodes, entries of cells, and where the cells that have some are */
     uint32_t first_node, node_count, first_entry, entry_count;
     uint32_t lower_cells[3], upper_cells[3];
     uint32_t layers_needed, layers_kept;
@@ -30,7 +30,7 @@ struct ldc_cube {
 struct ldc_store {
     struct gpu_device *device;
     struct gpu_buffer texels, quads, geometry, surface, nodes, entries;
-    bool no_cells;                        /* ldc_levels.c: they were too many, and there are ranges */
+    bool no_cells;                        /* levels.c: they were too many, and there are ranges */
     struct ldc_cube cubes[LDC_CUBES_MAX]; /* the static one first: what moves lies behind it */
 };
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What a sample holds of its surface, put into hits. */
+/* Copies the surface words of samples into hits. */
 #ifndef FARLIGHT_TRACE_LDC_SURFACE_H
 #define FARLIGHT_TRACE_LDC_SURFACE_H
 

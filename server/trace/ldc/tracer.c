@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The tracer `ldc`: layered depth cubes. One holds what stands still, another what moves (ldc_parts.h).
+/* The tracer `ldc`: layered depth cubes, one of static and one of dynamic instances (ldc/parts.h).
  *
  * Bürger, Hertel, Krüger, Westermann. GPU Rendering of Secondary Effects. 2007. */
 #include "gpu/timer.h"
@@ -89,7 +89,7 @@ static struct tracer *ldc_create(struct gpu_device *device, const struct tracer_
     return NULL;
 }
 
-/* After a failure: all is forgotten, and built anew by the next update. */
+/* After a failure: drops everything; the next update rebuilds it. */
 static void reset(struct ldc *ldc)
 {
     struct gpu_device *device = ldc->store.device;
@@ -196,7 +196,7 @@ static void fill_stats(struct ldc *ldc)
         ldc_store_bytes(&ldc->store) + ldc_builder_bytes(ldc->builder) + ldc_levels_bytes(&ldc->levels);
 }
 
-/* Which cubes are to be built. Of materials it is known which have changed, but not where they are. */
+/* The cubes to be built. Changed materials are known, but not the instances that use them. */
 static enum tracer_progress begin_update(struct ldc *ldc, const struct gpu_scene *scene, unsigned changed,
                                          struct error *error)
 {

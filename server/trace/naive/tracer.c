@@ -9,8 +9,8 @@
 #define DISPATCH_TESTS_MAX ((uint64_t)1 << 33)
 #define DISPATCH_RAYS_MIN 256u
 /* Software GL (llvmpipe) leaves the loops of an invocation after 65535 rounds in all, without a word; what lies
- * behind would be missed. Materials that are asked for at a crossing have loops of their own, of which each
- * primitive's counts a round whether it is crossed or not: five were measured. */
+ * behind would be missed. Materials that are evaluated at an intersection have loops of their own, whose rounds
+ * count for each primitive, hit or not: five were measured. */
 #define SOFTWARE_ROUNDS_MAX 65000u
 #define ROUNDS_WITH_MATERIALS 8u
 

@@ -3,7 +3,7 @@
 
 #include <math.h>
 
-/* Squares of the lengths in a larger box would not fit a float, and walks have such. */
+/* Squares of the lengths in a larger box would overflow a float, and traversals compute them. */
 #define PLACE_MAX 1e18
 /* Of a coordinate: a cell below this could not be told from its neighbours, as positions are floats. */
 #define CELL_RELATIVE_MIN 0x1p-22

@@ -5,7 +5,7 @@
 
 #define PI 3.14159265f
 
-/* What an instance's matrix makes of normals whose lengths are areas. */
+/* The transform of normals whose lengths are areas, by an instance's matrix. */
 struct areas {
     float rows[3][3];
     float per_cell; /* texels in the unit of area */
@@ -23,7 +23,7 @@ static struct areas areas_of(const struct instance *instance, float cell_world)
     return areas;
 }
 
-/* Of a flat area with this normal in object space: what is seen of it along the three axes. */
+/* The projected sizes of a flat area with this normal in object space along the three axes. */
 static float texels_of_normal(const struct areas *areas, const float normal[3])
 {
     float sum = 0;

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* How much drawing along the axes has to fill: a wall of two triangles takes longer than a statue of ten thousand.
+/* Estimates the texels that drawing along the axes fills: a wall of two triangles takes longer than a statue of
+ * ten thousand.
  */
 #ifndef FARLIGHT_TRACE_RASTER_COVER_H
 #define FARLIGHT_TRACE_RASTER_COVER_H

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Draws instances into three images at once, along the axes of the world (shaders/axes): for tracers that are
+/* Draws instances into three images at once, along the axes of the world (shaders/raster): for tracers that are
  * built by rasterising the scene. GL thread. */
 #ifndef FARLIGHT_TRACE_RASTER_DRAW_H
 #define FARLIGHT_TRACE_RASTER_DRAW_H

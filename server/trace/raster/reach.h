@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* How far it is empty around the empty blocks of a grid (shaders/raster/layout.h, raster/reach.comp). */
+/* The empty space around the empty blocks of a grid (shaders/raster/layout.h, raster/reach.comp). */
 #ifndef FARLIGHT_TRACE_RASTER_REACH_H
 #define FARLIGHT_TRACE_RASTER_REACH_H
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Embree's instances: where they are in each pose, and whether Embree can compute with that. */
+/* Embree's instances: their transform in each pose, and whether Embree can compute with it. */
 #include "trace/reference/tracer.h"
 
 #include <math.h>
@@ -118,7 +118,7 @@ static float reach_in_motion(const struct gpu_scene *scene, const struct instanc
     return reach;
 }
 
-/* Tells Embree what moved, or shows something else now. */
+/* Passes moved and changed instances to Embree. */
 static bool place_instance(struct reference *reference, const struct gpu_scene *scene, uint32_t i, bool *changed)
 {
     struct reference_instance *instance = &reference->instances[i];
@@ -168,7 +168,7 @@ static bool find_reach(struct reference *reference, const struct gpu_scene *scen
         }
         reference->coordinate_max = fminf(reference->coordinate_max, reach);
     }
-    /* Of what lies beyond, Embree would leave out whole instances without a word. */
+    /* Embree would silently leave out whole instances that lie beyond. */
     for (int k = 0; k < 3; k++) {
         const double farthest = fmax(-(double)scene->lower_world[k], (double)scene->upper_world[k]);
         if (scene->instance_count > 0 && farthest > (double)reference->coordinate_max) {

@@ -176,7 +176,7 @@ bool opacity_surface_lets_light_pass(const struct opacity_surface *surface)
 
 /* ---- points ---- */
 
-/* What alpha and tint depend on: texture coordinates of both sets, and the vertices' colour. */
+/* The inputs of alpha and tint: texture coordinates of both sets, and the vertices' colour. */
 struct attributes {
     float uv[2][2];
     float colour[4];
@@ -195,7 +195,7 @@ static const struct opacity_material *material_of(const struct opacity_surface *
     return &surface->materials->list[surface->runs[low].material];
 }
 
-/* What is not finite counts as zero, as gpu_scene_geometry.c uploads it. */
+/* What is not finite counts as zero, as gpu_scene/geometry.c uploads it. */
 static float finite_or_zero(float x)
 {
     return isfinite(x) ? x : 0.0f;

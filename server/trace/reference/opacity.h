@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Surfaces that are not all there, as shaders/common/alpha.glsl has them, from the host's copy of the scene:
- * cutouts, blending, transmission. Keeps references on the blobs that it reads and no pointer into the scene. Read
- * by any number of threads at once. */
+/* Cutouts, blending and transmission as in shaders/common/alpha.glsl, from the host's copy of the scene. Keeps
+ * references on the blobs that it reads and no pointer into the scene. Read by any number of threads at once. */
 #ifndef FARLIGHT_TRACE_REFERENCE_OPACITY_H
 #define FARLIGHT_TRACE_REFERENCE_OPACITY_H
 
@@ -42,7 +41,7 @@ struct opacity_run {
     uint32_t material;    /* index in the list */
 };
 
-/* What there is to know of one geometry; zero is an empty one. */
+/* The data of one geometry; zero is an empty one. */
 struct opacity_surface {
     enum { OPACITY_MESH, OPACITY_SPHERES, OPACITY_DISCS } kind;
     const struct opacity_materials *materials;

@@ -392,7 +392,7 @@ bool reference_scene_update(struct reference *reference, const struct gpu_scene 
 {
     struct tracer_stats *stats = &reference->base.stats;
     bool ok = update_parts(reference, scene, changed, error);
-    /* What Embree says comes first: where it fails it says why. */
+    /* Embree's own error comes first: it says why. */
     if (!reference_check(reference, "building", error) || !ok)
         return no_memory(error, scene);
     stats->nodes = (uint64_t)scene->instance_count + scene->disc_count;

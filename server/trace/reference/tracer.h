@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The tracer `reference`: Embree on the CPU, the truth that the other tracers are compared with. Private to
- * reference*.c, which are built only where Embree 3 is found.
+/* The tracer `reference`: Embree on the CPU, the ground truth for the other tracers. Private to this room, which
+ * is built only if Embree 3 is found.
  *
  * Of two surfaces in one place it may report the other one than bvh does.
  *
@@ -78,7 +78,7 @@ struct reference {
 /* True if Embree has reported nothing since the last call; else fills *error. */
 bool reference_check(struct reference *reference, const char *what, struct error *error);
 
-/* reference_scene.c: brings all of the above to the scene. After a failure reference_scene_finish is due. */
+/* scene.c: brings all of the above to the scene. After a failure reference_scene_finish is due. */
 bool reference_scene_update(struct reference *reference, const struct gpu_scene *scene, unsigned changed,
                             struct error *error);
 void reference_scene_finish(struct reference *reference); /* leaves it empty */

@@ -11,7 +11,7 @@
  *
  * Sixteen win everywhere. Streams (rtcIntersect1M, 1,024 rays) do 10.3, 6.2 and 4.4 on bounces. With
  * RTC_INTERSECT_CONTEXT_FLAG_COHERENT, which traverses rays as a frustum, streams do 21, 14.7 and 10.8 on primary
- * rays and sixteen a call 27 and 17. That is left alone: with it rtcOccluded16 went round in circles on the first
+ * rays and sixteen a call 27 and 17. That is left alone: with it rtcOccluded16 did not terminate on the first
  * scene of tests/tracers, and a ray of a direction near zero changed the answers of others in its packet. The
  * ground truth is slow rather than wrong. */
 #include "trace/reference/tracer.h"
@@ -181,7 +181,7 @@ static float begin_of(const struct ray *ray)
     return t_min < 0.0f ? t_min : 0.0f;
 }
 
-/* What is beyond the reach of the scene's instances, or not a number, hits nothing. */
+/* Rays beyond the coordinates that the scene's instances allow, or with NaN, hit nothing. */
 static inline void set_lane(struct packet *packet, unsigned n, unsigned lane, const struct ray *ray, float time,
                             uint32_t id, float coordinate_max)
 {
