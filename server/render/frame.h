@@ -82,7 +82,7 @@ struct frame_request {
  * bounce. What `ao` shows is how open a first hit is, 1 where nothing is hit; all else show radiance. A scene with
  * no light and a black environment is lit by the default of shaders/shared/sky.h. The same request on the same
  * revision and device gives the same bytes. Cut into other slices a frame may differ in rays within rounding of an
- * edge: how many rays `bvh` walks together follows the coherence of the slice's wave. */
+ * edge: the packet size of `bvh` follows the coherence of the slice's wave. */
 struct frame_result {
     /* Owned; free(). Layer after layer, each of width x height pixels, or planes; behind size_bytes lie the
      * attachments. */

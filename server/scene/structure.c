@@ -8,7 +8,7 @@
 /* State of a node in the traversal; above these, its depth plus FIRST_DEPTH. */
 enum { UNKNOWN, ON_CHAIN, FALLEN, ABOVE_ROOTS, FIRST_DEPTH };
 
-struct walk {
+struct traversal {
     struct draft *draft;
     struct hierarchy hierarchy;
     uint16_t *state;
@@ -37,9 +37,9 @@ static bool is_restructured(const struct draft *draft)
     return false;
 }
 
-static bool collect(struct walk *walk)
+static bool collect(struct traversal *traversal)
 {
-    const struct draft *draft = walk->draft;
+    const struct draft *draft = traversal->draft;
     const struct hashmap *now = &draft->scene->objects[OBJECT_NODE], *edited = &draft->last[OBJECT_NODE];
     const struct scene_node **nodes = malloc((now->count + edited->count) * sizeof *nodes);
     if (!nodes)
@@ -57,104 +57,105 @@ static bool collect(struct walk *walk)
         if (edit->kind == EDIT_SET)
             nodes[count++] = &edit->set.node;
     }
-    walk->state = calloc(count ? count : 1, sizeof *walk->state);
-    return hierarchy_init(&walk->hierarchy, nodes, count) && walk->state;
+    traversal->state = calloc(count ? count : 1, sizeof *traversal->state);
+    return hierarchy_init(&traversal->hierarchy, nodes, count) && traversal->state;
 }
 
 /* An error about the current chain. The hierarchy was valid before, so an edit in the chain or above is at fault:
  * the one nearest to the start of the traversal is named. */
-static bool chain_error(struct walk *walk, enum error_code kind, const char *what)
+static bool chain_error(struct traversal *traversal, enum error_code kind, const char *what)
 {
-    uint32_t position = walk->chain[0];
+    uint32_t position = traversal->chain[0];
     for (size_t steps = 0; steps <= 2 * SCENE_DEPTH_MAX && position != HIERARCHY_NONE; steps++) {
-        const struct scene_node *node = walk->hierarchy.nodes[position];
-        const struct scene_edit *edit = node_edit(walk->draft, node->base.id);
+        const struct scene_node *node = traversal->hierarchy.nodes[position];
+        const struct scene_edit *edit = node_edit(traversal->draft, node->base.id);
         if (edit) {
-            struct edit_place place = draft_place(walk->draft, edit);
+            struct edit_place place = draft_place(traversal->draft, edit);
             return edit_error(&place, kind, ".parent", "with node %u as its parent, %s", node->parent, what);
         }
-        position = walk->hierarchy.parents[position];
+        position = traversal->hierarchy.parents[position];
     }
-    return error_set(walk->draft->error, ERROR_INTERNAL, "edits", "%s", what);
+    return error_set(traversal->draft->error, ERROR_INTERNAL, "edits", "%s", what);
 }
 
-static bool too_deep(struct walk *walk)
+static bool too_deep(struct traversal *traversal)
 {
     char what[64];
-    snprintf(what, sizeof what, "the hierarchy is more than %u levels deep", walk->depth_max);
-    chain_error(walk, ERROR_LIMIT, what);
-    return error_remedy(walk->draft->error, walk->depth_max == SCENE_DEPTH_MAX
-                                                ? "join groups that only have a transform"
-                                                : "join groups that only have a transform, or raise limits.depth "
-                                                  "in the daemon's configuration");
+    snprintf(what, sizeof what, "the hierarchy is more than %u levels deep", traversal->depth_max);
+    chain_error(traversal, ERROR_LIMIT, what);
+    return error_remedy(traversal->draft->error,
+                        traversal->depth_max == SCENE_DEPTH_MAX
+                            ? "join groups that only have a transform"
+                            : "join groups that only have a transform, or raise limits.depth "
+                              "in the daemon's configuration");
 }
 
-static bool missing_parent(struct walk *walk, const struct scene_node *node)
+static bool missing_parent(struct traversal *traversal, const struct scene_node *node)
 {
-    const struct scene_edit *edit = node_edit(walk->draft, node->base.id);
+    const struct scene_edit *edit = node_edit(traversal->draft, node->base.id);
     if (!edit)
         return true; /* unedited, below a removed node: it is removed too */
-    struct edit_place place = draft_place(walk->draft, edit);
-    if (!node_edit(walk->draft, node->parent))
+    struct edit_place place = draft_place(traversal->draft, edit);
+    if (!node_edit(traversal->draft, node->parent))
         edit_error(&place, ERROR_UNKNOWN_ID, ".parent", "node %u does not exist", node->parent);
     else
         edit_error(&place, ERROR_UNKNOWN_ID, ".parent", "node %u is removed by the same transaction",
                    node->parent);
-    return error_remedy(walk->draft->error, "make the parent in the same transaction, or use 0 for the root");
+    return error_remedy(traversal->draft->error, "make the parent in the same transaction, or use 0 for the root");
 }
 
-static bool fallen_parent(struct walk *walk, const struct scene_node *node)
+static bool fallen_parent(struct traversal *traversal, const struct scene_node *node)
 {
-    const struct scene_edit *edit = node_edit(walk->draft, node->base.id);
+    const struct scene_edit *edit = node_edit(traversal->draft, node->base.id);
     if (!edit)
         return true;
-    struct edit_place place = draft_place(walk->draft, edit);
+    struct edit_place place = draft_place(traversal->draft, edit);
     edit_error(&place, ERROR_UNKNOWN_ID, ".parent", "node %u is removed along with one above it", node->parent);
-    return error_remedy(walk->draft->error, "give it a parent that remains");
+    return error_remedy(traversal->draft->error, "give it a parent that remains");
 }
 
 /* Goes up from a node to one whose state is known, or to a root, then gives states down the chain. */
-static bool resolve(struct walk *walk, uint32_t start)
+static bool resolve(struct traversal *traversal, uint32_t start)
 {
-    const struct hierarchy *hierarchy = &walk->hierarchy;
+    const struct hierarchy *hierarchy = &traversal->hierarchy;
     uint32_t above = start;
-    walk->length = 0;
-    while (above != HIERARCHY_NONE && walk->state[above] == UNKNOWN) {
-        if (walk->length == SCENE_DEPTH_MAX)
-            return too_deep(walk);
-        walk->state[above] = ON_CHAIN;
-        walk->chain[walk->length++] = above;
+    traversal->length = 0;
+    while (above != HIERARCHY_NONE && traversal->state[above] == UNKNOWN) {
+        if (traversal->length == SCENE_DEPTH_MAX)
+            return too_deep(traversal);
+        traversal->state[above] = ON_CHAIN;
+        traversal->chain[traversal->length++] = above;
         above = hierarchy->parents[above];
     }
-    if (above != HIERARCHY_NONE && walk->state[above] == ON_CHAIN)
-        return chain_error(walk, ERROR_INVALID, "it would be above itself");
-    uint16_t state = above == HIERARCHY_NONE ? ABOVE_ROOTS : walk->state[above];
-    for (size_t i = walk->length; i-- > 0;) {
-        uint32_t position = walk->chain[i];
+    if (above != HIERARCHY_NONE && traversal->state[above] == ON_CHAIN)
+        return chain_error(traversal, ERROR_INVALID, "it would be above itself");
+    uint16_t state = above == HIERARCHY_NONE ? ABOVE_ROOTS : traversal->state[above];
+    for (size_t i = traversal->length; i-- > 0;) {
+        uint32_t position = traversal->chain[i];
         const struct scene_node *node = hierarchy->nodes[position];
         if (state == FALLEN) {
-            if (hierarchy->parents[position] != HIERARCHY_NONE && !fallen_parent(walk, node))
+            if (hierarchy->parents[position] != HIERARCHY_NONE && !fallen_parent(traversal, node))
                 return false;
         }
         if (node->parent && hierarchy->parents[position] == HIERARCHY_NONE) {
-            if (!missing_parent(walk, node))
+            if (!missing_parent(traversal, node))
                 return false;
             state = FALLEN;
         } else if (state != FALLEN) {
             state++;
         }
-        if (state >= FIRST_DEPTH + walk->depth_max)
-            return too_deep(walk);
-        walk->state[position] = state;
+        if (state >= FIRST_DEPTH + traversal->depth_max)
+            return too_deep(traversal);
+        traversal->state[position] = state;
     }
     return true;
 }
 
-static bool note_fallen(struct walk *walk)
+static bool note_fallen(struct traversal *traversal)
 {
-    for (size_t i = 0; i < walk->hierarchy.count; i++) {
-        if (walk->state[i] == FALLEN &&
-            !draft_note_fallen(walk->draft, OBJECT_NODE, walk->hierarchy.nodes[i]->base.id))
+    for (size_t i = 0; i < traversal->hierarchy.count; i++) {
+        if (traversal->state[i] == FALLEN &&
+            !draft_note_fallen(traversal->draft, OBJECT_NODE, traversal->hierarchy.nodes[i]->base.id))
             return false;
     }
     return true;
@@ -166,14 +167,14 @@ bool structure_check(struct draft *draft)
         return true;
     uint32_t depth_max = draft->scene->limits.depth;
     bool is_limited = depth_max && depth_max < SCENE_DEPTH_MAX;
-    struct walk walk = {.draft = draft, .depth_max = is_limited ? depth_max : SCENE_DEPTH_MAX};
-    bool sound = collect(&walk);
+    struct traversal traversal = {.draft = draft, .depth_max = is_limited ? depth_max : SCENE_DEPTH_MAX};
+    bool sound = collect(&traversal);
     if (!sound)
         error_set(draft->error, ERROR_OUT_OF_MEMORY, "edits", "no memory to look at the hierarchy");
-    for (uint32_t i = 0; sound && i < walk.hierarchy.count; i++)
-        sound = resolve(&walk, i);
-    sound = sound && note_fallen(&walk);
-    hierarchy_finish(&walk.hierarchy);
-    free(walk.state);
+    for (uint32_t i = 0; sound && i < traversal.hierarchy.count; i++)
+        sound = resolve(&traversal, i);
+    sound = sound && note_fallen(&traversal);
+    hierarchy_finish(&traversal.hierarchy);
+    free(traversal.state);
     return sound;
 }

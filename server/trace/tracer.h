@@ -60,9 +60,9 @@ struct tracer_stats {
     uint64_t nodes;          /* elements of the structure */
     uint64_t nodes_rebuilt;  /* by the last update */
     uint64_t nodes_refitted;
-    uint32_t parts_built; /* by the last update: a bit for each part of the structure */
-    uint64_t walk_ns; /* `reference`: of the last wave or part, in Embree alone, without the copies from and to the
-                         device */
+    uint32_t parts_built;  /* by the last update: a bit for each part of the structure */
+    uint64_t traversal_ns; /* `reference`: of the last wave or part, in Embree alone, without the copies from and
+                         to the device */
 };
 
 struct tracer {

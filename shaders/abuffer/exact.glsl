@@ -100,7 +100,7 @@ bool next_beside(inout samples_beside b, out int index, out uint id)
 //
 // A ray passes beyond an edge behind which the surface turns back, or if it would hit the next triangle before its
 // begin. Without such evidence from neighbours, a sample's plane stands for its texel.
-bool settle(trace_ray r, voxel_walk w, float limit, inout abuffer_found found)
+bool settle(trace_ray r, voxel_traversal w, float limit, inout abuffer_found found)
 {
     int index = found.sample_index;
     uint id = texelFetch(abuffer_ids, index).x;
@@ -149,7 +149,7 @@ bool settle(trace_ray r, voxel_walk w, float limit, inout abuffer_found found)
 const int PASSES_MAX = 8; // then the sample's plane is the answer
 
 // The rest of the ray.
-void search_voxels(trace_ray r, inout voxel_walk w, inout abuffer_found found)
+void search_voxels(trace_ray r, inout voxel_traversal w, inout abuffer_found found)
 {
     while (w.s < w.s_end) {
         found_voxel here = next_voxel(w);
@@ -160,14 +160,14 @@ void search_voxels(trace_ray r, inout voxel_walk w, inout abuffer_found found)
 
 #ifdef ANY_HIT
 
-void walk_planes(trace_ray r, inout voxel_walk w, inout abuffer_found found)
+void traverse_planes(trace_ray r, inout voxel_traversal w, inout abuffer_found found)
 {
     search_voxels(r, w, found);
 }
 
 #else
 
-void walk_planes(trace_ray r, inout voxel_walk w, inout abuffer_found found)
+void traverse_planes(trace_ray r, inout voxel_traversal w, inout abuffer_found found)
 {
     float s_end = w.s_end, s_limit = w.s_limit, limit = found.end;
     bool goes_on;

@@ -5,7 +5,7 @@
 #include "shared/hit.h"
 #include "common/crossed.glsl"
 #include "abuffer/sample_primitive.glsl"
-#include "abuffer/walk.glsl"
+#include "abuffer/voxel_traversal.glsl"
 
 // What a ray has found, and up to where it is still looking.
 struct abuffer_found {
@@ -69,7 +69,7 @@ abuffer_found found_of(trace_ray r, candidate best)
 #endif
 
 // The same at `s` of the traversal.
-void offer_at(trace_ray r, inout voxel_walk w, inout abuffer_found found, int sample_index, float s, float side)
+void offer_at(trace_ray r, inout voxel_traversal w, inout abuffer_found found, int sample_index, float s, float side)
 {
     offer_sample(r, found, sample_index, (s + w.ray.begin) / w.ray.scale, side, 1.0 / w.ray.scale);
     w.s_limit = found.end * w.ray.scale - w.ray.begin;

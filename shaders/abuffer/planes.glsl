@@ -33,7 +33,7 @@ bool leans(column_sample p)
 
 // Searches the part [s_in, s_out] of the ray. `only_leaning`: surfaces that do not lean to this axis are searched in
 // another image. True: an intersection was found.
-bool search_image(trace_ray r, inout voxel_walk w, inout abuffer_found found, int axis, bool only_leaning, float s_in,
+bool search_image(trace_ray r, inout voxel_traversal w, inout abuffer_found found, int axis, bool only_leaning, float s_in,
                   float s_out)
 {
     vec3 o = in_image(w.ray.o, axis), d = in_image(w.ray.d, axis);
@@ -80,7 +80,7 @@ bool search_image(trace_ray r, inout voxel_walk w, inout abuffer_found found, in
 }
 
 // All images that a voxel names, in order; an intersection in one ends the search in the next there.
-void search_planes(trace_ray r, inout voxel_walk w, inout abuffer_found found, found_voxel here)
+void search_planes(trace_ray r, inout voxel_traversal w, inout abuffer_found found, found_voxel here)
 {
     uint images = here.what & ABUFFER_VOXEL_IMAGES;
     bool only_leaning = bitCount(images) > 1;

@@ -22,7 +22,7 @@ const float FOLLOW_ALONG = 4.0; // extension of an open surface beyond a step
 const float NEAR_ORIGIN = 4.0;
 
 // A ray's state in the steps of a subvoxel.
-struct step_walk {
+struct step_traversal {
     found_voxel here; // `what` 0: past it
     float size;       // of its steps
     int next;         // step of the subvoxel; 0: its begin
@@ -48,7 +48,7 @@ int image_of(uint what, vec3 d)
     return along.x >= along.y && along.x >= along.z ? 0 : along.y >= along.z ? 1 : 2;
 }
 
-vec3 place_in_image(voxel_walk w, int axis, float s)
+vec3 place_in_image(voxel_traversal w, int axis, float s)
 {
     return in_image(w.ray.o + s * w.ray.d, axis);
 }
@@ -57,7 +57,7 @@ vec3 place_in_image(voxel_walk w, int axis, float s)
 // A ray along the surface is on the side of a point a little farther on: a sample's normal is not that of the origin.
 const float OWN_ALONG = 0.15;
 
-int winding_at_origin(voxel_walk w, uint what)
+int winding_at_origin(voxel_traversal w, uint what)
 {
     float nearest = OWN_BEHIND;
     int own_winding = 0;
@@ -95,7 +95,7 @@ int winding_at_origin(voxel_walk w, uint what)
 
 // Intersects the ray with a surface near s: with the plane of a sample there, then with that of a sample at this
 // intersection, and so on until the intersection is in the sample's own texel.
-bool follow(trace_ray r, inout voxel_walk w, inout abuffer_found found, step_walk t)
+bool follow(trace_ray r, inout voxel_traversal w, inout abuffer_found found, step_traversal t)
 {
     int axis = t.axis;
     float beyond = t.by_winding ? 1.0 : FOLLOW_ALONG, lo = t.lo - beyond, hi = t.hi + beyond, s = t.s;
@@ -153,7 +153,7 @@ int nearest_sample(int axis, vec3 p)
 }
 
 // The winding differs between lo and hi, but no plane is intersected near hi.
-void search_passage(trace_ray r, inout voxel_walk w, inout abuffer_found found, int axis, float lo, float hi,
+void search_passage(trace_ray r, inout voxel_traversal w, inout abuffer_found found, int axis, float lo, float hi,
                     int winding_lo)
 {
     int i = 0;
@@ -185,7 +185,7 @@ void search_passage(trace_ray r, inout voxel_walk w, inout abuffer_found found, 
 //
 // that of a body if the winding changes, an open one if the plane of a sample at the step's end is intersected within
 // the step or not far from it.
-bool look(inout voxel_walk w, inout step_walk t)
+bool look(inout voxel_traversal w, inout step_traversal t)
 {
     bool is_body = (t.here.what & ABUFFER_VOXEL_BODY) != 0u;
     t.lo = t.here.s_in + float(t.next - 1) * t.size;
@@ -234,7 +234,7 @@ bool look(inout voxel_walk w, inout step_walk t)
 }
 
 // Settles a surface that a step may have passed.
-void pass(trace_ray r, inout voxel_walk w, inout abuffer_found found, inout step_walk t)
+void pass(trace_ray r, inout voxel_traversal w, inout abuffer_found found, inout step_traversal t)
 {
 #ifdef ANYTHING_ENDS
     if (t.by_winding)
@@ -250,7 +250,7 @@ void pass(trace_ray r, inout voxel_walk w, inout abuffer_found found, inout step
 }
 
 // On to the next occupied voxel, at most one step.
-void step_to_voxel(inout voxel_walk w, inout step_walk t)
+void step_to_voxel(inout voxel_traversal w, inout step_traversal t)
 {
     step_on(w, t.here);
     float end = t.here.s_out < w.s_limit ? t.here.s_out : w.s_limit;
@@ -260,9 +260,9 @@ void step_to_voxel(inout voxel_walk w, inout step_walk t)
     t.images = 0u;
 }
 
-void walk_steps(trace_ray r, inout voxel_walk w, inout abuffer_found found)
+void traverse_steps(trace_ray r, inout voxel_traversal w, inout abuffer_found found)
 {
-    step_walk t;
+    step_traversal t;
     t.here = found_voxel(0u, 0.0, 0.0);
     t.next = 0;
     t.size = 0.0;

@@ -10,15 +10,15 @@
 #include "abuffer/exact.glsl"
 #include "abuffer/steps.glsl"
 
-void walk_ray(trace_ray r, inout abuffer_found found)
+void traverse_ray(trace_ray r, inout abuffer_found found)
 {
 #ifndef ABUFFER_EMPTY
-    voxel_walk w;
-    begin_walk(r, found.end, w);
+    voxel_traversal w;
+    begin_traversal(r, found.end, w);
 #ifdef ABUFFER_STEPS
-    walk_steps(r, w, found);
+    traverse_steps(r, w, found);
 #else
-    walk_planes(r, w, found);
+    traverse_planes(r, w, found);
 #endif
 #endif
 }
@@ -29,7 +29,7 @@ void walk_ray(trace_ray r, inout abuffer_found found)
 bool trace_any(trace_ray r, inout vec3 taken)
 {
     abuffer_found found = found_of(r, taken);
-    walk_ray(r, found);
+    traverse_ray(r, found);
     taken = found.taken;
     return least(taken) >= TAKEN_BLACK;
 }
@@ -39,7 +39,7 @@ bool trace_any(trace_ray r, inout vec3 taken)
 void trace_closest(trace_ray r, inout candidate best)
 {
     abuffer_found found = found_of(r, best);
-    walk_ray(r, found);
+    traverse_ray(r, found);
 #ifdef ABUFFER_COUNT_STEPS
     best = candidate(float(abuffer_counts.x), abuffer_counts.z, abuffer_counts.y, vec2(0.0));
 #else

@@ -9,7 +9,7 @@
 #include "bvh/together.glsl"
 
 layout(binding = UNIT_RAYS) uniform samplerBuffer rays; // two texels each
-layout(std430, binding = BIND_TRACER_0) buffer count_block { uint alive_count, walk_count; };
+layout(std430, binding = BIND_TRACER_0) buffer count_block { uint alive_count, packet_count; };
 
 uniform uint group_count;
 uniform uint group_stride;    // rays from one group to the next
@@ -30,7 +30,7 @@ void main()
         return;
     int first = int(item_index() * group_stride);
     vec3 origins[RAYS_TOGETHER], directions[RAYS_TOGETHER];
-    uint waiting = 0u, walks = 0u;
+    uint waiting = 0u, packets = 0u;
     for (int k = 0; k < RAYS_TOGETHER; k++) {
         vec4 origin_t_min = texelFetch(rays, 2 * (first + k)), direction_t_max = texelFetch(rays, 2 * (first + k) + 1);
         origins[k] = origin_t_min.xyz;
@@ -38,7 +38,7 @@ void main()
         waiting |= direction_t_max.w > origin_t_min.w ? 1u << k : 0u;
     }
     atomicAdd(alive_count, uint(bitCount(waiting)));
-    for (; waiting != 0u; walks++) {
+    for (; waiting != 0u; packets++) {
         int leading = findLSB(waiting);
         for (int k = 0; k < RAYS_TOGETHER; k++)
             if (k == leading ||
@@ -46,5 +46,5 @@ void main()
                  stay_close(origins[leading], directions[leading], origins[k], directions[k])))
                 waiting &= ~(1u << k);
     }
-    atomicAdd(walk_count, walks);
+    atomicAdd(packet_count, packets);
 }

@@ -51,7 +51,7 @@ uniform vec3 bvh_top_cells_per_unit;
 #define NOT_INSIDE 0xffffffffu
 #define NO_GRID tree_grid(vec3(0.0), vec3(1.0))
 
-struct walk_state {
+struct tree_traversal {
     uint first;   // the traversed tree's copy for the octant
     uint end;     // its number of elements
     uint element; // next one, counted from the first
@@ -59,16 +59,16 @@ struct walk_state {
     uint primitive; // the next one in it
 };
 
-void begin_tree(inout walk_state walk, uint first_element, uint element_count, uint octant)
+void begin_tree(inout tree_traversal traversal, uint first_element, uint element_count, uint octant)
 {
 #ifdef BVH_PLAIN
-    walk.first = first_element;
+    traversal.first = first_element;
 #else
-    walk.first = first_element * BVH_OCTANTS + octant * element_count;
+    traversal.first = first_element * BVH_OCTANTS + octant * element_count;
 #endif
-    walk.end = element_count;
-    walk.element = 0u;
-    walk.leaf = walk.primitive = 0u;
+    traversal.end = element_count;
+    traversal.element = 0u;
+    traversal.leaf = traversal.primitive = 0u;
 }
 
 // The range of distances in which some ray may still hit something.
@@ -95,24 +95,24 @@ distances_left left_of(trace_ray r[RAYS_TOGETHER], answer found[RAYS_TOGETHER])
 }
 
 // The inner loop: on to the next leaf whose bound some ray may hit. Returns its link, 0: the tree is finished.
-uint next_leaf(inout walk_state walk, bundle b, distances_left left, trace_ray r[RAYS_TOGETHER],
+uint next_leaf(inout tree_traversal traversal, bundle b, distances_left left, trace_ray r[RAYS_TOGETHER],
                answer found[RAYS_TOGETHER])
 {
-    uint leaf = walk.leaf;
-    while (leaf == 0u && walk.element < walk.end) {
+    uint leaf = traversal.leaf;
+    while (leaf == 0u && traversal.element < traversal.end) {
 #ifdef BVH_PLAIN
-        bvh_element e = bvh_elements[walk.first + walk.element];
+        bvh_element e = bvh_elements[traversal.first + traversal.element];
         vec4 lower = vec4(e.lower_x, e.lower_y, e.lower_z, e.upper_x);
         uint link = e.link;
 #elif !defined BVH_PACKED
-        int texel = int(walk.first + walk.element) * 2;
+        int texel = int(traversal.first + traversal.element) * 2;
         uvec4 first_half = texelFetch(bvh_elements, texel);
         vec3 lower_corner = uintBitsToFloat(first_half.xyz);
         vec3 upper_corner = uintBitsToFloat(texelFetch(bvh_elements, texel + 1).xyz);
         vec4 lower = vec4(lower_corner, upper_corner.x);
         uint link = first_half.w;
 #else
-        uvec4 element = texelFetch(bvh_elements, int(walk.first + walk.element));
+        uvec4 element = texelFetch(bvh_elements, int(traversal.first + traversal.element));
         uint link = element.w;
 #endif
 #ifdef BVH_SPHERES
@@ -129,7 +129,7 @@ uint next_leaf(inout walk_state walk, bundle b, distances_left left, trace_ray r
 #endif
         bool is_leaf = link >> BVH_LEAF_KIND_SHIFT != 0u;
         leaf = any_hit && is_leaf ? link : 0u;
-        walk.element = any_hit || is_leaf ? walk.element + 1u : link;
+        traversal.element = any_hit || is_leaf ? traversal.element + 1u : link;
     }
     return leaf;
 }
@@ -167,7 +167,7 @@ void enter_tree(object_ray o[RAYS_TOGETHER], trace_ray r[RAYS_TOGETHER], int lea
 
 // A transform element: the rays continue in the instance's space.
 void enter_instance(uint instance_index, trace_ray r[RAYS_TOGETHER], int leading, out entered_instance inside,
-                    out object_ray o[RAYS_TOGETHER], out walk_state walk, out bundle b, out relative_rays rays)
+                    out object_ray o[RAYS_TOGETHER], out tree_traversal traversal, out bundle b, out relative_rays rays)
 {
     int texel = int(instance_index) * BVH_TRANSFORM_TEXELS;
 #ifndef HAS_MOTION
@@ -195,7 +195,7 @@ void enter_instance(uint instance_index, trace_ray r[RAYS_TOGETHER], int leading
 #endif
     }
     enter_tree(o, r, leading, grid, OBJECT_SLACK, b, rays);
-    begin_tree(walk, tree.x, tree.y, b.octant);
+    begin_tree(traversal, tree.x, tree.y, b.octant);
 }
 
 // A link that no leaf has: an intersection is noted, and the current leaf not finished.
@@ -203,39 +203,39 @@ void enter_instance(uint instance_index, trace_ray r[RAYS_TOGETHER], int leading
 
 // Traverses the current tree's leaves up to an instance, whose link is returned; 0: the tree is finished; or up to an
 // intersection that must be settled.
-uint test_leaves(inout walk_state walk, bundle b, entered_instance inside, object_ray o[RAYS_TOGETHER],
+uint test_leaves(inout tree_traversal traversal, bundle b, entered_instance inside, object_ray o[RAYS_TOGETHER],
                  relative_rays rays, inout trace_ray r[RAYS_TOGETHER], inout answer found[RAYS_TOGETHER],
                  inout noted_primitive noted)
 {
     for (;;) {
-        uint leaf = next_leaf(walk, b, left_of(r, found), r, found);
+        uint leaf = next_leaf(traversal, b, left_of(r, found), r, found);
         if (leaf == 0u || leaf >> BVH_LEAF_KIND_SHIFT == BVH_LEAF_INSTANCE)
             return leaf;
 #ifdef ASK_MATERIALS
-        walk.leaf = test_leaf(leaf, walk.primitive, inside, o, rays, r, found, noted) ? 0u : leaf;
-        if (walk.leaf != 0u)
+        traversal.leaf = test_leaf(leaf, traversal.primitive, inside, o, rays, r, found, noted) ? 0u : leaf;
+        if (traversal.leaf != 0u)
             return LEAF_NOTED;
-        walk.primitive = 0u;
+        traversal.primitive = 0u;
 #else
         uint primitive = 0u;
         test_leaf(leaf, primitive, inside, o, rays, r, found, noted);
 #ifdef ANY_HIT
         if (!is_alive_any(r))
-            walk.element = walk.end;
+            traversal.element = traversal.end;
 #endif
 #endif
     }
 }
 
 #ifdef ASK_MATERIALS
-void settle_and_go_on(inout walk_state walk, inout noted_primitive noted, inout trace_ray r[RAYS_TOGETHER],
+void settle_and_go_on(inout tree_traversal traversal, inout noted_primitive noted, inout trace_ray r[RAYS_TOGETHER],
                       inout answer found[RAYS_TOGETHER])
 {
     settle(noted, r, found);
 #ifdef ANY_HIT
     if (!is_alive_any(r)) {
-        walk.leaf = 0u;
-        walk.element = walk.end;
+        traversal.leaf = 0u;
+        traversal.element = traversal.end;
     }
 #endif
 }
@@ -261,39 +261,40 @@ void trace_together(inout trace_ray r[RAYS_TOGETHER], inout answer found[RAYS_TO
 {
     entered_instance inside;
     object_ray o[RAYS_TOGETHER];
-    walk_state walk;
+    tree_traversal traversal;
     bundle b;
     relative_rays rays;
-    enter_instance(bvh_instance, r, leading_of(r), inside, o, walk, b, rays);
+    enter_instance(bvh_instance, r, leading_of(r), inside, o, traversal, b, rays);
     noted_primitive noted;
     noted.bits = 0u;
 #ifdef ASK_MATERIALS
-    while (test_leaves(walk, b, inside, o, rays, r, found, noted) != 0u)
-        settle_and_go_on(walk, noted, r, found);
+    while (test_leaves(traversal, b, inside, o, rays, r, found, noted) != 0u)
+        settle_and_go_on(traversal, noted, r, found);
 #else
-    test_leaves(walk, b, inside, o, rays, r, found, noted);
+    test_leaves(traversal, b, inside, o, rays, r, found, noted);
 #endif
 }
 
 #else
 
 // All instances along the rays. True: an intersection must be settled before the traversal continues.
-bool walk_instances(inout walk_state walk, inout walk_state world_walk, inout bundle b, bundle world_bundle, int leading,
-                    inout entered_instance inside, inout object_ray o[RAYS_TOGETHER], inout relative_rays rays,
-                    inout trace_ray r[RAYS_TOGETHER], inout answer found[RAYS_TOGETHER], inout noted_primitive noted)
+bool traverse_instances(inout tree_traversal traversal, inout tree_traversal world_traversal, inout bundle b,
+                        bundle world_bundle, int leading, inout entered_instance inside, inout object_ray o[RAYS_TOGETHER],
+                        inout relative_rays rays, inout trace_ray r[RAYS_TOGETHER], inout answer found[RAYS_TOGETHER],
+                        inout noted_primitive noted)
 {
     for (;;) {
-        uint leaf = test_leaves(walk, b, inside, o, rays, r, found, noted);
+        uint leaf = test_leaves(traversal, b, inside, o, rays, r, found, noted);
 #ifdef ASK_MATERIALS
         if (leaf == LEAF_NOTED)
             return true;
 #endif
         if (leaf != 0u) {
-            world_walk.element = walk.element;
+            world_traversal.element = traversal.element;
 #ifdef FAVOUR_INSTANCES
             favour_instance(leaf & BVH_LEAF_FIRST_MASK, 1, found);
 #endif
-            enter_instance(leaf & BVH_LEAF_FIRST_MASK, r, leading, inside, o, walk, b, rays);
+            enter_instance(leaf & BVH_LEAF_FIRST_MASK, r, leading, inside, o, traversal, b, rays);
         } else {
             // The tree is finished. Leaving an instance restores the world's packet.
             bool all_done = inside.index == NOT_INSIDE;
@@ -307,7 +308,7 @@ bool walk_instances(inout walk_state walk, inout walk_state world_walk, inout bu
 #endif
             inside.index = NOT_INSIDE;
             b = world_bundle;
-            walk = world_walk;
+            traversal = world_traversal;
         }
     }
 }
@@ -327,8 +328,8 @@ void trace_together(inout trace_ray r[RAYS_TOGETHER], inout answer found[RAYS_TO
     relative_rays rays;
     int leading = leading_of(r);
     enter_tree(o, r, leading, grid, WORLD_SLACK, world_bundle, rays);
-    walk_state walk, world_walk;
-    begin_tree(world_walk, 0u, bvh_top_count, world_bundle.octant);
+    tree_traversal traversal, world_traversal;
+    begin_tree(world_traversal, 0u, bvh_top_count, world_bundle.octant);
     entered_instance inside;
     inside.index = NOT_INSIDE;
     inside.first_texel = inside.first_primitive = 0u;
@@ -336,14 +337,14 @@ void trace_together(inout trace_ray r[RAYS_TOGETHER], inout answer found[RAYS_TO
     inside.close_texels = 0u;
 #endif
     b = world_bundle;
-    walk = world_walk;
+    traversal = world_traversal;
     noted_primitive noted;
     noted.bits = 0u;
 #ifdef ASK_MATERIALS
-    while (walk_instances(walk, world_walk, b, world_bundle, leading, inside, o, rays, r, found, noted))
-        settle_and_go_on(walk, noted, r, found);
+    while (traverse_instances(traversal, world_traversal, b, world_bundle, leading, inside, o, rays, r, found, noted))
+        settle_and_go_on(traversal, noted, r, found);
 #else
-    walk_instances(walk, world_walk, b, world_bundle, leading, inside, o, rays, r, found, noted);
+    traverse_instances(traversal, world_traversal, b, world_bundle, leading, inside, o, rays, r, found, noted);
 #endif
 }
 
@@ -355,18 +356,18 @@ void trace_together(inout trace_ray r[RAYS_TOGETHER], inout answer found[RAYS_TO
 #ifdef ANY_HIT
 bool trace_any(trace_ray r, inout vec3 taken)
 {
-    trace_ray walked[RAYS_TOGETHER] = trace_ray[RAYS_TOGETHER](r);
+    trace_ray packet[RAYS_TOGETHER] = trace_ray[RAYS_TOGETHER](r);
     vec3 found[RAYS_TOGETHER] = vec3[RAYS_TOGETHER](taken);
-    trace_together(walked, found);
+    trace_together(packet, found);
     taken = found[0];
     return least(taken) >= TAKEN_BLACK;
 }
 #else
 void trace_closest(trace_ray r, inout candidate best)
 {
-    trace_ray walked[RAYS_TOGETHER] = trace_ray[RAYS_TOGETHER](r);
+    trace_ray packet[RAYS_TOGETHER] = trace_ray[RAYS_TOGETHER](r);
     candidate found[RAYS_TOGETHER] = candidate[RAYS_TOGETHER](best);
-    trace_together(walked, found);
+    trace_together(packet, found);
     best = found[0];
 }
 #endif
@@ -387,20 +388,20 @@ void TRACE_GROUP(trace_ray r[RAYS_TOGETHER], inout answer found[RAYS_TOGETHER])
         waiting |= r[k].t_max > r[k].t_min ? 1u << k : 0u;
     while (waiting != 0u) {
         int first = findLSB(waiting);
-        trace_ray leading = r[0], walked[RAYS_TOGETHER];
+        trace_ray leading = r[0], packet[RAYS_TOGETHER];
         for (int k = 1; k < RAYS_TOGETHER; k++)
             if (k == first)
                 leading = r[k];
         for (int k = 0; k < RAYS_TOGETHER; k++) {
-            walked[k] = r[k];
+            packet[k] = r[k];
             bool goes = k == first ||
                         go_together(leading.origin, leading.direction, r[k].origin, r[k].direction);
             if (goes && (waiting >> k & 1u) != 0u)
                 waiting &= ~(1u << k);
             else
-                put_out(walked[k]);
+                put_out(packet[k]);
         }
-        trace_together(walked, found);
+        trace_together(packet, found);
     }
 }
 

@@ -16,7 +16,7 @@ uniform int ldc_grid[LDC_CUBES]; // nodes along a side
 uniform vec3 ldc_lower[LDC_CUBES], ldc_upper[LDC_CUBES]; // of the occupied cells
 
 // Axes are mirrored as in raster/blocks.glsl.
-struct cell_walk {
+struct cell_traversal {
     vec3 o, d, inverse;
     ivec3 flip;  // -1: turned
     ivec3 cell;
@@ -34,19 +34,19 @@ struct found_cell {
 };
 
 // Not mirrored.
-ivec3 cube_cell(cell_walk w, ivec3 cell)
+ivec3 cube_cell(cell_traversal w, ivec3 cell)
 {
     return turned(cell, w.flip, w.grid << LDC_NODE_SHIFT);
 }
 
 // The lower corner of the node or block that the ray is in.
-int node_at(cell_walk w, ivec3 cell)
+int node_at(cell_traversal w, ivec3 cell)
 {
     ivec3 n = cube_cell(w, cell) >> LDC_NODE_SHIFT;
     return w.first_node + (n.z * w.grid + n.y) * w.grid + n.x;
 }
 
-void begin_cells(trace_ray r, float end, int pass, out cell_walk w)
+void begin_cells(trace_ray r, float end, int pass, out cell_traversal w)
 {
     w.cube = pass;
     cell_ray c = cube_ray_of(r, w.cube);
@@ -78,7 +78,7 @@ void begin_cells(trace_ray r, float end, int pass, out cell_walk w)
 
 // Tests one of 64 parts of the current node or block, and enters it or passes it; an occupied cell becomes `found` and
 // is passed.
-void step_on(inout cell_walk w, inout found_cell found, bvec3 down)
+void step_on(inout cell_traversal w, inout found_cell found, bvec3 down)
 {
         LDC_COUNT(x);
         uvec4 words = texelFetch(ldc_nodes, w.at);
@@ -117,7 +117,7 @@ void step_on(inout cell_walk w, inout found_cell found, bvec3 down)
 // Up to two steps towards the next occupied cell. The lanes of a SIMD group wait for the slowest, so cells are tested
 // after few steps: with four steps rays are a seventh slower, with one a tenth, with a loop up to the next cell a
 // fifth.
-found_cell next_cell(inout cell_walk w)
+found_cell next_cell(inout cell_traversal w)
 {
     found_cell found = found_cell(ivec3(0), LDC_ENTRY_NONE);
     bvec3 down = notEqual(w.flip, ivec3(0));
@@ -127,7 +127,7 @@ found_cell next_cell(inout cell_walk w)
     return found;
 }
 
-void test_cell_sample(inout cell_walk w, int axis, ivec3 cell, uint sample_index, float depth, uint normal_bits,
+void test_cell_sample(inout cell_traversal w, int axis, ivec3 cell, uint sample_index, float depth, uint normal_bits,
                       inout ldc_found found)
 {
     vec3 flipped = vec3(w.flip);
@@ -143,7 +143,7 @@ void test_cell_sample(inout cell_walk w, int axis, ivec3 cell, uint sample_index
     }
 }
 
-void test_cell(inout cell_walk w, found_cell at, inout ldc_found found)
+void test_cell(inout cell_traversal w, found_cell at, inout ldc_found found)
 {
     uint entry = at.entry;
     do {

@@ -18,7 +18,7 @@ uniform int ldc_top[LDC_CUBES]; // the top level; 0 are the texels
 uniform int ldc_row[LDC_CUBES]; // nodes
 #endif
 
-struct image_walk {
+struct image_traversal {
     vec3 o, d; // cells of the image
     vec2 inverse;
     float s, s_end;
@@ -30,7 +30,7 @@ struct image_walk {
 };
 
 // Image number `pass` of all cubes for a ray; if the ray does not enter it, s >= s_end.
-void begin_image(trace_ray r, float end, int pass, out image_walk w)
+void begin_image(trace_ray r, float end, int pass, out image_traversal w)
 {
     w.cube = pass / 3;
     int rank = pass - 3 * w.cube;
@@ -58,7 +58,7 @@ void begin_image(trace_ray r, float end, int pass, out image_walk w)
     w.level = ldc_top[CUBE(w.cube)];
 }
 
-int node_index(image_walk w, ivec2 node)
+int node_index(image_traversal w, ivec2 node)
 {
     int top = ldc_top[CUBE(w.cube)];
 #ifdef LDC_BLOCKS
@@ -81,7 +81,7 @@ int node_index(image_walk w, ivec2 node)
 }
 
 // Where the ray leaves its current node of a level, and by which side.
-float node_exit(image_walk w, int shift, out bool by_u)
+float node_exit(image_traversal w, int shift, out bool by_u)
 {
     ivec2 first = w.texel >> shift << shift, last = first + ((1 << shift) - 1);
     vec2 exits = vec2(w.d.x >= 0.0 ? last.x + 1 : first.x, w.d.y >= 0.0 ? last.y + 1 : first.y);
@@ -91,7 +91,7 @@ float node_exit(image_walk w, int shift, out bool by_u)
 }
 
 // Out of that node, in integers, so that each step advances.
-void leave_node(inout image_walk w, int shift, float s_out, bool by_u)
+void leave_node(inout image_traversal w, int shift, float s_out, bool by_u)
 {
     ivec2 first = w.texel >> shift << shift, last = first + ((1 << shift) - 1);
     ivec2 next = clamp(ivec2(floor(w.o.xy + s_out * w.d.xy)), first, last);
@@ -109,7 +109,7 @@ void leave_node(inout image_walk w, int shift, float s_out, bool by_u)
 const int IMAGE_ROUNDS = 4;
 
 // On towards the next texel in which the ray may hit something, for some rounds. True: it was reached.
-bool next_texel(inout image_walk w, out uvec4 words, out float z_least, out float z_greatest)
+bool next_texel(inout image_traversal w, out uvec4 words, out float z_least, out float z_greatest)
 {
     words = uvec4(0u);
     z_least = z_greatest = 0.0;
@@ -145,7 +145,7 @@ bool next_texel(inout image_walk w, out uvec4 words, out float z_least, out floa
     return false;
 }
 
-void test_sample(inout image_walk w, uint sample_index, float depth, uint normal_bits, inout ldc_found found)
+void test_sample(inout image_traversal w, uint sample_index, float depth, uint normal_bits, inout ldc_found found)
 {
     vec3 normal = in_image(direction_from_octahedral(normal_bits), w.axis);
     float s, side;
@@ -156,7 +156,7 @@ void test_sample(inout image_walk w, uint sample_index, float depth, uint normal
 }
 
 // Tests the samples of the current texel between two depths, and leaves the texel.
-void test_texel(inout image_walk w, uvec4 words, float z_least, float z_greatest, inout ldc_found found)
+void test_texel(inout image_traversal w, uvec4 words, float z_least, float z_greatest, inout ldc_found found)
 {
     uint count = words.y & LDC_TEXEL_COUNT_MASK;
     float low = z_least - LDC_SPAN, high = z_greatest + LDC_SPAN;

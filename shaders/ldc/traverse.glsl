@@ -19,11 +19,11 @@
 
 #ifdef LDC_CELLS
 const int LDC_PASSES = LDC_CUBES;
-#define WALK cell_walk
+#define TRAVERSAL cell_traversal
 #define BEGIN begin_cells
 #else
 const int LDC_PASSES = 3 * LDC_CUBES;
-#define WALK image_walk
+#define TRAVERSAL image_traversal
 #define BEGIN begin_image
 #endif
 
@@ -42,13 +42,13 @@ void settle(ldc_found found, inout answer a)
 #endif
 }
 
-void walk_rays(trace_ray rays_[RAYS_TOGETHER], inout answer answers[RAYS_TOGETHER])
+void traverse_rays(trace_ray rays_[RAYS_TOGETHER], inout answer answers[RAYS_TOGETHER])
 {
     for (int ray = 0; ray < RAYS_TOGETHER; ray++) {
         trace_ray r = rays_[ray];
         ldc_found found = ldc_found_of(r, answers[ray]);
         for (int pass = 0; pass < LDC_PASSES; pass++) {
-            WALK w;
+            TRAVERSAL w;
             BEGIN(r, found.end, pass, w);
             while (w.s < w.s_end) {
 #ifdef LDC_CELLS
@@ -81,9 +81,9 @@ void trace_closest_together(trace_ray r[RAYS_TOGETHER], inout candidate best[RAY
 #endif
 {
 #ifdef ANY_HIT
-    walk_rays(r, taken);
+    traverse_rays(r, taken);
 #else
-    walk_rays(r, best);
+    traverse_rays(r, best);
 #endif
 }
 
@@ -93,7 +93,7 @@ bool trace_any(trace_ray r, inout vec3 taken)
 {
     trace_ray rays_[1] = trace_ray[1](r);
     vec3 answers[1] = vec3[1](taken);
-    walk_rays(rays_, answers);
+    traverse_rays(rays_, answers);
     taken = answers[0];
     return least(taken) >= TAKEN_BLACK;
 }
@@ -104,7 +104,7 @@ void trace_closest(trace_ray r, inout candidate best)
 {
     trace_ray rays_[1] = trace_ray[1](r);
     candidate answers[1] = candidate[1](best);
-    walk_rays(rays_, answers);
+    traverse_rays(rays_, answers);
     best = answers[0];
 }
 

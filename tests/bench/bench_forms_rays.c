@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 /* Builds: {"name", "structure", "bytes", "build_ns": [..]}; of octrees also "octree": what the last build counted.
- * Waves: the same, and "waves": [{"kind", "rays", "hits_ns": [..], "walk_ns": [..]}]: rays to hits on the device,
- * surfaces included, and the walk alone (of any-hit waves there is none). Closest-hit waves beside the reference
- * also have "agree" (share of the rays that hit with both or miss with both), "only_form", "only_reference", and
- * of rays that hit with both the difference of distances: "error_median", "error_p99", in metres; of ldc and
- * abuffer also what a ray looked at in the mean: "nodes" (abuffer: blocks of voxels), "texels" (or cells) and
- * "samples". Rays begin where the reference's camera rays hit. */
+ * Waves: the same, and "waves": [{"kind", "rays", "hits_ns": [..], "traversal_ns": [..]}]: rays to hits on the
+ * device, surfaces included, and the walk alone (of any-hit waves there is none). Closest-hit waves beside the
+ * reference also have "agree" (share of the rays that hit with both or miss with both), "only_form",
+ * "only_reference", and of rays that hit with both the difference of distances: "error_median", "error_p99", in
+ * metres; of ldc and abuffer also what a ray looked at in the mean: "nodes" (abuffer: blocks of voxels), "texels"
+ * (or cells) and "samples". Rays begin where the reference's camera rays hit. */
 #include "tests/bench/bench_forms.h"
 
 #include "base/clock.h"
@@ -215,7 +215,7 @@ static bool measure(struct waves *waves, const struct bench_wave *wave, struct e
         json_t *object = json_pack("{s:s, s:i, s:o}", "kind", fact->name, "rays", (int)wave->ray_count, "hits_ns",
                                    bench_times_json(&pair[0].runs));
         if (!fact->is_any) {
-            json_object_set_new(object, "walk_ns", bench_times_json(&pair[1].runs));
+            json_object_set_new(object, "traversal_ns", bench_times_json(&pair[1].runs));
             if (!examine(waves, &bench->forms[i], wave, object, error)) {
                 json_decref(object);
                 return false;

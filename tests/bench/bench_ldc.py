@@ -109,7 +109,7 @@ def measure_family(bench):
             results[n] = got
             continue
         for form, more in zip(results[n]["forms"], got["forms"]):
-            for key in ("hits_ns", "walk_ns"):
+            for key in ("hits_ns", "traversal_ns"):
                 form["waves"][0][key] += more["waves"][0][key]
     return list(results.values())
 

@@ -78,7 +78,7 @@ def show_family(results):
         for name, form in (("ldc", at(result, USUAL)), ("bvh", form_of(result, "bvh"))):
             wave = wave_of(form, "reflection")
             lines.append((result["triangles"], name,
-                          *(with_spread(figure([ns / wave["rays"] for ns in wave[key]])) for key in ("hits_ns", "walk_ns"))))
+                          *(with_spread(figure([ns / wave["rays"] for ns in wave[key]])) for key in ("hits_ns", "traversal_ns"))))
     return table([("triangles", "tracer", "reflection", "the walk alone"), ("", "", "ns/ray", "ns/ray")], lines)
 
 

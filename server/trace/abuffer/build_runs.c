@@ -17,7 +17,7 @@ static bool reserve(struct abuffer_task *task, struct error *error)
     struct gpu_device *device = builder->device;
     struct abuffer_store *store = task->store;
     size_t nodes = task->counts.nodes, deep = nodes / ABUFFER_LIST_MAX + 1;
-    /* The walk reads samples two per texel. */
+    /* The traversal reads samples two per texel. */
     return gpu_buffer_reserve(device, &store->samples, (nodes + nodes % 2) * ABUFFER_SAMPLE_BYTES, error) &&
            gpu_buffer_reserve(device, &store->ids, nodes * ABUFFER_ID_BYTES, error) &&
            gpu_buffer_reserve(device, &builder->longer, longer_max(task) * sizeof(uint32_t), error) &&

@@ -97,8 +97,8 @@ static bool count_below(struct bake *bake)
     return true;
 }
 
-/* The places of all elements in four octants' orders, in one walk that carries where the subtree it is in begins:
- * its own element first, then all of the nearer child, then all of the farther one. */
+/* The places of all elements in four octants' orders, in one traversal that carries where the subtree it is in
+ * begins: its own element first, then all of the nearer child, then all of the farther one. */
 static void place_octants(void *context, uint32_t group)
 {
     struct bake *bake = context;

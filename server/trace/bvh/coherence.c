@@ -12,7 +12,7 @@
  * several rays per invocation cost registers; not measured there. */
 #define TOGETHER_SOFTWARE 8u
 /* The traversal of a packet takes as long as four single ones (bench_bvh): it pays with more rays than that. */
-#define RAYS_A_WALK_MIN 5u
+#define RAYS_PER_PACKET_MIN 5u
 /* Rays that are farther apart than so many leaves, where the scene is, have few leaves in common. Measured: with
  * 871K triangles in 70K pixels (4 leaves) eight camera rays together are 0.9 of one alone, with 590K in 213K (2
  * leaves) 1.5; eight shadow rays, of which the last decides, 1.3, 1.04 and 0.87 with 147K, 590K and 1M triangles.
@@ -76,5 +76,5 @@ uint32_t bvh_rays_together(struct bvh *bvh, const struct gpu_scene *scene, const
         return 1;
     if (!measure_coherence(bvh, scene, wave, counts, error))
         return 0;
-    return counts[0] >= (uint64_t)RAYS_A_WALK_MIN * counts[1] && counts[1] > 0 ? TOGETHER_SOFTWARE : 1;
+    return counts[0] >= (uint64_t)RAYS_PER_PACKET_MIN * counts[1] && counts[1] > 0 ? TOGETHER_SOFTWARE : 1;
 }

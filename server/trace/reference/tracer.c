@@ -197,8 +197,8 @@ static bool reference_trace_range(struct tracer *tracer, struct gpu_scene *scene
         gpu_buffer_read(tracer->device, wave->times, first * sizeof(float), reference->times + first,
                         count * sizeof(float));
     uint64_t start_ns = clock_now_ns();
-    reference_walk(reference, rays);
-    tracer->stats.walk_ns = clock_now_ns() - start_ns;
+    reference_traverse(reference, rays);
+    tracer->stats.traversal_ns = clock_now_ns() - start_ns;
     if (!reference_check(reference, "tracing", error))
         return false;
     if (wave->kind == WAVE_ANY)

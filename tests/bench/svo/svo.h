@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* A sparse voxel octree on the device: what its build (svo/voxelise.frag, svo/mark.comp, svo/allocate.comp,
- * svo/leaves.comp, svo/planes.comp) writes and the walk (svo/traverse.glsl) reads.
+ * svo/leaves.comp, svo/planes.comp) writes and the traversal (svo/traverse.glsl) reads.
  *
  * Crassin, Green. Octree-Based Sparse Voxelization Using the GPU Hardware Rasterizer. OpenGL Insights, 2012: one
  * pass of the rasteriser along each triangle's dominant axis lists the cells that hold something, then the tree is

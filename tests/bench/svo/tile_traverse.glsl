@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The walk through a tree of tiles (svo/svo.h): from the root to the leaf or empty node that the ray is in, then from
+// The traversal through a tree of tiles (svo/svo.h): from the root to the leaf or empty node that the ray is in, then from
 // there to where the ray leaves it, and from the root again. Crassin et al. GigaVoxels. 2009.
 //
 // Define: SVO_LEVELS

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The walk through a sparse voxel octree (svo/svo.h), front to back down to the leaves. Laine, Karras. Efficient Sparse
+// The traversal through a sparse voxel octree (svo/svo.h), front to back down to the leaves. Laine, Karras. Efficient Sparse
 // Voxel Octrees. 2010: the ray's cell as whole numbers whose highest differing bit says how far to climb, and a stack
 // of the nodes above, which are so few here that they are variables.
 //
@@ -30,7 +30,7 @@ const float PLANE_MARGIN_CELLS = 0.5;
 // Of a cell a length of the direction.
 const float SLOWEST = 1e-6;
 
-struct svo_walk {
+struct svo_traversal {
     vec3 origin, direction, inverse; // cells; upwards
     ivec3 mirrored;                  // -1 where it was turned round
     int mirror_bits;                 // of grandchild_of()
@@ -54,7 +54,7 @@ float greatest_of(vec3 v)
 }
 
 // False: it passes by all.
-bool begin(trace_ray r, out svo_walk w)
+bool begin(trace_ray r, out svo_traversal w)
 {
     float cells = 1.0 / cell_world;
     w.origin = (r.origin - lower_world) * cells;
@@ -85,7 +85,7 @@ bool begin(trace_ray r, out svo_walk w)
 }
 
 // Where the ray leaves the cell of 2^size that it is in.
-float leaves_at(svo_walk w, int size, out ivec3 upper, out vec3 at)
+float leaves_at(svo_traversal w, int size, out ivec3 upper, out vec3 at)
 {
     upper = (w.cell | ((1 << size) - 1)) + 1;
     at = (vec3(upper) - w.origin) * w.inverse;
@@ -93,7 +93,7 @@ float leaves_at(svo_walk w, int size, out ivec3 upper, out vec3 at)
 }
 
 // To the cell behind that one; false: the ray ends before.
-bool advance(inout svo_walk w, int size)
+bool advance(inout svo_traversal w, int size)
 {
     ivec3 upper;
     vec3 at;
@@ -119,7 +119,7 @@ bool advance(inout svo_walk w, int size)
 }
 
 // The next leaf from where the ray is; -1: none.
-int next_leaf(inout svo_walk w)
+int next_leaf(inout svo_traversal w)
 {
     int leaf = -1;
     bool on = true;
@@ -150,7 +150,7 @@ int next_leaf(inout svo_walk w)
 }
 
 // Whether the ray hits what is in a leaf, and where.
-bool is_hit(svo_walk w, int leaf, out float distance_)
+bool is_hit(svo_traversal w, int leaf, out float distance_)
 {
     ivec3 upper;
     vec3 at;
@@ -185,7 +185,7 @@ bool is_other_surface(float t, float left_at)
 #ifdef ANY_HIT
 bool trace_any(trace_ray r, inout vec3 taken)
 {
-    svo_walk w;
+    svo_traversal w;
     if (!begin(r, w))
         return false;
     float left_at = -1.0; // the leaf before
@@ -211,7 +211,7 @@ bool trace_any(trace_ray r, inout vec3 taken)
 #else
 void trace_closest(trace_ray r, inout candidate best)
 {
-    svo_walk w;
+    svo_traversal w;
     r.t_max = best.distance;
     if (!begin(r, w))
         return;

@@ -11,7 +11,7 @@ uniform vec4 abuffer_place; // lower corner, world; size of a cell
 uniform int abuffer_grid;   // blocks along a side
 uniform bool abuffer_has_subvoxels;
 
-struct voxel_walk {
+struct voxel_traversal {
     cell_ray ray;
     // In subvoxels, axes turned as raster/blocks.glsl says.
     vec3 o, d, inverse;
@@ -31,12 +31,12 @@ struct found_voxel {
 };
 
 // The subvoxel at w.s.
-void enter(inout voxel_walk w)
+void enter(inout voxel_traversal w)
 {
     w.subvoxel = clamp(ivec3(w.o + w.s * w.d), ivec3(0), ivec3((abuffer_grid << 4) - 1));
 }
 
-void begin_walk(trace_ray r, float end, out voxel_walk w)
+void begin_traversal(trace_ray r, float end, out voxel_traversal w)
 {
     float along = float(abuffer_grid << 4), subvoxels_a_cell = along / float(abuffer_resolution);
     w.ray = cell_ray_of(r, abuffer_place, float(abuffer_resolution));
@@ -85,7 +85,7 @@ uint what_of(int block, uvec3 b)
 }
 
 // Past an occupied subvoxel, which becomes `found`, or past the empty space.
-void step_on(inout voxel_walk w, inout found_voxel found)
+void step_on(inout voxel_traversal w, inout found_voxel found)
 {
     ABUFFER_COUNT(x);
     bvec3 down = notEqual(w.flip, ivec3(0));
@@ -128,7 +128,7 @@ void step_on(inout voxel_walk w, inout found_voxel found)
 }
 
 // To the next occupied subvoxel, if there is one.
-found_voxel next_voxel(inout voxel_walk w)
+found_voxel next_voxel(inout voxel_traversal w)
 {
     found_voxel found = found_voxel(0u, 0.0, 0.0);
     do {

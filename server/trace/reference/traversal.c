@@ -62,14 +62,14 @@ struct packet {
     _Alignas(64) union lane lanes[(RAY_FIELDS + HIT_FIELDS) * REFERENCE_RAYS_MAX];
 };
 
-struct walk {
+struct traversal {
     struct reference *reference;
     const struct ray_range *rays;
     unsigned width;
 };
 
 /* Embree's context, with what the filter functions write behind it. */
-struct walk_context {
+struct traversal_context {
     struct RTCIntersectContext embree; /* first: it comes back by this address */
     float transmittance[CHUNK_RAYS][3];
 };
@@ -138,7 +138,7 @@ void reference_filter_closest(const struct RTCFilterFunctionNArguments *argument
 void reference_filter_any(const struct RTCFilterFunctionNArguments *arguments)
 {
     const struct opacity_surface *surface = arguments->geometryUserPtr;
-    struct walk_context *context = (struct walk_context *)arguments->context;
+    struct traversal_context *context = (struct traversal_context *)arguments->context;
     const union lane *ray = (const union lane *)(const void *)arguments->ray;
     for (unsigned lane = 0; lane < arguments->N; lane++) {
         if (!arguments->valid[lane])
@@ -239,7 +239,7 @@ static uint32_t visibility_of(const struct packet *packet, unsigned n, unsigned 
 
 /* ---- packets ---- */
 
-static inline void intersect(RTCScene scene, struct walk_context *context, struct packet *packet, unsigned n)
+static inline void intersect(RTCScene scene, struct traversal_context *context, struct packet *packet, unsigned n)
 {
     void *lanes = packet->lanes;
     switch (n) {
@@ -258,7 +258,7 @@ static inline void intersect(RTCScene scene, struct walk_context *context, struc
     }
 }
 
-static inline void occlude(RTCScene scene, struct walk_context *context, struct packet *packet, unsigned n)
+static inline void occlude(RTCScene scene, struct traversal_context *context, struct packet *packet, unsigned n)
 {
     void *lanes = packet->lanes;
     switch (n) {
@@ -278,18 +278,19 @@ static inline void occlude(RTCScene scene, struct walk_context *context, struct 
 }
 
 /* The rays `first` .. of a chunk that ends at `end`, n at a time. Inlined with a constant n. */
-static inline __attribute__((always_inline)) void
-walk_packets(const struct walk *walk, struct walk_context *context, uint32_t first, uint32_t end, unsigned n)
+static inline __attribute__((always_inline)) void traverse_packets(const struct traversal *traversal,
+                                                                   struct traversal_context *context,
+                                                                   uint32_t first, uint32_t end, unsigned n)
 {
-    const struct reference *reference = walk->reference;
-    bool any = walk->rays->wave->kind == WAVE_ANY;
+    const struct reference *reference = traversal->reference;
+    bool any = traversal->rays->wave->kind == WAVE_ANY;
     struct packet packet;
     for (uint32_t at = first; at < end; at += n) {
         unsigned count = end - at < n ? end - at : n;
         for (unsigned lane = 0; lane < n; lane++) {
             static const struct ray dead = {.direction_t_max = {0.0f, 0.0f, 0.0f, -1.0f}};
             bool there = lane < count;
-            float time = there && walk->rays->wave->times ? reference->times[at + lane] : 0.0f;
+            float time = there && traversal->rays->wave->times ? reference->times[at + lane] : 0.0f;
             set_lane(&packet, n, lane, there ? &reference->rays[at + lane] : &dead, time, at + lane - first,
                      reference->coordinate_max);
         }
@@ -308,37 +309,37 @@ walk_packets(const struct walk *walk, struct walk_context *context, uint32_t fir
     }
 }
 
-static void walk_chunk(void *argument, uint32_t chunk)
+static void traverse_chunk(void *argument, uint32_t chunk)
 {
-    const struct walk *walk = argument;
-    uint32_t first = walk->rays->first + chunk * CHUNK_RAYS, left = walk->rays->end - first;
+    const struct traversal *traversal = argument;
+    uint32_t first = traversal->rays->first + chunk * CHUNK_RAYS, left = traversal->rays->end - first;
     uint32_t end = first + (left < CHUNK_RAYS ? left : CHUNK_RAYS);
-    struct walk_context context;
+    struct traversal_context context;
     unsigned mode = enter_fast_mode();
     rtcInitIntersectContext(&context.embree);
-    if (walk->rays->wave->kind == WAVE_ANY)
+    if (traversal->rays->wave->kind == WAVE_ANY)
         for (uint32_t i = 0; i < end - first; i++)
             for (int k = 0; k < 3; k++)
                 context.transmittance[i][k] = 1.0f;
-    switch (walk->width) {
+    switch (traversal->width) {
     case 1:
-        walk_packets(walk, &context, first, end, 1);
+        traverse_packets(traversal, &context, first, end, 1);
         break;
     case 4:
-        walk_packets(walk, &context, first, end, 4);
+        traverse_packets(traversal, &context, first, end, 4);
         break;
     case 8:
-        walk_packets(walk, &context, first, end, 8);
+        traverse_packets(traversal, &context, first, end, 8);
         break;
     default:
-        walk_packets(walk, &context, first, end, 16);
+        traverse_packets(traversal, &context, first, end, 16);
     }
     leave_fast_mode(mode);
 }
 
-void reference_walk(struct reference *reference, const struct ray_range *rays)
+void reference_traverse(struct reference *reference, const struct ray_range *rays)
 {
-    struct walk walk = {.reference = reference, .rays = rays, .width = reference->width};
+    struct traversal traversal = {.reference = reference, .rays = rays, .width = reference->width};
     uint32_t chunks = (rays->end - rays->first - 1) / CHUNK_RAYS + 1;
-    parallel_run(parallel_processors(), chunks, walk_chunk, &walk);
+    parallel_run(parallel_processors(), chunks, traverse_chunk, &traversal);
 }
