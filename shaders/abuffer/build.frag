@@ -175,7 +175,7 @@ void main()
     bool closed = (primitive.w & DRAWN_CLOSED) != 0u;
     for (int side = 0; side < 2; side++) {
         vec3 normal;
-        float depth_cells = crossing_of(chord, side, normal), least_cells, most_cells;
+        float depth_cells = intersection_of(chord, side, normal), least_cells, most_cells;
         if (is_sphere_cut_out(chord, depth_cells))
             continue;
         reach_of(chord, normal, side, depth_cells, least_cells, most_cells);

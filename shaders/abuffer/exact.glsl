@@ -18,16 +18,16 @@ const float BESIDE = 3.0;
 const float BESIDE_BEHIND = 4.0;
 
 // The line of a ray, and a triangle of the same instance.
-struct line_crossing {
+struct line_intersection {
     vec3 v0, v1, v2; // from the ray's origin
     vec3 weights;    // barycentric, where the line intersects the triangle's plane
     float distance;  // there
     bool from_behind;
 };
 
-line_crossing cross_triangle(vec3 o, vec3 d, uint primitive)
+line_intersection cross_triangle(vec3 o, vec3 d, uint primitive)
 {
-    line_crossing c;
+    line_intersection c;
     uvec4 triangle = texelFetch(triangles, int(primitive));
     c.v0 = texelFetch(positions, int(triangle.x)).xyz - o;
     c.v1 = texelFetch(positions, int(triangle.y)).xyz - o;
@@ -42,13 +42,13 @@ line_crossing cross_triangle(vec3 o, vec3 d, uint primitive)
     return c;
 }
 
-bool has_corner(line_crossing c, vec3 v)
+bool has_corner(line_intersection c, vec3 v)
 {
     return c.v0 == v || c.v1 == v || c.v2 == v;
 }
 
 // Whether the edge beyond which the line passes the one triangle is an edge of the other, too.
-bool is_beyond_edge_of(line_crossing c, line_crossing other)
+bool is_beyond_edge_of(line_intersection c, line_intersection other)
 {
     bvec3 has = bvec3(has_corner(other, c.v0), has_corner(other, c.v1), has_corner(other, c.v2));
     return c.weights.x < 0.0 && has.y && has.z || c.weights.y < 0.0 && has.z && has.x || c.weights.z < 0.0 && has.x && has.y;
@@ -122,10 +122,10 @@ bool settle(trace_ray r, voxel_traversal w, float limit, inout abuffer_found fou
     vec3 o = affine_point(rows, r.origin), d = affine_vector(rows, r.direction);
     float end = found.end + BESIDE_BEHIND / w.ray.scale;
     end = end < limit ? end : limit;
-    line_crossing own;
+    line_intersection own;
     bool is_own = true, passes = false, is_hit, goes_on;
     do {
-        line_crossing c = cross_triangle(o, d, id - drawn.y);
+        line_intersection c = cross_triangle(o, d, id - drawn.y);
         if (is_own)
             own = c;
         bool is_inside = least(c.weights) >= 0.0, is_ahead = c.distance > r.t_min;

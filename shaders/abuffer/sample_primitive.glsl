@@ -3,7 +3,7 @@
 #include "abuffer/layout.h"
 #include "raster/layout.h"
 #include "shared/bindings.h"
-#include "common/crossing.glsl"
+#include "common/intersection.glsl"
 #include "common/alpha.glsl"
 
 layout(binding = UNIT_TRACER_3) uniform usamplerBuffer abuffer_ids;

@@ -17,18 +17,18 @@ void main()
     uint k = first_ray + item_index();
     if (k >= ray_count)
         return;
-    uvec4 crossing = imageLoad(hits, int(3u * k));
-    float distance_ = uintBitsToFloat(crossing.x);
+    uvec4 intersection = imageLoad(hits, int(3u * k));
+    float distance_ = uintBitsToFloat(intersection.x);
     hit h = surface_miss();
-    if (crossing.z != HIT_NO_PRIMITIVE) {
+    if (intersection.z != HIT_NO_PRIMITIVE) {
         vec3 origin = texelFetch(rays, int(2u * k)).xyz, direction = texelFetch(rays, int(2u * k + 1u)).xyz;
 #ifdef HAS_DISCS
-        if (crossing.w == HIT_NO_PRIMITIVE)
-            h = surface_disc(crossing.z, distance_, origin, direction);
+        if (intersection.w == HIT_NO_PRIMITIVE)
+            h = surface_disc(intersection.z, distance_, origin, direction);
         else
 #endif
         {
-            candidate found = candidate_of_sample(int(crossing.z), distance_);
+            candidate found = candidate_of_sample(int(intersection.z), distance_);
             found.barycentrics = nearest_barycentrics(found, origin, direction);
             h = surface_of(found, origin, direction, 0.0);
         }

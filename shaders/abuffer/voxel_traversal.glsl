@@ -19,7 +19,7 @@ struct voxel_traversal {
     ivec3 subvoxel;
     int octant_shift;
     float s, s_end;
-    float s_least, s_limit; // between which a crossing counts
+    float s_least, s_limit; // between which an intersection counts
     float s_behind;         // and behind which, if the ray continues from a rejected one
     float beyond;           // extension of a sample's plane beyond its texel, in cells
 };

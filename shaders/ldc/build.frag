@@ -88,7 +88,7 @@ void main()
         discard;
     for (int side = 0; side < 2; side++) {
         vec3 normal;
-        float depth_cells = crossing_of(chord, side, normal);
+        float depth_cells = intersection_of(chord, side, normal);
         if (is_in_image(abs(normal), gl_Layer) && !is_sphere_cut_out(chord, depth_cells))
             record(depth_in_cube(depth_cells));
     }

@@ -21,7 +21,7 @@ struct cell_traversal {
     ivec3 flip;  // -1: turned
     ivec3 cell;
     float s, s_end;
-    float s_least, s_limit; // between which a crossing counts
+    float s_least, s_limit; // between which an intersection counts
     float begin, scale; // cell_ray's
     int cube, grid, first_node, octant_shift;
     int at, shift; // texel of the current node or block; log2 of the size of its parts: 2 in a node, 0 in a block

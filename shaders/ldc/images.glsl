@@ -22,7 +22,7 @@ struct image_traversal {
     vec3 o, d; // cells of the image
     vec2 inverse;
     float s, s_end;
-    float s_least, s_limit; // between which a crossing counts
+    float s_least, s_limit; // between which an intersection counts
     float begin, scale; // cell_ray's
     ivec2 texel;
     int level;

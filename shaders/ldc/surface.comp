@@ -33,17 +33,17 @@ void main()
     uint k = first_ray + item_index();
     if (k >= ray_count)
         return;
-    uvec4 crossing = imageLoad(hits, int(3u * k));
-    float distance_ = uintBitsToFloat(crossing.x);
+    uvec4 intersection = imageLoad(hits, int(3u * k));
+    float distance_ = uintBitsToFloat(intersection.x);
     hit h = surface_miss();
-    if (crossing.z != HIT_NO_PRIMITIVE) {
+    if (intersection.z != HIT_NO_PRIMITIVE) {
         vec3 direction = texelFetch(rays, int(2u * k + 1u)).xyz;
 #ifdef HAS_DISCS
-        if (crossing.w == HIT_NO_PRIMITIVE)
-            h = surface_disc(crossing.z, distance_, texelFetch(rays, int(2u * k)).xyz, direction);
+        if (intersection.w == HIT_NO_PRIMITIVE)
+            h = surface_disc(intersection.z, distance_, texelFetch(rays, int(2u * k)).xyz, direction);
         else
 #endif
-            h = surface_sampled(crossing.z, distance_, direction);
+            h = surface_sampled(intersection.z, distance_, direction);
     }
     imageStore(hits, int(3u * k), uvec4(floatBitsToUint(h.distance), h.material, h.primitive, h.instance));
     imageStore(hits, int(3u * k + 1u), floatBitsToUint(vec4(h.u0, h.v0, h.u1, h.v1)));

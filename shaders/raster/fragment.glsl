@@ -83,7 +83,7 @@ sphere_chord chord_of_sphere()
 }
 
 // side 0: where the line enters; 1: where it leaves. The normal may have any length.
-float crossing_of(sphere_chord c, int side, out vec3 normal_world)
+float intersection_of(sphere_chord c, int side, out vec3 normal_world)
 {
     precise float reach = side == 0 ? -c.half_chord : c.half_chord;
     precise float depth_cells = c.nearest + reach;

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
 // A pixel's ray against the one primitive that the rasteriser saw there.
 //
-// At an edge the exact test may just miss what the rasteriser drew (common/crossing.glsl).
+// At an edge the exact test may just miss what the rasteriser drew (common/intersection.glsl).
 //
 // Defines: HAS_SPHERES, HAS_CUTOUT as the scene has them.
 
 #include "common/alpha.glsl"
-#include "common/crossing.glsl"
+#include "common/intersection.glsl"
 #include "common/intersect.glsl"
 
 #ifdef HAS_SPHERES

@@ -4,7 +4,7 @@
 //
 // Defines: HAS_SPHERES, HAS_MOTION as the scene has them.
 #include "common/dispatch.glsl"
-#include "common/crossing.glsl"
+#include "common/intersection.glsl"
 
 layout(binding = UNIT_RAYS) uniform samplerBuffer rays; // two texels each
 #ifdef HAS_MOTION
@@ -31,13 +31,13 @@ void main()
     uint k = first_ray + item_index();
     if (k >= ray_count)
         return;
-    uvec4 crossing = imageLoad(hits, int(3u * k));
+    uvec4 intersection = imageLoad(hits, int(3u * k));
     vec3 origin = texelFetch(rays, int(2u * k)).xyz, direction = texelFetch(rays, int(2u * k + 1u)).xyz;
     float time = 0.0;
 #ifdef HAS_MOTION
     time = texelFetch(ray_times, int(k)).x;
 #endif
-    candidate found = candidate(uintBitsToFloat(crossing.x), crossing.z, crossing.w, vec2(0.0));
+    candidate found = candidate(uintBitsToFloat(intersection.x), intersection.z, intersection.w, vec2(0.0));
     if (is_triangle(found))
         found.barycentrics =
             candidate_triangle(found.instance_index, found.primitive, origin, direction, time).barycentrics;

@@ -46,7 +46,7 @@ layout(binding = UNIT_RAY_TIMES) uniform samplerBuffer ray_times;
 #ifdef ANY_HIT
 layout(std430, binding = BIND_VISIBILITY) writeonly buffer visibility_block { uint visibilities[]; };
 #else
-layout(binding = IMAGE_HITS, rgba32ui) writeonly uniform uimageBuffer crossings;
+layout(binding = IMAGE_HITS, rgba32ui) writeonly uniform uimageBuffer intersections;
 #endif
 
 uniform uint first_ray; // of this dispatch
@@ -120,12 +120,12 @@ void discs_closest(trace_ray r, inout candidate best)
     }
 }
 
-void store_crossing(uint ray_index, candidate best)
+void store_intersection(uint ray_index, candidate best)
 {
     if (ray_index >= ray_count)
         return;
     float distance_ = best.primitive == HIT_NO_PRIMITIVE ? -1.0 : best.distance;
-    imageStore(crossings, int(3u * ray_index), uvec4(floatBitsToUint(distance_), 0u, best.primitive, best.instance_index));
+    imageStore(intersections, int(3u * ray_index), uvec4(floatBitsToUint(distance_), 0u, best.primitive, best.instance_index));
 }
 
 #endif
@@ -149,7 +149,7 @@ void main()
         discs_closest(r, best);
         trace_closest(r, best);
     }
-    store_crossing(ray_index, best);
+    store_intersection(ray_index, best);
 #endif
 }
 
@@ -222,7 +222,7 @@ void main()
     if (any_alive)
         trace_closest_together(r, found);
     for (int k = 0; k < RAYS_TOGETHER; k++)
-        store_crossing(first + uint(k), found[k]);
+        store_intersection(first + uint(k), found[k]);
 #endif
 }
 

@@ -69,7 +69,7 @@ static bool run_tracer(struct bench_contest *contest, struct tracer *tracer, boo
     return ok;
 }
 
-/* `raw`: a crossing or a visibility for each ray. */
+/* `raw`: an intersection or a visibility for each ray. */
 static bool run_once(struct bench_contest *contest, const struct bench_contender *contender,
                      const struct bench_wave *wave, void *raw, uint64_t *time_ns, struct error *error)
 {
@@ -77,12 +77,13 @@ static bool run_once(struct bench_contest *contest, const struct bench_contender
     const uint64_t start_ns = clock_now_ns();
     bool ok = true;
     if (contender->way == BENCH_RAW)
-        bench_embree_trace(contender->embree, &(struct bench_embree_wave){.rays = wave->rays,
-                                                                          .ray_count = wave->ray_count,
-                                                                          .packet = contender->packet,
-                                                                          .coherent = fact->coherent,
-                                                                          .crossings = fact->is_any ? NULL : raw,
-                                                                          .visibilities = raw});
+        bench_embree_trace(contender->embree,
+                           &(struct bench_embree_wave){.rays = wave->rays,
+                                                       .ray_count = wave->ray_count,
+                                                       .packet = contender->packet,
+                                                       .coherent = fact->coherent,
+                                                       .intersections = fact->is_any ? NULL : raw,
+                                                       .visibilities = raw});
     else
         ok = run_tracer(contest, contender->tracer_used, contender->way == BENCH_WALK, wave, error);
     *time_ns = clock_now_ns() - start_ns;
@@ -109,7 +110,7 @@ static void read_answers(struct bench_contest *contest, const struct bench_conte
         if (is_any)
             answers[i] = let_through(((const uint32_t *)raw)[i]);
         else if (contender->way == BENCH_RAW)
-            answers[i] = ((const struct bench_crossing *)raw)[i].distance;
+            answers[i] = ((const struct bench_intersection *)raw)[i].distance;
         else
             answers[i] = ((const struct hit *)raw)[i].distance;
     }
@@ -295,8 +296,8 @@ bool bench_contest_hits(struct bench_contest *contest, struct tracer *tracer, co
     return trace_once(contest, tracer, false, wave, hits, error);
 }
 
-bool bench_contest_crossings(struct bench_contest *contest, struct tracer *tracer, const struct bench_wave *wave,
-                             struct hit *hits, struct error *error)
+bool bench_contest_intersections(struct bench_contest *contest, struct tracer *tracer,
+                                 const struct bench_wave *wave, struct hit *hits, struct error *error)
 {
     return trace_once(contest, tracer, true, wave, hits, error);
 }

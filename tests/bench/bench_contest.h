@@ -61,8 +61,8 @@ bool bench_contest_wave(struct bench_contest *contest, const struct bench_wave *
 bool bench_contest_hits(struct bench_contest *contest, struct tracer *tracer, const struct bench_wave *wave,
                         struct hit *hits, struct error *error);
 /* Likewise of the walk alone: distance, primitive and instance of the hits. */
-bool bench_contest_crossings(struct bench_contest *contest, struct tracer *tracer, const struct bench_wave *wave,
-                             struct hit *hits, struct error *error);
+bool bench_contest_intersections(struct bench_contest *contest, struct tracer *tracer,
+                                 const struct bench_wave *wave, struct hit *hits, struct error *error);
 /* More than 0.01 % of the rays wrong, edges aside. */
 bool bench_contender_failed(const struct bench_contender *contender, uint32_t ray_count);
 void bench_contest_finish(struct bench_contest *contest); /* the buffers */

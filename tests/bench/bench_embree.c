@@ -222,12 +222,12 @@ struct tracing {
 static void store(const struct bench_embree_wave *wave, uint32_t i, float t_far, const uint32_t ids[2],
                   const float uv[2])
 {
-    if (!wave->crossings) {
+    if (!wave->intersections) {
         wave->visibilities[i] = t_far < 0 ? 0 : UINT32_MAX;
         return;
     }
     bool is_hit = ids[0] != RTC_INVALID_GEOMETRY_ID;
-    wave->crossings[i] = (struct bench_crossing){is_hit ? t_far : -1, ids[1], ids[0], uv[0], uv[1]};
+    wave->intersections[i] = (struct bench_intersection){is_hit ? t_far : -1, ids[1], ids[0], uv[0], uv[1]};
 }
 
 /* Embree must not be asked about a dead ray; a tracer answers that nothing is in its way. */
@@ -257,7 +257,7 @@ static void trace_single(const struct tracing *tracing, struct RTCIntersectConte
     };
     if (skip_dead(tracing->wave, i))
         return;
-    if (tracing->wave->crossings)
+    if (tracing->wave->intersections)
         rtcIntersect1(tracing->embree->scene, context, &one);
     else
         rtcOccluded1(tracing->embree->scene, context, &one.ray);
@@ -289,7 +289,7 @@ static void trace_single(const struct tracing *tracing, struct RTCIntersectConte
             many.ray.mask[k] = UINT32_MAX;                                                                        \
             many.ray.id[k] = many.ray.flags[k] = 0;                                                               \
         }                                                                                                         \
-        if (wave->crossings)                                                                                      \
+        if (wave->intersections)                                                                                  \
             rtcIntersect##N(valid, tracing->embree->scene, context, &many);                                       \
         else                                                                                                      \
             rtcOccluded##N(valid, tracing->embree->scene, context, &many.ray);                                    \

@@ -13,7 +13,7 @@
 struct bench_embree;
 
 /* What a ray found, as much as a walk tells. */
-struct bench_crossing {
+struct bench_intersection {
     float distance; /* < 0: nothing */
     uint32_t primitive, instance;
     float u, v;
@@ -22,10 +22,10 @@ struct bench_crossing {
 struct bench_embree_wave {
     const struct ray *rays;
     uint32_t ray_count;
-    unsigned packet;                  /* rays a call: 1, 8, 16 */
-    bool coherent;                    /* Embree's flag of that name */
-    struct bench_crossing *crossings; /* closest hits; NULL: any hit */
-    uint32_t *visibilities;           /* any hit: all bits set where nothing is in the way, as of a tracer */
+    unsigned packet;                          /* rays a call: 1, 8, 16 */
+    bool coherent;                            /* Embree's flag of that name */
+    struct bench_intersection *intersections; /* closest hits; NULL: any hit */
+    uint32_t *visibilities; /* any hit: all bits set where nothing is in the way, as of a tracer */
 };
 
 /* `robust`: RTC_SCENE_FLAG_ROBUST, else the default flags. *build_ns: Embree's own build. NULL and *error: no

@@ -140,7 +140,7 @@ static bool count_steps(struct bench_contest *contest, struct bench_form *form, 
     double sums[3] = {0};
     struct tracer_options *options = &form->made->options;
     options->bench.ldc_count_steps = options->bench.abuffer_count_steps = 1;
-    const bool done = bench_contest_crossings(contest, form->made, wave, counts, error);
+    const bool done = bench_contest_intersections(contest, form->made, wave, counts, error);
     options->bench.ldc_count_steps = options->bench.abuffer_count_steps = 0;
     for (uint32_t i = 0; done && i < wave->ray_count; i++) {
         sums[0] += (double)counts[i].distance;

@@ -80,7 +80,7 @@ static void add_contenders(struct bench *bench, const struct structure *structur
     const bool is_exact = bench_is_named("bvh,reference,naive", structure->tracer);
     for (enum bench_way way = BENCH_INTERFACE; way <= BENCH_WALK; way++) {
         if (way == BENCH_WALK && !is_exact)
-            continue; /* has no crossings */
+            continue; /* has no intersections */
         struct bench_contender *added = bench_contest_add(contest, structure->tracer, structure->form, way);
         added->tracer_used = structure->made;
         added->is_exact = is_exact;

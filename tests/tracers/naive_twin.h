@@ -27,7 +27,7 @@ struct twin_hit {
 };
 
 /* One surface that the ray's line crosses. */
-struct twin_crossing {
+struct twin_intersection {
     struct twin_hit hit;
     double alpha; /* of base colour, texture and vertices */
     double transmittance[3];
@@ -246,42 +246,42 @@ static inline void twin_is_close(struct twin_answer *answer, double distance)
 }
 
 /* Alpha, tint and cutout of a surface, from its material. */
-static inline void twin_material(struct twin_answer *answer, struct twin_crossing *crossing)
+static inline void twin_material(struct twin_answer *answer, struct twin_intersection *intersection)
 {
     const struct scene *scene = answer->twin->scene;
-    const struct scene_material *material = scene_material(scene, crossing->hit.material);
-    memset(crossing->transmittance, 0, sizeof(crossing->transmittance));
-    crossing->cut_out = false;
+    const struct scene_material *material = scene_material(scene, intersection->hit.material);
+    memset(intersection->transmittance, 0, sizeof(intersection->transmittance));
+    intersection->cut_out = false;
     if (!material)
         return;
     double colour[4], texel[4];
     for (int k = 0; k < 4; k++)
-        colour[k] = material->base_colour[k] * crossing->hit.colour[k];
-    if (twin_sample(scene, &material->textures[MATERIAL_BASE_COLOUR], crossing->hit.uv, texel))
+        colour[k] = material->base_colour[k] * intersection->hit.colour[k];
+    if (twin_sample(scene, &material->textures[MATERIAL_BASE_COLOUR], intersection->hit.uv, texel))
         for (int k = 0; k < 4; k++)
             colour[k] *= texel[k];
-    crossing->alpha = colour[3];
+    intersection->alpha = colour[3];
     if (material->alpha_mode == ALPHA_MASK) {
-        crossing->cut_out = colour[3] < material->alpha_cutoff;
+        intersection->cut_out = colour[3] < material->alpha_cutoff;
         answer->close_call |= fabs(colour[3] - material->alpha_cutoff) < 1e-3;
         if (fabs(colour[3] - material->alpha_cutoff) < answer->twin->blur.alpha)
-            twin_is_close(answer, crossing->hit.distance);
+            twin_is_close(answer, intersection->hit.distance);
     }
     double transmission = material->transmission * (1 - material->metallic);
-    if (twin_sample(scene, &material->textures[MATERIAL_TRANSMISSION], crossing->hit.uv, texel))
+    if (twin_sample(scene, &material->textures[MATERIAL_TRANSMISSION], intersection->hit.uv, texel))
         transmission *= texel[0];
     for (int k = 0; k < 3; k++) {
         double through = transmission * colour[k];
-        crossing->transmittance[k] =
+        intersection->transmittance[k] =
             material->alpha_mode == ALPHA_BLEND ? 1 - colour[3] + colour[3] * through : through;
-        if (crossing->cut_out)
-            crossing->transmittance[k] = 1;
+        if (intersection->cut_out)
+            intersection->transmittance[k] = 1;
     }
 }
 
-static inline void twin_cross_surface(struct twin_answer *answer, struct twin_crossing *crossing)
+static inline void twin_cross_surface(struct twin_answer *answer, struct twin_intersection *intersection)
 {
-    struct twin_hit *hit = &crossing->hit;
+    struct twin_hit *hit = &intersection->hit;
     /* Around the ray's ends a float may fall on either side. */
     answer->close_call |= fabs(hit->distance - answer->t_min) < 1e-4 * (1 + fabs(answer->t_min));
     answer->close_call |= fabs(hit->distance - answer->t_max) < 1e-4 * (1 + fabs(answer->t_max));
@@ -290,15 +290,15 @@ static inline void twin_cross_surface(struct twin_answer *answer, struct twin_cr
         twin_is_close(answer, hit->distance);
     if (!(hit->distance > answer->t_min && hit->distance < answer->t_max))
         return;
-    twin_material(answer, crossing);
+    twin_material(answer, intersection);
     for (int k = 0; k < 3; k++)
-        answer->transmittance[k] *= crossing->transmittance[k];
+        answer->transmittance[k] *= intersection->transmittance[k];
     if (near > 0 && answer->surface_count < TWIN_SURFACES_MAX)
         answer->surfaces[answer->surface_count++] = hit->distance;
-    if (crossing->cut_out)
+    if (intersection->cut_out)
         return;
-    answer->is_opaque |= !answer->is_close && crossing->transmittance[0] == 0 && crossing->transmittance[1] == 0 &&
-                         crossing->transmittance[2] == 0;
+    answer->is_opaque |= !answer->is_close && intersection->transmittance[0] == 0 &&
+                         intersection->transmittance[1] == 0 && intersection->transmittance[2] == 0;
     hit->back_face = twin_dot(answer->direction, hit->normal_geometric) > 0;
     if (answer->closest.distance < 0 || hit->distance < answer->closest.distance) {
         if (answer->closest.distance >= 0)
@@ -415,18 +415,18 @@ static inline void twin_triangle(struct twin_answer *answer, const struct scene_
     }
     if (inside < 0)
         return;
-    struct twin_crossing crossing = {.hit = {.distance = distance, .node = instance->node->base.id}};
+    struct twin_intersection intersection = {.hit = {.distance = distance, .node = instance->node->base.id}};
     double a[3], b[3];
     for (int k = 0; k < 3; k++) {
         a[k] = corner[1][k] - corner[0][k];
         b[k] = corner[2][k] - corner[0][k];
     }
-    twin_cross(crossing.hit.normal_geometric, a, b);
-    twin_normal_to_world(crossing.hit.normal_geometric, instance->object_from_world);
+    twin_cross(intersection.hit.normal_geometric, a, b);
+    twin_normal_to_world(intersection.hit.normal_geometric, instance->object_from_world);
     twin_attributes(answer, mesh, index, (const double[3]){1 - u - v, u, v}, instance->object_from_world,
-                    &crossing.hit);
-    crossing.hit.material = twin_range_material(mesh->ranges, mesh->range_count, primitive);
-    twin_cross_surface(answer, &crossing);
+                    &intersection.hit);
+    intersection.hit.material = twin_range_material(mesh->ranges, mesh->range_count, primitive);
+    twin_cross_surface(answer, &intersection);
 }
 
 static inline void twin_sphere(struct twin_answer *answer, const struct scene_instance *instance,
@@ -454,8 +454,8 @@ static inline void twin_sphere(struct twin_answer *answer, const struct scene_in
     if (discriminant < 0)
         return;
     for (int side = -1; side <= 1; side += 2) {
-        struct twin_crossing crossing = {.hit = {.node = instance->node->base.id, .colour = {1, 1, 1, 1}}};
-        struct twin_hit *hit = &crossing.hit;
+        struct twin_intersection intersection = {.hit = {.node = instance->node->base.id, .colour = {1, 1, 1, 1}}};
+        struct twin_hit *hit = &intersection.hit;
         hit->distance = (-b + side * sqrt(discriminant)) / a;
         for (int k = 0; k < 3; k++)
             hit->normal_geometric[k] = (from[k] + hit->distance * direction[k]) / sphere[3];
@@ -464,7 +464,7 @@ static inline void twin_sphere(struct twin_answer *answer, const struct scene_in
         twin_normal_to_world(hit->normal_geometric, instance->object_from_world);
         memcpy(hit->normal_shading, hit->normal_geometric, sizeof(hit->normal_shading));
         hit->material = twin_range_material(set->ranges, set->range_count, primitive);
-        twin_cross_surface(answer, &crossing);
+        twin_cross_surface(answer, &intersection);
     }
 }
 
@@ -475,23 +475,24 @@ static inline void twin_discs(struct twin_answer *answer)
     void *value;
     while (hashmap_next(&answer->twin->scene->objects[OBJECT_DISC], &cursor, &id, &value)) {
         const struct scene_disc *disc = value;
-        struct twin_crossing crossing = {.hit = {.material = disc->material, .colour = {1, 1, 1, 1}}};
+        struct twin_intersection intersection = {.hit = {.material = disc->material, .colour = {1, 1, 1, 1}}};
         double slope = 0, height = 0, squared = 0;
         for (int k = 0; k < 3; k++) {
-            crossing.hit.normal_geometric[k] = crossing.hit.normal_shading[k] = disc->normal_world[k];
+            intersection.hit.normal_geometric[k] = intersection.hit.normal_shading[k] = disc->normal_world[k];
             slope += disc->normal_world[k] * answer->direction[k];
             height += disc->normal_world[k] * (disc->centre_world[k] - answer->origin[k]);
         }
-        crossing.hit.distance = height / slope;
+        intersection.hit.distance = height / slope;
         answer->is_close = false;
         for (int k = 0; k < 3; k++) {
-            double d = answer->origin[k] + crossing.hit.distance * answer->direction[k] - disc->centre_world[k];
+            double d =
+                answer->origin[k] + intersection.hit.distance * answer->direction[k] - disc->centre_world[k];
             squared += d * d;
         }
         double radius = sqrt(squared) / disc->radius;
         answer->close_call |= fabs(radius - 1) < 1e-3;
         if (slope != 0 && radius <= 1)
-            twin_cross_surface(answer, &crossing);
+            twin_cross_surface(answer, &intersection);
     }
 }
 

@@ -209,21 +209,21 @@ static inline void set_lane(struct packet *packet, unsigned n, unsigned lane, co
     hits[HIT_INSTANCE * n + lane].u = RTC_INVALID_GEOMETRY_ID;
 }
 
-static struct hit crossing_of(const struct reference *reference, const struct packet *packet, unsigned n,
-                              unsigned lane, const struct ray *ray)
+static struct hit intersection_of(const struct reference *reference, const struct packet *packet, unsigned n,
+                                  unsigned lane, const struct ray *ray)
 {
     const union lane *hits = packet->lanes + RAY_FIELDS * n;
-    struct hit crossing = {.distance = -1.0f, .primitive = HIT_NO_PRIMITIVE, .instance = HIT_NO_PRIMITIVE};
+    struct hit intersection = {.distance = -1.0f, .primitive = HIT_NO_PRIMITIVE, .instance = HIT_NO_PRIMITIVE};
     if (!packet->valid[lane] || hits[HIT_GEOMETRY * n + lane].u == RTC_INVALID_GEOMETRY_ID)
-        return crossing;
+        return intersection;
     uint32_t instance = hits[HIT_INSTANCE * n + lane].u;
-    crossing.distance = packet->lanes[RAY_T_FAR * n + lane].f + begin_of(ray);
-    crossing.primitive = hits[HIT_PRIMITIVE * n + lane].u;
+    intersection.distance = packet->lanes[RAY_T_FAR * n + lane].f + begin_of(ray);
+    intersection.primitive = hits[HIT_PRIMITIVE * n + lane].u;
     if (instance != RTC_INVALID_GEOMETRY_ID) {
-        crossing.instance = instance - 1;
-        crossing.primitive += reference->instances[instance - 1].first_primitive;
+        intersection.instance = instance - 1;
+        intersection.primitive += reference->instances[instance - 1].first_primitive;
     }
-    return crossing;
+    return intersection;
 }
 
 static uint32_t visibility_of(const struct packet *packet, unsigned n, unsigned lane, const float transmittance[3])
@@ -304,7 +304,7 @@ static inline __attribute__((always_inline)) void traverse_packets(const struct 
                     visibility_of(&packet, n, lane, context->transmittance[at + lane - first]);
             else
                 ((struct hit *)reference->answers)[at + lane] =
-                    crossing_of(reference, &packet, n, lane, &reference->rays[at + lane]);
+                    intersection_of(reference, &packet, n, lane, &reference->rays[at + lane]);
         }
     }
 }

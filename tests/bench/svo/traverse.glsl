@@ -163,10 +163,10 @@ bool is_hit(svo_traversal w, int leaf, out float distance_)
     vec4 plane = unpack_plane(bits);
     vec3 normal = mix(plane.xyz, -plane.xyz, lessThan(w.mirrored, ivec3(0)));
     float approach = dot(normal, w.direction);
-    float crossing = (plane.w - dot(normal, w.origin - (vec3(upper) - 0.5))) / approach;
+    float intersection = (plane.w - dot(normal, w.origin - (vec3(upper) - 0.5))) / approach;
     float margin = PLANE_MARGIN_CELLS * cell_world;
-    distance_ = crossing;
-    return crossing >= w.t - margin && crossing <= leaves + margin;
+    distance_ = intersection;
+    return intersection >= w.t - margin && intersection <= leaves + margin;
 #else
     return true;
 #endif

@@ -74,7 +74,7 @@ void main()
         discard;
     for (int side = 0; side < 2; side++) {
         vec3 normal;
-        float depth = crossing_of(chord, side, normal);
+        float depth = intersection_of(chord, side, normal);
         normal = normalize(normal);
         vec3 lean = abs(normal);
         float reach = 0.5 * (lean[u] + lean[v]) / lean[axis];

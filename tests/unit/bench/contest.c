@@ -169,7 +169,7 @@ TEST(hits_that_were_missed_fail)
 TEST(packets_of_every_size_answer_alike)
 {
     static struct ray rays[RAYS];
-    static struct bench_crossing crossings[3][RAYS];
+    static struct bench_intersection intersections[3][RAYS];
     static uint32_t visibilities[3][RAYS];
     static const unsigned packets[3] = {1, 8, 16};
     struct error error = {0};
@@ -182,21 +182,22 @@ TEST(packets_of_every_size_answer_alike)
     rays[5].direction_t_max[3] = -1; /* dead */
     const uint32_t count = RAYS - 3; /* no multiple of a packet */
     for (int i = 0; i < 3; i++) {
-        bench_embree_trace(embree, &(struct bench_embree_wave){rays, count, packets[i], true, crossings[i], NULL});
+        bench_embree_trace(embree,
+                           &(struct bench_embree_wave){rays, count, packets[i], true, intersections[i], NULL});
         bench_embree_trace(embree,
                            &(struct bench_embree_wave){rays, count, packets[i], true, NULL, visibilities[i]});
     }
     unsigned met = 0;
     for (uint32_t k = 0; k < count; k++) {
-        met += crossings[0][k].distance >= 0;
-        assert_int_equal(visibilities[0][k] == 0, crossings[0][k].distance >= 0);
+        met += intersections[0][k].distance >= 0;
+        assert_int_equal(visibilities[0][k] == 0, intersections[0][k].distance >= 0);
         for (int i = 1; i < 3; i++) {
-            assert_float_equal(crossings[i][k].distance, crossings[0][k].distance, 1e-4f);
+            assert_float_equal(intersections[i][k].distance, intersections[0][k].distance, 1e-4f);
             assert_int_equal(visibilities[i][k], visibilities[0][k]);
         }
     }
     assert_true(met > count / 2);
-    assert_true(crossings[0][5].distance < 0);
+    assert_true(intersections[0][5].distance < 0);
     assert_int_equal(visibilities[0][5], UINT32_MAX);
     bench_embree_destroy(embree);
 }

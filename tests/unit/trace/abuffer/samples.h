@@ -206,7 +206,8 @@ static inline bool abuffer_upload(struct abuffer_samples *s, struct abuffer_stor
     uint32_t(*samples)[2] = calloc(s->count + 1, sizeof *samples), *ids = calloc(s->count + 1, sizeof *ids);
     int32_t(*sums)[4] = calloc(voxel_count, sizeof *sums);
     uint32_t(*subvoxels)[3][2] = calloc(voxel_count, sizeof *subvoxels);
-    const uint32_t drawn[4] = {0, 0, 0, DRAWN_SPHERES}; /* no triangles that a crossing would be held against */
+    const uint32_t drawn[4] = {0, 0, 0,
+                               DRAWN_SPHERES}; /* no triangles that an intersection would be held against */
     store->cell_world = cell_world;
     store->resolution = s->resolution;
     store->voxels_along = s->voxels_along;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Traversal of layered depth cubes against brute force over all samples of cubes made on the CPU: every form
- * of levels, of rays and of layers together. What is a crossing is the shader's rule (ldc/cube.glsl) in doubles;
- * where it hangs on rounding whether one counts, either answer is taken, see judge(). */
+ * of levels, of rays and of layers together. What is an intersection is the shader's rule (ldc/cube.glsl) in
+ * doubles; where it hangs on rounding whether one counts, either answer is taken, see judge(). */
 #include "tests/unit/trace/ldc/traversal_fixture.h"
 #include "tests/harness/test.h"
 
@@ -25,14 +25,15 @@ static void add_soup(struct ldc_samples *s, int count, float size, uint64_t seed
 /* ---- brute force ---- */
 
 /* Of one sample: where a ray crosses its plane. */
-struct crossing {
+struct intersection {
     double distance; /* in lengths of the direction; no number: not at all */
     double beyond;   /* cells: how far outside of the texel, <= 0: inside */
     bool is_in_cube; /* not only the sample is */
     bool is_own, is_surely_not_own;
 };
 
-static struct crossing cross(const struct ldc_samples *s, const struct ldc_sample *sample, const struct ray *ray)
+static struct intersection cross(const struct ldc_samples *s, const struct ldc_sample *sample,
+                                 const struct ray *ray)
 {
     const uint32_t n = s->resolution, axis = sample->texel / (n * n), iu = (axis + 1) % 3, iv = (axis + 2) % 3;
     double o[3], d[3], to[3], height = 0, slope = 0, size = 0;
@@ -52,7 +53,7 @@ static struct crossing cross(const struct ldc_samples *s, const struct ldc_sampl
         slope += normal[k] * d[k];
     }
     const double along = height / slope, own = slope > 0 ? (double)LDC_OWN_BEHIND : (double)LDC_OWN_BEFORE;
-    struct crossing c = {.distance = along * s->cell / size};
+    struct intersection c = {.distance = along * s->cell / size};
     c.beyond = fmax(fabs(along * d[iu] - to[iu]), fabs(along * d[iv] - to[iv])) - 0.5;
     c.is_in_cube = along * d[axis] + o[axis] > 0 && along * d[axis] + o[axis] < n;
     c.is_own = along < (double)LDC_OWN_WAY - ROUNDING && fabs(height) < own - ROUNDING;
@@ -81,7 +82,7 @@ static struct verdict judge(const struct fixture *fixture, const struct ray *ray
     for (int which = 0; which < LDC_CUBES_MAX; which++) {
         const struct ldc_samples *s = &fixture->samples[which];
         for (size_t i = 0; i < s->count; i++) {
-            const struct crossing c = cross(s, &s->list[i], ray);
+            const struct intersection c = cross(s, &s->list[i], ray);
             const double margin = fabs(ROUNDING / cells_of(s, ray, 1));
             if (!(c.distance > t_min - margin && c.distance < t_max + margin))
                 continue;
@@ -94,9 +95,9 @@ static struct verdict judge(const struct fixture *fixture, const struct ray *ray
     return verdict;
 }
 
-/* A crossing that was found is one, and there is no nearer one. */
-static void expect_crossing(const struct fixture *fixture, const struct ray *ray, const struct hit *hit,
-                            const struct verdict *verdict, const char *form, uint32_t number)
+/* An intersection that was found is one, and there is no nearer one. */
+static void expect_intersection(const struct fixture *fixture, const struct ray *ray, const struct hit *hit,
+                                const struct verdict *verdict, const char *form, uint32_t number)
 {
     if (hit->distance < 0) {
         if (verdict->nearest_sure < INFINITY)
@@ -109,7 +110,7 @@ static void expect_crossing(const struct fixture *fixture, const struct ray *ray
     const struct ldc_samples *s = &fixture->samples[is_dynamic ? LDC_CUBE_DYNAMIC : LDC_CUBE_STATIC];
     const size_t index = hit->primitive - (is_dynamic ? behind : 0);
     assert_true(index < s->count);
-    const struct crossing c = cross(s, &s->list[index], ray);
+    const struct intersection c = cross(s, &s->list[index], ray);
     /* A plane that is nearly along the ray multiplies what is rounded. */
     const double wrong = fabs(cells_of(s, ray, hit->distance - c.distance));
     if (!(c.beyond < (double)LDC_SLACK + 0.01 && !c.is_own && wrong < 0.05))
@@ -138,7 +139,7 @@ static void expect_like_brute_force(struct fixture *fixture, const struct ray *r
         }
         trace(fixture, &forms[f].options, WAVE_CLOSEST, rays, count, hits, NULL);
         for (uint32_t i = 0; i < count; i++)
-            expect_crossing(fixture, &rays[i], &hits[i], &verdicts[i], forms[f].name, i);
+            expect_intersection(fixture, &rays[i], &hits[i], &verdicts[i], forms[f].name, i);
         trace(fixture, &forms[f].options, WAVE_ANY, rays, count, NULL, visibility);
         for (uint32_t i = 0; i < count; i++)
             if (visibility[i] == 0 ? !verdicts[i].may_hit : verdicts[i].nearest_sure < INFINITY)
