@@ -11,7 +11,7 @@
 struct abuffer_found {
     float end; // in lengths of the direction
 #ifdef ANY_HIT
-    vec3 taken;
+    vec3 optical_depth;
 #ifdef HAS_TRANSLUCENT
     crossed_surfaces crossed;
 #endif
@@ -34,22 +34,22 @@ void offer_sample(trace_ray r, inout abuffer_found found, int sample_index, floa
 #ifdef HAS_TRANSLUCENT
     candidate c = candidate_of_sample(sample_index, distance_);
     c.barycentrics = nearest_barycentrics(c, r.origin, r.direction);
-    cross_surface(found.crossed, found.taken, material_index_of(c), distance_, side, near,
+    cross_surface(found.crossed, found.optical_depth, material_index_of(c), distance_, side, near,
                   transmittance_of(c, r.origin, r.direction, 0.0));
-    if (least(found.taken) >= TAKEN_BLACK)
+    if (least(found.optical_depth) >= OPTICAL_DEPTH_BLACK)
         found.end = -1.0;
 #else
-    found.taken = vec3(TAKEN_ALL);
+    found.optical_depth = vec3(OPTICAL_DEPTH_MAX);
     found.end = -1.0;
 #endif
 }
 
-abuffer_found found_of(trace_ray r, vec3 taken)
+abuffer_found found_of(trace_ray r, vec3 optical_depth)
 {
 #ifdef HAS_TRANSLUCENT
-    return abuffer_found(r.t_max, taken, crossed_nothing());
+    return abuffer_found(r.t_max, optical_depth, crossed_nothing());
 #else
-    return abuffer_found(r.t_max, taken);
+    return abuffer_found(r.t_max, optical_depth);
 #endif
 }
 

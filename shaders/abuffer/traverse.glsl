@@ -26,12 +26,12 @@ void traverse_ray(trace_ray r, inout abuffer_found found)
 // Called by trace/wave.comp.
 #ifdef ANY_HIT
 
-bool trace_any(trace_ray r, inout vec3 taken)
+bool trace_any(trace_ray r, inout vec3 optical_depth)
 {
-    abuffer_found found = found_of(r, taken);
+    abuffer_found found = found_of(r, optical_depth);
     traverse_ray(r, found);
-    taken = found.taken;
-    return least(taken) >= TAKEN_BLACK;
+    optical_depth = found.optical_depth;
+    return least(optical_depth) >= OPTICAL_DEPTH_BLACK;
 }
 
 #else

@@ -4,7 +4,7 @@
 //
 // Rounding, with u = 2^-24. A box's plane b is crossed at b i - o i, i = 1 / d: the reciprocal errs by 1 u (2.5 u on
 // hardware), each product by 1 u, the difference by 1 u, which moves the plane by at most 5 u (|b| + |o|). The
-// intersection of the primitive itself errs by about as much (corners are taken relative to the origin), and a sphere's
+// intersection of the primitive itself errs by about as much (corners are relative to the origin), and a sphere's
 // distance from the line by less than 8 u of the same. The part of b is in the bounds: the builder pads them by
 // BVH_PAD_RELATIVE = 8 u of their magnitude, and on a grid by 8 u of its cells. The part of o is the slack of the ray:
 // OBJECT_SLACK |o| with 16 u, on a grid of |o| + |the grid's corner|, to which it is relative. In the top tree the ray

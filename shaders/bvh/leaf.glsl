@@ -58,7 +58,7 @@ void offer(inout trace_ray r, candidate c, inout answer found)
 {
 #ifdef ANY_HIT
     if (offer_any(r, c, found)) {
-        found = vec3(TAKEN_ALL);
+        found = vec3(OPTICAL_DEPTH_MAX);
         put_out(r);
     }
 #elif defined BVH_DEFORMS

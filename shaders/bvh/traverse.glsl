@@ -20,7 +20,7 @@
 // Answers do not depend on the top tree: a refitted and a rebuilt one give the same to the bit. The intersection with a
 // primitive depends on the ray and the packet's leading ray alone (leaf.glsl); of instances at one distance the first
 // by number is hit (favour_instance), within one the first in the order of its tree, which is that of its shape (with
-// BVH_DEFORMS: the first by number, is_before); optical depths are summed exactly (taken_by).
+// BVH_DEFORMS: the first by number, is_before); optical depths are summed exactly (optical_depth_of).
 //
 // Three loops in one another: elements until a leaf, leaves until an instance is entered or left, instances. All
 // invocations of a SIMD group first find their leaf, then all test primitives (the paper's PROCESSGEOMETRY): software
@@ -354,13 +354,13 @@ void trace_together(inout trace_ray r[RAYS_TOGETHER], inout answer found[RAYS_TO
 #if RAYS_TOGETHER == 1
 
 #ifdef ANY_HIT
-bool trace_any(trace_ray r, inout vec3 taken)
+bool trace_any(trace_ray r, inout vec3 optical_depth)
 {
     trace_ray packet[RAYS_TOGETHER] = trace_ray[RAYS_TOGETHER](r);
-    vec3 found[RAYS_TOGETHER] = vec3[RAYS_TOGETHER](taken);
+    vec3 found[RAYS_TOGETHER] = vec3[RAYS_TOGETHER](optical_depth);
     trace_together(packet, found);
-    taken = found[0];
-    return least(taken) >= TAKEN_BLACK;
+    optical_depth = found[0];
+    return least(optical_depth) >= OPTICAL_DEPTH_BLACK;
 }
 #else
 void trace_closest(trace_ray r, inout candidate best)

@@ -52,40 +52,41 @@ void offer_closest(trace_ray r, candidate found, inout candidate best)
 // The optical depth of a shadow ray so far, per channel: -log2 of the transmittance in steps of 2^-19, as whole numbers
 // in floats. Their sums are exact, so the answer does not depend on the order of the surfaces, as a product of floats
 // would.
-const float TAKEN_STEPS = 524288.0;
-const float TAKEN_ALL = 8388607.0;   // the maximum: twice as much is still a whole number in a float
-const float TAKEN_BLACK = 4715632.0; // the 8-bit answer rounds to black: transmittance 0.5 / 255
+const float OPTICAL_DEPTH_STEPS = 524288.0;
+const float OPTICAL_DEPTH_MAX = 8388607.0;   // the maximum: twice as much is still a whole number in a float
+const float OPTICAL_DEPTH_BLACK = 4715632.0; // the 8-bit answer rounds to black: transmittance 0.5 / 255
 
-vec3 taken_by(vec3 transmittance)
+vec3 optical_depth_of(vec3 transmittance)
 {
 #ifdef HAS_TRANSLUCENT
-    vec3 taken = min(round(-TAKEN_STEPS * log2(max(transmittance, vec3(1e-5)))), vec3(TAKEN_ALL));
-    return mix(taken, vec3(0.0), greaterThanEqual(transmittance, vec3(1.0)));
+    vec3 optical_depth = min(round(-OPTICAL_DEPTH_STEPS * log2(max(transmittance, vec3(1e-5)))), vec3(OPTICAL_DEPTH_MAX));
+    return mix(optical_depth, vec3(0.0), greaterThanEqual(transmittance, vec3(1.0)));
 #else
-    return TAKEN_ALL * (1.0 - transmittance); // 0 or 1
+    return OPTICAL_DEPTH_MAX * (1.0 - transmittance); // 0 or 1
 #endif
 }
 
-vec3 transmittance_left(vec3 taken)
+vec3 transmittance_left(vec3 optical_depth)
 {
 #ifdef HAS_TRANSLUCENT
-    return least(taken) >= TAKEN_BLACK ? vec3(0.0) : exp2(-taken / TAKEN_STEPS);
+    return least(optical_depth) >= OPTICAL_DEPTH_BLACK ? vec3(0.0) : exp2(-optical_depth / OPTICAL_DEPTH_STEPS);
 #else
-    return vec3(taken.x == 0.0 ? 1.0 : 0.0);
+    return vec3(optical_depth.x == 0.0 ? 1.0 : 0.0);
 #endif
 }
 
 // Any hit: true if no light is left and the ray is finished. A surface counts once for each intersection, so no
 // primitive may be offered twice to one ray.
-bool offer_any(trace_ray r, candidate found, inout vec3 taken)
+bool offer_any(trace_ray r, candidate found, inout vec3 optical_depth)
 {
     if (!(found.distance > r.t_min && found.distance < r.t_max))
         return false;
 #if defined HAS_CUTOUT || defined HAS_TRANSLUCENT
-    taken = min(taken + taken_by(transmittance_of(found, r.origin, r.direction, time_of(r))), vec3(TAKEN_ALL));
-    return least(taken) >= TAKEN_BLACK;
+    vec3 transmittance = transmittance_of(found, r.origin, r.direction, time_of(r));
+    optical_depth = min(optical_depth + optical_depth_of(transmittance), vec3(OPTICAL_DEPTH_MAX));
+    return least(optical_depth) >= OPTICAL_DEPTH_BLACK;
 #else
-    taken = vec3(TAKEN_ALL);
+    optical_depth = vec3(OPTICAL_DEPTH_MAX);
     return true;
 #endif
 }
@@ -113,10 +114,10 @@ void visit_triangle_closest(trace_ray r, object_ray o, uint primitive, uint inst
         offer_closest(r, found, best);
 }
 
-bool visit_triangle_any(trace_ray r, object_ray o, uint primitive, uint instance_index, inout vec3 taken)
+bool visit_triangle_any(trace_ray r, object_ray o, uint primitive, uint instance_index, inout vec3 optical_depth)
 {
     candidate found;
-    return cross_triangle(r, o, primitive, instance_index, found) && offer_any(r, found, taken);
+    return cross_triangle(r, o, primitive, instance_index, found) && offer_any(r, found, optical_depth);
 }
 
 void visit_sphere_closest(trace_ray r, object_ray o, uint primitive, uint instance_index, inout candidate best)
@@ -131,7 +132,7 @@ void visit_sphere_closest(trace_ray r, object_ray o, uint primitive, uint instan
     }
 }
 
-bool visit_sphere_any(trace_ray r, object_ray o, uint primitive, uint instance_index, inout vec3 taken)
+bool visit_sphere_any(trace_ray r, object_ray o, uint primitive, uint instance_index, inout vec3 optical_depth)
 {
     vec4 sphere = texelFetch(spheres, int(primitive));
     vec2 distances;
@@ -139,7 +140,7 @@ bool visit_sphere_any(trace_ray r, object_ray o, uint primitive, uint instance_i
         return false;
     for (int side = 0; side < 2; side++) {
         float distance = side == 0 ? distances.x : distances.y;
-        if (offer_any(r, candidate(distance, primitive, instance_index, vec2(0.0)), taken))
+        if (offer_any(r, candidate(distance, primitive, instance_index, vec2(0.0)), optical_depth))
             return true;
     }
     return false;

@@ -18,9 +18,9 @@ crossed_surfaces crossed_nothing()
 
 // A surface that transmits `through` of the light is intersected at a distance; `side` is positive if the ray comes
 // from behind. Samples of one surface overlap by the slack, and where images meet by up to a cell: `near`. Adds its
-// optical depth to `taken`, if it is not one of the last, or is opaque.
-void cross_surface(inout crossed_surfaces crossed, inout vec3 taken, uint material_index, float distance_, float side,
-                   float near, vec3 through)
+// own to `optical_depth`, if it is not one of the last, or is opaque.
+void cross_surface(inout crossed_surfaces crossed, inout vec3 optical_depth, uint material_index, float distance_,
+                   float side, float near, vec3 through)
 {
     float signed_ = side > 0.0 ? distance_ : -distance_;
     bvec4 same = lessThan(abs(crossed.distances - signed_), vec4(near));
@@ -29,5 +29,5 @@ void cross_surface(inout crossed_surfaces crossed, inout vec3 taken, uint materi
         return;
     crossed.distances = vec4(signed_, crossed.distances.xyz);
     crossed.materials = uvec4(material_index, crossed.materials.xyz);
-    taken = min(taken + taken_by(through), vec3(TAKEN_ALL));
+    optical_depth = min(optical_depth + optical_depth_of(through), vec3(OPTICAL_DEPTH_MAX));
 }

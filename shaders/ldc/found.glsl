@@ -11,7 +11,7 @@
 struct ldc_found {
     float end; // in lengths of the direction
 #ifdef ANY_HIT
-    vec3 taken;
+    vec3 optical_depth;
 #ifdef HAS_TRANSLUCENT
     crossed_surfaces crossed;
 #endif
@@ -44,22 +44,22 @@ void offer_sample(inout ldc_found found, uint sample_index, float distance_, flo
 {
 #ifdef HAS_TRANSLUCENT
     uvec4 words = texelFetch(ldc_surface, int(sample_index));
-    cross_surface(found.crossed, found.taken, sample_material(words), distance_, side, near,
+    cross_surface(found.crossed, found.optical_depth, sample_material(words), distance_, side, near,
                   transmittance_of_sample(words));
-    if (least(found.taken) >= TAKEN_BLACK)
+    if (least(found.optical_depth) >= OPTICAL_DEPTH_BLACK)
         found.end = -1.0;
 #else
-    found.taken = vec3(TAKEN_ALL);
+    found.optical_depth = vec3(OPTICAL_DEPTH_MAX);
     found.end = -1.0;
 #endif
 }
 
-ldc_found ldc_found_of(trace_ray r, vec3 taken)
+ldc_found ldc_found_of(trace_ray r, vec3 optical_depth)
 {
 #ifdef HAS_TRANSLUCENT
-    return ldc_found(r.t_max, taken, crossed_nothing());
+    return ldc_found(r.t_max, optical_depth, crossed_nothing());
 #else
-    return ldc_found(r.t_max, taken);
+    return ldc_found(r.t_max, optical_depth);
 #endif
 }
 

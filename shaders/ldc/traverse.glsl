@@ -30,7 +30,7 @@ const int LDC_PASSES = 3 * LDC_CUBES;
 void settle(ldc_found found, inout answer a)
 {
 #ifdef ANY_HIT
-    a = found.taken;
+    a = found.optical_depth;
 #else
 #ifdef LDC_COUNT_STEPS
     a = candidate(float(ldc_counts.x), ldc_counts.z, ldc_counts.y, vec2(0.0));
@@ -75,13 +75,13 @@ void traverse_rays(trace_ray rays_[RAYS_TOGETHER], inout answer answers[RAYS_TOG
 #if RAYS_TOGETHER > 1
 
 #ifdef ANY_HIT
-void trace_any_together(trace_ray r[RAYS_TOGETHER], inout vec3 taken[RAYS_TOGETHER])
+void trace_any_together(trace_ray r[RAYS_TOGETHER], inout vec3 optical_depth[RAYS_TOGETHER])
 #else
 void trace_closest_together(trace_ray r[RAYS_TOGETHER], inout candidate best[RAYS_TOGETHER])
 #endif
 {
 #ifdef ANY_HIT
-    traverse_rays(r, taken);
+    traverse_rays(r, optical_depth);
 #else
     traverse_rays(r, best);
 #endif
@@ -89,13 +89,13 @@ void trace_closest_together(trace_ray r[RAYS_TOGETHER], inout candidate best[RAY
 
 #elif defined ANY_HIT
 
-bool trace_any(trace_ray r, inout vec3 taken)
+bool trace_any(trace_ray r, inout vec3 optical_depth)
 {
     trace_ray rays_[1] = trace_ray[1](r);
-    vec3 answers[1] = vec3[1](taken);
+    vec3 answers[1] = vec3[1](optical_depth);
     traverse_rays(rays_, answers);
-    taken = answers[0];
-    return least(taken) >= TAKEN_BLACK;
+    optical_depth = answers[0];
+    return least(optical_depth) >= OPTICAL_DEPTH_BLACK;
 }
 
 #else

@@ -6,7 +6,7 @@
 uniform uint instance_count;
 
 #ifdef ANY_HIT
-bool trace_any(trace_ray r, inout vec3 taken)
+bool trace_any(trace_ray r, inout vec3 optical_depth)
 {
     for (uint i = 0u; i < instance_count; i++) {
         object_ray o = object_from_world_ray(r, i);
@@ -14,12 +14,12 @@ bool trace_any(trace_ray r, inout vec3 taken)
         for (uint p = g.first_primitive; p < g.first_primitive + g.primitive_count; p++) {
 #ifdef HAS_SPHERES
             if (g.kind == GEOMETRY_SPHERES) {
-                if (visit_sphere_any(r, o, p, i, taken))
+                if (visit_sphere_any(r, o, p, i, optical_depth))
                     return true;
                 continue;
             }
 #endif
-            if (visit_triangle_any(r, o, p, i, taken))
+            if (visit_triangle_any(r, o, p, i, optical_depth))
                 return true;
         }
     }

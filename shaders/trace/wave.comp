@@ -16,14 +16,14 @@
 //
 // A traverse.glsl defines one of these, for ANY_HIT or not, and for RAYS_TOGETHER 1 or more:
 //   void trace_closest(trace_ray r, inout candidate best);
-//   bool trace_any(trace_ray r, inout vec3 taken);
+//   bool trace_any(trace_ray r, inout vec3 optical_depth);
 //   void trace_closest_together(trace_ray r[RAYS_TOGETHER], inout candidate best[RAYS_TOGETHER]);
-//   void trace_any_together(trace_ray r[RAYS_TOGETHER], inout vec3 taken[RAYS_TOGETHER]);
+//   void trace_any_together(trace_ray r[RAYS_TOGETHER], inout vec3 optical_depth[RAYS_TOGETHER]);
 // It does not include this file; it includes common/candidate.glsl, whose visit_* and offer_* functions take a
 // primitive against a ray with cutouts and tints accounted for. A traversal that intersects by its own means calls
 // offer_closest / offer_any with what it found, or where the scene has neither cutouts nor translucent surfaces
 // (no define) may compare distances itself. `best.distance` starts at the ray's end, or at the nearest disc.
-// `taken` is what offer_any adds to; trace_any returns true, and may stop, once offer_any did: no light is left.
+// offer_any adds to `optical_depth`; trace_any returns true, and may stop, once offer_any did: no light is left.
 //
 // This file handles all else: discs, dead rays (t_max <= t_min), rays beyond the wave's end, and writing the answer: a
 // visibility, or an intersection (shared/hit.h) of which surface.comp makes a hit. Some rays of a packet may be dead:
@@ -86,23 +86,23 @@ trace_ray load_ray(uint ray_index)
 
 #ifdef ANY_HIT
 
-bool discs_any(trace_ray r, inout vec3 taken)
+bool discs_any(trace_ray r, inout vec3 optical_depth)
 {
     for (uint i = 0u; i < disc_count; i++) {
         candidate found = candidate(0.0, i, HIT_NO_PRIMITIVE, vec2(0.0));
         disc d = discs[i];
         if (intersect_disc(r.origin, r.direction, d.centre_radius.xyz, d.normal.xyz, d.centre_radius.w,
                            found.distance) &&
-            offer_any(r, found, taken))
+            offer_any(r, found, optical_depth))
             return true;
     }
     return false;
 }
 
 // Nothing stops a dead ray.
-void store_visibility(uint ray_index, vec3 taken)
+void store_visibility(uint ray_index, vec3 optical_depth)
 {
-    vec3 left = transmittance_left(taken);
+    vec3 left = transmittance_left(optical_depth);
     if (ray_index < ray_count)
         visibilities[ray_index] = packUnorm4x8(vec4(left, greatest(left) > 0.0 ? 1.0 : 0.0));
 }
@@ -125,7 +125,8 @@ void store_intersection(uint ray_index, candidate best)
     if (ray_index >= ray_count)
         return;
     float distance_ = best.primitive == HIT_NO_PRIMITIVE ? -1.0 : best.distance;
-    imageStore(intersections, int(3u * ray_index), uvec4(floatBitsToUint(distance_), 0u, best.primitive, best.instance_index));
+    imageStore(intersections, int(3u * ray_index),
+               uvec4(floatBitsToUint(distance_), 0u, best.primitive, best.instance_index));
 }
 
 #endif
@@ -139,10 +140,10 @@ void main()
         return;
     trace_ray r = load_ray(ray_index);
 #ifdef ANY_HIT
-    vec3 taken = vec3(0.0);
-    if (is_alive(r) && (discs_any(r, taken) || trace_any(r, taken)))
-        taken = vec3(TAKEN_ALL);
-    store_visibility(ray_index, taken);
+    vec3 optical_depth = vec3(0.0);
+    if (is_alive(r) && (discs_any(r, optical_depth) || trace_any(r, optical_depth)))
+        optical_depth = vec3(OPTICAL_DEPTH_MAX);
+    store_visibility(ray_index, optical_depth);
 #else
     candidate best = candidate_none(r.t_max);
     if (is_alive(r)) {
@@ -177,7 +178,7 @@ void look_at_discs(inout trace_ray r[RAYS_TOGETHER], inout found_type found[RAYS
         if (is_alive(r_i)) {
 #ifdef ANY_HIT
             if (discs_any(r_i, found_i)) {
-                found_i = vec3(TAKEN_ALL);
+                found_i = vec3(OPTICAL_DEPTH_MAX);
                 r_i.t_max = -1.0; // nothing can be hit any more
                 r_i.t_min = 0.0;
             }

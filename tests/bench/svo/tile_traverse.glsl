@@ -67,16 +67,16 @@ int first_leaf_of(trace_ray r, out float distance_)
 }
 
 #ifdef ANY_HIT
-bool trace_any(trace_ray r, inout vec3 taken)
+bool trace_any(trace_ray r, inout vec3 optical_depth)
 {
     float distance_;
     int leaf = first_leaf_of(r, distance_);
     if (leaf < 0)
         return false;
 #ifdef HAS_TRANSLUCENT
-    return offer_any(r, candidate_of(leaf, distance_), taken); // only the first: enough for what is compared
+    return offer_any(r, candidate_of(leaf, distance_), optical_depth); // only the first: enough for what is compared
 #else
-    taken = vec3(TAKEN_ALL);
+    optical_depth = vec3(OPTICAL_DEPTH_MAX);
     return true;
 #endif
 }

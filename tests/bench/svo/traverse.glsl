@@ -172,7 +172,7 @@ bool is_hit(svo_traversal w, int leaf, out float distance_)
 #endif
 }
 
-// Cells side by side are taken to be one surface, which takes of the light once.
+// Adjacent cells count as one surface, which attenuates the light once.
 bool is_other_surface(float t, float left_at)
 {
 #ifdef SVO_PLANES
@@ -183,7 +183,7 @@ bool is_other_surface(float t, float left_at)
 }
 
 #ifdef ANY_HIT
-bool trace_any(trace_ray r, inout vec3 taken)
+bool trace_any(trace_ray r, inout vec3 optical_depth)
 {
     svo_traversal w;
     if (!begin(r, w))
@@ -196,10 +196,10 @@ bool trace_any(trace_ray r, inout vec3 taken)
         float distance_;
         if (is_hit(w, leaf, distance_)) {
 #ifdef HAS_TRANSLUCENT
-            if (is_other_surface(w.t, left_at) && offer_any(r, candidate_of(leaf, distance_), taken))
+            if (is_other_surface(w.t, left_at) && offer_any(r, candidate_of(leaf, distance_), optical_depth))
                 return true;
 #else
-            taken = vec3(TAKEN_ALL);
+            optical_depth = vec3(OPTICAL_DEPTH_MAX);
             return true;
 #endif
         }

@@ -11,7 +11,7 @@ uint toy_instance(uint i)
 }
 
 #ifdef ANY_HIT
-bool trace_any(trace_ray r, inout vec3 taken)
+bool trace_any(trace_ray r, inout vec3 optical_depth)
 {
     for (uint k = 0u; k < instance_count; k++) {
         uint i = toy_instance(k);
@@ -20,12 +20,12 @@ bool trace_any(trace_ray r, inout vec3 taken)
         for (uint p = g.first_primitive; p < g.first_primitive + g.primitive_count; p++) {
 #ifdef HAS_SPHERES
             if (g.kind == GEOMETRY_SPHERES) {
-                if (visit_sphere_any(r, o, p, i, taken))
+                if (visit_sphere_any(r, o, p, i, optical_depth))
                     return true;
                 continue;
             }
 #endif
-            if (visit_triangle_any(r, o, p, i, taken))
+            if (visit_triangle_any(r, o, p, i, optical_depth))
                 return true;
         }
     }
