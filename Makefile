@@ -255,10 +255,6 @@ CONTRACT := $(B)/tests/tracers/test_contract
 CONTRACT_OBJ := $(call obj,$(filter-out tests/tracers/test_%,$(wildcard tests/tracers/*.c $(EXTRA_TRACER:%=%/row.c))))
 $(CONTRACT): %: %.o $(CONTRACT_OBJ) $(SERVER_OBJ) $(PROTOCOL_OBJ) $(LIB_OBJ)
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(TEST_LIBS) -o $@
-# Programs of the benchmark; the rest of its folder is what they share. They hold us against Embree itself.
-BENCHES := $(addprefix $(B)/tests/bench/,bench_bvh bench_changes bench_forms bench_parallel bench_tracers)
-$(BENCHES): %: %.o $(SERVER_OBJ) $(PROTOCOL_OBJ) $(LIB_OBJ)
-	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $(LINKED) $(TEST_LIBS) -lembree3 -o $@
 MODEL_OBJ := $(B)/tests/bench/load_model.o
 RIVAL_OBJ := $(call obj,$(addprefix tests/bench/svo,.c _build.c _tiles.c)) $(RIVAL_SOURCES)
 CONTEST_OBJ := $(MODEL_OBJ) $(call obj,$(addprefix tests/bench/bench_,contest.c embree.c scene.c sheets.c stats.c waves.c))
@@ -284,41 +280,16 @@ $(B)/tests/unit/corpus_tests: TEST_LIBS += $(SERVING_WRAP) $(READERS_LIBS) -lstd
 $(B)/tests/unit/media_tests: $(patsubst %,$(B)/client/viewer/%.o,camera decode heat hud input metrics paint panel pixmap replay settings tour window)
 $(B)/tests/unit/media_tests: TEST_LIBS += $(VIEWER_LIBS) -Wl,--wrap=libav_load
 $(B)/tests/unit/unit_tests: $(B)/client/import/closed.o $(MODEL_OBJ) $(RIVAL_OBJ) $(if $(filter 1,$(EMBREE)),$(CONTEST_OBJ))
-$(B)/tests/bench/bench_tracers: $(CONTEST_OBJ) $(B)/tests/bench/bench_options.o
-$(B)/tests/bench/bench_changes: $(B)/tests/bench/bench_stats.o
-$(B)/tests/bench/bench_forms: $(CONTEST_OBJ) $(RIVAL_OBJ) $(call obj,$(addprefix tests/bench/bench_,forms_frames.c forms_parse.c forms_rays.c forms_samples.c options.c) tests/bench/plain_pass.c)
-$(B)/tests/bench/bench_parallel: $(CONTEST_OBJ)
-$(B)/tests/bench/bench_bvh: $(MODEL_OBJ) $(B)/tests/bench/bench_scene.o $(B)/tests/bench/bench_sheets.o $(B)/tests/bench/bench_waves.o
-BENCH_PROGRAMS := $(BENCHES) $(B)/tests/bench/embree_build
-# Whole frames, beside nothing of Embree's.
-BENCH_DISTRIBUTED := $(B)/tests/bench/bench_distributed
-$(BENCH_DISTRIBUTED): %: %.o $(B)/tests/bench/paper_scene.o $(SERVER_OBJ) $(PROTOCOL_OBJ) $(LIB_OBJ)
-	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(TEST_LIBS) -o $@
-# So are their steps.
-BENCH_STEPS := $(B)/tests/bench/bench_steps
-$(BENCH_STEPS): %: %.o $(MODEL_OBJ) $(call obj,$(addprefix tests/bench/bench_,options.c scene.c sheets.c waves.c)) $(SERVER_OBJ) $(PROTOCOL_OBJ) $(LIB_OBJ)
-	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(TEST_LIBS) -o $@
-BENCH_CANCEL := $(B)/tests/bench/bench_cancel
-$(BENCH_CANCEL): %: %.o $(PROTOCOL_OBJ) $(LIB_OBJ)
-	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(CLIENT_LIBS) -o $@
-# What sealing costs.
-BENCH_LINK := $(B)/tests/bench/bench_link
-$(BENCH_LINK): %: %.o $(SERVER_OBJ) $(PROTOCOL_OBJ) $(LIB_OBJ)
-	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(TEST_LIBS) -o $@
-# What somebody waits for who looks at a view; and a link to look over.
-BENCH_VIEW := $(addprefix $(B)/tests/bench/,bench_view shaped_link)
-$(B)/tests/bench/bench_view: $(call obj,tests/bench/bench_view.c $(addprefix client/viewer/,camera.c decode.c pixmap.c)) $(PROTOCOL_OBJ) $(LIB_OBJ)
-	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(VIEWER_LIBS) -o $@
-$(B)/tests/bench/shaped_link: $(B)/tests/bench/shaped_link.o
+# Measurements of the benchmark register themselves (tests/bench/bench.h). Those that hold us against Embree need it.
+EMBREE_BENCH_SRC := $(addprefix tests/bench/,embree_build.c $(addprefix bench_,contest.c embree.c forms.c forms_frames.c forms_parse.c forms_rays.c forms_samples.c parallel.c tracers.c))
+BENCH_SRC := $(filter-out tests/bench/shaped_link.c $(if $(filter 0,$(EMBREE)),$(EMBREE_BENCH_SRC)),$(wildcard tests/bench/*.c))
+BENCH_PROGRAM := $(B)/tests/bench/bench
+$(BENCH_PROGRAM): $(call obj,$(BENCH_SRC) $(addprefix client/viewer/,camera.c decode.c pixmap.c)) $(RIVAL_SOURCES) $(SERVER_OBJ) $(PROTOCOL_OBJ) $(LIB_OBJ)
+	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $(LINKED) $(TEST_LIBS) $(VIEWER_LIBS) -o $@
+# A link to look over.
+SHAPED_LINK := $(B)/tests/bench/shaped_link
+$(SHAPED_LINK): %: %.o
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ -o $@
-# EMBREE=0 leaves out what cannot be built without it.
-ifeq ($(EMBREE),0)
-BENCH_PROGRAMS :=
-endif
-
-# The yardstick of the one-shot command: reading a file and Embree's build of it.
-$(B)/tests/bench/embree_build: $(B)/tests/bench/embree_build.o $(filter $(B)/server/base/%,$(SERVER_OBJ)) $(COMMON_OBJ)
-	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(call pkg_libs,libsodium) -lembree3 -o $@
 
 # The generator of the bundled scenes.
 TOOLS_OBJ := $(patsubst %,$(B)/tests/tools/%.o,make_scenes animated_scene animated_parts gltf_writer glb shape)
@@ -345,7 +316,7 @@ COVERAGE_PACKAGES := gcovr
 FUZZ_PACKAGES := clang libclang-rt-14-dev
 
 .PHONY: tests build-packages test-packages lint-packages analyze-packages coverage-packages fuzz-packages test test-long demo bench soak bench-plot check-headers check-rules lint check analyze coverage format install uninstall clean distclean help
-tests: $(TEST_PROGRAMS) $(CONTRACT) $(BENCH_PROGRAMS) $(BENCH_DISTRIBUTED) $(BENCH_STEPS) $(BENCH_CANCEL) $(BENCH_LINK) $(BENCH_VIEW) $(B)/tests/tools/make_scenes $(B)/tests/tools/pose_dump $(LOSING_DAEMON)
+tests: $(TEST_PROGRAMS) $(CONTRACT) $(BENCH_PROGRAM) $(SHAPED_LINK) $(B)/tests/tools/make_scenes $(B)/tests/tools/pose_dump $(LOSING_DAEMON)
 
 build-packages:
 	@tests/tools/install_packages.sh $(BUILD_PACKAGES)
@@ -373,7 +344,7 @@ demo: build-packages
 	$(MAKE) -j$(JOBS) all $(B)/tests/tools/make_scenes
 	tests/tools/demo.sh $(B) out $(FAST)
 # The programs that are measured, and those that measure.
-BENCHED = all $(BENCHES) $(BENCH_DISTRIBUTED) $(BENCH_STEPS) $(BENCH_CANCEL) $(BENCH_LINK) $(BENCH_VIEW) $(B)/tests/bench/embree_build $(B)/tests/tools/make_scenes
+BENCHED = all $(BENCH_PROGRAM) $(SHAPED_LINK) $(B)/tests/tools/make_scenes
 bench: test-packages
 	$(MAKE) -j$(JOBS) $(BENCHED)
 	python3 tests/bench/bench.py $(B) $(BENCH)

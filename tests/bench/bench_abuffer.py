@@ -2,7 +2,7 @@
 """The part `abuffer` of the benchmark: voxels and A-buffers next to what their paper has ('Ray Tracing via GPU
 Rasterization'), beside `bvh`, and beside a sparse voxel octree of the same precision (tests/bench/svo). Its JSON:
 
-  searches    the paper's figure 6: model, how (mirrors, glass, ao), `frames` and `waves`, results of bench_forms, the waves
+  searches    the paper's figure 6: model, how (mirrors, glass, ao), `frames` and `waves`, results of `bench forms`, the waves
               None where an earlier one of the model has them: dda, linear3, linear1, bvh
   rays        result of frames: ambient occlusion with more and more rays a pixel
   builds      results of builds: the structure beside a pass for depths alone, at two resolutions
@@ -11,7 +11,7 @@ Rasterization'), beside `bvh`, and beside a sparse voxel octree of the same prec
   voxels      result of frames: voxels along a side, in a room
   wanted      rows as in bench_reach.py
 
-A result is what bench_forms prints (its head says what), with "title" added. Octrees: svo-tiles is as it was published,
+A result is what `bench forms` prints (its head says what), with "title" added. Octrees: svo-tiles is as it was published,
 svo-cells the same answers faster, svo-planes nearer ones.
 """
 from bench_common import KITCHEN_VIEW, figure, paired_ratio

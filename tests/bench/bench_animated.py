@@ -22,7 +22,7 @@ FRAME_STAGES = ("primary", "trace", "shade", "resolve", "readback")
 
 def run_json(bench, name, *arguments):
     """What a program prints; a wrong answer (status 1 with something printed) is noted as a fault."""
-    full = list(map(str, (bench.program(f"tests/bench/{name}"), *arguments)))
+    full = list(map(str, (*bench.form(name), *arguments)))
     say("  " + " ".join([name, *map(str, arguments)]))
     result = subprocess.run(full, stdout=subprocess.PIPE, text=True, check=False)
     if not result.stdout:
@@ -40,7 +40,7 @@ def met(is_met):
 
 
 def measure_parallel(bench):
-    return {"results": [run_json(bench, "bench_parallel", n, bench.times(5)) for n in ((1000,) if bench.tiny else (1800, 146000))]}
+    return {"results": [run_json(bench, "parallel", n, bench.times(5)) for n in ((1000,) if bench.tiny else (1800, 146000))]}
 
 
 def beside_one(result, order, bounds):
@@ -78,7 +78,7 @@ def show_parallel(data):
 
 
 def measure_instances(bench):
-    return run_json(bench, "bench_changes", "instances", *((20, 2) if bench.tiny else (1000, bench.times(15))))
+    return run_json(bench, "changes", "instances", *((20, 2) if bench.tiny else (1000, bench.times(15))))
 
 
 def show_instances(data):
@@ -92,7 +92,7 @@ def show_instances(data):
 
 
 def measure_refit(bench):
-    return run_json(bench, "bench_changes", "refit", *((2000, 2) if bench.tiny else (100000, bench.times(25))))
+    return run_json(bench, "changes", "refit", *((2000, 2) if bench.tiny else (100000, bench.times(25))))
 
 
 def show_refit(data):

@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /* The forms of the tracer `bvh` side by side: rays a second of the walk alone, build time, memory.
- * Usage: bench_bvh [TRIANGLES ..]     (default: 5000 37000 146000 590000)
+ * Usage: bench bvh [TRIANGLES ..]     (default: 5000 37000 146000 590000)
  * Nine bumpy spheres on a floor, seen from above: waves of camera rays (8x8 tiles in Morton order) and of one
  * diffuse bounce from where these hit. Each figure is the median of RUNS after a warm-up, which also compiles.
  * Every form's hits are compared ray by ray with those of the first; exit status 1 if more than 0.01 % differ, or
  * GL reports an error. */
 #include "tests/accuracy/test_scenes.h"
+#include "tests/bench/bench.h"
 #include "tests/bench/bench_scene.h"
 
 #include "base/clock.h"
@@ -62,7 +63,7 @@ static void require(bool ok, const struct error *error)
 {
     if (ok)
         return;
-    fprintf(stderr, "bench_bvh: %s %s\n", error->field, error->text);
+    fprintf(stderr, "bench bvh: %s %s\n", error->field, error->text);
     exit(1);
 }
 
@@ -255,7 +256,7 @@ static bool bench_scene(struct gpu_device *device, uint32_t triangles)
     return !bench.failed;
 }
 
-int main(int argc, char **argv)
+BENCH(bvh)
 {
     static const uint32_t defaults[] = {5000, 37000, 146000, 590000};
     struct error error = {0};
@@ -269,7 +270,7 @@ int main(int argc, char **argv)
     for (int i = 1; i < argc; i++) {
         long triangles = strtol(argv[i], NULL, 10);
         if (triangles < 1 || triangles > 50000000) {
-            fprintf(stderr, "bench_bvh: %s: between 1 and 50000000 triangles\n", argv[i]);
+            fprintf(stderr, "bench bvh: %s: between 1 and 50000000 triangles\n", argv[i]);
             gpu_device_destroy(device);
             return 2;
         }

@@ -1,10 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /* How long a client waits for the answer to a cancel while its frame is rendered, over a socket.
- * Usage: bench_cancel ADDRESS MODEL [CANCELS [TRACER]]   (default: 20, tracer 0 of the protocol's)
+ * Usage: bench cancel ADDRESS MODEL [CANCELS [TRACER]]   (default: 20, tracer 0 of the protocol's)
  *
  * Path tracing at 1280x720 with 64 samples is asked for, and cancelled after something between 0.1 and 1 s, which
  * is far from its end. A small picture before brings the daemon the programs and the structure.
  * Prints JSON: {"cancels_ns": [..]}: from the call to the confirmed end. */
+#include "tests/bench/bench.h"
+
 #include "lib/farlight.h"
 #include "protocol/common/clock.h"
 
@@ -63,10 +65,10 @@ static bool measure(struct fl_scene *scene, enum protocol_tracer tracer, unsigne
     return true;
 }
 
-int main(int argc, char **argv)
+BENCH(cancel)
 {
     if (argc < 3) {
-        fputs("usage: bench_cancel ADDRESS MODEL [CANCELS [TRACER]]\n", stderr);
+        fputs("usage: bench cancel ADDRESS MODEL [CANCELS [TRACER]]\n", stderr);
         return 2;
     }
     const unsigned cancels = argc > 3 ? (unsigned)strtoul(argv[3], NULL, 10) : 20;
@@ -84,7 +86,7 @@ int main(int argc, char **argv)
     } else {
         char line[1200];
         fl_error_print(&error, line, sizeof line);
-        fprintf(stderr, "bench_cancel: %s\n", line);
+        fprintf(stderr, "bench cancel: %s\n", line);
     }
     fl_scene_destroy(scene);
     fl_connection_destroy(connection);

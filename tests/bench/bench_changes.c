@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 /* What a change of the scene costs the tracer `bvh`. One JSON object on standard output; bench.py makes the
- * tables. bench_changes instances [COUNT [FRAMES]]   all instances of a small mesh move each frame, 640x480 pixels
- *   bench_changes refit [TRIANGLES [RUNS]]     a mesh bends as a skin would bend it: its tree refitted, and
+ * tables. bench changes instances [COUNT [FRAMES]]   all instances of a small mesh move each frame, 640x480 pixels
+ *   bench changes refit [TRIANGLES [RUNS]]     a mesh bends as a skin would bend it: its tree refitted, and
  * rebuilt Exit status 1 if something fails or a refitted tree answers otherwise than one that is built for the
  * pose. */
 #include "tests/accuracy/test_scenes.h"
+#include "tests/bench/bench.h"
 #include "tests/bench/bench_stats.h"
 
 #include "base/clock.h"
@@ -25,7 +26,7 @@ static void require(bool ok, const struct error *error)
 {
     if (ok)
         return;
-    fprintf(stderr, "bench_changes: %s %s\n", error->field, error->text);
+    fprintf(stderr, "bench changes: %s %s\n", error->field, error->text);
     exit(1);
 }
 
@@ -293,15 +294,15 @@ static uint32_t number(int argc, char **argv, int i, uint32_t usual, uint32_t mo
     long value = strtol(argv[i], NULL, 10);
     if (value >= 1 && value <= (long)most)
         return (uint32_t)value;
-    fprintf(stderr, "bench_changes: %s: between 1 and %u\n", argv[i], most);
+    fprintf(stderr, "bench changes: %s: between 1 and %u\n", argv[i], most);
     exit(2);
 }
 
-int main(int argc, char **argv)
+BENCH(changes)
 {
     bool instances = argc > 1 && strcmp(argv[1], "instances") == 0, failed = false;
     if (argc < 2 || (!instances && strcmp(argv[1], "refit") != 0)) {
-        fprintf(stderr, "usage: bench_changes instances [COUNT [FRAMES]] | refit [TRIANGLES [RUNS]]\n");
+        fprintf(stderr, "usage: bench changes instances [COUNT [FRAMES]] | refit [TRIANGLES [RUNS]]\n");
         return 2;
     }
     uint32_t size = number(argc, argv, 2, instances ? 1000 : 100000, instances ? 50000 : 10000000);

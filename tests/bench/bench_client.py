@@ -96,7 +96,7 @@ def measure_oneshot(bench):
     if not models:
         return {"left_out": left_out}
     model = models[0][1]
-    yardstick = json.loads(command(bench.program("tests/bench/embree_build"), model, *glb_triangles(model)))
+    yardstick = json.loads(command(*bench.form("embree_build"), model, *glb_triangles(model)))
     runs = []
     with tempfile.TemporaryDirectory(prefix="farlight-bench-") as folder:
         for _ in range(1 + bench.times(3)):

@@ -32,6 +32,10 @@ class Bench:
     def program(self, name):
         return self.build / name
 
+    def form(self, name):
+        """The beginning of the command line of one measurement of the program `bench`."""
+        return self.program("tests/bench/bench"), name
+
     def times(self, usual):
         """How many runs, where `usual` is what is done when nobody asks for another number."""
         return self.runs or usual
@@ -147,8 +151,8 @@ def commit_name():
 
 
 def environment(bench):
-    """Where it was measured; the device as bench_tracers opens it."""
-    probe = json.loads(command(bench.program("tests/bench/bench_tracers"), "--family", "100", "--size", "8x8", "--waves",
+    """Where it was measured; the device as `bench tracers` opens it."""
+    probe = json.loads(command(*bench.form("tracers"), "--family", "100", "--size", "8x8", "--waves",
                                "primary", "--runs", "1", "--quick"))["environment"]
     return {"date": datetime.datetime.now(datetime.timezone.utc).isoformat(timespec="seconds"), "commit": commit_name(),
             "processor": processor_name(), "processors": len(os.sched_getaffinity(0)), **probe}

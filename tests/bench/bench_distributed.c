@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /* What a sample of distributed ray tracing costs beside a plain one, whole frames on the paper's kind of scene.
- * Usage: bench_distributed [--size WxH] [--runs N] [--picture FILE.ppm]
+ * Usage: bench distributed [--size WxH] [--runs N] [--picture FILE.ppm]
  *
  * The contenders take turns, run by run, after a warm-up. Prints JSON: {"scene": {primitives, width, height},
  * "forms": [{name, samples, primary_rays, shadow_rays, secondary_rays, "frame_ns": [..], "stages_ns": {stage:
  * [..]}}]}; times of the frame from begin to the pixels on the host, one a run. --picture also writes what the
  * last form shows. */
+#include "tests/bench/bench.h"
 #include "tests/bench/paper_scene.h"
 
 #include "base/clock.h"
@@ -99,7 +100,7 @@ static void write_picture(struct bench *bench)
     struct error error = {0};
     FILE *file = fopen(bench->picture, "wb");
     if (!file || !render(bench, &forms[FORM_WHOLE], &result, &error)) {
-        fprintf(stderr, "bench_distributed: %s cannot be written\n", bench->picture);
+        fprintf(stderr, "bench distributed: %s cannot be written\n", bench->picture);
     } else {
         fprintf(file, "P6\n%u %u\n255\n", result.width, result.height);
         for (size_t i = 0; i < result.size_bytes; i += 4)
@@ -167,12 +168,12 @@ static bool parse(struct bench *bench, int argc, char **argv)
     return bench->runs >= 1 && bench->runs <= RUNS_MAX;
 }
 
-int main(int argc, char **argv)
+BENCH(distributed)
 {
     struct bench bench = {0};
     struct error error = {0};
     if (!parse(&bench, argc, argv)) {
-        fputs("usage: bench_distributed [--size WxH] [--runs N] [--picture FILE.ppm]\n", stderr);
+        fputs("usage: bench distributed [--size WxH] [--runs N] [--picture FILE.ppm]\n", stderr);
         return 2;
     }
     bench.device = gpu_device_create(&(struct gpu_options){.index = -1}, &error);
@@ -182,7 +183,7 @@ int main(int argc, char **argv)
     bool ok = bench.renderer && bench.scene && paper_scene_motion(&bench.motion) && measure(&bench, &error) &&
               print(&bench);
     if (!ok)
-        fprintf(stderr, "bench_distributed: %s%s%s\n", error.field, error.field[0] ? ": " : "", error.text);
+        fprintf(stderr, "bench distributed: %s%s%s\n", error.field, error.field[0] ? ": " : "", error.text);
     for (unsigned i = 0; i < FORM_COUNT; i++)
         json_decref(bench.results[i]);
     paper_scene_motion_finish(&bench.motion);

@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /* Tracers with options, their forms, beside each other on one scene. Prints one JSON object: {"scene",
  * "triangles", "spheres", "diagonal", "width", "height", "device", "software", "forms": [..]}; what a form's
- * object has, the parts say. `bench_forms --help` has the options. The forms take turns, run by run. Exit status:
+ * object has, the parts say. `bench forms --help` has the options. The forms take turns, run by run. Exit status:
  * 1 failed, 2 usage.
  */
+#include "tests/bench/bench.h"
 #include "tests/bench/bench_forms.h"
 #include "tests/bench/bench_options.h"
 
@@ -13,7 +14,7 @@
 #include <string.h>
 
 static const char usage[] =
-    "usage: bench_forms builds|samples|waves|frames  --model FILE | --family TRIANGLES | --sheets N\n"
+    "usage: bench forms builds|samples|waves|frames  --model FILE | --family TRIANGLES | --sheets N\n"
     "                 --form FORM .. [options]\n"
     "  builds: what making a structure takes; samples: making those of ldc, and not what leads over emptiness;\n"
     "  waves: rays of them, and how far answers are from the reference;\n"
@@ -142,7 +143,7 @@ static bool parse(struct bench_forms *bench, int argc, char **argv)
         if (option == '?')
             return false;
         if (!parse_option(bench, option, optarg)) {
-            fprintf(stderr, "bench_forms: no such value: %s\n", optarg ? optarg : "");
+            fprintf(stderr, "bench forms: no such value: %s\n", optarg ? optarg : "");
             return false;
         }
     }
@@ -165,7 +166,7 @@ static void finish(struct bench_forms *bench)
     gpu_device_destroy(bench->device);
 }
 
-int main(int argc, char **argv)
+BENCH(forms)
 {
     static json_t *(*const parts[])(struct bench_forms *, struct error *) = {
         bench_forms_builds, bench_forms_samples, bench_forms_waves, bench_forms_frames};
@@ -188,7 +189,7 @@ int main(int argc, char **argv)
         forms = parts[part](&bench, &error);
     const bool done = forms && print(&bench, forms);
     if (!done)
-        fprintf(stderr, "bench_forms: %s%s%s\n", error.field, error.field[0] ? ": " : "", error.text);
+        fprintf(stderr, "bench forms: %s%s%s\n", error.field, error.field[0] ? ": " : "", error.text);
     finish(&bench);
     return done ? 0 : 1;
 }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What the parts of bench_forms share: a scene, and tracers with options, its forms. */
+/* What the parts of `bench forms` share: a scene, and tracers with options, its forms. */
 #ifndef FARLIGHT_TESTS_BENCH_FORMS_H
 #define FARLIGHT_TESTS_BENCH_FORMS_H
 

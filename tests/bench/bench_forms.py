@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: MIT
-"""What the parts of the benchmark share that call bench_forms: models, calls, and how results are read."""
+"""What the parts of the benchmark share that call `bench forms`: models, calls, and how results are read."""
 from bench_animated import run_json
 from bench_common import figure, paired_ratio, shared
 
 
 def call(bench, part, title, usual_runs, *arguments):
-    """What bench_forms prints, with a title."""
-    return {"title": title, **run_json(bench, "bench_forms", part, *arguments, "--runs", bench.times(usual_runs))}
+    """What `bench forms` prints, with a title."""
+    return {"title": title, **run_json(bench, "forms", part, *arguments, "--runs", bench.times(usual_runs))}
 
 
 def wave_size(bench):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The part of the benchmark that measures whole frames of distributed ray tracing: bench_distributed on the paper's kind of
+"""The part of the benchmark that measures whole frames of distributed ray tracing: `bench distributed` on the paper's kind of
 scene. Its JSON is `scene` (primitives, width, height) and `forms`: name, samples, primary_rays, shadow_rays, secondary_rays,
 frame_ns and stages_ns, times of each run. The forms take turns, so ratios are paired run by run.
 """
@@ -15,7 +15,7 @@ WHOLE = "and motion"  # lens, soft light, gloss and motion
 
 def measure_distributed(bench):
     size = ["--size", "64x48"] if bench.tiny else []
-    return json.loads(command(bench.program("tests/bench/bench_distributed"), "--runs", bench.times(5), *size))
+    return json.loads(command(*bench.form("distributed"), "--runs", bench.times(5), *size))
 
 
 def form_of(data, name):

@@ -2,15 +2,15 @@
 """The part `ldc` of the benchmark: layered depth cubes next to what their paper has ('GPU Rendering of Secondary Effects'),
 beside `bvh` and `reference`, and in their variants. Its JSON:
 
-  table1     the paper's table: name, instead (what stands for the paper's model), `builds` and `frames`, results of bench_forms
-  scenes     results of bench_forms waves: bvh, and ldc at 512, 1024 and 2048
-  pictures   how, and results of bench_forms frames of the meshes that accuracy is wanted of: ldc at 512, 1024 and 2048
-  family     results of bench_forms waves over triangles, at one resolution
-  depths     results of bench_forms samples: peeling and lists, at depth complexities and of models
-  variants   what, and results of bench_forms waves: levels, images, layers and rays together, tolerance
+  table1     the paper's table: name, instead (what stands for the paper's model), `builds` and `frames`, results of `bench forms`
+  scenes     results of `bench forms` waves: bvh, and ldc at 512, 1024 and 2048
+  pictures   how, and results of `bench forms` frames of the meshes that accuracy is wanted of: ldc at 512, 1024 and 2048
+  family     results of `bench forms` waves over triangles, at one resolution
+  depths     results of `bench forms` samples: peeling and lists, at depth complexities and of models
+  variants   what, and results of `bench forms` waves: levels, images, layers and rays together, tolerance
   wanted     rows as in bench_reach.py
 
-A result is what bench_forms prints (its head says what), with "title" added.
+A result is what `bench forms` prints (its head says what), with "title" added.
 """
 from bench_common import figure, paired_ratio
 from bench_forms import call, form_of, models, once, ratio, wave_of, wave_size

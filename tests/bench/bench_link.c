@@ -1,8 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /* What sealing costs: frames from the daemon's network side to the library over TCP on loopback, open and sealed
- * by turns. bench_link [MIB [RUNS]] prints JSON: "mib", and for "open" and "sealed" a figure for each run:
+ * by turns. bench link [MIB [RUNS]] prints JSON: "mib", and for "open" and "sealed" a figure for each run:
  * "wall_ns" from the connect to the last byte, "daemon_ns" and "client_ns", what either end took of a processor.
  */
+#include "tests/bench/bench.h"
+
 #include "base/clock.h"
 #include "lib/connection.h"
 #include "net/connection.h"
@@ -41,7 +43,7 @@ static uint64_t thread_ns(void)
 
 static _Noreturn void die(const char *what)
 {
-    fprintf(stderr, "bench_link: %s\n", what);
+    fprintf(stderr, "bench link: %s\n", what);
     exit(1);
 }
 
@@ -209,7 +211,7 @@ static void print_runs(const char *name, const struct run *runs, unsigned long c
     printf("}");
 }
 
-int main(int argc, char **argv)
+BENCH(link)
 {
     const unsigned long mib = argc > 1 ? strtoul(argv[1], NULL, 10) : 512;
     const unsigned long count = argc > 2 ? strtoul(argv[2], NULL, 10) : 7;
@@ -219,7 +221,7 @@ int main(int argc, char **argv)
     struct error error = {0};
     struct address address;
     if (mib < 1 || mib > 65536 || count < 1 || count > RUNS_MAX)
-        die("bench_link [MIB [RUNS]]");
+        die("bench link [MIB [RUNS]]");
     uint8_t *data = malloc(FRAME_PIECE_BYTES);
     if (!data || !mkdtemp(folder))
         die("no memory, or no folder");

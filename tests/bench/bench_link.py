@@ -12,7 +12,7 @@ BYTES_PER_MIB = 1 << 20
 
 def measure(bench):
     mib = 4 if bench.tiny else 512
-    told = json.loads(command(bench.program("tests/bench/bench_link"), mib, 1 if bench.tiny else bench.times(9)))
+    told = json.loads(command(*bench.form("link"), mib, 1 if bench.tiny else bench.times(9)))
     data = {"mib": mib, "ratio": paired_ratio(told["open"]["wall_ns"], told["sealed"]["wall_ns"])}
     for name in ("open", "sealed"):
         data[name] = {"mib_per_s": figure([mib * 1e9 / ns for ns in told[name]["wall_ns"]])}

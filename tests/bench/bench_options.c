@@ -20,7 +20,7 @@ bool bench_is_named(const char *list, const char *name)
 }
 
 const char bench_usage[] =
-    "usage: bench_tracers --model FILE | --family TRIANGLES  [options]\n"
+    "usage: bench tracers --model FILE | --family TRIANGLES  [options]\n"
     "  --size WxH            multiples of 8; default 512x512\n"
     "  --eye X,Y,Z --look-at X,Y,Z [--up X,Y,Z] [--fov DEGREES]   else the model's first camera, or one that sees "
     "all\n"
@@ -137,16 +137,16 @@ bool bench_parse(int argc, char **argv, struct bench_options *options, struct gp
         if (option == '?')
             return false;
         if (!parse_option(option, optarg, options, gpu)) {
-            fprintf(stderr, "bench_tracers: no such value: %s\n", optarg ? optarg : "");
+            fprintf(stderr, "bench tracers: no such value: %s\n", optarg ? optarg : "");
             return false;
         }
     }
     if ((options->scene.model != NULL) == (options->scene.family_triangles != 0)) {
-        fprintf(stderr, "bench_tracers: one of --model and --family is needed\n");
+        fprintf(stderr, "bench tracers: one of --model and --family is needed\n");
         return false;
     }
     if ((uint64_t)options->width * options->height * options->rays_each > RAYS_MAX) {
-        fprintf(stderr, "bench_tracers: more than 16 Mi rays a wave\n");
+        fprintf(stderr, "bench tracers: more than 16 Mi rays a wave\n");
         return false;
     }
     return optind == argc;

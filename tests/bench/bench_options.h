@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The command line of bench_tracers, and what it has in common with others. */
+/* The command line of `bench tracers`, and what it has in common with others. */
 #ifndef FARLIGHT_TESTS_BENCH_OPTIONS_H
 #define FARLIGHT_TESTS_BENCH_OPTIONS_H
 

@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 /* How many rays are best walked together: the paper's parallel traversal ('Stackless traversal of a sphere BVH',
  * section 5) with 1, 2, 3, 4 and 8 rays on coherent, partly coherent and incoherent rays, boxes and spheres. One
- * JSON object on standard output; bench.py makes the table. bench_parallel TRIANGLES [RUNS]    the generated
+ * JSON object on standard output; bench.py makes the table. bench parallel TRIANGLES [RUNS]    the generated
  * family Exit status 1 if something fails or answers differ beyond 0.01 % of the rays from those of one ray at a
  * time. */
 #include "tests/accuracy/test_scenes.h"
+#include "tests/bench/bench.h"
 #include "tests/bench/bench_contest.h"
 
 #include "base/clock.h"
@@ -40,7 +41,7 @@ static void require(bool ok, const struct error *error)
 {
     if (ok)
         return;
-    fprintf(stderr, "bench_parallel: %s %s\n", error->field, error->text);
+    fprintf(stderr, "bench parallel: %s %s\n", error->field, error->text);
     exit(1);
 }
 
@@ -184,11 +185,11 @@ static void make_tracers(struct bench *bench)
     }
 }
 
-int main(int argc, char **argv)
+BENCH(parallel)
 {
     long triangles = argc > 1 ? strtol(argv[1], NULL, 10) : 0, runs = argc > 2 ? strtol(argv[2], NULL, 10) : 5;
     if (triangles < 1 || triangles > 10000000 || runs < 1 || runs > BENCH_RUNS_MAX) {
-        fprintf(stderr, "usage: bench_parallel TRIANGLES [RUNS]\n");
+        fprintf(stderr, "usage: bench parallel TRIANGLES [RUNS]\n");
         return 2;
     }
     struct error error = {0};

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The parts of the benchmark that measure rays: bench_tracers over scenes, triangles, pixels and rays per pixel.
+"""The parts of the benchmark that measure rays: `bench tracers` over scenes, triangles, pixels and rays per pixel.
 
-A result is what bench_tracers prints, with "title" added. Two measures: through the interface (rays to hits on the device,
+A result is what `bench tracers` prints, with "title" added. Two measures: through the interface (rays to hits on the device,
 surface included), and the walk alone (distance, primitive, instance, barycentrics), which is held against Embree itself. A
 visibility is all that an any-hit wave asks for, so there the two are the same.
 """
@@ -22,8 +22,8 @@ MEBI = 1 << 20
 
 
 def trace(bench, title, runs, *arguments):
-    """One call of bench_tracers, which says what it does on our standard error. A disagreement is noted as a fault."""
-    full = [bench.program("tests/bench/bench_tracers"), "--runs", runs, *arguments]
+    """One call of `bench tracers`, which says what it does on our standard error. A disagreement is noted as a fault."""
+    full = [*bench.form("tracers"), "--runs", runs, *arguments]
     result = subprocess.run(list(map(str, full)), stdout=subprocess.PIPE, text=True, check=False)
     if not result.stdout:
         raise Failure(f"{' '.join(map(str, full))} ended with {result.returncode}")
@@ -60,7 +60,7 @@ def measure_reach(bench):
 
 
 def join_times(into, more):
-    """Adds the runs of a figure of bench_tracers to those of another."""
+    """Adds the runs of a figure of `bench tracers` to those of another."""
     into["runs_ns"] += more["runs_ns"]
     joined = figure(into["runs_ns"])
     into.update({f"{key}_ns": joined[key] for key in ("median", "deviation", "least", "greatest")})
@@ -117,9 +117,9 @@ def measure_rays(bench):
 
 
 def measure_forms(bench):
-    """The table of the forms of `bvh` that bench_bvh prints, with a warm-up and medians of its own; two of its sizes."""
-    say("  bench_bvh")
-    return {"text": command(bench.program("tests/bench/bench_bvh"), *(["1000"] if bench.tiny else ["37000", "146000"]))}
+    """The table of the forms of `bvh` that `bench bvh` prints, with a warm-up and medians of its own; two of its sizes."""
+    say("  bench bvh")
+    return {"text": command(*bench.form("bvh"), *(["1000"] if bench.tiny else ["37000", "146000"]))}
 
 
 # ---- reading results --------------------------------------------------------------------------------

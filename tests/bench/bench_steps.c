@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* How long one step of a frame takes, which is how long a cancel and other clients wait for it: every integrator
- * with every tracer. Usage: bench_steps --model FILE | --family TRIANGLES  [--size WxH] [--samples N]
+ * with every tracer. Usage: bench steps --model FILE | --family TRIANGLES  [--size WxH] [--samples N]
  * [--tracers LIST] [--integrators LIST] [--seconds N] [--eye X,Y,Z --look-at X,Y,Z [--up X,Y,Z] [--fov DEGREES]]
  *
  * The first frame of a form builds the structure and compiles programs: how long its begin took, which is one step
@@ -9,6 +9,7 @@
  * "stages": [{stage, count, median_ns, p99_ns, greatest_ns, cpu_greatest_ns}], "first_stages": [the same]}]}; the
  * stage "all" has the steps of all. A frame is left after so many seconds (30): whole says whether it was
  * finished. cpu: of all threads together, which other work on the machine makes hardly longer. */
+#include "tests/bench/bench.h"
 #include "tests/bench/bench_options.h"
 
 #include "base/clock.h"
@@ -240,12 +241,12 @@ static bool parse(struct bench *bench, int argc, char **argv)
     return (bench->scene_options.model != NULL) != (bench->scene_options.family_triangles != 0);
 }
 
-int main(int argc, char **argv)
+BENCH(steps)
 {
     struct bench bench;
     struct error error = {0};
     if (!parse(&bench, argc, argv)) {
-        fputs("bench_steps: wrong arguments; they are described at the head of bench_steps.c\n", stderr);
+        fputs("bench steps: wrong arguments; they are described at the head of bench_steps.c\n", stderr);
         return 2;
     }
     bench.forms = json_array();
@@ -255,7 +256,7 @@ int main(int argc, char **argv)
     bool ok = bench.renderer && bench_scene_init(&bench.scene, bench.device, &bench.scene_options, &error) &&
               measure_all(&bench, &error) && print(&bench);
     if (!ok)
-        fprintf(stderr, "bench_steps: %s%s%s\n", error.field, error.field[0] ? ": " : "", error.text);
+        fprintf(stderr, "bench steps: %s%s%s\n", error.field, error.field[0] ? ": " : "", error.text);
     json_decref(bench.forms);
     if (bench.renderer)
         bench_scene_finish(&bench.scene);

@@ -22,7 +22,7 @@ def models(bench, left_out):
 
 def measure(bench):
     left_out = []
-    results = [{"title": title, **json.loads(command(bench.program("tests/bench/bench_steps"), *options))}
+    results = [{"title": title, **json.loads(command(*bench.form("steps"), *options))}
                for title, options in models(bench, left_out)]
     return {"results": results, "cancels": measure_cancels(bench), "left_out": left_out}
 
@@ -33,7 +33,7 @@ def measure_cancels(bench):
     rows = []
     with Daemon(bench) as daemon:
         for tracer, number in list(TRACERS.items())[:1 if bench.tiny else None]:
-            times = json.loads(command(bench.program("tests/bench/bench_cancel"), daemon.address, model, 1 if bench.tiny else 30,
+            times = json.loads(command(*bench.form("cancel"), daemon.address, model, 1 if bench.tiny else 30,
                                        number))["cancels_ns"]
             rows.append({"title": model.stem, "tracer": tracer, "ms": figure([ns / 1e6 for ns in times])})
     return rows

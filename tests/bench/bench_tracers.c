@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* Every tracer of the build beside Embree on the same rays of one scene: one JSON object on standard output, what
- * it is doing on standard error. bench.py calls it and makes the tables. `bench_tracers --help` has the options.
+ * it is doing on standard error. bench.py calls it and makes the tables. `bench tracers --help` has the options.
  * Exit status: 1 if answers are wrong beyond 0.01 % of the rays, edges aside, or something fails; 2 usage. */
+#include "tests/bench/bench.h"
 #include "tests/bench/bench_contest.h"
 #include "tests/bench/bench_options.h"
 
@@ -187,7 +188,7 @@ static json_t *wave_json(struct bench *bench, const struct bench_wave *wave)
         json_array_append_new(list, contender_json(contender, wave->ray_count));
         if (!bench_contender_failed(contender, wave->ray_count))
             continue;
-        fprintf(stderr, "bench_tracers: %s (%s): %u of %u %s rays differ, %u of them at edges\n",
+        fprintf(stderr, "bench tracers: %s (%s): %u of %u %s rays differ, %u of them at edges\n",
                 contender->tracer, contender->form, contender->differing, wave->ray_count, fact->name,
                 contender->edges);
         bench->failed = true;
@@ -332,7 +333,7 @@ static void finish(struct bench *bench)
     gpu_device_destroy(bench->device);
 }
 
-int main(int argc, char **argv)
+BENCH(tracers)
 {
     struct bench bench = {0};
     struct gpu_options gpu = {.index = -1};
@@ -348,7 +349,7 @@ int main(int argc, char **argv)
     bench.device = gpu_device_create(&gpu, &error);
     bool ok = bench.device && run_bench(&bench, &error);
     if (!ok)
-        fprintf(stderr, "bench_tracers: %s%s%s\n", error.field, error.field[0] ? ": " : "", error.text);
+        fprintf(stderr, "bench tracers: %s%s%s\n", error.field, error.field[0] ? ": " : "", error.text);
     if (bench.device)
         finish(&bench);
     return ok && !bench.failed ? 0 : 1;

@@ -8,6 +8,8 @@
  * after a rest, how long until a frame of it is decoded; "rested", how many pictures at rest came; and "frames",
  * an array for each of "columns". Times are nanoseconds of the host's monotonic clock, which the daemon must share
  * where they are its own: received, applied, rendered; encode_begin is since applied. */
+#include "tests/bench/bench.h"
+
 #include "lib/farlight.h"
 #include "viewer/camera.h"
 #include "viewer/decode.h"
@@ -35,7 +37,7 @@
 #define TAU 6.283185307179586
 
 static const char usage[] =
-    "usage: bench_view ADDRESS MODEL [options]\n"
+    "usage: bench view ADDRESS MODEL [options]\n"
     "  --size WxH        default 1280x720\n"
     "  --encoding E      raw, zstd, jpeg, h264 or predicted; default jpeg\n"
     "  --seconds S       default 5\n"
@@ -468,7 +470,7 @@ static bool parse(int argc, char **argv)
     return true;
 }
 
-int main(int argc, char **argv)
+BENCH(view)
 {
     if (!parse(argc, argv)) {
         fputs(usage, stderr);
@@ -485,7 +487,7 @@ int main(int argc, char **argv)
     } else {
         char line[1200];
         fl_error_print(&error, line, sizeof line);
-        fprintf(stderr, "bench_view: %s\n", line);
+        fprintf(stderr, "bench view: %s\n", line);
     }
     json_decref(result);
     return ok ? 0 : 1;

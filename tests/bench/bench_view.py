@@ -56,7 +56,7 @@ def frames_of(told):
 
 
 def watch(bench, daemon, model, *options):
-    return json.loads(command(bench.program("tests/bench/bench_view"), daemon.address, *model, "--pid", daemon.process.pid,
+    return json.loads(command(*bench.form("view"), daemon.address, *model, "--pid", daemon.process.pid,
                               *options))
 
 
@@ -166,13 +166,13 @@ def measure_viewers(bench, daemon, model):
 
 
 def over_a_link(bench, model, kbit_per_s, seconds, encoding):
-    """What bench_view told, and None; or None, and why there can be no such link here."""
+    """What `bench view` printed, and None; or None, and why there can be no such link here."""
     with tempfile.TemporaryDirectory(prefix="farlight-bench-") as folder:
         key, address = pathlib.Path(folder) / "key", "tcp:10.77.0.1:7100"
         command(bench.program("farlight"), "key", key)
         arguments = [bench.program("tests/bench/shaped_link"), kbit_per_s, LINK_DELAY_MS, LINK_BUFFER_KIB,
                      bench.program("farlightd"), "--listen", address, "--key-file", key, "--",
-                     bench.program("tests/bench/bench_view"), address, *model, "--key", key, "--seconds", seconds,
+                     *bench.form("view"), address, *model, "--key", key, "--seconds", seconds,
                      "--encoding", encoding, "--adapt", "--rate", LINK_ASKED_PER_S, "--looks", 60]
         result = subprocess.run(list(map(str, arguments)), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
                                 check=False)

@@ -1,7 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /* The yardstick of `make bench`: reads a file, hashes it, and lets Embree build the triangles that lie in it.
- * Usage: embree_build FILE POSITIONS_OFFSET VERTEX_COUNT INDICES_OFFSET TRIANGLE_COUNT
+ * Usage: bench embree_build FILE POSITIONS_OFFSET VERTEX_COUNT INDICES_OFFSET TRIANGLE_COUNT
  * Prints one JSON object with nanoseconds, the least of five runs of each. */
+#include "tests/bench/bench.h"
+
 #include "base/blob.h"
 #include "base/clock.h"
 
@@ -22,7 +24,7 @@ static uint8_t *read_file(const char *path, size_t *size_bytes)
     FILE *file = fopen(path, "rb");
     struct stat stat;
     if (!file || fstat(fileno(file), &stat) != 0 || stat.st_size <= 0) {
-        fprintf(stderr, "embree_build: %s: %s\n", path, strerror(errno));
+        fprintf(stderr, "bench embree_build: %s: %s\n", path, strerror(errno));
         if (file)
             fclose(file);
         return NULL;
@@ -56,10 +58,11 @@ static uint64_t build_ns(RTCDevice device, uint8_t *data, size_t positions, size
     return end - begin;
 }
 
-int main(int argc, char **argv)
+BENCH(embree_build)
 {
     if (argc != 6) {
-        fprintf(stderr, "usage: embree_build FILE POSITIONS_OFFSET VERTEX_COUNT INDICES_OFFSET TRIANGLE_COUNT\n");
+        fprintf(stderr,
+                "usage: bench embree_build FILE POSITIONS_OFFSET VERTEX_COUNT INDICES_OFFSET TRIANGLE_COUNT\n");
         return 2;
     }
     size_t numbers[4];
@@ -74,7 +77,7 @@ int main(int argc, char **argv)
         uint8_t *data = read_file(argv[1], &size_bytes);
         if (!data || numbers[0] > size_bytes || numbers[1] > (size_bytes - numbers[0]) / 12 ||
             numbers[2] > size_bytes || numbers[3] > (size_bytes - numbers[2]) / 12) {
-            fprintf(stderr, "embree_build: %s: shorter than the arguments say\n", argv[1]);
+            fprintf(stderr, "bench embree_build: %s: shorter than the arguments say\n", argv[1]);
             free(data);
             return 1;
         }
@@ -91,7 +94,7 @@ int main(int argc, char **argv)
     const bool failed = rtcGetDeviceError(device) != RTC_ERROR_NONE;
     rtcReleaseDevice(device);
     if (failed) {
-        fprintf(stderr, "embree_build: Embree reports an error\n");
+        fprintf(stderr, "bench embree_build: Embree reports an error\n");
         return 1;
     }
     printf("{\"read_ns\": %llu, \"hash_ns\": %llu, \"build_ns\": %llu}\n", (unsigned long long)read_best_ns,

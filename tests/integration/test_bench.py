@@ -22,7 +22,7 @@ import bench_rays  # noqa: E402  pylint: disable=wrong-import-position
 import bench_reach  # noqa: E402  pylint: disable=wrong-import-position
 import bench_view  # noqa: E402  pylint: disable=wrong-import-position
 
-TRACED = ("tracers", "family", "pixels", "rays", "flake", "reach")  # results of bench_tracers
+TRACED = ("tracers", "family", "pixels", "rays", "flake", "reach")  # results of `bench tracers`
 PARTS = ("frames", "distributed", "steps", "link", "view", "tracers", "family", "pixels", "rays", "parallel", "instances",
          "refit", "flake", "ldc", "abuffer", "reach")
 
@@ -72,8 +72,14 @@ class Verdicts(unittest.TestCase):
         self.assertEqual(self.verdict(0.9, 0.04, at_most=True), "MISSED")
 
 
+def measures(name):
+    program = BIN / "tests/bench/bench"
+    return program.is_file() and name in subprocess.run([program, "--list"], stdout=subprocess.PIPE, text=True,
+                                                        check=True).stdout.split()
+
+
 @long_test
-@unittest.skipUnless((BIN / "tests/bench/bench_tracers").is_file(), "built without Embree, which the benchmark compares with")
+@unittest.skipUnless(measures("tracers"), "built without Embree, which the benchmark compares with")
 class Benchmark(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
