@@ -47,7 +47,7 @@ static double five_errors(double open, double rays)
 ALL_TESTS(fixture_setup, fixture_teardown)
 EACH_TEST(fixture_clear, NULL)
 
-TEST(an_open_plane_is_wholly_open_and_so_is_what_leaves_the_scene)
+TEST(an_open_plane_and_rays_that_leave_the_scene_are_unoccluded)
 {
     struct fixture *fixture = *state;
     for (size_t t = 0; t < COUNT(tracers); t++) {

@@ -173,7 +173,7 @@ static void hold_against_its_density(struct bsdf_probe *probe, const struct bsdf
                      fabs((double)(chosen[i].weight * chosen[i].probability / chosen[i].sent) - 1.0));
 }
 
-TEST(directions_are_as_probable_as_is_said)
+TEST(sampled_directions_follow_the_stated_density)
 {
     static const float roughnesses[] = {0.45f, 0.7f, 1.0f};
     struct densities densities = {0};

@@ -271,7 +271,7 @@ TEST(motion_blur_converges_without_bias)
 }
 
 /* A ball that glows before nothing, a pixel within its way: the share of the time that it is there. */
-TEST(what_moves_is_seen_for_as_long_as_it_is_there)
+TEST(a_moving_surface_covers_a_pixel_for_the_share_of_time_it_is_in_it)
 {
     struct fixture *fixture = *state;
     enum { WIDTH = 16, SAMPLES = 256 };
@@ -354,7 +354,7 @@ TEST(a_rough_mirror_in_an_even_light_loses_only_what_a_second_facet_would_catch)
     assert_near(sum, 1.0 - log(2.0), 5.0 * 0.5 / 256.0);
 }
 
-TEST(coverage_is_whole_where_half_open_panes_stand_before_a_wall)
+TEST(coverage_is_1_where_translucent_panes_stand_before_a_wall)
 {
     struct fixture *fixture = *state;
     begin(fixture, smooth_things);

@@ -125,7 +125,7 @@ TEST(translucent_surfaces_transmit_their_transmittance)
 }
 
 /* Lambert's law for each layer, as if the others were not there; and the environment's irradiance. */
-TEST(every_layer_is_lit_as_if_it_were_alone)
+TEST(every_layer_is_lit_without_the_others)
 {
     struct fixture *fixture = *state;
     for (size_t t = 0; t < COUNT(tracers); t++) {

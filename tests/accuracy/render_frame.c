@@ -250,7 +250,7 @@ TEST(an_edit_between_two_frames_is_seen_by_the_second)
     frame_result_finish(&result);
 }
 
-TEST(an_abandoned_frame_leaves_the_next_one_whole)
+TEST(an_abandoned_frame_does_not_change_the_next_one)
 {
     struct fixture *fixture = *state;
     struct error error = {0};

@@ -323,7 +323,7 @@ TEST(hits_of_nothing_are_caught_in_their_wave)
     frame_result_finish(&result);
 }
 
-TEST(wrong_distances_are_far_and_their_size_is_told)
+TEST(wrong_distances_count_as_far_and_their_size_is_reported)
 {
     struct fixture *fixture = *state;
     build_scene(fixture);

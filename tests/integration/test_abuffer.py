@@ -13,7 +13,7 @@ SMALL = [*ABUFFER, "--abuffer-resolution", "256", "--abuffer-voxels", "16"]  # s
 
 
 class Options(Case):
-    def test_each_wrong_value_is_told_with_its_option_and_what_is_known(self):
+    def test_each_wrong_value_is_reported_with_its_option_and_what_is_allowed(self):
         for option, value, says in (
                 ("--abuffer-resolution", "15", "16 to 4096"), ("--abuffer-resolution", "4097", "4096"),
                 ("--abuffer-resolution", "fine", "fine"), ("--abuffer-voxels", "100", "auto, 16, 32, 64, 128, 256"),
@@ -97,7 +97,7 @@ class Pictures(OneDaemon):
                                                                                      ("--abuffer-voxels", voxels))}
             self.assertEqual(len(digests), 1, resolution)
 
-    def test_two_tracers_of_one_daemon_do_not_mind_each_other(self):
+    def test_two_tracers_of_one_daemon_do_not_affect_each_other(self):
         alone = {tracer: self.picture("x", "--tracer", tracer, env=private_daemon())[1]["digest"]
                  for tracer in ("bvh", "abuffer")}
         for tracer in ("bvh", "abuffer", "bvh", "abuffer", "abuffer"):
@@ -129,7 +129,7 @@ class Lists(OneDaemon):
         # The box is the same; a texel or two of it may be a margin.
         self.assertAlmostEqual(texels[128] / texels[512], 4, delta=0.1)
 
-    def test_the_table_says_it_to_people(self):
+    def test_the_table_of_timings_describes_the_structure(self):
         text = self.render(*ABUFFER, "--abuffer-resolution", "128", "--timings").stdout
         self.assertRegex(text, r"structure +resolution 128, cell [0-9.]+ m?m, samples \d+, longest list \d+; built for 1 of 1 frame\n")
 

@@ -107,7 +107,7 @@ class Animations(Case):
 class Parts(OneDaemon, Animations):
     RANGE = ["--frames", "10-31:3"]  # 10 13 16 19 22 25 28 31
 
-    def test_parts_together_are_the_whole_to_the_bit(self):
+    def test_parts_together_equal_the_whole_to_the_bit(self):
         whole, _ = self.animate("whole", self.model, *self.RANGE)
         self.assertEqual(list(whole), list(range(10, 32, 3)))
         self.assertEqual(len(set(whole.values())), 8, "frames of an orbit differ")
@@ -134,7 +134,7 @@ class Parts(OneDaemon, Animations):
             after = (folder / f"{frame:04d}.exr").stat()
             self.assertEqual((after.st_ino, after.st_mtime_ns), (before.st_ino, before.st_mtime_ns))
 
-    def test_with_all_frames_there_nothing_is_asked_of_anyone(self):
+    def test_with_all_frames_present_no_daemon_is_asked(self):
         whole, _ = self.animate("whole", self.model, *self.RANGE)
         again, _ = self.animate("whole", self.model, *self.RANGE, "--resume", "--server", "unix:/nonexistent")
         self.assertEqual(again, whole)
@@ -256,7 +256,7 @@ class Lost(Animations):
             self.assertEqual(path.suffix, ".exr", "an unfinished file was left")
             digest(path)
 
-    def test_a_video_goes_on_where_it_was(self):
+    def test_a_video_continues_after_a_killed_daemon(self):
         path = self.folder / "movie.mkv"
         command = [BIN / "farlight", "animate", self.model, *self.FRAMES, *SIZE, "--lossless", "-o"]
         subprocess.run([*command, self.folder / "whole.mkv"], check=True, stderr=subprocess.DEVNULL,
@@ -276,7 +276,7 @@ class Lost(Animations):
 
 
 class Videos(OneDaemon, Animations):
-    def test_a_video_and_images_come_of_one_script(self):
+    def test_one_script_writes_a_video_and_images(self):
         (self.folder / "f").mkdir()
         script = self.write({"model": str(self.model), "frames": "1-5", "size": [96, 64], "camera": {"orbit": True},
                              "outputs": ["f/%d.png", "movie.mp4", "raw.y4m"]})
@@ -309,7 +309,7 @@ class Videos(OneDaemon, Animations):
         self.assertEqual(result.returncode, 2, result.stderr)
         self.assertIn("terminal", result.stderr)
 
-    def test_a_reader_that_goes_away_is_told(self):
+    def test_a_closed_standard_output_is_reported(self):
         child = subprocess.Popen([BIN / "farlight", "animate", self.model, "--frames", "1-500", *SIZE, "-q", "-o", "-"],
                                  stdout=subprocess.PIPE, stderr=subprocess.PIPE)
         child.stdout.read(1000)
@@ -366,7 +366,7 @@ class Scripts(OneDaemon, Animations):
                                "0,0,0", "--fov", "40")
         self.assertEqual(got, want)
 
-    def test_the_command_line_goes_before_the_script(self):
+    def test_the_command_line_overrides_the_script(self):
         self.shot("script", camera=self.camera(orbit=True), frames="1-4")
         self.expect(farlight("animate", "--script", self.folder / "shot.json", "--shard", "2/2", "-o",
                              self.folder / "%d.exr"), 0)
@@ -403,7 +403,7 @@ class Scripts(OneDaemon, Animations):
         self.assertEqual((ease[1], ease[5]), (got[1], got[5]))
         self.assertNotEqual(ease[2], got[2])
 
-    def test_parts_of_a_script_are_the_whole_to_the_bit(self):
+    def test_parts_of_a_script_equal_the_whole_to_the_bit(self):
         keyed = {"camera": self.camera(eye={"times": [0, 0.2, 0.5], "values": [self.EYE, [3, 1, 1], [1, 3, 1]],
                                             "interpolation": "catmull-rom"},
                                        exposure={"times": [0, 0.5], "values": [0, -2]}),
@@ -414,7 +414,7 @@ class Scripts(OneDaemon, Animations):
         second, _ = self.shot("second", shard="2/2", **keyed)
         self.assertEqual({**first, **second}, whole)
 
-    def test_names_that_the_model_does_not_have_are_told_with_their_line(self):
+    def test_names_that_the_model_lacks_are_reported_with_their_line(self):
         model = moving_model(self.folder / "moving.gltf")
         for member, value, told in (("materials", [{"target": "brass", "roughness": 1}], "clay"),
                                     ("nodes", [{"target": "pyramids", "scale": [1, 1, 1]}], "pyramid"),
@@ -516,7 +516,7 @@ class Clips(OneDaemon, Animations):
                 if name not in ("colour",):  # its first key is not the model's own
                     self.assertEqual(first, plain)
 
-    def test_a_turn_in_degrees_goes_all_the_way_round(self):
+    def test_a_turn_of_360_degrees_is_a_full_turn(self):
         """Between 0 and 360 degrees the shorter arc would stand still."""
         script = self.write({"model": str(self.model), "fps": 4, "frames": "1-5", "size": [96, 64], "output": "%d.exr",
                              "camera": {"eye": [0, 2, 7], "look_at": [0, 0.5, 0]},
@@ -529,7 +529,7 @@ class Clips(OneDaemon, Animations):
         self.assertEqual(len(set(frames)), 4)
 
     @needs_shared_scenes
-    def test_a_skinned_model_in_parts_and_resumed_is_the_whole_to_the_bit(self):
+    def test_a_skinned_model_in_parts_and_resumed_equals_the_whole_to_the_bit(self):
         self.model = SHARED_SCENES / "gltf" / "Fox.glb"
         common = ["--clip", "Run", "--fps", "12", "--samples", "2"]
         whole, _ = self.animate("whole", self.model, *common)

@@ -66,7 +66,7 @@ class Verdicts(unittest.TestCase):
         self.assertEqual(self.verdict(0.8, 0.1), "met")
         self.assertEqual(self.verdict(0.7, 0.1, at_most=True), "met")
 
-    def test_a_miss_within_twice_the_deviation_is_told_from_one_beyond(self):
+    def test_a_miss_within_two_deviations_differs_from_one_beyond(self):
         self.assertEqual(self.verdict(0.7, 0.06), "missed, within the spread")
         self.assertEqual(self.verdict(0.7, 0.04), "MISSED")
         self.assertEqual(self.verdict(0.9, 0.04, at_most=True), "MISSED")
@@ -201,7 +201,7 @@ class Benchmark(unittest.TestCase):
         for row in data["wanted"]:
             self.assertIn(row["line"], text)
 
-    def test_steps_are_told_by_stage(self):
+    def test_steps_are_reported_by_stage(self):
         forms = self.document["parts"]["steps"]["results"][0]["forms"]
         self.assertEqual([(form["tracer"], form["integrator"], form["whole"]) for form in forms], [("bvh", "path", True)])
         for form in forms:

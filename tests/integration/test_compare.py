@@ -193,7 +193,7 @@ class Figures(Compare):
         self.assertEqual([got[k] for k in ("psnr", "mean", "rms", "max")], [None] * 4)
         self.assertEqual((got["beyond"], got["nonfinite"], got["nonfinite_pixels_b"]), (1, 1, 0))
 
-    def test_the_greatest_floats_do_not_overflow_the_answer(self):
+    def test_the_maximum_floats_do_not_overflow_the_answer(self):
         a, b = self.exr("a.exr", [3.4e38] * 768), self.exr("b.exr", [-3.4e38] * 768)
         got = self.compare(a, b, "-o", self.folder / "d.png")
         self.assertGreaterEqual(got["max"], 2.9e38)
@@ -276,7 +276,7 @@ class Pictures(Compare):
         self.assertGreater(sums.pop((20, 9)), 600)
         self.assertLess(max(sums.values()), 10)
 
-    def test_the_scale_can_be_fixed_and_is_said(self):
+    def test_the_scale_can_be_fixed_and_is_reported(self):
         a, b = self.png("a.png", [100] * 768), self.png("b.png", [110] * 768)
         brightness = []
         for top in ("0.04", "0.4"):
@@ -327,7 +327,7 @@ class Pictures(Compare):
         self.refused(a, a, "-o", a, says=("would replace",))
         self.assertEqual(a.read_bytes(), before)
 
-    def test_a_picture_that_cannot_be_written_is_said(self):
+    def test_an_unwritable_picture_is_reported(self):
         a = self.png("a.png", [9] * 768)
         self.refused(a, a, "-o", self.folder / "no" / "d.png", says=("d.png", "folder"))
         self.assertEqual(self.leftovers(), ["a.png"])
@@ -373,7 +373,7 @@ class BadFiles(Compare):
         got = self.compare(self.good, other, "--ignore-alpha")
         self.assertEqual((got["max"], got["channels"]), (0, "R,G,B"))
 
-    def test_no_beginning_of_a_file_is_taken_for_an_image(self):
+    def test_no_prefix_of_a_file_is_read_as_an_image(self):
         whole = {"png": self.good.read_bytes(), "exr": self.exr("e.exr", [0.5] * 768).read_bytes()}
         path = self.folder / "j.jpg"
         self.expect(farlight("render", bundled_scenes() / "cornell.glb", "-o", path, "--size", "160x120", "-q"), 0)
@@ -422,7 +422,7 @@ class BadFiles(Compare):
         path.write_text("no image at all\n" * 50)
         self.refused(path, self.good, says=(path, "is not an EXR, HDR, PNG or JPEG"))
 
-    def test_what_was_typed_wrong_is_said(self):
+    def test_wrong_arguments_are_reported(self):
         self.refused(self.good, says=("two image files",))
         self.refused(self.good, self.good, self.good, says=("two images",))
         self.refused(self.good, self.good, "--threshold", "-1", says=("--threshold",))

@@ -63,14 +63,14 @@ class Rays(OneDaemon):
             self.assertIn(word, result.stdout)
         self.assertLessEqual(max(map(len, result.stdout.splitlines())), 110)
 
-    def test_a_daemon_of_ones_own_gives_the_same_counts(self):
+    def test_a_private_daemon_gives_the_same_counts(self):
         there = json.loads(self.expect(compare("--json"), 0).stdout)
         here = json.loads(self.expect(compare("--json", env=private_daemon()), 0).stdout)
         for a, b in zip(there["waves"], here["waves"]):
             self.assertEqual([a[k] for k in ("wave", "kind", "rays", "both_hit", "both_missed")],
                              [b[k] for k in ("wave", "kind", "rays", "both_hit", "both_missed")])
 
-    def test_options_of_render_are_taken(self):
+    def test_options_of_render_are_accepted(self):
         result = self.expect(compare("--depth", "0", "--eye", "3,3,3", "--look-at", "0,0,0", "--up", "0,0,1", "--json"), 0)
         self.assertEqual({w["wave"] for w in json.loads(result.stdout)["waves"]}, {0})
 
@@ -92,7 +92,7 @@ class Talk(Case):
             os.close(ours)
             return shown.decode(), process.wait(TIMEOUT_S)
 
-    def test_a_bar_says_what_is_done_and_goes_away(self):
+    def test_a_progress_bar_names_the_steps_and_is_erased(self):
         shown, status = self.compare_on_a_terminal()
         self.assertEqual(status, 0, shown)
         for step in ("0 of 3: rays of bvh and naive", "1 of 3: picture of naive", "2 of 3: comparing the pictures"):

@@ -143,7 +143,7 @@ class Hostile(Case):
         peer.until_closed()
         self.assert_alive()
 
-    def test_another_version_is_told_which_ones_there_are(self):
+    def test_another_version_is_answered_with_the_supported_ones(self):
         peer = Peer(self.daemon, greet=False)
         peer.socket.sendall(hello(77, 99))
         self.addCleanup(peer.close)

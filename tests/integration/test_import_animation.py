@@ -157,7 +157,7 @@ class Written(unittest.TestCase):
         self.assertEqual(result.of(importer.SET_NODE)[0]["skin"], 0)
         self.assertIn("no joints or weights", result.text())
 
-    def test_matrices_that_are_no_numbers_are_taken_as_none(self):
+    def test_matrices_with_NaN_are_ignored(self):
         made = File()
         made.add_skin(inverseBindMatrices=made.accessor("MAT4", [(float("nan"),) * 16, (2.0,) * 16]))
         result = self.run_file(made)
@@ -268,7 +268,7 @@ class Written(unittest.TestCase):
                 self.assertEqual({name for name, _ in self.channels(result)}, {"hip"})
                 self.assertIn(expected or "", result.text())
 
-    def test_an_animation_of_nothing_is_told_as_one_that_cannot_be_played(self):
+    def test_an_animation_with_nothing_to_play_is_reported(self):
         result = self.run_file(File().channel(77, "scale", [0, 1], [(0, 0, 0), (1, 0, 0)]))
         self.assertEqual(result.clips, [{"id": 0, "channels": 0, "duration": 0, "name": "move"}])
         self.assertEqual((result.of(importer.SET_CLIP), result.of(importer.SET_CHANNEL)), ([], []))

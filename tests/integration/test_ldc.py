@@ -17,7 +17,7 @@ def build_ms(frame, cube):
 
 
 class Options(Case):
-    def test_each_wrong_value_is_told_with_its_option_and_what_is_known(self):
+    def test_each_wrong_value_is_reported_with_its_option_and_what_is_allowed(self):
         for option, value, says in (
                 ("--ldc-resolution", "15", "16 to 4096"), ("--ldc-resolution", "4097", "4096"),
                 ("--ldc-resolution", "fine", "fine"), ("--ldc-block", "12", "2, 4, 8, 16, 32"),
@@ -113,12 +113,12 @@ class Structure(OneDaemon):
         frame, = frames_of(self.render("--timings=json"))
         self.assertEqual(set(frame["structure"]), {"nodes", "nodes_rebuilt", "nodes_refitted"})
 
-    def test_the_table_says_it_to_people(self):
+    def test_the_table_of_timings_describes_the_structure(self):
         text = self.render(*LDC, "--ldc-resolution", "128", "--timings").stdout
         self.assertRegex(text, r"structure +static +resolution 128, cell [0-9.]+ m?m, layers needed \d+, layers kept \d+, "
                                r"samples \d+, samples lost 0; built for 1 of 1 frame\n")
 
-    def test_layers_that_a_limit_takes_away_are_told_with_the_remedy(self):
+    def test_layers_that_a_limit_drops_are_reported_with_the_remedy(self):
         result = self.render(*LDC, "--ldc-resolution", "128", "--timings=json",
                              env=private_daemon(FARLIGHT_LIMITS_LDC_LAYERS="1"))
         frame, = frames_of(result)

@@ -33,7 +33,7 @@ class Light(Case):
         _, _, channels = read_exr(self.render("--float", *options, name="x.exr")[0])
         return sum(sum(channels[c]) for c in "RGB") / (3 * len(channels["R"]))
 
-    def test_noisy_integrators_take_more_samples_where_nothing_is_said(self):
+    def test_noisy_integrators_take_more_samples_by_default(self):
         small = ["--size", "8x6"]
         for integrator, samples in (("whitted", 1), ("raycast", 1), ("ao", 16), ("path", 64)):
             _, frame = self.render("--integrator", integrator, *small)
@@ -84,13 +84,13 @@ class Light(Case):
         self.assertGreater(rays["0.2"], rays["1"])
         self.assertNotEqual(self.digest(*options, "--layer-opacity", "0.2"), self.digest(*options, "--layer-opacity", "1"))
 
-    def test_light_that_goes_from_wall_to_wall_adds_up_bounce_by_bounce(self):
+    def test_indirect_light_adds_up_bounce_by_bounce(self):
         """Each bounce adds light and none is taken away: the same random numbers decide, so that noise is no excuse."""
         means = [self.mean("--integrator", "path", "--samples", "16", "--bounces", bounces) for bounces in ("0", "1", "4")]
         self.assertGreater(means[1], means[0] * 1.05)
         self.assertGreater(means[2], means[1] * 1.02)
 
-    def test_rough_surfaces_reflect_as_was_chosen(self):
+    def test_rough_surfaces_reflect_by_the_chosen_brdf(self):
         options = ["--integrator", "path", "--samples", "2"]
         self.assertEqual(self.digest(*options, scene="teapot.glb"), self.digest(*options, "--brdf", "ggx", scene="teapot.glb"))
         self.assertNotEqual(self.digest(*options, scene="teapot.glb"), self.digest(*options, "--brdf", "ward", scene="teapot.glb"))

@@ -311,7 +311,7 @@ class MadeFiles(PoseCase):
         made.animate(2, "rotation", self.KEYS, [unit(self.vector(-1, 1, 4)) for _ in self.KEYS])
         self.compare(self.save(made), 0, self.TIMES)
 
-    def test_an_animated_matrix_is_taken_apart(self):
+    def test_an_animated_matrix_is_decomposed(self):
         """glTF forbids it; where the clip changes one of the parts, the others stay as the matrix has them."""
         turned = Made([{"mesh": 0, "matrix": [0, 2, 0, 0, -3, 0, 0, 0, 0, 0, 0.5, 0, 1, 2, 3, 1]}])
         turned.mesh()

@@ -114,7 +114,7 @@ class Keys(Case):
             self.assertFalse((self.folder / "a.png").exists())
             self.expect(farlight("render", *options, "--key", self.folder / "key"), 0)
 
-    def test_a_wrong_key_is_told_after_a_second_and_too_many_are_not_heard(self):
+    def test_a_wrong_key_is_refused_after_a_second_and_too_many_are_ignored(self):
         with SealedDaemon(self.folder) as daemon:
             other = ("ping", "--server", daemon.reached, "--key", self.folder / "other")
             begin = time.monotonic()
@@ -139,7 +139,7 @@ class Keys(Case):
         self.assertEqual(refused.returncode, 1)
         self.assertIn("chmod 600", refused.stderr)
 
-    def test_on_this_host_both_come_in(self):
+    def test_on_this_host_both_are_accepted(self):
         with Daemon("--key-file", self.folder / "key", "--listen", "tcp:127.0.0.1:0") as daemon:
             loopback = daemon.process.stdout.readline().split()[1]
             for address in (daemon.address, loopback):

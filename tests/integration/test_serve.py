@@ -243,7 +243,7 @@ class Serve(Case):
 
     # ---- lost connections ---------------------------------------------------------------------------
 
-    def test_a_scene_outlives_a_cut_connection_and_is_come_back_to(self):
+    def test_a_scene_outlives_a_cut_connection_and_can_be_attached_again(self):
         with Daemon() as daemon:
             with Serving(self.model, "--server", daemon.address) as serving:
                 self.assertIsNone(serving.daemon)
@@ -342,7 +342,7 @@ class Serve(Case):
         wait_until(lambda: is_gone(daemon), "the daemon stays")
         self.assertFalse(self.socket.exists())
 
-    def test_a_daemon_that_is_killed_is_told(self):
+    def test_a_killed_daemon_is_reported(self):
         serving = self.serve()
         os.kill(serving.daemon, signal.SIGKILL)
         self.assertEqual(serving.process.wait(TIMEOUT_S), 1)
@@ -350,7 +350,7 @@ class Serve(Case):
 
     # ---- mistakes -----------------------------------------------------------------------------------
 
-    def test_mistakes_are_told_before_anything_starts(self):
+    def test_mistakes_are_reported_before_anything_starts(self):
         for arguments, part in (
                 (("serve",), "a model file is needed"),
                 (("serve", self.model, "--name", ""), "need it to attach"),
@@ -366,13 +366,13 @@ class Serve(Case):
             self.assertIn(part, result.stderr)
         self.assertEqual(self.leftovers(), [])
 
-    def test_an_address_that_cannot_be_listened_at_is_told_in_the_daemons_words(self):
+    def test_an_unusable_address_is_reported_in_the_daemons_words(self):
         (self.folder / "file").write_text("mine")
         result = self.expect(farlight("serve", self.model, "--listen", f"unix:{self.folder}/file"), 1)
         self.assertIn("not a socket; it was left alone", result.stderr)
         self.assertEqual((self.folder / "file").read_text(), "mine")
 
-    def test_a_name_that_nothing_has_is_told(self):
+    def test_an_unknown_name_is_reported(self):
         self.serve()
         result = self.render(self.folder / "a.png", "--scene", "teapot", status=1)
         self.assertIn('no scene "teapot"', result.stderr)

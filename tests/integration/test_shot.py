@@ -135,15 +135,15 @@ class Shots(Case):
 
 
 class Mistakes(Shots):
-    def test_the_examples_are_taken(self):
+    def test_the_examples_are_accepted(self):
         for name, document in EXAMPLES.items():
             with self.subTest(example=name):
                 self.expect(self.try_shot(document, "--frames", "1-240"), 0)
 
-    def test_what_would_be_rendered_is_said(self):
+    def test_a_dry_run_says_what_would_be_rendered(self):
         self.assertIn("15 frames would be rendered", self.expect(self.try_shot(EXAMPLES["stills"]), 0).stdout)
 
-    def test_a_mistake_is_told_with_file_line_way_and_remedy(self):
+    def test_a_mistake_is_reported_with_file_line_path_and_remedy(self):
         text = json.dumps(EXAMPLES["moving"], indent=1)
         for wrong, right, told in (
                 ('"roughness": 0.3', '"roughness": 1.3', "materials[0].roughness: is out of range"),
@@ -162,7 +162,7 @@ class Mistakes(Shots):
                 self.assertIn(f"shot.json: line {line}: {told}", result.stderr)
                 self.assertRegex(result.stderr.strip(), r"\([^()]+(\(5\))?\)$", "a remedy in brackets at the end")
 
-    def test_what_is_no_json_is_told_with_its_line(self):
+    def test_invalid_json_is_reported_with_its_line(self):
         result = self.expect(self.try_text('{\n "model": "teapot.glb",\n "samples": 4,,\n}'), 1)
         self.assertIn("shot.json: line 3", result.stderr)
         result = self.expect(self.try_text('{"samples": 4,\n"samples": 5}'), 1)
@@ -183,7 +183,7 @@ class Mistakes(Shots):
                 self.assertIn(told, result.stderr)
                 self.assertRegex(result.stderr, r"shot\.json: line \d+: ")
 
-    def test_the_command_line_goes_before_the_file(self):
+    def test_the_command_line_overrides_the_file(self):
         stills = EXAMPLES["stills"]
         result = self.expect(self.try_shot(stills, "--shard", "1/1", "--frames", "1-9"), 0)
         self.assertIn("9 frames would be rendered", result.stdout)

@@ -81,7 +81,7 @@ class Activation(Case):
         return Daemon(listen=f"unix:{self.elsewhere}", environment=environment, pass_fds=fds,
                       launcher=[sys.executable, "-c", LAUNCHER, ",".join(map(str, fds)), whose])
 
-    def test_sockets_are_taken_in_place_of_addresses_and_outlive_the_daemon(self):
+    def test_inherited_sockets_replace_addresses_and_outlive_the_daemon(self):
         self.unix.listen()
         self.tcp.listen()
         address = f"tcp:127.0.0.1:{self.tcp.getsockname()[1]}"
@@ -202,7 +202,7 @@ class Reading(Case):
             self.assertFalse((self.folder / "trace").exists())
             Peer(daemon).close()
 
-    def test_the_command_line_still_goes_first(self):
+    def test_the_command_line_still_overrides(self):
         self.config.write_text("[server]\nlog_level = info\n")
         with self.daemon("--log-level", "debug") as daemon:
             self.config.write_text("[server]\nlog_level = error\n")
@@ -316,7 +316,7 @@ class LostGpu(Case):
             if (frame.command, frame.samples) == (command, SAMPLES):
                 return frame.digest, numbers
 
-    def test_a_view_goes_on_and_shows_the_same_pictures(self):
+    def test_a_view_continues_and_shows_the_same_pictures(self):
         with Losing(self.folder) as daemon:
             client = self.client(daemon)
             view = client.render(1, 2, (64, 48), LEFT, kind=tiny_client.VIEW, samples=SAMPLES, credit=2)

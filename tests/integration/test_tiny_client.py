@@ -128,7 +128,7 @@ class Session(Case):
             self.assertEqual(client.commit(1, edits), 1)
         return client
 
-    def test_a_frame_has_the_size_and_the_revision_that_were_asked_for(self):
+    def test_a_frame_has_the_requested_size_and_revision(self):
         client = self.connect(tiny_client.triangle())
         job = client.render(1, 2, (31, 17), ABOVE)
         frame = client.next_frame()
@@ -181,7 +181,7 @@ class Session(Case):
                                       "--server", self.daemon.address, "--timings=json"), 0)
         self.assertEqual(int(frames_of(result)[0]["digest"], 16), digest)
 
-    def test_a_view_shows_the_camera_that_it_was_told_and_ends(self):
+    def test_a_view_shows_the_requested_camera_and_ends(self):
         client = self.connect(tiny_client.triangle())
         view = client.render(1, 2, (32, 24), ABOVE, kind=VIEW, samples=4, credit=2)
         first = client.next_frame()

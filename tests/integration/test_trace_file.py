@@ -88,7 +88,7 @@ class OfTheClient(Traced):
         self.assertTrue(all(len(found) == 1 for found in clocks.values()), clocks)
         self.assertIn({"gpu"}, clocks.values())
 
-    def test_after_an_interruption_it_is_still_whole(self):
+    def test_after_an_interruption_the_file_is_still_valid(self):
         for number in (signal.SIGINT, signal.SIGTERM):
             path = self.folder / f"{number}.json"
             process = subprocess.Popen([BIN / "farlight", "animate", bundled_scenes() / "sphereflake-2.nff", "--frames",
@@ -105,14 +105,14 @@ class OfTheClient(Traced):
             for picture in self.folder.glob("*.png"):
                 picture.unlink()
 
-    def test_a_command_that_fails_leaves_a_whole_file_and_its_own_message(self):
+    def test_a_command_that_fails_leaves_a_valid_file_and_its_own_message(self):
         path = self.folder / "trace.json"
         result = self.expect(farlight("render", self.folder / "missing.glb", "-o", self.folder / "a.png", "--trace-file",
                                       path), 1)
         self.assertIn("missing.glb", result.stderr)
         self.check_form(json.loads(path.read_text()))
 
-    def test_a_file_that_cannot_be_written_is_said_before_anything_is_rendered(self):
+    def test_an_unwritable_file_is_reported_before_anything_is_rendered(self):
         self.assertIn("no/trace.json", self.expect(self.render("--trace-file", self.folder / "no" / "trace.json"),
                                                    1).stderr)
         self.assertEqual(self.leftovers(), [])
@@ -159,7 +159,7 @@ class OfTheDaemon(Traced):
             daemon.process.wait()
         self.check_form(json.loads(path.read_text() + "]"))
 
-    def test_it_stops_at_its_limit_with_a_line_in_the_log_and_stays_whole(self):
+    def test_it_stops_at_its_limit_with_a_line_in_the_log_and_stays_valid(self):
         path, config = self.folder / "trace.json", self.folder / "farlightd.conf"
         config.write_text(f"[server]\ntrace_file = {path}\n[limits]\ntrace_file = 32K\n")
         with Daemon("--config", config) as daemon:
@@ -171,14 +171,14 @@ class OfTheDaemon(Traced):
         self.assertGreater(path.stat().st_size, 16384)
         self.check_form(json.loads(path.read_text()))
 
-    def test_a_full_disk_is_said_at_the_start(self):
+    def test_a_full_disk_is_reported_at_the_start(self):
         result = subprocess.run([BIN / "farlightd", "--listen", f"unix:{self.folder}/s", "--trace-file", "/dev/full"],
                                 stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, check=False,
                                 timeout=TIMEOUT_S)
         self.assertEqual(result.returncode, 1)
         self.assertIn("/dev/full: the trace file cannot be written: No space left", result.stderr)
 
-    def test_a_file_that_cannot_be_made_is_said_at_the_start(self):
+    def test_a_file_that_cannot_be_created_is_reported_at_the_start(self):
         path = self.folder / "no" / "trace.json"
         result = subprocess.run([BIN / "farlightd", "--listen", f"unix:{self.folder}/s", "--trace-file", path],
                                 stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, check=False,

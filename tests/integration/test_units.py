@@ -118,7 +118,7 @@ class Units(unittest.TestCase):
         self.assertEqual((self.shown("Result"), self.shown("ExecMainStatus")), ("success", "0"))
         self.assert_served()
 
-    def test_by_itself_it_listens_at_the_same_place_for_the_same_people(self):
+    def test_without_systemd_it_listens_at_the_same_address_for_the_same_users(self):
         self.systemctl("stop", SOCKET)
         self.systemctl("start", SERVICE)
         self.assert_mode(PATH, 0o660)

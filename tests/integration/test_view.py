@@ -125,7 +125,7 @@ class WithoutAWindow(Viewer):
         # Some of the last steps behind, and what is lost in motion.
         self.assertTrue(0 < difference(moving, rested) < 5)
 
-    def test_a_double_click_focuses_on_what_is_there(self):
+    def test_a_double_click_focuses_on_the_surface_there(self):
         click = [{"mouse": "down", "button": "left", "x": 250, "y": 100, "clicks": clicks} for clicks in (1, 2)]
         states = self.replay([rest(), {"state": "before"}, click[0], {**click[0], "mouse": "up"}, click[1],
                               {**click[1], "mouse": "up"}, rest(), {"state": "after"},
@@ -183,7 +183,7 @@ class WithoutAWindow(Viewer):
         middle = rows[SIZE[1] // 2]
         self.assertLess(max(middle[0::channels]), 64)
 
-    def test_cameras_and_clips_are_gone_through(self):
+    def test_keys_cycle_through_cameras_and_clips(self):
         states = self.replay([rest(), {"state": "first"}, {"key": "v"}, {"state": "chosen"}, {"after": 0.5},
                               {"key": "space"}, rest(), {"state": "paused"}, {"screenshot": "paused.png"},
                               {"key": "right"}, rest(), {"state": "stepped"}, *drag(160, 90, 50, 0), {"key": "c"},
@@ -220,7 +220,7 @@ class WithoutAWindow(Viewer):
         # As where nothing moves: rounding in the order of the passes.
         self.assertLess(difference(self.folder / "ridden.png", self.folder / "render.png"), 0.05)
 
-    def test_keys_that_are_held_fly_and_the_wheel_goes_nearer(self):
+    def test_held_keys_fly_and_the_wheel_moves_nearer(self):
         states = self.replay([rest(), {"state": "first"}, {"key": "d", "hold": 0.3}, rest(), {"state": "right"},
                               {"wheel": 3}, rest(), {"state": "near"}])
         first, right, near = states["first"], states["right"], states["near"]
@@ -238,13 +238,13 @@ class WithoutAWindow(Viewer):
         for name in ("small.png", "coarse.png"):
             self.assertEqual(read_png(self.folder / name)[:2], (200, 150))
 
-    def test_what_is_waited_for_in_vain_is_told(self):
+    def test_a_wait_in_vain_is_reported(self):
         self.replay([{"wait": "lost", "timeout": 0.2}], status=1)
         self.assertIn("event 0", self.errors)
         self.replay([{"nothing": 1}], status=1)
         self.assertIn("[0]", self.errors)
 
-    def test_wrong_usage_is_told(self):
+    def test_wrong_usage_is_reported(self):
         scene = bundled_scenes() / "teapot.glb"
         for arguments, part in (([], "MODEL"), ([scene, "--headless"], "--replay"), ([scene, "--scene", "a"], "--scene"),
                                 (["--scene", "a"], "--server"), ([scene, "--scale", "3"], "--scale"),
@@ -380,7 +380,7 @@ class OnADaemon(Viewer):
         self.assertGreater(uploaded, 100_000)
         self.assertLess(again, 20_000)
 
-    def test_a_scene_that_is_up_is_come_to_by_its_name(self):
+    def test_an_uploaded_scene_is_attached_by_its_name(self):
         command = [BIN / "farlight", "serve", bundled_scenes() / "teapot.glb", "--name", "pot", "--listen",
                    f"unix:{self.folder}/up"]
         with subprocess.Popen(list(map(str, command)), stdout=subprocess.PIPE, text=True) as server:

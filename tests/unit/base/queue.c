@@ -56,7 +56,7 @@ TEST(the_event_descriptor_is_readable_exactly_while_something_waits)
     queue_destroy(queue, NULL);
 }
 
-TEST(a_pop_from_an_empty_queue_waits_as_long_as_it_was_told)
+TEST(a_pop_from_an_empty_queue_waits_until_its_timeout)
 {
     struct queue *queue = queue_create(1, false);
     uint64_t before_ns = clock_now_ns();
@@ -120,7 +120,7 @@ static void *consume(void *context)
     return NULL;
 }
 
-TEST(many_threads_lose_nothing_and_get_nothing_twice)
+TEST(many_threads_get_every_item_exactly_once)
 {
     static struct shared shared;
     shared.queue = queue_create(8, true);

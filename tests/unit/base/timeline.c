@@ -141,7 +141,7 @@ TEST(frames_that_overlap_without_nesting_get_lanes_of_their_own)
     json_decref(events);
 }
 
-TEST(the_file_never_grows_past_its_limit_and_stays_whole)
+TEST(the_file_never_grows_past_its_limit_and_stays_valid)
 {
     for (uint64_t limit_bytes = 0; limit_bytes < 4096; limit_bytes += 61) {
         struct timeline *timeline = start(limit_bytes);

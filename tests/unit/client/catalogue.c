@@ -92,7 +92,7 @@ TEST(only_some_lights_have_a_size)
     assert_false(fl_catalogue_light_has_size(&catalogue, 1));
 }
 
-TEST(what_is_not_there_is_answered_with_what_is)
+TEST(an_unknown_name_is_refused_with_the_known_ones)
 {
     uint32_t clip = 0;
     assert_false(fl_catalogue_find_clip(&catalogue, "0", &clip, NULL, &error));

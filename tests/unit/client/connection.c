@@ -68,7 +68,7 @@ static void play_other_version(struct daemon *daemon)
     more(daemon);
 }
 
-TEST(a_daemon_of_another_version_is_told_in_its_own_words)
+TEST(a_daemon_of_another_version_is_reported_in_its_own_words)
 {
     struct daemon *daemon = start(play_other_version);
     assert_null(connect_to(daemon));
@@ -153,7 +153,7 @@ static void play_goodbye(struct daemon *daemon)
     tell(daemon, 0, &goodbye);
 }
 
-TEST(a_goodbye_is_told_and_may_be_tried_again)
+TEST(a_goodbye_is_reported_and_may_be_retried)
 {
     struct daemon *daemon = start(play_goodbye);
     struct fl_connection *connection = connect_to(daemon);
@@ -363,7 +363,7 @@ static void play_wrong_frame(struct daemon *daemon)
         continue;
 }
 
-TEST(a_frame_that_comes_twice_is_a_broken_protocol)
+TEST(a_repeated_frame_is_a_broken_protocol)
 {
     expect_broken_after_a_frame(play_wrong_frame, "frame 0 arrived, but frame 1 was expected");
 }

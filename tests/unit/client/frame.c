@@ -339,7 +339,7 @@ TEST(a_frame_that_was_not_asked_for_is_refused)
     }
 }
 
-TEST(declared_sizes_beyond_all_reason_are_refused_before_memory_is_taken)
+TEST(huge_declared_sizes_are_refused_before_memory_is_allocated)
 {
     static const enum protocol_encoding encodings[] = {PROTOCOL_ENCODING_RAW, PROTOCOL_ENCODING_ZSTD,
                                                        PROTOCOL_ENCODING_JPEG};
@@ -377,7 +377,7 @@ TEST(layers_arrive_one_behind_the_other_under_one_digest)
     fl_frame_destroy(frame);
 }
 
-TEST(other_layers_than_were_asked_for_are_refused_before_memory_is_taken)
+TEST(layers_that_were_not_requested_are_refused_before_memory_is_allocated)
 {
     static const unsigned came[] = {2, 3, 127};
     for (size_t i = 0; i < sizeof came / sizeof came[0]; i++) {

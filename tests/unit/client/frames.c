@@ -69,7 +69,7 @@ static bool is_there(void *user, uint32_t frame)
     return strchr(user, (char)frame) != NULL;
 }
 
-TEST(missing_frames_are_runs_between_those_that_are_there)
+TEST(missing_frames_are_listed_as_ranges)
 {
     const struct fl_frame_run range = {.first = 'a', .last = 'k', .step = 2}; /* a c e g i k */
     static const struct {

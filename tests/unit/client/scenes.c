@@ -198,7 +198,7 @@ TEST(a_revision_is_heard_of_whatever_is_waited_for)
     stop(daemon);
 }
 
-TEST(a_clip_added_to_a_scene_of_others_is_taken_away_again)
+TEST(a_clip_added_to_a_shared_scene_is_removed_again)
 {
     struct daemon *daemon = start(play_scenes);
     struct fl_connection *connection = connect_to(daemon);

@@ -196,7 +196,7 @@ static void play_open(struct daemon *daemon)
     heard_only_the_seal = daemon->in_bytes == SEALED_MESSAGE_MAX_BYTES && memcmp(daemon->in, SEALED_MAGIC, 4) == 0;
 }
 
-TEST(an_open_answer_is_not_taken)
+TEST(an_unsealed_answer_is_refused)
 {
     heard_only_the_seal = false;
     struct daemon *daemon = start(play_open);

@@ -394,7 +394,7 @@ TEST(lower_quality_makes_smaller_files)
 
 /* ---- videos that do not come about ---- */
 
-TEST(what_cannot_be_written_is_said_before_the_first_frame)
+TEST(an_unwritable_output_is_reported_before_the_first_frame)
 {
     static const struct {
         const char *name;
@@ -490,7 +490,7 @@ TEST(a_video_without_frames_is_refused)
     assert_int_equal(count_files(), 0);
 }
 
-TEST(an_unfinished_video_leaves_nothing_and_the_old_file_as_it_was)
+TEST(an_unfinished_video_leaves_nothing_and_keeps_the_old_file)
 {
     uint8_t *bytes;
     need(false);
@@ -578,7 +578,7 @@ TEST(a_full_disk_is_reported_and_no_file_is_left)
     free(frame.pixels);
 }
 
-TEST(an_interrupted_video_can_be_finished_with_what_there_is)
+TEST(an_interrupted_video_can_be_finished_with_the_frames_so_far)
 {
     int interrupt[2];
     uint32_t written = 0;

@@ -239,7 +239,7 @@ TEST(cameras_are_sent_and_frames_name_them_with_their_times)
 }
 
 /* Every frame is acknowledged once it is whole, and makes room for another once it is taken. */
-TEST(frames_are_acknowledged_and_credit_follows_those_that_are_taken)
+TEST(frames_are_acknowledged_and_credit_follows_the_frames_consumed)
 {
     struct viewing viewing;
     struct fl_view *view = begin_view(&viewing, play_view);
@@ -380,7 +380,7 @@ static void play_refused_change(struct daemon *daemon)
     }
 }
 
-TEST(a_refused_change_is_told_once_and_the_view_goes_on_as_it_was)
+TEST(a_refused_change_is_reported_once_and_the_view_continues_unchanged)
 {
     struct viewing viewing;
     struct fl_view *view = begin_view(&viewing, play_refused_change);
@@ -597,7 +597,7 @@ static void play_half(struct daemon *daemon)
     }
 }
 
-TEST(a_connection_that_is_lost_within_a_frame_is_told_and_nothing_waits_for_ever)
+TEST(a_connection_lost_within_a_frame_is_reported_and_nothing_waits_forever)
 {
     struct viewing viewing;
     struct fl_view *view = begin_view(&viewing, play_half);

@@ -85,7 +85,7 @@ static double pass(struct encoder_stream *stream, struct player *player, int ste
 
 ALL_TESTS(skip_without_h264, NULL)
 
-TEST(each_picture_decodes_at_once_and_looks_as_it_was)
+TEST(each_picture_decodes_alone_and_looks_like_the_original)
 {
     struct encoder_stream *stream = new_stream();
     struct player player = player_begin();
@@ -107,7 +107,7 @@ TEST(each_picture_decodes_at_once_and_looks_as_it_was)
 }
 
 /* Beyond 75, what 8 bits of Y'CbCr lose outweighs the rest: only bytes tell. */
-TEST(quality_is_the_one_that_is_asked_for_picture_by_picture)
+TEST(quality_may_change_from_picture_to_picture)
 {
     struct encoder_stream *stream = new_stream();
     struct player player = player_begin();

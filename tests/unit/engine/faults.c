@@ -82,7 +82,7 @@ TEST(a_job_over_which_the_device_is_lost_each_time_is_put_aside_and_others_go_on
     stop(engine);
 }
 
-TEST(a_device_that_is_lost_for_good_fails_all_jobs_and_is_told)
+TEST(a_permanently_lost_device_fails_all_jobs_and_is_reported)
 {
     struct engine *engine = start((struct engine_options){0});
     open_scene(engine, 1, 1);

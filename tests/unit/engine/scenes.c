@@ -655,7 +655,7 @@ TEST(a_description_names_cameras_and_clips)
     stop(engine);
 }
 
-TEST(of_many_cameras_the_first_are_told)
+TEST(of_many_cameras_the_first_are_listed)
 {
     struct engine *engine = start((struct engine_options){0});
     open_as(engine, 1, 1, "a", SHARING_PRIVATE);

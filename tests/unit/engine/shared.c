@@ -173,7 +173,7 @@ TEST(a_lost_device_loses_all_frames_of_a_scene_and_all_are_rendered_again)
     stop(engine);
 }
 
-TEST(what_a_clients_job_held_is_there_for_its_next_one)
+TEST(the_renderer_of_a_clients_job_serves_its_next_job)
 {
     struct engine *engine = start((struct engine_options){0});
     open_scene(engine, 1, 1);

@@ -535,7 +535,7 @@ TEST(rest_that_is_encoded_as_motion_comes_in_the_same_form)
     expect_form(take(expect_frame(watching->engine, 1, 2, 1)), ENCODING_JPEG, YCBCR_JPEG);
 }
 
-TEST(a_view_that_does_not_adapt_stays_as_it_was_asked_for)
+TEST(a_view_that_does_not_adapt_keeps_its_requested_settings)
 {
     struct watching *watching = *state;
     struct engine_command *made = with_samples(view(2, watching->wishes), 2, 1);

@@ -48,7 +48,7 @@ TEST(listing_devices_leaves_the_current_context_alone_or_none_behind)
     assert_string_equal(device->info.name, list[0].name);
 }
 
-TEST(a_device_that_is_not_there_is_an_error_with_a_remedy)
+TEST(a_missing_device_is_an_error_with_a_remedy)
 {
     struct error error = {0};
     gpu_device_destroy(device);
@@ -354,7 +354,7 @@ static void spoil_files(const char *folder)
     assert_int_equal(system(command), 0);
 }
 
-TEST(programs_outlive_the_process_where_there_is_a_place_for_them)
+TEST(programs_outlive_the_process_in_a_writable_cache)
 {
     char folder[1024], command[2048];
     const char *temporary = getenv("TMPDIR");

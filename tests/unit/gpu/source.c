@@ -70,7 +70,7 @@ TEST(defines_stand_in_front_and_a_path_among_them_is_not_seen_by_glsl)
                 "#line 3 0\nint last;\n");
 }
 
-TEST(a_file_that_includes_itself_is_there_once)
+TEST(a_file_that_includes_itself_is_expanded_once)
 {
     expect_text("circle.comp", NULL, "#version 450 core\n#line 1 0\n\n#line 2 0\nint once;\n");
 }

@@ -242,7 +242,7 @@ TEST(lights_go_along_minus_z_of_their_nodes)
     fixture_finish(&fixture);
 }
 
-TEST(an_environment_image_is_there_until_it_is_taken_away)
+TEST(an_environment_image_stays_until_it_is_removed)
 {
     struct fixture fixture;
     uint16_t half_floats[2 * 1 * 4] = {0x3c00};

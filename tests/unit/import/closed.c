@@ -172,7 +172,7 @@ TEST(sheets_with_two_sides_bound_nothing)
     assert_false(closed(&beside));
 }
 
-TEST(a_body_may_be_there_twice)
+TEST(two_coincident_bodies_are_closed)
 {
     struct mesh mesh = {0};
     add_cube(&mesh, 0, 1);

@@ -126,7 +126,7 @@ TEST_WITH(a_key_file_of_another_user_is_refused, make_folder, remove_folder)
     assert_non_null(strstr(error.text, "another user"));
 }
 
-TEST_WITH(the_daemon_reads_its_keys_and_wants_two_different_ones, make_folder, remove_folder)
+TEST_WITH(the_daemon_reads_its_keys_and_refuses_two_equal_ones, make_folder, remove_folder)
 {
     struct auth_keys keys;
     struct error error = {0};

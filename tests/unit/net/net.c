@@ -447,7 +447,7 @@ static void drain(struct out_queue *queue, size_t step, char *text)
     *text = '\0';
 }
 
-TEST(control_goes_first_and_nothing_is_lost_however_little_is_taken)
+TEST(control_data_is_sent_first_and_partial_writes_lose_nothing)
 {
     for (size_t step = 1; step < 30; step++) {
         struct queue_scene scene;
@@ -489,7 +489,7 @@ TEST(what_is_dropped_is_not_sent_but_what_was_begun_is_finished)
     queue_end(&scene);
 }
 
-TEST(what_was_begun_is_sent_and_told_when_the_rest_is_dropped)
+TEST(a_begun_item_is_sent_and_reported_when_the_rest_is_dropped)
 {
     struct queue_scene scene;
     struct iovec parts[16];
@@ -514,7 +514,7 @@ TEST(what_was_begun_is_sent_and_told_when_the_rest_is_dropped)
 }
 
 /* What a sealed connection has copied, but the kernel has not taken yet. */
-TEST(what_was_taken_is_begun_but_not_sent)
+TEST(copied_bytes_count_as_begun_and_not_as_sent)
 {
     struct queue_scene scene;
     struct iovec parts[16];

@@ -10,7 +10,7 @@
 #define GOLDEN_PATH "tests/unit/protocol/golden/messages.hex"
 #define RANDOM_CASES 20u
 
-TEST(every_message_comes_back_as_it_was_sent)
+TEST(every_message_round_trips_unchanged)
 {
     struct message message;
     for (size_t i = 0; i < protocol_message_count; i++) {

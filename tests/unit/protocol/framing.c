@@ -182,7 +182,7 @@ TEST(the_header_has_its_fixed_layout)
     assert_memory_equal(&back, &header, sizeof header);
 }
 
-TEST(a_message_that_does_not_fit_leaves_the_buffer_as_it_was)
+TEST(a_message_that_does_not_fit_leaves_the_buffer_unchanged)
 {
     struct message message;
     struct writer writer;
@@ -205,7 +205,7 @@ TEST(a_message_that_does_not_fit_leaves_the_buffer_as_it_was)
     }
 }
 
-TEST(the_table_has_no_number_or_name_twice)
+TEST(numbers_and_names_of_the_table_are_unique)
 {
     for (size_t i = 0; i < protocol_message_count; i++) {
         const struct message_info *info = &protocol_messages[i].info;

@@ -153,7 +153,7 @@ TEST(the_reply_has_its_frozen_layout)
     assert_string_equal(back.text, reply.text);
 }
 
-TEST(every_prefix_wants_more_and_what_follows_is_left_alone)
+TEST(every_prefix_needs_more_and_bytes_that_follow_are_not_consumed)
 {
     uint8_t bytes[HANDSHAKE_REPLY_MAX_BYTES + 16];
     struct handshake_hello hello = some_hello(), hello_back;

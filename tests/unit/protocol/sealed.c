@@ -361,7 +361,7 @@ ALL_TESTS(prepare, NULL)
 
 /* ---- who has no business there ------------------------------------------------------------------------- */
 
-TEST(a_wrong_key_is_refused_and_nothing_is_told)
+TEST(a_wrong_key_is_refused_without_a_reason)
 {
     const struct sealed_key keys[2] = {full_key, reader_key};
     begin(&other_key, keys, 2);
@@ -397,7 +397,7 @@ TEST(a_server_without_the_key_is_found_out)
     end_both();
 }
 
-TEST(refusals_are_told_by_their_reason)
+TEST(refusals_are_reported_with_their_reason)
 {
     static const enum sealed_status at_once[] = {SEALED_TOO_MANY, SEALED_NO_KEY, SEALED_OTHER_VERSION};
     uint8_t refusal[SEALED_REFUSAL_BYTES];

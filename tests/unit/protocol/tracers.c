@@ -65,7 +65,7 @@ static void expect_fault(const struct tracer_settings *settings, const char *pre
         fail_msg("got \"%s\" (%s)", fault.text, fault.remedy);
 }
 
-TEST(a_wrong_setting_is_told_with_its_name_and_what_is_allowed)
+TEST(a_wrong_setting_is_reported_with_its_name_and_what_is_allowed)
 {
     expect_fault(&(struct tracer_settings){.ldc = {.resolution = 15}}, "render.", "render.ldc_resolution",
                  "15 is not one of 16 to 4096 (0: 1024)", "");
@@ -75,7 +75,7 @@ TEST(a_wrong_setting_is_told_with_its_name_and_what_is_allowed)
     expect_fault(&(struct tracer_settings){.abuffer = {.search = 9}}, "", "abuffer_search", "auto, dda", "");
 }
 
-TEST(settings_that_do_not_go_together_are_told_with_both_names)
+TEST(settings_that_contradict_each_other_are_reported_with_both_names)
 {
     struct setting_fault fault;
     struct tracer_settings settings = {.ldc = {.levels = PROTOCOL_LDC_LEVELS_CELLS, .tolerance = 1}};

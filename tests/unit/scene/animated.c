@@ -147,7 +147,7 @@ TEST(skins_clips_and_channels_make_sense_alone)
 
 /* ---- several ------------------------------------------------------------------------------------ */
 
-TEST(skins_and_channels_refer_to_what_is_there)
+TEST(skins_and_channels_refer_to_existing_objects)
 {
     struct scene *scene = animated_scene();
     struct draft_list list = {0};
@@ -218,7 +218,7 @@ TEST(channels_have_their_numbers_in_their_clips)
 }
 
 /* As many as are not compared one by one any more. */
-TEST(many_channels_of_the_same_times_are_told_apart)
+TEST(many_channels_with_equal_times_stay_distinct)
 {
     enum { COUNT = 4 << 20, CHANNELS = 20, LEAP = COUNT - 3 };
     struct scene *scene = animated_scene();

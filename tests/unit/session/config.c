@@ -122,7 +122,7 @@ TEST(the_environment_goes_over_the_file_and_a_flag_over_both)
     unsetenv("FARLIGHT_LIMITS_CLIENTS");
 }
 
-TEST(a_missing_file_is_an_error_only_if_it_was_asked_for)
+TEST(a_missing_file_is_an_error_only_if_it_was_named)
 {
     struct config config;
     struct error error = {0};

@@ -188,7 +188,7 @@ SESSION_TEST(a_size_that_is_only_declared_takes_no_room_from_others)
     expect(MESSAGE_OK, 6);
 }
 
-SESSION_TEST(made_up_hashes_with_the_same_head_are_told_apart)
+SESSION_TEST(made_up_hashes_with_the_same_head_stay_distinct)
 {
     uint8_t data[100] = {7};
     struct record_blob_ref references[3] = {reference_to(data, sizeof data)};

@@ -35,7 +35,7 @@ static void expect_frame(uint32_t request, uint32_t number)
     assert_true(queue && sent);
 }
 
-SESSION_TEST(frames_come_whole_in_order_and_as_far_as_credit_goes)
+SESSION_TEST(frames_arrive_complete_in_order_and_within_the_credit)
 {
     open_scene(1, 1);
     struct message message = render_message(6, 2);
@@ -70,7 +70,7 @@ SESSION_TEST(a_cancelled_job_has_one_answer_and_nothing_follows_it)
 }
 
 /* Cancelled in the middle of its frames: pieces may be in the socket, nothing comes after the answer. */
-SESSION_TEST(a_job_whose_credit_is_used_up_is_told_so_once)
+SESSION_TEST(exhausted_credit_is_reported_once)
 {
     open_scene(1, 1);
     struct message message = render_message(2, 2);
@@ -415,7 +415,7 @@ SESSION_TEST(a_frame_tells_what_the_tracer_says_of_its_structure)
     expect(MESSAGE_OK, 2);
 }
 
-SESSION_TEST(a_job_whose_frames_have_no_room_waits_for_others_to_end)
+SESSION_TEST(a_job_whose_frames_do_not_fit_in_memory_waits_for_others_to_end)
 {
     atomic_store(&engine.keep_jobs, true);
     open_scene(1, 1);

@@ -251,7 +251,7 @@ TEST(a_cut_connection_finds_its_scene_again_without_sending_it)
     cut(witness, NULL);
 }
 
-TEST(a_stranger_leaves_a_shared_scene_that_stays_whole)
+TEST(a_client_that_leaves_a_shared_scene_does_not_change_it)
 {
     struct client *witness = come(false), *stranger = come(true);
     open_scene_as(stranger, 1, "shared", PROTOCOL_SHARING_SHARED);

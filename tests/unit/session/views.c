@@ -419,7 +419,7 @@ SESSION_TEST(a_request_for_a_key_frame_reaches_the_engine)
     engine_command_destroy(start);
 }
 
-SESSION_TEST(a_client_without_credit_is_told_that_it_is_used_up)
+SESSION_TEST(exhausted_credit_of_a_view_is_reported)
 {
     struct engine_command *start = start_acknowledged_view(2, 1);
     for (unsigned i = 0; !client.blocked && i < 6000; i++) {
@@ -536,7 +536,7 @@ SESSION_TEST(a_frame_that_is_still_needed_is_not_abandoned)
     engine_command_destroy(start);
 }
 
-TEST_WITH(a_client_that_does_not_allow_abandoned_frames_gets_them_whole, set_up_ungreeted, tear_down)
+TEST_WITH(a_client_that_does_not_allow_abandoned_frames_gets_complete_frames, set_up_ungreeted, tear_down)
 {
     assert_int_equal(greet_with(0) & HANDSHAKE_CAN_ABANDON, 0);
     struct engine_command *start = start_view(2, 100);
@@ -647,7 +647,7 @@ SESSION_TEST(a_view_takes_the_place_of_another_on_its_channel)
     engine_command_destroy(start);
 }
 
-SESSION_TEST(a_frame_under_way_comes_whole_before_the_answer)
+SESSION_TEST(a_frame_being_sent_is_completed_before_the_answer)
 {
     start_view_with_credit();
     engine_command_destroy(replace_view(3, 17));
@@ -715,7 +715,7 @@ SESSION_TEST(a_frame_under_way_of_a_view_that_was_replaced_still_takes_room)
     engine_command_destroy(start);
 }
 
-SESSION_TEST(a_view_that_cannot_be_leaves_the_one_that_is)
+SESSION_TEST(a_refused_view_leaves_the_running_one_unchanged)
 {
     start_view_with_credit();
     struct message message = view_message(0);
@@ -867,7 +867,7 @@ TEST_WITH(video_needs_the_word_of_both_sides_and_a_view_of_8_bits, set_up_ungree
     engine_command_destroy(command);
 }
 
-SESSION_TEST(what_a_view_attaches_is_told_on_and_announced)
+SESSION_TEST(attachments_of_a_view_are_forwarded_and_announced)
 {
     open_scene(1, 1);
     struct message message = made(MESSAGE_RENDER); /* a batch has layers */

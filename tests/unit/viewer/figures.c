@@ -238,7 +238,7 @@ TEST(the_overlay_shows_its_figures_within_the_window)
 }
 
 /* What does not fit is left out; nothing lies over something else but help and status. */
-TEST(in_a_small_window_there_is_less)
+TEST(a_small_window_shows_less)
 {
     for (uint32_t i = 0; i < 20; i++)
         add(i, i + 1, (1000 + i * 20) * MS);

@@ -48,7 +48,7 @@ TEST(many_layers_are_sorted)
 }
 
 /* One body in another, a thousand times: 63 is the greatest number that a sample tells. */
-TEST(windings_beyond_what_is_told_stay_there)
+TEST(windings_beyond_the_stored_range_are_clamped)
 {
     struct test_edits edits = {.scene = test_scene_create()};
     struct fixture fixture;

@@ -463,7 +463,7 @@ TEST(an_evenly_fine_mesh_loses_nothing_to_its_grid)
     input_finish(&input);
 }
 
-TEST(fine_detail_in_a_great_extent_is_told_by_the_cost_of_its_grid)
+TEST(fine_detail_in_a_large_extent_shows_in_the_cost_of_its_grid)
 {
     struct input input = triangles(2002, 1, 0.05f, 26);
     for (uint32_t i = 0; i < 9 * 2000; i++)

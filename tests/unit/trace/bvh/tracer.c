@@ -376,7 +376,7 @@ TEST(coherent_neighbours_are_traced_as_packets_and_a_wave_keeps_its_packet_size)
 }
 
 /* The first of each eight goes nowhere; the others must neither wait for it nor be lost with it. */
-TEST(rays_beside_one_that_is_no_number_hit_as_by_brute_force)
+TEST(rays_beside_a_NaN_ray_hit_as_by_brute_force)
 {
     struct ray *rays = malloc(RAY_COUNT * sizeof(struct ray));
     uint64_t seed = 34;
