@@ -138,7 +138,7 @@ static const struct option options[] = {
      "Output waiting for a client beyond which it is disconnected at once"},
 };
 /* clang-format on */
-#define OPTION_COUNT (sizeof options / sizeof options[0])
+#define OPTION_COUNT (sizeof(options) / sizeof(options[0]))
 
 /* ---- values ------------------------------------------------------------------------------------------ */
 
@@ -308,7 +308,7 @@ static int on_value(void *user, const char *section, const char *key, const char
 {
     struct reader *reader = user;
     char name[128];
-    snprintf(name, sizeof name, "%s.%s", section, key);
+    snprintf(name, sizeof(name), "%s.%s", section, key);
     return set_named(reader->config, name, value, name, &reader->error);
 }
 
@@ -325,8 +325,8 @@ bool config_read_file(struct config *config, const char *path, bool optional, st
     fclose(file);
     if (line == 0)
         return true;
-    char field[sizeof error->field];
-    snprintf(field, sizeof field, "%s:%d", path, line);
+    char field[sizeof(error->field)];
+    snprintf(field, sizeof(field), "%s:%d", path, line);
     if (reader.error.kind == ERROR_NONE)
         return error_set(error, ERROR_INVALID, field, "neither a [section] nor key = value");
     return error_set(error, ERROR_INVALID, field, "%s: %s", reader.error.field, reader.error.text);
@@ -336,7 +336,7 @@ bool config_read_environment(struct config *config, struct error *error)
 {
     for (size_t i = 0; i < OPTION_COUNT; i++) {
         char name[128];
-        snprintf(name, sizeof name, "FARLIGHT_%s_%s", options[i].section, options[i].key);
+        snprintf(name, sizeof(name), "FARLIGHT_%s_%s", options[i].section, options[i].key);
         for (char *c = name; *c; c++)
             *c = (char)toupper((unsigned char)*c);
         const char *value = getenv(name);
@@ -448,9 +448,9 @@ static void print_doc(const struct option *option, FILE *stream)
 {
     char text[COMMENT_MAX_BYTES], range[64] = "";
     if (option->type == OPTION_U32 || option->type == OPTION_BYTES || option->type == OPTION_MEBIBYTES)
-        snprintf(range, sizeof range, " %" PRIu64 " .. %" PRIu64 "%s%s.", option->min, option->max,
+        snprintf(range, sizeof(range), " %" PRIu64 " .. %" PRIu64 "%s%s.", option->min, option->max,
                  option->unit[0] ? " " : "", option->unit);
-    snprintf(text, sizeof text, "%s.%s%s", option->doc, option->time == START ? " Read at the start only." : "",
+    snprintf(text, sizeof(text), "%s.%s%s", option->doc, option->time == START ? " Read at the start only." : "",
              range);
     print_comment(text, stream);
 }

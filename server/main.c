@@ -61,7 +61,7 @@ struct arguments {
 static int list_devices(void)
 {
     struct gpu_device_info list[32];
-    size_t count = gpu_device_list(list, sizeof list / sizeof list[0]);
+    size_t count = gpu_device_list(list, sizeof(list) / sizeof(list[0]));
     for (size_t i = 0; i < count; i++)
         printf("%d  %s  (%s, OpenGL %s%s)\n", list[i].index, list[i].name, list[i].vendor, list[i].version,
                list[i].software ? ", software" : "");
@@ -71,7 +71,7 @@ static int list_devices(void)
 static error_t parse_option(int key, char *value, struct argp_state *state)
 {
     struct arguments *arguments = state->input;
-    size_t used = strlen(arguments->listen), room = sizeof arguments->listen - used;
+    size_t used = strlen(arguments->listen), room = sizeof(arguments->listen) - used;
     switch (key) {
     case 'l':
         if ((size_t)snprintf(arguments->listen + used, room, "%s ", value) >= room)

@@ -18,7 +18,7 @@ struct blob *blob_create_empty(size_t size_bytes)
 {
     if (size_bytes > SIZE_MAX / 2)
         return NULL;
-    struct blob *blob = calloc(1, sizeof *blob);
+    struct blob *blob = calloc(1, sizeof(*blob));
     if (!blob)
         return NULL;
     atomic_init(&blob->references, 1);

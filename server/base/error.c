@@ -10,10 +10,10 @@ bool error_set(struct error *error, enum error_code kind, const char *field, con
         return false;
     *error = (struct error){.kind = kind, .retryable = kind == ERROR_BUSY};
     if (field)
-        snprintf(error->field, sizeof error->field, "%s", field);
+        snprintf(error->field, sizeof(error->field), "%s", field);
     va_list arguments;
     va_start(arguments, format);
-    vsnprintf(error->text, sizeof error->text, format, arguments);
+    vsnprintf(error->text, sizeof(error->text), format, arguments);
     va_end(arguments);
     return false;
 }
@@ -24,7 +24,7 @@ bool error_remedy(struct error *error, const char *format, ...)
         return false;
     va_list arguments;
     va_start(arguments, format);
-    vsnprintf(error->remedy, sizeof error->remedy, format, arguments);
+    vsnprintf(error->remedy, sizeof(error->remedy), format, arguments);
     va_end(arguments);
     return false;
 }

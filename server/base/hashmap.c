@@ -33,7 +33,7 @@ static uint64_t secret(void)
     uint64_t chosen = atomic_load_explicit(&value, memory_order_relaxed);
     if (chosen)
         return chosen;
-    if (getrandom(&chosen, sizeof chosen, 0) != (ssize_t)sizeof chosen)
+    if (getrandom(&chosen, sizeof(chosen), 0) != (ssize_t)sizeof(chosen))
         chosen = (uintptr_t)&chosen; /* no random numbers: better than nothing */
     chosen |= 1;
     uint64_t other = 0;
@@ -71,10 +71,10 @@ static bool grow(struct hashmap *map)
     size_t capacity = map->capacity ? map->capacity * 2 : CAPACITY_MIN;
     if (capacity > CAPACITY_MAX)
         return false;
-    uint32_t *index = calloc(capacity, sizeof *index);
+    uint32_t *index = calloc(capacity, sizeof(*index));
     if (!index)
         return false;
-    struct hashmap_slot *slots = realloc(map->slots, capacity / 2 * sizeof *slots);
+    struct hashmap_slot *slots = realloc(map->slots, capacity / 2 * sizeof(*slots));
     if (!slots) {
         free(index);
         return false;

@@ -42,13 +42,13 @@ void log_write(enum log_level level, const char *module, const char *format, ...
     if (!log_enabled(level))
         return;
     char line[LINE_BYTES_MAX];
-    int head = snprintf(line, sizeof line - 1, "%s %s: ", log_level_name(level), module);
+    int head = snprintf(line, sizeof(line) - 1, "%s %s: ", log_level_name(level), module);
     size_t used = head < 0 ? 0 : (size_t)head;
-    if (used > sizeof line - 2)
-        used = sizeof line - 2;
+    if (used > sizeof(line) - 2)
+        used = sizeof(line) - 2;
     va_list arguments;
     va_start(arguments, format);
-    int tail = vsnprintf(line + used, sizeof line - 1 - used, format, arguments);
+    int tail = vsnprintf(line + used, sizeof(line) - 1 - used, format, arguments);
     va_end(arguments);
     if (tail > 0)
         used += strlen(line + used);

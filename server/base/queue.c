@@ -20,7 +20,7 @@ struct queue *queue_create(size_t capacity, bool event_fd)
 {
     if (!capacity || capacity > (SIZE_MAX - sizeof(struct queue)) / sizeof(void *))
         return NULL;
-    struct queue *queue = calloc(1, sizeof *queue + capacity * sizeof(void *));
+    struct queue *queue = calloc(1, sizeof(*queue) + capacity * sizeof(void *));
     if (!queue)
         return NULL;
     queue->capacity = capacity;
@@ -63,14 +63,14 @@ void queue_destroy(struct queue *queue, void (*drop)(void *item))
 static void raise_event(struct queue *queue)
 {
     uint64_t one = 1;
-    ssize_t written = queue->event_fd >= 0 ? write(queue->event_fd, &one, sizeof one) : 0;
+    ssize_t written = queue->event_fd >= 0 ? write(queue->event_fd, &one, sizeof(one)) : 0;
     (void)written; /* cannot fail: the counter is 0 */
 }
 
 static void clear_event(struct queue *queue)
 {
     uint64_t value;
-    ssize_t got = queue->event_fd >= 0 ? read(queue->event_fd, &value, sizeof value) : 0;
+    ssize_t got = queue->event_fd >= 0 ? read(queue->event_fd, &value, sizeof(value)) : 0;
     (void)got; /* cannot fail: the counter is 1 */
 }
 

@@ -30,7 +30,7 @@ static void make_room(struct stage_times *times)
         if (!before)
             continue;
         before->duration_ns += span->duration_ns;
-        memmove(span, span + 1, (--times->count - i) * sizeof *span);
+        memmove(span, span + 1, (--times->count - i) * sizeof(*span));
         return;
     }
 }

@@ -91,8 +91,8 @@ static void *write_waiting(void *context)
 /* A block is one or more events, separated. */
 static void accept(struct timeline *timeline, const char *block, size_t count)
 {
-    size_t separator_bytes = timeline->accepted_bytes > 0 ? sizeof separator - 1 : 0;
-    uint64_t fixed_bytes = sizeof head - 1 + sizeof tail - 1 + separator_bytes;
+    size_t separator_bytes = timeline->accepted_bytes > 0 ? sizeof(separator) - 1 : 0;
+    uint64_t fixed_bytes = sizeof(head) - 1 + sizeof(tail) - 1 + separator_bytes;
     if (timeline->limit_bytes < fixed_bytes + timeline->accepted_bytes ||
         count > timeline->limit_bytes - fixed_bytes - timeline->accepted_bytes) {
         timeline->full = true;
@@ -105,7 +105,7 @@ static void accept(struct timeline *timeline, const char *block, size_t count)
         timeline->full = true;
     } else if (separator_bytes + count > WAITING_MAX_BYTES - timeline->waiting_bytes) {
         timeline->left_out++;
-        memset(timeline->jobs, 0, sizeof timeline->jobs); /* the names of new tracks may be lost with it */
+        memset(timeline->jobs, 0, sizeof(timeline->jobs)); /* the names of new tracks may be lost with it */
     } else {
         memcpy(timeline->waiting + timeline->waiting_bytes, separator, separator_bytes);
         memcpy(timeline->waiting + timeline->waiting_bytes + separator_bytes, block, count);
@@ -134,7 +134,7 @@ static struct job_tracks *find_tracks(struct timeline *timeline, const struct ti
     }
     *oldest = (struct job_tracks){.client = frame->client, .job = frame->job, .last_used = timeline->uses};
     char name[160];
-    snprintf(name, sizeof name, "client %" PRIu64 " %s", frame->client, frame->client_name);
+    snprintf(name, sizeof(name), "client %" PRIu64 " %s", frame->client, frame->client_name);
     trace_write_process_name(writer, frame->client, name);
     return oldest;
 }
@@ -194,7 +194,7 @@ void timeline_frame(struct timeline *timeline, const struct timeline_frame *fram
 
 struct timeline *timeline_create(const char *path, uint64_t limit_bytes, struct error *error)
 {
-    struct timeline *timeline = calloc(1, sizeof *timeline);
+    struct timeline *timeline = calloc(1, sizeof(*timeline));
     if (!timeline || !(timeline->waiting = malloc(WAITING_MAX_BYTES))) {
         free(timeline);
         error_set(error, ERROR_OUT_OF_MEMORY, path, "no memory for a trace file");
@@ -206,7 +206,7 @@ struct timeline *timeline_create(const char *path, uint64_t limit_bytes, struct 
     /* Not blocking: a FIFO without a reader is an error and not a daemon that never starts. */
     timeline->fd = open(path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NONBLOCK | O_NOCTTY, 0644);
     int failure = timeline->fd < 0 ? errno : 0;
-    if (!failure && !write_all(timeline->fd, head, sizeof head - 1))
+    if (!failure && !write_all(timeline->fd, head, sizeof(head) - 1))
         failure = errno;
     if (!failure)
         failure = pthread_create(&timeline->thread, NULL, write_waiting, timeline);
@@ -231,7 +231,7 @@ void timeline_destroy(struct timeline *timeline)
     pthread_cond_signal(&timeline->changed);
     pthread_mutex_unlock(&timeline->mutex);
     pthread_join(timeline->thread, NULL);
-    if (!timeline->failed && !write_all(timeline->fd, tail, sizeof tail - 1))
+    if (!timeline->failed && !write_all(timeline->fd, tail, sizeof(tail) - 1))
         log_write(LOG_WARNING, "trace-file", "cannot be ended: %s", strerror(errno));
     close(timeline->fd);
     if (timeline->left_out > 0)

@@ -296,7 +296,7 @@ struct encoder_stream *encoder_stream_create(enum encoding encoding, float frame
         error_set(error, ERROR_UNSUPPORTED, "encoding", "libavcodec has no encoder of H.264");
         return NULL;
     }
-    struct encoder_stream *stream = calloc(1, sizeof *stream);
+    struct encoder_stream *stream = calloc(1, sizeof(*stream));
     if (!stream) {
         error_set(error, ERROR_OUT_OF_MEMORY, "encoding", "no memory for a stream");
         return NULL;

@@ -17,7 +17,7 @@ static bool find(void *library, const char *name, void *function)
 {
     void *address = library ? dlsym(library, name) : NULL;
     /* Through bytes, as a pointer to data is no pointer to a function in C. */
-    memcpy(function, &address, sizeof address);
+    memcpy(function, &address, sizeof(address));
     return address != NULL;
 }
 

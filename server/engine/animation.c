@@ -43,7 +43,7 @@ void animation_key_at(const struct camera_key *keys, uint32_t key_count, double 
     float numbers[KEY_FLOATS] = {(float)time_s};
     for (size_t i = 0; i < KEY_FLOATS - 1; i++)
         numbers[i + 1] = (float)value[i];
-    memcpy(key, numbers, sizeof numbers);
+    memcpy(key, numbers, sizeof(numbers));
     key->fov_y = fminf(fmaxf(key->fov_y, FOV_MIN), FOV_MAX);
 }
 
@@ -227,7 +227,7 @@ bool animation_check(const struct engine_job *job, struct error *error)
         if (job->keys[i].time_s > job->keys[i - 1].time_s)
             continue;
         char field[48];
-        snprintf(field, sizeof field, "render.keys[%u].time_s", i);
+        snprintf(field, sizeof(field), "render.keys[%u].time_s", i);
         return error_set(error, ERROR_INVALID, field, "%g s is not after the key before it, at %g s",
                          (double)job->keys[i].time_s, (double)job->keys[i - 1].time_s);
     }
@@ -244,11 +244,11 @@ static bool keys_camera(const struct engine_job *job, const struct pose_view *gi
     struct camera_key key;
     animation_key_at(job->keys, job->key_count, time_s, &key);
     if (given->given & POSE_VIEW_EYE)
-        memcpy(key.eye_world, given->eye_world, sizeof key.eye_world);
+        memcpy(key.eye_world, given->eye_world, sizeof(key.eye_world));
     if (given->given & POSE_VIEW_LOOK_AT)
-        memcpy(key.look_at_world, given->look_at_world, sizeof key.look_at_world);
+        memcpy(key.look_at_world, given->look_at_world, sizeof(key.look_at_world));
     if (given->given & POSE_VIEW_UP)
-        memcpy(key.up_world, given->up_world, sizeof key.up_world);
+        memcpy(key.up_world, given->up_world, sizeof(key.up_world));
     if (!animation_key_camera(&key, "render.keys", camera, error))
         return false;
     *focus = animation_distance(camera, key.look_at_world);

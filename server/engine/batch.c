@@ -52,11 +52,11 @@ static bool jobs_reserve(struct engine *engine)
     if (engine->job_count < engine->job_capacity)
         return true;
     size_t capacity = engine->job_capacity ? engine->job_capacity * 2 : 16;
-    struct job **jobs = realloc(engine->jobs, capacity * sizeof *jobs);
+    struct job **jobs = realloc(engine->jobs, capacity * sizeof(*jobs));
     if (!jobs)
         return false;
     engine->jobs = jobs;
-    struct schedule_entry *entries = realloc(engine->entries, capacity * sizeof *entries);
+    struct schedule_entry *entries = realloc(engine->entries, capacity * sizeof(*entries));
     if (!entries)
         return false;
     engine->entries = entries;
@@ -89,7 +89,7 @@ bool job_start(struct engine *engine, struct engine_reference *reference, struct
 {
     if (!spec_check(&command->job, reference->scene->scene, error))
         return false;
-    struct job *job = calloc(1, sizeof *job);
+    struct job *job = calloc(1, sizeof(*job));
     struct job_output *output = job_output_create(&(struct job_output_options){
         .events = engine->events,
         .client = command->client,
@@ -425,7 +425,7 @@ static void frame_done(struct engine *engine, struct job *job, struct engine_fra
 static void frame_go_on(struct engine *engine, struct job *job)
 {
     struct error error = {0};
-    struct engine_frame *frame = calloc(1, sizeof *frame);
+    struct engine_frame *frame = calloc(1, sizeof(*frame));
     if (!frame) {
         error_set(&error, ERROR_OUT_OF_MEMORY, "render", "no memory for a frame");
         frame_failed(engine, job, &error);

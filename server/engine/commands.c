@@ -79,7 +79,7 @@ static void start(struct engine *engine, struct engine_reference *reference, str
 /* False: it stays the caller's. */
 static bool keep_waiting(struct engine_scene *scene, struct engine_command *command)
 {
-    struct engine_command **waiting = realloc(scene->waiting, (scene->waiting_count + 1) * sizeof *waiting);
+    struct engine_command **waiting = realloc(scene->waiting, (scene->waiting_count + 1) * sizeof(*waiting));
     if (!waiting)
         return false;
     scene->waiting = waiting;
@@ -114,7 +114,7 @@ static bool waits_by(const struct engine_scene *scene, const struct engine_refer
 static struct engine_command *take_waiting(struct engine_scene *scene, size_t i)
 {
     struct engine_command *command = scene->waiting[i];
-    memmove(&scene->waiting[i], &scene->waiting[i + 1], (--scene->waiting_count - i) * sizeof *scene->waiting);
+    memmove(&scene->waiting[i], &scene->waiting[i + 1], (--scene->waiting_count - i) * sizeof(*scene->waiting));
     return command;
 }
 

@@ -49,7 +49,7 @@ static void fill_entry(struct engine_scene_entry *entry, struct engine_scene *sc
     engine_count_contents(scene);
     *entry = (struct engine_scene_entry){
         .revision = scene->scene->revision, .triangles = scene->triangles, .sharing = scene->sharing};
-    memcpy(entry->name, scene->scene->name, sizeof entry->name);
+    memcpy(entry->name, scene->scene->name, sizeof(entry->name));
     for (const struct engine_reference *one = scene->references; one; one = one->next)
         entry->clients++;
 }
@@ -60,7 +60,7 @@ void engine_scene_list(struct engine *engine, const struct engine_command *comma
     for (const struct engine_scene *scene = engine->scenes; scene; scene = scene->next)
         count++;
     struct engine_event *event = event_create(ENGINE_SCENES_LISTED, command->client, command->request);
-    struct engine_scene_list *list = calloc(1, sizeof *list + count * sizeof list->scenes[0]);
+    struct engine_scene_list *list = calloc(1, sizeof(*list) + count * sizeof(list->scenes[0]));
     if (event && !list) {
         event->kind = ENGINE_FAILED;
         error_set(&event->error, ERROR_OUT_OF_MEMORY, "scene_list", "no memory for an answer");
@@ -74,7 +74,7 @@ void engine_scene_list(struct engine *engine, const struct engine_command *comma
         if (engine_scene_is_open_to(scene, command->principal))
             fill_entry(&list->scenes[list->count++], scene);
     }
-    qsort(list->scenes, list->count, sizeof list->scenes[0], by_name);
+    qsort(list->scenes, list->count, sizeof(list->scenes[0]), by_name);
     event->list = list;
     engine_post(engine, event);
 }
@@ -115,14 +115,14 @@ static void describe_cameras(struct engine_scene_description *description, const
         entry->node = nodes[i];
         entry->fov_y = camera ? camera->fov_y : 0;
         memcpy(entry->name, node->base.name[0] || !camera ? node->base.name : camera->base.name,
-               sizeof entry->name);
+               sizeof(entry->name));
     }
 }
 
 static void describe_channel(struct engine_scene_description *description, const uint32_t *numbers,
                              const struct scene *scene, const struct scene_channel *channel)
 {
-    const uint32_t *found = bsearch(&channel->clip, numbers, description->clip_count, sizeof *numbers, by_number);
+    const uint32_t *found = bsearch(&channel->clip, numbers, description->clip_count, sizeof(*numbers), by_number);
     const struct scene_clip *clip = scene_clip(scene, channel->clip);
     if (!found || !clip || !clip->floats)
         return;
@@ -143,7 +143,7 @@ static void describe_clips(struct engine_scene_description *description, const s
     for (uint32_t i = 0; i < description->clip_count; i++) {
         struct engine_clip_entry *entry = &description->clips[i];
         entry->clip = numbers[i];
-        memcpy(entry->name, scene_clip(scene, numbers[i])->base.name, sizeof entry->name);
+        memcpy(entry->name, scene_clip(scene, numbers[i])->base.name, sizeof(entry->name));
     }
     cursor = 0;
     while (hashmap_next(&scene->objects[OBJECT_CHANNEL], &cursor, NULL, &value))
@@ -168,7 +168,7 @@ static const struct engine_scene_description *need_description(struct engine_sce
     if (from->description && from->description->revision == scene->revision)
         return from->description;
     free(from->description);
-    from->description = calloc(1, sizeof *from->description);
+    from->description = calloc(1, sizeof(*from->description));
     if (!from->description)
         return NULL;
     engine_count_contents(from);
@@ -187,7 +187,7 @@ void engine_scene_describe(struct engine *engine, struct engine_scene *scene, co
     struct engine_event *event = event_create(ENGINE_SCENE_DESCRIBED, command->client, command->request);
     const struct engine_scene_description *description = need_description(scene);
     if (event && description)
-        event->description = malloc(sizeof *description);
+        event->description = malloc(sizeof(*description));
     if (event && event->description) {
         *event->description = *description;
     } else if (event) {

@@ -45,7 +45,7 @@ struct encode_lane {
 
 struct encode_lane *encode_lane_create(float frames_per_second)
 {
-    struct encode_lane *lane = calloc(1, sizeof *lane);
+    struct encode_lane *lane = calloc(1, sizeof(*lane));
     if (!lane)
         return NULL;
     atomic_init(&lane->references, 1);
@@ -230,7 +230,7 @@ static void *run_thread(void *context)
 
 struct encode_pool *encode_pool_create(const struct encode_pool_options *options, struct error *error)
 {
-    struct encode_pool *pool = calloc(1, sizeof *pool);
+    struct encode_pool *pool = calloc(1, sizeof(*pool));
     struct queue *tasks = queue_create(QUEUE_CAPACITY, false);
     if (!pool || !tasks) {
         free(pool);
@@ -272,7 +272,7 @@ void encode_pool_destroy(struct encode_pool *pool)
 bool encode_pool_submit(struct encode_pool *pool, struct job_output *output, struct encode_lane *lane,
                         uint64_t position, struct engine_frame *frame)
 {
-    struct encode_task *task = calloc(1, sizeof *task);
+    struct encode_task *task = calloc(1, sizeof(*task));
     if (!task) {
         engine_frame_destroy(frame);
         return false;

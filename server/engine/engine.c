@@ -227,7 +227,7 @@ static bool start_threads(struct engine *engine, struct error *error)
 
 struct engine *engine_create(const struct engine_options *options, struct error *error)
 {
-    struct engine *engine = calloc(1, sizeof *engine);
+    struct engine *engine = calloc(1, sizeof(*engine));
     if (!engine) {
         error_set(error, ERROR_OUT_OF_MEMORY, "engine", "no memory for the engine");
         return NULL;

@@ -23,7 +23,7 @@ struct job_output {
 
 struct job_output *job_output_create(const struct job_output_options *options)
 {
-    struct job_output *output = calloc(1, sizeof *output + options->window * sizeof output->waiting[0]);
+    struct job_output *output = calloc(1, sizeof(*output) + options->window * sizeof(output->waiting[0]));
     if (!output)
         return NULL;
     output->options = *options;
@@ -189,7 +189,7 @@ void job_output_taken(struct job_output *output)
 
 struct engine_event *event_create(enum engine_event_kind kind, uint64_t client, uint32_t request)
 {
-    struct engine_event *event = calloc(1, sizeof *event);
+    struct engine_event *event = calloc(1, sizeof(*event));
     if (!event)
         return NULL;
     event->kind = kind;

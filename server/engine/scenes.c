@@ -14,7 +14,7 @@ static struct engine_client *need_client(struct engine *engine, const struct eng
     struct engine_client *client = hashmap_get(&engine->clients, command->client);
     if (client)
         return client;
-    client = calloc(1, sizeof *client);
+    client = calloc(1, sizeof(*client));
     if (!client || !hashmap_put(&engine->clients, command->client, client)) {
         free(client);
         return NULL;
@@ -35,7 +35,7 @@ struct engine_reference *engine_find_reference(struct engine *engine, uint64_t c
 static bool reference_add(struct engine *engine, struct engine_scene *scene, const struct engine_command *command)
 {
     struct engine_client *client = need_client(engine, command);
-    struct engine_reference *reference = client ? calloc(1, sizeof *reference) : NULL;
+    struct engine_reference *reference = client ? calloc(1, sizeof(*reference)) : NULL;
     if (!reference || !hashmap_put(&client->references, command->scene, reference)) {
         free(reference);
         return false;
@@ -293,7 +293,7 @@ static bool name_is_free(struct engine *engine, const struct engine_command *com
 
 static bool scene_add(struct engine *engine, const struct engine_command *command)
 {
-    struct engine_scene *scene = calloc(1, sizeof *scene);
+    struct engine_scene *scene = calloc(1, sizeof(*scene));
     if (scene)
         scene->scene = scene_create(command->name, &engine->options.limits.scene);
     if (!scene || !scene->scene || !reference_add(engine, scene, command)) {

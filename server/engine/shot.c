@@ -49,8 +49,8 @@ static bool motion_make(struct shot *shot, const struct engine_job *job, const s
     if (!job->clip_count || scene_motion_evaluate(&shot->motion, scene, job->clips, job->clip_count, time_s,
                                                   (double)shot->shutter_s, &local))
         return true;
-    char field[sizeof local.field];
-    snprintf(field, sizeof field, "render.%.100s", local.field);
+    char field[sizeof(local.field)];
+    snprintf(field, sizeof(field), "render.%.100s", local.field);
     return error_set(error, local.kind, field, "%s", local.text);
 }
 

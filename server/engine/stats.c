@@ -22,7 +22,7 @@ static void describe_scene(const struct engine *engine, struct engine_scene *fro
         .triangles = from->triangles,
         .spheres = from->spheres,
     };
-    memcpy(stat->name, scene->name, sizeof stat->name);
+    memcpy(stat->name, scene->name, sizeof(stat->name));
 }
 
 static bool describe_scenes(const struct engine *engine, uint64_t principal, struct engine_stats *stats)
@@ -32,7 +32,7 @@ static bool describe_scenes(const struct engine *engine, uint64_t principal, str
         count++;
     if (!count)
         return true;
-    stats->scenes = calloc(count, sizeof *stats->scenes);
+    stats->scenes = calloc(count, sizeof(*stats->scenes));
     if (!stats->scenes)
         return false;
     for (struct engine_scene *scene = engine->scenes; scene; scene = scene->next) {
@@ -44,7 +44,7 @@ static bool describe_scenes(const struct engine *engine, uint64_t principal, str
 
 struct engine_stats *engine_stats_collect(const struct engine *engine, uint64_t principal)
 {
-    struct engine_stats *stats = calloc(1, sizeof *stats);
+    struct engine_stats *stats = calloc(1, sizeof(*stats));
     if (!stats)
         return NULL;
     stats->device = engine->device_info;

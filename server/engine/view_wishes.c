@@ -14,7 +14,7 @@ struct view_wishes {
 
 struct view_wishes *view_wishes_create(void)
 {
-    struct view_wishes *wishes = calloc(1, sizeof *wishes);
+    struct view_wishes *wishes = calloc(1, sizeof(*wishes));
     if (!wishes)
         return NULL;
     atomic_init(&wishes->references, 1);

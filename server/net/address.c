@@ -15,12 +15,12 @@ static bool parse_unix(struct address *address, const char *text, const char *pa
     size_t bytes = strlen(path);
     if (path[0] != '/')
         return error_set(error, ERROR_INVALID, text, "the path of a Unix socket must begin with /");
-    if (bytes >= sizeof local.sun_path)
+    if (bytes >= sizeof(local.sun_path))
         return error_set(error, ERROR_INVALID, text, "the path has %zu bytes, at most %zu fit a Unix socket",
-                         bytes, sizeof local.sun_path - 1);
+                         bytes, sizeof(local.sun_path) - 1);
     memcpy(local.sun_path, path, bytes + 1);
-    memcpy(&address->storage, &local, sizeof local);
-    address->storage_bytes = (socklen_t)sizeof local;
+    memcpy(&address->storage, &local, sizeof(local));
+    address->storage_bytes = (socklen_t)sizeof(local);
     return true;
 }
 
@@ -38,7 +38,7 @@ static bool parse_tcp(struct address *address, const char *text, const char *hos
     } else if (memchr(first, ':', bytes)) {
         return error_set(error, ERROR_INVALID, text, "write an IPv6 address in brackets: tcp:[::1]:PORT");
     }
-    if (bytes >= sizeof host)
+    if (bytes >= sizeof(host))
         return error_set(error, ERROR_INVALID, text, "the host name is too long");
     memcpy(host, first, bytes);
     host[bytes] = '\0';
@@ -72,14 +72,14 @@ bool address_is_unix(const struct address *address)
 static struct sockaddr_in as_ipv4(const struct address *address)
 {
     struct sockaddr_in ipv4;
-    memcpy(&ipv4, &address->storage, sizeof ipv4);
+    memcpy(&ipv4, &address->storage, sizeof(ipv4));
     return ipv4;
 }
 
 static struct sockaddr_in6 as_ipv6(const struct address *address)
 {
     struct sockaddr_in6 ipv6;
-    memcpy(&ipv6, &address->storage, sizeof ipv6);
+    memcpy(&ipv6, &address->storage, sizeof(ipv6));
     return ipv6;
 }
 
@@ -88,11 +88,11 @@ void address_print(const struct address *address, char text[ADDRESS_TEXT_BYTES])
     char host[INET6_ADDRSTRLEN] = "";
     if (address->storage.ss_family == AF_INET) {
         struct sockaddr_in ipv4 = as_ipv4(address);
-        inet_ntop(AF_INET, &ipv4.sin_addr, host, sizeof host);
+        inet_ntop(AF_INET, &ipv4.sin_addr, host, sizeof(host));
         snprintf(text, ADDRESS_TEXT_BYTES, "tcp:%s:%u", host, ntohs(ipv4.sin_port));
     } else if (address->storage.ss_family == AF_INET6) {
         struct sockaddr_in6 ipv6 = as_ipv6(address);
-        inet_ntop(AF_INET6, &ipv6.sin6_addr, host, sizeof host);
+        inet_ntop(AF_INET6, &ipv6.sin6_addr, host, sizeof(host));
         snprintf(text, ADDRESS_TEXT_BYTES, "tcp:[%s]:%u", host, ntohs(ipv6.sin6_port));
     } else {
         snprintf(text, ADDRESS_TEXT_BYTES, "unix:%s", address_path(address));
@@ -138,7 +138,7 @@ bool address_same_host(const struct address *a, const struct address *b)
         return as_ipv4(a).sin_addr.s_addr == as_ipv4(b).sin_addr.s_addr;
     if (a->storage.ss_family == AF_INET6) {
         struct in6_addr host_a = as_ipv6(a).sin6_addr, host_b = as_ipv6(b).sin6_addr;
-        return memcmp(&host_a, &host_b, sizeof host_a) == 0;
+        return memcmp(&host_a, &host_b, sizeof(host_a)) == 0;
     }
     return true;
 }

@@ -27,7 +27,7 @@ bool auth_read_keys(struct auth_keys *keys, const char *key_file, const char *re
     *keys = (struct auth_keys){0};
     if (!read_key(keys, key_file, false, error) || !read_key(keys, reader_key_file, true, error))
         return false;
-    if (keys->count == 2 && memcmp(&keys->keys[0], &keys->keys[1], sizeof keys->keys[0]) == 0)
+    if (keys->count == 2 && memcmp(&keys->keys[0], &keys->keys[1], sizeof(keys->keys[0])) == 0)
         return error_set(error, ERROR_INVALID, reader_key_file,
                          "is the same key as server.key_file, whose holders may edit");
     return true;
@@ -44,18 +44,18 @@ bool auth_identify(struct auth_identity *identity, int fd, const struct address 
     *identity = (struct auth_identity){0};
     if (address_is_unix(peer)) {
         struct ucred credentials = {0};
-        socklen_t bytes = sizeof credentials;
+        socklen_t bytes = sizeof(credentials);
         if (getsockopt(fd, SOL_SOCKET, SO_PEERCRED, &credentials, &bytes) < 0)
             return error_set(error, ERROR_DENIED, "peer", "the kernel does not tell the peer's user: %s",
                              strerror(errno));
         identity->known = identity->has_user = true;
         identity->user = credentials.uid;
-        snprintf(identity->name, sizeof identity->name, "user %u", (unsigned)credentials.uid);
+        snprintf(identity->name, sizeof(identity->name), "user %u", (unsigned)credentials.uid);
         return true;
     }
     char text[ADDRESS_TEXT_BYTES];
     address_print(peer, text);
-    snprintf(identity->name, sizeof identity->name, "%.39s", text);
+    snprintf(identity->name, sizeof(identity->name), "%.39s", text);
     if (beyond_loopback || address_is_loopback(peer))
         return true;
     return error_set(error, ERROR_DENIED, "peer", "%s is not on this host", text);
@@ -67,6 +67,6 @@ void auth_identify_by_key(struct auth_identity *identity, const struct auth_keys
     identity->known = identity->has_key = true;
     identity->key = sealed_key_number(&keys->keys[index]);
     identity->read_only = keys->read_only[index];
-    snprintf(identity->name, sizeof identity->name, "%s, %.33s", identity->read_only ? "reader's key" : "key",
+    snprintf(identity->name, sizeof(identity->name), "%s, %.33s", identity->read_only ? "reader's key" : "key",
              before.name);
 }

@@ -27,7 +27,7 @@ struct connection *connection_create(struct loop *loop, int fd, const struct con
                                      const struct connection_entry *entry,
                                      const struct connection_handler *handler, void *context, struct error *error)
 {
-    struct connection *connection = calloc(1, sizeof *connection);
+    struct connection *connection = calloc(1, sizeof(*connection));
     uint8_t *in = malloc(HANDSHAKE_HELLO_MAX_BYTES);
     struct loop_watch *watch =
         connection && in ? loop_watch_add(loop, fd, EPOLLIN, on_ready, connection, error) : NULL;

@@ -63,7 +63,7 @@ static void refuse_seal(struct connection *connection, enum sealed_status status
 {
     uint8_t bytes[SEALED_REFUSAL_BYTES];
     sealed_refuse(bytes, status);
-    if (queue_bytes(connection, bytes, sizeof bytes))
+    if (queue_bytes(connection, bytes, sizeof(bytes)))
         end(connection);
 }
 
@@ -143,7 +143,7 @@ static void answer_hello(struct connection *connection)
     case HANDSHAKE_NEED_MORE:
         return;
     case HANDSHAKE_FATAL:
-        strncpy(reply.text, error.text, sizeof reply.text - 1);
+        strncpy(reply.text, error.text, sizeof(reply.text) - 1);
         refuse_hello(connection, &reply);
         return;
     case HANDSHAKE_CONSUMED:
@@ -151,7 +151,8 @@ static void answer_hello(struct connection *connection)
     }
     if (!connection->link && connection->entry.sealed_only) {
         reply.capabilities = HANDSHAKE_NEEDS_KEY;
-        strncpy(reply.text, "this address needs a key: it accepts sealed connections only", sizeof reply.text - 1);
+        strncpy(reply.text, "this address needs a key: it accepts sealed connections only",
+                sizeof(reply.text) - 1);
         refuse_hello(connection, &reply);
         return;
     }

@@ -35,7 +35,7 @@ static const struct sockaddr *raw(const struct address *address)
 static bool make_folder(const char *path, struct error *error)
 {
     char copy[PATH_MAX];
-    snprintf(copy, sizeof copy, "%s", path);
+    snprintf(copy, sizeof(copy), "%s", path);
     const char *folder = dirname(copy);
     if (mkdir(folder, 0750) == 0 || errno == EEXIST)
         return true;
@@ -92,9 +92,9 @@ static bool bind_and_listen(struct listener *listener, const struct address *add
     address_print(address, text);
     int on = 1;
     if (!address_is_unix(address))
-        setsockopt(listener->fd, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
+        setsockopt(listener->fd, SOL_SOCKET, SO_REUSEADDR, &on, sizeof(on));
     if (address->storage.ss_family == AF_INET6)
-        setsockopt(listener->fd, IPPROTO_IPV6, IPV6_V6ONLY, &on, sizeof on);
+        setsockopt(listener->fd, IPPROTO_IPV6, IPV6_V6ONLY, &on, sizeof(on));
     /* Other users must never be able to connect, not even before the chmod: the mask applies at creation. */
     mode_t mask = umask(0117);
     int result = sys.bind(listener->fd, raw(address), address->storage_bytes);
@@ -105,7 +105,7 @@ static bool bind_and_listen(struct listener *listener, const struct address *add
     listener->owns_path = address_is_unix(address);
     if (sys.listen(listener->fd, BACKLOG) < 0)
         return error_set(error, ERROR_INTERNAL, text, "listen: %s", strerror(errno));
-    listener->address.storage_bytes = sizeof listener->address.storage;
+    listener->address.storage_bytes = sizeof(listener->address.storage);
     if (getsockname(listener->fd, (struct sockaddr *)&listener->address.storage,
                     &listener->address.storage_bytes) < 0)
         return error_set(error, ERROR_INTERNAL, text, "getsockname: %s", strerror(errno));
@@ -135,7 +135,7 @@ bool listener_open(struct listener *listener, const struct address *address, boo
 static bool is_listening_stream(int fd)
 {
     int type = 0, listens = 0;
-    socklen_t bytes = sizeof type, listens_bytes = sizeof listens;
+    socklen_t bytes = sizeof(type), listens_bytes = sizeof(listens);
     return getsockopt(fd, SOL_SOCKET, SO_TYPE, &type, &bytes) == 0 && type == SOCK_STREAM &&
            getsockopt(fd, SOL_SOCKET, SO_ACCEPTCONN, &listens, &listens_bytes) == 0 && listens;
 }
@@ -144,7 +144,7 @@ bool listener_adopt(struct listener *listener, int fd, const char *name, bool be
 {
     *listener = (struct listener){.fd = fd};
     struct address *address = &listener->address;
-    address->storage_bytes = sizeof address->storage;
+    address->storage_bytes = sizeof(address->storage);
     if (!is_listening_stream(fd) ||
         getsockname(fd, (struct sockaddr *)&address->storage, &address->storage_bytes) < 0) {
         error_set(error, ERROR_INVALID, name,
@@ -173,7 +173,7 @@ void listener_close(struct listener *listener)
 int listener_accept(const struct listener *listener, struct address *peer, bool *retry_later)
 {
     *retry_later = false;
-    *peer = (struct address){.storage_bytes = sizeof peer->storage};
+    *peer = (struct address){.storage_bytes = sizeof(peer->storage)};
     int fd = sys_accept(listener->fd, (struct sockaddr *)&peer->storage, &peer->storage_bytes,
                         SOCK_CLOEXEC | SOCK_NONBLOCK);
     if (fd < 0) {
@@ -186,11 +186,11 @@ int listener_accept(const struct listener *listener, struct address *peer, bool 
     peer->storage.ss_family = listener->address.storage.ss_family;
     if (!address_is_unix(peer)) {
         int on = 1; /* answers are small and urgent; frames are large in any case */
-        setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
+        setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &on, sizeof(on));
         /* Bytes in the kernel can be neither withdrawn nor overtaken. */
         setsockopt(fd, IPPROTO_TCP, TCP_NOTSENT_LOWAT, &(int){UNSENT_BYTES}, sizeof(int));
         /* A client that waits for frames may be silent for ever, and vanish without notice. */
-        setsockopt(fd, SOL_SOCKET, SO_KEEPALIVE, &on, sizeof on);
+        setsockopt(fd, SOL_SOCKET, SO_KEEPALIVE, &on, sizeof(on));
         setsockopt(fd, IPPROTO_TCP, TCP_KEEPIDLE, &(int){PROBE_AFTER_S}, sizeof(int));
         setsockopt(fd, IPPROTO_TCP, TCP_KEEPINTVL, &(int){PROBE_EVERY_S}, sizeof(int));
         setsockopt(fd, IPPROTO_TCP, TCP_KEEPCNT, &(int){PROBES}, sizeof(int));

@@ -31,7 +31,7 @@ struct loop {
 
 struct loop *loop_create(struct error *error)
 {
-    struct loop *loop = calloc(1, sizeof *loop);
+    struct loop *loop = calloc(1, sizeof(*loop));
     if (!loop) {
         error_set(error, ERROR_OUT_OF_MEMORY, "loop", "no memory");
         return NULL;
@@ -86,7 +86,7 @@ void loop_destroy(struct loop *loop)
 struct loop_watch *loop_watch_add(struct loop *loop, int fd, uint32_t epoll_events, loop_ready_fn *ready,
                                   void *context, struct error *error)
 {
-    struct loop_watch *watch = calloc(1, sizeof *watch);
+    struct loop_watch *watch = calloc(1, sizeof(*watch));
     if (!watch) {
         error_set(error, ERROR_OUT_OF_MEMORY, "loop", "no memory");
         return NULL;

@@ -22,7 +22,7 @@ void notify_manager(const char *state)
         return;
     struct sockaddr_un address = {.sun_family = AF_UNIX};
     size_t bytes = strlen(path);
-    if (bytes >= sizeof address.sun_path)
+    if (bytes >= sizeof(address.sun_path))
         return;
     memcpy(address.sun_path, path, bytes);
     if (path[0] == '@')
@@ -30,7 +30,7 @@ void notify_manager(const char *state)
     int fd = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
     socklen_t address_bytes = (socklen_t)(offsetof(struct sockaddr_un, sun_path) + bytes);
     const struct timeval wait = {.tv_usec = WAIT_US};
-    if (fd < 0 || setsockopt(fd, SOL_SOCKET, SO_SNDTIMEO, &wait, sizeof wait) < 0 ||
+    if (fd < 0 || setsockopt(fd, SOL_SOCKET, SO_SNDTIMEO, &wait, sizeof(wait)) < 0 ||
         sendto(fd, state, strlen(state), MSG_NOSIGNAL, (const struct sockaddr *)&address, address_bytes) < 0)
         log_write(LOG_WARNING, "net", "cannot tell the service manager %s: %s", state, strerror(errno));
     if (fd >= 0)

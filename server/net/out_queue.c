@@ -21,7 +21,7 @@ struct out_message *out_message_create(size_t head_bytes)
 {
     if (head_bytes > SIZE_MAX - sizeof(struct out_message))
         return NULL;
-    struct out_message *message = malloc(sizeof *message + head_bytes);
+    struct out_message *message = malloc(sizeof(*message) + head_bytes);
     if (message)
         *message = (struct out_message){.head_bytes = head_bytes};
     return message;

@@ -42,7 +42,7 @@ static size_t seal_parts(struct sealed_link *link, struct iovec *parts, const st
             parts++;
         } else {
             uint8_t together[TOGETHER_BYTES];
-            size_t most = room_bytes < sizeof together ? room_bytes : sizeof together;
+            size_t most = room_bytes < sizeof(together) ? room_bytes : sizeof(together);
             sealed_bytes += sealed_link_seal(link, together, put_together(together, most, &parts, end));
         }
     }

@@ -50,7 +50,7 @@ static void check_open(struct connection *connection, uint64_t now_ns)
         return;
     }
     if (connection_incoming_bytes(connection) < progress_due_bytes(connection, now_ns)) {
-        snprintf(text, sizeof text, "a message arrived at less than %u bytes a second",
+        snprintf(text, sizeof(text), "a message arrived at less than %u bytes a second",
                  limits->progress_bytes_per_s);
         connection_finish(connection, PROTOCOL_ERROR_TIMEOUT, "", text);
         return;
@@ -63,7 +63,7 @@ static void check_open(struct connection *connection, uint64_t now_ns)
         return;
     }
     if (is_idle(connection, now_ns)) {
-        snprintf(text, sizeof text, "no message for %u seconds", limits->idle_ms / 1000);
+        snprintf(text, sizeof(text), "no message for %u seconds", limits->idle_ms / 1000);
         connection_finish(connection, PROTOCOL_ERROR_TIMEOUT, "", text);
     }
 }

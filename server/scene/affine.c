@@ -12,7 +12,7 @@
 
 void affine_double_identity(double m[12])
 {
-    memset(m, 0, 12 * sizeof *m);
+    memset(m, 0, 12 * sizeof(*m));
     m[0] = m[5] = m[10] = 1.0;
 }
 
@@ -25,7 +25,7 @@ void affine_double_multiply(double a_from_c[12], const double a_from_b[12], cons
             product[4 * row + column] = a[0] * (double)b_from_c[column] + a[1] * (double)b_from_c[4 + column] +
                                         a[2] * (double)b_from_c[8 + column] + (column == 3 ? a[3] : 0.0);
     }
-    memcpy(a_from_c, product, sizeof product);
+    memcpy(a_from_c, product, sizeof(product));
 }
 
 static double row_length(const double *row)
@@ -35,7 +35,7 @@ static double row_length(const double *row)
 
 bool affine_double_invert(float b_from_a[12], const double m[12])
 {
-    memset(b_from_a, 0, 12 * sizeof *b_from_a);
+    memset(b_from_a, 0, 12 * sizeof(*b_from_a));
     /* Rows of unit length keep the products of very large or small scales within the range of doubles. */
     double length[3], unit[3][3];
     for (int row = 0; row < 3; row++) {
@@ -65,7 +65,7 @@ bool affine_double_invert(float b_from_a[12], const double m[12])
     }
     if (affine_double_round(b_from_a, inverse))
         return true;
-    memset(b_from_a, 0, 12 * sizeof *b_from_a);
+    memset(b_from_a, 0, 12 * sizeof(*b_from_a));
     return false;
 }
 
@@ -81,7 +81,7 @@ bool affine_double_round(float out[12], const double m[12])
 
 void affine_identity(float m[12])
 {
-    memset(m, 0, 12 * sizeof *m);
+    memset(m, 0, 12 * sizeof(*m));
     m[0] = m[5] = m[10] = 1.0f;
 }
 

@@ -16,7 +16,7 @@ bool weights_check(const float *weights, uint32_t count, const struct edit_place
     if (bad == count)
         return true;
     char path[32];
-    snprintf(path, sizeof path, ".weights[%zu]", bad);
+    snprintf(path, sizeof(path), ".weights[%zu]", bad);
     return edit_error(place, ERROR_INVALID, path, "%g is not finite or beyond 1e6", (double)weights[bad]);
 }
 

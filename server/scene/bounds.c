@@ -31,7 +31,7 @@ static bool extend_by_deformed(const struct scene *scene, const struct scene_pos
 {
     const struct scene_mesh *mesh = scene_mesh(scene, instance->node->object);
     const uint32_t *indices = (const uint32_t *)(const void *)mesh->arrays[MESH_INDICES]->data;
-    float *positions = malloc((size_t)mesh->vertex_count * 3 * sizeof *positions);
+    float *positions = malloc((size_t)mesh->vertex_count * 3 * sizeof(*positions));
     bool found = false;
     if (positions && scene_deform(scene, pose, instance->node, positions, NULL, NULL)) {
         for (size_t i = 0; i < (size_t)mesh->triangle_count * 3; i++) {

@@ -27,7 +27,7 @@ const struct channel_row *channel_row(enum channel_path path)
         [CHANNEL_VIEW_FOCUS] = {TARGET_VIEW, 1, 1, 0, 1e12},
         [CHANNEL_VIEW_EXPOSURE] = {TARGET_VIEW, 1, 1, -64, 64},
     };
-    if ((unsigned)path >= sizeof rows / sizeof rows[0] || !rows[path].width_min)
+    if ((unsigned)path >= sizeof(rows) / sizeof(rows[0]) || !rows[path].width_min)
         return NULL;
     return &rows[path];
 }

@@ -234,7 +234,7 @@ static void apply_set(struct scene *scene, struct scene_edit *edit)
     object->revision = scene->revision;
     touch_kind(scene, edit->object);
     /* The scene owns the blobs and ranges now. */
-    memset(&edit->set, 0, sizeof edit->set);
+    memset(&edit->set, 0, sizeof(edit->set));
 }
 
 static void apply_remove(struct scene *scene, enum object_kind kind, uint32_t id)
@@ -270,7 +270,7 @@ static void apply(struct draft *draft, const struct size *size)
             blob_unref(scene->environment.texels);
             scene->environment = edit->set.environment;
             scene->environment.revision = scene->lights_revision = scene->revision;
-            memset(&edit->set, 0, sizeof edit->set);
+            memset(&edit->set, 0, sizeof(edit->set));
         }
     }
     for (int k = 0; k < OBJECT_COUNT; k++) {

@@ -141,7 +141,7 @@ static void make_unit(double q[4])
 {
     double length = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
     if (!(length > 0.0)) {
-        memcpy(q, (double[4]){0, 0, 0, 1}, 4 * sizeof *q);
+        memcpy(q, (double[4]){0, 0, 0, 1}, 4 * sizeof(*q));
         return;
     }
     for (int i = 0; i < 4; i++)
@@ -241,7 +241,7 @@ double curve_turn_bound(const struct curve *curve, double from_s, double to_s)
             return INFINITY;
         unit_key(curve, key, next);
         arc += arc_between(at, next, shorter_sign(at, next));
-        memcpy(at, next, sizeof at);
+        memcpy(at, next, sizeof(at));
     }
     curve_rotation_at(curve, to_s, next);
     return 2.0 * (arc + arc_between(at, next, shorter_sign(at, next)));

@@ -42,7 +42,7 @@ static bool blend(const struct scene_mesh *mesh, const float *world_from_mesh, s
     const uint16_t *joints = (const uint16_t *)(const void *)mesh->arrays[MESH_JOINTS]->data + vertex * count;
     const float *weights = floats_of(mesh->arrays[MESH_WEIGHTS]) + vertex * count;
     double sum = 0.0;
-    memset(m, 0, 12 * sizeof *m);
+    memset(m, 0, 12 * sizeof(*m));
     for (uint32_t i = 0; i < count; i++) {
         const float *matrix = world_from_mesh + (size_t)joints[i] * 12;
         sum += (double)weights[i];
@@ -112,8 +112,8 @@ bool scene_deform(const struct scene *scene, const struct scene_pose *pose, cons
     if (!mesh)
         return error_set(error, ERROR_INVALID, "node", "node %u shows no mesh", node->base.id);
     const struct scene_skin *skin = node->skin && mesh->influence_count ? scene_skin(scene, node->skin) : NULL;
-    float *matrices = skin ? malloc((size_t)skin->joint_count * 12 * sizeof *matrices) : NULL;
-    float *weights = malloc(((size_t)mesh->target_count + 1) * sizeof *weights);
+    float *matrices = skin ? malloc((size_t)skin->joint_count * 12 * sizeof(*matrices)) : NULL;
+    float *weights = malloc(((size_t)mesh->target_count + 1) * sizeof(*weights));
     bool fine = weights && (!skin || matrices);
     if (!fine)
         error_set(error, ERROR_OUT_OF_MEMORY, "node", "no memory to deform the mesh of node %u", node->base.id);

@@ -66,7 +66,7 @@ bool draft_note_fallen(struct draft *draft, enum object_kind kind, uint32_t id)
     struct draft_list *list = &draft->fallen[kind];
     if (list->count == list->capacity) {
         size_t capacity = list->capacity ? list->capacity * 2 : 64;
-        uint32_t *ids = realloc(list->ids, capacity * sizeof *ids);
+        uint32_t *ids = realloc(list->ids, capacity * sizeof(*ids));
         if (ids) {
             list->ids = ids;
             list->capacity = capacity;

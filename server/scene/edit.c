@@ -30,15 +30,15 @@ uint32_t edit_object_id(const struct scene_edit *edit)
 
 bool edit_error(const struct edit_place *place, enum error_code kind, const char *path, const char *format, ...)
 {
-    char field[sizeof place->error->field], text[sizeof place->error->text];
+    char field[sizeof(place->error->field)], text[sizeof(place->error->text)];
     if (place->edit->kind == EDIT_SET_ENVIRONMENT)
-        snprintf(field, sizeof field, "edits[%zu] (environment)%s", place->index, path);
+        snprintf(field, sizeof(field), "edits[%zu] (environment)%s", place->index, path);
     else
-        snprintf(field, sizeof field, "edits[%zu] (%s %u)%s", place->index, object_kind_name(place->edit->object),
+        snprintf(field, sizeof(field), "edits[%zu] (%s %u)%s", place->index, object_kind_name(place->edit->object),
                  edit_object_id(place->edit), path);
     va_list arguments;
     va_start(arguments, format);
-    vsnprintf(text, sizeof text, format, arguments);
+    vsnprintf(text, sizeof(text), format, arguments);
     va_end(arguments);
     return error_set(place->error, kind, field, "%s", text);
 }
@@ -82,13 +82,13 @@ bool ranges_check(const struct material_range *ranges, uint32_t range_count, uin
     for (uint32_t i = 0; i < range_count; i++) {
         char path[64];
         if (ranges[i].first < done) {
-            snprintf(path, sizeof path, ".ranges[%u].first", i);
+            snprintf(path, sizeof(path), ".ranges[%u].first", i);
             edit_error(place, ERROR_INVALID, path, "%u lies before %u, where the range before it ends",
                        ranges[i].first, done);
             return error_remedy(place->error, "sort the ranges by their first primitive and let none overlap");
         }
         if (ranges[i].first > primitive_count || ranges[i].count > primitive_count - ranges[i].first) {
-            snprintf(path, sizeof path, ".ranges[%u].count", i);
+            snprintf(path, sizeof(path), ".ranges[%u].count", i);
             return edit_error(place, ERROR_INVALID, path, "%u from %u reaches beyond the %u primitives",
                               ranges[i].count, ranges[i].first, primitive_count);
         }

@@ -42,7 +42,7 @@ bool hierarchy_init(struct hierarchy *hierarchy, const struct scene_node **nodes
     *hierarchy = (struct hierarchy){.nodes = nodes, .count = count};
     if (!count)
         return true;
-    hierarchy->parents = malloc(count * sizeof *hierarchy->parents);
+    hierarchy->parents = malloc(count * sizeof(*hierarchy->parents));
     if (!hierarchy->parents) {
         hierarchy_finish(hierarchy);
         return false;
@@ -67,7 +67,7 @@ bool hierarchy_of_scene(struct hierarchy *hierarchy, const struct scene *scene)
     const struct hashmap *map = &scene->objects[OBJECT_NODE];
     if (!map->count)
         return true;
-    const struct scene_node **nodes = malloc(map->count * sizeof *nodes);
+    const struct scene_node **nodes = malloc(map->count * sizeof(*nodes));
     if (!nodes)
         return false;
     size_t cursor = 0, count = 0;

@@ -34,7 +34,7 @@ static const uint32_t *ascents_of(struct ascents *ascents, const struct scene_cl
     uint32_t *lengths = hashmap_get(&ascents->clips, clip->base.id);
     size_t count = clip->floats->size_bytes / sizeof(float);
     const float *floats = (const float *)(const void *)clip->floats->data;
-    if (lengths || !(lengths = malloc(count * sizeof *lengths)))
+    if (lengths || !(lengths = malloc(count * sizeof(*lengths))))
         return lengths;
     for (size_t i = count; i-- > 0;) {
         bool ascends = i + 1 < count && floats[i + 1] > floats[i];
@@ -81,11 +81,11 @@ static bool channel_fits(struct ascents *ascents, const struct scene_channel *ch
     uint64_t value_floats = (uint64_t)channel->key_count * channel_key_floats(channel);
     uint64_t floats = clip->floats->size_bytes / sizeof(float);
     if (!has_numbers(clip, channel->first_time, channel->key_count)) {
-        snprintf(text, sizeof text, "its %u times from %u on reach beyond the %" PRIu64 " numbers of clip %u",
+        snprintf(text, sizeof(text), "its %u times from %u on reach beyond the %" PRIu64 " numbers of clip %u",
                  channel->key_count, channel->first_time, floats, channel->clip);
     } else if (!has_numbers(clip, channel->first_value, value_floats)) {
         path = own ? ".first_value" : path;
-        snprintf(text, sizeof text,
+        snprintf(text, sizeof(text),
                  "its %" PRIu64 " numbers of values from %u on reach beyond the %" PRIu64 " numbers of clip %u",
                  value_floats, channel->first_value, floats, channel->clip);
     } else {
@@ -94,7 +94,7 @@ static bool channel_fits(struct ascents *ascents, const struct scene_channel *ch
             return edit_error(whose, ERROR_OUT_OF_MEMORY, path, "no memory to look at clip %u", channel->clip);
         if (unordered == channel->key_count)
             return true;
-        snprintf(text, sizeof text, "its key %u is not after the one before it", unordered);
+        snprintf(text, sizeof(text), "its key %u is not after the one before it", unordered);
     }
     return own ? edit_error(whose, ERROR_INVALID, path, "%s", text)
                : edit_error(whose, ERROR_INVALID, path, "channel %u: %s", channel->base.id, text);

@@ -11,7 +11,7 @@ static void cross(double out[3], const double a[3], const double b[3])
     double product[3];
     for (int i = 0; i < 3; i++)
         product[i] = a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3];
-    memcpy(out, product, sizeof product);
+    memcpy(out, product, sizeof(product));
 }
 
 static double normalise(double v[3])
@@ -39,7 +39,7 @@ static void complete(double column[3][3], const double length[3])
             return;
     }
     for (int i = 0; i < 3 && count > 0; i++)
-        memcpy(column[i], axes[i], sizeof axes[i]);
+        memcpy(column[i], axes[i], sizeof(axes[i]));
 }
 
 void local_transform_from_matrix(struct local_transform *transform, const float matrix[12])
@@ -73,7 +73,7 @@ void local_transform_set_rotation(struct local_transform *transform, const doubl
         {2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)},
         {2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)},
     };
-    memcpy(transform->turn, turn, sizeof turn);
+    memcpy(transform->turn, turn, sizeof(turn));
 }
 
 void local_transform_to_matrix(const struct local_transform *transform, float matrix[12])

@@ -71,8 +71,8 @@ static bool turn_sums_init(struct turn_sums *sums, const struct scene *scene, co
     *sums = (struct turn_sums){.pose = pose, .turns = turns};
     if (!hierarchy_of_scene(&sums->hierarchy, scene))
         return false;
-    sums->sums = malloc((sums->hierarchy.count + 1) * sizeof *sums->sums);
-    sums->known = calloc(sums->hierarchy.count + 1, sizeof *sums->known);
+    sums->sums = malloc((sums->hierarchy.count + 1) * sizeof(*sums->sums));
+    sums->known = calloc(sums->hierarchy.count + 1, sizeof(*sums->known));
     return sums->sums && sums->known;
 }
 
@@ -158,7 +158,7 @@ static bool same_places(const struct scene_pose *a, const struct scene_pose *b)
 {
     for (uint32_t i = 0; i < a->node_count; i++) {
         if (memcmp(a->nodes[i].parent_from_node, b->nodes[i].parent_from_node,
-                   sizeof a->nodes[i].parent_from_node))
+                   sizeof(a->nodes[i].parent_from_node)))
             return false;
     }
     return true;
@@ -166,7 +166,7 @@ static bool same_places(const struct scene_pose *a, const struct scene_pose *b)
 
 static bool same_weights(const struct scene_pose *a, const struct scene_pose *b)
 {
-    return !a->weight_count || memcmp(a->weights, b->weights, a->weight_count * sizeof *a->weights) == 0;
+    return !a->weight_count || memcmp(a->weights, b->weights, a->weight_count * sizeof(*a->weights)) == 0;
 }
 
 /* Only nodes and weights move within a frame. */
@@ -210,7 +210,7 @@ static void bound_turns(struct player *player, uint32_t node_count, double open_
                         double *bounds, interval_turns *turns)
 {
     player_turn_bounds(player, open_s, open_s + shutter_s, bounds);
-    memset(turns, 0, node_count * sizeof *turns);
+    memset(turns, 0, node_count * sizeof(*turns));
     for (uint32_t node = 0; node < node_count; node++)
         turns[node][0] = bounds[node];
 }
@@ -239,8 +239,8 @@ static bool choose_poses(struct scene_motion *motion, struct player *player, dou
                          struct error *error)
 {
     size_t count = (size_t)motion->poses[0].node_count + 1;
-    interval_turns *turns = malloc(count * sizeof *turns);
-    double *bounds = malloc(count * sizeof *bounds);
+    interval_turns *turns = malloc(count * sizeof(*turns));
+    double *bounds = malloc(count * sizeof(*bounds));
     bool fine = turns && bounds && fill_in(motion, player, open_s, shutter_s, turns, bounds, error);
     free(turns);
     free(bounds);
@@ -258,7 +258,7 @@ bool scene_motion_evaluate(struct scene_motion *motion, const struct scene *scen
     bool moves = shutter_s > 0.0;
     *motion = (struct scene_motion){0};
     bool fine = player_init(&player, scene, uses, use_count, error);
-    if (fine && !(motion->poses = calloc(MOTION_POSES_MAX, sizeof *motion->poses)))
+    if (fine && !(motion->poses = calloc(MOTION_POSES_MAX, sizeof(*motion->poses))))
         fine = error_set(error, ERROR_OUT_OF_MEMORY, "clips", "no memory for %d poses", MOTION_POSES_MAX);
     fine = fine && add_poses(motion, &player, open_s, shutter_s, moves ? 1 : 0, error) &&
            (!moves || choose_poses(motion, &player, open_s, shutter_s, error));

@@ -19,8 +19,8 @@ struct world {
 static bool world_init(struct world *world, const struct scene_pose *pose, size_t count)
 {
     world->pose = pose;
-    world->world_from_node = malloc(count * sizeof *world->world_from_node);
-    world->state = calloc(count, sizeof *world->state);
+    world->world_from_node = malloc(count * sizeof(*world->world_from_node));
+    world->state = calloc(count, sizeof(*world->state));
     return world->world_from_node && world->state;
 }
 
@@ -95,7 +95,7 @@ bool scene_flatten(const struct scene *scene, const struct scene_pose *pose, enu
         return true;
     }
     struct world world;
-    struct scene_instance *list = malloc(shown * sizeof *list);
+    struct scene_instance *list = malloc(shown * sizeof(*list));
     bool complete = world_init(&world, pose, hierarchy.count) && list;
     size_t used = 0;
     for (uint32_t i = 0; complete && i < hierarchy.count; i++) {

@@ -85,7 +85,7 @@ static bool uses_check(const struct scene *scene, const struct clip_use *uses, u
         if (scene_clip(scene, uses[i].clip))
             continue;
         char field[48];
-        snprintf(field, sizeof field, "clips[%u].clip", i);
+        snprintf(field, sizeof(field), "clips[%u].clip", i);
         return error_set(error, ERROR_UNKNOWN_ID, field, "clip %u does not exist", uses[i].clip);
     }
     return true;
@@ -100,9 +100,9 @@ bool player_init(struct player *player, const struct scene *scene, const struct 
     const struct hashmap *channels = &scene->objects[OBJECT_CHANNEL];
     if (!use_count || !channels->count)
         return true;
-    player->durations_s = calloc(use_count, sizeof *player->durations_s);
-    player->times_s = calloc(use_count, sizeof *player->times_s);
-    player->tracks = malloc(channels->count * sizeof *player->tracks);
+    player->durations_s = calloc(use_count, sizeof(*player->durations_s));
+    player->times_s = calloc(use_count, sizeof(*player->times_s));
+    player->tracks = malloc(channels->count * sizeof(*player->tracks));
     if (!player->durations_s || !player->times_s || !player->tracks)
         return error_set(error, ERROR_OUT_OF_MEMORY, "clips", "no memory for %zu channels", channels->count);
     size_t cursor = 0;
@@ -110,7 +110,7 @@ bool player_init(struct player *player, const struct scene *scene, const struct 
     while (hashmap_next(channels, &cursor, NULL, &value))
         take_channel(player, value);
     if (!is_sorted(player))
-        qsort(player->tracks, player->track_count, sizeof *player->tracks, compare_tracks);
+        qsort(player->tracks, player->track_count, sizeof(*player->tracks), compare_tracks);
     return true;
 }
 
@@ -172,7 +172,7 @@ static void change_transform(const struct player *player, const struct player_tr
     }
     curve_at(&curve, time_s, value);
     memcpy(track->channel->path == CHANNEL_NODE_TRANSLATION ? transform->translation : transform->scale, value,
-           3 * sizeof *value);
+           3 * sizeof(*value));
 }
 
 /* `tracks` to `count` are those of one object. */
@@ -186,7 +186,7 @@ static void pose_node(const struct player *player, const struct player_track *tr
     struct local_transform transform;
     bool moves = false;
     *posed = (struct pose_node){.node = node->base.id, .hidden = node->hidden};
-    memcpy(posed->parent_from_node, node->parent_from_node, sizeof posed->parent_from_node);
+    memcpy(posed->parent_from_node, node->parent_from_node, sizeof(posed->parent_from_node));
     for (size_t i = 0; i < count; i++) {
         if (tracks[i].channel->path == CHANNEL_NODE_HIDDEN) {
             float hidden;
@@ -298,11 +298,11 @@ static void pose_view(const struct player *player, const struct player_track *tr
 static bool pose_reserve(const struct player *player, struct scene_pose *pose, struct error *error)
 {
     const size_t *tracks = player->target_tracks;
-    pose->nodes = calloc(tracks[TARGET_NODE] + 1, sizeof *pose->nodes);
-    pose->morphs = calloc(tracks[TARGET_WEIGHTS] + 1, sizeof *pose->morphs);
-    pose->weights = calloc(player->weight_count + 1, sizeof *pose->weights);
-    pose->lights = calloc(tracks[TARGET_LIGHT] + 1, sizeof *pose->lights);
-    pose->materials = calloc(tracks[TARGET_MATERIAL] + 1, sizeof *pose->materials);
+    pose->nodes = calloc(tracks[TARGET_NODE] + 1, sizeof(*pose->nodes));
+    pose->morphs = calloc(tracks[TARGET_WEIGHTS] + 1, sizeof(*pose->morphs));
+    pose->weights = calloc(player->weight_count + 1, sizeof(*pose->weights));
+    pose->lights = calloc(tracks[TARGET_LIGHT] + 1, sizeof(*pose->lights));
+    pose->materials = calloc(tracks[TARGET_MATERIAL] + 1, sizeof(*pose->materials));
     if (pose->nodes && pose->morphs && pose->weights && pose->lights && pose->materials)
         return true;
     scene_pose_finish(pose);

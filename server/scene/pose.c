@@ -34,7 +34,7 @@ static size_t find(const void *list, size_t count, size_t element_bytes, uint32_
     while (low < high) {
         size_t middle = low + (high - low) / 2;
         uint32_t at;
-        memcpy(&at, (const char *)list + middle * element_bytes, sizeof at);
+        memcpy(&at, (const char *)list + middle * element_bytes, sizeof(at));
         if (at == id)
             return middle;
         if (at < id)
@@ -54,7 +54,7 @@ STARTS_WITH_ID(scene_material, base.id);
 
 const struct pose_node *scene_pose_node(const struct scene_pose *pose, uint32_t id)
 {
-    size_t i = pose ? find(pose->nodes, pose->node_count, sizeof *pose->nodes, id) : 0;
+    size_t i = pose ? find(pose->nodes, pose->node_count, sizeof(*pose->nodes), id) : 0;
     return pose && i < pose->node_count ? &pose->nodes[i] : NULL;
 }
 
@@ -72,21 +72,21 @@ bool scene_pose_hidden(const struct scene_pose *pose, const struct scene_node *n
 
 const struct scene_light *scene_pose_light(const struct scene_pose *pose, const struct scene_light *light)
 {
-    size_t i = pose ? find(pose->lights, pose->light_count, sizeof *pose->lights, light->base.id) : 0;
+    size_t i = pose ? find(pose->lights, pose->light_count, sizeof(*pose->lights), light->base.id) : 0;
     return pose && i < pose->light_count ? &pose->lights[i] : light;
 }
 
 const struct scene_material *scene_pose_material(const struct scene_pose *pose,
                                                  const struct scene_material *material)
 {
-    size_t i = pose ? find(pose->materials, pose->material_count, sizeof *pose->materials, material->base.id) : 0;
+    size_t i = pose ? find(pose->materials, pose->material_count, sizeof(*pose->materials), material->base.id) : 0;
     return pose && i < pose->material_count ? &pose->materials[i] : material;
 }
 
 void scene_pose_weights(const struct scene_pose *pose, const struct scene_node *node,
                         const struct scene_mesh *mesh, float *weights)
 {
-    size_t i = pose ? find(pose->morphs, pose->morph_count, sizeof *pose->morphs, node->base.id) : 0;
+    size_t i = pose ? find(pose->morphs, pose->morph_count, sizeof(*pose->morphs), node->base.id) : 0;
     const float *from = node->weights ? node->weights : mesh->weights;
     uint32_t count = node->weights ? node->weight_count : mesh->weight_count;
     if (pose && i < pose->morph_count) {

@@ -43,7 +43,7 @@ static bool next_in_ranges(const struct material_range *ranges, uint32_t count, 
         if (!ranges[i].material)
             continue;
         *reference = (struct reference){.kind = OBJECT_MATERIAL, .id = ranges[i].material};
-        snprintf(reference->path, sizeof reference->path, ".ranges[%u].material", i);
+        snprintf(reference->path, sizeof(reference->path), ".ranges[%u].material", i);
         return true;
     }
     return false;
@@ -56,7 +56,7 @@ static bool next_in_material(const struct scene_material *material, uint32_t *cu
         if (!material->textures[i].texture)
             continue;
         *reference = (struct reference){.kind = OBJECT_TEXTURE, .id = material->textures[i].texture};
-        snprintf(reference->path, sizeof reference->path, ".textures[%u].texture", i);
+        snprintf(reference->path, sizeof(reference->path), ".textures[%u].texture", i);
         return true;
     }
     return false;
@@ -81,7 +81,7 @@ static bool next_in_skin(const struct scene_skin *skin, uint32_t *cursor, struct
     uint32_t i = (*cursor)++;
     const uint32_t *joints = (const uint32_t *)(const void *)skin->joints->data;
     *reference = (struct reference){.kind = OBJECT_NODE, .id = joints[i]};
-    snprintf(reference->path, sizeof reference->path, ".arrays[0] (joints)[%u]", i);
+    snprintf(reference->path, sizeof(reference->path), ".arrays[0] (joints)[%u]", i);
     return true;
 }
 

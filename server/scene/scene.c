@@ -8,10 +8,10 @@
 
 struct scene *scene_create(const char *name, const struct scene_limits *limits)
 {
-    struct scene *scene = calloc(1, sizeof *scene);
+    struct scene *scene = calloc(1, sizeof(*scene));
     if (!scene)
         return NULL;
-    snprintf(scene->name, sizeof scene->name, "%s", name ? name : "");
+    snprintf(scene->name, sizeof(scene->name), "%s", name ? name : "");
     if (limits)
         scene->limits = *limits;
     return scene;

@@ -24,7 +24,7 @@ static double *add(struct placed_nodes *placed, uint32_t node)
 {
     if (placed->count == placed->capacity) {
         size_t capacity = placed->capacity ? placed->capacity * 2 : 64;
-        double(*grown)[12] = realloc(placed->world_from_node, capacity * sizeof *grown);
+        double(*grown)[12] = realloc(placed->world_from_node, capacity * sizeof(*grown));
         if (!grown)
             return NULL;
         placed->world_from_node = grown;
@@ -51,7 +51,7 @@ static bool place(struct placed_nodes *placed, const struct scene *scene, const 
         node = node->parent ? scene_node(scene, node->parent) : NULL;
     }
     if (above)
-        memcpy(world_from_joint, above, 12 * sizeof *above);
+        memcpy(world_from_joint, above, 12 * sizeof(*above));
     else
         affine_double_identity(world_from_joint);
     while (length > 0) {
@@ -60,7 +60,7 @@ static bool place(struct placed_nodes *placed, const struct scene *scene, const 
         double *kept = add(placed, node->base.id);
         if (!kept)
             return error_set(error, ERROR_OUT_OF_MEMORY, "skin", "no memory for the places of joints");
-        memcpy(kept, world_from_joint, 12 * sizeof *kept);
+        memcpy(kept, world_from_joint, 12 * sizeof(*kept));
     }
     return true;
 }

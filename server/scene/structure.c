@@ -41,7 +41,7 @@ static bool collect(struct traversal *traversal)
 {
     const struct draft *draft = traversal->draft;
     const struct hashmap *now = &draft->scene->objects[OBJECT_NODE], *edited = &draft->last[OBJECT_NODE];
-    const struct scene_node **nodes = malloc((now->count + edited->count) * sizeof *nodes);
+    const struct scene_node **nodes = malloc((now->count + edited->count) * sizeof(*nodes));
     if (!nodes)
         return false;
     size_t count = 0, cursor = 0;
@@ -57,7 +57,7 @@ static bool collect(struct traversal *traversal)
         if (edit->kind == EDIT_SET)
             nodes[count++] = &edit->set.node;
     }
-    traversal->state = calloc(count ? count : 1, sizeof *traversal->state);
+    traversal->state = calloc(count ? count : 1, sizeof(*traversal->state));
     return hierarchy_init(&traversal->hierarchy, nodes, count) && traversal->state;
 }
 
@@ -81,7 +81,7 @@ static bool chain_error(struct traversal *traversal, enum error_code kind, const
 static bool too_deep(struct traversal *traversal)
 {
     char what[64];
-    snprintf(what, sizeof what, "the hierarchy is more than %u levels deep", traversal->depth_max);
+    snprintf(what, sizeof(what), "the hierarchy is more than %u levels deep", traversal->depth_max);
     chain_error(traversal, ERROR_LIMIT, what);
     return error_remedy(traversal->draft->error,
                         traversal->depth_max == SCENE_DEPTH_MAX

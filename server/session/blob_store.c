@@ -25,13 +25,13 @@ struct blob_store {
 static uint64_t key_of(blob_principal principal, const uint8_t hash[BLOB_HASH_BYTES])
 {
     uint64_t key;
-    memcpy(&key, hash, sizeof key);
+    memcpy(&key, hash, sizeof(key));
     return key ^ principal * UINT64_C(0x9e3779b97f4a7c15);
 }
 
 struct blob_store *blob_store_create(uint64_t limit_bytes, uint64_t cache_limit_bytes)
 {
-    struct blob_store *store = calloc(1, sizeof *store);
+    struct blob_store *store = calloc(1, sizeof(*store));
     if (!store)
         return NULL;
     store->limit_bytes = limit_bytes;
@@ -109,7 +109,7 @@ struct blob *blob_store_add(struct blob_store *store, blob_principal principal, 
     struct entry *entry = find(store, principal, blob->hash);
     if (entry)
         return blob_ref(entry->blob);
-    entry = calloc(1, sizeof *entry);
+    entry = calloc(1, sizeof(*entry));
     if (!entry)
         return NULL;
     uint64_t key = key_of(principal, blob->hash);

@@ -60,7 +60,7 @@ static bool listen_at(struct daemon *daemon, const char *text, bool beyond_loopb
 bool daemon_listen(struct daemon *daemon, const char *addresses, bool beyond_loopback, struct error *error)
 {
     char *copy = strdup(addresses), *rest = copy;
-    bool ok = copy != NULL || error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory");
+    bool ok = copy || error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory");
     for (char *address; ok && (address = strsep(&rest, " \t"));)
         ok = !address[0] || listen_at(daemon, address, beyond_loopback, error);
     free(copy);
@@ -165,7 +165,7 @@ static void stop(struct daemon *daemon)
 static void reload(struct daemon *daemon)
 {
     char state[64];
-    snprintf(state, sizeof state, "RELOADING=1\nMONOTONIC_USEC=%" PRIu64, clock_now_ns() / 1000);
+    snprintf(state, sizeof(state), "RELOADING=1\nMONOTONIC_USEC=%" PRIu64, clock_now_ns() / 1000);
     notify_manager(state);
     if (daemon->reload)
         daemon->reload(daemon->reload_context);
@@ -177,7 +177,7 @@ static void on_signal(void *context, uint32_t epoll_events)
     (void)epoll_events;
     struct daemon *daemon = context;
     struct signalfd_siginfo info;
-    if (read(daemon->signal_fd, &info, sizeof info) != (ssize_t)sizeof info)
+    if (read(daemon->signal_fd, &info, sizeof(info)) != (ssize_t)sizeof(info))
         return;
     if (info.ssi_signo == SIGHUP) {
         if (!daemon->hub.stopping)
@@ -269,9 +269,9 @@ bool daemon_start(struct daemon *daemon, const struct hub_options *options, stru
 
 bool daemon_serve_fd(struct daemon *daemon, int fd, struct error *error)
 {
-    struct address own = {.storage_bytes = sizeof own.storage}, peer = {.storage_bytes = sizeof peer.storage};
+    struct address own = {.storage_bytes = sizeof(own.storage)}, peer = {.storage_bytes = sizeof(peer.storage)};
     char field[32];
-    snprintf(field, sizeof field, "--fd %d", fd);
+    snprintf(field, sizeof(field), "--fd %d", fd);
     if (getsockname(fd, (struct sockaddr *)&own.storage, &own.storage_bytes) < 0 ||
         getpeername(fd, (struct sockaddr *)&peer.storage, &peer.storage_bytes) < 0)
         return error_set(error, ERROR_INVALID, field, "not a connected socket: %s", strerror(errno));

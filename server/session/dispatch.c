@@ -193,7 +193,7 @@ static const struct dispatch_row rows[] = {
 
 const struct dispatch_row *dispatch_find(uint32_t type)
 {
-    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+    for (size_t i = 0; i < sizeof(rows) / sizeof(rows[0]); i++) {
         if ((uint32_t)rows[i].type == type)
             return &rows[i];
     }

@@ -16,7 +16,7 @@ static void begin_set(struct scene_edit *edit, enum object_kind kind, struct sce
     edit->object = kind;
     edit->id = id;
     base->id = id;
-    snprintf(base->name, sizeof base->name, "%s", name);
+    snprintf(base->name, sizeof(base->name), "%s", name);
 }
 
 static bool take_ranges(struct material_range **ranges, uint32_t *range_count,
@@ -24,7 +24,7 @@ static bool take_ranges(struct material_range **ranges, uint32_t *range_count,
 {
     if (!count)
         return true;
-    *ranges = malloc(count * sizeof **ranges);
+    *ranges = malloc(count * sizeof(**ranges));
     if (!*ranges)
         return error_set(error, ERROR_OUT_OF_MEMORY, "ranges", "no memory");
     for (uint32_t i = 0; i < count; i++) {
@@ -40,7 +40,7 @@ static bool take_weights(float **weights, uint32_t *weight_count, const struct r
 {
     if (!count)
         return true;
-    *weights = malloc(count * sizeof **weights);
+    *weights = malloc(count * sizeof(**weights));
     if (!*weights)
         return error_set(error, ERROR_OUT_OF_MEMORY, "weights", "no memory");
     for (uint32_t i = 0; i < count; i++)
@@ -54,7 +54,7 @@ static bool take_blob(const struct session *session, const struct record_blob_re
                       uint32_t index, const char *what, uint32_t id, struct blob **blob, struct error *error)
 {
     char field[64];
-    snprintf(field, sizeof field, "%s %u.arrays[%u]", what, id, index);
+    snprintf(field, sizeof(field), "%s %u.arrays[%u]", what, id, index);
     if (index >= array_count)
         return true;
     return upload_resolve(session, &arrays[index], field, blob, error);
@@ -68,7 +68,7 @@ static bool from_node(const struct message_set_node *message, struct scene_edit 
     node->kind = (enum node_kind)message->kind;
     node->object = message->object;
     node->hidden = message->hidden;
-    memcpy(node->parent_from_node, message->parent_from_node, sizeof node->parent_from_node);
+    memcpy(node->parent_from_node, message->parent_from_node, sizeof(node->parent_from_node));
     node->skin = message->skin;
     return take_weights(&node->weights, &node->weight_count, message->weights, message->weights_count, error);
 }
@@ -108,8 +108,8 @@ static void from_disc(const struct message_set_disc *message, struct scene_edit 
     struct scene_disc *disc = &edit->set.disc;
     begin_set(edit, OBJECT_DISC, &disc->base, message->disc, message->name);
     disc->material = message->material;
-    memcpy(disc->centre_world, message->centre_world, sizeof disc->centre_world);
-    memcpy(disc->normal_world, message->normal_world, sizeof disc->normal_world);
+    memcpy(disc->centre_world, message->centre_world, sizeof(disc->centre_world));
+    memcpy(disc->normal_world, message->normal_world, sizeof(disc->normal_world));
     disc->radius = message->radius;
 }
 
@@ -120,8 +120,8 @@ static void from_material(const struct message_set_material *message, struct sce
     material->alpha_mode = (enum alpha_mode)message->alpha_mode;
     material->double_sided = message->double_sided;
     material->unlit = message->unlit;
-    memcpy(material->base_colour, message->base_colour, sizeof material->base_colour);
-    memcpy(material->emission, message->emission, sizeof material->emission);
+    memcpy(material->base_colour, message->base_colour, sizeof(material->base_colour));
+    memcpy(material->emission, message->emission, sizeof(material->emission));
     material->metallic = message->metallic;
     material->roughness = message->roughness;
     material->transmission = message->transmission;
@@ -134,7 +134,7 @@ static void from_material(const struct message_set_material *message, struct sce
         struct texture_use *use = &material->textures[i];
         use->texture = from->texture;
         use->texcoord_set = from->texcoord_set;
-        memcpy(use->uv_transform, from->uv_transform, sizeof use->uv_transform);
+        memcpy(use->uv_transform, from->uv_transform, sizeof(use->uv_transform));
         use->strength = from->strength;
     }
 }
@@ -167,11 +167,11 @@ static void from_light(const struct message_set_light *message, struct scene_edi
     struct scene_light *light = &edit->set.light;
     begin_set(edit, OBJECT_LIGHT, &light->base, message->light, message->name);
     light->kind = (enum light_kind)message->kind;
-    memcpy(light->colour, message->colour, sizeof light->colour);
+    memcpy(light->colour, message->colour, sizeof(light->colour));
     light->range = message->range;
     light->inner_cone = message->inner_cone;
     light->outer_cone = message->outer_cone;
-    memcpy(light->size, message->size, sizeof light->size);
+    memcpy(light->size, message->size, sizeof(light->size));
 }
 
 static void from_camera(const struct message_set_camera *message, struct scene_edit *edit)
@@ -194,7 +194,7 @@ static bool from_environment(const struct session *session, const struct message
                   message->height, limit_texels);
         return error_remedy(error, texture_remedy);
     }
-    memcpy(environment->colour, message->colour, sizeof environment->colour);
+    memcpy(environment->colour, message->colour, sizeof(environment->colour));
     environment->rotation = message->rotation;
     environment->width = message->width;
     environment->height = message->height;
@@ -240,7 +240,7 @@ static void from_channel(const struct message_set_channel *message, struct scene
 bool edit_from_message(const struct session *session, const struct message *message, struct scene_edit *edit,
                        struct error *error)
 {
-    memset(edit, 0, sizeof *edit);
+    memset(edit, 0, sizeof(*edit));
     switch (message->type) {
     case MESSAGE_SET_NODE:
         return from_node(&message->set_node, edit, error);

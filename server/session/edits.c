@@ -19,7 +19,7 @@ void edits_begin(struct session *session, struct request *request, const struct 
     struct error error = {0};
     /* A scene that is being opened will do: the engine carries things out in order. */
     enum session_scene_state state = session_scene(session, begin->scene);
-    struct transaction *transaction = calloc(1, sizeof *transaction);
+    struct transaction *transaction = calloc(1, sizeof(*transaction));
     if (state != SCENE_OPENING && state != SCENE_OPEN)
         error_set(&error, ERROR_UNKNOWN_ID, "edit_begin.scene", "there is no scene %u", begin->scene);
     else if (!transaction)
@@ -55,7 +55,7 @@ static bool make_room(const struct session *session, struct transaction *transac
     if (transaction->count < transaction->capacity)
         return true;
     size_t capacity = transaction->capacity ? transaction->capacity * 2 : 32;
-    struct scene_edit *edits = realloc(transaction->edits, capacity * sizeof *edits);
+    struct scene_edit *edits = realloc(transaction->edits, capacity * sizeof(*edits));
     if (!edits)
         return error_set(error, ERROR_OUT_OF_MEMORY, "transaction", "no memory for %zu edits", capacity);
     transaction->edits = edits;
@@ -68,14 +68,14 @@ static bool account(struct session *session, struct transaction *transaction, co
                     struct error *error)
 {
     uint64_t limit_bytes = session->hub->options.limits.transaction_bytes;
-    uint64_t bytes = sizeof *edit;
+    uint64_t bytes = sizeof(*edit);
     if (edit->kind == EDIT_SET && edit->object == OBJECT_NODE)
-        bytes += edit->set.node.weight_count * sizeof *edit->set.node.weights;
+        bytes += edit->set.node.weight_count * sizeof(*edit->set.node.weights);
     if (edit->kind == EDIT_SET && edit->object == OBJECT_MESH)
-        bytes += edit->set.mesh.range_count * sizeof *edit->set.mesh.ranges +
-                 edit->set.mesh.weight_count * sizeof *edit->set.mesh.weights;
+        bytes += edit->set.mesh.range_count * sizeof(*edit->set.mesh.ranges) +
+                 edit->set.mesh.weight_count * sizeof(*edit->set.mesh.weights);
     if (edit->kind == EDIT_SET && edit->object == OBJECT_SPHERES)
-        bytes += edit->set.spheres.range_count * sizeof *edit->set.spheres.ranges;
+        bytes += edit->set.spheres.range_count * sizeof(*edit->set.spheres.ranges);
     if (bytes > limit_bytes || session->transaction_bytes > limit_bytes - bytes) {
         error_set(error, ERROR_LIMIT, "transaction",
                   "the edits that wait to be committed take more than %" PRIu64 " bytes, the limit", limit_bytes);

@@ -44,7 +44,7 @@ static void release(struct out_chunk *chunk)
 
 void frames_add(struct job *job, struct engine_frame *frame)
 {
-    struct pending_frame *pending = job->cancelled ? NULL : calloc(1, sizeof *pending);
+    struct pending_frame *pending = job->cancelled ? NULL : calloc(1, sizeof(*pending));
     if (!pending) {
         engine_frame_destroy(frame);
         if (!job->cancelled)
@@ -162,7 +162,7 @@ static void fill_begin(struct message_frame_begin *begin, const struct engine_fr
     begin->integrator = (enum protocol_integrator)frame->request.integrator;
     begin->digest = frame->digest;
     begin->exposure_stops = frame->request.exposure_stops;
-    memcpy(begin->world_from_view, frame->request.camera.world_from_view, sizeof begin->world_from_view);
+    memcpy(begin->world_from_view, frame->request.camera.world_from_view, sizeof(begin->world_from_view));
     begin->fov_y = frame->request.camera.fov_y;
     begin->ortho_height = frame->request.camera.ortho_height;
     begin->time_s = frame->time_s;

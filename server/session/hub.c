@@ -16,7 +16,7 @@
 
 struct engine_command *hub_command(enum engine_command_kind kind, uint64_t client, uint32_t request)
 {
-    struct engine_command *command = calloc(1, sizeof *command);
+    struct engine_command *command = calloc(1, sizeof(*command));
     if (command) {
         command->kind = kind;
         command->client = client;

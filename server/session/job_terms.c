@@ -216,7 +216,7 @@ static bool fill_clips(struct engine_job *job, const struct message_render *rend
 {
     if (!render->clips_count)
         return true;
-    job->clips = calloc(render->clips_count, sizeof *job->clips);
+    job->clips = calloc(render->clips_count, sizeof(*job->clips));
     if (!job->clips)
         return false;
     job->clip_count = render->clips_count;
@@ -231,7 +231,7 @@ static bool fill_keys(struct engine_job *job, const struct message_render *rende
 {
     if (!render->keys_count)
         return true;
-    job->keys = calloc(render->keys_count, sizeof *job->keys);
+    job->keys = calloc(render->keys_count, sizeof(*job->keys));
     if (!job->keys)
         return false;
     job->key_count = render->keys_count;
@@ -239,9 +239,9 @@ static bool fill_keys(struct engine_job *job, const struct message_render *rende
         const struct record_camera_key *from = &render->keys[i];
         struct camera_key *key = &job->keys[i];
         key->time_s = from->time_s;
-        memcpy(key->eye_world, from->eye_world, sizeof key->eye_world);
-        memcpy(key->look_at_world, from->look_at_world, sizeof key->look_at_world);
-        memcpy(key->up_world, from->up_world, sizeof key->up_world);
+        memcpy(key->eye_world, from->eye_world, sizeof(key->eye_world));
+        memcpy(key->look_at_world, from->look_at_world, sizeof(key->look_at_world));
+        memcpy(key->up_world, from->up_world, sizeof(key->up_world));
         key->fov_y = from->fov_y;
     }
     return true;

@@ -34,7 +34,7 @@ static uint64_t allowed_credit(struct job *job)
 static struct job *job_create(struct session *session, uint32_t request, const struct message_render *render)
 {
     bool is_view = render->kind == PROTOCOL_JOB_VIEW;
-    struct job *job = calloc(1, sizeof *job);
+    struct job *job = calloc(1, sizeof(*job));
     struct view_terms terms = view_terms_of(render);
     struct session_view *view = job && is_view ? session_view_create(&terms) : NULL;
     if (!job || (is_view && !view)) {
@@ -65,7 +65,7 @@ static struct job *job_create(struct session *session, uint32_t request, const s
  * way. */
 static bool add_change(struct job *job, uint32_t request, const struct message_render *render)
 {
-    struct view_change *change = calloc(1, sizeof *change);
+    struct view_change *change = calloc(1, sizeof(*change));
     if (!change)
         return false;
     if (render->credit > job->client_credit)

@@ -27,7 +27,7 @@
 #define BETTER_ROOM 1.25
 
 static const unsigned scales_eighths[] = {8, 6, 4, 3, 2};
-#define SCALES (sizeof scales_eighths / sizeof scales_eighths[0])
+#define SCALES (sizeof(scales_eighths) / sizeof(scales_eighths[0]))
 
 void pacing_init(struct pacing *pacing, uint64_t frame_ns)
 {
@@ -115,7 +115,7 @@ static void remove_oldest(struct pacing *pacing, size_t count)
     for (size_t i = 0; i < count; i++)
         pacing->in_flight_bytes -= pacing->in_flight[i].bytes;
     pacing->in_flight_count -= count;
-    memmove(pacing->in_flight, pacing->in_flight + count, pacing->in_flight_count * sizeof pacing->in_flight[0]);
+    memmove(pacing->in_flight, pacing->in_flight + count, pacing->in_flight_count * sizeof(pacing->in_flight[0]));
 }
 
 void pacing_acknowledged(struct pacing *pacing, uint32_t frame, bool whole, uint64_t now_ns)

@@ -40,7 +40,7 @@ struct request *request_begin(struct session *session, uint32_t id, enum request
         session_send_error(session, id, &error);
         return NULL;
     }
-    struct request *request = calloc(1, sizeof *request);
+    struct request *request = calloc(1, sizeof(*request));
     if (!request || !hashmap_put(&session->requests.in_flight, id, request)) {
         free(request);
         error_set(&error, ERROR_OUT_OF_MEMORY, "request", "no memory");

@@ -50,7 +50,7 @@ static bool add(struct session *session, uint32_t scene, const char *field, stru
         error_set(error, ERROR_LIMIT, field, "%u scenes are open, the limit", limit);
         return error_remedy(error, "close one, or raise limits.scenes in the daemon's configuration");
     }
-    struct session_scene *added = calloc(1, sizeof *added);
+    struct session_scene *added = calloc(1, sizeof(*added));
     if (!added || !hashmap_put(&session->scenes, scene, added)) {
         free(added);
         return error_set(error, ERROR_OUT_OF_MEMORY, field, "no memory");
@@ -68,7 +68,7 @@ static void submit(struct session *session, struct request *request, enum engine
         command->scene = scene;
         command->principal = session->principal;
         command->sharing = sharing;
-        snprintf(command->name, sizeof command->name, "%s", name);
+        snprintf(command->name, sizeof(command->name), "%s", name);
     }
     session_submit(session, request, command);
 }

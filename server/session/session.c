@@ -293,15 +293,15 @@ static bool on_hello(void *context, const struct handshake_hello *hello, struct 
     *reply = (struct handshake_reply){.name = "farlightd " FARLIGHT_VERSION};
     reply->version = handshake_choose_version(hello, &error);
     if (!reply->version)
-        snprintf(reply->text, sizeof reply->text, "%s", error.text);
+        snprintf(reply->text, sizeof(reply->text), "%s", error.text);
     else if (hub->stopping)
-        snprintf(reply->text, sizeof reply->text, "the daemon is about to stop");
+        snprintf(reply->text, sizeof(reply->text), "the daemon is about to stop");
     else if (introduced_count(hub) >= hub->options.limits.clients)
-        snprintf(reply->text, sizeof reply->text, "%u clients are connected, the limit; try again later",
+        snprintf(reply->text, sizeof(reply->text), "%u clients are connected, the limit; try again later",
                  hub->options.limits.clients);
-    if (getrandom(reply->nonce, sizeof reply->nonce, 0) < 0 ||
-        getrandom(reply->session_token, sizeof reply->session_token, 0) < 0)
-        snprintf(reply->text, sizeof reply->text, "no random numbers");
+    if (getrandom(reply->nonce, sizeof(reply->nonce), 0) < 0 ||
+        getrandom(reply->session_token, sizeof(reply->session_token), 0) < 0)
+        snprintf(reply->text, sizeof(reply->text), "no random numbers");
     if (session->identity.read_only)
         reply->capabilities |= HANDSHAKE_CAN_READ_ONLY;
     session->can_h264 = (hello->capabilities & HANDSHAKE_CAN_H264) && reply->text[0] == '\0' &&
@@ -312,7 +312,7 @@ static bool on_hello(void *context, const struct handshake_hello *hello, struct 
     if (session->can_abandon)
         reply->capabilities |= HANDSHAKE_CAN_ABANDON;
     fill_limits(&reply->limits, session);
-    snprintf(session->name, sizeof session->name, "%s", hello->name);
+    snprintf(session->name, sizeof(session->name), "%s", hello->name);
     return reply->text[0] == '\0';
 }
 
@@ -402,7 +402,7 @@ struct session *session_create(struct hub *hub, uint64_t number, int fd, bool se
                                const struct address *peer, const struct auth_identity *identity,
                                struct error *error)
 {
-    struct session *session = calloc(1, sizeof *session);
+    struct session *session = calloc(1, sizeof(*session));
     if (!session) {
         error_set(error, ERROR_OUT_OF_MEMORY, "session", "no memory");
         return NULL;

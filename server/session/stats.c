@@ -126,7 +126,7 @@ static void fill(struct message_stats_reply *reply, const struct hub *hub, const
 
 void stats_answer(struct session *session, struct request *request, const struct engine_stats *stats)
 {
-    struct stats_storage *storage = calloc(1, sizeof *storage);
+    struct stats_storage *storage = calloc(1, sizeof(*storage));
     if (!storage) {
         struct error error = {0};
         error_set(&error, ERROR_OUT_OF_MEMORY, "stats", "no memory");

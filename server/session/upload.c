@@ -20,7 +20,7 @@ static uint64_t key_of(const struct session *session, const uint8_t hash[BLOB_HA
     uint8_t bytes[crypto_shorthash_BYTES];
     crypto_shorthash(bytes, hash, BLOB_HASH_BYTES, session->blobs.offers_key);
     uint64_t key;
-    memcpy(&key, bytes, sizeof key);
+    memcpy(&key, bytes, sizeof(key));
     return key;
 }
 
@@ -46,7 +46,7 @@ struct offer *upload_add(struct session *session, const struct record_blob_ref *
         error_remedy(error, "connect again, or raise limits.blobs in the daemon's configuration");
         return NULL;
     }
-    struct offer *offer = calloc(1, sizeof *offer);
+    struct offer *offer = calloc(1, sizeof(*offer));
     uint64_t key = key_of(session, reference->hash);
     if (offer) {
         offer->same_key = hashmap_get(&session->blobs.offers, key);
@@ -85,7 +85,7 @@ static bool take_offer(struct session *session, const struct record_blob_ref *re
 void upload_offer(struct session *session, struct request *request, const struct message_blob_offer *message)
 {
     struct error error = {0};
-    struct record_blob_index *needed = calloc(message->blobs_count + 1u, sizeof *needed);
+    struct record_blob_index *needed = calloc(message->blobs_count + 1u, sizeof(*needed));
     if (!needed)
         error_set(&error, ERROR_OUT_OF_MEMORY, "blob_offer", "no memory");
     struct message answer;
@@ -156,7 +156,7 @@ static void tell_credit(struct session *session)
 
 void upload_begin(struct session *session)
 {
-    randombytes_buf(session->blobs.offers_key, sizeof session->blobs.offers_key);
+    randombytes_buf(session->blobs.offers_key, sizeof(session->blobs.offers_key));
     tell_credit(session);
 }
 

@@ -41,7 +41,7 @@ struct view_terms view_terms_of(const struct message_render *render)
 
 struct session_view *session_view_create(const struct view_terms *terms)
 {
-    struct session_view *view = calloc(1, sizeof *view);
+    struct session_view *view = calloc(1, sizeof(*view));
     if (!view)
         return NULL;
     view->terms = *terms;
@@ -325,9 +325,9 @@ void views_look(struct session *session, const struct message_view_camera *messa
         .key = {.time_s = message->time_s, .fov_y = message->fov_y},
         .node = message->node,
     };
-    memcpy(camera.key.eye_world, message->eye_world, sizeof camera.key.eye_world);
-    memcpy(camera.key.look_at_world, message->look_at_world, sizeof camera.key.look_at_world);
-    memcpy(camera.key.up_world, message->up_world, sizeof camera.key.up_world);
+    memcpy(camera.key.eye_world, message->eye_world, sizeof(camera.key.eye_world));
+    memcpy(camera.key.look_at_world, message->look_at_world, sizeof(camera.key.look_at_world));
+    memcpy(camera.key.up_world, message->up_world, sizeof(camera.key.up_world));
     if (view_wishes_look(job->view->wishes, &camera))
         tell_engine(job);
     frames_abandon(job);

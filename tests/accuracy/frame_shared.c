@@ -165,7 +165,7 @@ TEST(what_moves_is_alone)
     struct frame_renderer *first = fixture->renderer, *second = another_renderer(fixture);
     const float raised[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0.3f};
     struct pose_node place = {.node = node};
-    memcpy(place.parent_from_node, raised, sizeof raised);
+    memcpy(place.parent_from_node, raised, sizeof(raised));
     struct scene_pose pose = {.nodes = &place, .node_count = 1};
     const struct scene_motion motion = {.poses = &pose, .pose_count = 1};
     const struct frame_request *request = &fixture->request;
@@ -329,7 +329,7 @@ TEST(pictures_that_are_copied_behind_are_the_same)
         frame_renderer_read_behind(fixture->renderer, true);
         begin(fixture, fixture->renderer, &request);
         struct frame_result dropped = {0};
-        while (!frame_step_waits(fixture->renderer) && dropped.pixels == NULL)
+        while (!frame_step_waits(fixture->renderer) && !dropped.pixels)
             if (frame_step(fixture->renderer, &dropped, &error) == FRAME_FAILED)
                 fail_msg("frame_step: %s", error.text);
         frame_abandon(fixture->renderer); /* while a copy is on its way, if the device is slow enough to show it */

@@ -70,7 +70,7 @@ TEST(planes_are_those_of_the_pixels_at_any_size)
     /* Odd ones, those that fill a tile or a word less or more by one, and one of several bands. */
     static const uint32_t sizes[][2] = {{1, 1}, {2, 2}, {7, 5}, {8, 8}, {9, 17}, {64, 31}, {320, 180}, {701, 903}};
     build_scene(fixture);
-    for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++) {
+    for (size_t i = 0; i < sizeof(sizes) / sizeof(*sizes); i++) {
         fixture->request.width = sizes[i][0];
         fixture->request.height = sizes[i][1];
         frame_renderer_read_behind(fixture->renderer, i % 2);

@@ -85,7 +85,7 @@ BENCH(cancel)
         json_decref(all);
     } else {
         char line[1200];
-        fl_error_print(&error, line, sizeof line);
+        fl_error_print(&error, line, sizeof(line));
         fprintf(stderr, "bench cancel: %s\n", line);
     }
     fl_scene_destroy(scene);

@@ -41,8 +41,8 @@ static json_t *figure_json(const struct bench_runs *runs)
 static void add_sphere(struct test_edits *edits, uint32_t id, uint32_t steps)
 {
     uint32_t vertex_count = (steps + 1) * (steps + 1), triangle_count = 2 * steps * steps;
-    float(*vertices)[3] = malloc(vertex_count * sizeof *vertices);
-    uint32_t *indices = malloc(3 * (size_t)triangle_count * sizeof *indices), *next = indices;
+    float(*vertices)[3] = malloc(vertex_count * sizeof(*vertices));
+    uint32_t *indices = malloc(3 * (size_t)triangle_count * sizeof(*indices)), *next = indices;
     for (uint32_t i = 0; i < vertex_count; i++) {
         float theta = PI_F * (float)(i / (steps + 1)) / (float)steps,
               phi = 2 * PI_F * (float)(i % (steps + 1)) / (float)steps;
@@ -53,7 +53,7 @@ static void add_sphere(struct test_edits *edits, uint32_t id, uint32_t steps)
     for (uint32_t i = 0; i < steps; i++) {
         for (uint32_t j = 0; j < steps; j++, next += 6) {
             uint32_t a = i * (steps + 1) + j, b = a + steps + 1;
-            memcpy(next, (uint32_t[6]){a, a + 1, b, a + 1, b + 1, b}, 6 * sizeof *next);
+            memcpy(next, (uint32_t[6]){a, a + 1, b, a + 1, b + 1, b}, 6 * sizeof(*next));
         }
     }
     test_mesh(edits, id, (const float(*)[3])vertices, vertex_count, indices, triangle_count);
@@ -67,7 +67,7 @@ static void add_sphere(struct test_edits *edits, uint32_t id, uint32_t steps)
 static uint64_t move_all(struct scene *scene, uint32_t count, float time)
 {
     struct error error = {0};
-    struct scene_edit *edits = calloc(count, sizeof *edits);
+    struct scene_edit *edits = calloc(count, sizeof(*edits));
     uint32_t side = (uint32_t)ceilf(sqrtf((float)count));
     for (uint32_t i = 0; i < count; i++) {
         edits[i].kind = EDIT_SET;
@@ -163,7 +163,7 @@ static void bend(struct bent *bent, float radians)
         out[2] = in[2];
     }
     gpu_buffer_write(bent->device, &bent->gpu.positions, 0, bent->vertices,
-                     bent->vertex_count * 4 * sizeof *bent->vertices);
+                     bent->vertex_count * 4 * sizeof(*bent->vertices));
     bent->gpu.geometries[0].deformed_revision++;
     glFinish();
 }
@@ -188,8 +188,8 @@ static struct hit *trace(struct bent *bent, struct tracer *tracer, struct gpu_bu
 {
     struct error error = {0};
     struct gpu_buffer answers = {0};
-    struct hit *hits = malloc(RAY_COUNT * sizeof *hits);
-    require(gpu_buffer_reserve(bent->device, &answers, RAY_COUNT * sizeof *hits, &error), &error);
+    struct hit *hits = malloc(RAY_COUNT * sizeof(*hits));
+    require(gpu_buffer_reserve(bent->device, &answers, RAY_COUNT * sizeof(*hits), &error), &error);
     gpu_scene_bind(&bent->gpu);
     const struct wave wave = {.ray_count = RAY_COUNT, .rays = rays, .hits = &answers};
     for (int run = 0; run < 4; run++) {
@@ -199,7 +199,7 @@ static struct hit *trace(struct bent *bent, struct tracer *tracer, struct gpu_bu
         uint64_t took_ns = clock_now_ns() - start_ns;
         *time_ns = run == 0 || took_ns < *time_ns ? took_ns : *time_ns;
     }
-    gpu_buffer_read(bent->device, &answers, 0, hits, RAY_COUNT * sizeof *hits);
+    gpu_buffer_read(bent->device, &answers, 0, hits, RAY_COUNT * sizeof(*hits));
     gpu_buffer_finish(bent->device, &answers);
     return hits;
 }
@@ -209,7 +209,7 @@ static uint32_t compare(struct bent *bent, uint64_t times_ns[2])
 {
     struct error error = {0};
     struct gpu_buffer buffer = {0};
-    struct ray *rays = calloc(RAY_COUNT, sizeof *rays);
+    struct ray *rays = calloc(RAY_COUNT, sizeof(*rays));
     uint64_t seed = 3;
     for (uint32_t i = 0; i < RAY_COUNT; i++) {
         for (int k = 0; k < 3; k++) {
@@ -218,7 +218,7 @@ static uint32_t compare(struct bent *bent, uint64_t times_ns[2])
         }
         rays[i].direction_t_max[3] = 1e9f;
     }
-    require(gpu_buffer_upload(bent->device, &buffer, rays, RAY_COUNT * sizeof *rays, &error), &error);
+    require(gpu_buffer_upload(bent->device, &buffer, rays, RAY_COUNT * sizeof(*rays), &error), &error);
     struct hit *a = trace(bent, bent->refitted, &buffer, &times_ns[0]);
     struct hit *b = trace(bent, bent->rebuilt, &buffer, &times_ns[1]);
     uint32_t differing = 0;
@@ -244,7 +244,7 @@ static void bent_init(struct bent *bent, struct gpu_device *device, uint32_t tri
     require(gpu_scene_update(&bent->gpu, bent->scene, NULL, &changes, NULL, &error), &error);
     bent->gpu.geometries[0].node = 1; /* as if it had a skin */
     bent->vertex_count = bent->gpu.geometries[0].device.vertex_count;
-    bent->vertices = calloc(bent->vertex_count, 4 * sizeof *bent->vertices);
+    bent->vertices = calloc(bent->vertex_count, 4 * sizeof(*bent->vertices));
     bent->refitted = tracer_create(&tracer_bvh_impl, device, NULL, &error);
     bent->rebuilt = tracer_create(&tracer_bvh_impl, device, NULL, &error);
     require(bent->refitted && bent->rebuilt && bent->vertices, &error);

@@ -156,9 +156,9 @@ static bool count_edges(struct bench_contest *contest, const struct bench_conten
                         const float *answers, uint32_t *edges, struct error *error)
 {
     const bool is_any = bench_wave_facts[wave->kind].is_any;
-    struct ray *rays = malloc(count * NUDGES * sizeof *rays);
+    struct ray *rays = malloc(count * NUDGES * sizeof(*rays));
     void *raw = malloc(count * NUDGES * sizeof(struct hit));
-    float *near = malloc(count * NUDGES * sizeof *near);
+    float *near = malloc(count * NUDGES * sizeof(*near));
     const struct bench_wave nudged = {.kind = wave->kind, .rays = rays, .ray_count = count * NUDGES};
     uint64_t time_ns;
     bool ok = rays && raw && near;
@@ -186,7 +186,7 @@ static bool compare(struct bench_contest *contest, struct bench_contender *conte
                     const float *answers, struct error *error)
 {
     const bool is_any = bench_wave_facts[wave->kind].is_any;
-    uint32_t *places = malloc(EXAMINED_MAX * sizeof *places);
+    uint32_t *places = malloc(EXAMINED_MAX * sizeof(*places));
     if (!places)
         return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory to compare");
     contender->is_compared = true;
@@ -261,7 +261,8 @@ bool bench_contest_wave(struct bench_contest *contest, const struct bench_wave *
 {
     const struct bench_contender *truth = find_truth(contest, wave->kind);
     void *raw = malloc(wave->ray_count * sizeof(struct hit));
-    float *truths = malloc(wave->ray_count * sizeof *truths), *answers = malloc(wave->ray_count * sizeof *answers);
+    float *truths = malloc(wave->ray_count * sizeof(*truths)),
+          *answers = malloc(wave->ray_count * sizeof(*answers));
     bool ok = raw && truths && answers;
     if (!ok)
         error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a wave");
@@ -286,7 +287,7 @@ static bool trace_once(struct bench_contest *contest, struct tracer *tracer, boo
     gpu_scene_bind(&contest->scene->gpu);
     if (!upload(contest, wave, error) || !run_tracer(contest, tracer, intersections_only, wave, error))
         return false;
-    gpu_buffer_read(contest->device, &contest->answer_buffer, 0, hits, wave->ray_count * sizeof *hits);
+    gpu_buffer_read(contest->device, &contest->answer_buffer, 0, hits, wave->ray_count * sizeof(*hits));
     return true;
 }
 

@@ -52,11 +52,11 @@ static bool flat_reserve(struct flat *flat, const struct gpu_scene *scene)
         *(geometry->mesh ? &triangles : &spheres) += geometry->device.primitive_count;
     }
     /* One more than is needed: Embree reads 16 bytes at the last vertex. */
-    flat->vertices = malloc((3 * triangles + 2) * sizeof *flat->vertices);
-    flat->triangles = malloc((3 * triangles + 2) * sizeof *flat->triangles);
-    flat->spheres = malloc((spheres + 1) * sizeof *flat->spheres);
-    flat->discs = malloc((scene->disc_count + 1u) * sizeof *flat->discs);
-    flat->disc_normals = malloc((scene->disc_count + 2u) * sizeof *flat->disc_normals);
+    flat->vertices = malloc((3 * triangles + 2) * sizeof(*flat->vertices));
+    flat->triangles = malloc((3 * triangles + 2) * sizeof(*flat->triangles));
+    flat->spheres = malloc((spheres + 1) * sizeof(*flat->spheres));
+    flat->discs = malloc((scene->disc_count + 1u) * sizeof(*flat->discs));
+    flat->disc_normals = malloc((scene->disc_count + 2u) * sizeof(*flat->disc_normals));
     return flat->vertices && flat->triangles && flat->spheres && flat->discs && flat->disc_normals;
 }
 
@@ -98,15 +98,15 @@ static bool flatten(struct flat *flat, const struct gpu_scene *scene, struct err
     for (uint32_t i = 0; i < scene->instance_count; i++) {
         const struct gpu_scene_geometry *geometry = &scene->geometries[scene->instances[i].geometry];
         float m[12];
-        memcpy(m, scene->instances[i].world_from_object, sizeof m);
+        memcpy(m, scene->instances[i].world_from_object, sizeof(m));
         if (geometry->mesh)
             add_mesh(flat, m, geometry->mesh);
         else if (!add_spheres(flat, m, geometry->spheres))
             return error_set(error, ERROR_UNSUPPORTED, NULL, "a sphere is squeezed: Embree's points are round");
     }
     for (uint32_t i = 0; i < scene->disc_count; i++) {
-        memcpy(flat->discs[i], &scene->discs[i].centre_radius, sizeof flat->discs[i]);
-        memcpy(flat->disc_normals[i], &scene->discs[i].normal, sizeof flat->disc_normals[i]);
+        memcpy(flat->discs[i], &scene->discs[i].centre_radius, sizeof(flat->discs[i]));
+        memcpy(flat->disc_normals[i], &scene->discs[i].normal, sizeof(flat->disc_normals[i]));
     }
     return true;
 }
@@ -158,7 +158,7 @@ struct bench_embree *bench_embree_create(const struct gpu_scene *scene, bool rob
                                          struct error *error)
 {
     struct flat flat = {0};
-    struct bench_embree *embree = calloc(1, sizeof *embree);
+    struct bench_embree *embree = calloc(1, sizeof(*embree));
     const unsigned flags = _mm_getcsr();
     *build_ns = 0;
     if (!embree || !flatten(&flat, scene, error)) {
@@ -273,7 +273,7 @@ static void trace_single(const struct tracing *tracing, struct RTCIntersectConte
         const struct bench_embree_wave *wave = tracing->wave;                                                     \
         _Alignas(64) int valid[N];                                                                                \
         struct RTCRayHit##N many;                                                                                 \
-        memset(&many.hit, 0xff, sizeof many.hit);                                                                 \
+        memset(&many.hit, 0xff, sizeof(many.hit));                                                                \
         for (uint32_t k = 0; k < N; k++) {                                                                        \
             const struct ray *from = &wave->rays[first + k < wave->ray_count ? first + k : first];                \
             valid[k] = first + k < wave->ray_count && from->direction_t_max[3] > from->origin_t_min[3] ? -1 : 0;  \

@@ -101,7 +101,7 @@ static bool parse_option(struct bench_forms *bench, int option, char *text)
     case 'k':
         return bench_parse_number(text, 1, 64, &bench->rays_each);
     case 't':
-        if (!bench_parse_word(text, integrators, sizeof integrators / sizeof *integrators, &word))
+        if (!bench_parse_word(text, integrators, sizeof(integrators) / sizeof(*integrators), &word))
             return false;
         bench->integrator = word;
         return true;

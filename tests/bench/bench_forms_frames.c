@@ -17,7 +17,7 @@
 #define WARM_UPS 2u
 
 static const enum stage shown[] = {STAGE_UPLOAD, STAGE_PRIMARY, STAGE_TRACE, STAGE_SHADE, STAGE_RESOLVE};
-enum { SHOWN = sizeof shown / sizeof shown[0] };
+enum { SHOWN = sizeof(shown) / sizeof(shown[0]) };
 
 struct frames {
     struct bench_forms *bench;
@@ -163,7 +163,7 @@ static bool render_truth(struct frames *frames, struct frame_result *truth, stru
 
 json_t *bench_forms_frames(struct bench_forms *bench, struct error *error)
 {
-    struct frames *frames = calloc(1, sizeof *frames);
+    struct frames *frames = calloc(1, sizeof(*frames));
     if (!frames) {
         error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for frames");
         return NULL;

@@ -54,7 +54,7 @@ static bool set_key(struct bench_form *form, const char *key, const char *value)
                    {"resolution", &options->bench.baseline_side, form->rival},
                    {"voxels", &options->abuffer.voxels, is_abuffer},
                    {"ao", &form->ao_rays, true}};
-    for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; i++)
+    for (size_t i = 0; i < sizeof(numbers) / sizeof(numbers[0]); i++)
         if (numbers[i].fits && strcmp(key, numbers[i].key) == 0)
             return bench_parse_number(value, 1, 4096, numbers[i].number);
     if (is_abuffer && strcmp(key, "search") == 0) {
@@ -76,14 +76,14 @@ static bool set_tracer(struct bench_form *form, const char *name)
                   {"svo-planes", &svo_planes_impl},
                   {"svo-tiles", &svo_tiles_impl},
                   {"plain", &plain_pass_impl}};
-    for (size_t i = 0; i < sizeof rivals / sizeof *rivals; i++) {
+    for (size_t i = 0; i < sizeof(rivals) / sizeof(*rivals); i++) {
         if (strcmp(name, rivals[i].name) == 0) {
             form->tracer = BENCH_TRACER_RIVAL;
             form->rival = rivals[i].impl;
             return true;
         }
     }
-    return bench_parse_word(name, tracers, sizeof tracers / sizeof *tracers, &form->tracer);
+    return bench_parse_word(name, tracers, sizeof(tracers) / sizeof(*tracers), &form->tracer);
 }
 
 bool bench_form_parse(struct bench_form *form, char *text)

@@ -109,7 +109,7 @@ static int by_size(const void *a, const void *b)
 static void compare(json_t *object, const struct hit *truth, const struct hit *hits, uint32_t count)
 {
     uint32_t both = 0, only_form = 0, only_reference = 0;
-    float *errors = malloc((count + 1) * sizeof *errors);
+    float *errors = malloc((count + 1) * sizeof(*errors));
     if (!errors)
         return;
     for (uint32_t i = 0; i < count; i++) {
@@ -119,7 +119,7 @@ static void compare(json_t *object, const struct hit *truth, const struct hit *h
         only_form += is_hit && !is_truly;
         only_reference += !is_hit && is_truly;
     }
-    qsort(errors, both, sizeof *errors, by_size);
+    qsort(errors, both, sizeof(*errors), by_size);
     json_object_set_new(object, "agree", json_real(1 - (double)(only_form + only_reference) / (double)count));
     json_object_set_new(object, "only_form", json_integer(only_form));
     json_object_set_new(object, "only_reference", json_integer(only_reference));
@@ -170,10 +170,10 @@ static bool begin(struct waves *waves, struct bench_forms *bench, struct error *
     *waves = (struct waves){.bench = bench,
                             .contest = {.device = bench->device, .scene = &bench->scene, .runs = bench->runs},
                             .reference = {.name = "reference", .tracer = TRACER_REFERENCE},
-                            .camera_rays = malloc(pixels * sizeof *waves->camera_rays),
-                            .camera_hits = malloc(pixels * sizeof *waves->camera_hits),
-                            .truth = malloc(most * sizeof *waves->truth),
-                            .hits = malloc(most * sizeof *waves->hits)};
+                            .camera_rays = malloc(pixels * sizeof(*waves->camera_rays)),
+                            .camera_hits = malloc(pixels * sizeof(*waves->camera_hits)),
+                            .truth = malloc(most * sizeof(*waves->truth)),
+                            .hits = malloc(most * sizeof(*waves->hits))};
     if (!waves->camera_rays || !waves->camera_hits || !waves->truth || !waves->hits)
         return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a picture's rays");
     uint64_t time_ns;
@@ -231,12 +231,12 @@ static bool run_wave(struct waves *waves, enum bench_wave_kind kind, struct erro
     const struct bench_forms *bench = waves->bench;
     const uint32_t pixels = bench->width * bench->height;
     const size_t most = (size_t)pixels * (kind == BENCH_PRIMARY || kind == BENCH_SHUFFLED ? 1 : bench->rays_each);
-    struct ray *rays = malloc(most * sizeof *rays);
+    struct ray *rays = malloc(most * sizeof(*rays));
     struct bench_wave wave = {.kind = kind, .rays = rays, .ray_count = pixels};
     if (!rays)
         return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for rays");
     if (kind == BENCH_PRIMARY)
-        memcpy(rays, waves->camera_rays, pixels * sizeof *rays);
+        memcpy(rays, waves->camera_rays, pixels * sizeof(*rays));
     else
         wave.ray_count = bench_secondary_rays(rays, kind, waves->camera_rays, waves->camera_hits, pixels,
                                               bench->rays_each, &bench->scene);

@@ -98,7 +98,7 @@ json_t *bench_forms_samples(struct bench_forms *bench, struct error *error)
     const uint32_t count = bench->scene.gpu.instance_count;
     struct sampled sampled[BENCH_FORMS_MAX] = {0};
     json_t *list = NULL;
-    uint32_t *instances = malloc(((size_t)count + 1) * sizeof *instances);
+    uint32_t *instances = malloc(((size_t)count + 1) * sizeof(*instances));
     for (uint32_t i = 0; instances && i < count; i++)
         instances[i] = i;
     if (!instances)

@@ -216,7 +216,7 @@ BENCH(link)
     const unsigned long mib = argc > 1 ? strtoul(argv[1], NULL, 10) : 512;
     const unsigned long count = argc > 2 ? strtoul(argv[2], NULL, 10) : 7;
     static struct run runs[2][RUNS_MAX]; /* open, sealed */
-    char folder[] = P_tmpdir "/farlight-bench-XXXXXX", key_file[sizeof folder + 8], text[ADDRESS_TEXT_BYTES];
+    char folder[] = P_tmpdir "/farlight-bench-XXXXXX", key_file[sizeof(folder) + 8], text[ADDRESS_TEXT_BYTES];
     struct decode_error why = {0};
     struct error error = {0};
     struct address address;
@@ -228,7 +228,7 @@ BENCH(link)
     for (size_t i = 0; i < FRAME_PIECE_BYTES; i++)
         data[i] = (uint8_t)(i * 2654435761u >> 13);
     piece = (struct out_chunk){.references = 1, .data = data, .size_bytes = FRAME_PIECE_BYTES};
-    snprintf(key_file, sizeof key_file, "%s/key", folder);
+    snprintf(key_file, sizeof(key_file), "%s/key", folder);
     if (!sealed_key_create(key_file, &why) || !sealed_key_read(&served.key, key_file, &why))
         die(why.text);
     if (!address_parse(&address, "tcp:127.0.0.1:0", &error) ||

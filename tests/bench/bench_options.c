@@ -131,7 +131,7 @@ bool bench_parse(int argc, char **argv, struct bench_options *options, struct gp
     *options = (struct bench_options){.width = 512, .height = 512, .rays_each = 1, .runs = 5};
     options->scene.up[1] = 1;
     options->scene.fov_y = 0.7f;
-    memset(options->waves, true, sizeof options->waves);
+    memset(options->waves, true, sizeof(options->waves));
     options->waves[BENCH_REFRACTION] = false; /* rays into what is no glass */
     for (int option; (option = getopt_long(argc, argv, "", names, NULL)) != -1;) {
         if (option == '?')

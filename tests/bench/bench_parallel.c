@@ -25,7 +25,7 @@
 enum order { COHERENT, PARTLY, INCOHERENT, ORDERS };
 static const char *const order_names[ORDERS] = {"coherent", "partly", "incoherent"};
 static const uint32_t numbers[] = {1, 2, 3, 4, 8};
-#define NUMBER_COUNT (sizeof numbers / sizeof numbers[0])
+#define NUMBER_COUNT (sizeof(numbers) / sizeof(numbers[0]))
 enum { BOXES, SPHERES, BOUNDS };
 
 struct bench {
@@ -86,15 +86,15 @@ static void trace(struct bench *bench, struct tracer *tracer, uint32_t ray_count
 
 static struct hit *read_hits(struct bench *bench, uint32_t ray_count)
 {
-    struct hit *hits = malloc(ray_count * sizeof *hits);
-    gpu_buffer_read(bench->device, &bench->hits, 0, hits, ray_count * sizeof *hits);
+    struct hit *hits = malloc(ray_count * sizeof(*hits));
+    gpu_buffer_read(bench->device, &bench->hits, 0, hits, ray_count * sizeof(*hits));
     return hits;
 }
 
 static void upload(struct bench *bench, const struct ray *rays, uint32_t count)
 {
     struct error error = {0};
-    require(gpu_buffer_upload(bench->device, &bench->rays, rays, count * sizeof *rays, &error) &&
+    require(gpu_buffer_upload(bench->device, &bench->rays, rays, count * sizeof(*rays), &error) &&
                 gpu_buffer_reserve(bench->device, &bench->hits, count * sizeof(struct hit), &error),
             &error);
     gpu_scene_bind(&bench->scene.gpu);
@@ -120,7 +120,7 @@ static json_t *measure(struct bench *bench, enum order order, const struct ray *
     upload(bench, rays, count);
     trace(bench, bench->tracers[BOXES][0], count, false);
     struct hit *expected = read_hits(bench, count);
-    memset(bench->runs, 0, sizeof bench->runs);
+    memset(bench->runs, 0, sizeof(bench->runs));
     for (int bounds = 0; bounds < BOUNDS; bounds++)
         for (size_t n = 0; n < NUMBER_COUNT; n++)
             check(bench, bench->tracers[bounds][n], expected, count); /* compiles, too */
@@ -149,7 +149,7 @@ static json_t *measure(struct bench *bench, enum order order, const struct ray *
 
 static json_t *measure_all(struct bench *bench, unsigned runs)
 {
-    struct ray *rays = malloc(RAY_COUNT * sizeof *rays), *secondary = malloc(RAY_COUNT * sizeof *rays);
+    struct ray *rays = malloc(RAY_COUNT * sizeof(*rays)), *secondary = malloc(RAY_COUNT * sizeof(*rays));
     camera_rays(rays, &bench->scene.camera);
     json_t *results = measure(bench, COHERENT, rays, RAY_COUNT, runs);
     upload(bench, rays, RAY_COUNT);

@@ -118,7 +118,7 @@ bool bench_scene_init(struct bench_scene *scene, struct gpu_device *device,
                       const struct bench_scene_options *options, struct error *error)
 {
     struct scene_changes changes;
-    memset(scene, 0, sizeof *scene);
+    memset(scene, 0, sizeof(*scene));
     gpu_scene_init(&scene->gpu, device);
     if (options->model) {
         if (!load_model(&scene->loaded, options->model, error))

@@ -31,7 +31,7 @@ static void add_sheet(struct test_edits *edits, uint32_t number, uint32_t count)
     for (uint32_t i = 0; i < STEPS; i++) {
         for (uint32_t j = 0; j < STEPS; j++, next += 6) {
             const uint32_t a = i * (STEPS + 1) + j, b = a + STEPS + 1;
-            memcpy(next, (uint32_t[6]){a, b, a + 1, a + 1, b, b + 1}, 6 * sizeof *next);
+            memcpy(next, (uint32_t[6]){a, b, a + 1, a + 1, b, b + 1}, 6 * sizeof(*next));
         }
     }
     test_mesh(edits, number + 1, (const float(*)[3])vertices, (STEPS + 1) * (STEPS + 1), indices,
@@ -71,9 +71,9 @@ static void add_mirror(struct test_edits *edits)
 
 static float *copy_weights(const float *weights, uint32_t count)
 {
-    float *copy = count > 0 ? malloc(count * sizeof *copy) : NULL;
+    float *copy = count > 0 ? malloc(count * sizeof(*copy)) : NULL;
     if (copy)
-        memcpy(copy, weights, count * sizeof *copy);
+        memcpy(copy, weights, count * sizeof(*copy));
     return copy;
 }
 
@@ -109,7 +109,7 @@ bool bench_make_alike(struct scene *scene, enum bench_material material, struct 
     test_commit(&edits);
     for (int i = 0; i < 2; i++) {
         const size_t count = scene->objects[kinds[i]].count;
-        uint64_t *ids = calloc(count + 1, sizeof *ids), key;
+        uint64_t *ids = calloc(count + 1, sizeof(*ids)), key;
         void *value;
         size_t cursor = 0, found = 0;
         if (!ids)

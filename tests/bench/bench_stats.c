@@ -18,7 +18,7 @@ static int by_size(const void *a, const void *b)
 
 static double median(double *values, unsigned count)
 {
-    qsort(values, count, sizeof *values, by_size);
+    qsort(values, count, sizeof(*values), by_size);
     return count % 2 ? values[count / 2] : (values[count / 2 - 1] + values[count / 2]) / 2;
 }
 

@@ -224,7 +224,7 @@ static json_t *environment_json(const struct bench *bench)
     char embree[80] = "";
     for (unsigned i = 0; i < bench->structure_count; i++)
         if (bench->structures[i].embree)
-            bench_embree_describe(bench->structures[i].embree, embree, sizeof embree);
+            bench_embree_describe(bench->structures[i].embree, embree, sizeof(embree));
     json_t *made = json_pack("{s:s, s:s, s:s, s:b, s:i, s:s}", "device", info->name, "vendor", info->vendor,
                              "version", info->version, "software", bench->device->facts.software, "processors",
                              (int)parallel_processors(), "embree", embree);
@@ -261,12 +261,12 @@ static bool run_wave(struct bench *bench, enum bench_wave_kind kind, const struc
 {
     const uint32_t pixels = bench->options.width * bench->options.height,
                    each = kind == BENCH_PRIMARY ? 1 : bench->options.rays_each;
-    struct ray *rays = malloc((size_t)pixels * each * sizeof *rays);
+    struct ray *rays = malloc((size_t)pixels * each * sizeof(*rays));
     struct bench_wave wave = {.kind = kind, .rays = rays, .ray_count = pixels};
     if (!rays)
         return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for rays");
     if (kind == BENCH_PRIMARY)
-        memcpy(rays, camera_rays, pixels * sizeof *rays);
+        memcpy(rays, camera_rays, pixels * sizeof(*rays));
     else
         wave.ray_count = bench_secondary_rays(rays, kind, camera_rays, hits, pixels, each, &bench->scene);
     fprintf(stderr, "    %s: %u rays\n", bench_wave_facts[kind].name, wave.ray_count);
@@ -280,8 +280,8 @@ static bool run_wave(struct bench *bench, enum bench_wave_kind kind, const struc
 static bool run_waves(struct bench *bench, json_t *waves, struct error *error)
 {
     const uint32_t pixels = bench->options.width * bench->options.height;
-    struct ray *camera_rays = malloc(pixels * sizeof *camera_rays);
-    struct hit *hits = malloc(pixels * sizeof *hits);
+    struct ray *camera_rays = malloc(pixels * sizeof(*camera_rays));
+    struct hit *hits = malloc(pixels * sizeof(*hits));
     bool ok = camera_rays && hits;
     if (ok)
         bench_camera_rays(camera_rays, &bench->scene.camera, bench->options.width, bench->options.height);

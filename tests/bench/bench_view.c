@@ -88,7 +88,7 @@ static struct options options = {.width = 1280,
 static bool read_line(const char *task, const char *file, char *line, int line_bytes)
 {
     char path[300];
-    snprintf(path, sizeof path, "/proc/%" PRIu32 "/task/%.32s/%s", options.pid, task, file);
+    snprintf(path, sizeof(path), "/proc/%" PRIu32 "/task/%.32s/%s", options.pid, task, file);
     FILE *from = fopen(path, "r");
     bool read = from && fgets(line, line_bytes, from);
     if (from)
@@ -100,11 +100,11 @@ static bool read_line(const char *task, const char *file, char *line, int line_b
 static void add_threads(json_t *threads, int sign)
 {
     char folder[64], name[64], times[128];
-    snprintf(folder, sizeof folder, "/proc/%" PRIu32 "/task", options.pid);
+    snprintf(folder, sizeof(folder), "/proc/%" PRIu32 "/task", options.pid);
     DIR *tasks = options.pid ? opendir(folder) : NULL;
-    for (struct dirent *task; tasks && (task = readdir(tasks)) != NULL;) {
-        if (task->d_name[0] == '.' || !read_line(task->d_name, "comm", name, sizeof name) ||
-            !read_line(task->d_name, "schedstat", times, sizeof times))
+    for (struct dirent *task; tasks && (task = readdir(tasks));) {
+        if (task->d_name[0] == '.' || !read_line(task->d_name, "comm", name, sizeof(name)) ||
+            !read_line(task->d_name, "schedstat", times, sizeof(times)))
             continue;
         name[strcspn(name, "\n")] = '\0';
         json_int_t taken_ns = sign * (json_int_t)strtoull(times, NULL, 10);
@@ -155,9 +155,9 @@ static json_t *row_of(const struct fl_frame *frame, const struct viewer *viewer,
                                frame->begun_ns,
                                whole_ns,
                                decode_ns};
-    _Static_assert(sizeof values / sizeof values[0] == sizeof columns / sizeof columns[0], "a value for each");
+    _Static_assert(sizeof(values) / sizeof(values[0]) == sizeof(columns) / sizeof(columns[0]), "a value for each");
     json_t *row = json_array();
-    for (size_t i = 0; i < sizeof values / sizeof values[0]; i++)
+    for (size_t i = 0; i < sizeof(values) / sizeof(values[0]); i++)
         json_array_append_new(row, json_integer((json_int_t)values[i]));
     return row;
 }
@@ -211,7 +211,7 @@ static bool look(struct viewer *viewer, uint64_t now, struct fl_error *error)
 static bool serve(struct viewer *viewer, json_t *rows, struct fl_error *error)
 {
     struct fl_frame *frame;
-    while ((frame = fl_view_next(viewer->view, 0, error)) != NULL)
+    while ((frame = fl_view_next(viewer->view, 0, error)))
         if (!take_frame(viewer, frame, rows, error))
             return false;
     if (error->code != FL_ERROR_NONE)
@@ -231,7 +231,7 @@ static bool serve_batch(struct fl_job *batch, json_int_t *frames, struct fl_erro
 {
     struct fl_frame *frame;
     bool done = false;
-    while (batch && (frame = fl_render_poll(batch, 0, &done, error)) != NULL) {
+    while (batch && (frame = fl_render_poll(batch, 0, &done, error))) {
         fl_frame_destroy(frame);
         ++*frames;
     }
@@ -368,7 +368,7 @@ static bool measure(json_t *result, struct fl_error *error)
         ok = come(&viewers[i], error);
     for (uint32_t i = 0; ok && i < options.viewers; i++)
         ok = begin_view(&viewers[i], error);
-    ok = ok && (!options.batch || (batch = begin_batch(&beside, error)) != NULL) &&
+    ok = ok && (!options.batch || (batch = begin_batch(&beside, error))) &&
          move_for(WARM_UP_NS, beside.connection, batch, NULL, late, &batch_frames, error);
     json_array_clear(late);
     add_threads(threads, -1);
@@ -478,7 +478,7 @@ BENCH(view)
     }
     struct fl_error error = {0};
     json_t *result = json_object(), *names = json_array();
-    for (size_t i = 0; i < sizeof columns / sizeof columns[0]; i++)
+    for (size_t i = 0; i < sizeof(columns) / sizeof(columns[0]); i++)
         json_array_append_new(names, json_string(columns[i]));
     json_object_set_new(result, "columns", names);
     bool ok = measure(result, &error);
@@ -486,7 +486,7 @@ BENCH(view)
         ok = json_dumpf(result, stdout, 0) == 0 && putchar('\n') == '\n' && fflush(stdout) == 0;
     } else {
         char line[1200];
-        fl_error_print(&error, line, sizeof line);
+        fl_error_print(&error, line, sizeof(line));
         fprintf(stderr, "bench view: %s\n", line);
     }
     json_decref(result);

@@ -123,7 +123,7 @@ uint32_t bench_secondary_rays(struct ray *rays, enum bench_wave_kind kind, const
     uint64_t seed = 7;
     uint32_t made = 0;
     if (kind == BENCH_SHUFFLED) {
-        memcpy(rays, camera_rays, count * sizeof *rays);
+        memcpy(rays, camera_rays, count * sizeof(*rays));
         shuffle(rays, count, &seed);
         return count;
     }

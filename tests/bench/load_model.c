@@ -77,7 +77,7 @@ static bool take_data(struct loading *loading, const struct message_blob_data *d
 static bool take_edit(struct loading *loading, const struct message *message, struct error *error)
 {
     struct fl_error full = {0};
-    if (!fl_grow((void **)&loading->edits, &loading->edit_capacity, loading->edit_count, sizeof *loading->edits,
+    if (!fl_grow((void **)&loading->edits, &loading->edit_capacity, loading->edit_count, sizeof(*loading->edits),
                  &full))
         return error_set(error, ERROR_OUT_OF_MEMORY, "edits", "%s", full.text);
     struct scene_edit *edit = &loading->edits[loading->edit_count++];
@@ -124,7 +124,7 @@ static bool handle(struct loading *loading, const struct frame *frame, const str
     bool is_answered = true, done = true;
     switch (message->type) {
     case MESSAGE_BLOB_OFFER:
-        needed = calloc(message->blob_offer.blobs_count + 1u, sizeof *needed);
+        needed = calloc(message->blob_offer.blobs_count + 1u, sizeof(*needed));
         done = needed ? take_offer(loading, &message->blob_offer, &reply, needed, error)
                       : error_set(error, ERROR_OUT_OF_MEMORY, "blob_offer", "no memory");
         break;
@@ -206,7 +206,7 @@ static bool converse(struct loading *loading, struct error *error)
 static void point_to_helpers(void)
 {
     char path[4096];
-    const ssize_t length = readlink("/proc/self/exe", path, sizeof path - 8);
+    const ssize_t length = readlink("/proc/self/exe", path, sizeof(path) - 8);
     if (getenv("FARLIGHT_LIBEXEC") || length <= 0)
         return;
     path[length] = '\0';

@@ -32,7 +32,7 @@ static void plain_destroy(struct tracer *tracer)
 static struct tracer *plain_create(struct gpu_device *device, const struct tracer_options *options,
                                    struct error *error)
 {
-    struct plain_pass *pass = calloc(1, sizeof *pass);
+    struct plain_pass *pass = calloc(1, sizeof(*pass));
     if (!pass) {
         error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a pass");
         return NULL;
@@ -62,7 +62,7 @@ static bool draw(struct plain_pass *pass, struct gpu_scene *scene, const uint32_
         .cell_world = box.cell_world,
         .resolution = pass->resolution,
     };
-    memcpy(axes.lower_world, box.lower_world, sizeof axes.lower_world);
+    memcpy(axes.lower_world, box.lower_world, sizeof(axes.lower_world));
     gpu_scene_bind(scene);
     glDepthMask(GL_TRUE);
     glEnable(GL_DEPTH_TEST);

@@ -75,8 +75,8 @@ static void write_file(const char *path, const char *text)
 static void become_root_of_a_namespace(void)
 {
     char users[64], groups[64];
-    snprintf(users, sizeof users, "0 %u 1", (unsigned)geteuid());
-    snprintf(groups, sizeof groups, "0 %u 1", (unsigned)getegid());
+    snprintf(users, sizeof(users), "0 %u 1", (unsigned)geteuid());
+    snprintf(groups, sizeof(groups), "0 %u 1", (unsigned)getegid());
     if (unshare(CLONE_NEWUSER))
         give_up("user namespace");
     write_file("/proc/self/setgroups", "deny");
@@ -140,7 +140,7 @@ static bool becomes_ready(int output)
 {
     char line[512];
     FILE *lines = fdopen(output, "r");
-    while (lines && fgets(line, sizeof line, lines))
+    while (lines && fgets(line, sizeof(line), lines))
         if (strncmp(line, "READY", 5) == 0)
             return true; /* the pipe stays open: it may print more */
     return false;

@@ -38,7 +38,7 @@ static struct tracer *create(struct gpu_device *device, const struct tracer_opti
                   RESOLUTION_MIN, SVO_SIDE_MAX);
         return NULL;
     }
-    struct svo *svo = calloc(1, sizeof *svo);
+    struct svo *svo = calloc(1, sizeof(*svo));
     if (!svo) {
         error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a tracer");
         return NULL;
@@ -90,8 +90,8 @@ static bool svo_trace_range(struct tracer *tracer, struct gpu_scene *scene, stru
     struct svo_tree *tree = &((struct svo *)tracer)->tree;
     const bool tiles = tree->kind == SVO_KIND_TILES;
     char top_shift[4], levels[4];
-    snprintf(top_shift, sizeof top_shift, "%u", tree->top_shift & 31);
-    snprintf(levels, sizeof levels, "%u", tree->levels & 31);
+    snprintf(top_shift, sizeof(top_shift), "%u", tree->top_shift & 31);
+    snprintf(levels, sizeof(levels), "%u", tree->levels & 31);
     struct gpu_define defines[] = {{"TRACER_SVO", "1"}, {"SVO_TOP_SHIFT", top_shift}, {0}, {0}};
     if (tiles)
         defines[1] = (struct gpu_define){"SVO_LEVELS", levels};

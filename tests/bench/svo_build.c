@@ -36,7 +36,7 @@ void svo_tree_init(struct svo_tree *tree, struct gpu_device *device, uint32_t re
 void svo_tree_finish(struct svo_tree *tree)
 {
     struct gpu_buffer *buffers[] = BUFFERS(tree);
-    for (size_t i = 0; i < sizeof buffers / sizeof *buffers; i++)
+    for (size_t i = 0; i < sizeof(buffers) / sizeof(*buffers); i++)
         gpu_buffer_finish(tree->device, buffers[i]);
     axes_draw_finish(&tree->draw);
 }
@@ -45,7 +45,7 @@ uint64_t svo_tree_bytes(const struct svo_tree *tree)
 {
     const struct gpu_buffer *buffers[] = BUFFERS(tree);
     uint64_t bytes = 0;
-    for (size_t i = 0; i < sizeof buffers / sizeof *buffers; i++)
+    for (size_t i = 0; i < sizeof(buffers) / sizeof(*buffers); i++)
         bytes += buffers[i]->capacity_bytes;
     return bytes;
 }
@@ -60,7 +60,7 @@ static bool place(struct svo_tree *tree, const struct gpu_scene *scene, const ui
     if (!axes_box_place(&box, scene, instances, count, tree->resolution, error))
         return false;
     tree->cell_world = box.cell_world;
-    memcpy(tree->lower_world, box.lower_world, sizeof tree->lower_world);
+    memcpy(tree->lower_world, box.lower_world, sizeof(tree->lower_world));
     for (int k = 0; k < 3; k++) {
         float upper_world = box.lower_world[k], lower[3], upper[3];
         for (uint32_t i = 0; i < count; i++) {
@@ -78,7 +78,7 @@ static bool place(struct svo_tree *tree, const struct gpu_scene *scene, const ui
 
 static void read_counts(struct svo_tree *tree, struct svo_counts *counts)
 {
-    gpu_buffer_read(tree->device, &tree->counts, 0, counts, sizeof *counts);
+    gpu_buffer_read(tree->device, &tree->counts, 0, counts, sizeof(*counts));
 }
 
 static void set_list(const void *context, const struct gpu_program *program)
@@ -111,7 +111,7 @@ static bool voxelise(struct svo_tree *tree, const struct gpu_scene *scene, struc
                              .context = tree};
     struct gpu_device *device = tree->device;
     struct svo_counts counts = {0};
-    memcpy(pass.lower_world, tree->lower_world, sizeof pass.lower_world);
+    memcpy(pass.lower_world, tree->lower_world, sizeof(pass.lower_world));
     do {
         const uint32_t wanted = counts.fragments > tree->fragments_max ? counts.fragments
                                 : tree->fragments_max                  ? tree->fragments_max
@@ -161,7 +161,7 @@ bool svo_add_records(struct svo_tree *tree, uint32_t count, uint32_t record_byte
 uint32_t svo_allocate(struct svo_tree *tree, const struct gpu_program *program, uint32_t first, uint32_t next)
 {
     struct svo_counts counts = {.fragments = tree->facts.fragments, .children = next};
-    gpu_buffer_write(tree->device, &tree->counts, 0, &counts, sizeof counts);
+    gpu_buffer_write(tree->device, &tree->counts, 0, &counts, sizeof(counts));
     gpu_buffer_bind_storage(&tree->counts, BIND_SVO_COUNTS);
     gpu_uniform_uint(program, "first_record", first);
     gpu_uniform_uint(program, "record_count", tree->facts.records - first);
@@ -301,7 +301,7 @@ static bool build(struct svo_tree *tree, struct gpu_scene *scene, struct error *
 
 bool svo_tree_build(struct svo_tree *tree, struct gpu_scene *scene, struct error *error)
 {
-    uint32_t *instances = malloc((scene->instance_count + 1u) * sizeof *instances), count = 0;
+    uint32_t *instances = malloc((scene->instance_count + 1u) * sizeof(*instances)), count = 0;
     tree->facts = (struct svo_build_facts){0};
     if (!instances)
         return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for %u instances", scene->instance_count);

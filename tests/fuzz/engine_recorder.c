@@ -55,7 +55,7 @@ static struct {
 
 static struct engine_event *say(enum engine_event_kind kind, uint64_t client, uint32_t request)
 {
-    struct engine_event *event = calloc(1, sizeof *event);
+    struct engine_event *event = calloc(1, sizeof(*event));
     FUZZ_REQUIRE(event != NULL);
     event->kind = kind;
     event->client = client;
@@ -98,7 +98,7 @@ static struct recorded_job *find_job(uint64_t client, uint32_t request)
 static void add_reference(const struct engine_command *command, struct recorded_scene *scene)
 {
     struct recorded_reference *reference = find_reference(0, 0);
-    FUZZ_REQUIRE(reference != NULL && !find_reference(command->client, command->scene));
+    FUZZ_REQUIRE(reference && !find_reference(command->client, command->scene));
     *reference = (struct recorded_reference){command->client, command->scene, scene};
     say(ENGINE_DONE, command->client, command->request)->revision = scene->scene->revision;
 }
@@ -184,7 +184,7 @@ static void attach(const struct engine_command *command)
 
 static void list(const struct engine_command *command)
 {
-    struct engine_scene_list *made = calloc(1, sizeof *made + SCENES_MAX * sizeof made->scenes[0]);
+    struct engine_scene_list *made = calloc(1, sizeof(*made) + SCENES_MAX * sizeof(made->scenes[0]));
     FUZZ_REQUIRE(made != NULL);
     for (size_t i = 0; i < SCENES_MAX; i++) {
         const struct recorded_scene *scene = &recorder.scenes[i];
@@ -192,14 +192,14 @@ static void list(const struct engine_command *command)
             continue;
         struct engine_scene_entry *entry = &made->scenes[made->count++];
         *entry = (struct engine_scene_entry){.revision = scene->scene->revision, .sharing = scene->sharing};
-        snprintf(entry->name, sizeof entry->name, "%s", scene->scene->name);
+        snprintf(entry->name, sizeof(entry->name), "%s", scene->scene->name);
     }
     say(ENGINE_SCENES_LISTED, command->client, command->request)->list = made;
 }
 
 static void describe(const struct engine_command *command, const struct scene *scene)
 {
-    struct engine_scene_description *made = calloc(1, sizeof *made);
+    struct engine_scene_description *made = calloc(1, sizeof(*made));
     FUZZ_REQUIRE(made != NULL);
     made->revision = scene->revision;
     made->nodes = (uint32_t)scene->objects[OBJECT_NODE].count;
@@ -216,7 +216,7 @@ static void describe(const struct engine_command *command, const struct scene *s
 
 static void say_frame(struct recorded_job *job, uint32_t samples, const struct view_camera *camera)
 {
-    struct engine_frame *frame = calloc(1, sizeof *frame);
+    struct engine_frame *frame = calloc(1, sizeof(*frame));
     FUZZ_REQUIRE(frame != NULL);
     frame->frame = (uint32_t)job->next;
     frame->request.width = job->width;
@@ -283,7 +283,7 @@ static void start_job(struct engine_command *command, struct recorded_reference 
 {
     const struct engine_job *asked = &command->job;
     struct recorded_job *job = find_job(0, 0);
-    FUZZ_REQUIRE(job != NULL && asked->frame_step > 0 && asked->pass_samples > 0);
+    FUZZ_REQUIRE(job && asked->frame_step > 0 && asked->pass_samples > 0);
     FUZZ_REQUIRE((asked->kind == JOB_VIEW) == (asked->wishes != NULL));
     uint64_t first = asked->first_frame;
     for (size_t i = 0; asked->wishes && i < JOBS_MAX; i++) {
@@ -369,7 +369,7 @@ static void forget(uint64_t client)
 
 static void say_stats(const struct engine_command *command)
 {
-    struct engine_stats *stats = calloc(1, sizeof *stats);
+    struct engine_stats *stats = calloc(1, sizeof(*stats));
     FUZZ_REQUIRE(stats != NULL);
     strcpy(stats->device.name, "recorder");
     say(ENGINE_STATS_READY, command->client, command->request)->stats = stats;
@@ -490,7 +490,7 @@ static void report_sent(void *context, uint64_t queue_ns, uint64_t send_ns)
 
 struct engine_port recorder_begin(void)
 {
-    memset(&recorder, 0, sizeof recorder);
+    memset(&recorder, 0, sizeof(recorder));
     recorder.events = queue_create(EVENTS_MAX, true);
     FUZZ_REQUIRE(recorder.events != NULL);
     return (struct engine_port){

@@ -12,7 +12,7 @@ static uint8_t scratch_memory[2][SCRATCH_BYTES];
 static void check_refusal(const struct message *message, const struct decode_error *error)
 {
     static const struct message zero;
-    FUZZ_REQUIRE(memcmp(message, &zero, sizeof zero) == 0);
+    FUZZ_REQUIRE(memcmp(message, &zero, sizeof(zero)) == 0);
     FUZZ_REQUIRE(error->code == PROTOCOL_ERROR_PROTOCOL || error->code == PROTOCOL_ERROR_INVALID);
     FUZZ_REQUIRE(error->text[0] != '\0');
 }
@@ -24,7 +24,7 @@ static void check_round_trip(const struct message *message, size_t payload_bytes
     struct writer first, second;
     struct message again;
     struct decode_error error;
-    writer_init(&first, first_bytes, sizeof first_bytes);
+    writer_init(&first, first_bytes, sizeof(first_bytes));
     if (!message_encode(&first, message)) {
         /* Only this: the fixed part came short, and with the defaults it no longer fits. */
         FUZZ_REQUIRE(first.error.code == PROTOCOL_ERROR_LIMIT);
@@ -33,10 +33,10 @@ static void check_round_trip(const struct message *message, size_t payload_bytes
     }
     FUZZ_REQUIRE(first.used_bytes == message_payload_bytes(message));
     FUZZ_REQUIRE(first.used_bytes >= desc->info.payload_min_bytes);
-    scratch_init(&scratch, scratch_memory[1], sizeof scratch_memory[1]);
+    scratch_init(&scratch, scratch_memory[1], sizeof(scratch_memory[1]));
     FUZZ_REQUIRE(message_decode(&again, (uint16_t)message->type, first_bytes, first.used_bytes, &scratch, &error));
-    FUZZ_REQUIRE(message_difference(message, &again) == NULL);
-    writer_init(&second, second_bytes, sizeof second_bytes);
+    FUZZ_REQUIRE(!message_difference(message, &again));
+    writer_init(&second, second_bytes, sizeof(second_bytes));
     FUZZ_REQUIRE(message_encode(&second, &again));
     FUZZ_REQUIRE(first.used_bytes == second.used_bytes);
     FUZZ_REQUIRE(memcmp(first_bytes, second_bytes, first.used_bytes) == 0);
@@ -60,8 +60,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         return 0;
     }
     check_round_trip(&message, size - 2);
-    nowhere = nowhere != NULL ? nowhere : fopen("/dev/null", "w");
-    if (nowhere != NULL) {
+    nowhere = nowhere ? nowhere : fopen("/dev/null", "w");
+    if (nowhere) {
         message_print(nowhere, &message);
     }
     return 0;

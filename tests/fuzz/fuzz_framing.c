@@ -13,8 +13,8 @@ static void decode(const struct frame *frame)
 {
     struct scratch scratch;
     struct message message;
-    scratch_init(&scratch, scratch_memory, sizeof scratch_memory);
-    if (frame->info != NULL) {
+    scratch_init(&scratch, scratch_memory, sizeof(scratch_memory));
+    if (frame->info) {
         message_decode(&message, frame->header.type, frame->payload, frame->header.payload_bytes, &scratch, NULL);
     }
 }
@@ -26,7 +26,7 @@ static enum framing_result check_piece(const uint8_t *bytes, size_t count, uint3
     struct frame frame;
     struct decode_error error;
     uint8_t *copy = malloc(count > 0 ? count : 1); /* of its own, so that a read beyond it is seen */
-    if (copy == NULL) {
+    if (!copy) {
         return FRAMING_FATAL;
     }
     memcpy(copy, bytes, count);

@@ -18,7 +18,7 @@ static void check_hello(const uint8_t *data, size_t size)
         FUZZ_REQUIRE(consumed == 0);
         return;
     }
-    FUZZ_REQUIRE(consumed <= size && consumed <= sizeof bytes && consumed % 8 == 0);
+    FUZZ_REQUIRE(consumed <= size && consumed <= sizeof(bytes) && consumed % 8 == 0);
     FUZZ_REQUIRE(handshake_hello_encode(bytes, &hello) == consumed);
     FUZZ_REQUIRE(memcmp(bytes, data, consumed) == 0);
     for (size_t length = 0; length < consumed; length++) {
@@ -41,7 +41,7 @@ static void check_reply(const uint8_t *data, size_t size)
         FUZZ_REQUIRE(consumed == 0);
         return;
     }
-    FUZZ_REQUIRE(consumed <= size && consumed <= sizeof bytes && consumed % 8 == 0);
+    FUZZ_REQUIRE(consumed <= size && consumed <= sizeof(bytes) && consumed % 8 == 0);
     size_t encoded = handshake_reply_encode(bytes, &reply);
     FUZZ_REQUIRE(encoded > 0);
     if (data[6] + 256u * data[7] == HANDSHAKE_LIMITS_BYTES) { /* nothing was skipped or missing */

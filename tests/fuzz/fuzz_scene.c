@@ -59,7 +59,7 @@ static struct blob *take_array(struct input *input, size_t elements, size_t elem
 static void take_weights(struct input *input, float **weights, uint32_t *count)
 {
     *count = take(input) % 4;
-    *weights = *count ? malloc(*count * sizeof **weights) : NULL;
+    *weights = *count ? malloc(*count * sizeof(**weights)) : NULL;
     for (uint32_t i = 0; i < *count; i++)
         (*weights)[i] = take_float(input, false);
 }
@@ -254,17 +254,17 @@ static struct scene *make_scene(void)
     mesh->triangle_count = 1;
     mesh->influence_count = 2;
     mesh->target_count = 1;
-    mesh->arrays[MESH_POSITIONS] = array_of(triangle, sizeof triangle);
-    mesh->arrays[MESH_NORMALS] = array_of(triangle, sizeof triangle);
-    mesh->arrays[MESH_INDICES] = array_of(indices, sizeof indices);
-    mesh->arrays[MESH_JOINTS] = array_of(places, sizeof places);
-    mesh->arrays[MESH_WEIGHTS] = array_of(weights, sizeof weights);
-    mesh->arrays[MESH_TARGET_POSITIONS] = array_of(triangle, sizeof triangle);
+    mesh->arrays[MESH_POSITIONS] = array_of(triangle, sizeof(triangle));
+    mesh->arrays[MESH_NORMALS] = array_of(triangle, sizeof(triangle));
+    mesh->arrays[MESH_INDICES] = array_of(indices, sizeof(indices));
+    mesh->arrays[MESH_JOINTS] = array_of(places, sizeof(places));
+    mesh->arrays[MESH_WEIGHTS] = array_of(weights, sizeof(weights));
+    mesh->arrays[MESH_TARGET_POSITIONS] = array_of(triangle, sizeof(triangle));
     set(&edits[4], OBJECT_SKIN, 1);
     edits[4].set.skin.joint_count = 2;
-    edits[4].set.skin.joints = array_of(joints, sizeof joints);
+    edits[4].set.skin.joints = array_of(joints, sizeof(joints));
     set(&edits[5], OBJECT_CLIP, 1);
-    edits[5].set.clip.floats = array_of(turning, sizeof turning);
+    edits[5].set.clip.floats = array_of(turning, sizeof(turning));
     set(&edits[6], OBJECT_CHANNEL, 1);
     edits[6].set.channel = (struct scene_channel){.base.id = 1,
                                                   .clip = 1,
@@ -274,7 +274,7 @@ static struct scene *make_scene(void)
                                                   .key_count = 2,
                                                   .first_value = 2};
     struct scene *scene = scene_create("fuzz", NULL);
-    FUZZ_REQUIRE(scene != NULL && scene_commit(scene, edits, 7, NULL));
+    FUZZ_REQUIRE(scene && scene_commit(scene, edits, 7, NULL));
     return scene;
 }
 

@@ -33,7 +33,7 @@ static void speak(struct sealed_link *link)
 {
     size_t bytes;
     static const uint8_t word[] = "word";
-    size_t sealed_bytes = sealed_link_seal(link, word, sizeof word);
+    size_t sealed_bytes = sealed_link_seal(link, word, sizeof(word));
     FUZZ_REQUIRE(sealed_bytes == 0 || sealed_may_seal(link->sealed));
     const uint8_t *waiting = sealed_link_waiting(link, &bytes);
     FUZZ_REQUIRE((waiting != NULL) == (bytes > 0));
@@ -66,9 +66,9 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         memcpy(space, data + used, bytes);
         sealed_link_came(link, bytes);
         used += bytes;
-        open = hear(link, (data[0] & 0x80) != 0 ? sizeof plain : 4) || sealed_link_has_record(link);
+        open = hear(link, (data[0] & 0x80) != 0 ? sizeof(plain) : 4) || sealed_link_has_record(link);
         if ((data[0] & 0x80) == 0 && sealed_link_has_record(link)) {
-            open = hear(link, sizeof plain); /* after there was no room */
+            open = hear(link, sizeof(plain)); /* after there was no room */
         }
         speak(link);
     }

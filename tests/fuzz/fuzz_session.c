@@ -64,7 +64,7 @@ static void send_message(unsigned client, struct input *input)
     header.payload_bytes = (uint32_t)count;
     uint8_t head[FRAMING_HEADER_BYTES];
     framing_header_encode(head, &header);
-    if (serving_clients[client].fd >= 0 && serving_send(client, head, sizeof head) &&
+    if (serving_clients[client].fd >= 0 && serving_send(client, head, sizeof(head)) &&
         serving_send(client, input->next, count))
         serving_send(client, zeros, -count & 7);
     input->next += count;

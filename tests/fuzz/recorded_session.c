@@ -51,7 +51,7 @@ static struct record_blob_ref reference_to(const void *data, size_t bytes)
 static void upload(struct talk *talk, uint32_t request, const struct record_blob_ref *reference, const void *data)
 {
     struct message *message = begin(talk, MESSAGE_BLOB_DATA);
-    memcpy(message->blob_data.hash, reference->hash, sizeof reference->hash);
+    memcpy(message->blob_data.hash, reference->hash, sizeof(reference->hash));
     message->blob_data.data = data;
     message->blob_data.data_bytes = (uint32_t)reference->size_bytes;
     talk->say(talk->context, request, 1, message);
@@ -97,8 +97,8 @@ static void set_mesh(struct talk *talk, uint32_t request, struct record_blob_ref
 /* Requests from `request` on: 5 of them. */
 static void put_up(struct talk *talk, uint32_t request)
 {
-    struct record_blob_ref references[] = {reference_to(positions, sizeof positions),
-                                           reference_to(indices, sizeof indices)};
+    struct record_blob_ref references[] = {reference_to(positions, sizeof(positions)),
+                                           reference_to(indices, sizeof(indices))};
     struct message *message = begin(talk, MESSAGE_BLOB_OFFER);
     message->blob_offer.blobs = references;
     message->blob_offer.blobs_count = 2;
@@ -240,7 +240,7 @@ void recorded_blunders(recorded_say_fn *say, void *context)
 {
     static const uint8_t noise[40];
     struct talk talk = {.say = say, .context = context};
-    struct record_blob_ref reference = {.size_bytes = sizeof noise, .hash = {1}};
+    struct record_blob_ref reference = {.size_bytes = sizeof(noise), .hash = {1}};
     open_scene(&talk, 1, PROTOCOL_SHARING_PRIVATE, "");
     open_scene(&talk, 2, PROTOCOL_SHARING_KEPT, "again");
     struct message *message = begin(&talk, MESSAGE_BLOB_OFFER);

@@ -37,7 +37,7 @@ static inline void sealed_random_fill(void *const out, const size_t count)
 static inline uint32_t sealed_random_number(void)
 {
     uint32_t number;
-    sealed_random_fill(&number, sizeof number);
+    sealed_random_fill(&number, sizeof(number));
     return number;
 }
 

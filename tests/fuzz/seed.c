@@ -28,14 +28,14 @@ static bool write_file(const char *folder, const char *what, const char *name, i
                        size_t count)
 {
     char path[4096];
-    snprintf(path, sizeof path, "%s/%s", folder, what);
+    snprintf(path, sizeof(path), "%s/%s", folder, what);
     if (!make_folder(path)) {
         return false;
     }
-    snprintf(path, sizeof path, "%s/%s/%s-%d", folder, what, name, number);
+    snprintf(path, sizeof(path), "%s/%s/%s-%d", folder, what, name, number);
     FILE *file = fopen(path, "wb");
-    bool ok = file != NULL && fwrite(bytes, 1, count, file) == count;
-    ok = (file == NULL || fclose(file) == 0) && ok;
+    bool ok = file && fwrite(bytes, 1, count, file) == count;
+    ok = (!file || fclose(file) == 0) && ok;
     if (!ok) {
         perror(path);
     }
@@ -84,9 +84,9 @@ static void words_of_struct(FILE *file, const struct struct_desc *desc)
 static bool write_dictionary(const char *folder)
 {
     char path[4096];
-    snprintf(path, sizeof path, "%s/protocol.dict", folder);
+    snprintf(path, sizeof(path), "%s/protocol.dict", folder);
     FILE *file = fopen(path, "w");
-    if (file == NULL) {
+    if (!file) {
         perror(path);
         return false;
     }
@@ -113,7 +113,7 @@ static bool write_messages(const char *folder)
             case_make(&maker, &message, &protocol_messages[i], mode, 21);
             plain_encode(&plain, &message);
             uint8_t *input = malloc(plain.count + 2);
-            if (input == NULL) {
+            if (!input) {
                 return false;
             }
             input[0] = (uint8_t)i;
@@ -121,7 +121,7 @@ static bool write_messages(const char *folder)
             memcpy(input + 2, plain.data, plain.count);
             bool ok = write_file(folder, "codec", name, (int)mode, input, plain.count + 2);
             free(input);
-            writer_init(&writer, framed, sizeof framed);
+            writer_init(&writer, framed, sizeof(framed));
             writer_put_u8(&writer, 7);
             writer_put_u8(&writer, 12);
             if (!message_write(&writer, 1, 2, &message)) {
@@ -161,7 +161,7 @@ static bool pass(struct sealed_link *from, struct sealed_link *to, unsigned hear
     size_t bytes, room;
     const uint8_t *waiting = sealed_link_waiting(from, &bytes);
     uint8_t *space = sealed_link_space(to, &room);
-    if (bytes == 0 || bytes > room || bytes > sizeof said->bytes - said->count) {
+    if (bytes == 0 || bytes > room || bytes > sizeof(said->bytes) - said->count) {
         return bytes == 0;
     }
     memcpy(space, waiting, bytes);
@@ -181,7 +181,7 @@ static bool write_sealed(const char *folder)
     sealed_random_end = 0;
     struct sealed_link *client = sealed_link_client(&sealed_fuzz_key);
     struct sealed_link *server = sealed_link_server(&sealed_fuzz_key, 1);
-    bool ok = client != NULL && server != NULL;
+    bool ok = client && server;
     for (int round = 0; ok && round < 3; round++) {
         ok = pass(client, server, 1, &up) && pass(server, client, 0, &down);
     }
@@ -200,11 +200,11 @@ static bool write_noise(const char *folder)
     uint32_t state = 1;
     for (int number = 0; number < 16; number++) {
         uint8_t bytes[1024];
-        for (size_t i = 0; i < sizeof bytes; i++) {
+        for (size_t i = 0; i < sizeof(bytes); i++) {
             state = state * 1664525u + 1013904223u; /* Numerical Recipes */
             bytes[i] = (uint8_t)(state >> 24);
         }
-        if (!write_file(folder, "scene", "noise", number, bytes, sizeof bytes)) {
+        if (!write_file(folder, "scene", "noise", number, bytes, sizeof(bytes))) {
             return false;
         }
     }
@@ -260,7 +260,7 @@ static void put_message(void *context, uint32_t request, uint32_t channel, const
     /* By way of its own buffer: bulk data are aligned from the start of the payload. */
     static uint8_t payload[8192];
     struct writer of_payload;
-    writer_init(&of_payload, payload, sizeof payload);
+    writer_init(&of_payload, payload, sizeof(payload));
     if (!message_encode(&of_payload, message)) {
         fprintf(stderr, "%s: %s\n", of_payload.error.field, of_payload.error.text);
         exit(1);
@@ -294,7 +294,7 @@ static bool write_session(const char *folder, int number, unsigned settle, unsig
 {
     static struct session_seed seed;
     seed = (struct session_seed){.settle = settle, .takes_time = settle && circumstance == 0};
-    writer_init(&seed.writer, seed.bytes, sizeof seed.bytes);
+    writer_init(&seed.writer, seed.bytes, sizeof(seed.bytes));
     if (session == recorded_onlooker) {
         come(&seed, 1);
         recorded_session(put_message_but_the_last, &seed);
@@ -312,7 +312,7 @@ static bool write_sessions(const char *folder)
     int number = 0;
     static const unsigned circumstances[] = {0, 1, 2, 4, 8, ONLY_LOOKS};
     for (unsigned settle = 0; settle <= STEP_SETTLE; settle += STEP_SETTLE) {
-        for (size_t i = 0; i < sizeof circumstances / sizeof circumstances[0]; i++) {
+        for (size_t i = 0; i < sizeof(circumstances) / sizeof(circumstances[0]); i++) {
             ok = ok && write_session(folder, number++, settle, circumstances[i], recorded_session) &&
                  write_session(folder, number++, settle, circumstances[i], recorded_onlooker) &&
                  write_session(folder, number++, settle, circumstances[i], recorded_blunders);
@@ -358,9 +358,9 @@ static const char nff_model[] =
 
 static bool write_models(const char *folder)
 {
-    return write_file(folder, "gltf", "model", 0, gltf_model, sizeof gltf_model - 1) &&
-           write_file(folder, "obj", "model", 0, obj_model, sizeof obj_model - 1) &&
-           write_file(folder, "nff", "model", 0, nff_model, sizeof nff_model - 1);
+    return write_file(folder, "gltf", "model", 0, gltf_model, sizeof(gltf_model) - 1) &&
+           write_file(folder, "obj", "model", 0, obj_model, sizeof(obj_model) - 1) &&
+           write_file(folder, "nff", "model", 0, nff_model, sizeof(nff_model) - 1);
 }
 
 int main(int argument_count, char **arguments)

@@ -48,8 +48,8 @@ static int epoll_without_waiting(int fd, struct epoll_event *events, int max_eve
 static bool is_refused_sealing(const struct serving_client *client)
 {
     static const uint8_t begun[] = {'S', 'E', 'A', 'L', 2};
-    return client->in_used >= SEALED_REFUSAL_BYTES && memcmp(client->in, begun, sizeof begun) == 0 &&
-           client->in[sizeof begun] != 0;
+    return client->in_used >= SEALED_REFUSAL_BYTES && memcmp(client->in, begun, sizeof(begun)) == 0 &&
+           client->in[sizeof(begun)] != 0;
 }
 
 static size_t take_reply(struct serving_client *client)
@@ -75,7 +75,7 @@ static size_t take_message(struct serving_client *client)
         return 0;
     struct message message;
     struct scratch scratch;
-    scratch_init(&scratch, scratch_data, sizeof scratch_data);
+    scratch_init(&scratch, scratch_data, sizeof(scratch_data));
     FUZZ_REQUIRE(frame.info != NULL);
     FUZZ_REQUIRE(
         message_decode(&message, frame.header.type, frame.payload, frame.header.payload_bytes, &scratch, &error));
@@ -231,7 +231,7 @@ void serving_begin(void)
     now_ns = 1000000000;
     sys.epoll_wait = epoll_without_waiting;
     loop = loop_create(&error);
-    FUZZ_REQUIRE(loop != NULL && hub_init(&serving_hub, loop, &options, &error));
+    FUZZ_REQUIRE(loop && hub_init(&serving_hub, loop, &options, &error));
     for (int i = 0; i < SERVING_CLIENTS; i++) {
         serving_clients[i].fd = -1;
         if (!serving_clients[i].in)
@@ -245,7 +245,7 @@ void serving_check_empty(void)
     FUZZ_REQUIRE(serving_hub.sessions.count == 0);
     FUZZ_REQUIRE(serving_hub.unauthenticated == 0);
     FUZZ_REQUIRE(serving_hub.frame_bytes == 0);
-    FUZZ_REQUIRE(serving_hub.waiting == NULL);
+    FUZZ_REQUIRE(!serving_hub.waiting);
     FUZZ_REQUIRE(blob_store_bytes(serving_hub.blobs) == 0);
     FUZZ_REQUIRE(recorder_jobs() == 0);
     FUZZ_REQUIRE(recorder_references() == 0);
@@ -257,7 +257,7 @@ void serving_check_next(void)
     message_init(&message, MESSAGE_PING);
     uint8_t bytes[64];
     struct writer writer;
-    writer_init(&writer, bytes, sizeof bytes);
+    writer_init(&writer, bytes, sizeof(bytes));
     FUZZ_REQUIRE(message_write(&writer, 1, 0, &message));
     FUZZ_REQUIRE(serving_connect(0));
     serving_greet(0);

@@ -40,7 +40,7 @@ unsigned parts_platform(struct gltf_writer *writer)
     /* Twice the same place makes an edge: normals are taken from the neighbours. */
     static const float profile[][2] = {{2.25f, 0},    {2.25f, 0.1f}, {2.25f, 0.1f},  {2.1f, 0.1f},   {2.1f, 0.1f},
                                        {2.1f, 0.24f}, {2.1f, 0.24f}, {2.06f, 0.27f}, {2.06f, 0.27f}, {0, 0.27f}};
-    return parts_lathe(writer, "platform", profile, sizeof profile / sizeof *profile, CREAM);
+    return parts_lathe(writer, "platform", profile, sizeof(profile) / sizeof(*profile), CREAM);
 }
 
 /* Rows of a ball about the axis, from where it is as wide as the neck that carries it. */
@@ -121,8 +121,8 @@ unsigned parts_reed(struct gltf_writer *writer)
     struct shape shape = {0};
     shape_lathe(&shape, (const float(*)[2])profile, STEM + BALL, 32);
     struct gltf_geometry geometry = gltf_geometry(writer, &shape);
-    uint8_t(*joints)[4] = calloc(shape.vertex_count, sizeof *joints);
-    float(*weights)[4] = calloc(shape.vertex_count, sizeof *weights);
+    uint8_t(*joints)[4] = calloc(shape.vertex_count, sizeof(*joints));
+    float(*weights)[4] = calloc(shape.vertex_count, sizeof(*weights));
     if (joints && weights && !writer->failed) {
         for (uint32_t i = 0; i < shape.vertex_count; i++) {
             const float at = shape.positions[3 * (size_t)i + 1] * PARTS_JOINTS / PARTS_REED_HEIGHT - 0.5f;
@@ -204,7 +204,7 @@ unsigned parts_blob(struct gltf_writer *writer)
     struct shape shape = {0};
     shape_sphere(&shape, (const float[3]){0, 0, 0}, 0.42f, 64);
     struct gltf_geometry geometry = gltf_geometry(writer, &shape);
-    float *offsets = malloc((size_t)shape.vertex_count * 6 * sizeof *offsets);
+    float *offsets = malloc((size_t)shape.vertex_count * 6 * sizeof(*offsets));
     writer->failed |= !offsets;
     geometry.target_count = 2;
     for (unsigned target = 0; target < 2 && !writer->failed; target++) {

@@ -51,7 +51,7 @@ __attribute__((format(printf, 4, 5))) static void set_node(struct carousel *caro
                                                            const char *name, const char *format, ...)
 {
     char *text = carousel->nodes[node];
-    const size_t room = sizeof carousel->nodes[node];
+    const size_t room = sizeof(carousel->nodes[node]);
     size_t length = (size_t)snprintf(text, room, "{\"name\":\"%s\",", name);
     va_list arguments;
     va_start(arguments, format);
@@ -75,7 +75,7 @@ static void add_riders(struct carousel *carousel)
                         {"arm 2", "mirrored red pot", RED, true},
                         {"arm 3", "copper pot", COPPER, false},
                         {"arm 4", "mirrored jade pot", JADE, true}};
-    const unsigned pole_mesh = parts_lathe(&carousel->writer, "pole", pole, sizeof pole / sizeof *pole, GOLD);
+    const unsigned pole_mesh = parts_lathe(&carousel->writer, "pole", pole, sizeof(pole) / sizeof(*pole), GOLD);
     struct shape shape = {0};
     shape_teapot(&shape, 48);
     const struct gltf_geometry pot = gltf_geometry(&carousel->writer, &shape);
@@ -150,13 +150,13 @@ static void add_neighbours(struct carousel *carousel)
     set_node(carousel, WHEEL_BALL, "ball on the wheel", "\"mesh\":%u,\"translation\":[0.85,0,0.05]",
              parts_mesh(&carousel->writer, "ball", &ball, GOLD));
     set_node(carousel, PLINTH, "plinth", "\"mesh\":%u,\"translation\":[-2.95,0,0.9],\"children\":[%d]",
-             parts_lathe(&carousel->writer, "plinth", plinth, sizeof plinth / sizeof *plinth, CREAM), BLOB);
+             parts_lathe(&carousel->writer, "plinth", plinth, sizeof(plinth) / sizeof(*plinth), CREAM), BLOB);
     set_node(carousel, BLOB, "blob", "\"mesh\":%u,\"translation\":[0,1.1,0]", parts_blob(&carousel->writer));
     set_node(carousel, POST, "reed", "\"mesh\":%u,\"skin\":0", parts_reed(&carousel->writer));
     for (unsigned i = 0; i < JOINTS; i++) {
         char children[40] = "";
         if (i + 1 < JOINTS)
-            snprintf(children, sizeof children, ",\"children\":[%u]", JOINT + i + 1);
+            snprintf(children, sizeof(children), ",\"children\":[%u]", JOINT + i + 1);
         set_node(carousel, JOINT + i, "joint", "\"translation\":[%g,%g,%g]%s", i == 0 ? -2.6 : 0,
                  i == 0 ? 0 : (double)(PARTS_REED_HEIGHT / JOINTS), i == 0 ? -1.7 : 0, children);
     }
@@ -184,7 +184,7 @@ static void add_floor_and_camera(struct carousel *carousel)
 
 static void set_turn(float q[4], int axis, float angle)
 {
-    memset(q, 0, 4 * sizeof *q);
+    memset(q, 0, 4 * sizeof(*q));
     q[axis] = sinf(angle / 2);
     q[3] = cosf(angle / 2);
 }
@@ -296,7 +296,7 @@ static void print_rest(FILE *json, const struct carousel *carousel, unsigned bin
                   "\"scenes\":[{\"nodes\":[");
     static const int roots[] = {FLOOR, PLATFORM, LAMP,      SOCKETS,    STAND, POST,
                                 JOINT, PLINTH,   KEY_LIGHT, FILL_LIGHT, CAMERA};
-    for (size_t i = 0; i < sizeof roots / sizeof *roots; i++)
+    for (size_t i = 0; i < sizeof(roots) / sizeof(*roots); i++)
         fprintf(json, "%s%d", i ? "," : "", roots[i]);
     fprintf(json, "]}],\"nodes\":[");
     for (size_t i = 0; i < NODES; i++)
@@ -319,7 +319,7 @@ static void print_rest(FILE *json, const struct carousel *carousel, unsigned bin
 
 bool animated_scene_write(const char *path)
 {
-    struct carousel *carousel = calloc(1, sizeof *carousel);
+    struct carousel *carousel = calloc(1, sizeof(*carousel));
     char *rest = NULL;
     size_t rest_bytes = 0;
     FILE *json = open_memstream(&rest, &rest_bytes);

@@ -10,7 +10,7 @@
 static void text_begin(struct gltf_writer *writer, struct gltf_text *text)
 {
     text->stream = open_memstream(&text->text, &text->bytes);
-    writer->failed |= text->stream == NULL;
+    writer->failed |= !text->stream;
 }
 
 static bool text_end(struct gltf_text *text)
@@ -25,10 +25,10 @@ static bool text_end(struct gltf_text *text)
 
 void gltf_begin(struct gltf_writer *writer)
 {
-    memset(writer, 0, sizeof *writer);
+    memset(writer, 0, sizeof(*writer));
     struct gltf_text *const texts[] = {&writer->binary, &writer->views,    &writer->accessors,
                                        &writer->meshes, &writer->samplers, &writer->channels};
-    for (size_t i = 0; i < sizeof texts / sizeof *texts; i++)
+    for (size_t i = 0; i < sizeof(texts) / sizeof(*texts); i++)
         text_begin(writer, texts[i]);
 }
 
@@ -78,7 +78,7 @@ unsigned gltf_floats(struct gltf_writer *writer, const float *numbers, size_t co
         least[i % width] = fminf(least[i % width], numbers[i]);
         most[i % width] = fmaxf(most[i % width], numbers[i]);
     }
-    const unsigned view = add_view(writer, numbers, count * width * sizeof *numbers, use);
+    const unsigned view = add_view(writer, numbers, count * width * sizeof(*numbers), use);
     FILE *stream = begin_accessor(writer, view, 5126, count, types[width]);
     print_numbers(stream, "min", least, width);
     print_numbers(stream, "max", most, width);
@@ -90,7 +90,7 @@ unsigned gltf_joints(struct gltf_writer *writer, const uint8_t (*joints)[4], siz
 {
     if (writer->failed)
         return 0;
-    const unsigned view = add_view(writer, joints, count * sizeof *joints, GLTF_VERTICES);
+    const unsigned view = add_view(writer, joints, count * sizeof(*joints), GLTF_VERTICES);
     fprintf(begin_accessor(writer, view, 5121, count, "VEC4"), "}");
     return writer->accessors.count - 1;
 }
@@ -104,7 +104,7 @@ struct gltf_geometry gltf_geometry(struct gltf_writer *writer, const struct shap
     result.positions = gltf_floats(writer, shape->positions, shape->vertex_count, 3, GLTF_VERTICES);
     result.normals = gltf_floats(writer, shape->normals, shape->vertex_count, 3, GLTF_VERTICES);
     const unsigned view =
-        add_view(writer, shape->indices, shape->index_count * sizeof *shape->indices, GLTF_INDICES);
+        add_view(writer, shape->indices, shape->index_count * sizeof(*shape->indices), GLTF_INDICES);
     fprintf(begin_accessor(writer, view, 5125, shape->index_count, "SCALAR"), "}");
     result.indices = writer->accessors.count - 1;
     return result;
@@ -152,7 +152,7 @@ bool gltf_finish(struct gltf_writer *writer, const char *path, const char *rest)
 {
     struct gltf_text *const texts[] = {&writer->binary, &writer->views,    &writer->accessors,
                                        &writer->meshes, &writer->samplers, &writer->channels};
-    for (size_t i = 0; i < sizeof texts / sizeof *texts; i++)
+    for (size_t i = 0; i < sizeof(texts) / sizeof(*texts); i++)
         writer->failed |= !text_end(texts[i]);
     bool written = false;
     struct gltf_text json = {0};
@@ -173,7 +173,7 @@ bool gltf_finish(struct gltf_writer *writer, const char *path, const char *rest)
             fprintf(stderr, "make_scenes: %s: out of memory\n", path);
     }
     free(json.text);
-    for (size_t i = 0; i < sizeof texts / sizeof *texts; i++)
+    for (size_t i = 0; i < sizeof(texts) / sizeof(*texts); i++)
         free(texts[i]->text);
     return written;
 }

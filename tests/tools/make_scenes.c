@@ -60,7 +60,7 @@ static bool write_cornell(const char *path)
     const struct glb_light lights[] = {{"point", {1, 0.93f, 0.8f}, 2.6f, {0, 1.85f, 0}},
                                        {"point", {0.8f, 0.9f, 1}, 1.6f, {0.4f, 1.3f, 3.5f}}};
     const struct glb_camera camera = {{0, 1, 3.6f}, {0, 0.97f, 0}, 0.66f};
-    const size_t count = sizeof parts / sizeof *parts;
+    const size_t count = sizeof(parts) / sizeof(*parts);
     return finish_parts(glb_write(path, parts, count, lights, 2, &camera), parts, count);
 }
 
@@ -79,7 +79,7 @@ static bool write_teapot(const char *path, uint32_t segments)
     const struct glb_light lights[] = {{"point", {1, 0.95f, 0.85f}, 42, {3, 5, 4}},
                                        {"point", {0.6f, 0.75f, 1}, 14, {-4, 3.5f, 2}}};
     const struct glb_camera camera = {{0.9f, 1.7f, 5.0f}, {0, 0.5f, 0}, 0.68f};
-    const size_t count = sizeof parts / sizeof *parts;
+    const size_t count = sizeof(parts) / sizeof(*parts);
     return finish_parts(glb_write(path, parts, count, lights, 2, &camera), parts, count);
 }
 
@@ -209,20 +209,20 @@ int main(int argc, char **argv)
         return 1;
     }
     char path[4096];
-    snprintf(path, sizeof path, "%s/cornell.glb", argv[1]);
+    snprintf(path, sizeof(path), "%s/cornell.glb", argv[1]);
     bool ok = write_cornell(path);
-    snprintf(path, sizeof path, "%s/teapot.glb", argv[1]);
+    snprintf(path, sizeof(path), "%s/teapot.glb", argv[1]);
     ok &= write_teapot(path, 96);
-    snprintf(path, sizeof path, "%s/fine-teapot.glb", argv[1]);
+    snprintf(path, sizeof(path), "%s/fine-teapot.glb", argv[1]);
     ok &= write_teapot(path, 288);
-    snprintf(path, sizeof path, "%s/carousel.glb", argv[1]);
+    snprintf(path, sizeof(path), "%s/carousel.glb", argv[1]);
     ok &= animated_scene_write(path);
-    snprintf(path, sizeof path, "%s/sky.hdr", argv[1]);
+    snprintf(path, sizeof(path), "%s/sky.hdr", argv[1]);
     ok &= write_sky(path, 1);
-    snprintf(path, sizeof path, "%s/dusk.hdr", argv[1]);
+    snprintf(path, sizeof(path), "%s/dusk.hdr", argv[1]);
     ok &= write_sky(path, 0.16f);
     for (int levels = 2; levels <= 4; levels++) {
-        snprintf(path, sizeof path, "%s/sphereflake-%d.nff", argv[1], levels);
+        snprintf(path, sizeof(path), "%s/sphereflake-%d.nff", argv[1], levels);
         ok &= write_sphereflake(path, levels);
     }
     for (int i = 2; i < argc; i++) {
@@ -232,7 +232,7 @@ int main(int argc, char **argv)
                 fprintf(stderr, "make_scenes: %s: 1 to 6 levels are expected\n", argv[i]);
                 return 2;
             }
-            snprintf(path, sizeof path, "%s/sphereflake-%ld.nff", argv[1], levels);
+            snprintf(path, sizeof(path), "%s/sphereflake-%ld.nff", argv[1], levels);
             ok &= write_sphereflake(path, (int)levels);
             continue;
         }
@@ -241,7 +241,7 @@ int main(int argc, char **argv)
             fprintf(stderr, "make_scenes: %s: a number of thousands from 1 to 8000 is expected\n", argv[i]);
             return 2;
         }
-        snprintf(path, sizeof path, "%s/bumpy-%ld.glb", argv[1], thousands);
+        snprintf(path, sizeof(path), "%s/bumpy-%ld.glb", argv[1], thousands);
         ok &= write_bumpy(path, (uint32_t)thousands);
     }
     return ok ? 0 : 1;

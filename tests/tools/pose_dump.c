@@ -54,8 +54,8 @@ static void print_corners(const struct scene_mesh *mesh, const struct shown *sho
     const uint32_t *indices = (const uint32_t *)(const void *)mesh->arrays[MESH_INDICES]->data;
     for (size_t i = 0; i < (size_t)mesh->triangle_count * 3; i++) {
         float p[3], n[3];
-        memcpy(p, shown->positions + (size_t)indices[i] * 3, sizeof p);
-        memcpy(n, shown->normals + (size_t)indices[i] * 3, sizeof n);
+        memcpy(p, shown->positions + (size_t)indices[i] * 3, sizeof(p));
+        memcpy(n, shown->normals + (size_t)indices[i] * 3, sizeof(n));
         if (world_from_node)
             transform(world_from_node, p, n);
         printf("c %.9g %.9g %.9g %.9g %.9g %.9g\n", (double)p[0], (double)p[1], (double)p[2], (double)n[0],

@@ -15,7 +15,7 @@ void shape_finish(struct shape *shape)
     free(shape->positions);
     free(shape->normals);
     free(shape->indices);
-    memset(shape, 0, sizeof *shape);
+    memset(shape, 0, sizeof(*shape));
 }
 
 static bool grow(void **array, size_t count, size_t element_bytes)
@@ -128,7 +128,7 @@ static void close_end(struct shape *shape, uint32_t first, uint32_t columns, con
     const uint32_t middle = add_vertex(shape, centre, normal);
     for (uint32_t i = 0; i <= columns && !shape->out_of_memory; i++) {
         float position[3];
-        memcpy(position, shape->positions + 3 * (size_t)(first + i), sizeof position);
+        memcpy(position, shape->positions + 3 * (size_t)(first + i), sizeof(position));
         add_vertex(shape, position, normal);
     }
     for (uint32_t i = 1; i <= columns; i++)

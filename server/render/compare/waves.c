@@ -53,14 +53,14 @@ static struct wave_tally *tally_of(struct tally_list *list, uint32_t wave, enum 
         place++;
     if (place < list->count && order(list->tallies[place], wave, kind) == 0)
         return list->tallies[place];
-    struct wave_tally *tally = list->count < COMPARISONS_MAX ? calloc(1, sizeof *tally) : NULL;
+    struct wave_tally *tally = list->count < COMPARISONS_MAX ? calloc(1, sizeof(*tally)) : NULL;
     if (!tally) {
         error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory to compare wave %u", wave);
         return NULL;
     }
     tally->wave = wave;
     tally->kind = kind;
-    memmove(&list->tallies[place + 1], &list->tallies[place], (list->count++ - place) * sizeof list->tallies[0]);
+    memmove(&list->tallies[place + 1], &list->tallies[place], (list->count++ - place) * sizeof(list->tallies[0]));
     list->tallies[place] = tally;
     return tally;
 }
@@ -94,7 +94,7 @@ bool comparison_take(struct comparison *comparison, struct wave_comparison **fig
                      struct error *error)
 {
     uint32_t n = comparison->frame.count;
-    *figures = malloc((n ? n : 1) * sizeof **figures);
+    *figures = malloc((n ? n : 1) * sizeof(**figures));
     if (!*figures)
         return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the figures of %u waves", n);
     for (uint32_t i = 0; i < n; i++)
@@ -108,9 +108,9 @@ bool comparison_take(struct comparison *comparison, struct wave_comparison **fig
 
 struct comparison *comparison_create(struct gpu_device *device, struct error *error)
 {
-    struct comparison *comparison = calloc(1, sizeof *comparison);
+    struct comparison *comparison = calloc(1, sizeof(*comparison));
     if (comparison)
-        comparison->chunk = malloc(sizeof *comparison->chunk);
+        comparison->chunk = malloc(sizeof(*comparison->chunk));
     if (!comparison || !comparison->chunk) {
         free(comparison);
         error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory to compare tracers");
@@ -148,7 +148,7 @@ void comparison_begin(struct comparison *comparison, struct gpu_scene *scene, st
 {
     empty_list(&comparison->slice);
     empty_list(&comparison->frame);
-    memset(comparison->prepared, 0, sizeof comparison->prepared);
+    memset(comparison->prepared, 0, sizeof(comparison->prepared));
     comparison->scene = scene;
     comparison->tracers[0] = first;
     comparison->tracers[1] = second;
@@ -265,7 +265,7 @@ static struct wave_answers read_answers(struct comparison *comparison, const str
     if (wave->times)
         gpu_buffer_read(device, wave->times, first * sizeof(float), chunk->times, count * sizeof(float));
     else
-        memset(chunk->times, 0, sizeof chunk->times);
+        memset(chunk->times, 0, sizeof(chunk->times));
     if (wave->kind == WAVE_ANY) {
         size_t offset = first * sizeof(uint), bytes = count * sizeof(uint);
         gpu_buffer_read(device, wave->visibility, offset, chunk->first_visibility, bytes);

@@ -62,8 +62,8 @@ static uint32_t partition(const struct builder *builder, const struct range *ran
         left += goes_left;
         right += !goes_left;
     }
-    memcpy(boxes + left, boxes_right, right * sizeof *boxes);
-    memcpy(order + left, order_right, right * sizeof *order);
+    memcpy(boxes + left, boxes_right, right * sizeof(*boxes));
+    memcpy(order + left, order_right, right * sizeof(*order));
     return left;
 }
 
@@ -193,11 +193,11 @@ bool bvh_binary_build(struct bvh_binary *tree, struct bvh_box *boxes, uint32_t c
 {
     *tree = (struct bvh_binary){.primitive_count = count};
     struct builder builder = {.tree = tree, .boxes = boxes, .costs = costs, .shared = threads > 1, .stop = stop};
-    tree->nodes = aligned_alloc(16, (2 * (size_t)count - 1) * sizeof *tree->nodes);
-    tree->areas = malloc((2 * (size_t)count - 1) * sizeof *tree->areas);
-    tree->order = malloc(count * sizeof *tree->order);
-    builder.waiting = malloc((count / TASK_PRIMITIVES + 1) * sizeof *builder.waiting);
-    builder.order_right = malloc(count * sizeof *builder.order_right);
+    tree->nodes = aligned_alloc(16, (2 * (size_t)count - 1) * sizeof(*tree->nodes));
+    tree->areas = malloc((2 * (size_t)count - 1) * sizeof(*tree->areas));
+    tree->order = malloc(count * sizeof(*tree->order));
+    builder.waiting = malloc((count / TASK_PRIMITIVES + 1) * sizeof(*builder.waiting));
+    builder.order_right = malloc(count * sizeof(*builder.order_right));
     if (!tree->nodes || !tree->areas || !tree->order || !builder.waiting || !builder.order_right) {
         free_work(&builder);
         bvh_binary_finish(tree);

@@ -81,7 +81,7 @@ static lanes choose(lanes which, lanes yes, lanes no)
 static bool count_below(struct bake *bake)
 {
     uint32_t count = 0;
-    uint32_t *order = malloc(bake->place_count * sizeof *order);
+    uint32_t *order = malloc(bake->place_count * sizeof(*order));
     if (!order)
         return false;
     for (uint32_t i = 0; i < bake->place_count; i = bvh_binary_next(bake->nodes, i))
@@ -106,7 +106,7 @@ static void place_octants(void *context, uint32_t group)
     size_t count = bake->baked->element_count;
     uint32_t *places = bake->baked->place + first_octant * count;
     lanes begin = {0, 0, 0, 0};
-    lanes *begin_right = aligned_alloc(sizeof begin, ((size_t)bake->waiting_max + 1) * sizeof begin);
+    lanes *begin_right = aligned_alloc(sizeof(begin), ((size_t)bake->waiting_max + 1) * sizeof(begin));
     bake->failed[group] = !begin_right;
     if (!begin_right)
         return;
@@ -134,11 +134,11 @@ static void place_octants(void *context, uint32_t group)
 static bool bake_alloc(struct bake *bake, struct bvh_baked *baked)
 {
     size_t places = bake->place_count;
-    bake->element = malloc(places * sizeof *bake->element);
-    bake->below = malloc(places * sizeof *bake->below);
-    baked->node = malloc(places * sizeof *baked->node);
-    baked->size = malloc(places * sizeof *baked->size);
-    baked->parent = malloc(places * sizeof *baked->parent);
+    bake->element = malloc(places * sizeof(*bake->element));
+    bake->below = malloc(places * sizeof(*bake->below));
+    baked->node = malloc(places * sizeof(*baked->node));
+    baked->size = malloc(places * sizeof(*baked->size));
+    baked->parent = malloc(places * sizeof(*baked->parent));
     return bake->element && bake->below && baked->node && baked->size && baked->parent;
 }
 
@@ -147,7 +147,7 @@ static bool place_all(struct bake *bake, uint32_t octants, unsigned threads)
     struct bvh_baked *baked = bake->baked;
     if (octants == 1)
         return true;
-    baked->place = malloc((size_t)octants * baked->element_count * sizeof *baked->place);
+    baked->place = malloc((size_t)octants * baked->element_count * sizeof(*baked->place));
     if (!baked->place || !count_below(bake))
         return false;
     parallel_run(threads, octants / LANES, place_octants, bake);

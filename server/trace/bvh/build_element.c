@@ -58,8 +58,8 @@ void bvh_pad_box(float lower[3], float upper[3])
 struct bvh_bound bvh_bound_of_box(const float lower[3], const float upper[3])
 {
     struct bvh_bound bound;
-    memcpy(bound.lower, lower, sizeof bound.lower);
-    memcpy(bound.upper, upper, sizeof bound.upper);
+    memcpy(bound.lower, lower, sizeof(bound.lower));
+    memcpy(bound.upper, upper, sizeof(bound.upper));
     bvh_pad_box(bound.lower, bound.upper);
     return bound;
 }
@@ -68,7 +68,7 @@ struct bvh_bound bvh_bound_of_sphere(const float centre[3], float radius)
 {
     float magnitude = fabsf(centre[0]) + fabsf(centre[1]) + fabsf(centre[2]) + radius;
     struct bvh_bound bound = {.upper = {radius + magnitude * BVH_PAD_RELATIVE + FLT_MIN}};
-    memcpy(bound.lower, centre, sizeof bound.lower);
+    memcpy(bound.lower, centre, sizeof(bound.lower));
     return bound;
 }
 
@@ -163,7 +163,7 @@ void bvh_write_element(uint32_t *elements, const struct bvh_form *settings, cons
             .upper_y = bound->upper[1],
             .upper_z = bound->upper[2],
         };
-        memcpy(elements + (octant * count + place) * (sizeof element / sizeof *elements), &element,
-               sizeof element);
+        memcpy(elements + (octant * count + place) * (sizeof(element) / sizeof(*elements)), &element,
+               sizeof(element));
     }
 }

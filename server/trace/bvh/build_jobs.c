@@ -77,7 +77,7 @@ static void init_ended(struct bvh_run *run)
 struct bvh_run *bvh_jobs_start(struct bvh_job *jobs, uint32_t count, const struct bvh_form *settings)
 {
     uint64_t primitives = 0;
-    struct bvh_run *run = calloc(1, sizeof *run);
+    struct bvh_run *run = calloc(1, sizeof(*run));
     if (!run)
         return NULL;
     run->jobs = jobs;

@@ -20,8 +20,8 @@ struct heights {
 static bool find_heights(struct heights *heights, const struct bvh_baked *baked)
 {
     uint32_t count = baked->element_count;
-    heights->of = calloc(count, sizeof *heights->of);
-    heights->rounds = calloc(count, sizeof *heights->rounds);
+    heights->of = calloc(count, sizeof(*heights->of));
+    heights->rounds = calloc(count, sizeof(*heights->rounds));
     if (!heights->of || !heights->rounds)
         return false;
     for (uint32_t e = count; e-- > 1;) {
@@ -31,7 +31,7 @@ static bool find_heights(struct heights *heights, const struct bvh_baked *baked)
             heights->of[parent] = above;
     }
     heights->count = heights->of[0] + 1;
-    heights->begin = calloc((size_t)heights->count + 2, sizeof *heights->begin);
+    heights->begin = calloc((size_t)heights->count + 2, sizeof(*heights->begin));
     if (!heights->begin)
         return false;
     for (uint32_t e = 0; e < count; e++)
@@ -88,12 +88,12 @@ bool bvh_refit_plan_make(struct bvh_refit_plan *plan, const struct bvh_baked *ba
     struct heights heights = {0};
     *plan = (struct bvh_refit_plan){.record_count = baked->element_count};
     bool ok = find_heights(&heights, baked);
-    uint32_t *next = ok ? malloc(((size_t)heights.count + 1) * sizeof *next) : NULL;
-    plan->records = malloc(baked->element_count * sizeof *plan->records);
-    plan->steps = malloc(baked->element_count * sizeof *plan->steps); /* none is empty */
+    uint32_t *next = ok ? malloc(((size_t)heights.count + 1) * sizeof(*next)) : NULL;
+    plan->records = malloc(baked->element_count * sizeof(*plan->records));
+    plan->steps = malloc(baked->element_count * sizeof(*plan->steps)); /* none is empty */
     ok = ok && next && plan->records && plan->steps;
     if (ok) {
-        memcpy(next, heights.begin, heights.count * sizeof *next);
+        memcpy(next, heights.begin, heights.count * sizeof(*next));
         plan->leaf_count = heights.begin[1];
         fill_records(plan, baked, leaves, &heights, next);
     }

@@ -29,7 +29,7 @@ static bvh_vec4 choose(int4 which, bvh_vec4 yes, bvh_vec4 no)
 static inline int4 counts_of(const struct bins *bins, int bin)
 {
     int4 counts;
-    memcpy(&counts, bins->counts[bin], sizeof counts);
+    memcpy(&counts, bins->counts[bin], sizeof(counts));
     return counts;
 }
 
@@ -44,7 +44,7 @@ static void fill_bins(struct bins *bins, const struct bvh_box *boxes, uint32_t c
 {
     for (int i = 0; i < bins->count; i++) {
         bins->boxes[i][0] = bins->boxes[i][1] = bins->boxes[i][2] = bvh_box_empty();
-        memset(bins->counts[i], 0, sizeof bins->counts[i]);
+        memset(bins->counts[i], 0, sizeof(bins->counts[i]));
     }
     const float last = (float)(bins->count - 1);
     const bvh_vec4 zero = {0, 0, 0, 0}, last_bin = {last, last, last, last};

@@ -60,9 +60,9 @@ static bool top_alloc(struct bvh_top *top)
 {
     uint32_t count = top->element_count;
     top->elements = calloc(count, bvh_element_bytes(&top->settings));
-    top->boxes = malloc(count * sizeof *top->boxes);
-    top->leaves = calloc(count, sizeof *top->leaves);
-    top->moved = calloc(count, sizeof *top->moved);
+    top->boxes = malloc(count * sizeof(*top->boxes));
+    top->leaves = calloc(count, sizeof(*top->leaves));
+    top->moved = calloc(count, sizeof(*top->moved));
     return top->elements && top->boxes && top->leaves && top->moved;
 }
 
@@ -73,8 +73,8 @@ static void fill_elements(struct bvh_top *top, const struct bvh_binary *binary, 
     top->grid = bvh_grid_over(root.lower, root.upper, GRID_ROOM);
     for (uint32_t e = 0; e < top->element_count; e++) {
         const struct bvh_binary_node *node = &binary->nodes[top->baked.node[e]];
-        memcpy(top->boxes[e].lower, node->lower, sizeof node->lower);
-        memcpy(top->boxes[e].upper, node->upper, sizeof node->upper);
+        memcpy(top->boxes[e].lower, node->lower, sizeof(node->lower));
+        memcpy(top->boxes[e].upper, node->upper, sizeof(node->upper));
         if (node->count_axis >> 2 > 0) {
             uint32_t instance = instances[binary->order[node->link]];
             top->leaves[e] = bvh_leaf(BVH_LEAF_INSTANCE, instance, 1);
@@ -114,9 +114,9 @@ bool bvh_top_build(struct bvh_top *top, const struct bvh_world_box *boxes, uint3
     if (count == 0)
         return true;
     struct bvh_binary binary = {0};
-    struct bvh_box *filled = aligned_alloc(16, count * sizeof *filled);
-    uint32_t *instances = malloc(count * sizeof *instances);
-    top->element_of = malloc(count * sizeof *top->element_of);
+    struct bvh_box *filled = aligned_alloc(16, count * sizeof(*filled));
+    uint32_t *instances = malloc(count * sizeof(*instances));
+    top->element_of = malloc(count * sizeof(*top->element_of));
     bool ok = filled && instances && top->element_of;
     uint32_t filled_count = ok ? collect(boxes, count, filled, instances) : 0;
     for (uint32_t i = 0; ok && i < count; i++)
@@ -154,7 +154,7 @@ bool bvh_top_move(struct bvh_top *top, uint32_t instance, const struct bvh_world
     bool is_there = element != BVH_NONE;
     if (is_there == box_is_empty(box))
         return false;
-    if (!is_there || memcmp(&top->boxes[element], box, sizeof *box) == 0)
+    if (!is_there || memcmp(&top->boxes[element], box, sizeof(*box)) == 0)
         return true;
     top->boxes[element] = *box;
     for (; element != BVH_NONE && !top->moved[element]; element = top->baked.parent[element])
@@ -183,7 +183,7 @@ uint32_t bvh_top_refit(struct bvh_top *top)
 void bvh_top_settle(struct bvh_top *top)
 {
     if (top->moved)
-        memset(top->moved, 0, top->element_count * sizeof *top->moved);
+        memset(top->moved, 0, top->element_count * sizeof(*top->moved));
 }
 
 bool bvh_top_is_stale(const struct bvh_top *top)

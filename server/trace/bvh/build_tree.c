@@ -91,10 +91,10 @@ static void chunk_boxes(void *context, uint32_t chunk)
 static void write_triangle(const struct bvh_shape *shape, const float *positions, uint32_t number, float *out)
 {
     for (unsigned corner = 0; corner < 3; corner++) {
-        memcpy(out + 4 * corner, corner_of(shape, positions, number, corner), 3 * sizeof *out);
+        memcpy(out + 4 * corner, corner_of(shape, positions, number, corner), 3 * sizeof(*out));
         out[4 * corner + 3] = 0;
     }
-    memcpy(out + 3, &number, sizeof number);
+    memcpy(out + 3, &number, sizeof(number));
 }
 
 /* Primitives as the shader reads them, in the order of the leaves. */
@@ -111,9 +111,9 @@ static void chunk_primitives(void *context, uint32_t chunk)
         uint32_t number = work->binary.order[i];
         if (shape->centres_radii) {
             float *out = work->tree->primitives + (size_t)i * 4 * BVH_SPHERE_TEXELS;
-            memcpy(out, shape->centres_radii + 4 * (size_t)number, 4 * sizeof *out);
-            memset(out + 4, 0, 4 * sizeof *out);
-            memcpy(out + 4, &number, sizeof number);
+            memcpy(out, shape->centres_radii + 4 * (size_t)number, 4 * sizeof(*out));
+            memset(out + 4, 0, 4 * sizeof(*out));
+            memcpy(out + 4, &number, sizeof(number));
             continue;
         }
         float *out = work->tree->primitives + (size_t)i * 4 * BVH_TRIANGLE_TEXELS;
@@ -159,8 +159,8 @@ static bool make_spheres(struct work *work)
 {
     const struct bvh_binary_node *nodes = work->binary.nodes;
     uint32_t places = 2 * work->binary.primitive_count - 1, count = 0;
-    uint32_t *order = malloc(places * sizeof *order);
-    work->spheres = malloc(places * sizeof *work->spheres);
+    uint32_t *order = malloc(places * sizeof(*order));
+    work->spheres = malloc(places * sizeof(*work->spheres));
     if (!order || !work->spheres) {
         free(order);
         return false;
@@ -264,10 +264,10 @@ static bool list_corners(struct work *work)
     const struct bvh_shape *shape = work->shape;
     struct bvh_refit_plan *plan = &work->tree->plan;
     plan->triangle_count = shape->primitive_count;
-    plan->corners = malloc(shape->primitive_count * 4 * sizeof *plan->corners);
+    plan->corners = malloc(shape->primitive_count * 4 * sizeof(*plan->corners));
     for (uint32_t i = 0; plan->corners && i < shape->primitive_count; i++) {
         uint32_t number = work->binary.order[i];
-        memcpy(plan->corners + 4 * (size_t)i, shape->indices + 3 * (size_t)number, 3 * sizeof *plan->corners);
+        memcpy(plan->corners + 4 * (size_t)i, shape->indices + 3 * (size_t)number, 3 * sizeof(*plan->corners));
         plan->corners[4 * (size_t)i + 3] = number;
     }
     return plan->corners != NULL;
@@ -277,7 +277,7 @@ static bool make_plan(struct work *work)
 {
     const struct bvh_baked *baked = &work->baked;
     uint32_t kind = work->shape->centres_radii ? BVH_LEAF_SPHERES : BVH_LEAF_TRIANGLES;
-    uint32_t *leaves = calloc(baked->element_count, sizeof *leaves);
+    uint32_t *leaves = calloc(baked->element_count, sizeof(*leaves));
     bool ok = leaves != NULL;
     for (uint32_t e = 0; ok && e < baked->element_count; e++) {
         const struct bvh_binary_node *node = &work->binary.nodes[baked->node[e]];
@@ -326,8 +326,8 @@ static bool build(struct work *work)
         return false;
     if (is_stopped(work))
         return false;
-    memcpy(tree->lower, work->binary.nodes[0].lower, sizeof tree->lower);
-    memcpy(tree->upper, work->binary.nodes[0].upper, sizeof tree->upper);
+    memcpy(tree->lower, work->binary.nodes[0].lower, sizeof(tree->lower));
+    memcpy(tree->upper, work->binary.nodes[0].upper, sizeof(tree->upper));
     bvh_pad_box(tree->lower, tree->upper);
     tree->grid = bvh_grid_over(tree->lower, tree->upper, 0);
     survey(work);

@@ -16,11 +16,11 @@ bool bvh_refit_init(struct bvh_refit *refit, struct gpu_device *device, struct b
     *refit = (struct bvh_refit){0};
     if (plan->record_count == 0)
         return true;
-    if (!gpu_buffer_upload(device, &refit->records, plan->records, plan->record_count * sizeof *plan->records,
+    if (!gpu_buffer_upload(device, &refit->records, plan->records, plan->record_count * sizeof(*plan->records),
                            error))
         return false;
     if (!gpu_buffer_upload(device, &refit->corners, plan->corners,
-                           plan->triangle_count * 4 * sizeof *plan->corners, error))
+                           plan->triangle_count * 4 * sizeof(*plan->corners), error))
         return false;
     refit->record_count = plan->record_count;
     refit->leaf_count = plan->leaf_count;

@@ -121,7 +121,7 @@ static bool resize(struct gpu_device *device, struct gpu_buffer *buffer, size_t 
 static bool pack(struct bvh_store *store, uint32_t top_capacity, uint64_t elements, uint64_t texels,
                  struct error *error)
 {
-    struct move *moves = calloc(2 * (size_t)store->entry_count + 1, sizeof *moves);
+    struct move *moves = calloc(2 * (size_t)store->entry_count + 1, sizeof(*moves));
     if (!moves)
         return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory to arrange the trees");
     struct move *element_moves = moves, *texel_moves = moves + store->entry_count;
@@ -253,8 +253,8 @@ static void add_entry(struct bvh_store *store, const struct gpu_scene_geometry *
                                 .element_count = tree->element_count,
                                 .first_texel = texel,
                                 .texel_count = (uint32_t)tree->primitive_texels};
-    memcpy(entry->lower, tree->lower, sizeof entry->lower);
-    memcpy(entry->upper, tree->upper, sizeof entry->upper);
+    memcpy(entry->lower, tree->lower, sizeof(entry->lower));
+    memcpy(entry->upper, tree->upper, sizeof(entry->upper));
     entry->grid = tree->grid;
     entry->grid_cost = tree->grid_cost;
     entry->leaf_extent = tree->leaf_extent;
@@ -297,8 +297,8 @@ static enum tracer_progress upload_tree(struct bvh_store *store, struct bvh_tree
     report->uploaded_bytes += element_bytes + texel_bytes;
     report->built_elements += tree->element_count;
     const struct bvh_refit_plan *plan = &tree->plan;
-    report->uploaded_bytes += plan->record_count * sizeof *plan->records;
-    report->uploaded_bytes += plan->triangle_count * 4 * sizeof *plan->corners;
+    report->uploaded_bytes += plan->record_count * sizeof(*plan->records);
+    report->uploaded_bytes += plan->triangle_count * 4 * sizeof(*plan->corners);
     /* The refit writes to parts of the buffers, and what a shader can write to is limited. */
     uint64_t part_max = store->device->facts.storage_block_bytes_max - PART_SLACK;
     if (element_bytes > part_max || texel_bytes > part_max)
@@ -313,7 +313,7 @@ static bool begin_build(struct bvh_store *store, struct bvh_job *jobs, uint32_t 
     store->build =
         (struct bvh_store_build){.jobs = jobs, .which = which, .count = count, .start_ns = clock_now_ns()};
     struct bvh_entry *entries =
-        realloc(store->entries, ((size_t)store->entry_count + count + 1) * sizeof *entries);
+        realloc(store->entries, ((size_t)store->entry_count + count + 1) * sizeof(*entries));
     if (entries) {
         store->entries = entries;
         store->build.run = bvh_jobs_start(jobs, count, &store->settings);
@@ -378,7 +378,7 @@ static bool index_entries(struct bvh_store *store, const struct gpu_scene *scene
 {
     struct hashmap by_key;
     hashmap_init(&by_key);
-    uint32_t *entry_of = malloc(((size_t)scene->geometry_count + 1) * sizeof *entry_of);
+    uint32_t *entry_of = malloc(((size_t)scene->geometry_count + 1) * sizeof(*entry_of));
     bool ok = entry_of != NULL;
     for (uint32_t i = 0; ok && i < store->entry_count; i++)
         ok = hashmap_put(&by_key,
@@ -406,7 +406,7 @@ bool bvh_store_rebuild(struct bvh_store *store, const struct gpu_scene *scene, s
                        uint32_t *which, uint32_t count, struct bvh_store_report *report, struct stage_times *times,
                        struct error *error)
 {
-    struct bvh_entry *old = malloc(((size_t)count + 1) * sizeof *old);
+    struct bvh_entry *old = malloc(((size_t)count + 1) * sizeof(*old));
     if (!old) {
         free(jobs);
         free(which);
@@ -439,9 +439,9 @@ bool bvh_store_begin(struct bvh_store *store, const struct gpu_scene *scene, boo
     for (uint32_t i = 0; all && i < store->entry_count; i++)
         store->entries[i].deformed_revision = UINT64_MAX;
     uint32_t missing_count = 0;
-    uint32_t *missing = malloc(((size_t)scene->geometry_count + 1) * sizeof *missing);
+    uint32_t *missing = malloc(((size_t)scene->geometry_count + 1) * sizeof(*missing));
     bool found = missing && find_missing(store, scene, missing, &missing_count);
-    struct bvh_job *jobs = found ? calloc((size_t)missing_count + 1, sizeof *jobs) : NULL;
+    struct bvh_job *jobs = found ? calloc((size_t)missing_count + 1, sizeof(*jobs)) : NULL;
     if (!jobs) {
         free(missing);
         bvh_store_finish(store);
@@ -485,7 +485,7 @@ bool bvh_store_waits(struct bvh_store *store)
 static uint64_t write_top_copy(struct bvh_store *store, const struct bvh_top *top, uint32_t octant,
                                const bool *moved)
 {
-    size_t each_bytes = bvh_element_words(&store->settings) * sizeof *top->elements;
+    size_t each_bytes = bvh_element_words(&store->settings) * sizeof(*top->elements);
     size_t first = (size_t)octant * top->element_count;
     uint64_t bytes = 0;
     for (uint32_t begin = 0; begin < top->element_count;) {

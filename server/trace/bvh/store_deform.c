@@ -30,7 +30,7 @@ static struct bvh_entry *entry_of(struct bvh_store *store, uint32_t geometry)
 
 static bool list_moved(struct deforming *deforming, const struct bvh_store *store, const struct gpu_scene *scene)
 {
-    deforming->list = malloc(((size_t)scene->geometry_count + 1) * sizeof *deforming->list);
+    deforming->list = malloc(((size_t)scene->geometry_count + 1) * sizeof(*deforming->list));
     for (uint32_t g = 0; deforming->list && g < scene->geometry_count; g++) {
         const struct bvh_entry *entry = bvh_store_entry(store, g);
         if (!entry || entry->node == 0 || entry->deformed_revision == scene->geometries[g].deformed_revision)
@@ -68,7 +68,7 @@ static bool make_bounds(struct bvh_store *store, struct gpu_scene *scene, struct
 {
     struct gpu_device *device = store->device;
     if (!gpu_buffer_reserve(device, &store->boxes, deforming->boxes * BVH_REFIT_BOX_BYTES, error) ||
-        !gpu_buffer_reserve(device, &store->roots, deforming->count * sizeof *roots, error))
+        !gpu_buffer_reserve(device, &store->roots, deforming->count * sizeof(*roots), error))
         return false;
     gpu_buffer_bind_texels(device, &scene->positions, UNIT_POSITIONS, GL_RGBA32F);
     for (uint32_t i = 0; i < deforming->count; i++) {
@@ -79,18 +79,18 @@ static bool make_bounds(struct bvh_store *store, struct gpu_scene *scene, struct
         if (!bvh_refit_bounds(&entry_of(store, moved->geometry)->refit, device, &place, error))
             return false;
         glCopyNamedBufferSubData(store->boxes.name, store->roots.name,
-                                 (GLintptr)moved->first_box * (GLintptr)sizeof *roots,
-                                 (GLintptr)i * (GLintptr)sizeof *roots, sizeof *roots);
+                                 (GLintptr)moved->first_box * (GLintptr)sizeof(*roots),
+                                 (GLintptr)i * (GLintptr)sizeof(*roots), sizeof(*roots));
     }
-    gpu_buffer_read(device, &store->roots, 0, roots, deforming->count * sizeof *roots);
+    gpu_buffer_read(device, &store->roots, 0, roots, deforming->count * sizeof(*roots));
     return true;
 }
 
 /* Padded as the builder does; what overflows is in it. Lower above upper: no corner is a number. */
 static void take_box(struct bvh_entry *entry, const struct bvh_refit_root *root)
 {
-    memcpy(entry->lower, root->lower, sizeof entry->lower);
-    memcpy(entry->upper, root->upper, sizeof entry->upper);
+    memcpy(entry->lower, root->lower, sizeof(entry->lower));
+    memcpy(entry->upper, root->upper, sizeof(entry->upper));
     bvh_pad_box(entry->lower, entry->upper);
     for (int k = 0; k < 3; k++) {
         entry->lower[k] = entry->lower[k] < -FLT_MAX ? -FLT_MAX : entry->lower[k];
@@ -106,7 +106,7 @@ static bool has_worn_out(const struct bvh_entry *entry, const struct bvh_refit_r
 static bool refit(struct bvh_store *store, struct gpu_scene *scene, struct deforming *deforming,
                   struct bvh_store_report *report, struct error *error)
 {
-    struct bvh_refit_root *roots = calloc((size_t)deforming->count + 1, sizeof *roots);
+    struct bvh_refit_root *roots = calloc((size_t)deforming->count + 1, sizeof(*roots));
     if (!roots)
         return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for %u trees", deforming->count);
     bool ok = deforming->boxes == 0 || make_bounds(store, scene, deforming, roots, error);
@@ -149,9 +149,9 @@ static float *read_vertices(struct bvh_store *store, const struct gpu_scene *sce
 static bool rebuild(struct bvh_store *store, const struct gpu_scene *scene, const struct deforming *deforming,
                     struct bvh_store_report *report, struct stage_times *times, struct error *error)
 {
-    struct bvh_job *jobs = calloc((size_t)deforming->count + 1, sizeof *jobs);
-    float **vertices = calloc((size_t)deforming->count + 1, sizeof *vertices);
-    uint32_t *which = malloc(((size_t)deforming->count + 1) * sizeof *which), count = 0;
+    struct bvh_job *jobs = calloc((size_t)deforming->count + 1, sizeof(*jobs));
+    float **vertices = calloc((size_t)deforming->count + 1, sizeof(*vertices));
+    uint32_t *which = malloc(((size_t)deforming->count + 1) * sizeof(*which)), count = 0;
     bool ok = jobs && vertices && which;
     for (uint32_t i = 0; ok && i < deforming->count; i++) {
         const struct gpu_scene_geometry *geometry = &scene->geometries[deforming->list[i].geometry];

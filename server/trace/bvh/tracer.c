@@ -40,7 +40,7 @@ static struct bvh_form settings_of(const struct tracer_options *options)
 static struct tracer *bvh_create(struct gpu_device *device, const struct tracer_options *options,
                                  struct error *error)
 {
-    struct bvh *bvh = calloc(1, sizeof *bvh);
+    struct bvh *bvh = calloc(1, sizeof(*bvh));
     if (!bvh) {
         error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a tracer");
         return NULL;
@@ -115,7 +115,7 @@ static struct bvh_transform describe(const struct bvh *bvh, const struct gpu_sce
     struct instance *instance = &scene->instances[i];
     const struct bvh_entry *entry = bvh_store_entry(&bvh->store, instance->geometry);
     struct bvh_transform transform = {0};
-    memcpy(transform.object_from_world, instance->object_from_world, sizeof transform.object_from_world);
+    memcpy(transform.object_from_world, instance->object_from_world, sizeof(transform.object_from_world));
     *box = (struct bvh_world_box){{1, 1, 1}, {-1, -1, -1}};
     if (!entry || !(entry->lower[0] <= entry->upper[0]))
         return transform;
@@ -126,7 +126,7 @@ static struct bvh_transform describe(const struct bvh *bvh, const struct gpu_sce
     transform.grid_lower_x = entry->grid.lower[0];
     transform.grid_lower_y = entry->grid.lower[1];
     transform.grid_lower_z = entry->grid.lower[2];
-    memcpy(transform.cells_per_unit, entry->grid.cells_per_unit, sizeof entry->grid.cells_per_unit);
+    memcpy(transform.cells_per_unit, entry->grid.cells_per_unit, sizeof(entry->grid.cells_per_unit));
     if (scene->geometries[instance->geometry].device.close_offset)
         transform.close_texels = entry->texel_count / 2;
     *box = world_box(entry, scene, instance);
@@ -159,8 +159,8 @@ static void survey_leaves(struct bvh *bvh, const struct gpu_scene *scene)
 static bool rebuild_top(struct bvh *bvh, const struct gpu_scene *scene, struct error *error)
 {
     uint32_t count = scene->instance_count;
-    struct bvh_world_box *boxes = malloc(((size_t)count + 1) * sizeof *boxes);
-    struct bvh_transform *transforms = malloc(((size_t)count + 1) * sizeof *transforms);
+    struct bvh_world_box *boxes = malloc(((size_t)count + 1) * sizeof(*boxes));
+    struct bvh_transform *transforms = malloc(((size_t)count + 1) * sizeof(*transforms));
     bool ok = boxes && transforms;
     for (uint32_t i = 0; ok && i < count; i++)
         transforms[i] = describe(bvh, scene, i, &boxes[i]);
@@ -188,15 +188,15 @@ static bool refit_top(struct bvh *bvh, const struct gpu_scene *scene)
         struct bvh_transform *old = &bvh->transforms[i];
         if (!bvh_top_move(&bvh->top, i, &box))
             return false;
-        if (memcmp(old, &transform, sizeof transform) == 0)
+        if (memcmp(old, &transform, sizeof(transform)) == 0)
             continue;
         *old = transform;
         first = i < first ? i : first;
         end = i + 1;
     }
     if (first < end) {
-        size_t bytes = (end - first) * sizeof *bvh->transforms;
-        gpu_buffer_write(bvh->store.device, &bvh->transform_buffer, first * sizeof *bvh->transforms,
+        size_t bytes = (end - first) * sizeof(*bvh->transforms);
+        gpu_buffer_write(bvh->store.device, &bvh->transform_buffer, first * sizeof(*bvh->transforms),
                          &bvh->transforms[first], bytes);
         bvh->base.stats.uploaded_bytes += bytes;
     }
@@ -208,7 +208,7 @@ static bool upload_top(struct bvh *bvh, bool rebuilt, struct error *error)
 {
     struct bvh_store *store = &bvh->store;
     struct tracer_stats *stats = &bvh->base.stats;
-    size_t transform_bytes = bvh->transform_count * sizeof *bvh->transforms;
+    size_t transform_bytes = bvh->transform_count * sizeof(*bvh->transforms);
     if (rebuilt) {
         if (!gpu_buffer_upload(store->device, &bvh->transform_buffer, bvh->transforms, transform_bytes, error))
             return false;

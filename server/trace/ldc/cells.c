@@ -138,7 +138,7 @@ static bool count_entries(struct ldc_cells *cells, struct error *error)
     bind_nodes(cells, GL_RGBA32UI);
     if (!cells_pass(cells, "CELLS_COUNT", counts->blocks, error))
         return false;
-    gpu_buffer_read(cells->store->device, &cells->counter, 0, counts, sizeof *counts);
+    gpu_buffer_read(cells->store->device, &cells->counter, 0, counts, sizeof(*counts));
     return reserve_entries(cells, error);
 }
 
@@ -161,7 +161,7 @@ static bool place_blocks(struct ldc_cells *cells, struct error *error)
     bind_nodes(cells, GL_RGBA32UI);
     if (!cells_pass(cells, "CELLS_PLACE", nodes, error))
         return false;
-    gpu_buffer_read(store->device, &cells->counter, 0, counts, sizeof *counts);
+    gpu_buffer_read(store->device, &cells->counter, 0, counts, sizeof(*counts));
     for (int k = 0; k < 3; k++) {
         cube->lower_cells[k] = counts->blocks ? counts->lower_nodes[k] << LDC_NODE_SHIFT : 0;
         cube->upper_cells[k] = counts->blocks ? (counts->upper_nodes[k] + 1) << LDC_NODE_SHIFT : 0;
@@ -210,7 +210,7 @@ static bool list_samples(struct ldc_cells *cells, struct error *error)
 static bool begin(struct ldc_cells *cells, struct error *error)
 {
     cells->next = cells->store->cubes[cells->which].sample_count > 0 ? list_samples : mark_blocks;
-    return gpu_buffer_upload(cells->store->device, &cells->counter, &cells->counts, sizeof cells->counts, error);
+    return gpu_buffer_upload(cells->store->device, &cells->counter, &cells->counts, sizeof(cells->counts), error);
 }
 
 /* ---- the whole ---- */

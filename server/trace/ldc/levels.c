@@ -84,9 +84,9 @@ static void set_place(const struct gpu_program *program, const char *which, cons
         const char *name;
         uint32_t value;
     } parts[] = {{"first", place->first}, {"row", place->row}, {"width", place->width}, {"image", place->image}};
-    for (size_t i = 0; i < sizeof parts / sizeof *parts; i++) {
+    for (size_t i = 0; i < sizeof(parts) / sizeof(*parts); i++) {
         char name[32];
-        snprintf(name, sizeof name, "%s_%s", parts[i].name, which);
+        snprintf(name, sizeof(name), "%s_%s", parts[i].name, which);
         gpu_uniform_uint(program, name, parts[i].value);
     }
 }
@@ -102,7 +102,7 @@ static enum tracer_progress build_ranges(struct ldc_levels *levels, struct error
         !ldc_levels_reserve(store, levels->at, 3 * (uint64_t)layout->image_nodes, 0, RANGE_BYTES, error))
         return TRACER_FAILED;
     char bits[4];
-    snprintf(bits, sizeof bits, "%u", layout->bits);
+    snprintf(bits, sizeof(bits), "%u", layout->bits);
     const struct gpu_define defines[] = {
         {"LDC_LEVEL_BITS", bits}, {level == 1 ? "LDC_FROM_TEXELS" : NULL, "1"}, {NULL, NULL}};
     const struct gpu_program_source source = {.compute = "ldc/levels.comp", .defines = defines};

@@ -27,20 +27,20 @@ static void set_cube(const struct gpu_program *program, unsigned slot, const str
         {"ldc_grid", layout->grid},
     };
     char name[32];
-    for (size_t i = 0; i < sizeof whole / sizeof *whole; i++) {
-        snprintf(name, sizeof name, "%s[%u]", whole[i].name, slot);
+    for (size_t i = 0; i < sizeof(whole) / sizeof(*whole); i++) {
+        snprintf(name, sizeof(name), "%s[%u]", whole[i].name, slot);
         gpu_uniform_int(program, name, (int32_t)whole[i].value);
     }
     const float place[4] = {cube->lower_world[0], cube->lower_world[1], cube->lower_world[2], cube->cell_world};
-    snprintf(name, sizeof name, "ldc_place[%u]", slot);
+    snprintf(name, sizeof(name), "ldc_place[%u]", slot);
     gpu_uniform_vec(program, name, 4, place);
     const float lower[3] = {(float)cube->lower_cells[0], (float)cube->lower_cells[1], (float)cube->lower_cells[2]};
     const float upper[3] = {(float)cube->upper_cells[0], (float)cube->upper_cells[1], (float)cube->upper_cells[2]};
-    snprintf(name, sizeof name, "ldc_lower[%u]", slot);
+    snprintf(name, sizeof(name), "ldc_lower[%u]", slot);
     gpu_uniform_vec(program, name, 3, lower);
-    snprintf(name, sizeof name, "ldc_upper[%u]", slot);
+    snprintf(name, sizeof(name), "ldc_upper[%u]", slot);
     gpu_uniform_vec(program, name, 3, upper);
-    snprintf(name, sizeof name, "ldc_tolerance[%u]", slot);
+    snprintf(name, sizeof(name), "ldc_tolerance[%u]", slot);
     gpu_uniform_float(program, name, options->ldc.tolerance / cube->cell_world);
 }
 
@@ -65,9 +65,9 @@ bool ldc_intersect(struct ldc_store *store, struct gpu_scene *scene, const struc
             cubes[cube_count++] = &store->cubes[i];
     cube_count = cube_count ? cube_count : 1;
     char number_of_cubes[4], bits[4];
-    snprintf(number_of_cubes, sizeof number_of_cubes, "%u", cube_count);
+    snprintf(number_of_cubes, sizeof(number_of_cubes), "%u", cube_count);
     const struct ldc_level_layout layout = ldc_level_layout_of(store, cubes[0]->resolution, options);
-    snprintf(bits, sizeof bits, "%u", layout.bits);
+    snprintf(bits, sizeof(bits), "%u", layout.bits);
     struct gpu_define defines[10] = {
         {"TRACER_LDC", "1"},
         {"LDC_CUBES", number_of_cubes},

@@ -18,7 +18,7 @@ static char path[64];
 static int make_path(void **state)
 {
     (void)state;
-    snprintf(path, sizeof path, "%s/farlight-timeline-XXXXXX", P_tmpdir);
+    snprintf(path, sizeof(path), "%s/farlight-timeline-XXXXXX", P_tmpdir);
     int fd = mkstemp(path);
     return fd < 0 ? -1 : close(fd);
 }

@@ -52,12 +52,12 @@ static bool liar_trace(struct tracer *tracer, struct gpu_scene *gpu, struct trac
     (void)rays; /* all of them */
     if (!tracer_intersect(honest, gpu, wave, error) || lie == LIE_NONE)
         return true;
-    gpu_buffer_read(tracer->device, wave->hits, 0, hits, wave->ray_count * sizeof *hits);
+    gpu_buffer_read(tracer->device, wave->hits, 0, hits, wave->ray_count * sizeof(*hits));
     for (uint32_t i = 0, met = 0; i < wave->ray_count; i++) {
         if (hits[i].distance >= 0 && met++ % 100 == 0)
             hits[i].distance = lie == LIE_MISSES ? -1 : hits[i].distance * 1.01f;
     }
-    gpu_buffer_write(tracer->device, wave->hits, 0, hits, wave->ray_count * sizeof *hits);
+    gpu_buffer_write(tracer->device, wave->hits, 0, hits, wave->ray_count * sizeof(*hits));
     return true;
 }
 
@@ -208,7 +208,7 @@ TEST(the_median_and_its_deviation_are_those_of_the_runs)
     struct bench_runs runs = {0};
     (void)state;
     assert_true(bench_figure(&runs).median_ns == 0);
-    for (size_t i = 0; i < sizeof times / sizeof times[0]; i++)
+    for (size_t i = 0; i < sizeof(times) / sizeof(times[0]); i++)
         bench_add(&runs, times[i]);
     const struct bench_figure figure = bench_figure(&runs);
     assert_true(figure.median_ns == 30 && figure.deviation_ns == 20); /* of 20 20 10 970 0 */

@@ -25,7 +25,7 @@ static const char small_nff[] = "v\nfrom 0 0 5\nat 0 0 0\nup 0 1 0\nangle 45\nhi
 static void write_file(const char *folder, const char *name, const char *text)
 {
     char path[256];
-    snprintf(path, sizeof path, "%s/%s", folder, name);
+    snprintf(path, sizeof(path), "%s/%s", folder, name);
     FILE *file = fopen(path, "w");
     assert_non_null(file);
     assert_int_equal(fputs(text, file) >= 0, 1);
@@ -35,7 +35,7 @@ static void write_file(const char *folder, const char *name, const char *text)
 static void remove_file(const char *folder, const char *name)
 {
     char path[256];
-    snprintf(path, sizeof path, "%s/%s", folder, name);
+    snprintf(path, sizeof(path), "%s/%s", folder, name);
     unlink(path);
 }
 
@@ -87,7 +87,7 @@ static void expect_what_the_importer_counts(const char *path)
 static int make_folder(void **state)
 {
     static char folder[64];
-    snprintf(folder, sizeof folder, "%s/farlight-load-XXXXXX", P_tmpdir);
+    snprintf(folder, sizeof(folder), "%s/farlight-load-XXXXXX", P_tmpdir);
     if (!mkdtemp(folder))
         return -1;
     write_file(folder, "small.obj", small_obj);
@@ -101,7 +101,7 @@ static int make_folder(void **state)
 static int remove_folder(void **state)
 {
     static const char *const names[] = {"small.obj", "small.mtl", "small.nff", "broken.obj"};
-    for (size_t i = 0; i < sizeof names / sizeof names[0]; i++)
+    for (size_t i = 0; i < sizeof(names) / sizeof(names[0]); i++)
         remove_file(*state, names[i]);
     return rmdir(*state);
 }
@@ -111,7 +111,7 @@ ALL_TESTS(make_folder, remove_folder)
 TEST(a_mesh_arrives_with_what_the_importer_counts)
 {
     char path[256];
-    snprintf(path, sizeof path, "%s/small.obj", (const char *)*state);
+    snprintf(path, sizeof(path), "%s/small.obj", (const char *)*state);
     struct loaded_model model;
     struct error error = {0};
     assert_true(load_model(&model, path, &error));
@@ -123,7 +123,7 @@ TEST(a_mesh_arrives_with_what_the_importer_counts)
 TEST(spheres_and_the_camera_arrive)
 {
     char path[256];
-    snprintf(path, sizeof path, "%s/small.nff", (const char *)*state);
+    snprintf(path, sizeof(path), "%s/small.nff", (const char *)*state);
     struct loaded_model model;
     struct error error = {0};
     float m[12];
@@ -141,12 +141,12 @@ TEST(what_cannot_be_loaded_is_an_error_that_says_why)
     char path[256];
     struct loaded_model model;
     struct error error = {0};
-    snprintf(path, sizeof path, "%s/absent.obj", (const char *)*state);
+    snprintf(path, sizeof(path), "%s/absent.obj", (const char *)*state);
     assert_false(load_model(&model, path, &error));
     assert_non_null(strstr(error.text, "cannot be read"));
     assert_null(model.scene);
     error = (struct error){0};
-    snprintf(path, sizeof path, "%s/broken.obj", (const char *)*state);
+    snprintf(path, sizeof(path), "%s/broken.obj", (const char *)*state);
     assert_false(load_model(&model, path, &error));
     assert_true(strlen(error.text) > 0);
     assert_null(model.scene);
@@ -159,9 +159,9 @@ TEST(real_models_arrive_with_what_the_importer_counts)
     const char *folder = getenv("FARLIGHT_SCENES");
     unsigned found = 0;
     (void)state;
-    for (size_t i = 0; i < sizeof names / sizeof names[0]; i++) {
+    for (size_t i = 0; i < sizeof(names) / sizeof(names[0]); i++) {
         char path[512];
-        snprintf(path, sizeof path, "%s/%s", folder ? folder : "../shared/scenes", names[i]);
+        snprintf(path, sizeof(path), "%s/%s", folder ? folder : "../shared/scenes", names[i]);
         if (access(path, R_OK) != 0)
             continue;
         expect_what_the_importer_counts(path);

@@ -50,7 +50,7 @@ static struct scene *two_spheres(void)
             if (i == STEPS || j == STEPS)
                 continue;
             const uint32_t corners[6] = {a, b, a + 1, a + 1, b, b + 1};
-            memcpy(next, corners, sizeof corners);
+            memcpy(next, corners, sizeof(corners));
             next += 6;
         }
     }
@@ -84,11 +84,11 @@ static void begin(struct fixture *stage)
 {
     struct error error = {0};
     struct scene_changes changes;
-    *stage = (struct fixture){.scene = two_spheres(), .cast = malloc(RAYS * sizeof *stage->cast)};
+    *stage = (struct fixture){.scene = two_spheres(), .cast = malloc(RAYS * sizeof(*stage->cast))};
     cast_rays(stage->cast);
     gpu_scene_init(&stage->gpu, device);
     must(gpu_scene_update(&stage->gpu, stage->scene, NULL, &changes, NULL, &error) &&
-             gpu_buffer_upload(device, &stage->rays, stage->cast, RAYS * sizeof *stage->cast, &error) &&
+             gpu_buffer_upload(device, &stage->rays, stage->cast, RAYS * sizeof(*stage->cast), &error) &&
              gpu_buffer_reserve(device, &stage->answers, RAYS * sizeof(struct hit), &error),
          &error);
 }
@@ -180,10 +180,10 @@ static void hits_are_of(const struct tracer_impl *impl, float off_most_cells, fl
     struct fixture stage;
     begin(&stage);
     struct tracer *tracer = build(&stage, impl, RESOLUTION);
-    struct hit *hits = malloc(RAYS * sizeof *hits);
+    struct hit *hits = malloc(RAYS * sizeof(*hits));
     const float cell = svo_facts(tracer).cell_world;
     uint32_t clear[3] = {0}, unusual = 0;
-    trace(&stage, tracer, WAVE_CLOSEST, hits, RAYS * sizeof *hits);
+    trace(&stage, tracer, WAVE_CLOSEST, hits, RAYS * sizeof(*hits));
     for (uint32_t i = 0; i < RAYS; i++) {
         float distance;
         const int truth = truth_of(&stage.cast[i], DIAGONAL_CELLS * cell, &distance);
@@ -227,11 +227,11 @@ TEST(rays_to_anything_are_stopped_where_it_is)
     static const struct tracer_impl *const impls[] = {&svo_cells_impl, &svo_planes_impl, &svo_tiles_impl};
     struct fixture stage;
     begin(&stage);
-    uint32_t *visibility = malloc(RAYS * sizeof *visibility);
+    uint32_t *visibility = malloc(RAYS * sizeof(*visibility));
     for (int which = 0; which < 3; which++) {
         struct tracer *tracer = build(&stage, impls[which], RESOLUTION);
         const float margin = DIAGONAL_CELLS * svo_facts(tracer).cell_world;
-        trace(&stage, tracer, WAVE_ANY, visibility, RAYS * sizeof *visibility);
+        trace(&stage, tracer, WAVE_ANY, visibility, RAYS * sizeof(*visibility));
         for (uint32_t i = 0; i < RAYS; i++) {
             float distance;
             const int truth = truth_of(&stage.cast[i], margin, &distance);

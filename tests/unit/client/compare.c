@@ -31,11 +31,11 @@ static void write_file(const char *path, const void *bytes, size_t count, mode_t
 static int make_folder(void **state)
 {
     (void)state;
-    snprintf(folder, sizeof folder, "%s/farlight-compare-XXXXXX", P_tmpdir);
-    if (mkdtemp(folder) == NULL)
+    snprintf(folder, sizeof(folder), "%s/farlight-compare-XXXXXX", P_tmpdir);
+    if (!mkdtemp(folder))
         return -1;
-    snprintf(script, sizeof script, "%s/farlight-export", folder);
-    snprintf(answer, sizeof answer, "%s/answer", folder);
+    snprintf(script, sizeof(script), "%s/farlight-export", folder);
+    snprintf(answer, sizeof(answer), "%s/answer", folder);
     return setenv("FARLIGHT_LIBEXEC", folder, 1);
 }
 
@@ -57,7 +57,7 @@ static bool compare_with(const char *text, unsigned timeout_ms)
 
 static void check_error(enum fl_error_code code, const char *part)
 {
-    if (error.code != code || strstr(error.text, part) == NULL)
+    if (error.code != code || !strstr(error.text, part))
         fail_msg("error %d '%s' in place of %d '%s'", (int)error.code, error.text, (int)code, part);
 }
 
@@ -68,10 +68,10 @@ static bool compare_answered(const struct message_images_compared *figures)
     const struct message message = {.type = MESSAGE_IMAGES_COMPARED, .images_compared = *figures};
     struct writer writer;
     char text[256];
-    writer_init(&writer, bytes, sizeof bytes);
+    writer_init(&writer, bytes, sizeof(bytes));
     assert_true(message_write(&writer, 1, 0, &message));
     write_file(answer, bytes, writer.used_bytes, 0600);
-    snprintf(text, sizeof text, "#!/bin/sh\ncat %s >&3\nsleep 0.2\n", answer);
+    snprintf(text, sizeof(text), "#!/bin/sh\ncat %s >&3\nsleep 0.2\n", answer);
     return compare_with(text, 60000);
 }
 
@@ -141,7 +141,7 @@ TEST(what_cannot_be_meant_starts_nothing)
                                                       {.a = "a.png", .b = "b.png", .threshold = INFINITY},
                                                       {.a = "a.png", .b = "b.png", .heat_top = -1},
                                                       {.a = "a.png", .b = "b.png", .heat_top = NAN}};
-    for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
+    for (size_t i = 0; i < sizeof(wrong) / sizeof(wrong[0]); i++) {
         error = (struct fl_error){0};
         assert_false(fl_compare(&wrong[i], &comparison, &error));
         assert_int_equal(error.code, FL_ERROR_ARGUMENT);

@@ -35,7 +35,7 @@ TEST(a_ping_comes_back_and_a_ping_is_answered)
     struct daemon *daemon = start(play_pong);
     struct fl_connection *connection = connect_to(daemon);
     uint64_t ns = 0;
-    if (connection == NULL)
+    if (!connection)
         fail_msg("%s", error.text);
     assert_true(fl_connection_is_local(connection));
     assert_true(fl_ping(connection, &ns, &error));
@@ -104,11 +104,11 @@ TEST(wrong_addresses_are_reported)
         "",         "unix:",      "tcp:",           "tcp:host",    "tcp:host:",
         "tcp::1",   "tcp:host:0", "tcp:host:65536", "tcp:host:1x", "tcp:::1:5",
         "http://x", "ssh:",       "ssh:-oX",        "ssh:host:",   "ssh:host:/a;rm"};
-    for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
+    for (size_t i = 0; i < sizeof(wrong) / sizeof(wrong[0]); i++) {
         error = (struct fl_error){0};
         struct fl_connection *connection =
             fl_connect(&(struct fl_connect_options){.server = wrong[i], .timeout_ms = 100}, &error);
-        if (connection != NULL || error.code != FL_ERROR_ARGUMENT)
+        if (connection || error.code != FL_ERROR_ARGUMENT)
             fail_msg("'%s': error %d '%s'", wrong[i], (int)error.code, error.text);
     }
     assert_null(fl_connect(&(struct fl_connect_options){.server = "unix:/nonexistent/socket"}, &error));
@@ -124,7 +124,7 @@ static void play_half_message(struct daemon *daemon)
     uint8_t bytes[128];
     greet(daemon);
     if (take(daemon, &header, &message))
-        put(daemon, bytes, pack(bytes, sizeof bytes, header.request, &pong) - 9);
+        put(daemon, bytes, pack(bytes, sizeof(bytes), header.request, &pong) - 9);
 }
 
 TEST(half_an_answer_is_a_lost_connection_and_stays_one)
@@ -175,7 +175,7 @@ static void play_oversize(struct daemon *daemon)
     greet(daemon);
     take(daemon, &header, &message);
     framing_header_encode(bytes, &wrong);
-    put(daemon, bytes, sizeof bytes);
+    put(daemon, bytes, sizeof(bytes));
     more(daemon);
 }
 
@@ -239,12 +239,12 @@ static void tell_frame(struct daemon *daemon, uint32_t request, uint32_t number)
                                                        .height = EDGE,
                                                        .samples = 1,
                                                        .layers = 1,
-                                                       .size_bytes = sizeof pixels,
-                                                       .digest = XXH3_64bits(pixels, sizeof pixels)};
+                                                       .size_bytes = sizeof(pixels),
+                                                       .digest = XXH3_64bits(pixels, sizeof(pixels))};
     tell(daemon, request, &message);
     message = (struct message){.type = MESSAGE_FRAME_DATA};
     message.frame_data.data = pixels;
-    message.frame_data.data_bytes = sizeof pixels;
+    message.frame_data.data_bytes = sizeof(pixels);
     tell(daemon, request, &message);
     message = (struct message){.type = MESSAGE_FRAME_END};
     message.frame_end.frame = number;
@@ -305,7 +305,7 @@ TEST(every_frame_of_a_job_comes_once_and_in_order)
     assert_null(start_job(&scene, 0, 1, 1)); /* one at a time */
     for (uint32_t number = 10; number <= 30; number += 4) {
         struct fl_frame *frame = fl_render_next(job, &error);
-        if (frame == NULL)
+        if (!frame)
             fail_msg("frame %u: %s", number, error.text);
         assert_int_equal(frame->frame, number);
         fl_frame_destroy(frame);

@@ -21,7 +21,7 @@ static uint8_t pixels[PIXELS_BYTES];
 static int fill_pixels(void **state)
 {
     (void)state;
-    for (size_t i = 0; i < sizeof pixels; i++)
+    for (size_t i = 0; i < sizeof(pixels); i++)
         pixels[i] = i % 4 == 3 ? 255 : (uint8_t)(i / 64);
     return 0;
 }
@@ -42,7 +42,7 @@ static struct message_frame_begin some_begin(enum protocol_encoding encoding, ui
                                         .layers = 1,
                                         .size_bytes = size_bytes,
                                         .encoding = encoding,
-                                        .digest = XXH3_64bits(pixels, sizeof pixels)};
+                                        .digest = XXH3_64bits(pixels, sizeof(pixels))};
 }
 
 static bool begin(struct fl_assembly *assembly, const struct message_frame_begin *message)
@@ -81,10 +81,10 @@ ALL_TESTS(fill_pixels, NULL)
 
 TEST(a_raw_frame_arrives)
 {
-    struct fl_frame *frame = receive(PROTOCOL_ENCODING_RAW, pixels, sizeof pixels);
+    struct fl_frame *frame = receive(PROTOCOL_ENCODING_RAW, pixels, sizeof(pixels));
     assert_non_null(frame);
     assert_true(frame->digest_checked);
-    assert_memory_equal(frame->pixels, pixels, sizeof pixels);
+    assert_memory_equal(frame->pixels, pixels, sizeof(pixels));
     assert_int_equal(frame->frame, 3);
     assert_int_equal(frame->primary_rays, 960);
     assert_int_equal(frame->stage_count, 1);
@@ -95,12 +95,12 @@ TEST(a_raw_frame_arrives)
 TEST(a_zstd_frame_arrives)
 {
     uint8_t packed[2 * PIXELS_BYTES];
-    const size_t count = ZSTD_compress(packed, sizeof packed, pixels, sizeof pixels, 1);
+    const size_t count = ZSTD_compress(packed, sizeof(packed), pixels, sizeof(pixels), 1);
     assert_false(ZSTD_isError(count));
     struct fl_frame *frame = receive(PROTOCOL_ENCODING_ZSTD, packed, count);
     assert_non_null(frame);
     assert_true(frame->digest_checked);
-    assert_memory_equal(frame->pixels, pixels, sizeof pixels);
+    assert_memory_equal(frame->pixels, pixels, sizeof(pixels));
     fl_frame_destroy(frame);
 }
 
@@ -134,7 +134,7 @@ TEST(a_predicted_frame_arrives_in_every_pixel_format)
         struct fl_frame *frame = end(&assembly);
         assert_non_null(frame);
         assert_true(frame->digest_checked);
-        assert_memory_equal(frame->pixels, pixels, sizeof pixels);
+        assert_memory_equal(frame->pixels, pixels, sizeof(pixels));
         fl_frame_destroy(frame);
         free(packed);
     }
@@ -155,7 +155,7 @@ TEST(a_damaged_predicted_frame_is_refused)
     assert_int_equal(error.code, FL_ERROR_PROTOCOL);
     free(packed);
     uint8_t other[PIXELS_BYTES];
-    memcpy(other, pixels, sizeof other);
+    memcpy(other, pixels, sizeof(other));
     other[77] ^= 1;
     struct picture changed = picture_of(other);
     count = make_predicted(&changed, &packed);
@@ -197,7 +197,7 @@ TEST(what_is_attached_arrives_beside_any_encoding)
     uint8_t normals[PIXELS_BYTES];
     for (size_t i = 0; i < WIDTH * HEIGHT; i++)
         depth[i] = 1.5f + (float)(i % WIDTH) / 7;
-    for (size_t i = 0; i < sizeof normals; i++)
+    for (size_t i = 0; i < sizeof(normals); i++)
         normals[i] = (uint8_t)(i * 3);
     for (unsigned i = 0; i < 4 * PROTOCOL_ENCODING_COUNT; i++) {
         const enum protocol_encoding encoding = (enum protocol_encoding)(i / 4);
@@ -213,14 +213,14 @@ TEST(what_is_attached_arrives_beside_any_encoding)
         assert_int_equal(frame->wire_bytes, count);
         assert_int_equal(frame->depth != NULL, (i & FL_ATTACH_DEPTH) != 0);
         assert_int_equal(frame->normals != NULL, (i & FL_ATTACH_NORMALS) != 0);
-        if (frame->depth != NULL)
-            assert_memory_equal(frame->depth, depth, sizeof depth);
-        if (frame->normals != NULL)
-            assert_memory_equal(frame->normals, normals, sizeof normals);
+        if (frame->depth)
+            assert_memory_equal(frame->depth, depth, sizeof(depth));
+        if (frame->normals)
+            assert_memory_equal(frame->normals, normals, sizeof(normals));
         if (encoding == PROTOCOL_ENCODING_H264)
-            assert_true(frame->encoded_bytes == sizeof pixels && frame->pixels == NULL);
+            assert_true(frame->encoded_bytes == sizeof(pixels) && !frame->pixels);
         else if (encoding != PROTOCOL_ENCODING_JPEG)
-            assert_memory_equal(frame->pixels, pixels, sizeof pixels);
+            assert_memory_equal(frame->pixels, pixels, sizeof(pixels));
         fl_frame_destroy(frame);
         fl_assembly_finish(&assembly);
         free(bytes);
@@ -270,7 +270,7 @@ TEST(a_jpeg_frame_arrives_with_an_opaque_alpha)
     struct fl_frame *frame = receive(PROTOCOL_ENCODING_JPEG, packed, count);
     assert_non_null(frame);
     assert_false(frame->digest_checked);
-    for (size_t i = 3; i < sizeof pixels; i += 4)
+    for (size_t i = 3; i < sizeof(pixels); i += 4)
         assert_int_equal(frame->pixels[i], 255);
     fl_frame_destroy(frame);
     tjFree(packed);
@@ -299,9 +299,9 @@ TEST(a_damaged_jpeg_is_refused)
 TEST(changed_pixels_do_not_pass_the_digest)
 {
     uint8_t changed[PIXELS_BYTES];
-    memcpy(changed, pixels, sizeof changed);
+    memcpy(changed, pixels, sizeof(changed));
     changed[PIXELS_BYTES - 1] ^= 1;
-    assert_null(receive(PROTOCOL_ENCODING_RAW, changed, sizeof changed));
+    assert_null(receive(PROTOCOL_ENCODING_RAW, changed, sizeof(changed)));
     assert_string_equal(error.field, "frame.digest");
 }
 
@@ -309,10 +309,10 @@ TEST(a_zstd_frame_that_unpacks_to_more_or_less_is_refused)
 {
     uint8_t *large = calloc(1, 100 * PIXELS_BYTES), packed[2 * PIXELS_BYTES];
     assert_non_null(large);
-    size_t count = ZSTD_compress(packed, sizeof packed, large, 100 * PIXELS_BYTES, 1);
+    size_t count = ZSTD_compress(packed, sizeof(packed), large, 100 * PIXELS_BYTES, 1);
     assert_null(receive(PROTOCOL_ENCODING_ZSTD, packed, count));
     assert_int_equal(error.code, FL_ERROR_PROTOCOL);
-    count = ZSTD_compress(packed, sizeof packed, large, PIXELS_BYTES - 1, 1);
+    count = ZSTD_compress(packed, sizeof(packed), large, PIXELS_BYTES - 1, 1);
     assert_null(receive(PROTOCOL_ENCODING_ZSTD, packed, count));
     assert_int_equal(error.code, FL_ERROR_PROTOCOL);
     assert_null(receive(PROTOCOL_ENCODING_ZSTD, large, 50));
@@ -361,18 +361,18 @@ TEST(layers_arrive_one_behind_the_other_under_one_digest)
     memcpy(both, pixels, PIXELS_BYTES);
     for (size_t i = 0; i < PIXELS_BYTES; i++)
         both[PIXELS_BYTES + i] = (uint8_t)(pixels[i] ^ 0x5a);
-    const size_t packed_bytes = ZSTD_compress(packed, sizeof packed, both, sizeof both, 1);
+    const size_t packed_bytes = ZSTD_compress(packed, sizeof(packed), both, sizeof(both), 1);
     struct fl_assembly assembly = some_assembly(PROTOCOL_ENCODING_ZSTD);
     struct message_frame_begin message = some_begin(PROTOCOL_ENCODING_ZSTD, packed_bytes);
     assembly.expected.layers = message.layers = 3;
-    message.digest = XXH3_64bits(both, sizeof both);
+    message.digest = XXH3_64bits(both, sizeof(both));
     assert_true(begin(&assembly, &message));
     assert_true(give(&assembly, packed, packed_bytes, 0));
     struct fl_frame *frame = end(&assembly);
     assert_non_null(frame);
     assert_int_equal(frame->layers, 3);
-    assert_int_equal(frame->pixels_bytes, sizeof both);
-    assert_memory_equal(frame->pixels, both, sizeof both);
+    assert_int_equal(frame->pixels_bytes, sizeof(both));
+    assert_memory_equal(frame->pixels, both, sizeof(both));
     assert_true(frame->digest_checked);
     fl_frame_destroy(frame);
 }
@@ -380,7 +380,7 @@ TEST(layers_arrive_one_behind_the_other_under_one_digest)
 TEST(layers_that_were_not_requested_are_refused_before_memory_is_allocated)
 {
     static const unsigned came[] = {2, 3, 127};
-    for (size_t i = 0; i < sizeof came / sizeof came[0]; i++) {
+    for (size_t i = 0; i < sizeof(came) / sizeof(came[0]); i++) {
         struct fl_assembly assembly = some_assembly(PROTOCOL_ENCODING_RAW);
         struct message_frame_begin message =
             some_begin(PROTOCOL_ENCODING_RAW, (uint64_t)__builtin_popcount(came[i]) * PIXELS_BYTES);

@@ -21,7 +21,7 @@ TEST(a_part_is_written_as_k_of_n)
     static const char *const bad[] = {
         "",    "/",    "3",    "3/",   "/8",    "0/8",       "9/8",
         "3/0", "-1/8", "3/8 ", " 3/8", "3/8/1", "1/1000001", "00000000000000000001/8"};
-    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
+    for (size_t i = 0; i < sizeof(bad) / sizeof(bad[0]); i++) {
         if (fl_text_shard(bad[i], &part, &parts, &error))
             fail_msg("'%s' was taken", bad[i]);
         assert_true(error.text[0] != '\0' && error.remedy[0] != '\0');
@@ -36,7 +36,7 @@ TEST(the_parts_of_a_range_are_the_range)
         for (uint32_t last = 7; last < 60; last++)
             for (uint32_t parts = 1; parts <= 9; parts++) {
                 const struct fl_frame_run range = {.first = 7, .last = last, .step = step};
-                memset(seen, 0, sizeof seen);
+                memset(seen, 0, sizeof(seen));
                 for (uint32_t part = 1; part <= parts; part++) {
                     struct fl_frame_run run;
                     if (!fl_frame_run_shard(&range, part, parts, &run)) {
@@ -76,16 +76,16 @@ TEST(missing_frames_are_listed_as_ranges)
         const char *there, *runs;
     } cases[] = {{"", "a-k"},       {"acegik", ""},        {"a", "c-k"},    {"k", "a-i"},
                  {"eg", "a-c i-k"}, {"ci", "a-a e-g k-k"}, {"bdfhj", "a-k"}};
-    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+    for (size_t i = 0; i < sizeof(cases) / sizeof(cases[0]); i++) {
         char told[64] = "";
         char there[16];
         uint32_t count = 0;
         struct fl_frame_set set;
-        snprintf(there, sizeof there, "%s", cases[i].there);
+        snprintf(there, sizeof(there), "%s", cases[i].there);
         assert_true(fl_frame_set_missing(&range, is_there, there, &set, &error));
         for (size_t r = 0; r < set.run_count; r++) {
             const size_t used = strlen(told);
-            snprintf(told + used, sizeof told - used, "%s%c-%c", r > 0 ? " " : "", (char)set.runs[r].first,
+            snprintf(told + used, sizeof(told) - used, "%s%c-%c", r > 0 ? " " : "", (char)set.runs[r].first,
                      (char)set.runs[r].last);
             assert_int_equal(set.runs[r].step, 2);
             count += fl_frame_run_count(&set.runs[r]);
@@ -110,7 +110,7 @@ static const char *size_of(const void *bytes, size_t count)
     close(fd);
     told[0] = '\0';
     if (fl_image_size(path, &width, &height))
-        snprintf(told, sizeof told, "%ux%u", width, height);
+        snprintf(told, sizeof(told), "%ux%u", width, height);
     unlink(path);
     return told;
 }
@@ -129,10 +129,10 @@ static const char hdr[] = "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 3\nxxxx
 
 TEST(image_files_tell_their_size)
 {
-    assert_string_equal(size_of(png, sizeof png - 1), "3x2");
-    assert_string_equal(size_of(jpeg, sizeof jpeg - 1), "3x2");
-    assert_string_equal(size_of(exr, sizeof exr - 1), "3x2");
-    assert_string_equal(size_of(hdr, sizeof hdr - 1), "3x2");
+    assert_string_equal(size_of(png, sizeof(png) - 1), "3x2");
+    assert_string_equal(size_of(jpeg, sizeof(jpeg) - 1), "3x2");
+    assert_string_equal(size_of(exr, sizeof(exr) - 1), "3x2");
+    assert_string_equal(size_of(hdr, sizeof(hdr) - 1), "3x2");
     uint32_t width = 0, height = 0;
     assert_false(fl_image_size("/nonexistent/0001.png", &width, &height));
     assert_false(fl_image_size("/", &width, &height));
@@ -140,11 +140,11 @@ TEST(image_files_tell_their_size)
 
 TEST(files_cut_short_are_not_complete)
 {
-    for (size_t count = 0; count < sizeof png - 1; count++)
+    for (size_t count = 0; count < sizeof(png) - 1; count++)
         assert_string_equal(size_of(png, count), "");
-    for (size_t count = 0; count < sizeof jpeg - 1; count++)
+    for (size_t count = 0; count < sizeof(jpeg) - 1; count++)
         assert_string_equal(size_of(jpeg, count), "");
-    for (size_t count = 0; count < sizeof exr - 1; count++)
+    for (size_t count = 0; count < sizeof(exr) - 1; count++)
         assert_string_equal(size_of(exr, count), "");
 }
 
@@ -154,11 +154,11 @@ TEST(files_of_nonsense_do_no_harm)
     const struct {
         const void *bytes;
         size_t count;
-    } files[] = {{png, sizeof png - 1}, {jpeg, sizeof jpeg - 1}, {exr, sizeof exr - 1}, {hdr, sizeof hdr - 1}};
+    } files[] = {{png, sizeof(png) - 1}, {jpeg, sizeof(jpeg) - 1}, {exr, sizeof(exr) - 1}, {hdr, sizeof(hdr) - 1}};
     static const uint8_t values[] = {0, 1, 0x7f, 0x80, 0xff};
-    for (size_t f = 0; f < sizeof files / sizeof files[0]; f++)
+    for (size_t f = 0; f < sizeof(files) / sizeof(files[0]); f++)
         for (size_t i = 0; i < files[f].count; i++)
-            for (size_t v = 0; v < sizeof values; v++) {
+            for (size_t v = 0; v < sizeof(values); v++) {
                 uint8_t bytes[256];
                 memcpy(bytes, files[f].bytes, files[f].count);
                 bytes[i] = values[v];

@@ -29,11 +29,11 @@ static void write_file(const char *path, const char *text, mode_t mode)
 static int make_folder(void **state)
 {
     (void)state;
-    snprintf(folder, sizeof folder, "%s/farlight-client-XXXXXX", P_tmpdir);
-    if (mkdtemp(folder) == NULL)
+    snprintf(folder, sizeof(folder), "%s/farlight-client-XXXXXX", P_tmpdir);
+    if (!mkdtemp(folder))
         return -1;
-    snprintf(script, sizeof script, "%s/farlight-import", folder);
-    snprintf(model, sizeof model, "%s/-model.obj", folder);
+    snprintf(script, sizeof(script), "%s/farlight-import", folder);
+    snprintf(model, sizeof(model), "%s/-model.obj", folder);
     write_file(model, "v 0 0 0\n", 0600);
     return 0;
 }
@@ -57,7 +57,7 @@ static struct fl_model_info *import_with(const char *text, unsigned timeout_ms)
 
 static void check_error(enum fl_error_code code, const char *part)
 {
-    if (error.code != code || strstr(error.text, part) == NULL)
+    if (error.code != code || !strstr(error.text, part))
         fail_msg("error %d '%s' in place of %d '%s'", (int)error.code, error.text, (int)code, part);
 }
 
@@ -133,12 +133,12 @@ TEST(a_helper_that_is_not_installed_is_named)
 static bool find_exporter(void)
 {
     char self[4096], program[4200];
-    const ssize_t length = readlink("/proc/self/exe", self, sizeof self - 1);
+    const ssize_t length = readlink("/proc/self/exe", self, sizeof(self) - 1);
     assert_true(length > 0);
     self[length] = '\0';
     for (int i = 0; i < 3; i++) /* build/CONFIG/tests/unit/test: the programs are in build/CONFIG */
         *strrchr(self, '/') = '\0';
-    snprintf(program, sizeof program, "%s/farlight-export", self);
+    snprintf(program, sizeof(program), "%s/farlight-export", self);
     setenv("FARLIGHT_LIBEXEC", self, 1);
     return access(program, X_OK) == 0;
 }
@@ -168,7 +168,7 @@ static void check_magic(const char *path, const char *magic, size_t count)
 {
     char found[16] = "";
     FILE *file = fopen(path, "rb");
-    if (file == NULL)
+    if (!file)
         fail_msg("%s is missing", path);
     assert_int_equal(fread(found, 1, count, file), count);
     fclose(file);
@@ -194,10 +194,10 @@ TEST(one_exporter_writes_every_format)
     struct fl_exporter *exporter = fl_exporter_start(&(struct fl_exporter_options){.folder = folder}, &error);
     assert_non_null(exporter);
     uint8_t *pixels = calloc(1, EDGE * EDGE * 16);
-    for (size_t i = 0; i < sizeof files / sizeof files[0]; i++) {
+    for (size_t i = 0; i < sizeof(files) / sizeof(files[0]); i++) {
         char path[128];
         const struct fl_frame frame = some_frame(files[i].format, pixels);
-        snprintf(path, sizeof path, "%s/%s", folder, files[i].name);
+        snprintf(path, sizeof(path), "%s/%s", folder, files[i].name);
         error = (struct fl_error){0};
         if (!fl_exporter_write(exporter, &frame, &(struct fl_export_options){.path = path}, &error) ||
             !fl_exporter_wait(exporter, &error))
@@ -247,11 +247,11 @@ static void read_channels(const char *path, char *text, size_t text_bytes)
     size_t used = 0;
     FILE *file = fopen(path, "rb");
     assert_non_null(file);
-    const size_t count = fread(head, 1, sizeof head, file);
+    const size_t count = fread(head, 1, sizeof(head), file);
     fclose(file);
-    const char *at = memmem(head, count, attribute, sizeof attribute);
+    const char *at = memmem(head, count, attribute, sizeof(attribute));
     assert_non_null(at);
-    for (at += sizeof attribute + 4; at[0] != '\0'; at += strlen(at) + 17) /* type, linear, sampling */
+    for (at += sizeof(attribute) + 4; at[0] != '\0'; at += strlen(at) + 17) /* type, linear, sampling */
         used += (size_t)snprintf(text + used, text_bytes - used, "%s%s:%d", used > 0 ? " " : "", at,
                                  at[strlen(at) + 1]);
 }
@@ -279,8 +279,8 @@ TEST(layers_become_channels_by_name)
     uint8_t *pixels = calloc(PROTOCOL_LAYER_COUNT, EDGE * EDGE * 16);
     struct fl_exporter *exporter = fl_exporter_start(&(struct fl_exporter_options){.folder = folder}, &error);
     assert_non_null(exporter);
-    snprintf(path, sizeof path, "%s/layers.exr", folder);
-    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+    snprintf(path, sizeof(path), "%s/layers.exr", folder);
+    for (size_t i = 0; i < sizeof(cases) / sizeof(cases[0]); i++) {
         struct fl_frame frame = some_frame(PROTOCOL_PIXEL_FORMAT_RGBA32F, pixels);
         frame.layers = cases[i].layers;
         frame.pixels_bytes *= (size_t)__builtin_popcount(frame.layers);
@@ -289,7 +289,7 @@ TEST(layers_become_channels_by_name)
                                &error) ||
             !fl_exporter_wait(exporter, &error))
             fail_msg("%#x: %s", frame.layers, error.text);
-        read_channels(path, found, sizeof found);
+        read_channels(path, found, sizeof(found));
         assert_string_equal(found, cases[i].channels);
         unlink(path);
     }
@@ -313,10 +313,10 @@ TEST(layers_that_a_file_cannot_have_are_refused_and_the_next_picture_is_written)
     uint8_t *pixels = calloc(2, EDGE * EDGE * 16);
     struct fl_exporter *exporter = fl_exporter_start(&(struct fl_exporter_options){.folder = folder}, &error);
     assert_non_null(exporter);
-    for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
+    for (size_t i = 0; i < sizeof(wrong) / sizeof(wrong[0]); i++) {
         char path[128];
         struct fl_frame frame = some_frame(wrong[i].format, pixels);
-        snprintf(path, sizeof path, "%s/%s", folder, wrong[i].name);
+        snprintf(path, sizeof(path), "%s/%s", folder, wrong[i].name);
         frame.layers = LAYER_SET(BEAUTY) | LAYER_SET(ALBEDO);
         frame.pixels_bytes *= 2;
         error = (struct fl_error){0};
@@ -346,9 +346,9 @@ TEST(a_file_that_cannot_be_written_is_named_and_nothing_is_left)
     assert_non_null(exporter);
     uint8_t pixels[EDGE * EDGE * 4] = {0};
     const struct fl_frame frame = some_frame(PROTOCOL_PIXEL_FORMAT_RGBA8, pixels);
-    for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
+    for (size_t i = 0; i < sizeof(wrong) / sizeof(wrong[0]); i++) {
         char path[128];
-        snprintf(path, sizeof path, "%s%s", wrong[i][0] == '%' ? folder : "",
+        snprintf(path, sizeof(path), "%s%s", wrong[i][0] == '%' ? folder : "",
                  wrong[i] + (wrong[i][0] == '%' ? 2 : 0));
         error = (struct fl_error){0};
         assert_true(fl_exporter_write(exporter, &frame, &(struct fl_export_options){.path = path}, &error));
@@ -370,7 +370,7 @@ TEST(a_full_disk_is_reported_and_no_file_is_left)
         skip();
     }
     const size_t before = count_files(folder);
-    snprintf(path, sizeof path, "%s/large.exr", folder);
+    snprintf(path, sizeof(path), "%s/large.exr", folder);
     assert_int_equal(getrlimit(RLIMIT_FSIZE, &saved), 0);
     small = (struct rlimit){.rlim_cur = 4096, .rlim_max = saved.rlim_max};
     setrlimit(RLIMIT_FSIZE, &small); /* inherited by the exporter */

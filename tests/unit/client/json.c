@@ -35,7 +35,7 @@ TEST(places_are_found_line_by_line)
                                "\n"                                              /* 7 */
                                "    {\"x\": 3}], \"b\": 4\n"                     /* 8 */
                                "}\n";
-    assert_true(load(text, sizeof text - 1, 4096));
+    assert_true(load(text, sizeof(text) - 1, 4096));
     const struct fl_json_place a = {.key = "a"}, b = {.outer = &a, .key = "b"}, second = {.outer = &b, .index = 1},
                                third = {.outer = &b, .index = 2}, cd = {.outer = &a, .key = "cd"},
                                e = {.outer = &a, .key = "e"}, f = {.outer = &e, .key = "f"},
@@ -50,9 +50,9 @@ TEST(places_are_found_line_by_line)
         {&third, 3, "a.b[2]"}, {&cd, 3, "a.cd"},       {&e, 4, "a.e"},       {&f, 5, "a.e.f"},
         {&list, 6, "list"},    {&entry, 8, "list[2]"}, {&x, 8, "list[2].x"}, {&outer_b, 8, "b"},
     };
-    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+    for (size_t i = 0; i < sizeof(cases) / sizeof(cases[0]); i++) {
         char path[64];
-        fl_json_path(cases[i].place, path, sizeof path);
+        fl_json_path(cases[i].place, path, sizeof(path));
         assert_string_equal(path, cases[i].path);
         if (fl_json_line(&json, cases[i].place) != cases[i].line)
             fail_msg("%s is said to be in line %u", cases[i].path, fl_json_line(&json, cases[i].place));
@@ -63,7 +63,7 @@ TEST(places_are_found_line_by_line)
 TEST(what_is_missing_has_the_line_of_what_is_around_it)
 {
     static const char text[] = "\n[\n{\"a\": 1},\n{\"b\": []}]";
-    assert_true(load(text, sizeof text - 1, 4096));
+    assert_true(load(text, sizeof(text) - 1, 4096));
     const struct fl_json_place second = {.index = 1}, missing = {.outer = &second, .key = "a"},
                                b = {.outer = &second, .key = "b"}, none = {.outer = &b, .index = 0},
                                fourth = {.index = 3}, below = {.outer = &fourth, .key = "x"},
@@ -73,7 +73,7 @@ TEST(what_is_missing_has_the_line_of_what_is_around_it)
     assert_int_equal(fl_json_line(&json, &below), 2);
     assert_int_equal(fl_json_line(&json, &not_an_object), 2);
     char path[8];
-    fl_json_path(&none, path, sizeof path); /* cut off, but whole in memory */
+    fl_json_path(&none, path, sizeof(path)); /* cut off, but whole in memory */
     assert_string_equal(path, "[1].b[0");
     fl_json_finish(&json);
 }
@@ -81,7 +81,7 @@ TEST(what_is_missing_has_the_line_of_what_is_around_it)
 TEST(invalid_json_is_reported_with_its_line)
 {
     static const char *const bad[] = {"", "{\"a\": 1,\n\"a\": 2}", "{\"a\":\n tru}", "[1]]", "\"\\ud800\""};
-    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
+    for (size_t i = 0; i < sizeof(bad) / sizeof(bad[0]); i++) {
         if (load(bad[i], strlen(bad[i]), 4096))
             fail_msg("'%s' was taken", bad[i]);
         assert_int_equal(error.code, FL_ERROR_FILE);

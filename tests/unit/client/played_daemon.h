@@ -45,7 +45,7 @@ static inline void put_link(struct daemon *daemon)
 {
     size_t count;
     const uint8_t *bytes = sealed_link_waiting(daemon->link, &count);
-    if (bytes != NULL)
+    if (bytes)
         put_plainly(daemon, bytes, count);
     sealed_link_sent(daemon->link, count);
 }
@@ -64,15 +64,15 @@ static inline bool more_sealed(struct daemon *daemon)
     put_link(daemon);
     for (; result == SEALED_CONSUMED; daemon->in_bytes += opened)
         result = sealed_link_open(daemon->link, daemon->in + daemon->in_bytes,
-                                  sizeof daemon->in - daemon->in_bytes, &opened, &why);
+                                  sizeof(daemon->in) - daemon->in_bytes, &opened, &why);
     return got > 0 && result != SEALED_REFUSED && result != SEALED_FATAL;
 }
 
 static inline bool more(struct daemon *daemon)
 {
-    if (daemon->link != NULL)
+    if (daemon->link)
         return more_sealed(daemon);
-    const ssize_t got = recv(daemon->fd, daemon->in + daemon->in_bytes, sizeof daemon->in - daemon->in_bytes, 0);
+    const ssize_t got = recv(daemon->fd, daemon->in + daemon->in_bytes, sizeof(daemon->in) - daemon->in_bytes, 0);
     daemon->in_bytes += got > 0 ? (size_t)got : 0;
     return got > 0;
 }
@@ -86,9 +86,9 @@ static inline void used(struct daemon *daemon, size_t count)
 static inline void put(struct daemon *daemon, const void *bytes, size_t count)
 {
     const uint8_t *next = bytes;
-    if (daemon->link == NULL)
+    if (!daemon->link)
         put_plainly(daemon, bytes, count);
-    for (size_t sealed; daemon->link != NULL && count > 0; next += sealed, count -= sealed) {
+    for (size_t sealed; daemon->link && count > 0; next += sealed, count -= sealed) {
         sealed = sealed_link_seal(daemon->link, next, count);
         put_link(daemon);
     }
@@ -115,7 +115,7 @@ static inline bool take(struct daemon *daemon, struct framing_header *header, st
         if (!more(daemon))
             return false;
     *header = frame.header;
-    scratch_init(&daemon->scratch, daemon->scratch_data, sizeof daemon->scratch_data);
+    scratch_init(&daemon->scratch, daemon->scratch_data, sizeof(daemon->scratch_data));
     const bool good = message_decode(message, frame.header.type, frame.payload, frame.header.payload_bytes,
                                      &daemon->scratch, NULL);
     used(daemon, frame.consumed_bytes);
@@ -132,7 +132,7 @@ static inline size_t pack(uint8_t *bytes, size_t capacity, uint32_t request, con
 static inline void tell(struct daemon *daemon, uint32_t request, const struct message *message)
 {
     static uint8_t bytes[FRAMING_MESSAGE_MAX_BYTES];
-    put(daemon, bytes, pack(bytes, sizeof bytes, request, message));
+    put(daemon, bytes, pack(bytes, sizeof(bytes), request, message));
 }
 
 static inline void *run(void *argument)
@@ -148,17 +148,17 @@ static inline void *run(void *argument)
 
 static inline struct daemon *start(void (*play)(struct daemon *daemon))
 {
-    struct daemon *daemon = calloc(1, sizeof *daemon);
+    struct daemon *daemon = calloc(1, sizeof(*daemon));
     struct sockaddr_un name = {.sun_family = AF_UNIX};
     assert_non_null(daemon);
     daemon->play = play;
-    snprintf(daemon->folder, sizeof daemon->folder, "%s/farlight-client-XXXXXX", P_tmpdir);
+    snprintf(daemon->folder, sizeof(daemon->folder), "%s/farlight-client-XXXXXX", P_tmpdir);
     assert_non_null(mkdtemp(daemon->folder));
-    snprintf(daemon->path, sizeof daemon->path, "%s/socket", daemon->folder);
-    snprintf(daemon->address, sizeof daemon->address, "unix:%s", daemon->path);
+    snprintf(daemon->path, sizeof(daemon->path), "%s/socket", daemon->folder);
+    snprintf(daemon->address, sizeof(daemon->address), "unix:%s", daemon->path);
     strcpy(name.sun_path, daemon->path);
     daemon->listener = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
-    assert_int_equal(bind(daemon->listener, (const struct sockaddr *)&name, sizeof name), 0);
+    assert_int_equal(bind(daemon->listener, (const struct sockaddr *)&name, sizeof(name)), 0);
     assert_int_equal(listen(daemon->listener, 1), 0);
     assert_int_equal(pthread_create(&daemon->thread, NULL, run, daemon), 0);
     return daemon;
@@ -183,7 +183,7 @@ static inline struct fl_connection *connect_to(struct daemon *daemon)
 
 static inline void check_error(enum fl_error_code code, const char *part)
 {
-    if (error.code != code || strstr(error.text, part) == NULL)
+    if (error.code != code || !strstr(error.text, part))
         fail_msg("error %d '%s' in place of %d '%s'", (int)error.code, error.text, (int)code, part);
 }
 

@@ -34,11 +34,11 @@ TEST(an_importer_may_send_blobs_edits_and_its_own_messages_only)
 #define MESSAGE(NAME, name, number, from, doc) MESSAGE_##NAME,
 #include "protocol/messages.def"
     };
-    for (size_t i = 0; i < sizeof all / sizeof all[0]; i++) {
+    for (size_t i = 0; i < sizeof(all) / sizeof(all[0]); i++) {
         enum fl_relay_verdict expected = FL_RELAY_REFUSE;
-        for (size_t j = 0; j < sizeof forwarded / sizeof forwarded[0]; j++)
+        for (size_t j = 0; j < sizeof(forwarded) / sizeof(forwarded[0]); j++)
             expected = forwarded[j] == all[i] ? FL_RELAY_FORWARD : expected;
-        for (size_t j = 0; j < sizeof local / sizeof local[0]; j++)
+        for (size_t j = 0; j < sizeof(local) / sizeof(local[0]); j++)
             expected = local[j] == all[i] ? FL_RELAY_LOCAL : expected;
         struct fl_relay relay = some_relay();
         uint32_t mapped = 0;

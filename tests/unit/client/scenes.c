@@ -74,7 +74,7 @@ static void answer(struct daemon *daemon, uint32_t request, const struct message
     struct message reply;
     switch (message->type) {
     case MESSAGE_SCENE_ATTACH:
-        snprintf(seen.attached, sizeof seen.attached, "%s", message->scene_attach.name);
+        snprintf(seen.attached, sizeof(seen.attached), "%s", message->scene_attach.name);
         seen.scene = message->scene_attach.scene;
         if (strcmp(message->scene_attach.name, "model") == 0)
             tell_ok(daemon, request, 4);
@@ -120,7 +120,7 @@ static void play_scenes(struct daemon *daemon)
 {
     struct framing_header header;
     struct message message;
-    memset(&seen, 0, sizeof seen);
+    memset(&seen, 0, sizeof(seen));
     greet(daemon);
     while (take(daemon, &header, &message))
         answer(daemon, header.request, &message);
@@ -129,7 +129,7 @@ static void play_scenes(struct daemon *daemon)
 static struct fl_scene *attach(struct fl_connection *connection)
 {
     struct fl_scene *scene = connection ? fl_scene_attach(connection, "model", &error) : NULL;
-    if (scene == NULL)
+    if (!scene)
         fail_msg("%s", error.text);
     return scene;
 }

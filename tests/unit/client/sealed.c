@@ -14,7 +14,7 @@ static int make_key(void **state)
 {
     (void)state;
     struct decode_error why = {0};
-    snprintf(key_file, sizeof key_file, "%s/farlight-key-XXXXXX", P_tmpdir);
+    snprintf(key_file, sizeof(key_file), "%s/farlight-key-XXXXXX", P_tmpdir);
     const int fd = mkstemp(key_file);
     assert_true(fd >= 0);
     close(fd);
@@ -56,9 +56,9 @@ static void play_pieces(struct daemon *daemon)
         /* Far more than the library's buffers hold, before the answer. */
         for (uint32_t i = 0; i < PIECES; i++) {
             struct message piece = {.type = MESSAGE_FRAME_DATA};
-            memset(data, (int)i, sizeof data);
+            memset(data, (int)i, sizeof(data));
             piece.frame_data.data = data;
-            piece.frame_data.data_bytes = (uint32_t)sizeof data - 1000 * i;
+            piece.frame_data.data_bytes = (uint32_t)sizeof(data) - 1000 * i;
             tell(daemon, 1000 + i, &piece);
         }
         struct message pong = {.type = MESSAGE_PONG};
@@ -72,7 +72,7 @@ TEST(more_comes_than_the_buffers_hold_and_nothing_is_lost)
 {
     struct daemon *daemon = start(play_pieces);
     struct fl_connection *connection = connect_sealed(daemon);
-    if (connection == NULL)
+    if (!connection)
         fail_msg("%s", error.text);
     struct message ping = {.type = MESSAGE_PING};
     assert_true(fl_connection_send(connection, 7, 0, &ping, &error));
@@ -108,7 +108,7 @@ TEST(the_library_seals_its_end_behind_its_goodbye)
     heard_the_last = false;
     struct daemon *daemon = start(play_until_the_end);
     struct fl_connection *connection = connect_sealed(daemon);
-    if (connection == NULL)
+    if (!connection)
         fail_msg("%s", error.text);
     fl_connection_destroy(connection);
     stop(daemon);
@@ -143,7 +143,7 @@ static void play_refusal(struct daemon *daemon)
     uint8_t bytes[SEALED_REFUSAL_BYTES];
     more(daemon);
     sealed_refuse(bytes, refusal);
-    put(daemon, bytes, sizeof bytes);
+    put(daemon, bytes, sizeof(bytes));
     more(daemon);
 }
 
@@ -227,7 +227,7 @@ static void play_cut(struct daemon *daemon)
     struct message goodbye = {.type = MESSAGE_GOODBYE, .goodbye = {.text = "enough"}};
     static uint8_t plain[HANDSHAKE_REPLY_MAX_BYTES + 200];
     size_t plain_bytes = handshake_reply_encode(plain, &reply), sealed_bytes;
-    plain_bytes += pack(plain + plain_bytes, sizeof plain - plain_bytes, 0, &goodbye);
+    plain_bytes += pack(plain + plain_bytes, sizeof(plain) - plain_bytes, 0, &goodbye);
     seal_with(daemon, &key);
     while (daemon->in_bytes == 0 && more(daemon))
         continue;
@@ -272,7 +272,7 @@ TEST(a_changed_byte_breaks_the_connection)
     struct daemon *daemon = start(play_cut);
     struct fl_connection *connection = connect_sealed(daemon);
     /* The last record is wrong: whether it is looked at before the reply is taken depends on what came at once. */
-    if (connection != NULL) {
+    if (connection) {
         uint64_t ns;
         assert_false(fl_ping(connection, &ns, &error));
     }

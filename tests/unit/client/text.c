@@ -25,7 +25,7 @@ TEST(impossible_sizes_are_refused_and_leave_the_result_alone)
         "",        "x",    "1280",      "1280x",      "x720", "0x5",   "5x0",  "8193x1",
         "1x8193",  "-1x5", "1280x720x", "1280 x 720", "+1x1", "1.5x2", "1x1 ", "99999999999999999999x1",
         "0x10x10", "١x١"};
-    for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
+    for (size_t i = 0; i < sizeof(wrong) / sizeof(wrong[0]); i++) {
         uint32_t width = 7, height = 9;
         error = (struct fl_error){0};
         if (fl_text_size(wrong[i], &width, &height, &error))
@@ -43,7 +43,7 @@ TEST(a_vector_is_three_finite_numbers)
     assert_true(vector[0] == -1 && vector[1] == 2.5f && vector[2] == 1000);
     static const char *const wrong[] = {"",       "1,2",   "1,2,3,4",  "1,2,nan", "inf,0,0", "1,,3", "1,2,3 ",
                                         " 1,2,3", "1;2;3", "1,2,1e40", "0x1,0,0", "1,2,",    ",,",   "1,2,3x"};
-    for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++)
+    for (size_t i = 0; i < sizeof(wrong) / sizeof(wrong[0]); i++)
         if (fl_text_vector(wrong[i], vector, &error))
             fail_msg("'%s' was taken as %g,%g,%g", wrong[i], (double)vector[0], (double)vector[1],
                      (double)vector[2]);
@@ -81,7 +81,7 @@ TEST(a_range_of_frames_is_read)
     static const char *const wrong[] = {
         "",     "-",    "1-",         "-5",      "5-1", "1-5:", "1:2",  "1-5:0",
         "1-5x", "1--5", "1-10000001", "1-5:2:1", "a-b", " 1-5", "1 -5", "4294967296"};
-    for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++)
+    for (size_t i = 0; i < sizeof(wrong) / sizeof(wrong[0]); i++)
         if (fl_text_range(wrong[i], &first, &last, &step, &error))
             fail_msg("'%s' was taken as %u-%u:%u", wrong[i], first, last, step);
     assert_true(first == 42 && last == 42 && step == 1);
@@ -94,7 +94,7 @@ static void check_path(const char *text, uint32_t frame, const char *expected)
     error = (struct fl_error){0};
     if (!fl_pattern_parse(text, &pattern, &error))
         fail_msg("'%s' was refused: %s", text, error.text);
-    assert_true(fl_pattern_path(&pattern, frame, path, sizeof path));
+    assert_true(fl_pattern_path(&pattern, frame, path, sizeof(path)));
     assert_string_equal(path, expected);
 }
 
@@ -114,7 +114,7 @@ TEST(what_printf_would_make_of_a_pattern_is_refused)
                                         "%d/a.png",  "%-4d.png", "%ld.png", "%*d",       "%1$d.png",
                                         "%x.png",    "%05i.png", "%%.png",  "%%04d.png", ""};
     struct fl_pattern pattern;
-    for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
+    for (size_t i = 0; i < sizeof(wrong) / sizeof(wrong[0]); i++) {
         error = (struct fl_error){0};
         if (fl_pattern_parse(wrong[i], &pattern, &error))
             fail_msg("'%s' was taken", wrong[i]);
@@ -126,7 +126,7 @@ TEST(a_pattern_that_is_too_long_is_refused)
 {
     static char text[9000];
     struct fl_pattern pattern;
-    memset(text, 'a', sizeof text - 1);
+    memset(text, 'a', sizeof(text) - 1);
     memcpy(text, "%d", 2);
     assert_false(fl_pattern_parse(text, &pattern, &error));
     memset(text, 'a', 8000);
@@ -135,22 +135,22 @@ TEST(a_pattern_that_is_too_long_is_refused)
     strcpy(text, "abc%04d.png");
     char path[10];
     assert_true(fl_pattern_parse(text, &pattern, &error));
-    assert_false(fl_pattern_path(&pattern, 1, path, sizeof path));
+    assert_false(fl_pattern_path(&pattern, 1, path, sizeof(path)));
 }
 
 TEST(names_are_made_utf8_without_cutting_a_character)
 {
     char out[9];
-    fl_text_utf8("plain", out, sizeof out);
+    fl_text_utf8("plain", out, sizeof(out));
     assert_string_equal(out, "plain");
-    fl_text_utf8("a\xff\xc3(\x80", out, sizeof out);
+    fl_text_utf8("a\xff\xc3(\x80", out, sizeof(out));
     assert_string_equal(out, "a?"
                              "?(?");
-    fl_text_utf8("1234567\xc3\xa4", out, sizeof out);
+    fl_text_utf8("1234567\xc3\xa4", out, sizeof(out));
     assert_string_equal(out, "1234567");
-    fl_text_utf8("\xed\xa0\x80\xf4\x90\x80\x80", out, sizeof out);
+    fl_text_utf8("\xed\xa0\x80\xf4\x90\x80\x80", out, sizeof(out));
     assert_string_equal(out, "???????");
-    fl_text_utf8("\xe2\x82", out, sizeof out);
+    fl_text_utf8("\xe2\x82", out, sizeof(out));
     assert_string_equal(out, "?"
                              "?");
 }
@@ -160,7 +160,7 @@ TEST(an_error_never_carries_an_escape_sequence)
     char line[64];
     fl_error_set(&error, FL_ERROR_FILE, "a\033[2Jb", "bad\nthing");
     fl_error_remedy(&error, "do\tthis");
-    fl_error_print(&error, line, sizeof line);
+    fl_error_print(&error, line, sizeof(line));
     assert_string_equal(line, "a?[2Jb: bad?thing (do?this)");
     fl_error_print(&error, line, 8);
     assert_string_equal(line, "a?[2Jb:");

@@ -21,12 +21,12 @@ static char folder[64], video_path[96];
 static bool find_writer(void)
 {
     char self[4096], program[4200];
-    const ssize_t length = readlink("/proc/self/exe", self, sizeof self - 1);
+    const ssize_t length = readlink("/proc/self/exe", self, sizeof(self) - 1);
     assert_true(length > 0);
     self[length] = '\0';
     for (int i = 0; i < 3; i++) /* build/CONFIG/tests/unit/test: the programs are in build/CONFIG */
         *strrchr(self, '/') = '\0';
-    snprintf(program, sizeof program, "%s/farlight-video", self);
+    snprintf(program, sizeof(program), "%s/farlight-video", self);
     setenv("FARLIGHT_LIBEXEC", self, 1);
     return access(program, X_OK) == 0;
 }
@@ -46,8 +46,8 @@ static void need(bool reader)
 static int make_folder(void **state)
 {
     (void)state;
-    snprintf(folder, sizeof folder, "%s/farlight-video-XXXXXX", P_tmpdir);
-    return mkdtemp(folder) == NULL ? -1 : 0;
+    snprintf(folder, sizeof(folder), "%s/farlight-video-XXXXXX", P_tmpdir);
+    return !mkdtemp(folder) ? -1 : 0;
 }
 
 static int remove_folder(void **state)
@@ -69,7 +69,7 @@ static size_t count_files(void)
 
 static const char *path_of(const char *name)
 {
-    snprintf(video_path, sizeof video_path, "%s/%s", folder, name);
+    snprintf(video_path, sizeof(video_path), "%s/%s", folder, name);
     return video_path;
 }
 
@@ -78,7 +78,7 @@ static const char *path_of(const char *name)
 /* Squares of 32 pixels; with the frame's number they move on. */
 static const uint8_t colours[][3] = {{255, 0, 0}, {0, 255, 0},     {0, 0, 255},    {255, 255, 255},
                                      {0, 0, 0},   {128, 128, 128}, {200, 120, 40}, {20, 90, 160}};
-#define COLOURS (sizeof colours / sizeof colours[0])
+#define COLOURS (sizeof(colours) / sizeof(colours[0]))
 #define SQUARE 32u
 
 static const uint8_t *colour_at(uint32_t frame, uint32_t x, uint32_t y)
@@ -116,7 +116,7 @@ static void write_video(const struct fl_video_options *options, uint32_t count, 
 {
     error = (struct fl_error){0};
     struct fl_video *video = fl_video_start(options, &error);
-    if (video == NULL)
+    if (!video)
         fail_msg("%s: %s", error.field, error.text);
     write_frames(video, count, width, height);
     if (!fl_video_finish(video, &error))
@@ -150,26 +150,26 @@ static void probe(const char *path)
 {
     char command[512];
     uint8_t *bytes;
-    snprintf(command, sizeof command,
+    snprintf(command, sizeof(command),
              "ffprobe -v error -count_frames -show_streams -show_format -of default=noprint_wrappers=1 '%s'",
              path);
     const size_t count = output_of(command, &bytes);
-    snprintf(probe_text, sizeof probe_text, "\n%.*s", (int)count, (const char *)bytes);
+    snprintf(probe_text, sizeof(probe_text), "\n%.*s", (int)count, (const char *)bytes);
     free(bytes);
 }
 
 static void expect(const char *line)
 {
     char wanted[128];
-    snprintf(wanted, sizeof wanted, "\n%s\n", line);
-    if (strstr(probe_text, wanted) == NULL)
+    snprintf(wanted, sizeof(wanted), "\n%s\n", line);
+    if (!strstr(probe_text, wanted))
         fail_msg("'%s' is not in:%s", line, probe_text);
 }
 
 static size_t decode(const char *path, const char *format, uint8_t **bytes)
 {
     char command[512];
-    snprintf(command, sizeof command, "ffmpeg -v error -i '%s' -f rawvideo -pix_fmt %s -", path, format);
+    snprintf(command, sizeof(command), "ffmpeg -v error -i '%s' -f rawvideo -pix_fmt %s -", path, format);
     return output_of(command, bytes);
 }
 
@@ -197,7 +197,7 @@ TEST(an_mp4_holds_every_frame_in_its_colours_and_says_what_it_is)
                                        "nb_read_frames=12",
                                        "avg_frame_rate=24000/1001",
                                        "sample_aspect_ratio=1:1"};
-    for (size_t i = 0; i < sizeof said / sizeof said[0]; i++)
+    for (size_t i = 0; i < sizeof(said) / sizeof(said[0]); i++)
         expect(said[i]);
     uint8_t *decoded;
     const size_t frame_bytes = (size_t)width * height * 3 / 2;
@@ -232,7 +232,7 @@ static const uint8_t *find_bytes(const uint8_t *bytes, size_t count, const char 
 static size_t read_file(const char *path, uint8_t **bytes)
 {
     char command[160];
-    snprintf(command, sizeof command, "cat '%s'", path);
+    snprintf(command, sizeof(command), "cat '%s'", path);
     return output_of(command, bytes);
 }
 
@@ -258,7 +258,7 @@ TEST(the_same_frames_make_the_same_file)
                                                     {.format = "mkv", .lossless = true},
                                                     {.format = "mp4", .codec = "mpeg4"}};
     need(false);
-    for (size_t i = 0; i < sizeof kinds / sizeof kinds[0]; i++) {
+    for (size_t i = 0; i < sizeof(kinds) / sizeof(kinds[0]); i++) {
         uint8_t *bytes[2];
         size_t counts[2];
         for (int run = 0; run < 2; run++) {
@@ -280,7 +280,7 @@ TEST(a_lossless_video_gives_every_pixel_back)
     static const uint32_t sizes[][2] = {{96, 64}, {65, 67}, {1, 1}, {2, 300}, {200, 2}, {7, 300}};
     uint32_t noise = 1;
     need(true);
-    for (size_t i = 0; i < sizeof sizes / sizeof sizes[0]; i++) {
+    for (size_t i = 0; i < sizeof(sizes) / sizeof(sizes[0]); i++) {
         const uint32_t width = sizes[i][0], height = sizes[i][1];
         struct ycbcr_converter converter;
         struct fl_video *video =
@@ -412,15 +412,15 @@ TEST(an_unwritable_output_is_reported_before_the_first_frame)
         {"a.mp4", {.quality = 52}, "not within 0 .. 51", "", "quality"},
         {"\xff.mp4", {0}, "no UTF-8", "", "path"}};
     need(false);
-    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+    for (size_t i = 0; i < sizeof(rows) / sizeof(rows[0]); i++) {
         struct fl_video_options options = rows[i].options;
         options.path = path_of(rows[i].name);
         error = (struct fl_error){0};
-        if (fl_video_start(&options, &error) != NULL)
+        if (fl_video_start(&options, &error))
             fail_msg("%s was begun", video_path);
-        assert_int_equal(error.code, rows[i].field == NULL ? FL_ERROR_FILE : FL_ERROR_ARGUMENT);
-        assert_string_equal(error.field, rows[i].field == NULL ? video_path : rows[i].field);
-        if (strstr(error.text, rows[i].text) == NULL || strstr(error.remedy, rows[i].remedy) == NULL)
+        assert_int_equal(error.code, !rows[i].field ? FL_ERROR_FILE : FL_ERROR_ARGUMENT);
+        assert_string_equal(error.field, !rows[i].field ? video_path : rows[i].field);
+        if (!strstr(error.text, rows[i].text) || !strstr(error.remedy, rows[i].remedy))
             fail_msg("%s: %s (%s)", error.field, error.text, error.remedy);
         assert_int_equal(count_files(), 0);
     }
@@ -453,7 +453,7 @@ TEST(a_frame_that_does_not_fit_ends_the_video_and_nothing_is_left)
                  "H.264 cannot encode pictures of 8192x4368",
                  "smaller"}};
     need(false);
-    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+    for (size_t i = 0; i < sizeof(rows) / sizeof(rows[0]); i++) {
         struct fl_video *video = fl_video_start(&(struct fl_video_options){.path = path_of("a.mp4")}, &error);
         assert_non_null(video);
         if (rows[i].first[0] > 0)
@@ -468,7 +468,7 @@ TEST(a_frame_that_does_not_fit_ends_the_video_and_nothing_is_left)
         assert_true(fl_video_write(video, &frame, &error));
         assert_false(fl_video_finish(video, &error));
         assert_int_equal(error.code, FL_ERROR_FILE);
-        if (strstr(error.text, rows[i].text) == NULL || strstr(error.remedy, rows[i].remedy) == NULL)
+        if (!strstr(error.text, rows[i].text) || !strstr(error.remedy, rows[i].remedy))
             fail_msg("%s: %s (%s)", error.field, error.text, error.remedy);
         assert_int_equal(count_files(), 0);
         assert_false(fl_video_write(video, &frame, &error));
@@ -515,9 +515,9 @@ static pid_t find_child(void)
 {
     char path[64];
     int child = 0;
-    snprintf(path, sizeof path, "/proc/self/task/%d/children", (int)getpid());
+    snprintf(path, sizeof(path), "/proc/self/task/%d/children", (int)getpid());
     FILE *file = fopen(path, "r");
-    if (file != NULL) {
+    if (file) {
         if (fscanf(file, "%d", &child) != 1)
             child = 0;
         fclose(file);
@@ -606,7 +606,7 @@ TEST(an_interrupted_video_can_be_finished_with_the_frames_so_far)
     assert_false(fl_video_write(video, &frame, &error));
     assert_int_equal(error.code, FL_ERROR_ARGUMENT);
     char line[64];
-    snprintf(line, sizeof line, "nb_read_frames=%u", fl_video_info(video)->frames);
+    snprintf(line, sizeof(line), "nb_read_frames=%u", fl_video_info(video)->frames);
     fl_video_destroy(video);
     probe(video_path);
     expect(line);
@@ -675,7 +675,7 @@ static void expect_answer(struct fl_helper *writer, enum message_type type, cons
         fail_msg("%s", error.text);
     if (message.type != type)
         fail_msg("%s in place of %s", message_type_text(message.type), message_type_text(type));
-    if (type == MESSAGE_ERROR && strstr(message.error.text, text) == NULL)
+    if (type == MESSAGE_ERROR && !strstr(message.error.text, text))
         fail_msg("'%s' in place of '%s'", message.error.text, text);
     assert_true(type != MESSAGE_ERROR || message.error.field[0] != '\0');
 }
@@ -725,7 +725,7 @@ TEST(nothing_can_be_written_outside_the_folder)
     struct fl_helper writer;
     char path[96];
     need(false);
-    snprintf(path, sizeof path, "%s.mkv", folder);
+    snprintf(path, sizeof(path), "%s.mkv", folder);
     start_writer(&writer);
     send_begin(&writer, path);
     expect_answer(&writer, MESSAGE_ERROR, "Permission denied");
@@ -776,8 +776,8 @@ TEST(a_client_that_breaks_the_protocol_is_left_with_a_line_and_no_file)
         }
         error = (struct fl_error){0};
         assert_false(fl_helper_receive(&writer, &message, &error));
-        if (strstr(error.text, "farlight-video ended with status 1") == NULL ||
-            strstr(error.text, "is not allowed here") == NULL)
+        if (!strstr(error.text, "farlight-video ended with status 1") ||
+            !strstr(error.text, "is not allowed here"))
             fail_msg("%d: %s", kind, error.text);
         fl_helper_finish(&writer);
         assert_int_equal(count_files(), 0);

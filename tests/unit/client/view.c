@@ -446,7 +446,7 @@ static void expect_broken(const struct message_frame_begin *frame, unsigned coun
     struct viewing viewing;
     struct fl_view *view = begin_view(&viewing, play_wrong);
     struct fl_frame *whole = NULL;
-    while ((whole = fl_view_next(view, 10000, &error)) != NULL)
+    while ((whole = fl_view_next(view, 10000, &error)))
         fl_frame_destroy(whole);
     check_error(FL_ERROR_PROTOCOL, part);
     assert_false(fl_view_look(view, &some_camera, NULL, &error));

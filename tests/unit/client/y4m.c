@@ -143,7 +143,7 @@ static void half_chroma_at(const uint8_t *pixels, uint32_t size[2], uint32_t x, 
 TEST(half_chroma_is_filtered_and_odd_pictures_repeat_their_edges)
 {
     static uint32_t sizes[][2] = {{1, 1}, {2, 2}, {3, 5}, {5, 3}, {16, 9}, {17, 8}, {1, 7}, {7, 1}};
-    for (size_t i = 0; i < sizeof sizes / sizeof sizes[0]; i++) {
+    for (size_t i = 0; i < sizeof(sizes) / sizeof(sizes[0]); i++) {
         uint32_t *size = sizes[i];
         uint8_t *pixels = noise_pixels(size[0], size[1], true), y[1024], cb[256], cr[256];
         const uint32_t even[2] = {(size[0] + 1) & ~1u, (size[1] + 1) & ~1u};
@@ -191,7 +191,7 @@ TEST(frame_rates_are_the_fractions_that_are_meant)
                 {14.985f, 2997, 200},
                 {1000, 1000, 1},
                 {0.001f, 1, 1000}};
-    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+    for (size_t i = 0; i < sizeof(rows) / sizeof(rows[0]); i++) {
         uint32_t numerator, denominator;
         fl_rate_exact(rows[i].rate, &numerator, &denominator);
         if (numerator != rows[i].numerator || denominator != rows[i].denominator)
@@ -232,8 +232,8 @@ TEST(a_stream_is_a_header_and_frames_of_planes)
         float rate;
         enum fl_y4m_chroma chroma;
         unsigned frames;
-    } rows[] = {{wanted_444, sizeof wanted_444 - 1, 29.97f, FL_Y4M_444, 2},
-                {wanted_420, sizeof wanted_420 - 1, 0, FL_Y4M_420, 1}};
+    } rows[] = {{wanted_444, sizeof(wanted_444) - 1, 29.97f, FL_Y4M_444, 2},
+                {wanted_420, sizeof(wanted_420) - 1, 0, FL_Y4M_420, 1}};
     for (size_t i = 0; i < 2; i++) {
         FILE *file = tmpfile();
         assert_non_null(file);
@@ -245,7 +245,7 @@ TEST(a_stream_is_a_header_and_frames_of_planes)
         for (unsigned n = 0; n < rows[i].frames; n++)
             assert_true(fl_y4m_write(y4m, &frame, &error));
         fl_y4m_end(y4m);
-        assert_int_equal(read_file(file, found, sizeof found), rows[i].count);
+        assert_int_equal(read_file(file, found, sizeof(found)), rows[i].count);
         assert_memory_equal(found, rows[i].bytes, rows[i].count);
         fclose(file);
     }
@@ -260,25 +260,25 @@ TEST(frames_that_do_not_fit_are_refused_and_write_nothing)
     assert_non_null(y4m);
     struct fl_frame frame = frame_of(pixels, 4, 4);
     frame.format = PROTOCOL_PIXEL_FORMAT_RGBA32F;
-    frame.pixels_bytes = sizeof pixels;
+    frame.pixels_bytes = sizeof(pixels);
     assert_false(fl_y4m_write(y4m, &frame, &error));
     assert_string_equal(error.field, "format");
     assert_non_null(strstr(error.remedy, "rgba8"));
     static const uint32_t wrong[][2] = {{0, 4}, {4, 0}, {4, 5}, {8193, 1}, {0xffffffff, 1}};
-    for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
+    for (size_t i = 0; i < sizeof(wrong) / sizeof(wrong[0]); i++) {
         frame = frame_of(pixels, wrong[i][0], wrong[i][1]);
         frame.pixels_bytes = i < 2 ? 0 : 64;
         assert_false(fl_y4m_write(y4m, &frame, &error));
         assert_string_equal(error.field, "size");
     }
-    assert_int_equal(read_file(file, found, sizeof found), 0);
+    assert_int_equal(read_file(file, found, sizeof(found)), 0);
     frame = frame_of(pixels, 4, 4);
     assert_true(fl_y4m_write(y4m, &frame, &error));
-    const size_t count = read_file(file, found, sizeof found);
+    const size_t count = read_file(file, found, sizeof(found));
     frame = frame_of(pixels, 2, 8);
     assert_false(fl_y4m_write(y4m, &frame, &error));
     assert_non_null(strstr(error.text, "2x8 pixels, but the video has 4x4"));
-    assert_int_equal(read_file(file, found, sizeof found), count);
+    assert_int_equal(read_file(file, found, sizeof(found)), count);
     fl_y4m_end(y4m);
     fclose(file);
 }
@@ -358,10 +358,10 @@ TEST(ffmpeg_reads_the_stream_from_a_pipe)
     }
     for (int half = 0; half < 2; half++) {
         char path[64], command[256];
-        snprintf(path, sizeof path, "%s/farlight-y4m-XXXXXX", P_tmpdir);
+        snprintf(path, sizeof(path), "%s/farlight-y4m-XXXXXX", P_tmpdir);
         const int out = mkstemp(path);
         assert_true(out >= 0);
-        snprintf(command, sizeof command, "ffmpeg -v error -i - -f rawvideo -pix_fmt %s -y %s",
+        snprintf(command, sizeof(command), "ffmpeg -v error -i - -f rawvideo -pix_fmt %s -y %s",
                  half ? "yuv420p" : "yuv444p", path);
         FILE *pipe = popen(command, "w");
         assert_non_null(pipe);
@@ -390,7 +390,7 @@ TEST(ffmpeg_reads_the_stream_from_a_pipe)
         ycbcr_convert(&converter, pixels, &planes);
         ycbcr_converter_finish(&converter);
         const size_t frame_bytes = luma + 2 * chroma;
-        assert_int_equal(read(out, found, sizeof found), count * frame_bytes);
+        assert_int_equal(read(out, found, sizeof(found)), count * frame_bytes);
         for (uint32_t n = 0; n < count; n++)
             assert_memory_equal(found + n * frame_bytes, planes_memory, frame_bytes);
         free(pixels);

@@ -152,9 +152,9 @@ TEST(predicted_leaves_what_the_rule_says)
         10, 20, (uint8_t)-5, 40, 10, (uint8_t)(200 - 55), 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 2, 255, 0, 0, 0, 0, 0};
     struct picture picture = {.width = 3, .height = 2, .bytes_per_pixel = 4, .pixels = pixels};
     size_t bytes;
-    uint8_t planes[sizeof pixels], *out = encode(ENCODING_PREDICTED, &picture, 1, &bytes);
-    assert_int_equal(ZSTD_decompress(planes, sizeof planes, out, bytes), sizeof planes);
-    assert_memory_equal(planes, left, sizeof left);
+    uint8_t planes[sizeof(pixels)], *out = encode(ENCODING_PREDICTED, &picture, 1, &bytes);
+    assert_int_equal(ZSTD_decompress(planes, sizeof(planes), out, bytes), sizeof(planes));
+    assert_memory_equal(planes, left, sizeof(left));
     free(out);
 }
 

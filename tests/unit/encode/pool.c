@@ -17,7 +17,7 @@ static void on_done(void *context)
 /* Of one grey that tells its number; the pool's. */
 static struct engine_frame *new_frame(enum encoding encoding, uint32_t number)
 {
-    struct engine_frame *frame = calloc(1, sizeof *frame);
+    struct engine_frame *frame = calloc(1, sizeof(*frame));
     assert_non_null(frame);
     frame->frame = number;
     frame->encoding = encoding;
@@ -142,9 +142,9 @@ TEST(what_is_attached_lies_behind_the_picture)
             assert_int_equal(picture_bytes, plane_bytes);
         const uint8_t *behind = frame->bytes + picture_bytes, magic[] = {0x28, 0xb5, 0x2f, 0xfd}; /* Zstandard's */
         if (frame->depth_bytes)
-            assert_memory_equal(behind, magic, sizeof magic);
+            assert_memory_equal(behind, magic, sizeof(magic));
         if (frame->normal_bytes)
-            assert_memory_equal(behind + frame->depth_bytes, magic, sizeof magic);
+            assert_memory_equal(behind + frame->depth_bytes, magic, sizeof(magic));
         engine_event_destroy(event);
     }
     end(&fixture);

@@ -147,7 +147,7 @@ TEST(a_key_frame_comes_when_it_is_asked_for_and_stands_alone)
         assert_int_equal(key, i == 0 || i == 7);
         /* Annex B: a start code first. */
         const uint8_t start_code[] = {0, 0, 0, 1};
-        assert_memory_equal(out.bytes, start_code, sizeof start_code);
+        assert_memory_equal(out.bytes, start_code, sizeof(start_code));
         assert_true(play(&player, out.bytes, out.size_bytes));
         if (i >= 7) { /* nothing before has been seen here: the parameter sets are in it */
             assert_true(play(&late, out.bytes, out.size_bytes));
@@ -259,7 +259,7 @@ static double quality_of_first(const struct picture *picture, const uint8_t *pix
 TEST(planes_are_shown_as_the_pixels_that_they_were_made_of)
 {
     static const uint32_t sizes[][2] = {{WIDTH, HEIGHT}, {181, 97}, {2, 1}, {33, 16}};
-    for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++) {
+    for (size_t i = 0; i < sizeof(sizes) / sizeof(*sizes); i++) {
         const uint32_t width = sizes[i][0], height = sizes[i][1];
         uint8_t *pixels = new_pixels(width, height);
         draw(pixels, width, height, 0);

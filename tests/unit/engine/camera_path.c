@@ -199,7 +199,7 @@ TEST(keys_that_span_no_view_are_errors)
     struct error error = {0};
     assert_false(shot_check(&job, scene, &error));
     assert_string_equal(error.field, "render.keys[1].time_s");
-    memcpy(keys[0].look_at_world, keys[0].eye_world, sizeof keys[0].eye_world);
+    memcpy(keys[0].look_at_world, keys[0].eye_world, sizeof(keys[0].eye_world));
     job.key_count = 1;
     error = (struct error){0};
     assert_false(shot_check(&job, scene, &error));
@@ -280,7 +280,7 @@ TEST(an_orbit_without_a_key_keeps_the_distance_of_the_automatic_camera)
     job.orbit_turn = 1;
     job.orbit_seconds = 1;
     struct frame_camera first = camera_at(&still, scene, 0), camera = camera_at(&job, scene, 0);
-    assert_memory_equal(&first, &camera, sizeof first);
+    assert_memory_equal(&first, &camera, sizeof(first));
     float start[3], eye[3];
     eye_of(&first, start);
     for (uint32_t frame = 5; frame < 50; frame += 5) {
@@ -321,8 +321,8 @@ TEST(a_camera_node_gives_its_place_without_its_scale_or_mirror)
     edits[0].set.camera = (struct scene_camera){.base.id = 4, .fov_y = 0.9f, .near = 0.25f};
     edits[1].set.node = (struct scene_node){.base.id = 1};
     edits[2].set.node = (struct scene_node){.base.id = 2, .parent = 1, .kind = NODE_CAMERA, .object = 4};
-    memcpy(edits[1].set.node.parent_from_node, parent, sizeof parent);
-    memcpy(edits[2].set.node.parent_from_node, child, sizeof child);
+    memcpy(edits[1].set.node.parent_from_node, parent, sizeof(parent));
+    memcpy(edits[2].set.node.parent_from_node, child, sizeof(child));
     struct error error = {0};
     if (!scene_commit(scene, edits, 3, &error))
         fail_msg("%s", error.text);

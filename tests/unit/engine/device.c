@@ -106,7 +106,7 @@ static int stop(void **state)
 
 static void submit(struct engine_command made)
 {
-    struct engine_command *command = malloc(sizeof *command);
+    struct engine_command *command = malloc(sizeof(*command));
     assert_non_null(command);
     *command = made;
     struct error error = {0};
@@ -140,26 +140,26 @@ static void make_scene(uint64_t client, float radius)
     static const float square[12] = {-1, 0, -1, 1, 0, -1, 1, 0, 1, -1, 0, 1},
                        identity[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
     static const uint32_t indices[6] = {0, 2, 1, 0, 3, 2};
-    struct scene_edit *edits = calloc(5, sizeof *edits);
+    struct scene_edit *edits = calloc(5, sizeof(*edits));
     assert_non_null(edits);
     for (int i = 0; i < 5; i++)
         edits[i].object = i < 2 ? OBJECT_NODE : i == 2 ? OBJECT_MESH : i == 3 ? OBJECT_SPHERES : OBJECT_MATERIAL;
     for (int i = 0; i < 2; i++) {
         struct scene_node *node = &edits[i].set.node;
         *node = (struct scene_node){.base.id = (uint32_t)i + 1, .kind = i ? NODE_SPHERES : NODE_MESH, .object = 1};
-        memcpy(node->parent_from_node, identity, sizeof identity);
+        memcpy(node->parent_from_node, identity, sizeof(identity));
     }
     struct scene_mesh *mesh = &edits[2].set.mesh;
     *mesh = (struct scene_mesh){.base.id = 1, .vertex_count = 4, .triangle_count = 2};
-    mesh->arrays[MESH_POSITIONS] = blob_create(sizeof square);
-    memcpy(mesh->arrays[MESH_POSITIONS]->data, square, sizeof square);
-    mesh->arrays[MESH_INDICES] = blob_create(sizeof indices);
-    memcpy(mesh->arrays[MESH_INDICES]->data, indices, sizeof indices);
+    mesh->arrays[MESH_POSITIONS] = blob_create(sizeof(square));
+    memcpy(mesh->arrays[MESH_POSITIONS]->data, square, sizeof(square));
+    mesh->arrays[MESH_INDICES] = blob_create(sizeof(indices));
+    memcpy(mesh->arrays[MESH_INDICES]->data, indices, sizeof(indices));
     struct scene_spheres *spheres = &edits[3].set.spheres;
     *spheres = (struct scene_spheres){.base.id = 1, .sphere_count = 1, .range_count = 1};
     spheres->centres_radii = blob_create(16);
     memcpy(spheres->centres_radii->data, (const float[]){0, radius, 0, radius}, 16);
-    spheres->ranges = calloc(1, sizeof *spheres->ranges);
+    spheres->ranges = calloc(1, sizeof(*spheres->ranges));
     *spheres->ranges = (struct material_range){0, 1, 1};
     edits[4].set.material = (struct scene_material){
         .base.id = 1, .base_colour = {1, 1, 1, 1}, .emission = {0.2f, 0.9f, 0.4f}, .roughness = 1, .ior = 1.5f};
@@ -235,7 +235,7 @@ TEST(clients_that_take_turns_get_the_frames_they_would_get_alone)
     submit_job(1, 4, TRACER_BVH);
     submit_job(2, 4, TRACER_BVH);
     collect(together, 2);
-    assert_memory_equal(alone, together, sizeof alone);
+    assert_memory_equal(alone, together, sizeof(alone));
     /* They are pictures of something: each frame and each scene has its own. */
     for (int i = 0; i < FRAMES; i++) {
         assert_true(alone[0][i] != alone[1][i]);
@@ -299,7 +299,7 @@ TEST(jobs_switch_tracers_on_one_scene_while_both_run)
     submit_job(3, 5, TRACER_BVH);
     submit_job(3, 6, TRACER_LDC);
     collect_jobs(together, 5, 2, &cubes, &built);
-    assert_memory_equal(alone, together, sizeof alone);
+    assert_memory_equal(alone, together, sizeof(alone));
     assert_int_equal(cubes, FRAMES);
     assert_int_equal(built, 0); /* it was kept beside the other tracer's tree */
     for (int i = 0; i < FRAMES; i++)
@@ -318,7 +318,7 @@ TEST(jobs_switch_tracers_on_one_scene_while_both_run)
 /* A view that refines one picture, frame by frame. */
 static void submit_view(uint64_t client, uint32_t request, uint32_t view)
 {
-    struct camera_key *key = malloc(sizeof *key);
+    struct camera_key *key = malloc(sizeof(*key));
     assert_non_null(key);
     *key = (struct camera_key){.eye_world = {2.0f - (float)view, 1.5f, 3.0f},
                                .look_at_world = {0, 0.3f, 0},
@@ -427,7 +427,7 @@ static struct engine_command picture(uint32_t request, struct camera_key *key)
                           .seed = 5,
                           .accumulate = true},
                 .path = CAMERA_KEYS,
-                .keys = malloc(sizeof *key),
+                .keys = malloc(sizeof(*key)),
                 .key_count = 1,
                 .credit = 1000,
             },
@@ -478,7 +478,7 @@ TEST(views_beside_each_other_come_to_the_pictures_of_single_frames)
             assert_true(frame->digest != expected[event->request - 20]);
         engine_event_destroy(event);
     }
-    assert_memory_equal(seen, expected, sizeof seen);
+    assert_memory_equal(seen, expected, sizeof(seen));
     submit((struct engine_command){.kind = ENGINE_CLIENT_GONE, .client = 1});
     struct engine_event *event = next_event();
     assert_int_equal(event->kind, ENGINE_CLIENT_FORGOTTEN);
@@ -526,7 +526,7 @@ TEST(frames_go_on_after_a_lost_context_and_are_the_same)
     }
     expect_done();
     assert_int_equal(atomic_load(&resets), 0); /* it was told */
-    assert_memory_equal(before[0], after[0], sizeof before[0]);
+    assert_memory_equal(before[0], after[0], sizeof(before[0]));
     /* Pictures that are refined, too: what was held is made again. */
     struct view_frame alone[VIEWS][FRAMES], healed[VIEWS][FRAMES];
     submit_view(7, 5, 0);
@@ -550,7 +550,7 @@ enum { FIELD_ALONG = 600, FIELD_TRIANGLES = 2 * FIELD_ALONG * FIELD_ALONG };
 static void make_field(uint64_t client)
 {
     make_scene(client, 0.5f);
-    struct scene_edit *edits = calloc(1, sizeof *edits);
+    struct scene_edit *edits = calloc(1, sizeof(*edits));
     assert_non_null(edits);
     edits[0].object = OBJECT_MESH;
     struct scene_mesh *mesh = &edits[0].set.mesh;
@@ -558,7 +558,7 @@ static void make_field(uint64_t client)
         .base.id = 1, .vertex_count = 3 * FIELD_TRIANGLES, .triangle_count = FIELD_TRIANGLES, .range_count = 1};
     mesh->arrays[MESH_POSITIONS] = blob_create((size_t)FIELD_TRIANGLES * 9 * sizeof(float));
     mesh->arrays[MESH_INDICES] = blob_create((size_t)FIELD_TRIANGLES * 3 * sizeof(uint32_t));
-    mesh->ranges = calloc(1, sizeof *mesh->ranges);
+    mesh->ranges = calloc(1, sizeof(*mesh->ranges));
     assert_true(mesh->arrays[MESH_POSITIONS] && mesh->arrays[MESH_INDICES] && mesh->ranges);
     *mesh->ranges = (struct material_range){0, FIELD_TRIANGLES, 1};
     float *positions = (float *)(void *)mesh->arrays[MESH_POSITIONS]->data;
@@ -686,7 +686,7 @@ TEST(what_comes_while_a_structure_is_built_leaves_it_right)
     watch(false);
     submit_picture(1, 14);
     wait_until_held();
-    struct scene_edit *edit = calloc(1, sizeof *edit);
+    struct scene_edit *edit = calloc(1, sizeof(*edit));
     assert_non_null(edit);
     *edit = (struct scene_edit){.kind = EDIT_REMOVE, .object = OBJECT_NODE, .id = 1};
     submit((struct engine_command){

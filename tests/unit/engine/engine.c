@@ -55,16 +55,16 @@ TEST(layers_are_encoded_as_one_picture)
         struct engine_event *event = expect_frame(engine, 1, 2 + encoding, 0);
         const struct engine_frame *got = event->frame;
         uint8_t pixels[4 * 3 * 16 * 3];
-        memset(pixels, (int)encoding, sizeof pixels); /* the fake's frames count up */
+        memset(pixels, (int)encoding, sizeof(pixels)); /* the fake's frames count up */
         assert_int_equal(got->result.layers, layers);
-        assert_true(got->digest == XXH3_64bits(pixels, sizeof pixels));
+        assert_true(got->digest == XXH3_64bits(pixels, sizeof(pixels)));
         if (encoding == ENCODING_RAW) {
-            assert_int_equal(got->size_bytes, sizeof pixels);
-            assert_memory_equal(got->bytes, pixels, sizeof pixels);
+            assert_int_equal(got->size_bytes, sizeof(pixels));
+            assert_memory_equal(got->bytes, pixels, sizeof(pixels));
         } else {
-            uint8_t back[sizeof pixels + 1];
-            assert_int_equal(ZSTD_decompress(back, sizeof back, got->bytes, got->size_bytes), sizeof pixels);
-            assert_memory_equal(back, pixels, sizeof pixels);
+            uint8_t back[sizeof(pixels) + 1];
+            assert_int_equal(ZSTD_decompress(back, sizeof(back), got->bytes, got->size_bytes), sizeof(pixels));
+            assert_memory_equal(back, pixels, sizeof(pixels));
         }
         engine_event_destroy(event);
         expect_done(engine, 1, 2 + encoding);
@@ -259,7 +259,7 @@ TEST(a_refused_commit_names_its_field)
     struct engine *engine = start((struct engine_options){0});
     open_scene(engine, 1, 1);
     struct engine_command *made = command(ENGINE_COMMIT, 1, 2);
-    made->edits = calloc(1, sizeof *made->edits);
+    made->edits = calloc(1, sizeof(*made->edits));
     made->edit_count = 1;
     made->edits[0].set.node.base.id = 3;
     made->edits[0].set.node.parent = 9;

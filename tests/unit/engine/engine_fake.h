@@ -79,7 +79,7 @@ static inline struct gpu_device *fake_device_create(const struct gpu_options *op
         error_set(error, ERROR_UNSUPPORTED, "device", "there is none");
         return NULL;
     }
-    struct gpu_device *device = calloc(1, sizeof *device);
+    struct gpu_device *device = calloc(1, sizeof(*device));
     assert_non_null(device);
     strcpy(device->info.name, "fake");
     device->facts.memory_bytes = 1000;
@@ -100,7 +100,7 @@ static inline struct frame_scene *fake_scene_create(struct gpu_device *device, s
     (void)error;
     assert_non_null(device);
     atomic_fetch_add(&fake.scenes, 1);
-    struct frame_scene *shared = calloc(1, sizeof *shared);
+    struct frame_scene *shared = calloc(1, sizeof(*shared));
     assert_non_null(shared);
     return shared;
 }
@@ -127,7 +127,7 @@ static inline struct frame_renderer *fake_renderer_create(struct frame_scene *sh
     shared->users++;
     atomic_fetch_add(&fake.renderers_made, 1);
     atomic_fetch_add(&fake.renderers, 1);
-    struct frame_renderer *renderer = calloc(1, sizeof *renderer);
+    struct frame_renderer *renderer = calloc(1, sizeof(*renderer));
     assert_non_null(renderer);
     renderer->shared = shared;
     return renderer;
@@ -166,14 +166,15 @@ static inline uint64_t fake_motion_digest(const struct scene_motion *motion)
         const struct scene_pose *pose = &motion->poses[i];
         for (uint32_t k = 0; k < pose->node_count; k++) {
             const struct pose_node *node = &pose->nodes[k];
-            digest = XXH3_64bits_withSeed(node->parent_from_node, sizeof node->parent_from_node,
+            digest = XXH3_64bits_withSeed(node->parent_from_node, sizeof(node->parent_from_node),
                                           digest + node->node * 2 + node->hidden);
         }
-        digest = XXH3_64bits_withSeed(pose->weights, pose->weight_count * sizeof *pose->weights, digest);
+        digest = XXH3_64bits_withSeed(pose->weights, pose->weight_count * sizeof(*pose->weights), digest);
         for (uint32_t k = 0; k < pose->light_count; k++)
-            digest = XXH3_64bits_withSeed(pose->lights[k].colour, sizeof pose->lights[k].colour, digest);
+            digest = XXH3_64bits_withSeed(pose->lights[k].colour, sizeof(pose->lights[k].colour), digest);
         for (uint32_t k = 0; k < pose->material_count; k++)
-            digest = XXH3_64bits_withSeed(pose->materials[k].emission, sizeof pose->materials[k].emission, digest);
+            digest =
+                XXH3_64bits_withSeed(pose->materials[k].emission, sizeof(pose->materials[k].emission), digest);
     }
     return digest;
 }
@@ -347,7 +348,7 @@ static inline void stop(struct engine *engine)
 
 static inline struct engine_command *command(enum engine_command_kind kind, uint64_t client, uint32_t request)
 {
-    struct engine_command *made = calloc(1, sizeof *made);
+    struct engine_command *made = calloc(1, sizeof(*made));
     assert_non_null(made);
     made->kind = kind;
     made->client = client;
@@ -474,7 +475,7 @@ static inline struct engine_command *commit_of_nodes(uint64_t client, uint32_t r
 {
     struct engine_command *made = command(ENGINE_COMMIT, client, request);
     made->scene = scene;
-    made->edits = calloc(count, sizeof *made->edits);
+    made->edits = calloc(count, sizeof(*made->edits));
     assert_non_null(made->edits);
     made->edit_count = count;
     for (uint32_t i = 0; i < count; i++) {

@@ -296,12 +296,12 @@ TEST(stats_add_up)
     struct engine_command *made = command(ENGINE_COMMIT, 1, 5);
     static const float sphere[4] = {0, 0, 0, 1};
     made->scene = 2;
-    made->edits = calloc(2, sizeof *made->edits);
+    made->edits = calloc(2, sizeof(*made->edits));
     made->edit_count = 2;
     made->edits[0].object = OBJECT_SPHERES;
     made->edits[0].set.spheres =
-        (struct scene_spheres){.base.id = 7, .sphere_count = 1, .centres_radii = blob_create(sizeof sphere)};
-    memcpy(made->edits[0].set.spheres.centres_radii->data, sphere, sizeof sphere);
+        (struct scene_spheres){.base.id = 7, .sphere_count = 1, .centres_radii = blob_create(sizeof(sphere))};
+    memcpy(made->edits[0].set.spheres.centres_radii->data, sphere, sizeof(sphere));
     made->edits[1].set.node = (struct scene_node){
         .base.id = 2, .kind = NODE_SPHERES, .object = 7, .parent_from_node = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}};
     submit(engine, made);

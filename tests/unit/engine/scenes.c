@@ -180,7 +180,7 @@ TEST(a_commit_notifies_all_other_clients)
     expect_changed(engine, 2, 8, 1);
     struct engine_command *wrong = command(ENGINE_COMMIT, 1, 10);
     wrong->scene = 5;
-    wrong->edits = calloc(1, sizeof *wrong->edits);
+    wrong->edits = calloc(1, sizeof(*wrong->edits));
     wrong->edit_count = 1;
     wrong->edits[0].set.node.base.id = 3;
     wrong->edits[0].set.node.parent = 9;
@@ -494,7 +494,7 @@ static void leave_spheres(struct engine *engine, uint64_t client, const char *na
     open_as(engine, client, 1, name, SHARING_SHARED);
     struct engine_command *made = command(ENGINE_COMMIT, client, 2);
     made->scene = 1;
-    made->edits = malloc(sizeof *made->edits);
+    made->edits = malloc(sizeof(*made->edits));
     assert_non_null(made->edits);
     *made->edits = list.edits[0];
     made->edit_count = 1;
@@ -578,9 +578,9 @@ TEST(stats_have_each_scene_once)
 static void submit_edits(struct engine *engine, uint32_t request, const struct draft_list *list)
 {
     struct engine_command *made = command(ENGINE_COMMIT, 1, request);
-    made->edits = malloc(list->count * sizeof *made->edits);
+    made->edits = malloc(list->count * sizeof(*made->edits));
     assert_non_null(made->edits);
-    memcpy(made->edits, list->edits, list->count * sizeof *made->edits);
+    memcpy(made->edits, list->edits, list->count * sizeof(*made->edits));
     made->edit_count = list->count;
     submit(engine, made);
     expect_done(engine, 1, request);
@@ -689,7 +689,7 @@ TEST(what_a_left_scene_uses_stays)
     submit_edits(engine, 2, &list);
     client_goes(engine, 1);
     assert_int_equal(atomic_load(&blob->references), 2);
-    submit_trim(engine, 1, sizeof sphere);
+    submit_trim(engine, 1, sizeof(sphere));
     expect_ended(engine);
     assert_int_equal(atomic_load(&blob->references), 1);
     blob_unref(blob);

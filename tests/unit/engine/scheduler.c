@@ -127,7 +127,7 @@ TEST(weights_divide_the_time_between_clients)
     /* A batch that is given the same weight has the same share, and the greatest weight sixteen times that of the
      * least. */
     size_t great = add(&simulation, 2, 16, 5 * MS), same = add(&simulation, 3, 4, 5 * MS);
-    memset(simulation.had_ns, 0, sizeof simulation.had_ns);
+    memset(simulation.had_ns, 0, sizeof(simulation.had_ns));
     serve_for(&simulation, 25000 * MS);
     expect_had(&simulation, view, 4000 * MS);
     expect_had(&simulation, batch, 1000 * MS);
@@ -152,14 +152,14 @@ TEST(a_job_that_returns_after_a_pause_has_no_claim_on_missed_time)
     simulation.entries[paused].ready = false;
     serve_for(&simulation, 5000 * MS);
     simulation.entries[paused].ready = true;
-    memset(simulation.had_ns, 0, sizeof simulation.had_ns);
+    memset(simulation.had_ns, 0, sizeof(simulation.had_ns));
     assert_int_equal(serve(&simulation), paused); /* it is next at once */
     serve_for(&simulation, 195 * MS);
     expect_had(&simulation, there, 100 * MS);
     expect_had(&simulation, paused, 100 * MS);
     /* So it is for one that was never seen, and for a job among others of its client. */
     size_t late = add(&simulation, 2, 1, 5 * MS), second = add(&simulation, 0, 1, 5 * MS);
-    memset(simulation.had_ns, 0, sizeof simulation.had_ns);
+    memset(simulation.had_ns, 0, sizeof(simulation.had_ns));
     serve_for(&simulation, 300 * MS);
     expect_had(&simulation, late, 100 * MS);
     expect_had(&simulation, paused, 100 * MS);
@@ -177,7 +177,7 @@ TEST(a_client_whose_job_has_ended_has_no_claim_either)
     serve_for(&simulation, 3000 * MS);
     simulation.shares[job] = (struct schedule_share){0}; /* another one of that client */
     simulation.count++;
-    memset(simulation.had_ns, 0, sizeof simulation.had_ns);
+    memset(simulation.had_ns, 0, sizeof(simulation.had_ns));
     serve_for(&simulation, 200 * MS);
     expect_had(&simulation, 0, 100 * MS);
     expect_had(&simulation, job, 100 * MS);
@@ -193,7 +193,7 @@ TEST(pauses_of_all_do_not_make_the_first_to_come_the_owner)
     size_t second = add(&simulation, 1, 1, 5 * MS);
     assert_int_equal(serve(&simulation), second);
     simulation.entries[first].ready = true;
-    memset(simulation.had_ns, 0, sizeof simulation.had_ns);
+    memset(simulation.had_ns, 0, sizeof(simulation.had_ns));
     serve_for(&simulation, 200 * MS);
     expect_had(&simulation, first, 100 * MS);
     expect_had(&simulation, second, 100 * MS);
@@ -287,8 +287,8 @@ TEST(a_very_long_slice_is_not_paid_for_without_end)
     while (serve(&simulation) != first)
         continue;
     simulation.slice_ns[first] = 5 * MS;
-    memset(simulation.longest_wait_ns, 0, sizeof simulation.longest_wait_ns);
-    memset(simulation.waited_ns, 0, sizeof simulation.waited_ns);
+    memset(simulation.longest_wait_ns, 0, sizeof(simulation.longest_wait_ns));
+    memset(simulation.waited_ns, 0, sizeof(simulation.waited_ns));
     serve_for(&simulation, 10000 * MS);
     /* Of so many, two turns of each; and one round, as the others were not alike far either. */
     uint64_t turn_ns = SCHEDULE_TURN_NS + JOBS_MAX * (uint64_t)SCHEDULE_TURN_EACH_NS;
@@ -306,8 +306,8 @@ TEST(a_slice_that_the_machine_interrupts_costs_no_turns)
     while (serve(&simulation) != 7)
         continue;
     simulation.slice_ns[7] = MS / 4;
-    memset(simulation.longest_wait_ns, 0, sizeof simulation.longest_wait_ns);
-    memset(simulation.waited_ns, 0, sizeof simulation.waited_ns);
+    memset(simulation.longest_wait_ns, 0, sizeof(simulation.longest_wait_ns));
+    memset(simulation.waited_ns, 0, sizeof(simulation.waited_ns));
     serve_for(&simulation, 1000 * MS);
     assert_true(simulation.longest_wait_ns[7] <= JOBS_MAX * (SCHEDULE_OUTLIER_MIN_NS + MS / 4));
 }

@@ -76,7 +76,7 @@ TEST(there_are_as_many_poses_as_the_fastest_turn_needs)
         uint32_t alone, together;
     } cases[] = {{4, 2, 2},  {9, 2, 3},  {11, 3, 5},  {19, 3, 5},  {21, 5, 9},
                  {39, 5, 9}, {41, 9, 9}, {360, 9, 9}, {1440, 9, 9}};
-    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+    for (size_t i = 0; i < sizeof(cases) / sizeof(cases[0]); i++) {
         struct scene *scene = turning_scene(cases[i].degrees);
         uint32_t alone = pose_count(scene, 1, 0, 1), together = pose_count(scene, 2, 0, 1);
         if (alone != cases[i].alone || together != cases[i].together)
@@ -255,8 +255,8 @@ TEST(an_automatic_camera_shows_the_pose_at_time_0_in_all_frames)
     for (uint32_t frame = 0; frame < 20; frame += 3) {
         struct shot fresh = shot_at(&job, scene, frame), kept;
         assert_true(shot_make(&kept, &job, scene, frame, &bounds, NULL));
-        assert_memory_equal(&fresh.request.camera, &expected, sizeof expected);
-        assert_memory_equal(&kept.request.camera, &expected, sizeof expected);
+        assert_memory_equal(&fresh.request.camera, &expected, sizeof(expected));
+        assert_memory_equal(&kept.request.camera, &expected, sizeof(expected));
         shot_finish(&fresh);
         shot_finish(&kept);
     }
@@ -265,7 +265,7 @@ TEST(an_automatic_camera_shows_the_pose_at_time_0_in_all_frames)
     expect_commit(scene, &list);
     struct shot kept;
     assert_true(shot_make(&kept, &job, scene, 0, &bounds, NULL));
-    assert_memory_not_equal(&kept.request.camera, &expected, sizeof expected);
+    assert_memory_not_equal(&kept.request.camera, &expected, sizeof(expected));
     shot_finish(&kept);
     scene_destroy(scene);
 }
@@ -338,7 +338,7 @@ TEST(a_view_through_a_camera_of_the_scene_shows_what_a_job_along_it_does)
         struct view_camera from = {.command = 1, .key = home, .node = 3};
         from.key.time_s = expected.time_s;
         assert_true(shot_look(&look, &watched, scene, &from, NULL, NULL));
-        assert_memory_equal(&look.request.camera, &expected.request.camera, sizeof look.request.camera);
+        assert_memory_equal(&look.request.camera, &expected.request.camera, sizeof(look.request.camera));
         assert_true(look.request.focus == expected.request.focus);
         shot_finish(&expected);
         shot_finish(&look);
@@ -376,9 +376,9 @@ static void commit_turning(struct engine *engine)
     struct engine_command *made = command(ENGINE_COMMIT, 1, 2);
     struct draft_list list = {0};
     add_turning(&list, 120);
-    made->edits = calloc(list.count, sizeof *made->edits);
+    made->edits = calloc(list.count, sizeof(*made->edits));
     assert_non_null(made->edits);
-    memcpy(made->edits, list.edits, list.count * sizeof *made->edits);
+    memcpy(made->edits, list.edits, list.count * sizeof(*made->edits));
     made->edit_count = list.count;
     submit(engine, made);
     expect_done(engine, 1, 2);
@@ -392,7 +392,7 @@ static void run_range(struct engine *engine, uint32_t request, uint32_t first, u
     made->job.shutter = 0.5f;
     made->job.frame.aperture = 0.25f;
     made->job.clip_count = 2;
-    made->job.clips = calloc(2, sizeof *made->job.clips);
+    made->job.clips = calloc(2, sizeof(*made->job.clips));
     assert_non_null(made->job.clips);
     made->job.clips[0] = (struct clip_use){.clip = 1, .speed = 1.5f, .loop = true};
     made->job.clips[1] = (struct clip_use){.clip = 2, .speed = 1, .start_s = 0.25f};
@@ -413,7 +413,7 @@ static void expect_same(const struct record *whole, const struct record *part, u
     assert_true(part->seen);
     if (whole->motion != part->motion || whole->poses != part->poses)
         fail_msg("frame %u shows another motion", frame);
-    assert_memory_equal(a->camera.world_from_view, b->camera.world_from_view, sizeof a->camera.world_from_view);
+    assert_memory_equal(a->camera.world_from_view, b->camera.world_from_view, sizeof(a->camera.world_from_view));
     assert_true(a->camera.fov_y == b->camera.fov_y && a->aperture == b->aperture && a->focus == b->focus);
     assert_true(a->seed == b->seed && a->exposure_stops == b->exposure_stops);
     assert_true(whole->time_s == part->time_s && whole->shutter_s == part->shutter_s);
@@ -447,13 +447,13 @@ TEST(a_clip_that_goes_ends_the_job_and_says_which)
     commit_turning(engine);
     struct engine_command *made = gated(render(1, 10, 0, 9));
     made->job.clip_count = 1;
-    made->job.clips = calloc(1, sizeof *made->job.clips);
+    made->job.clips = calloc(1, sizeof(*made->job.clips));
     assert_non_null(made->job.clips);
     made->job.clips[0] = (struct clip_use){.clip = 2, .speed = 1};
     submit(engine, made);
     wait_until(&fake.frames_begun, 1);
     struct engine_command *removal = command(ENGINE_COMMIT, 1, 11);
-    removal->edits = calloc(1, sizeof *removal->edits);
+    removal->edits = calloc(1, sizeof(*removal->edits));
     assert_non_null(removal->edits);
     removal->edits[0] = (struct scene_edit){.kind = EDIT_REMOVE, .object = OBJECT_CLIP, .id = 2};
     removal->edit_count = 1;

@@ -18,7 +18,7 @@ struct watching {
 
 static int begin_with(void **state, struct engine_options options)
 {
-    struct watching *watching = calloc(1, sizeof *watching);
+    struct watching *watching = calloc(1, sizeof(*watching));
     assert_non_null(watching);
     *state = watching;
     watching->engine = start(options);
@@ -556,7 +556,7 @@ TEST(a_camera_that_spans_no_view_ends_it)
     submit(watching->engine, with_samples(view(2, watching->wishes), 1, 1));
     expect_picture(watching, 2, 0, 0, 1, ENCODING_RAW);
     struct view_camera nowhere = camera(1, true);
-    memcpy(nowhere.key.look_at_world, nowhere.key.eye_world, sizeof nowhere.key.eye_world);
+    memcpy(nowhere.key.look_at_world, nowhere.key.eye_world, sizeof(nowhere.key.eye_world));
     assert_true(view_wishes_look(watching->wishes, &nowhere));
     submit(watching->engine, command(ENGINE_VIEW_LOOK, 1, 0));
     expect_failed(watching->engine, 1, 2, ERROR_INVALID, "view_camera.up_world");
@@ -598,7 +598,7 @@ TEST_WITH(a_frame_is_begun_so_that_it_comes_when_the_encoder_is_free, NULL, NULL
     assert_int_equal(view_due_ns(&job), 7 * MS);
     uint64_t position = job_output_reserve(job.output);
     struct engine_event *event = event_create(ENGINE_FRAME, 1, 1);
-    event->frame = calloc(1, sizeof *event->frame);
+    event->frame = calloc(1, sizeof(*event->frame));
     stage_times_begin(&event->frame->result.times);
     stage_times_add(&event->frame->result.times, STAGE_ENCODE, CLOCK_CPU, 0, 0, 5 * MS);
     job_output_put(job.output, position, event);

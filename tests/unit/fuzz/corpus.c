@@ -31,7 +31,7 @@ static uint8_t *read_file(const char *path, size_t *size_bytes)
 static void run(const char *name, fuzz_one_fn *one)
 {
     char path[512];
-    snprintf(path, sizeof path, "tests/fuzz/corpus/%s", name);
+    snprintf(path, sizeof(path), "tests/fuzz/corpus/%s", name);
     DIR *folder = opendir(path);
     if (!folder)
         fail_msg("%s is not there: the working folder is to be that of the sources", path);
@@ -39,7 +39,7 @@ static void run(const char *name, fuzz_one_fn *one)
     for (struct dirent *entry; (entry = readdir(folder));) {
         if (entry->d_name[0] == '.')
             continue;
-        snprintf(path, sizeof path, "tests/fuzz/corpus/%s/%s", name, entry->d_name);
+        snprintf(path, sizeof(path), "tests/fuzz/corpus/%s/%s", name, entry->d_name);
         size_t size_bytes;
         uint8_t *data = read_file(path, &size_bytes);
         one(data, size_bytes); /* which stops the program where a rule is broken */

@@ -23,14 +23,14 @@ struct mesh {
 static uint32_t add_vertex(struct mesh *mesh, float x, float y, float z)
 {
     assert_true(mesh->vertex_count < 128);
-    memcpy(mesh->positions[mesh->vertex_count], (float[3]){x, y, z}, sizeof mesh->positions[0]);
+    memcpy(mesh->positions[mesh->vertex_count], (float[3]){x, y, z}, sizeof(mesh->positions[0]));
     return mesh->vertex_count++;
 }
 
 static void add_triangle(struct mesh *mesh, uint32_t a, uint32_t b, uint32_t c)
 {
     assert_true(mesh->triangle_count < 128);
-    memcpy(mesh->indices[mesh->triangle_count++], (uint32_t[3]){a, b, c}, sizeof mesh->indices[0]);
+    memcpy(mesh->indices[mesh->triangle_count++], (uint32_t[3]){a, b, c}, sizeof(mesh->indices[0]));
 }
 
 static void add_cube(struct mesh *mesh, float x, float size)
@@ -62,7 +62,7 @@ TEST(a_cube_is_closed_and_open_without_any_of_its_triangles)
     for (uint32_t missing = 0; missing < CUBE_TRIANGLES; missing++) {
         struct mesh mesh = whole;
         mesh.triangle_count--;
-        memcpy(mesh.indices[missing], mesh.indices[mesh.triangle_count], sizeof mesh.indices[0]);
+        memcpy(mesh.indices[missing], mesh.indices[mesh.triangle_count], sizeof(mesh.indices[0]));
         assert_false(closed(&mesh));
     }
 }
@@ -213,22 +213,22 @@ TEST(a_million_triangles_are_looked_at)
 {
     enum { STEPS = 720, EACH = STEPS + 1 };
     const uint32_t triangle_count = 2 * STEPS * STEPS;
-    float(*positions)[3] = malloc(sizeof *positions * EACH * EACH);
-    uint32_t(*indices)[3] = malloc(sizeof *indices * triangle_count), (*out)[3] = indices;
+    float(*positions)[3] = malloc(sizeof(*positions) * EACH * EACH);
+    uint32_t(*indices)[3] = malloc(sizeof(*indices) * triangle_count), (*out)[3] = indices;
     assert_true(positions && indices);
     for (uint32_t i = 0; i < EACH * EACH; i++) {
         const float u = 6.2831853f * (float)(i % EACH % STEPS) / STEPS;
         const float v = 6.2831853f * (float)(i / EACH % STEPS) / STEPS, across = 3 + cosf(v);
-        memcpy(positions[i], (float[3]){across * cosf(u), sinf(v), across * sinf(u)}, sizeof *positions);
+        memcpy(positions[i], (float[3]){across * cosf(u), sinf(v), across * sinf(u)}, sizeof(*positions));
     }
     for (uint32_t i = 0; i < STEPS * STEPS; i++) {
         const uint32_t a = i / STEPS * EACH + i % STEPS, b = a + EACH;
-        memcpy(*out++, (uint32_t[3]){a, a + 1, b}, sizeof *out);
-        memcpy(*out++, (uint32_t[3]){a + 1, b + 1, b}, sizeof *out);
+        memcpy(*out++, (uint32_t[3]){a, a + 1, b}, sizeof(*out));
+        memcpy(*out++, (uint32_t[3]){a + 1, b + 1, b}, sizeof(*out));
     }
     assert_true(import_triangles_closed(positions[0], indices[0], triangle_count));
     assert_false(import_triangles_closed(positions[0], indices[0], triangle_count - 1));
-    memcpy(indices[1234], indices[77777], sizeof *indices);
+    memcpy(indices[1234], indices[77777], sizeof(*indices));
     assert_false(import_triangles_closed(positions[0], indices[0], triangle_count));
     free(positions);
     free(indices);

@@ -23,10 +23,10 @@ static int make_folder(void **state)
 {
     (void)state;
     const char *base = getenv("TMPDIR");
-    snprintf(folder, sizeof folder, "%.40s/farlight-XXXXXX", base ? base : P_tmpdir);
+    snprintf(folder, sizeof(folder), "%.40s/farlight-XXXXXX", base ? base : P_tmpdir);
     assert_non_null(mkdtemp(folder));
-    snprintf(path, sizeof path, "%s/key", folder);
-    snprintf(other_path, sizeof other_path, "%s/other", folder);
+    snprintf(path, sizeof(path), "%s/key", folder);
+    snprintf(other_path, sizeof(other_path), "%s/other", folder);
     return 0;
 }
 
@@ -42,7 +42,7 @@ static int remove_folder(void **state)
 static void write_file(const char *name, size_t bytes, mode_t mode)
 {
     char data[100];
-    memset(data, 7, sizeof data);
+    memset(data, 7, sizeof(data));
     unlink(name);
     int fd = open(name, O_WRONLY | O_CREAT | O_EXCL, 0600);
     assert_true(fd >= 0);
@@ -66,14 +66,14 @@ TEST_WITH(a_key_is_made_for_its_owner_alone_and_never_over_another, make_folder,
     assert_false(sealed_key_create(path, &error));
     assert_non_null(strstr(error.text, "left alone"));
     assert_true(sealed_key_read(&again, path, &error));
-    assert_memory_equal(&key, &again, sizeof key);
+    assert_memory_equal(&key, &again, sizeof(key));
     /* Nor through a link that leads nowhere yet. */
     assert_int_equal(symlink("/nowhere/key", other_path), 0);
     assert_false(sealed_key_create(other_path, &error));
     unlink(other_path);
     assert_true(sealed_key_create(other_path, &error));
     assert_true(sealed_key_read(&again, other_path, &error));
-    assert_memory_not_equal(&key, &again, sizeof key);
+    assert_memory_not_equal(&key, &again, sizeof(key));
 }
 
 TEST_WITH(what_is_no_key_file_is_refused_by_its_reason, make_folder, remove_folder)
@@ -89,14 +89,14 @@ TEST_WITH(what_is_no_key_file_is_refused_by_its_reason, make_folder, remove_fold
         {33, 0600, PROTOCOL_ERROR_INVALID, "33 bytes"}, {0, 0600, PROTOCOL_ERROR_INVALID, "0 bytes"},
     };
     struct sealed_key key, none = {0};
-    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+    for (size_t i = 0; i < sizeof(cases) / sizeof(cases[0]); i++) {
         struct decode_error error = {0};
         write_file(path, cases[i].bytes, cases[i].mode);
         assert_false(sealed_key_read(&key, path, &error));
         assert_int_equal(error.code, cases[i].code);
         assert_string_equal(error.field, path);
         assert_non_null(strstr(error.text, cases[i].what));
-        assert_memory_equal(&key, &none, sizeof key);
+        assert_memory_equal(&key, &none, sizeof(key));
     }
     struct decode_error error = {0};
     write_file(path, 32, 0400);
@@ -174,7 +174,7 @@ TEST(only_connections_within_loopback_need_no_key)
         {"tcp:10.0.0.1:1", "tcp:10.0.0.1:2", true},
         {"tcp:127.0.0.1:1", "tcp:10.0.0.7:2", true},
     };
-    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+    for (size_t i = 0; i < sizeof(cases) / sizeof(cases[0]); i++) {
         struct address own = parsed(cases[i].own), peer = parsed(cases[i].peer);
         assert_int_equal(auth_is_beyond_loopback(&own, &peer), cases[i].beyond);
     }
@@ -217,7 +217,7 @@ TEST(networks_are_what_one_holder_has)
         {"tcp:[2001:db8:1:2::7]:1", "tcp:[2001:db8:1:3::7]:1", false},
         {"tcp:10.0.0.7:1", "unix:/a", false},
     };
-    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+    for (size_t i = 0; i < sizeof(cases) / sizeof(cases[0]); i++) {
         struct address a = parsed(cases[i].a), b = parsed(cases[i].b);
         if ((address_network(&a) == address_network(&b)) != cases[i].same)
             fail_msg("%s and %s", cases[i].a, cases[i].b);
@@ -231,7 +231,7 @@ TEST(networks_are_what_one_holder_has)
 TEST(wrong_keys_are_limited_per_minute)
 {
     static struct attempts attempts;
-    memset(&attempts, 0, sizeof attempts);
+    memset(&attempts, 0, sizeof(attempts));
     for (uint64_t second = 1; second <= 5; second++) {
         assert_true(attempts_are_allowed(&attempts, 77, 5, second * SECOND_NS));
         attempts_add_failed(&attempts, 77, second * SECOND_NS);
@@ -249,7 +249,7 @@ TEST(wrong_keys_are_limited_per_minute)
 TEST(of_too_many_networks_the_quietest_is_forgotten)
 {
     static struct attempts attempts;
-    memset(&attempts, 0, sizeof attempts);
+    memset(&attempts, 0, sizeof(attempts));
     for (uint64_t network = 1; network <= ATTEMPTS_NETWORKS; network++)
         attempts_add_failed(&attempts, network, network);
     attempts_add_failed(&attempts, 1, 1000); /* 2 is now the one that failed the longest ago */

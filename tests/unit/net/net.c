@@ -55,7 +55,7 @@ TEST(bad_addresses_are_refused)
         "aaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaa"
         "aaaaaa",
     };
-    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
+    for (size_t i = 0; i < sizeof(bad) / sizeof(bad[0]); i++) {
         struct address address;
         struct error error = {0};
         if (address_parse(&address, bad[i], &error))
@@ -72,7 +72,7 @@ TEST(only_loopback_is_loopback)
     } cases[] = {{"tcp:127.9.9.9:1", true},          {"tcp:128.0.0.1:1", false},
                  {"tcp:0.0.0.0:1", false},           {"tcp:[::]:1", false},
                  {"tcp:[::ffff:127.0.0.1]:1", true}, {"tcp:[::ffff:10.0.0.1]:1", false}};
-    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+    for (size_t i = 0; i < sizeof(cases) / sizeof(cases[0]); i++) {
         struct address address;
         struct error error = {0};
         assert_true(address_parse(&address, cases[i].text, &error));
@@ -89,9 +89,9 @@ static int make_folder(void **state)
 {
     (void)state;
     const char *base = getenv("TMPDIR");
-    snprintf(folder, sizeof folder, "%.40s/farlight-XXXXXX", base ? base : P_tmpdir);
+    snprintf(folder, sizeof(folder), "%.40s/farlight-XXXXXX", base ? base : P_tmpdir);
     assert_non_null(mkdtemp(folder));
-    snprintf(socket_path, sizeof socket_path, "%s/inner/s", folder);
+    snprintf(socket_path, sizeof(socket_path), "%s/inner/s", folder);
     return 0;
 }
 
@@ -99,7 +99,7 @@ static int remove_folder(void **state)
 {
     (void)state;
     char inner[96];
-    snprintf(inner, sizeof inner, "%s/inner", folder);
+    snprintf(inner, sizeof(inner), "%s/inner", folder);
     unlink(socket_path);
     rmdir(inner);
     rmdir(folder);
@@ -111,7 +111,7 @@ static struct address unix_address(void)
     struct address address;
     struct error error = {0};
     char text[160];
-    snprintf(text, sizeof text, "unix:%s", socket_path);
+    snprintf(text, sizeof(text), "unix:%s", socket_path);
     assert_true(address_parse(&address, text, &error));
     return address;
 }
@@ -162,7 +162,7 @@ TEST(a_host_that_is_gone_is_noticed)
     assert_int_equal(connect(fd, (struct sockaddr *)&listener.address.storage, listener.address.storage_bytes), 0);
     int accepted = listener_accept(&listener, &peer, &retry_later);
     assert_true(accepted >= 0);
-    assert_int_equal(getsockopt(accepted, SOL_SOCKET, SO_KEEPALIVE, &on, &(socklen_t){sizeof on}), 0);
+    assert_int_equal(getsockopt(accepted, SOL_SOCKET, SO_KEEPALIVE, &on, &(socklen_t){sizeof(on)}), 0);
     assert_int_equal(on, 1);
     close(accepted);
     close(fd);
@@ -580,7 +580,7 @@ static struct blob *made_blob(uint8_t name, size_t bytes)
     struct blob *blob = blob_create(bytes);
     assert_non_null(blob);
     memset(blob->data, name, bytes);
-    memset(blob->hash, 0x11, sizeof blob->hash); /* the same head: they share a key of the map */
+    memset(blob->hash, 0x11, sizeof(blob->hash)); /* the same head: they share a key of the map */
     blob->hash[31] = name;
     return blob;
 }
@@ -597,7 +597,7 @@ static void put(struct blob_store *store, blob_principal principal, uint8_t name
 static bool has(struct blob_store *store, blob_principal principal, uint8_t name, size_t bytes)
 {
     uint8_t hash[BLOB_HASH_BYTES];
-    memset(hash, 0x11, sizeof hash);
+    memset(hash, 0x11, sizeof(hash));
     hash[31] = name;
     struct blob *blob = blob_store_find(store, principal, hash, bytes);
     assert_true(!blob || blob->data[0] == name);

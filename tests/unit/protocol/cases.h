@@ -36,7 +36,7 @@ static inline uint64_t case_below(struct case_maker *maker, uint64_t bound)
 static inline void *case_alloc(struct case_maker *maker, size_t bytes)
 {
     size_t start = (maker->used_bytes + 15) & ~(size_t)15;
-    if (bytes > sizeof maker->memory - start) {
+    if (bytes > sizeof(maker->memory) - start) {
         return NULL;
     }
     maker->used_bytes = start + bytes;
@@ -83,8 +83,8 @@ static inline char *case_text(struct case_maker *maker, size_t max_bytes)
                                                  : case_below(maker, max_bytes + 1);
     char *text = case_alloc(maker, max_bytes + 1);
     size_t used = 0;
-    while (text != NULL && used < want) {
-        const char *character = characters[case_below(maker, sizeof characters / sizeof characters[0])];
+    while (text && used < want) {
+        const char *character = characters[case_below(maker, sizeof(characters) / sizeof(characters[0]))];
         size_t length = strlen(character);
         if (length > want - used) {
             character = "x";
@@ -146,9 +146,9 @@ static inline void case_counted(struct case_maker *maker, const struct field_des
             pointer[i] = (char)case_random(maker);
         }
     }
-    memcpy(body + field->offset, &pointer, sizeof pointer);
+    memcpy(body + field->offset, &pointer, sizeof(pointer));
     if (field->kind != FIELD_STRING) {
-        memcpy(body + field->count_offset, &count, sizeof count);
+        memcpy(body + field->count_offset, &count, sizeof(count));
     }
 }
 
@@ -170,7 +170,7 @@ static inline void case_make(struct case_maker *maker, struct message *message, 
     maker->state = seed * 65537 + desc->info.type;
     maker->mode = mode;
     maker->used_bytes = 0;
-    memset(message, 0, sizeof *message);
+    memset(message, 0, sizeof(*message));
     message->type = (enum message_type)desc->info.type;
     case_struct(maker, desc->body(), (char *)message + MESSAGE_BODY_OFFSET);
 }
@@ -184,14 +184,14 @@ struct plain_bytes {
 
 static inline void plain_put(struct plain_bytes *out, uint64_t value, size_t bytes)
 {
-    for (size_t i = 0; i < bytes && out->count < sizeof out->data; i++) {
+    for (size_t i = 0; i < bytes && out->count < sizeof(out->data); i++) {
         out->data[out->count++] = (uint8_t)(value >> (8 * i));
     }
 }
 
 static inline void plain_copy(struct plain_bytes *out, const void *bytes, size_t count)
 {
-    if (bytes != NULL && count <= sizeof out->data - out->count) {
+    if (bytes && count <= sizeof(out->data) - out->count) {
         memcpy(out->data + out->count, bytes, count);
         out->count += count;
     }
@@ -207,15 +207,15 @@ static inline void plain_struct(struct plain_bytes *out, const struct struct_des
             plain_copy(out, body + field->offset, (size_t)field->width_bytes * field->count);
             continue;
         }
-        memcpy(&pointer, body + field->offset, sizeof pointer);
+        memcpy(&pointer, body + field->offset, sizeof(pointer));
         if (field->kind == FIELD_STRING) {
-            count = pointer != NULL ? (uint32_t)strlen(pointer) : 0;
+            count = pointer ? (uint32_t)strlen(pointer) : 0;
         } else {
-            memcpy(&count, body + field->count_offset, sizeof count);
+            memcpy(&count, body + field->count_offset, sizeof(count));
         }
         plain_put(out, count, 4);
         if (field->kind == FIELD_ARRAY) {
-            for (uint32_t i = 0; pointer != NULL && i < count; i++) {
+            for (uint32_t i = 0; pointer && i < count; i++) {
                 plain_struct(out, field->record(), pointer + i * field->record()->size_bytes);
             }
             continue;
@@ -250,16 +250,16 @@ static inline const char *case_difference(const struct struct_desc *desc, const 
             }
             continue;
         }
-        memcpy(&a, left + field->offset, sizeof a);
-        memcpy(&b, right + field->offset, sizeof b);
+        memcpy(&a, left + field->offset, sizeof(a));
+        memcpy(&b, right + field->offset, sizeof(b));
         if (field->kind == FIELD_STRING) {
-            if (strcmp(a != NULL ? a : "", b != NULL ? b : "") != 0) {
+            if (strcmp(a ? a : "", b ? b : "") != 0) {
                 return field->name;
             }
             continue;
         }
-        memcpy(&a_count, left + field->count_offset, sizeof a_count);
-        memcpy(&b_count, right + field->count_offset, sizeof b_count);
+        memcpy(&a_count, left + field->count_offset, sizeof(a_count));
+        memcpy(&b_count, right + field->count_offset, sizeof(b_count));
         if (a_count != b_count) {
             return field->name;
         }
@@ -272,7 +272,7 @@ static inline const char *case_difference(const struct struct_desc *desc, const 
         const struct struct_desc *record = field->record();
         for (uint32_t i = 0; i < a_count; i++) {
             const char *inner = case_difference(record, a + i * record->size_bytes, b + i * record->size_bytes);
-            if (inner != NULL) {
+            if (inner) {
                 return inner;
             }
         }

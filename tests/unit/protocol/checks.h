@@ -27,12 +27,12 @@ static inline bool decode_copy(struct message *out, uint16_t type, const uint8_t
     copy = malloc(count > 0 ? count : 1);
     assert_non_null(copy);
     memcpy(copy, payload, count);
-    scratch_init(&scratch, scratch_memory, sizeof scratch_memory);
+    scratch_init(&scratch, scratch_memory, sizeof(scratch_memory));
     bool ok = message_decode(out, type, copy, count, &scratch, error);
     if (!ok) {
         struct message zero;
-        memset(&zero, 0, sizeof zero);
-        assert_memory_equal(out, &zero, sizeof zero);
+        memset(&zero, 0, sizeof(zero));
+        assert_memory_equal(out, &zero, sizeof(zero));
         assert_int_not_equal(error->code, PROTOCOL_ERROR_NONE);
         assert_true(error->text[0] != '\0');
         free(copy);
@@ -45,7 +45,7 @@ static inline bool decode_copy(struct message *out, uint16_t type, const uint8_t
 static inline size_t encode_both(const struct message *message)
 {
     struct writer writer;
-    writer_init(&writer, encoded, sizeof encoded);
+    writer_init(&writer, encoded, sizeof(encoded));
     if (!message_encode(&writer, message)) {
         fail_msg("%s: %s: %s", message_type_text(message->type), writer.error.field, writer.error.text);
     }
@@ -65,7 +65,7 @@ static inline void check_round_trip(const struct message *message)
         fail_msg("%s: %s: %s", message_type_text(message->type), error.field, error.text);
     }
     const char *difference = message_difference(message, &back);
-    if (difference != NULL) {
+    if (difference) {
         fail_msg("%s.%s came back otherwise", message_type_text(message->type), difference);
     }
 }

@@ -57,7 +57,7 @@ static int update_golden(void)
 {
     struct message message;
     FILE *file = fopen(GOLDEN_PATH, "w");
-    if (file == NULL) {
+    if (!file) {
         perror(GOLDEN_PATH);
         return 1;
     }
@@ -98,14 +98,14 @@ TEST(the_bytes_on_the_wire_are_the_stored_ones)
     char *line = NULL;
     size_t line_capacity = 0;
     FILE *file = fopen(GOLDEN_PATH, "r");
-    if (file == NULL) {
+    if (!file) {
         fail_msg("cannot read %s (run from the top of the tree)", GOLDEN_PATH);
     }
     for (size_t i = 0; i < protocol_message_count; i++) {
         for (enum case_mode mode = CASE_LEAST; mode < CASE_MODE_COUNT; mode++) {
             const char *name = protocol_messages[i].info.name;
             char head[96];
-            snprintf(head, sizeof head, "%s %s ", name, mode_names[mode]);
+            snprintf(head, sizeof(head), "%s %s ", name, mode_names[mode]);
             if (getline(&line, &line_capacity, file) < 0 || strncmp(line, head, strlen(head)) != 0) {
                 fail_msg("%s: no line for '%s'; if the table grew, run this test with FARLIGHT_UPDATE_GOLDEN=1",
                          GOLDEN_PATH, head);
@@ -172,7 +172,7 @@ static void encode_fixed_part(const struct message *message, size_t fixed_bytes,
     size_t counted_count = 0;
     uint8_t fixed[1024];
     plain_encode(&plain, message);
-    assert_true(desc->wire_fixed_bytes < sizeof fixed);
+    assert_true(desc->wire_fixed_bytes < sizeof(fixed));
     memcpy(fixed, plain.data + 2, desc->wire_fixed_bytes);
     for (const struct field_desc *field = desc->fields; field->name != NULL; field++) {
         if (field_is_counted(field)) {
@@ -209,19 +209,18 @@ TEST(a_shorter_fixed_part_gets_defaults_and_a_longer_one_is_read_past)
             }
         }
         size_t fixed_bytes = 0;
-        for (const struct field_desc *field = body->fields; !(field->name == NULL || field_is_counted(field));
-             field++) {
+        for (const struct field_desc *field = body->fields; !(!field->name || field_is_counted(field)); field++) {
             size_t size = (size_t)field->width_bytes * field->count;
             encode_fixed_part(&message, fixed_bytes, 0);
             assert_true(decode_copy(&back, desc->info.type, plain.data, plain.count, &error));
             const char *difference = message_difference(&back, &expected);
-            if (difference != NULL) {
+            if (difference) {
                 fail_msg("%s.%s is not what it should be after %zu fixed bytes", desc->info.name, difference,
                          fixed_bytes);
             }
             for (size_t part = 1; part < size; part++) { /* cut within the field */
                 char path[128];
-                snprintf(path, sizeof path, "%s.%s", desc->info.name, field->name);
+                snprintf(path, sizeof(path), "%s.%s", desc->info.name, field->name);
                 encode_fixed_part(&message, fixed_bytes + part, 0);
                 assert_false(decode_copy(&back, desc->info.type, plain.data, plain.count, &error));
                 assert_string_equal(error.field, path);
@@ -309,7 +308,7 @@ TEST(a_message_above_the_control_maximum_is_not_sent)
     struct message message;
     struct writer writer;
     char name[129];
-    memset(name, 'n', sizeof name - 1);
+    memset(name, 'n', sizeof(name) - 1);
     name[128] = '\0';
     for (size_t i = 0; i < 256; i++) {
         scenes[i] = (struct record_scene_stat){.client = i, .name = name};
@@ -327,12 +326,12 @@ TEST(a_message_above_the_control_maximum_is_not_sent)
     message.stats_reply.scenes_count = 256;
     message.stats_reply.clients = clients;
     message.stats_reply.clients_count = 256;
-    writer_init(&writer, large, sizeof large);
+    writer_init(&writer, large, sizeof(large));
     assert_false(message_encode(&writer, &message));
     assert_int_equal(writer.error.code, PROTOCOL_ERROR_LIMIT);
     assert_string_equal(writer.error.field, "stats_reply");
     message.stats_reply.clients_count = 10;
-    writer_init(&writer, large, sizeof large);
+    writer_init(&writer, large, sizeof(large));
     assert_true(message_encode(&writer, &message));
 }
 
@@ -341,7 +340,7 @@ TEST(unknown_types_are_neither_sent_nor_decoded)
     struct message message = {.type = (enum message_type)0x7ffe}, back;
     struct writer writer;
     struct decode_error error;
-    writer_init(&writer, encoded, sizeof encoded);
+    writer_init(&writer, encoded, sizeof(encoded));
     assert_false(message_encode(&writer, &message));
     assert_int_equal(message_payload_bytes(&message), 0);
     assert_false(decode_copy(&back, 0x7ffe, encoded, 2, &error));

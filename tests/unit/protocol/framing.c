@@ -16,7 +16,7 @@ static size_t make_stream(void)
 {
     struct writer writer;
     struct message message;
-    writer_init(&writer, stream, sizeof stream);
+    writer_init(&writer, stream, sizeof(stream));
     for (size_t i = 0; i < protocol_message_count; i++) {
         case_make(&maker, &message, &protocol_messages[i], CASE_RANDOM, 11);
         size_t start = writer.used_bytes;
@@ -54,7 +54,7 @@ static void check_message(const struct frame *frame, size_t index)
     assert_int_equal(frame->header.channel, index);
     assert_int_equal(frame->header.flags, 0);
     assert_ptr_equal(frame->info, &protocol_messages[index].info);
-    scratch_init(&scratch, scratch_memory, sizeof scratch_memory);
+    scratch_init(&scratch, scratch_memory, sizeof(scratch_memory));
     if (!message_decode(&back, frame->header.type, frame->payload, frame->header.payload_bytes, &scratch,
                         &error)) {
         fail_msg("%s: %s", error.field, error.text);
@@ -95,7 +95,7 @@ TEST(a_message_of_the_wrong_side_is_denied_before_its_payload)
         uint8_t bytes[FRAMING_HEADER_BYTES];
         framing_header_encode(bytes, &header);
         for (uint32_t accept = 0; accept <= ACCEPT_ALL; accept++) {
-            enum framing_result result = parse_copy(&frame, bytes, sizeof bytes, accept, &error);
+            enum framing_result result = parse_copy(&frame, bytes, sizeof(bytes), accept, &error);
             if ((accept & info->from) != 0) {
                 assert_int_equal(result, FRAMING_NEED_MORE);
             } else {
@@ -114,13 +114,13 @@ static void expect_fatal(const struct framing_header *header, const char *field)
     struct frame frame;
     struct decode_error error;
     framing_header_encode(bytes, header);
-    if (parse_copy(&frame, bytes, sizeof bytes, ACCEPT_ALL, &error) != FRAMING_FATAL) {
+    if (parse_copy(&frame, bytes, sizeof(bytes), ACCEPT_ALL, &error) != FRAMING_FATAL) {
         fail_msg("type 0x%04x, %u bytes, flags %u: %s was taken", header->type, header->payload_bytes,
                  header->flags, field);
     }
     assert_int_equal(error.code, PROTOCOL_ERROR_PROTOCOL);
     assert_string_equal(error.field, field);
-    assert_int_equal(framing_parse(&frame, bytes, sizeof bytes, ACCEPT_ALL, NULL), FRAMING_FATAL);
+    assert_int_equal(framing_parse(&frame, bytes, sizeof(bytes), ACCEPT_ALL, NULL), FRAMING_FATAL);
 }
 
 TEST(sizes_outside_the_row_of_the_table_are_refused_before_the_payload_comes)
@@ -130,7 +130,7 @@ TEST(sizes_outside_the_row_of_the_table_are_refused_before_the_payload_comes)
         const uint32_t wrong[] = {
             info->payload_min_bytes - 1, 0, info->payload_max_bytes + 1, 0x7fffffffu, 0xfffffff8u, UINT32_MAX};
         assert_true(info->payload_min_bytes >= 2);
-        for (size_t k = 0; k < sizeof wrong / sizeof wrong[0]; k++) {
+        for (size_t k = 0; k < sizeof(wrong) / sizeof(wrong[0]); k++) {
             expect_fatal(&(struct framing_header){.payload_bytes = wrong[k], .type = info->type}, "payload_bytes");
         }
         expect_fatal(
@@ -149,10 +149,10 @@ TEST(an_unknown_type_is_fatal_unless_it_may_be_ignored)
     expect_fatal(&(struct framing_header){.payload_bytes = CODEC_BULK_PAYLOAD_MAX_BYTES + 1, .type = 0xfffe},
                  "payload_bytes");
     framing_header_encode(bytes, &(struct framing_header){.payload_bytes = 3, .type = 0xfffe});
-    assert_int_equal(parse_copy(&frame, bytes, sizeof bytes - 1, 0, &error), FRAMING_NEED_MORE);
-    assert_int_equal(parse_copy(&frame, bytes, sizeof bytes, 0, &error), FRAMING_CONSUMED);
+    assert_int_equal(parse_copy(&frame, bytes, sizeof(bytes) - 1, 0, &error), FRAMING_NEED_MORE);
+    assert_int_equal(parse_copy(&frame, bytes, sizeof(bytes), 0, &error), FRAMING_CONSUMED);
     assert_null(frame.info);
-    assert_int_equal(frame.consumed_bytes, sizeof bytes);
+    assert_int_equal(frame.consumed_bytes, sizeof(bytes));
 }
 
 TEST(padding_must_be_zero)
@@ -161,10 +161,10 @@ TEST(padding_must_be_zero)
     struct frame frame;
     struct decode_error error;
     framing_header_encode(bytes, &(struct framing_header){.payload_bytes = 2, .type = MESSAGE_STATS});
-    assert_int_equal(parse_copy(&frame, bytes, sizeof bytes, ACCEPT_ALL, &error), FRAMING_CONSUMED);
-    for (size_t i = FRAMING_HEADER_BYTES + 2; i < sizeof bytes; i++) {
+    assert_int_equal(parse_copy(&frame, bytes, sizeof(bytes), ACCEPT_ALL, &error), FRAMING_CONSUMED);
+    for (size_t i = FRAMING_HEADER_BYTES + 2; i < sizeof(bytes); i++) {
         bytes[i] = 0x80;
-        assert_int_equal(parse_copy(&frame, bytes, sizeof bytes, ACCEPT_ALL, &error), FRAMING_FATAL);
+        assert_int_equal(parse_copy(&frame, bytes, sizeof(bytes), ACCEPT_ALL, &error), FRAMING_FATAL);
         assert_string_equal(error.field, "padding");
         bytes[i] = 0;
     }
@@ -177,9 +177,9 @@ TEST(the_header_has_its_fixed_layout)
     struct framing_header back;
     uint8_t bytes[FRAMING_HEADER_BYTES];
     framing_header_encode(bytes, &header);
-    assert_memory_equal(bytes, expected, sizeof bytes);
+    assert_memory_equal(bytes, expected, sizeof(bytes));
     framing_header_decode(&back, bytes);
-    assert_memory_equal(&back, &header, sizeof header);
+    assert_memory_equal(&back, &header, sizeof(header));
 }
 
 TEST(a_message_that_does_not_fit_leaves_the_buffer_unchanged)
@@ -234,7 +234,7 @@ TEST(the_largest_bulk_message_fits_the_stated_buffer)
     struct frame frame;
     struct decode_error error;
     message.blob_data.data = bytes;
-    message.blob_data.data_bytes = sizeof bytes;
+    message.blob_data.data_bytes = sizeof(bytes);
     writer_init(&writer, stream, FRAMING_MESSAGE_MAX_BYTES);
     assert_true(message_write(&writer, 7, 1, &message));
     assert_int_equal(framing_parse(&frame, stream, writer.used_bytes, MESSAGE_FROM_CLIENT, &error),
@@ -242,6 +242,6 @@ TEST(the_largest_bulk_message_fits_the_stated_buffer)
     struct scratch scratch = {0};
     assert_true(
         message_decode(&message, MESSAGE_BLOB_DATA, frame.payload, frame.header.payload_bytes, &scratch, &error));
-    assert_int_equal(message.blob_data.data_bytes, sizeof bytes);
+    assert_int_equal(message.blob_data.data_bytes, sizeof(bytes));
     assert_int_equal((size_t)(message.blob_data.data - stream) % 8, 0);
 }

@@ -103,14 +103,14 @@ TEST(the_first_bytes_of_the_client_have_their_frozen_layout)
     struct handshake_hello hello = some_hello(), back;
     struct decode_error error;
     size_t consumed;
-    assert_int_equal(handshake_hello_encode(bytes, &hello), sizeof expected);
-    assert_memory_equal(bytes, expected, sizeof expected);
-    assert_int_equal(parse_hello_copy(&back, bytes, sizeof expected, &consumed, &error), HANDSHAKE_CONSUMED);
-    assert_int_equal(consumed, sizeof expected);
+    assert_int_equal(handshake_hello_encode(bytes, &hello), sizeof(expected));
+    assert_memory_equal(bytes, expected, sizeof(expected));
+    assert_int_equal(parse_hello_copy(&back, bytes, sizeof(expected), &consumed, &error), HANDSHAKE_CONSUMED);
+    assert_int_equal(consumed, sizeof(expected));
     assert_int_equal(back.version_min, 1);
     assert_int_equal(back.version_max, 3);
     assert_int_equal(back.capabilities, hello.capabilities);
-    assert_memory_equal(back.nonce, hello.nonce, sizeof hello.nonce);
+    assert_memory_equal(back.nonce, hello.nonce, sizeof(hello.nonce));
     assert_string_equal(back.name, hello.name);
 }
 
@@ -126,24 +126,24 @@ TEST(the_reply_has_its_frozen_layout)
                                      10, 0, 0, 0, 11, 0, 0, 0, 12, 0, 0, 0, 13, 0, 0, 0, 14, 0, 0, 0};
     static const uint8_t texts[] = {9, 'f', 'a', 'r', 'l', 'i', 'g', 'h', 't', 'd', 14, 'n'};
     assert_int_equal(count, 240 + 1 + 9 + 1 + 14 + 7);
-    assert_memory_equal(bytes, head, sizeof head);
+    assert_memory_equal(bytes, head, sizeof(head));
     assert_int_equal(bytes[32], 0xc0);
-    assert_memory_equal(bytes + 48, limits, sizeof limits);
+    assert_memory_equal(bytes + 48, limits, sizeof(limits));
     /* Those that came later, from 15 on: 7 of 8 bytes, 13 of 4, and the tracers' at the end. */
-    size_t offset = 48 + sizeof limits;
+    size_t offset = 48 + sizeof(limits);
     for (uint8_t value = 15; value <= 37; value++) {
         size_t bytes_of_it = value < 22 || value == 35 || value == 36 ? 8 : 4;
         uint8_t expected[8] = {value};
         assert_memory_equal(bytes + offset, expected, bytes_of_it);
         offset += bytes_of_it;
     }
-    assert_memory_equal(bytes + 240, texts, sizeof texts);
+    assert_memory_equal(bytes + 240, texts, sizeof(texts));
     assert_int_equal(parse_reply_copy(&back, bytes, count, &consumed, &error), HANDSHAKE_CONSUMED);
     assert_int_equal(consumed, count);
     assert_int_equal(back.version, 1);
     assert_int_equal(back.capabilities, 5);
-    assert_memory_equal(back.nonce, reply.nonce, sizeof reply.nonce);
-    assert_memory_equal(back.session_token, reply.session_token, sizeof reply.session_token);
+    assert_memory_equal(back.nonce, reply.nonce, sizeof(reply.nonce));
+    assert_memory_equal(back.session_token, reply.session_token, sizeof(reply.session_token));
     struct handshake_limit sent, came;
     for (size_t i = 0; handshake_limit_at(&reply.limits, i, &sent); i++) {
         assert_true(handshake_limit_at(&back.limits, i, &came));
@@ -251,12 +251,12 @@ TEST(a_version_without_overlap_is_named)
 
     hello = some_hello();
     reply.version = 0;
-    memset(&error, 0, sizeof error);
+    memset(&error, 0, sizeof(error));
     assert_false(handshake_reply_accept(&hello, &reply, &error));
     assert_int_equal(error.code, PROTOCOL_ERROR_VERSION);
     assert_string_equal(error.text, "none in common");
     reply.version = 4; /* 1 to 3 were offered */
-    memset(&error, 0, sizeof error);
+    memset(&error, 0, sizeof(error));
     assert_false(handshake_reply_accept(&hello, &reply, &error));
     assert_int_equal(error.code, PROTOCOL_ERROR_PROTOCOL);
     reply.version = 3;
@@ -272,7 +272,7 @@ TEST(limits_of_an_older_and_of_a_newer_daemon_are_understood)
     size_t texts = 1 + strlen(reply.name) + 1 + strlen(reply.text);
     for (size_t limits_bytes = 0; limits_bytes <= 256; limits_bytes += 4) {
         size_t kept = limits_bytes < 192 ? limits_bytes : 192;
-        memset(other, 0, sizeof other);
+        memset(other, 0, sizeof(other));
         memcpy(other, bytes, 48 + kept);
         memset(other + 48 + kept, 0xee, limits_bytes - kept);
         other[6] = (uint8_t)limits_bytes;
@@ -290,7 +290,7 @@ TEST(limits_of_an_older_and_of_a_newer_daemon_are_understood)
     }
     other[6] = 1; /* 257 */
     other[7] = 1;
-    assert_int_equal(parse_reply_copy(&back, other, sizeof other, &consumed, &error), HANDSHAKE_FATAL);
+    assert_int_equal(parse_reply_copy(&back, other, sizeof(other), &consumed, &error), HANDSHAKE_FATAL);
     assert_string_equal(error.field, "limits_bytes");
     bytes[count - 1] = 1;
     assert_int_equal(parse_reply_copy(&back, bytes, count, &consumed, &error), HANDSHAKE_FATAL);

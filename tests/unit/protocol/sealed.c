@@ -33,7 +33,7 @@ static const char *random_name(void)
 
 static void random_fill(void *const out, const size_t count)
 {
-    if (chosen == NULL) {
+    if (!chosen) {
         randombytes_sysrandom_implementation.buf(out, count);
         return;
     }
@@ -46,7 +46,7 @@ static void random_fill(void *const out, const size_t count)
 static uint32_t random_number(void)
 {
     uint32_t number;
-    random_fill(&number, sizeof number);
+    random_fill(&number, sizeof(number));
     return number;
 }
 
@@ -158,7 +158,7 @@ static enum sealed_result unseal(struct end *end, const uint8_t *bytes, size_t c
 {
     size_t consumed = 0;
     enum sealed_result result = sealed_open(end->sealed, bytes + *offset, count - *offset, &consumed, opened,
-                                            sizeof opened, &opened_bytes, &end->error);
+                                            sizeof(opened), &opened_bytes, &end->error);
     assert_true((result == SEALED_CONSUMED) == (consumed > 0));
     assert_true(result == SEALED_CONSUMED || opened_bytes == 0);
     *offset += consumed;
@@ -171,11 +171,11 @@ TEST(both_ends_open_and_understand_each_other)
 {
     static uint8_t much[SEALED_PLAIN_MAX_BYTES];
     open_both();
-    for (size_t i = 0; i < sizeof much; i++) {
+    for (size_t i = 0; i < sizeof(much); i++) {
         much[i] = (uint8_t)(i * 31 + i / 256);
     }
     say(&client, &up, "a", 1);
-    say(&client, &up, much, sizeof much);
+    say(&client, &up, much, sizeof(much));
     say(&server, &down, "from the server", 15);
     say(&client, &up, NULL, 0);
     assert_true(sealed_has_sealed_last(client.sealed) && !sealed_has_sealed_last(server.sealed));
@@ -184,8 +184,8 @@ TEST(both_ends_open_and_understand_each_other)
     assert_int_equal(opened_bytes, 1);
     assert_int_equal(opened[0], 'a');
     assert_int_equal(unseal(&server, up.bytes, up.count, &offset), SEALED_CONSUMED);
-    assert_int_equal(opened_bytes, sizeof much);
-    assert_memory_equal(opened, much, sizeof much);
+    assert_int_equal(opened_bytes, sizeof(much));
+    assert_memory_equal(opened, much, sizeof(much));
     assert_false(sealed_has_opened_last(server.sealed));
     assert_int_equal(unseal(&server, up.bytes, up.count, &offset), SEALED_CONSUMED);
     assert_true(sealed_has_opened_last(server.sealed));
@@ -260,7 +260,7 @@ static struct {
 static void fill_given(void)
 {
     uint8_t *bytes = (uint8_t *)&given;
-    for (size_t i = 0; i < sizeof given; i++) {
+    for (size_t i = 0; i < sizeof(given); i++) {
         bytes[i] = (uint8_t)(i * 7 + 1);
     }
 }
@@ -280,12 +280,12 @@ static void print_session(FILE *file)
     static uint8_t long_plain[300];
     fill_given();
     chosen = (const uint8_t *)&given;
-    chosen_left = sizeof given;
+    chosen_left = sizeof(given);
     begin(&full_key, &full_key, 1);
     shake_hands(0, 0);
     assert_int_equal(chosen_left, 0);
     chosen = NULL;
-    for (size_t i = 0; i < sizeof long_plain; i++) {
+    for (size_t i = 0; i < sizeof(long_plain); i++) {
         long_plain[i] = (uint8_t)i;
     }
     print_hex(file, "key", full_key.bytes, SEALED_KEY_BYTES);
@@ -304,8 +304,8 @@ static void print_session(FILE *file)
     print_hex(file, "client_plain_1", "hello", 5);
     print_hex(file, "client_record_1", up.bytes, up.count);
     up.count = 0;
-    say(&client, &up, long_plain, sizeof long_plain);
-    print_hex(file, "client_plain_2", long_plain, sizeof long_plain);
+    say(&client, &up, long_plain, sizeof(long_plain));
+    print_hex(file, "client_plain_2", long_plain, sizeof(long_plain));
     print_hex(file, "client_record_2", up.bytes, up.count);
     up.count = 0;
     say(&client, &up, NULL, 0);
@@ -325,10 +325,10 @@ TEST(the_bytes_are_the_stored_ones)
     char *made = NULL;
     size_t made_bytes;
     FILE *file = fopen(GOLDEN_PATH, "r");
-    if (file == NULL) {
+    if (!file) {
         fail_msg("cannot read %s (run from the top of the tree)", GOLDEN_PATH);
     }
-    stored[fread(stored, 1, sizeof stored - 1, file)] = '\0';
+    stored[fread(stored, 1, sizeof(stored) - 1, file)] = '\0';
     fclose(file);
     FILE *stream = open_memstream(&made, &made_bytes);
     assert_non_null(stream);
@@ -341,7 +341,7 @@ TEST(the_bytes_are_the_stored_ones)
 static int update_golden(void)
 {
     FILE *file = fopen(GOLDEN_PATH, "w");
-    if (file == NULL) {
+    if (!file) {
         perror(GOLDEN_PATH);
         return 1;
     }
@@ -386,7 +386,7 @@ TEST(a_server_without_the_key_is_found_out)
     struct sealed *victim = sealed_client(&full_key);
     uint8_t out[SEALED_MESSAGE_MAX_BYTES], message[SEALED_MESSAGE_MAX_BYTES], proof[64];
     size_t consumed, out_bytes;
-    memcpy(proof, down.bytes + 72, sizeof proof);
+    memcpy(proof, down.bytes + 72, sizeof(proof));
     sealed_begin(victim, out);
     assert_int_equal(sealed_handshake(impostor, out, 72, &consumed, message, &out_bytes, NULL), SEALED_CONSUMED);
     assert_int_equal(sealed_handshake(victim, message, 72, &consumed, out, &out_bytes, NULL), SEALED_CONSUMED);
@@ -404,7 +404,7 @@ TEST(refusals_are_reported_with_their_reason)
     for (size_t i = 0; i < 3; i++) {
         begin(&full_key, &full_key, 1);
         sealed_refuse(refusal, at_once[i]);
-        hear(&client, refusal, sizeof refusal, &up);
+        hear(&client, refusal, sizeof(refusal), &up);
         assert_int_equal(client.last, SEALED_REFUSED);
         assert_int_equal(sealed_status(client.sealed), at_once[i]);
         assert_string_equal(client.error.text, sealed_status_text(at_once[i]));
@@ -413,7 +413,7 @@ TEST(refusals_are_reported_with_their_reason)
     begin(&full_key, &other_key, 1);
     shake_hands(0, 0);
     sealed_refuse(refusal, sealed_status(server.sealed));
-    hear(&client, refusal, sizeof refusal, &up);
+    hear(&client, refusal, sizeof(refusal), &up);
     assert_int_equal(client.last, SEALED_REFUSED);
     assert_int_equal(sealed_status(client.sealed), SEALED_WRONG_KEY);
     end_both();
@@ -450,7 +450,7 @@ TEST(no_bit_of_a_record_can_be_changed)
     uint8_t plain[40] = "forty bytes";
     for (size_t bit = 0; bit < 8 * record_bytes; bit++) {
         open_both();
-        say(&client, &up, plain, sizeof plain);
+        say(&client, &up, plain, sizeof(plain));
         /* Enough behind it that a length which has grown is there. */
         memset(up.bytes + up.count, 0x55, SEALED_RECORD_MAX_BYTES);
         changed.count = 0;
@@ -494,13 +494,13 @@ TEST(a_weak_public_key_is_refused)
 TEST(lengths_tags_and_what_comes_too_late_are_refused)
 {
     static const uint32_t lengths[] = {0, 16, SEALED_PLAIN_MAX_BYTES + 18, UINT32_MAX};
-    for (size_t i = 0; i < sizeof lengths / sizeof lengths[0]; i++) {
+    for (size_t i = 0; i < sizeof(lengths) / sizeof(lengths[0]); i++) {
         size_t offset = 0;
         const uint8_t head[4] = {(uint8_t)lengths[i], (uint8_t)(lengths[i] >> 8), (uint8_t)(lengths[i] >> 16),
                                  (uint8_t)(lengths[i] >> 24)};
         open_both();
-        assert_true(sealed_has_record(head, sizeof head));
-        assert_int_equal(unseal(&server, head, sizeof head, &offset), SEALED_FATAL);
+        assert_true(sealed_has_record(head, sizeof(head)));
+        assert_int_equal(unseal(&server, head, sizeof(head), &offset), SEALED_FATAL);
         end_both();
     }
     open_both();
@@ -560,16 +560,16 @@ TEST(a_message_cannot_be_reflected_to_its_sender)
 {
     uint8_t first[72];
     begin(&full_key, &full_key, 1);
-    memcpy(first, up.bytes, sizeof first);
+    memcpy(first, up.bytes, sizeof(first));
     /* As it is, and as what the client waits for. */
-    hear(&client, first, sizeof first, &up);
+    hear(&client, first, sizeof(first), &up);
     assert_int_equal(client.last, SEALED_FATAL);
     end_both();
     begin(&full_key, &full_key, 1);
-    memcpy(first, up.bytes, sizeof first);
+    memcpy(first, up.bytes, sizeof(first));
     first[4] = 2;
     first[5] = SEALED_WELCOME;
-    hear(&client, first, sizeof first, &up);
+    hear(&client, first, sizeof(first), &up);
     assert_int_equal(client.last, SEALED_FATAL);
     end_both();
     /* Message 2 to the server in place of message 3; and 3 to the client in place of 4. */
@@ -579,9 +579,9 @@ TEST(a_message_cannot_be_reflected_to_its_sender)
     hear(&server, down.bytes, 72, &down);
     assert_int_equal(server.last, SEALED_FATAL);
     uint8_t proof[64];
-    memcpy(proof, up.bytes + 72, sizeof proof);
+    memcpy(proof, up.bytes + 72, sizeof(proof));
     proof[4] = 4;
-    hear(&client, proof, sizeof proof, &up);
+    hear(&client, proof, sizeof(proof), &up);
     assert_int_equal(client.last, SEALED_FATAL);
     end_both();
     /* Message 4 after it was said, and records of either. */
@@ -630,7 +630,7 @@ TEST(connections_cannot_be_mixed)
 static size_t record_session(const uint8_t *client_randomness, struct traffic *told)
 {
     chosen = client_randomness;
-    chosen_left = sizeof given;
+    chosen_left = sizeof(given);
     begin(&full_key, &full_key, 1);
     shake_hands(0, 0);
     chosen = NULL;
@@ -655,7 +655,7 @@ TEST(a_session_that_is_cut_anywhere_is_seen_to_be)
         enum sealed_result result = SEALED_CONSUMED;
         /* The same client again: its random numbers are those of the record. */
         chosen = (const uint8_t *)&given;
-        chosen_left = sizeof given;
+        chosen_left = sizeof(given);
         up.count = 0;
         client = (struct end){.sealed = sealed_client(&full_key)};
         sealed_begin(client.sealed, out);
@@ -700,8 +700,8 @@ TEST(a_link_carries_everything_however_little_goes_at_once)
 {
     static const size_t steps[] = {1, 7, 100, 65536, 1 << 20};
     static uint8_t plain[300000], back[300000 + SEALED_PLAIN_MAX_BYTES];
-    randombytes_buf(plain, sizeof plain);
-    for (size_t i = 0; i < sizeof steps / sizeof steps[0]; i++) {
+    randombytes_buf(plain, sizeof(plain));
+    for (size_t i = 0; i < sizeof(steps) / sizeof(steps[0]); i++) {
         struct sealed_link *one = sealed_link_client(&full_key), *two = sealed_link_server(&full_key, 1);
         struct decode_error error;
         size_t taken = 0, told = 0, got = 0;
@@ -709,8 +709,8 @@ TEST(a_link_carries_everything_however_little_goes_at_once)
         assert_non_null(one);
         assert_non_null(two);
         while (!sealed_has_opened_last(two->sealed)) {
-            taken += sealed_link_seal(one, plain + taken, sizeof plain - taken);
-            is_last = is_last || (taken == sizeof plain && sealed_link_seal_last(one));
+            taken += sealed_link_seal(one, plain + taken, sizeof(plain) - taken);
+            is_last = is_last || (taken == sizeof(plain) && sealed_link_seal_last(one));
             told += carry(one, two, steps[i]);
             carry(two, one, steps[i]);
             assert_true(told <= taken);
@@ -720,15 +720,15 @@ TEST(a_link_carries_everything_however_little_goes_at_once)
             assert_true(result == SEALED_CONSUMED || result == SEALED_NEED_MORE);
             while (result == SEALED_CONSUMED && !sealed_has_opened_last(two->sealed)) {
                 size_t bytes = 0;
-                assert_true(sizeof back - got >= SEALED_PLAIN_MAX_BYTES);
+                assert_true(sizeof(back) - got >= SEALED_PLAIN_MAX_BYTES);
                 result = sealed_link_open(two, back + got, SEALED_PLAIN_MAX_BYTES, &bytes, &error);
                 got += bytes;
             }
             assert_true(result == SEALED_CONSUMED || result == SEALED_NEED_MORE);
         }
-        assert_int_equal(told, sizeof plain);
-        assert_int_equal(got, sizeof plain);
-        assert_memory_equal(back, plain, sizeof plain);
+        assert_int_equal(told, sizeof(plain));
+        assert_int_equal(got, sizeof(plain));
+        assert_memory_equal(back, plain, sizeof(plain));
         assert_int_equal(sealed_link_room(one), 0); /* after the last one */
         assert_true(sealed_link_seal_last(one));
         sealed_link_destroy(one);
@@ -760,7 +760,7 @@ TEST(a_refusal_goes_over_the_link)
 {
     struct sealed_link *one = sealed_link_client(&other_key), *two = sealed_link_server(&full_key, 1);
     struct decode_error error;
-    assert_true(one != NULL && two != NULL);
+    assert_true(one && two);
     carry(one, two, 1000);
     assert_int_equal(sealed_link_handshake(two, &error), SEALED_NEED_MORE);
     carry(two, one, 1000);

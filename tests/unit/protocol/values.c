@@ -15,7 +15,7 @@ static void expect_both_refuse(const struct message *message, const char *path, 
     struct decode_error error;
     wrong_values_tried++;
     if (encoder_too) {
-        writer_init(&writer, encoded, sizeof encoded);
+        writer_init(&writer, encoded, sizeof(encoded));
         if (message_encode(&writer, message)) {
             fail_msg("%s: a wrong value was sent", path);
         }
@@ -87,11 +87,11 @@ static void try_wrong_reals(const struct message *message, const struct field_de
         uint32_t good;
         memcpy(&good, place + 4 * i, 4);
         if (field->count > 1) {
-            snprintf(element, sizeof element, "%s[%u]", path, i);
+            snprintf(element, sizeof(element), "%s[%u]", path, i);
         } else {
-            snprintf(element, sizeof element, "%s", path);
+            snprintf(element, sizeof(element), "%s", path);
         }
-        for (size_t k = 0; k < sizeof wrong / sizeof wrong[0]; k++) {
+        for (size_t k = 0; k < sizeof(wrong) / sizeof(wrong[0]); k++) {
             memcpy(place + 4 * i, &wrong[k], 4);
             expect_both_refuse(message, element, true);
         }
@@ -119,9 +119,9 @@ static void try_wrong_string(const struct message *message, const struct field_d
     const char *good;
     char *text = calloc(1, (size_t)field->max + 2);
     assert_non_null(text);
-    memcpy(&good, body + field->offset, sizeof good);
-    memcpy(body + field->offset, &text, sizeof text);
-    for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
+    memcpy(&good, body + field->offset, sizeof(good));
+    memcpy(body + field->offset, &text, sizeof(text));
+    for (size_t i = 0; i < sizeof(wrong) / sizeof(wrong[0]); i++) {
         snprintf(text, (size_t)field->max + 2, "%s", wrong[i]);
         expect_both_refuse(message, path, true);
     }
@@ -131,8 +131,7 @@ static void try_wrong_string(const struct message *message, const struct field_d
     memcpy(text, "\x01", 2);
     plain_encode(&plain, message);
     uint8_t *at = memmem(plain.data, plain.count, "\x01\0\0\0\x01", 5);
-    while (at != NULL &&
-           memmem(at + 1, plain.count - (size_t)(at + 1 - plain.data), "\x01\0\0\0\x01", 5) != NULL) {
+    while (at && memmem(at + 1, plain.count - (size_t)(at + 1 - plain.data), "\x01\0\0\0\x01", 5)) {
         at = memmem(at + 1, plain.count - (size_t)(at + 1 - plain.data), "\x01\0\0\0\x01", 5);
     }
     assert_non_null(at);
@@ -141,7 +140,7 @@ static void try_wrong_string(const struct message *message, const struct field_d
     struct decode_error error;
     assert_false(decode_copy(&back, (uint16_t)message->type, plain.data, plain.count, &error));
     assert_string_equal(error.field, path);
-    memcpy(body + field->offset, &good, sizeof good);
+    memcpy(body + field->offset, &good, sizeof(good));
     free(text);
 }
 
@@ -150,9 +149,9 @@ static void try_wrong_count(const struct message *message, const struct field_de
 {
     const void *good_pointer, *none = NULL;
     uint32_t good_count, wrong_counts[] = {(uint32_t)field->max + 1, 0x7fffffffu, UINT32_MAX};
-    memcpy(&good_pointer, body + field->offset, sizeof good_pointer);
+    memcpy(&good_pointer, body + field->offset, sizeof(good_pointer));
     memcpy(&good_count, body + field->count_offset, 4);
-    memcpy(body + field->offset, &none, sizeof none);
+    memcpy(body + field->offset, &none, sizeof(none));
     for (size_t i = 0; i < 3; i++) {
         memcpy(body + field->count_offset, &wrong_counts[i], 4);
         expect_both_refuse(message, path, true);
@@ -164,12 +163,12 @@ static void try_wrong_count(const struct message *message, const struct field_de
     struct message back;
     struct decode_error error;
     memcpy(body + field->count_offset, &absent, 4);
-    writer_init(&writer, encoded, sizeof encoded);
+    writer_init(&writer, encoded, sizeof(encoded));
     assert_false(message_encode(&writer, message));
     assert_string_equal(writer.error.field, path);
     plain_encode(&plain, message);
     assert_false(decode_copy(&back, (uint16_t)message->type, plain.data, plain.count, &error));
-    memcpy(body + field->offset, &good_pointer, sizeof good_pointer);
+    memcpy(body + field->offset, &good_pointer, sizeof(good_pointer));
     memcpy(body + field->count_offset, &good_count, 4);
 }
 
@@ -180,7 +179,7 @@ static void try_wrong_fields(const struct message *message, const struct struct_
         char path[120];
         char *elements;
         uint32_t count;
-        assert_true(snprintf(path, sizeof path, "%s.%s", parent, field->name) < (int)sizeof path);
+        assert_true(snprintf(path, sizeof(path), "%s.%s", parent, field->name) < (int)sizeof(path));
         switch (field->kind) {
         case FIELD_INT:
         case FIELD_ENUM:
@@ -199,10 +198,10 @@ static void try_wrong_fields(const struct message *message, const struct struct_
             break;
         case FIELD_ARRAY:
             try_wrong_count(message, field, body, path);
-            memcpy(&elements, body + field->offset, sizeof elements);
+            memcpy(&elements, body + field->offset, sizeof(elements));
             memcpy(&count, body + field->count_offset, 4);
             assert_true(count > 0);
-            snprintf(path, sizeof path, "%s.%s[%u]", parent, field->name, count - 1);
+            snprintf(path, sizeof(path), "%s.%s[%u]", parent, field->name, count - 1);
             try_wrong_fields(message, field->record(), elements + (count - 1) * field->record()->size_bytes, path);
             break;
         }
@@ -228,7 +227,7 @@ TEST(bulk_padding_must_be_zero)
     struct decode_error error;
     static const uint8_t bytes[3] = {1, 2, 3};
     message.blob_data.data = bytes;
-    message.blob_data.data_bytes = sizeof bytes;
+    message.blob_data.data_bytes = sizeof(bytes);
     size_t count = encode_both(&message);
     assert_int_equal(count, 2 + 40 + 4 + 2 + 3);
     assert_true(decode_copy(&back, MESSAGE_BLOB_DATA, encoded, count, &error));

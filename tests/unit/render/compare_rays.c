@@ -91,7 +91,7 @@ EACH_TEST(make_tally, free_tally)
 
 TEST(percentiles_are_true_to_a_bin_and_the_maximum_is_exact)
 {
-    struct error_histogram *histogram = calloc(1, sizeof *histogram);
+    struct error_histogram *histogram = calloc(1, sizeof(*histogram));
     for (int i = 1000; i >= 1; i--)
         error_histogram_add(histogram, (float)i * 1e-7f);
     assert_close(error_histogram_percentile(histogram, 0.5), 500e-7, PERCENTILE_TOLERANCE);
@@ -104,7 +104,7 @@ TEST(percentiles_are_true_to_a_bin_and_the_maximum_is_exact)
 
 TEST(zeros_stay_zero_and_nan_is_the_maximum)
 {
-    struct error_histogram *histogram = calloc(1, sizeof *histogram);
+    struct error_histogram *histogram = calloc(1, sizeof(*histogram));
     assert_true(error_histogram_percentile(histogram, 0.5) == 0.0f);
     for (int i = 0; i < 60; i++)
         error_histogram_add(histogram, 0.0f);
@@ -124,7 +124,7 @@ TEST(zeros_stay_zero_and_nan_is_the_maximum)
 TEST(every_size_of_error_falls_into_its_own_bin)
 {
     for (float error = 1e-14f; error < 6e4f; error *= 1.7f) {
-        struct error_histogram *histogram = calloc(1, sizeof *histogram);
+        struct error_histogram *histogram = calloc(1, sizeof(*histogram));
         error_histogram_add(histogram, 2.0f * error);
         error_histogram_add(histogram, error);
         assert_close(error_histogram_percentile(histogram, 0.5), error, PERCENTILE_TOLERANCE);
@@ -319,9 +319,9 @@ TEST(moved_rays_are_a_few_rounding_steps_off_and_still_different_rays)
             assert_true(off < 4000 * 2e-6f);
         }
         assert_true(moved[i].origin_t_min[3] == 0.5f);
-        assert_memory_equal(moved[i].direction_t_max, ray.direction_t_max, sizeof ray.direction_t_max);
+        assert_memory_equal(moved[i].direction_t_max, ray.direction_t_max, sizeof(ray.direction_t_max));
         for (int j = 0; j < i; j++)
-            assert_memory_not_equal(&moved[i], &moved[j], sizeof moved[i]);
+            assert_memory_not_equal(&moved[i], &moved[j], sizeof(moved[i]));
     }
     /* A shadow ray to a sun may end anywhere; what is in its way is in the scene. */
     uint lit = ~0u, dark = 0;
@@ -338,7 +338,7 @@ TEST(the_order_of_rays_and_slices_changes_no_figure)
     struct wave_tally *forward = *state, *parts[3];
     struct wave_comparison a, b;
     for (int i = 0; i < 3; i++)
-        parts[i] = calloc(1, sizeof *parts[i]);
+        parts[i] = calloc(1, sizeof(*parts[i]));
     for (int i = 0; i < 3000; i++)
         compare(forward, &down, hit_at(4), hit_at(4 + (float)(i % 997) * 1e-6f));
     for (int i = 2999; i >= 0; i--)
@@ -351,7 +351,7 @@ TEST(the_order_of_rays_and_slices_changes_no_figure)
     wave_tally_figures(parts[1], &b);
     assert_int_equal(b.first_ns, 12);
     b.first_ns = 0;
-    assert_memory_equal(&a, &b, offsetof(struct wave_comparison, normal_greatest) + sizeof a.normal_greatest);
+    assert_memory_equal(&a, &b, offsetof(struct wave_comparison, normal_greatest) + sizeof(a.normal_greatest));
     assert_int_equal(b.rays, 3000);
     for (int i = 0; i < 3; i++)
         free(parts[i]);

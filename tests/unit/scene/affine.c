@@ -35,8 +35,8 @@ TEST(a_product_may_overwrite_its_factors)
 {
     float expected[12], a[12], b[12];
     affine_multiply(expected, turned, turned);
-    memcpy(a, turned, sizeof a);
-    memcpy(b, turned, sizeof b);
+    memcpy(a, turned, sizeof(a));
+    memcpy(b, turned, sizeof(b));
     affine_multiply(a, a, turned);
     affine_multiply(b, b, b);
     assert_near(a, expected, 12, 0);
@@ -76,9 +76,9 @@ TEST(flattening_transforms_have_no_inverse)
         {NAN, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0},
         {1e-39f, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}, /* the inverse is beyond a float */
     };
-    for (size_t i = 0; i < sizeof flat / sizeof flat[0]; i++) {
+    for (size_t i = 0; i < sizeof(flat) / sizeof(flat[0]); i++) {
         float inverse[12];
-        memset(inverse, 0x55, sizeof inverse);
+        memset(inverse, 0x55, sizeof(inverse));
         if (affine_invert(inverse, flat[i]))
             fail_msg("matrix %zu was inverted", i);
         assert_near(inverse, (const float[12]){0}, 12, 0);

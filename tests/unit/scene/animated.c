@@ -56,7 +56,7 @@ TEST(joints_and_targets_come_with_all_they_need)
     for (int array = MESH_TARGET_POSITIONS; array <= MESH_TARGET_TANGENTS; array++) {
         const char *names[] = {"target positions", "target normals", "target tangents"};
         char field[64];
-        snprintf(field, sizeof field, "edits[0] (mesh 7).arrays[%d] (%s)", array, names[array - 9]);
+        snprintf(field, sizeof(field), "edits[0] (mesh 7).arrays[%d] (%s)", array, names[array - 9]);
         mesh = add_mesh(&list, 7);
         mesh->arrays[array] = make_blob(lifts, 48);
         expect_refusal(scene, &list, ERROR_INVALID, field); /* no targets */
@@ -85,7 +85,7 @@ TEST(joints_fit_their_counts_and_weights_are_not_negative)
     add_targets(add_mesh(&list, 7), lifts, 2)->target_count = UINT32_MAX;
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (mesh 7).target_count");
     const float bad[] = {-1e-30f, NAN, INFINITY, 2e18f};
-    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
+    for (size_t i = 0; i < sizeof(bad) / sizeof(bad[0]); i++) {
         float weights[8] = {0, 0, 0, 0, 0, bad[i], 0, 0};
         add_joints(add_mesh(&list, 7), two_joints, weights);
         expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (mesh 7).arrays[8] (joint weights)");
@@ -223,7 +223,7 @@ TEST(many_channels_with_equal_times_stay_distinct)
     enum { COUNT = 4 << 20, CHANNELS = 20, LEAP = COUNT - 3 };
     struct scene *scene = animated_scene();
     struct draft_list list = {0};
-    float *times = malloc(COUNT * sizeof *times);
+    float *times = malloc(COUNT * sizeof(*times));
     assert_non_null(times);
     for (int i = 0; i < COUNT; i++)
         times[i] = (float)(i < LEAP ? i : i - LEAP);
@@ -336,7 +336,7 @@ TEST(memory_of_what_moves_is_counted)
     uint64_t host_bytes = scene->host_bytes, table_bytes = scene->table_bytes;
     add_targets(add_joints(add_mesh(&list, 1), two_joints, halves), lifts, 2);
     expect_commit(scene, &list);
-    assert_int_equal(scene->host_bytes - host_bytes, sizeof two_joints + sizeof halves + sizeof lifts);
+    assert_int_equal(scene->host_bytes - host_bytes, sizeof(two_joints) + sizeof(halves) + sizeof(lifts));
     assert_int_equal(scene->table_bytes, table_bytes);
     struct scene_node *node = add_node(&list, 1, 0);
     node->weights = make_weights((float[]){1, 2, 3}, 3);

@@ -42,7 +42,7 @@ TEST(a_step_holds_until_the_next_key)
     const float times[] = {1, 2, 4}, values[] = {10, 20, 40};
     struct curve curve = curve_of(INTERPOLATION_STEP, times, 3, values, 1);
     const double cases[][2] = {{-5, 10}, {1, 10}, {1.999, 10}, {2, 20}, {3.9, 20}, {4, 40}, {9, 40}};
-    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++)
+    for (size_t i = 0; i < sizeof(cases) / sizeof(cases[0]); i++)
         assert_true(number_at(&curve, cases[i][0]) == cases[i][1]);
 }
 
@@ -52,7 +52,7 @@ TEST(a_line_is_straight_between_keys_and_still_outside)
     struct curve curve = curve_of(INTERPOLATION_LINEAR, times, 3, values, 2);
     const double cases[][3] = {{0, 10, 1},  {1.25, 12.5, 1.25}, {2, 20, 2},
                                {3, 30, -2}, {3.5, 35, -4},      {5, 40, -6}};
-    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+    for (size_t i = 0; i < sizeof(cases) / sizeof(cases[0]); i++) {
         double value[2];
         curve_at(&curve, cases[i][0], value);
         expect("first number", value[0], cases[i][1], 1e-12);
@@ -201,7 +201,7 @@ static void expect_turn(const char *what, const double q[4], double degrees, dou
 TEST(slerp_turns_evenly_along_the_shorter_arc)
 {
     const double arcs[][3] = {{20, 140, 120}, {10, 350, -20}, {-90, 80, 170}, {30, 30, 0}, {5, 5.001, 0.001}};
-    for (size_t i = 0; i < sizeof arcs / sizeof arcs[0]; i++) {
+    for (size_t i = 0; i < sizeof(arcs) / sizeof(arcs[0]); i++) {
         const float times[] = {1, 3};
         float values[8];
         turn(arcs[i][0], 1, values);
@@ -267,7 +267,7 @@ TEST(what_has_no_direction_is_no_rotation)
     double q[4];
     for (double t = 0; t <= 1; t += 0.5) {
         curve_rotation_at(&curve, t, q);
-        assert_memory_equal(q, ((double[]){0, 0, 0, 1}), sizeof q);
+        assert_memory_equal(q, ((double[]){0, 0, 0, 1}), sizeof(q));
     }
     /* Half a turn apart both arcs are as short; what comes is a rotation. */
     curve = curve_of(INTERPOLATION_LINEAR, times, 2, opposite, 4);
@@ -306,7 +306,7 @@ TEST(how_far_a_rotation_turns_is_the_sum_of_its_arcs)
                                {5, 6, 0},
                                {2, 2.5, 5},
                                {3.9, 4, 10}};
-    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++)
+    for (size_t i = 0; i < sizeof(cases) / sizeof(cases[0]); i++)
         expect("turn", curve_turn_bound(&curve, cases[i][0], cases[i][1]) * 180 / PI, cases[i][2], 1e-4);
     curve.interpolation = INTERPOLATION_STEP;
     expect("steps", curve_turn_bound(&curve, 0.5, 3.5) * 180 / PI, 40 + 50 + 10, 1e-4);

@@ -35,7 +35,7 @@ TEST(a_vertex_is_the_mean_of_where_its_joints_put_it)
     /* Joint 1 moves by 10 along x; joint 2 below it turns a quarter about z. */
     add_node(&list, 1, 0)->parent_from_node[3] = 10;
     const float quarter[12] = {0, -1, 0, 0, 1, 0, 0, 0, 0, 0, 1, 0};
-    memcpy(add_node(&list, 2, 1)->parent_from_node, quarter, sizeof quarter);
+    memcpy(add_node(&list, 2, 1)->parent_from_node, quarter, sizeof(quarter));
     /* Weights of vertex 0: none; 1: the first alone; 2: a quarter and three, of a sum of 8; 3: the second alone.
      */
     const float weights[8] = {0, 0, 5, 0, 2, 6, 0, 0.125f};
@@ -46,7 +46,7 @@ TEST(a_vertex_is_the_mean_of_where_its_joints_put_it)
     struct scene_skin *skin = add_skin(&list, 1, (uint32_t[]){1, 2}, 2);
     /* The second joint's own place in the mesh is at 1 0 0. */
     const float inverse_binds[24] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 1, 0, 0, -1, 0, 1, 0, 0, 0, 0, 1, 0};
-    skin->joint_from_mesh = make_blob(inverse_binds, sizeof inverse_binds);
+    skin->joint_from_mesh = make_blob(inverse_binds, sizeof(inverse_binds));
     expect_commit(scene, &list);
     float positions[12];
     deform(scene, NULL, 3, positions, NULL);
@@ -64,8 +64,8 @@ TEST(a_vertex_is_the_mean_of_where_its_joints_put_it)
     assert_true(scene_flatten(scene, NULL, NODE_MESH, &instances, &count));
     assert_int_equal(count, 1);
     const float identity[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
-    assert_memory_equal(instances[0].world_from_object, identity, sizeof identity);
-    assert_memory_equal(instances[0].object_from_world, identity, sizeof identity);
+    assert_memory_equal(instances[0].world_from_object, identity, sizeof(identity));
+    assert_memory_equal(instances[0].object_from_world, identity, sizeof(identity));
     free(instances);
     scene_destroy(scene);
 }
@@ -82,7 +82,7 @@ TEST(joints_below_joints_follow_a_clip)
     add_shown(&list, 3, NODE_MESH, 1)->skin = 1;
     struct scene_skin *skin = add_skin(&list, 1, (uint32_t[]){1, 2}, 2);
     const float inverse_binds[24] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 1, 0, 0, -1, 0, 1, 0, 0, 0, 0, 1, 0};
-    skin->joint_from_mesh = make_blob(inverse_binds, sizeof inverse_binds);
+    skin->joint_from_mesh = make_blob(inverse_binds, sizeof(inverse_binds));
     add_clip(&list, 1, (float[]){0, 1, 0, 0, 0, 1, 0, 0, 0.70710678f, 0.70710678f}, 10);
     add_channel(&list, 1, 1, CHANNEL_NODE_ROTATION, 1, 4, 2);
     add_channel(&list, 2, 1, CHANNEL_NODE_ROTATION, 2, 4, 2);
@@ -118,7 +118,7 @@ TEST(targets_are_added_before_joints_move)
     struct scene *scene = new_scene();
     struct draft_list list = {0};
     const float doubled[12] = {2, 0, 0, 0, 0, 2, 0, 0, 0, 0, 2, 0};
-    memcpy(add_node(&list, 1, 0)->parent_from_node, doubled, sizeof doubled);
+    memcpy(add_node(&list, 1, 0)->parent_from_node, doubled, sizeof(doubled));
     const float weights[8] = {1, 0, 1, 0, 1, 0, 1, 0};
     const float targets[24] = {0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1, 3, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
     add_targets(add_joints(add_mesh(&list, 1), both, weights), targets, 2);
@@ -151,7 +151,7 @@ TEST(targets_are_added_before_joints_move)
     expect_commit(scene, &list);
     assert_false(scene_node_deforms(scene_node(scene, 2), scene_mesh(scene, 1)));
     deform(scene, NULL, 2, positions, NULL);
-    assert_memory_equal(positions, square, sizeof square);
+    assert_memory_equal(positions, square, sizeof(square));
     scene_destroy(scene);
 }
 
@@ -165,13 +165,13 @@ TEST(normals_follow_scaled_sheared_and_mirrored_joints)
         {-2, 0, 0, 0, 0, 1, 0.5f, 0, 0.75f, 0, 1, 0},
         {1, 0, 0, 0, 0, 1, 0, 0, 0.5f, -0.25f, -1, 0},
     };
-    for (size_t i = 0; i < sizeof matrices / sizeof matrices[0]; i++) {
+    for (size_t i = 0; i < sizeof(matrices) / sizeof(matrices[0]); i++) {
         struct scene *scene = new_scene();
         struct draft_list list = {0};
-        memcpy(add_node(&list, 1, 0)->parent_from_node, matrices[i], sizeof matrices[i]);
+        memcpy(add_node(&list, 1, 0)->parent_from_node, matrices[i], sizeof(matrices[i]));
         const float weights[8] = {1, 0, 1, 0, 1, 0, 1, 0};
         struct scene_mesh *mesh = add_joints(add_mesh(&list, 1), both, weights);
-        mesh->arrays[MESH_NORMALS] = make_blob(up_normals, sizeof up_normals);
+        mesh->arrays[MESH_NORMALS] = make_blob(up_normals, sizeof(up_normals));
         add_skin(&list, 1, (uint32_t[]){1, 1}, 2);
         add_shown(&list, 2, NODE_MESH, 1)->skin = 1;
         expect_commit(scene, &list);
@@ -198,8 +198,8 @@ TEST(morphed_normals_are_given_along)
     struct draft_list list = {0};
     const float targets[12] = {0}, tilts[12] = {1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
     struct scene_mesh *mesh = add_targets(add_mesh(&list, 1), targets, 1);
-    mesh->arrays[MESH_NORMALS] = make_blob(up_normals, sizeof up_normals);
-    mesh->arrays[MESH_TARGET_NORMALS] = make_blob(tilts, sizeof tilts);
+    mesh->arrays[MESH_NORMALS] = make_blob(up_normals, sizeof(up_normals));
+    mesh->arrays[MESH_TARGET_NORMALS] = make_blob(tilts, sizeof(tilts));
     mesh->weights = make_weights((float[]){1}, 1);
     mesh->weight_count = 1;
     add_shown(&list, 2, NODE_MESH, 1);

@@ -70,14 +70,14 @@ static inline struct scene_mesh *add_mesh(struct draft_list *list, uint32_t id)
     struct scene_mesh *mesh = &add_set(list, OBJECT_MESH, id)->set.mesh;
     mesh->vertex_count = 4;
     mesh->triangle_count = 2;
-    mesh->arrays[MESH_POSITIONS] = make_blob(square, sizeof square);
-    mesh->arrays[MESH_INDICES] = make_blob(square_indices, sizeof square_indices);
+    mesh->arrays[MESH_POSITIONS] = make_blob(square, sizeof(square));
+    mesh->arrays[MESH_INDICES] = make_blob(square_indices, sizeof(square_indices));
     return mesh;
 }
 
 static inline void add_range(struct scene_mesh *mesh, uint32_t first, uint32_t count, uint32_t material)
 {
-    mesh->ranges = realloc(mesh->ranges, (mesh->range_count + 1) * sizeof *mesh->ranges);
+    mesh->ranges = realloc(mesh->ranges, (mesh->range_count + 1) * sizeof(*mesh->ranges));
     assert_non_null(mesh->ranges);
     mesh->ranges[mesh->range_count++] = (struct material_range){first, count, material};
 }
@@ -134,7 +134,7 @@ static inline void expect_refusal(struct scene *scene, struct draft_list *list, 
         fail_msg("error kind %d, expected %d (%s)", error.kind, kind, error.text);
     assert_true(strlen(error.text) > 0);
     struct snapshot after = snapshot_of(scene);
-    assert_memory_equal(before.counts, after.counts, sizeof before.counts);
+    assert_memory_equal(before.counts, after.counts, sizeof(before.counts));
     assert_int_equal(after.scene.revision, before.scene.revision);
     assert_int_equal(after.scene.host_bytes, before.scene.host_bytes);
     assert_int_equal(after.scene.geometry_revision, before.scene.geometry_revision);
@@ -156,14 +156,14 @@ static inline struct scene_skin *add_skin(struct draft_list *list, uint32_t id, 
 {
     struct scene_skin *skin = &add_set(list, OBJECT_SKIN, id)->set.skin;
     skin->joint_count = count;
-    skin->joints = make_blob(joints, count * sizeof *joints);
+    skin->joints = make_blob(joints, count * sizeof(*joints));
     return skin;
 }
 
 static inline struct scene_clip *add_clip(struct draft_list *list, uint32_t id, const float *floats, size_t count)
 {
     struct scene_clip *clip = &add_set(list, OBJECT_CLIP, id)->set.clip;
-    clip->floats = make_blob(floats, count * sizeof *floats);
+    clip->floats = make_blob(floats, count * sizeof(*floats));
     return clip;
 }
 
@@ -188,8 +188,8 @@ static inline struct scene_mesh *add_joints(struct scene_mesh *mesh, const uint1
                                             const float weights[8])
 {
     mesh->influence_count = 2;
-    mesh->arrays[MESH_JOINTS] = make_blob(joints, 8 * sizeof *joints);
-    mesh->arrays[MESH_WEIGHTS] = make_blob(weights, 8 * sizeof *weights);
+    mesh->arrays[MESH_JOINTS] = make_blob(joints, 8 * sizeof(*joints));
+    mesh->arrays[MESH_WEIGHTS] = make_blob(weights, 8 * sizeof(*weights));
     return mesh;
 }
 
@@ -197,15 +197,15 @@ static inline struct scene_mesh *add_joints(struct scene_mesh *mesh, const uint1
 static inline struct scene_mesh *add_targets(struct scene_mesh *mesh, const float *positions, uint32_t count)
 {
     mesh->target_count = count;
-    mesh->arrays[MESH_TARGET_POSITIONS] = make_blob(positions, count * sizeof square);
+    mesh->arrays[MESH_TARGET_POSITIONS] = make_blob(positions, count * sizeof(square));
     return mesh;
 }
 
 static inline float *make_weights(const float *weights, uint32_t count)
 {
-    float *copy = malloc(count * sizeof *copy);
+    float *copy = malloc(count * sizeof(*copy));
     assert_non_null(copy);
-    memcpy(copy, weights, count * sizeof *copy);
+    memcpy(copy, weights, count * sizeof(*copy));
     return copy;
 }
 

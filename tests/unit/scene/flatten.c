@@ -50,7 +50,7 @@ static struct scene_edit node_edit(uint32_t id, uint32_t parent, enum node_kind 
     edit.set.node.parent = parent;
     edit.set.node.kind = kind;
     edit.set.node.object = kind == NODE_GROUP ? 0 : 1;
-    memcpy(edit.set.node.parent_from_node, m, 12 * sizeof *m);
+    memcpy(edit.set.node.parent_from_node, m, 12 * sizeof(*m));
     return edit;
 }
 
@@ -87,7 +87,7 @@ static void expect_matrix(const float got[12], const double expected[12], uint32
 TEST(instances_agree_with_the_plain_recursion_in_the_order_of_ids)
 {
     struct scene *scene = scene_with_camera();
-    struct scene_edit *edits = calloc(NODES, sizeof *edits);
+    struct scene_edit *edits = calloc(NODES, sizeof(*edits));
     assert_non_null(edits);
     uint32_t ids[NODES];
     for (uint32_t i = 0; i < NODES; i++) {

@@ -54,7 +54,7 @@ TEST(a_part_that_no_channel_gives_is_that_of_the_node)
     /* Turned by 90 degrees about x, scaled by 2, 3, -4: a mirror; and moved. */
     const float mirrored[12] = {2, 0, 0, 10, 0, 0, 4, 20, 0, 3, 0, 30};
     for (uint32_t node = 1; node <= 3; node++)
-        memcpy(add_node(&list, node, 0)->parent_from_node, mirrored, sizeof mirrored);
+        memcpy(add_node(&list, node, 0)->parent_from_node, mirrored, sizeof(mirrored));
     add_clip(&list, 1, (float[]){0, 1, 1, 2, 3, 5, 6, 7}, 8);
     add_channel(&list, 1, 1, CHANNEL_NODE_TRANSLATION, 1, 3, 2);
     add_channel(&list, 2, 1, CHANNEL_NODE_SCALE, 2, 3, 2);
@@ -81,7 +81,7 @@ TEST(a_turned_mirror_stays_a_mirror_and_keeps_its_size)
     struct scene *scene = new_scene();
     struct draft_list list = {0};
     const float mirrored[12] = {0, 3, 0, 1, 2, 0, 0, 2, 0, 0, 4, 3}; /* determinant -24 */
-    memcpy(add_node(&list, 1, 0)->parent_from_node, mirrored, sizeof mirrored);
+    memcpy(add_node(&list, 1, 0)->parent_from_node, mirrored, sizeof(mirrored));
     add_clip(&list, 1, quarter_turns, 15);
     add_channel(&list, 1, 1, CHANNEL_NODE_ROTATION, 1, 4, 3);
     expect_commit(scene, &list);
@@ -100,8 +100,8 @@ TEST(a_flat_node_can_be_scaled_up_again)
     struct scene *scene = new_scene();
     struct draft_list list = {0};
     const float flat[12] = {0, 0, 0, 0, 0, 0, 5, 0, 0, -5, 0, 0}, point[12] = {0};
-    memcpy(add_node(&list, 1, 0)->parent_from_node, flat, sizeof flat);
-    memcpy(add_node(&list, 2, 0)->parent_from_node, point, sizeof point);
+    memcpy(add_node(&list, 1, 0)->parent_from_node, flat, sizeof(flat));
+    memcpy(add_node(&list, 2, 0)->parent_from_node, point, sizeof(point));
     add_clip(&list, 1, (float[]){0, 1, 2, 3}, 4);
     add_channel(&list, 1, 1, CHANNEL_NODE_SCALE, 1, 3, 1);
     add_channel(&list, 2, 1, CHANNEL_NODE_SCALE, 2, 3, 1);
@@ -168,7 +168,7 @@ TEST(clips_begin_end_repeat_and_run_at_their_speed)
         {{.clip = 1, .speed = 1, .loop = true}, -2, 10},
         {{.clip = 1, .speed = 2, .start_s = 1, .loop = true}, 1 + 2 * 7 + 1, 20},
     };
-    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+    for (size_t i = 0; i < sizeof(cases) / sizeof(cases[0]); i++) {
         struct scene_pose pose = pose_at(scene, &cases[i].use, 1, cases[i].time_s);
         double x = (double)scene_pose_parent_from_node(&pose, scene_node(scene, 1))[3];
         if (!(fabs(x - cases[i].x) < 1e-5))

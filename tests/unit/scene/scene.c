@@ -29,7 +29,7 @@ TEST(an_edit_may_refer_to_what_a_later_one_makes)
     assert_int_equal(scene_mesh(scene, 7)->ranges[0].material, 5);
     assert_int_equal(scene_mesh(scene, 7)->base.revision, 1);
     assert_non_null(scene_texture(scene, 9)->texels);
-    assert_true(scene->host_bytes > sizeof square + sizeof square_indices);
+    assert_true(scene->host_bytes > sizeof(square) + sizeof(square_indices));
     scene_destroy(scene);
 }
 
@@ -164,7 +164,7 @@ TEST(numbers_that_are_no_place_are_refused)
     struct scene *scene = new_scene();
     struct draft_list list = {0};
     const float bad[] = {NAN, INFINITY, -INFINITY, 2e18f, -2e18f};
-    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
+    for (size_t i = 0; i < sizeof(bad) / sizeof(bad[0]); i++) {
         for (size_t place = 0; place < 12; place += 11) {
             float *positions = (float *)(void *)add_mesh(&list, 1)->arrays[MESH_POSITIONS]->data;
             positions[place] = bad[i];
@@ -172,10 +172,10 @@ TEST(numbers_that_are_no_place_are_refused)
         }
     }
     float normals[12] = {0, 0, 1, 0, 0, 1, 0, NAN, 1, 0, 0, 1};
-    add_mesh(&list, 1)->arrays[MESH_NORMALS] = make_blob(normals, sizeof normals);
+    add_mesh(&list, 1)->arrays[MESH_NORMALS] = make_blob(normals, sizeof(normals));
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (mesh 1).arrays[2] (normals)");
     float texcoords[8] = {0, 0, 1, 0, 0, 1, 0, INFINITY};
-    add_mesh(&list, 1)->arrays[MESH_TEXCOORDS_1] = make_blob(texcoords, sizeof texcoords);
+    add_mesh(&list, 1)->arrays[MESH_TEXCOORDS_1] = make_blob(texcoords, sizeof(texcoords));
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (mesh 1).arrays[5] (texture coordinates 1)");
     const float radii[][4] = {{0, 0, 0, 0}, {0, 0, 0, -1}, {0, 0, 0, NAN}, {0, INFINITY, 0, 1}};
     for (int i = 0; i < 4; i++) {
@@ -367,7 +367,7 @@ TEST(limits_are_kept_and_reported)
     expect_commit(scene, &list);
     const float spheres[4 * 60] = {[3] = 1};
     float numbers[4 * 60];
-    memcpy(numbers, spheres, sizeof numbers);
+    memcpy(numbers, spheres, sizeof(numbers));
     for (int i = 0; i < 60; i++)
         numbers[4 * i + 3] = 1;
     add_spheres(&list, 1, numbers, 60);
@@ -404,7 +404,7 @@ static void expect_touched(const struct scene *scene, struct revisions expected)
     uint64_t r = scene->revision;
     struct revisions got = {scene->geometry_revision == r, scene->instances_revision == r,
                             scene->shading_revision == r, scene->lights_revision == r};
-    if (memcmp(&got, &expected, sizeof got))
+    if (memcmp(&got, &expected, sizeof(got)))
         fail_msg("geometry %d, instances %d, shading %d, lights %d; expected %d %d %d %d", (int)got.geometry,
                  (int)got.instances, (int)got.shading, (int)got.lights, (int)expected.geometry,
                  (int)expected.instances, (int)expected.shading, (int)expected.lights);

@@ -30,7 +30,7 @@ static struct {
 
 static inline void event(enum engine_event_kind kind, const struct engine_command *command, uint32_t request)
 {
-    struct engine_event *made = calloc(1, sizeof *made);
+    struct engine_event *made = calloc(1, sizeof(*made));
     made->kind = kind;
     made->client = command->client;
     made->request = request;
@@ -38,7 +38,7 @@ static inline void event(enum engine_event_kind kind, const struct engine_comman
     if (kind == ENGINE_FAILED)
         error_set(&made->error, ERROR_CANCELLED, NULL, "cancelled");
     if (kind == ENGINE_STATS_READY) {
-        made->stats = calloc(1, sizeof *made->stats);
+        made->stats = calloc(1, sizeof(*made->stats));
         strcpy(made->stats->device.name, "none");
     }
     queue_push(engine.events, made);
@@ -47,11 +47,11 @@ static inline void event(enum engine_event_kind kind, const struct engine_comman
 static inline void render(const struct engine_command *command)
 {
     for (; engine.next_frame <= engine.last_frame && engine.next_frame < engine.credit_seen; engine.next_frame++) {
-        struct engine_event *made = calloc(1, sizeof *made);
+        struct engine_event *made = calloc(1, sizeof(*made));
         made->kind = ENGINE_FRAME;
         made->client = command->client;
         made->request = engine.job_request;
-        made->frame = calloc(1, sizeof *made->frame);
+        made->frame = calloc(1, sizeof(*made->frame));
         struct engine_frame *frame = made->frame;
         frame->frame = engine.next_frame;
         frame->request.width = frame->request.height = frame->request.samples = 1;
@@ -166,7 +166,7 @@ static inline void drop_event(void *item)
 
 static inline struct engine_port engine_begin(void)
 {
-    memset(&engine, 0, sizeof engine);
+    memset(&engine, 0, sizeof(engine));
     engine.events = queue_create(4096, true);
     return (struct engine_port){
         .submit = submit, .event_fd = event_fd, .next_event = next_event, .report_sent = report_sent};

@@ -78,7 +78,7 @@ static inline void start_daemon(const struct hub_options *wanted)
     options.engine = engine_port(served.engine);
     strcpy(served.folder, "/tmp/farlight-test-XXXXXX");
     assert_non_null(mkdtemp(served.folder));
-    snprintf(served.address, sizeof served.address, "unix:%s/s tcp:127.0.0.1:0", served.folder);
+    snprintf(served.address, sizeof(served.address), "unix:%s/s tcp:127.0.0.1:0", served.folder);
     daemon_init(&served.daemon);
     assert_true(daemon_listen(&served.daemon, served.address, false, &error));
     assert_true(daemon_start(&served.daemon, &options, &error));
@@ -125,7 +125,7 @@ static inline void receive_some(struct client *client)
     struct pollfd fd = {.fd = client->fd, .events = POLLIN};
     if (poll(&fd, 1, 20000) != 1)
         fail_msg("nothing came for 20 s");
-    ssize_t got = recv(client->fd, client->in + client->in_used, sizeof client->in - client->in_used, 0);
+    ssize_t got = recv(client->fd, client->in + client->in_used, sizeof(client->in) - client->in_used, 0);
     if (got <= 0)
         fail_msg("the connection is closed");
     client->in_used += (size_t)got;
@@ -136,7 +136,7 @@ static inline void send_message(struct client *client, uint32_t request, uint32_
 {
     static uint8_t bytes[FRAMING_MESSAGE_MAX_BYTES];
     struct writer writer;
-    writer_init(&writer, bytes, sizeof bytes);
+    writer_init(&writer, bytes, sizeof(bytes));
     if (!message_write(&writer, request, channel, message))
         fail_msg("%s: %s", writer.error.field, writer.error.text);
     for (size_t sent = 0; sent < writer.used_bytes;) {
@@ -163,7 +163,7 @@ static inline void receive(struct client *client)
             fail_msg("%s: %s", error.field, error.text);
         client->consumed += frame.consumed_bytes;
         client->header = frame.header;
-        scratch_init(&client->scratch, client->scratch_data, sizeof client->scratch_data);
+        scratch_init(&client->scratch, client->scratch_data, sizeof(client->scratch_data));
         if (!message_decode(&client->message, frame.header.type, frame.payload, frame.header.payload_bytes,
                             &client->scratch, &error))
             fail_msg("%s: %s", error.field, error.text);
@@ -222,7 +222,7 @@ static inline void greet(struct client *client)
  */
 static inline struct client *knock(bool over_tcp)
 {
-    struct client *client = calloc(1, sizeof *client);
+    struct client *client = calloc(1, sizeof(*client));
     assert_non_null(client);
     const struct address *address = &served.daemon.listeners[over_tcp].address;
     client->fd = socket(address->storage.ss_family, SOCK_STREAM | SOCK_CLOEXEC, 0);
@@ -308,7 +308,7 @@ static inline void send_blob(struct client *client, uint32_t request, const stru
                              const void *data)
 {
     struct message message = made(MESSAGE_BLOB_DATA);
-    memcpy(message.blob_data.hash, reference->hash, sizeof reference->hash);
+    memcpy(message.blob_data.hash, reference->hash, sizeof(reference->hash));
     message.blob_data.data = data;
     message.blob_data.data_bytes = (uint32_t)reference->size_bytes;
     send_message(client, request, 1, &message);

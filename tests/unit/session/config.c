@@ -19,7 +19,7 @@ static bool read_text(struct config *config, const char *text, struct error *err
     int fd = memfd_create("config", MFD_CLOEXEC);
     assert_true(fd >= 0);
     assert_int_equal(write(fd, text, strlen(text)), strlen(text));
-    snprintf(path, sizeof path, "/proc/self/fd/%d", fd);
+    snprintf(path, sizeof(path), "/proc/self/fd/%d", fd);
     config_defaults(config);
     bool ok = config_read_file(config, path, false, error);
     close(fd);
@@ -89,7 +89,7 @@ TEST(a_mistake_is_reported_with_its_file_line_and_key)
         {"clients = 3\n", ":1", "clients"},
         {"[limits\nclients = 3\n", ":1", "section"},
     };
-    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+    for (size_t i = 0; i < sizeof(cases) / sizeof(cases[0]); i++) {
         struct config config;
         struct error error = {0};
         assert_false(read_text(&config, cases[i].text, &error));
@@ -147,7 +147,7 @@ TEST(what_is_dumped_reads_back_the_same)
     assert_non_null(strstr(text, "\n#requests = 64\n"));
     if (!read_text(&again, text, &error))
         fail_msg("%s: %s", error.field, error.text);
-    assert_memory_equal(&again, &config, sizeof config);
+    assert_memory_equal(&again, &config, sizeof(config));
     free(text);
 }
 
@@ -163,9 +163,9 @@ TEST(readers_are_names_and_numbers_of_users)
     assert_true(readers_have(&options.readers, 4294967));
     assert_false(readers_have(&options.readers, 1));
     static const char *const wrong[] = {"nobody-has-this-name", "-1", "4294967295", "1x"};
-    for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
+    for (size_t i = 0; i < sizeof(wrong) / sizeof(wrong[0]); i++) {
         char text[64];
-        snprintf(text, sizeof text, "[server]\nreaders = 0 %s\n", wrong[i]);
+        snprintf(text, sizeof(text), "[server]\nreaders = 0 %s\n", wrong[i]);
         error = (struct error){0};
         assert_true(read_text(&config, text, &error));
         assert_false(config_hub(&config, &options, &error));
@@ -220,7 +220,7 @@ TEST(the_file_in_conf_is_what_is_dumped)
         skip();
     }
     static char there[65536];
-    size_t there_bytes = fread(there, 1, sizeof there - 1, file);
+    size_t there_bytes = fread(there, 1, sizeof(there) - 1, file);
     fclose(file);
     there[there_bytes] = '\0';
     struct config config;

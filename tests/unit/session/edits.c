@@ -25,7 +25,7 @@ static void send_piece(uint32_t request, const struct record_blob_ref *reference
 {
     struct message message = made(MESSAGE_BLOB_DATA);
     message.blob_data.offset_bytes = offset;
-    memcpy(message.blob_data.hash, reference->hash, sizeof reference->hash);
+    memcpy(message.blob_data.hash, reference->hash, sizeof(reference->hash));
     message.blob_data.data = data + offset;
     message.blob_data.data_bytes = (uint32_t)bytes;
     send_message(request, 1, &message);
@@ -155,7 +155,7 @@ SESSION_TEST(a_blob_is_sent_once_and_needed_no_more)
 SESSION_TEST(a_blob_with_another_hash_is_refused_and_can_be_sent_again)
 {
     uint8_t data[1000] = {1, 2, 3}, wrong[1000] = {3, 2, 1};
-    struct record_blob_ref reference = reference_to(data, sizeof data);
+    struct record_blob_ref reference = reference_to(data, sizeof(data));
     assert_int_equal(offer(1, reference), 1);
     send_piece(2, &reference, wrong, 0, 1000);
     expect_error(2, PROTOCOL_ERROR_HASH_MISMATCH);
@@ -178,9 +178,9 @@ SESSION_TEST(a_size_that_is_only_declared_takes_no_room_from_others)
     assert_int_equal(offer(3, beyond), 1);
     send_piece(4, &beyond, data, 0, 8);
     expect_error(4, PROTOCOL_ERROR_LIMIT);
-    struct record_blob_ref whole = reference_to(data, sizeof data);
+    struct record_blob_ref whole = reference_to(data, sizeof(data));
     assert_int_equal(offer(5, whole), 1);
-    for (size_t offset = 0; offset < sizeof data; offset += 131072) {
+    for (size_t offset = 0; offset < sizeof(data); offset += 131072) {
         while (client.upload_credit < 16 + offset + 131072)
             expect_alive(9999);
         send_piece(6, &whole, data, offset, 131072);
@@ -191,14 +191,14 @@ SESSION_TEST(a_size_that_is_only_declared_takes_no_room_from_others)
 SESSION_TEST(made_up_hashes_with_the_same_head_stay_distinct)
 {
     uint8_t data[100] = {7};
-    struct record_blob_ref references[3] = {reference_to(data, sizeof data)};
+    struct record_blob_ref references[3] = {reference_to(data, sizeof(data))};
     for (uint8_t i = 1; i < 3; i++) {
         references[i] = references[0];
         references[i].hash[31] ^= i;
     }
     for (uint32_t i = 0; i < 3; i++)
         assert_int_equal(offer(1 + i, references[i]), 1);
-    send_piece(4, &references[0], data, 0, sizeof data);
+    send_piece(4, &references[0], data, 0, sizeof(data));
     expect(MESSAGE_OK, 4);
     assert_int_equal(offer(5, references[0]), 0);
     assert_int_equal(offer(6, references[1]), 1);
@@ -208,12 +208,12 @@ SESSION_TEST(made_up_hashes_with_the_same_head_stay_distinct)
 SESSION_TEST(blob_data_on_another_channel_ends_the_connection)
 {
     static const uint8_t data[100];
-    struct record_blob_ref reference = reference_to(data, sizeof data);
+    struct record_blob_ref reference = reference_to(data, sizeof(data));
     assert_int_equal(offer(1, reference), 1);
     struct message message = made(MESSAGE_BLOB_DATA);
     message.blob_data.data = data;
-    message.blob_data.data_bytes = sizeof data;
-    memcpy(message.blob_data.hash, reference.hash, sizeof reference.hash);
+    message.blob_data.data_bytes = sizeof(data);
+    memcpy(message.blob_data.hash, reference.hash, sizeof(reference.hash));
     send_message(2, 7, &message);
     expect_error(0, PROTOCOL_ERROR_PROTOCOL);
     expect(MESSAGE_GOODBYE, 0);
@@ -283,8 +283,8 @@ SESSION_TEST(skins_clips_and_channels_become_edits)
     const uint32_t joint = 7;
     const float matrix[12] = {1, 2, 3}, numbers[3] = {4, 5, 6};
     open_scene(1, 1);
-    struct record_blob_ref joints_and_matrices[] = {upload(10, &joint, 4), upload(12, matrix, sizeof matrix)};
-    struct record_blob_ref floats = upload(14, numbers, sizeof numbers);
+    struct record_blob_ref joints_and_matrices[] = {upload(10, &joint, 4), upload(12, matrix, sizeof(matrix))};
+    struct record_blob_ref floats = upload(14, numbers, sizeof(numbers));
     atomic_store(&engine.keep_commits, true);
     begin_edit(2, 1);
     send_skinned(2, joints_and_matrices, &floats);
@@ -303,10 +303,10 @@ SESSION_TEST(skins_clips_and_channels_become_edits)
     assert_true(kept->edits[2].object == OBJECT_SKIN && skin->base.id == 5 && skin->joint_count == 1);
     assert_string_equal(skin->base.name, "bones");
     assert_memory_equal(skin->joints->data, &joint, 4);
-    assert_memory_equal(skin->joint_from_mesh->data, matrix, sizeof matrix);
+    assert_memory_equal(skin->joint_from_mesh->data, matrix, sizeof(matrix));
     const struct scene_clip *clip = &kept->edits[3].set.clip;
     assert_true(kept->edits[3].object == OBJECT_CLIP && clip->base.id == 6);
-    assert_memory_equal(clip->floats->data, numbers, sizeof numbers);
+    assert_memory_equal(clip->floats->data, numbers, sizeof(numbers));
     const struct scene_channel *channel = &kept->edits[4].set.channel;
     assert_true(kept->edits[4].object == OBJECT_CHANNEL && channel->base.id == 8 && channel->clip == 6);
     assert_true(channel->path == CHANNEL_LIGHT_SIZE && channel->object == 9);

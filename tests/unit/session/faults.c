@@ -30,7 +30,7 @@ static void record(void *context, uint32_t request, uint32_t channel, const stru
 {
     (void)context;
     struct writer writer;
-    writer_init(&writer, recording.bytes + recording.count, sizeof recording.bytes - recording.count);
+    writer_init(&writer, recording.bytes + recording.count, sizeof(recording.bytes) - recording.count);
     assert_true(message_write(&writer, request, channel, message));
     recording.count += writer.used_bytes;
     recording.ends[recording.message_count++] = recording.count;

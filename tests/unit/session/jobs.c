@@ -264,7 +264,7 @@ SESSION_TEST(layers_that_pixels_or_messages_do_not_hold_are_refused)
         {15, 8192, PROTOCOL_PIXEL_FORMAT_RGBA32F, PROTOCOL_ENCODING_RAW, PROTOCOL_ERROR_LIMIT, "fewer layers"},
     };
     open_scene(1, 1);
-    for (uint32_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+    for (uint32_t i = 0; i < sizeof(cases) / sizeof(cases[0]); i++) {
         struct message message = render_message(0, 1);
         message.render.width = message.render.height = cases[i].edge_pixels;
         message.render.layers = cases[i].layers;
@@ -291,7 +291,7 @@ SESSION_TEST(settings_that_no_cube_has_are_refused_by_their_field)
         {0, 0, 3, "render.ldc_rays", "1, 4"},
     };
     open_scene(1, 1);
-    for (uint32_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+    for (uint32_t i = 0; i < sizeof(cases) / sizeof(cases[0]); i++) {
         struct message message = render_message(0, 1);
         message.render.settings.ldc.resolution = cases[i].resolution;
         message.render.settings.ldc.block = cases[i].block;
@@ -354,7 +354,7 @@ SESSION_TEST(settings_that_no_a_buffer_has_are_refused_by_their_field)
         {32, 64, "render.abuffer_voxels", "the 32 texels"},
     };
     open_scene(1, 1);
-    for (uint32_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+    for (uint32_t i = 0; i < sizeof(cases) / sizeof(cases[0]); i++) {
         struct message message = render_message(0, 1);
         message.render.settings.abuffer.resolution = cases[i].resolution;
         message.render.settings.abuffer.voxels = cases[i].voxels;
@@ -449,17 +449,17 @@ TEST(the_header_of_a_frame_chunk_is_what_the_codec_writes)
 {
     static uint8_t data[FRAME_PIECE_BYTES], bytes[FRAMING_MESSAGE_MAX_BYTES];
     static const size_t sizes[] = {1, 7, 8, 1000, FRAME_PIECE_BYTES};
-    for (size_t i = 0; i < sizeof sizes / sizeof sizes[0]; i++) {
+    for (size_t i = 0; i < sizeof(sizes) / sizeof(sizes[0]); i++) {
         struct message message = made(MESSAGE_FRAME_DATA);
         message.frame_data.offset_bytes = UINT64_C(0xa1b2c3d4);
         message.frame_data.data = data;
         message.frame_data.data_bytes = (uint32_t)sizes[i];
         struct writer writer;
-        writer_init(&writer, bytes, sizeof bytes);
+        writer_init(&writer, bytes, sizeof(bytes));
         assert_true(message_write(&writer, 77, 5, &message));
         uint8_t head[FRAME_DATA_HEAD_BYTES];
         frame_data_head(head, 77, 5, UINT64_C(0xa1b2c3d4), (uint32_t)sizes[i]);
-        assert_memory_equal(head, bytes, sizeof head);
-        assert_int_equal(writer.used_bytes, (sizeof head + sizes[i] + 7) & ~(size_t)7);
+        assert_memory_equal(head, bytes, sizeof(head));
+        assert_int_equal(writer.used_bytes, (sizeof(head) + sizes[i] + 7) & ~(size_t)7);
     }
 }

@@ -277,15 +277,15 @@ TEST(a_message_may_be_slow_but_not_slower_than_the_limit)
     options.connection_limits.progress_bytes_per_s = 300;
     start_daemon(&options);
     static uint8_t data[SLOW_BYTES], bytes[FRAMING_MESSAGE_MAX_BYTES];
-    struct record_blob_ref reference = reference_to(data, sizeof data);
+    struct record_blob_ref reference = reference_to(data, sizeof(data));
     struct client *within = come(false), *slower = come(false);
     assert_int_equal(offer(within, 1, reference), 1);
     struct message message = made(MESSAGE_BLOB_DATA);
-    memcpy(message.blob_data.hash, reference.hash, sizeof reference.hash);
+    memcpy(message.blob_data.hash, reference.hash, sizeof(reference.hash));
     message.blob_data.data = data;
-    message.blob_data.data_bytes = sizeof data;
+    message.blob_data.data_bytes = sizeof(data);
     struct writer writer;
-    writer_init(&writer, bytes, sizeof bytes);
+    writer_init(&writer, bytes, sizeof(bytes));
     assert_true(message_write(&writer, 2, 1, &message));
     /* 2000 bytes each time, as this thread may have to wait for the processor for seconds; and one byte each time.
      * The whole takes several times the grace. */
@@ -322,7 +322,7 @@ TEST(a_client_with_too_much_unread_output_is_disconnected_at_once)
         send_message(within, request, 0, &message); /* about 16 KiB of answers */
     uint8_t bytes[64];
     struct writer writer;
-    writer_init(&writer, bytes, sizeof bytes);
+    writer_init(&writer, bytes, sizeof(bytes));
     assert_true(message_write(&writer, 7, 0, &message));
     unsigned pings = 0;
     while (send(client->fd, bytes, writer.used_bytes, MSG_NOSIGNAL) == (ssize_t)writer.used_bytes) {
@@ -399,9 +399,9 @@ TEST(memory_of_a_scene_is_limited)
     start_daemon(&options);
     struct client *client = come(false), *other = come(true);
     static float spheres[4 * SPHERES];
-    for (size_t i = 0; i < sizeof spheres / sizeof spheres[0]; i++)
+    for (size_t i = 0; i < sizeof(spheres) / sizeof(spheres[0]); i++)
         spheres[i] = 1;
-    struct record_blob_ref reference = reference_to(spheres, sizeof spheres);
+    struct record_blob_ref reference = reference_to(spheres, sizeof(spheres));
     open_scene_as(client, 1, "", PROTOCOL_SHARING_PRIVATE);
     upload(client, 1, &reference, spheres);
     struct message message = made(MESSAGE_SET_SPHERES);
@@ -443,7 +443,7 @@ TEST(edges_of_images_are_limited)
     start_daemon(&options); /* 64 */
     struct client *client = come(false), *other = come(true);
     static uint8_t texels[64 * 64 * 4];
-    struct record_blob_ref reference = reference_to(texels, sizeof texels);
+    struct record_blob_ref reference = reference_to(texels, sizeof(texels));
     open_scene_as(client, 1, "", PROTOCOL_SHARING_PRIVATE);
     upload(client, 1, &reference, texels);
     send_texture(client, 3, 64, 64, &reference);
@@ -477,12 +477,12 @@ TEST(blobs_of_a_connection_are_limited)
     uint8_t data[4] = {0};
     for (uint8_t i = 1; i <= 3; i++) {
         data[0] = i;
-        struct record_blob_ref reference = reference_to(data, sizeof data);
+        struct record_blob_ref reference = reference_to(data, sizeof(data));
         upload(client, 2 * i, &reference, data);
         assert_int_equal(offer(client, 2 * i, reference), 0); /* the same one again is none more */
     }
     data[0] = 4;
-    struct record_blob_ref reference = reference_to(data, sizeof data);
+    struct record_blob_ref reference = reference_to(data, sizeof(data));
     struct message message = made(MESSAGE_BLOB_OFFER);
     message.blob_offer.blobs = &reference;
     message.blob_offer.blobs_count = 1;

@@ -61,7 +61,7 @@ static void link_deliver(struct link *link, struct pacing *pacing, uint64_t now_
         pacing_acknowledged(pacing, next->frame, next->whole, next->at_ns);
     }
     link->coming_count -= count;
-    memmove(link->coming, link->coming + count, link->coming_count * sizeof link->coming[0]);
+    memmove(link->coming, link->coming + count, link->coming_count * sizeof(link->coming[0]));
 }
 
 struct tally {

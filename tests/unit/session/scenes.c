@@ -60,7 +60,7 @@ static void expect_changed(struct client *client, uint32_t scene, uint64_t revis
 /* Puts the sphere up, with a node that shows it. */
 static void commit_sphere(struct client *client, uint32_t scene)
 {
-    struct record_blob_ref reference = reference_to(sphere, sizeof sphere);
+    struct record_blob_ref reference = reference_to(sphere, sizeof(sphere));
     if (offer(client, 1, reference)) {
         send_blob(client, 2, &reference, sphere);
         expect_ok(client, 2);
@@ -245,7 +245,7 @@ TEST(a_cut_connection_finds_its_scene_again_without_sending_it)
     one = come(false);
     assert_int_equal(attach(one, 9, "kept"), 1);
     assert_int_equal(render_frame(one, 20, 9), 1);
-    struct record_blob_ref reference = reference_to(sphere, sizeof sphere);
+    struct record_blob_ref reference = reference_to(sphere, sizeof(sphere));
     assert_int_equal(offer(one, 21, reference), 0); /* it is held, by the scene */
     cut(one, NULL);
     cut(witness, NULL);
@@ -265,9 +265,9 @@ TEST(a_client_that_leaves_a_shared_scene_does_not_change_it)
     struct message message = made(MESSAGE_STATS);
     send_message(witness, 21, 0, &message);
     expect(witness, MESSAGE_STATS_REPLY, 21);
-    assert_int_equal(witness->message.stats_reply.blob_bytes, sizeof sphere);
+    assert_int_equal(witness->message.stats_reply.blob_bytes, sizeof(sphere));
     assert_int_equal(witness->message.stats_reply.scenes_count, 1);
-    assert_int_equal(offer(witness, 22, reference_to(sphere, sizeof sphere)), 1);
+    assert_int_equal(offer(witness, 22, reference_to(sphere, sizeof(sphere))), 1);
     cut(witness, NULL);
 }
 
@@ -275,15 +275,15 @@ TEST_WITH(lingering_scenes_are_evicted_for_blobs, set_up_with_few_blobs, tear_do
 {
     /* Room for one blob of 200,000 bytes, not for two. */
     static float spheres[2][50000];
-    for (size_t i = 0; i < sizeof spheres / sizeof spheres[0]; i++) {
-        for (size_t k = 0; k < sizeof spheres[0] / sizeof spheres[0][0]; k++)
+    for (size_t i = 0; i < sizeof(spheres) / sizeof(spheres[0]); i++) {
+        for (size_t k = 0; k < sizeof(spheres[0]) / sizeof(spheres[0][0]); k++)
             spheres[i][k] = (float)(k % 5 + i + 1);
     }
     struct client *one = come(true), *witness = come(false);
     open_scene_as(one, 1, "shared", PROTOCOL_SHARING_SHARED);
     struct record_blob_ref references[2];
     for (int i = 0; i < 2; i++)
-        references[i] = reference_to(spheres[i], sizeof spheres[i]);
+        references[i] = reference_to(spheres[i], sizeof(spheres[i]));
     assert_int_equal(offer(one, 1, references[0]), 1);
     send_blob(one, 2, &references[0], spheres[0]);
     expect_ok(one, 2);
@@ -388,7 +388,7 @@ TEST_WITH(a_reader_looks_and_changes_nothing, set_up_for_readers, tear_down)
     submit_open(reader, 2, "", PROTOCOL_SHARING_PRIVATE);
     expect_error(reader, 102, PROTOCOL_ERROR_DENIED);
     assert_true(reader->message.error.remedy[0] != '\0');
-    struct record_blob_ref reference = reference_to(sphere, sizeof sphere);
+    struct record_blob_ref reference = reference_to(sphere, sizeof(sphere));
     struct message message = made(MESSAGE_BLOB_OFFER);
     message.blob_offer.blobs = &reference;
     message.blob_offer.blobs_count = 1;

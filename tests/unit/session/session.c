@@ -83,8 +83,8 @@ SESSION_TEST(messages_that_come_while_the_engine_is_full_are_answered_later)
 SESSION_TEST(garbage_is_answered_by_an_error_and_closes_the_connection)
 {
     uint8_t bytes[64];
-    memset(bytes, 0xff, sizeof bytes);
-    send_bytes(bytes, sizeof bytes);
+    memset(bytes, 0xff, sizeof(bytes));
+    send_bytes(bytes, sizeof(bytes));
     expect_error(0, PROTOCOL_ERROR_PROTOCOL);
     expect(MESSAGE_GOODBYE, 0);
     expect_end();
@@ -144,7 +144,7 @@ static void expect_closed_within_5_s(void)
     uint64_t before_ns = clock_now_ns();
     struct pollfd fd = {.fd = client.fd, .events = POLLIN};
     uint8_t bytes[4096];
-    while (poll(&fd, 1, 20000) == 1 && recv(client.fd, bytes, sizeof bytes, 0) > 0)
+    while (poll(&fd, 1, 20000) == 1 && recv(client.fd, bytes, sizeof(bytes), 0) > 0)
         continue;
     assert_in_range((clock_now_ns() - before_ns) / 1000000, 0, 5000);
 }
@@ -168,7 +168,7 @@ TEST(a_client_with_an_unfinished_message_is_disconnected)
     uint8_t header[FRAMING_HEADER_BYTES];
     framing_header_encode(header,
                           &(struct framing_header){.type = MESSAGE_PING, .payload_bytes = 10, .request = 1});
-    send_bytes(header, sizeof header);
+    send_bytes(header, sizeof(header));
     expect_error(0, PROTOCOL_ERROR_TIMEOUT);
     expect(MESSAGE_GOODBYE, 0);
     expect_closed_within_5_s();
@@ -185,7 +185,7 @@ TEST(a_client_that_the_daemon_does_not_read_has_its_time_later)
     open_scene(1, 1);
     uint8_t bytes[1024];
     struct writer writer;
-    writer_init(&writer, bytes, sizeof bytes);
+    writer_init(&writer, bytes, sizeof(bytes));
     struct message message = render_message(5, 6);
     assert_true(message_write(&writer, 2, 0, &message));
     size_t begun_bytes = writer.used_bytes + 20;
@@ -261,7 +261,7 @@ TEST(a_client_with_an_unfinished_record_is_disconnected)
     seal_with(&session_key);
     greet();
     const uint8_t length_and_a_byte[5] = {200};
-    send_plainly(length_and_a_byte, sizeof length_and_a_byte);
+    send_plainly(length_and_a_byte, sizeof(length_and_a_byte));
     expect_closed_within_5_s();
 }
 
@@ -271,7 +271,7 @@ TEST(a_changed_record_is_reported_and_closes_the_connection)
     seal_with(&session_key);
     greet();
     uint8_t record[21] = {17};
-    send_plainly(record, sizeof record);
+    send_plainly(record, sizeof(record));
     expect_error(0, PROTOCOL_ERROR_PROTOCOL);
     assert_string_equal(client.message.error.field, "record");
     expect(MESSAGE_GOODBYE, 0);

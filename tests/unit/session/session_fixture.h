@@ -100,7 +100,7 @@ static inline size_t open_records(void)
     enum sealed_result result = sealed_link_handshake(client.link, &error);
     while (result == SEALED_CONSUMED && !sealed_has_opened_last(client.link->sealed)) {
         size_t bytes = 0;
-        result = sealed_link_open(client.link, client.in + client.in_used, sizeof client.in - client.in_used,
+        result = sealed_link_open(client.link, client.in + client.in_used, sizeof(client.in) - client.in_used,
                                   &bytes, &error);
         client.in_used += bytes;
     }
@@ -135,7 +135,7 @@ static inline void receive_some(void)
         open_records();
         return;
     }
-    ssize_t got = recv(client.fd, client.in + client.in_used, sizeof client.in - client.in_used, 0);
+    ssize_t got = recv(client.fd, client.in + client.in_used, sizeof(client.in) - client.in_used, 0);
     if (got <= 0)
         fail_msg("the connection is closed");
     client.in_used += (size_t)got;
@@ -186,7 +186,7 @@ static inline void send_message(uint32_t request, uint32_t channel, const struct
 {
     static uint8_t bytes[FRAMING_MESSAGE_MAX_BYTES];
     struct writer writer;
-    writer_init(&writer, bytes, sizeof bytes);
+    writer_init(&writer, bytes, sizeof(bytes));
     if (!message_write(&writer, request, channel, message))
         fail_msg("%s: %s", writer.error.field, writer.error.text);
     send_bytes(bytes, writer.used_bytes);
@@ -211,14 +211,14 @@ static inline const struct message *receive_now(void)
             fail_msg("%s: %s", error.field, error.text);
         client.consumed += frame.consumed_bytes;
         client.header = frame.header;
-        scratch_init(&client.scratch, client.scratch_data, sizeof client.scratch_data);
+        scratch_init(&client.scratch, client.scratch_data, sizeof(client.scratch_data));
         if (!message_decode(&client.message, frame.header.type, frame.payload, frame.header.payload_bytes,
                             &client.scratch, &error))
             fail_msg("%s: %s", error.field, error.text);
         if (client.message.type == MESSAGE_CREDIT)
             client.upload_credit = client.message.credit.total;
         else if (client.message.type == MESSAGE_BLOCKED && ++client.blocked)
-            snprintf(client.blocked_text, sizeof client.blocked_text, "%s", client.message.blocked.text);
+            snprintf(client.blocked_text, sizeof(client.blocked_text), "%s", client.message.blocked.text);
         else
             return &client.message;
     }
@@ -334,7 +334,7 @@ static inline void start(const struct connection_limits *connection_limits)
     daemon_init(&served);
     assert_true(daemon_start(&served, &options, &error));
     assert_true(daemon_serve_fd(&served, pair[0], &error));
-    memset(&client, 0, sizeof client);
+    memset(&client, 0, sizeof(client));
     client.fd = pair[1];
     assert_int_equal(pthread_create(&thread, NULL, run, NULL), 0);
 }

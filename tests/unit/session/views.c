@@ -25,7 +25,7 @@ static struct {
 
 static void say(enum engine_event_kind kind, uint32_t request, enum error_code error)
 {
-    struct engine_event *made = calloc(1, sizeof *made);
+    struct engine_event *made = calloc(1, sizeof(*made));
     assert_non_null(made);
     made->kind = kind;
     made->client = 1;
@@ -134,8 +134,8 @@ static void told_nothing(void)
 /* A frame of a view, that shows a command and was taken up, read back and encoded at 100, 200 and 300 ns. */
 static struct engine_event *frame_of(uint32_t request, uint32_t number, uint64_t command, size_t bytes)
 {
-    struct engine_event *made = calloc(1, sizeof *made);
-    struct engine_frame *frame = calloc(1, sizeof *frame);
+    struct engine_event *made = calloc(1, sizeof(*made));
+    struct engine_frame *frame = calloc(1, sizeof(*frame));
     assert_true(made && frame);
     made->kind = ENGINE_FRAME;
     made->client = 1;
@@ -1089,7 +1089,7 @@ static bool all_answered(void)
 
 static void play_from(uint64_t chance)
 {
-    memset(&play, 0, sizeof play);
+    memset(&play, 0, sizeof(play));
     play.chance = chance;
     uint32_t request = 2;
     for (; request < REQUESTS / 2; request++) {

@@ -147,7 +147,7 @@ TEST(between_two_cameras_the_ends_are_the_cameras)
     camera_between(&from, &to, 0, &camera);
     check_place(camera.eye, 0, 0, 5);
     camera_between(&from, &to, 1, &camera);
-    assert_memory_equal(&camera, &to, sizeof to);
+    assert_memory_equal(&camera, &to, sizeof(to));
     camera_between(&from, &to, 0.5, &camera); /* both would be the same place */
     assert_true(camera_distance(&camera) > 1);
     to = from;
@@ -188,7 +188,7 @@ TEST(what_is_dragged_follows_the_pointer)
     camera = drag(INPUT_LEFT, true, 36, 0);
     assert_true(camera.look_at[0] < -0.1 && camera.eye[2] == 5);
     const struct viewer_camera same = drag(INPUT_MIDDLE, false, 36, 0);
-    assert_memory_equal(&camera, &same, sizeof same);
+    assert_memory_equal(&camera, &same, sizeof(same));
     camera = drag(INPUT_RIGHT, false, 40, 0);
     check_place(camera.eye, 0, 0, 5);
     assert_true(camera.look_at[0] > 0.1);
@@ -231,9 +231,9 @@ TEST(keys_mean_what_the_list_says)
     assert_int_equal(input_action(&(struct input){.key = "?"}), ACTION_NONE);
     for (size_t i = 0; i < input_binding_count; i++) {
         const struct binding *binding = &input_bindings[i];
-        assert_true(binding->keys == NULL || binding->doc != NULL);
-        for (size_t j = 0; j < i && binding->key != NULL; j++)
-            if (input_bindings[j].key != NULL && strcmp(binding->key, input_bindings[j].key) == 0)
+        assert_true(!binding->keys || binding->doc);
+        for (size_t j = 0; j < i && binding->key; j++)
+            if (input_bindings[j].key && strcmp(binding->key, input_bindings[j].key) == 0)
                 fail_msg("two lines have the key '%s'", binding->key);
     }
 }

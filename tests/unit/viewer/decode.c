@@ -25,7 +25,7 @@ static uint8_t luma_of(int frame)
 static AVCodecContext *open_encoder(void)
 {
     const AVCodec *codec = avcodec_find_encoder_by_name("libx264");
-    if (codec == NULL)
+    if (!codec)
         return NULL;
     AVCodecContext *context = avcodec_alloc_context3(codec);
     context->width = WIDTH;
@@ -47,7 +47,7 @@ static int make_stream(void **state)
 {
     (void)state;
     AVCodecContext *context = open_encoder();
-    if (context == NULL)
+    if (!context)
         return 0;
     AVFrame *frame = av_frame_alloc();
     frame->format = AV_PIX_FMT_YUV420P;
@@ -112,7 +112,7 @@ EACH_TEST(make_stream, drop_stream)
 
 TEST(every_frame_comes_out_as_soon_as_it_is_in)
 {
-    if (packets[0] == NULL)
+    if (!packets[0])
         skip();
     struct decoder *decoder = decoder_create(&error);
     struct pixmap picture = {0};
@@ -131,7 +131,7 @@ TEST(every_frame_comes_out_as_soon_as_it_is_in)
 
 TEST(after_a_damaged_frame_nothing_is_shown_before_a_key_frame)
 {
-    if (packets[0] == NULL)
+    if (!packets[0])
         skip();
     struct decoder *decoder = decoder_create(&error);
     struct pixmap picture = {0};
@@ -139,7 +139,7 @@ TEST(after_a_damaged_frame_nothing_is_shown_before_a_key_frame)
     struct fl_frame frame = frame_of(0);
     assert_true(decode(decoder, &frame, &picture));
     frame.encoded = (uint8_t *)(uintptr_t)rubbish; /* only read */
-    frame.encoded_bytes = sizeof rubbish;
+    frame.encoded_bytes = sizeof(rubbish);
     frame.key_frame = false;
     assert_false(decode(decoder, &frame, &picture));
     frame = frame_of(2);
@@ -155,7 +155,7 @@ TEST(after_a_damaged_frame_nothing_is_shown_before_a_key_frame)
 
 TEST(a_frame_of_another_size_than_announced_is_refused)
 {
-    if (packets[0] == NULL)
+    if (!packets[0])
         skip();
     struct decoder *decoder = decoder_create(&error);
     struct pixmap picture = {0};

@@ -38,7 +38,7 @@ static void add(uint32_t number, uint64_t command, uint64_t sent_ns)
 static int begin(void **state)
 {
     (void)state;
-    memset(&metrics, 0, sizeof metrics);
+    memset(&metrics, 0, sizeof(metrics));
     return 0;
 }
 
@@ -195,7 +195,7 @@ static struct hud_state some_state(double width, double height)
 static bool tells(const char *part)
 {
     for (size_t i = 0; i < hud.count; i++)
-        if (strstr(hud.marks[i].text, part) != NULL)
+        if (strstr(hud.marks[i].text, part))
             return true;
     return false;
 }
@@ -284,7 +284,7 @@ TEST(what_is_not_wanted_is_not_drawn_but_a_loss_is)
 TEST(the_timeline_has_times_on_its_axis_that_do_not_overlap)
 {
     static const uint64_t pauses_ms[] = {1, 3, 7, 15, 33, 70, 78};
-    for (size_t p = 0; p < sizeof pauses_ms / sizeof pauses_ms[0]; p++) {
+    for (size_t p = 0; p < sizeof(pauses_ms) / sizeof(pauses_ms[0]); p++) {
         begin(NULL);
         for (uint32_t i = 0; i < 20; i++)
             add(i, i + 1, (1000 + i * pauses_ms[p]) * MS);

@@ -82,10 +82,10 @@ TEST(mistakes_are_reported_with_line_and_event)
         {"[{\"screenshot\": true}]", "screenshot: is not a text"},
         {"[5]", "[0]: is not one of"},
     };
-    for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
+    for (size_t i = 0; i < sizeof(wrong) / sizeof(wrong[0]); i++) {
         if (load(wrong[i].text))
             fail_msg("taken: %s", wrong[i].text);
-        if (strstr(error.text, wrong[i].part) == NULL)
+        if (!strstr(error.text, wrong[i].part))
             fail_msg("%s: '%s'", wrong[i].text, error.text);
     }
     error = (struct fl_error){0};

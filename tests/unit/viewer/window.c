@@ -48,7 +48,7 @@ static struct window *open_window(void)
 {
     struct window *window = window_create("test", WIDTH, HEIGHT, &error);
     struct input input;
-    if (window == NULL)
+    if (!window)
         fail_msg("%s", error.text);
     while (window_poll(window, &input)) /* those of its opening */
         continue;
@@ -86,7 +86,7 @@ TEST(keys_have_the_names_of_the_list)
                 {SDLK_HOME, "home"},     {SDLK_COMMA, ","},  {SDLK_PERIOD, "."},    {SDLK_w, "w"}};
     struct window *window = open_window();
     struct input input;
-    for (size_t i = 0; i < sizeof keys / sizeof keys[0]; i++) {
+    for (size_t i = 0; i < sizeof(keys) / sizeof(keys[0]); i++) {
         push_key(SDL_KEYDOWN, keys[i].key, false);
         push_key(SDL_KEYDOWN, keys[i].key, true); /* held down: not again and again */
         push_key(SDL_KEYUP, keys[i].key, false);

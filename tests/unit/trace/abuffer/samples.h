@@ -48,7 +48,7 @@ static inline void abuffer_add_sample(struct abuffer_samples *s, uint32_t texel,
     const struct abuffer_triangle *t = &s->triangles[id];
     if (s->count == s->room) {
         s->room = s->room ? 2 * s->room : 1 << 16;
-        s->list = realloc(s->list, s->room * sizeof *s->list);
+        s->list = realloc(s->list, s->room * sizeof(*s->list));
     }
     s->list[s->count++] =
         (struct abuffer_sample){texel, depth, {t->unit[0], t->unit[1], t->unit[2]}, id, t->is_body};
@@ -106,10 +106,10 @@ static inline void abuffer_add_triangle(struct abuffer_samples *s, const double 
         return;
     if (s->triangle_count == s->triangle_room) {
         s->triangle_room = s->triangle_room ? 2 * s->triangle_room : 1 << 12;
-        s->triangles = realloc(s->triangles, s->triangle_room * sizeof *s->triangles);
+        s->triangles = realloc(s->triangles, s->triangle_room * sizeof(*s->triangles));
     }
     struct abuffer_triangle *t = &s->triangles[s->triangle_count];
-    memcpy(t->corners, corners, sizeof t->corners);
+    memcpy(t->corners, corners, sizeof(t->corners));
     for (int k = 0; k < 3; k++)
         t->unit[k] = (float)(normal[k] / length);
     t->is_body = is_body;
@@ -202,10 +202,10 @@ static inline bool abuffer_upload(struct abuffer_samples *s, struct abuffer_stor
     const uint32_t n = s->resolution, tiles = ABUFFER_TILES_ALONG(n);
     const size_t texel_count = 3 * (size_t)tiles * tiles * ABUFFER_TILE_TEXELS;
     const size_t voxel_count = (size_t)s->voxels_along * s->voxels_along * s->voxels_along;
-    uint32_t(*texels)[2] = calloc(texel_count, sizeof *texels);
-    uint32_t(*samples)[2] = calloc(s->count + 1, sizeof *samples), *ids = calloc(s->count + 1, sizeof *ids);
-    int32_t(*sums)[4] = calloc(voxel_count, sizeof *sums);
-    uint32_t(*subvoxels)[3][2] = calloc(voxel_count, sizeof *subvoxels);
+    uint32_t(*texels)[2] = calloc(texel_count, sizeof(*texels));
+    uint32_t(*samples)[2] = calloc(s->count + 1, sizeof(*samples)), *ids = calloc(s->count + 1, sizeof(*ids));
+    int32_t(*sums)[4] = calloc(voxel_count, sizeof(*sums));
+    uint32_t(*subvoxels)[3][2] = calloc(voxel_count, sizeof(*subvoxels));
     const uint32_t drawn[4] = {0, 0, 0,
                                DRAWN_SPHERES}; /* no triangles that an intersection would be held against */
     store->cell_world = cell_world;
@@ -215,7 +215,7 @@ static inline bool abuffer_upload(struct abuffer_samples *s, struct abuffer_stor
     store->depth_max = 0;
     store->drawn_count = 1;
     if (s->count > 1)
-        qsort(s->list, s->count, sizeof *s->list, abuffer_by_texel);
+        qsort(s->list, s->count, sizeof(*s->list), abuffer_by_texel);
     for (size_t t = 0, i = 0; t < 3 * (size_t)n * n; t++) {
         const size_t first = i, axis = t / ((size_t)n * n);
         uint32_t *words = texels[ABUFFER_TEXEL(tiles, (uint32_t)axis, (uint32_t)(t % n), (uint32_t)(t / n % n))];
@@ -237,15 +237,15 @@ static inline bool abuffer_upload(struct abuffer_samples *s, struct abuffer_stor
     }
     const bool has_subvoxels = abuffer_has_subvoxels(store);
     if (!has_subvoxels)
-        memset(subvoxels, 0xff, sizeof *subvoxels);
-    bool ok = gpu_buffer_upload(store->device, &store->texels, texels, texel_count * sizeof *texels, error) &&
+        memset(subvoxels, 0xff, sizeof(*subvoxels));
+    bool ok = gpu_buffer_upload(store->device, &store->texels, texels, texel_count * sizeof(*texels), error) &&
               gpu_buffer_upload(store->device, &store->samples, samples,
-                                (s->count + s->count % 2) * sizeof *samples, error) &&
-              gpu_buffer_upload(store->device, &store->ids, ids, s->count * sizeof *ids, error) &&
-              gpu_buffer_upload(store->device, &store->drawn, drawn, sizeof drawn, error) &&
+                                (s->count + s->count % 2) * sizeof(*samples), error) &&
+              gpu_buffer_upload(store->device, &store->ids, ids, s->count * sizeof(*ids), error) &&
+              gpu_buffer_upload(store->device, &store->drawn, drawn, sizeof(drawn), error) &&
               gpu_buffer_upload(store->device, &store->subvoxels, subvoxels,
-                                (has_subvoxels ? voxel_count : 1) * sizeof *subvoxels, error) &&
-              gpu_buffer_upload(store->device, &store->sums, sums, voxel_count * sizeof *sums, error);
+                                (has_subvoxels ? voxel_count : 1) * sizeof(*subvoxels), error) &&
+              gpu_buffer_upload(store->device, &store->sums, sums, voxel_count * sizeof(*sums), error);
     free(texels);
     free(samples);
     free(ids);

@@ -15,8 +15,8 @@ struct outcome {
 
 static struct outcome compare(struct fixture *fixture, int form, const struct ray *rays, uint32_t count)
 {
-    struct hit *hits = malloc(count * sizeof *hits);
-    uint32_t *visibility = malloc(count * sizeof *visibility);
+    struct hit *hits = malloc(count * sizeof(*hits));
+    uint32_t *visibility = malloc(count * sizeof(*visibility));
     struct outcome o = {0};
     trace(fixture, &forms[form].options, WAVE_CLOSEST, rays, count, hits, NULL);
     trace(fixture, &forms[form].options, WAVE_ANY, rays, count, NULL, visibility);
@@ -154,8 +154,8 @@ TEST(rays_meet_shapes_where_they_are)
         {"plates", add_plates, {{7, 4, 7}, {18, 18, 18}, {30, 30, 30}}},
         {"a room", add_room, {{3, 3, 3}, {3, 3, 3}, {3, 3, 3}}},
     };
-    struct ray *rays = malloc(RAY_COUNT * sizeof *rays);
-    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+    struct ray *rays = malloc(RAY_COUNT * sizeof(*rays));
+    for (size_t i = 0; i < sizeof(rows) / sizeof(*rows); i++) {
         struct fixture fixture;
         fixture_init(&fixture, NULL, CELLS, VOXELS);
         rows[i].add(&fixture.samples);
@@ -172,13 +172,13 @@ TEST(voxels_of_any_size_lead_to_the_same)
 {
     static const uint32_t grids[][2] = {{97, 16}, {100, 64}, {64, 64}, {33, 16}, {130, 32}};
     static const struct limits limits[FORM_COUNT] = {{3, 5, 3}, {12, 40, 12}, {16, 50, 16}};
-    struct ray *rays = malloc(RAY_COUNT * sizeof *rays);
-    for (size_t i = 0; i < sizeof grids / sizeof *grids; i++) {
+    struct ray *rays = malloc(RAY_COUNT * sizeof(*rays));
+    for (size_t i = 0; i < sizeof(grids) / sizeof(*grids); i++) {
         const double n = grids[i][0];
         struct fixture fixture;
         uint64_t seed = 5 + i;
         char name[64];
-        snprintf(name, sizeof name, "%u cells, %u voxels", grids[i][0], grids[i][1]);
+        snprintf(name, sizeof(name), "%u cells, %u voxels", grids[i][0], grids[i][1]);
         fixture_init(&fixture, NULL, grids[i][0], grids[i][1]);
         add_ball(&fixture.samples, (const double[3]){0.45 * n, 0.52 * n, 0.5 * n}, 0.38 * n, 24, true);
         fixture_build(&fixture);
@@ -200,7 +200,7 @@ TEST(voxels_of_any_size_lead_to_the_same)
 TEST(deep_columns_are_searched_at_their_depth)
 {
     enum { sheets = 150 };
-    struct ray *rays = malloc(RAY_COUNT * sizeof *rays);
+    struct ray *rays = malloc(RAY_COUNT * sizeof(*rays));
     for (int body = 0; body < 2; body++) {
         struct fixture fixture;
         uint64_t seed = 9;

@@ -120,8 +120,8 @@ static struct decoded decode(const struct view *view, uint32_t octant, uint32_t 
             decoded.upper[k] = begin + cell * (negative ? near : far);
         } else {
             float lower, upper;
-            memcpy(&lower, &words[k], sizeof lower);
-            memcpy(&upper, &words[4 + k], sizeof upper);
+            memcpy(&lower, &words[k], sizeof(lower));
+            memcpy(&upper, &words[4 + k], sizeof(upper));
             decoded.lower[k] = (double)lower;
             decoded.upper[k] = (double)upper;
         }
@@ -148,7 +148,7 @@ static uint32_t primitive_number(const struct input *input, const struct bvh_tre
     uint32_t number;
     const float *texels = tree->primitives;
     memcpy(&number, input->spheres ? &texels[8 * (size_t)place + 4] : &texels[12 * (size_t)place + 3],
-           sizeof number);
+           sizeof(number));
     return number;
 }
 
@@ -289,15 +289,15 @@ static int compare_placeless(const void *a, const void *b)
 
 static struct placeless *sorted_elements(const struct view *view, uint32_t octant)
 {
-    struct placeless *all = calloc(view->count, sizeof *all);
+    struct placeless *all = calloc(view->count, sizeof(*all));
     for (uint32_t e = 0; e < view->count; e++) {
         const struct decoded decoded = decode(view, octant, e);
-        memcpy(all[e].lower, decoded.lower, sizeof all[e].lower);
-        memcpy(all[e].upper, decoded.upper, sizeof all[e].upper);
+        memcpy(all[e].lower, decoded.lower, sizeof(all[e].lower));
+        memcpy(all[e].upper, decoded.upper, sizeof(all[e].upper));
         all[e].leaf = decoded.leaf;
         all[e].subtree = decoded.end - e;
     }
-    qsort(all, view->count, sizeof *all, compare_placeless);
+    qsort(all, view->count, sizeof(*all), compare_placeless);
     return all;
 }
 
@@ -306,7 +306,7 @@ static void expect_copies_alike(const struct view *view)
     struct placeless *first = sorted_elements(view, 0);
     for (uint32_t octant = 1; octant < bvh_octants(view->settings); octant++) {
         struct placeless *other = sorted_elements(view, octant);
-        assert_memory_equal(other, first, view->count * sizeof *first);
+        assert_memory_equal(other, first, view->count * sizeof(*first));
         free(other);
     }
     free(first);
@@ -499,7 +499,7 @@ TEST(the_tree_does_not_depend_on_the_threads)
         struct bvh_tree several = build(&input, &settings);
         assert_int_equal(several.element_count, one.element_count);
         assert_memory_equal(several.elements, one.elements, one.element_count * bvh_element_bytes(&settings));
-        assert_memory_equal(&several.grid, &one.grid, sizeof one.grid);
+        assert_memory_equal(&several.grid, &one.grid, sizeof(one.grid));
         assert_int_equal(several.primitive_texels, one.primitive_texels);
         assert_memory_equal(several.primitives, one.primitives, one.primitive_texels * 4 * sizeof(float));
         bvh_tree_finish(&several);

@@ -109,7 +109,7 @@ static void place(struct test_edits *edits, uint64_t seed)
 /* Eight at a time begin close together and go almost the same way. */
 static struct ray *make_rays(void)
 {
-    struct ray *rays = malloc(RAY_COUNT * sizeof *rays);
+    struct ray *rays = malloc(RAY_COUNT * sizeof(*rays));
     uint64_t seed = 51;
     float origin[3] = {0}, aim[3] = {0};
     for (uint32_t i = 0; i < RAY_COUNT; i++) {
@@ -134,7 +134,7 @@ static void *trace(struct fixture *fixture, const struct ray *rays, enum wave_ki
     struct error error = {0};
     struct gpu_buffer ray_buffer = {0}, answers = {0};
     size_t bytes = RAY_COUNT * (kind == WAVE_ANY ? sizeof(uint32_t) : sizeof(struct hit));
-    expect_ok(gpu_buffer_upload(device, &ray_buffer, rays, RAY_COUNT * sizeof *rays, &error) &&
+    expect_ok(gpu_buffer_upload(device, &ray_buffer, rays, RAY_COUNT * sizeof(*rays), &error) &&
                   gpu_buffer_reserve(device, &answers, bytes, &error),
               &error);
     gpu_scene_bind(&fixture->gpu);
@@ -167,7 +167,7 @@ static void make_histories(struct fixture *built, struct fixture *moved, enum lo
     }
     const struct bvh_top *a = &bvh_of(built)->top, *b = &bvh_of(moved)->top;
     assert_true(a->element_count != b->element_count ||
-                memcmp(a->leaves, b->leaves, a->element_count * sizeof *a->leaves) != 0); /* other trees */
+                memcmp(a->leaves, b->leaves, a->element_count * sizeof(*a->leaves)) != 0); /* other trees */
 }
 
 static void expect_same_answers(enum look look, const struct tracer_options *options)
@@ -179,7 +179,7 @@ static void expect_same_answers(enum look look, const struct tracer_options *opt
     uint32_t hit_count = 0;
     for (uint32_t i = 0; i < RAY_COUNT; i++) {
         hit_count += expected[i].distance >= 0;
-        if (memcmp(&expected[i], &hits[i], sizeof *hits) != 0)
+        if (memcmp(&expected[i], &hits[i], sizeof(*hits)) != 0)
             fail_msg("ray %u, %u together: distance %.9g, primitive %u, instance %u; %.9g, %u, %u in the tree "
                      "that was refitted",
                      i, options->bvh.rays, (double)expected[i].distance, expected[i].primitive,
@@ -214,7 +214,7 @@ TEST(answers_do_not_depend_on_how_instances_came_to_where_they_are)
         {.bvh = {.rays = 3}},
         {.bvh = {.bounds = BVH_BOUNDS_SPHERE, .rays = 2}},
     };
-    for (size_t form = 0; form < sizeof forms / sizeof forms[0]; form++)
+    for (size_t form = 0; form < sizeof(forms) / sizeof(forms[0]); form++)
         expect_same_answers(LOOK_PLAIN, &forms[form]);
     for (enum look look = LOOK_CUTOUT; look < LOOKS; look++)
         for (size_t form = 0; form < 2; form++)

@@ -31,14 +31,14 @@ static void expect_ok(bool ok, const struct error *error)
 /* One target: each triangle goes its own way, and turns a little. */
 static void add_target(struct scene_mesh *mesh)
 {
-    float(*ways)[3] = malloc(TRIANGLES * 3 * sizeof *ways);
+    float(*ways)[3] = malloc(TRIANGLES * 3 * sizeof(*ways));
     uint64_t seed = 41;
     for (uint32_t v = 0; v < TRIANGLES * 3; v++)
         for (int k = 0; k < 3; k++)
             ways[v][k] = (v % 3 ? ways[v - v % 3][k] + test_uniform(&seed, -0.01f, 0.01f)
                                 : test_uniform(&seed, -0.3f, 0.3f));
     mesh->target_count = 1;
-    mesh->arrays[MESH_TARGET_POSITIONS] = test_blob(ways, TRIANGLES * 3 * sizeof *ways);
+    mesh->arrays[MESH_TARGET_POSITIONS] = test_blob(ways, TRIANGLES * 3 * sizeof(*ways));
     mesh->weights = calloc(1, sizeof(*mesh->weights));
     mesh->weight_count = 1;
     free(ways);
@@ -48,8 +48,8 @@ static void add_target(struct scene_mesh *mesh)
 static struct scene *scene_of_soup(void)
 {
     struct test_edits edits = {.scene = test_scene_create()};
-    float(*vertices)[3] = malloc(TRIANGLES * 3 * sizeof *vertices);
-    uint32_t *indices = malloc(TRIANGLES * 6 * sizeof *indices);
+    float(*vertices)[3] = malloc(TRIANGLES * 3 * sizeof(*vertices));
+    uint32_t *indices = malloc(TRIANGLES * 6 * sizeof(*indices));
     uint64_t seed = 9;
     for (uint32_t i = 0; i < TRIANGLES; i++) {
         float centre[3];
@@ -120,9 +120,9 @@ static struct hit *trace(struct fixture *fixture, struct tracer *tracer, bool ti
 {
     struct error error = {0};
     struct gpu_buffer ray_buffer = {0}, times = {0}, answers = {0};
-    struct ray *rays = malloc(RAY_COUNT * sizeof *rays);
-    float *ray_times = malloc(RAY_COUNT * sizeof *ray_times);
-    struct hit *hits = malloc(RAY_COUNT * sizeof *hits);
+    struct ray *rays = malloc(RAY_COUNT * sizeof(*rays));
+    float *ray_times = malloc(RAY_COUNT * sizeof(*ray_times));
+    struct hit *hits = malloc(RAY_COUNT * sizeof(*hits));
     uint64_t seed = 3;
     for (uint32_t i = 0; i < RAY_COUNT; i++) {
         for (int k = 0; k < 3; k++) {
@@ -133,15 +133,15 @@ static struct hit *trace(struct fixture *fixture, struct tracer *tracer, bool ti
         rays[i].direction_t_max[3] = 1e9f;
         ray_times[i] = test_uniform(&seed, 0, 1);
     }
-    expect_ok(gpu_buffer_upload(device, &ray_buffer, rays, RAY_COUNT * sizeof *rays, &error) &&
-                  gpu_buffer_upload(device, &times, ray_times, RAY_COUNT * sizeof *ray_times, &error) &&
-                  gpu_buffer_reserve(device, &answers, RAY_COUNT * sizeof *hits, &error),
+    expect_ok(gpu_buffer_upload(device, &ray_buffer, rays, RAY_COUNT * sizeof(*rays), &error) &&
+                  gpu_buffer_upload(device, &times, ray_times, RAY_COUNT * sizeof(*ray_times), &error) &&
+                  gpu_buffer_reserve(device, &answers, RAY_COUNT * sizeof(*hits), &error),
               &error);
     gpu_scene_bind(&fixture->gpu);
     const struct wave wave = {
         .ray_count = RAY_COUNT, .rays = &ray_buffer, .hits = &answers, .times = timed ? &times : NULL};
     expect_ok(tracer_trace(tracer, &fixture->gpu, &wave, &error), &error);
-    gpu_buffer_read(device, &answers, 0, hits, RAY_COUNT * sizeof *hits);
+    gpu_buffer_read(device, &answers, 0, hits, RAY_COUNT * sizeof(*hits));
     gpu_buffer_finish(device, &ray_buffer);
     gpu_buffer_finish(device, &times);
     gpu_buffer_finish(device, &answers);
@@ -182,7 +182,7 @@ TEST(a_mesh_that_deforms_is_refitted)
 {
     static const struct tracer_options forms[] = {
         {.bvh = {.rays = 1}}, {.bvh = {.rays = 4}}, {.bvh = {.bounds = BVH_BOUNDS_SPHERE, .rays = 1}}};
-    for (size_t form = 0; form < sizeof forms / sizeof forms[0]; form++) {
+    for (size_t form = 0; form < sizeof(forms) / sizeof(forms[0]); form++) {
         struct fixture fixture;
         fixture_init(&fixture, &forms[form], 0);
         const struct tracer_stats *stats = &fixture.tracer->stats;
@@ -215,7 +215,7 @@ TEST(a_mesh_that_deforms_while_the_shutter_is_open_is_met_at_each_rays_time)
         {.bvh = {.bounds = BVH_BOUNDS_SPHERE, .rays = 1}},
         {.bench = {.bvh_layout = BVH_LAYOUT_PLAIN}},
     };
-    for (size_t form = 0; form < sizeof forms / sizeof forms[0]; form++) {
+    for (size_t form = 0; form < sizeof(forms) / sizeof(forms[0]); form++) {
         struct fixture fixture;
         fixture_init(&fixture, &forms[form], 0);
         pose(&fixture, 0.2f, 0.9f);
@@ -256,7 +256,7 @@ TEST(answers_do_not_depend_on_earlier_poses)
         struct hit *expected = trace(&straight, straight.tracer, true),
                    *hits = trace(&roundabout, roundabout.tracer, true);
         for (uint32_t i = 0; i < RAY_COUNT; i++)
-            if (memcmp(&expected[i], &hits[i], sizeof *hits) != 0)
+            if (memcmp(&expected[i], &hits[i], sizeof(*hits)) != 0)
                 fail_msg("ray %u, %u together: distance %.9g, primitive %u; %.9g, %u after other poses", i,
                          together, (double)expected[i].distance, expected[i].primitive, (double)hits[i].distance,
                          hits[i].primitive);

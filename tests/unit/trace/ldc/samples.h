@@ -53,7 +53,7 @@ static inline void ldc_add_sample(struct ldc_samples *s, int axis, uint32_t u, u
 {
     if (s->count == s->room) {
         s->room = s->room ? 2 * s->room : 1 << 16;
-        s->list = realloc(s->list, s->room * sizeof *s->list);
+        s->list = realloc(s->list, s->room * sizeof(*s->list));
     }
     struct ldc_sample *sample = &s->list[s->count++];
     *sample = (struct ldc_sample){((uint32_t)axis * s->resolution + v) * s->resolution + u,
@@ -148,46 +148,46 @@ static inline bool ldc_upload(struct ldc_samples *s, struct ldc_store *store, un
     const struct ldc_cube *before = which ? &store->cubes[which - 1] : NULL;
     *cube =
         (struct ldc_cube){.cell_world = s->cell, .resolution = s->resolution, .sample_count = (uint32_t)s->count};
-    memcpy(cube->lower_world, s->lower, sizeof s->lower);
+    memcpy(cube->lower_world, s->lower, sizeof(s->lower));
     if (before && before->resolution) {
         cube->first_texel = before->first_texel + 3 * before->resolution * before->resolution;
         cube->first_sample = before->first_sample + before->sample_count;
         cube->first_quad = before->first_quad + before->quad_count;
     }
     if (s->count > 1)
-        qsort(s->list, s->count, sizeof *s->list, ldc_by_texel);
+        qsort(s->list, s->count, sizeof(*s->list), ldc_by_texel);
     const size_t texel_count = 3 * (size_t)s->resolution * s->resolution;
-    uint32_t(*texels)[4] = calloc(texel_count, sizeof *texels),
-    (*geometry)[2] = malloc((s->count + 1) * sizeof *geometry);
-    uint32_t(*surface)[4] = malloc((s->count + 1) * sizeof *surface);
-    float(*quads)[4] = malloc((s->count + 1) * sizeof *quads);
+    uint32_t(*texels)[4] = calloc(texel_count, sizeof(*texels)),
+    (*geometry)[2] = malloc((s->count + 1) * sizeof(*geometry));
+    uint32_t(*surface)[4] = malloc((s->count + 1) * sizeof(*surface));
+    float(*quads)[4] = malloc((s->count + 1) * sizeof(*quads));
     uint32_t quad = 0;
     for (size_t t = 0, i = 0; t < texel_count; t++) {
         const size_t first = i;
         for (; i < s->count && s->list[i].texel == t; i++) {
             memcpy(&geometry[i][0], &s->list[i].depth, 4);
             geometry[i][1] = s->list[i].normal;
-            memcpy(surface[i], s->list[i].surface, sizeof surface[i]);
+            memcpy(surface[i], s->list[i].surface, sizeof(surface[i]));
         }
         const size_t count = i - first;
         const float range[2] = {count ? s->list[first].depth : LDC_NO_DEPTH,
                                 count ? s->list[i - 1].depth : -LDC_NO_DEPTH};
         texels[t][0] = cube->first_sample + (uint32_t)first;
         texels[t][1] = (uint32_t)count | (cube->first_quad + quad) << LDC_TEXEL_QUAD_SHIFT;
-        memcpy(&texels[t][2], range, sizeof range);
+        memcpy(&texels[t][2], range, sizeof(range));
         for (size_t k = 0; k < (count + 3) / 4 * 4; k++)
             quads[quad + k / 4][k % 4] = k < count ? s->list[first + k].depth : LDC_NO_DEPTH;
         quad += (uint32_t)(count + 3) / 4;
     }
     cube->quad_count = quad;
-    bool ok = ldc_append(store->device, &store->texels, cube->first_texel * sizeof *texels, texels,
-                         texel_count * sizeof *texels, error) &&
-              ldc_append(store->device, &store->quads, cube->first_quad * sizeof *quads, quads,
-                         quad * sizeof *quads, error) &&
-              ldc_append(store->device, &store->geometry, cube->first_sample * sizeof *geometry, geometry,
-                         s->count * sizeof *geometry, error) &&
-              ldc_append(store->device, &store->surface, cube->first_sample * sizeof *surface, surface,
-                         s->count * sizeof *surface, error);
+    bool ok = ldc_append(store->device, &store->texels, cube->first_texel * sizeof(*texels), texels,
+                         texel_count * sizeof(*texels), error) &&
+              ldc_append(store->device, &store->quads, cube->first_quad * sizeof(*quads), quads,
+                         quad * sizeof(*quads), error) &&
+              ldc_append(store->device, &store->geometry, cube->first_sample * sizeof(*geometry), geometry,
+                         s->count * sizeof(*geometry), error) &&
+              ldc_append(store->device, &store->surface, cube->first_sample * sizeof(*surface), surface,
+                         s->count * sizeof(*surface), error);
     free(texels);
     free(geometry);
     free(surface);

@@ -125,9 +125,9 @@ static void expect_intersection(const struct fixture *fixture, const struct ray 
 static void expect_like_brute_force(struct fixture *fixture, const struct ray *rays, uint32_t count,
                                     uint32_t hits_min)
 {
-    struct verdict *verdicts = malloc(count * sizeof *verdicts);
-    struct hit *hits = malloc(count * sizeof *hits);
-    uint32_t *visibility = malloc(count * sizeof *visibility), hit_count = 0;
+    struct verdict *verdicts = malloc(count * sizeof(*verdicts));
+    struct hit *hits = malloc(count * sizeof(*hits));
+    uint32_t *visibility = malloc(count * sizeof(*visibility)), hit_count = 0;
     for (size_t f = 0; f < FORM_COUNT; f++) {
         build(fixture, &forms[f].options);
         if (f == 0) { /* now the samples are sorted */
@@ -172,8 +172,8 @@ ALL_TESTS(open_device, close_device)
 TEST(rays_cross_samples_as_by_brute_force)
 {
     static const uint32_t resolutions[] = {97, 64, 33};
-    struct ray *rays = malloc(RAY_COUNT * sizeof *rays);
-    for (size_t r = 0; r < sizeof resolutions / sizeof *resolutions; r++) {
+    struct ray *rays = malloc(RAY_COUNT * sizeof(*rays));
+    for (size_t r = 0; r < sizeof(resolutions) / sizeof(*resolutions); r++) {
         struct fixture fixture;
         fixture_init(&fixture, NULL);
         struct ldc_samples *s = &fixture.samples[LDC_CUBE_STATIC];
@@ -189,7 +189,7 @@ TEST(rays_cross_samples_as_by_brute_force)
 
 TEST(two_cubes_are_traversed_as_one)
 {
-    struct ray *rays = malloc(RAY_COUNT * sizeof *rays);
+    struct ray *rays = malloc(RAY_COUNT * sizeof(*rays));
     struct fixture fixture;
     fixture_init(&fixture, NULL);
     start_samples(&fixture.samples[LDC_CUBE_STATIC], 70, 4, -2, -2, -2);
@@ -212,7 +212,7 @@ TEST(two_cubes_are_traversed_as_one)
 /* A few samples that stand still, and behind them more that move than this device has room for in cells. */
 TEST(where_cells_do_not_fit_a_pyramid_is_traversed)
 {
-    struct ray *rays = malloc(RAY_COUNT * sizeof *rays);
+    struct ray *rays = malloc(RAY_COUNT * sizeof(*rays));
     struct fixture fixture;
     fixture_init(&fixture, NULL);
     start_samples(&fixture.samples[LDC_CUBE_STATIC], 40, 4, -2, -2, -2);
@@ -255,9 +255,9 @@ TEST(what_shares_cells_is_in_each_of_them_once)
     }
     build(&fixture, &(struct tracer_options){.ldc = {.levels = LDC_LEVELS_CELLS}});
     const struct ldc_cube *cube = &fixture.store.cubes[LDC_CUBE_STATIC];
-    uint32_t(*entries)[4] = malloc(cube->entry_count * sizeof *entries);
-    uint32_t *times = calloc(s->count, sizeof *times);
-    gpu_buffer_read(device, &fixture.store.entries, 0, entries, cube->entry_count * sizeof *entries);
+    uint32_t(*entries)[4] = malloc(cube->entry_count * sizeof(*entries));
+    uint32_t *times = calloc(s->count, sizeof(*times));
+    gpu_buffer_read(device, &fixture.store.entries, 0, entries, cube->entry_count * sizeof(*entries));
     expect_ok(gpu_check(device, "entries", &error), &error);
     for (uint32_t i = 0; i < cube->entry_count; i++) {
         const uint32_t sample = entries[i][0] & LDC_ENTRY_SAMPLE_MASK;
@@ -300,7 +300,7 @@ TEST(blocks_of_many_layers_hold_all_of_them)
 /* Along axes through the middles of texels, along their borders, through corners, and nearly so. */
 TEST(rays_along_axes_and_borders_cross_samples_as_by_brute_force)
 {
-    struct ray *rays = malloc(RAY_COUNT * sizeof *rays);
+    struct ray *rays = malloc(RAY_COUNT * sizeof(*rays));
     struct fixture fixture;
     uint64_t seed = 31;
     fixture_init(&fixture, NULL);
@@ -328,8 +328,8 @@ TEST(rays_along_axes_and_borders_cross_samples_as_by_brute_force)
 /* Samples in the outermost texels and depths, a floor that lies in the cube's own side. */
 TEST(what_lies_in_the_sides_of_the_cube_is_hit)
 {
-    struct ray *rays = malloc(RAY_COUNT * sizeof *rays);
-    struct hit *hits = malloc(RAY_COUNT * sizeof *hits);
+    struct ray *rays = malloc(RAY_COUNT * sizeof(*rays));
+    struct hit *hits = malloc(RAY_COUNT * sizeof(*hits));
     struct fixture fixture;
     uint64_t seed = 41;
     fixture_init(&fixture, NULL);
@@ -368,8 +368,8 @@ TEST(what_lies_in_the_sides_of_the_cube_is_hit)
  * slope meet samples' own depths; a tolerance of nearly nothing is passed by rays that are aslant. */
 TEST(a_tolerance_takes_depths_for_planes)
 {
-    struct ray *rays = malloc(RAY_COUNT * sizeof *rays);
-    struct hit *hits = malloc(RAY_COUNT * sizeof *hits);
+    struct ray *rays = malloc(RAY_COUNT * sizeof(*rays));
+    struct hit *hits = malloc(RAY_COUNT * sizeof(*hits));
     struct fixture fixture;
     uint64_t seed = 101;
     fixture_init(&fixture, NULL);
@@ -384,7 +384,7 @@ TEST(a_tolerance_takes_depths_for_planes)
     const struct tracer_options kinds[] = {{.ldc = {.tolerance = 0.01f}},
                                            {.ldc = {.tolerance = 0.01f, .levels = LDC_LEVELS_BLOCKS, .block = 8}},
                                            {.ldc = {.tolerance = 0.01f}, .bench = {.ldc_layers_together = 1}}};
-    for (size_t f = 0; f < sizeof kinds / sizeof *kinds; f++) {
+    for (size_t f = 0; f < sizeof(kinds) / sizeof(*kinds); f++) {
         build(&fixture, &kinds[f]);
         trace(&fixture, &kinds[f], WAVE_CLOSEST, rays, RAY_COUNT, hits, NULL);
         for (uint32_t i = 0; i < RAY_COUNT; i++) {

@@ -30,7 +30,7 @@ static const struct form {
     {"blocks of 32, layers one by one",
      {.ldc = {.levels = LDC_LEVELS_BLOCKS, .block = 32}, .bench = {.ldc_layers_together = 1}}},
 };
-#define FORM_COUNT (sizeof forms / sizeof *forms)
+#define FORM_COUNT (sizeof(forms) / sizeof(*forms))
 
 /* ---- what is traversed ---- */
 
