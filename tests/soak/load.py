@@ -23,6 +23,7 @@ SAMPLES = 4  # of a view that rests
 TEXELS = 16  # along an edge of a texture
 # Structures of a few cells, built at once.
 LDC_RESOLUTION, ABUFFER_RESOLUTION, ABUFFER_VOXELS = 32, 32, 16
+COMPARE_FAR, AO_RAYS, LAYER_OPACITY = 1e-4, 8, 0.5  # their defaults: zero is none of their values
 
 
 @dataclasses.dataclass
@@ -165,12 +166,14 @@ class Soak:
         one = fields.__getitem__
         if kind == VIEW:
             client.acknowledged.add(channel)
-        fixed = struct.pack("<8I", 1, kind, channel, 0, 0, 0, one("still"), one("attachments"))
+        fixed = struct.pack("<8I", 1, kind, channel, 0, 1, 0, one("still"), one("attachments"))
         fixed += struct.pack("<5IQ3IfI", one("credit"), *SIZE, one("samples"), 2, 1, 0, one("frames") - 1, 1, 1000, 0)
-        fixed += struct.pack("<5If4I", one("tracer"), 0, one("integrator"), one("tracer") != BVH, 0, 0, 0,
-                             one("encoding"), 80 if one("encoding") in (JPEG, H264) else 1, tiny_client.CAMERA_PATH_KEYS)
-        fixed += struct.pack("<I2f2I4f3I", 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0)
-        fixed += struct.pack("<5IfI2I", LDC_RESOLUTION, 0, 0, 0, 0, 0, 0, ABUFFER_RESOLUTION, ABUFFER_VOXELS)
+        fixed += struct.pack("<4If4I", one("tracer"), one("integrator"), one("tracer") != BVH, 0, 0, 0, one("encoding"),
+                             80 if one("encoding") in (JPEG, H264) else 1, tiny_client.CAMERA_PATH_KEYS)
+        fixed += struct.pack("<I2f2I4f2I", 0, 0, 0, 0, 0, COMPARE_FAR, 0, 0, 0, 0, 0)
+        fixed += struct.pack("<I2fIfI", 0, 0, 0, AO_RAYS, LAYER_OPACITY, 0)
+        # Settings of bvh, ldc and abuffer, in the order of protocol/tracers.def; the rest of them keeps its defaults.
+        fixed += struct.pack("<2IIf5I2I", 0, 0, LDC_RESOLUTION, 0, 0, 0, 0, 0, 0, ABUFFER_RESOLUTION, ABUFFER_VOXELS)
         turn = math.pi * self.random.random()
         keys = [struct.pack("<f", i / 100) + tiny_client.camera_bytes(eye_at(turn + i / 10)) for i in range(10)]
         keys = tiny_client.array(keys[:1 if kind == VIEW else 10])
