@@ -41,8 +41,9 @@ NOT_SANITIZED = tuple(f"accuracy/{name}" for name in (
     "ao", "bsdf", "depth_of_field", "distributed", "path", "path_light", "sampling", "shading_convergence",
     "shading_energy", "shading_furnace", "shading_glass", "shading_light", "shading_surface", "shading_texture"))
 # Where no times of an earlier run are known: what takes longest begins first.
-LONGEST_FIRST = ("test_import", "test_models", "test_bench", "test_light", "test_poses", "test_import_animation",
-                 "test_animate", "test_render", "test_ldc", "test_abuffer", "test_units")
+LONGEST_FIRST = ("accuracy/sampled_against_reference", "test_import", "test_light", "test_models", "test_view", "test_compare",
+                 "test_poses", "test_animate", "contract/bvh, eight rays together", "test_import_animation", "contract/bvh",
+                 "test_units", "unit/trace/ldc/limits", "unit/trace/ldc/traversal", "test_soak")
 
 Result = collections.namedtuple("Result", "text passed failed skips")  # skips: (test, reason)
 
@@ -150,7 +151,9 @@ def tasks(build, names):
             found[file] = lambda file=file, program=program, tests=tests: run_cmocka(file, [program, file], tests)
     contract = build / "tests/tracers/test_contract"
     if contract.is_file():
-        found[contract.name] = lambda: run_cmocka(contract.name, [contract], ())
+        rows = subprocess.run([contract, "--list"], stdout=subprocess.PIPE, text=True, check=True).stdout.splitlines()
+        found.update({f"contract/{row}": lambda row=row: run_cmocka(f"contract/{row}", [contract, f"{row}: "], ())
+                      for row in rows})
     if os.environ.get("FARLIGHT_TEST_SANITIZED"):
         for name in NOT_SANITIZED:
             found.pop(name, None)

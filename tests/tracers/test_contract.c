@@ -97,10 +97,20 @@ static void add_tests_of(const struct tracer_row *row)
     }
 }
 
-/* A part of tests' names may be given. */
+static int list_rows(void)
+{
+    puts("the table");
+    for (size_t r = 0; r < row_count; r++)
+        puts(rows[r]->name);
+    return 0;
+}
+
+/* A part of tests' names may be given; --list says by what rows they begin. */
 int main(int argc, char **argv)
 {
     struct error error = {0};
+    if (argc > 1 && strcmp(argv[1], "--list") == 0)
+        return list_rows();
     add_test("the table", "every tracer has a row that says what it is", NULL,
              every_tracer_has_a_row_that_says_what_it_is, (struct contract_case){0});
     for (size_t r = 0; r < row_count; r++)
