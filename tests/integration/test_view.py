@@ -353,12 +353,13 @@ class OnADaemon(Viewer):
         self.assertLess(difference(self.folder / "before.png", self.folder / "after.png"), 2)
 
     def test_over_tcp_pictures_travel_encoded_and_rest_without_loss(self):
-        events = [rest(), {"key": "d", "hold": 1.5}, {"state": "moving"}, {"key": "home"}, rest(8), {"state": "resting"},
-                  *HIDE, {"screenshot": "tcp.png"}]
+        # On a busy machine the first frame in motion may take longer than the key is held at first.
+        moves = [event for seconds in (1, 2, 4) for event in ({"key": "d", "hold": seconds}, {"state": f"moving {seconds}"})]
+        events = [rest(), *moves, {"key": "home"}, rest(8), {"state": "resting"}, *HIDE, {"screenshot": "tcp.png"}]
         with Daemon(listen="tcp:127.0.0.1:0") as daemon:
             address = next(line for line in daemon.ready if "tcp:" in line).split()[-1]
             states = self.replay(events, "--server", address)
-        self.assertEqual((states["moving"]["encoding"], states["moving"]["moving"]), ("h264", True))
+        self.assertIn(("h264", True), [(state["encoding"], state["moving"]) for name, state in states.items() if "moving " in name])
         self.assertEqual((states["resting"]["encoding"], states["resting"]["moving"]), ("predicted", False))
         self.replay([rest(8), *HIDE, {"screenshot": "private.png"}])
         self.assertEqual(difference(self.folder / "tcp.png", self.folder / "private.png"), 0)
