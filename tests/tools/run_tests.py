@@ -35,11 +35,10 @@ EXPECTED_SKIPS = (
     r"this kernel does not name children",
     r"left to make test-long",  # which .ci/run calls
 )
-# They hold what shaders compute against closed forms, or against the reference. Mesa compiles shaders at run time, so that sanitizers do not see
+# They hold what shaders compute against closed forms. Mesa compiles shaders at run time, so that sanitizers do not see
 # them; the C around them is that of the files that stay.
 NOT_SANITIZED = tuple(f"accuracy/{name}" for name in (
-    "ao", "bsdf", "depth_of_field", "distributed", "path", "path_light", "sampled_against_reference", "sampling",
-    "shading_convergence",
+    "ao", "bsdf", "depth_of_field", "distributed", "path", "path_light", "sampling", "shading_convergence",
     "shading_energy", "shading_furnace", "shading_glass", "shading_light", "shading_surface", "shading_texture"))
 # Where no times of an earlier run are known: what takes longest begins first.
 LONGEST_FIRST = ("accuracy/sampled_against_reference", "test_import", "test_light", "test_models", "test_view", "test_compare",
