@@ -29,9 +29,11 @@ void cli_structure_set_json(json_t *object, const struct fl_frame *frame)
     for (size_t i = 0; i < frame->structure_count; i++) {
         const struct record_structure_row *row = &frame->structure[i];
         char name[FL_STRUCTURE_NAME_BYTES + 16];
-        snprintf(name, sizeof(name), "%s%s", row->name, row->unit == PROTOCOL_UNIT_METRES ? "_metres" : "");
+        const bool is_counted = row->unit == PROTOCOL_UNIT_NUMBER || row->unit == PROTOCOL_UNIT_BUILT;
+        snprintf(name, sizeof(name), "%s%s%s", row->name, is_counted ? "" : "_",
+                 is_counted ? "" : protocol_unit_text(row->unit));
         json_object_set_new(structure, name,
-                            row->unit == PROTOCOL_UNIT_METRES  ? json_real((double)row->measure)
+                            !is_counted                        ? json_real((double)row->measure)
                             : row->unit == PROTOCOL_UNIT_BUILT ? json_boolean(row->number != 0)
                                                                : json_integer((json_int_t)row->number));
         if (row->warning[0] != '\0')

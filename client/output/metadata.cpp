@@ -31,10 +31,11 @@ void add_structure(std::vector<metadata_entry> &entries, const struct message_fr
     for (uint32_t i = 0; i < end.structure_count; i++) {
         const struct record_structure_row &row = end.structure[i];
         const std::string name = std::string("structure/") + row.name;
-        if (row.unit == PROTOCOL_UNIT_METRES)
-            add_number(entries, (name + "_metres").c_str(), static_cast<double>(row.measure));
-        else
+        if (row.unit == PROTOCOL_UNIT_NUMBER || row.unit == PROTOCOL_UNIT_BUILT)
             add_count(entries, name.c_str(), row.number);
+        else
+            add_number(entries, (name + "_" + protocol_unit_text(row.unit)).c_str(),
+                       static_cast<double>(row.measure));
         if (row.warning[0])
             add_text(entries, (name + "/warning").c_str(), row.warning);
     }

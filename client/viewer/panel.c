@@ -7,17 +7,9 @@
 
 #define REAL_SMALLEST 1e-3f /* beside 0: a range of lengths has no natural unit */
 
-static const struct struct_desc *render_fields(void)
-{
-    for (size_t i = 0; i < protocol_message_count; i++)
-        if (protocol_messages[i].info.type == MESSAGE_RENDER)
-            return protocol_messages[i].body();
-    return NULL;
-}
-
 const struct field_desc *panel_setting(enum protocol_tracer tracer, size_t index)
 {
-    const struct field_desc *field = render_fields()->fields;
+    const struct field_desc *field = message_describe(MESSAGE_RENDER)->body()->fields;
     for (; field->name; field++)
         if (field->tracer && strcmp(field->tracer, protocol_tracer_text(tracer)) == 0 && index-- == 0)
             return field;

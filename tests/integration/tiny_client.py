@@ -200,8 +200,11 @@ class Client:
     def revision(self, request):
         return struct.unpack("<Q", fixed_of(self.wait(request))[0])[0]
 
-    def next_frame(self):
+    def next_frame(self, job=None):
+        """Raises Failed where the job has ended with an error instead."""
         while not self.frames:
+            if isinstance(self.answers.get(job), Failed):
+                raise self.answers.pop(job)
             self.receive()
         return self.frames.pop(0)
 

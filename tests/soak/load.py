@@ -3,11 +3,14 @@
 each run the same."""
 import array
 import dataclasses
+import functools
 import math
 import random
+import re
 import socket
 import struct
 
+import farlight_test
 import tiny_client
 from tiny_client import BATCH, KEPT, PRIVATE, SHARED, VIEW, Client
 
@@ -23,7 +26,6 @@ SAMPLES = 4  # of a view that rests
 TEXELS = 16  # along an edge of a texture
 # Structures of a few cells, built at once.
 LDC_RESOLUTION, ABUFFER_RESOLUTION, ABUFFER_VOXELS = 32, 32, 16
-COMPARE_FAR, AO_RAYS, LAYER_OPACITY = 1e-4, 8, 0.5  # their defaults: zero is none of their values
 
 
 @dataclasses.dataclass
@@ -40,6 +42,29 @@ class Mix:
 
 # Without what takes seconds to compile, in software, when it is first used.
 SHORT = Mix(frames=25, cycle=1, sides=(1, 8, 30), tracers=(BVH,), integrators=(WHITTED,))
+
+
+@functools.cache
+def layout(message):
+    """Of the fixed part of a message, as the document of the protocol has it: field -> (offset, format, least value)."""
+    document = (farlight_test.BIN / "protocol.md").read_text()
+    rows = re.search(rf"^### 0x\w+ {message}\n(.*?)^### ", document, re.M | re.S)[1]
+    formats = {"u32": "<I", "u64": "<Q", "f32": "<f"}
+    row = r"^\| (\d+) \| `(\w+)` \| ([^|]+) \| ([\d.e+-]*)(?: \.\.)?"
+    return {name: (int(offset) - 2, formats.get(kind, "<I"), max(float(least or 0), 0))  # 2: the size of the part
+            for offset, name, kind, least in re.findall(row, rows, re.M)}
+
+
+def fixed_part(message, **fields):
+    """Fields that are not given have their least value, or 0."""
+    fixed = bytearray()
+    places = layout(message)
+    assert set(fields) <= set(places), set(fields) - set(places)
+    for name, (offset, kind, least) in places.items():
+        value = fields.get(name, least)
+        assert offset == len(fixed), name
+        fixed += struct.pack(kind, value if kind == "<f" else int(value))
+    return bytes(fixed)
 
 
 def sheet(side, unique):
@@ -166,21 +191,21 @@ class Soak:
         one = fields.__getitem__
         if kind == VIEW:
             client.acknowledged.add(channel)
-        fixed = struct.pack("<8I", 1, kind, channel, 0, 1, 0, one("still"), one("attachments"))
-        fixed += struct.pack("<5IQ3IfI", one("credit"), *SIZE, one("samples"), 2, 1, 0, one("frames") - 1, 1, 1000, 0)
-        fixed += struct.pack("<4If4I", one("tracer"), one("integrator"), one("tracer") != BVH, 0, 0, 0, one("encoding"),
-                             80 if one("encoding") in (JPEG, H264) else 1, tiny_client.CAMERA_PATH_KEYS)
-        fixed += struct.pack("<I2f2I4f2I", 0, 0, 0, 0, 0, COMPARE_FAR, 0, 0, 0, 0, 0)
-        fixed += struct.pack("<I2fIfI", 0, 0, 0, AO_RAYS, LAYER_OPACITY, 0)
-        # Settings of bvh, ldc and abuffer, in the order of protocol/tracers.def; the rest of them keeps its defaults.
-        fixed += struct.pack("<2IIf5I2I", 0, 0, LDC_RESOLUTION, 0, 0, 0, 0, 0, 0, ABUFFER_RESOLUTION, ABUFFER_VOXELS)
+        quality = 80 if one("encoding") in (JPEG, H264) else 1
+        fixed = fixed_part("render", scene=1, kind=kind, channel=channel, still_encoding=one("still"),
+                           attachments=one("attachments"), credit=one("credit"), width=SIZE[0], height=SIZE[1],
+                           samples=one("samples"), depth=2, seed=1, last_frame=one("frames") - 1, frames_per_second=1000,
+                           tracer=one("tracer"), integrator=one("integrator"), primary=int(one("tracer") != BVH),
+                           encoding=one("encoding"), quality=quality, camera_path=tiny_client.CAMERA_PATH_KEYS,
+                           ldc_resolution=LDC_RESOLUTION, abuffer_resolution=ABUFFER_RESOLUTION,
+                           abuffer_voxels=ABUFFER_VOXELS)
         turn = math.pi * self.random.random()
         keys = [struct.pack("<f", i / 100) + tiny_client.camera_bytes(eye_at(turn + i / 10)) for i in range(10)]
         keys = tiny_client.array(keys[:1 if kind == VIEW else 10])
         return client.ask(tiny_client.RENDER, tiny_client.payload(fixed, keys, tiny_client.array([])))
 
-    def take(self, client, channel, credit):
-        frame = client.next_frame()
+    def take(self, client, channel, credit, job):
+        frame = client.next_frame(job)
         self.frames += 1
         client.raise_credit(channel, credit)
         return frame
@@ -188,7 +213,7 @@ class Soak:
     def batch(self, client, channel, frames, **options):
         job = self.render(client, BATCH, channel, frames=frames, **options)
         for i in range(frames):
-            self.take(client, channel, 8 + i + 1)
+            self.take(client, channel, 8 + i + 1, job)
         client.wait(job)
 
     def view(self, client, channel, frames, **options):
@@ -196,12 +221,12 @@ class Soak:
         job = self.render(client, VIEW, channel, samples=SAMPLES, **options)
         for i in range(frames):
             client.look(channel, i + 1, eye_at(i / 7), moving=True)
-            self.take(client, channel, 8 + i + 1)
+            self.take(client, channel, 8 + i + 1, job)
         client.look(channel, frames + 1, eye_at(0))
         credit = 8 + frames
         while True:
             credit += 1
-            frame = self.take(client, channel, credit)
+            frame = self.take(client, channel, credit, job)
             if (frame.command, frame.samples) == (frames + 1, SAMPLES):
                 break
         try:
