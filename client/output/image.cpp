@@ -105,18 +105,6 @@ bool write_with_library(const struct library_image &image, uint8_t **file, size_
     return library && library->encode(&image, file, file_bytes, reason, reason_bytes);
 }
 
-unsigned component_bytes(enum protocol_pixel_format format)
-{
-    switch (format) {
-    case PROTOCOL_PIXEL_FORMAT_RGBA16F:
-        return 2;
-    case PROTOCOL_PIXEL_FORMAT_RGBA32F:
-        return 4;
-    default:
-        return 1;
-    }
-}
-
 std::tm now()
 {
     const std::time_t seconds = std::time(nullptr);
@@ -135,7 +123,8 @@ std::string date_text(const std::tm &date)
 bool write_frame(const struct image &image, uint8_t **file, size_t *file_bytes, char *reason, size_t reason_bytes)
 {
     const struct message_frame_begin &begin = *image.begin;
-    const struct raster raster = {begin.width, begin.height, 4, component_bytes(begin.format), image.pixels};
+    const struct raster raster = {begin.width, begin.height, 4, protocol_pixel_format_bytes(begin.format) / 4,
+                                  image.pixels};
     const std::tm date = now();
     if (has_layers(begin) && (image.format != IMAGE_EXR || begin.format != PROTOCOL_PIXEL_FORMAT_RGBA32F))
         return fail(reason, reason_bytes, "only an EXR file of 32-bit floats can store layers");
