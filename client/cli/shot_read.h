@@ -31,7 +31,7 @@ bool shot_is_array(const struct shot_reader *reader, const struct shot_value *at
 /* A number in [least, greatest]. */
 bool shot_number(const struct shot_reader *reader, const struct shot_value *at, double least, double greatest,
                  double *number);
-/* A name, or a whole number as text: "Lamp", "0". Lives as long as the shot. */
+/* A name, or a whole number as text: "Light", "0". Lives as long as the shot. */
 bool shot_name(const struct shot_reader *reader, const struct shot_value *at, const char **name);
 /* A path relative to the file's folder. Lives as long as the shot. */
 bool shot_path(const struct shot_reader *reader, const struct shot_value *at, const char **path);

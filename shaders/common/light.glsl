@@ -103,12 +103,12 @@ float light_meet(light l, vec3 origin, vec3 direction, out float probability)
 }
 
 // The density of a sample's direction; 0: the light has no extent, and only light_sample_at() finds it.
-float light_probability(light l, light_sample lamp)
+float light_probability(light l, light_sample sampled)
 {
     int kind = int(l.position_kind.w);
     if (kind != LIGHT_KIND_RECTANGLE && kind != LIGHT_KIND_SPHERE)
         return 0.0;
-    float shining = greatest(l.colour.rgb), arriving = greatest(lamp.irradiance);
+    float shining = greatest(l.colour.rgb), arriving = greatest(sampled.irradiance);
     return arriving > 0.0 ? shining / arriving : 0.0; // radiance times this is irradiance
 }
 #endif

@@ -49,10 +49,10 @@ bool ask_for_light(uint j, path p, surface s, split parts, vec3 view, float NoV,
         no_shadow_ray(j);
         return false;
     }
-    light_sample lamp = light_sample_at(index, origin, u);
-    float NoL = dot(s.normal, lamp.direction);
-    vec3 arriving = weight * (brdf(s, parts, view, NoV, lamp.direction) * lamp.irradiance * (NoL / probability));
-    return add_shadow_ray(j, p, origin, lamp.direction, lamp.distance_, arriving);
+    light_sample sampled = light_sample_at(index, origin, u);
+    float NoL = dot(s.normal, sampled.direction);
+    vec3 arriving = weight * (brdf(s, parts, view, NoV, sampled.direction) * sampled.irradiance * (NoL / probability));
+    return add_shadow_ray(j, p, origin, sampled.direction, sampled.distance_, arriving);
 }
 
 void main()

@@ -32,8 +32,8 @@ void main()
 #ifdef SHARES
     arriving *= p.environment_share;
 #ifdef HAS_AREA_LIGHTS
-    if (p.lamp != 0u)
-        arriving += light_at(p.lamp - 1u).colour.rgb * p.lamp_share;
+    if (p.light_number != 0u)
+        arriving += light_at(p.light_number - 1u).colour.rgb * p.light_share;
 #endif
 #endif
     // Pixels beyond the picture's edge have no weight.

@@ -66,14 +66,14 @@ bool ask_for_light(inout eye_hit e, uint place, uint seed, uint index)
         no_shadow_ray(place);
         return false;
     }
-    light_sample lamp = light_sample_at(number, e.origin, u);
-    vec3 arriving = e.weight * bsdf_evaluate(e.b, e.s, lamp.direction, found) * (lamp.irradiance / chance);
+    light_sample sampled = light_sample_at(number, e.origin, u);
+    vec3 arriving = e.weight * bsdf_evaluate(e.b, e.s, sampled.direction, found) * (sampled.irradiance / chance);
 #ifdef HAS_AREA_LIGHTS
-    float probability = chance * light_probability(light_at(number), lamp);
+    float probability = chance * light_probability(light_at(number), sampled);
     if (!e.last && probability > 0.0)
         arriving *= heuristic(probability, found);
 #endif
-    return add_shadow_ray(place, e.p, e.origin, lamp.direction, lamp.distance_, arriving);
+    return add_shadow_ray(place, e.p, e.origin, sampled.direction, sampled.distance_, arriving);
 }
 
 bool ask_for_environment(eye_hit e, uint place, uint seed, uint index)
@@ -92,7 +92,7 @@ bool ask_for_environment(eye_hit e, uint place, uint seed, uint index)
 #ifdef HAS_AREA_LIGHTS
 // Chooses one of the lights that a child's ray will hit if nothing is in the way, and its weight. `found`: the
 // probability density of its direction per steradian; 0: no other technique finds them.
-void meet_lamps(inout path p, eye_hit e, vec3 origin, vec3 direction, float found, float choice)
+void meet_lights(inout path p, eye_hit e, vec3 origin, vec3 direction, float found, float choice)
 {
     float sum = 0.0;
     for (uint i = 0u; i < frame.light_count; i++) {
@@ -111,11 +111,11 @@ void meet_lamps(inout path p, eye_hit e, vec3 origin, vec3 direction, float foun
             continue;
         }
         choice = choice * sum / size;
-        p.lamp = i + 1u;
-        p.lamp_distance = distance_ * (1.0 - 4.0 * PATH_OFFSET); // as shadow rays end before it
-        p.lamp_share = share / size;
+        p.light_number = i + 1u;
+        p.light_distance = distance_ * (1.0 - 4.0 * PATH_OFFSET); // as shadow rays end before it
+        p.light_share = share / size;
     }
-    p.lamp_share *= sum;
+    p.light_share *= sum;
 }
 #endif
 
@@ -126,10 +126,10 @@ uint ask_straight_on(eye_hit e, vec3 direction, vec3 through)
     vec3 origin = off_surface(e.s, e.distance_, -e.s.geometric), carried = e.weight * through;
     if (asks_lights != 0u) {
         vec3 arriving = vec3(0.0);
-        float rest = e.p.lamp_distance - e.distance_;
+        float rest = e.p.light_distance - e.distance_;
 #ifdef HAS_AREA_LIGHTS
-        if (e.p.lamp != 0u && rest > 0.0)
-            arriving = carried * light_at(e.p.lamp - 1u).colour.rgb * e.p.lamp_share;
+        if (e.p.light_number != 0u && rest > 0.0)
+            arriving = carried * light_at(e.p.light_number - 1u).colour.rgb * e.p.light_share;
 #endif
         if (add_shadow_ray(place, e.p, origin, direction, rest, arriving))
             alive++;
@@ -180,26 +180,26 @@ void go_on(eye_hit e, uint seed, uint index, bool asked, float choice)
     float found = asked && !of_glass ? chosen.probability : 0.0;
     p.flags &= ~(PATH_ASKED | PATH_COVERED);
     p.flags |= (found > 0.0 ? PATH_ASKED : 0u) | (covered ? PATH_COVERED : 0u);
-    p.lamp = 0u;
-    p.lamp_share = 0.0;
+    p.light_number = 0u;
+    p.light_share = 0.0;
     p.environment_share = covered ? 0.0 : 1.0;
     if (found > 0.0 && asks_environment != 0u)
         p.environment_share = heuristic(found, environment_probability(e.s.normal, chosen.direction));
 #ifdef HAS_AREA_LIGHTS
     float side = dot(chosen.direction, e.s.geometric) > 0.0 ? 1.0 : -1.0;
     if (!covered)
-        meet_lamps(p, e, off_surface(e.s, e.distance_, side * e.s.geometric), chosen.direction, found,
-                   sequence_number(seed, numbers_of(SEQUENCE_PATH_LAMP), index));
+        meet_lights(p, e, off_surface(e.s, e.distance_, side * e.s.geometric), chosen.direction, found,
+                   sequence_number(seed, numbers_of(SEQUENCE_PATH_MET_LIGHT), index));
 #endif
     add_child(e.j, p, e.s, e.distance_, chosen.direction, carried / survival, false);
 }
 
 // The area light that the ray hit before the surface.
-vec3 met_lamp(path p, float distance_)
+vec3 met_light(path p, float distance_)
 {
 #ifdef HAS_AREA_LIGHTS
-    if (p.lamp != 0u && p.lamp_distance <= distance_)
-        return light_at(p.lamp - 1u).colour.rgb * p.lamp_share;
+    if (p.light_number != 0u && p.light_distance <= distance_)
+        return light_at(p.light_number - 1u).colour.rgb * p.light_share;
 #endif
     return vec3(0.0);
 }
@@ -238,7 +238,7 @@ void main()
     uint seed = path_seed(e.p), index = path_sample(e.p);
     float choice = sequence_number(seed, numbers_of(SEQUENCE_PATH_LOBE), index);
     bool straight = choice >= e.s.alpha;
-    vec3 sent = met_lamp(e.p, h.distance);
+    vec3 sent = met_light(e.p, h.distance);
     bool asks = !straight && !e.s.unlit && !e.b.leaves;
     uint alive = 0u;
     if (!straight)
@@ -259,8 +259,8 @@ void main()
     }
     e.weight = weight;
     if (straight) {
-        e.p.lamp = e.p.lamp_distance > h.distance ? e.p.lamp : 0u;
-        e.p.lamp_distance -= h.distance;
+        e.p.light_number = e.p.light_distance > h.distance ? e.p.light_number : 0u;
+        e.p.light_distance -= h.distance;
         add_child(j, e.p, e.s, h.distance, direction, e.weight, true);
     } else if (!e.s.unlit) {
         go_on(e, seed, index, asks, min(choice / e.s.alpha, 0.99999994));

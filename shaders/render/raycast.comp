@@ -37,8 +37,9 @@ vec3 lit(path p, surface s, vec3 direction, float distance_)
 #ifdef HAS_AREA_LIGHTS
         u = sequence_pair(seed, SEQUENCE_EVERY_LIGHT + (wave_number << 16 ^ i), sample_);
 #endif
-        light_sample lamp = light_sample_at(i, origin, u);
-        sum += brdf(s, parts, view, NoV, lamp.direction) * lamp.irradiance * max(dot(s.normal, lamp.direction), 0.0);
+        light_sample sampled = light_sample_at(i, origin, u);
+        float NoL = max(dot(s.normal, sampled.direction), 0.0);
+        sum += brdf(s, parts, view, NoV, sampled.direction) * sampled.irradiance * NoL;
     }
     return sum;
 }

@@ -94,9 +94,9 @@ void add_child(uint j, path parent, surface s, float distance_, vec3 direction, 
     uint kept = straight ? ~PATH_BOUNCES_MASK : ~(PATH_BOUNCES_MASK | PATH_STRAIGHT);
     c.flags = bounces | parent.flags & kept;
     c.time = parent.time;
-    c.lamp = parent.lamp;
-    c.lamp_distance = parent.lamp_distance;
-    c.lamp_share = parent.lamp_share;
+    c.light_number = parent.light_number;
+    c.light_distance = parent.light_distance;
+    c.light_share = parent.light_share;
     c.environment_share = parent.environment_share;
     children[j * children_a_hit + child_count] = c;
     child_count++;

@@ -39,10 +39,10 @@ uint ask_for_lights(uint j, path parent, surface s, split parts, vec3 view, floa
 #ifdef HAS_AREA_LIGHTS
         u = sequence_pair(seed, SEQUENCE_EVERY_LIGHT + (wave_number << 16 ^ index), sample_);
 #endif
-        light_sample lamp = light_sample_at(index, origin, u);
-        float NoL = dot(s.normal, lamp.direction);
-        vec3 arriving = weight * (brdf(s, parts, view, NoV, lamp.direction) * lamp.irradiance * NoL);
-        if (add_shadow_ray(i * hit_count + j, parent, origin, lamp.direction, lamp.distance_, arriving))
+        light_sample sampled = light_sample_at(index, origin, u);
+        float NoL = dot(s.normal, sampled.direction);
+        vec3 arriving = weight * (brdf(s, parts, view, NoV, sampled.direction) * sampled.irradiance * NoL);
+        if (add_shadow_ray(i * hit_count + j, parent, origin, sampled.direction, sampled.distance_, arriving))
             alive++;
     }
     return alive;

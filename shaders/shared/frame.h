@@ -53,7 +53,7 @@ SHARED_SIZE(frame_uniforms, 576)
 #define SEQUENCE_PATH_LOBE 2u        /* 1: the lobe of the surface */
 #define SEQUENCE_PATH_DIRECTION 3u   /* 2 */
 #define SEQUENCE_PATH_END 4u         /* 1: Russian roulette */
-#define SEQUENCE_PATH_LAMP 5u        /* 1: chooses among the lights that it hits */
+#define SEQUENCE_PATH_MET_LIGHT 5u   /* 1: chooses among the lights that it hits */
 #define SEQUENCE_PATH_PASS 6u        /* 1: glass: which light is sampled */
 #define SEQUENCE_EVERY_LIGHT                                                                                      \
     0x10000u /* plus wave number * 0x10000 + light number, 2: for every light at every hit */

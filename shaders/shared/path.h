@@ -18,9 +18,9 @@ struct path {
     uint flags;                         /* PATH_* */
     float time;                         /* 0: the shutter opens .. 1: it closes */
     /* integrator path: the weights of lights that the ray hits, as shares of their radiance */
-    uint lamp;           /* number of the light that it hits, plus 1; 0: none counts */
-    float lamp_distance; /* its distance, if nothing is hit before */
-    float lamp_share, environment_share;
+    uint light_number;    /* of the light that it hits, plus 1; 0: none counts */
+    float light_distance; /* its distance, if nothing is hit before */
+    float light_share, environment_share;
 };
 SHARED_SIZE(path, 48)
 #define PATH_TEXELS 3 /* RGBA32UI */
@@ -47,8 +47,8 @@ struct child {
     float cone_width, cone_spread;
     uint flags;
     float time;
-    uint lamp;
-    float lamp_distance, lamp_share, environment_share;
+    uint light_number;
+    float light_distance, light_share, environment_share;
 };
 SHARED_SIZE(child, 80)
 #define CHILD_TEXELS 5       /* RGBA32UI */

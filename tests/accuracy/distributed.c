@@ -10,14 +10,14 @@ enum { EDGE = 16, PIXELS = EDGE * EDGE };
 
 /* ---- scenes ---- */
 
-static void a_lamp(struct fixture *fixture, enum light_kind kind, float x, float y, float z, float power)
+static void a_light(struct fixture *fixture, enum light_kind kind, float x, float y, float z, float power)
 {
     struct scene_light *light = fixture_light(fixture, kind, x, y, z, power);
     light->size[0] = light->size[1] = 0.8f;
     light->outer_cone = 1.2f;
 }
 
-/* Diffuse, mirror and glass, all smooth, a pane that is half open, and lamps without a size. */
+/* Diffuse, mirror and glass, all smooth, a pane that is half open, and lights without a size. */
 static void smooth_things(struct fixture *fixture)
 {
     struct scene_material *ground = fixture_material(fixture), *mirror = fixture_material(fixture),
@@ -42,21 +42,21 @@ static void smooth_things(struct fixture *fixture)
                 behind[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, -1.0f};
     fixture_square(fixture, 0.4f, pane->base.id, before);
     fixture_square(fixture, 4.0f, ground->base.id, behind);
-    a_lamp(fixture, LIGHT_POINT, 2.0f, 2.0f, 2.0f, 8.0f);
-    a_lamp(fixture, LIGHT_POINT, -3.0f, 1.0f, 1.0f, 5.0f);
-    a_lamp(fixture, LIGHT_SPOT, 0.0f, 0.5f, 4.0f, 10.0f);
-    a_lamp(fixture, LIGHT_DIRECTIONAL, 0.0f, 0.0f, 0.0f, 0.3f);
+    a_light(fixture, LIGHT_POINT, 2.0f, 2.0f, 2.0f, 8.0f);
+    a_light(fixture, LIGHT_POINT, -3.0f, 1.0f, 1.0f, 5.0f);
+    a_light(fixture, LIGHT_SPOT, 0.0f, 0.5f, 4.0f, 10.0f);
+    a_light(fixture, LIGHT_DIRECTIONAL, 0.0f, 0.0f, 0.0f, 0.3f);
     fixture_environment(fixture, 0.2f, 0.3f, 0.4f);
 }
 
-/* A ball that hides part of two lamps that have a size from the ground. */
+/* A ball that hides part of two lights that have a size from the ground. */
 static void a_soft_shadow(struct fixture *fixture)
 {
     struct scene_material *ground = fixture_material(fixture);
     fixture_square(fixture, 4.0f, ground->base.id, NULL);
     fixture_sphere(fixture, 0.4f, 0.3f, 0.9f, 0.4f, ground->base.id);
-    a_lamp(fixture, LIGHT_SPHERE, 1.5f, 1.0f, 3.0f, 6.0f);
-    a_lamp(fixture, LIGHT_RECTANGLE, -1.0f, 0.5f, 3.0f, 4.0f);
+    a_light(fixture, LIGHT_SPHERE, 1.5f, 1.0f, 3.0f, 6.0f);
+    a_light(fixture, LIGHT_RECTANGLE, -1.0f, 0.5f, 3.0f, 4.0f);
 }
 
 /* A rough metal wall before which coloured balls glow. */

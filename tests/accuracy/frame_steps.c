@@ -29,7 +29,7 @@ static bool count_rays(struct tracer *tracer, struct gpu_scene *scene, struct tr
     return behind->trace_range(tracer, scene, state, rays, error);
 }
 
-/* More lamps than go into one batch, mirrors, glass and panes. */
+/* More lights than go into one batch, mirrors, glass and panes. */
 static void a_crowded_scene(struct fixture *fixture)
 {
     struct scene_material *ground = fixture_material(fixture), *mirror = fixture_material(fixture),

@@ -161,7 +161,7 @@ TEST(no_material_outshines_a_furnace)
 
 /* ---- frames ---- */
 
-/* Lamps of two kinds, an environment, glass, metal, a pane: something of everything. */
+/* Lights of two kinds, an environment, glass, metal, a pane: something of everything. */
 static void a_still_life(struct fixture *fixture)
 {
     struct scene_material *ground = fixture_material(fixture), *metal = fixture_material(fixture),

@@ -7,7 +7,7 @@
 #include "tests/accuracy/path_fixture.h"
 #include "tests/harness/test.h"
 
-#define HEIGHT 2.0f /* of the lamps above the floor */
+#define HEIGHT 2.0f /* of the lights above the floor */
 #define HALF 0.5f   /* of the rectangle's edges, and the ball's radius */
 #define VIEW 4.0f   /* metres of the floor that are seen */
 
@@ -58,15 +58,15 @@ static double below_a_ball(const double place[2])
     return (double)(HALF * HALF) / squared * (double)HEIGHT / sqrt(squared);
 }
 
-static void a_lamp_of(struct fixture *fixture, enum light_kind kind, float radiance)
+static void a_light_of(struct fixture *fixture, enum light_kind kind, float radiance)
 {
     struct scene_light *light = fixture_light(fixture, kind, 0.0f, 0.0f, HEIGHT, radiance);
     light->size[0] = light->size[1] = kind == LIGHT_RECTANGLE ? 2.0f * HALF : HALF;
 }
 
-static void a_lamp(struct fixture *fixture, enum light_kind kind)
+static void a_light(struct fixture *fixture, enum light_kind kind)
 {
-    a_lamp_of(fixture, kind, 1.0f);
+    a_light_of(fixture, kind, 1.0f);
 }
 
 /* The same rectangle as a surface; it looks down, and glows on both sides. A light that gives none keeps the
@@ -113,17 +113,17 @@ TEST(lights_illuminate_a_floor_as_their_closed_forms_say)
         const char *name;
         enum light_kind kind;
         double (*form)(const double place[2]);
-    } lamps[] = {{"rectangle", LIGHT_RECTANGLE, below_a_rectangle}, {"sphere", LIGHT_SPHERE, below_a_ball}};
-    for (size_t l = 0; l < COUNT(lamps); l++)
+    } lights[] = {{"rectangle", LIGHT_RECTANGLE, below_a_rectangle}, {"sphere", LIGHT_SPHERE, below_a_ball}};
+    for (size_t l = 0; l < COUNT(lights); l++)
         for (size_t t = 0; t < COUNT(tracers); t++)
             for (uint32_t depth = 0; depth < 2; depth++) {
                 path_begin(fixture, tracers[t], depth);
                 a_floor(fixture, 1.0f);
-                a_lamp(fixture, lamps[l].kind);
+                a_light(fixture, lights[l].kind);
                 fixture->request.samples = 16;
-                closed_form = lamps[l].form;
+                closed_form = lights[l].form;
                 struct mean mean = mean_of_seeds(fixture, off_the_form);
-                print_message("%s, tracer %u, %s: off by %+.1e, standard error %.1e\n", lamps[l].name, tracers[t],
+                print_message("%s, tracer %u, %s: off by %+.1e, standard error %.1e\n", lights[l].name, tracers[t],
                               depth ? "both ways" : "shadow rays", mean.value, mean.error);
                 assert_mean(mean, 0.0, PIXEL_CURVATURE);
                 assert_true(mean.error < 2e-3);
@@ -164,9 +164,9 @@ TEST(shadow_rays_and_rays_that_go_on_find_the_same_light)
                 material->anisotropy = floors[f].anisotropy;
                 material->anisotropy_rotation = 0.5f;
                 material->ior = 1.5f;
-                fixture_look(fixture, 1.5f, -1.5f, 1.2f, 0.8f); /* the lamp's image, and the floor beside it */
+                fixture_look(fixture, 1.5f, -1.5f, 1.2f, 0.8f); /* the light's image, and the floor beside it */
                 if (way < 2)
-                    a_lamp(fixture, LIGHT_RECTANGLE);
+                    a_light(fixture, LIGHT_RECTANGLE);
                 else
                     a_glowing_square(fixture);
                 fixture->request.brdf = ward ? BRDF_WARD : BRDF_GGX;
@@ -189,7 +189,7 @@ TEST(shadow_rays_and_rays_that_go_on_find_the_same_light)
 
 /* ---- kinds of lights ---- */
 
-/* Where lamps have no size and the floor is diffuse, a path without bounces is what whitted shows. */
+/* Where lights have no size and the floor is diffuse, a path without bounces is what whitted shows. */
 TEST(point_lights_contribute_as_in_whitted)
 {
     struct fixture *fixture = *state;
@@ -210,7 +210,7 @@ TEST(point_lights_contribute_as_in_whitted)
             fixture->request.samples = 16;
             means[path] = mean_of_seeds(fixture, whole);
         }
-        print_message("lamps %d: %.5f, whitted's %.5f (%.0e)\n", which, means[1].value, means[0].value,
+        print_message("lights %d: %.5f, whitted's %.5f (%.0e)\n", which, means[1].value, means[0].value,
                       means[1].error);
         /* The default material's ball mirrors a little in both; whitted's direct light is the same model. Both
          * have their samples in the same places. */
@@ -224,11 +224,11 @@ TEST(lights_are_visible_in_mirrors_and_not_directly)
     static const enum light_kind kinds[] = {LIGHT_RECTANGLE, LIGHT_SPHERE};
     for (size_t k = 0; k < COUNT(kinds); k++) {
         path_begin(fixture, TRACER_REFERENCE, 1);
-        struct scene_material *mirror = a_floor(fixture, 5.0f); /* the lamp is between */
+        struct scene_material *mirror = a_floor(fixture, 5.0f); /* the light is between */
         mirror->metallic = 1.0f;
         mirror->roughness = 0.0f;
-        a_lamp_of(fixture, kinds[k], 0.0f); /* one that is switched off is no obstacle */
-        a_lamp(fixture, kinds[k]);
+        a_light_of(fixture, kinds[k], 0.0f); /* one that is switched off is no obstacle */
+        a_light(fixture, kinds[k]);
         struct frame_result result = fixture_render(fixture);
         for (uint32_t i = 0; i < PIXELS; i++) {
             double place[2];
@@ -263,7 +263,7 @@ TEST(light_through_glass_is_not_counted_twice)
             if (which == ENVIRONMENT_LIGHTS)
                 fixture_environment(fixture, 1.0f, 1.0f, 1.0f);
             else
-                a_lamp(fixture, which == 0 ? LIGHT_RECTANGLE : LIGHT_SPHERE);
+                a_light(fixture, which == 0 ? LIGHT_RECTANGLE : LIGHT_SPHERE);
             fixture->request.samples = 16;
             closed_form = which == 0 ? below_a_rectangle : below_a_ball;
             struct mean mean = mean_of_seeds(fixture, which == ENVIRONMENT_LIGHTS ? whole : off_the_form);

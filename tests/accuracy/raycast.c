@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The integrator `raycast`: parallel layers blend to their closed form, whatever the tracer; lamps shine through.
+/* The integrator `raycast`: parallel layers blend to their closed form, whatever the tracer; lights shine through.
  */
 #include "tests/accuracy/render_fixture.h"
 

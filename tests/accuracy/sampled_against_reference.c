@@ -197,7 +197,7 @@ TEST(occlusion_of_open_shapes_is_like_the_references)
 /* Where a scene lies. */
 struct extent {
     float lower_world[3], upper_world[3];
-    float diagonal; /* metres; lamps belong to it */
+    float diagonal; /* metres; lights belong to it */
 };
 
 static struct extent scene_extent(struct fixture *fixture)

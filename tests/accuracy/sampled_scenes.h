@@ -117,8 +117,8 @@ static inline uint32_t add_shape(struct fixture *fixture, enum shape shape, uint
     return fixture_node(fixture, NODE_MESH, mesh, m);
 }
 
-/* A floor of some size below it all, and two lamps. */
-static inline void add_floor_and_lamps(struct fixture *fixture, uint32_t material)
+/* A floor of some size below it all, and two lights. */
+static inline void add_floor_and_lights(struct fixture *fixture, uint32_t material)
 {
     const float floor[12] = {1, 0, 0, 0, 0, 0, 1, -1.05f, 0, -1, 0, 0};
     fixture_square(fixture, 3.0f, material, floor);
@@ -176,7 +176,7 @@ static inline uint32_t add_mirror(struct fixture *fixture, float r, float g, flo
 static inline void add_mirrors(struct fixture *fixture)
 {
     uint32_t gold = add_mirror(fixture, 1.0f, 0.8f, 0.4f), silver = add_mirror(fixture, 0.9f, 0.9f, 0.95f);
-    add_floor_and_lamps(fixture, add_matte(fixture, 0.6f, 0.6f, 0.5f));
+    add_floor_and_lights(fixture, add_matte(fixture, 0.6f, 0.6f, 0.5f));
     add_shape(fixture, SHAPE_SPHERE, 96, silver, 0.8f, 0, -1.3f, -0.2f, 0);
     add_shape(fixture, SHAPE_TORUS, 96, gold, 0.9f, 0.9f, 1.2f, -0.1f, 0.2f);
     add_shape(fixture, SHAPE_BUMPY, 160, add_matte(fixture, 0.8f, 0.3f, 0.2f), 0.5f, 0.3f, 0, -0.5f, 1.2f);
@@ -189,7 +189,7 @@ static inline void add_textured(struct fixture *fixture)
     use_texture(checked, MATERIAL_BASE_COLOUR, texture);
     use_texture(checked, MATERIAL_EMISSION, texture);
     checked->emission[0] = 0.2f;
-    add_floor_and_lamps(fixture, mirror);
+    add_floor_and_lights(fixture, mirror);
     add_shape(fixture, SHAPE_SPHERE, 96, checked->base.id, 0.9f, 0.5f, -1.1f, 0, 0);
     add_shape(fixture, SHAPE_TORUS, 96, checked->base.id, 0.9f, 1.2f, 1.2f, 0, 0);
 }
@@ -240,7 +240,7 @@ static inline void add_every_texture(struct fixture *fixture)
     use_texture(bumpy, MATERIAL_BUMP, hills);
     bumpy->textures[MATERIAL_BUMP].strength = 0.1f;
     uint32_t bumpy_id = bumpy->base.id;
-    add_floor_and_lamps(fixture, add_mirror(fixture, 0.9f, 0.9f, 0.9f));
+    add_floor_and_lights(fixture, add_mirror(fixture, 0.9f, 0.9f, 0.9f));
     add_shape(fixture, SHAPE_SPHERE, 96, rich_id, 0.9f, 0.5f, -1.1f, 0, 0);
     add_shape(fixture, SHAPE_TORUS, 96, bumpy_id, 0.9f, 1.2f, 1.2f, 0, 0);
 }
@@ -252,7 +252,7 @@ static inline void add_glass(struct fixture *fixture)
     glass->transmission = 1.0f;
     glass->roughness = 0.0f;
     glass->ior = 1.5f;
-    add_floor_and_lamps(fixture, add_matte(fixture, 0.7f, 0.6f, 0.5f));
+    add_floor_and_lights(fixture, add_matte(fixture, 0.7f, 0.6f, 0.5f));
     add_shape(fixture, SHAPE_SPHERE, 96, glass->base.id, 0.9f, 0, -1.1f, 0, 0.6f);
     add_shape(fixture, SHAPE_TORUS, 96, glass->base.id, 0.9f, 1.0f, 1.2f, 0, 0.4f);
     add_shape(fixture, SHAPE_BUMPY, 96, add_matte(fixture, 0.2f, 0.4f, 0.8f), 0.6f, 0, 0, -0.3f, -1.2f);
@@ -263,7 +263,7 @@ static inline void add_cutout(struct fixture *fixture)
     struct scene_material *fence = fixture_material(fixture);
     use_texture(fence, MATERIAL_BASE_COLOUR, add_texture(fixture, true));
     fence->alpha_mode = ALPHA_MASK;
-    add_floor_and_lamps(fixture, add_mirror(fixture, 0.8f, 0.8f, 0.8f));
+    add_floor_and_lights(fixture, add_mirror(fixture, 0.8f, 0.8f, 0.8f));
     add_shape(fixture, SHAPE_SPHERE, 64, fence->base.id, 0.9f, 0.4f, -0.9f, 0, 0);
     const float pane[12] = {0.8f, 0, 0.6f, 1.3f, 0, 1, 0, 0, -0.6f, 0, 0.8f, 0};
     fixture_square(fixture, 0.9f, fence->base.id, pane);
@@ -272,7 +272,7 @@ static inline void add_cutout(struct fixture *fixture)
 static inline void add_spheres(struct fixture *fixture)
 {
     uint32_t silver = add_mirror(fixture, 0.9f, 0.9f, 0.95f), red = add_matte(fixture, 0.8f, 0.2f, 0.2f);
-    add_floor_and_lamps(fixture, add_matte(fixture, 0.6f, 0.6f, 0.5f));
+    add_floor_and_lights(fixture, add_matte(fixture, 0.6f, 0.6f, 0.5f));
     for (int i = 0; i < 9; i++)
         fixture_sphere(fixture, -1.4f + 1.4f * (float)(i % 3), -0.6f + 0.1f * (float)i,
                        1.2f - 1.1f * (float)(i / 3), 0.45f, i % 2 ? red : silver);

@@ -176,7 +176,7 @@ TEST(the_filters_are_those_of_the_protocol)
 
 /* ---- how samples add up ---- */
 
-/* Glass, gloss, a blended pane and two lamps that have a size. */
+/* Glass, gloss, a blended pane and two lights that have a size. */
 static void a_mixture(struct fixture *fixture)
 {
     struct scene_material *gloss = fixture_material(fixture), *glass = fixture_material(fixture),

@@ -34,8 +34,9 @@ struct quadrature {
  * rings and sectors are off by four times as much, so the finer sum by a third of the difference. */
 #define HORIZON_ERROR 1e-3
 #define MIDPOINT_ERROR(fine_albedo, coarse_albedo) (fabs((fine_albedo) - (coarse_albedo)) / 3.0)
-/* A lamp's highlight is blurred by a least roughness and a refracted ray is not. Where Fresnel's curve is bent up,
- * at worst about 80 degrees for an index of 10, its mean over the highlight is 4e-4 above what was kept back. */
+/* A light's highlight is blurred by a least roughness and a refracted ray is not. Where Fresnel's curve is bent
+ * up, at worst about 80 degrees for an index of 10, its mean over the highlight is 4e-4 above what was kept back.
+ */
 #define HIGHLIGHT_BLUR 5e-4
 
 static struct quadrature fine, coarse;
@@ -113,7 +114,8 @@ static double fresnel(double cosine, double n)
 /* What is looked for in one walk over the grid; each is printed, so that its margin is seen. */
 struct extremes {
     double greatest, mistake, lambert, mirror, parts;
-    double least_dielectric, least_metal; /* of a lamp's light: facets that shadow each other are not followed */
+    double least_dielectric,
+        least_metal; /* of what a light sends: facets that shadow each other are not followed */
     char where[160];
 };
 
@@ -163,11 +165,11 @@ TEST(no_material_gives_out_more_than_arrives)
     walk_grid(*state, &extremes);
     print_message("greatest albedo %.6f (%s); quadrature off by %.1e at most\n", extremes.greatest, extremes.where,
                   extremes.mistake);
-    print_message("a lamp in glass is mirrored within %.1e of Fresnel; Lambert within %.1e; parts of all that "
+    print_message("a light in glass is mirrored within %.1e of Fresnel; Lambert within %.1e; parts of all that "
                   "surrounds within %.1e\n",
                   extremes.mirror, extremes.lambert, extremes.parts);
     print_message(
-        "of a lamp's light a white dielectric keeps %.3f at least (index up to 1.5), a white metal %.3f\n",
+        "of what a light sends a white dielectric reflects at least %.3f (index up to 1.5), a white metal %.3f\n",
         extremes.least_dielectric, extremes.least_metal);
     assert_true(extremes.mistake < 2e-3); /* else the tolerance above would let faults through */
     assert_true(extremes.lambert < HORIZON_ERROR);

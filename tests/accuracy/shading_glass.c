@@ -25,11 +25,11 @@ static struct scene_material *clear_glass(struct fixture *fixture, double ior)
     return glass;
 }
 
-static uint32_t lamp_material(struct fixture *fixture)
+static uint32_t light_material(struct fixture *fixture)
 {
-    struct scene_material *lamp = fixture_material(fixture);
-    lamp->unlit = true;
-    return lamp->base.id;
+    struct scene_material *light = fixture_material(fixture);
+    light->unlit = true;
+    return light->base.id;
 }
 
 ALL_TESTS(fixture_setup, fixture_teardown)
@@ -88,14 +88,14 @@ static void no_sky(struct fixture *fixture)
     fixture_light(fixture, LIGHT_POINT, 0.0f, 0.0f, 900.0f, 1e-9f);
 }
 
-/* The eye looks at the boundary under `before`; a lamp of 0.1 degrees stands where the ray should go, and nothing
- * else shines. `side`: of the eye, -1 inside. What the lamp brings is what the boundary lets through. */
+/* The eye looks at the boundary under `before`; a light of 0.1 degrees stands where the ray should go, and nothing
+ * else shines. `side`: of the eye, -1 inside. What the light brings is what the boundary lets through. */
 static void expect_bent(struct fixture *fixture, double n, double before, double after, int side)
 {
     fixture_clear((void **)&fixture);
     fixture_square(fixture, 100.0f, clear_glass(fixture, n)->base.id, NULL);
     double x = -2.0 * sin(after), z = -2.0 * side * cos(after);
-    fixture_sphere(fixture, (float)x, 0.0f, (float)z, 0.0035f, lamp_material(fixture));
+    fixture_sphere(fixture, (float)x, 0.0f, (float)z, 0.0035f, light_material(fixture));
     no_sky(fixture);
     fixture->request.width = fixture->request.height = 9;
     fixture_look(fixture, (float)(4.0 * sin(before)), 0.0f, (float)(4.0 * side * cos(before)), 0.001f);
@@ -116,8 +116,8 @@ TEST(refraction_obeys_snells_law)
         }
 }
 
-/* What a pane of clear glass lets through (bounces = 2, 4, ..) or sends back (1, 3, ..) of a lamp's radiance of 1,
- * its walls mirroring the share f each time; so far as the bounces are followed and a path carries enough. */
+/* What a pane of clear glass lets through (bounces = 2, 4, ..) or sends back (1, 3, ..) of a light's radiance of
+ * 1, its walls mirroring the share f each time; so far as the bounces are followed and a path carries enough. */
 static double pane_series(double f, uint32_t depth, bool through)
 {
     const double weight_min = (double)PATH_WEIGHT_MIN;
@@ -141,10 +141,10 @@ TEST(a_pane_of_glass_shares_light_out_as_the_series_of_its_reflections)
             for (uint32_t depth = 0; depth <= 8; depth++) {
                 fixture_clear(state);
                 uint32_t glass = clear_glass(fixture, 2.4)->base.id;
-                const float lamp[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, through ? -2.0f : 7.0f};
+                const float light[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, through ? -2.0f : 7.0f};
                 fixture_square(fixture, 1000.0f, glass, NULL);
                 fixture_square(fixture, 1000.0f, glass, turned);
-                fixture_square(fixture, 1000.0f, lamp_material(fixture), lamp);
+                fixture_square(fixture, 1000.0f, light_material(fixture), light);
                 no_sky(fixture);
                 fixture->request.width = fixture->request.height = 3;
                 fixture->request.depth = depth;

@@ -102,7 +102,7 @@ static bool wrong_surfaces(struct tracer *tracer, struct gpu_scene *scene, const
 
 /* ---- scenes and sums ------------------------------------------------------------------------------ */
 
-/* Mirror, glass, a veil, a disc, spheres and triangles; a lamp and shadows. */
+/* Mirror, glass, a veil, a disc, spheres and triangles; a light and shadows. */
 static void build_scene(struct fixture *fixture)
 {
     struct scene_material *mirror = fixture_material(fixture);

@@ -131,17 +131,17 @@ static void add_blob(struct test_edits *edits)
 
 static void add_lights(struct test_edits *edits)
 {
-    static const float lamps[3][7] = {/* place, radius, radiance */
-                                      {-5.0f, 8.0f, 4.0f, 0.6f, 22.0f, 20.0f, 17.0f},
-                                      {6.0f, 7.0f, 5.0f, 0.5f, 14.0f, 16.0f, 22.0f},
-                                      {1.0f, 9.0f, -6.0f, 0.8f, 12.0f, 12.0f, 12.0f}};
+    static const float lights[3][7] = {/* place, radius, radiance */
+                                       {-5.0f, 8.0f, 4.0f, 0.6f, 22.0f, 20.0f, 17.0f},
+                                       {6.0f, 7.0f, 5.0f, 0.5f, 14.0f, 16.0f, 22.0f},
+                                       {1.0f, 9.0f, -6.0f, 0.8f, 12.0f, 12.0f, 12.0f}};
     for (uint32_t i = 0; i < 3; i++) {
         struct scene_light *light = &test_add(edits, OBJECT_LIGHT)->set.light;
         light->base.id = 1 + i;
         light->kind = LIGHT_SPHERE;
-        light->size[0] = lamps[i][3];
-        memcpy(light->colour, &lamps[i][4], sizeof(light->colour));
-        const float at[12] = {1, 0, 0, lamps[i][0], 0, 1, 0, lamps[i][1], 0, 0, 1, lamps[i][2]};
+        light->size[0] = lights[i][3];
+        memcpy(light->colour, &lights[i][4], sizeof(light->colour));
+        const float at[12] = {1, 0, 0, lights[i][0], 0, 1, 0, lights[i][1], 0, 0, 1, lights[i][2]};
         test_node(edits, NODE_LIGHTS + i, 0, NODE_LIGHT, 1 + i, at);
     }
     struct scene_edit *sky = test_add(edits, OBJECT_NODE);

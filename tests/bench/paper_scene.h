@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* The kind of scene that the stackless sphere tree's paper measures distributed ray tracing with: 1,767
  * primitives. A textured disc as the ground, 64 loose spheres (rough, glossy, glass, mirror), a sphereflake of
- * 820, a blob of 882 triangles, and three lamps that have a size. */
+ * 820, a blob of 882 triangles, and three lights that have a size. */
 #ifndef FARLIGHT_TESTS_PAPER_SCENE_H
 #define FARLIGHT_TESTS_PAPER_SCENE_H
 

@@ -70,7 +70,7 @@ def moving_model(path):
         "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0, 1, 2]}],
         "nodes": [{"name": "pyramid", "mesh": 0}, {"name": "ground", "mesh": 0, "translation": [0, -2.2, -1],
                                                    "scale": [4, 1, 4]},
-                  {"name": "lamp", "extensions": {"KHR_lights_punctual": {"light": 0}}, "translation": [2, 5, 4]}],
+                  {"name": "light", "extensions": {"KHR_lights_punctual": {"light": 0}}, "translation": [2, 5, 4]}],
         "extensionsUsed": ["KHR_lights_punctual"],
         "extensions": {"KHR_lights_punctual": {"lights": [{"type": "point", "name": "bulb", "intensity": 400}]}},
         "meshes": [{"primitives": [{"attributes": {"POSITION": position}, "indices": index, "material": 0}]}],

@@ -14,8 +14,8 @@ SIZE = (320, 180)
 # Where parts are at 0.55 and at 0.95 s of the clip, as shares of the picture: left, right, top, bottom.
 MOVING = {"skinned reed": (0.16, 0.28, 0.15, 0.50), "morphing blob": (0.08, 0.18, 0.34, 0.60),
           "turning wheel": (0.73, 0.93, 0.24, 0.60), "bobbing pots": (0.26, 0.72, 0.28, 0.62)}
-STILL = {"a socket without the lamp": (0.54, 0.58, 0.87, 0.90), "the blob's plinth": (0.09, 0.2, 0.70, 0.73)}
-LAMP = {"the lamp's second place": (0.24, 0.27, 0.75, 0.81)}
+STILL = {"a socket without the bulb": (0.54, 0.58, 0.87, 0.90), "the blob's plinth": (0.09, 0.2, 0.70, 0.73)}
+BULB = {"the bulb's second place": (0.24, 0.27, 0.75, 0.81)}
 
 
 def carousel():
@@ -88,7 +88,7 @@ class Pictures(Case):
         for name, region in STILL.items():
             # What moves is seen in the floor and its light is reflected: a little may change, no edge may move.
             self.assertLess(self.change(early, late, region), 2, name)
-        for name, region in LAMP.items():
+        for name, region in BULB.items():
             self.assertLess(self.change(early, late, region), 2, name + " between two leaps")
             self.assertGreater(self.change(before_leap, early, region), 20, name + " across a leap")
 

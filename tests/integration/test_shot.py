@@ -37,7 +37,7 @@ EXAMPLES = {
                     "handles": [[0, -5], [5, 0]]},
             "aperture": {"times": [0], "values": [0.1]}, "focus": 3.2,
             "exposure": {"times": [0, 1], "values": [0, -2], "interpolation": "step"}},
-        "lights": [{"target": "Lamp", "colour": [10, 9, 8], "size": 0.5},
+        "lights": [{"target": "Light", "colour": [10, 9, 8], "size": 0.5},
                    {"target": 0, "colour": {"times": [0, 1], "values": [[0, 0, 0], [1, 1, 1]]},
                     "size": {"times": [0, 1], "values": [[1, 2], 0.5]}}],
         "materials": [{"target": 0, "base_colour": [1, 0.5, 0], "emission": [0, 0, 4], "metallic": 1, "roughness": 0.3,

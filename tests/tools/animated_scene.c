@@ -14,7 +14,7 @@
 #define CLIP_S 3.0f /* what turns has turned fully after it, what swings is where it was */
 #define KEYS_MAX 33
 
-enum { JOINTS = PARTS_JOINTS, RIDERS = 4, LAMP_PLACES = 6 };
+enum { JOINTS = PARTS_JOINTS, RIDERS = 4, BULB_PLACES = 6 };
 
 /* Numbers of the nodes in the file; the arms and what is on them follow one another. */
 enum node {
@@ -22,8 +22,8 @@ enum node {
     PLATFORM,
     COLUMN,
     STUDS,
-    LAMP,
-    LAMP_LIGHT,
+    BULB,
+    BULB_LIGHT,
     SOCKETS,
     STAND,
     WHEEL,
@@ -107,29 +107,29 @@ static void add_roundabout(struct carousel *carousel)
     add_riders(carousel);
 }
 
-static void lamp_place(float place[3], unsigned which)
+static void bulb_place(float place[3], unsigned which)
 {
-    const float angle = PI * (0.16f + 0.68f * (float)which / (LAMP_PLACES - 1));
+    const float angle = PI * (0.16f + 0.68f * (float)which / (BULB_PLACES - 1));
     place[0] = -2.7f * cosf(angle);
     place[1] = 0.2f;
     place[2] = 2.7f * sinf(angle);
 }
 
-static void add_lamp(struct carousel *carousel)
+static void add_bulb(struct carousel *carousel)
 {
     struct shape sockets = {0}, bulb = {0};
-    for (unsigned i = 0; i < LAMP_PLACES; i++) {
+    for (unsigned i = 0; i < BULB_PLACES; i++) {
         float place[3];
-        lamp_place(place, i);
+        bulb_place(place, i);
         place[1] = 0.05f;
         shape_box(&sockets, place, (const float[3]){0.1f, 0.05f, 0.1f}, 0);
     }
     shape_sphere(&bulb, (const float[3]){0, 0, 0}, 0.11f, 32);
     set_node(carousel, SOCKETS, "sockets", "\"mesh\":%u",
              parts_mesh(&carousel->writer, "sockets", &sockets, DARK));
-    set_node(carousel, LAMP, "lamp", "\"mesh\":%u,\"children\":[%d]",
-             parts_mesh(&carousel->writer, "lamp", &bulb, GLOW), LAMP_LIGHT);
-    set_node(carousel, LAMP_LIGHT, "lamp light",
+    set_node(carousel, BULB, "bulb", "\"mesh\":%u,\"children\":[%d]",
+             parts_mesh(&carousel->writer, "bulb", &bulb, GLOW), BULB_LIGHT);
+    set_node(carousel, BULB_LIGHT, "bulb light",
              "\"translation\":[0,0.3,0],\"extensions\":{\"KHR_lights_punctual\":{\"light\":2}}");
 }
 
@@ -237,12 +237,12 @@ static void bend(struct carousel *carousel, unsigned joint)
 
 static void jump(struct carousel *carousel)
 {
-    float times_s[LAMP_PLACES + 1], values[LAMP_PLACES + 1][3];
-    even_times(times_s, LAMP_PLACES + 1);
-    for (unsigned i = 0; i <= LAMP_PLACES; i++)
-        lamp_place(values[i], i % LAMP_PLACES);
-    gltf_animate(&carousel->writer, LAMP,
-                 &(struct gltf_curve){"translation", "STEP", times_s, &values[0][0], LAMP_PLACES + 1, 3});
+    float times_s[BULB_PLACES + 1], values[BULB_PLACES + 1][3];
+    even_times(times_s, BULB_PLACES + 1);
+    for (unsigned i = 0; i <= BULB_PLACES; i++)
+        bulb_place(values[i], i % BULB_PLACES);
+    gltf_animate(&carousel->writer, BULB,
+                 &(struct gltf_curve){"translation", "STEP", times_s, &values[0][0], BULB_PLACES + 1, 3});
 }
 
 static float smooth(float t)
@@ -294,7 +294,7 @@ static void print_rest(FILE *json, const struct carousel *carousel, unsigned bin
 {
     fprintf(json, "\"extensionsUsed\":[\"KHR_lights_punctual\",\"KHR_materials_emissive_strength\"],\"scene\":0,"
                   "\"scenes\":[{\"nodes\":[");
-    static const int roots[] = {FLOOR, PLATFORM, LAMP,      SOCKETS,    STAND, POST,
+    static const int roots[] = {FLOOR, PLATFORM, BULB,      SOCKETS,    STAND, POST,
                                 JOINT, PLINTH,   KEY_LIGHT, FILL_LIGHT, CAMERA};
     for (size_t i = 0; i < sizeof(roots) / sizeof(*roots); i++)
         fprintf(json, "%s%d", i ? "," : "", roots[i]);
@@ -328,7 +328,7 @@ bool animated_scene_write(const char *path)
         gltf_begin(&carousel->writer);
         add_floor_and_camera(carousel);
         add_roundabout(carousel);
-        add_lamp(carousel);
+        add_bulb(carousel);
         add_neighbours(carousel);
         add_clip(carousel);
         print_rest(json, carousel, add_bind_matrices(carousel));

@@ -5,7 +5,7 @@
  *   fine-teapot.glb  the same of fifteen times as many triangles, so that its reflections show no facets
  *   carousel.glb     a roundabout of teapots with a clip, "ride": everything that moves
  *   sky.hdr          an evening sky with two soft lights, to be used as environment
- *   dusk.hdr         the same, a sixth as bright: what lamps light has shadows under it
+ *   dusk.hdr         the same, a sixth as bright: what the lights reach has shadows under it
  *   sphereflake-N.nff  Eric Haines' 'balls' of the Standard Procedural Databases, N levels: 2 to 4, others
  *                    where asked for
  *   bumpy-N.glb      a bumpy sphere of about N thousand triangles above a floor, the family of the benchmark */
@@ -26,7 +26,7 @@ static const struct glb_material mirror = {"mirror", {0.92f, 0.92f, 0.92f, 1}, 1
 static const struct glb_material gold = {"gold", {1.0f, 0.77f, 0.34f, 1}, 1, 0.05f, 0, 0, {0, 0, 0}};
 static const struct glb_material glass = {"glass", {1, 1, 1, 1}, 0, 0, 1, 1.5f, {0, 0, 0}};
 static const struct glb_material glaze = {"glaze", {0.08f, 0.22f, 0.55f, 1}, 0, 0.08f, 0, 0, {0, 0, 0}};
-static const struct glb_material lamp = {"lamp", {0, 0, 0, 1}, 0, 1, 0, 0, {12, 11, 9}};
+static const struct glb_material glow = {"glow", {0, 0, 0, 1}, 0, 1, 0, 0, {12, 11, 9}};
 
 static bool finish_parts(bool written, struct glb_part *parts, size_t count)
 {
@@ -38,7 +38,7 @@ static bool finish_parts(bool written, struct glb_part *parts, size_t count)
 static bool write_cornell(const char *path)
 {
     struct glb_part parts[] = {{"room", {0}, white}, {"left wall", {0}, red},       {"right wall", {0}, green},
-                               {"lamp", {0}, lamp},  {"mirror block", {0}, mirror}, {"glass sphere", {0}, glass},
+                               {"light", {0}, glow}, {"mirror block", {0}, mirror}, {"glass sphere", {0}, glass},
                                {"block", {0}, white}};
     /* The room goes on behind the camera, so that mirror and glass have something to show. */
     const float corner[8][3] = {{-1, 0, -1}, {1, 0, -1}, {-1, 2, -1}, {1, 2, -1},
@@ -49,9 +49,9 @@ static bool write_cornell(const char *path)
     shape_quad(&parts[0].shape, corner[4], corner[6], corner[7], corner[5]); /* front */
     shape_quad(&parts[1].shape, corner[0], corner[2], corner[6], corner[4]);
     shape_quad(&parts[2].shape, corner[1], corner[5], corner[7], corner[3]);
-    const float lamp_corner[4][3] = {
+    const float light_corner[4][3] = {
         {-0.3f, 1.995f, -0.3f}, {0.3f, 1.995f, -0.3f}, {0.3f, 1.995f, 0.3f}, {-0.3f, 1.995f, 0.3f}};
-    shape_quad(&parts[3].shape, lamp_corner[0], lamp_corner[1], lamp_corner[2], lamp_corner[3]);
+    shape_quad(&parts[3].shape, light_corner[0], light_corner[1], light_corner[2], light_corner[3]);
     shape_box(&parts[4].shape, (const float[3]){-0.38f, 0.6f, -0.35f}, (const float[3]){0.28f, 0.6f, 0.28f},
               0.35f);
     shape_sphere(&parts[5].shape, (const float[3]){0.42f, 0.33f, 0.32f}, 0.33f, 96);

@@ -74,11 +74,11 @@ TEST(an_object_is_found_by_name_before_number)
 TEST(a_light_is_also_known_by_the_node_that_shows_it)
 {
     see_light(7, "", PROTOCOL_LIGHT_POINT);
-    see_light(8, "lamp", PROTOCOL_LIGHT_SPHERE);
+    see_light(8, "light", PROTOCOL_LIGHT_SPHERE);
     see_node(1, "ceiling", PROTOCOL_NODE_LIGHT, 7);
-    see_node(2, "lamp", PROTOCOL_NODE_LIGHT, 7);
+    see_node(2, "light", PROTOCOL_NODE_LIGHT, 7);
     assert_int_equal(find(PROTOCOL_OBJECT_LIGHT, "ceiling"), 7);
-    assert_int_equal(find(PROTOCOL_OBJECT_LIGHT, "lamp"), 8);
+    assert_int_equal(find(PROTOCOL_OBJECT_LIGHT, "light"), 8);
     assert_int_equal(find(PROTOCOL_OBJECT_LIGHT, "0"), 7);
 }
 
