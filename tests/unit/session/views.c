@@ -10,6 +10,9 @@
 #include "engine/view_wishes.h"
 #include "tests/harness/test.h"
 
+#include <linux/sockios.h>
+#include <sys/ioctl.h>
+
 #define CHANNEL 5u
 #define FRAME_BYTES ((size_t)300001)        /* two pieces, the last of odd size */
 #define LARGE_FRAME_BYTES ((size_t)5 << 20) /* more than sockets and queues hold */
@@ -679,6 +682,16 @@ static void expect_error_within_frame(uint32_t request, enum protocol_error_code
     assert_int_equal(client.message.error.code, code);
 }
 
+/* Until the session has read what was sent: what this client reads before lets a frame go on. */
+static void wait_until_read(void)
+{
+    int unread_bytes = 0;
+    do {
+        usleep(1000);
+        assert_int_equal(ioctl(client.fd, SIOCOUTQ, &unread_bytes), 0);
+    } while (unread_bytes > 0);
+}
+
 SESSION_TEST(a_frame_under_way_of_a_view_that_was_replaced_still_takes_room)
 {
     struct engine_command *start = start_acknowledged_view(2, 100);
@@ -697,6 +710,7 @@ SESSION_TEST(a_frame_under_way_of_a_view_that_was_replaced_still_takes_room)
     message.render.channel = CHANNEL + 1;
     message.render.width = message.render.height = LESS_THAN_ALL_EDGE;
     send_message(5, 0, &message);
+    wait_until_read();
     expect_error_within_frame(5, PROTOCOL_ERROR_BUSY, &bytes);
     while (bytes < LARGE_FRAME_BYTES) {
         expect(MESSAGE_FRAME_DATA, 2);
