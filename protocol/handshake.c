@@ -237,14 +237,14 @@ enum handshake_result handshake_reply_parse(struct handshake_reply *out, const u
 
 uint16_t handshake_choose_version(const struct handshake_hello *hello, struct decode_error *error)
 {
-    uint16_t greatest = hello->version_max < HANDSHAKE_VERSION_MAX ? hello->version_max : HANDSHAKE_VERSION_MAX;
-    if (greatest < hello->version_min || greatest < HANDSHAKE_VERSION_MIN) {
+    uint16_t maximum = hello->version_max < HANDSHAKE_VERSION_MAX ? hello->version_max : HANDSHAKE_VERSION_MAX;
+    if (maximum < hello->version_min || maximum < HANDSHAKE_VERSION_MIN) {
         decode_error_set(error, PROTOCOL_ERROR_VERSION, "version",
                          "the daemon speaks versions %u to %u, the client %u to %u", HANDSHAKE_VERSION_MIN,
                          HANDSHAKE_VERSION_MAX, hello->version_min, hello->version_max);
         return 0;
     }
-    return greatest;
+    return maximum;
 }
 
 bool handshake_reply_accept(const struct handshake_hello *hello, const struct handshake_reply *reply,

@@ -104,7 +104,7 @@ enum handshake_result handshake_hello_parse(struct handshake_hello *out, const u
 enum handshake_result handshake_reply_parse(struct handshake_reply *out, const uint8_t *bytes, size_t count,
                                             size_t *consumed_bytes, struct decode_error *error);
 
-/* The greatest version that both speak. 0: none; *error (may be NULL) gets code VERSION and a text for the reply.
+/* The newest version that both speak. 0: none; *error (may be NULL) gets code VERSION and a text for the reply.
  */
 uint16_t handshake_choose_version(const struct handshake_hello *hello, struct decode_error *error);
 /* Client: is the version of the reply one that was offered? False: *error (may be NULL) has code VERSION, with the

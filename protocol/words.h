@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* The enumerations of words.def under the protocol's names: enum protocol_<name>, PROTOCOL_<PREFIX>_<VALUE> and
- * PROTOCOL_<PREFIX>_COUNT, one past the greatest number; the texts that people read and type. */
+ * PROTOCOL_<PREFIX>_COUNT, one past the largest number; the texts that people read and type. */
 #ifndef FARLIGHT_PROTOCOL_WORDS_H
 #define FARLIGHT_PROTOCOL_WORDS_H
 

@@ -249,7 +249,7 @@ bool cli_choose_camera(struct cli_job *job, const struct fl_scene *scene, struct
 bool cli_daemon_is_lost(const struct fl_error *error);
 /* The pause before the next try after this number of failures in a row, at least 1: it doubles each time, within
  * bounds. */
-uint32_t cli_retry_pause_ms(unsigned failures, uint32_t least_ms);
+uint32_t cli_retry_pause_ms(unsigned failures, uint32_t min_ms);
 bool cli_retry_wait(uint32_t pause_ms, struct fl_error *error); /* false: interrupted */
 
 /* ---- daemon.c: commands that only query a daemon ---- */

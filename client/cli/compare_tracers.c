@@ -11,7 +11,7 @@
 #include <unistd.h>
 
 #define FAR_DEFAULT 1e-4
-#define FAR_LEAST 1e-9
+#define FAR_MIN 1e-9
 #define STEPS 3u /* that progress is counted in */
 
 enum key {
@@ -29,7 +29,7 @@ struct tracer_comparison {
     struct cli_job job;
     bool has_tracers, json;
     enum protocol_tracer tracer, reference;
-    double far_share, least_agreement; /* of all rays; 0: no limit */
+    double far_share, min_agreement; /* of all rays; 0: no limit */
     struct cli_limits limits;
     struct fl_compare_options images; /* `picture` NULL: none is asked for */
     struct fl_comparison figures;
@@ -88,9 +88,9 @@ static error_t name_field(struct tracer_comparison *comparison, const char *fiel
 }
 
 static error_t parse_real(struct tracer_comparison *comparison, const char *field, const char *value,
-                          double greatest, double *real)
+                          double maximum, double *real)
 {
-    return fl_text_real(value, 0, greatest, real, &comparison->job.error) ? 0 : name_field(comparison, field);
+    return fl_text_real(value, 0, maximum, real, &comparison->job.error) ? 0 : name_field(comparison, field);
 }
 
 /* "agree=99.99%" or "agree=0.9999"; others are of the images. */
@@ -100,7 +100,7 @@ static error_t parse_limit(struct tracer_comparison *comparison, const char *val
     if (strncmp(value, agree, sizeof(agree) - 1) != 0)
         return cli_limits_add(&comparison->limits, value, &comparison->job.error) ? 0
                                                                                   : name_field(comparison, field);
-    return cli_share_parse(value + sizeof(agree) - 1, &comparison->least_agreement, &comparison->job.error)
+    return cli_share_parse(value + sizeof(agree) - 1, &comparison->min_agreement, &comparison->job.error)
                ? 0
                : name_field(comparison, field);
 }
@@ -114,8 +114,8 @@ static error_t parse_own(struct tracer_comparison *comparison, int key, char *va
         return parse_tracers(comparison, value);
     case KEY_FAR:
         status = parse_real(comparison, "--far", value, 1, &comparison->far_share);
-        if (status == 0 && !(comparison->far_share >= FAR_LEAST))
-            return cli_usage(&comparison->job, "--far", "must be at least %g", FAR_LEAST);
+        if (status == 0 && !(comparison->far_share >= FAR_MIN))
+            return cli_usage(&comparison->job, "--far", "must be at least %g", FAR_MIN);
         return status;
     case KEY_TIME:
         return fl_text_real(value, -1e6, 1e6, &comparison->job.time_s, &comparison->job.error)
@@ -266,7 +266,7 @@ static bool compare_pictures(struct tracer_comparison *comparison, struct fl_err
 
 static bool is_within(const struct tracer_comparison *comparison)
 {
-    return cli_wave_agreement(comparison->frame) >= comparison->least_agreement &&
+    return cli_wave_agreement(comparison->frame) >= comparison->min_agreement &&
            cli_limits_hold(&comparison->limits, &comparison->figures);
 }
 
@@ -289,9 +289,9 @@ static void print_text(const struct tracer_comparison *comparison)
            frame->samples == 1 ? "" : "s", protocol_integrator_text(frame->integrator));
     print_structure(frame);
     cli_print_waves(frame, comparison->reference, comparison->far_share);
-    if (agreement < comparison->least_agreement)
+    if (agreement < comparison->min_agreement)
         printf("  over the limit: agree %.6g %%, at least %.6g %%\n", agreement * 100,
-               comparison->least_agreement * 100);
+               comparison->min_agreement * 100);
     printf("\nthe picture of %s and that of %s\n", reference, tracer);
     cli_comparison_print(stdout, &comparison->figures, &comparison->limits);
 }
@@ -312,8 +312,8 @@ static void print_json(const struct tracer_comparison *comparison)
     json_object_set_new(object, "model", json_string(model));
     json_object_set_new(object, "picture", picture ? json_string(picture) : json_null());
     cli_structure_set_json(object, frame);
-    json_object_set_new(object, "least_agreement",
-                        comparison->least_agreement > 0 ? json_real(comparison->least_agreement) : json_null());
+    json_object_set_new(object, "min_agreement",
+                        comparison->min_agreement > 0 ? json_real(comparison->min_agreement) : json_null());
     json_dumpf(object, stdout, JSON_COMPACT | JSON_REAL_PRECISION(9));
     putchar('\n');
     json_decref(object);

@@ -8,17 +8,17 @@
 
 static const struct figure {
     const char *name, *unit;
-    bool is_share;          /* of the pixels; may be typed in percent */
-    bool less_fails;        /* the limit is a least value */
-    double least, greatest; /* that a limit may be; shares are 0 to 1 */
+    bool is_share;   /* of the pixels; may be typed in percent */
+    bool less_fails; /* the limit is a minimum */
+    double min, max; /* that a limit may be; shares are 0 to 1 */
 } figures[CLI_FIGURE_COUNT] = {
-    [CLI_FIGURE_PSNR] = {.name = "psnr", .unit = " dB", .less_fails = true, .least = -1000, .greatest = 1000},
-    [CLI_FIGURE_MEAN] = {.name = "mean", .unit = "", .greatest = 1e30},
-    [CLI_FIGURE_RMS] = {.name = "rms", .unit = "", .greatest = 1e30},
-    [CLI_FIGURE_MAX] = {.name = "max", .unit = "", .greatest = 1e30},
+    [CLI_FIGURE_PSNR] = {.name = "psnr", .unit = " dB", .less_fails = true, .min = -1000, .max = 1000},
+    [CLI_FIGURE_MEAN] = {.name = "mean", .unit = "", .max = 1e30},
+    [CLI_FIGURE_RMS] = {.name = "rms", .unit = "", .max = 1e30},
+    [CLI_FIGURE_MAX] = {.name = "max", .unit = "", .max = 1e30},
     [CLI_FIGURE_BEYOND] = {.name = "beyond", .unit = "", .is_share = true},
-    [CLI_FIGURE_SSIM] = {.name = "ssim", .unit = "", .less_fails = true, .least = -1, .greatest = 1},
-    [CLI_FIGURE_BUTTERAUGLI] = {.name = "butteraugli", .unit = "", .greatest = 1e30},
+    [CLI_FIGURE_SSIM] = {.name = "ssim", .unit = "", .less_fails = true, .min = -1, .max = 1},
+    [CLI_FIGURE_BUTTERAUGLI] = {.name = "butteraugli", .unit = "", .max = 1e30},
     [CLI_FIGURE_VISIBLE] = {.name = "visible", .unit = "", .is_share = true},
     [CLI_FIGURE_NONFINITE] = {.name = "nonfinite", .unit = "", .is_share = true}};
 
@@ -67,7 +67,7 @@ bool cli_limits_add(struct cli_limits *limits, const char *text, struct fl_error
         return fl_error_set(error, FL_ERROR_ARGUMENT, "",
                             "'%s' is not a share of the pixels, so it cannot be a percentage", figure->name);
     if (figure->is_share ? !cli_share_parse(value, &limit.value, error)
-                         : !fl_text_real(value, figure->least, figure->greatest, &limit.value, error))
+                         : !fl_text_real(value, figure->min, figure->max, &limit.value, error))
         return false;
     limits->limits[limits->count++] = limit;
     return true;
@@ -90,7 +90,7 @@ static double value_of(enum cli_figure figure, const struct fl_comparison *compa
     case CLI_FIGURE_RMS:
         return comparison->has_errors ? comparison->rms_error : unknown;
     case CLI_FIGURE_MAX:
-        return comparison->has_errors ? comparison->greatest_error : unknown;
+        return comparison->has_errors ? comparison->max_error : unknown;
     case CLI_FIGURE_BEYOND:
         return share(comparison->beyond, comparison);
     case CLI_FIGURE_SSIM:
@@ -139,10 +139,10 @@ static void print_errors(FILE *out, const struct fl_comparison *comparison)
         fprintf(out, "  %-16sinfinite: no error\n", "PSNR");
     fprintf(out, "  %-16s%.6g\n", "mean error", comparison->mean_error);
     fprintf(out, "  %-16s%.6g\n", "rms error", comparison->rms_error);
-    fprintf(out, "  %-16s%.6g", "maximum error", comparison->greatest_error);
-    if (comparison->greatest_error > 0)
-        fprintf(out, " at %u,%u, channel %u of %s", comparison->greatest_x, comparison->greatest_y,
-                comparison->greatest_channel + 1, comparison->channel_names);
+    fprintf(out, "  %-16s%.6g", "maximum error", comparison->max_error);
+    if (comparison->max_error > 0)
+        fprintf(out, " at %u,%u, channel %u of %s", comparison->max_error_x, comparison->max_error_y,
+                comparison->max_error_channel + 1, comparison->channel_names);
     fputc('\n', out);
 }
 
@@ -179,14 +179,14 @@ void cli_comparison_print(FILE *out, const struct fl_comparison *comparison, con
         fprintf(out, "  %-16s%.6f\n", "SSIM", comparison->ssim);
     if (comparison->has_butteraugli)
         fprintf(out, "  %-16s%.4g (3-norm), maximum %.4g; %.4g %% of the pixels above 1\n", "Butteraugli",
-                comparison->butteraugli, comparison->butteraugli_greatest,
+                comparison->butteraugli, comparison->butteraugli_max,
                 100 * share(comparison->visible, comparison));
     if (comparison->nonfinite > 0)
         fprintf(out,
                 "  %-16s%" PRIu64 " pixels (%" PRIu64 " in the first, %" PRIu64
                 " in the second): beyond, and in no other figure\n",
                 "not finite", comparison->nonfinite, comparison->nonfinite_a, comparison->nonfinite_b);
-    if (comparison->picture_width > 0 && comparison->greatest_error > 0)
+    if (comparison->picture_width > 0 && comparison->max_error > 0)
         fprintf(out, "  %-16s%ux%u, errors from black, 0, to light yellow, %.4g, on a square-root scale\n",
                 "picture", comparison->picture_width, comparison->picture_height, comparison->heat_top);
     else if (comparison->picture_width > 0)
@@ -218,11 +218,12 @@ static json_t *limits_array(const struct cli_limits *limits, const struct fl_com
     return array;
 }
 
-static json_t *greatest_at(const struct fl_comparison *comparison)
+static json_t *max_error_at(const struct fl_comparison *comparison)
 {
-    return comparison->has_errors && comparison->greatest_error > 0
-               ? json_pack("{s:I,s:I,s:I}", "x", (json_int_t)comparison->greatest_x, "y",
-                           (json_int_t)comparison->greatest_y, "channel", (json_int_t)comparison->greatest_channel)
+    return comparison->has_errors && comparison->max_error > 0
+               ? json_pack("{s:I,s:I,s:I}", "x", (json_int_t)comparison->max_error_x, "y",
+                           (json_int_t)comparison->max_error_y, "channel",
+                           (json_int_t)comparison->max_error_channel)
                : json_null();
 }
 
@@ -237,9 +238,9 @@ json_t *cli_comparison_json(const struct fl_comparison *comparison, const struct
     set(object, "pixels", comparison->pixels);
     for (size_t i = 0; i < CLI_FIGURE_COUNT; i++)
         json_object_set_new(object, figures[i].name, number(value_of((enum cli_figure)i, comparison)));
-    json_object_set_new(object, "max_at", greatest_at(comparison));
+    json_object_set_new(object, "max_at", max_error_at(comparison));
     json_object_set_new(object, "butteraugli_max",
-                        comparison->has_butteraugli ? number(comparison->butteraugli_greatest) : json_null());
+                        comparison->has_butteraugli ? number(comparison->butteraugli_max) : json_null());
     set(object, "beyond_pixels", comparison->beyond);
     set(object, "visible_pixels", comparison->visible);
     set(object, "nonfinite_pixels", comparison->nonfinite);

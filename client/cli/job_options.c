@@ -116,10 +116,10 @@ static error_t set_format(struct cli_job *job, const char *field, const char *va
                : cli_usage(job, field, "unknown format '%s' (known: png, jpeg, exr, hdr, mp4, mkv, y4m)", value);
 }
 
-static error_t set_real(struct cli_job *job, const char *field, const char *value, double least, double greatest,
+static error_t set_real(struct cli_job *job, const char *field, const char *value, double minimum, double maximum,
                         double *number)
 {
-    return fl_text_real(value, least, greatest, number, &job->error) ? 0 : name_field(job, field);
+    return fl_text_real(value, minimum, maximum, number, &job->error) ? 0 : name_field(job, field);
 }
 
 static error_t set_fov(struct cli_job *job, const char *field, const char *value)

@@ -37,18 +37,18 @@ static error_t parse(int key, char *value, struct argp_state *state)
 
 static bool ping(struct fl_connection *connection, const struct ping_options *wanted, struct fl_error *error)
 {
-    uint64_t least_ns = UINT64_MAX, greatest_ns = 0, sum_ns = 0;
+    uint64_t min_ns = UINT64_MAX, max_ns = 0, sum_ns = 0;
     for (uint64_t i = 0; i < wanted->count; i++) {
         uint64_t ns = 0;
         if (!fl_ping(connection, &ns, error))
             return false;
-        least_ns = ns < least_ns ? ns : least_ns;
-        greatest_ns = ns > greatest_ns ? ns : greatest_ns;
+        min_ns = ns < min_ns ? ns : min_ns;
+        max_ns = ns > max_ns ? ns : max_ns;
         sum_ns += ns;
     }
     printf("%s: %" PRIu64 " round trips, minimum %.3f ms, mean %.3f ms, maximum %.3f ms\n",
-           fl_connection_address(connection), wanted->count, (double)least_ns * 1e-6,
-           (double)sum_ns * 1e-6 / (double)wanted->count, (double)greatest_ns * 1e-6);
+           fl_connection_address(connection), wanted->count, (double)min_ns * 1e-6,
+           (double)sum_ns * 1e-6 / (double)wanted->count, (double)max_ns * 1e-6);
     return true;
 }
 

@@ -17,11 +17,11 @@ bool cli_daemon_is_lost(const struct fl_error *error)
     return error->code == FL_ERROR_CONNECTION || (error->code == FL_ERROR_REFUSED && is_passing);
 }
 
-uint32_t cli_retry_pause_ms(unsigned failures, uint32_t least_ms)
+uint32_t cli_retry_pause_ms(unsigned failures, uint32_t min_ms)
 {
     const unsigned doublings = failures <= DOUBLINGS_MAX ? failures - 1 : DOUBLINGS_MAX;
     uint32_t pause_ms = FIRST_PAUSE_MS << doublings;
-    pause_ms = pause_ms > least_ms ? pause_ms : least_ms;
+    pause_ms = pause_ms > min_ms ? pause_ms : min_ms;
     return pause_ms < LONGEST_PAUSE_MS ? pause_ms : LONGEST_PAUSE_MS;
 }
 

@@ -273,9 +273,9 @@ static bool is_lost(const struct session *session, const struct fl_error *error)
 }
 
 /* Twice as long each time. False: interrupted. */
-static bool pause_before_retry(const struct session *session, uint32_t least_ms, struct fl_error *error)
+static bool pause_before_retry(const struct session *session, uint32_t min_ms, struct fl_error *error)
 {
-    const uint32_t pause_ms = cli_retry_pause_ms(session->failures, least_ms);
+    const uint32_t pause_ms = cli_retry_pause_ms(session->failures, min_ms);
     if (!session->job->quiet)
         fprintf(stderr, "farlight: trying again in %.1f s (%u of %u); %u of %u frames are written\n",
                 pause_ms * 1e-3, session->failures, session->job->series.retries, session->done,

@@ -72,13 +72,13 @@ static bool unknown_member(const struct shot_reader *reader, const struct shot_v
 {
     char list[560] = "", remedy[80];
     const char *nearest = NULL;
-    unsigned least = 3; /* further off it is another word */
+    unsigned minimum = 3; /* further off it is another word */
     for (size_t i = 0; known[i]; i++) {
         const size_t used = strlen(list);
         const unsigned off = strlen(name) < 32 ? distance(name, known[i]) : 99;
         snprintf(list + used, sizeof(list) - used, "%s%s", i > 0 ? ", " : "", known[i]);
-        if (off < least) {
-            least = off;
+        if (off < minimum) {
+            minimum = off;
             nearest = known[i];
         }
     }
@@ -104,23 +104,23 @@ bool shot_is_object(const struct shot_reader *reader, const struct shot_value *a
     return true;
 }
 
-bool shot_is_array(const struct shot_reader *reader, const struct shot_value *at, size_t most)
+bool shot_is_array(const struct shot_reader *reader, const struct shot_value *at, size_t maximum)
 {
     if (!json_is_array(at->value))
         return shot_wrong(reader, at, NULL, "must be an array [..]");
-    return json_array_size(at->value) <= most ||
-           shot_wrong(reader, at, "leave some out", "has more than %zu elements", most);
+    return json_array_size(at->value) <= maximum ||
+           shot_wrong(reader, at, "leave some out", "has more than %zu elements", maximum);
 }
 
 /* ---- values ---- */
 
-bool shot_number(const struct shot_reader *reader, const struct shot_value *at, double least, double greatest,
+bool shot_number(const struct shot_reader *reader, const struct shot_value *at, double minimum, double maximum,
                  double *number)
 {
     const double read = json_is_number(at->value) ? json_number_value(at->value) : NAN;
-    if (!(read >= least && read <= greatest)) {
+    if (!(read >= minimum && read <= maximum)) {
         char remedy[80];
-        snprintf(remedy, sizeof(remedy), "give a number from %.7g to %.7g", least, greatest);
+        snprintf(remedy, sizeof(remedy), "give a number from %.7g to %.7g", minimum, maximum);
         return shot_wrong(reader, at, remedy, json_is_number(at->value) ? "is out of range" : "must be a number");
     }
     *number = read;

@@ -26,10 +26,10 @@ bool shot_wrong(const struct shot_reader *reader, const struct shot_value *at, c
                 const char *format, ...) __attribute__((format(printf, 4, 5)));
 /* An object that has no other members than those listed (NULL-terminated). */
 bool shot_is_object(const struct shot_reader *reader, const struct shot_value *at, const char *const *known);
-/* An array of at most `most` elements. */
-bool shot_is_array(const struct shot_reader *reader, const struct shot_value *at, size_t most);
-/* A number in [least, greatest]. */
-bool shot_number(const struct shot_reader *reader, const struct shot_value *at, double least, double greatest,
+/* An array of at most `maximum` elements. */
+bool shot_is_array(const struct shot_reader *reader, const struct shot_value *at, size_t maximum);
+/* A number in [minimum, maximum]. */
+bool shot_number(const struct shot_reader *reader, const struct shot_value *at, double minimum, double maximum,
                  double *number);
 /* A name, or a whole number as text: "Light", "0". Lives as long as the shot. */
 bool shot_name(const struct shot_reader *reader, const struct shot_value *at, const char **name);
@@ -53,7 +53,7 @@ struct shot_property {
     enum protocol_channel_path path;
     enum shot_kind kind;
     unsigned width; /* numbers of a value, as they are written */
-    double least, greatest;
+    double min, max;
     double scale; /* from the file's unit to the protocol's */
     const char *example;
 };

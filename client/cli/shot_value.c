@@ -55,7 +55,7 @@ static bool read_scaled(const struct shot_reader *reader, const struct shot_valu
                         const struct shot_property *property, float *value)
 {
     double number = 0;
-    if (!shot_number(reader, at, property->least, property->greatest, &number))
+    if (!shot_number(reader, at, property->min, property->max, &number))
         return false;
     *value = (float)(number * property->scale);
     return true;
@@ -206,8 +206,8 @@ static bool read_spline_key(const struct shot_reader *reader, const struct shot_
                           "must be an array of two values");
     /* A curve's control values may lie beyond what the curve reaches, and tangents are per second. */
     struct shot_property property = *keys->property;
-    property.least = -1e12;
-    property.greatest = 1e12;
+    property.min = -1e12;
+    property.max = 1e12;
     for (size_t k = 0; k < 2; k++) {
         const struct shot_value at = shot_element(&pair, k);
         if (!read_plain(reader, &at, &property, side))
@@ -248,12 +248,12 @@ static bool read_angles(const struct shot_reader *reader, const struct shot_valu
         const struct shot_value at = shot_element(values, i);
         if (!read_plain(reader, &at, keys->property, degrees[i]))
             return false;
-        double most = 0;
+        double maximum = 0;
         for (unsigned k = 0; k < 3 && i > 0; k++)
-            most = fmax(most, fabs((double)degrees[i][k] - (double)degrees[i - 1][k]));
+            maximum = fmax(maximum, fabs((double)degrees[i][k] - (double)degrees[i - 1][k]));
         /* In place of the fourth number: steps from the previous key. */
         degrees[i][3] =
-            keys->interpolation == PROTOCOL_INTERPOLATION_STEP ? 1 : (float)(floor(most / STEP_DEGREES) + 1);
+            keys->interpolation == PROTOCOL_INTERPOLATION_STEP ? 1 : (float)(floor(maximum / STEP_DEGREES) + 1);
         total += i > 0 ? (size_t)degrees[i][3] : 0;
         if (total > KEYS_MAX)
             return shot_wrong(reader, &at, "use fewer turns, or several shots", "turns too often");

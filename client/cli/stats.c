@@ -96,7 +96,7 @@ static json_t *stages_array(const struct message_stats_reply *reply)
                                    protocol_clock_text(total->clock));
         set(object, "count", total->count);
         set(object, "total_ns", total->total_ns);
-        set(object, "greatest_ns", total->greatest_ns);
+        set(object, "max_ns", total->max_ns);
         json_array_append_new(array, object);
     }
     return array;
@@ -161,7 +161,7 @@ static void print_stages(const struct message_stats_reply *reply)
         const double mean = total->count > 0 ? (double)total->total_ns * 1e-6 / (double)total->count : 0;
         printf("  %-10s %-5s %12" PRIu64 " %14.3f %12.3f %12.3f\n", protocol_stage_text(total->stage),
                protocol_clock_text(total->clock), total->count, (double)total->total_ns * 1e-6, mean,
-               (double)total->greatest_ns * 1e-6);
+               (double)total->max_ns * 1e-6);
     }
 }
 

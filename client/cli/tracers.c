@@ -128,9 +128,9 @@ static json_t *names_json(const struct field_desc *field)
 
 static json_t *whole_json(const struct field_desc *field)
 {
-    const double most = (double)field->max < WHOLE_MAX ? (double)field->max : WHOLE_MAX;
+    const double maximum = (double)field->max < WHOLE_MAX ? (double)field->max : WHOLE_MAX;
     return json_pack("{s:s, s:I, s:I}", "type", "integer", "minimum", (json_int_t)field->min, "maximum",
-                     (json_int_t)most);
+                     (json_int_t)maximum);
 }
 
 static json_t *member_json(const struct cli_field *member)

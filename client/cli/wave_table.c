@@ -72,8 +72,8 @@ static void print_error(double error)
 static void print_errors(const struct fl_frame *frame)
 {
     printf("\n%15s%30s%10s%30s\n", "", "distance error, diagonals", "relative", "normal error, degrees");
-    printf("  %-13s%10s%10s%10s%10s%10s%10s%10s\n", "wave of rays", "median", "99 %", "greatest", "median",
-           "median", "99 %", "greatest");
+    printf("  %-13s%10s%10s%10s%10s%10s%10s%10s\n", "wave of rays", "median", "99 %", "max", "median", "median",
+           "99 %", "max");
     for (size_t i = 0; i < frame->wave_comparison_count; i++) {
         const struct record_wave_comparison *wave = &frame->wave_comparisons[i];
         if (wave->kind == PROTOCOL_RAY_SHADOW)
@@ -81,10 +81,10 @@ static void print_errors(const struct fl_frame *frame)
         print_name(wave);
         print_error((double)wave->distance_median);
         print_error((double)wave->distance_p99);
-        print_error((double)wave->distance_greatest);
+        print_error((double)wave->distance_max);
         print_error((double)wave->relative_median);
         printf("%10.3f%10.3f%10.3f\n", (double)wave->normal_median, (double)wave->normal_p99,
-               (double)wave->normal_greatest);
+               (double)wave->normal_max);
     }
 }
 
@@ -143,11 +143,11 @@ static json_t *wave_object(const struct record_wave_comparison *wave)
         return object;
     set_real(object, "distance_median", (double)wave->distance_median);
     set_real(object, "distance_p99", (double)wave->distance_p99);
-    set_real(object, "distance_greatest", (double)wave->distance_greatest);
+    set_real(object, "distance_max", (double)wave->distance_max);
     set_real(object, "relative_median", (double)wave->relative_median);
     set_real(object, "normal_median", (double)wave->normal_median);
     set_real(object, "normal_p99", (double)wave->normal_p99);
-    set_real(object, "normal_greatest", (double)wave->normal_greatest);
+    set_real(object, "normal_max", (double)wave->normal_max);
     return object;
 }
 

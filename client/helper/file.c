@@ -159,7 +159,7 @@ static bool read_up_to(int fd, uint8_t *bytes, size_t capacity, size_t *count)
     return true;
 }
 
-bool file_read(int fd, size_t greatest_bytes, uint8_t **bytes, size_t *count, char *reason, size_t reason_bytes)
+bool file_read(int fd, size_t max_bytes, uint8_t **bytes, size_t *count, char *reason, size_t reason_bytes)
 {
     struct stat status;
     *bytes = NULL;
@@ -167,9 +167,9 @@ bool file_read(int fd, size_t greatest_bytes, uint8_t **bytes, size_t *count, ch
         snprintf(reason, reason_bytes, "cannot be read: %s", strerror(errno));
         return false;
     }
-    if (status.st_size <= 0 || (uint64_t)status.st_size > greatest_bytes) {
+    if (status.st_size <= 0 || (uint64_t)status.st_size > max_bytes) {
         snprintf(reason, reason_bytes, status.st_size <= 0 ? "is empty" : "is larger than %zu MiB",
-                 greatest_bytes >> 20);
+                 max_bytes >> 20);
         return false;
     }
     /* What grows meanwhile is read as it was. */

@@ -35,7 +35,7 @@ void file_clean_up_on_end(void);
 /* Opens an ordinary file for reading; -1, with `reason`, for anything else: opening a FIFO does not block. */
 int file_open(const char *path, char *reason, size_t reason_bytes);
 /* Reads all of it. *bytes is malloc'ed. */
-bool file_read(int fd, size_t greatest_bytes, uint8_t **bytes, size_t *count, char *reason, size_t reason_bytes);
+bool file_read(int fd, size_t max_bytes, uint8_t **bytes, size_t *count, char *reason, size_t reason_bytes);
 
 #ifdef __cplusplus
 }

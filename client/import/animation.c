@@ -6,10 +6,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-static bool all_within(const float *values, size_t count, float most)
+static bool all_within(const float *values, size_t count, float maximum)
 {
     for (size_t i = 0; i < count; i++)
-        if (!(fabsf(values[i]) <= most)) /* NaN fails, too */
+        if (!(fabsf(values[i]) <= maximum)) /* NaN fails, too */
             return false;
     return true;
 }

@@ -186,16 +186,16 @@ static bool mesh_valid(struct import_scene *scene, struct import_mesh *mesh)
 {
     const char *where = mesh->where ? mesh->where : mesh->name;
     size_t index_count = (size_t)mesh->triangle_count * 3;
-    uint32_t greatest = 0;
+    uint32_t maximum = 0;
 
     if (scene->failed)
         return false;
     if (!mesh->positions || !mesh->indices || mesh->vertex_count == 0 || mesh->triangle_count == 0)
         return import_fail(scene, where, "a mesh without vertices or triangles");
     for (size_t i = 0; i < index_count; i++)
-        greatest = mesh->indices[i] > greatest ? mesh->indices[i] : greatest;
-    if (greatest >= mesh->vertex_count)
-        return import_fail(scene, where, "index %u is beyond the %u vertices", greatest, mesh->vertex_count);
+        maximum = mesh->indices[i] > maximum ? mesh->indices[i] : maximum;
+    if (maximum >= mesh->vertex_count)
+        return import_fail(scene, where, "index %u is beyond the %u vertices", maximum, mesh->vertex_count);
     mesh->range_count = ranges_merge(mesh->ranges, mesh->range_count);
     if (mesh->range_count > IMPORT_RANGES_MAX)
         return import_fail(scene, where, "more than %d changes of material in one mesh", IMPORT_RANGES_MAX);

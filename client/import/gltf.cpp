@@ -73,11 +73,11 @@ std::vector<double> numbers(const tinygltf::Value &object, const char *key)
     return result;
 }
 
-float limited(reader &r, const std::string &where, const char *what, double value, double least, double most)
+float limited(reader &r, const std::string &where, const char *what, double value, double minimum, double maximum)
 {
-    if (value >= least && value <= most)
+    if (value >= minimum && value <= maximum)
         return float(value);
-    const double cut = value > most ? most : least; // NaN becomes the least
+    const double cut = value > maximum ? maximum : minimum; // NaN becomes the minimum
     import_note(r.scene, PROTOCOL_SEVERITY_WARNING, where.c_str(), "%s is %g; it was set to %g", what, value, cut);
     return float(cut);
 }

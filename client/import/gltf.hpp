@@ -27,11 +27,11 @@ struct failed {
 
 // What became of a glTF mesh.
 struct shown_mesh {
-    uint32_t id = 0;             // 0: there is nothing to show
-    bool has_joints = false;     // a skin can move it
-    uint32_t greatest_joint = 0; // that moves one of its vertices: place in the skin
-    size_t file_targets = 0;     // morph targets in the file, and
-    uint32_t target_count = 0;   // those that are kept, the first ones
+    uint32_t id = 0;           // 0: there is nothing to show
+    bool has_joints = false;   // a skin can move it
+    uint32_t max_joint = 0;    // that moves one of its vertices: place in the skin
+    size_t file_targets = 0;   // morph targets in the file, and
+    uint32_t target_count = 0; // those that are kept, the first ones
 };
 
 struct reader {
@@ -87,7 +87,7 @@ void check_room(reader &r, const std::string &where, uint64_t count, uint64_t el
 // vertex uses more than `used`.
 struct influences {
     size_t stride = 0, used = 0;
-    uint32_t greatest_joint = 0;
+    uint32_t max_joint = 0;
     std::vector<uint16_t> joints;
     std::vector<float> weights;
 };
@@ -139,7 +139,7 @@ const tinygltf::Value *extension(const tinygltf::ExtensionMap &extensions, const
 double number(const tinygltf::Value &object, const char *key, double otherwise);
 std::vector<double> numbers(const tinygltf::Value &object, const char *key);
 // A number within the protocol's limits; beyond them it is cut, with a note.
-float limited(reader &r, const std::string &where, const char *what, double value, double least, double most);
+float limited(reader &r, const std::string &where, const char *what, double value, double minimum, double maximum);
 } // namespace gltf
 
 #endif

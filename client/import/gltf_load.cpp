@@ -211,12 +211,12 @@ std::string one_line(std::string text)
 
 void check_version(reader &r)
 {
-    const std::string &version = r.model.asset.version, &least = r.model.asset.minVersion;
+    const std::string &version = r.model.asset.version, &minimum = r.model.asset.minVersion;
 
     if (version.compare(0, 2, "2.") != 0)
         fail(r, "asset", "glTF version '%.32s' is not supported; use 2.0", version.c_str());
-    if (!least.empty() && least != "2.0")
-        fail(r, "asset", "the file needs glTF version '%.32s'; only 2.0 is supported", least.c_str());
+    if (!minimum.empty() && minimum != "2.0")
+        fail(r, "asset", "the file needs glTF version '%.32s'; only 2.0 is supported", minimum.c_str());
 }
 } // namespace
 

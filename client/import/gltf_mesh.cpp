@@ -269,7 +269,7 @@ void read_joints(builder &b)
         of_lots.push_back(read_influences(b.r, *lot.primitive, lot.count, b.where));
         used = std::max(used, of_lots.back().used);
         without += of_lots.back().stride == 0;
-        b.shown.greatest_joint = std::max(b.shown.greatest_joint, of_lots.back().greatest_joint);
+        b.shown.max_joint = std::max(b.shown.max_joint, of_lots.back().max_joint);
     }
     if (without > 0)
         import_note(b.r.scene, PROTOCOL_SEVERITY_WARNING, b.where.c_str(),

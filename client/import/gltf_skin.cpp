@@ -56,7 +56,7 @@ void collect(reader &r, const std::vector<influence_set> &sets, size_t vertex, s
                          [](const influence &a, const influence &b) { return a.weight > b.weight; });
         found.resize(IMPORT_INFLUENCES_MAX);
         import_note(r.scene, PROTOCOL_SEVERITY_WARNING, where.c_str(),
-                    "of the joints that move a vertex the %d with the greatest weights were kept",
+                    "of the joints that move a vertex the %d with the largest weights were kept",
                     IMPORT_INFLUENCES_MAX);
     }
     if (found.empty()) { // held by nothing: as other programs do
@@ -150,7 +150,7 @@ influences read_influences(reader &r, const tinygltf::Primitive &primitive, size
                 fail(r, where, "vertex %zu names joint %u", v, found[i].joint);
             result.joints[v * result.stride + i] = uint16_t(found[i].joint);
             result.weights[v * result.stride + i] = found[i].weight;
-            result.greatest_joint = std::max(result.greatest_joint, found[i].joint);
+            result.max_joint = std::max(result.max_joint, found[i].joint);
         }
     }
     return result;
@@ -164,8 +164,8 @@ uint32_t skin_id(reader &r, int index, const shown_mesh &mesh, const std::string
     if (skin.joints.empty() || skin.joints.size() > IMPORT_JOINTS_MAX)
         fail(r, place("skins", size_t(index)), "%zu joints; 1 to %d are allowed", skin.joints.size(),
              IMPORT_JOINTS_MAX);
-    if (mesh.greatest_joint >= skin.joints.size())
-        fail(r, where, "a vertex of the mesh names joint %u of %zu", mesh.greatest_joint, skin.joints.size());
+    if (mesh.max_joint >= skin.joints.size())
+        fail(r, where, "a vertex of the mesh names joint %u of %zu", mesh.max_joint, skin.joints.size());
     uint32_t &id = r.skin_ids[index];
     if (id != 0)
         return id;

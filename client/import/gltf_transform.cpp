@@ -67,16 +67,16 @@ vector3 any_perpendicular(vector3 a)
     return scaled(other, 1 / length(other));
 }
 
-// The quaternion of a rotation with these columns (Shepperd 1978: the greatest of the four is found by a root).
+// The quaternion of a rotation with these columns (Shepperd 1978: the largest of the four is found by a root).
 void quaternion_of(vector3 x, vector3 y, vector3 z, float out[4])
 {
     const double candidates[4] = {x.x - y.y - z.z, y.y - x.x - z.z, z.z - x.x - y.y, x.x + y.y + z.z};
-    const size_t greatest = size_t(std::max_element(candidates, candidates + 4) - candidates);
-    const double root = std::sqrt(std::max(0.0, 1 + candidates[greatest])), part = 0.5 / root;
+    const size_t maximum = size_t(std::max_element(candidates, candidates + 4) - candidates);
+    const double root = std::sqrt(std::max(0.0, 1 + candidates[maximum])), part = 0.5 / root;
     double q[4];
 
-    q[greatest] = root / 2;
-    switch (greatest) {
+    q[maximum] = root / 2;
+    switch (maximum) {
     case 0:
         q[1] = (x.y + y.x) * part, q[2] = (x.z + z.x) * part, q[3] = (y.z - z.y) * part;
         break;

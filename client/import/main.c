@@ -43,15 +43,15 @@ static const struct argp_option option_rows[] = {
     {"no-model", OPTION_NO_MODEL, NULL, 0, "send the environment only; MODEL is not needed", 0},
     {0}};
 
-static uint32_t parse_number(struct argp_state *state, const char *name, const char *text, uint32_t least)
+static uint32_t parse_number(struct argp_state *state, const char *name, const char *text, uint32_t minimum)
 {
     char *end;
     unsigned long value;
 
     errno = 0;
     value = strtoul(text, &end, 10);
-    if (errno != 0 || end == text || *end != '\0' || text[0] == '-' || value < least || value > INT32_MAX)
-        argp_error(state, "--%s: '%s' is not a whole number from %u", name, text, least);
+    if (errno != 0 || end == text || *end != '\0' || text[0] == '-' || value < minimum || value > INT32_MAX)
+        argp_error(state, "--%s: '%s' is not a whole number from %u", name, text, minimum);
     return (uint32_t)value;
 }
 

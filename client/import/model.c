@@ -260,10 +260,10 @@ uint32_t import_next_id(struct import_scene *scene, enum protocol_object_kind ki
     return ++scene->last_id[kind];
 }
 
-static bool within(const float *values, size_t count, float least, float most)
+static bool within(const float *values, size_t count, float minimum, float maximum)
 {
     for (size_t i = 0; i < count; i++)
-        if (!(values[i] >= least && values[i] <= most)) /* NaN fails, too */
+        if (!(values[i] >= minimum && values[i] <= maximum)) /* NaN fails, too */
             return false;
     return true;
 }

@@ -130,8 +130,8 @@ static bool read_numbers(struct nff *nff, float *out, uint32_t count, const char
     return true;
 }
 
-/* Up to `most` numbers of this line; stops at the first word that is none. The rest of the line is skipped. */
-static uint32_t read_some(struct nff *nff, float *out, uint32_t most)
+/* Up to `maximum` numbers of this line; stops at the first word that is none. The rest of the line is skipped. */
+static uint32_t read_some(struct nff *nff, float *out, uint32_t maximum)
 {
     uint32_t count = 0;
     bool more = false;
@@ -139,7 +139,7 @@ static uint32_t read_some(struct nff *nff, float *out, uint32_t most)
     while (skip_blanks(nff, true)) {
         struct word word = next_word(nff);
 
-        if (more || count == most || !to_number(word, &out[count]))
+        if (more || count == maximum || !to_number(word, &out[count]))
             more = true;
         else
             count++;

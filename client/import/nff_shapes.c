@@ -180,12 +180,12 @@ static void cross(const double a[3], const double b[3], double out[3])
 static void frame_of(const double axis[3], double u[3], double v[3])
 {
     double other[3] = {0}, length;
-    int least = 0;
+    int minimum = 0;
 
     for (int c = 1; c < 3; c++)
-        if (fabs(axis[c]) < fabs(axis[least]))
-            least = c;
-    other[least] = 1;
+        if (fabs(axis[c]) < fabs(axis[minimum]))
+            minimum = c;
+    other[minimum] = 1;
     cross(axis, other, u);
     length = sqrt(u[0] * u[0] + u[1] * u[1] + u[2] * u[2]);
     for (int c = 0; c < 3; c++)

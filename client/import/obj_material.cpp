@@ -228,7 +228,7 @@ float unit(float value)
     return std::min(std::max(value, 0.0f), 1.0f); // NaN becomes 0
 }
 
-float greatest(const float colour[3])
+float max_component(const float colour[3])
 {
     return unit(std::max({colour[0], colour[1], colour[2]}));
 }
@@ -237,7 +237,7 @@ float greatest(const float colour[3])
 void reflection(const tinyobj::material_t &m, message_set_material &set)
 {
     const bool mirrors = m.illum >= 3 && m.illum <= 7;
-    const float diffuse = greatest(m.diffuse), specular = greatest(m.specular);
+    const float diffuse = max_component(m.diffuse), specular = max_component(m.specular);
 
     for (size_t c = 0; c < 3; c++)
         set.base_colour[c] = unit(m.diffuse[c]);
@@ -269,7 +269,7 @@ void anisotropy(const tinyobj::material_t &m, message_set_material &set)
 
 void transparency(const tinyobj::material_t &m, message_set_material &set)
 {
-    const float through = 1 - unit(m.dissolve), filter = greatest(m.transmittance);
+    const float through = 1 - unit(m.dissolve), filter = max_component(m.transmittance);
     const bool refracts = m.illum == 4 || m.illum == 6 || m.illum == 7 || m.illum == 9;
 
     if (m.ior >= 1 && m.ior <= 10)
@@ -279,9 +279,9 @@ void transparency(const tinyobj::material_t &m, message_set_material &set)
         set.metallic = 0;
         set.roughness = m.shininess >= 100 || refracts ? 0 : set.roughness;
         for (size_t c = 0; c < 3; c++) // black glass would let nothing through: colours are for the filter
-            set.base_colour[c] = filter > 0                ? unit(m.transmittance[c])
-                                 : greatest(m.diffuse) > 0 ? unit(m.diffuse[c])
-                                                           : 1;
+            set.base_colour[c] = filter > 0                     ? unit(m.transmittance[c])
+                                 : max_component(m.diffuse) > 0 ? unit(m.diffuse[c])
+                                                                : 1;
     } else if (through > 0) {
         set.alpha_mode = PROTOCOL_ALPHA_BLEND;
         set.base_colour[3] = 1 - through;
@@ -301,7 +301,7 @@ void maps(building &b, const tinyobj::material_t &m, message_set_material &set, 
     if (!m.emissive_texname.empty()) {
         uses[EMISSION] =
             use_of(plain_texture(b, m.emissive_texname, true, m.emissive_texopt.clamp), m.emissive_texopt);
-        if (greatest(m.emission) <= 0)
+        if (max_component(m.emission) <= 0)
             set.emission[0] = set.emission[1] = set.emission[2] = 1;
     }
     if (!m.roughness_texname.empty() || !m.metallic_texname.empty())

@@ -16,7 +16,7 @@ static double area(const struct corner *a, const struct corner *b, const struct 
     return (b->x - a->x) * (c->y - a->y) - (b->y - a->y) * (c->x - a->x);
 }
 
-/* Newell's normal: its greatest component says which coordinate to drop. */
+/* Newell's normal: its largest component says which coordinate to drop. */
 static void flatten(const float *positions, uint32_t count, struct corner *corners)
 {
     double normal[3] = {0};

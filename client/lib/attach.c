@@ -103,7 +103,7 @@ static bool choose_new_ids(struct fl_catalogue *catalogue)
     if (getrandom(&chance, sizeof(chance), 0) != (ssize_t)sizeof(chance))
         return false;
     for (int kind = 0; kind < PROTOCOL_OBJECT_COUNT; kind++)
-        catalogue->greatest_id[kind] = NEW_IDS_FROM + chance / 4;
+        catalogue->max_id[kind] = NEW_IDS_FROM + chance / 4;
     return true;
 }
 

@@ -82,8 +82,8 @@ static bool keep_clip(struct fl_catalogue *catalogue, const struct message_impor
 
 static bool count_id(struct fl_catalogue *catalogue, enum protocol_object_kind kind, uint32_t id)
 {
-    if (id > catalogue->greatest_id[kind])
-        catalogue->greatest_id[kind] = id;
+    if (id > catalogue->max_id[kind])
+        catalogue->max_id[kind] = id;
     return true;
 }
 
@@ -277,7 +277,7 @@ bool fl_catalogue_find_clip(const struct fl_catalogue *catalogue, const char *wh
 
 uint32_t fl_catalogue_new_id(struct fl_catalogue *catalogue, enum protocol_object_kind kind)
 {
-    if ((unsigned)kind >= PROTOCOL_OBJECT_COUNT || catalogue->greatest_id[kind] == UINT32_MAX)
+    if ((unsigned)kind >= PROTOCOL_OBJECT_COUNT || catalogue->max_id[kind] == UINT32_MAX)
         return 0;
-    return ++catalogue->greatest_id[kind];
+    return ++catalogue->max_id[kind];
 }

@@ -30,7 +30,7 @@ struct fl_catalogue {
     size_t text_bytes, text_capacity;
     struct fl_clip_info *clips;
     size_t clip_count, clip_capacity;
-    uint32_t greatest_id[PROTOCOL_OBJECT_COUNT];
+    uint32_t max_id[PROTOCOL_OBJECT_COUNT];
 };
 
 /* Looks at one message of an importer's. */

@@ -115,19 +115,19 @@ static void take(struct fl_comparison *to, const struct message_images_compared 
     to->nonfinite = from->nonfinite;
     to->beyond = from->beyond;
     to->has_errors = from->nonfinite < to->pixels;
-    to->identical = from->nonfinite == 0 && !(from->greatest_error > 0);
+    to->identical = from->nonfinite == 0 && !(from->max_error > 0);
     to->mean_error = (double)from->mean_error;
     to->rms_error = (double)from->rms_error;
     to->psnr_db = from->rms_error > 0 ? -20 * log10((double)from->rms_error) : (double)INFINITY;
-    to->greatest_error = (double)from->greatest_error;
-    to->greatest_x = from->greatest_x;
-    to->greatest_y = from->greatest_y;
-    to->greatest_channel = from->greatest_channel;
+    to->max_error = (double)from->max_error;
+    to->max_error_x = from->max_error_x;
+    to->max_error_y = from->max_error_y;
+    to->max_error_channel = from->max_error_channel;
     to->has_ssim = from->has_ssim != 0;
     to->ssim = (double)from->ssim;
     to->has_butteraugli = from->has_butteraugli != 0;
     to->butteraugli = (double)from->butteraugli;
-    to->butteraugli_greatest = (double)from->butteraugli_greatest;
+    to->butteraugli_max = (double)from->butteraugli_max;
     to->visible = from->visible;
     to->heat_top = (double)from->heat_top;
     to->picture_width = from->picture_width;
@@ -140,8 +140,8 @@ static bool is_sound(const struct message_images_compared *answer)
     const uint64_t pixels = (uint64_t)answer->width * answer->height;
     return answer->nonfinite <= pixels && answer->nonfinite_a <= answer->nonfinite &&
            answer->nonfinite_b <= answer->nonfinite && answer->beyond <= pixels && answer->visible <= pixels &&
-           answer->greatest_x < answer->width && answer->greatest_y < answer->height &&
-           answer->greatest_channel < answer->channels;
+           answer->max_error_x < answer->width && answer->max_error_y < answer->height &&
+           answer->max_error_channel < answer->channels;
 }
 
 static bool explain(struct judge *judge, struct fl_error *error)

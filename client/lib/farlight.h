@@ -544,8 +544,8 @@ struct fl_comparison {
     bool identical;                               /* no error at all, and no pixel that is not finite */
     double psnr_db; /* peak signal to noise ratio, 20 log10(1 / rms_error): the peak is white, 1, in both spaces;
                        INFINITY without error */
-    double mean_error, rms_error, greatest_error;
-    uint32_t greatest_x, greatest_y, greatest_channel; /* from the top left; counted from 0 */
+    double mean_error, rms_error, max_error;
+    uint32_t max_error_x, max_error_y, max_error_channel; /* from the top left; counted from 0 */
     /* Structural similarity (Wang, Bovik, Sheikh, Simoncelli. Image quality assessment: from error visibility to
      * structural similarity. 2004): 11x11 Gaussian window of sigma 1.5, K1 0.01, K2 0.03, range 1, on the luma of
      * what a screen shows (linear files: neutral tone map and sRGB curve, as in a PNG of the renderer); the mean
@@ -554,9 +554,9 @@ struct fl_comparison {
     double ssim;
     /* Butteraugli distance as libjxl computes it, of what a screen of 80 cd/m2 shows: about 1 where a difference
      * is just seen. */
-    bool has_butteraugli;                     /* the picture is at least 8x8 and has at most 2^24 pixels */
-    double butteraugli, butteraugli_greatest; /* 3-norm over the picture; the greatest */
-    uint64_t visible;                         /* pixels with a distance above 1 */
+    bool has_butteraugli;                /* the picture is at least 8x8 and has at most 2^24 pixels */
+    double butteraugli, butteraugli_max; /* 3-norm over the picture; maximum */
+    uint64_t visible;                    /* pixels with a distance above 1 */
     /* The picture: black is no error, the brightest colour `heat_top` and above, in between by the square root of
      * the error (the maximum of a pixel's channels); pixels that are not finite are magenta. */
     double heat_top;

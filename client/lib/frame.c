@@ -69,21 +69,21 @@ static uint64_t encoded_bytes_max(const struct message_frame_begin *begin, size_
     }
 }
 
-/* Whether the sizes of attachments match the flags; `most` is the maximum of one. */
+/* Whether the sizes of attachments match the flags; `maximum` is the maximum of one. */
 static bool check_attachments(const struct fl_assembly *assembly, const struct message_frame_begin *begin,
                               struct fl_error *error)
 {
-    const uint64_t most = ZSTD_compressBound((size_t)begin->width * begin->height * ATTACHMENT_PIXEL_BYTES);
+    const uint64_t maximum = ZSTD_compressBound((size_t)begin->width * begin->height * ATTACHMENT_PIXEL_BYTES);
     const bool has_depth = (begin->attachments & FL_ATTACH_DEPTH) != 0;
     const bool has_normals = (begin->attachments & FL_ATTACH_NORMALS) != 0;
     if (begin->attachments != assembly->expected.attachments)
         return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_begin.attachments",
                             "attachments %#x arrived, but %#x were expected", begin->attachments,
                             assembly->expected.attachments);
-    if (has_depth != (begin->depth_bytes > 0) || begin->depth_bytes > most)
+    if (has_depth != (begin->depth_bytes > 0) || begin->depth_bytes > maximum)
         return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_begin.depth_bytes", "%llu bytes cannot be depths",
                             (unsigned long long)begin->depth_bytes);
-    return (has_normals == (begin->normal_bytes > 0) && begin->normal_bytes <= most) ||
+    return (has_normals == (begin->normal_bytes > 0) && begin->normal_bytes <= maximum) ||
            fl_error_set(error, FL_ERROR_PROTOCOL, "frame_begin.normal_bytes", "%llu bytes cannot be normals",
                         (unsigned long long)begin->normal_bytes);
 }
@@ -117,9 +117,9 @@ static bool check_begin(const struct fl_assembly *assembly, const struct message
         return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_begin.layers",
                             "layers %#x arrived, but %#x were expected", begin->layers, expected->layers);
     const size_t pixels_bytes = pixels_bytes_of(begin);
-    const uint64_t most = encoded_bytes_max(begin, pixels_bytes);
+    const uint64_t maximum = encoded_bytes_max(begin, pixels_bytes);
     const bool exact = begin->encoding == PROTOCOL_ENCODING_RAW;
-    if (begin->size_bytes == 0 || begin->size_bytes > most || (exact && begin->size_bytes != most))
+    if (begin->size_bytes == 0 || begin->size_bytes > maximum || (exact && begin->size_bytes != maximum))
         return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_begin.size_bytes",
                             "%llu bytes cannot be a picture of %ux%u", (unsigned long long)begin->size_bytes,
                             begin->width, begin->height);

@@ -28,15 +28,15 @@ static bool wrong(const struct place *place, const char *field, const char *what
 
 /* Missing values keep their default; `needed` ones must be present. */
 static bool read_number(const struct place *place, const json_t *object, const char *field, bool needed,
-                        double least, double greatest, double *value)
+                        double minimum, double maximum, double *value)
 {
     const json_t *found = json_object_get(object, field);
     if (!found)
         return needed ? wrong(place, field, "is missing") : true;
     char what[96];
     const double read = json_is_number(found) ? json_number_value(found) : NAN;
-    if (!(read >= least && read <= greatest)) {
-        snprintf(what, sizeof(what), "must be a number from %g to %g", least, greatest);
+    if (!(read >= minimum && read <= maximum)) {
+        snprintf(what, sizeof(what), "must be a number from %g to %g", minimum, maximum);
         return wrong(place, field, what);
     }
     *value = read;
@@ -44,7 +44,7 @@ static bool read_number(const struct place *place, const json_t *object, const c
 }
 
 static bool read_vector(const struct place *place, const json_t *object, const char *field, bool needed,
-                        double greatest, float vector[3])
+                        double maximum, float vector[3])
 {
     const json_t *found = json_object_get(object, field);
     if (!found)
@@ -54,7 +54,7 @@ static bool read_vector(const struct place *place, const json_t *object, const c
     for (size_t i = 0; i < 3; i++) {
         const json_t *part = json_array_get(found, i);
         const double read = json_is_number(part) ? json_number_value(part) : NAN;
-        if (!(fabs(read) <= greatest))
+        if (!(fabs(read) <= maximum))
             return wrong(place, field, "must be an array of three numbers");
         vector[i] = (float)read;
     }

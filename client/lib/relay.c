@@ -50,8 +50,8 @@ enum fl_relay_verdict fl_relay_from_importer(struct fl_relay *relay, const struc
         return refuse(error, "the importer sent a message that is not allowed", message);
     if (kind == FL_RELAY_LOCAL)
         return kind;
-    const bool in_range = header->request > 0 && (header->request <= relay->greatest_request ||
-                                                  header->request - relay->greatest_request <= REQUEST_AHEAD_MAX);
+    const bool in_range = header->request > 0 && (header->request <= relay->max_request ||
+                                                  header->request - relay->max_request <= REQUEST_AHEAD_MAX);
     if (!in_range || header->request > UINT32_MAX - relay->request_base)
         return refuse(error, "the importer's request numbers are not consecutive", message);
     if (header->channel > (message->type == MESSAGE_BLOB_DATA ? 1u : 0u))
@@ -61,8 +61,8 @@ enum fl_relay_verdict fl_relay_from_importer(struct fl_relay *relay, const struc
             return refuse(error, "the importer tried to edit another scene", message);
         message->edit_begin.scene = relay->scene;
     }
-    if (header->request > relay->greatest_request)
-        relay->greatest_request = header->request;
+    if (header->request > relay->max_request)
+        relay->max_request = header->request;
     *request = relay->request_base + header->request;
     return FL_RELAY_FORWARD;
 }
@@ -71,7 +71,7 @@ bool fl_relay_from_daemon(const struct fl_relay *relay, const struct framing_hea
 {
     if (header->type != MESSAGE_OK && header->type != MESSAGE_ERROR && header->type != MESSAGE_BLOB_NEED)
         return false;
-    if (header->request <= relay->request_base || header->request - relay->request_base > relay->greatest_request)
+    if (header->request <= relay->request_base || header->request - relay->request_base > relay->max_request)
         return false;
     *request = header->request - relay->request_base;
     return true;

@@ -11,10 +11,10 @@
 #include "protocol/framing.h"
 
 struct fl_relay {
-    uint32_t scene;            /* the daemon's; the importer knows it as 1 */
-    uint32_t request_base;     /* our last request before the import */
-    uint32_t greatest_request; /* of the importer so far */
-    uint64_t upload_base;      /* bytes sent on the upload channel before the import */
+    uint32_t scene;        /* the daemon's; the importer knows it as 1 */
+    uint32_t request_base; /* our last request before the import */
+    uint32_t max_request;  /* of the importer so far */
+    uint64_t upload_base;  /* bytes sent on the upload channel before the import */
 };
 
 enum fl_relay_verdict {

@@ -235,7 +235,7 @@ static bool load_with(struct fl_importer *importer, struct fl_scene *scene, stru
     load.relay = (struct fl_relay){
         .scene = scene->scene, .request_base = connection->last_request, .upload_base = connection->upload_sent};
     const bool loaded = relay_all(&load, error);
-    connection->last_request = load.relay.request_base + load.relay.greatest_request;
+    connection->last_request = load.relay.request_base + load.relay.max_request;
     return loaded;
 }
 

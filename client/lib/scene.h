@@ -9,7 +9,7 @@ struct fl_scene {
     struct fl_scene *next; /* of the connection's */
     struct fl_connection *connection;
     uint32_t scene;
-    uint64_t revision; /* the greatest that was told of */
+    uint64_t revision; /* the newest that the daemon has named */
     uint32_t *clips;   /* own ones in a scene of others: removed at the end */
     size_t clip_count, clip_capacity;
     bool attached;

@@ -8,16 +8,16 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define EDGE_MAX 8192      /* the protocol's greatest picture */
-#define FRAME_MAX 10000000 /* the protocol's greatest frame number */
+#define EDGE_MAX 8192      /* the protocol's maximum of a picture */
+#define FRAME_MAX 10000000 /* the protocol's maximum of a frame number */
 
 static bool is_digit(char c)
 {
     return c >= '0' && c <= '9';
 }
 
-/* Digits at *cursor, at most `greatest`; moves the cursor behind them. */
-static bool read_digits(const char **cursor, uint64_t greatest, uint64_t *value)
+/* Digits at *cursor, at most `maximum`; moves the cursor behind them. */
+static bool read_digits(const char **cursor, uint64_t maximum, uint64_t *value)
 {
     const char *at = *cursor;
     if (!is_digit(*at))
@@ -29,20 +29,20 @@ static bool read_digits(const char **cursor, uint64_t greatest, uint64_t *value)
             return false;
         sum = sum * 10 + digit;
     }
-    if (sum > greatest)
+    if (sum > maximum)
         return false;
     *value = sum;
     *cursor = at;
     return true;
 }
 
-bool fl_text_integer(const char *text, uint64_t least, uint64_t greatest, uint64_t *value, struct fl_error *error)
+bool fl_text_integer(const char *text, uint64_t minimum, uint64_t maximum, uint64_t *value, struct fl_error *error)
 {
     const char *at = text;
     uint64_t read = 0;
-    if (!read_digits(&at, greatest, &read) || *at != '\0' || read < least)
+    if (!read_digits(&at, maximum, &read) || *at != '\0' || read < minimum)
         return fl_error_set(error, FL_ERROR_ARGUMENT, "", "'%s' is not a whole number from %llu to %llu", text,
-                            (unsigned long long)least, (unsigned long long)greatest);
+                            (unsigned long long)minimum, (unsigned long long)maximum);
     *value = read;
     return true;
 }
@@ -64,14 +64,14 @@ static bool looks_decimal(const char *text, size_t length)
     return length > 0 && strspn(text, "+-.0123456789eE") >= length;
 }
 
-bool fl_text_real(const char *text, double least, double greatest, double *value, struct fl_error *error)
+bool fl_text_real(const char *text, double minimum, double maximum, double *value, struct fl_error *error)
 {
     char *end = NULL;
     const size_t length = strlen(text);
     const double read = looks_decimal(text, length) ? read_real(text, &end) : NAN;
-    if (end != text + length || !isfinite(read) || read < least || read > greatest)
-        return fl_error_set(error, FL_ERROR_ARGUMENT, "", "'%s' is not a number from %g to %g", text, least,
-                            greatest);
+    if (end != text + length || !isfinite(read) || read < minimum || read > maximum)
+        return fl_error_set(error, FL_ERROR_ARGUMENT, "", "'%s' is not a number from %g to %g", text, minimum,
+                            maximum);
     *value = read;
     return true;
 }

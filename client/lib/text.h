@@ -10,9 +10,10 @@
 #include "lib/farlight.h"
 
 /* Decimal digits only. */
-bool fl_text_integer(const char *text, uint64_t least, uint64_t greatest, uint64_t *value, struct fl_error *error);
-/* Finite decimal number, within [least, greatest]. */
-bool fl_text_real(const char *text, double least, double greatest, double *value, struct fl_error *error);
+bool fl_text_integer(const char *text, uint64_t minimum, uint64_t maximum, uint64_t *value,
+                     struct fl_error *error);
+/* Finite decimal number, within [minimum, maximum]. */
+bool fl_text_real(const char *text, double minimum, double maximum, double *value, struct fl_error *error);
 /* "1280x720", each edge 1..8192. */
 bool fl_text_size(const char *text, uint32_t *width, uint32_t *height, struct fl_error *error);
 /* "X,Y,Z" */

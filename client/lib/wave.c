@@ -30,8 +30,8 @@ void fl_wave_add(struct record_wave_comparison *into, const struct record_wave_c
     into->reference_ns += from->reference_ns;
     into->distance_median = into->distance_p99 = into->relative_median = 0;
     into->normal_median = into->normal_p99 = 0;
-    if (from->distance_greatest > into->distance_greatest)
-        into->distance_greatest = from->distance_greatest;
-    if (from->normal_greatest > into->normal_greatest)
-        into->normal_greatest = from->normal_greatest;
+    if (from->distance_max > into->distance_max)
+        into->distance_max = from->distance_max;
+    if (from->normal_max > into->normal_max)
+        into->normal_max = from->normal_max;
 }

@@ -22,7 +22,7 @@ struct library_image {
 
 /* What the module needs of the program, for files are the program's. */
 struct library_host {
-    bool (*read)(int fd, size_t greatest_bytes, uint8_t **bytes, size_t *count, char *reason, size_t reason_bytes);
+    bool (*read)(int fd, size_t max_bytes, uint8_t **bytes, size_t *count, char *reason, size_t reason_bytes);
     /* Writes the picture of errors that the request names. */
     bool (*write)(const struct message_compare_images *wanted, const struct raster *picture,
                   const char *description, char *reason, size_t reason_bytes);

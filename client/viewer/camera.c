@@ -65,8 +65,8 @@ static void swing(const struct viewer_camera *camera, double arm[3], double righ
     double right[3], above[3], into[3];
     axes(camera, right, above, into);
     const double slope = acos(fmax(-1, fmin(1, dot(into, camera->up)))); /* 0: straight along the axis */
-    const double most = slope - POLE_MARGIN, least = slope - (M_PI - POLE_MARGIN);
-    rotate(arm, right, fmax(fmin(least, 0), fmin(fmax(most, 0), up_angle)));
+    const double maximum = slope - POLE_MARGIN, minimum = slope - (M_PI - POLE_MARGIN);
+    rotate(arm, right, fmax(fmin(minimum, 0), fmin(fmax(maximum, 0), up_angle)));
     rotate(arm, camera->up, -right_angle);
 }
 
@@ -107,10 +107,10 @@ void camera_pan(struct viewer_camera *camera, double right, double up)
     camera_fly(camera, (const double[3]){right * height, up * height, 0});
 }
 
-void camera_dolly(struct viewer_camera *camera, double factor, double least)
+void camera_dolly(struct viewer_camera *camera, double factor, double minimum)
 {
     const double distance = camera_distance(camera), wanted = distance * factor;
-    const double share = (wanted > least ? wanted : fmin(least, distance)) / distance;
+    const double share = (wanted > minimum ? wanted : fmin(minimum, distance)) / distance;
     for (int i = 0; i < 3; i++)
         camera->eye[i] = camera->look_at[i] + (camera->eye[i] - camera->look_at[i]) * share;
 }

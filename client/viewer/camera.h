@@ -19,8 +19,8 @@ void camera_orbit(struct viewer_camera *camera, double right, double up);
 void camera_turn(struct viewer_camera *camera, double right, double up);
 /* Pans by a share of the picture's height at the target's distance. */
 void camera_pan(struct viewer_camera *camera, double right, double up);
-/* Multiplies the distance; at least `least` metres. */
-void camera_dolly(struct viewer_camera *camera, double factor, double least);
+/* Multiplies the distance; at least `minimum` metres. */
+void camera_dolly(struct viewer_camera *camera, double factor, double minimum);
 /* Moves by metres to the right, upwards and forwards in the view; the target moves along. */
 void camera_fly(struct viewer_camera *camera, const double metres[3]);
 /* Turns to another target; nothing happens if that is the eye. */

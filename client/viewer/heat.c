@@ -19,12 +19,12 @@ void heat_colour(double share, uint8_t colour[3])
 
 static int error_of(const uint8_t *a, const uint8_t *b)
 {
-    int greatest = 0;
+    int maximum = 0;
     for (int c = 0; c < 3; c++) {
         const int error = abs(a[c] - b[c]);
-        greatest = error > greatest ? error : greatest;
+        maximum = error > maximum ? error : maximum;
     }
-    return greatest;
+    return maximum;
 }
 
 void heat_map(const uint8_t *picture, const uint8_t *reference, size_t pixels, double top, uint8_t *out,
@@ -45,7 +45,7 @@ void heat_map(const uint8_t *picture, const uint8_t *reference, size_t pixels, d
     for (int error = 0; error < 256; error++) {
         const double share = pixels > 0 ? (double)counts[error] / (double)pixels : 0;
         figures->mean += share * error / 255;
-        figures->greatest = counts[error] > 0 ? error / 255.0 : figures->greatest;
+        figures->max = counts[error] > 0 ? error / 255.0 : figures->max;
         figures->beyond += error / 255.0 > HEAT_BEYOND ? share : 0;
     }
 }

@@ -8,8 +8,8 @@
 
 /* An error is the difference of display values, 0 to 1, the maximum of a pixel's channels. */
 struct heat_figures {
-    double mean, greatest; /* over pixels */
-    double beyond;         /* share of the pixels with more than HEAT_BEYOND */
+    double mean, max; /* over pixels */
+    double beyond;    /* share of the pixels with more than HEAT_BEYOND */
 };
 #define HEAT_BEYOND 0.01
 

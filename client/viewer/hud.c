@@ -11,7 +11,7 @@
 #define PADDING 10.0
 #define ROW 12.0 /* of the timeline */
 #define TIMELINE_FRAMES 8u
-#define TIMELINE_LEAST_NS 20e6
+#define TIMELINE_MIN_NS 20e6
 #define STRUCTURE_SHARE_MAX 0.6 /* of the width of the window: longer lines are left out */
 
 static const struct hud_colour panel = {14, 17, 22, 205}, ink = {232, 236, 241, 255}, faint = {148, 158, 170, 255},
@@ -250,11 +250,14 @@ static double place_on(const struct axis *axis, int64_t at_ns)
     return axis->x + fmax(0, fmin(1, (double)(at_ns - axis->begin_ns) / axis->length_ns)) * axis->width;
 }
 
-/* 1, 2 or 5 times a power of ten: the least of which no more than `most` are in the length. */
-static double tick_ns(double length_ns, double most)
+/* 1, 2 or 5 times a power of ten: the smallest that fits into the length at most `maximum` times. */
+static double tick_ns(double length_ns, double maximum)
 {
-    const double least = length_ns / most, power = pow(10, floor(log10(least)));
-    return least <= power ? power : least <= 2 * power ? 2 * power : least <= 5 * power ? 5 * power : 10 * power;
+    const double minimum = length_ns / maximum, power = pow(10, floor(log10(minimum)));
+    return minimum <= power       ? power
+           : minimum <= 2 * power ? 2 * power
+           : minimum <= 5 * power ? 5 * power
+                                  : 10 * power;
 }
 
 static bool choose_axis(const struct metrics *metrics, int64_t offset_ns, struct axis *axis)
@@ -271,12 +274,12 @@ static bool choose_axis(const struct metrics *metrics, int64_t offset_ns, struct
         }
         /* A pause between frames is not worth its room. */
         const struct metrics_frame *before = metrics_frame(metrics, back + 1);
-        if (!frame || !before || (double)(begin_ns - (int64_t)before->shown_ns) > TIMELINE_LEAST_NS * 4)
+        if (!frame || !before || (double)(begin_ns - (int64_t)before->shown_ns) > TIMELINE_MIN_NS * 4)
             break;
     }
     if (end_ns <= begin_ns)
         return false;
-    axis->length_ns = fmax((double)(end_ns - begin_ns), TIMELINE_LEAST_NS);
+    axis->length_ns = fmax((double)(end_ns - begin_ns), TIMELINE_MIN_NS);
     axis->begin_ns = end_ns - (int64_t)axis->length_ns;
     return true;
 }
@@ -311,8 +314,8 @@ static void draw_frames(struct layout *layout, const struct axis *axis, double t
     }
 }
 
-/* Not drawn where it would come above `top_least`. */
-static void draw_timeline(struct layout *layout, double top_least)
+/* Not drawn where it would come above `top_min`. */
+static void draw_timeline(struct layout *layout, double top_min)
 {
     const struct hud_state *state = layout->state;
     const double s = layout->scale, inner = PADDING * s, line = LINE * s;
@@ -321,7 +324,7 @@ static void draw_timeline(struct layout *layout, double top_least)
     const int64_t offset_ns = metrics_clock_offset_ns(state->metrics);
     struct axis axis = {.x = x + inner + 62 * s};
     axis.width = x + width - inner - axis.x;
-    if (axis.width < 40 * s || y < top_least + MARGIN * s || !choose_axis(state->metrics, offset_ns, &axis))
+    if (axis.width < 40 * s || y < top_min + MARGIN * s || !choose_axis(state->metrics, offset_ns, &axis))
         return;
     box(layout, x, y, width, height, panel);
     const double top = y + inner;
@@ -353,8 +356,7 @@ static double draw_legend(struct layout *layout, double bottom)
         snprintf(figures, sizeof(figures), "tracing the reference ..");
     else
         snprintf(figures, sizeof(figures), "mean %.2g, maximum %.2g; %.2g %% of the pixels beyond %g",
-                 state->heat_figures.mean, state->heat_figures.greatest, state->heat_figures.beyond * 100,
-                 HEAT_BEYOND);
+                 state->heat_figures.mean, state->heat_figures.max, state->heat_figures.beyond * 100, HEAT_BEYOND);
     const double width = fmax(bar, text_width(layout, HUD_PLAIN, figures)) + 2 * inner;
     const double height = 2 * line + 9 * s + 2 * inner, x = MARGIN * s, y = bottom - height;
     box(layout, x, y, width, height, panel);
@@ -413,10 +415,10 @@ static void draw_status(struct layout *layout)
     const char *title = is_lost ? "The connection is lost" : "Loading";
     char what[HUD_TEXT_MAX];
     snprintf(what, sizeof(what), "%s", state->status_text);
-    const double most = state->width - 2 * inner - 2 * MARGIN * s;
-    for (size_t length = strlen(what); length > 4 && text_width(layout, HUD_PLAIN, what) > most; length--)
+    const double maximum = state->width - 2 * inner - 2 * MARGIN * s;
+    for (size_t length = strlen(what); length > 4 && text_width(layout, HUD_PLAIN, what) > maximum; length--)
         strcpy(what + length - 4, "..");
-    const double bar = fmin(320 * s, most);
+    const double bar = fmin(320 * s, maximum);
     const double width = fmax(fmax(bar, text_width(layout, HUD_PLAIN, what)), text_width(layout, HUD_BOLD, title));
     const double height = 2 * line + (is_lost ? 4 : 14) * s + 2 * inner;
     const double x = (state->width - width) / 2 - inner, y = (state->height - height) / 2;

@@ -7,7 +7,7 @@
 #define ORBIT_RADIANS_PER_HEIGHT 3.5 /* across the window's height: a little more than half around */
 #define TURN_RADIANS_PER_HEIGHT 1.6
 #define DOLLY_PER_NOTCH 0.88 /* the distance is multiplied by it */
-#define LEAST_SHARE 1e-4     /* of the distance that one notch leaves at least */
+#define MIN_SHARE 1e-4       /* of the distance that one notch leaves at least */
 #define FLY_DISTANCES_PER_SECOND 0.8
 #define FLY_FAST 4.0
 
@@ -107,7 +107,7 @@ bool controls_input(struct controls *controls, const struct input *input, double
     case INPUT_MOTION:
         return drag(controls, input, height, camera);
     case INPUT_WHEEL:
-        camera_dolly(camera, pow(DOLLY_PER_NOTCH, input->wheel), camera_distance(camera) * LEAST_SHARE);
+        camera_dolly(camera, pow(DOLLY_PER_NOTCH, input->wheel), camera_distance(camera) * MIN_SHARE);
         return input->wheel != 0;
     case INPUT_KEY_DOWN:
     case INPUT_KEY_UP:

@@ -71,11 +71,11 @@ static error_t name_field(struct cli_job *job, const char *field, bool good)
     return EINVAL;
 }
 
-static error_t set_integer(struct cli_job *job, const char *field, const char *value, uint64_t least,
-                           uint64_t greatest, uint32_t *out)
+static error_t set_integer(struct cli_job *job, const char *field, const char *value, uint64_t minimum,
+                           uint64_t maximum, uint32_t *out)
 {
     uint64_t number = *out;
-    const error_t status = name_field(job, field, fl_text_integer(value, least, greatest, &number, &job->error));
+    const error_t status = name_field(job, field, fl_text_integer(value, minimum, maximum, &number, &job->error));
     *out = (uint32_t)number;
     return status;
 }

@@ -115,19 +115,19 @@ bool metrics_span(const struct metrics_frame *frame, enum lane lane, int64_t off
 
 int64_t metrics_clock_offset_ns(const struct metrics *metrics)
 {
-    int64_t least = INT64_MIN, most = INT64_MAX;
+    int64_t minimum = INT64_MIN, maximum = INT64_MAX;
     for (size_t i = 0; i < metrics->count; i++) {
         const struct metrics_frame *frame = &metrics->frames[i];
         const int64_t from_input = (int64_t)(frame->command_sent_ns - frame->command_received_ns);
         const int64_t from_frame = (int64_t)(frame->begun_ns - frame->rendered_ns);
-        if (frame->command_sent_ns > 0 && from_input > least)
-            least = from_input;
-        if (frame->rendered_ns > 0 && from_frame < most)
-            most = from_frame;
+        if (frame->command_sent_ns > 0 && from_input > minimum)
+            minimum = from_input;
+        if (frame->rendered_ns > 0 && from_frame < maximum)
+            maximum = from_frame;
     }
-    if (least == INT64_MIN)
-        return most == INT64_MAX ? 0 : most;
-    return most == INT64_MAX ? least : least + (most - least) / 2;
+    if (minimum == INT64_MIN)
+        return maximum == INT64_MAX ? 0 : maximum;
+    return maximum == INT64_MAX ? minimum : minimum + (maximum - minimum) / 2;
 }
 
 static int by_value(const void *a, const void *b)

@@ -27,14 +27,14 @@ static bool refuse(struct reader *reader, const char *key, const char *what)
 }
 
 /* *value stays if the event lacks the key. */
-static bool read_number(struct reader *reader, const json_t *event, const char *key, double least, double greatest,
-                        double *value)
+static bool read_number(struct reader *reader, const json_t *event, const char *key, double minimum,
+                        double maximum, double *value)
 {
     const json_t *found = json_object_get(event, key);
     if (!found)
         return true;
     const double number = json_number_value(found);
-    if (!json_is_number(found) || !(number >= least && number <= greatest))
+    if (!json_is_number(found) || !(number >= minimum && number <= maximum))
         return refuse(reader, key, "is not a number in its range");
     *value = number;
     return true;

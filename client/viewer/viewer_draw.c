@@ -153,8 +153,8 @@ void viewer_print_state(struct viewer *viewer, const char *name)
         "latency_s", summary.latency_s);
     if (line && viewer->has_heat)
         json_object_set_new(line, "errors",
-                            json_pack("{s:f, s:f, s:f}", "mean", viewer->heat_figures.mean, "greatest",
-                                      viewer->heat_figures.greatest, "beyond", viewer->heat_figures.beyond));
+                            json_pack("{s:f, s:f, s:f}", "mean", viewer->heat_figures.mean, "max",
+                                      viewer->heat_figures.max, "beyond", viewer->heat_figures.beyond));
     if (line && viewer->notice_ns > state.now_ns)
         json_object_set_new(line, "notice", json_string(viewer->notice));
     char *text = json_dumps(line, JSON_COMPACT | JSON_REAL_PRECISION(9));

@@ -8,7 +8,7 @@
 
 #define LOOK_PAUSE_NS 4000000ull   /* between cameras: no screen shows more */
 #define REST_PAUSE_NS 120000000ull /* without movement: that was all of it */
-#define EDGE_LEAST 16u
+#define EDGE_MIN 16u
 #define FRAMES_AT_ONCE 4u /* then people have their turn */
 
 /* Even edges: the chroma of a video is subsampled by 2. */
@@ -17,8 +17,8 @@ void viewer_render_size(const struct viewer *viewer, uint32_t *width, uint32_t *
     const uint32_t divisor = 1u << viewer->settings.coarser;
     *width = ((uint32_t)viewer->width / divisor) & ~1u;
     *height = ((uint32_t)viewer->height / divisor) & ~1u;
-    *width = *width > EDGE_LEAST ? *width < 8192 ? *width : 8192 : EDGE_LEAST;
-    *height = *height > EDGE_LEAST ? *height < 8192 ? *height : 8192 : EDGE_LEAST;
+    *width = *width > EDGE_MIN ? *width < 8192 ? *width : 8192 : EDGE_MIN;
+    *height = *height > EDGE_MIN ? *height < 8192 ? *height : 8192 : EDGE_MIN;
 }
 
 /* On this machine pixels travel as they are; over a network as video while they move, and without loss at rest. */
@@ -163,7 +163,7 @@ void viewer_receive(struct viewer *viewer, unsigned timeout_ms)
 
 bool viewer_is_at_rest(const struct viewer *viewer, unsigned samples)
 {
-    const unsigned most = viewer->view.samples, enough = samples > 0 && samples < most ? samples : most;
+    const unsigned maximum = viewer->view.samples, enough = samples > 0 && samples < maximum ? samples : maximum;
     return viewer->has_camera && viewer->has_looked && !viewer->must_show && !viewer->must_look &&
            !viewer->told_moving && viewer->glide_begin_ns == 0 && viewer->frames > 0 &&
            viewer->frame.command == viewer->command && viewer->frame.change == viewer->change &&

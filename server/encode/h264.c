@@ -63,8 +63,8 @@ static double rate_factor(unsigned quality)
 static void set_rate(struct encoder_stream *stream, const struct encoder_wish *wish)
 {
     AVCodecContext *codec = stream->codec;
-    uint64_t most = (uint64_t)stream->width * stream->height * BYTES_PER_PIXEL_UNLIMITED;
-    uint64_t bytes = wish->bytes && wish->bytes < most ? wish->bytes : most;
+    uint64_t maximum = (uint64_t)stream->width * stream->height * BYTES_PER_PIXEL_UNLIMITED;
+    uint64_t bytes = wish->bytes && wish->bytes < maximum ? wish->bytes : maximum;
     double bits = 8.0 * (double)(bytes < BYTES_MIN ? BYTES_MIN : bytes);
     double bits_per_second = bits * stream->rate_numerator / RATE_DENOMINATOR;
     codec->rc_buffer_size = (int)fmin(bits, (double)BITS_MAX);
@@ -96,8 +96,8 @@ static void set_latency(struct encoder_stream *stream, AVDictionary **options)
     const struct libav *av = stream->av;
     AVCodecContext *codec = stream->codec;
     unsigned wanted = stream->width * stream->height / PIXELS_PER_THREAD, processors = parallel_processors();
-    unsigned most = processors < THREADS_MAX ? processors : THREADS_MAX;
-    codec->thread_count = (int)(wanted < 1 ? 1 : wanted < most ? wanted : most);
+    unsigned maximum = processors < THREADS_MAX ? processors : THREADS_MAX;
+    codec->thread_count = (int)(wanted < 1 ? 1 : wanted < maximum ? wanted : maximum);
     codec->thread_type = FF_THREAD_SLICE;
     codec->gop_size = KEY_FRAMES_NEVER;
     codec->max_b_frames = 0;

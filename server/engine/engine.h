@@ -138,7 +138,7 @@ struct engine_stats {
     struct engine_scene_stat *scenes; /* owned */
     uint32_t scene_count;
     struct {
-        uint64_t count, total_ns, greatest_ns;
+        uint64_t count, total_ns, max_ns;
     } stages[STAGE_COUNT][2]; /* by stage and clock */
 };
 

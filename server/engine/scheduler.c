@@ -40,8 +40,8 @@ static void group_look(struct schedule_group *group, const struct scheduler *sch
 
 static void group_advance(struct schedule_group *group)
 {
-    if (group->next_ns != UINT64_MAX && group->next_ns > group->least_ns)
-        group->least_ns = group->next_ns;
+    if (group->next_ns != UINT64_MAX && group->next_ns > group->min_ns)
+        group->min_ns = group->next_ns;
 }
 
 /* More than once, if the share is a client's. */
@@ -50,9 +50,9 @@ static void share_settle(struct schedule_share *share, const struct scheduler *s
 {
     if (!share->ready || share->ready_in == scheduler->picks)
         return;
-    if (!was_ready(scheduler, share) && share->virtual_ns < group->least_ns)
-        share->virtual_ns = group->least_ns;
-    share->virtual_ns = at_most(share->virtual_ns, group->least_ns + debt_max_ns(group->ready_count));
+    if (!was_ready(scheduler, share) && share->virtual_ns < group->min_ns)
+        share->virtual_ns = group->min_ns;
+    share->virtual_ns = at_most(share->virtual_ns, group->min_ns + debt_max_ns(group->ready_count));
     share->ready_in = scheduler->picks;
 }
 
@@ -102,9 +102,9 @@ static uint64_t without_outliers(struct schedule_client *client, uint64_t slice_
 {
     if (!client->mean_ns)
         client->mean_ns = slice_ns;
-    uint64_t most_ns = SCHEDULE_OUTLIER * client->mean_ns;
+    uint64_t max_ns = SCHEDULE_OUTLIER * client->mean_ns;
     client->mean_ns = client->mean_ns - client->mean_ns / 16 + slice_ns / 16;
-    return at_most(slice_ns, most_ns > SCHEDULE_OUTLIER_MIN_NS ? most_ns : SCHEDULE_OUTLIER_MIN_NS);
+    return at_most(slice_ns, max_ns > SCHEDULE_OUTLIER_MIN_NS ? max_ns : SCHEDULE_OUTLIER_MIN_NS);
 }
 
 static void charge(struct schedule_share *share, uint64_t virtual_ns, uint64_t turn)

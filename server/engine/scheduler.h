@@ -30,7 +30,7 @@ struct schedule_share {
 
 /* The competitors for a turn: all clients, or the jobs of one client. */
 struct schedule_group {
-    uint64_t least_ns; /* the minimum virtual time of those that were ready; never decreases */
+    uint64_t min_ns; /* the minimum virtual time of those that were ready; never decreases */
     /* During a pick. */
     uint64_t next_ns;
     uint32_t ready_count;

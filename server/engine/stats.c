@@ -60,7 +60,7 @@ struct engine_stats *engine_stats_collect(const struct engine *engine, uint64_t 
             const struct stage_total *total = &engine->totals.by_stage[stage][clock];
             stats->stages[stage][clock].count = atomic_load(&total->count);
             stats->stages[stage][clock].total_ns = atomic_load(&total->total_ns);
-            stats->stages[stage][clock].greatest_ns = atomic_load(&total->greatest_ns);
+            stats->stages[stage][clock].max_ns = atomic_load(&total->max_ns);
         }
     }
     if (describe_scenes(engine, principal, stats))

@@ -7,10 +7,10 @@ void stage_totals_add(struct stage_totals *totals, enum stage stage, enum clock 
     struct stage_total *total = &totals->by_stage[stage][clock];
     atomic_fetch_add_explicit(&total->count, 1, memory_order_relaxed);
     atomic_fetch_add_explicit(&total->total_ns, duration_ns, memory_order_relaxed);
-    uint64_t greatest = atomic_load_explicit(&total->greatest_ns, memory_order_relaxed);
-    while (duration_ns > greatest &&
-           !atomic_compare_exchange_weak_explicit(&total->greatest_ns, &greatest, duration_ns,
-                                                  memory_order_relaxed, memory_order_relaxed)) {
+    uint64_t maximum = atomic_load_explicit(&total->max_ns, memory_order_relaxed);
+    while (duration_ns > maximum &&
+           !atomic_compare_exchange_weak_explicit(&total->max_ns, &maximum, duration_ns, memory_order_relaxed,
+                                                  memory_order_relaxed)) {
     }
 }
 

@@ -8,7 +8,7 @@
 #include <stdatomic.h>
 
 struct stage_total {
-    _Atomic uint64_t count, total_ns, greatest_ns;
+    _Atomic uint64_t count, total_ns, max_ns;
 };
 struct stage_totals {
     struct stage_total by_stage[STAGE_COUNT][2]; /* by stage and clock */

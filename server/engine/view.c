@@ -113,7 +113,7 @@ bool view_take_up(struct job *job, struct shot *shot, struct error *error)
     shot->request.seed = job->spec.frame.seed; /* the same picture of the same place */
     shot->request.accumulate = adds_up(job);
     shot->request.samples = samples_of_next(job);
-    shot->request.samples_most = job->spec.frame.samples; /* one that is complete may be wished again */
+    shot->request.samples_max = job->spec.frame.samples; /* one that is complete may be wished again */
     apply_effort(job, &shot->request);
     return true;
 }

@@ -102,7 +102,7 @@ static bool has_bindings(struct error *error)
 {
     static const struct {
         GLenum name;
-        unsigned least;
+        unsigned min;
         const char *what;
     } rows[] = {
         {GL_MAX_SHADER_STORAGE_BUFFER_BINDINGS, 16, "storage bindings"},
@@ -111,9 +111,9 @@ static bool has_bindings(struct error *error)
         {GL_MAX_FRAGMENT_SHADER_STORAGE_BLOCKS, 8, "storage blocks in fragment shaders"},
     };
     for (size_t i = 0; i < sizeof(rows) / sizeof(rows[0]); i++)
-        if (get_integer(rows[i].name) < rows[i].least)
+        if (get_integer(rows[i].name) < rows[i].min)
             return error_set(error, ERROR_UNSUPPORTED, "device", "it has %u %s; %u are needed",
-                             (unsigned)get_integer(rows[i].name), rows[i].what, rows[i].least);
+                             (unsigned)get_integer(rows[i].name), rows[i].what, rows[i].min);
     return true;
 }
 

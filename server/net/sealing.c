@@ -14,13 +14,13 @@
  */
 #define AHEAD_BYTES ((size_t)64 << 10)
 
-/* Copies from small parts, which shrink by the copied bytes, up to `most` bytes or the first large part. */
-static size_t put_together(uint8_t *to, size_t most, struct iovec **parts, const struct iovec *end)
+/* Copies from small parts, which shrink by the copied bytes, up to `maximum` bytes or the first large part. */
+static size_t put_together(uint8_t *to, size_t maximum, struct iovec **parts, const struct iovec *end)
 {
     size_t used_bytes = 0;
-    while (*parts < end && (*parts)->iov_len < TOGETHER_BYTES && used_bytes < most) {
+    while (*parts < end && (*parts)->iov_len < TOGETHER_BYTES && used_bytes < maximum) {
         struct iovec *part = *parts;
-        size_t bytes = part->iov_len < most - used_bytes ? part->iov_len : most - used_bytes;
+        size_t bytes = part->iov_len < maximum - used_bytes ? part->iov_len : maximum - used_bytes;
         memcpy(to + used_bytes, part->iov_base, bytes);
         used_bytes += bytes;
         part->iov_base = (char *)part->iov_base + bytes;
@@ -42,21 +42,21 @@ static size_t seal_parts(struct sealed_link *link, struct iovec *parts, const st
             parts++;
         } else {
             uint8_t together[TOGETHER_BYTES];
-            size_t most = room_bytes < sizeof(together) ? room_bytes : sizeof(together);
-            sealed_bytes += sealed_link_seal(link, together, put_together(together, most, &parts, end));
+            size_t maximum = room_bytes < sizeof(together) ? room_bytes : sizeof(together);
+            sealed_bytes += sealed_link_seal(link, together, put_together(together, maximum, &parts, end));
         }
     }
     return sealed_bytes;
 }
 
 /* Cuts the parts to at most that many bytes. Returns their number. */
-static size_t cut_parts(struct iovec *parts, size_t count, size_t most_bytes)
+static size_t cut_parts(struct iovec *parts, size_t count, size_t max_bytes)
 {
     size_t used = 0;
-    for (; used < count && most_bytes; used++) {
-        if (parts[used].iov_len > most_bytes)
-            parts[used].iov_len = most_bytes;
-        most_bytes -= parts[used].iov_len;
+    for (; used < count && max_bytes; used++) {
+        if (parts[used].iov_len > max_bytes)
+            parts[used].iov_len = max_bytes;
+        max_bytes -= parts[used].iov_len;
     }
     return used;
 }

@@ -119,9 +119,9 @@ static float focus_distance(const struct frame_camera *camera, const struct gpu_
     float middle[3];
     for (int i = 0; i < 3; i++)
         middle[i] = scene->lower_world[i] / 2.0f + scene->upper_world[i] / 2.0f;
-    float distance = distance_along_view(camera, middle), least = scene->diagonal / 2.0f;
+    float distance = distance_along_view(camera, middle), minimum = scene->diagonal / 2.0f;
     if (!(distance > 0.0f) || !isfinite(distance))
-        distance = least > 0.0f && isfinite(least) ? least : 1.0f;
+        distance = minimum > 0.0f && isfinite(minimum) ? minimum : 1.0f;
     return distance;
 }
 

@@ -97,9 +97,9 @@ static bool image_luminances(float *cells, const struct scene_environment *image
     return true;
 }
 
-static uint32_t cells_along(uint32_t texels, uint32_t most)
+static uint32_t cells_along(uint32_t texels, uint32_t maximum)
 {
-    uint32_t each = (texels + most - 1) / most;
+    uint32_t each = (texels + maximum - 1) / maximum;
     return (texels + each - 1) / each;
 }
 

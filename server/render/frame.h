@@ -56,7 +56,7 @@ struct frame_request {
     bool accumulate;
     /* With `accumulate`: the limit of accumulated samples; of `samples` only those up to it are added. 0: no
      * limit. */
-    uint32_t samples_most;
+    uint32_t samples_max;
     /* Every wave is traced by a second tracer too, primary rays included (`primary` is taken to be PRIMARY_TRACE),
      * and the result has what came of it. The picture is that of `tracer`. */
     bool compare;
@@ -114,7 +114,7 @@ struct frame_scene;
 struct frame_scene *frame_scene_create(struct gpu_device *device, struct error *error);
 void frame_scene_destroy(struct frame_scene *shared); /* after its renderers; accepts NULL */
 uint64_t frame_scene_device_bytes(const struct frame_scene *shared);
-/* For tests: how long a step of bringing a tracer to the scene may take; 0: the least that it can be cut to. */
+/* For tests: how long a step of bringing a tracer to the scene may take; 0: the shortest that it can be cut to. */
 void frame_scene_set_step(struct frame_scene *shared, uint64_t step_ns);
 
 /* The resources of one viewer: the waves and the picture of one frame at a time, and the last one's samples. */

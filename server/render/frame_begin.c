@@ -164,9 +164,9 @@ static bool begin_comparison(struct frame_renderer *renderer, struct error *erro
     return true;
 }
 
-static uint32_t at_least(uint32_t value, uint32_t least)
+static uint32_t at_least(uint32_t value, uint32_t minimum)
 {
-    return value > least ? value : least;
+    return value > minimum ? value : minimum;
 }
 
 bool frame_reserve_waves(struct frame_renderer *renderer, struct error *error)
@@ -222,10 +222,10 @@ static void fill_filter(struct render_context *context)
 /* Once it is known what the frame goes on from. */
 static void limit_samples(const struct frame_renderer *renderer, struct frame_request *request)
 {
-    uint32_t before = renderer->samples_before, most = request->samples_most;
-    if (!request->accumulate || !most || !before)
+    uint32_t before = renderer->samples_before, maximum = request->samples_max;
+    if (!request->accumulate || !maximum || !before)
         return;
-    uint32_t lacking = most > before ? most - before : 0;
+    uint32_t lacking = maximum > before ? maximum - before : 0;
     request->samples = request->samples < lacking ? request->samples : lacking;
 }
 

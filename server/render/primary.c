@@ -15,8 +15,8 @@
 #define DRAW_VERTICES_HARDWARE (3u << 24)
 /* Fewer where such a part takes long: larger triangles, other work on the machine. Each part costs something of
  * its own, so only then. */
-#define DRAW_VERTICES_LEAST (3u << 12)
-#define DRAW_NS_MOST UINT64_C(25000000)
+#define DRAW_VERTICES_MIN (3u << 12)
+#define DRAW_NS_MAX UINT64_C(25000000)
 
 enum primitive_kind { PRIMITIVE_TRIANGLES, PRIMITIVE_SPHERES, PRIMITIVE_DISCS };
 static const unsigned vertices_per_primitive[] = {3, 36, 6};
@@ -98,7 +98,7 @@ static bool draw_sort(struct primary *primary, struct render_context *context, u
             continue;
         if (!program && !(program = use_program(context, kind, has_cutout(context, sort), error)))
             return false;
-        uint32_t most = *budget / vertices_per_primitive[kind], part = count < most ? count : most;
+        uint32_t maximum = *budget / vertices_per_primitive[kind], part = count < maximum ? count : maximum;
         if (sort == SORT_SPHERES) /* the picture's y runs down, which turns every winding round */
             glFrontFace(scene->instances[primary->instance].flags & INSTANCE_MIRRORED ? GL_CCW : GL_CW);
         gpu_uniform_uint(program, "instance_index", primary->instance);
@@ -119,9 +119,9 @@ static bool draw_sort(struct primary *primary, struct render_context *context, u
 
 static void learn(struct primary *primary, uint64_t took_ns)
 {
-    if (took_ns > DRAW_NS_MOST && primary->part_vertices > DRAW_VERTICES_LEAST)
+    if (took_ns > DRAW_NS_MAX && primary->part_vertices > DRAW_VERTICES_MIN)
         primary->part_vertices /= 2;
-    else if (took_ns < DRAW_NS_MOST / 4 && primary->part_vertices < DRAW_VERTICES_SOFTWARE)
+    else if (took_ns < DRAW_NS_MAX / 4 && primary->part_vertices < DRAW_VERTICES_SOFTWARE)
         primary->part_vertices *= 2;
 }
 

@@ -3,8 +3,8 @@
 
 uint32_t slices_sample_shift(const struct slices *slices, uint32_t samples)
 {
-    uint32_t most = samples < slices->slice_rays ? samples : slices->slice_rays, shift = 0;
-    while (2u << shift <= SLICES_SAMPLES_TOGETHER && 2u << shift <= most)
+    uint32_t maximum = samples < slices->slice_rays ? samples : slices->slice_rays, shift = 0;
+    while (2u << shift <= SLICES_SAMPLES_TOGETHER && 2u << shift <= maximum)
         shift++;
     return shift;
 }

@@ -13,7 +13,7 @@ enum channel_target { TARGET_NODE, TARGET_WEIGHTS, TARGET_LIGHT, TARGET_MATERIAL
 struct channel_row {
     enum channel_target target;
     uint32_t width_min, width_max; /* numbers of a value */
-    double least, greatest;        /* that a number may be, as the protocol has it; evaluated ones are clamped */
+    double min, max;               /* that a number may be, as the protocol has it; evaluated ones are clamped */
 };
 /* NULL: no such path. */
 const struct channel_row *channel_row(enum channel_path path);

@@ -57,20 +57,20 @@ bool array_size_check(const struct blob *blob, uint64_t count, uint64_t element_
 /* A block has a constant length and no exit inside, so that the compiler does several numbers at a time. */
 #define FLOAT_BLOCK 1024
 
-static bool block_is_fine(const float *values, float greatest)
+static bool block_is_fine(const float *values, float maximum)
 {
     unsigned bad = 0;
     for (size_t i = 0; i < FLOAT_BLOCK; i++)
-        bad |= (unsigned)!(fabsf(values[i]) <= greatest); /* true for a NaN too */
+        bad |= (unsigned)!(fabsf(values[i]) <= maximum); /* true for a NaN too */
     return !bad;
 }
 
-size_t first_bad_float(const float *values, size_t count, float greatest)
+size_t first_bad_float(const float *values, size_t count, float maximum)
 {
     size_t i = 0;
-    while (count - i >= FLOAT_BLOCK && block_is_fine(values + i, greatest))
+    while (count - i >= FLOAT_BLOCK && block_is_fine(values + i, maximum))
         i += FLOAT_BLOCK;
-    while (i < count && fabsf(values[i]) <= greatest)
+    while (i < count && fabsf(values[i]) <= maximum)
         i++;
     return i;
 }

@@ -41,9 +41,9 @@ bool weights_check(const float *weights, uint32_t count, const struct edit_place
 /* The blob holds `count` elements of `element_bytes`, neither more nor less. */
 bool array_size_check(const struct blob *blob, uint64_t count, uint64_t element_bytes, const char *path,
                       const struct edit_place *place);
-/* Index of the first float that is not finite, or whose magnitude is above `greatest`; `count` if there is none.
+/* Index of the first float that is not finite, or whose magnitude is above `maximum`; `count` if there is none.
  */
-size_t first_bad_float(const float *values, size_t count, float greatest);
+size_t first_bad_float(const float *values, size_t count, float maximum);
 
 /* Host memory that an object counts for. */
 uint64_t object_bytes(enum object_kind kind, const void *object);

@@ -15,13 +15,13 @@ struct array_row {
     unsigned bytes;
     enum array_of of;
     bool required;
-    float greatest; /* 0: any finite number */
+    float max; /* 0: any finite number */
 };
 static const struct array_row array_rows[MESH_ARRAY_COUNT] = {
     [MESH_POSITIONS] = {.path = ".arrays[0] (positions)",
                         .components = 3,
                         .required = true,
-                        .greatest = COORDINATE_MAX},
+                        .max = COORDINATE_MAX},
     [MESH_INDICES] = {.path = ".arrays[1] (indices)", .components = 3, .of = PER_TRIANGLE, .required = true},
     [MESH_NORMALS] = {.path = ".arrays[2] (normals)", .components = 3},
     [MESH_TANGENTS] = {.path = ".arrays[3] (tangents)", .components = 4},
@@ -32,19 +32,19 @@ static const struct array_row array_rows[MESH_ARRAY_COUNT] = {
     [MESH_WEIGHTS] = {.path = ".arrays[8] (joint weights)",
                       .components = 1,
                       .of = PER_INFLUENCE,
-                      .greatest = COORDINATE_MAX},
+                      .max = COORDINATE_MAX},
     [MESH_TARGET_POSITIONS] = {.path = ".arrays[9] (target positions)",
                                .components = 3,
                                .of = PER_TARGET,
-                               .greatest = COORDINATE_MAX},
+                               .max = COORDINATE_MAX},
     [MESH_TARGET_NORMALS] = {.path = ".arrays[10] (target normals)",
                              .components = 3,
                              .of = PER_TARGET,
-                             .greatest = COORDINATE_MAX},
+                             .max = COORDINATE_MAX},
     [MESH_TARGET_TANGENTS] = {.path = ".arrays[11] (target tangents)",
                               .components = 3,
                               .of = PER_TARGET,
-                              .greatest = COORDINATE_MAX},
+                              .max = COORDINATE_MAX},
 };
 
 /* Elements of an array; neither product leaves 64 bits. */
@@ -120,7 +120,7 @@ static bool floats_check(const struct scene_mesh *mesh, const struct edit_place 
             continue;
         const float *values = (const float *)(const void *)mesh->arrays[i]->data;
         size_t count = (size_t)element_count(mesh, row) * row->components;
-        size_t bad = first_bad_float(values, count, row->greatest > 0.0f ? row->greatest : FLT_MAX);
+        size_t bad = first_bad_float(values, count, row->max > 0.0f ? row->max : FLT_MAX);
         if (bad == count)
             continue;
         char name[64];
@@ -128,7 +128,7 @@ static bool floats_check(const struct scene_mesh *mesh, const struct edit_place 
         edit_error(place, ERROR_INVALID, row->path, "%s has %g as component %zu", name, (double)values[bad],
                    row->of == PER_INFLUENCE ? bad % mesh->influence_count : bad % row->components);
         return error_remedy(place->error, "numbers must be finite%s",
-                            row->greatest > 0.0f ? " and not beyond 1e18" : "");
+                            row->max > 0.0f ? " and not beyond 1e18" : "");
     }
     return true;
 }
@@ -142,14 +142,14 @@ static bool influences_check(struct scene_mesh *mesh, const struct edit_place *p
     const uint16_t *joints = (const uint16_t *)(const void *)mesh->arrays[MESH_JOINTS]->data;
     const float *weights = (const float *)(const void *)mesh->arrays[MESH_WEIGHTS]->data;
     size_t count = (size_t)mesh->vertex_count * mesh->influence_count;
-    uint16_t greatest = 0;
-    float least = 0.0f;
+    uint16_t maximum = 0;
+    float minimum = 0.0f;
     for (size_t i = 0; i < count; i++)
-        greatest = joints[i] > greatest ? joints[i] : greatest;
+        maximum = joints[i] > maximum ? joints[i] : maximum;
     for (size_t i = 0; i < count; i++)
-        least = weights[i] < least ? weights[i] : least;
-    mesh->joint_places = greatest + 1u;
-    if (least >= 0.0f)
+        minimum = weights[i] < minimum ? weights[i] : minimum;
+    mesh->joint_places = maximum + 1u;
+    if (minimum >= 0.0f)
         return true;
     size_t bad = 0;
     while (weights[bad] >= 0.0f)
@@ -161,17 +161,17 @@ static bool influences_check(struct scene_mesh *mesh, const struct edit_place *p
 /* A block has a constant length, so that the compiler does several indices at a time. */
 #define INDEX_BLOCK 1536
 
-static uint32_t greatest_index(const uint32_t *indices, size_t count)
+static uint32_t max_index(const uint32_t *indices, size_t count)
 {
-    uint32_t greatest = 0;
+    uint32_t maximum = 0;
     if (count == INDEX_BLOCK) {
         for (size_t i = 0; i < INDEX_BLOCK; i++)
-            greatest = indices[i] > greatest ? indices[i] : greatest;
-        return greatest;
+            maximum = indices[i] > maximum ? indices[i] : maximum;
+        return maximum;
     }
     for (size_t i = 0; i < count; i++)
-        greatest = indices[i] > greatest ? indices[i] : greatest;
-    return greatest;
+        maximum = indices[i] > maximum ? indices[i] : maximum;
+    return maximum;
 }
 
 struct bounds {
@@ -203,7 +203,7 @@ static bool indices_check(struct scene_mesh *mesh, const struct edit_place *plac
     struct bounds bounds = {FLT_MAX, FLT_MAX, FLT_MAX, -FLT_MAX, -FLT_MAX, -FLT_MAX};
     for (size_t begin = 0; begin < count; begin += INDEX_BLOCK) {
         size_t length = count - begin < INDEX_BLOCK ? count - begin : INDEX_BLOCK;
-        if (greatest_index(indices + begin, length) >= mesh->vertex_count) {
+        if (max_index(indices + begin, length) >= mesh->vertex_count) {
             size_t bad = begin;
             while (indices[bad] < mesh->vertex_count)
                 bad++;

@@ -103,10 +103,10 @@ static void turn_sums_resolve(struct turn_sums *sums, uint32_t start)
     }
 }
 
-/* Intervals that may be one without a turn beyond the limit, from `most` down. */
-static int joinable(const interval_turns sum, int most)
+/* Intervals that may be one without a turn beyond the limit, from `maximum` down. */
+static int joinable(const interval_turns sum, int maximum)
 {
-    for (int together = most; together > 1; together /= 2) {
+    for (int together = maximum; together > 1; together /= 2) {
         bool fine = true;
         for (int first = 0; first < INTERVALS; first += together) {
             double turn = 0.0;

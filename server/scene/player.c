@@ -157,7 +157,7 @@ static void evaluate(const struct player *player, const struct player_track *tra
     double value[CURVE_WIDTH_MAX];
     curve_at(&curve, player->times_s[track->use], value);
     for (uint32_t i = 0; i < curve.width; i++)
-        out[i] = (float)fmin(fmax(value[i], row->least), row->greatest);
+        out[i] = (float)fmin(fmax(value[i], row->min), row->max);
 }
 
 static void change_transform(const struct player *player, const struct player_track *track,

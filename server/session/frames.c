@@ -199,11 +199,11 @@ static uint32_t fill_comparisons(struct record_wave_comparison *records, const s
             .reference_ns = from->second_ns,
             .distance_median = from->distance_median,
             .distance_p99 = from->distance_p99,
-            .distance_greatest = from->distance_greatest,
+            .distance_max = from->distance_max,
             .relative_median = from->relative_median,
             .normal_median = from->normal_median,
             .normal_p99 = from->normal_p99,
-            .normal_greatest = from->normal_greatest,
+            .normal_max = from->normal_max,
         };
     }
     return count;
@@ -355,8 +355,8 @@ static bool queue_piece(struct pending_frame *pending)
 {
     struct job *job = pending->job;
     size_t left_bytes = pending->frame->size_bytes - pending->queued_bytes;
-    size_t most_bytes = job->view && !pending->frame->moving ? FRAME_PIECE_AT_REST_BYTES : FRAME_PIECE_BYTES;
-    size_t piece_bytes = left_bytes < most_bytes ? left_bytes : most_bytes;
+    size_t max_bytes = job->view && !pending->frame->moving ? FRAME_PIECE_AT_REST_BYTES : FRAME_PIECE_BYTES;
+    size_t piece_bytes = left_bytes < max_bytes ? left_bytes : max_bytes;
     struct out_message *out = out_message_create(FRAME_DATA_HEAD_BYTES);
     if (!out)
         return false;

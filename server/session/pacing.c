@@ -11,7 +11,7 @@
  * one. */
 #define WAIT_MAX_NS 0x1p61
 /* A local socket takes no time that could be measured; this keeps the rate finite. */
-#define CARRIED_LEAST_NS 1000.0
+#define CARRIED_MIN_NS 1000.0
 /* Share of the link that frames may fill: the rest drains other queues, and the connection's own. */
 #define LINK_SHARE 0.9
 #define LEARN_SHARE 0.25
@@ -107,7 +107,7 @@ static void learn_rate(struct pacing *pacing, const struct pacing_frame *frame, 
         since_ns = pacing->last_whole_ns;
     double taken_ns = now_ns > since_ns ? (double)(now_ns - since_ns) : 0.0;
     pacing->carried_bytes = pacing->carried_bytes * CARRIED_FADES + (double)frame->bytes;
-    pacing->carried_ns = pacing->carried_ns * CARRIED_FADES + fmax(taken_ns, CARRIED_LEAST_NS);
+    pacing->carried_ns = pacing->carried_ns * CARRIED_FADES + fmax(taken_ns, CARRIED_MIN_NS);
 }
 
 static void remove_oldest(struct pacing *pacing, size_t count)
@@ -197,8 +197,8 @@ static void learn_render(struct pacing *pacing, double area, double render_ns)
     double mean_area = pacing->render_areas / pacing->render_frames;
     double mean_ns = pacing->render_ns / pacing->render_frames;
     double variance = pacing->render_areas_areas / pacing->render_frames - mean_area * mean_area;
-    double least = AREA_DEVIATION * mean_area;
-    if (variance > least * least) {
+    double minimum = AREA_DEVIATION * mean_area;
+    if (variance > minimum * minimum) {
         double slope = (pacing->render_areas_ns / pacing->render_frames - mean_area * mean_ns) / variance;
         pacing->render_fixed_ns = fmax(mean_ns - slope * mean_area, 0.0);
     }
@@ -246,16 +246,16 @@ static struct pacing_advice best_that_fits(const struct pacing *pacing, unsigned
     double bytes_max = bytes_a_frame(pacing) / room;
     /* Where even the smallest picture would be late, it would not be worth its size. */
     double render_max_ns = fmax((double)pacing->frame_ns, OF_FIXED * pacing->render_fixed_ns);
-    unsigned least = quality_wanted < PACING_QUALITY_LEAST ? quality_wanted : PACING_QUALITY_LEAST;
-    struct pacing_advice advice = {.scale_eighths = scales_eighths[SCALES - 1], .quality = least};
+    unsigned minimum = quality_wanted < PACING_QUALITY_MIN ? quality_wanted : PACING_QUALITY_MIN;
+    struct pacing_advice advice = {.scale_eighths = scales_eighths[SCALES - 1], .quality = minimum};
     for (size_t i = 0; i < SCALES; i++) {
         unsigned scale = scales_eighths[i];
         bool rendered_in_time = render_ns_of(pacing, scale) * room <= render_max_ns || i == SCALES - 1;
-        if (!rendered_in_time || (bytes_of(pacing, scale, least) > bytes_max && i < SCALES - 1))
+        if (!rendered_in_time || (bytes_of(pacing, scale, minimum) > bytes_max && i < SCALES - 1))
             continue;
         advice.scale_eighths = scale;
         advice.quality = quality_wanted;
-        while (advice.quality > least && bytes_of(pacing, scale, advice.quality) > bytes_max)
+        while (advice.quality > minimum && bytes_of(pacing, scale, advice.quality) > bytes_max)
             advice.quality--;
         break;
     }

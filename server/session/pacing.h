@@ -47,11 +47,11 @@ struct pacing {
 
 struct pacing_advice {
     unsigned scale_eighths; /* of width and height: 8, 6, 4, 3, 2 */
-    unsigned quality;       /* as JPEG has it, PACING_QUALITY_LEAST .. the wanted one */
+    unsigned quality;       /* as JPEG has it, PACING_QUALITY_MIN .. the wanted one */
     uint64_t bytes;         /* that a frame may have, for an encoder that can be told */
 };
 
-#define PACING_QUALITY_LEAST 40
+#define PACING_QUALITY_MIN 40
 #define PACING_QUALITY_REFERENCE 75
 
 void pacing_init(struct pacing *pacing, uint64_t frame_ns);

@@ -99,7 +99,7 @@ static uint32_t fill_stages(struct stats_storage *storage, const struct engine_s
                 .clock = (enum protocol_clock)clock,
                 .count = stats->stages[stage][clock].count,
                 .total_ns = stats->stages[stage][clock].total_ns,
-                .greatest_ns = stats->stages[stage][clock].greatest_ns,
+                .max_ns = stats->stages[stage][clock].max_ns,
             };
         }
     }

@@ -31,8 +31,8 @@ static inline bool step_is_over(uint64_t step_end_ns)
  * ones may cost more. */
 static inline uint32_t step_batch_items(uint32_t items, uint64_t took_ns)
 {
-    const uint64_t fitting = items * STEP_BATCH_NS / (took_ns + 1), most = 2 * (uint64_t)items;
-    const uint64_t next = fitting < most ? fitting : most;
+    const uint64_t fitting = items * STEP_BATCH_NS / (took_ns + 1), maximum = 2 * (uint64_t)items;
+    const uint64_t next = fitting < maximum ? fitting : maximum;
     return next < 1 ? 1 : next < UINT32_MAX / 2 ? (uint32_t)next : UINT32_MAX / 2;
 }
 

@@ -122,11 +122,11 @@ static struct ray_range next_range(const struct trace_state *state, uint64_t ste
     const struct wave *wave = &state->wave;
     const uint32_t learnt = state->step_rays[wave->family], minimum = minimum_rays(state);
     const uint32_t first = state->traced_rays, left = wave->ray_count - first;
-    const uint32_t most = step_ns == 0 ? minimum : learnt ? learnt : STEP_RAYS_FIRST;
+    const uint32_t maximum = step_ns == 0 ? minimum : learnt ? learnt : STEP_RAYS_FIRST;
     struct ray_range rays = {.wave = wave, .first = first, .end = wave->ray_count};
-    if (step_ns == STEP_WITHOUT_END || (step_ns > 0 && !state->device->facts.software) || most >= left)
+    if (step_ns == STEP_WITHOUT_END || (step_ns > 0 && !state->device->facts.software) || maximum >= left)
         return rays;
-    const uint32_t steps = (left - 1) / most + 1, even = (left - 1) / steps + 1;
+    const uint32_t steps = (left - 1) / maximum + 1, even = (left - 1) / steps + 1;
     const uint32_t count = (even + minimum - 1) / minimum * minimum;
     if (count < left)
         rays.end = first + count;
@@ -137,8 +137,8 @@ static void learn(struct trace_state *state, uint32_t rays, uint64_t step_ns, ui
 {
     uint32_t *step_rays = &state->step_rays[state->wave.family];
     const uint64_t last = *step_rays ? *step_rays : STEP_RAYS_FIRST, minimum = minimum_rays(state);
-    const uint64_t wanted = rays * step_ns / (took_ns + 1), most = STEP_RAYS_GROWTH * last;
-    const uint64_t next = wanted < most ? wanted : most;
+    const uint64_t wanted = rays * step_ns / (took_ns + 1), maximum = STEP_RAYS_GROWTH * last;
+    const uint64_t next = wanted < maximum ? wanted : maximum;
     *step_rays = (uint32_t)(next < minimum ? minimum : next < STEP_RAYS_MAX ? next : STEP_RAYS_MAX);
 }
 

@@ -70,12 +70,12 @@ uint subvoxels_between(ivec3 first, ivec3 last, ivec3 half_)
 
 // The patch of a surface behind a texel, from one depth to the other: usually in one or two halves of a voxel. A load
 // is cheaper than an atomic, and the bits are usually set already. `looks_along`: its normal's dominant axis.
-void mark(float least_cells, float greatest_cells, int bits, int looks_along)
+void mark(float min_cells, float max_cells, int bits, int looks_along)
 {
     float subvoxels_per_cell = 4.0 * voxels_per_cell;
     int along = int(voxels_along);
-    ivec3 first = ivec3(vec3(least_cells - DEPTH_MARGIN_CELLS, gl_FragCoord.xy - HALF_TEXEL) * subvoxels_per_cell);
-    ivec3 last = ivec3(vec3(greatest_cells + DEPTH_MARGIN_CELLS, gl_FragCoord.xy + HALF_TEXEL) * subvoxels_per_cell);
+    ivec3 first = ivec3(vec3(min_cells - DEPTH_MARGIN_CELLS, gl_FragCoord.xy - HALF_TEXEL) * subvoxels_per_cell);
+    ivec3 last = ivec3(vec3(max_cells + DEPTH_MARGIN_CELLS, gl_FragCoord.xy + HALF_TEXEL) * subvoxels_per_cell);
     first = turned(clamp(first, ivec3(0), ivec3(4 * along - 1)));
     last = turned(clamp(last, ivec3(0), ivec3(4 * along - 1)));
     ivec3 half_first = first >> ivec3(2, 2, 1), half_last = last >> ivec3(2, 2, 1), half_ = half_first;
@@ -137,14 +137,14 @@ void main()
     if (!link(depth_cells, face & (FACE_NORMAL_MASK | FACE_CLOSED) | (leaves ? ABUFFER_NODE_LEAVES : 0u)))
         return;
     // The plane's range of depth in the texel; if it is steep, no farther than the triangle reaches.
-    float reach = 0.5 * (abs(plane.x) + abs(plane.y)), least_cells = depth_cells - reach, most_cells = depth_cells + reach;
+    float reach = 0.5 * (abs(plane.x) + abs(plane.y)), min_cells = depth_cells - reach, max_cells = depth_cells + reach;
     if ((face & FACE_STEEP << gl_Layer) != 0u) {
-        least_cells = max(least_cells, depths.y);
-        most_cells = min(most_cells, depths.z);
+        min_cells = max(min_cells, depths.y);
+        max_cells = min(max_cells, depths.z);
     }
     if ((face & FACE_LEANS << gl_Layer) != 0u)
-        mark(least_cells, most_cells, sum_bits(face, (face & FACE_CLOSED) != 0u, leaves), axis_of_plane());
-    if ((face & FACE_MOST) != 0u) {
+        mark(min_cells, max_cells, sum_bits(face, (face & FACE_CLOSED) != 0u, leaves), axis_of_plane());
+    if ((face & FACE_DOMINANT) != 0u) {
         vec3 normal = vec3(1.0, -plane.xy) * inversesqrt(1.0 + dot(plane.xy, plane.xy));
         add_normal(depth_cells, leaves ? normal : -normal);
     }
@@ -153,17 +153,17 @@ void main()
 // The range of a sphere's surface in the texel's square, from its intersection with the line through the texel's
 // centre: outwards, it is bounded by the tangent plane and by the square's point nearest to the sphere's centre;
 // inwards by the rim, if that is in the square.
-void reach_of(sphere_chord c, vec3 normal, int side, float depth_cells, out float least_cells,
-              out float most_cells)
+void reach_of(sphere_chord c, vec3 normal, int side, float depth_cells, out float min_cells,
+              out float max_cells)
 {
     int axis = gl_Layer, u = axis == 2 ? 0 : axis + 1, v = axis == 0 ? 2 : axis - 1;
     vec3 half_u = 0.5 * cell_world * vec3(c.rows[0][u], c.rows[1][u], c.rows[2][u]);
     vec3 half_v = 0.5 * cell_world * vec3(c.rows[0][v], c.rows[1][v], c.rows[2][v]);
     float nearer = 2.0 * length(c.closest) * (length(half_u) + length(half_v)) / dot(c.step_object, c.step_object);
-    float tangent = 0.5 * (abs(normal[u]) + abs(normal[v])) / max(abs(normal[axis]), 1e-6 * greatest(abs(normal)));
+    float tangent = 0.5 * (abs(normal[u]) + abs(normal[v])) / max(abs(normal[axis]), 1e-6 * max_component(abs(normal)));
     float outwards = min(tangent, sqrt(nearer)), inwards = min(c.half_chord, 2.0 * tangent + 0.75);
-    least_cells = depth_cells - (side == 0 ? outwards : inwards);
-    most_cells = depth_cells + (side == 0 ? inwards : outwards);
+    min_cells = depth_cells - (side == 0 ? outwards : inwards);
+    max_cells = depth_cells + (side == 0 ? inwards : outwards);
 }
 
 void main()
@@ -175,18 +175,18 @@ void main()
     bool closed = (primitive.w & DRAWN_CLOSED) != 0u;
     for (int side = 0; side < 2; side++) {
         vec3 normal;
-        float depth_cells = intersection_of(chord, side, normal), least_cells, most_cells;
+        float depth_cells = intersection_of(chord, side, normal), min_cells, max_cells;
         if (is_sphere_cut_out(chord, depth_cells))
             continue;
-        reach_of(chord, normal, side, depth_cells, least_cells, most_cells);
+        reach_of(chord, normal, side, depth_cells, min_cells, max_cells);
         depth_cells = depth_in_cube(depth_cells);
-        normal = normalize(normal / greatest(abs(normal)));
+        normal = normalize(normal / max_component(abs(normal)));
         uint face = face_of(normal);
         if (!link(depth_cells, face & FACE_NORMAL_MASK | (closed ? ABUFFER_NODE_CLOSED : 0u) |
                                    (side == 1 ? ABUFFER_NODE_LEAVES : 0u)))
             continue;
         if ((face & FACE_LEANS << axis) != 0u)
-            mark(least_cells, most_cells, sum_bits(face, closed, side == 1), axis_of(abs(normal)));
+            mark(min_cells, max_cells, sum_bits(face, closed, side == 1), axis_of(abs(normal)));
         if (axis_of(abs(normal)) == axis)
             add_normal(depth_cells, vec3(normal[axis], normal[u], normal[v]));
     }

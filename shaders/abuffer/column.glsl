@@ -102,31 +102,31 @@ column_scan scan_of(column c)
 
 // One round of a loop that runs while next < end; true: it reached a sample, whose words are in `words`. Bisection runs
 // as rounds of the same loop, so that columns without it do not wait for code that they skip.
-bool scan(inout column_scan c, float least_, out int index, out uvec2 words)
+bool scan(inout column_scan c, float depth_min, out int index, out uvec2 words)
 {
     ABUFFER_COUNT(z);
     bool is_far = c.bound - c.next > PASSED;
     int at = is_far ? (c.next + c.bound) >> 1 : c.next;
     uvec4 two = texelFetch(abuffer_samples, at >> 1);
     bool is_even = (at & 1) == 0;
-    bool is_before = uintBitsToFloat(is_even ? two.x : two.z) < least_;
+    bool is_before = uintBitsToFloat(is_even ? two.x : two.z) < depth_min;
     bool is_first = is_even && !is_before;
     index = is_first ? at : at | 1;
     words = is_first ? two.xy : two.zw;
     int passed = is_first ? at + 1 : (at | 1) + 1;
     c.next = is_far ? is_before ? at + 1 : c.next : passed;
     c.bound = is_far && !is_before ? at : c.bound;
-    return !is_far && index < c.end && depth_of(words) >= least_;
+    return !is_far && index < c.end && depth_of(words) >= depth_min;
 }
 
 // The same, one sample per round. For loops whose rounds depend on earlier results: with two per round llvmpipe
 // answered a few rays in ten thousand differently if the column began at an odd index, and where it begins is chance.
-bool scan_singly(inout column_scan c, float least_, out int index, out uvec2 words)
+bool scan_singly(inout column_scan c, float depth_min, out int index, out uvec2 words)
 {
     bool is_far = c.bound - c.next > PASSED;
     index = is_far ? (c.next + c.bound) >> 1 : c.next;
     words = words_at(index);
-    bool is_before = depth_of(words) < least_;
+    bool is_before = depth_of(words) < depth_min;
     c.next = is_far && !is_before ? c.next : index + 1;
     c.bound = is_far && !is_before ? index : c.bound;
     return !is_far && !is_before && index < c.end;

@@ -128,7 +128,7 @@ bool settle(trace_ray r, voxel_traversal w, float limit, inout abuffer_found fou
         line_intersection c = cross_triangle(o, d, id - drawn.y);
         if (is_own)
             own = c;
-        bool is_inside = least(c.weights) >= 0.0, is_ahead = c.distance > r.t_min;
+        bool is_inside = min_component(c.weights) >= 0.0, is_ahead = c.distance > r.t_min;
         bool same_way = c.from_behind == own.from_behind;
         is_hit = is_inside && is_ahead && c.distance < end;
         passes = passes || (same_way ? is_inside && !is_ahead : is_beyond_edge_of(own, c));
@@ -181,7 +181,7 @@ void traverse_planes(trace_ray r, inout voxel_traversal w, inout abuffer_found f
             // A plane that is extended beyond its texel may have hidden that of the next texel at the same point.
             w.s_behind = found.is_within ? s + AGAIN : w.s_behind;
             w.beyond = found.is_within ? BEYOND : ABUFFER_SLACK;
-            w.s = s > w.s_least ? s : w.s_least;
+            w.s = s > w.s_min ? s : w.s_min;
             w.s_end = s_end;
             w.s_limit = s_limit;
             enter(w);

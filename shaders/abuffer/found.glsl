@@ -36,7 +36,7 @@ void offer_sample(trace_ray r, inout abuffer_found found, int sample_index, floa
     c.barycentrics = nearest_barycentrics(c, r.origin, r.direction);
     cross_surface(found.crossed, found.optical_depth, material_index_of(c), distance_, side, near,
                   transmittance_of(c, r.origin, r.direction, 0.0));
-    if (least(found.optical_depth) >= OPTICAL_DEPTH_BLACK)
+    if (min_component(found.optical_depth) >= OPTICAL_DEPTH_BLACK)
         found.end = -1.0;
 #else
     found.optical_depth = vec3(OPTICAL_DEPTH_MAX);

@@ -15,12 +15,12 @@ const float OWN_BEHIND = 0.5, OWN_BEFORE = 0.12, OWN_RISE = 0.05; // the rise is
 
 // Intersects a ray (o, d in the image) with a sample's plane; false: it begins on this plane. `side` is positive if it
 // comes from behind.
-bool cross_plane(vec3 o, vec3 d, float s_least, ivec2 texel, column_sample p, out float s, out float side)
+bool cross_plane(vec3 o, vec3 d, float s_min, ivec2 texel, column_sample p, out float s, out float side)
 {
     float height = dot(p.normal, vec3(vec2(texel) + 0.5, p.depth) - o);
     side = dot(p.normal, d);
     s = height / side;
-    float way = s - s_least, own = side > 0.0 ? OWN_BEHIND : OWN_BEFORE + OWN_RISE * way;
+    float way = s - s_min, own = side > 0.0 ? OWN_BEHIND : OWN_BEFORE + OWN_RISE * way;
     return way > 0.0 && !(way < OWN_WAY && height * height < own * own * dot(p.normal, p.normal));
 }
 
@@ -28,7 +28,7 @@ bool cross_plane(vec3 o, vec3 d, float s_least, ivec2 texel, column_sample p, ou
 bool leans(column_sample p)
 {
     vec3 size = abs(p.normal);
-    return size.z >= AXES_OVERLAP * greatest(size);
+    return size.z >= AXES_OVERLAP * max_component(size);
 }
 
 // Searches the part [s_in, s_out] of the ray. `only_leaning`: surfaces that do not lean to this axis are searched in
@@ -48,17 +48,17 @@ bool search_image(trace_ray r, inout voxel_traversal w, inout abuffer_found foun
         float s_next = along_u ? border.x : border.y;
         float s_here = s_next < s_out ? s_next : s_out;
         float z_in = o.z + s * d.z, z_out = o.z + s_here * d.z;
-        float least_ = (z_in < z_out ? z_in : z_out) - SPAN, greatest_ = (z_in < z_out ? z_out : z_in) + SPAN;
+        float depth_min = (z_in < z_out ? z_in : z_out) - SPAN, depth_max = (z_in < z_out ? z_out : z_in) + SPAN;
         column_scan c = scan_of(column_at(axis, texel));
         bool is_behind = false;
         do {
             int i;
             uvec2 words;
-            bool is_one = scan(c, least_, i, words);
-            is_behind = is_one && depth_of(words) > greatest_;
+            bool is_one = scan(c, depth_min, i, words);
+            is_behind = is_one && depth_of(words) > depth_max;
             column_sample p = sample_of(words, axis);
             float s_plane, side;
-            bool crosses = cross_plane(o, d, w.s_least, texel, p, s_plane, side);
+            bool crosses = cross_plane(o, d, w.s_min, texel, p, s_plane, side);
             vec2 from_middle = abs(o.xy + s_plane * d.xy - vec2(texel) - 0.5);
             bool is_met = crosses && from_middle.x <= 0.5 + w.beyond && from_middle.y <= 0.5 + w.beyond;
             if (is_one && !is_behind && is_met && s_plane > w.s_behind && s_plane < w.s_limit &&

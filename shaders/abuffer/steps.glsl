@@ -67,7 +67,7 @@ int winding_at_origin(voxel_traversal w, uint what)
     // All images: in a corner one of them shows the other wall, which may be near too.
     do {
         int axis = findLSB(images);
-        vec3 p = place_in_image(w, axis, w.s_least), d = in_image(w.ray.d, axis);
+        vec3 p = place_in_image(w, axis, w.s_min), d = in_image(w.ray.d, axis);
         ivec2 texel = texel_of(p.xy);
         column_scan c = scan_of(column_at(axis, texel));
         bool is_behind = false;
@@ -89,7 +89,7 @@ int winding_at_origin(voxel_traversal w, uint what)
         } while (c.next < c.end && !is_behind);
         images &= images - 1u;
     } while (images != 0u);
-    int there = winding_at(own_axis, place_in_image(w, own_axis, w.s_least + OWN_WAY));
+    int there = winding_at(own_axis, place_in_image(w, own_axis, w.s_min + OWN_WAY));
     return is_own && !goes_along ? own_winding : there;
 }
 
@@ -118,7 +118,7 @@ bool follow(trace_ray r, inout voxel_traversal w, inout abuffer_found found, ste
             is_behind = is_one && depth_of(words) > p.z + FOLLOW_REACH;
             float s_plane, side;
             column_sample q = sample_of(words, axis);
-            bool crosses = cross_plane(o, d, w.s_least, texel, q, s_plane, side) && (!t.only_leaning || leans(q));
+            bool crosses = cross_plane(o, d, w.s_min, texel, q, s_plane, side) && (!t.only_leaning || leans(q));
             crosses = crosses && (t.by_winding || (s_plane > lo && s_plane < hi));
             if (is_one && !is_behind && crosses && abs(s_plane - s) < abs(nearest - s)) {
                 nearest = s_plane;
@@ -143,11 +143,11 @@ int nearest_sample(int axis, vec3 p)
 {
     column c = column_at(axis, texel_of(p.xy));
     int nearest = -1;
-    float least_ = 1e30;
+    float away_min = 1e30;
     for (int i = c.first; i < c.end; i++) {
         float away = abs(depth_of(words_at(i)) - p.z);
-        nearest = away < least_ ? i : nearest;
-        least_ = away < least_ ? away : least_;
+        nearest = away < away_min ? i : nearest;
+        away_min = away < away_min ? away : away_min;
     }
     return nearest;
 }
@@ -169,9 +169,9 @@ void search_passage(trace_ray r, inout voxel_traversal w, inout abuffer_found fo
     int other = 0;
     do {
         int image = axis + other < 3 ? axis + other : axis + other - 3;
-        crossed = search_image(r, w, found, image, other > 0, max(lo - 0.5, w.s_least), hi + 0.5);
+        crossed = search_image(r, w, found, image, other > 0, max(lo - 0.5, w.s_min), hi + 0.5);
     } while (++other < 3 && !crossed);
-    if (!crossed && hi > w.s_least + OWN_WAY + 1.0 && hi < w.s_limit) {
+    if (!crossed && hi > w.s_min + OWN_WAY + 1.0 && hi < w.s_limit) {
         i = nearest_sample(axis, place_in_image(w, axis, hi));
         i = i < 0 ? nearest_sample(axis, place_in_image(w, axis, lo)) : i;
         if (i >= 0)
@@ -192,7 +192,7 @@ bool look(inout voxel_traversal w, inout step_traversal t)
     t.hi = t.here.s_in + float(t.next) * t.size;
     // All images that a voxel names only near the ray's origin: else light would leak along bodies that stand on a
     // surface. Farther on the one along the ray's dominant axis, which shows most of what it hits.
-    t.only_leaning = !is_body && t.lo <= w.s_least + NEAR_ORIGIN;
+    t.only_leaning = !is_body && t.lo <= w.s_min + NEAR_ORIGIN;
     if (t.images == 0u)
         t.images = t.only_leaning ? t.here.what & ABUFFER_VOXEL_IMAGES : 1u << image_of(t.here.what, w.ray.d);
     t.axis = findLSB(t.images);
@@ -214,12 +214,12 @@ bool look(inout voxel_traversal w, inout step_traversal t)
             winding += !is_behind && plane_depth(q, from_middle) < p.z ? q.step_ : 0;
             is_first = false;
             float s, side;
-            bool crosses = cross_plane(o, d, w.s_least, texel, q, s, side) && (!t.only_leaning || leans(q));
+            bool crosses = cross_plane(o, d, w.s_min, texel, q, s, side) && (!t.only_leaning || leans(q));
             bool is_here = s > t.lo - FOLLOW_ALONG && s < t.hi + FOLLOW_ALONG && s < nearest;
             nearest = !is_behind && crosses && is_here ? s : nearest;
         }
     } while (c.next < c.end && !is_behind);
-    bool is_past_own = t.hi > w.s_least + OWN_WAY;
+    bool is_past_own = t.hi > w.s_min + OWN_WAY;
     bool differs = t.next > 0 && is_past_own && winding != t.winding;
     t.by_winding = is_body;
     t.winding_lo = t.winding;
@@ -269,12 +269,12 @@ void traverse_steps(trace_ray r, inout voxel_traversal w, inout abuffer_found fo
     t.images = 0u;
     // Everything beyond the voxels is outside.
     t.winding = 0;
-    t.is_known = w.s > w.s_least;
+    t.is_known = w.s > w.s_min;
     if (!t.is_known && w.s < w.s_end) {
         do {
             step_to_voxel(w, t);
-        } while (t.here.what == 0u && w.s <= w.s_least && w.s < w.s_end);
-        if ((t.here.what & ABUFFER_VOXEL_BODY) != 0u && t.here.s_in <= w.s_least) {
+        } while (t.here.what == 0u && w.s <= w.s_min && w.s < w.s_end);
+        if ((t.here.what & ABUFFER_VOXEL_BODY) != 0u && t.here.s_in <= w.s_min) {
             t.winding = winding_at_origin(w, t.here.what);
             t.is_known = true;
             t.next = 1;

@@ -31,7 +31,7 @@ bool trace_any(trace_ray r, inout vec3 optical_depth)
     abuffer_found found = found_of(r, optical_depth);
     traverse_ray(r, found);
     optical_depth = found.optical_depth;
-    return least(optical_depth) >= OPTICAL_DEPTH_BLACK;
+    return min_component(optical_depth) >= OPTICAL_DEPTH_BLACK;
 }
 
 #else

@@ -19,7 +19,7 @@ struct voxel_traversal {
     ivec3 subvoxel;
     int octant_shift;
     float s, s_end;
-    float s_least, s_limit; // between which an intersection counts
+    float s_min, s_limit; // between which an intersection counts
     float s_behind;         // and behind which, if the ray continues from a rejected one
     float beyond;           // extension of a sample's plane beyond its texel, in cells
 };
@@ -51,11 +51,11 @@ void begin_traversal(trace_ray r, float end, out voxel_traversal w)
     w.o = mix(o, along - o, down);
     w.d = abs(w.ray.d) * subvoxels_a_cell;
     w.inverse = 1.0 / w.d;
-    w.s_least = r.t_min * w.ray.scale - w.ray.begin;
+    w.s_min = r.t_min * w.ray.scale - w.ray.begin;
     w.s_limit = min(end * w.ray.scale, 1e30) - w.ray.begin;
-    w.s_behind = w.s_least;
+    w.s_behind = w.s_min;
     w.beyond = ABUFFER_SLACK;
-    w.s = w.s_least;
+    w.s = w.s_min;
     w.s_end = w.s_limit;
     clip(w.s, w.s_end, w.o, w.inverse, vec3(0.0), vec3(along));
     w.s_end = w.ray.scale > 0.0 ? w.s_end : -1e30;

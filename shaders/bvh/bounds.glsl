@@ -74,9 +74,9 @@ bundle bundle_of(object_ray o[RAYS_TOGETHER], bool alive[RAYS_TOGETHER], int lea
 // and the slack are in the offsets. Along an axis where the rays' directions differ in sign nothing is culled: scales
 // are 0 there, and offsets beyond everything. One ray has no interval: its minimum and maximum are equal.
 struct bundle {
-    vec3 scale_least, near_offset_least, far_offset_least;
+    vec3 scale_min, near_offset_min, far_offset_min;
 #if RAYS_TOGETHER > 1
-    vec3 scale_greatest, near_offset_greatest, far_offset_greatest;
+    vec3 scale_max, near_offset_max, far_offset_max;
 #endif
     uint octant;
 };
@@ -91,7 +91,7 @@ bundle bundle_of(object_ray o[RAYS_TOGETHER], bool alive[RAYS_TOGETHER], int lea
         // A component of zero would give infinity times zero. The replacement moves the ray sideways by 1e-12 of its
         // length, far below the slack.
         vec3 d = o[k].direction * grid.cells_per_unit;
-        float smallest = 1e-12 * greatest(abs(d));
+        float smallest = 1e-12 * max_component(abs(d));
         scale[k] = 1.0 / mix(d, vec3(smallest), lessThan(abs(d), vec3(smallest)));
         origin[k] = (o[k].origin - grid.lower) * grid.cells_per_unit;
         slacks[k] = slack * (abs(o[k].origin) + abs(grid.lower)) * grid.cells_per_unit * abs(scale[k]);
@@ -104,26 +104,26 @@ bundle bundle_of(object_ray o[RAYS_TOGETHER], bool alive[RAYS_TOGETHER], int lea
     uvec3 negative = uvec3(lessThan(scale_leading, vec3(0.0)));
     b.octant = negative.x | negative.y << 1 | negative.z << 2;
 #if RAYS_TOGETHER == 1
-    b.scale_least = scale_leading;
-    b.near_offset_least = centre * scale_leading + slacks[0];
-    b.far_offset_least = centre * scale_leading - slacks[0];
+    b.scale_min = scale_leading;
+    b.near_offset_min = centre * scale_leading + slacks[0];
+    b.far_offset_min = centre * scale_leading - slacks[0];
 #else
-    vec3 least = scale_leading, most = scale_leading, before = vec3(-NOWHERE), after = vec3(NOWHERE);
+    vec3 minimum = scale_leading, maximum = scale_leading, before = vec3(-NOWHERE), after = vec3(NOWHERE);
     for (int k = 0; k < RAYS_TOGETHER; k++) {
         vec3 off = (origin[k] - centre) * scale[k];
         // The products centre * scale round as the ray's own would: their part is in the slack.
-        least = alive[k] ? min(least, scale[k]) : least;
-        most = alive[k] ? max(most, scale[k]) : most;
+        minimum = alive[k] ? min(minimum, scale[k]) : minimum;
+        maximum = alive[k] ? max(maximum, scale[k]) : maximum;
         before = alive[k] ? max(before, off + slacks[k]) : before;
         after = alive[k] ? min(after, off - slacks[k]) : after;
     }
-    bvec3 mixed = notEqual(lessThan(least, vec3(0.0)), lessThan(most, vec3(0.0)));
-    b.scale_least = mix(least, vec3(0.0), mixed);
-    b.scale_greatest = mix(most, vec3(0.0), mixed);
-    b.near_offset_least = mix(centre * least + before, vec3(NOWHERE), mixed);
-    b.near_offset_greatest = mix(centre * most + before, vec3(NOWHERE), mixed);
-    b.far_offset_least = mix(centre * least + after, vec3(-NOWHERE), mixed);
-    b.far_offset_greatest = mix(centre * most + after, vec3(-NOWHERE), mixed);
+    bvec3 mixed = notEqual(lessThan(minimum, vec3(0.0)), lessThan(maximum, vec3(0.0)));
+    b.scale_min = mix(minimum, vec3(0.0), mixed);
+    b.scale_max = mix(maximum, vec3(0.0), mixed);
+    b.near_offset_min = mix(centre * minimum + before, vec3(NOWHERE), mixed);
+    b.near_offset_max = mix(centre * maximum + before, vec3(NOWHERE), mixed);
+    b.far_offset_min = mix(centre * minimum + after, vec3(-NOWHERE), mixed);
+    b.far_offset_max = mix(centre * maximum + after, vec3(-NOWHERE), mixed);
 #endif
     return b;
 }
@@ -131,11 +131,11 @@ bundle bundle_of(object_ray o[RAYS_TOGETHER], bool alive[RAYS_TOGETHER], int lea
 // `near`, `far`: the corners that rays of the packet's octant reach first and last.
 bool box_is_hit(bundle b, vec3 near, vec3 far, float t_min, float t_max)
 {
-    vec3 enter = near * b.scale_least - b.near_offset_least;
-    vec3 leave = far * b.scale_least - b.far_offset_least;
+    vec3 enter = near * b.scale_min - b.near_offset_min;
+    vec3 leave = far * b.scale_min - b.far_offset_min;
 #if RAYS_TOGETHER > 1
-    vec3 enter_other = near * b.scale_greatest - b.near_offset_greatest;
-    vec3 leave_other = far * b.scale_greatest - b.far_offset_greatest;
+    vec3 enter_other = near * b.scale_max - b.near_offset_max;
+    vec3 leave_other = far * b.scale_max - b.far_offset_max;
     enter = mix(enter_other, enter, lessThan(enter, enter_other));
     leave = mix(leave_other, leave, greaterThan(leave, leave_other));
 #endif

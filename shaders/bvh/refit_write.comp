@@ -16,7 +16,7 @@ uniform uint first_texel; // of the tree's elements
 uniform vec3 grid_lower, cells_per_unit;
 
 const float PAD_RELATIVE = 4.76837158203125e-7; // 2^-21, the builder's BVH_PAD_RELATIVE
-const float PAD_LEAST = 1.17549435e-38;
+const float PAD_MIN = 1.17549435e-38;
 // The builder's GRID_PAD, which is computed in doubles, and the rounding error of floats on coordinates of up to 65535
 // cells: 4 units in the last place.
 const float GRID_PAD = 0.0625;
@@ -47,10 +47,10 @@ void main()
     float radius = length(upper - centre);
     float magnitude = abs(centre.x) + abs(centre.y) + abs(centre.z) + radius;
     uvec3 first_half = floatBitsToUint(centre);
-    uvec4 second_half = uvec4(floatBitsToUint(radius + 2.0 * magnitude * PAD_RELATIVE + PAD_LEAST), 0u, 0u, 0u);
+    uvec4 second_half = uvec4(floatBitsToUint(radius + 2.0 * magnitude * PAD_RELATIVE + PAD_MIN), 0u, 0u, 0u);
 #else
-    lower -= abs(lower) * PAD_RELATIVE + PAD_LEAST;
-    upper += abs(upper) * PAD_RELATIVE + PAD_LEAST;
+    lower -= abs(lower) * PAD_RELATIVE + PAD_MIN;
+    upper += abs(upper) * PAD_RELATIVE + PAD_MIN;
 #ifdef BVH_PACKED
     vec3 low = (lower - grid_lower) * cells_per_unit - GRID_PAD, high = (upper - grid_lower) * cells_per_unit + GRID_PAD;
     uvec3 near = uvec3(cell_below(low.x), cell_below(low.y), cell_below(low.z));

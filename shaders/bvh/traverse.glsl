@@ -360,7 +360,7 @@ bool trace_any(trace_ray r, inout vec3 optical_depth)
     vec3 found[RAYS_TOGETHER] = vec3[RAYS_TOGETHER](optical_depth);
     trace_together(packet, found);
     optical_depth = found[0];
-    return least(optical_depth) >= OPTICAL_DEPTH_BLACK;
+    return min_component(optical_depth) >= OPTICAL_DEPTH_BLACK;
 }
 #else
 void trace_closest(trace_ray r, inout candidate best)

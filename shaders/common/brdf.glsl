@@ -52,7 +52,7 @@ float fresnel_rough_dielectric_mean(float eta, float roughness)
 vec3 fresnel_schlick(vec3 f0, float cos_i)
 {
     float m = clamp(1.0 - cos_i, 0.0, 1.0), m2 = m * m;
-    float f90 = clamp(50.0 * greatest(f0), 0.0, 1.0);
+    float f90 = clamp(50.0 * max_component(f0), 0.0, 1.0);
     return f0 + (f90 - f0) * (m2 * m2 * m);
 }
 

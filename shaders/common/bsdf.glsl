@@ -108,11 +108,12 @@ bsdf bsdf_of(surface s, split parts, vec3 view, float NoV, vec3 along, float ani
                                     (1.0 - boundary_share(NoV, s.ior, s.roughness)));
     float enters_mean = b.leaves ? 1.0 : 1.0 - boundary_share_mean(s.ior, s.roughness);
     b.scattered = parts.scattered * (INVERSE_PI / enters_mean);
-    float scattered = greatest(parts.scattered), facets = greatest(parts.mirror) + greatest(parts.refracted);
+    float scattered = max_component(parts.scattered);
+    float facets = max_component(parts.mirror) + max_component(parts.refracted);
     facets = facets > 0.0 ? max(facets, LOBE_CHANCE_MIN) : 0.0;
     b.scattered_chance = scattered + facets > 0.0 ? scattered / (scattered + facets) : 1.0;
-    b.mirror_chance = max(greatest(parts.mirror), LOBE_CHANCE_MIN) /
-                      (max(greatest(parts.mirror), LOBE_CHANCE_MIN) + greatest(parts.refracted));
+    b.mirror_chance = max(max_component(parts.mirror), LOBE_CHANCE_MIN) /
+                      (max(max_component(parts.mirror), LOBE_CHANCE_MIN) + max_component(parts.refracted));
     return b;
 }
 
@@ -132,7 +133,7 @@ float facet_mirror_chance(bsdf b, vec3 mirror, vec3 window)
 #ifdef WARD
     return b.mirror_chance;
 #else
-    float size = greatest(mirror), both = size + greatest(window);
+    float size = max_component(mirror), both = size + max_component(window);
     return both > 0.0 ? size / both : 1.0;
 #endif
 }

@@ -69,7 +69,7 @@ vec3 optical_depth_of(vec3 transmittance)
 vec3 transmittance_left(vec3 optical_depth)
 {
 #ifdef HAS_TRANSLUCENT
-    return least(optical_depth) >= OPTICAL_DEPTH_BLACK ? vec3(0.0) : exp2(-optical_depth / OPTICAL_DEPTH_STEPS);
+    return min_component(optical_depth) >= OPTICAL_DEPTH_BLACK ? vec3(0.0) : exp2(-optical_depth / OPTICAL_DEPTH_STEPS);
 #else
     return vec3(optical_depth.x == 0.0 ? 1.0 : 0.0);
 #endif
@@ -84,7 +84,7 @@ bool offer_any(trace_ray r, candidate found, inout vec3 optical_depth)
 #if defined HAS_CUTOUT || defined HAS_TRANSLUCENT
     vec3 transmittance = transmittance_of(found, r.origin, r.direction, time_of(r));
     optical_depth = min(optical_depth + optical_depth_of(transmittance), vec3(OPTICAL_DEPTH_MAX));
-    return least(optical_depth) >= OPTICAL_DEPTH_BLACK;
+    return min_component(optical_depth) >= OPTICAL_DEPTH_BLACK;
 #else
     optical_depth = vec3(OPTICAL_DEPTH_MAX);
     return true;

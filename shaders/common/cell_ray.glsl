@@ -7,7 +7,7 @@
 
 // Replaces a direction's zero component: the ray moves by less than a thousandth of a cell through a cube, and no
 // quotient is infinite.
-const float CELL_RAY_LEAST_SLOPE = 1e-8;
+const float CELL_RAY_MIN_SLOPE = 1e-8;
 
 // At this distance, in cells, floats round positions by more than the distance of distinct planes: the origin of a ray
 // from farther away is moved nearer, or its steps and intersections would be off.
@@ -21,16 +21,16 @@ struct cell_ray {
 
 vec3 without_zeros(vec3 d)
 {
-    const float small = CELL_RAY_LEAST_SLOPE;
-    vec3 least_ = vec3(d.x < 0.0 ? -small : small, d.y < 0.0 ? -small : small, d.z < 0.0 ? -small : small);
-    return mix(d, least_, lessThan(abs(d), vec3(small)));
+    const float small = CELL_RAY_MIN_SLOPE;
+    vec3 smallest = vec3(d.x < 0.0 ? -small : small, d.y < 0.0 ? -small : small, d.z < 0.0 ? -small : small);
+    return mix(d, smallest, lessThan(abs(d), vec3(small)));
 }
 
 // `place`: the cube's lower corner, world; size of a cell. `cells`: along a side.
 cell_ray cell_ray_of(trace_ray r, vec4 place, float cells)
 {
     vec3 size = abs(r.direction);
-    float length_ = greatest(size);
+    float length_ = max_component(size);
     cell_ray c;
     c.scale = length_ / place.w;
     // Written so that a direction that is NaN, or too small or large for a finite inverse, hits nothing.
@@ -52,6 +52,6 @@ void clip(inout float s_first, inout float s_end, vec3 o, vec3 inverse, vec3 low
 {
     vec3 a = (lower - o) * inverse, b = (upper - o) * inverse;
     vec3 near = min(a, b), far = max(a, b);
-    s_first = max(s_first, greatest(near));
-    s_end = min(s_end, least(far));
+    s_first = max(s_first, max_component(near));
+    s_end = min(s_end, min_component(far));
 }

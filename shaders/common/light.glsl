@@ -108,7 +108,7 @@ float light_probability(light l, light_sample sampled)
     int kind = int(l.position_kind.w);
     if (kind != LIGHT_KIND_RECTANGLE && kind != LIGHT_KIND_SPHERE)
         return 0.0;
-    float shining = greatest(l.colour.rgb), arriving = greatest(sampled.irradiance);
+    float shining = max_component(l.colour.rgb), arriving = max_component(sampled.irradiance);
     return arriving > 0.0 ? shining / arriving : 0.0; // radiance times this is irradiance
 }
 #endif

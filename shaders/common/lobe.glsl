@@ -47,7 +47,7 @@ lobe lobe_choose(surface s, float NoV, vec3 direction, inout float choice, vec2 
         mirror += window;
         window = vec3(0.0);
     }
-    float mirror_size = greatest(mirror), both = mirror_size + greatest(window);
+    float mirror_size = max_component(mirror), both = mirror_size + max_component(window);
     if (!(both > 0.0))
         return lobe(s.normal, vec3(0.0));
     float share = mirror_size / both;

@@ -16,12 +16,12 @@ float azimuth(float y, float x)
     return x == 0.0 && y == 0.0 ? 0.0 : atan(y, x);
 }
 
-float greatest(vec3 v)
+float max_component(vec3 v)
 {
     return max(v.x, max(v.y, v.z));
 }
 
-float least(vec3 v)
+float min_component(vec3 v)
 {
     return min(v.x, min(v.y, v.z));
 }

@@ -23,8 +23,8 @@ void world_from_object_at(uint first_texel, uint pose_count, float time, out vec
 // products of very small or large ones stay finite. The inverse of a singular one is NaN, and no ray hits anything.
 float invert(vec4 m[3], out vec4 inverse[3])
 {
-    float greatest_entry = greatest(max(abs(m[0].xyz), max(abs(m[1].xyz), abs(m[2].xyz))));
-    float scale = 1.0 / greatest_entry;
+    float max_entry = max_component(max(abs(m[0].xyz), max(abs(m[1].xyz), abs(m[2].xyz))));
+    float scale = 1.0 / max_entry;
     vec3 r0 = m[0].xyz * scale, r1 = m[1].xyz * scale, r2 = m[2].xyz * scale;
     vec3 c0 = cross(r1, r2), c1 = cross(r2, r0), c2 = cross(r0, r1); // columns of the inverse
     float determinant = dot(r0, c0);

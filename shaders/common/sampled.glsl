@@ -17,8 +17,8 @@ struct surface_sample {
 
 uint sample_bits(float share, uint shift, uint bits)
 {
-    float most = float((1u << bits) - 1u);
-    return uint(clamp(share, 0.0, 1.0) * most + 0.5) << shift;
+    float maximum = float((1u << bits) - 1u);
+    return uint(clamp(share, 0.0, 1.0) * maximum + 0.5) << shift;
 }
 
 float sample_share(uint word, int shift, int bits)

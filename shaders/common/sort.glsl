@@ -37,16 +37,16 @@ void sift(run r, uint at, uint count)
         uint below = 2u * at + 1u;
         if (below >= count)
             break;
-        SORT_ITEM most = load(r, below);
+        SORT_ITEM maximum = load(r, below);
         if (below + 1u < count) {
             SORT_ITEM other = load(r, below + 1u);
-            bool greater = before(most, other);
-            most = greater ? other : most;
+            bool greater = before(maximum, other);
+            maximum = greater ? other : maximum;
             below += greater ? 1u : 0u;
         }
-        if (!before(own, most))
+        if (!before(own, maximum))
             break;
-        store(r, at, most);
+        store(r, at, maximum);
         at = below;
     }
     store(r, at, own);

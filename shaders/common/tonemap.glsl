@@ -10,8 +10,8 @@
 vec3 tone_map_neutral(vec3 colour)
 {
     const float start = 0.8 - 0.04, desaturation = 0.15;
-    float least = min(colour.r, min(colour.g, colour.b));
-    colour -= least < 0.08 ? least - 6.25 * least * least : 0.04;
+    float minimum = min(colour.r, min(colour.g, colour.b));
+    colour -= minimum < 0.08 ? minimum - 6.25 * minimum * minimum : 0.04;
     float peak = max(colour.r, max(colour.g, colour.b));
     if (peak < start)
         return colour;

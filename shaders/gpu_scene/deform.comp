@@ -71,7 +71,7 @@ bool blend(uint vertex, out vec4 rows[3])
 // A vector without a direction stays as it is. (The squares of small components would underflow.)
 vec3 unit_or_same(vec3 v)
 {
-    float scale = greatest(abs(v));
+    float scale = max_component(abs(v));
     return scale > 0.0 && scale <= FLOAT_MAX ? normalize(v / scale) : v;
 }
 
@@ -80,7 +80,7 @@ vec3 moved_normal(vec4 rows[3], vec3 normal, float determinant)
 {
     vec3 moved = vec3(dot(cross(rows[1].xyz, rows[2].xyz), normal), dot(cross(rows[2].xyz, rows[0].xyz), normal),
                       dot(cross(rows[0].xyz, rows[1].xyz), normal));
-    float scale = greatest(abs(moved));
+    float scale = max_component(abs(moved));
     if (!(scale > 0.0 && scale <= FLOAT_MAX))
         return normal;
     return determinant < 0.0 ? -unit_or_same(moved) : unit_or_same(moved);
@@ -88,7 +88,7 @@ vec3 moved_normal(vec4 rows[3], vec3 normal, float determinant)
 
 uint pack_unit_or_zero(vec3 v)
 {
-    float scale = greatest(abs(v));
+    float scale = max_component(abs(v));
     return scale > 0.0 && scale <= FLOAT_MAX ? pack_unit(v / scale) : 0u;
 }
 

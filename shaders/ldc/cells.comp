@@ -230,16 +230,16 @@ void handle(uint item)
     listed_sample s;
     uint here = first_entry_of(item, s);
     for (uint next = next_of(here); next != 0u; here = next, next = next_of(here)) {
-        uint least_ = here, least_key = imageLoad(entries, int(4u * here)).x;
+        uint min_place = here, min_key = imageLoad(entries, int(4u * here)).x;
         for (uint k = next; k != 0u; k = next_of(k)) {
             uint key = imageLoad(entries, int(4u * k)).x;
-            least_ = key < least_key ? k : least_;
-            least_key = key < least_key ? key : least_key;
+            min_place = key < min_key ? k : min_place;
+            min_key = key < min_key ? key : min_key;
         }
-        if (least_ != here) {
-            swap_words(here, least_, 0u);
-            swap_words(here, least_, 2u);
-            swap_words(here, least_, 3u);
+        if (min_place != here) {
+            swap_words(here, min_place, 0u);
+            swap_words(here, min_place, 2u);
+            swap_words(here, min_place, 3u);
         }
     }
 }

@@ -21,7 +21,7 @@ struct cell_traversal {
     ivec3 flip;  // -1: turned
     ivec3 cell;
     float s, s_end;
-    float s_least, s_limit; // between which an intersection counts
+    float s_min, s_limit; // between which an intersection counts
     float begin, scale; // cell_ray's
     int cube, grid, first_node, octant_shift;
     int at, shift; // texel of the current node or block; log2 of the size of its parts: 2 in a node, 0 in a block
@@ -60,8 +60,8 @@ void begin_cells(trace_ray r, float end, int pass, out cell_traversal w)
     w.inverse = 1.0 / w.d;
     w.scale = c.scale;
     w.begin = c.begin;
-    w.s_least = r.t_min * c.scale - w.begin;
-    w.s = w.s_least;
+    w.s_min = r.t_min * c.scale - w.begin;
+    w.s = w.s_min;
     w.s_limit = min(end * c.scale, 1e30) - w.begin;
     w.s_end = w.s_limit;
     float cells = float(w.grid << LDC_NODE_SHIFT);
@@ -137,7 +137,7 @@ void test_cell_sample(inout cell_traversal w, int axis, ivec3 cell, uint sample_
     float s, side;
     if (cross_sample(in_image(w.o, axis), in_image(w.d, axis), w.cube, in_image(vec3(cell), axis).xy, turned,
                      in_image(normal, axis), s, side) &&
-        s > w.s_least && s < w.s_limit) {
+        s > w.s_min && s < w.s_limit) {
         offer_sample(found, sample_index, (s + w.begin) / w.scale, side, 1.0 / w.scale);
         w.s_limit = found.end * w.scale - w.begin;
     }

@@ -46,7 +46,7 @@ void offer_sample(inout ldc_found found, uint sample_index, float distance_, flo
     uvec4 words = texelFetch(ldc_surface, int(sample_index));
     cross_surface(found.crossed, found.optical_depth, sample_material(words), distance_, side, near,
                   transmittance_of_sample(words));
-    if (least(found.optical_depth) >= OPTICAL_DEPTH_BLACK)
+    if (min_component(found.optical_depth) >= OPTICAL_DEPTH_BLACK)
         found.end = -1.0;
 #else
     found.optical_depth = vec3(OPTICAL_DEPTH_MAX);

@@ -22,7 +22,7 @@ struct image_traversal {
     vec3 o, d; // cells of the image
     vec2 inverse;
     float s, s_end;
-    float s_least, s_limit; // between which an intersection counts
+    float s_min, s_limit; // between which an intersection counts
     float begin, scale; // cell_ray's
     ivec2 texel;
     int level;
@@ -36,18 +36,18 @@ void begin_image(trace_ray r, float end, int pass, out image_traversal w)
     int rank = pass - 3 * w.cube;
     cell_ray c = cube_ray_of(r, w.cube);
     vec3 size = abs(c.d);
-    int most = size.x >= size.y ? (size.x >= size.z ? 0 : 2) : (size.y >= size.z ? 1 : 2);
-    int least_ = size.z < size.y ? (size.z < size.x ? 2 : 0) : (size.y < size.x ? 1 : 0);
-    least_ = least_ == most ? (most + 1) % 3 : least_;
-    w.axis = rank == 0 ? most : rank == 2 ? least_ : 3 - most - least_;
+    int longest = size.x >= size.y ? (size.x >= size.z ? 0 : 2) : (size.y >= size.z ? 1 : 2);
+    int shortest = size.z < size.y ? (size.z < size.x ? 2 : 0) : (size.y < size.x ? 1 : 0);
+    shortest = shortest == longest ? (longest + 1) % 3 : shortest;
+    w.axis = rank == 0 ? longest : rank == 2 ? shortest : 3 - longest - shortest;
     w.o = in_image(c.o, w.axis);
     w.d = in_image(c.d, w.axis);
     vec3 inverse = 1.0 / w.d;
     w.inverse = inverse.xy;
     w.scale = c.scale;
     w.begin = c.begin;
-    w.s_least = r.t_min * c.scale - w.begin;
-    w.s = w.s_least;
+    w.s_min = r.t_min * c.scale - w.begin;
+    w.s = w.s_min;
     w.s_limit = min(end * c.scale, 1e30) - w.begin;
     w.s_end = w.s_limit;
     int resolution = ldc_resolution[CUBE(w.cube)];
@@ -109,10 +109,10 @@ void leave_node(inout image_traversal w, int shift, float s_out, bool by_u)
 const int IMAGE_ROUNDS = 4;
 
 // On towards the next texel in which the ray may hit something, for some rounds. True: it was reached.
-bool next_texel(inout image_traversal w, out uvec4 words, out float z_least, out float z_greatest)
+bool next_texel(inout image_traversal w, out uvec4 words, out float z_min, out float z_max)
 {
     words = uvec4(0u);
-    z_least = z_greatest = 0.0;
+    z_min = z_max = 0.0;
     int resolution = ldc_resolution[CUBE(w.cube)];
     int first_texel = ldc_first_texel[CUBE(w.cube)] + w.axis * resolution * resolution;
     for (int round_ = 0; round_ < IMAGE_ROUNDS && w.s < w.s_end; round_++) {
@@ -122,8 +122,8 @@ bool next_texel(inout image_traversal w, out uvec4 words, out float z_least, out
         float s_out = node_exit(w, shift, by_u);
         float s_last = s_out < w.s_end ? s_out : w.s_end;
         float z0 = w.o.z + w.s * w.d.z, z1 = w.o.z + s_last * w.d.z;
-        z_least = z0 < z1 ? z0 : z1;
-        z_greatest = z0 < z1 ? z1 : z0;
+        z_min = z0 < z1 ? z0 : z1;
+        z_max = z0 < z1 ? z1 : z0;
         vec2 range;
         if (w.level == 0) {
             words = texelFetch(ldc_texels, first_texel + w.texel.y * resolution + w.texel.x);
@@ -134,7 +134,7 @@ bool next_texel(inout image_traversal w, out uvec4 words, out float z_least, out
 #ifdef LDC_TOLERANCE
         range += vec2(-ldc_tolerance[CUBE(w.cube)], ldc_tolerance[CUBE(w.cube)]);
 #endif
-        if (z_greatest >= range.x && z_least <= range.y) {
+        if (z_max >= range.x && z_min <= range.y) {
             if (w.level == 0)
                 return true;
             w.level--;
@@ -149,17 +149,17 @@ void test_sample(inout image_traversal w, uint sample_index, float depth, uint n
 {
     vec3 normal = in_image(direction_from_octahedral(normal_bits), w.axis);
     float s, side;
-    if (cross_sample(w.o, w.d, w.cube, vec2(w.texel), depth, normal, s, side) && s > w.s_least && s < w.s_limit) {
+    if (cross_sample(w.o, w.d, w.cube, vec2(w.texel), depth, normal, s, side) && s > w.s_min && s < w.s_limit) {
         offer_sample(found, sample_index, (s + w.begin) / w.scale, side, 1.0 / w.scale);
         w.s_limit = found.end * w.scale - w.begin;
     }
 }
 
 // Tests the samples of the current texel between two depths, and leaves the texel.
-void test_texel(inout image_traversal w, uvec4 words, float z_least, float z_greatest, inout ldc_found found)
+void test_texel(inout image_traversal w, uvec4 words, float z_min, float z_max, inout ldc_found found)
 {
     uint count = words.y & LDC_TEXEL_COUNT_MASK;
-    float low = z_least - LDC_SPAN, high = z_greatest + LDC_SPAN;
+    float low = z_min - LDC_SPAN, high = z_max + LDC_SPAN;
 #ifdef LDC_TOLERANCE
     low -= ldc_tolerance[CUBE(w.cube)];
     high += ldc_tolerance[CUBE(w.cube)];

@@ -26,9 +26,9 @@ layout(std430, binding = BIND_LDC_BUILD_COUNTS) buffer build_block { ldc_build_c
 void in_order(inout uvec2 a, inout uvec2 b)
 {
     bool turned = before(b, a);
-    uvec2 least = turned ? b : a;
+    uvec2 minimum = turned ? b : a;
     b = turned ? a : b;
-    a = least;
+    a = minimum;
 }
 
 // The first four in registers, the rest by insertion: most texels have few, and many often come nearly in order. True:

@@ -21,12 +21,12 @@ void main()
     if (first >= texel_count)
         return;
     uint end = first + LDC_PLACES_TEXELS < texel_count ? first + LDC_PLACES_TEXELS : texel_count;
-    uint sum = 0u, most = 0u, filled = 0u, kept = 0u, quads = 0u, deep = 0u;
+    uint sum = 0u, maximum = 0u, filled = 0u, kept = 0u, quads = 0u, deep = 0u;
     for (uint texel = first; texel < end; texel++) {
         uint count = texelFetch(counts, int(texel)).x;
         uint own = count < fragments_kept ? count : fragments_kept;
         sum += count;
-        most = count > most ? count : most;
+        maximum = count > maximum ? count : maximum;
         filled += count > 0u ? 1u : 0u;
         kept += own;
         quads += (own + 3u) >> 2;
@@ -38,8 +38,8 @@ void main()
         atomicAdd(build.fragments_wraps, 1u);
     atomicAdd(build.samples_max, kept);
     atomicAdd(build.quads_max, quads);
-    if (most > build.layers_needed) // rare, so the atomic's cost does not matter
-        atomicMax(build.layers_needed, most);
+    if (maximum > build.layers_needed) // rare, so the atomic's cost does not matter
+        atomicMax(build.layers_needed, maximum);
     uint at = atomicAdd(build.occupied, filled), place = deep > 0u ? atomicAdd(build.places, deep) : 0u;
     uint row = first / texels_along, u = first - row * texels_along, axis = row / texels_along;
     uint bits = axis << 24 | row - axis * texels_along << 12;

@@ -77,8 +77,8 @@ plain_surface plain_triangle(point p)
                    texelFetch(normals, int(t.vertices.y)).xyz * weights.y +
                    texelFetch(normals, int(t.vertices.z)).xyz * weights.z;
         vec4 rows[3] = t.world_from_object;
-        float most = greatest(max(abs(rows[0].xyz), max(abs(rows[1].xyz), abs(rows[2].xyz))));
-        vec3 r0 = rows[0].xyz / most, r1 = rows[1].xyz / most, r2 = rows[2].xyz / most;
+        float maximum = max_component(max(abs(rows[0].xyz), max(abs(rows[1].xyz), abs(rows[2].xyz))));
+        vec3 r0 = rows[0].xyz / maximum, r1 = rows[1].xyz / maximum, r2 = rows[2].xyz / maximum;
         // Cofactors: the transposed inverse but for the determinant, of which only the sign matters.
         vec3 interpolated = side * vec3(dot(cross(r1, r2), sum), dot(cross(r2, r0), sum), dot(cross(r0, r1), sum));
         float squared = dot(interpolated, interpolated);

@@ -59,10 +59,10 @@ void traverse_rays(trace_ray rays_[RAYS_TOGETHER], inout answer answers[RAYS_TOG
                 }
 #else
                 uvec4 words;
-                float z_least, z_greatest;
-                if (next_texel(w, words, z_least, z_greatest)) {
+                float z_min, z_max;
+                if (next_texel(w, words, z_min, z_max)) {
                     LDC_COUNT(y);
-                    test_texel(w, words, z_least, z_greatest, found);
+                    test_texel(w, words, z_min, z_max, found);
                 }
 #endif
             }
@@ -95,7 +95,7 @@ bool trace_any(trace_ray r, inout vec3 optical_depth)
     vec3 answers[1] = vec3[1](optical_depth);
     traverse_rays(rays_, answers);
     optical_depth = answers[0];
-    return least(optical_depth) >= OPTICAL_DEPTH_BLACK;
+    return min_component(optical_depth) >= OPTICAL_DEPTH_BLACK;
 }
 
 #else

@@ -37,7 +37,7 @@ layout(location = 0) flat in uvec4 primitive_in[];
 
 #if PRIMITIVE_KIND == 0
 layout(location = 0) flat out vec4 plane;  // slopes of the depth along u and v; u, v of a point of it
-layout(location = 1) flat out vec3 depths; // of that point; least, greatest
+layout(location = 1) flat out vec3 depths; // of that point; minimum, maximum
 #ifdef HAS_CUTOUT
 layout(location = 3) out vec2 barycentrics;
 #endif
@@ -112,9 +112,9 @@ vec2 slopes_of(vec3 normal, int axis, int u, int v)
 // The normal may have any length; a needle's may be zero: it counts as steep everywhere.
 uint face_of_triangle(vec3 normal)
 {
-    float most = greatest(abs(normal));
+    float maximum = max_component(abs(normal));
     uint closed = (primitive_in[0].w & DRAWN_CLOSED) != 0u ? FACE_CLOSED : 0u;
-    return most > 0.0 ? face_of(normalize(normal / most)) | closed : FACE_NEEDLE | closed;
+    return maximum > 0.0 ? face_of(normalize(normal / maximum)) | closed : FACE_NEEDLE | closed;
 }
 #endif
 
@@ -139,9 +139,9 @@ void main()
 #ifdef ALL_IMAGES
     // A triangle whose area rounds to zero may have one in the rasteriser, and a body needs its whole surface.
     uint face = face_of_triangle(normal);
-    int most = axis_of(lean);
+    int dominant = axis_of(lean);
 #else
-    if (!(greatest(lean) > 0.0)) // no area
+    if (!(max_component(lean) > 0.0)) // no area
         return;
 #endif
     for (int axis = 0; axis < 3; axis++) {
@@ -160,7 +160,7 @@ void main()
             depths = depths_;
             primitive = primitive_in[0];
 #ifdef ALL_IMAGES
-            primitive.w = face | (axis == most ? FACE_MOST : 0u);
+            primitive.w = face | (axis == dominant ? FACE_DOMINANT : 0u);
 #endif
 #ifdef HAS_CUTOUT
             barycentrics = vec2(i == second ? 1.0 : 0.0, i == 3 - second ? 1.0 : 0.0);

@@ -7,10 +7,10 @@
 uint face_of(vec3 unit)
 {
     vec3 lean = abs(unit);
-    float most = greatest(lean);
+    float maximum = max_component(lean);
     uint face = pack_unit_24(unit);
     for (int axis = 0; axis < 3; axis++) {
-        face |= lean[axis] >= AXES_OVERLAP * most ? FACE_LEANS << axis : 0u;
+        face |= lean[axis] >= AXES_OVERLAP * maximum ? FACE_LEANS << axis : 0u;
         face |= lean[axis] < FACE_STEEP_BELOW ? FACE_STEEP << axis : 0u;
     }
     return face;

@@ -9,7 +9,7 @@ uniform uint texels_along; // a side of the images
 
 #if PRIMITIVE_KIND == 0
 layout(location = 0) flat in vec4 plane;  // slopes of the depth along u and v; u, v of a point of it
-layout(location = 1) flat in vec3 depths; // of that point; least, greatest
+layout(location = 1) flat in vec3 depths; // of that point; minimum, maximum
 #ifdef HAS_CUTOUT
 layout(location = 3) in vec2 barycentrics;
 #endif

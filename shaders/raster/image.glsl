@@ -7,9 +7,9 @@ uniform float overlap; // AXES_OVERLAP, or 1: one image per triangle
 // `lean`: absolute values of its normal's components.
 bool is_in_image(vec3 lean, int axis)
 {
-    float most = max(lean.x, max(lean.y, lean.z));
+    float maximum = max(lean.x, max(lean.y, lean.z));
     if (overlap < 1.0)
-        return lean[axis] >= overlap * most;
-    int first = lean.x == most ? 0 : lean.y == most ? 1 : 2; // of equal ones
+        return lean[axis] >= overlap * maximum;
+    int first = lean.x == maximum ? 0 : lean.y == maximum ? 1 : 2; // of equal ones
     return axis == first;
 }

@@ -22,7 +22,7 @@
 #define FACE_NORMAL_MASK 0x00ffffffu /* octahedral 2 x 12 bit snorm, world space, to the outside */
 #define FACE_LEANS 0x01000000u       /* shifted by the axis: it leans to it as much as to any, or almost */
 #define FACE_STEEP 0x08000000u       /* shifted by the axis: the normal's component is below FACE_STEEP_BELOW */
-#define FACE_MOST 0x40000000u        /* this is the image of its dominant axis, of equal ones the first */
+#define FACE_DOMINANT 0x40000000u    /* this is the image of its dominant axis, of equal ones the first */
 #define FACE_CLOSED 0x80000000u      /* DRAWN_CLOSED */
 #define FACE_NEEDLE 0x3f000000u      /* it has no normal: steep, and leaning to every axis */
 #define FACE_STEEP_BELOW 0.5f        /* of a unit normal */

@@ -30,7 +30,7 @@ void add_lobe(uint j, path p, surface s, float NoV, float distance_, vec3 direct
 {
     lobe chosen = lobe_choose(s, NoV, direction, choice, u);
     vec3 carried = weight * chosen.weight;
-    float survival = greatest(carried) / ROULETTE;
+    float survival = max_component(carried) / ROULETTE;
     if (!(choice < survival)) // also if it is NaN
         return;
     uint roughness = uint(max(path_roughness(p), s.roughness) * 65535.0 + 0.5);

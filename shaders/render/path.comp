@@ -82,7 +82,7 @@ bool ask_for_environment(eye_hit e, uint place, uint seed, uint index)
     vec2 u = sequence_pair(seed, numbers_of(SEQUENCE_PATH_ENVIRONMENT), index);
     vec3 direction = environment_choose(e.s.normal, u, probability);
     vec3 arriving = vec3(0.0), sent = bsdf_evaluate(e.b, e.s, direction, found);
-    if (probability > 0.0 && greatest(sent) > 0.0)
+    if (probability > 0.0 && max_component(sent) > 0.0)
         arriving = e.weight * sent * environment_radiance(direction) / probability;
     if (!e.last)
         arriving *= heuristic(probability, found);
@@ -102,7 +102,7 @@ void meet_lights(inout path p, eye_hit e, vec3 origin, vec3 direction, float fou
             continue;
         if (found > 0.0 && e.all_lights > 0.0)
             share = heuristic(found, probability * light_estimate(i, e.receiver) / e.all_lights);
-        float size = share * greatest(l.colour.rgb);
+        float size = share * max_component(l.colour.rgb);
         if (!(size > 0.0)) // no contribution, and a divisor
             continue;
         sum += size;
@@ -171,7 +171,7 @@ void go_on(eye_hit e, uint seed, uint index, bool asked, float choice)
     vec3 carried = e.weight * chosen.weight;
     float survival = 1.0, end = sequence_number(seed, numbers_of(SEQUENCE_PATH_END), index);
     if ((p.flags & PATH_BOUNCES_MASK) >= ROULETTE_BOUNCES)
-        survival = min(greatest(carried), 1.0);
+        survival = min(max_component(carried), 1.0);
     if (!(end < survival)) // also if it is NaN
         return;
     bool of_glass = chosen.lobe == BSDF_REFRACTED || e.b.leaves && chosen.lobe == BSDF_MIRRORED;
@@ -245,7 +245,7 @@ void main()
         sent += e.s.unlit ? e.s.base : e.s.emission;
     float passes = 0.0; // share of its shadow rays that are for light behind it
     vec3 through = e.s.base * (e.s.transmission * (1.0 - e.s.metallic));
-    if (!straight && !e.s.unlit && (e.p.flags & PATH_ASKED) != 0u && greatest(through) > 0.0)
+    if (!straight && !e.s.unlit && (e.p.flags & PATH_ASKED) != 0u && max_component(through) > 0.0)
         passes = asks ? 0.5 : 1.0; // one or the other
     vec3 weight = e.weight;
     if (sequence_number(seed, numbers_of(SEQUENCE_PATH_PASS), index) < passes) {

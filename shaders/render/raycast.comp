@@ -63,7 +63,7 @@ void main()
         through = vec3(1.0 - layer_opacity);
     }
     vec3 rest = weight * through;
-    bool goes_on = greatest(rest) >= PATH_WEIGHT_MIN; // not if it is NaN
+    bool goes_on = max_component(rest) >= PATH_WEIGHT_MIN; // not if it is NaN
     if (goes_on)
         add_child(j, p, s, h.distance, direction, rest, true);
     radiance[k] = vec4(weight * opacity * (s.unlit ? s.base : lit(p, s, direction, h.distance)),

@@ -70,7 +70,7 @@ uint path_sample(path p)
 
 vec3 off_surface(surface s, float distance_, vec3 side)
 {
-    return s.position + PATH_OFFSET * max(greatest(abs(s.position)), distance_) * side;
+    return s.position + PATH_OFFSET * max(max_component(abs(s.position)), distance_) * side;
 }
 
 uint child_count = 0u;
@@ -116,7 +116,7 @@ void no_shadow_ray(uint place)
 // `arriving`: the radiance at the eye if the ray reaches the light. False if it is zero.
 bool add_shadow_ray(uint place, path p, vec3 origin, vec3 direction, float distance_, vec3 arriving)
 {
-    if (!(greatest(arriving) > 0.0)) { // also if it is NaN
+    if (!(max_component(arriving) > 0.0)) { // also if it is NaN
         no_shadow_ray(place);
         return false;
     }

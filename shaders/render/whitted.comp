@@ -20,7 +20,7 @@ uniform uint first_ray, batch_rays; // a light each
 void add_child_of_weight(uint j, path parent, surface s, float distance_, vec3 direction, vec3 weight, bool straight)
 {
     // not `<`: NaN ends here as well
-    if (greatest(weight) >= PATH_WEIGHT_MIN)
+    if (max_component(weight) >= PATH_WEIGHT_MIN)
         add_child(j, parent, s, distance_, direction, weight, straight);
 }
 

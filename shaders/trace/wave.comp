@@ -104,7 +104,7 @@ void store_visibility(uint ray_index, vec3 optical_depth)
 {
     vec3 left = transmittance_left(optical_depth);
     if (ray_index < ray_count)
-        visibilities[ray_index] = packUnorm4x8(vec4(left, greatest(left) > 0.0 ? 1.0 : 0.0));
+        visibilities[ray_index] = packUnorm4x8(vec4(left, max_component(left) > 0.0 ? 1.0 : 0.0));
 }
 
 #else

@@ -129,7 +129,7 @@ static double counts_of(const struct bsdf_answer *chosen, double cells[CELLS_ACR
 }
 
 struct densities {
-    double greatest_z, sum_off, greatest_weight_off;
+    double max_z, sum_off, max_weight_off;
     size_t cases;
     char where[200];
 };
@@ -161,15 +161,15 @@ static void hold_against_its_density(struct bsdf_probe *probe, const struct bsdf
     for (int i = 0; i < CELLS_ACROSS * CELLS_ABOUT; i++) {
         /* Poisson's deviation, and 1 % for the quadrature where a lobe is steep across a cell's edge */
         double z = fabs(counts[i] - expected[i]) / (sqrt(expected[i] + 1.0) + 0.01 * expected[i]);
-        if (z > densities->greatest_z) {
-            densities->greatest_z = z;
+        if (z > densities->max_z) {
+            densities->max_z = z;
             snprintf(densities->where, sizeof(densities->where), "%s", case_name(c, ward));
         }
     }
     for (int i = 0; i < NUMBERS; i++)
         if (chosen[i].probability > 0.0f && chosen[i].sent > 0.0f)
-            densities->greatest_weight_off =
-                fmax(densities->greatest_weight_off,
+            densities->max_weight_off =
+                fmax(densities->max_weight_off,
                      fabs((double)(chosen[i].weight * chosen[i].probability / chosen[i].sent) - 1.0));
 }
 
@@ -179,16 +179,16 @@ TEST(sampled_directions_follow_the_stated_density)
     struct densities densities = {0};
     walk(*state, roughnesses, COUNT(roughnesses), hold_against_its_density, &densities);
     print_message("%zu cases: of a cell's count %.1f deviations off at most (%s), of all %.1e\n", densities.cases,
-                  densities.greatest_z, densities.where, densities.sum_off);
+                  densities.max_z, densities.where, densities.sum_off);
     /* 432 cases of 128 cells: independent counts are beyond 5.5 deviations once in 500 such tests */
-    assert_true(densities.greatest_z < 5.5);
-    assert_true(densities.greatest_weight_off < 1e-4); /* roundings */
+    assert_true(densities.max_z < 5.5);
+    assert_true(densities.max_weight_off < 1e-4); /* roundings */
 }
 
 /* ---- how much comes back ---- */
 
 struct albedos {
-    double greatest, least_metal[2], least_scattering[2], least_glass[2];
+    double max, min_metal[2], min_scattering[2], min_glass[2];
     char where[200];
 };
 
@@ -204,27 +204,27 @@ static void sum_up(struct bsdf_probe *probe, const struct bsdf_case *c, bool war
         squares += weight * weight;
     }
     double albedo = sum / NUMBERS, error = sqrt(fmax(squares / NUMBERS - albedo * albedo, 0.0) / NUMBERS);
-    if (albedo - 5.0 * error > albedos->greatest) {
-        albedos->greatest = albedo - 5.0 * error;
+    if (albedo - 5.0 * error > albedos->max) {
+        albedos->max = albedo - 5.0 * error;
         snprintf(albedos->where, sizeof(albedos->where), "%s", case_name(c, ward));
     }
-    double *least = c->metallic == 1.0f       ? albedos->least_metal
-                    : c->transmission == 0.0f ? albedos->least_scattering
-                                              : albedos->least_glass;
-    least[ward] = fmin(least[ward], albedo);
+    double *minimum = c->metallic == 1.0f       ? albedos->min_metal
+                      : c->transmission == 0.0f ? albedos->min_scattering
+                                                : albedos->min_glass;
+    minimum[ward] = fmin(minimum[ward], albedo);
 }
 
 TEST(no_white_material_sends_on_more_than_arrives)
 {
     static const float roughnesses[] = {0.0f, 0.05f, 0.15f, 0.3f, 0.5f, 0.7f, 0.85f, 1.0f};
-    struct albedos albedos = {.least_metal = {1, 1}, .least_scattering = {1, 1}, .least_glass = {1, 1}};
+    struct albedos albedos = {.min_metal = {1, 1}, .min_scattering = {1, 1}, .min_glass = {1, 1}};
     walk(*state, roughnesses, COUNT(roughnesses), sum_up, &albedos);
-    print_message("greatest albedo, less five standard errors: %.5f (%s)\n", albedos.greatest, albedos.where);
+    print_message("maximum albedo, less five standard errors: %.5f (%s)\n", albedos.max, albedos.where);
     for (int ward = 0; ward < 2; ward++)
-        print_message("%s, least albedo of a white metal %.3f, of what scatters %.3f, of glass %.3f\n",
-                      ward ? "ward" : "ggx", albedos.least_metal[ward], albedos.least_scattering[ward],
-                      albedos.least_glass[ward]);
-    assert_true(albedos.greatest <= 1.0 + 1e-4); /* sums of 2^15 weights in double, each rounded to 6e-8 */
+        print_message("%s, minimum albedo of a white metal %.3f, of what scatters %.3f, of glass %.3f\n",
+                      ward ? "ward" : "ggx", albedos.min_metal[ward], albedos.min_scattering[ward],
+                      albedos.min_glass[ward]);
+    assert_true(albedos.max <= 1.0 + 1e-4); /* sums of 2^15 weights in double, each rounded to 6e-8 */
 }
 
 /* ---- light and view in each other's place ---- */

@@ -43,21 +43,21 @@ static double pixel_share(double x, double size, double confusion)
 static void expect_profile(struct fixture *fixture, const char *name, double step, double confusion)
 {
     struct frame_result result = fixture_render(fixture);
-    double squares = 0.0, greatest = 0.0;
+    double squares = 0.0, maximum = 0.0;
     for (uint32_t x = 0; x < WIDTH; x++) {
         double mean = 0.0, expected = pixel_share((x - WIDTH / 2.0) * step, step, confusion);
         for (uint32_t y = 0; y < HEIGHT; y++)
             mean += (double)fixture_pixel(&result, x, y)[0] / HEIGHT;
-        greatest = fmax(greatest, fabs(mean - expected));
+        maximum = fmax(maximum, fabs(mean - expected));
         squares += (mean - expected) * (mean - expected) / WIDTH;
     }
     print_message("%s: blur of %.1f pixels, off by %.1e at most, %.1e rms\n", name, 2.0 * confusion / step,
-                  greatest, sqrt(squares));
+                  maximum, sqrt(squares));
     frame_result_finish(&result);
     assert_true(2.0 * confusion / step > 8.0); /* else nothing is shown */
     /* 32 x 256 samples of a probability of a half differ by 1/2 / sqrt(8192) = 0.0055 if they are independent; of
      * 64 columns the worst is 2.7 of those off. Being stratified they are better. */
-    assert_true(greatest < 0.015);
+    assert_true(maximum < 0.015);
 }
 
 ALL_TESTS(fixture_setup, fixture_teardown)

@@ -201,7 +201,7 @@ TEST(where_all_is_smooth_the_mean_is_whitteds_picture)
 /* ---- against itself ---- */
 
 /* Bias and slope of the error over 4, 16, 64 and 256 samples, against 4096 of the reference's. */
-static void expect_convergence(struct fixture *fixture, const char *name, double slope_most)
+static void expect_convergence(struct fixture *fixture, const char *name, double slope_max)
 {
     enum { STEPS = 4, SEEDS = 4, TRUTH_SAMPLES = 4096 };
     double truth[PIXELS], found[PIXELS], x_sum = 0.0, y_sum = 0.0, xx = 0.0, xy = 0.0;
@@ -233,41 +233,41 @@ static void expect_convergence(struct fixture *fixture, const char *name, double
     }
     double slope = (STEPS * xy - x_sum * y_sum) / (STEPS * xx - x_sum * x_sum);
     print_message("%-14s slope %.2f\n", name, slope);
-    assert_true(slope <= slope_most);
+    assert_true(slope <= slope_max);
 }
 
 /* Independent samples have a slope of -0.5. 1024 errors know a deviation to 2 %, more where the errors of a few
  * pixels are large; twice that makes 0.03 of the slope. */
-#define SLOPE_MOST (-0.47)
+#define SLOPE_MAX (-0.47)
 
 TEST(soft_shadows_converge_without_bias)
 {
     begin(*state, a_soft_shadow);
-    expect_convergence(*state, "soft shadow", SLOPE_MOST);
+    expect_convergence(*state, "soft shadow", SLOPE_MAX);
 }
 
 TEST(glossy_reflections_converge_without_bias)
 {
     begin(*state, gloss);
-    expect_convergence(*state, "gloss", SLOPE_MOST);
+    expect_convergence(*state, "gloss", SLOPE_MAX);
 }
 
 TEST(frosted_glass_converges_without_bias)
 {
     begin(*state, frosted_glass);
-    expect_convergence(*state, "frosted glass", SLOPE_MOST);
+    expect_convergence(*state, "frosted glass", SLOPE_MAX);
 }
 
 TEST(depth_of_field_converges_without_bias)
 {
     begin(*state, out_of_focus);
-    expect_convergence(*state, "out of focus", SLOPE_MOST);
+    expect_convergence(*state, "out of focus", SLOPE_MAX);
 }
 
 TEST(motion_blur_converges_without_bias)
 {
     begin(*state, in_motion);
-    expect_convergence(*state, "in motion", SLOPE_MOST);
+    expect_convergence(*state, "in motion", SLOPE_MAX);
 }
 
 /* A ball that glows before nothing, a pixel within its way: the share of the time that it is there. */

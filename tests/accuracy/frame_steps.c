@@ -54,7 +54,7 @@ static void a_crowded_scene(struct fixture *fixture)
 }
 
 struct counts {
-    uint64_t rays, most, steps;
+    uint64_t rays, max, steps;
 };
 
 /* The request, by that tracer, which is slow or as it is. */
@@ -78,7 +78,7 @@ static struct frame_result render_counted(struct fixture *fixture, unsigned trac
         rays_of_step = waves_of_step = 0;
         progress = frame_step(fixture->renderer, &result, &error);
         assert_true(waves_of_step <= 1);
-        counts->most = rays_of_step > counts->most ? rays_of_step : counts->most;
+        counts->max = rays_of_step > counts->max ? rays_of_step : counts->max;
         counts->rays += rays_of_step;
         counts->steps++;
     } while (progress == FRAME_MORE);
@@ -95,10 +95,10 @@ static void expect_short_steps(struct fixture *fixture, unsigned tracer, const c
     struct frame_result got = render_counted(fixture, tracer, true, &parts);
     print_message("%s: %llu rays in %llu steps, where they are slow in %llu, %llu in one at most\n", name,
                   (unsigned long long)whole.rays, (unsigned long long)whole.steps, (unsigned long long)parts.steps,
-                  (unsigned long long)parts.most);
+                  (unsigned long long)parts.max);
     assert_true(parts.rays == whole.rays);
     if (fixture->device->facts.software)
-        assert_true(parts.most <= STEP_RAYS_MAX);
+        assert_true(parts.max <= STEP_RAYS_MAX);
     assert_true(got.size_bytes == expected.size_bytes);
     assert_memory_equal(got.pixels, expected.pixels, expected.size_bytes);
     frame_result_finish(&expected);

@@ -282,7 +282,7 @@ TEST(openness_is_that_of_the_integrator_ao)
         fixture->request.ao_falloff = (float)falloff;
         fixture->request.integrator = INTEGRATOR_AO;
         struct frame_result result = render(fixture, BIT(LAYER_BEAUTY) | BIT(LAYER_AO));
-        double least = 1, sum = 0;
+        double minimum = 1, sum = 0;
         uint32_t compared = 0;
         for (uint32_t i = 0; i < 32 * 32; i++) {
             const float *open_share = pixel_of(&result, LAYER_AO, i % 32, i / 32);
@@ -291,12 +291,12 @@ TEST(openness_is_that_of_the_integrator_ao)
                 continue;
             for (int k = 0; k < 3; k++)
                 assert_near(open_share[k], shown[k], 1e-6); /* the same rays, summed in another order */
-            least = fmin(least, (double)open_share[0]);
+            minimum = fmin(minimum, (double)open_share[0]);
             sum += (double)open_share[0];
             compared++;
         }
         assert_true(compared > 300 && compared < 32 * 32);
-        assert_true(least < 0.5 && sum / compared > 0.7); /* dark below the ball, open elsewhere */
+        assert_true(minimum < 0.5 && sum / compared > 0.7); /* dark below the ball, open elsewhere */
         frame_result_finish(&result);
     }
     fixture->request.integrator = INTEGRATOR_WHITTED;

@@ -123,7 +123,7 @@ TEST(no_material_outshines_a_furnace)
     static const struct kind {
         const char *name;
         float metallic, transmission, ior;
-        double least; /* of the picture's mean: what single scattering of facets leaves, at the roughest */
+        double min; /* of the picture's mean: what single scattering of facets leaves, at the roughest */
     } kinds[] = {
         {"metal", 1.0f, 0.0f, 1.5f, 0.7}, {"varnish", 0.0f, 0.0f, 1.5f, 0.85}, {"glass", 0.0f, 1.0f, 1.5f, 0.5}};
     for (int ward = 0; ward < 2; ward++)
@@ -139,22 +139,22 @@ TEST(no_material_outshines_a_furnace)
                 fixture->request.brdf = ward ? BRDF_WARD : BRDF_GGX;
                 fixture->request.samples = 64;
                 struct frame_result result = fixture_render(fixture);
-                double values[64], least = 1.0;
+                double values[64], minimum = 1.0;
                 for (uint32_t i = 0; i < 64; i++) { /* blocks of 4 x 4 pixels */
                     values[i] = 0.0;
                     for (uint32_t p = 0; p < 16; p++)
                         values[i] +=
                             (double)fixture_pixel(&result, i % 8 * 4 + p % 4, i / 8 * 4 + p / 4)[1] / 16.0;
-                    least = fmin(least, values[i]);
+                    minimum = fmin(minimum, values[i]);
                     /* 1024 samples of which none is above 2 (Ward's, see facets.glsl) or 1: five of their errors
                      */
                     assert_true(values[i] < 1.0 + 5.0 / sqrt(1024.0));
                 }
                 struct mean mean = mean_of(values, 64);
-                print_message("%s, %s, roughness %.1f: mean %.4f, least %.3f\n", ward ? "ward" : "ggx",
-                              kinds[k].name, 0.2 * step, mean.value, least);
+                print_message("%s, %s, roughness %.1f: mean %.4f, minimum %.3f\n", ward ? "ward" : "ggx",
+                              kinds[k].name, 0.2 * step, mean.value, minimum);
                 assert_true(mean.value < 1.0 + 1e-3);
-                assert_true(mean.value > kinds[k].least);
+                assert_true(mean.value > kinds[k].min);
                 frame_result_finish(&result);
             }
 }

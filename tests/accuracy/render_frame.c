@@ -342,7 +342,7 @@ TEST(the_automatic_camera_sees_all_corners_and_wastes_little)
     const float lower[3] = {-3.0f, 1.0f, 2.0f}, upper[3] = {5.0f, 2.0f, 40.0f}, aspect = 1.5f;
     struct frame_camera camera;
     frame_camera_auto(&camera, lower, upper, aspect);
-    float greatest = 0.0f;
+    float maximum = 0.0f;
     for (int corner = 0; corner < 8; corner++) {
         float d[3], v[3];
         for (int i = 0; i < 3; i++)
@@ -352,10 +352,10 @@ TEST(the_automatic_camera_sees_all_corners_and_wastes_little)
                    d[2] * camera.world_from_view[8 + i];
         assert_true(v[2] < 0.0f);
         float tangent = tanf(camera.fov_y / 2.0f);
-        greatest = fmaxf(greatest, fmaxf(fabsf(v[0] / -v[2]) / (tangent * aspect), fabsf(v[1] / -v[2]) / tangent));
+        maximum = fmaxf(maximum, fmaxf(fabsf(v[0] / -v[2]) / (tangent * aspect), fabsf(v[1] / -v[2]) / tangent));
     }
-    assert_true(greatest <= 1.0f);
-    assert_true(greatest > 0.6f);
+    assert_true(maximum <= 1.0f);
+    assert_true(maximum > 0.6f);
     const float eye[3] = {1, 2, 3}, up[3] = {0, 0, 2};
     assert_false(frame_camera_look_at(&camera, eye, eye, up, 1.0f));
     const float above[3] = {1, 2, 9};

@@ -19,7 +19,7 @@ struct agreement {
     uint64_t rays;
     double agreed;       /* the share of them for which both have a hit, or none */
     double median_cells; /* of differences of distances, in the worst wave */
-    double most_cells;   /* what 99 in 100 of them are below, in the worst wave */
+    double max_cells;    /* what 99 in 100 of them are below, in the worst wave */
 };
 
 /* What is asked of each: of pictures in dB, and of rays. */
@@ -44,28 +44,28 @@ static const struct row {
      5,
      0,
      {38, 34, 0},
-     {.agreed = 0.99, .median_cells = 0.25, .most_cells = INFINITY}},
+     {.agreed = 0.99, .median_cells = 0.25, .max_cells = INFINITY}},
     {"abuffer, dda",
      TRACER_ABUFFER,
      {.abuffer = {.search = ABUFFER_SEARCH_DDA}},
      3,
      ABUFFER_SEARCH_DDA,
      {36, 34, 34},
-     {.agreed = 0.995, .median_cells = 0.1, .most_cells = 0.01}},
+     {.agreed = 0.995, .median_cells = 0.1, .max_cells = 0.01}},
     {"abuffer, linear3",
      TRACER_ABUFFER,
      {.abuffer = {.search = ABUFFER_SEARCH_DDA}},
      3,
      ABUFFER_SEARCH_LINEAR3,
      {36, 34, 34},
-     {.agreed = 0.995, .median_cells = 0.1, .most_cells = 0.1}},
+     {.agreed = 0.995, .median_cells = 0.1, .max_cells = 0.1}},
     {"abuffer, linear1",
      TRACER_ABUFFER,
      {.abuffer = {.search = ABUFFER_SEARCH_DDA}},
      3,
      ABUFFER_SEARCH_LINEAR1,
      {36, 34, 34},
-     {.agreed = 0.995, .median_cells = 0.1, .most_cells = 0.1}},
+     {.agreed = 0.995, .median_cells = 0.1, .max_cells = 0.1}},
 };
 enum { ROWS = sizeof(rows) / sizeof(rows[0]) };
 
@@ -295,18 +295,18 @@ static struct agreement compare_rays(struct fixture *fixture, const struct row *
         uint64_t apart = wave->only_first + wave->only_second;
         double agreed = 1 - (double)apart / (double)(wave->rays ? wave->rays : 1);
         double median_cells = (double)wave->distance_median * cells,
-               most_cells = (double)wave->distance_p99 * cells;
+               max_cells = (double)wave->distance_p99 * cells;
         printf("%s, wave %u, %s: %llu rays, %.3f %% agree on hit or miss, median distance %.4f cells, 99 %% below "
                "%.3f\n",
                name, wave->wave, kinds[wave->kind], (unsigned long long)wave->rays, 100 * agreed, median_cells,
-               most_cells);
+               max_cells);
         if (wave->kind != RAY_SECONDARY)
             continue;
         found.rays += wave->rays;
         disagreed += apart;
         if (wave->both_hit > 100) {
             found.median_cells = fmax(found.median_cells, median_cells);
-            found.most_cells = fmax(found.most_cells, most_cells);
+            found.max_cells = fmax(found.max_cells, max_cells);
             compared++;
         }
     }
@@ -324,8 +324,8 @@ static void expect_agreement(const char *name, const struct agreement *found, co
                  (unsigned long long)found->rays);
     if (!(found->median_cells <= asked->median_cells))
         fail_msg("%s: the median distance is %.3f cells off", name, found->median_cells);
-    if (!(found->most_cells <= asked->most_cells))
-        fail_msg("%s: one in 100 distances is %.3f cells off", name, found->most_cells);
+    if (!(found->max_cells <= asked->max_cells))
+        fail_msg("%s: one in 100 distances is %.3f cells off", name, found->max_cells);
 }
 
 /* Shapes as mirrors and as glass, two of each so that there is something to be mirrored. */

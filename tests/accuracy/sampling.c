@@ -112,18 +112,18 @@ TEST(samples_are_as_dense_as_the_filter_is_high)
             fixture->request.primary = traced ? PRIMARY_TRACE : PRIMARY_RASTER;
             fixture->request.samples = 256;
             struct frame_result result = fixture_render(fixture);
-            double greatest = 0.0;
+            double maximum = 0.0;
             for (uint32_t x = 0; x < 16; x++) {
                 double mean = 0.0;
                 for (uint32_t y = 0; y < 64; y++)
                     mean += (double)fixture_pixel(&result, x, y)[0] / 64.0;
-                greatest = fmax(greatest, fabs(mean - edge_value(filter, (double)x - 7.5)));
+                maximum = fmax(maximum, fabs(mean - edge_value(filter, (double)x - 7.5)));
             }
             print_message("filter %d, %s: off by %.1e at most\n", (int)filter, traced ? "traced" : "rasterised",
-                          greatest);
+                          maximum);
             /* One in each 256th by x: a mean is off by a sample at most; the table's places by 1/1000 of a pixel,
              * which is as dense as the filter is high, twice a sample at most. */
-            assert_true(greatest <= 1.0 / 256.0 + 0.002);
+            assert_true(maximum <= 1.0 / 256.0 + 0.002);
             frame_result_finish(&result);
         }
 }
@@ -300,7 +300,7 @@ TEST(a_picture_that_has_all_its_samples_is_handed_out_again)
     a_mixture(fixture);
     fixture->request.accumulate = true;
     fixture->request.samples = 3;
-    fixture->request.samples_most = 5;
+    fixture->request.samples_max = 5;
     static const uint32_t held[] = {3, 5, 5};
     static const uint64_t traced[] = {3, 2, 0};
     struct frame_result results[3];
@@ -310,7 +310,7 @@ TEST(a_picture_that_has_all_its_samples_is_handed_out_again)
         assert_int_equal(results[i].primary_rays, traced[i] * WIDTH * HEIGHT);
     }
     assert_same_floats(&results[1], &results[2]);
-    fixture->request.samples_most = 4; /* more are there than are wanted now */
+    fixture->request.samples_max = 4; /* more are there than are wanted now */
     struct frame_result fewer = fixture_render(fixture);
     assert_int_equal(fewer.samples, 5);
     assert_same_floats(&results[1], &fewer);

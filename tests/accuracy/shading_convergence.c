@@ -111,11 +111,11 @@ static struct estimate estimate(struct fixture *fixture, uint32_t samples, doubl
     return found;
 }
 
-/* The slope of log deviation over log samples, 4 .. most. */
-static void expect_convergence(struct fixture *fixture, const char *name, double expected, uint32_t most)
+/* The slope of log deviation over log samples, 4 .. maximum. */
+static void expect_convergence(struct fixture *fixture, const char *name, double expected, uint32_t maximum)
 {
     double x_sum = 0.0, y_sum = 0.0, xx = 0.0, xy = 0.0, steps = 0.0;
-    for (uint32_t samples = 4; samples <= most; samples *= 4) {
+    for (uint32_t samples = 4; samples <= maximum; samples *= 4) {
         struct estimate found = estimate(fixture, samples, expected);
         double x = log(samples), y = log(found.deviation);
         print_message("%-10s %4u samples: off by %+.1e in the mean (standard error %.1e), %.1e each\n", name,

@@ -34,7 +34,7 @@ struct quadrature {
  * rings and sectors are off by four times as much, so the finer sum by a third of the difference. */
 #define HORIZON_ERROR 1e-3
 #define MIDPOINT_ERROR(fine_albedo, coarse_albedo) (fabs((fine_albedo) - (coarse_albedo)) / 3.0)
-/* A light's highlight is blurred by a least roughness and a refracted ray is not. Where Fresnel's curve is bent
+/* A light's highlight is blurred by a minimum roughness and a refracted ray is not. Where Fresnel's curve is bent
  * up, at worst about 80 degrees for an index of 10, its mean over the highlight is 4e-4 above what was kept back.
  */
 #define HIGHLIGHT_BLUR 5e-4
@@ -113,9 +113,8 @@ static double fresnel(double cosine, double n)
 
 /* What is looked for in one walk over the grid; each is printed, so that its margin is seen. */
 struct extremes {
-    double greatest, mistake, lambert, mirror, parts;
-    double least_dielectric,
-        least_metal; /* of what a light sends: facets that shadow each other are not followed */
+    double max, mistake, lambert, mirror, parts;
+    double min_dielectric, min_metal; /* of what a light sends: facets that shadow each other are not followed */
     char where[160];
 };
 
@@ -125,8 +124,8 @@ static void look_at(const struct probe_case *c, double albedo, double mistake, c
     double total = albedo + (double)split->refracted;
     if (!(total <= 1.0 + HORIZON_ERROR + mistake + HIGHLIGHT_BLUR))
         fail_msg("%s: %.6f of the light is reflected or refracted", case_name(c), total);
-    if (total > extremes->greatest) {
-        extremes->greatest = total;
+    if (total > extremes->max) {
+        extremes->max = total;
         snprintf(extremes->where, sizeof(extremes->where), "%s", case_name(c));
     }
     extremes->mistake = fmax(extremes->mistake, mistake);
@@ -137,9 +136,9 @@ static void look_at(const struct probe_case *c, double albedo, double mistake, c
     if (c->metallic == 0.0f && c->transmission == 1.0f && c->roughness == 0.0f && c->view[2] >= 0.25f)
         extremes->mirror = fmax(extremes->mirror, fabs(albedo - fresnel((double)c->view[2], (double)c->ior)));
     if (c->metallic == 0.0f && c->transmission == 0.0f && c->ior <= 1.5f)
-        extremes->least_dielectric = fmin(extremes->least_dielectric, albedo);
+        extremes->min_dielectric = fmin(extremes->min_dielectric, albedo);
     if (c->metallic == 1.0f)
-        extremes->least_metal = fmin(extremes->least_metal, albedo);
+        extremes->min_metal = fmin(extremes->min_metal, albedo);
 }
 
 static void walk_grid(struct probe *probe, struct extremes *extremes)
@@ -161,16 +160,16 @@ static void walk_grid(struct probe *probe, struct extremes *extremes)
 
 TEST(no_material_gives_out_more_than_arrives)
 {
-    struct extremes extremes = {.least_dielectric = 1.0, .least_metal = 1.0};
+    struct extremes extremes = {.min_dielectric = 1.0, .min_metal = 1.0};
     walk_grid(*state, &extremes);
-    print_message("greatest albedo %.6f (%s); quadrature off by %.1e at most\n", extremes.greatest, extremes.where,
+    print_message("maximum albedo %.6f (%s); quadrature off by %.1e at most\n", extremes.max, extremes.where,
                   extremes.mistake);
     print_message("a light in glass is mirrored within %.1e of Fresnel; Lambert within %.1e; parts of all that "
                   "surrounds within %.1e\n",
                   extremes.mirror, extremes.lambert, extremes.parts);
     print_message(
         "of what a light sends a white dielectric reflects at least %.3f (index up to 1.5), a white metal %.3f\n",
-        extremes.least_dielectric, extremes.least_metal);
+        extremes.min_dielectric, extremes.min_metal);
     assert_true(extremes.mistake < 2e-3); /* else the tolerance above would let faults through */
     assert_true(extremes.lambert < HORIZON_ERROR);
     assert_true(extremes.mirror < 1e-3); /* the highlight is blurred: alpha^2 = 4e-5 times Fresnel's curvature */
@@ -247,7 +246,7 @@ TEST(mirrored_scattered_and_refracted_never_add_up_to_more_than_one)
     static struct probe_split splits[CASES];
     static float ignored[CASES];
     const float up[1][4] = {{0.0f, 0.0f, 1.0f, 0.0f}};
-    double greatest = 0.0;
+    double maximum = 0.0;
     for (int i = 0; i < CASES; i++) {
         cases[i] = random_case();
         cases[i].inside = next_random() < 0.5 ? 1.0f : 0.0f;
@@ -257,10 +256,10 @@ TEST(mirrored_scattered_and_refracted_never_add_up_to_more_than_one)
         const struct probe_split *split = &splits[i];
         assert_true(split->mirror >= 0.0f && split->scattered >= 0.0f && split->refracted >= 0.0f);
         assert_true(split->mirror_ray >= 0.0f && split->mirror_ray <= 1.0f);
-        greatest = fmax(greatest, (double)split->mirror + (double)split->scattered + (double)split->refracted);
+        maximum = fmax(maximum, (double)split->mirror + (double)split->scattered + (double)split->refracted);
     }
-    print_message("greatest sum of the parts %.9f\n", greatest);
-    assert_true(greatest <= 1.0 + 1e-6); /* three roundings */
+    print_message("maximum sum of the parts %.9f\n", maximum);
+    assert_true(maximum <= 1.0 + 1e-6); /* three roundings */
 }
 
 /* One smooth boundary under one angle, from outside or (inside = 1) from the dense side; what it mirrors. */

@@ -89,7 +89,7 @@ static struct scene_material *furnace_material(struct fixture *fixture, float ro
 }
 
 struct range {
-    double least, greatest;
+    double min, max;
     uint64_t secondary_rays;
 };
 
@@ -101,8 +101,8 @@ static struct range picture_range(struct fixture *fixture)
         for (uint32_t x = 0; x < result.width; x++)
             for (int channel = 0; channel < 4; channel++) {
                 double value = (double)fixture_pixel(&result, x, y)[channel];
-                range.least = fmin(range.least, value);
-                range.greatest = fmax(range.greatest, value);
+                range.min = fmin(range.min, value);
+                range.max = fmax(range.max, value);
             }
     range.secondary_rays = result.secondary_rays;
     frame_result_finish(&result);
@@ -127,21 +127,20 @@ TEST(white_surfaces_vanish)
     };
     struct fixture *fixture = *state;
     for (size_t i = 0; i < sizeof(materials) / sizeof(materials[0]); i++) {
-        double least = 1.0, greatest = 1.0;
+        double minimum = 1.0, maximum = 1.0;
         for (enum shape shape = 0; shape < SHAPE_COUNT; shape++) {
             struct scene_material *material =
                 furnace_material(fixture, materials[i].roughness, materials[i].metallic, materials[i].ior);
             add_shape(fixture, shape, material->base.id);
             struct range range = picture_range(fixture);
-            least = fmin(least, range.least);
-            greatest = fmax(greatest, range.greatest);
-            if (!(range.least >= 1.0 - weight_min - FLOAT_ERROR && range.greatest <= 1.0 + FLOAT_ERROR))
-                fail_msg("%s, %s: %.6f .. %.6f", materials[i].name, shape_names[shape], range.least,
-                         range.greatest);
+            minimum = fmin(minimum, range.min);
+            maximum = fmax(maximum, range.max);
+            if (!(range.min >= 1.0 - weight_min - FLOAT_ERROR && range.max <= 1.0 + FLOAT_ERROR))
+                fail_msg("%s, %s: %.6f .. %.6f", materials[i].name, shape_names[shape], range.min, range.max);
             if (materials[i].roughness == 0.0f)
                 assert_true(range.secondary_rays > 0); /* there was something to be mirrored */
         }
-        print_message("%-18s 1 %+.1e %+.1e\n", materials[i].name, least - 1.0, greatest - 1.0);
+        print_message("%-18s 1 %+.1e %+.1e\n", materials[i].name, minimum - 1.0, maximum - 1.0);
     }
 }
 
@@ -153,7 +152,7 @@ TEST(grey_surfaces_do_not_vanish)
         for (int i = 0; i < 3; i++)
             material->base_colour[i] = 0.5f;
         add_shape(fixture, shape, material->base.id);
-        assert_near(picture_range(fixture).least, 0.5, FLOAT_ERROR); /* so the others were there, too */
+        assert_near(picture_range(fixture).min, 0.5, FLOAT_ERROR); /* so the others were there, too */
     }
 }
 
@@ -198,22 +197,22 @@ TEST(a_clear_glass_sphere_lacks_only_what_is_cut_off)
         add_shape(fixture, SHAPE_SPHERE, glass->base.id);
         fixture->request.depth = depth;
         struct frame_result result = fixture_render(fixture);
-        double least = 1.0, worst = 0.0;
+        double minimum = 1.0, worst = 0.0;
         for (uint32_t y = 0; y < result.height; y++)
             for (uint32_t x = 0; x < result.width; x++) {
                 double sine = incidence(&fixture->request, x, y), expected = glass_pixel(sine, depth);
                 double nearer = glass_pixel(sine - SINE_ERROR, depth),
                        farther = glass_pixel(sine + SINE_ERROR, depth);
                 double value = (double)fixture_pixel(&result, x, y)[0];
-                least = fmin(least, value);
+                minimum = fmin(minimum, value);
                 worst = fmax(worst, fabs(value - expected));
                 /* and a path that carries weight_min but for that may end or not */
                 assert_true(value >= fmin(expected, fmin(nearer, farther)) - weight_min);
                 assert_true(value <= fmax(expected, fmax(nearer, farther)) + weight_min);
             }
         frame_result_finish(&result);
-        print_message("glass sphere, depth %2u: 1 %+.4f, from what is expected off by %.1e\n", depth, least - 1.0,
-                      worst);
+        print_message("glass sphere, depth %2u: 1 %+.4f, from what is expected off by %.1e\n", depth,
+                      minimum - 1.0, worst);
     }
 }
 
@@ -227,9 +226,9 @@ TEST(clear_glass_vanishes_whatever_its_shape)
         add_shape(fixture, shape, glass->base.id);
         fixture->request.depth = 32;
         struct range range = picture_range(fixture);
-        print_message("glass, %-34s 1 %+.4f %+.1e\n", shape_names[shape], range.least - 1.0, range.greatest - 1.0);
-        assert_true(range.greatest <= 1.0 + FLOAT_ERROR);
-        assert_true(range.least >= 1.0 - 33.0 * weight_min);
+        print_message("glass, %-34s 1 %+.4f %+.1e\n", shape_names[shape], range.min - 1.0, range.max - 1.0);
+        assert_true(range.max <= 1.0 + FLOAT_ERROR);
+        assert_true(range.min >= 1.0 - 33.0 * weight_min);
     }
 }
 
@@ -238,7 +237,7 @@ TEST(clear_glass_vanishes_whatever_its_shape)
 TEST(tilted_normals_lose_no_light)
 {
     struct fixture *fixture = *state;
-    double least = 1.0, greatest = 1.0;
+    double minimum = 1.0, maximum = 1.0;
     for (int transmission = 0; transmission < 2; transmission++)
         for (int tilt = -75; tilt <= 75; tilt += 15)
             for (int slant = 0; slant < 360; slant += 15) {
@@ -252,11 +251,11 @@ TEST(tilted_normals_lose_no_light)
                 fixture->request.width = fixture->request.height = 3;
                 fixture_look(fixture, (float)(5.0 * sin(from)), 0.0f, (float)(5.0 * cos(from)), 0.01f);
                 struct range range = picture_range(fixture);
-                least = fmin(least, range.least);
-                greatest = fmax(greatest, range.greatest);
-                if (!(range.least >= 1.0 - 3.0 * weight_min && range.greatest <= 1.0 + FLOAT_ERROR))
+                minimum = fmin(minimum, range.min);
+                maximum = fmax(maximum, range.max);
+                if (!(range.min >= 1.0 - 3.0 * weight_min && range.max <= 1.0 + FLOAT_ERROR))
                     fail_msg("transmission %d, tilt %d, slant %d: %.6f .. %.6f", transmission, tilt, slant,
-                             range.least, range.greatest);
+                             range.min, range.max);
             }
-    print_message("tilted normals: 1 %+.1e %+.1e\n", least - 1.0, greatest - 1.0);
+    print_message("tilted normals: 1 %+.1e %+.1e\n", minimum - 1.0, maximum - 1.0);
 }

@@ -227,7 +227,7 @@ TEST(bvh_and_brute_force_agree_on_every_ray_of_every_wave)
         const struct wave_comparison *figures = &result.comparisons[i];
         /* Both run the same intersection code on the same numbers: not a ray may differ, on edges neither. */
         assert_int_equal(disagreeing(figures), 0);
-        assert_true(figures->distance_greatest == 0.0f && figures->normal_greatest == 0.0f);
+        assert_true(figures->distance_max == 0.0f && figures->normal_max == 0.0f);
     }
     frame_result_finish(&result);
 }
@@ -333,7 +333,7 @@ TEST(wrong_distances_count_as_far_and_their_size_is_reported)
     assert_int_equal(figures->far, figures->both_hit);
     /* half a bin, and rounding of a float */
     assert_near(figures->distance_median, 0.25, 0.25 / 256 + 1e-5);
-    assert_near(figures->distance_greatest, 0.25, 1e-5);
+    assert_near(figures->distance_max, 0.25, 1e-5);
     frame_result_finish(&result);
 }
 
@@ -347,7 +347,7 @@ TEST(imprecise_distances_are_hits_with_an_error)
     assert_int_equal(disagreeing(figures), 0);
     /* 1/65536 is 256 steps of a float's last place: half of one step, and half a bin */
     assert_near(figures->relative_median * 65536.0f, 1.0, 1.0 / 512 + 1.0 / 256);
-    assert_true(figures->distance_greatest > 0.0f && figures->distance_greatest < 1e-4f);
+    assert_true(figures->distance_max > 0.0f && figures->distance_max < 1e-4f);
     frame_result_finish(&result);
     fixture->request.compare_far_share = 1e-6f; /* to whom that is too far */
     result = fixture_render(fixture);

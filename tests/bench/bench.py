@@ -10,7 +10,7 @@ warm-up, with the median absolute deviation beside it; what is compared takes tu
 Writes FOLDER/bench.txt and FOLDER/bench.json (FOLDER: out); a run that writes into out, other than with --tiny, also brings
 the sections of its parts in tests/bench/README.md up to date. Parts that an earlier run on the same device and commit left
 there stay. The JSON: {"format": 1, "environment": {date, commit, processor, processors, device, vendor, version, software,
-embree, and on a GPU copy_bytes_per_s}, "parts": {NAME: {..}}}. Figures are objects of median, deviation, least, greatest
+embree, and on a GPU copy_bytes_per_s}, "parts": {NAME: {..}}}. Figures are objects of median, deviation, min, max
 and runs; keys end with their unit. tracers, reach, family, pixels and rays have `results`, one for each call of
 bench_tracers: title, triangles, spheres, instances, width, height, rays_per_pixel, `structures` (tracer, form, build,
 memory_bytes) and `waves` (kind, order, any, rays, `measures`: tracer, form, way, time, rays_per_s, agreement).

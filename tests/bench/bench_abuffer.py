@@ -34,8 +34,8 @@ WAVES = ("reflection", "refraction", "shadow", "occlusion")
 # At least so many times as fast as dda, whole frames; the paper's frames a second: 69, 157, 210 and 11, 19, 27.
 FASTER = {"whitted": {"linear3": 2.3, "linear1": 3.0}, "ao": {"linear3": 1.7, "linear1": 2.5}}
 PAPER_FASTER = {"whitted": {"linear3": 157 / 69, "linear1": 210 / 69}, "ao": {"linear3": 19 / 11, "linear1": 27 / 11}}
-EVEN_MOST, BUILD_MOST, OCTREE_LEAST, BESIDE_BVH = 1.1, 2, 6, 1.5
-PSNR_LEAST = {"whitted": 36, "ao": 34}
+EVEN_MAX, BUILD_MAX, OCTREE_MIN, BESIDE_BVH = 1.1, 2, 6, 1.5
+PSNR_MIN = {"whitted": 36, "ao": 34}
 # ms of construction, tracing, others: figure 1(b) and the upper picture of figure 8, by the paper's tracer and its octree.
 PAPER_TABLE1 = [("Figure 1(b)", (13.2, 11.6, 2.7), (42.8, 84.6, 3.8)), ("Figure 8 top", (10.8, 8.7, 2.6), (35.6, 79.6, 2.9))]
 
@@ -189,17 +189,17 @@ def search_rows(results):
 
 def even_row(result):
     each = [ns_a_ray(form)[0] for form in result["forms"]]
-    most, least = (choose(each, key=lambda f: f["median"]) for choose in (max, min))
-    share = most["median"] / least["median"]
-    deviation = share * (most["deviation"] / most["median"] + least["deviation"] / least["median"])
-    return row("abuffer, time an ambient-occlusion ray, greatest / least", EVEN_MOST, {**once(share), "deviation": deviation},
+    maximum, minimum = (choose(each, key=lambda f: f["median"]) for choose in (max, min))
+    share = maximum["median"] / minimum["median"]
+    deviation = share * (maximum["deviation"] / maximum["median"] + minimum["deviation"] / minimum["median"])
+    return row("abuffer, time an ambient-occlusion ray, maximum / minimum", EVEN_MAX, {**once(share), "deviation": deviation},
                f"{result['title']}, {len(each)} numbers of rays a pixel", at_most=True)
 
 
 def build_rows(results):
     for result in results:
         for texels, ours, plain in build_pairs(result):
-            yield row("abuffer, build / a pass for depths alone", BUILD_MOST,
+            yield row("abuffer, build / a pass for depths alone", BUILD_MAX,
                       paired_ratio(ours["build_ns"], plain["build_ns"]), f"{result['title']}, {texels} texels",
                       at_most=True)
 
@@ -207,7 +207,7 @@ def build_rows(results):
 def octree_rows(rows):
     for row_ in rows:
         for kind in OCTREES:
-            yield row(f"{kind}, build and trace / abuffer", OCTREE_LEAST,
+            yield row(f"{kind}, build and trace / abuffer", OCTREE_MIN,
                       paired_ratio(costs(row_, kind)["both"], costs(row_, "abuffer")["both"]),
                       f"{row_['title']}, {row_['how']}; the paper has 5.1 and 5.9")
 
@@ -224,10 +224,10 @@ def beside_rows(results):
 def accuracy_rows(searches, accuracy):
     for result in searches:
         if integrator_of(result) == "whitted":
-            yield row("abuffer whitted by dda: PSNR of the picture, dB", PSNR_LEAST["whitted"],
+            yield row("abuffer whitted by dda: PSNR of the picture, dB", PSNR_MIN["whitted"],
                       once(psnr(by_search(result["frames"])["dda"])), f"{result['title']}, {result['how']}, depth 3")
     for result in accuracy:
-        yield row("abuffer ao by dda: PSNR of the picture, dB", PSNR_LEAST["ao"], once(psnr(result["forms"][0])),
+        yield row("abuffer ao by dda: PSNR of the picture, dB", PSNR_MIN["ao"], once(psnr(result["forms"][0])),
                   f"{result['title']}, {ACCURATE_RAYS} rays")
 
 

@@ -34,8 +34,8 @@ static json_t *figure_json(const struct bench_runs *runs)
 {
     const struct bench_figure figure = bench_figure(runs);
     return json_pack("{s:f, s:f, s:f, s:f, s:i}", "median", figure.median_ns / 1e6, "deviation",
-                     figure.deviation_ns / 1e6, "least", figure.least_ns / 1e6, "greatest",
-                     figure.greatest_ns / 1e6, "runs", (int)runs->count);
+                     figure.deviation_ns / 1e6, "min", figure.min_ns / 1e6, "max", figure.max_ns / 1e6, "runs",
+                     (int)runs->count);
 }
 
 static void add_sphere(struct test_edits *edits, uint32_t id, uint32_t steps)
@@ -287,14 +287,14 @@ static json_t *bench_refit(struct gpu_device *device, uint32_t triangles, uint32
     return result;
 }
 
-static uint32_t number(int argc, char **argv, int i, uint32_t usual, uint32_t most)
+static uint32_t number(int argc, char **argv, int i, uint32_t usual, uint32_t maximum)
 {
     if (i >= argc)
         return usual;
     long value = strtol(argv[i], NULL, 10);
-    if (value >= 1 && value <= (long)most)
+    if (value >= 1 && value <= (long)maximum)
         return (uint32_t)value;
-    fprintf(stderr, "bench changes: %s: between 1 and %u\n", argv[i], most);
+    fprintf(stderr, "bench changes: %s: between 1 and %u\n", argv[i], maximum);
     exit(2);
 }
 

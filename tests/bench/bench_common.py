@@ -75,10 +75,10 @@ def shared(bench, names, left_out):
 
 
 def figure(values):
-    """Median and median absolute deviation, least and greatest."""
+    """Median and median absolute deviation, minimum and maximum."""
     middle = statistics.median(values)
-    return {"median": middle, "deviation": statistics.median(abs(v - middle) for v in values), "least": min(values),
-            "greatest": max(values), "runs": len(values)}
+    return {"median": middle, "deviation": statistics.median(abs(v - middle) for v in values), "min": min(values),
+            "max": max(values), "runs": len(values)}
 
 
 def paired_ratio(numerators, denominators):

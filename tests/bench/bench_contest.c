@@ -131,10 +131,10 @@ static void nudge(struct ray *out, const struct ray *ray, uint32_t which, float 
 {
     const float *d = ray->direction_t_max;
     float side[3], above[3], by = (which & 1 ? -1.0f : 1.0f) * NUDGE;
-    int least =
+    int minimum =
         fabsf(d[0]) < fabsf(d[1]) ? (fabsf(d[0]) < fabsf(d[2]) ? 0 : 2) : (fabsf(d[1]) < fabsf(d[2]) ? 1 : 2);
-    int a = (least + 1) % 3, b = (least + 2) % 3;
-    side[least] = 0;
+    int a = (minimum + 1) % 3, b = (minimum + 2) % 3;
+    side[minimum] = 0;
     side[a] = -d[b];
     side[b] = d[a];
     above[0] = d[1] * side[2] - d[2] * side[1];

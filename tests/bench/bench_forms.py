@@ -49,4 +49,4 @@ def milliseconds(runs_ns):
 
 
 def once(value):
-    return {"median": value, "deviation": 0, "least": value, "greatest": value, "runs": 1}
+    return {"median": value, "deviation": 0, "min": value, "max": value, "runs": 1}

@@ -166,14 +166,14 @@ struct waves {
 static bool begin(struct waves *waves, struct bench_forms *bench, struct error *error)
 {
     const uint32_t pixels = bench->width * bench->height;
-    const size_t most = (size_t)pixels * bench->rays_each;
+    const size_t maximum = (size_t)pixels * bench->rays_each;
     *waves = (struct waves){.bench = bench,
                             .contest = {.device = bench->device, .scene = &bench->scene, .runs = bench->runs},
                             .reference = {.name = "reference", .tracer = TRACER_REFERENCE},
                             .camera_rays = malloc(pixels * sizeof(*waves->camera_rays)),
                             .camera_hits = malloc(pixels * sizeof(*waves->camera_hits)),
-                            .truth = malloc(most * sizeof(*waves->truth)),
-                            .hits = malloc(most * sizeof(*waves->hits))};
+                            .truth = malloc(maximum * sizeof(*waves->truth)),
+                            .hits = malloc(maximum * sizeof(*waves->hits))};
     if (!waves->camera_rays || !waves->camera_hits || !waves->truth || !waves->hits)
         return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a picture's rays");
     uint64_t time_ns;
@@ -230,8 +230,9 @@ static bool run_wave(struct waves *waves, enum bench_wave_kind kind, struct erro
 {
     const struct bench_forms *bench = waves->bench;
     const uint32_t pixels = bench->width * bench->height;
-    const size_t most = (size_t)pixels * (kind == BENCH_PRIMARY || kind == BENCH_SHUFFLED ? 1 : bench->rays_each);
-    struct ray *rays = malloc(most * sizeof(*rays));
+    const size_t maximum =
+        (size_t)pixels * (kind == BENCH_PRIMARY || kind == BENCH_SHUFFLED ? 1 : bench->rays_each);
+    struct ray *rays = malloc(maximum * sizeof(*rays));
     struct bench_wave wave = {.kind = kind, .rays = rays, .ray_count = pixels};
     if (!rays)
         return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for rays");

@@ -34,10 +34,10 @@ CLOSED = [("bunny 69K", "common/bunny-69k.obj"), ("dragon 47K", "common/dragon-4
 LARGE = [("dragon 101K", "gltf/chinesedragon.gltf"), ("dragon 202K", "common/dragon-202k.glb"),
          ("bust 269K", "ldc/igea-bust.glb"), ("dragon 871K", "common/dragon-871k.glb")]
 FAMILY = (8000, 19000, 44000, 104000, 300000)
-LARGE_LEAST = 100000
+LARGE_MIN = 100000
 PEEL_WANTED = {8: 6, 48: 40}
-GROWTH_MOST, FAMILY_MOST, BESIDE_BVH = 1.4, 2, 1
-DISAGREE_MOST, ERROR_MOST, PSNR_LEAST = 1, 0.25, 38
+GROWTH_MAX, FAMILY_MAX, BESIDE_BVH = 1.4, 2, 1
+DISAGREE_MAX, ERROR_MAX, PSNR_MIN = 1, 0.25, 38
 ACCURACY_WAVES = ("reflection", "bounce")
 # Pictures: as the model is, and as in the paper; what mirrors multiply is shown, and nothing is wanted of it.
 PICTURES = {"as it is, depth 8": ["--depth", 8], "mirrors, depth 1": ["--mirrors"],
@@ -205,24 +205,24 @@ def depth_rows(results):
 
 def growth_row(results):
     worst = max(results, key=lambda r: ratio(at(r, 1024), at(r, 512), "reflection")["median"])
-    return row("ldc reflection, time at 1024 / at 512", GROWTH_MOST, ratio(at(worst, 1024), at(worst, 512), "reflection"),
+    return row("ldc reflection, time at 1024 / at 512", GROWTH_MAX, ratio(at(worst, 1024), at(worst, 512), "reflection"),
                f"worst of {len(results)} scenes: {worst['title']}; the paper 1.9 to 3.0", at_most=True)
 
 
 def family_row(results):
     each = [figure([ns / wave_of(at(r, USUAL), "reflection")["rays"] for ns in wave_of(at(r, USUAL), "reflection")["hits_ns"]])
             for r in results]
-    most, least = (choose(each, key=lambda f: f["median"]) for choose in (max, min))
-    share = most["median"] / least["median"]
-    deviation = share * (most["deviation"] / most["median"] + least["deviation"] / least["median"])
-    return row("ldc reflection, greatest time a ray / least over triangles", FAMILY_MOST,
+    maximum, minimum = (choose(each, key=lambda f: f["median"]) for choose in (max, min))
+    share = maximum["median"] / minimum["median"]
+    deviation = share * (maximum["deviation"] / maximum["median"] + minimum["deviation"] / minimum["median"])
+    return row("ldc reflection, maximum time a ray / minimum over triangles", FAMILY_MAX,
                {**once(share), "deviation": deviation}, f"{results[0]['triangles']} to {results[-1]['triangles']} triangles",
                at_most=True)
 
 
 def beside_rows(results):
     for result in results:
-        if result["triangles"] >= LARGE_LEAST:
+        if result["triangles"] >= LARGE_MIN:
             yield row(f"ldc at {USUAL}, reflection, rate / bvh", BESIDE_BVH,
                       ratio(form_of(result, "bvh"), at(result, USUAL), "reflection"),
                       f"{result['title']}, {result['triangles']} triangles")
@@ -235,14 +235,14 @@ def accuracy_rows(scenes, pictures):
         for kind in ACCURACY_WAVES:
             wave = wave_of(form, kind)
             error = error_cells(form, wave)
-            yield row(f"ldc at {USUAL}, {kind}: % of the rays that only one hits with", DISAGREE_MOST,
+            yield row(f"ldc at {USUAL}, {kind}: % of the rays that only one hits with", DISAGREE_MAX,
                       once(100 * (1 - wave["agree"])), result["title"], at_most=True)
             if error is not None:
-                yield row(f"ldc at {USUAL}, {kind}: median distance error, cells", ERROR_MOST, once(error),
+                yield row(f"ldc at {USUAL}, {kind}: median distance error, cells", ERROR_MAX, once(error),
                           result["title"], at_most=True)
     for result in (r for r in pictures if r["how"] in WANTED_PICTURES):
         psnr = at(result, USUAL)["psnr_db"]
-        yield row(f"ldc at {USUAL}: PSNR of the picture, dB", PSNR_LEAST, once(99.0 if psnr is None else psnr),
+        yield row(f"ldc at {USUAL}: PSNR of the picture, dB", PSNR_MIN, once(99.0 if psnr is None else psnr),
                   f"{result['title']}, {result['how']}")
 
 

@@ -38,12 +38,12 @@ bool bench_parse_vector(const char *text, float v[3])
     return sscanf(text, "%f,%f,%f%c", &v[0], &v[1], &v[2], &rest) == 3;
 }
 
-bool bench_parse_number(const char *text, uint32_t least, uint32_t most, uint32_t *value)
+bool bench_parse_number(const char *text, uint32_t minimum, uint32_t maximum, uint32_t *value)
 {
     char *end;
     unsigned long parsed = strtoul(text, &end, 10);
     *value = (uint32_t)parsed;
-    return *text >= '0' && *text <= '9' && *end == '\0' && parsed >= least && parsed <= most;
+    return *text >= '0' && *text <= '9' && *end == '\0' && parsed >= minimum && parsed <= maximum;
 }
 
 bool bench_parse_word(const char *text, const char *const words[], uint32_t count, uint32_t *found)

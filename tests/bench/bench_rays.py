@@ -63,7 +63,7 @@ def join_times(into, more):
     """Adds the runs of a figure of `bench tracers` to those of another."""
     into["runs_ns"] += more["runs_ns"]
     joined = figure(into["runs_ns"])
-    into.update({f"{key}_ns": joined[key] for key in ("median", "deviation", "least", "greatest")})
+    into.update({f"{key}_ns": joined[key] for key in ("median", "deviation", "min", "max")})
 
 
 def join(into, more):

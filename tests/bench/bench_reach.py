@@ -7,8 +7,8 @@ from bench_rays import CURVES, exponents, find_measure, find_wave, times_as_fast
 
 RAY_BYTES = 32
 SMALL, MIDDLE = 40000, 150000
-TOGETHER_LEAST = 0.95
-EXPONENT_MOST = 0.2
+TOGETHER_MIN = 0.95
+EXPONENT_MAX = 0.2
 
 
 def row(line, wanted, measured, where, at_most=False):
@@ -44,14 +44,14 @@ def together_rows(results):
             if ratio and (worst is None or ratio["median"] < worst[0]["median"]):
                 worst = ratio, result["title"], wave["order"]
         if worst:
-            yield row(f"bvh {kind} ({worst[2]}), as many together as chosen / 1 ray", TOGETHER_LEAST, worst[0],
+            yield row(f"bvh {kind} ({worst[2]}), as many together as chosen / 1 ray", TOGETHER_MIN, worst[0],
                       f"worst of {len(results)} scenes: {worst[1]}")
 
 
 def exponent_rows(results):
     for (kind, name), (slope, error) in exponents(results).items():
         if name == CURVES[0][0]:
-            yield row(f"bvh {kind}, exponent of time against triangles", EXPONENT_MOST,
+            yield row(f"bvh {kind}, exponent of time against triangles", EXPONENT_MAX,
                       {"median": slope, "deviation": error},
                       f"{results[0]['triangles']} to {results[-1]['triangles']} triangles, ± standard error", at_most=True)
 

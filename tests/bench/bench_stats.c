@@ -31,8 +31,8 @@ struct bench_figure bench_figure(const struct bench_runs *runs)
     for (unsigned i = 0; i < runs->count; i++)
         values[i] = (double)runs->times_ns[i];
     figure.median_ns = median(values, runs->count);
-    figure.least_ns = values[0];
-    figure.greatest_ns = values[runs->count - 1];
+    figure.min_ns = values[0];
+    figure.max_ns = values[runs->count - 1];
     for (unsigned i = 0; i < runs->count; i++)
         values[i] = fabs(values[i] - figure.median_ns);
     figure.deviation_ns = median(values, runs->count);

@@ -13,7 +13,7 @@ struct bench_runs {
 };
 
 struct bench_figure {
-    double median_ns, least_ns, greatest_ns;
+    double median_ns, min_ns, max_ns;
     double deviation_ns; /* median of the absolute deviations from the median */
 };
 

@@ -5,8 +5,8 @@
  *
  * The first frame of a form builds the structure and compiles programs: how long its begin took, which is one step
  * too, and its longest step is told apart from those of the second. Prints JSON: {"width", "height", "samples",
- * "software", "forms": [{tracer, integrator, first_begin_ns, first_greatest_ns, begin_ns, whole, frame_ns, cpu_ns,
- * "stages": [{stage, count, median_ns, p99_ns, greatest_ns, cpu_greatest_ns}], "first_stages": [the same]}]}; the
+ * "software", "forms": [{tracer, integrator, first_begin_ns, first_max_ns, begin_ns, whole, frame_ns, cpu_ns,
+ * "stages": [{stage, count, median_ns, p99_ns, max_ns, cpu_max_ns}], "first_stages": [the same]}]}; the
  * stage "all" has the steps of all. A frame is left after so many seconds (30): whole says whether it was
  * finished. cpu: of all threads together, which other work on the machine makes hardly longer. */
 #include "tests/bench/bench.h"
@@ -87,22 +87,21 @@ static int by_size(const void *a, const void *b)
 static void describe_stage(json_t *list, const struct steps *steps, int stage)
 {
     struct steps own = {0};
-    uint64_t cpu_greatest_ns = 0;
+    uint64_t cpu_max_ns = 0;
     for (size_t i = 0; i < steps->count; i++) {
         const struct step *step = &steps->list[i];
         if (stage != ALL && step->stage != stage)
             continue;
-        cpu_greatest_ns = step->cpu_ns > cpu_greatest_ns ? step->cpu_ns : cpu_greatest_ns;
+        cpu_max_ns = step->cpu_ns > cpu_max_ns ? step->cpu_ns : cpu_max_ns;
         if (!add_step(&own, step))
             break;
     }
     if (own.count > 0)
-        json_array_append_new(list,
-                              json_pack("{s:s, s:I, s:I, s:I, s:I, s:I}", "stage", stage_names[stage], "count",
-                                        (json_int_t)own.count, "median_ns", (json_int_t)own.list[own.count / 2].ns,
-                                        "p99_ns", (json_int_t)own.list[own.count - 1 - own.count / 100].ns,
-                                        "greatest_ns", (json_int_t)own.list[own.count - 1].ns, "cpu_greatest_ns",
-                                        (json_int_t)cpu_greatest_ns));
+        json_array_append_new(
+            list, json_pack("{s:s, s:I, s:I, s:I, s:I, s:I}", "stage", stage_names[stage], "count",
+                            (json_int_t)own.count, "median_ns", (json_int_t)own.list[own.count / 2].ns, "p99_ns",
+                            (json_int_t)own.list[own.count - 1 - own.count / 100].ns, "max_ns",
+                            (json_int_t)own.list[own.count - 1].ns, "cpu_max_ns", (json_int_t)cpu_max_ns));
     free(own.list);
 }
 
@@ -170,9 +169,9 @@ static bool measure(struct bench *bench, unsigned tracer, enum integrator_kind i
                               json_pack("{s:s, s:s, s:I, s:I, s:I, s:b, s:I, s:I, s:o, s:o}", "tracer",
                                         tracer_impl_by_number(tracer)->name, "integrator",
                                         integrator_names[integrator], "first_begin_ns", (json_int_t)first_begin_ns,
-                                        "first_greatest_ns", (json_int_t)first.list[first.count - 1].ns,
-                                        "begin_ns", (json_int_t)begin_ns, "whole", whole, "frame_ns", frame_ns,
-                                        "cpu_ns", cpu_ns, "stages", stages, "first_stages", first_stages));
+                                        "first_max_ns", (json_int_t)first.list[first.count - 1].ns, "begin_ns",
+                                        (json_int_t)begin_ns, "whole", whole, "frame_ns", frame_ns, "cpu_ns",
+                                        cpu_ns, "stages", stages, "first_stages", first_stages));
     }
     free(first.list);
     free(steps.list);

@@ -42,11 +42,11 @@ def measure_cancels(bench):
 def steps_row(result, form):
     stages = {stage["stage"]: stage for stage in form["stages"]}
     whole = stages.pop("all")
-    longest = max(stages.values(), key=lambda stage: stage["greatest_ns"])
+    longest = max(stages.values(), key=lambda stage: stage["max_ns"])
     return (f"{result['title']}, {form['tracer']}, {form['integrator']}", f"{form['frame_ns'] / 1e6:.0f}" + "+" * (not form["whole"]),
-            whole["count"], *(f"{whole[key] / 1e6:.1f}" for key in ("median_ns", "p99_ns", "greatest_ns")), longest["stage"],
-            f"{whole['cpu_greatest_ns'] / 1e6:.1f}", f"{form['first_begin_ns'] / 1e6:.0f}",
-            f"{form['first_greatest_ns'] / 1e6:.0f}")
+            whole["count"], *(f"{whole[key] / 1e6:.1f}" for key in ("median_ns", "p99_ns", "max_ns")), longest["stage"],
+            f"{whole['cpu_max_ns'] / 1e6:.1f}", f"{form['first_begin_ns'] / 1e6:.0f}",
+            f"{form['first_max_ns'] / 1e6:.0f}")
 
 
 def show(data):
@@ -54,7 +54,7 @@ def show(data):
             ("", "ms", "", "ms", "ms", "ms", "", "cores, ms", "begin, ms", "of it, ms")]
     size = data["results"][0]
     cancels = [(f"{row['title']}, {row['tracer']}, path", row["ms"]["runs"], f"{row['ms']['median']:.1f}",
-                f"{row['ms']['greatest']:.1f}") for row in data["cancels"]]
+                f"{row['ms']['max']:.1f}") for row in data["cancels"]]
     return (f"{size['width']}x{size['height']}, {size['samples']} sample; +: left before its end. A cancel is to be served within "
             f"{SERVED_MS} ms.\nThe first frame builds the structure and compiles.\n\n" +
             table(head, [steps_row(result, form) for result in data["results"] for form in result["forms"]]) + "\n\n" +

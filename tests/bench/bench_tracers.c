@@ -146,8 +146,7 @@ static json_t *figure_json(const struct bench_runs *runs)
     for (unsigned i = 0; i < runs->count; i++)
         json_array_append_new(all, json_integer((json_int_t)runs->times_ns[i]));
     return json_pack("{s:f, s:f, s:f, s:f, s:o}", "median_ns", figure.median_ns, "deviation_ns",
-                     figure.deviation_ns, "least_ns", figure.least_ns, "greatest_ns", figure.greatest_ns,
-                     "runs_ns", all);
+                     figure.deviation_ns, "min_ns", figure.min_ns, "max_ns", figure.max_ns, "runs_ns", all);
 }
 
 static json_t *structures_json(const struct bench *bench)

@@ -390,12 +390,12 @@ static bool measure(json_t *result, struct fl_error *error)
 
 /* ---- command line ------------------------------------------------------------------------------------ */
 
-static bool parse_number(const char *text, uint32_t least, uint32_t most, uint32_t *value)
+static bool parse_number(const char *text, uint32_t minimum, uint32_t maximum, uint32_t *value)
 {
     char *end;
     const unsigned long parsed = strtoul(text, &end, 10);
     *value = (uint32_t)parsed;
-    return *text >= '0' && *text <= '9' && *end == '\0' && parsed >= least && parsed <= most;
+    return *text >= '0' && *text <= '9' && *end == '\0' && parsed >= minimum && parsed <= maximum;
 }
 
 static bool parse_real(const char *text, double *value)

@@ -8,7 +8,7 @@
              by how much a sleep of the client ends late, which is what the machine does to each that waits; and `way`, the
              medians of its parts
   processor  ms of a processor that the daemon's network thread takes a frame
-  viewers    count, frames of each in seconds, and slowest, the share of the mean that who got least has
+  viewers    count, frames of each in seconds, and slowest, the share of the mean that the slowest viewer has
   links      kbit_per_s, encoding, frames_per_s, render_per_s (what its rendering allows of those asked for), mbit_per_s, delay_ms of the
              first and of the last third (from the camera sent to the frame decoded, beyond its stages), scale (of the
              width, the mean); or `why` there is no such link here. Nothing is wanted of the narrower one: it is full also
@@ -30,15 +30,15 @@ from bench_client import Daemon
 from bench_common import Failure, bundled, command, figure, say, shared, significant, table, with_spread
 from bench_reach import row
 
-SHARE_LEAST = 0.95
-P50_MS_MOST, P99_MS_MOST = 2, 6
-PROCESSOR_MS_MOST = 0.3
-SLOWEST_LEAST = 0.5
+SHARE_MIN = 0.95
+P50_MS_MAX, P99_MS_MAX = 2, 6
+PROCESSOR_MS_MAX = 0.3
+SLOWEST_MIN = 0.5
 LINK_KBIT_PER_S, LINK_DELAY_MS, LINK_BUFFER_KIB = 10000, 50, 128
 NARROW_KBIT_PER_S = 1000
 LINK_FRAMES_PER_S = 20
 LINK_ASKED_PER_S = 30
-DELAY_GROWS_MOST = 1.1
+DELAY_GROWS_MAX = 1.1
 NO_LINK, NO_ENCODER = 125, "no encoder"
 SMALL = ["--size", "320x240"]
 WAY = ("to the daemon", "taken up", "rendered, beyond its stages", "to the encoder", "queue", "to the client")
@@ -185,8 +185,8 @@ def over_a_link(bench, model, kbit_per_s, seconds, encoding):
 
 def rendering_allows(frames):
     """Frames a second. One that is rendered faster than was asked for does not make up for one that took longer."""
-    least_ns = 1e9 / LINK_ASKED_PER_S
-    return (len(frames) - 1) * 1e9 / sum(max(stage_ns(frame, "render"), least_ns) for frame in frames[1:])
+    min_ns = 1e9 / LINK_ASKED_PER_S
+    return (len(frames) - 1) * 1e9 / sum(max(stage_ns(frame, "render"), min_ns) for frame in frames[1:])
 
 
 def measure_link(bench, model, kbit_per_s, encoding):
@@ -215,27 +215,27 @@ def single(value):
 
 def wanted(data):
     worst = min(data["rates"], key=lambda r: r["share"]["median"])
-    rows = [row("frames of a view / what its slowest stage alone allows", SHARE_LEAST, worst["share"],
+    rows = [row("frames of a view / what its slowest stage alone allows", SHARE_MIN, worst["share"],
                 f"worst of {len(data['rates'])}: {worst['scene']}, {worst['encoding']}")]
     for latency in data["latencies"]:
         stages = "its stages" if latency["stages"] == 1 else "twice its stages"
-        for key, most in (("p50_ms", P50_MS_MOST), ("p99_ms", P99_MS_MOST)):
+        for key, maximum in (("p50_ms", P50_MS_MAX), ("p99_ms", P99_MS_MAX)):
             late = significant(latency["late_p99_ms"]["median"])
-            rows.append(row(f"camera to decoded frame {latency['where']}, {key[1:3]} %, ms beyond {stages}", most, latency[key],
+            rows.append(row(f"camera to decoded frame {latency['where']}, {key[1:3]} %, ms beyond {stages}", maximum, latency[key],
                             f"{latency['frames']} frames; a sleep ends late by {late}, 99 %", at_most=True))
-    rows.append(row("the daemon's own processor time a frame, ms", PROCESSOR_MS_MOST, data["processor"],
+    rows.append(row("the daemon's own processor time a frame, ms", PROCESSOR_MS_MAX, data["processor"],
                     "its network thread", at_most=True))
     viewers = data["viewers"]
-    rows.append(row(f"{viewers['count']} viewers, frames of the slowest / mean", SLOWEST_LEAST, single(viewers["slowest"]),
+    rows.append(row(f"{viewers['count']} viewers, frames of the slowest / mean", SLOWEST_MIN, single(viewers["slowest"]),
                     f"{sum(viewers['frames'])} frames in {viewers['seconds']} s"))
     for link in data["links"]:
         if "why" in link or link["kbit_per_s"] != LINK_KBIT_PER_S:
             continue
         reach = min(LINK_FRAMES_PER_S, link["render_per_s"])
         rows.append(row(f"10 Mbit/s, 50 ms, {link['encoding']}: frames a second / the lesser of 20 and what rendering allows",
-                        SHARE_LEAST, single(link["frames_per_s"] / reach), f"{significant(link['frames_per_s'])} a second"))
+                        SHARE_MIN, single(link["frames_per_s"] / reach), f"{significant(link['frames_per_s'])} a second"))
         first, last = link["delay_ms"]
-        rows.append(row(f"10 Mbit/s, 50 ms, {link['encoding']}: delay in the end / at first", DELAY_GROWS_MOST,
+        rows.append(row(f"10 Mbit/s, 50 ms, {link['encoding']}: delay in the end / at first", DELAY_GROWS_MAX,
                         single(last["median"] / first["median"]), f"thirds of {link['seconds']} s", at_most=True))
     return rows
 

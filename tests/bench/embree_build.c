@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* The yardstick of `make bench`: reads a file, hashes it, and lets Embree build the triangles that lie in it.
  * Usage: bench embree_build FILE POSITIONS_OFFSET VERTEX_COUNT INDICES_OFFSET TRIANGLE_COUNT
- * Prints one JSON object with nanoseconds, the least of five runs of each. */
+ * Prints one JSON object with nanoseconds, the minimum of five runs of each. */
 #include "tests/bench/bench.h"
 
 #include "base/blob.h"

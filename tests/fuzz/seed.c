@@ -54,7 +54,7 @@ static void word(FILE *file, uint64_t value, size_t bytes)
 static void words_of_struct(FILE *file, const struct struct_desc *desc)
 {
     for (const struct field_desc *field = desc->fields; field->name != NULL; field++) {
-        uint32_t least, greatest;
+        uint32_t minimum, maximum;
         switch (field->kind) {
         case FIELD_INT:
             word(file, field->min, field->width_bytes);
@@ -64,10 +64,10 @@ static void words_of_struct(FILE *file, const struct struct_desc *desc)
             word(file, field->enumeration->values[field->enumeration->value_count - 1].number, 4);
             break;
         case FIELD_REAL:
-            memcpy(&least, &field->real_min, 4);
-            memcpy(&greatest, &field->real_max, 4);
-            word(file, least, 4);
-            word(file, greatest, 4);
+            memcpy(&minimum, &field->real_min, 4);
+            memcpy(&maximum, &field->real_max, 4);
+            word(file, minimum, 4);
+            word(file, maximum, 4);
             break;
         case FIELD_STRING:
         case FIELD_ARRAY:
@@ -109,7 +109,7 @@ static bool write_messages(const char *folder)
     struct writer writer;
     for (size_t i = 0; i < protocol_message_count; i++) {
         const char *name = protocol_messages[i].info.name;
-        for (enum case_mode mode = CASE_LEAST; mode < CASE_MODE_COUNT; mode++) {
+        for (enum case_mode mode = CASE_MIN; mode < CASE_MODE_COUNT; mode++) {
             case_make(&maker, &message, &protocol_messages[i], mode, 21);
             plain_encode(&plain, &message);
             uint8_t *input = malloc(plain.count + 2);

@@ -154,7 +154,7 @@ class Model:
             return self.known[index]
         accessor = self.json["accessors"][index]
         count, components = accessor["count"], COMPONENTS[accessor["type"]]
-        form, greatest = FORMS[accessor["componentType"]]
+        form, maximum = FORMS[accessor["componentType"]]
         size = struct.calcsize(form) * components
 
         def unpack(data, offset, stride, amount):
@@ -173,7 +173,7 @@ class Model:
                                                    sparse["count"])):
                 elements[place] = value
         if accessor.get("normalized"):
-            elements = [tuple(max(x / greatest, -1.0) for x in element) for element in elements]
+            elements = [tuple(max(x / maximum, -1.0) for x in element) for element in elements]
         self.known[index] = elements
         return elements
 

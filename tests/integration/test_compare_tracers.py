@@ -32,7 +32,7 @@ class Rays(OneDaemon):
                 self.assertGreater(wave["tracer_mrays"], 0)
                 self.assertGreater(wave["reference_mrays"], 0)
                 if wave["kind"] != "shadow":
-                    self.assertEqual((wave["distance_greatest"], wave["normal_greatest"]), (0, 0))
+                    self.assertEqual((wave["distance_max"], wave["normal_max"]), (0, 0))
         self.assertEqual(report["all"]["rays"], sum(w["rays"] for w in report["waves"]))
         self.assertTrue(report["image"]["identical"])
 

@@ -111,7 +111,7 @@ class Written(unittest.TestCase):
         mesh, = result.of(importer.SET_MESH)
         self.assertEqual(mesh["influences"], 16)
         self.assertEqual(sorted(memoryview(result.data(mesh["arrays"][7])).cast("H")[:16]), list(range(4, 20)))
-        self.assertIn("the 16 with the greatest weights", result.text())
+        self.assertIn("the 16 with the largest weights", result.text())
 
     def test_a_mesh_that_no_skin_moves_has_no_joints(self):
         made = File().add_skin()

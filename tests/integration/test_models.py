@@ -77,7 +77,7 @@ class Models(Case):
     def test_the_standard_procedural_databases_have_their_primitives_and_show_them(self):
         """Spheres are exact, polygons triangles, a cone or cylinder has 64 triangles. What covers the picture is held
         against one of the same view with nothing in it: all of it where the camera sees ground only."""
-        databases = {  # triangles, spheres, least and greatest share of the picture that is covered
+        databases = {  # triangles, spheres, minimum and maximum share of the picture that is covered
             "spd-balls-2": (2, 91, 1, 1), "spd-balls-3": (2, 820, 1, 1), "spd-balls-4": (2, 7381, 1, 1),
             "spd-balls-5": (2, 66430, 1, 1), "spd-gears-2": (4578, 0, 0.6, 0.99), "spd-gears": (36610, 0, 0.7, 0.99),
             "spd-mount": (8192, 4, 0.4, 0.8), "spd-rings": (64 * 4200 + 2, 4200, 0.95, 1),
@@ -85,7 +85,7 @@ class Models(Case):
             "spd-tree": (64 * 4095 + 2, 4095, 0.5, 0.8)}
         self.assertEqual(set(databases), {path.stem for path in (SHARED_SCENES / "bvh").glob("spd-*.nff")})
         with Daemon() as daemon:
-            for name, (triangles, spheres, least, greatest) in databases.items():
+            for name, (triangles, spheres, minimum, maximum) in databases.items():
                 with self.subTest(database=name):
                     path = SHARED_SCENES / "bvh" / f"{name}.nff"
                     info = json.loads(self.expect(farlight("info", "--json", path), 0).stdout)
@@ -104,7 +104,7 @@ class Models(Case):
                     self.expect(result, 0)
                     self.assertEqual(len(set(pixels(background))), 1)
                     covered = sum(a != b for a, b in zip(pixels(shown), pixels(background))) / (48 * 48)
-                    self.assertTrue(least <= covered <= greatest, f"{covered} is covered")
+                    self.assertTrue(minimum <= covered <= maximum, f"{covered} is covered")
 
     def test_hostile_files_are_rendered_or_refused_by_name_and_never_crash_anything(self):
         paths = models("hostile")[::HOSTILE_STRIDE]

@@ -46,34 +46,34 @@ def size_of(corners):
 
 class PoseCase(Case):
     def compare(self, path, animation, times):
-        """Greatest distance between the two, as a share of the model's size."""
-        model, greatest = Model(path), 0.0
+        """Maximum distance between the two, as a share of the model's size."""
+        model, maximum = Model(path), 0.0
         for time, theirs in zip(times, daemon_pose(path, animation, times)):
             ours = own_pose(model, animation, time)
             self.assertEqual(len(theirs), len(ours))
             size = size_of(ours)
             for (place, normal), (their_place, their_normal) in zip(ours, theirs):
                 apart = math.dist(place, their_place) / size
-                greatest = max(greatest, apart)
+                maximum = max(maximum, apart)
                 self.assertLess(apart, PLACE_TOLERANCE, f"clip {animation} at {time}: {their_place} for {place}")
                 if normal and any(their_normal):
                     self.assertLess(math.dist(normal, their_normal), NORMAL_TOLERANCE,
                                     f"clip {animation} at {time}: normal {their_normal} for {normal}")
-        return greatest
+        return maximum
 
 
 @needs_shared_scenes
 class Files(PoseCase):
     def test_every_clip_moves_every_vertex_to_where_glTF_says(self):
-        greatest = 0.0
+        maximum = 0.0
         for name in MODELS:
             model = Model(SHARED_SCENES / name)
             for animation in range(len(model.json["animations"])):
                 begin, end = model.times(animation)
                 times = [begin + 0.37 * (end - begin), end]
                 with self.subTest(model=name, clip=animation):
-                    greatest = max(greatest, self.compare(SHARED_SCENES / name, animation, times))
-        print(f"{len(MODELS)} models, at most {greatest:.1e} of a model's size apart ", end="")
+                    maximum = max(maximum, self.compare(SHARED_SCENES / name, animation, times))
+        print(f"{len(MODELS)} models, at most {maximum:.1e} of a model's size apart ", end="")
 
     def test_without_a_clip_a_model_stands_as_its_nodes_do(self):
         for name in MODELS:
@@ -236,10 +236,10 @@ class MadeFiles(PoseCase):
         made = Made([{"mesh": 0}])
         made.mesh(primitive={"targets": [{"POSITION": made.accessor("VEC3", [self.vector() for _ in CORNERS])}
                                          for _ in range(2)]})
-        for component, greatest in ((5122, 32767), (5120, 127)):
+        for component, maximum in ((5122, 32767), (5120, 127)):
             with self.subTest(component=component):
                 made.json["animations"] = [{"samplers": [], "channels": []}]
-                made.animate(0, "rotation", self.KEYS, [tuple(round(greatest * x) for x in unit(self.vector(-1, 1, 4)))
+                made.animate(0, "rotation", self.KEYS, [tuple(round(maximum * x) for x in unit(self.vector(-1, 1, 4)))
                                                         for _ in self.KEYS], "LINEAR", component, normalized=True)
                 made.animate(0, "weights", self.KEYS, [self.random.randrange(256) for _ in range(6)], "LINEAR", 5121,
                              normalized=True)

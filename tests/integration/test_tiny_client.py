@@ -150,9 +150,9 @@ class Session(Case):
         camera = ((0, 0, 2), (0, 0, 0), (0, 1, 0), 2 * math.atan(0.5))  # 2 m high at 2 m
         client.wait(client.render(1, 2, (16, 16), camera))
         frame = client.next_frame()
-        # Khronos PBR neutral takes an offset away that the least of the three channels gives.
-        least = min(linear)
-        offset = least - 6.25 * least**2 if least < 0.08 else 0.04
+        # Khronos PBR neutral takes away an offset that the minimum of the three channels gives.
+        minimum = min(linear)
+        offset = minimum - 6.25 * minimum**2 if minimum < 0.08 else 0.04
         for y in range(16):
             for x in range(16):
                 pixel = frame.pixels[4 * (16 * y + x):4 * (16 * y + x) + 4]

@@ -12,7 +12,7 @@ KIB, MIB = 1 << 10, 1 << 20
 # they are depends on which thread came first; a program that the driver compiles late takes 5 MiB of them.
 WOBBLE_BYTES = 8 * MIB
 # What one round of 10 connects, one upload and 100 frames may leave behind for ever, once there are enough samples to
-# tell. Resident: 10 bytes for each frame, or 100 for each connect, less than the least struct that any of them has. Data
+# tell. Resident: 10 bytes for each frame, or 100 for each connect, less than the smallest struct that any of them has. Data
 # counts as well what arenas have reserved and not used; they fill slower and slower, at last by 1.7 KiB a round.
 MEMORY = {"rss": 1 * KIB, "data": 4 * KIB}
 SAMPLES_MIN = 7  # beside the first
@@ -72,10 +72,10 @@ class Verdict:
             self.judge_memory(name, [one[name] for one in used], third, rounds)
         for name in COUNTS:
             self.judge_count(name, [one[name] for one in used[third:]])
-        most = max(one["blob_bytes"] for one in used)
-        self.rows.append(("blob_bytes", "", most, f"at most {BLOB_CACHE_BYTES} (its cache)"))
-        if most > BLOB_CACHE_BYTES:
-            self.complaints.append(f"{most} bytes of blobs that nobody uses")
+        maximum = max(one["blob_bytes"] for one in used)
+        self.rows.append(("blob_bytes", "", maximum, f"at most {BLOB_CACHE_BYTES} (its cache)"))
+        if maximum > BLOB_CACHE_BYTES:
+            self.complaints.append(f"{maximum} bytes of blobs that nobody uses")
 
     def judge_memory(self, name, values, third, rounds):
         second, last = max(values[third:2 * third]), max(values[2 * third:])

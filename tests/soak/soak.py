@@ -81,9 +81,9 @@ def parse():
     parser.add_argument("build", type=pathlib.Path, help="folder of the programs")
     parser.add_argument("rounds", type=int, nargs="?", default=ROUNDS, help="%(default)s if not given")
     options = parser.parse_args()
-    least = flat.SAMPLES_MIN * load.Mix.cycle
-    if options.rounds < least:
-        parser.error(f"fewer than {least} rounds tell nothing")
+    minimum = flat.SAMPLES_MIN * load.Mix.cycle
+    if options.rounds < minimum:
+        parser.error(f"fewer than {minimum} rounds tell nothing")
     return options
 
 

@@ -157,9 +157,9 @@ def complaints_of(batch):
                 pathlib.Path(path).write_text(f"{text}\nstruct {END_OF_FILE} {{ int unused; }};\n")
                 files_of[path], programs[path] = names, f"{stages[0]} [{shown}]"
         for path, blocks in zip(files_of, stored_blocks(files_of)):
-            most = STORAGE_BLOCKS_MAX[pathlib.Path(path).suffix]
-            if blocks > most:
-                complaints.append(f"{programs[path]}: {blocks} storage blocks, where {most} are asked of a driver")
+            maximum = STORAGE_BLOCKS_MAX[pathlib.Path(path).suffix]
+            if blocks > maximum:
+                complaints.append(f"{programs[path]}: {blocks} storage blocks, where {maximum} are asked of a driver")
         linked = [[path for path in files_of if path.startswith(os.path.join(folder, f"variant{number}."))]
                   for number, (stages, _) in enumerate(batch) if len(stages) > 1]
         alone = [path for path in files_of if not any(path in paths for paths in linked)]

@@ -69,19 +69,19 @@ unsigned gltf_floats(struct gltf_writer *writer, const float *numbers, size_t co
     static const char *const types[17] = {[1] = "SCALAR", [3] = "VEC3", [4] = "VEC4", [16] = "MAT4"};
     if (writer->failed)
         return 0;
-    float least[16], most[16];
+    float minimum[16], maximum[16];
     for (unsigned c = 0; c < width; c++) {
-        least[c] = INFINITY;
-        most[c] = -INFINITY;
+        minimum[c] = INFINITY;
+        maximum[c] = -INFINITY;
     }
     for (size_t i = 0; i < count * width; i++) {
-        least[i % width] = fminf(least[i % width], numbers[i]);
-        most[i % width] = fmaxf(most[i % width], numbers[i]);
+        minimum[i % width] = fminf(minimum[i % width], numbers[i]);
+        maximum[i % width] = fmaxf(maximum[i % width], numbers[i]);
     }
     const unsigned view = add_view(writer, numbers, count * width * sizeof(*numbers), use);
     FILE *stream = begin_accessor(writer, view, 5126, count, types[width]);
-    print_numbers(stream, "min", least, width);
-    print_numbers(stream, "max", most, width);
+    print_numbers(stream, "min", minimum, width);
+    print_numbers(stream, "max", maximum, width);
     fprintf(stream, "}");
     return writer->accessors.count - 1;
 }

@@ -120,12 +120,12 @@ void measure_errors(struct comparison &each)
     answer.beyond = found.nfail + answer.nonfinite;
     answer.mean_error = sendable(found.meanerror * part);
     answer.rms_error = sendable(found.rms_error * std::sqrt(part));
-    answer.greatest_error = sendable(found.maxerror);
-    answer.greatest_x = static_cast<uint32_t>(found.maxx);
-    answer.greatest_y = static_cast<uint32_t>(found.maxy);
-    answer.greatest_channel = static_cast<uint32_t>(found.maxc);
-    const float greatest = answer.greatest_error;
-    answer.heat_top = each.wanted.heat_top > 0 ? each.wanted.heat_top : std::min(greatest, 1.0f);
+    answer.max_error = sendable(found.maxerror);
+    answer.max_error_x = static_cast<uint32_t>(found.maxx);
+    answer.max_error_y = static_cast<uint32_t>(found.maxy);
+    answer.max_error_channel = static_cast<uint32_t>(found.maxc);
+    const float maximum = answer.max_error;
+    answer.heat_top = each.wanted.heat_top > 0 ? each.wanted.heat_top : std::min(maximum, 1.0f);
 }
 
 void measure_likeness(struct comparison &each, const ImageBuf &screen_a, const ImageBuf &screen_b)
@@ -137,7 +137,7 @@ void measure_likeness(struct comparison &each, const ImageBuf &screen_a, const I
     if (!answer.has_butteraugli)
         return;
     answer.butteraugli = sendable(found.distance);
-    answer.butteraugli_greatest = sendable(found.greatest);
+    answer.butteraugli_max = sendable(found.max);
     answer.visible = found.visible;
 }
 
@@ -148,7 +148,7 @@ bool write_picture(struct comparison &each, const ImageBuf &screen_a, const Imag
     char reason[512] = "", scale[64];
     const ImageBuf errors = algo::maxchan(algo::absdiff(each.a.pixels, each.b.pixels));
     ImageBuf shown = heat_map(errors, answer.heat_top, each.nonfinite);
-    if (answer.greatest_error > 0)
+    if (answer.max_error > 0)
         std::snprintf(scale, sizeof(scale), "error, 0 to %.4g", static_cast<double>(answer.heat_top));
     else
         std::snprintf(scale, sizeof(scale), "no error");

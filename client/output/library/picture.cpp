@@ -110,8 +110,8 @@ bool choose_channels(const OIIO::ImageSpec &spec, struct channel_range &chosen, 
 void tone_map_neutral(float colour[3])
 {
     const float start = 0.8f - 0.04f, desaturation = 0.15f;
-    const float least = std::min({colour[0], colour[1], colour[2]});
-    const float offset = least < 0.08f ? least - 6.25f * least * least : 0.04f;
+    const float minimum = std::min({colour[0], colour[1], colour[2]});
+    const float offset = minimum < 0.08f ? minimum - 6.25f * minimum * minimum : 0.04f;
     for (int c = 0; c < 3; c++)
         colour[c] -= offset;
     const float peak = std::max({colour[0], colour[1], colour[2]});

@@ -106,5 +106,5 @@ bool similarity_butteraugli(const ImageBuf &a, const ImageBuf &b, struct buttera
     for (size_t y = 0; y < height; y++)
         found.visible += static_cast<uint64_t>(std::count_if(
             distances + y * stride, distances + y * stride + width, [](float distance) { return distance > 1; }));
-    return std::isfinite(found.distance) && std::isfinite(found.greatest);
+    return std::isfinite(found.distance) && std::isfinite(found.max);
 }

@@ -14,7 +14,7 @@ bool similarity_ssim(const OIIO::ImageBuf &a, const OIIO::ImageBuf &b, float &ss
 
 struct butteraugli {
     float distance; // 3-norm over the picture
-    float greatest;
+    float max;
     uint64_t visible; // pixels with a distance above 1
 };
 // Butteraugli's distance, by libjxl. (compare_Yee of OpenImageIO 2.4 is no substitute: its luminance pyramids read

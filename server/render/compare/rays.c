@@ -33,12 +33,12 @@ static uint32_t bin_of(float error)
 
 void error_histogram_add(struct error_histogram *histogram, float error)
 {
-    if (!(error >= 0.0f && error <= ERROR_GREATEST))
-        error = ERROR_GREATEST;
+    if (!(error >= 0.0f && error <= ERROR_MAX))
+        error = ERROR_MAX;
     histogram->counts[bin_of(error)]++;
     histogram->count++;
-    if (error > histogram->greatest)
-        histogram->greatest = error;
+    if (error > histogram->max)
+        histogram->max = error;
 }
 
 void error_histogram_merge(struct error_histogram *into, const struct error_histogram *from)
@@ -48,8 +48,8 @@ void error_histogram_merge(struct error_histogram *into, const struct error_hist
     for (uint32_t i = 0; i < ERROR_BINS; i++)
         into->counts[i] += from->counts[i];
     into->count += from->count;
-    if (from->greatest > into->greatest)
-        into->greatest = from->greatest;
+    if (from->max > into->max)
+        into->max = from->max;
 }
 
 float error_histogram_percentile(const struct error_histogram *histogram, double share)
@@ -64,9 +64,9 @@ float error_histogram_percentile(const struct error_histogram *histogram, double
     if (bin == 0)
         return 0.0f;
     if (bin == ERROR_BINS - 1)
-        return histogram->greatest;
+        return histogram->max;
     float middle = float_of((bin - 1 + BIN_LOWEST) << BIN_SHIFT | 1u << (BIN_SHIFT - 1));
-    return fminf(middle, histogram->greatest);
+    return fminf(middle, histogram->max);
 }
 
 /* ---- tallies ------------------------------------------------------------------------------------ */
@@ -105,11 +105,11 @@ void wave_tally_figures(const struct wave_tally *tally, struct wave_comparison *
         .second_ns = tally->second_ns,
         .distance_median = error_histogram_percentile(&tally->distance, 0.5),
         .distance_p99 = error_histogram_percentile(&tally->distance, 0.99),
-        .distance_greatest = tally->distance.greatest,
+        .distance_max = tally->distance.max,
         .relative_median = error_histogram_percentile(&tally->relative, 0.5),
         .normal_median = error_histogram_percentile(&tally->normal, 0.5),
         .normal_p99 = error_histogram_percentile(&tally->normal, 0.99),
-        .normal_greatest = tally->normal.greatest,
+        .normal_max = tally->normal.max,
     };
 }
 

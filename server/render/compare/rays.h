@@ -38,11 +38,11 @@
 /* Errors by size, in bins of the float's upper bits: seven of the mantissa, so that a percentile is true to 0.4 %
  * however many errors there are. Below 2^-48 counts as 0, from 2^16 on as the maximum. */
 #define ERROR_BINS (64 * 128 + 2)
-#define ERROR_GREATEST 1e30f /* in place of greater ones, and of what is no number */
+#define ERROR_MAX 1e30f /* in place of greater ones, and of what is no number */
 struct error_histogram {
     uint64_t counts[ERROR_BINS];
     uint64_t count;
-    float greatest; /* exact */
+    float max; /* exact */
 };
 
 void error_histogram_add(struct error_histogram *histogram, float error);
@@ -74,10 +74,10 @@ struct wave_comparison {
     uint64_t rays, both_hit, both_missed, only_first, only_second, far, edges, other_surface;
     uint64_t first_ns, second_ns;
     /* Of rays that hit with both and are not on an edge: difference in world space, in scene diagonals. */
-    float distance_median, distance_p99, distance_greatest;
+    float distance_median, distance_p99, distance_max;
     float relative_median; /* of the same, as a share of the reference's distance */
     /* Of those that are not far either: between the shading normals, degrees. */
-    float normal_median, normal_p99, normal_greatest;
+    float normal_median, normal_p99, normal_max;
 };
 
 void wave_tally_figures(const struct wave_tally *tally, struct wave_comparison *figures);

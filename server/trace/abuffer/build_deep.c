@@ -20,8 +20,8 @@ static int compare(const void *a, const void *b)
 /* As abuffer/run.glsl has it. */
 static uint32_t sample_bits(uint32_t bits, int64_t winding)
 {
-    int64_t stored = winding + ABUFFER_WINDING_ZERO, most = ABUFFER_WINDING_MASK;
-    stored = stored < 0 ? 0 : stored > most ? most : stored;
+    int64_t stored = winding + ABUFFER_WINDING_ZERO, maximum = ABUFFER_WINDING_MASK;
+    stored = stored < 0 ? 0 : stored > maximum ? maximum : stored;
     return (bits & ABUFFER_NODE_NORMAL) | (uint32_t)stored << ABUFFER_WINDING_SHIFT |
            (bits & ABUFFER_NODE_CLOSED ? ABUFFER_SAMPLE_BODY : 0);
 }

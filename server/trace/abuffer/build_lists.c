@@ -32,11 +32,11 @@ static uint64_t bytes_of(const struct abuffer_task *task, uint64_t nodes)
 static uint64_t nodes_allowed(const struct abuffer_task *task)
 {
     uint64_t allowed = (uint64_t)task->options->limits.abuffer_mebibytes << 20, fixed = bytes_of(task, 0);
-    uint64_t most = task->builder->device->facts.texture_buffer_texels_max;
+    uint64_t maximum = task->builder->device->facts.texture_buffer_texels_max;
     if (allowed == 0)
-        return most;
+        return maximum;
     uint64_t fitting = allowed > fixed ? (allowed - fixed) / (bytes_of(task, 1) - fixed) : 0;
-    return fitting < most ? fitting : most;
+    return fitting < maximum ? fitting : maximum;
 }
 
 static bool refuse(const struct abuffer_task *task, uint64_t nodes, struct error *error)
@@ -162,14 +162,14 @@ bool abuffer_draw_begin(struct abuffer_task *task, uint32_t *items, struct error
 uint32_t abuffer_draw_fit(struct abuffer_task *task, uint32_t first, uint32_t items)
 {
     const struct abuffer_store *store = task->store;
-    const double most = task->builder->device->facts.software ? DRAW_TEXELS_SOFTWARE : DRAW_TEXELS_HARDWARE;
+    const double maximum = task->builder->device->facts.software ? DRAW_TEXELS_SOFTWARE : DRAW_TEXELS_HARDWARE;
     double texels;
     if (task->band_count > 0)
         return 1;
-    const uint32_t end =
-        axes_cover_end(&task->builder->draw, task->scene, store->cell_world, first, first + items, most, &texels);
-    if (end == first + 1 && texels > 2 * most) {
-        const double bands = ceil(texels / most), bands_max = (store->resolution + 7) / 8;
+    const uint32_t end = axes_cover_end(&task->builder->draw, task->scene, store->cell_world, first, first + items,
+                                        maximum, &texels);
+    if (end == first + 1 && texels > 2 * maximum) {
+        const double bands = ceil(texels / maximum), bands_max = (store->resolution + 7) / 8;
         task->band_count = (uint32_t)(bands < bands_max ? bands : bands_max);
         task->band = 0;
     }

@@ -85,11 +85,11 @@ static float float_below(double x)
 struct bvh_grid bvh_grid_over(const float lower[3], const float upper[3], float room)
 {
     struct bvh_grid grid;
-    double greatest = 0;
+    double maximum = 0;
     for (int i = 0; i < 3; i++)
-        greatest = fmax(greatest, ((double)upper[i] - lower[i]));
+        maximum = fmax(maximum, ((double)upper[i] - lower[i]));
     for (int i = 0; i < 3; i++) {
-        double extent = fmax((double)upper[i] - lower[i], greatest * GRID_FLATNESS);
+        double extent = fmax((double)upper[i] - lower[i], maximum * GRID_FLATNESS);
         extent = fmax(extent, fmax(fabs((double)lower[i]), fabs((double)upper[i])) * GRID_FLATNESS);
         extent = fmax(extent, (double)FLT_MIN / GRID_FLATNESS) * (1 + 2 * (double)room);
         double middle = ((double)lower[i] + (double)upper[i]) / 2;

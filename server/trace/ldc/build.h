@@ -25,7 +25,7 @@ void ldc_builder_clear(struct ldc_builder *builder);
  * triangles and spheres of instances[0 .. count - 1] as they are when the shutter opens (gpu_scene's); texels,
  * quads, geometry and surface are written, nodes are not. Of the other cube nothing changes but, if this is the
  * static one, everything behind it is lost. Discs are no part of it. More layers than options->limits.ldc_layers
- * or than fit options->limits.ldc_mebibytes: the nearest (least depth) of each texel are kept, and the cube says
+ * or than fit options->limits.ldc_mebibytes: the nearest (minimum depth) of each texel are kept, and the cube says
  * how many were needed. Never TRACER_DONE; store, scene and options must stay until the build is done. */
 enum tracer_progress ldc_build_begin(struct ldc_builder *builder, struct ldc_store *store, unsigned which,
                                      struct gpu_scene *scene, const uint32_t *instances, uint32_t instance_count,

@@ -60,14 +60,14 @@ static float texels_of_sphere(const struct areas *areas, const struct scene_sphe
 
 /* Of one instance's primitives, as axes_cover_end(). */
 static uint32_t end_in_instance(const struct gpu_scene *scene, const struct instance *instance, float cell_world,
-                                uint32_t first, uint32_t end, double most, double *texels)
+                                uint32_t first, uint32_t end, double maximum, double *texels)
 {
     const struct gpu_scene_geometry *geometry = &scene->geometries[instance->geometry];
     const struct areas areas = areas_of(instance, cell_world);
     for (uint32_t i = first; i < end; i++) {
         const double more = geometry->mesh ? (double)texels_of_triangle(&areas, geometry->mesh, i)
                                            : (double)texels_of_sphere(&areas, geometry->spheres, i);
-        if (*texels > 0 && !(*texels + more <= most))
+        if (*texels > 0 && !(*texels + more <= maximum))
             return i;
         *texels += more > 1 ? more : 1;
     }
@@ -75,7 +75,7 @@ static uint32_t end_in_instance(const struct gpu_scene *scene, const struct inst
 }
 
 uint32_t axes_cover_end(const struct axes_draw *draw, const struct gpu_scene *scene, float cell_world,
-                        uint32_t first, uint32_t end, double most, double *texels)
+                        uint32_t first, uint32_t end, double maximum, double *texels)
 {
     *texels = 0;
     for (uint32_t id = first; id < end;) {
@@ -84,7 +84,8 @@ uint32_t axes_cover_end(const struct axes_draw *draw, const struct gpu_scene *sc
         const uint32_t start = command->first_id + number * each, left = end - start;
         const uint32_t inner_end = left < each ? left : each;
         const struct instance *instance = &scene->instances[draw->instances[command->base_instance + number]];
-        const uint32_t inner = end_in_instance(scene, instance, cell_world, id - start, inner_end, most, texels);
+        const uint32_t inner =
+            end_in_instance(scene, instance, cell_world, id - start, inner_end, maximum, texels);
         id = start + inner;
         if (inner < inner_end)
             return id;

@@ -69,7 +69,7 @@ struct axes_pass {
     float lower_world[3], cell_world; /* of the cube */
     uint32_t resolution;              /* texels along a side of the images */
     uint32_t first_row, end_row;      /* of each image, what is drawn; 0, 0: all */
-    float overlap; /* of the greatest component of a normal, to be in an axis' image; without ALL_IMAGES */
+    float overlap; /* of the largest component of a normal, to be in an axis' image; without ALL_IMAGES */
     /* Sets further uniforms of each program; may be NULL */
     void (*set)(const void *context, const struct gpu_program *program);
     const void *context;

@@ -63,7 +63,7 @@ static float reach_of(const struct instance *instance)
 
 /* The minimum magnitude of the determinant of a + u (b - a) for u in 0 .. 1, 0 if the sign changes: a cubic
  * polynomial, given by four values, examined at its ends and extrema. */
-static double least_determinant(const float *a, const float *b)
+static double min_determinant(const float *a, const float *b)
 {
     double at[4];
     for (int i = 0; i < 4; i++) {
@@ -93,18 +93,18 @@ static double least_determinant(const float *a, const float *b)
  * m. */
 static float reach_between(const float *a, const float *b)
 {
-    double greatest = 0.0, farthest = 0.0;
+    double maximum = 0.0, farthest = 0.0;
     for (int k = 0; k < 12; k++) {
-        double *most = k % 4 == 3 ? &farthest : &greatest;
-        *most = fmax(*most, fmax(fabs((double)a[k]), fabs((double)b[k])));
+        double *into = k % 4 == 3 ? &farthest : &maximum;
+        *into = fmax(*into, fmax(fabs((double)a[k]), fabs((double)b[k])));
     }
     double lengths = 1.0;
     for (int k = 0; k < 3; k++)
         lengths *= fmax(hypot(hypot((double)a[k], (double)a[4 + k]), (double)a[8 + k]),
                         hypot(hypot((double)b[k], (double)b[4 + k]), (double)b[8 + k]));
-    const double least = least_determinant(a, b);
-    const double reach = REFERENCE_COORDINATE_MAX / (6.0 * greatest * greatest / least) - farthest;
-    bool inverts = least > 1e-30 && lengths < 1e30 && least >= 1e-6 * lengths;
+    const double minimum = min_determinant(a, b);
+    const double reach = REFERENCE_COORDINATE_MAX / (6.0 * maximum * maximum / minimum) - farthest;
+    bool inverts = minimum > 1e-30 && lengths < 1e30 && minimum >= 1e-6 * lengths;
     return inverts && reach >= REACH_MIN ? (float)reach : 0.0f;
 }
 

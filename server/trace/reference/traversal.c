@@ -145,13 +145,13 @@ void reference_filter_any(const struct RTCFilterFunctionNArguments *arguments)
             continue;
         const struct opacity_point point = point_of(arguments, lane);
         float *left = context->transmittance[ray[RAY_ID * (size_t)arguments->N + lane].u % CHUNK_RAYS];
-        float passes[3], greatest = 0.0f;
+        float passes[3], maximum = 0.0f;
         opacity_transmittance(surface, &point, passes);
         for (int k = 0; k < 3; k++) {
             left[k] *= passes[k];
-            greatest = fmaxf(greatest, left[k]);
+            maximum = fmaxf(maximum, left[k]);
         }
-        if (greatest >= 0.5f / 255.0f) /* below, the 8-bit answer is black */
+        if (maximum >= 0.5f / 255.0f) /* below, the 8-bit answer is black */
             arguments->valid[lane] = 0;
     }
 }

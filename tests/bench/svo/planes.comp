@@ -9,7 +9,7 @@ layout(binding = IMAGE_SVO_PLANES, r32ui) writeonly uniform uimageBuffer planes;
 uniform uint leaf_count;
 
 // Of the normals, so much must be left over: of two sides of a sheet nothing is.
-const float AGREE_LEAST = 0.3;
+const float AGREE_MIN = 0.3;
 
 void main()
 {
@@ -22,6 +22,6 @@ void main()
     float count = float(sum.w & (SVO_SUM_COUNT - 1)), distance_ = float(sum.w >> 12) / SVO_DISTANCE_UNIT;
     vec3 normal = vec3(sum.xyz) / SVO_NORMAL_UNIT;
     float long_ = length(normal);
-    uint plane = long_ < AGREE_LEAST * count ? SVO_NO_PLANE : pack_plane(normal / long_, distance_ / count);
+    uint plane = long_ < AGREE_MIN * count ? SVO_NO_PLANE : pack_plane(normal / long_, distance_ / count);
     imageStore(planes, k, uvec4(plane));
 }

@@ -4,6 +4,7 @@
 //
 // Define: SVO_LEVELS
 #include "common/candidate.glsl"
+#include "common/math.glsl"
 #include "svo/held.glsl"
 #include "svo/tree.glsl"
 
@@ -15,18 +16,6 @@ uniform uint first_leaf;
 const float SKIP_CELLS = 2.0; // of a ray that begins on a surface: its first cells hold it
 const float SLOWEST = 1e-6;   // of a cell a length of the direction
 
-float least_of(vec3 v)
-{
-    float xy = v.x < v.y ? v.x : v.y;
-    return xy < v.z ? xy : v.z;
-}
-
-float greatest_of(vec3 v)
-{
-    float xy = v.x > v.y ? v.x : v.y;
-    return xy > v.z ? xy : v.z;
-}
-
 // The first leaf, -1: none, and the middle of the ray's way through it.
 int first_leaf_of(trace_ray r, out float distance_)
 {
@@ -37,7 +26,7 @@ int first_leaf_of(trace_ray r, out float distance_)
     direction = mix(direction, slow, lessThan(abs(direction), vec3(SLOWEST * cells)));
     vec3 inverse = 1.0 / direction, near = (mix(upper_cells, lower_cells, up) - origin) * inverse,
          far = (mix(lower_cells, upper_cells, up) - origin) * inverse;
-    float t = max(max(r.t_min, 0.0) + SKIP_CELLS * cell_world, greatest_of(near)), end = min(r.t_max, least_of(far));
+    float t = max(max(r.t_min, 0.0) + SKIP_CELLS * cell_world, max_component(near)), end = min(r.t_max, min_component(far));
     ivec3 lower = ivec3(lower_cells), last = ivec3(upper_cells) - 1;
     ivec3 cell = clamp(ivec3(origin + t * direction), lower, last), upward = ivec3(up);
     int node = 0, shift = SVO_LEVELS, leaf = -1;
@@ -45,7 +34,7 @@ int first_leaf_of(trace_ray r, out float distance_)
         uint word = texelFetch(records, node).x;
         ivec3 corner = ((cell >> shift) + upward) << shift;
         vec3 at = (vec3(corner) - origin) * inverse;
-        float leaves = least_of(at);
+        float leaves = min_component(at);
         if (word == 0u) {
             ivec3 own = (cell >> shift) << shift;
             cell = clamp(ivec3(origin + leaves * direction), own, own + (1 << shift) - 1);

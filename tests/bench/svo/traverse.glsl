@@ -8,6 +8,7 @@
 // Defines: SVO_PLANES  a leaf is hit where the ray crosses its plane, within the cell; else anywhere in it
 //          SVO_TOP_SHIFT  the root's grandchildren are cells of 2^SVO_TOP_SHIFT: 8 and less
 #include "common/candidate.glsl"
+#include "common/math.glsl"
 #include "svo/held.glsl"
 #include "svo/plane.glsl"
 #include "svo/tree.glsl"
@@ -41,18 +42,6 @@ struct svo_traversal {
     int record, at_2, at_4, at_6;
 };
 
-float least_of(vec3 v)
-{
-    float xy = v.x < v.y ? v.x : v.y;
-    return xy < v.z ? xy : v.z;
-}
-
-float greatest_of(vec3 v)
-{
-    float xy = v.x > v.y ? v.x : v.y;
-    return xy > v.z ? xy : v.z;
-}
-
 // False: it passes by all.
 bool begin(trace_ray r, out svo_traversal w)
 {
@@ -76,8 +65,8 @@ bool begin(trace_ray r, out svo_traversal w)
     }
     w.mirror_high = w.mirrored.z != 0;
     w.inverse = 1.0 / w.direction;
-    w.t = max(max(r.t_min, 0.0) + SKIP_CELLS * cell_world, greatest_of((lower - w.origin) * w.inverse));
-    w.end = min(r.t_max, least_of((upper - w.origin) * w.inverse));
+    w.t = max(max(r.t_min, 0.0) + SKIP_CELLS * cell_world, max_component((lower - w.origin) * w.inverse));
+    w.end = min(r.t_max, min_component((upper - w.origin) * w.inverse));
     w.cell = clamp(ivec3(w.origin + w.t * w.direction), ivec3(lower), ivec3(upper) - 1);
     w.shift = SVO_TOP_SHIFT;
     w.record = w.at_2 = w.at_4 = w.at_6 = 0;
@@ -89,7 +78,7 @@ float leaves_at(svo_traversal w, int size, out ivec3 upper, out vec3 at)
 {
     upper = (w.cell | ((1 << size) - 1)) + 1;
     at = (vec3(upper) - w.origin) * w.inverse;
-    return least_of(at);
+    return min_component(at);
 }
 
 // To the cell behind that one; false: the ray ends before.

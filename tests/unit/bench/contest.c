@@ -212,5 +212,5 @@ TEST(the_median_and_its_deviation_are_those_of_the_runs)
         bench_add(&runs, times[i]);
     const struct bench_figure figure = bench_figure(&runs);
     assert_true(figure.median_ns == 30 && figure.deviation_ns == 20); /* of 20 20 10 970 0 */
-    assert_true(figure.least_ns == 10 && figure.greatest_ns == 1000);
+    assert_true(figure.min_ns == 10 && figure.max_ns == 1000);
 }

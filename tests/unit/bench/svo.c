@@ -142,16 +142,16 @@ static float nearest_to(const struct ray *ray, const float sphere[4], float *alo
 /* Of the point of a ray to the surface of the nearer sphere. */
 static float off_surface(const struct ray *ray, float distance)
 {
-    float least = 1e30f;
+    float minimum = 1e30f;
     for (int s = 0; s < 2; s++) {
         float squared = 0;
         for (int k = 0; k < 3; k++) {
             const float from = ray->origin_t_min[k] + distance * ray->direction_t_max[k] - centres_radii[s][k];
             squared += from * from;
         }
-        least = fminf(least, fabsf(sqrtf(squared) - centres_radii[s][3]));
+        minimum = fminf(minimum, fabsf(sqrtf(squared) - centres_radii[s][3]));
     }
-    return least;
+    return minimum;
 }
 
 /* What a ray has to do with the spheres, where it is clear: which one it hits first, -1: none, -2: it begins in
@@ -175,7 +175,7 @@ static int truth_of(const struct ray *ray, float margin, float *distance)
     return first;
 }
 
-static void hits_are_of(const struct tracer_impl *impl, float off_most_cells, float off_usual_cells)
+static void hits_are_of(const struct tracer_impl *impl, float off_max_cells, float off_usual_cells)
 {
     struct fixture stage;
     begin(&stage);
@@ -196,7 +196,7 @@ static void hits_are_of(const struct tracer_impl *impl, float off_most_cells, fl
         }
         assert_int_equal(hits[i].instance, truth);
         const float off_cells = off_surface(&stage.cast[i], hits[i].distance) / cell;
-        assert_true(off_cells <= off_most_cells);
+        assert_true(off_cells <= off_max_cells);
         unusual += off_cells > off_usual_cells;
     }
     assert_true(clear[0] > RAYS / 20 && clear[1] > RAYS / 10 && clear[2] > RAYS / 10);

@@ -112,7 +112,7 @@ TEST(figures_arrive_and_no_error_is_an_infinite_ratio)
     assert_int_equal(comparison.pixels, 12);
     assert_true(fabs(comparison.threshold - FL_THRESHOLD_DEFAULT) <= 0);
     figures.rms_error = 0.1f;
-    figures.greatest_error = 0.5f;
+    figures.max_error = 0.5f;
     assert_true(compare_answered(&figures));
     assert_false(comparison.identical);
     /* 0.1 is a 32-bit float on the way: 20 dB to 1 part in 1e7. */

@@ -472,12 +472,12 @@ TEST(agreement_leaves_edges_aside_and_stays_a_share_whatever_a_daemon_says)
     assert_true(fl_wave_agreement(&wave) == 1 - 10.0 / 995);
     struct record_wave_comparison sum = {0};
     assert_true(fl_wave_agreement(&sum) == 1);
-    wave.distance_greatest = 0.5f;
+    wave.distance_max = 0.5f;
     fl_wave_add(&sum, &wave);
-    wave.distance_greatest = 0.25f;
+    wave.distance_max = 0.25f;
     fl_wave_add(&sum, &wave);
     assert_int_equal(sum.rays, 2000);
-    assert_true(sum.distance_greatest == 0.5f);
+    assert_true(sum.distance_max == 0.5f);
     assert_true(fl_wave_agreement(&sum) == fl_wave_agreement(&wave));
     struct record_wave_comparison lie = {.rays = 1, .only_tracer = UINT64_MAX, .far = UINT64_MAX};
     assert_true(fl_wave_agreement(&lie) == 0);

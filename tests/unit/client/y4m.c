@@ -62,7 +62,7 @@ TEST(every_colour_becomes_the_nearest_luma_and_chroma)
     struct ycbcr_converter converter;
     const struct ycbcr_target planes = {y, cb, cr, 256, 256, 256, 1, false};
     assert_true(ycbcr_converter_init(&converter, 256, 1, YCBCR_ALPHA_OVER_BLACK));
-    double greatest = 0;
+    double maximum = 0;
     /* Red and blue in steps of 3 that hit both ends; green, which weighs most, in all steps. */
     for (unsigned red = 0; red < 256; red += 3)
         for (unsigned blue = 0; blue < 256; blue += 3) {
@@ -73,15 +73,15 @@ TEST(every_colour_becomes_the_nearest_luma_and_chroma)
             for (unsigned green = 0; green < 256; green++) {
                 double wanted[3];
                 ycbcr_of((double[]){red, green, blue}, wanted);
-                greatest = fmax(greatest, fabs(y[green] - wanted[0]));
-                greatest = fmax(greatest, fabs(cb[green] - wanted[1]));
-                greatest = fmax(greatest, fabs(cr[green] - wanted[2]));
+                maximum = fmax(maximum, fabs(y[green] - wanted[0]));
+                maximum = fmax(maximum, fabs(cb[green] - wanted[1]));
+                maximum = fmax(maximum, fabs(cr[green] - wanted[2]));
             }
         }
     ycbcr_converter_finish(&converter);
     /* The nearest is half a step away at most; fixed point adds less than 1e-3 (see ycbcr.c). */
-    if (greatest > 0.501)
-        fail_msg("a value is off by %.4f", greatest);
+    if (maximum > 0.501)
+        fail_msg("a value is off by %.4f", maximum);
 }
 
 TEST(black_white_and_grey_have_the_levels_of_the_standard)

@@ -93,8 +93,8 @@ static uint8_t foretell(const uint8_t *plane, size_t x, size_t y, size_t width)
 {
     int a = x ? plane[y * width + x - 1] : 0, b = y ? plane[(y - 1) * width + x] : 0;
     int c = x && y ? plane[(y - 1) * width + x - 1] : 0;
-    int least = a < b ? a : b, greatest = a < b ? b : a;
-    return (uint8_t)(c >= greatest ? least : c <= least ? greatest : a + b - c);
+    int minimum = a < b ? a : b, maximum = a < b ? b : a;
+    return (uint8_t)(c >= maximum ? minimum : c <= minimum ? maximum : a + b - c);
 }
 
 static uint8_t *decode_predicted(const uint8_t *in, size_t in_bytes, const struct picture *picture)

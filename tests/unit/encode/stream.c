@@ -8,7 +8,7 @@
 #define WIDTH 320u
 #define HEIGHT 180u
 #define FRAMES_PER_SECOND 30.0f
-#define LEAST_DB 38 /* at quality 75, of what a JPEG of this picture has about */
+#define MIN_DB 38 /* at quality 75, of what a JPEG of this picture has about */
 
 /* ---- pictures ---- */
 
@@ -90,18 +90,18 @@ TEST(each_picture_decodes_alone_and_looks_like_the_original)
     struct encoder_stream *stream = new_stream();
     struct player player = player_begin();
     const struct encoder_wish wish = {.quality = 75};
-    double least = 99;
+    double minimum = 99;
     for (int i = 0; i < 20; i++) {
         struct encoded_picture made;
         double quality = pass(stream, &player, i, &wish, &made);
-        least = quality < least ? quality : least;
+        minimum = quality < minimum ? quality : minimum;
         assert_int_equal(made.key_frame, i == 0); /* and no others that nobody asked for */
     }
-    print_message("%.1f dB\n", least);
+    print_message("%.1f dB\n", minimum);
     assert_int_equal(player.frame->colorspace, AVCOL_SPC_BT709);
     assert_int_equal(player.frame->color_range, AVCOL_RANGE_MPEG);
     /* Not to be told from the picture by eye, as a JPEG of that quality. */
-    assert_true(least > LEAST_DB);
+    assert_true(minimum > MIN_DB);
     encoder_stream_destroy(stream);
     player_end(&player);
 }
@@ -151,7 +151,7 @@ TEST(a_key_frame_comes_when_it_is_asked_for_and_stands_alone)
         assert_true(play(&player, out.bytes, out.size_bytes));
         if (i >= 7) { /* nothing before has been seen here: the parameter sets are in it */
             assert_true(play(&late, out.bytes, out.size_bytes));
-            assert_true(psnr(late.frame, pixels, WIDTH, HEIGHT) > LEAST_DB);
+            assert_true(psnr(late.frame, pixels, WIDTH, HEIGHT) > MIN_DB);
         }
         free(out.bytes);
         free(pixels);
@@ -173,9 +173,9 @@ TEST(a_decoder_that_lost_a_picture_recovers_at_the_next_key_frame)
     free(encode(stream, pixels, WIDTH, HEIGHT, &plain).bytes); /* never arrives */
     free(pixels);
     avcodec_flush_buffers(player.context);
-    assert_true(pass(stream, &player, 6, &wanted, &made) > LEAST_DB);
+    assert_true(pass(stream, &player, 6, &wanted, &made) > MIN_DB);
     assert_true(made.key_frame);
-    assert_true(pass(stream, &player, 7, &plain, &made) > LEAST_DB);
+    assert_true(pass(stream, &player, 7, &plain, &made) > MIN_DB);
     encoder_stream_destroy(stream);
     player_end(&player);
 }
@@ -215,25 +215,26 @@ TEST(pictures_keep_to_the_bytes_that_they_may_have)
     const uint64_t limits[] = {0, 6000, 3000, 12000};
     size_t unlimited = 0;
     for (int i = 0; i < 4; i++) {
-        size_t sum = 0, most = 0;
+        size_t sum = 0, maximum = 0;
         for (int k = 0; k < 10; k++) {
             draw_noise(pixels, (uint32_t)(100 * i + k));
             const struct encoder_wish wish = {.quality = 95, .bytes = limits[i], .key_frame = k == 5};
             struct encoded_picture out = encode(stream, pixels, WIDTH, HEIGHT, &wish);
             /* The first picture after a change is judged by the buffer as it was before. */
             sum += k ? out.size_bytes : 0;
-            most = k && out.size_bytes > most ? out.size_bytes : most;
+            maximum = k && out.size_bytes > maximum ? out.size_bytes : maximum;
             free(out.bytes);
         }
         print_message("at most %llu bytes: %zu in the mean, %zu at most\n", (unsigned long long)limits[i], sum / 9,
-                      most);
+                      maximum);
         if (!limits[i]) {
             unlimited = sum / 9;
             continue;
         }
         assert_true(unlimited > 2 * limits[i]);
         assert_true(sum / 9 <= limits[i]);
-        assert_true(most <= limits[i] + limits[i] / 4); /* rate control foretells, and sometimes is a little off */
+        assert_true(maximum <=
+                    limits[i] + limits[i] / 4); /* rate control foretells, and sometimes is a little off */
     }
     free(pixels);
     encoder_stream_destroy(stream);

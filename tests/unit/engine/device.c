@@ -37,7 +37,7 @@ static enum tracer_progress watched_update(struct tracer *tracer, struct gpu_sce
         while (!atomic_load(&watched.gate))
             poll(NULL, 0, 1);
     }
-    tracer->step_end_ns = 0; /* the least that it can be cut to */
+    tracer->step_end_ns = 0; /* the shortest that it can be cut to */
     enum tracer_progress progress = tracer_bvh_impl.update(tracer, scene, update, error);
     if (goes_on || progress == TRACER_MORE) {
         watched.building = progress == TRACER_MORE ? tracer : NULL;

@@ -252,9 +252,9 @@ static inline enum frame_progress fake_step(struct frame_renderer *renderer, str
         return FRAME_MORE;
     bool goes_on = renderer->kept_samples && renderer->kept_revision == renderer->scene->revision &&
                    frame_request_adds_to(&renderer->kept_request, &renderer->request);
-    uint32_t before = goes_on ? renderer->kept_samples : 0, most = renderer->request.samples_most;
+    uint32_t before = goes_on ? renderer->kept_samples : 0, maximum = renderer->request.samples_max;
     uint32_t all = before + renderer->request.samples;
-    renderer->kept_samples = before && most && all > most ? (before > most ? before : most) : all;
+    renderer->kept_samples = before && maximum && all > maximum ? (before > maximum ? before : maximum) : all;
     renderer->kept_request = renderer->request;
     renderer->kept_revision = renderer->scene->revision;
     const struct frame_request *request = &renderer->request;

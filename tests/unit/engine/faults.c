@@ -289,7 +289,7 @@ TEST(stats_add_up)
     assert_int_equal(stats->stages[STAGE_FRAME][CLOCK_CPU].count, 4);
     assert_int_equal(stats->stages[STAGE_SEND][CLOCK_CPU].count, 2);
     assert_int_equal(stats->stages[STAGE_SEND][CLOCK_CPU].total_ns, 77);
-    assert_int_equal(stats->stages[STAGE_QUEUE][CLOCK_CPU].greatest_ns, 50);
+    assert_int_equal(stats->stages[STAGE_QUEUE][CLOCK_CPU].max_ns, 50);
     assert_int_equal(stats->scenes[1].instances, 0);
     engine_event_destroy(event);
     /* What a scene holds is counted anew after a transaction. */

@@ -659,7 +659,7 @@ TEST(of_many_cameras_the_first_are_listed)
 {
     struct engine *engine = start((struct engine_options){0});
     open_as(engine, 1, 1, "a", SHARING_PRIVATE);
-    /* From the greatest number down, a few at a time. */
+    /* From the largest number down, a few at a time. */
     uint32_t next = ENGINE_DESCRIPTION_MAX + 40, request = 2;
     bool has_camera = false;
     while (next > 0) {

@@ -124,8 +124,8 @@ TEST(weights_divide_the_time_between_clients)
     serve_for(&simulation, 5000 * MS);
     expect_had(&simulation, view, 4000 * MS);
     expect_had(&simulation, batch, 1000 * MS);
-    /* A batch that is given the same weight has the same share, and the greatest weight sixteen times that of the
-     * least. */
+    /* A batch that is given the same weight has the same share, and the maximum weight sixteen times that of the
+     * minimum. */
     size_t great = add(&simulation, 2, 16, 5 * MS), same = add(&simulation, 3, 4, 5 * MS);
     memset(simulation.had_ns, 0, sizeof(simulation.had_ns));
     serve_for(&simulation, 25000 * MS);

@@ -169,9 +169,9 @@ TEST(what_is_read_back_is_what_was_stored)
             /* half a step, and a little for the driver's pow() */
             assert_float_equal(out->base_colour[k], in->base_colour[k],
                                0.5f * decode_step(in->base_colour[k]) + 1e-4f);
-            float most = k == 1 ? 63 : 31; /* of a square root: the slope is twice the root */
+            float maximum = k == 1 ? 63 : 31; /* of a square root: the slope is twice the root */
             assert_float_equal(out->emission[k], in->emission[k],
-                               sqrtf(in->emission[k]) / most + 0.25f / (most * most) + 1e-6f);
+                               sqrtf(in->emission[k]) / maximum + 0.25f / (maximum * maximum) + 1e-6f);
             cosine += out->normal[k] * in->normal[k];
         }
         assert_true(cosine > 0.999999f);

@@ -9,7 +9,7 @@
 
 #include "protocol/describe.h"
 
-enum case_mode { CASE_LEAST, CASE_GREATEST, CASE_RANDOM, CASE_MODE_COUNT };
+enum case_mode { CASE_MIN, CASE_MAX, CASE_RANDOM, CASE_MODE_COUNT };
 
 struct case_maker {
     uint64_t state; /* of the random numbers */
@@ -47,9 +47,9 @@ static inline uint64_t case_int(struct case_maker *maker, const struct field_des
 {
     uint64_t span = field->max - field->min, value = field->min;
     switch (maker->mode) {
-    case CASE_LEAST:
+    case CASE_MIN:
         return field->min;
-    case CASE_GREATEST:
+    case CASE_MAX:
         return field->max;
     default:
         do {
@@ -61,13 +61,13 @@ static inline uint64_t case_int(struct case_maker *maker, const struct field_des
 
 static inline float case_real(struct case_maker *maker, const struct field_desc *field)
 {
-    double least = (double)field->real_min, greatest = (double)field->real_max;
+    double minimum = (double)field->real_min, maximum = (double)field->real_max;
     double share = (double)(case_random(maker) >> 11) / 9007199254740992.0;
-    float value = (float)(least + share * (greatest - least));
-    if (maker->mode == CASE_LEAST || value < field->real_min) {
+    float value = (float)(minimum + share * (maximum - minimum));
+    if (maker->mode == CASE_MIN || value < field->real_min) {
         return field->real_min;
     }
-    if (maker->mode == CASE_GREATEST || value > field->real_max) {
+    if (maker->mode == CASE_MAX || value > field->real_max) {
         return field->real_max;
     }
     return value;
@@ -78,9 +78,9 @@ static inline char *case_text(struct case_maker *maker, size_t max_bytes)
 {
     static const char *const characters[] = {
         "a", "Z", "7", " ", "/", "\"", "\xc3\xa9", "\xe2\x82\xac", "\xf0\x9f\x92\xa1"};
-    size_t want = maker->mode == CASE_LEAST      ? 0
-                  : maker->mode == CASE_GREATEST ? max_bytes
-                                                 : case_below(maker, max_bytes + 1);
+    size_t want = maker->mode == CASE_MIN   ? 0
+                  : maker->mode == CASE_MAX ? max_bytes
+                                            : case_below(maker, max_bytes + 1);
     char *text = case_alloc(maker, max_bytes + 1);
     size_t used = 0;
     while (text && used < want) {
@@ -107,7 +107,7 @@ static inline void case_fixed(struct case_maker *maker, const struct field_desc 
         case FIELD_ENUM:
             field_store_int(
                 field, place,
-                maker->mode == CASE_LEAST
+                maker->mode == CASE_MIN
                     ? field->enumeration->values[0].number
                     : field->enumeration->values[case_below(maker, field->enumeration->value_count)].number);
             break;
@@ -116,7 +116,7 @@ static inline void case_fixed(struct case_maker *maker, const struct field_desc 
             memcpy(place, &value, 4);
             break;
         default:
-            *place = (char)(maker->mode == CASE_LEAST ? 0 : case_random(maker));
+            *place = (char)(maker->mode == CASE_MIN ? 0 : case_random(maker));
             break;
         }
     }
@@ -127,11 +127,11 @@ static inline void case_struct(struct case_maker *maker, const struct struct_des
 static inline void case_counted(struct case_maker *maker, const struct field_desc *field, char *body)
 {
     char *pointer = NULL;
-    uint64_t most = field->kind == FIELD_ARRAY ? 5 : 300; /* a few suffice */
-    most = field->max < most ? field->max : most;
-    uint32_t count = (uint32_t)(maker->mode == CASE_LEAST      ? 0
-                                : maker->mode == CASE_GREATEST ? most
-                                                               : case_below(maker, most + 1));
+    uint64_t maximum = field->kind == FIELD_ARRAY ? 5 : 300; /* a few suffice */
+    maximum = field->max < maximum ? field->max : maximum;
+    uint32_t count = (uint32_t)(maker->mode == CASE_MIN   ? 0
+                                : maker->mode == CASE_MAX ? maximum
+                                                          : case_below(maker, maximum + 1));
     if (field->kind == FIELD_STRING) {
         pointer = case_text(maker, (size_t)field->max);
     } else if (field->kind == FIELD_ARRAY) {

@@ -15,9 +15,9 @@ TEST(every_message_round_trips_unchanged)
     struct message message;
     for (size_t i = 0; i < protocol_message_count; i++) {
         const struct message_desc *desc = &protocol_messages[i];
-        case_make(&maker, &message, desc, CASE_LEAST, 0);
+        case_make(&maker, &message, desc, CASE_MIN, 0);
         check_round_trip(&message);
-        case_make(&maker, &message, desc, CASE_GREATEST, 0);
+        case_make(&maker, &message, desc, CASE_MAX, 0);
         check_round_trip(&message);
         for (uint64_t seed = 1; seed <= RANDOM_CASES; seed++) {
             case_make(&maker, &message, desc, CASE_RANDOM, seed);
@@ -51,7 +51,7 @@ static void write_hex(FILE *file, const uint8_t *bytes, size_t count)
     fputc('\n', file);
 }
 
-static const char *const mode_names[CASE_MODE_COUNT] = {"least", "greatest", "random"};
+static const char *const mode_names[CASE_MODE_COUNT] = {"min", "max", "random"};
 
 static int update_golden(void)
 {
@@ -62,7 +62,7 @@ static int update_golden(void)
         return 1;
     }
     for (size_t i = 0; i < protocol_message_count; i++) {
-        for (enum case_mode mode = CASE_LEAST; mode < CASE_MODE_COUNT; mode++) {
+        for (enum case_mode mode = CASE_MIN; mode < CASE_MODE_COUNT; mode++) {
             case_make(&maker, &message, &protocol_messages[i], mode, 1);
             plain_encode(&plain, &message);
             fprintf(file, "%s %s ", protocol_messages[i].info.name, mode_names[mode]);
@@ -102,7 +102,7 @@ TEST(the_bytes_on_the_wire_are_the_stored_ones)
         fail_msg("cannot read %s (run from the top of the tree)", GOLDEN_PATH);
     }
     for (size_t i = 0; i < protocol_message_count; i++) {
-        for (enum case_mode mode = CASE_LEAST; mode < CASE_MODE_COUNT; mode++) {
+        for (enum case_mode mode = CASE_MIN; mode < CASE_MODE_COUNT; mode++) {
             const char *name = protocol_messages[i].info.name;
             char head[96];
             snprintf(head, sizeof(head), "%s %s ", name, mode_names[mode]);
@@ -133,7 +133,7 @@ TEST(every_prefix_of_every_message_is_refused)
     struct message message, back;
     struct decode_error error;
     for (size_t i = 0; i < protocol_message_count; i++) {
-        for (enum case_mode mode = CASE_LEAST; mode < CASE_MODE_COUNT; mode++) {
+        for (enum case_mode mode = CASE_MIN; mode < CASE_MODE_COUNT; mode++) {
             case_make(&maker, &message, &protocol_messages[i], mode, 3);
             size_t count = encode_both(&message);
             for (size_t length = 0; length < count; length++) {
@@ -259,7 +259,7 @@ TEST(the_stated_scratch_suffices_and_less_is_refused_safely)
         }
     }
     for (size_t i = 0; i < protocol_message_count; i++) {
-        case_make(&maker, &message, &protocol_messages[i], CASE_GREATEST, 7);
+        case_make(&maker, &message, &protocol_messages[i], CASE_MAX, 7);
         size_t count = encode_both(&message);
         size_t used = 0;
         for (size_t shift = 0; shift < 8; shift++) {

@@ -680,14 +680,14 @@ TEST(a_session_that_is_cut_anywhere_is_seen_to_be)
 
 /* ---- links --------------------------------------------------------------------------------------------- */
 
-/* Moves at most `most` bytes; what the sender learns of its plain text. */
-static size_t carry(struct sealed_link *from, struct sealed_link *to, size_t most)
+/* Moves at most `maximum` bytes; what the sender learns of its plain text. */
+static size_t carry(struct sealed_link *from, struct sealed_link *to, size_t maximum)
 {
     size_t waiting_bytes, room_bytes;
     const uint8_t *waiting = sealed_link_waiting(from, &waiting_bytes);
     uint8_t *room = sealed_link_space(to, &room_bytes);
     size_t bytes = waiting_bytes < room_bytes ? waiting_bytes : room_bytes;
-    bytes = bytes < most ? bytes : most;
+    bytes = bytes < maximum ? bytes : maximum;
     if (bytes == 0) {
         return 0;
     }

@@ -61,7 +61,7 @@ TEST(messages_print_as_one_line)
         size_t count = 0;
         FILE *stream = open_memstream(&text, &count);
         assert_non_null(stream);
-        case_make(&maker, &message, &protocol_messages[i], CASE_GREATEST, 9);
+        case_make(&maker, &message, &protocol_messages[i], CASE_MAX, 9);
         message_print(stream, &message);
         assert_int_equal(fclose(stream), 0);
         assert_null(strchr(text, '\n'));

@@ -212,7 +212,7 @@ TEST(a_wrong_value_of_any_field_is_refused_with_the_path_of_the_field)
 {
     struct message message;
     for (size_t i = 0; i < protocol_message_count; i++) {
-        case_make(&maker, &message, &protocol_messages[i], CASE_GREATEST, 6);
+        case_make(&maker, &message, &protocol_messages[i], CASE_MAX, 6);
         try_wrong_fields(&message, protocol_messages[i].body(), (char *)&message + MESSAGE_BODY_OFFSET,
                          protocol_messages[i].info.name);
         check_round_trip(&message); /* all was put back */

@@ -97,8 +97,8 @@ TEST(percentiles_are_true_to_a_bin_and_the_maximum_is_exact)
     assert_close(error_histogram_percentile(histogram, 0.5), 500e-7, PERCENTILE_TOLERANCE);
     assert_close(error_histogram_percentile(histogram, 0.99), 990e-7, PERCENTILE_TOLERANCE);
     assert_close(error_histogram_percentile(histogram, 0.0), 1e-7, PERCENTILE_TOLERANCE);
-    assert_true(histogram->greatest == 1000 * 1e-7f);
-    assert_true(error_histogram_percentile(histogram, 1.0) <= histogram->greatest);
+    assert_true(histogram->max == 1000 * 1e-7f);
+    assert_true(error_histogram_percentile(histogram, 1.0) <= histogram->max);
     free(histogram);
 }
 
@@ -113,11 +113,11 @@ TEST(zeros_stay_zero_and_nan_is_the_maximum)
     assert_true(error_histogram_percentile(histogram, 0.5) == 0.0f);
     assert_close(error_histogram_percentile(histogram, 0.61), 1.0, PERCENTILE_TOLERANCE);
     error_histogram_add(histogram, NAN);
-    assert_true(histogram->greatest == ERROR_GREATEST);
-    assert_true(error_histogram_percentile(histogram, 1.0) == ERROR_GREATEST);
+    assert_true(histogram->max == ERROR_MAX);
+    assert_true(error_histogram_percentile(histogram, 1.0) == ERROR_MAX);
     error_histogram_add(histogram, INFINITY);
     error_histogram_add(histogram, -1.0f);
-    assert_true(error_histogram_percentile(histogram, 0.98) == ERROR_GREATEST);
+    assert_true(error_histogram_percentile(histogram, 0.98) == ERROR_MAX);
     free(histogram);
 }
 
@@ -174,9 +174,9 @@ TEST(errors_are_in_scene_diagonals_and_in_shares_of_the_distance)
     /* 4.001 as a float is off by up to 2.4e-7, of 1e-3 */
     assert_close(figures.distance_median, 1e-4, PERCENTILE_TOLERANCE + 2.4e-4);
     assert_close(figures.distance_p99, 1e-4, PERCENTILE_TOLERANCE + 2.4e-4);
-    assert_close(figures.distance_greatest, 4e-4, 1e-4);
+    assert_close(figures.distance_max, 4e-4, 1e-4);
     assert_close(figures.relative_median, 2.5e-4, PERCENTILE_TOLERANCE + 2.4e-4);
-    assert_true(figures.normal_greatest == 0.0f);
+    assert_true(figures.normal_max == 0.0f);
 }
 
 TEST(a_real_far_hit_counts_among_the_errors_and_one_on_an_edge_does_not)
@@ -185,10 +185,10 @@ TEST(a_real_far_hit_counts_among_the_errors_and_one_on_an_edge_does_not)
     compare(tally, &down, hit_at(4), hit_at(4));
     compare_moved(tally, &down, hit_at(9), hit_at(4), hit_at(9.001f));
     assert_counts(tally, 2, 0, 0, 0, 1, 1, 0);
-    assert_true(tally->distance.greatest == 0.0f);
+    assert_true(tally->distance.max == 0.0f);
     compare(tally, &down, hit_at(9), hit_at(4));
     assert_counts(tally, 3, 0, 0, 0, 2, 1, 0);
-    assert_close(tally->distance.greatest, 0.5, 1e-6);
+    assert_close(tally->distance.max, 0.5, 1e-6);
 }
 
 TEST(an_edge_is_where_the_reference_says_the_same_to_a_moved_ray)
@@ -213,7 +213,7 @@ TEST(another_normal_material_or_side_is_another_surface_unless_on_an_edge)
     compare(tally, &down, inside, good);
     compare(tally, &down, other, good);
     assert_counts(tally, 3, 0, 0, 0, 0, 0, 3);
-    assert_close(tally->normal.greatest, 45.0, 1e-4);
+    assert_close(tally->normal.max, 45.0, 1e-4);
     compare_moved(tally, &down, turned, good, turned); /* a crease */
     assert_counts(tally, 4, 0, 0, 0, 0, 0, 3);
     struct hit tangent = good; /* is shading's own affair */
@@ -238,7 +238,7 @@ TEST(angles_are_right_all_over_the_sphere)
     }
     assert_counts(tally, 200, 0, 0, 0, 0, 0, 0);
     /* two normals packed to 0.003 degrees each */
-    assert_close(tally->normal.greatest, 3.0, 0.006 / 3.0);
+    assert_close(tally->normal.max, 3.0, 0.006 / 3.0);
     assert_close(error_histogram_percentile(&tally->normal, 0.01), 3.0, 0.006 / 3.0 + PERCENTILE_TOLERANCE);
 }
 
@@ -262,7 +262,7 @@ TEST(distances_that_are_no_numbers_are_errors)
     compare(tally, &down, hit_at(INFINITY), hit_at(4));
     assert_counts(tally, 1, 0, 0, 1, 1, 0, 0);
     wave_tally_figures(tally, &figures);
-    assert_true(figures.distance_greatest == ERROR_GREATEST);
+    assert_true(figures.distance_max == ERROR_MAX);
 }
 
 /* ---- shadows ------------------------------------------------------------------------------------ */
@@ -351,7 +351,7 @@ TEST(the_order_of_rays_and_slices_changes_no_figure)
     wave_tally_figures(parts[1], &b);
     assert_int_equal(b.first_ns, 12);
     b.first_ns = 0;
-    assert_memory_equal(&a, &b, offsetof(struct wave_comparison, normal_greatest) + sizeof(a.normal_greatest));
+    assert_memory_equal(&a, &b, offsetof(struct wave_comparison, normal_max) + sizeof(a.normal_max));
     assert_int_equal(b.rays, 3000);
     for (int i = 0; i < 3; i++)
         free(parts[i]);

@@ -118,9 +118,9 @@ TEST(keeps_the_line_as_short_as_the_rule_says)
     struct tally last = run(&pacing, &link, 272 * S, 302 * S, 83000, &frame);
     /* In flight are at most the bytes of a frame time and a round trip; those in the line are fewer by what is on
      * the way there and back. A fifth above: sizes of frames are known only when they are sent. */
-    double most_ns = (double)FRAME_NS + 50.0 * MS + 0.2 * 83000 / link.bytes_per_ns;
-    assert_true(first.longest_line_ns < most_ns);
-    assert_true(last.longest_line_ns < most_ns);
+    double max_ns = (double)FRAME_NS + 50.0 * MS + 0.2 * 83000 / link.bytes_per_ns;
+    assert_true(first.longest_line_ns < max_ns);
+    assert_true(last.longest_line_ns < max_ns);
     /* The link is not left idle: a frame of this size takes 66 ms, and the next goes before it is acknowledged. */
     assert_true((double)last.bytes > 0.5 * 30e9 * link.bytes_per_ns);
     assert_true(last.frames >= first.frames - 2);
@@ -284,7 +284,7 @@ TEST(makes_frames_fit_the_link)
     double frames_per_second = 300e9 / (double)(now_ns - before_ns);
     assert_true(frames_per_second > 27.0); /* of 30 */
     assert_true(advice.scale_eighths < PACING_SCALE_FULL);
-    assert_true(advice.quality >= PACING_QUALITY_LEAST);
+    assert_true(advice.quality >= PACING_QUALITY_MIN);
     assert_true((double)advice.bytes <= 10e6 / 8 / 30);
     /* A better link: better frames, and not more than were asked for. */
     link.bytes_per_ns *= 20;
@@ -315,7 +315,7 @@ TEST(does_not_shrink_what_takes_long_at_any_size)
 {
     struct pacing pacing;
     pacing_init(&pacing, FRAME_NS);
-    /* 33 ms a frame: 60 ms at the least, 70 in full; hardly worth the picture. */
+    /* 33 ms a frame: 60 ms at least, 70 in full; hardly worth the picture. */
     assert_int_equal(follow_renderer(&pacing, 60 * MS, 10 * MS, 100).scale_eighths, PACING_SCALE_FULL);
     /* Size is what it costs: the same renderer with a slow light transport. */
     struct pacing_advice advice = follow_renderer(&pacing, 2 * MS, 200 * MS, 100);

@@ -41,17 +41,17 @@ static inline bool interrupted(void)
 
 static inline ssize_t short_read(int fd, void *data, size_t bytes)
 {
-    size_t least = atomic_load(&calls) % 5 + 1;
-    size_t most = bytes > 65536 ? bytes - 12345 : least; /* small messages in tiny parts, bulk in odd ones */
-    return interrupted() ? -1 : real.read(fd, data, bytes < most ? bytes : most);
+    size_t minimum = atomic_load(&calls) % 5 + 1;
+    size_t maximum = bytes > 65536 ? bytes - 12345 : minimum; /* small messages in tiny parts, bulk in odd ones */
+    return interrupted() ? -1 : real.read(fd, data, bytes < maximum ? bytes : maximum);
 }
 
 static inline ssize_t short_sendmsg(int fd, const struct msghdr *message, int flags)
 {
     struct iovec part = message->msg_iov[0];
     struct msghdr shorter = {.msg_iov = &part, .msg_iovlen = 1};
-    size_t most = part.iov_len > 4096 ? part.iov_len - 777 : atomic_load(&calls) % 7 + 1;
-    part.iov_len = part.iov_len < most ? part.iov_len : most;
+    size_t maximum = part.iov_len > 4096 ? part.iov_len - 777 : atomic_load(&calls) % 7 + 1;
+    part.iov_len = part.iov_len < maximum ? part.iov_len : maximum;
     return interrupted() ? -1 : real.sendmsg(fd, &shorter, flags);
 }
 

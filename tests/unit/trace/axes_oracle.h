@@ -16,7 +16,7 @@
 
 /* A rasteriser moves corners by half of a 1/256 of a texel (OpenGL asks for four bits, drivers have eight). */
 #define ORACLE_EDGE_TEXELS (1.0 / 128)
-/* Of a normal's greatest entry: whether it leans enough to an axis is for rounding to say below this. */
+/* Of a normal's largest entry: whether it leans enough to an axis is for rounding to say below this. */
 #define ORACLE_LEAN 1e-4
 
 struct oracle_sample {
@@ -122,9 +122,9 @@ static inline enum oracle_lean oracle_lean(const double n[3], int axis, enum ora
 {
     if (images == ORACLE_ALL)
         return ORACLE_LEANS_TO;
-    double others = fmax(fabs(n[(axis + 1) % 3]), fabs(n[(axis + 2) % 3])), most = fmax(fabs(n[axis]), others);
+    double others = fmax(fabs(n[(axis + 1) % 3]), fabs(n[(axis + 2) % 3])), maximum = fmax(fabs(n[axis]), others);
     double beyond =
-        images == ORACLE_ONE ? (fabs(n[axis]) - others) / most : fabs(n[axis]) / most - (double)AXES_OVERLAP;
+        images == ORACLE_ONE ? (fabs(n[axis]) - others) / maximum : fabs(n[axis]) / maximum - (double)AXES_OVERLAP;
     if (fabs(beyond) <= ORACLE_LEAN)
         return ORACLE_LEANS_SO_SO;
     return beyond > 0 ? ORACLE_LEANS_TO : ORACLE_LEANS_AWAY;

@@ -135,11 +135,11 @@ TEST_WITH(errors_become_colours_and_figures, NULL, NULL)
     assert_memory_equal(made[2], brightest, 3);
     assert_memory_equal(made[3], middle, 3); /* a quarter of the top: half way */
     assert_int_equal(made[0][3], 255);
-    assert_true(figures.greatest == 1);
+    assert_true(figures.max == 1);
     assert_true(fabs(figures.mean - (1 + 0.2) / 4) < 1e-12);
     assert_true(fabs(figures.beyond - 0.5) < 1e-12);
     heat_map(a[0], b[0], 0, 1, made[0], &figures);
-    assert_true(figures.mean == 0 && figures.greatest == 0 && figures.beyond == 0);
+    assert_true(figures.mean == 0 && figures.max == 0 && figures.beyond == 0);
 }
 
 TEST_WITH(hotter_is_brighter, NULL, NULL)

@@ -126,12 +126,12 @@ static struct patch patch_of(const struct contents *contents, uint32_t texel, ui
 static int bits_of(const struct patch *patch, bool certain)
 {
     const double *n = patch->normal, slack = certain ? NORMAL_SLACK : -NORMAL_SLACK;
-    double most = fmax(fabs(n[0]), fmax(fabs(n[1]), fabs(n[2])));
+    double maximum = fmax(fabs(n[0]), fmax(fabs(n[1]), fabs(n[2])));
     int bits = patch->body ? 0 : (int)ABUFFER_SUM_OPEN, axis = patch->axis;
-    if (fabs(n[axis]) >= (double)AXES_OVERLAP * most + slack)
+    if (fabs(n[axis]) >= (double)AXES_OVERLAP * maximum + slack)
         bits |= (int)(n[axis] > 0 ? ABUFFER_SUM_UP : ABUFFER_SUM_DOWN) << axis;
     for (int k = 0; k < 3; k++) {
-        bits |= fabs(n[k]) >= (double)AXES_OVERLAP * most + slack ? (int)ABUFFER_SUM_LEANS << k : 0;
+        bits |= fabs(n[k]) >= (double)AXES_OVERLAP * maximum + slack ? (int)ABUFFER_SUM_LEANS << k : 0;
         bits |= fabs(n[k]) < (double)ABUFFER_STEEP - slack ? (int)ABUFFER_SUM_STEEP << k : 0;
     }
     return bits;
@@ -157,8 +157,8 @@ static void spread(int *marks, int along, const struct contents *contents, const
 /* In the image that a surface leans to it is seen by as many samples as in any; the others say nothing. */
 static bool leans(const struct patch *patch, double slack)
 {
-    const double *n = patch->normal, most = fmax(fabs(n[0]), fmax(fabs(n[1]), fabs(n[2])));
-    return fabs(n[patch->axis]) >= (double)AXES_OVERLAP * most + slack;
+    const double *n = patch->normal, maximum = fmax(fabs(n[0]), fmax(fabs(n[1]), fabs(n[2])));
+    return fabs(n[patch->axis]) >= (double)AXES_OVERLAP * maximum + slack;
 }
 
 /* Of voxels, or subvoxels, so many along a side: what they have to know of the patches that touch them, and what
@@ -172,8 +172,8 @@ static void spread_all(int *certain, int *possible, int along, const struct cont
                 continue;
             if (leans(&patch, NORMAL_SLACK))
                 spread(certain, along, contents, &patch, bits_of(&patch, true), 0.499, patch.half_depth - 0.01);
-            double most = has_spheres ? 2 * patch.half_depth + 1 : patch.half_depth;
-            spread(possible, along, contents, &patch, bits_of(&patch, false), 0.501, most * 1.02 + 0.03);
+            double maximum = has_spheres ? 2 * patch.half_depth + 1 : patch.half_depth;
+            spread(possible, along, contents, &patch, bits_of(&patch, false), 0.501, maximum * 1.02 + 0.03);
         }
 }
 

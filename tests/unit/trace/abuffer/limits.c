@@ -47,7 +47,7 @@ TEST(many_layers_are_sorted)
         }
 }
 
-/* One body in another, a thousand times: 63 is the greatest number that a sample tells. */
+/* One body in another, a thousand times: 63 is the largest number that a sample can hold. */
 TEST(windings_beyond_the_stored_range_are_clamped)
 {
     struct test_edits edits = {.scene = test_scene_create()};
@@ -143,12 +143,12 @@ static enum tracer_progress build_in_units(struct fixture *fixture, uint32_t res
 {
     struct error error = {0};
     enum tracer_progress progress = TRACER_MORE;
-    const uint32_t most = *pieces;
+    const uint32_t maximum = *pieces;
     place(fixture, resolution, VOXELS);
     expect_ok(abuffer_build_begin(fixture->builder, &fixture->store, &fixture->gpu, fixture->instances,
                                   fixture->instance_count, &fixture->options, &error),
               &error);
-    for (*pieces = 0; progress == TRACER_MORE && *pieces < most; ++*pieces) {
+    for (*pieces = 0; progress == TRACER_MORE && *pieces < maximum; ++*pieces) {
         for (int stage = 0; stage < ABUFFER_STAGES; stage++)
             fixture->builder->unit_items[stage] = items;
         /* What others do in between. */

@@ -145,14 +145,14 @@ static inline void abuffer_sum(const struct abuffer_samples *s, int32_t (*sums)[
 {
     const uint32_t n = s->resolution, axis = at->texel / (n * n), iu = (axis + 1) % 3, iv = (axis + 2) % 3;
     const float voxel = (float)n / (float)s->voxels_along;
-    float size[3], most = 0, low[3], high[3], middle[3];
+    float size[3], maximum = 0, low[3], high[3], middle[3];
     int first[3], last[3], own[3], inner_first[3], inner_last[3];
-    uint32_t most_axis = 0;
+    uint32_t dominant_axis = 0;
     for (uint32_t k = 0; k < 3; k++) {
         size[k] = fabsf(at->normal[k]);
-        if (size[k] > most) {
-            most = size[k];
-            most_axis = k;
+        if (size[k] > maximum) {
+            maximum = size[k];
+            dominant_axis = k;
         }
     }
     middle[iu] = (float)(at->texel % n) + 0.5f;
@@ -174,7 +174,7 @@ static inline void abuffer_sum(const struct abuffer_samples *s, int32_t (*sums)[
     }
     uint32_t bits = at->is_body ? 0 : ABUFFER_SUM_OPEN;
     for (uint32_t k = 0; k < 3; k++) {
-        if (size[k] >= AXES_OVERLAP * most)
+        if (size[k] >= AXES_OVERLAP * maximum)
             bits |= (ABUFFER_SUM_LEANS | (at->normal[k] > 0 ? ABUFFER_SUM_UP : ABUFFER_SUM_DOWN)) << k;
         bits |= size[k] < ABUFFER_STEEP ? ABUFFER_SUM_STEEP << k : 0;
     }
@@ -182,14 +182,14 @@ static inline void abuffer_sum(const struct abuffer_samples *s, int32_t (*sums)[
     for (int z = inner_first[2]; z <= inner_last[2]; z++)
         for (int y = inner_first[1]; y <= inner_last[1]; y++)
             for (int x = inner_first[0]; x <= inner_last[0]; x++)
-                subvoxels[(z / 4 * along + y / 4) * along + x / 4][most_axis][z / 2 % 2] |=
+                subvoxels[(z / 4 * along + y / 4) * along + x / 4][dominant_axis][z / 2 % 2] |=
                     1u << (x % 4 + 4 * (y % 4) + 16 * (z % 2));
     for (int z = first[2]; z <= last[2]; z++)
         for (int y = first[1]; y <= last[1]; y++)
             for (int x = first[0]; x <= last[0]; x++) {
                 int32_t *sum = sums[(z * along + y) * along + x];
                 sum[3] |= (int32_t)bits;
-                if (axis == most_axis && x == own[0] && y == own[1] && z == own[2])
+                if (axis == dominant_axis && x == own[0] && y == own[1] && z == own[2])
                     for (int k = 0; k < 3; k++)
                         sum[k] += (int32_t)lrintf(at->normal[k] * ABUFFER_NORMAL_UNIT);
             }

@@ -156,10 +156,10 @@ static inline void expect_consistent(const struct contents *contents)
     uint32_t total = 0;
     for (uint32_t i = 0; i < 3 * cube->resolution * cube->resolution; i++) {
         uint32_t count = count_of(contents, i);
-        float least = float_of(contents->texels[i][2]), greatest = float_of(contents->texels[i][3]);
+        float minimum = float_of(contents->texels[i][2]), maximum = float_of(contents->texels[i][3]);
         total += count;
         if (count == 0) {
-            assert_true(least == LDC_NO_DEPTH && greatest == -LDC_NO_DEPTH);
+            assert_true(minimum == LDC_NO_DEPTH && maximum == -LDC_NO_DEPTH);
             continue;
         }
         uint32_t first = sample_of(contents, i);
@@ -177,7 +177,7 @@ static inline void expect_consistent(const struct contents *contents)
             assert_true(k == 0 || depth > contents->quads[4 * quad + k - 1]);
             assert_false(taken[first + k]++);
         }
-        assert_true(least == contents->quads[4 * quad] && greatest == contents->quads[4 * quad + count - 1]);
+        assert_true(minimum == contents->quads[4 * quad] && maximum == contents->quads[4 * quad + count - 1]);
     }
     assert_int_equal(total, cube->sample_count);
     free(taken);

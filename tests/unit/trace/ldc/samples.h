@@ -65,8 +65,8 @@ static inline void ldc_add_sample(struct ldc_samples *s, int axis, uint32_t u, u
 /* Whether a surface with this normal is in the image of an axis. */
 static inline bool ldc_is_in_image(const float normal[3], int axis)
 {
-    float most = fmaxf(fabsf(normal[0]), fmaxf(fabsf(normal[1]), fabsf(normal[2])));
-    return fabsf(normal[axis]) >= AXES_OVERLAP * most;
+    float maximum = fmaxf(fabsf(normal[0]), fmaxf(fabsf(normal[1]), fabsf(normal[2])));
+    return fabsf(normal[axis]) >= AXES_OVERLAP * maximum;
 }
 
 /* An edge that two share is one's only. */

@@ -336,7 +336,8 @@ TEST(more_layers_than_may_be_kept_are_reported_and_the_nearest_stay)
         assert_int_equal(told(fixture.tracer, "static/layers_kept"), 2);
         assert_int_equal(told(fixture.tracer, "static/samples_lost"), 2 * told(fixture.tracer, "static/samples"));
         assert_non_null(strstr(told_row(fixture.tracer, "static/layers_kept").warning, "2 of 6 layers"));
-        expect_distance(distance_below(&fixture, 0, 0), 9.75); /* z = 0.25, the second from below: least depths */
+        expect_distance(distance_below(&fixture, 0, 0),
+                        9.75); /* z = 0.25, the second from below: minimum depths */
         struct ray up = {{0.013f, 0.017f, -10, 0}, {0, 0, 1, 1e9f}};
         expect_distance(trace_one(&fixture, up).distance, 10);
         fixture_finish(&fixture);
