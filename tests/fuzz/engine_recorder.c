@@ -2,8 +2,8 @@
 #include "tests/fuzz/engine_recorder.h"
 
 #include "base/clock.h"
-#include "base/queue.h"
 #include "engine/view_wishes.h"
+#include "tests/fixtures/engine_port.h"
 #include "tests/fuzz/fuzz.h"
 
 #include <stdlib.h>
@@ -12,7 +12,6 @@
 #define SCENES_MAX 64
 #define REFERENCES_MAX 64
 #define JOBS_MAX 64
-#define EVENTS_MAX 4096
 /* Of one job; then it stands, as if the GPU were busy with others: a million may be asked for. */
 #define FRAMES_MAX 100
 
@@ -44,7 +43,6 @@ struct recorded_job {
 bool recorder_at_work;
 
 static struct {
-    struct queue *events;
     unsigned mood;
     struct recorded_scene scenes[SCENES_MAX];
     struct recorded_reference references[REFERENCES_MAX];
@@ -55,13 +53,9 @@ static struct {
 
 static struct engine_event *say(enum engine_event_kind kind, uint64_t client, uint32_t request)
 {
-    struct engine_event *event = calloc(1, sizeof(*event));
-    FUZZ_REQUIRE(event != NULL);
-    event->kind = kind;
-    event->client = client;
-    event->request = request;
-    FUZZ_REQUIRE(queue_try_push(recorder.events, event));
-    return event;
+    struct engine_event *event = port_event(kind, client, request);
+    port_say(event);
+    return event; /* what it says is filled in by this thread, which takes it out later */
 }
 
 static void say_failed(uint64_t client, uint32_t request, enum error_code kind, const char *field)
@@ -216,19 +210,15 @@ static void describe(const struct engine_command *command, const struct scene *s
 
 static void say_frame(struct recorded_job *job, uint32_t samples, const struct view_camera *camera)
 {
-    struct engine_frame *frame = calloc(1, sizeof(*frame));
-    FUZZ_REQUIRE(frame != NULL);
-    frame->frame = (uint32_t)job->next;
+    const bool large = recorder.mood & RECORDER_LARGE;
+    struct engine_event *event = port_frame(job->client, job->request, (uint32_t)job->next,
+                                            large ? RECORDER_LARGE_FRAME_BYTES : RECORDER_FRAME_BYTES);
+    struct engine_frame *frame = event->frame;
     frame->request.width = job->width;
     frame->request.height = job->height;
     frame->result.samples = samples;
-    frame->result.layers = 1;
     frame->result.revision = job->reference->scene->scene->revision;
-    stage_times_begin(&frame->result.times);
     frame->encoding = camera && !camera->moving ? job->still_encoding : job->encoding;
-    frame->size_bytes = recorder.mood & RECORDER_LARGE ? RECORDER_LARGE_FRAME_BYTES : RECORDER_FRAME_BYTES;
-    frame->bytes = calloc(1, frame->size_bytes);
-    FUZZ_REQUIRE(frame->bytes != NULL);
     frame->key_frame = true;
     if (camera) {
         frame->command = camera->command;
@@ -238,7 +228,7 @@ static void say_frame(struct recorded_job *job, uint32_t samples, const struct v
     frame->applied_ns = clock_now_ns();
     frame->rendered_ns = clock_now_ns();
     frame->encoded_ns = clock_now_ns();
-    say(ENGINE_FRAME, job->client, job->request)->frame = frame;
+    port_say(event);
     job->next += job->step;
     job->made++;
 }
@@ -471,30 +461,17 @@ static bool submit(void *context, struct engine_command *command, struct error *
     return true;
 }
 
-static int event_fd(void *context)
-{
-    (void)context;
-    return queue_event_fd(recorder.events);
-}
-
 static struct engine_event *next_event(void *context)
 {
-    (void)context;
-    return recorder.mood & RECORDER_HOLDS ? NULL : queue_try_pop(recorder.events);
-}
-
-static void report_sent(void *context, uint64_t queue_ns, uint64_t send_ns)
-{
-    (void)context, (void)queue_ns, (void)send_ns;
+    return recorder.mood & RECORDER_HOLDS ? NULL : port_next_event(context);
 }
 
 struct engine_port recorder_begin(void)
 {
     memset(&recorder, 0, sizeof(recorder));
-    recorder.events = queue_create(EVENTS_MAX, true);
-    FUZZ_REQUIRE(recorder.events != NULL);
-    return (struct engine_port){
-        .submit = submit, .event_fd = event_fd, .next_event = next_event, .report_sent = report_sent};
+    struct engine_port made = port_begin(submit);
+    made.next_event = next_event;
+    return made;
 }
 
 void recorder_set_mood(unsigned mood)
@@ -518,13 +495,8 @@ size_t recorder_references(void)
     return count;
 }
 
-static void drop_event(void *event)
-{
-    engine_event_destroy(event);
-}
-
 void recorder_end(void)
 {
     FUZZ_REQUIRE(recorder_references() == 0); /* and no scene without one */
-    queue_destroy(recorder.events, drop_event);
+    port_end();
 }

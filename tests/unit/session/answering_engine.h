@@ -4,18 +4,16 @@
 #ifndef FARLIGHT_TESTS_ANSWERING_ENGINE_H
 #define FARLIGHT_TESTS_ANSWERING_ENGINE_H
 
+#include "tests/fixtures/engine_port.h"
 #include "tests/unit/session/session_fixture.h"
 
 #include "base/clock.h"
-#include "base/queue.h"
 
 #define FRAME_BYTES ((size_t)700001) /* three pieces, the last of odd size */
 
 /* ---- an engine --------------------------------------------------------------------------------------- */
 
 static struct {
-    struct queue *events;
-    pthread_mutex_t mutex;
     atomic_bool full;      /* takes no commands */
     atomic_bool keep_jobs; /* jobs render nothing until they are cancelled */
     atomic_bool keep_commits;
@@ -25,36 +23,28 @@ static struct {
     struct clip_use job_clips[16];
     struct structure_rows structure; /* of the frames that it renders */
     uint64_t credit_seen, commits;
-    atomic_uint edits, gone, frames_sent;
+    atomic_uint edits, gone;
 } engine;
 
 static inline void event(enum engine_event_kind kind, const struct engine_command *command, uint32_t request)
 {
-    struct engine_event *made = calloc(1, sizeof(*made));
-    made->kind = kind;
-    made->client = command->client;
-    made->request = request;
+    struct engine_event *made = port_event(kind, command->client, request);
     made->revision = engine.commits;
     if (kind == ENGINE_FAILED)
         error_set(&made->error, ERROR_CANCELLED, NULL, "cancelled");
     if (kind == ENGINE_STATS_READY) {
-        made->stats = calloc(1, sizeof(*made->stats));
+        made->stats = port_allocate(sizeof(*made->stats));
         strcpy(made->stats->device.name, "none");
     }
-    queue_push(engine.events, made);
+    port_say(made);
 }
 
 static inline void render(const struct engine_command *command)
 {
     for (; engine.next_frame <= engine.last_frame && engine.next_frame < engine.credit_seen; engine.next_frame++) {
-        struct engine_event *made = calloc(1, sizeof(*made));
-        made->kind = ENGINE_FRAME;
-        made->client = command->client;
-        made->request = engine.job_request;
-        made->frame = calloc(1, sizeof(*made->frame));
+        struct engine_event *made =
+            port_frame(command->client, engine.job_request, engine.next_frame, FRAME_BYTES);
         struct engine_frame *frame = made->frame;
-        frame->frame = engine.next_frame;
-        frame->request.width = frame->request.height = frame->request.samples = 1;
         frame->request.tracer = engine.job.frame.tracer;
         frame->request.aperture = engine.job.frame.aperture;
         frame->request.focus = engine.job.frame.focus;
@@ -62,13 +52,10 @@ static inline void render(const struct engine_command *command)
         frame->result.layers = engine.job.frame.layers ? engine.job.frame.layers : 1;
         frame->result.samples = 5; /* with those of frames before */
         frame->result.structure = engine.structure;
-        frame->size_bytes = FRAME_BYTES;
-        frame->bytes = malloc(FRAME_BYTES);
         for (size_t i = 0; i < FRAME_BYTES; i++)
             frame->bytes[i] = (uint8_t)(i * 31 + engine.next_frame);
         frame->encoded_ns = clock_now_ns();
-        stage_times_begin(&frame->result.times);
-        queue_push(engine.events, made);
+        port_say(made);
     }
     if (engine.next_frame > engine.last_frame)
         event(ENGINE_DONE, command, engine.job_request);
@@ -141,40 +128,15 @@ static inline void release_commit(void)
     engine_command_destroy(command);
 }
 
-static inline int event_fd(void *context)
-{
-    (void)context;
-    return queue_event_fd(engine.events);
-}
-
-static inline struct engine_event *next_event(void *context)
-{
-    (void)context;
-    return queue_try_pop(engine.events);
-}
-
-static inline void report_sent(void *context, uint64_t queue_ns, uint64_t send_ns)
-{
-    (void)context, (void)queue_ns, (void)send_ns;
-    atomic_fetch_add(&engine.frames_sent, 1);
-}
-
-static inline void drop_event(void *item)
-{
-    engine_event_destroy(item);
-}
-
 static inline struct engine_port engine_begin(void)
 {
     memset(&engine, 0, sizeof(engine));
-    engine.events = queue_create(4096, true);
-    return (struct engine_port){
-        .submit = submit, .event_fd = event_fd, .next_event = next_event, .report_sent = report_sent};
+    return port_begin(submit);
 }
 
 static inline void engine_end(void)
 {
-    queue_destroy(engine.events, drop_event);
+    port_end();
 }
 
 /* ---- steps ------------------------------------------------------------------------------------------- */

@@ -50,7 +50,7 @@ SESSION_TEST(frames_arrive_complete_in_order_and_within_the_credit)
     for (uint32_t frame = 2; frame <= 6; frame++)
         expect_frame(2, frame);
     expect(MESSAGE_OK, 2);
-    assert_int_equal(atomic_load(&engine.frames_sent), 7);
+    assert_int_equal(atomic_load(&port.frames_sent), 7);
 }
 
 SESSION_TEST(a_cancelled_job_has_one_answer_and_nothing_follows_it)

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /* Views as a session serves them, with an engine that keeps what it is told for the test to see, and says what the
  * test has it say. */
+#include "tests/fixtures/engine_port.h"
 #include "tests/unit/session/session_fixture.h"
 
 #include "encode/stream.h"
 
 #include "base/clock.h"
-#include "base/queue.h"
 #include "engine/view_wishes.h"
 #include "tests/harness/test.h"
 
@@ -22,20 +22,16 @@
 /* ---- an engine --------------------------------------------------------------------------------------- */
 
 static struct {
-    struct queue *events, *commands;
+    struct queue *commands;
     atomic_uint gone;
 } engine;
 
 static void say(enum engine_event_kind kind, uint32_t request, enum error_code error)
 {
-    struct engine_event *made = calloc(1, sizeof(*made));
-    assert_non_null(made);
-    made->kind = kind;
-    made->client = 1;
-    made->request = request;
+    struct engine_event *made = port_event(kind, 1, request);
     if (error)
         error_set(&made->error, error, "fake", "as the test wants");
-    assert_true(queue_push(engine.events, made));
+    port_say(made);
 }
 
 static bool submit(void *context, struct engine_command *command, struct error *error)
@@ -56,35 +52,11 @@ static bool submit(void *context, struct engine_command *command, struct error *
     }
 }
 
-static int event_fd(void *context)
-{
-    (void)context;
-    return queue_event_fd(engine.events);
-}
-
-static struct engine_event *next_event(void *context)
-{
-    (void)context;
-    return queue_try_pop(engine.events);
-}
-
-static void report_sent(void *context, uint64_t queue_ns, uint64_t send_ns)
-{
-    (void)context, (void)queue_ns, (void)send_ns;
-}
-
 static struct engine_port engine_begin(void)
 {
-    engine.events = queue_create(4096, true);
-    engine.commands = queue_create(4096, false);
+    engine.commands = queue_create(ENGINE_PORT_EVENTS_MAX, false);
     atomic_store(&engine.gone, 0);
-    return (struct engine_port){
-        .submit = submit, .event_fd = event_fd, .next_event = next_event, .report_sent = report_sent};
-}
-
-static void drop_event(void *item)
-{
-    engine_event_destroy(item);
+    return port_begin(submit);
 }
 
 static void drop_command(void *item)
@@ -94,7 +66,7 @@ static void drop_command(void *item)
 
 static void engine_end(void)
 {
-    queue_destroy(engine.events, drop_event);
+    port_end();
     queue_destroy(engine.commands, drop_command);
 }
 
@@ -137,19 +109,8 @@ static void told_nothing(void)
 /* A frame of a view, that shows a command and was taken up, read back and encoded at 100, 200 and 300 ns. */
 static struct engine_event *frame_of(uint32_t request, uint32_t number, uint64_t command, size_t bytes)
 {
-    struct engine_event *made = calloc(1, sizeof(*made));
-    struct engine_frame *frame = calloc(1, sizeof(*frame));
-    assert_true(made && frame);
-    made->kind = ENGINE_FRAME;
-    made->client = 1;
-    made->request = request;
-    made->frame = frame;
-    frame->frame = number;
-    frame->request.width = frame->request.height = 1;
-    frame->result.samples = frame->result.layers = 1;
-    frame->size_bytes = bytes;
-    frame->bytes = malloc(bytes);
-    assert_non_null(frame->bytes);
+    struct engine_event *made = port_frame(1, request, number, bytes);
+    struct engine_frame *frame = made->frame;
     memset(frame->bytes, (int)number, bytes);
     frame->command = command;
     frame->received_ns = command ? 50 : 0;
@@ -159,13 +120,12 @@ static struct engine_event *frame_of(uint32_t request, uint32_t number, uint64_t
     frame->encoded_ns = 300;
     frame->key_frame = true;
     frame->quality = 77;
-    stage_times_begin(&frame->result.times);
     return made;
 }
 
 static void say_frame_of(uint32_t request, uint32_t number, uint64_t command, size_t bytes)
 {
-    assert_true(queue_push(engine.events, frame_of(request, number, command, bytes)));
+    port_say(frame_of(request, number, command, bytes));
 }
 
 static void say_frame_with(uint32_t request, uint32_t number, size_t depth_bytes, size_t normal_bytes)
@@ -174,7 +134,7 @@ static void say_frame_with(uint32_t request, uint32_t number, size_t depth_bytes
     made->frame->result.attachments = 1u << ATTACHMENT_DEPTH | 1u << ATTACHMENT_NORMALS;
     made->frame->depth_bytes = depth_bytes;
     made->frame->normal_bytes = normal_bytes;
-    assert_true(queue_push(engine.events, made));
+    port_say(made);
 }
 
 static void say_frame(uint32_t request, uint32_t number, uint64_t command)
@@ -457,7 +417,7 @@ static struct engine_command *let_a_frame_wait(enum encoding encoding)
     told_credit(2, 3);
     struct engine_event *late = frame_of(2, 2, 0, FRAME_BYTES);
     late->frame->encoding = encoding;
-    assert_true(queue_push(engine.events, late));
+    port_say(late);
     send_camera(8, true);
     told_and_forgotten(ENGINE_VIEW_LOOK);
     usleep(20000);
@@ -506,7 +466,7 @@ static bool is_abandoned(uint32_t number, uint64_t command, enum encoding encodi
 {
     struct engine_event *made = frame_of(2, number, command, LARGE_FRAME_BYTES);
     made->frame->encoding = encoding;
-    assert_true(queue_push(engine.events, made));
+    port_say(made);
     expect(MESSAGE_FRAME_BEGIN, 2);
     send_camera(camera, moving);
     return take_rest_of_large_frame(2, number);
