@@ -25,7 +25,7 @@ struct line_intersection {
     bool from_behind;
 };
 
-line_intersection cross_triangle(vec3 o, vec3 d, uint primitive)
+line_intersection intersect_line_triangle(vec3 o, vec3 d, uint primitive)
 {
     line_intersection c;
     uvec4 triangle = texelFetch(triangles, int(primitive));
@@ -125,7 +125,7 @@ bool settle(trace_ray r, voxel_traversal w, float limit, inout abuffer_found fou
     line_intersection own;
     bool is_own = true, passes = false, is_hit, goes_on;
     do {
-        line_intersection c = cross_triangle(o, d, id - drawn.y);
+        line_intersection c = intersect_line_triangle(o, d, id - drawn.y);
         if (is_own)
             own = c;
         bool is_inside = min_component(c.weights) >= 0.0, is_ahead = c.distance > r.t_min;

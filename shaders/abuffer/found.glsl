@@ -3,7 +3,7 @@
 //
 // Defines: those of trace/wave.comp.
 #include "shared/hit.h"
-#include "common/crossed.glsl"
+#include "common/intersected.glsl"
 #include "abuffer/sample_primitive.glsl"
 #include "abuffer/voxel_traversal.glsl"
 
@@ -13,7 +13,7 @@ struct abuffer_found {
 #ifdef ANY_HIT
     vec3 optical_depth;
 #ifdef HAS_TRANSLUCENT
-    crossed_surfaces crossed;
+    intersected_surfaces intersected;
 #endif
 #else
     int sample_index; // -1: none
@@ -34,8 +34,8 @@ void offer_sample(trace_ray r, inout abuffer_found found, int sample_index, floa
 #ifdef HAS_TRANSLUCENT
     candidate c = candidate_of_sample(sample_index, distance_);
     c.barycentrics = nearest_barycentrics(c, r.origin, r.direction);
-    cross_surface(found.crossed, found.optical_depth, material_index_of(c), distance_, side, near,
-                  transmittance_of(c, r.origin, r.direction, 0.0));
+    add_intersected(found.intersected, found.optical_depth, material_index_of(c), distance_, side, near,
+                    transmittance_of(c, r.origin, r.direction, 0.0));
     if (min_component(found.optical_depth) >= OPTICAL_DEPTH_BLACK)
         found.end = -1.0;
 #else
@@ -47,7 +47,7 @@ void offer_sample(trace_ray r, inout abuffer_found found, int sample_index, floa
 abuffer_found found_of(trace_ray r, vec3 optical_depth)
 {
 #ifdef HAS_TRANSLUCENT
-    return abuffer_found(r.t_max, optical_depth, crossed_nothing());
+    return abuffer_found(r.t_max, optical_depth, intersected_nothing());
 #else
     return abuffer_found(r.t_max, optical_depth);
 #endif

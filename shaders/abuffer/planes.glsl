@@ -15,7 +15,7 @@ const float OWN_BEHIND = 0.5, OWN_BEFORE = 0.12, OWN_RISE = 0.05; // the rise is
 
 // Intersects a ray (o, d in the image) with a sample's plane; false: it begins on this plane. `side` is positive if it
 // comes from behind.
-bool cross_plane(vec3 o, vec3 d, float s_min, ivec2 texel, column_sample p, out float s, out float side)
+bool intersect_plane(vec3 o, vec3 d, float s_min, ivec2 texel, column_sample p, out float s, out float side)
 {
     float height = dot(p.normal, vec3(vec2(texel) + 0.5, p.depth) - o);
     side = dot(p.normal, d);
@@ -42,7 +42,7 @@ bool search_image(trace_ray r, inout voxel_traversal w, inout abuffer_found foun
     vec2 inverse = 1.0 / d.xy;
     vec2 border = (vec2(texel + forward) - o.xy) * inverse;
     float s = s_in;
-    bool any_crossed = false, goes_on;
+    bool any_intersected = false, goes_on;
     do {
         bool along_u = border.x < border.y;
         float s_next = along_u ? border.x : border.y;
@@ -58,16 +58,16 @@ bool search_image(trace_ray r, inout voxel_traversal w, inout abuffer_found foun
             is_behind = is_one && depth_of(words) > depth_max;
             column_sample p = sample_of(words, axis);
             float s_plane, side;
-            bool crosses = cross_plane(o, d, w.s_min, texel, p, s_plane, side);
+            bool intersects = intersect_plane(o, d, w.s_min, texel, p, s_plane, side);
             vec2 from_middle = abs(o.xy + s_plane * d.xy - vec2(texel) - 0.5);
-            bool is_met = crosses && from_middle.x <= 0.5 + w.beyond && from_middle.y <= 0.5 + w.beyond;
+            bool is_met = intersects && from_middle.x <= 0.5 + w.beyond && from_middle.y <= 0.5 + w.beyond;
             if (is_one && !is_behind && is_met && s_plane > w.s_behind && s_plane < w.s_limit &&
                 (!only_leaning || leans(p))) {
                 offer_at(r, w, found, i, s_plane, side);
 #ifndef ANY_HIT
                 found.is_within = from_middle.x <= 0.5 + ABUFFER_SLACK && from_middle.y <= 0.5 + ABUFFER_SLACK;
 #endif
-                any_crossed = true;
+                any_intersected = true;
             }
         } while (c.next < c.end && !is_behind);
         goes_on = s_next < s_out && s_next < w.s_limit;
@@ -76,7 +76,7 @@ bool search_image(trace_ray r, inout voxel_traversal w, inout abuffer_found foun
         goes_on = goes_on && all(lessThan(uvec2(texel), uvec2(abuffer_resolution)));
         border = (vec2(texel + forward) - o.xy) * inverse;
     } while (goes_on);
-    return any_crossed;
+    return any_intersected;
 }
 
 // All images that a voxel names, in order; an intersection in one ends the search in the next there.

@@ -38,7 +38,7 @@ struct step_traversal {
     int winding_lo;
 };
 
-// The image that the voxel names; of several the one along the ray's dominant axis: there it crosses the fewest texels,
+// The image that the voxel names; of several the one along the ray's dominant axis: there it passes the fewest texels,
 // and sees no surface edge-on.
 int image_of(uint what, vec3 d)
 {
@@ -118,9 +118,9 @@ bool follow(trace_ray r, inout voxel_traversal w, inout abuffer_found found, ste
             is_behind = is_one && depth_of(words) > p.z + FOLLOW_REACH;
             float s_plane, side;
             column_sample q = sample_of(words, axis);
-            bool crosses = cross_plane(o, d, w.s_min, texel, q, s_plane, side) && (!t.only_leaning || leans(q));
-            crosses = crosses && (t.by_winding || (s_plane > lo && s_plane < hi));
-            if (is_one && !is_behind && crosses && abs(s_plane - s) < abs(nearest - s)) {
+            bool intersects = intersect_plane(o, d, w.s_min, texel, q, s_plane, side) && (!t.only_leaning || leans(q));
+            intersects = intersects && (t.by_winding || (s_plane > lo && s_plane < hi));
+            if (is_one && !is_behind && intersects && abs(s_plane - s) < abs(nearest - s)) {
                 nearest = s_plane;
                 nearest_side = side;
                 nearest_sample = i;
@@ -165,13 +165,13 @@ void search_passage(trace_ray r, inout voxel_traversal w, inout abuffer_found fo
         hi = !is_far || is_before ? hi : middle;
     } while (++i < BISECTIONS_MAX && hi - lo > 1.0);
     // If it was passed at a texel's border and no plane was intersected, it is steep here and another image shows it.
-    bool crossed = false;
+    bool intersected = false;
     int other = 0;
     do {
         int image = axis + other < 3 ? axis + other : axis + other - 3;
-        crossed = search_image(r, w, found, image, other > 0, max(lo - 0.5, w.s_min), hi + 0.5);
-    } while (++other < 3 && !crossed);
-    if (!crossed && hi > w.s_min + OWN_WAY + 1.0 && hi < w.s_limit) {
+        intersected = search_image(r, w, found, image, other > 0, max(lo - 0.5, w.s_min), hi + 0.5);
+    } while (++other < 3 && !intersected);
+    if (!intersected && hi > w.s_min + OWN_WAY + 1.0 && hi < w.s_limit) {
         i = nearest_sample(axis, place_in_image(w, axis, hi));
         i = i < 0 ? nearest_sample(axis, place_in_image(w, axis, lo)) : i;
         if (i >= 0)
@@ -214,9 +214,9 @@ bool look(inout voxel_traversal w, inout step_traversal t)
             winding += !is_behind && plane_depth(q, from_middle) < p.z ? q.step_ : 0;
             is_first = false;
             float s, side;
-            bool crosses = cross_plane(o, d, w.s_min, texel, q, s, side) && (!t.only_leaning || leans(q));
+            bool intersects = intersect_plane(o, d, w.s_min, texel, q, s, side) && (!t.only_leaning || leans(q));
             bool is_here = s > t.lo - FOLLOW_ALONG && s < t.hi + FOLLOW_ALONG && s < nearest;
-            nearest = !is_behind && crosses && is_here ? s : nearest;
+            nearest = !is_behind && intersects && is_here ? s : nearest;
         }
     } while (c.next < c.end && !is_behind);
     bool is_past_own = t.hi > w.s_min + OWN_WAY;

@@ -2,7 +2,7 @@
 // Rays against the bound of an element: spheres (BVH_SPHERES), boxes in floats, or boxes on the tree's grid
 // (BVH_PACKED), whose cells are then the unit of the ray too. All tests only ever err towards a hit.
 //
-// Rounding, with u = 2^-24. A box's plane b is crossed at b i - o i, i = 1 / d: the reciprocal errs by 1 u (2.5 u on
+// Rounding, with u = 2^-24. A box's plane b is hit at b i - o i, i = 1 / d: the reciprocal errs by 1 u (2.5 u on
 // hardware), each product by 1 u, the difference by 1 u, which moves the plane by at most 5 u (|b| + |o|). The
 // intersection of the primitive itself errs by about as much (corners are relative to the origin), and a sphere's
 // distance from the line by less than 8 u of the same. The part of b is in the bounds: the builder pads them by
@@ -69,7 +69,7 @@ bundle bundle_of(object_ray o[RAYS_TOGETHER], bool alive[RAYS_TOGETHER], int lea
 
 // Where rays intersect the planes of boxes, as an interval that holds for all rays of the packet: the test of eight
 // costs that of two. Wald, Boulos, Shirley, Ray Tracing Deformable Scenes Using Dynamic Bounding Volume Hierarchies,
-// ACM TOG 2007, section 4.2 (interval arithmetic). A plane at p is crossed at (p - c) i - e, with c the leading ray's
+// ACM TOG 2007, section 4.2 (interval arithmetic). A plane at p is hit at (p - c) i - e, with c the leading ray's
 // origin, i of a ray between the minimum and the maximum inverse direction, e how far the ray's own origin is off c; e
 // and the slack are in the offsets. Along an axis where the rays' directions differ in sign nothing is culled: scales
 // are 0 there, and offsets beyond everything. One ray has no interval: its minimum and maximum are equal.

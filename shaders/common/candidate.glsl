@@ -91,7 +91,7 @@ bool offer_any(trace_ray r, candidate found, inout vec3 optical_depth)
 #endif
 }
 
-bool cross_triangle(trace_ray r, object_ray o, uint primitive, uint instance_index, out candidate found)
+bool intersect_primitive(trace_ray r, object_ray o, uint primitive, uint instance_index, out candidate found)
 {
     uint close_offset = 0u;
 #ifdef HAS_MOTION
@@ -110,14 +110,14 @@ bool cross_triangle(trace_ray r, object_ray o, uint primitive, uint instance_ind
 void visit_triangle_closest(trace_ray r, object_ray o, uint primitive, uint instance_index, inout candidate best)
 {
     candidate found;
-    if (cross_triangle(r, o, primitive, instance_index, found))
+    if (intersect_primitive(r, o, primitive, instance_index, found))
         offer_closest(r, found, best);
 }
 
 bool visit_triangle_any(trace_ray r, object_ray o, uint primitive, uint instance_index, inout vec3 optical_depth)
 {
     candidate found;
-    return cross_triangle(r, o, primitive, instance_index, found) && offer_any(r, found, optical_depth);
+    return intersect_primitive(r, o, primitive, instance_index, found) && offer_any(r, found, optical_depth);
 }
 
 void visit_sphere_closest(trace_ray r, object_ray o, uint primitive, uint instance_index, inout candidate best)

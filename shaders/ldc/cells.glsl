@@ -135,8 +135,8 @@ void test_cell_sample(inout cell_traversal w, int axis, ivec3 cell, uint sample_
     float flip_depth = in_image(flipped, axis).z;
     float turned = flip_depth < 0.0 ? float(w.grid << LDC_NODE_SHIFT) - depth : depth;
     float s, side;
-    if (cross_sample(in_image(w.o, axis), in_image(w.d, axis), w.cube, in_image(vec3(cell), axis).xy, turned,
-                     in_image(normal, axis), s, side) &&
+    if (intersect_sample(in_image(w.o, axis), in_image(w.d, axis), w.cube, in_image(vec3(cell), axis).xy, turned,
+                         in_image(normal, axis), s, side) &&
         s > w.s_min && s < w.s_limit) {
         offer_sample(found, sample_index, (s + w.begin) / w.scale, side, 1.0 / w.scale);
         w.s_limit = found.end * w.scale - w.begin;

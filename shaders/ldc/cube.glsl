@@ -48,7 +48,7 @@ cell_ray cube_ray_of(trace_ray r, int cube)
 
 // Intersects the ray (o, d in the image) with a sample of a texel, within the texel. `normal` may have any length;
 // `side` is positive if the ray comes from behind.
-bool cross_sample(vec3 o, vec3 d, int cube, vec2 texel, float depth, vec3 normal, out float s, out float side)
+bool intersect_sample(vec3 o, vec3 d, int cube, vec2 texel, float depth, vec3 normal, out float s, out float side)
 {
     LDC_COUNT(z);
     vec3 to_sample = vec3(texel + 0.5, depth) - o;
@@ -60,13 +60,13 @@ bool cross_sample(vec3 o, vec3 d, int cube, vec2 texel, float depth, vec3 normal
     vec2 a = (to_sample.xy - 0.5) * inverse, b = (to_sample.xy + 0.5) * inverse;
     vec2 near = min(a, b), far = max(a, b);
     s = min(max(to_sample.z / d.z, max(near.x, near.y)), min(far.x, far.y));
-    bool crosses = abs(s * d.z - to_sample.z) <= ldc_tolerance[CUBE(cube)];
+    bool intersects = abs(s * d.z - to_sample.z) <= ldc_tolerance[CUBE(cube)];
 #else
     s = height / side;
     vec2 from_middle = abs(s * d.xy - to_sample.xy);
-    bool crosses = from_middle.x <= 0.5 + LDC_SLACK && from_middle.y <= 0.5 + LDC_SLACK;
+    bool intersects = from_middle.x <= 0.5 + LDC_SLACK && from_middle.y <= 0.5 + LDC_SLACK;
 #endif
     float own = side > 0.0 ? LDC_OWN_BEHIND * LDC_OWN_BEHIND : LDC_OWN_BEFORE * LDC_OWN_BEFORE;
     bool is_own = s < LDC_OWN_WAY && height * height < own * dot(normal, normal);
-    return crosses && !is_own;
+    return intersects && !is_own;
 }

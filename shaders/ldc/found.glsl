@@ -3,7 +3,7 @@
 //
 // Defines: those of trace/wave.comp.
 #include "shared/hit.h"
-#include "common/crossed.glsl"
+#include "common/intersected.glsl"
 #include "common/sampled.glsl"
 #include "ldc/cube.glsl"
 
@@ -13,7 +13,7 @@ struct ldc_found {
 #ifdef ANY_HIT
     vec3 optical_depth;
 #ifdef HAS_TRANSLUCENT
-    crossed_surfaces crossed;
+    intersected_surfaces intersected;
 #endif
 #else
     uint sample_index; // HIT_NO_PRIMITIVE: none
@@ -44,8 +44,8 @@ void offer_sample(inout ldc_found found, uint sample_index, float distance_, flo
 {
 #ifdef HAS_TRANSLUCENT
     uvec4 words = texelFetch(ldc_surface, int(sample_index));
-    cross_surface(found.crossed, found.optical_depth, sample_material(words), distance_, side, near,
-                  transmittance_of_sample(words));
+    add_intersected(found.intersected, found.optical_depth, sample_material(words), distance_, side, near,
+                    transmittance_of_sample(words));
     if (min_component(found.optical_depth) >= OPTICAL_DEPTH_BLACK)
         found.end = -1.0;
 #else
@@ -57,7 +57,7 @@ void offer_sample(inout ldc_found found, uint sample_index, float distance_, flo
 ldc_found ldc_found_of(trace_ray r, vec3 optical_depth)
 {
 #ifdef HAS_TRANSLUCENT
-    return ldc_found(r.t_max, optical_depth, crossed_nothing());
+    return ldc_found(r.t_max, optical_depth, intersected_nothing());
 #else
     return ldc_found(r.t_max, optical_depth);
 #endif

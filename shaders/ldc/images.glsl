@@ -2,7 +2,7 @@
 // The traversal image by image: a DDA through an image's nodes, into the children where the ray's depths meet the
 // node's range and on to the next node where they do not. Paper, section 1.4.
 //
-// The image of the ray's dominant axis comes first, as the ray crosses fewest of its texels; an intersection in one
+// The image of the ray's dominant axis comes first, as the ray passes the fewest of its texels; an intersection in one
 // image ends the ray in the next.
 //
 // Defines: LDC_LEVEL_BITS nodes have 2^bits x 2^bits children; LDC_BLOCKS there is one level, else up to a single node;
@@ -149,7 +149,7 @@ void test_sample(inout image_traversal w, uint sample_index, float depth, uint n
 {
     vec3 normal = in_image(direction_from_octahedral(normal_bits), w.axis);
     float s, side;
-    if (cross_sample(w.o, w.d, w.cube, vec2(w.texel), depth, normal, s, side) && s > w.s_min && s < w.s_limit) {
+    if (intersect_sample(w.o, w.d, w.cube, vec2(w.texel), depth, normal, s, side) && s > w.s_min && s < w.s_limit) {
         offer_sample(found, sample_index, (s + w.begin) / w.scale, side, 1.0 / w.scale);
         w.s_limit = found.end * w.scale - w.begin;
     }

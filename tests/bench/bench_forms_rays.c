@@ -130,7 +130,7 @@ static void compare(json_t *object, const struct hit *truth, const struct hit *h
     free(errors);
 }
 
-/* What the walk looks at, in the mean of the wave's rays. Crossings are no answers then (shaders/ldc/cube.glsl,
+/* What the walk looks at, in the mean of the wave's rays. Intersections are no answers then (shaders/ldc/cube.glsl,
  * shaders/abuffer/column.glsl).
  */
 static bool count_steps(struct bench_contest *contest, struct bench_form *form, const struct bench_wave *wave,

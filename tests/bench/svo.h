@@ -4,7 +4,7 @@
  * most SVO_SIDE_MAX; 0: as many.
  *
  * A hit is the primitive of lowest id in a leaf, at the place of it that is nearest to the ray. Its distance is
- * that of the middle of the ray's way through the leaf's cell, or where it crosses the leaf's plane. Rays that
+ * that of the middle of the ray's way through the leaf's cell, or where it intersects the leaf's plane. Rays that
  * begin on a surface pass by what is in their first cells. */
 #ifndef FARLIGHT_TESTS_BENCH_SVO_H
 #define FARLIGHT_TESTS_BENCH_SVO_H

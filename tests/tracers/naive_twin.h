@@ -26,7 +26,7 @@ struct twin_hit {
     bool back_face;
 };
 
-/* One surface that the ray's line crosses. */
+/* One surface that the ray's line intersects. */
 struct twin_intersection {
     struct twin_hit hit;
     double alpha; /* of base colour, texture and vertices */
@@ -279,7 +279,7 @@ static inline void twin_material(struct twin_answer *answer, struct twin_interse
     }
 }
 
-static inline void twin_cross_surface(struct twin_answer *answer, struct twin_intersection *intersection)
+static inline void twin_add_intersection(struct twin_answer *answer, struct twin_intersection *intersection)
 {
     struct twin_hit *hit = &intersection->hit;
     /* Around the ray's ends a float may fall on either side. */
@@ -426,7 +426,7 @@ static inline void twin_triangle(struct twin_answer *answer, const struct scene_
     twin_attributes(answer, mesh, index, (const double[3]){1 - u - v, u, v}, instance->object_from_world,
                     &intersection.hit);
     intersection.hit.material = twin_range_material(mesh->ranges, mesh->range_count, primitive);
-    twin_cross_surface(answer, &intersection);
+    twin_add_intersection(answer, &intersection);
 }
 
 static inline void twin_sphere(struct twin_answer *answer, const struct scene_instance *instance,
@@ -464,7 +464,7 @@ static inline void twin_sphere(struct twin_answer *answer, const struct scene_in
         twin_normal_to_world(hit->normal_geometric, instance->object_from_world);
         memcpy(hit->normal_shading, hit->normal_geometric, sizeof(hit->normal_shading));
         hit->material = twin_range_material(set->ranges, set->range_count, primitive);
-        twin_cross_surface(answer, &intersection);
+        twin_add_intersection(answer, &intersection);
     }
 }
 
@@ -492,7 +492,7 @@ static inline void twin_discs(struct twin_answer *answer)
         double radius = sqrt(squared) / disc->radius;
         answer->close_call |= fabs(radius - 1) < 1e-3;
         if (slope != 0 && radius <= 1)
-            twin_cross_surface(answer, &intersection);
+            twin_add_intersection(answer, &intersection);
     }
 }
 

@@ -5,7 +5,7 @@
 //
 // All directions are made to run upwards: where a component runs down, cells are counted from the other side.
 //
-// Defines: SVO_PLANES  a leaf is hit where the ray crosses its plane, within the cell; else anywhere in it
+// Defines: SVO_PLANES  a leaf is hit where the ray intersects its plane, within the cell; else anywhere in it
 //          SVO_TOP_SHIFT  the root's grandchildren are cells of 2^SVO_TOP_SHIFT: 8 and less
 #include "common/candidate.glsl"
 #include "common/math.glsl"
@@ -26,7 +26,7 @@ const float SKIP_CELLS = 1.0;
 #else
 const float SKIP_CELLS = 2.0;
 #endif
-// What is crossed a little outside of the cell counts, as the planes of two neighbours do not meet at their side.
+// What is intersected a little outside of the cell counts, as the planes of two neighbours do not meet at their side.
 const float PLANE_MARGIN_CELLS = 0.5;
 // Of a cell a length of the direction.
 const float SLOWEST = 1e-6;

@@ -24,7 +24,7 @@ static void add_soup(struct ldc_samples *s, int count, float size, uint64_t seed
 
 /* ---- brute force ---- */
 
-/* Of one sample: where a ray crosses its plane. */
+/* Of one sample: where a ray intersects its plane. */
 struct intersection {
     double distance; /* in lengths of the direction; no number: not at all */
     double beyond;   /* cells: how far outside of the texel, <= 0: inside */
@@ -169,7 +169,7 @@ static void random_rays(struct ray *rays, uint32_t count, const struct ldc_sampl
 
 ALL_TESTS(open_device, close_device)
 
-TEST(rays_cross_samples_as_by_brute_force)
+TEST(rays_intersect_samples_as_by_brute_force)
 {
     static const uint32_t resolutions[] = {97, 64, 33};
     struct ray *rays = malloc(RAY_COUNT * sizeof(*rays));
@@ -298,7 +298,7 @@ TEST(blocks_of_many_layers_hold_all_of_them)
 }
 
 /* Along axes through the middles of texels, along their borders, through corners, and nearly so. */
-TEST(rays_along_axes_and_borders_cross_samples_as_by_brute_force)
+TEST(rays_along_axes_and_borders_intersect_samples_as_by_brute_force)
 {
     struct ray *rays = malloc(RAY_COUNT * sizeof(*rays));
     struct fixture fixture;

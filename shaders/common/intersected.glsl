@@ -6,28 +6,28 @@
 
 // The last ones, to distinguish one surface with two samples from two surfaces: distances, positive if the ray came
 // from behind, and materials.
-struct crossed_surfaces {
+struct intersected_surfaces {
     vec4 distances;
     uvec4 materials;
 };
 
-crossed_surfaces crossed_nothing()
+intersected_surfaces intersected_nothing()
 {
-    return crossed_surfaces(vec4(1e30), uvec4(HIT_NO_PRIMITIVE));
+    return intersected_surfaces(vec4(1e30), uvec4(HIT_NO_PRIMITIVE));
 }
 
 // A surface that transmits `through` of the light is intersected at a distance; `side` is positive if the ray comes
 // from behind. Samples of one surface overlap by the slack, and where images meet by up to a cell: `near`. Adds its
 // own to `optical_depth`, if it is not one of the last, or is opaque.
-void cross_surface(inout crossed_surfaces crossed, inout vec3 optical_depth, uint material_index, float distance_,
-                   float side, float near, vec3 through)
+void add_intersected(inout intersected_surfaces intersected, inout vec3 optical_depth, uint material_index,
+                     float distance_, float side, float near, vec3 through)
 {
     float signed_ = side > 0.0 ? distance_ : -distance_;
-    bvec4 same = lessThan(abs(crossed.distances - signed_), vec4(near));
-    same = bvec4(uvec4(same) * uvec4(equal(crossed.materials, uvec4(material_index))));
+    bvec4 same = lessThan(abs(intersected.distances - signed_), vec4(near));
+    same = bvec4(uvec4(same) * uvec4(equal(intersected.materials, uvec4(material_index))));
     if (any(same) && through != vec3(0.0))
         return;
-    crossed.distances = vec4(signed_, crossed.distances.xyz);
-    crossed.materials = uvec4(material_index, crossed.materials.xyz);
+    intersected.distances = vec4(signed_, intersected.distances.xyz);
+    intersected.materials = uvec4(material_index, intersected.materials.xyz);
     optical_depth = min(optical_depth + optical_depth_of(through), vec3(OPTICAL_DEPTH_MAX));
 }
