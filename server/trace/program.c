@@ -25,13 +25,13 @@ const struct gpu_program *trace_program_get(const struct gpu_scene *scene, const
                                             const struct trace_program_source *source, struct error *error)
 {
     struct gpu_define defines[OWN_DEFINES_MAX + 14] = {0};
-    char traverse[128], together[16];
+    char traverse[128], packet_rays[16];
     size_t n = 0;
     /* In quotes: program.c takes the file to include from it. */
     snprintf(traverse, sizeof(traverse), "\"%s\"", source->traverse);
-    snprintf(together, sizeof(together), "%u", source->rays_together ? source->rays_together : 1);
+    snprintf(packet_rays, sizeof(packet_rays), "%u", source->packet_rays ? source->packet_rays : 1);
     defines[n++] = (struct gpu_define){"TRAVERSE", traverse};
-    defines[n++] = (struct gpu_define){"RAYS_TOGETHER", together};
+    defines[n++] = (struct gpu_define){"PACKET_RAYS", packet_rays};
     if (wave->kind == WAVE_ANY)
         defines[n++] = (struct gpu_define){"ANY_HIT", "1"};
     if (scene->has_spheres)
@@ -59,7 +59,7 @@ void trace_program_run(const struct gpu_program *program, const struct gpu_scene
                        const struct ray_range *rays, const struct trace_program_source *source)
 {
     const struct wave *wave = rays->wave;
-    uint32_t together = source->rays_together ? source->rays_together : 1;
+    uint32_t packet_rays = source->packet_rays ? source->packet_rays : 1;
     bind_rays(scene, wave);
     if (wave->kind == WAVE_ANY)
         gpu_buffer_bind_storage(wave->visibility, BIND_VISIBILITY);
@@ -73,7 +73,7 @@ void trace_program_run(const struct gpu_program *program, const struct gpu_scene
             part = source->rays_a_dispatch;
         gpu_uniform_uint(program, "first_ray", first);
         gpu_uniform_uint(program, "ray_count", first + part);
-        gpu_dispatch(scene->device, program, ((uint64_t)part + together - 1) / together);
+        gpu_dispatch(scene->device, program, ((uint64_t)part + packet_rays - 1) / packet_rays);
         if (first + part < rays->end) /* a part of its own to the driver too, which may gather commands */
             glFlush();
     }

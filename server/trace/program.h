@@ -16,8 +16,8 @@
 struct trace_program_source {
     const char *traverse;             /* "bvh/traverse.glsl" */
     const struct gpu_define *defines; /* of the tracer's own, ends with {0}; may be NULL; at most 12 */
-    uint32_t rays_together;           /* 0: 1 */
-    uint32_t rays_a_dispatch;         /* 0: all; a multiple of rays_together */
+    uint32_t packet_rays;             /* 0: 1 */
+    uint32_t rays_a_dispatch;         /* 0: all; a multiple of packet_rays */
 };
 
 /* Compiled for what the scene has (spheres, cutouts, translucent surfaces, motion where the wave has times) and

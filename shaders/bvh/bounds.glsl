@@ -48,15 +48,15 @@ bool sphere_is_hit(bound_ray r, vec4 centre_radius, float t_min, float t_max)
 
 // All rays of the packet: each has its own test.
 struct bundle {
-    bound_ray rays[RAYS_TOGETHER];
+    bound_ray rays[PACKET_RAYS];
     uint octant;
 };
 
-bundle bundle_of(object_ray o[RAYS_TOGETHER], bool alive[RAYS_TOGETHER], int leading, tree_grid grid, float slack)
+bundle bundle_of(object_ray o[PACKET_RAYS], bool alive[PACKET_RAYS], int leading, tree_grid grid, float slack)
 {
     bundle b;
     b.octant = 0u;
-    for (int k = 0; k < RAYS_TOGETHER; k++) {
+    for (int k = 0; k < PACKET_RAYS; k++) {
         vec3 d = o[k].direction;
         b.rays[k] = bound_ray(o[k].origin, d, 1.0 / dot(d, d), slack * length(o[k].origin));
         if (k == leading)
@@ -75,7 +75,7 @@ bundle bundle_of(object_ray o[RAYS_TOGETHER], bool alive[RAYS_TOGETHER], int lea
 // are 0 there, and offsets beyond everything. One ray has no interval: its minimum and maximum are equal.
 struct bundle {
     vec3 scale_min, near_offset_min, far_offset_min;
-#if RAYS_TOGETHER > 1
+#if PACKET_RAYS > 1
     vec3 scale_max, near_offset_max, far_offset_max;
 #endif
     uint octant;
@@ -83,11 +83,11 @@ struct bundle {
 
 const float NOWHERE = 3e38;
 
-bundle bundle_of(object_ray o[RAYS_TOGETHER], bool alive[RAYS_TOGETHER], int leading, tree_grid grid, float slack)
+bundle bundle_of(object_ray o[PACKET_RAYS], bool alive[PACKET_RAYS], int leading, tree_grid grid, float slack)
 {
-    vec3 scale[RAYS_TOGETHER], origin[RAYS_TOGETHER], slacks[RAYS_TOGETHER];
+    vec3 scale[PACKET_RAYS], origin[PACKET_RAYS], slacks[PACKET_RAYS];
     vec3 centre = vec3(0.0), scale_leading = vec3(0.0);
-    for (int k = 0; k < RAYS_TOGETHER; k++) {
+    for (int k = 0; k < PACKET_RAYS; k++) {
         // A component of zero would give infinity times zero. The replacement moves the ray sideways by 1e-12 of its
         // length, far below the slack.
         vec3 d = o[k].direction * grid.cells_per_unit;
@@ -103,13 +103,13 @@ bundle bundle_of(object_ray o[RAYS_TOGETHER], bool alive[RAYS_TOGETHER], int lea
     bundle b;
     uvec3 negative = uvec3(lessThan(scale_leading, vec3(0.0)));
     b.octant = negative.x | negative.y << 1 | negative.z << 2;
-#if RAYS_TOGETHER == 1
+#if PACKET_RAYS == 1
     b.scale_min = scale_leading;
     b.near_offset_min = centre * scale_leading + slacks[0];
     b.far_offset_min = centre * scale_leading - slacks[0];
 #else
     vec3 minimum = scale_leading, maximum = scale_leading, before = vec3(-NOWHERE), after = vec3(NOWHERE);
-    for (int k = 0; k < RAYS_TOGETHER; k++) {
+    for (int k = 0; k < PACKET_RAYS; k++) {
         vec3 off = (origin[k] - centre) * scale[k];
         // The products centre * scale round as the ray's own would: their part is in the slack.
         minimum = alive[k] ? min(minimum, scale[k]) : minimum;
@@ -133,7 +133,7 @@ bool box_is_hit(bundle b, vec3 near, vec3 far, float t_min, float t_max)
 {
     vec3 enter = near * b.scale_min - b.near_offset_min;
     vec3 leave = far * b.scale_min - b.far_offset_min;
-#if RAYS_TOGETHER > 1
+#if PACKET_RAYS > 1
     vec3 enter_other = near * b.scale_max - b.near_offset_max;
     vec3 leave_other = far * b.scale_max - b.far_offset_max;
     enter = mix(enter_other, enter, lessThan(enter, enter_other));

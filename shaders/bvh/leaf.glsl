@@ -80,7 +80,7 @@ struct noted_hits {
 struct noted_primitive {
     uint bits; // two per ray; 0: none is noted
     candidate common_part;
-    noted_hits hits[RAYS_TOGETHER];
+    noted_hits hits[PACKET_RAYS];
 };
 
 void offer_or_note(uint bit, candidate c, inout trace_ray r, inout answer found, inout noted_hits hits,
@@ -98,7 +98,7 @@ void offer_or_note(uint bit, candidate c, inout trace_ray r, inout answer found,
 }
 
 #ifdef ASK_MATERIALS
-void settle(inout noted_primitive noted, inout trace_ray r[RAYS_TOGETHER], inout answer found[RAYS_TOGETHER])
+void settle(inout noted_primitive noted, inout trace_ray r[PACKET_RAYS], inout answer found[PACKET_RAYS])
 {
     while (noted.bits != 0u) {
         int bit = findLSB(noted.bits), chosen = bit >> 1;
@@ -106,7 +106,7 @@ void settle(inout noted_primitive noted, inout trace_ray r[RAYS_TOGETHER], inout
         trace_ray ray_asking = r[0];
         noted_hits noted_here = noted.hits[0];
         answer found_here = found[0];
-        for (int k = 1; k < RAYS_TOGETHER; k++) {
+        for (int k = 1; k < PACKET_RAYS; k++) {
             if (k == chosen) {
                 ray_asking = r[k];
                 noted_here = noted.hits[k];
@@ -117,7 +117,7 @@ void settle(inout noted_primitive noted, inout trace_ray r[RAYS_TOGETHER], inout
         c.distance = (bit & 1) == 0 ? noted_here.distances.x : noted_here.distances.y;
         c.barycentrics = noted_here.barycentrics;
         offer(ray_asking, c, found_here);
-        for (int k = 0; k < RAYS_TOGETHER; k++) {
+        for (int k = 0; k < PACKET_RAYS; k++) {
             if (k == chosen) {
                 r[k] = ray_asking;
                 found[k] = found_here;
@@ -127,7 +127,7 @@ void settle(inout noted_primitive noted, inout trace_ray r[RAYS_TOGETHER], inout
 }
 #endif
 
-#if RAYS_TOGETHER > 1 && !defined SHARED_ORIGIN
+#if PACKET_RAYS > 1 && !defined SHARED_ORIGIN
 #define ORIGINS_DIFFER
 #endif
 
@@ -136,18 +136,18 @@ void settle(inout noted_primitive noted, inout trace_ray r[RAYS_TOGETHER], inout
 // of a triangle's distance must not depend on earlier hits.
 struct relative_rays {
     vec3 centre;
-    vec3 direction[RAYS_TOGETHER];
+    vec3 direction[PACKET_RAYS];
 #ifdef ORIGINS_DIFFER
-    vec3 origin[RAYS_TOGETHER]; // from the centre
-    vec3 moment[RAYS_TOGETHER]; // 2 (origin x direction)
+    vec3 origin[PACKET_RAYS]; // from the centre
+    vec3 moment[PACKET_RAYS]; // 2 (origin x direction)
 #endif
 };
 
-relative_rays relative_to(vec3 centre, object_ray o[RAYS_TOGETHER])
+relative_rays relative_to(vec3 centre, object_ray o[PACKET_RAYS])
 {
     relative_rays rays;
     rays.centre = centre;
-    for (int k = 0; k < RAYS_TOGETHER; k++) {
+    for (int k = 0; k < PACKET_RAYS; k++) {
         rays.direction[k] = o[k].direction;
 #ifdef ORIGINS_DIFFER
         rays.origin[k] = o[k].origin - centre;
@@ -160,8 +160,8 @@ relative_rays relative_to(vec3 centre, object_ray o[RAYS_TOGETHER])
 #ifdef BVH_DEFORMS_IN_SHUTTER
 
 // The corners at the ray's own time: rays share no computation of such a triangle.
-void test_triangle(uint i, entered_instance inside, object_ray o[RAYS_TOGETHER], relative_rays rays,
-                   inout trace_ray r[RAYS_TOGETHER], inout answer found[RAYS_TOGETHER], inout noted_primitive noted)
+void test_triangle(uint i, entered_instance inside, object_ray o[PACKET_RAYS], relative_rays rays,
+                   inout trace_ray r[PACKET_RAYS], inout answer found[PACKET_RAYS], inout noted_primitive noted)
 {
     int texel = int(inside.first_texel + i * BVH_TRIANGLE_TEXELS), close = texel + int(inside.close_texels);
     uvec4 first = texelFetch(bvh_primitives, texel);
@@ -173,7 +173,7 @@ void test_triangle(uint i, entered_instance inside, object_ray o[RAYS_TOGETHER],
     vec3 way1 = uintBitsToFloat(texelFetch(bvh_primitives, close + 1).xyz) - v1;
     vec3 way2 = uintBitsToFloat(texelFetch(bvh_primitives, close + 2).xyz) - v2;
     candidate c = candidate(0.0, inside.first_primitive + first.w, inside.index, vec2(0.0));
-    for (int k = 0; k < RAYS_TOGETHER; k++) {
+    for (int k = 0; k < PACKET_RAYS; k++) {
         float time = time_of(r[k]);
         bool is_hit = intersect_triangle(o[k].direction, v0 + time * way0 - o[k].origin,
                                          v1 + time * way1 - o[k].origin, v2 + time * way2 - o[k].origin,
@@ -191,8 +191,8 @@ void test_triangle(uint i, entered_instance inside, object_ray o[RAYS_TOGETHER],
 // As intersect_triangle (common/intersect.glsl), for several rays. An edge from a to b, e = b - a, s = b + a, has for a
 // ray from o along d the edge function d . (e x (s - 2 o)) = d . (e x s) - e . (2 o x d): the first cross product is the
 // same for all rays, the second for all edges. Two triangles that share an edge still get exactly opposite values.
-void test_triangle(uint i, entered_instance inside, object_ray o[RAYS_TOGETHER], relative_rays rays,
-                   inout trace_ray r[RAYS_TOGETHER], inout answer found[RAYS_TOGETHER], inout noted_primitive noted)
+void test_triangle(uint i, entered_instance inside, object_ray o[PACKET_RAYS], relative_rays rays,
+                   inout trace_ray r[PACKET_RAYS], inout answer found[PACKET_RAYS], inout noted_primitive noted)
 {
     int texel = int(inside.first_texel + i * BVH_TRIANGLE_TEXELS);
     uvec4 first = texelFetch(bvh_primitives, texel);
@@ -203,7 +203,7 @@ void test_triangle(uint i, entered_instance inside, object_ray o[RAYS_TOGETHER],
     precise vec3 c0 = cross(e0, v2 + v1), c1 = cross(e1, v0 + v2), c2 = cross(e2, v1 + v0);
     precise vec3 normal = cross(e2, v2 - v0);
     candidate c = candidate(0.0, inside.first_primitive + first.w, inside.index, vec2(0.0));
-    for (int k = 0; k < RAYS_TOGETHER; k++) {
+    for (int k = 0; k < PACKET_RAYS; k++) {
         vec3 d = rays.direction[k];
 #ifdef ORIGINS_DIFFER
         vec3 m = rays.moment[k];
@@ -231,14 +231,14 @@ void test_triangle(uint i, entered_instance inside, object_ray o[RAYS_TOGETHER],
 #endif
 
 #ifdef HAS_SPHERES
-void test_sphere(uint i, entered_instance inside, object_ray o[RAYS_TOGETHER], inout trace_ray r[RAYS_TOGETHER],
-                 inout answer found[RAYS_TOGETHER], inout noted_primitive noted)
+void test_sphere(uint i, entered_instance inside, object_ray o[PACKET_RAYS], inout trace_ray r[PACKET_RAYS],
+                 inout answer found[PACKET_RAYS], inout noted_primitive noted)
 {
     int texel = int(inside.first_texel + i * BVH_SPHERE_TEXELS);
     vec4 sphere = uintBitsToFloat(texelFetch(bvh_primitives, texel));
     candidate c = candidate(0.0, inside.first_primitive + texelFetch(bvh_primitives, texel + 1).x, inside.index,
                             vec2(0.0));
-    for (int k = 0; k < RAYS_TOGETHER; k++) {
+    for (int k = 0; k < PACKET_RAYS; k++) {
         vec2 distances;
         if (intersect_sphere(o[k].origin, o[k].direction, sphere.xyz, sphere.w, distances)) {
             c.distance = distances.x;
@@ -255,8 +255,8 @@ void test_sphere(uint i, entered_instance inside, object_ray o[RAYS_TOGETHER], i
 
 // Tests the leaf from `primitive` on, and returns the next one in it. False: the leaf is not finished, as an
 // intersection is noted.
-bool test_leaf(uint leaf, inout uint primitive, entered_instance inside, object_ray o[RAYS_TOGETHER], relative_rays rays,
-               inout trace_ray r[RAYS_TOGETHER], inout answer found[RAYS_TOGETHER], inout noted_primitive noted)
+bool test_leaf(uint leaf, inout uint primitive, entered_instance inside, object_ray o[PACKET_RAYS], relative_rays rays,
+               inout trace_ray r[PACKET_RAYS], inout answer found[PACKET_RAYS], inout noted_primitive noted)
 {
     uint first = leaf & BVH_LEAF_FIRST_MASK, count = (leaf >> BVH_LEAF_COUNT_SHIFT & BVH_LEAF_COUNT_MASK) + 1u;
 #ifdef HAS_SPHERES

@@ -13,7 +13,7 @@
 //
 // With HAS_MOTION every ray enters an instance at the ray's own time, and leaves bound all times.
 //
-// RAYS_TOGETHER rays form a packet: an element is entered when any of them may hit its bound, a primitive is fetched
+// PACKET_RAYS rays form a packet: an element is entered when any of them may hit its bound, a primitive is fetched
 // once and tested against all. The octant is that of the first live ray; the others' answers are right whatever the
 // order, only less is pruned.
 //
@@ -29,7 +29,7 @@
 #include "bvh/layout.h"
 #include "bvh/bounds.glsl"
 #include "bvh/leaf.glsl"
-#include "bvh/together.glsl"
+#include "bvh/packet.glsl"
 
 #ifdef BVH_PLAIN
 layout(std430, binding = BIND_TRACER_0) readonly buffer bvh_element_block { bvh_element bvh_elements[]; };
@@ -81,10 +81,10 @@ struct distances_left {
 // between ray and normal is above some 0.005; below, of two surfaces this close together, either may be hit.
 const float PRUNE_SLACK = 1.00006103515625;
 
-distances_left left_of(trace_ray r[RAYS_TOGETHER], answer found[RAYS_TOGETHER])
+distances_left left_of(trace_ray r[PACKET_RAYS], answer found[PACKET_RAYS])
 {
     distances_left left = distances_left(r[0].t_min, end_of(r[0], found[0]));
-    for (int k = 1; k < RAYS_TOGETHER; k++) {
+    for (int k = 1; k < PACKET_RAYS; k++) {
         left.t_min = min(left.t_min, r[k].t_min);
         left.t_max = max(left.t_max, end_of(r[k], found[k]));
     }
@@ -95,8 +95,8 @@ distances_left left_of(trace_ray r[RAYS_TOGETHER], answer found[RAYS_TOGETHER])
 }
 
 // The inner loop: on to the next leaf whose bound some ray may hit. Returns its link, 0: the tree is finished.
-uint next_leaf(inout tree_traversal traversal, bundle b, distances_left left, trace_ray r[RAYS_TOGETHER],
-               answer found[RAYS_TOGETHER])
+uint next_leaf(inout tree_traversal traversal, bundle b, distances_left left, trace_ray r[PACKET_RAYS],
+               answer found[PACKET_RAYS])
 {
     uint leaf = traversal.leaf;
     while (leaf == 0u && traversal.element < traversal.end) {
@@ -117,7 +117,7 @@ uint next_leaf(inout tree_traversal traversal, bundle b, distances_left left, tr
 #endif
 #ifdef BVH_SPHERES
         bool any_hit = false;
-        for (int k = 0; k < RAYS_TOGETHER; k++)
+        for (int k = 0; k < PACKET_RAYS; k++)
             any_hit = sphere_is_hit(b.rays[k], lower, r[k].t_min, end_of(r[k], found[k])) || any_hit;
 #elif defined BVH_PACKED
         bool any_hit = box_is_hit(b, vec3(ivec3(element.xyz & 0xffffu)), vec3(ivec3(element.xyz >> 16)), left.t_min,
@@ -134,30 +134,30 @@ uint next_leaf(inout tree_traversal traversal, bundle b, distances_left left, tr
     return leaf;
 }
 
-bool is_alive_any(trace_ray r[RAYS_TOGETHER])
+bool is_alive_any(trace_ray r[PACKET_RAYS])
 {
     bool alive = false;
-    for (int k = 0; k < RAYS_TOGETHER; k++)
+    for (int k = 0; k < PACKET_RAYS; k++)
         alive = alive || r[k].t_max > r[k].t_min;
     return alive;
 }
 
 // The first active ray: it leads to the end, also when it is finished.
-int leading_of(trace_ray r[RAYS_TOGETHER])
+int leading_of(trace_ray r[PACKET_RAYS])
 {
     int leading = 0;
-    for (int k = RAYS_TOGETHER - 1; k > 0; k--)
+    for (int k = PACKET_RAYS - 1; k > 0; k--)
         leading = r[k].t_max > r[k].t_min ? k : leading;
     return r[0].t_max > r[0].t_min ? 0 : leading;
 }
 
 // Enters a tree with all live rays: computes their bounds in its space.
-void enter_tree(object_ray o[RAYS_TOGETHER], trace_ray r[RAYS_TOGETHER], int leading, tree_grid grid, float slack,
+void enter_tree(object_ray o[PACKET_RAYS], trace_ray r[PACKET_RAYS], int leading, tree_grid grid, float slack,
                 out bundle b, out relative_rays rays)
 {
-    bool alive[RAYS_TOGETHER];
+    bool alive[PACKET_RAYS];
     vec3 centre = o[0].origin;
-    for (int k = 0; k < RAYS_TOGETHER; k++) {
+    for (int k = 0; k < PACKET_RAYS; k++) {
         alive[k] = r[k].t_max > r[k].t_min;
         centre = k == leading ? o[k].origin : centre;
     }
@@ -166,8 +166,8 @@ void enter_tree(object_ray o[RAYS_TOGETHER], trace_ray r[RAYS_TOGETHER], int lea
 }
 
 // A transform element: the rays continue in the instance's space.
-void enter_instance(uint instance_index, trace_ray r[RAYS_TOGETHER], int leading, out entered_instance inside,
-                    out object_ray o[RAYS_TOGETHER], out tree_traversal traversal, out bundle b, out relative_rays rays)
+void enter_instance(uint instance_index, trace_ray r[PACKET_RAYS], int leading, out entered_instance inside,
+                    out object_ray o[PACKET_RAYS], out tree_traversal traversal, out bundle b, out relative_rays rays)
 {
     int texel = int(instance_index) * BVH_TRANSFORM_TEXELS;
 #ifndef HAS_MOTION
@@ -187,7 +187,7 @@ void enter_instance(uint instance_index, trace_ray r[RAYS_TOGETHER], int leading
 #ifdef BVH_DEFORMS_IN_SHUTTER
     inside.close_texels = texelFetch(bvh_transforms, texel + 3).w;
 #endif
-    for (int k = 0; k < RAYS_TOGETHER; k++) {
+    for (int k = 0; k < PACKET_RAYS; k++) {
 #ifdef HAS_MOTION
         o[k] = object_from_world_ray(r[k], instance_index);
 #else
@@ -203,8 +203,8 @@ void enter_instance(uint instance_index, trace_ray r[RAYS_TOGETHER], int leading
 
 // Traverses the current tree's leaves up to an instance, whose link is returned; 0: the tree is finished; or up to an
 // intersection that must be settled.
-uint test_leaves(inout tree_traversal traversal, bundle b, entered_instance inside, object_ray o[RAYS_TOGETHER],
-                 relative_rays rays, inout trace_ray r[RAYS_TOGETHER], inout answer found[RAYS_TOGETHER],
+uint test_leaves(inout tree_traversal traversal, bundle b, entered_instance inside, object_ray o[PACKET_RAYS],
+                 relative_rays rays, inout trace_ray r[PACKET_RAYS], inout answer found[PACKET_RAYS],
                  inout noted_primitive noted)
 {
     for (;;) {
@@ -228,8 +228,8 @@ uint test_leaves(inout tree_traversal traversal, bundle b, entered_instance insi
 }
 
 #ifdef ASK_MATERIALS
-void settle_and_go_on(inout tree_traversal traversal, inout noted_primitive noted, inout trace_ray r[RAYS_TOGETHER],
-                      inout answer found[RAYS_TOGETHER])
+void settle_and_go_on(inout tree_traversal traversal, inout noted_primitive noted, inout trace_ray r[PACKET_RAYS],
+                      inout answer found[PACKET_RAYS])
 {
     settle(noted, r, found);
 #ifdef ANY_HIT
@@ -245,9 +245,9 @@ void settle_and_go_on(inout tree_traversal traversal, inout noted_primitive note
 #define FAVOUR_INSTANCES
 // Inside an instance, a hit in one with a higher number counts as one float step farther away, so that a hit at the
 // same distance here comes before it. (Discs and misses have a number that wraps to 0.)
-void favour_instance(uint instance_index, int step_, inout answer found[RAYS_TOGETHER])
+void favour_instance(uint instance_index, int step_, inout answer found[PACKET_RAYS])
 {
-    for (int k = 0; k < RAYS_TOGETHER; k++) {
+    for (int k = 0; k < PACKET_RAYS; k++) {
         int moved = floatBitsToInt(found[k].distance) + step_;
         found[k].distance =
             instance_index + 1u < found[k].instance_index + 1u ? intBitsToFloat(moved) : found[k].distance;
@@ -257,10 +257,10 @@ void favour_instance(uint instance_index, int step_, inout answer found[RAYS_TOG
 
 #ifdef BVH_ONE_INSTANCE
 
-void trace_together(inout trace_ray r[RAYS_TOGETHER], inout answer found[RAYS_TOGETHER])
+void trace_packet(inout trace_ray r[PACKET_RAYS], inout answer found[PACKET_RAYS])
 {
     entered_instance inside;
-    object_ray o[RAYS_TOGETHER];
+    object_ray o[PACKET_RAYS];
     tree_traversal traversal;
     bundle b;
     relative_rays rays;
@@ -279,8 +279,8 @@ void trace_together(inout trace_ray r[RAYS_TOGETHER], inout answer found[RAYS_TO
 
 // All instances along the rays. True: an intersection must be settled before the traversal continues.
 bool traverse_instances(inout tree_traversal traversal, inout tree_traversal world_traversal, inout bundle b,
-                        bundle world_bundle, int leading, inout entered_instance inside, inout object_ray o[RAYS_TOGETHER],
-                        inout relative_rays rays, inout trace_ray r[RAYS_TOGETHER], inout answer found[RAYS_TOGETHER],
+                        bundle world_bundle, int leading, inout entered_instance inside, inout object_ray o[PACKET_RAYS],
+                        inout relative_rays rays, inout trace_ray r[PACKET_RAYS], inout answer found[PACKET_RAYS],
                         inout noted_primitive noted)
 {
     for (;;) {
@@ -313,7 +313,7 @@ bool traverse_instances(inout tree_traversal traversal, inout tree_traversal wor
     }
 }
 
-void trace_together(inout trace_ray r[RAYS_TOGETHER], inout answer found[RAYS_TOGETHER])
+void trace_packet(inout trace_ray r[PACKET_RAYS], inout answer found[PACKET_RAYS])
 {
     if (bvh_top_count == 0u)
         return;
@@ -321,8 +321,8 @@ void trace_together(inout trace_ray r[RAYS_TOGETHER], inout answer found[RAYS_TO
 #ifdef BVH_PACKED
     grid = tree_grid(bvh_top_grid_lower, bvh_top_cells_per_unit);
 #endif
-    object_ray o[RAYS_TOGETHER];
-    for (int k = 0; k < RAYS_TOGETHER; k++)
+    object_ray o[PACKET_RAYS];
+    for (int k = 0; k < PACKET_RAYS; k++)
         o[k] = object_ray(r[k].origin, r[k].direction);
     bundle b, world_bundle;
     relative_rays rays;
@@ -351,23 +351,23 @@ void trace_together(inout trace_ray r[RAYS_TOGETHER], inout answer found[RAYS_TO
 #endif
 
 // Called by trace/wave.comp.
-#if RAYS_TOGETHER == 1
+#if PACKET_RAYS == 1
 
 #ifdef ANY_HIT
 bool trace_any(trace_ray r, inout vec3 optical_depth)
 {
-    trace_ray packet[RAYS_TOGETHER] = trace_ray[RAYS_TOGETHER](r);
-    vec3 found[RAYS_TOGETHER] = vec3[RAYS_TOGETHER](optical_depth);
-    trace_together(packet, found);
+    trace_ray packet[PACKET_RAYS] = trace_ray[PACKET_RAYS](r);
+    vec3 found[PACKET_RAYS] = vec3[PACKET_RAYS](optical_depth);
+    trace_packet(packet, found);
     optical_depth = found[0];
     return min_component(optical_depth) >= OPTICAL_DEPTH_BLACK;
 }
 #else
 void trace_closest(trace_ray r, inout candidate best)
 {
-    trace_ray packet[RAYS_TOGETHER] = trace_ray[RAYS_TOGETHER](r);
-    candidate found[RAYS_TOGETHER] = candidate[RAYS_TOGETHER](best);
-    trace_together(packet, found);
+    trace_ray packet[PACKET_RAYS] = trace_ray[PACKET_RAYS](r);
+    candidate found[PACKET_RAYS] = candidate[PACKET_RAYS](best);
+    trace_packet(packet, found);
     best = found[0];
 }
 #endif
@@ -375,33 +375,33 @@ void trace_closest(trace_ray r, inout candidate best)
 #else
 
 #ifdef ANY_HIT
-#define TRACE_GROUP trace_any_together
+#define TRACE_GROUP trace_any_packet
 #else
-#define TRACE_GROUP trace_closest_together
+#define TRACE_GROUP trace_closest_packet
 #endif
 
 // Each packet has all remaining rays with a direction similar to the first one's; the first in any case, NaN included.
-void TRACE_GROUP(trace_ray r[RAYS_TOGETHER], inout answer found[RAYS_TOGETHER])
+void TRACE_GROUP(trace_ray r[PACKET_RAYS], inout answer found[PACKET_RAYS])
 {
     uint waiting = 0u;
-    for (int k = 0; k < RAYS_TOGETHER; k++)
+    for (int k = 0; k < PACKET_RAYS; k++)
         waiting |= r[k].t_max > r[k].t_min ? 1u << k : 0u;
     while (waiting != 0u) {
         int first = findLSB(waiting);
-        trace_ray leading = r[0], packet[RAYS_TOGETHER];
-        for (int k = 1; k < RAYS_TOGETHER; k++)
+        trace_ray leading = r[0], packet[PACKET_RAYS];
+        for (int k = 1; k < PACKET_RAYS; k++)
             if (k == first)
                 leading = r[k];
-        for (int k = 0; k < RAYS_TOGETHER; k++) {
+        for (int k = 0; k < PACKET_RAYS; k++) {
             packet[k] = r[k];
             bool goes = k == first ||
-                        go_together(leading.origin, leading.direction, r[k].origin, r[k].direction);
+                        form_packet(leading.origin, leading.direction, r[k].origin, r[k].direction);
             if (goes && (waiting >> k & 1u) != 0u)
                 waiting &= ~(1u << k);
             else
                 put_out(packet[k]);
         }
-        trace_together(packet, found);
+        trace_packet(packet, found);
     }
 }
 

@@ -4,7 +4,7 @@
 //
 // The host (trace/ldc/trace.c) sets, besides the defines of trace/wave.comp, those that the files included here name.
 //
-// One invocation traces RAYS_TOGETHER rays in sequence: fewer invocations, each with more work. (Letting each
+// One invocation traces PACKET_RAYS rays in sequence: fewer invocations, each with more work. (Letting each
 // invocation begin its next ray as soon as one is finished was slower: the code that begins a ray then ran each round.)
 //
 // Define: LDC_CELLS the traversal is that of ldc/cells.glsl, else that of ldc/images.glsl.
@@ -42,9 +42,9 @@ void settle(ldc_found found, inout answer a)
 #endif
 }
 
-void traverse_rays(trace_ray rays_[RAYS_TOGETHER], inout answer answers[RAYS_TOGETHER])
+void traverse_rays(trace_ray rays_[PACKET_RAYS], inout answer answers[PACKET_RAYS])
 {
-    for (int ray = 0; ray < RAYS_TOGETHER; ray++) {
+    for (int ray = 0; ray < PACKET_RAYS; ray++) {
         trace_ray r = rays_[ray];
         ldc_found found = ldc_found_of(r, answers[ray]);
         for (int pass = 0; pass < LDC_PASSES; pass++) {
@@ -72,12 +72,12 @@ void traverse_rays(trace_ray rays_[RAYS_TOGETHER], inout answer answers[RAYS_TOG
 }
 
 // Called by trace/wave.comp.
-#if RAYS_TOGETHER > 1
+#if PACKET_RAYS > 1
 
 #ifdef ANY_HIT
-void trace_any_together(trace_ray r[RAYS_TOGETHER], inout vec3 optical_depth[RAYS_TOGETHER])
+void trace_any_packet(trace_ray r[PACKET_RAYS], inout vec3 optical_depth[PACKET_RAYS])
 #else
-void trace_closest_together(trace_ray r[RAYS_TOGETHER], inout candidate best[RAYS_TOGETHER])
+void trace_closest_packet(trace_ray r[PACKET_RAYS], inout candidate best[PACKET_RAYS])
 #endif
 {
 #ifdef ANY_HIT

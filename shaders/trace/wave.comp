@@ -12,13 +12,13 @@
 //   HAS_TRANSLUCENT      some material lets shadow rays pass
 //   HAS_TRANSMISSION     and tints them on the way
 //   EVEN_ALPHA           none of these has a texture or vertex colours
-//   RAYS_TOGETHER        how many consecutive rays one invocation traverses as a packet: 1, 2, 3, 4, 8
+//   PACKET_RAYS        how many consecutive rays one invocation traverses as a packet: 1, 2, 3, 4, 8
 //
-// A traverse.glsl defines one of these, for ANY_HIT or not, and for RAYS_TOGETHER 1 or more:
+// A traverse.glsl defines one of these, for ANY_HIT or not, and for PACKET_RAYS 1 or more:
 //   void trace_closest(trace_ray r, inout candidate best);
 //   bool trace_any(trace_ray r, inout vec3 optical_depth);
-//   void trace_closest_together(trace_ray r[RAYS_TOGETHER], inout candidate best[RAYS_TOGETHER]);
-//   void trace_any_together(trace_ray r[RAYS_TOGETHER], inout vec3 optical_depth[RAYS_TOGETHER]);
+//   void trace_closest_packet(trace_ray r[PACKET_RAYS], inout candidate best[PACKET_RAYS]);
+//   void trace_any_packet(trace_ray r[PACKET_RAYS], inout vec3 optical_depth[PACKET_RAYS]);
 // It does not include this file; it includes common/candidate.glsl, whose visit_* and offer_* functions take a
 // primitive against a ray with cutouts and tints accounted for. A traversal that intersects by its own means calls
 // offer_closest / offer_any with what it found, or where the scene has neither cutouts nor translucent surfaces
@@ -35,8 +35,8 @@
 #include "common/candidate.glsl"
 #include TRAVERSE
 
-#ifndef RAYS_TOGETHER
-#define RAYS_TOGETHER 1
+#ifndef PACKET_RAYS
+#define PACKET_RAYS 1
 #endif
 
 layout(binding = UNIT_RAYS) uniform samplerBuffer rays; // two texels each: software GL fetches those faster
@@ -131,7 +131,7 @@ void store_intersection(uint ray_index, candidate best)
 
 #endif
 
-#if RAYS_TOGETHER == 1
+#if PACKET_RAYS == 1
 
 void main()
 {
@@ -157,19 +157,19 @@ void main()
 #else
 
 // Work per ray runs in a loop that selects its ray by comparing indices: indexing the arrays by the loop's counter
-// would make the compiler unroll all of it (discs, textures, surfaces) RAYS_TOGETHER times.
+// would make the compiler unroll all of it (discs, textures, surfaces) PACKET_RAYS times.
 #ifdef ANY_HIT
 #define found_type vec3 // optical depths
 #else
 #define found_type candidate
 #endif
 
-void look_at_discs(inout trace_ray r[RAYS_TOGETHER], inout found_type found[RAYS_TOGETHER])
+void look_at_discs(inout trace_ray r[PACKET_RAYS], inout found_type found[PACKET_RAYS])
 {
-    for (int i = 0; i < RAYS_TOGETHER; i++) {
+    for (int i = 0; i < PACKET_RAYS; i++) {
         trace_ray r_i = r[0];
         found_type found_i = found[0];
-        for (int k = 1; k < RAYS_TOGETHER; k++) {
+        for (int k = 1; k < PACKET_RAYS; k++) {
             if (k == i) {
                 r_i = r[k];
                 found_i = found[k];
@@ -186,7 +186,7 @@ void look_at_discs(inout trace_ray r[RAYS_TOGETHER], inout found_type found[RAYS
             discs_closest(r_i, found_i);
 #endif
         }
-        for (int k = 0; k < RAYS_TOGETHER; k++) {
+        for (int k = 0; k < PACKET_RAYS; k++) {
             if (k == i) {
                 r[k] = r_i;
                 found[k] = found_i;
@@ -197,13 +197,13 @@ void look_at_discs(inout trace_ray r[RAYS_TOGETHER], inout found_type found[RAYS
 
 void main()
 {
-    uint first = first_ray + item_index() * RAYS_TOGETHER;
+    uint first = first_ray + item_index() * PACKET_RAYS;
     if (first >= ray_count)
         return;
-    trace_ray r[RAYS_TOGETHER];
-    found_type found[RAYS_TOGETHER];
+    trace_ray r[PACKET_RAYS];
+    found_type found[PACKET_RAYS];
     bool any_alive = false;
-    for (int k = 0; k < RAYS_TOGETHER; k++) {
+    for (int k = 0; k < PACKET_RAYS; k++) {
         r[k] = load_ray(first + uint(k));
         any_alive = any_alive || is_alive(r[k]);
 #ifdef ANY_HIT
@@ -216,13 +216,13 @@ void main()
         look_at_discs(r, found);
 #ifdef ANY_HIT
     if (any_alive)
-        trace_any_together(r, found);
-    for (int k = 0; k < RAYS_TOGETHER; k++)
+        trace_any_packet(r, found);
+    for (int k = 0; k < PACKET_RAYS; k++)
         store_visibility(first + uint(k), found[k]);
 #else
     if (any_alive)
-        trace_closest_together(r, found);
-    for (int k = 0; k < RAYS_TOGETHER; k++)
+        trace_closest_packet(r, found);
+    for (int k = 0; k < PACKET_RAYS; k++)
         store_intersection(first + uint(k), found[k]);
 #endif
 }

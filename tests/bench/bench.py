@@ -54,7 +54,7 @@ PARTS = {
     "family": ("Time against triangles", bench_rays.measure_family, bench_rays.show_family),
     "pixels": ("Time against pixels", bench_rays.measure_pixels, bench_rays.show_pixels),
     "rays": ("Time against rays per pixel", bench_rays.measure_rays, bench_rays.show_rays),
-    "parallel": ("Rays that walk together", bench_animated.measure_parallel, bench_animated.show_parallel),
+    "parallel": ("Packets of rays", bench_animated.measure_parallel, bench_animated.show_parallel),
     "instances": ("Instances that move", bench_animated.measure_instances, bench_animated.show_instances),
     "refit": ("A mesh that deforms", bench_animated.measure_refit, bench_animated.show_refit),
     "flake": ("Time against spheres", bench_animated.measure_flake, bench_animated.show_flake),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The parts of the benchmark about `bvh` in animated, distributed ray tracing: rays that walk together, instances that
+"""The parts of the benchmark about `bvh` in animated, distributed ray tracing: packets of rays, instances that
 move, meshes that deform, and the sphereflake's scaling, next to what the paper has ('Stackless traversal of a sphere BVH').
 """
 import json
@@ -11,8 +11,8 @@ from bench_common import Failure, command, figure, fit_exponent, paired_ratio, s
 from bench_rays import find_measure, find_wave, sweep
 
 ORDERS = ("coherent", "partly", "incoherent")
-TOGETHER = (1, 2, 3, 4, 8)
-# Frames a second on a GeForce 9800: one ray a pixel, then two of them together. Twice the rays a frame.
+PACKETS = (1, 2, 3, 4, 8)
+# Frames a second on a GeForce 9800: one ray a pixel, then packets of two. Twice the rays a frame.
 PAPER_SIZES = {"512x512": (51, {"coherent": 44, "partly": 26, "incoherent": 14}),
                "256x256": (72, {"coherent": 66, "partly": 54, "incoherent": 36})}
 FLAKES = {2: 91, 3: 820, 4: 7381, 5: 66430, 6: 597871}
@@ -36,7 +36,7 @@ def met(is_met):
     return "met" if is_met else "MISSED"
 
 
-# ---- rays together ----------------------------------------------------------------------------------
+# ---- packets of rays ----------------------------------------------------------------------------------
 
 
 def measure_parallel(bench):
@@ -44,9 +44,9 @@ def measure_parallel(bench):
 
 
 def beside_one(result, order, bounds):
-    """{together: rays a second over those of one ray at a time, a figure}"""
-    runs = {row["together"]: row["runs_ns"] for row in result["rows"] if (row["order"], row["bounds"]) == (order, bounds)}
-    return {n: paired_ratio(runs[1], runs[n]) for n in TOGETHER}
+    """{rays of a packet: rays a second over those of one ray at a time, a figure}"""
+    runs = {row["packet"]: row["runs_ns"] for row in result["rows"] if (row["order"], row["bounds"]) == (order, bounds)}
+    return {n: paired_ratio(runs[1], runs[n]) for n in PACKETS}
 
 
 def show_parallel(data):
@@ -55,21 +55,21 @@ def show_parallel(data):
         for order in ORDERS:
             for bounds in ("boxes", "spheres"):
                 found = [row for row in result["rows"] if (row["order"], row["bounds"]) == (order, bounds)]
-                one = next(row for row in found if row["together"] == 1)
+                one = next(row for row in found if row["packet"] == 1)
                 ratios = beside_one(result, order, bounds)
                 rows.append((f"{result['triangles']} triangles", order, bounds, one["rays"],
                              significant(one["rays"] / figure(one["runs_ns"])["median"] * 1e3),
-                             *(with_spread(ratios[n]) for n in TOGETHER[1:]),
+                             *(with_spread(ratios[n]) for n in PACKETS[1:]),
                              *(significant(2 * fps[order] / single) for single, fps in PAPER_SIZES.values())))
-                best = max(TOGETHER, key=lambda n, r=ratios: r[n]["median"])
-                worst = min(TOGETHER, key=lambda n, r=ratios: r[n]["median"])
+                best = max(PACKETS, key=lambda n, r=ratios: r[n]["median"])
+                worst = min(PACKETS, key=lambda n, r=ratios: r[n]["median"])
                 verdicts.append(f"{result['triangles']:7} triangles, {order:10} {bounds:8} "
-                                f"{'wins with ' + str(best) + ' together: ' + significant(ratios[best]['median']) if best > 1 else 'wins with none':36} "
+                                f"{'wins with packets of ' + str(best) + ': ' + significant(ratios[best]['median']) if best > 1 else 'wins with none':36} "
                                 f"{'loses most with ' + str(worst) + ': ' + significant(ratios[worst]['median']) if worst > 1 else 'never loses'}")
-    header = [("scene", "rays", "bounds", "number", "1 ray", *(str(n) for n in TOGETHER[1:]), *(["paper, 2"] * 2)),
+    header = [("scene", "rays", "bounds", "number", "1 ray", *(str(n) for n in PACKETS[1:]), *(["paper, 2"] * 2)),
               ("", "", "", "", "Mray/s", *(["x 1 ray"] * 4), *PAPER_SIZES)]
     return ("Coherent: 24 jittered camera rays a pixel; partly: their reflections; incoherent: diffuse bounces in random order.\n"
-            "Of a group, rays that go apart are walked one after the other (bvh/together.glsl), which the paper's are not.\n"
+            "Of a packet, rays that go apart are traversed one after the other (bvh/packet.glsl), which the paper's are not.\n"
             "Paper: twice the frames a second with two rays of a pixel, over those with one: its 512x512 (51; 44, 26, 14) and\n"
             "256x256 (72; 66, 54, 36).\n\n" + table(header, rows) + "\n\n" + "\n".join(verdicts))
 

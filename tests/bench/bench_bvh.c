@@ -26,7 +26,7 @@
 #define PI_F 3.14159265f
 /* Distances of the same surface by way of different bounds are the same computation. */
 #define TOLERANCE 1e-5f
-/* Rays that several walk together take triangles relative to the leading one's origin: one that passes within
+/* Rays of a packet take triangles relative to the leading one's origin: one that passes within
  * rounding of an edge may go by it, or meet its other triangle. */
 #define DIFFERING_MAX (RAY_COUNT / 10000)
 
@@ -37,11 +37,11 @@ struct form {
 static const struct form forms[] = {
     {"plain (spheres, storage buffer)", {.bench = {.bvh_layout = BVH_LAYOUT_PLAIN}}},
     {"spheres, 1 ray", {.bvh = {.bounds = BVH_BOUNDS_SPHERE, .rays = 1}}},
-    {"spheres, 2 together", {.bvh = {.bounds = BVH_BOUNDS_SPHERE, .rays = 2}}},
+    {"spheres, packets of 2", {.bvh = {.bounds = BVH_BOUNDS_SPHERE, .rays = 2}}},
     {"boxes, 1 ray", {.bvh = {.bounds = BVH_BOUNDS_BOX, .rays = 1}}},
-    {"boxes, 2 together", {.bvh = {.bounds = BVH_BOUNDS_BOX, .rays = 2}}},
-    {"boxes, 4 together", {.bvh = {.bounds = BVH_BOUNDS_BOX, .rays = 4}}},
-    {"boxes, 8 together", {.bvh = {.bounds = BVH_BOUNDS_BOX, .rays = 8}}},
+    {"boxes, packets of 2", {.bvh = {.bounds = BVH_BOUNDS_BOX, .rays = 2}}},
+    {"boxes, packets of 4", {.bvh = {.bounds = BVH_BOUNDS_BOX, .rays = 4}}},
+    {"boxes, packets of 8", {.bvh = {.bounds = BVH_BOUNDS_BOX, .rays = 8}}},
     {"auto", {.bvh = {0}}},
 };
 #define FORM_COUNT (sizeof(forms) / sizeof(forms[0]))

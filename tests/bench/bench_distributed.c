@@ -25,8 +25,8 @@ static const struct form {
     uint32_t samples;
     float aperture;
     bool moves;
-    uint32_t rays_together; /* of the bvh, 0: chosen */
-    uint32_t slice_rays;    /* 0: chosen */
+    uint32_t packet_rays; /* of the bvh, 0: chosen */
+    uint32_t slice_rays;  /* 0: chosen */
 } forms[] = {
     {"whitted, 1 sample", INTEGRATOR_WHITTED, 1, 0.0f, false, 0, 0},
     {"distributed, 1 sample", INTEGRATOR_DISTRIBUTED, 1, 0.0f, false, 0, 0},
@@ -58,7 +58,7 @@ static bool render(struct bench *bench, const struct form *form, struct frame_re
     request.integrator = form->integrator;
     request.samples = form->samples;
     request.aperture = form->aperture;
-    request.tracer_options.bvh.rays = form->rays_together;
+    request.tracer_options.bvh.rays = form->packet_rays;
     frame_renderer_set_capacity(bench->renderer, form->slice_rays, 0);
     if (!frame_begin(bench->renderer, bench->scene, form->moves ? &bench->motion : NULL, &request, error))
         return false;

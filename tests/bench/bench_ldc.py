@@ -7,7 +7,7 @@ beside `bvh` and `reference`, and in their variants. Its JSON:
   pictures   how, and results of `bench forms` frames of the meshes that accuracy is wanted of: ldc at 512, 1024 and 2048
   family     results of `bench forms` waves over triangles, at one resolution
   depths     results of `bench forms` samples: peeling and lists, at depth complexities and of models
-  variants   what, and results of `bench forms` waves: levels, images, layers and rays together, tolerance
+  variants   what, and results of `bench forms` waves: levels, images, layers at once, packets, tolerance
   wanted     rows as in bench_reach.py
 
 A result is what `bench forms` prints (its head says what), with "title" added.
@@ -131,8 +131,8 @@ def variants(resolution, cell):
     return {"levels": [{"levels": "cells"}, pyramid, *({"levels": "blocks", "block": n} for n in (8, 32))],
             "images": [{"images": "overlap"}, {"images": "one"}],
             "layers of a texel at once": [{**pyramid, "layers": 1}, {**pyramid, "layers": 4}],
-            "rays together": [{"rays": 1}, {"rays": 4}],
-            "rays together, pyramid": [{**pyramid, "rays": 1}, {**pyramid, "rays": 4}],
+            "packets": [{"rays": 1}, {"rays": 4}],
+            "packets, pyramid": [{**pyramid, "rays": 1}, {**pyramid, "rays": 4}],
             "hit, pyramid": [pyramid, {"tolerance": f"{cell:.6g}"}, {"tolerance": f"{cell / 2:.6g}"}]}
 
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* How many rays are best walked together: the paper's parallel traversal ('Stackless traversal of a sphere BVH',
+/* How many rays are best in a packet: the paper's parallel traversal ('Stackless traversal of a sphere BVH',
  * section 5) with 1, 2, 3, 4 and 8 rays on coherent, partly coherent and incoherent rays, boxes and spheres. One
  * JSON object on standard output; bench.py makes the table. bench parallel TRIANGLES [RUNS]    the generated
  * family Exit status 1 if something fails or answers differ beyond 0.01 % of the rays from those of one ray at a
@@ -17,7 +17,7 @@
 #define HEIGHT 96u
 #define SAMPLES 24u /* of a pixel, next to each other; a multiple of all numbers of rays */
 #define RAY_COUNT (WIDTH * HEIGHT * SAMPLES)
-/* Rays that walk together take triangles relative to the leading one's origin: one within rounding of an edge may
+/* Rays of a packet take triangles relative to the leading one's origin: one within rounding of an edge may
  * go by it, or meet its other triangle. */
 #define DIFFERING_SHARE 10000u
 #define TOLERANCE 1e-5f
@@ -139,7 +139,7 @@ static json_t *measure(struct bench *bench, enum order order, const struct ray *
             for (unsigned i = 0; i < bench->runs[bounds][n].count; i++)
                 json_array_append_new(all, json_integer((json_int_t)bench->runs[bounds][n].times_ns[i]));
             json_array_append_new(rows, json_pack("{s:s, s:s, s:i, s:i, s:o}", "order", order_names[order],
-                                                  "bounds", bounds == BOXES ? "boxes" : "spheres", "together",
+                                                  "bounds", bounds == BOXES ? "boxes" : "spheres", "packet",
                                                   (int)numbers[n], "rays", (int)count, "runs_ns", all));
         }
     }

@@ -213,9 +213,9 @@ def walk_table(results):
         for wave in result["waves"]:
             measures = [find_measure(wave, *which[1:]) for which in WALKERS]
             beside = times_as_fast(measures[0], measures[3])
-            together = times_as_fast(measures[0], measures[1])
+            packets = times_as_fast(measures[0], measures[1])
             rows.append((result["title"], wave["kind"], wave["rays"], *(with_spread(rate(m)) for m in measures),
-                         with_spread(beside), with_spread(together)))
+                         with_spread(beside), with_spread(packets)))
     header = [("scene", "wave", "rays", *(which[0] for which in WALKERS), "bvh", "bvh"),
               ("", "", "", *(["Mray/s"] * len(WALKERS)), "/ Embree 1", "/ bvh 1 ray")]
     return table(header, rows)

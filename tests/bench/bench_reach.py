@@ -7,7 +7,7 @@ from bench_rays import CURVES, exponents, find_measure, find_wave, times_as_fast
 
 RAY_BYTES = 32
 SMALL, MIDDLE = 40000, 150000
-TOGETHER_MIN = 0.95
+PACKET_MIN = 0.95
 EXPONENT_MAX = 0.2
 
 
@@ -34,7 +34,7 @@ def beside_embree(result, kind, wanted):
                f"{result['triangles']} triangles; with surfaces {significant(hits['median'])}")
 
 
-def together_rows(results):
+def packet_rows(results):
     """One for each kind of wave: the scene in which choosing pays least."""
     for kind in ("primary", "shadow", "reflection", "occlusion", "bounce", "shuffled"):
         worst = None
@@ -44,7 +44,7 @@ def together_rows(results):
             if ratio and (worst is None or ratio["median"] < worst[0]["median"]):
                 worst = ratio, result["title"], wave["order"]
         if worst:
-            yield row(f"bvh {kind} ({worst[2]}), as many together as chosen / 1 ray", TOGETHER_MIN, worst[0],
+            yield row(f"bvh {kind} ({worst[2]}), packets as chosen / 1 ray", PACKET_MIN, worst[0],
                       f"worst of {len(results)} scenes: {worst[1]}")
 
 
@@ -80,7 +80,7 @@ def derive(parts):
             rows.append(beside_embree(result, "primary", 1.0))
         elif result["triangles"] <= MIDDLE:
             rows += [beside_embree(result, "primary", 0.8), beside_embree(result, "bounce", 0.33)]
-    rows += list(together_rows(scenes)) + list(exponent_rows(family))
+    rows += list(packet_rows(scenes)) + list(exponent_rows(family))
     if "distributed" in parts:
         line, wanted, measured, where = distributed_row(parts["distributed"])
         rows.append(row(line, wanted, measured, where, at_most=True))

@@ -128,7 +128,7 @@ static bool build_all(struct bench *bench, struct error *error)
         fprintf(stderr, "    building %s\n", impl->name);
         if (!add_tracer(bench, impl, "auto", NULL, error))
             return false;
-        /* What choosing the number of rays walked together is measured by. */
+        /* The baseline of the choice of packets. */
         if (impl == &tracer_bvh_impl && !bench->options.quick &&
             !add_tracer(bench, impl, "1 ray", &(struct tracer_options){.bvh = {.rays = 1}}, error))
             return false;

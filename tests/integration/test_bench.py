@@ -121,7 +121,7 @@ class Benchmark(unittest.TestCase):
 
     def test_packets_of_all_sizes_trace_all_kinds_of_rays(self):
         for result in self.document["parts"]["parallel"]["results"]:
-            self.assertEqual({(row["order"], row["bounds"], row["together"]) for row in result["rows"]},
+            self.assertEqual({(row["order"], row["bounds"], row["packet"]) for row in result["rows"]},
                              {(order, bounds, n) for order in ("coherent", "partly", "incoherent")
                               for bounds in ("boxes", "spheres") for n in (1, 2, 3, 4, 8)})
 
@@ -245,7 +245,7 @@ class Benchmark(unittest.TestCase):
     def test_the_wanted_lines_have_a_verdict_and_stand_in_the_text(self):
         text = (self.out / "bench.txt").read_text()
         rows = self.document["parts"]["wanted"]["rows"]
-        for part in ("rtcIntersect1", "as many together as chosen / 1 ray", "exponent of time against triangles"):
+        for part in ("rtcIntersect1", "packets as chosen / 1 ray", "exponent of time against triangles"):
             self.assertTrue(any(part in row["line"] for row in rows), part)
         for row in rows:
             self.assertIn(row["met"], (True, False))

@@ -21,22 +21,22 @@ BATCH = 40  # programs in one run of the compiler
 END_OF_FILE = "end_of_file_"  # a name that separates what the preprocessor writes of one file from that of the next
 ROOTS = (pathlib.Path("shaders"), pathlib.Path("tests/bench"))
 # Program -> its stages, and the defines of which it has one combination always.
-TRACERS = [{"TRAVERSE": '"naive/traverse.glsl"', "TRACER_NAIVE": "1", "RAYS_TOGETHER": "1"}] + [
-    {"TRAVERSE": '"bvh/traverse.glsl"', "TRACER_BVH": "1", "RAYS_TOGETHER": together, **bounds}
-    for together in ("1", "8")
+TRACERS = [{"TRAVERSE": '"naive/traverse.glsl"', "TRACER_NAIVE": "1", "PACKET_RAYS": "1"}] + [
+    {"TRAVERSE": '"bvh/traverse.glsl"', "TRACER_BVH": "1", "PACKET_RAYS": packet, **bounds}
+    for packet in ("1", "8")
     for bounds in ({"BVH_PACKED": "1"}, {}, {"BVH_SPHERES": "1"}, {"BVH_SPHERES": "1", "BVH_PLAIN": "1"})] + [
     {"TRAVERSE": '"ldc/traverse.glsl"', "TRACER_LDC": "1", "LDC_CUBES": cubes, "LDC_LAYERS_TOGETHER": layers,
-     "RAYS_TOGETHER": together, "LDC_LEVEL_BITS": bits, **levels}
-    for cubes, layers, together, bits, levels in (
+     "PACKET_RAYS": packet, "LDC_LEVEL_BITS": bits, **levels}
+    for cubes, layers, packet, bits, levels in (
         ("1", "4", "1", "0", {"LDC_CELLS": "1"}), ("2", "4", "4", "0", {"LDC_CELLS": "1"}),
         ("2", "1", "4", "2", {}), ("1", "4", "1", "3", {"LDC_BLOCKS": "1"}))] + [
-    {"TRAVERSE": '"abuffer/traverse.glsl"', "TRACER_ABUFFER": "1", "RAYS_TOGETHER": "1", **search}
+    {"TRAVERSE": '"abuffer/traverse.glsl"', "TRACER_ABUFFER": "1", "PACKET_RAYS": "1", **search}
     for search in ({}, {"ABUFFER_STEPS": "3"}, {"ABUFFER_STEPS": "1"})] + [
-    {"TRAVERSE": f'"svo/{walk}.glsl"', "TRACER_SVO": "1", "RAYS_TOGETHER": "1", **tree}
+    {"TRAVERSE": f'"svo/{walk}.glsl"', "TRACER_SVO": "1", "PACKET_RAYS": "1", **tree}
     for walk, tree in (("traverse", {"SVO_TOP_SHIFT": "8"}), ("tile_traverse", {"SVO_LEVELS": "10"}))]
 CHOICES = {
     "trace/wave.comp": [TRACERS, [{}, {"ANY_HIT": "1"}]],
-    "bvh/coherence.comp": [[{"RAYS_TOGETHER": "8"}]],
+    "bvh/coherence.comp": [[{"PACKET_RAYS": "8"}]],
     "bvh/refit_write.comp": [[{"BVH_PACKED": "1"}, {}, {"BVH_SPHERES": "1"}]],
     "abuffer/voxels.comp": [[{"VOXELS_" + stage: "1"} for stage in "JUDGE REACH_X REACH_Y REACH_Z".split()]],
     "ldc/levels.comp": [[{"LDC_LEVEL_BITS": "2"}]],

@@ -44,7 +44,7 @@ NOT_SANITIZED = re.compile(
     r"|test_(abuffer|animate|compare|import_animation|layers|ldc|light|models|poses|shot|view)$")
 # Where no times of an earlier run are known: what takes longest begins first.
 LONGEST_FIRST = ("accuracy/sampled_against_reference", "test_import", "test_light", "test_models", "test_view", "test_compare",
-                 "test_poses", "test_animate", "contract/bvh, eight rays together", "test_import_animation", "contract/bvh",
+                 "test_poses", "test_animate", "contract/bvh, packets of eight", "test_import_animation", "contract/bvh",
                  "test_units", "unit/trace/ldc/limits", "unit/trace/ldc/traversal", "test_soak")
 
 Result = collections.namedtuple("Result", "text passed failed skips")  # skips: (test, reason)

@@ -16,10 +16,10 @@ static const struct tracer_row rows[] = {
     }
     BVH("", .is_form = false),
     BVH(", one ray alone", .is_form = true, .options.bvh.rays = 1),
-    BVH(", two rays together", .is_form = true, .options.bvh.rays = 2),
-    BVH(", eight rays together", .is_form = true, .options.bvh.rays = 8),
+    BVH(", packets of two", .is_form = true, .options.bvh.rays = 2),
+    BVH(", packets of eight", .is_form = true, .options.bvh.rays = 8),
     BVH(" in the plain form", .is_form = true, .options.bench.bvh_layout = BVH_LAYOUT_PLAIN),
-    BVH(" with spheres, four rays together", .is_form = true,
+    BVH(" with spheres, packets of four", .is_form = true,
         .options = {.bvh.bounds = BVH_BOUNDS_SPHERE, .bvh.rays = 4}),
 #define REFERENCE(form, ...)                                                                                      \
     {                                                                                                             \
@@ -37,12 +37,12 @@ static const struct tracer_row rows[] = {
         .refuses_motion = STILL                                                                                   \
     }
     LDC("", .ldc.build = LDC_BUILD_AUTO),
-    LDC(", peeled, four rays together", .ldc.build = LDC_BUILD_PEEL, .ldc.rays = 4),
+    LDC(", peeled, packets of four", .ldc.build = LDC_BUILD_PEEL, .ldc.rays = 4),
     LDC(", in lists, by a pyramid", .ldc.build = LDC_BUILD_LISTS, .ldc.levels = LDC_LEVELS_PYRAMID),
-    LDC(" by a pyramid, four rays together, layers one by one", .ldc.levels = LDC_LEVELS_PYRAMID, .ldc.rays = 4,
+    LDC(" by a pyramid, packets of four, layers one by one", .ldc.levels = LDC_LEVELS_PYRAMID, .ldc.rays = 4,
         .bench.ldc_layers_together = 1),
     LDC(" by blocks of 8", .ldc.levels = LDC_LEVELS_BLOCKS),
-    LDC(" by blocks of 2, four rays together", .ldc.levels = LDC_LEVELS_BLOCKS, .ldc.block = 2, .ldc.rays = 4),
+    LDC(" by blocks of 2, packets of four", .ldc.levels = LDC_LEVELS_BLOCKS, .ldc.block = 2, .ldc.rays = 4),
     LDC(" by blocks of 32, layers one by one", .ldc.levels = LDC_LEVELS_BLOCKS, .ldc.block = 32,
         .bench.ldc_layers_together = 1),
 #define ABUFFER(form, searched)                                                                                   \

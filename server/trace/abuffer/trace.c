@@ -44,7 +44,7 @@ bool abuffer_intersect(struct abuffer_store *store, struct gpu_scene *scene, con
     const struct trace_program_source source = {
         .traverse = "abuffer/traverse.glsl",
         .defines = defines,
-        .rays_together = 1,
+        .packet_rays = 1,
         .rays_a_dispatch = store->device->facts.software ? 0 : DISPATCH_RAYS_MAX,
     };
     const struct gpu_program *program = trace_program_get(scene, rays->wave, &source, error);

@@ -10,24 +10,24 @@
 
 /* The packet size on software GL where packets pay. On hardware a SIMD group traverses together already, and
  * several rays per invocation cost registers; not measured there. */
-#define TOGETHER_SOFTWARE 8u
+#define PACKET_RAYS_SOFTWARE 8u
 /* The traversal of a packet takes as long as four single ones (bench_bvh): it pays with more rays than that. */
 #define RAYS_PER_PACKET_MIN 5u
 /* Rays that are farther apart than so many leaves, where the scene is, have few leaves in common. Measured: with
- * 871K triangles in 70K pixels (4 leaves) eight camera rays together are 0.9 of one alone, with 590K in 213K (2
+ * 871K triangles in 70K pixels (4 leaves) packets of eight camera rays are 0.9 of one alone, with 590K in 213K (2
  * leaves) 1.5; eight shadow rays, of which the last decides, 1.3, 1.04 and 0.87 with 147K, 590K and 1M triangles.
  */
-#define WIDTH_TOGETHER_CLOSEST 2.5f
-#define WIDTH_TOGETHER_ANY 1.5f
+#define PACKET_WIDTH_CLOSEST 2.5f
+#define PACKET_WIDTH_ANY 1.5f
 /* A share of the scene's diagonal. */
-#define REACH_TOGETHER (1.0f / 512)
+#define PACKET_REACH (1.0f / 512)
 /* Groups of which the coherence of a wave is found, and the rays below which it is not worth it. */
 #define COHERENCE_GROUPS 512u
 #define COHERENCE_RAYS_MIN 1024u
 
-float bvh_reach_together(const struct gpu_scene *scene, const struct wave *wave)
+float bvh_packet_reach(const struct gpu_scene *scene, const struct wave *wave)
 {
-    float reach = REACH_TOGETHER * scene->diagonal;
+    float reach = PACKET_REACH * scene->diagonal;
     /* Rays of several times have several places in what moves: measured, those of a lens are 0.7 of single ones
      * then. */
     return wave->origin_spread > reach && !scene->has_motion ? wave->origin_spread : reach;
@@ -38,33 +38,33 @@ static bool measure_coherence(struct bvh *bvh, const struct gpu_scene *scene, co
                               uint32_t counts[2], struct error *error)
 {
     struct gpu_device *device = scene->device;
-    static const struct gpu_define defines[] = {{"RAYS_TOGETHER", "8"}, {NULL, NULL}};
-    _Static_assert(TOGETHER_SOFTWARE == 8, "the define above");
+    static const struct gpu_define defines[] = {{"PACKET_RAYS", "8"}, {NULL, NULL}};
+    _Static_assert(PACKET_RAYS_SOFTWARE == 8, "the define above");
     const struct gpu_program *program = gpu_program_get(
         device, &(struct gpu_program_source){.compute = "bvh/coherence.comp", .defines = defines}, error);
     if (!program)
         return false;
-    uint32_t groups = wave->ray_count / TOGETHER_SOFTWARE;
+    uint32_t groups = wave->ray_count / PACKET_RAYS_SOFTWARE;
     uint32_t step = groups > COHERENCE_GROUPS ? groups / COHERENCE_GROUPS : 1;
     gpu_buffer_clear(device, &bvh->coherence, 0);
     gpu_buffer_bind_storage(&bvh->coherence, BIND_TRACER_0);
     gpu_buffer_bind_texels(device, wave->rays, UNIT_RAYS, GL_RGBA32F);
     gpu_uniform_uint(program, "group_count", groups / step);
-    gpu_uniform_uint(program, "group_stride", step * TOGETHER_SOFTWARE);
-    gpu_uniform_float(program, "bvh_reach_together", bvh_reach_together(scene, wave));
+    gpu_uniform_uint(program, "group_stride", step * PACKET_RAYS_SOFTWARE);
+    gpu_uniform_float(program, "bvh_packet_reach", bvh_packet_reach(scene, wave));
     float centre[3];
     for (int k = 0; k < 3; k++)
         centre[k] = 0.5f * scene->lower_world[k] + 0.5f * scene->upper_world[k];
     gpu_uniform_vec(program, "scene_centre", 3, centre);
-    float leaves = wave->kind == WAVE_ANY ? WIDTH_TOGETHER_ANY : WIDTH_TOGETHER_CLOSEST;
-    gpu_uniform_float(program, "width_together", leaves * bvh->leaf_extent_world);
+    float leaves = wave->kind == WAVE_ANY ? PACKET_WIDTH_ANY : PACKET_WIDTH_CLOSEST;
+    gpu_uniform_float(program, "packet_width", leaves * bvh->leaf_extent_world);
     gpu_dispatch(device, program, groups / step);
     gpu_buffer_read(device, &bvh->coherence, 0, counts, BVH_COHERENCE_BYTES);
     return true;
 }
 
-uint32_t bvh_rays_together(struct bvh *bvh, const struct gpu_scene *scene, const struct wave *wave,
-                           struct error *error)
+uint32_t bvh_packet_rays(struct bvh *bvh, const struct gpu_scene *scene, const struct wave *wave,
+                         struct error *error)
 {
     const struct tracer_options *options = &bvh->base.options;
     uint32_t counts[2];
@@ -76,5 +76,5 @@ uint32_t bvh_rays_together(struct bvh *bvh, const struct gpu_scene *scene, const
         return 1;
     if (!measure_coherence(bvh, scene, wave, counts, error))
         return 0;
-    return counts[0] >= (uint64_t)RAYS_PER_PACKET_MIN * counts[1] && counts[1] > 0 ? TOGETHER_SOFTWARE : 1;
+    return counts[0] >= (uint64_t)RAYS_PER_PACKET_MIN * counts[1] && counts[1] > 0 ? PACKET_RAYS_SOFTWARE : 1;
 }

@@ -365,8 +365,8 @@ static bool bvh_trace_begin(struct tracer *tracer, struct gpu_scene *scene, stru
                             struct error *error)
 {
     struct bvh_state *own = (struct bvh_state *)state;
-    own->rays_together = bvh_rays_together((struct bvh *)tracer, scene, &state->wave, error);
-    return own->rays_together > 0;
+    own->packet_rays = bvh_packet_rays((struct bvh *)tracer, scene, &state->wave, error);
+    return own->packet_rays > 0;
 }
 
 static void bind(struct bvh *bvh)
@@ -390,7 +390,7 @@ static bool is_one_instance(const struct bvh *bvh)
 static void set_uniforms(const struct bvh *bvh, const struct gpu_program *program, const struct gpu_scene *scene,
                          const struct wave *wave)
 {
-    gpu_uniform_float(program, "bvh_reach_together", bvh_reach_together(scene, wave));
+    gpu_uniform_float(program, "bvh_packet_reach", bvh_packet_reach(scene, wave));
     if (is_one_instance(bvh)) {
         gpu_uniform_uint(program, "bvh_instance", bvh->top.leaves[0] & BVH_LEAF_FIRST_MASK);
         return;
@@ -408,7 +408,7 @@ static bool bvh_trace_range(struct tracer *tracer, struct gpu_scene *scene, stru
     struct bvh *bvh = (struct bvh *)tracer;
     const struct bvh_form *settings = &bvh->store.settings;
     const struct wave *wave = &state->wave;
-    const uint32_t together = ((struct bvh_state *)state)->rays_together;
+    const uint32_t packet_rays = ((struct bvh_state *)state)->packet_rays;
     struct gpu_define defines[9] = {{"TRACER_BVH", "1"}};
     size_t n = 1;
     if (settings->bounds == BVH_BOUNDS_SPHERE)
@@ -420,7 +420,7 @@ static bool bvh_trace_range(struct tracer *tracer, struct gpu_scene *scene, stru
     if (is_one_instance(bvh))
         defines[n++] = (struct gpu_define){"BVH_ONE_INSTANCE", "1"};
     /* One origin in the world is many in the space of what moves. */
-    if (wave->shared_origin && together > 1 && !scene->has_motion)
+    if (wave->shared_origin && packet_rays > 1 && !scene->has_motion)
         defines[n++] = (struct gpu_define){"SHARED_ORIGIN", "1"};
     if (bvh->store.deforms)
         defines[n++] = (struct gpu_define){"BVH_DEFORMS", "1"};
@@ -429,8 +429,8 @@ static bool bvh_trace_range(struct tracer *tracer, struct gpu_scene *scene, stru
     const struct trace_program_source source = {
         .traverse = "bvh/traverse.glsl",
         .defines = defines,
-        .rays_together = together,
-        .rays_a_dispatch = DISPATCH_RAYS_MAX / together * together,
+        .packet_rays = packet_rays,
+        .rays_a_dispatch = DISPATCH_RAYS_MAX / packet_rays * packet_rays,
     };
     const struct gpu_program *program = trace_program_get(scene, wave, &source, error);
     if (!program)

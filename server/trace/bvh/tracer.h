@@ -28,16 +28,16 @@ struct bvh {
 /* Of one wave. */
 struct bvh_state {
     struct trace_state base;
-    uint32_t rays_together;
+    uint32_t packet_rays;
 };
 
 /* How far apart the origins of a packet's rays may be, in world space. Those of a lens may be all over it: its
  * rays meet again in the plane of focus. */
-float bvh_reach_together(const struct gpu_scene *scene, const struct wave *wave);
+float bvh_packet_reach(const struct gpu_scene *scene, const struct wave *wave);
 
 /* The packet size for the wave: that of the options, else the faster one for the wave's coherence, which is
  * measured on a sample. 0: failed. */
-uint32_t bvh_rays_together(struct bvh *bvh, const struct gpu_scene *scene, const struct wave *wave,
-                           struct error *error);
+uint32_t bvh_packet_rays(struct bvh *bvh, const struct gpu_scene *scene, const struct wave *wave,
+                         struct error *error);
 
 #endif

@@ -86,7 +86,7 @@ bool ldc_intersect(struct ldc_store *store, struct gpu_scene *scene, const struc
     const struct trace_program_source source = {
         .traverse = "ldc/traverse.glsl",
         .defines = defines,
-        .rays_together = options->ldc.rays ? options->ldc.rays : 1,
+        .packet_rays = options->ldc.rays ? options->ldc.rays : 1,
         .rays_a_dispatch = store->device->facts.software ? 0 : DISPATCH_RAYS_MAX,
     };
     const struct gpu_program *program = trace_program_get(scene, rays->wave, &source, error);

@@ -42,10 +42,10 @@ struct ldc {
 
 static bool check_options(const struct tracer_options *options, struct error *error)
 {
-    const uint32_t together = options->bench.ldc_layers_together;
-    if (together != 0 && together != 1 && together != 4)
+    const uint32_t layers = options->bench.ldc_layers_together;
+    if (layers != 0 && layers != 1 && layers != 4)
         return error_set(error, ERROR_INVALID, "options.ldc_layers_together",
-                         "1 or 4 layers are tested together, not %u", together);
+                         "1 or 4 layers are tested together, not %u", layers);
     if (options->limits.ldc_layers > LDC_LAYERS_MAX)
         return error_set(error, ERROR_INVALID, "options.ldc_layers", "%u layers; at most %u can be kept",
                          options->limits.ldc_layers, LDC_LAYERS_MAX);

@@ -180,7 +180,7 @@ static void expect_same_answers(enum look look, const struct tracer_options *opt
     for (uint32_t i = 0; i < RAY_COUNT; i++) {
         hit_count += expected[i].distance >= 0;
         if (memcmp(&expected[i], &hits[i], sizeof(*hits)) != 0)
-            fail_msg("ray %u, %u together: distance %.9g, primitive %u, instance %u; %.9g, %u, %u in the tree "
+            fail_msg("ray %u, packets of %u: distance %.9g, primitive %u, instance %u; %.9g, %u, %u in the tree "
                      "that was refitted",
                      i, options->bvh.rays, (double)expected[i].distance, expected[i].primitive,
                      expected[i].instance, (double)hits[i].distance, hits[i].primitive, hits[i].instance);
@@ -191,7 +191,7 @@ static void expect_same_answers(enum look look, const struct tracer_options *opt
     for (uint32_t i = 0; i < RAY_COUNT; i++) {
         tinted += (light[i] & 0xff) != 0 && (light[i] & 0xff) != 0xff;
         if (light[i] != other[i])
-            fail_msg("ray %u, %u together: visibility %08x, %08x in the tree that was refitted", i,
+            fail_msg("ray %u, packets of %u: visibility %08x, %08x in the tree that was refitted", i,
                      options->bvh.rays, light[i], other[i]);
     }
     assert_in_range(tinted, look == LOOK_TINTED ? RAY_COUNT / 8 : 0, RAY_COUNT);

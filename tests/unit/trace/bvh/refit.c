@@ -245,9 +245,9 @@ TEST(a_tree_that_is_worn_out_is_built_anew)
 
 TEST(answers_do_not_depend_on_earlier_poses)
 {
-    for (uint32_t together = 0; together <= 8; together += 4) {
+    for (uint32_t packet = 0; packet <= 8; packet += 4) {
         struct fixture straight, roundabout;
-        const struct tracer_options options = {.bvh = {.rays = together}};
+        const struct tracer_options options = {.bvh = {.rays = packet}};
         fixture_init(&straight, &options, 0.3f);
         fixture_init(&roundabout, &options, 0);
         pose(&roundabout, 8, 8);
@@ -257,8 +257,8 @@ TEST(answers_do_not_depend_on_earlier_poses)
                    *hits = trace(&roundabout, roundabout.tracer, true);
         for (uint32_t i = 0; i < RAY_COUNT; i++)
             if (memcmp(&expected[i], &hits[i], sizeof(*hits)) != 0)
-                fail_msg("ray %u, %u together: distance %.9g, primitive %u; %.9g, %u after other poses", i,
-                         together, (double)expected[i].distance, expected[i].primitive, (double)hits[i].distance,
+                fail_msg("ray %u, packets of %u: distance %.9g, primitive %u; %.9g, %u after other poses", i,
+                         packet, (double)expected[i].distance, expected[i].primitive, (double)hits[i].distance,
                          hits[i].primitive);
         free(expected);
         free(hits);

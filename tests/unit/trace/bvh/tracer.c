@@ -340,7 +340,7 @@ static struct trace_state *begin_wave(struct fixture *fixture, struct gpu_buffer
 
 static uint32_t packet_of(const struct trace_state *state)
 {
-    return ((const struct bvh_state *)state)->rays_together;
+    return ((const struct bvh_state *)state)->packet_rays;
 }
 
 /* Also in the middle of a wave, whatever was traced in between and whatever its other rays are. */

@@ -6,16 +6,16 @@ uint octant_of(vec3 direction)
     return (direction.x < 0.0 ? 1u : 0u) | (direction.y < 0.0 ? 2u : 0u) | (direction.z < 0.0 ? 4u : 0u);
 }
 
-uniform float bvh_reach_together;             // maximum distance of their origins; world space
-const float SQUARED_COSINE_TOGETHER = 0.998;  // of the maximum angle between them: 2.6 degrees
+uniform float bvh_packet_reach;             // maximum distance of their origins; world space
+const float PACKET_SQUARED_COSINE = 0.998;  // of the maximum angle between them: 2.6 degrees
 
 // Do two rays have similar directions? Others have no interval that would cull anything.
-bool go_together(vec3 origin_a, vec3 direction_a, vec3 origin_b, vec3 direction_b)
+bool form_packet(vec3 origin_a, vec3 direction_a, vec3 origin_b, vec3 direction_b)
 {
     vec3 apart = origin_b - origin_a;
     float cosine = dot(direction_a, direction_b);
     return octant_of(direction_a) == octant_of(direction_b) &&
            cosine * cosine >=
-               SQUARED_COSINE_TOGETHER * dot(direction_a, direction_a) * dot(direction_b, direction_b) &&
-           dot(apart, apart) <= bvh_reach_together * bvh_reach_together;
+               PACKET_SQUARED_COSINE * dot(direction_a, direction_a) * dot(direction_b, direction_b) &&
+           dot(apart, apart) <= bvh_packet_reach * bvh_packet_reach;
 }
