@@ -224,7 +224,7 @@ void note_uses(reader &r, const tinygltf::Node &node, std::set<int> &used)
 }
 
 // Calls `visit(node, parent's result)` for all nodes below the roots, parents first.
-template <typename visitor> void walk(reader &r, const std::vector<int> &roots, visitor visit)
+template <typename visitor> void traverse(reader &r, const std::vector<int> &roots, visitor visit)
 {
     std::vector<pending> open;
 
@@ -276,13 +276,13 @@ void add_scene(reader &r)
     const std::vector<int> roots = roots_of(r);
     std::set<int> used;
 
-    walk(r, roots, [&](size_t node, uint32_t) {
+    traverse(r, roots, [&](size_t node, uint32_t) {
         note_uses(r, r.model.nodes[node], used);
         return 0u;
     });
     add_materials(r, used);
     r.node_ids.assign(r.model.nodes.size(), 0);
-    walk(r, roots, [&](size_t node, uint32_t parent) { return add_one(r, node, parent); });
+    traverse(r, roots, [&](size_t node, uint32_t parent) { return add_one(r, node, parent); });
     add_skins(r);
 }
 

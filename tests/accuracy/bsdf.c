@@ -75,10 +75,10 @@ static void look_from(struct bsdf_case *c, double cosine)
     c->view[2] = (float)cosine;
 }
 
-/* A walk over white materials. */
+/* Visits white materials. */
 typedef void look(struct bsdf_probe *probe, const struct bsdf_case *c, bool ward, void *seen);
-static void walk(struct bsdf_probe probes[2], const float *roughnesses, size_t roughness_count, look *look_at,
-                 void *seen)
+static void visit_materials(struct bsdf_probe probes[2], const float *roughnesses, size_t roughness_count,
+                            look *look_at, void *seen)
 {
     static const struct bsdf_case kinds[] = {
         {.metallic = 1.0f, .ior = 1.5f},
@@ -177,7 +177,7 @@ TEST(sampled_directions_follow_the_stated_density)
 {
     static const float roughnesses[] = {0.45f, 0.7f, 1.0f};
     struct densities densities = {0};
-    walk(*state, roughnesses, COUNT(roughnesses), hold_against_its_density, &densities);
+    visit_materials(*state, roughnesses, COUNT(roughnesses), hold_against_its_density, &densities);
     print_message("%zu cases: of a cell's count %.1f deviations off at most (%s), of all %.1e\n", densities.cases,
                   densities.max_z, densities.where, densities.sum_off);
     /* 432 cases of 128 cells: independent counts are beyond 5.5 deviations once in 500 such tests */
@@ -218,7 +218,7 @@ TEST(no_white_material_sends_on_more_than_arrives)
 {
     static const float roughnesses[] = {0.0f, 0.05f, 0.15f, 0.3f, 0.5f, 0.7f, 0.85f, 1.0f};
     struct albedos albedos = {.min_metal = {1, 1}, .min_scattering = {1, 1}, .min_glass = {1, 1}};
-    walk(*state, roughnesses, COUNT(roughnesses), sum_up, &albedos);
+    visit_materials(*state, roughnesses, COUNT(roughnesses), sum_up, &albedos);
     print_message("maximum albedo, less five standard errors: %.5f (%s)\n", albedos.max, albedos.where);
     for (int ward = 0; ward < 2; ward++)
         print_message("%s, minimum albedo of a white metal %.3f, of what scatters %.3f, of glass %.3f\n",

@@ -111,7 +111,7 @@ static double fresnel(double cosine, double n)
     return (s * s + p * p) / 2.0;
 }
 
-/* What is looked for in one walk over the grid; each is printed, so that its margin is seen. */
+/* What is looked for in one pass over the grid; each is printed, so that its margin is seen. */
 struct extremes {
     double max, mistake, lambert, mirror, parts;
     double min_dielectric, min_metal; /* of what a light sends: facets that shadow each other are not followed */
@@ -141,7 +141,7 @@ static void look_at(const struct probe_case *c, double albedo, double mistake, c
         extremes->min_metal = fmin(extremes->min_metal, albedo);
 }
 
-static void walk_grid(struct probe *probe, struct extremes *extremes)
+static void visit_grid(struct probe *probe, struct extremes *extremes)
 {
     static struct probe_case cases[CASES_MAX];
     static struct probe_split splits[CASES_MAX];
@@ -161,7 +161,7 @@ static void walk_grid(struct probe *probe, struct extremes *extremes)
 TEST(no_material_gives_out_more_than_arrives)
 {
     struct extremes extremes = {.min_dielectric = 1.0, .min_metal = 1.0};
-    walk_grid(*state, &extremes);
+    visit_grid(*state, &extremes);
     print_message("maximum albedo %.6f (%s); quadrature off by %.1e at most\n", extremes.max, extremes.where,
                   extremes.mistake);
     print_message("a light in glass is mirrored within %.1e of Fresnel; Lambert within %.1e; parts of all that "

@@ -100,7 +100,7 @@ def show(data):
         f"Ambient occlusion with more rays, {data['rays']['title']}", show_rays(data["rays"]),
         "Building, beside a pass over the same triangles that keeps the nearest depths and nothing else",
         show_builds(data["builds"]),
-        "Beside an octree of as many cells (table 1): svo-tiles as Crassin and Green have it, and walked from the root in\n"
+        "Beside an octree of as many cells (table 1): svo-tiles as Crassin and Green have it, and traversed from the root in\n"
         "each step; svo-cells the same hits, with records of two levels, a stack, and fragments that know where they have\n"
         "come to; svo-planes with a plane in each leaf, as near to the surface as A-buffers are. abuffer: linear3, as in the\n"
         "paper. Others: all of the picture but its rays.",

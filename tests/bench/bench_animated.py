@@ -121,8 +121,8 @@ def flakes(bench, folder):
 def measure_flake(bench):
     size = "64x64" if bench.tiny else "512x512"
     models = list(flakes(bench, bench.scenes))
-    walks = sweep(bench, [(f"sphereflake {n}", ["--model", model, "--size", size, "--waves", "primary,bounce"])
-                          for n, model in models])
+    traversals = sweep(bench, [(f"sphereflake {n}", ["--model", model, "--size", size, "--waves", "primary,bounce"])
+                               for n, model in models])
     frames = []
     for n, model in models:
         say(f"  frames of {n} spheres")
@@ -131,7 +131,7 @@ def measure_flake(bench):
                            "64x64" if bench.tiny else "640x480", "--depth", "4", "--server", daemon.address, "--timings=json")[0][0]
                    for _ in range(1 + bench.times(3))][1:]
         frames.append({"spheres": n, "frame_ms": figure([sum(stage_ms(f, s) for s in FRAME_STAGES) for f in got])})
-    return {**walks, "frames": frames}
+    return {**traversals, "frames": frames}
 
 
 def flake_lines(data):
@@ -141,9 +141,9 @@ def flake_lines(data):
         points = []
         for result in data["results"]:
             wave = find_wave(result, kind)
-            measure = find_measure(wave, "bvh", "auto", "walk")
+            measure = find_measure(wave, "bvh", "auto", "traversal")
             points.append((result["spheres"], figure([ns / wave["rays"] for ns in measure["time"]["runs_ns"]])))
-        lines[f"walk, {kind}, ns/ray"] = points
+        lines[f"traversal, {kind}, ns/ray"] = points
     lines["whole frame, ms"] = [(frame["spheres"], frame["frame_ms"]) for frame in data["frames"]]
     return lines
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The forms of the tracer `bvh` side by side: rays a second of the walk alone, build time, memory.
+/* The forms of the tracer `bvh` side by side: rays a second of the traversal alone, build time, memory.
  * Usage: bench bvh [TRIANGLES ..]     (default: 5000 37000 146000 590000)
  * Nine bumpy spheres on a floor, seen from above: waves of camera rays (8x8 tiles in Morton order) and of one
  * diffuse bounce from where these hit. Each figure is the median of RUNS after a warm-up, which also compiles.
@@ -129,7 +129,7 @@ static void make_secondary_rays(struct bench *bench, const struct hit *hits)
 
 /* ---- measuring ---- */
 
-/* The walk alone, or its surfaces too. */
+/* The traversal alone, or its surfaces too. */
 static void run(struct bench *bench, struct tracer *tracer, int kind, bool surfaces)
 {
     struct error error = {0};

@@ -34,7 +34,7 @@ bool bench_contest_fits(const struct bench_contest *contest, const struct bench_
 {
     const struct gpu_scene *scene = &contest->scene->gpu;
     const bool is_any = bench_wave_facts[kind].is_any;
-    if (contender->way == BENCH_WALK)
+    if (contender->way == BENCH_TRAVERSAL)
         return !is_any; /* a visibility is all that there is */
     if (contender->way == BENCH_RAW)
         return !scene->has_cutout && !(is_any && scene->has_translucent); /* what it knows nothing of */
@@ -85,7 +85,7 @@ static bool run_once(struct bench_contest *contest, const struct bench_contender
                                                        .intersections = fact->is_any ? NULL : raw,
                                                        .visibilities = raw});
     else
-        ok = run_tracer(contest, contender->tracer_used, contender->way == BENCH_WALK, wave, error);
+        ok = run_tracer(contest, contender->tracer_used, contender->way == BENCH_TRAVERSAL, wave, error);
     *time_ns = clock_now_ns() - start_ns;
     return ok;
 }

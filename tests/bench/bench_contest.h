@@ -16,14 +16,14 @@
 
 enum bench_way {
     BENCH_INTERFACE, /* rays on the device to hits there, or to visibilities */
-    BENCH_WALK,      /* closest hits only: distance, primitive, instance, barycentrics */
+    BENCH_TRAVERSAL, /* closest hits only: distance, primitive, instance, barycentrics */
     BENCH_RAW,       /* the same from Embree itself */
 };
 
 struct bench_contender {
     const char *tracer, *form; /* "bvh", "1 ray" */
     enum bench_way way;
-    struct tracer *tracer_used;        /* interface and walk */
+    struct tracer *tracer_used;        /* interface and traversal */
     const struct bench_embree *embree; /* raw */
     unsigned packet;
     bool is_exact; /* its disagreement is a fault, not a property */
@@ -60,7 +60,7 @@ bool bench_contest_wave(struct bench_contest *contest, const struct bench_wave *
 /* One untimed run through the interface: the hits, for what is made of them. */
 bool bench_contest_hits(struct bench_contest *contest, struct tracer *tracer, const struct bench_wave *wave,
                         struct hit *hits, struct error *error);
-/* Likewise of the walk alone: distance, primitive and instance of the hits. */
+/* Likewise of the traversal alone: distance, primitive and instance of the hits. */
 bool bench_contest_intersections(struct bench_contest *contest, struct tracer *tracer,
                                  const struct bench_wave *wave, struct hit *hits, struct error *error);
 /* More than 0.01 % of the rays wrong, edges aside. */

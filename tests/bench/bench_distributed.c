@@ -33,7 +33,7 @@ static const struct form {
     {"distributed, 16 samples", INTEGRATOR_DISTRIBUTED, 16, 0.0f, false, 0, 0},
     {"and a lens", INTEGRATOR_DISTRIBUTED, 16, 0.12f, false, 0, 0},
     {"and motion", INTEGRATOR_DISTRIBUTED, 16, 0.12f, true, 0, 0},
-    {"rays walk alone", INTEGRATOR_DISTRIBUTED, 16, 0.12f, true, 1, 0},
+    {"rays traverse alone", INTEGRATOR_DISTRIBUTED, 16, 0.12f, true, 1, 0},
 };
 enum { FORM_COUNT = sizeof(forms) / sizeof(forms[0]), FORM_WHOLE = 4 };
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Embree itself, without our interface around it: the yardstick of the walk alone. The scene's visible triangles
- * lie in world space as one geometry, spheres and discs as points; nothing is cut out. */
+/* Embree itself, without our interface around it: the yardstick of the traversal alone. The scene's visible
+ * triangles lie in world space as one geometry, spheres and discs as points; nothing is cut out. */
 #ifndef FARLIGHT_TESTS_BENCH_EMBREE_H
 #define FARLIGHT_TESTS_BENCH_EMBREE_H
 
@@ -12,7 +12,7 @@
 
 struct bench_embree;
 
-/* What a ray found, as much as a walk tells. */
+/* What a ray found, as much as a traversal tells. */
 struct bench_intersection {
     float distance; /* < 0: nothing */
     uint32_t primitive, instance;

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* Builds: {"name", "structure", "bytes", "build_ns": [..]}; of octrees also "octree": what the last build counted.
  * Waves: the same, and "waves": [{"kind", "rays", "hits_ns": [..], "traversal_ns": [..]}]: rays to hits on the
- * device, surfaces included, and the walk alone (of any-hit waves there is none). Closest-hit waves beside the
- * reference also have "agree" (share of the rays that hit with both or miss with both), "only_form",
+ * device, surfaces included, and the traversal alone (of any-hit waves there is none). Closest-hit waves beside
+ * the reference also have "agree" (share of the rays that hit with both or miss with both), "only_form",
  * "only_reference", and of rays that hit with both the difference of distances: "error_median", "error_p99", in
  * metres; of ldc and abuffer also what a ray looked at in the mean: "nodes" (abuffer: blocks of voxels), "texels"
  * (or cells) and "samples". Rays begin where the reference's camera rays hit. */
@@ -130,8 +130,8 @@ static void compare(json_t *object, const struct hit *truth, const struct hit *h
     free(errors);
 }
 
-/* What the walk looks at, in the mean of the wave's rays. Intersections are no answers then (shaders/ldc/cube.glsl,
- * shaders/abuffer/column.glsl).
+/* What the traversal looks at, in the mean of the wave's rays. Intersections are no answers then
+ * (shaders/ldc/cube.glsl, shaders/abuffer/column.glsl).
  */
 static bool count_steps(struct bench_contest *contest, struct bench_form *form, const struct bench_wave *wave,
                         struct hit *counts, json_t *object, struct error *error)
@@ -186,7 +186,7 @@ static bool begin(struct waves *waves, struct bench_forms *bench, struct error *
 static void add_contenders(struct waves *waves)
 {
     for (unsigned i = 0; i < waves->bench->form_count; i++)
-        for (enum bench_way way = BENCH_INTERFACE; way <= BENCH_WALK; way++)
+        for (enum bench_way way = BENCH_INTERFACE; way <= BENCH_TRAVERSAL; way++)
             bench_contest_add(&waves->contest, "", waves->bench->forms[i].name, way)->tracer_used =
                 waves->bench->forms[i].made;
 }

@@ -79,7 +79,7 @@ def show_family(results):
             wave = wave_of(form, "reflection")
             lines.append((result["triangles"], name,
                           *(with_spread(figure([ns / wave["rays"] for ns in wave[key]])) for key in ("hits_ns", "traversal_ns"))))
-    return table([("triangles", "tracer", "reflection", "the walk alone"), ("", "", "ns/ray", "ns/ray")], lines)
+    return table([("triangles", "tracer", "reflection", "the traversal alone"), ("", "", "ns/ray", "ns/ray")], lines)
 
 
 def show_depths(results):

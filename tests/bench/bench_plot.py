@@ -16,7 +16,7 @@ from bench_common import Failure, figure, fit_exponent
 from bench_rays import CURVES, curve
 
 # One colour a contender, told apart without colour vision too (Okabe and Ito 2008); one dash and mark a kind of ray.
-COLOURS = {"bvh, walk": "#0072b2", "bvh, hits": "#56b4e9", "reference, hits": "#009e73", "Embree, 1 ray a call": "#d55e00"}
+COLOURS = {"bvh, traversal": "#0072b2", "bvh, hits": "#56b4e9", "reference, hits": "#009e73", "Embree, 1 ray a call": "#d55e00"}
 KINDS = {"primary": (1, 7), "occlusion": (1, 7), "bounce": (2, 9)}  # gnuplot's dash and point types
 SIZES = {"svg": "svg size 1100,560 dynamic enhanced font 'DejaVu Sans,14' background '#ffffff'",
          "png": "pngcairo size 1650,840 enhanced font 'DejaVu Sans,18' background '#ffffff'"}

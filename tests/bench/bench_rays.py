@@ -2,7 +2,7 @@
 """The parts of the benchmark that measure rays: `bench tracers` over scenes, triangles, pixels and rays per pixel.
 
 A result is what `bench tracers` prints, with "title" added. Two measures: through the interface (rays to hits on the device,
-surface included), and the walk alone (distance, primitive, instance, barycentrics), which is held against Embree itself. A
+surface included), and the traversal alone (distance, primitive, instance, barycentrics), which is held against Embree itself. A
 visibility is all that an any-hit wave asks for, so there the two are the same.
 """
 import json
@@ -130,8 +130,8 @@ def find_wave(result, kind):
 
 
 def find_measure(wave, tracer, form, way):
-    """None: was not measured. The walk of an any-hit wave is what the interface does."""
-    if wave and wave["any"] and way == "walk":
+    """None: was not measured. The traversal of an any-hit wave is what the interface does."""
+    if wave and wave["any"] and way == "traversal":
         way = "interface"
     return next((m for m in wave["measures"] if (m["tracer"], m["form"], m["way"]) == (tracer, form, way)), None) if wave else None
 
@@ -201,43 +201,43 @@ def interface_table(results):
     return table(header, [row for result in results for row in tracer_rows(result)])
 
 
-WALKERS = [("bvh", "bvh", "auto", "walk"), ("bvh 1 ray", "bvh", "1 ray", "walk"), ("reference", "reference", "auto", "walk"),
-           ("Embree 1", "embree", "1 a call", "raw"), ("Embree 8", "embree", "8 a call", "raw"),
-           ("Embree 16", "embree", "16 a call", "raw"), ("robust 1", "embree", "1 a call, robust", "raw"),
-           ("robust 8", "embree", "8 a call, robust", "raw"), ("robust 16", "embree", "16 a call, robust", "raw")]
+TRAVERSERS = [("bvh", "bvh", "auto", "traversal"), ("bvh 1 ray", "bvh", "1 ray", "traversal"), ("reference", "reference", "auto", "traversal"),
+              ("Embree 1", "embree", "1 a call", "raw"), ("Embree 8", "embree", "8 a call", "raw"),
+              ("Embree 16", "embree", "16 a call", "raw"), ("robust 1", "embree", "1 a call, robust", "raw"),
+              ("robust 8", "embree", "8 a call, robust", "raw"), ("robust 16", "embree", "16 a call, robust", "raw")]
 
 
-def walk_table(results):
+def traversal_table(results):
     rows = []
     for result in results:
         for wave in result["waves"]:
-            measures = [find_measure(wave, *which[1:]) for which in WALKERS]
+            measures = [find_measure(wave, *which[1:]) for which in TRAVERSERS]
             beside = times_as_fast(measures[0], measures[3])
             packets = times_as_fast(measures[0], measures[1])
             rows.append((result["title"], wave["kind"], wave["rays"], *(with_spread(rate(m)) for m in measures),
                          with_spread(beside), with_spread(packets)))
-    header = [("scene", "wave", "rays", *(which[0] for which in WALKERS), "bvh", "bvh"),
-              ("", "", "", *(["Mray/s"] * len(WALKERS)), "/ Embree 1", "/ bvh 1 ray")]
+    header = [("scene", "wave", "rays", *(which[0] for which in TRAVERSERS), "bvh", "bvh"),
+              ("", "", "", *(["Mray/s"] * len(TRAVERSERS)), "/ Embree 1", "/ bvh 1 ray")]
     return table(header, rows)
 
 
 def show_tracers(data):
     text = ("Rays to hits on the device, surface included; median ± median absolute deviation. Trace: the primary wave. Any-hit\n"
             "waves of scenes with translucent or cut-out surfaces are not the same work for Embree itself, and left out there.\n\n")
-    return (text + interface_table(data["results"]) + "\n\nThe walk alone beside Embree itself, 1, 8 and 16 rays a call, "
-            "default and robust scene; all cores, denormals flushed.\n\n" + walk_table(data["results"]))
+    return (text + interface_table(data["results"]) + "\n\nThe traversal alone beside Embree itself, 1, 8 and 16 rays a call, "
+            "default and robust scene; all cores, denormals flushed.\n\n" + traversal_table(data["results"]))
 
 
 def show_reach(data):
-    return "The generated family at three sizes: what is wanted of it is in the table at the end.\n\n" + walk_table(data["results"])
+    return "The generated family at three sizes: what is wanted of it is in the table at the end.\n\n" + traversal_table(data["results"])
 
 
-CURVES = [("bvh, walk", "bvh", "auto", "walk"), ("bvh, hits", "bvh", "auto", "interface"),
+CURVES = [("bvh, traversal", "bvh", "auto", "traversal"), ("bvh, hits", "bvh", "auto", "interface"),
           ("reference, hits", "reference", "auto", "interface"), ("Embree, 1 ray a call", "embree", "1 a call", "raw")]
 
 
 def curve(results, kind, which, x):
-    """[(x, ns a ray as a figure)] of one line of a plot. What the interface adds to a walk is surfaces: not for any hit."""
+    """[(x, ns a ray as a figure)] of one line of a plot. What the interface adds to a traversal is surfaces: not for any hit."""
     points = []
     for result in results:
         wave = find_wave(result, kind)

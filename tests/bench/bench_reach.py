@@ -26,11 +26,11 @@ def verdict(line):
 def beside_embree(result, kind, wanted):
     wave = find_wave(result, kind)
     embree = find_measure(wave, "embree", "1 a call", "raw")
-    walk = times_as_fast(find_measure(wave, "bvh", "auto", "walk"), embree)
+    traversal = times_as_fast(find_measure(wave, "bvh", "auto", "traversal"), embree)
     hits = times_as_fast(find_measure(wave, "bvh", "auto", "interface"), embree)
-    if walk is None:
+    if traversal is None:
         return None
-    return row(f"bvh {kind}, the walk / rtcIntersect1", wanted, walk,
+    return row(f"bvh {kind}, the traversal / rtcIntersect1", wanted, traversal,
                f"{result['triangles']} triangles; with surfaces {significant(hits['median'])}")
 
 
@@ -40,7 +40,7 @@ def packet_rows(results):
         worst = None
         for result in results:
             wave = find_wave(result, kind)
-            ratio = times_as_fast(find_measure(wave, "bvh", "auto", "walk"), find_measure(wave, "bvh", "1 ray", "walk"))
+            ratio = times_as_fast(find_measure(wave, "bvh", "auto", "traversal"), find_measure(wave, "bvh", "1 ray", "traversal"))
             if ratio and (worst is None or ratio["median"] < worst[0]["median"]):
                 worst = ratio, result["title"], wave["order"]
         if worst:

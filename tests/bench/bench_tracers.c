@@ -77,10 +77,10 @@ static bool build_embree(struct bench *bench, struct structure *structure, bool 
 static void add_contenders(struct bench *bench, const struct structure *structure)
 {
     struct bench_contest *contest = &bench->contest;
-    /* Those that walk a tree of the scene itself answer exactly; samples of it have their own measure. */
+    /* Those that traverse a tree of the scene itself answer exactly; samples of it have their own measure. */
     const bool is_exact = bench_is_named("bvh,reference,naive", structure->tracer);
-    for (enum bench_way way = BENCH_INTERFACE; way <= BENCH_WALK; way++) {
-        if (way == BENCH_WALK && !is_exact)
+    for (enum bench_way way = BENCH_INTERFACE; way <= BENCH_TRAVERSAL; way++) {
+        if (way == BENCH_TRAVERSAL && !is_exact)
             continue; /* has no intersections */
         struct bench_contender *added = bench_contest_add(contest, structure->tracer, structure->form, way);
         added->tracer_used = structure->made;
@@ -163,7 +163,7 @@ static json_t *structures_json(const struct bench *bench)
 
 static json_t *contender_json(const struct bench_contender *contender, uint32_t ray_count)
 {
-    static const char *const ways[] = {"interface", "walk", "raw"};
+    static const char *const ways[] = {"interface", "traversal", "raw"};
     const double median_ns = bench_figure(&contender->runs).median_ns;
     json_t *made = json_pack("{s:s, s:s, s:s, s:o, s:f}", "tracer", contender->tracer, "form", contender->form,
                              "way", ways[contender->way], "time", figure_json(&contender->runs), "rays_per_s",

@@ -234,8 +234,8 @@ class Benchmark(unittest.TestCase):
         for wave in result["waves"]:
             for form in ("1 a call", "8 a call", "16 a call", "1 a call, robust"):
                 self.assertIsNotNone(bench_rays.find_measure(wave, "embree", form, "raw"), (wave["kind"], form))
-            walk = bench_rays.find_measure(wave, "bvh", "auto", "walk")
-            self.assertEqual(walk["agreement"]["differing"] - walk["agreement"]["edges"], 0)
+            traversal = bench_rays.find_measure(wave, "bvh", "auto", "traversal")
+            self.assertEqual(traversal["agreement"]["differing"] - traversal["agreement"]["edges"], 0)
 
     def test_rays_per_pixel_multiply_the_rays(self):
         rays = {r["rays_per_pixel"]: next(w["rays"] for w in r["waves"] if w["kind"] == "bounce")

@@ -32,8 +32,8 @@ TRACERS = [{"TRAVERSE": '"naive/traverse.glsl"', "TRACER_NAIVE": "1", "PACKET_RA
         ("2", "1", "4", "2", {}), ("1", "4", "1", "3", {"LDC_BLOCKS": "1"}))] + [
     {"TRAVERSE": '"abuffer/traverse.glsl"', "TRACER_ABUFFER": "1", "PACKET_RAYS": "1", **search}
     for search in ({}, {"ABUFFER_STEPS": "3"}, {"ABUFFER_STEPS": "1"})] + [
-    {"TRAVERSE": f'"svo/{walk}.glsl"', "TRACER_SVO": "1", "PACKET_RAYS": "1", **tree}
-    for walk, tree in (("traverse", {"SVO_TOP_SHIFT": "8"}), ("tile_traverse", {"SVO_LEVELS": "10"}))]
+    {"TRAVERSE": f'"svo/{traversal}.glsl"', "TRACER_SVO": "1", "PACKET_RAYS": "1", **tree}
+    for traversal, tree in (("traverse", {"SVO_TOP_SHIFT": "8"}), ("tile_traverse", {"SVO_LEVELS": "10"}))]
 CHOICES = {
     "trace/wave.comp": [TRACERS, [{}, {"ANY_HIT": "1"}]],
     "bvh/coherence.comp": [[{"PACKET_RAYS": "8"}]],

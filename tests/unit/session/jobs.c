@@ -186,10 +186,10 @@ SESSION_TEST(a_job_takes_its_clips_and_its_lens_along)
     assert_int_equal(job->frame.tracer_options.bvh.rays, 3);
     while (receive()->type != MESSAGE_OK)
         continue;
-    const uint32_t not_walked[] = {5, 6, 7};
+    const uint32_t refused[] = {5, 6, 7};
     for (uint32_t i = 0; i < 3; i++) {
         message = render_message(0, 1);
-        message.render.settings.bvh.rays = not_walked[i];
+        message.render.settings.bvh.rays = refused[i];
         send_unchecked(3 + i, &message);
         expect_error(3 + i, PROTOCOL_ERROR_INVALID);
         assert_string_equal(client.message.error.field, "render.bvh_rays");

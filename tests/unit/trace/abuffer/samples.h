@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* A-buffers made on the CPU from triangles, as abuffer/layout.h has them, and what rays meet of the triangles
- * themselves: for the tests of the walk. */
+ * themselves: for the tests of the traversal. */
 #ifndef FARLIGHT_TESTS_ABUFFER_SAMPLES_H
 #define FARLIGHT_TESTS_ABUFFER_SAMPLES_H
 

@@ -240,13 +240,13 @@ static void expect_bounds_contain(const struct input *input, const struct bvh_tr
     }
 }
 
-/* Walks as the shader does, with every bound hit (or none); returns the steps. */
-static uint32_t walk(const struct view *view, uint32_t octant, bool hit, uint8_t *visited)
+/* Traverses as the shader does, with every bound hit (or none); returns the steps. */
+static uint32_t traverse(const struct view *view, uint32_t octant, bool hit, uint8_t *visited)
 {
     uint32_t element = 0, steps = 0;
     while (element < view->count) {
         const struct decoded decoded = decode(view, octant, element);
-        /* So no walk is endless. */
+        /* So no traversal is endless. */
         if (decoded.end <= element || decoded.end > view->count)
             fail_msg("octant %u: element %u leads to %u of %u", octant, element, decoded.end, view->count);
         steps++;
@@ -260,7 +260,7 @@ static uint32_t walk(const struct view *view, uint32_t octant, bool hit, uint8_t
 static void expect_links_right(const struct view *view, uint32_t octant)
 {
     uint8_t *visited = calloc(view->count, 1);
-    assert_int_equal(walk(view, octant, true, visited), view->count);
+    assert_int_equal(traverse(view, octant, true, visited), view->count);
     for (uint32_t e = 0; e < view->count; e++) {
         if (visited[e] != 1)
             fail_msg("octant %u: element %u is visited %u times", octant, e, visited[e]);
@@ -272,7 +272,7 @@ static void expect_links_right(const struct view *view, uint32_t octant)
             child = decode(view, octant, child).end;
         assert_int_equal(child, parent.end);
     }
-    assert_int_equal(walk(view, octant, false, visited), 1);
+    assert_int_equal(traverse(view, octant, false, visited), 1);
     free(visited);
 }
 

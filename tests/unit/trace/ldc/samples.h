@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A cube made on the CPU, sample by sample as ldc/layout.h has it: what the walk's tests compare with. */
+/* A cube made on the CPU, sample by sample as ldc/layout.h has it: what the traversal's tests compare with. */
 #ifndef FARLIGHT_TESTS_LDC_SAMPLES_H
 #define FARLIGHT_TESTS_LDC_SAMPLES_H
 
