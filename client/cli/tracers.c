@@ -265,7 +265,7 @@ int cli_complete(int argc, char **argv)
         return CLI_DONE;
     if (field->field->kind == FIELD_ENUM || field->field->numbers) {
         field_allowed_text(field->field, text, sizeof(text));
-        for (char *rest = text, *word; (word = strtok_r(rest, ", ", &rest)) != NULL;)
+        for (char *rest = text, *word; (word = strtok_r(rest, ", ", &rest));)
             puts(word);
     } else {
         puts(field_default_text(field->field, text, sizeof(text)));

@@ -255,7 +255,7 @@ bool fl_process_find_line(const struct fl_process *process, const char *start, s
     const ssize_t got = process->talk_fd >= 0 ? pread(process->talk_fd, talk, sizeof(talk) - 1, 0) : 0;
     char *rest = talk;
     talk[got > 0 ? got : 0] = '\0';
-    for (char *line; (line = strsep(&rest, "\n")) != NULL;) {
+    for (char *line; (line = strsep(&rest, "\n"));) {
         if (strncmp(line, start, strlen(start)) != 0 || !rest || index-- > 0)
             continue;
         snprintf(text, text_bytes, "%s", line + strlen(start));

@@ -114,7 +114,7 @@ static json_t *settings_json(const struct settings *settings)
     json_t *object = json_object();
     const struct field_desc *setting;
     char value[40];
-    for (size_t i = 0; (setting = panel_setting(settings->tracer, i)) != NULL; i++) {
+    for (size_t i = 0; (setting = panel_setting(settings->tracer, i)); i++) {
         panel_value(setting, &settings->tracers, value, sizeof(value));
         json_object_set_new(object, setting->name, json_string(value));
     }

@@ -182,7 +182,7 @@ TEST(every_shared_struct_has_one_layout)
             continue;
         char *text = without_comments(source->begin, source->end);
         struct layout layout;
-        for (char *at = text; (at = read_struct(at, &layout)) != NULL; struct_count++) {
+        for (char *at = text; (at = read_struct(at, &layout)); struct_count++) {
             expect_same_layout(source->path, &layout, "std430");
             if (layout.size_bytes % 16 == 0) /* std140 rounds the stride of an array of others up */
                 expect_same_layout(source->path, &layout, "std140");

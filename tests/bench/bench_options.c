@@ -13,7 +13,7 @@
 bool bench_is_named(const char *list, const char *name)
 {
     const size_t length = strlen(name);
-    for (const char *at = list; (at = strstr(at, name)) != NULL; at += length)
+    for (const char *at = list; (at = strstr(at, name)); at += length)
         if ((at == list || at[-1] == ',') && (at[length] == '\0' || at[length] == ','))
             return true;
     return false;

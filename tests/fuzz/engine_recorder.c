@@ -163,7 +163,7 @@ static void open_scene(const struct engine_command *command)
         return;
     }
     *scene = (struct recorded_scene){scene_create(command->name, NULL), command->sharing, command->principal};
-    FUZZ_REQUIRE(scene->scene != NULL);
+    FUZZ_REQUIRE(scene->scene);
     add_reference(command, scene);
 }
 
@@ -179,7 +179,7 @@ static void attach(const struct engine_command *command)
 static void list(const struct engine_command *command)
 {
     struct engine_scene_list *made = calloc(1, sizeof(*made) + SCENES_MAX * sizeof(made->scenes[0]));
-    FUZZ_REQUIRE(made != NULL);
+    FUZZ_REQUIRE(made);
     for (size_t i = 0; i < SCENES_MAX; i++) {
         const struct recorded_scene *scene = &recorder.scenes[i];
         if (!scene->scene || find_named(scene->scene->name, command->principal) != scene)
@@ -194,7 +194,7 @@ static void list(const struct engine_command *command)
 static void describe(const struct engine_command *command, const struct scene *scene)
 {
     struct engine_scene_description *made = calloc(1, sizeof(*made));
-    FUZZ_REQUIRE(made != NULL);
+    FUZZ_REQUIRE(made);
     made->revision = scene->revision;
     made->nodes = (uint32_t)scene->objects[OBJECT_NODE].count;
     made->upper_world[0] = 1;
@@ -360,7 +360,7 @@ static void forget(uint64_t client)
 static void say_stats(const struct engine_command *command)
 {
     struct engine_stats *stats = calloc(1, sizeof(*stats));
-    FUZZ_REQUIRE(stats != NULL);
+    FUZZ_REQUIRE(stats);
     strcpy(stats->device.name, "recorder");
     say(ENGINE_STATS_READY, command->client, command->request)->stats = stats;
 }

@@ -45,7 +45,7 @@ static struct blob *take_array(struct input *input, size_t elements, size_t elem
         return NULL;
     size_t bytes = (elements + (how == 251)) * element_bytes - (how == 250 && elements > 0);
     struct blob *blob = blob_create(bytes ? bytes : 1);
-    FUZZ_REQUIRE(blob != NULL);
+    FUZZ_REQUIRE(blob);
     memset(blob->data, 0, bytes ? bytes : 1);
     for (size_t i = 0; i + 4 <= bytes && !limit; i += 4) {
         float value = take_float(input, how < 200);
@@ -222,7 +222,7 @@ static void play(const struct scene *scene, struct input *input)
 static struct blob *array_of(const void *data, size_t bytes)
 {
     struct blob *blob = blob_create(bytes);
-    FUZZ_REQUIRE(blob != NULL);
+    FUZZ_REQUIRE(blob);
     memcpy(blob->data, data, bytes);
     return blob;
 }

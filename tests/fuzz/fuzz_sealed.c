@@ -55,7 +55,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     sealed_random_end = data[0] & 1;
     struct sealed_link *link =
         sealed_random_end == 0 ? sealed_link_client(&sealed_fuzz_key) : sealed_link_server(&sealed_fuzz_key, 1);
-    FUZZ_REQUIRE(link != NULL);
+    FUZZ_REQUIRE(link);
     bool open = true;
     for (size_t used = 1; open && used < size;) {
         size_t room;

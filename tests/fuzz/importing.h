@@ -18,7 +18,7 @@ static inline void import_any(importing_fn *import, const uint8_t *data, size_t 
     static struct import_scene scene;
     struct files files = {.folder = -1, .model = -1, .environment = -1};
     unsigned char *bytes = malloc(size + 1);
-    FUZZ_REQUIRE(bytes != NULL);
+    FUZZ_REQUIRE(bytes);
     if (size > 0)
         memcpy(bytes, data, size);
     bytes[size] = 0;

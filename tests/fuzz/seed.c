@@ -53,7 +53,7 @@ static void word(FILE *file, uint64_t value, size_t bytes)
 
 static void words_of_struct(FILE *file, const struct struct_desc *desc)
 {
-    for (const struct field_desc *field = desc->fields; field->name != NULL; field++) {
+    for (const struct field_desc *field = desc->fields; field->name; field++) {
         uint32_t minimum, maximum;
         switch (field->kind) {
         case FIELD_INT:

@@ -76,7 +76,7 @@ static size_t take_message(struct serving_client *client)
     struct message message;
     struct scratch scratch;
     scratch_init(&scratch, scratch_data, sizeof(scratch_data));
-    FUZZ_REQUIRE(frame.info != NULL);
+    FUZZ_REQUIRE(frame.info);
     FUZZ_REQUIRE(
         message_decode(&message, frame.header.type, frame.payload, frame.header.payload_bytes, &scratch, &error));
     if (message.type <= MESSAGE_FRAME_END)
@@ -236,7 +236,7 @@ void serving_begin(void)
         serving_clients[i].fd = -1;
         if (!serving_clients[i].in)
             serving_clients[i].in = malloc(IN_BYTES);
-        FUZZ_REQUIRE(serving_clients[i].in != NULL);
+        FUZZ_REQUIRE(serving_clients[i].in);
     }
 }
 

@@ -158,7 +158,7 @@ static size_t count_files(const char *where)
     size_t count = 0;
     DIR *listing = opendir(where);
     assert_non_null(listing);
-    for (const struct dirent *entry = readdir(listing); entry != NULL; entry = readdir(listing))
+    for (const struct dirent *entry = readdir(listing); entry; entry = readdir(listing))
         count += strcmp(entry->d_name, ".") != 0 && strcmp(entry->d_name, "..") != 0;
     closedir(listing);
     return count;

@@ -61,7 +61,7 @@ static size_t count_files(void)
     size_t count = 0;
     DIR *listing = opendir(folder);
     assert_non_null(listing);
-    for (const struct dirent *entry = readdir(listing); entry != NULL; entry = readdir(listing))
+    for (const struct dirent *entry = readdir(listing); entry; entry = readdir(listing))
         count += strcmp(entry->d_name, ".") != 0 && strcmp(entry->d_name, "..") != 0;
     closedir(listing);
     return count;

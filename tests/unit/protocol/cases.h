@@ -154,7 +154,7 @@ static inline void case_counted(struct case_maker *maker, const struct field_des
 
 static inline void case_struct(struct case_maker *maker, const struct struct_desc *desc, char *body)
 {
-    for (const struct field_desc *field = desc->fields; field->name != NULL; field++) {
+    for (const struct field_desc *field = desc->fields; field->name; field++) {
         if (field_is_counted(field)) {
             case_counted(maker, field, body);
         } else {
@@ -199,7 +199,7 @@ static inline void plain_copy(struct plain_bytes *out, const void *bytes, size_t
 
 static inline void plain_struct(struct plain_bytes *out, const struct struct_desc *desc, const char *body)
 {
-    for (const struct field_desc *field = desc->fields; field->name != NULL; field++) {
+    for (const struct field_desc *field = desc->fields; field->name; field++) {
         const char *pointer = NULL;
         uint32_t count = 0;
         if (!field_is_counted(field)) {
@@ -240,7 +240,7 @@ static inline void plain_encode(struct plain_bytes *out, const struct message *m
 /* The first field that differs; NULL: equal. Reals by their bits. */
 static inline const char *case_difference(const struct struct_desc *desc, const char *left, const char *right)
 {
-    for (const struct field_desc *field = desc->fields; field->name != NULL; field++) {
+    for (const struct field_desc *field = desc->fields; field->name; field++) {
         const char *a = NULL, *b = NULL;
         uint32_t a_count = 0, b_count = 0;
         if (!field_is_counted(field)) {

@@ -174,7 +174,7 @@ static void encode_fixed_part(const struct message *message, size_t fixed_bytes,
     plain_encode(&plain, message);
     assert_true(desc->wire_fixed_bytes < sizeof(fixed));
     memcpy(fixed, plain.data + 2, desc->wire_fixed_bytes);
-    for (const struct field_desc *field = desc->fields; field->name != NULL; field++) {
+    for (const struct field_desc *field = desc->fields; field->name; field++) {
         if (field_is_counted(field)) {
             assert_true(counted_count < 15);
             counted[counted_count++] = *field;
@@ -199,7 +199,7 @@ TEST(a_shorter_fixed_part_gets_defaults_and_a_longer_one_is_read_past)
         const struct struct_desc *body = desc->body();
         case_make(&maker, &message, desc, CASE_RANDOM, 5);
         message_init(&expected, message.type);
-        for (const struct field_desc *field = body->fields; field->name != NULL; field++) {
+        for (const struct field_desc *field = body->fields; field->name; field++) {
             if (field_is_counted(field)) {
                 size_t pointer_and_count = field->kind == FIELD_STRING ? 0 : 4;
                 memcpy((char *)&expected + MESSAGE_BODY_OFFSET + field->offset,
@@ -249,7 +249,7 @@ TEST(the_stated_scratch_suffices_and_less_is_refused_safely)
         /* what the header promises: an element never takes more than twice its bytes */
         const struct struct_desc *record = protocol_records[i]();
         size_t strings = 0;
-        for (const struct field_desc *field = record->fields; field->name != NULL; field++) {
+        for (const struct field_desc *field = record->fields; field->name; field++) {
             strings += field->kind == FIELD_STRING;
             assert_int_not_equal(field->kind, FIELD_BULK);
         }

@@ -217,7 +217,7 @@ TEST(numbers_and_names_of_the_table_are_unique)
             assert_int_not_equal(info->type, protocol_messages[k].info.type);
             assert_string_not_equal(info->name, protocol_messages[k].info.name);
         }
-        for (const struct field_desc *field = protocol_messages[i].body()->fields; field->name != NULL; field++) {
+        for (const struct field_desc *field = protocol_messages[i].body()->fields; field->name; field++) {
             if (counted && !field_is_counted(field)) {
                 fail_msg("%s.%s: fixed fields come first", info->name, field->name);
             }

@@ -175,7 +175,7 @@ static void try_wrong_count(const struct message *message, const struct field_de
 static void try_wrong_fields(const struct message *message, const struct struct_desc *desc, char *body,
                              const char *parent)
 {
-    for (const struct field_desc *field = desc->fields; field->name != NULL; field++) {
+    for (const struct field_desc *field = desc->fields; field->name; field++) {
         char path[120];
         char *elements;
         uint32_t count;

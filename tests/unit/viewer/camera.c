@@ -287,7 +287,7 @@ static const char *panel_says(const struct settings *settings, const char *name)
 {
     static char text[40];
     const struct field_desc *setting;
-    for (size_t i = 0; (setting = panel_setting(PROTOCOL_TRACER_LDC, i)) != NULL; i++)
+    for (size_t i = 0; (setting = panel_setting(PROTOCOL_TRACER_LDC, i)); i++)
         if (strcmp(setting->name, name) == 0)
             panel_value(setting, &settings->tracers, text, sizeof(text));
     return text;
