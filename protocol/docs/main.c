@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Prints the document of the wire format, in Markdown: from the table, from the prose in the file that is its
- * argument, and from the messages of docgen_example.c. */
+ * argument, and from the messages of example.c. */
 #include <inttypes.h>
 #include <stdio.h>
 

@@ -2,7 +2,7 @@
 // Stackless traversal of a two-level bounding volume tree by baked links; layout and octants: bvh/layout.h. 'Stackless
 // traversal of a sphere BVH', sections 4 (links), 5 (packets) and 6 (transform elements).
 //
-// The host (trace/bvh/tracer.c) sets, besides the defines of trace.comp:
+// The host (trace/bvh/tracer.c) sets, besides the defines of trace/wave.comp:
 //   BVH_SPHERES  bounds are spheres, not boxes
 //   BVH_PACKED   boxes are on a grid
 //   BVH_PLAIN    the paper's form, for comparison: elements in a storage buffer, one order for all directions

@@ -88,7 +88,7 @@ bool reference_update_instances(struct reference *reference, const struct gpu_sc
                                 bool *changed, struct error *error);
 void reference_drop_instances(struct reference *reference);
 
-/* traverse.c: traces the wave in `rays` and `times`; intersections or visibilities go to `answers`. */
+/* traversal.c: traces the wave in `rays` and `times`; intersections or visibilities go to `answers`. */
 void reference_traverse(struct reference *reference, const struct ray_range *rays);
 /* Embree asks these about each candidate on a geometry that has cutouts (closest), or lets light pass (any). */
 void reference_filter_closest(const struct RTCFilterFunctionNArguments *arguments);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* net: addresses, listeners, the loop, the out-queue. Sessions over real sockets are in test_session.c. */
+/* net: addresses, listeners, the loop, the out-queue. Sessions over real sockets are in unit/session/session.c. */
 #include <stddef.h>
 #include <stdint.h>
 

@@ -2,10 +2,9 @@
 /* Limits of the configuration, reached by clients of a daemon that has small ones: what is told beforehand, what
  * is told when one is reached, that just within is fine, and that another client does not notice. Limits that
  * belong to one subject are reached in its tests: requests, silence and slow readers in session.c, edits and
- * the memory of blobs in edits.c, that of frames in jobs.c, jobs in
- * views.c, open scenes in scenes.c, scenes that stay in engine/scenes.c, layers and
- * memory of tracers in test_ldc_limits.c and test_abuffer_limits.c, keys and connections of one address in the
- * integration tests. */
+ * the memory of blobs in edits.c, that of frames in jobs.c, jobs in views.c, open scenes in scenes.c, scenes that
+ * linger in unit/engine/scenes.c, layers and memory of tracers in limits.c of unit/trace/ldc and
+ * unit/trace/abuffer, keys and connections of one address in the integration tests. */
 #include "tests/unit/session/clients_fixture.h"
 #include "tests/harness/test.h"
 
