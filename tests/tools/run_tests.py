@@ -40,7 +40,7 @@ EXPECTED_SKIPS = (
 # to end where pictures are compared.
 NOT_SANITIZED = re.compile(
     r"accuracy/(?!frame_steps|frame_shared|raycast|render_frame|shader_layout|tracer_owners|wave_comparison)"
-    r"|contract/.*(rays? alone|rays together|rays? a call|columns? a step)"
+    r"|contract/.*(rays? alone|packets of|rays? a call|columns? a step)"
     r"|test_(abuffer|animate|compare|import_animation|layers|ldc|light|models|poses|shot|view)$")
 # Where no times of an earlier run are known: what takes longest begins first.
 LONGEST_FIRST = ("accuracy/sampled_against_reference", "test_import", "test_light", "test_models", "test_view", "test_compare",
