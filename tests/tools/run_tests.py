@@ -39,7 +39,7 @@ EXPECTED_SKIPS = (
 # that stay. Pictures and samples against closed forms; forms of a tracer that differ in its shaders; programs from end
 # to end where pictures are compared.
 NOT_SANITIZED = re.compile(
-    r"accuracy/(?!frame_steps|frame_shared|raycast|render_frame|shader_layout|tracer_owners|wave_comparison)"
+    r"accuracy/(?!frame_steps|frame_shared|render_frame|tracer_owners|wave_comparison)"
     r"|contract/.*(rays? alone|packets of|rays? a call|columns? a step)"
     r"|test_(abuffer|animate|compare|import_animation|layers|ldc|light|models|poses|shot|view)$")
 # Where no times of an earlier run are known: what takes longest begins first.
