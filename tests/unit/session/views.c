@@ -445,6 +445,16 @@ SESSION_TEST(a_frame_of_a_stream_comes_however_long_it_waits)
     engine_command_destroy(start);
 }
 
+/* Until the session has read what was sent: what this client reads before that lets the frame under way go on. */
+static void wait_until_read(void)
+{
+    int unread_bytes = 0;
+    do {
+        usleep(1000);
+        assert_int_equal(ioctl(client.fd, SIOCOUTQ, &unread_bytes), 0);
+    } while (unread_bytes > 0);
+}
+
 /* Takes the pieces of the large frame that was begun, and its end; whether that was abandoned. */
 static bool take_rest_of_large_frame(uint32_t request, uint32_t number)
 {
@@ -469,6 +479,7 @@ static bool is_abandoned(uint32_t number, uint64_t command, enum encoding encodi
     port_say(made);
     expect(MESSAGE_FRAME_BEGIN, 2);
     send_camera(camera, moving);
+    wait_until_read();
     return take_rest_of_large_frame(2, number);
 }
 
@@ -528,6 +539,7 @@ SESSION_TEST(a_picture_at_rest_that_has_not_begun_is_dropped_when_motion_goes_on
     expect(MESSAGE_FRAME_BEGIN, 2);
     say_large_frame(2, 1); /* waits behind it, or comes too late */
     send_camera(7, true);
+    wait_until_read();
     assert_true(take_rest_of_large_frame(2, 0));
     say_frame(2, 2, 7);
     take_frame(2, 2);
@@ -640,16 +652,6 @@ static void expect_error_within_frame(uint32_t request, enum protocol_error_code
     assert_int_equal(client.message.type, MESSAGE_ERROR);
     assert_int_equal(client.header.request, request);
     assert_int_equal(client.message.error.code, code);
-}
-
-/* Until the session has read what was sent: what this client reads before lets a frame go on. */
-static void wait_until_read(void)
-{
-    int unread_bytes = 0;
-    do {
-        usleep(1000);
-        assert_int_equal(ioctl(client.fd, SIOCOUTQ, &unread_bytes), 0);
-    } while (unread_bytes > 0);
 }
 
 SESSION_TEST(a_frame_under_way_of_a_view_that_was_replaced_still_takes_room)
