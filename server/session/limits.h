@@ -24,7 +24,7 @@ struct session_limits {
     uint32_t samples;
     struct tracer_limits tracers;
     uint64_t blob_bytes;        /* all blobs of all clients, arriving ones included */
-    uint64_t blob_cache_bytes;  /* of them: blobs that nobody uses now */
+    uint64_t blob_cache_bytes;  /* of them: blobs that are unused now */
     uint64_t transaction_bytes; /* of them: memory */
     uint64_t upload_window_bytes;
     uint64_t frame_bytes;      /* maximum of the frames of all jobs before they are sent; one job may always run */

@@ -75,7 +75,7 @@ class Verdict:
         maximum = max(one["blob_bytes"] for one in used)
         self.rows.append(("blob_bytes", "", maximum, f"at most {BLOB_CACHE_BYTES} (its cache)"))
         if maximum > BLOB_CACHE_BYTES:
-            self.complaints.append(f"{maximum} bytes of blobs that nobody uses")
+            self.complaints.append(f"{maximum} bytes of unused blobs")
 
     def judge_memory(self, name, values, third, rounds):
         second, last = max(values[third:2 * third]), max(values[2 * third:])

@@ -8,7 +8,7 @@ own. Integration tests are unittest modules in tests/integration, which find the
 rules of the sources are checked first. Files and modules run side by side, as most of them leave processors idle:
 FARLIGHT_TEST_JOBS at a time (default: one more than there are processors, at most 4), those first that took longest
 the last time. With CI=true in the environment, a skipped test fails unless EXPECTED_SKIPS names its reason.
-FARLIGHT_TEST_SANITIZED=1 leaves out what the sanitizers see nothing of (NOT_SANITIZED).
+FARLIGHT_TEST_SANITIZED=1 leaves out where the sanitizers see little for their time (NOT_SANITIZED).
 """
 import collections
 import concurrent.futures
