@@ -240,7 +240,7 @@ static bool any_frame(const struct engine *engine)
 /* Something waits for the frames in progress to end. */
 static bool is_waited_for(const struct engine_scene *scene)
 {
-    return scene->waiting_count || (scene->put_off && wants_frame(scene->put_off));
+    return scene->commit || scene->waiting_count || (scene->put_off && wants_frame(scene->put_off));
 }
 
 /* A frame of a batch may take minutes, in which views of the scene would show nothing: while such a frame delays
@@ -260,6 +260,8 @@ static bool may_begin_meanwhile(const struct engine *engine, const struct job *j
 static bool may_begin(const struct engine *engine, const struct job *job)
 {
     const struct engine_scene *scene = job->scene;
+    if (scene->commit)
+        return false;
     if (engine->needs_all && engine->needs_all != job && wants_frame(engine->needs_all))
         return false;
     if (engine->needs_all == job)

@@ -10,13 +10,20 @@
 /* Commands that may wait for one scene's frames; more are answered with busy. */
 #define WAITING_MAX 256
 
+void engine_command_release_edits(struct engine_command *command)
+{
+    for (size_t i = 0; i < command->edit_count; i++)
+        scene_edit_finish(&command->edits[i]);
+    free(command->edits);
+    command->edits = NULL;
+    command->edit_count = 0;
+}
+
 void engine_command_destroy(struct engine_command *command)
 {
     if (!command)
         return;
-    for (size_t i = 0; i < command->edit_count; i++)
-        scene_edit_finish(&command->edits[i]);
-    free(command->edits);
+    engine_command_release_edits(command);
     free(command->job.keys);
     free(command->job.clips);
     view_wishes_unref(command->job.wishes);
@@ -37,36 +44,84 @@ static void done(struct engine *engine, const struct engine_command *command, ui
 
 /* Blobs are limited by their store, as scenes share them; the tables of all scenes are limited here. Scenes
  * without a holder are evicted only if that releases enough, which is known beforehand. */
-static bool commit_within_limits(struct engine *engine, struct scene *scene, struct engine_command *command,
-                                 struct error *error)
+static void limit_tables(const struct engine *engine, struct engine_scene *scene)
 {
     uint64_t limit_bytes = engine->options.limits.scene.host_bytes;
-    uint64_t others_bytes = engine->table_bytes - scene->table_bytes;
-    uint64_t held_bytes = others_bytes - engine_left_table_bytes(engine);
+    uint64_t held_bytes = engine->table_bytes - scene->known.table_bytes - engine_left_table_bytes(engine);
+    held_bytes += engine->promised_bytes;
     if (limit_bytes)
-        scene->limits.table_bytes = held_bytes < limit_bytes ? limit_bytes - held_bytes : 1;
-    bool applied = scene_commit(scene, command->edits, command->edit_count, error);
-    engine->table_bytes = others_bytes + scene->table_bytes;
-    return applied;
+        scene->scene->limits.table_bytes = held_bytes < limit_bytes ? limit_bytes - held_bytes : 1;
 }
 
-static void commit(struct engine *engine, const struct engine_reference *reference, struct engine_command *command)
+/* `by` NULL: it is gone, and hears no answer. */
+static void committed(struct engine *engine, struct engine_scene *scene, const struct engine_reference *by,
+                      const struct aside_commit *commit)
 {
-    struct engine_scene *scene = reference->scene;
-    struct error error = {0};
-    uint64_t start_ns = clock_now_ns();
-    uint64_t before_bytes = scene->scene->table_bytes;
-    if (!commit_within_limits(engine, scene->scene, command, &error)) {
-        fail(engine, command, &error);
+    uint64_t before_bytes = scene->known.table_bytes;
+    engine_scene_note(engine, scene);
+    if (!commit->applied) {
+        if (by)
+            fail(engine, commit->command, &commit->error);
         return;
     }
-    if (scene->scene->table_bytes > before_bytes)
-        engine_trim_tables(engine, reference->client->principal);
+    if (scene->known.table_bytes > before_bytes)
+        engine_trim_tables(engine, commit->principal);
     if (!scene->apply_ns)
-        scene->apply_start_ns = start_ns;
-    scene->apply_ns += clock_now_ns() - start_ns;
-    done(engine, command, scene->scene->revision);
-    engine_scene_changed(engine, reference);
+        scene->apply_start_ns = commit->start_ns;
+    scene->apply_ns += commit->duration_ns;
+    if (by)
+        done(engine, commit->command, scene->known.revision);
+    engine_scene_changed(engine, scene, by);
+}
+
+static void commit_here(struct engine *engine, const struct engine_reference *reference,
+                        struct engine_command *command)
+{
+    struct engine_scene *scene = reference->scene;
+    struct aside_commit commit = {.command = command, .principal = reference->client->principal};
+    commit.start_ns = clock_now_ns();
+    commit.applied = scene_commit(scene->scene, command->edits, command->edit_count, &commit.error);
+    commit.duration_ns = clock_now_ns() - commit.start_ns;
+    committed(engine, scene, reference, &commit);
+}
+
+/* False: the command stays the caller's. */
+static bool commit(struct engine *engine, const struct engine_reference *reference, struct engine_command *command)
+{
+    struct engine_scene *scene = reference->scene;
+    limit_tables(engine, scene);
+    bool here = scene_commit_is_short(scene->scene, command->edits, command->edit_count);
+    struct aside_commit *commit = here ? NULL : calloc(1, sizeof(*commit));
+    if (!commit) {
+        commit_here(engine, reference, command);
+        return false;
+    }
+    commit->scene = scene->scene;
+    commit->command = command;
+    commit->principal = reference->client->principal;
+    commit->promised_bytes = scene_edits_table_bytes(command->edits, command->edit_count);
+    engine->promised_bytes += commit->promised_bytes;
+    scene->commit = commit;
+    aside_submit(engine->aside, commit);
+    return true;
+}
+
+void engine_finish_commits(struct engine *engine)
+{
+    struct aside_commit *commit;
+    while ((commit = aside_take_done(engine->aside))) {
+        struct engine_scene *scene = engine->scenes;
+        while (scene->commit != commit)
+            scene = scene->next;
+        scene->commit = NULL;
+        engine->promised_bytes -= commit->promised_bytes;
+        const struct engine_command *command = commit->command;
+        const struct engine_reference *by = engine_find_reference(engine, command->client, command->scene);
+        committed(engine, scene, by && by->scene == scene ? by : NULL, commit);
+        aside_commit_destroy(commit);
+        engine_run_waiting(engine, scene);
+        engine_reap_scenes(engine);
+    }
 }
 
 static void start(struct engine *engine, struct engine_reference *reference, struct engine_command *command)
@@ -87,12 +142,12 @@ static bool keep_waiting(struct engine_scene *scene, struct engine_command *comm
     return true;
 }
 
-static void wait_for_frames(struct engine *engine, struct engine_scene *scene, struct engine_command *command)
+static void wait_for_scene(struct engine *engine, struct engine_scene *scene, struct engine_command *command)
 {
     if (scene->waiting_count < WAITING_MAX && keep_waiting(scene, command))
         return;
     struct error error = {0};
-    error_set(&error, ERROR_BUSY, "", "%zu requests wait for frames in progress already", scene->waiting_count);
+    error_set(&error, ERROR_BUSY, "", "%zu requests wait for this scene already", scene->waiting_count);
     fail(engine, command, &error);
     engine_command_destroy(command);
 }
@@ -127,14 +182,16 @@ struct engine_command *engine_take_waiting(struct engine_scene *scene, const str
     return NULL;
 }
 
-/* False: it must wait for an earlier command of this client, which waits for another client's frame. */
+/* False: it must wait for an earlier command of this client, which waits for another client's frame or is carried
+ * out. */
 static bool scene_close(struct engine *engine, struct engine_reference *reference, struct engine_command *command)
 {
     struct engine_scene *scene = reference->scene;
     engine_abort_jobs(engine, reference, "its scene was closed");
     /* Earlier commands are answered first. */
     engine_run_waiting(engine, scene);
-    if (waits_by(scene, reference) && keep_waiting(scene, command))
+    bool changes = scene->commit && is_by(scene->commit->command, reference);
+    if ((changes || waits_by(scene, reference)) && keep_waiting(scene, command))
         return false;
     engine_scene_close(engine, reference, command);
     return true;
@@ -163,11 +220,12 @@ static void handle_of_scene(struct engine *engine, struct engine_command *comman
     if (command->kind == ENGINE_SCENE_CLOSE) {
         if (!scene_close(engine, reference, command))
             return;
-    } else if ((command->kind == ENGINE_COMMIT && scene->frames) || scene->waiting_count) {
-        wait_for_frames(engine, scene, command);
+    } else if ((command->kind == ENGINE_COMMIT && scene->frames) || scene->commit || scene->waiting_count) {
+        wait_for_scene(engine, scene, command);
         return;
     } else if (command->kind == ENGINE_COMMIT) {
-        commit(engine, reference, command);
+        if (commit(engine, reference, command))
+            return;
     } else if (command->kind == ENGINE_SCENE_DESCRIBE) {
         engine_scene_describe(engine, scene, command);
     } else {
@@ -178,9 +236,9 @@ static void handle_of_scene(struct engine *engine, struct engine_command *comman
 
 void engine_run_waiting(struct engine *engine, struct engine_scene *scene)
 {
-    if (scene->frames || !scene->waiting_count)
+    if (scene->frames || scene->commit || !scene->waiting_count)
         return;
-    /* No command here begins a frame, so all of them can run. */
+    /* No command here begins a frame, so all can run up to a long transaction, for which the rest waits again. */
     struct engine_command **waiting = scene->waiting;
     size_t count = scene->waiting_count;
     scene->waiting = NULL;

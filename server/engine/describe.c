@@ -13,7 +13,7 @@
 void engine_count_contents(struct engine_scene *from)
 {
     const struct scene *scene = from->scene;
-    if (from->counted_revision == scene->revision)
+    if (from->commit || from->counted_revision == scene->revision)
         return;
     from->counted_revision = scene->revision;
     from->instances = 0;
@@ -48,7 +48,7 @@ static void fill_entry(struct engine_scene_entry *entry, struct engine_scene *sc
 {
     engine_count_contents(scene);
     *entry = (struct engine_scene_entry){
-        .revision = scene->scene->revision, .triangles = scene->triangles, .sharing = scene->sharing};
+        .revision = scene->known.revision, .triangles = scene->triangles, .sharing = scene->sharing};
     memcpy(entry->name, scene->scene->name, sizeof(entry->name));
     for (const struct engine_reference *one = scene->references; one; one = one->next)
         entry->clients++;

@@ -71,7 +71,7 @@ void engine_nudge(struct engine *engine)
 static void run_all_waiting(struct engine *engine)
 {
     for (struct engine_scene *scene = engine->scenes; scene;) {
-        bool waits = scene->waiting_count && !scene->frames;
+        bool waits = scene->waiting_count && !scene->frames && !scene->commit;
         if (waits)
             engine_run_waiting(engine, scene);
         scene = waits ? engine->scenes : scene->next; /* scenes may have ended */
@@ -136,6 +136,7 @@ static void run(struct engine *engine)
         /* A change from here on nudges the thread again. */
         atomic_store(&engine->nudged, false);
         take_commands(engine, queue_try_pop(engine->commands));
+        engine_finish_commits(engine);
         jobs_reap(engine);
         uint64_t reap_ns = engine_reap_scenes(engine);
         atomic_fetch_add(&engine->turns, 1);
@@ -167,6 +168,10 @@ static void *run_thread(void *context)
     if (!opened)
         return NULL;
     run(engine);
+    for (struct engine_scene *scene = engine->scenes; scene; scene = scene->next)
+        scene->commit = NULL; /* it is destroyed here */
+    aside_destroy(engine->aside);
+    engine->aside = NULL;
     size_t cursor = 0;
     void *client;
     while (hashmap_next(&engine->clients, &cursor, NULL, &client)) {
@@ -187,7 +192,8 @@ void engine_set_limits(struct engine *engine, const struct engine_limits *limits
 
 /* ---- start and stop ----------------------------------------------------------------------------- */
 
-static void on_encoded(void *context)
+/* Beside the thread, something was finished. */
+static void on_done(void *context)
 {
     engine_nudge(context);
 }
@@ -197,7 +203,7 @@ static bool start_threads(struct engine *engine, struct error *error)
     struct encode_pool_options pool = {
         .threads = engine->options.encode_threads,
         .totals = &engine->totals,
-        .on_done = on_encoded,
+        .on_done = on_done,
         .context = engine,
     };
     /* Signals are for the main thread. */
@@ -205,10 +211,11 @@ static bool start_threads(struct engine *engine, struct error *error)
     sigfillset(&all);
     pthread_sigmask(SIG_SETMASK, &all, &before);
     engine->pool = encode_pool_create(&pool, error);
-    if (engine->pool)
+    engine->aside = engine->pool ? aside_create(on_done, engine, error) : NULL;
+    if (engine->aside)
         engine->has_thread = !pthread_create(&engine->thread, NULL, run_thread, engine);
     pthread_sigmask(SIG_SETMASK, &before, NULL);
-    if (!engine->pool)
+    if (!engine->aside)
         return false;
     if (!engine->has_thread)
         return error_set(error, ERROR_OUT_OF_MEMORY, "engine", "could not start a thread");
@@ -278,6 +285,7 @@ void engine_destroy(struct engine *engine)
         queue_close(engine->events);
     if (engine->has_thread)
         pthread_join(engine->thread, NULL);
+    aside_destroy(engine->aside);
     encode_pool_destroy(engine->pool);
     queue_destroy(engine->commands, drop_command);
     queue_destroy(engine->events, drop_event);

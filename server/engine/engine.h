@@ -122,6 +122,7 @@ struct engine_command {
     struct engine_limits limits; /* limits */
 };
 void engine_command_destroy(struct engine_command *command); /* frees it with all it holds; accepts NULL */
+void engine_command_release_edits(struct engine_command *command);
 
 struct engine_scene_stat {
     bool is_known; /* for the asking client: its own scene, or one that it may attach to */

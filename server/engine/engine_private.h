@@ -7,6 +7,7 @@
 #include "base/hashmap.h"
 #include "base/queue.h"
 #include "engine/animation.h"
+#include "engine/aside.h"
 #include "engine/backend.h"
 #include "engine/encode_pool.h"
 #include "engine/engine.h"
@@ -39,6 +40,12 @@ struct engine_reference {
     struct frame_renderer *idle;
 };
 
+/* What all may know of a scene while another thread changes it. */
+struct scene_known {
+    uint64_t revision, host_bytes, table_bytes;
+    uint32_t nodes;
+};
+
 struct engine_scene {
     struct engine_scene *next;           /* of the engine's, in the order of their opening */
     struct engine_reference *references; /* NULL: it has no holder, and ends or lingers */
@@ -46,6 +53,9 @@ struct engine_scene {
     enum sharing sharing;
     uint64_t principal; /* the owner that opened it */
     struct scene *scene;
+    struct aside_commit
+        *commit;                /* that changes `scene` beside this thread, which keeps away from it; NULL: none */
+    struct scene_known known;   /* as of its last transaction */
     struct frame_scene *shared; /* NULL until the first frame, and after the device was lost */
     uint32_t frames;            /* in progress, of all jobs */
     uint64_t frames_ended;      /* and one */
@@ -111,6 +121,7 @@ struct engine {
     atomic_bool waits;                  /* it has nothing to do; any thread */
     struct stage_totals totals;         /* any thread */
     struct encode_pool *pool;
+    struct aside *aside;
     pthread_t thread;
     bool has_thread;
 
@@ -136,7 +147,8 @@ struct engine {
     struct job *needs_all;
     struct job *turn_of; /* the job of the last slice; NULL: it has ended, or none was ready */
     uint64_t frames, rays;
-    uint64_t table_bytes; /* of all scenes */
+    uint64_t table_bytes;    /* of all scenes */
+    uint64_t promised_bytes; /* for those that change beside this thread */
 };
 
 /* engine.c */
@@ -154,6 +166,10 @@ struct engine_event *engine_cancelled(uint64_t client, uint32_t request, const c
 void engine_handle(struct engine *engine, struct engine_command *command);
 /* Runs the commands that waited for a scene, if no frame of it is in progress. */
 void engine_run_waiting(struct engine *engine, struct engine_scene *scene);
+/* Answers the transactions that are finished beside this thread. */
+void engine_finish_commits(struct engine *engine);
+/* Notes what all may know of the scene. */
+void engine_scene_note(struct engine *engine, struct engine_scene *scene);
 /* Of those that wait, the first that has come by the reference; NULL: none. Takes it out. */
 struct engine_command *engine_take_waiting(struct engine_scene *scene, const struct engine_reference *reference);
 
@@ -167,8 +183,9 @@ struct engine_reference *engine_find_reference(struct engine *engine, uint64_t c
 /* Ends the jobs that were started through a reference, with ERROR_CANCELLED; `why` NULL: without an answer. */
 void engine_abort_jobs(struct engine *engine, const struct engine_reference *reference, const char *why);
 void engine_forget_client(struct engine *engine, struct engine_client *client);
-/* Notifies every holder of a scene except the one that changed it. */
-void engine_scene_changed(struct engine *engine, const struct engine_reference *by);
+/* Notifies every holder of a scene except the one that changed it (NULL: it is gone). */
+void engine_scene_changed(struct engine *engine, const struct engine_scene *scene,
+                          const struct engine_reference *by);
 /* Releases scenes without a holder whose time is over. Returns the time until the next one ends, UINT64_MAX: none.
  */
 uint64_t engine_reap_scenes(struct engine *engine);

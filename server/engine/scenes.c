@@ -93,6 +93,9 @@ void engine_forget_client(struct engine *engine, struct engine_client *client)
         struct engine_reference *reference = value;
         struct engine_scene *scene = reference->scene;
         struct engine_command *waiting;
+        const struct engine_command *running = scene->commit ? scene->commit->command : NULL;
+        if (running && running->client == client->client && running->scene == reference->id)
+            atomic_store(&scene->commit->abandoned, true);
         engine_abort_jobs(engine, reference, NULL);
         while ((waiting = engine_take_waiting(scene, reference)))
             engine_command_destroy(waiting);
@@ -111,7 +114,7 @@ void engine_forget_client(struct engine *engine, struct engine_client *client)
 static void scene_free(struct engine *engine, struct engine_scene *scene)
 {
     scene_drop_shared(engine, scene);
-    engine->table_bytes -= scene->scene->table_bytes;
+    engine->table_bytes -= scene->known.table_bytes;
     scene_destroy(scene->scene);
     free(scene->description);
     free(scene->waiting);
@@ -134,16 +137,22 @@ static void scene_end(struct engine *engine, struct engine_scene *scene)
 /* The end of a scene without a holder; 0: now. An empty scene does not linger. */
 static uint64_t lingers_until_ns(const struct engine *engine, const struct engine_scene *scene)
 {
-    if (scene->sharing == SHARING_PRIVATE || !scene->scene->revision || !engine->options.limits.scene_linger_ms)
+    if (scene->sharing == SHARING_PRIVATE || !scene->known.revision || !engine->options.limits.scene_linger_ms)
         return 0;
     return scene->left_ns + engine->options.limits.scene_linger_ms * UINT64_C(1000000);
+}
+
+/* Nobody holds it, and nothing changes it any more. */
+static bool is_left(const struct engine_scene *scene)
+{
+    return !scene->references && !scene->commit;
 }
 
 static size_t count_left_by(const struct engine *engine, uint64_t principal)
 {
     size_t count = 0;
     for (const struct engine_scene *scene = engine->scenes; scene; scene = scene->next)
-        count += !scene->references && scene->principal == principal;
+        count += is_left(scene) && scene->principal == principal;
     return count;
 }
 
@@ -158,7 +167,7 @@ static struct engine_scene *first_to_go(const struct engine *engine)
 {
     struct engine_scene *first = NULL;
     for (struct engine_scene *scene = engine->scenes; scene; scene = scene->next) {
-        if (!scene->references && (!first || goes_before(engine, scene, first)))
+        if (is_left(scene) && (!first || goes_before(engine, scene, first)))
             first = scene;
     }
     return first;
@@ -172,7 +181,7 @@ static size_t end_overdue(struct engine *engine, uint64_t *wait_ns)
     *wait_ns = UINT64_MAX;
     for (struct engine_scene *scene = engine->scenes, *next; scene; scene = next) {
         next = scene->next;
-        if (scene->references)
+        if (!is_left(scene))
             continue;
         uint64_t until_ns = lingers_until_ns(engine, scene);
         if (until_ns <= now_ns) {
@@ -204,7 +213,7 @@ static struct engine_scene *first_to_give_way(const struct engine *engine, uint6
 {
     struct engine_scene *own = NULL;
     for (struct engine_scene *scene = engine->scenes; scene; scene = scene->next) {
-        if (!scene->references && scene->principal == principal && (!own || scene->left_ns < own->left_ns))
+        if (is_left(scene) && scene->principal == principal && (!own || scene->left_ns < own->left_ns))
             own = scene;
     }
     return own ? own : first_to_go(engine);
@@ -214,7 +223,7 @@ uint64_t engine_left_table_bytes(const struct engine *engine)
 {
     uint64_t bytes = 0;
     for (const struct engine_scene *scene = engine->scenes; scene; scene = scene->next)
-        bytes += scene->references ? 0 : scene->scene->table_bytes;
+        bytes += is_left(scene) ? scene->known.table_bytes : 0;
     return bytes;
 }
 
@@ -231,14 +240,14 @@ void engine_trim_tables(struct engine *engine, uint64_t principal)
 /* An upper bound: other scenes may use them too. */
 static uint64_t blob_bytes_of(const struct engine_scene *scene)
 {
-    return scene->scene->host_bytes - scene->scene->table_bytes;
+    return scene->known.host_bytes - scene->known.table_bytes;
 }
 
 void engine_trim_blobs(struct engine *engine, uint64_t principal, uint64_t bytes)
 {
     uint64_t left_bytes = 0;
     for (const struct engine_scene *scene = engine->scenes; scene; scene = scene->next)
-        left_bytes += scene->references ? 0 : blob_bytes_of(scene);
+        left_bytes += is_left(scene) ? blob_bytes_of(scene) : 0;
     struct engine_scene *scene;
     if (left_bytes < bytes)
         return;
@@ -282,13 +291,24 @@ static bool name_is_free(struct engine *engine, const struct engine_command *com
     if (!command->name[0])
         return error_set(error, ERROR_INVALID, "scene_open.name", "a kept or shared scene needs a name");
     struct engine_scene *other;
-    while ((other = find_namesake(engine, command)) && !other->references &&
-           other->principal == command->principal)
+    while ((other = find_namesake(engine, command)) && is_left(other) && other->principal == command->principal)
         scene_end(engine, other);
     if (!other)
         return true;
     error_set(error, ERROR_INVALID, "scene_open.name", "a scene \"%s\" exists already", command->name);
     return error_remedy(error, "attach to it, or choose another name");
+}
+
+void engine_scene_note(struct engine *engine, struct engine_scene *scene)
+{
+    const struct scene *from = scene->scene;
+    engine->table_bytes += from->table_bytes - scene->known.table_bytes;
+    scene->known = (struct scene_known){
+        .revision = from->revision,
+        .host_bytes = from->host_bytes,
+        .table_bytes = from->table_bytes,
+        .nodes = (uint32_t)from->objects[OBJECT_NODE].count,
+    };
 }
 
 static bool scene_add(struct engine *engine, const struct engine_command *command)
@@ -305,6 +325,7 @@ static bool scene_add(struct engine *engine, const struct engine_command *comman
     scene->frames_ended = 1;
     scene->sharing = command->sharing;
     scene->principal = command->principal;
+    engine_scene_note(engine, scene);
     struct engine_scene **place = &engine->scenes;
     while (*place)
         place = &(*place)->next;
@@ -344,17 +365,18 @@ void engine_scene_attach(struct engine *engine, const struct engine_command *com
     } else if (!reference_add(engine, scene, command)) {
         error_set(&error, ERROR_OUT_OF_MEMORY, "scene_attach", "no memory");
     }
-    answer(engine, command, &error, error.kind ? 0 : scene->scene->revision);
+    answer(engine, command, &error, error.kind ? 0 : scene->known.revision);
 }
 
-void engine_scene_changed(struct engine *engine, const struct engine_reference *by)
+void engine_scene_changed(struct engine *engine, const struct engine_scene *scene,
+                          const struct engine_reference *by)
 {
-    for (const struct engine_reference *one = by->scene->references; one; one = one->next) {
+    for (const struct engine_reference *one = scene->references; one; one = one->next) {
         struct engine_event *event = one == by ? NULL : event_create(ENGINE_SCENE_CHANGED, one->client->client, 0);
         if (!event)
             continue; /* without memory, the next change tells of this one, too */
         event->scene = one->id;
-        event->revision = by->scene->scene->revision;
+        event->revision = scene->known.revision;
         engine_post(engine, event);
     }
 }

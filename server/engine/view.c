@@ -32,7 +32,7 @@ static bool has_news(const struct job *job, const struct view_wish *wish)
     /* A key frame that could not be finished is wished still. */
     bool key_frame = wish->key_frame || view->wish.key_frame;
     return !view->shown || wish->camera.command != view->shown_command || key_frame ||
-           job->scene->scene->revision != view->shown_revision;
+           job->scene->known.revision != view->shown_revision;
 }
 
 bool view_has_news(const struct job *job)

@@ -28,42 +28,53 @@ bool node_check(const struct scene_node *node, const struct edit_place *place)
     return weights_check(node->weights, node->weight_count, place);
 }
 
-bool skin_check(const struct scene_skin *skin, const struct edit_place *place)
+static const char matrices_path[] = ".arrays[1] (joint_from_mesh)";
+static const char clip_floats_path[] = ".arrays[0] (times and values)";
+
+bool skin_check_shape(const struct scene_skin *skin, const struct edit_place *place)
 {
-    const char *joints = ".arrays[0] (joints)", *matrices = ".arrays[1] (joint_from_mesh)";
+    const char *joints = ".arrays[0] (joints)";
     if (!skin->joint_count || skin->joint_count > SKIN_JOINTS_MAX)
         return edit_error(place, ERROR_INVALID, ".joint_count", "%u is not within 1 .. %d", skin->joint_count,
                           SKIN_JOINTS_MAX);
     if (!skin->joints)
         return edit_error(place, ERROR_INVALID, joints, "a skin needs this array");
-    if (!array_size_check(skin->joints, skin->joint_count, 4, joints, place))
-        return false;
+    return array_size_check(skin->joints, skin->joint_count, 4, joints, place) &&
+           (!skin->joint_from_mesh ||
+            array_size_check(skin->joint_from_mesh, skin->joint_count, 48, matrices_path, place));
+}
+
+bool skin_check_content(const struct scene_skin *skin, const struct edit_place *place)
+{
     if (!skin->joint_from_mesh)
         return true;
-    if (!array_size_check(skin->joint_from_mesh, skin->joint_count, 48, matrices, place))
-        return false;
     const float *values = (const float *)(const void *)skin->joint_from_mesh->data;
     size_t count = (size_t)skin->joint_count * 12, bad = first_bad_float(values, count, COORDINATE_MAX);
     if (bad == count)
         return true;
-    edit_error(place, ERROR_INVALID, matrices, "the matrix of joint %zu has %g as entry %zu", bad / 12,
+    edit_error(place, ERROR_INVALID, matrices_path, "the matrix of joint %zu has %g as entry %zu", bad / 12,
                (double)values[bad], bad % 12);
     return error_remedy(place->error, "numbers must be finite and not beyond 1e18");
 }
 
-bool clip_check(const struct scene_clip *clip, const struct edit_place *place)
+bool clip_check_shape(const struct scene_clip *clip, const struct edit_place *place)
 {
-    const char *path = ".arrays[0] (times and values)";
+    const char *path = clip_floats_path;
     if (!clip->floats)
         return edit_error(place, ERROR_INVALID, path, "a clip needs this array");
     if (clip->floats->size_bytes % 4)
         return edit_error(place, ERROR_INVALID, path, "the array has %zu bytes, which are no whole floats",
                           clip->floats->size_bytes);
+    return true;
+}
+
+bool clip_check_content(const struct scene_clip *clip, const struct edit_place *place)
+{
     const float *values = (const float *)(const void *)clip->floats->data;
     size_t count = clip->floats->size_bytes / 4, bad = first_bad_float(values, count, FLT_MAX);
     if (bad == count)
         return true;
-    return edit_error(place, ERROR_INVALID, path, "number %zu is %g, which is not finite", bad,
+    return edit_error(place, ERROR_INVALID, clip_floats_path, "number %zu is %g, which is not finite", bad,
                       (double)values[bad]);
 }
 

@@ -4,18 +4,25 @@
 
 #include <stdlib.h>
 #include <string.h>
+#include <xxhash.h>
 
 #define NODES_MAX_DEFAULT (4u << 20)
+/* Of a transaction that takes about a millisecond: what it has, and what the scene has. */
+#define SHORT_EDITS 256
+#define SHORT_OBJECTS 8192
+#define SHORT_BYTES (UINT64_C(1) << 20)
 
 /* ---- checks ------------------------------------------------------------------------------------- */
 
-static bool content_check(struct scene_edit *edit, const struct edit_place *place)
+static bool shape_check(const struct scene_edit *edit, const struct edit_place *place)
 {
+    if (edit->kind == EDIT_SET_ENVIRONMENT)
+        return environment_check_shape(&edit->set.environment, place);
     switch (edit->object) {
     case OBJECT_MESH:
-        return mesh_check(&edit->set.mesh, place);
+        return mesh_check_shape(&edit->set.mesh, place);
     case OBJECT_SPHERES:
-        return spheres_check(&edit->set.spheres, place);
+        return spheres_check_shape(&edit->set.spheres, place);
     case OBJECT_TEXTURE:
         return texture_check(&edit->set.texture, place);
     case OBJECT_LIGHT:
@@ -27,9 +34,9 @@ static bool content_check(struct scene_edit *edit, const struct edit_place *plac
     case OBJECT_NODE:
         return node_check(&edit->set.node, place);
     case OBJECT_SKIN:
-        return skin_check(&edit->set.skin, place);
+        return skin_check_shape(&edit->set.skin, place);
     case OBJECT_CLIP:
-        return clip_check(&edit->set.clip, place);
+        return clip_check_shape(&edit->set.clip, place);
     case OBJECT_CHANNEL:
         return channel_check(&edit->set.channel, place);
     case OBJECT_MATERIAL:
@@ -39,13 +46,63 @@ static bool content_check(struct scene_edit *edit, const struct edit_place *plac
     return true;
 }
 
-/* Looks at one edit alone and makes it the last of its object. */
+static bool is_same_content(const struct scene_mesh *a, const struct scene_mesh *b)
+{
+    return memcmp(a->arrays, b->arrays, sizeof(a->arrays)) == 0 && a->vertex_count == b->vertex_count &&
+           a->triangle_count == b->triangle_count && a->influence_count == b->influence_count &&
+           a->target_count == b->target_count;
+}
+
+/* Arrays that several meshes share are looked through once. */
+static bool mesh_content_check(struct draft *draft, struct scene_mesh *mesh, const struct edit_place *place)
+{
+    const uint64_t key = XXH3_64bits(mesh->arrays, sizeof(mesh->arrays));
+    const struct scene_mesh *checked = hashmap_get(&draft->checked_meshes, key);
+    if (checked && is_same_content(checked, mesh)) {
+        memcpy(mesh->lower, checked->lower, sizeof(mesh->lower));
+        memcpy(mesh->upper, checked->upper, sizeof(mesh->upper));
+        mesh->joint_places = checked->joint_places;
+        return true;
+    }
+    if (!mesh_check_content(mesh, place))
+        return false;
+    hashmap_put(&draft->checked_meshes, key, mesh); /* without memory, the next is looked through again */
+    return true;
+}
+
+static bool content_check(struct draft *draft, struct scene_edit *edit, const struct edit_place *place)
+{
+    if (edit->kind == EDIT_SET_ENVIRONMENT)
+        return environment_check_content(&edit->set.environment, place);
+    switch (edit->object) {
+    case OBJECT_MESH:
+        return mesh_content_check(draft, &edit->set.mesh, place);
+    case OBJECT_SPHERES:
+        return spheres_check_content(&edit->set.spheres, place);
+    case OBJECT_SKIN:
+        return skin_check_content(&edit->set.skin, place);
+    case OBJECT_CLIP:
+        return clip_check_content(&edit->set.clip, place);
+    case OBJECT_NODE:
+    case OBJECT_MATERIAL:
+    case OBJECT_TEXTURE:
+    case OBJECT_LIGHT:
+    case OBJECT_CAMERA:
+    case OBJECT_DISC:
+    case OBJECT_CHANNEL:
+    case OBJECT_COUNT:
+        break;
+    }
+    return true;
+}
+
+/* Makes an edit the last of its object. */
 static bool take_edit(struct draft *draft, struct scene_edit *edit)
 {
     struct edit_place place = draft_place(draft, edit);
     if (edit->kind == EDIT_SET_ENVIRONMENT) {
         draft->last_environment = edit;
-        return environment_check(&edit->set.environment, &place);
+        return true;
     }
     if ((unsigned)edit->object >= OBJECT_COUNT)
         return edit_error(&place, ERROR_INVALID, ".kind", "%u is no kind of object", (unsigned)edit->object);
@@ -55,11 +112,41 @@ static bool take_edit(struct draft *draft, struct scene_edit *edit)
     if (edit->kind == EDIT_REMOVE && !draft_find(draft, edit->object, id))
         return edit_error(&place, ERROR_UNKNOWN_ID, "", "cannot remove %s %u: it does not exist",
                           object_kind_name(edit->object), id);
-    if (edit->kind == EDIT_SET && !content_check(edit, &place))
-        return false;
     return hashmap_put(&draft->last[edit->object], id, edit) ||
            error_set(draft->error, ERROR_OUT_OF_MEMORY, "edits", "no memory for a table of %zu edits",
                      draft->edit_count);
+}
+
+static bool take_edits(struct draft *draft)
+{
+    bool sound = true;
+    for (size_t i = 0; sound && i < draft->edit_count; i++)
+        sound = !draft_is_abandoned(draft) && take_edit(draft, &draft->edits[i]);
+    return sound;
+}
+
+static bool shapes_check(const struct draft *draft)
+{
+    bool sound = true;
+    for (size_t i = 0; sound && i < draft->edit_count; i++) {
+        const struct scene_edit *edit = &draft->edits[i];
+        struct edit_place place = draft_place(draft, edit);
+        sound = !draft_is_abandoned(draft) &&
+                (edit->kind == EDIT_REMOVE || !draft_counts(draft, edit) || shape_check(edit, &place));
+    }
+    return sound;
+}
+
+static bool contents_check(struct draft *draft)
+{
+    bool sound = true;
+    for (size_t i = 0; sound && i < draft->edit_count; i++) {
+        struct scene_edit *edit = &draft->edits[i];
+        struct edit_place place = draft_place(draft, edit);
+        sound = !draft_is_abandoned(draft) &&
+                (edit->kind == EDIT_REMOVE || !draft_counts(draft, edit) || content_check(draft, edit, &place));
+    }
+    return sound;
 }
 
 struct size {
@@ -279,19 +366,22 @@ static void apply(struct draft *draft, const struct size *size)
     }
 }
 
-bool scene_commit(struct scene *scene, struct scene_edit *edits, size_t edit_count, struct error *error)
+/* Edits that others replace are not looked at, and nothing large is before the limits are known to hold. */
+static bool is_sound(struct draft *draft, struct size *size)
 {
-    struct draft draft = {.scene = scene, .edits = edits, .edit_count = edit_count, .error = error};
+    if (!take_edits(draft) || !shapes_check(draft) || !structure_check(draft) || !companions_check(draft))
+        return false;
+    *size = draft_size(draft);
+    return limits_check(draft, size) && contents_check(draft) && references_check(draft) && links_check(draft);
+}
+
+bool scene_commit_unless(struct scene *scene, struct scene_edit *edits, size_t edit_count,
+                         const atomic_bool *abandoned, struct error *error)
+{
+    struct draft draft = {
+        .scene = scene, .edits = edits, .edit_count = edit_count, .abandoned = abandoned, .error = error};
     struct size size = {0};
-    bool sound = true;
-    for (size_t i = 0; sound && i < edit_count; i++)
-        sound = take_edit(&draft, &edits[i]);
-    sound = sound && structure_check(&draft) && companions_check(&draft) && references_check(&draft) &&
-            links_check(&draft);
-    if (sound) {
-        size = draft_size(&draft);
-        sound = limits_check(&draft, &size);
-    }
+    bool sound = is_sound(&draft, &size);
     if (sound && !make_room(&draft)) {
         give_room_back(&draft);
         sound = false;
@@ -300,4 +390,34 @@ bool scene_commit(struct scene *scene, struct scene_edit *edits, size_t edit_cou
         apply(&draft, &size);
     draft_finish(&draft);
     return sound;
+}
+
+bool scene_commit(struct scene *scene, struct scene_edit *edits, size_t edit_count, struct error *error)
+{
+    return scene_commit_unless(scene, edits, edit_count, NULL, error);
+}
+
+bool scene_commit_is_short(const struct scene *scene, const struct scene_edit *edits, size_t edit_count)
+{
+    uint64_t bytes = 0;
+    size_t objects = 0;
+    for (int k = 0; k < OBJECT_COUNT; k++)
+        objects += scene->objects[k].count;
+    if (edit_count > SHORT_EDITS || objects > SHORT_OBJECTS)
+        return false;
+    for (size_t i = 0; i < edit_count; i++) {
+        if (edits[i].kind == EDIT_SET)
+            bytes += object_bytes(edits[i].object, &edits[i].set);
+        else if (edits[i].kind == EDIT_SET_ENVIRONMENT)
+            bytes += environment_bytes(&edits[i].set.environment);
+    }
+    return bytes <= SHORT_BYTES;
+}
+
+uint64_t scene_edits_table_bytes(const struct scene_edit *edits, size_t edit_count)
+{
+    uint64_t bytes = 0;
+    for (size_t i = 0; i < edit_count; i++)
+        bytes += edits[i].kind == EDIT_SET ? object_table_bytes(edits[i].object, &edits[i].set) : 0;
+    return bytes;
 }

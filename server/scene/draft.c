@@ -10,6 +10,15 @@ void draft_finish(struct draft *draft)
         free(draft->fallen[kind].ids);
     }
     hashmap_finish(&draft->fallen_nodes);
+    hashmap_finish(&draft->checked_meshes);
+}
+
+bool draft_is_abandoned(const struct draft *draft)
+{
+    if (!draft->abandoned || !atomic_load_explicit(draft->abandoned, memory_order_relaxed))
+        return false;
+    error_set(draft->error, ERROR_CANCELLED, "edits", "the transaction was abandoned");
+    return true;
 }
 
 const void *draft_find(const struct draft *draft, enum object_kind kind, uint32_t id)

@@ -18,13 +18,18 @@ struct draft {
     struct scene *scene;
     struct scene_edit *edits;
     size_t edit_count;
-    struct hashmap last[OBJECT_COUNT];      /* struct scene_edit *, by object id */
-    struct scene_edit *last_environment;    /* NULL: unchanged */
+    struct hashmap last[OBJECT_COUNT];   /* struct scene_edit *, by object id */
+    struct scene_edit *last_environment; /* NULL: unchanged */
+    struct hashmap checked_meshes; /* struct scene_mesh *, by a hash of their arrays: looked through already */
     struct draft_list fallen[OBJECT_COUNT]; /* companions of removed objects: companions.c */
     struct hashmap fallen_nodes;            /* the same of nodes, by id; NULL is never stored */
+    const atomic_bool *abandoned;           /* NULL: it never is */
     struct error *error;
 };
 void draft_finish(struct draft *draft);
+/* To be asked within loops over edits and nodes. True: nobody waits for the transaction any more, which
+ * *draft->error says. */
+bool draft_is_abandoned(const struct draft *draft);
 
 /* The object after all edits, or NULL. Nodes that fall with a removed one are still found. */
 const void *draft_find(const struct draft *draft, enum object_kind kind, uint32_t id);

@@ -107,7 +107,7 @@ size_t object_struct_bytes(enum object_kind kind)
         [OBJECT_SKIN] = sizeof(struct scene_skin),       [OBJECT_CLIP] = sizeof(struct scene_clip),
         [OBJECT_CHANNEL] = sizeof(struct scene_channel),
     };
-    return sizes[kind];
+    return (unsigned)kind < OBJECT_COUNT ? sizes[kind] : 0;
 }
 
 static uint64_t blob_bytes(const struct blob *blob)

@@ -19,18 +19,25 @@ uint32_t edit_object_id(const struct scene_edit *edit);
 bool edit_error(const struct edit_place *place, enum error_code kind, const char *path, const char *format, ...)
     __attribute__((format(printf, 4, 5)));
 
-/* Each looks at one object alone, no references; bounds are filled in. */
-bool mesh_check(struct scene_mesh *mesh, const struct edit_place *place);
-bool spheres_check(struct scene_spheres *spheres, const struct edit_place *place);
+/* Each looks at one object alone, without references. A shape is what takes a moment to see: counts, which arrays
+ * there are, their sizes. */
+bool mesh_check_shape(const struct scene_mesh *mesh, const struct edit_place *place);
+bool spheres_check_shape(const struct scene_spheres *spheres, const struct edit_place *place);
 bool texture_check(const struct scene_texture *texture, const struct edit_place *place);
 bool light_check(const struct scene_light *light, const struct edit_place *place);
 bool camera_check(const struct scene_camera *camera, const struct edit_place *place);
 bool disc_check(const struct scene_disc *disc, const struct edit_place *place);
 bool node_check(const struct scene_node *node, const struct edit_place *place);
-bool skin_check(const struct scene_skin *skin, const struct edit_place *place);
-bool clip_check(const struct scene_clip *clip, const struct edit_place *place);
+bool skin_check_shape(const struct scene_skin *skin, const struct edit_place *place);
+bool clip_check_shape(const struct scene_clip *clip, const struct edit_place *place);
 bool channel_check(const struct scene_channel *channel, const struct edit_place *place);
-bool environment_check(const struct scene_environment *environment, const struct edit_place *place);
+bool environment_check_shape(const struct scene_environment *environment, const struct edit_place *place);
+/* The contents of arrays whose sizes are right, which may take a second; bounds are filled in. */
+bool mesh_check_content(struct scene_mesh *mesh, const struct edit_place *place);
+bool spheres_check_content(struct scene_spheres *spheres, const struct edit_place *place);
+bool skin_check_content(const struct scene_skin *skin, const struct edit_place *place);
+bool clip_check_content(const struct scene_clip *clip, const struct edit_place *place);
+bool environment_check_content(const struct scene_environment *environment, const struct edit_place *place);
 
 /* Helpers that several kinds of edits share. */
 #define COORDINATE_MAX 1e18f /* beyond it, squares leave the range of floats */

@@ -36,9 +36,11 @@ bool texture_check(const struct scene_texture *texture, const struct edit_place 
     return array_size_check(texture->texels, (uint64_t)texture->width * texture->height, 4, path, place);
 }
 
-bool environment_check(const struct scene_environment *environment, const struct edit_place *place)
+static const char texels_path[] = ".arrays[0] (texels)";
+
+bool environment_check_shape(const struct scene_environment *environment, const struct edit_place *place)
 {
-    const char *path = ".arrays[0] (texels)";
+    const char *path = texels_path;
     if (!environment->texels) {
         if (environment->width || environment->height)
             return edit_error(place, ERROR_INVALID, path, "an image of %ux%u texels needs this array",
@@ -48,15 +50,21 @@ bool environment_check(const struct scene_environment *environment, const struct
     if (!environment->width || !environment->height)
         return edit_error(place, ERROR_INVALID, environment->width ? ".height" : ".width",
                           "an image has at least one texel");
+    return array_size_check(environment->texels, (uint64_t)environment->width * environment->height, 8, path,
+                            place);
+}
+
+bool environment_check_content(const struct scene_environment *environment, const struct edit_place *place)
+{
+    if (!environment->texels)
+        return true;
     uint64_t texels = (uint64_t)environment->width * environment->height;
-    if (!array_size_check(environment->texels, texels, 8, path, place))
-        return false;
     const uint16_t *halves = (const uint16_t *)(const void *)environment->texels->data;
     const uint16_t exponent = 0x7c00; /* all ones: infinity or NaN */
     for (uint64_t i = 0; i < texels * 4; i++) {
         /* The fourth half of a texel is not used. */
         if ((halves[i] & exponent) == exponent && i % 4 != 3)
-            return edit_error(place, ERROR_INVALID, path, "texel %llu of row %llu is not finite",
+            return edit_error(place, ERROR_INVALID, texels_path, "texel %llu of row %llu is not finite",
                               (unsigned long long)(i / 4 % environment->width),
                               (unsigned long long)(i / 4 / environment->width));
     }

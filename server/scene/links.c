@@ -162,6 +162,8 @@ static bool set_objects_check(struct draft *draft, struct ascents *ascents)
 {
     for (size_t i = 0; i < draft->edit_count; i++) {
         const struct scene_edit *edit = &draft->edits[i];
+        if (draft_is_abandoned(draft))
+            return false;
         if (edit->kind != EDIT_SET || !draft_counts(draft, edit))
             continue;
         if (edit->object == OBJECT_NODE && edit->set.node.skin && !node_fits(draft, &edit->set.node, edit))

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Checks of triangle meshes. They run over every element on the thread that owns GL: a loop per array and
- * nothing else in it. */
+/* Checks of triangle meshes. They run over every element: a loop per array and nothing else in it. */
 #include "scene/edit.h"
 
 #include <float.h>
@@ -217,13 +216,17 @@ static bool indices_check(struct scene_mesh *mesh, const struct edit_place *plac
     return true;
 }
 
-bool mesh_check(struct scene_mesh *mesh, const struct edit_place *place)
+bool mesh_check_shape(const struct scene_mesh *mesh, const struct edit_place *place)
 {
     if (!mesh->vertex_count || !mesh->triangle_count)
         return edit_error(place, ERROR_INVALID, mesh->vertex_count ? ".triangle_count" : ".vertex_count",
                           "a mesh has at least one triangle");
-    return company_check(mesh, place) && sizes_check(mesh, place) && floats_check(mesh, place) &&
-           influences_check(mesh, place) && indices_check(mesh, place) &&
+    return company_check(mesh, place) && sizes_check(mesh, place) &&
            weights_check(mesh->weights, mesh->weight_count, place) &&
            ranges_check(mesh->ranges, mesh->range_count, mesh->triangle_count, place);
+}
+
+bool mesh_check_content(struct scene_mesh *mesh, const struct edit_place *place)
+{
+    return floats_check(mesh, place) && influences_check(mesh, place) && indices_check(mesh, place);
 }

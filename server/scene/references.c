@@ -189,7 +189,8 @@ bool references_check(struct draft *draft)
 {
     for (size_t i = 0; i < draft->edit_count; i++) {
         const struct scene_edit *edit = &draft->edits[i];
-        if (edit->kind == EDIT_SET && draft_counts(draft, edit) && !set_check(draft, edit))
+        if (draft_is_abandoned(draft) ||
+            (edit->kind == EDIT_SET && draft_counts(draft, edit) && !set_check(draft, edit)))
             return false;
     }
     return removals_check(draft);

@@ -8,6 +8,7 @@
 #include "base/error.h"
 #include "base/hashmap.h"
 
+#include <stdatomic.h>
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -230,6 +231,13 @@ void scene_destroy(struct scene *scene);                                        
  * looked at together: the last edit of an object counts, and an edit may refer to what a later one makes. A
  * removed node removes its subtree as it is after the other edits. */
 bool scene_commit(struct scene *scene, struct scene_edit *edits, size_t edit_count, struct error *error);
+/* The same; ends soon with ERROR_CANCELLED and an unchanged scene if another thread sets *abandoned in time. */
+bool scene_commit_unless(struct scene *scene, struct scene_edit *edits, size_t edit_count,
+                         const atomic_bool *abandoned, struct error *error);
+/* Whether a transaction takes no longer than a slice of a frame, whatever is in it. */
+bool scene_commit_is_short(const struct scene *scene, const struct scene_edit *edits, size_t edit_count);
+/* What the tables of a scene may grow by. */
+uint64_t scene_edits_table_bytes(const struct scene_edit *edits, size_t edit_count);
 
 /* Objects by identifier, NULL if there is none. */
 const struct scene_node *scene_node(const struct scene *scene, uint32_t id);

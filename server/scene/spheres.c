@@ -5,15 +5,22 @@
 #include <float.h>
 #include <math.h>
 
-bool spheres_check(struct scene_spheres *spheres, const struct edit_place *place)
+static const char centres_radii_path[] = ".arrays[0] (centres and radii)";
+
+bool spheres_check_shape(const struct scene_spheres *spheres, const struct edit_place *place)
 {
-    const char *path = ".arrays[0] (centres and radii)";
+    const char *path = centres_radii_path;
     if (!spheres->sphere_count)
         return edit_error(place, ERROR_INVALID, ".sphere_count", "a set of spheres has at least one");
     if (!spheres->centres_radii)
         return edit_error(place, ERROR_INVALID, path, "spheres need this array");
-    if (!array_size_check(spheres->centres_radii, spheres->sphere_count, 16, path, place))
-        return false;
+    return array_size_check(spheres->centres_radii, spheres->sphere_count, 16, path, place) &&
+           ranges_check(spheres->ranges, spheres->range_count, spheres->sphere_count, place);
+}
+
+bool spheres_check_content(struct scene_spheres *spheres, const struct edit_place *place)
+{
+    const char *path = centres_radii_path;
     const float *values = (const float *)(const void *)spheres->centres_radii->data;
     size_t count = (size_t)spheres->sphere_count * 4;
     size_t bad = first_bad_float(values, count, COORDINATE_MAX);
@@ -37,7 +44,7 @@ bool spheres_check(struct scene_spheres *spheres, const struct edit_place *place
         spheres->lower[axis] = lower[axis];
         spheres->upper[axis] = upper[axis];
     }
-    return ranges_check(spheres->ranges, spheres->range_count, spheres->sphere_count, place);
+    return true;
 }
 
 bool disc_check(const struct scene_disc *disc, const struct edit_place *place)

@@ -172,7 +172,7 @@ bool structure_check(struct draft *draft)
     if (!sound)
         error_set(draft->error, ERROR_OUT_OF_MEMORY, "edits", "no memory to look at the hierarchy");
     for (uint32_t i = 0; sound && i < traversal.hierarchy.count; i++)
-        sound = resolve(&traversal, i);
+        sound = !draft_is_abandoned(draft) && resolve(&traversal, i);
     sound = sound && note_fallen(&traversal);
     hierarchy_finish(&traversal.hierarchy);
     free(traversal.state);

@@ -88,6 +88,75 @@ static struct engine_command *render_scene(uint64_t client, uint32_t request, ui
     return made;
 }
 
+/* ---- transactions that are carried out beside the thread ---------------------------------------------- */
+
+/* More than is done at once. */
+#define MANY_NODES 1000
+
+static void submit_long_commit(struct engine *engine, uint64_t client, uint32_t request, uint32_t scene)
+{
+    submit(engine, commit_of_nodes(client, request, scene, MANY_NODES));
+}
+
+TEST(what_follows_a_long_transaction_waits_for_it)
+{
+    struct engine *engine = start((struct engine_options){0});
+    open_as(engine, 1, 5, "a", SHARING_SHARED);
+    open_as(engine, 2, 6, "b", SHARING_PRIVATE);
+    attach(engine, 2, 7, "a");
+    submit_long_commit(engine, 1, 10, 5);
+    submit_commit(engine, 1, 11, 5);
+    submit_long_commit(engine, 1, 12, 5);
+    submit(engine, render_scene(1, 13, 5, 0));
+    assert_int_equal(expect_done(engine, 1, 10), 1);
+    expect_changed(engine, 2, 7, 1);
+    assert_int_equal(expect_done(engine, 1, 11), 2);
+    expect_changed(engine, 2, 7, 2);
+    assert_int_equal(expect_done(engine, 1, 12), 3);
+    expect_changed(engine, 2, 7, 3);
+    struct engine_event *event = expect_frame(engine, 1, 13, 0);
+    assert_int_equal(event->frame->result.revision, 3);
+    engine_event_destroy(event);
+    expect_done(engine, 1, 13);
+    engine_destroy(engine);
+}
+
+TEST(a_scene_is_closed_after_its_long_transaction)
+{
+    struct engine *engine = start((struct engine_options){0});
+    open_as(engine, 1, 5, "", SHARING_PRIVATE);
+    submit_long_commit(engine, 1, 10, 5);
+    close_scene(engine, 1, 11, 5);
+    assert_int_equal(expect_done(engine, 1, 10), 1);
+    expect_done(engine, 1, 11);
+    submit_commit(engine, 1, 12, 5);
+    expect_failed(engine, 1, 12, ERROR_UNKNOWN_ID, "edit_begin.scene");
+    engine_destroy(engine);
+}
+
+TEST(clients_and_the_engine_may_go_during_a_long_transaction)
+{
+    for (int round = 0; round < 20; round++) {
+        struct engine *engine = start((struct engine_options){0});
+        open_as(engine, 1, 5, "", SHARING_PRIVATE);
+        open_as(engine, 2, 6, "", SHARING_PRIVATE);
+        submit_long_commit(engine, 1, 10, 5);
+        submit(engine, command(ENGINE_CLIENT_GONE, 1, 0));
+        struct engine_event *event = event_within(engine, 60000);
+        assert_non_null(event);
+        if (event->kind == ENGINE_DONE) { /* it was finished before */
+            engine_event_destroy(event);
+            event = expect_event(engine, ENGINE_CLIENT_FORGOTTEN, 1, 0);
+        }
+        assert_int_equal(event->kind, ENGINE_CLIENT_FORGOTTEN);
+        engine_event_destroy(event);
+        submit_long_commit(engine, 2, 11, 6);
+        if (round % 2)
+            assert_int_equal(expect_done(engine, 2, 11), 1);
+        engine_destroy(engine);
+    }
+}
+
 /* ---- names ------------------------------------------------------------------------------------------- */
 
 TEST(a_shared_scene_is_rendered_by_all_attached_clients)

@@ -454,8 +454,82 @@ TEST(revisions_tell_what_a_transaction_touched)
     scene_destroy(scene);
 }
 
-/* The size of the largest model that is at hand; its time is printed, as it is spent on the thread that owns GL.
- */
+/* ---- what is not looked at ---------------------------------------------------------------------- */
+
+static const float square_with_nan[12] = {0, 0, 0, 1, 0, 0, NAN, 1, 0, 0, 1, 0};
+
+static struct scene_mesh *add_bad_mesh(struct draft_list *list, uint32_t id)
+{
+    struct scene_mesh *mesh = add_mesh(list, id);
+    memcpy(mesh->arrays[MESH_POSITIONS]->data, square_with_nan, sizeof(square_with_nan));
+    return mesh;
+}
+
+TEST(an_edit_that_a_later_one_replaces_is_not_looked_at)
+{
+    struct scene *scene = new_scene();
+    struct draft_list list = {0};
+    add_bad_mesh(&list, 1);
+    add_mesh(&list, 1);
+    add_bad_mesh(&list, 2);
+    add_remove(&list, OBJECT_MESH, 2);
+    expect_commit(scene, &list);
+    assert_true(scene_mesh(scene, 1)->upper[0] == 1.0f);
+    add_mesh(&list, 1);
+    add_bad_mesh(&list, 1);
+    expect_refusal(scene, &list, ERROR_INVALID, "edits[1] (mesh 1).arrays[0] (positions)");
+    scene_destroy(scene);
+}
+
+TEST(limits_are_looked_at_before_the_contents_of_arrays)
+{
+    struct scene *scene = scene_create("small", &(struct scene_limits){.host_bytes = 200});
+    struct draft_list list = {0};
+    add_bad_mesh(&list, 1);
+    expect_refusal(scene, &list, ERROR_LIMIT, "edits");
+    scene_destroy(scene);
+}
+
+TEST(meshes_that_share_arrays_have_bounds_of_their_own)
+{
+    static const uint32_t first_triangle[6] = {0, 1, 2, 0, 1, 2}, edge[6] = {0, 1, 1, 0, 1, 1};
+    struct scene *scene = new_scene();
+    struct draft_list list = {0};
+    struct blob *positions = add_mesh(&list, 1)->arrays[MESH_POSITIONS];
+    for (uint32_t id = 2; id <= 4; id++) {
+        struct scene_mesh *mesh = add_mesh(&list, id);
+        blob_unref(mesh->arrays[MESH_POSITIONS]);
+        mesh->arrays[MESH_POSITIONS] = blob_ref(positions);
+    }
+    blob_unref(list.edits[1].set.mesh.arrays[MESH_INDICES]); /* mesh 2 has both from mesh 1 */
+    list.edits[1].set.mesh.arrays[MESH_INDICES] = blob_ref(list.edits[0].set.mesh.arrays[MESH_INDICES]);
+    memcpy(list.edits[2].set.mesh.arrays[MESH_INDICES]->data, first_triangle, sizeof(first_triangle));
+    memcpy(list.edits[3].set.mesh.arrays[MESH_INDICES]->data, edge, sizeof(edge));
+    expect_commit(scene, &list);
+    for (uint32_t id = 1; id <= 4; id++) {
+        assert_true(scene_mesh(scene, id)->lower[1] == 0.0f);
+        assert_true(scene_mesh(scene, id)->upper[0] == 1.0f);
+        assert_true(scene_mesh(scene, id)->upper[1] == (id == 4 ? 0.0f : 1.0f));
+    }
+    scene_destroy(scene);
+}
+
+TEST(an_abandoned_transaction_changes_nothing)
+{
+    struct scene *scene = new_scene();
+    struct draft_list list = {0};
+    struct error error = {0};
+    const atomic_bool abandoned = true;
+    add_mesh(&list, 1);
+    assert_false(scene_commit_unless(scene, list.edits, list.count, &abandoned, &error));
+    assert_int_equal(error.kind, ERROR_CANCELLED);
+    assert_int_equal(scene->revision, 0);
+    assert_int_equal(scene->objects[OBJECT_MESH].count, 0);
+    expect_commit(scene, &list);
+    scene_destroy(scene);
+}
+
+/* The size of the largest model that is at hand; its time is printed. */
 TEST(a_mesh_of_871_thousand_triangles_is_checked)
 {
     const uint32_t triangles = 871414, vertices = 437645;
