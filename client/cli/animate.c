@@ -16,14 +16,11 @@ enum key {
     KEY_KEYS,
     KEY_SHARD,
     KEY_RESUME,
-    KEY_RETRIES,
     KEY_SCRIPT,
     KEY_LOSSLESS,
     KEY_DRY_RUN,
     KEY_SCENE
 };
-
-#define DEFAULT_RETRIES 5u
 
 struct animation {
     struct cli_job job;
@@ -49,11 +46,9 @@ static const struct argp_option options[] = {
     {"keys", KEY_KEYS, "FILE.json", 0,
      "Read camera keys: array of {\"time\", \"eye\", \"look_at\", \"up\", \"fov\"}; seconds, degrees", 0},
     {"lossless", KEY_LOSSLESS, NULL, 0, "Write a lossless video, for .mkv", 0},
-    {NULL, 0, NULL, 0, "Parts and failures:", -1},
+    {NULL, 0, NULL, 0, "Parts:", -1},
     {"shard", KEY_SHARD, "K/N", 0, "Render only every N-th frame of the range, beginning with the K-th", 0},
     {"resume", KEY_RESUME, NULL, 0, "Skip frames whose files exist, are complete and have the requested size", 0},
-    {"retries", KEY_RETRIES, "N", 0,
-     "Reconnect to a lost daemon up to N times in a row, 0 to 1000 (default 5); no frame is lost", 0},
     {0}};
 
 /* An error of lib/text.h gets the option's name. */
@@ -68,7 +63,6 @@ static error_t named(struct cli_job *job, bool good, const char *field)
 static error_t parse_series(struct cli_job *job, int key, const char *value)
 {
     struct cli_series *series = &job->series;
-    uint64_t number = 0;
     double real = 0;
     error_t status = 0;
     switch (key) {
@@ -93,10 +87,6 @@ static error_t parse_series(struct cli_job *job, int key, const char *value)
     case KEY_LOSSLESS:
         job->lossless = true;
         return 0;
-    case KEY_RETRIES:
-        status = named(job, fl_text_integer(value, 0, 1000, &number, &job->error), "--retries");
-        series->retries = (unsigned)number;
-        return status;
     default:
         return ARGP_ERR_UNKNOWN;
     }
@@ -172,7 +162,6 @@ static bool begin(struct animation *animation)
 {
     const bool begun = cli_job_begin(&animation->job, fl_render_defaults());
     animation->job.series.orbit_degrees = TURN_DEGREES;
-    animation->job.series.retries = DEFAULT_RETRIES;
     return begun;
 }
 

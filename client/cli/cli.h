@@ -126,13 +126,19 @@ struct cli_output {
     enum cli_image image;
 };
 
-/* Options of an animation: its frames, and the reaction to errors. */
+/* How long a lost daemon is waited for, without a new frame in between. */
+struct cli_retries {
+    bool has_count, has_duration;
+    unsigned count; /* in a row */
+    double for_s;
+};
+
+/* Options of an animation. */
 struct cli_series {
     bool has_range;
     struct fl_frame_run range;
     uint32_t shard_part, shard_parts; /* 0 parts: all frames */
     bool resume;                      /* frames whose files exist are not rendered again */
-    unsigned retries;                 /* in a row, without a frame between them */
     double orbit_degrees;
     double orbit_seconds; /* for these degrees; 0: the range */
     float *dolly_times;   /* two keys of the camera's path, the second one at: */
@@ -167,6 +173,7 @@ struct cli_job {
         outputs[CLI_OUTPUTS_MAX]; /* destinations of the pictures: `output`, or several of a script */
     size_t output_count;
     struct cli_series series;
+    struct cli_retries retries;
     const char *script; /* path; NULL: none */
     const struct fl_json *script_json;
     struct cli_clip clips[CLI_CLIPS_MAX];
@@ -246,9 +253,10 @@ bool cli_choose_camera(struct cli_job *job, const struct fl_scene *scene, struct
 
 /* ---- retry.c: lost daemons that may come back ---- */
 
-bool cli_daemon_is_lost(const struct fl_error *error);
+/* Whether the same command may succeed later: the daemon is lost, or says that its state will change. */
+bool cli_is_temporary(const struct fl_error *error);
 /* The pause before the next try after this number of failures in a row, at least 1: it doubles each time, within
- * bounds. */
+ * bounds, and differs by a quarter by chance, so that many clients of one daemon do not come back at once. */
 uint32_t cli_retry_pause_ms(unsigned failures, uint32_t min_ms);
 bool cli_retry_wait(uint32_t pause_ms, struct fl_error *error); /* false: interrupted */
 

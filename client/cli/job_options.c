@@ -14,6 +14,7 @@
 
 #define RADIANS_PER_DEGREE 0.017453292519943295
 #define OPTIONS_MAX 160
+#define RETRY_MAX_S 2592000.0 /* 30 days */
 
 enum key {
     KEY_SERVER = 's',
@@ -37,6 +38,8 @@ enum key {
     KEY_CLIP_START,
     KEY_CLIP_SPEED,
     KEY_LAYERS,
+    KEY_RETRY_FOR,
+    KEY_RETRIES,
     KEY_FIELD = 0x200 /* and its index */
 };
 
@@ -52,6 +55,11 @@ static const struct argp_option special[] = {
      CLI_GROUP_OUTPUT},
     {"key", KEY_KEY, "FILE", 0,
      "Key that the daemon has as well: the connection is sealed (default for tcp: FARLIGHT_KEY)",
+     CLI_GROUP_OUTPUT},
+    {"retry-for", KEY_RETRY_FOR, "DURATION", 0,
+     "Reconnect to a lost daemon for this long, in seconds or as 5m or 2h (default 5m; 0: never)",
+     CLI_GROUP_OUTPUT},
+    {"retries", KEY_RETRIES, "N", 0, "Reconnect at most N times in a row, 0 to 1000 (default: no limit)",
      CLI_GROUP_OUTPUT},
     {NULL, 0, NULL, 0, "Picture:", CLI_GROUP_PICTURE},
     {"size", KEY_SIZE, "WxH", 0, "Pixels (default 1280x720)", CLI_GROUP_OUTPUT},
@@ -152,6 +160,22 @@ static error_t set_layers(struct cli_job *job, const char *field, const char *va
     return 0;
 }
 
+static error_t set_retries(struct cli_job *job, const char *field, const char *value)
+{
+    uint64_t number = 0;
+    if (!fl_text_integer(value, 0, 1000, &number, &job->error))
+        return name_field(job, field);
+    job->retries.has_count = true;
+    job->retries.count = (unsigned)number;
+    return 0;
+}
+
+static error_t set_retry_duration(struct cli_job *job, const char *field, const char *value)
+{
+    job->retries.has_duration = true;
+    return fl_text_duration(value, RETRY_MAX_S, &job->retries.for_s, &job->error) ? 0 : name_field(job, field);
+}
+
 static error_t set_option(struct cli_job *job, int key, const char *field, const char *value)
 {
     switch (key) {
@@ -215,6 +239,10 @@ static error_t set_option(struct cli_job *job, int key, const char *field, const
         return set_real(job, field, value, 0.001, 1000, &job->clip_speed);
     case KEY_LAYERS:
         return set_layers(job, field, value);
+    case KEY_RETRY_FOR:
+        return set_retry_duration(job, field, value);
+    case KEY_RETRIES:
+        return set_retries(job, field, value);
     default:
         return key >= KEY_FIELD && cli_field_at((size_t)(key - KEY_FIELD))
                    ? cli_field_set(job, cli_field_at((size_t)(key - KEY_FIELD)), field, value)
@@ -320,8 +348,9 @@ const struct argp *cli_job_argp(void)
 
 const struct argp *cli_picture_argp(void)
 {
-    static const char *const left_out[] = {"output",  "format",  "half",       "float",  "tone-map", "tracer",
-                                           "primary", "timings", "trace-file", "layers", NULL};
+    static const char *const left_out[] = {"output",    "format",  "half",    "float",      "tone-map",
+                                           "tracer",    "primary", "timings", "trace-file", "layers",
+                                           "retry-for", "retries", NULL};
     static struct argp_option kept[OPTIONS_MAX];
     static const struct argp argp = {.options = kept, .parser = parse};
     keep(kept, left_out);
@@ -330,9 +359,9 @@ const struct argp *cli_picture_argp(void)
 
 const struct argp *cli_view_argp(void)
 {
-    static const char *const left_out[] = {"output",     "format",   "half",       "float",  "samples",
-                                           "integrator", "timings",  "trace-file", "layers", "clip-once",
-                                           "clip-start", "encoding", NULL};
+    static const char *const left_out[] = {"output",     "format",   "half",       "float",   "samples",
+                                           "integrator", "timings",  "trace-file", "layers",  "clip-once",
+                                           "clip-start", "encoding", "retry-for",  "retries", NULL};
     static struct argp_option kept[OPTIONS_MAX];
     static const struct argp argp = {.options = kept, .parser = parse};
     keep(kept, left_out);

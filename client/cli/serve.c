@@ -286,7 +286,7 @@ static bool recover(const struct serving *serving, struct cli_loading *loading, 
 {
     unsigned failures = 0;
     loading->again = true;
-    while (serving->job.server && cli_daemon_is_lost(error)) {
+    while (serving->job.server && cli_is_temporary(error)) {
         const uint32_t pause_ms = cli_retry_pause_ms(++failures, error->retry_after_ms);
         cli_progress_clear(loading->progress);
         cli_report(error);

@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: MIT */
-/* From a model to pictures: loads the scene, fetches frames and writes them. An animation survives the loss of its
- * daemon: the scene is loaded again, and the first unwritten frame is the next one. */
+/* From a model to pictures: loads the scene, fetches frames and writes them. A lost daemon is waited for: the
+ * scene is loaded again, and the first unwritten frame is the next one. */
 #include "cli/sink.h"
 #include "cli/trace_file.h"
 #include "protocol/common/clock.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -12,6 +13,7 @@
 #include <unistd.h>
 
 #define LONG_PASS_NS 1000000000u
+#define DEFAULT_RETRY_S 300
 #define PASS_SAMPLES_MAX 65536u /* of one request, in the protocol */
 
 struct session {
@@ -21,14 +23,15 @@ struct session {
     bool sinks_started, sink_failed;
     struct cli_loading loading;
     struct fl_job *rendering;
-    bool was_loaded; /* the daemon has accepted the scene at least once */
-    bool has_set;    /* which frames are wanted is known */
+    bool was_reached, was_loaded; /* the daemon, once at least; likewise, and it has accepted the scene */
+    bool has_set;                 /* which frames are wanted is known */
     struct fl_frame_set set;
     size_t run;        /* the current one of the set */
     bool begun;        /* of this run a frame has been written */
     uint64_t next;     /* once begun: its first frame that has not */
     uint32_t done;     /* frames written */
     unsigned failures; /* lost connections since the last frame */
+    uint64_t lost_ns;  /* when the first of them was lost */
     struct cli_warned warned;
     struct cli_timings *timings;
     struct cli_trace_file *trace; /* NULL: none is wanted */
@@ -68,6 +71,7 @@ static bool load_scene(struct session *session, struct fl_error *error)
         (struct cli_loading){.job = session->job, .progress = &session->progress, .again = session->was_loaded};
     if (!cli_loading_begin(loading, error))
         return false;
+    session->was_reached = true;
     cli_trace_span(session->trace, CLI_TRACE_CLIENT, "start", -1, loading->connect_begin_ns,
                    fl_connection_start_ns(loading->connection));
     if (!start_sinks(session, error) || !cli_loading_end(loading, error))
@@ -264,34 +268,62 @@ static void close_connection(struct session *session)
     cli_loading_close(&session->loading);
 }
 
-/* Only if the daemon was reached before: otherwise the address is probably wrong. */
-static bool is_lost(const struct session *session, const struct fl_error *error)
+/* Where nobody has listened yet the address may be misspelt: a daemon is waited for only if that was asked for. */
+static bool may_be_retried(const struct session *session, const struct fl_error *error)
 {
-    if (!session->is_series || !session->was_loaded || session->sink_failed)
-        return false;
-    return cli_daemon_is_lost(error);
+    const struct cli_job *job = session->job;
+    return !session->sink_failed && cli_is_temporary(error) &&
+           (session->was_reached || error->retryable || job->retries.has_duration);
 }
 
-/* Twice as long each time. False: interrupted. */
+/* Without a number of attempts a duration is the limit. */
+static double seconds_left(const struct session *session)
+{
+    const struct cli_retries *retries = &session->job->retries;
+    const double for_s = retries->has_duration ? retries->for_s : retries->has_count ? INFINITY : DEFAULT_RETRY_S;
+    return for_s - (double)(monotonic_now_ns() - session->lost_ns) * 1e-9;
+}
+
+/* Longer each time, and no longer than is left. False: interrupted. */
 static bool pause_before_retry(const struct session *session, uint32_t min_ms, struct fl_error *error)
 {
-    const uint32_t pause_ms = cli_retry_pause_ms(session->failures, min_ms);
-    if (!session->job->quiet)
-        fprintf(stderr, "farlight: trying again in %.1f s (%u of %u); %u of %u frames are written\n",
-                pause_ms * 1e-3, session->failures, session->job->series.retries, session->done,
-                session->set.frame_count);
+    const double left_s = seconds_left(session);
+    uint32_t pause_ms = cli_retry_pause_ms(session->failures, min_ms);
+    if (pause_ms * 1e-3 > left_s)
+        pause_ms = (uint32_t)(left_s * 1e3) + 1;
+    if (!session->job->quiet) {
+        fprintf(stderr, "farlight: trying again in %.1f s", pause_ms * 1e-3);
+        if (session->job->retries.has_count)
+            fprintf(stderr, " (%u of %u)", session->failures, session->job->retries.count);
+        if (isfinite(left_s))
+            fprintf(stderr, ", for at most %.0f s more", left_s);
+        if (session->is_series && session->has_set)
+            fprintf(stderr, "; %u of %u frames are written", session->done, session->set.frame_count);
+        fputc('\n', stderr);
+    }
     return cli_retry_wait(pause_ms, error);
 }
 
 /* Reports the error; true: the session continues after it. */
 static bool recover(struct session *session, struct fl_error *error)
 {
-    if (!is_lost(session, error) || session->failures >= session->job->series.retries)
+    const struct cli_retries *retries = &session->job->retries;
+    if (!may_be_retried(session, error))
         return false;
+    if (session->failures == 0)
+        session->lost_ns = monotonic_now_ns();
+    if ((retries->has_count && session->failures >= retries->count) || seconds_left(session) <= 0) {
+        if (session->failures > 0 && !session->job->quiet)
+            fprintf(stderr, "farlight: given up after %u attempt%s in %.0f s\n", session->failures,
+                    session->failures == 1 ? "" : "s", (double)(monotonic_now_ns() - session->lost_ns) * 1e-9);
+        return false;
+    }
     session->failures++;
     cli_progress_clear(&session->progress);
     cli_report(error);
     close_connection(session);
+    if (session->job->progressive)
+        session->begun = false; /* its samples are lost with the daemon */
     return pause_before_retry(session, error->retry_after_ms, error);
 }
 

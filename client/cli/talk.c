@@ -41,7 +41,7 @@ int cli_report(const struct fl_error *error)
     say("", "", error);
     if (error->code == FL_ERROR_ARGUMENT)
         return CLI_USAGE;
-    return error->retryable ? CLI_TRY_AGAIN : CLI_FAILED;
+    return cli_is_temporary(error) ? CLI_TRY_AGAIN : CLI_FAILED;
 }
 
 void cli_note(const struct fl_note *note, bool chatty)

@@ -32,9 +32,16 @@ static int connect_by(int fd, const struct sockaddr *address, socklen_t address_
 
 static int refuse(const char *address, int failure, struct fl_error *error)
 {
+    /* What the address itself or the rights to it forbid stays so; a daemon may still come. */
+    const bool is_final = failure == EACCES || failure == EPERM || failure == ENOTDIR || failure == ELOOP ||
+                          failure == ENAMETOOLONG || failure == EPROTOTYPE || failure == EAFNOSUPPORT;
     if (failure > 0) {
-        fl_error_set(error, FL_ERROR_CONNECTION, address, "cannot reach a daemon: %s", strerror(failure));
-        fl_error_remedy(error, "start one with 'farlightd --listen ADDRESS', or leave --server out");
+        fl_error_set(error, is_final ? FL_ERROR_SYSTEM : FL_ERROR_CONNECTION, address, "cannot reach a daemon: %s",
+                     strerror(failure));
+        if (failure == EACCES)
+            fl_error_remedy(error, "ask for the socket's group, usually farlight, or leave --server out");
+        else
+            fl_error_remedy(error, "start one with 'farlightd --listen ADDRESS', or leave --server out");
         if (error)
             error->retryable = failure == EAGAIN || failure == ETIMEDOUT;
     }
@@ -97,7 +104,8 @@ static int connect_tcp(const char *address, const char *where, uint64_t deadline
     struct addrinfo *found = NULL;
     const int status = getaddrinfo(host, port, &hints, &found);
     if (status != 0) {
-        fl_error_set(error, FL_ERROR_CONNECTION, address, "unknown host: %s", gai_strerror(status));
+        fl_error_set(error, status == EAI_AGAIN ? FL_ERROR_CONNECTION : FL_ERROR_SYSTEM, address,
+                     "unknown host: %s", gai_strerror(status));
         return -1;
     }
     int failure = ECONNREFUSED, fd = -1;

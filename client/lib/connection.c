@@ -18,13 +18,20 @@
 bool fl_connection_break(struct fl_connection *connection, struct fl_error *error)
 {
     /* An interrupted or late call leaves the stream intact: later messages can still be sent. */
-    if (error->code == FL_ERROR_INTERRUPTED || error->code == FL_ERROR_TIMEOUT)
+    if (error->code == FL_ERROR_INTERRUPTED)
         return false;
+    if (error->code == FL_ERROR_TIMEOUT) {
+        error->retryable = true;
+        return false;
+    }
     if (connection->process.pid > 0 && error->code == FL_ERROR_CONNECTION) {
         char words[520];
         fl_process_last_words(&connection->process, 500, words, sizeof(words));
+        const bool is_final = fl_process_has_refused(&connection->process);
         if (words[0] != '\0')
-            fl_error_set(error, FL_ERROR_CONNECTION, "", "the connection is lost: %s", words);
+            fl_error_set(error, is_final ? FL_ERROR_SYSTEM : FL_ERROR_CONNECTION, "", "the connection is lost: %s",
+                         words);
+        error->retryable = !is_final;
     }
     connection->broken = *error;
     return false;
@@ -44,7 +51,10 @@ bool fl_error_from_message(struct fl_error *error, const struct message_error *m
                  message->text[0] != '\0' ? message->text : protocol_error_code_text(message->code));
     fl_error_remedy(error, "%s", message->remedy);
     error->server_code = message->code;
-    error->retryable = message->retryable != 0;
+    /* These codes speak of the daemon's state, which changes, or of which another daemon at its address is free.
+     */
+    error->retryable = message->retryable != 0 || message->code == PROTOCOL_ERROR_SHUTTING_DOWN ||
+                       message->code == PROTOCOL_ERROR_DEVICE_LOST || message->code == PROTOCOL_ERROR_BUSY;
     error->retry_after_ms = message->retry_after_ms;
     return false;
 }
@@ -67,6 +77,7 @@ static bool fail_ended(struct fl_connection *connection, struct fl_error *error)
     else if (!fl_stream_is_whole(&connection->stream))
         how = ", or somebody on the way cut it: its sealed end is missing";
     fl_error_set(error, FL_ERROR_CONNECTION, "", "the daemon closed the connection%s", how);
+    error->retryable = true; /* a daemon was there */
     return fl_connection_break(connection, error);
 }
 
@@ -123,8 +134,10 @@ bool fl_connection_send(struct fl_connection *connection, uint32_t request, uint
         return fl_connection_break(connection, error);
     if (!fl_connection_push_late(connection, error))
         return false;
-    if (!fl_stream_has_room(&connection->stream))
-        return fl_error_set(error, FL_ERROR_TIMEOUT, "", "the daemon reads no more messages");
+    if (!fl_stream_has_room(&connection->stream)) {
+        fl_error_set(error, FL_ERROR_TIMEOUT, "", "the daemon reads no more messages");
+        return fl_connection_break(connection, error);
+    }
     if (!fl_stream_push(&connection->stream, request, channel, message, error))
         return false;
     /* While the daemon reads nothing we continue to read, so that the two cannot wait for each other. Received
@@ -392,6 +405,7 @@ struct fl_connection *fl_connect(const struct fl_connect_options *options, struc
         if (error->field[0] == '\0' && error->code == FL_ERROR_CONNECTION)
             snprintf(error->field, sizeof(error->field), "%.*s", (int)sizeof(error->field) - 1,
                      connection->address);
+        error->retryable = error->retryable || error->code == FL_ERROR_TIMEOUT;
         connection->broken = *error;
         fl_connection_destroy(connection);
         return NULL;

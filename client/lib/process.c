@@ -18,6 +18,8 @@
 
 extern char **environ;
 
+#define TRY_AGAIN_STATUS 75     /* of our programs */
+#define FIRST_SIGNAL_STATUS 128 /* 128 + signal; ssh: 255 */
 #define ARGUMENTS_MAX 32
 #define CHILD_SOCKET 3
 
@@ -230,6 +232,14 @@ static void last_line(int fd, char *line, size_t line_bytes)
     while (start > 0 && tail[start - 1] != '\n')
         start--;
     snprintf(line, line_bytes, "%.*s", (int)(end - start), tail + start);
+}
+
+bool fl_process_has_refused(const struct fl_process *process)
+{
+    siginfo_t info = {0};
+    return process->pid > 0 && waitid(P_PID, (id_t)process->pid, &info, WEXITED | WNOHANG | WNOWAIT) == 0 &&
+           info.si_pid != 0 && info.si_code == CLD_EXITED && info.si_status > 0 &&
+           info.si_status < FIRST_SIGNAL_STATUS && info.si_status != TRY_AGAIN_STATUS;
 }
 
 void fl_process_last_words(struct fl_process *process, unsigned grace_ms, char *text, size_t text_bytes)

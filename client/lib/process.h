@@ -34,6 +34,9 @@ void fl_process_kill(struct fl_process *process); /* at once; fl_process_end mus
 /* Waits up to `grace_ms` for its end, then writes how it ended and its last line into `text`: "farlightd was ended
  * by signal 11: ..."; still running: its last line alone. */
 void fl_process_last_words(struct fl_process *process, unsigned grace_ms, char *text, size_t text_bytes);
+/* Whether it has ended by itself with a status after which another start would end the same way: neither success,
+ * nor 75, nor that of a signal or of ssh without a connection (255). */
+bool fl_process_has_refused(const struct fl_process *process);
 
 /* The rest of the log's line with this index among those that begin with `start`. False: there is none.
  */

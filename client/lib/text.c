@@ -76,6 +76,26 @@ bool fl_text_real(const char *text, double minimum, double maximum, double *valu
     return true;
 }
 
+bool fl_text_duration(const char *text, double max_s, double *seconds, struct fl_error *error)
+{
+    static const struct {
+        char name;
+        double seconds;
+    } units[] = {{'s', 1}, {'m', 60}, {'h', 3600}, {'\0', 1}};
+    char *end = NULL;
+    const size_t length = strspn(text, ".0123456789");
+    const double read = looks_decimal(text, length) ? read_real(text, &end) : NAN;
+    for (size_t i = 0; i < sizeof(units) / sizeof(units[0]); i++) {
+        if (end != text + length || text[length] != units[i].name || (text[length] && text[length + 1]) ||
+            !(read * units[i].seconds <= max_s))
+            continue;
+        *seconds = read * units[i].seconds;
+        return true;
+    }
+    return fl_error_set(error, FL_ERROR_ARGUMENT, "",
+                        "'%s' is not a duration of at most %g seconds, such as 90, 5m or 2h", text, max_s);
+}
+
 bool fl_text_size(const char *text, uint32_t *width, uint32_t *height, struct fl_error *error)
 {
     const char *at = text;

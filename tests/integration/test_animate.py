@@ -10,9 +10,13 @@ import json
 import os
 import pathlib
 import pty
+import select
 import signal
+import socket
 import struct
 import subprocess
+import tempfile
+import threading
 import time
 
 import farlight_test
@@ -34,6 +38,52 @@ def children(pid, name):
                 if pathlib.Path(f"/proc/{child}/comm").read_text().strip() == name:
                     found.append(int(child))
     return found
+
+
+class Cut:
+    """A relay to a daemon's socket whose first connection ends after so many bytes of the daemon's, as if it was killed."""
+
+    def __init__(self, path, count):
+        self.path, self.count = path, count
+
+    def __enter__(self):
+        self.folder = tempfile.TemporaryDirectory(prefix="farlight-cut-")
+        self.address = f"unix:{self.folder.name}/socket"
+        self.listener = socket.socket(socket.AF_UNIX)
+        self.listener.bind(self.address.removeprefix("unix:"))
+        self.listener.listen()
+        self.thread = threading.Thread(target=self.serve, daemon=True)
+        self.thread.start()
+        return self
+
+    def serve(self):
+        left = self.count
+        while True:
+            try:
+                client = self.listener.accept()[0]
+            except OSError:
+                return
+            with client, socket.socket(socket.AF_UNIX) as daemon:
+                daemon.connect(str(self.path))
+                self.relay(client, daemon, left)
+            left = None
+
+    @staticmethod
+    def relay(client, daemon, left):
+        while left is None or left > 0:
+            for one in select.select([client, daemon], [], [])[0]:
+                data = one.recv(65536 if left is None else min(left, 65536))
+                if not data:
+                    return
+                if one is daemon and left is not None:
+                    left -= len(data)
+                (daemon if one is client else client).sendall(data)
+
+    def __exit__(self, *_):
+        self.listener.shutdown(socket.SHUT_RDWR)
+        self.listener.close()
+        self.thread.join()
+        self.folder.cleanup()
 
 
 def moving_model(path):
@@ -217,10 +267,10 @@ class Lost(Animations):
 
     def test_without_retries_it_fails_with_complete_files_only(self):
         with Daemon() as daemon:
-            child = self.start("failed", "--server", daemon.address, "--retries", "0")
+            child = self.start("failed", "--server", daemon.address, "--retry-for", "0")
             self.wait_for_files("failed", 2, child)
             daemon.process.kill()
-            errors = self.finish(child, 1)
+            errors = self.finish(child, 75)
         self.assertNotIn("trying again", errors)
         whole, _ = self.animate("whole", self.model, *self.FRAMES)
         made = self.digests("failed")
@@ -232,15 +282,76 @@ class Lost(Animations):
             child = self.start("failed", "--server", daemon.address, "--retries", "2")
             self.wait_for_files("failed", 2, child)
             daemon.process.kill()
-            errors = self.finish(child, 1)
+            errors = self.finish(child, 75)
         self.assertEqual(errors.count("trying again"), 2, errors)
+
+    def test_attempts_end_after_the_time_that_was_given(self):
+        with Daemon() as daemon:
+            child = self.start("failed", "--server", daemon.address, "--retry-for", "1.5s")
+            self.wait_for_files("failed", 2, child)
+            daemon.process.kill()
+            begin = time.monotonic()
+            errors = self.finish(child, 75)
+            self.assertGreater(time.monotonic() - begin, 1.4)
+        self.assertIn("given up after", errors)
 
     def test_a_daemon_that_never_was_is_not_waited_for(self):
         begin = time.monotonic()
         _, result = self.animate("none", self.model, "--frames", "1-2", "--server", "unix:/nonexistent/socket",
-                                 status=1)
+                                 status=75)
         self.assertNotIn("trying again", result.stderr)
+        self.assertIn("farlightd --listen", result.stderr)
         self.assertLess(time.monotonic() - begin, 30)
+
+    def test_a_daemon_that_is_not_there_yet_is_waited_for_if_that_is_asked_for(self):
+        address = f"unix:{self.folder}/later.sock"
+        child = subprocess.Popen([BIN / "farlight", "render", self.model, *SIZE, "-o", self.folder / "one.exr", "--server",
+                                  address, "--retry-for", "10m"], stderr=subprocess.PIPE, text=True)
+        self.addCleanup(child.stderr.close)
+        self.assertIn("No such file", child.stderr.readline())
+        with Daemon(listen=address):
+            errors = child.stderr.read()
+            self.assertEqual(child.wait(farlight_test.TIMEOUT_S), 0, errors)
+
+    def test_a_private_daemon_that_is_killed_while_the_scene_is_loading_is_started_again(self):
+        for command, name in (("animate", "%d.exr"), ("render", "1.exr")):
+            with self.subTest(command=command):
+                (self.folder / command).mkdir()
+                frames = ["--frames", "1-2"] if command == "animate" else []
+                child = subprocess.Popen([BIN / "farlight", command, self.model, *frames, *SIZE, "-o",
+                                          self.folder / command / name], stderr=subprocess.PIPE, text=True)
+                self.addCleanup(child.stderr.close)
+                while not (daemons := children(child.pid, "farlightd")):
+                    self.assertIsNone(child.poll())
+                os.kill(daemons[0], signal.SIGKILL)
+                errors = child.stderr.read()
+                self.assertEqual(child.wait(farlight_test.TIMEOUT_S), 0, errors)
+                self.assertEqual(errors.count("trying again"), 1, errors)
+
+    def test_a_daemon_that_is_lost_while_the_scene_is_loading_is_sought_again(self):
+        """It hangs up at each step of the beginning: before the handshake, after the scene was opened, and so on."""
+        with Daemon() as daemon:
+            for cut in (0, 1, 100, 1000, 3000):
+                with self.subTest(cut=cut), Cut(daemon.path, cut) as proxy:
+                    result = self.expect(farlight("render", self.model, *SIZE, "-o", self.folder / "one.exr", "--server",
+                                                  proxy.address), 0)
+                    self.assertIn("trying again", result.stderr)
+
+    def test_commands_without_retries_end_with_75_if_the_daemon_hangs_up(self):
+        with Daemon() as daemon:
+            for command in (["stats"], ["ping"], ["scenes"]):
+                with self.subTest(command=command), Cut(daemon.path, 10) as proxy:
+                    self.expect(farlight(*command, "--server", proxy.address), 75)
+
+    def test_what_would_fail_again_ends_with_1_and_is_not_tried_again(self):
+        result = self.expect(farlight("render", self.model, *SIZE, "-o", self.folder / "one.exr", "--retry-for", "1m",
+                                      "--server", f"unix:{self.model}/socket"), 1)
+        self.assertNotIn("trying again", result.stderr)
+
+    def test_a_private_daemon_that_cannot_start_is_not_tried_again(self):
+        result = self.expect(farlight("render", self.model, *SIZE, "-o", self.folder / "one.exr",
+                                      env=farlight_test.private_daemon(FARLIGHT_LIMITS_SAMPLES="none")), 1)
+        self.assertNotIn("trying again", result.stderr)
 
     def test_an_interrupt_while_waiting_ends_it(self):
         with Daemon() as daemon:

@@ -345,7 +345,7 @@ class Serve(Case):
     def test_a_killed_daemon_is_reported(self):
         serving = self.serve()
         os.kill(serving.daemon, signal.SIGKILL)
-        self.assertEqual(serving.process.wait(TIMEOUT_S), 1)
+        self.assertEqual(serving.process.wait(TIMEOUT_S), 75)
         self.assertIn("signal 9", serving.process.stderr.read())
 
     # ---- mistakes -----------------------------------------------------------------------------------

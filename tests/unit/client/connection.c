@@ -113,6 +113,8 @@ TEST(wrong_addresses_are_reported)
     }
     assert_null(fl_connect(&(struct fl_connect_options){.server = "unix:/nonexistent/socket"}, &error));
     check_error(FL_ERROR_CONNECTION, "No such file");
+    assert_null(fl_connect(&(struct fl_connect_options){.server = "unix:/dev/null/socket"}, &error));
+    check_error(FL_ERROR_SYSTEM, "Not a directory");
 }
 
 /* ---- a connection that ends ---- */
@@ -163,6 +165,41 @@ TEST(a_goodbye_is_reported_and_may_be_retried)
     check_error(FL_ERROR_CONNECTION, "maintenance");
     assert_true(error.retryable);
     fl_connection_destroy(connection);
+    stop(daemon);
+}
+
+static void play_busy(struct daemon *daemon)
+{
+    struct framing_header header;
+    struct message message, refusal = {.type = MESSAGE_ERROR};
+    refusal.error.code = PROTOCOL_ERROR_BUSY;
+    refusal.error.field = refusal.error.remedy = "";
+    refusal.error.text = "no place";
+    greet(daemon);
+    take(daemon, &header, &message);
+    tell(daemon, 0, &refusal);
+}
+
+static void play_hanging_up(struct daemon *daemon)
+{
+    more(daemon);
+}
+
+TEST(a_daemon_without_a_place_or_a_word_may_be_tried_again)
+{
+    struct daemon *daemon = start(play_busy);
+    struct fl_connection *connection = connect_to(daemon);
+    uint64_t ns = 0;
+    assert_non_null(connection);
+    assert_false(fl_ping(connection, &ns, &error));
+    check_error(FL_ERROR_REFUSED, "no place");
+    assert_true(error.retryable);
+    fl_connection_destroy(connection);
+    stop(daemon);
+    daemon = start(play_hanging_up);
+    assert_null(connect_to(daemon));
+    check_error(FL_ERROR_CONNECTION, "closed the connection");
+    assert_true(error.retryable);
     stop(daemon);
 }
 

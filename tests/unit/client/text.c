@@ -50,6 +50,26 @@ TEST(a_vector_is_three_finite_numbers)
     assert_true(vector[0] == -1 && vector[1] == 2.5f && vector[2] == 1000);
 }
 
+TEST(a_duration_is_seconds_minutes_or_hours)
+{
+    static const struct {
+        const char *text;
+        double seconds;
+    } good[] = {{"0", 0}, {"90", 90}, {"1.5s", 1.5}, {"5m", 300}, {"2h", 7200}, {".5m", 30}};
+    static const char *const wrong[] = {"",    "s",   "5d", "5 m",   "-1",   "1e3",
+                                        "5mm", "nan", "3h", "10801", "1..2", "m5"};
+    double seconds = -1;
+    for (size_t i = 0; i < sizeof(good) / sizeof(good[0]); i++) {
+        assert_true(fl_text_duration(good[i].text, 10800 - 1, &seconds, &error));
+        assert_true(seconds == good[i].seconds);
+    }
+    for (size_t i = 0; i < sizeof(wrong) / sizeof(wrong[0]); i++)
+        if (fl_text_duration(wrong[i], 10800 - 1, &seconds, &error))
+            fail_msg("'%s' was read as %g", wrong[i], seconds);
+    assert_int_equal(error.code, FL_ERROR_ARGUMENT);
+    assert_true(seconds == 30);
+}
+
 TEST(numbers_keep_to_their_bounds)
 {
     uint64_t whole = 0;
