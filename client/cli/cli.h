@@ -77,6 +77,8 @@ enum cli_image cli_image_by_name(const char *name);
 enum cli_image cli_image_by_path(const char *path);
 const char *cli_image_name(enum cli_image image);
 bool cli_image_is_video(enum cli_image image);
+/* The name of a file without its folders. */
+const char *cli_base_name(const char *path);
 /* Whether a file can be created at `path`, without creating it. `folder` gets its folder. */
 bool cli_check_output(const char *path, char *folder, size_t folder_bytes, struct fl_error *error);
 /* Whether writing to `path`, named by `option`, overwrites none of the inputs; NULL among them is skipped. */
@@ -190,6 +192,7 @@ struct cli_job {
     uint32_t pass_samples; /* more each time; 0: as many as there are */
     bool lens_changes;     /* opened by clips: the integrator must support lenses */
     bool lossless;         /* of a video */
+    bool full_metadata;    /* with times and paths */
     bool has_aperture, has_focus;
     bool has_eye, has_look_at, has_up, has_fov; /* in `key` */
     bool float_pixels, half_pixels, has_encoding, has_primary, has_quality, has_integrator, quiet, is_orbit;

@@ -198,7 +198,7 @@ static bool prepare(struct tracer_comparison *comparison, struct fl_error *error
 static bool load(struct tracer_comparison *comparison, struct fl_error *error)
 {
     const struct fl_exporter_options export = {.folder = comparison->folder,
-                                               .model = comparison->job.model,
+                                               .model = cli_base_name(comparison->job.model),
                                                .interrupt_fd = cli_interrupt_fd(),
                                                .format = "exr"};
     if (!cli_loading_begin(&comparison->loading, error))

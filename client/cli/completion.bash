@@ -15,6 +15,7 @@ _farlight()
         --scale) words="1 2 4 8" ;;
         --still-encoding) words="raw zstd predicted jpeg" ;;
         --format) words="png jpeg exr hdr mp4 mkv y4m" ;;
+        --metadata) words="stable full" ;;
         --layout) words="heat side" ;;
         --fail-above) words="psnr= mean= rms= max= beyond= ssim= butteraugli= visible= nonfinite= agree=" ;;
         --*) words=$("$program" complete "$before" 2>/dev/null) ;;

@@ -45,6 +45,12 @@ bool cli_image_is_video(enum cli_image image)
     return image >= CLI_IMAGE_MP4 && image < CLI_IMAGE_COUNT;
 }
 
+const char *cli_base_name(const char *path)
+{
+    const char *slash = strrchr(path, '/');
+    return slash ? slash + 1 : path;
+}
+
 /* Rights, read-only file systems, quotas: only an attempt shows them. */
 static bool try_folder(const char *path, const char *folder, struct fl_error *error)
 {

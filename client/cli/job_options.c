@@ -40,6 +40,7 @@ enum key {
     KEY_LAYERS,
     KEY_RETRY_FOR,
     KEY_RETRIES,
+    KEY_METADATA,
     KEY_FIELD = 0x200 /* and its index */
 };
 
@@ -50,6 +51,9 @@ static const struct argp_option special[] = {
     {"format", KEY_FORMAT, "FORMAT", 0, "png, jpeg, exr, hdr, where the ending does not say it", CLI_GROUP_OUTPUT},
     {"half", KEY_HALF, NULL, 0, "EXR of half floats (default)", CLI_GROUP_OUTPUT},
     {"float", KEY_FLOAT, NULL, 0, "EXR of 32-bit floats", CLI_GROUP_OUTPUT},
+    {"metadata", KEY_METADATA, "stable|full", 0,
+     "What files say of themselves: what is the same for the same request (default), or times and paths, too",
+     CLI_GROUP_OUTPUT},
     {"server", KEY_SERVER, "ADDRESS", 0,
      "unix:PATH, tcp:HOST:PORT or ssh:HOST[:SOCKET] (default: a private daemon for this command)",
      CLI_GROUP_OUTPUT},
@@ -239,6 +243,11 @@ static error_t set_option(struct cli_job *job, int key, const char *field, const
         return set_real(job, field, value, 0.001, 1000, &job->clip_speed);
     case KEY_LAYERS:
         return set_layers(job, field, value);
+    case KEY_METADATA:
+        job->full_metadata = strcmp(value, "full") == 0;
+        return job->full_metadata || strcmp(value, "stable") == 0
+                   ? 0
+                   : cli_usage(job, field, "'%s' is not known (known: stable, full)", value);
     case KEY_RETRY_FOR:
         return set_retry_duration(job, field, value);
     case KEY_RETRIES:
@@ -348,9 +357,9 @@ const struct argp *cli_job_argp(void)
 
 const struct argp *cli_picture_argp(void)
 {
-    static const char *const left_out[] = {"output",    "format",  "half",    "float",      "tone-map",
-                                           "tracer",    "primary", "timings", "trace-file", "layers",
-                                           "retry-for", "retries", NULL};
+    static const char *const left_out[] = {"output",    "format",  "half",     "float",      "tone-map",
+                                           "tracer",    "primary", "timings",  "trace-file", "layers",
+                                           "retry-for", "retries", "metadata", NULL};
     static struct argp_option kept[OPTIONS_MAX];
     static const struct argp argp = {.options = kept, .parser = parse};
     keep(kept, left_out);
@@ -359,9 +368,9 @@ const struct argp *cli_picture_argp(void)
 
 const struct argp *cli_view_argp(void)
 {
-    static const char *const left_out[] = {"output",     "format",   "half",       "float",   "samples",
-                                           "integrator", "timings",  "trace-file", "layers",  "clip-once",
-                                           "clip-start", "encoding", "retry-for",  "retries", NULL};
+    static const char *const left_out[] = {
+        "output", "format",    "half",       "float",    "samples",   "integrator", "timings",  "trace-file",
+        "layers", "clip-once", "clip-start", "encoding", "retry-for", "retries",    "metadata", NULL};
     static struct argp_option kept[OPTIONS_MAX];
     static const struct argp argp = {.options = kept, .parser = parse};
     keep(kept, left_out);

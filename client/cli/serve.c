@@ -236,12 +236,6 @@ static bool announce(const struct serving *serving, const struct cli_loading *lo
 
 /* ---- serving ---- */
 
-static const char *base_name(const char *path)
-{
-    const char *slash = strrchr(path, '/');
-    return slash ? slash + 1 : path;
-}
-
 /* Serves until it is interrupted, which is success, or the daemon is lost. */
 static bool stay(struct fl_connection *connection, struct fl_error *error)
 {
@@ -327,7 +321,7 @@ static int serve(struct serving *serving)
     struct cli_loading loading = {.job = &serving->job,
                                   .progress = &progress,
                                   .sharing = PROTOCOL_SHARING_SHARED,
-                                  .scene_name = serving->name ? serving->name : base_name(serving->job.model),
+                                  .scene_name = serving->name ? serving->name : cli_base_name(serving->job.model),
                                   .daemon_arguments = serving->words};
     cli_progress_begin(&progress, serving->job.quiet);
     const bool is_up = put_up(serving, &loading, &error);

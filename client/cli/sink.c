@@ -76,6 +76,13 @@ static bool open_y4m(struct cli_sink *sink, struct fl_error *error)
     return fl_error_set(error, FL_ERROR_FILE, sink->output.path, "cannot be written: %s", strerror(errno));
 }
 
+/* A path tells where the file lay, which differs from host to host. */
+static const char *model_name(const struct cli_job *job)
+{
+    const char *model = job->model ? job->model : job->scene;
+    return job->full_metadata ? model : cli_base_name(model);
+}
+
 static bool start_video(struct cli_sink *sink, struct fl_error *error)
 {
     const struct cli_job *job = sink->job;
@@ -91,7 +98,7 @@ static bool start_video(struct cli_sink *sink, struct fl_error *error)
     }
     const struct fl_video_options options = {.path = sink->path,
                                              .format = cli_image_name(sink->output.image),
-                                             .model = job->model ? job->model : job->scene,
+                                             .model = model_name(job),
                                              .frames_per_second = job->options.frames_per_second,
                                              .quality = job->file_quality,
                                              .lossless = job->lossless,
@@ -107,7 +114,8 @@ static bool start(struct cli_sink *sink, struct fl_error *error)
     const struct cli_job *job = sink->job;
     /* An interruption is the normal end of progressive pictures: a file that has begun is finished. */
     const struct fl_exporter_options options = {.folder = sink->folder,
-                                                .model = job->model ? job->model : job->scene,
+                                                .model = model_name(job),
+                                                .full_metadata = job->full_metadata,
                                                 .frames_per_second =
                                                     sink->is_series ? job->options.frames_per_second : 0,
                                                 .interrupt_fd = job->progressive ? 0 : cli_interrupt_fd(),

@@ -32,6 +32,8 @@ struct fl_exporter *fl_exporter_start(const struct fl_exporter_options *options,
         arguments[count++] = "--fps";
         arguments[count++] = rate;
     }
+    if (options->full_metadata)
+        arguments[count++] = "--full-metadata";
     if (options->format) {
         arguments[count++] = "--format";
         arguments[count++] = options->format;

@@ -418,6 +418,7 @@ struct fl_exporter_options {
     float frames_per_second; /* named in EXR files; 0: unknown */
     int interrupt_fd;
     const char *format; /* of all files, as below: some start faster; NULL: any */
+    bool full_metadata; /* date, times of stages and revision too: then no two files are the same */
 };
 struct fl_export_options {
     const char *path;

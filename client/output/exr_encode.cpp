@@ -130,7 +130,8 @@ Imf::Header make_header(const struct image &image, const std::string &date)
     header.compression() = Imf::ZIP_COMPRESSION;
     add_channels(header.channels(), image.begin->layers, image.half);
     header.insert("Software", Imf::StringAttribute("farlight " FARLIGHT_VERSION));
-    Imf::addCapDate(header, date);
+    if (!date.empty())
+        Imf::addCapDate(header, date);
     for (const metadata_entry &each : metadata_of(image)) {
         const std::string name = "farlight/" + each.name;
         if (each.is_number)

@@ -126,20 +126,21 @@ bool write_frame(const struct image &image, uint8_t **file, size_t *file_bytes, 
     const struct raster raster = {begin.width, begin.height, 4, protocol_pixel_format_bytes(begin.format) / 4,
                                   image.pixels};
     const std::tm date = now();
+    const std::string date_words = image.full_metadata ? date_text(date) : "";
     if (has_layers(begin) && (image.format != IMAGE_EXR || begin.format != PROTOCOL_PIXEL_FORMAT_RGBA32F))
         return fail(reason, reason_bytes, "only an EXR file of 32-bit floats can store layers");
     if (image.format == IMAGE_EXR)
-        return copy_out(exr_encode(image, date_text(date)), file, file_bytes, reason, reason_bytes);
+        return copy_out(exr_encode(image, date_words), file, file_bytes, reason, reason_bytes);
     if (image.format != IMAGE_PNG)
         return write_with_library(
-            {image.format, raster, image.quality, metadata_lines(image).c_str(), date_text(date).c_str()}, file,
+            {image.format, raster, image.quality, metadata_lines(image).c_str(), date_words.c_str()}, file,
             file_bytes, reason, reason_bytes);
     const std::vector<metadata_entry> entries = metadata_of(image);
     std::vector<std::pair<std::string, std::string>> texts;
     for (const metadata_entry &each : entries)
         if (!each.text.empty())
             texts.emplace_back("farlight/" + each.name, each.text);
-    return write_png(raster, texts, &date, file, file_bytes, reason, reason_bytes);
+    return write_png(raster, texts, image.full_metadata ? &date : nullptr, file, file_bytes, reason, reason_bytes);
 }
 
 // Runs what may throw.

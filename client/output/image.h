@@ -22,6 +22,7 @@ struct image {
     bool half;                               /* EXR: half floats */
     unsigned quality;                        /* JPEG */
     float frames_per_second;                 /* 0: unknown */
+    bool full_metadata;                      /* also what differs from run to run: times, the scene's revision */
     const char *model;                       /* for the metadata; may be empty */
     const struct message_frame_begin *begin; /* encoding raw */
     const struct message_frame_end *end;

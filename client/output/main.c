@@ -22,7 +22,7 @@
 /* The C library looks for it by name, past our hidden visibility. */
 __attribute__((visibility("default"))) const char *argp_program_version = "farlight-export " FARLIGHT_VERSION;
 
-enum { KEY_FD = 0x100, KEY_FOLDER, KEY_FPS, KEY_FORMAT, KEY_READ };
+enum { KEY_FD = 0x100, KEY_FOLDER, KEY_FPS, KEY_FORMAT, KEY_READ, KEY_FULL_METADATA };
 
 #define READ_MAX 2u
 
@@ -57,6 +57,9 @@ static error_t parse(int key, char *value, struct argp_state *state)
         if (options->serve.file_count == READ_MAX)
             argp_error(state, "--read: two files are the most");
         options->files[options->serve.file_count++].path = value;
+        return 0;
+    case KEY_FULL_METADATA:
+        options->serve.full_metadata = true;
         return 0;
     case KEY_FPS:
         options->serve.frames_per_second = strtof(value, &end);
@@ -121,6 +124,8 @@ int main(int argc, char **argv)
          "What is written: png, jpeg, exr or hdr, only (default: any, which takes longer to start)", 0},
         {"read", KEY_READ, "FILE", 0, "An image that may be read and compared; twice", 0},
         {"fps", KEY_FPS, "N", 0, "Frames per second, for the metadata of EXR files", 0},
+        {"full-metadata", KEY_FULL_METADATA, NULL, 0,
+         "Store what differs from run to run, too: date, times of stages, revision", 0},
         {0}};
     static const struct argp argp = {.options = rows,
                                      .parser = parse,

@@ -26,14 +26,16 @@ void add_count(std::vector<metadata_entry> &entries, const char *name, uint64_t 
     add_text(entries, name, std::to_string(value));
 }
 
-void add_structure(std::vector<metadata_entry> &entries, const struct message_frame_end &end)
+// Lengths and warnings belong to the picture; numbers tell what was built for it, which depends on earlier frames.
+void add_structure(std::vector<metadata_entry> &entries, const struct message_frame_end &end, bool full)
 {
     for (uint32_t i = 0; i < end.structure_count; i++) {
         const struct record_structure_row &row = end.structure[i];
         const std::string name = std::string("structure/") + row.name;
-        if (row.unit == PROTOCOL_UNIT_NUMBER || row.unit == PROTOCOL_UNIT_BUILT)
+        const bool is_length = row.unit == PROTOCOL_UNIT_METRES;
+        if (!is_length && full)
             add_count(entries, name.c_str(), row.number);
-        else
+        if (is_length)
             add_number(entries, (name + "_" + protocol_unit_text(row.unit)).c_str(),
                        static_cast<double>(row.measure));
         if (row.warning[0])
@@ -72,7 +74,8 @@ std::vector<metadata_entry> metadata_of(const struct image &image)
     std::vector<metadata_entry> entries;
     add_text(entries, "model", image.model);
     add_count(entries, "frame", begin.frame);
-    add_count(entries, "revision", begin.revision);
+    if (image.full_metadata)
+        add_count(entries, "revision", begin.revision);
     add_text(entries, "tracer", protocol_tracer_text(begin.tracer));
     add_text(entries, "integrator", protocol_integrator_text(begin.integrator));
     add_count(entries, "samples", begin.samples);
@@ -85,8 +88,9 @@ std::vector<metadata_entry> metadata_of(const struct image &image)
     add_count(entries, "primary_rays", end.primary_rays);
     add_count(entries, "shadow_rays", end.shadow_rays);
     add_count(entries, "secondary_rays", end.secondary_rays);
-    add_structure(entries, end);
-    add_stages(entries, end);
+    add_structure(entries, end, image.full_metadata);
+    if (image.full_metadata)
+        add_stages(entries, end);
     return entries;
 }
 

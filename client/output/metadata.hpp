@@ -16,6 +16,7 @@ struct metadata_entry {
     bool is_number;
     float number;
 };
+// Without full_metadata only what is the same whenever the same request is carried out.
 std::vector<metadata_entry> metadata_of(const struct image &image);
 // All of them as lines "farlight/NAME=VALUE".
 std::string metadata_lines(const struct image &image);

@@ -9,8 +9,9 @@
 #include <stddef.h>
 
 struct serve_options {
-    int fd;                           /* connected stream socket */
-    float frames_per_second;          /* for the metadata of images; 0: none */
+    int fd;                  /* connected stream socket */
+    float frames_per_second; /* for the metadata of images; 0: none */
+    bool full_metadata;
     const struct compare_file *files; /* that may be compared: a message opens nothing */
     size_t file_count;
 };

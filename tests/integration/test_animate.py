@@ -63,7 +63,7 @@ class Cut:
                 client = self.listener.accept()[0]
             except OSError:
                 return
-            with client, socket.socket(socket.AF_UNIX) as daemon:
+            with contextlib.suppress(OSError), client, socket.socket(socket.AF_UNIX) as daemon:
                 daemon.connect(str(self.path))
                 self.relay(client, daemon, left)
             left = None

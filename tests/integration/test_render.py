@@ -6,6 +6,7 @@ them anew after a change that is meant to change pictures; look at the pictures 
 """
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -102,12 +103,36 @@ class Outputs(OneDaemon):
             self.assertTrue(path.read_bytes().startswith(magic), ending)
         self.assertEqual(self.leftovers(), sorted(f"picture.{ending}" for ending in magics))
 
-    def test_exr_metadata_holds_camera_revision_tracer_and_times(self):
+    def test_exr_metadata_holds_camera_and_tracer_and_in_full_revision_times_and_path(self):
         path = self.folder / "picture.exr"
+        always = {"worldToCamera", "farlight/tracer", "farlight/digest", "farlight/model"}
+        only_full = {"capDate", "farlight/revision", "farlight/stage/primary/gpu_ms"}
         self.expect(render_picture("cornell", path), 0)
-        head = path.read_bytes()[:65536]
-        for attribute in (b"worldToCamera", b"farlight/revision", b"farlight/tracer", b"farlight/"):
-            self.assertIn(attribute, head)
+        stable = farlight_test.exr_attributes(path)
+        self.expect(render_picture("cornell", path, "--metadata", "full"), 0)
+        full = farlight_test.exr_attributes(path)
+        self.assertLessEqual(always, set(stable))
+        self.assertLessEqual(always | only_full, set(full))
+        self.assertEqual(only_full & set(stable), set())
+        self.assertEqual(stable["farlight/model"], b"cornell.glb")
+        self.assertEqual(full["farlight/model"], str(bundled_scenes() / "cornell.glb").encode())
+
+    def test_the_same_request_makes_the_same_bytes_in_every_format(self):
+        folders = [self.folder / "a", self.folder / "b"]
+        formats = {"png": [], "jpg": [], "hdr": [], "exr": ["--layers", "beauty,depth"]}
+        for folder in folders:
+            folder.mkdir()
+            shutil.copy(bundled_scenes() / "teapot.glb", folder)
+            for ending, options in formats.items():
+                self.expect(farlight("render", folder / "teapot.glb", "-o", folder / f"p.{ending}", "--size", "40x30",
+                                     "--tracer", "ldc", *options), 0)
+            self.expect(farlight("render", folder / "teapot.glb", "-o", folder / "full.png", "--size", "40x30",
+                                 "--metadata", "full"), 0)
+            time.sleep(1)  # dates in files have seconds
+        for ending in formats:
+            same = [(folder / f"p.{ending}").read_bytes() for folder in folders]
+            self.assertTrue(same[0] == same[1], ending)
+        self.assertTrue((folders[0] / "full.png").read_bytes() != (folders[1] / "full.png").read_bytes())
 
     def test_standard_output_gets_the_picture_and_no_talk(self):
         result = farlight("render", bundled_scenes() / "cornell.glb", "-o", "-", "--format", "png", "--size", "32x24",
@@ -155,7 +180,7 @@ class BadInput(Case):
         self.refused(2, "render", says=["MODEL"])
         self.refused(2, "render", cornell, "-o", output, "--no-such-option")
         self.refused(1, "render", cornell, "-o", self.folder / "no" / "x.png", says=["no"])
-        self.refused(1, "render", cornell, "-o", output, "--server", f"unix:{self.folder}/nobody.sock",
+        self.refused(75, "render", cornell, "-o", output, "--server", f"unix:{self.folder}/nobody.sock",
                      says=["nobody.sock"])
         self.refused(2, "render", cornell, "-o", output, "--camera", "no such camera", says=["no such camera"])
         self.refused(2, "animate", cornell, "--frames", "1-4", "-o", self.folder / "%s.png", says=["%"])

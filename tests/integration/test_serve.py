@@ -161,7 +161,7 @@ class Serve(Case):
     def test_an_edit_by_one_appears_to_all_with_its_revision(self):
         self.serve("--name", "pot")
         before, after = self.folder / "before.exr", self.folder / "after.exr"
-        self.render(before, "--scene", "pot")
+        self.render(before, "--scene", "pot", "--metadata", "full")
         one, other = Viewer(self.socket, "pot"), Viewer(self.socket, "pot", scene=77)
         self.addCleanup(one.close)
         self.addCleanup(other.close)
@@ -173,7 +173,7 @@ class Serve(Case):
         kind, payload = other.edit(6, REMOVE, struct.pack("<II", 0, 1))
         self.assertEqual((kind, struct.unpack_from("<Q", payload, 2)[0]), (OK, 3), error_text(payload))
         self.assertEqual(one.changed(), 3)
-        self.render(after, "--scene", "pot")
+        self.render(after, "--scene", "pot", "--metadata", "full")
         revisions = [int(exr_attributes(path)["farlight/revision"]) for path in (before, after)]
         self.assertEqual(revisions, [1, 3])
         self.assertNotEqual(read_exr(before), read_exr(after))  # a part of it is gone
