@@ -315,7 +315,7 @@ ANALYZE_PACKAGES := clang clang-tidy python3
 COVERAGE_PACKAGES := gcovr
 FUZZ_PACKAGES := clang libclang-rt-14-dev
 
-.PHONY: tests build-packages test-packages lint-packages analyze-packages coverage-packages fuzz-packages test test-long demo bench soak bench-plot check-headers check-rules lint check analyze coverage format install uninstall clean distclean help
+.PHONY: tests build-packages test-packages lint-packages analyze-packages coverage-packages fuzz-packages test test-long demo bench soak farm-drill bench-plot check-headers check-rules lint check analyze coverage format install uninstall clean distclean help
 tests: $(TEST_PROGRAMS) $(CONTRACT) $(BENCH_PROGRAM) $(SHAPED_LINK) $(B)/tests/tools/make_scenes $(B)/tests/tools/pose_dump $(LOSING_DAEMON)
 
 build-packages:
@@ -353,6 +353,10 @@ ROUNDS ?= 1000
 soak: test-packages
 	$(MAKE) -j$(JOBS) all
 	python3 tests/soak/soak.py $(B) $(ROUNDS)
+# Rounds of an animation whose daemon or client is killed at a random moment; SEED= repeats a run.
+farm-drill: test-packages
+	$(MAKE) -j$(JOBS) all
+	python3 tests/soak/drill.py $(B) $(ROUNDS) $(if $(SEED),--seed $(SEED))
 # Measures what the curves need where out/bench.json does not have it yet.
 bench-plot: test-packages
 	$(MAKE) -j$(JOBS) $(BENCHED)
@@ -452,6 +456,7 @@ help:
 	@echo 'make test-long  all tests and what takes minutes: the benchmark itself, every hostile file the whole way'
 	@echo 'make bench      measure, into out/bench.txt and out/bench.json   [BENCH="family reach"; see tests/bench/bench.py]'
 	@echo 'make soak       use one daemon for some minutes, and see that its memory stays flat   [ROUNDS=1000]'
+	@echo 'make farm-drill kill the daemon or the client of animations at random, and see that no frame is lost   [ROUNDS=1000 SEED=]'
 	@echo 'make bench-plot draw the scaling curves into out/, as SVG and PNG'
 	@echo 'make all        build the programs into build/$$config/   [config=debug|release|sanitize|fuzz EMBREE=0]'
 	@echo 'make fuzz       run every fuzzer for a while   [SECONDS=20]'
