@@ -10,7 +10,7 @@
  *       zeros up to a multiple of 8
  * Reply, at most 640 bytes:
  *    0  "FARL"
- *    4  u16 version                         0: none in common; `text` says which ones there are
+ *    4  u16 version                         0: refused; `text` says why
  *    6  u16 limits_bytes                    size of the limits; at most 256
  *    8  u64 capabilities                    bits that both understand
  *   16  nonce, 16 bytes
@@ -40,6 +40,7 @@ extern "C" {
 #define HANDSHAKE_CAN_H264 (UINT64_C(1) << 0)      /* client: decodes it; daemon: encodes it */
 #define HANDSHAKE_CAN_READ_ONLY (UINT64_C(1) << 1) /* reply: this client may only look: it edits nothing */
 #define HANDSHAKE_NEEDS_KEY (UINT64_C(1) << 2)     /* reply of version 0: only sealed connections are let in */
+#define HANDSHAKE_TRY_AGAIN (UINT64_C(1) << 4)     /* reply of version 0: there may be a place later */
 #define HANDSHAKE_CAN_ABANDON (UINT64_C(1) << 3)   /* frames of views may end unfinished, as frame_end says */
 
 struct handshake_hello {

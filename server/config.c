@@ -72,7 +72,7 @@ static const struct option options[] = {
     {"memory", "blob_cache", ANYTIME, OPTION_BYTES, AT(limits.blob_cache_bytes), "10%", 0, 16 * TIB, "bytes",
      "The part of it for blobs that are no longer used, kept for a user's next connection"},
     {"memory", "transactions", ANYTIME, OPTION_BYTES, AT(limits.transaction_bytes), "10%", MIB, 16 * TIB, "bytes",
-     "Host memory of one client's edits that wait to be committed"},
+     "Host memory of the edits of all clients that wait to be committed"},
     {"memory", "frames", ANYTIME, OPTION_BYTES, AT(limits.frame_bytes), "50%", MIB, 16 * TIB, "bytes",
      "Host memory of the frames of all jobs; a job that may need more waits for others to end"},
     {"memory", "device", START, OPTION_BYTES, AT(device_bytes), "0", 0, 16 * TIB, "bytes",
@@ -83,10 +83,14 @@ static const struct option options[] = {
 #include "protocol/tracers.def"
 
     {"limits", "clients", ANYTIME, OPTION_U32, AT(limits.clients), "256", 1, 65536, "", "Connected clients"},
-    {"limits", "unauthenticated", ANYTIME, OPTION_U32, AT(limits.unauthenticated), "64", 1, 65536, "",
-     "Connections whose handshake is not complete"},
+    {"limits", "share", ANYTIME, OPTION_U32, AT(limits.share_percent), "75", 1, 100, "%",
+     "What one user or key may have of what all have together: of limits.clients, memory.frames and "
+     "memory.transactions. The rest is kept for others. The daemon's own user and root always find a place"},
+    {"limits", "unauthenticated", ANYTIME, OPTION_U32, AT(limits.unauthenticated), "64", 2, 65536, "",
+     "Connections whose handshake is not complete. Beyond half of them, a newcomer takes the place of one of the user "
+     "or network that has most, chosen at random"},
     {"limits", "unauthenticated_per_address", ANYTIME, OPTION_U32, AT(limits.unauthenticated_per_address), "8", 1, 65536, "",
-     "The same, from one TCP address"},
+     "The same, from one TCP address; a newcomer takes the place of another one, chosen at random"},
     {"limits", "wrong_keys", ANYTIME, OPTION_U32, AT(limits.wrong_keys_a_minute), "5", 1, ATTEMPTS_LIMIT_MAX, "",
      "Wrong keys from one TCP address within a minute; further keys from it are refused until the minute is over"},
     {"limits", "requests", ANYTIME, OPTION_U32, AT(limits.requests_in_flight), "64", 1, 65536, "",
@@ -98,6 +102,9 @@ static const struct option options[] = {
      "Lingering scenes of all clients; beyond it, the user with most of them loses the oldest. They are evicted "
      "when memory is full, first those of the user whose scene needs it"},
     {"limits", "jobs", ANYTIME, OPTION_U32, AT(limits.jobs_per_client), "4", 1, 65536, "", "Running jobs of one client"},
+    {"limits", "view_weight", ANYTIME, OPTION_U32, AT(limits.view_weight), "4", 1, 16, "",
+     "Maximum weight of a view against the jobs of other users and keys; a client's own weights divide its own share"},
+    {"limits", "batch_weight", ANYTIME, OPTION_U32, AT(limits.batch_weight), "1", 1, 16, "", "The same of a batch"},
     {"limits", "blobs", ANYTIME, OPTION_U32, AT(limits.blobs_per_client), "262144", 1, 16777216, "",
      "Blobs that one connection may name"},
     {"limits", "transaction_edits", ANYTIME, OPTION_U32, AT(limits.transaction_edits), "1048576", 1, 16777216, "",

@@ -312,6 +312,10 @@ static void client_gone(struct engine *engine, const struct engine_command *comm
 static void report_stats(struct engine *engine, const struct engine_command *command)
 {
     struct engine_event *event = event_create(ENGINE_STATS_READY, command->client, command->request);
+    if (event) {
+        event->answers_stats = true;
+        event->owner = command->owner;
+    }
     if (event)
         event->stats = engine_stats_collect(engine, command->principal);
     if (event && !event->stats) {

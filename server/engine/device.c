@@ -82,15 +82,17 @@ void job_leave_renderer(struct engine *engine, struct job *job)
     job->renderer = NULL;
 }
 
-uint64_t scene_device_bytes(const struct engine *engine, const struct engine_scene *scene)
+uint64_t scene_own_device_bytes(const struct engine *engine, const struct engine_scene *scene)
 {
     uint64_t bytes = scene->shared ? engine->backend->scene_bytes(scene->shared) : 0;
-    for (size_t i = 0; i < engine->job_count; i++)
-        if (engine->jobs[i]->scene == scene && engine->jobs[i]->renderer)
-            bytes += engine->backend->renderer_bytes(engine->jobs[i]->renderer);
     for (const struct engine_reference *one = scene->references; one; one = one->next)
         bytes += one->idle ? engine->backend->renderer_bytes(one->idle) : 0;
     return bytes;
+}
+
+uint64_t job_device_bytes(const struct engine *engine, const struct job *job)
+{
+    return job->renderer ? engine->backend->renderer_bytes(job->renderer) : 0;
 }
 
 /* ---- loss and need ------------------------------------------------------------------------------ */

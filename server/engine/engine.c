@@ -13,8 +13,11 @@
 
 #define QUEUE_CAPACITY_DEFAULT 1024
 #define FRAMES_IN_FLIGHT_DEFAULT 3
-/* Maximum of commands between two slices, so that a flood of commands does not stop the frames. */
-#define COMMANDS_AT_ONCE 256
+/* Time for commands between two slices, so that a flood of commands does not stop the frames. */
+#define COMMANDS_NS UINT64_C(1500000)
+/* Maximum of commands that wait: the network side lets owners take turns at the places, so the fewer there are,
+ * the sooner another owner's command is carried out. */
+#define COMMANDS_WAITING_MAX 64
 
 /* Wakes the thread without being a command. */
 static struct engine_command nudge;
@@ -83,6 +86,13 @@ static bool waits_for_device(const struct engine *engine, const struct job *job)
     return job->rendering && engine->backend->step_waits(job->renderer);
 }
 
+static struct schedule_entry entry_of(struct job *job)
+{
+    struct engine_client *client = job->reference->client;
+    return (struct schedule_entry){
+        .owner = &client->owner->schedule, .client = &client->schedule, .job = &job->schedule};
+}
+
 /* The job whose turn it is; NULL: none is ready. A job that would only wait for the device yields to others, which
  * give the device more work in that time. */
 static struct job *next_job(struct engine *engine)
@@ -95,11 +105,8 @@ static struct job *next_job(struct engine *engine)
         struct job *job = engine->jobs[i];
         bool ready = job_is_ready(engine, job), waits = ready && waits_for_device(engine, job);
         waiting = waits && !waiting ? job : waiting;
-        engine->entries[i] = (struct schedule_entry){
-            .client = &job->reference->client->schedule,
-            .job = &job->schedule,
-            .ready = ready && !waits,
-        };
+        engine->entries[i] = entry_of(job);
+        engine->entries[i].ready = ready && !waits;
     }
     size_t picked = schedule_pick(&engine->scheduler, engine->entries, engine->job_count);
     engine->turn_of = picked == SCHEDULE_NONE ? waiting : engine->jobs[picked];
@@ -114,19 +121,21 @@ static bool serve(struct engine *engine)
         return false;
     uint64_t start_ns = clock_now_ns();
     job_step(engine, job);
-    schedule_charge(&engine->scheduler, &job->reference->client->schedule, &job->schedule,
-                    clock_now_ns() - start_ns, job->spec.weight ? job->spec.weight : 1);
+    const struct schedule_entry entry = entry_of(job);
+    uint32_t weight = job->spec.weight ? job->spec.weight : 1;
+    schedule_charge(&engine->scheduler, &entry, clock_now_ns() - start_ns, weight,
+                    job->spec.granted_weight ? job->spec.granted_weight : weight);
     run_all_waiting(engine);
     return true;
 }
 
 static void take_commands(struct engine *engine, struct engine_command *first)
 {
-    struct engine_command *command = first;
-    for (int i = 0; command && i < COMMANDS_AT_ONCE; i++) {
+    uint64_t end_ns = clock_now_ns() + COMMANDS_NS;
+    for (struct engine_command *command = first; command;) {
         if (command != &nudge)
             engine_handle(engine, command);
-        command = i + 1 < COMMANDS_AT_ONCE ? queue_try_pop(engine->commands) : NULL;
+        command = clock_now_ns() < end_ns ? queue_try_pop(engine->commands) : NULL;
     }
 }
 
@@ -250,8 +259,9 @@ struct engine *engine_create(const struct engine_options *options, struct error 
         engine->options.frame_window_bytes = ENGINE_FRAME_WINDOW_BYTES;
     pthread_mutex_init(&engine->start_lock, NULL);
     pthread_cond_init(&engine->start_changed, NULL);
-    /* One more for the nudge. */
-    engine->commands = queue_create(engine->options.queue_capacity + 1, false);
+    size_t capacity = engine->options.queue_capacity;
+    capacity = capacity < COMMANDS_WAITING_MAX ? capacity : COMMANDS_WAITING_MAX;
+    engine->commands = queue_create(capacity + 1, false); /* one more for the nudge */
     engine->events = queue_create(engine->options.queue_capacity, true);
     if (!engine->commands || !engine->events)
         error_set(error, ERROR_OUT_OF_MEMORY, "queue_capacity", "no memory or descriptor for a queue of %zu",
@@ -290,6 +300,7 @@ void engine_destroy(struct engine *engine)
     queue_destroy(engine->commands, drop_command);
     queue_destroy(engine->events, drop_event);
     hashmap_finish(&engine->clients);
+    hashmap_finish(&engine->owners);
     free(engine->jobs);
     free(engine->entries);
     pthread_cond_destroy(&engine->start_changed);
@@ -313,7 +324,7 @@ bool engine_submit(struct engine *engine, struct engine_command *command, struct
 {
     if (queue_try_push(engine->commands, command))
         return true;
-    error_set(error, ERROR_BUSY, "", "%zu requests wait already", engine->options.queue_capacity);
+    error_set(error, ERROR_BUSY, "", "%zu requests wait already", queue_length(engine->commands));
     return error_remedy(error, "try again in a moment");
 }
 

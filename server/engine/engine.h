@@ -79,8 +79,9 @@ struct engine_job {
     struct view_wishes *wishes;
     uint32_t pass_samples; /* that a frame of a view adds, up to frame.samples */
     enum encoding still_encoding;
-    unsigned weight; /* its share of the device's time among the jobs of all clients and of its own; 0: 1 */
-    bool adapt;      /* view: quality and size follow the link */
+    unsigned weight; /* its share of the device's time among the jobs of its client, and of its owner; 0: 1 */
+    unsigned granted_weight; /* the same among all owners; 0: weight */
+    bool adapt;              /* view: quality and size follow the link */
 };
 
 enum engine_command_kind {
@@ -111,6 +112,7 @@ struct engine_command {
     uint32_t scene;
     char name[SCENE_NAME_MAX + 1]; /* scene_open, scene_attach */
     enum sharing sharing;          /* scene_open */
+    uint64_t owner;                /* of the client: with whom its connections share the device's time */
     uint64_t principal;  /* scene_open, _attach, _list, _trim, stats: the asking client's owner; kept scenes belong
                             to owners */
     uint64_t trim_bytes; /* scenes_trim */
@@ -218,6 +220,8 @@ struct engine_event {
     uint32_t request;
     uint64_t revision;  /* done, for a commit or an attach; scene_changed */
     uint32_t scene;     /* scene_changed */
+    bool answers_stats; /* of `owner`, whatever the answer is */
+    uint64_t owner;
     struct error error; /* failed */
     struct engine_frame *frame;
     struct engine_stats *stats;

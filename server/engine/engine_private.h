@@ -23,8 +23,15 @@
 #define DEVICE_REBUILDS_MAX 3
 #define DEVICE_REBUILDS_WINDOW_NS (300 * 1000000000ull)
 
+struct engine_owner {
+    uint64_t number;
+    size_t clients;
+    struct schedule_owner schedule;
+};
+
 struct engine_client {
     uint64_t client, principal;
+    struct engine_owner *owner;
     struct hashmap references; /* struct engine_reference *, by the client's number */
     struct schedule_client schedule;
 };
@@ -65,6 +72,7 @@ struct engine_scene {
     size_t waiting_count;
     uint64_t apply_start_ns, apply_ns; /* of the commits since the last frame */
     /* For stats, as of that revision: a large scene is not traversed for each request. */
+    struct engine_scene_stat *stat; /* while it is filled in */
     uint64_t counted_revision, triangles, spheres;
     uint32_t instances;
     struct engine_scene_description *description; /* as of its revision; NULL: not asked for yet */
@@ -136,6 +144,7 @@ struct engine {
     uint64_t rebuilds_ns[DEVICE_REBUILDS_MAX]; /* times of its reopenings, a ring */
     unsigned rebuilds;
     struct hashmap clients;      /* struct engine_client *, by number */
+    struct hashmap owners;       /* struct engine_owner *, by number */
     struct engine_scene *scenes; /* owned */
     struct job **jobs;           /* owned, in the order of their start */
     size_t job_count, job_capacity;
@@ -259,7 +268,9 @@ void job_leave_renderer(struct engine *engine, struct job *job);
 bool reference_drop_idle(struct engine *engine, struct engine_reference *reference);
 /* Everything of it on the device; its jobs have ended, or no frame is in progress. */
 void scene_drop_shared(struct engine *engine, struct engine_scene *scene);
-uint64_t scene_device_bytes(const struct engine *engine, const struct engine_scene *scene);
+/* Without its jobs. */
+uint64_t scene_own_device_bytes(const struct engine *engine, const struct engine_scene *scene);
+uint64_t job_device_bytes(const struct engine *engine, const struct job *job);
 uint64_t engine_device_bytes(const struct engine *engine);
 
 /* stats.c */

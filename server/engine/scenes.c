@@ -9,16 +9,42 @@
 
 /* ---- clients ------------------------------------------------------------------------------------ */
 
+static struct engine_owner *need_owner(struct engine *engine, uint64_t number)
+{
+    struct engine_owner *owner = hashmap_get(&engine->owners, number);
+    if (!owner) {
+        owner = calloc(1, sizeof(*owner));
+        if (!owner || !hashmap_put(&engine->owners, number, owner)) {
+            free(owner);
+            return NULL;
+        }
+        owner->number = number;
+    }
+    owner->clients++;
+    return owner;
+}
+
+static void leave_owner(struct engine *engine, struct engine_owner *owner)
+{
+    if (!owner || --owner->clients)
+        return;
+    hashmap_remove(&engine->owners, owner->number);
+    free(owner);
+}
+
 static struct engine_client *need_client(struct engine *engine, const struct engine_command *command)
 {
     struct engine_client *client = hashmap_get(&engine->clients, command->client);
     if (client)
         return client;
-    client = calloc(1, sizeof(*client));
+    struct engine_owner *owner = need_owner(engine, command->owner);
+    client = owner ? calloc(1, sizeof(*client)) : NULL;
     if (!client || !hashmap_put(&engine->clients, command->client, client)) {
         free(client);
+        leave_owner(engine, owner);
         return NULL;
     }
+    client->owner = owner;
     client->client = command->client;
     client->principal = command->principal;
     return client;
@@ -105,6 +131,7 @@ void engine_forget_client(struct engine *engine, struct engine_client *client)
     }
     hashmap_remove(&engine->clients, client->client);
     hashmap_finish(&client->references);
+    leave_owner(engine, client->owner);
     free(client);
 }
 

@@ -44,7 +44,7 @@ static void group_advance(struct schedule_group *group)
         group->min_ns = group->next_ns;
 }
 
-/* More than once, if the share is a client's. */
+/* More than once, if the share is an owner's or a client's. */
 static void share_settle(struct schedule_share *share, const struct scheduler *scheduler,
                          const struct schedule_group *group)
 {
@@ -61,40 +61,65 @@ static bool goes_before(const struct schedule_share *a, const struct schedule_sh
     return a->virtual_ns != b->virtual_ns ? a->virtual_ns < b->virtual_ns : a->turn < b->turn;
 }
 
-size_t schedule_pick(struct scheduler *scheduler, const struct schedule_entry *entries, size_t count)
+static void begin(struct scheduler *scheduler, const struct schedule_entry *entries, size_t count)
 {
-    size_t best = SCHEDULE_NONE;
-    scheduler->picks++;
-    group_begin(&scheduler->clients);
+    group_begin(&scheduler->owners);
     for (size_t i = 0; i < count; i++) {
-        entries[i].client->share.ready = false;
+        entries[i].owner->share.ready = entries[i].client->share.ready = false;
+        group_begin(&entries[i].owner->clients);
         group_begin(&entries[i].client->jobs);
     }
+}
+
+static void look(struct scheduler *scheduler, const struct schedule_entry *entries, size_t count)
+{
     for (size_t i = 0; i < count; i++) {
+        struct schedule_owner *owner = entries[i].owner;
         struct schedule_client *client = entries[i].client;
-        scheduler->clients.ready_count += entries[i].ready && !client->share.ready;
+        scheduler->owners.ready_count += entries[i].ready && !owner->share.ready;
+        owner->clients.ready_count += entries[i].ready && !client->share.ready;
         client->jobs.ready_count += entries[i].ready;
+        owner->share.ready |= entries[i].ready;
         client->share.ready |= entries[i].ready;
         entries[i].job->ready = entries[i].ready;
         group_look(&client->jobs, scheduler, entries[i].job);
     }
-    for (size_t i = 0; i < count; i++)
-        group_look(&scheduler->clients, scheduler, &entries[i].client->share);
-    group_advance(&scheduler->clients);
+    for (size_t i = 0; i < count; i++) {
+        group_look(&scheduler->owners, scheduler, &entries[i].owner->share);
+        group_look(&entries[i].owner->clients, scheduler, &entries[i].client->share);
+    }
+}
+
+static bool entry_goes_before(const struct schedule_entry *a, const struct schedule_entry *b)
+{
+    return a->owner != b->owner     ? goes_before(&a->owner->share, &b->owner->share)
+           : a->client != b->client ? goes_before(&a->client->share, &b->client->share)
+                                    : goes_before(a->job, b->job);
+}
+
+size_t schedule_pick(struct scheduler *scheduler, const struct schedule_entry *entries, size_t count)
+{
+    size_t best = SCHEDULE_NONE;
+    scheduler->picks++;
+    begin(scheduler, entries, count);
+    look(scheduler, entries, count);
+    group_advance(&scheduler->owners);
     for (size_t i = 0; i < count; i++) {
         const struct schedule_entry *entry = &entries[i];
+        group_advance(&entry->owner->clients);
         group_advance(&entry->client->jobs);
-        share_settle(&entry->client->share, scheduler, &scheduler->clients);
+        share_settle(&entry->owner->share, scheduler, &scheduler->owners);
+        share_settle(&entry->client->share, scheduler, &entry->owner->clients);
         share_settle(entry->job, scheduler, &entry->client->jobs);
-        if (!entry->ready)
-            continue;
-        bool same = best != SCHEDULE_NONE && entries[best].client == entry->client;
-        if (best == SCHEDULE_NONE || (same ? goes_before(entry->job, entries[best].job)
-                                           : goes_before(&entry->client->share, &entries[best].client->share)))
+        if (entry->ready && (best == SCHEDULE_NONE || entry_goes_before(entry, &entries[best])))
             best = i;
     }
+    /* Beside other owners, an owner's turns are no longer for having many clients. */
+    uint32_t competitors = scheduler->owners.ready_count;
+    if (competitors == 1)
+        competitors = entries[best].owner->clients.ready_count;
     scheduler->turn_ns = 0;
-    scheduler->turn_end_ns = turn_ns(scheduler->clients.ready_count);
+    scheduler->turn_end_ns = turn_ns(competitors);
     return best;
 }
 
@@ -113,15 +138,16 @@ static void charge(struct schedule_share *share, uint64_t virtual_ns, uint64_t t
     share->turn = turn;
 }
 
-void schedule_charge(struct scheduler *scheduler, struct schedule_client *client, struct schedule_share *job,
-                     uint64_t slice_ns, uint32_t weight)
+void schedule_charge(struct scheduler *scheduler, const struct schedule_entry *entry, uint64_t slice_ns,
+                     uint32_t weight, uint32_t granted_weight)
 {
-    /* A slice below the clock's resolution is charged a little, or its job would have every turn. */
-    uint64_t virtual_ns = without_outliers(client, slice_ns) / weight + 1;
+    uint64_t charged_ns = without_outliers(entry->client, slice_ns);
     uint64_t turn = ++scheduler->turns;
     scheduler->turn_ns += slice_ns;
-    charge(&client->share, virtual_ns, turn);
-    charge(job, virtual_ns, turn);
+    /* A slice below the clock's resolution is charged a little, or its job would have every turn. */
+    charge(&entry->owner->share, charged_ns / granted_weight + 1, turn);
+    charge(&entry->client->share, charged_ns / weight + 1, turn);
+    charge(entry->job, charged_ns / weight + 1, turn);
 }
 
 bool schedule_turn_lasts(const struct scheduler *scheduler)

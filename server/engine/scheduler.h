@@ -2,9 +2,11 @@
 /* Chooses the job of the next slice. Pure: no clock, no GL, no socket.
  *
  * Fair queueing by virtual time: the time that the GL thread has spent on a job, divided by the job's weight. The
- * client with the minimum is next, and within it the job with the minimum; so each gets its share of time however
- * long its slices are, and however many jobs others have. A client that arrives, or returns after a pause, begins
- * at the minimum of those that are ready: it is among the next, and has no claim on the time that it missed.
+ * owner with the minimum is next, of its clients the one with the minimum, and of that client's jobs the same; so
+ * each gets its share of time however long its slices are, however many clients and jobs others have, and whatever
+ * weight they ask for: between owners, the weight that is granted counts. A client that arrives, or returns after
+ * a pause, begins at the minimum of those that are ready: it is among the next, and has no claim on the time that
+ * it missed.
  *
  * Some slices are very long: the first ones compile programs, upload the scene and build its structures, for all
  * later users. The job of such a slice waits afterwards, but not much longer than SCHEDULE_WAIT_MAX_NS.
@@ -20,7 +22,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* Of a client, or of a job among those of its client. All-zero: it has just arrived. */
+/* Of an owner, of a client among those of its owner, or of a job among those of its client. All-zero: it has just
+ * arrived. */
 struct schedule_share {
     uint64_t virtual_ns;
     uint64_t turn;     /* number of its last slice; among equals the longest waiting is next */
@@ -28,12 +31,17 @@ struct schedule_share {
     bool ready;        /* during a pick */
 };
 
-/* The competitors for a turn: all clients, or the jobs of one client. */
+/* The competitors for a turn: all owners, the clients of one, or the jobs of one client. */
 struct schedule_group {
     uint64_t min_ns; /* the minimum virtual time of those that were ready; never decreases */
     /* During a pick. */
     uint64_t next_ns;
     uint32_t ready_count;
+};
+
+struct schedule_owner {
+    struct schedule_share share;
+    struct schedule_group clients;
 };
 
 struct schedule_client {
@@ -43,19 +51,20 @@ struct schedule_client {
 };
 
 struct scheduler {
-    struct schedule_group clients;
+    struct schedule_group owners;
     uint64_t picks, turns;
     uint64_t turn_ns, turn_end_ns; /* since the pick of the last slice */
 };
 
 struct schedule_entry {
+    struct schedule_owner *owner;   /* of several clients the same one */
     struct schedule_client *client; /* of several jobs the same one */
     struct schedule_share *job;
     bool ready;
 };
 
 #define SCHEDULE_TURN_NS 10000000u    /* about a slice on software GL */
-#define SCHEDULE_TURN_EACH_NS 500000u /* longer for each client that is ready */
+#define SCHEDULE_TURN_EACH_NS 500000u /* longer for each competitor that is ready */
 /* A slice that is this many times as long as the client's mean, and at least this long, is charged at that length:
  * the machine was busy with other work, or something was done once for all. Repeated cost enters the mean. */
 #define SCHEDULE_OUTLIER 8
@@ -66,9 +75,10 @@ struct schedule_entry {
 /* The index of the entry whose slice is next, which is to be charged; SCHEDULE_NONE: none is ready. Entries that
  * are not passed are not ready. */
 size_t schedule_pick(struct scheduler *scheduler, const struct schedule_entry *entries, size_t count);
-/* Charges a slice to a job. `weight`: the job's, at least 1. */
-void schedule_charge(struct scheduler *scheduler, struct schedule_client *client, struct schedule_share *job,
-                     uint64_t slice_ns, uint32_t weight);
+/* Charges a slice to a job. Weights are at least 1: the one that its client gives it, and what of that counts
+ * among owners. */
+void schedule_charge(struct scheduler *scheduler, const struct schedule_entry *entry, uint64_t slice_ns,
+                     uint32_t weight, uint32_t granted_weight);
 
 /* Whether the job of the last slice may continue without another pick, if its frame is better finished. */
 bool schedule_turn_lasts(const struct scheduler *scheduler);

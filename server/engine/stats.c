@@ -4,8 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-static void describe_scene(const struct engine *engine, struct engine_scene *from, uint64_t principal,
-                           struct engine_scene_stat *stat)
+static void describe_scene(struct engine_scene *from, uint64_t principal, struct engine_scene_stat *stat)
 {
     const struct scene *scene = from->scene;
     engine_count_contents(from);
@@ -16,13 +15,24 @@ static void describe_scene(const struct engine *engine, struct engine_scene *fro
         .scene = first ? first->id : 0,
         .revision = from->known.revision,
         .host_bytes = from->known.host_bytes,
-        .device_bytes = scene_device_bytes(engine, from),
         .nodes = from->known.nodes,
         .instances = from->instances,
         .triangles = from->triangles,
         .spheres = from->spheres,
     };
     memcpy(stat->name, scene->name, sizeof(stat->name));
+}
+
+/* Each job is looked at once, however many scenes there are. */
+static void add_device_bytes(const struct engine *engine, struct engine_stats *stats)
+{
+    uint32_t i = 0;
+    for (struct engine_scene *scene = engine->scenes; scene; scene = scene->next) {
+        scene->stat = &stats->scenes[i++];
+        scene->stat->device_bytes = scene_own_device_bytes(engine, scene);
+    }
+    for (size_t j = 0; j < engine->job_count; j++)
+        engine->jobs[j]->scene->stat->device_bytes += job_device_bytes(engine, engine->jobs[j]);
 }
 
 static bool describe_scenes(const struct engine *engine, uint64_t principal, struct engine_stats *stats)
@@ -36,9 +46,10 @@ static bool describe_scenes(const struct engine *engine, uint64_t principal, str
     if (!stats->scenes)
         return false;
     for (struct engine_scene *scene = engine->scenes; scene; scene = scene->next) {
-        describe_scene(engine, scene, principal, &stats->scenes[stats->scene_count]);
+        describe_scene(scene, principal, &stats->scenes[stats->scene_count]);
         stats->host_bytes += stats->scenes[stats->scene_count++].host_bytes;
     }
+    add_device_bytes(engine, stats);
     return true;
 }
 

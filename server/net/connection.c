@@ -3,6 +3,7 @@
 
 #include "base/clock.h"
 #include "base/log.h"
+#include "base/log_rate.h"
 #include "base/sys.h"
 #include "net/greeting.h"
 #include "net/timeouts.h"
@@ -13,8 +14,11 @@
 #include <string.h>
 #include <unistd.h>
 
-/* Bytes that one client may send or take before other clients get their turn. */
-#define BYTES_A_TURN ((size_t)2 << 20)
+/* What may go to one client, and come from it, before others get their turn. Messages are counted together for
+ * those that share a turn. */
+#define SENT_BYTES_A_TURN ((size_t)2 << 20)
+#define RECEIVED_BYTES_A_TURN ((size_t)256 << 10)
+#define MESSAGES_A_TURN 64
 /* Maximum of queued bulk: a cancel, and another job's frame, wait behind it. */
 #define BULK_QUEUED_BYTES ((size_t)512 << 10)
 #define PARTS_A_CALL 64
@@ -22,6 +26,12 @@
 static void turn_end(void *context);
 static void on_ready(void *context, uint32_t epoll_events);
 static void on_timer(void *context);
+
+static unsigned messages_a_turn(const struct connection *connection)
+{
+    unsigned sharers = connection->entry.sharers ? *connection->entry.sharers : 1;
+    return sharers < MESSAGES_A_TURN ? MESSAGES_A_TURN / (sharers ? sharers : 1) : 1;
+}
 
 struct connection *connection_create(struct loop *loop, int fd, const struct connection_limits *limits,
                                      const struct connection_entry *entry,
@@ -53,6 +63,7 @@ struct connection *connection_create(struct loop *loop, int fd, const struct con
         .connected_ns = now_ns,
         .last_received_ns = now_ns,
         .last_sent_ns = now_ns,
+        .messages_left = MESSAGES_A_TURN,
     };
     out_queue_init(&connection->out);
     loop_defer(loop, &connection->turn_end);
@@ -144,8 +155,9 @@ void connection_send_raw(struct connection *connection, struct out_message *mess
     out_queue_push(&connection->out, message, bulk);
     loop_defer(connection->loop, &connection->turn_end);
     if (connection->out.queued_bytes > connection->limits->queued_hard_bytes) {
-        log_write(LOG_WARNING, "net", "disconnected a client that does not read: %zu bytes wait for it",
-                  connection->out.queued_bytes);
+        if (log_is_due(connection->entry.log_source, "does not read"))
+            log_write(LOG_WARNING, "net", "disconnected a client that does not read: %zu bytes wait for it",
+                      connection->out.queued_bytes);
         connection_close(connection);
     }
 }
@@ -163,7 +175,7 @@ bool connection_wants_bulk(const struct connection *connection)
 static void flush(struct connection *connection)
 {
     size_t sent_bytes = 0;
-    while (connection->state != CONNECTION_CLOSED && sent_bytes < BYTES_A_TURN) {
+    while (connection->state != CONNECTION_CLOSED && sent_bytes < SENT_BYTES_A_TURN) {
         if (connection_wants_bulk(connection))
             connection->handler->room(connection->context);
         struct iovec parts[PARTS_A_CALL];
@@ -236,16 +248,20 @@ static void drop_input(struct connection *connection)
         sealed_link_drop_input(connection->link);
 }
 
+static bool may_process(const struct connection *connection)
+{
+    return connection->state == CONNECTION_OPEN && !connection->held && connection->messages_left;
+}
+
 static void process_messages(struct connection *connection)
 {
     size_t offset = 0;
-    while (connection->state == CONNECTION_OPEN && !connection->held && offset < connection->in_used &&
-           process_message(connection, &offset))
-        continue;
+    while (may_process(connection) && offset < connection->in_used && process_message(connection, &offset))
+        connection->messages_left--;
     connection->in_used -= offset;
     memmove(connection->in, connection->in + offset, connection->in_used);
-    if (!connection_incoming_bytes(connection))
-        connection->message_began_ns = 0;
+    if (!connection_incoming_bytes(connection) || !connection->messages_left)
+        connection->message_began_ns = 0; /* what is left may be whole messages */
     else if (!connection->message_began_ns)
         connection->message_began_ns = clock_now_ns();
 }
@@ -288,8 +304,8 @@ static void process(struct connection *connection)
             greeting_process(connection);
         if (connection->state == CONNECTION_OPEN)
             process_messages(connection);
-    } while (connection->link && sealed_is_open(connection->link->sealed) && may_read(connection) &&
-             sealing_open_next(connection));
+    } while (connection->link && sealed_is_open(connection->link->sealed) && connection->messages_left &&
+             may_read(connection) && sealing_open_next(connection));
     if (connection->state == CONNECTION_FLUSHING || connection->state == CONNECTION_LINGERING)
         drop_input(connection);
 }
@@ -299,7 +315,7 @@ static void receive(struct connection *connection)
     size_t received_bytes = 0;
     if (has_waiting_records(connection))
         process(connection); /* they release space */
-    while (may_read(connection) && received_bytes < BYTES_A_TURN) {
+    while (may_read(connection) && connection->messages_left && received_bytes < RECEIVED_BYTES_A_TURN) {
         size_t free_bytes = connection->in_capacity - connection->in_used;
         uint8_t *space = connection->in + connection->in_used;
         if (connection->link)
@@ -356,8 +372,9 @@ static void turn_end(void *context)
 {
     struct connection *connection = context;
     bool was_held = connection->in_used && !connection->message_began_ns;
-    if (connection->state == CONNECTION_OPEN && !connection->held && (was_held || has_waiting_records(connection)))
-        process(connection); /* messages that arrived before it was held */
+    connection->messages_left = messages_a_turn(connection);
+    if (may_process(connection) && (was_held || has_waiting_records(connection)))
+        process(connection); /* messages that arrived before it was held, or had had its turn */
     flush(connection);
     if (connection->state == CONNECTION_FLUSHING && has_flushed(connection))
         linger(connection);
@@ -376,7 +393,7 @@ static void turn_end(void *context)
         if (connection->message_began_ns)
             connection->message_began_ns = clock_now_ns(); /* it was blocked until now */
     }
-    if (has_waiting_records(connection))
+    if (has_waiting_records(connection) || !connection->messages_left)
         loop_defer(connection->loop, &connection->turn_end);
     loop_watch_change(connection->watch, (may_read(connection) ? (uint32_t)EPOLLIN : 0) |
                                              (connection->write_blocked ? (uint32_t)EPOLLOUT : 0));

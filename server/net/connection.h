@@ -30,6 +30,8 @@ struct connection_limits {
 
 /* What a client must prove before it is accepted. */
 struct connection_entry {
+    uint64_t log_source;           /* whose lines in the log are counted together */
+    const uint32_t *sharers;       /* the number of connections that share one's turn; NULL: it has its own */
     const struct sealed_key *keys; /* the owner's; they stay while the connection is there */
     size_t key_count;
     bool sealed_only; /* a client without one of the keys is refused */
@@ -86,6 +88,7 @@ struct connection {
     struct scratch scratch;
     void *scratch_data;
     bool held;                 /* the layer above takes no messages at present */
+    unsigned messages_left;    /* that it may pass on before other clients get their turn */
     bool write_blocked;        /* the kernel's buffer is full */
     uint64_t message_began_ns; /* of the incomplete message at the start of `in`; 0: none */
 

@@ -3,6 +3,7 @@
 
 #include "base/clock.h"
 #include "base/log.h"
+#include "base/sys.h"
 #include "net/connection.h"
 
 #include <stdlib.h>
@@ -37,6 +38,17 @@ static void refuse_hello(struct connection *connection, struct handshake_reply *
     reply->version = 0;
     if (queue_reply(connection, reply))
         end(connection);
+}
+
+void greeting_turn_away(int fd, const char *why, uint64_t capabilities)
+{
+    struct handshake_reply reply = {.capabilities = capabilities};
+    uint8_t bytes[HANDSHAKE_REPLY_MAX_BYTES];
+    strncpy(reply.text, why, sizeof(reply.text) - 1);
+    struct iovec part = {.iov_base = bytes, .iov_len = handshake_reply_encode(bytes, &reply)};
+    struct msghdr message = {.msg_iov = &part, .msg_iovlen = 1};
+    ssize_t sent = sys_sendmsg(fd, &message, MSG_NOSIGNAL | MSG_DONTWAIT);
+    (void)sent; /* a peer that cannot hear it sees the end */
 }
 
 static bool make_room_for_messages(struct connection *connection, size_t capacity_bytes)

@@ -3,11 +3,15 @@
 #ifndef FARLIGHT_NET_GREETING_H
 #define FARLIGHT_NET_GREETING_H
 
+#include <stdint.h>
+
 struct connection;
 
 /* Processes the bytes so far. A whole hello is answered; then the connection is open, or about to close if the
  * client was refused. */
 void greeting_process(struct connection *connection);
+/* Says to a client of whom nothing was read yet why it has to go, as far as the kernel takes it at once. */
+void greeting_turn_away(int fd, const char *why, uint64_t capabilities);
 /* Sends the refusal of a wrong key, after its delay. */
 void greeting_refuse_key(struct connection *connection);
 

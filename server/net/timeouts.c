@@ -2,6 +2,7 @@
 #include "net/timeouts.h"
 
 #include "base/log.h"
+#include "base/log_rate.h"
 #include "net/connection.h"
 #include "net/greeting.h"
 
@@ -44,8 +45,9 @@ static void check_open(struct connection *connection, uint64_t now_ns)
     char text[128];
     if (connection->over_soft_since_ns &&
         since(connection->over_soft_since_ns, now_ns) >= limits->queued_soft_ms * NS_PER_MS) {
-        log_write(LOG_WARNING, "net", "disconnected a client that reads too slowly: %zu bytes wait for it",
-                  connection->out.queued_bytes);
+        if (log_is_due(connection->entry.log_source, "reads slowly"))
+            log_write(LOG_WARNING, "net", "disconnected a client that reads too slowly: %zu bytes wait for it",
+                      connection->out.queued_bytes);
         connection_close(connection);
         return;
     }
@@ -58,7 +60,8 @@ static void check_open(struct connection *connection, uint64_t now_ns)
     /* A client that has not read for that long will not read any more. */
     if (limits->idle_ms && connection->out.queued_bytes &&
         since(connection->last_sent_ns, now_ns) >= limits->idle_ms * NS_PER_MS) {
-        log_write(LOG_INFO, "net", "disconnected a client that stopped reading");
+        if (log_is_due(connection->entry.log_source, "stopped reading"))
+            log_write(LOG_INFO, "net", "disconnected a client that stopped reading");
         connection_close(connection);
         return;
     }

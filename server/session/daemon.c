@@ -3,7 +3,9 @@
 
 #include "base/clock.h"
 #include "base/log.h"
+#include "base/log_rate.h"
 #include "net/activation.h"
+#include "net/greeting.h"
 #include "net/notify.h"
 #include "session/session.h"
 
@@ -20,6 +22,9 @@
 #define ACCEPTS_A_TURN 4
 /* Out of descriptors: a listener stays readable all the time, so it is not watched for this long. */
 #define ACCEPT_PAUSE_NS UINT64_C(100000000)
+
+/* In which clients may take their goodbye when the daemon stops. */
+#define STOP_NS UINT64_C(400000000)
 
 /* In the time in which the service manager wants to hear something. */
 #define WATCHDOG_LOOKS 4
@@ -116,23 +121,17 @@ static bool accept_one(struct daemon *daemon, const struct listener *listener)
     struct error error = {0};
     if (hub_add_client(&daemon->hub, fd, &listener->address, &peer, &error))
         return true;
-    log_write(LOG_WARNING, "session", "a client is turned away: %s", error.text);
+    if (log_is_due(address_network(&peer), "turned away"))
+        log_write(LOG_WARNING, "session", "a client is turned away: %s", error.text);
+    greeting_turn_away(fd, error.text, error.kind == ERROR_DENIED ? 0 : HANDSHAKE_TRY_AGAIN);
     close(fd);
     return true;
 }
 
 static void accept_from(struct daemon *daemon, const struct listener *listener)
 {
-    for (int i = 0; i < ACCEPTS_A_TURN; i++) {
-        /* Clients in the listener's own queue are accepted when others have finished their handshake or timed out.
-         */
-        if (daemon->hub.unauthenticated >= daemon->hub.options.limits.unauthenticated) {
-            pause_accepting(daemon);
-            return;
-        }
-        if (!accept_one(daemon, listener))
-            return;
-    }
+    for (int i = 0; i < ACCEPTS_A_TURN && accept_one(daemon, listener); i++)
+        continue;
 }
 
 static void on_listeners(void *context, uint32_t epoll_events)
@@ -158,6 +157,7 @@ static void stop(struct daemon *daemon)
         listener_close(&daemon->listeners[i]);
     }
     daemon->listener_count = 0;
+    loop_timer_start(daemon->loop, &daemon->stop_timer, STOP_NS);
     hub_stop(&daemon->hub);
 }
 
@@ -193,6 +193,12 @@ static void on_emptied(void *context)
     struct daemon *daemon = context;
     if (daemon->hub.stopping)
         loop_stop(daemon->loop);
+}
+
+static void on_stop_timer(void *context)
+{
+    struct daemon *daemon = context;
+    loop_stop(daemon->loop);
 }
 
 static void on_owner_gone(void *context)
@@ -252,6 +258,7 @@ bool daemon_start(struct daemon *daemon, const struct hub_options *options, stru
     daemon->hub.device_gone = on_device_gone;
     daemon->hub.call_context = daemon;
     daemon->accept_timer = (struct loop_timer){.call = on_accept_timer, .context = daemon};
+    daemon->stop_timer = (struct loop_timer){.call = on_stop_timer, .context = daemon};
     daemon->watchdog_timer = (struct loop_timer){.call = on_watchdog_timer, .context = daemon};
     daemon->watchdog_ns = notify_watchdog_ns();
     if (daemon->watchdog_ns)
@@ -321,6 +328,7 @@ void daemon_finish(struct daemon *daemon)
         close_sessions(daemon);
         loop_watch_remove(daemon->signal_watch);
         loop_timer_stop(daemon->loop, &daemon->accept_timer);
+        loop_timer_stop(daemon->loop, &daemon->stop_timer);
         loop_timer_stop(daemon->loop, &daemon->watchdog_timer);
         hub_finish(&daemon->hub);
         loop_destroy(daemon->loop);

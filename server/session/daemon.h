@@ -20,11 +20,11 @@ struct daemon {
     size_t listener_count;
     int signal_fd;
     struct loop_watch *signal_watch;
-    struct loop_timer accept_timer;   /* after which listeners are looked at again */
-    struct loop_timer watchdog_timer; /* after which the service manager is told that all goes on */
-    uint64_t watchdog_ns;             /* it wants to hear that so often; 0: it does not */
-    uint64_t engine_turns;            /* for engine_is_alive() */
-    bool device_gone;                 /* the engine's is lost for good: that is why it ends */
+    struct loop_timer accept_timer, stop_timer; /* after which listeners are looked at again */
+    struct loop_timer watchdog_timer;           /* after which the service manager is told that all goes on */
+    uint64_t watchdog_ns;                       /* it wants to hear that so often; 0: it does not */
+    uint64_t engine_turns;                      /* for engine_is_alive() */
+    bool device_gone;                           /* the engine's is lost for good: that is why it ends */
     /* Reads the configuration again and hands it to hub_reload(), at SIGHUP; NULL: that changes nothing. */
     loop_call_fn *reload;
     void *reload_context;

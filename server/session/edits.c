@@ -31,19 +31,45 @@ void edits_begin(struct session *session, struct request *request, const struct 
         edits_fail(session, request, &error);
 }
 
+void edits_count(struct session *session, int64_t edits, int64_t bytes)
+{
+    session->transaction_edits += (size_t)edits;
+    session->transaction_bytes += (uint64_t)bytes;
+    hub_count_edits(session->hub, session->owner, bytes);
+}
+
 void transaction_destroy(struct session *session, struct transaction *transaction)
 {
     if (!transaction)
         return;
-    session->transaction_edits -= transaction->count;
-    session->transaction_bytes -= transaction->bytes;
+    edits_count(session, -(int64_t)transaction->count, -(int64_t)transaction->bytes);
     for (size_t i = 0; i < transaction->count; i++)
         scene_edit_finish(&transaction->edits[i]);
     free(transaction->edits);
     free(transaction);
 }
 
-static bool make_room(const struct session *session, struct transaction *transaction, struct error *error)
+/* Counts memory before it is taken. */
+static bool account(struct session *session, struct transaction *transaction, uint64_t bytes, struct error *error)
+{
+    const struct hub *hub = session->hub;
+    const struct session_limits *limits = &hub->options.limits;
+    if (!owner_may_have(session->owner->transaction_bytes, hub->transaction_bytes, bytes,
+                        limits->transaction_bytes, limits->share_percent)) {
+        error_set(error, ERROR_LIMIT, "transaction",
+                  "edits that wait to be committed take %" PRIu64 " bytes, %" PRIu64
+                  " of them those of this user or key; the limits are %" PRIu64 " and %" PRIu64,
+                  hub->transaction_bytes, session->owner->transaction_bytes, limits->transaction_bytes,
+                  owner_share(limits->transaction_bytes, limits->share_percent));
+        return error_remedy(error, "commit fewer edits at a time and wait for the answer, or raise "
+                                   "memory.transactions in the daemon's configuration");
+    }
+    transaction->bytes += bytes;
+    edits_count(session, 0, (int64_t)bytes);
+    return true;
+}
+
+static bool make_room(struct session *session, struct transaction *transaction, struct error *error)
 {
     const struct session_limits *limits = &session->hub->options.limits;
     if (session->transaction_edits >= limits->transaction_edits) {
@@ -55,6 +81,8 @@ static bool make_room(const struct session *session, struct transaction *transac
     if (transaction->count < transaction->capacity)
         return true;
     size_t capacity = transaction->capacity ? transaction->capacity * 2 : 32;
+    if (!account(session, transaction, (capacity - transaction->capacity) * sizeof(*transaction->edits), error))
+        return false;
     struct scene_edit *edits = realloc(transaction->edits, capacity * sizeof(*edits));
     if (!edits)
         return error_set(error, ERROR_OUT_OF_MEMORY, "transaction", "no memory for %zu edits", capacity);
@@ -63,30 +91,19 @@ static bool make_room(const struct session *session, struct transaction *transac
     return true;
 }
 
-/* Counts an edit that has just been made. Blobs are counted where they are held. */
-static bool account(struct session *session, struct transaction *transaction, const struct scene_edit *edit,
-                    struct error *error)
+/* Of an edit, besides itself. Blobs are counted where they are held. */
+static uint64_t bytes_beside(const struct scene_edit *edit)
 {
-    uint64_t limit_bytes = session->hub->options.limits.transaction_bytes;
-    uint64_t bytes = sizeof(*edit);
-    if (edit->kind == EDIT_SET && edit->object == OBJECT_NODE)
-        bytes += edit->set.node.weight_count * sizeof(*edit->set.node.weights);
-    if (edit->kind == EDIT_SET && edit->object == OBJECT_MESH)
-        bytes += edit->set.mesh.range_count * sizeof(*edit->set.mesh.ranges) +
-                 edit->set.mesh.weight_count * sizeof(*edit->set.mesh.weights);
-    if (edit->kind == EDIT_SET && edit->object == OBJECT_SPHERES)
-        bytes += edit->set.spheres.range_count * sizeof(*edit->set.spheres.ranges);
-    if (bytes > limit_bytes || session->transaction_bytes > limit_bytes - bytes) {
-        error_set(error, ERROR_LIMIT, "transaction",
-                  "the edits that wait to be committed take more than %" PRIu64 " bytes, the limit", limit_bytes);
-        return error_remedy(error, "commit fewer edits at a time and wait for the answer, or raise "
-                                   "memory.transactions in the daemon's configuration");
-    }
-    transaction->count++;
-    transaction->bytes += bytes;
-    session->transaction_edits++;
-    session->transaction_bytes += bytes;
-    return true;
+    if (edit->kind != EDIT_SET)
+        return 0;
+    if (edit->object == OBJECT_NODE)
+        return edit->set.node.weight_count * sizeof(*edit->set.node.weights);
+    if (edit->object == OBJECT_MESH)
+        return edit->set.mesh.range_count * sizeof(*edit->set.mesh.ranges) +
+               edit->set.mesh.weight_count * sizeof(*edit->set.mesh.weights);
+    if (edit->object == OBJECT_SPHERES)
+        return edit->set.spheres.range_count * sizeof(*edit->set.spheres.ranges);
+    return 0;
 }
 
 void edits_add(struct session *session, struct request *request, const struct message *message)
@@ -98,8 +115,12 @@ void edits_add(struct session *session, struct request *request, const struct me
         return;
     }
     struct scene_edit *edit = &transaction->edits[transaction->count];
-    if (edit_from_message(session, message, edit, &error) && account(session, transaction, edit, &error))
+    if (edit_from_message(session, message, edit, &error) &&
+        account(session, transaction, bytes_beside(edit), &error)) {
+        transaction->count++;
+        edits_count(session, 1, 0);
         return;
+    }
     scene_edit_finish(edit);
     edits_fail(session, request, &error);
 }

@@ -20,6 +20,8 @@ void edits_add(struct session *session, struct request *request, const struct me
 void edits_commit(struct session *session, struct request *request);
 /* Answers the request with the error; later messages of the transaction are skipped. */
 void edits_fail(struct session *session, struct request *request, const struct error *error);
+/* Edits, and their bytes, that wait from now on (or no more, if negative). */
+void edits_count(struct session *session, int64_t edits, int64_t bytes);
 void transaction_destroy(struct session *session, struct transaction *transaction); /* accepts NULL */
 
 /* Fills the edit from a SET_.. or REMOVE message. False and *error: a blob is not there, or no memory; the

@@ -11,6 +11,10 @@
 #define RETRY_NS UINT64_C(2000000)
 /* Maximum of engine events that are handled before clients get their turn again. */
 #define EVENTS_A_TURN 64
+/* An owner with so many commands that wait for the engine is not read from until half of them are gone. */
+#define OWNER_COMMANDS_MAX 64
+#define STATS_AT_ONCE 4
+#define OWNER_ITSELF UINT64_MAX
 
 /* ---- commands ---------------------------------------------------------------------------------------- */
 
@@ -31,26 +35,143 @@ static bool try_submit(struct hub *hub, struct engine_command *command)
     return hub->options.engine.submit(hub->options.engine.context, command, &error);
 }
 
-static void hold_sessions(struct hub *hub, bool held)
+/* ---- turns ------------------------------------------------------------------------------------------- */
+
+static void hold(struct hub *hub, struct owner *owner, bool held)
 {
     size_t cursor = 0;
-    void *session;
-    while (hashmap_next(&hub->sessions, &cursor, NULL, &session))
-        session_hold(session, held);
+    void *value;
+    owner->held = held;
+    while (hashmap_next(&hub->sessions, &cursor, NULL, &value)) {
+        struct session *session = value;
+        if (session->owner == owner)
+            session_hold(session, held);
+    }
 }
 
-void hub_submit(struct hub *hub, struct engine_command *command)
+static void append_turn(struct hub *hub, struct owner *owner)
 {
-    if (!hub->waiting && try_submit(hub, command))
-        return;
-    if (!hub->waiting) {
-        log_write(LOG_DEBUG, "session", "the engine's queue is full; clients wait");
-        hold_sessions(hub, true);
-        loop_timer_start(hub->loop, &hub->retry_timer, RETRY_NS);
+    owner->next = NULL;
+    *hub->turn_end = owner;
+    hub->turn_end = &owner->next;
+}
+
+static struct owner *take_turn(struct hub *hub)
+{
+    struct owner *owner = hub->turn_first;
+    hub->turn_first = owner->next;
+    if (!hub->turn_first)
+        hub->turn_end = &hub->turn_first;
+    return owner;
+}
+
+/* Figures are much work for who asks nothing of the engine but them. */
+static bool waits_for_stats(const struct owner *owner)
+{
+    return owner->waiting->kind == ENGINE_STATS && owner->stats_asked >= STATS_AT_ONCE;
+}
+
+/* The first command of the owner whose turn it is. False: the engine's queue is full. */
+static bool feed_one(struct hub *hub)
+{
+    struct owner *owner = hub->turn_first;
+    if (waits_for_stats(owner)) {
+        take_turn(hub)->waits_for_stats = true;
+        return true;
     }
+    bool is_stats = owner->waiting->kind == ENGINE_STATS;
+    struct engine_command *next = owner->waiting->next; /* the engine may destroy the command */
+    if (!try_submit(hub, owner->waiting))
+        return false;
+    owner->waiting = next;
+    owner->waiting_count--;
+    owner->stats_asked += is_stats;
+    take_turn(hub);
+    if (owner->held && owner->waiting_count <= OWNER_COMMANDS_MAX / 2)
+        hold(hub, owner, false);
+    if (next) {
+        append_turn(hub, owner);
+    } else {
+        owner->waiting_end = &owner->waiting;
+        owner_unref(&hub->owners, owner);
+    }
+    return true;
+}
+
+static void feed(struct hub *hub)
+{
+    while (hub->turn_first && feed_one(hub))
+        continue;
+    if (hub->turn_first && !hub->retry_timer.running)
+        loop_timer_start(hub->loop, &hub->retry_timer, RETRY_NS);
+}
+
+void hub_submit(struct hub *hub, struct owner *owner, struct engine_command *command)
+{
     command->next = NULL;
-    *hub->waiting_end = command;
-    hub->waiting_end = &command->next;
+    command->owner = owner->number;
+    *owner->waiting_end = command;
+    owner->waiting_end = &command->next;
+    if (owner->waiting_count++ == 0)
+        append_turn(hub, owner_ref(owner));
+    feed(hub);
+    if (owner->waiting_count >= OWNER_COMMANDS_MAX && !owner->held) {
+        log_write(LOG_DEBUG, "session", "the engine's queue is full; clients of one owner wait");
+        hold(hub, owner, true);
+    }
+}
+
+static void stats_answered(struct hub *hub, uint64_t number)
+{
+    struct owner *owner = hashmap_get(&hub->owners.by_number, number);
+    if (!owner || !owner->stats_asked)
+        return; /* that owner was gone in between */
+    owner->stats_asked--;
+    if (!owner->waits_for_stats)
+        return;
+    owner->waits_for_stats = false;
+    append_turn(hub, owner);
+    feed(hub);
+}
+
+/* ---- memory ------------------------------------------------------------------------------------------ */
+
+void hub_count_frames(struct hub *hub, struct owner *owner, int64_t bytes)
+{
+    hub->frame_bytes += (uint64_t)bytes;
+    owner->frame_bytes += (uint64_t)bytes;
+}
+
+void hub_count_edits(struct hub *hub, struct owner *owner, int64_t bytes)
+{
+    hub->transaction_bytes += (uint64_t)bytes;
+    owner->transaction_bytes += (uint64_t)bytes;
+}
+
+struct departed {
+    struct owner *owner;
+    uint64_t transaction_bytes;
+};
+
+void hub_departed(struct hub *hub, uint64_t client, struct owner *owner, uint64_t transaction_bytes)
+{
+    struct departed *departed = transaction_bytes ? calloc(1, sizeof(*departed)) : NULL;
+    if (!departed || !hashmap_put(&hub->departed, client, departed)) {
+        free(departed);
+        hub_count_edits(hub, owner, -(int64_t)transaction_bytes);
+        return;
+    }
+    *departed = (struct departed){owner_ref(owner), transaction_bytes};
+}
+
+static void forgotten(struct hub *hub, uint64_t client)
+{
+    struct departed *departed = hashmap_remove(&hub->departed, client);
+    if (!departed)
+        return;
+    hub_count_edits(hub, departed->owner, -(int64_t)departed->transaction_bytes);
+    owner_unref(&hub->owners, departed->owner);
+    free(departed);
 }
 
 void hub_trim(struct hub *hub, blob_principal principal, uint64_t bytes)
@@ -60,24 +181,12 @@ void hub_trim(struct hub *hub, blob_principal principal, uint64_t bytes)
         return;
     command->principal = principal;
     command->trim_bytes = bytes;
-    hub_submit(hub, command);
+    hub_submit(hub, hub->itself, command);
 }
 
 static void retry(void *context)
 {
-    struct hub *hub = context;
-    while (hub->waiting) {
-        struct engine_command *next = hub->waiting->next; /* the engine may destroy the command */
-        if (!try_submit(hub, hub->waiting))
-            break;
-        hub->waiting = next;
-    }
-    if (hub->waiting) {
-        loop_timer_start(hub->loop, &hub->retry_timer, RETRY_NS);
-        return;
-    }
-    hub->waiting_end = &hub->waiting;
-    hold_sessions(hub, false);
+    feed(context);
 }
 
 /* ---- events ------------------------------------------------------------------------------------------ */
@@ -92,6 +201,10 @@ static void on_engine(void *context, uint32_t epoll_events)
         if (!event)
             return;
         struct session *session = hashmap_get(&hub->sessions, event->client);
+        if (event->answers_stats)
+            stats_answered(hub, event->owner);
+        if (event->kind == ENGINE_CLIENT_FORGOTTEN)
+            forgotten(hub, event->client);
         if (event->kind == ENGINE_CLIENT_FORGOTTEN || event->kind == ENGINE_SCENE_ENDED)
             blob_store_trim(hub->blobs);
         else if (event->kind == ENGINE_DEVICE_GONE && hub->device_gone)
@@ -104,22 +217,35 @@ static void on_engine(void *context, uint32_t epoll_events)
 
 /* ---- clients ----------------------------------------------------------------------------------------- */
 
-static size_t unauthenticated_from(const struct hub *hub, const struct address *peer)
+/* One that says nothing and has most of its kind gives way, by chance: an owner that takes all places loses its
+ * own, and cannot tell which. */
+static void turn_one_away(struct hub *hub, const struct owner *owner)
 {
-    size_t count = 0, cursor = 0;
+    uint32_t chosen = arc4random_uniform(owner->unauthenticated);
+    size_t cursor = 0;
     void *value;
     while (hashmap_next(&hub->sessions, &cursor, NULL, &value)) {
-        const struct session *session = value;
-        count += !session->introduced && address_same_host(&session->peer, peer);
+        struct session *session = value;
+        if (session->owner == owner && session->is_unauthenticated && chosen-- == 0) {
+            session_turn_away(session, "too many connections have not introduced themselves; try again later");
+            return;
+        }
     }
-    return count;
+}
+
+static void make_place(struct hub *hub, const struct owner *owner, bool is_tcp)
+{
+    const struct session_limits *limits = &hub->options.limits;
+    if (is_tcp && owner->unauthenticated >= limits->unauthenticated_per_address)
+        turn_one_away(hub, owner);
+    else if (hub->unauthenticated && hub->unauthenticated >= limits->unauthenticated / 2)
+        turn_one_away(hub, owners_most_unauthenticated(&hub->owners));
 }
 
 bool hub_add_client(struct hub *hub, int fd, const struct address *own, const struct address *peer,
                     struct error *error)
 {
     bool sealed_only = !hub->options.insecure && auth_is_beyond_loopback(own, peer);
-    const struct session_limits *limits = &hub->options.limits;
     struct auth_identity identity;
     if (hub->stopping)
         return error_set(error, ERROR_SHUTTING_DOWN, NULL, "the daemon stops");
@@ -128,13 +254,13 @@ bool hub_add_client(struct hub *hub, int fd, const struct address *own, const st
     bool is_owner = hub->last_number + 1 == hub->owner; /* local clients with full rights */
     if (!is_owner && identity.has_user && readers_have(&hub->options.readers, identity.user))
         identity.read_only = true;
-    if (hub->unauthenticated >= limits->unauthenticated)
-        return error_set(error, ERROR_LIMIT, NULL, "%zu connections have not introduced themselves",
-                         hub->unauthenticated);
-    if (!address_is_unix(peer) && unauthenticated_from(hub, peer) >= limits->unauthenticated_per_address)
-        return error_set(error, ERROR_LIMIT, NULL, "%u connections of this host have not introduced themselves",
-                         limits->unauthenticated_per_address);
-    struct session *session = session_create(hub, hub->last_number + 1, fd, sealed_only, peer, &identity, error);
+    struct owner *owner = owner_find(&hub->owners, owner_number(&identity, peer));
+    if (!owner)
+        return error_set(error, ERROR_OUT_OF_MEMORY, "session", "no memory");
+    make_place(hub, owner, !address_is_unix(peer));
+    struct session *session =
+        session_create(hub, hub->last_number + 1, fd, sealed_only, peer, &identity, owner, error);
+    owner_unref(&hub->owners, owner);
     if (!session)
         return false;
     if (!hashmap_put(&hub->sessions, ++hub->last_number, session)) {
@@ -142,7 +268,7 @@ bool hub_add_client(struct hub *hub, int fd, const struct address *own, const st
         session_close(session);
         return true;
     }
-    if (hub->waiting)
+    if (session->owner->held)
         session_hold(session, true);
     return true;
 }
@@ -172,7 +298,7 @@ bool hub_reload(struct hub *hub, const struct hub_options *options, struct error
     if (!command)
         return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory");
     command->limits = options->engine_limits;
-    hub_submit(hub, command);
+    hub_submit(hub, hub->itself, command);
     hub->options.limits = options->limits;
     set_connection_limits(hub, &options->connection_limits);
     hub->options.engine_limits = options->engine_limits;
@@ -193,15 +319,21 @@ bool hub_init(struct hub *hub, struct loop *loop, const struct hub_options *opti
         .retry_timer = {.call = retry, .context = hub},
     };
     set_connection_limits(hub, &options->connection_limits);
-    hub->waiting_end = &hub->waiting;
+    hub->turn_end = &hub->turn_first;
+    hub->itself = owner_find(&hub->owners, OWNER_ITSELF);
     hub->blobs = blob_store_create(options->limits.blob_bytes, options->limits.blob_cache_bytes);
-    if (!hub->blobs)
-        return error_set(error, ERROR_OUT_OF_MEMORY, "session", "no memory");
+    if (!hub->blobs || !hub->itself) {
+        error_set(error, ERROR_OUT_OF_MEMORY, "session", "no memory");
+        goto fail;
+    }
     hub->engine_watch =
         loop_watch_add(loop, options->engine.event_fd(options->engine.context), EPOLLIN, on_engine, hub, error);
     if (hub->engine_watch)
         return true;
+fail:
     blob_store_destroy(hub->blobs);
+    owner_unref(&hub->owners, hub->itself);
+    owners_finish(&hub->owners);
     return false;
 }
 
@@ -209,11 +341,21 @@ void hub_finish(struct hub *hub)
 {
     loop_watch_remove(hub->engine_watch);
     loop_timer_stop(hub->loop, &hub->retry_timer);
-    while (hub->waiting) {
-        struct engine_command *command = hub->waiting;
-        hub->waiting = command->next;
-        engine_command_destroy(command);
+    size_t cursor = 0;
+    void *value;
+    while (hashmap_next(&hub->owners.by_number, &cursor, NULL, &value)) {
+        struct owner *owner = value;
+        for (struct engine_command *command; (command = owner->waiting);) {
+            owner->waiting = command->next;
+            engine_command_destroy(command);
+        }
+        free(owner);
     }
+    cursor = 0;
+    while (hashmap_next(&hub->departed, &cursor, NULL, &value))
+        free(value);
+    hashmap_finish(&hub->departed);
+    owners_finish(&hub->owners);
     blob_store_destroy(hub->blobs);
     hashmap_finish(&hub->sessions);
 }

@@ -12,6 +12,7 @@
 #include "session/blob_store.h"
 #include "session/engine_port.h"
 #include "session/limits.h"
+#include "session/owners.h"
 
 #include <stdbool.h>
 #include <stddef.h>
@@ -37,9 +38,14 @@ struct hub {
     struct hub_options options;
     struct blob_store *blobs;
     struct hashmap sessions; /* struct session *, by number */
+    struct owners owners;
+    struct owner *itself; /* of commands that no client has asked for */
+    struct hashmap
+        departed; /* struct departed *, by number: clients that are gone and that the engine still knows */
     size_t unauthenticated;
-    struct attempts attempts; /* wrong keys */
-    uint64_t frame_bytes;     /* maximum of the frames of all jobs */
+    struct attempts attempts;   /* wrong keys */
+    uint64_t frame_bytes;       /* maximum of the frames of all jobs */
+    uint64_t transaction_bytes; /* of edits that are not answered */
     uint64_t last_number, started_ns;
     bool stopping;
     uint64_t owner;                        /* number of the client that the daemon serves alone; 0: none */
@@ -50,8 +56,8 @@ struct hub {
     void *call_context;
 
     struct loop_watch *engine_watch;
-    /* Commands that did not fit the engine's queue, in order. While one waits, no session reads. */
-    struct engine_command *waiting, **waiting_end;
+    /* Owners with commands that did not fit the engine's queue, in the order of their turns. */
+    struct owner *turn_first, **turn_end;
     struct loop_timer retry_timer;
 };
 
@@ -68,8 +74,13 @@ void hub_stop(struct hub *hub);
  * nothing is changed. */
 bool hub_reload(struct hub *hub, const struct hub_options *options, struct error *error);
 
-/* Submits a command to the engine, now or as soon as its queue has space. */
-void hub_submit(struct hub *hub, struct engine_command *command);
+/* Submits a command to the engine, now or as soon as its queue has space; owners take turns. */
+void hub_submit(struct hub *hub, struct owner *owner, struct engine_command *command);
+/* Memory that an owner's frames, and its edits, take from now on (or give back, if negative). */
+void hub_count_frames(struct hub *hub, struct owner *owner, int64_t bytes);
+void hub_count_edits(struct hub *hub, struct owner *owner, int64_t bytes);
+/* A client is gone whose edits the engine may hold until it has forgotten the client. */
+void hub_departed(struct hub *hub, uint64_t client, struct owner *owner, uint64_t transaction_bytes);
 /* The principal lacks that many bytes for blobs: evicts scenes without a holder, its own first. */
 void hub_trim(struct hub *hub, blob_principal principal, uint64_t bytes);
 /* The same for one of a session's requests: zeroed but for kind, client and request. NULL: out of memory. */

@@ -99,15 +99,16 @@ static bool check_room(const struct session *session, const struct message_rende
 {
     const struct hub *hub = session->hub;
     const struct job *before = job_replaced_by(session, render);
-    uint64_t bytes = job_bytes(session, render), limit_bytes = hub->options.limits.frame_bytes;
-    uint64_t own_bytes = before ? before->frame_bytes + frames_bytes_of_before(before) : 0;
-    uint64_t others_bytes = hub->frame_bytes - own_bytes;
-    if (!others_bytes || (others_bytes <= limit_bytes && bytes <= limit_bytes - others_bytes))
+    const struct session_limits *limits = &hub->options.limits;
+    uint64_t bytes = job_bytes(session, render), limit_bytes = limits->frame_bytes;
+    uint64_t before_bytes = before ? before->frame_bytes + frames_bytes_of_before(before) : 0;
+    uint64_t all_bytes = hub->frame_bytes - before_bytes, own_bytes = session->owner->frame_bytes - before_bytes;
+    if (!all_bytes || owner_may_have(own_bytes, all_bytes, bytes, limit_bytes, limits->share_percent))
         return true;
     error_set(error, ERROR_BUSY, "render",
-              "frames of this job may take %" PRIu64 " bytes; running jobs may take %" PRIu64
-              ", the limit of all is %" PRIu64,
-              bytes, others_bytes, limit_bytes);
+              "frames of this job may take %" PRIu64 " bytes; running jobs may take %" PRIu64 " of %" PRIu64
+              ", those of this user or key %" PRIu64 " of %" PRIu64,
+              bytes, all_bytes, limit_bytes, own_bytes, owner_share(limit_bytes, limits->share_percent));
     return error_remedy(error,
                         "try again when jobs have ended, ask for smaller frames, or raise memory.frames in the "
                         "daemon's configuration");
@@ -251,6 +252,11 @@ static bool fill_keys(struct engine_job *job, const struct message_render *rende
 static void fill_rest(struct engine_job *job, const struct session *session, const struct message_render *render)
 {
     bool is_view = render->kind == PROTOCOL_JOB_VIEW;
+    const struct session_limits *limits = &session->hub->options.limits;
+    uint32_t usual = is_view ? WEIGHT_OF_VIEW : WEIGHT_OF_BATCH;
+    uint32_t weight = render->weight ? render->weight : usual;
+    uint32_t granted = is_view ? limits->view_weight : limits->batch_weight;
+    granted = granted ? granted : usual;
     *job = (struct engine_job){
         .keys = job->keys,
         .key_count = job->key_count,
@@ -301,9 +307,8 @@ static void fill_rest(struct engine_job *job, const struct session *session, con
         .orbit_seconds = render->orbit_seconds,
         .pass_samples = render->pass_samples,
         .still_encoding = (enum encoding)render->still_encoding,
-        .weight = render->weight ? render->weight
-                  : is_view      ? WEIGHT_OF_VIEW
-                                 : WEIGHT_OF_BATCH,
+        .weight = weight,
+        .granted_weight = weight < granted ? weight : granted,
         .adapt = render->adapt != 0,
     };
 }

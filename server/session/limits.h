@@ -9,12 +9,14 @@
 
 struct session_limits {
     uint32_t clients;
-    uint32_t unauthenticated;             /* connections whose handshake is not done, all together */
-    uint32_t unauthenticated_per_address; /* from one TCP peer; Unix peers are let in by the file's mode */
+    uint32_t share_percent;   /* of what all clients may have together: what one user or key may have; 0: all */
+    uint32_t unauthenticated; /* connections whose handshake is not done, all together */
+    uint32_t unauthenticated_per_address; /* from one TCP peer */
     uint32_t wrong_keys_a_minute;         /* from one network; then nobody from there may try one for a while */
     uint32_t requests_in_flight;
     uint32_t scenes_per_client;
     uint32_t jobs_per_client;
+    uint32_t view_weight, batch_weight; /* greatest weights among the jobs of all users; 0: default */
     uint32_t blobs_per_client;
     uint32_t transaction_edits; /* of a client, in all transactions that are not answered */
     uint32_t nodes;
@@ -25,7 +27,7 @@ struct session_limits {
     struct tracer_limits tracers;
     uint64_t blob_bytes;        /* all blobs of all clients, arriving ones included */
     uint64_t blob_cache_bytes;  /* of them: blobs that are unused now */
-    uint64_t transaction_bytes; /* of them: memory */
+    uint64_t transaction_bytes; /* memory of the edits of all clients */
     uint64_t upload_window_bytes;
     uint64_t frame_bytes;      /* maximum of the frames of all jobs before they are sent; one job may always run */
     uint32_t frames_in_flight; /* of one job in the engine, as it has it */

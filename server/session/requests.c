@@ -64,8 +64,7 @@ static void send_ok(struct session *session, const struct request *request, uint
 static struct request *end(struct session *session, struct request *request)
 {
     uint32_t cancelled_by = request->cancelled_by;
-    session->transaction_edits -= request->edits;
-    session->transaction_bytes -= request->edit_bytes;
+    edits_count(session, -(int64_t)request->edits, -(int64_t)request->edit_bytes);
     hashmap_remove(&session->requests.in_flight, request->id);
     free(request);
     struct request *cancel = cancelled_by ? request_find(session, cancelled_by) : NULL;

@@ -3,7 +3,9 @@
 
 #include "base/clock.h"
 #include "base/log.h"
+#include "base/log_rate.h"
 #include "encode/stream.h"
+#include "net/greeting.h"
 #include "session/dispatch.h"
 #include "session/edits.h"
 #include "session/frames.h"
@@ -17,6 +19,10 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/random.h>
+#include <unistd.h>
+
+/* Places beyond limits.clients for the daemon's own user and for root. */
+#define PLACES_AT_HOME 4u
 
 /* ---- sending ----------------------------------------------------------------------------------------- */
 
@@ -64,8 +70,9 @@ void session_send_error(struct session *session, uint32_t request, const struct 
 void session_fail(struct session *session, const struct error *error)
 {
     struct error copy = *error;
-    log_write(LOG_INFO, "session", "client %" PRIu64 " (%s, %s) is disconnected: %s: %s", session->number,
-              session->name, session->identity.name, copy.field, copy.text);
+    if (log_is_due(session->owner->number, "disconnected"))
+        log_write(LOG_INFO, "session", "client %" PRIu64 " (%s, %s) is disconnected: %s: %s", session->number,
+                  session->name, session->identity.name, copy.field, copy.text);
     connection_finish(session->connection, (enum protocol_error_code)error->kind, whole_characters(copy.field),
                       whole_characters(copy.text));
 }
@@ -80,7 +87,7 @@ void session_fail_for_memory(struct session *session)
 void session_submit(struct session *session, struct request *request, struct engine_command *command)
 {
     if (command) {
-        hub_submit(session->hub, command);
+        hub_submit(session->hub, session->owner, command);
         return;
     }
     struct error error = {0};
@@ -222,8 +229,8 @@ static void fill_limits(struct handshake_limits *told, const struct session *ses
         .queued_soft_bytes = connection_limits->queued_soft_bytes,
         .device_memory_bytes = options->device_bytes,
         .blob_memory_bytes = limits->blob_bytes,
-        .transaction_memory_bytes = limits->transaction_bytes,
-        .frame_memory_bytes = limits->frame_bytes,
+        .transaction_memory_bytes = owner_share(limits->transaction_bytes, limits->share_percent),
+        .frame_memory_bytes = owner_share(limits->frame_bytes, limits->share_percent),
         .upload_window_bytes = limits->upload_window_bytes,
         .frame_window_bytes = limits->frame_window_bytes,
         .queued_soft_ms = connection_limits->queued_soft_ms,
@@ -273,16 +280,63 @@ static bool on_key_allowed(void *context)
 static void on_key_failed(void *context)
 {
     struct session *session = context;
-    log_write(LOG_WARNING, "session", "a wrong key came from %s", session->identity.name);
+    if (log_is_due(session->owner->number, "wrong key"))
+        log_write(LOG_WARNING, "session", "a wrong key came from %s", session->identity.name);
     if (!address_is_unix(&session->peer))
         attempts_add_failed(&session->hub->attempts, address_network(&session->peer), clock_now_ns());
+}
+
+static void count_unauthenticated(struct session *session, bool counts)
+{
+    if (session->is_unauthenticated == counts)
+        return;
+    session->is_unauthenticated = counts;
+    session->hub->unauthenticated += counts ? 1 : (size_t)-1;
+    session->owner->unauthenticated += counts ? 1 : UINT32_MAX;
 }
 
 static void on_key_proved(void *context, size_t index)
 {
     struct session *session = context;
+    struct owners *owners = &session->hub->owners;
     auth_identify_by_key(&session->identity, &session->keys, index);
     session->principal = principal_of(session);
+    struct owner *owner = owner_find(owners, owner_number(&session->identity, &session->peer));
+    if (!owner)
+        return; /* it goes on with the share of its network */
+    count_unauthenticated(session, false);
+    owner_unref(owners, session->owner);
+    session->owner = owner;
+    session->connection->entry.log_source = owner->number;
+    session->connection->entry.sharers = &owner->clients;
+    count_unauthenticated(session, true);
+}
+
+/* Whoever runs the daemon can always look at it. */
+static bool is_at_home(const struct session *session)
+{
+    const struct auth_identity *identity = &session->identity;
+    return identity->has_user && (identity->user == 0 || identity->user == geteuid());
+}
+
+static bool has_place(const struct session *session, char text[HANDSHAKE_TEXT_MAX_BYTES + 1])
+{
+    const struct session_limits *limits = &session->hub->options.limits;
+    const size_t text_bytes = HANDSHAKE_TEXT_MAX_BYTES + 1;
+    size_t all = introduced_count(session->hub);
+    bool at_home = is_at_home(session);
+    if (all >= limits->clients + (at_home ? PLACES_AT_HOME : 0u)) {
+        snprintf(text, text_bytes, "%u clients are connected, the limit; try again later", limits->clients);
+        return false;
+    }
+    if (at_home || session->owner->clients < owner_share(limits->clients, limits->share_percent))
+        return true;
+    snprintf(
+        text, text_bytes,
+        "%u of %u places are taken by the user or key of this client, its share; close one, try again later, or "
+        "raise limits.share in the daemon's configuration",
+        session->owner->clients, limits->clients);
+    return false;
 }
 
 static bool on_hello(void *context, const struct handshake_hello *hello, struct handshake_reply *reply)
@@ -296,9 +350,10 @@ static bool on_hello(void *context, const struct handshake_hello *hello, struct 
         snprintf(reply->text, sizeof(reply->text), "%s", error.text);
     else if (hub->stopping)
         snprintf(reply->text, sizeof(reply->text), "the daemon is about to stop");
-    else if (introduced_count(hub) >= hub->options.limits.clients)
-        snprintf(reply->text, sizeof(reply->text), "%u clients are connected, the limit; try again later",
-                 hub->options.limits.clients);
+    else
+        has_place(session, reply->text);
+    if (reply->version && reply->text[0])
+        reply->capabilities = HANDSHAKE_TRY_AGAIN;
     if (getrandom(reply->nonce, sizeof(reply->nonce), 0) < 0 ||
         getrandom(reply->session_token, sizeof(reply->session_token), 0) < 0)
         snprintf(reply->text, sizeof(reply->text), "no random numbers");
@@ -320,7 +375,8 @@ static void on_opened(void *context)
 {
     struct session *session = context;
     session->introduced = true;
-    session->hub->unauthenticated--;
+    count_unauthenticated(session, false);
+    session->owner->clients++;
     log_write(LOG_DEBUG, "session", "client %" PRIu64 " is %s, %s", session->number, session->name,
               session->identity.name);
     upload_begin(session);
@@ -369,12 +425,15 @@ static void on_closed(void *context)
     requests_finish(&session->requests);
     upload_finish(session);
     scenes_finish(session);
+    count_unauthenticated(session, false);
     if (session->introduced) {
-        hub_submit(hub, session->farewell);
+        session->owner->clients--;
+        hub_departed(hub, session->number, session->owner, session->transaction_bytes);
+        hub_submit(hub, session->owner, session->farewell);
     } else {
         engine_command_destroy(session->farewell);
-        hub->unauthenticated--;
     }
+    owner_unref(&hub->owners, session->owner);
     bool was_owner = session->number == hub->owner;
     free(session);
     if (was_owner && hub->owner_gone)
@@ -400,7 +459,7 @@ static const struct connection_handler connection_handler = {
 
 struct session *session_create(struct hub *hub, uint64_t number, int fd, bool sealed_only,
                                const struct address *peer, const struct auth_identity *identity,
-                               struct error *error)
+                               struct owner *owner, struct error *error)
 {
     struct session *session = calloc(1, sizeof(*session));
     if (!session) {
@@ -418,6 +477,8 @@ struct session *session_create(struct hub *hub, uint64_t number, int fd, bool se
         .keys = session->keys.keys,
         .key_count = session->keys.count,
         .sealed_only = sealed_only,
+        .log_source = owner->number,
+        .sharers = &owner->clients,
     };
     session->connection = session->farewell ? connection_create(hub->loop, fd, connection_limits_of(session),
                                                                 &entry, &connection_handler, session, error)
@@ -428,8 +489,16 @@ struct session *session_create(struct hub *hub, uint64_t number, int fd, bool se
         free(session);
         return NULL;
     }
-    hub->unauthenticated++;
+    session->owner = owner_ref(owner);
+    count_unauthenticated(session, true);
     return session;
+}
+
+void session_turn_away(struct session *session, const char *why)
+{
+    count_unauthenticated(session, false);
+    greeting_turn_away(session->connection->fd, why, HANDSHAKE_TRY_AGAIN);
+    connection_close(session->connection);
 }
 
 void session_stop(struct session *session)

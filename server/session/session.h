@@ -32,7 +32,9 @@ struct session {
     struct auth_keys keys; /* as they were when it came: others may be read while it proves that it has one */
     struct address peer;
     blob_principal principal;
+    struct owner *owner; /* whose share it uses */
     char name[HANDSHAKE_NAME_MAX_BYTES + 1];
+    bool is_unauthenticated;         /* it counts as such: the hello is not done */
     bool introduced;                 /* the hello is done: the engine may know it */
     bool can_h264;                   /* the client decodes it, and an encoder is here */
     bool can_abandon;                /* frames of views may end unfinished */
@@ -43,7 +45,7 @@ struct session {
     bool scenes_changed;   /* there may be changes to tell */
     struct session_blobs blobs;
     size_t transaction_edits;   /* in all transactions that are not answered */
-    uint64_t transaction_bytes; /* of them: memory */
+    uint64_t transaction_bytes; /* of them: memory, also of those that the engine has */
     struct job *jobs;           /* whose frame goes next is first */
     uint32_t job_count;
 };
@@ -51,7 +53,9 @@ struct session {
 /* `sealed_only`: it may not come in without a key. */
 struct session *session_create(struct hub *hub, uint64_t number, int fd, bool sealed_only,
                                const struct address *peer, const struct auth_identity *identity,
-                               struct error *error);
+                               struct owner *owner, struct error *error);
+/* Of one that has not introduced itself: says why, and closes. */
+void session_turn_away(struct session *session, const char *why);
 void session_stop(struct session *session); /* the daemon stops: goodbye */
 void session_close(struct session *session);
 void session_hold(struct session *session, bool held);                          /* reads no further */

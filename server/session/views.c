@@ -81,7 +81,7 @@ void view_add_change(struct job *job, struct view_change *change)
 {
     *job->view->changes_end = change;
     job->view->changes_end = &change->next;
-    job->session->hub->frame_bytes += change->frame_bytes;
+    hub_count_frames(job->session->hub, job->session->owner, (int64_t)change->frame_bytes);
 }
 
 struct view_change *view_find_change(const struct job *job, uint32_t request)
@@ -106,7 +106,7 @@ static void take_out(struct session_view *view, struct view_change *change)
 void view_drop_change(struct job *job, struct view_change *change)
 {
     take_out(job->view, change);
-    job->session->hub->frame_bytes -= change->frame_bytes;
+    hub_count_frames(job->session->hub, job->session->owner, -(int64_t)change->frame_bytes);
     free(change);
 }
 
@@ -115,7 +115,7 @@ void view_switch(struct job *job)
     struct session_view *view = job->view;
     struct view_change *change = view->changes;
     take_out(view, change);
-    job->session->hub->frame_bytes -= job->frame_bytes;
+    hub_count_frames(job->session->hub, job->session->owner, -(int64_t)job->frame_bytes);
     job->request = change->request;
     job->scene = change->scene;
     job->frame_bytes = change->frame_bytes;
@@ -300,7 +300,7 @@ static void tell_engine(struct job *job)
         return;
     }
     command->scene = job->scene;
-    hub_submit(session->hub, command);
+    hub_submit(session->hub, session->owner, command);
 }
 
 void views_look(struct session *session, const struct message_view_camera *message)

@@ -362,7 +362,10 @@ static void say_stats(const struct engine_command *command)
     struct engine_stats *stats = calloc(1, sizeof(*stats));
     FUZZ_REQUIRE(stats);
     strcpy(stats->device.name, "recorder");
-    say(ENGINE_STATS_READY, command->client, command->request)->stats = stats;
+    struct engine_event *event = say(ENGINE_STATS_READY, command->client, command->request);
+    event->stats = stats;
+    event->answers_stats = true;
+    event->owner = command->owner;
 }
 
 static void carry_out_on(struct engine_command *command, struct recorded_reference *reference)

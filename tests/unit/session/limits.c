@@ -226,44 +226,96 @@ TEST(times_below_a_second_are_not_stated_as_none)
 
 /* ---- connections ------------------------------------------------------------------------------------- */
 
+static void expect_refused(struct client *client, const char *why)
+{
+    send_hello(client);
+    struct handshake_reply reply = receive_reply(client);
+    assert_int_equal(reply.version, 0);
+    assert_true(reply.capabilities & HANDSHAKE_TRY_AGAIN);
+    if (!strstr(reply.text, why))
+        fail_msg("\"%s\" does not say \"%s\"", reply.text, why);
+    expect_end(client);
+    go(client);
+}
+
 TEST(one_client_too_many_is_refused_and_may_connect_later)
 {
     struct hub_options options = usual_options();
     options.limits.clients = 2;
     start_daemon(&options);
-    struct client *one = come(false), *other = come(true), *third = knock(false);
-    send_hello(third);
-    struct handshake_reply reply = receive_reply(third);
-    assert_int_equal(reply.version, 0);
-    assert_non_null(strstr(reply.text, "2 clients are connected"));
-    expect_end(third);
-    go(third);
+    struct client *one = come(true), *other = come(true);
+    expect_refused(knock(true), "2 clients are connected");
     expect_served(one);
     expect_served(other);
     cut(other, one);
-    third = come(true);
-    expect_served(third);
-    go(third);
+    other = come(true);
+    expect_served(other);
+    go(other);
     go(one);
 }
 
-TEST(a_client_beside_too_many_silent_ones_waits_until_one_speaks)
+TEST(the_daemons_own_user_finds_a_place_where_others_do_not)
 {
     struct hub_options options = usual_options();
-    options.limits.unauthenticated = 2;
+    options.limits.clients = 1;
     start_daemon(&options);
-    /* All at one socket, which lets them in as they come. */
-    struct client *client = come(false), *silent[2] = {knock(false), knock(false)}, *late = knock(false);
-    send_hello(late);
+    struct client *stranger = come(true), *own[4];
+    for (int i = 0; i < 3; i++)
+        own[i] = come(false); /* by the Unix socket, which tells the user */
+    own[3] = come(false);
+    expect_refused(knock(true), "1 clients are connected");
+    expect_refused(knock(false), "1 clients are connected");
+    expect_served(stranger);
+    for (int i = 0; i < 4; i++)
+        go(own[i]);
+    go(stranger);
+}
+
+TEST(one_user_leaves_places_for_others)
+{
+    struct hub_options options = usual_options();
+    options.limits.clients = 8;
+    options.limits.share_percent = 50;
+    start_daemon(&options);
+    struct client *clients[4];
+    for (int i = 0; i < 4; i++)
+        clients[i] = come(true);
+    expect_refused(knock(true), "4 of 8 places");
+    struct client *other = come(false);
+    expect_served(other);
+    go(other);
+    for (int i = 0; i < 4; i++)
+        go(clients[i]);
+}
+
+/* Those that say nothing give way to the next, whichever user they are: only a client of their own may have to
+ * come again, and none of another. */
+TEST(silent_connections_keep_no_one_out)
+{
+    struct hub_options options = usual_options();
+    options.limits.unauthenticated = 8;
+    options.limits.unauthenticated_per_address = 64;
+    start_daemon(&options);
+    struct client *client = come(false), *silent[32];
+    for (int i = 0; i < 32; i++)
+        silent[i] = knock(true);
     expect_served(client);
-    assert_false(has_come(late, 300));
-    greet(silent[1]); /* silent[0] is as silent as before */
-    assert_int_equal(receive_reply(late).version, 1);
-    expect_served(silent[1]);
-    expect_served(client);
-    for (int i = 0; i < 2; i++)
+    struct client *late = knock(false);
+    expect_served(client); /* `late` is silent as well for now, and stays */
+    struct client *another = come(false);
+    greet(late);
+    expect_served(late);
+    int told = 0;
+    for (int i = 0; i < 32; i++) {
+        if (has_come(silent[i], 0)) {
+            assert_non_null(strstr(receive_reply(silent[i]).text, "have not introduced themselves"));
+            told++;
+        }
         go(silent[i]);
+    }
+    assert_true(told >= 32 - 4); /* half of the limit may stay */
     go(late);
+    go(another);
     go(client);
 }
 

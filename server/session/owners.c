@@ -1,0 +1,77 @@
+/* SPDX-License-Identifier: MIT */
+#include "session/owners.h"
+
+#include <stdlib.h>
+
+/* Kinds of numbers: users are 32-bit numbers, keys have the top bit set. */
+#define KEY_BIT (UINT64_C(1) << 63)
+#define NETWORK_BIT (UINT64_C(1) << 62)
+
+uint64_t owner_number(const struct auth_identity *identity, const struct address *peer)
+{
+    if (identity->has_key)
+        return KEY_BIT | identity->key;
+    if (identity->has_user)
+        return identity->user;
+    return (address_network(peer) & ~KEY_BIT) | NETWORK_BIT;
+}
+
+struct owner *owner_find(struct owners *owners, uint64_t number)
+{
+    struct owner *owner = hashmap_get(&owners->by_number, number);
+    if (owner)
+        return owner_ref(owner);
+    owner = calloc(1, sizeof(*owner));
+    if (!owner || !hashmap_put(&owners->by_number, number, owner)) {
+        free(owner);
+        return NULL;
+    }
+    owner->number = number;
+    owner->references = 1;
+    owner->waiting_end = &owner->waiting;
+    return owner;
+}
+
+struct owner *owner_ref(struct owner *owner)
+{
+    owner->references++;
+    return owner;
+}
+
+void owner_unref(struct owners *owners, struct owner *owner)
+{
+    if (!owner || --owner->references)
+        return;
+    hashmap_remove(&owners->by_number, owner->number);
+    free(owner);
+}
+
+void owners_finish(struct owners *owners)
+{
+    hashmap_finish(&owners->by_number);
+}
+
+struct owner *owners_most_unauthenticated(const struct owners *owners)
+{
+    struct owner *most = NULL;
+    size_t cursor = 0;
+    void *value;
+    while (hashmap_next(&owners->by_number, &cursor, NULL, &value)) {
+        struct owner *owner = value;
+        if (owner->unauthenticated > (most ? most->unauthenticated : 0))
+            most = owner;
+    }
+    return most;
+}
+
+uint64_t owner_share(uint64_t limit, uint32_t percent)
+{
+    uint64_t share = !percent ? limit : limit / 100 * percent + limit % 100 * percent / 100;
+    return share ? share : 1;
+}
+
+bool owner_may_have(uint64_t own, uint64_t all, uint64_t more, uint64_t limit, uint32_t percent)
+{
+    uint64_t share = owner_share(limit, percent);
+    return more <= limit && all <= limit - more && more <= share && own <= share - more;
+}
