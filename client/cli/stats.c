@@ -1,22 +1,32 @@
 /* SPDX-License-Identifier: MIT */
 #include "cli/cli.h"
+#include "lib/text.h"
 
+#include <errno.h>
 #include <inttypes.h>
 #include <jansson.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <unistd.h>
 
-enum { KEY_JSON = 0x400, KEY_LIMITS };
+#define WATCH_DEFAULT_S 2.0
+#define WATCH_MIN_S 0.1
+#define WATCH_MAX_S 86400.0
+
+enum { KEY_JSON = 0x400, KEY_LIMITS, KEY_WATCH };
 
 struct stats_options {
     struct cli_daemon daemon;
     bool json, limits;
+    double watch_s;     /* 0: once */
     struct cli_job job; /* holds the error of what was typed */
 };
 
 static const struct argp_option options[] = {
     {"json", KEY_JSON, NULL, 0, "Print one JSON object on one line", 0},
     {"limits", KEY_LIMITS, NULL, 0, "Show the daemon's limits too (JSON always contains them)", 0},
+    {"watch", KEY_WATCH, "SECONDS", OPTION_ARG_OPTIONAL,
+     "Show them again after so many seconds (default 2), until Ctrl-C; write --watch=10", 0},
     {0},
 };
 
@@ -35,6 +45,12 @@ static error_t parse(int key, char *value, struct argp_state *state)
     case KEY_LIMITS:
         wanted->limits = true;
         return 0;
+    case KEY_WATCH:
+        wanted->watch_s = WATCH_DEFAULT_S;
+        if (!value || fl_text_real(value, WATCH_MIN_S, WATCH_MAX_S, &wanted->watch_s, &wanted->job.error))
+            return 0;
+        snprintf(wanted->job.error.field, sizeof(wanted->job.error.field), "--watch");
+        return EINVAL;
     case ARGP_KEY_ARG:
         return cli_usage(&wanted->job, value, "is an argument too many");
     default:
@@ -87,6 +103,26 @@ static json_t *scenes_array(const struct message_stats_reply *reply)
     return array;
 }
 
+static json_t *running_array(const struct message_stats_reply *reply)
+{
+    json_t *array = json_array();
+    for (uint32_t i = 0; i < reply->running_count; i++) {
+        const struct record_job_stat *job = &reply->running[i];
+        json_t *object =
+            json_pack("{s:s,s:s,s:s,s:s}", "owner", job->owner, "kind", protocol_job_kind_text(job->kind), "scene",
+                      job->scene, "tracer", protocol_tracer_text(job->tracer));
+        set(object, "client", job->client);
+        set(object, "running_ns", job->running_ns);
+        set(object, "frames_sent", job->frames_sent);
+        if (job->frames_total > 0) {
+            set(object, "frames_total", job->frames_total);
+            set(object, "frame", job->frame);
+        }
+        json_array_append_new(array, object);
+    }
+    return array;
+}
+
 static json_t *stages_array(const struct message_stats_reply *reply)
 {
     json_t *array = json_array();
@@ -129,6 +165,7 @@ static void print_json(const struct fl_connection *connection, const struct mess
     json_object_set_new(object, "limits", limits_object(connection));
     json_object_set_new(object, "clients", clients_array(reply));
     json_object_set_new(object, "scenes", scenes_array(reply));
+    json_object_set_new(object, "running", running_array(reply));
     json_object_set_new(object, "stages", stages_array(reply));
     json_dumpf(object, stdout, JSON_COMPACT);
     fputc('\n', stdout);
@@ -165,6 +202,22 @@ static void print_stages(const struct message_stats_reply *reply)
     }
 }
 
+static void print_jobs(const struct message_stats_reply *reply)
+{
+    char text[130];
+    for (uint32_t i = 0; i < reply->running_count; i++) {
+        const struct record_job_stat *job = &reply->running[i];
+        printf("job of %-5" PRIu64 " %s, ", job->client, plain(job->owner, text));
+        printf("%s of %s, %s, for %.1f s, ", protocol_job_kind_text(job->kind),
+               job->scene[0] != '\0' ? plain(job->scene, text) : "a private scene",
+               protocol_tracer_text(job->tracer), (double)job->running_ns * 1e-9);
+        if (job->frames_total == 0)
+            printf("%" PRIu64 " frames sent\n", job->frames_sent);
+        else
+            printf("frame %u, %" PRIu64 " of %" PRIu64 " sent\n", job->frame, job->frames_sent, job->frames_total);
+    }
+}
+
 static void print_table(const struct message_stats_reply *reply)
 {
     char text[130];
@@ -193,6 +246,7 @@ static void print_table(const struct message_stats_reply *reply)
                scene->client, scene->scene, plain(scene->name, text), scene->revision, scene->nodes,
                scene->triangles, scene->spheres, mb(scene->host_bytes), mb(scene->device_bytes));
     }
+    print_jobs(reply);
     print_stages(reply);
 }
 
@@ -203,26 +257,53 @@ static void print_limits(const struct fl_connection *connection)
         printf("limit  %-27s %14" PRIu64 "  %s\n", limit.name, limit.value, limit.what);
 }
 
+static bool show(struct fl_connection *connection, const struct stats_options *wanted, struct fl_error *error)
+{
+    const struct message_stats_reply *reply = NULL;
+    if (!fl_stats(connection, &reply, error))
+        return false;
+    if (wanted->watch_s > 0 && !wanted->json && cli_is_terminal(STDOUT_FILENO))
+        fputs("\033[H\033[J", stdout); /* on an empty screen */
+    if (wanted->json)
+        print_json(connection, reply);
+    else
+        print_table(reply);
+    if (wanted->limits && !wanted->json)
+        print_limits(connection);
+    return true;
+}
+
+/* An interruption is its normal end. */
+static bool watch(struct fl_connection *connection, const struct stats_options *wanted, struct fl_error *error)
+{
+    while (show(connection, wanted, error)) {
+        if (!wanted->json && !cli_is_terminal(STDOUT_FILENO))
+            putchar('\n'); /* between blocks */
+        if (fflush(stdout) != 0)
+            return true; /* the reader is gone, or the disk is full: main() tells */
+        if (!fl_connection_wait(connection, (unsigned)(wanted->watch_s * 1e3), error))
+            break;
+    }
+    if (error->code != FL_ERROR_INTERRUPTED)
+        return false;
+    *error = (struct fl_error){0};
+    return true;
+}
+
 int cli_stats(int argc, char **argv)
 {
     static const struct argp argp = {
         .options = options,
         .parser = parse,
         .children = children,
-        .doc = "Show a daemon's device, clients, scenes, memory, stage times and limits."};
+        .doc = "Show a daemon's device, clients, scenes, jobs, memory, stage times and limits."};
     struct stats_options wanted = {0};
     if (argp_parse(&argp, argc, argv, 0, NULL, &wanted) != 0)
         return cli_report(&wanted.job.error);
     struct fl_error error = {0};
     struct fl_connection *connection = cli_daemon_connect(&wanted.daemon, "farlight stats", true, &error);
-    const struct message_stats_reply *reply = NULL;
-    const bool done = connection && fl_stats(connection, &reply, &error);
-    if (done && wanted.json)
-        print_json(connection, reply);
-    else if (done)
-        print_table(reply);
-    if (done && wanted.limits && !wanted.json)
-        print_limits(connection);
+    const bool done = connection && (wanted.watch_s > 0 ? watch(connection, &wanted, &error)
+                                                        : show(connection, &wanted, &error));
     fl_connection_destroy(connection);
     return done ? CLI_DONE : cli_report(&error);
 }

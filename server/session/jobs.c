@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "session/jobs.h"
 
+#include "base/clock.h"
 #include "session/frames.h"
 #include "session/job_terms.h"
 #include "session/session.h"
@@ -47,6 +48,11 @@ static struct job *job_create(struct session *session, uint32_t request, const s
         .request = request,
         .channel = render->channel,
         .scene = render->scene,
+        .tracer = render->tracer,
+        .first_frame = render->first_frame,
+        .last_frame = render->last_frame,
+        .frame_step = render->frame_step,
+        .begun_ns = clock_now_ns(),
         .client_credit = render->credit,
         .window = job_window(session, render),
         .frame_bytes = job_bytes(session, render),
@@ -73,6 +79,7 @@ static bool add_change(struct job *job, uint32_t request, const struct message_r
     *change = (struct view_change){
         .request = request,
         .scene = render->scene,
+        .tracer = render->tracer,
         .credit = job->client_credit > job->frames_sent ? 1 : 0,
         .frame_bytes = job_bytes(job->session, render),
         .terms = view_terms_of(render),

@@ -18,6 +18,9 @@ struct job {
     struct job *next;
     struct session *session;
     uint32_t request, channel, scene;
+    enum protocol_tracer tracer;
+    uint32_t first_frame, last_frame, frame_step; /* of a batch */
+    uint64_t begun_ns;
     uint64_t frames_sent;
     uint64_t client_credit; /* frames, absolute, as the client said */
     uint64_t engine_credit; /* the part of it that the engine was told, counted in frames of `request` .. */

@@ -11,6 +11,7 @@
 
 struct session_scene {
     enum session_scene_state state;
+    char name[SCENE_NAME_MAX + 1];
     uint64_t changed_revision; /* to be told; 0: nothing is */
 };
 
@@ -23,6 +24,12 @@ enum session_scene_state session_scene(const struct session *session, uint32_t s
 {
     const struct session_scene *found = find(session, scene);
     return found ? found->state : 0;
+}
+
+const char *session_scene_name(const struct session *session, uint32_t scene)
+{
+    const struct session_scene *found = find(session, scene);
+    return found ? found->name : "";
 }
 
 static void forget(struct session *session, uint32_t scene)
@@ -41,7 +48,7 @@ void scenes_finish(struct session *session)
 
 /* ---- coming and going -------------------------------------------------------------------------------- */
 
-static bool add(struct session *session, uint32_t scene, const char *field, struct error *error)
+static bool add(struct session *session, uint32_t scene, const char *name, const char *field, struct error *error)
 {
     uint32_t limit = session->hub->options.limits.scenes_per_client;
     if (find(session, scene))
@@ -56,6 +63,7 @@ static bool add(struct session *session, uint32_t scene, const char *field, stru
         return error_set(error, ERROR_OUT_OF_MEMORY, field, "no memory");
     }
     added->state = SCENE_OPENING;
+    snprintf(added->name, sizeof(added->name), "%s", name);
     return true;
 }
 
@@ -80,7 +88,7 @@ void scenes_open(struct session *session, struct request *request, const struct 
     /* No other client is ever the same user. */
     if (sharing == SHARING_KEPT && !session->identity.known)
         sharing = SHARING_PRIVATE;
-    if (!add(session, open->scene, "scene_open.scene", &error)) {
+    if (!add(session, open->scene, open->name, "scene_open.scene", &error)) {
         request_answer_error(session, request, &error);
         return;
     }
@@ -90,7 +98,7 @@ void scenes_open(struct session *session, struct request *request, const struct 
 void scenes_attach(struct session *session, struct request *request, const struct message_scene_attach *attach)
 {
     struct error error = {0};
-    if (!add(session, attach->scene, "scene_attach.scene", &error)) {
+    if (!add(session, attach->scene, attach->name, "scene_attach.scene", &error)) {
         request_answer_error(session, request, &error);
         return;
     }

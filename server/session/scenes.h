@@ -18,6 +18,8 @@ void scenes_describe(struct session *session, struct request *request,
 
 /* State of a scene, 0: it does not exist. */
 enum session_scene_state session_scene(const struct session *session, uint32_t scene);
+/* As it was opened or attached to; empty: there is none. */
+const char *session_scene_name(const struct session *session, uint32_t scene);
 
 /* The engine's answers: to an open or an attach, to a close, to the others. */
 void scenes_opened(struct session *session, struct request *request, uint64_t revision);

@@ -4,6 +4,7 @@
 #include "base/clock.h"
 #include "protocol/codec.h"
 #include "protocol/version.h"
+#include "session/jobs.h"
 #include "session/session.h"
 
 #include <stdio.h>
@@ -12,6 +13,7 @@
 
 #define CLIENTS_MAX 256
 #define SCENES_MAX 256
+#define JOBS_MAX 256
 #define STAGES_MAX (STAGE_COUNT * 2)
 #define NAME_BYTES 65
 
@@ -20,6 +22,7 @@ struct stats_storage {
     char client_names[CLIENTS_MAX][NAME_BYTES];
     struct record_scene_stat scenes[SCENES_MAX];
     struct record_stage_total stages[STAGES_MAX];
+    struct record_job_stat jobs[JOBS_MAX];
 };
 
 static void fill_client(struct record_client_stat *stat, char name[NAME_BYTES], const struct session *session,
@@ -87,6 +90,54 @@ static uint32_t fill_scenes(struct stats_storage *storage, const struct session 
     return count;
 }
 
+/* A client of the same user or key has the scene, or a scene of that name is listed for this client anyway. */
+static bool may_know_scene(const struct session *asker, const struct session *owner, const char *name,
+                           const struct engine_stats *stats)
+{
+    bool may = owner->principal == asker->principal;
+    for (uint32_t i = 0; !may && i < stats->scene_count; i++)
+        may = stats->scenes[i].is_known && strcmp(stats->scenes[i].name, name) == 0;
+    return may;
+}
+
+static void fill_job(struct record_job_stat *stat, const struct job *job, uint64_t now_ns)
+{
+    const uint64_t next = job->first_frame + job->frames_sent * job->frame_step;
+    *stat = (struct record_job_stat){
+        .client = job->session->number,
+        .running_ns = now_ns - job->begun_ns,
+        .frames_sent = job->frames_sent,
+        .frames_total = job->view ? 0 : (job->last_frame - job->first_frame) / job->frame_step + 1,
+        .frame = job->view ? 0 : (uint32_t)(next < job->last_frame ? next : job->last_frame),
+        .kind = job->view ? PROTOCOL_JOB_VIEW : PROTOCOL_JOB_BATCH,
+        .tracer = job->tracer,
+        .owner = job->session->identity.name,
+        .scene = session_scene_name(job->session, job->scene),
+    };
+}
+
+/* A read-only client is told of its own alone. */
+static uint32_t fill_jobs(struct stats_storage *storage, const struct session *asker,
+                          const struct engine_stats *stats)
+{
+    const uint64_t now_ns = clock_now_ns();
+    uint32_t count = 0;
+    size_t cursor = 0;
+    void *value;
+    while (hashmap_next(&asker->hub->sessions, &cursor, NULL, &value)) {
+        const struct session *session = value;
+        if (asker->identity.read_only && session != asker)
+            continue;
+        for (const struct job *job = session->jobs; job && count < JOBS_MAX; job = job->next) {
+            struct record_job_stat *stat = &storage->jobs[count++];
+            fill_job(stat, job, now_ns);
+            if (!may_know_scene(asker, session, stat->scene, stats))
+                stat->scene = "";
+        }
+    }
+    return count;
+}
+
 static uint32_t fill_stages(struct stats_storage *storage, const struct engine_stats *stats)
 {
     uint32_t count = 0;
@@ -143,9 +194,13 @@ void stats_answer(struct session *session, struct request *request, const struct
     reply->scenes_count = fill_scenes(storage, session, stats);
     reply->stages = storage->stages;
     reply->stages_count = fill_stages(storage, stats);
-    /* A very busy daemon has more to tell than one message holds: the totals matter more than the last scenes. */
-    while (reply->scenes_count && message_payload_bytes(&message) > CODEC_CONTROL_PAYLOAD_MAX_BYTES)
-        reply->scenes_count--;
+    reply->running = storage->jobs;
+    reply->running_count = fill_jobs(storage, session, stats);
+    /* A very busy daemon has more to tell than one message holds: the totals matter more than the last scenes and
+     * jobs. */
+    while ((reply->scenes_count || reply->running_count) &&
+           message_payload_bytes(&message) > CODEC_CONTROL_PAYLOAD_MAX_BYTES)
+        --*(reply->scenes_count > reply->running_count ? &reply->scenes_count : &reply->running_count);
     if (session_send(session, request->id, 0, &message)) {
         request_answered(session, request);
     } else {

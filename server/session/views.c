@@ -118,6 +118,7 @@ void view_switch(struct job *job)
     hub_count_frames(job->session->hub, job->session->owner, -(int64_t)job->frame_bytes);
     job->request = change->request;
     job->scene = change->scene;
+    job->tracer = change->tracer;
     job->frame_bytes = change->frame_bytes;
     job->engine_credit = change->credit;
     job->frames_gone = 0;

@@ -27,6 +27,7 @@ struct view_terms {
 struct view_change {
     struct view_change *next;
     uint32_t request, scene;
+    enum protocol_tracer tracer;
     uint64_t credit, frame_bytes; /* as of struct job: engine_credit, frame_bytes */
     struct view_terms terms;
     bool cancelled;

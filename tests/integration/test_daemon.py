@@ -3,6 +3,8 @@
 
 Each test that misbehaves ends with `assert_alive`: a bystander, connected all the while, still gets its answer.
 """
+import contextlib
+import json
 import os
 import pathlib
 import random
@@ -10,6 +12,7 @@ import signal
 import socket
 import stat
 import struct
+import subprocess
 import time
 
 import farlight_test
@@ -426,6 +429,53 @@ class Jobs(Case):
                 time.sleep(0.1)
             self.assertEqual(jobs, 0)
             peer.close()
+
+    def test_stats_say_whose_jobs_run_and_which_frame_of_how_many(self):
+        with Daemon() as daemon, self.animation(daemon):
+            deadline = time.monotonic() + farlight_test.TIMEOUT_S
+            jobs = []
+            while not (jobs and jobs[0]["frames_sent"] > 0):
+                self.assertLess(time.monotonic(), deadline)
+                jobs = json.loads(self.expect(farlight("stats", "--json", "--server", daemon.address), 0).stdout)["running"]
+                time.sleep(0.02)
+            job = jobs[0]
+            self.assertEqual((len(jobs), job["owner"], job["kind"], job["scene"], job["tracer"], job["frames_total"]),
+                             (1, f"user {os.getuid()}", "batch", "teapot.glb", "bvh", 100001))
+            self.assertEqual(job["frame"], 7 + 3 * job["frames_sent"])
+            self.assertGreater(job["running_ns"], 0)
+            table = self.expect(farlight("stats", "--server", daemon.address), 0).stdout
+            self.assertRegex(table, r"(?m)^job of \d+ +user \d+, batch of teapot.glb, bvh, for [0-9.]+ s, frame \d+, \d+ of 100001 sent$")
+
+    def test_stats_are_watched_until_an_interrupt(self):
+        with Daemon() as daemon:
+            watched = subprocess.Popen([farlight_test.BIN / "farlight", "stats", "--json", "--watch=0.1", "--server",
+                                        daemon.address], stdout=subprocess.PIPE, text=True)
+            self.addCleanup(watched.stdout.close)
+            uptimes = [json.loads(watched.stdout.readline())["uptime_ns"] for _ in range(3)]
+            self.assertEqual(uptimes, sorted(set(uptimes)))
+            watched.send_signal(signal.SIGINT)
+            self.assertEqual(watched.wait(farlight_test.TIMEOUT_S), 0)
+            watched = subprocess.Popen([farlight_test.BIN / "farlight", "stats", "--watch=0.1", "--server", daemon.address],
+                                       stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+            self.addCleanup(watched.stderr.close)
+            self.addCleanup(watched.stdout.close)
+            while watched.stdout.readline() != "\n":  # the end of a block
+                self.assertIsNone(watched.poll())
+            daemon.process.kill()
+            self.assertEqual(watched.wait(farlight_test.TIMEOUT_S), 75)
+        for wrong in ("0", "x", "1e9"):
+            self.expect(farlight("stats", "--server", "unix:/nonexistent", f"--watch={wrong}"), 2)
+
+    @contextlib.contextmanager
+    def animation(self, daemon):
+        child = subprocess.Popen(
+            [farlight_test.BIN / "farlight", "animate", bundled_scenes() / "teapot.glb", "--server", daemon.address, "--frames",
+             "7-300007:3", "--orbit", "--size", "320x240", "-o", self.folder / "%04d.png", "-q"])
+        try:
+            yield child
+        finally:
+            child.kill()
+            child.wait()
 
 
 if __name__ == "__main__":

@@ -360,6 +360,48 @@ TEST(what_others_keep_to_themselves_has_no_name_in_stats)
     cut(owner, NULL);
 }
 
+static void start_job(struct client *client, uint32_t scene, uint32_t channel)
+{
+    struct message message = made(MESSAGE_RENDER);
+    message.render.scene = scene;
+    message.render.channel = channel;
+    message.render.first_frame = 10;
+    message.render.last_frame = 19;
+    message.render.frame_step = 3;
+    message.render.credit = 0;
+    message.render.width = message.render.height = 16;
+    message.render.tracer = PROTOCOL_TRACER_NAIVE;
+    send_message(client, 800 + scene, 0, &message);
+}
+
+TEST(a_job_is_told_with_its_owner_its_frames_and_the_name_of_a_scene_that_is_no_secret)
+{
+    struct client *owner = come(true), *other = come(true);
+    open_one_of_each(owner);
+    for (uint32_t scene = 1; scene <= 3; scene++)
+        start_job(owner, scene, 10 + scene);
+    const struct message_stats_reply *stats = stats_of(owner);
+    assert_int_equal(stats->running_count, 3);
+    const struct message_stats_reply *told = stats_of(other);
+    assert_int_equal(told->running_count, 3);
+    unsigned named = 0;
+    for (uint32_t i = 0; i < 3; i++) {
+        const struct record_job_stat *job = &told->running[i];
+        assert_int_equal(job->client, 1);
+        assert_int_equal(job->frames_sent, 0);
+        assert_int_equal(job->frames_total, 4);
+        assert_int_equal(job->frame, 10);
+        assert_int_equal(job->kind, PROTOCOL_JOB_BATCH);
+        assert_int_equal(job->tracer, PROTOCOL_TRACER_NAIVE);
+        assert_true(job->owner[0] != '\0');
+        assert_true(job->scene[0] == '\0' || strcmp(job->scene, "shared") == 0);
+        named += job->scene[0] != '\0';
+    }
+    assert_int_equal(named, 1);
+    cut(other, NULL);
+    cut(owner, NULL);
+}
+
 TEST_WITH(a_reader_hears_of_no_other_client, set_up_for_readers, tear_down)
 {
     struct client *owner = come(true), *reader = come(false);
