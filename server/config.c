@@ -59,7 +59,7 @@ static const struct option options[] = {
     {"engine", "device", START, OPTION_TEXT, AT(device), "auto", 0, 0, "",
      "GPU: a number of --list-devices, software, or auto for the first hardware, else software"},
     {"engine", "encode_threads", START, OPTION_U32, AT(encode_threads), "0", 0, 64, "",
-     "Threads that encode frames; 0: one per core, at most 4"},
+     "Threads that encode frames, of which one user or key has all but one at most; 0: one per core, 2 to 4"},
     {"engine", "frames_in_flight", START, OPTION_U32, AT(frames_in_flight), "3", 1, 16, "",
      "Frames of one job between the renderer and the network"},
     {"engine", "queue", START, OPTION_U32, AT(engine_queue), "1024", 16, 65536, "",

@@ -121,39 +121,48 @@ static void residuals_of_row(struct residuals *residuals, size_t channel, size_t
     predict_row(residuals->out, row, residuals->above, width);
 }
 
-/* Row by row: all residuals at once would take as much memory as the picture. Returns 0, an error of zstd's, or
- * how many bytes did not fit into `out`. */
-static size_t pack(ZSTD_CCtx *context, struct residuals *residuals, ZSTD_outBuffer *out)
+/* Row by row: all residuals at once would take as much memory as the picture. *left: 0, an error of zstd's, or how
+ * many bytes did not fit into `out`. False: it was given up. */
+static bool pack(ZSTD_CCtx *context, struct residuals *residuals, const struct predicted_source *source,
+                 ZSTD_outBuffer *out, size_t *left)
 {
-    size_t height = residuals->form->rows, rows = residuals->form->pixel_bytes * height, left = 0;
+    size_t height = residuals->form->rows, rows = residuals->form->pixel_bytes * height;
+    *left = 0;
     for (size_t i = 0; i < rows; i++) {
+        if (source->is_given_up && source->is_given_up(source->context))
+            return false;
         residuals_of_row(residuals, i / height, i % height);
         ZSTD_inBuffer in = {residuals->out, residuals->form->width, 0};
         bool last = i + 1 == rows;
         do {
-            left = ZSTD_compressStream2(context, out, &in, last ? ZSTD_e_end : ZSTD_e_continue);
-            if (ZSTD_isError(left) || (left && out->pos == out->size))
-                return left;
-        } while (last ? left > 0 : in.pos < in.size);
+            *left = ZSTD_compressStream2(context, out, &in, last ? ZSTD_e_end : ZSTD_e_continue);
+            if (ZSTD_isError(*left) || (*left && out->pos == out->size))
+                return true;
+        } while (last ? *left > 0 : in.pos < in.size);
     }
-    return left;
+    return true;
 }
 
-struct predicted_result predicted_encode(const struct predicted_form *form, const uint8_t *pixels, unsigned level,
-                                         uint8_t *out, size_t capacity)
+struct predicted_result predicted_encode(const struct predicted_source *source, uint8_t *out, size_t capacity)
 {
     ZSTD_outBuffer packed = {out, capacity, 0};
     ZSTD_CCtx *context = ZSTD_createCCtx();
-    struct residuals *residuals = residuals_create(form, pixels);
+    struct residuals *residuals = residuals_create(&source->form, source->pixels);
     struct predicted_result result = no_memory();
     if (context && residuals) {
-        int clamped = (int)(level < 1 ? 1 : level > LEVEL_MAX ? LEVEL_MAX : level);
-        ZSTD_CCtx_setParameter(context, ZSTD_c_compressionLevel, clamped);
-        ZSTD_CCtx_setPledgedSrcSize(context, bytes_of(form));
-        size_t left = pack(context, residuals, &packed);
-        result = ZSTD_isError(left) ? failed(ZSTD_getErrorName(left))
-                 : left             ? failed("the capacity is too small")
-                                    : (struct predicted_result){.bytes = packed.pos};
+        unsigned level = source->level;
+        size_t left;
+        ZSTD_CCtx_setParameter(context, ZSTD_c_compressionLevel,
+                               (int)(level < 1           ? 1
+                                     : level > LEVEL_MAX ? LEVEL_MAX
+                                                         : level));
+        ZSTD_CCtx_setPledgedSrcSize(context, bytes_of(&source->form));
+        if (!pack(context, residuals, source, &packed, &left))
+            result = (struct predicted_result){.status = PREDICTED_GIVEN_UP};
+        else
+            result = ZSTD_isError(left) ? failed(ZSTD_getErrorName(left))
+                     : left             ? failed("the capacity is too small")
+                                        : (struct predicted_result){.bytes = packed.pos};
     }
     free(residuals);
     ZSTD_freeCCtx(context);

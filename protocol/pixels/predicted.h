@@ -19,10 +19,11 @@
 #ifndef FARLIGHT_PROTOCOL_PIXELS_PREDICTED_H
 #define FARLIGHT_PROTOCOL_PIXELS_PREDICTED_H
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
-enum predicted_status { PREDICTED_DONE, PREDICTED_NO_MEMORY, PREDICTED_FAILED };
+enum predicted_status { PREDICTED_DONE, PREDICTED_NO_MEMORY, PREDICTED_FAILED, PREDICTED_GIVEN_UP };
 
 struct predicted_result {
     enum predicted_status status;
@@ -35,11 +36,19 @@ struct predicted_form {
     uint32_t width, rows, pixel_bytes;
 };
 
+struct predicted_source {
+    struct predicted_form form;
+    const uint8_t *pixels;
+    unsigned level; /* zstd's, clamped to 1 .. 19 */
+    /* Asked at each row of a channel; true ends the work. NULL: it goes to its end. */
+    bool (*is_given_up)(const void *context);
+    const void *context;
+};
+
 /* How many bytes predicted_encode() may need; 0: more than a size_t can say. */
 size_t predicted_bound(const struct predicted_form *form);
-/* `level` is zstd's, clamped to 1 .. 19. Fails where `capacity` is too small. */
-struct predicted_result predicted_encode(const struct predicted_form *form, const uint8_t *pixels, unsigned level,
-                                         uint8_t *out, size_t capacity);
+/* Fails where `capacity` is too small. */
+struct predicted_result predicted_encode(const struct predicted_source *source, uint8_t *out, size_t capacity);
 /* Fills width * rows * pixel_bytes bytes. Pixels have 4, 8 or 16 bytes. Fails where `encoded` is damaged, or of
  * another size. */
 struct predicted_result predicted_decode(const struct predicted_form *form, const uint8_t *encoded,

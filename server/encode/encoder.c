@@ -45,6 +45,11 @@ enum ycbcr encoder_takes(enum encoding encoding, unsigned quality)
     return is_known(encoding) && impls[encoding]->takes ? impls[encoding]->takes(quality) : YCBCR_NONE;
 }
 
+bool encoder_given_up(struct error *error)
+{
+    return error_set(error, ERROR_CANCELLED, "encoding", "nobody waits for the frame any more");
+}
+
 bool encoder_encode(enum encoding encoding, const struct picture *picture, unsigned quality, uint8_t **out,
                     size_t *out_bytes, struct error *error)
 {

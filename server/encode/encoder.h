@@ -18,6 +18,10 @@ struct picture {
      */
     enum ycbcr ycbcr;
     struct ycbcr_planes planes;
+    /* Asked every few milliseconds by encoders that may take seconds: nobody waits for the bytes any more. NULL:
+     * somebody always does. */
+    bool (*is_given_up)(const void *context);
+    const void *given_up_context;
 };
 
 /* Of the pixels; 0: more than a size_t can say. */
@@ -41,7 +45,8 @@ bool encoder_supports(enum encoding encoding, uint32_t bytes_per_pixel);
 bool encoder_loses(enum encoding encoding);
 /* Which planes spare it a conversion and lose nothing that it keeps; RGBA8 it takes in any case. */
 enum ycbcr encoder_takes(enum encoding encoding, unsigned quality);
-/* *out is malloc'ed; quality as in the protocol's render message. */
+bool encoder_given_up(struct error *error); /* the error of an encoder that was; false */
+/* *out is malloc'ed; quality as in the protocol's render message. ERROR_CANCELLED: it was given up. */
 bool encoder_encode(enum encoding encoding, const struct picture *picture, unsigned quality, uint8_t **out,
                     size_t *out_bytes, struct error *error);
 

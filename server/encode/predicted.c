@@ -16,10 +16,18 @@ static size_t bound(const struct picture *picture)
 static size_t encode(const struct picture *picture, unsigned quality, uint8_t *out, size_t capacity,
                      struct error *error)
 {
-    struct predicted_form form = form_of(picture);
-    struct predicted_result result = predicted_encode(&form, picture->pixels, quality, out, capacity);
+    const struct predicted_source source = {
+        .form = form_of(picture),
+        .pixels = picture->pixels,
+        .level = quality,
+        .is_given_up = picture->is_given_up,
+        .context = picture->given_up_context,
+    };
+    struct predicted_result result = predicted_encode(&source, out, capacity);
     if (result.status == PREDICTED_NO_MEMORY)
         error_set(error, ERROR_OUT_OF_MEMORY, "encoding", "no memory to encode a frame with");
+    else if (result.status == PREDICTED_GIVEN_UP)
+        encoder_given_up(error);
     else if (result.status == PREDICTED_FAILED)
         error_set(error, ERROR_INTERNAL, "encoding", "predicted: %s", result.reason);
     return result.bytes;

@@ -16,15 +16,56 @@ static size_t zstd_bound(const struct picture *picture)
     return ZSTD_isError(bound) ? 0 : bound;
 }
 
+/* Some milliseconds at the highest level. */
+#define STEP_BYTES ((size_t)64 << 10)
+/* Less than that, or at a low level, takes no time worth asking within. */
+#define WHOLE_BYTES ((size_t)4 << 20)
+#define WHOLE_LEVEL_MAX 5
+
+/* Returns the size, an error of zstd's, or 0: it was given up. */
+static size_t encode_in_steps(ZSTD_CCtx *context, const struct picture *picture, uint8_t *out, size_t capacity)
+{
+    const size_t bytes = picture_bytes(picture);
+    ZSTD_outBuffer packed = {out, capacity, 0};
+    ZSTD_CCtx_setPledgedSrcSize(context, bytes);
+    for (size_t done = 0; done < bytes;) {
+        size_t step = bytes - done < STEP_BYTES ? bytes - done : STEP_BYTES;
+        ZSTD_inBuffer in = {picture->pixels + done, step, 0};
+        if (picture->is_given_up(picture->given_up_context))
+            return 0;
+        done += step;
+        size_t left;
+        do {
+            left = ZSTD_compressStream2(context, &packed, &in, done < bytes ? ZSTD_e_continue : ZSTD_e_end);
+            if (ZSTD_isError(left))
+                return left;
+        } while (done < bytes ? in.pos < in.size : left > 0); /* `out` has room for all */
+    }
+    return packed.pos;
+}
+
 static size_t zstd_encode(const struct picture *picture, unsigned quality, uint8_t *out, size_t capacity,
                           struct error *error)
 {
+    const size_t bytes = picture_bytes(picture);
     int level = quality < 1 ? 1 : quality > LEVEL_MAX ? LEVEL_MAX : (int)quality;
-    size_t used = ZSTD_compress(out, capacity, picture->pixels, picture_bytes(picture), level);
+    bool whole =
+        !picture->is_given_up || bytes <= WHOLE_BYTES || (level <= WHOLE_LEVEL_MAX && bytes <= 16 * WHOLE_BYTES);
+    ZSTD_CCtx *context = ZSTD_createCCtx();
+    if (!context) {
+        error_set(error, ERROR_OUT_OF_MEMORY, "encoding", "no memory to encode a frame with");
+        return 0;
+    }
+    ZSTD_CCtx_setParameter(context, ZSTD_c_compressionLevel, level);
+    size_t used = whole ? ZSTD_compress2(context, out, capacity, picture->pixels, bytes)
+                        : encode_in_steps(context, picture, out, capacity);
+    ZSTD_freeCCtx(context);
     if (ZSTD_isError(used)) {
         error_set(error, ERROR_INTERNAL, "encoding", "zstd: %s", ZSTD_getErrorName(used));
         return 0;
     }
+    if (!used)
+        encoder_given_up(error);
     return used;
 }
 

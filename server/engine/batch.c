@@ -94,6 +94,7 @@ bool job_start(struct engine *engine, struct engine_reference *reference, struct
         .events = engine->events,
         .client = command->client,
         .request = command->request,
+        .owner = reference->client->owner->number,
         .window = window_of(engine, &command->job.frame),
         .credit = command->job.kind == JOB_VIEW ? UINT64_MAX : command->job.credit,
     });

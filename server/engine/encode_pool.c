@@ -13,8 +13,11 @@
 #include <xxhash.h>
 
 #define THREADS_MAX 64
+/* So that one is left to others where one user's frames take long. */
+#define THREADS_MIN 2
 #define THREADS_AUTO_MAX 4
-#define QUEUE_CAPACITY 256
+/* Bytes that are hashed between two looks at whether they are wanted. */
+#define DIGEST_STEP_BYTES ((size_t)16 << 20)
 #define ATTACHMENT_PIXEL_BYTES 4
 
 struct encode_task {
@@ -22,12 +25,18 @@ struct encode_task {
     struct encode_lane *lane; /* NULL: it goes its own way */
     uint64_t position;
     struct engine_frame *frame;
-    struct encode_task *next; /* of those that wait in the lane */
+    struct encode_task *next; /* of those that wait, in the lane or in the pool */
+    struct encode_pool *pool;
 };
 
 struct encode_pool {
     struct encode_pool_options options;
-    struct queue *tasks;
+    atomic_bool closed;
+    pthread_mutex_t lock; /* of what follows, but for the threads */
+    pthread_cond_t changed;
+    struct encode_task *first, **end; /* that wait, in order */
+    struct encode_task *running[THREADS_MAX];
+    unsigned numbered; /* threads that know their place in `running` */
     unsigned thread_count;
     pthread_t threads[THREADS_MAX];
 };
@@ -105,10 +114,16 @@ static struct encode_task *task_end(struct encode_task *task)
     return next;
 }
 
-static void task_destroy(void *item)
+static void task_destroy(struct encode_task *task)
 {
-    for (struct encode_task *task = item; task;)
+    while (task)
         task = task_end(task);
+}
+
+static bool is_given_up(const void *context)
+{
+    const struct encode_task *task = context;
+    return job_output_is_closed(task->output) || atomic_load_explicit(&task->pool->closed, memory_order_relaxed);
 }
 
 static bool encode_in_stream(struct encode_lane *lane, const struct picture *picture, struct engine_frame *frame,
@@ -137,16 +152,19 @@ static bool encode_pixels(struct encode_lane *lane, const struct picture *pictur
 }
 
 /* Appends to the queue. */
-static bool append_attachment(struct engine_frame *frame, enum attachment which, size_t *added_bytes,
+static bool append_attachment(const struct encode_task *task, enum attachment which, size_t *added_bytes,
                               struct error *error)
 {
+    struct engine_frame *frame = task->frame;
     const struct frame_result *result = &frame->result;
     if (!(result->attachments & 1u << which))
         return true;
     const struct picture picture = {.width = result->width,
                                     .height = result->height,
                                     .bytes_per_pixel = ATTACHMENT_PIXEL_BYTES,
-                                    .pixels = frame_result_attachment(result, which)};
+                                    .pixels = frame_result_attachment(result, which),
+                                    .is_given_up = is_given_up,
+                                    .given_up_context = task};
     uint8_t *encoded;
     if (!encoder_encode(ENCODING_PREDICTED, &picture, 1, &encoded, added_bytes, error))
         return false;
@@ -160,9 +178,28 @@ static bool append_attachment(struct engine_frame *frame, enum attachment which,
     return bytes || error_set(error, ERROR_OUT_OF_MEMORY, "encoding", "out of memory for a frame's attachments");
 }
 
-static bool encode(struct encode_pool *pool, struct encode_lane *lane, struct engine_frame *frame,
-                   struct error *error)
+static bool make_digest(const struct encode_task *task, struct error *error)
 {
+    const struct frame_result *result = &task->frame->result;
+    XXH3_state_t *state = XXH3_createState();
+    if (!state)
+        return error_set(error, ERROR_OUT_OF_MEMORY, "encoding", "out of memory for a frame's digest");
+    XXH3_64bits_reset(state);
+    size_t done = 0;
+    while (done < result->size_bytes && !is_given_up(task)) {
+        size_t left = result->size_bytes - done, step = left < DIGEST_STEP_BYTES ? left : DIGEST_STEP_BYTES;
+        XXH3_64bits_update(state, result->pixels + done, step);
+        done += step;
+    }
+    task->frame->digest = XXH3_64bits_digest(state);
+    XXH3_freeState(state);
+    return done == result->size_bytes || encoder_given_up(error);
+}
+
+static bool encode(const struct encode_task *task, struct error *error)
+{
+    struct engine_frame *frame = task->frame;
+    struct stage_totals *totals = task->pool->options.totals;
     struct frame_result *result = &frame->result;
     /* Layers lie one behind the other: one picture of their common height. */
     uint32_t rows = result->height * (uint32_t)__builtin_popcount(result->layers);
@@ -178,11 +215,12 @@ static bool encode(struct encode_pool *pool, struct encode_lane *lane, struct en
                                    .bytes_per_pixel = 4,
                                    .ycbcr = result->ycbcr,
                                    .planes = ycbcr_planes_at(result->pixels, result->width)};
+    picture.is_given_up = is_given_up;
+    picture.given_up_context = task;
     uint64_t start_ns = clock_now_ns();
-    frame->digest = XXH3_64bits(result->pixels, result->size_bytes);
-    if (!encode_pixels(lane, &picture, frame, error) ||
-        !append_attachment(frame, ATTACHMENT_DEPTH, &frame->depth_bytes, error) ||
-        !append_attachment(frame, ATTACHMENT_NORMALS, &frame->normal_bytes, error))
+    if (!make_digest(task, error) || !encode_pixels(task->lane, &picture, frame, error) ||
+        !append_attachment(task, ATTACHMENT_DEPTH, &frame->depth_bytes, error) ||
+        !append_attachment(task, ATTACHMENT_NORMALS, &frame->normal_bytes, error))
         return false;
     if (!encoder_loses(frame->encoding))
         frame->quality = 0; /* a level, which costs no picture */
@@ -190,16 +228,16 @@ static bool encode(struct encode_pool *pool, struct encode_lane *lane, struct en
     result->pixels = NULL;
     frame->encoded_ns = clock_now_ns();
     stage_times_add(&result->times, STAGE_ENCODE, CLOCK_CPU, 0, start_ns, frame->encoded_ns - start_ns);
-    stage_totals_add(pool->options.totals, STAGE_ENCODE, CLOCK_CPU, frame->encoded_ns - start_ns);
+    stage_totals_add(totals, STAGE_ENCODE, CLOCK_CPU, frame->encoded_ns - start_ns);
     return true;
 }
 
-static void run_task(struct encode_pool *pool, struct encode_task *task)
+static void run_task(struct encode_task *task)
 {
-    if (job_output_is_closed(task->output))
-        return;
     struct error error = {0};
-    bool encoded = encode(pool, task->lane, task->frame, &error);
+    bool encoded = !is_given_up(task) && encode(task, &error);
+    if (is_given_up(task))
+        return;
     struct engine_event *event = event_create(encoded ? ENGINE_FRAME : ENGINE_FAILED, 0, 0);
     if (!event) {
         log_write(LOG_ERROR, "encode", "no memory for an event; a job ends without an answer");
@@ -215,57 +253,119 @@ static void run_task(struct encode_pool *pool, struct encode_task *task)
     job_output_put(task->output, task->position, event);
 }
 
+static unsigned running_of(const struct encode_pool *pool, uint64_t owner)
+{
+    unsigned count = 0;
+    for (unsigned i = 0; i < pool->thread_count; i++)
+        count += pool->running[i] && job_output_owner(pool->running[i]->output) == owner;
+    return count;
+}
+
+/* The first of the owner that has the fewest threads; NULL: none waits, or one thread is to be left to others. */
+static struct encode_task *next_locked(struct encode_pool *pool)
+{
+    struct encode_task **best = NULL;
+    unsigned fewest = pool->thread_count > 1 ? pool->thread_count - 1 : 1;
+    for (struct encode_task **place = &pool->first; *place && fewest; place = &(*place)->next) {
+        unsigned count = running_of(pool, job_output_owner((*place)->output));
+        if (count >= fewest)
+            continue;
+        fewest = count;
+        best = place;
+    }
+    if (!best)
+        return NULL;
+    struct encode_task *task = *best;
+    *best = task->next;
+    if (!*best)
+        pool->end = best;
+    task->next = NULL;
+    return task;
+}
+
+static void run_tasks(struct encode_pool *pool, unsigned self, struct encode_task *task)
+{
+    while (task) {
+        pthread_mutex_lock(&pool->lock);
+        pool->running[self] = task;
+        pthread_mutex_unlock(&pool->lock);
+        run_task(task);
+        pthread_mutex_lock(&pool->lock);
+        pool->running[self] = NULL;
+        pthread_mutex_unlock(&pool->lock);
+        task = task_end(task); /* one that waited for it in its lane */
+        pool->options.on_done(pool->options.context);
+    }
+}
+
 static void *run_thread(void *context)
 {
     struct encode_pool *pool = context;
-    for (struct encode_task *task; (task = queue_pop(pool->tasks, UINT64_MAX));) {
-        while (task) {
-            run_task(pool, task);
-            task = task_end(task);
-            pool->options.on_done(pool->options.context);
+    pthread_mutex_lock(&pool->lock);
+    const unsigned self = pool->numbered++;
+    while (!atomic_load(&pool->closed)) {
+        struct encode_task *task = next_locked(pool);
+        if (!task) {
+            pthread_cond_wait(&pool->changed, &pool->lock);
+            continue;
         }
+        pool->running[self] = task;
+        pthread_mutex_unlock(&pool->lock);
+        run_tasks(pool, self, task);
+        pthread_mutex_lock(&pool->lock);
+        pthread_cond_signal(&pool->changed); /* a task of that owner may have been left waiting */
     }
+    pthread_mutex_unlock(&pool->lock);
     return NULL;
 }
 
 struct encode_pool *encode_pool_create(const struct encode_pool_options *options, struct error *error)
 {
     struct encode_pool *pool = calloc(1, sizeof(*pool));
-    struct queue *tasks = queue_create(QUEUE_CAPACITY, false);
-    if (!pool || !tasks) {
-        free(pool);
-        queue_destroy(tasks, NULL);
+    if (!pool) {
         error_set(error, ERROR_OUT_OF_MEMORY, "encode_threads", "no memory for the encoding pool");
         return NULL;
     }
     pool->options = *options;
-    pool->tasks = tasks;
+    pool->end = &pool->first;
+    pthread_mutex_init(&pool->lock, NULL);
+    pthread_cond_init(&pool->changed, NULL);
     unsigned threads = options->threads, processors = parallel_processors();
     if (!threads)
-        threads = processors > THREADS_AUTO_MAX ? THREADS_AUTO_MAX : processors;
+        threads = processors > THREADS_AUTO_MAX ? THREADS_AUTO_MAX
+                  : processors < THREADS_MIN    ? THREADS_MIN
+                                                : processors;
     threads = threads > THREADS_MAX ? THREADS_MAX : threads;
-    while (pool->thread_count < threads) {
-        if (pthread_create(&pool->threads[pool->thread_count], NULL, run_thread, pool)) {
-            error_set(error, ERROR_OUT_OF_MEMORY, "encode_threads", "could start only %u of %u threads",
-                      pool->thread_count, threads);
-            encode_pool_destroy(pool);
-            return NULL;
-        }
+    pthread_mutex_lock(&pool->lock); /* the threads wait until there are all */
+    while (pool->thread_count < threads &&
+           pthread_create(&pool->threads[pool->thread_count], NULL, run_thread, pool) == 0)
         pthread_setname_np(pool->threads[pool->thread_count++], "encode");
-    }
-    return pool;
+    pthread_mutex_unlock(&pool->lock);
+    if (pool->thread_count == threads)
+        return pool;
+    error_set(error, ERROR_OUT_OF_MEMORY, "encode_threads", "could start only %u of %u threads",
+              pool->thread_count, threads);
+    encode_pool_destroy(pool);
+    return NULL;
 }
 
 void encode_pool_destroy(struct encode_pool *pool)
 {
     if (!pool)
         return;
-    queue_close(pool->tasks);
-    for (void *task; (task = queue_try_pop(pool->tasks));)
-        task_destroy(task);
+    pthread_mutex_lock(&pool->lock);
+    atomic_store(&pool->closed, true);
+    pthread_cond_broadcast(&pool->changed);
+    pthread_mutex_unlock(&pool->lock);
     for (unsigned i = 0; i < pool->thread_count; i++)
         pthread_join(pool->threads[i], NULL);
-    queue_destroy(pool->tasks, task_destroy);
+    for (struct encode_task *task; (task = pool->first);) {
+        pool->first = task->next;
+        task->next = NULL;
+        task_destroy(task);
+    }
+    pthread_cond_destroy(&pool->changed);
+    pthread_mutex_destroy(&pool->lock);
     free(pool);
 }
 
@@ -277,15 +377,18 @@ bool encode_pool_submit(struct encode_pool *pool, struct job_output *output, str
         engine_frame_destroy(frame);
         return false;
     }
-    *task = (struct encode_task){.output = job_output_ref(output), .position = position, .frame = frame};
+    *task =
+        (struct encode_task){.output = job_output_ref(output), .position = position, .frame = frame, .pool = pool};
     if (lane && frame->encoding == ENCODING_H264) {
         atomic_fetch_add(&lane->references, 1);
         task->lane = lane;
         if (!lane_enter(lane, task))
             return true;
     }
-    if (queue_push(pool->tasks, task))
-        return true;
-    task_destroy(task);
-    return false;
+    pthread_mutex_lock(&pool->lock);
+    *pool->end = task;
+    pool->end = &task->next;
+    pthread_cond_signal(&pool->changed);
+    pthread_mutex_unlock(&pool->lock);
+    return true;
 }

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Threads that turn rendered pixels into the bytes that travel. */
+/* Threads that turn rendered pixels into the bytes that travel. An owner's frames have all threads but one at
+ * most; a frame that nobody waits for any more is given up. */
 #ifndef FARLIGHT_ENGINE_ENCODE_POOL_H
 #define FARLIGHT_ENGINE_ENCODE_POOL_H
 
@@ -9,7 +10,7 @@
 struct encode_pool;
 
 struct encode_pool_options {
-    unsigned threads; /* 0: one per core, at most 4 */
+    unsigned threads; /* 0: one per core, 2 to 4 */
     struct stage_totals *totals;
     void (*on_done)(void *context); /* after each frame, from a thread of the pool */
     void *context;
@@ -23,12 +24,11 @@ struct encode_lane *encode_lane_create(float frames_per_second); /* NULL: out of
 void encode_lane_unref(struct encode_lane *lane);                /* accepts NULL */
 
 struct encode_pool *encode_pool_create(const struct encode_pool_options *options, struct error *error);
-/* Ends after the frames that are being encoded; waiting ones are dropped. Accepts NULL. */
+/* Drops all frames, also those that are being encoded. Nothing may be submitted any more. Accepts NULL. */
 void encode_pool_destroy(struct encode_pool *pool);
 /* Encodes a frame (its result holds the pixels) with its encoding and quality, and puts it at its position. Takes
  * over the frame, not the output and the lane, of which it holds references of its own. `lane`: the view's; NULL
- * if no frame is part of a stream. One thread submits the frames of a lane. May block; false: the pool is closed
- * or out of memory. */
+ * if no frame is part of a stream. One thread submits the frames of a lane. False: out of memory. */
 bool encode_pool_submit(struct encode_pool *pool, struct job_output *output, struct encode_lane *lane,
                         uint64_t position, struct engine_frame *frame);
 

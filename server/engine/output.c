@@ -180,6 +180,11 @@ bool job_output_is_closed(const struct job_output *output)
     return atomic_load(&output->closed);
 }
 
+uint64_t job_output_owner(const struct job_output *output)
+{
+    return output->options.owner;
+}
+
 void job_output_taken(struct job_output *output)
 {
     atomic_fetch_sub(&output->in_hand, 1);
