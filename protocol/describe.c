@@ -6,6 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "protocol/plain_text.h"
+
 #define LENGTH(array) (sizeof(array) / sizeof(array)[0])
 
 /* clang-format off */
@@ -330,28 +332,12 @@ void struct_defaults(const struct struct_desc *desc, void *body)
 
 bool utf8_valid(const uint8_t *bytes, size_t count)
 {
-    size_t i = 0;
-    while (i < count) {
-        uint8_t first = bytes[i++];
-        if (first >= 0x01 && first <= 0x7f) {
-            continue;
-        }
-        /* Table 3-7 of the Unicode standard: the second byte's range excludes over-long forms and surrogates. */
-        size_t more = first >= 0xf0 ? 3 : first >= 0xe0 ? 2 : 1;
-        uint8_t low = first == 0xe0 ? 0xa0 : first == 0xf0 ? 0x90 : 0x80;
-        uint8_t high = first == 0xed ? 0x9f : first == 0xf4 ? 0x8f : 0xbf;
-        if (first < 0xc2 || first > 0xf4 || more > count - i) {
+    uint32_t code;
+    for (size_t at = 0, length; at < count; at += length) {
+        length = utf8_read(bytes + at, count - at, &code);
+        if (length == 0) {
             return false;
         }
-        if (bytes[i] < low || bytes[i] > high) {
-            return false;
-        }
-        for (size_t k = 1; k < more; k++) {
-            if (bytes[i + k] < 0x80 || bytes[i + k] > 0xbf) {
-                return false;
-            }
-        }
-        i += more;
     }
     return true;
 }

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "protocol/describe.h"
+#include "protocol/plain_text.h"
 
 #define ELEMENTS_SHOWN 4u /* of an array */
 #define BYTES_SHOWN 8u    /* of bulk data and long byte arrays */
@@ -12,19 +13,20 @@
 
 static void print_struct(FILE *stream, const struct struct_desc *desc, const char *body);
 
-/* Bytes above 0x7f pass as they are: decoded strings are UTF-8. */
+/* Characters that are not plain are written as their bytes. */
 static void print_text(FILE *stream, const char *text)
 {
     size_t shown = 0;
     fputc('"', stream);
-    for (; *text != '\0' && shown < TEXT_SHOWN; text++, shown++) {
-        unsigned char byte = (unsigned char)*text;
-        if (byte == '"' || byte == '\\') {
-            fprintf(stream, "\\%c", byte);
-        } else if (byte < 0x20 || byte == 0x7f) {
-            fprintf(stream, "\\x%02x", byte);
-        } else {
-            fputc(byte, stream);
+    while (*text != '\0' && shown < TEXT_SHOWN) {
+        uint32_t code = 0;
+        size_t length = utf8_read(text, UTF8_BYTES_MAX, &code);
+        bool plain = length > 0 && plain_text_allows(code);
+        if (code == '"' || code == '\\') {
+            fputc('\\', stream);
+        }
+        for (size_t end = shown + (length > 0 ? length : 1); shown < end; text++, shown++) {
+            fprintf(stream, plain ? "%c" : "\\x%02x", (unsigned char)*text);
         }
     }
     fputs(*text != '\0' ? "\".." : "\"", stream);

@@ -9,6 +9,7 @@
 #include "gpu/device.h"
 #include "engine/engine.h"
 #include "session/daemon.h"
+#include "protocol/plain_text.h"
 #include "protocol/version.h"
 
 #include <argp.h>
@@ -116,8 +117,12 @@ static error_t parse_option(int key, char *value, struct argp_state *state)
 
 static int fail(const struct error *error)
 {
-    fprintf(stderr, "farlightd: %s%s%s\n", error->field, error->field[0] ? ": " : "", error->text);
-    fprintf(stderr, error->remedy[0] ? "farlightd: %s\n" : "%s", error->remedy);
+    struct error plain;
+    plain_text_copy(plain.field, sizeof(plain.field), error->field);
+    plain_text_copy(plain.text, sizeof(plain.text), error->text);
+    plain_text_copy(plain.remedy, sizeof(plain.remedy), error->remedy);
+    fprintf(stderr, "farlightd: %s%s%s\n", plain.field, plain.field[0] ? ": " : "", plain.text);
+    fprintf(stderr, plain.remedy[0] ? "farlightd: %s\n" : "%s", plain.remedy);
     return EXIT_FAILURE;
 }
 

@@ -47,9 +47,11 @@ int cli_report(const struct fl_error *error);
 int cli_trouble(const struct fl_error *error); /* likewise, of `compare` (compare.c): 2 where others return 1 */
 /* A note about a model: warnings always, plain information only if `chatty`. */
 void cli_note(const struct fl_note *note, bool chatty);
-/* On standard output; control characters in names are made harmless for a terminal. */
+/* On standard output; characters that could control a terminal or change the order of a line are not printed. */
 void cli_print_name(const char *name);
 bool cli_is_terminal(int fd); /* one that can move its cursor */
+/* How JSON is written: names say all that they hold, in escapes that do nothing to a terminal. */
+#define CLI_JSON (JSON_COMPACT | JSON_ENSURE_ASCII)
 
 /* ---- interrupt.c ---- */
 

@@ -121,7 +121,7 @@ static void print_object(const struct comparing *comparing, const struct fl_comp
     json_object_set_new(object, "a", json_string(comparing->options.a));
     json_object_set_new(object, "b", json_string(comparing->options.b));
     json_object_set_new(object, "picture", picture ? json_string(picture) : json_null());
-    json_dumpf(object, stdout, JSON_COMPACT | JSON_REAL_PRECISION(9));
+    json_dumpf(object, stdout, CLI_JSON | JSON_REAL_PRECISION(9));
     putchar('\n');
     json_decref(object);
 }

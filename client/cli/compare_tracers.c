@@ -314,7 +314,7 @@ static void print_json(const struct tracer_comparison *comparison)
     cli_structure_set_json(object, frame);
     json_object_set_new(object, "min_agreement",
                         comparison->min_agreement > 0 ? json_real(comparison->min_agreement) : json_null());
-    json_dumpf(object, stdout, JSON_COMPACT | JSON_REAL_PRECISION(9));
+    json_dumpf(object, stdout, CLI_JSON | JSON_REAL_PRECISION(9));
     putchar('\n');
     json_decref(object);
 }

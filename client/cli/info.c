@@ -90,16 +90,9 @@ static void print_json(const struct info_options *wanted, const struct fl_model_
     json_object_set_new(object, "model", string(wanted->model ? wanted->model : ""));
     for (size_t i = 0; i < sizeof(numbers) / sizeof(numbers[0]); i++)
         json_object_set_new(object, numbers[i].name, json_integer((json_int_t)numbers[i].value));
-    json_dumpf(object, stdout, JSON_COMPACT | JSON_REAL_PRECISION(9));
+    json_dumpf(object, stdout, CLI_JSON | JSON_REAL_PRECISION(9));
     fputc('\n', stdout);
     json_decref(object);
-}
-
-/* Names come from the file: made harmless for a terminal. */
-static void print_text(const char *text)
-{
-    for (; *text != '\0'; text++)
-        fputc((unsigned char)*text < 0x20 || *text == 0x7f ? '?' : *text, stdout);
 }
 
 static void print_table(const struct info_options *wanted, const struct fl_model_info *info)
@@ -112,7 +105,7 @@ static void print_table(const struct info_options *wanted, const struct fl_model
                 {"materials", info->materials},  {"textures", info->textures}, {"lights", info->lights},
                 {"cameras", info->camera_count}, {"skins", info->skins},       {"targets", info->morph_targets},
                 {"clips", info->clip_count}};
-    print_text(wanted->model ? wanted->model : wanted->environment);
+    cli_print_name(wanted->model ? wanted->model : wanted->environment);
     printf("\n");
     for (size_t i = 0; i < sizeof(rows) / sizeof(rows[0]); i++)
         printf("  %-10s %12" PRIu64 "\n", rows[i].name, rows[i].value);
@@ -120,19 +113,19 @@ static void print_table(const struct info_options *wanted, const struct fl_model
            (double)info->import.read_bytes * 1e-6, (double)info->import.offered_bytes * 1e-6);
     for (size_t i = 0; i < info->camera_count; i++) {
         printf("  camera %zu: ", i);
-        print_text(info->cameras[i].name);
+        cli_print_name(info->cameras[i].name);
         printf("\n");
     }
     for (size_t i = 0; i < info->clip_count; i++) {
         printf("  clip %zu: ", i);
-        print_text(info->clips[i].name);
+        cli_print_name(info->clips[i].name);
         printf(", %.3f s, %u channels\n", (double)info->clips[i].duration_s, info->clips[i].channels);
     }
     for (size_t i = 0; i < info->note_count; i++) {
         printf("  %s: ", protocol_severity_text(info->notes[i].severity));
-        print_text(info->notes[i].where);
+        cli_print_name(info->notes[i].where);
         printf(": ");
-        print_text(info->notes[i].text);
+        cli_print_name(info->notes[i].text);
         printf("\n");
     }
     if (info->notes_left_out > 0)

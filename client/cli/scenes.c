@@ -41,7 +41,7 @@ static void print_json(const struct fl_scene_entry *scene)
     json_t *object = json_pack("{s:s,s:s,s:I,s:I,s:I}", "name", scene->name, "sharing",
                                protocol_sharing_text(scene->sharing), "clients", (json_int_t)scene->clients,
                                "revision", (json_int_t)scene->revision, "triangles", (json_int_t)scene->triangles);
-    json_dumpf(object, stdout, JSON_COMPACT);
+    json_dumpf(object, stdout, CLI_JSON);
     fputc('\n', stdout);
     json_decref(object);
 }

@@ -9,6 +9,8 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "protocol/plain_text.h"
+
 #define KEY_LISTEN 0x400
 #define KEY_NAME 0x401
 #define KEY_ENVIRONMENT 0x402
@@ -177,11 +179,12 @@ static void print_word(const char *word)
         return;
     }
     putchar('\'');
-    for (; *word != '\0'; word++) {
-        if (*word == '\'')
+    for (char shown[UTF8_BYTES_MAX]; *word != '\0';) {
+        const size_t bytes = plain_text_next(&word, shown);
+        if (shown[0] == '\'')
             fputs("'\\''", stdout);
         else
-            putchar((unsigned char)*word < 0x20 || *word == 0x7f ? '?' : *word);
+            fwrite(shown, 1, bytes, stdout);
     }
     putchar('\'');
 }

@@ -9,6 +9,8 @@
 #include <stdlib.h>
 #include <unistd.h>
 
+#include "protocol/plain_text.h"
+
 #define WATCH_DEFAULT_S 2.0
 #define WATCH_MIN_S 0.1
 #define WATCH_MAX_S 86400.0
@@ -167,7 +169,7 @@ static void print_json(const struct fl_connection *connection, const struct mess
     json_object_set_new(object, "scenes", scenes_array(reply));
     json_object_set_new(object, "running", running_array(reply));
     json_object_set_new(object, "stages", stages_array(reply));
-    json_dumpf(object, stdout, JSON_COMPACT);
+    json_dumpf(object, stdout, CLI_JSON);
     fputc('\n', stdout);
     json_decref(object);
 }
@@ -182,10 +184,7 @@ static double mb(uint64_t bytes)
 /* Texts of the daemon and of other clients, made harmless for a terminal. */
 static const char *plain(const char *text, char out[130])
 {
-    size_t length = 0;
-    for (; *text != '\0' && length + 1 < 130; text++)
-        out[length++] = (unsigned char)*text < 0x20 || *text == 0x7f ? '?' : *text;
-    out[length] = '\0';
+    plain_text_copy(out, 130, text);
     return out;
 }
 

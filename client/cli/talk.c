@@ -6,6 +6,8 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "protocol/plain_text.h"
+
 bool cli_is_terminal(int fd)
 {
     const char *kind = getenv("TERM");
@@ -28,8 +30,7 @@ static void say(const char *kind, const char *colour, const struct fl_error *wha
 
 void cli_print_name(const char *name)
 {
-    for (; *name != '\0'; name++)
-        putchar((unsigned char)*name < 0x20 || *name == 0x7f ? '?' : *name);
+    plain_text_print(stdout, name);
 }
 
 int cli_report(const struct fl_error *error)

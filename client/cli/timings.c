@@ -121,7 +121,7 @@ static void add_frame(struct cli_timings *timings, const struct fl_frame *frame)
 
 static void print_object(struct cli_timings *timings, json_t *object)
 {
-    if (object && json_dumpf(object, timings->out, JSON_COMPACT | JSON_REAL_PRECISION(9)) == 0)
+    if (object && json_dumpf(object, timings->out, CLI_JSON | JSON_REAL_PRECISION(9)) == 0)
         fputc('\n', timings->out);
     json_decref(object);
 }

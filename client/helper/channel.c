@@ -7,6 +7,8 @@
 #include <string.h>
 #include <sys/socket.h>
 
+#include "protocol/plain_text.h"
+
 #define FIELD_BYTES 129
 #define TEXT_BYTES 512
 #define REMEDY_BYTES 256
@@ -89,7 +91,11 @@ static int read_more(struct channel *channel)
 
 static bool refuse(const struct channel *channel, const char *field, const char *text)
 {
-    fprintf(stderr, "%s: %s%s%s\n", channel->program, field, field[0] != '\0' ? ": " : "", text);
+    fprintf(stderr, "%s: ", channel->program);
+    plain_text_print(stderr, field);
+    fputs(field[0] != '\0' ? ": " : "", stderr);
+    plain_text_print(stderr, text);
+    fputc('\n', stderr);
     return false;
 }
 

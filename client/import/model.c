@@ -8,43 +8,19 @@
 #include <string.h>
 #include <time.h>
 
+#include "protocol/plain_text.h"
+
 /* ---- text ---- */
-
-/* Length of the UTF-8 character at `text`, 0 if it is none. Overlong forms and surrogates are none. */
-static size_t utf8_length(const unsigned char *text)
-{
-    uint32_t code;
-    size_t length;
-
-    if (text[0] < 0x80)
-        return text[0] != 0;
-    if (text[0] >= 0xc2 && text[0] <= 0xdf)
-        length = 2, code = text[0] & 0x1fu;
-    else if (text[0] >= 0xe0 && text[0] <= 0xef)
-        length = 3, code = text[0] & 0x0fu;
-    else if (text[0] >= 0xf0 && text[0] <= 0xf4)
-        length = 4, code = text[0] & 0x07u;
-    else
-        return 0;
-    for (size_t i = 1; i < length; i++) {
-        if ((text[i] & 0xc0) != 0x80)
-            return 0;
-        code = code << 6 | (text[i] & 0x3fu);
-    }
-    if ((length == 3 && code < 0x800) || (length == 4 && (code < 0x10000 || code > 0x10ffff)) ||
-        (code >= 0xd800 && code <= 0xdfff))
-        return 0;
-    return length;
-}
 
 /* Copies as much as fits in whole characters; bytes that are no UTF-8 and control characters become '?'. */
 void import_copy_text(char *out, size_t out_bytes, const char *text)
 {
     size_t used = 0;
 
-    for (const unsigned char *at = (const unsigned char *)(text ? text : ""); *at;) {
-        size_t length = utf8_length(at);
-        bool bad = length == 0 || *at < 0x20 || *at == 0x7f;
+    for (const char *at = text ? text : ""; *at;) {
+        uint32_t code = 0;
+        size_t length = utf8_read(at, UTF8_BYTES_MAX, &code);
+        bool bad = length == 0 || code < 0x20 || code == 0x7f;
 
         if (length == 0)
             length = 1;

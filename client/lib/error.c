@@ -3,7 +3,8 @@
 
 #include <stdarg.h>
 #include <stdio.h>
-#include <string.h>
+
+#include "protocol/plain_text.h"
 
 bool fl_error_set(struct fl_error *error, enum fl_error_code code, const char *field, const char *format, ...)
 {
@@ -29,14 +30,10 @@ bool fl_error_remedy(struct fl_error *error, const char *format, ...)
     return false;
 }
 
-/* Texts may come from a peer or a file's name: no escape sequence of theirs may reach a terminal. */
+/* Texts may come from a peer or a file's name: nothing of theirs may control a terminal. */
 static void append_harmless(char *line, size_t line_bytes, size_t *used, const char *text)
 {
-    for (; *text != '\0' && *used + 1 < line_bytes; text++) {
-        const unsigned char c = (unsigned char)*text;
-        line[(*used)++] = c < 0x20 || c == 0x7f ? '?' : *text;
-    }
-    line[*used] = '\0';
+    *used += plain_text_copy(line + *used, line_bytes - *used, text);
 }
 
 void fl_error_print(const struct fl_error *error, char *line, size_t line_bytes)

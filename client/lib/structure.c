@@ -5,11 +5,7 @@
 #include <stdio.h>
 #include <string.h>
 
-/* Text from a daemon must not control the terminal. */
-static char printable(char c)
-{
-    return (unsigned char)c < 0x20 || c == 0x7f ? '?' : c;
-}
+#include "protocol/plain_text.h"
 
 /* Behind the name of the part. */
 static const char *own_name(const struct record_structure_row *row)
@@ -41,7 +37,8 @@ static void append_row(char *text, size_t text_bytes, const struct record_struct
     char name[FL_STRUCTURE_NAME_BYTES], value[32];
     snprintf(name, sizeof(name), "%s%s", text[0] != '\0' ? ", " : "", own_name(row));
     for (char *c = name; *c != '\0'; c++)
-        *c = *c == '_' ? ' ' : printable(*c);
+        *c = *c == '_' ? ' ' : *c;
+    plain_text_copy(name, sizeof(name), name); /* text from a daemon must not control the terminal */
     if (row->unit == PROTOCOL_UNIT_METRES)
         print_length(value, sizeof(value), (double)row->measure);
     else
@@ -60,8 +57,7 @@ bool fl_structure_next(const struct fl_frame *frame, size_t *at, struct fl_struc
     snprintf(part->name, sizeof(part->name), "%.*s", (int)(own_name(row) - row->name), row->name);
     if (part->name[0] != '\0')
         part->name[strlen(part->name) - 1] = '\0'; /* the slash */
-    for (char *c = part->name; *c != '\0'; c++)
-        *c = printable(*c);
+    plain_text_copy(part->name, sizeof(part->name), part->name);
     for (; *at < frame->structure_count && frame->structure[*at].part == part->number; ++*at) {
         row = &frame->structure[*at];
         if (row->unit != PROTOCOL_UNIT_BUILT) {

@@ -8,6 +8,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "protocol/plain_text.h"
+
 #define EDGE_MAX 8192      /* the protocol's maximum of a picture */
 #define FRAME_MAX 10000000 /* the protocol's maximum of a frame number */
 
@@ -153,28 +155,12 @@ bool fl_text_range(const char *text, uint32_t *first, uint32_t *last, uint32_t *
     return true;
 }
 
-/* Length of the UTF-8 character at `text`; 0: none. */
-static size_t utf8_length(const unsigned char *text)
-{
-    const unsigned char c = text[0];
-    const size_t length = c < 0x80                ? 1
-                          : c >= 0xc2 && c < 0xe0 ? 2
-                          : c >= 0xe0 && c < 0xf0 ? 3
-                          : c >= 0xf0 && c < 0xf5 ? 4
-                                                  : 0;
-    for (size_t i = 1; i < length; i++)
-        if ((text[i] & 0xc0) != 0x80)
-            return 0;
-    const bool overlong = (c == 0xe0 && text[1] < 0xa0) || (c == 0xf0 && text[1] < 0x90);
-    const bool outside = (c == 0xed && text[1] >= 0xa0) || (c == 0xf4 && text[1] >= 0x90);
-    return overlong || outside ? 0 : length;
-}
-
 void fl_text_utf8(const char *text, char *out, size_t out_bytes)
 {
     size_t used = 0;
     while (*text != '\0') {
-        const size_t length = utf8_length((const unsigned char *)text);
+        uint32_t code;
+        const size_t length = utf8_read(text, UTF8_BYTES_MAX, &code);
         const size_t taken = length > 0 ? length : 1;
         if (used + taken >= out_bytes)
             break;

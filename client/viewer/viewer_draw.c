@@ -157,7 +157,7 @@ void viewer_print_state(struct viewer *viewer, const char *name)
                                       viewer->heat_figures.max, "beyond", viewer->heat_figures.beyond));
     if (line && viewer->notice_ns > state.now_ns)
         json_object_set_new(line, "notice", json_string(viewer->notice));
-    char *text = json_dumps(line, JSON_COMPACT | JSON_REAL_PRECISION(9));
+    char *text = json_dumps(line, JSON_COMPACT | JSON_ENSURE_ASCII | JSON_REAL_PRECISION(9));
     if (text)
         puts(text);
     fflush(stdout);

@@ -4,8 +4,9 @@
 #include <stdarg.h>
 #include <stdatomic.h>
 #include <stdio.h>
-#include <string.h>
 #include <unistd.h>
+
+#include "protocol/plain_text.h"
 
 /* Longer lines are cut: a line must leave in one write to stay whole beside other threads' lines. */
 #define LINE_BYTES_MAX 1024
@@ -28,15 +29,6 @@ const char *log_level_name(enum log_level level)
     return (unsigned)level < LOG_LEVEL_COUNT ? names[level] : "unknown";
 }
 
-/* Text from outside may be in the line: nothing in it may move the terminal's cursor or fake a line. */
-static void make_harmless(char *text, size_t bytes)
-{
-    for (size_t i = 0; i < bytes; i++) {
-        if ((unsigned char)text[i] < 0x20 || text[i] == 0x7f)
-            text[i] = '?';
-    }
-}
-
 void log_write(enum log_level level, const char *module, const char *format, ...)
 {
     if (!log_enabled(level))
@@ -50,9 +42,10 @@ void log_write(enum log_level level, const char *module, const char *format, ...
     va_start(arguments, format);
     int tail = vsnprintf(line + used, sizeof(line) - 1 - used, format, arguments);
     va_end(arguments);
-    if (tail > 0)
-        used += strlen(line + used);
-    make_harmless(line, used);
+    if (tail < 0)
+        line[used] = '\0';
+    /* Text from outside may be in the line: nothing in it may control a terminal or fake a line. */
+    used = plain_text_copy(line, sizeof(line) - 1, line);
     line[used++] = '\n';
     /* A failure of standard error cannot be reported anywhere. */
     ssize_t written = write(STDERR_FILENO, line, used);

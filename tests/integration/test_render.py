@@ -10,6 +10,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 
 import farlight_test
@@ -253,6 +254,20 @@ class ThroughADaemon(Case):
         text = self.expect(farlight("info", bundled_scenes() / "cornell.glb"), 0).stdout
         for word in ("triangles", "materials", "lights", "cameras"):
             self.assertIn(word, text)
+
+    def test_names_that_a_terminal_would_obey_are_shown_harmless_and_complete_in_json(self):
+        name = "a\u009b2J\u202egpj.exe\u2066\u00e4"
+        with tempfile.TemporaryDirectory(prefix="farlight-test-") as folder:
+            path = os.path.join(folder, "names.gltf")
+            with open(path, "w", encoding="utf-8") as file:
+                json.dump({"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}],
+                           "nodes": [{"camera": 0, "name": name}],
+                           "cameras": [{"type": "perspective", "name": name, "perspective": {"yfov": 1, "znear": 1}}]}, file)
+            table = self.expect(farlight("info", path), 0).stdout
+            line = self.expect(farlight("info", path, "--json"), 0).stdout
+        self.assertIn("a?2J?gpj.exe?\u00e4", table)
+        self.assertTrue(line.isascii())
+        self.assertIn(name, [camera["name"] for camera in json.loads(line)["cameras"]])
 
 
 def update_figures():

@@ -51,12 +51,13 @@ MAY_INCLUDE = {
     "client/viewer": ("protocol", "protocol/common", "client/lib", "client/cli"),  # the command line is parsed as that of render
 }
 # Files that every room may include.
-FOR_EVERYBODY = re.compile(r"^protocol/(version\.h|(words|tracers)\.(h|def))$")
+FOR_EVERYBODY = re.compile(r"^protocol/((version|plain_text)\.h|(words|tracers)\.(h|def))$")
 # A test in tests/unit/ROOM is one of the rooms of that name, with those in it (`client`: all of the client): it may include
 # them, all that is below them, and what UNIT_ALSO says. The rest of tests/ may include every room; no room includes tests/.
 TESTS, UNIT = "tests", "tests/unit/"
 UNIT_ROOTS = ("", "server/", "server/trace/", "client/")
 UNIT_ALSO = {
+    "protocol": ("server/base",),  # lines of the log
     "client": ("server/encode",),  # what the daemon encodes is decoded
     "encode": ("server/engine",),  # the pool of encoders
     "gpu_scene": ("server/trace",),  # where rays meet what moved

@@ -175,6 +175,17 @@ TEST(names_are_made_utf8_without_cutting_a_character)
                              "?");
 }
 
+TEST(an_error_carries_nothing_that_a_terminal_obeys)
+{
+    char line[64];
+    fl_error_set(&error, FL_ERROR_FILE,
+                 "a\xc2\x9b"
+                 "2Jb",
+                 "a\xe2\x80\xaegpj.exe and \xc3\xa4");
+    fl_error_print(&error, line, sizeof(line));
+    assert_string_equal(line, "a?2Jb: a?gpj.exe and \xc3\xa4");
+}
+
 TEST(an_error_never_carries_an_escape_sequence)
 {
     char line[64];
