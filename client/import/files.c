@@ -3,9 +3,11 @@
 
 #include "import.h"
 #include "protocol/common/clock.h"
+#include "protocol/plain_text.h"
 
 #include <errno.h>
 #include <fcntl.h>
+#include <limits.h>
 #include <linux/openat2.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -154,68 +156,126 @@ unsigned char *files_read_descriptor(struct files *files, int descriptor, size_t
     return bytes;
 }
 
-/* For kernels and containers without openat2: one part at a time, following no link, never upwards. */
-static int open_by_parts(int folder, const char *name)
+/* ---- names beneath the folder ---- */
+
+#define LINKS_MAX 40 /* of one name, as the kernel's own limit */
+
+/* Puts what a link holds in the place of `rest`, before what stands behind the link. */
+static bool put_before(char rest[PATH_MAX], const char *target, const char *behind)
 {
-    int at = dup(folder);
+    char joined[PATH_MAX];
+    int length = snprintf(joined, sizeof(joined), "%s%s%s", target, behind[0] != '\0' ? "/" : "", behind);
 
-    while (at >= 0) {
-        size_t length = strcspn(name, "/");
-        char part[256];
-        bool last = name[length] == '\0';
-        int next;
-
-        if (length >= sizeof(part)) {
-            errno = ENAMETOOLONG;
-            break;
-        }
-        memcpy(part, name, length);
-        part[length] = '\0';
-        if (strcmp(part, "..") == 0) {
-            errno = EXDEV;
-            break;
-        }
-        if (length == 0 && !last) {
-            name++;
-            continue;
-        }
-        next =
-            openat(at, length == 0 ? "." : part, last ? OPEN_FLAGS | O_NOFOLLOW : O_PATH | O_NOFOLLOW | O_CLOEXEC);
-        close(at);
-        at = next;
-        if (last)
-            return at;
-        name += length + 1;
+    if (length < 0 || (size_t)length >= sizeof(joined)) {
+        errno = ENAMETOOLONG;
+        return false;
     }
-    if (at >= 0) {
-        int error = errno;
-
-        close(at);
-        errno = error;
-    }
-    return -1;
+    memcpy(rest, joined, (size_t)length + 1);
+    return true;
 }
 
-static int open_beneath(int folder, const char *name)
+/* Resolves a name beneath the folder to one without "..", "." and links, in `path`, which is empty for the folder
+ * itself. */
+static bool resolve_beneath(int folder, const char *name, char path[PATH_MAX])
 {
-    struct open_how how = {.flags = OPEN_FLAGS, .resolve = RESOLVE_BENEATH | RESOLVE_NO_MAGICLINKS};
-    int descriptor = (int)syscall(SYS_openat2, folder, name, &how, sizeof(how));
+    char rest[PATH_MAX], target[PATH_MAX];
+    size_t used = 0;
 
-    if (descriptor < 0 && (errno == ENOSYS || errno == EPERM)) {
-        if (name[0] == '/') {
-            errno = EXDEV;
+    if (name[0] == '/') {
+        errno = EXDEV;
+        return false;
+    }
+    if (!put_before(rest, name, ""))
+        return false;
+    path[0] = '\0';
+    for (unsigned links = 0; rest[0] != '\0';) {
+        size_t length = strcspn(rest, "/");
+        const char *behind = rest + length + (rest[length] == '/' ? 1 : 0);
+        size_t before = used;
+        ssize_t linked = -1;
+
+        rest[length] = '\0';
+        if (strcmp(rest, "..") == 0) {
+            const char *slash = strrchr(path, '/');
+
+            if (used == 0) {
+                errno = EXDEV;
+                return false;
+            }
+            used = slash ? (size_t)(slash - path) : 0;
+            path[used] = '\0';
+        } else if (length > 0 && strcmp(rest, ".") != 0) {
+            if (used + length + 2 > PATH_MAX) {
+                errno = ENAMETOOLONG;
+                return false;
+            }
+            if (used > 0)
+                path[used++] = '/';
+            memcpy(path + used, rest, length + 1);
+            used += length;
+            linked = readlinkat(folder, path, target, sizeof(target) - 1);
+            if (linked < 0 && errno != EINVAL) /* EINVAL: no link */
+                return false;
+        }
+        if (linked < 0) {
+            memmove(rest, behind, strlen(behind) + 1);
+            continue;
+        }
+        target[linked] = '\0';
+        path[used = before] = '\0';
+        if (target[0] == '/' || ++links > LINKS_MAX) {
+            errno = target[0] == '/' ? EXDEV : ELOOP;
+            return false;
+        }
+        if (!put_before(rest, target, behind))
+            return false;
+    }
+    return true;
+}
+
+/* What is hidden in a folder (keys, tokens, histories) is no part of a model. */
+static bool is_hidden(const char *path)
+{
+    return path[0] == '.' || strstr(path, "/.");
+}
+
+static int open_beneath(int folder, const char *name, char reason[FILES_REASON_BYTES])
+{
+    struct open_how how = {.flags = OPEN_FLAGS, .resolve = RESOLVE_BENEATH | RESOLVE_NO_SYMLINKS};
+    char path[PATH_MAX];
+    int descriptor = -1;
+
+    if (resolve_beneath(folder, name, path)) {
+        if (is_hidden(path)) {
+            snprintf(reason, FILES_REASON_BYTES,
+                     "is hidden: a model may not name files or folders that begin with a dot");
             return -1;
         }
-        return open_by_parts(folder, name);
+        descriptor = (int)syscall(SYS_openat2, folder, path[0] != '\0' ? path : ".", &how, sizeof(how));
+        /* Kernels and containers without openat2: the path was found to have no links, and only
+         * who may write in the folder could put one there since. */
+        if (descriptor < 0 && (errno == ENOSYS || errno == EPERM))
+            descriptor = openat(folder, path[0] != '\0' ? path : ".", OPEN_FLAGS | O_NOFOLLOW);
     }
+    if (descriptor < 0)
+        snprintf(reason, FILES_REASON_BYTES, "%s",
+                 errno == EXDEV ? "lies outside the model's folder" : strerror(errno));
     return descriptor;
+}
+
+/* A key file of farlight looks like any other bytes, but for its size and mode (protocol/sealed/key.h). */
+static bool may_be_key(int descriptor)
+{
+    struct stat status;
+
+    return fstat(descriptor, &status) == 0 && status.st_size == 32 && (status.st_mode & (S_IRWXG | S_IRWXO)) == 0;
 }
 
 unsigned char *files_read(struct files *files, const char *name, size_t *size_bytes,
                           char reason[FILES_REASON_BYTES])
 {
     unsigned char *bytes = NULL;
-    int descriptor = open_beneath(files->folder, name);
+    int descriptor = open_beneath(files->folder, name, reason);
 
     if (descriptor < 0 && strchr(name, '\\')) {
         char *slashed = strdup(name);
@@ -224,16 +284,91 @@ unsigned char *files_read(struct files *files, const char *name, size_t *size_by
             if (*at == '\\')
                 *at = '/';
         if (slashed)
-            descriptor = open_beneath(files->folder, slashed);
+            descriptor = open_beneath(files->folder, slashed, reason);
         free(slashed);
     }
-    if (descriptor < 0) {
-        snprintf(reason, FILES_REASON_BYTES, "%s",
-                 errno == EXDEV ? "lies outside the model's folder" : strerror(errno));
+    if (descriptor < 0)
         return NULL;
-    }
-    if (is_regular(descriptor, reason))
+    if (may_be_key(descriptor))
+        snprintf(reason, FILES_REASON_BYTES, "has the size and mode of a key");
+    else if (is_regular(descriptor, reason))
         bytes = files_read_descriptor(files, descriptor, size_bytes, reason);
     close(descriptor);
     return bytes;
+}
+
+/* ---- kinds of content ---- */
+
+/* Text, maybe cut within its last character. Vertices and indices hold zeros or other bytes that no text has. */
+static bool is_text(const unsigned char *bytes, size_t size_bytes)
+{
+    size_t at = 0;
+
+    while (at < size_bytes) {
+        uint32_t code = 0;
+        size_t length = utf8_read(bytes + at, size_bytes - at, &code);
+        bool is_blank = code == '\t' || code == '\n' || code == '\r' || code == '\f';
+
+        if (length == 0)
+            return at > 0 && bytes[at] >= 0xc2 && size_bytes - at < UTF8_BYTES_MAX;
+        if ((code < 0x20 && !is_blank) || (code >= 0x7f && code <= 0x9f))
+            return false;
+        at += length;
+    }
+    return size_bytes > 0;
+}
+
+bool files_is_buffer(const unsigned char *bytes, size_t size_bytes, const char **kind)
+{
+    static const struct {
+        const char *kind, *magic;
+        size_t bytes;
+    } kinds[] = {
+        {"a program",
+         "\x7f"
+         "ELF",
+         4},
+        {"a database", "SQLite format 3", 16},
+        {"an archive", "PK\3\4", 4},
+        {"packed with gzip", "\x1f\x8b\x08", 3},
+        {"packed with bzip2", "BZh", 3},
+        {"packed with xz",
+         "\xfd"
+         "7zXZ",
+         6},
+        {"packed with zstd", "\x28\xb5\x2f\xfd", 4},
+        {"a document", "%PDF-", 5},
+        {"a database of keys", "\x03\xd9\xa2\x9a", 4},
+        {"a store of keys", "\xfe\xed\xfe\xed", 4},
+    };
+
+    for (size_t i = 0; i < sizeof(kinds) / sizeof(kinds[0]); i++) {
+        *kind = kinds[i].kind;
+        if (size_bytes >= kinds[i].bytes && memcmp(bytes, kinds[i].magic, kinds[i].bytes) == 0)
+            return false;
+    }
+    /* DER: a sequence with two bytes of length that begins with the integer of a version, as private keys do. */
+    *kind = "a key";
+    if (size_bytes >= 7 && bytes[0] == 0x30 && bytes[1] == 0x82 && bytes[4] == 0x02 && bytes[5] == 0x01)
+        return false;
+    *kind = "text";
+    return !is_text(bytes, size_bytes);
+}
+
+bool files_is_material_library(const unsigned char *bytes, size_t size_bytes)
+{
+    const char *text = (const char *)bytes; /* terminated */
+
+    if (memchr(bytes, '\0', size_bytes))
+        return false;
+    for (const char *at = strstr(text, "newmtl"); at; at = strstr(at + 1, "newmtl")) {
+        const char *before = at;
+
+        while (before > text && (before[-1] == ' ' || before[-1] == '\t'))
+            before--;
+        if (before == text || before[-1] == '\n' || before[-1] == '\r' ||
+            before[-1] == '\xbf') /* of a byte order mark */
+            return true;
+    }
+    return false;
 }

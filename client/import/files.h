@@ -1,6 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 /* Reads the model file and the files that it refers to. These are opened beneath the model's own folder and
- * nowhere else, must be regular files, and are read completely into memory. */
+ * nowhere else, must be regular files, and are read completely into memory.
+ *
+ * A model that lies in a home folder may name what is no part of it, and its buffers end in a scene that others
+ * may have. So nothing is read whose name, or a folder's on the way, begins with a dot, links resolved; a buffer
+ * is refused if its content is text or of a known other kind; a library of materials must be one. Images need no
+ * check here: only texels of what can be decoded (texture.h) leave the importer. */
 #ifndef FARLIGHT_IMPORT_FILES_H
 #define FARLIGHT_IMPORT_FILES_H
 
@@ -38,6 +43,12 @@ unsigned char *files_read_descriptor(struct files *files, int descriptor, size_t
 /* `name` is relative to the model's folder; '\' also separates folders if there is no file of that very name. */
 unsigned char *files_read(struct files *files, const char *name, size_t *size_bytes,
                           char reason[FILES_REASON_BYTES]);
+
+/* Whether the content may be vertices and the like: no text, archive, database, program or key. False: *kind says
+ * what. */
+bool files_is_buffer(const unsigned char *bytes, size_t size_bytes, const char **kind);
+/* Whether it is text with statements of MTL. `bytes` has a NUL behind it. */
+bool files_is_material_library(const unsigned char *bytes, size_t size_bytes);
 
 #ifdef __cplusplus
 }

@@ -209,6 +209,19 @@ std::string one_line(std::string text)
     return text;
 }
 
+// What buffers hold ends in a scene that others may have.
+void check_buffers(reader &r)
+{
+    for (size_t i = 0; i < r.model.buffers.size(); i++) {
+        const tinygltf::Buffer &buffer = r.model.buffers[i];
+        const char *kind = nullptr;
+        if (!buffer.uri.empty() && buffer.uri.compare(0, 5, "data:") != 0 &&
+            !files_is_buffer(buffer.data.data(), buffer.data.size(), &kind))
+            fail(r, place("buffers", i), "'%.200s' is %s; a buffer holds vertices and the like in binary form",
+                 buffer.uri.c_str(), kind);
+    }
+}
+
 void check_version(reader &r)
 {
     const std::string &version = r.model.asset.version, &minimum = r.model.asset.minVersion;
@@ -296,5 +309,6 @@ void load(reader &r, const unsigned char *bytes, size_t size_bytes)
     if (!error.empty()) // it went on all the same
         import_note(r.scene, PROTOCOL_SEVERITY_WARNING, "", "%s", one_line(error).substr(0, 400).c_str());
     check_version(r);
+    check_buffers(r);
 }
 } // namespace gltf

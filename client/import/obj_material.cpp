@@ -377,6 +377,11 @@ bool material_reader::operator()(const std::string &name, std::vector<tinyobj::m
         return false;
     }
     const std::unique_ptr<unsigned char, free_bytes> owner(bytes);
+    if (!files_is_material_library(bytes, size_bytes)) {
+        import_note(r.scene, PROTOCOL_SEVERITY_WARNING, tried.c_str(),
+                    "the material file '%.100s' has no statement 'newmtl'", tried.c_str());
+        return false;
+    }
     memory_stream stream(reinterpret_cast<const char *>(bytes), size_bytes);
     std::istream input(&stream);
     std::string warning, error;

@@ -564,6 +564,60 @@ class Hostile(unittest.TestCase):
                     self.assertEqual((result.status, result.faults), (1, []))
                     self.assertEqual(len(result.errors()), 1, result.notes)
 
+    def test_secrets_beside_a_model_are_no_buffers(self):
+        with tempfile.TemporaryDirectory() as folder:
+            secrets = {".ssh/id": b"\0" * 16, ".token": b"\0" * 16, "key.bin": os.urandom(32),
+                       "id_rsa": b"-----BEGIN OPENSSH PRIVATE KEY-----\n" * 4, "secrets.json": b'{"password": "\xc3\xa4"}',
+                       "cookies.sqlite": b"SQLite format 3\0" + bytes(32), "key.der": b"\x30\x82\1\2\2\1\0" + bytes(32),
+                       "program": b"\x7fELF" + bytes(32), "packed.gz": b"\x1f\x8b\x08" + bytes(32)}
+            os.mkdir(os.path.join(folder, ".ssh"))
+            os.mkdir(os.path.join(folder, "plain"))
+            os.mkdir(os.path.join(folder, ".hidden"))
+            for name, data in secrets.items():
+                with open(os.path.join(folder, name), "wb") as file:
+                    file.write(data)
+            os.chmod(os.path.join(folder, "key.bin"), 0o600)
+            os.symlink(".ssh", os.path.join(folder, "link"))
+            os.symlink("../.token", os.path.join(folder, "plain", "link.bin"))
+            for name in [*secrets, "link/id", "plain/link.bin", "./plain/../.token", "plain\\..\\.token"]:
+                with self.subTest(name):
+                    path = os.path.join(folder, "model.gltf")
+                    with open(path, "w", encoding="utf-8") as file:
+                        json.dump({"asset": {"version": "2.0"}, "buffers": [{"uri": name, "byteLength": 16}]}, file)
+                    result = import_file(path, seconds=5)
+                    self.assertEqual((result.status, result.faults, result.blobs), (1, [], {}))
+                    self.assertRegex(result.text(), "begin with a dot|mode of a key|is (text|a |an |packed)")
+
+    def test_links_within_the_folder_and_a_hidden_folder_of_the_model_are_read(self):
+        with tempfile.TemporaryDirectory() as folder:
+            models = os.path.join(folder, ".models")
+            os.makedirs(os.path.join(models, "data"))
+            with open(os.path.join(models, "data", "real.bin"), "wb") as file:
+                file.write(bytes(16))
+            os.symlink("data", os.path.join(models, "also"))
+            os.symlink("../also/real.bin", os.path.join(models, "data", "link.bin"))
+            for name in ("data/real.bin", "./data/link.bin", "also/../data/./real.bin", "data\\real.bin"):
+                with self.subTest(name):
+                    path = os.path.join(models, "model.gltf")
+                    with open(path, "w", encoding="utf-8") as file:
+                        json.dump({"asset": {"version": "2.0"}, "buffers": [{"uri": name, "byteLength": 16}]}, file)
+                    result = import_file(path, seconds=5)
+                    self.assertNotIn("real.bin", result.text())
+                    self.assertNotIn("buffer", result.text())
+
+    def test_a_material_file_that_is_none_is_not_read(self):
+        with tempfile.TemporaryDirectory() as folder:
+            for name, data in (("passwords", b"admin newmtl secret\n"), ("binary.mtl", b"newmtl a\n\0"), (".hidden.mtl", b"newmtl a\n")):
+                with self.subTest(name):
+                    with open(os.path.join(folder, name), "wb") as file:
+                        file.write(data)
+                    path = os.path.join(folder, "model.obj")
+                    with open(path, "w", encoding="utf-8") as file:
+                        file.write(f"mtllib {name}\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\n")
+                    result = import_file(path, seconds=5)
+                    self.assertEqual((result.status, result.faults), (0, []))
+                    self.assertRegex(result.text(), "no statement 'newmtl'|begin with a dot")
+
     def test_a_fifo_as_model_is_refused(self):
         with tempfile.TemporaryDirectory() as folder:
             path = os.path.join(folder, "model.obj")
