@@ -206,7 +206,7 @@ static bool read_all(struct animation *animation, int argc, char **argv)
             "in .mp4, .mkv or .y4m; '-' is standard output, as y4m.",
         .children = children};
     struct animation typed = {0};
-    bool good = begin(&typed) && argp_parse(&argp, argc, argv, 0, NULL, &typed) == 0;
+    bool good = begin(&typed) && cli_parse(&argp, argc, argv, 0, &typed) == 0;
     if (!good || !typed.script_path) {
         *animation = typed;
         return good;
@@ -215,7 +215,7 @@ static bool read_all(struct animation *animation, int argc, char **argv)
     good = begin(animation) && apply_script(animation, &typed);
     const char *model = !typed.job.scene ? animation->job.model : NULL; /* which --scene replaces */
     animation->job.model = NULL;
-    good = good && argp_parse(&argp, argc, argv, 0, NULL, animation) == 0;
+    good = good && cli_parse(&argp, argc, argv, 0, animation) == 0;
     if (!animation->job.model)
         animation->job.model = model;
     return good;

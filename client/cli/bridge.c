@@ -28,7 +28,7 @@ int cli_bridge(int argc, char **argv)
         .doc = "Copy standard input and output to a daemon's socket (unix:PATH or tcp:HOST:PORT). "
                "--server ssh:HOST runs this on HOST."};
     struct bridge_options wanted = {0};
-    if (argp_parse(&argp, argc, argv, 0, NULL, &wanted) != 0)
+    if (cli_parse(&argp, argc, argv, 0, &wanted) != 0)
         return cli_report(&wanted.job.error);
     if (!wanted.address) {
         cli_usage(&wanted.job, "ADDRESS", "the address of a socket is needed");

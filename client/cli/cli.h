@@ -40,6 +40,11 @@ int cli_complete(int argc, char **argv); /* for the shell: values of an option *
 /* The key file for a daemon: that of --key, else, for a TCP address, of FARLIGHT_KEY. NULL: none. */
 const char *cli_key_file(const char *server, const char *given);
 
+/* ---- parse.c ---- */
+
+/* argp_parse(), which ends the program after a mistake, and tells which option was probably meant. */
+error_t cli_parse(const struct argp *argp, int argc, char **argv, unsigned flags, void *input);
+
 /* ---- talk.c: what people read ---- */
 
 /* "farlight: FIELD: TEXT (REMEDY)"; returns the exit status that belongs to the error. */
@@ -81,13 +86,16 @@ const char *cli_image_name(enum cli_image image);
 bool cli_image_is_video(enum cli_image image);
 /* The name of a file without its folders. */
 const char *cli_base_name(const char *path);
-/* Whether a file can be created at `path`, without creating it. `folder` gets its folder. */
+/* Whether a file can be created at `path`, without creating it. `folder` gets its folder, which may be missing:
+ * then it is one that can be made. */
 bool cli_check_output(const char *path, char *folder, size_t folder_bytes, struct fl_error *error);
+/* Makes the folder, and those around it, where they are missing. */
+bool cli_make_folder(const char *folder, struct fl_error *error);
 /* Whether writing to `path`, named by `option`, overwrites none of the inputs; NULL among them is skipped. */
 bool cli_check_not_input(const char *path, const char *option, const char *const *inputs, size_t count,
                          struct fl_error *error);
-/* Whether a comparison of the inputs can write its picture to the path: PNG or JPEG, and not one of them. NULL:
- * there is no picture. */
+/* Whether a comparison of the inputs can write its picture to the path: PNG or JPEG, and not one of them. Makes
+ * its folder. NULL: there is no picture. */
 bool cli_check_error_picture(const char *picture, const char *const *inputs, size_t count, struct fl_error *error);
 /* Whether `path` is a file that can be read. */
 bool cli_check_input(const char *path, struct fl_error *error);

@@ -170,7 +170,7 @@ int cli_compare(int argc, char **argv)
                "Images are EXR, HDR, PNG or JPEG. EXR and HDR files are compared in linear light, others as a "
                "screen shows them, 0 to 1. Exit status: 0 within all limits, 1 beyond a limit, 2 not compared."};
     struct comparing comparing = {0};
-    if (argp_parse(&argp, argc, argv, 0, NULL, &comparing) != 0)
+    if (cli_parse(&argp, argc, argv, 0, &comparing) != 0)
         return cli_trouble(&comparing.job.error);
     if (comparing.operand_count < 2) {
         cli_usage(&comparing.job, "IMAGE", "two image files are needed");

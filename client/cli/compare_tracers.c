@@ -353,7 +353,7 @@ int cli_compare_tracers(int argc, char **argv)
     struct tracer_comparison comparison = {.far_share = FAR_DEFAULT};
     struct fl_error error = {0};
     if (!cli_job_begin(&comparison.job, fl_render_defaults()) ||
-        argp_parse(&argp, argc, argv, 0, NULL, &comparison) != 0 || !complete(&comparison))
+        cli_parse(&argp, argc, argv, 0, &comparison) != 0 || !complete(&comparison))
         return cli_trouble(&comparison.job.error);
     if (!cli_interrupt_begin(&error))
         return cli_trouble(&error);

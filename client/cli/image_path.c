@@ -64,6 +64,16 @@ static bool try_folder(const char *path, const char *folder, struct fl_error *er
     return true;
 }
 
+/* "a/b" becomes "a", "a" becomes ".", "/a" becomes "/". */
+static void outer_folder(char *path)
+{
+    char *slash = strrchr(path, '/');
+    if (!slash)
+        snprintf(path, 2, ".");
+    else
+        slash[slash == path ? 1 : 0] = '\0';
+}
+
 bool cli_check_output(const char *path, char *folder, size_t folder_bytes, struct fl_error *error)
 {
     char plain[4097];
@@ -76,16 +86,34 @@ bool cli_check_output(const char *path, char *folder, size_t folder_bytes, struc
         return fl_error_set(error, FL_ERROR_FILE, "", "the path of the image is too long");
     memcpy(folder, !slash ? "." : path, length);
     folder[length] = '\0';
+    char present[4097];
     struct stat status;
-    if (stat(folder, &status) < 0) {
-        fl_error_set(error, FL_ERROR_FILE, path, "its folder cannot be used: %s", strerror(errno));
-        return errno == ENOENT ? fl_error_remedy(error, "create it with 'mkdir -p %.200s'", folder) : false;
-    }
+    snprintf(present, sizeof(present), "%s", folder);
+    while (stat(present, &status) < 0 && errno == ENOENT)
+        outer_folder(present);
+    if (stat(present, &status) < 0)
+        return fl_error_set(error, FL_ERROR_FILE, path, "its folder cannot be used: %s", strerror(errno));
     if (!S_ISDIR(status.st_mode))
-        return fl_error_set(error, FL_ERROR_FILE, path, "'%s' is not a folder", folder);
+        return fl_error_set(error, FL_ERROR_FILE, path, "'%s' is not a folder", present);
     if (stat(path, &status) == 0 && !S_ISREG(status.st_mode))
         return fl_error_set(error, FL_ERROR_FILE, path, "exists and is not a regular file");
-    return try_folder(path, folder, error);
+    return try_folder(path, present, error);
+}
+
+bool cli_make_folder(const char *folder, struct fl_error *error)
+{
+    char path[4097];
+    snprintf(path, sizeof(path), "%s", folder);
+    for (char *slash = path; slash;) {
+        slash = strchr(slash + 1, '/');
+        if (slash)
+            *slash = '\0';
+        if (mkdir(path, 0777) < 0 && errno != EEXIST)
+            return fl_error_set(error, FL_ERROR_FILE, path, "this folder cannot be made: %s", strerror(errno));
+        if (slash)
+            *slash = '/';
+    }
+    return true;
 }
 
 static bool is_same_file(const char *a, const char *b)
@@ -115,7 +143,7 @@ bool cli_check_error_picture(const char *picture, const char *const *inputs, siz
         return fl_error_remedy(error, "known endings: .png .jpg .jpeg");
     }
     return cli_check_not_input(picture, "--output", inputs, count, error) &&
-           cli_check_output(picture, folder, sizeof(folder), error);
+           cli_check_output(picture, folder, sizeof(folder), error) && cli_make_folder(folder, error);
 }
 
 bool cli_check_input(const char *path, struct fl_error *error)

@@ -140,7 +140,7 @@ int cli_info(int argc, char **argv)
         .args_doc = "MODEL",
         .doc = "Show what a model file contains, and which parts of it are not supported."};
     struct info_options wanted = {0};
-    if (argp_parse(&argp, argc, argv, 0, NULL, &wanted) != 0)
+    if (cli_parse(&argp, argc, argv, 0, &wanted) != 0)
         return cli_report(&wanted.job.error);
     if (!wanted.model && !wanted.environment) {
         cli_usage(&wanted.job, "MODEL", "a model file is needed");

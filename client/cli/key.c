@@ -40,7 +40,7 @@ int cli_key(int argc, char **argv)
                "--key-file) "
                "accepts clients with a copy of it (--key) from any host, on sealed connections."};
     struct key_options wanted = {0};
-    if (argp_parse(&argp, argc, argv, 0, NULL, &wanted) != 0)
+    if (cli_parse(&argp, argc, argv, 0, &wanted) != 0)
         return cli_report(&wanted.job.error);
     if (!wanted.path) {
         cli_usage(&wanted.job, "FILE", "a file name is needed");

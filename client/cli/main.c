@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "cli/cli.h"
+#include "lib/text.h"
 #include "protocol/version.h"
 
 #include <stdio.h>
@@ -53,24 +54,33 @@ static int run(const struct subcommand *subcommand, int argc, char **argv)
     return subcommand->run(argc, argv);
 }
 
-static int help(int argc, char **argv)
-{
-    char option[] = "--help";
-    const struct subcommand *subcommand = argc > 2 ? find(argv[2]) : NULL;
-    if (!subcommand) {
-        print_help(stdout);
-        return CLI_DONE;
-    }
-    char *arguments[] = {NULL, option, NULL};
-    return run(subcommand, 2, arguments);
-}
-
 static int unknown(const char *name)
 {
     struct fl_error error;
     fl_error_set(&error, FL_ERROR_ARGUMENT, name, "is not a subcommand");
-    fl_error_remedy(&error, "'farlight help' lists all subcommands");
+    struct fl_nearest nearest = {0};
+    for (size_t i = 0; i < SUBCOMMAND_COUNT; i++)
+        fl_nearest_try(&nearest, name, subcommands[i].name);
+    fl_nearest_try(&nearest, name, "help");
+    if (nearest.name)
+        fl_error_remedy(&error, "did you mean '%s'?", nearest.name);
+    else
+        fl_error_remedy(&error, "'farlight help' lists all subcommands");
     return cli_report(&error);
+}
+
+static int help(int argc, char **argv)
+{
+    char option[] = "--help";
+    if (argc < 3 || strcmp(argv[2], "help") == 0) {
+        print_help(stdout);
+        return CLI_DONE;
+    }
+    const struct subcommand *subcommand = find(argv[2]);
+    if (!subcommand)
+        return unknown(argv[2]);
+    char *arguments[] = {NULL, option, NULL};
+    return run(subcommand, 2, arguments);
 }
 
 int main(int argc, char **argv)

@@ -59,7 +59,7 @@ int cli_ping(int argc, char **argv)
                                      .children = children,
                                      .doc = "Measure the round-trip time to a daemon."};
     struct ping_options wanted = {.count = 5};
-    if (argp_parse(&argp, argc, argv, 0, NULL, &wanted) != 0)
+    if (cli_parse(&argp, argc, argv, 0, &wanted) != 0)
         return cli_report(&wanted.job.error);
     struct fl_error error = {0};
     struct fl_connection *connection = cli_daemon_connect(&wanted.daemon, "farlight ping", false, &error);

@@ -3,6 +3,7 @@
 #include "protocol/common/clock.h"
 
 #include <stdio.h>
+#include <string.h>
 #include <sys/ioctl.h>
 #include <time.h>
 #include <unistd.h>
@@ -10,10 +11,12 @@
 #define BAR_EVERY_NS 100000000ull
 #define LINE_EVERY_NS 1000000000ull
 
+#define COLUMNS_UNKNOWN 80
+
 static unsigned columns(void)
 {
     struct winsize size = {0};
-    return ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 20 ? size.ws_col : 80;
+    return ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0 ? size.ws_col : COLUMNS_UNKNOWN;
 }
 
 void cli_progress_begin(struct cli_progress *progress, bool silent)
@@ -48,6 +51,24 @@ static bool is_due(struct cli_progress *progress, bool always)
     return true;
 }
 
+/* A bar, if `total` is not 0 and there is space for it, and the text, on one line: one that is longer than the
+ * terminal would stay when it is drawn again. */
+static void draw(struct cli_progress *progress, uint32_t done, uint32_t total, const char *text)
+{
+    const unsigned wide = columns(), length = (unsigned)strlen(text);
+    const unsigned width = total > 0 && wide > length + 6 ? wide - length - 4 : 0;
+    const unsigned filled = total > 0 ? (unsigned)((uint64_t)width * done / total) : 0;
+    cli_progress_clear(progress);
+    if (width >= 8) {
+        fputc('[', stderr);
+        for (unsigned i = 0; i < width; i++)
+            fputc(i < filled ? '#' : '.', stderr);
+        fputs("] ", stderr);
+    }
+    fprintf(stderr, "%.*s", (int)wide - 1, text);
+    progress->drawn = true;
+}
+
 /* `what` comes from our importer, which is not trusted: only plain characters are shown. */
 void cli_progress_import(struct cli_progress *progress, uint64_t done_bytes, uint64_t total_bytes,
                          const char *what)
@@ -60,12 +81,12 @@ void cli_progress_import(struct cli_progress *progress, uint64_t done_bytes, uin
         if (*what >= 0x20 && *what < 0x7f)
             plain[length++] = *what;
     plain[length] = '\0';
-    cli_progress_clear(progress);
+    char text[80];
     if (total_bytes > 0)
-        fprintf(stderr, "%s: %.0f %%", plain, 100.0 * (double)done_bytes / (double)total_bytes);
+        snprintf(text, sizeof(text), "%s: %.0f %%", plain, 100.0 * (double)done_bytes / (double)total_bytes);
     else
-        fprintf(stderr, "%s: %.1f MB", plain, (double)done_bytes * 1e-6);
-    progress->drawn = true;
+        snprintf(text, sizeof(text), "%s: %.1f MB", plain, (double)done_bytes * 1e-6);
+    draw(progress, 0, 0, text);
 }
 
 /* "1:02:03" or "2:03" */
@@ -78,34 +99,18 @@ static void print_duration(char *text, size_t text_bytes, double seconds)
         snprintf(text, text_bytes, "%lu:%02lu", whole / 60, whole % 60);
 }
 
-static void draw_bar(uint32_t done, uint32_t total, const char *numbers, size_t numbers_length)
-{
-    const unsigned wide = columns();
-    const unsigned width = wide > numbers_length + 6 ? wide - (unsigned)numbers_length - 4 : 0;
-    const unsigned filled = total > 0 ? (unsigned)((uint64_t)width * done / total) : 0;
-    if (width >= 8) {
-        fputc('[', stderr);
-        for (unsigned i = 0; i < width; i++)
-            fputc(i < filled ? '#' : '.', stderr);
-        fputs("] ", stderr);
-    }
-    fputs(numbers, stderr);
-}
-
 void cli_progress_step(struct cli_progress *progress, uint32_t done, uint32_t total, const char *what)
 {
     const uint64_t now = monotonic_now_ns();
     if (progress->silent || (!progress->bar && now - progress->begin_ns < LINE_EVERY_NS))
         return;
     char text[120];
-    int length = snprintf(text, sizeof(text), "%u of %u: %s", done, total, what);
+    snprintf(text, sizeof(text), "%u of %u: %s", done, total, what);
     if (!progress->bar) {
         fprintf(stderr, "%s\n", text);
         return;
     }
-    cli_progress_clear(progress);
-    draw_bar(done, total, text, length > 0 && length < (int)sizeof(text) ? (size_t)length : sizeof(text) - 1);
-    progress->drawn = true;
+    draw(progress, done, total, text);
 }
 
 void cli_progress_samples(struct cli_progress *progress, uint32_t held, uint32_t total)
@@ -113,21 +118,15 @@ void cli_progress_samples(struct cli_progress *progress, uint32_t held, uint32_t
     char text[80];
     if (progress->silent || !is_due(progress, held == total))
         return;
-    int length = 0;
     if (total > 0)
-        length = snprintf(text, sizeof(text), "%u of %u samples a pixel", held, total);
+        snprintf(text, sizeof(text), "%u of %u samples a pixel", held, total);
     else
-        length = snprintf(text, sizeof(text), "%u sample%s a pixel; Ctrl-C ends it", held, held == 1 ? "" : "s");
+        snprintf(text, sizeof(text), "%u sample%s a pixel; Ctrl-C ends it", held, held == 1 ? "" : "s");
     if (!progress->bar) {
         fprintf(stderr, "%s\n", text);
         return;
     }
-    cli_progress_clear(progress);
-    if (total > 0)
-        draw_bar(held, total, text, (size_t)length);
-    else
-        fputs(text, stderr);
-    progress->drawn = true;
+    draw(progress, held, total, text);
 }
 
 void cli_progress_frames(struct cli_progress *progress, uint32_t done, uint32_t total)
@@ -145,13 +144,15 @@ void cli_progress_frames(struct cli_progress *progress, uint32_t done, uint32_t 
         print_duration(left, sizeof(left), (total - done) / rate);
     int length = snprintf(numbers, sizeof(numbers), "%u of %u frames", done, total);
     if (left[0] != '\0')
-        length +=
-            snprintf(numbers + length, sizeof(numbers) - (size_t)length, ", %.2f frames/s, %s left", rate, left);
+        snprintf(numbers + length, sizeof(numbers) - (size_t)length, ", %.2f frames/s, %s left", rate, left);
     if (!progress->bar) {
         fprintf(stderr, "%s\n", numbers);
         return;
     }
-    cli_progress_clear(progress);
-    draw_bar(done, total, numbers, (size_t)length);
-    progress->drawn = true;
+    /* What is left of it is more worth than the rate. */
+    if (left[0] != '\0' && strlen(numbers) >= columns())
+        snprintf(numbers + length, sizeof(numbers) - (size_t)length, ", %s left", left);
+    if (strlen(numbers) >= columns())
+        snprintf(numbers, sizeof(numbers), "%u/%u", done, total);
+    draw(progress, done, total, numbers);
 }

@@ -79,7 +79,7 @@ int cli_render(int argc, char **argv)
                                      "FARLIGHT_SAMPLES and so on give defaults.",
                               .children = children};
     struct cli_job job;
-    if (!cli_job_begin(&job, fl_render_defaults()) || argp_parse(&argp, argc, argv, 0, NULL, &job) != 0 ||
+    if (!cli_job_begin(&job, fl_render_defaults()) || cli_parse(&argp, argc, argv, 0, &job) != 0 ||
         !complete(&job))
         return cli_report(&job.error);
     return cli_run_job(&job, false);

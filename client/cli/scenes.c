@@ -68,7 +68,7 @@ int cli_scenes(int argc, char **argv)
                                          "List the scenes of a daemon to which clients may attach: those that are "
                                          "shared with all clients, and those kept for the same user or key."};
     struct scenes_options wanted = {0};
-    if (argp_parse(&argp, argc, argv, 0, NULL, &wanted) != 0)
+    if (cli_parse(&argp, argc, argv, 0, &wanted) != 0)
         return cli_report(&wanted.job.error);
     struct fl_error error = {0};
     struct fl_connection *connection = cli_daemon_connect(&wanted.daemon, "farlight scenes", true, &error);

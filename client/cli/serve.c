@@ -346,7 +346,7 @@ int cli_serve(int argc, char **argv)
                "Without --server the command starts a daemon, which ends with the command. Arguments after -- are "
                "options of that daemon, for example --device software."};
     struct serving serving = {0};
-    if (argp_parse(&argp, argc, argv, ARGP_IN_ORDER, NULL, &serving) != 0)
+    if (cli_parse(&argp, argc, argv, ARGP_IN_ORDER, &serving) != 0)
         return cli_report(&serving.job.error);
     const int status = serve(&serving);
     remove_folder(&serving);

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Reading a shot file: members, names, paths, and mistakes with their line. */
 #include "cli/shot_read.h"
+#include "lib/text.h"
 
 #include <math.h>
 #include <stdarg.h>
@@ -45,46 +46,19 @@ bool shot_wrong(const struct shot_reader *reader, const struct shot_value *at, c
 
 /* ---- members ---- */
 
-/* Number of letters to change, insert or delete (Levenshtein 1965). */
-static unsigned distance(const char *a, const char *b)
-{
-    unsigned row[32];
-    const size_t columns = strlen(b);
-    if (columns + 1 > sizeof(row) / sizeof(row[0]))
-        return 99;
-    for (unsigned i = 0; i <= columns; i++)
-        row[i] = i;
-    for (unsigned y = 1; a[y - 1] != '\0'; y++) {
-        unsigned corner = row[0];
-        row[0] = y;
-        for (size_t x = 1; x <= columns; x++) {
-            const unsigned change = corner + (a[y - 1] != b[x - 1] ? 1 : 0);
-            const unsigned shorter = row[x] < row[x - 1] ? row[x] : row[x - 1];
-            corner = row[x];
-            row[x] = change < shorter + 1 ? change : shorter + 1;
-        }
-    }
-    return row[columns];
-}
-
 static bool unknown_member(const struct shot_reader *reader, const struct shot_value *object, const char *name,
                            const char *const *known)
 {
     char list[560] = "", remedy[80];
-    const char *nearest = NULL;
-    unsigned minimum = 3; /* further off it is another word */
+    struct fl_nearest nearest = {0};
     for (size_t i = 0; known[i]; i++) {
         const size_t used = strlen(list);
-        const unsigned off = strlen(name) < 32 ? distance(name, known[i]) : 99;
         snprintf(list + used, sizeof(list) - used, "%s%s", i > 0 ? ", " : "", known[i]);
-        if (off < minimum) {
-            minimum = off;
-            nearest = known[i];
-        }
+        fl_nearest_try(&nearest, name, known[i]);
     }
     struct shot_value member = shot_member(object, name);
-    snprintf(remedy, sizeof(remedy), "did you mean '%s'?", nearest ? nearest : "");
-    return shot_wrong(reader, &member, nearest ? remedy : NULL, "is not known; known: %s", list);
+    snprintf(remedy, sizeof(remedy), "did you mean '%s'?", nearest.name ? nearest.name : "");
+    return shot_wrong(reader, &member, nearest.name ? remedy : NULL, "is not known; known: %s", list);
 }
 
 bool shot_is_object(const struct shot_reader *reader, const struct shot_value *at, const char *const *known)

@@ -46,7 +46,11 @@ static bool prepare(struct cli_sink *sink, struct fl_error *error)
     /* The highest possible frame number: it gives the longest path. */
     if (!fl_pattern_path(&sink->pattern, 10000000, sink->path, sizeof(sink->path)))
         return fl_error_set(error, FL_ERROR_ARGUMENT, "--output", "the path of a frame is too long");
-    return cli_check_output(sink->path, sink->folder, sizeof(sink->folder), error);
+    if (cli_check_output(sink->path, sink->folder, sizeof(sink->folder), error))
+        return true;
+    /* No frame of that number may be wanted. */
+    fl_text_utf8(path, error->field, sizeof(error->field));
+    return false;
 }
 
 bool cli_sinks_prepare(struct cli_sinks *sinks, const struct cli_job *job, bool is_series, struct fl_error *error)
@@ -109,6 +113,8 @@ static bool start_video(struct cli_sink *sink, struct fl_error *error)
 
 static bool start(struct cli_sink *sink, struct fl_error *error)
 {
+    if (!sink->to_stdout && !cli_make_folder(sink->folder, error))
+        return false;
     if (cli_image_is_video(sink->output.image))
         return start_video(sink, error);
     const struct cli_job *job = sink->job;

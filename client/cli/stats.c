@@ -297,7 +297,7 @@ int cli_stats(int argc, char **argv)
         .children = children,
         .doc = "Show a daemon's device, clients, scenes, jobs, memory, stage times and limits."};
     struct stats_options wanted = {0};
-    if (argp_parse(&argp, argc, argv, 0, NULL, &wanted) != 0)
+    if (cli_parse(&argp, argc, argv, 0, &wanted) != 0)
         return cli_report(&wanted.job.error);
     struct fl_error error = {0};
     struct fl_connection *connection = cli_daemon_connect(&wanted.daemon, "farlight stats", true, &error);

@@ -232,7 +232,7 @@ int cli_tracers(int argc, char **argv)
                                          "Settings are options of render, animate, view and compare, members of "
                                          "shot files, and variables such as FARLIGHT_LDC_RESOLUTION."};
     int form = 0;
-    if (argp_parse(&argp, argc, argv, 0, NULL, &form) != 0)
+    if (cli_parse(&argp, argc, argv, 0, &form) != 0)
         return CLI_USAGE;
     if (form == KEY_JSON)
         print_json(tracers_json());

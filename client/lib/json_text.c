@@ -21,7 +21,7 @@ bool fl_json_load(struct fl_json *json, const char *path, size_t max_bytes, stru
     else if (json->length > max_bytes)
         fl_error_set(error, FL_ERROR_FILE, path, "is larger than %zu bytes", max_bytes);
     else if (!(json->root = json_loadb(json->text, json->length, JSON_REJECT_DUPLICATES, &why)))
-        fl_error_set(error, FL_ERROR_FILE, path, "line %d, column %d: %s", why.line, why.column, why.text);
+        fl_error_set(error, FL_ERROR_ARGUMENT, path, "line %d, column %d: %s", why.line, why.column, why.text);
     fclose(file);
     if (json->root)
         return true;

@@ -22,7 +22,7 @@ struct place {
 static bool wrong(const struct place *place, const char *field, const char *what)
 {
     const struct fl_json_place key = {.index = place->key}, at = {.outer = &key, .key = field};
-    return fl_error_set(place->error, FL_ERROR_FILE, place->path, "line %u: key %zu, \"%s\": %s",
+    return fl_error_set(place->error, FL_ERROR_ARGUMENT, place->path, "line %u: key %zu, \"%s\": %s",
                         fl_json_line(place->json, &at), place->key, field, what);
 }
 
@@ -80,7 +80,7 @@ static bool check_names(const struct place *place, json_t *object)
 static bool read_key(const struct place *place, json_t *object, struct record_camera_key *key)
 {
     if (!json_is_object(object))
-        return fl_error_set(place->error, FL_ERROR_FILE, place->path, "line %u: key %zu is not an object",
+        return fl_error_set(place->error, FL_ERROR_ARGUMENT, place->path, "line %u: key %zu is not an object",
                             fl_json_line(place->json, &(struct fl_json_place){.index = place->key}), place->key);
     double time_s = 0, fov = 45;
     *key = (struct record_camera_key){.up_world = {0, 1, 0}};
@@ -121,7 +121,7 @@ bool fl_camera_keys_load(const char *path, struct record_camera_key **keys, size
     struct record_camera_key *made = NULL;
     bool good = false;
     if (count == 0 || count > KEYS_MAX) {
-        fl_error_set(error, FL_ERROR_FILE, path, "must be an array of 1 to %u camera keys", KEYS_MAX);
+        fl_error_set(error, FL_ERROR_ARGUMENT, path, "must be an array of 1 to %u camera keys", KEYS_MAX);
     } else {
         made = calloc(count, sizeof(*made));
         good =

@@ -2,6 +2,7 @@
 #include "lib/text.h"
 
 #include <errno.h>
+#include <limits.h>
 #include <locale.h>
 #include <math.h>
 #include <stdio.h>
@@ -10,7 +11,9 @@
 
 #include "protocol/plain_text.h"
 
-#define EDGE_MAX 8192      /* the protocol's maximum of a picture */
+#define EDGE_MAX 8192  /* the protocol's maximum of a picture */
+#define NEAREST_MAX 2u /* further off it is another word */
+#define NEAREST_BYTES_MAX 32u
 #define FRAME_MAX 10000000 /* the protocol's maximum of a frame number */
 
 static bool is_digit(char c)
@@ -153,6 +156,37 @@ bool fl_text_range(const char *text, uint32_t *first, uint32_t *last, uint32_t *
     *last = (uint32_t)to;
     *step = (uint32_t)by;
     return true;
+}
+
+/* Number of letters to change, insert or delete (Levenshtein 1965). */
+static unsigned distance(const char *a, const char *b)
+{
+    unsigned row[NEAREST_BYTES_MAX];
+    const size_t columns = strlen(b);
+    if (columns + 1 > NEAREST_BYTES_MAX)
+        return UINT_MAX;
+    for (unsigned i = 0; i <= columns; i++)
+        row[i] = i;
+    for (unsigned y = 1; a[y - 1] != '\0'; y++) {
+        unsigned corner = row[0];
+        row[0] = y;
+        for (size_t x = 1; x <= columns; x++) {
+            const unsigned change = corner + (a[y - 1] != b[x - 1] ? 1 : 0);
+            const unsigned shorter = row[x] < row[x - 1] ? row[x] : row[x - 1];
+            corner = row[x];
+            row[x] = change < shorter + 1 ? change : shorter + 1;
+        }
+    }
+    return row[columns];
+}
+
+void fl_nearest_try(struct fl_nearest *nearest, const char *typed, const char *known)
+{
+    const unsigned off = strlen(typed) < NEAREST_BYTES_MAX ? distance(typed, known) : UINT_MAX;
+    if (off > NEAREST_MAX || off >= strlen(known) || (nearest->name && off >= nearest->distance))
+        return;
+    nearest->name = known;
+    nearest->distance = off;
 }
 
 void fl_text_utf8(const char *text, char *out, size_t out_bytes)

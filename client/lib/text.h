@@ -23,6 +23,13 @@ bool fl_text_vector(const char *text, float vector[3], struct fl_error *error);
 /* "A", "A-B" or "A-B:STEP"; A <= B, STEP >= 1. */
 bool fl_text_range(const char *text, uint32_t *first, uint32_t *last, uint32_t *step, struct fl_error *error);
 
+/* The one of several known words that was probably meant: at most two letters differ. Initially zero. */
+struct fl_nearest {
+    const char *name; /* NULL: none is near */
+    unsigned distance;
+};
+void fl_nearest_try(struct fl_nearest *nearest, const char *typed, const char *known);
+
 /* Copies as much of `text` as fits, without cutting a character; bytes that are not UTF-8 become '?'. */
 void fl_text_utf8(const char *text, char *out, size_t out_bytes);
 

@@ -250,7 +250,7 @@ int main(int argc, char **argv)
         .help_filter = help_filter};
     static struct command_line line;
     argp_err_exit_status = CLI_USAGE;
-    if (!cli_job_begin(&line.job, fl_view_defaults()) || argp_parse(&argp, argc, argv, 0, NULL, &line) != 0 ||
+    if (!cli_job_begin(&line.job, fl_view_defaults()) || cli_parse(&argp, argc, argv, 0, &line) != 0 ||
         !complete(&line))
         return cli_report(&line.job.error);
     struct fl_error error = {0};

@@ -22,7 +22,7 @@ static bool refuse(struct reader *reader, const char *key, const char *what)
     const struct fl_json_place *place = key ? &member : &reader->event;
     char name[96];
     fl_json_path(place, name, sizeof(name));
-    return fl_error_set(reader->error, FL_ERROR_FILE, reader->path, "line %u: %s: %s",
+    return fl_error_set(reader->error, FL_ERROR_ARGUMENT, reader->path, "line %u: %s: %s",
                         fl_json_line(&reader->json, place), name, what);
 }
 
@@ -161,7 +161,7 @@ bool replay_load(struct replay *replay, const char *path, struct fl_error *error
     const size_t count = json_array_size(reader.json.root);
     bool good = json_is_array(reader.json.root);
     if (!good)
-        fl_error_set(error, FL_ERROR_FILE, path, "is not a list of events");
+        fl_error_set(error, FL_ERROR_ARGUMENT, path, "is not a list of events");
     replay->events = calloc(2 * count + 1, sizeof(*replay->events));
     if (good && !replay->events)
         good = fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");

@@ -146,7 +146,7 @@ class Limits(OneDaemon):
                  (["--tracers", "bvh,naive", "--far", "0"], "--far"),
                  (["--tracers", "bvh,naive", "--tracer", "bvh"], "--tracer"), (["--tracer", "bvh"], "a pair of tracers"),
                  (["--tracers", "bvh,naive", "-o", self.folder / "x.exr"], "PNG"),
-                 (["--tracers", "bvh,naive", "-o", self.folder / "no" / "x.png"], "no"),
+                 (["--tracers", "bvh,naive", "-o", bundled_scenes() / FLAKE / "x.png"], "folder"),
                  (["--tracers", "bvh,naive", "--encoding", "jpeg"], "jpeg"))
         for arguments, word in cases:
             with self.subTest(arguments=arguments):

@@ -4,13 +4,19 @@
 Pictures are compared with stored figures: the mean colour of 8 x 8 parts. `python3 test_render.py --update` writes
 them anew after a change that is meant to change pictures; look at the pictures first.
 """
+import contextlib
+import fcntl
 import json
 import os
+import pty
+import re
 import shutil
 import signal
+import struct
 import subprocess
 import sys
 import tempfile
+import termios
 import time
 
 import farlight_test
@@ -180,11 +186,63 @@ class BadInput(Case):
         self.refused(2, "render", cornell, says=["-o"])
         self.refused(2, "render", says=["MODEL"])
         self.refused(2, "render", cornell, "-o", output, "--no-such-option")
-        self.refused(1, "render", cornell, "-o", self.folder / "no" / "x.png", says=["no"])
         self.refused(75, "render", cornell, "-o", output, "--server", f"unix:{self.folder}/nobody.sock",
                      says=["nobody.sock"])
         self.refused(2, "render", cornell, "-o", output, "--camera", "no such camera", says=["no such camera"])
         self.refused(2, "animate", cornell, "--frames", "1-4", "-o", self.folder / "%s.png", says=["%"])
+
+    def test_what_is_nearly_an_option_or_a_subcommand_is_guessed(self):
+        self.refused(2, "render", "--sise", "1x1", says=["'--size'"])
+        self.refused(2, "render", "-q", "--tracr=bvh", says=["'--tracer'"])
+        self.refused(2, "stats", "--wacth", says=["'--watch'"])
+        self.refused(2, "rendr", says=["'render'"])
+        self.refused(2, "help", "rendr", says=["'render'"])
+        self.refused(2, "help", "nonsense", says=["not a subcommand"])
+        # A value that looks like an option is none.
+        result = self.refused(2, "render", bundled_scenes() / "cornell.glb", "-qo", "--sise", says=["no image format"])
+        self.assertNotIn("did you mean", result.stderr)
+
+    def test_a_script_that_is_no_json_is_a_mistake_in_usage(self):
+        script = self.folder / "script.json"
+        cornell = bundled_scenes() / "cornell.glb"
+        for text in ("nothing", "[1", ""):
+            script.write_text(text)
+            for command in (["animate", "--script", script], ["view", cornell, "--headless", "--replay", script],
+                            ["animate", cornell, "--frames", "1-2", "--keys", script, "-o", self.folder / "%d.png"]):
+                with self.subTest(text=text, command=command):
+                    self.assertIn("script.json", self.expect(farlight(*command), 2).stderr)
+
+    def test_a_missing_folder_is_made_when_there_is_something_to_write(self):
+        cornell, folder = bundled_scenes() / "cornell.glb", self.folder / "made" / "for" / "it"
+        self.expect(farlight("animate", cornell, "--frames", "1-2", "-o", folder / "%d.png", "--dry-run"), 0)
+        self.refused(1, "render", self.folder / "missing.glb", "-o", folder / "x.png", says=["missing.glb"])
+        self.assertEqual(list(self.folder.iterdir()), [])
+        self.expect(farlight("render", cornell, "--size", "8x8", "-o", folder / "x.png"), 0)
+        self.assertEqual(self.leftovers(), ["made/for/it/x.png"])
+
+    def test_messages_name_the_pattern_of_the_files_not_a_file_that_nobody_wants(self):
+        (self.folder / "file").write_text("")
+        result = farlight("animate", bundled_scenes() / "cornell.glb", "--frames", "1-2", "-o", self.folder / "file" / "%04d.png")
+        self.expect(result, 1)
+        self.assertIn("file/%04d.png: ", result.stderr)
+        self.assertNotIn("10000000", result.stderr)
+
+    def test_progress_fits_a_narrow_terminal(self):
+        for columns in (10, 30, 60):
+            parent, child = pty.openpty()
+            fcntl.ioctl(child, termios.TIOCSWINSZ, struct.pack("HHHH", 24, columns, 0, 0))
+            drawing = subprocess.Popen([BIN / "farlight", "animate", bundled_scenes() / "cornell.glb", "--frames", "1-3", "--size",
+                                        "16x16", "-o", self.folder / "%d.png"], stderr=child, env={**os.environ, "TERM": "xterm"})
+            os.close(child)
+            shown = b""
+            with contextlib.suppress(OSError):  # the end of a terminal
+                while data := os.read(parent, 65536):
+                    shown += data
+            os.close(parent)
+            self.assertEqual(drawing.wait(farlight_test.TIMEOUT_S), 0, shown)
+            lines = [line for line in re.split(rb"[\r\n]|\x1b\[K", shown) if line]
+            self.assertIn(b"3", lines[-1])
+            self.assertLess(max(map(len, lines)), columns, lines)
 
     def test_a_model_that_is_no_model_is_refused_by_name(self):
         path = self.folder / "rubbish.glb"

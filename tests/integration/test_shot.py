@@ -163,9 +163,9 @@ class Mistakes(Shots):
                 self.assertRegex(result.stderr.strip(), r"\([^()]+(\(5\))?\)$", "a remedy in brackets at the end")
 
     def test_invalid_json_is_reported_with_its_line(self):
-        result = self.expect(self.try_text('{\n "model": "teapot.glb",\n "samples": 4,,\n}'), 1)
+        result = self.expect(self.try_text('{\n "model": "teapot.glb",\n "samples": 4,,\n}'), 2)
         self.assertIn("shot.json: line 3", result.stderr)
-        result = self.expect(self.try_text('{"samples": 4,\n"samples": 5}'), 1)
+        result = self.expect(self.try_text('{"samples": 4,\n"samples": 5}'), 2)
         self.assertIn("shot.json: line 2", result.stderr)
         result = self.expect(farlight("animate", "--script", self.folder / "no.json"), 1)
         self.assertIn("no.json", result.stderr)

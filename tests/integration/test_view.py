@@ -241,7 +241,7 @@ class WithoutAWindow(Viewer):
     def test_a_wait_in_vain_is_reported(self):
         self.replay([{"wait": "lost", "timeout": 0.2}], status=1)
         self.assertIn("event 0", self.errors)
-        self.replay([{"nothing": 1}], status=1)
+        self.replay([{"nothing": 1}], status=2)
         self.assertIn("[0]", self.errors)
 
     def test_wrong_usage_is_reported(self):
@@ -395,7 +395,7 @@ class OnADaemon(Viewer):
         self.assertIn("pan", self.errors)
 
     def test_a_daemon_that_is_not_there_ends_the_viewer(self):
-        self.replay([rest()], "--server", f"unix:{self.folder}/nothing", status=1)
+        self.replay([rest()], "--server", f"unix:{self.folder}/nothing", status=75)
         self.assertIn("nothing", self.errors)
 
 
