@@ -48,7 +48,7 @@ static bool begin_sample(struct frame_renderer *renderer, struct error *error)
     context->wave_number = 0;
     slices_restart(&renderer->slices);
     renderer->phase = renderer->rasterise ? PHASE_RASTER : PHASE_SLICE;
-    primary_rasterise_begin(&renderer->work->primary);
+    primary_rasterise_begin(&renderer->work->primary, 0);
     return context_upload_uniforms(context, error);
 }
 
@@ -73,6 +73,13 @@ static bool begin_slice(struct frame_renderer *renderer, struct error *error)
     if (!slices_take(&renderer->slices, &renderer->picture, sample_shift, &context->slice)) {
         renderer->sample += 1u << sample_shift;
         renderer->phase = renderer->sample < context->request.samples ? PHASE_SAMPLE : PHASE_RESOLVE;
+        return true;
+    }
+    uint32_t row = picture_row_of(&renderer->picture, context->slice.first_slot);
+    if (renderer->rasterise && row - renderer->work->primary.first_row >= renderer->strip_rows) {
+        slices_put_back(&renderer->slices, &context->slice); /* it is the first of the next strip */
+        primary_rasterise_begin(&renderer->work->primary, row);
+        renderer->phase = PHASE_RASTER;
         return true;
     }
     layers_begin_slice(&renderer->work->layers);

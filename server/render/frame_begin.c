@@ -18,6 +18,8 @@
 #define SLICE_RAYS_COMPARED (1u << 14)
 #define SLICE_RAYS_HARDWARE (1u << 18)
 #define WAVE_PER_SLICE 2
+/* Pixels that are rasterised together: more take a while to reserve and to clear. */
+#define STRIP_PIXELS_MAX (1u << 22)
 /* The number of samples that texture filtering assumes for a picture that accumulates without an end. */
 #define SAMPLES_GOING_ON 16
 
@@ -193,9 +195,10 @@ static bool reserve_frame(struct frame_renderer *renderer, struct error *error)
         return false;
     const struct frame_request *request = &context->request;
     bool flat = !(request->aperture > 0.0f) && !renderer->shared->copy.has_motion;
-    /* A picture too large for the visibility buffer is traced from the first ray: the same hits, another way. */
-    renderer->rasterise = flat && request->primary == PRIMARY_RASTER && !request->compare &&
-                          primary_reserve(&renderer->work->primary, context, NULL);
+    renderer->rasterise = flat && request->primary == PRIMARY_RASTER && !request->compare;
+    renderer->strip_rows = picture_strip_rows(&renderer->picture, STRIP_PIXELS_MAX);
+    if (renderer->rasterise && !primary_reserve(&renderer->work->primary, context, renderer->strip_rows, error))
+        return false;
     uint32_t rays = slice_rays(renderer);
     uint64_t all = picture_slot_count(&renderer->picture);
     all *= renderer->rasterise ? 1 : SLICES_SAMPLES_TOGETHER;

@@ -70,6 +70,7 @@ struct frame_renderer {
     struct tracer *tracer, *second; /* held; NULL: none */
     bool built;                     /* `tracer` is what the scene is */
     bool rasterise;
+    uint32_t strip_rows; /* that are rasterised together */
     uint32_t samples_before; /* that the picture holds of the frames that this one goes on from */
     uint32_t sample;         /* samples of this frame that are done */
     uint32_t plane, band;    /* of the picture that is handed out next */

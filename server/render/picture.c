@@ -56,6 +56,18 @@ static uint32_t band_slots(const struct picture *picture)
     return picture->tiles_across * 8 * picture->band_rows;
 }
 
+uint32_t picture_row_of(const struct picture *picture, uint32_t slot)
+{
+    return picture_band_first_row(picture, slot / band_slots(picture));
+}
+
+uint32_t picture_strip_rows(const struct picture *picture, uint32_t pixels_max)
+{
+    uint32_t bands = pixels_max / (picture->width * picture->band_rows);
+    uint32_t rows = (bands ? bands : 1) * picture->band_rows;
+    return rows < picture->height ? rows : picture->height;
+}
+
 uint32_t picture_slot_count(const struct picture *picture)
 {
     return picture->tiles_across * ((picture->height + 7) / 8) * 64;

@@ -25,6 +25,10 @@ struct picture {
  * request adds, is kept. */
 bool picture_begin(struct picture *picture, struct render_context *context, uint32_t samples_before,
                    struct error *error);
+/* Row of the first slot of a band. */
+uint32_t picture_row_of(const struct picture *picture, uint32_t slot);
+/* Rows of as many whole bands as have that many pixels, at least one; all rows if there are no more. */
+uint32_t picture_strip_rows(const struct picture *picture, uint32_t pixels_max);
 uint32_t picture_slot_count(const struct picture *picture);
 /* First slot of the band after the one that `slot` is in. */
 uint32_t picture_band_end(const struct picture *picture, uint32_t slot);

@@ -21,14 +21,14 @@
 enum primitive_kind { PRIMITIVE_TRIANGLES, PRIMITIVE_SPHERES, PRIMITIVE_DISCS };
 static const unsigned vertices_per_primitive[] = {3, 36, 6};
 
-bool primary_reserve(struct primary *primary, struct render_context *context, struct error *error)
+bool primary_reserve(struct primary *primary, struct render_context *context, uint32_t rows, struct error *error)
 {
-    uint32_t width = context->request.width, height = context->request.height;
-    if (primary->framebuffer.name && primary->visible.width == width && primary->visible.height == height)
+    uint32_t width = context->request.width;
+    if (primary->framebuffer.name && primary->visible.width == width && primary->visible.height == rows)
         return true;
-    primary_finish(primary, context->device);
-    return gpu_texture_reserve(context->device, &primary->visible, GL_RG32UI, width, height, error) &&
-           gpu_texture_reserve(context->device, &primary->depth, GL_DEPTH_COMPONENT32F, width, height, error) &&
+    gpu_framebuffer_finish(context->device, &primary->framebuffer);
+    return gpu_texture_reserve(context->device, &primary->visible, GL_RG32UI, width, rows, error) &&
+           gpu_texture_reserve(context->device, &primary->depth, GL_DEPTH_COMPONENT32F, width, rows, error) &&
            gpu_framebuffer_create(context->device, &primary->framebuffer, &primary->visible, 1, &primary->depth,
                                   error);
 }
@@ -103,6 +103,7 @@ static bool draw_sort(struct primary *primary, struct render_context *context, u
             glFrontFace(scene->instances[primary->instance].flags & INSTANCE_MIRRORED ? GL_CCW : GL_CW);
         gpu_uniform_uint(program, "instance_index", primary->instance);
         gpu_uniform_uint(program, "first_primitive", first + primary->primitive);
+        gpu_uniform_uint(program, "first_row", primary->first_row);
         if (part > 0)
             glDrawArrays(GL_TRIANGLES, 0, (GLsizei)(part * vertices_per_primitive[kind]));
         *budget -= part * vertices_per_primitive[kind];
@@ -149,8 +150,9 @@ static void clear(const struct primary *primary)
     glClearNamedFramebufferfv(primary->framebuffer.name, GL_DEPTH, 0, &farthest);
 }
 
-void primary_rasterise_begin(struct primary *primary)
+void primary_rasterise_begin(struct primary *primary, uint32_t first_row)
 {
+    primary->first_row = first_row;
     primary->sort = SORT_WHOLE;
     primary->instance = primary->primitive = 0;
     primary->cleared = false;
@@ -165,7 +167,8 @@ bool primary_rasterise(struct primary *primary, struct render_context *context, 
     gpu_push_group(context->device, "rasterise primary");
     context_bind(context);
     glBindFramebuffer(GL_FRAMEBUFFER, primary->framebuffer.name);
-    glViewport(0, 0, (GLsizei)primary->visible.width, (GLsizei)primary->visible.height);
+    /* All of the picture, of which the framebuffer has a strip. */
+    glViewport(0, -(GLint)primary->first_row, (GLsizei)primary->visible.width, (GLsizei)context->request.height);
     glDisable(GL_BLEND);
     glDisable(GL_SCISSOR_TEST);
     glEnable(GL_DEPTH_TEST);
@@ -207,8 +210,10 @@ static bool make_rays(const struct primary *primary, struct render_context *cont
         return false;
     context_bind(context);
     glUseProgram(program->name);
-    if (primary)
+    if (primary) {
         gpu_texture_bind(&primary->visible, UNIT_PASS_0);
+        gpu_uniform_uint(program, "first_row", primary->first_row);
+    }
     gpu_buffer_bind_storage(&context->rays, BIND_RAYS);
     gpu_buffer_bind_storage(&context->hits, BIND_HITS);
     gpu_buffer_bind_storage(&context->paths, BIND_PATHS);

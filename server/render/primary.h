@@ -6,22 +6,24 @@
 #include "gpu/texture.h"
 #include "render/context.h"
 
-/* The visibility buffer: which primitive of which instance each pixel of one sample sees. */
+/* The visibility buffer: which primitive of which instance each pixel of one sample sees. It has a strip of the
+ * picture's rows at a time, so that no picture needs more than some memory at once. */
 struct primary {
-    struct gpu_texture visible; /* RG32UI: instance + 1 (0: nothing), primitive; row 0 is the uppermost */
+    struct gpu_texture visible; /* RG32UI: instance + 1 (0: nothing), primitive; row 0 is the strip's uppermost */
     struct gpu_texture depth;   /* reversed, 32-bit float */
     struct gpu_framebuffer framebuffer;
+    uint32_t first_row; /* of the strip, in the picture */
     /* where drawing goes on */
     uint32_t sort, instance, primitive;
     bool cleared;
     uint32_t part_vertices; /* that are drawn in one step on software GL; 0: not known yet */
 };
 
-/* Makes the buffer fit the request's size. */
-bool primary_reserve(struct primary *primary, struct render_context *context, struct error *error);
-/* Draws the whole picture for the sample that the uniforms describe, a part of the scene a call until it is done.
+/* Makes room for strips of that many rows of the request's picture. */
+bool primary_reserve(struct primary *primary, struct render_context *context, uint32_t rows, struct error *error);
+/* Draws the strip from that row on for the sample that the uniforms describe, a part of the scene a call until it is done.
  */
-void primary_rasterise_begin(struct primary *primary);
+void primary_rasterise_begin(struct primary *primary, uint32_t first_row);
 bool primary_rasterise(struct primary *primary, struct render_context *context, bool *done, struct error *error);
 /* Rays, paths and black pixels of context->slice. */
 bool primary_begin_slice(const struct primary *primary, struct render_context *context, struct error *error);

@@ -25,6 +25,7 @@ layout(std430, binding = BIND_RAY_TIMES) writeonly buffer time_block { float tim
 #ifdef VISIBILITY
 layout(std430, binding = BIND_HITS) writeonly buffer hit_block { hit hits[]; };
 layout(binding = UNIT_PASS_0) uniform usampler2D visible_primitives;
+uniform uint first_row; // of the picture in them
 #endif
 
 void main()
@@ -60,7 +61,7 @@ void main()
     paths[k] = path(weight, weight, weight, k, cone.x, cone.y, PATH_STRAIGHT, time, 0u, 0.0, 0.0, 1.0);
     slice_sums[k] = vec4(0.0);
 #ifdef VISIBILITY
-    uvec2 visible = in_picture ? texelFetch(visible_primitives, ivec2(pixel), 0).xy : uvec2(0u);
+    uvec2 visible = in_picture ? texelFetch(visible_primitives, ivec2(pixel - uvec2(0u, first_row)), 0).xy : uvec2(0u);
     hits[k].distance = visible.x != VISIBLE_NOTHING ? 0.0 : -1.0;
     hits[k].instance = visible.x == VISIBLE_DISC ? HIT_NO_PRIMITIVE : visible.x - 1u;
     hits[k].primitive = visible.y;

@@ -8,6 +8,7 @@
 
 uniform uint instance_index;
 uniform uint first_primitive;
+uniform uint first_row; // of the strip that is drawn, in the picture
 
 layout(location = 0) out uvec2 visible;
 
@@ -27,7 +28,7 @@ void main()
 {
     vec3 origin, direction;
     float t_min;
-    camera_ray(uvec2(gl_FragCoord.xy), origin, direction, t_min);
+    camera_ray(uvec2(gl_FragCoord.xy) + uvec2(0u, first_row), origin, direction, t_min);
 #if PRIMITIVE_KIND == 0
     uint primitive = first_primitive + uint(gl_PrimitiveID);
 #ifdef HAS_CUTOUT
