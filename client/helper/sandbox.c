@@ -4,11 +4,14 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <linux/landlock.h>
+#include <sched.h>
 #include <seccomp.h>
 #include <signal.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/ioctl.h>
+#include <sys/mman.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/syscall.h>
@@ -34,6 +37,7 @@
 #endif
 
 #define DEFAULT_ADDRESS_SPACE_BYTES (8ULL << 30)
+#define UNCONFINED "FARLIGHT_UNCONFINED" /* environment variable */
 
 static bool set_limit(int resource, uint64_t value)
 {
@@ -141,9 +145,9 @@ static int enter_landlock(const struct sandbox_options *options)
 
 static const char *const allowed_calls[] = {
     /* memory, threads, time */
-    "brk", "mmap", "munmap", "mremap", "mprotect", "madvise", "clone", "clone3", "futex", "set_robust_list",
-    "rseq", "set_tid_address", "sched_yield", "sched_getaffinity", "getcpu", "clock_gettime", "clock_getres",
-    "gettimeofday", "time", "nanosleep", "clock_nanosleep", "restart_syscall", "arch_prctl", "membarrier",
+    "brk", "munmap", "mremap", "madvise", "futex", "set_robust_list", "rseq", "set_tid_address", "sched_yield",
+    "sched_getaffinity", "getcpu", "clock_gettime", "clock_getres", "gettimeofday", "time", "nanosleep",
+    "clock_nanosleep", "restart_syscall", "arch_prctl", "membarrier",
     /* descriptors */
     "read", "readv", "pread64", "write", "writev", "pwrite64", "close", "lseek", "fstat", "newfstatat", "stat",
     "lstat", "statx", "open", "openat", "openat2", "access", "faccessat", "faccessat2", "readlink", "readlinkat",
@@ -151,8 +155,8 @@ static const char *const allowed_calls[] = {
     "getcwd", "statfs", "fstatfs", "select", "pselect6",
     /* the process itself */
     "exit", "exit_group", "rt_sigaction", "rt_sigprocmask", "rt_sigreturn", "sigaltstack", "getpid", "gettid",
-    "tgkill", "getuid", "geteuid", "getgid", "getegid", "getppid", "getrandom", "sysinfo", "uname", "getrusage",
-    "times", "getrlimit"};
+    "getuid", "geteuid", "getgid", "getegid", "getppid", "getrandom", "sysinfo", "uname", "getrusage", "times",
+    "getrlimit"};
 static const char *const write_calls[] = {"fsync", "fdatasync", "ftruncate", "fallocate", "fchmod", "umask"};
 static const char *const rename_calls[] = {"rename", "renameat", "renameat2", "unlink", "unlinkat", "linkat"};
 
@@ -168,11 +172,41 @@ static bool allow_calls(scmp_filter_ctx filter, const char *const *names, size_t
     return true;
 }
 
+/* Allows the call where the bits of `mask` of an argument have this value. */
+static bool allow_masked(scmp_filter_ctx filter, int number, unsigned argument, uint64_t mask, uint64_t value)
+{
+    const struct scmp_arg_cmp is_value = {
+        .arg = argument, .op = SCMP_CMP_MASKED_EQ, .datum_a = mask, .datum_b = value};
+
+    return seccomp_rule_add_array(filter, SCMP_ACT_ALLOW, number, 1, &is_value) == 0;
+}
+
 static bool allow_with_argument(scmp_filter_ctx filter, int number, unsigned argument, uint64_t value)
 {
     const struct scmp_arg_cmp is_value = {.arg = argument, .op = SCMP_CMP_EQ, .datum_a = value, .datum_b = 0};
 
     return seccomp_rule_add_array(filter, SCMP_ACT_ALLOW, number, 1, &is_value) == 0;
+}
+
+/* No memory is ever both writable and executable. Code comes from files alone, as the dynamic linker maps it. */
+static bool allow_memory(scmp_filter_ctx filter)
+{
+    return allow_masked(filter, SCMP_SYS(mmap), 2, PROT_EXEC, 0) &&
+           allow_masked(filter, SCMP_SYS(mmap), 2, PROT_WRITE | PROT_EXEC, PROT_EXEC) &&
+           allow_masked(filter, SCMP_SYS(mprotect), 2, PROT_EXEC, 0);
+}
+
+/* Threads, but no processes and no namespaces. The flags of clone3 lie in memory, where no filter sees them: the C
+ * library falls back to clone. Signals only to threads of this process. */
+static bool allow_threads(scmp_filter_ctx filter)
+{
+    const uint64_t of_threads = CLONE_VM | CLONE_SIGHAND | CLONE_THREAD;
+    const uint64_t of_others = CLONE_NEWNS | CLONE_NEWCGROUP | CLONE_NEWUTS | CLONE_NEWIPC | CLONE_NEWUSER |
+                               CLONE_NEWPID | CLONE_NEWNET | CLONE_VFORK | CLONE_PTRACE;
+
+    return allow_masked(filter, SCMP_SYS(clone), 0, of_threads | of_others, of_threads) &&
+           seccomp_rule_add(filter, SCMP_ACT_ERRNO(ENOSYS), SCMP_SYS(clone3), 0) == 0 &&
+           allow_with_argument(filter, SCMP_SYS(tgkill), 0, (uint64_t)getpid());
 }
 
 /* fcntl and ioctl only with the requests of a reader of files, so that no descriptor gains abilities. */
@@ -203,7 +237,7 @@ static bool enter_seccomp(const struct sandbox_options *options)
     /* Libraries may have started threads before main(): the filter applies to them, too. Landlock cannot. */
     entered = seccomp_attr_set(filter, SCMP_FLTATR_CTL_TSYNC, 1) == 0 &&
               allow_calls(filter, allowed_calls, sizeof(allowed_calls) / sizeof(allowed_calls[0])) &&
-              allow_arguments(filter);
+              allow_arguments(filter) && allow_memory(filter) && allow_threads(filter);
     if (entered && options->write_folder_count > 0)
         entered = allow_calls(filter, write_calls, sizeof(write_calls) / sizeof(write_calls[0]));
     if (entered && options->allow_rename)
@@ -211,6 +245,13 @@ static bool enter_seccomp(const struct sandbox_options *options)
     entered = entered && seccomp_load(filter) == 0;
     seccomp_release(filter);
     return entered;
+}
+
+static bool may_be_unconfined(void)
+{
+    const char *said = getenv(UNCONFINED);
+
+    return said && strcmp(said, "1") == 0;
 }
 
 bool sandbox_enter(const struct sandbox_options *options, char *reason, size_t reason_bytes)
@@ -224,6 +265,13 @@ bool sandbox_enter(const struct sandbox_options *options, char *reason, size_t r
         return false;
     }
     landlock = enter_landlock(options);
+    if (landlock < 0 && !may_be_unconfined()) {
+        snprintf(
+            reason, reason_bytes,
+            "this kernel has no Landlock, so nothing confines which files are read and written; set " UNCONFINED
+            "=1 to accept that");
+        return false;
+    }
     if (landlock == 0) {
         snprintf(reason, reason_bytes, "Landlock refused the rules: %s", strerror(errno));
         return false;

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* Drops a helper program's rights before it reads hostile input: files beneath the named
- * folders only (Landlock), few system calls (seccomp), bounded memory, time and file sizes, no new
- * privileges. Cannot be undone. Also used by farlight-export.
+ * folders only (Landlock), few system calls (seccomp: no processes,
+ * no signals to others, no memory that is both writable and executable), bounded memory, time and file sizes, no
+ * new privileges. Cannot be undone. Also used by farlight-export.
  *
  * Threads that libraries have started before get the filter and the limits; Landlock binds the calling thread and
  * those that it starts. */
@@ -29,8 +30,8 @@ struct sandbox_options {
 };
 
 /* False, with `reason` set, if a protection that every supported kernel has (limits, no new privileges, system
- * call filter) fails: then nothing may be parsed. If the kernel merely lacks Landlock, the result is true and
- * `reason` says so; else `reason` is empty. */
+ * call filter, Landlock) fails: then nothing may be parsed. If the kernel lacks Landlock and the environment
+ * variable FARLIGHT_UNCONFINED is 1, the result is true and `reason` says so; else `reason` is empty. */
 bool sandbox_enter(const struct sandbox_options *options, char *reason, size_t reason_bytes);
 
 #ifdef __cplusplus
