@@ -154,7 +154,7 @@ static void reload(void *context)
 {
     struct source *source = context;
     struct config next;
-    struct hub_options options;
+    struct hub_options options = {0};
     struct error error = {0};
     bool read = read_config(&next, source->arguments, &error);
     if (read)
@@ -162,8 +162,10 @@ static void reload(void *context)
     if (!read || !config_hub(&next, &options, &error) || !hub_reload(&source->daemon->hub, &options, &error)) {
         log_write(LOG_ERROR, "config", "the configuration stays as it was: %s%s%s", error.field,
                   error.field[0] ? ": " : "", error.text);
+        auth_keys_unref(options.keys);
         return;
     }
+    auth_keys_unref(options.keys); /* the hub has its own reference */
     *source->config = next;
     log_set_level((enum log_level)source->config->log_level);
     log_write(LOG_INFO, "config", "the configuration was read again");
@@ -185,7 +187,7 @@ static bool serve(struct daemon *daemon, const struct config *config, int fd, bo
     struct engine_options engine_options;
     struct hub_options options;
     if (!config_engine(config, &engine_options, error) || !config_hub(config, &options, error) ||
-        (listens && !begin_to_listen(daemon, config, config->insecure || options.keys.count, error)))
+        (listens && !begin_to_listen(daemon, config, config->insecure || options.keys, error)))
         return false;
     struct engine *engine = engine_create(&engine_options, error);
     if (!engine)
@@ -194,7 +196,9 @@ static bool serve(struct daemon *daemon, const struct config *config, int fd, bo
     options.device_bytes = engine_device_limit_bytes(engine);
     options.timeline = timeline;
     options.owner_may_be_idle = true;
-    bool ok = daemon_start(daemon, &options, error) && (fd < 0 || daemon_serve_fd(daemon, fd, error));
+    bool ok = daemon_start(daemon, &options, error);
+    auth_keys_unref(options.keys); /* the hub has its own reference */
+    ok = ok && (fd < 0 || daemon_serve_fd(daemon, fd, error));
     if (ok) {
         daemon_print_ready(daemon, stdout);
         ok = daemon_run(daemon, device_gone, error);

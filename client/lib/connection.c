@@ -2,6 +2,7 @@
 #include "lib/connection.h"
 
 #include "protocol/sealed/key.h"
+#include "protocol/sealed/secret.h"
 #include "protocol/common/clock.h"
 
 #include <stdio.h>
@@ -373,13 +374,14 @@ static bool open_stream(struct fl_connection *connection, const struct fl_connec
 static bool open_link(struct fl_connection *connection, const struct fl_connect_options *options,
                       uint64_t deadline_ns, struct fl_error *error)
 {
-    struct sealed_key key;
     if (!options->server || !options->key_file)
         return open_stream(connection, options, deadline_ns, error);
-    const bool opened = read_key(&key, options->key_file, error) &&
+    struct sealed_key *key = secret_create(sizeof(*key));
+    const bool opened = (key || fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory, or no random numbers")) &&
+                        read_key(key, options->key_file, error) &&
                         open_stream(connection, options, deadline_ns, error) &&
-                        fl_stream_seal(&connection->stream, &key, error);
-    sealed_key_wipe(&key);
+                        fl_stream_seal(&connection->stream, key, error);
+    secret_destroy(key);
     return opened;
 }
 

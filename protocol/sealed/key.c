@@ -8,6 +8,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "protocol/sealed/secret.h"
+
 static bool invalid(struct decode_error *error, const char *path, const char *what)
 {
     return decode_error_set(error, PROTOCOL_ERROR_INVALID, path, "%s", what);
@@ -99,11 +101,14 @@ bool sealed_key_create(const char *path, struct decode_error *error)
     if (fd < 0) {
         return invalid(error, path, errno == EEXIST ? "is there already, and is left alone" : strerror(errno));
     }
-    struct sealed_key key;
-    randombytes_buf(key.bytes, sizeof(key.bytes));
-    bool ok = fchmod(fd, S_IRUSR | S_IWUSR) == 0 && write_whole(fd, &key);
+    struct sealed_key *key = secret_create(sizeof(*key));
+    if (key) {
+        randombytes_buf(key->bytes, sizeof(key->bytes));
+    }
+    errno = ENOMEM;
+    bool ok = key && fchmod(fd, S_IRUSR | S_IWUSR) == 0 && write_whole(fd, key);
     const int why = errno;
-    sealed_key_wipe(&key);
+    secret_destroy(key);
     if (close(fd) < 0 || !ok) {
         unlink(path);
         return invalid(error, path, strerror(why));

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 #include "protocol/sealed/sealed.h"
 
-#include <stdlib.h>
 #include <string.h>
 
+#include "protocol/sealed/secret.h"
 #include "protocol/sealed/state.h"
 #include "protocol/writer.h"
 
@@ -32,7 +32,7 @@ static struct sealed *create(const struct sealed_key *keys, size_t key_count, bo
     if (sodium_init() < 0 || key_count < 1 || key_count > SEALED_KEYS_MAX) {
         return NULL;
     }
-    struct sealed *sealed = calloc(1, sizeof(*sealed));
+    struct sealed *sealed = secret_create(sizeof(*sealed));
     if (sealed) {
         sealed->is_client = is_client;
         sealed->key_count = key_count;
@@ -53,10 +53,7 @@ struct sealed *sealed_server(const struct sealed_key *keys, size_t key_count)
 
 void sealed_destroy(struct sealed *sealed)
 {
-    if (sealed) {
-        sodium_memzero(sealed, sizeof(*sealed));
-        free(sealed);
-    }
+    secret_destroy(sealed);
 }
 
 bool sealed_is_open(const struct sealed *sealed)

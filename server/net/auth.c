@@ -1,7 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 #include "net/auth.h"
 
+#include "base/log.h"
 #include "protocol/sealed/key.h"
+#include "protocol/sealed/secret.h"
 
 #include <errno.h>
 #include <stdio.h>
@@ -22,15 +24,58 @@ static bool read_key(struct auth_keys *keys, const char *path, bool read_only, s
     return true;
 }
 
-bool auth_read_keys(struct auth_keys *keys, const char *key_file, const char *reader_key_file, struct error *error)
+static bool read_keys(struct auth_keys *keys, const char *key_file, const char *reader_key_file,
+                      struct error *error)
 {
-    *keys = (struct auth_keys){0};
     if (!read_key(keys, key_file, false, error) || !read_key(keys, reader_key_file, true, error))
         return false;
     if (keys->count == 2 && memcmp(&keys->keys[0], &keys->keys[1], sizeof(keys->keys[0])) == 0)
         return error_set(error, ERROR_INVALID, reader_key_file,
                          "is the same key as server.key_file, whose holders may edit");
     return true;
+}
+
+bool auth_read_keys(struct auth_keys **keys, const char *key_file, const char *reader_key_file,
+                    struct error *error)
+{
+    *keys = NULL;
+    if (!key_file[0] && !reader_key_file[0])
+        return true;
+    struct auth_keys *read = secret_create(sizeof(*read));
+    if (!read)
+        return error_set(error, ERROR_OUT_OF_MEMORY, "server.key_file", "no memory for keys");
+    read->refs = 1;
+    if (!read_keys(read, key_file, reader_key_file, error)) {
+        auth_keys_unref(read);
+        return false;
+    }
+    if (!secret_is_locked(read, sizeof(*read)))
+        log_write(LOG_WARNING, "net",
+                  "the memory of keys cannot be locked, and may be swapped: raise LimitMEMLOCK");
+    *keys = read;
+    return true;
+}
+
+struct auth_keys *auth_keys_ref(struct auth_keys *keys)
+{
+    if (keys)
+        keys->refs++;
+    return keys;
+}
+
+void auth_keys_unref(struct auth_keys *keys)
+{
+    if (keys && --keys->refs == 0)
+        secret_destroy(keys);
+}
+
+bool auth_keys_have(const struct auth_keys *keys, const struct auth_identity *identity)
+{
+    for (size_t i = 0; keys && i < keys->count; i++) {
+        if (sealed_key_number(&keys->keys[i]) == identity->key && keys->read_only[i] == identity->read_only)
+            return true;
+    }
+    return false;
 }
 
 bool auth_is_beyond_loopback(const struct address *own, const struct address *peer)

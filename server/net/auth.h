@@ -12,8 +12,9 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* The keys that the daemon knows. */
+/* The keys that the daemon knows, in memory for secrets. NULL stands for none. */
 struct auth_keys {
+    uint32_t refs;
     struct sealed_key keys[SEALED_KEYS_MAX];
     bool read_only[SEALED_KEYS_MAX]; /* its holder may look at scenes and not change them */
     size_t count;
@@ -29,9 +30,13 @@ struct auth_identity {
     char name[48];  /* for people: "user 1000", "tcp:127.0.0.1:40312", "key, tcp:10.0.0.7:40312" */
 };
 
-/* Reads the key files; an empty path names none. */
-bool auth_read_keys(struct auth_keys *keys, const char *key_file, const char *reader_key_file,
+/* Reads the key files; an empty path names none. The caller has a reference to *keys. */
+bool auth_read_keys(struct auth_keys **keys, const char *key_file, const char *reader_key_file,
                     struct error *error);
+struct auth_keys *auth_keys_ref(struct auth_keys *keys);
+void auth_keys_unref(struct auth_keys *keys); /* the last one wipes the keys */
+/* Whether a holder of that identity's key may still do what it may. */
+bool auth_keys_have(const struct auth_keys *keys, const struct auth_identity *identity);
 /* What is known before the client's first byte. False with ERROR_DENIED: the peer is refused.
  * `beyond_loopback` as for listener_open(). */
 bool auth_identify(struct auth_identity *identity, int fd, const struct address *peer, bool beyond_loopback,

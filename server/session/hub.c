@@ -249,7 +249,7 @@ bool hub_add_client(struct hub *hub, int fd, const struct address *own, const st
     struct auth_identity identity;
     if (hub->stopping)
         return error_set(error, ERROR_SHUTTING_DOWN, NULL, "the daemon stops");
-    if (!auth_identify(&identity, fd, peer, hub->options.insecure || hub->options.keys.count, error))
+    if (!auth_identify(&identity, fd, peer, hub->options.insecure || hub->options.keys, error))
         return false;
     bool is_owner = hub->last_number + 1 == hub->owner; /* local clients with full rights */
     if (!is_owner && identity.has_user && readers_have(&hub->options.readers, identity.user))
@@ -292,6 +292,15 @@ static void set_connection_limits(struct hub *hub, const struct connection_limit
         hub->owner_limits.idle_ms = 0;
 }
 
+/* A key is replaced because somebody has it that should not: its holders go at once. */
+static void end_those_without_key(struct hub *hub)
+{
+    size_t cursor = 0;
+    void *session;
+    while (hashmap_next(&hub->sessions, &cursor, NULL, &session))
+        session_check_key(session);
+}
+
 bool hub_reload(struct hub *hub, const struct hub_options *options, struct error *error)
 {
     struct engine_command *command = hub_command(ENGINE_LIMITS, 0, 0);
@@ -303,7 +312,9 @@ bool hub_reload(struct hub *hub, const struct hub_options *options, struct error
     set_connection_limits(hub, &options->connection_limits);
     hub->options.engine_limits = options->engine_limits;
     hub->options.readers = options->readers;
-    hub->options.keys = options->keys;
+    auth_keys_unref(hub->options.keys);
+    hub->options.keys = auth_keys_ref(options->keys);
+    end_those_without_key(hub);
     blob_store_limit(hub->blobs, options->limits.blob_bytes, options->limits.blob_cache_bytes);
     return true;
 }
@@ -318,6 +329,7 @@ bool hub_init(struct hub *hub, struct loop *loop, const struct hub_options *opti
         .started_ns = clock_now_ns(),
         .retry_timer = {.call = retry, .context = hub},
     };
+    auth_keys_ref(hub->options.keys);
     set_connection_limits(hub, &options->connection_limits);
     hub->turn_end = &hub->turn_first;
     hub->itself = owner_find(&hub->owners, OWNER_ITSELF);
@@ -331,6 +343,7 @@ bool hub_init(struct hub *hub, struct loop *loop, const struct hub_options *opti
     if (hub->engine_watch)
         return true;
 fail:
+    auth_keys_unref(hub->options.keys);
     blob_store_destroy(hub->blobs);
     owner_unref(&hub->owners, hub->itself);
     owners_finish(&hub->owners);
@@ -358,4 +371,5 @@ void hub_finish(struct hub *hub)
     owners_finish(&hub->owners);
     blob_store_destroy(hub->blobs);
     hashmap_finish(&hub->sessions);
+    auth_keys_unref(hub->options.keys);
 }

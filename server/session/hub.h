@@ -29,7 +29,8 @@ struct hub_options {
     struct timeline *timeline;          /* hears of every frame that was sent; may be NULL */
     struct engine_limits engine_limits; /* as the engine has them; told to clients */
     uint64_t device_bytes;              /* likewise; 0: no limit */
-    struct auth_keys keys;              /* with which clients come in sealed, from everywhere */
+    struct auth_keys *keys;             /* with which clients come in sealed, from everywhere; hub_init() and
+                                           hub_reload() take references of their own */
     bool insecure;                      /* peers beyond loopback are accepted without a key too */
 };
 

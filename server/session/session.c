@@ -299,7 +299,7 @@ static void on_key_proved(void *context, size_t index)
 {
     struct session *session = context;
     struct owners *owners = &session->hub->owners;
-    auth_identify_by_key(&session->identity, &session->keys, index);
+    auth_identify_by_key(&session->identity, session->keys, index);
     session->principal = principal_of(session);
     struct owner *owner = owner_find(owners, owner_number(&session->identity, &session->peer));
     if (!owner)
@@ -310,6 +310,14 @@ static void on_key_proved(void *context, size_t index)
     session->connection->entry.log_source = owner->number;
     session->connection->entry.sharers = &owner->clients;
     count_unauthenticated(session, true);
+}
+
+static const char replaced_key[] = "the daemon's key was replaced; connect with the new one";
+
+/* Whether its key, if it came by one, is still one of the daemon's. */
+static bool is_key_valid(const struct session *session)
+{
+    return !session->identity.has_key || auth_keys_have(session->hub->options.keys, &session->identity);
 }
 
 /* Whoever runs the daemon can always look at it. */
@@ -350,10 +358,12 @@ static bool on_hello(void *context, const struct handshake_hello *hello, struct 
         snprintf(reply->text, sizeof(reply->text), "%s", error.text);
     else if (hub->stopping)
         snprintf(reply->text, sizeof(reply->text), "the daemon is about to stop");
-    else
+    else if (is_key_valid(session))
         has_place(session, reply->text);
     if (reply->version && reply->text[0])
         reply->capabilities = HANDSHAKE_TRY_AGAIN;
+    if (!is_key_valid(session))
+        snprintf(reply->text, sizeof(reply->text), "%s", replaced_key);
     if (getrandom(reply->nonce, sizeof(reply->nonce), 0) < 0 ||
         getrandom(reply->session_token, sizeof(reply->session_token), 0) < 0)
         snprintf(reply->text, sizeof(reply->text), "no random numbers");
@@ -434,6 +444,7 @@ static void on_closed(void *context)
         engine_command_destroy(session->farewell);
     }
     owner_unref(&hub->owners, session->owner);
+    auth_keys_unref(session->keys);
     bool was_owner = session->number == hub->owner;
     free(session);
     if (was_owner && hub->owner_gone)
@@ -468,14 +479,14 @@ struct session *session_create(struct hub *hub, uint64_t number, int fd, bool se
     }
     session->hub = hub;
     session->number = number;
+    session->keys = auth_keys_ref(hub->options.keys);
     session->identity = *identity;
     session->peer = *peer;
-    session->keys = hub->options.keys;
     session->principal = principal_of(session);
     session->farewell = hub_command(ENGINE_CLIENT_GONE, number, 0);
     const struct connection_entry entry = {
-        .keys = session->keys.keys,
-        .key_count = session->keys.count,
+        .keys = session->keys ? session->keys->keys : NULL,
+        .key_count = session->keys ? session->keys->count : 0,
         .sealed_only = sealed_only,
         .log_source = owner->number,
         .sharers = &owner->clients,
@@ -486,6 +497,7 @@ struct session *session_create(struct hub *hub, uint64_t number, int fd, bool se
     if (!session->connection) {
         error_set(error, ERROR_OUT_OF_MEMORY, "session", "no memory");
         engine_command_destroy(session->farewell);
+        auth_keys_unref(session->keys);
         free(session);
         return NULL;
     }
@@ -499,6 +511,15 @@ void session_turn_away(struct session *session, const char *why)
     count_unauthenticated(session, false);
     greeting_turn_away(session->connection->fd, why, HANDSHAKE_TRY_AGAIN);
     connection_close(session->connection);
+}
+
+void session_check_key(struct session *session)
+{
+    if (!session->introduced || is_key_valid(session))
+        return; /* who has not introduced itself is refused when it does */
+    log_write(LOG_INFO, "session", "client %" PRIu64 " (%s, %s) is disconnected: its key was replaced",
+              session->number, session->name, session->identity.name);
+    connection_finish(session->connection, PROTOCOL_ERROR_DENIED, "key", replaced_key);
 }
 
 void session_stop(struct session *session)

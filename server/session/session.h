@@ -29,7 +29,7 @@ struct session {
     uint64_t number;
     struct connection *connection;
     struct auth_identity identity;
-    struct auth_keys keys; /* as they were when it came: others may be read while it proves that it has one */
+    struct auth_keys *keys; /* as they were when it came: others may be read while it proves that it has one */
     struct address peer;
     blob_principal principal;
     struct owner *owner; /* whose share it uses */
@@ -56,6 +56,8 @@ struct session *session_create(struct hub *hub, uint64_t number, int fd, bool se
                                struct owner *owner, struct error *error);
 /* Of one that has not introduced itself: says why, and closes. */
 void session_turn_away(struct session *session, const char *why);
+/* After the daemon's keys were replaced: goodbye to one whose key is none of them. */
+void session_check_key(struct session *session);
 void session_stop(struct session *session); /* the daemon stops: goodbye */
 void session_close(struct session *session);
 void session_hold(struct session *session, bool held);                          /* reads no further */

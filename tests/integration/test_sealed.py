@@ -4,8 +4,10 @@ loopback may reach, keys that are right, wrong or open to others, and somebody o
 import json
 import os
 import pathlib
+import signal
 import socket
 import struct
+import subprocess
 import threading
 import time
 
@@ -138,6 +140,24 @@ class Keys(Case):
         refused = farlight_test.run("farlightd", "--listen", f"unix:{self.folder}/s", "--key-file", self.folder / "key")
         self.assertEqual(refused.returncode, 1)
         self.assertIn("chmod 600", refused.stderr)
+
+    def test_clients_of_a_replaced_key_are_told_to_go(self):
+        with SealedDaemon(self.folder) as daemon:
+            def serve(key, name):
+                command = [farlight_test.BIN / "farlight", "serve", bundled_scenes() / "teapot.glb", "--server", daemon.reached, "--key",
+                           self.folder / key, "--name", name]
+                process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+                self.addCleanup(process.kill)
+                self.assertIn("serving", process.stdout.readline())
+                return process
+            served = serve("key", "served")
+            os.replace(self.folder / "other", self.folder / "key")
+            daemon.process.send_signal(signal.SIGHUP)
+            _, said = served.communicate(timeout=farlight_test.TIMEOUT_S)
+            self.assertEqual(served.returncode, 1, said)
+            self.assertIn("key was replaced", said)
+            stats = self.expect(farlight("stats", "--server", daemon.reached, "--key", self.folder / "key"), 0)
+            self.assertIn("farlightd", stats.stdout)
 
     def test_on_this_host_both_are_accepted(self):
         with Daemon("--key-file", self.folder / "key", "--listen", "tcp:127.0.0.1:0") as daemon:

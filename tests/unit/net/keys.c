@@ -6,12 +6,14 @@
 #include "net/attempts.h"
 #include "net/auth.h"
 #include "protocol/sealed/key.h"
+#include "protocol/sealed/secret.h"
 #include "tests/harness/test.h"
 
 #include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/prctl.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -128,26 +130,86 @@ TEST_WITH(a_key_file_of_another_user_is_refused, make_folder, remove_folder)
 
 TEST_WITH(the_daemon_reads_its_keys_and_refuses_two_equal_ones, make_folder, remove_folder)
 {
-    struct auth_keys keys;
+    struct auth_keys *keys;
     struct error error = {0};
     struct decode_error why = {0};
     assert_true(sealed_key_create(path, &why));
     assert_true(sealed_key_create(other_path, &why));
     assert_true(auth_read_keys(&keys, "", "", &error));
-    assert_int_equal(keys.count, 0);
+    assert_null(keys);
     assert_true(auth_read_keys(&keys, "", other_path, &error));
-    assert_int_equal(keys.count, 1);
-    assert_true(keys.read_only[0]);
+    assert_int_equal(keys->count, 1);
+    assert_true(keys->read_only[0]);
+    auth_keys_unref(keys);
     assert_true(auth_read_keys(&keys, path, other_path, &error));
-    assert_int_equal(keys.count, 2);
-    assert_false(keys.read_only[0]);
-    assert_true(keys.read_only[1]);
+    assert_int_equal(keys->count, 2);
+    assert_false(keys->read_only[0]);
+    assert_true(keys->read_only[1]);
+    auth_keys_unref(keys);
     assert_false(auth_read_keys(&keys, path, path, &error));
     assert_non_null(strstr(error.text, "same key"));
     error = (struct error){0};
     assert_false(auth_read_keys(&keys, "/nowhere/key", "", &error));
     assert_string_equal(error.field, "/nowhere/key");
     assert_non_null(strstr(error.remedy, "farlight key"));
+}
+
+/* The flags of the mapping at an address, as the kernel shows them. */
+static void mapping_flags(const void *at, char flags[512])
+{
+    FILE *file = fopen("/proc/self/smaps", "r");
+    char line[512];
+    bool is_here = false;
+    unsigned long begin, end;
+    assert_non_null(file);
+    flags[0] = '\0';
+    while (fgets(line, sizeof(line), file)) {
+        if (sscanf(line, "%lx-%lx ", &begin, &end) == 2)
+            is_here = (uintptr_t)at >= begin && (uintptr_t)at < end;
+        else if (is_here && strncmp(line, "VmFlags:", 8) == 0)
+            memcpy(flags, line, sizeof(line));
+    }
+    fclose(file);
+}
+
+TEST_WITH(keys_are_locked_and_left_out_of_dumps_by_the_daemon_and_its_links, make_folder, remove_folder)
+{
+    struct auth_keys *keys;
+    struct error error = {0};
+    struct decode_error why = {0};
+    char flags[512];
+    assert_true(sealed_key_create(path, &why));
+    assert_int_equal(prctl(PR_SET_DUMPABLE, 1, 0, 0, 0), 0);
+    assert_true(auth_read_keys(&keys, path, "", &error));
+    assert_int_equal(prctl(PR_GET_DUMPABLE, 0, 0, 0, 0), 0);
+    struct sealed *sealed = sealed_client(&keys->keys[0]);
+    assert_non_null(sealed);
+    const void *const secrets[] = {keys, sealed};
+    for (size_t i = 0; i < 2; i++) {
+        mapping_flags(secrets[i], flags);
+        assert_non_null(strstr(flags, " dd"));
+        if (secret_is_locked(keys, sizeof(*keys)))
+            assert_non_null(strstr(flags, " lo"));
+    }
+    sealed_destroy(sealed);
+    auth_keys_unref(auth_keys_ref(keys));
+    assert_int_equal(keys->count, 1);
+    auth_keys_unref(keys);
+}
+
+TEST(a_key_is_still_the_daemons_if_it_allows_the_same)
+{
+    const struct auth_keys before = {
+        .keys = {{.bytes = "one"}, {.bytes = "two"}}, .read_only = {false, true}, .count = 2};
+    const struct auth_keys after = {
+        .keys = {{.bytes = "two"}, {.bytes = "new"}}, .read_only = {false, true}, .count = 2};
+    struct auth_identity identity = {.name = "tcp:10.0.0.7:40312"};
+    for (size_t i = 0; i < 2; i++) {
+        auth_identify_by_key(&identity, &before, i);
+        assert_true(auth_keys_have(&before, &identity));
+        assert_false(auth_keys_have(&after, &identity)); /* gone, or now with other rights */
+        assert_false(auth_keys_have(NULL, &identity));
+    }
 }
 
 /* ---- who comes from where ------------------------------------------------------------------------------ */

@@ -1,0 +1,38 @@
+/* SPDX-License-Identifier: MIT */
+#include "protocol/sealed/secret.h"
+
+#include <sodium.h>
+#include <string.h>
+#include <sys/prctl.h>
+
+/* sodium_malloc() puts the bytes at the end of a page. */
+#define ALIGNMENT 16u
+
+static size_t rounded(size_t bytes)
+{
+    return (bytes + ALIGNMENT - 1) / ALIGNMENT * ALIGNMENT;
+}
+
+void *secret_create(size_t bytes)
+{
+    if (sodium_init() < 0) {
+        return NULL;
+    }
+    void *secret = sodium_malloc(rounded(bytes));
+    if (secret) {
+        memset(secret, 0, rounded(bytes));
+        /* It cannot fail with this value. */
+        prctl(PR_SET_DUMPABLE, 0, 0, 0, 0);
+    }
+    return secret;
+}
+
+void secret_destroy(void *secret)
+{
+    sodium_free(secret);
+}
+
+bool secret_is_locked(void *secret, size_t bytes)
+{
+    return sodium_mlock(secret, rounded(bytes)) == 0;
+}
