@@ -141,6 +141,15 @@ class Units(unittest.TestCase):
             self.assertEqual(touched.returncode == 0, writable, f"{path}: {touched.stderr}")
         self.assertFalse(self.root.path("/tmp/touched").exists(), "its temporary files are its own")
 
+    def test_its_memory_threads_and_core_files_are_limited(self):
+        self.assert_served()
+        memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+        self.assertLess(int(self.shown("MemoryMax")), memory)
+        self.assertGreater(int(self.shown("MemoryMax")), memory // 2)
+        threads = list(self.root.path(f"/proc/{self.shown('MainPID')}/task").iterdir())
+        self.assertLess(len(threads), int(self.shown("TasksMax")))
+        self.assertEqual((self.shown("TasksMax"), self.shown("LimitCORE")), ("1024", "0"))
+
     def test_a_reload_is_answered_and_a_broken_configuration_changes_nothing(self):
         self.assert_served()
         pid = self.shown("MainPID")
