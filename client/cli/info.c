@@ -6,6 +6,7 @@
 #include <stdio.h>
 
 #define KEY_JSON 0x400
+#define LISTED_MAX 200u
 
 struct info_options {
     const char *model, *environment;
@@ -61,6 +62,24 @@ static json_t *lists(const struct fl_model_info *info)
     return json_pack("{s:o,s:o,s:o}", "cameras", cameras, "clips", clips, "notes", notes);
 }
 
+static json_t *bounds(const float lower[3], const float upper[3])
+{
+    return json_pack("{s:[f,f,f],s:[f,f,f]}", "lower", (double)lower[0], (double)lower[1], (double)lower[2],
+                     "upper", (double)upper[0], (double)upper[1], (double)upper[2]);
+}
+
+static json_t *objects(const struct fl_model_object *list, size_t count)
+{
+    json_t *array = json_array();
+    for (size_t i = 0; i < count; i++) {
+        json_t *object = json_pack("{s:I,s:o}", "index", (json_int_t)i, "name", string(list[i].name));
+        if (list[i].has_bounds)
+            json_object_set_new(object, "bounds", bounds(list[i].lower_world, list[i].upper_world));
+        json_array_append_new(array, object);
+    }
+    return array;
+}
+
 static void print_json(const struct info_options *wanted, const struct fl_model_info *info)
 {
     json_t *object = lists(info);
@@ -87,12 +106,39 @@ static void print_json(const struct info_options *wanted, const struct fl_model_
                    {"parse_ns", info->import.parse_ns},
                    {"hash_ns", info->import.hash_ns},
                    {"import_ns", info->import.import_ns}};
+    json_object_set_new(object, "node_list", objects(info->node_list, info->node_list_count));
+    json_object_set_new(object, "material_list", objects(info->material_list, info->material_list_count));
+    json_object_set_new(object, "light_list", objects(info->light_list, info->light_list_count));
+    if (info->has_bounds)
+        json_object_set_new(object, "bounds", bounds(info->lower_world, info->upper_world));
     json_object_set_new(object, "model", string(wanted->model ? wanted->model : ""));
     for (size_t i = 0; i < sizeof(numbers) / sizeof(numbers[0]); i++)
         json_object_set_new(object, numbers[i].name, json_integer((json_int_t)numbers[i].value));
     json_dumpf(object, stdout, CLI_JSON | JSON_REAL_PRECISION(9));
     fputc('\n', stdout);
     json_decref(object);
+}
+
+static void print_bounds(const float lower[3], const float upper[3])
+{
+    printf("(%g %g %g) to (%g %g %g)", (double)lower[0], (double)lower[1], (double)lower[2], (double)upper[0],
+           (double)upper[1], (double)upper[2]);
+}
+
+/* A list that nobody reads to its end is cut. */
+static void print_objects(const char *kind, const struct fl_model_object *list, size_t count)
+{
+    for (size_t i = 0; i < count && i < LISTED_MAX; i++) {
+        printf("  %s %zu: ", kind, i);
+        cli_print_name(list[i].name);
+        if (list[i].has_bounds) {
+            fputs(list[i].name[0] != '\0' ? ", " : "", stdout);
+            print_bounds(list[i].lower_world, list[i].upper_world);
+        }
+        putchar('\n');
+    }
+    if (count > LISTED_MAX)
+        printf("  %zu more %ss (--json lists all)\n", count - LISTED_MAX, kind);
 }
 
 static void print_table(const struct info_options *wanted, const struct fl_model_info *info)
@@ -111,6 +157,14 @@ static void print_table(const struct info_options *wanted, const struct fl_model
         printf("  %-10s %12" PRIu64 "\n", rows[i].name, rows[i].value);
     printf("  %-10s %12.3f MB in files, at most %.3f MB to upload\n", "bytes",
            (double)info->import.read_bytes * 1e-6, (double)info->import.offered_bytes * 1e-6);
+    if (info->has_bounds) {
+        printf("  %-10s ", "box");
+        print_bounds(info->lower_world, info->upper_world);
+        putchar('\n');
+    }
+    print_objects("node", info->node_list, info->node_list_count);
+    print_objects("material", info->material_list, info->material_list_count);
+    print_objects("light", info->light_list, info->light_list_count);
     for (size_t i = 0; i < info->camera_count; i++) {
         printf("  camera %zu: ", i);
         cli_print_name(info->cameras[i].name);

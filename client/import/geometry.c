@@ -3,6 +3,7 @@
 #include "closed.h"
 #include "model.h"
 
+#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -219,6 +220,33 @@ static uint32_t add_array(struct import_scene *scene, void *bytes, uint64_t coun
     return import_add_blob(scene, bytes, count * element_bytes);
 }
 
+/* Of points with `stride` floats each, the fourth of which, if there is one, is a radius. */
+static void add_bounds(struct import_scene *scene, const struct import_bounds *object, const float *points,
+                       size_t count, size_t stride)
+{
+    struct import_bounds *grown =
+        import_grow(scene, scene->bounds, scene->bounds_count, &scene->bounds_capacity, sizeof(*grown));
+    if (!grown)
+        return;
+    struct import_bounds box = {.kind = object->kind,
+                                .object = object->object,
+                                .lower = {FLT_MAX, FLT_MAX, FLT_MAX},
+                                .upper = {-FLT_MAX, -FLT_MAX, -FLT_MAX}};
+    for (size_t i = 0; i < count; i++) {
+        const float *point = points + i * stride, radius = stride > 3 ? point[3] : 0;
+        for (unsigned axis = 0; axis < 3; axis++) {
+            box.lower[axis] = fminf(box.lower[axis], point[axis] - radius);
+            box.upper[axis] = fmaxf(box.upper[axis], point[axis] + radius);
+        }
+    }
+    for (unsigned axis = 0; axis < 3; axis++) { /* in the message's range */
+        box.lower[axis] = fmaxf(box.lower[axis], -3e38f);
+        box.upper[axis] = fminf(box.upper[axis], 3e38f);
+    }
+    scene->bounds = grown;
+    scene->bounds[scene->bounds_count++] = box;
+}
+
 uint32_t import_add_mesh(struct import_scene *scene, struct import_mesh *mesh)
 {
     const char *where = mesh->where ? mesh->where : mesh->name;
@@ -250,6 +278,9 @@ uint32_t import_add_mesh(struct import_scene *scene, struct import_mesh *mesh)
     edit->message.set_mesh.target_count = mesh->target_count;
     edit->message.set_mesh.weights = import_copy_weights(scene, mesh->weights, mesh->weight_count);
     edit->message.set_mesh.weights_count = mesh->weight_count;
+    edit->message.set_mesh.mesh = import_next_id(scene, PROTOCOL_OBJECT_MESH);
+    add_bounds(scene, &(struct import_bounds){PROTOCOL_NODE_MESH, edit->message.set_mesh.mesh, {0}, {0}},
+               mesh->positions, mesh->vertex_count, 3);
     edit->blobs[0] = add_array(scene, mesh->positions, vertices, 12);
     edit->blobs[1] = add_array(scene, mesh->indices, mesh->triangle_count, 12);
     edit->blobs[2] = add_array(scene, mesh->normals, vertices, 12);
@@ -266,7 +297,7 @@ uint32_t import_add_mesh(struct import_scene *scene, struct import_mesh *mesh)
             count = i + 1;
     edit->message.set_mesh.arrays_count = count;
     memset(mesh, 0, sizeof(*mesh));
-    return edit->message.set_mesh.mesh = import_next_id(scene, PROTOCOL_OBJECT_MESH);
+    return edit->message.set_mesh.mesh;
 }
 
 static bool spheres_valid(struct import_scene *scene, const char *name, const float *spheres, uint32_t count,
@@ -303,6 +334,9 @@ uint32_t import_add_spheres(struct import_scene *scene, const char *name, float 
     edit->message.set_spheres.ranges = ranges;
     edit->message.set_spheres.ranges_count = range_count;
     edit->message.set_spheres.arrays_count = 1;
+    edit->message.set_spheres.spheres = import_next_id(scene, PROTOCOL_OBJECT_SPHERES);
+    add_bounds(scene, &(struct import_bounds){PROTOCOL_NODE_SPHERES, edit->message.set_spheres.spheres, {0}, {0}},
+               spheres, count, 4);
     edit->blobs[0] = add_array(scene, spheres, count, 16);
-    return edit->message.set_spheres.spheres = import_next_id(scene, PROTOCOL_OBJECT_SPHERES);
+    return edit->message.set_spheres.spheres;
 }

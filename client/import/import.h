@@ -55,6 +55,13 @@ struct import_clip {
     float duration_s;
 };
 
+/* Of a mesh or a set of spheres, in its own space. */
+struct import_bounds {
+    enum protocol_node_kind kind;
+    uint32_t object;
+    float lower[3], upper[3];
+};
+
 struct import_scene {
     struct import_edit *edits;
     size_t edit_count, edit_capacity;
@@ -62,6 +69,8 @@ struct import_scene {
     size_t blob_count, blob_capacity;
     struct import_clip *clips;
     size_t clip_count, clip_capacity;
+    struct import_bounds *bounds;
+    size_t bounds_count, bounds_capacity;
     struct import_notice notes[IMPORT_NOTES_MAX];
     size_t note_count;
     uint32_t notes_lost; /* distinct ones beyond IMPORT_NOTES_MAX, about */

@@ -256,6 +256,17 @@ bool sender_notes(struct sender *sender)
         if (!put(sender, 0, 0, &message))
             return false;
     }
+    for (size_t i = 0; i < scene->bounds_count; i++) {
+        struct message message;
+
+        message_init(&message, MESSAGE_IMPORT_BOUNDS);
+        message.import_bounds.kind = scene->bounds[i].kind;
+        message.import_bounds.object = scene->bounds[i].object;
+        memcpy(message.import_bounds.lower, scene->bounds[i].lower, sizeof(scene->bounds[i].lower));
+        memcpy(message.import_bounds.upper, scene->bounds[i].upper, sizeof(scene->bounds[i].upper));
+        if (!put(sender, 0, 0, &message))
+            return false;
+    }
     return flush(sender);
 }
 

@@ -256,6 +256,12 @@ struct fl_model_note {
     char where[257];
     char text[513];
 };
+/* A node, material or light, in the order of the file. */
+struct fl_model_object {
+    const char *name; /* may be empty */
+    bool has_bounds;  /* a node that shows a mesh or spheres: */
+    float lower_world[3], upper_world[3];
+};
 struct fl_model_info {
     uint64_t nodes, meshes, triangles, sphere_sets, spheres, discs, materials, textures, lights;
     uint64_t skins, joints, morph_targets; /* joints of all skins, targets of all meshes */
@@ -266,6 +272,13 @@ struct fl_model_info {
     struct fl_clip_info *clips;
     struct fl_model_note *notes; /* at most 1000; `notes_left_out` more */
     uint64_t notes_left_out;
+    /* At most 1 M of each. */
+    struct fl_model_object *node_list, *material_list, *light_list;
+    size_t node_list_count, material_list_count, light_list_count;
+    char *names; /* what the lists' names are in */
+    /* Of all nodes with meshes or spheres, as they are before clips, skins and morph targets move anything. */
+    bool has_bounds;
+    float lower_world[3], upper_world[3];
 };
 /* options->note is not called: the notes are in the result. `interrupt_fd` as in the connection's options. */
 FL_API struct fl_model_info *fl_model_info(const struct fl_load_options *options, int interrupt_fd,

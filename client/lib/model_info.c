@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* The contents of a model: the importer runs as for a daemon, and is answered here. No bulk data is requested. */
+#include "lib/boxes.h"
 #include "lib/importer.h"
 #include "lib/relay.h"
 
@@ -15,6 +16,7 @@ struct listing {
     size_t note_capacity;
     struct fl_relay relay; /* the same rules as towards a daemon */
     uint64_t revision;
+    struct fl_boxes boxes;
 };
 
 static bool add_note(struct listing *listing, const struct message_import_note *note, struct fl_error *error)
@@ -39,7 +41,9 @@ static bool list(struct listing *listing, const struct message *message, struct 
     switch (message->type) {
     case MESSAGE_SET_NODE:
         info->nodes++;
-        break;
+        return fl_boxes_add_node(&listing->boxes, &message->set_node, error);
+    case MESSAGE_IMPORT_BOUNDS:
+        return fl_boxes_add(&listing->boxes, &message->import_bounds, error);
     case MESSAGE_SET_MESH:
         info->meshes++;
         info->closed_meshes += message->set_mesh.closed;
@@ -134,6 +138,33 @@ static bool run(struct listing *listing, int interrupt_fd, struct fl_error *erro
     }
 }
 
+static bool list_names(const struct fl_catalogue *catalogue, enum fl_catalogue_list list,
+                       struct fl_model_object **objects, size_t *count, struct fl_error *error)
+{
+    const struct fl_catalogue_entry *entries = catalogue->lists[list].entries;
+    *count = catalogue->lists[list].count;
+    *objects = calloc(*count + 1, sizeof(**objects));
+    if (!*objects)
+        return fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
+    for (size_t i = 0; i < *count; i++)
+        (*objects)[i].name = catalogue->text + entries[i].name;
+    return true;
+}
+
+/* Moves the names to the result. */
+static bool list_objects(struct listing *listing, struct fl_error *error)
+{
+    struct fl_model_info *info = listing->info;
+    struct fl_catalogue *catalogue = &listing->importer.catalogue;
+    const bool listed =
+        list_names(catalogue, FL_CATALOGUE_NODES, &info->node_list, &info->node_list_count, error) &&
+        list_names(catalogue, FL_CATALOGUE_MATERIALS, &info->material_list, &info->material_list_count, error) &&
+        list_names(catalogue, FL_CATALOGUE_LIGHTS, &info->light_list, &info->light_list_count, error);
+    info->names = catalogue->text;
+    catalogue->text = NULL;
+    return listed && fl_boxes_place(&listing->boxes, info, error);
+}
+
 struct fl_model_info *fl_model_info(const struct fl_load_options *options, int interrupt_fd,
                                     struct fl_error *error)
 {
@@ -148,7 +179,8 @@ struct fl_model_info *fl_model_info(const struct fl_load_options *options, int i
         fl_model_info_destroy(listing.info);
         return NULL;
     }
-    const bool complete = run(&listing, interrupt_fd, error);
+    const bool complete = run(&listing, interrupt_fd, error) && list_objects(&listing, error);
+    fl_boxes_finish(&listing.boxes);
     fl_importer_stop(&listing.importer);
     listing.info->import = listing.importer.stats;
     listing.info->cameras = listing.importer.cameras;
@@ -172,5 +204,9 @@ void fl_model_info_destroy(struct fl_model_info *info)
     free(info->cameras);
     free(info->clips);
     free(info->notes);
+    free(info->node_list);
+    free(info->material_list);
+    free(info->light_list);
+    free(info->names);
     free(info);
 }

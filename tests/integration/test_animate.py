@@ -656,6 +656,25 @@ class Clips(OneDaemon, Animations):
         self.assertEqual(resumed, whole)
 
 
+class Info(Animations):
+    def test_info_lists_names_and_boxes(self):
+        model = moving_model(self.folder / "moving.gltf")
+        info = json.loads(self.expect(farlight("info", "--json", model), 0).stdout)
+        names = {kind: [one["name"] for one in info[kind]] for kind in ("node_list", "material_list", "light_list")}
+        self.assertEqual(names, {"node_list": ["pyramid", "ground", "light"], "material_list": ["clay"],
+                                 "light_list": ["bulb"]})
+        boxes = [info["bounds"], *(node.get("bounds") for node in info["node_list"])]
+        expected = [([-4, -2.2, -5], [4, 2, 3]), ([-1, 0, -1], [1, 2, 1]), ([-4, -2.2, -5], [4, -0.2, 3]), None]
+        for box, wanted in zip(boxes, expected):
+            self.assertEqual(box is None, wanted is None)
+            for got, value in zip(box["lower"] + box["upper"] if box else [], wanted[0] + wanted[1] if wanted else []):
+                self.assertAlmostEqual(got, value, places=5)
+        table = self.expect(farlight("info", model), 0).stdout
+        for line in ("  node 1: ground, (-4 -2.2 -5) to (4 -0.2 3)", "  material 0: clay", "  light 0: bulb",
+                     "  box        (-4 -2.2 -5) to (4 2 3)"):
+            self.assertIn(line + "\n", table)
+
+
 class Progressive(OneDaemon, Animations):
     ARGUMENTS = [*SIZE, "--aperture", "0.2"]
 

@@ -46,7 +46,7 @@ SET_TEXTURE, SET_LIGHT, SET_CAMERA, SET_ENVIRONMENT = 0x0135, 0x0136, 0x0137, 0x
 SET_SKIN, SET_CLIP, SET_CHANNEL = 0x0139, 0x013a, 0x013b
 TRANSLATION, ROTATION, SCALE, WEIGHTS = 0, 1, 2, 3
 STEP, LINEAR, CUBIC = 0, 1, 2
-IMPORT_NOTE, IMPORT_CLIP, IMPORT_PROGRESS, IMPORT_DONE = 0x8301, 0x8302, 0x8303, 0x8304
+IMPORT_NOTE, IMPORT_CLIP, IMPORT_PROGRESS, IMPORT_DONE, IMPORT_BOUNDS = 0x8301, 0x8302, 0x8303, 0x8304, 0x8305
 UPLOAD_CHANNEL = 1
 CHUNK = 1 << 20
 
@@ -236,6 +236,10 @@ class Peer:
         elif kind == IMPORT_DONE:
             result.done = True
             result.times = Fields(payload).take("5Q")
+        elif kind == IMPORT_BOUNDS:
+            values = Fields(payload).take("II6f")
+            if not all(lower <= upper for lower, upper in zip(values[2:5], values[5:])):
+                self.fault("a box that is inside out")
         elif kind != IMPORT_PROGRESS:
             if request != self.open_request:
                 self.fault("an edit outside the transaction")

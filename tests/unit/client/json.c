@@ -84,7 +84,7 @@ TEST(invalid_json_is_reported_with_its_line)
     for (size_t i = 0; i < sizeof(bad) / sizeof(bad[0]); i++) {
         if (load(bad[i], strlen(bad[i]), 4096))
             fail_msg("'%s' was taken", bad[i]);
-        assert_int_equal(error.code, FL_ERROR_FILE);
+        assert_int_equal(error.code, FL_ERROR_ARGUMENT);
         assert_non_null(strstr(error.text, "line "));
     }
     assert_false(load("[1, 2]", 6, 5));

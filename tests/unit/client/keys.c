@@ -65,7 +65,7 @@ TEST(a_wrong_file_is_reported_by_line_or_key_and_field)
     for (size_t i = 0; i < sizeof(cases) / sizeof(cases[0]); i++) {
         if (load(cases[i].text))
             fail_msg("'%s' was taken", cases[i].text);
-        assert_int_equal(error.code, FL_ERROR_FILE);
+        assert_int_equal(error.code, FL_ERROR_ARGUMENT);
         assert_true(strlen(error.field) > 0);
         if (!strstr(error.text, cases[i].told))
             fail_msg("'%s' was told as '%s', which lacks '%s'", cases[i].text, error.text, cases[i].told);
