@@ -4,6 +4,7 @@
 #include "cli/sink.h"
 #include "cli/trace_file.h"
 #include "protocol/common/clock.h"
+#include "protocol/plain_text.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -183,6 +184,13 @@ static uint32_t pass_samples(const struct cli_job *job, uint32_t held, uint32_t 
     return samples < total - held ? samples : total - held;
 }
 
+static void print_held(const char *path, uint32_t held)
+{
+    fputs("farlight: ", stderr);
+    plain_text_print(stderr, path);
+    fprintf(stderr, " has %u sample%s a pixel\n", held, held == 1 ? "" : "s");
+}
+
 /* After an interruption: completes the file that is being written. False: the interruption is an error. */
 static bool end_passes(struct session *session, uint32_t held, struct fl_error *error)
 {
@@ -196,8 +204,7 @@ static bool end_passes(struct session *session, uint32_t held, struct fl_error *
     }
     cli_progress_clear(&session->progress);
     if (!job->quiet)
-        fprintf(stderr, "farlight: %s has %u sample%s a pixel\n", job->outputs[0].path, held,
-                held == 1 ? "" : "s");
+        print_held(job->outputs[0].path, held);
     if (job->endless)
         *error = (struct fl_error){0};
     return job->endless;

@@ -82,7 +82,7 @@ struct fl_connect_options {
     const char *name; /* the client's name in the daemon's statistics; NULL: "libfarlight" */
     /* File of the 32 random bytes that the daemon has as well, mode 0600: the connection is sealed with it, and
      * fails if the daemon does not have it. TCP beyond loopback needs it; NULL: nothing is sealed. Of no effect
-     * for a private daemon. */
+     * for a private daemon. With a key the calling process can no longer be dumped or traced by its user. */
     const char *key_file;
     bool can_h264;       /* frames of views may come in H.264, for the caller to decode */
     int interrupt_fd;    /* > 0: calls give up with FL_ERROR_INTERRUPTED when it becomes readable */

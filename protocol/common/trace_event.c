@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 #include "protocol/common/trace_event.h"
 
+#include "protocol/plain_text.h"
+
 #include <inttypes.h>
 #include <stdlib.h>
 
@@ -13,14 +15,18 @@ static void begin_event(struct trace_writer *writer)
 static void write_text(FILE *out, const char *text)
 {
     fputc('"', out);
-    for (; *text; text++) {
-        unsigned char c = (unsigned char)*text;
-        if (c == '"' || c == '\\')
-            fprintf(out, "\\%c", c);
-        else if (c < 0x20 || c == 0x7f)
-            fprintf(out, "\\u%04x", c);
+    while (*text) {
+        uint32_t code = 0xfffd; /* U+FFFD: a byte that is no UTF-8 */
+        size_t length = utf8_read(text, UTF8_BYTES_MAX, &code);
+        if (code == '"' || code == '\\')
+            fprintf(out, "\\%c", (char)code);
+        else if (length > 0 && plain_text_allows(code))
+            fwrite(text, 1, length, out);
+        else if (code > 0xffff)
+            fprintf(out, "\\u%04x\\u%04x", 0xd800 + ((code - 0x10000) >> 10), 0xdc00 + (code & 0x3ff));
         else
-            fputc(c, out);
+            fprintf(out, "\\u%04x", code);
+        text += length > 0 ? length : 1;
     }
     fputc('"', out);
 }

@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include "base/log.h"
+#include "protocol/common/trace_event.h"
 #include "tests/harness/test.h"
 
 static const struct {
@@ -56,6 +57,20 @@ TEST(a_copy_ends_at_a_whole_character)
     assert_int_equal(plain_text_copy(out, 1, "ab"), 0);
     assert_string_equal(out, "");
     assert_int_equal(plain_text_copy(out, 0, "ab"), 0);
+}
+
+TEST(names_in_a_trace_are_complete_and_valid_json)
+{
+    char *text = NULL;
+    size_t bytes = 0;
+    uint64_t threads = 0;
+    FILE *stream = open_memstream(&text, &bytes);
+    assert_non_null(stream);
+    struct trace_writer writer = {.out = stream, .before = "", .threads = &threads};
+    trace_write_process_name(&writer, 1, "a\xc2\x9b\"\xe2\x80\xae\xf3\xa0\x81\x81\xff\xc3\xa4");
+    assert_int_equal(fclose(stream), 0);
+    assert_non_null(strstr(text, "\"a\\u009b\\\"\\u202e\\udb40\\udc41\\ufffd\xc3\xa4\""));
+    free(text);
 }
 
 TEST(a_log_line_holds_nothing_that_a_terminal_obeys)
