@@ -12,6 +12,9 @@
 #include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
+
+#define SOCKET_NAME "farlight.sock"
 
 #define KIB UINT64_C(1024)
 #define MIB (1024 * KIB)
@@ -41,7 +44,7 @@ struct option {
 
 /* clang-format off */
 static const struct option options[] = {
-    {"server", "listen", START, OPTION_TEXT, AT(listen), "unix:/run/farlight/farlight.sock", 0, 0, "",
+    {"server", "listen", START, OPTION_TEXT, AT(listen), "unix:" HOST_RUNTIME_FOLDER "/" SOCKET_NAME, 0, 0, "",
      "Addresses to listen at, separated by blanks: unix:/PATH, tcp:HOST:PORT"},
     {"server", "readers", ANYTIME, OPTION_TEXT, AT(readers), "", 0, 0, "",
      "Read-only users of the Unix socket: names or numbers, separated by blanks. They attach to shared scenes and "
@@ -252,11 +255,23 @@ static const struct option *find(const char *section, size_t section_bytes, cons
     return NULL;
 }
 
+/* A user who may not write to the system's folder has a socket of their own. */
+static void use_user_socket(struct config *config)
+{
+    char folder[CONFIG_TEXT_BYTES], listen[CONFIG_TEXT_BYTES];
+    if (geteuid() == 0 || access(HOST_RUNTIME_FOLDER, W_OK) == 0 ||
+        !host_user_runtime_folder(folder, sizeof(folder)))
+        return;
+    if ((size_t)snprintf(listen, sizeof(listen), "unix:%s/" SOCKET_NAME, folder) < sizeof(listen))
+        memcpy(config->listen, listen, sizeof(listen));
+}
+
 void config_defaults(struct config *config)
 {
     *config = (struct config){0};
     for (size_t i = 0; i < OPTION_COUNT; i++)
         set_option(config, &options[i], options[i].default_text, options[i].key, NULL);
+    use_user_socket(config);
 }
 
 static bool set_named(struct config *config, const char *name, const char *value, const char *field,

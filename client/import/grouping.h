@@ -22,6 +22,7 @@ bool import_add_grouped_spheres(struct import_scene *scene, const char *name, co
  * concave polygons of a whole file: it is counted down, and once it is 0 they become fans, too. Returns false for
  * such. */
 bool polygon_triangulate(const float *corners, uint32_t count, uint32_t *triangles, uint64_t *budget);
+#define POLYGON_CORNERS_MAX 65536u   /* cutting takes the square of it */
 #define POLYGON_BUDGET 2000000000ull /* a few seconds */
 
 #ifdef __cplusplus

@@ -13,7 +13,6 @@
 
 #define PI 3.14159265358979323846
 #define LIGHTS_MAX 4096
-#define POLYGON_CORNERS_MAX (1u << 20)
 
 struct light {
     float position[3], colour[3];
@@ -352,7 +351,8 @@ static bool read_polygon(struct nff *nff, bool patch)
     if (!read_numbers(nff, &stated, 1, patch ? "pp" : "p"))
         return false;
     if (!(stated >= 3 && stated <= (float)POLYGON_CORNERS_MAX))
-        return import_fail(nff->scene, where(nff), "a polygon of %g corners", (double)stated);
+        return import_fail(nff->scene, where(nff), "a polygon of %g corners; 3 to %u are allowed", (double)stated,
+                           POLYGON_CORNERS_MAX);
     count = (uint32_t)stated;
     /* Every number takes two bytes at least: more than the file could hold is not worth memory. */
     if ((uint64_t)count * floats * 2 > (uint64_t)(nff->end - nff->at) + 1)

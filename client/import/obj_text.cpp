@@ -114,6 +114,22 @@ bool scan_vertex(scan &s, const char *at, const char *end)
     return true;
 }
 
+// The library would keep them all before we hear of the face.
+bool scan_face(scan &s, const char *at, const char *end)
+{
+    size_t corners = 0;
+
+    if (size_t(end - at) < 2 * size_t(POLYGON_CORNERS_MAX))
+        return true; // each takes a digit and a blank
+    for (bool in_corner = false; at < end; at++) {
+        corners += !in_corner && !is_blank(*at);
+        in_corner = !is_blank(*at);
+    }
+    return corners <= POLYGON_CORNERS_MAX ||
+           import_fail(s.r.scene, ("line " + std::to_string(s.line)).c_str(),
+                       "a polygon of %zu corners; 3 to %u are allowed", corners, POLYGON_CORNERS_MAX);
+}
+
 bool scan_line(scan &s, const char *at, const char *end)
 {
     while (at < end && is_blank(*at))
@@ -122,6 +138,8 @@ bool scan_line(scan &s, const char *at, const char *end)
         return true;
     if (at[0] == 'v' && is_blank(at[1]))
         return scan_vertex(s, at + 2, end);
+    if (at[0] == 'f' && is_blank(at[1]))
+        return scan_face(s, at + 2, end);
     if ((at[0] == 'p' || at[0] == 'l') && is_blank(at[1]))
         s.seen_points_or_lines = true;
     if (end - at > 7 && memcmp(at, "mtllib", 6) == 0 && is_blank(at[6])) {

@@ -1,9 +1,18 @@
 /* SPDX-License-Identifier: MIT */
 #include "base/host.h"
 
+#include <stdio.h>
+#include <stdlib.h>
 #include <unistd.h>
 
 #define BYTES_IF_UNKNOWN (UINT64_C(8) << 30)
+
+bool host_user_runtime_folder(char *folder, size_t folder_bytes)
+{
+    const char *runtime = getenv("XDG_RUNTIME_DIR");
+    return runtime && runtime[0] == '/' &&
+           (size_t)snprintf(folder, folder_bytes, "%s/farlight", runtime) < folder_bytes;
+}
 
 uint64_t host_memory_bytes(void)
 {

@@ -3,7 +3,14 @@
 #ifndef FARLIGHT_BASE_HOST_H
 #define FARLIGHT_BASE_HOST_H
 
+#include <stdbool.h>
+#include <stddef.h>
 #include <stdint.h>
+
+/* Where daemons have their sockets: the system's, and of a user without rights to that, "farlight" in
+ * $XDG_RUNTIME_DIR. */
+#define HOST_RUNTIME_FOLDER "/run/farlight"
+bool host_user_runtime_folder(char *folder, size_t folder_bytes); /* false: there is none */
 
 /* Physical memory; 8 GiB where the system does not tell. */
 uint64_t host_memory_bytes(void);

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "net/listen.h"
 
+#include "base/host.h"
 #include "base/log.h"
 #include "base/sys.h"
 
@@ -32,14 +33,30 @@ static const struct sockaddr *raw(const struct address *address)
     return (const struct sockaddr *)&address->storage;
 }
 
+static bool is_runtime_folder(const char *folder)
+{
+    char of_user[PATH_MAX];
+    return strcmp(folder, HOST_RUNTIME_FOLDER) == 0 ||
+           (host_user_runtime_folder(of_user, sizeof(of_user)) && strcmp(folder, of_user) == 0);
+}
+
 static bool make_folder(const char *path, struct error *error)
 {
     char copy[PATH_MAX];
     snprintf(copy, sizeof(copy), "%s", path);
     const char *folder = dirname(copy);
+    struct stat status;
+    if (stat(folder, &status) == 0)
+        return true;
+    /* Any other one is more likely misspelt than missing. */
+    if (!is_runtime_folder(folder)) {
+        error_set(error, ERROR_INVALID, path, "the folder %s cannot be used: %s", folder, strerror(errno));
+        return error_remedy(error, "correct the address, or make the folder");
+    }
     if (mkdir(folder, 0750) == 0 || errno == EEXIST)
         return true;
-    return error_set(error, ERROR_INVALID, path, "cannot make the folder %s: %s", folder, strerror(errno));
+    error_set(error, ERROR_INVALID, path, "cannot make the folder %s: %s", folder, strerror(errno));
+    return error_remedy(error, "give --listen unix:/PATH, or set XDG_RUNTIME_DIR to a folder of yours");
 }
 
 /* A live daemon answers a connect; a refusal shows that the file is stale. */

@@ -14,8 +14,8 @@ struct listener {
     bool owns_path;         /* the socket file is ours to remove */
 };
 
-/* Unix: the file gets mode 0660; its folder is made with mode 0750 if it is missing (its parent must be
- * there); a stale socket file is removed, a live daemon there is an error. TCP: loopback only, unless
+/* Unix: the file gets mode 0660; its folder must be there, except one of base/host.h, which is made with mode
+ * 0750; a stale socket file is removed, a live daemon there is an error. TCP: loopback only, unless
  * `beyond_loopback` says that a key protects the address, or that none is wanted. */
 bool listener_open(struct listener *listener, const struct address *address, bool beyond_loopback,
                    struct error *error);

@@ -8,6 +8,7 @@ import json
 import os
 import pathlib
 import random
+import shutil
 import signal
 import socket
 import stat
@@ -308,6 +309,35 @@ class Sessions(Case):
 
 
 class Listening(Case):
+    def as_plain_user(self, *arguments, **environment):
+        """A daemon of a user who may write to nothing of the system's; its first line, or its status and errors."""
+        self.folder.chmod(0o755)
+        program = shutil.copy(farlight_test.BIN / "farlightd", self.folder)
+        user = {"user": 65534, "group": 65534, "extra_groups": []} if os.geteuid() == 0 else {}
+        child = subprocess.Popen([program, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd="/",
+                                 env={"PATH": os.environ["PATH"], **environment}, **user)
+        self.addCleanup(child.stdout.close)
+        self.addCleanup(child.stderr.close)
+        line = child.stdout.readline()
+        if line:
+            child.terminate()
+        return line.strip() or (child.wait(farlight_test.TIMEOUT_S), child.stderr.read())
+
+    def test_a_plain_user_has_a_socket_of_their_own_or_hears_how_to_get_one(self):
+        runtime = self.folder / "runtime"
+        runtime.mkdir()
+        runtime.chmod(0o777)
+        self.assertEqual(self.as_plain_user(XDG_RUNTIME_DIR=str(runtime)), f"READY unix:{runtime}/farlight/farlight.sock")
+        status, errors = self.as_plain_user()
+        self.assertEqual(status, 1)
+        self.assertIn("--listen", errors)
+        self.assertIn("XDG_RUNTIME_DIR", errors)
+
+    def test_a_misspelt_folder_is_not_made(self):
+        refused = self.expect(farlight_test.run("farlightd", "--listen", f"unix:{self.folder}/mispelt/farlight.sock"), 1)
+        self.assertIn("mispelt", refused.stderr)
+        self.assertEqual(list(self.folder.iterdir()), [])
+
     def test_the_socket_is_not_for_the_world(self):
         with Daemon() as daemon:
             mode = stat.S_IMODE(os.stat(daemon.path).st_mode)

@@ -930,6 +930,17 @@ class Written(unittest.TestCase):
             area += one
         self.assertEqual(area, 10)
 
+    def test_polygons_have_a_limit_of_corners(self):
+        corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
+        for count, status in ((65536, 0), (65537, 1)):
+            face = "f" + " 1 2 3" * (count // 3) + " 1" * (count % 3)
+            polygon = "f 1 1 1 0 0 0 1 1\np %d\n" % count + "0 0 0\n1 0 0\n0 1 0\n" * (count // 3) + "0 0 0\n" * (count % 3)
+            for name, text in (("model.obj", corners + face + "\n"), ("model.nff", polygon)):
+                with self.subTest(name=name, count=count):
+                    result = self.run_text(name, text, status)
+                    if status:
+                        self.assertIn("65537 corners; 3 to 65536 are allowed", result.text())
+
     def test_obj_faults_name_their_line(self):
         for text, expected in (("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n", "line 4: vertex 4"),
                                ("v 0 0 0\nf -2 1 1\n", "line 2: vertex -2"), ("v 0 0 0\nv nan 0 0\n", "line 2: 'nan'"),

@@ -91,7 +91,8 @@ static int make_folder(void **state)
     const char *base = getenv("TMPDIR");
     snprintf(folder, sizeof(folder), "%.40s/farlight-XXXXXX", base ? base : P_tmpdir);
     assert_non_null(mkdtemp(folder));
-    snprintf(socket_path, sizeof(socket_path), "%s/inner/s", folder);
+    setenv("XDG_RUNTIME_DIR", folder, 1);
+    snprintf(socket_path, sizeof(socket_path), "%s/farlight/s", folder);
     return 0;
 }
 
@@ -99,10 +100,11 @@ static int remove_folder(void **state)
 {
     (void)state;
     char inner[96];
-    snprintf(inner, sizeof(inner), "%s/inner", folder);
+    snprintf(inner, sizeof(inner), "%s/farlight", folder);
     unlink(socket_path);
     rmdir(inner);
     rmdir(folder);
+    unsetenv("XDG_RUNTIME_DIR");
     return 0;
 }
 
@@ -167,6 +169,20 @@ TEST(a_host_that_is_gone_is_noticed)
     close(accepted);
     close(fd);
     listener_close(&listener);
+}
+
+TEST_WITH(a_listener_makes_no_folder_that_is_not_the_daemons_own, make_folder, remove_folder)
+{
+    struct listener listener;
+    struct error error = {0};
+    struct stat status;
+    snprintf(socket_path, sizeof(socket_path), "%s/farlihgt/s", folder);
+    struct address address = unix_address();
+    assert_false(listener_open(&listener, &address, false, &error));
+    assert_non_null(strstr(error.text, "No such file"));
+    assert_non_null(strstr(error.remedy, "make the folder"));
+    *strrchr(socket_path, '/') = '\0';
+    assert_int_equal(stat(socket_path, &status), -1);
 }
 
 TEST_WITH(a_live_daemon_is_left_alone_and_a_stale_socket_replaced, make_folder, remove_folder)
