@@ -424,6 +424,8 @@ install: all
 	sed 's#@PREFIX@#$(PREFIX)#; s#@VERSION@#$(VERSION)#' conf/farlight.pc.in \
 	    >$(DESTDIR)$(PREFIX)/lib/pkgconfig/farlight.pc
 	install -m 644 client/cli/completion.bash $(DESTDIR)$(PREFIX)/share/bash-completion/completions/farlight
+	for name in $(filter-out farlight,$(notdir $(PROGRAMS))); do \
+	    ln -sf farlight $(DESTDIR)$(PREFIX)/share/bash-completion/completions/$$name; done
 	for page in $(filter-out conf/man/farlight.1,$(wildcard conf/man/*)) $(B)/man/farlight.1; do sed 's#@VERSION@#$(VERSION)#' $$page \
 	    >$(DESTDIR)$(PREFIX)/share/man/man$${page##*.}/$${page##*/}; done
 	install -m 644 $(B)/shot.schema.json $(DESTDIR)$(PREFIX)/share/farlight
@@ -440,7 +442,8 @@ uninstall:
 	rm -f $(addprefix $(DESTDIR)$(PREFIX)/share/man/man5/,$(notdir $(wildcard conf/man/*.5)))
 	rm -f $(addprefix $(DESTDIR)$(PREFIX)/share/man/man8/,$(notdir $(wildcard conf/man/*.8)))
 	rm -f $(DESTDIR)$(PREFIX)/lib/$(SONAME) $(DESTDIR)$(PREFIX)/lib/libfarlight.so \
-	    $(DESTDIR)$(PREFIX)/lib/pkgconfig/farlight.pc $(DESTDIR)$(PREFIX)/share/bash-completion/completions/farlight
+	    $(DESTDIR)$(PREFIX)/lib/pkgconfig/farlight.pc \
+	    $(addprefix $(DESTDIR)$(PREFIX)/share/bash-completion/completions/,$(notdir $(PROGRAMS)))
 	rm -f $(addprefix $(DESTDIR)$(PREFIX)/lib/systemd/system/farlightd.,service socket) \
 	    $(DESTDIR)$(PREFIX)/lib/sysusers.d/farlight.conf
 	rm -rf $(DESTDIR)$(PREFIX)/lib/farlight $(DESTDIR)$(PREFIX)/share/doc/farlight $(DESTDIR)$(PREFIX)/share/farlight $(DESTDIR)$(PREFIX)/include/farlight

@@ -1,6 +1,13 @@
 # SPDX-License-Identifier: MIT
-# Completion of farlight's command line for bash; to be installed as .../bash-completion/completions/farlight.
-# Subcommands, options and the values of settings are asked of the program itself.
+# Completion of the command lines of farlight and its other programs for bash; to be installed as
+# .../bash-completion/completions/farlight, with a link to it for each other program.
+# Subcommands, options and the values of settings are asked of the programs themselves.
+
+# The options of a command, as it lists them.
+_farlight_options()
+{
+    "$@" --usage 2>/dev/null | grep -o -e '--[a-z][a-z0-9-]*'
+}
 
 _farlight()
 {
@@ -21,13 +28,29 @@ _farlight()
         --*) words=$("$program" complete "$before" 2>/dev/null) ;;
         esac
         if [[ -z $words && $word == -* ]]; then
-            local usage=("$program" "$subcommand" --usage)
-            [[ " ${COMP_WORDS[*]} " == *" --tracers "* ]] && usage=("$program" compare --tracers bvh,naive --usage)
-            words=$("${usage[@]}" 2>/dev/null | grep -o -e '--[a-z][a-z0-9-]*')
+            local usage=("$program" "$subcommand")
+            [[ " ${COMP_WORDS[*]} " == *" --tracers "* ]] && usage=("$program" compare --tracers bvh,naive)
+            words=$(_farlight_options "${usage[@]}")
             [[ $words == *--timings* ]] && words="$words --timings=json"
         fi
     fi
     COMPREPLY=()
     [ -z "$words" ] || mapfile -t COMPREPLY < <(compgen -W "$words" -- "$word")
 }
+
+_farlight_program()
+{
+    local word=${COMP_WORDS[COMP_CWORD]} before=${COMP_WORDS[COMP_CWORD - 1]} program=${COMP_WORDS[0]} words=
+
+    case ${program##*/}:$before in
+    farlightd:--device) words="auto software $("$program" --list-devices 2>/dev/null | sed -n 's/^\([0-9]*\).*/\1/p')" ;;
+    farlightd:--log-level) words="error warning info debug" ;;
+    farlight-view:--*) words=$("${program%-view}" complete "$before" 2>/dev/null) ;;
+    farlight-export:--format) words="png jpeg exr hdr" ;;
+    esac
+    [[ -n $words || $word != -* ]] || words=$(_farlight_options "$program")
+    COMPREPLY=()
+    [ -z "$words" ] || mapfile -t COMPREPLY < <(compgen -W "$words" -- "$word")
+}
 complete -o default -F _farlight farlight
+complete -o default -F _farlight_program farlightd farlight-view farlight-import farlight-export farlight-video

@@ -51,9 +51,9 @@ class Tracers(farlight_test.Case):
                 self.assertIn(variable, result.stderr)
 
     def test_the_shell_completes_options_and_their_values(self):
-        def completed(*words):
+        def completed(*words, function="_farlight"):
             script = (f"source {farlight_test.ROOT}/client/cli/completion.bash; COMP_WORDS=({' '.join(words)}); "
-                      "COMP_CWORD=$((${#COMP_WORDS[@]} - 1)); _farlight; printf '%s\\n' \"${COMPREPLY[@]}\"")
+                      f"COMP_CWORD=$((${{#COMP_WORDS[@]}} - 1)); {function}; printf '%s\\n' \"${{COMPREPLY[@]}}\"")
             return subprocess.run(["bash", "-c", script], capture_output=True, text=True, check=True).stdout.split()
         program = str(BIN / "farlight")
         self.assertEqual(completed(program, "tra"), ["tracers"])
@@ -61,6 +61,18 @@ class Tracers(farlight_test.Case):
         self.assertEqual(completed(program, "render", "--ldc-levels", "py"), ["pyramid"])
         self.assertEqual(completed(program, "render", "--ldc-block", "1"), ["16"])
         self.assertIn("naive", completed(program, "render", "--tracer", "''"))
+        self.assertEqual(completed(program, "render", "--metadata", "f"), ["full"])
+
+        def others(name, *words):
+            return completed(str(BIN / name), *words, function="_farlight_program")
+        self.assertEqual(others("farlightd", "--key"), ["--key-file"])
+        self.assertEqual(others("farlightd", "--device", "s"), ["software"])
+        self.assertEqual(others("farlightd", "--log-level", "d"), ["debug"])
+        self.assertEqual(others("farlight-view", "--tracer", "nai"), ["naive"])
+        self.assertEqual(others("farlight-view", "--headl"), ["--headless"])
+        self.assertEqual(others("farlight-import", "--env"), ["--environment"])
+        self.assertEqual(others("farlight-export", "--full"), ["--full-metadata"])
+        self.assertEqual(others("farlight-video", "--fo"), ["--folder"])
 
 
 if __name__ == "__main__":
