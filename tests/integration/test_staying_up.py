@@ -15,6 +15,8 @@ import tiny_client
 from farlight_test import Case, Daemon
 from test_daemon import ERROR, GOODBYE, LIMIT, OK, PING, PONG, SCENE_OPEN, STATS, Peer, error_code, hello, message, text
 
+PONG_1 = struct.pack("<HHI", PONG, 0, 1)  # within the header of the answer to request 1
+
 DEVICE_LOST, SHUTTING_DOWN = 11, 14  # error_code
 
 READ_AGAIN, STAYS = "read again", "stays as it was"
@@ -234,8 +236,8 @@ class Reading(Case):
             self.assertTrue(comes_in(keys[1]))
 
 
-    def test_a_handshake_in_progress_ends_with_the_former_keys(self):
-        """A handshake that has begun is ended with the keys with which it began; who comes after it needs the new one."""
+    def test_a_handshake_in_progress_ends_with_the_former_keys_and_is_told_of_the_new_one(self):
+        """A proof is for the keys that were there when it began; its holder is then sent away, as all holders of that key."""
         keys = [self.folder / name for name in ("key", "other")]
         for key in keys:
             self.expect(farlight_test.farlight("key", key), 0)
@@ -245,10 +247,12 @@ class Reading(Case):
             under_way = [self.begin_sealed(daemon, key) for key in (old, new)]
             self.config.write_text(self.config.read_text().replace(str(keys[0]), str(keys[1])))
             self.reload(daemon, READ_AGAIN)
-            self.end_sealed(*under_way[0])
+            said = self.end_sealed(*under_way[0])
+            self.assertIn(b"key was replaced", said)
+            self.assertNotIn(PONG_1, said)
             with self.assertRaises(sealed_link.Refused):
                 self.end_sealed(*under_way[1])
-            self.end_sealed(*self.begin_sealed(daemon, new))
+            self.assertIn(PONG_1, self.end_sealed(*self.begin_sealed(daemon, new)))
             with self.assertRaises(sealed_link.Refused):
                 self.end_sealed(*self.begin_sealed(daemon, old))
 
@@ -262,15 +266,14 @@ class Reading(Case):
         return connection, client, connection.recv(72, socket.MSG_WAITALL)
 
     def end_sealed(self, connection, client, message_2):
-        """Comes in, and is answered."""
+        """What the daemon says, until it answers a ping or closes."""
         connection.sendall(client.proving(message_2))
         client.finish(connection.recv(64, socket.MSG_WAITALL))
         connection.sendall(client.seal(hello() + message(PING, 1, struct.pack("<Q", 1))))
         plain = b""
-        while struct.pack("<HHI", PONG, 0, 1) not in plain:
-            head = connection.recv(4, socket.MSG_WAITALL)
-            self.assertEqual(len(head), 4, "closed")
+        while PONG_1 not in plain and (head := connection.recv(4, socket.MSG_WAITALL)):
             plain += client.open(head + connection.recv(struct.unpack("<I", head)[0], socket.MSG_WAITALL))[0]
+        return plain
 
 
 class Losing(Daemon):
