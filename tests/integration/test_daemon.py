@@ -321,6 +321,7 @@ class Listening(Case):
         line = child.stdout.readline()
         if line:
             child.terminate()
+            child.wait(farlight_test.TIMEOUT_S)  # a program that runs cannot be written
         return line.strip() or (child.wait(farlight_test.TIMEOUT_S), child.stderr.read())
 
     def test_a_plain_user_has_a_socket_of_their_own_or_hears_how_to_get_one(self):
