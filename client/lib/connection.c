@@ -317,6 +317,11 @@ static bool shake_hands(struct fl_connection *connection, const char *name, uint
             stream->in_start += consumed;
             if (reply.version == 0 && (reply.capabilities & HANDSHAKE_NEEDS_KEY) != 0)
                 return tell_key_needed(connection, error);
+            if (fl_stream_is_turned_away(&reply, error)) {
+                snprintf(error->field, sizeof(error->field), "%.*s", (int)sizeof(error->field) - 1,
+                         connection->address);
+                return false;
+            }
             if (!handshake_reply_accept(&hello, &reply, &why))
                 return fl_error_set(error, FL_ERROR_PROTOCOL, connection->address, "%s", why.text);
             connection->limits = reply.limits;

@@ -199,11 +199,31 @@ static bool tell_refusal(enum sealed_status status, struct fl_error *error)
     return false;
 }
 
+bool fl_stream_is_turned_away(const struct handshake_reply *reply, struct fl_error *error)
+{
+    if (reply->version != 0 || (reply->capabilities & HANDSHAKE_TRY_AGAIN) == 0)
+        return false;
+    fl_error_set(error, FL_ERROR_REFUSED, "", "%s",
+                 reply->text[0] != '\0' ? reply->text : "the daemon has no place for another client now");
+    error->server_code = PROTOCOL_ERROR_BUSY;
+    return error->retryable = true;
+}
+
 static bool tell_broken_seal(const struct fl_stream *stream, const struct decode_error *why,
                              struct fl_error *error)
 {
     if (why->code == PROTOCOL_ERROR_OUT_OF_MEMORY)
         return fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
+    /* A daemon without a place says so before it knows that the connection would be sealed. */
+    struct handshake_reply reply;
+    struct decode_error ignored = {0};
+    size_t consumed = 0;
+    const struct sealed_link *link = stream->link;
+    if (!sealed_is_open(link->sealed) &&
+        handshake_reply_parse(&reply, link->in + link->in_start, sealed_link_unopened(link), &consumed,
+                              &ignored) == HANDSHAKE_CONSUMED &&
+        fl_stream_is_turned_away(&reply, error))
+        return false;
     return fl_error_set(error, FL_ERROR_PROTOCOL, "", "the data is not what %s has sealed: %s: %s", stream->peer,
                         why->field, why->text);
 }

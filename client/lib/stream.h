@@ -6,6 +6,7 @@
 
 #include "lib/farlight.h"
 #include "protocol/framing.h"
+#include "protocol/handshake.h"
 
 #include <poll.h>
 
@@ -58,6 +59,8 @@ enum fl_stream_result { FL_STREAM_MESSAGE, FL_STREAM_NOTHING, FL_STREAM_ERROR };
  * are valid until the next call. NOTHING with `ended`: half a message at most remains. */
 enum fl_stream_result fl_stream_next(struct fl_stream *stream, struct frame *frame, struct message *message,
                                      struct fl_error *error);
+/* Whether a reply says that the daemon has no place now; the error is set then, retryable. */
+bool fl_stream_is_turned_away(const struct handshake_reply *reply, struct fl_error *error);
 /* Whether the buffer holds an incomplete message. */
 bool fl_stream_has_remains(const struct fl_stream *stream);
 

@@ -504,6 +504,20 @@ class Jobs(Case):
         for wrong in ("0", "x", "1e9"):
             self.expect(farlight("stats", "--server", "unix:/nonexistent", f"--watch={wrong}"), 2)
 
+    def test_a_daemon_without_a_place_ends_a_client_with_75_and_says_why(self):
+        with Daemon(listen="tcp:127.0.0.1:0", environment={**os.environ, "FARLIGHT_LIMITS_CLIENTS": "1"}) as daemon:
+            address = next(word for line in daemon.ready for word in line.split() if word.startswith("tcp:"))
+            holder = subprocess.Popen([farlight_test.BIN / "farlight", "stats", "--json", "--watch=1", "--server", address],
+                                      stdout=subprocess.PIPE, text=True)
+            self.addCleanup(holder.stdout.close)
+            self.assertEqual(len(json.loads(holder.stdout.readline())["clients"]), 1)
+            for command in (["stats"], ["render", bundled_scenes() / "cornell.glb", "-o", self.folder / "x.png", "--retry-for", "0"]):
+                result = self.expect(farlight(*command, "--server", address), 75)
+                self.assertIn("the limit", result.stderr)
+            holder.send_signal(signal.SIGINT)
+            holder.wait(farlight_test.TIMEOUT_S)
+            self.expect(farlight("stats", "--server", address), 0)
+
     @contextlib.contextmanager
     def animation(self, daemon):
         child = subprocess.Popen(

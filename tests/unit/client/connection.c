@@ -180,6 +180,15 @@ static void play_busy(struct daemon *daemon)
     tell(daemon, 0, &refusal);
 }
 
+static void play_turning_away(struct daemon *daemon)
+{
+    struct handshake_reply reply = {.capabilities = HANDSHAKE_TRY_AGAIN, .text = "all places are taken"};
+    uint8_t bytes[HANDSHAKE_REPLY_MAX_BYTES];
+    more(daemon);
+    put(daemon, bytes, handshake_reply_encode(bytes, &reply));
+    more(daemon);
+}
+
 static void play_hanging_up(struct daemon *daemon)
 {
     more(daemon);
@@ -195,6 +204,11 @@ TEST(a_daemon_without_a_place_or_a_word_may_be_tried_again)
     check_error(FL_ERROR_REFUSED, "no place");
     assert_true(error.retryable);
     fl_connection_destroy(connection);
+    stop(daemon);
+    daemon = start(play_turning_away);
+    assert_null(connect_to(daemon));
+    check_error(FL_ERROR_REFUSED, "all places are taken");
+    assert_true(error.retryable);
     stop(daemon);
     daemon = start(play_hanging_up);
     assert_null(connect_to(daemon));

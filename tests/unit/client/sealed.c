@@ -182,6 +182,24 @@ TEST(a_needed_key_is_reported_with_a_remedy)
     stop(daemon);
 }
 
+static void play_no_place(struct daemon *daemon)
+{
+    struct handshake_reply reply = {.capabilities = HANDSHAKE_TRY_AGAIN, .text = "all places are taken"};
+    uint8_t bytes[HANDSHAKE_REPLY_MAX_BYTES];
+    more(daemon);
+    put(daemon, bytes, handshake_reply_encode(bytes, &reply));
+    more(daemon);
+}
+
+TEST(a_daemon_without_a_place_is_heard_before_the_seal)
+{
+    struct daemon *daemon = start(play_no_place);
+    assert_null(connect_sealed(daemon));
+    check_error(FL_ERROR_REFUSED, "all places are taken");
+    assert_true(error.retryable);
+    stop(daemon);
+}
+
 /* A client with a key never speaks openly, whatever answers. */
 static bool heard_only_the_seal;
 
