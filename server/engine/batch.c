@@ -227,7 +227,8 @@ static void job_finish(struct job *job, const struct error *error)
 static bool wants_frame(const struct job *job)
 {
     return !job_output_is_closed(job->output) && !job->rendering && job->next_frame <= job->spec.last_frame &&
-           job_output_has_room(job->output) && (job->spec.kind == JOB_BATCH || view_due_ns(job) != UINT64_MAX);
+           job_output_has_room(job->output) &&
+           (job->spec.kind == JOB_BATCH ? job_output_has_credit(job->output) : view_due_ns(job) != UINT64_MAX);
 }
 
 static bool any_frame(const struct engine *engine)

@@ -133,7 +133,9 @@ static void take_commands(struct engine *engine, struct engine_command *first)
 {
     uint64_t end_ns = clock_now_ns() + COMMANDS_NS;
     for (struct engine_command *command = first; command;) {
-        if (command != &nudge)
+        if (command == &nudge)
+            atomic_store(&engine->nudged, false); /* what changes from here on is not seen by this turn, perhaps */
+        else
             engine_handle(engine, command);
         command = clock_now_ns() < end_ns ? queue_try_pop(engine->commands) : NULL;
     }
@@ -142,8 +144,7 @@ static void take_commands(struct engine *engine, struct engine_command *first)
 static void run(struct engine *engine)
 {
     while (!atomic_load(&engine->stop)) {
-        /* A change from here on nudges the thread again. */
-        atomic_store(&engine->nudged, false);
+        atomic_store(&engine->nudged, false); /* the queue may have been full, and the nudge not in it */
         take_commands(engine, queue_try_pop(engine->commands));
         engine_finish_commits(engine);
         jobs_reap(engine);

@@ -71,8 +71,9 @@ struct engine_job {
     uint32_t key_count;
     struct clip_use *clips; /* owned */
     uint32_t clip_count;
-    /* Frames that may be handed out so far, absolute. Beyond it, frames of a batch are rendered as far as
-     * frames_in_flight goes, and kept; those of a view are not begun, so that none becomes stale. */
+    /* Frames that may be handed out so far, absolute. Without any, nothing is rendered or reserved. Beyond it,
+     * frames of a batch are rendered as far as frames_in_flight goes, and kept; those of a view are not begun, so
+     * that none becomes stale. */
     uint64_t credit;
     /* Of a view, see engine/view_wishes.h; owned: a reference. It takes the place of a view that has the same
      * wishes, which ends with ENGINE_DONE; frame numbers, counted from first_frame on, go on. */

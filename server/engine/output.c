@@ -15,8 +15,8 @@ struct job_output {
     /* Held while events are pushed, which keeps them in order. A push may wait for the network thread, which never
      * takes this lock. */
     pthread_mutex_t lock;
-    uint64_t reserved, next; /* positions given out, and handed out */
-    uint64_t credit;
+    uint64_t reserved, next;     /* positions given out, and handed out */
+    atomic_uint_fast64_t credit; /* written under the lock */
     struct engine_event *final;
     struct engine_event *waiting[]; /* by position modulo the window */
 };
@@ -27,7 +27,7 @@ struct job_output *job_output_create(const struct job_output_options *options)
     if (!output)
         return NULL;
     output->options = *options;
-    output->credit = options->credit;
+    atomic_init(&output->credit, options->credit);
     atomic_init(&output->references, 1);
     pthread_mutex_init(&output->lock, NULL);
     return output;
@@ -61,6 +61,11 @@ void job_output_unref(struct job_output *output)
 bool job_output_has_room(const struct job_output *output)
 {
     return atomic_load(&output->in_hand) < output->options.window;
+}
+
+bool job_output_has_credit(const struct job_output *output)
+{
+    return atomic_load(&output->credit) > 0;
 }
 
 uint64_t job_output_reserve(struct job_output *output)

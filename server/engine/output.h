@@ -27,6 +27,8 @@ void job_output_unref(struct job_output *output); /* accepts NULL */
 
 /* Reserves a place for one more frame; false: `window` frames are not fetched yet. One thread only. */
 bool job_output_has_room(const struct job_output *output);
+/* Whether the client wants any frame at all. */
+bool job_output_has_credit(const struct job_output *output);
 /* Takes that place; the number is the frame's position in the output. */
 uint64_t job_output_reserve(struct job_output *output);
 /* Adds the frame, or its error, for a reserved place. Takes over the event and fills in its client and request. */

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "gpu/device.h"
 
+#include "base/clock.h"
 #include "base/host.h"
 #include "base/log.h"
 #include "gpu/debug.h"
@@ -318,6 +319,28 @@ bool gpu_memory_take(struct gpu_device *device, uint64_t size_bytes, const char 
                          (unsigned long long)limit);
     device->memory_used_bytes += size_bytes;
     return true;
+}
+
+void gpu_reserve_begin(struct gpu_device *device, uint64_t time_ns)
+{
+    device->reserve_until_ns = clock_now_ns() + time_ns;
+    device->reserve_made = device->reserve_put_off = false;
+}
+
+bool gpu_reserve_end(struct gpu_device *device)
+{
+    bool put_off = device->reserve_put_off;
+    device->reserve_until_ns = 0;
+    device->reserve_put_off = false;
+    return put_off;
+}
+
+bool gpu_reserve_goes_on(struct gpu_device *device, struct error *error)
+{
+    if (device->reserve_until_ns && device->reserve_made && clock_now_ns() >= device->reserve_until_ns)
+        device->reserve_put_off = true;
+    device->reserve_made = true;
+    return !device->reserve_put_off || error_set(error, ERROR_BUSY, NULL, "memory is reserved in steps");
 }
 
 void gpu_memory_give(struct gpu_device *device, uint64_t size_bytes)

@@ -42,7 +42,9 @@ struct gpu_device {
     unsigned empty_buffer;              /* 256 zero bytes, bound in place of an empty buffer */
     uint64_t memory_used_bytes;         /* counted by gpu_memory_take: buffers, textures, Embree */
     uint64_t memory_limit_bytes;        /* 0: none; facts.memory_bytes at first */
-    bool lost;                          /* the context; nothing works any more, see gpu_note_loss */
+    uint64_t reserve_until_ns;          /* see gpu_reserve_begin; 0: whenever */
+    bool reserve_made, reserve_put_off;
+    bool lost; /* the context; nothing works any more, see gpu_note_loss */
 };
 
 struct gpu_options {
@@ -72,6 +74,15 @@ struct gpu_device *gpu_device_current(void);
 /* Counts memory before it is asked of the driver: ERROR_OUT_OF_MEMORY if the limit would be passed. */
 bool gpu_memory_take(struct gpu_device *device, uint64_t size_bytes, const char *what, struct error *error);
 void gpu_memory_give(struct gpu_device *device, uint64_t size_bytes);
+
+/* Software GL clears new memory at once, which takes a second a gigabyte and more. From here to gpu_reserve_end(),
+ * reservations beyond `time_ns` are put off: they fail with ERROR_BUSY, and the caller comes again with the same
+ * ones, of which those that were made stay. The first one of each time is made in any case. */
+void gpu_reserve_begin(struct gpu_device *device, uint64_t time_ns);
+/* Whether anything was put off. */
+bool gpu_reserve_end(struct gpu_device *device);
+/* Before work of milliseconds for a reservation. False: it is put off. */
+bool gpu_reserve_goes_on(struct gpu_device *device, struct error *error);
 
 /* GL debug group for the scope of a pass; shows in driver messages and frame debuggers. */
 void gpu_push_group(struct gpu_device *device, const char *name);

@@ -228,8 +228,11 @@ static bool read_band(struct frame_renderer *renderer, struct error *error)
 
 bool frame_step_waits(const struct frame_renderer *renderer)
 {
+    struct tracer *building = !renderer->built          ? renderer->tracer
+                              : !renderer->second_built ? renderer->second
+                                                        : NULL;
     if (renderer->phase == PHASE_BUILD)
-        return tracer_update_waits(renderer->built ? renderer->second : renderer->tracer);
+        return building && tracer_update_waits(building);
     return renderer->phase == PHASE_RESOLVE && renderer->copying && all_resolved(renderer) &&
            !gpu_readback_is_done(&renderer->work->copies[renderer->copied % 2]);
 }

@@ -18,6 +18,8 @@
 #define SLICE_RAYS_COMPARED (1u << 14)
 #define SLICE_RAYS_HARDWARE (1u << 18)
 #define WAVE_PER_SLICE 2
+/* Of a step that reserves memory. */
+#define RESERVE_NS UINT64_C(3000000)
 /* Pixels that are rasterised together: more take a while to reserve and to clear. */
 #define STRIP_PIXELS_MAX (1u << 22)
 /* The number of samples that texture filtering assumes for a picture that accumulates without an end. */
@@ -277,6 +279,19 @@ static enum tracer_progress bring(struct frame_renderer *renderer, const struct 
     return progress;
 }
 
+/* As far as time allows; the next step goes on with the same. */
+static bool get_ready_in_steps(struct frame_renderer *renderer, struct error *error)
+{
+    struct gpu_device *device = renderer->device;
+    struct error failed = {0};
+    gpu_reserve_begin(device, RESERVE_NS);
+    bool ready = get_ready(renderer, &failed);
+    bool put_off = gpu_reserve_end(device);
+    if (!ready && !put_off && error && error->kind == ERROR_NONE)
+        *error = failed;
+    return ready || put_off;
+}
+
 bool frame_build(struct frame_renderer *renderer, struct error *error)
 {
     const struct tracer_stats *stats = &renderer->tracer->stats;
@@ -290,9 +305,11 @@ bool frame_build(struct frame_renderer *renderer, struct error *error)
         renderer->result.structure_bytes = stats->device_bytes;
         tracer_tell(renderer->tracer, &renderer->result.structure);
     }
-    if (renderer->second)
+    if (renderer->second && !renderer->second_built) {
         progress = bring(renderer, renderer->second, error);
-    return progress == TRACER_DONE ? get_ready(renderer, error) : progress == TRACER_MORE;
+        renderer->second_built = progress == TRACER_DONE;
+    }
+    return progress == TRACER_DONE ? get_ready_in_steps(renderer, error) : progress == TRACER_MORE;
 }
 
 static struct trace_view view_of(const struct frame_request *request)
@@ -330,7 +347,8 @@ static bool begin(struct frame_renderer *renderer, const struct scene *scene, co
 /* The first step of each, which may read the scene's motion. */
 static bool begin_tracers(struct frame_renderer *renderer, struct error *error)
 {
-    renderer->built = false;
+    renderer->built = renderer->second_built = false;
+    picture_restart(&renderer->picture);
     if (!frame_build(renderer, error))
         return false;
     return renderer->built || !renderer->second || bring(renderer, renderer->second, error) != TRACER_FAILED;

@@ -69,8 +69,9 @@ struct frame_renderer {
     struct trace_view view;
     struct tracer *tracer, *second; /* held; NULL: none */
     bool built;                     /* `tracer` is what the scene is */
+    bool second_built;              /* the same of `second` */
     bool rasterise;
-    uint32_t strip_rows; /* that are rasterised together */
+    uint32_t strip_rows;     /* that are rasterised together */
     uint32_t samples_before; /* that the picture holds of the frames that this one goes on from */
     uint32_t sample;         /* samples of this frame that are done */
     uint32_t plane, band;    /* of the picture that is handed out next */

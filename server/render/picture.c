@@ -80,13 +80,13 @@ uint32_t picture_band_end(const struct picture *picture, uint32_t slot)
     return end < all ? (uint32_t)end : all;
 }
 
-static bool make_bands(struct picture *picture, struct gpu_device *device, struct error *error)
+static bool list_bands(struct picture *picture, const struct frame_request *request, struct error *error)
 {
     uint32_t row_slots = picture->tiles_across * 8;
     picture->band_rows = BAND_SLOTS_MAX / row_slots & ~7u;
     if (picture->band_rows == 0)
         picture->band_rows = 8;
-    uint32_t padded_rows = (picture->height + 7) & ~7u;
+    uint32_t padded_rows = (request->height + 7) & ~7u;
     if (picture->band_rows > padded_rows)
         picture->band_rows = padded_rows;
     uint32_t count = (padded_rows + picture->band_rows - 1) / picture->band_rows;
@@ -94,12 +94,33 @@ static bool make_bands(struct picture *picture, struct gpu_device *device, struc
     if (!picture->bands)
         return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the picture");
     picture->band_count = count;
-    for (uint32_t i = 0; i < count * picture->plane_count; i++) {
-        uint32_t rows = (picture_band_row_count(picture, i % count) + 7) & ~7u;
+    return true;
+}
+
+static bool reserve_bands(struct picture *picture, struct gpu_device *device, struct error *error)
+{
+    uint32_t row_slots = picture->tiles_across * 8;
+    for (uint32_t i = 0; i < picture->band_count * picture->plane_count; i++) {
+        uint32_t rows = (picture_band_row_count(picture, i % picture->band_count) + 7) & ~7u;
         if (!gpu_buffer_reserve(device, &picture->bands[i], (size_t)rows * row_slots * sizeof(vec4), error))
             return false;
     }
     return true;
+}
+
+static bool clear_bands(struct picture *picture, struct gpu_device *device, struct error *error)
+{
+    for (; picture->cleared < picture->band_count * picture->plane_count; picture->cleared++) {
+        if (!gpu_reserve_goes_on(device, error))
+            return false;
+        gpu_buffer_clear(device, &picture->bands[picture->cleared], 0);
+    }
+    return true;
+}
+
+void picture_restart(struct picture *picture)
+{
+    picture->cleared = 0;
 }
 
 bool picture_begin(struct picture *picture, struct render_context *context, uint32_t samples_before,
@@ -116,15 +137,12 @@ bool picture_begin(struct picture *picture, struct render_context *context, uint
         picture->width = request->width;
         picture->height = request->height;
         picture->tiles_across = (request->width + 7) / 8;
-        if (!make_bands(picture, context->device, error)) {
-            free_bands(picture, context->device);
+        if (!list_bands(picture, request, error))
             return false;
-        }
     }
     picture->samples = samples_before + request->samples;
-    for (uint32_t i = 0; i < picture->band_count * picture->plane_count && samples_before == 0; i++)
-        gpu_buffer_clear(context->device, &picture->bands[i], 0);
-    return true;
+    return reserve_bands(picture, context->device, error) &&
+           (samples_before > 0 || clear_bands(picture, context->device, error));
 }
 
 bool picture_accumulate(struct picture *picture, struct render_context *context, uint32_t plane,

@@ -12,6 +12,7 @@ struct picture {
     uint32_t tiles_across;
     uint32_t samples;   /* samples per pixel in the sums, those of the current frame included */
     uint32_t band_rows; /* pixel rows of every band but the last; a multiple of 8 */
+    uint32_t cleared;   /* bands that are so for this frame */
     uint32_t band_count;
     uint32_t layers;            /* bits; each layer is a plane, in the order of their numbers */
     uint32_t plane_count;       /* of them */
@@ -21,6 +22,8 @@ struct picture {
     size_t size_bytes;
 };
 
+/* Another frame: all of it is to be cleared. */
+void picture_restart(struct picture *picture);
 /* Reserves the request's picture and clears it; a picture of `samples_before` samples per pixel, to which the
  * request adds, is kept. */
 bool picture_begin(struct picture *picture, struct render_context *context, uint32_t samples_before,

@@ -21,7 +21,8 @@ struct primary {
 
 /* Makes room for strips of that many rows of the request's picture. */
 bool primary_reserve(struct primary *primary, struct render_context *context, uint32_t rows, struct error *error);
-/* Draws the strip from that row on for the sample that the uniforms describe, a part of the scene a call until it is done.
+/* Draws the strip from that row on for the sample that the uniforms describe, a part of the scene a call until it
+ * is done.
  */
 void primary_rasterise_begin(struct primary *primary, uint32_t first_row);
 bool primary_rasterise(struct primary *primary, struct render_context *context, bool *done, struct error *error);

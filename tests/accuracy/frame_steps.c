@@ -290,7 +290,7 @@ static uint32_t finish(struct frame_renderer *renderer, struct frame_result *res
     uint32_t pieces = 0;
     enum frame_progress progress = FRAME_MORE;
     while (progress == FRAME_MORE) {
-        pieces += renderer->phase == PHASE_BUILD;
+        pieces += renderer->phase == PHASE_BUILD && !renderer->built; /* memory is reserved in steps, too */
         progress = step(renderer, result, &error);
     }
     if (progress != FRAME_DONE)

@@ -106,16 +106,32 @@ TEST(large_frames_are_fewer_in_flight_but_always_one)
         struct engine *engine = start((struct engine_options){.frames_in_flight = 3, .frame_window_bytes = bytes});
         open_scene(engine, 1, 1);
         struct engine_command *made = render(1, 2, 0, 9);
-        made->job.credit = 0;
+        made->job.credit = 1;
         submit(engine, made);
+        take_frame(engine, 1, 2, 0);
         expect_silence(engine);
-        assert_int_equal(atomic_load(&fake.frames_begun), frames < 3 ? frames : 3);
+        assert_int_equal(atomic_load(&fake.frames_begun), 1 + (frames < 3 ? frames : 3));
         submit_target(engine, ENGINE_JOB_CREDIT, 1, 0, 2, 100);
-        for (uint32_t frame = 0; frame <= 9; frame++)
+        for (uint32_t frame = 1; frame <= 9; frame++)
             take_frame(engine, 1, 2, frame);
         expect_done(engine, 1, 2);
         stop(engine);
     }
+}
+
+TEST(nothing_is_begun_for_a_client_that_gives_no_credit)
+{
+    struct engine *engine = start((struct engine_options){0});
+    open_scene(engine, 1, 1);
+    struct engine_command *made = render(1, 2, 0, 0);
+    made->job.credit = 0;
+    submit(engine, made);
+    expect_silence(engine);
+    assert_int_equal(atomic_load(&fake.frames_begun), 0);
+    submit_target(engine, ENGINE_JOB_CREDIT, 1, 0, 2, 1);
+    take_frame(engine, 1, 2, 0);
+    expect_done(engine, 1, 2);
+    stop(engine);
 }
 
 TEST(frames_without_credit_stop_the_rendering)
@@ -298,10 +314,11 @@ TEST(a_cancelled_job_that_lacks_credit_ends_too)
 {
     struct engine *engine = start((struct engine_options){0});
     open_scene(engine, 1, 1);
-    struct engine_command *made = render(1, 2, 0, 2);
-    made->job.credit = 0;
+    struct engine_command *made = render(1, 2, 0, 3);
+    made->job.credit = 1;
     submit(engine, made);
-    wait_until(&fake.frames_done, 3);
+    take_frame(engine, 1, 2, 0);
+    wait_until(&fake.frames_done, 4);
     expect_silence(engine);
     submit_target(engine, ENGINE_JOB_CANCEL, 1, 3, 2, 0);
     expect_failed(engine, 1, 2, ERROR_CANCELLED, "");
