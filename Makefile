@@ -316,7 +316,7 @@ ANALYZE_PACKAGES := clang clang-tidy python3
 COVERAGE_PACKAGES := gcovr
 FUZZ_PACKAGES := clang libclang-rt-14-dev
 
-.PHONY: tests build-packages test-packages lint-packages analyze-packages coverage-packages fuzz-packages test test-long demo bench soak farm-drill bench-plot check-headers check-rules lint check analyze coverage format install uninstall clean distclean help
+.PHONY: tests build-packages test-packages lint-packages analyze-packages coverage-packages fuzz-packages test test-long demo bench soak farm-drill siege bench-plot check-headers check-rules lint check analyze coverage format install uninstall clean distclean help
 tests: $(TEST_PROGRAMS) $(CONTRACT) $(BENCH_PROGRAM) $(SHAPED_LINK) $(B)/tests/tools/make_scenes $(B)/tests/tools/pose_dump $(LOSING_DAEMON)
 
 build-packages:
@@ -358,6 +358,10 @@ soak: test-packages
 farm-drill: test-packages
 	$(MAKE) -j$(JOBS) all
 	python3 tests/soak/drill.py $(B) $(ROUNDS) $(if $(SEED),--seed $(SEED))
+# One user attacks a daemon in every way that tests/siege knows, another one looks at a triangle beside it.
+siege: test-packages
+	$(MAKE) -j$(JOBS) all
+	FARLIGHT_BIN=$(CURDIR)/$(B) python3 tests/siege/siege.py $(ATTACKS)
 # Measures what the curves need where out/bench.json does not have it yet.
 bench-plot: test-packages
 	$(MAKE) -j$(JOBS) $(BENCHED)
@@ -461,6 +465,7 @@ help:
 	@echo 'make bench      measure, into out/bench.txt and out/bench.json   [BENCH="family reach"; see tests/bench/bench.py]'
 	@echo 'make soak       use one daemon for some minutes, and see that its memory stays flat   [ROUNDS=1000]'
 	@echo 'make farm-drill kill the daemon or the client of animations at random, and see that no frame is lost   [ROUNDS=1000 SEED=]'
+	@echo 'make siege      attack a daemon as one user, and see that another one does not notice   [ATTACKS="stats pings"]'
 	@echo 'make bench-plot draw the scaling curves into out/, as SVG and PNG'
 	@echo 'make all        build the programs into build/$$config/   [config=debug|release|sanitize|fuzz EMBREE=0]'
 	@echo 'make fuzz       run every fuzzer for a while   [SECONDS=20]'

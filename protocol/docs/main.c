@@ -43,9 +43,11 @@ static void print_capabilities(void)
         "| %d | of a client: it decodes the encoding h264; of a reply: the daemon encodes it, too |\n"
         "| %d | of a reply: this client may only look, and change nothing |\n"
         "| %d | of a reply of version 0: only sealed connections are accepted |\n"
+        "| %d | of a reply of version 0: there may be a place later |\n"
         "| %d | of a client: frames of views may end unfinished, as `frame_end` says; of a reply: they will |\n\n",
         __builtin_ctzll(HANDSHAKE_CAN_H264), __builtin_ctzll(HANDSHAKE_CAN_READ_ONLY),
-        __builtin_ctzll(HANDSHAKE_NEEDS_KEY), __builtin_ctzll(HANDSHAKE_CAN_ABANDON));
+        __builtin_ctzll(HANDSHAKE_NEEDS_KEY), __builtin_ctzll(HANDSHAKE_TRY_AGAIN),
+        __builtin_ctzll(HANDSHAKE_CAN_ABANDON));
 }
 
 static void print_handshake(void)
@@ -64,14 +66,14 @@ static void print_handshake(void)
     printf("The reply, at most %u bytes:\n\n"
            "| offset | type | field |\n| ---: | --- | --- |\n"
            "| 0 | 4 bytes | `FARL` |\n"
-           "| 4 | u16 | version chosen; 0: none in common, the connection ends |\n"
+           "| 4 | u16 | version chosen; 0: the client is refused, the connection ends |\n"
            "| 6 | u16 | limits_bytes, at most 256 |\n"
            "| 8 | u64 | capabilities that both understand |\n"
            "| 16 | 16 bytes | nonce |\n"
            "| 32 | 16 bytes | session token |\n"
            "| 48 | limits_bytes | limits, see below |\n"
            "| | u8, bytes | name of the daemon: at most %u bytes |\n"
-           "| | u8, bytes | text: why there is no version in common; at most %u bytes |\n"
+           "| | u8, bytes | text: why the client is refused; at most %u bytes |\n"
            "| | | zeros up to a multiple of 8 |\n\n",
            HANDSHAKE_REPLY_MAX_BYTES, HANDSHAKE_NAME_MAX_BYTES, HANDSHAKE_TEXT_MAX_BYTES);
     print_limits();

@@ -99,6 +99,10 @@ struct trace_state {
     struct wave wave;     /* in progress */
     bool in_progress;     /* the wave has begun and is not traced to its end */
     uint32_t traced_rays; /* rays before this one have their final answers */
+    /* Of the range being traced: when the step ends, and the range, which trace_range() may end before its end, at
+     * a multiple of minimum_rays. */
+    uint64_t step_end_ns;
+    uint32_t range_end;
     /* Of a tracer that traces ranges of rays: how many rays the next step may have, by family; 0: not known. */
     uint32_t step_rays[WAVE_FAMILIES];
 };
@@ -150,7 +154,8 @@ struct tracer_impl {
                         struct error *error);
     /* One of these two finds the intersections (shared/hit.h) or visibilities of state->wave.
      * trace_range: for tracers that trace one ray, or one packet, independently of others. Does the rays of the
-     * range; the wrapper chooses ranges that fit a step and calls it for one after another. */
+     * range; the wrapper chooses ranges that fit a step and calls it for one after another. Where the cost of a
+     * ray has no bound, it ends the range early, once the step is over (see range_end). */
     bool (*trace_range)(struct tracer *tracer, struct gpu_scene *scene, struct trace_state *state,
                         const struct ray_range *rays, struct error *error);
     /* trace_step: for tracers that advance in another way, by batches of triangles for example. Does a step until

@@ -151,6 +151,11 @@ static bool make_surfaces(struct tracer *tracer, struct gpu_scene *scene, const 
                                   : trace_surfaces(scene, rays, error);
 }
 
+static uint64_t step_end_of(uint64_t step_ns)
+{
+    return step_ns == STEP_WITHOUT_END ? STEP_WITHOUT_END : clock_now_ns() + step_ns;
+}
+
 /* Intersections of some rays; *rays: those that are final. */
 static enum tracer_progress intersect(struct tracer *tracer, struct gpu_scene *scene, struct trace_state *state,
                                       uint64_t step_ns, struct ray_range *rays, struct error *error)
@@ -159,11 +164,14 @@ static enum tracer_progress intersect(struct tracer *tracer, struct gpu_scene *s
     const uint32_t all = state->wave.ray_count;
     if (!impl->trace_step) {
         *rays = next_range(state, step_ns);
+        state->range_end = rays->end;
+        state->step_end_ns = step_end_of(step_ns);
         if (!impl->trace_range(tracer, scene, state, rays, error))
             return TRACER_FAILED;
+        rays->end = state->range_end;
         return rays->end == all ? TRACER_DONE : TRACER_MORE;
     }
-    const uint64_t end_ns = step_ns == STEP_WITHOUT_END ? STEP_WITHOUT_END : clock_now_ns() + step_ns;
+    const uint64_t end_ns = step_end_of(step_ns);
     enum tracer_progress progress;
     do
         progress = impl->trace_step(tracer, scene, state, end_ns, error);

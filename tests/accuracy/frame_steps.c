@@ -23,10 +23,11 @@ static bool count_rays(struct tracer *tracer, struct gpu_scene *scene, struct tr
                        const struct ray_range *rays, struct error *error)
 {
     const uint64_t count = rays->end - rays->first, ns = slow ? count * RAY_NS : 0;
-    rays_of_step += count;
     waves_of_step++;
     nanosleep(&(struct timespec){(time_t)(ns / 1000000000u), (long)(ns % 1000000000u)}, NULL);
-    return behind->trace_range(tracer, scene, state, rays, error);
+    bool traced = behind->trace_range(tracer, scene, state, rays, error);
+    rays_of_step += state->range_end - rays->first; /* the range may have ended early */
+    return traced;
 }
 
 /* More lights than go into one batch, mirrors, glass and panes. */

@@ -184,7 +184,6 @@ static bool find_reach(struct reference *reference, const struct gpu_scene *scen
 bool reference_update_instances(struct reference *reference, const struct gpu_scene *scene, bool look,
                                 bool *changed, struct error *error)
 {
-    struct tracer_stats *stats = &reference->base.stats;
     if (look && !find_reach(reference, scene, error))
         return false;
     *changed = *changed || reference->instance_count != scene->instance_count;
@@ -193,10 +192,8 @@ bool reference_update_instances(struct reference *reference, const struct gpu_sc
     for (uint32_t i = 0; look && i < scene->instance_count; i++)
         if (!place_instance(reference, scene, i, changed))
             return false;
-    if (*changed) {
-        rtcCommitScene(reference->top);
-        stats->nodes_rebuilt += (uint64_t)scene->instance_count + scene->disc_count;
-    }
+    if (*changed)
+        reference->base.stats.nodes_rebuilt += (uint64_t)scene->instance_count + scene->disc_count;
     return true;
 }
 

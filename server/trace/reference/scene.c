@@ -87,26 +87,27 @@ static bool take_shape(struct reference_entry *entry, RTCDevice device, const st
     return opacity_surface_init_spheres(&entry->surface, geometry->spheres);
 }
 
-/* Embree's builder is at it. */
+/* Embree's builder is at it. False ends it. */
 static bool on_progress(void *context, double share)
 {
-    (void)context, (void)share;
+    const struct reference *reference = context;
+    (void)share;
     progress_tell();
-    return true;
+    return !atomic_load(&reference->is_abandoned);
 }
 
-static RTCScene new_scene(RTCDevice device)
+static RTCScene new_scene(struct reference *reference)
 {
-    RTCScene scene = rtcNewScene(device);
+    RTCScene scene = rtcNewScene(reference->device);
     if (scene) {
-        rtcSetSceneProgressMonitorFunction(scene, on_progress, NULL);
+        rtcSetSceneProgressMonitorFunction(scene, on_progress, reference);
         rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
         rtcSetSceneBuildQuality(scene, RTC_BUILD_QUALITY_MEDIUM);
     }
     return scene;
 }
 
-static struct reference_entry *entry_create(RTCDevice device, const struct gpu_scene_geometry *geometry)
+static struct reference_entry *entry_create(struct reference *reference, const struct gpu_scene_geometry *geometry)
 {
     struct reference_entry *entry = calloc(1, sizeof(*entry));
     if (!entry)
@@ -116,8 +117,8 @@ static struct reference_entry *entry_create(RTCDevice device, const struct gpu_s
     entry->node = geometry->node;
     entry->revision = geometry->revision;
     entry->is_wanted = entry->is_stale = true;
-    entry->scene = new_scene(device);
-    if (!entry->scene || !take_shape(entry, device, geometry)) {
+    entry->scene = new_scene(reference);
+    if (!entry->scene || !take_shape(entry, reference->device, geometry)) {
         entry_destroy(entry);
         return NULL;
     }
@@ -189,7 +190,7 @@ static bool list_entries(struct reference *reference, const struct gpu_scene *sc
     bool ok = entries && find_kept(reference, scene, entries);
     for (uint32_t g = 0; ok && g < count; g++) {
         if (!entries[g])
-            entries[g] = entry_create(reference->device, &scene->geometries[g]);
+            entries[g] = entry_create(reference, &scene->geometries[g]);
         ok = entries[g] != NULL;
     }
     if (!ok) {
@@ -228,7 +229,6 @@ static void commit_entry(struct reference_entry *entry)
     rtcCommitGeometry(entry->geometry);
     rtcCommitScene(entry->scene);
     entry->is_stale = false;
-    entry->is_fresh = true;
 }
 
 static void commit_small(void *context, uint32_t i)
@@ -238,15 +238,27 @@ static void commit_small(void *context, uint32_t i)
         commit_entry(entry);
 }
 
+/* Those that are to be built are fresh for what follows. False: there are none. */
+static bool mark_fresh(struct reference *reference)
+{
+    bool any = false;
+    for (uint32_t i = 0; i < reference->entry_count; i++) {
+        struct reference_entry *entry = reference->entries[i];
+        entry->is_fresh = entry->is_stale;
+        any = any || entry->is_stale;
+        if (entry->is_stale)
+            reference->base.stats.nodes_rebuilt += entry->primitive_count;
+    }
+    return any;
+}
+
 static void commit_entries(struct reference *reference)
 {
     uint32_t small_count = 0;
-    uint64_t built = 0;
-    for (uint32_t i = 0; i < reference->entry_count; i++) {
+    for (uint32_t i = 0; i < reference->entry_count && !atomic_load(&reference->is_abandoned); i++) {
         struct reference_entry *entry = reference->entries[i];
         if (!entry->is_stale)
             continue;
-        built += entry->primitive_count;
         if (entry->primitive_count >= ALONE_PRIMITIVES_MIN)
             commit_entry(entry);
         else
@@ -254,7 +266,6 @@ static void commit_entries(struct reference *reference)
     }
     if (small_count > 0)
         parallel_run(parallel_processors(), reference->entry_count, commit_small, reference);
-    reference->base.stats.nodes_rebuilt += built;
 }
 
 /* ---- discs ---- */
@@ -370,30 +381,45 @@ static bool update_materials(struct reference *reference, const struct gpu_scene
 }
 
 static bool update_parts(struct reference *reference, const struct gpu_scene *scene, unsigned changed,
-                         struct error *error)
+                         bool *builds, struct error *error)
 {
     bool top_changed = !reference->top, shading = changed & (CHANGED_SHADING | CHANGED_GEOMETRY);
     if (!reference->top)
-        reference->top = new_scene(reference->device);
+        reference->top = new_scene(reference);
     if (!reference->top || ((changed & CHANGED_GEOMETRY) && !list_entries(reference, scene)) ||
         (shading && !update_materials(reference, scene)))
         return false;
     if ((changed & (CHANGED_GEOMETRY | CHANGED_DEFORMED)) && !deform_entries(reference, scene, error))
         return false;
-    commit_entries(reference);
-    return update_discs(reference, scene, shading, &top_changed) &&
-           reference_update_instances(reference, scene,
-                                      shading || (changed & (CHANGED_INSTANCES | CHANGED_DEFORMED)), &top_changed,
-                                      error);
+    bool any_fresh = mark_fresh(reference);
+    if (!update_discs(reference, scene, shading, &top_changed) ||
+        !reference_update_instances(
+            reference, scene, shading || (changed & (CHANGED_INSTANCES | CHANGED_DEFORMED)), &top_changed, error))
+        return false;
+    reference->top_changed = top_changed;
+    *builds = any_fresh || top_changed;
+    return true;
 }
 
 bool reference_scene_update(struct reference *reference, const struct gpu_scene *scene, unsigned changed,
-                            struct error *error)
+                            bool *builds, struct error *error)
+{
+    bool ok = update_parts(reference, scene, changed, builds, error);
+    /* Embree's own error comes first: it says why. */
+    return (reference_check(reference, "building", error) && ok) || no_memory(error, scene);
+}
+
+void reference_scene_build(struct reference *reference)
+{
+    commit_entries(reference);
+    if (reference->top_changed && !atomic_load(&reference->is_abandoned))
+        rtcCommitScene(reference->top);
+}
+
+bool reference_scene_built(struct reference *reference, const struct gpu_scene *scene, struct error *error)
 {
     struct tracer_stats *stats = &reference->base.stats;
-    bool ok = update_parts(reference, scene, changed, error);
-    /* Embree's own error comes first: it says why. */
-    if (!reference_check(reference, "building", error) || !ok)
+    if (!reference_check(reference, "building", error))
         return no_memory(error, scene);
     stats->nodes = (uint64_t)scene->instance_count + scene->disc_count;
     for (uint32_t i = 0; i < reference->entry_count; i++) {

@@ -7,6 +7,10 @@
 
 #include <stdio.h>
 #include <stdlib.h>
+#include <unistd.h>
+
+/* How often it is looked whether the builder is done. */
+#define BUILDER_LOOK_US 200
 
 /* ---- what Embree calls ---- */
 
@@ -42,8 +46,7 @@ bool reference_check(struct reference *reference, const char *what, struct error
 }
 
 /* Embree's memory counts as the device's: it is what this tracer keeps in place of buffers. Called before (or,
- * with `post`, after) an allocation. Meanwhile the device's thread waits, so nothing else changes its accounts.
- */
+ * with `post`, after) an allocation, on any thread. */
 static bool count_memory(void *context, ssize_t bytes, bool post)
 {
     struct reference *reference = context;
@@ -51,8 +54,7 @@ static bool count_memory(void *context, ssize_t bytes, bool post)
     const struct gpu_device *gpu = reference->base.device;
     if (bytes <= 0 || !gpu || gpu->memory_limit_bytes == 0)
         return true;
-    uint64_t of_others = gpu->memory_used_bytes - reference->taken_bytes;
-    bool fits = sum < 0 || of_others + (uint64_t)sum <= gpu->memory_limit_bytes;
+    bool fits = sum < 0 || reference->others_bytes + (uint64_t)sum <= gpu->memory_limit_bytes;
     if (!fits && !post) /* it will not be allocated */
         atomic_fetch_sub(&reference->device_bytes, bytes);
     return fits;
@@ -74,6 +76,8 @@ static bool book_memory(struct reference *reference, struct error *error)
     reference->taken_bytes = bytes;
     return true;
 }
+
+static void join_builder(struct reference *reference);
 
 /* ---- life ---- */
 
@@ -104,6 +108,8 @@ static bool check_features(RTCDevice device, struct error *error)
 static void reference_destroy(struct tracer *tracer)
 {
     struct reference *reference = (struct reference *)tracer;
+    atomic_store(&reference->is_abandoned, true);
+    join_builder(reference);
     reference_scene_finish(reference);
     if (reference->base.device)
         gpu_memory_give(reference->base.device, reference->taken_bytes);
@@ -149,19 +155,90 @@ static struct tracer *reference_create(struct gpu_device *device, const struct t
     return &reference->base;
 }
 
+/* ---- building ---- */
+
+static void *run_builder(void *context)
+{
+    struct reference *reference = context;
+    uint64_t start_ns = clock_now_ns();
+    reference_scene_build(reference);
+    reference->build_ns = clock_now_ns() - start_ns;
+    atomic_store(&reference->is_built, true);
+    return NULL;
+}
+
+/* Without a thread, it is done here and now. */
+static void begin_build(struct reference *reference)
+{
+    atomic_store(&reference->is_built, false);
+    reference->is_building = pthread_create(&reference->builder, NULL, run_builder, reference) == 0;
+    if (!reference->is_building)
+        run_builder(reference);
+}
+
+static void join_builder(struct reference *reference)
+{
+    if (reference->is_building)
+        pthread_join(reference->builder, NULL);
+    reference->is_building = false;
+}
+
+static void reference_abandon(struct tracer *tracer)
+{
+    struct reference *reference = (struct reference *)tracer;
+    struct error error = {0}; /* of what is given up */
+    atomic_store(&reference->is_abandoned, true);
+    join_builder(reference);
+    atomic_store(&reference->is_abandoned, false);
+    reference_scene_finish(reference);
+    reference_check(reference, "building", &error);
+    book_memory(reference, &error);
+}
+
+static bool reference_waits(struct tracer *tracer)
+{
+    const struct reference *reference = (const struct reference *)tracer;
+    return reference->is_building && !atomic_load(&reference->is_built);
+}
+
+static enum tracer_progress fail(struct reference *reference)
+{
+    struct error second = {0}; /* says nothing that the first does not */
+    reference_scene_finish(reference);
+    book_memory(reference, &second);
+    return TRACER_FAILED;
+}
+
+/* What reads the scene is done here, Embree's builders run beside. */
 static enum tracer_progress reference_update(struct tracer *tracer, struct gpu_scene *scene,
                                              const struct tracer_update *update, struct error *error)
 {
     struct reference *reference = (struct reference *)tracer;
     uint64_t start_ns = clock_now_ns();
-    bool ok = reference_scene_update(reference, scene, update->changed, error) && book_memory(reference, error);
-    if (!ok) {
-        struct error second = {0}; /* says nothing that *error does not */
-        reference_scene_finish(reference);
-        book_memory(reference, &second);
+    if (!reference->is_building) {
+        bool builds = false;
+        const struct gpu_device *gpu = tracer->device;
+        reference->others_bytes = gpu ? gpu->memory_used_bytes - reference->taken_bytes : 0;
+        bool read = reference_scene_update(reference, scene, update->changed, &builds, error);
+        stage_times_add(update->times, STAGE_BUILD, CLOCK_CPU, 0, start_ns, clock_now_ns() - start_ns);
+        if (!read)
+            return fail(reference);
+        if (!builds)
+            return reference_scene_built(reference, scene, error) && book_memory(reference, error)
+                       ? TRACER_DONE
+                       : fail(reference);
+        start_ns = clock_now_ns();
+        begin_build(reference);
     }
-    stage_times_add(update->times, STAGE_BUILD, CLOCK_CPU, 0, start_ns, clock_now_ns() - start_ns);
-    return tracer_progress_of(ok);
+    while (reference_waits(tracer) && !step_is_over(tracer->step_end_ns))
+        usleep(BUILDER_LOOK_US);
+    if (reference_waits(tracer))
+        return TRACER_MORE;
+    join_builder(reference);
+    stage_times_add(update->times, STAGE_BUILD, CLOCK_CPU, 0, clock_now_ns() - reference->build_ns,
+                    reference->build_ns);
+    bool built = reference_scene_built(reference, scene, error) && book_memory(reference, error);
+    return built ? TRACER_DONE : fail(reference);
 }
 
 /* ---- waves ---- */
@@ -190,17 +267,19 @@ static bool reference_trace_range(struct tracer *tracer, struct gpu_scene *scene
     const struct wave *wave = &state->wave;
     if (!reserve_host(reference, wave->ray_count, error))
         return false;
-    const size_t first = rays->first, count = rays->end - rays->first;
+    const size_t first = rays->first;
+    size_t count = rays->end - rays->first;
     gpu_buffer_read(tracer->device, wave->rays, first * sizeof(struct ray), reference->rays + first,
                     count * sizeof(struct ray));
     if (wave->times)
         gpu_buffer_read(tracer->device, wave->times, first * sizeof(float), reference->times + first,
                         count * sizeof(float));
     uint64_t start_ns = clock_now_ns();
-    reference_traverse(reference, rays);
+    state->range_end = reference_traverse(reference, rays, state->step_end_ns);
     tracer->stats.traversal_ns = clock_now_ns() - start_ns;
     if (!reference_check(reference, "tracing", error))
         return false;
+    count = state->range_end - first;
     if (wave->kind == WAVE_ANY)
         gpu_buffer_write(tracer->device, wave->visibility, first * sizeof(uint32_t),
                          (const uint32_t *)reference->answers + first, count * sizeof(uint32_t));
@@ -213,9 +292,11 @@ static bool reference_trace_range(struct tracer *tracer, struct gpu_scene *scene
 const struct tracer_impl tracer_reference_impl = {
     .name = "reference",
     .depends_on = CHANGED_GEOMETRY | CHANGED_DEFORMED | CHANGED_INSTANCES | CHANGED_DISCS | CHANGED_SHADING,
-    .minimum_rays = 192,
+    .minimum_rays = REFERENCE_RAYS_MAX,
     .create = reference_create,
     .destroy = reference_destroy,
     .update = reference_update,
+    .abandon = reference_abandon,
+    .waits = reference_waits,
     .trace_range = reference_trace_range,
 };

@@ -63,6 +63,12 @@ struct reference {
     struct opacity_surface disc_surface;
     unsigned width;       /* rays a call */
     uint64_t taken_bytes; /* of the device's memory, in its books */
+    /* The builder's thread, between two steps of an update. */
+    pthread_t builder;
+    bool is_building, top_changed;
+    atomic_bool is_built, is_abandoned;
+    uint64_t build_ns;     /* how long it took */
+    uint64_t others_bytes; /* device memory that is not Embree's, as the update began */
     /* What Embree's callbacks write, from any thread. */
     atomic_llong device_bytes;
     pthread_mutex_t failure_mutex;
@@ -78,18 +84,22 @@ struct reference {
 /* True if Embree has reported nothing since the last call; else fills *error. */
 bool reference_check(struct reference *reference, const char *what, struct error *error);
 
-/* scene.c: brings all of the above to the scene. After a failure reference_scene_finish is due. */
+/* scene.c: brings all of the above to the scene, in three steps. The first one reads the scene; *builds: the
+ * second one, which takes long and may run on any thread, is to be done. After a failure reference_scene_finish is
+ * due. */
 bool reference_scene_update(struct reference *reference, const struct gpu_scene *scene, unsigned changed,
-                            struct error *error);
+                            bool *builds, struct error *error);
+void reference_scene_build(struct reference *reference);
+bool reference_scene_built(struct reference *reference, const struct gpu_scene *scene, struct error *error);
 void reference_scene_finish(struct reference *reference); /* leaves it empty */
-/* instance.c. `look`: some may have moved, or show rebuilt geometry; *changed is set if so.
- */
+/* instance.c. `look`: some may have moved, or show geometry that is rebuilt; *changed is set if so. */
 bool reference_update_instances(struct reference *reference, const struct gpu_scene *scene, bool look,
                                 bool *changed, struct error *error);
 void reference_drop_instances(struct reference *reference);
 
-/* traversal.c: traces the wave in `rays` and `times`; intersections or visibilities go to `answers`. */
-void reference_traverse(struct reference *reference, const struct ray_range *rays);
+/* traversal.c: traces the wave in `rays` and `times`; intersections or visibilities go to `answers`. Returns where
+ * it ended: a ray through a million triangles in one place takes milliseconds, its neighbour none. */
+uint32_t reference_traverse(struct reference *reference, const struct ray_range *rays, uint64_t step_end_ns);
 /* Embree asks these about each candidate on a geometry that has cutouts (closest), or lets light pass (any). */
 void reference_filter_closest(const struct RTCFilterFunctionNArguments *arguments);
 void reference_filter_any(const struct RTCFilterFunctionNArguments *arguments);

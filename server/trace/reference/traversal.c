@@ -19,15 +19,18 @@
 #include "base/parallel.h"
 #include "shared/hit.h"
 #include "shared/ray.h"
+#include "trace/step.h"
 
 #include <float.h>
 #include <math.h>
+#include <stdatomic.h>
 #include <string.h>
 #if defined(__SSE2__)
 #include <pmmintrin.h>
 #endif
 
-/* Rays that a thread takes at a time: some tens of microseconds of work. */
+/* Rays that a thread takes at a time, at most: some tens of microseconds of work. Fewer where a range has few, as
+ * its rays may cost milliseconds each. */
 #define CHUNK_RAYS 1024u
 
 /* A packet of n rays, and of hits behind them, is a row of n values for each of these fields (rtcore_ray.h has
@@ -66,6 +69,9 @@ struct traversal {
     struct reference *reference;
     const struct ray_range *rays;
     unsigned width;
+    uint32_t chunk_rays;
+    uint64_t step_end_ns;
+    atomic_uint undone; /* the first ray without an answer, so far */
 };
 
 /* Embree's context, with what the filter functions write behind it. */
@@ -277,8 +283,20 @@ static inline void occlude(RTCScene scene, struct traversal_context *context, st
     }
 }
 
+/* Asked before a packet; the first packet of all is traced in any case. Packets of n that end a range at a
+ * multiple of REFERENCE_RAYS_MAX keep the packets of the next one what they would have been. */
+static bool is_over(struct traversal *traversal, uint32_t at)
+{
+    if (at == traversal->rays->first || at % REFERENCE_RAYS_MAX || !step_is_over(traversal->step_end_ns))
+        return false;
+    unsigned undone = atomic_load(&traversal->undone);
+    while (at < undone && !atomic_compare_exchange_weak(&traversal->undone, &undone, at))
+        continue;
+    return true;
+}
+
 /* The rays `first` .. of a chunk that ends at `end`, n at a time. Inlined with a constant n. */
-static inline __attribute__((always_inline)) void traverse_packets(const struct traversal *traversal,
+static inline __attribute__((always_inline)) void traverse_packets(struct traversal *traversal,
                                                                    struct traversal_context *context,
                                                                    uint32_t first, uint32_t end, unsigned n)
 {
@@ -287,6 +305,8 @@ static inline __attribute__((always_inline)) void traverse_packets(const struct 
     struct packet packet;
     for (uint32_t at = first; at < end; at += n) {
         unsigned count = end - at < n ? end - at : n;
+        if (is_over(traversal, at))
+            return;
         for (unsigned lane = 0; lane < n; lane++) {
             static const struct ray dead = {.direction_t_max = {0.0f, 0.0f, 0.0f, -1.0f}};
             bool there = lane < count;
@@ -311,9 +331,9 @@ static inline __attribute__((always_inline)) void traverse_packets(const struct 
 
 static void traverse_chunk(void *argument, uint32_t chunk)
 {
-    const struct traversal *traversal = argument;
-    uint32_t first = traversal->rays->first + chunk * CHUNK_RAYS, left = traversal->rays->end - first;
-    uint32_t end = first + (left < CHUNK_RAYS ? left : CHUNK_RAYS);
+    struct traversal *traversal = argument;
+    uint32_t first = traversal->rays->first + chunk * traversal->chunk_rays, left = traversal->rays->end - first;
+    uint32_t end = first + (left < traversal->chunk_rays ? left : traversal->chunk_rays);
     struct traversal_context context;
     unsigned mode = enter_fast_mode();
     rtcInitIntersectContext(&context.embree);
@@ -337,9 +357,19 @@ static void traverse_chunk(void *argument, uint32_t chunk)
     leave_fast_mode(mode);
 }
 
-void reference_traverse(struct reference *reference, const struct ray_range *rays)
+uint32_t reference_traverse(struct reference *reference, const struct ray_range *rays, uint64_t step_end_ns)
 {
-    struct traversal traversal = {.reference = reference, .rays = rays, .width = reference->width};
-    uint32_t chunks = (rays->end - rays->first - 1) / CHUNK_RAYS + 1;
-    parallel_run(parallel_processors(), chunks, traverse_chunk, &traversal);
+    const unsigned processors = parallel_processors();
+    const uint32_t count = rays->end - rays->first;
+    const uint32_t even = (count / processors + REFERENCE_RAYS_MAX) / REFERENCE_RAYS_MAX * REFERENCE_RAYS_MAX;
+    struct traversal traversal = {
+        .reference = reference,
+        .rays = rays,
+        .width = reference->width,
+        .chunk_rays = even < CHUNK_RAYS ? even : CHUNK_RAYS,
+        .step_end_ns = step_end_ns,
+        .undone = rays->end,
+    };
+    parallel_run(processors, (count - 1) / traversal.chunk_rays + 1, traverse_chunk, &traversal);
+    return atomic_load(&traversal.undone);
 }
