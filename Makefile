@@ -498,9 +498,9 @@ $(FUZZ_SEED): %: %.o $(B)/tests/fuzz/recorded_session.o $(COMMON_OBJ) $(PROTOCOL
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(call pkg_libs,libsodium) -o $@
 $(addprefix $(B)/tests/fuzz/fuzz_,$(FUZZERS)): %: %.o $(PROTOCOL_OBJ)
 	$(call say,LINK)$(CXX) $(OPT) -fsanitize=fuzzer $(LDFLAGS_ALL) $^ $(FUZZ_LIBS) -o $@
-$(B)/tests/fuzz/fuzz_scene: $(filter $(B)/server/scene/% $(B)/server/base/%,$(SERVER_OBJ)) $(COMMON_OBJ)
+$(B)/tests/fuzz/fuzz_scene $(B)/tests/fuzz/fuzz_transaction: $(filter $(B)/server/scene/% $(B)/server/base/%,$(SERVER_OBJ)) $(COMMON_OBJ)
 $(B)/tests/fuzz/fuzz_sealed: $(SEALED_OBJ)
-$(B)/tests/fuzz/fuzz_scene $(B)/tests/fuzz/fuzz_sealed: FUZZ_LIBS = $(call pkg_libs,libsodium) -lm
+$(addprefix $(B)/tests/fuzz/fuzz_,scene sealed transaction): FUZZ_LIBS = $(call pkg_libs,libsodium libxxhash) -lm
 $(B)/tests/fuzz/fuzz_session: $(SERVING_OBJ) $(SERVER_OBJ)
 $(B)/tests/fuzz/fuzz_session: FUZZ_LIBS = $(SERVER_LIBS) $(SERVING_WRAP)
 $(addprefix $(B)/tests/fuzz/fuzz_,gltf nff obj): $(READERS_OBJ)
@@ -520,7 +520,7 @@ $(FUZZ_DICTIONARY): $(FUZZ_SEED)
 	$< $(@D)
 # The limit of an input's time is wall time: most take a millisecond, and other work must not look like a hang.
 $(addprefix run-fuzz-,$(FUZZERS)): run-fuzz-%: $(B)/tests/fuzz/fuzz_% $(FUZZ_DICTIONARY)
-	@mkdir -p $(B)/corpus/$* $(B)/found
+	@mkdir -p $(B)/corpus/$* $(B)/seed/$* $(B)/found
 	@$< -max_total_time=$(FUZZ_SECONDS) -max_len=8192 -timeout=20 -rss_limit_mb=1024 -use_value_profile=1 \
 		-print_final_stats=1 -dict=$(FUZZ_DICTIONARY) -artifact_prefix=$(B)/found/$*- $(B)/corpus/$* $(B)/seed/$* \
 		$(wildcard tests/fuzz/corpus/$*) $(FUZZ_FLAGS) \

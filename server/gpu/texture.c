@@ -116,9 +116,15 @@ bool gpu_texture_reserve_array(struct gpu_device *device, struct gpu_texture *te
 
 void gpu_texture_write(struct gpu_texture *texture, unsigned format, unsigned type, const void *texels)
 {
+    gpu_texture_write_rows(texture, format, type, 0, texture->height, texels);
+}
+
+void gpu_texture_write_rows(struct gpu_texture *texture, unsigned format, unsigned type, uint32_t first_row,
+                            uint32_t rows, const void *texels)
+{
     glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
-    glTextureSubImage2D(texture->name, 0, 0, 0, (GLsizei)texture->width, (GLsizei)texture->height, format, type,
-                        texels);
+    glTextureSubImage2D(texture->name, 0, 0, (GLint)first_row, (GLsizei)texture->width, (GLsizei)rows, format,
+                        type, texels);
 }
 
 void gpu_texture_finish(struct gpu_device *device, struct gpu_texture *texture)

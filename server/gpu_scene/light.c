@@ -2,6 +2,7 @@
 /* Lights, environment, and what they add to the bounds of the scene. */
 #include "gpu_scene/state.h"
 
+#include "base/clock.h"
 #include "scene/affine.h"
 #include "shared/light.h"
 
@@ -9,6 +10,9 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+
+#define ENVIRONMENT_TEXEL_BYTES 8
+#define ENVIRONMENT_STRIP_BYTES ((size_t)1 << 20)
 
 static const int device_kinds[] = {
     [LIGHT_POINT] = LIGHT_KIND_POINT,
@@ -97,7 +101,7 @@ static bool upload_environment(struct gpu_scene *gpu, const struct scene *scene,
         if (!gpu_texture_reserve(gpu->device, &gpu->environment, GL_RGBA16F, environment->width,
                                  environment->height, error))
             return false;
-        gpu_texture_write(&gpu->environment, GL_RGBA, GL_HALF_FLOAT, environment->texels->data);
+        gpu->state->environment_rows = 0;
         glTextureParameteri(gpu->environment.name, GL_TEXTURE_WRAP_S, GL_REPEAT); /* all round */
         changes->uploaded_bytes += gpu->environment.size_bytes;
     } else {
@@ -105,6 +109,26 @@ static bool upload_environment(struct gpu_scene *gpu, const struct scene *scene,
     }
     gpu->state->environment_revision = environment->revision;
     return true;
+}
+
+bool gpu_scene_upload_environment(struct gpu_scene *gpu, uint64_t end_ns)
+{
+    const struct scene_environment *environment = &gpu->scene->environment;
+    uint32_t *row = &gpu->state->environment_rows;
+    if (!gpu->has_environment_image)
+        return true;
+    const size_t row_bytes = (size_t)environment->width * ENVIRONMENT_TEXEL_BYTES;
+    const uint32_t strip =
+        ENVIRONMENT_STRIP_BYTES / row_bytes ? (uint32_t)(ENVIRONMENT_STRIP_BYTES / row_bytes) : 1;
+    while (*row < environment->height) {
+        uint32_t left = environment->height - *row, rows = left < strip ? left : strip;
+        gpu_texture_write_rows(&gpu->environment, GL_RGBA, GL_HALF_FLOAT, *row, rows,
+                               environment->texels->data + *row * row_bytes);
+        *row += rows;
+        if (clock_now_ns() >= end_ns)
+            break;
+    }
+    return *row == environment->height;
 }
 
 static void grow(struct gpu_scene *gpu, const float point[3], float radius)

@@ -31,6 +31,7 @@ struct gpu_scene_state {
     uint64_t discs_signature;
     uint64_t textures_signature;
     uint64_t environment_revision;
+    uint32_t environment_rows;          /* of its image that are uploaded */
     struct hashmap texture_index_by_id; /* value: (index + 1) as a pointer */
     uint32_t rigid_count;               /* geometries that do not deform: the first ones */
     uint32_t close_vertex;              /* where the deforming geometries' vertices as the shutter closes begin */

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "render/environment.h"
 
+#include "base/clock.h"
 #include "shared/bindings.h"
 #include "shared/sky.h"
 
@@ -82,7 +83,9 @@ static void add_sky(double sums[9][3])
     }
 }
 
-static bool add_image(double sums[9][3], const struct scene_environment *image, struct error *error)
+/* Goes on with the rows until about `end_ns`. */
+static bool add_image(struct environment *environment, const struct scene_environment *image, uint64_t end_ns,
+                      struct error *error)
 {
     const uint8_t *texels = image->texels->data;
     uint32_t width = image->width, height = image->height;
@@ -95,7 +98,13 @@ static bool add_image(double sums[9][3], const struct scene_environment *image, 
         circle[u][0] = sin(azimuth);
         circle[u][1] = -cos(azimuth);
     }
-    for (uint32_t v = 0; v < height; v++) {
+    if (environment->summed_revision != image->revision) {
+        memset(environment->sums, 0, sizeof(environment->sums));
+        environment->summed_rows = 0;
+        environment->summed_revision = image->revision;
+    }
+    do {
+        const uint32_t v = environment->summed_rows;
         struct row_sums row = {0};
         for (uint32_t u = 0; u < width; u++) {
             double x = circle[u][0], z = circle[u][1];
@@ -111,8 +120,8 @@ static bool add_image(double sums[9][3], const struct scene_environment *image, 
             }
         }
         double cap = cos(PI * v / height) - cos(PI * (v + 1) / height);
-        add_row(sums, &row, PI * (v + 0.5) / height, 2.0 * PI / width * cap);
-    }
+        add_row(environment->sums, &row, PI * (v + 0.5) / height, 2.0 * PI / width * cap);
+    } while (++environment->summed_rows < height && clock_now_ns() < end_ns);
     free(circle);
     return true;
 }
@@ -133,11 +142,12 @@ static bool make_default_light(struct environment *environment, struct gpu_devic
            gpu_buffer_upload(device, &environment->default_lights, &key, sizeof(key), error);
 }
 
-bool environment_update(struct environment *environment, struct gpu_device *device, const struct scene *scene,
-                        const struct gpu_scene *gpu, struct error *error)
+bool environment_update(struct environment *environment, struct gpu_device *device, const struct gpu_scene *gpu,
+                        uint64_t end_ns, bool *done, struct error *error)
 {
     static const float white[3] = {1.0f, 1.0f, 1.0f};
-    const struct scene_environment *given = &scene->environment;
+    const struct scene_environment *given = &gpu->scene->environment;
+    *done = true;
     bool image = given->texels && given->width > 0 && given->height > 0;
     uint32_t kind = image ? ENVIRONMENT_IMAGE : ENVIRONMENT_CONSTANT;
     if (is_black(given->colour))
@@ -154,9 +164,13 @@ bool environment_update(struct environment *environment, struct gpu_device *devi
         fold_constants(environment->irradiance, sums, white);
     } else if (kind == ENVIRONMENT_IMAGE) {
         environment->known = false;
-        if (!add_image(sums, given, error))
+        if (!add_image(environment, given, end_ns, error))
             return false;
-        fold_constants(environment->irradiance, sums, given->colour);
+        *done = environment->summed_rows == given->height;
+        if (!*done)
+            return true;
+        fold_constants(environment->irradiance, environment->sums, given->colour);
+        environment->summed_revision = 0;
     } else if (kind == ENVIRONMENT_CONSTANT) {
         memcpy(environment->irradiance[0], given->colour, sizeof(given->colour));
     }

@@ -19,12 +19,17 @@ struct environment {
     float irradiance[9][3]; /* of the environment itself; the colour that multiplies an image included */
     bool default_light;
     struct gpu_buffer default_lights; /* one struct light */
+    /* Of an image that is being integrated: */
+    uint64_t summed_revision; /* 0: none is */
+    uint32_t summed_rows;
+    double sums[9][3];
 };
 
 /* Of an image's texel; infinity becomes the largest half, NaN becomes 0. */
 float environment_float_from_half(uint16_t half);
-bool environment_update(struct environment *environment, struct gpu_device *device, const struct scene *scene,
-                        const struct gpu_scene *gpu, struct error *error);
+/* Works until about `end_ns`; *done false: it is to be called again. */
+bool environment_update(struct environment *environment, struct gpu_device *device, const struct gpu_scene *gpu,
+                        uint64_t end_ns, bool *done, struct error *error);
 void environment_fill_uniforms(const struct environment *environment, struct frame_uniforms *uniforms,
                                const struct gpu_scene *gpu);
 /* Of the scene, or the default light where it has none. */

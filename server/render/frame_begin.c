@@ -18,6 +18,8 @@
 #define SLICE_RAYS_COMPARED (1u << 14)
 #define SLICE_RAYS_HARDWARE (1u << 18)
 #define WAVE_PER_SLICE 2
+/* Of a step that uploads and integrates an environment. */
+#define ENVIRONMENT_STEP_NS UINT64_C(6000000)
 /* Of a step that reserves memory. */
 #define RESERVE_NS UINT64_C(3000000)
 /* Pixels that are rasterised together: more take a while to reserve and to clear. */
@@ -94,8 +96,19 @@ static bool update_scene(struct frame_renderer *renderer, const struct scene *sc
         renderer->samples_before = 0;
     renderer->result.uploaded_bytes = changes.uploaded_bytes;
     context->features = scene_features_of(scene);
-    uint64_t start_ns = clock_now_ns();
-    updated = environment_update(context->environment, renderer->device, scene, &renderer->shared->copy, error);
+    return true;
+}
+
+/* A step of it. */
+static bool update_environment(struct frame_renderer *renderer, bool *done, struct error *error)
+{
+    struct render_context *context = &renderer->work->context;
+    struct gpu_scene *copy = &renderer->shared->copy;
+    uint64_t start_ns = clock_now_ns(), end_ns = start_ns + ENVIRONMENT_STEP_NS;
+    *done = gpu_scene_upload_environment(copy, end_ns);
+    if (!*done)
+        return true;
+    bool updated = environment_update(context->environment, renderer->device, copy, end_ns, done, error);
     stage_times_add(&context->times, STAGE_BUILD, CLOCK_CPU, 0, start_ns, clock_now_ns() - start_ns);
     return updated;
 }
@@ -309,7 +322,12 @@ bool frame_build(struct frame_renderer *renderer, struct error *error)
         progress = bring(renderer, renderer->second, error);
         renderer->second_built = progress == TRACER_DONE;
     }
-    return progress == TRACER_DONE ? get_ready_in_steps(renderer, error) : progress == TRACER_MORE;
+    if (progress != TRACER_DONE)
+        return progress == TRACER_MORE;
+    bool lit;
+    if (!update_environment(renderer, &lit, error))
+        return false;
+    return !lit || get_ready_in_steps(renderer, error);
 }
 
 static struct trace_view view_of(const struct frame_request *request)

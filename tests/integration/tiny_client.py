@@ -224,12 +224,12 @@ class Client:
 
     def send_blob(self, blob):
         self.last_request += 1
-        request = self.last_request
+        request, name = self.last_request, blob_hash(blob)
         for offset in range(0, len(blob), PIECE_BYTES):
             piece = blob[offset:offset + PIECE_BYTES]
             while self.credit - self.sent < len(piece):
                 self.receive()
-            body = payload(struct.pack("<Q", offset) + blob_hash(blob))
+            body = payload(struct.pack("<Q", offset) + name)
             self.send(BLOB_DATA, request, UPLOAD_CHANNEL, body + bulk(piece, body))
             self.sent += len(piece)
         return request

@@ -2,6 +2,7 @@
 """What a client that means harm does to a daemon, one function an attack; each goes on until it is ended. Run as a program:
 attacks.py NAME USER ADDRESS. USER: whom the attacker becomes, as a number; 0: nobody else. It says BEGUN once it is at it."""
 import array
+import itertools
 import os
 import pathlib
 import random
@@ -129,12 +130,12 @@ def coincident(address):
 
 
 def large_picture(address):
-    """A frame of 8192x7800 with four layers of floats for whom has given no credit, begun anew all the time."""
+    """A frame of 8192x7800 with four layers of floats, begun anew all the time, with credit and without."""
     client = with_triangle(address)
     begun()
-    while True:
-        request = render(client, width=8192, height=7800, format=RGBA32F, layers=0b1111, encoding=ZSTD, credit=0)
-        drain(client, 2)
+    for credit in itertools.cycle((1, 0)):
+        request = render(client, width=8192, height=7800, format=RGBA32F, layers=0b1111, encoding=ZSTD, credit=credit)
+        drain(client, 4)
         try:
             client.cancel(request)
         except (tiny_client.Failed, KeyError):
@@ -147,11 +148,13 @@ def environments(address):
     half = struct.pack("<4e", 1, 1, 1, 0)
     images = [(half * 8192 * 4096)[:-8] + struct.pack("<4e", 1 + i, 1, 1, 0) for i in range(2)]
     client.upload(images)
+    fixed = struct.pack("<4f2I", 1, 1, 1, 0, 8192, 4096)
+    edits = [(SET_ENVIRONMENT, tiny_client.payload(fixed, tiny_client.array([tiny_client.blob_reference(image)])))
+             for image in images]
     begun()
     while True:
-        for image in images:
-            fixed = struct.pack("<4f2I", 1, 1, 1, 0, 8192, 4096)
-            client.commit(1, [(SET_ENVIRONMENT, tiny_client.payload(fixed, tiny_client.array([tiny_client.blob_reference(image)])))])
+        for edit in edits:
+            client.commit(1, [edit])
             request = render(client, credit=1)
             try:
                 client.next_frame(request)
