@@ -117,7 +117,10 @@ void engine_finish_commits(struct engine *engine)
         engine->promised_bytes -= commit->promised_bytes;
         const struct engine_command *command = commit->command;
         const struct engine_reference *by = engine_find_reference(engine, command->client, command->scene);
-        committed(engine, scene, by && by->scene == scene ? by : NULL, commit);
+        if (scene->references)
+            committed(engine, scene, by && by->scene == scene ? by : NULL, commit);
+        else
+            engine_scene_note(engine, scene); /* nobody is left to hear of it, and it may end now */
         aside_commit_destroy(commit);
         engine_run_waiting(engine, scene);
         engine_reap_scenes(engine);

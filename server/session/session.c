@@ -309,6 +309,7 @@ static void on_key_proved(void *context, size_t index)
     session->owner = owner;
     session->connection->entry.log_source = owner->number;
     session->connection->entry.sharers = &owner->clients;
+    session_hold(session, owner->held);
     count_unauthenticated(session, true);
 }
 
