@@ -197,7 +197,7 @@ static enum tracer_progress do_step(struct tracer *tracer, struct gpu_scene *sce
     state->in_progress = progress == TRACER_MORE;
     if (progress == TRACER_FAILED)
         return TRACER_FAILED;
-    if (!tracer->impl->trace_step && step_ns > 0 && step_ns != STEP_WITHOUT_END)
+    if (rays.first < rays.end && !tracer->impl->trace_step && step_ns > 0 && step_ns != STEP_WITHOUT_END)
         learn(state, rays.end - rays.first, step_ns, clock_now_ns() - start_ns);
     state->traced_rays = rays.end;
     return progress;

@@ -78,6 +78,7 @@ static bool book_memory(struct reference *reference, struct error *error)
 }
 
 static void join_builder(struct reference *reference);
+static void end_waves(struct reference *reference);
 
 /* ---- life ---- */
 
@@ -110,15 +111,13 @@ static void reference_destroy(struct tracer *tracer)
     struct reference *reference = (struct reference *)tracer;
     atomic_store(&reference->is_abandoned, true);
     join_builder(reference);
+    end_waves(reference);
     reference_scene_finish(reference);
     if (reference->base.device)
         gpu_memory_give(reference->base.device, reference->taken_bytes);
     if (reference->device)
         rtcReleaseDevice(reference->device);
     pthread_mutex_destroy(&reference->failure_mutex);
-    free(reference->rays);
-    free(reference->times);
-    free(reference->answers);
     free(reference);
 }
 
@@ -176,6 +175,15 @@ static void begin_build(struct reference *reference)
         run_builder(reference);
 }
 
+/* What is under way of waves that nobody waits for any more reads the structure. */
+static void end_waves(struct reference *reference)
+{
+    atomic_store(&reference->ends_waves, true);
+    while (atomic_load(&reference->waves_under_way))
+        usleep(BUILDER_LOOK_US);
+    atomic_store(&reference->ends_waves, false);
+}
+
 static void join_builder(struct reference *reference)
 {
     if (reference->is_building)
@@ -190,6 +198,7 @@ static void reference_abandon(struct tracer *tracer)
     atomic_store(&reference->is_abandoned, true);
     join_builder(reference);
     atomic_store(&reference->is_abandoned, false);
+    end_waves(reference);
     reference_scene_finish(reference);
     reference_check(reference, "building", &error);
     book_memory(reference, &error);
@@ -217,6 +226,7 @@ static enum tracer_progress reference_update(struct tracer *tracer, struct gpu_s
     uint64_t start_ns = clock_now_ns();
     if (!reference->is_building) {
         bool builds = false;
+        end_waves(reference);
         const struct gpu_device *gpu = tracer->device;
         reference->others_bytes = gpu ? gpu->memory_used_bytes - reference->taken_bytes : 0;
         bool read = reference_scene_update(reference, scene, update->changed, &builds, error);
@@ -241,53 +251,7 @@ static enum tracer_progress reference_update(struct tracer *tracer, struct gpu_s
     return built ? TRACER_DONE : fail(reference);
 }
 
-/* ---- waves ---- */
-
-static bool reserve_host(struct reference *reference, uint32_t ray_count, struct error *error)
-{
-    if (ray_count <= reference->ray_capacity)
-        return true;
-    free(reference->rays);
-    free(reference->times);
-    free(reference->answers);
-    reference->rays = malloc((size_t)ray_count * sizeof(*reference->rays));
-    reference->times = malloc((size_t)ray_count * sizeof(*reference->times));
-    reference->answers = malloc((size_t)ray_count * sizeof(struct hit));
-    reference->ray_capacity = reference->rays && reference->times && reference->answers ? ray_count : 0;
-    return reference->ray_capacity > 0 ||
-           error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a wave of %u rays", ray_count);
-}
-
-/* Unlike the others it waits, for the rays and for itself. */
-static bool reference_trace_range(struct tracer *tracer, struct gpu_scene *scene, struct trace_state *state,
-                                  const struct ray_range *rays, struct error *error)
-{
-    (void)scene;
-    struct reference *reference = (struct reference *)tracer;
-    const struct wave *wave = &state->wave;
-    if (!reserve_host(reference, wave->ray_count, error))
-        return false;
-    const size_t first = rays->first;
-    size_t count = rays->end - rays->first;
-    gpu_buffer_read(tracer->device, wave->rays, first * sizeof(struct ray), reference->rays + first,
-                    count * sizeof(struct ray));
-    if (wave->times)
-        gpu_buffer_read(tracer->device, wave->times, first * sizeof(float), reference->times + first,
-                        count * sizeof(float));
-    uint64_t start_ns = clock_now_ns();
-    state->range_end = reference_traverse(reference, rays, state->step_end_ns);
-    tracer->stats.traversal_ns = clock_now_ns() - start_ns;
-    if (!reference_check(reference, "tracing", error))
-        return false;
-    count = state->range_end - first;
-    if (wave->kind == WAVE_ANY)
-        gpu_buffer_write(tracer->device, wave->visibility, first * sizeof(uint32_t),
-                         (const uint32_t *)reference->answers + first, count * sizeof(uint32_t));
-    else
-        gpu_buffer_write(tracer->device, wave->hits, first * sizeof(struct hit),
-                         (const struct hit *)reference->answers + first, count * sizeof(struct hit));
-    return true;
-}
+/* ---- the tracer ---- */
 
 const struct tracer_impl tracer_reference_impl = {
     .name = "reference",
@@ -298,5 +262,9 @@ const struct tracer_impl tracer_reference_impl = {
     .update = reference_update,
     .abandon = reference_abandon,
     .waits = reference_waits,
+    .state_create = reference_state_create,
+    .state_destroy = reference_state_destroy,
+    .state_device_bytes = reference_state_device_bytes,
+    .trace_begin = reference_trace_begin,
     .trace_range = reference_trace_range,
 };

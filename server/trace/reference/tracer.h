@@ -74,11 +74,9 @@ struct reference {
     pthread_mutex_t failure_mutex;
     enum RTCError failure; /* the first since it was last asked */
     char failure_text[256];
-    /* A wave on the host; they grow and stay. */
-    struct ray *rays;
-    float *times; /* of those rays */
-    void *answers;
-    uint32_t ray_capacity;
+    /* Waves of any state that threads traverse, which an update ends. */
+    atomic_uint waves_under_way;
+    atomic_bool ends_waves;
 };
 
 /* True if Embree has reported nothing since the last call; else fills *error. */
@@ -97,9 +95,38 @@ bool reference_update_instances(struct reference *reference, const struct gpu_sc
                                 bool *changed, struct error *error);
 void reference_drop_instances(struct reference *reference);
 
-/* traversal.c: traces the wave in `rays` and `times`; intersections or visibilities go to `answers`. Returns where
- * it ended: a ray through a million triangles in one place takes milliseconds, its neighbour none. */
-uint32_t reference_traverse(struct reference *reference, const struct ray_range *rays, uint64_t step_end_ns);
+/* The state of a wave: what Embree reads and writes, and the range that a thread traverses. */
+struct reference_wave {
+    struct trace_state base;
+    struct ray *rays; /* they grow and stay */
+    float *times;     /* of those rays */
+    void *answers;
+    uint32_t ray_capacity;
+    struct reference *reference; /* whose thread is to be joined; NULL: none */
+    pthread_t thread;
+    atomic_bool is_cancelled;
+    struct wave traversed; /* the wave, for the thread */
+    struct ray_range range;
+    uint64_t step_end_ns;
+    pthread_mutex_t lock; /* of what follows */
+    pthread_cond_t landed;
+    bool has_landed;
+    uint32_t end; /* of the rays that have answers */
+};
+
+/* wave.c: functions of struct tracer_impl. */
+struct trace_state *reference_state_create(struct gpu_device *device, const struct tracer_options *options,
+                                           struct error *error);
+void reference_state_destroy(struct trace_state *state);
+uint64_t reference_state_device_bytes(const struct trace_state *state);
+bool reference_trace_begin(struct tracer *tracer, struct gpu_scene *scene, struct trace_state *state,
+                           struct error *error);
+bool reference_trace_range(struct tracer *tracer, struct gpu_scene *scene, struct trace_state *state,
+                           const struct ray_range *rays, struct error *error);
+
+/* traversal.c: traces the range of the wave; intersections or visibilities go to `answers`. Returns where it
+ * ended: a ray through a million triangles in one place takes milliseconds, its neighbour none. */
+uint32_t reference_traverse(struct reference *reference, struct reference_wave *wave);
 /* Embree asks these about each candidate on a geometry that has cutouts (closest), or lets light pass (any). */
 void reference_filter_closest(const struct RTCFilterFunctionNArguments *arguments);
 void reference_filter_any(const struct RTCFilterFunctionNArguments *arguments);

@@ -66,11 +66,11 @@ struct packet {
 };
 
 struct traversal {
-    struct reference *reference;
+    const struct reference *reference;
+    struct reference_wave *wave;
     const struct ray_range *rays;
     unsigned width;
     uint32_t chunk_rays;
-    uint64_t step_end_ns;
     atomic_uint undone; /* the first ray without an answer, so far */
 };
 
@@ -287,7 +287,10 @@ static inline void occlude(RTCScene scene, struct traversal_context *context, st
  * multiple of REFERENCE_RAYS_MAX keep the packets of the next one what they would have been. */
 static bool is_over(struct traversal *traversal, uint32_t at)
 {
-    if (at == traversal->rays->first || at % REFERENCE_RAYS_MAX || !step_is_over(traversal->step_end_ns))
+    bool is_cancelled =
+        atomic_load(&traversal->wave->is_cancelled) || atomic_load(&traversal->reference->ends_waves);
+    if (!is_cancelled &&
+        (at == traversal->rays->first || at % REFERENCE_RAYS_MAX || !step_is_over(traversal->wave->step_end_ns)))
         return false;
     unsigned undone = atomic_load(&traversal->undone);
     while (at < undone && !atomic_compare_exchange_weak(&traversal->undone, &undone, at))
@@ -310,8 +313,8 @@ static inline __attribute__((always_inline)) void traverse_packets(struct traver
         for (unsigned lane = 0; lane < n; lane++) {
             static const struct ray dead = {.direction_t_max = {0.0f, 0.0f, 0.0f, -1.0f}};
             bool there = lane < count;
-            float time = there && traversal->rays->wave->times ? reference->times[at + lane] : 0.0f;
-            set_lane(&packet, n, lane, there ? &reference->rays[at + lane] : &dead, time, at + lane - first,
+            float time = there && traversal->rays->wave->times ? traversal->wave->times[at + lane] : 0.0f;
+            set_lane(&packet, n, lane, there ? &traversal->wave->rays[at + lane] : &dead, time, at + lane - first,
                      reference->coordinate_max);
         }
         if (any)
@@ -320,11 +323,11 @@ static inline __attribute__((always_inline)) void traverse_packets(struct traver
             intersect(reference->top, context, &packet, n);
         for (unsigned lane = 0; lane < count; lane++) {
             if (any)
-                ((uint32_t *)reference->answers)[at + lane] =
+                ((uint32_t *)traversal->wave->answers)[at + lane] =
                     visibility_of(&packet, n, lane, context->transmittance[at + lane - first]);
             else
-                ((struct hit *)reference->answers)[at + lane] =
-                    intersection_of(reference, &packet, n, lane, &reference->rays[at + lane]);
+                ((struct hit *)traversal->wave->answers)[at + lane] =
+                    intersection_of(reference, &packet, n, lane, &traversal->wave->rays[at + lane]);
         }
     }
 }
@@ -357,17 +360,18 @@ static void traverse_chunk(void *argument, uint32_t chunk)
     leave_fast_mode(mode);
 }
 
-uint32_t reference_traverse(struct reference *reference, const struct ray_range *rays, uint64_t step_end_ns)
+uint32_t reference_traverse(struct reference *reference, struct reference_wave *wave)
 {
+    const struct ray_range *rays = &wave->range;
     const unsigned processors = parallel_processors();
     const uint32_t count = rays->end - rays->first;
     const uint32_t even = (count / processors + REFERENCE_RAYS_MAX) / REFERENCE_RAYS_MAX * REFERENCE_RAYS_MAX;
     struct traversal traversal = {
         .reference = reference,
+        .wave = wave,
         .rays = rays,
         .width = reference->width,
         .chunk_rays = even < CHUNK_RAYS ? even : CHUNK_RAYS,
-        .step_end_ns = step_end_ns,
         .undone = rays->end,
     };
     parallel_run(processors, (count - 1) / traversal.chunk_rays + 1, traverse_chunk, &traversal);
