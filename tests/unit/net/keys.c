@@ -190,8 +190,10 @@ TEST_WITH(keys_are_locked_and_left_out_of_dumps_by_the_daemon_and_its_links, mak
     for (size_t i = 0; i < 2; i++) {
         mapping_flags(secrets[i], flags);
         assert_non_null(strstr(flags, " dd"));
+#ifndef __SANITIZE_ADDRESS__ /* which locks nothing, and says that it has */
         if (secret_is_locked(keys, sizeof(*keys)))
             assert_non_null(strstr(flags, " lo"));
+#endif
     }
     sealed_destroy(sealed);
     auth_keys_unref(auth_keys_ref(keys));
