@@ -27,8 +27,8 @@ STRANGER = 65534  # the attacker's user, where this one may become another: nobo
 
 @dataclasses.dataclass
 class Bounds:
-    """The innocent's 99th percentile, against its own without an attack; never less than the floor, as a machine with
-    two processors runs attackers and the innocent as well."""
+    """The innocent's 99th percentile, against its own without an attack. That is 9 to 40 ms on machines with two
+    processors, which run the attackers as well: the floor is what a quiet one with 20 ms would be allowed."""
     slower: float = 2.5
     p99_floor_ms: float = 50
     frozen_ms: float = 250
