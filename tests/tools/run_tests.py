@@ -30,7 +30,7 @@ MODULE = "--module"  # run_tests.py --module NAME: one module of integration tes
 # Reasons for which a test may be skipped in CI.
 EXPECTED_SKIPS = (
     r"no systemd can be started here",  # most containers start none
-    r"sanitizers do not run within the limits of the service",
+    r"sanitizers do not run within",
     r"ptrace: ",  # forbidden in many containers
     r"this kernel does not name children",
     r"left to make test-long",  # which .ci/run calls
@@ -42,7 +42,7 @@ EXPECTED_SKIPS = (
 NOT_SANITIZED = re.compile(
     r"accuracy/(?!render_frame|tracer_owners|wave_comparison)"
     r"|contract/(.*(ray alone|packets of|rays? a call)|ldc|abuffer)"
-    r"|test_(abuffer|animate|compare|import_animation|layers|ldc|light|models|poses|shot|view)$")
+    r"|test_(abuffer|animate|compare|import_animation|layers|ldc|light|models|poses|shot|siege|view)$")
 # Where no times of an earlier run are known: what takes longest begins first.
 LONGEST_FIRST = ("accuracy/sampled_against_reference", "test_import", "test_light", "test_models", "test_view", "test_compare",
                  "accuracy/frame_steps", "test_poses", "test_animate", "contract/bvh, packets of eight",

@@ -153,8 +153,10 @@ static int result_of(int (*attempt)(void))
 
 TEST(only_threads_and_memory_that_is_not_both_are_to_be_had)
 {
-    if (!FILTERED)
+    if (!FILTERED) {
+        print_message("skipped: sanitizers do not run within the sandbox's filter\n");
         skip();
+    }
     for (size_t i = 0; i < sizeof(attempts) / sizeof(attempts[0]); i++) {
         const int result = result_of(attempts[i].attempt);
         if (result != attempts[i].expected)
