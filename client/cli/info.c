@@ -125,7 +125,7 @@ static void print_bounds(const float lower[3], const float upper[3])
            (double)upper[1], (double)upper[2]);
 }
 
-/* A list that nobody reads to its end is cut. */
+/* A list too long to be read is cut. */
 static void print_objects(const char *kind, const struct fl_model_object *list, size_t count)
 {
     for (size_t i = 0; i < count && i < LISTED_MAX; i++) {

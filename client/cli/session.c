@@ -275,7 +275,7 @@ static void close_connection(struct session *session)
     cli_loading_close(&session->loading);
 }
 
-/* Where nobody has listened yet the address may be misspelt: a daemon is waited for only if that was asked for. */
+/* Where no daemon has answered yet, the address may be misspelt: the command waits only if that was asked for. */
 static bool may_be_retried(const struct session *session, const struct fl_error *error)
 {
     const struct cli_job *job = session->job;

@@ -11,10 +11,9 @@
 #define INTERVAL_NS UINT64_C(10000000000)
 #define ENTRIES 256
 
-/* The latest pair that has this place; another one takes it over, as what is logged is bounded all the same. */
+/* Of all pairs of source and kind that have this place: few lines are enough where two meet. */
 struct entry {
-    uint64_t source, began_ns;
-    const char *kind;
+    uint64_t began_ns; /* 0: none yet */
     uint32_t written, left_out;
 };
 
@@ -33,15 +32,15 @@ bool log_is_due(uint64_t source, const char *kind)
     uint32_t left_out = 0;
     pthread_mutex_lock(&lock);
     struct entry *entry = entry_of(source, kind);
-    if (!entry->kind || now_ns - entry->began_ns >= INTERVAL_NS) {
+    if (!entry->began_ns || now_ns - entry->began_ns >= INTERVAL_NS) {
         left_out = entry->left_out;
-        *entry = (struct entry){.source = source, .kind = kind, .began_ns = now_ns};
+        *entry = (struct entry){.began_ns = now_ns};
     }
     bool due = entry->written < LINES_AT_ONCE;
     entry->written += due;
     entry->left_out += !due;
     pthread_mutex_unlock(&lock);
     if (left_out)
-        log_write(LOG_WARNING, "log", "%u lines like the next were left out", left_out);
+        log_write(LOG_WARNING, "log", "%u lines about clients were left out", left_out);
     return due;
 }

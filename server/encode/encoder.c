@@ -47,7 +47,7 @@ enum ycbcr encoder_takes(enum encoding encoding, unsigned quality)
 
 bool encoder_given_up(struct error *error)
 {
-    return error_set(error, ERROR_CANCELLED, "encoding", "nobody waits for the frame any more");
+    return error_set(error, ERROR_CANCELLED, "encoding", "the frame is not wanted any more");
 }
 
 bool encoder_encode(enum encoding encoding, const struct picture *picture, unsigned quality, uint8_t **out,

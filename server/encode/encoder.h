@@ -18,8 +18,8 @@ struct picture {
      */
     enum ycbcr ycbcr;
     struct ycbcr_planes planes;
-    /* Asked every few milliseconds by encoders that may take seconds: nobody waits for the bytes any more. NULL:
-     * somebody always does. */
+    /* Asked every few milliseconds by encoders that may take seconds: the bytes are not wanted any more. NULL:
+     * they always are. */
     bool (*is_given_up)(const void *context);
     const void *given_up_context;
 };

@@ -48,10 +48,10 @@ static struct aside_commit *take(struct list *list, struct aside_commit **place)
     return commit;
 }
 
-static bool is_busy(const struct aside *aside, uint64_t principal)
+static bool is_busy(const struct aside *aside, uint64_t owner)
 {
     for (unsigned i = 0; i < THREADS; i++) {
-        if (aside->running[i] && aside->running[i]->principal == principal)
+        if (aside->running[i] && aside->running[i]->owner == owner)
             return true;
     }
     return false;
@@ -61,7 +61,7 @@ static bool is_busy(const struct aside *aside, uint64_t principal)
 static struct aside_commit *next_locked(struct aside *aside)
 {
     struct aside_commit **place = &aside->waiting.first;
-    while (*place && is_busy(aside, (*place)->principal))
+    while (*place && is_busy(aside, (*place)->owner))
         place = &(*place)->next;
     return take(&aside->waiting, place);
 }

@@ -16,6 +16,7 @@ struct aside_commit {
     struct aside_commit *next; /* for the pool */
     struct scene *scene;
     struct engine_command *command; /* owned; its edits are gone afterwards */
+    uint64_t owner;                 /* one of whose at most one is carried out at a time */
     uint64_t principal;
     atomic_bool abandoned;
     bool applied;

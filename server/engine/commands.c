@@ -98,6 +98,7 @@ static bool commit(struct engine *engine, const struct engine_reference *referen
     }
     commit->scene = scene->scene;
     commit->command = command;
+    commit->owner = reference->client->owner->number;
     commit->principal = reference->client->principal;
     commit->promised_bytes = scene_edits_table_bytes(command->edits, command->edit_count);
     engine->promised_bytes += commit->promised_bytes;
@@ -120,7 +121,7 @@ void engine_finish_commits(struct engine *engine)
         if (scene->references)
             committed(engine, scene, by && by->scene == scene ? by : NULL, commit);
         else
-            engine_scene_note(engine, scene); /* nobody is left to hear of it, and it may end now */
+            engine_scene_note(engine, scene); /* it has no holder to be told, and may end now */
         aside_commit_destroy(commit);
         engine_run_waiting(engine, scene);
         engine_reap_scenes(engine);

@@ -283,19 +283,11 @@ static struct encode_task *next_locked(struct encode_pool *pool)
     return task;
 }
 
-static void run_tasks(struct encode_pool *pool, unsigned self, struct encode_task *task)
+static void set_running(struct encode_pool *pool, unsigned self, struct encode_task *task)
 {
-    while (task) {
-        pthread_mutex_lock(&pool->lock);
-        pool->running[self] = task;
-        pthread_mutex_unlock(&pool->lock);
-        run_task(task);
-        pthread_mutex_lock(&pool->lock);
-        pool->running[self] = NULL;
-        pthread_mutex_unlock(&pool->lock);
-        task = task_end(task); /* one that waited for it in its lane */
-        pool->options.on_done(pool->options.context);
-    }
+    pthread_mutex_lock(&pool->lock);
+    pool->running[self] = task;
+    pthread_mutex_unlock(&pool->lock);
 }
 
 static void *run_thread(void *context)
@@ -311,7 +303,13 @@ static void *run_thread(void *context)
         }
         pool->running[self] = task;
         pthread_mutex_unlock(&pool->lock);
-        run_tasks(pool, self, task);
+        while (task) {
+            run_task(task);
+            set_running(pool, self, NULL);
+            task = task_end(task); /* one that waited for it in its lane */
+            set_running(pool, self, task);
+            pool->options.on_done(pool->options.context);
+        }
         pthread_mutex_lock(&pool->lock);
         pthread_cond_signal(&pool->changed); /* a task of that owner may have been left waiting */
     }

@@ -29,8 +29,9 @@ static void on_timer(void *context);
 
 static unsigned messages_a_turn(const struct connection *connection)
 {
-    unsigned sharers = connection->entry.sharers ? *connection->entry.sharers : 1;
-    return sharers < MESSAGES_A_TURN ? MESSAGES_A_TURN / (sharers ? sharers : 1) : 1;
+    unsigned sharers = connection->entry.sharers ? *connection->entry.sharers : 0;
+    unsigned share = sharers ? MESSAGES_A_TURN / sharers : MESSAGES_A_TURN;
+    return share ? share : 1;
 }
 
 struct connection *connection_create(struct loop *loop, int fd, const struct connection_limits *limits,
