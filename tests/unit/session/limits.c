@@ -319,6 +319,46 @@ TEST(silent_connections_keep_no_one_out)
     go(client);
 }
 
+/* Begins a transaction with one edit, for which room for 32 is taken. */
+static void begin_with_node(struct client *client, uint32_t request)
+{
+    begin_edit(client, request, 1);
+    struct message message = made(MESSAGE_SET_NODE);
+    message.set_node.node = 1;
+    for (int i = 0; i < 3; i++)
+        message.set_node.parent_from_node[5 * i] = 1;
+    send_message(client, request, 0, &message);
+}
+
+TEST(edits_of_one_user_leave_memory_for_those_of_others)
+{
+    struct hub_options options = usual_options();
+    options.limits.transaction_bytes = 3 * 32 * sizeof(struct scene_edit);
+    options.limits.share_percent = 70; /* two of the three */
+    start_daemon(&options);
+    struct client *one = come(true), *two = come(true), *other = come(false);
+    open_scene_as(one, 1, "", PROTOCOL_SHARING_PRIVATE);
+    open_scene_as(two, 1, "", PROTOCOL_SHARING_PRIVATE);
+    open_scene_as(other, 1, "", PROTOCOL_SHARING_PRIVATE);
+    begin_with_node(one, 1);
+    expect_served(one); /* it has been read */
+    begin_with_node(two, 2);
+    expect_served(two);
+    begin_with_node(one, 3);
+    expect_error(one, 3, PROTOCOL_ERROR_LIMIT);
+    begin_with_node(other, 4);
+    commit(other, 4);
+    assert_int_equal(expect_ok(other, 4), 1);
+    commit(two, 2);
+    assert_int_equal(expect_ok(two, 2), 1);
+    begin_with_node(one, 5);
+    commit(one, 5);
+    assert_int_equal(expect_ok(one, 5), 1);
+    go(one);
+    go(two);
+    go(other);
+}
+
 #define SLOW_BYTES 30000
 
 TEST(a_message_may_be_slow_but_not_slower_than_the_limit)
