@@ -85,6 +85,13 @@ static const struct option options[] = {
      "The part of the device memory for " doc ". 0: no limit of its own"},
 #include "protocol/tracers.def"
 
+    {"scenes", "store", START, OPTION_TEXT, AT(store), "", 0, 0, "",
+     "Folder in which kept and shared scenes outlive the daemon, such as /var/lib/farlight/scenes; empty: they end "
+     "with it. A scene is written about a second after it has changed, and removed when it ends. The folder belongs to "
+     "one daemon, and nobody but its user may enter: what users have uploaded is in it, not encrypted"},
+    {"scenes", "store_bytes", START, OPTION_BYTES, AT(store_bytes), "16G", MIB, 1024 * TIB, "bytes",
+     "Maximum size of the folder; beyond it, the user with most in it loses the scene that was written first"},
+
     {"limits", "clients", ANYTIME, OPTION_U32, AT(limits.clients), "256", 1, 65536, "", "Connected clients"},
     {"limits", "share", ANYTIME, OPTION_U32, AT(limits.share_percent), "75", 1, 100, "%",
      "What one user or key may have of what all have together: of limits.clients, memory.frames and "

@@ -28,6 +28,8 @@ struct config {
     uint32_t encode_threads, frames_in_flight, engine_queue;
     uint64_t scene_bytes, device_bytes;
     uint32_t scene_linger_s, lingering_scenes;
+    char store[CONFIG_TEXT_BYTES]; /* folder of the scenes on disk; empty: there are none */
+    uint64_t store_bytes;
     struct session_limits limits;
     struct connection_limits connection;
 };

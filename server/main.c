@@ -9,8 +9,10 @@
 #include "gpu/device.h"
 #include "engine/engine.h"
 #include "session/daemon.h"
+#include "session/keeper.h"
 #include "protocol/plain_text.h"
 #include "protocol/version.h"
+#include "store/store.h"
 
 #include <argp.h>
 #include <stdlib.h>
@@ -180,31 +182,57 @@ static bool begin_to_listen(struct daemon *daemon, const struct config *config, 
            (activated || daemon_listen(daemon, config->listen, beyond_loopback, error));
 }
 
-/* `fd` < 0: there is no client yet. */
-static bool serve(struct daemon *daemon, const struct config *config, int fd, bool listens,
-                  struct timeline *timeline, bool *device_gone, struct error *error)
+struct serving {
+    struct daemon *daemon;
+    const struct config *config;
+    int fd; /* of the client; < 0: there is none yet */
+    bool listens;
+    struct timeline *timeline;
+    struct store *store; /* NULL: scenes end with the daemon */
+    bool device_gone;
+};
+
+static bool serve_with_engine(struct serving *serving, struct hub_options *options, struct engine *engine,
+                              struct error *error)
 {
+    struct daemon *daemon = serving->daemon;
+    options->engine = engine_port(engine);
+    options->device_bytes = engine_device_limit_bytes(engine);
+    options->timeline = serving->timeline;
+    options->owner_may_be_idle = true;
+    bool ok = daemon_start(daemon, options, error);
+    auth_keys_unref(options->keys); /* the hub has its own reference */
+    if (ok && serving->store)
+        keeper_restore(serving->store, &daemon->hub);
+    ok = ok && (serving->fd < 0 || daemon_serve_fd(daemon, serving->fd, error));
+    if (ok) {
+        daemon_print_ready(daemon, stdout);
+        ok = daemon_run(daemon, &serving->device_gone, error);
+    }
+    daemon_finish(daemon);
+    return ok;
+}
+
+static bool serve(struct serving *serving, struct error *error)
+{
+    const struct config *config = serving->config;
     struct engine_options engine_options;
     struct hub_options options;
     if (!config_engine(config, &engine_options, error) || !config_hub(config, &options, error) ||
-        (listens && !begin_to_listen(daemon, config, config->insecure || options.keys, error)))
+        (serving->listens &&
+         !begin_to_listen(serving->daemon, config, config->insecure || options.keys, error)))
         return false;
+    /* Scenes of a daemon that serves one client alone end with that client. */
+    if (serving->listens && config->store[0] &&
+        !(serving->store = store_open(config->store, config->store_bytes, error)))
+        return false;
+    const struct engine_keeper keeper = keeper_port(serving->store);
+    if (serving->store)
+        engine_options.keeper = &keeper;
     struct engine *engine = engine_create(&engine_options, error);
-    if (!engine)
-        return false;
-    options.engine = engine_port(engine);
-    options.device_bytes = engine_device_limit_bytes(engine);
-    options.timeline = timeline;
-    options.owner_may_be_idle = true;
-    bool ok = daemon_start(daemon, &options, error);
-    auth_keys_unref(options.keys); /* the hub has its own reference */
-    ok = ok && (fd < 0 || daemon_serve_fd(daemon, fd, error));
-    if (ok) {
-        daemon_print_ready(daemon, stdout);
-        ok = daemon_run(daemon, device_gone, error);
-    }
-    daemon_finish(daemon);
+    bool ok = engine && serve_with_engine(serving, &options, engine, error);
     engine_destroy(engine);
+    store_close(serving->store);
     return ok;
 }
 
@@ -231,10 +259,10 @@ int main(int argc, char **argv)
     struct timeline *timeline = NULL;
     if (config.trace_file[0])
         timeline = timeline_create(config.trace_file, config.trace_file_bytes, &error);
-    bool device_gone = false;
-    bool ok = (timeline || !config.trace_file[0]) &&
-              serve(&daemon, &config, arguments.fd, listens, timeline, &device_gone, &error);
+    struct serving serving = {
+        .daemon = &daemon, .config = &config, .fd = arguments.fd, .listens = listens, .timeline = timeline};
+    bool ok = (timeline || !config.trace_file[0]) && serve(&serving, &error);
     daemon_finish(&daemon); /* what was begun before it failed */
     timeline_destroy(timeline);
-    return !ok ? fail(&error) : device_gone ? EX_TEMPFAIL : EXIT_SUCCESS;
+    return !ok ? fail(&error) : serving.device_gone ? EX_TEMPFAIL : EXIT_SUCCESS;
 }

@@ -224,7 +224,8 @@ static void handle_of_scene(struct engine *engine, struct engine_command *comman
     if (command->kind == ENGINE_SCENE_CLOSE) {
         if (!scene_close(engine, reference, command))
             return;
-    } else if ((command->kind == ENGINE_COMMIT && scene->frames) || scene->commit || scene->waiting_count) {
+    } else if ((command->kind == ENGINE_COMMIT && !engine_scene_may_change(engine, scene)) || scene->commit ||
+               scene->waiting_count) {
         wait_for_scene(engine, scene, command);
         return;
     } else if (command->kind == ENGINE_COMMIT) {
@@ -240,7 +241,7 @@ static void handle_of_scene(struct engine *engine, struct engine_command *comman
 
 void engine_run_waiting(struct engine *engine, struct engine_scene *scene)
 {
-    if (scene->frames || scene->commit || !scene->waiting_count)
+    if (!scene->waiting_count || !engine_scene_may_change(engine, scene))
         return;
     /* No command here begins a frame, so all can run up to a long transaction, for which the rest waits again. */
     struct engine_command **waiting = scene->waiting;

@@ -74,7 +74,7 @@ void engine_nudge(struct engine *engine)
 static void run_all_waiting(struct engine *engine)
 {
     for (struct engine_scene *scene = engine->scenes; scene;) {
-        bool waits = scene->waiting_count && !scene->frames && !scene->commit;
+        bool waits = scene->waiting_count && engine_scene_may_change(engine, scene);
         if (waits)
             engine_run_waiting(engine, scene);
         scene = waits ? engine->scenes : scene->next; /* scenes may have ended */
@@ -141,6 +141,11 @@ static void take_commands(struct engine *engine, struct engine_command *first)
     }
 }
 
+static uint64_t shorter(uint64_t a_ns, uint64_t b_ns)
+{
+    return a_ns < b_ns ? a_ns : b_ns;
+}
+
 static void run(struct engine *engine)
 {
     while (!atomic_load(&engine->stop)) {
@@ -148,13 +153,13 @@ static void run(struct engine *engine)
         take_commands(engine, queue_try_pop(engine->commands));
         engine_finish_commits(engine);
         jobs_reap(engine);
-        uint64_t reap_ns = engine_reap_scenes(engine);
+        uint64_t scenes_ns = shorter(engine_reap_scenes(engine), engine_keep_scenes(engine));
         atomic_fetch_add(&engine->turns, 1);
         if (serve(engine))
             continue;
-        uint64_t idle_ns = jobs_idle_ns(engine);
+        uint64_t idle_ns = shorter(jobs_idle_ns(engine), scenes_ns);
         atomic_store(&engine->waits, true);
-        struct engine_command *first = queue_pop(engine->commands, idle_ns < reap_ns ? idle_ns : reap_ns);
+        struct engine_command *first = queue_pop(engine->commands, idle_ns);
         atomic_store(&engine->waits, false);
         take_commands(engine, first);
     }
@@ -182,6 +187,7 @@ static void *run_thread(void *context)
         scene->commit = NULL; /* it is destroyed here */
     aside_destroy(engine->aside);
     engine->aside = NULL;
+    engine_stop_keeping(engine);
     size_t cursor = 0;
     void *client;
     while (hashmap_next(&engine->clients, &cursor, NULL, &client)) {
@@ -222,10 +228,13 @@ static bool start_threads(struct engine *engine, struct error *error)
     pthread_sigmask(SIG_SETMASK, &all, &before);
     engine->pool = encode_pool_create(&pool, error);
     engine->aside = engine->pool ? aside_create(on_done, engine, error) : NULL;
-    if (engine->aside)
+    bool may_start = engine->aside != NULL;
+    if (may_start && engine->options.keeper)
+        may_start = (engine->keep = keep_create(engine->options.keeper, on_done, engine, error));
+    if (may_start)
         engine->has_thread = !pthread_create(&engine->thread, NULL, run_thread, engine);
     pthread_sigmask(SIG_SETMASK, &before, NULL);
-    if (!engine->aside)
+    if (!may_start)
         return false;
     if (!engine->has_thread)
         return error_set(error, ERROR_OUT_OF_MEMORY, "engine", "could not start a thread");
@@ -297,6 +306,7 @@ void engine_destroy(struct engine *engine)
     if (engine->has_thread)
         pthread_join(engine->thread, NULL);
     aside_destroy(engine->aside);
+    keep_destroy(engine->keep, 0);
     encode_pool_destroy(engine->pool);
     queue_destroy(engine->commands, drop_command);
     queue_destroy(engine->events, drop_event);

@@ -34,6 +34,19 @@ struct engine_limits {
                                   oldest; 0: default */
 };
 
+/* Who keeps attachable scenes for the next process. */
+struct engine_keeper {
+    void *context;
+    /* The first two are called on a thread of their own, one after the other. read() takes from the scene, which
+     * does not change in that time, what write() writes: NULL: nothing is to be written. Both end soon once
+     * *abandoned is set; write() releases the record in any case. */
+    void *(*read)(void *context, const struct scene *scene, uint64_t principal, enum sharing sharing,
+                  const atomic_bool *abandoned);
+    void (*write)(void *context, void *record, const atomic_bool *abandoned);
+    /* The scene has ended. On the same thread, after what was written before. */
+    void (*forget)(void *context, uint64_t principal, const char *name);
+};
+
 struct engine_options {
     struct gpu_options gpu;
     unsigned encode_threads;     /* 0: one per core, at most 4 */
@@ -44,6 +57,7 @@ struct engine_options {
     struct engine_limits limits;
     uint64_t device_bytes_limit; /* 0: 70 % of the device's memory, or no limit if the device does not tell it */
     const struct engine_backend *backend; /* NULL: the GPU; for tests */
+    const struct engine_keeper *keeper;   /* NULL: scenes end with the process */
 };
 
 /* Camera of a job over time, `time_s` and ten numbers that a spline goes through. */
@@ -113,6 +127,8 @@ struct engine_command {
     uint32_t scene;
     char name[SCENE_NAME_MAX + 1]; /* scene_open, scene_attach */
     enum sharing sharing;          /* scene_open */
+    uint64_t kept_revision;        /* scene_open: the next transaction has this revision, and the keeper has it; 0:
+                                      the scene is new */
     uint64_t owner;                /* of the client: with whom its connections share the device's time */
     uint64_t principal;  /* scene_open, _attach, _list, _trim, stats: the asking client's owner; kept scenes belong
                             to owners */

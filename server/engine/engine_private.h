@@ -11,6 +11,7 @@
 #include "engine/backend.h"
 #include "engine/encode_pool.h"
 #include "engine/engine.h"
+#include "engine/keep.h"
 #include "engine/output.h"
 #include "engine/scheduler.h"
 #include "engine/shot.h"
@@ -70,6 +71,7 @@ struct engine_scene {
     struct job *put_off;
     struct engine_command **waiting; /* owned: commands for when no frame is in progress, in order */
     size_t waiting_count;
+    uint64_t kept_revision, keep_due_ns; /* that the keeper has, and when it may have the next */
     uint64_t apply_start_ns, apply_ns; /* of the commits since the last frame */
     /* For stats, as of that revision: a large scene is not traversed for each request. */
     struct engine_scene_stat *stat; /* while it is filled in */
@@ -130,6 +132,7 @@ struct engine {
     struct stage_totals totals;         /* any thread */
     struct encode_pool *pool;
     struct aside *aside;
+    struct keep *keep; /* NULL: there is no keeper */
     pthread_t thread;
     bool has_thread;
 
@@ -146,6 +149,8 @@ struct engine {
     struct hashmap clients;      /* struct engine_client *, by number */
     struct hashmap owners;       /* struct engine_owner *, by number */
     struct engine_scene *scenes; /* owned */
+    struct engine_scene *read_scene; /* that the keeper reads; no transaction changes it. NULL: none */
+    bool read_scene_ended;           /* it is in no list, and owned here */
     struct job **jobs;           /* owned, in the order of their start */
     size_t job_count, job_capacity;
     struct scheduler scheduler;
@@ -207,6 +212,18 @@ uint64_t engine_left_table_bytes(const struct engine *engine);
  * the owner with most of them. */
 void engine_trim_tables(struct engine *engine, uint64_t principal);
 void engine_trim_blobs(struct engine *engine, uint64_t principal, uint64_t bytes);
+
+/* Whether it may change now: no frame of it is in progress, nothing else changes it, and nobody reads it. */
+bool engine_scene_may_change(const struct engine *engine, const struct engine_scene *scene);
+/* Releases a scene that is in no list. */
+void engine_scene_free(struct engine *engine, struct engine_scene *scene);
+
+/* kept.c: scenes that outlive the process; nothing happens without a keeper. */
+/* Gives the keeper what has changed. Returns the time until it may have more, UINT64_MAX: nothing waits for that. */
+uint64_t engine_keep_scenes(struct engine *engine);
+void engine_forget_kept(struct engine *engine, const struct engine_scene *scene);
+/* At the end of the thread: what is not kept yet, as far as there is time. */
+void engine_stop_keeping(struct engine *engine);
 
 /* describe.c: contents of a scene, and the list of scenes. */
 void engine_count_contents(struct engine_scene *scene);

@@ -137,8 +137,13 @@ void engine_forget_client(struct engine *engine, struct engine_client *client)
 
 /* ---- scenes ------------------------------------------------------------------------------------- */
 
-/* Jobs have ended, nothing waits, it is out of the list. */
-static void scene_free(struct engine *engine, struct engine_scene *scene)
+bool engine_scene_may_change(const struct engine *engine, const struct engine_scene *scene)
+{
+    return !scene->frames && !scene->commit && engine->read_scene != scene;
+}
+
+/* Jobs have ended, nothing waits. */
+void engine_scene_free(struct engine *engine, struct engine_scene *scene)
 {
     scene_drop_shared(engine, scene);
     engine->table_bytes -= scene->known.table_bytes;
@@ -156,15 +161,20 @@ static void scene_end(struct engine *engine, struct engine_scene *scene)
     while (*place != scene)
         place = &(*place)->next;
     *place = scene->next;
-    scene_free(engine, scene);
+    engine_forget_kept(engine, scene);
+    if (engine->read_scene == scene)
+        engine->read_scene_ended = true;
+    else
+        engine_scene_free(engine, scene);
     if (lingered)
         engine_post(engine, event_create(ENGINE_SCENE_ENDED, 0, 0));
 }
 
-/* The end of a scene without a holder; 0: now. An empty scene does not linger. */
+/* The end of a scene without a holder; 0: now. Neither an empty scene lingers, nor one that could not be restored. */
 static uint64_t lingers_until_ns(const struct engine *engine, const struct engine_scene *scene)
 {
-    if (scene->sharing == SHARING_PRIVATE || !scene->known.revision || !engine->options.limits.scene_linger_ms)
+    bool is_empty = !scene->known.revision || scene->known.revision < scene->kept_revision;
+    if (scene->sharing == SHARING_PRIVATE || is_empty || !engine->options.limits.scene_linger_ms)
         return 0;
     return scene->left_ns + engine->options.limits.scene_linger_ms * UINT64_C(1000000);
 }
@@ -352,6 +362,10 @@ static bool scene_add(struct engine *engine, const struct engine_command *comman
     scene->frames_ended = 1;
     scene->sharing = command->sharing;
     scene->principal = command->principal;
+    if (command->kept_revision) {
+        scene->scene->revision = command->kept_revision - 1;
+        scene->kept_revision = command->kept_revision;
+    }
     engine_scene_note(engine, scene);
     struct engine_scene **place = &engine->scenes;
     while (*place)

@@ -2,8 +2,6 @@
 /* One function per edit message: its fields into a struct scene_edit. The decoder has checked each field; how
  * they fit together is for the scene to check when the transaction is applied. */
 #include "session/edits.h"
-#include "session/session.h"
-#include "session/upload.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -50,14 +48,14 @@ static bool take_weights(float **weights, uint32_t *weight_count, const struct r
 }
 
 /* "set_mesh 7.arrays[2]" */
-static bool take_blob(const struct session *session, const struct record_blob_ref *arrays, uint32_t array_count,
+static bool take_blob(const struct edit_source *source, const struct record_blob_ref *arrays, uint32_t array_count,
                       uint32_t index, const char *what, uint32_t id, struct blob **blob, struct error *error)
 {
     char field[64];
     snprintf(field, sizeof(field), "%s %u.arrays[%u]", what, id, index);
     if (index >= array_count)
         return true;
-    return upload_resolve(session, &arrays[index], field, blob, error);
+    return source->resolve(source->context, &arrays[index], field, blob, error);
 }
 
 static bool from_node(const struct message_set_node *message, struct scene_edit *edit, struct error *error)
@@ -73,7 +71,7 @@ static bool from_node(const struct message_set_node *message, struct scene_edit 
     return take_weights(&node->weights, &node->weight_count, message->weights, message->weights_count, error);
 }
 
-static bool from_mesh(const struct session *session, const struct message_set_mesh *message,
+static bool from_mesh(const struct edit_source *source, const struct message_set_mesh *message,
                       struct scene_edit *edit, struct error *error)
 {
     struct scene_mesh *mesh = &edit->set.mesh;
@@ -84,7 +82,7 @@ static bool from_mesh(const struct session *session, const struct message_set_me
     mesh->target_count = message->target_count;
     mesh->closed = message->closed != 0;
     for (uint32_t i = 0; i < MESH_ARRAY_COUNT; i++) {
-        if (!take_blob(session, message->arrays, message->arrays_count, i, "set_mesh", message->mesh,
+        if (!take_blob(source, message->arrays, message->arrays_count, i, "set_mesh", message->mesh,
                        &mesh->arrays[i], error))
             return false;
     }
@@ -92,13 +90,13 @@ static bool from_mesh(const struct session *session, const struct message_set_me
            take_weights(&mesh->weights, &mesh->weight_count, message->weights, message->weights_count, error);
 }
 
-static bool from_spheres(const struct session *session, const struct message_set_spheres *message,
+static bool from_spheres(const struct edit_source *source, const struct message_set_spheres *message,
                          struct scene_edit *edit, struct error *error)
 {
     struct scene_spheres *spheres = &edit->set.spheres;
     begin_set(edit, OBJECT_SPHERES, &spheres->base, message->spheres, message->name);
     spheres->sphere_count = message->sphere_count;
-    return take_blob(session, message->arrays, message->arrays_count, 0, "set_spheres", message->spheres,
+    return take_blob(source, message->arrays, message->arrays_count, 0, "set_spheres", message->spheres,
                      &spheres->centres_radii, error) &&
            take_ranges(&spheres->ranges, &spheres->range_count, message->ranges, message->ranges_count, error);
 }
@@ -141,12 +139,12 @@ static void from_material(const struct message_set_material *message, struct sce
 
 static const char texture_remedy[] = "make it smaller, or raise limits.texture_edge in the daemon's configuration";
 
-static bool from_texture(const struct session *session, const struct message_set_texture *message,
+static bool from_texture(const struct edit_source *source, const struct message_set_texture *message,
                          struct scene_edit *edit, struct error *error)
 {
     struct scene_texture *texture = &edit->set.texture;
     begin_set(edit, OBJECT_TEXTURE, &texture->base, message->texture, message->name);
-    uint32_t limit_texels = session->hub->options.limits.texture_edge_texels;
+    uint32_t limit_texels = source->texture_edge_texels;
     if (message->width > limit_texels || message->height > limit_texels) {
         error_set(error, ERROR_LIMIT, "set_texture", "texture %u has %u x %u texels, the limit is %u a side",
                   message->texture, message->width, message->height, limit_texels);
@@ -158,7 +156,7 @@ static bool from_texture(const struct session *session, const struct message_set
     texture->wrap_u = (enum wrap)message->wrap_u;
     texture->wrap_v = (enum wrap)message->wrap_v;
     texture->nearest = message->nearest;
-    return take_blob(session, message->arrays, message->arrays_count, 0, "set_texture", message->texture,
+    return take_blob(source, message->arrays, message->arrays_count, 0, "set_texture", message->texture,
                      &texture->texels, error);
 }
 
@@ -183,12 +181,12 @@ static void from_camera(const struct message_set_camera *message, struct scene_e
     camera->near = message->near;
 }
 
-static bool from_environment(const struct session *session, const struct message_set_environment *message,
+static bool from_environment(const struct edit_source *source, const struct message_set_environment *message,
                              struct scene_edit *edit, struct error *error)
 {
     struct scene_environment *environment = &edit->set.environment;
     edit->kind = EDIT_SET_ENVIRONMENT;
-    uint32_t limit_texels = session->hub->options.limits.texture_edge_texels;
+    uint32_t limit_texels = source->texture_edge_texels;
     if (message->width > limit_texels || message->height > limit_texels) {
         error_set(error, ERROR_LIMIT, "set_environment", "%u x %u texels, the limit is %u a side", message->width,
                   message->height, limit_texels);
@@ -198,28 +196,28 @@ static bool from_environment(const struct session *session, const struct message
     environment->rotation = message->rotation;
     environment->width = message->width;
     environment->height = message->height;
-    return take_blob(session, message->arrays, message->arrays_count, 0, "set_environment", 0,
+    return take_blob(source, message->arrays, message->arrays_count, 0, "set_environment", 0,
                      &environment->texels, error);
 }
 
-static bool from_skin(const struct session *session, const struct message_set_skin *message,
+static bool from_skin(const struct edit_source *source, const struct message_set_skin *message,
                       struct scene_edit *edit, struct error *error)
 {
     struct scene_skin *skin = &edit->set.skin;
     begin_set(edit, OBJECT_SKIN, &skin->base, message->skin, message->name);
     skin->joint_count = message->joint_count;
-    return take_blob(session, message->arrays, message->arrays_count, 0, "set_skin", message->skin, &skin->joints,
+    return take_blob(source, message->arrays, message->arrays_count, 0, "set_skin", message->skin, &skin->joints,
                      error) &&
-           take_blob(session, message->arrays, message->arrays_count, 1, "set_skin", message->skin,
+           take_blob(source, message->arrays, message->arrays_count, 1, "set_skin", message->skin,
                      &skin->joint_from_mesh, error);
 }
 
-static bool from_clip(const struct session *session, const struct message_set_clip *message,
+static bool from_clip(const struct edit_source *source, const struct message_set_clip *message,
                       struct scene_edit *edit, struct error *error)
 {
     struct scene_clip *clip = &edit->set.clip;
     begin_set(edit, OBJECT_CLIP, &clip->base, message->clip, message->name);
-    return take_blob(session, message->arrays, message->arrays_count, 0, "set_clip", message->clip, &clip->floats,
+    return take_blob(source, message->arrays, message->arrays_count, 0, "set_clip", message->clip, &clip->floats,
                      error);
 }
 
@@ -237,7 +235,7 @@ static void from_channel(const struct message_set_channel *message, struct scene
     channel->first_value = message->first_value;
 }
 
-bool edit_from_message(const struct session *session, const struct message *message, struct scene_edit *edit,
+bool edit_from_message(const struct edit_source *source, const struct message *message, struct scene_edit *edit,
                        struct error *error)
 {
     memset(edit, 0, sizeof(*edit));
@@ -245,9 +243,9 @@ bool edit_from_message(const struct session *session, const struct message *mess
     case MESSAGE_SET_NODE:
         return from_node(&message->set_node, edit, error);
     case MESSAGE_SET_MESH:
-        return from_mesh(session, &message->set_mesh, edit, error);
+        return from_mesh(source, &message->set_mesh, edit, error);
     case MESSAGE_SET_SPHERES:
-        return from_spheres(session, &message->set_spheres, edit, error);
+        return from_spheres(source, &message->set_spheres, edit, error);
     case MESSAGE_SET_DISC:
         from_disc(&message->set_disc, edit);
         return true;
@@ -255,7 +253,7 @@ bool edit_from_message(const struct session *session, const struct message *mess
         from_material(&message->set_material, edit);
         return true;
     case MESSAGE_SET_TEXTURE:
-        return from_texture(session, &message->set_texture, edit, error);
+        return from_texture(source, &message->set_texture, edit, error);
     case MESSAGE_SET_LIGHT:
         from_light(&message->set_light, edit);
         return true;
@@ -263,11 +261,11 @@ bool edit_from_message(const struct session *session, const struct message *mess
         from_camera(&message->set_camera, edit);
         return true;
     case MESSAGE_SET_ENVIRONMENT:
-        return from_environment(session, &message->set_environment, edit, error);
+        return from_environment(source, &message->set_environment, edit, error);
     case MESSAGE_SET_SKIN:
-        return from_skin(session, &message->set_skin, edit, error);
+        return from_skin(source, &message->set_skin, edit, error);
     case MESSAGE_SET_CLIP:
-        return from_clip(session, &message->set_clip, edit, error);
+        return from_clip(source, &message->set_clip, edit, error);
     case MESSAGE_SET_CHANNEL:
         from_channel(&message->set_channel, edit);
         return true;

@@ -2,6 +2,7 @@
 #include "session/edits.h"
 
 #include "session/session.h"
+#include "session/upload.h"
 
 #include <inttypes.h>
 #include <stdlib.h>
@@ -106,6 +107,12 @@ static uint64_t bytes_beside(const struct scene_edit *edit)
     return 0;
 }
 
+static bool resolve(void *context, const struct record_blob_ref *reference, const char *field, struct blob **blob,
+                    struct error *error)
+{
+    return upload_resolve(context, reference, field, blob, error);
+}
+
 void edits_add(struct session *session, struct request *request, const struct message *message)
 {
     struct transaction *transaction = request->object;
@@ -114,8 +121,9 @@ void edits_add(struct session *session, struct request *request, const struct me
         edits_fail(session, request, &error);
         return;
     }
+    const struct edit_source source = {resolve, session, session->hub->options.limits.texture_edge_texels};
     struct scene_edit *edit = &transaction->edits[transaction->count];
-    if (edit_from_message(session, message, edit, &error) &&
+    if (edit_from_message(&source, message, edit, &error) &&
         account(session, transaction, bytes_beside(edit), &error)) {
         transaction->count++;
         edits_count(session, 1, 0);

@@ -24,9 +24,19 @@ void edits_fail(struct session *session, struct request *request, const struct e
 void edits_count(struct session *session, int64_t edits, int64_t bytes);
 void transaction_destroy(struct session *session, struct transaction *transaction); /* accepts NULL */
 
+/* What edits refer to beyond their messages. */
+struct edit_source {
+    /* The blob of a reference, or NULL where none is meant. False and *error, whose field is `field`: it is not
+     * there. */
+    bool (*resolve)(void *context, const struct record_blob_ref *reference, const char *field, struct blob **blob,
+                    struct error *error);
+    void *context;
+    uint32_t texture_edge_texels; /* the limit */
+};
+
 /* Fills the edit from a SET_.. or REMOVE message. False and *error: a blob is not there, or no memory; the
  * edit is to be finished either way. */
-bool edit_from_message(const struct session *session, const struct message *message, struct scene_edit *edit,
+bool edit_from_message(const struct edit_source *source, const struct message *message, struct scene_edit *edit,
                        struct error *error);
 
 #endif

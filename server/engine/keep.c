@@ -1,0 +1,205 @@
+/* SPDX-License-Identifier: MIT */
+#include "engine/keep.h"
+
+#include "base/clock.h"
+
+#include <pthread.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/resource.h>
+#include <time.h>
+
+#define NICENESS 10
+
+struct order {
+    struct order *next;
+    struct keep_save *save; /* owned; NULL: a scene is to be forgotten */
+    uint64_t principal;
+    char name[SCENE_NAME_MAX + 1];
+};
+
+struct keep {
+    const struct engine_keeper *keeper;
+    void (*on_change)(void *context);
+    void *context;
+    atomic_bool abandoned;
+    pthread_mutex_t lock; /* of what follows */
+    pthread_cond_t changed;
+    struct order *first, **end;
+    struct keep_save *read_first;
+    size_t left; /* orders that are not carried out */
+    bool closed;
+    pthread_t thread;
+    bool started; /* the owner's */
+};
+
+static void order_destroy(struct order *order)
+{
+    free(order->save);
+    free(order);
+}
+
+static void carry_out(struct keep *keep, struct order *order)
+{
+    const struct engine_keeper *keeper = keep->keeper;
+    struct keep_save *save = order->save;
+    if (!save) {
+        keeper->forget(keeper->context, order->principal, order->name);
+        return;
+    }
+    uint64_t start_ns = clock_now_ns();
+    void *record = keeper->read(keeper->context, save->scene, save->principal, save->sharing, &keep->abandoned);
+    save->read_ns = clock_now_ns() - start_ns;
+    order->save = NULL;
+    pthread_mutex_lock(&keep->lock);
+    save->next = keep->read_first;
+    keep->read_first = save;
+    pthread_mutex_unlock(&keep->lock);
+    keep->on_change(keep->context);
+    if (record)
+        keeper->write(keeper->context, record, &keep->abandoned);
+}
+
+static struct order *take_first(struct keep *keep)
+{
+    struct order *order = keep->first;
+    if (!order)
+        return NULL;
+    keep->first = order->next;
+    if (!keep->first)
+        keep->end = &keep->first;
+    return order;
+}
+
+static void *run_thread(void *context)
+{
+    struct keep *keep = context;
+    setpriority(PRIO_PROCESS, 0, NICENESS); /* of this thread alone, on Linux */
+    pthread_mutex_lock(&keep->lock);
+    for (struct order *order; (order = take_first(keep)) || !keep->closed;) {
+        if (!order) {
+            pthread_cond_wait(&keep->changed, &keep->lock);
+            continue;
+        }
+        pthread_mutex_unlock(&keep->lock);
+        if (!atomic_load(&keep->abandoned))
+            carry_out(keep, order);
+        order_destroy(order);
+        pthread_mutex_lock(&keep->lock);
+        keep->left--;
+        pthread_cond_broadcast(&keep->changed);
+        pthread_mutex_unlock(&keep->lock);
+        keep->on_change(keep->context);
+        pthread_mutex_lock(&keep->lock);
+    }
+    pthread_mutex_unlock(&keep->lock);
+    return NULL;
+}
+
+struct keep *keep_create(const struct engine_keeper *keeper, void (*on_change)(void *context), void *context,
+                         struct error *error)
+{
+    struct keep *keep = calloc(1, sizeof(*keep));
+    if (!keep) {
+        error_set(error, ERROR_OUT_OF_MEMORY, "engine", "no memory");
+        return NULL;
+    }
+    keep->keeper = keeper;
+    keep->on_change = on_change;
+    keep->context = context;
+    keep->end = &keep->first;
+    pthread_condattr_t monotonic;
+    pthread_condattr_init(&monotonic);
+    pthread_condattr_setclock(&monotonic, CLOCK_MONOTONIC);
+    pthread_mutex_init(&keep->lock, NULL);
+    pthread_cond_init(&keep->changed, &monotonic);
+    pthread_condattr_destroy(&monotonic);
+    keep->started = pthread_create(&keep->thread, NULL, run_thread, keep) == 0;
+    if (keep->started) {
+        pthread_setname_np(keep->thread, "keep");
+        return keep;
+    }
+    error_set(error, ERROR_OUT_OF_MEMORY, "engine", "could not start a thread");
+    keep_destroy(keep, 0);
+    return NULL;
+}
+
+static void wait_for_all(struct keep *keep, uint64_t within_ns)
+{
+    uint64_t end_ns = clock_now_ns() + within_ns;
+    const struct timespec end = {.tv_sec = (time_t)(end_ns / 1000000000u), .tv_nsec = (long)(end_ns % 1000000000u)};
+    while (keep->left && pthread_cond_timedwait(&keep->changed, &keep->lock, &end) == 0)
+        continue;
+}
+
+void keep_destroy(struct keep *keep, uint64_t within_ns)
+{
+    if (!keep)
+        return;
+    pthread_mutex_lock(&keep->lock);
+    keep->closed = true;
+    pthread_cond_broadcast(&keep->changed);
+    if (keep->started)
+        wait_for_all(keep, within_ns);
+    pthread_mutex_unlock(&keep->lock);
+    atomic_store(&keep->abandoned, true);
+    if (keep->started)
+        pthread_join(keep->thread, NULL);
+    for (struct keep_save *save; (save = keep_take_read(keep));)
+        free(save);
+    pthread_cond_destroy(&keep->changed);
+    pthread_mutex_destroy(&keep->lock);
+    free(keep);
+}
+
+/* Takes the save over. */
+static bool submit(struct keep *keep, struct keep_save *save, uint64_t principal, const char *name)
+{
+    struct order *order = calloc(1, sizeof(*order));
+    if (!order) {
+        free(save);
+        return false;
+    }
+    order->save = save;
+    order->principal = principal;
+    memcpy(order->name, name, strnlen(name, SCENE_NAME_MAX));
+    pthread_mutex_lock(&keep->lock);
+    *keep->end = order;
+    keep->end = &order->next;
+    keep->left++;
+    pthread_cond_broadcast(&keep->changed);
+    pthread_mutex_unlock(&keep->lock);
+    return true;
+}
+
+bool keep_save(struct keep *keep, const struct scene *scene, uint64_t principal, enum sharing sharing)
+{
+    struct keep_save *save = calloc(1, sizeof(*save));
+    if (!save)
+        return false;
+    *save = (struct keep_save){.scene = scene, .principal = principal, .sharing = sharing};
+    return submit(keep, save, principal, "");
+}
+
+bool keep_forget(struct keep *keep, uint64_t principal, const char *name)
+{
+    return submit(keep, NULL, principal, name);
+}
+
+struct keep_save *keep_take_read(struct keep *keep)
+{
+    pthread_mutex_lock(&keep->lock);
+    struct keep_save *save = keep->read_first;
+    if (save)
+        keep->read_first = save->next;
+    pthread_mutex_unlock(&keep->lock);
+    return save;
+}
+
+bool keep_is_idle(struct keep *keep)
+{
+    pthread_mutex_lock(&keep->lock);
+    bool idle = !keep->left;
+    pthread_mutex_unlock(&keep->lock);
+    return idle;
+}

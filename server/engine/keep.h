@@ -1,0 +1,35 @@
+/* SPDX-License-Identifier: MIT */
+/* The thread on which a keeper reads and writes scenes, in the order in which it is asked. The caller keeps changes
+ * away from a scene until it has been read; frames may go on. */
+#ifndef FARLIGHT_ENGINE_KEEP_H
+#define FARLIGHT_ENGINE_KEEP_H
+
+#include "base/error.h"
+#include "engine/engine.h"
+
+struct keep;
+
+/* A scene that is to be read, and then written. */
+struct keep_save {
+    struct keep_save *next; /* for the thread */
+    const struct scene *scene;
+    uint64_t principal;
+    enum sharing sharing;
+    uint64_t read_ns; /* how long it took */
+};
+
+/* `on_change` is called on the thread when a scene was read, and when an order was carried out. NULL and *error: no
+ * memory, or no thread. */
+struct keep *keep_create(const struct engine_keeper *keeper, void (*on_change)(void *context), void *context,
+                         struct error *error);
+/* Goes on for at most that long with what is to be done, and leaves the rest. Accepts NULL. */
+void keep_destroy(struct keep *keep, uint64_t within_ns);
+
+bool keep_is_idle(struct keep *keep); /* a scene that is to be saved now is read at once */
+/* False: no memory. */
+bool keep_save(struct keep *keep, const struct scene *scene, uint64_t principal, enum sharing sharing);
+bool keep_forget(struct keep *keep, uint64_t principal, const char *name);
+/* A scene that was read, to be freed; NULL: none. */
+struct keep_save *keep_take_read(struct keep *keep);
+
+#endif

@@ -1,0 +1,91 @@
+/* SPDX-License-Identifier: MIT */
+/* Scenes that others than their client may attach to, on their way to the keeper. */
+#include "engine/engine_private.h"
+
+#include "base/clock.h"
+
+#include <stdlib.h>
+
+/* Between two times that a scene is kept: at least this, and this many times as long as its changes waited. */
+#define PAUSE_NS UINT64_C(1000000000)
+#define PAUSE_OF_READ 20
+/* At the end. */
+#define STOP_NS UINT64_C(200000000)
+
+static bool has_news(const struct engine_scene *scene)
+{
+    return scene->sharing != SHARING_PRIVATE && !scene->commit && scene->known.revision > scene->kept_revision;
+}
+
+static void keep_scene(struct engine *engine, struct engine_scene *scene)
+{
+    uint64_t now_ns = clock_now_ns();
+    scene->keep_due_ns = now_ns + PAUSE_NS;
+    if (!keep_save(engine->keep, scene->scene, scene->principal, scene->sharing))
+        return; /* later, perhaps */
+    scene->kept_revision = scene->known.revision;
+    engine->read_scene = scene;
+}
+
+/* The scene that was read may change again, and end. */
+static void finish_reading(struct engine *engine)
+{
+    struct keep_save *save = keep_take_read(engine->keep);
+    if (!save)
+        return;
+    struct engine_scene *scene = engine->read_scene;
+    uint64_t pause_ns = save->read_ns * PAUSE_OF_READ;
+    engine->read_scene = NULL;
+    free(save);
+    if (engine->read_scene_ended) {
+        engine->read_scene_ended = false;
+        engine_scene_free(engine, scene);
+        return;
+    }
+    scene->keep_due_ns = clock_now_ns() + (pause_ns > PAUSE_NS ? pause_ns : PAUSE_NS);
+    engine_run_waiting(engine, scene);
+}
+
+uint64_t engine_keep_scenes(struct engine *engine)
+{
+    if (!engine->keep)
+        return UINT64_MAX;
+    finish_reading(engine);
+    if (engine->read_scene || !keep_is_idle(engine->keep))
+        return UINT64_MAX; /* the end of that wakes the thread */
+    struct engine_scene *first = NULL;
+    uint64_t now_ns = clock_now_ns();
+    for (struct engine_scene *scene = engine->scenes; scene; scene = scene->next) {
+        if (!has_news(scene))
+            continue;
+        if (!scene->keep_due_ns)
+            scene->keep_due_ns = now_ns + PAUSE_NS; /* who loads a scene goes on, perhaps */
+        if (!first || scene->keep_due_ns < first->keep_due_ns)
+            first = scene;
+    }
+    if (!first)
+        return UINT64_MAX;
+    if (first->keep_due_ns > now_ns)
+        return first->keep_due_ns - now_ns;
+    keep_scene(engine, first);
+    return UINT64_MAX;
+}
+
+void engine_forget_kept(struct engine *engine, const struct engine_scene *scene)
+{
+    if (engine->keep && scene->kept_revision)
+        keep_forget(engine->keep, scene->principal, scene->scene->name);
+}
+
+void engine_stop_keeping(struct engine *engine)
+{
+    for (struct engine_scene *scene = engine->scenes; scene && engine->keep; scene = scene->next) {
+        if (has_news(scene) && engine->read_scene != scene)
+            keep_save(engine->keep, scene->scene, scene->principal, scene->sharing);
+    }
+    keep_destroy(engine->keep, STOP_NS);
+    engine->keep = NULL;
+    if (engine->read_scene_ended)
+        engine_scene_free(engine, engine->read_scene);
+    engine->read_scene = NULL;
+}

@@ -1,0 +1,17 @@
+/* SPDX-License-Identifier: MIT */
+/* Kept and shared scenes on disk: written while they change, removed when they end, and restored at the start. */
+#ifndef FARLIGHT_SESSION_KEEPER_H
+#define FARLIGHT_SESSION_KEEPER_H
+
+#include "session/hub.h"
+#include "store/store.h"
+
+/* For the engine's thread of that kind; `store` outlives the engine. */
+struct engine_keeper keeper_port(struct store *store);
+
+/* Makes the scenes of the store again, as their users' and keys' lingering ones, before any client is served. What
+ * cannot be restored is removed, and the log says so. Ends early where SIGTERM or SIGINT waits; the rest stays
+ * on the disk. */
+void keeper_restore(struct store *store, struct hub *hub);
+
+#endif

@@ -1,0 +1,32 @@
+/* SPDX-License-Identifier: MIT */
+/* A scene as bytes: the messages that a client would send to make it, with names and sharing before them. Blobs are
+ * named by their hashes and lie beside. */
+#ifndef FARLIGHT_SESSION_SCENE_RECORD_H
+#define FARLIGHT_SESSION_SCENE_RECORD_H
+
+#include "scene/scene.h"
+#include "session/edits.h"
+#include "store/store.h"
+
+#include <stdatomic.h>
+
+/* Fills content and blobs of the record. False: out of memory, or *abandoned was set; the record is to be finished
+ * either way. */
+bool scene_record_write(struct store_record *record, const struct scene *scene, enum sharing sharing,
+                        const atomic_bool *abandoned);
+
+/* What scene_record_read() finds. */
+struct scene_record {
+    uint64_t revision;
+    enum sharing sharing; /* kept or shared */
+    char name[SCENE_NAME_MAX + 1];
+    struct scene_edit *edits; /* owned */
+    size_t edit_count;
+};
+/* Any bytes may be given: they are checked as a client's messages are. False and *error: they are not what was
+ * written. */
+bool scene_record_read(struct scene_record *record, const uint8_t *content, size_t content_bytes,
+                       const struct edit_source *source, struct error *error);
+void scene_record_finish(struct scene_record *record);
+
+#endif

@@ -1,0 +1,136 @@
+/* SPDX-License-Identifier: MIT */
+#include "store/files.h"
+
+#include <dirent.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+/* Between two looks at whether the work was abandoned. */
+#define CHUNK_BYTES ((size_t)4 << 20)
+
+static bool is_own_alone(int folder, const char *path, struct error *error)
+{
+    struct stat about;
+    if (fstat(folder, &about) < 0)
+        return error_set(error, ERROR_INTERNAL, path, "%s", strerror(errno));
+    if (about.st_uid == geteuid() && !(about.st_mode & (S_IRWXG | S_IRWXO)))
+        return true;
+    error_set(error, ERROR_DENIED, path, "others may enter the folder, or it belongs to another user");
+    return error_remedy(error, "give it to the daemon's user, with mode 0700");
+}
+
+int store_folder_open(int at, const char *path, struct error *error)
+{
+    if (mkdirat(at, path, S_IRWXU) < 0 && errno != EEXIST) {
+        error_set(error, ERROR_INVALID, path, "the folder cannot be made: %s", strerror(errno));
+        return -1;
+    }
+    int folder = openat(at, path, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
+    if (folder < 0) {
+        error_set(error, ERROR_INVALID, path, "the folder cannot be opened: %s", strerror(errno));
+        return -1;
+    }
+    if (is_own_alone(folder, path, error))
+        return folder;
+    close(folder);
+    return -1;
+}
+
+static bool write_part(int fd, const struct store_file_part *part, const atomic_bool *abandoned, struct error *error)
+{
+    const char *at = part->data;
+    for (size_t left_bytes = part->size_bytes; left_bytes;) {
+        if (abandoned && atomic_load(abandoned))
+            return error_set(error, ERROR_CANCELLED, "", "the daemon stops");
+        ssize_t written_bytes = write(fd, at, left_bytes < CHUNK_BYTES ? left_bytes : CHUNK_BYTES);
+        if (written_bytes < 0 && errno == EINTR)
+            continue;
+        if (written_bytes < 0)
+            return error_set(error, ERROR_INTERNAL, "", "%s", strerror(errno));
+        at += written_bytes;
+        left_bytes -= (size_t)written_bytes;
+    }
+    return true;
+}
+
+bool store_file_write(int folder, const char *name, const struct store_file_part *parts, size_t part_count,
+                 const atomic_bool *abandoned, struct error *error)
+{
+    char new_name[NAME_MAX + 1];
+    snprintf(new_name, sizeof(new_name), "%s" STORE_FILE_NEW_SUFFIX, name);
+    unlinkat(folder, new_name, 0);
+    int fd = openat(folder, new_name, O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, S_IRUSR | S_IWUSR);
+    if (fd < 0)
+        return error_set(error, ERROR_INTERNAL, name, "%s", strerror(errno));
+    bool written = true;
+    for (size_t i = 0; i < part_count && written; i++)
+        written = write_part(fd, &parts[i], abandoned, error);
+    if (written && fdatasync(fd) < 0)
+        written = error_set(error, ERROR_INTERNAL, name, "%s", strerror(errno));
+    if (close(fd) < 0 && written)
+        written = error_set(error, ERROR_INTERNAL, name, "%s", strerror(errno));
+    if (written && renameat(folder, new_name, folder, name) < 0)
+        written = error_set(error, ERROR_INTERNAL, name, "%s", strerror(errno));
+    if (!written)
+        unlinkat(folder, new_name, 0);
+    return written;
+}
+
+bool store_file_size(int folder, const char *name, uint64_t *size_bytes)
+{
+    struct stat about;
+    if (fstatat(folder, name, &about, AT_SYMLINK_NOFOLLOW) < 0 || !S_ISREG(about.st_mode))
+        return false;
+    *size_bytes = (uint64_t)about.st_size;
+    return true;
+}
+
+static bool read_all(int fd, char *data, size_t size_bytes)
+{
+    while (size_bytes) {
+        ssize_t read_bytes = read(fd, data, size_bytes);
+        if (read_bytes < 0 && errno == EINTR)
+            continue;
+        if (read_bytes <= 0)
+            return false;
+        data += read_bytes;
+        size_bytes -= (size_t)read_bytes;
+    }
+    char beyond;
+    return read(fd, &beyond, 1) == 0;
+}
+
+bool store_file_read(int folder, const char *name, void *data, size_t size_bytes, struct error *error)
+{
+    /* Nobody waits for a pipe that was put there. */
+    int fd = openat(folder, name, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
+    if (fd < 0)
+        return error_set(error, ERROR_INTERNAL, name, "%s", strerror(errno));
+    bool complete = read_all(fd, data, size_bytes);
+    close(fd);
+    return complete || error_set(error, ERROR_INTERNAL, name, "the file has not the %zu bytes that it should have",
+                                 size_bytes);
+}
+
+bool store_folder_each(int folder, void (*each)(void *context, const char *name), void *context, struct error *error)
+{
+    int copy = openat(folder, ".", O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    DIR *entries = copy < 0 ? NULL : fdopendir(copy);
+    if (!entries) {
+        if (copy >= 0)
+            close(copy);
+        return error_set(error, ERROR_INTERNAL, "", "the folder cannot be read: %s", strerror(errno));
+    }
+    for (const struct dirent *entry; (entry = readdir(entries));) {
+        if (strcmp(entry->d_name, ".") != 0 && strcmp(entry->d_name, "..") != 0)
+            each(context, entry->d_name);
+    }
+    closedir(entries);
+    return true;
+}

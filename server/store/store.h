@@ -1,0 +1,53 @@
+/* SPDX-License-Identifier: MIT */
+/* Records and their blobs in a folder, for the next process. Any thread; a call waits for the one before. */
+#ifndef FARLIGHT_STORE_STORE_H
+#define FARLIGHT_STORE_STORE_H
+
+#include "base/blob.h"
+#include "base/error.h"
+
+#include <stdatomic.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#define STORE_NAME_BYTES 16
+
+struct store;
+
+struct store_record {
+    uint8_t name[STORE_NAME_BYTES]; /* one of the same name takes its place */
+    uint64_t owner;                 /* owners share the store: who has most gives way first */
+    uint8_t *content;               /* owned, malloc'ed */
+    size_t content_bytes;
+    struct blob **blobs; /* owned: an array of references, each blob once or more */
+    size_t blob_count;
+};
+void store_record_finish(struct store_record *record); /* releases what it holds, not the struct */
+
+/* Opens the folder, and makes it where its parent is there. Records that cannot be used are removed, and the log
+ * says so. NULL and *error: it is not the user's own, another process uses it, or it cannot be read. */
+struct store *store_open(const char *folder, uint64_t limit_bytes, struct error *error);
+void store_close(struct store *store); /* accepts NULL */
+
+/* Writes the record and those of its blobs that are not there. False and *error: it is greater than the limit, the
+ * disk fails, or *abandoned was set on the way (ERROR_CANCELLED); what was there under the name is there still
+ * but for the first reason. */
+bool store_put(struct store *store, const struct store_record *record, const atomic_bool *abandoned,
+               struct error *error);
+/* Removes a record, with the blobs that no other one names. */
+void store_remove(struct store *store, const uint8_t name[STORE_NAME_BYTES]);
+
+/* The names of all records, from the first written to the last: an array to free(). NULL: out of memory. */
+uint8_t (*store_names(struct store *store, size_t *count))[STORE_NAME_BYTES];
+/* Reads a record without its blobs, and marks it: if the process ends before store_tried(), the next one will not
+ * have it. False and *error: it is not there, or not what was written. */
+bool store_try(struct store *store, const uint8_t name[STORE_NAME_BYTES], struct store_record *record,
+               struct error *error);
+void store_tried(struct store *store, const uint8_t name[STORE_NAME_BYTES]);
+/* A blob, verified; the reference is the caller's. NULL and *error: it is not there, or not what was written. */
+struct blob *store_read_blob(struct store *store, const uint8_t hash[BLOB_HASH_BYTES], uint64_t size_bytes,
+                             struct error *error);
+uint64_t store_bytes(struct store *store); /* that are on the disk */
+
+#endif

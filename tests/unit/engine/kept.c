@@ -1,0 +1,212 @@
+/* SPDX-License-Identifier: MIT */
+/* Scenes on their way to a keeper, which the test controls. */
+#include "tests/unit/engine/engine_fake.h"
+
+#include "tests/harness/test.h"
+
+#include <pthread.h>
+#include <stdio.h>
+
+/* What the keeper was asked for, in order: "read a 1, write a 1, forget a". */
+static struct {
+    pthread_mutex_t lock;
+    char told[1024];
+    atomic_bool holds_reads; /* none ends but those that are abandoned */
+} keeper = {.lock = PTHREAD_MUTEX_INITIALIZER};
+
+static void tell(const char *what, const char *name, uint64_t revision)
+{
+    pthread_mutex_lock(&keeper.lock);
+    size_t used = strlen(keeper.told);
+    snprintf(keeper.told + used, sizeof(keeper.told) - used, revision ? "%s %s %d, " : "%s %s, ", what, name,
+             (int)revision);
+    pthread_mutex_unlock(&keeper.lock);
+}
+
+static void *keeper_read(void *context, const struct scene *scene, uint64_t principal, enum sharing sharing,
+                         const atomic_bool *abandoned)
+{
+    (void)context;
+    (void)principal;
+    (void)sharing;
+    tell("read", scene->name, scene->revision);
+    while (atomic_load(&keeper.holds_reads) && !atomic_load(abandoned))
+        usleep(1000);
+    return strdup(scene->name);
+}
+
+static void keeper_write(void *context, void *record, const atomic_bool *abandoned)
+{
+    (void)context;
+    (void)abandoned;
+    tell("write", record, 0);
+    free(record);
+}
+
+static void keeper_forget(void *context, uint64_t principal, const char *name)
+{
+    (void)context;
+    (void)principal;
+    tell("forget", name, 0);
+}
+
+static const struct engine_keeper port = {.read = keeper_read, .write = keeper_write, .forget = keeper_forget};
+
+static struct engine *start_keeping(uint64_t linger_ms)
+{
+    keeper.told[0] = '\0';
+    atomic_store(&keeper.holds_reads, false);
+    return start((struct engine_options){.keeper = &port, .limits = {.scene_linger_ms = linger_ms}});
+}
+
+static void hold_reads(bool held)
+{
+    atomic_store(&keeper.holds_reads, held);
+}
+
+static bool was_told(const char *what)
+{
+    pthread_mutex_lock(&keeper.lock);
+    bool told = strstr(keeper.told, what) != NULL;
+    pthread_mutex_unlock(&keeper.lock);
+    return told;
+}
+
+static void wait_for(const char *what)
+{
+    for (int i = 0; i < 6000; i++) {
+        if (was_told(what))
+            return;
+        usleep(10000);
+    }
+    fail_msg("no \"%s\" in \"%s\"", what, keeper.told);
+}
+
+static struct engine_command *open_command(uint32_t request, const char *name, enum sharing sharing)
+{
+    struct engine_command *made = command(ENGINE_SCENE_OPEN, 1, request);
+    made->scene = request;
+    made->sharing = sharing;
+    made->principal = 100;
+    strcpy(made->name, name);
+    return made;
+}
+
+static void open_named(struct engine *engine, uint32_t request, const char *name, enum sharing sharing)
+{
+    submit(engine, open_command(request, name, sharing));
+    expect_done(engine, 1, request);
+}
+
+static void change(struct engine *engine, uint32_t request, uint32_t scene)
+{
+    submit_commit(engine, 1, request, scene);
+    expect_done(engine, 1, request);
+}
+
+TEST(attachable_scenes_are_kept_and_forgotten_with_their_end)
+{
+    struct engine *engine = start_keeping(1);
+    open_named(engine, 1, "private", SHARING_PRIVATE);
+    open_named(engine, 2, "a", SHARING_KEPT);
+    open_named(engine, 3, "empty", SHARING_SHARED);
+    change(engine, 10, 1);
+    change(engine, 11, 2);
+    wait_for("read a 1, write a, ");
+    change(engine, 12, 2);
+    wait_for("read a 2, write a, ");
+    submit(engine, command(ENGINE_CLIENT_GONE, 1, 0));
+    wait_for("write a, forget a, ");
+    assert_false(was_told("private"));
+    assert_false(was_told("empty"));
+    engine_destroy(engine);
+}
+
+TEST(changes_wait_while_a_scene_is_read_and_frames_go_on)
+{
+    struct engine *engine = start_keeping(1000);
+    open_named(engine, 1, "a", SHARING_SHARED);
+    open_named(engine, 2, "b", SHARING_PRIVATE);
+    hold_reads(true);
+    change(engine, 10, 1);
+    wait_for("read a 1");
+    submit_commit(engine, 1, 11, 1);
+    change(engine, 12, 2); /* of another scene */
+    assert_null(event_within(engine, 100));
+    hold_reads(false);
+    assert_int_equal(expect_done(engine, 1, 11), 2);
+    wait_for("read a 2");
+    hold_reads(true);
+    change(engine, 13, 1);
+    wait_for("read a 3");
+    struct engine_command *job = render(1, 14, 0, 0);
+    job->scene = 1;
+    submit(engine, job);
+    engine_event_destroy(expect_frame(engine, 1, 14, 0));
+    expect_done(engine, 1, 14);
+    hold_reads(false);
+    engine_destroy(engine);
+}
+
+TEST(a_scene_may_end_while_it_is_read)
+{
+    struct engine *engine = start_keeping(0);
+    open_named(engine, 1, "a", SHARING_SHARED);
+    hold_reads(true);
+    change(engine, 10, 1);
+    wait_for("read a 1");
+    submit(engine, command(ENGINE_CLIENT_GONE, 1, 0));
+    engine_event_destroy(expect_event(engine, ENGINE_SCENE_ENDED, 0, 0));
+    engine_event_destroy(expect_event(engine, ENGINE_CLIENT_FORGOTTEN, 1, 0));
+    hold_reads(false);
+    wait_for("write a, forget a, ");
+    engine_destroy(engine);
+}
+
+TEST(what_has_just_changed_is_kept_when_the_engine_ends)
+{
+    struct engine *engine = start_keeping(1000);
+    open_named(engine, 1, "a", SHARING_SHARED);
+    change(engine, 10, 1);
+    engine_destroy(engine);
+    assert_string_equal(keeper.told, "read a 1, write a, "); /* and not forgotten */
+}
+
+TEST(the_engine_ends_although_the_keeper_does_not)
+{
+    struct engine *engine = start_keeping(1000);
+    open_named(engine, 1, "a", SHARING_SHARED);
+    hold_reads(true);
+    change(engine, 10, 1);
+    wait_for("read a 1");
+    uint64_t start_ns = clock_now_ns();
+    engine_destroy(engine);
+    /* 0.2 s are given to it; the rest is for a busy machine. */
+    assert_true(clock_now_ns() - start_ns < 2000000000u);
+}
+
+TEST(a_restored_scene_has_its_revision_and_is_not_written_again)
+{
+    struct engine *engine = start_keeping(1000);
+    struct engine_command *open = open_command(1, "a", SHARING_SHARED);
+    open->kept_revision = 7;
+    submit(engine, open);
+    expect_done(engine, 1, 1);
+    submit_commit(engine, 1, 10, 1);
+    assert_int_equal(expect_done(engine, 1, 10), 7);
+    engine_destroy(engine);
+    assert_string_equal(keeper.told, "");
+}
+
+TEST(a_scene_that_could_not_be_restored_does_not_linger)
+{
+    struct engine *engine = start_keeping(600000);
+    struct engine_command *open = open_command(1, "a", SHARING_SHARED);
+    open->kept_revision = 7;
+    submit(engine, open);
+    expect_done(engine, 1, 1);
+    submit(engine, command(ENGINE_CLIENT_GONE, 1, 0));
+    engine_event_destroy(expect_event(engine, ENGINE_SCENE_ENDED, 0, 0));
+    wait_for("forget a, ");
+    engine_destroy(engine);
+}
