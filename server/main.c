@@ -219,8 +219,7 @@ static bool serve(struct serving *serving, struct error *error)
     struct engine_options engine_options;
     struct hub_options options;
     if (!config_engine(config, &engine_options, error) || !config_hub(config, &options, error) ||
-        (serving->listens &&
-         !begin_to_listen(serving->daemon, config, config->insecure || options.keys, error)))
+        (serving->listens && !begin_to_listen(serving->daemon, config, config->insecure || options.keys, error)))
         return false;
     /* Scenes of a daemon that serves one client alone end with that client. */
     if (serving->listens && config->store[0] &&

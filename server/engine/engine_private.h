@@ -58,6 +58,7 @@ struct engine_scene {
     struct engine_scene *next;           /* of the engine's, in the order of their opening */
     struct engine_reference *references; /* NULL: it has no holder, and ends or lingers */
     uint64_t left_ns;                    /* since when it has had no holder */
+    bool is_restored;                    /* and has had none since: the last process had that many */
     enum sharing sharing;
     uint64_t principal; /* the owner that opened it */
     struct scene *scene;
@@ -72,7 +73,7 @@ struct engine_scene {
     struct engine_command **waiting; /* owned: commands for when no frame is in progress, in order */
     size_t waiting_count;
     uint64_t kept_revision, keep_due_ns; /* that the keeper has, and when it may have the next */
-    uint64_t apply_start_ns, apply_ns; /* of the commits since the last frame */
+    uint64_t apply_start_ns, apply_ns;   /* of the commits since the last frame */
     /* For stats, as of that revision: a large scene is not traversed for each request. */
     struct engine_scene_stat *stat; /* while it is filled in */
     uint64_t counted_revision, triangles, spheres;
@@ -146,12 +147,12 @@ struct engine {
     uint64_t device_bytes_limit;
     uint64_t rebuilds_ns[DEVICE_REBUILDS_MAX]; /* times of its reopenings, a ring */
     unsigned rebuilds;
-    struct hashmap clients;      /* struct engine_client *, by number */
-    struct hashmap owners;       /* struct engine_owner *, by number */
-    struct engine_scene *scenes; /* owned */
+    struct hashmap clients;          /* struct engine_client *, by number */
+    struct hashmap owners;           /* struct engine_owner *, by number */
+    struct engine_scene *scenes;     /* owned */
     struct engine_scene *read_scene; /* that the keeper reads; no transaction changes it. NULL: none */
     bool read_scene_ended;           /* it is in no list, and owned here */
-    struct job **jobs;           /* owned, in the order of their start */
+    struct job **jobs;               /* owned, in the order of their start */
     size_t job_count, job_capacity;
     struct scheduler scheduler;
     struct schedule_entry *entries; /* owned; as many entries as there may be jobs */
@@ -219,7 +220,8 @@ bool engine_scene_may_change(const struct engine *engine, const struct engine_sc
 void engine_scene_free(struct engine *engine, struct engine_scene *scene);
 
 /* kept.c: scenes that outlive the process; nothing happens without a keeper. */
-/* Gives the keeper what has changed. Returns the time until it may have more, UINT64_MAX: nothing waits for that. */
+/* Gives the keeper what has changed. Returns the time until it may have more, UINT64_MAX: nothing waits for that.
+ */
 uint64_t engine_keep_scenes(struct engine *engine);
 void engine_forget_kept(struct engine *engine, const struct engine_scene *scene);
 /* At the end of the thread: what is not kept yet, as far as there is time. */

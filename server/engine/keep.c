@@ -127,7 +127,8 @@ struct keep *keep_create(const struct engine_keeper *keeper, void (*on_change)(v
 static void wait_for_all(struct keep *keep, uint64_t within_ns)
 {
     uint64_t end_ns = clock_now_ns() + within_ns;
-    const struct timespec end = {.tv_sec = (time_t)(end_ns / 1000000000u), .tv_nsec = (long)(end_ns % 1000000000u)};
+    const struct timespec end = {.tv_sec = (time_t)(end_ns / 1000000000u),
+                                 .tv_nsec = (long)(end_ns % 1000000000u)};
     while (keep->left && pthread_cond_timedwait(&keep->changed, &keep->lock, &end) == 0)
         continue;
 }

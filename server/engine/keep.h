@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The thread on which a keeper reads and writes scenes, in the order in which it is asked. The caller keeps changes
- * away from a scene until it has been read; frames may go on. */
+/* The thread on which a keeper reads and writes scenes, in the order in which it is asked. The caller keeps
+ * changes away from a scene until it has been read; frames may go on. */
 #ifndef FARLIGHT_ENGINE_KEEP_H
 #define FARLIGHT_ENGINE_KEEP_H
 
@@ -18,8 +18,8 @@ struct keep_save {
     uint64_t read_ns; /* how long it took */
 };
 
-/* `on_change` is called on the thread when a scene was read, and when an order was carried out. NULL and *error: no
- * memory, or no thread. */
+/* `on_change` is called on the thread when a scene was read, and when an order was carried out. NULL and *error:
+ * no memory, or no thread. */
 struct keep *keep_create(const struct engine_keeper *keeper, void (*on_change)(void *context), void *context,
                          struct error *error);
 /* Goes on for at most that long with what is to be done, and leaves the rest. Accepts NULL. */

@@ -73,7 +73,8 @@ uint64_t engine_keep_scenes(struct engine *engine)
 
 void engine_forget_kept(struct engine *engine, const struct engine_scene *scene)
 {
-    if (engine->keep && scene->kept_revision)
+    /* What could not be restored is for the keeper to decide. */
+    if (engine->keep && scene->kept_revision && scene->known.revision >= scene->kept_revision)
         keep_forget(engine->keep, scene->principal, scene->scene->name);
 }
 

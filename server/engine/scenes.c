@@ -71,6 +71,7 @@ static bool reference_add(struct engine *engine, struct engine_scene *scene, con
     while (*place)
         place = &(*place)->next;
     *place = reference;
+    scene->is_restored = false;
     return true;
 }
 
@@ -170,7 +171,8 @@ static void scene_end(struct engine *engine, struct engine_scene *scene)
         engine_post(engine, event_create(ENGINE_SCENE_ENDED, 0, 0));
 }
 
-/* The end of a scene without a holder; 0: now. Neither an empty scene lingers, nor one that could not be restored. */
+/* The end of a scene without a holder; 0: now. Neither an empty scene lingers, nor one that could not be restored.
+ */
 static uint64_t lingers_until_ns(const struct engine *engine, const struct engine_scene *scene)
 {
     bool is_empty = !scene->known.revision || scene->known.revision < scene->kept_revision;
@@ -200,17 +202,19 @@ static bool goes_before(const struct engine *engine, const struct engine_scene *
     return a_count != b_count ? a_count > b_count : a->left_ns < b->left_ns;
 }
 
-static struct engine_scene *first_to_go(const struct engine *engine)
+/* NULL: there is none. */
+static struct engine_scene *first_to_go(const struct engine *engine, bool restored_too)
 {
     struct engine_scene *first = NULL;
     for (struct engine_scene *scene = engine->scenes; scene; scene = scene->next) {
-        if (is_left(scene) && (!first || goes_before(engine, scene, first)))
+        if (is_left(scene) && (restored_too || !scene->is_restored) &&
+            (!first || goes_before(engine, scene, first)))
             first = scene;
     }
     return first;
 }
 
-/* Ends those whose time has passed. Of the rest: how many, and when the next one ends. */
+/* Ends those whose time has passed. Of the rest: how many count against the limit, and when the next one ends. */
 static size_t end_overdue(struct engine *engine, uint64_t *wait_ns)
 {
     uint64_t now_ns = clock_now_ns();
@@ -225,7 +229,7 @@ static size_t end_overdue(struct engine *engine, uint64_t *wait_ns)
             scene_end(engine, scene);
             continue;
         }
-        count++;
+        count += !scene->is_restored;
         *wait_ns = until_ns - now_ns < *wait_ns ? until_ns - now_ns : *wait_ns;
     }
     return count;
@@ -235,13 +239,13 @@ uint64_t engine_reap_scenes(struct engine *engine)
 {
     uint64_t wait_ns;
     while (end_overdue(engine, &wait_ns) > engine->options.limits.lingering_scenes)
-        scene_end(engine, first_to_go(engine));
+        scene_end(engine, first_to_go(engine, false));
     return wait_ns;
 }
 
 void engine_end_left_scenes(struct engine *engine)
 {
-    for (struct engine_scene *scene; (scene = first_to_go(engine));)
+    for (struct engine_scene *scene; (scene = first_to_go(engine, true));)
         scene_end(engine, scene);
 }
 
@@ -253,7 +257,7 @@ static struct engine_scene *first_to_give_way(const struct engine *engine, uint6
         if (is_left(scene) && scene->principal == principal && (!own || scene->left_ns < own->left_ns))
             own = scene;
     }
-    return own ? own : first_to_go(engine);
+    return own ? own : first_to_go(engine, true);
 }
 
 uint64_t engine_left_table_bytes(const struct engine *engine)
@@ -365,6 +369,7 @@ static bool scene_add(struct engine *engine, const struct engine_command *comman
     if (command->kept_revision) {
         scene->scene->revision = command->kept_revision - 1;
         scene->kept_revision = command->kept_revision;
+        scene->is_restored = true;
     }
     engine_scene_note(engine, scene);
     struct engine_scene **place = &engine->scenes;

@@ -196,8 +196,8 @@ static bool from_environment(const struct edit_source *source, const struct mess
     environment->rotation = message->rotation;
     environment->width = message->width;
     environment->height = message->height;
-    return take_blob(source, message->arrays, message->arrays_count, 0, "set_environment", 0,
-                     &environment->texels, error);
+    return take_blob(source, message->arrays, message->arrays_count, 0, "set_environment", 0, &environment->texels,
+                     error);
 }
 
 static bool from_skin(const struct edit_source *source, const struct message_set_skin *message,

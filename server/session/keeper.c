@@ -68,8 +68,8 @@ static void write_scene(void *context, void *made, const atomic_bool *abandoned)
     struct store_record *record = made;
     struct error error = {0};
     if (!store_put(store, record, abandoned, &error) && log_is_due(record->owner, "not kept"))
-        log_write(LOG_WARNING, "store", "a scene is not kept on disk: %s%s%s", error.text, error.remedy[0] ? "; " : "",
-                  error.remedy);
+        log_write(LOG_WARNING, "store", "a scene is not kept on disk: %s%s%s", error.text,
+                  error.remedy[0] ? "; " : "", error.remedy);
     store_record_finish(record);
     free(record);
 }
@@ -100,7 +100,8 @@ struct restoring {
 static bool is_asked_to_stop(void)
 {
     sigset_t pending;
-    return sigpending(&pending) == 0 && (sigismember(&pending, SIGTERM) == 1 || sigismember(&pending, SIGINT) == 1);
+    return sigpending(&pending) == 0 &&
+           (sigismember(&pending, SIGTERM) == 1 || sigismember(&pending, SIGINT) == 1);
 }
 
 static void tell_manager(struct restoring *restoring)
@@ -229,8 +230,8 @@ static bool restore_one(struct restoring *restoring, const uint8_t name[STORE_NA
     size_t edits = scene.edit_count;
     restored = make_scene(restoring, &scene, error);
     if (restored)
-        log_write(LOG_INFO, "store", "restored scene \"%s\": %zu objects, %" PRIu64 " MiB, %" PRIu64 " ms", scene.name,
-                  edits, restoring->bytes >> 20, (clock_now_ns() - start_ns) / 1000000);
+        log_write(LOG_INFO, "store", "restored scene \"%s\": %zu objects, %" PRIu64 " MiB, %" PRIu64 " ms",
+                  scene.name, edits, restoring->bytes >> 20, (clock_now_ns() - start_ns) / 1000000);
     scene_record_finish(&scene);
     return restored;
 }
@@ -247,9 +248,12 @@ void keeper_restore(struct store *store, struct hub *hub)
         store_tried(store, names[i]);
         if (restored || error.kind == ERROR_CANCELLED)
             continue;
-        log_write(LOG_WARNING, "store", "a scene cannot be restored, and is removed: %s%s%s", error.field,
-                  error.field[0] ? ": " : "", error.text);
-        store_remove(store, names[i]);
+        /* What there is no place for now may have one after another start. */
+        bool stays = error.kind == ERROR_LIMIT || error.kind == ERROR_OUT_OF_MEMORY;
+        log_write(LOG_WARNING, "store", "a scene cannot be restored, and %s: %s%s%s",
+                  stays ? "stays on the disk" : "is removed", error.field, error.field[0] ? ": " : "", error.text);
+        if (!stays)
+            store_remove(store, names[i]);
     }
     free(names);
     blob_store_trim(hub->blobs);

@@ -10,8 +10,8 @@
 struct engine_keeper keeper_port(struct store *store);
 
 /* Makes the scenes of the store again, as their users' and keys' lingering ones, before any client is served. What
- * cannot be restored is removed, and the log says so. Ends early where SIGTERM or SIGINT waits; the rest stays
- * on the disk. */
+ * cannot be restored is removed, or stays on the disk where memory or a limit is the reason, and the log says so.
+ * Ends early where SIGTERM or SIGINT waits; the rest stays on the disk. */
 void keeper_restore(struct store *store, struct hub *hub);
 
 #endif

@@ -7,9 +7,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define SCENE 1u                 /* its number in the messages */
-#define ABANDONED_LOOKS 1024u    /* objects between two looks at whether the work is abandoned */
-#define RANGES_MAX 4096u         /* of a message */
+#define SCENE 1u              /* its number in the messages */
+#define ABANDONED_LOOKS 1024u /* objects between two looks at whether the work is abandoned */
+#define RANGES_MAX 4096u      /* of a message */
 #define WEIGHTS_MAX MESH_TARGETS_MAX
 
 /* ---- writing ----------------------------------------------------------------------------------------- */
@@ -51,8 +51,7 @@ static void put(struct sink *sink, const struct message *message)
     struct store_record *record = sink->record;
     void *content = record->content;
     size_t message_bytes = message_write_bytes(message);
-    if (sink->failed ||
-        !grow(sink, &content, &sink->capacity_bytes, record->content_bytes + message_bytes, 1))
+    if (sink->failed || !grow(sink, &content, &sink->capacity_bytes, record->content_bytes + message_bytes, 1))
         return;
     record->content = content;
     struct writer writer;
@@ -396,7 +395,8 @@ static bool next(struct source *source, struct message *message, struct error *e
 {
     struct frame frame;
     struct decode_error why = {0};
-    enum framing_result result = framing_parse(&frame, source->content, source->left_bytes, MESSAGE_FROM_BOTH, &why);
+    enum framing_result result =
+        framing_parse(&frame, source->content, source->left_bytes, MESSAGE_FROM_BOTH, &why);
     if (result == FRAMING_NEED_MORE)
         return error_set(error, ERROR_INVALID, "", "a message ends too early");
     scratch_init(&source->scratch, source->scratch_data, sizeof(source->scratch_data));

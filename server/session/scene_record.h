@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A scene as bytes: the messages that a client would send to make it, with names and sharing before them. Blobs are
- * named by their hashes and lie beside. */
+/* A scene as bytes: the messages that a client would send to make it, with names and sharing before them. Blobs
+ * are named by their hashes and lie beside. */
 #ifndef FARLIGHT_SESSION_SCENE_RECORD_H
 #define FARLIGHT_SESSION_SCENE_RECORD_H
 

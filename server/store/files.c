@@ -42,7 +42,8 @@ int store_folder_open(int at, const char *path, struct error *error)
     return -1;
 }
 
-static bool write_part(int fd, const struct store_file_part *part, const atomic_bool *abandoned, struct error *error)
+static bool write_part(int fd, const struct store_file_part *part, const atomic_bool *abandoned,
+                       struct error *error)
 {
     const char *at = part->data;
     for (size_t left_bytes = part->size_bytes; left_bytes;) {
@@ -60,7 +61,7 @@ static bool write_part(int fd, const struct store_file_part *part, const atomic_
 }
 
 bool store_file_write(int folder, const char *name, const struct store_file_part *parts, size_t part_count,
-                 const atomic_bool *abandoned, struct error *error)
+                      const atomic_bool *abandoned, struct error *error)
 {
     char new_name[NAME_MAX + 1];
     snprintf(new_name, sizeof(new_name), "%s" STORE_FILE_NEW_SUFFIX, name);
@@ -118,7 +119,8 @@ bool store_file_read(int folder, const char *name, void *data, size_t size_bytes
                                  size_bytes);
 }
 
-bool store_folder_each(int folder, void (*each)(void *context, const char *name), void *context, struct error *error)
+bool store_folder_each(int folder, void (*each)(void *context, const char *name), void *context,
+                       struct error *error)
 {
     int copy = openat(folder, ".", O_RDONLY | O_DIRECTORY | O_CLOEXEC);
     DIR *entries = copy < 0 ? NULL : fdopendir(copy);

@@ -22,12 +22,13 @@ struct store_file_part {
     size_t size_bytes;
 };
 bool store_file_write(int folder, const char *name, const struct store_file_part *parts, size_t part_count,
-                 const atomic_bool *abandoned, struct error *error);
+                      const atomic_bool *abandoned, struct error *error);
 /* Size of a plain file; false: there is none of that name. */
 bool store_file_size(int folder, const char *name, uint64_t *size_bytes);
 /* Reads exactly that many bytes, which are all of the file. */
 bool store_file_read(int folder, const char *name, void *data, size_t size_bytes, struct error *error);
 /* Calls `each` for every entry but "." and ".."; it may remove that entry. */
-bool store_folder_each(int folder, void (*each)(void *context, const char *name), void *context, struct error *error);
+bool store_folder_each(int folder, void (*each)(void *context, const char *name), void *context,
+                       struct error *error);
 
 #endif

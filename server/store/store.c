@@ -330,9 +330,11 @@ static void find_record(void *context, const char *file)
     uint64_t size_bytes;
     struct error error = {0};
     size_t length = strlen(file);
-    bool was_tried = length > strlen(TRYING_SUFFIX) && strcmp(file + length - strlen(TRYING_SUFFIX), TRYING_SUFFIX) == 0;
+    bool was_tried =
+        length > strlen(TRYING_SUFFIX) && strcmp(file + length - strlen(TRYING_SUFFIX), TRYING_SUFFIX) == 0;
     uint8_t *bytes = parse_hex(file, name, sizeof(name)) ? read_whole(store, file, &size_bytes, &error) : NULL;
-    bool found = bytes && parse_record(store, name, bytes, (size_t)size_bytes, &entry) && insert_entry(store, entry);
+    bool found =
+        bytes && parse_record(store, name, bytes, (size_t)size_bytes, &entry) && insert_entry(store, entry);
     free(bytes);
     if (found)
         return;
@@ -500,7 +502,8 @@ static bool write_blobs(struct store *store, const struct store_record *record, 
         if (held->is_there)
             continue;
         print_hex(blob->hash, BLOB_HASH_BYTES, text);
-        if (!store_file_write(store->blobs, text, &(struct store_file_part){blob->data, blob->size_bytes}, 1, abandoned, error))
+        if (!store_file_write(store->blobs, text, &(struct store_file_part){blob->data, blob->size_bytes}, 1,
+                              abandoned, error))
             return false;
         held->is_there = true;
         store->bytes += held->size_bytes;
@@ -530,8 +533,9 @@ static bool write_record(struct store *store, const struct entry *entry, const s
     blob_hash(bytes + MAGIC_BYTES, bytes + SEAL_BYTES, size_bytes - SEAL_BYTES);
     char text[RECORD_TEXT_BYTES];
     print_hex(entry->name, STORE_NAME_BYTES, text);
-    bool written = !writer.failed && store_file_write(store->scenes, text, &(struct store_file_part){bytes, size_bytes}, 1,
-                                                 abandoned, error);
+    bool written =
+        !writer.failed &&
+        store_file_write(store->scenes, text, &(struct store_file_part){bytes, size_bytes}, 1, abandoned, error);
     free(bytes);
     return written;
 }

@@ -184,8 +184,8 @@ TEST(a_scene_of_all_kinds_is_the_same_afterwards)
     /* Structs are compared but for what they own, and where it is compared by the bytes below. */
     const struct scene_material *one = scene_material(scene, 30), *other = scene_material(again, 30);
     assert_memory_equal(one->textures, other->textures, sizeof(one->textures));
-    assert_true(one->ior == other->ior && one->anisotropy_rotation == other->anisotropy_rotation &&
-                other->unlit && other->double_sided && other->alpha_cutoff == 0.375f && other->emission[1] == 5);
+    assert_true(one->ior == other->ior && one->anisotropy_rotation == other->anisotropy_rotation && other->unlit &&
+                other->double_sided && other->alpha_cutoff == 0.375f && other->emission[1] == 5);
     assert_string_equal(other->base.name, "material");
     const struct scene_node *node = scene_node(again, 1);
     assert_true(node->parent == 2 && node->hidden && node->skin == 70 && node->weight_count == 1 &&
