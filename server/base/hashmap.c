@@ -140,6 +140,26 @@ void *hashmap_remove(struct hashmap *map, uint64_t key)
     return value;
 }
 
+bool hashmap_chain(struct hashmap *map, uint64_t key, struct hashmap_link *link)
+{
+    link->next = hashmap_get(map, key);
+    return hashmap_put(map, key, link);
+}
+
+void hashmap_unchain(struct hashmap *map, uint64_t key, struct hashmap_link *link)
+{
+    struct hashmap_link *before = hashmap_get(map, key);
+    if (before == link && link->next) {
+        hashmap_put(map, key, link->next); /* replaces: needs no memory */
+    } else if (before == link) {
+        hashmap_remove(map, key);
+    } else {
+        while (before->next != link)
+            before = before->next;
+        before->next = link->next;
+    }
+}
+
 bool hashmap_next(const struct hashmap *map, size_t *cursor, uint64_t *key, void **value)
 {
     if (*cursor >= map->count)

@@ -22,6 +22,13 @@ void *hashmap_get(const struct hashmap *map, uint64_t key);
 /* Replaces; value not NULL; false: out of memory, or more than 2^31 pairs. */
 bool hashmap_put(struct hashmap *map, uint64_t key, void *value);
 void *hashmap_remove(struct hashmap *map, uint64_t key); /* the value, or NULL */
+/* Several values under one key, for keys that are shorter than what they stand for: each begins with a link, and
+ * the map has the first. */
+struct hashmap_link {
+    struct hashmap_link *next;
+};
+bool hashmap_chain(struct hashmap *map, uint64_t key, struct hashmap_link *link);   /* false: as hashmap_put() */
+void hashmap_unchain(struct hashmap *map, uint64_t key, struct hashmap_link *link); /* it is there */
 /* *cursor starts at 0; false at the end. The map must not change in between. */
 bool hashmap_next(const struct hashmap *map, size_t *cursor, uint64_t *key, void **value);
 

@@ -13,8 +13,9 @@
 
 struct order {
     struct order *next;
-    struct keep_save *save; /* owned; NULL: a scene is to be forgotten */
+    const struct scene *scene; /* NULL: one of this name is to be forgotten */
     uint64_t principal;
+    enum sharing sharing;
     char name[SCENE_NAME_MAX + 1];
 };
 
@@ -26,34 +27,26 @@ struct keep {
     pthread_mutex_t lock; /* of what follows */
     pthread_cond_t changed;
     struct order *first, **end;
-    struct keep_save *read_first;
+    bool was_read; /* and the caller does not know yet */
+    uint64_t read_ns;
     size_t left; /* orders that are not carried out */
     bool closed;
     pthread_t thread;
     bool started; /* the owner's */
 };
 
-static void order_destroy(struct order *order)
-{
-    free(order->save);
-    free(order);
-}
-
-static void carry_out(struct keep *keep, struct order *order)
+static void carry_out(struct keep *keep, const struct order *order)
 {
     const struct engine_keeper *keeper = keep->keeper;
-    struct keep_save *save = order->save;
-    if (!save) {
+    if (!order->scene) {
         keeper->forget(keeper->context, order->principal, order->name);
         return;
     }
     uint64_t start_ns = clock_now_ns();
-    void *record = keeper->read(keeper->context, save->scene, save->principal, save->sharing, &keep->abandoned);
-    save->read_ns = clock_now_ns() - start_ns;
-    order->save = NULL;
+    void *record = keeper->read(keeper->context, order->scene, order->principal, order->sharing, &keep->abandoned);
     pthread_mutex_lock(&keep->lock);
-    save->next = keep->read_first;
-    keep->read_first = save;
+    keep->was_read = true;
+    keep->read_ns = clock_now_ns() - start_ns;
     pthread_mutex_unlock(&keep->lock);
     keep->on_change(keep->context);
     if (record)
@@ -84,7 +77,7 @@ static void *run_thread(void *context)
         pthread_mutex_unlock(&keep->lock);
         if (!atomic_load(&keep->abandoned))
             carry_out(keep, order);
-        order_destroy(order);
+        free(order);
         pthread_mutex_lock(&keep->lock);
         keep->left--;
         pthread_cond_broadcast(&keep->changed);
@@ -146,24 +139,17 @@ void keep_destroy(struct keep *keep, uint64_t within_ns)
     atomic_store(&keep->abandoned, true);
     if (keep->started)
         pthread_join(keep->thread, NULL);
-    for (struct keep_save *save; (save = keep_take_read(keep));)
-        free(save);
     pthread_cond_destroy(&keep->changed);
     pthread_mutex_destroy(&keep->lock);
     free(keep);
 }
 
-/* Takes the save over. */
-static bool submit(struct keep *keep, struct keep_save *save, uint64_t principal, const char *name)
+static bool submit(struct keep *keep, const struct order *what)
 {
-    struct order *order = calloc(1, sizeof(*order));
-    if (!order) {
-        free(save);
+    struct order *order = malloc(sizeof(*order));
+    if (!order)
         return false;
-    }
-    order->save = save;
-    order->principal = principal;
-    memcpy(order->name, name, strnlen(name, SCENE_NAME_MAX));
+    *order = *what;
     pthread_mutex_lock(&keep->lock);
     *keep->end = order;
     keep->end = &order->next;
@@ -175,26 +161,24 @@ static bool submit(struct keep *keep, struct keep_save *save, uint64_t principal
 
 bool keep_save(struct keep *keep, const struct scene *scene, uint64_t principal, enum sharing sharing)
 {
-    struct keep_save *save = calloc(1, sizeof(*save));
-    if (!save)
-        return false;
-    *save = (struct keep_save){.scene = scene, .principal = principal, .sharing = sharing};
-    return submit(keep, save, principal, "");
+    return submit(keep, &(struct order){.scene = scene, .principal = principal, .sharing = sharing});
 }
 
 bool keep_forget(struct keep *keep, uint64_t principal, const char *name)
 {
-    return submit(keep, NULL, principal, name);
+    struct order order = {.principal = principal};
+    memcpy(order.name, name, strnlen(name, SCENE_NAME_MAX));
+    return submit(keep, &order);
 }
 
-struct keep_save *keep_take_read(struct keep *keep)
+bool keep_was_read(struct keep *keep, uint64_t *read_ns)
 {
     pthread_mutex_lock(&keep->lock);
-    struct keep_save *save = keep->read_first;
-    if (save)
-        keep->read_first = save->next;
+    bool was_read = keep->was_read;
+    *read_ns = keep->read_ns;
+    keep->was_read = false;
     pthread_mutex_unlock(&keep->lock);
-    return save;
+    return was_read;
 }
 
 bool keep_is_idle(struct keep *keep)

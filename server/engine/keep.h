@@ -9,15 +9,6 @@
 
 struct keep;
 
-/* A scene that is to be read, and then written. */
-struct keep_save {
-    struct keep_save *next; /* for the thread */
-    const struct scene *scene;
-    uint64_t principal;
-    enum sharing sharing;
-    uint64_t read_ns; /* how long it took */
-};
-
 /* `on_change` is called on the thread when a scene was read, and when an order was carried out. NULL and *error:
  * no memory, or no thread. */
 struct keep *keep_create(const struct engine_keeper *keeper, void (*on_change)(void *context), void *context,
@@ -29,7 +20,7 @@ bool keep_is_idle(struct keep *keep); /* a scene that is to be saved now is read
 /* False: no memory. */
 bool keep_save(struct keep *keep, const struct scene *scene, uint64_t principal, enum sharing sharing);
 bool keep_forget(struct keep *keep, uint64_t principal, const char *name);
-/* A scene that was read, to be freed; NULL: none. */
-struct keep_save *keep_take_read(struct keep *keep);
+/* True once for a scene that was read; *read_ns: how long that took. The caller saves one at a time until then. */
+bool keep_was_read(struct keep *keep, uint64_t *read_ns);
 
 #endif

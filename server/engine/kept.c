@@ -4,8 +4,6 @@
 
 #include "base/clock.h"
 
-#include <stdlib.h>
-
 /* Between two times that a scene is kept: at least this, and this many times as long as its changes waited. */
 #define PAUSE_NS UINT64_C(1000000000)
 #define PAUSE_OF_READ 20
@@ -17,9 +15,8 @@ static bool has_news(const struct engine_scene *scene)
     return scene->sharing != SHARING_PRIVATE && !scene->commit && scene->known.revision > scene->kept_revision;
 }
 
-static void keep_scene(struct engine *engine, struct engine_scene *scene)
+static void keep_scene(struct engine *engine, struct engine_scene *scene, uint64_t now_ns)
 {
-    uint64_t now_ns = clock_now_ns();
     scene->keep_due_ns = now_ns + PAUSE_NS;
     if (!keep_save(engine->keep, scene->scene, scene->principal, scene->sharing))
         return; /* later, perhaps */
@@ -30,13 +27,12 @@ static void keep_scene(struct engine *engine, struct engine_scene *scene)
 /* The scene that was read may change again, and end. */
 static void finish_reading(struct engine *engine)
 {
-    struct keep_save *save = keep_take_read(engine->keep);
-    if (!save)
+    uint64_t read_ns;
+    if (!engine->read_scene || !keep_was_read(engine->keep, &read_ns))
         return;
     struct engine_scene *scene = engine->read_scene;
-    uint64_t pause_ns = save->read_ns * PAUSE_OF_READ;
+    uint64_t pause_ns = read_ns * PAUSE_OF_READ;
     engine->read_scene = NULL;
-    free(save);
     if (engine->read_scene_ended) {
         engine->read_scene_ended = false;
         engine_scene_free(engine, scene);
@@ -51,8 +47,6 @@ uint64_t engine_keep_scenes(struct engine *engine)
     if (!engine->keep)
         return UINT64_MAX;
     finish_reading(engine);
-    if (engine->read_scene || !keep_is_idle(engine->keep))
-        return UINT64_MAX; /* the end of that wakes the thread */
     struct engine_scene *first = NULL;
     uint64_t now_ns = clock_now_ns();
     for (struct engine_scene *scene = engine->scenes; scene; scene = scene->next) {
@@ -63,12 +57,11 @@ uint64_t engine_keep_scenes(struct engine *engine)
         if (!first || scene->keep_due_ns < first->keep_due_ns)
             first = scene;
     }
-    if (!first)
-        return UINT64_MAX;
-    if (first->keep_due_ns > now_ns)
-        return first->keep_due_ns - now_ns;
-    keep_scene(engine, first);
-    return UINT64_MAX;
+    if (!first || engine->read_scene || !keep_is_idle(engine->keep))
+        return UINT64_MAX; /* the end of what it does wakes this thread */
+    if (first->keep_due_ns <= now_ns)
+        keep_scene(engine, first, now_ns);
+    return first->keep_due_ns - now_ns;
 }
 
 void engine_forget_kept(struct engine *engine, const struct engine_scene *scene)

@@ -7,8 +7,8 @@
 #include <string.h>
 
 struct entry {
+    struct hashmap_link same_key;
     struct entry *older, *newer;
-    struct entry *same_key; /* the map's keys are short: blobs that share a key form a chain */
     blob_principal principal;
     bool forgotten; /* the principal will not return: the blob cannot be found and ends with its last use */
     struct blob *blob;
@@ -55,18 +55,7 @@ static void link_newest(struct blob_store *store, struct entry *entry)
 
 static void remove_entry(struct blob_store *store, struct entry *entry)
 {
-    uint64_t key = key_of(entry->principal, entry->blob->hash);
-    struct entry *first = hashmap_get(&store->map, key);
-    if (first == entry) {
-        if (entry->same_key)
-            hashmap_put(&store->map, key, entry->same_key); /* replaces: needs no memory */
-        else
-            hashmap_remove(&store->map, key);
-    } else {
-        while (first->same_key != entry)
-            first = first->same_key;
-        first->same_key = entry->same_key;
-    }
+    hashmap_unchain(&store->map, key_of(entry->principal, entry->blob->hash), &entry->same_key);
     unlink_age(store, entry);
     store->held_bytes -= entry->blob->size_bytes;
     store->count--;
@@ -89,7 +78,7 @@ static struct entry *find(const struct blob_store *store, blob_principal princip
 {
     struct entry *entry = hashmap_get(&store->map, key_of(principal, hash));
     while (entry && (entry->principal != principal || memcmp(entry->blob->hash, hash, BLOB_HASH_BYTES) != 0))
-        entry = entry->same_key;
+        entry = (struct entry *)entry->same_key.next;
     return entry;
 }
 
@@ -112,9 +101,8 @@ struct blob *blob_store_add(struct blob_store *store, blob_principal principal, 
     entry = calloc(1, sizeof(*entry));
     if (!entry)
         return NULL;
-    uint64_t key = key_of(principal, blob->hash);
-    *entry = (struct entry){.same_key = hashmap_get(&store->map, key), .principal = principal, .blob = blob};
-    if (!hashmap_put(&store->map, key, entry)) {
+    *entry = (struct entry){.principal = principal, .blob = blob};
+    if (!hashmap_chain(&store->map, key_of(principal, blob->hash), &entry->same_key)) {
         free(entry);
         return NULL;
     }

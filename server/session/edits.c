@@ -107,12 +107,6 @@ static uint64_t bytes_beside(const struct scene_edit *edit)
     return 0;
 }
 
-static bool resolve(void *context, const struct record_blob_ref *reference, const char *field, struct blob **blob,
-                    struct error *error)
-{
-    return upload_resolve(context, reference, field, blob, error);
-}
-
 void edits_add(struct session *session, struct request *request, const struct message *message)
 {
     struct transaction *transaction = request->object;
@@ -121,7 +115,7 @@ void edits_add(struct session *session, struct request *request, const struct me
         edits_fail(session, request, &error);
         return;
     }
-    const struct edit_source source = {resolve, session, session->hub->options.limits.texture_edge_texels};
+    const struct edit_source source = upload_source(session);
     struct scene_edit *edit = &transaction->edits[transaction->count];
     if (edit_from_message(&source, message, edit, &error) &&
         account(session, transaction, bytes_beside(edit), &error)) {

@@ -13,10 +13,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* As numbers of principals: those of sessions, which mean nothing to the next process; see session.c. */
-#define KEY_BIT (UINT64_C(1) << 63)
-#define NOBODY (UINT64_C(1) << 32)
-
 #define SCENE 1u /* its number while it is restored */
 
 /* The service manager waits on for as long as it hears this. */
@@ -25,17 +21,12 @@
 
 #define LOOK_MS 50 /* between two looks at whether the daemon is to stop */
 
-static uint64_t owner_of(uint64_t principal)
-{
-    return principal & KEY_BIT || principal < NOBODY ? principal : NOBODY;
-}
-
 static void name_record(uint8_t record_name[STORE_NAME_BYTES], uint64_t principal, const char *name)
 {
     struct {
         uint64_t owner;
         char name[SCENE_NAME_MAX];
-    } key = {.owner = owner_of(principal)};
+    } key = {.owner = principal_for_next_process(principal)};
     uint8_t hash[BLOB_HASH_BYTES];
     memcpy(key.name, name, strnlen(name, SCENE_NAME_MAX));
     blob_hash(hash, (const uint8_t *)&key, sizeof(key));
@@ -52,7 +43,7 @@ static void *read_scene(void *context, const struct scene *scene, uint64_t princ
     if (!record)
         return NULL;
     name_record(record->name, principal, scene->name);
-    record->owner = owner_of(principal);
+    record->owner = principal_for_next_process(principal);
     if (scene_record_write(record, scene, sharing, abandoned))
         return record;
     if (!atomic_load(abandoned) && log_is_due(record->owner, "not kept"))
@@ -256,5 +247,5 @@ void keeper_restore(struct store *store, struct hub *hub)
             store_remove(store, names[i]);
     }
     free(names);
-    blob_store_trim(hub->blobs);
+    blob_store_forget(hub->blobs, PRINCIPAL_NOBODY); /* none of them is offered by its client again */
 }

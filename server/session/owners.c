@@ -3,9 +3,11 @@
 
 #include <stdlib.h>
 
-/* Kinds of numbers: users are 32-bit numbers, keys have the top bit set. */
+/* Kinds of numbers: users are 32-bit numbers, keys have the top bit set; those between are of clients that nobody
+ * knows. */
 #define KEY_BIT (UINT64_C(1) << 63)
 #define NETWORK_BIT (UINT64_C(1) << 62)
+#define SESSION_BIT (UINT64_C(1) << 32)
 
 uint64_t owner_number(const struct auth_identity *identity, const struct address *peer)
 {
@@ -14,6 +16,18 @@ uint64_t owner_number(const struct auth_identity *identity, const struct address
     if (identity->has_user)
         return identity->user;
     return (address_network(peer) & ~KEY_BIT) | NETWORK_BIT;
+}
+
+blob_principal principal_number(const struct auth_identity *identity, uint64_t session)
+{
+    if (identity->has_key)
+        return KEY_BIT | identity->key;
+    return identity->has_user ? identity->user : SESSION_BIT + session;
+}
+
+blob_principal principal_for_next_process(blob_principal principal)
+{
+    return principal & KEY_BIT || principal < SESSION_BIT ? principal : PRINCIPAL_NOBODY;
 }
 
 struct owner *owner_find(struct owners *owners, uint64_t number)

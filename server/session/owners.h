@@ -8,6 +8,7 @@
 #include "base/hashmap.h"
 #include "net/address.h"
 #include "net/auth.h"
+#include "session/blob_store.h"
 
 #include <stdbool.h>
 #include <stddef.h>
@@ -37,6 +38,12 @@ struct owners {
 
 /* Whose client this is. */
 uint64_t owner_number(const struct auth_identity *identity, const struct address *peer);
+/* To whom blobs and kept scenes belong: the same of users and keys; a client that nobody knows shares with no
+ * other. */
+blob_principal principal_number(const struct auth_identity *identity, uint64_t session);
+/* As the next process knows it: sessions are counted from 1 there, too, so theirs become nobody's. */
+#define PRINCIPAL_NOBODY (UINT64_C(1) << 32)
+blob_principal principal_for_next_process(blob_principal principal);
 /* A reference to the owner of that number, made where there is none. NULL: out of memory. */
 struct owner *owner_find(struct owners *owners, uint64_t number);
 struct owner *owner_ref(struct owner *owner);

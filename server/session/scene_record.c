@@ -9,8 +9,6 @@
 
 #define SCENE 1u              /* its number in the messages */
 #define ABANDONED_LOOKS 1024u /* objects between two looks at whether the work is abandoned */
-#define RANGES_MAX 4096u      /* of a message */
-#define WEIGHTS_MAX MESH_TARGETS_MAX
 
 /* ---- writing ----------------------------------------------------------------------------------------- */
 
@@ -22,8 +20,9 @@ struct sink {
     bool failed;
     /* Of the message that is being made. */
     struct record_blob_ref arrays[MESH_ARRAY_COUNT];
-    struct record_material_range ranges[RANGES_MAX];
-    struct record_morph_weight weights[WEIGHTS_MAX];
+    struct record_material_range *ranges; /* owned */
+    struct record_morph_weight *weights;  /* owned */
+    size_t range_capacity, weight_capacity;
 };
 
 static bool fail(struct sink *sink)
@@ -82,8 +81,10 @@ static uint16_t put_blobs(struct sink *sink, struct blob *const *blobs, uint16_t
 
 static uint16_t put_ranges(struct sink *sink, const struct material_range *ranges, uint32_t count)
 {
-    if (count > RANGES_MAX)
+    void *array = sink->ranges;
+    if (count > UINT16_MAX || !grow(sink, &array, &sink->range_capacity, count, sizeof(*sink->ranges)))
         return (uint16_t)fail(sink);
+    sink->ranges = array;
     for (uint32_t i = 0; i < count; i++)
         sink->ranges[i] = (struct record_material_range){
             .first = ranges[i].first, .count = ranges[i].count, .material = ranges[i].material};
@@ -92,8 +93,10 @@ static uint16_t put_ranges(struct sink *sink, const struct material_range *range
 
 static uint16_t put_weights(struct sink *sink, const float *weights, uint32_t count)
 {
-    if (count > WEIGHTS_MAX)
+    void *array = sink->weights;
+    if (count > UINT16_MAX || !grow(sink, &array, &sink->weight_capacity, count, sizeof(*sink->weights)))
         return (uint16_t)fail(sink);
+    sink->weights = array;
     for (uint32_t i = 0; i < count; i++)
         sink->weights[i] = (struct record_morph_weight){.weight = weights[i]};
     return (uint16_t)count;
@@ -111,8 +114,8 @@ static void put_node(struct sink *sink, const struct scene_node *node)
     set->hidden = node->hidden;
     memcpy(set->parent_from_node, node->parent_from_node, sizeof(set->parent_from_node));
     set->skin = node->skin;
-    set->weights = sink->weights;
     set->weights_count = put_weights(sink, node->weights, node->weight_count);
+    set->weights = sink->weights;
     set->name = node->base.name;
     put(sink, &message);
 }
@@ -130,10 +133,10 @@ static void put_mesh(struct sink *sink, const struct scene_mesh *mesh)
     set->closed = mesh->closed;
     set->arrays = sink->arrays;
     set->arrays_count = put_blobs(sink, mesh->arrays, MESH_ARRAY_COUNT);
-    set->ranges = sink->ranges;
     set->ranges_count = put_ranges(sink, mesh->ranges, mesh->range_count);
-    set->weights = sink->weights;
+    set->ranges = sink->ranges;
     set->weights_count = put_weights(sink, mesh->weights, mesh->weight_count);
+    set->weights = sink->weights;
     set->name = mesh->base.name;
     put(sink, &message);
 }
@@ -147,8 +150,8 @@ static void put_spheres(struct sink *sink, const struct scene_spheres *spheres)
     set->sphere_count = spheres->sphere_count;
     set->arrays = sink->arrays;
     set->arrays_count = put_blobs(sink, &spheres->centres_radii, 1);
-    set->ranges = sink->ranges;
     set->ranges_count = put_ranges(sink, spheres->ranges, spheres->range_count);
+    set->ranges = sink->ranges;
     set->name = spheres->base.name;
     put(sink, &message);
 }
@@ -357,28 +360,24 @@ static void put_objects(struct sink *sink, enum object_kind kind, const struct h
 bool scene_record_write(struct store_record *record, const struct scene *scene, enum sharing sharing,
                         const atomic_bool *abandoned)
 {
-    struct sink *sink = calloc(1, sizeof(*sink));
-    if (!sink)
-        return false;
-    sink->record = record;
-    sink->abandoned = abandoned;
+    struct sink sink = {.record = record, .abandoned = abandoned};
     struct message message;
     message_init(&message, MESSAGE_SCENE_OPEN);
     message.scene_open.scene = SCENE;
     message.scene_open.sharing = (enum protocol_sharing)sharing;
     message.scene_open.name = scene->name;
-    put(sink, &message);
+    put(&sink, &message);
     message_init(&message, MESSAGE_SCENE_CHANGED);
     message.scene_changed.scene = SCENE;
     message.scene_changed.revision = scene->revision;
-    put(sink, &message);
+    put(&sink, &message);
     for (int kind = 0; kind < OBJECT_COUNT; kind++)
-        put_objects(sink, (enum object_kind)kind, &scene->objects[kind]);
+        put_objects(&sink, (enum object_kind)kind, &scene->objects[kind]);
     if (scene->environment.revision)
-        put_environment(sink, &scene->environment);
-    bool written = !sink->failed;
-    free(sink);
-    return written;
+        put_environment(&sink, &scene->environment);
+    free(sink.ranges);
+    free(sink.weights);
+    return !sink.failed;
 }
 
 /* ---- reading ----------------------------------------------------------------------------------------- */

@@ -257,16 +257,6 @@ static size_t introduced_count(const struct hub *hub)
     return hub->sessions.count - hub->unauthenticated;
 }
 
-/* Users are 32-bit numbers, sessions are counted, keys have the top bit set; an unknown client shares with no
- * other. */
-static blob_principal principal_of(const struct session *session)
-{
-    const struct auth_identity *identity = &session->identity;
-    if (identity->has_key)
-        return UINT64_C(1) << 63 | identity->key;
-    return identity->has_user ? identity->user : (UINT64_C(1) << 32) + session->number;
-}
-
 static bool on_key_allowed(void *context)
 {
     const struct session *session = context;
@@ -300,7 +290,7 @@ static void on_key_proved(void *context, size_t index)
     struct session *session = context;
     struct owners *owners = &session->hub->owners;
     auth_identify_by_key(&session->identity, session->keys, index);
-    session->principal = principal_of(session);
+    session->principal = principal_number(&session->identity, session->number);
     struct owner *owner = owner_find(owners, owner_number(&session->identity, &session->peer));
     if (!owner)
         return; /* it goes on with the share of its network */
@@ -483,7 +473,7 @@ struct session *session_create(struct hub *hub, uint64_t number, int fd, bool se
     session->keys = auth_keys_ref(hub->options.keys);
     session->identity = *identity;
     session->peer = *peer;
-    session->principal = principal_of(session);
+    session->principal = principal_number(&session->identity, session->number);
     session->farewell = hub_command(ENGINE_CLIENT_GONE, number, 0);
     const struct connection_entry entry = {
         .keys = session->keys ? session->keys->keys : NULL,

@@ -28,14 +28,8 @@ struct offer *upload_find(const struct session *session, const uint8_t hash[BLOB
 {
     struct offer *offer = hashmap_get(&session->blobs.offers, key_of(session, hash));
     while (offer && memcmp(offer->hash, hash, BLOB_HASH_BYTES) != 0)
-        offer = offer->same_key;
+        offer = (struct offer *)offer->same_key.next;
     return offer;
-}
-
-static void print_hash(const uint8_t hash[BLOB_HASH_BYTES], char text[2 * BLOB_HASH_BYTES + 1])
-{
-    for (size_t i = 0; i < BLOB_HASH_BYTES; i++)
-        snprintf(text + 2 * i, 3, "%02x", hash[i]);
 }
 
 struct offer *upload_add(struct session *session, const struct record_blob_ref *reference, struct error *error)
@@ -47,13 +41,11 @@ struct offer *upload_add(struct session *session, const struct record_blob_ref *
         return NULL;
     }
     struct offer *offer = calloc(1, sizeof(*offer));
-    uint64_t key = key_of(session, reference->hash);
     if (offer) {
-        offer->same_key = hashmap_get(&session->blobs.offers, key);
         memcpy(offer->hash, reference->hash, BLOB_HASH_BYTES);
         offer->size_bytes = reference->size_bytes;
     }
-    if (!offer || !hashmap_put(&session->blobs.offers, key, offer)) {
+    if (!offer || !hashmap_chain(&session->blobs.offers, key_of(session, reference->hash), &offer->same_key)) {
         free(offer);
         error_set(error, ERROR_OUT_OF_MEMORY, "blob_offer.blobs", "no memory");
         return NULL;
@@ -107,9 +99,10 @@ void upload_offer(struct session *session, struct request *request, const struct
     free(needed);
 }
 
-bool upload_resolve(const struct session *session, const struct record_blob_ref *reference, const char *field,
-                    struct blob **blob, struct error *error)
+static bool resolve(void *context, const struct record_blob_ref *reference, const char *field, struct blob **blob,
+                    struct error *error)
 {
+    const struct session *session = context;
     *blob = NULL;
     if (!reference->size_bytes)
         return true;
@@ -119,10 +112,15 @@ bool upload_resolve(const struct session *session, const struct record_blob_ref 
         return true;
     }
     char text[2 * BLOB_HASH_BYTES + 1];
-    print_hash(reference->hash, text);
+    sodium_bin2hex(text, sizeof(text), reference->hash, BLOB_HASH_BYTES);
     error_set(error, ERROR_UNKNOWN_ID, field, "blob %s of %" PRIu64 " bytes is not held", text,
               reference->size_bytes);
     return error_remedy(error, "offer it on this connection, and send it if it is needed, before the edit");
+}
+
+struct edit_source upload_source(struct session *session)
+{
+    return (struct edit_source){resolve, session, session->hub->options.limits.texture_edge_texels};
 }
 
 /* ---- pieces ------------------------------------------------------------------------------------------ */
@@ -223,8 +221,8 @@ static bool complete(struct session *session, struct offer *offer, struct error 
 {
     if (memcmp(offer->arriving->hash, offer->hash, BLOB_HASH_BYTES) != 0) {
         char named[2 * BLOB_HASH_BYTES + 1], found[2 * BLOB_HASH_BYTES + 1];
-        print_hash(offer->hash, named);
-        print_hash(offer->arriving->hash, found);
+        sodium_bin2hex(named, sizeof(named), offer->hash, BLOB_HASH_BYTES);
+        sodium_bin2hex(found, sizeof(found), offer->arriving->hash, BLOB_HASH_BYTES);
         return error_set(error, ERROR_HASH_MISMATCH, "blob_data", "the bytes of blob %s have the hash %s", named,
                          found);
     }
@@ -325,7 +323,7 @@ void upload_finish(struct session *session)
     void *value;
     while (hashmap_next(&session->blobs.offers, &cursor, NULL, &value)) {
         for (struct offer *offer = value, *next; offer; offer = next) {
-            next = offer->same_key;
+            next = (struct offer *)offer->same_key.next;
             upload_abandon(session, offer);
             blob_unref(offer->held);
             free(offer);

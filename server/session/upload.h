@@ -4,7 +4,9 @@
 #define FARLIGHT_SESSION_UPLOAD_H
 
 #include "base/blob.h"
+#include "base/hashmap.h"
 #include "protocol/framing.h"
+#include "session/edits.h"
 #include "session/requests.h"
 
 #include <stdbool.h>
@@ -14,7 +16,7 @@
 
 /* A blob that the client named. Until the connection ends it is held if it is there. */
 struct offer {
-    struct offer *same_key;
+    struct hashmap_link same_key;
     uint8_t hash[BLOB_HASH_BYTES];
     uint64_t size_bytes;
     struct blob *held;     /* complete and checked */
@@ -38,9 +40,7 @@ struct offer *upload_find(const struct session *session, const uint8_t hash[BLOB
 /* Notes an offer that is not there yet, with nothing held. NULL and *error: too many, or no memory. */
 struct offer *upload_add(struct session *session, const struct record_blob_ref *reference, struct error *error);
 
-/* The blob that an edit names: *blob is a new reference, or NULL where none is meant (0 bytes). False: it is not
- * held. */
-bool upload_resolve(const struct session *session, const struct record_blob_ref *reference, const char *field,
-                    struct blob **blob, struct error *error);
+/* What the edits of a session refer to: blobs that it has offered and that are held. */
+struct edit_source upload_source(struct session *session);
 
 #endif

@@ -42,11 +42,9 @@ int store_folder_open(int at, const char *path, struct error *error)
     return -1;
 }
 
-static bool write_part(int fd, const struct store_file_part *part, const atomic_bool *abandoned,
-                       struct error *error)
+static bool write_all(int fd, const char *at, size_t size_bytes, const atomic_bool *abandoned, struct error *error)
 {
-    const char *at = part->data;
-    for (size_t left_bytes = part->size_bytes; left_bytes;) {
+    for (size_t left_bytes = size_bytes; left_bytes;) {
         if (abandoned && atomic_load(abandoned))
             return error_set(error, ERROR_CANCELLED, "", "the daemon stops");
         ssize_t written_bytes = write(fd, at, left_bytes < CHUNK_BYTES ? left_bytes : CHUNK_BYTES);
@@ -60,7 +58,7 @@ static bool write_part(int fd, const struct store_file_part *part, const atomic_
     return true;
 }
 
-bool store_file_write(int folder, const char *name, const struct store_file_part *parts, size_t part_count,
+bool store_file_write(int folder, const char *name, const void *data, size_t size_bytes,
                       const atomic_bool *abandoned, struct error *error)
 {
     char new_name[NAME_MAX + 1];
@@ -69,9 +67,7 @@ bool store_file_write(int folder, const char *name, const struct store_file_part
     int fd = openat(folder, new_name, O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, S_IRUSR | S_IWUSR);
     if (fd < 0)
         return error_set(error, ERROR_INTERNAL, name, "%s", strerror(errno));
-    bool written = true;
-    for (size_t i = 0; i < part_count && written; i++)
-        written = write_part(fd, &parts[i], abandoned, error);
+    bool written = write_all(fd, data, size_bytes, abandoned, error);
     if (written && fdatasync(fd) < 0)
         written = error_set(error, ERROR_INTERNAL, name, "%s", strerror(errno));
     if (close(fd) < 0 && written)

@@ -16,12 +16,8 @@
 /* The folder, made if it is not there; its owner is this process' user, and nobody else may enter. `at` is a
  * folder or AT_FDCWD. < 0 and *error: it is not like that. */
 int store_folder_open(int at, const char *path, struct error *error);
-/* Two parts, one behind the other, as a file that is on the disk before it has its name. */
-struct store_file_part {
-    const void *data;
-    size_t size_bytes;
-};
-bool store_file_write(int folder, const char *name, const struct store_file_part *parts, size_t part_count,
+/* Writes a file that is on the disk before it has its name. */
+bool store_file_write(int folder, const char *name, const void *data, size_t size_bytes,
                       const atomic_bool *abandoned, struct error *error);
 /* Size of a plain file; false: there is none of that name. */
 bool store_file_size(int folder, const char *name, uint64_t *size_bytes);

@@ -11,6 +11,7 @@
 #include <fcntl.h>
 #include <inttypes.h>
 #include <pthread.h>
+#include <sodium.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -30,7 +31,7 @@
 
 /* A blob on the disk, or one that is about to be. */
 struct held {
-    struct held *same_key;
+    struct hashmap_link same_key;
     uint8_t hash[BLOB_HASH_BYTES];
     uint64_t size_bytes;
     size_t uses; /* by records */
@@ -43,6 +44,7 @@ struct entry {
     uint64_t owner, number; /* ascending with each that is written */
     uint64_t count_id;      /* unlike that of any other in this process */
     uint64_t file_bytes, content_bytes;
+    uint64_t blob_bytes; /* also of those that other entries have, too */
     struct held **blobs; /* owned array, each once */
     size_t blob_count;
 };
@@ -69,25 +71,23 @@ void store_record_finish(struct store_record *record)
 
 /* ---- names ------------------------------------------------------------------------------------------- */
 
-static void print_hex(const uint8_t *bytes, size_t count, char *text)
+static void print_name(const uint8_t name[STORE_NAME_BYTES], char text[RECORD_TEXT_BYTES])
 {
-    for (size_t i = 0; i < count; i++)
-        snprintf(text + 2 * i, 3, "%02x", bytes[i]);
+    sodium_bin2hex(text, RECORD_TEXT_BYTES, name, STORE_NAME_BYTES);
 }
 
-/* Exactly that many bytes, in small letters, with nothing behind. */
+static void print_hash(const uint8_t hash[BLOB_HASH_BYTES], char text[BLOB_TEXT_BYTES])
+{
+    sodium_bin2hex(text, BLOB_TEXT_BYTES, hash, BLOB_HASH_BYTES);
+}
+
+/* Exactly that many bytes, as they are printed. */
 static bool parse_hex(const char *text, uint8_t *bytes, size_t count)
 {
-    static const char digits[] = "0123456789abcdef";
-    if (strlen(text) != 2 * count)
-        return false;
-    for (size_t i = 0; i < count; i++) {
-        const char *high = strchr(digits, text[2 * i]), *low = strchr(digits, text[2 * i + 1]);
-        if (!high || !low)
-            return false;
-        bytes[i] = (uint8_t)((high - digits) << 4 | (low - digits));
-    }
-    return true;
+    char printed[BLOB_TEXT_BYTES];
+    size_t parsed;
+    return sodium_hex2bin(bytes, count, text, strlen(text), NULL, &parsed, NULL) == 0 && parsed == count &&
+           strcmp(sodium_bin2hex(printed, sizeof(printed), bytes, count), text) == 0;
 }
 
 /* ---- blobs ------------------------------------------------------------------------------------------- */
@@ -103,7 +103,7 @@ static struct held *find_held(const struct store *store, const uint8_t hash[BLOB
 {
     struct held *held = hashmap_get(&store->held, key_of(hash));
     while (held && memcmp(held->hash, hash, BLOB_HASH_BYTES) != 0)
-        held = held->same_key;
+        held = (struct held *)held->same_key.next;
     return held;
 }
 
@@ -116,27 +116,12 @@ static struct held *need_held(struct store *store, const uint8_t hash[BLOB_HASH_
     held = calloc(1, sizeof(*held));
     if (!held)
         return NULL;
-    held->same_key = hashmap_get(&store->held, key_of(hash));
     memcpy(held->hash, hash, BLOB_HASH_BYTES);
     held->size_bytes = size_bytes;
-    if (hashmap_put(&store->held, key_of(hash), held))
+    if (hashmap_chain(&store->held, key_of(hash), &held->same_key))
         return held;
     free(held);
     return NULL;
-}
-
-static void unlink_held(struct store *store, struct held *held)
-{
-    struct held *first = hashmap_get(&store->held, key_of(held->hash));
-    if (first != held) {
-        while (first->same_key != held)
-            first = first->same_key;
-        first->same_key = held->same_key;
-    } else if (held->same_key) {
-        hashmap_put(&store->held, key_of(held->hash), held->same_key); /* replaces: needs no memory */
-    } else {
-        hashmap_remove(&store->held, key_of(held->hash));
-    }
 }
 
 static void release_held(struct store *store, struct held *held)
@@ -145,11 +130,11 @@ static void release_held(struct store *store, struct held *held)
         return;
     if (held->is_there) {
         char text[BLOB_TEXT_BYTES];
-        print_hex(held->hash, BLOB_HASH_BYTES, text);
+        print_hash(held->hash, text);
         unlinkat(store->blobs, text, 0);
         store->bytes -= held->size_bytes;
     }
-    unlink_held(store, held);
+    hashmap_unchain(&store->held, key_of(held->hash), &held->same_key);
     free(held);
 }
 
@@ -175,6 +160,7 @@ static bool add_blob(struct store *store, struct entry *entry, const uint8_t has
     held->counted_by = entry->count_id;
     held->uses++;
     entry->blobs[entry->blob_count++] = held;
+    entry->blob_bytes += held->size_bytes;
     return held->size_bytes == size_bytes;
 }
 
@@ -237,7 +223,7 @@ static void remove_entry(struct store *store, size_t place)
 {
     struct entry *entry = take_entry(store, place);
     char text[RECORD_TEXT_BYTES + sizeof(TRYING_SUFFIX)];
-    print_hex(entry->name, STORE_NAME_BYTES, text);
+    print_name(entry->name, text);
     unlinkat(store->scenes, text, 0);
     strcat(text, TRYING_SUFFIX);
     unlinkat(store->scenes, text, 0);
@@ -249,11 +235,7 @@ static uint64_t bytes_of_owner(const struct store *store, uint64_t owner)
     uint64_t bytes = 0;
     for (size_t i = 0; i < store->entry_count; i++) {
         const struct entry *entry = store->entries[i];
-        if (entry->owner != owner)
-            continue;
-        bytes += entry->file_bytes;
-        for (size_t blob = 0; blob < entry->blob_count; blob++)
-            bytes += entry->blobs[blob]->size_bytes;
+        bytes += entry->owner == owner ? entry->file_bytes + entry->blob_bytes : 0;
     }
     return bytes;
 }
@@ -275,16 +257,21 @@ static size_t first_to_give_way(const struct store *store)
 
 /* ---- opening ----------------------------------------------------------------------------------------- */
 
+static bool is_what_was_written(const uint8_t *bytes, size_t size_bytes)
+{
+    uint8_t hash[BLOB_HASH_BYTES];
+    if (size_bytes < SEAL_BYTES + HEAD_BYTES || memcmp(bytes, MAGIC, MAGIC_BYTES) != 0)
+        return false;
+    blob_hash(hash, bytes + SEAL_BYTES, size_bytes - SEAL_BYTES);
+    return memcmp(hash, bytes + MAGIC_BYTES, BLOB_HASH_BYTES) == 0;
+}
+
 /* What the whole file says; *entry is not in the list. False: it is not what was written. */
 static bool parse_record(struct store *store, const uint8_t name[STORE_NAME_BYTES], const uint8_t *bytes,
                          size_t size_bytes, struct entry **entry)
 {
-    uint8_t hash[BLOB_HASH_BYTES];
     *entry = NULL;
-    if (size_bytes < SEAL_BYTES + HEAD_BYTES || memcmp(bytes, MAGIC, MAGIC_BYTES) != 0)
-        return false;
-    blob_hash(hash, bytes + SEAL_BYTES, size_bytes - SEAL_BYTES);
-    if (memcmp(hash, bytes + MAGIC_BYTES, BLOB_HASH_BYTES) != 0)
+    if (!is_what_was_written(bytes, size_bytes))
         return false;
     struct reader reader;
     reader_init(&reader, bytes + SEAL_BYTES, size_bytes - SEAL_BYTES);
@@ -433,7 +420,7 @@ void store_close(struct store *store)
     void *value;
     while (hashmap_next(&store->held, &cursor, NULL, &value)) {
         for (struct held *held = value, *next; held; held = next) {
-            next = held->same_key;
+            next = (struct held *)held->same_key.next;
             free(held);
         }
     }
@@ -473,12 +460,9 @@ static struct entry *entry_of(struct store *store, const struct store_record *re
 /* Evicts until the entry fits; its predecessor goes first. False: it never does. */
 static bool make_room(struct store *store, const struct entry *entry, struct error *error)
 {
-    uint64_t all_bytes = entry->file_bytes, new_bytes = entry->file_bytes;
-    for (size_t i = 0; i < entry->blob_count; i++) {
-        const struct held *held = entry->blobs[i];
-        all_bytes += held->size_bytes;
-        new_bytes += held->is_there ? 0 : held->size_bytes;
-    }
+    uint64_t all_bytes = entry->file_bytes + entry->blob_bytes, new_bytes = entry->file_bytes;
+    for (size_t i = 0; i < entry->blob_count; i++)
+        new_bytes += entry->blobs[i]->is_there ? 0 : entry->blobs[i]->size_bytes;
     size_t before = find_entry(store, entry->name);
     if (before < store->entry_count && store->bytes + new_bytes > store->limit_bytes)
         remove_entry(store, before);
@@ -501,9 +485,8 @@ static bool write_blobs(struct store *store, const struct store_record *record, 
         char text[BLOB_TEXT_BYTES];
         if (held->is_there)
             continue;
-        print_hex(blob->hash, BLOB_HASH_BYTES, text);
-        if (!store_file_write(store->blobs, text, &(struct store_file_part){blob->data, blob->size_bytes}, 1,
-                              abandoned, error))
+        print_hash(blob->hash, text);
+        if (!store_file_write(store->blobs, text, blob->data, blob->size_bytes, abandoned, error))
             return false;
         held->is_there = true;
         store->bytes += held->size_bytes;
@@ -532,10 +515,8 @@ static bool write_record(struct store *store, const struct entry *entry, const s
     memcpy(bytes, MAGIC, MAGIC_BYTES);
     blob_hash(bytes + MAGIC_BYTES, bytes + SEAL_BYTES, size_bytes - SEAL_BYTES);
     char text[RECORD_TEXT_BYTES];
-    print_hex(entry->name, STORE_NAME_BYTES, text);
-    bool written =
-        !writer.failed &&
-        store_file_write(store->scenes, text, &(struct store_file_part){bytes, size_bytes}, 1, abandoned, error);
+    print_name(entry->name, text);
+    bool written = !writer.failed && store_file_write(store->scenes, text, bytes, size_bytes, abandoned, error);
     free(bytes);
     return written;
 }
@@ -591,7 +572,7 @@ uint8_t (*store_names(struct store *store, size_t *count))[STORE_NAME_BYTES]
 static void rename_record(struct store *store, const uint8_t name[STORE_NAME_BYTES], bool is_tried)
 {
     char plain[RECORD_TEXT_BYTES], trying[RECORD_TEXT_BYTES + sizeof(TRYING_SUFFIX)];
-    print_hex(name, STORE_NAME_BYTES, plain);
+    print_name(name, plain);
     snprintf(trying, sizeof(trying), "%s" TRYING_SUFFIX, plain);
     renameat(store->scenes, is_tried ? plain : trying, store->scenes, is_tried ? trying : plain);
 }
@@ -605,14 +586,11 @@ static bool try_record(struct store *store, const uint8_t name[STORE_NAME_BYTES]
     const struct entry *entry = store->entries[place];
     char text[RECORD_TEXT_BYTES];
     uint64_t size_bytes;
-    print_hex(name, STORE_NAME_BYTES, text);
+    print_name(name, text);
     uint8_t *bytes = read_whole(store, text, &size_bytes, error);
     if (!bytes)
         return false;
-    uint8_t hash[BLOB_HASH_BYTES];
-    if (size_bytes == entry->file_bytes)
-        blob_hash(hash, bytes + SEAL_BYTES, (size_t)size_bytes - SEAL_BYTES);
-    if (size_bytes != entry->file_bytes || memcmp(hash, bytes + MAGIC_BYTES, BLOB_HASH_BYTES) != 0) {
+    if (size_bytes != entry->file_bytes || !is_what_was_written(bytes, (size_t)size_bytes)) {
         free(bytes);
         return error_set(error, ERROR_INVALID, text, "the file has changed");
     }
@@ -648,7 +626,7 @@ struct blob *store_read_blob(struct store *store, const uint8_t hash[BLOB_HASH_B
 {
     char text[BLOB_TEXT_BYTES];
     uint64_t found_bytes;
-    print_hex(hash, BLOB_HASH_BYTES, text);
+    print_hash(hash, text);
     if (!store_file_size(store->blobs, text, &found_bytes) || found_bytes != size_bytes) {
         error_set(error, ERROR_INVALID, text, "no file of %" PRIu64 " bytes", size_bytes);
         return NULL;
@@ -666,12 +644,4 @@ struct blob *store_read_blob(struct store *store, const uint8_t hash[BLOB_HASH_B
     }
     blob_unref(blob);
     return NULL;
-}
-
-uint64_t store_bytes(struct store *store)
-{
-    pthread_mutex_lock(&store->lock);
-    uint64_t bytes = store->bytes;
-    pthread_mutex_unlock(&store->lock);
-    return bytes;
 }

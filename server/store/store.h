@@ -48,6 +48,5 @@ void store_tried(struct store *store, const uint8_t name[STORE_NAME_BYTES]);
 /* A blob, verified; the reference is the caller's. NULL and *error: it is not there, or not what was written. */
 struct blob *store_read_blob(struct store *store, const uint8_t hash[BLOB_HASH_BYTES], uint64_t size_bytes,
                              struct error *error);
-uint64_t store_bytes(struct store *store); /* that are on the disk */
 
 #endif

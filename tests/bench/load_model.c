@@ -74,12 +74,6 @@ static bool take_data(struct loading *loading, const struct message_blob_data *d
 
 /* ---- edits ---- */
 
-static bool resolve(void *context, const struct record_blob_ref *reference, const char *field, struct blob **blob,
-                    struct error *error)
-{
-    return upload_resolve(context, reference, field, blob, error);
-}
-
 static bool take_edit(struct loading *loading, const struct message *message, struct error *error)
 {
     struct fl_error full = {0};
@@ -87,8 +81,7 @@ static bool take_edit(struct loading *loading, const struct message *message, st
                  &full))
         return error_set(error, ERROR_OUT_OF_MEMORY, "edits", "%s", full.text);
     struct scene_edit *edit = &loading->edits[loading->edit_count++];
-    const struct edit_source source = {resolve, &loading->session,
-                                       loading->hub.options.limits.texture_edge_texels};
+    const struct edit_source source = upload_source(&loading->session);
     if (!edit_from_message(&source, message, edit, error))
         return false;
     if (message->type == MESSAGE_SET_NODE && message->set_node.kind == PROTOCOL_NODE_CAMERA &&

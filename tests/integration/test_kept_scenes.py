@@ -9,6 +9,7 @@ import time
 from farlight_test import Case, Daemon, bundled_scenes, farlight, read_png
 from test_daemon import OK, SCENE_OPEN, SET_NODE, named, set_node, text
 from test_serve import KEPT, Serving, Viewer, wait_until
+from test_staying_up import Manager
 
 
 class KeptScenes(Case):
@@ -121,6 +122,17 @@ class KeptScenes(Case):
             self.assertEqual(self.scenes(daemon), [])
             self.assertIn("ended while it restored", daemon.messages())
         self.assertEqual(self.records(), [])
+
+    def test_the_service_manager_waits_while_scenes_are_restored(self):
+        with self.daemon() as daemon:
+            with Serving(bundled_scenes() / "teapot.glb", "--server", daemon.address):
+                wait_until(self.records, "the scene is not written")
+            self.kill(daemon)
+        manager = Manager(self.folder)
+        self.addCleanup(manager.close)
+        with Daemon(environment=manager.environment(FARLIGHT_SCENES_STORE=str(self.store))):
+            self.assertIn("EXTEND_TIMEOUT_USEC", manager.hear())
+            self.assertEqual(manager.wait_for("READY"), {"READY": "1"})
 
     def test_a_folder_of_another_daemon_or_for_others_is_refused(self):
         with self.daemon():

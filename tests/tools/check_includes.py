@@ -77,7 +77,7 @@ RESTRICTED = {
     r"(png\.h|(OpenEXR|Imath)/)": ("client/output",),
     r"tiny_(gltf|obj_loader)": ("client/import",),
     r"(turbojpeg|zstd)\.h": ("server/encode", "client/lib", "protocol/pixels"),
-    r"sodium\.h": ("server/session", "protocol/common", "protocol/sealed"),
+    r"sodium\.h": ("server/session", "server/store", "protocol/common", "protocol/sealed"),
 }
 # Where the matrix of the server's rooms stands.
 README = pathlib.Path("server/README.md")

@@ -98,6 +98,15 @@ static void open_named(struct engine *engine, uint32_t request, const char *name
     expect_done(engine, 1, request);
 }
 
+/* As the last process had it, with that revision. */
+static void open_restored(struct engine *engine, uint32_t request, const char *name, uint64_t revision)
+{
+    struct engine_command *open = open_command(request, name, SHARING_SHARED);
+    open->kept_revision = revision;
+    submit(engine, open);
+    expect_done(engine, 1, request);
+}
+
 static void change(struct engine *engine, uint32_t request, uint32_t scene)
 {
     submit_commit(engine, 1, request, scene);
@@ -188,10 +197,7 @@ TEST(the_engine_ends_although_the_keeper_does_not)
 TEST(a_restored_scene_has_its_revision_and_is_not_written_again)
 {
     struct engine *engine = start_keeping(1000);
-    struct engine_command *open = open_command(1, "a", SHARING_SHARED);
-    open->kept_revision = 7;
-    submit(engine, open);
-    expect_done(engine, 1, 1);
+    open_restored(engine, 1, "a", 7);
     submit_commit(engine, 1, 10, 1);
     assert_int_equal(expect_done(engine, 1, 10), 7);
     engine_destroy(engine);
@@ -201,10 +207,7 @@ TEST(a_restored_scene_has_its_revision_and_is_not_written_again)
 TEST(a_scene_that_could_not_be_restored_does_not_linger)
 {
     struct engine *engine = start_keeping(600000);
-    struct engine_command *open = open_command(1, "a", SHARING_SHARED);
-    open->kept_revision = 7;
-    submit(engine, open);
-    expect_done(engine, 1, 1);
+    open_restored(engine, 1, "a", 7);
     submit(engine, command(ENGINE_CLIENT_GONE, 1, 0));
     engine_event_destroy(expect_event(engine, ENGINE_SCENE_ENDED, 0, 0));
     engine_destroy(engine);
@@ -217,10 +220,7 @@ TEST(restored_scenes_are_no_others_lingering_ones)
         start((struct engine_options){.limits = {.scene_linger_ms = 600000, .lingering_scenes = 1}});
     for (uint32_t scene = 1; scene <= 3; scene++) {
         char name[] = {(char)('a' + scene), '\0'};
-        struct engine_command *open = open_command(scene, name, SHARING_SHARED);
-        open->kept_revision = 1;
-        submit(engine, open);
-        expect_done(engine, 1, scene);
+        open_restored(engine, scene, name, 1);
         change(engine, 10 + scene, scene);
     }
     submit(engine, command(ENGINE_CLIENT_GONE, 1, 0));

@@ -122,6 +122,18 @@ static void path_of_first(const char *of, char path[PATH_BYTES * 2])
     closedir(entries);
 }
 
+/* From the end if negative. */
+static void change_byte(const char *path, int at)
+{
+    FILE *file = fopen(path, "r+b");
+    assert_non_null(file);
+    assert_int_equal(fseek(file, at, at < 0 ? SEEK_END : SEEK_SET), 0);
+    int before = fgetc(file);
+    assert_int_equal(fseek(file, -1, SEEK_CUR), 0);
+    assert_true(fputc(before ^ 1, file) >= 0);
+    assert_int_equal(fclose(file), 0);
+}
+
 static bool try_record(struct store *store, uint8_t name, struct store_record *record)
 {
     uint8_t bytes[STORE_NAME_BYTES];
@@ -134,11 +146,8 @@ TEST(a_record_and_its_blobs_come_back_in_another_process)
 {
     struct store *store = open_store(LIMIT_BYTES);
     expect_put(store, 'a', 7, 1, 1000);
-    uint64_t bytes = store_bytes(store);
-    assert_true(bytes > 1000 && bytes < 1500);
     store_close(store);
     store = open_store(LIMIT_BYTES);
-    assert_int_equal(store_bytes(store), bytes);
     expect_names(store, "a");
     struct store_record record;
     assert_true(try_record(store, 'a', &record));
@@ -171,7 +180,7 @@ TEST(blobs_go_with_the_last_record_that_names_them)
     assert_int_equal(count_files("scenes"), 1);
     store_remove(store, b);
     assert_int_equal(count_files("blobs"), 0);
-    assert_int_equal(store_bytes(store), 0);
+    assert_int_equal(count_files("scenes"), 0);
     store_close(store);
 }
 
@@ -198,23 +207,14 @@ TEST(who_has_most_gives_way_with_what_was_written_first)
 
 TEST(what_was_tampered_with_is_removed)
 {
-    static const struct {
-        const char *of;
-        int at; /* from the end if negative */
-    } places[] = {{"scenes", 3}, {"scenes", 20}, {"scenes", 60}, {"scenes", -1}, {"scenes", -30}};
+    static const int places[] = {3, 20, 60, -1, -30};
     for (size_t i = 0; i < sizeof(places) / sizeof(places[0]); i++) {
         char path[PATH_BYTES * 2];
         struct store *store = open_store(LIMIT_BYTES);
         expect_put(store, 'a', 1, 1, 1000);
         store_close(store);
-        path_of_first(places[i].of, path);
-        FILE *file = fopen(path, "r+b");
-        assert_non_null(file);
-        fseek(file, places[i].at, places[i].at < 0 ? SEEK_END : SEEK_SET);
-        int before = fgetc(file);
-        fseek(file, -1, SEEK_CUR);
-        fputc(before ^ 1, file);
-        fclose(file);
+        path_of_first("scenes", path);
+        change_byte(path, places[i]);
         store = open_store(LIMIT_BYTES);
         expect_names(store, "");
         assert_int_equal(count_files("scenes"), 0);
@@ -229,10 +229,7 @@ TEST(a_blob_that_was_tampered_with_is_not_read)
     struct store *store = open_store(LIMIT_BYTES);
     expect_put(store, 'a', 1, 1, 1000);
     path_of_first("blobs", path);
-    FILE *file = fopen(path, "r+b");
-    assert_non_null(file);
-    fputc(2, file);
-    fclose(file);
+    change_byte(path, 0);
     struct blob *blob = blob_of(1, 1000);
     struct error error = {0};
     assert_null(store_read_blob(store, blob->hash, 1000, &error));
