@@ -47,6 +47,8 @@ endif
 
 # Linked libraries, by program.
 SERVER_PKGS := epoxy egl libzstd libsodium libxxhash libturbojpeg inih cglm
+# Its allocator (server/base/allocator.c), but where the sanitizers have theirs.
+SERVER_PKGS += $(if $(filter sanitize fuzz,$(config)),,jemalloc)
 # The daemon loads this one when it needs it, so that only its headers are needed here.
 SERVER_LOADED_PKGS := libavcodec libavutil
 CLIENT_PKGS := libzstd libsodium libxxhash libturbojpeg jansson
@@ -308,7 +310,7 @@ $(LOSING_DAEMON): $(B)/tests/tools/lost_gpu.o $(B)/server/main.o $(SERVER_OBJ) $
 
 # ---- what people call ------------------------------------------------------------------------------
 BUILD_PACKAGES := gcc g++ make pkg-config libepoxy-dev libegl-dev libgl-dev libcglm-dev libturbojpeg0-dev libzstd-dev \
-    libsodium-dev libxxhash-dev libinih-dev libjansson-dev libseccomp-dev libopenimageio-dev libpng-dev libopenexr-dev libjxl-dev libtinygltf-dev \
+    libsodium-dev libxxhash-dev libinih-dev libjansson-dev libjemalloc-dev libseccomp-dev libopenimageio-dev libpng-dev libopenexr-dev libjxl-dev libtinygltf-dev \
     libtinyobjloader-dev libembree-dev libavcodec-dev libavformat-dev libavutil-dev libswscale-dev libsdl2-dev libsdl2-ttf-dev fonts-dejavu-core libegl1 libgl1-mesa-dri
 TEST_PACKAGES := libcmocka-dev python3 python3-jsonschema ffmpeg xvfb gnuplot-nox
 LINT_PACKAGES := clang clang-format glslang-tools python3

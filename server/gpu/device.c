@@ -4,6 +4,7 @@
 #include "base/clock.h"
 #include "base/host.h"
 #include "base/log.h"
+#include "base/prefault.h"
 #include "gpu/debug.h"
 #include "gpu/egl.h"
 #include "gpu/program_cache.h"
@@ -222,6 +223,8 @@ struct gpu_device *gpu_device_create(const struct gpu_options *options, struct e
     }
     ask_facts(&device->facts, device->info.software, device->egl->robust, debug);
     device->memory_limit_bytes = device->facts.memory_bytes;
+    if (device->facts.software)
+        device->prefault = prefault_create();
     if (debug)
         gpu_debug_start();
     if (!has_bindings(error) || !create_defaults(device, error))
@@ -243,6 +246,7 @@ void gpu_device_destroy(struct gpu_device *device)
     if (device->egl)
         gpu_egl_close(device->egl);
     free(device->egl);
+    prefault_destroy(device->prefault);
     if (current_device == device)
         current_device = NULL;
     free(device);
@@ -324,21 +328,43 @@ bool gpu_memory_take(struct gpu_device *device, uint64_t size_bytes, const char 
 void gpu_reserve_begin(struct gpu_device *device, uint64_t time_ns)
 {
     device->reserve_until_ns = clock_now_ns() + time_ns;
+    device->reserve_awaited_bytes = 0;
     device->reserve_made = device->reserve_put_off = false;
 }
 
-bool gpu_reserve_end(struct gpu_device *device)
+bool gpu_reserve_end(struct gpu_device *device, size_t *awaited_bytes)
 {
     bool put_off = device->reserve_put_off;
+    *awaited_bytes = device->reserve_awaited_bytes;
     device->reserve_until_ns = 0;
     device->reserve_put_off = false;
     return put_off;
 }
 
-bool gpu_reserve_goes_on(struct gpu_device *device, struct error *error)
+bool gpu_reserve_waits(const struct gpu_device *device, size_t awaited_bytes)
 {
-    if (device->reserve_until_ns && device->reserve_made && clock_now_ns() >= device->reserve_until_ns)
+    return prefault_goes_on(device->prefault, awaited_bytes);
+}
+
+/* What is beyond the limit is not to be had at all. */
+static bool is_prefaulted(struct gpu_device *device, size_t bytes)
+{
+    uint64_t limit = device->memory_limit_bytes;
+    if (limit && (device->memory_used_bytes > limit || bytes > limit - device->memory_used_bytes))
+        return true;
+    return prefault_is_ready(device->prefault, bytes, device->reserve_until_ns);
+}
+
+bool gpu_reserve_goes_on(struct gpu_device *device, size_t bytes, struct error *error)
+{
+    if (!device->reserve_until_ns)
+        return true;
+    if (device->reserve_made && clock_now_ns() >= device->reserve_until_ns)
         device->reserve_put_off = true;
+    if (!device->reserve_put_off && !is_prefaulted(device, bytes)) {
+        device->reserve_put_off = true;
+        device->reserve_awaited_bytes = bytes;
+    }
     device->reserve_made = true;
     return !device->reserve_put_off || error_set(error, ERROR_BUSY, NULL, "memory is reserved in steps");
 }

@@ -87,36 +87,35 @@ static bool pack_lights(struct gpu_scene *gpu, const struct scene *scene, const 
     return *packed || error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the lights of a scene");
 }
 
-static bool upload_environment(struct gpu_scene *gpu, const struct scene *scene, struct scene_changes *changes,
-                               struct error *error)
+/* Its image is gpu_scene_upload_environment()'s. */
+static void note_environment(struct gpu_scene *gpu, const struct scene *scene, struct scene_changes *changes)
 {
     const struct scene_environment *environment = &scene->environment;
     if (gpu->state->any_update && gpu->state->environment_revision == environment->revision)
-        return true;
+        return;
     memcpy(gpu->environment_colour, environment->colour, sizeof(gpu->environment_colour));
     gpu->environment_rotation = environment->rotation;
     gpu->has_environment_image = environment->texels != NULL;
     changes->bits |= CHANGED_LIGHTS;
-    if (gpu->has_environment_image) {
-        if (!gpu_texture_reserve(gpu->device, &gpu->environment, GL_RGBA16F, environment->width,
-                                 environment->height, error))
-            return false;
-        gpu->state->environment_rows = 0;
-        glTextureParameteri(gpu->environment.name, GL_TEXTURE_WRAP_S, GL_REPEAT); /* all round */
-        changes->uploaded_bytes += gpu->environment.size_bytes;
-    } else {
+    gpu->state->environment_rows = 0;
+    if (gpu->has_environment_image)
+        changes->uploaded_bytes += (uint64_t)environment->width * environment->height * ENVIRONMENT_TEXEL_BYTES;
+    else
         gpu_texture_finish(gpu->device, &gpu->environment);
-    }
     gpu->state->environment_revision = environment->revision;
-    return true;
 }
 
-bool gpu_scene_upload_environment(struct gpu_scene *gpu, uint64_t end_ns)
+bool gpu_scene_upload_environment(struct gpu_scene *gpu, uint64_t end_ns, bool *done, struct error *error)
 {
     const struct scene_environment *environment = &gpu->scene->environment;
     uint32_t *row = &gpu->state->environment_rows;
-    if (!gpu->has_environment_image)
+    *done = !gpu->has_environment_image || *row == environment->height;
+    if (*done)
         return true;
+    if (!gpu_texture_reserve(gpu->device, &gpu->environment, GL_RGBA16F, environment->width, environment->height,
+                             error))
+        return false;
+    glTextureParameteri(gpu->environment.name, GL_TEXTURE_WRAP_S, GL_REPEAT); /* all round */
     const size_t row_bytes = (size_t)environment->width * ENVIRONMENT_TEXEL_BYTES;
     const uint32_t strip =
         ENVIRONMENT_STRIP_BYTES / row_bytes ? (uint32_t)(ENVIRONMENT_STRIP_BYTES / row_bytes) : 1;
@@ -128,7 +127,8 @@ bool gpu_scene_upload_environment(struct gpu_scene *gpu, uint64_t end_ns)
         if (clock_now_ns() >= end_ns)
             break;
     }
-    return *row == environment->height;
+    *done = *row == environment->height;
+    return true;
 }
 
 static void grow(struct gpu_scene *gpu, const float point[3], float radius)
@@ -163,8 +163,8 @@ bool gpu_scene_upload_lights(struct gpu_scene *gpu, const struct scene *scene, c
 {
     uint32_t count_before = gpu->light_count;
     struct light *packed;
-    if (!upload_environment(gpu, scene, changes, error) ||
-        !pack_lights(gpu, scene, motion ? &motion->poses[0] : NULL, &packed, error))
+    note_environment(gpu, scene, changes);
+    if (!pack_lights(gpu, scene, motion ? &motion->poses[0] : NULL, &packed, error))
         return false;
     if (!gpu_scene_check_texels(gpu, (uint64_t)gpu->light_count * LIGHT_TEXELS, "texels of lights", error)) {
         free(packed);

@@ -232,7 +232,8 @@ bool frame_step_waits(const struct frame_renderer *renderer)
                               : !renderer->second_built ? renderer->second
                                                         : NULL;
     if (renderer->phase == PHASE_BUILD)
-        return building && tracer_update_waits(building);
+        return building ? tracer_update_waits(building)
+                        : gpu_reserve_waits(renderer->device, renderer->awaited_bytes);
     return renderer->phase == PHASE_RESOLVE && renderer->copying && all_resolved(renderer) &&
            !gpu_readback_is_done(&renderer->work->copies[renderer->copied % 2]);
 }

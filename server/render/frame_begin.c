@@ -105,10 +105,10 @@ static bool update_environment(struct frame_renderer *renderer, bool *done, stru
     struct render_context *context = &renderer->work->context;
     struct gpu_scene *copy = &renderer->shared->copy;
     uint64_t start_ns = clock_now_ns(), end_ns = start_ns + ENVIRONMENT_STEP_NS;
-    *done = gpu_scene_upload_environment(copy, end_ns);
-    if (!*done)
-        return true;
-    bool updated = environment_update(context->environment, renderer->device, copy, end_ns, done, error);
+    bool updated = gpu_scene_upload_environment(copy, end_ns, done, error);
+    if (!updated || !*done)
+        return updated;
+    updated = environment_update(context->environment, renderer->device, copy, end_ns, done, error);
     stage_times_add(&context->times, STAGE_BUILD, CLOCK_CPU, 0, start_ns, clock_now_ns() - start_ns);
     return updated;
 }
@@ -297,9 +297,10 @@ static bool get_ready_in_steps(struct frame_renderer *renderer, struct error *er
 {
     struct gpu_device *device = renderer->device;
     struct error failed = {0};
+    bool lit = false;
     gpu_reserve_begin(device, RESERVE_NS);
-    bool ready = get_ready(renderer, &failed);
-    bool put_off = gpu_reserve_end(device);
+    bool ready = update_environment(renderer, &lit, &failed) && (!lit || get_ready(renderer, &failed));
+    bool put_off = gpu_reserve_end(device, &renderer->awaited_bytes);
     if (!ready && !put_off && error && error->kind == ERROR_NONE)
         *error = failed;
     return ready || put_off;
@@ -324,10 +325,7 @@ bool frame_build(struct frame_renderer *renderer, struct error *error)
     }
     if (progress != TRACER_DONE)
         return progress == TRACER_MORE;
-    bool lit;
-    if (!update_environment(renderer, &lit, error))
-        return false;
-    return !lit || get_ready_in_steps(renderer, error);
+    return get_ready_in_steps(renderer, error);
 }
 
 static struct trace_view view_of(const struct frame_request *request)
@@ -366,6 +364,7 @@ static bool begin(struct frame_renderer *renderer, const struct scene *scene, co
 static bool begin_tracers(struct frame_renderer *renderer, struct error *error)
 {
     renderer->built = renderer->second_built = false;
+    renderer->awaited_bytes = 0;
     picture_restart(&renderer->picture);
     if (!frame_build(renderer, error))
         return false;

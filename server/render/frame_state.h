@@ -70,6 +70,7 @@ struct frame_renderer {
     struct tracer *tracer, *second; /* held; NULL: none */
     bool built;                     /* `tracer` is what the scene is */
     bool second_built;              /* the same of `second` */
+    size_t awaited_bytes;           /* of a reservation that was put off, see gpu_reserve_waits(); 0: of none */
     bool rasterise;
     uint32_t strip_rows;     /* that are rasterised together */
     uint32_t samples_before; /* that the picture holds of the frames that this one goes on from */

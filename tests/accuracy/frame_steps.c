@@ -199,14 +199,19 @@ static uint32_t count_steps(struct fixture *fixture, struct frame_result *result
 {
     struct error error = {0};
     uint32_t steps = 0;
-    enum frame_progress progress;
-    if (!frame_begin(fixture->renderer, fixture->scene, NULL, &fixture->request, &error))
-        fail_msg("frame_begin: %s: %s", error.field, error.text);
-    do {
-        progress = frame_step(fixture->renderer, result, &error);
-        steps++;
-    } while (progress == FRAME_MORE);
-    assert_int_equal(progress, FRAME_DONE);
+    /* The first frame has its buffers made, in as many steps as their memory takes to come. */
+    for (int i = 0; i < 2; i++) {
+        enum frame_progress progress;
+        frame_result_finish(result);
+        if (!frame_begin(fixture->renderer, fixture->scene, NULL, &fixture->request, &error))
+            fail_msg("frame_begin: %s: %s", error.field, error.text);
+        steps = 0;
+        do {
+            progress = frame_step(fixture->renderer, result, &error);
+            steps++;
+        } while (progress == FRAME_MORE);
+        assert_int_equal(progress, FRAME_DONE);
+    }
     return steps;
 }
 

@@ -14,6 +14,7 @@
 
 #include <epoxy/egl.h>
 #include <epoxy/gl.h>
+#include <sched.h>
 #include <stddef.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -170,6 +171,38 @@ TEST(memory_beyond_the_limit_is_refused_before_the_driver_is_asked)
     device->memory_limit_bytes = limit;
     gpu_buffer_finish(device, &buffer);
     gpu_texture_finish(device, &texture);
+    assert_int_equal(device->memory_used_bytes, before);
+}
+
+/* Software GL clears memory at once, and the kernel may take long to give it. */
+TEST(a_large_reservation_waits_for_its_memory_and_is_made_in_a_later_step)
+{
+    const size_t bytes = (size_t)64 << 20;
+    struct error error = {0};
+    struct gpu_buffer small = {0}, large = {0};
+    uint64_t before = device->memory_used_bytes;
+    size_t awaited_bytes = 0;
+    bool made = false;
+    while (!made) {
+        error = (struct error){0};
+        gpu_reserve_begin(device, 1); /* no time */
+        made =
+            gpu_buffer_reserve(device, &small, 4096, &error) && gpu_buffer_reserve(device, &large, bytes, &error);
+        assert_true(made != gpu_reserve_end(device, &awaited_bytes));
+        assert_int_equal(error.kind, made ? ERROR_NONE : ERROR_BUSY);
+        while (!made && gpu_reserve_waits(device, awaited_bytes))
+            sched_yield();
+    }
+    assert_int_equal(device->memory_used_bytes, before + 4096 + bytes);
+    device->memory_limit_bytes = device->memory_used_bytes + bytes;
+    gpu_reserve_begin(device, UINT64_C(60000000000));
+    error = (struct error){0};
+    assert_false(gpu_buffer_reserve(device, &small, 2 * bytes, &error)); /* nothing is awaited for it */
+    assert_int_equal(error.kind, ERROR_OUT_OF_MEMORY);
+    assert_false(gpu_reserve_end(device, &awaited_bytes));
+    device->memory_limit_bytes = device->facts.memory_bytes;
+    gpu_buffer_finish(device, &small);
+    gpu_buffer_finish(device, &large);
     assert_int_equal(device->memory_used_bytes, before);
 }
 

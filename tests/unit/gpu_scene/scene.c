@@ -254,6 +254,8 @@ TEST(an_environment_image_stays_until_it_is_removed)
     test_commit(&fixture.edits);
     update(&fixture);
     assert_true(fixture.gpu.has_environment_image && (fixture.changes.bits & CHANGED_LIGHTS));
+    bool done = false;
+    assert_true(gpu_scene_upload_environment(&fixture.gpu, UINT64_MAX, &done, NULL) && done);
     assert_int_equal(fixture.gpu.environment.width, 2);
     edit = test_add(&fixture.edits, OBJECT_NODE);
     edit->kind = EDIT_SET_ENVIRONMENT;

@@ -1,0 +1,196 @@
+/* SPDX-License-Identifier: MIT */
+#include "base/prefault.h"
+
+#include "base/clock.h"
+
+#include <pthread.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#define BLOCKS_MAX 16
+/* Between two looks at what else is wanted. */
+#define STEP_BYTES ((size_t)2 << 20)
+/* Drivers allocate a little more than they are asked for. */
+#define SLACK_BYTES ((size_t)1 << 16)
+/* A block that nobody has come for is freed. */
+#define UNCLAIMED_NS UINT64_C(1000000000)
+
+struct block {
+    size_t bytes;   /* that are reserved; 0: none */
+    size_t faulted; /* with the slack */
+    uint8_t *memory;
+    uint64_t finished_ns; /* 0: not yet */
+};
+
+struct prefault {
+    pthread_mutex_t lock; /* of all that follows but the thread */
+    pthread_cond_t changed;
+    struct block blocks[BLOCKS_MAX];
+    size_t total_bytes;
+    bool ends;
+    pthread_t thread; /* of the first block on */
+    bool has_thread;
+};
+
+static struct block *find(struct prefault *prefault, size_t bytes)
+{
+    for (size_t i = 0; i < BLOCKS_MAX; i++)
+        if (prefault->blocks[i].bytes == bytes)
+            return &prefault->blocks[i];
+    return NULL;
+}
+
+static void drop(struct prefault *prefault, struct block *block)
+{
+    prefault->total_bytes -= block->bytes;
+    free(block->memory);
+    *block = (struct block){0};
+}
+
+static size_t left(const struct block *block)
+{
+    return block->bytes + SLACK_BYTES - block->faulted;
+}
+
+/* The one with least left to do; NULL: all are finished. */
+static struct block *next_block(struct prefault *prefault)
+{
+    struct block *next = NULL;
+    for (size_t i = 0; i < BLOCKS_MAX; i++) {
+        struct block *block = &prefault->blocks[i];
+        if (block->bytes && !block->finished_ns && (!next || left(block) < left(next)))
+            next = block;
+    }
+    return next;
+}
+
+/* Until when the thread may wait; 0: for ever. */
+static uint64_t drop_unclaimed(struct prefault *prefault)
+{
+    uint64_t now_ns = clock_now_ns(), first_ns = 0;
+    for (size_t i = 0; i < BLOCKS_MAX; i++) {
+        struct block *block = &prefault->blocks[i];
+        uint64_t end_ns = block->finished_ns + UNCLAIMED_NS;
+        if (block->finished_ns && end_ns <= now_ns)
+            drop(prefault, block);
+        else if (block->finished_ns && (!first_ns || end_ns < first_ns))
+            first_ns = end_ns;
+    }
+    return first_ns;
+}
+
+static void wait_until(struct prefault *prefault, uint64_t until_ns)
+{
+    const struct timespec until = {.tv_sec = (time_t)(until_ns / 1000000000),
+                                   .tv_nsec = (long)(until_ns % 1000000000)};
+    pthread_cond_timedwait(&prefault->changed, &prefault->lock, &until);
+}
+
+static void *run(void *context)
+{
+    struct prefault *prefault = context;
+    pthread_mutex_lock(&prefault->lock);
+    while (!prefault->ends) {
+        struct block *block = next_block(prefault);
+        uint64_t until_ns = drop_unclaimed(prefault);
+        if (!block && until_ns)
+            wait_until(prefault, until_ns);
+        else if (!block)
+            pthread_cond_wait(&prefault->changed, &prefault->lock);
+        if (!block)
+            continue;
+        size_t step = left(block) < STEP_BYTES ? left(block) : STEP_BYTES;
+        pthread_mutex_unlock(&prefault->lock); /* nobody touches an unfinished block meanwhile */
+        memset(block->memory + block->faulted, 0, step);
+        pthread_mutex_lock(&prefault->lock);
+        block->faulted += step;
+        if (left(block) == 0)
+            block->finished_ns = clock_now_ns();
+        pthread_cond_broadcast(&prefault->changed);
+    }
+    pthread_mutex_unlock(&prefault->lock);
+    return NULL;
+}
+
+struct prefault *prefault_create(void)
+{
+    struct prefault *prefault = calloc(1, sizeof(*prefault));
+    if (!prefault)
+        return NULL;
+    pthread_condattr_t monotonic;
+    pthread_condattr_init(&monotonic);
+    pthread_condattr_setclock(&monotonic, CLOCK_MONOTONIC);
+    pthread_mutex_init(&prefault->lock, NULL);
+    pthread_cond_init(&prefault->changed, &monotonic);
+    pthread_condattr_destroy(&monotonic);
+    return prefault;
+}
+
+void prefault_destroy(struct prefault *prefault)
+{
+    if (!prefault)
+        return;
+    pthread_mutex_lock(&prefault->lock);
+    prefault->ends = true;
+    pthread_cond_broadcast(&prefault->changed);
+    pthread_mutex_unlock(&prefault->lock);
+    if (prefault->has_thread)
+        pthread_join(prefault->thread, NULL);
+    for (size_t i = 0; i < BLOCKS_MAX; i++)
+        free(prefault->blocks[i].memory);
+    pthread_cond_destroy(&prefault->changed);
+    pthread_mutex_destroy(&prefault->lock);
+    free(prefault);
+}
+
+/* NULL: it cannot be had. */
+static struct block *begin(struct prefault *prefault, size_t bytes)
+{
+    struct block *block = find(prefault, 0);
+    if (!block || bytes > PREFAULT_BYTES_MAX - prefault->total_bytes)
+        return NULL;
+    if (!prefault->has_thread)
+        prefault->has_thread = pthread_create(&prefault->thread, NULL, run, prefault) == 0;
+    uint8_t *memory = prefault->has_thread ? malloc(bytes + SLACK_BYTES) : NULL;
+    if (!memory)
+        return NULL;
+    pthread_setname_np(prefault->thread, "prefault");
+    *block = (struct block){.bytes = bytes, .memory = memory};
+    prefault->total_bytes += bytes;
+    pthread_cond_broadcast(&prefault->changed);
+    return block;
+}
+
+static bool is_worth_it(const struct prefault *prefault, size_t bytes)
+{
+    return prefault && bytes >= PREFAULT_BYTES_MIN && bytes <= PREFAULT_BYTES_MAX;
+}
+
+bool prefault_is_ready(struct prefault *prefault, size_t bytes, uint64_t until_ns)
+{
+    if (!is_worth_it(prefault, bytes))
+        return true;
+    pthread_mutex_lock(&prefault->lock);
+    struct block *block = find(prefault, bytes);
+    if (!block)
+        block = begin(prefault, bytes);
+    while (block && !block->finished_ns && clock_now_ns() < until_ns)
+        wait_until(prefault, until_ns);
+    bool ready = !block || block->finished_ns;
+    if (block && ready)
+        drop(prefault, block);
+    pthread_mutex_unlock(&prefault->lock);
+    return ready;
+}
+
+bool prefault_goes_on(struct prefault *prefault, size_t bytes)
+{
+    if (!is_worth_it(prefault, bytes))
+        return false;
+    pthread_mutex_lock(&prefault->lock);
+    const struct block *block = find(prefault, bytes);
+    bool goes_on = block && !block->finished_ns;
+    pthread_mutex_unlock(&prefault->lock);
+    return goes_on;
+}
