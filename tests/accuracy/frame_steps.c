@@ -372,7 +372,8 @@ TEST(a_structure_without_waiting_frames_is_forgotten)
             /* Others' work on the machine makes it more pieces, or fewer. */
             for (uint32_t i = 0; i < done && fixture->renderer->phase == PHASE_BUILD; i++)
                 assert_int_equal(step(fixture->renderer, &result, &error), FRAME_MORE);
-            const bool was_building = fixture->renderer->phase == PHASE_BUILD;
+            /* With the structure built, the frame may still wait for memory. */
+            const bool was_building = fixture->renderer->phase == PHASE_BUILD && !fixture->renderer->built;
             assert_true(was_building || done > 0);
             frame_abandon(fixture->renderer);
             /* What a builder works with may stay for the next one, but no structure. */
