@@ -30,7 +30,7 @@ MODULE = "--module"  # run_tests.py --module NAME: one module of integration tes
 # Reasons for which a test may be skipped in CI.
 EXPECTED_SKIPS = (
     r"no systemd can be started here",  # most containers start none
-    r"sanitizers do not run within",
+    r"sanitizers (do not run within|have an allocator)",
     r"ptrace: ",  # forbidden in many containers
     r"this kernel does not name children",
     r"left to make test-long",  # which .ci/run calls
