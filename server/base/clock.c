@@ -3,7 +3,21 @@
 
 #include "protocol/common/clock.h"
 
+#include <errno.h>
+#include <time.h>
+
+#define NS_PER_S UINT64_C(1000000000)
+
 uint64_t clock_now_ns(void)
 {
     return monotonic_now_ns();
+}
+
+bool clock_wait(pthread_cond_t *condition, pthread_mutex_t *lock, uint64_t until_ns)
+{
+    const struct timespec until = {.tv_sec = (time_t)(until_ns / NS_PER_S),
+                                   .tv_nsec = (long)(until_ns % NS_PER_S)};
+    if (until_ns == UINT64_MAX)
+        return pthread_cond_wait(condition, lock) == 0;
+    return pthread_cond_clockwait(condition, lock, CLOCK_MONOTONIC, &until) != ETIMEDOUT;
 }

@@ -6,19 +6,18 @@
 #include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
 #define BLOCKS_MAX 16
 /* Between two looks at what else is wanted. */
 #define STEP_BYTES ((size_t)2 << 20)
 /* Drivers allocate a little more than they are asked for. */
 #define SLACK_BYTES ((size_t)1 << 16)
-/* A block that nobody has come for is freed. */
+/* A finished block that the caller has not asked for again is freed after this time. */
 #define UNCLAIMED_NS UINT64_C(1000000000)
 
 struct block {
-    size_t bytes;   /* that are reserved; 0: none */
-    size_t faulted; /* with the slack */
+    size_t bytes;   /* that the caller will allocate; 0: the place is free */
+    size_t faulted; /* of the bytes and the slack */
     uint8_t *memory;
     uint64_t finished_ns; /* 0: not yet */
 };
@@ -27,9 +26,8 @@ struct prefault {
     pthread_mutex_t lock; /* of all that follows but the thread */
     pthread_cond_t changed;
     struct block blocks[BLOCKS_MAX];
-    size_t total_bytes;
     bool ends;
-    pthread_t thread; /* of the first block on */
+    pthread_t thread; /* since the first block */
     bool has_thread;
 };
 
@@ -41,9 +39,8 @@ static struct block *find(struct prefault *prefault, size_t bytes)
     return NULL;
 }
 
-static void drop(struct prefault *prefault, struct block *block)
+static void drop(struct block *block)
 {
-    prefault->total_bytes -= block->bytes;
     free(block->memory);
     *block = (struct block){0};
 }
@@ -65,26 +62,19 @@ static struct block *next_block(struct prefault *prefault)
     return next;
 }
 
-/* Until when the thread may wait; 0: for ever. */
+/* Returns until when the thread may wait for work. */
 static uint64_t drop_unclaimed(struct prefault *prefault)
 {
-    uint64_t now_ns = clock_now_ns(), first_ns = 0;
+    uint64_t now_ns = clock_now_ns(), first_ns = UINT64_MAX;
     for (size_t i = 0; i < BLOCKS_MAX; i++) {
         struct block *block = &prefault->blocks[i];
         uint64_t end_ns = block->finished_ns + UNCLAIMED_NS;
         if (block->finished_ns && end_ns <= now_ns)
-            drop(prefault, block);
-        else if (block->finished_ns && (!first_ns || end_ns < first_ns))
+            drop(block);
+        else if (block->finished_ns && end_ns < first_ns)
             first_ns = end_ns;
     }
     return first_ns;
-}
-
-static void wait_until(struct prefault *prefault, uint64_t until_ns)
-{
-    const struct timespec until = {.tv_sec = (time_t)(until_ns / 1000000000),
-                                   .tv_nsec = (long)(until_ns % 1000000000)};
-    pthread_cond_timedwait(&prefault->changed, &prefault->lock, &until);
 }
 
 static void *run(void *context)
@@ -92,16 +82,14 @@ static void *run(void *context)
     struct prefault *prefault = context;
     pthread_mutex_lock(&prefault->lock);
     while (!prefault->ends) {
-        struct block *block = next_block(prefault);
         uint64_t until_ns = drop_unclaimed(prefault);
-        if (!block && until_ns)
-            wait_until(prefault, until_ns);
-        else if (!block)
-            pthread_cond_wait(&prefault->changed, &prefault->lock);
-        if (!block)
+        struct block *block = next_block(prefault);
+        if (!block) {
+            clock_wait(&prefault->changed, &prefault->lock, until_ns);
             continue;
+        }
         size_t step = left(block) < STEP_BYTES ? left(block) : STEP_BYTES;
-        pthread_mutex_unlock(&prefault->lock); /* nobody touches an unfinished block meanwhile */
+        pthread_mutex_unlock(&prefault->lock); /* the caller leaves unfinished blocks alone */
         memset(block->memory + block->faulted, 0, step);
         pthread_mutex_lock(&prefault->lock);
         block->faulted += step;
@@ -118,12 +106,8 @@ struct prefault *prefault_create(void)
     struct prefault *prefault = calloc(1, sizeof(*prefault));
     if (!prefault)
         return NULL;
-    pthread_condattr_t monotonic;
-    pthread_condattr_init(&monotonic);
-    pthread_condattr_setclock(&monotonic, CLOCK_MONOTONIC);
     pthread_mutex_init(&prefault->lock, NULL);
-    pthread_cond_init(&prefault->changed, &monotonic);
-    pthread_condattr_destroy(&monotonic);
+    pthread_cond_init(&prefault->changed, NULL);
     return prefault;
 }
 
@@ -144,20 +128,34 @@ void prefault_destroy(struct prefault *prefault)
     free(prefault);
 }
 
-/* NULL: it cannot be had. */
+static size_t total_bytes(const struct prefault *prefault)
+{
+    size_t total = 0;
+    for (size_t i = 0; i < BLOCKS_MAX; i++)
+        total += prefault->blocks[i].bytes;
+    return total;
+}
+
+static bool start_thread(struct prefault *prefault)
+{
+    if (prefault->has_thread)
+        return true;
+    prefault->has_thread = pthread_create(&prefault->thread, NULL, run, prefault) == 0;
+    if (prefault->has_thread)
+        pthread_setname_np(prefault->thread, "prefault");
+    return prefault->has_thread;
+}
+
+/* NULL: there is no thread, or no place or memory for the block. */
 static struct block *begin(struct prefault *prefault, size_t bytes)
 {
     struct block *block = find(prefault, 0);
-    if (!block || bytes > PREFAULT_BYTES_MAX - prefault->total_bytes)
+    if (!block || bytes > PREFAULT_BYTES_MAX - total_bytes(prefault))
         return NULL;
-    if (!prefault->has_thread)
-        prefault->has_thread = pthread_create(&prefault->thread, NULL, run, prefault) == 0;
-    uint8_t *memory = prefault->has_thread ? malloc(bytes + SLACK_BYTES) : NULL;
+    uint8_t *memory = start_thread(prefault) ? malloc(bytes + SLACK_BYTES) : NULL;
     if (!memory)
         return NULL;
-    pthread_setname_np(prefault->thread, "prefault");
     *block = (struct block){.bytes = bytes, .memory = memory};
-    prefault->total_bytes += bytes;
     pthread_cond_broadcast(&prefault->changed);
     return block;
 }
@@ -175,11 +173,12 @@ bool prefault_is_ready(struct prefault *prefault, size_t bytes, uint64_t until_n
     struct block *block = find(prefault, bytes);
     if (!block)
         block = begin(prefault, bytes);
-    while (block && !block->finished_ns && clock_now_ns() < until_ns)
-        wait_until(prefault, until_ns);
+    bool in_time = true;
+    while (block && !block->finished_ns && in_time)
+        in_time = clock_wait(&prefault->changed, &prefault->lock, until_ns);
     bool ready = !block || block->finished_ns;
     if (block && ready)
-        drop(prefault, block);
+        drop(block);
     pthread_mutex_unlock(&prefault->lock);
     return ready;
 }

@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 #include "base/queue.h"
 
+#include "base/clock.h"
+
 #include <pthread.h>
 #include <stdlib.h>
 #include <sys/eventfd.h>
-#include <time.h>
 #include <unistd.h>
 
 struct queue {
@@ -32,13 +33,9 @@ struct queue *queue_create(size_t capacity, bool event_fd)
             return NULL;
         }
     }
-    pthread_condattr_t monotonic;
-    pthread_condattr_init(&monotonic);
-    pthread_condattr_setclock(&monotonic, CLOCK_MONOTONIC);
     pthread_mutex_init(&queue->mutex, NULL);
-    pthread_cond_init(&queue->not_empty, &monotonic);
-    pthread_cond_init(&queue->not_full, &monotonic);
-    pthread_condattr_destroy(&monotonic);
+    pthread_cond_init(&queue->not_empty, NULL);
+    pthread_cond_init(&queue->not_full, NULL);
     return queue;
 }
 
@@ -124,27 +121,14 @@ void *queue_try_pop(struct queue *queue)
     return item;
 }
 
-static struct timespec deadline_after(uint64_t timeout_ns)
-{
-    struct timespec deadline;
-    clock_gettime(CLOCK_MONOTONIC, &deadline);
-    uint64_t ns = (uint64_t)deadline.tv_nsec + timeout_ns % 1000000000u;
-    deadline.tv_sec += (time_t)(timeout_ns / 1000000000u + ns / 1000000000u);
-    deadline.tv_nsec = (long)(ns % 1000000000u);
-    return deadline;
-}
-
 void *queue_pop(struct queue *queue, uint64_t timeout_ns)
 {
-    bool for_ever = timeout_ns == UINT64_MAX;
-    struct timespec deadline = deadline_after(for_ever ? 0 : timeout_ns);
+    uint64_t now_ns = clock_now_ns(),
+             until_ns = timeout_ns < UINT64_MAX - now_ns ? now_ns + timeout_ns : UINT64_MAX;
+    bool in_time = true;
     pthread_mutex_lock(&queue->mutex);
-    while (!queue->length && !queue->closed) {
-        if (for_ever)
-            pthread_cond_wait(&queue->not_empty, &queue->mutex);
-        else if (pthread_cond_timedwait(&queue->not_empty, &queue->mutex, &deadline))
-            break;
-    }
+    while (!queue->length && !queue->closed && in_time)
+        in_time = clock_wait(&queue->not_empty, &queue->mutex, until_ns);
     void *item = take_locked(queue);
     pthread_mutex_unlock(&queue->mutex);
     return item;

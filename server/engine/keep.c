@@ -7,7 +7,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/resource.h>
-#include <time.h>
 
 #define NICENESS 10
 
@@ -101,12 +100,8 @@ struct keep *keep_create(const struct engine_keeper *keeper, void (*on_change)(v
     keep->on_change = on_change;
     keep->context = context;
     keep->end = &keep->first;
-    pthread_condattr_t monotonic;
-    pthread_condattr_init(&monotonic);
-    pthread_condattr_setclock(&monotonic, CLOCK_MONOTONIC);
     pthread_mutex_init(&keep->lock, NULL);
-    pthread_cond_init(&keep->changed, &monotonic);
-    pthread_condattr_destroy(&monotonic);
+    pthread_cond_init(&keep->changed, NULL);
     keep->started = pthread_create(&keep->thread, NULL, run_thread, keep) == 0;
     if (keep->started) {
         pthread_setname_np(keep->thread, "keep");
@@ -120,9 +115,7 @@ struct keep *keep_create(const struct engine_keeper *keeper, void (*on_change)(v
 static void wait_for_all(struct keep *keep, uint64_t within_ns)
 {
     uint64_t end_ns = clock_now_ns() + within_ns;
-    const struct timespec end = {.tv_sec = (time_t)(end_ns / 1000000000u),
-                                 .tv_nsec = (long)(end_ns % 1000000000u)};
-    while (keep->left && pthread_cond_timedwait(&keep->changed, &keep->lock, &end) == 0)
+    while (keep->left && clock_wait(&keep->changed, &keep->lock, end_ns))
         continue;
 }
 

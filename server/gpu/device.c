@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "gpu/device.h"
 
+#include "base/allocator.h"
 #include "base/clock.h"
 #include "base/host.h"
 #include "base/log.h"
@@ -223,7 +224,7 @@ struct gpu_device *gpu_device_create(const struct gpu_options *options, struct e
     }
     ask_facts(&device->facts, device->info.software, device->egl->robust, debug);
     device->memory_limit_bytes = device->facts.memory_bytes;
-    if (device->facts.software)
+    if (device->facts.software && allocator_keeps_pages())
         device->prefault = prefault_create();
     if (debug)
         gpu_debug_start();
@@ -346,7 +347,7 @@ bool gpu_reserve_waits(const struct gpu_device *device, size_t awaited_bytes)
     return prefault_goes_on(device->prefault, awaited_bytes);
 }
 
-/* What is beyond the limit is not to be had at all. */
+/* A reservation beyond the limit is refused, so nothing is prefaulted for it. */
 static bool is_prefaulted(struct gpu_device *device, size_t bytes)
 {
     uint64_t limit = device->memory_limit_bytes;

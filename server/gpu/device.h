@@ -42,9 +42,9 @@ struct gpu_device {
     unsigned empty_buffer;              /* 256 zero bytes, bound in place of an empty buffer */
     uint64_t memory_used_bytes;         /* counted by gpu_memory_take: buffers, textures, Embree */
     uint64_t memory_limit_bytes;        /* 0: none; facts.memory_bytes at first */
-    struct prefault *prefault;          /* NULL: this device has memory of its own, or all that it gets is fast */
+    struct prefault *prefault;          /* of software GL; NULL: its reservations do not wait */
     uint64_t reserve_until_ns;          /* see gpu_reserve_begin; 0: whenever */
-    size_t reserve_awaited_bytes;       /* what was put off waits for the prefault of so many; 0: for its turn */
+    size_t reserve_awaited_bytes; /* size of the reservation that was put off until prefaulted; 0: none was */
     bool reserve_made, reserve_put_off;
     bool lost; /* the context; nothing works any more, see gpu_note_loss */
 };
@@ -79,12 +79,12 @@ void gpu_memory_give(struct gpu_device *device, uint64_t size_bytes);
 
 /* Software GL clears new memory at once, which takes a second a gigabyte and more. From here to gpu_reserve_end(),
  * reservations beyond `time_ns` are put off: they fail with ERROR_BUSY, and the caller comes again with the same
- * ones, of which those that were made stay. Of each time the first one is made in any case, but where its memory
- * is had from the kernel beside this thread (base/prefault.h). */
+ * ones, of which those that were made stay. The first reservation after each gpu_reserve_begin() is made in any
+ * case, unless its memory is still being prefaulted (base/prefault.h). */
 void gpu_reserve_begin(struct gpu_device *device, uint64_t time_ns);
-/* Whether anything was put off; then *awaited_bytes is for gpu_reserve_waits(). */
+/* Whether anything was put off. *awaited_bytes is then for gpu_reserve_waits(). */
 bool gpu_reserve_end(struct gpu_device *device, size_t *awaited_bytes);
-/* Whether what was put off would be put off again. */
+/* Whether the reservation that was put off is still being prefaulted. */
 bool gpu_reserve_waits(const struct gpu_device *device, size_t awaited_bytes);
 /* Before a reservation of that many bytes, 0: before other work of milliseconds for it. False: it is put off. */
 bool gpu_reserve_goes_on(struct gpu_device *device, size_t bytes, struct error *error);

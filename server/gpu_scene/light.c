@@ -87,7 +87,7 @@ static bool pack_lights(struct gpu_scene *gpu, const struct scene *scene, const 
     return *packed || error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the lights of a scene");
 }
 
-/* Its image is gpu_scene_upload_environment()'s. */
+/* All but the image, which gpu_scene_upload_environment() uploads. */
 static void note_environment(struct gpu_scene *gpu, const struct scene *scene, struct scene_changes *changes)
 {
     const struct scene_environment *environment = &scene->environment;

@@ -111,8 +111,8 @@ void gpu_scene_instance_bounds(const struct gpu_scene *gpu, uint32_t instance, f
                                float upper_world[3]);
 /* Binds every buffer and texture at its place of shared/bindings.h. */
 void gpu_scene_bind(struct gpu_scene *gpu);
-/* Uploads the environment's image after an update, until about `end_ns`, in as many calls as it takes. Until it is
- * `done`, no frame may show it. */
+/* Uploads the environment's image after an update, until about `end_ns`, in as many calls as it takes. No frame
+ * may show it before it is `done`. Fails as gpu_texture_reserve(), also where that is put off. */
 bool gpu_scene_upload_environment(struct gpu_scene *gpu, uint64_t end_ns, bool *done, struct error *error);
 uint64_t gpu_scene_device_bytes(const struct gpu_scene *gpu);
 

@@ -364,7 +364,6 @@ static bool begin(struct frame_renderer *renderer, const struct scene *scene, co
 static bool begin_tracers(struct frame_renderer *renderer, struct error *error)
 {
     renderer->built = renderer->second_built = false;
-    renderer->awaited_bytes = 0;
     picture_restart(&renderer->picture);
     if (!frame_build(renderer, error))
         return false;

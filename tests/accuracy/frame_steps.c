@@ -199,7 +199,7 @@ static uint32_t count_steps(struct fixture *fixture, struct frame_result *result
 {
     struct error error = {0};
     uint32_t steps = 0;
-    /* The first frame has its buffers made, in as many steps as their memory takes to come. */
+    /* The first frame reserves buffers, in steps whose number depends on the machine. */
     for (int i = 0; i < 2; i++) {
         enum frame_progress progress;
         frame_result_finish(result);

@@ -4,10 +4,8 @@
 #include "base/clock.h"
 #include "base/parallel.h"
 
-#include <errno.h>
 #include <pthread.h>
 #include <stdlib.h>
-#include <time.h>
 
 struct bvh_run {
     struct bvh_job *jobs;
@@ -64,16 +62,6 @@ static void *run_thread(void *argument)
     return NULL;
 }
 
-static void init_ended(struct bvh_run *run)
-{
-    pthread_condattr_t attributes;
-    pthread_condattr_init(&attributes);
-    pthread_condattr_setclock(&attributes, CLOCK_MONOTONIC);
-    pthread_cond_init(&run->ended, &attributes);
-    pthread_condattr_destroy(&attributes);
-    pthread_mutex_init(&run->mutex, NULL);
-}
-
 struct bvh_run *bvh_jobs_start(struct bvh_job *jobs, uint32_t count, const struct bvh_form *settings)
 {
     uint64_t primitives = 0;
@@ -89,7 +77,8 @@ struct bvh_run *bvh_jobs_start(struct bvh_job *jobs, uint32_t count, const struc
         jobs[i].error = (struct error){0};
         primitives += jobs[i].shape.primitive_count;
     }
-    init_ended(run);
+    pthread_cond_init(&run->ended, NULL);
+    pthread_mutex_init(&run->mutex, NULL);
     run->has_thread =
         primitives >= BVH_THREADED_PRIMITIVES && pthread_create(&run->thread, NULL, run_thread, run) == 0;
     if (!run->has_thread)
@@ -99,12 +88,10 @@ struct bvh_run *bvh_jobs_start(struct bvh_job *jobs, uint32_t count, const struc
 
 bool bvh_jobs_wait(struct bvh_run *run, uint64_t until_ns)
 {
-    const struct timespec until = {(time_t)(until_ns / 1000000000u), (long)(until_ns % 1000000000u)};
     pthread_mutex_lock(&run->mutex);
-    int waited = 0;
-    while (!run->has_ended && waited != ETIMEDOUT)
-        waited = until_ns == UINT64_MAX ? pthread_cond_wait(&run->ended, &run->mutex)
-                                        : pthread_cond_timedwait(&run->ended, &run->mutex, &until);
+    bool in_time = true;
+    while (!run->has_ended && in_time)
+        in_time = clock_wait(&run->ended, &run->mutex, until_ns);
     bool has_ended = run->has_ended;
     pthread_mutex_unlock(&run->mutex);
     return has_ended;

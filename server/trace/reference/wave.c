@@ -3,16 +3,15 @@
  * at the end of its step even where a single packet of rays takes a quarter of a second. */
 #include "trace/reference/tracer.h"
 
+#include "base/clock.h"
 #include "shared/hit.h"
 #include "shared/ray.h"
 #include "trace/step.h"
 
 #include <stdlib.h>
-#include <time.h>
 
 /* The traversal looks at the clock between two packets: usually it ends this soon after the step. */
 #define LANDING_NS UINT64_C(500000)
-#define NS_PER_S UINT64_C(1000000000)
 
 /* ---- life ---- */
 
@@ -25,12 +24,8 @@ struct trace_state *reference_state_create(struct gpu_device *device, const stru
         error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the state of a wave");
         return NULL;
     }
-    pthread_condattr_t monotonic;
-    pthread_condattr_init(&monotonic);
-    pthread_condattr_setclock(&monotonic, CLOCK_MONOTONIC);
     pthread_mutex_init(&wave->lock, NULL);
-    pthread_cond_init(&wave->landed, &monotonic);
-    pthread_condattr_destroy(&monotonic);
+    pthread_cond_init(&wave->landed, NULL);
     return &wave->base;
 }
 
@@ -132,13 +127,10 @@ static void take_off(struct reference *reference, struct reference_wave *wave, c
 static bool has_landed(struct reference_wave *wave, uint64_t step_end_ns)
 {
     uint64_t until_ns = step_end_ns == STEP_WITHOUT_END ? STEP_WITHOUT_END : step_end_ns + LANDING_NS;
-    const struct timespec until = {.tv_sec = (time_t)(until_ns / NS_PER_S),
-                                   .tv_nsec = (long)(until_ns % NS_PER_S)};
-    int status = 0;
+    bool in_time = true;
     pthread_mutex_lock(&wave->lock);
-    while (!wave->has_landed && status == 0)
-        status = until_ns == STEP_WITHOUT_END ? pthread_cond_wait(&wave->landed, &wave->lock)
-                                              : pthread_cond_timedwait(&wave->landed, &wave->lock, &until);
+    while (!wave->has_landed && in_time)
+        in_time = clock_wait(&wave->landed, &wave->lock, until_ns);
     bool landed = wave->has_landed;
     pthread_mutex_unlock(&wave->lock);
     return landed;

@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: MIT */
-/* base/prefault: memory that is had from the kernel beside the thread that needs it. */
+/* base/prefault: memory prefaulted by a background thread. */
 #include <stddef.h>
 #include <stdint.h>
 
+#include "base/allocator.h"
 #include "base/clock.h"
 #include "base/prefault.h"
 #include "tests/harness/test.h"
@@ -15,10 +16,6 @@
 #define BLOCK_BYTES ((size_t)64 << 20)
 #define LONG_NS UINT64_C(60000000000)
 
-/* jemalloc's; NULL where the sanitizers have an allocator of their own. */
-extern int mallctl(const char *name, void *old, size_t *old_bytes, void *new, size_t new_bytes)
-    __attribute__((weak));
-
 static long faults_of_this_thread(void)
 {
     struct rusage usage;
@@ -28,7 +25,7 @@ static long faults_of_this_thread(void)
 
 TEST(a_block_that_was_prefaulted_is_filled_without_faults)
 {
-    if (!mallctl) {
+    if (!allocator_keeps_pages()) {
         print_message("SKIP: sanitizers have an allocator of their own\n");
         skip();
     }
@@ -54,8 +51,8 @@ TEST(what_is_not_ready_is_put_off_and_ready_later)
         sched_yield();
     assert_true(prefault_is_ready(prefault, BLOCK_BYTES, 0));
     assert_false(prefault_goes_on(prefault, BLOCK_BYTES));
-    assert_false(prefault_is_ready(prefault, BLOCK_BYTES, 0)); /* each block is for one */
-    prefault_destroy(prefault);                                /* and nobody has to come for it */
+    assert_false(prefault_is_ready(prefault, BLOCK_BYTES, 0)); /* each block serves one reservation */
+    prefault_destroy(prefault);                                /* also with an unfinished block */
 }
 
 TEST(a_small_block_does_not_wait_for_a_large_one)
@@ -78,6 +75,6 @@ TEST(what_is_not_worth_it_or_too_much_does_not_wait)
     assert_true(prefault_is_ready(prefault, PREFAULT_BYTES_MIN - 1, 0));
     assert_true(prefault_is_ready(prefault, PREFAULT_BYTES_MAX + 1, 0));
     assert_false(prefault_is_ready(prefault, PREFAULT_BYTES_MAX, 0));
-    assert_true(prefault_is_ready(prefault, BLOCK_BYTES, 0)); /* beside that it would be too much */
+    assert_true(prefault_is_ready(prefault, BLOCK_BYTES, 0)); /* together they would be too much */
     prefault_destroy(prefault);
 }

@@ -174,7 +174,7 @@ TEST(memory_beyond_the_limit_is_refused_before_the_driver_is_asked)
     assert_int_equal(device->memory_used_bytes, before);
 }
 
-/* Software GL clears memory at once, and the kernel may take long to give it. */
+/* Software GL clears new memory at once, which is slow where each page is a fault. */
 TEST(a_large_reservation_waits_for_its_memory_and_is_made_in_a_later_step)
 {
     const size_t bytes = (size_t)64 << 20;
@@ -197,7 +197,7 @@ TEST(a_large_reservation_waits_for_its_memory_and_is_made_in_a_later_step)
     device->memory_limit_bytes = device->memory_used_bytes + bytes;
     gpu_reserve_begin(device, UINT64_C(60000000000));
     error = (struct error){0};
-    assert_false(gpu_buffer_reserve(device, &small, 2 * bytes, &error)); /* nothing is awaited for it */
+    assert_false(gpu_buffer_reserve(device, &small, 2 * bytes, &error)); /* refused, not put off */
     assert_int_equal(error.kind, ERROR_OUT_OF_MEMORY);
     assert_false(gpu_reserve_end(device, &awaited_bytes));
     device->memory_limit_bytes = device->facts.memory_bytes;
