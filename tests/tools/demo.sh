@@ -97,7 +97,8 @@ pictures() {
         render "$private/scenes/fine-teapot.glb" --environment "$sky" --size 960x540 --samples 6 \
         --integrator whitted --depth 6 --timings
     picture 4 orbit/%04d.png '24 frames once around a sphereflake' \
-        animate "$private/scenes/sphereflake-3.nff" --size 480x270 --orbit --frames 1-24 --fps 24
+        animate "$private/scenes/sphereflake-3.nff" --size 480x270 --orbit --frames 1-24 --fps 24 \
+        --eye 2.1,1.3,1.7 --look-at 0,0,0 --up 0,0,1 --fov 45
     picture 7 lens.png 'a lens that is in focus on the nearest pot' \
         render "$carousel" --environment "$dusk" --clip ride --time 0.7 --size 640x360 \
         --samples 16 --aperture 0.3 --focus 7.4 --timings
