@@ -51,16 +51,31 @@ const char *cli_base_name(const char *path)
     return slash ? slash + 1 : path;
 }
 
+/* A file without a name, which nobody finds if this process is killed now. Some file systems have only files with
+ * one. -1: errno says why. */
+static int open_probe(const char *folder)
+{
+    const int fd = open(folder, O_TMPFILE | O_WRONLY | O_CLOEXEC, 0600);
+    if (fd >= 0 || (errno != EOPNOTSUPP && errno != EISDIR))
+        return fd;
+    char path[4200];
+    if ((size_t)snprintf(path, sizeof(path), "%s/.farlight-XXXXXX", folder) >= sizeof(path)) {
+        errno = ENAMETOOLONG;
+        return -1;
+    }
+    const int named = mkostemp(path, O_CLOEXEC);
+    if (named >= 0)
+        unlink(path);
+    return named;
+}
+
 /* Rights, read-only file systems, quotas: only an attempt shows them. */
 static bool try_folder(const char *path, const char *folder, struct fl_error *error)
 {
-    char probe[4200];
-    const int length = snprintf(probe, sizeof(probe), "%s/.farlight-XXXXXX", folder);
-    const int fd = length > 0 && (size_t)length < sizeof(probe) ? mkostemp(probe, O_CLOEXEC) : -1;
+    const int fd = open_probe(folder);
     if (fd < 0)
         return fl_error_set(error, FL_ERROR_FILE, path, "its folder cannot be written: %s", strerror(errno));
     close(fd);
-    unlink(probe);
     return true;
 }
 

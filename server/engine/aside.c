@@ -2,15 +2,13 @@
 #include "engine/aside.h"
 
 #include "base/clock.h"
+#include "base/host.h"
 #include "base/progress.h"
 
 #include <pthread.h>
 #include <stdlib.h>
-#include <sys/resource.h>
 
 #define THREADS 3
-/* Frames go before. */
-#define NICENESS 5
 
 struct list {
     struct aside_commit *first, **end;
@@ -82,7 +80,7 @@ static void carry_out(struct aside_commit *commit)
 static void *run_thread(void *context)
 {
     struct aside *aside = context;
-    setpriority(PRIO_PROCESS, 0, NICENESS); /* of this thread alone, on Linux */
+    host_thread_gives_way();
     pthread_mutex_lock(&aside->lock);
     const unsigned self = aside->numbered++;
     while (!aside->closed) {

@@ -2,13 +2,11 @@
 #include "engine/keep.h"
 
 #include "base/clock.h"
+#include "base/host.h"
 
 #include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/resource.h>
-
-#define NICENESS 10
 
 struct order {
     struct order *next;
@@ -66,7 +64,7 @@ static struct order *take_first(struct keep *keep)
 static void *run_thread(void *context)
 {
     struct keep *keep = context;
-    setpriority(PRIO_PROCESS, 0, NICENESS); /* of this thread alone, on Linux */
+    host_thread_gives_way();
     pthread_mutex_lock(&keep->lock);
     for (struct order *order; (order = take_first(keep)) || !keep->closed;) {
         if (!order) {

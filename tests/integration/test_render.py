@@ -220,6 +220,12 @@ class BadInput(Case):
         self.expect(farlight("render", cornell, "--size", "8x8", "-o", folder / "x.png"), 0)
         self.assertEqual(self.leftovers(), ["made/for/it/x.png"])
 
+    def test_a_client_that_is_killed_while_it_tries_its_folder_leaves_no_file_there(self):
+        before = self.folder.stat().st_mtime_ns
+        self.refused(75, "render", bundled_scenes() / "cornell.glb", "-o", self.folder / "x.png", "--server",
+                     f"unix:{self.folder}/nobody.sock")
+        self.assertEqual(self.folder.stat().st_mtime_ns, before, "a file with a name was there")
+
     def test_messages_name_the_pattern_of_the_files_not_a_file_that_nobody_wants(self):
         (self.folder / "file").write_text("")
         result = farlight("animate", bundled_scenes() / "cornell.glb", "--frames", "1-2", "-o", self.folder / "file" / "%04d.png")

@@ -2,6 +2,7 @@
 #include "trace/bvh/build.h"
 
 #include "base/clock.h"
+#include "base/host.h"
 #include "base/parallel.h"
 
 #include <pthread.h>
@@ -50,15 +51,20 @@ static void run_all(struct bvh_run *run)
     parallel_run(threads, run->count, run_small, run);
 }
 
-static void *run_thread(void *argument)
+static void run_to_end(struct bvh_run *run)
 {
-    struct bvh_run *run = argument;
     run_all(run);
     pthread_mutex_lock(&run->mutex);
     run->end_ns = clock_now_ns();
     run->has_ended = true;
     pthread_cond_signal(&run->ended);
     pthread_mutex_unlock(&run->mutex);
+}
+
+static void *run_thread(void *argument)
+{
+    host_thread_gives_way();
+    run_to_end(argument);
     return NULL;
 }
 
@@ -82,7 +88,7 @@ struct bvh_run *bvh_jobs_start(struct bvh_job *jobs, uint32_t count, const struc
     run->has_thread =
         primitives >= BVH_THREADED_PRIMITIVES && pthread_create(&run->thread, NULL, run_thread, run) == 0;
     if (!run->has_thread)
-        run_thread(run);
+        run_to_end(run);
     return run;
 }
 

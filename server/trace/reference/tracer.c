@@ -2,6 +2,7 @@
 #include "trace/reference/tracer.h"
 
 #include "base/clock.h"
+#include "base/host.h"
 #include "shared/hit.h"
 #include "shared/ray.h"
 
@@ -156,13 +157,18 @@ static struct tracer *reference_create(struct gpu_device *device, const struct t
 
 /* ---- building ---- */
 
-static void *run_builder(void *context)
+static void build(struct reference *reference)
 {
-    struct reference *reference = context;
     uint64_t start_ns = clock_now_ns();
     reference_scene_build(reference);
     reference->build_ns = clock_now_ns() - start_ns;
     atomic_store(&reference->is_built, true);
+}
+
+static void *run_builder(void *context)
+{
+    host_thread_gives_way();
+    build(context);
     return NULL;
 }
 
@@ -172,7 +178,7 @@ static void begin_build(struct reference *reference)
     atomic_store(&reference->is_built, false);
     reference->is_building = pthread_create(&reference->builder, NULL, run_builder, reference) == 0;
     if (!reference->is_building)
-        run_builder(reference);
+        build(reference);
 }
 
 /* What is under way of waves that nobody waits for any more reads the structure. */

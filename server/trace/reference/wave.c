@@ -4,6 +4,7 @@
 #include "trace/reference/tracer.h"
 
 #include "base/clock.h"
+#include "base/host.h"
 #include "shared/hit.h"
 #include "shared/ray.h"
 #include "trace/step.h"
@@ -87,9 +88,8 @@ bool reference_trace_begin(struct tracer *tracer, struct gpu_scene *scene, struc
 
 /* ---- ranges ---- */
 
-static void *traverse(void *context)
+static void traverse(struct reference_wave *wave)
 {
-    struct reference_wave *wave = context;
     struct reference *reference = wave->reference;
     uint32_t end = reference_traverse(reference, wave);
     atomic_fetch_sub(&reference->waves_under_way, 1);
@@ -98,6 +98,12 @@ static void *traverse(void *context)
     wave->has_landed = true;
     pthread_cond_signal(&wave->landed);
     pthread_mutex_unlock(&wave->lock);
+}
+
+static void *run_thread(void *context)
+{
+    host_thread_gives_way();
+    traverse(context);
     return NULL;
 }
 
@@ -117,7 +123,7 @@ static void take_off(struct reference *reference, struct reference_wave *wave, c
     wave->has_landed = false;
     wave->reference = reference;
     atomic_fetch_add(&reference->waves_under_way, 1);
-    if (pthread_create(&wave->thread, NULL, traverse, wave) == 0)
+    if (pthread_create(&wave->thread, NULL, run_thread, wave) == 0)
         return;
     traverse(wave);
     wave->reference = NULL;
