@@ -94,8 +94,9 @@ static const struct option options[] = {
 
     {"limits", "clients", ANYTIME, OPTION_U32, AT(limits.clients), "256", 1, 65536, "", "Connected clients"},
     {"limits", "share", ANYTIME, OPTION_U32, AT(limits.share_percent), "75", 1, 100, "%",
-     "What one user or key may have of what all have together: of limits.clients, memory.frames and "
-     "memory.transactions. The rest is kept for others. The daemon's own user and root always find a place"},
+     "What one user or key may have of what all have together: of limits.clients, memory.frames, memory.transactions "
+     "and, while others render, memory.device. The rest is kept for others. The daemon's own user and root always find "
+     "a place"},
     {"limits", "unauthenticated", ANYTIME, OPTION_U32, AT(limits.unauthenticated), "64", 2, 65536, "",
      "Connections whose handshake is not complete. Beyond half of them, a newcomer takes the place of one of the user "
      "or network that has most, chosen at random"},
@@ -381,6 +382,7 @@ static struct engine_limits engine_limits(const struct config *config)
         .scene = {.host_bytes = config->scene_bytes, .nodes = config->limits.nodes, .depth = config->limits.depth},
         .scene_linger_ms = config->scene_linger_s * UINT64_C(1000),
         .lingering_scenes = config->lingering_scenes,
+        .device_share_percent = config->limits.share_percent,
     };
 }
 

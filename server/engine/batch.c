@@ -145,7 +145,7 @@ struct job *job_find(struct engine *engine, uint64_t client, uint32_t request)
 
 /* ---- end ---------------------------------------------------------------------------------------- */
 
-static void abandon_frame(struct engine *engine, struct job *job)
+void job_abandon_frame(struct engine *engine, struct job *job)
 {
     if (!job->rendering)
         return;
@@ -158,13 +158,12 @@ static void abandon_frame(struct engine *engine, struct job *job)
 /* The output may outlive the job: frames may still be in the encoder or wait for the network thread. */
 static void job_remove(struct engine *engine, struct job *job)
 {
-    abandon_frame(engine, job);
+    job_abandon_frame(engine, job);
     if (job->scene->put_off == job)
         job->scene->put_off = NULL;
     if (engine->turn_of == job)
         engine->turn_of = NULL;
-    if (engine->needs_all == job)
-        engine->needs_all = NULL;
+    engine_needs_no_memory(engine, job);
     job_leave_renderer(engine, job);
     size_t i = 0;
     while (engine->jobs[i] != job)
@@ -223,26 +222,17 @@ static void job_finish(struct job *job, const struct error *error)
 
 /* ---- frames ------------------------------------------------------------------------------------- */
 
-/* Whether the job has a frame to begin, and a free place for it. */
-static bool wants_frame(const struct job *job)
+bool job_wants_frame(const struct job *job)
 {
     return !job_output_is_closed(job->output) && !job->rendering && job->next_frame <= job->spec.last_frame &&
            job_output_has_room(job->output) &&
            (job->spec.kind == JOB_BATCH ? job_output_has_credit(job->output) : view_due_ns(job) != UINT64_MAX);
 }
 
-static bool any_frame(const struct engine *engine)
-{
-    bool any = false;
-    for (size_t i = 0; i < engine->job_count; i++)
-        any = any || engine->jobs[i]->rendering;
-    return any;
-}
-
 /* Something waits for the frames in progress to end. */
 static bool is_waited_for(const struct engine_scene *scene)
 {
-    return scene->commit || scene->waiting_count || (scene->put_off && wants_frame(scene->put_off));
+    return scene->commit || scene->waiting_count || (scene->put_off && job_wants_frame(scene->put_off));
 }
 
 /* A frame of a batch may take minutes, in which views of the scene would show nothing: while such a frame delays
@@ -262,12 +252,10 @@ static bool may_begin_meanwhile(const struct engine *engine, const struct job *j
 static bool may_begin(const struct engine *engine, const struct job *job)
 {
     const struct engine_scene *scene = job->scene;
-    if (scene->commit)
-        return false;
-    if (engine->needs_all && engine->needs_all != job && wants_frame(engine->needs_all))
+    if (scene->commit || !engine_memory_lets_begin(engine, job))
         return false;
     if (engine->needs_all == job)
-        return !scene->waiting_count && !any_frame(engine);
+        return !scene->waiting_count;
     if (!scene->waiting_count && scene->put_off == job)
         return !scene->frames;
     return !is_waited_for(scene) || (scene->put_off != job && may_begin_meanwhile(engine, job));
@@ -278,7 +266,7 @@ static uint64_t ready_ns(const struct engine *engine, const struct job *job)
 {
     if (job->rendering)
         return job_output_is_closed(job->output) ? UINT64_MAX : 0;
-    if (!wants_frame(job) || !may_begin(engine, job))
+    if (!job_wants_frame(job) || !may_begin(engine, job))
         return UINT64_MAX;
     return job->spec.kind == JOB_VIEW ? view_due_ns(job) : 0;
 }
@@ -316,25 +304,15 @@ static void device_lost(struct engine *engine, struct job *job)
 }
 
 /* Whether the frame is worth another try; if not, the job has failed. */
-static void frame_failed(struct engine *engine, struct job *job, const struct error *error)
+static void frame_failed(struct engine *engine, struct job *job, struct error *error)
 {
-    abandon_frame(engine, job);
+    job_abandon_frame(engine, job);
     if (error->kind == ERROR_DEVICE_LOST && engine->device) {
         device_lost(engine, job);
         return;
     }
-    if (error->kind == ERROR_OUT_OF_MEMORY && !job->evicted && engine_evict_idle(engine, job)) {
-        job->evicted = true;
-        log_write(LOG_INFO, "engine", "evicted idle structures from device memory for a frame");
-        return;
-    }
-    if (error->kind == ERROR_OUT_OF_MEMORY && any_frame(engine)) {
-        /* Their resources are idle afterwards. */
-        job->evicted = false;
-        engine->needs_all = job;
-        return;
-    }
-    job_finish(job, error);
+    if (error->kind != ERROR_OUT_OF_MEMORY || !engine_make_room(engine, job, error))
+        job_finish(job, error);
 }
 
 /* Or puts it off. */
@@ -352,8 +330,7 @@ static bool frame_begin_shot(struct engine *engine, struct job *job, const struc
     }
     if (scene->put_off == job)
         scene->put_off = NULL;
-    if (engine->needs_all == job)
-        engine->needs_all = NULL;
+    engine_needs_no_memory(engine, job);
     if (!engine->backend->begin(job->renderer, scene->scene, motion, &shot->request, error))
         return false;
     job->rendering = true;
@@ -447,8 +424,9 @@ static void frame_go_on(struct engine *engine, struct job *job)
 
 void job_step(struct engine *engine, struct job *job)
 {
+    engine_limit_memory(engine, job);
     if (job->rendering && job->spec.kind == JOB_VIEW && view_is_stale(job)) {
-        abandon_frame(engine, job);
+        job_abandon_frame(engine, job);
     } else if (job->rendering) {
         frame_go_on(engine, job);
     } else {

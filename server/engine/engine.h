@@ -32,6 +32,7 @@ struct engine_limits {
     uint64_t scene_linger_ms;  /* how long an attachable scene lingers without a holder; 0: it ends at once */
     uint32_t lingering_scenes; /* maximum of lingering scenes; beyond it, the client with most of them loses its
                                   oldest; 0: default */
+    uint32_t device_share_percent; /* of the device's memory: what an owner may have while others render; 0: all */
 };
 
 /* Who keeps attachable scenes for the next process. */

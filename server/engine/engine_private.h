@@ -28,6 +28,8 @@ struct engine_owner {
     uint64_t number;
     size_t clients;
     struct schedule_owner schedule;
+    /* Its job that lacked memory beside its other frames: none of those begins before. NULL: none. */
+    struct job *needs_own;
 };
 
 struct engine_client {
@@ -60,7 +62,8 @@ struct engine_scene {
     uint64_t left_ns;                    /* since when it has had no holder */
     bool is_restored;                    /* and has had none since: the last process had that many */
     enum sharing sharing;
-    uint64_t principal; /* the owner that opened it */
+    uint64_t principal; /* that opened it */
+    uint64_t owner;     /* to whom that client belonged: whose share of the device's memory it takes */
     struct scene *scene;
     struct aside_commit
         *commit;                /* that changes `scene` beside this thread, which keeps away from it; NULL: none */
@@ -160,7 +163,8 @@ struct engine {
      * none.
      */
     struct job *needs_all;
-    struct job *turn_of; /* the job of the last slice; NULL: it has ended, or none was ready */
+    uint64_t memory_shared_until_ns; /* until when no owner has more than its share */
+    struct job *turn_of;             /* the job of the last slice; NULL: it has ended, or none was ready */
     uint64_t frames, rays;
     uint64_t table_bytes;    /* of all scenes */
     uint64_t promised_bytes; /* for those that change beside this thread */
@@ -250,6 +254,10 @@ void job_abort(struct engine *engine, struct job *job, struct engine_event *fina
 /* Releases jobs whose last event is sent. */
 void jobs_reap(struct engine *engine);
 void job_credit(struct job *job, uint64_t credit); /* absolute */
+/* Whether the job has a frame to begin, and a free place for it. */
+bool job_wants_frame(const struct job *job);
+/* Gives up its frame in progress, if there is one, which begins again. */
+void job_abandon_frame(struct engine *engine, struct job *job);
 
 /* view.c: what differs for views. */
 /* Goes on where the view left off that `job` takes the place of. */
@@ -276,9 +284,9 @@ bool engine_need_device(struct engine *engine, struct error *error);
 bool engine_job_may_go_on(struct job *job, struct error *error);
 /* Releases everything on the device, and the device. */
 void engine_drop_device(struct engine *engine);
-/* Evicts resources on the device that neither a frame in progress nor the next frame of `keep` needs. False: there
- * were none. */
-bool engine_evict_idle(struct engine *engine, const struct job *keep);
+/* Evicts resources on the device, of one owner or (NULL) of all, that neither a frame in progress nor the next
+ * frame of `keep` needs. False: there were none. */
+bool engine_evict_idle(struct engine *engine, const struct job *keep, const struct engine_owner *owner);
 /* A renderer for a job without one: its reference's, or a new one. */
 bool job_need_renderer(struct engine *engine, struct job *job, struct error *error);
 /* Leaves it to the next job by its reference. */
@@ -291,6 +299,16 @@ void scene_drop_shared(struct engine *engine, struct engine_scene *scene);
 uint64_t scene_own_device_bytes(const struct engine *engine, const struct engine_scene *scene);
 uint64_t job_device_bytes(const struct engine *engine, const struct job *job);
 uint64_t engine_device_bytes(const struct engine *engine);
+
+/* memory.c: the device's memory among owners. */
+/* Before each slice: what the device may have in use for the job's owner to have no more than its share. */
+void engine_limit_memory(struct engine *engine, const struct job *job);
+/* For a job whose frame, given up by now, lacked memory. Whether it is worth another try, at once or when others
+ * have ended; if not, *error says more. */
+bool engine_make_room(struct engine *engine, struct job *job, struct error *error);
+/* Whether it would take memory that another job waits for. */
+bool engine_memory_lets_begin(const struct engine *engine, const struct job *job);
+void engine_needs_no_memory(struct engine *engine, const struct job *job); /* any more */
 
 /* stats.c */
 /* NULL: out of memory. */

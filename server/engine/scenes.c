@@ -366,6 +366,7 @@ static bool scene_add(struct engine *engine, const struct engine_command *comman
     scene->frames_ended = 1;
     scene->sharing = command->sharing;
     scene->principal = command->principal;
+    scene->owner = command->owner;
     if (command->kept_revision) {
         scene->scene->revision = command->kept_revision - 1;
         scene->kept_revision = command->kept_revision;

@@ -52,10 +52,9 @@ static bool count_memory(void *context, ssize_t bytes, bool post)
 {
     struct reference *reference = context;
     long long sum = atomic_fetch_add(&reference->device_bytes, bytes) + bytes;
-    const struct gpu_device *gpu = reference->base.device;
-    if (bytes <= 0 || !gpu || gpu->memory_limit_bytes == 0)
+    if (bytes <= 0 || reference->limit_bytes == 0)
         return true;
-    bool fits = sum < 0 || reference->others_bytes + (uint64_t)sum <= gpu->memory_limit_bytes;
+    bool fits = sum < 0 || reference->others_bytes + (uint64_t)sum <= reference->limit_bytes;
     if (!fits && !post) /* it will not be allocated */
         atomic_fetch_sub(&reference->device_bytes, bytes);
     return fits;
@@ -235,6 +234,7 @@ static enum tracer_progress reference_update(struct tracer *tracer, struct gpu_s
         end_waves(reference);
         const struct gpu_device *gpu = tracer->device;
         reference->others_bytes = gpu ? gpu->memory_used_bytes - reference->taken_bytes : 0;
+        reference->limit_bytes = gpu ? gpu->memory_limit_bytes : 0;
         bool read = reference_scene_update(reference, scene, update->changed, &builds, error);
         stage_times_add(update->times, STAGE_BUILD, CLOCK_CPU, 0, start_ns, clock_now_ns() - start_ns);
         if (!read)

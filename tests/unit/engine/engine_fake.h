@@ -34,6 +34,7 @@
 #define FAKE_RENDERER_BYTES 7
 
 struct frame_scene {
+    struct gpu_device *device;
     uint64_t revision;      /* that was shown last */
     bool moved;             /* with something in motion, or else changed */
     uint32_t frames, users; /* in progress; renderers */
@@ -64,7 +65,8 @@ static struct {
     atomic_int fail_kind;       /* enum error_code */
     atomic_int fail_from_frame; /* frames from this number on fail; 0: none */
     atomic_bool no_device;
-    atomic_bool holds_steps; /* as long as it is set, a step does not end */
+    atomic_bool takes_memory; /* a frame in progress takes a byte of the device's memory for each pixel */
+    atomic_bool holds_steps;  /* as long as it is set, a step does not end */
     atomic_int steps_held;
     atomic_int in_progress; /* frames, of all scenes */
     atomic_int step_count;
@@ -102,6 +104,7 @@ static inline struct frame_scene *fake_scene_create(struct gpu_device *device, s
     atomic_fetch_add(&fake.scenes, 1);
     struct frame_scene *shared = calloc(1, sizeof(*shared));
     assert_non_null(shared);
+    shared->device = device;
     return shared;
 }
 
@@ -133,11 +136,17 @@ static inline struct frame_renderer *fake_renderer_create(struct frame_scene *sh
     return renderer;
 }
 
+static inline uint64_t fake_frame_bytes(const struct frame_request *request)
+{
+    return atomic_load(&fake.takes_memory) ? (uint64_t)request->width * request->height : 0;
+}
+
 static inline void fake_end_frame(struct frame_renderer *renderer)
 {
     if (!renderer->busy)
         return;
     renderer->busy = false;
+    gpu_memory_give(renderer->shared->device, fake_frame_bytes(&renderer->request));
     renderer->shared->frames--;
     atomic_fetch_sub(&fake.in_progress, 1);
 }
@@ -154,8 +163,7 @@ static inline void fake_renderer_destroy(struct frame_renderer *renderer)
 
 static inline uint64_t fake_renderer_bytes(const struct frame_renderer *renderer)
 {
-    (void)renderer;
-    return FAKE_RENDERER_BYTES;
+    return FAKE_RENDERER_BYTES + (renderer->busy ? fake_frame_bytes(&renderer->request) : 0);
 }
 
 /* Of everything that a motion says; 0: none. The result's `splits` has it, and `structure_bytes` the poses. */
@@ -195,6 +203,8 @@ static inline bool fake_begin(struct frame_renderer *renderer, const struct scen
         return error_set(error, ERROR_INTERNAL, "fake", "a frame is in progress already");
     if (!fake_may_begin(renderer, scene, motion, request))
         return error_set(error, ERROR_INTERNAL, "fake", "a frame that may not begin");
+    if (!gpu_memory_take(renderer->shared->device, fake_frame_bytes(request), "a frame", error))
+        return false;
     renderer->shared->revision = scene->revision;
     renderer->shared->moved = motion || request->depth == CHANGING_DEPTH;
     renderer->shared->frames++;
@@ -323,6 +333,7 @@ static inline struct engine *start(struct engine_options options)
     atomic_store(&fake.fail_seed, 0);
     atomic_store(&fake.fail_from_frame, 0);
     atomic_store(&fake.no_device, false);
+    atomic_store(&fake.takes_memory, false);
     atomic_store(&fake.step_count, 0);
     atomic_store(&fake.renderers_made, 0);
     atomic_store(&fake.devices_made, 0);
