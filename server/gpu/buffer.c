@@ -33,7 +33,7 @@ static bool allocate(struct gpu_device *device, struct gpu_buffer *buffer, size_
 {
     if (capacity > PTRDIFF_MAX)
         return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "a buffer of %zu bytes", capacity);
-    if (!gpu_reserve_goes_on(device, capacity, error) || !gpu_memory_take(device, capacity, "a buffer", error))
+    if (!gpu_reserve_memory(device, capacity, "a buffer", error))
         return false;
     buffer->capacity_bytes = capacity;
     buffer->name = gpu_object_create(device->registry, GPU_BUFFER);

@@ -347,27 +347,28 @@ bool gpu_reserve_waits(const struct gpu_device *device, size_t awaited_bytes)
     return prefault_goes_on(device->prefault, awaited_bytes);
 }
 
-/* A reservation beyond the limit is refused, so nothing is prefaulted for it. */
-static bool is_prefaulted(struct gpu_device *device, size_t bytes)
-{
-    uint64_t limit = device->memory_limit_bytes;
-    if (limit && (device->memory_used_bytes > limit || bytes > limit - device->memory_used_bytes))
-        return true;
-    return prefault_is_ready(device->prefault, bytes, device->reserve_until_ns);
-}
-
 bool gpu_reserve_goes_on(struct gpu_device *device, size_t bytes, struct error *error)
 {
     if (!device->reserve_until_ns)
         return true;
     if (device->reserve_made && clock_now_ns() >= device->reserve_until_ns)
         device->reserve_put_off = true;
-    if (!device->reserve_put_off && !is_prefaulted(device, bytes)) {
+    if (!device->reserve_put_off && !prefault_is_ready(device->prefault, bytes, device->reserve_until_ns)) {
         device->reserve_put_off = true;
         device->reserve_awaited_bytes = bytes;
     }
     device->reserve_made = true;
     return !device->reserve_put_off || error_set(error, ERROR_BUSY, NULL, "memory is reserved in steps");
+}
+
+bool gpu_reserve_memory(struct gpu_device *device, size_t bytes, const char *what, struct error *error)
+{
+    if (!gpu_memory_take(device, bytes, what, error))
+        return false;
+    if (gpu_reserve_goes_on(device, bytes, error))
+        return true;
+    gpu_memory_give(device, bytes);
+    return false;
 }
 
 void gpu_memory_give(struct gpu_device *device, uint64_t size_bytes)

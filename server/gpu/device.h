@@ -86,8 +86,11 @@ void gpu_reserve_begin(struct gpu_device *device, uint64_t time_ns);
 bool gpu_reserve_end(struct gpu_device *device, size_t *awaited_bytes);
 /* Whether the reservation that was put off is still being prefaulted. */
 bool gpu_reserve_waits(const struct gpu_device *device, size_t awaited_bytes);
-/* Before a reservation of that many bytes, 0: before other work of milliseconds for it. False: it is put off. */
+/* Before a reservation of that many bytes, on the device or of the host; 0: before other work of milliseconds for
+ * it. False: it is put off. */
 bool gpu_reserve_goes_on(struct gpu_device *device, size_t bytes, struct error *error);
+/* The same for memory of the device, which is taken, unless it is put off or there is too little. */
+bool gpu_reserve_memory(struct gpu_device *device, size_t bytes, const char *what, struct error *error);
 
 /* GL debug group for the scope of a pass; shows in driver messages and frame debuggers. */
 void gpu_push_group(struct gpu_device *device, const char *name);

@@ -72,8 +72,8 @@ static bool reserve(struct gpu_device *device, struct gpu_texture *texture, unsi
         return error_set(error, ERROR_INTERNAL, NULL, "texture format 0x%04x is not in the table",
                          internal_format);
     uint64_t size_bytes = (uint64_t)width * height * (layers > 0 ? layers : 1) * row->texel_bytes;
-    if (!check_size(device, width, height, layers, error) || !gpu_reserve_goes_on(device, size_bytes, error) ||
-        !gpu_memory_take(device, size_bytes, "a texture", error))
+    if (!check_size(device, width, height, layers, error) ||
+        !gpu_reserve_memory(device, size_bytes, "a texture", error))
         return false;
     texture->size_bytes = size_bytes;
     texture->layers = layers;

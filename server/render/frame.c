@@ -214,6 +214,8 @@ static bool read_band(struct frame_renderer *renderer, struct error *error)
     struct picture *picture = &renderer->picture;
     struct render_context *context = &renderer->work->context;
     const uint32_t plane = renderer->plane, band = renderer->band;
+    if (!picture->pixels)
+        return frame_reserve_pixels(renderer, error);
     context->wave_number = 0;
     if (all_resolved(renderer))
         return pass_on(renderer, false, 0, 0, error);
@@ -231,9 +233,10 @@ bool frame_step_waits(const struct frame_renderer *renderer)
     struct tracer *building = !renderer->built          ? renderer->tracer
                               : !renderer->second_built ? renderer->second
                                                         : NULL;
-    if (renderer->phase == PHASE_BUILD)
-        return building ? tracer_update_waits(building)
-                        : gpu_reserve_waits(renderer->device, renderer->awaited_bytes);
+    if (renderer->phase == PHASE_BUILD && building)
+        return tracer_update_waits(building);
+    if (renderer->phase == PHASE_BUILD || (renderer->phase == PHASE_RESOLVE && !renderer->picture.pixels))
+        return gpu_reserve_waits(renderer->device, renderer->awaited_bytes);
     return renderer->phase == PHASE_RESOLVE && renderer->copying && all_resolved(renderer) &&
            !gpu_readback_is_done(&renderer->work->copies[renderer->copied % 2]);
 }

@@ -292,18 +292,31 @@ static enum tracer_progress bring(struct frame_renderer *renderer, const struct 
     return progress;
 }
 
-/* As far as time allows; the next step goes on with the same. */
+/* What has not failed for good is gone on with by the next step. */
+static bool end_reserving(struct frame_renderer *renderer, bool made, const struct error *failed,
+                          struct error *error)
+{
+    bool put_off = gpu_reserve_end(renderer->device, &renderer->awaited_bytes);
+    if (!made && !put_off && error && error->kind == ERROR_NONE)
+        *error = *failed;
+    return made || put_off;
+}
+
 static bool get_ready_in_steps(struct frame_renderer *renderer, struct error *error)
 {
-    struct gpu_device *device = renderer->device;
     struct error failed = {0};
     bool lit = false;
-    gpu_reserve_begin(device, RESERVE_NS);
+    gpu_reserve_begin(renderer->device, RESERVE_NS);
     bool ready = update_environment(renderer, &lit, &failed) && (!lit || get_ready(renderer, &failed));
-    bool put_off = gpu_reserve_end(device, &renderer->awaited_bytes);
-    if (!ready && !put_off && error && error->kind == ERROR_NONE)
-        *error = failed;
-    return ready || put_off;
+    return end_reserving(renderer, ready, &failed, error);
+}
+
+bool frame_reserve_pixels(struct frame_renderer *renderer, struct error *error)
+{
+    struct error failed = {0};
+    gpu_reserve_begin(renderer->device, RESERVE_NS);
+    bool reserved = picture_reserve_pixels(&renderer->picture, &renderer->work->context, &failed);
+    return end_reserving(renderer, reserved, &failed, error);
 }
 
 bool frame_build(struct frame_renderer *renderer, struct error *error)

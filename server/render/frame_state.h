@@ -103,5 +103,7 @@ bool frame_build(struct frame_renderer *renderer, struct error *error);
 void frame_end(struct frame_renderer *renderer);
 /* frame_begin.c. Reserves buffers for slices of slices.slice_rays and waves of context.wave_capacity rays. */
 bool frame_reserve_waves(struct frame_renderer *renderer, struct error *error);
+/* A step of reserving picture.pixels, which has them or not; false: there is no memory. */
+bool frame_reserve_pixels(struct frame_renderer *renderer, struct error *error);
 
 #endif

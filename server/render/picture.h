@@ -38,6 +38,8 @@ uint32_t picture_band_end(const struct picture *picture, uint32_t slot);
 /* Adds the current slice to a plane: the slice's samples in `sums` from first_sum on. */
 bool picture_accumulate(struct picture *picture, struct render_context *context, uint32_t plane,
                         struct gpu_buffer *sums, uint32_t first_sum, struct error *error);
+/* Before the first band is read; may be put off (gpu_reserve_begin). */
+bool picture_reserve_pixels(struct picture *picture, const struct render_context *context, struct error *error);
 /* resolve.c: band of a plane -> picture->resolved; readback.c: from there to picture->pixels. */
 bool picture_resolve_band(struct picture *picture, struct render_context *context, uint32_t plane, uint32_t band,
                           struct error *error);

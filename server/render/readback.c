@@ -19,18 +19,21 @@ static size_t band_bytes(const struct picture *picture, const struct render_cont
     return rows_bytes(picture, context, plane, picture_band_row_count(picture, band));
 }
 
-/* Where a band belongs. NULL: no memory. */
-static uint8_t *band_pixels(struct picture *picture, const struct render_context *context, uint32_t plane,
-                            uint32_t band, struct error *error)
+bool picture_reserve_pixels(struct picture *picture, const struct render_context *context, struct error *error)
 {
-    if (!picture->pixels) {
-        picture->size_bytes = (size_t)frame_request_bytes(&context->request);
-        picture->pixels = malloc(picture->size_bytes);
-    }
-    if (!picture->pixels) {
-        error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a picture of %zu bytes", picture->size_bytes);
-        return NULL;
-    }
+    const size_t size_bytes = (size_t)frame_request_bytes(&context->request);
+    if (!gpu_reserve_goes_on(context->device, size_bytes, error))
+        return false;
+    picture->pixels = malloc(size_bytes);
+    picture->size_bytes = size_bytes;
+    return picture->pixels ||
+           error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a picture of %zu bytes", size_bytes);
+}
+
+/* Where a band belongs. */
+static uint8_t *band_pixels(const struct picture *picture, const struct render_context *context, uint32_t plane,
+                            uint32_t band)
+{
     uint8_t *pixels = picture->pixels;
     for (uint32_t before = 0; before < plane; before++)
         pixels += rows_bytes(picture, context, before, picture->height);
@@ -40,9 +43,7 @@ static uint8_t *band_pixels(struct picture *picture, const struct render_context
 bool picture_read_band(struct picture *picture, struct render_context *context, uint32_t plane, uint32_t band,
                        struct error *error)
 {
-    uint8_t *pixels = band_pixels(picture, context, plane, band, error);
-    if (!pixels)
-        return false;
+    uint8_t *pixels = band_pixels(picture, context, plane, band);
     context_span_begin(context, STAGE_READBACK);
     gpu_buffer_read(context->device, &picture->resolved, 0, pixels, band_bytes(picture, context, plane, band));
     context_span_end(context);
@@ -62,9 +63,7 @@ bool picture_copy_band(struct picture *picture, struct render_context *context, 
 bool picture_take_band(struct picture *picture, struct render_context *context, struct gpu_readback *copy,
                        uint32_t plane, uint32_t band, struct error *error)
 {
-    uint8_t *pixels = band_pixels(picture, context, plane, band, error);
-    if (!pixels)
-        return false;
+    uint8_t *pixels = band_pixels(picture, context, plane, band);
     /* Not as a span of the device, behind which others' work may be queued already. */
     uint64_t start_ns = clock_now_ns();
     bool taken = gpu_readback_take(context->device, copy, pixels, error);

@@ -52,8 +52,9 @@ FILLED = {"many_meshes": ("scene", "blobs"), "environments": ("device", "blobs")
 # Frames that are encoded are within the device's limit here: an attack has one of either.
 ALL_FILLED = ("scene", "blobs", "transactions", "device")
 MEMORY_ROOM = 1.05  # more than that is not within a limit
-# What the attacks' connections, 64 at most, have beside all that: the largest message of each, and twice that decoded.
-CONNECTIONS_MIB = 64 * 3 * 256 // 1024
+# What the attacks' connections, 64 at most, have beside all that: room for the largest message of each (256 KiB), and
+# for one that is decoded (128 KiB).
+CONNECTIONS_MIB = 64 * (256 + 128) // 1024
 
 
 class Innocent(threading.Thread):
