@@ -184,7 +184,7 @@ class Drill:
         if client.poll() is not None or (victim == "daemon" and not self.kill_daemon(kind, client, number)):
             self.counts["too late"] += 1
             return (0,)
-        self.counts[f"{victim} killed while {'rendering' if self.files(out) else 'loading'}"] += 1
+        self.counts[f"{victim} killed while {'rendering' if any(out.iterdir()) else 'loading'}"] += 1
         if victim == "daemon":
             return (0,)
         client.send_signal(number)
