@@ -145,12 +145,18 @@ struct job *job_find(struct engine *engine, uint64_t client, uint32_t request)
 
 /* ---- end ---------------------------------------------------------------------------------------- */
 
+void job_end_frame(struct job *job)
+{
+    job->rendering = false;
+    scene_motion_finish(&job->motion);
+}
+
 void job_abandon_frame(struct engine *engine, struct job *job)
 {
     if (!job->rendering)
         return;
     engine->backend->abandon(job->renderer);
-    job->rendering = false;
+    job_end_frame(job);
     job->scene->frames--;
     job->scene->frames_ended++;
 }
@@ -316,7 +322,7 @@ static void frame_failed(struct engine *engine, struct job *job, struct error *e
 }
 
 /* Or puts it off. */
-static bool frame_begin_shot(struct engine *engine, struct job *job, const struct shot *shot, struct error *error)
+static bool frame_begin_shot(struct engine *engine, struct job *job, struct shot *shot, struct error *error)
 {
     struct engine_scene *scene = job->scene;
     const struct scene_motion *motion = shot->motion.pose_count ? &shot->motion : NULL;
@@ -331,8 +337,13 @@ static bool frame_begin_shot(struct engine *engine, struct job *job, const struc
     if (scene->put_off == job)
         scene->put_off = NULL;
     engine_needs_no_memory(engine, job);
-    if (!engine->backend->begin(job->renderer, scene->scene, motion, &shot->request, error))
+    job->motion = shot->motion;
+    shot->motion = (struct scene_motion){0};
+    motion = motion ? &job->motion : NULL;
+    if (!engine->backend->begin(job->renderer, scene->scene, motion, &shot->request, error)) {
+        scene_motion_finish(&job->motion);
         return false;
+    }
     job->rendering = true;
     scene->frames++;
     return true;
@@ -373,7 +384,7 @@ static void account(struct engine *engine, struct job *job, struct frame_result 
 
 static void frame_done(struct engine *engine, struct job *job, struct engine_frame *frame)
 {
-    job->rendering = false;
+    job_end_frame(job);
     job->evicted = false;
     job->scene->frames--;
     job->scene->frames_ended++;

@@ -109,7 +109,7 @@ void engine_drop_device(struct engine *engine)
 {
     /* Frames in progress start again. */
     for (size_t i = 0; i < engine->job_count; i++)
-        engine->jobs[i]->rendering = false;
+        job_end_frame(engine->jobs[i]);
     for (struct engine_scene *scene = engine->scenes; scene; scene = scene->next)
         lose_scene(engine, scene);
     engine->backend->device_destroy(engine->device);

@@ -118,7 +118,8 @@ struct job {
     uint64_t refused_after; /* frames_ended of its scene when its frame could not begin beside others */
     /* of the frame in progress */
     bool rendering;
-    bool evicted; /* others gave way once already for its memory */
+    bool evicted;               /* others gave way once already for its memory */
+    struct scene_motion motion; /* owned */
     struct frame_request frame;
     float time_s, shutter_s;
     uint64_t begin_ns;
@@ -258,6 +259,8 @@ void job_credit(struct job *job, uint64_t credit); /* absolute */
 bool job_wants_frame(const struct job *job);
 /* Gives up its frame in progress, if there is one, which begins again. */
 void job_abandon_frame(struct engine *engine, struct job *job);
+/* Its frame is in progress no longer. */
+void job_end_frame(struct job *job);
 
 /* view.c: what differs for views. */
 /* Goes on where the view left off that `job` takes the place of. */

@@ -61,7 +61,6 @@ uint64_t gpu_scene_deform_signature(const struct scene *scene);
 /* Lists the uses; the state of remaining ones is kept. */
 bool gpu_scene_deform_list(struct gpu_scene_deform *deform, const struct scene *scene, struct error *error);
 /* The buffers and boxes of the meshes at rest; nothing is in place afterwards. */
-bool gpu_scene_deform_upload_rest(struct gpu_scene *gpu, const struct scene *scene, struct scene_changes *changes,
-                                  struct error *error);
+bool gpu_scene_deform_list_rest(struct gpu_scene *gpu, const struct scene *scene, struct error *error);
 
 #endif

@@ -266,25 +266,32 @@ static size_t count_of(const struct scene_mesh *mesh, enum rest_place place)
                : vertices * (place == REST_INFLUENCE ? mesh->influence_count : mesh->target_count);
 }
 
-/* One array of all meshes: items of `components` 4-byte numbers, padded to four where there are three (a texel of
- * three has no image format, and no driver keeps it so). Joints are 16 bits and go as they are. */
-static bool upload_array(struct gpu_scene *gpu, const struct scene *scene, struct gpu_buffer *buffer,
-                         enum mesh_array array, enum rest_place place, size_t total, struct scene_changes *changes,
-                         struct error *error)
+/* Joints are 16 bits. */
+static size_t item_bytes(enum mesh_array array)
+{
+    return array == MESH_JOINTS     ? sizeof(uint16_t)
+           : array == MESH_WEIGHTS  ? sizeof(float)
+           : array == MESH_TANGENTS ? 4 * sizeof(float)
+                                    : 3 * sizeof(float);
+}
+
+/* Three components are padded to four: a texel of three has no image format, and no driver keeps it so. */
+static size_t packed_bytes(enum mesh_array array)
+{
+    return item_bytes(array) == 3 * sizeof(float) ? 4 * sizeof(float) : item_bytes(array);
+}
+
+/* One array of all meshes. */
+static void write_array(const struct gpu_scene *gpu, const struct packing_part *part, const atomic_bool *stop)
 {
     const struct gpu_scene_deform *deform = &gpu->state->deform;
-    size_t in_bytes = array == MESH_JOINTS     ? sizeof(uint16_t)
-                      : array == MESH_WEIGHTS  ? sizeof(float)
-                      : array == MESH_TANGENTS ? 4 * sizeof(float)
-                                               : 3 * sizeof(float);
-    size_t out_bytes = in_bytes == 3 * sizeof(float) ? 4 * sizeof(float) : in_bytes;
-    char *out = gpu_buffer_map(gpu->device, buffer, total * out_bytes, error);
-    if (!out)
-        return false;
-    memset(out, 0, total * out_bytes);
-    for (uint32_t m = 0; m < deform->mesh_count; m++) {
-        const struct scene_mesh *mesh = scene_mesh(scene, deform->meshes[m].id);
-        char *to = out + place_of(&deform->meshes[m], place) * out_bytes;
+    const enum mesh_array array = (enum mesh_array)part->array;
+    const enum rest_place place = (enum rest_place)part->place;
+    const size_t in_bytes = item_bytes(array), out_bytes = packed_bytes(array);
+    memset(part->out, 0, part->bytes);
+    for (uint32_t m = 0; m < deform->mesh_count && !atomic_load(stop); m++) {
+        const struct scene_mesh *mesh = scene_mesh(gpu->scene, deform->meshes[m].id);
+        char *to = (char *)part->out + place_of(&deform->meshes[m], place) * out_bytes;
         if (!mesh->arrays[array])
             continue;
         const char *from = (const char *)mesh->arrays[array]->data;
@@ -295,13 +302,9 @@ static bool upload_array(struct gpu_scene *gpu, const struct scene *scene, struc
             for (size_t i = 0; i < count; i++)
                 memcpy(to + i * out_bytes, from + i * in_bytes, in_bytes);
     }
-    gpu_buffer_unmap(gpu->device, buffer);
-    changes->uploaded_bytes += total * out_bytes;
-    return true;
 }
 
-bool gpu_scene_deform_upload_rest(struct gpu_scene *gpu, const struct scene *scene, struct scene_changes *changes,
-                                  struct error *error)
+bool gpu_scene_deform_list_rest(struct gpu_scene *gpu, const struct scene *scene, struct error *error)
 {
     struct gpu_scene_deform *deform = &gpu->state->deform;
     struct rest_totals totals = {0};
@@ -325,11 +328,15 @@ bool gpu_scene_deform_upload_rest(struct gpu_scene *gpu, const struct scene *sce
         {&deform->target_tangents, MESH_TARGET_TANGENTS, REST_TARGET, totals.target_vertices},
     };
     for (size_t i = 0; i < sizeof(rows) / sizeof(rows[0]); i++) {
-        bool needed = (totals.arrays >> rows[i].array & 1u) && rows[i].total > 0;
-        if (needed ? !upload_array(gpu, scene, rows[i].buffer, rows[i].array, rows[i].place, (size_t)rows[i].total,
-                                   changes, error)
-                   : !gpu_buffer_reserve(gpu->device, rows[i].buffer, 0, error))
-            return false;
+        const bool needed = totals.arrays >> rows[i].array & 1u;
+        packing_add(&gpu->state->packing,
+                    &(struct packing_part){
+                        .buffer = rows[i].buffer,
+                        .bytes = needed ? (size_t)rows[i].total * packed_bytes(rows[i].array) : 0,
+                        .write = write_array,
+                        .array = (int)rows[i].array,
+                        .place = (int)rows[i].place,
+                    });
     }
     return true;
 }

@@ -295,61 +295,64 @@ static void pack_colours(const struct gpu_scene_geometry *geometry, uint32_t *ou
         memset(out, 0, bytes);
 }
 
-/* A buffer of `count` items is mapped, each mesh writes its part, and it is unmapped. */
-#define PACK(buffer, count, type, call)                                                                           \
-    do {                                                                                                          \
-        type *out = gpu_buffer_map(gpu->device, &gpu->buffer, (size_t)(count) * sizeof(*out), error);             \
-        if (!out)                                                                                                 \
-            return false;                                                                                         \
-        for (uint32_t i = 0; i < gpu->geometry_count; i++)                                                        \
-            if (gpu->geometries[i].mesh)                                                                          \
-                call;                                                                                             \
-        gpu_buffer_unmap(gpu->device, &gpu->buffer);                                                              \
-        changes->uploaded_bytes += (uint64_t)(count) * sizeof(*out);                                              \
-    } while (0)
+/* What is written of each mesh. */
+enum packed {
+    PACKED_TRIANGLES,
+    PACKED_POSITIONS,
+    PACKED_NORMALS,
+    PACKED_TANGENTS,
+    PACKED_TEXCOORDS,
+    PACKED_COLOURS
+};
 
-static bool upload_meshes(struct gpu_scene *gpu, const struct totals *totals, struct scene_changes *changes,
-                          struct error *error)
+static void write_mesh(const struct gpu_scene *gpu, const struct gpu_scene_geometry *geometry, int packed,
+                       void *out)
 {
-    uint64_t moving = totals->vertices + totals->close_vertices;
-    if (totals->triangles) {
-        PACK(triangles, totals->triangles * 4, uint32_t, pack_triangles(gpu, &gpu->geometries[i], out));
-        PACK(positions, moving * 4, float, pack_positions(&gpu->geometries[i], out));
+    switch ((enum packed)packed) {
+    case PACKED_TRIANGLES:
+        pack_triangles(gpu, geometry, out);
+        break;
+    case PACKED_POSITIONS:
+        pack_positions(geometry, out);
+        break;
+    case PACKED_NORMALS:
+        pack_normals(geometry, out);
+        break;
+    case PACKED_TANGENTS:
+        pack_tangents(geometry, out);
+        break;
+    case PACKED_TEXCOORDS:
+        pack_texcoords(geometry, out);
+        break;
+    case PACKED_COLOURS:
+        pack_colours(geometry, out);
+        break;
     }
-    if (totals->flags & GEOMETRY_HAS_NORMALS)
-        PACK(normals, moving * 4, float, pack_normals(&gpu->geometries[i], out));
-    if (totals->flags & GEOMETRY_HAS_TANGENTS)
-        PACK(tangents, moving, uint32_t, pack_tangents(&gpu->geometries[i], out));
-    if (totals->flags & (GEOMETRY_HAS_TEXCOORDS_0 | GEOMETRY_HAS_TEXCOORDS_1))
-        PACK(texcoords, totals->vertices * 4, float, pack_texcoords(&gpu->geometries[i], out));
-    if (totals->flags & GEOMETRY_HAS_COLOURS)
-        PACK(colours, totals->vertices, uint32_t, pack_colours(&gpu->geometries[i], out));
-    return true;
 }
-#undef PACK
 
-static bool upload_spheres(struct gpu_scene *gpu, const struct totals *totals, struct scene_changes *changes,
-                           struct error *error)
+static void write_meshes(const struct gpu_scene *gpu, const struct packing_part *part, const atomic_bool *stop)
 {
-    gpu->has_spheres = totals->spheres > 0;
-    if (!gpu->has_spheres)
-        return true;
-    size_t sphere_bytes = (size_t)totals->spheres * 4 * sizeof(float);
-    size_t material_bytes = (size_t)totals->spheres * sizeof(uint32_t);
-    float *out = gpu_buffer_map(gpu->device, &gpu->spheres, sphere_bytes, error);
-    if (!out)
-        return false;
-    for (uint32_t i = 0; i < gpu->geometry_count; i++) {
+    for (uint32_t i = 0; i < gpu->geometry_count && !atomic_load(stop); i++)
+        if (gpu->geometries[i].mesh)
+            write_mesh(gpu, &gpu->geometries[i], part->array, part->out);
+}
+
+static void write_spheres(const struct gpu_scene *gpu, const struct packing_part *part, const atomic_bool *stop)
+{
+    float *out = part->out;
+    for (uint32_t i = 0; i < gpu->geometry_count && !atomic_load(stop); i++) {
         const struct gpu_scene_geometry *geometry = &gpu->geometries[i];
         if (geometry->spheres)
             memcpy(out + (size_t)geometry->device.first_primitive * 4, geometry->spheres->centres_radii->data,
                    (size_t)geometry->spheres->sphere_count * 4 * sizeof(float));
     }
-    gpu_buffer_unmap(gpu->device, &gpu->spheres);
-    uint32_t *materials = gpu_buffer_map(gpu->device, &gpu->sphere_materials, material_bytes, error);
-    if (!materials)
-        return false;
-    for (uint32_t i = 0; i < gpu->geometry_count; i++) {
+}
+
+static void write_sphere_materials(const struct gpu_scene *gpu, const struct packing_part *part,
+                                   const atomic_bool *stop)
+{
+    uint32_t *materials = part->out;
+    for (uint32_t i = 0; i < gpu->geometry_count && !atomic_load(stop); i++) {
         const struct scene_spheres *set = gpu->geometries[i].spheres;
         uint32_t range = 0;
         for (uint32_t at = 0; set && at < set->sphere_count;) {
@@ -358,9 +361,41 @@ static bool upload_spheres(struct gpu_scene *gpu, const struct totals *totals, s
                 materials[gpu->geometries[i].device.first_primitive + at] = run.material_index;
         }
     }
-    gpu_buffer_unmap(gpu->device, &gpu->sphere_materials);
-    changes->uploaded_bytes += sphere_bytes + material_bytes;
-    return true;
+}
+
+static void list_parts(struct gpu_scene *gpu, const struct totals *totals)
+{
+    const uint64_t moving = totals->triangles ? totals->vertices + totals->close_vertices : 0;
+    const uint64_t resting = totals->triangles ? totals->vertices : 0;
+    const struct {
+        struct gpu_buffer *buffer;
+        enum packed packed;
+        uint64_t bytes;
+        uint32_t flags; /* that any mesh has; 0: needs none */
+    } rows[] = {
+        {&gpu->triangles, PACKED_TRIANGLES, totals->triangles * 4 * sizeof(uint32_t), 0},
+        {&gpu->positions, PACKED_POSITIONS, moving * 4 * sizeof(float), 0},
+        {&gpu->normals, PACKED_NORMALS, moving * 4 * sizeof(float), GEOMETRY_HAS_NORMALS},
+        {&gpu->tangents, PACKED_TANGENTS, moving * sizeof(uint32_t), GEOMETRY_HAS_TANGENTS},
+        {&gpu->texcoords, PACKED_TEXCOORDS, resting * 4 * sizeof(float),
+         GEOMETRY_HAS_TEXCOORDS_0 | GEOMETRY_HAS_TEXCOORDS_1},
+        {&gpu->colours, PACKED_COLOURS, resting * sizeof(uint32_t), GEOMETRY_HAS_COLOURS},
+    };
+    struct packing *packing = &gpu->state->packing;
+    for (size_t i = 0; i < sizeof(rows) / sizeof(rows[0]); i++) {
+        const bool needed = !rows[i].flags || (totals->flags & rows[i].flags);
+        packing_add(packing, &(struct packing_part){.buffer = rows[i].buffer,
+                                                    .bytes = needed ? (size_t)rows[i].bytes : 0,
+                                                    .write = write_meshes,
+                                                    .array = (int)rows[i].packed});
+    }
+    gpu->has_spheres = totals->spheres > 0;
+    packing_add(packing, &(struct packing_part){.buffer = &gpu->spheres,
+                                                .bytes = (size_t)totals->spheres * 4 * sizeof(float),
+                                                .write = write_spheres});
+    packing_add(packing, &(struct packing_part){.buffer = &gpu->sphere_materials,
+                                                .bytes = (size_t)totals->spheres * sizeof(uint32_t),
+                                                .write = write_sphere_materials});
 }
 
 /* An edit of something else may have moved the objects in the host's memory. */
@@ -375,11 +410,15 @@ static void refresh_pointers(struct gpu_scene *gpu, const struct scene *scene)
     }
 }
 
-bool gpu_scene_upload_geometry(struct gpu_scene *gpu, const struct scene *scene, struct scene_changes *changes,
-                               struct error *error)
+static uint64_t signature_of(const struct scene *scene)
 {
-    uint64_t signature = gpu_scene_signature(scene, OBJECT_MESH) * 3 + gpu_scene_signature(scene, OBJECT_SPHERES) +
-                         gpu_scene_deform_signature(scene) * 5;
+    return gpu_scene_signature(scene, OBJECT_MESH) * 3 + gpu_scene_signature(scene, OBJECT_SPHERES) +
+           gpu_scene_deform_signature(scene) * 5;
+}
+
+bool gpu_scene_list_geometry(struct gpu_scene *gpu, const struct scene *scene, struct error *error)
+{
+    uint64_t signature = signature_of(scene);
     if (gpu->state->any_update && signature == gpu->state->shapes_signature) {
         refresh_pointers(gpu, scene);
         return true;
@@ -389,17 +428,12 @@ bool gpu_scene_upload_geometry(struct gpu_scene *gpu, const struct scene *scene,
     struct totals totals = lay_out(gpu);
     gpu->state->close_vertex = (uint32_t)totals.vertices;
     gpu->state->stale_geometries = true;
-    struct gpu_buffer *optional[] = {&gpu->triangles, &gpu->positions, &gpu->normals, &gpu->tangents,
-                                     &gpu->texcoords, &gpu->colours,   &gpu->spheres, &gpu->sphere_materials};
-    for (size_t i = 0; i < sizeof(optional) / sizeof(optional[0]); i++)
-        if (!gpu_buffer_reserve(gpu->device, optional[i], 0, error)) /* keeps the memory */
-            return false;
-    changes->bits |= CHANGED_GEOMETRY;
-    if (!check_totals(gpu, &totals, error) || !upload_meshes(gpu, &totals, changes, error) ||
-        !upload_spheres(gpu, &totals, changes, error) || !gpu_scene_deform_upload_rest(gpu, scene, changes, error))
-        return false;
+    gpu->state->brought.bits |= CHANGED_GEOMETRY;
     gpu->state->shapes_signature = signature;
-    return true;
+    if (!check_totals(gpu, &totals, error))
+        return false;
+    list_parts(gpu, &totals);
+    return gpu_scene_deform_list_rest(gpu, scene, error);
 }
 
 /* The features that a material needs of the tracers, as it is when the shutter opens. */

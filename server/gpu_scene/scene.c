@@ -37,11 +37,14 @@ void gpu_scene_finish(struct gpu_scene *gpu)
     struct gpu_buffer *buffers[BUFFERS_MAX];
     if (!gpu->device)
         return;
+    if (gpu->state)
+        packing_finish(gpu, &gpu->state->packing);
     size_t count = list_buffers(gpu, buffers);
     for (size_t i = 0; i < count; i++)
         gpu_buffer_finish(gpu->device, buffers[i]);
     gpu_texture_finish(gpu->device, &gpu->environment);
     if (gpu->state) {
+        gpu_scene_drop_texture_packing(gpu);
         gpu_scene_deform_finish(&gpu->state->deform, gpu->device);
         hashmap_finish(&gpu->state->material_indices.index_by_id);
         hashmap_finish(&gpu->state->texture_index_by_id);
@@ -102,9 +105,7 @@ static bool update_shading(struct gpu_scene *gpu, const struct scene *scene, con
                            bool edited, struct scene_changes *changes, struct error *error)
 {
     changes->bits |= edited ? CHANGED_SHADING : 0;
-    return (!edited || (gpu_scene_index_materials(gpu, scene, error) &&
-                        gpu_scene_upload_textures(gpu, scene, changes, error))) &&
-           gpu_scene_upload_materials(gpu, scene, motion, changes, error);
+    return gpu_scene_upload_materials(gpu, scene, motion, changes, error);
 }
 
 /* `posed`: the kinds that poses change, now or in the last update. */
@@ -118,9 +119,6 @@ static bool update_parts(struct gpu_scene *gpu, const struct scene *scene, const
     bool nodes = fresh || gpu->instances_revision != scene->instances_revision || (posed & POSED_NODES);
     bool lights = fresh || gpu->lights_revision != scene->lights_revision || (posed & POSED_LIGHTS);
     if (shading && !update_shading(gpu, scene, motion, shading_edited, changes, error))
-        return false;
-    /* Always: it detects changed shapes itself. */
-    if (!gpu_scene_upload_geometry(gpu, scene, changes, error))
         return false;
     if (geometry && !gpu_scene_upload_discs(gpu, scene, changes, error))
         return false;
@@ -146,6 +144,90 @@ bool gpu_scene_is_current(const struct gpu_scene *gpu, const struct scene *scene
            (posed_parts(motion) | gpu->state->posed_parts) == 0;
 }
 
+/* Materials first: triangles are packed with their indices. */
+static bool list_parts(struct gpu_scene *gpu, const struct scene *scene, struct error *error)
+{
+    const bool shading = !gpu->state->any_update || gpu->shading_revision != scene->shading_revision;
+    return (!shading ||
+            (gpu_scene_index_materials(gpu, scene, error) && gpu_scene_list_textures(gpu, scene, error))) &&
+           gpu_scene_list_geometry(gpu, scene, error);
+}
+
+static bool bring(struct gpu_scene *gpu, const struct scene *scene, uint64_t end_ns, bool *done,
+                  struct error *error)
+{
+    struct gpu_scene_state *state = gpu->state;
+    if (!state->is_bringing && !list_parts(gpu, scene, error))
+        return false;
+    state->is_bringing = true;
+    switch (packing_step(gpu, &state->packing, end_ns, error)) {
+    case PACKING_MORE:
+        return true;
+    case PACKING_FAILED:
+        return false;
+    case PACKING_DONE:
+        break;
+    }
+    *done = true;
+    state->is_bringing = false;
+    state->has_brought = true;
+    state->brought_revision = scene->revision;
+    state->brought.uploaded_bytes += packing_bytes(&state->packing);
+    packing_finish(gpu, &state->packing);
+    return gpu_scene_finish_textures(gpu, error);
+}
+
+static bool is_brought(const struct gpu_scene *gpu, const struct scene *scene)
+{
+    const struct gpu_scene_state *state = gpu->state;
+    return state && ((state->any_update && gpu->revision == scene->revision) ||
+                     (state->has_brought && state->brought_revision == scene->revision));
+}
+
+bool gpu_scene_bring(struct gpu_scene *gpu, const struct scene *scene, uint64_t end_ns, bool *done,
+                     struct stage_times *times, struct error *error)
+{
+    struct error failed = {0};
+    const uint64_t start_ns = clock_now_ns();
+    *done = is_brought(gpu, scene);
+    if (*done)
+        return true;
+    if (!gpu->state && !(gpu->state = calloc(1, sizeof(*gpu->state))))
+        return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the device's copy of a scene");
+    gpu->scene = scene;
+    gpu_push_group(gpu->device, "scene upload");
+    bool ok = bring(gpu, scene, end_ns, done, &failed);
+    gpu_pop_group(gpu->device);
+    if (times)
+        stage_times_add(times, STAGE_UPLOAD, CLOCK_CPU, 0, start_ns, clock_now_ns() - start_ns);
+    if (ok)
+        return true;
+    if (failed.kind != ERROR_BUSY)
+        gpu_scene_finish(gpu);
+    if (error)
+        *error = failed;
+    return false;
+}
+
+bool gpu_scene_bring_waits(struct gpu_scene *gpu)
+{
+    return gpu->state && packing_waits(&gpu->state->packing);
+}
+
+void gpu_scene_bring_abandon(struct gpu_scene *gpu)
+{
+    if (gpu->state && gpu->state->is_bringing)
+        gpu_scene_finish(gpu);
+}
+
+static bool bring_all(struct gpu_scene *gpu, const struct scene *scene, struct error *error)
+{
+    bool done = false;
+    while (!done && gpu_scene_bring(gpu, scene, UINT64_MAX, &done, NULL, error))
+        ;
+    return done;
+}
+
 bool gpu_scene_update(struct gpu_scene *gpu, const struct scene *scene, const struct scene_motion *motion,
                       struct scene_changes *changes, struct stage_times *times, struct error *error)
 {
@@ -156,10 +238,13 @@ bool gpu_scene_update(struct gpu_scene *gpu, const struct scene *scene, const st
     *changes = (struct scene_changes){0};
     gpu->scene = scene;
     gpu->motion = motion;
-    if (!gpu->state && !(gpu->state = calloc(1, sizeof(*gpu->state))))
-        return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the device's copy of a scene");
     if (gpu_scene_is_current(gpu, scene, motion))
         return true;
+    if (!bring_all(gpu, scene, error))
+        return false;
+    *changes = gpu->state->brought;
+    gpu->state->brought = (struct scene_changes){0};
+    gpu->state->has_brought = false;
     unsigned posed = parts | gpu->state->posed_parts;
     gpu_push_group(gpu->device, "scene upload");
     bool ok = update_parts(gpu, scene, motion, posed, changes, error);

@@ -100,6 +100,16 @@ void gpu_scene_finish(struct gpu_scene *gpu);
  * next update makes it again. */
 bool gpu_scene_update(struct gpu_scene *gpu, const struct scene *scene, const struct scene_motion *motion,
                       struct scene_changes *changes, struct stage_times *times, struct error *error);
+/* Brings what is large of the scene to the device, until about `end_ns` of the clock: triangles, vertices,
+ * textures. *done: the update, which does it at once where it is not done, will not take long for it. In between
+ * the scene must not change, and the copy is of use to nobody. Fails like gpu_scene_update(); ERROR_BUSY: memory
+ * is reserved in steps, and the next one goes on. */
+bool gpu_scene_bring(struct gpu_scene *gpu, const struct scene *scene, uint64_t end_ns, bool *done,
+                     struct stage_times *times, struct error *error);
+/* Whether the next step would only wait. */
+bool gpu_scene_bring_waits(struct gpu_scene *gpu);
+/* Gives up what is not done: then the copy is empty. */
+void gpu_scene_bring_abandon(struct gpu_scene *gpu);
 /* Whether an update would change nothing. */
 bool gpu_scene_is_current(const struct gpu_scene *gpu, const struct scene *scene,
                           const struct scene_motion *motion);

@@ -6,6 +6,7 @@
 #include "base/hashmap.h"
 #include "gpu_scene/scene.h"
 #include "gpu_scene/deform.h"
+#include "gpu_scene/packing.h"
 
 /* A material keeps its index while it lives, so that an edit of one does not touch the triangles of others. */
 struct material_indices {
@@ -39,6 +40,12 @@ struct gpu_scene_state {
     bool stale_geometries; /* the table on the device is not what `geometries` says */
     unsigned posed_parts;  /* POSED_*, by the last update: without poses they are elsewhere again */
     bool any_update;       /* false: nothing is there yet */
+    /* What gpu_scene_bring() is at, and what it has changed since the last update. */
+    bool is_bringing, has_brought;
+    uint64_t brought_revision; /* of the scene, with `has_brought` */
+    struct packing packing;
+    struct texture_packing *texture_packing; /* owned; NULL: no texture is packed */
+    struct scene_changes brought;
 };
 
 /* Spreads an id and a revision over 64 bits. */
@@ -56,13 +63,13 @@ uint32_t gpu_scene_material_index(const struct gpu_scene *gpu, uint32_t material
 bool gpu_scene_upload_materials(struct gpu_scene *gpu, const struct scene *scene,
                                 const struct scene_motion *motion, struct scene_changes *changes,
                                 struct error *error);
-/* texture.c. Does nothing where no texture changed. */
-bool gpu_scene_upload_textures(struct gpu_scene *gpu, const struct scene *scene, struct scene_changes *changes,
-                               struct error *error);
+/* texture.c. Lists what is to be packed, nothing where no texture changed; the second, once it is. */
+bool gpu_scene_list_textures(struct gpu_scene *gpu, const struct scene *scene, struct error *error);
+bool gpu_scene_finish_textures(struct gpu_scene *gpu, struct error *error);
+void gpu_scene_drop_texture_packing(struct gpu_scene *gpu);
 uint32_t gpu_scene_texture_index(const struct gpu_scene *gpu, uint32_t texture_id, bool *found);
-/* geometry.c */
-bool gpu_scene_upload_geometry(struct gpu_scene *gpu, const struct scene *scene, struct scene_changes *changes,
-                               struct error *error);
+/* geometry.c. Lists what is to be packed, nothing where no shape changed. */
+bool gpu_scene_list_geometry(struct gpu_scene *gpu, const struct scene *scene, struct error *error);
 /* Which geometry has cutouts, what the scene has of special materials. */
 void gpu_scene_classify_geometry(struct gpu_scene *gpu, const struct scene *scene,
                                  const struct scene_motion *motion);

@@ -172,90 +172,109 @@ static bool lay_out(struct gpu_scene *gpu, const struct scene *scene, struct tex
     return true;
 }
 
-/* Textures are packed by a few threads at once: halving is arithmetic on the host. They end before the call does.
- */
+/* Textures are packed by a few threads at once: halving is arithmetic on the host. */
 #define PACK_THREADS_MAX 8
 
-struct pack_job {
-    const struct srgb_tables *tables;
+struct texture_packing {
+    struct texture_info *infos;
     const struct scene_texture **list; /* in the order of `infos` */
-    const struct texture_info *infos;
     uint32_t count;
-    uint8_t *out;
+    uint64_t texel_count;
+    struct srgb_tables *tables;
     atomic_bool failed; /* no memory to halve in */
+};
+
+struct texture_run {
+    struct texture_packing *packing;
+    uint8_t *out;
+    const atomic_bool *stop;
 };
 
 static void pack_one(void *context, uint32_t i)
 {
-    struct pack_job *job = context;
-    const struct scene_texture *texture = job->list[i];
+    const struct texture_run *run = context;
+    struct texture_packing *packing = run->packing;
+    const struct scene_texture *texture = packing->list[i];
+    if (atomic_load(run->stop))
+        return;
     uint32_t levels;
     uint64_t below =
         chain_texels(texture->width, texture->height, &levels) - (uint64_t)texture->width * texture->height;
     uint8_t *chain = malloc((size_t)below * 4 + 1);
     if (chain)
-        pack_texture(job->tables, texture, chain, job->out + (size_t)job->infos[i].first_texel * 4);
+        pack_texture(packing->tables, texture, chain, run->out + (size_t)packing->infos[i].first_texel * 4);
     else
-        atomic_store(&job->failed, true);
+        atomic_store(&packing->failed, true);
     free(chain);
 }
 
-static void pack_all(struct pack_job *job, uint64_t texel_count)
+static void write_texels(const struct gpu_scene *gpu, const struct packing_part *part, const atomic_bool *stop)
 {
+    struct texture_packing *packing = gpu->state->texture_packing;
+    struct texture_run run = {.packing = packing, .out = part->out, .stop = stop};
     unsigned threads = parallel_processors();
-    /* For a few texels this thread is enough. */
-    if (texel_count < (1u << 18))
+    /* For a few texels one thread is enough. */
+    if (packing->texel_count < (1u << 18))
         threads = 1;
-    parallel_run(threads > PACK_THREADS_MAX ? PACK_THREADS_MAX : threads, job->count, pack_one, job);
+    parallel_run(threads > PACK_THREADS_MAX ? PACK_THREADS_MAX : threads, packing->count, pack_one, &run);
 }
 
-static bool pack_texels(struct gpu_scene *gpu, const struct scene *scene, const struct texture_info *infos,
-                        uint64_t texel_count, struct error *error)
+void gpu_scene_drop_texture_packing(struct gpu_scene *gpu)
+{
+    struct texture_packing *packing = gpu->state->texture_packing;
+    if (!packing)
+        return;
+    free(packing->infos);
+    free(packing->list);
+    free(packing->tables);
+    free(packing);
+    gpu->state->texture_packing = NULL;
+}
+
+static bool list_textures(struct gpu_scene *gpu, const struct scene *scene, struct texture_packing *packing,
+                          struct error *error)
 {
     size_t cursor = 0, count = scene->objects[OBJECT_TEXTURE].count;
     uint64_t id;
     void *value;
-    struct srgb_tables *tables = create_tables();
-    struct pack_job job = {.tables = tables, .infos = infos, .list = calloc(count, sizeof(*job.list))};
-    while (job.list && hashmap_next(&scene->objects[OBJECT_TEXTURE], &cursor, &id, &value)) {
-        job.list[job.count++] = value;
-    }
-    bool ok = tables && job.list;
-    if (ok) {
-        job.out = gpu_buffer_map(gpu->device, &gpu->texels, (size_t)texel_count * 4, error);
-        ok = job.out != NULL;
-    }
-    if (ok) {
-        pack_all(&job, texel_count);
-        gpu_buffer_unmap(gpu->device, &gpu->texels);
-        ok = !atomic_load(&job.failed);
-    }
-    free(job.list);
-    free(tables);
-    return ok || error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory to halve textures in");
+    packing->infos = calloc(count + 1, sizeof(*packing->infos));
+    packing->list = calloc(count + 1, sizeof(*packing->list));
+    packing->tables = create_tables();
+    if (!packing->infos || !packing->list || !packing->tables)
+        return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for %zu textures", count);
+    while (hashmap_next(&scene->objects[OBJECT_TEXTURE], &cursor, &id, &value))
+        packing->list[packing->count++] = value;
+    return lay_out(gpu, scene, packing->infos, &packing->texel_count, error);
 }
 
-bool gpu_scene_upload_textures(struct gpu_scene *gpu, const struct scene *scene, struct scene_changes *changes,
-                               struct error *error)
+bool gpu_scene_list_textures(struct gpu_scene *gpu, const struct scene *scene, struct error *error)
 {
-    uint64_t signature = gpu_scene_signature(scene, OBJECT_TEXTURE), texel_count = 0;
-    size_t count = scene->objects[OBJECT_TEXTURE].count;
+    uint64_t signature = gpu_scene_signature(scene, OBJECT_TEXTURE);
     if (gpu->state->any_update && signature == gpu->state->textures_signature)
         return true;
-    struct texture_info *infos = calloc(count ? count : 1, sizeof(*infos));
-    if (!infos)
-        return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for %zu textures", count);
-    bool ok = lay_out(gpu, scene, infos, &texel_count, error);
-    if (ok && count == 0)
-        ok = gpu_buffer_reserve(gpu->device, &gpu->texels, 0, error);
-    else if (ok)
-        ok = pack_texels(gpu, scene, infos, texel_count, error);
-    ok = ok && gpu_buffer_upload(gpu->device, &gpu->textures, infos, count * sizeof(*infos), error);
-    free(infos);
-    if (!ok)
+    struct texture_packing *packing = gpu->state->texture_packing = calloc(1, sizeof(*packing));
+    if (!packing)
+        return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for textures");
+    if (!list_textures(gpu, scene, packing, error))
         return false;
     gpu->state->textures_signature = signature;
-    changes->bits |= CHANGED_SHADING | CHANGED_SURFACES;
-    changes->uploaded_bytes += texel_count * 4 + count * sizeof(*infos);
+    gpu->state->brought.bits |= CHANGED_SHADING | CHANGED_SURFACES;
+    packing_add(&gpu->state->packing, &(struct packing_part){.buffer = &gpu->texels,
+                                                             .bytes = (size_t)packing->texel_count * 4,
+                                                             .write = write_texels});
     return true;
+}
+
+bool gpu_scene_finish_textures(struct gpu_scene *gpu, struct error *error)
+{
+    const struct texture_packing *packing = gpu->state->texture_packing;
+    if (!packing)
+        return true;
+    const size_t bytes = packing->count * sizeof(*packing->infos);
+    gpu->state->brought.uploaded_bytes += bytes;
+    const bool ok = atomic_load(&packing->failed)
+                        ? error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory to halve textures in")
+                        : gpu_buffer_upload(gpu->device, &gpu->textures, packing->infos, bytes, error);
+    gpu_scene_drop_texture_packing(gpu);
+    return ok;
 }

@@ -235,7 +235,10 @@ bool frame_step_waits(const struct frame_renderer *renderer)
                                                         : NULL;
     if (renderer->phase == PHASE_BUILD && building)
         return tracer_update_waits(building);
-    if (renderer->phase == PHASE_BUILD || (renderer->phase == PHASE_RESOLVE && !renderer->picture.pixels))
+    if (renderer->phase == PHASE_UPDATE && gpu_scene_bring_waits(&renderer->shared->copy))
+        return true;
+    if (renderer->phase == PHASE_UPDATE || renderer->phase == PHASE_BUILD ||
+        (renderer->phase == PHASE_RESOLVE && !renderer->picture.pixels))
         return gpu_reserve_waits(renderer->device, renderer->awaited_bytes);
     return renderer->phase == PHASE_RESOLVE && renderer->copying && all_resolved(renderer) &&
            !gpu_readback_is_done(&renderer->work->copies[renderer->copied % 2]);
@@ -284,6 +287,9 @@ enum frame_progress frame_step(struct frame_renderer *renderer, struct frame_res
     case PHASE_IDLE:
         error_set(error, ERROR_INTERNAL, NULL, "a step of no frame");
         return FRAME_FAILED;
+    case PHASE_UPDATE:
+        good = frame_update(renderer, error);
+        break;
     case PHASE_BUILD:
         good = frame_build(renderer, error);
         break;

@@ -134,8 +134,8 @@ bool frame_may_begin(const struct frame_renderer *renderer, const struct scene *
  * (or abandon). What a tracer has to build for it is part of the steps; abandoned with all frames that wait for
  * it, it is forgotten. Between the two the scene must not be edited. A step takes a few milliseconds where the
  * device allows. `result` is filled by the last step. `motion`: where things are while the shutter is open; NULL:
- * as they were committed. It is not needed after frame_begin. A frame that may not begin is refused,
- * ERROR_INTERNAL. */
+ * as they were committed. Both must stay until the frame is done or abandoned. A frame that may not begin is
+ * refused, ERROR_INTERNAL. */
 bool frame_begin(struct frame_renderer *renderer, const struct scene *scene, const struct scene_motion *motion,
                  const struct frame_request *request, struct error *error);
 enum frame_progress { FRAME_FAILED, FRAME_MORE, FRAME_DONE };

@@ -20,6 +20,8 @@
 #define WAVE_PER_SLICE 2
 /* Of a step that uploads and integrates an environment. */
 #define ENVIRONMENT_STEP_NS UINT64_C(6000000)
+/* Of a step in which a thread packs what is large of the scene. */
+#define UPDATE_STEP_NS UINT64_C(6000000)
 /* Of a step that reserves memory. */
 #define RESERVE_NS UINT64_C(3000000)
 /* Pixels that are rasterised together: more take a while to reserve and to clear. */
@@ -145,11 +147,21 @@ static void give_tracer(struct frame_renderer *renderer, const struct tracer *tr
         tracer_set_give(frame_tracers(renderer, tracer->impl), tracer);
 }
 
+/* The copy is empty then. */
+static void give_up_update(struct frame_scene *shared)
+{
+    gpu_scene_bring_abandon(&shared->copy);
+    change_history_note(&shared->changes, CHANGED_SCENE);
+    shared->showing++;
+}
+
 void frame_end(struct frame_renderer *renderer)
 {
     give_tracer(renderer, renderer->tracer);
     give_tracer(renderer, renderer->second);
     renderer->tracer = renderer->second = NULL;
+    if (renderer->phase == PHASE_UPDATE)
+        give_up_update(renderer->shared);
     if (renderer->phase != PHASE_IDLE)
         renderer->shared->frames--;
     renderer->phase = PHASE_IDLE;
@@ -370,7 +382,9 @@ static bool begin(struct frame_renderer *renderer, const struct scene *scene, co
     renderer->kept_samples = 0; /* until this one is finished */
     stage_times_begin(&context->times);
     context->wave_number = 0;
-    return update_scene(renderer, scene, motion, error) && take_tracers(renderer, error);
+    renderer->scene = scene;
+    renderer->motion = motion;
+    return true;
 }
 
 /* The first step of each, which may read the scene's motion. */
@@ -383,6 +397,28 @@ static bool begin_tracers(struct frame_renderer *renderer, struct error *error)
     return renderer->built || !renderer->second || bring(renderer, renderer->second, error) != TRACER_FAILED;
 }
 
+static bool bring_scene(struct frame_renderer *renderer, bool *done, struct error *error)
+{
+    struct error failed = {0};
+    gpu_reserve_begin(renderer->device, RESERVE_NS);
+    bool brought = gpu_scene_bring(&renderer->shared->copy, renderer->scene, clock_now_ns() + UPDATE_STEP_NS, done,
+                                   &renderer->work->context.times, &failed);
+    return end_reserving(renderer, brought, &failed, error);
+}
+
+bool frame_update(struct frame_renderer *renderer, struct error *error)
+{
+    bool done = false;
+    if (!bring_scene(renderer, &done, error))
+        return false;
+    if (!done)
+        return true;
+    if (!update_scene(renderer, renderer->scene, renderer->motion, error) || !take_tracers(renderer, error))
+        return false;
+    renderer->phase = PHASE_BUILD;
+    return begin_tracers(renderer, error);
+}
+
 bool frame_begin(struct frame_renderer *renderer, const struct scene *scene, const struct scene_motion *motion,
                  const struct frame_request *request, struct error *error)
 {
@@ -391,9 +427,9 @@ bool frame_begin(struct frame_renderer *renderer, const struct scene *scene, con
         return error_set(error, ERROR_INTERNAL, NULL, "a frame that may not begin beside others");
     bool begun = begin(renderer, scene, motion, request, error);
     if (begun) {
-        renderer->phase = PHASE_BUILD;
+        renderer->phase = PHASE_UPDATE;
         renderer->shared->frames++;
-        begun = begin_tracers(renderer, error);
+        begun = frame_update(renderer, error);
     }
     if (!begun)
         frame_end(renderer);

@@ -16,6 +16,7 @@
 
 enum frame_phase {
     PHASE_IDLE,
+    PHASE_UPDATE,
     PHASE_BUILD,
     PHASE_SAMPLE,
     PHASE_RASTER,
@@ -67,10 +68,12 @@ struct frame_renderer {
     enum frame_phase phase;
     struct frame_work *work; /* owned until it ends */
     struct trace_view view;
-    struct tracer *tracer, *second; /* held; NULL: none */
-    bool built;                     /* `tracer` is what the scene is */
-    bool second_built;              /* the same of `second` */
-    size_t awaited_bytes;           /* of a reservation that was put off, see gpu_reserve_waits(); 0: of none */
+    const struct scene *scene;         /* until the copy is of it */
+    const struct scene_motion *motion; /* the same; NULL: nothing moves */
+    struct tracer *tracer, *second;    /* held; NULL: none */
+    bool built;                        /* `tracer` is what the scene is */
+    bool second_built;                 /* the same of `second` */
+    size_t awaited_bytes;              /* of a reservation that was put off, see gpu_reserve_waits(); 0: of none */
     bool rasterise;
     uint32_t strip_rows;     /* that are rasterised together */
     uint32_t samples_before; /* that the picture holds of the frames that this one goes on from */
@@ -103,6 +106,8 @@ bool frame_build(struct frame_renderer *renderer, struct error *error);
 void frame_end(struct frame_renderer *renderer);
 /* frame_begin.c. Reserves buffers for slices of slices.slice_rays and waves of context.wave_capacity rays. */
 bool frame_reserve_waves(struct frame_renderer *renderer, struct error *error);
+/* frame_begin.c. A step of bringing the scene to the device; after the last one the tracers have their first. */
+bool frame_update(struct frame_renderer *renderer, struct error *error);
 /* A step of reserving picture.pixels, which has them or not; false: there is no memory. */
 bool frame_reserve_pixels(struct frame_renderer *renderer, struct error *error);
 

@@ -273,12 +273,16 @@ static void anew_in_pieces(struct fixture *fixture, uint64_t step_ns)
     assert_non_null(fixture->renderer);
 }
 
+/* Up to where its tracer has begun. */
 static void begin(struct fixture *fixture, struct frame_renderer *renderer)
 {
     struct error error = {0};
+    struct frame_result none = {0};
     assert_true(frame_may_begin(renderer, fixture->scene, NULL, &fixture->request));
     if (!frame_begin(renderer, fixture->scene, NULL, &fixture->request, &error))
         fail_msg("frame_begin: %s: %s", error.field, error.text);
+    while (renderer->phase == PHASE_UPDATE)
+        assert_int_equal(frame_step(renderer, &none, &error), FRAME_MORE);
 }
 
 /* A step that does something. */

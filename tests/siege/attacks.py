@@ -100,6 +100,26 @@ def many_meshes(address):
         transact(client, edits)
 
 
+def shown_meshes(address):
+    """A mesh of 2 M triangles that is set anew and shown, again and again."""
+    edge = 1024
+    vertices, triangles = edge * edge, 2 * (edge - 1) * (edge - 1)
+    rows = [array.array("f", itertools.chain.from_iterable((x / edge, y / edge, side) for y in range(edge) for x in range(edge)))
+            for side in (0, 1)]
+    indices = array.array("I", itertools.chain.from_iterable(
+        (i, i + 1, i + edge, i + 1, i + edge + 1, i + edge) for y in range(edge - 1) for i in range(y * edge, (y + 1) * edge - 1)))
+    shapes = [[positions.tobytes(), indices.tobytes()] for positions in rows]
+    client = Client(address)
+    client.open_scene(1)
+    client.upload([*shapes[0], shapes[1][0]])
+    client.commit(1, [tiny_client.set_mesh(1, vertices, triangles, shapes[0], 0), tiny_client.set_node(1, tiny_client.NODE_MESH, 1)])
+    begun()
+    for shape in itertools.cycle(shapes):
+        client.commit(1, [tiny_client.set_mesh(1, vertices, triangles, shape, 0)])
+        request = render(client, credit=1)
+        client.next_frame(request)
+
+
 def skins(address):
     """One skin of 65,536 joints again and again."""
     joints = 65536
@@ -324,7 +344,7 @@ def noise(address):
 
 
 ATTACKS = {attack.__name__: attack for attack in (
-    meshes, many_meshes, skins, coincident, large_picture, environments, stats, pings, credits, places, silent, weights,
+    meshes, many_meshes, shown_meshes, skins, coincident, large_picture, environments, stats, pings, credits, places, silent, weights,
     encoding, uncommitted, noise)}
 
 

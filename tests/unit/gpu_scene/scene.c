@@ -302,3 +302,90 @@ TEST(bounds_hold_all_that_is_visible)
     assert_in_range((unsigned)fixture.gpu.diagonal, 4, 12);
     fixture_finish(&fixture);
 }
+
+/* ---- what is large ---- */
+
+#define LARGE_TRIANGLES 200000u /* 3.2 MB of them, and 9.6 MB of each array of vertices */
+
+static struct scene *large_scene(void)
+{
+    struct test_edits edits = {.scene = test_scene_create()};
+    test_material(&edits, 1, 0.1f, 0.2f, 0.3f);
+    test_material(&edits, 2, 0.4f, 0.5f, 0.6f);
+    test_soup_mesh(&edits, 1, LARGE_TRIANGLES, 0.01f, 5);
+    test_texture(&edits, 1, 300, 200, TEXTURE_RGBA8_SRGB, WRAP_REPEAT, WRAP_REPEAT, 7);
+    test_node(&edits, 1, 0, NODE_MESH, 1, NULL);
+    test_commit(&edits);
+    return edits.scene;
+}
+
+/* One step; true: it was the last one. */
+static bool bring(struct gpu_scene *gpu, const struct scene *scene, uint64_t end_ns)
+{
+    struct error error = {0};
+    bool done = false;
+    assert_true(gpu_scene_bring(gpu, scene, end_ns, &done, NULL, &error));
+    return done;
+}
+
+static void expect_same_bytes(const struct gpu_buffer *a, const struct gpu_buffer *b)
+{
+    assert_int_equal(a->size_bytes, b->size_bytes);
+    char *of_a = malloc(a->size_bytes), *of_b = malloc(b->size_bytes);
+    gpu_buffer_read(device, a, 0, of_a, a->size_bytes);
+    gpu_buffer_read(device, b, 0, of_b, b->size_bytes);
+    assert_memory_equal(of_a, of_b, a->size_bytes);
+    free(of_a);
+    free(of_b);
+}
+
+static void expect_same_copies(const struct gpu_scene *a, const struct gpu_scene *b)
+{
+    assert_int_equal(a->triangles.size_bytes, LARGE_TRIANGLES * 16);
+    expect_same_bytes(&a->triangles, &b->triangles);
+    expect_same_bytes(&a->positions, &b->positions);
+    expect_same_bytes(&a->normals, &b->normals);
+    expect_same_bytes(&a->texcoords, &b->texcoords);
+    expect_same_bytes(&a->texels, &b->texels);
+}
+
+TEST(what_is_large_comes_in_steps_and_is_the_same_as_at_once)
+{
+    struct fixture at_once, in_steps = {.scene = large_scene()};
+    fixture_init(&at_once, large_scene());
+    gpu_scene_init(&in_steps.gpu, device);
+    unsigned steps = 1;
+    while (!bring(&in_steps.gpu, in_steps.scene, 0))
+        steps++;
+    assert_in_range(steps, 2, UINT32_MAX); /* a step does not wait for megabytes */
+    assert_false(gpu_scene_bring_waits(&in_steps.gpu));
+    update(&in_steps);
+    expect_changes(&in_steps, true, true, true, true);
+    assert_int_equal(in_steps.changes.uploaded_bytes, at_once.changes.uploaded_bytes);
+    expect_same_copies(&in_steps.gpu, &at_once.gpu);
+    assert_true(bring(&in_steps.gpu, in_steps.scene, 0));
+    update(&in_steps);
+    assert_int_equal(in_steps.changes.uploaded_bytes, 0);
+    fixture_finish(&in_steps);
+    fixture_finish(&at_once);
+}
+
+TEST(what_is_being_brought_may_be_given_up_at_any_time)
+{
+    struct fixture expected, fixture = {.scene = large_scene()};
+    fixture_init(&expected, large_scene());
+    for (int way = 0; way < 3; way++) {
+        gpu_scene_init(&fixture.gpu, device);
+        for (int step = 0; step < way; step++)
+            bring(&fixture.gpu, fixture.scene, 0);
+        gpu_scene_bring_abandon(&fixture.gpu);
+        update(&fixture);
+        expect_same_copies(&fixture.gpu, &expected.gpu);
+        gpu_scene_finish(&fixture.gpu);
+        bring(&fixture.gpu, fixture.scene, 0);
+        gpu_scene_finish(&fixture.gpu);
+        assert_int_equal(gpu_scene_device_bytes(&fixture.gpu), 0);
+    }
+    fixture_finish(&fixture);
+    fixture_finish(&expected);
+}
