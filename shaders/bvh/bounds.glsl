@@ -46,13 +46,13 @@ bool sphere_is_hit(bound_ray r, vec4 centre_radius, float t_min, float t_max)
            !(outside > 0.0 && outside * outside > squared_half_chord * r.inverse_square) && t_min < t_max;
 }
 
-// All rays of the packet: each has its own test.
+// All rays of the packet: each has its own test. `alive` has a bit for each ray.
 struct bundle {
     bound_ray rays[PACKET_RAYS];
     uint octant;
 };
 
-bundle bundle_of(object_ray o[PACKET_RAYS], bool alive[PACKET_RAYS], int leading, tree_grid grid, float slack)
+bundle bundle_of(object_ray o[PACKET_RAYS], uint alive, int leading, tree_grid grid, float slack)
 {
     bundle b;
     b.octant = 0u;
@@ -83,7 +83,7 @@ struct bundle {
 
 const float NOWHERE = 3e38;
 
-bundle bundle_of(object_ray o[PACKET_RAYS], bool alive[PACKET_RAYS], int leading, tree_grid grid, float slack)
+bundle bundle_of(object_ray o[PACKET_RAYS], uint alive, int leading, tree_grid grid, float slack)
 {
     vec3 scale[PACKET_RAYS], origin[PACKET_RAYS], slacks[PACKET_RAYS];
     vec3 centre = vec3(0.0), scale_leading = vec3(0.0);
@@ -112,10 +112,11 @@ bundle bundle_of(object_ray o[PACKET_RAYS], bool alive[PACKET_RAYS], int leading
     for (int k = 0; k < PACKET_RAYS; k++) {
         vec3 off = (origin[k] - centre) * scale[k];
         // The products centre * scale round as the ray's own would: their part is in the slack.
-        minimum = alive[k] ? min(minimum, scale[k]) : minimum;
-        maximum = alive[k] ? max(maximum, scale[k]) : maximum;
-        before = alive[k] ? max(before, off + slacks[k]) : before;
-        after = alive[k] ? min(after, off - slacks[k]) : after;
+        bool counts = (alive & 1u << k) != 0u;
+        minimum = counts ? min(minimum, scale[k]) : minimum;
+        maximum = counts ? max(maximum, scale[k]) : maximum;
+        before = counts ? max(before, off + slacks[k]) : before;
+        after = counts ? min(after, off - slacks[k]) : after;
     }
     bvec3 mixed = notEqual(lessThan(minimum, vec3(0.0)), lessThan(maximum, vec3(0.0)));
     b.scale_min = mix(minimum, vec3(0.0), mixed);

@@ -155,10 +155,10 @@ int leading_of(trace_ray r[PACKET_RAYS])
 void enter_tree(object_ray o[PACKET_RAYS], trace_ray r[PACKET_RAYS], int leading, tree_grid grid, float slack,
                 out bundle b, out relative_rays rays)
 {
-    bool alive[PACKET_RAYS];
+    uint alive = 0u; // a bit each: Mesa 22.3's zink fails over an array of bool
     vec3 centre = o[0].origin;
     for (int k = 0; k < PACKET_RAYS; k++) {
-        alive[k] = r[k].t_max > r[k].t_min;
+        alive |= r[k].t_max > r[k].t_min ? 1u << k : 0u;
         centre = k == leading ? o[k].origin : centre;
     }
     b = bundle_of(o, alive, leading, grid, slack);
