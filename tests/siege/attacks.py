@@ -18,7 +18,7 @@ import load  # pylint: disable=wrong-import-position
 import tiny_client  # pylint: disable=wrong-import-position
 from tiny_client import BATCH, CREDIT, Client  # pylint: disable=wrong-import-position
 
-RGBA32F, ZSTD, PREDICTED, REFERENCE, BVH, WHITTED, RAYCAST = 2, 1, 4, 2, 0, 0, 2
+RGBA32F, ZSTD, JPEG, PREDICTED, REFERENCE, BVH, WHITTED, RAYCAST = 2, 1, 2, 4, 2, 0, 0, 2
 STATS, SET_ENVIRONMENT, SET_SKIN = 0x0009, 0x0138, 0x0139
 CAMERA = ((0, 0, 6), (0, 0, 0), (0, 1, 0), 0.8)
 KEY = [struct.pack("<f", 0) + tiny_client.camera_bytes(CAMERA)]
@@ -293,16 +293,24 @@ def weights(address):
     flood(clients, lambda client: b"")
 
 
-def encoding(address):
-    """Frames that take long to encode."""
+def encode_much(address, **fields):
     clients = []
     for _ in range(4):
         client = with_triangle(address)
         for channel in range(2, 6):
-            render(client, channel=channel, width=2048, height=2048, encoding=ZSTD, quality=19, format=RGBA32F,
-                   last_frame=1 << 20, credit=65536)
+            render(client, channel=channel, last_frame=1 << 20, credit=65536, **fields)
         clients.append(client)
     flood(clients, lambda client: b"")
+
+
+def encoding(address):
+    """Frames that take long to encode."""
+    encode_much(address, width=2048, height=2048, encoding=ZSTD, quality=19, format=RGBA32F)
+
+
+def jpegs(address):
+    """Large frames as JPEG, which is not given up in the middle."""
+    encode_much(address, width=8192, height=4096, encoding=JPEG, quality=100)
 
 
 def uncommitted(address):
@@ -345,7 +353,7 @@ def noise(address):
 
 ATTACKS = {attack.__name__: attack for attack in (
     meshes, many_meshes, shown_meshes, skins, coincident, large_picture, environments, stats, pings, credits, places, silent, weights,
-    encoding, uncommitted, noise)}
+    encoding, jpegs, uncommitted, noise)}
 
 
 def main():

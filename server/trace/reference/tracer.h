@@ -67,7 +67,7 @@ struct reference {
     pthread_t builder;
     bool is_building, top_changed;
     atomic_bool is_built, is_abandoned;
-    uint64_t build_ns;     /* how long it took */
+    uint64_t build_ns; /* how long it took */
     /* Of the device's memory, as the update began: what is not Embree's, and the limit. */
     uint64_t others_bytes, limit_bytes;
     /* What Embree's callbacks write, from any thread. */
