@@ -9,7 +9,7 @@ sys.path.insert(0, str(ROOT / "tests/siege"))
 import siege  # pylint: disable=wrong-import-position
 
 SECONDS = 3
-ATTACKS = ("meshes", "stats", "places", "silent", "encoding", "noise", "tight_weights", "tight_uncommitted")
+ATTACKS = ("meshes", "stats", "places", "silent", "encoding", "noise", "tight_weights")
 
 
 @unittest.skipIf(b"__asan_init" in (BIN / "farlightd").read_bytes(), "its bounds of time are those of a daemon as it is shipped")
