@@ -51,8 +51,8 @@ const char *cli_base_name(const char *path)
     return slash ? slash + 1 : path;
 }
 
-/* A file without a name, which nobody finds if this process is killed now. Some file systems have only files with
- * one. -1: errno says why. */
+/* A file without a name: nothing stays in the folder if this process is killed now. Where the file system needs a
+ * name, it has one for a moment. -1: errno says why. */
 static int open_probe(const char *folder)
 {
     const int fd = open(folder, O_TMPFILE | O_WRONLY | O_CLOEXEC, 0600);

@@ -21,3 +21,14 @@ bool clock_wait(pthread_cond_t *condition, pthread_mutex_t *lock, uint64_t until
         return pthread_cond_wait(condition, lock) == 0;
     return pthread_cond_clockwait(condition, lock, CLOCK_MONOTONIC, &until) != ETIMEDOUT;
 }
+
+bool clock_wait_for(const bool *flag, pthread_cond_t *condition, pthread_mutex_t *lock, uint64_t until_ns)
+{
+    bool in_time = true;
+    pthread_mutex_lock(lock);
+    while (!*flag && in_time)
+        in_time = clock_wait(condition, lock, until_ns);
+    const bool is_set = *flag;
+    pthread_mutex_unlock(lock);
+    return is_set;
+}

@@ -15,8 +15,8 @@ bool host_user_runtime_folder(char *folder, size_t folder_bytes); /* false: ther
 /* Physical memory; 8 GiB where the system does not tell. */
 uint64_t host_memory_bytes(void);
 
-/* The thread that calls this, and those that it starts, give way to the threads of the frames: it is nice by 5.
- * Linux alone has that for a thread. */
+/* Lowers the priority of the calling thread, and of those that it starts later, so that frames go first. On Linux
+ * each thread has a priority of its own. */
 void host_thread_gives_way(void);
 
 #endif

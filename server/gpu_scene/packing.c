@@ -73,15 +73,7 @@ static void begin(struct gpu_scene *gpu, struct packing *packing)
 
 static bool has_ended_by(struct packing *packing, uint64_t until_ns)
 {
-    if (!packing->has_thread)
-        return true;
-    bool in_time = true;
-    pthread_mutex_lock(&packing->lock);
-    while (!packing->has_ended && in_time)
-        in_time = clock_wait(&packing->ended, &packing->lock, until_ns);
-    bool has_ended = packing->has_ended;
-    pthread_mutex_unlock(&packing->lock);
-    return has_ended;
+    return !packing->has_thread || clock_wait_for(&packing->has_ended, &packing->ended, &packing->lock, until_ns);
 }
 
 static void join(struct packing *packing)

@@ -101,9 +101,9 @@ void gpu_scene_finish(struct gpu_scene *gpu);
 bool gpu_scene_update(struct gpu_scene *gpu, const struct scene *scene, const struct scene_motion *motion,
                       struct scene_changes *changes, struct stage_times *times, struct error *error);
 /* Brings what is large of the scene to the device, until about `end_ns` of the clock: triangles, vertices,
- * textures. *done: the update, which does it at once where it is not done, will not take long for it. In between
- * the scene must not change, and the copy is of use to nobody. Fails like gpu_scene_update(); ERROR_BUSY: memory
- * is reserved in steps, and the next one goes on. */
+ * textures. *done: all is there, and the update will not take long for it. An update without it does all at once.
+ * Between two steps the scene must not change, and nobody may use the copy. Fails like gpu_scene_update();
+ * ERROR_BUSY: memory is reserved in steps, and the next one goes on. */
 bool gpu_scene_bring(struct gpu_scene *gpu, const struct scene *scene, uint64_t end_ns, bool *done,
                      struct stage_times *times, struct error *error);
 /* Whether the next step would only wait. */

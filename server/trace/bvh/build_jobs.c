@@ -94,13 +94,7 @@ struct bvh_run *bvh_jobs_start(struct bvh_job *jobs, uint32_t count, const struc
 
 bool bvh_jobs_wait(struct bvh_run *run, uint64_t until_ns)
 {
-    pthread_mutex_lock(&run->mutex);
-    bool in_time = true;
-    while (!run->has_ended && in_time)
-        in_time = clock_wait(&run->ended, &run->mutex, until_ns);
-    bool has_ended = run->has_ended;
-    pthread_mutex_unlock(&run->mutex);
-    return has_ended;
+    return clock_wait_for(&run->has_ended, &run->ended, &run->mutex, until_ns);
 }
 
 static void destroy(struct bvh_run *run)

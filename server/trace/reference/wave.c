@@ -133,13 +133,7 @@ static void take_off(struct reference *reference, struct reference_wave *wave, c
 static bool has_landed(struct reference_wave *wave, uint64_t step_end_ns)
 {
     uint64_t until_ns = step_end_ns == STEP_WITHOUT_END ? STEP_WITHOUT_END : step_end_ns + LANDING_NS;
-    bool in_time = true;
-    pthread_mutex_lock(&wave->lock);
-    while (!wave->has_landed && in_time)
-        in_time = clock_wait(&wave->landed, &wave->lock, until_ns);
-    bool landed = wave->has_landed;
-    pthread_mutex_unlock(&wave->lock);
-    return landed;
+    return clock_wait_for(&wave->has_landed, &wave->landed, &wave->lock, until_ns);
 }
 
 bool reference_trace_range(struct tracer *tracer, struct gpu_scene *scene, struct trace_state *state,
