@@ -6,17 +6,17 @@
 #include "render/wave_trace.h"
 #include "shared/bindings.h"
 #include "shared/path.h"
+#include "trace/step.h"
 
 #include <epoxy/gl.h>
 
-/* Vertices that one step of the frame draws: on software GL they take some ten milliseconds if triangles are
- * small. On a GPU nearly as many as an int can number. */
-#define DRAW_VERTICES_SOFTWARE (3u << 16)
+/* Vertices that one step of the frame draws. On a GPU nearly as many as an int can number. On software GL at most
+ * what takes some ten milliseconds if triangles are small, and fewer where that takes longer than a step should:
+ * larger triangles, other work on the machine. Each part costs something of its own, so only then. */
 #define DRAW_VERTICES_HARDWARE (3u << 24)
-/* Fewer where such a part takes long: larger triangles, other work on the machine. Each part costs something of
- * its own, so only then. */
+#define DRAW_VERTICES_SOFTWARE (3u << 16)
+#define DRAW_VERTICES_FIRST (3u << 14) /* nothing is known of the scene yet */
 #define DRAW_VERTICES_MIN (3u << 12)
-#define DRAW_NS_MAX UINT64_C(25000000)
 
 enum primitive_kind { PRIMITIVE_TRIANGLES, PRIMITIVE_SPHERES, PRIMITIVE_DISCS };
 static const unsigned vertices_per_primitive[] = {3, 36, 6};
@@ -120,9 +120,9 @@ static bool draw_sort(struct primary *primary, struct render_context *context, u
 
 static void learn(struct primary *primary, uint64_t took_ns)
 {
-    if (took_ns > DRAW_NS_MAX && primary->part_vertices > DRAW_VERTICES_MIN)
+    if (took_ns > STEP_NS && primary->part_vertices > DRAW_VERTICES_MIN)
         primary->part_vertices /= 2;
-    else if (took_ns < DRAW_NS_MAX / 4 && primary->part_vertices < DRAW_VERTICES_SOFTWARE)
+    else if (took_ns < STEP_NS / 8 && primary->part_vertices < DRAW_VERTICES_SOFTWARE)
         primary->part_vertices *= 2;
 }
 
@@ -162,7 +162,7 @@ bool primary_rasterise(struct primary *primary, struct render_context *context, 
 {
     const uint64_t start_ns = clock_now_ns();
     if (primary->part_vertices == 0)
-        primary->part_vertices = DRAW_VERTICES_SOFTWARE;
+        primary->part_vertices = DRAW_VERTICES_FIRST;
     context_span_begin(context, STAGE_PRIMARY);
     gpu_push_group(context->device, "rasterise primary");
     context_bind(context);

@@ -16,9 +16,10 @@ HERE = pathlib.Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE.parent / "integration"), str(HERE.parent / "soak")]
 import load  # pylint: disable=wrong-import-position
 import tiny_client  # pylint: disable=wrong-import-position
-from tiny_client import BATCH, CREDIT, Client  # pylint: disable=wrong-import-position
+from tiny_client import BATCH, CREDIT, VIEW, Client  # pylint: disable=wrong-import-position
 
-RGBA32F, ZSTD, JPEG, PREDICTED, REFERENCE, BVH, WHITTED, RAYCAST = 2, 1, 2, 4, 2, 0, 0, 2
+RGBA32F, ZSTD, JPEG, H264, PREDICTED, REFERENCE, BVH, WHITTED, RAYCAST = 2, 1, 2, 3, 4, 2, 0, 0, 2
+CAN_H264 = 1  # a capability
 STATS, SET_ENVIRONMENT, SET_SKIN = 0x0009, 0x0138, 0x0139
 CAMERA = ((0, 0, 6), (0, 0, 0), (0, 1, 0), 0.8)
 KEY = [struct.pack("<f", 0) + tiny_client.camera_bytes(CAMERA)]
@@ -40,8 +41,8 @@ def render(client, **fields):
     return client.ask(tiny_client.RENDER, tiny_client.payload(fixed, tiny_client.array(KEY), tiny_client.array([])))
 
 
-def with_triangle(address):
-    client = Client(address)
+def with_triangle(address, **options):
+    client = Client(address, **options)
     blobs, edits = tiny_client.triangle()
     client.open_scene(1)
     client.upload(blobs)
@@ -309,8 +310,27 @@ def encoding(address):
 
 
 def jpegs(address):
-    """Large frames as JPEG, which is not given up in the middle."""
-    encode_much(address, width=8192, height=4096, encoding=JPEG, quality=100)
+    """The largest frames as JPEG, which is not given up in the middle."""
+    encode_much(address, width=8192, height=8192, encoding=JPEG, quality=100)
+
+
+def videos(address):
+    """The largest views as H.264, which is not given up in the middle, either."""
+    clients = [with_triangle(address, capabilities=CAN_H264) for _ in range(4)]
+    for client in clients:
+        for channel in range(2, 4):
+            render(client, kind=VIEW, channel=channel, width=8192, height=8192, encoding=H264, still_encoding=H264, quality=100,
+                   credit=65536)
+    command = itertools.count(1)
+
+    def look(client):
+        time.sleep(0.05)
+        number = next(command)
+        eye, *rest = CAMERA
+        client.look(2 + number % 2, number, ((eye[0] + number % 1000 / 1000, *eye[1:]), *rest), True)
+        return b""
+
+    flood(clients, look)
 
 
 def uncommitted(address):
@@ -353,7 +373,7 @@ def noise(address):
 
 ATTACKS = {attack.__name__: attack for attack in (
     meshes, many_meshes, shown_meshes, skins, coincident, large_picture, environments, stats, pings, credits, places, silent, weights,
-    encoding, jpegs, uncommitted, noise)}
+    encoding, jpegs, videos, uncommitted, noise)}
 
 
 def main():
