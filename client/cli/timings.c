@@ -161,6 +161,7 @@ static void print_frame(struct cli_timings *timings, const struct fl_frame *fram
     set(object, "shadow_rays", frame->shadow_rays);
     set(object, "secondary_rays", frame->secondary_rays);
     set(object, "splits", frame->splits);
+    set(object, "device_waits", frame->device_waits);
     set(object, "uploaded_bytes", frame->uploaded_bytes);
     set(object, "structure_bytes", frame->structure_bytes);
     set(object, "pixels_bytes", frame->pixels_bytes);

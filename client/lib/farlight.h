@@ -310,6 +310,7 @@ struct fl_frame {
     float shutter_s;       /* how long the shutter was open, seconds */
     unsigned layers;       /* set of layers that `pixels` has, in the order of their numbers */
     uint64_t primary_rays, shadow_rays, secondary_rays, splits, uploaded_bytes, structure_bytes;
+    uint32_t device_waits;          /* how often the daemon has waited for the device */
     uint64_t wire_bytes;            /* of the encoded pixels and what is attached */
     uint64_t receive_ns, decode_ns; /* first byte to last; decoding and checking */
     uint64_t wait_ns;               /* how long fl_render_next waited for it */

@@ -351,6 +351,7 @@ static bool take_costs(struct fl_frame *frame, const struct message_frame_end *e
     frame->shadow_rays = end->shadow_rays;
     frame->secondary_rays = end->secondary_rays;
     frame->splits = end->splits;
+    frame->device_waits = end->device_waits;
     frame->uploaded_bytes = end->uploaded_bytes;
     frame->structure_bytes = end->structure_bytes;
     frame->stages = copy(end->stages, end->stages_count * sizeof(*frame->stages));

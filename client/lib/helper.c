@@ -113,6 +113,7 @@ static void describe_costs(struct message_frame_end *end, const struct fl_frame 
     end->shadow_rays = frame->shadow_rays;
     end->secondary_rays = frame->secondary_rays;
     end->splits = frame->splits;
+    end->device_waits = frame->device_waits;
     end->uploaded_bytes = frame->uploaded_bytes;
     end->structure_bytes = frame->structure_bytes;
     end->stages = frame->stages;

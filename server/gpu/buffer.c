@@ -116,9 +116,9 @@ void gpu_buffer_write(struct gpu_device *device, struct gpu_buffer *buffer, size
 void gpu_buffer_read(struct gpu_device *device, const struct gpu_buffer *buffer, size_t offset_bytes, void *data,
                      size_t size_bytes)
 {
-    (void)device;
     if (!size_bytes)
         return;
+    device->waits++;
     glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
     glGetNamedBufferSubData(buffer->name, (GLintptr)offset_bytes, (GLsizeiptr)size_bytes, data);
 }

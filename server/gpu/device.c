@@ -315,6 +315,12 @@ bool gpu_check(struct gpu_device *device, const char *what, struct error *error)
     return error_set(error, kind, NULL, "%s: %s (0x%04x)", what, gl_error_name(first), first);
 }
 
+void gpu_finish(struct gpu_device *device)
+{
+    device->waits++;
+    glFinish();
+}
+
 bool gpu_memory_take(struct gpu_device *device, uint64_t size_bytes, const char *what, struct error *error)
 {
     uint64_t limit = device->memory_limit_bytes;

@@ -46,7 +46,8 @@ struct gpu_device {
     uint64_t reserve_until_ns;          /* see gpu_reserve_begin; 0: whenever */
     size_t reserve_awaited_bytes; /* size of the reservation that was put off until prefaulted; 0: none was */
     bool reserve_made, reserve_put_off;
-    bool lost; /* the context; nothing works any more, see gpu_note_loss */
+    uint64_t waits; /* how often this thread has waited for the device to come to an end with something */
+    bool lost;      /* the context; nothing works any more, see gpu_note_loss */
 };
 
 struct gpu_options {
@@ -91,6 +92,9 @@ bool gpu_reserve_waits(const struct gpu_device *device, size_t awaited_bytes);
 bool gpu_reserve_goes_on(struct gpu_device *device, size_t bytes, struct error *error);
 /* The same for memory of the device, which is taken, unless it is put off or there is too little. */
 bool gpu_reserve_memory(struct gpu_device *device, size_t bytes, const char *what, struct error *error);
+
+/* Waits until the device has nothing to do. */
+void gpu_finish(struct gpu_device *device);
 
 /* GL debug group for the scope of a pass; shows in driver messages and frame debuggers. */
 void gpu_push_group(struct gpu_device *device, const char *name);

@@ -255,3 +255,11 @@ void gpu_dispatch(struct gpu_device *device, const struct gpu_program *program, 
     glDispatchCompute((GLuint)groups_x, (GLuint)groups_y, 1);
     glMemoryBarrier(GL_ALL_BARRIER_BITS);
 }
+
+void gpu_dispatch_indirect(const struct gpu_program *program, const struct gpu_buffer *groups, size_t offset_bytes)
+{
+    glUseProgram(program->name);
+    glBindBuffer(GL_DISPATCH_INDIRECT_BUFFER, groups->name);
+    glDispatchComputeIndirect((GLintptr)offset_bytes);
+    glMemoryBarrier(GL_ALL_BARRIER_BITS);
+}

@@ -13,6 +13,7 @@
 #define FARLIGHT_GPU_PROGRAM_H
 
 #include "base/error.h"
+#include "gpu/buffer.h"
 #include "gpu/device.h"
 
 struct gpu_define {
@@ -44,5 +45,8 @@ void gpu_uniform_vec(const struct gpu_program *program, const char *name, unsign
  * facts.work_groups_max groups are spread over y; the shader finds its item with
  * `item_index()` of common/dispatch.glsl. */
 void gpu_dispatch(struct gpu_device *device, const struct gpu_program *program, uint64_t items);
+/* The same with the numbers of groups on x, y and z that the device has written there: three u32. */
+void gpu_dispatch_indirect(const struct gpu_program *program, const struct gpu_buffer *groups,
+                           size_t offset_bytes);
 
 #endif

@@ -74,7 +74,8 @@ bool gpu_readback_is_done(const struct gpu_readback *readback)
 
 bool gpu_readback_take(struct gpu_device *device, struct gpu_readback *readback, void *data, struct error *error)
 {
-    GLenum status = GL_TIMEOUT_EXPIRED;
+    GLenum status = readback->fence ? glClientWaitSync(readback->fence, 0, 0) : GL_TIMEOUT_EXPIRED;
+    device->waits += readback->fence && status == GL_TIMEOUT_EXPIRED;
     while (readback->fence && status == GL_TIMEOUT_EXPIRED && gpu_check(device, "reading back", error))
         status = glClientWaitSync(readback->fence, 0, WAIT_NS);
     gpu_readback_drop(readback);

@@ -6,6 +6,7 @@
 
 #include <epoxy/gl.h>
 #include <stdlib.h>
+#include <string.h>
 
 /* A frame of eight waves with four lights takes about a hundred spans. */
 #define RING_SPANS 256
@@ -22,6 +23,7 @@ struct gpu_timer {
     struct span *spans; /* since the last collect */
     size_t span_count, span_capacity;
     unsigned queries[RING_SPANS][2];
+    size_t next_query, queries_used; /* of the ring */
     bool open;
 };
 
@@ -60,9 +62,12 @@ static struct span *add_span(struct gpu_timer *timer)
     }
     struct span *span = &timer->spans[timer->span_count];
     *span = (struct span){0};
-    if (timer->span_count < RING_SPANS && timer->queries[timer->span_count][1]) {
-        span->queries[0] = timer->queries[timer->span_count][0];
-        span->queries[1] = timer->queries[timer->span_count][1];
+    const unsigned *queries = timer->queries[timer->next_query];
+    if (timer->queries_used < RING_SPANS && queries[1]) {
+        span->queries[0] = queries[0];
+        span->queries[1] = queries[1];
+        timer->next_query = (timer->next_query + 1) % RING_SPANS;
+        timer->queries_used++;
     }
     timer->span_count++;
     return span;
@@ -101,6 +106,12 @@ static bool is_available(unsigned query)
     return available;
 }
 
+/* The device is through with the span, if it measures it at all. */
+static bool is_done(const struct span *span)
+{
+    return !span->queries[1] || is_available(span->queries[1]);
+}
+
 /* The device is through with all spans, though it may have other work behind them. */
 static bool all_available(const struct gpu_timer *timer)
 {
@@ -121,24 +132,49 @@ static bool query_time(unsigned query, uint64_t *time_ns)
     return value != 0;
 }
 
-void gpu_timer_collect(struct gpu_timer *timer, struct stage_times *times)
+/* The first spans. */
+static void collect(struct gpu_timer *timer, size_t count, struct stage_times *times)
 {
-    if (timer->open)
-        gpu_timer_end(timer);
-    if (!all_available(timer))
-        glFinish();
     /* The GPU's clock now, to convert its times to the host's. */
     GLint64 gpu_now_ns = 0;
     glGetInteger64v(GL_TIMESTAMP, &gpu_now_ns);
     uint64_t cpu_from_gpu_ns = clock_now_ns() - (uint64_t)gpu_now_ns; /* wraps, and wraps back */
-    for (size_t i = 0; i < timer->span_count; i++) {
+    for (size_t i = 0; i < count; i++) {
         const struct span *span = &timer->spans[i];
         uint64_t begin_ns, end_ns;
+        timer->queries_used -= span->queries[1] != 0;
         stage_times_add(times, span->stage, CLOCK_CPU, span->wave, span->cpu_start_ns, span->cpu_duration_ns);
         if (span->queries[1] && query_time(span->queries[0], &begin_ns) && query_time(span->queries[1], &end_ns) &&
             end_ns >= begin_ns)
             stage_times_add(times, span->stage, CLOCK_GPU, span->wave, begin_ns + cpu_from_gpu_ns,
                             end_ns - begin_ns);
     }
-    timer->span_count = 0;
+    timer->span_count -= count;
+    if (timer->span_count > 0)
+        memmove(timer->spans, timer->spans + count, timer->span_count * sizeof(*timer->spans));
+}
+
+void gpu_timer_collect(struct gpu_timer *timer, struct stage_times *times)
+{
+    if (timer->open)
+        gpu_timer_end(timer);
+    if (!all_available(timer))
+        gpu_finish(timer->device);
+    collect(timer, timer->span_count, times);
+}
+
+size_t gpu_timer_collect_done(struct gpu_timer *timer, struct stage_times *times)
+{
+    size_t done = 0, closed = timer->span_count - timer->open;
+    while (done < closed && is_done(&timer->spans[done]))
+        done++;
+    if (done > 0)
+        collect(timer, done, times);
+    return timer->span_count;
+}
+
+void gpu_timer_drop(struct gpu_timer *timer)
+{
+    timer->open = false;
+    timer->span_count = timer->queries_used = 0;
 }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* GPU time of the passes of a frame: pairs of timestamp queries, read once at the end of the frame. */
+/* GPU time of the passes of a frame: pairs of timestamp queries. */
 #ifndef FARLIGHT_GPU_TIMER_H
 #define FARLIGHT_GPU_TIMER_H
 
@@ -17,5 +17,9 @@ void gpu_timer_end(struct gpu_timer *timer);
 /* Waits until the GPU is through with the spans, adds every span since the last collect to `times` (may be NULL).
  * A query without a result is left out, never reported as 0. */
 void gpu_timer_collect(struct gpu_timer *timer, struct stage_times *times);
+/* Forgets the spans. */
+void gpu_timer_drop(struct gpu_timer *timer);
+/* Without waiting: adds the spans that the GPU is through with. Returns how many are left. */
+size_t gpu_timer_collect_done(struct gpu_timer *timer, struct stage_times *times);
 
 #endif

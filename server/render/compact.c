@@ -4,43 +4,144 @@
 #include "shared/bindings.h"
 #include "shared/path.h"
 
-static uint32_t block_count_of(uint32_t item_count)
+#include <stddef.h>
+
+static uint32_t blocks_of(uint32_t item_count)
 {
     return (item_count + COMPACT_BLOCK - 1) / COMPACT_BLOCK;
 }
 
-bool compact_scan(struct render_context *context, const struct gpu_program *count, uint32_t item_count,
-                  struct wave_state *state, struct error *error)
+/* As the device counts them. */
+static struct wave_counts counts_of(uint32_t count)
+{
+    const uint32_t groups = (count + 63) / 64, x = groups < WAVE_GROUPS_MAX ? groups : WAVE_GROUPS_MAX;
+    return (struct wave_counts){count, x, x > 0 ? (groups + x - 1) / x : 1, 1};
+}
+
+void compact_begin(struct render_context *context)
+{
+    struct wave_state *state = &context->known_state;
+    context->shadow_rays = 0;
+    *state = (struct wave_state){.rays = counts_of(context->ray_count),
+                                 .ray_blocks = counts_of(blocks_of(context->ray_count))};
+    /* But for what became of the slices that are in flight. */
+    gpu_buffer_write(context->device, &context->wave_state, 0, state, offsetof(struct wave_state, stopped));
+}
+
+void compact_go_on(struct render_context *context)
+{
+    const uint32_t nothing = 0;
+    gpu_buffer_write(context->device, &context->wave_state, offsetof(struct wave_state, stopped), &nothing,
+                     sizeof(nothing));
+}
+
+/* Without counts_on_host: the maximum. */
+static uint32_t count_of(const struct render_context *context, enum wave_list list)
+{
+    switch (list) {
+    case WAVE_RAYS:
+        return context->ray_count;
+    case WAVE_RAY_BLOCKS:
+        return blocks_of(context->ray_count);
+    case WAVE_HITS:
+        return context->hit_count;
+    case WAVE_HIT_BLOCKS:
+        return blocks_of(context->hit_count);
+    case WAVE_SHADOW_RAYS:
+        break;
+    }
+    return 0;
+}
+
+void compact_dispatch(struct render_context *context, const struct gpu_program *program, enum wave_list list)
+{
+    gpu_buffer_bind_uniform(&context->wave_state, UNIFORM_WAVE);
+    if (context->counts_on_host)
+        gpu_dispatch(context->device, program, count_of(context, list));
+    else
+        gpu_dispatch_indirect(program, &context->wave_state,
+                              list * sizeof(struct wave_counts) + offsetof(struct wave_counts, groups_x));
+}
+
+/* The blocks' counts become places, and their sum the wave's. `program` is in use. */
+static bool scan(struct render_context *context, const struct gpu_program *program, struct error *error)
 {
     gpu_buffer_bind_storage(&context->block_offsets, BIND_BLOCK_OFFSETS);
-    gpu_dispatch(context->device, count, block_count_of(item_count));
-    const struct gpu_program *scan = context_use(context, "render/compact_scan.comp", error);
-    if (!scan)
-        return false;
     gpu_buffer_bind_storage(&context->wave_state, BIND_WAVE);
-    gpu_uniform_uint(scan, "block_count", block_count_of(item_count));
-    gpu_dispatch(context->device, scan, 1);
-    gpu_buffer_read(context->device, &context->wave_state, 0, state, sizeof(*state));
+    gpu_dispatch(context->device, program, 1);
+    if (context->counts_on_host)
+        gpu_buffer_read(context->device, &context->wave_state, 0, &context->known_state,
+                        sizeof(context->known_state));
     return gpu_check(context->device, "compacting", error);
 }
 
 bool compact_hits(struct render_context *context, struct error *error)
 {
-    struct wave_state state = {0};
-    const struct gpu_program *count = context_use(context, "render/hit_count.comp", error);
-    if (!count)
+    static const struct gpu_define hits[] = {{"HITS", "1"}, {NULL, NULL}};
+    const struct gpu_program *program = context_use(context, "render/hit_count.comp", error);
+    if (!program)
         return false;
-    gpu_uniform_uint(count, "ray_count", context->ray_count);
     gpu_buffer_bind_storage(&context->hits, BIND_HITS);
-    if (!compact_scan(context, count, context->ray_count, &state, error))
+    gpu_buffer_bind_storage(&context->block_offsets, BIND_BLOCK_OFFSETS);
+    compact_dispatch(context, program, WAVE_RAY_BLOCKS);
+    program = context_use_with(context, "render/compact_scan.comp", hits, error);
+    if (!program || !scan(context, program, error))
         return false;
-    const struct gpu_program *list = context_use(context, "render/hit_list.comp", error);
-    if (!list)
+    program = context_use(context, "render/hit_list.comp", error);
+    if (!program)
         return false;
-    gpu_uniform_uint(list, "ray_count", context->ray_count);
     gpu_buffer_bind_storage(&context->hit_list, BIND_HIT_LIST);
     gpu_buffer_bind_storage(&context->hit_places, BIND_HIT_PLACES);
-    gpu_dispatch(context->device, list, block_count_of(context->ray_count));
-    context->hit_count = state.ray_count;
+    compact_dispatch(context, program, WAVE_RAY_BLOCKS);
+    context->hit_count = context->counts_on_host ? context->known_state.hits.count : context->ray_count;
     return true;
+}
+
+bool compact_children(struct render_context *context, uint32_t children_a_hit, bool last_queued,
+                      struct error *error)
+{
+    const struct gpu_program *program = context_use(context, "render/compact_count.comp", error);
+    if (!program)
+        return false;
+    gpu_buffer_bind_storage(&context->block_offsets, BIND_BLOCK_OFFSETS);
+    compact_dispatch(context, program, WAVE_HIT_BLOCKS);
+    program = context_use(context, "render/compact_scan.comp", error);
+    if (!program)
+        return false;
+    gpu_uniform_uint(program, "capacity", context->wave_capacity);
+    gpu_uniform_uint(program, "last_queued", last_queued);
+    if (!scan(context, program, error))
+        return false;
+    const uint64_t maximum = (uint64_t)context->hit_count * children_a_hit;
+    context->ray_count = context->counts_on_host            ? context->known_state.rays.count
+                         : maximum < context->wave_capacity ? (uint32_t)maximum
+                                                            : context->wave_capacity;
+    return true;
+}
+
+bool compact_shadow_rays(struct render_context *context, uint32_t count, bool all_count, struct wave *wave,
+                         struct error *error)
+{
+    wave->ray_count = context->hit_count * count;
+    if (context->counts_on_host) {
+        context->shadow_rays += all_count ? wave->ray_count : 0;
+        return true;
+    }
+    const struct gpu_program *program = context_use(context, "render/shadow_count.comp", error);
+    if (!program)
+        return false;
+    gpu_uniform_uint(program, "batch_rays", count);
+    gpu_uniform_uint(program, "all_count", all_count);
+    gpu_buffer_bind_storage(&context->wave_state, BIND_WAVE);
+    gpu_dispatch(context->device, program, 1);
+    wave->counts = &context->wave_state;
+    wave->counts_index = WAVE_SHADOW_RAYS;
+    return true;
+}
+
+void compact_rays(struct render_context *context, struct wave *wave)
+{
+    wave->ray_count = context->ray_count;
+    wave->counts = context->counts_on_host ? NULL : &context->wave_state;
+    wave->counts_index = WAVE_RAYS;
 }

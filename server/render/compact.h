@@ -1,17 +1,32 @@
 /* SPDX-License-Identifier: MIT */
 /* Lists made on the device by prefix sums: their order is that of what they are made from, every time, and they
- * have no holes. */
+ * have no holes. How long they are the device notes in context->wave_state, from which the passes over them are
+ * dispatched. */
 #ifndef FARLIGHT_RENDER_COMPACT_H
 #define FARLIGHT_RENDER_COMPACT_H
 
 #include "render/context.h"
-#include "shared/wave.h"
 
-/* Lists the hits of the current wave: context->hit_list, hit_places and hit_count. Waits for the GPU. */
+/* In the order of struct wave_state. */
+enum wave_list { WAVE_RAYS, WAVE_RAY_BLOCKS, WAVE_HITS, WAVE_HIT_BLOCKS, WAVE_SHADOW_RAYS };
+
+/* A slice begins: the state of its first wave, of context->ray_count rays. */
+void compact_begin(struct render_context *context);
+/* A slice that the device stopped is done again. */
+void compact_go_on(struct render_context *context);
+/* One invocation of the program for each item of the list. */
+void compact_dispatch(struct render_context *context, const struct gpu_program *program, enum wave_list list);
+/* Lists the hits of the current wave: context->hit_list, hit_places and hit_count. */
 bool compact_hits(struct render_context *context, struct error *error);
-/* Counts of item_count items' blocks, made by the program `count` that is in use, become places in
- * context->block_offsets; *state takes the sums. Waits for the GPU. */
-bool compact_scan(struct render_context *context, const struct gpu_program *count, uint32_t item_count,
-                  struct wave_state *state, struct error *error);
+/* The places of the hits' children (context->block_offsets) and their number, context->ray_count, from
+ * BIND_CHILD_COUNTS. `last_queued`: no wave is queued behind this one, so that none may be left. */
+bool compact_children(struct render_context *context, uint32_t children_a_hit, bool last_queued,
+                      struct error *error);
+/* Makes the wave one of `count` shadow rays of each hit. `all_count`: they count as rays of the slice as they are;
+ * else the children's scan counts those that are alive. */
+bool compact_shadow_rays(struct render_context *context, uint32_t count, bool all_count, struct wave *wave,
+                         struct error *error);
+/* Makes the wave one of the current wave's rays. */
+void compact_rays(struct render_context *context, struct wave *wave);
 
 #endif

@@ -25,8 +25,10 @@ void context_span_begin(struct render_context *context, enum stage stage)
 void context_span_end(struct render_context *context)
 {
     gpu_timer_end(context->timer);
-    if (context->span_count >= SPANS_MAX)
+    if (context->span_count >= SPANS_MAX && context->counts_on_host)
         context_collect(context);
+    else if (context->span_count >= SPANS_MAX)
+        context_collect_done(context);
 }
 
 /* A frame of many slices and samples has more spans than a record holds; what is of one stage, clock and wave
@@ -49,14 +51,27 @@ void context_add_times(struct render_context *context, const struct stage_times 
         add_span(&context->times, spans->origin_ns, &spans->spans[i]);
 }
 
-void context_collect(struct render_context *context)
+static struct stage_times *no_spans(struct render_context *context)
 {
     struct stage_times *spans = &context->collected;
     spans->origin_ns = context->times.origin_ns;
     spans->count = 0;
+    return spans;
+}
+
+void context_collect(struct render_context *context)
+{
+    struct stage_times *spans = no_spans(context);
     gpu_timer_collect(context->timer, spans);
     context_add_times(context, spans);
     context->span_count = 0;
+}
+
+void context_collect_done(struct render_context *context)
+{
+    struct stage_times *spans = no_spans(context);
+    context->span_count = (uint32_t)gpu_timer_collect_done(context->timer, spans);
+    context_add_times(context, spans);
 }
 
 void context_add_cpu_time(struct render_context *context, enum stage stage, uint64_t start_ns)
@@ -90,6 +105,7 @@ void context_bind(struct render_context *context)
 {
     gpu_scene_bind(context->scene);
     gpu_buffer_bind_uniform(&context->uniform_buffer, UNIFORM_FRAME);
+    gpu_buffer_bind_uniform(&context->wave_state, UNIFORM_WAVE);
 }
 
 size_t context_surface_defines(const struct render_context *context, struct gpu_define *defines)

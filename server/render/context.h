@@ -11,6 +11,7 @@
 #include "render/features.h"
 #include "render/frame.h"
 #include "shared/frame.h"
+#include "shared/wave.h"
 #include "gpu_scene/scene.h"
 #include "trace/tracer.h"
 #include "render/compare/rays.h"
@@ -39,27 +40,35 @@ struct render_context {
     bool spread;     /* each pixel has its samples in places of its own; else jitter_pixel's */
     bool has_filter; /* the uniforms have the places of `filter` */
     enum pixel_filter filter;
+    /* The host waits for the counts of each wave and dispatches what there is; else it queues a slice's waves on
+     * what there may be at most, and the device leaves out what there is not (compact.h). */
+    bool counts_on_host;
+    uint32_t waves_queued;  /* of a slice, where it does not wait */
     uint32_t wave_capacity; /* rays that the buffers below hold */
     /* The current wave: ray, path and, once traced, hit of each. */
     struct gpu_buffer rays, paths, hits;
-    struct gpu_buffer ray_times; /* float a ray; empty where nothing moves */
-    struct slice slice;          /* in hand */
-    uint32_t ray_count, wave_number;
+    struct gpu_buffer ray_times;            /* float a ray; empty where nothing moves */
+    struct slice slice;                     /* in hand */
+    uint32_t ray_count, wave_number;        /* without counts_on_host: at most; so is hit_count */
     bool sampled_hits;                      /* but for those of discs, those of the wave are stored samples */
     struct gpu_buffer hit_list, hit_places; /* of those paths that hit something, see compact.h */
     uint32_t hit_count;
     uint32_t asked;  /* shadow rays of each hit of the current wave that are traced already */
     uint32_t asking; /* and that are made and not traced to the end; 0: none */
-    struct gpu_buffer block_offsets, wave_state; /* of the compaction */
-    struct gpu_buffer slice_sums;                /* vec4 per sample of the slice: radiance so far, coverage */
-    uint64_t shadow_rays, secondary_rays;        /* of the slice in hand */
-    uint32_t span_count;                         /* since the timer was collected */
+    struct gpu_buffer block_offsets;
+    struct gpu_buffer wave_state;  /* struct wave_state, of the compaction */
+    struct wave_state known_state; /* with counts_on_host: as it was last read */
+    struct gpu_buffer slice_sums;  /* vec4 per sample of the slice: radiance so far, coverage */
+    uint64_t shadow_rays;          /* of the slice in hand, that are not counted in the state */
+    uint32_t span_count;           /* since the timer was collected */
 };
 
 /* Spans of this frame; the ring is emptied before it is full. */
 void context_span_begin(struct render_context *context, enum stage stage);
 void context_span_end(struct render_context *context);
 void context_collect(struct render_context *context);
+void context_collect_done(
+    struct render_context *context); /* those that the device is through with; does not wait */
 /* Spans of this frame that were not measured by its timer. */
 void context_add_times(struct render_context *context, const struct stage_times *spans);
 /* What the host has done for a stage since then. */

@@ -15,7 +15,7 @@
 void frame_abandon(struct frame_renderer *renderer)
 {
     if (renderer->phase != PHASE_IDLE) {
-        gpu_timer_collect(renderer->work->context.timer, NULL);
+        gpu_timer_drop(renderer->work->context.timer);
         renderer->work->context.span_count = 0;
     }
     picture_drop_pixels(&renderer->picture);
@@ -35,7 +35,8 @@ static void place_sample(struct frame_renderer *renderer)
         uniforms->jitter_pixel[i] += pixel_filter_offset((const float *)uniforms->filter_places, numbers[i]);
 }
 
-static bool begin_sample(struct frame_renderer *renderer, struct error *error)
+/* The uniforms of the samples in hand. */
+static bool set_sample(struct frame_renderer *renderer, struct error *error)
 {
     struct render_context *context = &renderer->work->context;
     uint32_t left = context->request.samples - renderer->sample;
@@ -46,10 +47,23 @@ static bool begin_sample(struct frame_renderer *renderer, struct error *error)
         context->request.accumulate ? 0 : slices_group_shift(context->request.samples, renderer->sample);
     place_sample(renderer);
     context->wave_number = 0;
-    slices_restart(&renderer->slices);
-    renderer->phase = renderer->rasterise ? PHASE_RASTER : PHASE_SLICE;
-    primary_rasterise_begin(&renderer->work->primary, 0);
     return context_upload_uniforms(context, error);
+}
+
+/* What is seen from that row on. */
+static void begin_strip(struct frame_renderer *renderer, uint32_t row)
+{
+    primary_rasterise_begin(&renderer->work->primary, row);
+    renderer->phase = PHASE_RASTER;
+}
+
+static bool begin_sample(struct frame_renderer *renderer, struct error *error)
+{
+    slices_restart(&renderer->slices);
+    renderer->phase = PHASE_SLICE;
+    if (renderer->rasterise)
+        begin_strip(renderer, 0);
+    return set_sample(renderer, error);
 }
 
 static bool rasterise(struct frame_renderer *renderer, struct error *error)
@@ -66,20 +80,105 @@ static const struct primary *rasterised(const struct frame_renderer *renderer)
     return renderer->rasterise ? &renderer->work->primary : NULL;
 }
 
+/* A wave did not fit. Nothing of the slice has reached the picture, so it is traced again: as two halves, or, if
+ * the rays of one pixel are too many, with larger buffers. */
+static bool split_slice(struct frame_renderer *renderer, struct error *error)
+{
+    struct render_context *context = &renderer->work->context;
+    renderer->result.splits++;
+    if (context->comparison)
+        comparison_drop_slice(context->comparison);
+    compact_go_on(context);
+    renderer->phase = PHASE_SLICE;
+    if (slices_split(&renderer->slices, &context->slice))
+        return true;
+    if (context->wave_capacity > renderer->device->facts.storage_block_bytes_max / sizeof(struct child) / 8)
+        return error_set(error, ERROR_LIMIT, "depth", "the rays of one pixel are more than the device holds");
+    context->wave_capacity *= 2;
+    slices_put_back(&renderer->slices, &context->slice);
+    return frame_reserve_waves(renderer, error);
+}
+
+/* The device has stopped a slice: the picture has what was before it, and nothing of what is queued behind it. */
+static bool do_again(struct frame_renderer *renderer, const struct slice_ahead *stopped, uint32_t why,
+                     struct error *error)
+{
+    struct render_context *context = &renderer->work->context;
+    slices_ahead_drop(&renderer->work->ahead);
+    renderer->slices = stopped->slices;
+    renderer->sample = stopped->sample;
+    if (!set_sample(renderer, error) ||
+        !slices_take(&renderer->slices, &renderer->picture, context->uniforms.sample_shift, &context->slice))
+        return error_set(error, ERROR_INTERNAL, NULL, "a slice to be done again is not there");
+    const uint32_t row = picture_row_of(&renderer->picture, context->slice.first_slot);
+    if (why == WAVE_STOPPED_FULL && !split_slice(renderer, error))
+        return false;
+    if (why == WAVE_STOPPED_QUEUED) {
+        context->waves_queued *= 2;
+        slices_put_back(&renderer->slices, &context->slice);
+        compact_go_on(context);
+    }
+    renderer->phase = PHASE_SLICE;
+    if (renderer->rasterise)
+        begin_strip(renderer, row);
+    return true;
+}
+
+static void count_rays(struct frame_renderer *renderer, const struct wave_state *state)
+{
+    renderer->result.shadow_rays += state->all_shadow_rays;
+    renderer->result.secondary_rays += state->all_secondary_rays;
+}
+
+/* Those of the queued slices that are done. *again: one of them is done again. */
+static bool land(struct frame_renderer *renderer, bool *again, struct error *error)
+{
+    struct slices_ahead *ahead = &renderer->work->ahead;
+    *again = false;
+    while (!*again && slices_ahead_has_done(ahead)) {
+        const struct slice_ahead *slice;
+        struct wave_state state;
+        if (!slices_ahead_take(ahead, renderer->device, &slice, &state, error))
+            return false;
+        context_collect_done(&renderer->work->context);
+        *again = state.stopped != 0;
+        if (*again && !do_again(renderer, slice, state.stopped, error))
+            return false;
+        if (!*again)
+            count_rays(renderer, &state);
+    }
+    return true;
+}
+
+static bool land_all(struct frame_renderer *renderer, struct error *error)
+{
+    bool again = false;
+    if (!land(renderer, &again, error))
+        return false;
+    if (!again && renderer->work->ahead.count == 0)
+        renderer->phase = PHASE_RESOLVE;
+    return true;
+}
+
 static bool begin_slice(struct frame_renderer *renderer, struct error *error)
 {
     struct render_context *context = &renderer->work->context;
+    bool again = false;
+    if (!land(renderer, &again, error))
+        return false;
+    if (again || renderer->work->ahead.count == SLICES_AHEAD_MAX)
+        return true;
     uint32_t sample_shift = context->uniforms.sample_shift;
+    renderer->slices_before = renderer->slices;
     if (!slices_take(&renderer->slices, &renderer->picture, sample_shift, &context->slice)) {
         renderer->sample += 1u << sample_shift;
-        renderer->phase = renderer->sample < context->request.samples ? PHASE_SAMPLE : PHASE_RESOLVE;
+        renderer->phase = renderer->sample < context->request.samples ? PHASE_SAMPLE : PHASE_LAND;
         return true;
     }
     uint32_t row = picture_row_of(&renderer->picture, context->slice.first_slot);
     if (renderer->rasterise && row - renderer->work->primary.first_row >= renderer->strip_rows) {
         slices_put_back(&renderer->slices, &context->slice); /* it is the first of the next strip */
-        primary_rasterise_begin(&renderer->work->primary, row);
-        renderer->phase = PHASE_RASTER;
+        begin_strip(renderer, row);
         return true;
     }
     layers_begin_slice(&renderer->work->layers);
@@ -98,35 +197,17 @@ static bool find_primary(struct frame_renderer *renderer, struct error *error)
     return gpu_check(renderer->device, "primary hits", error);
 }
 
-/* A wave did not fit. Nothing of the slice has reached the picture, so it is traced again: as two halves, or, if
- * the rays of one pixel are too many, with larger buffers. */
-static bool split_slice(struct frame_renderer *renderer, struct error *error)
-{
-    struct render_context *context = &renderer->work->context;
-    renderer->result.splits++;
-    if (context->comparison)
-        comparison_drop_slice(context->comparison);
-    renderer->phase = PHASE_SLICE;
-    if (slices_split(&renderer->slices, &context->slice))
-        return true;
-    if (context->wave_capacity > renderer->device->facts.storage_block_bytes_max / sizeof(struct child) / 8)
-        return error_set(error, ERROR_LIMIT, "depth", "the rays of one pixel are more than the device holds");
-    context->wave_capacity *= 2;
-    slices_put_back(&renderer->slices, &context->slice);
-    return frame_reserve_waves(renderer, error);
-}
-
 static bool trace_wave(struct frame_renderer *renderer, struct error *error)
 {
     struct render_context *context = &renderer->work->context;
-    const struct wave wave = {
+    struct wave wave = {
         .kind = WAVE_CLOSEST,
-        .ray_count = context->ray_count,
         .rays = &context->rays,
         .hits = &context->hits,
         .times = context_ray_times(context),
     };
     bool done = false;
+    compact_rays(context, &wave);
     if (!wave_trace(context, RAY_SECONDARY, &wave, &done, error))
         return false;
     if (!done)
@@ -139,16 +220,27 @@ static bool trace_wave(struct frame_renderer *renderer, struct error *error)
     return listed;
 }
 
-static bool finish_slice(struct frame_renderer *renderer, struct error *error)
+static bool accumulate(struct frame_renderer *renderer, struct error *error)
 {
     struct render_context *context = &renderer->work->context;
-    renderer->result.shadow_rays += context->shadow_rays;
-    renderer->result.secondary_rays += context->secondary_rays;
-    renderer->phase = PHASE_SLICE;
     bool has_beauty = renderer->picture.layers & 1u << LAYER_BEAUTY; /* then it is the first plane */
     return (!context->comparison || comparison_keep_slice(context->comparison, error)) &&
            (!has_beauty || picture_accumulate(&renderer->picture, context, 0, &context->slice_sums, 0, error)) &&
            layers_accumulate(&renderer->work->layers, &renderer->picture, context, error);
+}
+
+static bool finish_slice(struct frame_renderer *renderer, struct error *error)
+{
+    struct render_context *context = &renderer->work->context;
+    renderer->phase = PHASE_SLICE;
+    if (!accumulate(renderer, error))
+        return false;
+    if (!context->counts_on_host)
+        return slices_ahead_add(&renderer->work->ahead, renderer->device, &context->wave_state,
+                                &renderer->slices_before, renderer->sample, error);
+    count_rays(renderer, &context->known_state);
+    renderer->result.shadow_rays += context->shadow_rays;
+    return true;
 }
 
 static bool note_layers(struct frame_renderer *renderer, struct error *error)
@@ -240,6 +332,9 @@ bool frame_step_waits(const struct frame_renderer *renderer)
     if (renderer->phase == PHASE_UPDATE || renderer->phase == PHASE_BUILD ||
         (renderer->phase == PHASE_RESOLVE && !renderer->picture.pixels))
         return gpu_reserve_waits(renderer->device, renderer->awaited_bytes);
+    const struct slices_ahead *ahead = &renderer->work->ahead;
+    if (renderer->phase == PHASE_LAND || (renderer->phase == PHASE_SLICE && ahead->count == SLICES_AHEAD_MAX))
+        return ahead->count > 0 && !slices_ahead_has_done(ahead);
     return renderer->phase == PHASE_RESOLVE && renderer->copying && all_resolved(renderer) &&
            !gpu_readback_is_done(&renderer->work->copies[renderer->copied % 2]);
 }
@@ -282,6 +377,7 @@ static bool hand_out(struct frame_renderer *renderer, struct frame_result *resul
 
 enum frame_progress frame_step(struct frame_renderer *renderer, struct frame_result *result, struct error *error)
 {
+    const uint64_t waits_before = renderer->device->waits;
     bool good = false;
     switch (renderer->phase) {
     case PHASE_IDLE:
@@ -314,10 +410,14 @@ enum frame_progress frame_step(struct frame_renderer *renderer, struct frame_res
     case PHASE_TRACE:
         good = trace_wave(renderer, error);
         break;
+    case PHASE_LAND:
+        good = land_all(renderer, error);
+        break;
     case PHASE_RESOLVE:
         good = read_band(renderer, error);
         break;
     }
+    renderer->result.device_waits += (uint32_t)(renderer->device->waits - waits_before);
     if (!good) {
         frame_abandon(renderer);
         return FRAME_FAILED;

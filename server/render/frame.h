@@ -96,6 +96,7 @@ struct frame_result {
     enum ycbcr ycbcr; /* in place of the RGBA8; base/ycbcr.h says how the planes lie in size_bytes */
     uint64_t revision;
     uint64_t primary_rays, shadow_rays, secondary_rays, splits;
+    uint32_t device_waits; /* how often the host has waited for the device, bringing the scene there included */
     uint64_t uploaded_bytes, structure_bytes;
     struct structure_rows structure; /* what the tracer says of it */
     struct stage_times times;
@@ -152,6 +153,9 @@ void frame_renderer_set_capacity(struct frame_renderer *renderer, uint32_t slice
 /* For tests: whether pictures are copied from the device while it has other work, as is chosen for the device.
  * From the next frame on. */
 void frame_renderer_read_behind(struct frame_renderer *renderer, bool reads_behind);
+/* For tests: whether the passes of a slice are queued without waiting for the counts of its waves, as is chosen
+ * for the device. From the next frame on. */
+void frame_renderer_queue_ahead(struct frame_renderer *renderer, bool queues_ahead);
 /* For tests: from the next frame on `impl` stands for that number of tracer_impl_by_number(); NULL: none does. */
 void frame_renderer_stand_in(struct frame_renderer *renderer, unsigned number, const struct tracer_impl *impl);
 

@@ -5,6 +5,7 @@
 
 #include "base/clock.h"
 #include "render/camera.h"
+#include "render/compact.h"
 #include "render/frame_request.h"
 #include "render/pixel_filter.h"
 
@@ -18,6 +19,8 @@
 #define SLICE_RAYS_COMPARED (1u << 14)
 #define SLICE_RAYS_HARDWARE (1u << 18)
 #define WAVE_PER_SLICE 2
+/* Of a slice at first: few paths are longer, and waves without rays cost some dispatches each. */
+#define WAVES_QUEUED_MAX 16
 /* Of a step that uploads and integrates an environment. */
 #define ENVIRONMENT_STEP_NS UINT64_C(6000000)
 /* Of a step in which a thread packs what is large of the scene. */
@@ -167,6 +170,8 @@ void frame_end(struct frame_renderer *renderer)
     renderer->phase = PHASE_IDLE;
     for (int i = 0; i < 2 && renderer->work; i++)
         gpu_readback_drop(&renderer->work->copies[i]);
+    if (renderer->work)
+        slices_ahead_drop(&renderer->work->ahead);
     frame_work_give(renderer->shared, renderer->work);
     renderer->work = NULL;
 }
@@ -215,6 +220,15 @@ static uint32_t slice_rays(const struct frame_renderer *renderer)
     return renderer->work->context.request.compare ? SLICE_RAYS_COMPARED : SLICE_RAYS_SOFTWARE;
 }
 
+/* As many as the depth has, and as many more as a slice has needed. */
+static uint32_t waves_queued(const struct frame_renderer *renderer)
+{
+    const struct render_context *context = &renderer->work->context;
+    const uint32_t depth =
+        context->request.depth < WAVES_QUEUED_MAX ? context->request.depth + 1 : WAVES_QUEUED_MAX;
+    return at_least(context->waves_queued, depth);
+}
+
 static bool reserve_frame(struct frame_renderer *renderer, struct error *error)
 {
     struct render_context *context = &renderer->work->context;
@@ -234,7 +248,12 @@ static bool reserve_frame(struct frame_renderer *renderer, struct error *error)
     if (renderer->wanted_wave_rays)
         wave_rays = renderer->wanted_wave_rays;
     context->wave_capacity = at_least(wave_rays, renderer->slices.slice_rays);
-    return frame_reserve_waves(renderer, error);
+    if (!frame_reserve_waves(renderer, error))
+        return false;
+    context->counts_on_host = !renderer->queues_ahead || request->compare || context->tracer->impl->traces_on_host;
+    context->waves_queued = waves_queued(renderer);
+    compact_go_on(context);
+    return true;
 }
 
 /* They take a third of a millisecond, and stay from frame to frame. */

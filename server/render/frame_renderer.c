@@ -77,6 +77,8 @@ struct frame_renderer *frame_renderer_create(struct frame_scene *shared, struct 
     renderer->tracers.history = &shared->changes;
     /* Software GL copies at once, and would do so twice. */
     renderer->reads_behind = !shared->device->facts.software;
+    /* Nor is there anything to wait for: its dispatches are done when they return. */
+    renderer->queues_ahead = renderer->reads_behind;
     return renderer;
 }
 
@@ -99,6 +101,11 @@ void frame_renderer_set_capacity(struct frame_renderer *renderer, uint32_t slice
 void frame_renderer_read_behind(struct frame_renderer *renderer, bool reads_behind)
 {
     renderer->reads_behind = reads_behind;
+}
+
+void frame_renderer_queue_ahead(struct frame_renderer *renderer, bool queues_ahead)
+{
+    renderer->queues_ahead = queues_ahead;
 }
 
 void frame_renderer_stand_in(struct frame_renderer *renderer, unsigned number, const struct tracer_impl *impl)

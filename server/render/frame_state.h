@@ -11,6 +11,7 @@
 #include "render/picture.h"
 #include "render/primary.h"
 #include "render/slices.h"
+#include "render/slices_ahead.h"
 #include "render/tracer_set.h"
 #include "render/wave_passes.h"
 
@@ -25,6 +26,7 @@ enum frame_phase {
     PHASE_LAYERS,
     PHASE_SHADE,
     PHASE_TRACE,
+    PHASE_LAND,
     PHASE_RESOLVE
 };
 
@@ -50,6 +52,7 @@ struct frame_work {
     struct render_context context;
     struct primary primary;
     struct layers layers;
+    struct slices_ahead ahead;
     struct comparison *comparison; /* NULL: the last frame asked for none */
     /* Two bands of the picture on their way to the host: while one is fetched, the next is copied. */
     struct gpu_readback copies[2];
@@ -64,6 +67,7 @@ struct frame_renderer {
     unsigned stand_in_number;
     uint32_t wanted_slice_pixels, wanted_wave_rays; /* 0: chosen */
     bool reads_behind;                              /* bands are copied while the device has other work */
+    bool queues_ahead;                              /* see counts_on_host of the context */
     /* the frame in hand */
     enum frame_phase phase;
     struct frame_work *work; /* owned until it ends */
@@ -81,7 +85,7 @@ struct frame_renderer {
     uint32_t plane, band;    /* of the picture that is handed out next */
     bool copying;            /* copies[copied % 2] is on its way, of these: */
     uint32_t copied, copied_plane, copied_band;
-    struct slices slices;
+    struct slices slices, slices_before; /* the slice in hand was taken */
     /* the last frame that was finished, whose sum the picture holds */
     struct frame_request kept_request;
     uint32_t kept_samples; /* 0: there is none */

@@ -12,6 +12,7 @@ static void work_destroy(struct frame_work *work, struct gpu_device *device)
     comparison_destroy(work->comparison);
     primary_finish(&work->primary, device);
     layers_finish(&work->layers, device);
+    slices_ahead_finish(&work->ahead, device);
     for (int i = 0; i < 2; i++)
         gpu_readback_finish(device, &work->copies[i]);
     context_finish(&work->context);

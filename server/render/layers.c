@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "render/layers.h"
 
+#include "render/compact.h"
 #include "render/frame_request.h"
 #include "render/wave_trace.h"
 #include "shared/layers.h"
@@ -56,7 +57,6 @@ static const struct gpu_program *use(struct render_context *context, const char 
         return NULL;
     context_bind_hits(context);
     gpu_uniform_uint(program, "first_slot", context->slice.first_slot);
-    gpu_uniform_uint(program, "hit_count", context->hit_count);
     return program;
 }
 
@@ -92,7 +92,7 @@ static bool make_ao_rays(struct layers *layers, struct render_context *context, 
         gpu_uniform_uint(program, "all_rays", context_ao_rays(context));
         gpu_uniform_float(program, "reach", context_ao_distance(context));
         gpu_uniform_float(program, "falloff", context->request.ao_falloff);
-        gpu_dispatch(context->device, program, context->hit_count);
+        compact_dispatch(context, program, WAVE_HITS);
     }
     context_span_end(context);
     return program != NULL;
@@ -101,14 +101,15 @@ static bool make_ao_rays(struct layers *layers, struct render_context *context, 
 /* A part of those that were made. */
 static bool trace_ao_rays(struct layers *layers, struct render_context *context, bool *done, struct error *error)
 {
-    const struct wave wave = {
+    struct wave wave = {
         .kind = WAVE_ANY,
-        .ray_count = context->hit_count * layers->asking,
         .rays = &layers->ao_rays,
         .visibility = &layers->ao_visibility,
         .times = context->scene->has_motion ? &layers->ao_times : NULL,
     };
-    return wave_trace(context, RAY_SHADOW, &wave, done, error);
+    const bool begins = !context->trace_state->in_progress; /* its rays are counted once */
+    return compact_shadow_rays(context, layers->asking, begins, &wave, error) &&
+           wave_trace(context, RAY_SHADOW, &wave, done, error);
 }
 
 static uint32_t plane_of(const struct layers *layers, uint32_t layer_bit)
@@ -124,12 +125,11 @@ static bool gather_ao(struct layers *layers, struct render_context *context, uin
         gpu_buffer_bind_storage(&context->hit_list, BIND_HIT_LIST);
         gpu_buffer_bind_storage(&layers->ao_visibility, BIND_VISIBILITY);
         gpu_buffer_bind_storage(&layers->sums, BIND_LAYER_SUMS);
-        gpu_uniform_uint(program, "hit_count", context->hit_count);
         gpu_uniform_uint(program, "ray_count", context->ray_count);
         gpu_uniform_uint(program, "batch_rays", count);
         gpu_uniform_uint(program, "all_rays", context_ao_rays(context));
         gpu_uniform_uint(program, "plane", plane_of(layers, LAYER_BIT_AO));
-        gpu_dispatch(context->device, program, context->hit_count);
+        compact_dispatch(context, program, WAVE_HITS);
     }
     context_span_end(context);
     return program && gpu_check(context->device, "ambient occlusion", error);
@@ -160,7 +160,6 @@ bool layers_step(struct layers *layers, struct render_context *context, bool *do
     if (layers->asking == 0) {
         uint32_t left = all - layers->asked, together = context->wave_capacity / context->hit_count;
         layers->asking = left < together ? left : together;
-        context->shadow_rays += (uint64_t)context->hit_count * layers->asking;
         return make_ao_rays(layers, context, layers->asking, error);
     }
     bool traced = false;

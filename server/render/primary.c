@@ -184,7 +184,7 @@ bool primary_rasterise(struct primary *primary, struct render_context *context, 
     glMemoryBarrier(GL_ALL_BARRIER_BITS);
     *done = primary->sort == SORT_COUNT;
     if (!*done || context->device->facts.software)
-        glFinish(); /* else all parts would be waited for at the end, at once */
+        gpu_finish(context->device); /* else all parts would be waited for at the end, at once */
     learn(primary, clock_now_ns() - start_ns);
     gpu_pop_group(context->device);
     context_span_end(context);
@@ -240,25 +240,24 @@ static bool fill_hits(struct render_context *context, struct error *error)
         return false;
     context_bind(context);
     glUseProgram(program->name);
-    gpu_uniform_uint(program, "hit_count", context->hit_count);
     gpu_buffer_bind_storage(&context->rays, BIND_RAYS);
     gpu_buffer_bind_storage(&context->hits, BIND_HITS);
     gpu_buffer_bind_storage(&context->hit_list, BIND_HIT_LIST);
-    gpu_dispatch(context->device, program, context->hit_count);
+    compact_dispatch(context, program, WAVE_HITS);
     return true;
 }
 
 static bool trace_hits(struct render_context *context, bool *done, struct error *error)
 {
-    const struct wave wave = {
+    struct wave wave = {
         .kind = WAVE_CLOSEST,
-        .ray_count = context->ray_count,
         .rays = &context->rays,
         .hits = &context->hits,
         .times = context_ray_times(context),
         .shared_origin = context->request.camera.fov_y > 0.0f && !(context->uniforms.lens[0] > 0.0f), /* an eye */
         .origin_spread = context->request.camera.fov_y > 0.0f ? 2.0f * context->uniforms.lens[0] : 0.0f,
     };
+    compact_rays(context, &wave);
     return wave_trace(context, RAY_PRIMARY, &wave, done, error);
 }
 
@@ -267,7 +266,7 @@ bool primary_begin_slice(const struct primary *primary, struct render_context *c
     context->ray_count = context->slice.slot_count << context->uniforms.sample_shift;
     context->wave_number = context->asked = context->asking = 0;
     context->sampled_hits = !primary && context->tracer->impl->sampled;
-    context->shadow_rays = context->secondary_rays = 0;
+    compact_begin(context);
     context_span_begin(context, STAGE_PRIMARY);
     bool made = make_rays(primary, context, error);
     context_span_end(context);

@@ -8,12 +8,9 @@
 #include "shared/hit.h"
 #include "shared/path.h"
 #include "shared/ray.h"
-#include "shared/wave.h"
 
 #include <epoxy/gl.h>
 
-/* What the scan over the blocks leaves in the wave state's free words. */
-#define WAVE_STATE_SHADOW_RAYS pad0
 #define DEFINES_MAX 12
 
 bool wave_passes_reserve(struct wave_passes *passes, struct render_context *context, struct error *error)
@@ -84,7 +81,6 @@ static const struct gpu_program *shade_program(struct wave_passes *passes, struc
     if (!program)
         return NULL;
     bool last = context->wave_number >= context->request.depth + integrator->straight_waves;
-    gpu_uniform_uint(program, "hit_count", context->hit_count);
     gpu_uniform_uint(program, "first_slot", context->slice.first_slot);
     gpu_uniform_uint(program, "wave_number", context->wave_number);
     gpu_uniform_uint(program, "last_wave", last);
@@ -106,7 +102,7 @@ static bool shade_hits(struct wave_passes *passes, struct render_context *contex
         gpu_uniform_uint(program, "batch_rays", count);
         if (passes->integrator->set)
             passes->integrator->set(context, program);
-        gpu_dispatch(context->device, program, context->hit_count);
+        compact_dispatch(context, program, WAVE_HITS);
     }
     context_span_end(context);
     return program != NULL;
@@ -117,7 +113,7 @@ static bool left_scene(struct wave_passes *passes, struct render_context *contex
 {
     struct gpu_define defines[4] = {0};
     size_t n = 0;
-    if (context->hit_count == context->ray_count)
+    if (context->counts_on_host && context->hit_count == context->ray_count)
         return true;
     if (context->environment->kind == ENVIRONMENT_IMAGE)
         defines[n++] = (struct gpu_define){"HAS_ENVIRONMENT_IMAGE", "1"};
@@ -131,13 +127,12 @@ static bool left_scene(struct wave_passes *passes, struct render_context *contex
     const struct gpu_program *program = context_use_with(context, "render/left_scene.comp", defines, error);
     if (!program)
         return false;
-    gpu_uniform_uint(program, "ray_count", context->ray_count);
     gpu_buffer_bind_storage(&context->rays, BIND_RAYS);
     gpu_buffer_bind_storage(&context->paths, BIND_PATHS);
     gpu_buffer_bind_storage(&context->hit_places, BIND_HIT_PLACES);
     gpu_buffer_bind_storage(&passes->radiance, BIND_RADIANCE);
     context_span_begin(context, STAGE_SHADE);
-    gpu_dispatch(context->device, program, context->ray_count);
+    compact_dispatch(context, program, WAVE_RAYS);
     context_span_end(context);
     return true;
 }
@@ -148,12 +143,12 @@ static bool trace_shadows(struct wave_passes *passes, struct render_context *con
 {
     struct wave wave = {
         .kind = WAVE_ANY,
-        .ray_count = context->hit_count * context->asking,
         .rays = &passes->shadow_rays,
         .visibility = &passes->visibility,
         .times = context->scene->has_motion ? &passes->shadow_times : NULL,
     };
-    return wave_trace(context, RAY_SHADOW, &wave, done, error);
+    return compact_shadow_rays(context, context->asking, false, &wave, error) &&
+           wave_trace(context, RAY_SHADOW, &wave, done, error);
 }
 
 /* Adds the light that they let through to the wave's radiance, and after the last batch that to the samples. */
@@ -164,8 +159,6 @@ static bool gather(struct wave_passes *passes, struct render_context *context, b
     const struct gpu_program *program = context_use_with(context, "render/gather.comp", defines, error);
     if (!program)
         return false;
-    gpu_uniform_uint(program, "ray_count", context->ray_count);
-    gpu_uniform_uint(program, "hit_count", context->hit_count);
     gpu_uniform_uint(program, "batch_rays", rays_a_hit);
     gpu_uniform_uint(program, "last_batch", last);
     gpu_buffer_bind_storage(&context->paths, BIND_PATHS);
@@ -175,7 +168,7 @@ static bool gather(struct wave_passes *passes, struct render_context *context, b
     gpu_buffer_bind_storage(&passes->light_samples, BIND_LIGHT_SAMPLES);
     gpu_buffer_bind_storage(&context->slice_sums, BIND_SLICE_SUMS);
     context_span_begin(context, STAGE_SHADE);
-    gpu_dispatch(context->device, program, context->ray_count);
+    compact_dispatch(context, program, WAVE_RAYS);
     context_span_end(context);
     return true;
 }
@@ -187,7 +180,6 @@ static bool move_children(struct wave_passes *passes, struct render_context *con
         context_use_with(context, "render/compact_move.comp", context->scene->has_motion ? times : NULL, error);
     if (!program)
         return false;
-    gpu_uniform_uint(program, "hit_count", context->hit_count);
     gpu_uniform_uint(program, "children_a_hit", passes->integrator->children_a_hit);
     gpu_buffer_bind_storage(&passes->child_counts, BIND_CHILD_COUNTS);
     gpu_buffer_bind_storage(&context->block_offsets, BIND_BLOCK_OFFSETS);
@@ -196,33 +188,24 @@ static bool move_children(struct wave_passes *passes, struct render_context *con
     gpu_buffer_bind_storage(&context->paths, BIND_PATHS);
     if (context->scene->has_motion)
         gpu_buffer_bind_storage(&context->ray_times, BIND_RAY_TIMES);
-    gpu_dispatch(context->device, program, context->hit_count);
+    compact_dispatch(context, program, WAVE_HITS);
     return true;
 }
 
 static enum wave_progress make_wave(struct wave_passes *passes, struct render_context *context,
                                     struct error *error)
 {
-    struct wave_state state = {0};
+    const bool last_queued = !context->counts_on_host && context->wave_number + 1 == context->waves_queued;
     if (context->hit_count == 0)
         return WAVE_DONE;
-    const struct gpu_program *count = context_use(context, "render/compact_count.comp", error);
-    if (!count)
-        return WAVE_FAILED;
     gpu_buffer_bind_storage(&passes->child_counts, BIND_CHILD_COUNTS);
-    gpu_uniform_uint(count, "hit_count", context->hit_count);
-    if (!compact_scan(context, count, context->hit_count, &state, error))
+    if (!compact_children(context, passes->integrator->children_a_hit, last_queued, error))
         return WAVE_FAILED;
-    context->shadow_rays += state.WAVE_STATE_SHADOW_RAYS;
-    if (state.ray_count == 0)
-        return WAVE_DONE;
-    if (state.ray_count > context->wave_capacity)
+    if (context->counts_on_host && context->known_state.stopped)
         return WAVE_OVERFLOW;
-    if (!move_children(passes, context, error))
-        return WAVE_FAILED;
-    context->ray_count = state.ray_count;
-    context->secondary_rays += state.ray_count;
-    return WAVE_MORE;
+    if (last_queued || context->ray_count == 0)
+        return WAVE_DONE;
+    return move_children(passes, context, error) ? WAVE_MORE : WAVE_FAILED;
 }
 
 /* The children become the context's rays and paths; counts the wave. */

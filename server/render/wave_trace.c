@@ -39,7 +39,7 @@ static bool trace_and_compare(struct render_context *context, enum ray_kind kind
     uint64_t start_ns = clock_now_ns();
     if (!ready || trace_step(context, kind, wave, STEP_WITHOUT_END, error) != TRACER_DONE)
         return false;
-    glFinish(); /* so that the time is that of the whole wave, as it is for the other tracer */
+    gpu_finish(context->device); /* so that the time is that of the whole wave, as it is for the other tracer */
     uint64_t trace_ns = clock_now_ns() - start_ns;
     context_span_begin(context, STAGE_COMPARE);
     bool compared = comparison_wave(context->comparison, wave, kind, context->wave_number, trace_ns, error);

@@ -259,6 +259,7 @@ static void send_end(struct pending_frame *pending, bool abandoned, uint64_t now
     message.frame_end.shadow_rays = frame->result.shadow_rays;
     message.frame_end.secondary_rays = frame->result.secondary_rays;
     message.frame_end.splits = frame->result.splits;
+    message.frame_end.device_waits = frame->result.device_waits;
     message.frame_end.uploaded_bytes = frame->result.uploaded_bytes;
     message.frame_end.structure_bytes = frame->result.structure_bytes;
     message.frame_end.abandoned = abandoned;

@@ -2,11 +2,14 @@
 #include "trace/program.h"
 
 #include "shared/bindings.h"
+#include "shared/wave.h"
 
 #include <epoxy/gl.h>
+#include <stddef.h>
 #include <stdio.h>
 
 #define OWN_DEFINES_MAX 12
+#define SURFACE_DEFINES_MAX 3
 
 /* Rays at the time 0 see the first pose, as does a program without motion. */
 static bool has_motion(const struct gpu_scene *scene, const struct wave *wave)
@@ -21,10 +24,29 @@ static void bind_rays(const struct gpu_scene *scene, const struct wave *wave)
         gpu_buffer_bind_texels(scene->device, wave->times, UNIT_RAY_TIMES, GL_R32F);
 }
 
+/* Rays first .. end - 1, some to an invocation. */
+static void dispatch_rays(const struct gpu_program *program, const struct gpu_scene *scene,
+                          const struct wave *wave, uint32_t first, uint32_t end, uint32_t rays_an_invocation)
+{
+    gpu_uniform_uint(program, "first_ray", first);
+    gpu_uniform_uint(program, "ray_count", end);
+    if (wave->counts) {
+        gpu_buffer_bind_storage(wave->counts, BIND_WAVE);
+        gpu_uniform_uint(program, "counts_index", wave->counts_index);
+    }
+    if (wave->counts && first == 0 && end == wave->ray_count)
+        gpu_dispatch_indirect(program, wave->counts,
+                              wave->counts_index * sizeof(struct wave_counts) +
+                                  offsetof(struct wave_counts, groups_x));
+    else
+        gpu_dispatch(scene->device, program,
+                     ((uint64_t)(end - first) + rays_an_invocation - 1) / rays_an_invocation);
+}
+
 const struct gpu_program *trace_program_get(const struct gpu_scene *scene, const struct wave *wave,
                                             const struct trace_program_source *source, struct error *error)
 {
-    struct gpu_define defines[OWN_DEFINES_MAX + 14] = {0};
+    struct gpu_define defines[OWN_DEFINES_MAX + 15] = {0};
     char traverse[128], packet_rays[16];
     size_t n = 0;
     /* In quotes: program.c takes the file to include from it. */
@@ -42,6 +64,8 @@ const struct gpu_program *trace_program_get(const struct gpu_scene *scene, const
         defines[n++] = (struct gpu_define){"HAS_CUTOUT", "1"};
     if (has_motion(scene, wave))
         defines[n++] = (struct gpu_define){"HAS_MOTION", "1"};
+    if (wave->counts)
+        defines[n++] = (struct gpu_define){"HAS_COUNTS", "1"};
     /* For closest hits a translucent surface is like any other: no second program for it. */
     if (scene->has_translucent && wave->kind == WAVE_ANY)
         defines[n++] = (struct gpu_define){"HAS_TRANSLUCENT", "1"};
@@ -71,9 +95,7 @@ void trace_program_run(const struct gpu_program *program, const struct gpu_scene
         part = rays->end - first;
         if (source->rays_a_dispatch && source->rays_a_dispatch < part)
             part = source->rays_a_dispatch;
-        gpu_uniform_uint(program, "first_ray", first);
-        gpu_uniform_uint(program, "ray_count", first + part);
-        gpu_dispatch(scene->device, program, ((uint64_t)part + packet_rays - 1) / packet_rays);
+        dispatch_rays(program, scene, wave, first, first + part, packet_rays);
         if (first + part < rays->end) /* a part of its own to the driver too, which may gather commands */
             glFlush();
     }
@@ -81,21 +103,25 @@ void trace_program_run(const struct gpu_program *program, const struct gpu_scene
 
 /* ---- surfaces ---- */
 
-const struct gpu_program *trace_surface_program_get(const struct gpu_scene *scene, const char *compute,
-                                                    const struct gpu_define *defines, struct error *error)
+const struct gpu_program *trace_surface_program_get(const struct gpu_scene *scene, const struct wave *wave,
+                                                    const char *compute, const struct gpu_define *defines,
+                                                    struct error *error)
 {
-    return gpu_program_get(scene->device, &(struct gpu_program_source){.compute = compute, .defines = defines},
-                           error);
+    struct gpu_define all[SURFACE_DEFINES_MAX + 2] = {0};
+    size_t n = 0;
+    for (; n < SURFACE_DEFINES_MAX && defines && defines[n].name; n++)
+        all[n] = defines[n];
+    if (wave->counts)
+        all[n++] = (struct gpu_define){"HAS_COUNTS", "1"};
+    return gpu_program_get(scene->device, &(struct gpu_program_source){.compute = compute, .defines = all}, error);
 }
 
 void trace_surface_program_run(const struct gpu_program *program, const struct gpu_scene *scene,
                                const struct ray_range *rays)
 {
-    gpu_uniform_uint(program, "first_ray", rays->first);
-    gpu_uniform_uint(program, "ray_count", rays->end);
     bind_rays(scene, rays->wave);
     gpu_buffer_bind_image(scene->device, rays->wave->hits, IMAGE_HITS, GL_RGBA32UI);
-    gpu_dispatch(scene->device, program, rays->end - rays->first);
+    dispatch_rays(program, scene, rays->wave, rays->first, rays->end, 1);
 }
 
 bool trace_surfaces(const struct gpu_scene *scene, const struct ray_range *rays, struct error *error)
@@ -106,7 +132,8 @@ bool trace_surfaces(const struct gpu_scene *scene, const struct ray_range *rays,
         defines[n++] = (struct gpu_define){"HAS_SPHERES", "1"};
     if (has_motion(scene, rays->wave))
         defines[n++] = (struct gpu_define){"HAS_MOTION", "1"};
-    const struct gpu_program *program = trace_surface_program_get(scene, "trace/surface.comp", defines, error);
+    const struct gpu_program *program =
+        trace_surface_program_get(scene, rays->wave, "trace/surface.comp", defines, error);
     if (program)
         trace_surface_program_run(program, scene, rays);
     return program != NULL;

@@ -116,6 +116,7 @@ struct tracer_impl {
     /* The structure knows the scene as the shutter opens: rays of a scene in which something moves meanwhile must
      * have no times. */
     bool still;
+    bool traces_on_host; /* fetches the rays: the caller must know how many there are */
     /* The smallest range of rays that trace_range() is good for: ranges begin at multiples of it, so that rays
      * that are traversed together stay together, and have no fewer rays unless the wave ends. 0: 1. */
     uint32_t minimum_rays;

@@ -75,7 +75,8 @@ static bool check_wave(const struct tracer *tracer, const struct gpu_scene *scen
     else
         fits = fits && buffer_holds(wave->hits, wave->ray_count, sizeof(struct hit));
     fits = fits && (!wave->times || buffer_holds(wave->times, wave->ray_count, sizeof(float)));
-    fits = fits && (!wave->counts || buffer_holds(wave->counts, 1, sizeof(struct wave_counts)));
+    fits =
+        fits && (!wave->counts || buffer_holds(wave->counts, wave->counts_index + 1, sizeof(struct wave_counts)));
     if (!fits)
         return error_set(error, ERROR_INTERNAL, NULL, "%s: a wave of %u rays does not fit its buffers",
                          tracer->impl->name, wave->ray_count);

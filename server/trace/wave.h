@@ -25,12 +25,13 @@ struct wave {
     /* The number of `rays` to trace, at least 1; an upper bound if `counts` is set.
      */
     uint32_t ray_count;
-    /* NULL, or a buffer that begins with a struct wave_counts (shared/wave.h), written on the device before the
-     * wave is traced: how many rays there are, at most ray_count, and the work groups of a dispatch over them. The
-     * buffers hold ray_count rays all the same; what is in them behind the last ray is arbitrary but finite. A
-     * tracer may trace these too, in which case their answers mean nothing; it never waits for the counts to be on
-     * the host. */
+    /* NULL, or a buffer of struct wave_counts (shared/wave.h), of which that one is written on the device before
+     * the wave is traced: how many rays there are, at most ray_count, and the work groups of a dispatch over them.
+     * The buffers hold ray_count rays all the same; what is in them behind the last ray is arbitrary but finite. A
+     * tracer that traces on the host (tracer_impl) traces these too, and their answers mean nothing; the others
+     * never wait for the counts to be on the host. */
     struct gpu_buffer *counts;
+    uint32_t counts_index;
     struct gpu_buffer *rays;       /* struct ray */
     struct gpu_buffer *hits;       /* struct hit; closest */
     struct gpu_buffer *visibility; /* uint; any */

@@ -2,20 +2,18 @@
 // From the intersections of a closest-hit wave to hits: the second half of A-buffer tracing, in place of
 // trace/surface.comp. A hit is the sample's own primitive at its point nearest to the intersection.
 //
-// Defines: HAS_SPHERES, HAS_DISCS as the scene has them.
+// Defines: HAS_SPHERES, HAS_DISCS as the scene has them; those of common/range.glsl.
 #include "common/dispatch.glsl"
+#include "common/range.glsl"
 #include "abuffer/sample_primitive.glsl"
 
 layout(binding = UNIT_RAYS) uniform samplerBuffer rays; // two texels each
 layout(binding = IMAGE_HITS, rgba32ui) uniform uimageBuffer hits; // three texels each; an intersection is the first
 
-uniform uint first_ray; // of this dispatch
-uniform uint ray_count; // where it ends
-
 void main()
 {
     uint k = first_ray + item_index();
-    if (k >= ray_count)
+    if (k >= ray_end)
         return;
     uvec4 intersection = imageLoad(hits, int(3u * k));
     float distance_ = uintBitsToFloat(intersection.x);

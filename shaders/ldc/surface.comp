@@ -3,8 +3,9 @@
 // trace/surface.comp. A sample's words are copied into the hit; discs, which no cube holds, become hits as for every
 // tracer.
 //
-// Defines: HAS_DISCS as the scene has them.
+// Defines: HAS_DISCS as the scene has them; those of common/range.glsl.
 #include "common/dispatch.glsl"
+#include "common/range.glsl"
 #include "common/sampled.glsl"
 #include "common/surface.glsl"
 
@@ -12,9 +13,6 @@ layout(binding = UNIT_RAYS) uniform samplerBuffer rays; // two texels each
 layout(binding = UNIT_TRACER_0) uniform usamplerBuffer sample_geometry;
 layout(binding = UNIT_TRACER_1) uniform usamplerBuffer sample_surfaces;
 layout(binding = IMAGE_HITS, rgba32ui) uniform uimageBuffer hits; // three texels each; an intersection is the first
-
-uniform uint first_ray; // of this dispatch
-uniform uint ray_count; // where it ends
 
 hit surface_sampled(uint sample_index, float distance_, vec3 direction)
 {
@@ -31,7 +29,7 @@ hit surface_sampled(uint sample_index, float distance_, vec3 direction)
 void main()
 {
     uint k = first_ray + item_index();
-    if (k >= ray_count)
+    if (k >= ray_end)
         return;
     uvec4 intersection = imageLoad(hits, int(3u * k));
     float distance_ = uintBitsToFloat(intersection.x);

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
-// Adds a finished slice to the picture: the samples of each pixel in their order.
+// Adds a slice to the picture, unless it must be done again: the samples of each pixel in their order.
 
 #include "shared/path.h"
 #include "common/dispatch.glsl"
+#include "render/wave.glsl"
 
 layout(local_size_x = 64) in;
 
@@ -17,7 +18,7 @@ layout(std430, binding = BIND_ACCUMULATION) buffer accumulation_block { vec4 acc
 void main()
 {
     uint k = item_index();
-    if (k >= slot_count)
+    if (k >= slot_count || wave.stopped != 0u)
         return;
     vec4 sum = accumulation[first_slot + k];
     uint end = (k + 1u) << sample_shift;

@@ -26,7 +26,7 @@ uint ask_for_openness(uint j, path p, surface s, float weight, float distance_)
             occlusion_direction(s.geometric, s.normal, sequence_pair(seed, dimension + SEQUENCE_LOBE_DIRECTION, index));
         float far = occlusion_reach(reach, falloff, sequence_number(seed, dimension + SEQUENCE_LOBE, index));
         vec3 arriving = vec3(weight / float(shadow_rays_a_hit));
-        if (add_shadow_ray(i * hit_count + j, p, origin, direction, far, arriving))
+        if (add_shadow_ray(i * wave.hits.count + j, p, origin, direction, far, arriving))
             alive++;
     }
     return alive;
@@ -35,7 +35,7 @@ uint ask_for_openness(uint j, path p, surface s, float weight, float distance_)
 void main()
 {
     uint j = item_index();
-    if (j >= hit_count)
+    if (j >= wave.hits.count)
         return;
     uint k = hit_list[j];
     path p = path_at(k);

@@ -6,10 +6,10 @@
 #include "shared/path.h"
 #include "shared/ray.h"
 #include "common/dispatch.glsl"
+#include "render/wave.glsl"
 
 layout(local_size_x = 64) in;
 
-uniform uint hit_count;
 uniform uint children_a_hit; // capacity
 
 layout(std430, binding = BIND_CHILD_COUNTS) readonly buffer count_block { uint child_counts[]; };
@@ -24,7 +24,8 @@ layout(std430, binding = BIND_RAY_TIMES) writeonly buffer time_block { float tim
 void main()
 {
     uint j = item_index();
-    if (j >= hit_count)
+    // None where the wave does not fit: then its places are not there.
+    if (j >= wave.hits.count || wave.rays.count == 0u)
         return;
     uint count = child_counts[j] & 3u;
     if (count == 0u)

@@ -1,22 +1,55 @@
 // SPDX-License-Identifier: MIT
-// Second: each block's count of children becomes the place of its first child. One group scans them all, each
-// invocation a run of blocks.
+// Second: each block's count becomes the place of its first item. One group scans them all, each invocation a run of
+// blocks. The sums are the wave's new counts.
+// Defines: HITS the blocks are of rays, of which the hits are counted; else of hits, whose children are the next wave.
 
-#include "shared/path.h"
-#include "shared/wave.h"
+#include "render/wave_counts.glsl"
 
 layout(local_size_x = COMPACT_SCAN_SIZE) in;
 
-uniform uint block_count;
+#ifndef HITS
+uniform uint capacity;    // rays that the buffers hold
+uniform uint last_queued; // 1: no wave is queued behind this one
+#endif
 
 layout(std430, binding = BIND_BLOCK_OFFSETS) buffer offset_block { uvec2 block_offsets[]; };
-layout(std430, binding = BIND_WAVE) writeonly buffer wave_block { wave_state wave; };
 
 shared uvec2 sums[COMPACT_SCAN_SIZE];
+
+#ifdef HITS
+
+void take(uvec2 total)
+{
+    uint count = state.stopped == 0u ? total.x : 0u;
+    state.hits = counts_of(count);
+    state.hit_blocks = blocks_of(count);
+}
+
+#else
+
+void take(uvec2 total)
+{
+    uint count = total.x;
+    if (state.stopped == 0u && count > 0u)
+        state.stopped = count > capacity ? WAVE_STOPPED_FULL : last_queued != 0u ? WAVE_STOPPED_QUEUED : 0u;
+    if (state.stopped != 0u)
+        count = 0u;
+    state.rays = counts_of(count);
+    state.ray_blocks = blocks_of(count);
+    state.all_secondary_rays += count;
+    state.all_shadow_rays += total.y;
+}
+
+#endif
 
 void main()
 {
     uint self = gl_LocalInvocationIndex;
+#ifdef HITS
+    uint block_count = state.ray_blocks.count;
+#else
+    uint block_count = state.hit_blocks.count;
+#endif
     uint run = (block_count + COMPACT_SCAN_SIZE - 1u) / COMPACT_SCAN_SIZE;
     uint first = min(self * run, block_count), end = min(first + run, block_count);
     uvec2 sum = uvec2(0u);
@@ -31,8 +64,7 @@ void main()
             sums[i] = total;
             total += own;
         }
-        wave.ray_count = total.x;
-        wave.pad0 = total.y; // shadow rays
+        take(total);
     }
     barrier();
     uint place = sums[self].x;

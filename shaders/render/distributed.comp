@@ -58,7 +58,7 @@ bool ask_for_light(uint j, path p, surface s, split parts, vec3 view, float NoV,
 void main()
 {
     uint j = item_index();
-    if (j >= hit_count)
+    if (j >= wave.hits.count)
         return;
     uint k = hit_list[j];
     path p = path_at(k);

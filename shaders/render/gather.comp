@@ -7,10 +7,10 @@
 
 #include "shared/path.h"
 #include "common/dispatch.glsl"
+#include "render/wave.glsl"
 
 layout(local_size_x = 64) in;
 
-uniform uint ray_count, hit_count;
 uniform uint batch_rays;
 uniform uint last_batch;
 
@@ -38,7 +38,7 @@ vec4 radiance_of(uint k)
     if (j == HIT_PLACE_NONE)
         return sum;
     for (uint i = 0u; i < batch_rays; i++) {
-        uint place = i * hit_count + j;
+        uint place = i * wave.hits.count + j;
         uint through = visibility[place] & 0xffffffu;
         if (through != 0u) {
             vec3 share = unpackUnorm4x8(through).rgb;
@@ -54,7 +54,7 @@ vec4 radiance_of(uint k)
 void main()
 {
     uint k = item_index();
-    if (k >= ray_count)
+    if (k >= wave.rays.count)
         return;
     if (last_batch == 0u) {
         radiance[k] = radiance_of(k);
@@ -64,7 +64,7 @@ void main()
     if (k > 0u && paths[k - 1u].sample_slot == slot)
         return;
     vec4 sum = slice_sums[slot];
-    for (; k < ray_count && paths[k].sample_slot == slot; k++)
+    for (; k < wave.rays.count && paths[k].sample_slot == slot; k++)
         sum += finite(radiance_of(k));
     slice_sums[slot] = sum;
 }

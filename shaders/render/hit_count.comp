@@ -6,10 +6,9 @@
 #include "shared/hit.h"
 #include "shared/path.h"
 #include "common/dispatch.glsl"
+#include "render/wave.glsl"
 
 layout(local_size_x = 64) in;
-
-uniform uint ray_count;
 
 layout(std430, binding = BIND_HITS) readonly buffer hit_block { hit hits[]; };
 layout(std430, binding = BIND_BLOCK_OFFSETS) writeonly buffer offset_block { uvec2 block_offsets[]; };
@@ -17,10 +16,10 @@ layout(std430, binding = BIND_BLOCK_OFFSETS) writeonly buffer offset_block { uve
 void main()
 {
     uint block = item_index(), first = block * COMPACT_BLOCK;
-    if (first >= ray_count)
+    if (first >= wave.rays.count)
         return;
     uint count = 0u;
-    for (uint k = first; k < min(first + COMPACT_BLOCK, ray_count); k++)
+    for (uint k = first; k < min(first + COMPACT_BLOCK, wave.rays.count); k++)
         count += hits[k].distance >= 0.0 ? 1u : 0u;
     block_offsets[block] = uvec2(count, 0u);
 }

@@ -4,10 +4,9 @@
 #include "shared/hit.h"
 #include "shared/path.h"
 #include "common/dispatch.glsl"
+#include "render/wave.glsl"
 
 layout(local_size_x = 64) in;
-
-uniform uint ray_count;
 
 layout(std430, binding = BIND_HITS) readonly buffer hit_block { hit hits[]; };
 layout(std430, binding = BIND_BLOCK_OFFSETS) readonly buffer offset_block { uvec2 block_offsets[]; };
@@ -17,10 +16,10 @@ layout(std430, binding = BIND_HIT_PLACES) writeonly buffer place_block { uint hi
 void main()
 {
     uint block = item_index(), first = block * COMPACT_BLOCK;
-    if (first >= ray_count)
+    if (first >= wave.rays.count)
         return;
     uint place = block_offsets[block].x;
-    for (uint k = first; k < min(first + COMPACT_BLOCK, ray_count); k++) {
+    for (uint k = first; k < min(first + COMPACT_BLOCK, wave.rays.count); k++) {
         bool is_hit = hits[k].distance >= 0.0;
         hit_places[k] = is_hit ? place : HIT_PLACE_NONE;
         if (is_hit)

@@ -14,7 +14,7 @@ uniform float reach, falloff;       // metres; see common/occlusion.glsl
 void main()
 {
     uint j = item_index();
-    if (j >= hit_count)
+    if (j >= wave.hits.count)
         return;
     uint k = hit_list[j];
     path p = path_at(k);
@@ -29,7 +29,7 @@ void main()
         vec2 u = sequence_pair(seed, SEQUENCE_WAVE + SEQUENCE_LOBE_DIRECTION, index);
         vec3 direction = occlusion_direction(s.geometric, s.normal, u);
         float far = occlusion_reach(reach, falloff, sequence_number(seed, SEQUENCE_WAVE + SEQUENCE_LOBE, index));
-        uint place = i * hit_count + j;
+        uint place = i * wave.hits.count + j;
         shadow_rays[place] = ray(vec4(origin, 0.0), vec4(direction, far * (1.0 - 4.0 * PATH_OFFSET)));
 #ifdef HAS_TIMES
         shadow_times[place] = p.time;

@@ -3,10 +3,11 @@
 
 #include "shared/layers.h"
 #include "common/dispatch.glsl"
+#include "render/wave.glsl"
 
 layout(local_size_x = 64) in;
 
-uniform uint hit_count, ray_count;
+uniform uint ray_count; // of the slice
 uniform uint batch_rays, all_rays;
 uniform uint plane; // of the layer
 
@@ -17,12 +18,12 @@ layout(std430, binding = BIND_LAYER_SUMS) buffer layer_block { vec4 layer_sums[]
 void main()
 {
     uint j = item_index();
-    if (j >= hit_count)
+    if (j >= wave.hits.count)
         return;
     uint place = plane * ray_count + hit_list[j];
     float open_share = layer_sums[place].r; // ray by ray, so that it is the same however they are batched
     for (uint i = 0u; i < batch_rays; i++) { // the mean of a coloured transmittance
-        vec3 through = unpackUnorm4x8(visibility[i * hit_count + j]).rgb;
+        vec3 through = unpackUnorm4x8(visibility[i * wave.hits.count + j]).rgb;
         open_share += dot(through, vec3(1.0 / 3.0)) / float(all_rays);
     }
     layer_sums[place].rgb = vec3(open_share);

@@ -8,10 +8,9 @@
 #include "common/dispatch.glsl"
 #include "common/environment.glsl"
 #include "common/light.glsl"
+#include "render/wave.glsl"
 
 layout(local_size_x = 64) in;
-
-uniform uint ray_count;
 
 layout(std430, binding = BIND_RAYS) readonly buffer ray_block { ray rays[]; };
 layout(std430, binding = BIND_PATHS) readonly buffer path_block { path paths[]; };
@@ -21,7 +20,7 @@ layout(std430, binding = BIND_RADIANCE) writeonly buffer radiance_block { vec4 r
 void main()
 {
     uint k = item_index();
-    if (k >= ray_count || hit_places[k] != HIT_PLACE_NONE)
+    if (k >= wave.rays.count || hit_places[k] != HIT_PLACE_NONE)
         return;
     path p = paths[k];
     bool seen = (p.flags & PATH_STRAIGHT) != 0u && frame.environment_kind != ENVIRONMENT_NONE;

@@ -133,7 +133,7 @@ uint ask_straight_on(eye_hit e, vec3 direction, vec3 through)
 #endif
         if (add_shadow_ray(place, e.p, origin, direction, rest, arriving))
             alive++;
-        place += hit_count;
+        place += wave.hits.count;
     }
     if (asks_environment != 0u) {
         vec3 arriving = carried * environment_radiance(direction) * e.p.environment_share;
@@ -149,7 +149,7 @@ uint ask(inout eye_hit e, uint seed, uint index)
     if (asks_lights != 0u) {
         if (ask_for_light(e, place, seed, index))
             alive++;
-        place += hit_count;
+        place += wave.hits.count;
     }
     if (asks_environment != 0u && ask_for_environment(e, place, seed, index))
         alive++;
@@ -159,7 +159,7 @@ uint ask(inout eye_hit e, uint seed, uint index)
 void ask_nothing(uint j)
 {
     for (uint i = 0u; i < shadow_rays_a_hit; i++)
-        no_shadow_ray(i * hit_count + j);
+        no_shadow_ray(i * wave.hits.count + j);
 }
 
 // The child that the surface emits.
@@ -207,7 +207,7 @@ vec3 met_light(path p, float distance_)
 void main()
 {
     uint j = item_index();
-    if (j >= hit_count)
+    if (j >= wave.hits.count)
         return;
     uint k = hit_list[j];
     eye_hit e;

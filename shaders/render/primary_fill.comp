@@ -7,10 +7,9 @@
 #include "shared/hit.h"
 #include "common/dispatch.glsl"
 #include "render/primary_hit.glsl"
+#include "render/wave.glsl"
 
 layout(local_size_x = 64) in;
-
-uniform uint hit_count;
 
 layout(std430, binding = BIND_RAYS) readonly buffer ray_block { ray rays[]; };
 layout(std430, binding = BIND_HITS) buffer hit_block { hit hits[]; };
@@ -19,7 +18,7 @@ layout(std430, binding = BIND_HIT_LIST) readonly buffer list_block { uint hit_li
 void main()
 {
     uint j = item_index();
-    if (j >= hit_count)
+    if (j >= wave.hits.count)
         return;
     uint k = hit_list[j], instance_index = hits[k].instance, primitive = hits[k].primitive;
     vec3 origin = rays[k].origin_t_min.xyz, direction = rays[k].direction_t_max.xyz;

@@ -47,7 +47,7 @@ vec3 lit(path p, surface s, vec3 direction, float distance_)
 void main()
 {
     uint j = item_index();
-    if (j >= hit_count)
+    if (j >= wave.hits.count)
         return;
     uint k = hit_list[j];
     path p = path_at(k);

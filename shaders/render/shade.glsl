@@ -10,10 +10,10 @@
 #include "common/dispatch.glsl"
 #include "common/material.glsl"
 #include "common/sequence.glsl"
+#include "render/wave.glsl"
 
 layout(local_size_x = 64) in;
 
-uniform uint hit_count;
 uniform uint first_slot; // of the slice
 uniform uint wave_number;
 uniform uint last_wave;  // 1: no children

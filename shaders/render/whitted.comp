@@ -42,7 +42,7 @@ uint ask_for_lights(uint j, path parent, surface s, split parts, vec3 view, floa
         light_sample sampled = light_sample_at(index, origin, u);
         float NoL = dot(s.normal, sampled.direction);
         vec3 arriving = weight * (brdf(s, parts, view, NoV, sampled.direction) * sampled.irradiance * NoL);
-        if (add_shadow_ray(i * hit_count + j, parent, origin, sampled.direction, sampled.distance_, arriving))
+        if (add_shadow_ray(i * wave.hits.count + j, parent, origin, sampled.direction, sampled.distance_, arriving))
             alive++;
     }
     return alive;
@@ -51,7 +51,7 @@ uint ask_for_lights(uint j, path parent, surface s, split parts, vec3 view, floa
 void no_lights(uint j)
 {
     for (uint i = 0u; i < batch_rays; i++)
-        no_shadow_ray(i * hit_count + j);
+        no_shadow_ray(i * wave.hits.count + j);
 }
 
 vec3 shade(uint j, path p, surface s, split parts, ray r, float distance_, vec3 weight)
@@ -75,7 +75,7 @@ vec3 shade(uint j, path p, surface s, split parts, ray r, float distance_, vec3 
 void main()
 {
     uint j = item_index();
-    if (j >= hit_count)
+    if (j >= wave.hits.count)
         return;
     uint k = hit_list[j];
     path p = path_at(k);

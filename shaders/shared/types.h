@@ -7,12 +7,14 @@
 
 #ifdef GL_core_profile
 #define SHARED_SIZE(type, size)
+#define SHARED(type) type /* a struct of this kind in another */
 #else
 #include <stdint.h>
 typedef float vec4[4];
 typedef uint32_t uvec4[4];
 typedef uint32_t uint;
 #define SHARED_SIZE(type, size) _Static_assert(sizeof(struct type) == (size), #type);
+#define SHARED(type) struct type
 #endif
 
 #endif

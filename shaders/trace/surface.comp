@@ -2,8 +2,9 @@
 // From the intersections of a closest-hit wave to hits: the second half of every exact tracer. It is apart from the
 // traversal, whose program stays small, and which need not carry barycentrics.
 //
-// Defines: HAS_SPHERES, HAS_MOTION as the scene has them.
+// Defines: HAS_SPHERES, HAS_MOTION as the scene has them; those of common/range.glsl.
 #include "common/dispatch.glsl"
+#include "common/range.glsl"
 #include "common/intersection.glsl"
 
 layout(binding = UNIT_RAYS) uniform samplerBuffer rays; // two texels each
@@ -11,9 +12,6 @@ layout(binding = UNIT_RAYS) uniform samplerBuffer rays; // two texels each
 layout(binding = UNIT_RAY_TIMES) uniform samplerBuffer ray_times;
 #endif
 layout(binding = IMAGE_HITS, rgba32ui) uniform uimageBuffer hits; // three texels each; an intersection is the first
-
-uniform uint first_ray; // of this dispatch
-uniform uint ray_count; // where it ends
 
 bool is_triangle(candidate found)
 {
@@ -29,7 +27,7 @@ bool is_triangle(candidate found)
 void main()
 {
     uint k = first_ray + item_index();
-    if (k >= ray_count)
+    if (k >= ray_end)
         return;
     uvec4 intersection = imageLoad(hits, int(3u * k));
     vec3 origin = texelFetch(rays, int(2u * k)).xyz, direction = texelFetch(rays, int(2u * k + 1u)).xyz;

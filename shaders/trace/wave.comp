@@ -12,6 +12,7 @@
 //   HAS_TRANSLUCENT      some material lets shadow rays pass
 //   HAS_TRANSMISSION     and tints them on the way
 //   EVEN_ALPHA           none of these has a texture or vertex colours
+//   HAS_COUNTS           only the device knows how many rays there are
 //   PACKET_RAYS        how many consecutive rays one invocation traverses as a packet: 1, 2, 3, 4, 8
 //
 // A traverse.glsl defines one of these, for ANY_HIT or not, and for PACKET_RAYS 1 or more:
@@ -32,6 +33,7 @@
 #include "shared/bindings.h"
 #include "shared/ray.h"
 #include "common/dispatch.glsl"
+#include "common/range.glsl"
 #include "common/candidate.glsl"
 #include TRAVERSE
 
@@ -49,8 +51,6 @@ layout(std430, binding = BIND_VISIBILITY) writeonly buffer visibility_block { ui
 layout(binding = IMAGE_HITS, rgba32ui) writeonly uniform uimageBuffer intersections;
 #endif
 
-uniform uint first_ray; // of this dispatch
-uniform uint ray_count; // where it ends
 #ifdef HAS_DISCS
 uniform uint disc_count;
 #else
@@ -65,12 +65,12 @@ bool is_alive(trace_ray r)
 trace_ray load_ray(uint ray_index)
 {
 #ifdef HAS_MOTION
-    float time = ray_index < ray_count ? texelFetch(ray_times, int(ray_index)).x : 0.0;
+    float time = ray_index < ray_end ? texelFetch(ray_times, int(ray_index)).x : 0.0;
     trace_ray dead = trace_ray(vec3(0.0), vec3(1.0, 0.0, 0.0), 0.0, -1.0, time);
 #else
     trace_ray dead = trace_ray(vec3(0.0), vec3(1.0, 0.0, 0.0), 0.0, -1.0);
 #endif
-    if (ray_index >= ray_count)
+    if (ray_index >= ray_end)
         return dead;
     vec4 origin_t_min = texelFetch(rays, int(2u * ray_index));
     vec4 direction_t_max = texelFetch(rays, int(2u * ray_index + 1u));
@@ -103,7 +103,7 @@ bool discs_any(trace_ray r, inout vec3 optical_depth)
 void store_visibility(uint ray_index, vec3 optical_depth)
 {
     vec3 left = transmittance_left(optical_depth);
-    if (ray_index < ray_count)
+    if (ray_index < ray_end)
         visibilities[ray_index] = packUnorm4x8(vec4(left, max_component(left) > 0.0 ? 1.0 : 0.0));
 }
 
@@ -122,7 +122,7 @@ void discs_closest(trace_ray r, inout candidate best)
 
 void store_intersection(uint ray_index, candidate best)
 {
-    if (ray_index >= ray_count)
+    if (ray_index >= ray_end)
         return;
     float distance_ = best.primitive == HIT_NO_PRIMITIVE ? -1.0 : best.distance;
     imageStore(intersections, int(3u * ray_index),
@@ -136,7 +136,7 @@ void store_intersection(uint ray_index, candidate best)
 void main()
 {
     uint ray_index = first_ray + item_index();
-    if (ray_index >= ray_count)
+    if (ray_index >= ray_end)
         return;
     trace_ray r = load_ray(ray_index);
 #ifdef ANY_HIT
@@ -198,7 +198,7 @@ void look_at_discs(inout trace_ray r[PACKET_RAYS], inout found_type found[PACKET
 void main()
 {
     uint first = first_ray + item_index() * PACKET_RAYS;
-    if (first >= ray_count)
+    if (first >= ray_end)
         return;
     trace_ray r[PACKET_RAYS];
     found_type found[PACKET_RAYS];

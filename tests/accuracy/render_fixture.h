@@ -180,6 +180,47 @@ static inline void fixture_environment(struct fixture *fixture, float r, float g
     edit->set.environment.colour[2] = b;
 }
 
+/* Mirrors, glass, blend, cutout, shadows, area light, discs: something of everything. */
+static inline void fixture_mixture(struct fixture *fixture)
+{
+    struct scene_material *glass = fixture_material(fixture);
+    glass->transmission = 1.0f;
+    glass->roughness = 0.0f;
+    glass->ior = 1.5f;
+    struct scene_material *mirror = fixture_material(fixture);
+    mirror->metallic = 1.0f;
+    mirror->roughness = 0.05f;
+    mirror->base_colour[2] = 0.6f;
+    struct scene_material *veil = fixture_material(fixture);
+    veil->alpha_mode = ALPHA_BLEND;
+    veil->base_colour[3] = 0.4f;
+    veil->base_colour[0] = 0.1f;
+    struct scene_material *plain = fixture_material(fixture);
+    plain->ior = 1.5f;
+    plain->roughness = 0.4f;
+    plain->base_colour[1] = 0.5f;
+    fixture_sphere(fixture, -0.7f, 0.1f, 0.3f, 0.5f, glass->base.id);
+    fixture_sphere(fixture, 0.6f, 0.0f, -0.2f, 0.6f, mirror->base.id);
+    fixture_sphere(fixture, 0.1f, -0.3f, 0.9f, 0.2f, plain->base.id);
+    const float floor_transform[12] = {1, 0, 0, 0, 0, 0, 1, -0.6f, 0, -1, 0, 0};
+    fixture_square(fixture, 3.0f, plain->base.id, floor_transform);
+    const float veil_transform[12] = {1, 0, 0, 0.9f, 0, 1, 0, 0.2f, 0, 0, 1, 0.8f};
+    fixture_square(fixture, 0.4f, veil->base.id, veil_transform);
+    struct scene_disc *disc = &fixture_edit(fixture, OBJECT_DISC)->set.disc;
+    disc->base.id = fixture->next_id++;
+    disc->material = plain->base.id;
+    disc->normal_world[2] = 1.0f;
+    disc->centre_world[2] = -3.0f;
+    disc->radius = 1.2f;
+    fixture_environment(fixture, 0.3f, 0.4f, 0.5f);
+    fixture_light(fixture, LIGHT_POINT, -2.0f, 3.0f, 3.0f, 20.0f);
+    struct scene_light *sphere = fixture_light(fixture, LIGHT_SPHERE, 2.0f, 2.0f, 2.0f, 10.0f);
+    sphere->size[0] = 0.4f;
+    fixture->request.width = 96;
+    fixture->request.height = 72;
+    fixture_look(fixture, 0.5f, 0.6f, 4.0f, 0.7f);
+}
+
 static inline void fixture_commit(struct fixture *fixture)
 {
     struct error error = {0};
@@ -222,6 +263,15 @@ static inline const float *fixture_pixel(const struct frame_result *result, uint
         if (!(fabs(value_ - expected_) <= (double)(tolerance)))                                                   \
             fail_msg("%s is %.9g, expected %.9g within %g", #value, value_, expected_, (double)(tolerance));      \
     } while (0)
+
+static inline void assert_same_picture(const struct frame_result *a, const struct frame_result *b)
+{
+    assert_int_equal(a->size_bytes, b->size_bytes);
+    for (size_t i = 0; i < a->size_bytes; i++)
+        if (a->pixels[i] != b->pixels[i])
+            fail_msg("byte %zu of %zu is %u in one and %u in the other", i, a->size_bytes, a->pixels[i],
+                     b->pixels[i]);
+}
 
 /* Writes an RGBA8 picture as a PPM where FARLIGHT_TEST_PICTURES names a folder; for the eye. */
 static inline void fixture_keep(const struct frame_result *result, const char *name)

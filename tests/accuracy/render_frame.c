@@ -3,47 +3,6 @@
 #include "tests/accuracy/render_fixture.h"
 #include "tests/harness/test.h"
 
-/* Mirrors, glass, blend, cutout, shadows, area light, discs: something of everything. */
-static void build_mixture(struct fixture *fixture)
-{
-    struct scene_material *glass = fixture_material(fixture);
-    glass->transmission = 1.0f;
-    glass->roughness = 0.0f;
-    glass->ior = 1.5f;
-    struct scene_material *mirror = fixture_material(fixture);
-    mirror->metallic = 1.0f;
-    mirror->roughness = 0.05f;
-    mirror->base_colour[2] = 0.6f;
-    struct scene_material *veil = fixture_material(fixture);
-    veil->alpha_mode = ALPHA_BLEND;
-    veil->base_colour[3] = 0.4f;
-    veil->base_colour[0] = 0.1f;
-    struct scene_material *plain = fixture_material(fixture);
-    plain->ior = 1.5f;
-    plain->roughness = 0.4f;
-    plain->base_colour[1] = 0.5f;
-    fixture_sphere(fixture, -0.7f, 0.1f, 0.3f, 0.5f, glass->base.id);
-    fixture_sphere(fixture, 0.6f, 0.0f, -0.2f, 0.6f, mirror->base.id);
-    fixture_sphere(fixture, 0.1f, -0.3f, 0.9f, 0.2f, plain->base.id);
-    const float floor_transform[12] = {1, 0, 0, 0, 0, 0, 1, -0.6f, 0, -1, 0, 0};
-    fixture_square(fixture, 3.0f, plain->base.id, floor_transform);
-    const float veil_transform[12] = {1, 0, 0, 0.9f, 0, 1, 0, 0.2f, 0, 0, 1, 0.8f};
-    fixture_square(fixture, 0.4f, veil->base.id, veil_transform);
-    struct scene_disc *disc = &fixture_edit(fixture, OBJECT_DISC)->set.disc;
-    disc->base.id = fixture->next_id++;
-    disc->material = plain->base.id;
-    disc->normal_world[2] = 1.0f;
-    disc->centre_world[2] = -3.0f;
-    disc->radius = 1.2f;
-    fixture_environment(fixture, 0.3f, 0.4f, 0.5f);
-    fixture_light(fixture, LIGHT_POINT, -2.0f, 3.0f, 3.0f, 20.0f);
-    struct scene_light *sphere = fixture_light(fixture, LIGHT_SPHERE, 2.0f, 2.0f, 2.0f, 10.0f);
-    sphere->size[0] = 0.4f;
-    fixture->request.width = 96;
-    fixture->request.height = 72;
-    fixture_look(fixture, 0.5f, 0.6f, 4.0f, 0.7f);
-}
-
 static void primary_hits_agree_however_they_are_found(struct fixture *fixture, double share_allowed)
 {
     fixture->request.primary = PRIMARY_RASTER;
@@ -71,14 +30,14 @@ EACH_TEST(fixture_clear, NULL)
 
 TEST(rasterised_and_traced_primary_hits_agree_but_for_edges)
 {
-    build_mixture(*state);
+    fixture_mixture(*state);
     primary_hits_agree_however_they_are_found(*state, 0.002);
 }
 
 TEST(they_agree_in_an_orthographic_view)
 {
     struct fixture *fixture = *state;
-    build_mixture(fixture);
+    fixture_mixture(fixture);
     fixture->request.camera.fov_y = 0.0f;
     fixture->request.camera.ortho_height = 3.0f;
     primary_hits_agree_however_they_are_found(fixture, 0.002);
@@ -89,7 +48,7 @@ TEST(they_agree_in_an_orthographic_view)
 TEST(they_agree_inside_a_sphere_and_beyond_the_near_plane)
 {
     struct fixture *fixture = *state;
-    build_mixture(fixture);
+    fixture_mixture(fixture);
     fixture_sphere(fixture, 0.0f, 0.0f, 0.0f, 20.0f, 0); /* the eye is in it */
     primary_hits_agree_however_they_are_found(fixture, 0.002);
     fixture->request.camera.near = 3.5f;
@@ -99,7 +58,7 @@ TEST(they_agree_inside_a_sphere_and_beyond_the_near_plane)
 TEST(they_agree_where_transforms_mirror_and_stretch)
 {
     struct fixture *fixture = *state;
-    build_mixture(fixture);
+    fixture_mixture(fixture);
     fixture_commit(fixture);
     const float transform[12] = {-1.5f, 0, 0, -0.2f, 0, 0.5f, 0.2f, 0.4f, 0, 0, 1, 0.5f};
     const float centre_radius[8] = {0.0f, 0.0f, 0.0f, 0.3f, 0.4f, 0.2f, 0.1f, 0.1f};
@@ -138,24 +97,15 @@ TEST(holes_are_cut_out_of_rasterised_triangles_too)
     frame_result_finish(&result);
 }
 
-static void assert_same_bytes(const struct frame_result *a, const struct frame_result *b)
-{
-    assert_int_equal(a->size_bytes, b->size_bytes);
-    for (size_t i = 0; i < a->size_bytes; i++)
-        if (a->pixels[i] != b->pixels[i])
-            fail_msg("byte %zu of %zu is %u in one and %u in the other", i, a->size_bytes, a->pixels[i],
-                     b->pixels[i]);
-}
-
 TEST(the_same_seed_gives_the_same_bytes)
 {
     struct fixture *fixture = *state;
-    build_mixture(fixture);
+    fixture_mixture(fixture);
     fixture->request.samples = 3;
     fixture->request.seed = 77;
     struct frame_result first = fixture_render(fixture);
     struct frame_result second = fixture_render(fixture);
-    assert_same_bytes(&first, &second);
+    assert_same_picture(&first, &second);
     frame_result_finish(&second);
     fixture->request.seed = 78;
     second = fixture_render(fixture);
@@ -167,14 +117,14 @@ TEST(the_same_seed_gives_the_same_bytes)
 TEST(a_wave_that_overflows_splits_its_slice_and_loses_nothing)
 {
     struct fixture *fixture = *state;
-    build_mixture(fixture);
+    fixture_mixture(fixture);
     fixture->request.depth = 6;
     struct frame_result large = fixture_render(fixture);
     assert_int_equal(large.splits, 0);
     frame_renderer_set_capacity(fixture->renderer, 512, 512);
     struct frame_result small = fixture_render(fixture);
     assert_true(small.splits > 0);
-    assert_same_bytes(&large, &small);
+    assert_same_picture(&large, &small);
     assert_int_equal(large.secondary_rays, small.secondary_rays);
     assert_int_equal(large.shadow_rays, small.shadow_rays);
     frame_result_finish(&small);
@@ -186,7 +136,7 @@ TEST(a_wave_that_overflows_splits_its_slice_and_loses_nothing)
     frame_result_finish(&large);
     frame_renderer_set_capacity(fixture->renderer, 0, 0);
     large = fixture_render(fixture);
-    assert_same_bytes(&large, &small);
+    assert_same_picture(&large, &small);
     frame_result_finish(&large);
     frame_result_finish(&small);
 }
@@ -194,7 +144,7 @@ TEST(a_wave_that_overflows_splits_its_slice_and_loses_nothing)
 TEST(formats_say_the_same)
 {
     struct fixture *fixture = *state;
-    build_mixture(fixture);
+    fixture_mixture(fixture);
     fixture->request.exposure_stops = 1.0f;
     struct frame_result floats = fixture_render(fixture);
     fixture->request.format = PIXEL_FORMAT_RGBA16F;
@@ -255,7 +205,7 @@ TEST(an_abandoned_frame_does_not_change_the_next_one)
     struct fixture *fixture = *state;
     struct error error = {0};
     struct frame_result dropped = {0};
-    build_mixture(fixture);
+    fixture_mixture(fixture);
     struct frame_result expected = fixture_render(fixture);
     assert_true(frame_begin(fixture->renderer, fixture->scene, NULL, &fixture->request, &error));
     for (int i = 0; i < 3; i++)
@@ -263,7 +213,7 @@ TEST(an_abandoned_frame_does_not_change_the_next_one)
     frame_abandon(fixture->renderer);
     assert_int_equal(frame_step(fixture->renderer, &dropped, &error), FRAME_FAILED);
     struct frame_result result = fixture_render(fixture);
-    assert_same_bytes(&expected, &result);
+    assert_same_picture(&expected, &result);
     frame_result_finish(&expected);
     frame_result_finish(&result);
 }
@@ -271,7 +221,7 @@ TEST(an_abandoned_frame_does_not_change_the_next_one)
 TEST(every_stage_of_the_frame_is_timed)
 {
     struct fixture *fixture = *state;
-    build_mixture(fixture);
+    fixture_mixture(fixture);
     struct frame_result result = fixture_render(fixture);
     static const enum stage stages[] = {STAGE_PRIMARY, STAGE_TRACE,    STAGE_SHADE,
                                         STAGE_RESOLVE, STAGE_READBACK, STAGE_FRAME};

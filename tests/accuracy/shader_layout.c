@@ -65,8 +65,13 @@ static char *without_comments(const char *begin, const char *end)
     return copy;
 }
 
+/* The struct that was read last, which the next one may hold. */
+static struct layout before;
+
 static unsigned type_bytes(const char *type)
 {
+    if (strcmp(type, before.name) == 0)
+        return before.size_bytes;
     if (strcmp(type, "float") == 0 || strcmp(type, "uint") == 0)
         return 4;
     if (strcmp(type, "vec4") == 0 || strcmp(type, "uvec4") == 0)
@@ -75,12 +80,13 @@ static unsigned type_bytes(const char *type)
     return 0;
 }
 
-/* "vec4 a[3], b" */
+/* "vec4 a[3], b" or "SHARED(inner) a, b", of which the inner struct's first member is looked at */
 static void read_declaration(struct layout *layout, char *text)
 {
     char type[NAME_MAX_LENGTH + 1];
     int length = 0;
-    if (sscanf(text, " %63[a-z0-9_]%n", type, &length) != 1)
+    const bool is_struct = sscanf(text, " SHARED(%63[a-z0-9_])%n", type, &length) == 1;
+    if (!is_struct && sscanf(text, " %63[a-z0-9_]%n", type, &length) != 1)
         return;
     char *rest = NULL;
     for (char *item = strtok_r(text + length, ",", &rest); item; item = strtok_r(NULL, ",", &rest)) {
@@ -90,6 +96,10 @@ static void read_declaration(struct layout *layout, char *text)
         int found = sscanf(item, " %63[A-Za-z0-9_] [%u]", member->name, &count);
         assert_in_range(found, 1, 2);
         member->is_array = found == 2;
+        if (is_struct) {
+            size_t end = strlen(member->name);
+            snprintf(member->name + end, sizeof(member->name) - end, ".%s", before.members[0].name);
+        }
         member->offset_bytes = layout->size_bytes;
         layout->size_bytes += count * type_bytes(type);
     }
@@ -98,6 +108,7 @@ static void read_declaration(struct layout *layout, char *text)
 /* The next `struct name { .. };` of the text; NULL: none. */
 static char *read_struct(char *text, struct layout *layout)
 {
+    before = *layout;
     *layout = (struct layout){0};
     for (char *at = strstr(text, "struct "); at; at = strstr(at + 1, "struct ")) {
         int length = 0;
@@ -181,7 +192,7 @@ TEST(every_shared_struct_has_one_layout)
         if (strncmp(source->path, "shared/", 7) != 0)
             continue;
         char *text = without_comments(source->begin, source->end);
-        struct layout layout;
+        struct layout layout = {0};
         for (char *at = text; (at = read_struct(at, &layout)); struct_count++) {
             expect_same_layout(source->path, &layout, "std430");
             if (layout.size_bytes % 16 == 0) /* std140 rounds the stride of an array of others up */

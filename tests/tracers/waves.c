@@ -133,7 +133,7 @@ CHECK(a_wave_that_does_not_fit_its_buffers_is_refused, 0)
 CHECK(rays_that_the_device_counts_get_the_same_answers, 0)
 {
     const struct contract_case *of = *state;
-    const struct wave_counts counts = {.ray_count = 1000, .groups_x = 16, .groups_y = 1, .groups_z = 1};
+    const struct wave_counts counts = {.count = 1000, .groups_x = 16, .groups_y = 1, .groups_z = 1};
     struct gpu_buffer small = {0}, buffer = {0};
     struct fixture fixture;
     struct error error = {0};
@@ -149,8 +149,8 @@ CHECK(rays_that_the_device_counts_get_the_same_answers, 0)
     assert_int_equal(error.kind, ERROR_INTERNAL);
     wave.counts = &buffer;
     expect_ok(tracer_trace(fixture.tracer, &fixture.gpu, &wave, &error), &error);
-    gpu_buffer_read(device, &fixture.answers, 0, hits, counts.ray_count * sizeof(*hits));
-    assert_memory_equal(hits, expected, counts.ray_count * sizeof(*hits));
+    gpu_buffer_read(device, &fixture.answers, 0, hits, counts.count * sizeof(*hits));
+    assert_memory_equal(hits, expected, counts.count * sizeof(*hits));
     gpu_buffer_finish(device, &small);
     gpu_buffer_finish(device, &buffer);
     free(hits);

@@ -192,7 +192,7 @@ bool comparison_prepare(struct comparison *comparison, const struct wave *wave, 
                 return false;
         *prepared = true;
     }
-    glFinish();
+    gpu_finish(comparison->device);
     return true;
 }
 
@@ -292,7 +292,7 @@ bool comparison_wave(struct comparison *comparison, const struct wave *wave, enu
     uint64_t start_ns = clock_now_ns();
     if (!tracer_trace(comparison->tracers[1], comparison->scene, &twin, error))
         return false;
-    glFinish();
+    gpu_finish(comparison->device);
     tally->first_ns += first_ns;
     tally->second_ns += clock_now_ns() - start_ns;
     for (uint32_t first = 0, count; first < wave->ray_count; first += count) {

@@ -169,7 +169,7 @@ static bool run_unit(struct abuffer_task *task, uint64_t step_end_ns, struct err
     }
     if (whole)
         return true;
-    glFinish(); /* else the last unit would wait for the time of all */
+    gpu_finish(task->builder->device); /* else the last unit would wait for the time of all */
     if (items == *unit)
         *unit = step_batch_items(items, clock_now_ns() - start_ns);
     return true;

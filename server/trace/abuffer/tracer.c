@@ -119,7 +119,7 @@ static enum tracer_progress do_step(struct abuffer *abuffer, struct gpu_scene *s
     gpu_timer_begin(abuffer->timer, STAGE_BUILD, 0);
     if (abuffer_build_is_on(abuffer->builder) || begin(abuffer, scene, error))
         progress = abuffer_build_step(abuffer->builder, abuffer->base.step_end_ns, error);
-    glFinish(); /* the time on the CPU's clock includes the wait for it */
+    gpu_finish(abuffer->base.device); /* the time on the CPU's clock includes the wait for it */
     gpu_timer_end(abuffer->timer);
     gpu_timer_collect(abuffer->timer, times);
     return progress;

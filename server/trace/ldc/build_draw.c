@@ -20,7 +20,7 @@ static bool draw_some(struct ldc_task *task, const struct axes_pass *pass, struc
     const uint64_t start_ns = clock_now_ns();
     if (!axes_draw_range(&builder->draw, task->scene, pass, task->drawn, task->drawn + count, error))
         return false;
-    glFinish();
+    gpu_finish(builder->device);
     if (task->drawn > 0 && count == builder->primitives_a_unit)
         builder->primitives_a_unit = step_batch_items(count, clock_now_ns() - start_ns);
     task->drawn += count;

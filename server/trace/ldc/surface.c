@@ -11,8 +11,8 @@ bool ldc_surfaces(struct ldc_store *store, const struct gpu_scene *scene, const 
                   struct error *error)
 {
     static const struct gpu_define discs[] = {{"HAS_DISCS", "1"}, {0}};
-    const struct gpu_program *program =
-        trace_surface_program_get(scene, "ldc/surface.comp", scene->disc_count > 0 ? discs : NULL, error);
+    const struct gpu_program *program = trace_surface_program_get(scene, rays->wave, "ldc/surface.comp",
+                                                                  scene->disc_count > 0 ? discs : NULL, error);
     if (!program)
         return false;
     gpu_buffer_bind_texels(scene->device, &store->geometry, UNIT_TRACER_0, GL_RG32UI);

@@ -166,7 +166,7 @@ static enum tracer_progress go_on_with_cube(struct ldc *ldc, struct gpu_scene *s
     do {
         progress = do_unit(ldc, scene, error);
         if (step_end_ns != STEP_WITHOUT_END || ldc->which != which)
-            glFinish();
+            gpu_finish(ldc->base.device);
     } while (progress == TRACER_MORE && ldc->which == which && !step_is_over(step_end_ns));
     gpu_timer_end(ldc->timer);
     return progress;

@@ -262,6 +262,7 @@ static enum tracer_progress reference_update(struct tracer *tracer, struct gpu_s
 const struct tracer_impl tracer_reference_impl = {
     .name = "reference",
     .depends_on = CHANGED_GEOMETRY | CHANGED_DEFORMED | CHANGED_INSTANCES | CHANGED_DISCS | CHANGED_SHADING,
+    .traces_on_host = true,
     .minimum_rays = REFERENCE_RAYS_MAX,
     .create = reference_create,
     .destroy = reference_destroy,

@@ -1,0 +1,38 @@
+/* SPDX-License-Identifier: MIT */
+/* Slices that are queued on the device and not known to be done. The host never waits for one: it looks whether
+ * the oldest is done when it could queue another one. */
+#ifndef FARLIGHT_RENDER_SLICES_AHEAD_H
+#define FARLIGHT_RENDER_SLICES_AHEAD_H
+
+#include "gpu/readback.h"
+#include "render/slices.h"
+#include "shared/wave.h"
+
+/* While the device works on one, the next is there already. */
+#define SLICES_AHEAD_MAX 2
+
+/* From where to do it again. */
+struct slice_ahead {
+    struct gpu_readback state; /* a struct wave_state, as it is behind the slice's last pass */
+    struct slices slices;      /* before it was taken */
+    uint32_t sample;
+};
+
+/* All-zero is the valid empty one. */
+struct slices_ahead {
+    struct slice_ahead ring[SLICES_AHEAD_MAX];
+    uint32_t oldest, count;
+};
+
+/* The slice's passes are queued; it was taken from `slices`, at that sample. There is a place for it. */
+bool slices_ahead_add(struct slices_ahead *ahead, struct gpu_device *device, const struct gpu_buffer *wave_state,
+                      const struct slices *slices, uint32_t sample, struct error *error);
+/* Whether the oldest is done; false if there is none. */
+bool slices_ahead_has_done(const struct slices_ahead *ahead);
+/* Takes the oldest, which is done: what became of it. *slice is valid until the next one is added. */
+bool slices_ahead_take(struct slices_ahead *ahead, struct gpu_device *device, const struct slice_ahead **slice,
+                       struct wave_state *state, struct error *error);
+void slices_ahead_drop(struct slices_ahead *ahead); /* all of them */
+void slices_ahead_finish(struct slices_ahead *ahead, struct gpu_device *device);
+
+#endif

@@ -1,0 +1,180 @@
+/* SPDX-License-Identifier: MIT */
+/* Frames whose waves are queued without waiting for their counts, as on a GPU: the same pictures as of frames that
+ * wait, and how often the host waits. The device is taken for hardware, whatever it is. */
+#include "protocol/tracers.h"
+#include "render/layers.h"
+#include "tests/accuracy/render_fixture.h"
+#include "tests/harness/test.h"
+
+#define PANES 24 /* more than the waves that are queued at first */
+
+static bool was_software;
+
+static int take_for_hardware(void **state)
+{
+    fixture_setup(state);
+    was_software = device->facts.software;
+    device->facts.software = false;
+    return 0;
+}
+
+static int take_for_what_it_is(void **state)
+{
+    device->facts.software = was_software;
+    return fixture_teardown(state);
+}
+
+ALL_TESTS(take_for_hardware, take_for_what_it_is)
+EACH_TEST(fixture_clear, NULL)
+
+/* The second of two frames: the first compiles, and brings the scene to the device. */
+static struct frame_result render(struct fixture *fixture, bool ahead)
+{
+    frame_renderer_queue_ahead(fixture->renderer, ahead);
+    struct frame_result first = fixture_render(fixture);
+    frame_result_finish(&first);
+    return fixture_render(fixture);
+}
+
+/* At most one wait, for the one band of a small picture. */
+static void assert_ahead_is_as_waiting(struct fixture *fixture, const char *what)
+{
+    struct frame_result waiting = render(fixture, false), ahead = render(fixture, true);
+    if (ahead.device_waits > 1)
+        fail_msg("%s: the host waits %u times", what, ahead.device_waits);
+    if (waiting.device_waits < 2)
+        fail_msg("%s: a frame that waits for its counts does so %u times", what, waiting.device_waits);
+    assert_same_picture(&waiting, &ahead);
+    assert_int_equal(ahead.primary_rays, waiting.primary_rays);
+    assert_int_equal(ahead.shadow_rays, waiting.shadow_rays);
+    assert_int_equal(ahead.secondary_rays, waiting.secondary_rays);
+    assert_int_equal(ahead.splits, waiting.splits);
+    frame_result_finish(&waiting);
+    frame_result_finish(&ahead);
+}
+
+TEST(every_integrator_and_tracer_gives_the_same_picture_and_waits_once)
+{
+    struct fixture *fixture = *state;
+    fixture_mixture(fixture);
+    static const struct form {
+        unsigned integrator, depth, samples;
+    } forms[] = {{INTEGRATOR_WHITTED, 4, 1},
+                 {INTEGRATOR_DISTRIBUTED, 4, 16},
+                 {INTEGRATOR_PATH, 4, 3},
+                 {INTEGRATOR_AO, 1, 2},
+                 {INTEGRATOR_RAYCAST, 4, 1}};
+    static const unsigned tracers[] = {TRACER_NAIVE, TRACER_BVH, TRACER_LDC, TRACER_ABUFFER};
+    for (size_t i = 0; i < sizeof(forms) / sizeof(forms[0]); i++)
+        for (size_t k = 0; k < sizeof(tracers) / sizeof(tracers[0]); k++) {
+            char what[64];
+            fixture->request.integrator = forms[i].integrator;
+            fixture->request.depth = forms[i].depth;
+            fixture->request.samples = forms[i].samples;
+            fixture->request.tracer = tracers[k];
+            fixture->request.primary = (i + k) % 2 ? PRIMARY_TRACE : PRIMARY_RASTER;
+            snprintf(what, sizeof(what), "integrator %u, tracer %u", forms[i].integrator, tracers[k]);
+            assert_ahead_is_as_waiting(fixture, what);
+        }
+}
+
+TEST(layers_are_the_same)
+{
+    struct fixture *fixture = *state;
+    fixture_mixture(fixture);
+    fixture->request.layers = (1u << LAYER_COUNT) - 1;
+    fixture->request.samples = 4;
+    frame_renderer_queue_ahead(fixture->renderer, false);
+    struct frame_result waiting = fixture_render(fixture);
+    frame_renderer_queue_ahead(fixture->renderer, true);
+    struct frame_result ahead = fixture_render(fixture);
+    assert_same_picture(&waiting, &ahead);
+    assert_int_equal(ahead.shadow_rays, waiting.shadow_rays);
+    frame_result_finish(&waiting);
+    frame_result_finish(&ahead);
+}
+
+TEST(a_slice_that_overflows_on_the_device_is_done_again_in_order)
+{
+    struct fixture *fixture = *state;
+    fixture_mixture(fixture);
+    fixture->request.depth = 6;
+    for (unsigned primary = PRIMARY_RASTER; primary <= PRIMARY_TRACE; primary++)
+        for (unsigned samples = 1; samples <= 3; samples += 2) {
+            fixture->request.primary = primary;
+            fixture->request.samples = samples;
+            frame_renderer_set_capacity(fixture->renderer, 0, 0);
+            frame_renderer_queue_ahead(fixture->renderer, false);
+            struct frame_result whole = fixture_render(fixture);
+            frame_renderer_set_capacity(fixture->renderer, 512, 512);
+            frame_renderer_queue_ahead(fixture->renderer, true);
+            struct frame_result split = fixture_render(fixture);
+            assert_true(split.splits > 0);
+            assert_same_picture(&whole, &split);
+            assert_int_equal(split.secondary_rays, whole.secondary_rays);
+            assert_int_equal(split.shadow_rays, whole.shadow_rays);
+            frame_result_finish(&split);
+            frame_result_finish(&whole);
+        }
+}
+
+TEST(one_pixel_that_overflows_gets_larger_buffers)
+{
+    struct fixture *fixture = *state;
+    fixture_mixture(fixture);
+    fixture->request.width = 8;
+    fixture->request.height = 6;
+    struct frame_result whole = fixture_render(fixture);
+    frame_renderer_set_capacity(fixture->renderer, 1, 1);
+    struct frame_result grown = fixture_render(fixture);
+    assert_true(grown.splits > 0);
+    assert_same_picture(&whole, &grown);
+    frame_result_finish(&whole);
+    frame_result_finish(&grown);
+}
+
+/* More waves than the depth says, as none of these rays counts as a bounce. */
+TEST(rays_behind_the_last_queued_wave_are_not_lost)
+{
+    struct fixture *fixture = *state;
+    struct scene_material *pane = fixture_material(fixture);
+    pane->alpha_mode = ALPHA_BLEND;
+    pane->base_colour[3] = 0.1f;
+    for (int i = 0; i < PANES; i++) {
+        const float at[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, -0.05f * (float)i};
+        fixture_square(fixture, 1.0f, pane->base.id, at);
+    }
+    fixture_environment(fixture, 0.5f, 0.5f, 0.5f);
+    fixture->request.depth = 1;
+    fixture->request.integrator = INTEGRATOR_RAYCAST;
+    fixture->request.layer_opacity = 0.1f;
+    frame_renderer_queue_ahead(fixture->renderer, false);
+    struct frame_result waiting = fixture_render(fixture);
+    frame_renderer_queue_ahead(fixture->renderer, true);
+    struct frame_result ahead = fixture_render(fixture);
+    assert_same_picture(&waiting, &ahead);
+    assert_int_equal(ahead.secondary_rays, waiting.secondary_rays);
+    assert_true(waiting.secondary_rays >= PANES);
+    frame_result_finish(&waiting);
+    frame_result_finish(&ahead);
+}
+
+TEST(a_frame_that_is_given_up_leaves_nothing_behind)
+{
+    struct fixture *fixture = *state;
+    struct error error = {0};
+    fixture_mixture(fixture);
+    struct frame_result whole = fixture_render(fixture);
+    frame_renderer_set_capacity(fixture->renderer, 512, 512);
+    for (unsigned steps = 1; steps < 40; steps += 6) {
+        struct frame_result none = {0};
+        assert_true(frame_begin(fixture->renderer, fixture->scene, NULL, &fixture->request, &error));
+        for (unsigned i = 0; i < steps; i++)
+            assert_int_equal(frame_step(fixture->renderer, &none, &error), FRAME_MORE);
+        frame_abandon(fixture->renderer);
+        struct frame_result after = fixture_render(fixture);
+        assert_same_picture(&whole, &after);
+        frame_result_finish(&after);
+    }
+    frame_result_finish(&whole);
+}
