@@ -130,6 +130,21 @@ static void count_rays(struct frame_renderer *renderer, const struct wave_state 
     renderer->result.secondary_rays += state->all_secondary_rays;
 }
 
+/* The samples of that slice are in the picture. */
+static void note_done(struct frame_renderer *renderer, const struct slice_ahead *slice,
+                      const struct wave_state *state)
+{
+    count_rays(renderer, state);
+    slices_ahead_learn(&renderer->work->ahead, slice, renderer->shared->step_ns);
+}
+
+static void begin_ahead(struct frame_renderer *renderer)
+{
+    struct slices_ahead *ahead = &renderer->work->ahead;
+    renderer->slices.slice_rays = slices_ahead_rays(ahead, renderer->slice_rays_max);
+    slices_ahead_begin(ahead, renderer->device, &renderer->slices, renderer->sample);
+}
+
 /* Those of the queued slices that are done. *again: one of them is done again. */
 static bool land(struct frame_renderer *renderer, bool *again, struct error *error)
 {
@@ -145,7 +160,7 @@ static bool land(struct frame_renderer *renderer, bool *again, struct error *err
         if (*again && !do_again(renderer, slice, state.stopped, error))
             return false;
         if (!*again)
-            count_rays(renderer, &state);
+            note_done(renderer, slice, &state);
     }
     return true;
 }
@@ -169,7 +184,8 @@ static bool begin_slice(struct frame_renderer *renderer, struct error *error)
     if (again || renderer->work->ahead.count == SLICES_AHEAD_MAX)
         return true;
     uint32_t sample_shift = context->uniforms.sample_shift;
-    renderer->slices_before = renderer->slices;
+    if (!context->counts_on_host)
+        begin_ahead(renderer);
     if (!slices_take(&renderer->slices, &renderer->picture, sample_shift, &context->slice)) {
         renderer->sample += 1u << sample_shift;
         renderer->phase = renderer->sample < context->request.samples ? PHASE_SAMPLE : PHASE_LAND;
@@ -237,7 +253,7 @@ static bool finish_slice(struct frame_renderer *renderer, struct error *error)
         return false;
     if (!context->counts_on_host)
         return slices_ahead_add(&renderer->work->ahead, renderer->device, &context->wave_state,
-                                &renderer->slices_before, renderer->sample, error);
+                                context->slice.slot_count << context->uniforms.sample_shift, error);
     count_rays(renderer, &context->known_state);
     renderer->result.shadow_rays += context->shadow_rays;
     return true;

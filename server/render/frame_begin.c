@@ -206,8 +206,8 @@ static uint32_t at_least(uint32_t value, uint32_t minimum)
 bool frame_reserve_waves(struct frame_renderer *renderer, struct error *error)
 {
     struct render_context *context = &renderer->work->context;
-    return context_reserve(context, renderer->slices.slice_rays, error) &&
-           layers_reserve(&renderer->work->layers, context, renderer->slices.slice_rays, error) &&
+    return context_reserve(context, renderer->slice_rays_max, error) &&
+           layers_reserve(&renderer->work->layers, context, renderer->slice_rays_max, error) &&
            wave_passes_reserve(&renderer->work->passes, context, error);
 }
 
@@ -243,11 +243,12 @@ static bool reserve_frame(struct frame_renderer *renderer, struct error *error)
     uint32_t rays = slice_rays(renderer);
     uint64_t all = picture_slot_count(&renderer->picture);
     all *= renderer->rasterise ? 1 : SLICES_SAMPLES_TOGETHER;
-    renderer->slices.slice_rays = rays < all ? rays : (uint32_t)all;
-    uint32_t wave_rays = renderer->slices.slice_rays * WAVE_PER_SLICE;
+    rays = rays < all ? rays : (uint32_t)all;
+    renderer->slice_rays_max = renderer->slices.slice_rays = rays;
+    uint32_t wave_rays = rays * WAVE_PER_SLICE;
     if (renderer->wanted_wave_rays)
         wave_rays = renderer->wanted_wave_rays;
-    context->wave_capacity = at_least(wave_rays, renderer->slices.slice_rays);
+    context->wave_capacity = at_least(wave_rays, rays);
     if (!frame_reserve_waves(renderer, error))
         return false;
     context->counts_on_host = !renderer->queues_ahead || request->compare || context->tracer->impl->traces_on_host;

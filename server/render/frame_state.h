@@ -85,7 +85,8 @@ struct frame_renderer {
     uint32_t plane, band;    /* of the picture that is handed out next */
     bool copying;            /* copies[copied % 2] is on its way, of these: */
     uint32_t copied, copied_plane, copied_band;
-    struct slices slices, slices_before; /* the slice in hand was taken */
+    struct slices slices;
+    uint32_t slice_rays_max; /* that the buffers are for */
     /* the last frame that was finished, whose sum the picture holds */
     struct frame_request kept_request;
     uint32_t kept_samples; /* 0: there is none */

@@ -1,13 +1,50 @@
 /* SPDX-License-Identifier: MIT */
 #include "render/slices_ahead.h"
 
-bool slices_ahead_add(struct slices_ahead *ahead, struct gpu_device *device, const struct gpu_buffer *wave_state,
-                      const struct slices *slices, uint32_t sample, struct error *error)
+#include "gpu/registry.h"
+
+#include <epoxy/gl.h>
+
+/* Rays of a slice: before one was measured, and at the least and most. Fewer do not fill a GPU. */
+#define SLICE_RAYS_FIRST (1u << 16)
+#define SLICE_RAYS_MIN (1u << 12)
+#define SLICE_RAYS_MAX (1u << 30)
+
+static struct slice_ahead *next_of(struct slices_ahead *ahead)
 {
-    struct slice_ahead *slice = &ahead->ring[(ahead->oldest + ahead->count) % SLICES_AHEAD_MAX];
+    return &ahead->ring[(ahead->oldest + ahead->count) % SLICES_AHEAD_MAX];
+}
+
+static void stamp(struct gpu_device *device, unsigned *query)
+{
+    if (!*query)
+        *query = gpu_object_create(device->registry, GPU_TIMESTAMP_QUERY);
+    if (*query)
+        glQueryCounter(*query, GL_TIMESTAMP);
+}
+
+uint32_t slices_ahead_rays(const struct slices_ahead *ahead, uint32_t maximum)
+{
+    const uint32_t rays = ahead->slice_rays ? ahead->slice_rays : SLICE_RAYS_FIRST;
+    return rays < maximum ? rays : maximum;
+}
+
+void slices_ahead_begin(struct slices_ahead *ahead, struct gpu_device *device, const struct slices *slices,
+                        uint32_t sample)
+{
+    struct slice_ahead *slice = next_of(ahead);
     slice->slices = *slices;
     slice->sample = sample;
+    stamp(device, &slice->queries[0]);
+}
+
+bool slices_ahead_add(struct slices_ahead *ahead, struct gpu_device *device, const struct gpu_buffer *wave_state,
+                      uint32_t rays, struct error *error)
+{
+    struct slice_ahead *slice = next_of(ahead);
+    slice->rays = rays;
     ahead->count++;
+    stamp(device, &slice->queries[1]);
     return gpu_readback_copy(device, &slice->state, wave_state, sizeof(struct wave_state), error) &&
            gpu_readback_fence(&slice->state, error);
 }
@@ -27,6 +64,30 @@ bool slices_ahead_take(struct slices_ahead *ahead, struct gpu_device *device, co
     return gpu_readback_take(device, &oldest->state, state, error);
 }
 
+/* 0: it has none. The slice is done, and so are its time stamps. */
+static uint64_t time_of(unsigned query)
+{
+    GLint available = 0;
+    GLuint64 time_ns = 0;
+    if (query)
+        glGetQueryObjectiv(query, GL_QUERY_RESULT_AVAILABLE, &available);
+    if (available)
+        glGetQueryObjectui64v(query, GL_QUERY_RESULT, &time_ns);
+    return time_ns;
+}
+
+void slices_ahead_learn(struct slices_ahead *ahead, const struct slice_ahead *slice, uint64_t step_ns)
+{
+    const uint64_t begin_ns = time_of(slice->queries[0]), end_ns = time_of(slice->queries[1]);
+    const bool is_whole = slice->rays == slice->slices.slice_rays; /* no smaller rest of a band */
+    if (begin_ns == 0 || end_ns <= begin_ns)
+        return;
+    if (end_ns - begin_ns > step_ns)
+        ahead->slice_rays = slice->rays / 2 > SLICE_RAYS_MIN ? slice->rays / 2 : SLICE_RAYS_MIN;
+    else if (end_ns - begin_ns < step_ns / 4 && is_whole && slice->rays < SLICE_RAYS_MAX)
+        ahead->slice_rays = slice->rays * 2;
+}
+
 void slices_ahead_drop(struct slices_ahead *ahead)
 {
     for (uint32_t i = 0; i < SLICES_AHEAD_MAX; i++)
@@ -36,7 +97,10 @@ void slices_ahead_drop(struct slices_ahead *ahead)
 
 void slices_ahead_finish(struct slices_ahead *ahead, struct gpu_device *device)
 {
-    for (uint32_t i = 0; i < SLICES_AHEAD_MAX; i++)
+    for (uint32_t i = 0; i < SLICES_AHEAD_MAX; i++) {
         gpu_readback_finish(device, &ahead->ring[i].state);
+        for (int end = 0; end < 2; end++)
+            gpu_object_destroy(device->registry, GPU_TIMESTAMP_QUERY, ahead->ring[i].queries[end]);
+    }
     *ahead = (struct slices_ahead){0};
 }

@@ -178,3 +178,43 @@ TEST(a_frame_that_is_given_up_leaves_nothing_behind)
     }
     frame_result_finish(&whole);
 }
+
+static unsigned steps_of(struct fixture *fixture, uint64_t step_ns, struct frame_result *result)
+{
+    struct error error = {0};
+    unsigned steps = 0;
+    enum frame_progress progress = FRAME_MORE;
+    frame_scene_set_step(fixture->shared, step_ns);
+    frame_result_finish(result);
+    if (!frame_begin(fixture->renderer, fixture->scene, NULL, &fixture->request, &error))
+        fail_msg("frame_begin: %s", error.text);
+    for (; progress == FRAME_MORE; steps++)
+        progress = frame_step(fixture->renderer, result, &error);
+    if (progress != FRAME_DONE)
+        fail_msg("frame_step: %s", error.text);
+    return steps;
+}
+
+/* By its time stamps: no slice is as short as a nanosecond, each is shorter than a second. */
+TEST(slices_are_as_large_as_the_device_can_do_in_a_step)
+{
+    struct fixture *fixture = *state;
+    struct frame_result large = {0}, small = {0};
+    fixture_mixture(fixture);
+    fixture_commit(fixture);
+    fixture->request.tracer = TRACER_BVH;
+    fixture->request.integrator = INTEGRATOR_RAYCAST;
+    fixture->request.depth = 0;
+    fixture->request.width = 512;
+    fixture->request.height = 512;
+    unsigned few = 0, many = 0;
+    for (int i = 0; i < 2; i++) /* learnt from picture to picture */
+        many = steps_of(fixture, 1, &small);
+    for (int i = 0; i < 3; i++)
+        few = steps_of(fixture, 4000000000u, &large);
+    /* 2^18 rays in slices of 2^12, and in one: the steps of 63 slices more, at least three each. */
+    assert_true(many >= few + 3 * 63);
+    assert_same_picture(&large, &small);
+    frame_result_finish(&large);
+    frame_result_finish(&small);
+}
