@@ -63,12 +63,24 @@ void compact_dispatch(struct render_context *context, const struct gpu_program *
                               list * sizeof(struct wave_counts) + offsetof(struct wave_counts, groups_x));
 }
 
+/* In use. `hits`: of rays, else of hits. */
+static const struct gpu_program *use_scan(struct render_context *context, bool hits, struct error *error)
+{
+    struct gpu_define defines[3] = {0};
+    size_t n = 0;
+    if (hits)
+        defines[n++] = (struct gpu_define){"HITS", "1"};
+    if (!context->device->facts.software)
+        defines[n++] = (struct gpu_define){"PARALLEL", "1"};
+    return context_use_with(context, "render/compact_scan.comp", defines, error);
+}
+
 /* The blocks' counts become places, and their sum the wave's. `program` is in use. */
 static bool scan(struct render_context *context, const struct gpu_program *program, struct error *error)
 {
     gpu_buffer_bind_storage(&context->block_offsets, BIND_BLOCK_OFFSETS);
     gpu_buffer_bind_storage(&context->wave_state, BIND_WAVE);
-    gpu_dispatch(context->device, program, 1);
+    gpu_dispatch(context->device, program, 1); /* one group */
     if (context->counts_on_host)
         gpu_buffer_read(context->device, &context->wave_state, 0, &context->known_state,
                         sizeof(context->known_state));
@@ -77,14 +89,13 @@ static bool scan(struct render_context *context, const struct gpu_program *progr
 
 bool compact_hits(struct render_context *context, struct error *error)
 {
-    static const struct gpu_define hits[] = {{"HITS", "1"}, {NULL, NULL}};
     const struct gpu_program *program = context_use(context, "render/hit_count.comp", error);
     if (!program)
         return false;
     gpu_buffer_bind_storage(&context->hits, BIND_HITS);
     gpu_buffer_bind_storage(&context->block_offsets, BIND_BLOCK_OFFSETS);
     compact_dispatch(context, program, WAVE_RAY_BLOCKS);
-    program = context_use_with(context, "render/compact_scan.comp", hits, error);
+    program = use_scan(context, true, error);
     if (!program || !scan(context, program, error))
         return false;
     program = context_use(context, "render/hit_list.comp", error);
@@ -105,7 +116,7 @@ bool compact_children(struct render_context *context, uint32_t children_a_hit, b
         return false;
     gpu_buffer_bind_storage(&context->block_offsets, BIND_BLOCK_OFFSETS);
     compact_dispatch(context, program, WAVE_HIT_BLOCKS);
-    program = context_use(context, "render/compact_scan.comp", error);
+    program = use_scan(context, false, error);
     if (!program)
         return false;
     gpu_uniform_uint(program, "capacity", context->wave_capacity);

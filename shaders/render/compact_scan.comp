@@ -1,11 +1,19 @@
 // SPDX-License-Identifier: MIT
 // Second: each block's count becomes the place of its first item. One group scans them all, each invocation a run of
 // blocks. The sums are the wave's new counts.
-// Defines: HITS the blocks are of rays, of which the hits are counted; else of hits, whose children are the next wave.
+// Defines:
+//   HITS      the blocks are of rays, of which the hits are counted; else of hits, whose children are the next wave
+//   PARALLEL  many invocations add up their sums side by side; else one of a few does, which is faster on software GL
 
 #include "render/wave_counts.glsl"
 
-layout(local_size_x = COMPACT_SCAN_SIZE) in;
+#ifdef PARALLEL
+#define SCAN_SIZE COMPACT_SCAN_SIZE_PARALLEL
+#else
+#define SCAN_SIZE COMPACT_SCAN_SIZE
+#endif
+
+layout(local_size_x = SCAN_SIZE) in;
 
 #ifndef HITS
 uniform uint capacity;    // rays that the buffers hold
@@ -14,7 +22,7 @@ uniform uint last_queued; // 1: no wave is queued behind this one
 
 layout(std430, binding = BIND_BLOCK_OFFSETS) buffer offset_block { uvec2 block_offsets[]; };
 
-shared uvec2 sums[COMPACT_SCAN_SIZE];
+shared uvec2 sums[SCAN_SIZE + 1];
 
 #ifdef HITS
 
@@ -42,6 +50,36 @@ void take(uvec2 total)
 
 #endif
 
+// The sum of what the invocations before this one have, and of what all have.
+void add_up(uint self, uvec2 own, out uvec2 before, out uvec2 total)
+{
+    sums[self] = own;
+    barrier();
+#ifdef PARALLEL
+    for (uint reach = 1u; reach < SCAN_SIZE; reach <<= 1) {
+        uvec2 more = self >= reach ? sums[self - reach] : uvec2(0u);
+        barrier();
+        sums[self] += more;
+        barrier();
+    }
+    before = sums[self] - own;
+    total = sums[SCAN_SIZE - 1];
+#else
+    if (self == 0u) {
+        uvec2 sum = uvec2(0u);
+        for (int i = 0; i < SCAN_SIZE; i++) {
+            uvec2 next = sums[i];
+            sums[i] = sum;
+            sum += next;
+        }
+        sums[SCAN_SIZE] = sum;
+    }
+    barrier();
+    before = sums[self];
+    total = sums[SCAN_SIZE];
+#endif
+}
+
 void main()
 {
     uint self = gl_LocalInvocationIndex;
@@ -50,24 +88,16 @@ void main()
 #else
     uint block_count = state.hit_blocks.count;
 #endif
-    uint run = (block_count + COMPACT_SCAN_SIZE - 1u) / COMPACT_SCAN_SIZE;
+    uint run = (block_count + SCAN_SIZE - 1u) / SCAN_SIZE;
     uint first = min(self * run, block_count), end = min(first + run, block_count);
     uvec2 sum = uvec2(0u);
     for (uint block = first; block < end; block++)
         sum += block_offsets[block];
-    sums[self] = sum;
-    barrier();
-    if (self == 0u) {
-        uvec2 total = uvec2(0u);
-        for (int i = 0; i < COMPACT_SCAN_SIZE; i++) {
-            uvec2 own = sums[i];
-            sums[i] = total;
-            total += own;
-        }
+    uvec2 before, total;
+    add_up(self, sum, before, total);
+    if (self == 0u)
         take(total);
-    }
-    barrier();
-    uint place = sums[self].x;
+    uint place = before.x;
     for (uint block = first; block < end; block++) {
         uint count = block_offsets[block].x;
         block_offsets[block].x = place;

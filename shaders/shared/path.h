@@ -51,10 +51,11 @@ struct child {
     float light_distance, light_share, environment_share;
 };
 SHARED_SIZE(child, 80)
-#define CHILD_TEXELS 5       /* RGBA32UI */
-#define CHILDREN_MAX 3u      /* of whitted: straight on, reflected, refracted */
-#define COMPACT_BLOCK 16u    /* paths whose hits, and then children, are counted together */
-#define COMPACT_SCAN_SIZE 64 /* invocations of the one group that scans the counts */
+#define CHILD_TEXELS 5                  /* RGBA32UI */
+#define CHILDREN_MAX 3u                 /* of whitted: straight on, reflected, refracted */
+#define COMPACT_BLOCK 16u               /* paths whose hits, and then children, are counted together */
+#define COMPACT_SCAN_SIZE 64            /* invocations of the one group that scans the counts */
+#define COMPACT_SCAN_SIZE_PARALLEL 1024 /* of a GPU: as many as every device has in a group */
 
 /* The visibility buffer's first word is an instance + 1, or one of these. */
 #define VISIBLE_NOTHING 0u

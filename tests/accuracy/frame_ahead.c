@@ -78,6 +78,23 @@ TEST(every_integrator_and_tracer_gives_the_same_picture_and_waits_once)
         }
 }
 
+/* Other sizes of slices, and lists that are made by other scans. */
+TEST(hardware_and_software_give_the_same_picture)
+{
+    struct fixture *fixture = *state;
+    fixture_mixture(fixture);
+    fixture->request.width = 300;
+    fixture->request.height = 200;
+    device->facts.software = true;
+    struct frame_result software = fixture_render(fixture);
+    device->facts.software = false;
+    struct frame_result hardware = fixture_render(fixture);
+    assert_same_picture(&software, &hardware);
+    assert_int_equal(hardware.secondary_rays, software.secondary_rays);
+    frame_result_finish(&software);
+    frame_result_finish(&hardware);
+}
+
 TEST(layers_are_the_same)
 {
     struct fixture *fixture = *state;
