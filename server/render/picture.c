@@ -154,6 +154,7 @@ bool picture_accumulate(struct picture *picture, struct render_context *context,
     uint32_t band = context->slice.first_slot / band_slots(picture);
     gpu_buffer_bind_storage(picture_band(picture, plane, band), BIND_ACCUMULATION);
     gpu_buffer_bind_storage(sums, BIND_SLICE_SUMS);
+    gpu_buffer_bind_uniform(&context->wave_state, UNIFORM_WAVE);
     gpu_uniform_uint(program, "first_sum", first_sum);
     gpu_uniform_uint(program, "first_slot", context->slice.first_slot - band * band_slots(picture));
     gpu_uniform_uint(program, "slot_count", context->slice.slot_count);

@@ -12,6 +12,7 @@
 
 #include "common/occlusion.glsl"
 #include "render/shade.glsl"
+#include "render/wave.glsl"
 
 uniform uint first_ray, batch_rays; // of shadow_rays_a_hit
 uniform float reach, falloff;       // metres; see common/occlusion.glsl

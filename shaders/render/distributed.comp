@@ -14,6 +14,7 @@
 #include "common/light_choice.glsl"
 #include "common/lobe.glsl"
 #include "render/shade.glsl"
+#include "render/wave.glsl"
 
 // A child with a lower weight than this is traced with the probability weight / this, and then has this weight.
 const float ROULETTE = 1.0 / 4.0;

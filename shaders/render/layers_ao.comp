@@ -6,6 +6,7 @@
 
 #include "common/occlusion.glsl"
 #include "render/shade.glsl"
+#include "render/wave.glsl"
 
 uniform uint first_ray, batch_rays; // of all_rays that a sample has
 uniform uint all_rays;

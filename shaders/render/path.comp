@@ -25,6 +25,7 @@
 #include "common/environment_choice.glsl"
 #include "common/light_choice.glsl"
 #include "render/shade.glsl"
+#include "render/wave.glsl"
 
 // Russian roulette begins at this bounce: a path with a weight below 1 survives with that probability, and then has the
 // weight 1.

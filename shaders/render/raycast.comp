@@ -15,6 +15,7 @@
 #include "common/light.glsl"
 #include "common/scattering.glsl"
 #include "render/shade.glsl"
+#include "render/wave.glsl"
 
 uniform float layer_opacity; // 0..1
 

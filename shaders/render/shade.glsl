@@ -10,7 +10,6 @@
 #include "common/dispatch.glsl"
 #include "common/material.glsl"
 #include "common/sequence.glsl"
-#include "render/wave.glsl"
 
 layout(local_size_x = 64) in;
 

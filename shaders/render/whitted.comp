@@ -14,6 +14,7 @@
 #include "common/light.glsl"
 #include "common/scattering.glsl"
 #include "render/shade.glsl"
+#include "render/wave.glsl"
 
 uniform uint first_ray, batch_rays; // a light each
 
