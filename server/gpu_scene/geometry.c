@@ -451,6 +451,8 @@ static void classify_material(struct gpu_scene *gpu, const struct scene *scene, 
     if (material->alpha_mode == ALPHA_BLEND || material->transmission > 0.0f)
         gpu->has_translucent = true;
     gpu->has_transmission |= material->transmission > 0.0f;
+    gpu->has_tangents |= material->textures[MATERIAL_NORMAL].texture ||
+                         material->textures[MATERIAL_BUMP].texture || material->anisotropy != 0.0f;
     bool varies = material->textures[MATERIAL_BASE_COLOUR].texture ||
                   material->textures[MATERIAL_TRANSMISSION].texture || (*geometry_flags & GEOMETRY_HAS_COLOURS);
     gpu->has_varied_alpha |= varies && (material->alpha_mode != ALPHA_OPAQUE || material->transmission > 0.0f);
@@ -464,6 +466,7 @@ void gpu_scene_classify_geometry(struct gpu_scene *gpu, const struct scene *scen
     gpu->has_translucent = false;
     gpu->has_transmission = false;
     gpu->has_varied_alpha = false;
+    gpu->has_texcoords = gpu->has_colours = gpu->has_tangents = false;
     for (uint32_t i = 0; i < gpu->geometry_count; i++) {
         struct gpu_scene_geometry *geometry = &gpu->geometries[i];
         const struct material_range *ranges = geometry->mesh ? geometry->mesh->ranges : geometry->spheres->ranges;
@@ -475,6 +478,9 @@ void gpu_scene_classify_geometry(struct gpu_scene *gpu, const struct scene *scen
         if (flags != geometry->device.flags)
             gpu->state->stale_geometries = true;
         geometry->device.flags = flags;
+        gpu->has_texcoords |= (flags & (GEOMETRY_HAS_TEXCOORDS_0 | GEOMETRY_HAS_TEXCOORDS_1)) != 0;
+        gpu->has_colours |= (flags & GEOMETRY_HAS_COLOURS) != 0;
+        gpu->has_tangents |= (flags & GEOMETRY_HAS_TANGENTS) != 0;
     }
     size_t cursor = 0;
     uint64_t id;

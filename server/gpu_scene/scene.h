@@ -76,6 +76,10 @@ struct gpu_scene {
     bool has_translucent; /* some material lets shadow rays pass: blend or transmission */
     bool has_transmission;
     bool has_varied_alpha; /* what one of these lets pass differs from place to place: texture or vertex colours */
+    bool has_texcoords;    /* some mesh has texture coordinates */
+    bool has_colours;      /* some mesh has vertex colours */
+    bool has_tangents;     /* some mesh has tangents, or some material in use asks for those of its texture
+                              coordinates: normal or bump map, anisotropy */
     bool has_motion;       /* something moves while the shutter is open: tracers must look at the rays' times */
     bool has_environment_image;
     float lower_world[3], upper_world[3]; /* all instances and lights with a place; discs left out */

@@ -6,6 +6,7 @@
 #include "render/wave_trace.h"
 #include "shared/bindings.h"
 #include "shared/path.h"
+#include "trace/program.h"
 #include "trace/step.h"
 
 #include <epoxy/gl.h>
@@ -228,10 +229,8 @@ static bool make_rays(const struct primary *primary, struct render_context *cont
 
 static bool fill_hits(struct render_context *context, struct error *error)
 {
-    struct gpu_define defines[3] = {0};
-    size_t n = 0;
-    if (context->scene->has_spheres)
-        defines[n++] = (struct gpu_define){"HAS_SPHERES", "1"};
+    struct gpu_define defines[TRACE_SURFACE_DEFINES + 2] = {0};
+    size_t n = trace_surface_defines(context->scene, defines);
     if (context->scene->has_spheres && context->scene->has_cutout)
         defines[n++] = (struct gpu_define){"HAS_CUTOUT", "1"};
     const struct gpu_program_source source = {.compute = "render/primary_fill.comp", .defines = defines};

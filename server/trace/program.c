@@ -9,7 +9,7 @@
 #include <stdio.h>
 
 #define OWN_DEFINES_MAX 12
-#define SURFACE_DEFINES_MAX 3
+#define SURFACE_DEFINES_MAX 5
 
 /* Rays at the time 0 see the first pose, as does a program without motion. */
 static bool has_motion(const struct gpu_scene *scene, const struct wave *wave)
@@ -124,12 +124,24 @@ void trace_surface_program_run(const struct gpu_program *program, const struct g
     dispatch_rays(program, scene, rays->wave, rays->first, rays->end, 1);
 }
 
-bool trace_surfaces(const struct gpu_scene *scene, const struct ray_range *rays, struct error *error)
+size_t trace_surface_defines(const struct gpu_scene *scene, struct gpu_define *defines)
 {
-    struct gpu_define defines[3] = {0};
     size_t n = 0;
     if (scene->has_spheres)
         defines[n++] = (struct gpu_define){"HAS_SPHERES", "1"};
+    if (!scene->has_texcoords)
+        defines[n++] = (struct gpu_define){"NO_TEXCOORDS", "1"};
+    if (!scene->has_colours)
+        defines[n++] = (struct gpu_define){"NO_COLOURS", "1"};
+    if (!scene->has_tangents)
+        defines[n++] = (struct gpu_define){"NO_TANGENTS", "1"};
+    return n;
+}
+
+bool trace_surfaces(const struct gpu_scene *scene, const struct ray_range *rays, struct error *error)
+{
+    struct gpu_define defines[TRACE_SURFACE_DEFINES + 2] = {0};
+    size_t n = trace_surface_defines(scene, defines);
     if (has_motion(scene, rays->wave))
         defines[n++] = (struct gpu_define){"HAS_MOTION", "1"};
     const struct gpu_program *program =

@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: MIT
 // From a primitive and a place on it to struct hit. Every exact tracer and the rasterised primary use it, so
 // that all see one surface.
+//
+// Software GL runs both sides of every branch: what no surface of the scene has may be left out by defines, without
+// any change to a hit. NO_TEXCOORDS, NO_COLOURS: no mesh has texture coordinates, vertex colours; NO_TANGENTS: no mesh
+// has tangents, and no material asks for those that follow from texture coordinates.
 #include "shared/hit.h"
 #include "common/math.glsl"
 #include "common/motion.glsl"
@@ -21,20 +25,28 @@ vec3 triangle_weights(vec2 barycentrics)
 
 vec4 triangle_texcoords(uvec4 triangle, uint flags, vec3 weights)
 {
+#ifdef NO_TEXCOORDS
+    return vec4(0.0);
+#else
     if ((flags & (GEOMETRY_HAS_TEXCOORDS_0 | GEOMETRY_HAS_TEXCOORDS_1)) == 0u)
         return vec4(0.0);
     return texelFetch(texcoords, int(triangle.x)) * weights.x +
            texelFetch(texcoords, int(triangle.y)) * weights.y +
            texelFetch(texcoords, int(triangle.z)) * weights.z;
+#endif
 }
 
 vec4 triangle_colour(uvec4 triangle, uint flags, vec3 weights)
 {
+#ifdef NO_COLOURS
+    return vec4(1.0);
+#else
     if ((flags & GEOMETRY_HAS_COLOURS) == 0u)
         return vec4(1.0);
     return texelFetch(colours, int(triangle.x)) * weights.x +
            texelFetch(colours, int(triangle.y)) * weights.y +
            texelFetch(colours, int(triangle.z)) * weights.z;
+#endif
 }
 
 // Seen from the front (+z) with y up, u grows to the right and v downwards, as an image is stored.
@@ -81,6 +93,10 @@ bool texture_tangent(uvec4 triangle, vec3 corners[3], bool second, vec3 normal_o
 bool triangle_tangent(uvec4 triangle, vec3 corners[3], geometry g, float time, vec3 weights, vec3 normal_object,
                       out vec4 tangent_object)
 {
+    tangent_object = vec4(0.0);
+#ifdef NO_TANGENTS
+    return false;
+#else
     if ((g.flags & GEOMETRY_HAS_TANGENTS) != 0u) {
         vec3 sum = tangent_at_time(triangle.x, g.close_offset, time) * weights.x +
                    tangent_at_time(triangle.y, g.close_offset, time) * weights.y +
@@ -89,13 +105,13 @@ bool triangle_tangent(uvec4 triangle, vec3 corners[3], geometry g, float time, v
         tangent_object = vec4(sum, handedness);
         return handedness != 0.0 && dot(sum, sum) > 0.0;
     }
-    tangent_object = vec4(0.0);
     material m = materials[triangle.w & HIT_MATERIAL_MASK];
     uint slot_index = m.texture_normal != 0u ? m.texture_normal : m.texture_bump;
     if (slot_index == 0u && m.anisotropy == 0.0 || (g.flags & (GEOMETRY_HAS_TEXCOORDS_0 | GEOMETRY_HAS_TEXCOORDS_1)) == 0u)
         return false;
     bool second = slot_index != 0u && (texture_slots[slot_index].texture & 0x80000000u) != 0u;
     return texture_tangent(triangle, corners, second, normal_object, tangent_object);
+#endif
 }
 
 // The interpolated normal, mirrored at the surface where it points to the wrong side of it: a reversed normal becomes

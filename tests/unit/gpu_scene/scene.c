@@ -98,6 +98,24 @@ TEST(an_edited_material_moves_no_geometry_and_no_texels)
     fixture_finish(&fixture);
 }
 
+TEST(what_surfaces_have_is_known_of_the_meshes_and_materials_in_use)
+{
+    static const float corners[3][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+    static const uint32_t indices[3] = {0, 1, 2};
+    struct fixture fixture;
+    fixture_init(&fixture, test_scene_soup());
+    assert_true(fixture.gpu.has_texcoords && fixture.gpu.has_colours && !fixture.gpu.has_tangents);
+    test_material(&fixture.edits, 2, 0.4f, 0.5f, 0.6f)->anisotropy = 0.5f;
+    test_commit(&fixture.edits);
+    update(&fixture);
+    assert_true(fixture.gpu.has_tangents);
+    test_mesh(&fixture.edits, 10, corners, 3, indices, 1);
+    test_commit(&fixture.edits);
+    update(&fixture);
+    assert_false(fixture.gpu.has_texcoords || fixture.gpu.has_colours || fixture.gpu.has_tangents);
+    fixture_finish(&fixture);
+}
+
 /* Of a stored surface: its textures are applied, holes are not there; factors are multiplied later. */
 TEST(only_what_is_more_than_a_factor_changes_surfaces)
 {
