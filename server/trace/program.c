@@ -46,7 +46,7 @@ static void dispatch_rays(const struct gpu_program *program, const struct gpu_sc
 const struct gpu_program *trace_program_get(const struct gpu_scene *scene, const struct wave *wave,
                                             const struct trace_program_source *source, struct error *error)
 {
-    struct gpu_define defines[OWN_DEFINES_MAX + 15] = {0};
+    struct gpu_define defines[OWN_DEFINES_MAX + 17] = {0};
     char traverse[128], packet_rays[16];
     size_t n = 0;
     /* In quotes: program.c takes the file to include from it. */
@@ -54,6 +54,8 @@ const struct gpu_program *trace_program_get(const struct gpu_scene *scene, const
     snprintf(packet_rays, sizeof(packet_rays), "%u", source->packet_rays ? source->packet_rays : 1);
     defines[n++] = (struct gpu_define){"TRAVERSE", traverse};
     defines[n++] = (struct gpu_define){"PACKET_RAYS", packet_rays};
+    if (scene->device->facts.software)
+        defines[n++] = (struct gpu_define){"SOFTWARE_GL", "1"};
     if (wave->kind == WAVE_ANY)
         defines[n++] = (struct gpu_define){"ANY_HIT", "1"};
     if (scene->has_spheres)

@@ -13,10 +13,25 @@
 const float OBJECT_SLACK = 9.5367431640625e-7;  // 2^-20
 const float WORLD_SLACK = 7.62939453125e-6;     // 2^-17
 
-// The minimum and the maximum of two; the second if one is NaN. min() and max() promise the other one then, which costs
-// software GL two more instructions in the critical chain of a traversal step.
-#define LESSER(a, b) ((a) < (b) ? (a) : (b))
-#define GREATER(a, b) ((a) > (b) ? (a) : (b))
+// The minimum and the maximum of two; if the first is NaN, the second. Software GL has one instruction for these
+// comparisons, and takes three for min() and max(), which `precise` keeps them from becoming: they are in the critical
+// chain of a traversal step.
+#ifdef SOFTWARE_GL
+float lesser(float a, float b)
+{
+    precise float c = a < b ? a : b;
+    return c;
+}
+
+float greater(float a, float b)
+{
+    precise float c = a > b ? a : b;
+    return c;
+}
+#else
+#define lesser min
+#define greater max
+#endif
 
 // The grid of the traversed tree; without one: 0 and 1.
 struct tree_grid {
@@ -141,9 +156,9 @@ bool box_is_hit(bundle b, vec3 near, vec3 far, float t_min, float t_max)
     leave = mix(leave_other, leave, greaterThan(leave, leave_other));
 #endif
     // NaN is ignored or, in the last comparison, counts as a hit: hence the negation.
-    float enter_xy = GREATER(enter.x, enter.y), enter_z = GREATER(enter.z, t_min);
-    float leave_xy = LESSER(leave.x, leave.y), leave_z = LESSER(leave.z, t_max);
-    return !(GREATER(enter_xy, enter_z) > LESSER(leave_xy, leave_z));
+    float enter_xy = greater(enter.x, enter.y), enter_z = greater(enter.z, t_min);
+    float leave_xy = lesser(leave.x, leave.y), leave_z = lesser(leave.z, t_max);
+    return !(greater(enter_xy, enter_z) > lesser(leave_xy, leave_z));
 }
 
 #endif
