@@ -46,7 +46,7 @@ static void dispatch_rays(const struct gpu_program *program, const struct gpu_sc
 const struct gpu_program *trace_program_get(const struct gpu_scene *scene, const struct wave *wave,
                                             const struct trace_program_source *source, struct error *error)
 {
-    struct gpu_define defines[OWN_DEFINES_MAX + 17] = {0};
+    struct gpu_define defines[OWN_DEFINES_MAX + 18] = {0};
     char traverse[128], packet_rays[16];
     size_t n = 0;
     /* In quotes: program.c takes the file to include from it. */
@@ -54,6 +54,8 @@ const struct gpu_program *trace_program_get(const struct gpu_scene *scene, const
     snprintf(packet_rays, sizeof(packet_rays), "%u", source->packet_rays ? source->packet_rays : 1);
     defines[n++] = (struct gpu_define){"TRAVERSE", traverse};
     defines[n++] = (struct gpu_define){"PACKET_RAYS", packet_rays};
+    if (source->ray_pairs)
+        defines[n++] = (struct gpu_define){"RAY_PAIRS", "1"};
     if (scene->device->facts.software)
         defines[n++] = (struct gpu_define){"SOFTWARE_GL", "1"};
     if (wave->kind == WAVE_ANY)
@@ -85,7 +87,7 @@ void trace_program_run(const struct gpu_program *program, const struct gpu_scene
                        const struct ray_range *rays, const struct trace_program_source *source)
 {
     const struct wave *wave = rays->wave;
-    uint32_t packet_rays = source->packet_rays ? source->packet_rays : 1;
+    const uint32_t rays_an_invocation = source->ray_pairs ? 2 : source->packet_rays ? source->packet_rays : 1;
     bind_rays(scene, wave);
     if (wave->kind == WAVE_ANY)
         gpu_buffer_bind_storage(wave->visibility, BIND_VISIBILITY);
@@ -97,7 +99,7 @@ void trace_program_run(const struct gpu_program *program, const struct gpu_scene
         part = rays->end - first;
         if (source->rays_a_dispatch && source->rays_a_dispatch < part)
             part = source->rays_a_dispatch;
-        dispatch_rays(program, scene, wave, first, first + part, packet_rays);
+        dispatch_rays(program, scene, wave, first, first + part, rays_an_invocation);
         if (first + part < rays->end) /* a part of its own to the driver too, which may gather commands */
             glFlush();
     }

@@ -17,7 +17,8 @@ struct trace_program_source {
     const char *traverse;             /* "bvh/traverse.glsl" */
     const struct gpu_define *defines; /* of the tracer's own, ends with {0}; may be NULL; at most 12 */
     uint32_t packet_rays;             /* 0: 1 */
-    uint32_t rays_a_dispatch;         /* 0: all; a multiple of packet_rays */
+    bool ray_pairs;                   /* an invocation traverses two packets of one ray side by side */
+    uint32_t rays_a_dispatch;         /* 0: all; a multiple of packet_rays, and of 2 */
 };
 
 /* Compiled for what the scene has (spheres, cutouts, translucent surfaces, motion where the wave has times) and

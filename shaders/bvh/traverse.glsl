@@ -48,6 +48,13 @@ uniform vec3 bvh_top_grid_lower;
 uniform vec3 bvh_top_cells_per_unit;
 #endif
 
+// Shadow rays that are traversed one by one have few octants in common: all read the first octant's copy, whose order
+// is as good for finding any hit, and which stays in the processor's cache. Measured on software GL with 146K triangles:
+// ambient occlusion takes 0.9 of the time. (Closest hits take 1.5 of it without their order.)
+#if defined SOFTWARE_GL && defined ANY_HIT && PACKET_RAYS == 1
+#define ONE_ORDER
+#endif
+
 #define NOT_INSIDE 0xffffffffu
 #define NO_GRID tree_grid(vec3(0.0), vec3(1.0))
 
@@ -63,6 +70,8 @@ void begin_tree(inout tree_traversal traversal, uint first_element, uint element
 {
 #ifdef BVH_PLAIN
     traversal.first = first_element;
+#elif defined ONE_ORDER
+    traversal.first = first_element * BVH_OCTANTS;
 #else
     traversal.first = first_element * BVH_OCTANTS + octant * element_count;
 #endif
@@ -94,44 +103,62 @@ distances_left left_of(trace_ray r[PACKET_RAYS], answer found[PACKET_RAYS])
     return left;
 }
 
+// A step of the traversal: tests an element, and goes on to the next one. Returns its link if it is a leaf that some
+// ray may hit, else 0.
+uint test_element(inout tree_traversal traversal, bundle b, distances_left left, trace_ray r[PACKET_RAYS],
+                  answer found[PACKET_RAYS])
+{
+#ifdef BVH_PLAIN
+    bvh_element e = bvh_elements[traversal.first + traversal.element];
+    vec4 lower = vec4(e.lower_x, e.lower_y, e.lower_z, e.upper_x);
+    uint link = e.link;
+#elif !defined BVH_PACKED
+    int texel = int(traversal.first + traversal.element) * 2;
+    uvec4 first_half = texelFetch(bvh_elements, texel);
+    vec3 lower_corner = uintBitsToFloat(first_half.xyz);
+    vec3 upper_corner = uintBitsToFloat(texelFetch(bvh_elements, texel + 1).xyz);
+    vec4 lower = vec4(lower_corner, upper_corner.x);
+    uint link = first_half.w;
+#else
+    uvec4 element = texelFetch(bvh_elements, int(traversal.first + traversal.element));
+    uint link = element.w;
+#endif
+#ifdef BVH_SPHERES
+    bool any_hit = false;
+    for (int k = 0; k < PACKET_RAYS; k++)
+        any_hit = sphere_is_hit(b.rays[k], lower, r[k].t_min, end_of(r[k], found[k])) || any_hit;
+#elif defined BVH_PACKED
+#ifdef ONE_ORDER
+    uvec3 first_corner = uvec3(b.octant << 4, b.octant << 3, b.octant << 2) & 16u; // 16: the other one
+#else
+    const uvec3 first_corner = uvec3(0u);
+#endif
+    bool any_hit = box_is_hit(b, vec3(ivec3(element.xyz >> first_corner & 0xffffu)),
+                              vec3(ivec3(element.xyz >> (16u - first_corner) & 0xffffu)), left.t_min, left.t_max);
+#else
+    bvec3 negative = notEqual(uvec3(b.octant) & uvec3(1u, 2u, 4u), uvec3(0u));
+    bool any_hit = box_is_hit(b, mix(lower_corner, upper_corner, negative),
+                              mix(upper_corner, lower_corner, negative), left.t_min, left.t_max);
+#endif
+    bool is_leaf = link >> BVH_LEAF_KIND_SHIFT != 0u;
+    traversal.element = any_hit || is_leaf ? traversal.element + 1u : link;
+    return any_hit && is_leaf ? link : 0u;
+}
+
+bool is_searching(tree_traversal traversal)
+{
+    return traversal.leaf == 0u && traversal.element < traversal.end;
+}
+
 // The inner loop: on to the next leaf whose bound some ray may hit. Returns its link, 0: the tree is finished.
 uint next_leaf(inout tree_traversal traversal, bundle b, distances_left left, trace_ray r[PACKET_RAYS],
                answer found[PACKET_RAYS])
 {
-    uint leaf = traversal.leaf;
-    while (leaf == 0u && traversal.element < traversal.end) {
-#ifdef BVH_PLAIN
-        bvh_element e = bvh_elements[traversal.first + traversal.element];
-        vec4 lower = vec4(e.lower_x, e.lower_y, e.lower_z, e.upper_x);
-        uint link = e.link;
-#elif !defined BVH_PACKED
-        int texel = int(traversal.first + traversal.element) * 2;
-        uvec4 first_half = texelFetch(bvh_elements, texel);
-        vec3 lower_corner = uintBitsToFloat(first_half.xyz);
-        vec3 upper_corner = uintBitsToFloat(texelFetch(bvh_elements, texel + 1).xyz);
-        vec4 lower = vec4(lower_corner, upper_corner.x);
-        uint link = first_half.w;
-#else
-        uvec4 element = texelFetch(bvh_elements, int(traversal.first + traversal.element));
-        uint link = element.w;
-#endif
-#ifdef BVH_SPHERES
-        bool any_hit = false;
-        for (int k = 0; k < PACKET_RAYS; k++)
-            any_hit = sphere_is_hit(b.rays[k], lower, r[k].t_min, end_of(r[k], found[k])) || any_hit;
-#elif defined BVH_PACKED
-        bool any_hit = box_is_hit(b, vec3(ivec3(element.xyz & 0xffffu)), vec3(ivec3(element.xyz >> 16)), left.t_min,
-                                  left.t_max);
-#else
-        bvec3 negative = notEqual(uvec3(b.octant) & uvec3(1u, 2u, 4u), uvec3(0u));
-        bool any_hit = box_is_hit(b, mix(lower_corner, upper_corner, negative),
-                                  mix(upper_corner, lower_corner, negative), left.t_min, left.t_max);
-#endif
-        bool is_leaf = link >> BVH_LEAF_KIND_SHIFT != 0u;
-        leaf = any_hit && is_leaf ? link : 0u;
-        traversal.element = any_hit || is_leaf ? traversal.element + 1u : link;
-    }
-    return leaf;
+    tree_traversal next = traversal;
+    while (is_searching(next))
+        next.leaf = test_element(next, b, left, r, found);
+    traversal.element = next.element;
+    return next.leaf;
 }
 
 bool is_alive_any(trace_ray r[PACKET_RAYS])
@@ -255,27 +282,75 @@ void favour_instance(uint instance_index, int step_, inout answer found[PACKET_R
 }
 #endif
 
-#ifdef BVH_ONE_INSTANCE
-
-void trace_packet(inout trace_ray r[PACKET_RAYS], inout answer found[PACKET_RAYS])
+// The first tree of a packet: the top tree, or that of the one instance.
+void begin_packet(trace_ray r[PACKET_RAYS], int leading, out entered_instance inside, out object_ray o[PACKET_RAYS],
+                  out tree_traversal traversal, out tree_traversal world_traversal, out bundle b,
+                  out bundle world_bundle, out relative_rays rays)
 {
-    entered_instance inside;
-    object_ray o[PACKET_RAYS];
-    tree_traversal traversal;
-    bundle b;
-    relative_rays rays;
-    enter_instance(bvh_instance, r, leading_of(r), inside, o, traversal, b, rays);
-    noted_primitive noted;
-    noted.bits = 0u;
-#ifdef ASK_MATERIALS
-    while (test_leaves(traversal, b, inside, o, rays, r, found, noted) != 0u)
-        settle_and_go_on(traversal, noted, r, found);
+#ifdef BVH_ONE_INSTANCE
+    enter_instance(bvh_instance, r, leading, inside, o, traversal, b, rays);
+    world_traversal = traversal;
+    world_bundle = b;
 #else
-    test_leaves(traversal, b, inside, o, rays, r, found, noted);
+    tree_grid grid = NO_GRID;
+#ifdef BVH_PACKED
+    grid = tree_grid(bvh_top_grid_lower, bvh_top_cells_per_unit);
+#endif
+    for (int k = 0; k < PACKET_RAYS; k++)
+        o[k] = object_ray(r[k].origin, r[k].direction);
+    enter_tree(o, r, leading, grid, WORLD_SLACK, world_bundle, rays);
+    begin_tree(world_traversal, 0u, bvh_top_count, world_bundle.octant);
+    inside.index = NOT_INSIDE;
+    inside.first_texel = inside.first_primitive = 0u;
+#ifdef BVH_DEFORMS_IN_SHUTTER
+    inside.close_texels = 0u;
+#endif
+    b = world_bundle;
+    traversal = world_traversal;
 #endif
 }
 
+#ifdef BVH_ONE_INSTANCE
+
+bool cross_border(uint leaf, inout tree_traversal traversal, inout tree_traversal world_traversal, inout bundle b,
+                  bundle world_bundle, int leading, inout entered_instance inside, inout object_ray o[PACKET_RAYS],
+                  inout relative_rays rays, inout trace_ray r[PACKET_RAYS], inout answer found[PACKET_RAYS])
+{
+    return false;
+}
+
 #else
+
+// Enters the instance of that leaf, or with 0, as its tree is finished, leaves the one that the packet is in. False:
+// nothing is left to traverse.
+bool cross_border(uint leaf, inout tree_traversal traversal, inout tree_traversal world_traversal, inout bundle b,
+                  bundle world_bundle, int leading, inout entered_instance inside, inout object_ray o[PACKET_RAYS],
+                  inout relative_rays rays, inout trace_ray r[PACKET_RAYS], inout answer found[PACKET_RAYS])
+{
+    if (leaf != 0u) {
+        world_traversal.element = traversal.element;
+#ifdef FAVOUR_INSTANCES
+        favour_instance(leaf & BVH_LEAF_FIRST_MASK, 1, found);
+#endif
+        enter_instance(leaf & BVH_LEAF_FIRST_MASK, r, leading, inside, o, traversal, b, rays);
+        return true;
+    }
+    bool all_done = inside.index == NOT_INSIDE;
+#ifdef ANY_HIT
+    all_done = all_done || !is_alive_any(r);
+#endif
+    if (all_done)
+        return false;
+#ifdef FAVOUR_INSTANCES
+    favour_instance(inside.index, -1, found);
+#endif
+    inside.index = NOT_INSIDE;
+    b = world_bundle;
+    traversal = world_traversal;
+    return true;
+}
+
+#endif
 
 // All instances along the rays. True: an intersection must be settled before the traversal continues.
 bool traverse_instances(inout tree_traversal traversal, inout tree_traversal world_traversal, inout bundle b,
@@ -289,55 +364,22 @@ bool traverse_instances(inout tree_traversal traversal, inout tree_traversal wor
         if (leaf == LEAF_NOTED)
             return true;
 #endif
-        if (leaf != 0u) {
-            world_traversal.element = traversal.element;
-#ifdef FAVOUR_INSTANCES
-            favour_instance(leaf & BVH_LEAF_FIRST_MASK, 1, found);
-#endif
-            enter_instance(leaf & BVH_LEAF_FIRST_MASK, r, leading, inside, o, traversal, b, rays);
-        } else {
-            // The tree is finished. Leaving an instance restores the world's packet.
-            bool all_done = inside.index == NOT_INSIDE;
-#ifdef ANY_HIT
-            all_done = all_done || !is_alive_any(r);
-#endif
-            if (all_done)
-                return false;
-#ifdef FAVOUR_INSTANCES
-            favour_instance(inside.index, -1, found);
-#endif
-            inside.index = NOT_INSIDE;
-            b = world_bundle;
-            traversal = world_traversal;
-        }
+        if (!cross_border(leaf, traversal, world_traversal, b, world_bundle, leading, inside, o, rays, r, found))
+            return false;
     }
 }
 
+#include "bvh/pair.glsl"
+
 void trace_packet(inout trace_ray r[PACKET_RAYS], inout answer found[PACKET_RAYS])
 {
-    if (bvh_top_count == 0u)
-        return;
-    tree_grid grid = NO_GRID;
-#ifdef BVH_PACKED
-    grid = tree_grid(bvh_top_grid_lower, bvh_top_cells_per_unit);
-#endif
+    entered_instance inside;
     object_ray o[PACKET_RAYS];
-    for (int k = 0; k < PACKET_RAYS; k++)
-        o[k] = object_ray(r[k].origin, r[k].direction);
+    tree_traversal traversal, world_traversal;
     bundle b, world_bundle;
     relative_rays rays;
     int leading = leading_of(r);
-    enter_tree(o, r, leading, grid, WORLD_SLACK, world_bundle, rays);
-    tree_traversal traversal, world_traversal;
-    begin_tree(world_traversal, 0u, bvh_top_count, world_bundle.octant);
-    entered_instance inside;
-    inside.index = NOT_INSIDE;
-    inside.first_texel = inside.first_primitive = 0u;
-#ifdef BVH_DEFORMS_IN_SHUTTER
-    inside.close_texels = 0u;
-#endif
-    b = world_bundle;
-    traversal = world_traversal;
+    begin_packet(r, leading, inside, o, traversal, world_traversal, b, world_bundle, rays);
     noted_primitive noted;
     noted.bits = 0u;
 #ifdef ASK_MATERIALS
@@ -348,10 +390,22 @@ void trace_packet(inout trace_ray r[PACKET_RAYS], inout answer found[PACKET_RAYS
 #endif
 }
 
+// Called by trace/wave.comp.
+#ifdef RAY_PAIRS
+
+#ifdef ANY_HIT
+void trace_any_rays(trace_ray r[2], inout vec3 optical_depth[2])
+{
+    trace_pair(r, optical_depth);
+}
+#else
+void trace_closest_rays(trace_ray r[2], inout candidate best[2])
+{
+    trace_pair(r, best);
+}
 #endif
 
-// Called by trace/wave.comp.
-#if PACKET_RAYS == 1
+#elif PACKET_RAYS == 1
 
 #ifdef ANY_HIT
 bool trace_any(trace_ray r, inout vec3 optical_depth)
@@ -375,9 +429,9 @@ void trace_closest(trace_ray r, inout candidate best)
 #else
 
 #ifdef ANY_HIT
-#define TRACE_GROUP trace_any_packet
+#define TRACE_GROUP trace_any_rays
 #else
-#define TRACE_GROUP trace_closest_packet
+#define TRACE_GROUP trace_closest_rays
 #endif
 
 // Each packet has all remaining rays with a direction similar to the first one's; the first in any case, NaN included.

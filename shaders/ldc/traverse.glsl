@@ -75,9 +75,9 @@ void traverse_rays(trace_ray rays_[PACKET_RAYS], inout answer answers[PACKET_RAY
 #if PACKET_RAYS > 1
 
 #ifdef ANY_HIT
-void trace_any_packet(trace_ray r[PACKET_RAYS], inout vec3 optical_depth[PACKET_RAYS])
+void trace_any_rays(trace_ray r[PACKET_RAYS], inout vec3 optical_depth[PACKET_RAYS])
 #else
-void trace_closest_packet(trace_ray r[PACKET_RAYS], inout candidate best[PACKET_RAYS])
+void trace_closest_rays(trace_ray r[PACKET_RAYS], inout candidate best[PACKET_RAYS])
 #endif
 {
 #ifdef ANY_HIT

@@ -25,6 +25,8 @@ TRACERS = [{"TRAVERSE": '"naive/traverse.glsl"', "TRACER_NAIVE": "1", "PACKET_RA
     {"TRAVERSE": '"bvh/traverse.glsl"', "TRACER_BVH": "1", "PACKET_RAYS": packet, **bounds}
     for packet in ("1", "8")
     for bounds in ({"BVH_PACKED": "1"}, {}, {"BVH_SPHERES": "1"}, {"BVH_SPHERES": "1", "BVH_PLAIN": "1"})] + [
+    {"TRAVERSE": '"bvh/traverse.glsl"', "TRACER_BVH": "1", "PACKET_RAYS": "1", "RAY_PAIRS": "1", **bounds}
+    for bounds in ({"BVH_PACKED": "1"}, {}, {"BVH_SPHERES": "1"})] + [
     {"TRAVERSE": '"ldc/traverse.glsl"', "TRACER_LDC": "1", "LDC_CUBES": cubes, "LDC_LAYERS_TOGETHER": layers,
      "PACKET_RAYS": packet, "LDC_LEVEL_BITS": bits, **levels}
     for cubes, layers, packet, bits, levels in (

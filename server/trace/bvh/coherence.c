@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-/* The packet size of a wave. The choice depends on the rays and the scene alone, never on the clock, so that a
- * picture is the same every time: it is made once for the whole wave, before its first step. */
+/* How many rays of a wave an invocation traverses, as a packet or side by side. The choice depends on the rays and
+ * the scene alone, never on the clock, so that a picture is the same every time: it is made once for the whole
+ * wave, before its first step. */
 #include "trace/bvh/tracer.h"
 
 #include "gpu/program.h"
@@ -77,4 +78,13 @@ uint32_t bvh_packet_rays(struct bvh *bvh, const struct gpu_scene *scene, const s
     if (!measure_coherence(bvh, scene, wave, counts, error))
         return 0;
     return counts[0] >= (uint64_t)RAYS_PER_PACKET_MIN * counts[1] && counts[1] > 0 ? PACKET_RAYS_SOFTWARE : 1;
+}
+
+bool bvh_ray_pairs(const struct bvh *bvh, const struct gpu_scene *scene, const struct wave *wave,
+                   uint32_t packet_rays)
+{
+    /* A traversal that stops to ask for materials does so for one ray. */
+    const bool asks_materials = scene->has_cutout || (wave->kind == WAVE_ANY && scene->has_translucent);
+    const bool is_chosen = bvh->base.options.bvh.rays == 0 && !bvh->store.settings.plain;
+    return is_chosen && packet_rays == 1 && scene->device->facts.software && !asks_materials;
 }

@@ -366,6 +366,7 @@ static bool bvh_trace_begin(struct tracer *tracer, struct gpu_scene *scene, stru
 {
     struct bvh_state *own = (struct bvh_state *)state;
     own->packet_rays = bvh_packet_rays((struct bvh *)tracer, scene, &state->wave, error);
+    own->ray_pairs = bvh_ray_pairs((struct bvh *)tracer, scene, &state->wave, own->packet_rays);
     return own->packet_rays > 0;
 }
 
@@ -408,7 +409,8 @@ static bool bvh_trace_range(struct tracer *tracer, struct gpu_scene *scene, stru
     struct bvh *bvh = (struct bvh *)tracer;
     const struct bvh_form *settings = &bvh->store.settings;
     const struct wave *wave = &state->wave;
-    const uint32_t packet_rays = ((struct bvh_state *)state)->packet_rays;
+    const struct bvh_state *own = (const struct bvh_state *)state;
+    const uint32_t packet_rays = own->packet_rays;
     struct gpu_define defines[9] = {{"TRACER_BVH", "1"}};
     size_t n = 1;
     if (settings->bounds == BVH_BOUNDS_SPHERE)
@@ -430,6 +432,7 @@ static bool bvh_trace_range(struct tracer *tracer, struct gpu_scene *scene, stru
         .traverse = "bvh/traverse.glsl",
         .defines = defines,
         .packet_rays = packet_rays,
+        .ray_pairs = own->ray_pairs,
         .rays_a_dispatch = DISPATCH_RAYS_MAX / packet_rays * packet_rays,
     };
     const struct gpu_program *program = trace_program_get(scene, wave, &source, error);

@@ -29,6 +29,7 @@ struct bvh {
 struct bvh_state {
     struct trace_state base;
     uint32_t packet_rays;
+    bool ray_pairs; /* an invocation traverses two packets of one ray side by side */
 };
 
 /* How far apart the origins of a packet's rays may be, in world space. Those of a lens may be all over it: its
@@ -39,5 +40,8 @@ float bvh_packet_reach(const struct gpu_scene *scene, const struct wave *wave);
  * measured on a sample. 0: failed. */
 uint32_t bvh_packet_rays(struct bvh *bvh, const struct gpu_scene *scene, const struct wave *wave,
                          struct error *error);
+/* Whether an invocation traverses two packets, of that many rays, side by side. */
+bool bvh_ray_pairs(const struct bvh *bvh, const struct gpu_scene *scene, const struct wave *wave,
+                   uint32_t packet_rays);
 
 #endif
