@@ -133,7 +133,7 @@ SHARED_SIZE(ldc_build_counts, 48)
 #define UNIT_LDC_DRAWN UNIT_TRACER_4
 #define UNIT_LDC_LAYER UNIT_TRACER_5
 #define UNIT_LDC_OCCUPIED UNIT_TRACER_6
-#define UNIT_LDC_LAYER_SURFACE UNIT_TRACER_0 /* in those of peeling */
+#define UNIT_LDC_LAYER_SURFACE UNIT_TRACER_2 /* in peeled.comp */
 #define UNIT_LDC_PEELED_SURFACE UNIT_TRACER_3
 
 #endif

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Appends a peeled layer of the scene to its texels' records.
+// Appends a peeled layer of the scene to its texels' records. A texel has as many places as fragments were counted in it:
+// what another program draws beyond them is lost, and said to be.
 
 #include "ldc/layout.h"
 #include "shared/bindings.h"
@@ -10,12 +11,14 @@ uniform uint texels_along; // a side of the images
 uniform uint layer;        // 0, 1, ..
 
 layout(binding = UNIT_LDC_OCCUPIED) uniform usamplerBuffer occupied;
+layout(binding = UNIT_LDC_COUNTS) uniform usamplerBuffer counts;
 layout(binding = UNIT_LDC_PLACES) uniform usamplerBuffer places;
 layout(binding = UNIT_LDC_LAYER) uniform usampler2DArray layer_geometry;
 layout(binding = UNIT_LDC_LAYER_SURFACE) uniform usampler2DArray layer_surface;
 layout(binding = IMAGE_LDC_ORDERED, rg32ui) writeonly uniform uimageBuffer ordered;
 layout(binding = IMAGE_LDC_PEELED_SURFACE, rgba32ui) writeonly uniform uimageBuffer peeled;
 layout(binding = IMAGE_LDC_FOUND, r32ui) writeonly uniform uimageBuffer found;
+layout(std430, binding = BIND_LDC_BUILD_COUNTS) buffer build_block { ldc_build_counts build; };
 
 void main()
 {
@@ -27,6 +30,10 @@ void main()
     if (geometry_words.x == LDC_NO_DEPTH_BITS)
         return;
     int texel = int((axis * texels_along + v) * texels_along + u), place = int(texelFetch(places, texel).x + layer);
+    if (layer >= texelFetch(counts, texel).x) {
+        atomicAdd(build.samples_lost, 1u);
+        return;
+    }
     imageStore(ordered, place, uvec4(geometry_words, 0u, 0u));
     imageStore(peeled, place, texelFetch(layer_surface, ivec3(u, v, axis), 0));
     imageStore(found, texel, uvec4(layer + 1u));

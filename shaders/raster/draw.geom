@@ -35,11 +35,14 @@ layout(triangle_strip, max_vertices = 12) out;
 
 layout(location = 0) flat in uvec4 primitive_in[];
 
+// A pass counts with one program what another draws with a second one: both must cover the same texels at the same
+// depths.
+invariant gl_Position;
 #if PRIMITIVE_KIND == 0
-layout(location = 0) flat out vec4 plane;  // slopes of the depth along u and v; u, v of a point of it
-layout(location = 1) flat out vec3 depths; // of that point; minimum, maximum
+layout(location = 0) flat invariant out vec4 plane;  // slopes of the depth along u and v; u, v of a point of it
+layout(location = 1) flat invariant out vec3 depths; // of that point; minimum, maximum
 #ifdef HAS_CUTOUT
-layout(location = 3) out vec2 barycentrics;
+layout(location = 3) invariant out vec2 barycentrics;
 #endif
 #endif
 layout(location = 2) flat out uvec4 primitive;

@@ -17,6 +17,8 @@ const uint BOX_CORNERS[36] = uint[36](0u, 4u, 6u, 0u, 6u, 2u, 1u, 3u, 7u, 1u, 7u
 const float BOX_MARGIN = 1.0001;
 #endif
 
+invariant gl_Position; // surfaces that coincide are drawn by several programs
+
 void main()
 {
 #if PRIMITIVE_KIND == 0

@@ -76,12 +76,14 @@ static bool note_layer(struct ldc_task *task, struct error *error)
     if (!program)
         return false;
     gpu_buffer_bind_texels(device, &builder->occupied, UNIT_LDC_OCCUPIED, GL_R32UI);
+    gpu_buffer_bind_texels(device, &builder->counts, UNIT_LDC_COUNTS, GL_R32UI);
     gpu_buffer_bind_texels(device, &builder->places, UNIT_LDC_PLACES, GL_R32UI);
     gpu_texture_bind(&builder->layers[task->layer & 1], UNIT_LDC_LAYER);
     gpu_texture_bind(&builder->layer_surface, UNIT_LDC_LAYER_SURFACE);
     gpu_buffer_bind_image(device, &builder->peeled, IMAGE_LDC_PEELED_SURFACE, GL_RGBA32UI);
     gpu_buffer_bind_image(device, &builder->ordered, IMAGE_LDC_ORDERED, GL_RG32UI);
     gpu_buffer_bind_image(device, &builder->found, IMAGE_LDC_FOUND, GL_R32UI);
+    gpu_buffer_bind_storage(&builder->build, BIND_LDC_BUILD_COUNTS);
     gpu_uniform_uint(program, "occupied_count", task->counts.occupied);
     gpu_uniform_uint(program, "texels_along", task->cube->resolution);
     gpu_uniform_uint(program, "layer", task->layer);

@@ -39,6 +39,15 @@ static void warn_of_lost_samples(const struct ldc_cube *cube, const char *name, 
                    "--ldc-resolution");
 }
 
+/* Peeling draws what was counted before, with another program. */
+static void warn_of_uncounted_samples(const struct ldc_cube *cube, const char *name, struct structure_row *row)
+{
+    snprintf(row->warning, sizeof(row->warning),
+             "%llu samples of the %s cube are missing: this device draws more than it counted (choose --ldc-build "
+             "lists)",
+             (unsigned long long)cube->samples_lost, name);
+}
+
 void ldc_cube_tell(const struct ldc_store *store, unsigned which, bool built, struct structure_rows *rows)
 {
     static const char *const names[LDC_CUBES_MAX] = {"static", "dynamic"};
@@ -54,7 +63,9 @@ void ldc_cube_tell(const struct ldc_store *store, unsigned which, bool built, st
     if (cube->layers_kept < cube->layers_needed)
         warn_of_lost_samples(cube, names[which], kept);
     structure_number(rows, "samples", cube->sample_count);
-    structure_number(rows, "samples_lost", cube->samples_lost);
+    struct structure_row *lost = structure_number(rows, "samples_lost", cube->samples_lost);
+    if (cube->samples_lost > 0 && cube->layers_kept == cube->layers_needed)
+        warn_of_uncounted_samples(cube, names[which], lost);
     structure_built(rows, built);
 }
 
