@@ -32,6 +32,6 @@ void main()
         }
     }
     imageStore(hits, int(3u * k), uvec4(floatBitsToUint(h.distance), h.material, h.primitive, h.instance));
-    imageStore(hits, int(3u * k + 1u), floatBitsToUint(vec4(h.u0, h.v0, h.u1, h.v1)));
+    imageStore(hits, int(3u * k + 1u), h.uv01_or_sample);
     imageStore(hits, int(3u * k + 2u), uvec4(h.normal_geometric, h.normal_shading, h.tangent, h.colour));
 }

@@ -44,7 +44,8 @@ bool surface_derivatives(hit h, texture_slot slot, out vec3 along_u, out vec3 al
     instance i = instance_at(h.instance);
     if (geometry_at(i.geometry).kind == GEOMETRY_SPHERES) {
         float radius = texelFetch(spheres, int(h.primitive)).w;
-        float phi = (h.u0 - 0.5) * TWO_PI, theta = h.v0 * PI;
+        vec2 uv = uintBitsToFloat(h.uv01_or_sample.xy);
+        float phi = (uv.x - 0.5) * TWO_PI, theta = uv.y * PI;
         vec3 east = vec3(cos(phi), 0.0, -sin(phi));
         vec3 south = vec3(cos(theta) * sin(phi), -sin(theta), cos(theta) * cos(phi));
         along_u = affine_vector(i.world_from_object, east * (TWO_PI * radius * sin(theta)));
@@ -190,7 +191,7 @@ void apply_sample(inout surface s, inout vec4 colour, uvec4 words)
 surface surface_at(hit h, vec3 origin, vec3 direction, float width)
 {
     material m = materials[h.material & HIT_MATERIAL_MASK];
-    vec4 uv01 = vec4(h.u0, h.v0, h.u1, h.v1);
+    vec4 uv01 = uintBitsToFloat(h.uv01_or_sample);
     surface s;
     s.position = origin + h.distance * direction;
     s.geometric = unpack_unit(h.normal_geometric);
@@ -208,7 +209,7 @@ surface surface_at(hit h, vec3 origin, vec3 direction, float width)
 #ifdef HAS_SAMPLED
     is_stored = (h.material & HIT_SAMPLED) != 0u;
     if (is_stored)
-        apply_sample(s, colour, floatBitsToUint(uv01));
+        apply_sample(s, colour, h.uv01_or_sample);
 #endif
 #ifdef HAS_TEXTURES
     if (!is_stored)

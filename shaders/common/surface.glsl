@@ -132,10 +132,7 @@ hit finish_hit(uint material_index, float distance, vec3 direction_world, vec3 g
         h.material |= HIT_BACK_FACE;
     h.primitive = HIT_NO_PRIMITIVE;
     h.instance = HIT_NO_PRIMITIVE;
-    h.u0 = uv01.x;
-    h.v0 = uv01.y;
-    h.u1 = uv01.z;
-    h.v1 = uv01.w;
+    h.uv01_or_sample = floatBitsToUint(uv01);
     h.normal_geometric = pack_unit(geometric);
     h.normal_shading = pack_unit(same_hemisphere(shading, geometric));
     h.tangent = 0u;
@@ -216,7 +213,7 @@ hit surface_disc(uint disc_index, float distance, vec3 origin_world, vec3 direct
 
 hit surface_miss()
 {
-    return hit(-1.0, 0u, HIT_NO_PRIMITIVE, HIT_NO_PRIMITIVE, 0.0, 0.0, 0.0, 0.0, 0u, 0u, 0u, 0u);
+    return hit(-1.0, 0u, HIT_NO_PRIMITIVE, HIT_NO_PRIMITIVE, uvec4(0u), 0u, 0u, 0u, 0u);
 }
 
 // At the time of the ray that found it.

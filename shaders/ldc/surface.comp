@@ -21,9 +21,8 @@ hit surface_sampled(uint sample_index, float distance_, vec3 direction)
     uint flags = HIT_SAMPLED;
     if (dot(direction, unpack_unit(normal_geometric)) > 0.0)
         flags |= HIT_BACK_FACE;
-    vec4 bits = uintBitsToFloat(words);
-    return hit(distance_, sample_material(words) | flags, HIT_NO_PRIMITIVE, HIT_NO_PRIMITIVE, bits.x, bits.y, bits.z,
-               bits.w, normal_geometric, words.y, 0u, 0xffffffffu);
+    return hit(distance_, sample_material(words) | flags, HIT_NO_PRIMITIVE, HIT_NO_PRIMITIVE, words, normal_geometric,
+               words.y, 0u, 0xffffffffu);
 }
 
 void main()
@@ -44,6 +43,6 @@ void main()
             h = surface_sampled(intersection.z, distance_, direction);
     }
     imageStore(hits, int(3u * k), uvec4(floatBitsToUint(h.distance), h.material, h.primitive, h.instance));
-    imageStore(hits, int(3u * k + 1u), floatBitsToUint(vec4(h.u0, h.v0, h.u1, h.v1)));
+    imageStore(hits, int(3u * k + 1u), h.uv01_or_sample);
     imageStore(hits, int(3u * k + 2u), uvec4(h.normal_geometric, h.normal_shading, h.tangent, h.colour));
 }

@@ -42,8 +42,7 @@ ray ray_at(uint k)
 hit hit_at(uint k)
 {
     uvec4 a = texelFetch(hits, int(3u * k)), b = texelFetch(hits, int(3u * k + 1u)), c = texelFetch(hits, int(3u * k + 2u));
-    vec4 uv01 = uintBitsToFloat(b);
-    return hit(uintBitsToFloat(a.x), a.y, a.z, a.w, uv01.x, uv01.y, uv01.z, uv01.w, c.x, c.y, c.z, c.w);
+    return hit(uintBitsToFloat(a.x), a.y, a.z, a.w, b, c.x, c.y, c.z, c.w);
 }
 
 path path_at(uint k)

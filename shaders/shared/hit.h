@@ -10,7 +10,7 @@ struct hit {
     uint material;         /* bits 0..23 index into the materials; then HIT_* flags */
     uint primitive;        /* scene-wide triangle or sphere number (see geometry.h), HIT_NO_PRIMITIVE if sampled */
     uint instance;         /* index into the instances, HIT_NO_PRIMITIVE: the discs */
-    float u0, v0, u1, v1;  /* texture coordinate sets 0 and 1 */
+    uvec4 uv01_or_sample;  /* bits of texture coordinate sets 0 and 1, u0 v0 u1 v1 */
     uint normal_geometric; /* octahedral, 2 x 16 bit snorm, world space, on the side of the outside (winding) */
     uint normal_shading;   /* likewise, interpolated; same hemisphere as the geometric one */
     uint tangent;          /* likewise with 15 bits for y; lowest bit: handedness is negative */
@@ -23,10 +23,10 @@ SHARED_SIZE(hit, 48)
 #define HIT_MATERIAL_MASK 0x00ffffffu
 #define HIT_BACK_FACE 0x01000000u /* the ray came from inside */
 #define HIT_HAS_TANGENT 0x02000000u
-/* A stored sample: u0, v0, u1, v1 hold the bits of its four words of `surface` (shared/surface_sample.h) in place
- * of texture coordinates; textures are applied already. `primitive` and `instance` are HIT_NO_PRIMITIVE, `colour`
- * is white.
- */
+/* A stored sample: `uv01_or_sample` is its four words of `surface` (shared/surface_sample.h) in place of texture
+ * coordinates; textures are applied already. They are no floats: a device may change bits that are carried in one,
+ * flush them to zero or make one NaN of another. `primitive` and `instance` are HIT_NO_PRIMITIVE, `colour` is
+ * white. */
 #define HIT_SAMPLED 0x04000000u
 #define HIT_NO_PRIMITIVE 0xffffffffu
 

@@ -173,13 +173,11 @@ static void expect_sample(struct fault *fault, const struct fixture *fixture, co
     const struct scene_material *material = scene_material(fixture->scene, expected->material);
     double colour[4] = {expected->colour[0], expected->colour[1], expected->colour[2], expected->colour[3]},
            texel[4];
-    uint32_t words;
-    memcpy(&words, &got->u0, sizeof(words));
     if (material && twin_sample(fixture->scene, &material->textures[MATERIAL_BASE_COLOUR], expected->uv, texel))
         for (int k = 0; k < 4; k++)
             colour[k] *= texel[k];
     for (int k = 0; k < 4; k++) {
-        double stored = (words >> (8 * k) & 255) / 255.0;
+        double stored = (got->uv01_or_sample[0] >> (8 * k) & 255) / 255.0;
         expect_near(fault, "stored colour", k < 3 ? linear(stored) : stored, colour[k], 0.2);
     }
 }
@@ -212,9 +210,11 @@ static void judge_hit(struct fault *fault, const struct fixture *fixture, const 
         if (got->instance >= fixture->gpu.instance_count)
             fail_msg("instance %u of %u", got->instance, fixture->gpu.instance_count);
         expect_near(fault, "node", fixture->gpu.instances[got->instance].node, expected->node, 0);
+        float got_uv[2];
+        memcpy(got_uv, got->uv01_or_sample, sizeof(got_uv));
         const double uv = is_sampled ? 0.3 : 5e-3, colour = is_sampled ? 0.2 : 5e-3;
-        expect_near(fault, "u", beside_seam((double)got->u0, expected->uv[0]), expected->uv[0], uv);
-        expect_near(fault, "v", (double)got->v0, expected->uv[1], uv);
+        expect_near(fault, "u", beside_seam((double)got_uv[0], expected->uv[0]), expected->uv[0], uv);
+        expect_near(fault, "v", (double)got_uv[1], expected->uv[1], uv);
         for (int k = 0; k < 4; k++)
             expect_near(fault, "colour", (got->colour >> (8 * k) & 255) / 255.0, expected->colour[k], colour);
     } else {

@@ -16,7 +16,7 @@
 #include <stdio.h>
 #include <string.h>
 
-/* As the shader below has it: five vec4. */
+/* As the shader below has it: five uvec4. */
 struct surface {
     float base_colour[4];
     float normal[3], metallic;
@@ -32,30 +32,32 @@ static const char probe_text[] =
     "#include \"common/dispatch.glsl\"\n"
     "#include \"common/sampled.glsl\"\n"
     "uniform uint count;\n"
-    "layout(std430, binding = BIND_PASS_0) buffer surface_block { vec4 surfaces[]; };\n"
+    "layout(std430, binding = BIND_PASS_0) buffer surface_block { uvec4 surfaces[]; };\n"
     "layout(std430, binding = BIND_PASS_1) buffer word_block { uvec4 words[]; };\n"
     "void main()\n"
     "{\n"
     "    uint i = item_index(), k = 5u * i;\n"
     "    if (i >= count)\n"
     "        return;\n"
+    "    vec4 second = uintBitsToFloat(surfaces[k + 1u]);\n"
+    "    vec3 third = uintBitsToFloat(surfaces[k + 2u].xyz);\n"
     "    surface_sample s;\n"
-    "    s.base_colour = surfaces[k];\n"
-    "    s.normal = surfaces[k + 1u].xyz;\n"
-    "    s.metallic = surfaces[k + 1u].w;\n"
-    "    s.transmission = surfaces[k + 2u].x;\n"
-    "    s.roughness = surfaces[k + 2u].y;\n"
-    "    s.occlusion = surfaces[k + 2u].z;\n"
-    "    s.material = floatBitsToUint(surfaces[k + 2u].w);\n"
-    "    s.emission = surfaces[k + 3u].xyz;\n"
+    "    s.base_colour = uintBitsToFloat(surfaces[k]);\n"
+    "    s.normal = second.xyz;\n"
+    "    s.metallic = second.w;\n"
+    "    s.transmission = third.x;\n"
+    "    s.roughness = third.y;\n"
+    "    s.occlusion = third.z;\n"
+    "    s.material = surfaces[k + 2u].w;\n"
+    "    s.emission = uintBitsToFloat(surfaces[k + 3u].xyz);\n"
     "    words[i] = pack_sample(s);\n"
     "    s = unpack_sample(words[i]);\n"
-    "    surfaces[k] = s.base_colour;\n"
-    "    surfaces[k + 1u] = vec4(s.normal, s.metallic);\n"
-    "    surfaces[k + 2u] = vec4(s.transmission, s.roughness, s.occlusion, uintBitsToFloat(s.material));\n"
-    "    surfaces[k + 3u] = vec4(s.emission, 0.0);\n"
-    "    surfaces[k + 4u] = vec4(sample_alpha(words[i]), sample_transmission(words[i]),\n"
-    "                            uintBitsToFloat(sample_material(words[i])), 0.0);\n"
+    "    surfaces[k] = floatBitsToUint(s.base_colour);\n"
+    "    surfaces[k + 1u] = floatBitsToUint(vec4(s.normal, s.metallic));\n"
+    "    surfaces[k + 2u] = uvec4(floatBitsToUint(vec3(s.transmission, s.roughness, s.occlusion)), s.material);\n"
+    "    surfaces[k + 3u] = uvec4(floatBitsToUint(s.emission), 0u);\n"
+    "    vec2 parts = vec2(sample_alpha(words[i]), sample_transmission(words[i]));\n"
+    "    surfaces[k + 4u] = uvec4(floatBitsToUint(parts), sample_material(words[i]), 0u);\n"
     "}\n";
 
 static bool lookup(const char *path, size_t length, const char **kept, const char **begin, const char **end)
