@@ -4,7 +4,8 @@
 // Triangle with the vertices relative to the ray's origin. Distance and the barycentrics of the second and
 // third vertex; both sides count. The edge functions are those of Pluecker coordinates, each computed from the
 // edge's difference and sum, so that two triangles that share an edge get exactly opposite values for it and no
-// ray passes between them; `precise` keeps the compiler from fusing the products differently on each side.
+// ray passes between them; `precise` keeps the compiler from fusing the products differently on each side, and
+// gives all programs the same answer.
 // Woop, Benthin, Wald, Watertight Ray/Triangle Intersection, JCGT 2013; the form is that of Embree's robust mode.
 bool intersect_triangle(vec3 direction, vec3 v0, vec3 v1, vec3 v2, out float distance, out vec2 barycentrics)
 {
@@ -15,12 +16,12 @@ bool intersect_triangle(vec3 direction, vec3 v0, vec3 v1, vec3 v2, out float dis
     barycentrics = vec2(0.0);
     if (min(w0, min(w1, w2)) < 0.0 && max(w0, max(w1, w2)) > 0.0)
         return false;
-    float sum = w0 + w1 + w2;
-    vec3 normal = cross(v1 - v0, v2 - v0);
-    float slope = dot(normal, direction);
+    precise float sum = w0 + w1 + w2;
+    precise vec3 normal = cross(v1 - v0, v2 - v0);
+    precise float slope = dot(normal, direction), along = dot(normal, v0) / slope;
     if (sum == 0.0 || slope == 0.0) // seen on edge, or no area
         return false;
-    distance = dot(normal, v0) / slope;
+    distance = along;
     barycentrics = vec2(w1, w2) / sum;
     return true;
 }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The point of a primitive at the centre of a texel of the images along the axes, from the outputs of raster/draw.geom.
+// It is `precise`, as the fragments that one program counts are drawn by another.
 // Defines: PRIMITIVE_KIND 0 triangles, 1 spheres; HAS_CUTOUT: they may have holes; HAS_SPHERES with PRIMITIVE_KIND 1.
 #include "shared/bindings.h"
 #include "common/alpha.glsl"
@@ -60,10 +61,10 @@ sphere_chord chord_of_sphere()
 {
     sphere_chord c;
     int axis = gl_Layer, u = axis == 2 ? 0 : axis + 1, v = axis == 0 ? 2 : axis - 1;
-    vec3 origin = vec3(0.0), direction = vec3(0.0);
-    origin[u] = gl_FragCoord.x * cell_world;
-    origin[v] = gl_FragCoord.y * cell_world;
-    origin += lower_world;
+    vec3 place_cells = vec3(0.0), direction = vec3(0.0);
+    place_cells[u] = gl_FragCoord.x;
+    place_cells[v] = gl_FragCoord.y;
+    precise vec3 origin = lower_world + place_cells * cell_world;
     direction[axis] = cell_world;
     c.rows = instance_at(primitive.y).object_from_world;
     vec4 sphere = texelFetch(spheres, int(primitive.z));
@@ -87,7 +88,8 @@ float intersection_of(sphere_chord c, int side, out vec3 normal_world)
 {
     precise float reach = side == 0 ? -c.half_chord : c.half_chord;
     precise float depth_cells = c.nearest + reach;
-    normal_world = affine_covector(c.rows, c.closest + reach * c.step_object);
+    precise vec3 from_centre = c.closest + reach * c.step_object;
+    normal_world = affine_covector(c.rows, from_centre);
     return depth_cells;
 }
 
