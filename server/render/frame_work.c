@@ -60,6 +60,7 @@ struct frame_work *frame_work_take(struct frame_scene *shared, const struct inte
     if (work && work->passes.integrator != integrator) {
         wave_passes_finish(&work->passes, shared->device);
         work->passes.integrator = integrator;
+        slices_ahead_forget(&work->ahead);
     }
     return work;
 }
@@ -95,6 +96,7 @@ bool frame_work_trace_by(struct frame_work *work, const struct tracer *tracer, s
     if (!work->trace_state || !trace_state_fits(work->trace_state, tracer->impl, &tracer->options)) {
         trace_state_destroy(work->trace_state);
         work->trace_state = trace_state_create(tracer->impl, tracer->device, &tracer->options, error);
+        slices_ahead_forget(&work->ahead);
     }
     work->context.trace_state = work->trace_state;
     if (work->trace_state)

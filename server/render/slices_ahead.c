@@ -5,10 +5,13 @@
 
 #include <epoxy/gl.h>
 
-/* Rays of a slice: before one was measured, and at the least and most. Fewer do not fill a GPU. */
-#define SLICE_RAYS_FIRST (1u << 16)
+/* Rays of a slice: before one was measured, and at the least and most. Fewer do not fill a GPU. Nothing is known
+ * of the first slice, and a driver ends what takes seconds: it is small, and the second one is as large as it
+ * should be, or SLICE_GROWTH times as large, since its rays may cost more. */
+#define SLICE_RAYS_FIRST (1u << 14)
 #define SLICE_RAYS_MIN (1u << 12)
 #define SLICE_RAYS_MAX (1u << 30)
+#define SLICE_GROWTH 8u
 
 static struct slice_ahead *next_of(struct slices_ahead *ahead)
 {
@@ -76,16 +79,32 @@ static uint64_t time_of(unsigned query)
     return time_ns;
 }
 
+uint32_t slices_ahead_next_rays(uint32_t rays, uint64_t took_ns, uint64_t step_ns)
+{
+    if (took_ns <= step_ns && took_ns >= step_ns / 4)
+        return rays;
+    const uint64_t fitting =
+        took_ns > step_ns ? (uint64_t)rays * step_ns / took_ns : (uint64_t)rays * (step_ns / 2) / (took_ns + 1);
+    uint64_t next = (uint64_t)rays * SLICE_GROWTH;
+    while (next > fitting && next > SLICE_RAYS_MIN)
+        next /= 2;
+    return (uint32_t)(next < SLICE_RAYS_MIN ? SLICE_RAYS_MIN : next < SLICE_RAYS_MAX ? next : SLICE_RAYS_MAX);
+}
+
 void slices_ahead_learn(struct slices_ahead *ahead, const struct slice_ahead *slice, uint64_t step_ns)
 {
     const uint64_t begin_ns = time_of(slice->queries[0]), end_ns = time_of(slice->queries[1]);
     const bool is_whole = slice->rays == slice->slices.slice_rays; /* no smaller rest of a band */
     if (begin_ns == 0 || end_ns <= begin_ns)
         return;
-    if (end_ns - begin_ns > step_ns)
-        ahead->slice_rays = slice->rays / 2 > SLICE_RAYS_MIN ? slice->rays / 2 : SLICE_RAYS_MIN;
-    else if (end_ns - begin_ns < step_ns / 4 && is_whole && slice->rays < SLICE_RAYS_MAX)
-        ahead->slice_rays = slice->rays * 2;
+    const uint32_t next = slices_ahead_next_rays(slice->rays, end_ns - begin_ns, step_ns);
+    if (is_whole || end_ns - begin_ns > step_ns)
+        ahead->slice_rays = next;
+}
+
+void slices_ahead_forget(struct slices_ahead *ahead)
+{
+    ahead->slice_rays = 0;
 }
 
 void slices_ahead_drop(struct slices_ahead *ahead)

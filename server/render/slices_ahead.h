@@ -41,6 +41,10 @@ bool slices_ahead_take(struct slices_ahead *ahead, struct gpu_device *device, co
                        struct wave_state *state, struct error *error);
 /* From the slice just taken, how large those to come are to be for the device to work about `step_ns` on one. */
 void slices_ahead_learn(struct slices_ahead *ahead, const struct slice_ahead *slice, uint64_t step_ns);
+/* What it learns: how many rays the next slices have, after one of `rays` took so long. */
+uint32_t slices_ahead_next_rays(uint32_t rays, uint64_t took_ns, uint64_t step_ns);
+/* Other rays, or by another tracer: the next slice is a first one. */
+void slices_ahead_forget(struct slices_ahead *ahead);
 void slices_ahead_drop(struct slices_ahead *ahead); /* all of them */
 void slices_ahead_finish(struct slices_ahead *ahead, struct gpu_device *device);
 
