@@ -35,6 +35,12 @@ void compact_go_on(struct render_context *context)
                      sizeof(nothing));
 }
 
+static void stop_in(struct render_context *context, struct wave *wave)
+{
+    wave->stopped = wave->counts ? &context->wave_state : NULL;
+    wave->stopped_word = offsetof(struct wave_state, stopped) / sizeof(uint32_t);
+}
+
 /* Without counts_on_host: the maximum. */
 static uint32_t count_of(const struct render_context *context, enum wave_list list)
 {
@@ -147,6 +153,7 @@ bool compact_shadow_rays(struct render_context *context, uint32_t count, bool al
     gpu_dispatch(context->device, program, 1);
     wave->counts = &context->wave_state;
     wave->counts_index = WAVE_SHADOW_RAYS;
+    stop_in(context, wave);
     return true;
 }
 
@@ -155,4 +162,5 @@ void compact_rays(struct render_context *context, struct wave *wave)
     wave->ray_count = context->ray_count;
     wave->counts = context->counts_on_host ? NULL : &context->wave_state;
     wave->counts_index = WAVE_RAYS;
+    stop_in(context, wave);
 }

@@ -113,8 +113,13 @@ static bool do_again(struct frame_renderer *renderer, const struct slice_ahead *
     const uint32_t row = picture_row_of(&renderer->picture, context->slice.first_slot);
     if (why == WAVE_STOPPED_FULL && !split_slice(renderer, error))
         return false;
-    if (why == WAVE_STOPPED_QUEUED) {
-        context->waves_queued *= 2;
+    if (why != WAVE_STOPPED_FULL) {
+        if (why == WAVE_STOPPED_LONG) {
+            context->trace_state->patient = true;
+            slices_ahead_forget(&renderer->work->ahead);
+        } else {
+            context->waves_queued *= 2;
+        }
         slices_put_back(&renderer->slices, &context->slice);
         compact_go_on(context);
     }

@@ -12,6 +12,8 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#define TRACE_DEPTH_BYTES 16u /* of a ray, where rays go on from one dispatch to the next (RAYS_GO_ON) */
+
 /* Zero is the default of each. */
 struct trace_program_source {
     const char *traverse;             /* "bvh/traverse.glsl" */

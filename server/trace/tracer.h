@@ -29,10 +29,11 @@
 /* Options of benchmarks and tests alone; zero is the default of each. */
 struct tracer_bench {
     enum { BVH_LAYOUT_FAST, BVH_LAYOUT_PLAIN } bvh_layout; /* plain: sphere links in a storage buffer */
-    uint32_t reference_rays;                               /* in a call of Embree; 0: chosen; 1, 4, 8, 16 */
-    uint32_t ldc_layers_together;                          /* of a texel, tested at once; 0: chosen; 1, 4 */
-    uint32_t ldc_count_steps;     /* 1: hits hold counts of the traversal (shaders/ldc/cube.glsl) */
-    uint32_t abuffer_count_steps; /* likewise */
+    uint32_t naive_tests, bvh_elements; /* of a ray in a dispatch, of bvh on a GPU; 0: as many as it may have */
+    uint32_t reference_rays;            /* in a call of Embree; 0: chosen; 1, 4, 8, 16 */
+    uint32_t ldc_layers_together;       /* of a texel, tested at once; 0: chosen; 1, 4 */
+    uint32_t ldc_count_steps;           /* 1: hits hold counts of the traversal (shaders/ldc/cube.glsl) */
+    uint32_t abuffer_count_steps;       /* likewise */
     uint32_t
         baseline_side; /* texels or cells along a side, of a structure of the benchmark's own; 0: its maximum */
 };
@@ -96,8 +97,10 @@ struct trace_state {
     struct gpu_device *device;
     struct tracer_options options;
     /* by the wrappers: */
-    struct wave wave;     /* in progress */
-    bool in_progress;     /* the wave has begun and is not traced to its end */
+    struct wave wave; /* in progress */
+    bool in_progress; /* the wave has begun and is not traced to its end */
+    bool patient; /* rays were too long for what can be queued: the tracer waits for each dispatch. Until the reset
+                   */
     uint32_t traced_rays; /* rays before this one have their final answers */
     /* Of the range being traced: when the step ends, and the range, which trace_range() may end before its end, at
      * a multiple of minimum_rays. */

@@ -53,7 +53,7 @@ uint64_t trace_state_device_bytes(const struct trace_state *state)
 
 void trace_state_reset(struct trace_state *state)
 {
-    state->in_progress = false;
+    state->in_progress = state->patient = false;
     for (unsigned i = 0; i < WAVE_FAMILIES; i++)
         state->step_rays[i] = 0;
 }

@@ -32,6 +32,11 @@ struct wave {
      * never wait for the counts to be on the host. */
     struct gpu_buffer *counts;
     uint32_t counts_index;
+    /* With counts: NULL, or the buffer and the word in it that a tracer sets to WAVE_STOPPED_LONG, unless it is
+     * set, where it could not finish the rays without waiting. Their answers then mean nothing; the caller has the
+     * wave traced again by a `patient` state (tracer.h). */
+    struct gpu_buffer *stopped;
+    uint32_t stopped_word;
     struct gpu_buffer *rays;       /* struct ray */
     struct gpu_buffer *hits;       /* struct hit; closest */
     struct gpu_buffer *visibility; /* uint; any */

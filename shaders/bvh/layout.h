@@ -15,6 +15,7 @@
 #ifndef FARLIGHT_SHADERS_BVH_LAYOUT_H
 #define FARLIGHT_SHADERS_BVH_LAYOUT_H
 #include "shared/types.h"
+#include "shared/wave.h"
 
 /* A texel of an RGBA32UI texel buffer. Each axis: cell of the corner that rays of this octant reach first, and,
  * times 65536, of the other corner. */
@@ -85,5 +86,11 @@ SHARED_SIZE(bvh_refit_record, 48)
  * corner and the size of its subtree; upper corner; (floats) surfaces of all boxes of its subtree, and of each of
  * its triangles' own box. */
 #define BVH_REFIT_BOX_TEXELS 3u
+
+/* Where a ray goes on in the next dispatch, uvec4: element; the instance that it is in; element of the top tree;
+ * 1: nowhere, it is finished. */
+#define BIND_BVH_PLACES BIND_TRACER_1
+#define BIND_BVH_UNFINISHED BIND_PASS_4
+#define BVH_UNFINISHED WAVE_STOPPED_LONG
 
 #endif

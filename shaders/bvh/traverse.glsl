@@ -10,6 +10,8 @@
 //   SHARED_ORIGIN     all rays of the wave begin at one point
 //   BVH_DEFORMS       there are meshes that deform, whose trees may have several histories
 //   BVH_DEFORMS_IN_SHUTTER  and some do while the shutter is open
+//   BVH_BUDGET        of PACKET_RAYS 1: a ray stops after as many elements as a dispatch may have of it, and says so
+//   BVH_RESUMES       and goes on in the next dispatch
 //
 // With HAS_MOTION every ray enters an instance at the ray's own time, and leaves bound all times.
 //
@@ -56,6 +58,20 @@ uniform vec3 bvh_top_cells_per_unit;
 #endif
 
 #define NOT_INSIDE 0xffffffffu
+
+#ifdef BVH_BUDGET
+// A driver ends a dispatch that takes seconds, and a ray may meet every element of a scene.
+uniform uint bvh_budget;
+uniform uint unfinished_word; // set to BVH_UNFINISHED where a ray is not finished
+layout(std430, binding = BIND_BVH_UNFINISHED) buffer unfinished_block { uint unfinished[]; };
+uint budget_left = bvh_budget;
+uvec4 place_of_ray; // bvh/layout.h
+#ifdef BVH_RESUMES
+#define RAYS_GO_ON
+uniform uint resumes;
+layout(std430, binding = BIND_BVH_PLACES) buffer place_block { uvec4 places[]; };
+#endif
+#endif
 #define NO_GRID tree_grid(vec3(0.0), vec3(1.0))
 
 struct tree_traversal {
@@ -141,7 +157,13 @@ uint test_element(inout tree_traversal traversal, bundle b, distances_left left,
                               mix(upper_corner, lower_corner, negative), left.t_min, left.t_max);
 #endif
     bool is_leaf = link >> BVH_LEAF_KIND_SHIFT != 0u;
-    traversal.element = any_hit || is_leaf ? traversal.element + 1u : link;
+    uint after_miss = link;
+#ifdef BVH_BUDGET
+    // Always forward, whatever a link says: no structure can keep a ray longer than it has elements. Software GL leaves
+    // a loop after 65535 rounds.
+    after_miss = max(link, traversal.element + 1u);
+#endif
+    traversal.element = any_hit || is_leaf ? traversal.element + 1u : after_miss;
     return any_hit && is_leaf ? link : 0u;
 }
 
@@ -155,8 +177,14 @@ uint next_leaf(inout tree_traversal traversal, bundle b, distances_left left, tr
                answer found[PACKET_RAYS])
 {
     tree_traversal next = traversal;
-    while (is_searching(next))
+    while (is_searching(next)) {
+#ifdef BVH_BUDGET
+        if (budget_left == 0u)
+            break;
+        budget_left--;
+#endif
         next.leaf = test_element(next, b, left, r, found);
+    }
     traversal.element = next.element;
     return next.leaf;
 }
@@ -335,6 +363,10 @@ bool cross_border(uint leaf, inout tree_traversal traversal, inout tree_traversa
         enter_instance(leaf & BVH_LEAF_FIRST_MASK, r, leading, inside, o, traversal, b, rays);
         return true;
     }
+#ifdef BVH_BUDGET
+    if (traversal.element < traversal.end) // it is not finished
+        return false;
+#endif
     bool all_done = inside.index == NOT_INSIDE;
 #ifdef ANY_HIT
     all_done = all_done || !is_alive_any(r);
@@ -380,6 +412,18 @@ void trace_packet(inout trace_ray r[PACKET_RAYS], inout answer found[PACKET_RAYS
     relative_rays rays;
     int leading = leading_of(r);
     begin_packet(r, leading, inside, o, traversal, world_traversal, b, world_bundle, rays);
+#ifdef BVH_BUDGET
+#ifndef BVH_ONE_INSTANCE
+    if (place_of_ray.y != NOT_INSIDE) {
+        world_traversal.element = place_of_ray.z;
+#ifdef FAVOUR_INSTANCES
+        favour_instance(place_of_ray.y, 1, found);
+#endif
+        enter_instance(place_of_ray.y, r, leading, inside, o, traversal, b, rays);
+    }
+#endif
+    traversal.element = place_of_ray.x;
+#endif
     noted_primitive noted;
     noted.bits = 0u;
 #ifdef ASK_MATERIALS
@@ -387,6 +431,18 @@ void trace_packet(inout trace_ray r[PACKET_RAYS], inout answer found[PACKET_RAYS
         settle_and_go_on(traversal, noted, r, found);
 #else
     traverse_instances(traversal, world_traversal, b, world_bundle, leading, inside, o, rays, r, found, noted);
+#endif
+#ifdef BVH_BUDGET
+    uint is_finished = traversal.element < traversal.end ? 0u : 1u;
+#ifdef BVH_ONE_INSTANCE
+    place_of_ray = uvec4(traversal.element, NOT_INSIDE, 0u, is_finished);
+#else
+    place_of_ray = uvec4(traversal.element, inside.index, world_traversal.element, is_finished);
+#ifdef FAVOUR_INSTANCES
+    if (is_finished == 0u && inside.index != NOT_INSIDE)
+        favour_instance(inside.index, -1, found);
+#endif
+#endif
 #endif
 }
 
@@ -407,12 +463,40 @@ void trace_closest_rays(trace_ray r[2], inout candidate best[2])
 
 #elif PACKET_RAYS == 1
 
+// False: the ray is finished.
+bool begin_budget()
+{
+#ifdef BVH_BUDGET
+    place_of_ray = uvec4(0u, NOT_INSIDE, 0u, 0u);
+#ifdef BVH_RESUMES
+    if (resumes != 0u)
+        place_of_ray = places[item_index()];
+#endif
+    return place_of_ray.w == 0u;
+#else
+    return true;
+#endif
+}
+
+void end_budget()
+{
+#ifdef BVH_BUDGET
+#ifdef BVH_RESUMES
+    places[item_index()] = place_of_ray;
+#endif
+    if (place_of_ray.w == 0u && unfinished[unfinished_word] == 0u)
+        atomicCompSwap(unfinished[unfinished_word], 0u, BVH_UNFINISHED);
+#endif
+}
+
 #ifdef ANY_HIT
 bool trace_any(trace_ray r, inout vec3 optical_depth)
 {
     trace_ray packet[PACKET_RAYS] = trace_ray[PACKET_RAYS](r);
     vec3 found[PACKET_RAYS] = vec3[PACKET_RAYS](optical_depth);
-    trace_packet(packet, found);
+    if (begin_budget())
+        trace_packet(packet, found);
+    end_budget();
     optical_depth = found[0];
     return min_component(optical_depth) >= OPTICAL_DEPTH_BLACK;
 }
@@ -421,7 +505,9 @@ void trace_closest(trace_ray r, inout candidate best)
 {
     trace_ray packet[PACKET_RAYS] = trace_ray[PACKET_RAYS](r);
     candidate found[PACKET_RAYS] = candidate[PACKET_RAYS](best);
-    trace_packet(packet, found);
+    if (begin_budget())
+        trace_packet(packet, found);
+    end_budget();
     best = found[0];
 }
 #endif

@@ -16,7 +16,8 @@
 #define BIND_DISCS 10
 #define BIND_TRACER_0 11 /* the tracer's own */
 #define BIND_TRACER_1 12
-#define BIND_PASS_0 11 /* the integrator's own, in passes without a tracer */
+#define BIND_OPTICAL_DEPTHS 13 /* trace/wave.comp */
+#define BIND_PASS_0 11         /* the integrator's own, in passes without a tracer */
 #define BIND_PASS_1 12
 #define BIND_PASS_2 13
 #define BIND_PASS_3 14

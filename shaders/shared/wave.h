@@ -30,6 +30,7 @@ SHARED_SIZE(wave_state, 96)
 
 #define WAVE_STOPPED_FULL 1u   /* a wave is larger than the buffers */
 #define WAVE_STOPPED_QUEUED 2u /* rays are left behind the last wave that is queued */
+#define WAVE_STOPPED_LONG 3u   /* a ray takes longer than a dispatch may */
 
 #define UNIFORM_WAVE 1 /* binding of the uniform block */
 

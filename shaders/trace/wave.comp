@@ -28,6 +28,10 @@
 // (no define) may compare distances itself. `best.distance` starts at the ray's end, or at the nearest disc.
 // offer_any adds to `optical_depth`; trace_any returns true, and may stop, once offer_any did: no light is left.
 //
+// With PACKET_RAYS 1, a traverse.glsl may define RAYS_GO_ON: several dispatches are of the same rays, which go on with what
+// they have found; the first one has is_first_part 1. BIND_OPTICAL_DEPTHS is then a buffer with a vec4 for each ray of the
+// dispatch.
+//
 // This file handles all else: discs, dead rays (t_max <= t_min), rays beyond the wave's end, and writing the answer: a
 // visibility, or an intersection (shared/hit.h) of which surface.comp makes a hit. Some of several rays may be dead:
 // they have t_max = -1 and t_min = 0, direction (1 0 0) and can hit nothing, so a traversal must not rely on ray 0 for
@@ -51,7 +55,18 @@ layout(binding = UNIT_RAY_TIMES) uniform samplerBuffer ray_times;
 #ifdef ANY_HIT
 layout(std430, binding = BIND_VISIBILITY) writeonly buffer visibility_block { uint visibilities[]; };
 #else
+#ifdef RAYS_GO_ON
+layout(binding = IMAGE_HITS, rgba32ui) uniform uimageBuffer intersections;
+#else
 layout(binding = IMAGE_HITS, rgba32ui) writeonly uniform uimageBuffer intersections;
+#endif
+#endif
+
+#ifdef RAYS_GO_ON
+uniform uint is_first_part;
+#ifdef ANY_HIT
+layout(std430, binding = BIND_OPTICAL_DEPTHS) buffer depth_block { vec4 optical_depths[]; }; // visibilities are rounded
+#endif
 #endif
 
 #ifdef HAS_DISCS
@@ -142,15 +157,36 @@ void main()
     if (ray_index >= ray_end)
         return;
     trace_ray r = load_ray(ray_index);
+    bool is_new = true; // not one that goes on
+#ifdef RAYS_GO_ON
+    is_new = is_first_part != 0u;
+#endif
 #ifdef ANY_HIT
     vec3 optical_depth = vec3(0.0);
-    if (is_alive(r) && (discs_any(r, optical_depth) || trace_any(r, optical_depth)))
+#ifdef RAYS_GO_ON
+    if (!is_new)
+        optical_depth = optical_depths[item_index()].xyz;
+    if (min_component(optical_depth) >= OPTICAL_DEPTH_BLACK)
+        return;
+#endif
+    if (is_alive(r) && (is_new && discs_any(r, optical_depth) || trace_any(r, optical_depth)))
         optical_depth = vec3(OPTICAL_DEPTH_MAX);
+#ifdef RAYS_GO_ON
+    optical_depths[item_index()] = vec4(optical_depth, 0.0);
+#endif
     store_visibility(ray_index, optical_depth);
 #else
     candidate best = candidate_none(r.t_max);
+#ifdef RAYS_GO_ON
+    if (!is_new) {
+        uvec4 before = imageLoad(intersections, int(3u * ray_index));
+        if (before.z != HIT_NO_PRIMITIVE)
+            best = candidate(uintBitsToFloat(before.x), before.z, before.w, vec2(0.0));
+    }
+#endif
     if (is_alive(r)) {
-        discs_closest(r, best);
+        if (is_new)
+            discs_closest(r, best);
         trace_closest(r, best);
     }
     store_intersection(ray_index, best);

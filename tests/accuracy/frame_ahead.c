@@ -235,3 +235,26 @@ TEST(slices_are_as_large_as_the_device_can_do_in_a_step)
     frame_result_finish(&large);
     frame_result_finish(&small);
 }
+
+/* Rays that may have a handful of elements in a dispatch: the slice stops on the device, and is done again with as
+ * many dispatches as its rays need. */
+TEST(rays_that_take_too_long_for_a_dispatch_are_traced_in_several)
+{
+    struct fixture *fixture = *state;
+    fixture_mixture(fixture);
+    fixture->request.integrator = INTEGRATOR_WHITTED;
+    fixture->request.depth = 3;
+    fixture->request.tracer = TRACER_BVH;
+    fixture->request.primary = PRIMARY_TRACE;
+    struct frame_result expected = render(fixture, true);
+    fixture->request.tracer_options.bench.bvh_elements = 5;
+    struct frame_result got = render(fixture, true);
+    assert_same_picture(&expected, &got);
+    assert_int_equal(got.shadow_rays, expected.shadow_rays);
+    assert_int_equal(got.secondary_rays, expected.secondary_rays);
+    assert_int_equal(expected.device_waits, 1);
+    if (got.device_waits < 5)
+        fail_msg("the host waited %u times", got.device_waits);
+    frame_result_finish(&expected);
+    frame_result_finish(&got);
+}

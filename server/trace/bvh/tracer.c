@@ -18,6 +18,10 @@
 #define GRID_COST_MAX 1.3f
 /* Fills any GPU; more at once only nears the time after which a driver ends a dispatch. */
 #define DISPATCH_RAYS_MAX (1u << 18)
+/* Elements that a GPU visits in a dispatch, at most: a second's work of a slow one. A ray of a large scene needs
+ * some hundred; it has enough of them to be finished in one dispatch, unless the scene is made to keep it. */
+#define DISPATCH_ELEMENTS_MAX (1u << 31)
+#define RAY_ELEMENTS_MAX (1u << 16)
 
 static unsigned build_threads(void)
 {
@@ -56,6 +60,9 @@ static void bvh_reset(struct bvh *bvh)
     bvh_top_finish(&bvh->top);
     gpu_buffer_finish(bvh->store.device, &bvh->transform_buffer);
     gpu_buffer_finish(bvh->store.device, &bvh->coherence);
+    gpu_buffer_finish(bvh->store.device, &bvh->places);
+    gpu_buffer_finish(bvh->store.device, &bvh->depths);
+    gpu_buffer_finish(bvh->store.device, &bvh->unfinished);
     free(bvh->transforms);
     bvh->transforms = NULL;
     bvh->transform_count = 0;
@@ -302,8 +309,9 @@ static bool begin_update(struct bvh *bvh, const struct gpu_scene *scene, unsigne
 static void fill_stats(struct bvh *bvh)
 {
     bvh->base.stats.nodes = node_count(bvh);
-    bvh->base.stats.device_bytes =
-        bvh_store_bytes(&bvh->store) + bvh->transform_buffer.capacity_bytes + bvh->coherence.capacity_bytes;
+    bvh->base.stats.device_bytes = bvh_store_bytes(&bvh->store) + bvh->transform_buffer.capacity_bytes +
+                                   bvh->coherence.capacity_bytes + bvh->places.capacity_bytes +
+                                   bvh->depths.capacity_bytes + bvh->unfinished.capacity_bytes;
 }
 
 static enum tracer_progress bvh_update(struct tracer *tracer, struct gpu_scene *scene,
@@ -403,6 +411,81 @@ static void set_uniforms(const struct bvh *bvh, const struct gpu_program *progra
     }
 }
 
+/* How the rays of a wave keep within the time of a dispatch. */
+enum budget {
+    BUDGET_NONE,   /* software GL traces short ranges, and no driver ends them; packets */
+    BUDGET_STOPS,  /* what is not finished stops the slice */
+    BUDGET_RESUMES /* dispatches follow one another until all is finished */
+};
+
+static enum budget budget_of(const struct bvh *bvh, const struct trace_state *state)
+{
+    if (bvh->base.device->facts.software || ((const struct bvh_state *)state)->packet_rays > 1 ||
+        bvh->store.settings.plain)
+        return BUDGET_NONE;
+    return state->wave.stopped && !state->patient ? BUDGET_STOPS : BUDGET_RESUMES;
+}
+
+static uint32_t elements_of_a_ray(const struct bvh *bvh, uint32_t rays)
+{
+    const uint32_t fitting = DISPATCH_ELEMENTS_MAX / rays, allowed = bvh->base.options.bench.bvh_elements;
+    const uint32_t maximum = allowed > 0 ? allowed : RAY_ELEMENTS_MAX;
+    return fitting < maximum ? fitting : maximum;
+}
+
+/* The same rays again, until they are finished. Waits for each dispatch. */
+static bool run_to_the_end(struct bvh *bvh, const struct gpu_program *program, const struct gpu_scene *scene,
+                           const struct ray_range *rays, struct error *error)
+{
+    struct gpu_device *device = bvh->store.device;
+    const struct trace_program_source all = {0};
+    const uint32_t count = rays->end - rays->first;
+    uint32_t unfinished = 0;
+    if (!gpu_buffer_reserve(device, &bvh->places, count * sizeof(uvec4), error) ||
+        !gpu_buffer_reserve(device, &bvh->depths, count * TRACE_DEPTH_BYTES, error))
+        return false;
+    fill_stats(bvh);
+    gpu_buffer_bind_storage(&bvh->places, BIND_BVH_PLACES);
+    gpu_buffer_bind_storage(&bvh->depths, BIND_OPTICAL_DEPTHS);
+    gpu_uniform_uint(program, "bvh_budget", elements_of_a_ray(bvh, count));
+    for (uint32_t dispatches = 0; dispatches == 0 || unfinished; dispatches++) {
+        gpu_buffer_clear(device, &bvh->unfinished, 0);
+        gpu_uniform_uint(program, "is_first_part", dispatches == 0);
+        gpu_uniform_uint(program, "resumes", dispatches > 0);
+        trace_program_run(program, scene, rays, &all);
+        gpu_buffer_read(device, &bvh->unfinished, 0, &unfinished, sizeof(unfinished));
+        if (device->lost)
+            return gpu_check(device, "tracing", error);
+    }
+    return true;
+}
+
+static bool run_within_budget(struct bvh *bvh, const struct gpu_program *program, const struct gpu_scene *scene,
+                              const struct trace_state *state, const struct ray_range *rays, struct error *error)
+{
+    const bool stops = budget_of(bvh, state) == BUDGET_STOPS;
+    const struct wave *wave = &state->wave;
+    if (!gpu_buffer_reserve(bvh->store.device, &bvh->unfinished, sizeof(uint32_t), error))
+        return false;
+    gpu_buffer_bind_storage(stops ? wave->stopped : &bvh->unfinished, BIND_BVH_UNFINISHED);
+    gpu_uniform_uint(program, "unfinished_word", stops ? wave->stopped_word : 0);
+    if (stops) {
+        const uint32_t count = rays->end - rays->first;
+        gpu_uniform_uint(program, "bvh_budget",
+                         elements_of_a_ray(bvh, count < DISPATCH_RAYS_MAX ? count : DISPATCH_RAYS_MAX));
+        const struct trace_program_source source = {.rays_a_dispatch = DISPATCH_RAYS_MAX};
+        trace_program_run(program, scene, rays, &source);
+        return true;
+    }
+    for (uint32_t first = rays->first, count; first < rays->end; first += count) {
+        count = rays->end - first < DISPATCH_RAYS_MAX ? rays->end - first : DISPATCH_RAYS_MAX;
+        const struct ray_range some = {.wave = wave, .first = first, .end = first + count};
+        if (!run_to_the_end(bvh, program, scene, &some, error))
+            return false;
+    }
+    return true;
+}
+
 static bool bvh_trace_range(struct tracer *tracer, struct gpu_scene *scene, struct trace_state *state,
                             const struct ray_range *rays, struct error *error)
 {
@@ -411,7 +494,8 @@ static bool bvh_trace_range(struct tracer *tracer, struct gpu_scene *scene, stru
     const struct wave *wave = &state->wave;
     const struct bvh_state *own = (const struct bvh_state *)state;
     const uint32_t packet_rays = own->packet_rays;
-    struct gpu_define defines[9] = {{"TRACER_BVH", "1"}};
+    const enum budget budget = budget_of(bvh, state);
+    struct gpu_define defines[11] = {{"TRACER_BVH", "1"}};
     size_t n = 1;
     if (settings->bounds == BVH_BOUNDS_SPHERE)
         defines[n++] = (struct gpu_define){"BVH_SPHERES", "1"};
@@ -428,6 +512,10 @@ static bool bvh_trace_range(struct tracer *tracer, struct gpu_scene *scene, stru
         defines[n++] = (struct gpu_define){"BVH_DEFORMS", "1"};
     if (bvh->store.deforms_in_shutter && wave->times) /* else all rays see the vertices of the first pose */
         defines[n++] = (struct gpu_define){"BVH_DEFORMS_IN_SHUTTER", "1"};
+    if (budget != BUDGET_NONE)
+        defines[n++] = (struct gpu_define){"BVH_BUDGET", "1"};
+    if (budget == BUDGET_RESUMES)
+        defines[n++] = (struct gpu_define){"BVH_RESUMES", "1"};
     const struct trace_program_source source = {
         .traverse = "bvh/traverse.glsl",
         .defines = defines,
@@ -440,6 +528,8 @@ static bool bvh_trace_range(struct tracer *tracer, struct gpu_scene *scene, stru
         return false;
     bind(bvh);
     set_uniforms(bvh, program, scene, wave);
+    if (budget != BUDGET_NONE)
+        return run_within_budget(bvh, program, scene, state, rays, error);
     trace_program_run(program, scene, rays, &source);
     return true;
 }

@@ -23,6 +23,8 @@ struct bvh {
     struct gpu_buffer transform_buffer;
     float leaf_extent_world;     /* diagonal of a leaf's box, in the mean over what the instances show */
     struct gpu_buffer coherence; /* what bvh/coherence.comp counts; there from the build on */
+    /* Of the rays of a dispatch, between it and the next one that they are in. */
+    struct gpu_buffer places, depths, unfinished;
 };
 
 /* Of one wave. */

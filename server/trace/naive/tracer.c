@@ -1,24 +1,31 @@
 /* SPDX-License-Identifier: MIT */
 /* Brute force: every primitive for every ray. For tests: it has no structure that could be wrong. */
+#include "trace/naive/parts.h"
+
+#include "shared/bindings.h"
 #include "trace/program.h"
 #include "trace/tracer.h"
 
+#include <epoxy/gl.h>
 #include <stdlib.h>
 
-/* Rays times primitives of one dispatch: well below a second on a GPU, whose driver may end what takes longer. */
-#define DISPATCH_TESTS_MAX ((uint64_t)1 << 33)
-#define DISPATCH_RAYS_MIN 256u
+/* Of one dispatch: rays times primitives, which the slowest of GPUs takes a second for, and those of one ray, one
+ * after the other. */
+#define DISPATCH_TESTS_MAX ((uint64_t)1 << 30)
+#define RAY_TESTS_MAX (1u << 16)
 /* Software GL (llvmpipe) leaves the loops of an invocation after 65535 rounds in all, without a word; what lies
  * behind would be missed. Materials that are evaluated at an intersection have loops of their own, whose rounds
  * count for each primitive, hit or not: five were measured. */
 #define SOFTWARE_ROUNDS_MAX 65000u
 #define ROUNDS_WITH_MATERIALS 8u
-
-static const struct gpu_define naive_defines[] = {{"TRACER_NAIVE", "1"}, {0}};
+/* On software GL a step of the smallest range of rays would take longer than a cancel may. */
+#define SOFTWARE_PRIMITIVES_MAX SOFTWARE_ROUNDS_MAX
 
 struct naive {
     struct tracer base;
-    uint32_t rays_a_dispatch;
+    uint32_t ray_tests_max;   /* of one dispatch */
+    bool has_parts;           /* there are more */
+    struct gpu_buffer depths; /* optical: of the rays of a dispatch, between two parts */
 };
 
 static struct tracer *naive_create(struct gpu_device *device, const struct tracer_options *options,
@@ -34,43 +41,78 @@ static struct tracer *naive_create(struct gpu_device *device, const struct trace
 
 static void naive_destroy(struct tracer *tracer)
 {
-    free(tracer);
+    struct naive *naive = (struct naive *)tracer;
+    if (tracer->device)
+        gpu_buffer_finish(tracer->device, &naive->depths);
+    free(naive);
 }
 
 static enum tracer_progress naive_update(struct tracer *tracer, struct gpu_scene *scene,
                                          const struct tracer_update *update, struct error *error)
 {
     (void)update;
-    uint64_t primitives = 1;
+    struct naive *naive = (struct naive *)tracer;
+    const bool software = tracer->device->facts.software;
+    const uint32_t rounds = scene->has_cutout || scene->has_translucent ? ROUNDS_WITH_MATERIALS : 1;
+    const uint32_t allowed = tracer->options.bench.naive_tests;
+    uint64_t primitives = 0;
     for (uint32_t i = 0; i < scene->instance_count; i++)
         primitives += scene->geometries[scene->instances[i].geometry].device.primitive_count;
-    uint64_t rounds = scene->has_cutout || scene->has_translucent ? ROUNDS_WITH_MATERIALS : 1;
-    if (tracer->device->facts.software && primitives * rounds > SOFTWARE_ROUNDS_MAX) {
-        error_set(error, ERROR_LIMIT, "tracer",
-                  "naive: %llu primitives; on software GL it can look at %u in this scene",
-                  (unsigned long long)primitives - 1, SOFTWARE_ROUNDS_MAX / (unsigned)rounds);
+    if (software && primitives > SOFTWARE_PRIMITIVES_MAX) {
+        error_set(error, ERROR_LIMIT, "tracer", "naive: %llu primitives; on software GL it can look at %u",
+                  (unsigned long long)primitives, SOFTWARE_PRIMITIVES_MAX);
         error_remedy(error, "take another tracer");
         return TRACER_FAILED;
     }
-    uint64_t rays = DISPATCH_TESTS_MAX / primitives;
-    ((struct naive *)tracer)->rays_a_dispatch = rays > UINT32_MAX          ? UINT32_MAX
-                                                : rays < DISPATCH_RAYS_MIN ? DISPATCH_RAYS_MIN
-                                                                           : (uint32_t)rays;
+    naive->ray_tests_max = allowed > 0 ? allowed : software ? SOFTWARE_ROUNDS_MAX / rounds : RAY_TESTS_MAX;
+    naive->has_parts = primitives + scene->instance_count > naive->ray_tests_max;
     return TRACER_DONE;
+}
+
+/* Some rays, from the first part of the primitives to the last. */
+static void trace_parts(const struct naive *naive, const struct gpu_program *program,
+                        const struct gpu_scene *scene, const struct ray_range *rays,
+                        const struct trace_program_source *source)
+{
+    struct naive_part part = {0};
+    naive_next_part(scene, naive->ray_tests_max, &part); /* discs are tested also where there is nothing else */
+    gpu_uniform_uint(program, "is_first_part", 1);
+    do {
+        gpu_uniform_uint(program, "part_first_instance", part.first_instance);
+        gpu_uniform_uint(program, "part_first_primitive", part.first_primitive);
+        gpu_uniform_uint(program, "part_tests", part.tests);
+        trace_program_run(program, scene, rays, source);
+        gpu_uniform_uint(program, "is_first_part", 0);
+        if (naive->has_parts)
+            glFlush(); /* a part of its own to the driver too, which may gather commands */
+    } while (naive_next_part(scene, naive->ray_tests_max, &part));
 }
 
 static bool naive_trace_range(struct tracer *tracer, struct gpu_scene *scene, struct trace_state *state,
                               const struct ray_range *rays, struct error *error)
 {
-    const struct trace_program_source source = {
-        .traverse = "naive/traverse.glsl",
-        .defines = naive_defines,
-        .rays_a_dispatch = ((struct naive *)tracer)->rays_a_dispatch,
-    };
+    struct naive *naive = (struct naive *)tracer;
+    const struct gpu_define defines[] = {
+        {"TRACER_NAIVE", "1"}, {naive->has_parts ? "NAIVE_PARTS" : NULL, "1"}, {NULL, NULL}};
+    const struct trace_program_source source = {.traverse = "naive/traverse.glsl", .defines = defines};
     const struct gpu_program *program = trace_program_get(scene, &state->wave, &source, error);
-    if (program)
-        trace_program_run(program, scene, rays, &source);
-    return program != NULL;
+    struct naive_part part = {0};
+    if (!program)
+        return false;
+    naive_next_part(scene, naive->ray_tests_max, &part); /* none is larger, but for a test */
+    const uint32_t each = naive_rays_of(&part, DISPATCH_TESTS_MAX);
+    for (uint32_t first = rays->first, count; first < rays->end; first += count) {
+        count = rays->end - first < each ? rays->end - first : each;
+        const struct ray_range some = {.wave = rays->wave, .first = first, .end = first + count};
+        if (naive->has_parts && state->wave.kind == WAVE_ANY) {
+            if (!gpu_buffer_reserve(tracer->device, &naive->depths, count * TRACE_DEPTH_BYTES, error))
+                return false;
+            tracer->stats.device_bytes = naive->depths.capacity_bytes;
+            gpu_buffer_bind_storage(&naive->depths, BIND_OPTICAL_DEPTHS);
+        }
+        trace_parts(naive, program, scene, &some, &source);
+    }
+    return true;
 }
 
 const struct tracer_impl tracer_naive_impl = {

@@ -387,6 +387,115 @@ TEST(rays_beside_a_NaN_ray_hit_as_by_brute_force)
     free(rays);
 }
 
+/* Rays go forward only, so no link keeps them for ever, and a node whose link is wrong is looked into. */
+TEST(a_link_that_leads_back_ends_no_ray_and_loses_no_hit)
+{
+    struct fixture fixture;
+    struct hit *hits[2];
+    struct ray *rays = malloc(RAY_COUNT * sizeof(struct ray));
+    struct gpu_buffer ray_buffer = {0}, hit_buffer = {0};
+    struct error error = {0};
+    uint64_t seed = 35;
+    fixture_init(&fixture, scene_of_instances(), NULL);
+    struct bvh_store *store = &((struct bvh *)fixture.tracer)->store;
+    assert_true(bvh_is_packed(&store->settings));
+    for (uint32_t i = 0; i < RAY_COUNT; i++)
+        rays[i] = make_ray(6, 6, 20, test_uniform(&seed, -0.4f, 0.4f), test_uniform(&seed, -0.4f, 0.4f), -1);
+    expect_ok(gpu_buffer_upload(device, &ray_buffer, rays, RAY_COUNT * sizeof(struct ray), &error), &error);
+    expect_ok(gpu_buffer_reserve(device, &hit_buffer, RAY_COUNT * sizeof(struct hit), &error), &error);
+    const struct wave wave = {.ray_count = RAY_COUNT, .rays = &ray_buffer, .hits = &hit_buffer};
+    const bool software = device->facts.software;
+    for (int i = 0; i < 2; i++) {
+        gpu_scene_bind(&fixture.gpu);
+        device->facts.software = false; /* which leaves a loop by itself */
+        const bool traced = tracer_trace(fixture.tracer, &fixture.gpu, &wave, &error);
+        device->facts.software = software;
+        expect_ok(traced, &error);
+        hits[i] = malloc(RAY_COUNT * sizeof(struct hit));
+        gpu_buffer_read(device, &hit_buffer, 0, hits[i], RAY_COUNT * sizeof(struct hit));
+        struct bvh_packed_element *elements = malloc(store->elements.size_bytes);
+        const size_t count = store->elements.size_bytes / sizeof(*elements);
+        gpu_buffer_read(device, &store->elements, 0, elements, store->elements.size_bytes);
+        for (size_t k = 0; k < count; k++)
+            if (elements[k].link >> BVH_LEAF_KIND_SHIFT == 0)
+                elements[k].link = 0;
+        gpu_buffer_write(device, &store->elements, 0, elements, store->elements.size_bytes);
+        free(elements);
+    }
+    uint32_t hit_count = 0;
+    for (uint32_t i = 0; i < RAY_COUNT; i++)
+        hit_count += hits[0][i].distance >= 0;
+    assert_in_range(hit_count, RAY_COUNT / 16, RAY_COUNT);
+    assert_memory_equal(hits[0], hits[1], RAY_COUNT * sizeof(struct hit));
+    for (int i = 0; i < 2; i++)
+        free(hits[i]);
+    free(rays);
+    gpu_buffer_finish(device, &ray_buffer);
+    gpu_buffer_finish(device, &hit_buffer);
+    fixture_finish(&fixture);
+}
+
+/* As a GPU does it, a few elements at a time: cutouts and tints, spheres, instances at one place, discs. */
+static void *trace_as_hardware(struct gpu_scene *gpu, const struct ray *rays, enum wave_kind kind,
+                               uint32_t elements)
+{
+    struct error error = {0};
+    const struct tracer_options options = {.bvh = {.rays = 1}, .bench = {.bvh_elements = elements}};
+    const size_t bytes = RAY_COUNT * (kind == WAVE_ANY ? sizeof(uint32_t) : sizeof(struct hit));
+    const bool software = device->facts.software;
+    struct gpu_buffer ray_buffer = {0}, answers = {0};
+    struct tracer *tracer = tracer_create(&tracer_bvh_impl, device, &options, &error);
+    expect_ok(tracer && tracer_update(tracer, gpu, &(struct tracer_update){0}, &error), &error);
+    expect_ok(gpu_buffer_upload(device, &ray_buffer, rays, RAY_COUNT * sizeof(struct ray), &error) &&
+                  gpu_buffer_reserve(device, &answers, bytes, &error),
+              &error);
+    gpu_scene_bind(gpu);
+    const struct wave wave = {
+        .kind = kind, .ray_count = RAY_COUNT, .rays = &ray_buffer, .hits = &answers, .visibility = &answers};
+    device->facts.software = elements == 0;
+    const bool traced = tracer_trace(tracer, gpu, &wave, &error);
+    device->facts.software = software;
+    expect_ok(traced, &error);
+    void *read = malloc(bytes);
+    gpu_buffer_read(device, &answers, 0, read, bytes);
+    gpu_buffer_finish(device, &ray_buffer);
+    gpu_buffer_finish(device, &answers);
+    tracer_destroy(tracer);
+    return read;
+}
+
+TEST(answers_do_not_depend_on_how_many_elements_a_dispatch_has)
+{
+    struct scene *(*const scenes[])(void) = {scene_of_instances, test_scene_soup, test_scene_spheres,
+                                             test_scene_translucent, scene_of_squares};
+    static const uint32_t budgets[] = {1, 7, 50};
+    struct ray *rays = malloc(RAY_COUNT * sizeof(struct ray));
+    uint64_t seed = 36;
+    for (uint32_t i = 0; i < RAY_COUNT; i++)
+        rays[i] = make_ray(test_uniform(&seed, -3, 3), test_uniform(&seed, -1, 3), test_uniform(&seed, -4, 4),
+                           test_uniform(&seed, -1, 1), test_uniform(&seed, -1, 1), test_uniform(&seed, -1, 1));
+    for (size_t s = 0; s < sizeof(scenes) / sizeof(scenes[0]); s++) {
+        struct error error = {0};
+        struct scene_changes changes;
+        struct scene *scene = scenes[s]();
+        struct gpu_scene gpu;
+        gpu_scene_init(&gpu, device);
+        expect_ok(gpu_scene_update(&gpu, scene, NULL, &changes, NULL, &error), &error);
+        for (int kind = WAVE_CLOSEST; kind <= WAVE_ANY; kind++) {
+            void *expected = trace_as_hardware(&gpu, rays, (enum wave_kind)kind, 0);
+            const uint32_t budget = budgets[s % 3];
+            void *got = trace_as_hardware(&gpu, rays, (enum wave_kind)kind, budget);
+            assert_memory_equal(got, expected,
+                                RAY_COUNT * (kind == WAVE_ANY ? sizeof(uint32_t) : sizeof(struct hit)));
+            free(got);
+            free(expected);
+        }
+        gpu_scene_finish(&gpu);
+        scene_destroy(scene);
+    }
+    free(rays);
+}
+
 TEST(an_impossible_packet_size_is_refused)
 {
     struct error error = {0};
