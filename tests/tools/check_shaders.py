@@ -4,8 +4,8 @@
 
 A program's text is made as server/gpu/program_source.c makes it. The defines that a program may have are those that
 its files ask for; each is tried alone, all and none together, for every choice that is not on or off (CHOICES).
-Exit status 1 and the compiler's lines for each program that does not pass. Run from the root of the project;
-needs glslang-tools.
+Exit status 1 and the compiler's lines for each program that does not pass. What a compiler takes and a device may take
+amiss is refused by name (HAZARDS). Run from the root of the project; needs glslang-tools.
 """
 import itertools
 import os
@@ -21,7 +21,8 @@ BATCH = 40  # programs in one run of the compiler
 END_OF_FILE = "end_of_file_"  # a name that separates what the preprocessor writes of one file from that of the next
 ROOTS = (pathlib.Path("shaders"), pathlib.Path("tests/bench"))
 # Program -> its stages, and the defines of which it has one combination always.
-TRACERS = [{"TRAVERSE": '"naive/traverse.glsl"', "TRACER_NAIVE": "1", "PACKET_RAYS": "1"}] + [
+TRACERS = [{"TRAVERSE": '"naive/traverse.glsl"', "TRACER_NAIVE": "1", "PACKET_RAYS": "1", **parts}
+           for parts in ({}, {"NAIVE_PARTS": "1"})] + [
     {"TRAVERSE": '"bvh/traverse.glsl"', "TRACER_BVH": "1", "PACKET_RAYS": packet, **bounds}
     for packet in ("1", "8")
     for bounds in ({"BVH_PACKED": "1"}, {}, {"BVH_SPHERES": "1"}, {"BVH_SPHERES": "1", "BVH_PLAIN": "1"})] + [
@@ -52,13 +53,33 @@ CHOICES = {
     "svo/voxelise.frag": [[{"PRIMITIVE_KIND": "0"}, {"PRIMITIVE_KIND": "1", "HAS_SPHERES": "1"}]],
 }
 # Defines that come only with others.
-WITH = {"BVH_DEFORMS_IN_SHUTTER": ("BVH_DEFORMS", "HAS_MOTION")}
+WITH = {"BVH_DEFORMS_IN_SHUTTER": ("BVH_DEFORMS", "HAS_MOTION"), "BVH_RESUMES": ("BVH_BUDGET",)}
 STAGES = {"render/primary.vert": ["render/primary.vert", "render/primary.frag"],
           "ldc/build.frag": ["raster/draw.vert", "raster/draw.geom", "ldc/build.frag"],
           "abuffer/build.frag": ["raster/draw.vert", "raster/draw.geom", "abuffer/build.frag"],
           "svo/voxelise.frag": ["raster/draw.vert", "raster/draw.geom", "svo/voxelise.frag"]}
 # Storage blocks of a stage; server/gpu/device.c asks a driver for as many.
 STORAGE_BLOCKS_MAX = {".comp": 16, ".vert": 4, ".geom": 0, ".frag": 8}
+
+# What GLSL allows and this project does not: of the text of a file without comments.
+HAZARDS = [
+    (re.compile(r"\bbool\s+\w+\s*\[|\bbool\s*\[\s*\w*\s*\]"),
+     "an array of bool, over which Mesa's zink fails: take the bits of a uint"),
+    (re.compile(r"\bu?intBitsToFloat\(\s*(?:\w+\.)*"
+                r"\w*(?:words|bits|index|material|primitive|instance|flags|count|number)\s*\)"),
+     "an integer in a float, whose bits a device may change: carry floats in integers instead"),
+]
+# Functions whose values several programs must agree on to the bit: what they compute with more than one rounding is
+# `precise`, in a statement of its own, as a compiler may fuse a product and a sum in one program and not in another.
+PRECISE = {
+    "common/math.glsl": ("affine_point", "affine_vector", "affine_covector"),
+    "common/intersect.glsl": ("intersect_triangle",),
+    "raster/fragment.glsl": ("triangle_depth_cells", "chord_of_sphere", "intersection_of"),
+}
+ROUNDS = re.compile(r"^[ \t]*(?:return|\w+|(?:float|vec[234])[ \t]+\w+)[ \t]*=?[^;=\n]*"
+                    r"(?:\*[^;]*[-+]|[-+][^;]*\*|\b(?:dot|cross)\()[^;]*;", re.MULTILINE)
+WRITES_POSITION = re.compile(r"\bgl_Position\s*=")
+INVARIANT_POSITION = re.compile(r"\binvariant\s+gl_Position\s*;")
 
 DIRECTIVE = re.compile(r"^[ \t]*#[ \t]*(include|version)\b[ \t]*(.*?)[ \t]*$")
 QUOTED = re.compile(r'^"([^"]*)"')
@@ -172,6 +193,23 @@ def complaints_of(batch):
     return complaints
 
 
+def hazards_of(path):
+    text = re.sub(r"//[^\n]*|/\*.*?\*/", lambda m: "\n" * m[0].count("\n"), path.read_text(), flags=re.DOTALL)
+    complaints = [(text[:found.start()].count("\n") + 1, why) for pattern, why in HAZARDS
+                  for found in pattern.finditer(text)]
+    position = WRITES_POSITION.search(text)
+    if position and not INVARIANT_POSITION.search(text):
+        complaints.append((text[:position.start()].count("\n") + 1,
+                           "gl_Position is not invariant: programs with this stage may cover different pixels"))
+    name = next((name for name in PRECISE if path.match("shaders/" + name)), None)
+    for function in PRECISE.get(name, ()):
+        begin = re.search(rf"^\w+ {function}\([^;{{]*\)\s*{{", text, re.MULTILINE).end()
+        for found in ROUNDS.finditer(text, begin, text.index("\n}", begin)):
+            complaints.append((text[:found.start()].count("\n") + 1,
+                               f"{function} is not precise here, and programs must agree on it"))
+    return [f"{path}:{line}: {why}" for line, why in sorted(complaints)]
+
+
 def main():
     stages = {stage for program, stages in STAGES.items() for stage in stages if stage != program}
     found = sorted(str(path.relative_to(root)) for suffix in ("comp", "vert", "frag") for root in ROOTS
@@ -181,6 +219,8 @@ def main():
     batches = [all_variants[i:i + BATCH] for i in range(0, len(all_variants), BATCH)]
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         complaints = [line for lines in pool.map(complaints_of, batches) for line in lines]
+    complaints += [line for root in ROOTS for suffix in ("comp", "vert", "geom", "frag", "glsl")
+                   for path in sorted(root.rglob("*." + suffix)) for line in hazards_of(path)]
     print("\n".join(complaints), end="\n" if complaints else "")
     print(f"{len(all_variants)} variants of {len(found)} programs, {len(complaints)} complaints", file=sys.stderr)
     return 1 if complaints else 0
