@@ -41,6 +41,10 @@
 #include "common/dispatch.glsl"
 #include "common/range.glsl"
 #include "common/candidate.glsl"
+
+#ifndef PACKET_RAYS
+#define PACKET_RAYS 1
+#endif
 #ifdef RAY_PAIRS
 #define INVOCATION_RAYS 2
 #else

@@ -252,7 +252,7 @@ TEST(rays_that_take_too_long_for_a_dispatch_are_traced_in_several)
     assert_same_picture(&expected, &got);
     assert_int_equal(got.shadow_rays, expected.shadow_rays);
     assert_int_equal(got.secondary_rays, expected.secondary_rays);
-    assert_int_equal(expected.device_waits, 1);
+    assert_in_range(expected.device_waits, 0, 1);
     if (got.device_waits < 5)
         fail_msg("the host waited %u times", got.device_waits);
     frame_result_finish(&expected);
