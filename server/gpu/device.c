@@ -10,6 +10,7 @@
 #include "gpu/egl.h"
 #include "gpu/program_cache.h"
 #include "gpu/registry.h"
+#include "gpu/uniforms.h"
 
 #include <epoxy/gl.h>
 #include <stdio.h>
@@ -183,7 +184,7 @@ static bool create_defaults(struct gpu_device *device, struct error *error)
     static const unsigned char zeros[EMPTY_BUFFER_BYTES];
     unsigned vertex_array = gpu_object_create(device->registry, GPU_VERTEX_ARRAY);
     device->empty_buffer = gpu_object_create(device->registry, GPU_BUFFER);
-    if (!vertex_array || !device->empty_buffer)
+    if (!vertex_array || !device->empty_buffer || !gpu_uniforms_start(device))
         return error_set(error, ERROR_OUT_OF_MEMORY, "device", "no memory for the first objects");
     glBindVertexArray(vertex_array);
     glNamedBufferStorage(device->empty_buffer, sizeof(zeros), zeros, 0);
@@ -302,6 +303,10 @@ bool gpu_check(struct gpu_device *device, const char *what, struct error *error)
 {
     if (was_reset(device))
         return error_set(error, ERROR_DEVICE_LOST, NULL, "%s: the GL context was lost", what);
+    const char *misused = device->misused_uniform;
+    device->misused_uniform = NULL;
+    if (misused)
+        return error_set(error, ERROR_INTERNAL, NULL, "%s: the uniform \"%s\" is of another type", what, misused);
     GLenum first = glGetError();
     if (first == GL_NO_ERROR)
         return true;

@@ -33,6 +33,14 @@ struct gpu_facts {
     uint64_t memory_bytes; /* device memory, of software GL the host's; 0: the driver does not tell */
 };
 
+/* Ranges of a buffer that passes have their uniforms in; private to uniforms.c. */
+struct gpu_uniform_ring {
+    unsigned name;
+    uint32_t alignment_bytes; /* of a range */
+    uint32_t end_bytes;       /* of the last range */
+    uint32_t turn;            /* how often its memory was exchanged for fresh memory */
+};
+
 struct gpu_device {
     struct gpu_device_info info;
     struct gpu_facts facts;
@@ -40,10 +48,12 @@ struct gpu_device {
     struct gpu_registry *registry;      /* every GL object that lives, see registry.h */
     struct gpu_program_cache *programs; /* private to program.c */
     unsigned empty_buffer;              /* 256 zero bytes, bound in place of an empty buffer */
-    uint64_t memory_used_bytes;         /* counted by gpu_memory_take: buffers, textures, Embree */
-    uint64_t memory_limit_bytes;        /* 0: none; facts.memory_bytes at first */
-    struct prefault *prefault;          /* of software GL; NULL: its reservations do not wait */
-    uint64_t reserve_until_ns;          /* see gpu_reserve_begin; 0: whenever */
+    struct gpu_uniform_ring uniform_ring;
+    const char *misused_uniform;  /* one that was given a value of another type; NULL: none */
+    uint64_t memory_used_bytes;   /* counted by gpu_memory_take: buffers, textures, Embree */
+    uint64_t memory_limit_bytes;  /* 0: none; facts.memory_bytes at first */
+    struct prefault *prefault;    /* of software GL; NULL: its reservations do not wait */
+    uint64_t reserve_until_ns;    /* see gpu_reserve_begin; 0: whenever */
     size_t reserve_awaited_bytes; /* size of the reservation that was put off until prefaulted; 0: none was */
     bool reserve_made, reserve_put_off;
     uint64_t waits; /* how often this thread has waited for the device to come to an end with something */

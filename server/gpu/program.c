@@ -6,6 +6,7 @@
 #include "gpu/program_cache.h"
 #include "gpu/program_source.h"
 #include "gpu/registry.h"
+#include "gpu/uniforms.h"
 
 #include <epoxy/gl.h>
 #include <stdio.h>
@@ -44,6 +45,7 @@ void gpu_program_cache_destroy(struct gpu_program_cache *cache)
         return;
     for (struct cached_program *next, *at = cache->first; at; at = next) {
         next = at->next;
+        gpu_uniforms_destroy(at->program.uniforms);
         free(at);
     }
     free(cache);
@@ -152,8 +154,8 @@ static bool build(struct gpu_device *device, GLuint program, struct shader_stage
     return true;
 }
 
-static const struct gpu_program *add_program(struct gpu_device *device, GLuint name, bool is_compute,
-                                             const char *key)
+static const struct gpu_program *add_program(struct gpu_device *device, const struct gpu_program *program,
+                                             bool is_compute, const char *key)
 {
     size_t key_bytes = strlen(key) + 1;
     struct cached_program *cached = malloc(sizeof(*cached) + key_bytes);
@@ -161,8 +163,9 @@ static const struct gpu_program *add_program(struct gpu_device *device, GLuint n
         return NULL;
     GLint size[3] = {1, 1, 1};
     if (is_compute)
-        glGetProgramiv(name, GL_COMPUTE_WORK_GROUP_SIZE, size);
-    cached->program = (struct gpu_program){.name = name, .group_size = (uint32_t)(size[0] * size[1] * size[2])};
+        glGetProgramiv(program->name, GL_COMPUTE_WORK_GROUP_SIZE, size);
+    cached->program = *program;
+    cached->program.group_size = (uint32_t)(size[0] * size[1] * size[2]);
     memcpy(cached->key, key, key_bytes);
     cached->next = device->programs->first;
     device->programs->first = cached;
@@ -179,17 +182,24 @@ static const struct gpu_program *create_program(struct gpu_device *device, const
     bool ok = name != 0;
     if (!ok)
         gpu_note_loss(device, error);
+    struct gpu_uniforms *uniforms = gpu_uniforms_create();
+    ok = ok && uniforms;
     for (unsigned i = 0; ok && i < stage_count; i++)
-        ok =
-            gpu_source_expand(&stages[i].text, gpu_source_lookup_embedded, stages[i].path, source->defines, error);
+        ok = gpu_source_expand(&stages[i].text, gpu_source_lookup_embedded, stages[i].path, source->defines,
+                               error) &&
+             gpu_uniforms_take(uniforms, &stages[i].text, source->defines, error);
+    for (unsigned i = 0; ok && i < stage_count; i++)
+        ok = gpu_uniforms_put(uniforms, &stages[i].text, error);
     ok = ok && build(device, name, stages, stage_count, error);
     for (unsigned i = 0; i < stage_count; i++) {
         gpu_source_finish(&stages[i].text);
         glDeleteShader(stages[i].shader);
     }
     if (ok)
-        program = add_program(device, name, source->compute != NULL, key);
+        program = add_program(device, &(struct gpu_program){.name = name, .uniforms = uniforms},
+                              source->compute != NULL, key);
     if (!program) {
+        gpu_uniforms_destroy(uniforms);
         gpu_object_destroy(device->registry, GPU_PROGRAM, name);
         error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a program"); /* unless a reason stands there */
     }
@@ -210,38 +220,10 @@ const struct gpu_program *gpu_program_get(struct gpu_device *device, const struc
     return create_program(device, source, key, error);
 }
 
-void gpu_uniform_uint(const struct gpu_program *program, const char *name, uint32_t value)
+void gpu_program_use(struct gpu_device *device, const struct gpu_program *program)
 {
-    glProgramUniform1ui(program->name, glGetUniformLocation(program->name, name), value);
-}
-
-void gpu_uniform_int(const struct gpu_program *program, const char *name, int32_t value)
-{
-    glProgramUniform1i(program->name, glGetUniformLocation(program->name, name), value);
-}
-
-void gpu_uniform_float(const struct gpu_program *program, const char *name, float value)
-{
-    glProgramUniform1f(program->name, glGetUniformLocation(program->name, name), value);
-}
-
-void gpu_uniform_vec(const struct gpu_program *program, const char *name, unsigned components, const float *value)
-{
-    GLint location = glGetUniformLocation(program->name, name);
-    switch (components) {
-    case 1:
-        glProgramUniform1fv(program->name, location, 1, value);
-        break;
-    case 2:
-        glProgramUniform2fv(program->name, location, 1, value);
-        break;
-    case 3:
-        glProgramUniform3fv(program->name, location, 1, value);
-        break;
-    default:
-        glProgramUniform4fv(program->name, location, 1, value);
-        break;
-    }
+    glUseProgram(program->name);
+    gpu_uniforms_bind(device, program->uniforms);
 }
 
 void gpu_dispatch(struct gpu_device *device, const struct gpu_program *program, uint64_t items)
@@ -251,14 +233,14 @@ void gpu_dispatch(struct gpu_device *device, const struct gpu_program *program, 
     uint64_t groups = (items + program->group_size - 1) / program->group_size;
     uint64_t groups_x = groups < device->facts.work_groups_max ? groups : device->facts.work_groups_max;
     uint64_t groups_y = (groups + groups_x - 1) / groups_x;
-    glUseProgram(program->name);
+    gpu_program_use(device, program);
     glDispatchCompute((GLuint)groups_x, (GLuint)groups_y, 1);
     glMemoryBarrier(GL_ALL_BARRIER_BITS);
 }
 
 void gpu_dispatch_indirect(const struct gpu_program *program, const struct gpu_buffer *groups, size_t offset_bytes)
 {
-    glUseProgram(program->name);
+    gpu_program_use(gpu_device_current(), program);
     glBindBuffer(GL_DISPATCH_INDIRECT_BUFFER, groups->name);
     glDispatchComputeIndirect((GLintptr)offset_bytes);
     glMemoryBarrier(GL_ALL_BARRIER_BITS);

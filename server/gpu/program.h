@@ -27,19 +27,25 @@ struct gpu_program_source {
 };
 
 struct gpu_program {
-    unsigned name;       /* GL program */
-    uint32_t group_size; /* compute: local_size_x * y * z */
+    unsigned name;                 /* GL program */
+    uint32_t group_size;           /* compute: local_size_x * y * z */
+    struct gpu_uniforms *uniforms; /* their values, see gpu/uniforms.h */
 };
 
 /* The cached program, or compiles it. The device owns it. NULL and *error with the compiler's log. */
 const struct gpu_program *gpu_program_get(struct gpu_device *device, const struct gpu_program_source *source,
                                           struct error *error);
 
-/* Uniforms by name; unknown names are ignored by GL, as optimised-out ones are. */
+/* Uniforms by name, "name[1]" of an array: what the next dispatch, or gpu_program_use(), hands to the device. They
+ * stay until they are set again and are zero at first. A name that the program does not have is ignored; one of
+ * another type makes gpu_check() fail. */
 void gpu_uniform_uint(const struct gpu_program *program, const char *name, uint32_t value);
 void gpu_uniform_int(const struct gpu_program *program, const char *name, int32_t value);
 void gpu_uniform_float(const struct gpu_program *program, const char *name, float value);
 void gpu_uniform_vec(const struct gpu_program *program, const char *name, unsigned components, const float *value);
+
+/* For draws, after the values are set; a dispatch does it. */
+void gpu_program_use(struct gpu_device *device, const struct gpu_program *program);
 
 /* Dispatches ceil(items / local size) groups on x, then glMemoryBarrier(GL_ALL_BARRIER_BITS). More than
  * facts.work_groups_max groups are spread over y; the shader finds its item with

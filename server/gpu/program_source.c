@@ -191,6 +191,17 @@ bool gpu_source_expand(struct gpu_source_text *text, gpu_source_lookup lookup, c
     return ok;
 }
 
+bool gpu_source_insert(struct gpu_source_text *text, size_t offset, const char *bytes, size_t length,
+                       struct error *error)
+{
+    const size_t behind = text->length - offset;
+    if (!append(text, bytes, length, error)) /* only makes room */
+        return false;
+    memmove(text->text + offset + length, text->text + offset, behind);
+    memcpy(text->text + offset, bytes, length);
+    return true;
+}
+
 void gpu_source_finish(struct gpu_source_text *text)
 {
     free(text->text);

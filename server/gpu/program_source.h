@@ -30,6 +30,9 @@ bool gpu_source_lookup_embedded(const char *path, size_t path_length, const char
 /* `#version`, the defines, then the file with everything that it includes. */
 bool gpu_source_expand(struct gpu_source_text *text, gpu_source_lookup lookup, const char *path,
                        const struct gpu_define *defines, struct error *error);
+/* Lines behind it keep their numbers where a #line stands between. */
+bool gpu_source_insert(struct gpu_source_text *text, size_t offset, const char *bytes, size_t length,
+                       struct error *error);
 void gpu_source_finish(struct gpu_source_text *text);
 /* A driver's log with the file numbers at the start of lines ("3:17(5): error", "3(17) : error") turned into
  * names; cut off where `size` ends. */

@@ -91,8 +91,6 @@ const struct gpu_program *context_use_with(struct render_context *context, const
 {
     const struct gpu_program_source source = {.compute = compute, .defines = defines};
     const struct gpu_program *program = gpu_program_get(context->device, &source, error);
-    if (program)
-        glUseProgram(program->name);
     return program;
 }
 

@@ -41,7 +41,7 @@ void primary_finish(struct primary *primary, struct gpu_device *device)
     gpu_texture_finish(device, &primary->depth);
 }
 
-static const struct gpu_program *use_program(struct render_context *context, enum primitive_kind kind, bool cutout,
+static const struct gpu_program *get_program(struct render_context *context, enum primitive_kind kind, bool cutout,
                                              struct error *error)
 {
     static const char *const numbers[] = {"0", "1", "2"};
@@ -53,10 +53,7 @@ static const struct gpu_program *use_program(struct render_context *context, enu
     };
     const struct gpu_program_source source = {
         .vertex = "render/primary.vert", .fragment = "render/primary.frag", .defines = defines};
-    const struct gpu_program *program = gpu_program_get(context->device, &source, error);
-    if (program)
-        glUseProgram(program->name);
-    return program;
+    return gpu_program_get(context->device, &source, error);
 }
 
 /* What is drawn one after the other, each under one program. */
@@ -97,7 +94,7 @@ static bool draw_sort(struct primary *primary, struct render_context *context, u
         uint32_t first, count = primitives_of(scene, sort, primary->instance, &first) - primary->primitive;
         if (count == 0)
             continue;
-        if (!program && !(program = use_program(context, kind, has_cutout(context, sort), error)))
+        if (!program && !(program = get_program(context, kind, has_cutout(context, sort), error)))
             return false;
         uint32_t maximum = *budget / vertices_per_primitive[kind], part = count < maximum ? count : maximum;
         if (sort == SORT_SPHERES) /* the picture's y runs down, which turns every winding round */
@@ -105,6 +102,7 @@ static bool draw_sort(struct primary *primary, struct render_context *context, u
         gpu_uniform_uint(program, "instance_index", primary->instance);
         gpu_uniform_uint(program, "first_primitive", first + primary->primitive);
         gpu_uniform_uint(program, "first_row", primary->first_row);
+        gpu_program_use(context->device, program);
         if (part > 0)
             glDrawArrays(GL_TRIANGLES, 0, (GLsizei)(part * vertices_per_primitive[kind]));
         *budget -= part * vertices_per_primitive[kind];
@@ -210,7 +208,6 @@ static bool make_rays(const struct primary *primary, struct render_context *cont
     if (!program)
         return false;
     context_bind(context);
-    glUseProgram(program->name);
     if (primary) {
         gpu_texture_bind(&primary->visible, UNIT_PASS_0);
         gpu_uniform_uint(program, "first_row", primary->first_row);
@@ -238,7 +235,6 @@ static bool fill_hits(struct render_context *context, struct error *error)
     if (!program)
         return false;
     context_bind(context);
-    glUseProgram(program->name);
     gpu_buffer_bind_storage(&context->rays, BIND_RAYS);
     gpu_buffer_bind_storage(&context->hits, BIND_HITS);
     gpu_buffer_bind_storage(&context->hit_list, BIND_HIT_LIST);

@@ -73,10 +73,11 @@ layout(std430, binding = BIND_OPTICAL_DEPTHS) buffer depth_block { vec4 optical_
 #endif
 #endif
 
-#ifdef HAS_DISCS
 uniform uint disc_count;
+#ifdef HAS_DISCS
+#define DISC_COUNT disc_count
 #else
-const uint disc_count = 0u;
+#define DISC_COUNT 0u
 #endif
 
 bool is_alive(trace_ray r)
@@ -110,7 +111,7 @@ trace_ray load_ray(uint ray_index)
 
 bool discs_any(trace_ray r, inout vec3 optical_depth)
 {
-    for (uint i = 0u; i < disc_count; i++) {
+    for (uint i = 0u; i < DISC_COUNT; i++) {
         candidate found = candidate(0.0, i, HIT_NO_PRIMITIVE, vec2(0.0));
         disc d = discs[i];
         if (intersect_disc(r.origin, r.direction, d.centre_radius.xyz, d.normal.xyz, d.centre_radius.w,
@@ -133,7 +134,7 @@ void store_visibility(uint ray_index, vec3 optical_depth)
 
 void discs_closest(trace_ray r, inout candidate best)
 {
-    for (uint i = 0u; i < disc_count; i++) {
+    for (uint i = 0u; i < DISC_COUNT; i++) {
         candidate found = candidate(0.0, i, HIT_NO_PRIMITIVE, vec2(0.0));
         disc d = discs[i];
         if (intersect_disc(r.origin, r.direction, d.centre_radius.xyz, d.normal.xyz, d.centre_radius.w,
@@ -255,7 +256,7 @@ void main()
         found[k] = candidate_none(r[k].t_max);
 #endif
     }
-    if (disc_count > 0u)
+    if (DISC_COUNT > 0u)
         look_at_discs(r, found);
 #ifdef ANY_HIT
     if (any_alive)

@@ -13,7 +13,7 @@
 #include "gpu/buffer.h"
 #include "gpu/device.h"
 #include "shared/bindings.h"
-#include "tests/accuracy/shader_probe.h"
+#include "tests/fixtures/shader_probe.h"
 
 #include <epoxy/gl.h>
 #include <string.h>
@@ -95,7 +95,7 @@ static inline void bsdf_probe_finish(struct bsdf_probe *probe)
 {
     gpu_buffer_finish(probe->device, &probe->questions);
     gpu_buffer_finish(probe->device, &probe->answers);
-    glDeleteProgram(probe->program.name);
+    shader_probe_finish(&probe->program);
 }
 
 static inline void bsdf_probe_ask(struct bsdf_probe *probe, const struct bsdf_question *questions, size_t count)
@@ -111,7 +111,6 @@ static inline void bsdf_probe_run(struct bsdf_probe *probe, const struct bsdf_ca
                                   struct bsdf_answer *answers)
 {
     struct error error = {0};
-    glUseProgram(probe->program.name);
     gpu_uniform_uint(&probe->program, "question_count", (uint32_t)count);
     gpu_uniform_uint(&probe->program, "chooses", chooses);
     gpu_uniform_vec(&probe->program, "material_", 4, &c->roughness);

@@ -5,14 +5,12 @@
 #include "tests/accuracy/render_fixture.h"
 
 #include "gpu/buffer.h"
-#include "gpu/program_source.h"
 #include "render/pixel_filter.h"
 #include "render/sequence.h"
 #include "shared/bindings.h"
 #include "shared/frame.h"
+#include "tests/fixtures/shader_probe.h"
 #include "tests/harness/test.h"
-
-#include <epoxy/gl.h>
 
 enum { WIDTH = 48, HEIGHT = 32 };
 
@@ -34,17 +32,6 @@ static const char twin_text[] =
     "                     sequence_number(seed, i >> 4, index), 0.0);\n"
     "}\n";
 
-static bool twin_lookup(const char *path, size_t length, const char **kept, const char **begin, const char **end)
-{
-    static const char own[] = "twin.comp";
-    if (length != strlen(own) || memcmp(path, own, length) != 0)
-        return gpu_source_lookup_embedded(path, length, kept, begin, end);
-    *kept = own;
-    *begin = twin_text;
-    *end = twin_text + strlen(twin_text);
-    return true;
-}
-
 ALL_TESTS(fixture_setup, fixture_teardown)
 EACH_TEST(fixture_clear, NULL)
 
@@ -54,14 +41,9 @@ TEST(the_device_has_the_hosts_numbers_to_the_bit)
     enum { COUNT = 4096 };
     static float values[COUNT][4];
     struct error error = {0};
-    struct gpu_source_text text = {0};
     struct gpu_buffer buffer = {0};
-    assert_true(gpu_source_expand(&text, twin_lookup, "twin.comp", NULL, &error));
-    const GLchar *source = text.text;
-    const struct gpu_program program = {glCreateShaderProgramv(GL_COMPUTE_SHADER, 1, &source), 64};
-    gpu_source_finish(&text);
+    struct gpu_program program = shader_probe_compile(twin_text, NULL);
     assert_true(gpu_buffer_reserve(fixture->device, &buffer, sizeof(values), &error));
-    glUseProgram(program.name);
     gpu_uniform_uint(&program, "count", COUNT);
     gpu_buffer_bind_storage(&buffer, BIND_PASS_0);
     gpu_dispatch(fixture->device, &program, COUNT);
@@ -75,7 +57,7 @@ TEST(the_device_has_the_hosts_numbers_to_the_bit)
         assert_memory_equal(values[i], expected, sizeof(expected));
     }
     gpu_buffer_finish(fixture->device, &buffer);
-    glDeleteProgram(program.name);
+    shader_probe_finish(&program);
 }
 
 /* ---- the pixel filter ---- */

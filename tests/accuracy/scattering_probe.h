@@ -13,7 +13,7 @@
 #include "gpu/buffer.h"
 #include "gpu/device.h"
 #include "shared/bindings.h"
-#include "tests/accuracy/shader_probe.h"
+#include "tests/fixtures/shader_probe.h"
 
 #include <epoxy/gl.h>
 #include <stdlib.h>
@@ -87,7 +87,7 @@ static inline void probe_finish(struct probe *probe)
     gpu_buffer_finish(probe->device, &probe->directions);
     gpu_buffer_finish(probe->device, &probe->values);
     gpu_buffer_finish(probe->device, &probe->splits);
-    glDeleteProgram(probe->program.name);
+    shader_probe_finish(&probe->program);
 }
 
 /* values[case * direction_count + j]: the BRDF, without the cosine. The directions (x, y, z, anything) are those
@@ -103,7 +103,6 @@ static inline void probe_run(struct probe *probe, const struct probe_case *cases
     assert_true(gpu_buffer_upload(probe->device, &probe->directions, directions, directions_bytes, &error));
     assert_true(gpu_buffer_reserve(probe->device, &probe->values, item_count * sizeof(*values), &error));
     assert_true(gpu_buffer_reserve(probe->device, &probe->splits, case_count * sizeof(*splits), &error));
-    glUseProgram(probe->program.name);
     gpu_uniform_uint(&probe->program, "case_count", (uint32_t)case_count);
     gpu_uniform_uint(&probe->program, "direction_count", (uint32_t)direction_count);
     gpu_uniform_uint(&probe->program, "direction_stride", own_directions ? (uint32_t)direction_count : 0);

@@ -140,8 +140,6 @@ const struct gpu_program *svo_use(struct svo_tree *tree, const char *path, const
     const struct gpu_define defines[] = {{define, "1"}, {0}};
     const struct gpu_program *program = gpu_program_get(
         tree->device, &(struct gpu_program_source){.compute = path, .defines = define ? defines : NULL}, error);
-    if (program)
-        glUseProgram(program->name);
     return program;
 }
 

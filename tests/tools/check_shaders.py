@@ -85,6 +85,7 @@ DIRECTIVE = re.compile(r"^[ \t]*#[ \t]*(include|version)\b[ \t]*(.*?)[ \t]*$")
 QUOTED = re.compile(r'^"([^"]*)"')
 ASKED = re.compile(r"^[ \t]*#[ \t]*(?:ifdef[ \t]+(\w+)|(?:el)?if\b(.*))", re.MULTILINE)
 OWN = re.compile(r"^[ \t]*#[ \t]*define[ \t]+(\w+)", re.MULTILINE)
+UNIFORM = re.compile(r"^[ \t]*uniform (\w+) ([^;]*);", re.MULTILINE)
 DEFINED = re.compile(r"\bdefined[ \t]*\(?[ \t]*(\w+)")
 STORAGE_BLOCK = re.compile(r"\bbuffer\s+\w+\s*\{")
 
@@ -119,6 +120,15 @@ def text_of(path, defines):
     head = ["#version 450 core"]
     head += [f"#define {name} {value}" for name, value in defines.items() if not value.startswith('"')]
     return "\n".join(head + expand(path, defines, files)) + "\n", files
+
+
+def with_block(texts):
+    """The uniforms of a program's stages in one block, as server/gpu/uniforms.c has them."""
+    members = {f"{kind} {name.strip()};": None for text in texts for kind, names in UNIFORM.findall(text)
+               for name in names.split(",")}
+    block = "layout(std140, binding = 2) uniform pass_block {" + " ".join(members) + "};\n" if members else ""
+    texts = [UNIFORM.sub("", text) for text in texts]
+    return [text.replace("#line 1 0\n", block + "#line 1 0\n", 1) for text in texts]
 
 
 def optional_defines(paths, chosen, all_chosen):
@@ -174,8 +184,8 @@ def complaints_of(batch):
     with tempfile.TemporaryDirectory() as folder:
         for number, (stages, defines) in enumerate(batch):
             shown = " ".join(f"{name}={value}" for name, value in defines.items())
-            for stage in stages:
-                text, names = text_of(stage, defines)
+            expanded = [text_of(stage, defines) for stage in stages]
+            for stage, text, (_, names) in zip(stages, with_block([text for text, _ in expanded]), expanded):
                 path = os.path.join(folder, f"variant{number}" + pathlib.Path(stage).suffix)
                 pathlib.Path(path).write_text(f"{text}\nstruct {END_OF_FILE} {{ int unused; }};\n")
                 files_of[path], programs[path] = names, f"{stages[0]} [{shown}]"

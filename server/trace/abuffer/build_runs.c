@@ -33,7 +33,6 @@ static const struct gpu_program *use(struct abuffer_task *task, const struct gpu
     const struct gpu_program *program = gpu_program_get(device, source, error);
     if (!program)
         return NULL;
-    glUseProgram(program->name);
     gpu_buffer_bind_texels(device, &builder->heads, UNIT_ABUFFER_HEADS, GL_R32UI);
     gpu_buffer_bind_texels(device, &builder->nodes, UNIT_ABUFFER_NODES, GL_RGBA32UI);
     gpu_buffer_bind_image(device, &task->store->samples, IMAGE_ABUFFER_SAMPLES, GL_RG32UI);

@@ -73,8 +73,6 @@ const struct gpu_program *ldc_use(struct gpu_device *device, const char *path, s
 {
     const struct gpu_program *program =
         gpu_program_get(device, &(struct gpu_program_source){.compute = path}, error);
-    if (program)
-        glUseProgram(program->name);
     return program;
 }
 

@@ -285,8 +285,8 @@ static bool draw_runs(struct axes_draw *draw, const struct gpu_scene *scene, con
         const struct gpu_program *program = get_program(draw, scene, pass, run->sort, error);
         if (!program)
             return false;
-        glUseProgram(program->name);
         set_uniforms(pass, program);
+        gpu_program_use(draw->device, program);
         draw_run(draw, run, first, end);
     }
     return true;

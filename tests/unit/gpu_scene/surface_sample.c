@@ -2,16 +2,14 @@
 /* The four words in which a sampled tracer stores a surface: the bits are where shaders/shared/surface_sample.h
  * says, and what is read back is what was stored, to their steps. */
 #include "gpu/buffer.h"
-#include "gpu/program.h"
-#include "gpu/program_source.h"
 #include "shared/bindings.h"
 #include "shared/surface_sample.h"
 #include "tests/fixtures/device.h"
+#include "tests/fixtures/shader_probe.h"
 #include "tests/harness/test.h"
 
 #include <stddef.h>
 
-#include <epoxy/gl.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -60,45 +58,14 @@ static const char probe_text[] =
     "    surfaces[k + 4u] = uvec4(floatBitsToUint(parts), sample_material(words[i]), 0u);\n"
     "}\n";
 
-static bool lookup(const char *path, size_t length, const char **kept, const char **begin, const char **end)
-{
-    static const char own[] = "probe.comp";
-    if (length != strlen(own) || memcmp(path, own, length) != 0)
-        return gpu_source_lookup_embedded(path, length, kept, begin, end);
-    *kept = own;
-    *begin = probe_text;
-    *end = probe_text + strlen(probe_text);
-    return true;
-}
-
-static struct gpu_program compile(void)
-{
-    struct error error = {0};
-    struct gpu_source_text text = {0};
-    if (!gpu_source_expand(&text, lookup, "probe.comp", NULL, &error))
-        fail_msg("%s", error.text);
-    const GLchar *source = text.text;
-    struct gpu_program program = {glCreateShaderProgramv(GL_COMPUTE_SHADER, 1, &source), 64};
-    GLint linked = GL_FALSE;
-    glGetProgramiv(program.name, GL_LINK_STATUS, &linked);
-    if (!linked) {
-        char log[2048] = "";
-        glGetProgramInfoLog(program.name, sizeof(log), NULL, log);
-        fail_msg("%s", log);
-    }
-    gpu_source_finish(&text);
-    return program;
-}
-
 /* Stores each and reads it back in its place. */
 static void store(struct surface *surfaces, uint32_t (*words)[4], uint32_t count)
 {
     struct error error = {0};
-    struct gpu_program program = compile();
+    struct gpu_program program = shader_probe_compile(probe_text, NULL);
     struct gpu_buffer surface_buffer = {0}, word_buffer = {0};
     assert_true(gpu_buffer_upload(device, &surface_buffer, surfaces, count * sizeof(*surfaces), &error));
     assert_true(gpu_buffer_reserve(device, &word_buffer, count * sizeof(*words), &error));
-    glUseProgram(program.name);
     gpu_uniform_uint(&program, "count", count);
     gpu_buffer_bind_storage(&surface_buffer, BIND_PASS_0);
     gpu_buffer_bind_storage(&word_buffer, BIND_PASS_1);
@@ -107,7 +74,7 @@ static void store(struct surface *surfaces, uint32_t (*words)[4], uint32_t count
     gpu_buffer_read(device, &word_buffer, 0, words, count * sizeof(*words));
     gpu_buffer_finish(device, &surface_buffer);
     gpu_buffer_finish(device, &word_buffer);
-    glDeleteProgram(program.name);
+    shader_probe_finish(&program);
 }
 
 ALL_TESTS(open_device, close_device)
