@@ -2,6 +2,7 @@
 #include "gpu/buffer.h"
 
 #include "base/progress.h"
+#include "gpu/barrier.h"
 #include "gpu/registry.h"
 
 #include <epoxy/gl.h>
@@ -80,8 +81,8 @@ bool gpu_buffer_upload(struct gpu_device *device, struct gpu_buffer *buffer, con
 {
     if (!gpu_buffer_reserve(device, buffer, size_bytes, error))
         return false;
-    if (data && size_bytes)
-        glNamedBufferSubData(buffer->name, 0, (GLsizeiptr)size_bytes, data);
+    if (data)
+        gpu_buffer_write(device, buffer, 0, data, size_bytes);
     return true;
 }
 
@@ -89,6 +90,7 @@ void *gpu_buffer_map(struct gpu_device *device, struct gpu_buffer *buffer, size_
 {
     if (!gpu_buffer_reserve(device, buffer, size_bytes ? size_bytes : 1, error))
         return NULL;
+    gpu_await(device, GL_BUFFER_UPDATE_BARRIER_BIT);
     void *data = glMapNamedBufferRange(buffer->name, 0, (GLsizeiptr)buffer->size_bytes,
                                        GL_MAP_WRITE_BIT | GL_MAP_INVALIDATE_BUFFER_BIT);
     if (data)
@@ -107,7 +109,7 @@ void gpu_buffer_unmap(struct gpu_device *device, struct gpu_buffer *buffer)
 void gpu_buffer_write(struct gpu_device *device, struct gpu_buffer *buffer, size_t offset_bytes, const void *data,
                       size_t size_bytes)
 {
-    (void)device;
+    gpu_await(device, GL_BUFFER_UPDATE_BARRIER_BIT);
     if (size_bytes)
         glNamedBufferSubData(buffer->name, (GLintptr)offset_bytes, (GLsizeiptr)size_bytes, data);
     progress_tell();
@@ -119,13 +121,13 @@ void gpu_buffer_read(struct gpu_device *device, const struct gpu_buffer *buffer,
     if (!size_bytes)
         return;
     device->waits++;
-    glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
+    gpu_await(device, GL_BUFFER_UPDATE_BARRIER_BIT);
     glGetNamedBufferSubData(buffer->name, (GLintptr)offset_bytes, (GLsizeiptr)size_bytes, data);
 }
 
 void gpu_buffer_clear(struct gpu_device *device, struct gpu_buffer *buffer, uint32_t value)
 {
-    (void)device;
+    gpu_await(device, GL_BUFFER_UPDATE_BARRIER_BIT);
     if (buffer->name)
         glClearNamedBufferData(buffer->name, GL_R32UI, GL_RED_INTEGER, GL_UNSIGNED_INT, &value);
 }
@@ -133,10 +135,27 @@ void gpu_buffer_clear(struct gpu_device *device, struct gpu_buffer *buffer, uint
 void gpu_buffer_clear_part(struct gpu_device *device, struct gpu_buffer *buffer, size_t offset_bytes,
                            size_t size_bytes, uint32_t value)
 {
-    (void)device;
+    gpu_await(device, GL_BUFFER_UPDATE_BARRIER_BIT);
     if (buffer->name && size_bytes > 0)
         glClearNamedBufferSubData(buffer->name, GL_R32UI, (GLintptr)offset_bytes, (GLsizeiptr)size_bytes,
                                   GL_RED_INTEGER, GL_UNSIGNED_INT, &value);
+}
+
+void gpu_buffer_fill(struct gpu_device *device, struct gpu_buffer *buffer, size_t offset_bytes, size_t size_bytes,
+                     const uint32_t words[4])
+{
+    gpu_await(device, GL_BUFFER_UPDATE_BARRIER_BIT);
+    if (buffer->name && size_bytes > 0)
+        glClearNamedBufferSubData(buffer->name, GL_RGBA32UI, (GLintptr)offset_bytes, (GLsizeiptr)size_bytes,
+                                  GL_RGBA_INTEGER, GL_UNSIGNED_INT, words);
+}
+
+void gpu_buffer_copy(struct gpu_device *device, struct gpu_buffer_place from, struct gpu_buffer_place to,
+                     size_t size_bytes)
+{
+    gpu_await(device, GL_BUFFER_UPDATE_BARRIER_BIT);
+    glCopyNamedBufferSubData(from.buffer->name, to.buffer->name, (GLintptr)from.offset_bytes,
+                             (GLintptr)to.offset_bytes, (GLsizeiptr)size_bytes);
 }
 
 void gpu_buffer_finish(struct gpu_device *device, struct gpu_buffer *buffer)

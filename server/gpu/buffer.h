@@ -38,6 +38,16 @@ void gpu_buffer_clear(struct gpu_device *device, struct gpu_buffer *buffer, uint
 /* A part of it, in whole u32. */
 void gpu_buffer_clear_part(struct gpu_device *device, struct gpu_buffer *buffer, size_t offset_bytes,
                            size_t size_bytes, uint32_t value);
+/* The same with four words over and over, in whole fours. */
+void gpu_buffer_fill(struct gpu_device *device, struct gpu_buffer *buffer, size_t offset_bytes, size_t size_bytes,
+                     const uint32_t words[4]);
+/* A part of one to a place in another one. */
+struct gpu_buffer_place {
+    const struct gpu_buffer *buffer;
+    size_t offset_bytes;
+};
+void gpu_buffer_copy(struct gpu_device *device, struct gpu_buffer_place from, struct gpu_buffer_place to,
+                     size_t size_bytes);
 void gpu_buffer_finish(struct gpu_device *device, struct gpu_buffer *buffer); /* leaves it empty */
 
 /* SSBO; an empty one is bound as a few zeros. */

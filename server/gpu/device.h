@@ -41,6 +41,12 @@ struct gpu_uniform_ring {
     uint32_t turn;            /* how often its memory was exchanged for fresh memory */
 };
 
+/* Ways in which what shaders wrote cannot be accessed yet, GL_*_BARRIER_BITs; private to barrier.c. */
+struct gpu_unseen {
+    unsigned before, together; /* by passes that the next one waits for, and that it does not */
+    bool are_together;
+};
+
 struct gpu_device {
     struct gpu_device_info info;
     struct gpu_facts facts;
@@ -49,6 +55,7 @@ struct gpu_device {
     struct gpu_program_cache *programs; /* private to program.c */
     unsigned empty_buffer;              /* 256 zero bytes, bound in place of an empty buffer */
     struct gpu_uniform_ring uniform_ring;
+    struct gpu_unseen unseen;
     const char *misused_uniform;  /* one that was given a value of another type; NULL: none */
     uint64_t memory_used_bytes;   /* counted by gpu_memory_take: buffers, textures, Embree */
     uint64_t memory_limit_bytes;  /* 0: none; facts.memory_bytes at first */

@@ -3,6 +3,7 @@
 
 #include "base/log.h"
 #include "base/progress.h"
+#include "gpu/barrier.h"
 #include "gpu/program_cache.h"
 #include "gpu/program_source.h"
 #include "gpu/registry.h"
@@ -182,24 +183,26 @@ static const struct gpu_program *create_program(struct gpu_device *device, const
     bool ok = name != 0;
     if (!ok)
         gpu_note_loss(device, error);
-    struct gpu_uniforms *uniforms = gpu_uniforms_create();
-    ok = ok && uniforms;
+    struct gpu_program made = {.name = name, .uniforms = gpu_uniforms_create()};
+    ok = ok && made.uniforms;
     for (unsigned i = 0; ok && i < stage_count; i++)
         ok = gpu_source_expand(&stages[i].text, gpu_source_lookup_embedded, stages[i].path, source->defines,
                                error) &&
-             gpu_uniforms_take(uniforms, &stages[i].text, source->defines, error);
-    for (unsigned i = 0; ok && i < stage_count; i++)
-        ok = gpu_uniforms_put(uniforms, &stages[i].text, error);
-    ok = ok && build(device, name, stages, stage_count, error);
+             gpu_uniforms_take(made.uniforms, &stages[i].text, source->defines, error);
+    for (unsigned i = 0; ok && i < stage_count; i++) {
+        gpu_accesses_add(&made, stages[i].text.text);
+        ok = gpu_uniforms_put(made.uniforms, &stages[i].text, error);
+    }
+    ok = ok && build(device, name, stages, stage_count, error) &&
+         (!device->facts.debug_output || gpu_accesses_check(&made, error));
     for (unsigned i = 0; i < stage_count; i++) {
         gpu_source_finish(&stages[i].text);
         glDeleteShader(stages[i].shader);
     }
     if (ok)
-        program = add_program(device, &(struct gpu_program){.name = name, .uniforms = uniforms},
-                              source->compute != NULL, key);
+        program = add_program(device, &made, source->compute != NULL, key);
     if (!program) {
-        gpu_uniforms_destroy(uniforms);
+        gpu_uniforms_destroy(made.uniforms);
         gpu_object_destroy(device->registry, GPU_PROGRAM, name);
         error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a program"); /* unless a reason stands there */
     }
@@ -220,10 +223,16 @@ const struct gpu_program *gpu_program_get(struct gpu_device *device, const struc
     return create_program(device, source, key, error);
 }
 
-void gpu_program_use(struct gpu_device *device, const struct gpu_program *program)
+static void begin_pass(struct gpu_device *device, const struct gpu_program *program, unsigned accesses)
 {
     glUseProgram(program->name);
     gpu_uniforms_bind(device, program->uniforms);
+    gpu_await_pass(device, program, accesses);
+}
+
+void gpu_program_use(struct gpu_device *device, const struct gpu_program *program)
+{
+    begin_pass(device, program, GL_COMMAND_BARRIER_BIT | GL_VERTEX_ATTRIB_ARRAY_BARRIER_BIT);
 }
 
 void gpu_dispatch(struct gpu_device *device, const struct gpu_program *program, uint64_t items)
@@ -233,15 +242,13 @@ void gpu_dispatch(struct gpu_device *device, const struct gpu_program *program, 
     uint64_t groups = (items + program->group_size - 1) / program->group_size;
     uint64_t groups_x = groups < device->facts.work_groups_max ? groups : device->facts.work_groups_max;
     uint64_t groups_y = (groups + groups_x - 1) / groups_x;
-    gpu_program_use(device, program);
+    begin_pass(device, program, 0);
     glDispatchCompute((GLuint)groups_x, (GLuint)groups_y, 1);
-    glMemoryBarrier(GL_ALL_BARRIER_BITS);
 }
 
 void gpu_dispatch_indirect(const struct gpu_program *program, const struct gpu_buffer *groups, size_t offset_bytes)
 {
-    gpu_program_use(gpu_device_current(), program);
+    begin_pass(gpu_device_current(), program, GL_COMMAND_BARRIER_BIT);
     glBindBuffer(GL_DISPATCH_INDIRECT_BUFFER, groups->name);
     glDispatchComputeIndirect((GLintptr)offset_bytes);
-    glMemoryBarrier(GL_ALL_BARRIER_BITS);
 }

@@ -30,6 +30,7 @@ struct gpu_program {
     unsigned name;                 /* GL program */
     uint32_t group_size;           /* compute: local_size_x * y * z */
     struct gpu_uniforms *uniforms; /* their values, see gpu/uniforms.h */
+    unsigned accesses;             /* to buffers, see gpu/barrier.h; 0: any */
 };
 
 /* The cached program, or compiles it. The device owns it. NULL and *error with the compiler's log. */
@@ -44,10 +45,10 @@ void gpu_uniform_int(const struct gpu_program *program, const char *name, int32_
 void gpu_uniform_float(const struct gpu_program *program, const char *name, float value);
 void gpu_uniform_vec(const struct gpu_program *program, const char *name, unsigned components, const float *value);
 
-/* For draws, after the values are set; a dispatch does it. */
+/* Before each draw, after the values are set; a dispatch does it. */
 void gpu_program_use(struct gpu_device *device, const struct gpu_program *program);
 
-/* Dispatches ceil(items / local size) groups on x, then glMemoryBarrier(GL_ALL_BARRIER_BITS). More than
+/* Dispatches ceil(items / local size) groups on x, behind the passes whose writes it may access. More than
  * facts.work_groups_max groups are spread over y; the shader finds its item with
  * `item_index()` of common/dispatch.glsl. */
 void gpu_dispatch(struct gpu_device *device, const struct gpu_program *program, uint64_t items);

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "gpu/readback.h"
 
+#include "gpu/barrier.h"
 #include "gpu/registry.h"
 
 #include <epoxy/gl.h>
@@ -55,7 +56,7 @@ bool gpu_readback_copy(struct gpu_device *device, struct gpu_readback *readback,
     if (!reserve(device, readback, size_bytes, error))
         return false;
     readback->size_bytes = size_bytes;
-    glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
+    gpu_await(device, GL_BUFFER_UPDATE_BARRIER_BIT);
     glCopyNamedBufferSubData(from->name, readback->name, 0, 0, (GLsizeiptr)size_bytes);
     return true;
 }

@@ -4,6 +4,7 @@
  * uploaded. */
 #include "gpu_scene/deform.h"
 
+#include "gpu/barrier.h"
 #include "gpu/program.h"
 #include "scene/affine.h"
 #include "shared/bindings.h"
@@ -285,8 +286,10 @@ static bool run_passes(struct work *work, struct scene_changes *changes, struct 
     gpu_push_group(gpu->device, "deform");
     bind(gpu);
     bool ok = true;
+    gpu_together_begin(gpu->device); /* each has vertices of its own */
     for (uint32_t i = 0; ok && i < work->pass_count; i++)
         ok = run_pass(work, &work->passes[i], error);
+    gpu_together_end(gpu->device);
     gpu_pop_group(gpu->device);
     return ok;
 }

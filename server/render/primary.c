@@ -180,7 +180,6 @@ bool primary_rasterise(struct primary *primary, struct render_context *context, 
     bool drawn = draw_part(primary, context, error);
     glDisable(GL_DEPTH_TEST);
     glBindFramebuffer(GL_FRAMEBUFFER, 0);
-    glMemoryBarrier(GL_ALL_BARRIER_BITS);
     *done = primary->sort == SORT_COUNT;
     if (!*done || context->device->facts.software)
         gpu_finish(context->device); /* else all parts would be waited for at the end, at once */

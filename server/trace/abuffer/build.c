@@ -98,7 +98,8 @@ static bool copy_drawn(struct abuffer_task *task, struct error *error)
     struct abuffer_store *store = task->store;
     if (!gpu_buffer_reserve(store->device, &store->drawn, draw->drawn.size_bytes, error))
         return false;
-    glCopyNamedBufferSubData(draw->drawn.name, store->drawn.name, 0, 0, (GLsizeiptr)draw->drawn.size_bytes);
+    gpu_buffer_copy(store->device, (struct gpu_buffer_place){&draw->drawn, 0},
+                    (struct gpu_buffer_place){&store->drawn, 0}, draw->drawn.size_bytes);
     store->drawn_count = draw->drawn_count;
     return true;
 }

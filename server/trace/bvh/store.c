@@ -109,9 +109,9 @@ static bool resize(struct gpu_device *device, struct gpu_buffer *buffer, size_t 
     }
     for (uint32_t i = 0; i < move_count; i++)
         if (moves[i].count > 0)
-            glCopyNamedBufferSubData(buffer->name, bigger.name, (GLintptr)(moves[i].from * item_bytes),
-                                     (GLintptr)(moves[i].to * item_bytes),
-                                     (GLsizeiptr)(moves[i].count * item_bytes));
+            gpu_buffer_copy(device, (struct gpu_buffer_place){buffer, moves[i].from * item_bytes},
+                            (struct gpu_buffer_place){&bigger, moves[i].to * item_bytes},
+                            moves[i].count * item_bytes);
     gpu_buffer_finish(device, buffer);
     *buffer = bigger;
     return true;

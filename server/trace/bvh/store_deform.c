@@ -78,9 +78,8 @@ static bool make_bounds(struct bvh_store *store, struct gpu_scene *scene, struct
             continue;
         if (!bvh_refit_bounds(&entry_of(store, moved->geometry)->refit, device, &place, error))
             return false;
-        glCopyNamedBufferSubData(store->boxes.name, store->roots.name,
-                                 (GLintptr)moved->first_box * (GLintptr)sizeof(*roots),
-                                 (GLintptr)i * (GLintptr)sizeof(*roots), sizeof(*roots));
+        gpu_buffer_copy(device, (struct gpu_buffer_place){&store->boxes, moved->first_box * sizeof(*roots)},
+                        (struct gpu_buffer_place){&store->roots, i * sizeof(*roots)}, sizeof(*roots));
     }
     gpu_buffer_read(device, &store->roots, 0, roots, deforming->count * sizeof(*roots));
     return true;

@@ -28,9 +28,8 @@ static void clear_texels(struct ldc_task *task)
     static const float no_range[2] = {LDC_NO_DEPTH, -LDC_NO_DEPTH};
     uint32_t empty[4] = {0};
     memcpy(&empty[2], no_range, sizeof(no_range));
-    glClearNamedBufferSubData(
-        task->store->texels.name, GL_RGBA32UI, (GLintptr)task->cube->first_texel * LDC_TEXEL_BYTES,
-        (GLsizeiptr)task->texel_count * LDC_TEXEL_BYTES, GL_RGBA_INTEGER, GL_UNSIGNED_INT, empty);
+    gpu_buffer_fill(task->store->device, &task->store->texels, (size_t)task->cube->first_texel * LDC_TEXEL_BYTES,
+                    (size_t)task->texel_count * LDC_TEXEL_BYTES, empty);
 }
 
 void ldc_sample_defines(const struct ldc_task *task, struct gpu_define defines[LDC_SAMPLE_DEFINES_MAX])

@@ -57,12 +57,11 @@ static void bind_samples(struct ldc_cells *cells)
     gpu_buffer_bind_texels(store->device, &store->geometry, UNIT_TRACER_1, GL_RG32UI);
 }
 
-static void clear_nodes(struct gpu_buffer *nodes, uint64_t first, uint64_t count)
+static void clear_nodes(struct ldc_store *store, uint64_t first, uint64_t count)
 {
     const uint32_t zero[4] = {0};
-    if (count > 0)
-        glClearNamedBufferSubData(nodes->name, GL_RGBA32UI, (GLintptr)(first * CELL_NODE_BYTES),
-                                  (GLsizeiptr)(count * CELL_NODE_BYTES), GL_RGBA_INTEGER, GL_UNSIGNED_INT, zero);
+    gpu_buffer_fill(store->device, &store->nodes, (size_t)(first * CELL_NODE_BYTES),
+                    (size_t)(count * CELL_NODE_BYTES), zero);
 }
 
 static bool reserve_entries(struct ldc_cells *cells, struct error *error)
@@ -168,7 +167,7 @@ static bool place_blocks(struct ldc_cells *cells, struct error *error)
     }
     if (!ldc_levels_reserve(store, cells->which, nodes + counts->blocks, nodes, CELL_NODE_BYTES, error))
         return false;
-    clear_nodes(&store->nodes, cube->first_node + nodes, counts->blocks);
+    clear_nodes(store, cube->first_node + nodes, counts->blocks);
     cells->next = counts->blocks > 0 ? mark_cells : reach;
     return true;
 }
@@ -181,7 +180,7 @@ static bool mark_blocks(struct ldc_cells *cells, struct error *error)
     cells->next = place_blocks;
     if (!ldc_levels_reserve(store, cells->which, nodes, 0, CELL_NODE_BYTES, error))
         return false;
-    clear_nodes(&store->nodes, cube->first_node, nodes);
+    clear_nodes(store, cube->first_node, nodes);
     if (cube->sample_count == 0)
         return true;
     bind_samples(cells);

@@ -86,8 +86,8 @@ bool ldc_store_grow(struct gpu_device *device, struct gpu_buffer *buffer, uint64
         gpu_buffer_finish(device, &grown);
         return false;
     }
-    glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
-    glCopyNamedBufferSubData(buffer->name, grown.name, 0, 0, (GLsizeiptr)kept_bytes);
+    gpu_buffer_copy(device, (struct gpu_buffer_place){buffer, 0}, (struct gpu_buffer_place){&grown, 0},
+                    (size_t)kept_bytes);
     gpu_buffer_finish(device, buffer);
     *buffer = grown;
     return true;

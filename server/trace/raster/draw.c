@@ -3,6 +3,7 @@
  * advances with the instance, so that no uniform has to be set between two of them; a primitive is one vertex. */
 #include "trace/raster/draw.h"
 
+#include "gpu/barrier.h"
 #include "gpu/registry.h"
 
 #include <epoxy/gl.h>
@@ -278,18 +279,22 @@ static bool run_has_any(const struct axes_draw *draw, const struct axes_run *run
 static bool draw_runs(struct axes_draw *draw, const struct gpu_scene *scene, const struct axes_pass *pass,
                       uint32_t first, uint32_t end, struct error *error)
 {
+    bool good = true;
+    gpu_together_begin(draw->device);
     for (uint32_t i = 0; i < draw->run_count; i++) {
         const struct axes_run *run = &draw->runs[i];
         if (!run_has_any(draw, run, first, end))
             continue;
         const struct gpu_program *program = get_program(draw, scene, pass, run->sort, error);
-        if (!program)
-            return false;
+        good = program != NULL;
+        if (!good)
+            break;
         set_uniforms(pass, program);
         gpu_program_use(draw->device, program);
         draw_run(draw, run, first, end);
     }
-    return true;
+    gpu_together_end(draw->device);
+    return good;
 }
 
 bool axes_draw_range(struct axes_draw *draw, const struct gpu_scene *scene, const struct axes_pass *pass,
@@ -309,7 +314,6 @@ bool axes_draw_range(struct axes_draw *draw, const struct gpu_scene *scene, cons
     glBindBuffer(GL_DRAW_INDIRECT_BUFFER, 0);
     glBindVertexArray((GLuint)vertex_array);
     glBindFramebuffer(GL_FRAMEBUFFER, 0);
-    glMemoryBarrier(GL_ALL_BARRIER_BITS);
     return drawn && gpu_check(draw->device, "drawing along the axes", error);
 }
 

@@ -1,0 +1,125 @@
+/* SPDX-License-Identifier: MIT */
+/* What is asked of the driver while a frame is made: calls that stall, or wait for more than they need, show in no
+ * picture. The device is taken for hardware, whatever it is. */
+#include "protocol/tracers.h"
+#include "render/layers.h"
+#include "tests/accuracy/render_fixture.h"
+#include "tests/harness/test.h"
+
+#include <epoxy/gl.h>
+
+/* In which passes access buffers. */
+#define KINDS                                                                                                     \
+    (GL_SHADER_STORAGE_BARRIER_BIT | GL_SHADER_IMAGE_ACCESS_BARRIER_BIT | GL_TEXTURE_FETCH_BARRIER_BIT |          \
+     GL_UNIFORM_BARRIER_BIT | GL_COMMAND_BARRIER_BIT | GL_VERTEX_ATTRIB_ARRAY_BARRIER_BIT |                       \
+     GL_BUFFER_UPDATE_BARRIER_BIT)
+
+static bool was_software;
+static PFNGLMEMORYBARRIERPROC barrier_of_driver;
+static PFNGLDISPATCHCOMPUTEPROC dispatch_of_driver;
+static PFNGLDISPATCHCOMPUTEINDIRECTPROC dispatch_indirect_of_driver;
+static PFNGLGETUNIFORMLOCATIONPROC location_of_driver;
+static struct {
+    unsigned locations, dispatches, barriers;
+    GLbitfield kinds;     /* that were waited for since the dispatch before */
+    GLbitfield all_kinds; /* in all */
+} calls;
+
+static GLint noted_location(GLuint program, const GLchar *name)
+{
+    calls.locations++;
+    return location_of_driver(program, name);
+}
+
+static void noted_barrier(GLbitfield kinds)
+{
+    calls.barriers++;
+    calls.kinds |= kinds;
+    calls.all_kinds |= kinds;
+    barrier_of_driver(kinds);
+}
+
+static void note_dispatch(void)
+{
+    calls.dispatches++;
+    calls.kinds = 0;
+}
+
+static void noted_dispatch(GLuint x, GLuint y, GLuint z)
+{
+    note_dispatch();
+    dispatch_of_driver(x, y, z);
+}
+
+static void noted_dispatch_indirect(GLintptr offset)
+{
+    if (!(calls.kinds & GL_COMMAND_BARRIER_BIT))
+        fail_msg("a dispatch whose size the device has written waits for 0x%x", calls.kinds);
+    note_dispatch();
+    dispatch_indirect_of_driver(offset);
+}
+
+static int watch_driver(void **state)
+{
+    struct error error = {0};
+    fixture_setup(state);
+    was_software = device->facts.software;
+    device->facts.software = false;
+    /* epoxy finds a function at its first call, and writes it where ours is to stand. */
+    const GLchar *nothing = "#version 450 core\nlayout(local_size_x = 1) in;\nvoid main() {}\n";
+    const GLuint program = glCreateShaderProgramv(GL_COMPUTE_SHADER, 1, &nothing);
+    glUseProgram(program);
+    glBindBuffer(GL_DISPATCH_INDIRECT_BUFFER, device->empty_buffer);
+    glDispatchCompute(1, 1, 1);
+    glDispatchComputeIndirect(0);
+    glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
+    (void)glGetUniformLocation(program, "none");
+    glDeleteProgram(program);
+    if (!gpu_check(device, "the first calls", &error))
+        fail_msg("%s", error.text);
+    barrier_of_driver = epoxy_glMemoryBarrier;
+    dispatch_of_driver = epoxy_glDispatchCompute;
+    dispatch_indirect_of_driver = epoxy_glDispatchComputeIndirect;
+    location_of_driver = epoxy_glGetUniformLocation;
+    epoxy_glMemoryBarrier = noted_barrier;
+    epoxy_glDispatchCompute = noted_dispatch;
+    epoxy_glDispatchComputeIndirect = noted_dispatch_indirect;
+    epoxy_glGetUniformLocation = noted_location;
+    return 0;
+}
+
+static int leave_driver(void **state)
+{
+    device->facts.software = was_software;
+    return fixture_teardown(state);
+}
+
+ALL_TESTS(watch_driver, leave_driver)
+EACH_TEST(fixture_clear, NULL)
+
+static const unsigned tracers[] = {TRACER_NAIVE, TRACER_BVH, TRACER_LDC, TRACER_ABUFFER};
+static const struct {
+    unsigned integrator, depth, samples;
+} forms[] = {{INTEGRATOR_WHITTED, 4, 1}, {INTEGRATOR_PATH, 4, 3}, {INTEGRATOR_AO, 1, 2}};
+
+TEST(passes_look_no_uniform_up_and_wait_for_kinds_of_access)
+{
+    struct fixture *fixture = *state;
+    fixture_mixture(fixture);
+    fixture->request.layers = (1u << LAYER_COUNT) - 1;
+    for (size_t i = 0; i < sizeof(forms) / sizeof(forms[0]); i++)
+        for (size_t k = 0; k < sizeof(tracers) / sizeof(tracers[0]); k++) {
+            memset(&calls, 0, sizeof(calls));
+            fixture->request.integrator = forms[i].integrator;
+            fixture->request.depth = forms[i].depth;
+            fixture->request.samples = forms[i].samples;
+            fixture->request.tracer = tracers[k];
+            fixture->request.primary = (i + k) % 2 ? PRIMARY_TRACE : PRIMARY_RASTER;
+            struct frame_result result = fixture_render(fixture);
+            frame_result_finish(&result);
+            assert_int_equal(calls.locations, 0);
+            assert_int_equal(calls.all_kinds & ~(GLbitfield)KINDS, 0);
+            assert_in_range(calls.dispatches, 5, UINT32_MAX);
+            assert_in_range(calls.barriers, 1, 2 * calls.dispatches);
+        }
+}
