@@ -190,7 +190,7 @@ static bool create_defaults(struct gpu_device *device, struct error *error)
     glNamedBufferStorage(device->empty_buffer, sizeof(zeros), zeros, 0);
     glPixelStorei(GL_PACK_ALIGNMENT, 1);
     glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
-    return gpu_check(device, "gpu_device_create", error);
+    return gpu_check_reset(device, "gpu_device_create", error);
 }
 
 struct gpu_device *gpu_device_create(const struct gpu_options *options, struct error *error)
@@ -301,7 +301,7 @@ void gpu_note_loss(struct gpu_device *device, struct error *error)
 
 bool gpu_check(struct gpu_device *device, const char *what, struct error *error)
 {
-    if (was_reset(device))
+    if (device->lost)
         return error_set(error, ERROR_DEVICE_LOST, NULL, "%s: the GL context was lost", what);
     const char *misused = device->misused_uniform;
     device->misused_uniform = NULL;
@@ -318,6 +318,12 @@ bool gpu_check(struct gpu_device *device, const char *what, struct error *error)
         return error_set(error, ERROR_DEVICE_LOST, NULL, "%s: the GL context was lost", what);
     enum error_code kind = first == GL_OUT_OF_MEMORY ? ERROR_OUT_OF_MEMORY : ERROR_INTERNAL;
     return error_set(error, kind, NULL, "%s: %s (0x%04x)", what, gl_error_name(first), first);
+}
+
+bool gpu_check_reset(struct gpu_device *device, const char *what, struct error *error)
+{
+    (void)was_reset(device);
+    return gpu_check(device, what, error);
 }
 
 void gpu_finish(struct gpu_device *device)

@@ -82,9 +82,12 @@ struct gpu_device *gpu_device_create(const struct gpu_options *options, struct e
 void gpu_device_destroy(struct gpu_device *device); /* accepts NULL; on the same thread */
 /* How many GL objects live in it, programs aside: each stays once it was needed. */
 size_t gpu_device_objects(const struct gpu_device *device);
-/* ERROR_DEVICE_LOST if the context was lost, ERROR_INTERNAL with the GL error if there is one (a bounded
- * number is read), else true. `what` names the caller. Cheap enough for once a pass. */
+/* ERROR_INTERNAL with the GL error if there is one (a bounded number is read), ERROR_DEVICE_LOST if the context is
+ * known to be lost or the error says so, else true. `what` names the caller. Cheap enough for once a pass. */
 bool gpu_check(struct gpu_device *device, const char *what, struct error *error);
+/* The same after the driver was asked whether the context was lost, which may go as far as the kernel: once for
+ * each slice and each step of building, and before what was read from the device goes out. */
+bool gpu_check_reset(struct gpu_device *device, const char *what, struct error *error);
 /* For where something else failed than gpu_check: sets ERROR_DEVICE_LOST if that is why, else nothing, so that the
  * caller sets its own error behind it (the first one stands). GL errors that were not read yet are gone. */
 void gpu_note_loss(struct gpu_device *device, struct error *error);

@@ -77,7 +77,7 @@ bool gpu_readback_take(struct gpu_device *device, struct gpu_readback *readback,
 {
     GLenum status = readback->fence ? glClientWaitSync(readback->fence, 0, 0) : GL_TIMEOUT_EXPIRED;
     device->waits += readback->fence && status == GL_TIMEOUT_EXPIRED;
-    while (readback->fence && status == GL_TIMEOUT_EXPIRED && gpu_check(device, "reading back", error))
+    while (readback->fence && status == GL_TIMEOUT_EXPIRED && gpu_check_reset(device, "reading back", error))
         status = glClientWaitSync(readback->fence, 0, WAIT_NS);
     gpu_readback_drop(readback);
     if (status != GL_ALREADY_SIGNALED && status != GL_CONDITION_SATISFIED) {

@@ -134,7 +134,7 @@ static bool update_parts(struct gpu_scene *gpu, const struct scene *scene, const
     if ((geometry || nodes || lights || (changes->bits & CHANGED_DEFORMED)) &&
         !gpu_scene_upload_lights(gpu, scene, motion, changes, error))
         return false;
-    return gpu_check(gpu->device, "scene upload", error);
+    return gpu_check_reset(gpu->device, "scene upload", error);
 }
 
 bool gpu_scene_is_current(const struct gpu_scene *gpu, const struct scene *scene,

@@ -205,7 +205,7 @@ static bool begin_slice(struct frame_renderer *renderer, struct error *error)
     layers_begin_slice(&renderer->work->layers);
     renderer->phase = PHASE_PRIMARY;
     return primary_begin_slice(rasterised(renderer), context, error) &&
-           gpu_check(renderer->device, "primary rays", error);
+           gpu_check_reset(renderer->device, "primary rays", error);
 }
 
 static bool find_primary(struct frame_renderer *renderer, struct error *error)

@@ -295,7 +295,7 @@ static bool get_ready(struct frame_renderer *renderer, struct error *error)
     context->spread = request->samples > 1 || request->accumulate;
     fill_filter(context);
     context->uniforms.seed = (uint32_t)(request->seed ^ request->seed >> 32);
-    if (!reserve_frame(renderer, error) || !gpu_check(renderer->device, "beginning a frame", error))
+    if (!reserve_frame(renderer, error) || !gpu_check_reset(renderer->device, "beginning a frame", error))
         return false;
     renderer->result.revision = renderer->shared->copy.revision;
     renderer->sample = renderer->plane = renderer->band = renderer->copied = 0;

@@ -47,7 +47,7 @@ bool picture_read_band(struct picture *picture, struct render_context *context, 
     context_span_begin(context, STAGE_READBACK);
     gpu_buffer_read(context->device, &picture->resolved, 0, pixels, band_bytes(picture, context, plane, band));
     context_span_end(context);
-    return gpu_check(context->device, "reading the picture", error);
+    return gpu_check_reset(context->device, "reading the picture", error);
 }
 
 bool picture_copy_band(struct picture *picture, struct render_context *context, struct gpu_readback *copy,
@@ -68,5 +68,5 @@ bool picture_take_band(struct picture *picture, struct render_context *context, 
     uint64_t start_ns = clock_now_ns();
     bool taken = gpu_readback_take(context->device, copy, pixels, error);
     context_add_cpu_time(context, STAGE_READBACK, start_ns);
-    return taken;
+    return taken && gpu_check_reset(context->device, "reading the picture", error);
 }

@@ -134,7 +134,7 @@ enum tracer_progress tracer_update_step(struct tracer *tracer, struct gpu_scene 
     gpu_push_group(tracer->device, impl->name);
     tracer->step_end_ns = step_ns == STEP_WITHOUT_END ? STEP_WITHOUT_END : clock_now_ns() + step_ns;
     enum tracer_progress progress = impl->update(tracer, scene, &own, error);
-    bool good = progress != TRACER_FAILED && gpu_check(tracer->device, impl->name, error);
+    bool good = progress != TRACER_FAILED && gpu_check_reset(tracer->device, impl->name, error);
     gpu_pop_group(tracer->device);
     if (!good && progress == TRACER_MORE)
         impl->abandon(tracer);

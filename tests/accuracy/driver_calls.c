@@ -20,7 +20,7 @@ static PFNGLDISPATCHCOMPUTEPROC dispatch_of_driver;
 static PFNGLDISPATCHCOMPUTEINDIRECTPROC dispatch_indirect_of_driver;
 static PFNGLGETUNIFORMLOCATIONPROC location_of_driver;
 static struct {
-    unsigned locations, dispatches, barriers;
+    unsigned locations, resets, dispatches, barriers;
     GLbitfield kinds;     /* that were waited for since the dispatch before */
     GLbitfield all_kinds; /* in all */
 } calls;
@@ -29,6 +29,12 @@ static GLint noted_location(GLuint program, const GLchar *name)
 {
     calls.locations++;
     return location_of_driver(program, name);
+}
+
+static GLenum noted_reset(void)
+{
+    calls.resets++;
+    return GL_NO_ERROR;
 }
 
 static void noted_barrier(GLbitfield kinds)
@@ -75,7 +81,7 @@ static int watch_driver(void **state)
     glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
     (void)glGetUniformLocation(program, "none");
     glDeleteProgram(program);
-    if (!gpu_check(device, "the first calls", &error))
+    if (!gpu_check_reset(device, "the first calls", &error))
         fail_msg("%s", error.text);
     barrier_of_driver = epoxy_glMemoryBarrier;
     dispatch_of_driver = epoxy_glDispatchCompute;
@@ -85,6 +91,7 @@ static int watch_driver(void **state)
     epoxy_glDispatchCompute = noted_dispatch;
     epoxy_glDispatchComputeIndirect = noted_dispatch_indirect;
     epoxy_glGetUniformLocation = noted_location;
+    epoxy_glGetGraphicsResetStatus = noted_reset;
     return 0;
 }
 
@@ -122,4 +129,23 @@ TEST(passes_look_no_uniform_up_and_wait_for_kinds_of_access)
             assert_in_range(calls.dispatches, 5, UINT32_MAX);
             assert_in_range(calls.barriers, 1, 2 * calls.dispatches);
         }
+}
+
+/* Each slice has dozens of passes. */
+TEST(the_driver_is_not_asked_for_a_reset_in_every_pass)
+{
+    struct fixture *fixture = *state;
+    fixture_mixture(fixture);
+    fixture->request.integrator = INTEGRATOR_PATH;
+    fixture->request.depth = 4;
+    fixture->request.tracer = TRACER_BVH;
+    for (unsigned ahead = 0; ahead < 2; ahead++) {
+        frame_renderer_queue_ahead(fixture->renderer, ahead);
+        struct frame_result first = fixture_render(fixture);
+        memset(&calls, 0, sizeof(calls));
+        struct frame_result second = fixture_render(fixture);
+        assert_in_range(calls.resets, 1, calls.dispatches / 8);
+        frame_result_finish(&first);
+        frame_result_finish(&second);
+    }
 }

@@ -302,5 +302,5 @@ bool comparison_wave(struct comparison *comparison, const struct wave *wave, enu
         if (!settle(comparison, tally, wave->kind, &answers, suspects, error))
             return false;
     }
-    return gpu_check(comparison->device, "comparing a wave", error);
+    return gpu_check_reset(comparison->device, "comparing a wave", error);
 }
