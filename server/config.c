@@ -79,7 +79,8 @@ static const struct option options[] = {
     {"memory", "frames", ANYTIME, OPTION_BYTES, AT(limits.frame_bytes), "50%", MIB, 16 * TIB, "bytes",
      "Host memory of the frames of all jobs; a job that may need more waits for others to end"},
     {"memory", "device", START, OPTION_BYTES, AT(device_bytes), "0", 0, 16 * TIB, "bytes",
-     "Device memory; 0: 70 % of the device's own, or of the host's for software GL"},
+     "Device memory; 0: 70 % of the device's own, of the host's for software GL, 85 % of what is free where the driver "
+     "tells no more, 2 GiB (at most a quarter of the host's) where it tells nothing"},
 #define MEMORY_LIMIT(tracer, doc)                                                                                 \
     {"memory", #tracer, ANYTIME, OPTION_MEBIBYTES, AT(limits.tracers.tracer##_mebibytes), "0", 0, 16 * TIB, "bytes", \
      "The part of the device memory for " doc ". 0: no limit of its own"},

@@ -4,19 +4,31 @@
 #include "engine/engine_private.h"
 
 #include "base/clock.h"
+#include "base/host.h"
 #include "base/log.h"
 
-/* Share of the device's memory that is used if nothing is configured. */
-#define DEVICE_SHARE_PERCENT 70
+/* What is configured, or a share of what there is. */
+static uint64_t device_limit(const struct engine *engine)
+{
+    const struct gpu_memory *memory = &engine->device->facts.memory;
+    if (engine->options.device_bytes_limit)
+        return engine->options.device_bytes_limit;
+    const uint64_t bytes = gpu_memory_default_limit(memory, host_memory_bytes());
+    if (memory->source == GPU_MEMORY_UNTOLD)
+        log_write(
+            LOG_WARNING, "engine",
+            "the driver does not tell how much memory the device has; %llu MiB are used, unless memory.device "
+            "of the configuration says otherwise",
+            (unsigned long long)(bytes >> 20));
+    return bytes;
+}
 
 bool engine_open_device(struct engine *engine, struct error *error)
 {
     engine->device = engine->backend->device_create(&engine->options.gpu, error);
     if (!engine->device)
         return false;
-    engine->device_bytes_limit = engine->options.device_bytes_limit;
-    if (!engine->device_bytes_limit)
-        engine->device_bytes_limit = engine->device->facts.memory_bytes / 100 * DEVICE_SHARE_PERCENT;
+    engine->device_bytes_limit = device_limit(engine);
     engine->device->memory_limit_bytes = engine->device_bytes_limit;
     return true;
 }

@@ -56,7 +56,7 @@ struct engine_options {
     uint64_t frame_window_bytes; /* the same in bytes of pixels, if that means fewer frames; at least one frame; 0:
                                     default */
     struct engine_limits limits;
-    uint64_t device_bytes_limit; /* 0: 70 % of the device's memory, or no limit if the device does not tell it */
+    uint64_t device_bytes_limit;          /* 0: gpu_memory_default_limit() */
     const struct engine_backend *backend; /* NULL: the GPU; for tests */
     const struct engine_keeper *keeper;   /* NULL: scenes end with the process */
 };

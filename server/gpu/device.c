@@ -3,7 +3,6 @@
 
 #include "base/allocator.h"
 #include "base/clock.h"
-#include "base/host.h"
 #include "base/log.h"
 #include "base/prefault.h"
 #include "gpu/debug.h"
@@ -88,37 +87,15 @@ static void ask_facts(struct gpu_facts *facts, bool software, bool robust, bool 
         .robust = robust,
         .debug_output = debug,
         .has_program_binary = get_integer(GL_NUM_PROGRAM_BINARY_FORMATS) > 0,
-        .texture_buffer_texels_max = get_integer(GL_MAX_TEXTURE_BUFFER_SIZE),
         .storage_block_bytes_max = get_integer(GL_MAX_SHADER_STORAGE_BLOCK_SIZE),
         .work_groups_max = groups > 0 ? (uint32_t)groups : 65535,
-        .texture_size_max = (uint32_t)get_integer(GL_MAX_TEXTURE_SIZE),
-        .texture_layers_max = (uint32_t)get_integer(GL_MAX_ARRAY_TEXTURE_LAYERS),
     };
-    if (epoxy_has_gl_extension("GL_NVX_gpu_memory_info"))
-        facts->memory_bytes = get_integer(GL_GPU_MEMORY_INFO_TOTAL_AVAILABLE_MEMORY_NVX) * 1024;
-    else if (software)
-        facts->memory_bytes = host_memory_bytes();
-}
-
-/* What the shaders need beyond the minima of OpenGL 4.5; tests/tools/check_shaders.py checks that they need no
- * more. */
-static bool has_bindings(struct error *error)
-{
-    static const struct {
-        GLenum name;
-        unsigned min;
-        const char *what;
-    } rows[] = {
-        {GL_MAX_SHADER_STORAGE_BUFFER_BINDINGS, 16, "storage bindings"},
-        {GL_MAX_COMPUTE_SHADER_STORAGE_BLOCKS, 16, "storage blocks in compute shaders"},
-        {GL_MAX_VERTEX_SHADER_STORAGE_BLOCKS, 4, "storage blocks in vertex shaders"},
-        {GL_MAX_FRAGMENT_SHADER_STORAGE_BLOCKS, 8, "storage blocks in fragment shaders"},
-    };
-    for (size_t i = 0; i < sizeof(rows) / sizeof(rows[0]); i++)
-        if (get_integer(rows[i].name) < rows[i].min)
-            return error_set(error, ERROR_UNSUPPORTED, "device", "it has %u %s; %u are needed",
-                             (unsigned)get_integer(rows[i].name), rows[i].what, rows[i].min);
-    return true;
+    gpu_limits_ask(facts->limits);
+    facts->texture_buffer_texels_max = facts->limits[GPU_MAX_TEXTURE_BUFFER_SIZE];
+    facts->texture_size_max = (uint32_t)facts->limits[GPU_MAX_TEXTURE_SIZE];
+    facts->texture_layers_max = (uint32_t)facts->limits[GPU_MAX_ARRAY_TEXTURE_LAYERS];
+    const struct gpu_memory_answers answers = gpu_memory_ask(software);
+    facts->memory = gpu_memory_from(&answers);
 }
 
 size_t gpu_device_list(struct gpu_device_info *list, size_t max)
@@ -224,12 +201,12 @@ struct gpu_device *gpu_device_create(const struct gpu_options *options, struct e
         goto fail;
     }
     ask_facts(&device->facts, device->info.software, device->egl->robust, debug);
-    device->memory_limit_bytes = device->facts.memory_bytes;
+    device->memory_limit_bytes = device->facts.memory.bytes;
     if (device->facts.software && allocator_keeps_pages())
         device->prefault = prefault_create();
     if (debug)
         gpu_debug_start();
-    if (!has_bindings(error) || !create_defaults(device, error))
+    if (!gpu_limits_check(device->facts.limits, error) || !create_defaults(device, error))
         goto fail;
     return device;
 fail:

@@ -5,6 +5,8 @@
 #define FARLIGHT_GPU_DEVICE_H
 
 #include "base/error.h"
+#include "gpu/limits.h"
+#include "gpu/memory.h"
 
 #include <stdbool.h>
 #include <stddef.h>
@@ -30,7 +32,8 @@ struct gpu_facts {
     uint32_t work_groups_max;  /* on x; more is a GL error */
     uint32_t texture_size_max; /* texels along an edge of a 2D texture */
     uint32_t texture_layers_max;
-    uint64_t memory_bytes; /* device memory, of software GL the host's; 0: the driver does not tell */
+    uint64_t limits[GPU_LIMIT_COUNT];
+    struct gpu_memory memory;
 };
 
 /* Ranges of a buffer that passes have their uniforms in; private to uniforms.c. */
@@ -58,7 +61,7 @@ struct gpu_device {
     struct gpu_unseen unseen;
     const char *misused_uniform;  /* one that was given a value of another type; NULL: none */
     uint64_t memory_used_bytes;   /* counted by gpu_memory_take: buffers, textures, Embree */
-    uint64_t memory_limit_bytes;  /* 0: none; facts.memory_bytes at first */
+    uint64_t memory_limit_bytes;  /* 0: none; facts.memory.bytes at first */
     struct prefault *prefault;    /* of software GL; NULL: its reservations do not wait */
     uint64_t reserve_until_ns;    /* see gpu_reserve_begin; 0: whenever */
     size_t reserve_awaited_bytes; /* size of the reservation that was put off until prefaulted; 0: none was */

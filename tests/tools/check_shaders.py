@@ -58,8 +58,24 @@ STAGES = {"render/primary.vert": ["render/primary.vert", "render/primary.frag"],
           "ldc/build.frag": ["raster/draw.vert", "raster/draw.geom", "ldc/build.frag"],
           "abuffer/build.frag": ["raster/draw.vert", "raster/draw.geom", "abuffer/build.frag"],
           "svo/voxelise.frag": ["raster/draw.vert", "raster/draw.geom", "svo/voxelise.frag"]}
-# Storage blocks of a stage; server/gpu/device.c asks a driver for as many.
-STORAGE_BLOCKS_MAX = {".comp": 16, ".vert": 4, ".geom": 0, ".frag": 8}
+# What a stage declares, and the limit that is asked of a driver for it (server/gpu/limits.def); none: nothing is there.
+LIMITS = pathlib.Path("server/gpu/limits.def")
+LIMIT = re.compile(r"^LIMIT\((\w+), +(\d+),", re.MULTILINE)
+COUNTED = {
+    "storage blocks": (re.compile(r"\bbuffer\s+\w+\s*\{"),
+                       {".comp": "MAX_COMPUTE_SHADER_STORAGE_BLOCKS", ".vert": "MAX_VERTEX_SHADER_STORAGE_BLOCKS",
+                        ".frag": "MAX_FRAGMENT_SHADER_STORAGE_BLOCKS"}),
+    "uniform blocks": (re.compile(r"\buniform\s+\w+\s*\{"), {".comp": "MAX_COMPUTE_UNIFORM_BLOCKS",
+                                                               ".vert": "MAX_COMPUTE_UNIFORM_BLOCKS",
+                                                               ".frag": "MAX_COMPUTE_UNIFORM_BLOCKS"}),
+    "samplers": (re.compile(r"\buniform\s+[iu]?sampler\w+\s+\w+"),
+                 {".comp": "MAX_COMPUTE_TEXTURE_IMAGE_UNITS", ".vert": "MAX_VERTEX_TEXTURE_IMAGE_UNITS",
+                  ".geom": "MAX_GEOMETRY_TEXTURE_IMAGE_UNITS", ".frag": "MAX_TEXTURE_IMAGE_UNITS"}),
+    "images": (re.compile(r"\buniform\s+(?:\w+\s+)*?[iu]?image\w+\s+\w+"),
+               {".comp": "MAX_COMPUTE_IMAGE_UNIFORMS", ".frag": "MAX_FRAGMENT_IMAGE_UNIFORMS"}),
+    "colours": (re.compile(r"\bout\s+\w+\s+\w+\s*;"), {".frag": None}),
+}
+WRITTEN, WRITTEN_LIMIT = ("storage blocks", "images", "colours"), "MAX_COMBINED_SHADER_OUTPUT_RESOURCES"
 
 # What GLSL allows and this project does not: of the text of a file without comments.
 HAZARDS = [
@@ -87,7 +103,6 @@ ASKED = re.compile(r"^[ \t]*#[ \t]*(?:ifdef[ \t]+(\w+)|(?:el)?if\b(.*))", re.MUL
 OWN = re.compile(r"^[ \t]*#[ \t]*define[ \t]+(\w+)", re.MULTILINE)
 UNIFORM = re.compile(r"^[ \t]*uniform (\w+) ([^;]*);", re.MULTILINE)
 DEFINED = re.compile(r"\bdefined[ \t]*\(?[ \t]*(\w+)")
-STORAGE_BLOCK = re.compile(r"\bbuffer\s+\w+\s*\{")
 
 
 def file_of(path):
@@ -171,16 +186,34 @@ def complaints_in(log, files_of, programs):
     return complaints
 
 
-def stored_blocks(paths):
-    """Of each file the number of storage blocks, once the preprocessor is through with it."""
+def declared(paths):
+    """Of each file the numbers of COUNTED, once the preprocessor is through with it."""
     parts = run(["-E", *paths])[1].split(END_OF_FILE)
-    return [len(STORAGE_BLOCK.findall(part)) for part in parts[:len(paths)]]
+    return [{what: len(pattern.findall(part)) for what, (pattern, _) in COUNTED.items()}
+            for part in parts[:len(paths)]]
+
+
+def needs_of(paths, files):
+    """What the programs ask of a driver: (limit, number, of which file). The colours of a stage before the last are none."""
+    needs, written = [], {}
+    for path, counts in zip(paths, files):
+        suffix, program = pathlib.Path(path).suffix, pathlib.Path(path).stem
+        for what, count in counts.items():
+            limits = COUNTED[what][1]
+            if count and suffix in limits and limits[suffix]:
+                needs.append((limits[suffix], count, path))
+            elif count and what != "colours":
+                needs.append((f"{what} in {suffix}", count, path))
+            if what in WRITTEN and suffix in (".comp", ".frag"):
+                written[program] = (written.get(program, (0, path))[0] + count, path)
+    return needs + [(WRITTEN_LIMIT, *of_program) for of_program in written.values()]
 
 
 def complaints_of(batch):
-    """What is wrong with these programs. Many in one run: most of the compiler's time is its start. Programs of several
-    stages are linked as well, each by itself."""
-    complaints, files_of, programs = [], {}, {}
+    """What is wrong with these programs, and the most that they need of each limit. Many in one run: most of the compiler's
+    time is its start. Programs of several stages are linked as well, each by itself."""
+    complaints, files_of, programs, needed = [], {}, {}, {}
+    limits = {name: int(maximum) for name, maximum in LIMIT.findall(LIMITS.read_text())}
     with tempfile.TemporaryDirectory() as folder:
         for number, (stages, defines) in enumerate(batch):
             shown = " ".join(f"{name}={value}" for name, value in defines.items())
@@ -189,10 +222,10 @@ def complaints_of(batch):
                 path = os.path.join(folder, f"variant{number}" + pathlib.Path(stage).suffix)
                 pathlib.Path(path).write_text(f"{text}\nstruct {END_OF_FILE} {{ int unused; }};\n")
                 files_of[path], programs[path] = names, f"{stages[0]} [{shown}]"
-        for path, blocks in zip(files_of, stored_blocks(files_of)):
-            maximum = STORAGE_BLOCKS_MAX[pathlib.Path(path).suffix]
-            if blocks > maximum:
-                complaints.append(f"{programs[path]}: {blocks} storage blocks, where {maximum} are asked of a driver")
+        for limit, count, path in needs_of(files_of, declared(files_of)):
+            needed[limit] = max(count, needed.get(limit, 0))
+            if count > limits.get(limit, 0):
+                complaints.append(f"{programs[path]}: needs {count} of {limit}; {LIMITS} asks for {limits.get(limit, 0)}")
         linked = [[path for path in files_of if path.startswith(os.path.join(folder, f"variant{number}."))]
                   for number, (stages, _) in enumerate(batch) if len(stages) > 1]
         alone = [path for path in files_of if not any(path in paths for paths in linked)]
@@ -200,7 +233,7 @@ def complaints_of(batch):
             status, log = run(arguments)
             found = complaints_in(log, files_of, programs)
             complaints += found if found or status == 0 else [log]
-    return complaints
+    return complaints, needed
 
 
 def hazards_of(path):
@@ -228,7 +261,11 @@ def main():
     all_variants = [variant for program in found for variant in variants(program)]
     batches = [all_variants[i:i + BATCH] for i in range(0, len(all_variants), BATCH)]
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        complaints = [line for lines in pool.map(complaints_of, batches) for line in lines]
+        results = list(pool.map(complaints_of, batches))
+    complaints = [line for lines, _ in results for line in lines]
+    needed = {limit: max(one.get(limit, 0) for _, one in results) for _, of in results for limit in of}
+    complaints += [f"{LIMITS}: asks for {asked} of {limit}, of which programs need {needed[limit]}"
+                   for limit, asked in LIMIT.findall(LIMITS.read_text()) if needed.get(limit, int(asked)) < int(asked)]
     complaints += [line for root in ROOTS for suffix in ("comp", "vert", "geom", "frag", "glsl")
                    for path in sorted(root.rglob("*." + suffix)) for line in hazards_of(path)]
     print("\n".join(complaints), end="\n" if complaints else "")

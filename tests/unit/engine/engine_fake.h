@@ -84,7 +84,7 @@ static inline struct gpu_device *fake_device_create(const struct gpu_options *op
     struct gpu_device *device = calloc(1, sizeof(*device));
     assert_non_null(device);
     strcpy(device->info.name, "fake");
-    device->facts.memory_bytes = 1000;
+    device->facts.memory = (struct gpu_memory){GPU_MEMORY_TOTAL, 1000};
     atomic_fetch_add(&fake.devices_made, 1);
     atomic_fetch_add(&fake.devices, 1);
     return device;

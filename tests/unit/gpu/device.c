@@ -151,8 +151,8 @@ TEST(mapped_memory_reaches_the_buffer)
 TEST(memory_is_limited_to_what_there_is)
 {
     if (device->facts.software)
-        assert_int_equal(device->facts.memory_bytes, host_memory_bytes());
-    assert_int_equal(device->memory_limit_bytes, device->facts.memory_bytes);
+        assert_int_equal(device->facts.memory.bytes, host_memory_bytes());
+    assert_int_equal(device->memory_limit_bytes, device->facts.memory.bytes);
 }
 
 TEST(memory_beyond_the_limit_is_refused_before_the_driver_is_asked)
@@ -200,7 +200,7 @@ TEST(a_large_reservation_waits_for_its_memory_and_is_made_in_a_later_step)
     assert_false(gpu_buffer_reserve(device, &small, 2 * bytes, &error)); /* refused, not put off */
     assert_int_equal(error.kind, ERROR_OUT_OF_MEMORY);
     assert_false(gpu_reserve_end(device, &awaited_bytes));
-    device->memory_limit_bytes = device->facts.memory_bytes;
+    device->memory_limit_bytes = device->facts.memory.bytes;
     gpu_buffer_finish(device, &small);
     gpu_buffer_finish(device, &large);
     assert_int_equal(device->memory_used_bytes, before);
