@@ -5,6 +5,7 @@
 
 #include "base/clock.h"
 #include "render/camera.h"
+#include "render/choices.h"
 #include "render/compact.h"
 #include "render/frame_request.h"
 #include "render/pixel_filter.h"
@@ -12,13 +13,6 @@
 #include <math.h>
 #include <string.h>
 
-/* Rays of a slice. Software GL has no latency to hide, and its caches are the CPU's; a GPU wants enough rays to
- * fill itself. Waves have room for twice as many: mirrors and glass rarely fill a slice. What takes long is traced
- * in parts (wave_trace.h), but where tracers are compared. */
-#define SLICE_RAYS_SOFTWARE (1u << 15)
-#define SLICE_RAYS_COMPARED (1u << 14)
-#define SLICE_RAYS_HARDWARE (1u << 18)
-#define WAVE_PER_SLICE 2
 /* Of a slice at first: few paths are longer, and waves without rays cost some dispatches each. */
 #define WAVES_QUEUED_MAX 16
 /* Of a step that uploads and integrates an environment. */
@@ -215,9 +209,7 @@ static uint32_t slice_rays(const struct frame_renderer *renderer)
 {
     if (renderer->wanted_slice_pixels)
         return renderer->wanted_slice_pixels;
-    if (!renderer->device->facts.software)
-        return SLICE_RAYS_HARDWARE;
-    return renderer->work->context.request.compare ? SLICE_RAYS_COMPARED : SLICE_RAYS_SOFTWARE;
+    return choices_slice_rays(renderer->device, renderer->work->context.request.compare);
 }
 
 /* As many as the depth has, and as many more as a slice has needed. */
@@ -245,7 +237,7 @@ static bool reserve_frame(struct frame_renderer *renderer, struct error *error)
     all *= renderer->rasterise ? 1 : SLICES_SAMPLES_TOGETHER;
     rays = rays < all ? rays : (uint32_t)all;
     renderer->slice_rays_max = renderer->slices.slice_rays = rays;
-    uint32_t wave_rays = rays * WAVE_PER_SLICE;
+    uint32_t wave_rays = rays * CHOICES_WAVE_PER_SLICE;
     if (renderer->wanted_wave_rays)
         wave_rays = renderer->wanted_wave_rays;
     context->wave_capacity = at_least(wave_rays, rays);

@@ -2,6 +2,7 @@
 /* Frames whose waves are queued without waiting for their counts, as on a GPU: the same pictures as of frames that
  * wait, and how often the host waits. The device is taken for hardware, whatever it is. */
 #include "protocol/tracers.h"
+#include "render/frame_state.h"
 #include "render/layers.h"
 #include "tests/accuracy/render_fixture.h"
 #include "tests/harness/test.h"
@@ -257,4 +258,31 @@ TEST(rays_that_take_too_long_for_a_dispatch_are_traced_in_several)
         fail_msg("the host waited %u times", got.device_waits);
     frame_result_finish(&expected);
     frame_result_finish(&got);
+}
+
+/* Their waves' buffers take a part of the memory, and are buffer textures. */
+TEST(slices_are_no_larger_than_the_device_has_memory_and_texels_for)
+{
+    struct fixture *fixture = *state;
+    const struct gpu_facts facts = device->facts;
+    static const struct {
+        const char *what;
+        uint64_t memory_bytes, texels;
+        uint32_t rays;
+    } rows[] = {{"nothing is short", (uint64_t)8 << 30, 1u << 27, 1u << 14}, /* all of the picture */
+                {"memory is not told", 0, 1u << 27, 1u << 14},
+                {"little memory", (uint64_t)256 << 20, 1u << 27, 1u << 13},
+                {"no more texels than OpenGL promises", (uint64_t)8 << 30, 1u << 16, 1u << 13},
+                {"hardly any memory", 1 << 20, 1u << 27, 1u << 12}};
+    fixture_mixture(fixture);
+    fixture->request.width = fixture->request.height = 128;
+    for (size_t i = 0; i < sizeof(rows) / sizeof(rows[0]); i++) {
+        device->facts.memory.bytes = rows[i].memory_bytes;
+        device->facts.texture_buffer_texels_max = rows[i].texels;
+        struct frame_result result = fixture_render(fixture);
+        if (fixture->renderer->slice_rays_max != rows[i].rays)
+            fail_msg("%s: slices of %u rays", rows[i].what, fixture->renderer->slice_rays_max);
+        frame_result_finish(&result);
+    }
+    device->facts = facts;
 }
