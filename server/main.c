@@ -65,9 +65,16 @@ static int list_devices(void)
 {
     struct gpu_device_info list[32];
     size_t count = gpu_device_list(list, sizeof(list) / sizeof(list[0]));
-    for (size_t i = 0; i < count; i++)
+    for (size_t i = 0; i < count; i++) {
+        struct gpu_measured measured;
         printf("%d  %s  (%s, OpenGL %s%s)\n", list[i].index, list[i].name, list[i].vendor, list[i].version,
                list[i].software ? ", software" : "");
+        if (gpu_measured_load(&list[i], &measured))
+            printf("   first hits are traced from %.3g primitives a pixel on, from %.3g with several samples\n",
+                   (double)measured.traced_from[0], (double)measured.traced_from[1]);
+        else
+            printf("   first hits are rasterised%s\n", list[i].software ? "" : ", until the first start measures");
+    }
     return count ? EXIT_SUCCESS : (fprintf(stderr, "farlightd: no device gives OpenGL 4.5\n"), EXIT_FAILURE);
 }
 

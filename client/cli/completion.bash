@@ -43,7 +43,7 @@ _farlight_program()
     local word=${COMP_WORDS[COMP_CWORD]} before=${COMP_WORDS[COMP_CWORD - 1]} program=${COMP_WORDS[0]} words=
 
     case ${program##*/}:$before in
-    farlightd:--device) words="auto software $("$program" --list-devices 2>/dev/null | sed -n 's/^\([0-9]*\).*/\1/p')" ;;
+    farlightd:--device) words="auto software $("$program" --list-devices 2>/dev/null | sed -n 's/^\([0-9][0-9]*\).*/\1/p')" ;;
     farlightd:--log-level) words="error warning info debug" ;;
     farlight-view:--*) words=$("${program%-view}" complete "$before" 2>/dev/null) ;;
     farlight-export:--format) words="png jpeg exr hdr" ;;

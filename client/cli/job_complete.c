@@ -228,9 +228,8 @@ static bool complete_tracer(struct cli_job *job)
         cli_usage(job, fault.field, "%s", fault.text);
         return fl_error_remedy(&job->error, "%s", fault.remedy);
     }
-    /* Else most of the reference would be the rasteriser's. */
-    if (!job->has_primary && wanted->tracer == PROTOCOL_TRACER_REFERENCE)
-        wanted->primary = PROTOCOL_PRIMARY_TRACE;
+    if (!job->has_primary)
+        wanted->primary = PROTOCOL_PRIMARY_AUTO;
     return true;
 }
 

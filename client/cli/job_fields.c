@@ -35,7 +35,7 @@ static const struct row {
     {"tracer", "tracer", "NAME", "What finds intersections ('farlight tracers' explains them)", CLI_GROUP_METHOD,
      0, true},
     {"primary", "primary", "NAME",
-     "How first hits are found (default: raster, but trace for the tracer reference)", CLI_GROUP_METHOD,
+     "How first hits are found: raster, trace, or auto, chosen for tracer and device (default)", CLI_GROUP_METHOD,
      GIVEN(has_primary), true},
     {"encoding", "encoding", "NAME",
      "How pixels travel: raw, zstd, predicted, jpeg (default: raw on this machine, zstd over a network)",

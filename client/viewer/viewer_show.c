@@ -50,9 +50,7 @@ static void show(struct viewer *viewer)
     view.settings = settings->tracers;
     view.tone_map = settings->tone_map;
     view.exposure_stops += (float)settings->exposure_thirds / 3;
-    /* Else most of the reference would be the rasteriser's. */
-    if (!viewer->options->has_primary && settings->tracer == PROTOCOL_TRACER_REFERENCE)
-        view.primary = PROTOCOL_PRIMARY_TRACE;
+    view.primary = viewer_primary(viewer);
     if (clip && clip->clip != 0) {
         use.clip = clip->clip;
         view.clips = &use;

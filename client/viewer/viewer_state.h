@@ -97,6 +97,9 @@ void viewer_drop_tasks(struct viewer *viewer); /* of a connection that is gone *
 void viewer_go(struct viewer *viewer, const struct viewer_camera *camera, uint32_t node);
 /* The picture is seen through the camera `followed`: `camera` only repeats the last frame's. */
 bool viewer_follows(const struct viewer *viewer);
+/* How first hits are found, in the view and in the reference that it is compared with: rasterised samples lie
+ * elsewhere than traced ones, so it is not left to the daemon. */
+uint32_t viewer_primary(const struct viewer *viewer);
 uint32_t viewer_home_node(const struct viewer *viewer); /* of the initial camera; 0: it is none of the scene's */
 
 /* ---- viewer_act.c ---- */

@@ -9,6 +9,13 @@
 
 #define COMPARED_SAMPLES 4u /* of a pixel: the reference may take long */
 
+uint32_t viewer_primary(const struct viewer *viewer)
+{
+    if (viewer->options->has_primary)
+        return viewer->view.primary;
+    return viewer->settings.tracer == PROTOCOL_TRACER_REFERENCE ? PROTOCOL_PRIMARY_TRACE : PROTOCOL_PRIMARY_RASTER;
+}
+
 bool viewer_follows(const struct viewer *viewer)
 {
     return viewer->followed != 0 && viewer->tour.clip != TOUR_NONE && viewer->glide_begin_ns == 0;
@@ -109,7 +116,7 @@ static void fill_reference(const struct viewer *viewer, struct message_render *j
     job->height = (uint32_t)viewer->compared.height;
     job->samples = viewer->frame.samples;
     job->tracer = PROTOCOL_TRACER_REFERENCE;
-    /* First hits are found as in the view: rasterised samples lie elsewhere than traced ones. */
+    job->primary = viewer_primary(viewer);
     job->integrator = viewer->settings.integrator;
     job->tone_map = viewer->settings.tone_map;
     job->exposure_stops += (float)viewer->settings.exposure_thirds / 3;

@@ -28,6 +28,7 @@ bool engine_open_device(struct engine *engine, struct error *error)
     engine->device = engine->backend->device_create(&engine->options.gpu, error);
     if (!engine->device)
         return false;
+    engine->options.gpu.measured = engine->device->measured; /* after a loss too */
     engine->device_bytes_limit = device_limit(engine);
     engine->device->memory_limit_bytes = engine->device_bytes_limit;
     return true;

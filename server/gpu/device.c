@@ -202,6 +202,9 @@ struct gpu_device *gpu_device_create(const struct gpu_options *options, struct e
     }
     ask_facts(&device->facts, device->info.software, device->egl->robust, debug);
     device->memory_limit_bytes = device->facts.memory.bytes;
+    device->measured = options->measured;
+    if (!device->measured.known)
+        gpu_measured_load(&device->info, &device->measured);
     if (device->facts.software && allocator_keeps_pages())
         device->prefault = prefault_create();
     if (debug)

@@ -6,6 +6,7 @@
 
 #include "base/error.h"
 #include "gpu/limits.h"
+#include "gpu/measured.h"
 #include "gpu/memory.h"
 
 #include <stdbool.h>
@@ -66,14 +67,16 @@ struct gpu_device {
     uint64_t reserve_until_ns;    /* see gpu_reserve_begin; 0: whenever */
     size_t reserve_awaited_bytes; /* size of the reservation that was put off until prefaulted; 0: none was */
     bool reserve_made, reserve_put_off;
-    uint64_t waits; /* how often this thread has waited for the device to come to an end with something */
-    bool lost;      /* the context; nothing works any more, see gpu_note_loss */
+    uint64_t waits;          /* how often this thread has waited for the device to come to an end with something */
+    struct gpu_measured measured;
+    bool lost; /* the context; nothing works any more, see gpu_note_loss */
 };
 
 struct gpu_options {
-    int index;     /* of gpu_device_list; -1: first hardware, else software */
-    bool software; /* insist on software */
-    bool debug;    /* debug context, messages to the log */
+    int index;                    /* of gpu_device_list; -1: first hardware, else software */
+    bool software;                /* insist on software */
+    bool debug;                   /* debug context, messages to the log */
+    struct gpu_measured measured; /* of this device by an earlier context; not known: of the disk */
 };
 
 /* Devices that give an OpenGL 4.5 core context; each is opened for a moment to be asked its name.

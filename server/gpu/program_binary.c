@@ -20,8 +20,7 @@ struct binary_header {
 static const char binary_magic[8] = "FLPROG1";
 #define BINARY_BYTES_MAX (64u << 20)
 
-/* False: nowhere to keep it. */
-static bool folder_path(char *path, size_t size)
+bool gpu_cache_folder(char *path, size_t size)
 {
     const char *cache = getenv("XDG_CACHE_HOME");
     const char *home = getenv("HOME");
@@ -40,7 +39,7 @@ static bool folder_path(char *path, size_t size)
 static bool file_path(char *path, size_t size, const struct gpu_binary_key *key)
 {
     char folder[3072];
-    if (!folder_path(folder, sizeof(folder)))
+    if (!gpu_cache_folder(folder, sizeof(folder)))
         return false;
     int n = snprintf(path, size, "%s/%016llx%016llx.program", folder, (unsigned long long)key->high,
                      (unsigned long long)key->low);

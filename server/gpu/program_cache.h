@@ -7,6 +7,7 @@
 #include "gpu/program.h"
 
 #include <stdbool.h>
+#include <stddef.h>
 #include <stdint.h>
 
 struct gpu_program_cache;
@@ -14,6 +15,9 @@ struct gpu_program_cache;
 struct gpu_program_cache *gpu_program_cache_create(void); /* NULL: out of memory */
 /* The table; the GL programs are the registry's. Accepts NULL. */
 void gpu_program_cache_destroy(struct gpu_program_cache *cache);
+
+/* Where files are kept between runs; made if it is not there. False: nowhere. */
+bool gpu_cache_folder(char *path, size_t size);
 
 /* A program's binary on the disk, under a hash of its sources and of the driver's vendor, renderer and version.
  * Both do nothing without a cache: no binaries, a home that cannot be written, a full disk. */

@@ -37,3 +37,30 @@ uint32_t choices_slice_rays(const struct gpu_device *device, bool compared)
         return hardware_slice_rays(&device->facts);
     return compared ? SLICE_RAYS_COMPARED : SLICE_RAYS_SOFTWARE;
 }
+
+static uint64_t primitives_shown(const struct gpu_scene *scene)
+{
+    uint64_t count = scene->disc_count;
+    for (uint32_t i = 0; i < scene->instance_count; i++)
+        count += scene->geometries[scene->instances[i].geometry].device.primitive_count;
+    return count;
+}
+
+/* Where it is left to us. A tracer that samples would show its cells. */
+static bool traces_first_hits(const struct render_context *context)
+{
+    const struct tracer_impl *impl = context->tracer->impl;
+    const uint64_t pixels = (uint64_t)context->request.width * context->request.height;
+    return impl->traces_on_host ||
+           (impl->finds_first_hits && gpu_measured_traces(&context->device->measured, context->spread,
+                                                          primitives_shown(context->scene), pixels));
+}
+
+bool choices_rasterise(const struct render_context *context)
+{
+    const struct frame_request *request = &context->request;
+    const bool flat = !(request->aperture > 0.0f) && !context->scene->has_motion;
+    return flat && !request->compare &&
+           (request->primary == PRIMARY_RASTER ||
+            (request->primary == PRIMARY_AUTO && !traces_first_hits(context)));
+}

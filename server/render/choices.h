@@ -11,5 +11,7 @@
 
 /* Rays of a slice at most. */
 uint32_t choices_slice_rays(const struct gpu_device *device, bool compared);
+/* Whether first hits are rasterised, once the scene and the tracer of the context are those of its request. */
+bool choices_rasterise(const struct render_context *context);
 
 #endif

@@ -226,9 +226,7 @@ static bool reserve_frame(struct frame_renderer *renderer, struct error *error)
     struct render_context *context = &renderer->work->context;
     if (!picture_begin(&renderer->picture, context, renderer->samples_before, error))
         return false;
-    const struct frame_request *request = &context->request;
-    bool flat = !(request->aperture > 0.0f) && !renderer->shared->copy.has_motion;
-    renderer->rasterise = flat && request->primary == PRIMARY_RASTER && !request->compare;
+    renderer->rasterise = choices_rasterise(context);
     renderer->strip_rows = picture_strip_rows(&renderer->picture, STRIP_PIXELS_MAX);
     if (renderer->rasterise && !primary_reserve(&renderer->work->primary, context, renderer->strip_rows, error))
         return false;
@@ -243,7 +241,8 @@ static bool reserve_frame(struct frame_renderer *renderer, struct error *error)
     context->wave_capacity = at_least(wave_rays, rays);
     if (!frame_reserve_waves(renderer, error))
         return false;
-    context->counts_on_host = !renderer->queues_ahead || request->compare || context->tracer->impl->traces_on_host;
+    context->counts_on_host =
+        !renderer->queues_ahead || context->request.compare || context->tracer->impl->traces_on_host;
     context->waves_queued = waves_queued(renderer);
     compact_go_on(context);
     return true;

@@ -120,6 +120,8 @@ struct tracer_impl {
      * have no times. */
     bool still;
     bool traces_on_host; /* fetches the rays: the caller must know how many there are */
+    /* Its first hits are those of the rasteriser, and fast enough that a device decides which way is faster. */
+    bool finds_first_hits;
     /* The smallest range of rays that trace_range() is good for: ranges begin at multiples of it, so that rays
      * that are traversed together stay together, and have no fewer rays unless the wave ends. 0: 1. */
     uint32_t minimum_rays;

@@ -536,6 +536,7 @@ static bool bvh_trace_range(struct tracer *tracer, struct gpu_scene *scene, stru
 
 const struct tracer_impl tracer_bvh_impl = {
     .name = "bvh",
+    .finds_first_hits = true,
     .depends_on = CHANGED_GEOMETRY | CHANGED_DEFORMED | CHANGED_INSTANCES,
     .minimum_rays = 192, /* a multiple of all packets' sizes */
     .create = bvh_create,

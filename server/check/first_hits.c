@@ -1,0 +1,153 @@
+/* SPDX-License-Identifier: MIT */
+#include "check/first_hits.h"
+
+#include "base/log.h"
+#include "check/frames.h"
+#include "check/scene.h"
+#include "protocol/tracers.h"
+
+#include <math.h>
+
+#define AROUND 256u
+#define ACROSS 128u
+#define AROUND_FEW 16u
+#define ACROSS_FEW 8u
+#define SIDE_HARDWARE 512u
+#define SIDE_SOFTWARE 128u
+#define SAMPLES_SEVERAL 16u
+#define REPEATS 4u /* of which the first compiles; the fastest counts, as others may use the device too */
+/* Of depths that are the same: some roundings of a distance. */
+#define DEPTH_SHARE 1e-4f
+/* Tracing must be clearly faster: devices of a kind decide the same, though measures differ from run to run. */
+#define TRACED_SHARE 0.8
+#define NEVER 1e9 /* primitives a pixel */
+
+/* Nothing but first hits, and their depth. */
+static struct frame_request request_of(const struct gpu_device *device, bool several, enum first_hits_way way)
+{
+    const uint32_t side = device->facts.software ? SIDE_SOFTWARE : SIDE_HARDWARE;
+    struct frame_request request = check_request(TRACER_BVH, side, side);
+    request.samples = several ? SAMPLES_SEVERAL : 1;
+    request.primary = way == FIRST_HITS_TRACED ? PRIMARY_TRACE : PRIMARY_RASTER;
+    request.layers = 1u << LAYER_DEPTH;
+    return request;
+}
+
+static uint64_t time_of(const struct frame_result *result)
+{
+    return stage_times_sum_ns(&result->times, STAGE_PRIMARY, CLOCK_GPU) +
+           stage_times_sum_ns(&result->times, STAGE_TRACE, CLOCK_GPU);
+}
+
+/* *result is that of the last frame. */
+static bool measure(struct check_frames *frames, const struct frame_request *request, uint64_t *best_ns,
+                    struct frame_result *result, struct error *error)
+{
+    *best_ns = 0;
+    for (uint32_t i = 0; i < REPEATS; i++) {
+        frame_result_finish(result);
+        if (!check_frame(frames, request, result, error))
+            return false;
+        const uint64_t ns = time_of(result);
+        if (i > 0 && (*best_ns == 0 || ns < *best_ns))
+            *best_ns = ns;
+    }
+    return true;
+}
+
+static double agreement(const struct frame_result *a, const struct frame_result *b)
+{
+    const float *one = (const float *)(const void *)a->pixels, *other = (const float *)(const void *)b->pixels;
+    const uint32_t pixels = a->width * a->height;
+    uint32_t same = 0;
+    for (uint32_t i = 0; i < pixels; i++)
+        same += fabsf(one[4 * i] - other[4 * i]) <= DEPTH_SHARE * fabsf(one[4 * i]);
+    return (double)same / pixels;
+}
+
+/* Both ways, with one sample a pixel or several. */
+static bool measure_ways(struct check_frames *frames, bool several, struct first_hits *measured,
+                         struct error *error)
+{
+    struct frame_result results[2] = {0};
+    bool ok = true;
+    for (int way = 0; ok && way < 2; way++) {
+        const struct frame_request request = request_of(frames->device, several, (enum first_hits_way)way);
+        ok = measure(frames, &request, &measured->ns[several][way], &results[way], error);
+        measured->ns[several][way] /= request.samples;
+        measured->pixels = (uint64_t)request.width * request.height;
+    }
+    if (ok && !several) /* several samples are elsewhere in their pixels either way */
+        measured->agree = agreement(&results[0], &results[1]);
+    for (int way = 0; way < 2; way++)
+        frame_result_finish(&results[way]);
+    return ok;
+}
+
+static bool measure_few(struct check_frames *frames, struct first_hits *measured, struct error *error)
+{
+    const struct frame_request request = request_of(frames->device, false, FIRST_HITS_RASTERISED);
+    struct frame_result result = {0};
+    bool ok = measure(frames, &request, &measured->few_ns, &result, error);
+    frame_result_finish(&result);
+    return ok;
+}
+
+bool first_hits_measure(struct gpu_device *device, struct first_hits *measured, struct error *error)
+{
+    struct check_frames frames;
+    *measured = (struct first_hits){.primitives = 2 * AROUND * ACROSS};
+    bool ok = check_frames_init(&frames, device, check_scene_torus(AROUND, ACROSS, error), error) &&
+              measure_ways(&frames, false, measured, error) && measure_ways(&frames, true, measured, error);
+    check_frames_finish(&frames);
+    ok = ok && check_frames_init(&frames, device, check_scene_torus(AROUND_FEW, ACROSS_FEW, error), error) &&
+         measure_few(&frames, measured, error);
+    check_frames_finish(&frames);
+    return ok;
+}
+
+/* Rasterising takes a time for each pixel, as of few primitives, and one for each primitive; tracing a time for
+ * each pixel. Where rasterising is as fast for many primitives as for few, it always is the faster way. */
+struct gpu_measured first_hits_limits(const struct first_hits *measured)
+{
+    struct gpu_measured limits = {.known = measured->few_ns > 0};
+    for (int several = 0; several < 2; several++) {
+        const double rasterised = (double)measured->ns[several][FIRST_HITS_RASTERISED],
+                     traced = (double)measured->ns[several][FIRST_HITS_TRACED], few = (double)measured->few_ns,
+                     a_primitive = fmax(rasterised - few, 0) / (double)measured->primitives,
+                     lacking = traced / TRACED_SHARE - few;
+        limits.known = limits.known && rasterised > 0 && traced > 0;
+        if (lacking <= 0)
+            limits.traced_from[several] = 0;
+        else
+            limits.traced_from[several] =
+                (float)fmin(lacking / fmax(a_primitive, 1e-9) / (double)measured->pixels, NEVER);
+    }
+    return limits;
+}
+
+bool first_hits_keep(struct gpu_device *device, const struct first_hits *measured)
+{
+    if (device->facts.software || device->measured.known)
+        return true;
+    device->measured = first_hits_limits(measured);
+    return !device->measured.known || gpu_measured_store(&device->info, &device->measured);
+}
+
+void first_hits_decide(struct gpu_device *device)
+{
+    struct first_hits measured;
+    struct error error = {0};
+    if (device->measured.known || device->facts.software)
+        return;
+    if (!first_hits_measure(device, &measured, &error)) {
+        log_write(LOG_WARNING, "check", "first hits were not measured, and are rasterised: %s", error.text);
+        return;
+    }
+    const bool kept = first_hits_keep(device, &measured);
+    if (device->measured.known)
+        log_write(LOG_INFO, "check",
+                  "first hits are traced from %.3g primitives a pixel on, from %.3g with several samples%s",
+                  (double)device->measured.traced_from[0], (double)device->measured.traced_from[1],
+                  kept ? "" : "; there is no cache folder to keep that in, so it is measured at each start");
+}
