@@ -2,9 +2,11 @@
 /* farlightd: options, and the wiring of the engine to the network.
  * Exit status: 0 when it was stopped (by SIGTERM or SIGINT, after a goodbye to its clients) or its one client is
  * gone; 1 when it cannot start or go on; 2 for wrong usage; 75 when its GPU is lost for good, which may be
- * different in a new process. */
+ * different in a new process. With --check-device: 0 when all holds, 1 when something does not, 75 when the GPU
+ * was lost on the way. */
 #include "base/log.h"
 #include "base/timeline.h"
+#include "check/check.h"
 #include "config.h"
 #include "gpu/device.h"
 #include "engine/engine.h"
@@ -27,6 +29,8 @@ enum {
     KEY_CONFIG,
     KEY_DEVICE,
     KEY_LIST,
+    KEY_CHECK,
+    KEY_JSON,
     KEY_LEVEL,
     KEY_DUMP,
     KEY_INSECURE,
@@ -42,6 +46,9 @@ static const struct argp_option option_table[] = {
     {"config", KEY_CONFIG, "FILE", 0, "Read options from FILE, after " CONFIG_SYSTEM_FILE, 0},
     {"device", KEY_DEVICE, "N|software|auto", 0, "GPU to use", 0},
     {"list-devices", KEY_LIST, NULL, 0, "Print the GPUs that can be used, and exit", 0},
+    {"check-device", KEY_CHECK, NULL, 0,
+     "Look the GPU over: limits, memory, programs, every tracer; exit with 0 if all of it holds", 0},
+    {"json", KEY_JSON, NULL, 0, "With --check-device: print one JSON object a line", 0},
     {"log-level", KEY_LEVEL, "LEVEL", 0, "error, warning, info or debug", 0},
     {"trace-file", KEY_TRACE, "FILE", 0,
      "Write the stages of all frames to FILE as trace events, for ui.perfetto.dev or chrome://tracing", 0},
@@ -58,7 +65,7 @@ struct arguments {
     char listen[CONFIG_TEXT_BYTES]; /* all of them, each followed by a blank */
     const char *config_file, *device, *log_level, *insecure, *trace_file, *key_file, *reader_key_file;
     int fd;
-    bool dump_config;
+    bool dump_config, check_device, json;
 };
 
 static int list_devices(void)
@@ -115,8 +122,18 @@ static error_t parse_option(int key, char *value, struct argp_state *state)
         break;
     case KEY_LIST:
         exit(list_devices());
+    case KEY_CHECK:
+        arguments->check_device = true;
+        break;
+    case KEY_JSON:
+        arguments->json = true;
+        break;
     case KEY_DUMP:
         arguments->dump_config = true;
+        break;
+    case ARGP_KEY_END:
+        if (arguments->json && !arguments->check_device)
+            argp_error(state, "--json goes with --check-device");
         break;
     default:
         return ARGP_ERR_UNKNOWN;
@@ -149,6 +166,24 @@ static bool read_config(struct config *config, const struct arguments *arguments
            config_flag(config, "server.reader_key_file", arguments->reader_key_file, "--reader-key-file", error) &&
            config_flag(config, "server.trace_file", arguments->trace_file, "--trace-file", error) &&
            config_flag(config, "server.log_level", arguments->log_level, "--log-level", error);
+}
+
+static int check(const struct config *config, bool json)
+{
+    struct engine_options engine;
+    struct error error = {0};
+    if (!config_engine(config, &engine, &error))
+        return fail(&error);
+    switch (check_device(&(struct check_options){
+        .gpu = engine.gpu, .device_bytes_limit = engine.device_bytes_limit, .stream = stdout, .json = json})) {
+    case CHECK_ALL_HOLDS:
+        return EXIT_SUCCESS;
+    case CHECK_DEVICE_LOST:
+        return EX_TEMPFAIL;
+    case CHECK_SOME_FAIL:
+        break;
+    }
+    return EXIT_FAILURE;
 }
 
 /* How the configuration came about, to be read again. */
@@ -255,6 +290,8 @@ int main(int argc, char **argv)
     if (arguments.dump_config)
         return !config_dump(&config, stdout);
     log_set_level((enum log_level)config.log_level);
+    if (arguments.check_device)
+        return check(&config, arguments.json);
     daemon_block_signals();
     bool listens = arguments.fd < 0 || arguments.listen[0];
     struct daemon daemon;

@@ -80,13 +80,15 @@ static uint64_t get_integer(GLenum name)
 
 static void ask_facts(struct gpu_facts *facts, bool software, bool robust, bool debug)
 {
-    GLint groups = 0;
+    GLint groups = 0, time_stamp_bits = 0;
+    glGetQueryiv(GL_TIMESTAMP, GL_QUERY_COUNTER_BITS, &time_stamp_bits);
     glGetIntegeri_v(GL_MAX_COMPUTE_WORK_GROUP_COUNT, 0, &groups);
     *facts = (struct gpu_facts){
         .software = software,
         .robust = robust,
         .debug_output = debug,
         .has_program_binary = get_integer(GL_NUM_PROGRAM_BINARY_FORMATS) > 0,
+        .time_stamp_bits = (uint32_t)time_stamp_bits,
         .storage_block_bytes_max = get_integer(GL_MAX_SHADER_STORAGE_BLOCK_SIZE),
         .work_groups_max = groups > 0 ? (uint32_t)groups : 65535,
     };
@@ -202,6 +204,7 @@ struct gpu_device *gpu_device_create(const struct gpu_options *options, struct e
     }
     ask_facts(&device->facts, device->info.software, device->egl->robust, debug);
     device->memory_limit_bytes = device->facts.memory.bytes;
+    device->compiles = options->compiles;
     device->measured = options->measured;
     if (!device->measured.known)
         gpu_measured_load(&device->info, &device->measured);

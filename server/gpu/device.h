@@ -28,6 +28,7 @@ struct gpu_facts {
     bool robust;   /* context tells of its loss */
     bool debug_output;
     bool has_program_binary;
+    uint32_t time_stamp_bits; /* 0: the device does not measure its time */
     uint64_t texture_buffer_texels_max;
     uint64_t storage_block_bytes_max;
     uint32_t work_groups_max;  /* on x; more is a GL error */
@@ -68,6 +69,8 @@ struct gpu_device {
     size_t reserve_awaited_bytes; /* size of the reservation that was put off until prefaulted; 0: none was */
     bool reserve_made, reserve_put_off;
     uint64_t waits;          /* how often this thread has waited for the device to come to an end with something */
+    struct gpu_watch *watch; /* of dispatches; NULL: nobody watches, see watch.h */
+    bool compiles;           /* see gpu_options */
     struct gpu_measured measured;
     bool lost; /* the context; nothing works any more, see gpu_note_loss */
 };
@@ -77,6 +80,7 @@ struct gpu_options {
     bool software;                /* insist on software */
     bool debug;                   /* debug context, messages to the log */
     struct gpu_measured measured; /* of this device by an earlier context; not known: of the disk */
+    bool compiles; /* no program is taken from the disk, where all that are compiled go nevertheless */
 };
 
 /* Devices that give an OpenGL 4.5 core context; each is opened for a moment to be asked its name.

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "gpu/program.h"
 
+#include "base/clock.h"
 #include "base/log.h"
 #include "base/progress.h"
 #include "gpu/barrier.h"
@@ -8,6 +9,7 @@
 #include "gpu/program_source.h"
 #include "gpu/registry.h"
 #include "gpu/uniforms.h"
+#include "gpu/watch.h"
 
 #include <epoxy/gl.h>
 #include <stdio.h>
@@ -21,6 +23,7 @@
 struct cached_program {
     struct gpu_program program;
     struct cached_program *next;
+    uint64_t build_ns;
     char key[]; /* files and defines */
 };
 
@@ -145,7 +148,7 @@ static bool build(struct gpu_device *device, GLuint program, struct shader_stage
     if (device->facts.has_program_binary) {
         key = binary_key(device, stages, stage_count);
         glProgramParameteri(program, GL_PROGRAM_BINARY_RETRIEVABLE_HINT, GL_TRUE);
-        if (gpu_binary_load(&key, program))
+        if (!device->compiles && gpu_binary_load(&key, program))
             return true;
     }
     if (!link_program(program, stages, stage_count, error))
@@ -155,8 +158,8 @@ static bool build(struct gpu_device *device, GLuint program, struct shader_stage
     return true;
 }
 
-static const struct gpu_program *add_program(struct gpu_device *device, const struct gpu_program *program,
-                                             bool is_compute, const char *key)
+static struct cached_program *add_program(struct gpu_device *device, const struct gpu_program *program,
+                                          bool is_compute, const char *key)
 {
     size_t key_bytes = strlen(key) + 1;
     struct cached_program *cached = malloc(sizeof(*cached) + key_bytes);
@@ -170,7 +173,7 @@ static const struct gpu_program *add_program(struct gpu_device *device, const st
     memcpy(cached->key, key, key_bytes);
     cached->next = device->programs->first;
     device->programs->first = cached;
-    return &cached->program;
+    return cached;
 }
 
 static const struct gpu_program *create_program(struct gpu_device *device, const struct gpu_program_source *source,
@@ -178,7 +181,8 @@ static const struct gpu_program *create_program(struct gpu_device *device, const
 {
     struct shader_stage stages[STAGE_MAX];
     unsigned stage_count = list_stages(stages, source);
-    const struct gpu_program *program = NULL;
+    struct cached_program *program = NULL;
+    const uint64_t start_ns = clock_now_ns();
     GLuint name = gpu_object_create(device->registry, GPU_PROGRAM);
     bool ok = name != 0;
     if (!ok)
@@ -205,8 +209,10 @@ static const struct gpu_program *create_program(struct gpu_device *device, const
         gpu_uniforms_destroy(made.uniforms);
         gpu_object_destroy(device->registry, GPU_PROGRAM, name);
         error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a program"); /* unless a reason stands there */
+        return NULL;
     }
-    return program;
+    program->build_ns = clock_now_ns() - start_ns;
+    return &program->program;
 }
 
 const struct gpu_program *gpu_program_get(struct gpu_device *device, const struct gpu_program_source *source,
@@ -221,6 +227,16 @@ const struct gpu_program *gpu_program_get(struct gpu_device *device, const struc
         if (strcmp(at->key, key) == 0)
             return &at->program;
     return create_program(device, source, key, error);
+}
+
+bool gpu_program_stat(const struct gpu_device *device, size_t index, struct gpu_program_stat *stat)
+{
+    const struct cached_program *at = device->programs->first;
+    while (at && index > 0)
+        at = at->next, index--;
+    if (at)
+        *stat = (struct gpu_program_stat){.key = at->key, .name = at->program.name, .build_ns = at->build_ns};
+    return at;
 }
 
 static void begin_pass(struct gpu_device *device, const struct gpu_program *program, unsigned accesses)
@@ -243,12 +259,16 @@ void gpu_dispatch(struct gpu_device *device, const struct gpu_program *program, 
     uint64_t groups_x = groups < device->facts.work_groups_max ? groups : device->facts.work_groups_max;
     uint64_t groups_y = (groups + groups_x - 1) / groups_x;
     begin_pass(device, program, 0);
+    gpu_watch_before(device);
     glDispatchCompute((GLuint)groups_x, (GLuint)groups_y, 1);
+    gpu_watch_after(device, program->name);
 }
 
 void gpu_dispatch_indirect(const struct gpu_program *program, const struct gpu_buffer *groups, size_t offset_bytes)
 {
     begin_pass(gpu_device_current(), program, GL_COMMAND_BARRIER_BIT);
     glBindBuffer(GL_DISPATCH_INDIRECT_BUFFER, groups->name);
+    gpu_watch_before(gpu_device_current());
     glDispatchComputeIndirect((GLintptr)offset_bytes);
+    gpu_watch_after(gpu_device_current(), program->name);
 }

@@ -37,6 +37,15 @@ struct gpu_program {
 const struct gpu_program *gpu_program_get(struct gpu_device *device, const struct gpu_program_source *source,
                                           struct error *error);
 
+/* A program that the device has, for who looks it over. */
+struct gpu_program_stat {
+    const char *key;   /* files and defines, each followed by ';'; as long as the device lives */
+    unsigned name;     /* GL program */
+    uint64_t build_ns; /* from the sources, or from the disk */
+};
+/* Those that were got so far, the newest first; false: there are no more. */
+bool gpu_program_stat(const struct gpu_device *device, size_t index, struct gpu_program_stat *stat);
+
 /* Uniforms by name, "name[1]" of an array: what the next dispatch, or gpu_program_use(), hands to the device. They
  * stay until they are set again and are zero at first. A name that the program does not have is ignored; one of
  * another type makes gpu_check() fail. */

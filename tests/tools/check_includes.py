@@ -42,7 +42,7 @@ MAY_INCLUDE = {
     "server/engine": (BASE, GPU, SCENE, "server/render", "server/check", "server/encode"),
     "server/store": (BASE, "protocol"),
     "server/session": (BASE, SCENE, "server/encode", "server/net", "server/store", "server/engine", "protocol"),
-    "server": (BASE, GPU, "server/store", "server/engine", "server/session"),
+    "server": (BASE, GPU, "server/check", "server/store", "server/engine", "server/session"),
     "client/lib": ("protocol", "protocol/sealed", "protocol/common", "protocol/pixels"),
     "client/helper": ("protocol",),
     "client/import": ("protocol", "protocol/common", "client/helper"),
