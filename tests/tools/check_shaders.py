@@ -65,9 +65,8 @@ COUNTED = {
     "storage blocks": (re.compile(r"\bbuffer\s+\w+\s*\{"),
                        {".comp": "MAX_COMPUTE_SHADER_STORAGE_BLOCKS", ".vert": "MAX_VERTEX_SHADER_STORAGE_BLOCKS",
                         ".frag": "MAX_FRAGMENT_SHADER_STORAGE_BLOCKS"}),
-    "uniform blocks": (re.compile(r"\buniform\s+\w+\s*\{"), {".comp": "MAX_COMPUTE_UNIFORM_BLOCKS",
-                                                               ".vert": "MAX_COMPUTE_UNIFORM_BLOCKS",
-                                                               ".frag": "MAX_COMPUTE_UNIFORM_BLOCKS"}),
+    "uniform blocks": (re.compile(r"\buniform\s+\w+\s*\{"),  # OpenGL promises each stage as many
+                       {stage: "MAX_COMPUTE_UNIFORM_BLOCKS" for stage in (".comp", ".vert", ".geom", ".frag")}),
     "samplers": (re.compile(r"\buniform\s+[iu]?sampler\w+\s+\w+"),
                  {".comp": "MAX_COMPUTE_TEXTURE_IMAGE_UNITS", ".vert": "MAX_VERTEX_TEXTURE_IMAGE_UNITS",
                   ".geom": "MAX_GEOMETRY_TEXTURE_IMAGE_UNITS", ".frag": "MAX_TEXTURE_IMAGE_UNITS"}),
