@@ -79,6 +79,8 @@ void add_child(uint j, path parent, surface s, float distance_, vec3 direction, 
     uint bounces = (parent.flags & PATH_BOUNCES_MASK) + (straight ? 0u : 1u);
     if (!(dot(direction, direction) > 0.5) || last_wave != 0u || bounces > frame.depth)
         return;
+    if (!(max_component(weight) > 0.0)) // also if it is NaN
+        return;
     vec3 side = dot(direction, s.geometric) > 0.0 ? s.geometric : -s.geometric;
     child c;
     c.origin_t_min = vec4(off_surface(s, distance_, side), 0.0);

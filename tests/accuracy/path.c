@@ -73,6 +73,24 @@ TEST(paths_that_end_by_chance_bring_as_much_in_the_mean)
     }
 }
 
+TEST(a_path_that_carries_nothing_has_no_ray)
+{
+    struct fixture *fixture = *state;
+    static const unsigned integrators[] = {INTEGRATOR_PATH, INTEGRATOR_DISTRIBUTED, INTEGRATOR_WHITTED};
+    for (size_t k = 0; k < COUNT(integrators); k++)
+        for (int black = 0; black < 2; black++) {
+            path_begin(fixture, TRACER_REFERENCE, 3);
+            a_glowing_room(fixture, black ? 0.0f : 0.5f);
+            fixture->request.integrator = integrators[k];
+            struct frame_result result = fixture_render(fixture);
+            /* Scattered rays are of paths alone. */
+            const uint32_t bounces = !black && integrators[k] == INTEGRATOR_PATH ? 3 : 0;
+            assert_int_equal(result.secondary_rays, bounces * PIXELS);
+            assert_true(!black || result.shadow_rays == 0); /* by default a sky is asked for light */
+            frame_result_finish(&result);
+        }
+}
+
 /* ---- furnaces ---- */
 
 static struct scene_material *a_ball(struct fixture *fixture)
