@@ -5,6 +5,8 @@
 
 #include <epoxy/gl.h>
 
+#define COLOURS_MAX 8 /* that every device draws at once */
+
 struct format_row {
     GLenum format;
     unsigned texel_bytes;
@@ -139,22 +141,21 @@ void gpu_texture_bind(const struct gpu_texture *texture, unsigned unit)
     glBindTextureUnit(unit, texture->name);
 }
 
-bool gpu_framebuffer_create(struct gpu_device *device, struct gpu_framebuffer *framebuffer,
-                            const struct gpu_texture *colours, unsigned colour_count,
-                            const struct gpu_texture *depth, struct error *error)
+static bool create_framebuffer(struct gpu_device *device, struct gpu_framebuffer *framebuffer, struct error *error)
 {
-    GLenum attachments[8];
-    if (colour_count > sizeof(attachments) / sizeof(attachments[0]))
-        return error_set(error, ERROR_INTERNAL, NULL, "a framebuffer with %u colours", colour_count);
     framebuffer->name = gpu_object_create(device->registry, GPU_FRAMEBUFFER);
-    if (!framebuffer->name)
-        gpu_note_loss(device, error);
-    if (!framebuffer->name)
-        return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no more framebuffer names");
-    for (unsigned i = 0; i < colour_count; i++) {
+    if (framebuffer->name)
+        return true;
+    gpu_note_loss(device, error);
+    return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no more framebuffer names");
+}
+
+static bool complete_framebuffer(struct gpu_device *device, struct gpu_framebuffer *framebuffer,
+                                 const struct gpu_texture *depth, unsigned colour_count, struct error *error)
+{
+    GLenum attachments[COLOURS_MAX];
+    for (unsigned i = 0; i < colour_count; i++)
         attachments[i] = GL_COLOR_ATTACHMENT0 + i;
-        glNamedFramebufferTexture(framebuffer->name, attachments[i], colours[i].name, 0);
-    }
     if (depth)
         glNamedFramebufferTexture(framebuffer->name, GL_DEPTH_ATTACHMENT, depth->name, 0);
     glNamedFramebufferDrawBuffers(framebuffer->name, (GLsizei)colour_count, attachments);
@@ -164,6 +165,29 @@ bool gpu_framebuffer_create(struct gpu_device *device, struct gpu_framebuffer *f
     gpu_framebuffer_finish(device, framebuffer);
     gpu_note_loss(device, error);
     return error_set(error, ERROR_INTERNAL, NULL, "framebuffer is not complete: 0x%04x", status);
+}
+
+bool gpu_framebuffer_create(struct gpu_device *device, struct gpu_framebuffer *framebuffer,
+                            const struct gpu_texture *colours, unsigned colour_count,
+                            const struct gpu_texture *depth, struct error *error)
+{
+    if (colour_count > COLOURS_MAX)
+        return error_set(error, ERROR_INTERNAL, NULL, "a framebuffer with %u colours", colour_count);
+    if (!create_framebuffer(device, framebuffer, error))
+        return false;
+    for (unsigned i = 0; i < colour_count; i++)
+        glNamedFramebufferTexture(framebuffer->name, GL_COLOR_ATTACHMENT0 + i, colours[i].name, 0);
+    return complete_framebuffer(device, framebuffer, depth, colour_count, error);
+}
+
+bool gpu_framebuffer_create_layer(struct gpu_device *device, struct gpu_framebuffer *framebuffer,
+                                  const struct gpu_texture *colour, uint32_t layer,
+                                  const struct gpu_texture *depth, struct error *error)
+{
+    if (!create_framebuffer(device, framebuffer, error))
+        return false;
+    glNamedFramebufferTextureLayer(framebuffer->name, GL_COLOR_ATTACHMENT0, colour->name, 0, (GLint)layer);
+    return complete_framebuffer(device, framebuffer, depth, 1, error);
 }
 
 void gpu_framebuffer_finish(struct gpu_device *device, struct gpu_framebuffer *framebuffer)

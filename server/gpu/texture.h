@@ -37,6 +37,10 @@ struct gpu_framebuffer {
 bool gpu_framebuffer_create(struct gpu_device *device, struct gpu_framebuffer *framebuffer,
                             const struct gpu_texture *colours, unsigned colour_count,
                             const struct gpu_texture *depth, struct error *error);
+/* Of one layer of an array, and a texture of depths that is none. */
+bool gpu_framebuffer_create_layer(struct gpu_device *device, struct gpu_framebuffer *framebuffer,
+                                  const struct gpu_texture *colour, uint32_t layer,
+                                  const struct gpu_texture *depth, struct error *error);
 void gpu_framebuffer_finish(struct gpu_device *device, struct gpu_framebuffer *framebuffer);
 
 #endif

@@ -141,7 +141,7 @@ void camera_fill_uniforms(struct frame_uniforms *uniforms, const struct frame_re
     uniforms->extent_near[1] = half_height;
     uniforms->extent_near[2] = near;
     uniforms->extent_near[3] = orthographic ? 1.0f : 0.0f;
-    uniforms->jitter_pixel[2] = far_distance(camera, scene, near);
+    uniforms->far_width[0] = far_distance(camera, scene, near);
     uniforms->lens[0] = request->aperture / 2.0f;
     uniforms->lens[1] = request->focus > 0.0f ? request->focus : focus_distance(camera, scene);
     uniforms->width = request->width;

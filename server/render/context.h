@@ -37,7 +37,7 @@ struct render_context {
     struct scene_features features;
     struct frame_uniforms uniforms;
     struct gpu_buffer uniform_buffer;
-    bool spread;     /* each pixel has its samples in places of its own; else jitter_pixel's */
+    bool spread;     /* each pixel has its samples in places of its own; else sample_places' */
     bool has_filter; /* the uniforms have the places of `filter` */
     enum pixel_filter filter;
     /* The host waits for the counts of each wave and dispatches what there is; else it queues a slice's waves on

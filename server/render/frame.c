@@ -22,30 +22,35 @@ void frame_abandon(struct frame_renderer *renderer)
     frame_end(renderer);
 }
 
-/* The position of the current sample within all pixels, if they share one. */
-static void place_sample(struct frame_renderer *renderer)
+/* The position of a sample within all pixels, if they share one. */
+static void place_sample(const struct render_context *context, uint32_t index, float place[2])
 {
-    struct frame_uniforms *uniforms = &renderer->work->context.uniforms;
-    uniforms->jitter_pixel[0] = uniforms->jitter_pixel[1] = 0.5f;
-    if (!renderer->work->context.spread)
+    const struct frame_uniforms *uniforms = &context->uniforms;
+    place[0] = place[1] = 0.5f;
+    if (!context->spread)
         return;
     float numbers[2];
-    sequence_pair(numbers, sequence_seed(UINT32_MAX, uniforms->seed), SEQUENCE_PIXEL, uniforms->sample_index);
+    sequence_pair(numbers, sequence_seed(UINT32_MAX, uniforms->seed), SEQUENCE_PIXEL, index);
     for (int i = 0; i < 2; i++)
-        uniforms->jitter_pixel[i] += pixel_filter_offset((const float *)uniforms->filter_places, numbers[i]);
+        place[i] += pixel_filter_offset((const float *)uniforms->filter_places, numbers[i]);
 }
 
 /* The uniforms of the samples in hand. */
 static bool set_sample(struct frame_renderer *renderer, struct error *error)
 {
+    _Static_assert(sizeof(((struct frame_uniforms *)0)->sample_places) == SAMPLES_TOGETHER_MAX * 2 * sizeof(float),
+                   "a place for each sample");
     struct render_context *context = &renderer->work->context;
     uint32_t left = context->request.samples - renderer->sample;
     context->uniforms.sample_index = renderer->samples_before + renderer->sample;
-    context->uniforms.sample_shift = renderer->rasterise ? 0 : slices_sample_shift(&renderer->slices, left);
+    const uint32_t shift = slices_sample_shift(&renderer->slices, left);
+    context->uniforms.sample_shift = shift < renderer->sample_shift_max ? shift : renderer->sample_shift_max;
     /* A sample that is added to others has no group of its own. */
     context->uniforms.group_shift =
         context->request.accumulate ? 0 : slices_group_shift(context->request.samples, renderer->sample);
-    place_sample(renderer);
+    for (uint32_t i = 0; i < 1u << context->uniforms.sample_shift; i++)
+        place_sample(context, context->uniforms.sample_index + i,
+                     &context->uniforms.sample_places[i / 2][i % 2 * 2]);
     context->wave_number = 0;
     return context_upload_uniforms(context, error);
 }
@@ -53,7 +58,7 @@ static bool set_sample(struct frame_renderer *renderer, struct error *error)
 /* What is seen from that row on. */
 static void begin_strip(struct frame_renderer *renderer, uint32_t row)
 {
-    primary_rasterise_begin(&renderer->work->primary, row);
+    primary_rasterise_begin(&renderer->work->primary, row, 1u << renderer->work->context.uniforms.sample_shift);
     renderer->phase = PHASE_RASTER;
 }
 
@@ -61,9 +66,11 @@ static bool begin_sample(struct frame_renderer *renderer, struct error *error)
 {
     slices_restart(&renderer->slices);
     renderer->phase = PHASE_SLICE;
+    if (!set_sample(renderer, error))
+        return false;
     if (renderer->rasterise)
         begin_strip(renderer, 0);
-    return set_sample(renderer, error);
+    return true;
 }
 
 static bool rasterise(struct frame_renderer *renderer, struct error *error)

@@ -23,6 +23,8 @@
 #define RESERVE_NS UINT64_C(3000000)
 /* Pixels that are rasterised together: more take a while to reserve and to clear. */
 #define STRIP_PIXELS_MAX (1u << 22)
+/* The same of all samples that are rasterised together: 64 MiB. */
+#define LAYERS_PIXELS_MAX (1u << 23)
 /* The number of samples that texture filtering assumes for a picture that accumulates without an end. */
 #define SAMPLES_GOING_ON 16
 
@@ -221,6 +223,18 @@ static uint32_t waves_queued(const struct frame_renderer *renderer)
     return at_least(context->waves_queued, depth);
 }
 
+/* Rasterised samples are together only if that needs no more strips: in each all of the scene is drawn. */
+static uint32_t sample_shift_max(const struct frame_renderer *renderer)
+{
+    const struct frame_request *request = &renderer->work->context.request;
+    const uint64_t strip_pixels = (uint64_t)request->width * renderer->strip_rows;
+    uint32_t shift = 0;
+    while (2u << shift <= SAMPLES_TOGETHER_MAX && 2u << shift <= request->samples &&
+           (!renderer->rasterise || strip_pixels << (shift + 1) <= LAYERS_PIXELS_MAX))
+        shift++;
+    return shift;
+}
+
 static bool reserve_frame(struct frame_renderer *renderer, struct error *error)
 {
     struct render_context *context = &renderer->work->context;
@@ -228,11 +242,12 @@ static bool reserve_frame(struct frame_renderer *renderer, struct error *error)
         return false;
     renderer->rasterise = choices_rasterise(context);
     renderer->strip_rows = picture_strip_rows(&renderer->picture, STRIP_PIXELS_MAX);
-    if (renderer->rasterise && !primary_reserve(&renderer->work->primary, context, renderer->strip_rows, error))
+    renderer->sample_shift_max = sample_shift_max(renderer);
+    if (renderer->rasterise && !primary_reserve(&renderer->work->primary, context, renderer->strip_rows,
+                                                1u << renderer->sample_shift_max, error))
         return false;
     uint32_t rays = slice_rays(renderer);
-    uint64_t all = picture_slot_count(&renderer->picture);
-    all *= renderer->rasterise ? 1 : SLICES_SAMPLES_TOGETHER;
+    uint64_t all = (uint64_t)picture_slot_count(&renderer->picture) << renderer->sample_shift_max;
     rays = rays < all ? rays : (uint32_t)all;
     renderer->slice_rays_max = renderer->slices.slice_rays = rays;
     uint32_t wave_rays = rays * CHOICES_WAVE_PER_SLICE;
@@ -281,7 +296,7 @@ static bool get_ready(struct frame_renderer *renderer, struct error *error)
     camera_fill_uniforms(&context->uniforms, request, &renderer->shared->copy);
     environment_fill_uniforms(context->environment, &context->uniforms, &renderer->shared->copy);
     context->uniforms.depth = request->depth;
-    context->uniforms.jitter_pixel[3] =
+    context->uniforms.far_width[1] =
         1.0f / sqrtf(request->accumulate ? SAMPLES_GOING_ON : (float)request->samples);
     context->spread = request->samples > 1 || request->accumulate;
     fill_filter(context);

@@ -79,7 +79,8 @@ struct frame_renderer {
     bool second_built;                 /* the same of `second` */
     size_t awaited_bytes;              /* of a reservation that was put off, see gpu_reserve_waits(); 0: of none */
     bool rasterise;
-    uint32_t strip_rows;     /* that are rasterised together */
+    uint32_t strip_rows; /* that are rasterised together */
+    uint32_t sample_shift_max;
     uint32_t samples_before; /* that the picture holds of the frames that this one goes on from */
     uint32_t sample;         /* samples of this frame that are done */
     uint32_t plane, band;    /* of the picture that is handed out next */

@@ -22,21 +22,37 @@
 enum primitive_kind { PRIMITIVE_TRIANGLES, PRIMITIVE_SPHERES, PRIMITIVE_DISCS };
 static const unsigned vertices_per_primitive[] = {3, 36, 6};
 
-bool primary_reserve(struct primary *primary, struct render_context *context, uint32_t rows, struct error *error)
+static void finish_framebuffers(struct primary *primary, struct gpu_device *device)
 {
+    for (int i = 0; i < SAMPLES_TOGETHER_MAX; i++)
+        gpu_framebuffer_finish(device, &primary->framebuffers[i]);
+}
+
+static bool has_room(const struct primary *primary, uint32_t width, uint32_t rows, uint32_t samples)
+{
+    const struct gpu_texture *visible = &primary->visible;
+    return primary->framebuffers[samples - 1].name && visible->width == width && visible->height == rows;
+}
+
+bool primary_reserve(struct primary *primary, struct render_context *context, uint32_t rows, uint32_t samples,
+                     struct error *error)
+{
+    struct gpu_device *device = context->device;
     uint32_t width = context->request.width;
-    if (primary->framebuffer.name && primary->visible.width == width && primary->visible.height == rows)
+    if (has_room(primary, width, rows, samples))
         return true;
-    gpu_framebuffer_finish(context->device, &primary->framebuffer);
-    return gpu_texture_reserve(context->device, &primary->visible, GL_RG32UI, width, rows, error) &&
-           gpu_texture_reserve(context->device, &primary->depth, GL_DEPTH_COMPONENT32F, width, rows, error) &&
-           gpu_framebuffer_create(context->device, &primary->framebuffer, &primary->visible, 1, &primary->depth,
-                                  error);
+    finish_framebuffers(primary, device);
+    bool made = gpu_texture_reserve_array(device, &primary->visible, GL_RG32UI, width, rows, samples, error) &&
+                gpu_texture_reserve(device, &primary->depth, GL_DEPTH_COMPONENT32F, width, rows, error);
+    for (uint32_t i = 0; made && i < samples; i++)
+        made = gpu_framebuffer_create_layer(device, &primary->framebuffers[i], &primary->visible, i,
+                                            &primary->depth, error);
+    return made;
 }
 
 void primary_finish(struct primary *primary, struct gpu_device *device)
 {
-    gpu_framebuffer_finish(device, &primary->framebuffer);
+    finish_framebuffers(primary, device);
     gpu_texture_finish(device, &primary->visible);
     gpu_texture_finish(device, &primary->depth);
 }
@@ -102,6 +118,7 @@ static bool draw_sort(struct primary *primary, struct render_context *context, u
         gpu_uniform_uint(program, "instance_index", primary->instance);
         gpu_uniform_uint(program, "first_primitive", first + primary->primitive);
         gpu_uniform_uint(program, "first_row", primary->first_row);
+        gpu_uniform_uint(program, "layer", primary->layer);
         gpu_program_use(context->device, program);
         if (part > 0)
             glDrawArrays(GL_TRIANGLES, 0, (GLsizei)(part * vertices_per_primitive[kind]));
@@ -125,36 +142,60 @@ static void learn(struct primary *primary, uint64_t took_ns)
         primary->part_vertices *= 2;
 }
 
-static bool draw_part(struct primary *primary, struct render_context *context, struct error *error)
+static bool draw_layer(struct primary *primary, struct render_context *context, uint32_t *budget,
+                       struct error *error)
 {
-    uint32_t budget = context->device->facts.software ? primary->part_vertices : DRAW_VERTICES_HARDWARE;
     bool drawn = true;
-    while (drawn && budget > 0 && primary->sort < SORT_COUNT) {
+    while (drawn && *budget > 0 && primary->sort < SORT_COUNT) {
         if (primary->sort == SORT_SPHERES) { /* of a sphere's box the inner sides: they are there also when the eye
                                               * is in the box */
             glEnable(GL_CULL_FACE);
             glCullFace(GL_FRONT);
         }
-        drawn = draw_sort(primary, context, &budget, error);
+        drawn = draw_sort(primary, context, budget, error);
         glDisable(GL_CULL_FACE);
     }
     return drawn;
 }
 
-static void clear(const struct primary *primary)
+static void begin_layer(struct primary *primary, uint32_t layer)
 {
-    static const GLuint nothing[4] = {0};
-    static const GLfloat farthest = 0.0f;
-    glClearNamedFramebufferuiv(primary->framebuffer.name, GL_COLOR, 0, nothing);
-    glClearNamedFramebufferfv(primary->framebuffer.name, GL_DEPTH, 0, &farthest);
-}
-
-void primary_rasterise_begin(struct primary *primary, uint32_t first_row)
-{
-    primary->first_row = first_row;
+    primary->layer = layer;
     primary->sort = SORT_WHOLE;
     primary->instance = primary->primitive = 0;
     primary->cleared = false;
+}
+
+static void set_layer(struct primary *primary)
+{
+    static const GLuint nothing[4] = {0};
+    static const GLfloat farthest = 0.0f;
+    const unsigned name = primary->framebuffers[primary->layer].name;
+    glBindFramebuffer(GL_FRAMEBUFFER, name);
+    if (!primary->cleared) {
+        glClearNamedFramebufferuiv(name, GL_COLOR, 0, nothing);
+        glClearNamedFramebufferfv(name, GL_DEPTH, 0, &farthest);
+    }
+    primary->cleared = true;
+}
+
+/* What one layer still needs, or a part of it. *whole: the layer is done. */
+static bool draw_part(struct primary *primary, struct render_context *context, bool *whole, struct error *error)
+{
+    uint32_t budget = context->device->facts.software ? primary->part_vertices : DRAW_VERTICES_HARDWARE;
+    set_layer(primary);
+    bool drawn = draw_layer(primary, context, &budget, error);
+    *whole = primary->sort == SORT_COUNT;
+    if (*whole)
+        begin_layer(primary, primary->layer + 1);
+    return drawn;
+}
+
+void primary_rasterise_begin(struct primary *primary, uint32_t first_row, uint32_t samples)
+{
+    primary->first_row = first_row;
+    primary->layer_count = samples;
+    begin_layer(primary, 0);
 }
 
 bool primary_rasterise(struct primary *primary, struct render_context *context, bool *done, struct error *error)
@@ -165,7 +206,6 @@ bool primary_rasterise(struct primary *primary, struct render_context *context, 
     context_span_begin(context, STAGE_PRIMARY);
     gpu_push_group(context->device, "rasterise primary");
     context_bind(context);
-    glBindFramebuffer(GL_FRAMEBUFFER, primary->framebuffer.name);
     /* All of the picture, of which the framebuffer has a strip. */
     glViewport(0, -(GLint)primary->first_row, (GLsizei)primary->visible.width, (GLsizei)context->request.height);
     glDisable(GL_BLEND);
@@ -174,14 +214,11 @@ bool primary_rasterise(struct primary *primary, struct render_context *context, 
     glDepthMask(GL_TRUE);
     glDepthFunc(GL_GREATER);
     glClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);
-    if (!primary->cleared)
-        clear(primary);
-    primary->cleared = true;
-    bool drawn = draw_part(primary, context, error);
+    bool whole = false, drawn = draw_part(primary, context, &whole, error);
     glDisable(GL_DEPTH_TEST);
     glBindFramebuffer(GL_FRAMEBUFFER, 0);
-    *done = primary->sort == SORT_COUNT;
-    if (!*done || context->device->facts.software)
+    *done = primary->layer == primary->layer_count;
+    if (!whole || context->device->facts.software)
         gpu_finish(context->device); /* else all parts would be waited for at the end, at once */
     learn(primary, clock_now_ns() - start_ns);
     gpu_pop_group(context->device);

@@ -6,25 +6,28 @@
 #include "gpu/texture.h"
 #include "render/context.h"
 
-/* The visibility buffer: which primitive of which instance each pixel of one sample sees. It has a strip of the
- * picture's rows at a time, so that no picture needs more than some memory at once. */
+/* The visibility buffer: which primitive of which instance each pixel sees, in a layer for each of the current
+ * samples. It has a strip of the picture's rows at a time, so that no picture needs more than some memory at once.
+ */
 struct primary {
-    struct gpu_texture visible; /* RG32UI: instance + 1 (0: nothing), primitive; row 0 is the strip's uppermost */
-    struct gpu_texture depth;   /* reversed, 32-bit float */
-    struct gpu_framebuffer framebuffer;
-    uint32_t first_row; /* of the strip, in the picture */
+    /* RG32UI: instance + 1 (0: nothing), primitive; row 0 is the strip's uppermost. An array. */
+    struct gpu_texture visible;
+    struct gpu_texture depth; /* reversed, 32-bit float; of the layer that is drawn */
+    struct gpu_framebuffer framebuffers[SAMPLES_TOGETHER_MAX]; /* one a layer */
+    uint32_t first_row;                                        /* of the strip, in the picture */
+    uint32_t layer_count;                                      /* that are drawn */
     /* where drawing goes on */
-    uint32_t sort, instance, primitive;
+    uint32_t layer, sort, instance, primitive;
     bool cleared;
     uint32_t part_vertices; /* that are drawn in one step on software GL; 0: not known yet */
 };
 
-/* Makes room for strips of that many rows of the request's picture. */
-bool primary_reserve(struct primary *primary, struct render_context *context, uint32_t rows, struct error *error);
-/* Draws the strip from that row on for the sample that the uniforms describe, a part of the scene a call until it
- * is done.
- */
-void primary_rasterise_begin(struct primary *primary, uint32_t first_row);
+/* Makes room for strips of that many rows of the request's picture, and for that many samples. */
+bool primary_reserve(struct primary *primary, struct render_context *context, uint32_t rows, uint32_t samples,
+                     struct error *error);
+/* Draws the strip from that row on for all samples that the uniforms describe, a part of the scene a call until it
+ * is done. */
+void primary_rasterise_begin(struct primary *primary, uint32_t first_row, uint32_t samples);
 bool primary_rasterise(struct primary *primary, struct render_context *context, bool *done, struct error *error);
 /* Rays, paths and black pixels of context->slice. */
 bool primary_begin_slice(const struct primary *primary, struct render_context *context, struct error *error);

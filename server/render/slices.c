@@ -4,7 +4,7 @@
 uint32_t slices_sample_shift(const struct slices *slices, uint32_t samples)
 {
     uint32_t maximum = samples < slices->slice_rays ? samples : slices->slice_rays, shift = 0;
-    while (2u << shift <= SLICES_SAMPLES_TOGETHER && 2u << shift <= maximum)
+    while (2u << shift <= SAMPLES_TOGETHER_MAX && 2u << shift <= maximum)
         shift++;
     return shift;
 }
@@ -14,7 +14,7 @@ uint32_t slices_group_shift(uint32_t samples, uint32_t done)
     uint32_t shift = 0, group = 0;
     for (uint32_t end = 0; end <= done; end += group) {
         shift = 0;
-        while (2u << shift <= SLICES_SAMPLES_TOGETHER && 2u << shift <= samples - end)
+        while (2u << shift <= SAMPLES_TOGETHER_MAX && 2u << shift <= samples - end)
             shift++;
         group = 1u << shift;
     }

@@ -6,8 +6,7 @@
 #include "render/context.h"
 #include "render/picture.h"
 
-#define SLICES_SAMPLES_TOGETHER 16 /* at most; a power of two */
-#define SLICES_WAITING_MAX 32      /* halves of halves of at most 2^32 pixels */
+#define SLICES_WAITING_MAX 32 /* halves of halves of at most 2^32 pixels */
 
 struct slices {
     uint32_t slice_rays; /* primary rays of a slice: pixels times samples */

@@ -62,10 +62,11 @@ void camera_ray_through(vec2 picture_place, out vec3 origin, out vec3 direction,
     }
 }
 
-// The same where all pixels have their sample in one place.
-void camera_ray(uvec2 pixel, out vec3 origin, out vec3 direction, out float t_min)
+// Where in a pixel that one of the current samples is, if it is the same in all.
+vec2 sample_place(uint i)
 {
-    camera_ray_through(vec2(pixel) + frame.jitter_pixel.xy, origin, direction, t_min);
+    vec4 two = frame.sample_places[i >> 1];
+    return (i & 1u) != 0u ? two.zw : two.xy;
 }
 
 // Shirley and Chiu. A Low Distortion Map Between Disk and Square. 1997. From [0, 1)^2 to the unit disc.
@@ -111,17 +112,17 @@ float filter_offset(float number)
     return side < 0.0 ? -place : place;
 }
 
-// Clip coordinates of a point so that a pixel's centre shows what camera_ray() sees through it. Row 0 of the
-// target is the picture's uppermost. Depth is reversed: 1 at the near plane; 0 infinitely far away, or, in an
-// orthographic view, at the far distance in jitter_pixel.z.
-vec4 clip_from_world_point(vec3 p)
+// Clip coordinates of a point so that a pixel's centre shows what camera_ray_through() sees through that place in it.
+// Row 0 of the target is the picture's uppermost. Depth is reversed: 1 at the near plane; 0 infinitely far away, or, in
+// an orthographic view, at the far distance.
+vec4 clip_from_world_point(vec3 p, vec2 place)
 {
     vec3 v = view_from_world_point(p);
-    vec2 shift = (1.0 - 2.0 * frame.jitter_pixel.xy) / vec2(frame.width, frame.height);
+    vec2 shift = (1.0 - 2.0 * place) / vec2(frame.width, frame.height);
     vec2 scaled = v.xy / vec2(frame.extent_near.x, -frame.extent_near.y);
     float near = frame.extent_near.z;
     if (frame.extent_near.w != 0.0) {
-        float far = frame.jitter_pixel.z;
+        float far = frame.far_width.x;
         return vec4(scaled + shift, (far + v.z) / (far - near), 1.0);
     }
     return vec4(scaled - shift * v.z, near, -v.z);
@@ -130,6 +131,6 @@ vec4 clip_from_world_point(vec3 p)
 // Ray cone of a primary ray: width at the origin and growth per length. Many samples share a pixel.
 vec2 camera_cone()
 {
-    float step = 2.0 * frame.extent_near.y / float(frame.height) * frame.jitter_pixel.w;
+    float step = 2.0 * frame.extent_near.y / float(frame.height) * frame.far_width.y;
     return frame.extent_near.w != 0.0 ? vec2(step, 0.0) : vec2(0.0, step);
 }

@@ -2,7 +2,7 @@
 // Rays and paths of a slice's samples, those of one pixel side by side; the slice's sums are set to black.
 // Defines:
 //   VISIBILITY  what the rasteriser saw is noted in the hits, for primary_fill.comp; else they are left to a tracer
-//   SPREAD      each pixel has its samples where its own numbers say; else all have them where frame.jitter_pixel says
+//   SPREAD      each pixel has its samples where its own numbers say; else all have them where frame.sample_places says
 //   HAS_LENS    rays start on a lens and meet in the plane in focus
 //   HAS_TIMES   something moves: rays have a time
 
@@ -24,7 +24,7 @@ layout(std430, binding = BIND_RAY_TIMES) writeonly buffer time_block { float tim
 #endif
 #ifdef VISIBILITY
 layout(std430, binding = BIND_HITS) writeonly buffer hit_block { hit hits[]; };
-layout(binding = UNIT_PASS_0) uniform usampler2D visible_primitives;
+layout(binding = UNIT_PASS_0) uniform usampler2DArray visible_primitives; // a layer for each of the current samples
 uniform uint first_row; // of the picture in them
 #endif
 
@@ -36,12 +36,12 @@ void main()
     uvec2 pixel = pixel_of_slot(first_slot + (k >> frame.sample_shift));
     bool in_picture = pixel.x < frame.width && pixel.y < frame.height;
     uint seed = sequence_seed(pixel.y * frame.width + pixel.x, frame.seed);
-    uint index = frame.sample_index + (k & (1u << frame.sample_shift) - 1u);
+    uint sample_ = k & (1u << frame.sample_shift) - 1u, index = frame.sample_index + sample_;
 #ifdef SPREAD
     vec2 u = sequence_pair(seed, SEQUENCE_PIXEL, index);
     vec2 place = vec2(pixel) + 0.5 + vec2(filter_offset(u.x), filter_offset(u.y));
 #else
-    vec2 place = vec2(pixel) + frame.jitter_pixel.xy;
+    vec2 place = vec2(pixel) + sample_place(sample_);
 #endif
     vec3 origin, direction;
     float t_min, time = 0.0;
@@ -61,7 +61,9 @@ void main()
     paths[k] = path(weight, weight, weight, k, cone.x, cone.y, PATH_STRAIGHT, time, 0u, 0.0, 0.0, 1.0);
     slice_sums[k] = vec4(0.0);
 #ifdef VISIBILITY
-    uvec2 visible = in_picture ? texelFetch(visible_primitives, ivec2(pixel - uvec2(0u, first_row)), 0).xy : uvec2(0u);
+    uvec2 visible = uvec2(VISIBLE_NOTHING, 0u);
+    if (in_picture)
+        visible = texelFetch(visible_primitives, ivec3(pixel - uvec2(0u, first_row), sample_), 0).xy;
     hits[k].distance = visible.x != VISIBLE_NOTHING ? 0.0 : -1.0;
     hits[k].instance = visible.x == VISIBLE_DISC ? HIT_NO_PRIMITIVE : visible.x - 1u;
     hits[k].primitive = visible.y;

@@ -9,6 +9,7 @@
 uniform uint instance_index;
 uniform uint first_primitive;
 uniform uint first_row; // of the strip that is drawn, in the picture
+uniform uint layer;     // the sample that is drawn, of the current ones
 
 layout(location = 0) out uvec2 visible;
 
@@ -19,7 +20,7 @@ float depth_of(float distance_, vec3 direction)
     vec3 axis = world_from_view_vector(vec3(0.0, 0.0, -1.0));
     float along = distance_ * dot(direction, axis), near = frame.extent_near.z;
     if (frame.extent_near.w != 0.0)
-        return (frame.jitter_pixel.z - along) / (frame.jitter_pixel.z - near);
+        return (frame.far_width.x - along) / (frame.far_width.x - near);
     return near / along;
 }
 #endif
@@ -28,7 +29,7 @@ void main()
 {
     vec3 origin, direction;
     float t_min;
-    camera_ray(uvec2(gl_FragCoord.xy) + uvec2(0u, first_row), origin, direction, t_min);
+    camera_ray_through(vec2(uvec2(gl_FragCoord.xy) + uvec2(0u, first_row)) + sample_place(layer), origin, direction, t_min);
 #if PRIMITIVE_KIND == 0
     uint primitive = first_primitive + uint(gl_PrimitiveID);
 #ifdef HAS_CUTOUT

@@ -8,6 +8,7 @@
 
 uniform uint instance_index;
 uniform uint first_primitive; // of this draw, scene-wide
+uniform uint layer;           // the sample that is drawn, of the current ones
 
 #if PRIMITIVE_KIND == 1
 // Corners of a cube by bit (x 1, y 2, z 4), two triangles a side, counter-clockwise from outside.
@@ -39,5 +40,5 @@ void main()
     vec2 place = vec2(corner & 1u, corner >> 1) * 2.0 - 1.0;
     vec3 world = d.centre_radius.xyz + d.centre_radius.w * (place.x * tangent + place.y * bitangent);
 #endif
-    gl_Position = clip_from_world_point(world);
+    gl_Position = clip_from_world_point(world, sample_place(layer));
 }

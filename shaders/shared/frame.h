@@ -3,7 +3,8 @@
 #define FARLIGHT_SHARED_FRAME_H
 #include "shared/types.h"
 
-#define UNIFORM_FRAME 0 /* binding of the uniform block below */
+#define UNIFORM_FRAME 0         /* binding of the uniform block below */
+#define SAMPLES_TOGETHER_MAX 16 /* of a pixel in a wave; a power of two */
 
 /* The uniforms of every pass of a frame; a std140 block. The order of the pixels is that of `slots`: 8x8 tiles row
  * by row, Morton order inside a tile; tiles at the right and lower edge may stick out of the picture. */
@@ -11,9 +12,10 @@ struct frame_uniforms {
     vec4 world_from_view[3]; /* rows; rigid; looks along -z, y up */
     vec4 extent_near;        /* xy: half width and half height of the view at distance 1 (perspective) or of
                                 the view itself (orthographic), z: near distance, w: 1 if orthographic */
-    vec4 jitter_pixel;       /* xy: the position of this sample from each pixel's top left, if it is the same
-                                in all pixels; z: far distance of an orthographic view;
-                                w: width of a sample in pixels */
+    vec4 far_width; /* x: far distance of an orthographic view; y: width of a sample in pixels; z, w unused */
+    /* Of the current samples, two in each: their positions from each pixel's top left, if these are the same in
+     * all pixels. */
+    vec4 sample_places[8];
     vec4 lens; /* x: radius, 0: a pinhole; y: distance of the plane in focus along the view; z, w unused */
     vec4 environment_colour; /* radiance, or the image's factor; w: rotation about +y, radians */
     vec4 irradiance[9];      /* rgb: of the environment, divided by pi: harmonics of a world-space normal */
@@ -29,7 +31,7 @@ struct frame_uniforms {
     uint group_shift; /* 2 to its power samples of a pixel have their lights in order: sequence_pair_sorted */
     uint pad0, pad1;
 };
-SHARED_SIZE(frame_uniforms, 576)
+SHARED_SIZE(frame_uniforms, 704)
 
 #define ENVIRONMENT_NONE 0u /* black; leaves the picture transparent */
 #define ENVIRONMENT_CONSTANT 1u

@@ -225,6 +225,28 @@ TEST(a_picture_is_the_same_to_the_bit_however_its_samples_are_grouped)
     }
 }
 
+/* Where the host waits for the counts of each wave, and on software GL once for each layer that is drawn. */
+TEST(rasterised_samples_of_a_pixel_share_their_waves)
+{
+    struct fixture *fixture = *state;
+    const struct scene_material *material = fixture_material(fixture);
+    fixture_square(fixture, 3.0f, material->base.id, NULL);
+    fixture_light(fixture, LIGHT_SPHERE, 1.0f, 2.0f, 3.0f, 5.0f);
+    fixture->request.integrator = INTEGRATOR_DISTRIBUTED;
+    fixture->request.depth = 0;
+    uint32_t waits[2];
+    for (int i = 0; i < 2; i++) {
+        fixture->request.samples = i ? 16 : 1;
+        struct frame_result first = fixture_render(fixture); /* compiles, and brings the scene to the device */
+        frame_result_finish(&first);
+        struct frame_result result = fixture_render(fixture);
+        waits[i] = result.device_waits;
+        frame_result_finish(&result);
+    }
+    if (waits[1] > waits[0] + 15)
+        fail_msg("16 samples wait %u times, one %u times", waits[1], waits[0]);
+}
+
 TEST(a_slice_of_less_than_a_pixels_samples_is_the_same_picture_too)
 {
     struct fixture *fixture = *state;
