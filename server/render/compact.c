@@ -114,9 +114,21 @@ bool compact_hits(struct render_context *context, struct error *error)
     return true;
 }
 
-bool compact_children(struct render_context *context, uint32_t children_a_hit, bool last_queued,
+static bool decide_order(struct render_context *context, struct error *error)
+{
+    const struct gpu_program *program = context_use(context, "render/compact_sample.comp", error);
+    if (!program)
+        return false;
+    gpu_buffer_bind_storage(&context->wave_state, BIND_WAVE);
+    gpu_dispatch(context->device, program, 1); /* one group */
+    return true;
+}
+
+bool compact_children(struct render_context *context, uint32_t children_a_hit, bool last_queued, bool sorts,
                       struct error *error)
 {
+    if (sorts && !decide_order(context, error))
+        return false;
     const struct gpu_program *program = context_use(context, "render/compact_count.comp", error);
     if (!program)
         return false;

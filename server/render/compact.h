@@ -19,8 +19,9 @@ void compact_dispatch(struct render_context *context, const struct gpu_program *
 /* Lists the hits of the current wave: context->hit_list, hit_places and hit_count. */
 bool compact_hits(struct render_context *context, struct error *error);
 /* The places of the hits' children (context->block_offsets) and their number, context->ray_count, from
- * BIND_CHILD_COUNTS. `last_queued`: no wave is queued behind this one, so that none may be left. */
-bool compact_children(struct render_context *context, uint32_t children_a_hit, bool last_queued,
+ * BIND_CHILD_COUNTS. `last_queued`: no wave is queued behind this one, so that none may be left. `sorts`: the
+ * places are in the order of the children's directions where that pays (compact_sample.comp). */
+bool compact_children(struct render_context *context, uint32_t children_a_hit, bool last_queued, bool sorts,
                       struct error *error);
 /* Makes the wave one of `count` shadow rays of each hit. `all_count`: they count as rays of the slice as they are;
  * else the children's scan counts those that are alive. */

@@ -158,7 +158,7 @@ bool context_reserve(struct render_context *context, uint32_t slice_samples, str
            gpu_buffer_reserve(device, &context->hits, capacity * sizeof(struct hit), error) &&
            gpu_buffer_reserve(device, &context->hit_list, capacity * sizeof(uint), error) &&
            gpu_buffer_reserve(device, &context->hit_places, capacity * sizeof(uint), error) &&
-           gpu_buffer_reserve(device, &context->block_offsets, blocks * 2 * sizeof(uint), error) &&
+           gpu_buffer_reserve(device, &context->block_offsets, blocks * OCTANTS * 2 * sizeof(uint), error) &&
            gpu_buffer_reserve(device, &context->wave_state, sizeof(struct wave_state), error) &&
            gpu_buffer_reserve(device, &context->slice_sums, slice_samples * sizeof(vec4), error);
 }

@@ -140,6 +140,7 @@ static void count_rays(struct frame_renderer *renderer, const struct wave_state 
 {
     renderer->result.shadow_rays += state->all_shadow_rays;
     renderer->result.secondary_rays += state->all_secondary_rays;
+    renderer->result.sorted_waves += state->all_sorted_waves;
 }
 
 /* The samples of that slice are in the picture. */

@@ -97,6 +97,7 @@ struct frame_result {
     enum ycbcr ycbcr; /* in place of the RGBA8; base/ycbcr.h says how the planes lie in size_bytes */
     uint64_t revision;
     uint64_t primary_rays, shadow_rays, secondary_rays, splits;
+    uint32_t sorted_waves; /* whose rays were brought into the order of their directions */
     uint32_t device_waits; /* how often the host has waited for the device, bringing the scene there included */
     uint64_t uploaded_bytes, structure_bytes;
     struct structure_rows structure; /* what the tracer says of it */

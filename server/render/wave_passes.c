@@ -199,7 +199,8 @@ static enum wave_progress make_wave(struct wave_passes *passes, struct render_co
     if (context->hit_count == 0)
         return WAVE_DONE;
     gpu_buffer_bind_storage(&passes->child_counts, BIND_CHILD_COUNTS);
-    if (!compact_children(context, passes->integrator->children_a_hit, last_queued, error))
+    const struct integrator *integrator = passes->integrator;
+    if (!compact_children(context, integrator->children_a_hit, last_queued, integrator->scatters, error))
         return WAVE_FAILED;
     if (context->counts_on_host && context->known_state.stopped)
         return WAVE_OVERFLOW;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Third: the children go to their places as rays and paths of the next wave, in the order of their parents. The host
-// has reserved the space.
+// Third: the children go to their places as rays and paths of the next wave, in the order of their parents, in a sorted
+// wave within each octant. The host has reserved the space.
 // Defines: HAS_TIMES something moves: rays have a time.
 
 #include "shared/path.h"
@@ -27,12 +27,16 @@ void main()
     // None where the wave does not fit: then its places are not there.
     if (j >= wave.hits.count || wave.rays.count == 0u)
         return;
-    uint count = child_counts[j] & 3u;
+    uint own = child_counts[j], count = own & CHILDREN_MASK;
     if (count == 0u)
         return;
-    uint block = j / COMPACT_BLOCK, place = block_offsets[block].x;
-    for (uint before = block * COMPACT_BLOCK; before < j; before++)
-        place += child_counts[before] & 3u;
+    uint octant_mask = wave.sorted != 0u ? OCTANTS - 1u << CHILD_OCTANT_SHIFT : 0u;
+    uint octant = (own & octant_mask) >> CHILD_OCTANT_SHIFT, block = j / COMPACT_BLOCK;
+    uint place = block_offsets[octant * wave.hit_blocks.count + block].x;
+    for (uint k = block * COMPACT_BLOCK; k < j; k++) {
+        uint before = child_counts[k];
+        place += ((before ^ own) & octant_mask) == 0u ? before & CHILDREN_MASK : 0u;
+    }
     for (uint i = 0u; i < count; i++) {
         int texel = int(j * children_a_hit + i) * CHILD_TEXELS;
         uvec4 third = texelFetch(children, texel + 2), fourth = texelFetch(children, texel + 3);

@@ -86,7 +86,7 @@ void main()
 #ifdef HITS
     uint block_count = state.ray_blocks.count;
 #else
-    uint block_count = state.hit_blocks.count;
+    uint block_count = state.hit_blocks.count * (state.sorted != 0u ? OCTANTS : 1u); // octant by octant
 #endif
     uint run = (block_count + SCAN_SIZE - 1u) / SCAN_SIZE;
     uint first = min(self * run, block_count), end = min(first + run, block_count);

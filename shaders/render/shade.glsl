@@ -71,7 +71,7 @@ vec3 off_surface(surface s, float distance_, vec3 side)
     return s.position + PATH_OFFSET * max(max_component(abs(s.position)), distance_) * side;
 }
 
-uint child_count = 0u;
+uint child_count = 0u, child_octant = 0u;
 
 // A child without weight or direction, or beyond the depth, is left out. All else is the parent's.
 void add_child(uint j, path parent, surface s, float distance_, vec3 direction, vec3 weight, bool straight)
@@ -98,6 +98,8 @@ void add_child(uint j, path parent, surface s, float distance_, vec3 direction, 
     c.light_distance = parent.light_distance;
     c.light_share = parent.light_share;
     c.environment_share = parent.environment_share;
+    uvec3 negative = uvec3(lessThan(direction, vec3(0.0)));
+    child_octant = negative.x | negative.y << 1 | negative.z << 2;
     children[j * children_a_hit + child_count] = c;
     child_count++;
 }
@@ -132,5 +134,6 @@ bool add_shadow_ray(uint place, path p, vec3 origin, vec3 direction, float dista
 // `first`: the first batch of the wave's shadow rays, which also emits the children.
 void note_children(uint j, bool first, uint shadow_rays_alive)
 {
-    child_counts[j] = (first ? child_count : child_counts[j]) + (shadow_rays_alive << 2);
+    uint before = first ? child_count | child_octant << CHILD_OCTANT_SHIFT : child_counts[j];
+    child_counts[j] = before + (shadow_rays_alive << SHADOW_RAYS_SHIFT);
 }

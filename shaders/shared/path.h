@@ -7,10 +7,11 @@
 /* The path of ray k of a closest-hit wave: its state besides the ray itself.
  *
  * A slice holds one sample of each of its pixels, or several (frame.sample_shift), those of a pixel side by side.
- * The paths of a wave are in the order of their samples, and those of one sample lie side by side: children take
- * their places by a prefix sum over their parents, never by an atomic counter. So the pass that sums up radiance
- * gives each sample to one invocation, which adds in that order; samples are added to their pixel in their order,
- * too, and a picture is the same to the bit however its slices were cut. */
+ * The paths of one sample lie side by side in their wave, in an order that never changes: children take their
+ * places by a prefix sum over their parents, never by an atomic counter. So the pass that sums up radiance gives
+ * each sample to one invocation, which adds in that order; samples are added to their pixel in their order, too,
+ * and a picture is the same to the bit however its slices were cut. Where a sample has at most one path, waves may
+ * be sorted by direction (compact_sample.comp); else they are in the order of their samples. */
 struct path {
     float weight_r, weight_g, weight_b; /* share of this ray's radiance that reaches the eye */
     uint sample_slot;                   /* in the slice: pixel times the samples that are together, plus sample */
@@ -51,8 +52,14 @@ struct child {
     float light_distance, light_share, environment_share;
 };
 SHARED_SIZE(child, 80)
-#define CHILD_TEXELS 5                  /* RGBA32UI */
-#define CHILDREN_MAX 3u                 /* of whitted: straight on, reflected, refracted */
+#define CHILD_TEXELS 5  /* RGBA32UI */
+#define CHILDREN_MAX 3u /* of whitted: straight on, reflected, refracted */
+/* A hit's children and live shadow rays in one word: how many children, the signs of the last one's direction
+ * (OCTANTS of them), how many shadow rays. */
+#define CHILDREN_MASK 3u
+#define CHILD_OCTANT_SHIFT 2u
+#define SHADOW_RAYS_SHIFT 5u
+#define OCTANTS 8u
 #define COMPACT_BLOCK 16u               /* paths whose hits, and then children, are counted together */
 #define COMPACT_SCAN_SIZE 64            /* invocations of the one group that scans the counts */
 #define COMPACT_SCAN_SIZE_PARALLEL 1024 /* of a GPU: as many as every device has in a group */
@@ -67,14 +74,16 @@ SHARED_SIZE(child, 80)
 #define BIND_PATHS BIND_PASS_0
 #define BIND_RADIANCE BIND_PASS_1         /* vec4 per path: its contribution to the pixel, coverage in w */
 #define BIND_CHILDREN BIND_PASS_2         /* struct child, the integrator's number per hit */
-#define BIND_CHILD_COUNTS BIND_PASS_3     /* uint per hit: children, plus 4 times the shadow rays */
+#define BIND_CHILD_COUNTS BIND_PASS_3     /* uint per hit: CHILDREN_MASK .. */
 #define BIND_LIGHT_SAMPLES BIND_PASS_4    /* vec4 per shadow ray: its contribution if nothing is in the way */
 #define BIND_SHADOW_RAYS BIND_VISIBILITY  /* struct ray; no pass both makes them and reads the answers */
 #define BIND_HIT_LIST BIND_WAVE           /* uint per hit: its path; in order */
 #define BIND_HIT_PLACES BIND_CHILD_COUNTS /* uint per path: its place in the list; where children are not used */
 #define BIND_SLICE_SUMS BIND_PASS_2       /* vec4 per sample of the slice; where children are not used */
-#define BIND_BLOCK_OFFSETS BIND_PASS_4    /* uvec2 per block of COMPACT_BLOCK; where light samples are not used */
-#define BIND_ACCUMULATION BIND_PASS_0     /* vec4 per pixel slot of the picture's band; sum of the samples */
-#define BIND_RESOLVED BIND_PASS_1         /* pixels of the output's format, rows from the top */
+#define BIND_BLOCK_OFFSETS                                                                                        \
+    BIND_PASS_4 /* uvec2 per block of COMPACT_BLOCK, of a sorted wave OCTANTS times as many; where light samples  \
+                   are not used */
+#define BIND_ACCUMULATION BIND_PASS_0 /* vec4 per pixel slot of the picture's band; sum of the samples */
+#define BIND_RESOLVED BIND_PASS_1     /* pixels of the output's format, rows from the top */
 
 #endif

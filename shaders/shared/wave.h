@@ -21,12 +21,14 @@ struct wave_state {
     SHARED(wave_counts) shadow_rays;      /* of the batch in hand; only where the host does not know */
     uint all_secondary_rays;              /* of the slice so far */
     uint all_shadow_rays;
+    uint all_sorted_waves;
+    uint sorted; /* 1: the children of the wave in hand are, by the octants of their directions */
     /* Not 0: a WAVE_STOPPED_ that says why the slice must be done again. It stays until the host has seen it, and
      * keeps this slice and all that are queued behind it out of the picture. */
     uint stopped;
-    uint pad0;
+    uint pad0, pad1, pad2;
 };
-SHARED_SIZE(wave_state, 96)
+SHARED_SIZE(wave_state, 112)
 
 #define WAVE_STOPPED_FULL 1u   /* a wave is larger than the buffers */
 #define WAVE_STOPPED_QUEUED 2u /* rays are left behind the last wave that is queued */

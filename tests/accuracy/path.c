@@ -248,6 +248,35 @@ TEST(the_picture_is_the_same_however_it_is_sliced)
     frame_result_finish(&small);
 }
 
+/* What a diffuse surface scatters goes in all directions, what a mirror reflects hardly does; waves of less than
+ * 1024 hits stay as they are. */
+TEST(waves_are_sorted_where_their_directions_differ_and_the_picture_stays_the_same)
+{
+    struct fixture *fixture = *state;
+    for (int mirrors = 0; mirrors < 2; mirrors++) {
+        path_begin(fixture, TRACER_NAIVE, 3);
+        a_glowing_room(fixture, 0.7f);
+        struct scene_material *material = &fixture->edits[0].set.material;
+        material->metallic = (float)mirrors;
+        material->roughness = mirrors ? 0.0f : 1.0f;
+        fixture->request.width = fixture->request.height = 64;
+        struct frame_result whole = fixture_render(fixture);
+        frame_renderer_queue_ahead(fixture->renderer, true);
+        struct frame_result ahead = fixture_render(fixture);
+        frame_renderer_queue_ahead(fixture->renderer, false);
+        frame_renderer_set_capacity(fixture->renderer, 1000, 1000);
+        struct frame_result cut = fixture_render(fixture);
+        assert_int_equal(whole.sorted_waves, mirrors ? 0 : 3); /* the last wave has no children */
+        assert_int_equal(ahead.sorted_waves, whole.sorted_waves);
+        assert_int_equal(cut.sorted_waves, 0);
+        assert_same(&whole, &cut);
+        assert_same(&whole, &ahead);
+        frame_result_finish(&whole);
+        frame_result_finish(&ahead);
+        frame_result_finish(&cut);
+    }
+}
+
 TEST(all_tracers_see_one_picture)
 {
     struct fixture *fixture = *state;
