@@ -314,17 +314,21 @@ BUILD_PACKAGES := gcc g++ make pkg-config libepoxy-dev libegl-dev libgl-dev libc
     libtinyobjloader-dev libembree-dev libavcodec-dev libavformat-dev libavutil-dev libswscale-dev libsdl2-dev libsdl2-ttf-dev fonts-dejavu-core libegl1 libgl1-mesa-dri
 TEST_PACKAGES := libcmocka-dev python3 python3-jsonschema ffmpeg xvfb gnuplot-nox
 LINT_PACKAGES := clang clang-format glslang-tools python3
+# A second driver stack: OpenGL over Vulkan, on the CPU.
+STACK_PACKAGES := mesa-vulkan-drivers
 ANALYZE_PACKAGES := clang clang-tidy python3
 COVERAGE_PACKAGES := gcovr
 FUZZ_PACKAGES := clang libclang-rt-14-dev
 
-.PHONY: tests build-packages test-packages lint-packages analyze-packages coverage-packages fuzz-packages test test-long demo bench soak farm-drill siege bench-plot check-headers check-rules lint check analyze coverage format install uninstall clean distclean help
+.PHONY: tests build-packages test-packages stack-packages lint-packages analyze-packages coverage-packages fuzz-packages test test-long test-zink demo bench soak farm-drill siege bench-plot check-headers check-rules lint check analyze coverage format install uninstall clean distclean help
 tests: $(TEST_PROGRAMS) $(CONTRACT) $(BENCH_PROGRAM) $(SHAPED_LINK) $(B)/tests/tools/make_scenes $(B)/tests/tools/pose_dump $(LOSING_DAEMON)
 
 build-packages:
 	@tests/tools/install_packages.sh $(BUILD_PACKAGES)
 test-packages:
 	@tests/tools/install_packages.sh $(BUILD_PACKAGES) $(TEST_PACKAGES)
+stack-packages:
+	@tests/tools/install_packages.sh $(BUILD_PACKAGES) $(TEST_PACKAGES) $(STACK_PACKAGES)
 lint-packages:
 	@tests/tools/install_packages.sh $(BUILD_PACKAGES) $(TEST_PACKAGES) $(LINT_PACKAGES)
 analyze-packages:
@@ -343,6 +347,10 @@ test: test-packages
 test-long: test-packages
 	$(MAKE) -j$(JOBS) all tests
 	FARLIGHT_TEST_LONG=1 python3 tests/tools/run_tests.py $(B) $(TESTS)
+# What depends on the driver, on Mesa's zink over lavapipe; FARLIGHT_TEST_LONG=1: all of it (run_tests.py, STACKS).
+test-zink: stack-packages
+	$(MAKE) -j$(JOBS) all tests
+	FARLIGHT_TEST_STACK=zink python3 tests/tools/run_tests.py $(B) $(TESTS)
 demo: build-packages
 	$(MAKE) -j$(JOBS) all $(B)/tests/tools/make_scenes
 	tests/tools/demo.sh $(B) out $(FAST)
@@ -464,6 +472,7 @@ help:
 	@echo 'make demo       install what is missing, build, render the bundled scenes into out/   [FAST=1: one picture]'
 	@echo 'make test       install what tests need, build, run all tests   [TESTS=part-of-a-name]'
 	@echo 'make test-long  all tests and what takes minutes: the benchmark itself, every hostile file the whole way'
+	@echo "make test-zink  tracers, frames and layers on another OpenGL stack, and its pictures beside llvmpipe's   [TESTS=part-of-a-name]"
 	@echo 'make bench      measure, into out/bench.txt and out/bench.json   [BENCH="family reach"; see tests/bench/bench.py]'
 	@echo 'make soak       use one daemon for some minutes, and see that its memory stays flat   [ROUNDS=1000]'
 	@echo 'make farm-drill kill the daemon or the client of animations at random, and see that no frame is lost   [ROUNDS=1000 SEED=]'

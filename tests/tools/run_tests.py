@@ -9,6 +9,8 @@ rules of the sources are checked first. Files and modules run side by side, as m
 FARLIGHT_TEST_JOBS at a time (default: one more than there are processors, at most 4), those first that took longest
 the last time. With CI=true in the environment, a skipped test fails unless EXPECTED_SKIPS names its reason.
 FARLIGHT_TEST_SANITIZED=1 leaves out where the sanitizers see little for their time (NOT_SANITIZED).
+FARLIGHT_TEST_STACK=zink runs what depends on the driver on another driver stack than Mesa's default (STACKS): without a
+part of a name what is worth most for its time, with FARLIGHT_TEST_LONG=1 all of it.
 """
 import collections
 import concurrent.futures
@@ -17,6 +19,7 @@ import json
 import os
 import pathlib
 import re
+import resource
 import subprocess
 import sys
 import time
@@ -48,6 +51,25 @@ LONGEST_FIRST = ("accuracy/sampled_against_reference", "test_import", "test_ligh
                  "accuracy/frame_steps", "test_poses", "test_animate", "contract/bvh, packets of eight",
                  "test_import_animation", "contract/bvh", "test_units", "unit/trace/ldc/limits", "unit/trace/ldc/traversal",
                  "test_soak")
+
+# Driver stacks beside the default one: what chooses it, and what the daemon must then say that it renders with.
+# zink is OpenGL 4.6 over Vulkan, here on lavapipe (mesa-vulkan-drivers). It inlines values of uniforms into its programs,
+# and Mesa 22.3 keeps wrong ones; ZINK_INLINE_UNIFORMS=0 forbids that.
+Stack = collections.namedtuple("Stack", "environment renderer")
+STACKS = {"zink": Stack({"LIBGL_ALWAYS_SOFTWARE": "1", "GALLIUM_DRIVER": "zink", "ZINK_INLINE_UNIFORMS": "0"}, "zink")}
+# What depends on the driver: tracers, frames, layers, and commands from end to end.
+ON_A_STACK = re.compile(r"accuracy/|contract/|unit/(gpu|gpu_scene|render|trace)/|test_stacks$"
+                        r"|test_(render|layers|ldc|abuffer|compare_tracers|animate|carousel|light|poses)$")
+# Left to FARLIGHT_TEST_LONG=1, as others see the same of a driver in less time: scattering and light against closed forms,
+# which is GLSL's arithmetic again; the lengths of steps; forms of a tracer that differ in constants of a shader, or in
+# what the host does; what fills memory up to limits; commands that differ from those of test_stacks in files and options.
+LONG_ON_A_STACK = re.compile(
+    r"accuracy/(bsdf|sampling|sampled_against_reference|shading_.*|path_light|depth_of_field|frame_steps)"
+    r"|contract/(bvh, (one ray alone|packets of)|reference, |ldc by|abuffer, )"
+    r"|unit/trace/(abuffer|ldc)/(limits|traversal)|unit/trace/bvh/history"
+    r"|test_(render|ldc|abuffer|animate|carousel|light|poses)$")
+# Compares two stacks.
+ONLY_ON_A_STACK = re.compile(r"test_stacks$")
 
 Result = collections.namedtuple("Result", "text passed failed skips")  # skips: (test, reason)
 
@@ -160,6 +182,11 @@ def tasks(build, names):
                       for row in rows})
     if os.environ.get("FARLIGHT_TEST_SANITIZED"):
         found = {name: task for name, task in found.items() if not NOT_SANITIZED.match(name)}
+    stack = STACKS.get(os.environ.get("FARLIGHT_TEST_STACK"))
+    found = {name: task for name, task in found.items()
+             if (ON_A_STACK.match(name) if stack else not ONLY_ON_A_STACK.match(name))}
+    if stack and not names and not os.environ.get("FARLIGHT_TEST_LONG"):
+        found = {name: task for name, task in found.items() if not LONG_ON_A_STACK.match(name)}
     return {name: task for name, task in found.items() if not names or any(part in f"/{name}" for part in names)}
 
 
@@ -195,13 +222,30 @@ class Sums:
             print(f"   {'FAILED, as it was skipped' if fails else 'skipped'}: {test}: {reason}", flush=True)
 
 
+def choose_stack(build):
+    """True when the programs render with the driver stack that FARLIGHT_TEST_STACK names; unset: Mesa's default."""
+    name = os.environ.get("FARLIGHT_TEST_STACK")
+    if not name:
+        return True
+    if name not in STACKS:
+        print(f"FARLIGHT_TEST_STACK={name} is not one of: {', '.join(STACKS)}")
+        return False
+    os.environ.update(STACKS[name].environment)
+    listing = subprocess.run([build / "farlightd", "--list-devices"], stdout=subprocess.PIPE, text=True, check=False).stdout
+    if STACKS[name].renderer not in listing:
+        print(f"no driver stack {name}: farlightd --list-devices says {listing.strip() or 'nothing'}")
+        return False
+    print(f"on {listing.strip()}")
+    return True
+
+
 def run_all(build, names):
     sums = Sums()
-    if not names:
+    if not names and not os.environ.get("FARLIGHT_TEST_STACK"):
         sums.add(run_check("include rules", [sys.executable, "tests/tools/check_includes.py"]))
         sums.add(run_check("headers alone", ["make", "-s", "check-headers"]))
     jobs = int(os.environ.get("FARLIGHT_TEST_JOBS") or min(JOBS_MAX, len(os.sched_getaffinity(0)) + 1))
-    times_path = build / "test_times.json"
+    times_path = build / f"test_times{os.environ.get('FARLIGHT_TEST_STACK', '')}.json"
     times, todo, took = known_times(times_path), tasks(build, names), {}
     with concurrent.futures.ThreadPoolExecutor(jobs) as pool:
         running = {pool.submit(timed, todo[name]): name
@@ -211,7 +255,9 @@ def run_all(build, names):
             sums.add(result, took[running[done]])
     times_path.write_text(json.dumps({**times, **took}, indent=1))
     slowest = sorted(took.items(), key=lambda item: -item[1])[:SLOWEST]
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
     print("\nslowest: " + ", ".join(f"{name} {seconds:.0f} s" for name, seconds in slowest))
+    print(f"processor time: {used.ru_utime + used.ru_stime:.0f} s")
     return sums
 
 
@@ -232,6 +278,8 @@ def main():
     cache = build.parent / "cache"
     cache.mkdir(exist_ok=True)
     os.environ.setdefault("XDG_CACHE_HOME", str(cache))
+    if not choose_stack(build):
+        return 1
     sums = run_all(build, sys.argv[2:])
     print(f"\n{sums.passed} passed, {sums.failed} failed, {sums.skipped} skipped")
     return 1 if sums.failed or not sums.passed else 0
