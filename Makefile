@@ -314,13 +314,14 @@ BUILD_PACKAGES := gcc g++ make pkg-config libepoxy-dev libegl-dev libgl-dev libc
     libtinyobjloader-dev libembree-dev libavcodec-dev libavformat-dev libavutil-dev libswscale-dev libsdl2-dev libsdl2-ttf-dev fonts-dejavu-core libegl1 libgl1-mesa-dri
 TEST_PACKAGES := libcmocka-dev python3 python3-jsonschema ffmpeg xvfb gnuplot-nox
 LINT_PACKAGES := clang clang-format glslang-tools python3
-# A second driver stack: OpenGL over Vulkan, on the CPU.
+# A second driver stack: OpenGL over Vulkan, on the CPU. The validation sees what it does.
 STACK_PACKAGES := mesa-vulkan-drivers
+SYNC_PACKAGES := $(STACK_PACKAGES) libvulkan1 libvulkan-dev vulkan-validationlayers
 ANALYZE_PACKAGES := clang clang-tidy python3
 COVERAGE_PACKAGES := gcovr
 FUZZ_PACKAGES := clang libclang-rt-14-dev
 
-.PHONY: tests build-packages test-packages stack-packages lint-packages analyze-packages coverage-packages fuzz-packages test test-long test-zink demo bench soak farm-drill siege bench-plot check-headers check-rules lint check analyze coverage format install uninstall clean distclean help
+.PHONY: tests build-packages test-packages stack-packages sync-packages lint-packages analyze-packages coverage-packages fuzz-packages test test-long test-zink check-sync demo bench soak farm-drill siege bench-plot check-headers check-rules lint check analyze coverage format install uninstall clean distclean help
 tests: $(TEST_PROGRAMS) $(CONTRACT) $(BENCH_PROGRAM) $(SHAPED_LINK) $(B)/tests/tools/make_scenes $(B)/tests/tools/pose_dump $(LOSING_DAEMON)
 
 build-packages:
@@ -329,6 +330,8 @@ test-packages:
 	@tests/tools/install_packages.sh $(BUILD_PACKAGES) $(TEST_PACKAGES)
 stack-packages:
 	@tests/tools/install_packages.sh $(BUILD_PACKAGES) $(TEST_PACKAGES) $(STACK_PACKAGES)
+sync-packages:
+	@tests/tools/install_packages.sh $(BUILD_PACKAGES) $(TEST_PACKAGES) $(SYNC_PACKAGES)
 lint-packages:
 	@tests/tools/install_packages.sh $(BUILD_PACKAGES) $(TEST_PACKAGES) $(LINT_PACKAGES)
 analyze-packages:
@@ -351,6 +354,13 @@ test-long: test-packages
 test-zink: stack-packages
 	$(MAKE) -j$(JOBS) all tests
 	FARLIGHT_TEST_STACK=zink python3 tests/tools/run_tests.py $(B) $(TESTS)
+# Frames under Vulkan's synchronisation validation: where a glMemoryBarrier() is missing.
+check-sync: sync-packages
+	$(MAKE) -j$(JOBS) $(B)/tests/unit/unit_tests $(B)/tests/tools/sync_layer.so
+	python3 tests/tools/check_sync.py $(B)
+$(B)/tests/tools/sync_layer.so: tests/tools/sync_layer.c
+	@mkdir -p $(@D)
+	$(call say,LINK)$(CC) -shared -fPIC $(CPPFLAGS_ALL) $(OPT) $(CFLAGS_ALL) $(WARN_C) $(LDFLAGS_ALL) $< -o $@
 demo: build-packages
 	$(MAKE) -j$(JOBS) all $(B)/tests/tools/make_scenes
 	tests/tools/demo.sh $(B) out $(FAST)
@@ -473,6 +483,7 @@ help:
 	@echo 'make test       install what tests need, build, run all tests   [TESTS=part-of-a-name]'
 	@echo 'make test-long  all tests and what takes minutes: the benchmark itself, every hostile file the whole way'
 	@echo "make test-zink  tracers, frames and layers on another OpenGL stack, and its pictures beside llvmpipe's   [TESTS=part-of-a-name]"
+	@echo 'make check-sync frames under Vulkan synchronisation validation, to find missing memory barriers'
 	@echo 'make bench      measure, into out/bench.txt and out/bench.json   [BENCH="family reach"; see tests/bench/bench.py]'
 	@echo 'make soak       use one daemon for some minutes, and see that its memory stays flat   [ROUNDS=1000]'
 	@echo 'make farm-drill kill the daemon or the client of animations at random, and see that no frame is lost   [ROUNDS=1000 SEED=]'
