@@ -54,7 +54,7 @@ def prepare(folder, library):
         "name": LAYER, "type": "GLOBAL", "library_path": str(library), "api_version": "1.3.239",
         "implementation_version": "1", "description": "barriers of glMemoryBarrier() alone",
         "functions": {"vkNegotiateLoaderLayerInterfaceVersion": "farlight_sync_layer"}}}))
-    return {**os.environ, "LIBGL_ALWAYS_SOFTWARE": "1", "GALLIUM_DRIVER": "zink", "ZINK_INLINE_UNIFORMS": "0",
+    return {**os.environ, "LIBGL_ALWAYS_SOFTWARE": "1", "GALLIUM_DRIVER": "zink",
             "VK_ADD_LAYER_PATH": str(folder), "VK_INSTANCE_LAYERS": f"{LAYER}:VK_LAYER_KHRONOS_validation",
             "VK_LAYER_SETTINGS_PATH": str(folder), "FARLIGHT_SYNC_COUNTS": str(folder / "counts")}
 

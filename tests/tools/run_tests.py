@@ -53,10 +53,9 @@ LONGEST_FIRST = ("accuracy/sampled_against_reference", "test_import", "test_ligh
                  "test_soak")
 
 # Driver stacks beside the default one: what chooses it, and what the daemon must then say that it renders with.
-# zink is OpenGL 4.6 over Vulkan, here on lavapipe (mesa-vulkan-drivers). It inlines values of uniforms into its programs,
-# and Mesa 22.3 keeps wrong ones; ZINK_INLINE_UNIFORMS=0 forbids that.
+# zink is OpenGL 4.6 over Vulkan, here on lavapipe (mesa-vulkan-drivers).
 Stack = collections.namedtuple("Stack", "environment renderer")
-STACKS = {"zink": Stack({"LIBGL_ALWAYS_SOFTWARE": "1", "GALLIUM_DRIVER": "zink", "ZINK_INLINE_UNIFORMS": "0"}, "zink")}
+STACKS = {"zink": Stack({"LIBGL_ALWAYS_SOFTWARE": "1", "GALLIUM_DRIVER": "zink"}, "zink")}
 # What depends on the driver: tracers, frames, layers, and commands from end to end.
 ON_A_STACK = re.compile(r"accuracy/|contract/|unit/(gpu|gpu_scene|render|trace)/|test_stacks$"
                         r"|test_(render|layers|ldc|abuffer|compare_tracers|animate|carousel|light|poses)$")
