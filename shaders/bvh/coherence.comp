@@ -2,8 +2,6 @@
 // The coherence of a wave: in a sample of groups of consecutive rays, the number of live rays and of the packets that
 // would be best for them: as bvh/traverse.glsl forms them, but none of rays so far apart that each meets leaves of its
 // own. One invocation per group.
-//
-// Defines: PACKET_RAYS, the rays of a group.
 #include "shared/bindings.h"
 #include "common/dispatch.glsl"
 #include "bvh/packet.glsl"
@@ -12,7 +10,8 @@ layout(binding = UNIT_RAYS) uniform samplerBuffer rays; // two texels each
 layout(std430, binding = BIND_TRACER_0) buffer count_block { uint alive_count, packet_count; };
 
 uniform uint group_count;
-uniform uint group_stride;    // rays from one group to the next
+uniform uint group_stride; // rays from one group to the next
+uniform uint group_rays;   // of a group; no constant, as a loop of eight within one of eight took 0.2 s to compile
 uniform vec3 scene_centre;
 uniform float packet_width; // maximum distance at the scene's centre; 0: any
 
@@ -28,23 +27,25 @@ void main()
 {
     if (item_index() >= group_count)
         return;
-    int first = int(item_index() * group_stride);
-    vec3 origins[PACKET_RAYS], directions[PACKET_RAYS];
+    int first = int(item_index() * group_stride), count = int(group_rays);
     uint waiting = 0u, packets = 0u;
-    for (int k = 0; k < PACKET_RAYS; k++) {
-        vec4 origin_t_min = texelFetch(rays, 2 * (first + k)), direction_t_max = texelFetch(rays, 2 * (first + k) + 1);
-        origins[k] = origin_t_min.xyz;
-        directions[k] = direction_t_max.xyz;
-        waiting |= direction_t_max.w > origin_t_min.w ? 1u << k : 0u;
+    for (int k = 0; k < count; k++) {
+        float t_min = texelFetch(rays, 2 * (first + k)).w, t_max = texelFetch(rays, 2 * (first + k) + 1).w;
+        waiting |= t_max > t_min ? 1u << k : 0u;
     }
     atomicAdd(alive_count, uint(bitCount(waiting)));
     for (; waiting != 0u; packets++) {
         int leading = findLSB(waiting);
-        for (int k = 0; k < PACKET_RAYS; k++)
-            if (k == leading ||
-                (form_packet(origins[leading], directions[leading], origins[k], directions[k]) &&
-                 stay_close(origins[leading], directions[leading], origins[k], directions[k])))
+        vec3 origin = texelFetch(rays, 2 * (first + leading)).xyz;
+        vec3 direction = texelFetch(rays, 2 * (first + leading) + 1).xyz;
+        waiting &= ~(1u << leading);
+        for (int k = leading + 1; k < count; k++) {
+            vec3 other_origin = texelFetch(rays, 2 * (first + k)).xyz;
+            vec3 other_direction = texelFetch(rays, 2 * (first + k) + 1).xyz;
+            if (form_packet(origin, direction, other_origin, other_direction) &&
+                stay_close(origin, direction, other_origin, other_direction))
                 waiting &= ~(1u << k);
+        }
     }
     atomicAdd(packet_count, packets);
 }

@@ -39,10 +39,8 @@ static bool measure_coherence(struct bvh *bvh, const struct gpu_scene *scene, co
                               uint32_t counts[2], struct error *error)
 {
     struct gpu_device *device = scene->device;
-    static const struct gpu_define defines[] = {{"PACKET_RAYS", "8"}, {NULL, NULL}};
-    _Static_assert(PACKET_RAYS_SOFTWARE == 8, "the define above");
-    const struct gpu_program *program = gpu_program_get(
-        device, &(struct gpu_program_source){.compute = "bvh/coherence.comp", .defines = defines}, error);
+    const struct gpu_program *program =
+        gpu_program_get(device, &(struct gpu_program_source){.compute = "bvh/coherence.comp"}, error);
     if (!program)
         return false;
     uint32_t groups = wave->ray_count / PACKET_RAYS_SOFTWARE;
@@ -52,6 +50,7 @@ static bool measure_coherence(struct bvh *bvh, const struct gpu_scene *scene, co
     gpu_buffer_bind_texels(device, wave->rays, UNIT_RAYS, GL_RGBA32F);
     gpu_uniform_uint(program, "group_count", groups / step);
     gpu_uniform_uint(program, "group_stride", step * PACKET_RAYS_SOFTWARE);
+    gpu_uniform_uint(program, "group_rays", PACKET_RAYS_SOFTWARE);
     gpu_uniform_float(program, "bvh_packet_reach", bvh_packet_reach(scene, wave));
     float centre[3];
     for (int k = 0; k < 3; k++)
