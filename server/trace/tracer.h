@@ -99,8 +99,7 @@ struct trace_state {
     /* by the wrappers: */
     struct wave wave; /* in progress */
     bool in_progress; /* the wave has begun and is not traced to its end */
-    bool patient; /* rays were too long for what can be queued: the tracer waits for each dispatch. Until the reset
-                   */
+    bool patient;     /* rays were too long to be queued: the tracer waits for each dispatch, until the reset */
     uint32_t traced_rays; /* rays before this one have their final answers */
     /* Of the range being traced: when the step ends, and the range, which trace_range() may end before its end, at
      * a multiple of minimum_rays. */

@@ -89,6 +89,7 @@ struct bvh_form {
     enum bvh_bounds bounds;
     bool plain;              /* one order for every direction */
     bool whole;              /* boxes in floats, not on a grid */
+    bool refit_by_height;    /* every height has a dispatch when a tree is refitted, however few elements it has */
     unsigned threads;        /* at most; small shapes take one */
     const atomic_bool *stop; /* once it is set a build fails, soon; NULL: never */
 };
@@ -168,7 +169,8 @@ struct bvh_baked {
 
 /* leaves[e]: link of a leaf, 0: an inner element. False: out of memory. The plan stays empty (record_count 0)
  * where an element has more children than a shader's loop looks at. */
-bool bvh_refit_plan_make(struct bvh_refit_plan *plan, const struct bvh_baked *baked, const uint32_t *leaves);
+bool bvh_refit_plan_make(struct bvh_refit_plan *plan, const struct bvh_baked *baked, const uint32_t *leaves,
+                         bool by_height);
 void bvh_refit_plan_finish(struct bvh_refit_plan *plan);
 
 /* Chooses which inner nodes stay, and orders them. areas[n]: surface of the bound of binary node n, up to a

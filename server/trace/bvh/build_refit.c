@@ -5,7 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Levels with fewer elements are refitted by one invocation in sequence: one dispatch for each takes longer. */
+/* Heights with fewer elements are refitted by one invocation in sequence: on software GL a dispatch for each takes
+ * longer. A GPU would wait for memory at each element. */
 #define STEP_ELEMENTS_MIN 64u
 /* Software GL leaves the loops of an invocation after 65,535 rounds, without a word. */
 #define ROUNDS_MAX 30000u
@@ -42,13 +43,13 @@ static bool find_heights(struct heights *heights, const struct bvh_baked *baked)
 }
 
 /* False: an element has too many children. */
-static bool find_steps(struct bvh_refit_plan *plan, const struct heights *heights)
+static bool find_steps(struct bvh_refit_plan *plan, const struct heights *heights, bool by_height)
 {
     struct bvh_refit_step *last = NULL;
     uint32_t rounds = 0; /* of the last step */
     for (uint32_t h = 1; h < heights->count; h++) {
         uint32_t first = heights->begin[h], end = heights->begin[h + 1];
-        if (end - first >= STEP_ELEMENTS_MIN) {
+        if (by_height || end - first >= STEP_ELEMENTS_MIN) {
             plan->steps[plan->step_count++] = (struct bvh_refit_step){first, end - first, false};
             last = NULL;
             continue;
@@ -83,7 +84,8 @@ static void fill_records(struct bvh_refit_plan *plan, const struct bvh_baked *ba
     }
 }
 
-bool bvh_refit_plan_make(struct bvh_refit_plan *plan, const struct bvh_baked *baked, const uint32_t *leaves)
+bool bvh_refit_plan_make(struct bvh_refit_plan *plan, const struct bvh_baked *baked, const uint32_t *leaves,
+                         bool by_height)
 {
     struct heights heights = {0};
     *plan = (struct bvh_refit_plan){.record_count = baked->element_count};
@@ -97,7 +99,7 @@ bool bvh_refit_plan_make(struct bvh_refit_plan *plan, const struct bvh_baked *ba
         plan->leaf_count = heights.begin[1];
         fill_records(plan, baked, leaves, &heights, next);
     }
-    if (!ok || !find_steps(plan, &heights))
+    if (!ok || !find_steps(plan, &heights, by_height))
         bvh_refit_plan_finish(plan);
     free(next);
     free(heights.of);

@@ -284,7 +284,7 @@ static bool make_plan(struct work *work)
         uint32_t count = node->count_axis >> 2;
         leaves[e] = count > 0 ? bvh_leaf(kind, node->link, count) : 0;
     }
-    ok = ok && bvh_refit_plan_make(&work->tree->plan, baked, leaves);
+    ok = ok && bvh_refit_plan_make(&work->tree->plan, baked, leaves, work->settings->refit_by_height);
     free(leaves);
     work->tree->wear = tree_wear(work);
     return ok && (work->tree->plan.record_count == 0 || list_corners(work));

@@ -29,7 +29,7 @@ static unsigned build_threads(void)
     return processors > BUILD_THREADS_MAX ? BUILD_THREADS_MAX : processors;
 }
 
-static struct bvh_form settings_of(const struct tracer_options *options)
+static struct bvh_form settings_of(const struct gpu_device *device, const struct tracer_options *options)
 {
     bool plain = options->bench.bvh_layout == BVH_LAYOUT_PLAIN;
     /* Boxes are twice as fast as spheres (bench_bvh), so `auto` is boxes. */
@@ -37,6 +37,7 @@ static struct bvh_form settings_of(const struct tracer_options *options)
     return (struct bvh_form){
         .bounds = spheres ? BVH_BOUNDS_SPHERE : BVH_BOUNDS_BOX,
         .plain = plain,
+        .refit_by_height = !device->facts.software,
         .threads = build_threads(),
     };
 }
@@ -49,7 +50,7 @@ static struct tracer *bvh_create(struct gpu_device *device, const struct tracer_
         error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a tracer");
         return NULL;
     }
-    struct bvh_form settings = settings_of(options);
+    struct bvh_form settings = settings_of(device, options);
     bvh_store_init(&bvh->store, device, &settings);
     return &bvh->base;
 }

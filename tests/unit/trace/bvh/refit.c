@@ -243,6 +243,47 @@ TEST(a_tree_that_is_worn_out_is_built_anew)
     fixture_finish(&fixture);
 }
 
+static void *elements_of(const struct fixture *fixture, size_t *bytes)
+{
+    const struct gpu_buffer *elements = &((const struct bvh *)fixture->tracer)->store.elements;
+    void *copy = malloc(elements->size_bytes);
+    *bytes = elements->size_bytes;
+    gpu_buffer_read(device, elements, 0, copy, *bytes);
+    return copy;
+}
+
+static uint32_t steps_in_order(const struct fixture *fixture)
+{
+    const struct bvh_store *store = &((const struct bvh *)fixture->tracer)->store;
+    uint32_t count = 0;
+    for (uint32_t i = 0; i < store->entry_count; i++)
+        for (uint32_t k = 0; k < store->entries[i].refit.step_count; k++)
+            count += store->entries[i].refit.steps[k].in_order;
+    return count;
+}
+
+TEST(no_invocation_of_a_gpu_refits_one_element_after_the_other)
+{
+    const bool software = device->facts.software;
+    struct fixture fixtures[2];
+    size_t bytes[2];
+    void *elements[2];
+    for (int i = 0; i < 2; i++) {
+        device->facts.software = i == 0;
+        fixture_init(&fixtures[i], &(struct tracer_options){0}, 0);
+        pose(&fixtures[i], 0.2f, 0.2f);
+        elements[i] = elements_of(&fixtures[i], &bytes[i]);
+        assert_int_equal(steps_in_order(&fixtures[i]) > 0, i == 0);
+    }
+    device->facts.software = software;
+    assert_int_equal(bytes[0], bytes[1]);
+    assert_memory_equal(elements[0], elements[1], bytes[0]);
+    for (int i = 0; i < 2; i++) {
+        free(elements[i]);
+        fixture_finish(&fixtures[i]);
+    }
+}
+
 TEST(answers_do_not_depend_on_earlier_poses)
 {
     for (uint32_t packet = 0; packet <= 8; packet += 4) {
