@@ -85,8 +85,7 @@ TEST(a_file_that_is_cut_or_makes_no_sense_is_as_good_as_none)
 {
     static const char *const contents[] = {
         "", "first hits are traced from ",
-        "first hits are traced from nan primitives a pixel on, from 1 with several "
-        "samples\n",
+        "first hits are traced from nan primitives a pixel on, from 1 with several samples\n",
         "first hits are traced from -1 primitives a pixel on, from 1 with several samples\n"};
     for (size_t i = 0; i < sizeof(contents) / sizeof(contents[0]); i++) {
         char path[4096];
