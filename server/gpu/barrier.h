@@ -2,10 +2,10 @@
 /* What shaders write is seen by a later command, and what they read is safe from it, only behind a barrier that
  * names the kind of that command's access.
  *
- * The barrier is issued by whoever comes to read, overwrite or copy: a pass waits for the kinds of access that the
- * text of its program declares, gpu/buffer.h for its own, and nobody waits twice for the same passes. So no caller
- * states what it waits for, and none can forget to. Shaders write buffers only, never textures, and what commands
- * other than shaders write needs no barrier. */
+ * The command that reads, overwrites or copies issues the barrier: a pass waits for the kinds of access that the
+ * text of its program declares, gpu/buffer.h for its own, and no command waits twice for the same passes. So no
+ * caller states what it waits for, and none can forget to. Shaders write buffers only, never textures, and what
+ * commands other than shaders write needs no barrier. */
 #ifndef FARLIGHT_GPU_BARRIER_H
 #define FARLIGHT_GPU_BARRIER_H
 

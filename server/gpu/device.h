@@ -69,7 +69,7 @@ struct gpu_device {
     size_t reserve_awaited_bytes; /* size of the reservation that was put off until prefaulted; 0: none was */
     bool reserve_made, reserve_put_off;
     uint64_t waits;          /* how often this thread has waited for the device to come to an end with something */
-    struct gpu_watch *watch; /* of dispatches; NULL: nobody watches, see watch.h */
+    struct gpu_watch *watch; /* of dispatches; NULL: none is watched, see watch.h */
     bool compiles;           /* see gpu_options */
     struct gpu_measured measured;
     bool lost; /* the context; nothing works any more, see gpu_note_loss */

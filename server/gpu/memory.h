@@ -12,7 +12,7 @@ struct gpu_memory_answers {
     bool software;
     uint64_t host_bytes;
     uint64_t total_bytes; /* GL_NVX_gpu_memory_info */
-    uint64_t free_bytes;  /* GL_ATI_meminfo: what nobody uses now */
+    uint64_t free_bytes;  /* GL_ATI_meminfo: what is free now */
 };
 
 enum gpu_memory_source { GPU_MEMORY_UNTOLD, GPU_MEMORY_HOST, GPU_MEMORY_TOTAL, GPU_MEMORY_FREE };

@@ -19,7 +19,7 @@ struct gpu_watch {
 void gpu_watch_begin(struct gpu_device *device, struct gpu_watch *watch);
 void gpu_watch_end(struct gpu_device *device); /* its figures stay */
 
-/* For program.c, around a dispatch; nothing happens while nobody watches. */
+/* For program.c, around a dispatch; nothing happens while no dispatch is watched. */
 void gpu_watch_before(struct gpu_device *device);
 void gpu_watch_after(struct gpu_device *device, unsigned program);
 

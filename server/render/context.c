@@ -90,8 +90,7 @@ const struct gpu_program *context_use_with(struct render_context *context, const
                                            const struct gpu_define *defines, struct error *error)
 {
     const struct gpu_program_source source = {.compute = compute, .defines = defines};
-    const struct gpu_program *program = gpu_program_get(context->device, &source, error);
-    return program;
+    return gpu_program_get(context->device, &source, error);
 }
 
 const struct gpu_program *context_use(struct render_context *context, const char *compute, struct error *error)
