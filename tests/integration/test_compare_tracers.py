@@ -39,7 +39,7 @@ class Rays(OneDaemon):
     def test_bvh_agrees_with_the_reference(self):
         """Triangles, spheres, mirrors and glass. 99.99 % of the rays that are on no edge, as issue 3 asks; half of all
         distances within 1e-6 of their length: a few roundings of the 24 bits of a float. The last waves have a dozen
-        rays, between spheres that touch, and short distances, beside which the roundings of where they begin are larger."""
+        rays, between spheres that touch, and short distances, beside which zink's roundings of where they begin are larger."""
         for model in ("teapot.glb", FLAKE):
             with self.subTest(model=model):
                 result = compare("--json", "--fail-above", "agree=99.99%", "--fail-above", "psnr=40", model=model,
@@ -54,8 +54,9 @@ class Rays(OneDaemon):
                 self.assertGreater(report["waves"][0]["both_hit"], 0)
                 for wave in report["waves"]:
                     self.assertLessEqual(wave["edges"], wave["only_tracer"] + wave["only_reference"] + wave["far"])
+                    on_other_stack = "FARLIGHT_TEST_STACK" in os.environ
                     if wave["kind"] != "shadow":
-                        self.assertLess(wave["relative_median"], 1e-6 if wave["rays"] >= 100 else 1e-5)
+                        self.assertLess(wave["relative_median"], 1e-5 if on_other_stack and wave["rays"] < 100 else 1e-6)
 
     def test_the_table_names_waves_tracers_and_what_its_columns_mean(self):
         result = self.expect(compare(), 0)
