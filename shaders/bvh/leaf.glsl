@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // A leaf's primitives against the rays of a packet.
-#include "bvh/layout.h"
+#include "tree/layout.h"
 #include "common/candidate.glsl"
 
 layout(binding = UNIT_TRACER_2) uniform usamplerBuffer bvh_primitives;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Stackless traversal of a two-level bounding volume tree by baked links; layout and octants: bvh/layout.h. 'Stackless
+// Stackless traversal of a two-level bounding volume tree by baked links; layout and octants: tree/layout.h. 'Stackless
 // traversal of a sphere BVH', sections 4 (links), 5 (packets) and 6 (transform elements).
 //
 // The host (trace/bvh/tracer.c) sets, besides the defines of trace/wave.comp:

@@ -181,7 +181,7 @@ static uint64_t update(struct bent *bent, struct tracer *tracer)
 /* A tree that was built without wear is worn out at once. */
 static void wear_out(struct tracer *tracer)
 {
-    ((struct bvh *)tracer)->store.entries[0].built_wear = 0;
+    ((struct bvh *)tracer)->tree.store.entries[0].built_wear = 0;
 }
 
 static struct hit *trace(struct bent *bent, struct tracer *tracer, struct gpu_buffer *rays, uint64_t *time_ns)
@@ -274,8 +274,8 @@ static json_t *bench_refit(struct gpu_device *device, uint32_t triangles, uint32
     *failed = *failed || differing > DIFFERING_MAX;
     json_t *result = json_pack("{s:i, s:i, s:i, s:o, s:o, s:f, s:f, s:i, s:i}", "triangles",
                                (int)bent.gpu.geometries[0].device.primitive_count, "elements",
-                               (int)((struct bvh *)bent.refitted)->store.entries[0].element_count, "steps",
-                               (int)((struct bvh *)bent.refitted)->store.entries[0].refit.step_count, "refit_ms",
+                               (int)((struct bvh *)bent.refitted)->tree.store.entries[0].element_count, "steps",
+                               (int)((struct bvh *)bent.refitted)->tree.store.entries[0].refit.step_count, "refit_ms",
                                figure_json(&refits), "rebuild_ms", figure_json(&rebuilds), "trace_refitted_ms",
                                (double)times_ns[0] / 1e6, "trace_rebuilt_ms", (double)times_ns[1] / 1e6, "rays",
                                (int)RAY_COUNT, "differing", (int)differing);

@@ -57,7 +57,7 @@ static bool measure_coherence(struct bvh *bvh, const struct gpu_scene *scene, co
         centre[k] = 0.5f * scene->lower_world[k] + 0.5f * scene->upper_world[k];
     gpu_uniform_vec(program, "scene_centre", 3, centre);
     float leaves = wave->kind == WAVE_ANY ? PACKET_WIDTH_ANY : PACKET_WIDTH_CLOSEST;
-    gpu_uniform_float(program, "packet_width", leaves * bvh->leaf_extent_world);
+    gpu_uniform_float(program, "packet_width", leaves * bvh->tree.leaf_extent_world);
     gpu_dispatch(device, program, groups / step);
     gpu_buffer_read(device, &bvh->coherence, 0, counts, BVH_COHERENCE_BYTES);
     return true;
@@ -84,6 +84,6 @@ bool bvh_ray_pairs(const struct bvh *bvh, const struct gpu_scene *scene, const s
 {
     /* A traversal that stops to ask for materials does so for one ray. */
     const bool asks_materials = scene->has_cutout || (wave->kind == WAVE_ANY && scene->has_translucent);
-    const bool is_chosen = bvh->base.options.bvh.rays == 0 && !bvh->store.settings.plain;
+    const bool is_chosen = bvh->base.options.bvh.rays == 0 && !bvh->tree.store.settings.plain;
     return is_chosen && packet_rays == 1 && scene->device->facts.software && !asks_materials;
 }

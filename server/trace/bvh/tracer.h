@@ -1,27 +1,17 @@
 /* SPDX-License-Identifier: MIT */
-/* The tracer `bvh`: stackless traversal of bounding volume trees by baked links. Layout on the device and
- * traversal: shaders/bvh/layout.h, shaders/bvh/traverse.glsl. */
+/* The tracer `bvh`: stackless traversal of bounding volume trees by baked links. Traversal:
+ * shaders/bvh/traverse.glsl. */
 #ifndef FARLIGHT_TRACE_BVH_TRACER_H
 #define FARLIGHT_TRACE_BVH_TRACER_H
 
-#include "trace/bvh/build_top.h"
-#include "trace/bvh/store.h"
 #include "trace/tracer.h"
-
-/* Where an update is. */
-enum bvh_phase { BVH_IDLE, BVH_TREES, BVH_TOP };
+#include "trace/tree/tree.h"
 
 #define BVH_COHERENCE_BYTES (2 * sizeof(uint32_t))
 
 struct bvh {
     struct tracer base;
-    enum bvh_phase phase;
-    struct bvh_store store;
-    struct bvh_top top;
-    struct bvh_transform *transforms; /* mirror of the buffer, one per instance of the scene */
-    uint32_t transform_count;
-    struct gpu_buffer transform_buffer;
-    float leaf_extent_world;     /* diagonal of a leaf's box, in the mean over what the instances show */
+    struct scene_tree tree;
     struct gpu_buffer coherence; /* what bvh/coherence.comp counts; there from the build on */
     /* Of the rays of a dispatch, between it and the next one that they are in. */
     struct gpu_buffer places, depths, unfinished;

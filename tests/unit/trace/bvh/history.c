@@ -165,7 +165,7 @@ static void make_histories(struct fixture *built, struct fixture *moved, enum lo
         update(moved);
         assert_int_equal(moved->tracer->stats.nodes_rebuilt, 0);
     }
-    const struct bvh_top *a = &bvh_of(built)->top, *b = &bvh_of(moved)->top;
+    const struct bvh_top *a = &bvh_of(built)->tree.top, *b = &bvh_of(moved)->tree.top;
     assert_true(a->element_count != b->element_count ||
                 memcmp(a->leaves, b->leaves, a->element_count * sizeof(*a->leaves)) != 0); /* other trees */
 }
@@ -251,10 +251,10 @@ TEST(a_thousand_moving_instances_rebuild_nothing)
         /* Nothing but where they are: of the scene its instances, of the trees the top one. */
         assert_int_equal(fixture.changes.uploaded_bytes, MOVING * sizeof(struct instance));
         assert_int_equal(stats->nodes_rebuilt, 0);
-        assert_int_equal(stats->nodes_refitted, bvh->top.element_count);
+        assert_int_equal(stats->nodes_refitted, bvh->tree.top.element_count);
         assert_int_equal(stats->uploaded_bytes,
                          MOVING * sizeof(struct bvh_transform) +
-                             bvh->top.element_count * bvh_element_bytes(&bvh->store.settings));
+                             bvh->tree.top.element_count * bvh_element_bytes(&bvh->tree.store.settings));
     }
     fixture_finish(&fixture);
 }

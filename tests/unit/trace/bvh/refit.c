@@ -109,7 +109,7 @@ static void fixture_finish(struct fixture *fixture)
 
 static uint32_t mesh_elements(const struct fixture *fixture)
 {
-    const struct bvh_store *store = &((const struct bvh *)fixture->tracer)->store;
+    const struct bvh_store *store = &((const struct bvh *)fixture->tracer)->tree.store;
     for (uint32_t i = 0; i < store->entry_count; i++)
         if (store->entries[i].node == NODE)
             return store->entries[i].element_count;
@@ -245,7 +245,7 @@ TEST(a_tree_that_is_worn_out_is_built_anew)
 
 static void *elements_of(const struct fixture *fixture, size_t *bytes)
 {
-    const struct gpu_buffer *elements = &((const struct bvh *)fixture->tracer)->store.elements;
+    const struct gpu_buffer *elements = &((const struct bvh *)fixture->tracer)->tree.store.elements;
     void *copy = malloc(elements->size_bytes);
     *bytes = elements->size_bytes;
     gpu_buffer_read(device, elements, 0, copy, *bytes);
@@ -254,7 +254,7 @@ static void *elements_of(const struct fixture *fixture, size_t *bytes)
 
 static uint32_t steps_in_order(const struct fixture *fixture)
 {
-    const struct bvh_store *store = &((const struct bvh *)fixture->tracer)->store;
+    const struct bvh_store *store = &((const struct bvh *)fixture->tracer)->tree.store;
     uint32_t count = 0;
     for (uint32_t i = 0; i < store->entry_count; i++)
         for (uint32_t k = 0; k < store->entries[i].refit.step_count; k++)

@@ -83,14 +83,14 @@ TEST(a_moved_node_costs_its_path_in_the_top_tree)
     const struct tracer_stats *stats = &fixture.tracer->stats;
     assert_int_equal(stats->nodes_rebuilt, stats->nodes);
     assert_int_equal(stats->nodes_refitted, 0);
-    uint32_t top_nodes = ((struct bvh *)fixture.tracer)->top.element_count;
+    uint32_t top_nodes = ((struct bvh *)fixture.tracer)->tree.top.element_count;
     float m[12];
     test_transform(m, 1, 1.1f, 1, 2, 0.3f, 1, 2, 0.5f);
     test_node(&fixture.edits, 7, 0, NODE_MESH, 10, m);
     update(&fixture);
     assert_int_equal(stats->nodes_rebuilt, 0);
     assert_in_range(stats->nodes_refitted, 1, top_nodes / 2);
-    size_t element_bytes = bvh_element_bytes(&((struct bvh *)fixture.tracer)->store.settings);
+    size_t element_bytes = bvh_element_bytes(&((struct bvh *)fixture.tracer)->tree.store.settings);
     uint64_t expected = sizeof(struct bvh_transform) + stats->nodes_refitted * element_bytes;
     assert_int_equal(stats->uploaded_bytes, expected);
     fixture_finish(&fixture);
@@ -292,10 +292,10 @@ TEST(detail_below_the_grid_is_traversed_in_floats)
 {
     struct fixture fixture;
     fixture_init(&fixture, scene_of_instances(), NULL);
-    assert_false(((struct bvh *)fixture.tracer)->store.settings.whole);
+    assert_false(((struct bvh *)fixture.tracer)->tree.store.settings.whole);
     fixture_finish(&fixture);
     fixture_init(&fixture, scene_of_detail(), NULL);
-    assert_true(((struct bvh *)fixture.tracer)->store.settings.whole);
+    assert_true(((struct bvh *)fixture.tracer)->tree.store.settings.whole);
     fixture_finish(&fixture);
     struct ray *rays = malloc(RAY_COUNT * sizeof(struct ray));
     uint64_t seed = 32;
@@ -397,7 +397,7 @@ TEST(a_link_that_leads_back_ends_no_ray_and_loses_no_hit)
     struct error error = {0};
     uint64_t seed = 35;
     fixture_init(&fixture, scene_of_instances(), NULL);
-    struct bvh_store *store = &((struct bvh *)fixture.tracer)->store;
+    struct bvh_store *store = &((struct bvh *)fixture.tracer)->tree.store;
     assert_true(bvh_is_packed(&store->settings));
     for (uint32_t i = 0; i < RAY_COUNT; i++)
         rays[i] = make_ray(6, 6, 20, test_uniform(&seed, -0.4f, 0.4f), test_uniform(&seed, -0.4f, 0.4f), -1);

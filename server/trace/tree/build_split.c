@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "trace/bvh/build_split.h"
+#include "trace/tree/build_split.h"
 
 #include <string.h>
 

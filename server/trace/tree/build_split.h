@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /* Where a range of primitives is best cut in two: the surface area heuristic over bins of the primitives' centres,
  * the three axes side by side in the lanes of a register. Private to the builder. */
-#ifndef FARLIGHT_TRACE_BVH_BUILD_SPLIT_H
-#define FARLIGHT_TRACE_BVH_BUILD_SPLIT_H
+#ifndef FARLIGHT_TRACE_TREE_BUILD_SPLIT_H
+#define FARLIGHT_TRACE_TREE_BUILD_SPLIT_H
 
-#include "trace/bvh/build.h"
+#include "trace/tree/build.h"
 
 #include <float.h>
 #if defined(__SSE__)

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /* The tree over the instances. It is small, stays on the host too, and is refitted where instances move. */
-#ifndef FARLIGHT_TRACE_BVH_BUILD_TOP_H
-#define FARLIGHT_TRACE_BVH_BUILD_TOP_H
+#ifndef FARLIGHT_TRACE_TREE_BUILD_TOP_H
+#define FARLIGHT_TRACE_TREE_BUILD_TOP_H
 
-#include "trace/bvh/build.h"
+#include "trace/tree/build.h"
 
 struct bvh_world_box {
     float lower[3], upper[3]; /* lower > upper: nothing there, not in the tree */

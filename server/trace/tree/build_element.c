@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 /* Elements as the device has them. */
-#include "trace/bvh/build.h"
+#include "trace/tree/build.h"
 
 #include <float.h>
 #include <math.h>

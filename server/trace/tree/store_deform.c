@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 /* Trees follow the vertices of deformed meshes. */
-#include "trace/bvh/store.h"
+#include "trace/tree/store.h"
 
 #include "base/clock.h"
 #include "shared/bindings.h"

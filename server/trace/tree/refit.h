@@ -2,12 +2,12 @@
 /* Refitting of trees of deformed geometries on the device: boxes are computed again bottom-up from the current
  * triangles; order and links stay. Based on: Wald, Boulos, Shirley. Ray Tracing Deformable Scenes Using Dynamic
  * Bounding Volume Hierarchies. ACM TOG 2007, section 5. GL thread. */
-#ifndef FARLIGHT_TRACE_BVH_REFIT_H
-#define FARLIGHT_TRACE_BVH_REFIT_H
+#ifndef FARLIGHT_TRACE_TREE_REFIT_H
+#define FARLIGHT_TRACE_TREE_REFIT_H
 
 #include "base/error.h"
 #include "gpu/buffer.h"
-#include "trace/bvh/build.h"
+#include "trace/tree/build.h"
 
 #include <stdbool.h>
 #include <stdint.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "trace/bvh/refit.h"
+#include "trace/tree/refit.h"
 
 #include "gpu/program.h"
 #include "shared/bindings.h"
@@ -63,8 +63,8 @@ bool bvh_refit_bounds(struct bvh_refit *refit, struct gpu_device *device, const 
 {
     const struct gpu_define of_leaves[] = {
         {"REFIT_LEAVES", "1"}, {place->close_offset ? "REFIT_CLOSE" : NULL, "1"}, {NULL, NULL}};
-    const struct gpu_program_source leaf_source = {.compute = "bvh/refit_bounds.comp", .defines = of_leaves};
-    const struct gpu_program_source source = {.compute = "bvh/refit_bounds.comp"};
+    const struct gpu_program_source leaf_source = {.compute = "tree/refit_bounds.comp", .defines = of_leaves};
+    const struct gpu_program_source source = {.compute = "tree/refit_bounds.comp"};
     const struct gpu_program *leaves = gpu_program_get(device, &leaf_source, error);
     const struct gpu_program *above = leaves ? gpu_program_get(device, &source, error) : NULL;
     if (!above)
@@ -95,7 +95,7 @@ bool bvh_refit_write(struct bvh_refit *refit, struct gpu_device *device, const s
         defines[0] = (struct gpu_define){"BVH_SPHERES", "1"};
     else if (bvh_is_packed(settings))
         defines[0] = (struct gpu_define){"BVH_PACKED", "1"};
-    const struct gpu_program_source source = {.compute = "bvh/refit_write.comp", .defines = defines};
+    const struct gpu_program_source source = {.compute = "tree/refit_write.comp", .defines = defines};
     const struct gpu_program *program = gpu_program_get(device, &source, error);
     if (!program)
         return false;

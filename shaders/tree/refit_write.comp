@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 // From boxes (refit_bounds.comp) to elements as the traversal reads them, in all octants' copies. The C twin is
-// bvh_write_element() in trace/bvh/build_element.c.
+// bvh_write_element() in trace/tree/build_element.c.
 //
 // Defines: BVH_PACKED, BVH_SPHERES as in traverse.glsl, one of them or none.
-#include "bvh/layout.h"
+#include "tree/layout.h"
 #include "common/dispatch.glsl"
 #include "shared/bindings.h"
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-#include "trace/bvh/build.h"
+#include "trace/tree/build.h"
 
 #include "base/clock.h"
 #include "base/parallel.h"
-#include "trace/bvh/build_split.h"
+#include "trace/tree/build_split.h"
 
 #include <assert.h>
 #include <math.h>

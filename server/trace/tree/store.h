@@ -1,16 +1,16 @@
 /* SPDX-License-Identifier: MIT */
 /* The trees on the device: one for each geometry, kept by (kind, id, revision), behind a space for the top tree.
  * GL thread. */
-#ifndef FARLIGHT_TRACE_BVH_STORE_H
-#define FARLIGHT_TRACE_BVH_STORE_H
+#ifndef FARLIGHT_TRACE_TREE_STORE_H
+#define FARLIGHT_TRACE_TREE_STORE_H
 
 #include "base/error.h"
 #include "base/stage_times.h"
 #include "gpu/buffer.h"
 #include "gpu/device.h"
-#include "trace/bvh/build.h"
-#include "trace/bvh/build_top.h"
-#include "trace/bvh/refit.h"
+#include "trace/tree/build.h"
+#include "trace/tree/build_top.h"
+#include "trace/tree/refit.h"
 #include "trace/step.h"
 #include "gpu_scene/scene.h"
 

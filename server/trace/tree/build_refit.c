@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 /* The order in which a tree's boxes are refitted after its primitives have moved. */
-#include "trace/bvh/build.h"
+#include "trace/tree/build.h"
 
 #include <stdlib.h>
 #include <string.h>

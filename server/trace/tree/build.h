@@ -6,11 +6,11 @@
  *
  * Based on: Wald. On fast Construction of SAH-based Bounding Volume Hierarchies. 2007 (binning);
  * 'Stackless traversal of a sphere BVH, distributed ray tracing', sections 4 and 6: wide nodes, baked links. */
-#ifndef FARLIGHT_TRACE_BVH_BUILD_H
-#define FARLIGHT_TRACE_BVH_BUILD_H
+#ifndef FARLIGHT_TRACE_TREE_BUILD_H
+#define FARLIGHT_TRACE_TREE_BUILD_H
 
 #include "base/error.h"
-#include "bvh/layout.h"
+#include "tree/layout.h"
 
 #include <stdatomic.h>
 #include <stdbool.h>
@@ -114,7 +114,7 @@ struct bvh_tree {
     float grid_cost;   /* how much larger the grid makes a box's surface, in the mean: 1 .. 4, also where it is
                           not used since `whole` is set; 1: never used */
     float leaf_extent; /* diagonal of a leaf's box, in the mean */
-    float *primitives; /* 4 x primitive_texels floats, see bvh/layout.h */
+    float *primitives; /* 4 x primitive_texels floats, see tree/layout.h */
     size_t primitive_texels;
     float lower[3], upper[3]; /* of everything, padded */
     float wear; /* surfaces of all elements' boxes over those of each primitive's own box; of shapes that deform.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "trace/bvh/store.h"
+#include "trace/tree/store.h"
 
 #include "base/clock.h"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "trace/bvh/build.h"
+#include "trace/tree/build.h"
 
 #include "base/parallel.h"
 #include "base/progress.h"

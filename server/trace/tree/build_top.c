@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "trace/bvh/build_top.h"
+#include "trace/tree/build_top.h"
 
 #include <math.h>
 #include <stdlib.h>

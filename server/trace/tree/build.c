@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-#include "trace/bvh/build.h"
+#include "trace/tree/build.h"
 
 #include "base/parallel.h"
 #include "base/progress.h"
-#include "trace/bvh/build_split.h"
+#include "trace/tree/build_split.h"
 
 #include <assert.h>
 #include <pthread.h>

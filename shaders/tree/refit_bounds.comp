@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
 // Boxes of a tree whose triangles have moved, bottom-up: one dispatch for the leaves, which writes their triangles
-// where the traversal reads them too, then one for each level above them (trace/bvh/build_refit.c). Order and links of
+// where the traversal reads them too, then one for each level above them (trace/tree/build_refit.c). Order and links of
 // the tree stay.
 //
 // The output is a storage buffer: measured on software GL, it takes 0.7 of the time of an image.
 //
 // Defines: REFIT_LEAVES for the leaves' pass, REFIT_CLOSE where their triangles move while the shutter is open.
-#include "bvh/layout.h"
+#include "tree/layout.h"
 #include "common/dispatch.glsl"
 #include "shared/bindings.h"
 
@@ -54,7 +54,7 @@ void store(uvec4 record, box b)
 
 layout(binding = UNIT_TRACER_1) uniform usamplerBuffer corners; // vertices of the mesh and number of each triangle
 layout(binding = UNIT_POSITIONS) uniform samplerBuffer positions;
-layout(std430, binding = BIND_TRACER_0) writeonly buffer primitive_block { uvec4 primitives[]; }; // bvh/layout.h
+layout(std430, binding = BIND_TRACER_0) writeonly buffer primitive_block { uvec4 primitives[]; }; // tree/layout.h
 uniform uint first_texel;  // of this tree's
 uniform uint close_texels; // from a triangle to itself as the shutter closes
 uniform uint first_vertex; // of the mesh in `positions`

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-#include "trace/bvh/build.h"
-#include "trace/bvh/build_top.h"
+#include "trace/tree/build.h"
+#include "trace/tree/build_top.h"
 
 #include "base/progress.h"
 #include "tests/harness/test.h"
