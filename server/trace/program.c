@@ -17,7 +17,7 @@ static bool has_motion(const struct gpu_scene *scene, const struct wave *wave)
     return scene->has_motion && wave->times;
 }
 
-static void bind_rays(const struct gpu_scene *scene, const struct wave *wave)
+void trace_bind_rays(const struct gpu_scene *scene, const struct wave *wave)
 {
     gpu_buffer_bind_texels(scene->device, wave->rays, UNIT_RAYS, GL_RGBA32F);
     if (has_motion(scene, wave))
@@ -43,19 +43,9 @@ static void dispatch_rays(const struct gpu_program *program, const struct gpu_sc
                      ((uint64_t)(end - first) + rays_an_invocation - 1) / rays_an_invocation);
 }
 
-const struct gpu_program *trace_program_get(const struct gpu_scene *scene, const struct wave *wave,
-                                            const struct trace_program_source *source, struct error *error)
+size_t trace_wave_defines(const struct gpu_scene *scene, const struct wave *wave, struct gpu_define *defines)
 {
-    struct gpu_define defines[OWN_DEFINES_MAX + 18] = {0};
-    char traverse[128], packet_rays[16];
     size_t n = 0;
-    /* In quotes: program.c takes the file to include from it. */
-    snprintf(traverse, sizeof(traverse), "\"%s\"", source->traverse);
-    snprintf(packet_rays, sizeof(packet_rays), "%u", source->packet_rays ? source->packet_rays : 1);
-    defines[n++] = (struct gpu_define){"TRAVERSE", traverse};
-    defines[n++] = (struct gpu_define){"PACKET_RAYS", packet_rays};
-    if (source->ray_pairs)
-        defines[n++] = (struct gpu_define){"RAY_PAIRS", "1"};
     if (scene->device->facts.software)
         defines[n++] = (struct gpu_define){"SOFTWARE_GL", "1"};
     if (wave->kind == WAVE_ANY)
@@ -77,6 +67,22 @@ const struct gpu_program *trace_program_get(const struct gpu_scene *scene, const
         defines[n++] = (struct gpu_define){"HAS_TRANSMISSION", "1"};
     if (!scene->has_varied_alpha)
         defines[n++] = (struct gpu_define){"EVEN_ALPHA", "1"};
+    return n;
+}
+
+const struct gpu_program *trace_program_get(const struct gpu_scene *scene, const struct wave *wave,
+                                            const struct trace_program_source *source, struct error *error)
+{
+    struct gpu_define defines[TRACE_WAVE_DEFINES + OWN_DEFINES_MAX + 4] = {0};
+    char traverse[128], packet_rays[16];
+    size_t n = trace_wave_defines(scene, wave, defines);
+    /* In quotes: program.c takes the file to include from it. */
+    snprintf(traverse, sizeof(traverse), "\"%s\"", source->traverse);
+    snprintf(packet_rays, sizeof(packet_rays), "%u", source->packet_rays ? source->packet_rays : 1);
+    defines[n++] = (struct gpu_define){"TRAVERSE", traverse};
+    defines[n++] = (struct gpu_define){"PACKET_RAYS", packet_rays};
+    if (source->ray_pairs)
+        defines[n++] = (struct gpu_define){"RAY_PAIRS", "1"};
     for (size_t i = 0; i < OWN_DEFINES_MAX && source->defines && source->defines[i].name; i++)
         defines[n++] = source->defines[i];
     struct gpu_program_source whole = {.compute = "trace/wave.comp", .defines = defines};
@@ -88,7 +94,7 @@ void trace_program_run(const struct gpu_program *program, const struct gpu_scene
 {
     const struct wave *wave = rays->wave;
     const uint32_t rays_an_invocation = source->ray_pairs ? 2 : source->packet_rays ? source->packet_rays : 1;
-    bind_rays(scene, wave);
+    trace_bind_rays(scene, wave);
     if (wave->kind == WAVE_ANY)
         gpu_buffer_bind_storage(wave->visibility, BIND_VISIBILITY);
     else
@@ -123,7 +129,7 @@ const struct gpu_program *trace_surface_program_get(const struct gpu_scene *scen
 void trace_surface_program_run(const struct gpu_program *program, const struct gpu_scene *scene,
                                const struct ray_range *rays)
 {
-    bind_rays(scene, rays->wave);
+    trace_bind_rays(scene, rays->wave);
     gpu_buffer_bind_image(scene->device, rays->wave->hits, IMAGE_HITS, GL_RGBA32UI);
     dispatch_rays(program, scene, rays->wave, rays->first, rays->end, 1);
 }

@@ -23,6 +23,13 @@ struct trace_program_source {
     uint32_t rays_a_dispatch;         /* 0: all; a multiple of packet_rays, and of 2 */
 };
 
+/* What a program that looks at the rays of the wave and the primitives of the scene is compiled with: at most
+ * TRACE_WAVE_DEFINES to `defines`, as shaders/trace/wave.comp lists them. Returns how many. */
+#define TRACE_WAVE_DEFINES 10
+size_t trace_wave_defines(const struct gpu_scene *scene, const struct wave *wave, struct gpu_define *defines);
+/* Rays, and their times where these count, as texels. */
+void trace_bind_rays(const struct gpu_scene *scene, const struct wave *wave);
+
 /* Compiled for what the scene has (spheres, cutouts, translucent surfaces, motion where the wave has times) and
  * for the kind of wave, or from the device's cache. The tracer may set uniforms of its own on it before
  * trace_program_run. */

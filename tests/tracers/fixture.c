@@ -50,7 +50,7 @@ enum tracer_progress fixture_update_in_steps(struct fixture *fixture, uint32_t s
     for (; made < steps_max && progress == TRACER_MORE; made++) {
         progress = tracer_update_step(fixture->tracer, &fixture->gpu, &update, 0, error);
         /* What of the device's memory is not others' is the structure's, in the middle of an update too. */
-        assert_int_equal(device->memory_used_bytes - fixture->others_bytes, fixture->tracer->stats.device_bytes);
+        assert_int_equal(device->memory_used_bytes - fixture->others_bytes, tracer_device_bytes(fixture->tracer));
     }
     if (steps)
         *steps = made;

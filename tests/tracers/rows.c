@@ -54,5 +54,6 @@ static const struct tracer_row rows[] = {
     ABUFFER("", ABUFFER_SEARCH_DDA),
     ABUFFER(", three columns a step", ABUFFER_SEARCH_LINEAR3),
     ABUFFER(", one column a step", ABUFFER_SEARCH_LINEAR1),
+    {.name = "rayspace", .number = 5},
 };
 TRACER_ROWS(rows)

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: MIT
+// Rays against the primitives of the leaves that they may meet: the test is that of brute force (common/candidate.glsl),
+// and so is the choice among surfaces at one distance, whatever the order of the pairs. An invocation has a pair.
+//
+// Closest hits take three passes over the pairs, for a least rank is only known when the least distance is. The defines
+// of common/candidate.glsl, and:
+//   LEAVES_TEST    the pair's nearest hit; the least distance of each ray
+//   LEAVES_RANK    the least rank at that distance
+//   LEAVES_SETTLE  the one pair that has it writes the hit down
+#include "common/dispatch.glsl"
+#include "rayspace/place.glsl"
+#ifdef LEAVES_TEST
+#include "rayspace/leaf.glsl"
+#endif
+
+layout(std430, binding = BIND_RAYSPACE_CONTROL) buffer control_block { rayspace_control control; };
+layout(std430, binding = BIND_RAYSPACE_LEAVES) buffer leaf_block { uvec4 leaves[]; };
+
+void main()
+{
+    uint which = item_index();
+    if (which >= control.leaves_taken)
+        return;
+    uvec4 pair = leaves[which];
+    uint ray = ray_of_place(pair.x);
+#ifdef LEAVES_TEST
+    atomicAdd(control.triangle_tests, (pair.y >> BVH_LEAF_COUNT_SHIFT & BVH_LEAF_COUNT_MASK) + 1u);
+#ifdef ANY_HIT
+    test_leaf_any(ray, pair);
+#else
+    uvec2 nearest = test_leaf_closest(ray, pair);
+    leaves[which].zw = uvec2(nearest.y, nearest.x);
+    answers[ray].y = RAYSPACE_NO_RANK;
+    if (nearest.y != RAYSPACE_NO_RANK)
+        atomicMin(answers[ray].x, nearest.x);
+#endif
+#elif defined LEAVES_RANK
+    if (pair.z != RAYSPACE_NO_RANK && pair.w == answers[ray].x)
+        atomicMin(answers[ray].y, pair.z);
+#else
+    uvec4 answer = answers[ray];
+    if (pair.z != RAYSPACE_NO_RANK && pair.w == answer.x && pair.z == answer.y &&
+        (pair.w < answer.z || (pair.w == answer.z && pair.z < answer.w)))
+        answers[ray].zw = pair.wz;
+#endif
+}

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: MIT
+// A ray of a wave as level 0 of the hierarchy.
+#include "rayspace/layout.h"
+#include "shared/bindings.h"
+#include "common/math.glsl"
+
+layout(binding = UNIT_RAYS) uniform samplerBuffer rays; // two texels each
+
+// The distance of a point that is computed from a ray is less exact than a bound if the ray grazes its triangle:
+// bvh/traverse.glsl, PRUNE_SLACK.
+const float END_SLACK = 1.00006103515625;
+// Rounding of the ray's transform to an instance's space: bvh/bounds.glsl, WORLD_SLACK.
+const float ORIGIN_SLACK = 7.62939453125e-6; // 2^-17
+const float DIRECTION_SLACK = 9.5367431640625e-7; // 2^-20
+
+// What a bundle of rays is tested with.
+struct bundle {
+    vec3 centre;
+    float radius; // of the origins
+    vec3 axis;
+    float secant, tangent; // secant 0: no cone
+    vec3 origin_lower, origin_upper;
+    vec3 direction_lower, direction_upper;
+    float end; // metres; negative: no ray is alive
+};
+
+struct live_ray {
+    vec3 origin, direction; // unit
+    float end;              // metres along it; negative: dead
+};
+
+// `t_max` may be less than the ray's own. Where a ray begins behind its origin it is taken from there on.
+live_ray live_ray_of(vec4 origin_t_min, vec4 direction_t_max, float t_max)
+{
+    float largest = max_component(abs(direction_t_max.xyz));
+    vec3 scaled = direction_t_max.xyz / largest;
+    float length_ = length(scaled) * largest, before = min(origin_t_min.w, 0.0);
+    live_ray r;
+    r.origin = origin_t_min.xyz + before * direction_t_max.xyz;
+    r.direction = scaled / length(scaled);
+    r.end = min((t_max - before) * length_ * END_SLACK, 3e38);
+    // NaN too: no comparison holds
+    if (!(t_max > origin_t_min.w && length_ > 0.0 && dot(r.origin, r.origin) < 3e38))
+        r.end = -1.0;
+    return r;
+}
+
+bundle bundle_of_ray(live_ray r)
+{
+    vec3 slack = vec3(ORIGIN_SLACK * max_component(abs(r.origin)));
+    return bundle(r.origin, slack.x * 2.0, r.direction, 1.0, DIRECTION_SLACK * 4.0, r.origin - slack, r.origin + slack,
+                  r.direction - DIRECTION_SLACK, r.direction + DIRECTION_SLACK, r.end);
+}

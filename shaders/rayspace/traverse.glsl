@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: MIT
+// What the descent has found for a ray, after discs were tested.
+#include "common/candidate.glsl"
+#include "rayspace/answer.glsl"
+
+layout(binding = UNIT_RAYSPACE_RANKS) uniform usamplerBuffer ranks;
+
+uniform uint instance_count;
+
+#ifdef ANY_HIT
+
+bool trace_any(trace_ray r, inout vec3 optical_depth)
+{
+    optical_depth = min(optical_depth + vec3(answers[first_ray + item_index()].xyz), vec3(OPTICAL_DEPTH_MAX));
+    return min_component(optical_depth) >= OPTICAL_DEPTH_BLACK;
+}
+
+#else
+
+void trace_closest(trace_ray r, inout candidate best)
+{
+    uvec4 answer = answers[first_ray + item_index()];
+    if (answer.w == RAYSPACE_NO_RANK || float_of_ordered(answer.z) >= best.distance)
+        return;
+    uint low = 0u, high = instance_count; // the last instance whose first rank is not above
+    while (low + 1u < high) {
+        uint middle = (low + high) / 2u;
+        if (texelFetch(ranks, int(middle)).x <= answer.w)
+            low = middle;
+        else
+            high = middle;
+    }
+    uint first_primitive = geometry_at(instance_at(low).geometry).first_primitive;
+    best = candidate(float_of_ordered(answer.z), first_primitive + answer.w - texelFetch(ranks, int(low)).x, low,
+                     vec2(0.0));
+}
+
+#endif
