@@ -1,0 +1,610 @@
+/* SPDX-License-Identifier: MIT */
+/* Bounds of the rays of a wave: what a ray hits in exact arithmetic is culled at no level. The device's own
+ * functions are run (rayspace/nodes.comp, rayspace/meet.glsl), on rays and triangles as hostile as can be. */
+#include "tests/unit/trace/tracer_fixture.h"
+
+#include "shared/bindings.h"
+#include "tests/fixtures/shader_probe.h"
+#include "trace/program.h"
+#include "trace/rayspace/tracer.h"
+
+#include <float.h>
+
+#define RAYSPACE_NUMBER 5u
+#define RAYS 1024u
+#define ELEMENTS 256u
+/* Half of the elements have a sphere about their box, as those of a tree; half one about their triangle. */
+#define CASES 32u
+
+ALL_TESTS(open_device, close_device)
+
+TEST(a_level_has_a_node_for_every_four_of_the_level_below)
+{
+    uint32_t counts[64], n = 0;
+    for (uint32_t power = 1; power <= 1u << 24; power *= 4) {
+        counts[n++] = power;
+        counts[n++] = power + 1;
+    }
+    counts[n++] = 17;
+    counts[n++] = RAYSPACE_INDEX_MASK;
+    for (uint32_t i = 0; i < n; i++) {
+        const struct rayspace_levels levels = rayspace_levels_over(counts[i]);
+        uint32_t first = 0, top = 0;
+        for (uint64_t reach = 1; reach < counts[i]; reach *= 4)
+            top++;
+        assert_int_equal(levels.top, top);
+        assert_true(levels.top < RAYSPACE_LEVELS);
+        assert_int_equal(levels.count[0], counts[i]);
+        assert_int_equal(levels.count[top], 1);
+        for (uint32_t level = 1; level <= top; level++) {
+            assert_int_equal(levels.count[level], (levels.count[level - 1] + 3) / 4);
+            assert_int_equal(levels.first[level], first);
+            first += levels.count[level];
+        }
+    }
+}
+
+/* ---- rays and triangles ---- */
+
+enum form {
+    FROM_A_POINT,
+    PARALLEL,
+    MIRRORED, /* from the surface of a ball */
+    WIDE,     /* within 80 to 100 degrees of an axis */
+    INCOHERENT,
+    OPPOSED, /* directions of neighbours sum to zero */
+    ALONG_AXES,
+    FROM_BEHIND, /* t_min is negative */
+    FORMS
+};
+
+static const char *const form_names[FORMS] = {"from a point", "parallel", "mirrored",   "wide",
+                                              "incoherent",   "opposed",  "along axes", "from behind"};
+
+struct triangle {
+    float v[3][3];
+};
+
+struct fuzz {
+    enum form form;
+    uint64_t seed;
+    double scale, offset[3];
+    struct triangle triangles[ELEMENTS];
+    struct ray rays[RAYS];
+};
+
+static double uniform(struct fuzz *fuzz, double low, double high)
+{
+    return low + (high - low) * ((double)test_random(&fuzz->seed) / 4294967296.0);
+}
+
+static bool one_in(struct fuzz *fuzz, uint32_t n)
+{
+    return test_random(&fuzz->seed) % n == 0;
+}
+
+static void random_unit(struct fuzz *fuzz, double v[3])
+{
+    const double z = uniform(fuzz, -1, 1), phi = uniform(fuzz, 0, 6.283185307179586), r = sqrt(1 - z * z);
+    v[0] = r * cos(phi);
+    v[1] = r * sin(phi);
+    v[2] = z;
+}
+
+/* To the world of the case. */
+static void place(const struct fuzz *fuzz, const double p[3], float out[3])
+{
+    for (int k = 0; k < 3; k++)
+        out[k] = (float)(p[k] * fuzz->scale + fuzz->offset[k]);
+}
+
+/* Tiny, middling, needles, huge, flat in an axis, without an area, points. */
+static void make_triangle(struct fuzz *fuzz, uint32_t number)
+{
+    struct triangle *t = &fuzz->triangles[number];
+    double centre[3], corner[3][3];
+    for (int k = 0; k < 3; k++)
+        centre[k] = uniform(fuzz, -1, 1);
+    const uint32_t kind = number % 8;
+    const double size = kind == 3   ? pow(10, uniform(fuzz, 1, 7))
+                        : kind == 0 ? pow(10, uniform(fuzz, -6, -1))
+                                    : 0.3;
+    for (int v = 0; v < 3; v++)
+        for (int k = 0; k < 3; k++)
+            corner[v][k] = centre[k] + uniform(fuzz, -size, size);
+    const int axis = (int)(test_random(&fuzz->seed) % 3);
+    const double along = uniform(fuzz, 0, 1), thin = pow(10, uniform(fuzz, -9, -3));
+    for (int v = 0; v < 3; v++) {
+        if (kind == 4)
+            corner[v][axis] = centre[axis];
+        if (kind == 7)
+            corner[v][axis] = corner[v][(axis + 1) % 3] = centre[axis];
+    }
+    for (int k = 0; k < 3; k++) {
+        if (kind == 2 || kind == 5) /* its third corner is on, or near, the opposite edge */
+            corner[2][k] = corner[0][k] + along * (corner[1][k] - corner[0][k]) +
+                           (kind == 2 ? thin * uniform(fuzz, -1, 1) : 0);
+        if (kind == 6 && number % 16 == 6)
+            corner[1][k] = corner[2][k] = corner[0][k];
+    }
+    for (int v = 0; v < 3; v++)
+        place(fuzz, corner[v], t->v[v]);
+}
+
+/* A point of a triangle, often a corner or on an edge. */
+static void target_on(struct fuzz *fuzz, const struct triangle *t, double out[3])
+{
+    double a = uniform(fuzz, 0, 1), b = uniform(fuzz, 0, 1);
+    if (a + b > 1) {
+        a = 1 - a;
+        b = 1 - b;
+    }
+    if (one_in(fuzz, 4))
+        a = 0;
+    if (one_in(fuzz, 4))
+        b = a == 0 && one_in(fuzz, 2) ? 1 : 0;
+    for (int k = 0; k < 3; k++)
+        out[k] = t->v[0][k] + a * ((double)t->v[1][k] - t->v[0][k]) + b * ((double)t->v[2][k] - t->v[0][k]);
+}
+
+static double length_of(const double v[3])
+{
+    return sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+}
+
+/* An origin, and the way to the target or elsewhere; not unit. */
+static void choose_way(struct fuzz *fuzz, const double shared[2][3], const double target[3], double origin[3],
+                       double way[3])
+{
+    double unit[3];
+    random_unit(fuzz, unit);
+    const double reach = fuzz->scale * pow(10, uniform(fuzz, -2, 1));
+    for (int k = 0; k < 3; k++) {
+        const double far = fuzz->offset[k] + fuzz->scale * 3 * shared[0][k];
+        switch (fuzz->form) {
+        case FROM_A_POINT:
+            origin[k] = far;
+            break;
+        case PARALLEL:
+            origin[k] = target[k] - reach * (shared[0][k] + 1e-3 * unit[k]);
+            break;
+        case MIRRORED:
+            origin[k] = fuzz->offset[k] + fuzz->scale * 0.3 * unit[k];
+            break;
+        case WIDE:
+        case OPPOSED:
+            origin[k] = fuzz->offset[k] + fuzz->scale * 0.1 * shared[0][k];
+            break;
+        default:
+            origin[k] = target[k] - reach * unit[k];
+        }
+        origin[k] = (float)origin[k];
+        way[k] = target[k] - origin[k];
+    }
+    if (fuzz->form == WIDE && one_in(fuzz, 2)) { /* at a right angle to the axis, or so */
+        const double tilt = uniform(fuzz, -0.17, 0.17);
+        double along = 0;
+        for (int k = 0; k < 3; k++)
+            along += unit[k] * shared[1][k];
+        for (int k = 0; k < 3; k++)
+            way[k] = unit[k] + (tilt - along) * shared[1][k];
+    }
+    if (fuzz->form == ALONG_AXES) {
+        const uint32_t axis = test_random(&fuzz->seed) % 3;
+        for (uint32_t k = 0; k < 3; k++) {
+            origin[k] = (float)(k == axis ? origin[k] : target[k]);
+            way[k] = k == axis ? target[k] - origin[k] : one_in(fuzz, 2) ? 0.0 : -0.0;
+        }
+    }
+}
+
+/* How far the ray goes: without end, just to its target and a little less or more, nowhere. */
+static void choose_ends(struct fuzz *fuzz, struct ray *ray, double target_t)
+{
+    float *t_min = &ray->origin_t_min[3], *t_max = &ray->direction_t_max[3];
+    *t_min = one_in(fuzz, 4) ? (float)(target_t * uniform(fuzz, 0, 1.01)) : 0.0f;
+    switch (test_random(&fuzz->seed) % 4) {
+    case 0:
+        *t_max = INFINITY;
+        break;
+    case 1:
+        *t_max = 1e30f;
+        break;
+    case 2:
+        *t_max = (float)target_t * (one_in(fuzz, 2) ? 1.0f : 1.0f + FLT_EPSILON);
+        break;
+    default:
+        *t_max = (float)(target_t * uniform(fuzz, 0.5, 3));
+    }
+    if (fuzz->form == FROM_BEHIND)
+        *t_min = (float)(-target_t * pow(10, uniform(fuzz, -3, 3)));
+    if (one_in(fuzz, 16))
+        *t_max = one_in(fuzz, 2) ? *t_min : -1.0f;
+}
+
+/* Neighbours aim at one triangle, in groups of all sizes. */
+static void make_rays(struct fuzz *fuzz)
+{
+    double shared[2][3];
+    random_unit(fuzz, shared[0]);
+    random_unit(fuzz, shared[1]);
+    for (uint32_t i = 0; i < RAYS; i++) {
+        const uint32_t group = 1u << 2 * (i / 256 + 1);
+        const uint32_t aimed = (i / group * 2654435761u >> 8) % ELEMENTS;
+        double target[3], origin[3], way[3];
+        target_on(fuzz, &fuzz->triangles[aimed], target);
+        choose_way(fuzz, (const double(*)[3])shared, target, origin, way);
+        /* Not of unit length, and where it is of none the ray is dead. */
+        const double length = length_of(way), of_unit = pow(10, uniform(fuzz, -3, 3));
+        struct ray *ray = &fuzz->rays[i];
+        *ray = (struct ray){0};
+        for (int k = 0; k < 3; k++) {
+            ray->origin_t_min[k] = (float)origin[k];
+            ray->direction_t_max[k] = length > 0 ? (float)(way[k] / length * of_unit) : 0.0f;
+        }
+        if (fuzz->form == FROM_BEHIND)
+            for (int k = 0; k < 3; k++) /* the target lies behind the origin */
+                ray->direction_t_max[k] = one_in(fuzz, 2) ? ray->direction_t_max[k] : -ray->direction_t_max[k];
+        if (fuzz->form == OPPOSED && i % 2)
+            for (int k = 0; k < 3; k++)
+                ray->direction_t_max[k] = -fuzz->rays[i - 1].direction_t_max[k];
+        choose_ends(fuzz, ray, length / of_unit);
+    }
+}
+
+static void fuzz_init(struct fuzz *fuzz, uint32_t number)
+{
+    *fuzz = (struct fuzz){.form = (enum form)(number % FORMS), .seed = 1000 + number};
+    fuzz->scale = number % 16 < FORMS ? 1 : pow(10, uniform(fuzz, -6, 6));
+    double away[3];
+    random_unit(fuzz, away);
+    for (int k = 0; k < 3 && number % 32 >= 16; k++)
+        fuzz->offset[k] = 1e4 * fuzz->scale * away[k];
+    for (uint32_t i = 0; i < ELEMENTS; i++)
+        make_triangle(fuzz, i);
+    make_rays(fuzz);
+}
+
+/* ---- the truth ---- */
+
+static bool is_dead(const struct ray *ray)
+{
+    const float *d = ray->direction_t_max;
+    return !(d[3] > ray->origin_t_min[3]) || (d[0] == 0 && d[1] == 0 && d[2] == 0);
+}
+
+static void cross(const double a[3], const double b[3], double out[3])
+{
+    for (int k = 0; k < 3; k++)
+        out[k] = a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3];
+}
+
+static double dot(const double a[3], const double b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+/* Moeller and Trumbore, in double precision. */
+static bool hits(const struct ray *ray, const struct triangle *t)
+{
+    double d[3], edges[2][3], from[3], p[3], q[3];
+    for (int k = 0; k < 3; k++) {
+        d[k] = ray->direction_t_max[k];
+        edges[0][k] = (double)t->v[1][k] - t->v[0][k];
+        edges[1][k] = (double)t->v[2][k] - t->v[0][k];
+        from[k] = (double)ray->origin_t_min[k] - t->v[0][k];
+    }
+    cross(d, edges[1], p);
+    cross(from, edges[0], q);
+    const double det = dot(edges[0], p), u = dot(from, p) / det, v = dot(d, q) / det,
+                 distance = dot(edges[1], q) / det;
+    return det != 0 && u >= 0 && v >= 0 && u + v <= 1 && distance >= ray->origin_t_min[3] &&
+           distance <= ray->direction_t_max[3];
+}
+
+/* ---- the device ---- */
+
+/* As the shader has it. */
+struct element {
+    float centre_radius[4], lower[4], upper[4];
+};
+
+static void bound_by_box(const struct triangle *t, struct element *e)
+{
+    float squared = 0;
+    for (int k = 0; k < 3; k++) {
+        e->lower[k] = fminf(t->v[0][k], fminf(t->v[1][k], t->v[2][k]));
+        e->upper[k] = fmaxf(t->v[0][k], fmaxf(t->v[1][k], t->v[2][k]));
+        const float half = 0.5f * e->upper[k] - 0.5f * e->lower[k];
+        e->centre_radius[k] = e->lower[k] + half;
+        squared += half * half;
+    }
+    e->centre_radius[3] = sqrtf(squared) * 1.000004f;
+}
+
+/* About the longest edge, and through the third corner where that is outside; rounded outward. */
+static void bound_by_sphere(const struct triangle *t, struct element *e)
+{
+    double centre[3] = {0}, longest = -1, radius = 0;
+    for (int v = 0; v < 3; v++) {
+        double edge[3];
+        for (int k = 0; k < 3; k++)
+            edge[k] = (double)t->v[(v + 1) % 3][k] - t->v[v][k];
+        if (length_of(edge) <= longest)
+            continue;
+        longest = length_of(edge);
+        for (int k = 0; k < 3; k++)
+            centre[k] = 0.5 * ((double)t->v[(v + 1) % 3][k] + t->v[v][k]);
+    }
+    for (int k = 0; k < 3; k++)
+        e->centre_radius[k] = (float)centre[k];
+    for (int v = 0; v < 3; v++) {
+        double away[3];
+        for (int k = 0; k < 3; k++)
+            away[k] = (double)t->v[v][k] - e->centre_radius[k];
+        radius = fmax(radius, length_of(away));
+    }
+    e->centre_radius[3] = nextafterf((float)radius, INFINITY);
+}
+
+/* Of each pair: bit 0 the cone meets the sphere, 1 the slabs the box, 2 it may meet, 3 a ray of it is alive. */
+static const char probe_text[] =
+    "#include \"common/dispatch.glsl\"\n"
+    "#include \"rayspace/meet.glsl\"\n"
+    "#include \"rayspace/place.glsl\"\n"
+    "layout(binding = UNIT_RAYSPACE_NODES) uniform samplerBuffer nodes;\n"
+    "layout(std430, binding = BIND_RAYSPACE_PAIRS) readonly buffer element_block { vec4 elements[]; };\n"
+    "layout(std430, binding = BIND_RAYSPACE_CONTROL) writeonly buffer met_block { uint met[]; };\n"
+    "uniform uint node_count, element_count;\n"
+    "bundle bundle_at(uint node)\n"
+    "{\n"
+    "    if (node < ray_count)\n"
+    "        return bundle_of_ray(ray_at_place(node));\n"
+    "    int texel = int(node - ray_count) * RAYSPACE_NODE_TEXELS;\n"
+    "    vec4 centre_radius = texelFetch(nodes, texel), axis_secant = texelFetch(nodes, texel + 1);\n"
+    "    vec4 lower_tan = texelFetch(nodes, texel + 2), upper_end = texelFetch(nodes, texel + 3);\n"
+    "    return bundle(centre_radius.xyz, centre_radius.w, axis_secant.xyz, axis_secant.w, lower_tan.w,\n"
+    "                  lower_tan.xyz, upper_end.xyz, texelFetch(nodes, texel + 4).xyz,\n"
+    "                  texelFetch(nodes, texel + 5).xyz, upper_end.w);\n"
+    "}\n"
+    "void main()\n"
+    "{\n"
+    "    uint i = item_index();\n"
+    "    if (i >= node_count * element_count)\n"
+    "        return;\n"
+    "    bundle b = bundle_at(i / element_count);\n"
+    "    int e = 3 * int(i % element_count);\n"
+    "    bounds what = bounds(elements[e].xyz, elements[e].w, elements[e + 1].xyz, elements[e + 2].xyz);\n"
+    "    met[i] = uint(cone_meets_sphere(b, what.centre, what.radius)) |\n"
+    "             uint(slabs_meet_box(b, what.lower, what.upper)) << 1 | uint(may_meet(b, what)) << 2 |\n"
+    "             uint(b.end >= 0.0) << 3;\n"
+    "}\n";
+
+struct run {
+    struct fixture fixture; /* a scene of any kind: rays alone matter */
+    struct gpu_program program;
+    struct rayspace_state state;
+    struct gpu_buffer rays, elements, met;
+    uint32_t node_count; /* with the rays themselves */
+    struct rayspace_node *nodes;
+    uint32_t *words;
+};
+
+static void run_init(struct run *run)
+{
+    struct error error = {0};
+    *run = (struct run){.state.levels = rayspace_levels_over(RAYS)};
+    fixture_init_by(&run->fixture, RAYSPACE_NUMBER, test_scene_soup(), NULL);
+    run->program = shader_probe_compile(probe_text, NULL);
+    run->state.base.wave = (struct wave){.ray_count = RAYS, .rays = &run->rays};
+    run->state.base.device = device;
+    run->node_count = RAYS + run->state.levels.first[run->state.levels.top] + 1;
+    const size_t answer_bytes = RAYS * RAYSPACE_ANSWER_BYTES, pairs = (size_t)run->node_count * ELEMENTS;
+    run->nodes = malloc(run->node_count * sizeof(*run->nodes));
+    run->words = malloc(pairs * sizeof(*run->words));
+    expect_ok(gpu_buffer_reserve(device, &run->state.answers, answer_bytes, &error) &&
+                  gpu_buffer_reserve(device, &run->met, pairs * sizeof(*run->words), &error),
+              &error);
+    const uint32_t no_hit[4] = {UINT32_MAX, RAYSPACE_NO_RANK, UINT32_MAX, RAYSPACE_NO_RANK};
+    gpu_buffer_fill(device, &run->state.answers, 0, answer_bytes, no_hit);
+}
+
+static void run_finish(struct run *run)
+{
+    gpu_buffer_finish(device, &run->state.answers);
+    gpu_buffer_finish(device, &run->state.nodes);
+    gpu_buffer_finish(device, &run->rays);
+    gpu_buffer_finish(device, &run->elements);
+    gpu_buffer_finish(device, &run->met);
+    shader_probe_finish(&run->program);
+    fixture_finish(&run->fixture);
+    free(run->nodes);
+    free(run->words);
+}
+
+static void run_case(struct run *run, const struct fuzz *fuzz)
+{
+    struct error error = {0};
+    struct element elements[ELEMENTS] = {0};
+    for (uint32_t i = 0; i < ELEMENTS; i++) {
+        bound_by_box(&fuzz->triangles[i], &elements[i]);
+        if (i / 8 % 2)
+            bound_by_sphere(&fuzz->triangles[i], &elements[i]);
+    }
+    expect_ok(gpu_buffer_upload(device, &run->rays, fuzz->rays, sizeof(fuzz->rays), &error) &&
+                  gpu_buffer_upload(device, &run->elements, elements, sizeof(elements), &error) &&
+                  rayspace_nodes_build(&run->state, &run->fixture.gpu, false, &error),
+              &error);
+    const uint32_t stored = run->node_count - RAYS;
+    gpu_buffer_read(device, &run->state.nodes, 0, run->nodes, stored * sizeof(*run->nodes));
+    trace_bind_rays(&run->fixture.gpu, &run->state.base.wave);
+    gpu_buffer_bind_texels(device, &run->state.nodes, UNIT_RAYSPACE_NODES, GL_RGBA32F);
+    gpu_buffer_bind_storage(&run->state.answers, BIND_RAYSPACE_ANSWERS);
+    gpu_buffer_bind_storage(&run->elements, BIND_RAYSPACE_PAIRS);
+    gpu_buffer_bind_storage(&run->met, BIND_RAYSPACE_CONTROL);
+    gpu_uniform_uint(&run->program, "ray_count", RAYS);
+    gpu_uniform_uint(&run->program, "node_count", run->node_count);
+    gpu_uniform_uint(&run->program, "element_count", ELEMENTS);
+    const size_t pairs = (size_t)run->node_count * ELEMENTS;
+    gpu_dispatch(device, &run->program, pairs);
+    gpu_buffer_read(device, &run->met, 0, run->words, pairs * sizeof(*run->words));
+    expect_ok(gpu_check(device, "nodes", &error), &error);
+}
+
+/* ---- no true hit is culled ---- */
+
+struct tally {
+    uint64_t pairs, hit, culled;
+};
+
+/* The node of a level that has the ray, among all, the rays first. */
+static uint32_t node_over(const struct rayspace_levels *levels, uint32_t level, uint32_t ray)
+{
+    return level == 0 ? ray : RAYS + levels->first[level] + (ray >> 2 * level);
+}
+
+static void expect_no_hit_culled(struct run *run, const struct fuzz *fuzz, uint32_t number, struct tally *tally)
+{
+    const struct rayspace_levels *levels = &run->state.levels;
+    bool *hit = calloc((size_t)run->node_count * ELEMENTS, sizeof(*hit));
+    for (uint32_t ray = 0; ray < RAYS; ray++) {
+        for (uint32_t e = 0; e < ELEMENTS; e++) {
+            if (is_dead(&fuzz->rays[ray]) || !hits(&fuzz->rays[ray], &fuzz->triangles[e]))
+                continue;
+            for (uint32_t level = 0; level <= levels->top; level++) {
+                const size_t pair = (size_t)node_over(levels, level, ray) * ELEMENTS + e;
+                hit[pair] = true;
+                if (run->words[pair] != 15)
+                    fail_msg("case %u, %s, scale %g: ray %u hits triangle %u, and its node of level %u is culled: "
+                             "cone %u, slabs %u, both %u, alive %u",
+                             number, form_names[fuzz->form], fuzz->scale, ray, e, level, run->words[pair] & 1,
+                             run->words[pair] >> 1 & 1, run->words[pair] >> 2 & 1, run->words[pair] >> 3);
+            }
+        }
+    }
+    for (size_t pair = 0; pair < (size_t)run->node_count * ELEMENTS; pair++) {
+        tally->hit += hit[pair];
+        tally->culled += !(run->words[pair] >> 2 & 1);
+    }
+    tally->pairs += (uint64_t)run->node_count * ELEMENTS;
+    free(hit);
+}
+
+TEST(no_triangle_that_a_ray_hits_is_culled_from_its_nodes)
+{
+    struct run run;
+    struct fuzz *fuzz = malloc(sizeof(*fuzz));
+    struct tally tallies[FORMS] = {0}, all = {0};
+    const uint32_t case_count = getenv("FARLIGHT_TEST_LONG") ? 16 * CASES : CASES;
+    run_init(&run);
+    for (uint32_t number = 0; number < case_count; number++) {
+        fuzz_init(fuzz, number);
+        run_case(&run, fuzz);
+        expect_no_hit_culled(&run, fuzz, number, &tallies[fuzz->form]);
+    }
+    for (int form = 0; form < FORMS; form++) {
+        const struct tally *tally = &tallies[form];
+        print_message("%-12s %9llu pairs, %5.2f %% of them hits, %5.1f %% culled\n", form_names[form],
+                      (unsigned long long)tally->pairs, 100.0 * (double)tally->hit / (double)tally->pairs,
+                      100.0 * (double)tally->culled / (double)tally->pairs);
+        all.pairs += tally->pairs;
+        all.hit += tally->hit;
+        all.culled += tally->culled;
+    }
+    assert_true(all.pairs >= 10000000);
+    /* The test has seen both. */
+    assert_true(all.hit > all.pairs / 200);
+    assert_true(all.culled > all.pairs / 4);
+    run_finish(&run);
+    free(fuzz);
+}
+
+/* ---- levels bound each other ---- */
+
+static double end_of(const struct ray *ray, const double d[3])
+{
+    const double before = fmin(ray->origin_t_min[3], 0);
+    return (ray->direction_t_max[3] - before) * length_of(d);
+}
+
+/* A ray in a node, in double precision. */
+static bool node_bounds_ray(const struct rayspace_node *node, const struct ray *ray)
+{
+    double d[3], origin[3], away[3], chord[3];
+    for (int k = 0; k < 3; k++)
+        d[k] = ray->direction_t_max[k];
+    const double length = length_of(d);
+    bool in = node->origin_upper_end[3] >= fmin(end_of(ray, d), 3e38f);
+    for (int k = 0; k < 3; k++) {
+        origin[k] = ray->origin_t_min[k] + fmin(ray->origin_t_min[3], 0) * d[k];
+        away[k] = origin[k] - node->centre_radius[k];
+        chord[k] = d[k] / length - node->axis_secant[k];
+        in = in && origin[k] >= node->origin_lower_tan[k] && origin[k] <= node->origin_upper_end[k] &&
+             d[k] / length >= node->direction_lower_spread[k] && d[k] / length <= node->direction_upper[k];
+    }
+    /* The node's own spread is rounded up by more than the device's tangent and secant are by to either side. */
+    const double angle = 2 * asin(fmin(length_of(chord) / 2, 1)), rounding = 1e-6;
+    return in && length_of(away) <= node->centre_radius[3] &&
+           (node->axis_secant[3] == 0 || (angle <= node->direction_lower_spread[3] &&
+                                          node->origin_lower_tan[3] >= tan(angle) * (1 - rounding) &&
+                                          node->axis_secant[3] >= (1 - rounding) / cos(angle)));
+}
+
+static bool box_bounds(const struct rayspace_node *node, const struct rayspace_node *below)
+{
+    bool in = true;
+    for (int k = 0; k < 3; k++)
+        in = in && below->origin_lower_tan[k] >= node->origin_lower_tan[k] &&
+             below->origin_upper_end[k] <= node->origin_upper_end[k] &&
+             below->direction_lower_spread[k] >= node->direction_lower_spread[k] &&
+             below->direction_upper[k] <= node->direction_upper[k];
+    return in && below->origin_upper_end[3] <= node->origin_upper_end[3];
+}
+
+TEST(every_level_bounds_the_rays_and_the_level_below)
+{
+    struct run run;
+    struct fuzz *fuzz = malloc(sizeof(*fuzz));
+    run_init(&run);
+    const struct rayspace_levels *levels = &run.state.levels;
+    for (uint32_t number = 0; number < CASES; number++) {
+        fuzz_init(fuzz, number);
+        run_case(&run, fuzz);
+        for (uint32_t level = 1; level <= levels->top; level++) {
+            for (uint32_t ray = 0; ray < RAYS; ray++) {
+                const struct rayspace_node *node = &run.nodes[levels->first[level] + (ray >> 2 * level)];
+                if (!is_dead(&fuzz->rays[ray]) && !node_bounds_ray(node, &fuzz->rays[ray]))
+                    fail_msg("case %u, %s, scale %g: ray %u leaves its node of level %u", number,
+                             form_names[fuzz->form], fuzz->scale, ray, level);
+            }
+            for (uint32_t i = 0; level > 1 && i < levels->count[level - 1]; i++) {
+                const struct rayspace_node *below = &run.nodes[levels->first[level - 1] + i];
+                if (below->origin_upper_end[3] >= 0 &&
+                    !box_bounds(&run.nodes[levels->first[level] + i / RAYSPACE_NODE_CHILDREN], below))
+                    fail_msg("case %u, %s: node %u of level %u leaves the one above", number,
+                             form_names[fuzz->form], i, level - 1);
+            }
+        }
+    }
+    run_finish(&run);
+    free(fuzz);
+}
+
+TEST(a_node_of_dead_rays_meets_nothing)
+{
+    struct run run;
+    struct fuzz *fuzz = malloc(sizeof(*fuzz));
+    run_init(&run);
+    fuzz_init(fuzz, INCOHERENT);
+    for (uint32_t ray = 0; ray < RAYS; ray++)
+        if (ray != RAYS - 1)
+            fuzz->rays[ray].direction_t_max[3] = fuzz->rays[ray].origin_t_min[3];
+    run_case(&run, fuzz);
+    const struct rayspace_levels *levels = &run.state.levels;
+    for (uint32_t level = 0; level <= levels->top; level++)
+        for (uint32_t ray = 0; ray < RAYS - 1; ray++)
+            for (uint32_t e = 0; e < ELEMENTS && ray >> 2 * level != (RAYS - 1) >> 2 * level; e++)
+                assert_false(run.words[(size_t)node_over(levels, level, ray) * ELEMENTS + e] >> 2 & 1);
+    run_finish(&run);
+    free(fuzz);
+}
