@@ -54,6 +54,12 @@ static const struct tracer_row rows[] = {
     ABUFFER("", ABUFFER_SEARCH_DDA),
     ABUFFER(", three columns a step", ABUFFER_SEARCH_LINEAR3),
     ABUFFER(", one column a step", ABUFFER_SEARCH_LINEAR1),
-    {.name = "rayspace", .number = 5},
+#define RAYSPACE(form, ...)                                                                                       \
+    {                                                                                                             \
+        .name = "rayspace" form, .number = 5, .is_form = sizeof(form) > 1, .options.rayspace = { __VA_ARGS__ }    \
+    }
+    RAYSPACE("", .batch = 0),
+    /* A 64th of what there is room for. */
+    RAYSPACE(", batches of 1024 pairs", .batch = 1024),
 };
 TRACER_ROWS(rows)

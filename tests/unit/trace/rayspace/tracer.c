@@ -1,0 +1,267 @@
+/* SPDX-License-Identifier: MIT */
+/* What only the tracer `rayspace` promises: its answers are brute force's to the bit, in batches of any size, also
+ * where these are halved, and in a scene of which everything moves. */
+#include "tests/unit/trace/tracer_fixture.h"
+
+#include "trace/rayspace/tracer.h"
+
+#define BVH_NUMBER 0u
+#define NAIVE_NUMBER 1u
+#define RAYSPACE_NUMBER 5u
+#define RAY_COUNT 4096u
+/* Pairs that a stack has room for, for so many rays. */
+#define STACK_PAIRS (1u << 16)
+
+ALL_TESTS(open_device, close_device)
+
+struct pair {
+    struct fixture naive, rayspace; /* of scenes that are alike */
+};
+
+static void pair_init(struct pair *pair, struct scene *(*create)(void), uint32_t batch)
+{
+    const struct tracer_options options = {.rayspace.batch = batch};
+    fixture_init_by(&pair->naive, NAIVE_NUMBER, create(), NULL);
+    fixture_init_by(&pair->rayspace, RAYSPACE_NUMBER, create(), &options);
+}
+
+static void pair_finish(struct pair *pair)
+{
+    fixture_finish(&pair->rayspace);
+    fixture_finish(&pair->naive);
+}
+
+static void random_rays(struct ray *rays, uint32_t count, uint64_t seed)
+{
+    for (uint32_t i = 0; i < count; i++) {
+        rays[i] = (struct ray){.direction_t_max[3] = i % 5 ? 1e30f : 2.0f};
+        for (int k = 0; k < 3; k++) {
+            /* Some of one point, as neighbours are. */
+            rays[i].origin_t_min[k] = i % 2048 < 1024 ? (float)(k + 1) : test_uniform(&seed, -3, 3);
+            rays[i].direction_t_max[k] =
+                test_uniform(&seed, -1, 1) - (i % 2048 < 1024 ? 0.5f * (float)(k + 1) : 0);
+        }
+    }
+}
+
+struct answers {
+    struct hit *hits;
+    uint32_t *visibility;
+};
+
+static struct answers ask(struct fixture *fixture, const struct ray *rays, uint32_t count)
+{
+    struct answers answers = {calloc(count, sizeof(*answers.hits)), calloc(count, sizeof(*answers.visibility))};
+    trace_rays(trace_by_tracer, fixture, WAVE_ANY, rays, count, NULL, answers.visibility);
+    trace_rays(trace_by_tracer, fixture, WAVE_CLOSEST, rays, count, answers.hits, NULL);
+    return answers;
+}
+
+/* `within`: distances, as a share of them; 0: all of the answers, to the bit. */
+static bool is_alike(const struct hit *a, const struct hit *b, float within)
+{
+    if (within == 0)
+        return memcmp(a, b, sizeof(*a)) == 0;
+    return (a->distance < 0) == (b->distance < 0) &&
+           fabsf(a->distance - b->distance) <= within * fabsf(a->distance);
+}
+
+/* Frees them. */
+static void expect_alike(struct answers own, struct answers other, uint32_t count, float within, const char *what)
+{
+    uint32_t found = 0, through = 0;
+    for (uint32_t i = 0; i < count; i++) {
+        if (!is_alike(&own.hits[i], &other.hits[i], within))
+            fail_msg("%s: the closest hit of ray %u: %.9g for %.9g", what, i, (double)own.hits[i].distance,
+                     (double)other.hits[i].distance);
+        if (own.visibility[i] != other.visibility[i])
+            fail_msg("%s: the transmittance of ray %u: %08x for %08x", what, i, own.visibility[i],
+                     other.visibility[i]);
+        found += other.hits[i].distance >= 0;
+        through += other.visibility[i] != 0;
+    }
+    /* The rays see both. */
+    assert_in_range(found, count / 20, count);
+    assert_in_range(through, 1, count);
+    free(own.hits);
+    free(own.visibility);
+    free(other.hits);
+    free(other.visibility);
+}
+
+static void expect_same_answers(struct pair *pair, const struct ray *rays, uint32_t count, const char *what)
+{
+    expect_alike(ask(&pair->rayspace, rays, count), ask(&pair->naive, rays, count), count, 0, what);
+}
+
+/* Of the last wave. */
+static struct rayspace_control control_of(const struct fixture *fixture)
+{
+    struct rayspace_control control;
+    const struct rayspace_state *state = (const struct rayspace_state *)fixture->tracer->state;
+    gpu_buffer_read(device, &state->control, 0, &control, sizeof(control));
+    return control;
+}
+
+TEST(answers_are_those_of_brute_force_to_the_bit_in_batches_of_any_size)
+{
+    static const struct {
+        const char *name;
+        struct scene *(*create)(void);
+    } scenes[] = {{"soup", test_scene_soup},
+                  {"spheres", test_scene_spheres},
+                  {"translucent", test_scene_translucent},
+                  {"deformed", test_scene_deformed}};
+    static const uint32_t batches[] = {0, STACK_PAIRS / 64, 61};
+    struct ray *rays = malloc(RAY_COUNT * sizeof(*rays));
+    for (size_t s = 0; s < sizeof(scenes) / sizeof(scenes[0]); s++) {
+        random_rays(rays, RAY_COUNT, 3 + s);
+        for (size_t b = 0; b < sizeof(batches) / sizeof(batches[0]); b++) {
+            struct pair pair;
+            pair_init(&pair, scenes[s].create, batches[b]);
+            expect_same_answers(&pair, rays, RAY_COUNT, scenes[s].name);
+            if (batches[b] > 0)
+                assert_in_range(control_of(&pair.rayspace).limit, 1, batches[b]);
+            pair_finish(&pair);
+        }
+    }
+    free(rays);
+}
+
+TEST(waves_of_few_rays_have_all_their_answers)
+{
+    static const uint32_t counts[] = {1, 2, 4, 5, 17, 64, 65, 256, 257};
+    struct pair pair;
+    struct ray rays[257];
+    random_rays(rays, 257, 11);
+    pair_init(&pair, test_scene_soup, 0);
+    for (size_t i = 0; i < sizeof(counts) / sizeof(counts[0]); i++) {
+        struct hit hits[2][257];
+        trace_rays(trace_by_tracer, &pair.naive, WAVE_CLOSEST, rays, counts[i], hits[0], NULL);
+        trace_rays(trace_by_tracer, &pair.rayspace, WAVE_CLOSEST, rays, counts[i], hits[1], NULL);
+        assert_memory_equal(hits[0], hits[1], counts[i] * sizeof(hits[0][0]));
+    }
+    pair_finish(&pair);
+}
+
+/* ---- halving ---- */
+
+/* Every ray passes most of them: many times the pairs that there is room for. */
+static struct scene *scene_of_large_triangles(void)
+{
+    struct test_edits edits = {.scene = test_scene_create()};
+    struct scene_material *pane = test_material(&edits, 1, 0.9f, 0.95f, 0.9f);
+    test_material(&edits, 2, 0.4f, 0.5f, 0.6f);
+    pane->alpha_mode = ALPHA_BLEND;
+    pane->base_colour[3] = 0.02f;
+    test_soup_mesh(&edits, 10, 600, 3.0f, 23);
+    const struct material_range ranges[] = {{0, 600, 1}};
+    struct scene_mesh *mesh = test_last_mesh(&edits);
+    free(mesh->ranges);
+    mesh->ranges = test_ranges(ranges, 1);
+    mesh->range_count = 1;
+    test_node(&edits, 1, 0, NODE_MESH, 10, NULL);
+    test_commit(&edits);
+    return edits.scene;
+}
+
+TEST(a_pass_that_overflows_is_halved_and_no_answer_is_lost)
+{
+    const uint32_t count = 2 * RAY_COUNT;
+    struct pair pair;
+    struct ray *rays = malloc(count * sizeof(*rays));
+    pair_init(&pair, scene_of_large_triangles, 0);
+    random_rays(rays, count, 5);
+    expect_same_answers(&pair, rays, count, "large triangles");
+    const struct rayspace_control control = control_of(&pair.rayspace);
+    print_message("%u passes, %u of them halved, at most %u pairs\n", control.passes, control.halvings,
+                  control.pairs_max);
+    assert_in_range(control.halvings, 1, control.passes / 2);
+    assert_true(control.triangle_tests > STACK_PAIRS);
+    /* Two stacks and the leaves. */
+    assert_in_range(control.pairs_max, STACK_PAIRS / 2, 3 * STACK_PAIRS);
+    pair_finish(&pair);
+    free(rays);
+}
+
+/* ---- everything moves ---- */
+
+#define FRAMES 3u
+
+/* A cloth that waves: `side` squares along a side, of two triangles each. */
+static void set_cloth(struct test_edits *edits, uint32_t side, float time)
+{
+    const uint32_t vertices = (side + 1) * (side + 1), triangles = 2 * side * side;
+    float(*positions)[3] = malloc(vertices * sizeof(*positions));
+    uint32_t *indices = malloc(triangles * 3 * sizeof(*indices)), *next = indices;
+    for (uint32_t i = 0; i < vertices; i++) {
+        const float x = (float)(i % (side + 1)) / (float)side, y = (float)(i / (side + 1)) / (float)side;
+        positions[i][0] = 4 * x - 2 + 0.1f * sinf(9 * y + time);
+        positions[i][1] = 4 * y - 2 + 0.1f * cosf(7 * x + 2 * time);
+        positions[i][2] = 0.5f * sinf(12 * x + 3 * time) * cosf(10 * y - time);
+    }
+    for (uint32_t i = 0; i < side * side; i++, next += 6) {
+        const uint32_t a = i / side * (side + 1) + i % side, b = a + side + 1;
+        memcpy(next, (uint32_t[6]){a, a + 1, b, a + 1, b + 1, b}, 6 * sizeof(*next));
+    }
+    test_mesh(edits, 10, (const float(*)[3])positions, vertices, indices, triangles);
+    free(positions);
+    free(indices);
+}
+
+static struct scene *scene_of_cloth(uint32_t side)
+{
+    struct test_edits edits = {.scene = test_scene_create()};
+    set_cloth(&edits, side, 0);
+    test_node(&edits, 1, 0, NODE_MESH, 10, NULL);
+    test_commit(&edits);
+    return edits.scene;
+}
+
+/* From above, to all sides. */
+static void rays_at_cloth(struct ray *rays, uint32_t count, uint64_t seed)
+{
+    for (uint32_t i = 0; i < count; i++) {
+        rays[i] = (struct ray){.direction_t_max[3] = 1e30f};
+        for (int k = 0; k < 3; k++) {
+            rays[i].origin_t_min[k] = k < 2 ? test_uniform(&seed, -1, 1) : 3;
+            rays[i].direction_t_max[k] = k < 2 ? test_uniform(&seed, -1, 1) : -1;
+        }
+    }
+}
+
+/* Answers in each frame. A whole new mesh comes for each, as a simulation would send it. */
+static void trace_frames(unsigned tracer, uint32_t side, uint32_t count, struct answers frames[FRAMES])
+{
+    struct fixture fixture;
+    struct ray *rays = malloc(count * sizeof(*rays));
+    fixture_init_by(&fixture, tracer, scene_of_cloth(side), NULL);
+    for (uint32_t frame = 0; frame < FRAMES; frame++) {
+        if (frame > 0) {
+            set_cloth(&fixture.edits, side, 0.4f * (float)frame);
+            update(&fixture);
+        }
+        rays_at_cloth(rays, count, 77 + frame);
+        frames[frame] = ask(&fixture, rays, count);
+    }
+    fixture_finish(&fixture);
+    free(rays);
+}
+
+static void expect_frames_alike(unsigned other, uint32_t side, uint32_t count, float within)
+{
+    struct answers frames[2][FRAMES];
+    trace_frames(RAYSPACE_NUMBER, side, count, frames[0]);
+    trace_frames(other, side, count, frames[1]);
+    for (uint32_t frame = 0; frame < FRAMES; frame++)
+        expect_alike(frames[0][frame], frames[1][frame], count, within, "cloth");
+}
+
+TEST(a_scene_whose_every_vertex_moves_is_traced_as_it_is_in_each_frame)
+{
+    /* Few rays, as brute force tests all of 64,082 triangles for each: on software GL it refuses more than 65,000.
+     */
+    expect_frames_alike(NAIVE_NUMBER, 179, 192, 0);
+    /* 199,712 triangles, and brute force's answers from bvh: its distances may differ in the last places. */
+    expect_frames_alike(BVH_NUMBER, 316, RAY_COUNT, 1e-6f);
+}
