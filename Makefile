@@ -284,7 +284,7 @@ $(B)/tests/unit/media_tests: TEST_LIBS += $(VIEWER_LIBS) -Wl,--wrap=libav_load
 $(B)/tests/unit/unit_tests: TEST_LIBS += $(call pkg_libs,libseccomp)
 $(B)/tests/unit/unit_tests: $(B)/client/helper/sandbox.o $(B)/client/import/closed.o $(MODEL_OBJ) $(RIVAL_OBJ) $(if $(filter 1,$(EMBREE)),$(CONTEST_OBJ))
 # Measurements of the benchmark register themselves (tests/bench/bench.h). Those that hold us against Embree need it.
-EMBREE_BENCH_SRC := $(addprefix tests/bench/,embree_build.c $(addprefix bench_,contest.c embree.c forms.c forms_frames.c forms_parse.c forms_rays.c forms_samples.c parallel.c tracers.c))
+EMBREE_BENCH_SRC := $(addprefix tests/bench/,embree_build.c $(addprefix bench_,contest.c embree.c forms.c forms_frames.c forms_parse.c forms_rays.c forms_samples.c parallel.c rayspace.c tracers.c))
 BENCH_SRC := $(filter-out tests/bench/shaped_link.c $(if $(filter 0,$(EMBREE)),$(EMBREE_BENCH_SRC)),$(wildcard tests/bench/*.c))
 BENCH_PROGRAM := $(B)/tests/bench/bench
 $(BENCH_PROGRAM): $(call obj,$(BENCH_SRC) $(addprefix client/viewer/,camera.c decode.c pixmap.c)) $(RIVAL_SOURCES) $(SERVER_OBJ) $(PROTOCOL_OBJ) $(LIB_OBJ)

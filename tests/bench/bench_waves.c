@@ -50,7 +50,7 @@ void bench_camera_rays(struct ray *rays, const struct frame_camera *camera, uint
     }
 }
 
-static void unpack_unit(float out[3], uint32_t bits)
+void bench_unpack_unit(float out[3], uint32_t bits)
 {
     float x = (float)(int16_t)(bits & 0xffff) / 32767, y = (float)(int16_t)(bits >> 16) / 32767;
     out[2] = 1 - fabsf(x) - fabsf(y);
@@ -79,7 +79,7 @@ static void from_hit(struct ray *ray, enum bench_wave_kind kind, const struct ra
 {
     const float diagonal = scene->gpu.diagonal, *d = from->direction_t_max;
     float n[3], origin[3], direction[3];
-    unpack_unit(n, hit->normal_geometric);
+    bench_unpack_unit(n, hit->normal_geometric);
     float cosine = n[0] * d[0] + n[1] * d[1] + n[2] * d[2], side = cosine > 0 ? -1.0f : 1.0f;
     /* A point on the unit sphere around the tip of the normal: directions in proportion to their cosine. */
     float z = test_uniform(seed, -0.999f, 0.999f), phi = test_uniform(seed, 0, 2 * PI_F), r = sqrtf(1 - z * z);

@@ -37,5 +37,7 @@ void bench_camera_rays(struct ray *rays, const struct frame_camera *camera, uint
 uint32_t bench_secondary_rays(struct ray *rays, enum bench_wave_kind kind, const struct ray *camera_rays,
                               const struct hit *hits, uint32_t count, uint32_t rays_each,
                               const struct bench_scene *scene);
+/* A normal of a hit. */
+void bench_unpack_unit(float out[3], uint32_t bits);
 
 #endif

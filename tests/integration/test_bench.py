@@ -24,7 +24,7 @@ import bench_view  # noqa: E402  pylint: disable=wrong-import-position
 
 TRACED = ("tracers", "family", "pixels", "rays", "flake", "reach")  # results of `bench tracers`
 PARTS = ("frames", "distributed", "steps", "link", "view", "tracers", "family", "pixels", "rays", "parallel", "instances",
-         "refit", "flake", "ldc", "abuffer", "reach")
+         "refit", "flake", "ldc", "abuffer", "rayspace", "reach")
 
 
 class Figures(unittest.TestCase):
