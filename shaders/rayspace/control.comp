@@ -1,21 +1,27 @@
 // SPDX-License-Identifier: MIT
 // Between two passes, by one invocation: takes what the last one wrote, or halves it where it did not fit; then says
-// what the next one takes, and whether leaves are tested before it.
-#include "rayspace/layout.h"
-#include "shared/bindings.h"
-#include "shared/wave.h"
+// what the next one takes, and whether leaves are tested before it. The last time it adds up what was done.
 #define GROUP_SIZE 1
 #include "common/dispatch.glsl"
+#include "rayspace/control.glsl"
+#include "shared/wave.h"
 
-layout(std430, binding = BIND_RAYSPACE_CONTROL) buffer control_block { rayspace_control control; };
+layout(std430, binding = BIND_RAYSPACE_TOTALS) buffer total_block { rayspace_totals totals[]; };
+layout(std430, binding = BIND_RAYSPACE_STOPPED) buffer stopped_block { uint stopped[]; };
 
-uniform uint from;              // the stack that the next pass takes from
-uniform uint capacity;          // pairs of a stack
-uniform uint leaves_capacity;   // pairs
-uniform uint leaves_wanted;     // so many are worth a dispatch
-uniform uint limit_max;         // pairs of a pass
+uniform uint last_from, last_to, last_later; // the stacks of the last pass
+uniform uint from, to, later;                // and of the next one
+uniform uint capacity;         // pairs of a stack
+uniform uint leaves_capacity;  // pairs
+uniform uint leaves_wanted;    // so many are worth a dispatch; 0: all are tested, 0xffffffff: none can be now
+uniform uint limit_max;        // pairs of a pass
 // The last places of a stack are for passes of one pair: one after another, these go down to the leaves with few.
 uniform uint reserve;
+uniform float band;
+uniform uint seeds;        // pairs that were put onto stack `from` since
+uniform uint ends; // 1: the batch in hand is traced, or something was left of it; 2: the wave, too
+uniform uint total;        // which of the totals
+uniform uint stopped_word; // in `stopped`; 0xffffffff: the slice cannot be stopped
 
 uvec3 groups_of(uint count, uint each)
 {
@@ -23,16 +29,28 @@ uvec3 groups_of(uint count, uint each)
     return uvec3(x, x > 0u ? (groups + x - 1u) / x : 1u, 1u);
 }
 
+void add_up(rayspace_control c)
+{
+    totals[total].waves++;
+    totals[total].cone_tests += c.cone_tests;
+    totals[total].triangle_tests += c.triangle_tests;
+    totals[total].passes += c.passes;
+    totals[total].halvings += c.halvings;
+    totals[total].pairs_max = max(totals[total].pairs_max, c.pairs_max);
+    totals[total].sorted_turned += c.sorted + (c.turned << 16);
+}
+
 void main()
 {
     rayspace_control c = control;
-    uint waiting[2] = uint[2](c.waiting_0, c.waiting_1);
+    uint waiting[RAYSPACE_STACKS] = uint[RAYSPACE_STACKS](c.waiting_0, c.waiting_1, c.waiting_2);
     bool fits = true;
     if (c.taken > 0u) {
-        fits = c.written <= c.room && c.leaves_written <= c.leaves_room;
+        fits = c.written <= c.room && c.put_off <= c.put_off_room && c.leaves_written <= c.leaves_room;
         if (fits) {
-            waiting[c.from] -= c.taken;
-            waiting[1u - c.from] += c.written;
+            waiting[last_from] -= c.taken;
+            waiting[last_to] += c.written;
+            waiting[last_later] += c.put_off;
             c.leaves += c.leaves_written;
             c.limit = min(c.limit * 2u, limit_max);
         } else {
@@ -40,20 +58,25 @@ void main()
             c.limit = max(c.taken / 2u, 1u);
         }
         c.passes++;
-        c.pairs_max = max(c.pairs_max, waiting[0] + waiting[1] + c.leaves);
     }
-    bool is_done = waiting[0] + waiting[1] == 0u;
-    c.leaves_taken = c.leaves >= leaves_wanted || is_done || !fits ? c.leaves : 0u;
+    waiting[from] += seeds;
+    uint all = waiting[0] + waiting[1] + waiting[2];
+    c.pairs_max = max(c.pairs_max, all + c.leaves);
+    bool is_due = c.leaves >= leaves_wanted || waiting[from] + waiting[to] == 0u || !fits;
+    c.leaves_taken = is_due && leaves_wanted != 0xffffffffu ? c.leaves : 0u;
     c.leaves -= c.leaves_taken;
-    c.from = from;
-    c.taken = min(waiting[from], c.limit);
+    c.taken = ends != 0u ? 0u : min(waiting[from], c.limit);
     c.first = waiting[from] - c.taken;
-    uint free = capacity - waiting[1u - from];
+    uint free = capacity - waiting[to];
     c.room = c.taken <= 1u ? free : free - min(free, reserve);
+    // Where there is hardly room for what is put off, nothing is.
+    c.put_off_room = capacity - waiting[later];
+    c.band = c.put_off_room > capacity / 2u ? band : 3e38;
     c.leaves_room = leaves_capacity - c.leaves;
-    c.written = c.leaves_written = 0u;
+    c.written = c.put_off = c.leaves_written = 0u;
     c.waiting_0 = waiting[0];
     c.waiting_1 = waiting[1];
+    c.waiting_2 = waiting[2];
     uvec3 pass_groups = groups_of(c.taken, RAYSPACE_CHUNK), leaf_groups = groups_of(c.leaves_taken, 1u);
     c.pass_groups_x = pass_groups.x;
     c.pass_groups_y = pass_groups.y;
@@ -61,5 +84,12 @@ void main()
     c.leaf_groups_x = leaf_groups.x;
     c.leaf_groups_y = leaf_groups.y;
     c.leaf_groups_z = leaf_groups.z;
+    if (ends != 0u && all + c.leaves > 0u)
+        c.left_over = 1u;
     control = c;
+    if (ends != 2u)
+        return;
+    add_up(c);
+    if (stopped_word != 0xffffffffu && c.left_over != 0u && stopped[stopped_word] == 0u)
+        stopped[stopped_word] = WAVE_STOPPED_LONG;
 }

@@ -1,24 +1,33 @@
 // SPDX-License-Identifier: MIT
 // A pass: pairs of nodes and elements that may meet become pairs of their children that may. Test and stream reduction
-// in one: an invocation takes RAYSPACE_CHUNK pairs and asks once for places for all that is left of them (section 4
-// reduces the stream in passes of its own).
+// in one: an invocation takes RAYSPACE_CHUNK pairs and asks once for places for all that is left of them.
 //
-// The defines of rayspace/place.glsl, rayspace/meet.glsl, rayspace/tree.glsl, and HAS_MOTION.
+// Defines: those of rayspace/place.glsl, rayspace/meet.glsl and rayspace/tree.glsl, HAS_MOTION, and
+//   RAYSPACE_TO_SLOTS  passes of their own reduce the stream (section 4, rayspace/reduce.h)
+//   RAYSPACE_FLAT      elements are primitives, and nodes alone are divided (section 3.3)
 #include "common/dispatch.glsl"
+#include "rayspace/control.glsl"
 #include "rayspace/place.glsl"
+#include "rayspace/reduce.h"
+#include "rayspace/item.glsl"
 #include "rayspace/tree.glsl"
 
 layout(binding = UNIT_RAYSPACE_NODES) uniform samplerBuffer nodes;
 layout(binding = UNIT_RAYSPACE_PAIRS) uniform usamplerBuffer pairs; // of the stack that is taken from
-layout(std430, binding = BIND_RAYSPACE_CONTROL) buffer control_block { rayspace_control control; };
+#ifdef RAYSPACE_TO_SLOTS
+layout(std430, binding = BIND_RAYSPACE_SLOTS) writeonly buffer slot_block { uvec4 slots_written[]; };
+#else
 layout(std430, binding = BIND_RAYSPACE_PAIRS) writeonly buffer pair_block { uvec4 pairs_written[]; };
+layout(std430, binding = BIND_RAYSPACE_PUT_OFF) writeonly buffer put_off_block { uvec4 pairs_put_off[]; };
 layout(std430, binding = BIND_RAYSPACE_LEAVES) writeonly buffer leaf_block { uvec4 leaves_written[]; };
+#endif
 
-uniform uint level_first[16]; // node of each level
+uniform uint level_first[16]; // RAYSPACE_LEVELS: node of each level
 uniform uint level_count[16];
+uniform uint to, later; // the stacks that are written to
 
-// The node is divided while it is wider than a fraction of the element, by that factor (RAYSPACE.md measured it best
-// for every wave): what is coarse on both sides costs tests and culls little.
+// The node is divided while it is wider than a fraction of the element, by that factor (measured best for every wave):
+// what is coarse on both sides costs tests and culls little.
 const float SPLIT_FACTOR = 4.0;
 
 bundle bundle_at(uint node)
@@ -33,13 +42,20 @@ bundle bundle_at(uint node)
                   upper_end.xyz, texelFetch(nodes, texel + 4).xyz, texelFetch(nodes, texel + 5).xyz, upper_end.w);
 }
 
+#ifndef RAYSPACE_FLAT
+
+bool holds_primitives(uint link)
+{
+    return is_leaf(link) && link >> BVH_LEAF_KIND_SHIFT != BVH_LEAF_INSTANCE;
+}
+
 // Whether the node of a pair is to be divided, rather than the element.
-bool divides_node(uint node, tree_element e, bounds b)
+bool divides_node(uint node, uint link, bounds b)
 {
     if (node >> RAYSPACE_LEVEL_SHIFT == 0u)
         return false;
-    if (is_leaf(e.link))
-        return e.link >> BVH_LEAF_KIND_SHIFT != BVH_LEAF_INSTANCE;
+    if (is_leaf(link))
+        return holds_primitives(link);
     int texel = int(level_first[node >> RAYSPACE_LEVEL_SHIFT] + (node & RAYSPACE_INDEX_MASK)) * RAYSPACE_NODE_TEXELS;
     vec4 centre_radius = texelFetch(nodes, texel);
     float tangent = texelFetch(nodes, texel + 2).w, secant = texelFetch(nodes, texel + 1).w;
@@ -47,78 +63,132 @@ bool divides_node(uint node, tree_element e, bounds b)
     return secant == 0.0 || width * SPLIT_FACTOR > b.radius;
 }
 
-const uint KEPT_MAX = RAYSPACE_CHUNK * (RAYSPACE_CHILDREN + 1u);
+uint after(uint element, uint link)
+{
+    return is_leaf(link) ? element + 1u : max(link, element + 1u);
+}
+
+#endif
+
+const uint KEPT_MAX = RAYSPACE_CHUNK_SLOTS;
+
+// What is left of the pairs of this invocation. No parameter: software GL takes minutes to compile an array that is
+// handed over.
+uvec4 kept[KEPT_MAX];
+uint kept_count = 0u;
+uint leaf_mask = 0u, far_mask = 0u; // a bit for each
+uint tests = 0u;
+
+void test(uvec4 pair, uint leaf_link, bool is_ray_leaf, bundle b, bounds what)
+{
+    tests++;
+    if (!may_meet(b, what))
+        return;
+    bool is_far = control.band < 3e38 && distance(b.centre, what.centre) - b.radius - what.radius > control.band;
+    if (is_far) {
+        pair.w |= RAYSPACE_AGAIN;
+        far_mask |= 1u << kept_count;
+    } else if (is_ray_leaf) {
+        pair.y = leaf_link;
+        leaf_mask |= 1u << kept_count;
+    }
+    kept[kept_count++] = pair;
+}
+
+void take(uvec4 pair)
+{
+    uint level = pair.x >> RAYSPACE_LEVEL_SHIFT, index = pair.x & RAYSPACE_INDEX_MASK;
+    bool again = (pair.w & RAYSPACE_AGAIN) != 0u;
+    uvec4 made = pair;
+    made.w &= ~RAYSPACE_AGAIN;
+#ifdef RAYSPACE_FLAT
+    bounds bounds_ = bounds_of_item(pair.y);
+    bool itself = again || level == 0u, by_node = true;
+    uint link = pair.y, next = 0u, end = 0u;
+#else
+    tree_place tree = tree_of(pair.z);
+    tree_element element = element_at(tree, pair.y);
+    bounds bounds_ = bounds_of(tree, element);
+    uint link = element.link, next = pair.y + 1u, end = link;
+    bool itself = again || (level == 0u && holds_primitives(link)), by_node = itself || divides_node(pair.x, link, bounds_);
+    if (!by_node && is_leaf(link)) { // an instance: its tree's root is the one child
+        made.z = link & BVH_LEAF_FIRST_MASK;
+        tree = tree_of(made.z);
+        next = 0u;
+        end = min(1u, tree.count);
+    }
+    for (uint skip = made.w; !by_node && skip > 0u && next < end; skip--)
+        next = after(next, element_at(tree, next).link);
+#endif
+    uint nodes_left = itself ? 1u : by_node ? min(level_count[level - 1u] - 4u * index, 4u) : 0u;
+    bundle b;
+    if (!by_node)
+        b = bundle_at(pair.x);
+    for (uint child = 0u; child < RAYSPACE_CHILDREN; child++) {
+        uvec4 one = made;
+        if (by_node) {
+            if (child >= nodes_left)
+                break;
+            if (!itself)
+                one.xw = uvec2((level - 1u) << RAYSPACE_LEVEL_SHIFT | (4u * index + child), 0u);
+            b = bundle_at(one.x);
+        }
+#ifndef RAYSPACE_FLAT
+        else {
+            if (next >= end)
+                break;
+            one.yw = uvec2(next, 0u);
+            element = element_at(tree, next);
+            bounds_ = bounds_of(tree, element);
+            link = element.link;
+            next = after(next, link);
+        }
+        bool is_ray_leaf = one.x >> RAYSPACE_LEVEL_SHIFT == 0u && holds_primitives(link);
+#else
+        bool is_ray_leaf = one.x >> RAYSPACE_LEVEL_SHIFT == 0u;
+#endif
+        test(one, link, is_ray_leaf, b, bounds_);
+    }
+    if (!by_node && next < end) // the rest of many children
+        kept[kept_count++] = uvec4(pair.xyz, made.w + RAYSPACE_CHILDREN);
+}
 
 void main()
 {
     uint begin = item_index() * RAYSPACE_CHUNK;
     if (begin >= control.taken)
         return;
-    uvec4 kept[KEPT_MAX];
-    uint kept_count = 0u, leaf_mask = 0u, tests = 0u;
-    for (uint i = begin; i < min(begin + RAYSPACE_CHUNK, control.taken); i++) {
-        uvec4 pair = texelFetch(pairs, int(control.first + i));
-        tree_place tree = tree_of(pair.z);
-        tree_element element = element_at(tree, pair.y);
-        bounds bounds_ = bounds_of(tree, element);
-        bool by_node = divides_node(pair.x, element, bounds_);
-        uint level = pair.x >> RAYSPACE_LEVEL_SHIFT, index = pair.x & RAYSPACE_INDEX_MASK;
-        uint end = element.link, next = pair.y + 1u, instance_index = pair.z;
-        if (!by_node && is_leaf(element.link)) { // an instance: its tree's root is the one child
-            instance_index = element.link & BVH_LEAF_FIRST_MASK;
-            tree = tree_of(instance_index);
-            next = 0u;
-            end = min(1u, tree.count);
-        }
-        for (uint skip = pair.w; !by_node && skip > 0u && next < end; skip--) {
-            uint link = element_at(tree, next).link;
-            next = is_leaf(link) ? next + 1u : max(link, next + 1u);
-        }
-        bundle b;
-        if (!by_node)
-            b = bundle_at(pair.x);
-        uint nodes_left = by_node ? min(level_count[level - 1u] - 4u * index, 4u) : 0u;
-        for (uint child = 0u; child < RAYSPACE_CHILDREN; child++) {
-            uvec4 made = uvec4(pair.x, pair.y, instance_index, 0u);
-            if (by_node) {
-                if (child >= nodes_left)
-                    break;
-                made.x = (level - 1u) << RAYSPACE_LEVEL_SHIFT | (4u * index + child);
-                b = bundle_at(made.x);
-            } else {
-                if (next >= end)
-                    break;
-                made.y = next;
-                element = element_at(tree, next);
-                bounds_ = bounds_of(tree, element);
-                next = is_leaf(element.link) ? next + 1u : max(element.link, next + 1u);
-            }
-            tests++;
-            if (!may_meet(b, bounds_))
-                continue;
-            if (made.x >> RAYSPACE_LEVEL_SHIFT == 0u && is_leaf(element.link) &&
-                element.link >> BVH_LEAF_KIND_SHIFT != BVH_LEAF_INSTANCE) {
-                made.y = element.link;
-                leaf_mask |= 1u << kept_count;
-            }
-            kept[kept_count++] = made;
-        }
-        if (!by_node && next < end) // the rest of many children
-            kept[kept_count++] = uvec4(pair.xyz, pair.w + RAYSPACE_CHILDREN);
-    }
+    for (uint i = begin; i < min(begin + RAYSPACE_CHUNK, control.taken); i++)
+        take(texelFetch(pairs, int(control.first + i)));
     atomicAdd(control.cone_tests, tests);
-    uint leaf_count = uint(bitCount(leaf_mask)), pair_count = kept_count - leaf_count;
+#ifdef RAYSPACE_TO_SLOTS
+    for (uint k = 0u; k < KEPT_MAX; k++) {
+        uvec4 slot = uvec4(RAYSPACE_SLOT_EMPTY);
+        if (k < kept_count)
+            slot = uvec4(kept[k].xyz, (leaf_mask >> k & 1u) != 0u ? RAYSPACE_SLOT_LEAF : kept[k].w);
+        slots_written[begin * (RAYSPACE_CHILDREN + 1u) + k] = slot;
+    }
+#else
+    uint leaf_count = uint(bitCount(leaf_mask)), far_count = uint(bitCount(far_mask));
+    uint near_count = kept_count - leaf_count - far_count;
     uint leaf_place = leaf_count > 0u ? atomicAdd(control.leaves_written, leaf_count) : 0u;
-    uint pair_place = pair_count > 0u ? atomicAdd(control.written, pair_count) : 0u;
-    bool leaves_fit = leaf_place + leaf_count <= control.leaves_room, pairs_fit = pair_place + pair_count <= control.room;
-    uint leaf_base = control.leaves + leaf_place;
-    uint pair_base = (control.from == 0u ? control.waiting_1 : control.waiting_0) + pair_place;
+    uint far_place = far_count > 0u ? atomicAdd(control.put_off, far_count) : 0u;
+    uint near_place = near_count > 0u ? atomicAdd(control.written, near_count) : 0u;
+    bool leaves_fit = leaf_place + leaf_count <= control.leaves_room;
+    bool far_fit = far_place + far_count <= control.put_off_room, near_fit = near_place + near_count <= control.room;
+    leaf_place += control.leaves;
+    far_place += waiting_on(later);
+    near_place += waiting_on(to);
     for (uint k = 0u; k < kept_count; k++) {
         if ((leaf_mask >> k & 1u) != 0u) {
             if (leaves_fit)
-                leaves_written[leaf_base++] = kept[k];
-        } else if (pairs_fit) {
-            pairs_written[pair_base++] = kept[k];
+                leaves_written[leaf_place++] = kept[k];
+        } else if ((far_mask >> k & 1u) != 0u) {
+            if (far_fit)
+                pairs_put_off[far_place++] = kept[k];
+        } else if (near_fit) {
+            pairs_written[near_place++] = kept[k];
         }
     }
+#endif
 }

@@ -9,10 +9,10 @@
  * taken as unit vectors, whatever those of the rays are. Node i of level n holds the nodes 4 i .. 4 i + 3 of level
  * n - 1. Level 0 is the rays themselves and is not stored; levels 1, 2, .. lie behind one another. RGBA32F. */
 struct rayspace_node {
-    vec4 centre_radius;   /* of the origins */
-    vec4 axis_secant;     /* 1 / cosine of the spread; 0: there is no cone, only the boxes hold */
-    vec4 origin_lower_tan; /* tangent of the spread */
-    vec4 origin_upper_end; /* the greatest distance of interest of any ray; negative: all are dead */
+    vec4 centre_radius;          /* of the origins */
+    vec4 axis_secant;            /* 1 / cosine of the spread; 0: there is no cone, only the boxes hold */
+    vec4 origin_lower_tan;       /* tangent of the spread */
+    vec4 origin_upper_end;       /* the greatest distance of interest of any ray; negative: all are dead */
     vec4 direction_lower_spread; /* the spread, radians */
     vec4 direction_upper;
 };
@@ -25,13 +25,15 @@ SHARED_SIZE(rayspace_node, 96)
  *   x  node: level, and its number in the level
  *   y  joint descent: element of the tree over the instance, or of the top tree; flat: item of the batch
  *   z  instance, RAYSPACE_TOP: the top tree
- *   w  joint descent: how many children of the element have been tested; the rest is to be
+ *   w  joint descent: how many children of the element have been tested; the rest is to be. RAYSPACE_AGAIN: the
+ *      pair was put off, and is itself to be tested again
  * A pair of a ray and a leaf:
  *   x  ray;  y  joint descent: link of the leaf; flat: item;  z  instance;
  *   then, once it was tested, z: rank of the nearest primitive, w: its distance, as ordered_bits() */
 #define RAYSPACE_LEVEL_SHIFT 27u
 #define RAYSPACE_INDEX_MASK 0x07ffffffu
 #define RAYSPACE_TOP 0xffffffffu
+#define RAYSPACE_AGAIN 0x80000000u
 #define RAYSPACE_PAIR_BYTES 16u
 #define RAYSPACE_CHUNK 4u    /* pairs of an invocation */
 #define RAYSPACE_CHILDREN 4u /* of a pair in a pass: nodes, or elements; more elements wait for the next pass */
@@ -46,39 +48,63 @@ SHARED_SIZE(rayspace_node, 96)
  * Any hit: x, y, z  optical depth in steps (common/candidate.glsl). */
 #define RAYSPACE_ANSWER_BYTES 16u
 
-/* A primitive of a batch of the flat descent, RGBA32UI, most words bits of floats: bounding sphere; lower corner of
- * the box, and the instance; upper corner, and the primitive's number in its geometry. */
+/* A primitive of a batch of the flat descent, RGBA32UI, most words bits of floats: bounding sphere; lower corner
+ * of the box, and the instance; upper corner, and the primitive's number in its geometry. */
 #define RAYSPACE_ITEM_TEXELS 3
 
-/* Two stacks of pairs; a pass takes pairs from the top of one and puts their children onto the other. What did not
- * fit is as if it had not happened: the next pass takes half as many. */
+/* Three stacks of pairs: a pass takes pairs from the top of one, puts their children onto the second, and those
+ * that are far away onto the third, which waits for the next round. What did not fit is as if it had not happened:
+ * the next pass takes half as many. */
+#define RAYSPACE_STACKS 3u
 struct rayspace_control {
-    uint waiting_0, waiting_1; /* pairs on each stack */
-    uint leaves;               /* pairs of rays and leaves that wait */
-    uint from;                 /* the stack that the pass in hand takes from */
-    uint taken, first;         /* pairs of the pass in hand: first .. first + taken - 1 of the stack */
-    uint written, leaves_written; /* by it; more than there is room for: they were not stored */
-    uint room, leaves_room;       /* for them */
-    uint limit;                /* pairs of a pass at most */
-    uint leaves_taken;         /* leaves to be tested before the pass in hand */
-    uint pass_groups_x, pass_groups_y, pass_groups_z;   /* arguments of indirect dispatches */
+    uint waiting_0, waiting_1, waiting_2;  /* pairs on each stack */
+    uint leaves;                           /* pairs of rays and leaves that wait */
+    uint taken, first;                     /* pairs of the pass in hand: first .. first + taken - 1 of its stack */
+    uint written, put_off, leaves_written; /* by it; more than there is room for: they were not stored */
+    uint room, put_off_room, leaves_room;  /* for them */
+    uint limit;                            /* pairs of a pass at most */
+    uint leaves_taken;                     /* leaves to be tested before the pass in hand */
+    uint pass_groups_x, pass_groups_y, pass_groups_z; /* arguments of indirect dispatches */
     uint leaf_groups_x, leaf_groups_y, leaf_groups_z;
+    uint sort_groups_x, sort_groups_y, sort_groups_z;
+    uint turned, sorted;             /* what a sample of the rays has decided */
+    float band;                      /* metres; what is farther away from its node than this is put off */
     uint cone_tests, triangle_tests; /* so far */
     uint pairs_max, passes, halvings;
-    uint pad0;
+    uint left_over; /* not 0: some batch was not traced to its end */
 };
-SHARED_SIZE(rayspace_control, 96)
+SHARED_SIZE(rayspace_control, 128)
+
+/* What was done for waves of a kind, since the frame began. */
+struct rayspace_totals {
+    uint rays, cone_tests, triangle_tests, pairs_max;
+    uint waves, passes, halvings, sorted_turned; /* waves of each; sorted in the lower half */
+};
+SHARED_SIZE(rayspace_totals, 32)
 
 #define BIND_RAYSPACE_CONTROL BIND_TRACER_0
 #define BIND_RAYSPACE_PAIRS BIND_TRACER_1 /* of the stack that is written to */
 #define BIND_RAYSPACE_LEAVES BIND_PASS_2
 #define BIND_RAYSPACE_ANSWERS BIND_PASS_3
-#define BIND_RAYSPACE_NODES BIND_PASS_4
+#define BIND_RAYSPACE_NODES BIND_PASS_4   /* of the pass that makes them */
+#define BIND_RAYSPACE_PUT_OFF BIND_PASS_4 /* of passes */
+#define BIND_RAYSPACE_STOPPED BIND_PASS_4 /* of control.comp */
+#define BIND_RAYSPACE_TOTALS BIND_PASS_3  /* likewise */
+#define BIND_RAYSPACE_ORDER BIND_PASS_4   /* of the sort */
+#define BIND_RAYSPACE_BINS BIND_PASS_2
+#define BIND_RAYSPACE_ITEMS BIND_PASS_4 /* of the pass that makes them */
 /* of the tree: UNIT_TRACER_0 .. 2 */
 #define UNIT_RAYSPACE_NODES UNIT_TRACER_3
 #define UNIT_RAYSPACE_PAIRS UNIT_TRACER_4
 #define UNIT_RAYSPACE_RANKS UNIT_TRACER_5 /* R32UI, of each instance its first primitive's */
 #define UNIT_RAYSPACE_ITEMS UNIT_TRACER_6
 #define UNIT_RAYSPACE_ORDER UNIT_TRACER_7 /* R32UI: which ray is at a place of level 0 */
+
+/* Cells in which rays are sorted, by interleaved bits: of the origin in the scene's box, and of the direction on
+ * the octahedron. */
+#define RAYSPACE_POSITION_BITS 4u
+#define RAYSPACE_DIRECTION_BITS 3u
+#define RAYSPACE_BINS 262144u /* 2^(3 x 4 + 2 x 3), at most */
+#define RAYSPACE_BINS_MIN 256u
 
 #endif

@@ -8,12 +8,10 @@
 //   LEAVES_RANK    the least rank at that distance
 //   LEAVES_SETTLE  the one pair that has it writes the hit down
 #include "common/dispatch.glsl"
+#include "rayspace/control.glsl"
 #include "rayspace/place.glsl"
-#ifdef LEAVES_TEST
 #include "rayspace/leaf.glsl"
-#endif
 
-layout(std430, binding = BIND_RAYSPACE_CONTROL) buffer control_block { rayspace_control control; };
 layout(std430, binding = BIND_RAYSPACE_LEAVES) buffer leaf_block { uvec4 leaves[]; };
 
 void main()
@@ -24,11 +22,12 @@ void main()
     uvec4 pair = leaves[which];
     uint ray = ray_of_place(pair.x);
 #ifdef LEAVES_TEST
-    atomicAdd(control.triangle_tests, (pair.y >> BVH_LEAF_COUNT_SHIFT & BVH_LEAF_COUNT_MASK) + 1u);
+    leaf_range leaf = leaf_of(pair);
+    atomicAdd(control.triangle_tests, leaf.end - leaf.first);
 #ifdef ANY_HIT
-    test_leaf_any(ray, pair);
+    test_leaf_any(ray, leaf);
 #else
-    uvec2 nearest = test_leaf_closest(ray, pair);
+    uvec2 nearest = test_leaf_closest(ray, leaf);
     leaves[which].zw = uvec2(nearest.y, nearest.x);
     answers[ray].y = RAYSPACE_NO_RANK;
     if (nearest.y != RAYSPACE_NO_RANK)

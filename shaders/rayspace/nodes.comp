@@ -3,6 +3,7 @@
 // invocation makes a node.
 //
 // Defines:
+//   ANY_HIT        the rays of the wave ask for transmittance
 //   NODES_OF_RAYS  level 1, from the rays
 //   NODES_ENDS     only how far rays go on, after hits were found
 #include "common/dispatch.glsl"
@@ -33,7 +34,8 @@ child child_at(uint index)
 {
 #ifdef NODES_OF_RAYS
     live_ray r = ray_at_place(index);
-    return child(r.origin, 0.0, r.direction, 0.0, r.origin, r.origin, r.direction, r.direction, r.end);
+    return child(r.origin, 2.0 * r.slack, r.direction, 0.0, r.origin - r.slack, r.origin + r.slack,
+                 r.direction - DIRECTION_SLACK, r.direction + DIRECTION_SLACK, r.end);
 #else
     int texel = int(below_first + index) * RAYSPACE_NODE_TEXELS;
     vec4 centre_radius = texelFetch(nodes, texel), axis_secant = texelFetch(nodes, texel + 1);
@@ -102,15 +104,6 @@ void main()
     all.radius = min(all.radius, distance(all.origin_lower, all.origin_upper) * 0.5);
     all.spread = min(all.spread, angle_above(length(farthest)));
     bool has_cone = all.spread < SPREAD_MAX && length_ > 1e-3;
-#ifdef NODES_OF_RAYS
-    // Rounding: here alone, as unions round outward by what they are given.
-    vec3 slack = vec3(ORIGIN_SLACK * max_component(max(abs(all.origin_lower), abs(all.origin_upper))));
-    all.origin_lower -= slack;
-    all.origin_upper += slack;
-    all.direction_lower -= DIRECTION_SLACK;
-    all.direction_upper += DIRECTION_SLACK;
-    all.radius += 2.0 * slack.x;
-#endif
     all.radius *= 1.0 + 3.8147e-6; // 2^-18
     all.spread += 4.0 * DIRECTION_SLACK;
     node_texels[texel] = vec4(all.centre, all.radius);

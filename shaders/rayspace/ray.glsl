@@ -27,6 +27,7 @@ struct bundle {
 struct live_ray {
     vec3 origin, direction; // unit
     float end;              // metres along it; negative: dead
+    float slack;            // rounding of where it is
 };
 
 // `t_max` may be less than the ray's own. Where a ray begins behind its origin it is taken from there on.
@@ -38,16 +39,16 @@ live_ray live_ray_of(vec4 origin_t_min, vec4 direction_t_max, float t_max)
     live_ray r;
     r.origin = origin_t_min.xyz + before * direction_t_max.xyz;
     r.direction = scaled / length(scaled);
+    r.slack = ORIGIN_SLACK * max(max_component(abs(origin_t_min.xyz)), max_component(abs(r.origin)));
     r.end = min((t_max - before) * length_ * END_SLACK, 3e38);
     // NaN too: no comparison holds
-    if (!(t_max > origin_t_min.w && length_ > 0.0 && dot(r.origin, r.origin) < 3e38))
+    if (!(t_max > origin_t_min.w && length_ > 0.0 && max_component(abs(r.origin)) < 3e38))
         r.end = -1.0;
     return r;
 }
 
 bundle bundle_of_ray(live_ray r)
 {
-    vec3 slack = vec3(ORIGIN_SLACK * max_component(abs(r.origin)));
-    return bundle(r.origin, slack.x * 2.0, r.direction, 1.0, DIRECTION_SLACK * 4.0, r.origin - slack, r.origin + slack,
-                  r.direction - DIRECTION_SLACK, r.direction + DIRECTION_SLACK, r.end);
+    return bundle(r.origin, r.slack * 2.0, r.direction, 1.0, DIRECTION_SLACK * 4.0, r.origin - r.slack,
+                  r.origin + r.slack, r.direction - DIRECTION_SLACK, r.direction + DIRECTION_SLACK, r.end);
 }

@@ -2,10 +2,7 @@
 // What the descent has found for a ray, after discs were tested.
 #include "common/candidate.glsl"
 #include "rayspace/answer.glsl"
-
-layout(binding = UNIT_RAYSPACE_RANKS) uniform usamplerBuffer ranks;
-
-uniform uint instance_count;
+#include "rayspace/rank.glsl"
 
 #ifdef ANY_HIT
 
@@ -22,17 +19,10 @@ void trace_closest(trace_ray r, inout candidate best)
     uvec4 answer = answers[first_ray + item_index()];
     if (answer.w == RAYSPACE_NO_RANK || float_of_ordered(answer.z) >= best.distance)
         return;
-    uint low = 0u, high = instance_count; // the last instance whose first rank is not above
-    while (low + 1u < high) {
-        uint middle = (low + high) / 2u;
-        if (texelFetch(ranks, int(middle)).x <= answer.w)
-            low = middle;
-        else
-            high = middle;
-    }
-    uint first_primitive = geometry_at(instance_at(low).geometry).first_primitive;
-    best = candidate(float_of_ordered(answer.z), first_primitive + answer.w - texelFetch(ranks, int(low)).x, low,
-                     vec2(0.0));
+    uint instance_index = instance_of_rank(answer.w);
+    uint first_primitive = geometry_at(instance_at(instance_index).geometry).first_primitive;
+    best = candidate(float_of_ordered(answer.z), first_primitive + answer.w - first_rank_of(instance_index),
+                     instance_index, vec2(0.0));
 }
 
 #endif

@@ -65,7 +65,7 @@ TEST(every_integrator_and_tracer_gives_the_same_picture_and_waits_once)
                  {INTEGRATOR_PATH, 4, 3},
                  {INTEGRATOR_AO, 1, 2},
                  {INTEGRATOR_RAYCAST, 4, 1}};
-    static const unsigned tracers[] = {TRACER_NAIVE, TRACER_BVH, TRACER_LDC, TRACER_ABUFFER};
+    static const unsigned tracers[] = {TRACER_NAIVE, TRACER_BVH, TRACER_LDC, TRACER_ABUFFER, TRACER_RAYSPACE};
     for (size_t i = 0; i < sizeof(forms) / sizeof(forms[0]); i++)
         for (size_t k = 0; k < sizeof(tracers) / sizeof(tracers[0]); k++) {
             char what[64];

@@ -56,6 +56,7 @@ CHOICES = {
 # Defines that come only with others.
 WITH = {"BVH_DEFORMS_IN_SHUTTER": ("BVH_DEFORMS", "HAS_MOTION"), "BVH_RESUMES": ("BVH_BUDGET",)}
 STAGES = {"render/primary.vert": ["render/primary.vert", "render/primary.frag"],
+          "rayspace/reduce.vert": ["rayspace/reduce.vert", "rayspace/reduce.geom"],
           "ldc/build.frag": ["raster/draw.vert", "raster/draw.geom", "ldc/build.frag"],
           "abuffer/build.frag": ["raster/draw.vert", "raster/draw.geom", "abuffer/build.frag"],
           "svo/voxelise.frag": ["raster/draw.vert", "raster/draw.geom", "svo/voxelise.frag"]}

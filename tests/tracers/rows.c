@@ -56,10 +56,16 @@ static const struct tracer_row rows[] = {
     ABUFFER(", one column a step", ABUFFER_SEARCH_LINEAR1),
 #define RAYSPACE(form, ...)                                                                                       \
     {                                                                                                             \
-        .name = "rayspace" form, .number = 5, .is_form = sizeof(form) > 1, .options.rayspace = { __VA_ARGS__ }    \
+        .name = "rayspace" form, .number = 5, .is_form = sizeof(form) > 1, .options = { __VA_ARGS__ }             \
     }
-    RAYSPACE("", .batch = 0),
-    /* A 64th of what there is room for. */
-    RAYSPACE(", batches of 1024 pairs", .batch = 1024),
+    RAYSPACE("", .rayspace.mode = RAYSPACE_MODE_JOINT),
+    RAYSPACE(", flat", .rayspace.mode = RAYSPACE_MODE_FLAT),
+    RAYSPACE(", flat, by spheres, in batches of 64", .rayspace.mode = RAYSPACE_MODE_FLAT,
+             .rayspace.bounds = RAYSPACE_BOUNDS_SPHERE, .rayspace.batch = 64),
+    RAYSPACE(", sorted, turned round, in four rounds, reduced by segments", .rayspace.sort = RAYSPACE_CHANCE_ON,
+             .rayspace.turn = RAYSPACE_CHANCE_ON, .rayspace.rounds = 4,
+             .rayspace.reduce = RAYSPACE_REDUCE_SEGMENTS),
+    RAYSPACE(" with little room, in two rounds, reduced by a geometry shader", .bench.rayspace_pairs = 512,
+             .rayspace.rounds = 2, .rayspace.reduce = RAYSPACE_REDUCE_GEOMETRY),
 };
 TRACER_ROWS(rows)

@@ -124,7 +124,8 @@ CHECK(at_a_limit_of_memory_an_update_fails_alone, CHECK_FORMS)
         if (progress == TRACER_FAILED) {
             assert_true(error.kind == ERROR_OUT_OF_MEMORY || error.kind == ERROR_LIMIT);
             assert_int_equal(fixture.tracer->stats.device_bytes, 0);
-            assert_int_equal(device->memory_used_bytes, fixture.others_bytes + tracer_device_bytes(fixture.tracer));
+            assert_int_equal(device->memory_used_bytes,
+                             fixture.others_bytes + tracer_device_bytes(fixture.tracer));
         }
         tracer_outdate(fixture.tracer);
     }

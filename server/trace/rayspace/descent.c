@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-/* Pairs of nodes and elements descend both hierarchies together (section 3.3, and the outlook of section 6). */
+/* Pairs of nodes and parts of the scene descend: the nodes alone (section 3.3), or both hierarchies together (the
+ * outlook of section 6). */
 #include "trace/rayspace/tracer.h"
 
 #include "gpu/program.h"
@@ -8,6 +9,7 @@
 #include "trace/program.h"
 
 #include <epoxy/gl.h>
+#include <math.h>
 #include <stddef.h>
 #include <stdio.h>
 
@@ -18,21 +20,115 @@
 /* See shaders/rayspace/control.comp: a pass of one pair leaves four more behind, at each of some hundred levels.
  */
 #define PAIRS_RESERVED (1u << 12)
-/* Leaves that are worth a dispatch, as a share of those that there is room for. */
-#define LEAVES_WANTED(capacity) ((capacity) / 2)
-/* Passes that are queued where the host does not wait: there are some forty levels in both hierarchies, and the
- * two stacks take turns. */
-#define PASSES_AHEAD 96u
+#define ITEMS_MAX (1u << 20) /* of a batch */
+#define ROUNDS 1u
+/* Where the host does not wait: passes that are queued for a round of the joint descent, whose two hierarchies
+ * have some forty levels; of a batch of the flat one beyond those of the rays; and of how many passes leaves are
+ * tested together. */
+#define PASSES_JOINT 64u
+#define PASSES_FLAT 16u
+#define PASSES_A_TEST 8u
+#define LEAVES_ALL 0u
+#define LEAVES_NONE UINT32_MAX
+
+bool rayspace_is_ahead(const struct rayspace_state *state)
+{
+    return state->base.wave.stopped && !state->base.patient;
+}
+
+static bool is_flat(const struct rayspace_state *state)
+{
+    return state->base.options.rayspace.mode == RAYSPACE_MODE_FLAT;
+}
+
+/* Passes of their own reduce the stream. */
+static bool leaves_slots(const struct rayspace_state *state)
+{
+    return state->base.options.rayspace.reduce != RAYSPACE_REDUCE_CHUNK;
+}
+
+static uint32_t rounds_of(const struct rayspace_state *state)
+{
+    const uint32_t rounds = state->base.options.rayspace.rounds;
+    return rounds ? rounds : ROUNDS;
+}
+
+static struct rayspace_roles roles_of(const struct rayspace_state *state)
+{
+    const uint32_t a = state->round % RAYSPACE_STACKS, b = (state->round + 1) % RAYSPACE_STACKS;
+    return (struct rayspace_roles){
+        .from = state->turn ? b : a, .to = state->turn ? a : b, .later = (state->round + 2) % RAYSPACE_STACKS};
+}
+
+/* What is farther from a node than this waits for the next round. */
+static float band_of(const struct rayspace_state *state, const struct gpu_scene *scene)
+{
+    const uint32_t rounds_left = rounds_of(state) - 1 - state->round;
+    return state->round + 1 >= rounds_of(state) ? 3e38f : ldexpf(scene->diagonal, -(int)rounds_left);
+}
 
 static const struct gpu_program *program_of(const struct gpu_scene *scene, const struct rayspace_state *state,
-                                            const char *compute, const struct gpu_define *own, struct error *error)
+                                            const char *compute, const char *stage, struct error *error)
 {
-    struct gpu_define defines[TRACE_WAVE_DEFINES + 6] = {0};
+    const struct rayspace_settings *settings = &state->base.options.rayspace;
+    struct gpu_define defines[TRACE_WAVE_DEFINES + 5] = {0};
     size_t n = trace_wave_defines(scene, &state->base.wave, defines);
-    for (; own && own->name; own++)
-        defines[n++] = *own;
+    if (stage)
+        defines[n++] = (struct gpu_define){stage, "1"};
+    if (settings->bounds == RAYSPACE_BOUNDS_SPHERE)
+        defines[n++] = (struct gpu_define){"RAYSPACE_SPHERES", "1"};
+    if (is_flat(state))
+        defines[n++] = (struct gpu_define){"RAYSPACE_FLAT", "1"};
+    if (leaves_slots(state))
+        defines[n++] = (struct gpu_define){"RAYSPACE_TO_SLOTS", "1"};
     return gpu_program_get(scene->device, &(struct gpu_program_source){.compute = compute, .defines = defines},
                            error);
+}
+
+/* ---- the beginning ---- */
+
+static uint32_t at_most(uint32_t number, uint32_t maximum)
+{
+    return number < maximum ? number : maximum;
+}
+
+static bool reserve(struct rayspace_state *state, struct gpu_device *device, struct error *error)
+{
+    const uint32_t rays = state->base.wave.ray_count;
+    const uint32_t wanted =
+        rays < PAIRS_MIN / PAIRS_A_RAY ? PAIRS_MIN : at_most(rays, PAIRS_MAX / PAIRS_A_RAY) * PAIRS_A_RAY;
+    state->capacity = state->base.options.bench.rayspace_pairs ? state->base.options.bench.rayspace_pairs : wanted;
+    state->leaves_capacity = state->capacity;
+    const size_t pair_bytes = (size_t)state->capacity * RAYSPACE_PAIR_BYTES;
+    bool good = true;
+    for (unsigned i = 0; i < RAYSPACE_STACKS && good; i++)
+        good = gpu_buffer_reserve(device, &state->stacks[i], pair_bytes, error);
+    if (is_flat(state))
+        good = good && gpu_buffer_reserve(device, &state->items,
+                                          (size_t)state->batch_max * RAYSPACE_ITEM_TEXELS * sizeof(vec4), error);
+    if (good && state->totals.size_bytes == 0) {
+        good = gpu_buffer_reserve(device, &state->totals, sizeof(struct rayspace_totals), error);
+        if (good)
+            gpu_buffer_clear(device, &state->totals, 0);
+    }
+    return good && gpu_buffer_reserve(device, &state->answers, (size_t)rays * RAYSPACE_ANSWER_BYTES, error) &&
+           gpu_buffer_reserve(device, &state->leaves, (size_t)state->leaves_capacity * RAYSPACE_PAIR_BYTES,
+                              error) &&
+           gpu_buffer_reserve(device, &state->control, sizeof(struct rayspace_control), error);
+}
+
+/* Pairs of a pass, and items of a batch. What was halved for the last waves of the family is taken halved. */
+static uint32_t batch_of(const struct rayspace_state *state, uint32_t maximum)
+{
+    const uint32_t wanted = state->base.options.rayspace.batch;
+    const uint32_t batch = at_most(wanted ? wanted : maximum, maximum) >> state->halved[state->base.wave.family];
+    return batch > 0 ? batch : 1;
+}
+
+static uint32_t pass_max(const struct rayspace_state *state, const struct gpu_device *device)
+{
+    const uint32_t pairs = batch_of(state, state->capacity);
+    return leaves_slots(state) ? rayspace_reduction_pairs(device, pairs) : pairs;
 }
 
 bool rayspace_descent_begin(struct rayspace *rayspace, struct gpu_scene *scene, struct rayspace_state *state,
@@ -40,51 +136,67 @@ bool rayspace_descent_begin(struct rayspace *rayspace, struct gpu_scene *scene, 
 {
     struct gpu_device *device = scene->device;
     const struct wave *wave = &state->base.wave;
-    const uint32_t rays = wave->ray_count;
-    state->levels = rayspace_levels_over(rays);
-    state->capacity = rays < PAIRS_MIN / PAIRS_A_RAY   ? PAIRS_MIN
-                      : rays < PAIRS_MAX / PAIRS_A_RAY ? PAIRS_A_RAY * rays
-                                                       : PAIRS_MAX;
-    state->leaves_capacity = state->capacity;
-    const size_t pair_bytes = (size_t)state->capacity * RAYSPACE_PAIR_BYTES;
-    if (!gpu_buffer_reserve(device, &state->answers, (size_t)rays * RAYSPACE_ANSWER_BYTES, error) ||
-        !gpu_buffer_reserve(device, &state->stacks[0], pair_bytes, error) ||
-        !gpu_buffer_reserve(device, &state->stacks[1], pair_bytes, error) ||
-        !gpu_buffer_reserve(device, &state->leaves, (size_t)state->leaves_capacity * RAYSPACE_PAIR_BYTES, error) ||
-        !gpu_buffer_reserve(device, &state->control, sizeof(struct rayspace_control), error))
+    state->levels = rayspace_levels_over(wave->ray_count);
+    state->batch_max = at_most(batch_of(state, ITEMS_MAX), rayspace->rank_count);
+    if (!reserve(state, device, error))
+        return false;
+    if (leaves_slots(state) &&
+        !rayspace_reduction_reserve(device, &state->reduction,
+                                    (enum rayspace_reduce)state->base.options.rayspace.reduce,
+                                    pass_max(state, device), error))
         return false;
     const uint32_t no_light_lost[4] = {0},
                    no_hit[4] = {UINT32_MAX, RAYSPACE_NO_RANK, UINT32_MAX, RAYSPACE_NO_RANK};
-    gpu_buffer_fill(device, &state->answers, 0, (size_t)rays * RAYSPACE_ANSWER_BYTES,
+    gpu_buffer_fill(device, &state->answers, 0, (size_t)wave->ray_count * RAYSPACE_ANSWER_BYTES,
                     wave->kind == WAVE_ANY ? no_light_lost : no_hit);
-    /* One pair: all rays, and all of the scene. */
-    const uint32_t root[4] = {state->levels.top << RAYSPACE_LEVEL_SHIFT, 0, RAYSPACE_TOP, 0};
-    const struct rayspace_control control = {
-        .waiting_0 = rayspace->tree.top.element_count > 0,
-        .limit = rayspace->base.options.rayspace.batch ? rayspace->base.options.rayspace.batch : state->capacity,
-    };
-    gpu_buffer_write(device, &state->stacks[0], 0, root, sizeof(root));
+    const struct rayspace_control control = {.limit = pass_max(state, device)};
     gpu_buffer_write(device, &state->control, 0, &control, sizeof(control));
-    state->from = 0;
-    return rayspace_nodes_build(state, scene, false, error);
+    state->round = state->next_rank = state->seeds = 0;
+    state->turn = false;
+    if (!is_flat(state) && rayspace->tree.top.element_count > 0) {
+        /* One pair: all rays, and all of the scene. */
+        const uint32_t root[4] = {state->levels.top << RAYSPACE_LEVEL_SHIFT, 0, RAYSPACE_TOP, 0};
+        gpu_buffer_write(device, &state->stacks[0], 0, root, sizeof(root));
+        state->seeds = 1;
+    }
+    return rayspace_order_rays(state, scene, error) && rayspace_nodes_build(state, scene, false, error);
 }
 
-static bool dispatch_control(const struct gpu_scene *scene, const struct rayspace *rayspace,
-                             struct rayspace_state *state, struct error *error)
+/* ---- passes ---- */
+
+/* What the control has come to the end of: as shaders/rayspace/control.comp has it. */
+enum end { END_OF_NOTHING, END_OF_BATCH, END_OF_WAVE };
+
+static bool dispatch_control(struct rayspace_state *state, const struct gpu_scene *scene, uint32_t leaves_wanted,
+                             enum end end, struct error *error)
 {
+    const struct wave *wave = &state->base.wave;
     const struct gpu_program *program =
         gpu_program_get(scene->device, &(struct gpu_program_source){.compute = "rayspace/control.comp"}, error);
-    const uint32_t batch = rayspace->base.options.rayspace.batch;
     if (!program)
         return false;
+    const struct rayspace_roles next = roles_of(state);
     gpu_buffer_bind_storage(&state->control, BIND_RAYSPACE_CONTROL);
-    gpu_uniform_uint(program, "from", state->from);
+    gpu_buffer_bind_storage(&state->totals, BIND_RAYSPACE_TOTALS);
+    if (wave->stopped)
+        gpu_buffer_bind_storage(wave->stopped, BIND_RAYSPACE_STOPPED);
+    gpu_uniform_uint(program, "last_from", state->last.from);
+    gpu_uniform_uint(program, "last_to", state->last.to);
+    gpu_uniform_uint(program, "last_later", state->last.later);
+    gpu_uniform_uint(program, "from", next.from);
+    gpu_uniform_uint(program, "to", next.to);
+    gpu_uniform_uint(program, "later", next.later);
     gpu_uniform_uint(program, "capacity", state->capacity);
     gpu_uniform_uint(program, "leaves_capacity", state->leaves_capacity);
-    gpu_uniform_uint(program, "leaves_wanted", LEAVES_WANTED(state->leaves_capacity));
-    gpu_uniform_uint(program, "limit_max", batch ? batch : state->capacity);
-    gpu_uniform_uint(program, "reserve", PAIRS_RESERVED);
+    gpu_uniform_uint(program, "leaves_wanted", leaves_wanted);
+    gpu_uniform_uint(program, "limit_max", pass_max(state, scene->device));
+    gpu_uniform_uint(program, "reserve", at_most(PAIRS_RESERVED, state->capacity / 4));
+    gpu_uniform_float(program, "band", band_of(state, scene));
+    gpu_uniform_uint(program, "seeds", state->seeds);
+    gpu_uniform_uint(program, "ends", end);
+    gpu_uniform_uint(program, "stopped_word", rayspace_is_ahead(state) ? wave->stopped_word : UINT32_MAX);
     gpu_dispatch(scene->device, program, 1);
+    state->seeds = 0;
     return true;
 }
 
@@ -92,9 +204,12 @@ static void bind_wave(struct gpu_scene *scene, struct rayspace *rayspace, struct
                       const struct gpu_program *program)
 {
     const struct wave *wave = &state->base.wave;
+    struct gpu_device *device = scene->device;
     trace_bind_rays(scene, wave);
     scene_tree_bind(&rayspace->tree);
-    gpu_buffer_bind_texels(scene->device, &rayspace->ranks, UNIT_RAYSPACE_RANKS, GL_R32UI);
+    gpu_buffer_bind_texels(device, &rayspace->ranks, UNIT_RAYSPACE_RANKS, GL_R32UI);
+    gpu_buffer_bind_texels(device, &state->items, UNIT_RAYSPACE_ITEMS, GL_RGBA32UI);
+    gpu_buffer_bind_texels(device, &state->order, UNIT_RAYSPACE_ORDER, GL_R32UI);
     gpu_buffer_bind_storage(&state->control, BIND_RAYSPACE_CONTROL);
     gpu_buffer_bind_storage(&state->leaves, BIND_RAYSPACE_LEAVES);
     gpu_buffer_bind_storage(&state->answers, BIND_RAYSPACE_ANSWERS);
@@ -102,16 +217,16 @@ static void bind_wave(struct gpu_scene *scene, struct rayspace *rayspace, struct
         gpu_buffer_bind_storage(wave->counts, BIND_WAVE);
     gpu_uniform_uint(program, "counts_index", wave->counts_index);
     gpu_uniform_uint(program, "ray_count", wave->ray_count);
+    gpu_uniform_uint(program, "instance_count", scene->instance_count);
 }
 
-static bool dispatch_leaves(struct gpu_scene *scene, struct rayspace *rayspace, struct rayspace_state *state,
+static bool dispatch_leaves(struct rayspace *rayspace, struct gpu_scene *scene, struct rayspace_state *state,
                             struct error *error)
 {
     static const char *const stages[] = {"LEAVES_TEST", "LEAVES_RANK", "LEAVES_SETTLE"};
     const unsigned count = state->base.wave.kind == WAVE_ANY ? 1 : 3;
     for (unsigned i = 0; i < count; i++) {
-        const struct gpu_define own[] = {{stages[i], "1"}, {0}};
-        const struct gpu_program *program = program_of(scene, state, "rayspace/leaves.comp", own, error);
+        const struct gpu_program *program = program_of(scene, state, "rayspace/leaves.comp", stages[i], error);
         if (!program)
             return false;
         bind_wave(scene, rayspace, state, program);
@@ -120,36 +235,106 @@ static bool dispatch_leaves(struct gpu_scene *scene, struct rayspace *rayspace, 
     return true;
 }
 
-static bool dispatch_pass(struct gpu_scene *scene, struct rayspace *rayspace, struct rayspace_state *state,
-                          struct error *error)
+static void set_tree(const struct gpu_program *program, const struct scene_tree *tree)
 {
-    const struct scene_tree *tree = &rayspace->tree;
-    const bool packed = bvh_is_packed(&tree->store.settings);
-    const struct gpu_define own[] = {{packed ? "RAYSPACE_PACKED" : NULL, "1"}, {0}};
-    const struct gpu_program *program = program_of(scene, state, "rayspace/descend.comp", own, error);
-    if (!program)
-        return false;
-    bind_wave(scene, rayspace, state, program);
-    gpu_buffer_bind_texels(scene->device, &state->nodes, UNIT_RAYSPACE_NODES, GL_RGBA32F);
-    gpu_buffer_bind_texels(scene->device, &state->stacks[state->from], UNIT_RAYSPACE_PAIRS, GL_RGBA32UI);
-    gpu_buffer_bind_storage(&state->stacks[1 - state->from], BIND_RAYSPACE_PAIRS);
     gpu_uniform_uint(program, "top_count", tree->top.element_count);
-    if (packed) {
+    if (bvh_is_packed(&tree->store.settings)) {
         float cell[3];
         for (int axis = 0; axis < 3; axis++)
             cell[axis] = 1 / tree->top.grid.cells_per_unit[axis];
         gpu_uniform_vec(program, "top_grid_lower", 3, tree->top.grid.lower);
         gpu_uniform_vec(program, "top_cell", 3, cell);
     }
-    for (uint32_t level = 0; level <= state->levels.top; level++) {
+}
+
+static void set_levels(const struct gpu_program *program, const struct rayspace_levels *levels)
+{
+    for (uint32_t level = 0; level <= levels->top; level++) {
         char name[24];
         snprintf(name, sizeof(name), "level_first[%u]", level);
-        gpu_uniform_uint(program, name, state->levels.first[level]);
+        gpu_uniform_uint(program, name, levels->first[level]);
         snprintf(name, sizeof(name), "level_count[%u]", level);
-        gpu_uniform_uint(program, name, state->levels.count[level]);
+        gpu_uniform_uint(program, name, levels->count[level]);
     }
+}
+
+static bool dispatch_pass(struct rayspace *rayspace, struct gpu_scene *scene, struct rayspace_state *state,
+                          struct error *error)
+{
+    const bool packed = !is_flat(state) && bvh_is_packed(&rayspace->tree.store.settings);
+    const struct gpu_program *program =
+        program_of(scene, state, "rayspace/descend.comp", packed ? "RAYSPACE_PACKED" : NULL, error);
+    if (!program)
+        return false;
+    const struct rayspace_roles roles = roles_of(state);
+    bind_wave(scene, rayspace, state, program);
+    gpu_buffer_bind_texels(scene->device, &state->nodes, UNIT_RAYSPACE_NODES, GL_RGBA32F);
+    gpu_buffer_bind_texels(scene->device, &state->stacks[roles.from], UNIT_RAYSPACE_PAIRS, GL_RGBA32UI);
+    gpu_buffer_bind_storage(leaves_slots(state) ? &state->reduction.slots : &state->stacks[roles.to],
+                            BIND_RAYSPACE_PAIRS);
+    gpu_buffer_bind_storage(&state->stacks[roles.later], BIND_RAYSPACE_PUT_OFF);
+    gpu_uniform_uint(program, "to", roles.to);
+    gpu_uniform_uint(program, "later", roles.later);
+    set_tree(program, &rayspace->tree);
+    set_levels(program, &state->levels);
     gpu_dispatch_indirect(program, &state->control, offsetof(struct rayspace_control, pass_groups_x));
+    const struct rayspace_lists lists = {.control = &state->control,
+                                         .pairs = &state->stacks[roles.to],
+                                         .leaves = &state->leaves,
+                                         .put_off = &state->stacks[roles.later],
+                                         .to = roles.to,
+                                         .later = roles.later};
+    return !leaves_slots(state) || rayspace_reduction_run(scene->device, &state->reduction, &lists, error);
+}
+
+static void next_pass(struct rayspace_state *state)
+{
+    state->last = roles_of(state);
+    state->turn = !state->turn;
+}
+
+/* Rays end at what they have hit, and what was far away has its turn. */
+static bool next_round(struct gpu_scene *scene, struct rayspace_state *state, struct error *error)
+{
+    state->round++;
+    state->turn = false;
+    return rayspace_nodes_build(state, scene, true, error);
+}
+
+/* The next primitives against the root. */
+static bool next_batch(struct rayspace *rayspace, struct gpu_scene *scene, struct rayspace_state *state,
+                       struct error *error)
+{
+    const struct gpu_program *program = program_of(scene, state, "rayspace/items.comp", NULL, error);
+    if (!program)
+        return false;
+    state->round = 0;
+    state->turn = false;
+    state->seeds = at_most(rayspace->rank_count - state->next_rank, state->batch_max);
+    gpu_buffer_bind_texels(scene->device, &rayspace->ranks, UNIT_RAYSPACE_RANKS, GL_R32UI);
+    gpu_buffer_bind_storage(&state->items, BIND_RAYSPACE_ITEMS);
+    gpu_buffer_bind_storage(&state->stacks[roles_of(state).from], BIND_RAYSPACE_PAIRS);
+    gpu_uniform_uint(program, "instance_count", scene->instance_count);
+    gpu_uniform_uint(program, "batch_first", state->next_rank);
+    gpu_uniform_uint(program, "batch_count", state->seeds);
+    gpu_uniform_uint(program, "root", state->levels.top << RAYSPACE_LEVEL_SHIFT);
+    gpu_dispatch(scene->device, program, state->seeds);
+    state->next_rank += state->seeds;
     return true;
+}
+
+static bool has_more_batches(const struct rayspace *rayspace, const struct rayspace_state *state)
+{
+    return is_flat(state) && state->next_rank < rayspace->rank_count;
+}
+
+/* ---- with the host ---- */
+
+static bool is_empty(const struct rayspace_control *control, const struct rayspace_state *state)
+{
+    const uint32_t waiting[RAYSPACE_STACKS] = {control->waiting_0, control->waiting_1, control->waiting_2};
+    const struct rayspace_roles roles = roles_of(state);
+    return waiting[roles.from] + waiting[roles.to] + control->leaves == 0;
 }
 
 /* Until about that time. The host waits for each pass, and leaves out what there is none of. */
@@ -157,29 +342,95 @@ static enum tracer_progress descend_waiting(struct rayspace *rayspace, struct gp
                                             struct rayspace_state *state, uint64_t step_end_ns,
                                             struct error *error)
 {
+    struct rayspace_control *control = &state->told;
     for (;;) {
-        struct rayspace_control *control = &state->told;
-        if (!dispatch_control(scene, rayspace, state, error))
+        if (!dispatch_control(state, scene, state->leaves_capacity / 2, END_OF_NOTHING, error))
             return TRACER_FAILED;
         gpu_buffer_read(scene->device, &state->control, 0, control, sizeof(*control));
         if (scene->device->lost)
             return tracer_progress_of(gpu_check(scene->device, "tracing", error));
-        if (control->leaves_taken > 0 && !dispatch_leaves(scene, rayspace, state, error))
+        if (control->leaves_taken > 0 && !dispatch_leaves(rayspace, scene, state, error))
             return TRACER_FAILED;
-        if (control->taken > 0 && !dispatch_pass(scene, rayspace, state, error))
+        if (control->taken > 0 && !dispatch_pass(rayspace, scene, state, error))
             return TRACER_FAILED;
-        state->from = 1 - state->from;
-        if (control->waiting_0 + control->waiting_1 + control->leaves == 0)
-            return TRACER_DONE;
-        if (step_is_over(step_end_ns))
-            return TRACER_MORE;
+        const bool empty = is_empty(control, state);
+        next_pass(state);
+        if (!empty) {
+            if (step_is_over(step_end_ns))
+                return TRACER_MORE;
+        } else if (control->waiting_0 + control->waiting_1 + control->waiting_2 > 0) {
+            if (!next_round(scene, state, error))
+                return TRACER_FAILED;
+        } else if (has_more_batches(rayspace, state)) {
+            if (!next_batch(rayspace, scene, state, error))
+                return TRACER_FAILED;
+        } else {
+            return tracer_progress_of(dispatch_control(state, scene, LEAVES_ALL, END_OF_WAVE, error));
+        }
     }
+}
+
+/* The paper's rule: what did not fit is halved for the next frame; what would fit twice is doubled again. */
+static void learn(struct rayspace_state *state)
+{
+    uint8_t *halved = &state->halved[state->base.wave.family];
+    if (state->told.halvings > 0 && *halved < 20)
+        ++*halved;
+    else if (*halved > 0 && state->told.pairs_max < state->capacity / 4)
+        --*halved;
+}
+
+/* ---- without it ---- */
+
+static bool queue_passes(struct rayspace *rayspace, struct gpu_scene *scene, struct rayspace_state *state,
+                         uint32_t passes, struct error *error)
+{
+    for (uint32_t i = 0; i < passes; i++) {
+        const bool tests = i % PASSES_A_TEST == PASSES_A_TEST - 1;
+        if (!dispatch_control(state, scene, tests ? LEAVES_ALL : LEAVES_NONE, END_OF_NOTHING, error) ||
+            (tests && !dispatch_leaves(rayspace, scene, state, error)) ||
+            !dispatch_pass(rayspace, scene, state, error))
+            return false;
+        next_pass(state);
+    }
+    return true;
+}
+
+/* What is left of a batch when its passes are over stops the slice: the wave is traced again by a patient state.
+ */
+static bool descend_ahead(struct rayspace *rayspace, struct gpu_scene *scene, struct rayspace_state *state,
+                          struct error *error)
+{
+    const uint32_t passes = is_flat(state) ? state->levels.top + PASSES_FLAT : PASSES_JOINT;
+    do {
+        if (is_flat(state) && has_more_batches(rayspace, state) && !next_batch(rayspace, scene, state, error))
+            return false;
+        for (;;) {
+            if (!queue_passes(rayspace, scene, state, passes, error))
+                return false;
+            if (state->round + 1 >= rounds_of(state))
+                break;
+            if (!dispatch_control(state, scene, LEAVES_ALL, END_OF_NOTHING, error) ||
+                !dispatch_leaves(rayspace, scene, state, error) || !next_round(scene, state, error))
+                return false;
+        }
+        const enum end end = has_more_batches(rayspace, state) ? END_OF_BATCH : END_OF_WAVE;
+        if (!dispatch_control(state, scene, LEAVES_ALL, end, error) ||
+            !dispatch_leaves(rayspace, scene, state, error))
+            return false;
+    } while (has_more_batches(rayspace, state));
+    return true;
 }
 
 enum tracer_progress rayspace_descent_step(struct rayspace *rayspace, struct gpu_scene *scene,
                                            struct rayspace_state *state, uint64_t step_end_ns, struct error *error)
 {
-    return descend_waiting(rayspace, scene, state, step_end_ns, error);
+    if (rayspace_is_ahead(state))
+        return tracer_progress_of(descend_ahead(rayspace, scene, state, error));
+    const enum tracer_progress progress = descend_waiting(rayspace, scene, state, step_end_ns, error);
+    if (progress == TRACER_DONE)
+        learn(state);
+    return progress;
 }
 
 bool rayspace_descent_finish(struct rayspace *rayspace, struct gpu_scene *scene, struct rayspace_state *state,

@@ -49,7 +49,9 @@ bool rayspace_nodes_build(struct rayspace_state *state, struct gpu_scene *scene,
         trace_bind_rays(scene, wave);
         gpu_buffer_bind_texels(device, &state->nodes, UNIT_RAYSPACE_NODES, GL_RGBA32F);
         gpu_buffer_bind_storage(&state->nodes, BIND_RAYSPACE_NODES);
+        gpu_buffer_bind_texels(device, &state->order, UNIT_RAYSPACE_ORDER, GL_R32UI);
         gpu_buffer_bind_storage(&state->answers, BIND_RAYSPACE_ANSWERS);
+        gpu_buffer_bind_storage(&state->control, BIND_RAYSPACE_CONTROL);
         if (wave->counts)
             gpu_buffer_bind_storage(wave->counts, BIND_WAVE);
         gpu_uniform_uint(program, "counts_index", wave->counts_index);

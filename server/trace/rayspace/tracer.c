@@ -44,6 +44,7 @@ static bool upload_ranks(struct rayspace *rayspace, const struct gpu_scene *scen
         if (rank >= RAYSPACE_NO_RANK)
             break;
     }
+    rayspace->rank_count = (uint32_t)rank;
     const size_t bytes = scene->instance_count * sizeof(*ranks);
     bool good = rank < RAYSPACE_NO_RANK;
     if (!good) {
@@ -61,7 +62,9 @@ static enum tracer_progress rayspace_update(struct tracer *tracer, struct gpu_sc
                                             const struct tracer_update *update, struct error *error)
 {
     struct rayspace *rayspace = (struct rayspace *)tracer;
-    enum tracer_progress progress = scene_tree_update(&rayspace->tree, scene, update, tracer->step_end_ns, error);
+    enum tracer_progress progress = TRACER_DONE;
+    if (tracer->options.rayspace.mode == RAYSPACE_MODE_JOINT)
+        progress = scene_tree_update(&rayspace->tree, scene, update, tracer->step_end_ns, error);
     if (progress == TRACER_DONE && update->changed & (CHANGED_GEOMETRY | CHANGED_INSTANCES) &&
         !upload_ranks(rayspace, scene, error))
         progress = TRACER_FAILED;
@@ -100,18 +103,28 @@ static void rayspace_state_destroy(struct trace_state *state)
     struct rayspace_state *own = (struct rayspace_state *)state;
     gpu_buffer_finish(state->device, &own->nodes);
     gpu_buffer_finish(state->device, &own->answers);
-    gpu_buffer_finish(state->device, &own->stacks[0]);
-    gpu_buffer_finish(state->device, &own->stacks[1]);
+    for (unsigned i = 0; i < RAYSPACE_STACKS; i++)
+        gpu_buffer_finish(state->device, &own->stacks[i]);
     gpu_buffer_finish(state->device, &own->leaves);
     gpu_buffer_finish(state->device, &own->control);
+    rayspace_reduction_finish(state->device, &own->reduction);
+    gpu_buffer_finish(state->device, &own->totals);
+    gpu_buffer_finish(state->device, &own->order);
+    gpu_buffer_finish(state->device, &own->bins);
+    gpu_buffer_finish(state->device, &own->items);
     free(own);
 }
 
 static uint64_t rayspace_state_bytes(const struct trace_state *state)
 {
     const struct rayspace_state *own = (const struct rayspace_state *)state;
-    return own->nodes.capacity_bytes + own->answers.capacity_bytes + own->stacks[0].capacity_bytes +
-           own->stacks[1].capacity_bytes + own->leaves.capacity_bytes + own->control.capacity_bytes;
+    uint64_t bytes = own->nodes.capacity_bytes + own->answers.capacity_bytes + own->leaves.capacity_bytes +
+                     own->control.capacity_bytes + own->totals.capacity_bytes + own->order.capacity_bytes +
+                     own->bins.capacity_bytes + own->items.capacity_bytes +
+                     rayspace_reduction_bytes(&own->reduction);
+    for (unsigned i = 0; i < RAYSPACE_STACKS; i++)
+        bytes += own->stacks[i].capacity_bytes;
+    return bytes;
 }
 
 static bool rayspace_trace_begin(struct tracer *tracer, struct gpu_scene *scene, struct trace_state *state,

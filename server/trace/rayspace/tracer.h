@@ -5,13 +5,15 @@
 #define FARLIGHT_TRACE_RAYSPACE_TRACER_H
 
 #include "rayspace/layout.h"
+#include "trace/rayspace/reduce.h"
 #include "trace/tracer.h"
 #include "trace/tree/tree.h"
 
 struct rayspace {
     struct tracer base;
-    struct scene_tree tree;
+    struct scene_tree tree;  /* empty in the flat mode */
     struct gpu_buffer ranks; /* of each instance: its first primitive's */
+    uint32_t rank_count;
 };
 
 /* Where the nodes of each level lie; those of level 0 are the rays. */
@@ -20,20 +22,40 @@ struct rayspace_levels {
     uint32_t first[RAYSPACE_LEVELS], count[RAYSPACE_LEVELS];
 };
 
+/* A stack has another part in every round: pairs go to and fro between two, and from both onto the third. */
+struct rayspace_roles {
+    uint32_t from, to, later;
+};
+
 /* Of one wave. */
 struct rayspace_state {
     struct trace_state base;
     struct rayspace_levels levels;
-    struct gpu_buffer nodes, answers, stacks[2], leaves, control;
+    struct gpu_buffer nodes, answers, stacks[RAYSPACE_STACKS], leaves, control, totals;
+    struct gpu_buffer order, bins;      /* of the sort */
+    struct gpu_buffer items;            /* of the flat descent: of the batch in hand */
     uint32_t capacity, leaves_capacity; /* pairs */
-    uint32_t from;                      /* the stack that the next pass takes from */
-    struct rayspace_control told;       /* as the host has last seen it */
+    struct rayspace_reduction reduction;
+    uint32_t batch_max; /* items */
+    uint32_t next_rank; /* the first primitive of the next batch */
+    uint32_t seeds;     /* pairs that were put onto the stack of the next pass */
+    uint32_t round;
+    bool turn;                    /* from the second stack onto the first */
+    struct rayspace_roles last;   /* of the last pass */
+    struct rayspace_control told; /* as the host has last seen it */
+    /* Halvings of the batch that the last waves of a family needed. */
+    uint8_t halved[WAVE_FAMILIES];
 };
 
 /* Levels over so many rays. */
 struct rayspace_levels rayspace_levels_over(uint32_t ray_count);
 /* Reserves the nodes, and builds them. `ends`: only how far rays go on. */
 bool rayspace_nodes_build(struct rayspace_state *state, struct gpu_scene *scene, bool ends, struct error *error);
+/* Decides whether the rays are sorted and turned round, and sorts them. The control is there. */
+bool rayspace_order_rays(struct rayspace_state *state, struct gpu_scene *scene, struct error *error);
+
+/* Whether all of a wave is queued without the host seeing how far it has come. */
+bool rayspace_is_ahead(const struct rayspace_state *state);
 /* Sets the descent to its beginning; passes until about that time, or all; the answers to the wave's hits. */
 bool rayspace_descent_begin(struct rayspace *rayspace, struct gpu_scene *scene, struct rayspace_state *state,
                             struct error *error);

@@ -354,7 +354,7 @@ static const char probe_text[] =
     "#include \"rayspace/place.glsl\"\n"
     "layout(binding = UNIT_RAYSPACE_NODES) uniform samplerBuffer nodes;\n"
     "layout(std430, binding = BIND_RAYSPACE_PAIRS) readonly buffer element_block { vec4 elements[]; };\n"
-    "layout(std430, binding = BIND_RAYSPACE_CONTROL) writeonly buffer met_block { uint met[]; };\n"
+    "layout(std430, binding = BIND_RAYSPACE_LEAVES) writeonly buffer met_block { uint met[]; };\n"
     "uniform uint node_count, element_count;\n"
     "bundle bundle_at(uint node)\n"
     "{\n"
@@ -405,6 +405,8 @@ static void run_init(struct run *run)
     expect_ok(gpu_buffer_reserve(device, &run->state.answers, answer_bytes, &error) &&
                   gpu_buffer_reserve(device, &run->met, pairs * sizeof(*run->words), &error),
               &error);
+    const struct rayspace_control control = {0}; /* neither sorted nor turned round */
+    expect_ok(gpu_buffer_upload(device, &run->state.control, &control, sizeof(control), &error), &error);
     const uint32_t no_hit[4] = {UINT32_MAX, RAYSPACE_NO_RANK, UINT32_MAX, RAYSPACE_NO_RANK};
     gpu_buffer_fill(device, &run->state.answers, 0, answer_bytes, no_hit);
 }
@@ -412,6 +414,7 @@ static void run_init(struct run *run)
 static void run_finish(struct run *run)
 {
     gpu_buffer_finish(device, &run->state.answers);
+    gpu_buffer_finish(device, &run->state.control);
     gpu_buffer_finish(device, &run->state.nodes);
     gpu_buffer_finish(device, &run->rays);
     gpu_buffer_finish(device, &run->elements);
@@ -441,7 +444,8 @@ static void run_case(struct run *run, const struct fuzz *fuzz)
     gpu_buffer_bind_texels(device, &run->state.nodes, UNIT_RAYSPACE_NODES, GL_RGBA32F);
     gpu_buffer_bind_storage(&run->state.answers, BIND_RAYSPACE_ANSWERS);
     gpu_buffer_bind_storage(&run->elements, BIND_RAYSPACE_PAIRS);
-    gpu_buffer_bind_storage(&run->met, BIND_RAYSPACE_CONTROL);
+    gpu_buffer_bind_storage(&run->met, BIND_RAYSPACE_LEAVES);
+    gpu_buffer_bind_storage(&run->state.control, BIND_RAYSPACE_CONTROL);
     gpu_uniform_uint(&run->program, "ray_count", RAYS);
     gpu_uniform_uint(&run->program, "node_count", run->node_count);
     gpu_uniform_uint(&run->program, "element_count", ELEMENTS);

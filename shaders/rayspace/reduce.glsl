@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: MIT
+// The slots of the pass in hand. A work group has the segments of RAYSPACE_CHUNK_SLOTS x 64 slots, which are those of a
+// work group of the descent.
+#include "common/dispatch.glsl"
+#include "rayspace/control.glsl"
+#include "rayspace/reduce.h"
+
+const uint GROUP_SEGMENTS = RAYSPACE_CHUNK_SLOTS * 64u / RAYSPACE_SEGMENT;
+
+uint slot_count()
+{
+    return (control.taken + RAYSPACE_CHUNK - 1u) / RAYSPACE_CHUNK * RAYSPACE_CHUNK_SLOTS;
+}
+
+uint first_segment()
+{
+    return (gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * GROUP_SEGMENTS;
+}
+
+// Of a slot that is not empty.
+uint list_of(uint last)
+{
+    if (last == RAYSPACE_SLOT_LEAF)
+        return RAYSPACE_LIST_LEAVES;
+    return (last & RAYSPACE_AGAIN) != 0u ? RAYSPACE_LIST_PUT_OFF : RAYSPACE_LIST_PAIRS;
+}
+
+// How many of a list are in a segment.
+uint count_in(uint counts, uint list)
+{
+    return counts >> list * RAYSPACE_COUNT_BITS & RAYSPACE_COUNT_MASK;
+}

@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: MIT
+// Sorts the rays of a wave by cells of origin and direction, whose bits are interleaved (a Morton code in five
+// dimensions). In a cell the order is by chance: no answer depends on it.
+//
+// Defines: SORT_COUNT how many rays each bin has; SORT_SCAN where each begins, by one group; SORT_PLACE rays to places.
+#ifdef SORT_SCAN
+#define GROUP_SIZE 256
+#endif
+#include "common/dispatch.glsl"
+#include "common/range.glsl"
+#include "rayspace/control.glsl"
+#include "rayspace/ray.glsl"
+
+layout(std430, binding = BIND_RAYSPACE_BINS) buffer bin_block { uint bins[]; };
+layout(std430, binding = BIND_RAYSPACE_ORDER) writeonly buffer order_block { uint order_written[]; };
+
+uniform vec3 lower_world, cells_per_metre;
+uniform uint bin_shift; // low bits that bins leave out: few rays have few bins
+
+#ifdef SORT_SCAN
+
+shared uint sums[GROUP_SIZE];
+
+void main()
+{
+    uint own = gl_LocalInvocationIndex, sum = 0u, each = (RAYSPACE_BINS >> bin_shift) / GROUP_SIZE;
+    if (control.sorted == 0u)
+        return;
+    for (uint i = 0u; i < each; i++)
+        sum += bins[own * each + i];
+    sums[own] = sum;
+    barrier();
+    uint before = 0u;
+    for (uint k = 0u; k < own; k++)
+        before += sums[k];
+    for (uint i = 0u; i < each; i++) {
+        uint count = bins[own * each + i];
+        bins[own * each + i] = before;
+        before += count;
+    }
+}
+
+#else
+
+uint spread(uint value, uint bits, uint stride)
+{
+    uint out_ = 0u;
+    for (uint i = 0u; i < bits; i++)
+        out_ |= (value >> i & 1u) << (i * stride);
+    return out_;
+}
+
+// Bits from the highest: in turn x, y, z and, while there are any, of the octahedron's u and v.
+uint bin_of(live_ray r)
+{
+    uvec3 p = uvec3(clamp((r.origin - lower_world) * cells_per_metre, 0.0, float((1u << RAYSPACE_POSITION_BITS) - 1u)));
+    vec3 d = r.direction;
+    vec2 uv = d.xy / (abs(d.x) + abs(d.y) + abs(d.z));
+    if (d.z < 0.0)
+        uv = (1.0 - abs(uv.yx)) * mix(vec2(-1.0), vec2(1.0), greaterThanEqual(uv, vec2(0.0)));
+    uvec2 q = uvec2(clamp((uv * 0.5 + 0.5) * float(1u << RAYSPACE_DIRECTION_BITS), 0.0,
+                          float((1u << RAYSPACE_DIRECTION_BITS) - 1u)));
+    uint low = spread(p.x & 7u, 3u, 5u) | spread(p.y & 7u, 3u, 5u) << 1 | spread(p.z & 7u, 3u, 5u) << 2 |
+               spread(q.x, 3u, 5u) << 3 | spread(q.y, 3u, 5u) << 4;
+    return low | (p.x >> 3) << 15 | (p.y >> 3) << 16 | (p.z >> 3) << 17;
+}
+
+void main()
+{
+    uint ray = item_index();
+    if (ray >= ray_count)
+        return;
+    // Those behind the wave's end, whose number only the device knows, are dead and stay at the end.
+    uint bin = (RAYSPACE_BINS >> bin_shift) - 1u;
+    if (ray < ray_end) {
+        vec4 origin_t_min = texelFetch(rays, int(2u * ray)), direction_t_max = texelFetch(rays, int(2u * ray + 1u));
+        live_ray r = live_ray_of(origin_t_min, direction_t_max, direction_t_max.w);
+        if (r.end >= 0.0)
+            bin = bin_of(r) >> bin_shift;
+    }
+#ifdef SORT_COUNT
+    atomicAdd(bins[bin], 1u);
+#else
+    order_written[atomicAdd(bins[bin], 1u)] = ray;
+#endif
+}
+
+#endif
