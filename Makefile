@@ -184,8 +184,8 @@ $(B)/shader_sources.c: shaders/embed.sh $(addprefix shaders/,$(SHADERS)) Makefil
 $(B)/shader_sources.o: $(B)/shader_sources.c
 	$(call say,CC)$(CC) $(CPPFLAGS_ALL) $(INCLUDES) $(OPT) $(CFLAGS_ALL) $(WARN_C) -c $< -o $@
 
-# Programs that measure or test the rival of tests/bench/svo have its shaders too.
-RIVAL_SHADERS := $(patsubst tests/bench/%,%,$(call sources,tests/bench/svo,h glsl comp frag))
+# Programs that measure or test rivals have their shaders too.
+RIVAL_SHADERS := $(patsubst tests/bench/%,%,$(call sources,tests/bench/svo tests/bench/reduce,h glsl comp frag))
 $(B)/tests/bench/shader_sources.c: shaders/embed.sh $(addprefix shaders/,$(SHADERS)) $(addprefix tests/bench/,$(RIVAL_SHADERS)) Makefile
 	@mkdir -p $(@D)
 	shaders/embed.sh $(CURDIR)/shaders $(SHADERS) -- $(CURDIR)/tests/bench $(RIVAL_SHADERS) >$@.new && mv $@.new $@
