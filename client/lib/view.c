@@ -80,6 +80,7 @@ static bool ask(struct fl_view *view, const struct message_render *wanted, struc
     struct message message = {.type = MESSAGE_RENDER, .render = *wanted};
     struct message_render *render = &message.render;
     fill_render(render, view);
+    fl_connection_fit_render(view->connection, render);
     struct asked *asked = &view->asked[view->asked_count];
     asked->request = fl_connection_next_request(view->connection);
     asked->change = view->changes;

@@ -37,17 +37,17 @@ static void print_limits(void)
 
 static void print_capabilities(void)
 {
-    printf(
-        "Capabilities are bits; all others are 0:\n\n"
-        "| bit | meaning |\n| ---: | --- |\n"
-        "| %d | of a client: it decodes the encoding h264; of a reply: the daemon encodes it, too |\n"
-        "| %d | of a reply: this client may only look, and change nothing |\n"
-        "| %d | of a reply of version 0: only sealed connections are accepted |\n"
-        "| %d | of a reply of version 0: there may be a place later |\n"
-        "| %d | of a client: frames of views may end unfinished, as `frame_end` says; of a reply: they will |\n\n",
-        __builtin_ctzll(HANDSHAKE_CAN_H264), __builtin_ctzll(HANDSHAKE_CAN_READ_ONLY),
-        __builtin_ctzll(HANDSHAKE_NEEDS_KEY), __builtin_ctzll(HANDSHAKE_TRY_AGAIN),
-        __builtin_ctzll(HANDSHAKE_CAN_ABANDON));
+    printf("Capabilities are bits; all others are 0:\n\n"
+           "| bit | meaning |\n| ---: | --- |\n"
+           "| %d | of a client: it decodes the encoding h264; of a reply: the daemon encodes it, too |\n"
+           "| %d | of a reply: this client may only look, and change nothing |\n"
+           "| %d | of a reply of version 0: only sealed connections are accepted |\n"
+           "| %d | of a reply of version 0: there may be a place later |\n"
+           "| %d | of a client: frames of views may end unfinished, as `frame_end` says; of a reply: they will |\n"
+           "| %d | `auto` of `primary` is known; without it in the reply, `auto` is refused by the daemon |\n\n",
+           __builtin_ctzll(HANDSHAKE_CAN_H264), __builtin_ctzll(HANDSHAKE_CAN_READ_ONLY),
+           __builtin_ctzll(HANDSHAKE_NEEDS_KEY), __builtin_ctzll(HANDSHAKE_TRY_AGAIN),
+           __builtin_ctzll(HANDSHAKE_CAN_ABANDON), __builtin_ctzll(HANDSHAKE_CAN_CHOOSE_PRIMARY));
 }
 
 static void print_handshake(void)

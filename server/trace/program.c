@@ -11,6 +11,13 @@
 #define OWN_DEFINES_MAX 12
 #define SURFACE_DEFINES_MAX 5
 
+/* A multiple of all packets' sizes. */
+#define DISPATCH_RAYS_MIN 192u
+/* Fills any GPU; more at once only nears the time after which a driver ends a dispatch. */
+#define DISPATCH_RAYS_MAX ((1u << 18) / DISPATCH_RAYS_MIN * DISPATCH_RAYS_MIN)
+/* Seconds of a slow GPU, if every ray took all of its rounds: a thousandth of them is usual. */
+#define DISPATCH_ROUNDS_MAX ((uint64_t)1 << 35)
+
 /* Rays at the time 0 see the first pose, as does a program without motion. */
 static bool has_motion(const struct gpu_scene *scene, const struct wave *wave)
 {
@@ -87,6 +94,15 @@ const struct gpu_program *trace_program_get(const struct gpu_scene *scene, const
         defines[n++] = source->defines[i];
     struct gpu_program_source whole = {.compute = "trace/wave.comp", .defines = defines};
     return gpu_program_get(scene->device, &whole, error);
+}
+
+uint32_t trace_rays_a_dispatch(const struct gpu_device *device, uint64_t rounds_of_a_ray)
+{
+    if (device->facts.software) /* traces short ranges, and no driver ends them */
+        return 0;
+    const uint64_t fitting = DISPATCH_ROUNDS_MAX / (rounds_of_a_ray + 1) / DISPATCH_RAYS_MIN * DISPATCH_RAYS_MIN;
+    const uint64_t some = fitting < DISPATCH_RAYS_MAX ? fitting : DISPATCH_RAYS_MAX;
+    return some > DISPATCH_RAYS_MIN ? (uint32_t)some : DISPATCH_RAYS_MIN;
 }
 
 void trace_program_run(const struct gpu_program *program, const struct gpu_scene *scene,

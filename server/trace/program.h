@@ -35,6 +35,10 @@ void trace_bind_rays(const struct gpu_scene *scene, const struct wave *wave);
  * trace_program_run. */
 const struct gpu_program *trace_program_get(const struct gpu_scene *scene, const struct wave *wave,
                                             const struct trace_program_source *source, struct error *error);
+/* How many rays a dispatch may have, for trace_program_source, of a traversal whose rays take no more rounds of
+ * its loops than that: all but of the densest of structures as many as fill any GPU. Even then its driver has no
+ * reason to end it. */
+uint32_t trace_rays_a_dispatch(const struct gpu_device *device, uint64_t rounds_of_a_ray);
 /* Binds the wave's buffers, sets `first_ray`, `ray_count`, `disc_count` and `instance_count`, and dispatches: the
  * rays of the range get their intersections or visibilities. The scene's buffers and the tracer's own are bound
  * already. */

@@ -5,6 +5,7 @@
 // Defines: HAS_SPHERES, HAS_DISCS as the scene has them; those of common/range.glsl.
 #include "common/dispatch.glsl"
 #include "common/range.glsl"
+#include "common/surface.glsl"
 #include "abuffer/sample_primitive.glsl"
 
 layout(binding = UNIT_RAYS) uniform samplerBuffer rays; // two texels each

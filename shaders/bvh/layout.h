@@ -4,8 +4,9 @@
 #include "shared/wave.h"
 #include "tree/layout.h"
 
-/* Where a ray goes on in the next dispatch, uvec4: element; the instance that it is in; element of the top tree;
- * 1: nowhere, it is finished. */
+/* Where an invocation goes on in the next dispatch, uvec4: element; the instance that its packet is in; element of
+ * the top tree; bit 0: nowhere, all is finished, above it a bit for each ray of this packet and of those to come.
+ */
 #define BIND_BVH_PLACES BIND_TRACER_1
 #define BIND_BVH_UNFINISHED BIND_PASS_4
 #define BVH_UNFINISHED WAVE_STOPPED_LONG

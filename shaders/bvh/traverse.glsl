@@ -10,7 +10,7 @@
 //   SHARED_ORIGIN     all rays of the wave begin at one point
 //   BVH_DEFORMS       there are meshes that deform, whose trees may have several histories
 //   BVH_DEFORMS_IN_SHUTTER  and some do while the shutter is open
-//   BVH_BUDGET        of PACKET_RAYS 1: a ray stops after as many elements as a dispatch may have of it, and says so
+//   BVH_BUDGET        a ray, or a packet, stops after as many elements as a dispatch may have of it, and says so
 //   BVH_RESUMES       and goes on in the next dispatch
 //
 // With HAS_MOTION every ray enters an instance at the ray's own time, and leaves bound all times.
@@ -195,15 +195,6 @@ bool is_alive_any(trace_ray r[PACKET_RAYS])
     for (int k = 0; k < PACKET_RAYS; k++)
         alive = alive || r[k].t_max > r[k].t_min;
     return alive;
-}
-
-// The first active ray: it leads to the end, also when it is finished.
-int leading_of(trace_ray r[PACKET_RAYS])
-{
-    int leading = 0;
-    for (int k = PACKET_RAYS - 1; k > 0; k--)
-        leading = r[k].t_max > r[k].t_min ? k : leading;
-    return r[0].t_max > r[0].t_min ? 0 : leading;
 }
 
 // Enters a tree with all live rays: computes their bounds in its space.
@@ -403,14 +394,14 @@ bool traverse_instances(inout tree_traversal traversal, inout tree_traversal wor
 
 #include "bvh/pair.glsl"
 
-void trace_packet(inout trace_ray r[PACKET_RAYS], inout answer found[PACKET_RAYS])
+// `leading`: the first ray that was active as the packet began: it leads to the end, also when it is finished.
+void trace_packet(inout trace_ray r[PACKET_RAYS], int leading, inout answer found[PACKET_RAYS])
 {
     entered_instance inside;
     object_ray o[PACKET_RAYS];
     tree_traversal traversal, world_traversal;
     bundle b, world_bundle;
     relative_rays rays;
-    int leading = leading_of(r);
     begin_packet(r, leading, inside, o, traversal, world_traversal, b, world_bundle, rays);
 #ifdef BVH_BUDGET
 #ifndef BVH_ONE_INSTANCE
@@ -446,6 +437,32 @@ void trace_packet(inout trace_ray r[PACKET_RAYS], inout answer found[PACKET_RAYS
 #endif
 }
 
+// False: nothing is left to do.
+bool begin_budget()
+{
+#ifdef BVH_BUDGET
+    place_of_ray = uvec4(0u, NOT_INSIDE, 0u, 0u);
+#ifdef BVH_RESUMES
+    if (resumes != 0u)
+        place_of_ray = places[item_index()];
+#endif
+    return (place_of_ray.w & 1u) == 0u;
+#else
+    return true;
+#endif
+}
+
+void end_budget()
+{
+#ifdef BVH_BUDGET
+#ifdef BVH_RESUMES
+    places[item_index()] = place_of_ray;
+#endif
+    if ((place_of_ray.w & 1u) == 0u && unfinished[unfinished_word] == 0u)
+        atomicCompSwap(unfinished[unfinished_word], 0u, BVH_UNFINISHED);
+#endif
+}
+
 // Called by trace/wave.comp.
 #ifdef RAY_PAIRS
 
@@ -463,39 +480,13 @@ void trace_closest_rays(trace_ray r[2], inout candidate best[2])
 
 #elif PACKET_RAYS == 1
 
-// False: the ray is finished.
-bool begin_budget()
-{
-#ifdef BVH_BUDGET
-    place_of_ray = uvec4(0u, NOT_INSIDE, 0u, 0u);
-#ifdef BVH_RESUMES
-    if (resumes != 0u)
-        place_of_ray = places[item_index()];
-#endif
-    return place_of_ray.w == 0u;
-#else
-    return true;
-#endif
-}
-
-void end_budget()
-{
-#ifdef BVH_BUDGET
-#ifdef BVH_RESUMES
-    places[item_index()] = place_of_ray;
-#endif
-    if (place_of_ray.w == 0u && unfinished[unfinished_word] == 0u)
-        atomicCompSwap(unfinished[unfinished_word], 0u, BVH_UNFINISHED);
-#endif
-}
-
 #ifdef ANY_HIT
 bool trace_any(trace_ray r, inout vec3 optical_depth)
 {
     trace_ray packet[PACKET_RAYS] = trace_ray[PACKET_RAYS](r);
     vec3 found[PACKET_RAYS] = vec3[PACKET_RAYS](optical_depth);
     if (begin_budget())
-        trace_packet(packet, found);
+        trace_packet(packet, 0, found);
     end_budget();
     optical_depth = found[0];
     return min_component(optical_depth) >= OPTICAL_DEPTH_BLACK;
@@ -506,7 +497,7 @@ void trace_closest(trace_ray r, inout candidate best)
     trace_ray packet[PACKET_RAYS] = trace_ray[PACKET_RAYS](r);
     candidate found[PACKET_RAYS] = candidate[PACKET_RAYS](best);
     if (begin_budget())
-        trace_packet(packet, found);
+        trace_packet(packet, 0, found);
     end_budget();
     best = found[0];
 }
@@ -526,7 +517,14 @@ void TRACE_GROUP(trace_ray r[PACKET_RAYS], inout answer found[PACKET_RAYS])
     uint waiting = 0u;
     for (int k = 0; k < PACKET_RAYS; k++)
         waiting |= r[k].t_max > r[k].t_min ? 1u << k : 0u;
+    if (!begin_budget())
+        waiting = 0u;
+#ifdef BVH_RESUMES
+    else if (resumes != 0u)
+        waiting = place_of_ray.w >> 1; // the packet is formed again as it was, of rays that may be finished by now
+#endif
     while (waiting != 0u) {
+        uint before = waiting;
         int first = findLSB(waiting);
         trace_ray leading = r[0], packet[PACKET_RAYS];
         for (int k = 1; k < PACKET_RAYS; k++)
@@ -541,8 +539,19 @@ void TRACE_GROUP(trace_ray r[PACKET_RAYS], inout answer found[PACKET_RAYS])
             else
                 put_out(packet[k]);
         }
-        trace_packet(packet, found);
+        trace_packet(packet, first, found);
+#ifdef BVH_BUDGET
+        if (place_of_ray.w == 0u) {
+            waiting = before;
+            break;
+        }
+        place_of_ray = uvec4(0u, NOT_INSIDE, 0u, 0u);
+#endif
     }
+#ifdef BVH_BUDGET
+    place_of_ray.w = waiting << 1 | (waiting == 0u ? 1u : 0u);
+#endif
+    end_budget();
 }
 
 #endif

@@ -2,7 +2,7 @@
 // Cutouts and translucent surfaces: a tracer evaluates a candidate's alpha before it counts. EVEN_ALPHA: no such
 // material has a texture or vertex colours, so the point on the surface does not matter. Compiled to constants where
 // the scene has no such material (HAS_CUTOUT, HAS_TRANSLUCENT not defined).
-#include "common/surface.glsl"
+#include "common/attributes.glsl"
 
 uint material_index_of(candidate found)
 {

@@ -5,8 +5,6 @@
 
 layout(binding = UNIT_TRIANGLES) uniform usamplerBuffer triangles;       // i0 i1 i2 material
 layout(binding = UNIT_POSITIONS) uniform samplerBuffer positions;        // xyz, object space
-layout(binding = UNIT_NORMALS) uniform samplerBuffer normals;            // xyz, handedness
-layout(binding = UNIT_TANGENTS) uniform usamplerBuffer tangents;         // octahedral
 layout(binding = UNIT_TEXCOORDS) uniform samplerBuffer texcoords;        // u0 v0 u1 v1
 layout(binding = UNIT_COLOURS) uniform samplerBuffer colours;            // rgba, linear
 layout(binding = UNIT_SPHERES) uniform samplerBuffer spheres;            // centre, radius

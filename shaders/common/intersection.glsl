@@ -5,7 +5,7 @@
 // own rounding which triangle is hit, so at an edge the exact test may just miss it: the point is then moved to the
 // nearest one of the triangle.
 #include "common/intersect.glsl"
-#include "common/surface.glsl"
+#include "common/attributes.glsl"
 
 // Barycentric weights of the vertices (relative to the ray's origin) at the intersection of the ray's line with their
 // plane; not normalised.

@@ -12,7 +12,7 @@
 
 #include "shared/hit.h"
 #include "common/sampled.glsl"
-#include "common/surface.glsl"
+#include "common/attributes.glsl"
 
 struct surface {
     vec3 position;

@@ -72,27 +72,3 @@ vec3 position_at_time(uint vertex, uint close_offset, float time)
 #endif
     return position;
 }
-
-// Normalised between two.
-vec3 normal_at_time(uint vertex, uint close_offset, float time)
-{
-    vec3 normal = texelFetch(normals, int(vertex)).xyz;
-#ifdef HAS_MOTION
-    if (close_offset != 0u) {
-        normal = mix(normal, texelFetch(normals, int(vertex + close_offset)).xyz, time);
-        float squared = dot(normal, normal);
-        normal *= squared > 0.0 ? inversesqrt(squared) : 0.0;
-    }
-#endif
-    return normal;
-}
-
-vec3 tangent_at_time(uint vertex, uint close_offset, float time)
-{
-    vec3 tangent = unpack_unit(texelFetch(tangents, int(vertex)).x);
-#ifdef HAS_MOTION
-    if (close_offset != 0u)
-        tangent = mix(tangent, unpack_unit(texelFetch(tangents, int(vertex + close_offset)).x), time);
-#endif
-    return tangent;
-}

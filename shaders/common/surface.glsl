@@ -2,69 +2,35 @@
 // From a primitive and a place on it to struct hit. Every exact tracer and the rasterised primary use it, so
 // that all see one surface.
 //
-// Software GL runs both sides of every branch: what no surface of the scene has may be left out by defines, without
-// any change to a hit. NO_TEXCOORDS, NO_COLOURS: no mesh has texture coordinates, vertex colours; NO_TANGENTS: no mesh
-// has tangents, and no material asks for those that follow from texture coordinates.
-#include "shared/hit.h"
-#include "common/math.glsl"
-#include "common/motion.glsl"
-#include "common/texture.glsl"
+// Defines: those of common/attributes.glsl; NO_TANGENTS: no mesh has tangents, and no material asks for those that follow
+// from texture coordinates.
+#include "common/attributes.glsl"
 
-// A possible hit of a ray.
-struct candidate {
-    float distance;     // in lengths of the direction
-    uint primitive;     // scene-wide triangle or sphere, or disc; HIT_NO_PRIMITIVE: nothing yet
-    uint instance_index; // HIT_NO_PRIMITIVE: a disc
-    vec2 barycentrics;  // triangles: of the second and third vertex
-};
+layout(binding = UNIT_NORMALS) uniform samplerBuffer normals;    // xyz, handedness
+layout(binding = UNIT_TANGENTS) uniform usamplerBuffer tangents; // octahedral
 
-vec3 triangle_weights(vec2 barycentrics)
+// Normalised between two.
+vec3 normal_at_time(uint vertex, uint close_offset, float time)
 {
-    return vec3(1.0 - barycentrics.x - barycentrics.y, barycentrics);
-}
-
-vec4 triangle_texcoords(uvec4 triangle, uint flags, vec3 weights)
-{
-#ifdef NO_TEXCOORDS
-    return vec4(0.0);
-#else
-    if ((flags & (GEOMETRY_HAS_TEXCOORDS_0 | GEOMETRY_HAS_TEXCOORDS_1)) == 0u)
-        return vec4(0.0);
-    return texelFetch(texcoords, int(triangle.x)) * weights.x +
-           texelFetch(texcoords, int(triangle.y)) * weights.y +
-           texelFetch(texcoords, int(triangle.z)) * weights.z;
+    vec3 normal = texelFetch(normals, int(vertex)).xyz;
+#ifdef HAS_MOTION
+    if (close_offset != 0u) {
+        normal = mix(normal, texelFetch(normals, int(vertex + close_offset)).xyz, time);
+        float squared = dot(normal, normal);
+        normal *= squared > 0.0 ? inversesqrt(squared) : 0.0;
+    }
 #endif
+    return normal;
 }
 
-vec4 triangle_colour(uvec4 triangle, uint flags, vec3 weights)
+vec3 tangent_at_time(uint vertex, uint close_offset, float time)
 {
-#ifdef NO_COLOURS
-    return vec4(1.0);
-#else
-    if ((flags & GEOMETRY_HAS_COLOURS) == 0u)
-        return vec4(1.0);
-    return texelFetch(colours, int(triangle.x)) * weights.x +
-           texelFetch(colours, int(triangle.y)) * weights.y +
-           texelFetch(colours, int(triangle.z)) * weights.z;
+    vec3 tangent = unpack_unit(texelFetch(tangents, int(vertex)).x);
+#ifdef HAS_MOTION
+    if (close_offset != 0u)
+        tangent = mix(tangent, unpack_unit(texelFetch(tangents, int(vertex + close_offset)).x), time);
 #endif
-}
-
-// Seen from the front (+z) with y up, u grows to the right and v downwards, as an image is stored.
-vec4 sphere_texcoords(vec3 normal_object)
-{
-    float u = 0.5 + azimuth(normal_object.x, normal_object.z) / TWO_PI;
-    float v = acos(clamp(normal_object.y, -1.0, 1.0)) / PI;
-    return vec4(u, v, u, v);
-}
-
-// 0..1 across the disc.
-vec4 disc_texcoords(disc d, vec3 position_world)
-{
-    vec3 tangent, bitangent;
-    tangent_frame(d.normal.xyz, tangent, bitangent);
-    vec3 from_centre = (position_world - d.centre_radius.xyz) / d.centre_radius.w;
-    vec2 uv = 0.5 + 0.5 * vec2(dot(from_centre, tangent), -dot(from_centre, bitangent));
-    return vec4(uv, uv);
+    return tangent;
 }
 
 // A triangle's tangent along u and the handedness of the frame, for meshes without tangents. v grows downwards in an
@@ -112,14 +78,6 @@ bool triangle_tangent(uvec4 triangle, vec3 corners[3], geometry g, float time, v
     bool second = slot_index != 0u && (texture_slots[slot_index].texture & 0x80000000u) != 0u;
     return texture_tangent(triangle, corners, second, normal_object, tangent_object);
 #endif
-}
-
-// The interpolated normal, mirrored at the surface where it points to the wrong side of it: a reversed normal becomes
-// its opposite, one slightly below the horizon moves slightly.
-vec3 same_hemisphere(vec3 shading, vec3 geometric)
-{
-    float cosine = dot(shading, geometric);
-    return cosine < 0.0 ? shading - 2.0 * cosine * geometric : shading;
 }
 
 hit finish_hit(uint material_index, float distance, vec3 direction_world, vec3 geometric, vec3 shading, vec4 uv01,
@@ -230,21 +188,4 @@ hit surface_of(candidate found, vec3 origin_world, vec3 direction_world, float t
 #endif
     return surface_triangle(found.instance_index, found.primitive, found.barycentrics, found.distance,
                             direction_world, time);
-}
-
-// The length of texture coordinates of set 0 per metre of a triangle: for the level of detail of a footprint.
-float texcoords_per_metre(uint instance_index, uint primitive)
-{
-    instance i = instance_at(instance_index);
-    uvec4 triangle = texelFetch(triangles, int(primitive));
-    if ((geometry_at(i.geometry).flags & GEOMETRY_HAS_TEXCOORDS_0) == 0u)
-        return 0.0;
-    vec3 p0 = texelFetch(positions, int(triangle.x)).xyz;
-    vec3 e1 = affine_vector(i.world_from_object, texelFetch(positions, int(triangle.y)).xyz - p0);
-    vec3 e2 = affine_vector(i.world_from_object, texelFetch(positions, int(triangle.z)).xyz - p0);
-    vec2 t0 = texelFetch(texcoords, int(triangle.x)).xy;
-    vec2 d1 = texelFetch(texcoords, int(triangle.y)).xy - t0;
-    vec2 d2 = texelFetch(texcoords, int(triangle.z)).xy - t0;
-    float area = length(cross(e1, e2));
-    return area > 0.0 ? sqrt(abs(d1.x * d2.y - d1.y * d2.x) / area) : 0.0;
 }

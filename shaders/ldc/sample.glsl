@@ -7,6 +7,7 @@
 #include "raster/cube.glsl"
 #include "common/material.glsl"
 #include "common/sampled.glsl"
+#include "common/surface.glsl"
 
 float cross_2d(vec2 a, vec2 b)
 {

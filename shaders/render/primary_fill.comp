@@ -6,6 +6,7 @@
 #include "shared/ray.h"
 #include "shared/hit.h"
 #include "common/dispatch.glsl"
+#include "common/surface.glsl"
 #include "render/primary_hit.glsl"
 #include "render/wave.glsl"
 

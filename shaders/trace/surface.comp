@@ -6,6 +6,7 @@
 #include "common/dispatch.glsl"
 #include "common/range.glsl"
 #include "common/intersection.glsl"
+#include "common/surface.glsl"
 
 layout(binding = UNIT_RAYS) uniform samplerBuffer rays; // two texels each
 #ifdef HAS_MOTION

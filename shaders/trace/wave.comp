@@ -28,9 +28,8 @@
 // (no define) may compare distances itself. `best.distance` starts at the ray's end, or at the nearest disc.
 // offer_any adds to `optical_depth`; trace_any returns true, and may stop, once offer_any did: no light is left.
 //
-// With PACKET_RAYS 1, a traverse.glsl may define RAYS_GO_ON: several dispatches are of the same rays, which go on with what
-// they have found; the first one has is_first_part 1. BIND_OPTICAL_DEPTHS is then a buffer with a vec4 for each ray of the
-// dispatch.
+// A traverse.glsl may define RAYS_GO_ON: several dispatches are of the same rays, which go on with what they have found; the
+// first one has is_first_part 1. BIND_OPTICAL_DEPTHS is then a buffer with a vec4 for each ray of the dispatch.
 //
 // This file handles all else: discs, dead rays (t_max <= t_min), rays beyond the wave's end, and writing the answer: a
 // visibility, or an intersection (shared/hit.h) of which surface.comp makes a hit. Some of several rays may be dead:
@@ -122,9 +121,22 @@ bool discs_any(trace_ray r, inout vec3 optical_depth)
     return false;
 }
 
+vec3 found_before(uint ray_index, trace_ray r)
+{
+#ifdef RAYS_GO_ON
+    if (is_first_part == 0u && ray_index < ray_end)
+        return optical_depths[ray_index - first_ray].xyz;
+#endif
+    return vec3(0.0);
+}
+
 // Nothing stops a dead ray.
 void store_visibility(uint ray_index, vec3 optical_depth)
 {
+#ifdef RAYS_GO_ON
+    if (ray_index < ray_end)
+        optical_depths[ray_index - first_ray] = vec4(optical_depth, 0.0);
+#endif
     vec3 left = transmittance_left(optical_depth);
     if (ray_index < ray_end)
         visibilities[ray_index] = packUnorm4x8(vec4(left, max_component(left) > 0.0 ? 1.0 : 0.0));
@@ -143,6 +155,18 @@ void discs_closest(trace_ray r, inout candidate best)
     }
 }
 
+candidate found_before(uint ray_index, trace_ray r)
+{
+#ifdef RAYS_GO_ON
+    if (is_first_part == 0u && ray_index < ray_end) {
+        uvec4 before = imageLoad(intersections, int(3u * ray_index));
+        if (before.z != HIT_NO_PRIMITIVE)
+            return candidate(uintBitsToFloat(before.x), before.z, before.w, vec2(0.0));
+    }
+#endif
+    return candidate_none(r.t_max);
+}
+
 void store_intersection(uint ray_index, candidate best)
 {
     if (ray_index >= ray_end)
@@ -154,6 +178,16 @@ void store_intersection(uint ray_index, candidate best)
 
 #endif
 
+// Not one that goes on.
+bool is_new()
+{
+#ifdef RAYS_GO_ON
+    return is_first_part != 0u;
+#else
+    return true;
+#endif
+}
+
 #if INVOCATION_RAYS == 1
 
 void main()
@@ -162,35 +196,19 @@ void main()
     if (ray_index >= ray_end)
         return;
     trace_ray r = load_ray(ray_index);
-    bool is_new = true; // not one that goes on
-#ifdef RAYS_GO_ON
-    is_new = is_first_part != 0u;
-#endif
 #ifdef ANY_HIT
-    vec3 optical_depth = vec3(0.0);
+    vec3 optical_depth = found_before(ray_index, r);
 #ifdef RAYS_GO_ON
-    if (!is_new)
-        optical_depth = optical_depths[item_index()].xyz;
     if (min_component(optical_depth) >= OPTICAL_DEPTH_BLACK)
         return;
 #endif
-    if (is_alive(r) && (is_new && discs_any(r, optical_depth) || trace_any(r, optical_depth)))
+    if (is_alive(r) && (is_new() && discs_any(r, optical_depth) || trace_any(r, optical_depth)))
         optical_depth = vec3(OPTICAL_DEPTH_MAX);
-#ifdef RAYS_GO_ON
-    optical_depths[item_index()] = vec4(optical_depth, 0.0);
-#endif
     store_visibility(ray_index, optical_depth);
 #else
-    candidate best = candidate_none(r.t_max);
-#ifdef RAYS_GO_ON
-    if (!is_new) {
-        uvec4 before = imageLoad(intersections, int(3u * ray_index));
-        if (before.z != HIT_NO_PRIMITIVE)
-            best = candidate(uintBitsToFloat(before.x), before.z, before.w, vec2(0.0));
-    }
-#endif
+    candidate best = found_before(ray_index, r);
     if (is_alive(r)) {
-        if (is_new)
+        if (is_new())
             discs_closest(r, best);
         trace_closest(r, best);
     }
@@ -250,13 +268,15 @@ void main()
     for (int k = 0; k < INVOCATION_RAYS; k++) {
         r[k] = load_ray(first + uint(k));
         any_alive = any_alive || is_alive(r[k]);
-#ifdef ANY_HIT
-        found[k] = vec3(0.0);
-#else
-        found[k] = candidate_none(r[k].t_max);
+        found[k] = found_before(first + uint(k), r[k]);
+#if defined ANY_HIT && defined RAYS_GO_ON
+        if (min_component(found[k]) >= OPTICAL_DEPTH_BLACK) {
+            r[k].t_max = -1.0;
+            r[k].t_min = 0.0;
+        }
 #endif
     }
-    if (DISC_COUNT > 0u)
+    if (DISC_COUNT > 0u && is_new())
         look_at_discs(r, found);
 #ifdef ANY_HIT
     if (any_alive)

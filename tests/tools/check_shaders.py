@@ -56,6 +56,8 @@ CHOICES = {
 }
 # Defines that come only with others.
 WITH = {"BVH_DEFORMS_IN_SHUTTER": ("BVH_DEFORMS", "HAS_MOTION"), "BVH_RESUMES": ("BVH_BUDGET",)}
+# Defines that never come with others: tracers that know the scene as the shutter opens refuse rays with times.
+WITHOUT = {tracer: ("HAS_MOTION",) for tracer in ("TRACER_LDC", "TRACER_ABUFFER", "TRACER_SVO")}
 STAGES = {"render/primary.vert": ["render/primary.vert", "render/primary.frag"],
           "rayspace/reduce.vert": ["rayspace/reduce.vert", "rayspace/reduce.geom"],
           "ldc/build.frag": ["raster/draw.vert", "raster/draw.geom", "ldc/build.frag"],
@@ -165,7 +167,8 @@ def variants(program):
                     for parts in itertools.product(*CHOICES.get(program, [[{}]]))]
     all_chosen = {name for combination in combinations for name in combination}
     for chosen in combinations:
-        optional = optional_defines(stages, chosen, all_chosen)
+        never = [name for one in chosen for name in WITHOUT.get(one, ())]
+        optional = [name for name in optional_defines(stages, chosen, all_chosen) if name not in never]
         for on in [[], optional] + [[name] for name in optional if len(optional) > 1]:
             if on or on is not optional:
                 on = [*on, *(other for name in on for other in WITH.get(name, ()))]

@@ -8,8 +8,12 @@
 
 #include <epoxy/gl.h>
 
-/* Fills any GPU; more at once only nears the time after which a driver ends a dispatch. */
-#define DISPATCH_RAYS_MAX (1u << 18)
+/* Columns that a linear search looks up (abuffer/steps.glsl): of three steps in three images, and to settle a
+ * passage. */
+#define STEP_COLUMNS 9
+#define PASSAGE_COLUMNS 28
+/* Bisection to a depth in a column, and the samples before it. */
+#define SCAN_ROUNDS 36
 
 bool abuffer_surfaces(struct abuffer_store *store, const struct gpu_scene *scene, const struct ray_range *rays,
                       struct error *error)
@@ -30,6 +34,23 @@ bool abuffer_surfaces(struct abuffer_store *store, const struct gpu_scene *scene
     return true;
 }
 
+static bool is_linear(const struct tracer_options *options)
+{
+    return options->abuffer.search == ABUFFER_SEARCH_LINEAR3 || options->abuffer.search == ABUFFER_SEARCH_LINEAR1;
+}
+
+/* With N texels and V voxels along a side, and D samples in the longest list: a ray passes 12 V parts of voxels,
+ * and with the voxels and blocks 16 V. In each part and image it begins with the texel where it enters, and passes
+ * 2 N texels of each image on its way; a linear search looks up its steps, and settles a passage in each part. Two
+ * samples of a column are one round. */
+uint64_t abuffer_rounds_of_a_ray(const struct abuffer_store *store, const struct tracer_options *options)
+{
+    const uint64_t parts = 12 * (uint64_t)store->voxels_along;
+    const uint64_t columns = is_linear(options) ? parts * (STEP_COLUMNS + PASSAGE_COLUMNS)
+                                                : 3 * (2 * (uint64_t)store->resolution + parts);
+    return parts + parts / 3 + columns * (SCAN_ROUNDS + store->depth_max / 2);
+}
+
 bool abuffer_intersect(struct abuffer_store *store, struct gpu_scene *scene, const struct ray_range *rays,
                        const struct tracer_options *options, struct error *error)
 {
@@ -37,7 +58,7 @@ bool abuffer_intersect(struct abuffer_store *store, struct gpu_scene *scene, con
     size_t n = 1;
     if (store->resolution == 0)
         defines[n++] = (struct gpu_define){"ABUFFER_EMPTY", "1"};
-    if (options->abuffer.search == ABUFFER_SEARCH_LINEAR3 || options->abuffer.search == ABUFFER_SEARCH_LINEAR1)
+    if (is_linear(options))
         defines[n++] =
             (struct gpu_define){"ABUFFER_STEPS", options->abuffer.search == ABUFFER_SEARCH_LINEAR3 ? "3" : "1"};
     if (options->bench.abuffer_count_steps && rays->wave->kind == WAVE_CLOSEST)
@@ -46,7 +67,7 @@ bool abuffer_intersect(struct abuffer_store *store, struct gpu_scene *scene, con
         .traverse = "abuffer/traverse.glsl",
         .defines = defines,
         .packet_rays = 1,
-        .rays_a_dispatch = store->device->facts.software ? 0 : DISPATCH_RAYS_MAX,
+        .rays_a_dispatch = trace_rays_a_dispatch(store->device, abuffer_rounds_of_a_ray(store, options)),
     };
     const struct gpu_program *program = trace_program_get(scene, rays->wave, &source, error);
     if (!program)

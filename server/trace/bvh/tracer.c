@@ -9,8 +9,9 @@
 #include <epoxy/gl.h>
 #include <stdlib.h>
 
+#define MINIMUM_RAYS 192u /* a multiple of all packets' sizes */
 /* Fills any GPU; more at once only nears the time after which a driver ends a dispatch. */
-#define DISPATCH_RAYS_MAX (1u << 18)
+#define DISPATCH_RAYS_MAX ((1u << 18) / MINIMUM_RAYS * MINIMUM_RAYS)
 /* Elements that a GPU visits in a dispatch, at most: a second's work of a slow one. A ray of a large scene needs
  * some hundred; it has enough of them to be finished in one dispatch, unless the scene is made to keep it. */
 #define DISPATCH_ELEMENTS_MAX (1u << 31)
@@ -43,9 +44,7 @@ static struct tracer *bvh_create(struct gpu_device *device, const struct tracer_
 
 static void fill_bytes(struct bvh *bvh)
 {
-    bvh->base.stats.device_bytes = scene_tree_bytes(&bvh->tree) + bvh->coherence.capacity_bytes +
-                                   bvh->places.capacity_bytes + bvh->depths.capacity_bytes +
-                                   bvh->unfinished.capacity_bytes;
+    bvh->base.stats.device_bytes = scene_tree_bytes(&bvh->tree) + bvh->coherence.capacity_bytes;
 }
 
 static void bvh_reset(struct bvh *bvh)
@@ -53,9 +52,6 @@ static void bvh_reset(struct bvh *bvh)
     struct gpu_device *device = bvh->tree.store.device;
     scene_tree_finish(&bvh->tree);
     gpu_buffer_finish(device, &bvh->coherence);
-    gpu_buffer_finish(device, &bvh->places);
-    gpu_buffer_finish(device, &bvh->depths);
-    gpu_buffer_finish(device, &bvh->unfinished);
     fill_bytes(bvh);
 }
 
@@ -110,7 +106,17 @@ static struct trace_state *bvh_state_create(struct gpu_device *device, const str
 
 static void bvh_state_destroy(struct trace_state *state)
 {
-    free(state);
+    struct bvh_state *own = (struct bvh_state *)state;
+    gpu_buffer_finish(state->device, &own->places);
+    gpu_buffer_finish(state->device, &own->depths);
+    gpu_buffer_finish(state->device, &own->unfinished);
+    free(own);
+}
+
+static uint64_t bvh_state_device_bytes(const struct trace_state *state)
+{
+    const struct bvh_state *own = (const struct bvh_state *)state;
+    return own->places.capacity_bytes + own->depths.capacity_bytes + own->unfinished.capacity_bytes;
 }
 
 static bool bvh_trace_begin(struct tracer *tracer, struct gpu_scene *scene, struct trace_state *state,
@@ -119,6 +125,7 @@ static bool bvh_trace_begin(struct tracer *tracer, struct gpu_scene *scene, stru
     struct bvh_state *own = (struct bvh_state *)state;
     own->packet_rays = bvh_packet_rays((struct bvh *)tracer, scene, &state->wave, error);
     own->ray_pairs = bvh_ray_pairs((struct bvh *)tracer, scene, &state->wave, own->packet_rays);
+    own->unfinished_rays = 0;
     return own->packet_rays > 0;
 }
 
@@ -139,19 +146,19 @@ static void set_uniforms(const struct bvh *bvh, const struct gpu_program *progra
 
 /* How the rays of a wave keep within the time of a dispatch. */
 enum budget {
-    BUDGET_NONE,   /* software GL traces short ranges, and no driver ends them; packets */
+    BUDGET_NONE,   /* software GL traces short ranges, and no driver ends them */
     BUDGET_STOPS,  /* what is not finished stops the slice */
     BUDGET_RESUMES /* dispatches follow one another until all is finished */
 };
 
 static enum budget budget_of(const struct bvh *bvh, const struct trace_state *state)
 {
-    if (bvh->base.device->facts.software || ((const struct bvh_state *)state)->packet_rays > 1 ||
-        bvh->tree.store.settings.plain)
+    if (bvh->base.device->facts.software)
         return BUDGET_NONE;
     return state->wave.stopped && !state->patient ? BUDGET_STOPS : BUDGET_RESUMES;
 }
 
+/* Of an invocation; a packet has as many as each of its rays would have. */
 static uint32_t elements_of_a_ray(const struct bvh *bvh, uint32_t rays)
 {
     const uint32_t fitting = DISPATCH_ELEMENTS_MAX / rays, allowed = bvh->base.options.bench.bvh_elements;
@@ -159,56 +166,65 @@ static uint32_t elements_of_a_ray(const struct bvh *bvh, uint32_t rays)
     return fitting < maximum ? fitting : maximum;
 }
 
-/* The same rays again, until they are finished. Waits for each dispatch. */
-static bool run_to_the_end(struct bvh *bvh, const struct gpu_program *program, const struct gpu_scene *scene,
-                           const struct ray_range *rays, struct error *error)
+static uint32_t rays_of_a_dispatch(const struct ray_range *rays)
 {
-    struct gpu_device *device = bvh->tree.store.device;
-    const struct trace_program_source all = {0};
     const uint32_t count = rays->end - rays->first;
-    uint32_t unfinished = 0;
-    if (!gpu_buffer_reserve(device, &bvh->places, count * sizeof(uvec4), error) ||
-        !gpu_buffer_reserve(device, &bvh->depths, count * TRACE_DEPTH_BYTES, error))
-        return false;
-    fill_bytes(bvh);
-    gpu_buffer_bind_storage(&bvh->places, BIND_BVH_PLACES);
-    gpu_buffer_bind_storage(&bvh->depths, BIND_OPTICAL_DEPTHS);
-    gpu_uniform_uint(program, "bvh_budget", elements_of_a_ray(bvh, count));
-    for (uint32_t dispatches = 0; dispatches == 0 || unfinished; dispatches++) {
-        gpu_buffer_clear(device, &bvh->unfinished, 0);
-        gpu_uniform_uint(program, "is_first_part", dispatches == 0);
-        gpu_uniform_uint(program, "resumes", dispatches > 0);
-        trace_program_run(program, scene, rays, &all);
-        gpu_buffer_read(device, &bvh->unfinished, 0, &unfinished, sizeof(unfinished));
-        if (device->lost)
-            return gpu_check(device, "tracing", error);
-    }
-    return true;
+    return count < DISPATCH_RAYS_MAX ? count : DISPATCH_RAYS_MAX;
 }
 
-static bool run_within_budget(struct bvh *bvh, const struct gpu_program *program, const struct gpu_scene *scene,
-                              const struct trace_state *state, const struct ray_range *rays, struct error *error)
+static void run_and_stop(struct bvh *bvh, const struct gpu_program *program, const struct gpu_scene *scene,
+                         const struct ray_range *rays, const struct trace_program_source *source)
 {
-    const bool stops = budget_of(bvh, state) == BUDGET_STOPS;
-    const struct wave *wave = &state->wave;
-    if (!gpu_buffer_reserve(bvh->tree.store.device, &bvh->unfinished, sizeof(uint32_t), error))
+    gpu_buffer_bind_storage(rays->wave->stopped, BIND_BVH_UNFINISHED);
+    gpu_uniform_uint(program, "unfinished_word", rays->wave->stopped_word);
+    gpu_uniform_uint(program, "bvh_budget", elements_of_a_ray(bvh, rays_of_a_dispatch(rays)));
+    trace_program_run(program, scene, rays, source);
+}
+
+/* One dispatch of some rays, new ones or such as go on, and waits for it. */
+static bool run_once(struct bvh *bvh, const struct gpu_program *program, const struct gpu_scene *scene,
+                     struct bvh_state *own, const struct ray_range *rays,
+                     const struct trace_program_source *source, struct error *error)
+{
+    struct gpu_device *device = bvh->tree.store.device;
+    const uint32_t count = rays->end - rays->first;
+    const bool is_new = own->unfinished_rays == 0;
+    uint32_t unfinished = 0;
+    if (is_new && (!gpu_buffer_reserve(device, &own->places, count * sizeof(uvec4), error) ||
+                   !gpu_buffer_reserve(device, &own->depths, count * TRACE_DEPTH_BYTES, error) ||
+                   !gpu_buffer_reserve(device, &own->unfinished, sizeof(unfinished), error)))
         return false;
-    gpu_buffer_bind_storage(stops ? wave->stopped : &bvh->unfinished, BIND_BVH_UNFINISHED);
-    gpu_uniform_uint(program, "unfinished_word", stops ? wave->stopped_word : 0);
-    if (stops) {
-        const uint32_t count = rays->end - rays->first;
-        gpu_uniform_uint(program, "bvh_budget",
-                         elements_of_a_ray(bvh, count < DISPATCH_RAYS_MAX ? count : DISPATCH_RAYS_MAX));
-        const struct trace_program_source source = {.rays_a_dispatch = DISPATCH_RAYS_MAX};
-        trace_program_run(program, scene, rays, &source);
-        return true;
-    }
-    for (uint32_t first = rays->first, count; first < rays->end; first += count) {
-        count = rays->end - first < DISPATCH_RAYS_MAX ? rays->end - first : DISPATCH_RAYS_MAX;
-        const struct ray_range some = {.wave = wave, .first = first, .end = first + count};
-        if (!run_to_the_end(bvh, program, scene, &some, error))
+    gpu_buffer_clear(device, &own->unfinished, 0);
+    gpu_buffer_bind_storage(&own->unfinished, BIND_BVH_UNFINISHED);
+    gpu_buffer_bind_storage(&own->places, BIND_BVH_PLACES);
+    gpu_buffer_bind_storage(&own->depths, BIND_OPTICAL_DEPTHS);
+    gpu_uniform_uint(program, "unfinished_word", 0);
+    gpu_uniform_uint(program, "bvh_budget", elements_of_a_ray(bvh, count));
+    gpu_uniform_uint(program, "is_first_part", is_new);
+    gpu_uniform_uint(program, "resumes", !is_new);
+    trace_program_run(program, scene, rays, source);
+    gpu_buffer_read(device, &own->unfinished, 0, &unfinished, sizeof(unfinished));
+    own->unfinished_rays = unfinished ? count : 0;
+    return !device->lost || gpu_check(device, "tracing", error);
+}
+
+/* Dispatch by dispatch until all rays are finished or the step is over: a scene can be made so that there is no
+ * end to them that a frame's cancelling, or other frames, could wait for. */
+static bool run_patiently(struct bvh *bvh, const struct gpu_program *program, const struct gpu_scene *scene,
+                          struct trace_state *state, const struct ray_range *rays,
+                          const struct trace_program_source *source, struct error *error)
+{
+    struct bvh_state *own = (struct bvh_state *)state;
+    state->range_end = rays->first;
+    do {
+        const struct ray_range left = {.wave = rays->wave, .first = state->range_end, .end = rays->end};
+        const uint32_t count = own->unfinished_rays ? own->unfinished_rays : rays_of_a_dispatch(&left);
+        const struct ray_range some = {.wave = rays->wave, .first = left.first, .end = left.first + count};
+        if (!run_once(bvh, program, scene, own, &some, source, error))
             return false;
-    }
+        if (own->unfinished_rays == 0)
+            state->range_end = some.end;
+    } while (state->range_end < rays->end && !step_is_over(state->step_end_ns));
     return true;
 }
 
@@ -247,16 +263,19 @@ static bool bvh_trace_range(struct tracer *tracer, struct gpu_scene *scene, stru
         .defines = defines,
         .packet_rays = packet_rays,
         .ray_pairs = own->ray_pairs,
-        .rays_a_dispatch = DISPATCH_RAYS_MAX / packet_rays * packet_rays,
+        .rays_a_dispatch = DISPATCH_RAYS_MAX,
     };
     const struct gpu_program *program = trace_program_get(scene, wave, &source, error);
     if (!program)
         return false;
     scene_tree_bind(&bvh->tree);
     set_uniforms(bvh, program, scene, wave);
-    if (budget != BUDGET_NONE)
-        return run_within_budget(bvh, program, scene, state, rays, error);
-    trace_program_run(program, scene, rays, &source);
+    if (budget == BUDGET_RESUMES)
+        return run_patiently(bvh, program, scene, state, rays, &source, error);
+    if (budget == BUDGET_STOPS)
+        run_and_stop(bvh, program, scene, rays, &source);
+    else
+        trace_program_run(program, scene, rays, &source);
     return true;
 }
 
@@ -264,7 +283,7 @@ const struct tracer_impl tracer_bvh_impl = {
     .name = "bvh",
     .finds_first_hits = true,
     .depends_on = CHANGED_GEOMETRY | CHANGED_DEFORMED | CHANGED_INSTANCES,
-    .minimum_rays = 192, /* a multiple of all packets' sizes */
+    .minimum_rays = MINIMUM_RAYS,
     .create = bvh_create,
     .destroy = bvh_destroy,
     .update = bvh_update,
@@ -273,6 +292,7 @@ const struct tracer_impl tracer_bvh_impl = {
     .waits = bvh_waits,
     .state_create = bvh_state_create,
     .state_destroy = bvh_state_destroy,
+    .state_device_bytes = bvh_state_device_bytes,
     .trace_begin = bvh_trace_begin,
     .trace_range = bvh_trace_range,
 };

@@ -13,8 +13,6 @@ struct bvh {
     struct tracer base;
     struct scene_tree tree;
     struct gpu_buffer coherence; /* what bvh/coherence.comp counts; there from the build on */
-    /* Of the rays of a dispatch, between it and the next one that they are in. */
-    struct gpu_buffer places, depths, unfinished;
 };
 
 /* Of one wave. */
@@ -22,6 +20,10 @@ struct bvh_state {
     struct trace_state base;
     uint32_t packet_rays;
     bool ray_pairs; /* an invocation traverses two packets of one ray side by side */
+    /* Rays that a dispatch has not finished: so many from the first on that has no final answer, 0: none. Where
+     * they go on, what they have found, and whether any is left. */
+    uint32_t unfinished_rays;
+    struct gpu_buffer places, depths, unfinished;
 };
 
 /* How far apart the origins of a packet's rays may be, in world space. Those of a lens may be all over it: its

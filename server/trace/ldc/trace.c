@@ -9,9 +9,6 @@
 #include <epoxy/gl.h>
 #include <stdio.h>
 
-/* Fills any GPU; more at once only nears the time after which a driver ends a dispatch. */
-#define DISPATCH_RAYS_MAX (1u << 18)
-
 static void set_cube(const struct gpu_program *program, unsigned slot, const struct ldc_cube *cube,
                      const struct ldc_level_layout *layout, const struct tracer_options *options)
 {
@@ -54,6 +51,17 @@ static void bind(struct ldc_store *store, bool cells)
     gpu_buffer_bind_texels(store->device, &store->entries, UNIT_TRACER_5, GL_RGBA32UI);
 }
 
+/* Of each cube, with R cells along a side and at most L samples in a texel: a ray passes 3 R cells, 3 R / 4 blocks
+ * and 3 R / 16 nodes, each step on to the next; in a cell it tests what its three texels have. Image by image it
+ * is less: 2 R texels of each image and the nodes above them, down to each and on from it. */
+uint64_t ldc_rounds_of_a_ray(const struct ldc_store *store)
+{
+    uint64_t rounds = 0;
+    for (unsigned i = 0; i < LDC_CUBES_MAX; i++)
+        rounds += store->cubes[i].resolution * (18 + 9 * (uint64_t)store->cubes[i].layers_kept);
+    return rounds;
+}
+
 bool ldc_intersect(struct ldc_store *store, struct gpu_scene *scene, const struct ray_range *rays,
                    const struct tracer_options *options, struct error *error)
 {
@@ -87,7 +95,7 @@ bool ldc_intersect(struct ldc_store *store, struct gpu_scene *scene, const struc
         .traverse = "ldc/traverse.glsl",
         .defines = defines,
         .packet_rays = options->ldc.rays ? options->ldc.rays : 1,
-        .rays_a_dispatch = store->device->facts.software ? 0 : DISPATCH_RAYS_MAX,
+        .rays_a_dispatch = trace_rays_a_dispatch(store->device, ldc_rounds_of_a_ray(store)),
     };
     const struct gpu_program *program = trace_program_get(scene, rays->wave, &source, error);
     if (!program)

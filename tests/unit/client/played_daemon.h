@@ -94,10 +94,10 @@ static inline void put(struct daemon *daemon, const void *bytes, size_t count)
     }
 }
 
-static inline void greet(struct daemon *daemon)
+static inline void greet_with(struct daemon *daemon, uint64_t capabilities)
 {
     struct handshake_hello hello;
-    struct handshake_reply reply = {.version = 1, .name = "played"};
+    struct handshake_reply reply = {.version = 1, .capabilities = capabilities, .name = "played"};
     uint8_t bytes[HANDSHAKE_REPLY_MAX_BYTES];
     size_t count = 0;
     while (handshake_hello_parse(&hello, daemon->in, daemon->in_bytes, &count, NULL) != HANDSHAKE_CONSUMED)
@@ -105,6 +105,11 @@ static inline void greet(struct daemon *daemon)
             return;
     used(daemon, count);
     put(daemon, bytes, handshake_reply_encode(bytes, &reply));
+}
+
+static inline void greet(struct daemon *daemon)
+{
+    greet_with(daemon, 0);
 }
 
 /* The next message of the client; false at the end. */

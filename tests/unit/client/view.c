@@ -317,6 +317,58 @@ TEST(a_changed_view_takes_frames_of_both_sizes_and_counts_on)
     assert_int_equal(seen.cameras, 41);
 }
 
+/* Until it has seen a render. */
+static void play_with(struct daemon *daemon, uint64_t capabilities)
+{
+    struct framing_header header;
+    struct message message;
+    greet_with(daemon, capabilities);
+    while (look(daemon, &header, &message) && message.type != MESSAGE_RENDER)
+        continue;
+}
+
+static void play_newer(struct daemon *daemon)
+{
+    play_with(daemon, HANDSHAKE_CAN_CHOOSE_PRIMARY);
+}
+
+static void play_older(struct daemon *daemon)
+{
+    play_with(daemon, 0);
+}
+
+TEST(how_first_hits_are_found_is_left_to_a_daemon_that_can_choose)
+{
+    static const struct {
+        void (*play)(struct daemon *daemon);
+        uint32_t tracer, asked, sent;
+    } rows[] = {
+        {play_newer, PROTOCOL_TRACER_BVH, PROTOCOL_PRIMARY_AUTO, PROTOCOL_PRIMARY_AUTO},
+        {play_older, PROTOCOL_TRACER_BVH, PROTOCOL_PRIMARY_AUTO, PROTOCOL_PRIMARY_RASTER},
+        {play_older, PROTOCOL_TRACER_REFERENCE, PROTOCOL_PRIMARY_AUTO, PROTOCOL_PRIMARY_TRACE},
+        {play_older, PROTOCOL_TRACER_BVH, PROTOCOL_PRIMARY_TRACE, PROTOCOL_PRIMARY_TRACE},
+    };
+    for (size_t i = 0; i < 2 * sizeof(rows) / sizeof(rows[0]); i++) {
+        const bool is_batch = i % 2;
+        struct daemon *daemon = start(rows[i / 2].play);
+        struct fl_scene scene = {.connection = connect_to(daemon), .scene = 1};
+        struct message_render options = is_batch ? fl_render_defaults() : fl_view_defaults();
+        options.tracer = rows[i / 2].tracer;
+        options.primary = rows[i / 2].asked;
+        memset(&seen, 0, sizeof(seen));
+        struct fl_job *job = is_batch ? fl_render_start(&scene, &options, &error) : NULL;
+        struct fl_view *view = is_batch ? NULL : fl_view_start(&scene, &options, &error);
+        if (!job && !view)
+            fail_msg("%s", error.text);
+        fl_render_destroy(job);
+        fl_view_destroy(view);
+        fl_connection_destroy(scene.connection);
+        stop(daemon);
+        assert_int_equal(seen.renders, 1);
+        assert_int_equal(seen.first.primary, rows[i / 2].sent);
+    }
+}
+
 TEST(a_job_runs_beside_a_view_and_each_gets_its_own_frames)
 {
     struct viewing viewing;

@@ -511,6 +511,11 @@ SESSION_TEST(a_frame_that_is_still_needed_is_not_abandoned)
     engine_command_destroy(start);
 }
 
+TEST_WITH(a_daemon_says_that_it_can_choose_how_first_hits_are_found, set_up_ungreeted, tear_down)
+{
+    assert_true(greet_with(HANDSHAKE_CAN_CHOOSE_PRIMARY) & HANDSHAKE_CAN_CHOOSE_PRIMARY);
+}
+
 TEST_WITH(a_client_that_does_not_allow_abandoned_frames_gets_complete_frames, set_up_ungreeted, tear_down)
 {
     assert_int_equal(greet_with(0) & HANDSHAKE_CAN_ABANDON, 0);

@@ -231,3 +231,42 @@ TEST(deep_columns_are_searched_at_their_depth)
     }
     free(rays);
 }
+
+/* Sheets that share cells, and rays that go along between them without a hit: what a dispatch must have time for
+ * (trace_rays_a_dispatch). */
+TEST(no_ray_takes_more_rounds_than_the_structure_allows)
+{
+    enum { sheets = 60 };
+    struct ray *rays = malloc(RAY_COUNT * sizeof(*rays));
+    struct hit *counts = malloc(RAY_COUNT * sizeof(*counts));
+    struct fixture fixture;
+    uint64_t seed = 10;
+    fixture_init(&fixture, NULL, CELLS, VOXELS);
+    for (int i = 0; i < sheets; i++) {
+        const double z = 120.1 + 0.015 * i;
+        add_quad(&fixture.samples, (const double[4][3]){{20, 20, z}, {220, 20, z}, {220, 220, z}, {20, 220, z}},
+                 i % 2);
+    }
+    fixture_build(&fixture);
+    assert_true(fixture.store.depth_max == sheets);
+    for (uint32_t i = 0; i < RAY_COUNT; i++) {
+        const double o[3] = {1, (double)test_uniform(&seed, 30, 210), 120.1 + 0.015 * (i % (sheets - 1) + 0.5)};
+        rays[i] = ray_from(o, (const double[3]){1, (double)test_uniform(&seed, -0.9f, 0.9f), 0}, 0, FAR);
+    }
+    for (int f = 0; f < FORM_COUNT; f++) {
+        struct tracer_options options = forms[f].options;
+        uint32_t scanned_max = 0;
+        options.bench.abuffer_count_steps = 1;
+        trace(&fixture, &options, WAVE_CLOSEST, rays, RAY_COUNT, counts, NULL);
+        for (uint32_t i = 0; i < RAY_COUNT; i++) {
+            const uint64_t rounds = (uint64_t)counts[i].distance + counts[i].primitive;
+            if (rounds > abuffer_rounds_of_a_ray(&fixture.store, &options))
+                fail_msg("%s: ray %u takes %llu rounds", forms[f].name, i, (unsigned long long)rounds);
+            scanned_max = counts[i].primitive > scanned_max ? counts[i].primitive : scanned_max;
+        }
+        assert_true(scanned_max >= (f == DDA ? CELLS : VOXELS) * sheets / 4);
+    }
+    fixture_finish(&fixture);
+    free(rays);
+    free(counts);
+}

@@ -435,33 +435,70 @@ TEST(a_link_that_leads_back_ends_no_ray_and_loses_no_hit)
     fixture_finish(&fixture);
 }
 
-/* As a GPU does it, a few elements at a time: cutouts and tints, spheres, instances at one place, discs. */
-static void *trace_as_hardware(struct gpu_scene *gpu, const struct ray *rays, enum wave_kind kind,
-                               uint32_t elements)
+/* As a GPU does it, a few elements at a time: cutouts and tints, spheres, instances at one place, discs. Elements
+ * 0: as software GL does it, in one dispatch. */
+struct hardware_wave {
+    struct gpu_buffer rays, answers;
+    size_t answer_bytes;
+    struct tracer *tracer;
+    struct wave wave;
+};
+
+static void hardware_wave_init(struct hardware_wave *this, struct gpu_scene *gpu, const struct ray *rays,
+                               enum wave_kind kind, const struct tracer_options *options)
 {
     struct error error = {0};
-    const struct tracer_options options = {.bvh = {.rays = 1}, .bench = {.bvh_elements = elements}};
-    const size_t bytes = RAY_COUNT * (kind == WAVE_ANY ? sizeof(uint32_t) : sizeof(struct hit));
-    const bool software = device->facts.software;
-    struct gpu_buffer ray_buffer = {0}, answers = {0};
-    struct tracer *tracer = tracer_create(&tracer_bvh_impl, device, &options, &error);
-    expect_ok(tracer && tracer_update(tracer, gpu, &(struct tracer_update){0}, &error), &error);
-    expect_ok(gpu_buffer_upload(device, &ray_buffer, rays, RAY_COUNT * sizeof(struct ray), &error) &&
-                  gpu_buffer_reserve(device, &answers, bytes, &error),
+    *this = (struct hardware_wave){.tracer = tracer_create(&tracer_bvh_impl, device, options, &error)};
+    this->answer_bytes = RAY_COUNT * (kind == WAVE_ANY ? sizeof(uint32_t) : sizeof(struct hit));
+    expect_ok(this->tracer && tracer_update(this->tracer, gpu, &(struct tracer_update){0}, &error), &error);
+    expect_ok(gpu_buffer_upload(device, &this->rays, rays, RAY_COUNT * sizeof(struct ray), &error) &&
+                  gpu_buffer_reserve(device, &this->answers, this->answer_bytes, &error),
               &error);
+    this->wave = (struct wave){.kind = kind,
+                               .ray_count = RAY_COUNT,
+                               .rays = &this->rays,
+                               .hits = &this->answers,
+                               .visibility = &this->answers};
     gpu_scene_bind(gpu);
-    const struct wave wave = {
-        .kind = kind, .ray_count = RAY_COUNT, .rays = &ray_buffer, .hits = &answers, .visibility = &answers};
-    device->facts.software = elements == 0;
-    const bool traced = tracer_trace(tracer, gpu, &wave, &error);
+}
+
+static void *hardware_wave_finish(struct hardware_wave *this)
+{
+    void *answers = malloc(this->answer_bytes);
+    gpu_buffer_read(device, &this->answers, 0, answers, this->answer_bytes);
+    gpu_buffer_finish(device, &this->rays);
+    gpu_buffer_finish(device, &this->answers);
+    tracer_destroy(this->tracer);
+    return answers;
+}
+
+static void *trace_as_hardware(struct gpu_scene *gpu, const struct ray *rays, enum wave_kind kind,
+                               const struct tracer_options *options)
+{
+    struct error error = {0};
+    struct hardware_wave own;
+    const bool software = device->facts.software;
+    hardware_wave_init(&own, gpu, rays, kind, options);
+    device->facts.software = options->bench.bvh_elements == 0;
+    const bool traced = tracer_trace(own.tracer, gpu, &own.wave, &error);
     device->facts.software = software;
     expect_ok(traced, &error);
-    void *read = malloc(bytes);
-    gpu_buffer_read(device, &answers, 0, read, bytes);
-    gpu_buffer_finish(device, &ray_buffer);
-    gpu_buffer_finish(device, &answers);
-    tracer_destroy(tracer);
-    return read;
+    return hardware_wave_finish(&own);
+}
+
+/* Some are alone, and some go along with others: what a packet is made of. */
+static struct ray *rays_for_packets(uint64_t seed)
+{
+    struct ray *rays = malloc(RAY_COUNT * sizeof(struct ray));
+    for (uint32_t i = 0; i < RAY_COUNT; i++) {
+        rays[i] = make_ray(test_uniform(&seed, -3, 3), test_uniform(&seed, -1, 3), test_uniform(&seed, -4, 4),
+                           test_uniform(&seed, -1, 1), test_uniform(&seed, -1, 1), test_uniform(&seed, -1, 1));
+        if (i % 5 > 1) {
+            rays[i] = rays[i - 2];
+            rays[i].direction_t_max[0] *= test_uniform(&seed, 0.98f, 1.02f);
+        }
+    }
+    return rays;
 }
 
 TEST(answers_do_not_depend_on_how_many_elements_a_dispatch_has)
@@ -469,11 +506,11 @@ TEST(answers_do_not_depend_on_how_many_elements_a_dispatch_has)
     struct scene *(*const scenes[])(void) = {scene_of_instances, test_scene_soup, test_scene_spheres,
                                              test_scene_translucent, scene_of_squares};
     static const uint32_t budgets[] = {1, 7, 50};
-    struct ray *rays = malloc(RAY_COUNT * sizeof(struct ray));
-    uint64_t seed = 36;
-    for (uint32_t i = 0; i < RAY_COUNT; i++)
-        rays[i] = make_ray(test_uniform(&seed, -3, 3), test_uniform(&seed, -1, 3), test_uniform(&seed, -4, 4),
-                           test_uniform(&seed, -1, 1), test_uniform(&seed, -1, 1), test_uniform(&seed, -1, 1));
+    static const struct {
+        uint32_t rays;
+        bool plain;
+    } forms[] = {{1, false}, {3, false}, {8, false}, {1, true}};
+    struct ray *rays = rays_for_packets(36);
     for (size_t s = 0; s < sizeof(scenes) / sizeof(scenes[0]); s++) {
         struct error error = {0};
         struct scene_changes changes;
@@ -481,19 +518,71 @@ TEST(answers_do_not_depend_on_how_many_elements_a_dispatch_has)
         struct gpu_scene gpu;
         gpu_scene_init(&gpu, device);
         expect_ok(gpu_scene_update(&gpu, scene, NULL, &changes, NULL, &error), &error);
-        for (int kind = WAVE_CLOSEST; kind <= WAVE_ANY; kind++) {
-            void *expected = trace_as_hardware(&gpu, rays, (enum wave_kind)kind, 0);
-            const uint32_t budget = budgets[s % 3];
-            void *got = trace_as_hardware(&gpu, rays, (enum wave_kind)kind, budget);
-            assert_memory_equal(got, expected,
-                                RAY_COUNT * (kind == WAVE_ANY ? sizeof(uint32_t) : sizeof(struct hit)));
-            free(got);
-            free(expected);
+        for (size_t f = 0; f < sizeof(forms) / sizeof(forms[0]); f++) {
+            for (int kind = WAVE_CLOSEST; kind <= WAVE_ANY; kind++) {
+                struct tracer_options options = {.bvh.rays = forms[f].rays};
+                options.bench.bvh_layout = forms[f].plain ? BVH_LAYOUT_PLAIN : BVH_LAYOUT_FAST;
+                void *expected = trace_as_hardware(&gpu, rays, (enum wave_kind)kind, &options);
+                options.bench.bvh_elements = budgets[(s + f) % 3];
+                void *got = trace_as_hardware(&gpu, rays, (enum wave_kind)kind, &options);
+                assert_memory_equal(got, expected,
+                                    RAY_COUNT * (kind == WAVE_ANY ? sizeof(uint32_t) : sizeof(struct hit)));
+                free(got);
+                free(expected);
+            }
         }
         gpu_scene_finish(&gpu);
         scene_destroy(scene);
     }
     free(rays);
+}
+
+/* Rays that need many dispatches: a step ends between two of them, and others are traced before the next one. */
+TEST(a_step_ends_between_the_dispatches_that_its_rays_take)
+{
+    struct ray *rays = rays_for_packets(37), *other_rays = rays_for_packets(38);
+    struct error error = {0};
+    struct scene_changes changes;
+    struct scene *scene = scene_of_instances();
+    struct gpu_scene gpu;
+    const bool software = device->facts.software;
+    gpu_scene_init(&gpu, device);
+    expect_ok(gpu_scene_update(&gpu, scene, NULL, &changes, NULL, &error), &error);
+    for (uint32_t packet_rays = 1; packet_rays <= 8; packet_rays *= 8) {
+        struct tracer_options options = {.bvh.rays = packet_rays};
+        void *expected = trace_as_hardware(&gpu, rays, WAVE_CLOSEST, &options);
+        options.bench.bvh_elements = 4;
+        struct hardware_wave own, other;
+        hardware_wave_init(&own, &gpu, rays, WAVE_CLOSEST, &options);
+        hardware_wave_init(&other, &gpu, other_rays, WAVE_CLOSEST, &options);
+        struct trace_state *trace_state =
+            trace_state_create(&tracer_bvh_impl, device, &own.tracer->options, &error);
+        expect_ok(trace_state && tracer_trace_begin(own.tracer, &gpu, &own.wave, trace_state, &error), &error);
+        unsigned steps = 0;
+        enum tracer_progress progress = TRACER_MORE;
+        device->facts.software = false;
+        while (progress == TRACER_MORE) {
+            /* One of the smallest range and one without regard to it, in turns. */
+            progress = tracer_trace_step(own.tracer, &gpu, trace_state, steps++ % 2, &error);
+            if (steps % 4 == 0 && progress == TRACER_MORE && !tracer_trace(own.tracer, &gpu, &other.wave, &error))
+                progress = TRACER_FAILED;
+        }
+        device->facts.software = software;
+        expect_ok(progress == TRACER_DONE, &error);
+        if (steps < 8)
+            fail_msg("packets of %u: only %u steps", packet_rays, steps);
+        assert_true(trace_state_device_bytes(trace_state) > 0);
+        trace_state_destroy(trace_state);
+        void *got = hardware_wave_finish(&own);
+        assert_memory_equal(got, expected, RAY_COUNT * sizeof(struct hit));
+        free(got);
+        free(expected);
+        free(hardware_wave_finish(&other));
+    }
+    gpu_scene_finish(&gpu);
+    scene_destroy(scene);
+    free(rays);
+    free(other_rays);
 }
 
 TEST(an_impossible_packet_size_is_refused)

@@ -209,6 +209,47 @@ TEST(two_cubes_are_traversed_as_one)
     free(rays);
 }
 
+/* Sheets that all pass the same cells, and rays that go along between them without a hit: what a dispatch must
+ * have time for (trace_rays_a_dispatch). */
+TEST(no_ray_takes_more_rounds_than_the_structure_allows)
+{
+    enum { sheets = 40, resolution = 64 };
+    struct ray *rays = malloc(RAY_COUNT * sizeof(*rays));
+    struct hit *counts = malloc(RAY_COUNT * sizeof(*counts));
+    struct fixture fixture;
+    uint64_t seed = 31;
+    fixture_init(&fixture, NULL);
+    struct ldc_samples *s = &fixture.samples[LDC_CUBE_STATIC];
+    start_samples(s, resolution, resolution, 0, 0, 0);
+    for (int i = 0; i < sheets; i++) {
+        const float y = 32.1f + 0.02f * (float)i;
+        add_quad(s, (const float[3]){1, y, 1}, (const float[3]){63, y, 1}, (const float[3]){63, y, 63},
+                 (const float[3]){1, y, 63}, 0);
+    }
+    for (uint32_t i = 0; i < RAY_COUNT; i++) {
+        const float o[3] = {-1, 32.11f + 0.02f * (float)(i % (sheets - 1)), test_uniform(&seed, 2, 62)};
+        rays[i] = ray_from(o, (const float[3]){1, 0, test_uniform(&seed, -0.9f, 0.9f)}, 0, FAR);
+    }
+    for (size_t f = 0; f < FORM_COUNT; f++) {
+        struct tracer_options options = forms[f].options;
+        uint32_t tests_max = 0;
+        build(&fixture, &options);
+        fixture.store.cubes[LDC_CUBE_STATIC].layers_kept = sheets;
+        options.bench.ldc_count_steps = 1;
+        trace(&fixture, &options, WAVE_CLOSEST, rays, RAY_COUNT, counts, NULL);
+        for (uint32_t i = 0; i < RAY_COUNT; i++) {
+            const uint64_t rounds = (uint64_t)counts[i].distance + counts[i].primitive;
+            if (rounds > ldc_rounds_of_a_ray(&fixture.store))
+                fail_msg("%s: ray %u takes %llu rounds", forms[f].name, i, (unsigned long long)rounds);
+            tests_max = counts[i].primitive > tests_max ? counts[i].primitive : tests_max;
+        }
+        assert_true(tests_max >= sheets * resolution / 2);
+    }
+    fixture_finish(&fixture);
+    free(rays);
+    free(counts);
+}
+
 /* A few samples that stand still, and behind them more that move than this device has room for in cells. */
 TEST(where_cells_do_not_fit_a_pyramid_is_traversed)
 {
