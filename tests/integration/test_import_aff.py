@@ -5,6 +5,7 @@ says of files that are broken."""
 import math
 import os
 import pathlib
+import subprocess
 import tempfile
 import unittest
 
@@ -396,6 +397,29 @@ class Written(unittest.TestCase):
                 "".join("0 1 2 %d %d %d\n" % (i, i, i) for i in range(count)))
         result = self.run_text(text, seconds=5)
         self.assertEqual(result.of(importer.SET_MESH)[0]["vertices"], 3 * count)
+
+
+class Posed(unittest.TestCase):
+    def test_the_daemon_has_things_where_the_file_puts_them(self):
+        """A triangle that is moved by 2, by 10 and turned by 90 degrees; one whose vertices are half-way, with normals that
+        are as long as they are stated until then."""
+        still = "0 0 0 0 0 0 0\n1 0 0 0 0 0 0\n2 0 2 0 0 0 0\n3 0 2 0 0 0 0\n4 0 2 0 0 0 0\n"
+        text = ("a 1 3 9\nx outer { xs 1 1 1 0 0 1 0 10 0 0 { x inner { p 3\n0 0 0\n1 0 0\n0 1 0\n} } }\n"
+                "k outer { rot 5\n0 0 0 1 0 0 0 0\n1 0 0 1 0 0 0 0\n2 0 0 1 90 0 0 0\n3 0 0 1 90 0 0 0\n4 0 0 1 90 0 0 0\n}\n"
+                "k inner { transl 5\n" + still + "}\n"
+                "tpa 2\n1\n0 0 0 3 0 0\n1 0 0 3 0 0\n0 1 0 3 0 0\n3\n0 0 4 0 4 0\n1 0 4 0 4 0\n0 1 4 0 4 0\n")
+        with tempfile.TemporaryDirectory() as folder:
+            model = pathlib.Path(folder) / "model.aff"
+            model.write_text(text, encoding="utf-8")
+            dump = subprocess.run([os.path.join(importer.BIN, "tests", "tools", "pose_dump"), model, "0", "1"],
+                                  capture_output=True, text=True, check=True, timeout=60).stdout
+        corners = [[float(x) for x in line.split()[1:]] for line in dump.splitlines() if line.startswith("c ")]
+        wanted = [(0, 0, 2, 0.6, 0.8, 0), (1, 0, 2, 0.6, 0.8, 0), (0, 1, 2, 0.6, 0.8, 0),
+                  (-2, 10, 0, 0, 0, 1), (-2, 11, 0, 0, 0, 1), (-3, 10, 0, 0, 0, 1)]
+        self.assertEqual(len(corners), 6, dump)
+        for got, want in zip(corners, wanted):
+            for a, b in zip(got, want):
+                self.assertAlmostEqual(a, b, 5)
 
 
 class Bart(unittest.TestCase):
