@@ -251,6 +251,7 @@ bool aff_import(struct import_scene *scene, struct files *files, const unsigned 
     nff_init(&aff->nff, scene, bytes, size_bytes);
     aff->nff.reader.comment_marks = "#%";
     aff->nff.reader.word_marks = "{}";
+    aff->nff.reader.free_form = true;
     aff->nff.fill = (struct nff_fill){.numbers = {1, 1, 1, 1, 0, 0, 0, 1}};
     aff->files = files;
     aff->blocks[0].group_from_block = placement_identity();

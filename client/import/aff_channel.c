@@ -8,7 +8,7 @@
 #include <math.h>
 #include <string.h>
 
-/* Radians between a rotation and its samples: at most a tenth of a pixel in a picture of 1000. */
+/* Radians between a rotation and its samples, about: far less than a pixel. */
 #define ROTATION_ERROR 1e-4
 #define ROTATION_HALVINGS 12 /* of the time between two keys */
 #define CHANNEL_KEYS_MAX (1u << 24)

@@ -115,12 +115,17 @@ uint32_t word_reader_some(struct word_reader *reader, float *out, uint32_t maxim
     bool more = false;
 
     while (word_reader_skip(reader, true)) {
+        const char *before = reader->at;
         struct word word = word_reader_next(reader);
 
-        if (more || count == maximum || !to_number(word, &out[count]))
-            more = true;
-        else
+        if (!more && count < maximum && to_number(word, &out[count])) {
             count++;
+        } else if (reader->free_form) {
+            reader->at = before;
+            break;
+        } else {
+            more = true;
+        }
     }
     if (more)
         import_note(reader->scene, PROTOCOL_SEVERITY_INFO, word_reader_where(reader),

@@ -11,6 +11,7 @@ struct word_reader {
     const char *at, *end;
     const char *comment_marks; /* each begins a comment that ends with the line */
     const char *word_marks;    /* each is a word of its own */
+    bool free_form;            /* several statements may share a line */
     const char *file;          /* NULL: the model file itself */
     uint32_t line;             /* of `at`, from 1 on */
     char where[160];
@@ -38,7 +39,8 @@ int word_shown(struct word word);
 
 /* Exactly `count` numbers, over several lines if need be; false: the scene has failed. */
 bool word_reader_numbers(struct word_reader *reader, float *out, uint32_t count, const char *of);
-/* Up to `maximum` numbers of this line; stops at the first word that is none. The rest of the line is skipped. */
+/* Up to `maximum` numbers of this line; stops at the first word that is none. The rest of the line is skipped,
+ * unless the text is free in its form. */
 uint32_t word_reader_some(struct word_reader *reader, float *out, uint32_t maximum);
 /* A whole number. */
 bool word_reader_count(struct word_reader *reader, uint32_t *out, uint32_t minimum, uint32_t maximum,

@@ -87,6 +87,12 @@ class Written(unittest.TestCase):
                      importer.SET_CAMERA, importer.SET_ENVIRONMENT, importer.SET_NODE):
             self.assertEqual(ours.of(kind), theirs.of(kind))
 
+    def test_statements_may_share_a_line(self):
+        result = self.run_text("f 1 0 0 s 0 0 0 1 l 0 0 5 l 0 5 0 1 1 1 xs 1 1 1 0 0 1 0 5 0 0 { f 0 1 0 p 3 0 0 0 1 0 0 0 1 0 }")
+        self.assertEqual([material["base"][:3] for material in result.of(importer.SET_MATERIAL)], [(1, 0, 0), (0, 1, 0)])
+        self.assertEqual((len(result.of(importer.SET_LIGHT)), len(result.of(importer.SET_SPHERES))), (2, 1))
+        self.assertEqual(self.positions(result, result.of(importer.SET_MESH)[0])[0], (5, 0, 0))
+
     def test_three_colours_become_base_colour_metal_and_emission(self):
         result = self.run_text("fm 0.1 0.2 0.3 0.3 0.2 0.1 0.1 0.1 0.1 20 0 0 % a comment\n" + TRIANGLE +
                                "fm 0.1 0.1 0.1 0.2 0.1 0 0 0 0 20 0.75 1.25 # another\n" + TRIANGLE + "am 2 1 0.5\n")
@@ -169,7 +175,7 @@ class Written(unittest.TestCase):
         self.assert_near(self.floats(result, mesh["arrays"][2])[:3], (0, 0, 1))
 
     def test_spheres_scale_with_a_node_of_their_own_only_where_they_are_stretched(self):
-        result = self.run_text("xs 2 2 2 0 1 0 30 1 0 0 {\ns 0 0 1 0.5\n}\nxs 1 2 1 0 0 1 0 5 0 0 {\ns 0 0 0 1\ns 0 0 3 1\n}\n")
+        result = self.run_text("xs 2 2 2 0 1 0 30 1 0 0 { s 0 0 1 0.5 }\nxs 1 2 1 0 0 1 0 5 0 0 {\ns 0 0 0 1\ns 0 0 3 1\n}\n")
         even, uneven = result.of(importer.SET_SPHERES)
         self.assert_near(self.floats(result, even["arrays"][0]), (1 + 2 * math.sin(math.pi / 6), 0, 2 * math.cos(math.pi / 6), 1))
         self.assertEqual(self.floats(result, uneven["arrays"][0]), [0, 0, 0, 1, 0, 0, 3, 1])
