@@ -282,7 +282,7 @@ $(B)/tests/unit/corpus_tests: TEST_LIBS += $(SERVING_WRAP) $(READERS_LIBS) -lstd
 $(B)/tests/unit/media_tests: $(patsubst %,$(B)/client/viewer/%.o,camera decode heat hud input metrics paint panel pixmap replay settings tour window)
 $(B)/tests/unit/media_tests: TEST_LIBS += $(VIEWER_LIBS) -Wl,--wrap=libav_load
 $(B)/tests/unit/unit_tests: TEST_LIBS += $(call pkg_libs,libseccomp)
-$(B)/tests/unit/unit_tests: $(B)/client/helper/sandbox.o $(B)/client/import/closed.o $(MODEL_OBJ) $(RIVAL_OBJ) $(if $(filter 1,$(EMBREE)),$(CONTEST_OBJ))
+$(B)/tests/unit/unit_tests: $(B)/client/helper/sandbox.o $(addprefix $(B)/client/import/,closed.o spline.o) $(MODEL_OBJ) $(RIVAL_OBJ) $(if $(filter 1,$(EMBREE)),$(CONTEST_OBJ))
 # Measurements of the benchmark register themselves (tests/bench/bench.h). Those that hold us against Embree need it.
 EMBREE_BENCH_SRC := $(addprefix tests/bench/,embree_build.c $(addprefix bench_,contest.c embree.c forms.c forms_frames.c forms_parse.c forms_rays.c forms_samples.c parallel.c rayspace.c tracers.c))
 BENCH_SRC := $(filter-out tests/bench/shaped_link.c $(if $(filter 0,$(EMBREE)),$(EMBREE_BENCH_SRC)),$(wildcard tests/bench/*.c))
@@ -525,8 +525,8 @@ $(B)/tests/fuzz/fuzz_sealed: $(SEALED_OBJ)
 $(addprefix $(B)/tests/fuzz/fuzz_,scene sealed transaction): FUZZ_LIBS = $(call pkg_libs,libsodium libxxhash) -lm
 $(B)/tests/fuzz/fuzz_session: $(SERVING_OBJ) $(SERVER_OBJ)
 $(B)/tests/fuzz/fuzz_session: FUZZ_LIBS = $(SERVER_LIBS) $(SERVING_WRAP)
-$(addprefix $(B)/tests/fuzz/fuzz_,gltf nff obj): $(READERS_OBJ)
-$(addprefix $(B)/tests/fuzz/fuzz_,gltf nff obj): FUZZ_LIBS = $(READERS_LIBS)
+$(addprefix $(B)/tests/fuzz/fuzz_,aff gltf nff obj): $(READERS_OBJ)
+$(addprefix $(B)/tests/fuzz/fuzz_,aff gltf nff obj): FUZZ_LIBS = $(READERS_LIBS)
 # OpenImageIO loses memory with broken images; the importer lives for one model only.
 run-fuzz-gltf run-fuzz-obj: FUZZ_FLAGS = -detect_leaks=0
 .PHONY: fuzz fuzz-keep $(addprefix run-fuzz-,$(FUZZERS)) $(addprefix keep-fuzz-,$(FUZZERS))

@@ -61,7 +61,7 @@ char *files_folder_of(const char *path)
 bool files_open(struct files *files, const char *model_path, const char *environment_path,
                 char reason[FILES_REASON_BYTES])
 {
-    *files = (struct files){.folder = -1, .model = -1, .environment = -1};
+    *files = (struct files){.folder = -1, .model = -1, .environment = -1, .images = -1};
     if (model_path) {
         char *folder;
 
@@ -84,6 +84,12 @@ bool files_open(struct files *files, const char *model_path, const char *environ
     return true;
 }
 
+/* No link: it could lead to the images of others. */
+void files_open_images(struct files *files)
+{
+    files->images = openat(files->folder, FILES_IMAGES_BESIDE, O_PATH | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
+}
+
 void files_finish(struct files *files)
 {
     if (files->folder >= 0)
@@ -92,7 +98,9 @@ void files_finish(struct files *files)
         close(files->model);
     if (files->environment >= 0)
         close(files->environment);
-    files->folder = files->model = files->environment = -1;
+    if (files->images >= 0)
+        close(files->images);
+    files->folder = files->model = files->environment = files->images = -1;
 }
 
 /* Reads until the end; the size that the file system states is only where the buffer begins. */
@@ -271,11 +279,11 @@ static bool may_be_key(int descriptor)
     return fstat(descriptor, &status) == 0 && status.st_size == 32 && (status.st_mode & (S_IRWXG | S_IRWXO)) == 0;
 }
 
-unsigned char *files_read(struct files *files, const char *name, size_t *size_bytes,
-                          char reason[FILES_REASON_BYTES])
+static unsigned char *read_beneath(struct files *files, int folder, const char *name, size_t *size_bytes,
+                                   char reason[FILES_REASON_BYTES])
 {
     unsigned char *bytes = NULL;
-    int descriptor = open_beneath(files->folder, name, reason);
+    int descriptor = open_beneath(folder, name, reason);
 
     if (descriptor < 0 && strchr(name, '\\')) {
         char *slashed = strdup(name);
@@ -284,7 +292,7 @@ unsigned char *files_read(struct files *files, const char *name, size_t *size_by
             if (*at == '\\')
                 *at = '/';
         if (slashed)
-            descriptor = open_beneath(files->folder, slashed, reason);
+            descriptor = open_beneath(folder, slashed, reason);
         free(slashed);
     }
     if (descriptor < 0)
@@ -294,6 +302,23 @@ unsigned char *files_read(struct files *files, const char *name, size_t *size_by
     else if (is_regular(descriptor, reason))
         bytes = files_read_descriptor(files, descriptor, size_bytes, reason);
     close(descriptor);
+    return bytes;
+}
+
+unsigned char *files_read(struct files *files, const char *name, size_t *size_bytes,
+                          char reason[FILES_REASON_BYTES])
+{
+    return read_beneath(files, files->folder, name, size_bytes, reason);
+}
+
+unsigned char *files_read_image(struct files *files, const char *name, size_t *size_bytes,
+                                char reason[FILES_REASON_BYTES])
+{
+    char reason_beside[FILES_REASON_BYTES];
+    unsigned char *bytes = read_beneath(files, files->folder, name, size_bytes, reason);
+
+    if (!bytes && files->images >= 0)
+        bytes = read_beneath(files, files->images, name, size_bytes, reason_beside);
     return bytes;
 }
 

@@ -25,6 +25,7 @@ struct files {
     int folder;      /* descriptor of the model's folder */
     int model;       /* descriptor of the model file */
     int environment; /* likewise, -1: none */
+    int images;      /* descriptor of a folder with further images, -1: none */
     uint64_t read_bytes, read_ns;
 };
 
@@ -33,6 +34,11 @@ struct files {
 bool files_open(struct files *files, const char *model_path, const char *environment_path,
                 char reason[FILES_REASON_BYTES]);
 void files_finish(struct files *files);
+
+/* AFF's images lie beside the model's folder, in one of this name, as BART is published. */
+#define FILES_IMAGES_BESIDE "../TextureFiles"
+/* Opens it if it is there; after files_open(). */
+void files_open_images(struct files *files);
 
 /* Folder part of a path, malloc'd: "." if it has none. NULL: out of memory. */
 char *files_folder_of(const char *path);
@@ -43,6 +49,10 @@ unsigned char *files_read_descriptor(struct files *files, int descriptor, size_t
 /* `name` is relative to the model's folder; '\' also separates folders if there is no file of that very name. */
 unsigned char *files_read(struct files *files, const char *name, size_t *size_bytes,
                           char reason[FILES_REASON_BYTES]);
+
+/* Likewise; what is not in the model's folder may be in that of further images. */
+unsigned char *files_read_image(struct files *files, const char *name, size_t *size_bytes,
+                                char reason[FILES_REASON_BYTES]);
 
 /* Whether the content may be vertices and the like: no text, archive, database, program or key. False: *kind says
  * what. */

@@ -56,9 +56,10 @@ static struct record_material_range *make_ranges(const struct keyed *order, uint
     return ranges;
 }
 
-static bool show(struct import_scene *scene, enum protocol_node_kind kind, uint32_t object, const char *name)
+static bool show(struct import_scene *scene, uint32_t parent, enum protocol_node_kind kind, uint32_t object,
+                 const char *name)
 {
-    struct message_set_node node = {.kind = kind, .object = object, .name = name};
+    struct message_set_node node = {.parent = parent, .kind = kind, .object = object, .name = name};
 
     import_identity(node.parent_from_node);
     return object != 0 && import_add_node(scene, &node) != 0;
@@ -87,8 +88,8 @@ static void copy_vertices(struct import_mesh *to, const struct import_mesh *from
     to->colours = copy_array(from->colours, count * 4);
 }
 
-static bool add_lot(struct import_scene *scene, const struct import_mesh *mesh, const struct keyed *order,
-                    uint32_t *first)
+static bool add_lot(struct import_scene *scene, uint32_t parent, const struct import_mesh *mesh,
+                    const struct keyed *order, uint32_t *first)
 {
     struct import_mesh lot;
     uint32_t end = *first, range_count = 0;
@@ -106,23 +107,24 @@ static bool add_lot(struct import_scene *scene, const struct import_mesh *mesh, 
     for (uint32_t i = 0; i < lot.triangle_count; i++)
         memcpy(lot.indices + (size_t)i * 3, mesh->indices + (size_t)order[*first + i].position * 3, 12);
     *first = end;
-    return show(scene, PROTOCOL_NODE_MESH, import_add_mesh(scene, &lot), mesh->name);
+    return show(scene, parent, PROTOCOL_NODE_MESH, import_add_mesh(scene, &lot), mesh->name);
 }
 
-bool import_add_grouped_mesh(struct import_scene *scene, struct import_mesh *mesh, const uint32_t *materials)
+bool import_add_grouped_mesh(struct import_scene *scene, uint32_t parent, struct import_mesh *mesh,
+                             const uint32_t *materials)
 {
     struct keyed *order = sort_by_material(materials, mesh->triangle_count);
     bool added = order || import_fail(scene, NULL, "out of memory");
 
     for (uint32_t first = 0; added && first < mesh->triangle_count;)
-        added = add_lot(scene, mesh, order, &first);
+        added = add_lot(scene, parent, mesh, order, &first);
     free(order);
     import_mesh_finish(mesh);
     return added;
 }
 
-bool import_add_grouped_spheres(struct import_scene *scene, const char *name, const float *spheres,
-                                const uint32_t *materials, uint32_t count)
+bool import_add_grouped_spheres(struct import_scene *scene, uint32_t parent, const char *name,
+                                const float *spheres, const uint32_t *materials, uint32_t count)
 {
     struct keyed *order = sort_by_material(materials, count);
     bool added = order || import_fail(scene, NULL, "out of memory");
@@ -140,7 +142,7 @@ bool import_add_grouped_spheres(struct import_scene *scene, const char *name, co
         }
         for (uint32_t i = first; i < end; i++)
             memcpy(lot + (size_t)(i - first) * 4, spheres + (size_t)order[i].position * 4, 16);
-        added = show(scene, PROTOCOL_NODE_SPHERES,
+        added = show(scene, parent, PROTOCOL_NODE_SPHERES,
                      import_add_spheres(scene, name, lot, end - first, ranges, range_count), name);
         first = end;
     }

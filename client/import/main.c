@@ -120,28 +120,40 @@ static void leave_at_once(int status)
 #endif
 }
 
+static bool has_ending(const char *path, const char *ending)
+{
+    size_t path_length = strlen(path), length = strlen(ending);
+
+    return path_length > length && strcasecmp(path + path_length - length, ending) == 0;
+}
+
+static bool is_aff(const char *path)
+{
+    return has_ending(path, ".aff");
+}
+
 static bool enter_sandbox(struct import_scene *scene, const struct options *options)
 {
-    char *folder = options->model ? files_folder_of(options->model) : NULL;
-    const char *const folders[] = {folder};
-    struct sandbox_options sandbox = {
-        .read_folders = folders, .read_folder_count = 1, .cpu_seconds = CPU_SECONDS_MAX};
+    char *folder = options->model ? files_folder_of(options->model) : NULL, *images = NULL;
     char reason[256];
-    bool entered = sandbox_enter(&sandbox, reason, sizeof(reason));
+    bool entered;
 
+    if (folder && is_aff(options->model) && asprintf(&images, "%s/" FILES_IMAGES_BESIDE, folder) < 0)
+        images = NULL;
+    {
+        const char *const folders[] = {folder, images};
+        struct sandbox_options sandbox = {
+            .read_folders = folders, .read_folder_count = 2, .cpu_seconds = CPU_SECONDS_MAX};
+
+        entered = sandbox_enter(&sandbox, reason, sizeof(reason));
+    }
+    free(images);
     free(folder);
     if (!entered)
         return import_fail(scene, NULL, "the sandbox cannot be entered: %s", reason);
     if (reason[0])
         import_note(scene, PROTOCOL_SEVERITY_WARNING, NULL, "%s", reason);
     return true;
-}
-
-static bool has_ending(const char *path, const char *ending)
-{
-    size_t path_length = strlen(path), length = strlen(ending);
-
-    return path_length > length && strcasecmp(path + path_length - length, ending) == 0;
 }
 
 static bool is_gltf(const char *name, const unsigned char *bytes, size_t size_bytes)
@@ -161,6 +173,9 @@ static bool may_name_images(const char *name, const unsigned char *bytes, size_t
 {
     if (is_gltf(name, bytes, size_bytes))
         return contains(bytes, size_bytes, "images") || contains(bytes, size_bytes, "\\u00");
+    if (is_aff(name)) /* what it includes may name some, too */
+        return contains(bytes, size_bytes, "texturecoords") || contains(bytes, size_bytes, "tt") ||
+               contains(bytes, size_bytes, ".aff") || contains(bytes, size_bytes, ".nff");
     return has_ending(name, ".obj") && contains(bytes, size_bytes, "mtllib");
 }
 
@@ -178,7 +193,9 @@ static bool parse_model(struct import_scene *scene, struct files *files, const c
         return obj_import(scene, files, bytes, size_bytes);
     if (has_ending(name, ".nff"))
         return nff_import(scene, bytes, size_bytes);
-    return import_fail(scene, NULL, "unknown format %s; known are .gltf, .glb, .obj and .nff",
+    if (is_aff(name))
+        return aff_import(scene, files, bytes, size_bytes);
+    return import_fail(scene, NULL, "unknown format %s; known are .gltf, .glb, .obj, .nff and .aff",
                        dot ? dot : "(no ending)");
 }
 
@@ -259,6 +276,8 @@ static bool run(struct import_scene *scene, struct sender *sender, const struct 
         files_finish(&files);
         return import_fail(scene, file_part(at_fault), "cannot be opened: %s", reason);
     }
+    if (options->model && is_aff(options->model))
+        files_open_images(&files);
     begin_ns = monotonic_now_ns();
     silence_libraries();
     imported = read_and_import(scene, &files, sender, options);
@@ -283,7 +302,7 @@ int main(int argc, char **argv)
 {
     static const struct argp argp = {
         option_rows, parse_option,
-        "MODEL",     "Turn MODEL (glTF 2.0, GLB, OBJ, NFF) into messages of farlight's protocol.",
+        "MODEL",     "Turn MODEL (glTF 2.0, GLB, OBJ, NFF, AFF) into messages of farlight's protocol.",
         NULL,        NULL,
         NULL};
     static struct import_scene scene; /* the table of notes is too large for the stack of a careful program */

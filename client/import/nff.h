@@ -1,39 +1,66 @@
 /* SPDX-License-Identifier: MIT */
-/* The parts of the NFF reader: nff.c parses statements, nff_shapes.c triangulates them. */
+/* What the readers of NFF and of AFF, which is NFF with more, share: nff.c parses statements, nff_material.c makes
+ * materials of fills, nff_world.c adds the camera, lights and background. */
 #ifndef FARLIGHT_IMPORT_NFF_H
 #define FARLIGHT_IMPORT_NFF_H
 
-#include "grouping.h"
+#include "shapes.h"
+#include "word_reader.h"
 
-#define NFF_CONE_SEGMENTS 32
-#define NFF_TRIANGLES_MAX (1u << 27)
-
-/* Arrays that grow while the file is read; malloc'd. */
-struct nff_shapes {
-    struct import_scene *scene;
-    float *positions, *normals;
-    size_t vertex_count, vertex_capacity;
-    uint32_t *indices, *triangle_materials;
-    size_t triangle_count, triangle_capacity;
-    float *spheres;
-    uint32_t *sphere_materials;
-    size_t sphere_count, sphere_capacity;
-    uint64_t polygon_budget;
-    uint32_t material; /* of what comes next */
-    float lower[3], upper[3];
+struct nff_light {
+    float position[3], colour[3];
+    bool coloured;
+    uint32_t node; /* once it is added */
 };
 
-/* Each false: the scene has failed. `where` names the line. */
-bool nff_add_sphere(struct nff_shapes *shapes, const float centre[3], float radius);
-/* Corners (3 floats each), with normals (likewise) for a patch or NULL for a flat polygon. */
-bool nff_add_polygon(struct nff_shapes *shapes, const float *corners, const float *normals, uint32_t count,
-                     const char *where);
-/* Open at both ends; `ends` are base x y z radius, apex x y z radius. */
-bool nff_add_cone(struct nff_shapes *shapes, const float ends[8], const char *where);
-/* A platonic solid of 4, 6, 8 or 12 faces around a centre. */
-bool nff_add_solid(struct nff_shapes *shapes, int faces, const float centre[3], float radius, const char *where);
-/* Hands all over to the scene. */
-bool nff_finish_shapes(struct nff_shapes *shapes);
-void nff_free_shapes(struct nff_shapes *shapes);
+struct nff_fill {
+    float numbers[12]; /* `f`: red green blue Kd Ks shine T ior; `fm`: ambient, diffuse, specular, shine T ior */
+    uint32_t extended; /* 1: `fm` */
+    uint32_t texture;  /* from 1 on, as the reader numbers them; 0: none */
+};
+
+struct nff_material {
+    struct nff_fill fill;
+    char name[64];
+};
+
+struct nff {
+    struct import_scene *scene;
+    struct word_reader reader;
+    struct shapes *shapes; /* take what is read */
+    struct nff_fill fill;  /* of what comes next */
+    struct nff_light *lights;
+    size_t light_count, light_capacity;
+    struct nff_material *materials; /* number 1 first */
+    size_t material_count, material_capacity;
+    uint32_t *slots; /* open addressing: numbers of materials; 0: free */
+    size_t slot_count;
+    uint32_t *material_ids; /* by number, once they are added */
+    uint64_t polygon_budget;
+    float ambient[3]; /* the light that an `fm` shows by its ambient colour */
+    bool has_view, has_background;
+    float from[3], look_at[3], up[3], angle_degrees, hither;
+    float background[3];
+    uint32_t camera_node; /* once it is added; 0: there is no view */
+};
+
+void nff_init(struct nff *nff, struct import_scene *scene, const unsigned char *bytes, size_t size_bytes);
+void nff_free(struct nff *nff);
+
+/* Whether the word begins a statement that both formats have. If so it is read; *read is false if the scene has
+ * failed. */
+bool nff_statement(struct nff *nff, struct word word, bool *read);
+/* Position and colour of a light. */
+bool nff_read_light(struct nff *nff);
+
+/* Gives what comes next the material of the fill. */
+bool nff_use_fill(struct nff *nff);
+/* Adds the materials that were in use. textures[i] is the identifier of texture i. */
+bool nff_add_materials(struct nff *nff, const uint32_t *textures);
+
+bool nff_add_camera(struct nff *nff);
+/* NFF's lights do not weaken with distance, ours do: each is as bright as NFF wants it at the place `lit`. */
+bool nff_add_lights(struct nff *nff, const float lit[3]);
+void nff_add_background(struct nff *nff);
 
 #endif

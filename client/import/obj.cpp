@@ -248,7 +248,7 @@ void add_mesh(state &s, const std::vector<uint8_t> &colours)
         throw;
     }
     mesh.name = s.r.scene->file;
-    import_add_grouped_mesh(s.r.scene, &mesh, materials.data());
+    import_add_grouped_mesh(s.r.scene, 0, &mesh, materials.data());
 }
 
 void import(reader &r, const unsigned char *bytes, size_t size_bytes)

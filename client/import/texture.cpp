@@ -46,6 +46,7 @@ const signature signatures[] = {
     {"bmp", 0, 2, "BM"},
     {"gif", 0, 6, "GIF87a"},
     {"gif", 0, 6, "GIF89a"},
+    {"pnm", 0, 2, "P6"},
 };
 
 bool looks_like_targa(const unsigned char *bytes, size_t size_bytes)

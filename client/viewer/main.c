@@ -245,7 +245,7 @@ int main(int argc, char **argv)
         .parser = parse,
         .args_doc = "MODEL",
         .doc = "Open a window on a model, or on a shared scene of a daemon.\v"
-               "MODEL is glTF, GLB, OBJ or NFF. FARLIGHT_SERVER, FARLIGHT_SIZE and so on give defaults.",
+               "MODEL is glTF, GLB, OBJ, NFF or AFF. FARLIGHT_SERVER, FARLIGHT_SIZE and so on give defaults.",
         .children = children,
         .help_filter = help_filter};
     static struct command_line line;

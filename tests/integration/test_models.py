@@ -106,6 +106,25 @@ class Models(Case):
                     covered = sum(a != b for a, b in zip(pixels(shown), pixels(background))) / (48 * 48)
                     self.assertTrue(minimum <= covered <= maximum, f"{covered} is covered")
 
+    def test_barts_scenes_move_and_show_their_images(self):
+        """Kitchen, museum and robots at two times of their animations: the camera goes on, and no picture has the marker of
+        a missing image, magenta (which with light on it may be dark, but never has green)."""
+        with Daemon() as daemon:
+            for name, times in (("kitchen/aff/kitchen", (0, 9)), ("museum/aff/museum5", (1, 4)), ("robot/aff/Robot", (0, 20))):
+                means = []
+                for time in times:
+                    output = self.folder / "bart.png"
+                    self.expect(farlight("render", SHARED_SCENES / "rayspace" / "bart" / f"{name}.aff", "--server",
+                                         daemon.address, "--size", "64x48", "--depth", "2", "--samples", "4", "--quiet",
+                                         "--clip", "animation", "--clip-start", f"-{time}", "-o", output), 0)
+                    colours = pixels(output)
+                    self.assertGreater(len(set(colours)), 300, f"{name} at {time} s")
+                    self.assertFalse([c for c in colours if c[0] > 60 and c[2] > 60 and c[1] < 10], f"{name} at {time} s")
+                    means.append(grid_means(output))
+                # A twentieth of the range, on the average of all cells: the camera is in another place.
+                apart = [abs(a - b) for cells in zip(*means) for a, b in zip(*cells)]
+                self.assertGreater(sum(apart) / len(apart), 255 / 20, name)
+
     def test_hostile_files_are_rendered_or_refused_by_name_and_never_crash_anything(self):
         paths = models("hostile")[::HOSTILE_STRIDE]
         rendered = refused = 0

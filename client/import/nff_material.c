@@ -1,0 +1,155 @@
+/* SPDX-License-Identifier: MIT */
+#include "nff.h"
+
+#include "model.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static float unit(float value)
+{
+    return value < 0 ? 0 : value > 1 ? 1 : value;
+}
+
+static float max_component(const float colour[3])
+{
+    return fmaxf(fmaxf(colour[0], colour[1]), colour[2]);
+}
+
+/* `diffuse` is what scatters and `specular` what mirrors, which it does like a metal's share of the surface. */
+static void reflect(struct message_set_material *material, float diffuse, float specular)
+{
+    float sum = diffuse + specular;
+
+    material->metallic = sum > 0 ? specular / sum : 0;
+    /* Reflections are sharp; Shine only shapes highlights. */
+    material->roughness = specular > 0 ? 0.0f : 1.0f;
+}
+
+/* Glass mirrors by its index of refraction. */
+static void transmit(struct message_set_material *material, float through, float ior)
+{
+    material->transmission = through;
+    material->metallic = 0;
+    material->roughness = 0;
+    material->ior = ior >= 1 && ior <= 10 ? ior : 1;
+}
+
+/* The colour is that of all three, times their sum, so that each comes out as stated. */
+static void from_plain(const float n[8], struct message_set_material *material)
+{
+    float diffuse = unit(n[3]), specular = unit(n[4]), through = unit(n[6]);
+
+    reflect(material, diffuse, specular);
+    for (int c = 0; c < 3; c++)
+        material->base_colour[c] = unit(n[c] * unit(diffuse + specular));
+    if (through > 0) {
+        transmit(material, through, n[7]);
+        for (int c = 0; c < 3; c++)
+            material->base_colour[c] = unit(n[c]);
+    }
+}
+
+/* What the ambient light shows is there whatever else lights the surface: it becomes emission. Glass has the hue
+ * of what it scatters, but lets all of T through. */
+static void from_extended(const float n[12], const float ambient[3], struct message_set_material *material)
+{
+    const float *diffuse = n + 3, *specular = n + 6;
+    float brightest = fmaxf(max_component(diffuse), 0), through = unit(n[10]);
+
+    reflect(material, brightest, fmaxf(max_component(specular), 0));
+    for (int c = 0; c < 3; c++) {
+        material->base_colour[c] = unit(fmaxf(diffuse[c], 0) + fmaxf(specular[c], 0));
+        material->emission[c] = fminf(fmaxf(n[c] * ambient[c], 0), 1e6f);
+    }
+    if (through > 0) {
+        transmit(material, through, n[11]);
+        for (int c = 0; c < 3; c++)
+            material->base_colour[c] = brightest > 0 ? unit(diffuse[c] / brightest) : 1;
+    }
+}
+
+static size_t find_slot(const struct nff *nff, const struct nff_fill *fill)
+{
+    uint64_t hash = 14695981039346656037ull; /* FNV-1a */
+    const unsigned char *bytes = (const unsigned char *)fill;
+    size_t at;
+
+    for (size_t i = 0; i < sizeof(*fill); i++)
+        hash = (hash ^ bytes[i]) * 1099511628211ull;
+    for (at = (size_t)hash & (nff->slot_count - 1); nff->slots[at] != 0; at = (at + 1) & (nff->slot_count - 1))
+        if (memcmp(&nff->materials[nff->slots[at] - 1].fill, fill, sizeof(*fill)) == 0)
+            break;
+    return at;
+}
+
+static bool grow_slots(struct nff *nff)
+{
+    size_t count = nff->slot_count ? nff->slot_count * 2 : 64;
+    uint32_t *slots = calloc(count, sizeof(*slots));
+
+    if (!slots)
+        return import_fail(nff->scene, NULL, "out of memory");
+    free(nff->slots);
+    nff->slots = slots;
+    nff->slot_count = count;
+    for (size_t i = 0; i < nff->material_count; i++)
+        nff->slots[find_slot(nff, &nff->materials[i].fill)] = (uint32_t)i + 1;
+    return true;
+}
+
+bool nff_use_fill(struct nff *nff)
+{
+    struct nff_material *grown;
+    size_t at;
+
+    if (nff->material_count * 2 >= nff->slot_count && !grow_slots(nff))
+        return false;
+    at = find_slot(nff, &nff->fill);
+    if (nff->slots[at] == 0) {
+        grown =
+            import_grow(nff->scene, nff->materials, nff->material_count, &nff->material_capacity, sizeof(*grown));
+        if (!grown)
+            return false;
+        nff->materials = grown;
+        grown[nff->material_count].fill = nff->fill;
+        snprintf(grown[nff->material_count].name, sizeof(grown->name), "fill of %.50s",
+                 word_reader_where(&nff->reader));
+        nff->slots[at] = (uint32_t)++nff->material_count;
+    }
+    nff->shapes->material = nff->slots[at];
+    return true;
+}
+
+static uint32_t add_material(struct nff *nff, const struct nff_material *from, const uint32_t *textures)
+{
+    struct message_set_material material;
+    struct record_texture_use uses[5] = {0}; /* by position: 0 base colour, 4 emission */
+
+    import_material_default(&material);
+    material.double_sided = 1;
+    material.name = from->name;
+    if (from->fill.extended)
+        from_extended(from->fill.numbers, nff->ambient, &material);
+    else
+        from_plain(from->fill.numbers, &material);
+    if (from->fill.texture != 0) {
+        import_texture_use_default(&uses[0], textures[from->fill.texture]);
+        import_texture_use_default(&uses[4], textures[from->fill.texture]);
+        material.textures = uses;
+        material.textures_count = 5;
+    }
+    return import_add_material(nff->scene, &material);
+}
+
+bool nff_add_materials(struct nff *nff, const uint32_t *textures)
+{
+    nff->material_ids = calloc(nff->material_count + 1, sizeof(*nff->material_ids));
+    if (!nff->material_ids)
+        return import_fail(nff->scene, NULL, "out of memory");
+    for (size_t i = 0; i < nff->material_count && !nff->scene->failed; i++)
+        nff->material_ids[i + 1] = add_material(nff, &nff->materials[i], textures);
+    return !nff->scene->failed;
+}
