@@ -116,6 +116,8 @@ size_t context_surface_defines(const struct render_context *context, struct gpu_
         defines[n++] = (struct gpu_define){"HAS_TEXTURES", "1"};
     if (context->features.bump && exact)
         defines[n++] = (struct gpu_define){"HAS_BUMP", "1"};
+    if (context->features.textures && exact && context->scene->has_spheres)
+        defines[n++] = (struct gpu_define){"HAS_SPHERES", "1"};
     return n;
 }
 

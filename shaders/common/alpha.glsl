@@ -51,7 +51,7 @@ vec4 base_colour_at(material m, surface_point point)
     vec4 colour = m.base_colour * point.colour;
 #ifndef EVEN_ALPHA
     if (m.texture_base_colour != 0u)
-        colour *= sample_slot(m.texture_base_colour, point.uv01, 0.0);
+        colour *= sample_slot(m.texture_base_colour, point.uv01);
 #endif
     return colour;
 }
@@ -88,7 +88,7 @@ vec3 transmittance_of(candidate found, vec3 origin_world, vec3 direction_world, 
     float transmission = m.transmission * (1.0 - m.metallic);
 #ifndef EVEN_ALPHA
     if (transmission > 0.0 && m.texture_transmission != 0u)
-        transmission *= sample_slot(m.texture_transmission, point.uv01, 0.0).r;
+        transmission *= sample_slot(m.texture_transmission, point.uv01).r;
 #endif
     through = transmission * clamp(colour.rgb, 0.0, 1.0);
 #endif

@@ -73,20 +73,3 @@ vec3 same_hemisphere(vec3 shading, vec3 geometric)
     float cosine = dot(shading, geometric);
     return cosine < 0.0 ? shading - 2.0 * cosine * geometric : shading;
 }
-
-// The length of texture coordinates of set 0 per metre of a triangle: for the level of detail of a footprint.
-float texcoords_per_metre(uint instance_index, uint primitive)
-{
-    instance i = instance_at(instance_index);
-    uvec4 triangle = texelFetch(triangles, int(primitive));
-    if ((geometry_at(i.geometry).flags & GEOMETRY_HAS_TEXCOORDS_0) == 0u)
-        return 0.0;
-    vec3 p0 = texelFetch(positions, int(triangle.x)).xyz;
-    vec3 e1 = affine_vector(i.world_from_object, texelFetch(positions, int(triangle.y)).xyz - p0);
-    vec3 e2 = affine_vector(i.world_from_object, texelFetch(positions, int(triangle.z)).xyz - p0);
-    vec2 t0 = texelFetch(texcoords, int(triangle.x)).xy;
-    vec2 d1 = texelFetch(texcoords, int(triangle.y)).xy - t0;
-    vec2 d2 = texelFetch(texcoords, int(triangle.z)).xy - t0;
-    float area = length(cross(e1, e2));
-    return area > 0.0 ? sqrt(abs(d1.x * d2.y - d1.y * d2.x) / area) : 0.0;
-}

@@ -5,12 +5,14 @@
 // with the alpha that glTF has, the square of the roughness. On a smooth surface, the ray's direction and mean weight
 // are those of whitted.
 
+#include "common/cone.glsl"
 #include "common/facets.glsl"
 #include "common/scattering.glsl"
 
 struct lobe {
-    vec3 direction; // unit
-    vec3 weight;    // of the radiance along it; 0: there is no ray
+    vec3 direction;    // unit
+    vec3 weight;       // of the radiance along it; 0: there is no ray
+    float solid_angle; // 1 / the density with which it was chosen, steradians; 0: the surface is smooth
 };
 
 // The lit share of the visible facets. Heitz. Understanding the Masking-Shadowing Function. 2014: height-correlated as
@@ -29,12 +31,14 @@ lobe lobe_choose(surface s, float NoV, vec3 direction, inout float choice, vec2 
     float alpha = square(s.roughness);
     bool rough = alpha > FACET_ALPHA_MIN;
     vec3 facet = s.normal;
+    float facet_angle = 0.0;
     if (rough) {
         vec3 x, y;
         tangent_frame(s.normal, x, y);
         vec3 view = normalize(vec3(-dot(direction, x), -dot(direction, y), NoV));
         vec3 found = visible_facet(view, vec2(alpha), u);
         facet = found.x * x + found.y * y + found.z * s.normal;
+        facet_angle = 1.0 / visible_facet_density(found, view, clamp(dot(view, found), 1e-4, 1.0), vec2(alpha));
     }
     bool leaves = s.inside && s.transmission > 0.0;
     float VoH = rough ? clamp(-dot(direction, facet), 1e-4, 1.0) : NoV;
@@ -49,7 +53,7 @@ lobe lobe_choose(surface s, float NoV, vec3 direction, inout float choice, vec2 
     }
     float mirror_size = max_component(mirror), both = mirror_size + max_component(window);
     if (!(both > 0.0))
-        return lobe(s.normal, vec3(0.0));
+        return lobe(s.normal, vec3(0.0), 0.0);
     float share = mirror_size / both;
     bool mirrored = choice < share;
     choice = min(mirrored ? choice / share : (choice - share) / (1.0 - share), 0.99999994);
@@ -63,6 +67,7 @@ lobe lobe_choose(surface s, float NoV, vec3 direction, inout float choice, vec2 
         result.direction = bent;
         result.weight = window / (1.0 - share);
     }
+    result.solid_angle = facet_angle * square(facet_turn(s.inside ? 1.0 / s.ior : s.ior, mirrored));
     if (rough)
         result.weight *= lit_share(NoV, dot(result.direction, s.normal), alpha);
     return result;

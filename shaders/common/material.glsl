@@ -12,7 +12,7 @@
 
 #include "shared/hit.h"
 #include "common/sampled.glsl"
-#include "common/attributes.glsl"
+#include "common/detail.glsl"
 
 struct surface {
     vec3 position;
@@ -22,9 +22,25 @@ struct surface {
     float alpha;    // opacity; 1 unless it is blended
     vec3 emission;
     float metallic, roughness, transmission, ior, occlusion;
+    float curvature; // 1 / metre, above 0: it bulges towards the viewer; 0 if there are no textures to be filtered
     bool unlit;
     bool inside;    // seen from behind
 };
+
+// The footprint of a ray in texture coordinates of both sets. On a slanted surface it is an ellipse; the mean of its
+// axes blurs less than the longer one and flickers less than the shorter.
+vec2 footprint_of(surface_detail detail, vec3 geometric, vec3 direction, float width)
+{
+    float slant = max(abs(dot(geometric, direction)), 0.01);
+    return abs(width) * inversesqrt(slant) * detail.texcoords_per_metre;
+}
+
+// Of the two nearest levels the nearer one: half the work of blending them.
+int use_level(texture_slot slot, vec2 footprint_uv)
+{
+    int last = int(textures[slot.texture & 0x7fffffffu].flags >> TEXTURE_LEVELS_SHIFT) - 1;
+    return clamp(int(slot_level(slot, footprint_uv) + 0.5), 0, last);
+}
 
 #ifdef HAS_BUMP
 // The derivatives of the position by the texture coordinates of a slot, world space, at a hit.
@@ -69,21 +85,21 @@ bool surface_derivatives(hit h, texture_slot slot, out vec3 along_u, out vec3 al
 
 // Blinn. Simulation of Wrinkled Surfaces. 1978, in the form of Mikkelsen. Bump Mapping Unparametrized Surfaces on
 // the GPU. 2010: the slope of the height along the surface tilts the normal. The height's derivatives are
-// differences over one texel.
-vec3 bump_normal(hit h, uint slot_index, vec3 normal, vec4 uv01)
+// differences over one texel of the level that the footprint sees.
+vec3 bump_normal(hit h, uint slot_index, vec3 normal, vec4 uv01, vec2 footprint_uv)
 {
     texture_slot slot = texture_slots[slot_index];
     vec3 along_u, along_v;
     if (!surface_derivatives(h, slot, along_u, along_v))
         return normal;
-    uint image = slot.texture & 0x7fffffffu;
-    vec2 uv = slot_texcoords(slot, uv01);
-    vec2 texel = 1.0 / vec2(textures[image].width, textures[image].height);
+    texture_info info = textures[slot.texture & 0x7fffffffu];
+    int level = use_level(slot, footprint_uv);
+    vec2 uv = slot_texcoords(slot, uv01), texel = 1.0 / vec2(find_level(info, level).size);
     float height_u = 0.0, height_v = 0.0;
     for (int i = 0; i < 4; i++) { // -u, +u, -v, +v
         float side = (i & 1) != 0 ? 0.5 : -0.5;
         vec2 step = i < 2 ? vec2(side * texel.x, 0.0) : vec2(0.0, side * texel.y);
-        float height = sample_level(textures[image], 0, uv + step).r * 2.0 * side;
+        float height = sample_level(info, level, uv + step).r * 2.0 * side;
         height_u += i < 2 ? height : 0.0;
         height_v += i < 2 ? 0.0 : height;
     }
@@ -114,34 +130,8 @@ vec3 mapped_normal(hit h, vec3 normal, vec3 texel, float strength)
     return squared > 1e-8 ? mapped * inversesqrt(squared) : normal;
 }
 
-bool is_textured(material m)
-{
-    return (m.texture_base_colour | m.texture_normal | m.texture_metallic_roughness | m.texture_occlusion |
-            m.texture_emission | m.texture_transmission) != 0u;
-}
-
-// The footprint of a ray in texture coordinates; 0 if it is not known. On a slanted surface it is an ellipse; the mean
-// of its axes blurs less than the longer one and flickers less than the shorter.
-float footprint_of(hit h, material m, vec3 geometric, vec3 direction, float width)
-{
-    if (!is_textured(m) || h.primitive == HIT_NO_PRIMITIVE || h.instance == HIT_NO_PRIMITIVE ||
-        geometry_at(instance_at(h.instance).geometry).kind == GEOMETRY_SPHERES)
-        return 0.0;
-    float slant = max(abs(dot(geometric, direction)), 0.01);
-    return width * inversesqrt(slant) * texcoords_per_metre(h.instance, h.primitive);
-}
-
-// Of the two nearest levels the nearer one: half the work of blending them.
-vec4 sample_use(texture_slot slot, vec4 uv01, float footprint_uv)
-{
-    texture_info info = textures[slot.texture & 0x7fffffffu];
-    float level = footprint_uv > 0.0 ? slot_level(slot, footprint_uv) : 0.0;
-    int last = int(info.flags >> TEXTURE_LEVELS_SHIFT) - 1;
-    return sample_level(info, clamp(int(level + 0.5), 0, last), slot_texcoords(slot, uv01));
-}
-
-// Replaces the inputs that have textures, normal maps included.
-void apply_textures(inout surface s, inout vec4 colour, hit h, material m, vec4 uv01, float footprint_uv)
+// Replaces the inputs that have textures, normal and bump maps included.
+void apply_textures(inout surface s, inout vec4 colour, hit h, material m, vec4 uv01, vec2 footprint_uv)
 {
     const int BASE_COLOUR = 0, NORMAL = 1, METALLIC_ROUGHNESS = 2, OCCLUSION = 3, EMISSION = 4, TRANSMISSION = 5;
     uint uses[6] = uint[6](m.texture_base_colour, m.texture_normal, m.texture_metallic_roughness,
@@ -153,7 +143,8 @@ void apply_textures(inout surface s, inout vec4 colour, hit h, material m, vec4 
         int i = findLSB(used);
         used &= used - 1u;
         texture_slot slot = texture_slots[uses[i]];
-        vec4 texel = sample_use(slot, uv01, footprint_uv);
+        texture_info info = textures[slot.texture & 0x7fffffffu];
+        vec4 texel = sample_level(info, use_level(slot, footprint_uv), slot_texcoords(slot, uv01));
         if (i == BASE_COLOUR) {
             colour *= texel;
         } else if (i == NORMAL) {
@@ -170,6 +161,10 @@ void apply_textures(inout surface s, inout vec4 colour, hit h, material m, vec4 
             s.transmission *= texel.r;
         }
     }
+#ifdef HAS_BUMP
+    if (m.texture_bump != 0u)
+        s.normal = bump_normal(h, m.texture_bump, s.normal, uv01, footprint_uv);
+#endif
 }
 #endif
 
@@ -206,21 +201,20 @@ surface surface_at(hit h, vec3 origin, vec3 direction, float width)
     s.occlusion = 1.0;
     vec4 colour = m.base_colour * unpackUnorm4x8(h.colour);
     bool is_stored = false;
+    s.curvature = 0.0;
 #ifdef HAS_SAMPLED
     is_stored = (h.material & HIT_SAMPLED) != 0u;
     if (is_stored)
         apply_sample(s, colour, h.uv01_or_sample);
 #endif
 #ifdef HAS_TEXTURES
+    surface_detail detail = detail_at(h);
+    s.curvature = s.inside ? -detail.curvature : detail.curvature;
     if (!is_stored)
-        apply_textures(s, colour, h, m, uv01, footprint_of(h, m, s.geometric, direction, width));
+        apply_textures(s, colour, h, m, uv01, footprint_of(detail, s.geometric, direction, width));
 #endif
     s.base = clamp(colour.rgb, vec3(0.0), vec3(1.0));
     s.alpha = (m.flags & MATERIAL_ALPHA_BLEND) != 0u ? clamp(colour.a, 0.0, 1.0) : 1.0;
-#ifdef HAS_BUMP
-    if (m.texture_bump != 0u && !is_stored)
-        s.normal = bump_normal(h, m.texture_bump, s.normal, uv01);
-#endif
     if (s.inside) {
         s.geometric = -s.geometric;
         s.normal = -s.normal;

@@ -5,8 +5,8 @@
 // Defines: those of common/attributes.glsl; NO_TANGENTS: no mesh has tangents, and no material asks for those that follow
 // from texture coordinates.
 #include "common/attributes.glsl"
+#include "common/normals.glsl"
 
-layout(binding = UNIT_NORMALS) uniform samplerBuffer normals;    // xyz, handedness
 layout(binding = UNIT_TANGENTS) uniform usamplerBuffer tangents; // octahedral
 
 // Normalised between two.

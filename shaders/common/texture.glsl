@@ -72,22 +72,6 @@ vec4 sample_level(texture_info info, int level_number, vec2 uv)
     return sum;
 }
 
-// `level_of_detail`: 0 or less is the full size, each 1 more halves it; between levels the two are blended.
-vec4 sample_texture(uint texture_index, vec2 uv, float level_of_detail)
-{
-    texture_info info = textures[texture_index];
-    float last = float(info.flags >> TEXTURE_LEVELS_SHIFT) - 1.0;
-    float level = clamp(level_of_detail, 0.0, last);
-    if ((info.flags & TEXTURE_NEAREST) != 0u)
-        level = floor(level);
-    float coarser = fract(level);
-    int level_count = coarser > 0.0 ? 2 : 1;
-    vec4 sum = vec4(0.0);
-    for (int i = 0; i < level_count; i++)
-        sum += (i == 0 ? 1.0 - coarser : coarser) * sample_level(info, int(level) + i, uv);
-    return sum;
-}
-
 // Texture coordinates that a slot sees. `uv01` holds both sets.
 vec2 slot_texcoords(texture_slot slot, vec4 uv01)
 {
@@ -95,20 +79,20 @@ vec2 slot_texcoords(texture_slot slot, vec4 uv01)
     return vec2(dot(slot.uv_matrix.xy, uv) + slot.offset_u, dot(slot.uv_matrix.zw, uv) + slot.offset_v);
 }
 
-// Level at which a texel is as wide as the footprint, given in texture coordinates before the slot's matrix.
-float slot_level(texture_slot slot, float footprint_uv)
+// Level at which a texel is as wide as the footprint, which is in texture coordinates of both sets before the slot's
+// matrix.
+float slot_level(texture_slot slot, vec2 footprint_uv)
 {
     texture_info info = textures[slot.texture & 0x7fffffffu];
+    float footprint = (slot.texture & 0x80000000u) != 0u ? footprint_uv.y : footprint_uv.x;
     float scale = sqrt(abs(determinant(mat2(slot.uv_matrix.xy, slot.uv_matrix.zw))));
-    float texels_wide = footprint_uv * scale * sqrt(float(info.width) * float(info.height));
+    float texels_wide = footprint * scale * sqrt(float(info.width) * float(info.height));
     return texels_wide > 1.0 ? log2(texels_wide) : 0.0;
 }
 
-// A material's input: `slot_index` is one of its texture_* fields and not 0. `footprint_uv`: the ray's width in texture
-// coordinates; 0: the texture's full detail.
-vec4 sample_slot(uint slot_index, vec4 uv01, float footprint_uv)
+// A material's input in full detail: `slot_index` is one of its texture_* fields and not 0.
+vec4 sample_slot(uint slot_index, vec4 uv01)
 {
     texture_slot slot = texture_slots[slot_index];
-    float level = footprint_uv > 0.0 ? slot_level(slot, footprint_uv) : 0.0;
-    return sample_texture(slot.texture & 0x7fffffffu, slot_texcoords(slot, uv01), level);
+    return sample_level(textures[slot.texture & 0x7fffffffu], 0, slot_texcoords(slot, uv01));
 }

@@ -151,11 +151,7 @@ void describe(point p, out uvec2 geometry_words, out uvec4 surface_words)
     material m = materials[h.material & HIT_MATERIAL_MASK];
     vec4 uv01 = uintBitsToFloat(h.uv01_or_sample);
 #ifdef HAS_TEXTURES
-    apply_textures(s, colour, h, m, uv01, footprint_of(h, m, s.geometric, direction, cell_world));
-#endif
-#ifdef HAS_BUMP
-    if (m.texture_bump != 0u)
-        s.normal = bump_normal(h, m.texture_bump, s.normal, uv01);
+    apply_textures(s, colour, h, m, uv01, footprint_of(detail_at(h), s.geometric, direction, cell_world));
 #endif
     geometry_words = uvec2(floatBitsToUint(p.depth_cells), h.normal_geometric);
     surface_words = words_of(s, colour, h.material);

@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: MIT
 // Primitives of the batch in hand: rayspace/layout.h, RAYSPACE_ITEM_TEXELS.
+//
+// Defines: RAYSPACE_FLAT there are any.
 #include "rayspace/meet.glsl"
+
+#ifdef RAYSPACE_FLAT
 
 layout(binding = UNIT_RAYSPACE_ITEMS) uniform usamplerBuffer items;
 
@@ -21,3 +25,5 @@ uint number_of_item(uint item)
 {
     return texelFetch(items, int(item) * RAYSPACE_ITEM_TEXELS + 2).w;
 }
+
+#endif

@@ -42,14 +42,14 @@ void main()
     path p = path_at(k);
     ray r = ray_at(k);
     hit h = hit_at(k);
-    surface s = surface_at(h, r.origin_t_min.xyz, r.direction_t_max.xyz, p.cone_width + p.cone_spread * h.distance);
+    surface s = surface_of_path(p, h, r);
     // Normal and bump maps may tilt the shading normal to the other side.
     s.normal = same_hemisphere(s.normal, s.geometric);
     bool first = first_ray == 0u;
     float weight = p.weight_r * s.alpha, rest = p.weight_r - weight;
     if (first) {
         if (rest >= PATH_WEIGHT_MIN)
-            add_child(j, p, s, h.distance, r.direction_t_max.xyz, vec3(rest), true);
+            add_child(j, p, s, h.distance, r.direction_t_max.xyz, vec3(rest), true, 0.0);
         radiance[k] = vec4(vec3(0.0), weight);
     }
     note_children(j, first, ask_for_openness(j, p, s, weight, h.distance));

@@ -36,7 +36,8 @@ void add_lobe(uint j, path p, surface s, float NoV, float distance_, vec3 direct
         return;
     uint roughness = uint(max(path_roughness(p), s.roughness) * 65535.0 + 0.5);
     p.flags = p.flags & (1u << PATH_ROUGHNESS_SHIFT) - 1u | roughness << PATH_ROUGHNESS_SHIFT;
-    add_child(j, p, s, distance_, chosen.direction, carried / min(survival, 1.0), false);
+    add_child(j, p, s, distance_, chosen.direction, carried / min(survival, 1.0), false,
+              sample_solid_angle(chosen.solid_angle));
 }
 
 bool ask_for_light(uint j, path p, surface s, split parts, vec3 view, float NoV, vec3 weight, float distance_, vec2 u)
@@ -67,7 +68,7 @@ void main()
     ray r = ray_at(k);
     hit h = hit_at(k);
     vec3 direction = r.direction_t_max.xyz, view = -direction;
-    surface s = surface_at(h, r.origin_t_min.xyz, direction, p.cone_width + p.cone_spread * h.distance);
+    surface s = surface_of_path(p, h, r);
     float NoV = clamp(dot(s.normal, view), 1e-4, 1.0); // a shading normal may lean away
     split parts = split_light(s, NoV);
     uint seed = path_seed(p), index = path_sample(p), dimension = SEQUENCE_WAVE + wave_number * SEQUENCE_WAVE_SIZE;
@@ -75,7 +76,7 @@ void main()
     vec3 sent = vec3(0.0);
     bool straight = choice >= s.alpha, asked = false;
     if (straight) {
-        add_child(j, p, s, h.distance, direction, weight, true);
+        add_child(j, p, s, h.distance, direction, weight, true, 0.0);
         no_shadow_ray(j);
     } else if (s.unlit) {
         sent = s.base;

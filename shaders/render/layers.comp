@@ -40,7 +40,7 @@ void main()
     ray r = ray_at(k);
     vec3 place = r.origin_t_min.xyz + h.distance * r.direction_t_max.xyz;
 #ifdef NEEDS_SURFACE
-    surface s = surface_at(h, r.origin_t_min.xyz, r.direction_t_max.xyz, p.cone_width + p.cone_spread * h.distance);
+    surface s = surface_of_path(p, h, r);
     put(LAYER_BIT_ALBEDO, k, vec4(s.base, 1.0));
     put(LAYER_BIT_NORMAL, k, vec4(s.normal, 1.0));
 #endif

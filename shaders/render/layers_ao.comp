@@ -21,7 +21,7 @@ void main()
     path p = path_at(k);
     ray r = ray_at(k);
     hit h = hit_at(k);
-    surface s = surface_at(h, r.origin_t_min.xyz, r.direction_t_max.xyz, p.cone_width + p.cone_spread * h.distance);
+    surface s = surface_of_path(p, h, r);
     s.normal = same_hemisphere(s.normal, s.geometric);
     vec3 origin = off_surface(s, h.distance, s.geometric);
     uint seed = path_seed(p);

@@ -192,7 +192,8 @@ void go_on(eye_hit e, uint seed, uint index, bool asked, float choice)
         meet_lights(p, e, off_surface(e.s, e.distance_, side * e.s.geometric), chosen.direction, found,
                    sequence_number(seed, numbers_of(SEQUENCE_PATH_MET_LIGHT), index));
 #endif
-    add_child(e.j, p, e.s, e.distance_, chosen.direction, carried / survival, false);
+    float angle = chosen.probability > 0.0 ? 1.0 / chosen.probability : rough_solid_angle(e.s, chosen.direction);
+    add_child(e.j, p, e.s, e.distance_, chosen.direction, carried / survival, false, sample_solid_angle(angle));
 }
 
 // The area light that the ray hit before the surface.
@@ -219,7 +220,7 @@ void main()
     hit h = hit_at(k);
     vec3 direction = r.direction_t_max.xyz, view = -direction;
     e.distance_ = h.distance;
-    e.s = surface_at(h, r.origin_t_min.xyz, direction, e.p.cone_width + e.p.cone_spread * h.distance);
+    e.s = surface_of_path(e.p, h, r);
     e.origin = off_surface(e.s, h.distance, e.s.geometric);
     e.last = last_wave != 0u || (e.p.flags & PATH_BOUNCES_MASK) >= frame.depth;
     e.all_lights = 0.0;
@@ -262,7 +263,7 @@ void main()
     if (straight) {
         e.p.light_number = e.p.light_distance > h.distance ? e.p.light_number : 0u;
         e.p.light_distance -= h.distance;
-        add_child(j, e.p, e.s, h.distance, direction, e.weight, true);
+        add_child(j, e.p, e.s, h.distance, direction, e.weight, true, 0.0);
     } else if (!e.s.unlit) {
         go_on(e, seed, index, asks, min(choice / e.s.alpha, 0.99999994));
     }

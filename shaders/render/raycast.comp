@@ -56,7 +56,7 @@ void main()
     ray r = ray_at(k);
     hit h = hit_at(k);
     vec3 direction = r.direction_t_max.xyz;
-    surface s = surface_at(h, r.origin_t_min.xyz, direction, p.cone_width + p.cone_spread * h.distance);
+    surface s = surface_of_path(p, h, r);
     float transmission = s.transmission * (1.0 - s.metallic), opacity = s.alpha * (1.0 - transmission);
     vec3 through = mix(vec3(1.0), transmission * s.base, s.alpha);
     if ((materials[h.material & HIT_MATERIAL_MASK].flags & MATERIAL_ALPHA_BLEND) == 0u && transmission == 0.0) {
@@ -66,7 +66,7 @@ void main()
     vec3 rest = weight * through;
     bool goes_on = max_component(rest) >= PATH_WEIGHT_MIN; // not if it is NaN
     if (goes_on)
-        add_child(j, p, s, h.distance, direction, rest, true);
+        add_child(j, p, s, h.distance, direction, rest, true, 0.0);
     radiance[k] = vec4(weight * opacity * (s.unlit ? s.base : lit(p, s, direction, h.distance)),
                        goes_on ? weight.r - rest.r : weight.r);
     note_children(j, true, 0u);

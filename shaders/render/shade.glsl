@@ -7,6 +7,7 @@
 #include "shared/path.h"
 #include "shared/ray.h"
 #include "common/camera.glsl"
+#include "common/cone.glsl"
 #include "common/dispatch.glsl"
 #include "common/material.glsl"
 #include "common/sequence.glsl"
@@ -66,6 +67,48 @@ uint path_sample(path p)
     return frame.sample_index + (p.sample_slot & (1u << frame.sample_shift) - 1u);
 }
 
+vec2 cone_at(path p, float distance_)
+{
+    return vec2(p.cone_width + p.cone_spread * distance_, p.cone_spread);
+}
+
+surface surface_of_path(path p, hit h, ray r)
+{
+    return surface_at(h, r.origin_t_min.xyz, r.direction_t_max.xyz, cone_at(p, h.distance).x);
+}
+
+float index_ratio(surface s)
+{
+    return s.inside ? 1.0 / s.ior : s.ior; // behind / before
+}
+
+// The cone of a ray that a surface sends on. `solid_angle`: see add_child().
+vec2 cone_sent_on(vec2 cone, surface s, vec3 direction, float solid_angle)
+{
+    float cosine = dot(direction, s.normal);
+    if (dot(direction, s.geometric) > 0.0) {
+        cone = cone_mirrored(cone, s.curvature);
+    } else {
+        float eta = index_ratio(s), sine_squared = min(square(eta) * (1.0 - square(cosine)), 0.99);
+        cone = cone_refracted(cone, s.curvature, eta, sqrt(1.0 - sine_squared), max(-cosine, 0.1));
+    }
+    return solid_angle > 0.0 ? cone_scattered(cone, solid_angle) : cone;
+}
+
+// The directions that the surface's roughness spreads a mirrored or refracted ray over, steradians. A smooth one: 0.
+float rough_solid_angle(surface s, vec3 direction)
+{
+    return lobe_solid_angle(square(s.roughness), facet_turn(index_ratio(s), dot(direction, s.geometric) > 0.0));
+}
+
+// Of the directions that one of the pixel's samples stands for, if it was chosen with a density of 1 / `solid_angle`.
+// The cone is half as wide as its share: at full width the noise is 2 dB lower still, but models whose textures are
+// atlases are 1 dB farther from the truth at 64 samples, as a wide footprint reaches over other parts of the image.
+float sample_solid_angle(float solid_angle)
+{
+    return square(0.5 * frame.far_width.y) * solid_angle;
+}
+
 vec3 off_surface(surface s, float distance_, vec3 side)
 {
     return s.position + PATH_OFFSET * max(max_component(abs(s.position)), distance_) * side;
@@ -73,8 +116,10 @@ vec3 off_surface(surface s, float distance_, vec3 side)
 
 uint child_count = 0u, child_octant = 0u;
 
-// A child without weight or direction, or beyond the depth, is left out. All else is the parent's.
-void add_child(uint j, path parent, surface s, float distance_, vec3 direction, vec3 weight, bool straight)
+// A child without weight or direction, or beyond the depth, is left out. All else is the parent's. `solid_angle`: of the
+// directions that it stands for, steradians; 0: a smooth mirror or window sends it on, or it goes straight on.
+void add_child(uint j, path parent, surface s, float distance_, vec3 direction, vec3 weight, bool straight,
+               float solid_angle)
 {
     uint bounces = (parent.flags & PATH_BOUNCES_MASK) + (straight ? 0u : 1u);
     if (!(dot(direction, direction) > 0.5) || last_wave != 0u || bounces > frame.depth)
@@ -89,8 +134,13 @@ void add_child(uint j, path parent, surface s, float distance_, vec3 direction, 
     c.weight_g = weight.g;
     c.weight_b = weight.b;
     c.sample_slot = parent.sample_slot;
-    c.cone_width = parent.cone_width + parent.cone_spread * distance_;
-    c.cone_spread = parent.cone_spread;
+    vec2 cone = cone_at(parent, distance_);
+#ifdef HAS_TEXTURES // else nobody asks for it
+    if (!straight)
+        cone = cone_sent_on(cone, s, direction, solid_angle);
+#endif
+    c.cone_width = cone.x;
+    c.cone_spread = cone.y;
     uint kept = straight ? ~PATH_BOUNCES_MASK : ~(PATH_BOUNCES_MASK | PATH_STRAIGHT);
     c.flags = bounces | parent.flags & kept;
     c.time = parent.time;

@@ -22,7 +22,7 @@ void add_child_of_weight(uint j, path parent, surface s, float distance_, vec3 d
 {
     // not `<`: NaN ends here as well
     if (max_component(weight) >= PATH_WEIGHT_MIN)
-        add_child(j, parent, s, distance_, direction, weight, straight);
+        add_child(j, parent, s, distance_, direction, weight, straight, rough_solid_angle(s, direction));
 }
 
 // Returns the number of the batch's live shadow rays.
@@ -84,8 +84,7 @@ void main()
     ray r = ray_at(k);
     hit h = hit_at(k);
     bool first = first_ray == 0u;
-    float width = p.cone_width + p.cone_spread * h.distance;
-    surface s = surface_at(h, r.origin_t_min.xyz, r.direction_t_max.xyz, width);
+    surface s = surface_of_path(p, h, r);
     vec3 view = -r.direction_t_max.xyz;
     float NoV = clamp(dot(s.normal, view), 1e-4, 1.0); // a shading normal may lean away
     split parts = split_light(s, NoV);

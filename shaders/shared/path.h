@@ -15,7 +15,7 @@
 struct path {
     float weight_r, weight_g, weight_b; /* share of this ray's radiance that reaches the eye */
     uint sample_slot;                   /* in the slice: pixel times the samples that are together, plus sample */
-    float cone_width, cone_spread;      /* ray cone: width at the origin, growth per unit of length */
+    float cone_width, cone_spread;      /* at the origin, and per metre: common/cone.glsl */
     uint flags;                         /* PATH_* */
     float time;                         /* 0: the shutter opens .. 1: it closes */
     /* integrator path: the weights of lights that the ray hits, as shares of their radiance */

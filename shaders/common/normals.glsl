@@ -1,0 +1,5 @@
+// SPDX-License-Identifier: MIT
+// Apart, as few stages read them, and a stage has few samplers.
+#include "shared/bindings.h"
+
+layout(binding = UNIT_NORMALS) uniform samplerBuffer normals; // xyz, handedness
