@@ -5,8 +5,10 @@
 #include "base/clock.h"
 #include "base/log.h"
 #include "base/prefault.h"
+#include "gpu/binary_cache.h"
 #include "gpu/debug.h"
 #include "gpu/egl.h"
+#include "gpu/program_ahead.h"
 #include "gpu/program_cache.h"
 #include "gpu/registry.h"
 #include "gpu/uniforms.h"
@@ -203,6 +205,13 @@ struct gpu_device *gpu_device_create(const struct gpu_options *options, struct e
         goto fail;
     }
     ask_facts(&device->facts, device->info.software, device->egl->robust, debug);
+    if (device->facts.has_program_binary)
+        device->binaries = gpu_binary_cache_open(options->binaries_bytes);
+    device->ahead = gpu_ahead_create(device);
+    if (!device->ahead) {
+        error_set(error, ERROR_OUT_OF_MEMORY, "device", "no memory for a device");
+        goto fail;
+    }
     device->memory_limit_bytes = device->facts.memory.bytes;
     device->compiles = options->compiles;
     device->measured = options->measured;
@@ -224,6 +233,8 @@ void gpu_device_destroy(struct gpu_device *device)
 {
     if (!device)
         return;
+    gpu_ahead_destroy(device->ahead);
+    gpu_binary_cache_close(device->binaries);
     if (device->registry)
         gpu_registry_destroy_all(device->registry);
     gpu_program_cache_destroy(device->programs);

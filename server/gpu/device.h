@@ -58,6 +58,9 @@ struct gpu_device {
     struct gpu_egl *egl;                /* private to device.c */
     struct gpu_registry *registry;      /* every GL object that lives, see registry.h */
     struct gpu_program_cache *programs; /* private to program.c */
+    struct gpu_binary_cache *binaries;  /* on the disk; NULL: none are kept */
+    struct gpu_ahead *ahead;            /* what compiles ahead */
+    bool announces;                     /* see gpu_program_announce */
     unsigned empty_buffer;              /* 256 zero bytes, bound in place of an empty buffer */
     struct gpu_uniform_ring uniform_ring;
     struct gpu_unseen unseen;
@@ -80,7 +83,8 @@ struct gpu_options {
     bool software;                /* insist on software */
     bool debug;                   /* debug context, messages to the log */
     struct gpu_measured measured; /* of this device by an earlier context; not known: of the disk */
-    bool compiles; /* no program is taken from the disk, where all that are compiled go nevertheless */
+    bool compiles;           /* no program is taken from the disk, where all that are compiled go nevertheless */
+    uint64_t binaries_bytes; /* of programs on the disk at most; 0: no limit */
 };
 
 /* Devices that give an OpenGL 4.5 core context; each is opened for a moment to be asked its name.

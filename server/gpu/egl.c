@@ -162,6 +162,26 @@ bool gpu_egl_open(struct gpu_egl *egl, const struct gpu_egl_place *place, bool d
     return true;
 }
 
+bool gpu_egl_open_beside(struct gpu_egl *beside, const struct gpu_egl *egl)
+{
+    *beside = (struct gpu_egl){.display = egl->display};
+    if (eglBindAPI(EGL_OPENGL_API) &&
+        create_any_context(beside, eglQueryString(egl->display, EGL_EXTENSIONS), false) &&
+        eglMakeCurrent(beside->display, EGL_NO_SURFACE, EGL_NO_SURFACE, beside->context))
+        return true;
+    gpu_egl_close_beside(beside);
+    return false;
+}
+
+void gpu_egl_close_beside(struct gpu_egl *beside)
+{
+    eglMakeCurrent(beside->display, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
+    if (beside->context)
+        eglDestroyContext(beside->display, beside->context);
+    eglReleaseThread();
+    *beside = (struct gpu_egl){0};
+}
+
 void gpu_egl_close(struct gpu_egl *egl)
 {
     if (!egl->display)

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 #include "gpu/measured.h"
 
+#include "gpu/binary_cache.h"
 #include "gpu/device.h"
-#include "gpu/program_cache.h"
 #include "protocol/version.h"
 
 #include <math.h>

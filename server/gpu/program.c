@@ -2,40 +2,36 @@
 #include "gpu/program.h"
 
 #include "base/clock.h"
-#include "base/log.h"
-#include "base/progress.h"
+#include "base/hashmap.h"
 #include "gpu/barrier.h"
+#include "gpu/binary_cache.h"
+#include "gpu/program_ahead.h"
+#include "gpu/program_build.h"
 #include "gpu/program_cache.h"
-#include "gpu/program_source.h"
 #include "gpu/registry.h"
 #include "gpu/uniforms.h"
 #include "gpu/watch.h"
 
 #include <epoxy/gl.h>
-#include <stdio.h>
+#include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
 #include <xxhash.h>
 
-#define STAGE_MAX 3
 #define KEY_MAX 1024
 
 struct cached_program {
     struct gpu_program program;
+    struct hashmap_link link; /* in `found` */
     struct cached_program *next;
     uint64_t build_ns;
+    bool compiled;
     char key[]; /* files and defines */
 };
 
 struct gpu_program_cache {
     struct cached_program *first;
-};
-
-struct shader_stage {
-    GLenum type;
-    const char *path;
-    struct gpu_source_text text;
-    GLuint shader;
+    struct hashmap found; /* by the key's hash: a frame asks some hundred times */
 };
 
 struct gpu_program_cache *gpu_program_cache_create(void)
@@ -52,181 +48,190 @@ void gpu_program_cache_destroy(struct gpu_program_cache *cache)
         gpu_uniforms_destroy(at->program.uniforms);
         free(at);
     }
+    hashmap_finish(&cache->found);
     free(cache);
 }
 
+struct key {
+    size_t length; /* more than KEY_MAX: it is too long */
+    char text[KEY_MAX + 1];
+};
+
+static void key_append(struct key *key, const char *text, char end)
+{
+    const size_t length = text ? strlen(text) : 0;
+    if (length + 1 > KEY_MAX - key->length) {
+        key->length = KEY_MAX + 1;
+        return;
+    }
+    if (text)
+        memcpy(key->text + key->length, text, length);
+    key->text[key->length + length] = end;
+    key->length += length + 1;
+}
+
 /* One line for files and defines; false: longer than KEY_MAX. */
-static bool make_key(char key[KEY_MAX], const struct gpu_program_source *source)
+static bool make_key(struct key *key, const struct gpu_program_source *source, struct error *error)
 {
     const char *paths[] = {source->compute, source->vertex, source->geometry, source->fragment};
-    size_t length = 0;
-    for (size_t i = 0; i < sizeof(paths) / sizeof(paths[0]) && length < KEY_MAX; i++)
-        length += (size_t)snprintf(key + length, KEY_MAX - length, "%s;", paths[i] ? paths[i] : "");
-    for (const struct gpu_define *define = source->defines; define && define->name && length < KEY_MAX; define++)
-        length += (size_t)snprintf(key + length, KEY_MAX - length, "%s=%s;", define->name,
-                                   define->value ? define->value : "1");
-    return length < KEY_MAX;
-}
-
-static unsigned list_stages(struct shader_stage stages[STAGE_MAX], const struct gpu_program_source *source)
-{
-    unsigned count = 0;
-    if (source->compute)
-        stages[count++] = (struct shader_stage){.type = GL_COMPUTE_SHADER, .path = source->compute};
-    if (source->vertex)
-        stages[count++] = (struct shader_stage){.type = GL_VERTEX_SHADER, .path = source->vertex};
-    if (source->geometry && count < STAGE_MAX)
-        stages[count++] = (struct shader_stage){.type = GL_GEOMETRY_SHADER, .path = source->geometry};
-    if (source->fragment && count < STAGE_MAX)
-        stages[count++] = (struct shader_stage){.type = GL_FRAGMENT_SHADER, .path = source->fragment};
-    return count;
-}
-
-static bool compile(struct shader_stage *stage, struct error *error)
-{
-    char log[4096] = "", named[sizeof(((struct error *)0)->text)];
-    const GLchar *text = stage->text.text;
-    GLint length = (GLint)stage->text.length, compiled = GL_FALSE;
-    stage->shader = glCreateShader(stage->type);
-    glShaderSource(stage->shader, 1, &text, &length);
-    glCompileShader(stage->shader);
-    glGetShaderiv(stage->shader, GL_COMPILE_STATUS, &compiled);
-    if (compiled)
-        return true;
-    gpu_note_loss(gpu_device_current(), error);
-    glGetShaderInfoLog(stage->shader, sizeof(log), NULL, log);
-    gpu_source_name_files(&stage->text, log, named, sizeof(named));
-    return error_set(error, ERROR_INTERNAL, stage->path, "%s", named);
-}
-
-static bool link_program(GLuint program, struct shader_stage *stages, unsigned stage_count, struct error *error)
-{
-    for (unsigned i = 0; i < stage_count; i++) {
-        if (!compile(&stages[i], error))
-            return false;
-        glAttachShader(program, stages[i].shader);
+    key->length = 0;
+    for (size_t i = 0; i < sizeof(paths) / sizeof(paths[0]) && key->length <= KEY_MAX; i++)
+        key_append(key, paths[i], ';');
+    for (const struct gpu_define *at = source->defines; at && at->name && key->length <= KEY_MAX; at++) {
+        key_append(key, at->name, '=');
+        if (key->length <= KEY_MAX)
+            key_append(key, at->value ? at->value : "1", ';');
     }
-    GLint linked = GL_FALSE;
-    glLinkProgram(program);
-    glGetProgramiv(program, GL_LINK_STATUS, &linked);
-    progress_tell();
-    for (unsigned i = 0; i < stage_count; i++)
-        glDetachShader(program, stages[i].shader);
-    if (linked)
-        return true;
-    gpu_note_loss(gpu_device_current(), error);
-    char log[sizeof(error->text)] = "";
-    glGetProgramInfoLog(program, sizeof(log), NULL, log);
-    return error_set(error, ERROR_INTERNAL, stages[0].path, "%s", log);
-}
-
-static struct gpu_binary_key binary_key(const struct gpu_device *device, const struct shader_stage *stages,
-                                        unsigned stage_count)
-{
-    XXH3_state_t *state = XXH3_createState();
-    if (!state)
-        return (struct gpu_binary_key){0};
-    XXH3_128bits_reset(state);
-    for (unsigned i = 0; i < stage_count; i++)
-        XXH3_128bits_update(state, stages[i].text.text, stages[i].text.length + 1);
-    XXH3_128bits_update(state, device->info.vendor, strlen(device->info.vendor) + 1);
-    XXH3_128bits_update(state, device->info.name, strlen(device->info.name) + 1);
-    XXH3_128bits_update(state, device->info.version, strlen(device->info.version) + 1);
-    XXH128_hash_t hash = XXH3_128bits_digest(state);
-    XXH3_freeState(state);
-    return (struct gpu_binary_key){hash.low64, hash.high64};
-}
-
-/* From the disk, else compiled. */
-static bool build(struct gpu_device *device, GLuint program, struct shader_stage *stages, unsigned stage_count,
-                  struct error *error)
-{
-    struct gpu_binary_key key = {0};
-    for (unsigned i = 0; i < stage_count; i++)
-        if (!stages[i].text.text)
-            return false;
-    if (device->facts.has_program_binary) {
-        key = binary_key(device, stages, stage_count);
-        glProgramParameteri(program, GL_PROGRAM_BINARY_RETRIEVABLE_HINT, GL_TRUE);
-        if (!device->compiles && gpu_binary_load(&key, program))
-            return true;
-    }
-    if (!link_program(program, stages, stage_count, error))
-        return false;
-    if (device->facts.has_program_binary)
-        gpu_binary_store(&key, program);
+    if (key->length > KEY_MAX)
+        return error_set(error, ERROR_INTERNAL, NULL, "a program's files and defines take more than %d bytes",
+                         KEY_MAX);
+    key->text[key->length] = '\0';
     return true;
 }
 
-static struct cached_program *add_program(struct gpu_device *device, const struct gpu_program *program,
-                                          bool is_compute, const char *key)
+static struct cached_program *find_program(const struct gpu_program_cache *cache, const struct key *key,
+                                           uint64_t hash)
 {
-    size_t key_bytes = strlen(key) + 1;
-    struct cached_program *cached = malloc(sizeof(*cached) + key_bytes);
+    for (struct hashmap_link *link = hashmap_get(&cache->found, hash); link; link = link->next) {
+        struct cached_program *at =
+            (struct cached_program *)(void *)((char *)link - offsetof(struct cached_program, link));
+        if (strcmp(at->key, key->text) == 0)
+            return at;
+    }
+    return NULL;
+}
+
+static bool load(GLuint program, const struct gpu_binary *binary)
+{
+    GLint linked = GL_FALSE;
+    if (!binary->data)
+        return false;
+    glProgramBinary(program, binary->format, binary->data, (GLsizei)binary->size_bytes);
+    /* A format of another driver is an error of GL and no more than a miss here. */
+    if (glGetError() == GL_NO_ERROR)
+        glGetProgramiv(program, GL_LINK_STATUS, &linked);
+    return linked == GL_TRUE;
+}
+
+static void store(struct gpu_device *device, GLuint program, const struct gpu_binary_key *key)
+{
+    struct gpu_binary binary = {0};
+    if (device->binaries && gpu_build_binary(&binary, program))
+        gpu_binary_write(device->binaries, key, &binary);
+    gpu_binary_finish(&binary);
+}
+
+/* From what was compiled ahead or is on the disk, else compiled. */
+static bool link_program(struct gpu_device *device, GLuint program, struct gpu_build *build,
+                         struct gpu_binary *binary, bool *compiled, struct error *error)
+{
+    struct error failed = {0};
+    *compiled = binary->data != NULL;
+    if (load(program, binary))
+        return true;
+    gpu_binary_finish(binary);
+    *compiled = false;
+    if (!device->compiles && gpu_binary_read(device->binaries, &build->key, binary) && load(program, binary))
+        return true;
+    *compiled = true;
+    gpu_build_start(build, program);
+    if (gpu_build_end(build, program, &failed)) {
+        store(device, program, &build->key);
+        return true;
+    }
+    gpu_note_loss(device, error);
+    if (error && error->kind == ERROR_NONE)
+        *error = failed;
+    return false;
+}
+
+static struct cached_program *add_program(struct gpu_device *device, const struct gpu_program *program,
+                                          bool is_compute, const struct key *key, uint64_t hash)
+{
+    struct cached_program *cached = malloc(sizeof(*cached) + key->length + 1);
     if (!cached)
         return NULL;
     GLint size[3] = {1, 1, 1};
     if (is_compute)
         glGetProgramiv(program->name, GL_COMPUTE_WORK_GROUP_SIZE, size);
-    cached->program = *program;
+    *cached = (struct cached_program){.program = *program};
     cached->program.group_size = (uint32_t)(size[0] * size[1] * size[2]);
-    memcpy(cached->key, key, key_bytes);
+    memcpy(cached->key, key->text, key->length + 1);
+    if (!hashmap_chain(&device->programs->found, hash, &cached->link)) {
+        free(cached);
+        return NULL;
+    }
     cached->next = device->programs->first;
     device->programs->first = cached;
     return cached;
 }
 
 static const struct gpu_program *create_program(struct gpu_device *device, const struct gpu_program_source *source,
-                                                const char *key, struct error *error)
+                                                const struct key *key, uint64_t hash, struct error *error)
 {
-    struct shader_stage stages[STAGE_MAX];
-    unsigned stage_count = list_stages(stages, source);
     struct cached_program *program = NULL;
+    struct gpu_build build = {0};
+    struct gpu_binary binary = {0};
+    bool compiled = false;
     const uint64_t start_ns = clock_now_ns();
     GLuint name = gpu_object_create(device->registry, GPU_PROGRAM);
     bool ok = name != 0;
     if (!ok)
         gpu_note_loss(device, error);
-    struct gpu_program made = {.name = name, .uniforms = gpu_uniforms_create()};
-    ok = ok && made.uniforms;
-    for (unsigned i = 0; ok && i < stage_count; i++)
-        ok = gpu_source_expand(&stages[i].text, gpu_source_lookup_embedded, stages[i].path, source->defines,
-                               error) &&
-             gpu_uniforms_take(made.uniforms, &stages[i].text, source->defines, error);
-    for (unsigned i = 0; ok && i < stage_count; i++) {
-        gpu_accesses_add(&made, stages[i].text.text);
-        ok = gpu_uniforms_put(made.uniforms, &stages[i].text, error);
-    }
-    ok = ok && build(device, name, stages, stage_count, error) &&
-         (!device->facts.debug_output || gpu_accesses_check(&made, error));
-    for (unsigned i = 0; i < stage_count; i++) {
-        gpu_source_finish(&stages[i].text);
-        glDeleteShader(stages[i].shader);
-    }
+    ok = ok && (gpu_ahead_take(device->ahead, key->text, &build, &binary) ||
+                gpu_build_prepare(&build, device, source, error));
+    build.program.name = name;
+    ok = ok && link_program(device, name, &build, &binary, &compiled, error) &&
+         (!device->facts.debug_output || gpu_accesses_check(&build.program, error));
     if (ok)
-        program = add_program(device, &made, source->compute != NULL, key);
+        program = add_program(device, &build.program, source->compute != NULL, key, hash);
+    if (program)
+        build.program.uniforms = NULL; /* handed over */
+    gpu_build_finish(&build);
+    gpu_binary_finish(&binary);
     if (!program) {
-        gpu_uniforms_destroy(made.uniforms);
         gpu_object_destroy(device->registry, GPU_PROGRAM, name);
         error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a program"); /* unless a reason stands there */
         return NULL;
     }
+    program->compiled = compiled;
     program->build_ns = clock_now_ns() - start_ns;
     return &program->program;
+}
+
+/* Unless it is on the disk, from where it is loaded in no time. Software GL compiles at a program's first
+ * dispatch, and hardly anything before: contexts for it cost more than they gain. */
+static void announce(struct gpu_device *device, const struct gpu_program_source *source, const struct key *key)
+{
+    struct gpu_build build;
+    if (device->facts.software || !device->facts.has_program_binary || device->compiles ||
+        gpu_ahead_knows(device->ahead, key->text) || !gpu_build_prepare(&build, device, source, NULL))
+        return;
+    if (gpu_binary_is_there(device->binaries, &build.key))
+        gpu_build_finish(&build);
+    else
+        gpu_ahead_add(device->ahead, key->text, &build);
+}
+
+void gpu_program_announce(struct gpu_device *device, bool begin)
+{
+    device->announces = begin;
 }
 
 const struct gpu_program *gpu_program_get(struct gpu_device *device, const struct gpu_program_source *source,
                                           struct error *error)
 {
-    char key[KEY_MAX];
-    if (!make_key(key, source)) {
-        error_set(error, ERROR_INTERNAL, NULL, "a program's files and defines take more than %d bytes", KEY_MAX);
+    struct key key;
+    if (!make_key(&key, source, error))
+        return NULL;
+    const uint64_t hash = XXH3_64bits(key.text, key.length);
+    const struct cached_program *known = find_program(device->programs, &key, hash);
+    if (device->announces) {
+        if (!known)
+            announce(device, source, &key);
         return NULL;
     }
-    for (struct cached_program *at = device->programs->first; at; at = at->next)
-        if (strcmp(at->key, key) == 0)
-            return &at->program;
-    return create_program(device, source, key, error);
+    return known ? &known->program : create_program(device, source, &key, hash, error);
 }
 
 bool gpu_program_stat(const struct gpu_device *device, size_t index, struct gpu_program_stat *stat)
@@ -235,7 +240,8 @@ bool gpu_program_stat(const struct gpu_device *device, size_t index, struct gpu_
     while (at && index > 0)
         at = at->next, index--;
     if (at)
-        *stat = (struct gpu_program_stat){.key = at->key, .name = at->program.name, .build_ns = at->build_ns};
+        *stat = (struct gpu_program_stat){
+            .key = at->key, .name = at->program.name, .build_ns = at->build_ns, .compiled = at->compiled};
     return at;
 }
 

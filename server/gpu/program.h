@@ -3,8 +3,8 @@
  *
  * `#include "common/math.glsl"` is resolved from the root of shaders/, each file once per program, with
  * #line so that the driver's messages name file and line. A `#version 450 core` line and the defines are put in
- * front. Programs are cached by (files, defines) for the life of the device, and their binaries on the disk below
- * $XDG_CACHE_HOME/farlight (or ~/.cache/farlight) where the driver has binaries and the folder can be written.
+ * front. Programs are cached by (files, defines) for the life of the device, and their binaries on the disk where
+ * the driver has binaries (gpu/binary_cache.h).
  *
  * `#include NAME` takes the path from the define of that name, whose value is then a path in double quotes; such
  * a define is not seen by GLSL. A file that is included again is skipped, so no `#include` may stand in a branch
@@ -37,11 +37,17 @@ struct gpu_program {
 const struct gpu_program *gpu_program_get(struct gpu_device *device, const struct gpu_program_source *source,
                                           struct error *error);
 
+/* From true to false, what is got is only announced: gpu_program_get() returns NULL without an error and looks up
+ * nothing, and the programs that are not known yet are compiled by threads until they are got in earnest
+ * (gpu/program_ahead.h). In the order of need; what may not be needed is not announced. */
+void gpu_program_announce(struct gpu_device *device, bool begin);
+
 /* A program that the device has, for who looks it over. */
 struct gpu_program_stat {
     const char *key;   /* files and defines, each followed by ';'; as long as the device lives */
     unsigned name;     /* GL program */
     uint64_t build_ns; /* from the sources, or from the disk */
+    bool compiled;     /* from the sources, here or ahead */
 };
 /* Those that were got so far, the newest first; false: there are no more. */
 bool gpu_program_stat(const struct gpu_device *device, size_t index, struct gpu_program_stat *stat);

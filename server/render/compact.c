@@ -176,3 +176,20 @@ void compact_rays(struct render_context *context, struct wave *wave)
     wave->counts_index = WAVE_RAYS;
     stop_in(context, wave);
 }
+
+void compact_announce_hits(struct render_context *context)
+{
+    (void)context_use(context, "render/hit_count.comp", NULL);
+    (void)use_scan(context, true, NULL);
+    (void)context_use(context, "render/hit_list.comp", NULL);
+}
+
+void compact_announce_children(struct render_context *context, bool sorts)
+{
+    if (!context->counts_on_host)
+        (void)context_use(context, "render/shadow_count.comp", NULL);
+    if (sorts)
+        (void)context_use(context, "render/compact_sample.comp", NULL);
+    (void)context_use(context, "render/compact_count.comp", NULL);
+    (void)use_scan(context, false, NULL);
+}

@@ -30,4 +30,8 @@ bool compact_shadow_rays(struct render_context *context, uint32_t count, bool al
 /* Makes the wave one of the current wave's rays. */
 void compact_rays(struct render_context *context, struct wave *wave);
 
+/* Announce the programs of compact_hits(), and of compact_children() and compact_shadow_rays(). */
+void compact_announce_hits(struct render_context *context);
+void compact_announce_children(struct render_context *context, bool sorts);
+
 #endif

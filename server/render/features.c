@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 #include "render/features.h"
 
+#include "shared/material.h"
+
 struct scene_features scene_features_of(const struct scene *scene)
 {
     struct scene_features features = {0};
@@ -10,6 +12,8 @@ struct scene_features scene_features_of(const struct scene *scene)
         const struct scene_material *material = value;
         for (int i = 0; i < MATERIAL_TEXTURE_COUNT; i++)
             features.textures |= material->textures[i].texture != 0;
+        features.mirrors |= material->roughness < MIRROR_ROUGHNESS_GONE || material->transmission > 0.0f ||
+                            material->alpha_mode == ALPHA_BLEND;
         features.anisotropy |= material->anisotropy > 0.0f;
         features.bump |= material->textures[MATERIAL_BUMP].texture != 0;
     }

@@ -13,6 +13,7 @@ struct scene_features {
     bool bump;        /* one of them is a bump map */
     bool area_lights; /* some light is a rectangle or a sphere */
     bool anisotropy;  /* some material has a grain */
+    bool mirrors;     /* some material sends a ray on: a smooth one, glass, a blended one */
 };
 
 struct scene_features scene_features_of(const struct scene *scene);

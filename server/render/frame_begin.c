@@ -285,6 +285,20 @@ static void limit_samples(const struct frame_renderer *renderer, struct frame_re
     request->samples = request->samples < lacking ? request->samples : lacking;
 }
 
+/* Threads compile while this one goes on. */
+static void announce_programs(struct frame_renderer *renderer)
+{
+    struct render_context *context = &renderer->work->context;
+    struct wave_passes *passes = &renderer->work->passes;
+    gpu_program_announce(renderer->device, true);
+    /* What takes longest begins first; the rest is in the order of its use. */
+    wave_passes_announce_shadows(passes, context);
+    primary_announce(context, renderer->rasterise);
+    wave_passes_announce(passes, context);
+    picture_announce(&renderer->picture, context);
+    gpu_program_announce(renderer->device, false);
+}
+
 /* Once its tracers are what the scene is. */
 static bool get_ready(struct frame_renderer *renderer, struct error *error)
 {
@@ -308,6 +322,8 @@ static bool get_ready(struct frame_renderer *renderer, struct error *error)
     renderer->copying = false;
     /* A picture that has all its samples is only output again. */
     renderer->phase = request->samples ? PHASE_SAMPLE : PHASE_RESOLVE;
+    if (request->samples)
+        announce_programs(renderer);
     return request->samples || context_upload_uniforms(context, error);
 }
 

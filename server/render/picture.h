@@ -41,6 +41,8 @@ bool picture_accumulate(struct picture *picture, struct render_context *context,
 /* Before the first band is read; may be put off (gpu_reserve_begin). */
 bool picture_reserve_pixels(struct picture *picture, const struct render_context *context, struct error *error);
 /* resolve.c: band of a plane -> picture->resolved; readback.c: from there to picture->pixels. */
+/* Announces what accumulates and resolves (gpu_program_announce). */
+void picture_announce(struct picture *picture, struct render_context *context);
 bool picture_resolve_band(struct picture *picture, struct render_context *context, uint32_t plane, uint32_t band,
                           struct error *error);
 bool picture_read_band(struct picture *picture, struct render_context *context, uint32_t plane, uint32_t band,

@@ -226,12 +226,11 @@ bool primary_rasterise(struct primary *primary, struct render_context *context, 
     return drawn && gpu_check(context->device, "rasterising primary hits", error);
 }
 
-/* Rays, paths, and what the rasteriser saw. */
-static bool make_rays(const struct primary *primary, struct render_context *context, struct error *error)
+static const struct gpu_program *rays_program(bool rasterised, struct render_context *context, struct error *error)
 {
     struct gpu_define defines[5] = {0};
     size_t n = 0;
-    if (primary)
+    if (rasterised)
         defines[n++] = (struct gpu_define){"VISIBILITY", "1"};
     else if (context->spread)
         defines[n++] = (struct gpu_define){"SPREAD", "1"};
@@ -240,7 +239,13 @@ static bool make_rays(const struct primary *primary, struct render_context *cont
     if (context->scene->has_motion)
         defines[n++] = (struct gpu_define){"HAS_TIMES", "1"};
     const struct gpu_program_source source = {.compute = "render/primary.comp", .defines = defines};
-    const struct gpu_program *program = gpu_program_get(context->device, &source, error);
+    return gpu_program_get(context->device, &source, error);
+}
+
+/* Rays, paths, and what the rasteriser saw. */
+static bool make_rays(const struct primary *primary, struct render_context *context, struct error *error)
+{
+    const struct gpu_program *program = rays_program(primary != NULL, context, error);
     if (!program)
         return false;
     context_bind(context);
@@ -260,14 +265,19 @@ static bool make_rays(const struct primary *primary, struct render_context *cont
     return true;
 }
 
-static bool fill_hits(struct render_context *context, struct error *error)
+static const struct gpu_program *fill_program(struct render_context *context, struct error *error)
 {
     struct gpu_define defines[TRACE_SURFACE_DEFINES + 2] = {0};
     size_t n = trace_surface_defines(context->scene, defines);
     if (context->scene->has_spheres && context->scene->has_cutout)
         defines[n++] = (struct gpu_define){"HAS_CUTOUT", "1"};
     const struct gpu_program_source source = {.compute = "render/primary_fill.comp", .defines = defines};
-    const struct gpu_program *program = gpu_program_get(context->device, &source, error);
+    return gpu_program_get(context->device, &source, error);
+}
+
+static bool fill_hits(struct render_context *context, struct error *error)
+{
+    const struct gpu_program *program = fill_program(context, error);
     if (!program)
         return false;
     context_bind(context);
@@ -278,9 +288,9 @@ static bool fill_hits(struct render_context *context, struct error *error)
     return true;
 }
 
-static bool trace_hits(struct render_context *context, bool *done, struct error *error)
+static struct wave camera_wave(struct render_context *context)
 {
-    struct wave wave = {
+    return (struct wave){
         .kind = WAVE_CLOSEST,
         .rays = &context->rays,
         .hits = &context->hits,
@@ -288,6 +298,11 @@ static bool trace_hits(struct render_context *context, bool *done, struct error 
         .shared_origin = context->request.camera.fov_y > 0.0f && !(context->uniforms.lens[0] > 0.0f), /* an eye */
         .origin_spread = context->request.camera.fov_y > 0.0f ? 2.0f * context->uniforms.lens[0] : 0.0f,
     };
+}
+
+static bool trace_hits(struct render_context *context, bool *done, struct error *error)
+{
+    struct wave wave = camera_wave(context);
     compact_rays(context, &wave);
     return wave_trace(context, RAY_PRIMARY, &wave, done, error);
 }
@@ -316,4 +331,27 @@ bool primary_find(const struct primary *primary, struct render_context *context,
         compact_hits(context, error) && (!primary || context->hit_count == 0 || fill_hits(context, error));
     context_span_end(context);
     return found;
+}
+
+static bool has_sort(const struct gpu_scene *scene, enum primitive_sort sort)
+{
+    uint32_t first;
+    for (uint32_t i = 0; i < scene->instance_count; i++)
+        if (primitives_of(scene, sort, i, &first) > 0)
+            return true;
+    return sort == SORT_DISCS && scene->disc_count > 0;
+}
+
+void primary_announce(struct render_context *context, bool rasterised)
+{
+    for (enum primitive_sort sort = 0; rasterised && sort < SORT_COUNT; sort++)
+        if (has_sort(context->scene, sort))
+            (void)get_program(context, kind_of_sort[sort], has_cutout(context, sort), NULL);
+    (void)rays_program(rasterised, context, NULL);
+    context->sampled_hits = !rasterised && context->tracer->impl->sampled;
+    const struct wave wave = camera_wave(context);
+    if (rasterised)
+        (void)fill_program(context, NULL);
+    else
+        wave_announce(context, &wave, true);
 }

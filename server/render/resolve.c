@@ -43,6 +43,18 @@ static const struct gpu_program *use_ycbcr(struct render_context *context, uint3
     return program;
 }
 
+void picture_announce(struct picture *picture, struct render_context *context)
+{
+    (void)context_use(context, "render/accumulate.comp", NULL);
+    for (uint32_t plane = 0; plane < picture->plane_count; plane++) {
+        const enum layer layer = picture_plane_layer(picture, plane);
+        if (layer == LAYER_BEAUTY && context->request.ycbcr != YCBCR_NONE)
+            (void)use_ycbcr(context, 0, NULL);
+        else
+            (void)use_pixels(context, layer, 0, NULL);
+    }
+}
+
 bool picture_resolve_band(struct picture *picture, struct render_context *context, uint32_t plane, uint32_t band,
                           struct error *error)
 {

@@ -108,25 +108,31 @@ static bool shade_hits(struct wave_passes *passes, struct render_context *contex
     return program != NULL;
 }
 
-/* What the paths that left the scene bring home. */
-static bool left_scene(struct wave_passes *passes, struct render_context *context, struct error *error)
+static const struct gpu_program *left_scene_program(const struct wave_passes *passes,
+                                                    struct render_context *context, struct error *error)
 {
     struct gpu_define defines[4] = {0};
     size_t n = 0;
-    if (context->counts_on_host && context->hit_count == context->ray_count)
-        return true;
     if (context->environment->kind == ENVIRONMENT_IMAGE)
         defines[n++] = (struct gpu_define){"HAS_ENVIRONMENT_IMAGE", "1"};
     if (passes->integrator->left_scene)
         defines[n++] = (struct gpu_define){passes->integrator->left_scene, "1"};
     if (passes->integrator->left_scene && context->features.area_lights)
         defines[n++] = (struct gpu_define){"HAS_AREA_LIGHTS", "1"};
+    return context_use_with(context, "render/left_scene.comp", defines, error);
+}
+
+/* What the paths that left the scene bring home. */
+static bool left_scene(struct wave_passes *passes, struct render_context *context, struct error *error)
+{
+    if (context->counts_on_host && context->hit_count == context->ray_count)
+        return true;
+    const struct gpu_program *program = left_scene_program(passes, context, error);
+    if (!program)
+        return false;
     context_bind(context);
     gpu_buffer_bind_texels(context->device, environment_lights(context->environment, context->scene),
                            UNIT_SHADE_LIGHTS, GL_RGBA32F);
-    const struct gpu_program *program = context_use_with(context, "render/left_scene.comp", defines, error);
-    if (!program)
-        return false;
     gpu_buffer_bind_storage(&context->rays, BIND_RAYS);
     gpu_buffer_bind_storage(&context->paths, BIND_PATHS);
     gpu_buffer_bind_storage(&context->hit_places, BIND_HIT_PLACES);
@@ -151,12 +157,18 @@ static bool trace_shadows(struct wave_passes *passes, struct render_context *con
            wave_trace(context, RAY_SHADOW, &wave, done, error);
 }
 
+static const struct gpu_program *gather_program(const struct wave_passes *passes, struct render_context *context,
+                                                struct error *error)
+{
+    const struct gpu_define defines[2] = {{passes->integrator->gather, "1"}, {NULL, NULL}};
+    return context_use_with(context, "render/gather.comp", defines, error);
+}
+
 /* Adds the light that they let through to the wave's radiance, and after the last batch that to the samples. */
 static bool gather(struct wave_passes *passes, struct render_context *context, bool last, uint32_t rays_a_hit,
                    struct error *error)
 {
-    const struct gpu_define defines[2] = {{passes->integrator->gather, "1"}, {NULL, NULL}};
-    const struct gpu_program *program = context_use_with(context, "render/gather.comp", defines, error);
+    const struct gpu_program *program = gather_program(passes, context, error);
     if (!program)
         return false;
     gpu_uniform_uint(program, "batch_rays", rays_a_hit);
@@ -173,11 +185,15 @@ static bool gather(struct wave_passes *passes, struct render_context *context, b
     return true;
 }
 
-static bool move_children(struct wave_passes *passes, struct render_context *context, struct error *error)
+static const struct gpu_program *move_program(struct render_context *context, struct error *error)
 {
     static const struct gpu_define times[] = {{"HAS_TIMES", "1"}, {NULL, NULL}};
-    const struct gpu_program *program =
-        context_use_with(context, "render/compact_move.comp", context->scene->has_motion ? times : NULL, error);
+    return context_use_with(context, "render/compact_move.comp", context->scene->has_motion ? times : NULL, error);
+}
+
+static bool move_children(struct wave_passes *passes, struct render_context *context, struct error *error)
+{
+    const struct gpu_program *program = move_program(context, error);
     if (!program)
         return false;
     gpu_uniform_uint(program, "children_a_hit", passes->integrator->children_a_hit);
@@ -264,4 +280,38 @@ enum wave_progress wave_passes_shade(struct wave_passes *passes, struct render_c
     if (!trace_shadows(passes, context, &done, error))
         return WAVE_FAILED;
     return done ? finish_batch(passes, context, error) : WAVE_AGAIN;
+}
+
+void wave_passes_announce_shadows(struct wave_passes *passes, struct render_context *context)
+{
+    /* Towards points on a light that each hit chooses for itself they go all ways. */
+    const bool coherent = passes->integrator->shadows_together && !context->features.area_lights;
+    const struct wave shadows = {.kind = WAVE_ANY,
+                                 .times = context->scene->has_motion ? &passes->shadow_times : NULL};
+    if (passes->integrator->shadow_rays_a_hit(context) > 0)
+        wave_announce(context, &shadows, coherent);
+}
+
+static void announce_bounces(struct wave_passes *passes, struct render_context *context)
+{
+    const struct wave bounces = {.kind = WAVE_CLOSEST, .times = context_ray_times(context)};
+    context->sampled_hits = context->tracer->impl->sampled;
+    (void)move_program(context, NULL);
+    wave_announce(context, &bounces, false);
+    (void)shade_program(passes, context, NULL);
+}
+
+void wave_passes_announce(struct wave_passes *passes, struct render_context *context)
+{
+    const struct integrator *integrator = passes->integrator;
+    const bool shows_something = context->scene->instance_count > 0;
+    compact_announce_hits(context);
+    if (shows_something)
+        (void)shade_program(passes, context, NULL);
+    (void)left_scene_program(passes, context, NULL);
+    (void)gather_program(passes, context, NULL);
+    compact_announce_children(context, integrator->scatters);
+    if (shows_something && context->request.depth > 0 &&
+        (integrator->always_bounces || (integrator->mirrors && context->features.mirrors)))
+        announce_bounces(passes, context);
 }

@@ -59,3 +59,13 @@ bool wave_trace(struct render_context *context, enum ray_kind kind, const struct
     *done = progress == TRACER_DONE;
     return progress != TRACER_FAILED;
 }
+
+void wave_announce(struct render_context *context, const struct wave *wave, bool coherent)
+{
+    struct wave own = *wave;
+    own.ray_count = context->wave_capacity;
+    if (!context->counts_on_host)
+        own.counts = &context->wave_state;
+    if (!context->comparison)
+        tracer_announce(context->tracer, context->scene, &own, coherent);
+}

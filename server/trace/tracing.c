@@ -217,6 +217,15 @@ enum tracer_progress tracer_trace_step(struct tracer *tracer, struct gpu_scene *
     return TRACER_FAILED;
 }
 
+void tracer_announce(struct tracer *tracer, struct gpu_scene *scene, const struct wave *wave, bool coherent)
+{
+    const struct ray_range rays = {.wave = wave, .end = wave->ray_count};
+    if (!tracer->impl->announce)
+        return;
+    tracer->impl->announce(tracer, scene, wave, coherent);
+    (void)make_surfaces(tracer, scene, &rays, NULL);
+}
+
 /* ---- at once ---- */
 
 static bool trace_at_once(struct tracer *tracer, struct gpu_scene *scene, const struct wave *wave, bool surfaces,

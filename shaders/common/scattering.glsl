@@ -10,11 +10,12 @@
 //
 // Defines: those of common/material.glsl.
 
+#include "shared/material.h"
 #include "common/brdf.glsl"
 #include "common/material.glsl"
 
-// Roughness at which the mirror ray begins to fade and at which it is gone.
-const float MIRROR_ROUGHNESS_SHARP = 0.1, MIRROR_ROUGHNESS_GONE = 0.5;
+// Roughness at which the mirror ray begins to fade; at MIRROR_ROUGHNESS_GONE it is gone.
+const float MIRROR_ROUGHNESS_SHARP = 0.1;
 
 // How a surface splits the light along the view.
 struct split {

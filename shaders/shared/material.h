@@ -42,4 +42,6 @@ SHARED_SIZE(texture_info, 16)
 #define TEXTURE_WRAP_V_SHIFT 4u
 #define TEXTURE_LEVELS_SHIFT 8u /* number of levels, 1 and more */
 
+#define MIRROR_ROUGHNESS_GONE 0.5f /* surfaces as rough send out no mirror ray; a bit less rough, a faint one */
+
 #endif

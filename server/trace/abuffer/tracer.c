@@ -174,6 +174,14 @@ static bool abuffer_trace_range(struct tracer *tracer, struct gpu_scene *scene, 
     return abuffer_intersect(&((struct abuffer *)tracer)->store, scene, rays, &tracer->options, error);
 }
 
+static void abuffer_announce(struct tracer *tracer, struct gpu_scene *scene, const struct wave *wave,
+                             bool coherent)
+{
+    const struct ray_range rays = {.wave = wave, .end = wave->ray_count};
+    (void)coherent;
+    (void)abuffer_intersect(&((struct abuffer *)tracer)->store, scene, &rays, &tracer->options, NULL);
+}
+
 static bool abuffer_make_surfaces(struct tracer *tracer, struct gpu_scene *scene, const struct ray_range *rays,
                                   struct error *error)
 {
@@ -191,5 +199,6 @@ const struct tracer_impl tracer_abuffer_impl = {
     .abandon = abuffer_abandon,
     .tell = abuffer_tell,
     .trace_range = abuffer_trace_range,
+    .announce = abuffer_announce,
     .surfaces = abuffer_make_surfaces,
 };

@@ -34,13 +34,14 @@ float bvh_packet_reach(const struct gpu_scene *scene, const struct wave *wave)
     return wave->origin_spread > reach && !scene->has_motion ? wave->origin_spread : reach;
 }
 
+static const struct gpu_program_source coherence_source = {.compute = "bvh/coherence.comp"};
+
 /* Of a sample of the wave: live rays, and the traversals that they would need. */
 static bool measure_coherence(struct bvh *bvh, const struct gpu_scene *scene, const struct wave *wave,
                               uint32_t counts[2], struct error *error)
 {
     struct gpu_device *device = scene->device;
-    const struct gpu_program *program =
-        gpu_program_get(device, &(struct gpu_program_source){.compute = "bvh/coherence.comp"}, error);
+    const struct gpu_program *program = gpu_program_get(device, &coherence_source, error);
     if (!program)
         return false;
     uint32_t groups = wave->ray_count / PACKET_RAYS_SOFTWARE;
@@ -61,6 +62,18 @@ static bool measure_coherence(struct bvh *bvh, const struct gpu_scene *scene, co
     gpu_dispatch(device, program, groups / step);
     gpu_buffer_read(device, &bvh->coherence, 0, counts, BVH_COHERENCE_BYTES);
     return true;
+}
+
+uint32_t bvh_packet_rays_expected(struct bvh *bvh, const struct wave *wave, bool coherent)
+{
+    const struct tracer_options *options = &bvh->base.options;
+    const bool measured = bvh->base.device->facts.software && wave->ray_count >= COHERENCE_RAYS_MIN &&
+                          options->bench.bvh_layout != BVH_LAYOUT_PLAIN && options->bvh.rays == 0;
+    if (measured)
+        (void)gpu_program_get(bvh->base.device, &coherence_source, NULL);
+    if (measured)
+        return coherent ? 0 : 1;
+    return options->bvh.rays ? options->bvh.rays : 1;
 }
 
 uint32_t bvh_packet_rays(struct bvh *bvh, const struct gpu_scene *scene, const struct wave *wave,

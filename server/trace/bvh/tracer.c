@@ -279,6 +279,18 @@ static bool bvh_trace_range(struct tracer *tracer, struct gpu_scene *scene, stru
     return true;
 }
 
+static void bvh_announce(struct tracer *tracer, struct gpu_scene *scene, const struct wave *wave, bool coherent)
+{
+    struct bvh *bvh = (struct bvh *)tracer;
+    const uint32_t packet_rays = bvh_packet_rays_expected(bvh, wave, coherent);
+    if (packet_rays == 0)
+        return;
+    struct bvh_state state = {.base.wave = *wave, .packet_rays = packet_rays};
+    const struct ray_range rays = {.wave = &state.base.wave, .end = wave->ray_count};
+    state.ray_pairs = bvh_ray_pairs(bvh, scene, wave, state.packet_rays);
+    (void)bvh_trace_range(tracer, scene, &state.base, &rays, NULL);
+}
+
 const struct tracer_impl tracer_bvh_impl = {
     .name = "bvh",
     .finds_first_hits = true,
@@ -295,4 +307,5 @@ const struct tracer_impl tracer_bvh_impl = {
     .state_device_bytes = bvh_state_device_bytes,
     .trace_begin = bvh_trace_begin,
     .trace_range = bvh_trace_range,
+    .announce = bvh_announce,
 };

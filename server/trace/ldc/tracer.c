@@ -248,6 +248,13 @@ static bool ldc_trace_range(struct tracer *tracer, struct gpu_scene *scene, stru
     return ldc_intersect(&((struct ldc *)tracer)->store, scene, rays, &tracer->options, error);
 }
 
+static void ldc_announce(struct tracer *tracer, struct gpu_scene *scene, const struct wave *wave, bool coherent)
+{
+    const struct ray_range rays = {.wave = wave, .end = wave->ray_count};
+    (void)coherent;
+    (void)ldc_intersect(&((struct ldc *)tracer)->store, scene, &rays, &tracer->options, NULL);
+}
+
 static bool ldc_make_surfaces(struct tracer *tracer, struct gpu_scene *scene, const struct ray_range *rays,
                               struct error *error)
 {
@@ -266,5 +273,6 @@ const struct tracer_impl tracer_ldc_impl = {
     .abandon = ldc_abandon,
     .tell = ldc_tell,
     .trace_range = ldc_trace_range,
+    .announce = ldc_announce,
     .surfaces = ldc_make_surfaces,
 };

@@ -1,0 +1,224 @@
+/* SPDX-License-Identifier: MIT */
+#include "gpu/program_ahead.h"
+
+#include "gpu/egl.h"
+
+#include <epoxy/gl.h>
+#include <pthread.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Compilers are single threads. More would need more memory and gain little: a frame has a few large programs. */
+#define THREADS_MAX 2
+/* Where the driver has threads of its own for them. */
+#define TOGETHER_MAX 32
+
+enum state { WAITING, BEGUN, DONE };
+
+struct item {
+    struct item *next; /* in the order in which they were announced, which is that of their need */
+    struct gpu_build build;
+    struct gpu_binary binary;
+    enum state state;
+    char key[]; /* files and defines */
+};
+
+struct gpu_ahead {
+    const struct gpu_device *device;
+    bool together;        /* the driver compiles several at a time */
+    pthread_mutex_t lock; /* of all that follows */
+    pthread_cond_t changed;
+    struct item *first, **end;
+    pthread_t threads[THREADS_MAX];
+    bool started[THREADS_MAX], ended[THREADS_MAX];
+    bool ends, unavailable; /* no context can be had */
+};
+
+struct worker {
+    struct gpu_ahead *ahead;
+    size_t number;
+};
+
+/* Locked. The next ones that wait; 0: there are none. */
+static size_t begin_items(struct gpu_ahead *ahead, struct item **items)
+{
+    const size_t max = ahead->together ? TOGETHER_MAX : 1;
+    size_t count = 0;
+    for (struct item *at = ahead->first; at && !ahead->ends && count < max; at = at->next)
+        if (at->state == WAITING) {
+            at->state = BEGUN;
+            items[count++] = at;
+        }
+    return count;
+}
+
+static void end_item(struct gpu_ahead *ahead, struct item *item, GLuint program)
+{
+    struct gpu_binary binary = {0};
+    const bool good = gpu_build_end(&item->build, program, NULL) && gpu_build_binary(&binary, program);
+    glDeleteProgram(program);
+    if (good)
+        gpu_binary_write(ahead->device->binaries, &item->build.key, &binary);
+    pthread_mutex_lock(&ahead->lock);
+    item->binary = binary;
+    item->state = DONE;
+    pthread_cond_broadcast(&ahead->changed);
+    pthread_mutex_unlock(&ahead->lock);
+}
+
+static void compile_items(struct gpu_ahead *ahead)
+{
+    struct item *items[TOGETHER_MAX];
+    GLuint programs[TOGETHER_MAX];
+    for (;;) {
+        pthread_mutex_lock(&ahead->lock);
+        const size_t count = begin_items(ahead, items);
+        pthread_mutex_unlock(&ahead->lock);
+        if (count == 0)
+            return;
+        for (size_t i = 0; i < count; i++) {
+            programs[i] = glCreateProgram();
+            gpu_build_start(&items[i]->build, programs[i]);
+        }
+        for (size_t i = 0; i < count; i++)
+            end_item(ahead, items[i], programs[i]);
+    }
+}
+
+static void *run(void *context)
+{
+    struct worker worker = *(struct worker *)context;
+    struct gpu_ahead *ahead = worker.ahead;
+    struct gpu_egl beside;
+    free(context);
+    const bool opened = gpu_egl_open_beside(&beside, ahead->device->egl);
+    if (opened) {
+        compile_items(ahead);
+        gpu_egl_close_beside(&beside);
+    }
+    pthread_mutex_lock(&ahead->lock);
+    ahead->ended[worker.number] = true;
+    ahead->unavailable |= !opened;
+    pthread_mutex_unlock(&ahead->lock);
+    return NULL;
+}
+
+struct gpu_ahead *gpu_ahead_create(const struct gpu_device *device)
+{
+    struct gpu_ahead *ahead = calloc(1, sizeof(*ahead));
+    if (!ahead)
+        return NULL;
+    ahead->device = device;
+    ahead->end = &ahead->first;
+    pthread_mutex_init(&ahead->lock, NULL);
+    pthread_cond_init(&ahead->changed, NULL);
+    return ahead;
+}
+
+void gpu_ahead_destroy(struct gpu_ahead *ahead)
+{
+    if (!ahead)
+        return;
+    pthread_mutex_lock(&ahead->lock);
+    ahead->ends = true;
+    pthread_mutex_unlock(&ahead->lock);
+    for (size_t i = 0; i < THREADS_MAX; i++)
+        if (ahead->started[i])
+            pthread_join(ahead->threads[i], NULL);
+    for (struct item *next, *at = ahead->first; at; at = next) {
+        next = at->next;
+        gpu_build_finish(&at->build);
+        gpu_binary_finish(&at->binary);
+        free(at);
+    }
+    pthread_cond_destroy(&ahead->changed);
+    pthread_mutex_destroy(&ahead->lock);
+    free(ahead);
+}
+
+/* Locked. Where it stands in the list. */
+static struct item **find(struct gpu_ahead *ahead, const char *key)
+{
+    for (struct item **at = &ahead->first; *at; at = &(*at)->next)
+        if (strcmp((*at)->key, key) == 0)
+            return at;
+    return NULL;
+}
+
+bool gpu_ahead_knows(struct gpu_ahead *ahead, const char *key)
+{
+    pthread_mutex_lock(&ahead->lock);
+    const bool knows = ahead->unavailable || find(ahead, key);
+    pthread_mutex_unlock(&ahead->lock);
+    return knows;
+}
+
+/* Locked. */
+static void start_thread(struct gpu_ahead *ahead, size_t number)
+{
+    if (ahead->started[number] && ahead->ended[number]) {
+        pthread_join(ahead->threads[number], NULL); /* which does no more than return */
+        ahead->started[number] = false;
+    }
+    struct worker *worker = ahead->started[number] ? NULL : malloc(sizeof(*worker));
+    if (!worker)
+        return;
+    *worker = (struct worker){ahead, number};
+    ahead->ended[number] = false;
+    ahead->started[number] = pthread_create(&ahead->threads[number], NULL, run, worker) == 0;
+    if (ahead->started[number])
+        pthread_setname_np(ahead->threads[number], "compile");
+    else
+        free(worker);
+}
+
+void gpu_ahead_add(struct gpu_ahead *ahead, const char *key, struct gpu_build *build)
+{
+    const size_t key_bytes = strlen(key) + 1;
+    struct item *item = malloc(sizeof(*item) + key_bytes);
+    if (!item) {
+        gpu_build_finish(build);
+        return;
+    }
+    *item = (struct item){.build = *build};
+    memcpy(item->key, key, key_bytes);
+    *build = (struct gpu_build){0};
+    pthread_mutex_lock(&ahead->lock);
+    if (!ahead->first)
+        ahead->together = epoxy_has_gl_extension("GL_KHR_parallel_shader_compile");
+    *ahead->end = item;
+    ahead->end = &item->next;
+    for (size_t i = 0; i < (ahead->together ? 1 : THREADS_MAX); i++)
+        start_thread(ahead, i);
+    pthread_mutex_unlock(&ahead->lock);
+}
+
+size_t gpu_ahead_left(struct gpu_ahead *ahead)
+{
+    size_t count = 0;
+    pthread_mutex_lock(&ahead->lock);
+    for (const struct item *at = ahead->first; at; at = at->next)
+        count++;
+    pthread_mutex_unlock(&ahead->lock);
+    return count;
+}
+
+bool gpu_ahead_take(struct gpu_ahead *ahead, const char *key, struct gpu_build *build, struct gpu_binary *binary)
+{
+    pthread_mutex_lock(&ahead->lock);
+    struct item **place = find(ahead, key), *item = place ? *place : NULL;
+    while (item && item->state == BEGUN)
+        pthread_cond_wait(&ahead->changed, &ahead->lock);
+    if (item) { /* this thread alone changes the list */
+        *place = item->next;
+        if (ahead->end == &item->next)
+            ahead->end = place;
+    }
+    pthread_mutex_unlock(&ahead->lock);
+    if (!item)
+        return false;
+    *build = item->build;
+    *binary = item->binary;
+    free(item);
+    return true;
+}
