@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The surface about a hit, for ray cones (common/cone.glsl).
 //
-// Defines: HAS_SPHERES; HAS_SAMPLED hits are stored samples, but for those of discs, and have their textures already.
+// Defines: HAS_SPHERES.
 #include "common/attributes.glsl"
 #include "common/normals.glsl"
 
@@ -9,8 +9,6 @@ struct surface_detail {
     vec2 texcoords_per_metre; // of sets 0 and 1
     float curvature;          // mean of the shading normal's, 1 / metre; above 0: it bulges to the outside
 };
-
-#ifndef HAS_SAMPLED
 
 surface_detail detail_sphere(instance i, float radius, float v)
 {
@@ -50,8 +48,6 @@ surface_detail detail_triangle(instance i, uint primitive, uint flags)
     return detail;
 }
 
-#endif
-
 surface_detail detail_at(hit h)
 {
     surface_detail detail = surface_detail(vec2(0.0), 0.0);
@@ -61,9 +57,6 @@ surface_detail detail_at(hit h)
         detail.texcoords_per_metre = vec2(0.5 / discs[h.primitive].centre_radius.w);
         return detail;
     }
-#ifdef HAS_SAMPLED
-    return detail;
-#else
     instance i = instance_at(h.instance);
     geometry g = geometry_at(i.geometry);
 #ifdef HAS_SPHERES
@@ -71,5 +64,4 @@ surface_detail detail_at(hit h)
         return detail_sphere(i, texelFetch(spheres, int(h.primitive)).w, uintBitsToFloat(h.uv01_or_sample.y));
 #endif
     return detail_triangle(i, h.primitive, g.flags);
-#endif
 }

@@ -275,10 +275,10 @@ static json_t *bench_refit(struct gpu_device *device, uint32_t triangles, uint32
     json_t *result = json_pack("{s:i, s:i, s:i, s:o, s:o, s:f, s:f, s:i, s:i}", "triangles",
                                (int)bent.gpu.geometries[0].device.primitive_count, "elements",
                                (int)((struct bvh *)bent.refitted)->tree.store.entries[0].element_count, "steps",
-                               (int)((struct bvh *)bent.refitted)->tree.store.entries[0].refit.step_count, "refit_ms",
-                               figure_json(&refits), "rebuild_ms", figure_json(&rebuilds), "trace_refitted_ms",
-                               (double)times_ns[0] / 1e6, "trace_rebuilt_ms", (double)times_ns[1] / 1e6, "rays",
-                               (int)RAY_COUNT, "differing", (int)differing);
+                               (int)((struct bvh *)bent.refitted)->tree.store.entries[0].refit.step_count,
+                               "refit_ms", figure_json(&refits), "rebuild_ms", figure_json(&rebuilds),
+                               "trace_refitted_ms", (double)times_ns[0] / 1e6, "trace_rebuilt_ms",
+                               (double)times_ns[1] / 1e6, "rays", (int)RAY_COUNT, "differing", (int)differing);
     tracer_destroy(bent.refitted);
     tracer_destroy(bent.rebuilt);
     gpu_scene_finish(&bent.gpu);

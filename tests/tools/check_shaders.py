@@ -58,6 +58,8 @@ CHOICES = {
 WITH = {"BVH_DEFORMS_IN_SHUTTER": ("BVH_DEFORMS", "HAS_MOTION"), "BVH_RESUMES": ("BVH_BUDGET",)}
 # Defines that never come with others: tracers that know the scene as the shutter opens refuse rays with times.
 WITHOUT = {tracer: ("HAS_MOTION",) for tracer in ("TRACER_LDC", "TRACER_ABUFFER", "TRACER_SVO")}
+# And in programs of a folder: what moves is met by tracers, and shaded where it was met.
+WITHOUT_IN = {"render": ("HAS_MOTION",)}
 STAGES = {"render/primary.vert": ["render/primary.vert", "render/primary.frag"],
           "rayspace/reduce.vert": ["rayspace/reduce.vert", "rayspace/reduce.geom"],
           "ldc/build.frag": ["raster/draw.vert", "raster/draw.geom", "ldc/build.frag"],
@@ -167,7 +169,7 @@ def variants(program):
                     for parts in itertools.product(*CHOICES.get(program, [[{}]]))]
     all_chosen = {name for combination in combinations for name in combination}
     for chosen in combinations:
-        never = [name for one in chosen for name in WITHOUT.get(one, ())]
+        never = [name for one in chosen for name in WITHOUT.get(one, ())] + [*WITHOUT_IN.get(program.split("/")[0], ())]
         optional = [name for name in optional_defines(stages, chosen, all_chosen) if name not in never]
         for on in [[], optional] + [[name] for name in optional if len(optional) > 1]:
             if on or on is not optional:
