@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: MIT
 // Between two passes, by one invocation: takes what the last one wrote, or halves it where it did not fit; then says
-// what the next one takes, and whether leaves are tested before it. The last time it adds up what was done.
+// what the next one takes, and whether leaves are tested before it.
 #define GROUP_SIZE 1
 #include "common/dispatch.glsl"
 #include "rayspace/control.glsl"
 #include "shared/wave.h"
 
-layout(std430, binding = BIND_RAYSPACE_TOTALS) buffer total_block { rayspace_totals totals[]; };
 layout(std430, binding = BIND_RAYSPACE_STOPPED) buffer stopped_block { uint stopped[]; };
 
 uniform uint last_from, last_to, last_later; // the stacks of the last pass
@@ -20,24 +19,12 @@ uniform uint reserve;
 uniform float band;
 uniform uint seeds;        // pairs that were put onto stack `from` since
 uniform uint ends; // 1: the batch in hand is traced, or something was left of it; 2: the wave, too
-uniform uint total;        // which of the totals
 uniform uint stopped_word; // in `stopped`; 0xffffffff: the slice cannot be stopped
 
 uvec3 groups_of(uint count, uint each)
 {
     uint groups = (count + 64u * each - 1u) / (64u * each), x = min(groups, WAVE_GROUPS_MAX);
     return uvec3(x, x > 0u ? (groups + x - 1u) / x : 1u, 1u);
-}
-
-void add_up(rayspace_control c)
-{
-    totals[total].waves++;
-    totals[total].cone_tests += c.cone_tests;
-    totals[total].triangle_tests += c.triangle_tests;
-    totals[total].passes += c.passes;
-    totals[total].halvings += c.halvings;
-    totals[total].pairs_max = max(totals[total].pairs_max, c.pairs_max);
-    totals[total].sorted_turned += c.sorted + (c.turned << 16);
 }
 
 void main()
@@ -87,9 +74,6 @@ void main()
     if (ends != 0u && all + c.leaves > 0u)
         c.left_over = 1u;
     control = c;
-    if (ends != 2u)
-        return;
-    add_up(c);
-    if (stopped_word != 0xffffffffu && c.left_over != 0u && stopped[stopped_word] == 0u)
+    if (ends == 2u && stopped_word != 0xffffffffu && c.left_over != 0u && stopped[stopped_word] == 0u)
         stopped[stopped_word] = WAVE_STOPPED_LONG;
 }

@@ -75,13 +75,6 @@ struct rayspace_control {
 };
 SHARED_SIZE(rayspace_control, 128)
 
-/* What was done for waves of a kind, since the frame began. */
-struct rayspace_totals {
-    uint rays, cone_tests, triangle_tests, pairs_max;
-    uint waves, passes, halvings, sorted_turned; /* waves of each; sorted in the lower half */
-};
-SHARED_SIZE(rayspace_totals, 32)
-
 #define BIND_RAYSPACE_CONTROL BIND_TRACER_0
 #define BIND_RAYSPACE_PAIRS BIND_TRACER_1 /* of the stack that is written to */
 #define BIND_RAYSPACE_LEAVES BIND_PASS_2
@@ -89,7 +82,6 @@ SHARED_SIZE(rayspace_totals, 32)
 #define BIND_RAYSPACE_NODES BIND_PASS_4   /* of the pass that makes them */
 #define BIND_RAYSPACE_PUT_OFF BIND_PASS_4 /* of passes */
 #define BIND_RAYSPACE_STOPPED BIND_PASS_4 /* of control.comp */
-#define BIND_RAYSPACE_TOTALS BIND_PASS_3  /* likewise */
 #define BIND_RAYSPACE_ORDER BIND_PASS_4   /* of the sort */
 #define BIND_RAYSPACE_BINS BIND_PASS_2
 #define BIND_RAYSPACE_ITEMS BIND_PASS_4 /* of the pass that makes them */

@@ -106,11 +106,6 @@ static bool reserve(struct rayspace_state *state, struct gpu_device *device, str
     if (is_flat(state))
         good = good && gpu_buffer_reserve(device, &state->items,
                                           (size_t)state->batch_max * RAYSPACE_ITEM_TEXELS * sizeof(vec4), error);
-    if (good && state->totals.size_bytes == 0) {
-        good = gpu_buffer_reserve(device, &state->totals, sizeof(struct rayspace_totals), error);
-        if (good)
-            gpu_buffer_clear(device, &state->totals, 0);
-    }
     return good && gpu_buffer_reserve(device, &state->answers, (size_t)rays * RAYSPACE_ANSWER_BYTES, error) &&
            gpu_buffer_reserve(device, &state->leaves, (size_t)state->leaves_capacity * RAYSPACE_PAIR_BYTES,
                               error) &&
@@ -177,7 +172,6 @@ static bool dispatch_control(struct rayspace_state *state, const struct gpu_scen
         return false;
     const struct rayspace_roles next = roles_of(state);
     gpu_buffer_bind_storage(&state->control, BIND_RAYSPACE_CONTROL);
-    gpu_buffer_bind_storage(&state->totals, BIND_RAYSPACE_TOTALS);
     if (wave->stopped)
         gpu_buffer_bind_storage(wave->stopped, BIND_RAYSPACE_STOPPED);
     gpu_uniform_uint(program, "last_from", state->last.from);
@@ -365,7 +359,7 @@ static enum tracer_progress descend_waiting(struct rayspace *rayspace, struct gp
             if (!next_batch(rayspace, scene, state, error))
                 return TRACER_FAILED;
         } else {
-            return tracer_progress_of(dispatch_control(state, scene, LEAVES_ALL, END_OF_WAVE, error));
+            return TRACER_DONE;
         }
     }
 }

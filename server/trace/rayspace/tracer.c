@@ -108,7 +108,6 @@ static void rayspace_state_destroy(struct trace_state *state)
     gpu_buffer_finish(state->device, &own->leaves);
     gpu_buffer_finish(state->device, &own->control);
     rayspace_reduction_finish(state->device, &own->reduction);
-    gpu_buffer_finish(state->device, &own->totals);
     gpu_buffer_finish(state->device, &own->order);
     gpu_buffer_finish(state->device, &own->bins);
     gpu_buffer_finish(state->device, &own->items);
@@ -119,9 +118,8 @@ static uint64_t rayspace_state_bytes(const struct trace_state *state)
 {
     const struct rayspace_state *own = (const struct rayspace_state *)state;
     uint64_t bytes = own->nodes.capacity_bytes + own->answers.capacity_bytes + own->leaves.capacity_bytes +
-                     own->control.capacity_bytes + own->totals.capacity_bytes + own->order.capacity_bytes +
-                     own->bins.capacity_bytes + own->items.capacity_bytes +
-                     rayspace_reduction_bytes(&own->reduction);
+                     own->control.capacity_bytes + own->order.capacity_bytes + own->bins.capacity_bytes +
+                     own->items.capacity_bytes + rayspace_reduction_bytes(&own->reduction);
     for (unsigned i = 0; i < RAYSPACE_STACKS; i++)
         bytes += own->stacks[i].capacity_bytes;
     return bytes;

@@ -31,7 +31,7 @@ struct rayspace_roles {
 struct rayspace_state {
     struct trace_state base;
     struct rayspace_levels levels;
-    struct gpu_buffer nodes, answers, stacks[RAYSPACE_STACKS], leaves, control, totals;
+    struct gpu_buffer nodes, answers, stacks[RAYSPACE_STACKS], leaves, control;
     struct gpu_buffer order, bins;      /* of the sort */
     struct gpu_buffer items;            /* of the flat descent: of the batch in hand */
     uint32_t capacity, leaves_capacity; /* pairs */
