@@ -294,7 +294,7 @@ static double seconds_left(const struct session *session)
 /* Longer each time, and no longer than is left. False: interrupted. */
 static bool pause_before_retry(const struct session *session, uint32_t min_ms, struct fl_error *error)
 {
-    const double left_s = seconds_left(session);
+    const double left_s = fmax(seconds_left(session), 0); /* closing the connection may have taken the rest */
     uint32_t pause_ms = cli_retry_pause_ms(session->failures, min_ms);
     if (pause_ms * 1e-3 > left_s)
         pause_ms = (uint32_t)(left_s * 1e3) + 1;

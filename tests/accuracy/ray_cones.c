@@ -236,6 +236,7 @@ TEST(a_cone_off_a_ball_is_as_wide_as_a_bundle_of_rays)
 static const char detail_text[] =
     "#include \"shared/bindings.h\"\n"
     "layout(local_size_x = 1) in;\n"
+    "#include \"common/detail.glsl\"\n"
     "#include \"common/surface.glsl\"\n"
     "layout(std430, binding = BIND_PASS_0) readonly buffer hit_block { uvec4 asked; };\n"
     "layout(std430, binding = BIND_PASS_1) writeonly buffer detail_block { vec4 answer; };\n"

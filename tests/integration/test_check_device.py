@@ -6,7 +6,7 @@ import os
 import farlight_test
 from farlight_test import Case
 
-TRACERS = {"bvh", "naive", "reference", "ldc", "abuffer"}
+TRACERS = {"bvh", "naive", "reference", "ldc", "abuffer", "rayspace"}
 
 
 def check_device(*arguments, **environment):

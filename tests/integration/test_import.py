@@ -486,9 +486,9 @@ class Models(unittest.TestCase):
 
     @needs_scenes
     def test_unknown_format_is_named(self):
-        result = import_file(os.path.join(SCENES, "rayspace", "bart", "kitchen", "aff", "kitchen.aff"))
+        result = import_file(os.path.join(SCENES, "formats", "stl", "colored.stl"))
         self.assertEqual(result.status, 1)
-        self.assertIn("unknown format .aff", result.text())
+        self.assertIn("unknown format .stl", result.text())
 
 
 # Valid by the letter, and yet there is nothing that could be shown of them.

@@ -19,7 +19,7 @@ class Tracers(farlight_test.Case):
 
     def test_every_tracer_says_what_it_is(self):
         names = [tracer["name"] for tracer in listed()]
-        self.assertEqual(names, ["bvh", "naive", "reference", "ldc", "abuffer"])
+        self.assertEqual(names, ["bvh", "naive", "reference", "ldc", "abuffer", "rayspace"])
         text = self.expect(farlight("tracers"), 0).stdout
         for tracer in listed():
             self.assertIn(f"{tracer['name']}: {tracer['doc']}", text)

@@ -142,11 +142,11 @@ class WithoutAWindow(Viewer):
         states = self.replay([rest(), *HIDE, {"screenshot": "first.png"}, {"state": "first"}, {"key": "]"}, {"key": "]"},
                               {"key": "]"}, rest(), {"state": "brighter"}, {"screenshot": "brighter.png"},
                               {"key": "["}, {"key": "["}, {"key": "["}, {"key": "t", "shift": True}, rest(),
-                              {"state": "abuffer"}, {"key": "t"}, {"key": "i", "shift": True}, rest(), {"state": "path"},
+                              {"state": "other"}, {"key": "t"}, {"key": "i", "shift": True}, rest(), {"state": "path"},
                               {"key": "i"}, {"key": "m"}, rest(), {"state": "back"}])
-        self.assertEqual([states[name]["tracer"] for name in ("first", "brighter", "abuffer", "path", "back")],
-                         ["bvh", "bvh", "abuffer", "bvh", "bvh"])
-        self.assertEqual([states[name]["integrator"] for name in ("first", "abuffer", "path", "back")],
+        self.assertEqual([states[name]["tracer"] for name in ("first", "brighter", "other", "path", "back")],
+                         ["bvh", "bvh", "rayspace", "bvh", "bvh"])
+        self.assertEqual([states[name]["integrator"] for name in ("first", "other", "path", "back")],
                          ["whitted", "whitted", "path", "whitted"])
         self.assertAlmostEqual(states["brighter"]["exposure_stops"], 1, 5)
         self.assertEqual(states["back"]["exposure_stops"], 0)

@@ -37,8 +37,8 @@ static void try_wrong_int(const struct message *message, const struct field_desc
     uint64_t good = field_load_int(field, place);
     uint64_t type_max = field->width_bytes == 8 ? UINT64_MAX : (UINT64_C(1) << (8 * field->width_bytes)) - 1;
     uint64_t wrong[] = {field->min - 1, 0, field->max + 1, type_max};
-    bool meant[] = {field->min > 0, field->min > 0 && !field->zero_is_default, field->max < type_max,
-                    field->max < type_max};
+    bool meant[] = {field->min > 1 || (field->min == 1 && !field->zero_is_default),
+                    field->min > 0 && !field->zero_is_default, field->max < type_max, field->max < type_max};
     if (field->kind == FIELD_ENUM) {
         wrong[0] = wrong[2] = field->enumeration->values[field->enumeration->value_count - 1].number + 1;
         meant[0] = meant[1] = false;
@@ -128,11 +128,11 @@ static void try_wrong_string(const struct message *message, const struct field_d
     memset(text, 'x', (size_t)field->max + 1);
     expect_both_refuse(message, path, true);
     /* a NUL can only come from the wire */
-    memcpy(text, "\x01", 2);
+    memcpy(text, "Q", 2); /* which no other field has */
     plain_encode(&plain, message);
-    uint8_t *at = memmem(plain.data, plain.count, "\x01\0\0\0\x01", 5);
-    while (at && memmem(at + 1, plain.count - (size_t)(at + 1 - plain.data), "\x01\0\0\0\x01", 5)) {
-        at = memmem(at + 1, plain.count - (size_t)(at + 1 - plain.data), "\x01\0\0\0\x01", 5);
+    uint8_t *at = memmem(plain.data, plain.count, "\x01\0\0\0Q", 5);
+    while (at && memmem(at + 1, plain.count - (size_t)(at + 1 - plain.data), "\x01\0\0\0Q", 5)) {
+        at = memmem(at + 1, plain.count - (size_t)(at + 1 - plain.data), "\x01\0\0\0Q", 5);
     }
     assert_non_null(at);
     at[4] = 0;
