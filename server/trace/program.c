@@ -19,7 +19,7 @@
 #define DISPATCH_ROUNDS_MAX ((uint64_t)1 << 35)
 
 /* Rays at the time 0 see the first pose, as does a program without motion. */
-static bool has_motion(const struct gpu_scene *scene, const struct wave *wave)
+bool trace_has_motion(const struct gpu_scene *scene, const struct wave *wave)
 {
     return scene->has_motion && wave->times;
 }
@@ -27,7 +27,7 @@ static bool has_motion(const struct gpu_scene *scene, const struct wave *wave)
 void trace_bind_rays(const struct gpu_scene *scene, const struct wave *wave)
 {
     gpu_buffer_bind_texels(scene->device, wave->rays, UNIT_RAYS, GL_RGBA32F);
-    if (has_motion(scene, wave))
+    if (trace_has_motion(scene, wave))
         gpu_buffer_bind_texels(scene->device, wave->times, UNIT_RAY_TIMES, GL_R32F);
 }
 
@@ -63,7 +63,7 @@ size_t trace_wave_defines(const struct gpu_scene *scene, const struct wave *wave
         defines[n++] = (struct gpu_define){"HAS_DISCS", "1"};
     if (scene->has_cutout)
         defines[n++] = (struct gpu_define){"HAS_CUTOUT", "1"};
-    if (has_motion(scene, wave))
+    if (trace_has_motion(scene, wave))
         defines[n++] = (struct gpu_define){"HAS_MOTION", "1"};
     if (wave->counts)
         defines[n++] = (struct gpu_define){"HAS_COUNTS", "1"};
@@ -168,7 +168,7 @@ bool trace_surfaces(const struct gpu_scene *scene, const struct ray_range *rays,
 {
     struct gpu_define defines[TRACE_SURFACE_DEFINES + 2] = {0};
     size_t n = trace_surface_defines(scene, defines);
-    if (has_motion(scene, rays->wave))
+    if (trace_has_motion(scene, rays->wave))
         defines[n++] = (struct gpu_define){"HAS_MOTION", "1"};
     const struct gpu_program *program =
         trace_surface_program_get(scene, rays->wave, "trace/surface.comp", defines, error);

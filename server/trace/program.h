@@ -23,6 +23,8 @@ struct trace_program_source {
     uint32_t rays_a_dispatch;         /* 0: all; a multiple of packet_rays, and of 2 */
 };
 
+/* Whether rays of the wave meet things that move. */
+bool trace_has_motion(const struct gpu_scene *scene, const struct wave *wave);
 /* What a program that looks at the rays of the wave and the primitives of the scene is compiled with: at most
  * TRACE_WAVE_DEFINES to `defines`, as shaders/trace/wave.comp lists them. Returns how many. */
 #define TRACE_WAVE_DEFINES 10

@@ -101,11 +101,6 @@ struct distances_left {
     float t_min, t_max;
 };
 
-// An element may begin this much farther than the closest hit so far: a distance is less exact than a bound if the ray
-// grazes a triangle, and finding a slightly nearer one must not depend on the order. 2^-14 suffices if the cosine
-// between ray and normal is above some 0.005; below, of two surfaces this close together, either may be hit.
-const float PRUNE_SLACK = 1.00006103515625;
-
 distances_left left_of(trace_ray r[PACKET_RAYS], answer found[PACKET_RAYS])
 {
     distances_left left = distances_left(r[0].t_min, end_of(r[0], found[0]));

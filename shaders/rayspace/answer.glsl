@@ -2,14 +2,11 @@
 // What is known of the rays of a wave: rayspace/layout.h, RAYSPACE_ANSWER_BYTES.
 //
 // Defines: ANY_HIT.
+#include "common/optical_depth.glsl"
 #include "rayspace/layout.h"
 #include "shared/bindings.h"
 
 layout(std430, binding = BIND_RAYSPACE_ANSWERS) buffer answer_block { uvec4 answers[]; };
-
-// Optical depths are whole steps (common/candidate.glsl); of more than this the answer is black.
-const uint DEPTH_BLACK = 4715632u;
-const uint DEPTH_MAX = 8388607u;
 
 // Order as the floats do, also negative ones.
 uint ordered_bits(float value)
@@ -28,7 +25,7 @@ float distance_left(uint ray, float t_max)
 {
 #ifdef ANY_HIT
     uvec4 depth = answers[ray];
-    return min(depth.x, min(depth.y, depth.z)) >= DEPTH_BLACK ? -3e38 : t_max;
+    return min(depth.x, min(depth.y, depth.z)) >= uint(OPTICAL_DEPTH_BLACK) ? -3e38 : t_max;
 #else
     uint nearest = answers[ray].x;
     return nearest == 0xffffffffu ? t_max : min(t_max, float_of_ordered(nearest));

@@ -4,7 +4,6 @@
 #define GROUP_SIZE 1
 #include "common/dispatch.glsl"
 #include "rayspace/control.glsl"
-#include "shared/wave.h"
 
 layout(std430, binding = BIND_RAYSPACE_STOPPED) buffer stopped_block { uint stopped[]; };
 
@@ -18,14 +17,8 @@ uniform uint limit_max;        // pairs of a pass
 uniform uint reserve;
 uniform float band;
 uniform uint seeds;        // pairs that were put onto stack `from` since
-uniform uint ends; // 1: the batch in hand is traced, or something was left of it; 2: the wave, too
+uniform uint ends;         // RAYSPACE_END_*
 uniform uint stopped_word; // in `stopped`; 0xffffffff: the slice cannot be stopped
-
-uvec3 groups_of(uint count, uint each)
-{
-    uint groups = (count + 64u * each - 1u) / (64u * each), x = min(groups, WAVE_GROUPS_MAX);
-    return uvec3(x, x > 0u ? (groups + x - 1u) / x : 1u, 1u);
-}
 
 void main()
 {
@@ -52,7 +45,7 @@ void main()
     bool is_due = c.leaves >= leaves_wanted || waiting[from] + waiting[to] == 0u || !fits;
     c.leaves_taken = is_due && leaves_wanted != 0xffffffffu ? c.leaves : 0u;
     c.leaves -= c.leaves_taken;
-    c.taken = ends != 0u ? 0u : min(waiting[from], c.limit);
+    c.taken = ends != RAYSPACE_END_NOTHING ? 0u : min(waiting[from], c.limit);
     c.first = waiting[from] - c.taken;
     uint free = capacity - waiting[to];
     c.room = c.taken <= 1u ? free : free - min(free, reserve);
@@ -71,9 +64,9 @@ void main()
     c.leaf_groups_x = leaf_groups.x;
     c.leaf_groups_y = leaf_groups.y;
     c.leaf_groups_z = leaf_groups.z;
-    if (ends != 0u && all + c.leaves > 0u)
+    if (ends >= RAYSPACE_END_BATCH && all + c.leaves > 0u)
         c.left_over = 1u;
     control = c;
-    if (ends == 2u && stopped_word != 0xffffffffu && c.left_over != 0u && stopped[stopped_word] == 0u)
+    if (ends == RAYSPACE_END_WAVE && stopped_word != 0xffffffffu && c.left_over != 0u && stopped[stopped_word] == 0u)
         stopped[stopped_word] = WAVE_STOPPED_LONG;
 }

@@ -2,10 +2,18 @@
 // What the passes of a wave share.
 #include "rayspace/layout.h"
 #include "shared/bindings.h"
+#include "shared/wave.h"
 
 layout(std430, binding = BIND_RAYSPACE_CONTROL) buffer control_block { rayspace_control control; };
 
 uint waiting_on(uint stack)
 {
     return stack == 0u ? control.waiting_0 : stack == 1u ? control.waiting_1 : control.waiting_2;
+}
+
+// The work groups of a dispatch with an invocation for `each` items, as common/dispatch.glsl counts them.
+uvec3 groups_of(uint count, uint each)
+{
+    uint groups = (count + 64u * each - 1u) / (64u * each), x = min(groups, WAVE_GROUPS_MAX);
+    return uvec3(x, x > 0u ? (groups + x - 1u) / x : 1u, 1u);
 }

@@ -7,12 +7,12 @@
 //   RAYSPACE_FLAT      elements are primitives, and nodes alone are divided (section 3.3)
 #include "common/dispatch.glsl"
 #include "rayspace/control.glsl"
+#include "rayspace/node.glsl"
 #include "rayspace/place.glsl"
 #include "rayspace/reduce.h"
 #include "rayspace/item.glsl"
 #include "rayspace/tree.glsl"
 
-layout(binding = UNIT_RAYSPACE_NODES) uniform samplerBuffer nodes;
 layout(binding = UNIT_RAYSPACE_PAIRS) uniform usamplerBuffer pairs; // of the stack that is taken from
 #ifdef RAYSPACE_TO_SLOTS
 layout(std430, binding = BIND_RAYSPACE_SLOTS) writeonly buffer slot_block { uvec4 slots_written[]; };
@@ -33,13 +33,7 @@ const float SPLIT_FACTOR = 4.0;
 bundle bundle_at(uint node)
 {
     uint level = node >> RAYSPACE_LEVEL_SHIFT, index = node & RAYSPACE_INDEX_MASK;
-    if (level == 0u)
-        return bundle_of_ray(ray_at_place(index));
-    int texel = int(level_first[level] + index) * RAYSPACE_NODE_TEXELS;
-    vec4 centre_radius = texelFetch(nodes, texel), axis_secant = texelFetch(nodes, texel + 1);
-    vec4 lower_tan = texelFetch(nodes, texel + 2), upper_end = texelFetch(nodes, texel + 3);
-    return bundle(centre_radius.xyz, centre_radius.w, axis_secant.xyz, axis_secant.w, lower_tan.w, lower_tan.xyz,
-                  upper_end.xyz, texelFetch(nodes, texel + 4).xyz, texelFetch(nodes, texel + 5).xyz, upper_end.w);
+    return level == 0u ? bundle_of_ray(ray_at_place(index)) : bundle_of_node(level_first[level] + index);
 }
 
 #ifndef RAYSPACE_FLAT
@@ -50,17 +44,14 @@ bool holds_primitives(uint link)
 }
 
 // Whether the node of a pair is to be divided, rather than the element.
-bool divides_node(uint node, uint link, bounds b)
+bool divides_node(uint level, bundle node, uint link, bounds b)
 {
-    if (node >> RAYSPACE_LEVEL_SHIFT == 0u)
+    if (level == 0u)
         return false;
     if (is_leaf(link))
         return holds_primitives(link);
-    int texel = int(level_first[node >> RAYSPACE_LEVEL_SHIFT] + (node & RAYSPACE_INDEX_MASK)) * RAYSPACE_NODE_TEXELS;
-    vec4 centre_radius = texelFetch(nodes, texel);
-    float tangent = texelFetch(nodes, texel + 2).w, secant = texelFetch(nodes, texel + 1).w;
-    float width = centre_radius.w + distance(b.centre, centre_radius.xyz) * tangent;
-    return secant == 0.0 || width * SPLIT_FACTOR > b.radius;
+    float width = node.radius + distance(b.centre, node.centre) * node.tangent;
+    return node.secant == 0.0 || width * SPLIT_FACTOR > b.radius;
 }
 
 uint after(uint element, uint link)
@@ -101,16 +92,20 @@ void take(uvec4 pair)
     bool again = (pair.w & RAYSPACE_AGAIN) != 0u;
     uvec4 made = pair;
     made.w &= ~RAYSPACE_AGAIN;
+    bundle b;
 #ifdef RAYSPACE_FLAT
     bounds bounds_ = bounds_of_item(pair.y);
     bool itself = again || level == 0u, by_node = true;
+    if (itself)
+        b = bundle_at(pair.x);
     uint link = pair.y, next = 0u, end = 0u;
 #else
+    b = bundle_at(pair.x);
     tree_place tree = tree_of(pair.z);
     tree_element element = element_at(tree, pair.y);
     bounds bounds_ = bounds_of(tree, element);
     uint link = element.link, next = pair.y + 1u, end = link;
-    bool itself = again || (level == 0u && holds_primitives(link)), by_node = itself || divides_node(pair.x, link, bounds_);
+    bool itself = again || (level == 0u && holds_primitives(link)), by_node = itself || divides_node(level, b, link, bounds_);
     if (!by_node && is_leaf(link)) { // an instance: its tree's root is the one child
         made.z = link & BVH_LEAF_FIRST_MASK;
         tree = tree_of(made.z);
@@ -121,17 +116,15 @@ void take(uvec4 pair)
         next = after(next, element_at(tree, next).link);
 #endif
     uint nodes_left = itself ? 1u : by_node ? min(level_count[level - 1u] - 4u * index, 4u) : 0u;
-    bundle b;
-    if (!by_node)
-        b = bundle_at(pair.x);
     for (uint child = 0u; child < RAYSPACE_CHILDREN; child++) {
         uvec4 one = made;
         if (by_node) {
             if (child >= nodes_left)
                 break;
-            if (!itself)
+            if (!itself) {
                 one.xw = uvec2((level - 1u) << RAYSPACE_LEVEL_SHIFT | (4u * index + child), 0u);
-            b = bundle_at(one.x);
+                b = bundle_at(one.x);
+            }
         }
 #ifndef RAYSPACE_FLAT
         else {

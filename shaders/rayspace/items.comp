@@ -2,7 +2,7 @@
 // A batch of primitives for the flat descent: what bounds each, and its pair with the root of the hierarchy. Nothing of it
 // is kept: the first picture costs what any other one does.
 //
-// Defines: HAS_SPHERES, HAS_MOTION.
+// Defines: HAS_MOTION.
 #include "common/dispatch.glsl"
 #include "common/motion.glsl"
 #include "rayspace/rank.glsl"

@@ -45,7 +45,7 @@ SHARED_SIZE(rayspace_node, 96)
 /* What is known of a ray. Closest hit:
  *   x  the nearest distance so far, as ordered_bits(); y  the least rank at it among the leaves in hand;
  *   z, w  the distance and rank of the nearest hit of all leaves that are settled
- * Any hit: x, y, z  optical depth in steps (common/candidate.glsl). */
+ * Any hit: x, y, z  optical depth in steps (common/optical_depth.glsl). */
 #define RAYSPACE_ANSWER_BYTES 16u
 
 /* A primitive of a batch of the flat descent, RGBA32UI, most words bits of floats: bounding sphere; lower corner
@@ -75,6 +75,13 @@ struct rayspace_control {
 };
 SHARED_SIZE(rayspace_control, 128)
 
+/* After which pass control.comp runs: no other one is taken yet. Of a batch or of the wave, what then waits is
+ * left over, and stops the slice. */
+#define RAYSPACE_END_NOTHING 0u
+#define RAYSPACE_END_ROUND 1u
+#define RAYSPACE_END_BATCH 2u
+#define RAYSPACE_END_WAVE 3u
+
 #define BIND_RAYSPACE_CONTROL BIND_TRACER_0
 #define BIND_RAYSPACE_PAIRS BIND_TRACER_1 /* of the stack that is written to */
 #define BIND_RAYSPACE_LEAVES BIND_PASS_2
@@ -93,10 +100,10 @@ SHARED_SIZE(rayspace_control, 128)
 #define UNIT_RAYSPACE_ORDER UNIT_TRACER_7 /* R32UI: which ray is at a place of level 0 */
 
 /* Cells in which rays are sorted, by interleaved bits: of the origin in the scene's box, and of the direction on
- * the octahedron. */
-#define RAYSPACE_POSITION_BITS 4u
+ * the octahedron, which have one less. */
 #define RAYSPACE_DIRECTION_BITS 3u
-#define RAYSPACE_BINS 262144u /* 2^(3 x 4 + 2 x 3), at most */
+#define RAYSPACE_POSITION_BITS 4u
+#define RAYSPACE_BINS (1u << (3u * RAYSPACE_POSITION_BITS + 2u * RAYSPACE_DIRECTION_BITS)) /* at most */
 #define RAYSPACE_BINS_MIN 256u
 
 #endif

@@ -78,8 +78,8 @@ uint number_of(leaf_range leaf, uint i)
 void deepen(uint ray, uint channel, uint steps)
 {
     uint expected = answers[ray][channel];
-    while (steps > 0u && expected < DEPTH_MAX) {
-        uint found = atomicCompSwap(answers[ray][channel], expected, min(expected + steps, DEPTH_MAX));
+    while (steps > 0u && expected < uint(OPTICAL_DEPTH_MAX)) {
+        uint found = atomicCompSwap(answers[ray][channel], expected, min(expected + steps, uint(OPTICAL_DEPTH_MAX)));
         if (found == expected)
             break;
         expected = found;

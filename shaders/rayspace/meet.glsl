@@ -39,7 +39,7 @@ bool slabs_meet_box(bundle b, vec3 lower, vec3 upper)
                        below.y && b.direction_upper.y <= 0.0 || above.y && b.direction_lower.y >= 0.0,
                        below.z && b.direction_upper.z <= 0.0 || above.z && b.direction_lower.z >= 0.0);
     float first = max_component(enter), last = min(b.end, min(leave.x, min(leave.y, leave.z)));
-    return !(first > last * END_SLACK) && !any(away) && last >= 0.0;
+    return !(first > last * PRUNE_SLACK) && !any(away) && last >= 0.0;
 }
 
 bool may_meet(bundle b, bounds what)

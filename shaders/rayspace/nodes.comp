@@ -2,10 +2,14 @@
 // One level of the hierarchy over the rays of a wave from the level below it, as mip levels are made (section 3.2). An
 // invocation makes a node.
 //
-// Defines:
-//   ANY_HIT        the rays of the wave ask for transmittance
-//   NODES_OF_RAYS  level 1, from the rays
-//   NODES_ENDS     only how far rays go on, after hits were found
+// Defines: ANY_HIT the rays of the wave ask for transmittance; and one of these, or none:
+//   NODES_OF_RAYS       level 1, from the rays
+//   NODES_ENDS          only how far rays go on, after hits were found
+//   NODES_ENDS_OF_RAYS  the same of level 1
+#ifdef NODES_ENDS_OF_RAYS
+#define NODES_OF_RAYS
+#define NODES_ENDS
+#endif
 #include "common/dispatch.glsl"
 #include "common/range.glsl"
 #include "rayspace/ray.glsl"

@@ -29,7 +29,7 @@ live_ray ray_at_place(uint place)
     if (control.turned != 0u && r.end >= 0.0 && r.end < TURNED_MAX) {
         r.origin += r.end * r.direction;
         r.direction = -r.direction;
-        r.slack = max(r.slack, ORIGIN_SLACK * max_component(abs(r.origin)));
+        r.slack = max(r.slack, WORLD_SLACK * max_component(abs(r.origin)));
     }
 #endif
     return r;

@@ -3,14 +3,10 @@
 #include "rayspace/layout.h"
 #include "shared/bindings.h"
 #include "common/math.glsl"
+#include "tree/slack.glsl"
 
 layout(binding = UNIT_RAYS) uniform samplerBuffer rays; // two texels each
 
-// The distance of a point that is computed from a ray is less exact than a bound if the ray grazes its triangle:
-// bvh/traverse.glsl, PRUNE_SLACK.
-const float END_SLACK = 1.00006103515625;
-// Rounding of the ray's transform to an instance's space: bvh/bounds.glsl, WORLD_SLACK.
-const float ORIGIN_SLACK = 7.62939453125e-6; // 2^-17
 const float DIRECTION_SLACK = 9.5367431640625e-7; // 2^-20
 
 // What a bundle of rays is tested with.
@@ -39,12 +35,18 @@ live_ray live_ray_of(vec4 origin_t_min, vec4 direction_t_max, float t_max)
     live_ray r;
     r.origin = origin_t_min.xyz + before * direction_t_max.xyz;
     r.direction = scaled / length(scaled);
-    r.slack = ORIGIN_SLACK * max(max_component(abs(origin_t_min.xyz)), max_component(abs(r.origin)));
-    r.end = min((t_max - before) * length_ * END_SLACK, 3e38);
+    r.slack = WORLD_SLACK * max(max_component(abs(origin_t_min.xyz)), max_component(abs(r.origin)));
+    r.end = min((t_max - before) * length_ * PRUNE_SLACK, 3e38);
     // NaN too: no comparison holds
     if (!(t_max > origin_t_min.w && length_ > 0.0 && max_component(abs(r.origin)) < 3e38))
         r.end = -1.0;
     return r;
+}
+
+live_ray live_ray_at(uint ray)
+{
+    vec4 direction_t_max = texelFetch(rays, int(2u * ray + 1u));
+    return live_ray_of(texelFetch(rays, int(2u * ray)), direction_t_max, direction_t_max.w);
 }
 
 bundle bundle_of_ray(live_ray r)

@@ -5,11 +5,10 @@
 // Defines: ANY_HIT.
 #include "common/dispatch.glsl"
 #include "common/range.glsl"
-#include "rayspace/answer.glsl"
 #include "rayspace/control.glsl"
 #include "rayspace/ray.glsl"
 
-uniform uint sorts, turns; // 0: never, 1: always, 2: as the sample says
+uniform uint sorts, turns; // as the settings: 0: as the sample says, 1: always, 2: never
 
 // Neighbours of one direction are some thousandths apart; of directions by chance, 1.3.
 const float SORTED_APART = 0.3;
@@ -28,10 +27,7 @@ void main()
         uint first = uint(float(own * EACH + i) / float(64u * EACH) * float(steps));
         if (first + 1u >= ray_end)
             continue;
-        live_ray a = live_ray_of(texelFetch(rays, int(2u * first)), texelFetch(rays, int(2u * first + 1u)),
-                                 texelFetch(rays, int(2u * first + 1u)).w);
-        live_ray b = live_ray_of(texelFetch(rays, int(2u * first + 2u)), texelFetch(rays, int(2u * first + 3u)),
-                                 texelFetch(rays, int(2u * first + 3u)).w);
+        live_ray a = live_ray_at(first), b = live_ray_at(first + 1u);
         if (a.end < 0.0 || b.end < 0.0)
             continue;
         sum += vec3(distance(a.direction, b.direction), min(distance(a.origin, b.origin), 1e30),
@@ -47,13 +43,13 @@ void main()
         sum += sums[k];
         count += counts[k];
     }
-    bool sorted = sorts == 1u || (sorts == 2u && sum.x > SORTED_APART * float(count));
+    bool sorted = sorts == 1u || (sorts == 0u && sum.x > SORTED_APART * float(count));
     control.sorted = sorted && ray_end > 1u ? 1u : 0u;
 #ifdef ANY_HIT
-    control.turned = turns == 1u || (turns == 2u && sum.z < sum.y) ? 1u : 0u;
+    control.turned = turns == 1u || (turns == 0u && sum.z < sum.y) ? 1u : 0u;
 #endif
-    uint groups = control.sorted != 0u ? (ray_count + 63u) / 64u : 0u, x = min(groups, WAVE_GROUPS_MAX);
-    control.sort_groups_x = x;
-    control.sort_groups_y = x > 0u ? (groups + x - 1u) / x : 1u;
-    control.sort_groups_z = 1u;
+    uvec3 groups = groups_of(control.sorted != 0u ? ray_count : 0u, 1u);
+    control.sort_groups_x = groups.x;
+    control.sort_groups_y = groups.y;
+    control.sort_groups_z = groups.z;
 }

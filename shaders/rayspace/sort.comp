@@ -42,27 +42,25 @@ void main()
 
 #else
 
-uint spread(uint value, uint bits, uint stride)
+// The lower bits of a value, four places free behind each.
+uint spread(uint value)
 {
-    uint out_ = 0u;
-    for (uint i = 0u; i < bits; i++)
-        out_ |= (value >> i & 1u) << (i * stride);
-    return out_;
+    uint spread_ = 0u;
+    for (uint i = 0u; i < RAYSPACE_DIRECTION_BITS; i++)
+        spread_ |= (value >> i & 1u) << (5u * i);
+    return spread_;
 }
 
-// Bits from the highest: in turn x, y, z and, while there are any, of the octahedron's u and v.
+// The highest bits are of the origin alone, then come in turn bits of v, u, z, y, x.
 uint bin_of(live_ray r)
 {
     uvec3 p = uvec3(clamp((r.origin - lower_world) * cells_per_metre, 0.0, float((1u << RAYSPACE_POSITION_BITS) - 1u)));
-    vec3 d = r.direction;
-    vec2 uv = d.xy / (abs(d.x) + abs(d.y) + abs(d.z));
-    if (d.z < 0.0)
-        uv = (1.0 - abs(uv.yx)) * mix(vec2(-1.0), vec2(1.0), greaterThanEqual(uv, vec2(0.0)));
+    vec2 uv = octahedral_from_unit(r.direction);
     uvec2 q = uvec2(clamp((uv * 0.5 + 0.5) * float(1u << RAYSPACE_DIRECTION_BITS), 0.0,
                           float((1u << RAYSPACE_DIRECTION_BITS) - 1u)));
-    uint low = spread(p.x & 7u, 3u, 5u) | spread(p.y & 7u, 3u, 5u) << 1 | spread(p.z & 7u, 3u, 5u) << 2 |
-               spread(q.x, 3u, 5u) << 3 | spread(q.y, 3u, 5u) << 4;
-    return low | (p.x >> 3) << 15 | (p.y >> 3) << 16 | (p.z >> 3) << 17;
+    uint low = spread(p.x) | spread(p.y) << 1 | spread(p.z) << 2 | spread(q.x) << 3 | spread(q.y) << 4;
+    uvec3 high = p >> RAYSPACE_DIRECTION_BITS;
+    return low | (high.x | high.y << 1 | high.z << 2) << (5u * RAYSPACE_DIRECTION_BITS);
 }
 
 void main()
@@ -73,8 +71,7 @@ void main()
     // Those behind the wave's end, whose number only the device knows, are dead and stay at the end.
     uint bin = (RAYSPACE_BINS >> bin_shift) - 1u;
     if (ray < ray_end) {
-        vec4 origin_t_min = texelFetch(rays, int(2u * ray)), direction_t_max = texelFetch(rays, int(2u * ray + 1u));
-        live_ray r = live_ray_of(origin_t_min, direction_t_max, direction_t_max.w);
+        live_ray r = live_ray_at(ray);
         if (r.end >= 0.0)
             bin = bin_of(r) >> bin_shift;
     }

@@ -63,26 +63,38 @@ static struct rayspace_roles roles_of(const struct rayspace_state *state)
 /* What is farther from a node than this waits for the next round. */
 static float band_of(const struct rayspace_state *state, const struct gpu_scene *scene)
 {
-    const uint32_t rounds_left = rounds_of(state) - 1 - state->round;
-    return state->round + 1 >= rounds_of(state) ? 3e38f : ldexpf(scene->diagonal, -(int)rounds_left);
+    const uint32_t rounds = rounds_of(state);
+    return state->round + 1 < rounds ? ldexpf(scene->diagonal, (int)(state->round + 1) - (int)rounds) : 3e38f;
 }
 
-static const struct gpu_program *program_of(const struct gpu_scene *scene, const struct rayspace_state *state,
-                                            const char *compute, const char *stage, struct error *error)
+const struct gpu_program *rayspace_program_get(const struct gpu_scene *scene, const struct rayspace_state *state,
+                                               const char *compute, const struct gpu_define *own,
+                                               struct error *error)
 {
-    const struct rayspace_settings *settings = &state->base.options.rayspace;
-    struct gpu_define defines[TRACE_WAVE_DEFINES + 5] = {0};
-    size_t n = trace_wave_defines(scene, &state->base.wave, defines);
-    if (stage)
-        defines[n++] = (struct gpu_define){stage, "1"};
-    if (settings->bounds == RAYSPACE_BOUNDS_SPHERE)
-        defines[n++] = (struct gpu_define){"RAYSPACE_SPHERES", "1"};
-    if (is_flat(state))
-        defines[n++] = (struct gpu_define){"RAYSPACE_FLAT", "1"};
-    if (leaves_slots(state))
-        defines[n++] = (struct gpu_define){"RAYSPACE_TO_SLOTS", "1"};
+    struct gpu_define defines[RAYSPACE_DEFINES + 3] = {0};
+    size_t n = 0;
+    if (state->base.wave.kind == WAVE_ANY)
+        defines[n++] = (struct gpu_define){"ANY_HIT", "1"};
+    if (state->base.wave.counts)
+        defines[n++] = (struct gpu_define){"HAS_COUNTS", "1"};
+    for (size_t i = 0; i < RAYSPACE_DEFINES && own && own[i].name; i++)
+        defines[n++] = own[i];
     return gpu_program_get(scene->device, &(struct gpu_program_source){.compute = compute, .defines = defines},
                            error);
+}
+
+void rayspace_bind_wave(const struct gpu_scene *scene, struct rayspace_state *state,
+                        const struct gpu_program *program)
+{
+    const struct wave *wave = &state->base.wave;
+    trace_bind_rays(scene, wave);
+    gpu_buffer_bind_texels(scene->device, &state->order, UNIT_RAYSPACE_ORDER, GL_R32UI);
+    gpu_buffer_bind_storage(&state->control, BIND_RAYSPACE_CONTROL);
+    gpu_buffer_bind_storage(&state->answers, BIND_RAYSPACE_ANSWERS);
+    if (wave->counts)
+        gpu_buffer_bind_storage(wave->counts, BIND_WAVE);
+    gpu_uniform_uint(program, "counts_index", wave->counts_index);
+    gpu_uniform_uint(program, "ray_count", wave->ray_count);
 }
 
 /* ---- the beginning ---- */
@@ -159,11 +171,8 @@ bool rayspace_descent_begin(struct rayspace *rayspace, struct gpu_scene *scene, 
 
 /* ---- passes ---- */
 
-/* What the control has come to the end of: as shaders/rayspace/control.comp has it. */
-enum end { END_OF_NOTHING, END_OF_BATCH, END_OF_WAVE };
-
 static bool dispatch_control(struct rayspace_state *state, const struct gpu_scene *scene, uint32_t leaves_wanted,
-                             enum end end, struct error *error)
+                             uint32_t end, struct error *error)
 {
     const struct wave *wave = &state->base.wave;
     const struct gpu_program *program =
@@ -194,36 +203,44 @@ static bool dispatch_control(struct rayspace_state *state, const struct gpu_scen
     return true;
 }
 
-static void bind_wave(struct gpu_scene *scene, struct rayspace *rayspace, struct rayspace_state *state,
-                      const struct gpu_program *program)
+/* What passes and tests of leaves read. */
+static void bind_descent(struct gpu_scene *scene, struct rayspace *rayspace, struct rayspace_state *state,
+                         const struct gpu_program *program)
 {
-    const struct wave *wave = &state->base.wave;
     struct gpu_device *device = scene->device;
-    trace_bind_rays(scene, wave);
+    rayspace_bind_wave(scene, state, program);
     scene_tree_bind(&rayspace->tree);
     gpu_buffer_bind_texels(device, &rayspace->ranks, UNIT_RAYSPACE_RANKS, GL_R32UI);
     gpu_buffer_bind_texels(device, &state->items, UNIT_RAYSPACE_ITEMS, GL_RGBA32UI);
-    gpu_buffer_bind_texels(device, &state->order, UNIT_RAYSPACE_ORDER, GL_R32UI);
-    gpu_buffer_bind_storage(&state->control, BIND_RAYSPACE_CONTROL);
     gpu_buffer_bind_storage(&state->leaves, BIND_RAYSPACE_LEAVES);
-    gpu_buffer_bind_storage(&state->answers, BIND_RAYSPACE_ANSWERS);
-    if (wave->counts)
-        gpu_buffer_bind_storage(wave->counts, BIND_WAVE);
-    gpu_uniform_uint(program, "counts_index", wave->counts_index);
-    gpu_uniform_uint(program, "ray_count", wave->ray_count);
     gpu_uniform_uint(program, "instance_count", scene->instance_count);
+}
+
+/* The test of rays against primitives, which materials may have a part in. */
+static const struct gpu_program *leaf_test_get(const struct gpu_scene *scene, const struct rayspace_state *state,
+                                               struct error *error)
+{
+    struct gpu_define defines[TRACE_WAVE_DEFINES + 3] = {0};
+    size_t n = trace_wave_defines(scene, &state->base.wave, defines);
+    defines[n++] = (struct gpu_define){"LEAVES_TEST", "1"};
+    if (is_flat(state))
+        defines[n++] = (struct gpu_define){"RAYSPACE_FLAT", "1"};
+    const struct gpu_program_source source = {.compute = "rayspace/leaves.comp", .defines = defines};
+    return gpu_program_get(scene->device, &source, error);
 }
 
 static bool dispatch_leaves(struct rayspace *rayspace, struct gpu_scene *scene, struct rayspace_state *state,
                             struct error *error)
 {
-    static const char *const stages[] = {"LEAVES_TEST", "LEAVES_RANK", "LEAVES_SETTLE"};
+    static const struct gpu_define choices[][2] = {{{"LEAVES_RANK", "1"}}, {{"LEAVES_SETTLE", "1"}}};
     const unsigned count = state->base.wave.kind == WAVE_ANY ? 1 : 3;
     for (unsigned i = 0; i < count; i++) {
-        const struct gpu_program *program = program_of(scene, state, "rayspace/leaves.comp", stages[i], error);
+        const struct gpu_program *program =
+            i == 0 ? leaf_test_get(scene, state, error)
+                   : rayspace_program_get(scene, state, "rayspace/leaves.comp", choices[i - 1], error);
         if (!program)
             return false;
-        bind_wave(scene, rayspace, state, program);
+        bind_descent(scene, rayspace, state, program);
         gpu_dispatch_indirect(program, &state->control, offsetof(struct rayspace_control, leaf_groups_x));
     }
     return true;
@@ -252,16 +269,32 @@ static void set_levels(const struct gpu_program *program, const struct rayspace_
     }
 }
 
+static const struct gpu_program *pass_get(const struct rayspace *rayspace, const struct gpu_scene *scene,
+                                          const struct rayspace_state *state, struct error *error)
+{
+    struct gpu_define own[RAYSPACE_DEFINES] = {0};
+    size_t n = 0;
+    if (is_flat(state))
+        own[n++] = (struct gpu_define){"RAYSPACE_FLAT", "1"};
+    else if (bvh_is_packed(&rayspace->tree.store.settings))
+        own[n++] = (struct gpu_define){"RAYSPACE_PACKED", "1"};
+    if (state->base.options.rayspace.bounds == RAYSPACE_BOUNDS_SPHERE)
+        own[n++] = (struct gpu_define){"RAYSPACE_SPHERES", "1"};
+    if (leaves_slots(state))
+        own[n++] = (struct gpu_define){"RAYSPACE_TO_SLOTS", "1"};
+    if (trace_has_motion(scene, &state->base.wave))
+        own[n++] = (struct gpu_define){"HAS_MOTION", "1"};
+    return rayspace_program_get(scene, state, "rayspace/descend.comp", own, error);
+}
+
 static bool dispatch_pass(struct rayspace *rayspace, struct gpu_scene *scene, struct rayspace_state *state,
                           struct error *error)
 {
-    const bool packed = !is_flat(state) && bvh_is_packed(&rayspace->tree.store.settings);
-    const struct gpu_program *program =
-        program_of(scene, state, "rayspace/descend.comp", packed ? "RAYSPACE_PACKED" : NULL, error);
+    const struct gpu_program *program = pass_get(rayspace, scene, state, error);
     if (!program)
         return false;
     const struct rayspace_roles roles = roles_of(state);
-    bind_wave(scene, rayspace, state, program);
+    bind_descent(scene, rayspace, state, program);
     gpu_buffer_bind_texels(scene->device, &state->nodes, UNIT_RAYSPACE_NODES, GL_RGBA32F);
     gpu_buffer_bind_texels(scene->device, &state->stacks[roles.from], UNIT_RAYSPACE_PAIRS, GL_RGBA32UI);
     gpu_buffer_bind_storage(leaves_slots(state) ? &state->reduction.slots : &state->stacks[roles.to],
@@ -272,13 +305,15 @@ static bool dispatch_pass(struct rayspace *rayspace, struct gpu_scene *scene, st
     set_tree(program, &rayspace->tree);
     set_levels(program, &state->levels);
     gpu_dispatch_indirect(program, &state->control, offsetof(struct rayspace_control, pass_groups_x));
+    if (!leaves_slots(state))
+        return true;
     const struct rayspace_lists lists = {.control = &state->control,
                                          .pairs = &state->stacks[roles.to],
                                          .leaves = &state->leaves,
                                          .put_off = &state->stacks[roles.later],
                                          .to = roles.to,
                                          .later = roles.later};
-    return !leaves_slots(state) || rayspace_reduction_run(scene->device, &state->reduction, &lists, error);
+    return rayspace_reduction_run(scene->device, &state->reduction, &lists, error);
 }
 
 static void next_pass(struct rayspace_state *state)
@@ -299,7 +334,10 @@ static bool next_round(struct gpu_scene *scene, struct rayspace_state *state, st
 static bool next_batch(struct rayspace *rayspace, struct gpu_scene *scene, struct rayspace_state *state,
                        struct error *error)
 {
-    const struct gpu_program *program = program_of(scene, state, "rayspace/items.comp", NULL, error);
+    const bool moves = trace_has_motion(scene, &state->base.wave);
+    const struct gpu_define defines[] = {{moves ? "HAS_MOTION" : NULL, "1"}, {0}};
+    const struct gpu_program_source source = {.compute = "rayspace/items.comp", .defines = defines};
+    const struct gpu_program *program = gpu_program_get(scene->device, &source, error);
     if (!program)
         return false;
     state->round = 0;
@@ -338,7 +376,7 @@ static enum tracer_progress descend_waiting(struct rayspace *rayspace, struct gp
 {
     struct rayspace_control *control = &state->told;
     for (;;) {
-        if (!dispatch_control(state, scene, state->leaves_capacity / 2, END_OF_NOTHING, error))
+        if (!dispatch_control(state, scene, state->leaves_capacity / 2, RAYSPACE_END_NOTHING, error))
             return TRACER_FAILED;
         gpu_buffer_read(scene->device, &state->control, 0, control, sizeof(*control));
         if (scene->device->lost)
@@ -381,7 +419,7 @@ static bool queue_passes(struct rayspace *rayspace, struct gpu_scene *scene, str
 {
     for (uint32_t i = 0; i < passes; i++) {
         const bool tests = i % PASSES_A_TEST == PASSES_A_TEST - 1;
-        if (!dispatch_control(state, scene, tests ? LEAVES_ALL : LEAVES_NONE, END_OF_NOTHING, error) ||
+        if (!dispatch_control(state, scene, tests ? LEAVES_ALL : LEAVES_NONE, RAYSPACE_END_NOTHING, error) ||
             (tests && !dispatch_leaves(rayspace, scene, state, error)) ||
             !dispatch_pass(rayspace, scene, state, error))
             return false;
@@ -404,11 +442,11 @@ static bool descend_ahead(struct rayspace *rayspace, struct gpu_scene *scene, st
                 return false;
             if (state->round + 1 >= rounds_of(state))
                 break;
-            if (!dispatch_control(state, scene, LEAVES_ALL, END_OF_NOTHING, error) ||
+            if (!dispatch_control(state, scene, LEAVES_ALL, RAYSPACE_END_ROUND, error) ||
                 !dispatch_leaves(rayspace, scene, state, error) || !next_round(scene, state, error))
                 return false;
         }
-        const enum end end = has_more_batches(rayspace, state) ? END_OF_BATCH : END_OF_WAVE;
+        const uint32_t end = has_more_batches(rayspace, state) ? RAYSPACE_END_BATCH : RAYSPACE_END_WAVE;
         if (!dispatch_control(state, scene, LEAVES_ALL, end, error) ||
             !dispatch_leaves(rayspace, scene, state, error))
             return false;

@@ -4,6 +4,7 @@
 #ifndef FARLIGHT_TRACE_RAYSPACE_TRACER_H
 #define FARLIGHT_TRACE_RAYSPACE_TRACER_H
 
+#include "gpu/program.h"
 #include "rayspace/layout.h"
 #include "trace/rayspace/reduce.h"
 #include "trace/tracer.h"
@@ -46,6 +47,16 @@ struct rayspace_state {
     /* Halvings of the batch that the last waves of a family needed. */
     uint8_t halved[WAVE_FAMILIES];
 };
+
+/* A program of shaders/rayspace that looks at the rays of a wave, for its kind, with defines of its own, at most
+ * RAYSPACE_DEFINES; they end with {0}. */
+#define RAYSPACE_DEFINES 5
+const struct gpu_program *rayspace_program_get(const struct gpu_scene *scene, const struct rayspace_state *state,
+                                               const char *compute, const struct gpu_define *own,
+                                               struct error *error);
+/* Binds the rays, how many they are, the control, the answers and the order. */
+void rayspace_bind_wave(const struct gpu_scene *scene, struct rayspace_state *state,
+                        const struct gpu_program *program);
 
 /* Levels over so many rays. */
 struct rayspace_levels rayspace_levels_over(uint32_t ray_count);

@@ -130,7 +130,7 @@ uint32_t bvh_element_words(const struct bvh_form *settings); /* uint32_t of one 
 size_t bvh_element_bytes(const struct bvh_form *settings);   /* of one element in all copies */
 
 /* Bounds are padded outward by BVH_PAD_RELATIVE of their magnitude, so that the rounding of the traversal's
- * arithmetic cannot lose a hit (shaders/bvh/bounds.glsl has the sum). ERROR_OUT_OF_MEMORY, ERROR_LIMIT. */
+ * arithmetic cannot lose a hit (shaders/tree/slack.glsl has the sum). ERROR_OUT_OF_MEMORY, ERROR_LIMIT. */
 bool bvh_tree_build(struct bvh_tree *tree, const struct bvh_shape *shape, const struct bvh_form *settings,
                     struct error *error);
 void bvh_tree_finish(struct bvh_tree *tree);

@@ -3,6 +3,7 @@
  * where these are halved, and in a scene of which everything moves. */
 #include "tests/unit/trace/tracer_fixture.h"
 
+#include "shared/wave.h"
 #include "trace/rayspace/tracer.h"
 
 #define BVH_NUMBER 0u
@@ -142,6 +143,72 @@ TEST(waves_of_few_rays_have_all_their_answers)
         assert_memory_equal(hits[0], hits[1], counts[i] * sizeof(hits[0][0]));
     }
     pair_finish(&pair);
+}
+
+/* ---- queued whole ---- */
+
+/* With a word that a wave sets where it was not traced to its end: then no pass is waited for. */
+struct ahead {
+    struct fixture *fixture;
+    struct gpu_buffer stopped;
+};
+
+static bool trace_ahead(void *user, const struct wave *wave, struct error *error)
+{
+    struct ahead *ahead = user;
+    struct wave own = *wave;
+    own.stopped = &ahead->stopped;
+    return trace_by_tracer(ahead->fixture, &own, error);
+}
+
+/* Whether the rays have been traced to their ends; their answers are then those of brute force. */
+static bool is_traced_ahead(struct pair *pair, const struct ray *rays, uint32_t count, const struct hit *expected)
+{
+    struct ahead ahead = {.fixture = &pair->rayspace};
+    struct hit *hits = calloc(count, sizeof(*hits));
+    struct error error = {0};
+    uint32_t stopped = 0;
+    expect_ok(gpu_buffer_upload(device, &ahead.stopped, &stopped, sizeof(stopped), &error), &error);
+    trace_rays(trace_ahead, &ahead, WAVE_CLOSEST, rays, count, hits, NULL);
+    gpu_buffer_read(device, &ahead.stopped, 0, &stopped, sizeof(stopped));
+    gpu_buffer_finish(device, &ahead.stopped);
+    assert_true(stopped == 0 || stopped == WAVE_STOPPED_LONG);
+    if (!stopped)
+        assert_memory_equal(hits, expected, count * sizeof(*hits));
+    free(hits);
+    return !stopped;
+}
+
+TEST(a_wave_that_is_queued_whole_has_its_answers_or_stops_its_slice)
+{
+    static const struct {
+        uint32_t batch, rounds;
+        bool flat, ends;
+    } cases[] = {
+        {0, 1, false, true},
+        {0, 4, false, true},
+        {0, 1, true, true},
+        /* The passes of a round take too few pairs: what is left has its turn in the rounds that follow. */
+        {192, 1, false, false},
+        {192, 4, false, true},
+        {64, 4, false, false},
+        {64, 1, true, false},
+    };
+    struct ray *rays = malloc(RAY_COUNT * sizeof(*rays));
+    struct hit *expected = calloc(RAY_COUNT, sizeof(*expected));
+    random_rays(rays, RAY_COUNT, 3);
+    for (size_t i = 0; i < sizeof(cases) / sizeof(cases[0]); i++) {
+        struct pair pair;
+        pair_init(&pair, test_scene_soup, cases[i].batch);
+        pair.rayspace.tracer->options.rayspace.rounds = cases[i].rounds;
+        pair.rayspace.tracer->options.rayspace.mode = cases[i].flat ? RAYSPACE_MODE_FLAT : RAYSPACE_MODE_JOINT;
+        trace_rays(trace_by_tracer, &pair.naive, WAVE_CLOSEST, rays, RAY_COUNT, expected, NULL);
+        if (is_traced_ahead(&pair, rays, RAY_COUNT, expected) != cases[i].ends)
+            fail_msg("case %zu is%s traced to its end", i, cases[i].ends ? " not" : "");
+        pair_finish(&pair);
+    }
+    free(expected);
+    free(rays);
 }
 
 /* ---- halving ---- */
