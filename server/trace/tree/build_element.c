@@ -9,7 +9,7 @@
 /* The grid's cells begin this far inside of it, so that rounding outward stays within. */
 #define GRID_INNER 2.0
 /* A box's corners are moved outward by this much of a cell before they are rounded outward: the rounding of the
- * traversal's arithmetic on coordinates of up to BVH_GRID_CELLS cells (shaders/bvh/bounds.glsl), 2^-24 each, 8
+ * traversal's arithmetic on coordinates of up to BVH_GRID_CELLS cells (shaders/tree/slack.glsl), 2^-24 each, 8
  * times.
  */
 #define GRID_PAD (8.0 * BVH_GRID_CELLS / 16777216.0)
