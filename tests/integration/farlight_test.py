@@ -48,6 +48,11 @@ def farlight(*arguments, **options):
     return run("farlight", *arguments, **options)
 
 
+def tracers():
+    """Those that there are, in their order, as `farlight tracers` says."""
+    return json.loads(farlight("tracers", "--json").stdout)["tracers"]
+
+
 def daemon_pose(path, animation, times):
     """For each time: a list of (place, normal) for each corner of a triangle, as the daemon has it."""
     result = run("tests/tools/pose_dump", path, "-" if animation is None else animation, *map(repr, times))
