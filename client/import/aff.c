@@ -32,7 +32,8 @@ bool aff_read_name(struct aff *aff, aff_name name, const char *of)
 
 static bool read_text(struct aff *aff);
 
-/* It is known by its ending: the words of other files would end in messages. */
+/* Its ending says that it is meant for this reader: messages quote the words of what it reads, and must quote no
+ * other file. */
 static bool may_be_included(const char *name)
 {
     const char *dot = strrchr(name, '.');
@@ -103,8 +104,7 @@ static bool read_include(struct aff *aff, const char *name)
     read = read_text(aff);
     aff->include_depth--;
     aff->texts[text].open = false;
-    if (read)
-        aff->nff.reader = outside;
+    aff->nff.reader = outside;
     return read;
 }
 
@@ -252,7 +252,6 @@ bool aff_import(struct import_scene *scene, struct files *files, const unsigned 
     aff->nff.reader.comment_marks = "#%";
     aff->nff.reader.word_marks = "{}";
     aff->nff.reader.free_form = true;
-    aff->nff.fill = (struct nff_fill){.numbers = {1, 1, 1, 1, 0, 0, 0, 1}};
     aff->files = files;
     aff->blocks[0].group_from_block = placement_identity();
     for (int c = 0; c < 3; c++)

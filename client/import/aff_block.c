@@ -6,8 +6,6 @@
 
 #include <stdlib.h>
 
-#define RADIANS_PER_DEGREE 0.017453292519943295
-
 struct aff_group *aff_add_group(struct aff *aff)
 {
     struct import_scene *scene = aff->nff.scene;
@@ -91,7 +89,7 @@ bool aff_read_static_transform(struct aff *aff)
         axis[c] = (double)n[3 + c];
         translation[c] = (double)n[7 + c];
     }
-    placement_turn(axis, (double)n[6] * RADIANS_PER_DEGREE, rotation);
+    placement_turn(axis, (double)n[6], rotation);
     own = placement_from_parts(scale, rotation, translation);
     block.group_from_block = placement_product(&block.group_from_block, &own);
     block.spheres = 0;

@@ -266,21 +266,21 @@ bool aff_add_constant_channels(struct aff_clip *clip, const struct aff_curve *cu
 
 bool aff_add_channels(struct aff_clip *clip, struct aff_keys *keys, uint32_t node, unsigned wanted)
 {
-    const struct aff_curve *curves = keys ? keys->curves : NULL;
+    if (!keys)
+        return true;
+    keys->used = true;
+    for (unsigned i = 0; i < AFF_PROPERTY_COUNT; i++) {
+        const struct aff_curve *curve = &keys->curves[i];
+        bool added;
 
-    if (keys)
-        keys->used = true;
-    for (unsigned i = 0; curves && i < AFF_PROPERTY_COUNT; i++) {
-        bool added = true;
-
-        if (curves[i].count == 0 || !(wanted & 1u << i))
+        if (curve->count == 0 || !(wanted & 1u << i))
             continue;
         if (i == AFF_ROT)
-            added = add_rotation(clip, &curves[i], node);
+            added = add_rotation(clip, curve, node);
         else if (i == AFF_VISIBILITY)
-            added = add_visibility(clip, &curves[i], node);
+            added = add_visibility(clip, curve, node);
         else
-            added = add_position(clip, &curves[i],
+            added = add_position(clip, curve,
                                  i == AFF_TRANSL ? PROTOCOL_CHANNEL_NODE_TRANSLATION : PROTOCOL_CHANNEL_NODE_SCALE,
                                  node);
         if (!added)

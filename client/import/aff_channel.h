@@ -18,9 +18,11 @@ struct aff_clip {
 };
 
 /* Each false: the scene has failed. */
+
 /* Of the node that has the keys (NULL: none). `wanted`: a bit for each property that counts. */
 bool aff_add_channels(struct aff_clip *clip, struct aff_keys *keys, uint32_t node, unsigned wanted);
-/* What the keys leave as it is takes part, so that no matrix need be taken apart. */
+/* Adds a constant for each of translation, rotation and scale that has no keys, so that they are all in the clip
+ * and the node's matrix need not be taken apart. */
 bool aff_add_constant_channels(struct aff_clip *clip, const struct aff_curve *curves, uint32_t node);
 bool aff_add_morph_channel(struct aff_clip *clip, const struct aff_morph *morph);
 

@@ -7,9 +7,13 @@
 
 static bool add_group_keys(struct aff_clip *clip, struct aff_keys *keys, uint32_t node)
 {
-    const struct aff_curve *curves = keys ? keys->curves : NULL;
-    bool moves = curves && curves[AFF_TRANSL].count + curves[AFF_ROT].count + curves[AFF_SCALE].count > 0;
+    const struct aff_curve *curves;
+    bool moves;
 
+    if (!keys)
+        return true;
+    curves = keys->curves;
+    moves = curves[AFF_TRANSL].count + curves[AFF_ROT].count + curves[AFF_SCALE].count > 0;
     return aff_add_channels(clip, keys, node, ~0u) && (!moves || aff_add_constant_channels(clip, curves, node));
 }
 

@@ -6,8 +6,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define RADIANS_PER_DEGREE 0.017453292519943295
-
 static const struct property {
     const char *word;
     uint32_t numbers; /* a key, with its time */
@@ -35,7 +33,7 @@ static struct spline_key key_of(enum aff_property property, const float *n)
     if (property == AFF_ROT) {
         const double axis[3] = {key.value[0], key.value[1], key.value[2]};
 
-        placement_turn(axis, (double)n[4] * RADIANS_PER_DEGREE, key.value);
+        placement_turn(axis, (double)n[4], key.value);
     }
     if (property == AFF_VISIBILITY) {
         key.value[0] = n[1] != 0.0f;
@@ -142,13 +140,16 @@ struct aff_keys *aff_find_keys(const struct aff *aff, const char *name)
 struct placement aff_pose_at(const struct aff_keys *keys, double time_s)
 {
     double translation[3] = {0}, rotation[4] = {0, 0, 0, 1}, scale[3] = {1, 1, 1};
-    const struct aff_curve *curves = keys ? keys->curves : NULL;
+    const struct aff_curve *curves;
 
-    if (curves && curves[AFF_TRANSL].count > 0)
+    if (!keys)
+        return placement_identity();
+    curves = keys->curves;
+    if (curves[AFF_TRANSL].count > 0)
         spline_position(curves[AFF_TRANSL].keys, curves[AFF_TRANSL].count, time_s, translation, NULL);
-    if (curves && curves[AFF_ROT].count > 0)
+    if (curves[AFF_ROT].count > 0)
         spline_rotation(curves[AFF_ROT].keys, curves[AFF_ROT].count, time_s, rotation);
-    if (curves && curves[AFF_SCALE].count > 0)
+    if (curves[AFF_SCALE].count > 0)
         spline_position(curves[AFF_SCALE].keys, curves[AFF_SCALE].count, time_s, scale, NULL);
     return placement_from_parts(scale, rotation, translation);
 }

@@ -35,33 +35,32 @@ bool aff_read_texture(struct aff *aff, uint32_t *texture, const char *of)
     return true;
 }
 
-/* Takes the texels. */
-static uint32_t add_texture(struct import_scene *scene, const char *name, const struct texture_job *job)
+/* Takes the texels. An image that cannot be used is shown in a conspicuous colour. */
+static uint32_t add_texture(struct import_scene *scene, const char *name, struct texture_job *job)
 {
-    struct message_set_texture set = {.width = job->width,
-                                      .height = job->height,
-                                      .format = PROTOCOL_TEXTURE_RGBA8_SRGB,
+    struct message_set_texture set = {.format = PROTOCOL_TEXTURE_RGBA8_SRGB,
                                       .wrap_u = PROTOCOL_WRAP_REPEAT,
                                       .wrap_v = PROTOCOL_WRAP_REPEAT,
                                       .name = name};
-    struct texture_job marker = {.texels = job->texels, .width = 2, .height = 2};
 
     if (!job->texels) {
         import_note(scene, PROTOCOL_SEVERITY_WARNING, name,
                     "the image '%.100s' cannot be used: %.150s; it is shown in magenta and black", name,
                     job->reason);
-        marker.texels = texture_marker();
-        set.width = set.height = 2;
+        job->texels = texture_marker();
+        job->width = job->height = 2;
         set.nearest = 1;
     }
+    set.width = job->width;
+    set.height = job->height;
     return import_add_texture(scene, &set,
-                              import_add_blob(scene, marker.texels, (uint64_t)set.width * set.height * 4));
+                              import_add_blob(scene, job->texels, (uint64_t)set.width * set.height * 4));
 }
 
 bool aff_add_textures(struct aff *aff, uint32_t *ids)
 {
-    size_t count = aff->texture_count, present = 0;
-    struct texture_job *jobs = calloc(2 * count + 1, sizeof(*jobs)), *decoded = jobs ? jobs + count : NULL;
+    size_t count = aff->texture_count;
+    struct texture_job *jobs = calloc(count + 1, sizeof(*jobs));
 
     if (!jobs)
         return import_fail(aff->nff.scene, NULL, "out of memory");
@@ -70,17 +69,13 @@ bool aff_add_textures(struct aff *aff, uint32_t *ids)
 
         jobs[i].srgb = true;
         jobs[i].bytes = files_read_image(aff->files, aff->textures[i], &jobs[i].size_bytes, reason);
-        if (jobs[i].bytes)
-            decoded[present++] = jobs[i];
-        else
+        if (!jobs[i].bytes)
             snprintf(jobs[i].reason, sizeof(jobs[i].reason), "%.199s", reason);
     }
-    texture_decode(decoded, present);
+    texture_decode(jobs, count);
     for (size_t i = 0; i < count; i++) {
-        const struct texture_job *job = jobs[i].bytes ? decoded++ : &jobs[i];
-
         free((void *)(uintptr_t)jobs[i].bytes);
-        ids[i + 1] = add_texture(aff->nff.scene, aff->textures[i], job);
+        ids[i + 1] = add_texture(aff->nff.scene, aff->textures[i], &jobs[i]);
     }
     free(jobs);
     return !aff->nff.scene->failed;

@@ -135,18 +135,16 @@ static bool is_aff(const char *path)
 static bool enter_sandbox(struct import_scene *scene, const struct options *options)
 {
     char *folder = options->model ? files_folder_of(options->model) : NULL, *images = NULL;
+    const char *folders[] = {folder, NULL};
+    struct sandbox_options sandbox = {
+        .read_folders = folders, .read_folder_count = 2, .cpu_seconds = CPU_SECONDS_MAX};
     char reason[256];
     bool entered;
 
     if (folder && is_aff(options->model) && asprintf(&images, "%s/" FILES_IMAGES_BESIDE, folder) < 0)
         images = NULL;
-    {
-        const char *const folders[] = {folder, images};
-        struct sandbox_options sandbox = {
-            .read_folders = folders, .read_folder_count = 2, .cpu_seconds = CPU_SECONDS_MAX};
-
-        entered = sandbox_enter(&sandbox, reason, sizeof(reason));
-    }
+    folders[1] = images;
+    entered = sandbox_enter(&sandbox, reason, sizeof(reason));
     free(images);
     free(folder);
     if (!entered)

@@ -13,9 +13,12 @@
 
 #define LIGHTS_MAX 4096
 
+/* Before any `f`, and what an `f` leaves out. */
+static const struct nff_fill default_fill = {.numbers = {1, 1, 1, 1, 0, 0, 0, 1}};
+
 static bool read_fill(struct nff *nff)
 {
-    struct nff_fill fill = {.numbers = {1, 1, 1, 1, 0, 0, 0, 1}};
+    struct nff_fill fill = default_fill;
     uint32_t count = word_reader_some(&nff->reader, fill.numbers, 8);
 
     if (count < 3)
@@ -222,7 +225,7 @@ static bool read_statement(struct nff *nff, struct word word)
 
 void nff_init(struct nff *nff, struct import_scene *scene, const unsigned char *bytes, size_t size_bytes)
 {
-    *nff = (struct nff){.scene = scene, .polygon_budget = POLYGON_BUDGET};
+    *nff = (struct nff){.scene = scene, .fill = default_fill, .polygon_budget = POLYGON_BUDGET};
     nff->reader = (struct word_reader){.scene = scene,
                                        .at = (const char *)bytes,
                                        .end = (const char *)bytes + size_bytes,

@@ -70,15 +70,10 @@ void read_images(building &b, const std::set<std::string> &names)
         files.emplace_back(bytes);
         jobs.push_back(job);
     }
-    std::vector<texture_job> present;
-    std::copy_if(jobs.begin(), jobs.end(), std::back_inserter(present),
-                 [](const texture_job &job) { return job.bytes != nullptr; });
-    texture_decode(present.data(), present.size());
-    size_t next = 0, number = 0;
+    texture_decode(jobs.data(), jobs.size());
+    size_t number = 0;
     for (const std::string &name : names) {
-        texture_job job = jobs[number++];
-        if (job.bytes)
-            job = present[next++];
+        const texture_job &job = jobs[number++];
         image &i = b.images[name];
         i.texels.reset(job.texels ? job.texels : texture_marker());
         if (!i.texels)

@@ -5,18 +5,21 @@
 #include <stddef.h>
 #include <string.h>
 
+#define RADIANS_PER_DEGREE 0.017453292519943295
+
 struct placement placement_identity(void)
 {
     return (struct placement){{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}};
 }
 
-void placement_turn(const double axis[3], double radians, double rotation[4])
+void placement_turn(const double axis[3], double degrees, double rotation[4])
 {
+    double half = degrees * RADIANS_PER_DEGREE / 2;
     double length = sqrt(axis[0] * axis[0] + axis[1] * axis[1] + axis[2] * axis[2]);
 
     for (int c = 0; c < 3; c++)
-        rotation[c] = length > 0 ? axis[c] / length * sin(radians / 2) : 0;
-    rotation[3] = length > 0 ? cos(radians / 2) : 1;
+        rotation[c] = length > 0 ? axis[c] / length * sin(half) : 0;
+    rotation[3] = length > 0 ? cos(half) : 1;
 }
 
 struct placement placement_from_parts(const double scale[3], const double rotation[4], const double translation[3])

@@ -28,7 +28,8 @@ void texture_decode(struct texture_job *jobs, size_t count)
         reader->decode(jobs, count);
     else
         for (size_t i = 0; i < count; i++)
-            snprintf(jobs[i].reason, sizeof(jobs[i].reason), "%s", why_none);
+            if (jobs[i].bytes)
+                snprintf(jobs[i].reason, sizeof(jobs[i].reason), "%s", why_none);
 }
 
 void texture_decode_environment(struct texture_job *job)

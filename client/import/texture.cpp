@@ -239,7 +239,8 @@ void run(texture_job &job, bool (*decoder)(texture_job &, std::string &)) noexce
 void decode_next(texture_job *jobs, size_t count, std::atomic<size_t> &next) noexcept
 {
     for (size_t i; (i = next.fetch_add(1)) < count;)
-        run(jobs[i], decode);
+        if (jobs[i].bytes)
+            run(jobs[i], decode);
 }
 
 // IEEE 754 binary16, rounded to nearest even; finite, non-negative, at most half_max.

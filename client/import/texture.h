@@ -15,7 +15,7 @@ extern "C" {
 
 /* One image to decode. */
 struct texture_job {
-    const unsigned char *bytes; /* the encoded file; not owned */
+    const unsigned char *bytes; /* the encoded file; not owned; NULL: the result stays as it is */
     size_t size_bytes;
     bool srgb; /* texels are wanted sRGB-encoded: matters for float images only, which are linear */
     /* Result. */

@@ -1,8 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Writes what the fuzzers start from: seed FOLDER makes FOLDER/protocol.dict out of the table, and valid inputs in
  * FOLDER/codec, FOLDER/framing, FOLDER/handshake and FOLDER/sealed, noise in FOLDER/scene, sessions in
- * FOLDER/session, models in FOLDER/aff, FOLDER/gltf, FOLDER/obj
- * and FOLDER/nff. */
+ * FOLDER/session, models in FOLDER/aff, FOLDER/gltf, FOLDER/obj and FOLDER/nff. */
 #include <errno.h>
 #include <inttypes.h>
 #include <stdlib.h>

@@ -48,6 +48,26 @@ def farlight(*arguments, **options):
     return run("farlight", *arguments, **options)
 
 
+def tracers():
+    """Those that there are, in their order, as `farlight tracers` says."""
+    return json.loads(farlight("tracers", "--json").stdout)["tracers"]
+
+
+def daemon_pose(path, animation, times):
+    """For each time: a list of (place, normal) for each corner of a triangle, as the daemon has it."""
+    result = run("tests/tools/pose_dump", path, "-" if animation is None else animation, *map(repr, times))
+    assert result.returncode == 0, result.stderr
+    poses = []
+    for line in result.stdout.splitlines():
+        word, _, rest = line.partition(" ")
+        if word == "time":
+            poses.append([])
+        elif word == "c":
+            numbers = tuple(map(float, rest.split()))
+            poses[-1].append((numbers[:3], numbers[3:]))
+    return poses
+
+
 class Daemon:
     """A farlightd on a socket of its own; a context manager."""
 

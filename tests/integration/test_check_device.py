@@ -4,9 +4,7 @@ import json
 import os
 
 import farlight_test
-from farlight_test import Case
-
-TRACERS = {"bvh", "naive", "reference", "ldc", "abuffer", "rayspace"}
+from farlight_test import Case, tracers
 
 
 def check_device(*arguments, **environment):
@@ -24,7 +22,7 @@ class CheckDevice(Case):
         of_check = {}
         for row in rows:
             of_check.setdefault(row["check"], []).append(row)
-        self.assertEqual({row["name"] for row in of_check["rays"]}, TRACERS)
+        self.assertEqual({row["name"] for row in of_check["rays"]}, {tracer["name"] for tracer in tracers()})
         self.assertLessEqual({"path", "distributed", "raycast", "ao"}, {row["name"] for row in of_check["picture"]})
         for row in of_check["limit"]:
             self.assertGreaterEqual(row["value"], row["bound"], row)

@@ -13,407 +13,21 @@ Properties verified:
 
 Environment: FARLIGHT_BIN (default build/release), FARLIGHT_SCENES (default ../shared/scenes beside the checkout).
 """
-
 import base64
-import concurrent.futures
-import hashlib
 import json
 import os
-import resource
-import select
 import shutil
-import socket
 import struct
 import subprocess
 import tempfile
-import threading
-import time
 import unittest
 import unittest.mock
 
-ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
-BIN = os.environ.get("FARLIGHT_BIN") or os.path.join(ROOT, "build", "release")
-IMPORTER = os.path.join(os.path.abspath(BIN), "farlight-import")
-SCENES = os.environ.get("FARLIGHT_SCENES") or os.path.join(os.path.dirname(ROOT), "shared", "scenes")
-SLOWER = 6 if "sanitize" in BIN else 1
-BUSY_S = 120  # that other work on the machine may take meanwhile
-
-OK, ERROR, CREDIT = 0x0001, 0x0002, 0x0007
-BLOB_OFFER, BLOB_NEED, BLOB_DATA = 0x0110, 0x0111, 0x0112
-EDIT_BEGIN, EDIT_COMMIT = 0x0120, 0x0121
-SET_NODE, SET_MESH, SET_SPHERES, SET_MATERIAL = 0x0130, 0x0131, 0x0132, 0x0134
-SET_TEXTURE, SET_LIGHT, SET_CAMERA, SET_ENVIRONMENT = 0x0135, 0x0136, 0x0137, 0x0138
-SET_SKIN, SET_CLIP, SET_CHANNEL = 0x0139, 0x013a, 0x013b
-TRANSLATION, ROTATION, SCALE, WEIGHTS, HIDDEN = 0, 1, 2, 3, 4
-STEP, LINEAR, CUBIC = 0, 1, 2
-IMPORT_NOTE, IMPORT_CLIP, IMPORT_PROGRESS, IMPORT_DONE, IMPORT_BOUNDS = 0x8301, 0x8302, 0x8303, 0x8304, 0x8305
-UPLOAD_CHANNEL = 1
-CHUNK = 1 << 20
-
-
-class Fields:
-    """Cursor over a payload: fixed part, then counted fields."""
-
-    def __init__(self, payload):
-        self.payload = payload
-        self.at = 2
-
-    def take(self, form):
-        values = struct.unpack_from("<" + form, self.payload, self.at)
-        self.at += struct.calcsize("<" + form)
-        return values if len(values) > 1 else values[0]
-
-    def string(self):
-        size = self.take("I")
-        self.at += size
-        return self.payload[self.at - size:self.at].decode("utf-8")
-
-    def array(self, form):
-        return [self.take(form) for _ in range(self.take("I"))]
-
-
-def blob_refs(fields):
-    return [(size, name) for size, name in fields.array("Q32s")]
-
-
-def decode(kind, payload):
-    """The edits as dictionaries; what no test looks at is left out."""
-    f = Fields(payload)
-    if kind == SET_NODE:
-        node, parent, node_kind, thing, hidden = f.take("5I")
-        return dict(id=node, parent=parent, kind=node_kind, object=thing, hidden=hidden, matrix=f.take("12f"),
-                    skin=f.take("I"), weights=f.array("f"), name=f.string())
-    if kind == SET_MESH:
-        mesh, vertices, triangles, influences, targets, closed = f.take("6I")
-        return dict(id=mesh, vertices=vertices, triangles=triangles, influences=influences, targets=targets, closed=closed,
-                    arrays=blob_refs(f), ranges=f.array("3I"), weights=f.array("f"), name=f.string())
-    if kind == SET_SPHERES:
-        spheres, count = f.take("2I")
-        return dict(id=spheres, count=count, arrays=blob_refs(f), ranges=f.array("3I"), name=f.string())
-    if kind == SET_MATERIAL:
-        material, alpha_mode, double_sided, unlit = f.take("4I")
-        base, emission = f.take("4f"), f.take("3f")
-        metallic, roughness, transmission, ior, cutoff, *anisotropy = f.take("7f")
-        uses = [dict(texture=u[0], texcoord=u[1], transform=u[2:8], strength=u[8]) for u in f.array("2I6ff")]
-        return dict(id=material, alpha_mode=alpha_mode, double_sided=double_sided, unlit=unlit, base=base,
-                    emission=emission, metallic=metallic, roughness=roughness, transmission=transmission, ior=ior,
-                    cutoff=cutoff, anisotropy=anisotropy, textures=uses, name=f.string())
-    if kind == SET_TEXTURE:
-        texture, width, height, form, wrap_u, wrap_v, nearest = f.take("7I")
-        return dict(id=texture, width=width, height=height, format=form, wrap=(wrap_u, wrap_v), nearest=nearest,
-                    arrays=blob_refs(f), name=f.string())
-    if kind == SET_LIGHT:
-        light, light_kind = f.take("2I")
-        return dict(id=light, kind=light_kind, colour=f.take("3f"), range=f.take("f"), cones=f.take("2f"),
-                    size=f.take("2f"), name=f.string())
-    if kind == SET_CAMERA:
-        return dict(id=f.take("I"), fov_y=f.take("f"), height=f.take("f"), near=f.take("f"), name=f.string())
-    if kind == SET_ENVIRONMENT:
-        return dict(id=0, colour=f.take("3f"), rotation=f.take("f"), size=f.take("2I"), arrays=blob_refs(f))
-    if kind == SET_SKIN:
-        return dict(id=f.take("I"), joints=f.take("I"), arrays=blob_refs(f), name=f.string())
-    if kind == SET_CLIP:
-        return dict(id=f.take("I"), arrays=blob_refs(f), name=f.string())
-    if kind == SET_CHANNEL:
-        names = ("id", "clip", "path", "object", "interpolation", "width", "keys", "first_time", "first_value")
-        return dict(zip(names, f.take("9I")))
-    raise AssertionError("unexpected edit 0x%04x" % kind)
-
-
-def blob_hash(data):
-    names = b"".join(hashlib.blake2b(data[at:at + CHUNK], digest_size=32).digest() for at in range(0, len(data), CHUNK))
-    return hashlib.blake2b(names, digest_size=32).digest()
-
-
-class Result:
-    def __init__(self):
-        self.notes, self.clips, self.edits = [], [], []
-        self.blobs = {}
-        self.committed = self.done = False
-        self.faults = []
-        self.status = None
-        self.stderr = ""
-        self.seconds = 0.0
-        self.times = None
-
-    def of(self, kind):
-        return [edit for edit_kind, edit in self.edits if edit_kind == kind]
-
-    def data(self, reference):
-        return self.blobs[reference[1]]
-
-    def errors(self):
-        return [note for note in self.notes if note[0] == 2]
-
-    def text(self):
-        return "; ".join("%s: %s" % (where, text) for _, where, text in self.notes)
-
-
-class Peer:
-    """Answers like a server: asks for all blobs (or none), gives credit bit by bit, checks what comes."""
-
-    def __init__(self, credit=4 << 20, refuse_commit=False, need=True, hang_up_after=None, first_credit=True):
-        self.credit_step, self.refuse_commit, self.need = credit, refuse_commit, need
-        self.hang_up_after, self.first_credit = hang_up_after, first_credit
-        self.result = Result()
-        self.sent, self.credit = 0, 0
-        self.sizes, self.partial = {}, {}
-        self.open_request = None
-
-    def send(self, kind, request, payload, channel=0):
-        padding = b"\0" * (-len(payload) % 8)
-        try:
-            self.socket.sendall(struct.pack("<IHHII", len(payload), kind, 0, request, channel) + payload + padding)
-        except (BrokenPipeError, ConnectionResetError):
-            pass
-
-    def give_credit(self):
-        self.credit += self.credit_step
-        self.send(CREDIT, 0, struct.pack("<HIQ", 12, UPLOAD_CHANNEL, self.credit))
-
-    def ok(self, request):
-        self.send(OK, request, struct.pack("<HQ", 8, 1))
-
-    def fault(self, text):
-        self.result.faults.append(text)
-
-    def on_offer(self, request, payload):
-        refs = Fields(payload).array("Q32s")
-        if not 1 <= len(refs) <= 1024:
-            self.fault("an offer of %d blobs" % len(refs))
-        self.sizes.update({name: size for size, name in refs})
-        wanted = range(len(refs)) if self.need else []
-        self.send(BLOB_NEED, request, struct.pack("<HI", 0, len(wanted)) + struct.pack("<%dI" % len(wanted), *wanted))
-
-    def on_data(self, request, channel, payload):
-        fields = Fields(payload)
-        offset, name = fields.take("Q32s")
-        count = fields.take("I")
-        start = fields.at + (-fields.at % 8)
-        piece = payload[start:start + count]
-        self.sent += count
-        if channel != UPLOAD_CHANNEL or count > 262144 or len(piece) != count:
-            self.fault("a piece of %d bytes on channel %d" % (count, channel))
-        if self.sent > self.credit:
-            self.fault("%d bytes sent with a credit of %d" % (self.sent, self.credit))
-        blob = self.partial.setdefault((request, name), bytearray())
-        if offset != len(blob):
-            self.fault("a piece out of order")
-        blob += piece
-        if self.credit - self.sent < self.credit_step // 2:
-            self.give_credit()
-        if len(blob) >= self.sizes.get(name, 0):
-            if blob_hash(bytes(blob)) != name:
-                self.fault("a blob without the hash that names it")
-            self.result.blobs[name] = bytes(self.partial.pop((request, name)))
-            self.ok(request)
-
-    def on_message(self, kind, request, channel, payload):
-        result = self.result
-        if kind == IMPORT_NOTE:
-            fields = Fields(payload)
-            result.notes.append((fields.take("I"), fields.string(), fields.string()))
-        elif kind == IMPORT_CLIP:
-            fields = Fields(payload)
-            result.clips.append(dict(id=fields.take("I"), channels=fields.take("I"), duration=fields.take("f"),
-                                     name=fields.string()))
-        elif kind == BLOB_OFFER:
-            self.on_offer(request, payload)
-        elif kind == BLOB_DATA:
-            self.on_data(request, channel, payload)
-        elif kind == EDIT_BEGIN:
-            self.open_request = request
-        elif kind == EDIT_COMMIT:
-            if request != self.open_request:
-                self.fault("commit of request %d, begun as %s" % (request, self.open_request))
-            if self.refuse_commit:
-                text, empty = b"not today", struct.pack("<I", 0)
-                self.send(ERROR, request, struct.pack("<HIII", 12, 6, 0, 0) + empty +
-                          struct.pack("<I", len(text)) + text + empty)
-            else:
-                result.committed = True
-                self.ok(request)
-        elif kind == IMPORT_DONE:
-            result.done = True
-            result.times = Fields(payload).take("5Q")
-        elif kind == IMPORT_BOUNDS:
-            values = Fields(payload).take("II6f")
-            if not all(lower <= upper for lower, upper in zip(values[2:5], values[5:])):
-                self.fault("a box that is inside out")
-        elif kind != IMPORT_PROGRESS:
-            if request != self.open_request:
-                self.fault("an edit outside the transaction")
-            result.edits.append((kind, decode(kind, payload)))
-
-    def pump(self, deadline):
-        buffer, seen = bytearray(), 0
-        while True:
-            left = deadline - time.monotonic()
-            if left <= 0 or not select.select([self.socket], [], [], left)[0]:
-                return False
-            try:
-                data = self.socket.recv(1 << 20)
-            except ConnectionResetError:
-                return True
-            if not data:
-                return True
-            buffer += data
-            at = 0
-            while len(buffer) - at >= 16:
-                size, kind, _, request, channel = struct.unpack_from("<IHHII", buffer, at)
-                whole = 16 + size + (-size % 8)
-                if len(buffer) - at < whole:
-                    break
-                self.on_message(kind, request, channel, bytes(buffer[at + 16:at + 16 + size]))
-                at += whole
-                seen += 1
-                if self.hang_up_after is not None and seen >= self.hang_up_after:
-                    self.socket.close()
-                    return True
-            del buffer[:at]
-
-    def run(self, arguments, seconds=10, wall_s=None, memory=None):
-        """`seconds` of processor time; `wall_s` on the clock, where it is to wait in vain."""
-        ours, theirs = socket.socketpair()
-        self.socket = ours
-        began = time.monotonic()
-
-        process = subprocess.Popen([IMPORTER, "--fd", str(theirs.fileno())] + arguments, pass_fds=[theirs.fileno()],
-                                   stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
-        theirs.close()
-        if memory and "sanitize" not in BIN:
-            resource.prlimit(process.pid, resource.RLIMIT_AS, (memory, memory))
-        if self.first_credit:
-            self.give_credit()
-        seconds *= SLOWER
-        end = began + (wall_s or seconds + BUSY_S)
-        in_time = self.pump(end)
-        late = threading.Timer(max(0.1, end - time.monotonic()), process.kill)
-        late.start()
-        with process.stderr:
-            self.result.stderr = process.stderr.read().decode("utf-8", "replace")
-        _, status, usage = os.wait4(process.pid, 0)
-        late.cancel()
-        process.returncode = os.waitstatus_to_exitcode(status)
-        # Sanitized, it lets the libraries talk; and the leak sanitizer cannot stop threads that libraries started
-        # before the sandbox was entered.
-        self.result.stderr = "".join(line for line in self.result.stderr.splitlines(True)
-                                     if SLOWER == 1 or not ("was not suspended. False leaks" in line or
-                                                            line.startswith("libpng ")))
-        self.result.seconds = usage.ru_utime + usage.ru_stime
-        if not in_time or self.result.seconds > seconds:
-            self.fault("not done within %g s of processor time" % seconds)
-        ours.close()
-        self.result.status = process.returncode
-        return self.result
-
-
-def import_file(path, *more, **options):
-    run = {key: options.pop(key) for key in ("seconds", "wall_s", "memory") if key in options}
-    return Peer(**options).run(list(more) + [path], **run)
-
-
-def import_files(paths, **options):
-    """Pairs of path and result; two at a time."""
-    with concurrent.futures.ThreadPoolExecutor(max_workers=2) as pool:
-        return list(zip(paths, pool.map(lambda path: import_file(path, **options), paths)))
-
-
-def array_widths(mesh):
-    """Bytes of a vertex in each array; the second one has 12 a triangle."""
-    influences, targets = mesh["influences"], mesh["targets"]
-    return (12, None, 12, 16, 8, 8, 4, 2 * influences, 4 * influences) + (12 * targets,) * 3
-
-
-def animation_inconsistencies(result):
-    found = []
-    nodes = {e["id"]: e for e in result.of(SET_NODE)}
-    meshes = {e["id"]: e for e in result.of(SET_MESH)}
-    skins = {e["id"]: e for e in result.of(SET_SKIN)}
-    clips = {e["id"]: memoryview(result.data(e["arrays"][0])).cast("f") for e in result.of(SET_CLIP)}
-    order = [(kind, edit["id"]) for kind, edit in result.edits]
-    for skin in skins.values():
-        joints = memoryview(result.data(skin["arrays"][0])).cast("I")
-        if len(joints) != skin["joints"] or any(joint not in nodes for joint in joints):
-            found.append("skin %d: joints" % skin["id"])
-        if any(order.index((SET_NODE, joint)) > order.index((SET_SKIN, skin["id"])) for joint in joints):
-            found.append("skin %d: a joint comes after it" % skin["id"])
-        if len(skin["arrays"]) == 2 and skin["arrays"][1][0] != skin["joints"] * 48:
-            found.append("skin %d: matrices" % skin["id"])
-    for node in nodes.values():
-        mesh = meshes[node["object"]] if node["kind"] == 1 else None
-        if node["skin"]:
-            if not mesh or not mesh["influences"] or node["skin"] not in skins:
-                found.append("node %d: skin" % node["id"])
-            elif max(memoryview(result.data(mesh["arrays"][7])).cast("H")) >= skins[node["skin"]]["joints"]:
-                found.append("node %d: its mesh names joints that its skin has not" % node["id"])
-        if len(node["weights"]) > (mesh["targets"] if mesh else 0):
-            found.append("node %d: weights" % node["id"])
-    moved = {}
-    for channel in result.of(SET_CHANNEL):
-        floats, path, node = clips.get(channel["clip"], ()), channel["path"], nodes.get(channel["object"])
-        count = channel["keys"] * channel["width"] * (3 if channel["interpolation"] == CUBIC else 1)
-        times = list(floats[channel["first_time"]:channel["first_time"] + channel["keys"]])
-        width = {TRANSLATION: 3, ROTATION: 4, SCALE: 3, HIDDEN: 1}.get(path)
-        if path == WEIGHTS and node and node["kind"] == 1:
-            width = meshes[node["object"]]["targets"]
-        if (len(times) != channel["keys"] or times != sorted(set(times)) or channel["width"] != width or
-                channel["first_value"] + count > len(floats)):
-            found.append("channel %d" % channel["id"])
-        key = (channel["clip"], channel["object"])
-        if path in moved.setdefault(key, set()):
-            found.append("channel %d: a second one of its property" % channel["id"])
-        moved[key].add(path)
-    # Cameras and lights have no scale: their matrices can be taken apart.
-    found += ["node %d of clip %d: paths %s" % (node, clip, paths) for (clip, node), paths in moved.items()
-              if nodes[node]["kind"] not in (3, 4) and
-              paths - {WEIGHTS, HIDDEN} not in (set(), {TRANSLATION, ROTATION, SCALE})]
-    listed = [clip["id"] for clip in result.clips if clip["id"]]
-    if sorted(listed) != sorted(clips) or len(set(listed)) != len(listed):
-        found.append("the clips %s are told as %s" % (sorted(clips), listed))
-    if any(value - value != 0 for floats in clips.values() for value in floats):
-        found.append("a clip with numbers that are not finite")
-    return found
-
-
-def inconsistencies(result):
-    """What a server would refuse, and a little more."""
-    found = animation_inconsistencies(result)
-    meshes = {e["id"]: e for e in result.of(SET_MESH)}
-    spheres = {e["id"]: e for e in result.of(SET_SPHERES)}
-    materials = {e["id"] for e in result.of(SET_MATERIAL)} | {0}
-    textures = {e["id"] for e in result.of(SET_TEXTURE)} | {0}
-    nodes = {e["id"] for e in result.of(SET_NODE)} | {0}
-    things = [None, meshes, spheres, {e["id"] for e in result.of(SET_LIGHT)}, {e["id"] for e in result.of(SET_CAMERA)}]
-    for mesh in meshes.values():
-        for number, (size, name) in enumerate(mesh["arrays"]):
-            wanted = mesh["triangles"] * 12 if number == 1 else mesh["vertices"] * array_widths(mesh)[number]
-            if size != wanted and not (size == 0 and number > 1):
-                found.append("mesh %d array %d has %d bytes, not %d" % (mesh["id"], number, size, wanted))
-        if (mesh["influences"] > 0) != (len(mesh["arrays"]) > 8 and mesh["arrays"][8][0] > 0):
-            found.append("mesh %d: %d influences" % (mesh["id"], mesh["influences"]))
-        if (mesh["targets"] > 0) != (len(mesh["arrays"]) > 9) or len(mesh["weights"]) > mesh["targets"]:
-            found.append("mesh %d: %d morph targets" % (mesh["id"], mesh["targets"]))
-        if max(memoryview(result.data(mesh["arrays"][1])).cast("I")) >= mesh["vertices"]:
-            found.append("mesh %d: index out of range" % mesh["id"])
-        positions = memoryview(result.data(mesh["arrays"][0])).cast("f")
-        if any(value - value != 0 for value in positions[:300000]):
-            found.append("mesh %d: position not finite" % mesh["id"])
-        end = 0
-        for first, count, material in mesh["ranges"]:
-            if first < end or first + count > mesh["triangles"] or material not in materials:
-                found.append("mesh %d: bad range" % mesh["id"])
-            end = first + count
-    for entry in result.of(SET_TEXTURE):
-        if entry["arrays"][0][0] != entry["width"] * entry["height"] * 4:
-            found.append("texture %d: size" % entry["id"])
-    for material in result.of(SET_MATERIAL):
-        if any(use["texture"] not in textures for use in material["textures"]):
-            found.append("material %d: texture" % material["id"])
-    for node in result.of(SET_NODE):
-        if node["parent"] not in nodes or (node["kind"] and node["object"] not in things[node["kind"]]):
-            found.append("node %d: reference" % node["id"])
-    return found
+import importer
+from farlight_test import SHARED_SCENES as SCENES, Case, needs_shared_scenes
+from importer import (
+    SET_CAMERA, SET_ENVIRONMENT, SET_LIGHT, SET_MATERIAL, SET_MESH, SET_NODE, SET_SPHERES, SET_TEXTURE,
+    Peer, import_file, import_files, inconsistencies)
 
 
 def model_files(folder, endings):
@@ -424,23 +38,12 @@ def model_files(folder, endings):
                 yield os.path.join(base, name)
 
 
-def needs_scenes(test):
-    def run(self):
-        if not os.path.isdir(SCENES):
-            print("skipped: there is no folder %s" % SCENES)
-            self.skipTest("no scenes folder")
-        test(self)
-
-    run.__doc__, run.__name__ = test.__doc__, test.__name__
-    return run
-
-
 def shorter(path):
     return os.path.relpath(path, SCENES)
 
 
 class Models(unittest.TestCase):
-    @needs_scenes
+    @needs_shared_scenes
     def test_every_model_is_imported(self):
         """All of common, ldc, bvh, rayspace, screenspace and gltf."""
         count, triangles, spheres, warned = 0, 0, 0, 0
@@ -458,7 +61,7 @@ class Models(unittest.TestCase):
                     spheres += sum(one["count"] for one in result.of(SET_SPHERES))
         print("models: %d imported, %d with warnings; %d triangles, %d spheres" % (count, warned, triangles, spheres))
 
-    @needs_scenes
+    @needs_shared_scenes
     def test_known_counts(self):
         """Triangles and spheres as the scenes' README states them."""
         for name, triangles, spheres in (
@@ -472,7 +75,7 @@ class Models(unittest.TestCase):
                 self.assertEqual(sum(mesh["triangles"] for mesh in result.of(SET_MESH)), triangles)
                 self.assertEqual(sum(one["count"] for one in result.of(SET_SPHERES)), spheres)
 
-    @needs_scenes
+    @needs_shared_scenes
     def test_environments_are_imported(self):
         """Every file of env, without a model."""
         for path in model_files(os.path.join(SCENES, "env"), (".exr", ".hdr")):
@@ -484,7 +87,7 @@ class Models(unittest.TestCase):
                 self.assertEqual(len(halves), width * height * 4)
                 self.assertLessEqual(max(halves), 0x7bff, "a half that is not finite or negative")
 
-    @needs_scenes
+    @needs_shared_scenes
     def test_unknown_format_is_named(self):
         result = import_file(os.path.join(SCENES, "formats", "stl", "colored.stl"))
         self.assertEqual(result.status, 1)
@@ -512,7 +115,7 @@ class Hostile(unittest.TestCase):
             cls.results.update(import_files(list(model_files(os.path.join(SCENES, "hostile"), ("",))), memory=6 << 30))
         return cls.results
 
-    @needs_scenes
+    @needs_shared_scenes
     def test_every_hostile_file_is_refused_or_imported(self):
         """All of hostile: also those that are no models, given as if they were."""
         imported, refused, slowest = 0, 0, 0.0
@@ -535,7 +138,7 @@ class Hostile(unittest.TestCase):
                 slowest = max(slowest, result.seconds)
         print("hostile: %d imported, %d refused; slowest %.2f s" % (imported, refused, slowest))
 
-    @needs_scenes
+    @needs_shared_scenes
     def test_what_the_validator_accepts_is_imported(self):
         accepted, shown, empty, paths = 0, 0, 0, []
         for report_path in model_files(os.path.join(SCENES, "hostile", "gltf-validator"), (".report.json",)):
@@ -633,20 +236,17 @@ class Hostile(unittest.TestCase):
             self.assertIn("FIFO", result.text())
 
 
-class Peers(unittest.TestCase):
+class Peers(Case):
     """What the importer does when its peer is not kind."""
 
     def setUp(self):
-        self.folder = tempfile.TemporaryDirectory()
-        self.path = os.path.join(self.folder.name, "strip.obj")
+        super().setUp()
+        self.path = str(self.folder / "strip.obj")
         with open(self.path, "w", encoding="utf-8") as file:
             for i in range(40000):
                 file.write("v %d %d 0\n" % (i // 2, i % 2))
             for i in range(1, 39999):
                 file.write("f %d %d %d\n" % (i, i + 1, i + 2))
-
-    def tearDown(self):
-        self.folder.cleanup()
 
     def test_small_credits_are_kept(self):
         result = import_file(self.path, credit=300000)
@@ -675,11 +275,11 @@ class Peers(unittest.TestCase):
 
     def test_wrong_usage_ends_with_2(self):
         for arguments in ([], ["--fd", "x", "m.obj"], ["--fd", "0"], ["--bogus"]):
-            done = subprocess.run([IMPORTER] + arguments, stdin=subprocess.DEVNULL, capture_output=True, check=False)
+            done = subprocess.run([importer.IMPORTER] + arguments, stdin=subprocess.DEVNULL, capture_output=True, check=False)
             self.assertEqual(done.returncode, 2, arguments)
 
     def test_a_missing_model_is_named(self):
-        result = import_file(os.path.join(self.folder.name, "nowhere.glb"))
+        result = import_file(str(self.folder / "nowhere.glb"))
         self.assertEqual(result.status, 1)
         self.assertIn("nowhere.glb", result.errors()[0][1])
 
@@ -700,33 +300,9 @@ def gltf(extra, data=TRIANGLE, views=None, accessors=None):
     return model
 
 
-class Written(unittest.TestCase):
-    """Small models, made here, whose outcome is known."""
-
-    def setUp(self):
-        self.folder = tempfile.TemporaryDirectory()
-
-    def tearDown(self):
-        self.folder.cleanup()
-
-    def run_text(self, name, text, status=0):
-        path = os.path.join(self.folder.name, name)
-        with open(path, "wb") as file:
-            file.write(text if isinstance(text, bytes) else text.encode("utf-8"))
-        result = import_file(path)
-        self.assertEqual((result.status, result.faults, result.stderr), (status, [], ""), result.text())
-        if status == 0:
-            self.assertEqual(inconsistencies(result), [])
-        return result
-
+class Written(importer.Written):
     def run_gltf(self, *arguments, status=0, **options):
-        return self.run_text("model.gltf", json.dumps(gltf(*arguments, **options)), status)
-
-    def floats(self, result, mesh, array):
-        return list(memoryview(result.data(mesh["arrays"][array])).cast("f"))
-
-    def integers(self, result, mesh):
-        return list(memoryview(result.data(mesh["arrays"][1])).cast("I"))
+        return self.import_text("model.gltf", json.dumps(gltf(*arguments, **options)), status)
 
     def test_gltf_transform_camera_and_light(self):
         result = self.run_gltf({
@@ -760,7 +336,7 @@ class Written(unittest.TestCase):
             result = self.run_gltf(
                 {"nodes": [{"mesh": 0}], "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "mode": mode}]}]},
                 data=data, accessors=[{"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3"}])
-            self.assertEqual(self.integers(result, result.of(SET_MESH)[0]), wanted)
+            self.assertEqual(result.integers(result.of(SET_MESH)[0]["arrays"][1]), wanted)
 
     def test_gltf_quantised_and_sparse_positions(self):
         data = struct.pack("<9bxxx", 0, 0, 0, 127, 0, 0, 0, 127, 0) + struct.pack("<Bxxx3f", 2, 0, 3, 0) + TRIANGLE
@@ -773,8 +349,8 @@ class Written(unittest.TestCase):
                                 "meshes": [{"primitives": [{"attributes": {"POSITION": i}}]} for i in (0, 1)]},
                                data=data, views=views, accessors=accessors)
         first, second = result.of(SET_MESH)
-        self.assertEqual(self.floats(result, first, 0), [0, 0, 0, 1, 0, 0, 0, 1, 0])
-        self.assertEqual(self.floats(result, second, 0), [0, 0, 0, 1, 0, 0, 0, 3, 0])
+        self.assertEqual(result.floats(first["arrays"][0]), [0, 0, 0, 1, 0, 0, 0, 1, 0])
+        self.assertEqual(result.floats(second["arrays"][0]), [0, 0, 0, 1, 0, 0, 0, 3, 0])
 
     def test_gltf_primitives_are_one_mesh_with_ranges(self):
         result = self.run_gltf({
@@ -850,17 +426,17 @@ class Written(unittest.TestCase):
 
     def test_gltf_images_are_found_however_their_name_is_spelt(self):
         for text in (self.textured(), self.textured().replace('"images"', '"im\\u0061ges"')):
-            result = self.run_text("model.gltf", text)
+            result = self.import_text("model.gltf", text)
             self.assertNotIn("image", result.text())
             texel, = set(result.data(result.of(SET_TEXTURE)[0]["arrays"][0])[:3])
             self.assertAlmostEqual(texel, 188, delta=1, msg="sRGB of 0.5")
 
     def test_without_its_module_the_importer_reads_models_but_no_images(self):
-        alone = shutil.copy(IMPORTER, self.folder.name)
-        with unittest.mock.patch.dict(globals(), IMPORTER=alone):
-            plain = self.run_text("model.nff", "v\nfrom 0 0 5\nat 0 0 0\nup 0 1 0\nangle 45\nhither 1\nresolution 8 8\ns 0 0 0 1\n")
+        alone = shutil.copy(importer.IMPORTER, self.folder)
+        with unittest.mock.patch.object(importer, "IMPORTER", alone):
+            plain = self.import_text("model.nff", "v\nfrom 0 0 5\nat 0 0 0\nup 0 1 0\nangle 45\nhither 1\nresolution 8 8\ns 0 0 0 1\n")
             self.assertNotIn("farlight-textures", plain.text())
-            result = self.run_text("model.gltf", self.textured())
+            result = self.import_text("model.gltf", self.textured())
             self.assertIn("farlight-textures.so", result.text())
             self.assertEqual(result.data(result.of(SET_TEXTURE)[0]["arrays"][0])[:4], b"\xff\x00\xff\xff")
 
@@ -896,16 +472,15 @@ class Written(unittest.TestCase):
             accessors=[{"bufferView": i, "componentType": 5126, "count": 3, "type": "VEC3"} for i in (0, 1)])
         mesh, = result.of(SET_MESH)
         self.assertEqual((mesh["targets"], mesh["weights"]), (1, [0.5]))
-        self.assertEqual(self.floats(result, mesh, 0)[2], 0, "as the file has it")
-        self.assertEqual(self.floats(result, mesh, 9), [0, 0, 2] * 3)
+        self.assertEqual(result.floats(mesh["arrays"][0])[2], 0, "as the file has it")
+        self.assertEqual(result.floats(mesh["arrays"][9]), [0, 0, 2] * 3)
         self.assertEqual([node["weights"] for node in result.of(SET_NODE)], [[], [1]])
 
     def test_obj_faces_and_materials(self):
-        with open(os.path.join(self.folder.name, "m.mtl"), "w", encoding="utf-8") as file:
-            file.write("newmtl red\nKd 1 0 0\nNs 10\nd 0.5\n\nnewmtl mirror\nKd 0 0 0\nKs 0.9 0.9 0.9\nNs 1000\nillum 3\n"
-                       "aniso 0.5\nanisor 0.25\n"
-                       "newmtl glass\nKd 0 0 0\nd 0.1\nNi 1.5\nillum 7\n")
-        result = self.run_text("model.obj", "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0.25\n"
+        self.write("m.mtl", "newmtl red\nKd 1 0 0\nNs 10\nd 0.5\n\nnewmtl mirror\nKd 0 0 0\nKs 0.9 0.9 0.9\nNs 1000\nillum 3\n"
+                            "aniso 0.5\nanisor 0.25\n"
+                            "newmtl glass\nKd 0 0 0\nd 0.1\nNi 1.5\nillum 7\n")
+        result = self.import_text("model.obj", "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0.25\n"
                                "usemtl red\nf 1/1 2/1 3/1 4/1\nusemtl mirror\nf -4 -3 -2\nusemtl glass\nf 1 2 4\n")
         mesh, = result.of(SET_MESH)
         red, mirror, glass = result.of(SET_MATERIAL)
@@ -918,13 +493,13 @@ class Written(unittest.TestCase):
         self.assertEqual(red["anisotropy"], [0, 0])
         self.assertAlmostEqual(glass["transmission"], 0.9, 6)
         self.assertEqual(glass["base"][:3], (1, 1, 1))
-        self.assertEqual(self.floats(result, mesh, 4)[1], 0.75, "v runs downwards here")
+        self.assertEqual(result.floats(mesh["arrays"][4])[1], 0.75, "v runs downwards here")
 
     def test_obj_concave_polygon(self):
-        result = self.run_text("model.obj", "v 0 0 0\nv 4 0 0\nv 4 4 0\nv 2 1 0\nv 0 4 0\nf 1 2 3 4 5\n")
+        result = self.import_text("model.obj", "v 0 0 0\nv 4 0 0\nv 4 4 0\nv 2 1 0\nv 0 4 0\nf 1 2 3 4 5\n")
         mesh, = result.of(SET_MESH)
-        positions, area = self.floats(result, mesh, 0), 0
-        corners = self.integers(result, mesh)
+        positions, area = result.floats(mesh["arrays"][0]), 0
+        corners = result.integers(mesh["arrays"][1])
         for t in range(0, len(corners), 3):
             (ax, ay), (bx, by), (cx, cy) = (positions[c * 3:c * 3 + 2] for c in corners[t:t + 3])
             one = ((bx - ax) * (cy - ay) - (by - ay) * (cx - ax)) / 2
@@ -939,7 +514,7 @@ class Written(unittest.TestCase):
             polygon = "f 1 1 1 0 0 0 1 1\np %d\n" % count + "0 0 0\n1 0 0\n0 1 0\n" * (count // 3) + "0 0 0\n" * (count % 3)
             for name, text in (("model.obj", corners + face + "\n"), ("model.nff", polygon)):
                 with self.subTest(name=name, count=count):
-                    result = self.run_text(name, text, status)
+                    result = self.import_text(name, text, status)
                     if status:
                         self.assertIn("65537 corners; 3 to 65536 are allowed", result.text())
 
@@ -948,7 +523,7 @@ class Written(unittest.TestCase):
                                ("v 0 0 0\nf -2 1 1\n", "line 2: vertex -2"), ("v 0 0 0\nv nan 0 0\n", "line 2: 'nan'"),
                                ("v 0 0 0\nf 1/2 1 1\n", "line 2: texture coordinate 2"), ("# nothing\n", "no faces")):
             with self.subTest(expected):
-                self.assertIn(expected, self.run_text("model.obj", text, 1).text())
+                self.assertIn(expected, self.import_text("model.obj", text, 1).text())
 
     NFF = ("# all of it\nb 0.1 0.2 0.3\nv\nfrom 0 0 5\nat 0 0 0\nup 0 1 0\nangle 40\nhither 1\nresolution 512 512\n"
            "l 0 0 5\nl 0 3 4 1 0.5 0\nf 1 0 0 0.5 0.5 3 0 0\ns 0 0 0 1\nf 1 1 1 0 0 0 0.9 1.5\ns 2 0 0 0.5\n"
@@ -956,7 +531,7 @@ class Written(unittest.TestCase):
            "pp 3\n0 0 0 0 0 1\n1 0 0 0 0 1\n0 1 0 0 1 0\n")
 
     def test_nff_statements(self):
-        result = self.run_text("model.nff", self.NFF)
+        result = self.import_text("model.nff", self.NFF)
         spheres, = result.of(SET_SPHERES)
         red, glass = result.of(SET_MATERIAL)
         self.assertEqual([r[:2] for r in spheres["ranges"]], [(0, 2), (2, 1)], "sorted by material")
@@ -975,10 +550,10 @@ class Written(unittest.TestCase):
         """Every edge of the triangles is met once in each direction, at equal places."""
         for word, triangles in (("tet", 4), ("hex", 12), ("oct", 8), ("dod", 36)):
             with self.subTest(word):
-                result = self.run_text("model.nff", word + " 1 2 3 5\n")
+                result = self.import_text("model.nff", word + " 1 2 3 5\n")
                 mesh, = result.of(SET_MESH)
                 self.assertEqual(mesh["triangles"], triangles)
-                positions, corners = self.floats(result, mesh, 0), self.integers(result, mesh)
+                positions, corners = result.floats(mesh["arrays"][0]), result.integers(mesh["arrays"][1])
                 places = [tuple(round(x, 4) for x in positions[c * 3:c * 3 + 3]) for c in corners]
                 edges = [(places[t + k], places[t + (k + 1) % 3]) for t in range(0, len(places), 3) for k in range(3)]
                 self.assertEqual(len(set(edges)), len(edges))
@@ -989,11 +564,11 @@ class Written(unittest.TestCase):
                                ("f 1 0 0\nwhat 3\n", "line 2: 'what'"), ("s 0 0 0 nan\n", "'nan'"),
                                ("s 0 0 0 0\n", "radius 0"), ("p 1e9\n", "polygon")):
             with self.subTest(expected):
-                self.assertIn(expected, self.run_text("model.nff", text, 1).text())
+                self.assertIn(expected, self.import_text("model.nff", text, 1).text())
 
     def test_many_materials_make_several_sets(self):
         lines = ["f %g 0 0\ns %d 0 0 0.25\n" % (i / 5000, i) for i in range(5000)]
-        result = self.run_text("model.nff", "".join(lines))
+        result = self.import_text("model.nff", "".join(lines))
         self.assertEqual([one["count"] for one in result.of(SET_SPHERES)], [4096, 904])
 
 

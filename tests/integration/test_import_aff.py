@@ -3,14 +3,10 @@
 """What farlight-import makes of AFF: every statement, keys as curves over time, included files and images, and what it
 says of files that are broken."""
 import math
-import os
-import pathlib
-import subprocess
-import tempfile
 import unittest
 
-import test_import as importer
-from test_import import needs_scenes
+import importer
+from farlight_test import SHARED_SCENES, Case, daemon_pose, needs_shared_scenes
 
 VIEW = "v\nfrom 0 0 5\nat 0 0 0\nup 0 1 0\nangle 40\nhither 0.01\nresolution 8 8\n"
 TRIANGLE = "p 3\n0 0 0\n1 0 0\n0 1 0\n"
@@ -25,47 +21,28 @@ def hermite(t0, t1, a, leaving, coming, b, t):
             (3 * s**2 - 2 * s**3) * b + (s**3 - s**2) * d * coming)
 
 
-class Written(unittest.TestCase):
+class Written(importer.Written):
     def setUp(self):
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        self.folder = pathlib.Path(folder.name) / "aff"
+        super().setUp()
+        self.folder = self.folder / "aff"  # beside which others may be
         self.folder.mkdir()
 
-    def write(self, name, text):
-        path = self.folder / name
-        path.parent.mkdir(exist_ok=True)
-        path.write_bytes(text if isinstance(text, bytes) else text.encode("utf-8"))
-        return path
-
     def run_text(self, text, status=0, **options):
-        result = importer.import_file(str(self.write("model.aff", text)), **options)
-        self.assertEqual((result.status, result.faults, result.stderr), (status, [], ""), result.text())
-        if status == 0:
-            self.assertEqual(importer.inconsistencies(result), [])
-        return result
-
-    def floats(self, result, reference):
-        return list(memoryview(result.data(reference)).cast("f"))
+        return self.import_text("model.aff", text, status, **options)
 
     def positions(self, result, mesh):
         """Of each triangle its three corners, rounded."""
-        values = [round(x, 5) + 0 for x in self.floats(result, mesh["arrays"][0])]
-        corners = list(memoryview(result.data(mesh["arrays"][1])).cast("I"))
+        values = [round(x, 5) + 0 for x in result.floats(mesh["arrays"][0])]
+        corners = result.integers(mesh["arrays"][1])
         return [tuple(values[c * 3:c * 3 + 3]) for c in corners]
 
     def channels(self, result):
-        """{(node's name, path): (interpolation, times, values)}, without what stays as it is."""
-        names = {node["id"]: node["name"] for node in result.of(importer.SET_NODE)}
-        clip, = result.of(importer.SET_CLIP)
-        numbers, found = self.floats(result, clip["arrays"][0]), {}
-        for c in result.of(importer.SET_CHANNEL):
-            width = c["width"] * (3 if c["interpolation"] == importer.CUBIC else 1)
-            values = numbers[c["first_value"]:c["first_value"] + c["keys"] * width]
-            if c["keys"] > 1 or c["interpolation"] != importer.STEP:
-                found[names[c["object"]], c["path"]] = (
-                    c["interpolation"], numbers[c["first_time"]:c["first_time"] + c["keys"]],
-                    [values[at:at + width] for at in range(0, len(values), width)])
+        """Without what stays as it is, and with one list of values for each key."""
+        found = {}
+        for name, (kind, times, values) in result.channels().items():
+            width = len(values) // len(times)
+            if len(times) > 1 or kind != importer.STEP:
+                found[name] = kind, times, [values[at:at + width] for at in range(0, len(values), width)]
         return found
 
     def node(self, result, name):
@@ -120,9 +97,9 @@ class Written(unittest.TestCase):
         self.assertEqual((mesh["triangles"], mesh["vertices"]), (2, 4))
         self.assertEqual(self.positions(result, mesh),
                          [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 0, 0), (1, 1, 0), (0, 1, 0)])
-        normals = self.floats(result, mesh["arrays"][2])
+        normals = result.floats(mesh["arrays"][2])
         self.assert_near(normals[:3] + normals[9:], (0, 0, 1, 0, 0.5**0.5, 0.5**0.5))
-        self.assertEqual(self.floats(result, mesh["arrays"][4]), [0, 0, 1, 0, 1, 1, 0, 1])
+        self.assertEqual(result.floats(mesh["arrays"][4]), [0, 0, 1, 0, 1, 1, 0, 1])
         texture, = result.of(importer.SET_TEXTURE)
         material, = result.of(importer.SET_MATERIAL)
         self.assertEqual(result.data(texture["arrays"][0])[:8], b"\xff\0\0\xff\0\xff\0\xff", "rows from the top")
@@ -138,7 +115,7 @@ class Written(unittest.TestCase):
         result = self.run_text("m vertices 4 0 0 0 1 0 0 0 1 0 0 0 1 triangles 2 0 1 2 0 3 1\n")
         mesh, = result.of(importer.SET_MESH)
         self.assertEqual(mesh["vertices"], 6)
-        self.assert_near(self.floats(result, mesh["arrays"][2]), (0, 0, 1) * 3 + (0, 1, 0) * 3)
+        self.assert_near(result.floats(mesh["arrays"][2]), (0, 0, 1) * 3 + (0, 1, 0) * 3)
 
     def test_textured_triangles(self):
         self.write("a.ppm", PPM)
@@ -147,8 +124,8 @@ class Written(unittest.TestCase):
         mesh, = result.of(importer.SET_MESH)
         plain, textured = result.of(importer.SET_MATERIAL)
         self.assertEqual([(r[1], r[2]) for r in mesh["ranges"]], [(1, plain["id"]), (2, textured["id"])])
-        self.assertEqual(self.floats(result, mesh["arrays"][4])[:6], [0, 0, 2, 0, 0, 2])
-        self.assert_near(self.floats(result, mesh["arrays"][2])[:18], (0, 0, 1) * 3 + (0, 1, 0) * 3)
+        self.assertEqual(result.floats(mesh["arrays"][4])[:6], [0, 0, 2, 0, 0, 2])
+        self.assert_near(result.floats(mesh["arrays"][2])[:18], (0, 0, 1) * 3 + (0, 1, 0) * 3)
         self.assertEqual(len(result.of(importer.SET_TEXTURE)), 1, "one image, named twice")
 
     # ---- static transforms
@@ -165,20 +142,20 @@ class Written(unittest.TestCase):
 
     def test_normals_stay_across_faces_that_are_stretched(self):
         result = self.run_text("xs 1 4 1 0 0 1 0 0 0 0 {\npp 3\n1 0 0 1 1 0\n0 1 0 1 1 0\n0 1 1 1 1 0\n}\n")
-        normal = self.floats(result, result.of(importer.SET_MESH)[0]["arrays"][2])[:3]
+        normal = result.floats(result.of(importer.SET_MESH)[0]["arrays"][2])[:3]
         self.assert_near(normal, (4 / 17**0.5, 1 / 17**0.5, 0))
 
     def test_what_is_mirrored_keeps_its_outside(self):
         result = self.run_text("xs -1 1 1 0 0 1 0 0 0 0 {\n" + TRIANGLE + "}\n")
         mesh, = result.of(importer.SET_MESH)
         self.assertEqual(self.positions(result, mesh), [(0, 0, 0), (0, 1, 0), (-1, 0, 0)], "counter-clockwise from +z")
-        self.assert_near(self.floats(result, mesh["arrays"][2])[:3], (0, 0, 1))
+        self.assert_near(result.floats(mesh["arrays"][2])[:3], (0, 0, 1))
 
     def test_spheres_scale_with_a_node_of_their_own_only_where_they_are_stretched(self):
         result = self.run_text("xs 2 2 2 0 1 0 30 1 0 0 { s 0 0 1 0.5 }\nxs 1 2 1 0 0 1 0 5 0 0 {\ns 0 0 0 1\ns 0 0 3 1\n}\n")
         even, uneven = result.of(importer.SET_SPHERES)
-        self.assert_near(self.floats(result, even["arrays"][0]), (1 + 2 * math.sin(math.pi / 6), 0, 2 * math.cos(math.pi / 6), 1))
-        self.assertEqual(self.floats(result, uneven["arrays"][0]), [0, 0, 0, 1, 0, 0, 3, 1])
+        self.assert_near(result.floats(even["arrays"][0]), (1 + 2 * math.sin(math.pi / 6), 0, 2 * math.cos(math.pi / 6), 1))
+        self.assertEqual(result.floats(uneven["arrays"][0]), [0, 0, 0, 1, 0, 0, 3, 1])
         holder, = (node for node in result.of(importer.SET_NODE) if node["object"] == uneven["id"] and node["kind"] == 2)
         above, = (node for node in result.of(importer.SET_NODE) if node["id"] == holder["parent"])
         self.assertEqual(above["matrix"], (1, 0, 0, 5, 0, 2, 0, 0, 0, 0, 1, 0))
@@ -290,8 +267,8 @@ class Written(unittest.TestCase):
         result = self.run_text("a 0 4 9\n" + self.moving_triangle(0) + self.moving_triangle(10))
         mesh, = result.of(importer.SET_MESH)
         self.assertEqual((mesh["triangles"], mesh["targets"]), (2, 2))
-        self.assertEqual(self.floats(result, mesh["arrays"][9]), [0, 0, 1] * 6 + [0, 0, 2] * 6)
-        self.assertEqual(self.floats(result, mesh["arrays"][10]), [0, 1, 0] * 6 + [0, 2, 0] * 6)
+        self.assertEqual(result.floats(mesh["arrays"][9]), [0, 0, 1] * 6 + [0, 0, 2] * 6)
+        self.assertEqual(result.floats(mesh["arrays"][10]), [0, 1, 0] * 6 + [0, 2, 0] * 6)
         self.assertEqual(self.channels(result)["moving triangles", importer.WEIGHTS],
                          (importer.LINEAR, [0, 1, 3, 4], [[0, 0], [1, 0], [0, 1], [0, 1]]))
 
@@ -304,7 +281,7 @@ class Written(unittest.TestCase):
     def test_moving_triangles_are_placed_and_at_rest_as_the_animation_begins(self):
         result = self.run_text("a 2 3 2\nxs 1 1 1 0 1 0 0 0 0 100 {\n" + self.moving_triangle(0) + "}\n")
         mesh, = result.of(importer.SET_MESH)
-        self.assertEqual(self.floats(result, mesh["arrays"][0])[:3], [0, 0, 100])
+        self.assertEqual(result.floats(mesh["arrays"][0])[:3], [0, 0, 100])
         self.assertEqual(self.node(result, "moving triangles")["weights"], [0.5, 0.5])
 
     # ---- other files
@@ -333,9 +310,9 @@ class Written(unittest.TestCase):
         self.assertIn("'../b.ppm' cannot be used: lies outside the model's folder", result.text())
 
     def test_a_link_named_TextureFiles_is_not_followed(self):
-        os.mkdir(self.folder.parent / "private")
+        (self.folder.parent / "private").mkdir()
         (self.folder.parent / "private" / "a.ppm").write_bytes(PPM)
-        os.symlink("private", self.folder.parent / "TextureFiles")
+        (self.folder.parent / "TextureFiles").symlink_to("private")
         result = self.run_text("tt a.ppm 0 0 0 0 0 1 0 0 1 0 0 1 0 0 1\n")
         self.assertIn("'a.ppm' cannot be used", result.text())
 
@@ -405,7 +382,7 @@ class Written(unittest.TestCase):
         self.assertEqual(result.of(importer.SET_MESH)[0]["vertices"], 3 * count)
 
 
-class Posed(unittest.TestCase):
+class Posed(Case):
     def test_the_daemon_has_things_where_the_file_puts_them(self):
         """A triangle that is moved by 2, by 10 and turned by 90 degrees; one whose vertices are half-way, with normals that
         are as long as they are stated until then."""
@@ -414,28 +391,25 @@ class Posed(unittest.TestCase):
                 "k outer { rot 5\n0 0 0 1 0 0 0 0\n1 0 0 1 0 0 0 0\n2 0 0 1 90 0 0 0\n3 0 0 1 90 0 0 0\n4 0 0 1 90 0 0 0\n}\n"
                 "k inner { transl 5\n" + still + "}\n"
                 "tpa 2\n1\n0 0 0 3 0 0\n1 0 0 3 0 0\n0 1 0 3 0 0\n3\n0 0 4 0 4 0\n1 0 4 0 4 0\n0 1 4 0 4 0\n")
-        with tempfile.TemporaryDirectory() as folder:
-            model = pathlib.Path(folder) / "model.aff"
-            model.write_text(text, encoding="utf-8")
-            dump = subprocess.run([os.path.join(importer.BIN, "tests", "tools", "pose_dump"), model, "0", "1"],
-                                  capture_output=True, text=True, check=True, timeout=60).stdout
-        corners = [[float(x) for x in line.split()[1:]] for line in dump.splitlines() if line.startswith("c ")]
+        model = self.folder / "model.aff"
+        model.write_text(text, encoding="utf-8")
+        corners, = daemon_pose(model, 0, [1])
         wanted = [(0, 0, 2, 0.6, 0.8, 0), (1, 0, 2, 0.6, 0.8, 0), (0, 1, 2, 0.6, 0.8, 0),
                   (-2, 10, 0, 0, 0, 1), (-2, 11, 0, 0, 0, 1), (-3, 10, 0, 0, 0, 1)]
-        self.assertEqual(len(corners), 6, dump)
-        for got, want in zip(corners, wanted):
-            for a, b in zip(got, want):
+        self.assertEqual(len(corners), 6)
+        for (place, normal), want in zip(corners, wanted):
+            for a, b in zip(place + normal, want):
                 self.assertAlmostEqual(a, b, 5)
 
 
 class Bart(unittest.TestCase):
     def counts(self, name):
-        result = importer.import_file(os.path.join(importer.SCENES, "rayspace", "bart", name), seconds=30)
+        result = importer.import_file(str(SHARED_SCENES / "rayspace" / "bart" / name), seconds=30)
         self.assertEqual((result.status, result.faults, importer.inconsistencies(result)), (0, [], []), result.text())
         self.assertNotIn("image", result.text())
         return result, sum(mesh["triangles"] for mesh in result.of(importer.SET_MESH))
 
-    @needs_scenes
+    @needs_shared_scenes
     def test_the_kitchen(self):
         """As many triangles as BART's paper states."""
         result, triangles = self.counts("kitchen/aff/kitchen.aff")
@@ -443,7 +417,7 @@ class Bart(unittest.TestCase):
         self.assertEqual(result.clips[0]["duration"], 20)
         self.assertIn("800 frames in 20 s", result.text())
 
-    @needs_scenes
+    @needs_shared_scenes
     def test_the_museum(self):
         """Its file counts 10,143 polygons, of which 133 with more corners are 274 triangles; and 8 cones, of 64."""
         result, triangles = self.counts("museum/aff/museum5.aff")
@@ -453,7 +427,7 @@ class Bart(unittest.TestCase):
         self.assertEqual((result.clips[0]["duration"], len(result.of(importer.SET_TEXTURE))), (6, 5))
         self.assertEqual(still["triangles"], triangles - 1024)
 
-    @needs_scenes
+    @needs_shared_scenes
     def test_the_robots(self):
         result, triangles = self.counts("robot/aff/Robot.aff")
         self.assertEqual(triangles, 71708)

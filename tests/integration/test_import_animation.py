@@ -10,7 +10,7 @@ import random
 import tempfile
 import unittest
 
-import test_import as importer
+import importer
 from gltf_pose import Writer
 
 VERTICES = [(0, 0, 0), (1, 0, 0), (0, 1, 0)]
@@ -55,34 +55,9 @@ class File(Writer):
         return self
 
 
-class Written(unittest.TestCase):
-    def setUp(self):
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        self.path = pathlib.Path(folder.name) / "model.gltf"
-
+class Written(importer.Written):
     def run_file(self, made, status=0, **options):
-        self.path.write_text(made if isinstance(made, str) else made.text(), encoding="utf-8")
-        result = importer.import_file(str(self.path), **options)
-        self.assertEqual((result.status, result.faults, result.stderr), (status, [], ""), result.text())
-        if status == 0:
-            self.assertEqual(importer.inconsistencies(result), [])
-        return result
-
-    def floats(self, result, reference):
-        return list(memoryview(result.data(reference)).cast("f"))
-
-    def channels(self, result):
-        """{(node's name, path): (interpolation, times, values)} of the first clip."""
-        names = {node["id"]: node["name"] for node in result.of(importer.SET_NODE)}
-        clip, = result.of(importer.SET_CLIP)
-        numbers, found = self.floats(result, clip["arrays"][0]), {}
-        for c in result.of(importer.SET_CHANNEL):
-            count = c["keys"] * c["width"] * (3 if c["interpolation"] == importer.CUBIC else 1)
-            found[names[c["object"]], c["path"]] = (
-                c["interpolation"], numbers[c["first_time"]:c["first_time"] + c["keys"]],
-                numbers[c["first_value"]:c["first_value"] + count])
-        return found
+        return self.import_text("model.gltf", made if isinstance(made, str) else made.text(), status, **options)
 
     def test_joints_and_weights_are_those_that_count(self):
         """Zeros go, the rest moves to the front; what no joint holds follows the first one."""
@@ -94,7 +69,7 @@ class Written(unittest.TestCase):
         mesh, = result.of(importer.SET_MESH)
         self.assertEqual(mesh["influences"], 2)
         self.assertEqual(list(memoryview(result.data(mesh["arrays"][7])).cast("H")), [1, 0, 1, 0, 0, 0])
-        self.assertEqual(self.floats(result, mesh["arrays"][8]), [0.5, 0.25, 1, 0, 1, 0])
+        self.assertEqual(result.floats(mesh["arrays"][8]), [0.5, 0.25, 1, 0, 1, 0])
         self.assertIn("without weights follow the first joint", result.text())
 
     def test_of_more_than_sixteen_joints_the_heaviest_are_kept(self):
@@ -126,8 +101,8 @@ class Written(unittest.TestCase):
         result = self.run_file(made)
         skin, = result.of(importer.SET_SKIN)
         names = {node["id"]: node["name"] for node in result.of(importer.SET_NODE)}
-        self.assertEqual([names[j] for j in memoryview(result.data(skin["arrays"][0])).cast("I")], ["hip", "knee"])
-        self.assertEqual(self.floats(result, skin["arrays"][1]),
+        self.assertEqual([names[j] for j in result.integers(skin["arrays"][0])], ["hip", "knee"])
+        self.assertEqual(result.floats(skin["arrays"][1]),
                          [columns[j][column * 4 + row] for j in (0, 1) for row in range(3) for column in range(4)])
         self.assertEqual(skin["name"], "bones")
 
@@ -141,7 +116,7 @@ class Written(unittest.TestCase):
                          [("body", 0, 1), ("above", 1, 0), ("hip", 1, 0), ("knee", 1, 0)])
         self.assertEqual(nodes["knee"]["parent"], nodes["hip"]["id"])
         self.assertEqual(nodes["hip"]["parent"], nodes["above"]["id"])
-        self.assertIn(("knee", importer.TRANSLATION), self.channels(result))
+        self.assertIn(("knee", importer.TRANSLATION), result.channels())
 
     def test_broken_skins_are_refused_by_name(self):
         for made, expected in (
@@ -161,7 +136,7 @@ class Written(unittest.TestCase):
         made = File()
         made.add_skin(inverseBindMatrices=made.accessor("MAT4", [(float("nan"),) * 16, (2.0,) * 16]))
         result = self.run_file(made)
-        matrices = self.floats(result, result.of(importer.SET_SKIN)[0]["arrays"][1])
+        matrices = result.floats(result.of(importer.SET_SKIN)[0]["arrays"][1])
         self.assertEqual(matrices, [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0] + [2] * 12)
         self.assertIn("not finite", result.text())
 
@@ -173,14 +148,14 @@ class Written(unittest.TestCase):
                        "values": {"bufferView": made.view(bytes.fromhex("0000803f00000040000040c0"))}}})
         made.primitive["targets"] = [{"POSITION": len(made.json["accessors"]) - 1}]
         result = self.run_file(made)
-        self.assertEqual(self.floats(result, result.of(importer.SET_MESH)[0]["arrays"][9]), [0] * 6 + [1, 2, -3])
+        self.assertEqual(result.floats(result.of(importer.SET_MESH)[0]["arrays"][9]), [0] * 6 + [1, 2, -3])
 
     def test_targets_of_normals_alone_come_with_zero_positions(self):
         made = File().add_targets(names=("NORMAL",))
         made.primitive["attributes"]["NORMAL"] = made.accessor("VEC3", [(0, 0, 1)] * 3)
         mesh, = (result := self.run_file(made)).of(importer.SET_MESH)
-        self.assertEqual((mesh["targets"], self.floats(result, mesh["arrays"][9])), (2, [0] * 18))
-        self.assertEqual(self.floats(result, mesh["arrays"][10]), [0, 0, 1] * 3 + [1, 0, 1] * 3)
+        self.assertEqual((mesh["targets"], result.floats(mesh["arrays"][9])), (2, [0] * 18))
+        self.assertEqual(result.floats(mesh["arrays"][10]), [0, 0, 1] * 3 + [1, 0, 1] * 3)
 
     def test_targets_and_weights_beyond_the_limits_are_cut(self):
         made = File()
@@ -193,7 +168,7 @@ class Written(unittest.TestCase):
         mesh, = result.of(importer.SET_MESH)
         self.assertEqual((mesh["targets"], len(mesh["weights"])), (1024, 1024))
         self.assertEqual(result.of(importer.SET_NODE)[0]["weights"], [1e6] * 1024)
-        self.assertEqual(self.channels(result)["body", importer.WEIGHTS][2], list(range(1024)) * 2)
+        self.assertEqual(result.channels()["body", importer.WEIGHTS][2], list(range(1024)) * 2)
         self.assertIn("the first 1024 of 1030 morph targets", result.text())
 
     def test_a_small_file_that_asks_for_much_is_refused(self):
@@ -211,7 +186,7 @@ class Written(unittest.TestCase):
         made.json["nodes"][1].update({"scale": [-1, 2, 3], "translation": [4, 5, 6]})
         made.channel(1, "rotation", [0.5, 1], [(0, 0, 0, 1), (0, 1, 0, 0)])
         result = self.run_file(made)
-        self.assertEqual(self.channels(result), {
+        self.assertEqual(result.channels(), {
             ("hip", importer.ROTATION): (importer.LINEAR, [0.5, 1], [0, 0, 0, 1, 0, 1, 0, 0]),
             ("hip", importer.TRANSLATION): (importer.STEP, [0], [4, 5, 6]),
             ("hip", importer.SCALE): (importer.STEP, [0], [-1, 2, 3])})
@@ -221,7 +196,7 @@ class Written(unittest.TestCase):
         for name, number, values in ((None, importer.LINEAR, 2), ("STEP", importer.STEP, 2),
                                      ("CUBICSPLINE", importer.CUBIC, 6)):
             result = self.run_file(File().channel(1, "translation", [0, 1], [(i, 0, 0) for i in range(values)], name))
-            self.assertEqual(self.channels(result)["hip", importer.TRANSLATION],
+            self.assertEqual(result.channels()["hip", importer.TRANSLATION],
                              (number, [0, 1], [x for i in range(values) for x in (i, 0, 0)]))
 
     def test_times_that_do_not_ascend_are_mended(self):
@@ -229,7 +204,7 @@ class Written(unittest.TestCase):
         made = File().channel(1, "translation", [0, 1, 1, 1, 0.5, 2, float("nan"), 3],
                               [(float(i), 0, 0) for i in range(8)])
         result = self.run_file(made)
-        _, times, values = self.channels(result)["hip", importer.TRANSLATION]
+        _, times, values = result.channels()["hip", importer.TRANSLATION]
         self.assertEqual(times, [0, 1, 1 + 2 ** -23, 2, 3])
         self.assertEqual(values[::3], [0, 1, 3, 5, 7])
         self.assertIn("do not ascend", result.text())
@@ -265,7 +240,7 @@ class Written(unittest.TestCase):
             with self.subTest(expected):
                 result = self.run_file(made.channel(1, "translation", [0, 2], [(3, 0, 0), (4, 0, 0)]))
                 self.assertEqual([clip["channels"] for clip in result.clips], [1])
-                self.assertEqual({name for name, _ in self.channels(result)}, {"hip"})
+                self.assertEqual({name for name, _ in result.channels()}, {"hip"})
                 self.assertIn(expected or "", result.text())
 
     def test_an_animation_with_nothing_to_play_is_reported(self):

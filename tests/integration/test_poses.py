@@ -3,10 +3,9 @@
 project (gltf_pose.py)."""
 import math
 import random
-import subprocess
 
 import farlight_test
-from farlight_test import BIN, SHARED_SCENES, TIMEOUT_S, Case, Daemon, farlight, needs_shared_scenes, read_png
+from farlight_test import SHARED_SCENES, Case, Daemon, daemon_pose, farlight, needs_shared_scenes, read_png
 from gltf_pose import Model, Writer, unit, write_still
 
 # Numbers travel as 32-bit floats (rounding 6e-8) through matrices of up to twenty nodes, each rounded once more.
@@ -15,23 +14,6 @@ PLACE_TOLERANCE = 2e-6  # of the model's size
 NORMAL_TOLERANCE = 1e-3
 MODELS = ("gltf/Fox.glb", "ldc/CesiumMan.glb", "gltf/MorphStressTest.gltf", "gltf/khronos/SimpleSkin.gltf",
           "gltf/khronos/simple_skin/simple_skin.gltf", "gltf/khronos/AnimatedMorphCube-glTF/AnimatedMorphCube.gltf")
-
-
-def daemon_pose(path, animation, times):
-    """For each time: a list of (place, normal) for each corner of a triangle, as the daemon has it."""
-    result = subprocess.run([BIN / "tests/tools/pose_dump", path, "-" if animation is None else str(animation),
-                             *map(repr, times)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, check=False,
-                            timeout=TIMEOUT_S)
-    assert result.returncode == 0, result.stderr
-    poses = []
-    for line in result.stdout.splitlines():
-        word, _, rest = line.partition(" ")
-        if word == "time":
-            poses.append([])
-        elif word == "c":
-            numbers = tuple(map(float, rest.split()))
-            poses[-1].append((numbers[:3], numbers[3:]))
-    return poses
 
 
 def own_pose(model, animation, time):

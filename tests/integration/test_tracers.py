@@ -6,22 +6,18 @@ import os
 import subprocess
 
 import farlight_test
-from farlight_test import BIN, farlight
-
-
-def listed():
-    return json.loads(farlight("tracers", "--json").stdout)["tracers"]
+from farlight_test import BIN, farlight, tracers
 
 
 class Tracers(farlight_test.Case):
     def settings(self):
-        return [setting for tracer in listed() for setting in tracer["settings"]]
+        return [setting for tracer in tracers() for setting in tracer["settings"]]
 
     def test_every_tracer_says_what_it_is(self):
-        names = [tracer["name"] for tracer in listed()]
+        names = [tracer["name"] for tracer in tracers()]
         self.assertEqual(names, ["bvh", "naive", "reference", "ldc", "abuffer", "rayspace"])
         text = self.expect(farlight("tracers"), 0).stdout
-        for tracer in listed():
+        for tracer in tracers():
             self.assertIn(f"{tracer['name']}: {tracer['doc']}", text)
             for setting in tracer["settings"]:
                 self.assertTrue(setting["name"].startswith(tracer["name"] + "_"))

@@ -22,28 +22,23 @@ static void assert_near(double got, double wanted)
         fail_msg("%.15g instead of %.15g", got, wanted);
 }
 
+static const struct spline_key even[] = {
+    {.time = 0, .value = {0}}, {.time = 1, .value = {1}}, {.time = 2, .value = {3}}, {.time = 3, .value = {2}}};
+
 TEST(without_shape_a_spline_is_catmull_rom)
 {
-    const struct spline_key keys[] = {{.time = 0, .value = {0}},
-                                      {.time = 1, .value = {1}},
-                                      {.time = 2, .value = {3}},
-                                      {.time = 3, .value = {2}}};
     /* Slopes (3 - 0) / 2 and (2 - 1) / 2; in the middle (1 + 3) / 2 + (1.5 - 0.5) / 8. */
-    assert_near(position_at(keys, 4, 1.5), 2.125);
-    assert_near(position_at(keys, 4, 1), 1);
-    assert_near(position_at(keys, 4, 2), 3);
+    assert_near(position_at(even, 4, 1.5), 2.125);
+    assert_near(position_at(even, 4, 1), 1);
+    assert_near(position_at(even, 4, 2), 3);
 }
 
 TEST(it_rests_before_its_second_key_and_after_its_last_but_one)
 {
-    const struct spline_key keys[] = {{.time = 0, .value = {0}},
-                                      {.time = 1, .value = {1}},
-                                      {.time = 2, .value = {3}},
-                                      {.time = 3, .value = {2}}};
-    assert_near(position_at(keys, 4, -5), 1);
-    assert_near(position_at(keys, 4, 0.5), 1);
-    assert_near(position_at(keys, 4, 2.5), 3);
-    assert_near(position_at(keys, 4, 9), 3);
+    assert_near(position_at(even, 4, -5), 1);
+    assert_near(position_at(even, 4, 0.5), 1);
+    assert_near(position_at(even, 4, 2.5), 3);
+    assert_near(position_at(even, 4, 9), 3);
 }
 
 TEST(tension_continuity_and_bias_shape_the_tangents)
@@ -138,9 +133,7 @@ TEST(turns_about_one_axis_go_as_squad_says)
 
 TEST(a_turn_takes_the_shorter_way)
 {
-    struct spline_key keys[] = {turned(0, 350), turned(1, 350), turned(2, 370), turned(3, 370)};
-    keys[2] = turned(2, 10);
-    keys[3] = turned(3, 10);
+    struct spline_key keys[] = {turned(0, 350), turned(1, 350), turned(2, 10), turned(3, 10)};
     spline_align(keys, 4);
     const double middle = degrees_at(keys, 4, 1.5);
     assert_near(fabs(remainder(middle, 360)), 0);
