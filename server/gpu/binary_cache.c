@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 #include "gpu/binary_cache.h"
 
+#include "base/file_io.h"
+
 #include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -108,27 +110,16 @@ bool gpu_binary_is_there(const struct gpu_binary_cache *cache, const struct gpu_
     return fstatat(cache->folder, name, &found, AT_SYMLINK_NOFOLLOW) == 0 && is_good(&found);
 }
 
-static bool read_all(int file, void *to, size_t bytes)
-{
-    for (size_t done = 0; done < bytes;) {
-        const ssize_t n = read(file, (char *)to + done, bytes - done);
-        if (n <= 0 && !(n < 0 && errno == EINTR))
-            return false;
-        done += n > 0 ? (size_t)n : 0;
-    }
-    return true;
-}
-
 static bool read_file(int file, const struct gpu_binary_key *key, struct gpu_binary *binary)
 {
     struct header header;
     struct stat found;
-    if (fstat(file, &found) != 0 || !is_good(&found) || !read_all(file, &header, sizeof(header)) ||
+    if (fstat(file, &found) != 0 || !is_good(&found) || !file_read_all(file, &header, sizeof(header)) ||
         memcmp(header.magic, magic, sizeof(magic)) != 0 || header.key.low != key->low ||
         header.key.high != key->high || header.size_bytes != (uint64_t)found.st_size - sizeof(header))
         return false;
     *binary = (struct gpu_binary){header.format, header.size_bytes, malloc(header.size_bytes)};
-    if (binary->data && read_all(file, binary->data, header.size_bytes) &&
+    if (binary->data && file_read_all(file, binary->data, header.size_bytes) &&
         XXH3_64bits(binary->data, header.size_bytes) == header.checksum)
         return true;
     gpu_binary_finish(binary);
@@ -225,17 +216,6 @@ static void trim(const struct gpu_binary_cache *cache)
 
 /* ---- writing ---- */
 
-static bool write_all(int file, const void *from, size_t bytes)
-{
-    for (size_t done = 0; done < bytes;) {
-        const ssize_t n = write(file, (const char *)from + done, bytes - done);
-        if (n <= 0 && !(n < 0 && errno == EINTR))
-            return false;
-        done += n > 0 ? (size_t)n : 0;
-    }
-    return true;
-}
-
 void gpu_binary_write(struct gpu_binary_cache *cache, const struct gpu_binary_key *key,
                       const struct gpu_binary *binary)
 {
@@ -253,7 +233,8 @@ void gpu_binary_write(struct gpu_binary_cache *cache, const struct gpu_binary_ke
     const int file = openat(cache->folder, fresh, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, 0600);
     if (file < 0)
         return;
-    bool written = write_all(file, &header, sizeof(header)) && write_all(file, binary->data, binary->size_bytes);
+    bool written =
+        file_write_all(file, &header, sizeof(header)) && file_write_all(file, binary->data, binary->size_bytes);
     written = close(file) == 0 && written && renameat(cache->folder, fresh, cache->folder, name) == 0;
     if (!written)
         (void)unlinkat(cache->folder, fresh, 0);
