@@ -19,11 +19,11 @@
 #define NAME_BYTES 64
 #define ENDING ".program"
 #define ENDING_FRESH ".fresh" /* not yet whole */
-/* A frame's programs are about twenty: the limit is passed by no more than those of two. */
+/* A frame has about twenty programs, so the limit is exceeded by the programs of two frames at most. */
 #define WRITES_BETWEEN_TRIMS 32
-/* Of one trim, so that its time has a bound; the rest is left to the next. */
+/* Entries that one trim looks at, so that its time has a bound; the next trim goes on. */
 #define ENTRIES_MAX 8192u
-/* What a process that was killed left behind; none writes for so long. */
+/* An older unfinished file is of a process that was killed: writing one takes far less. */
 #define FRESH_SECONDS_MAX 600
 
 /* A file is this header and the driver's bytes. */
@@ -57,7 +57,8 @@ bool gpu_cache_folder(char *path, size_t size)
     return mkdir(path, 0700) == 0 || errno == EEXIST;
 }
 
-/* Binaries are code: nobody else may write here. What others may read is closed to them. */
+/* Binaries are code: a folder that other users may write to is refused. One that they may read is closed to them.
+ */
 static bool is_ours_alone(int folder)
 {
     struct stat found;
@@ -134,7 +135,7 @@ bool gpu_binary_read(const struct gpu_binary_cache *cache, const struct gpu_bina
     if (!cache)
         return false;
     file_name(name, key);
-    /* Without waiting, should the name be that of a pipe. */
+    /* O_NONBLOCK: opening a pipe of that name must not wait. */
     const int file = openat(cache->folder, name, O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK);
     if (file < 0)
         return false;
@@ -167,7 +168,7 @@ static bool ends_with(const char *name, const char *ending)
     return length < NAME_BYTES && length > ending_length && strcmp(name + length - ending_length, ending) == 0;
 }
 
-/* Adds the programs; removes what was never made whole. */
+/* Lists the programs; removes files that were never finished. */
 static size_t list_entries(int folder, DIR *listing, struct entry *entries)
 {
     const time_t now = time(NULL);

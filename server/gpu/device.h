@@ -85,7 +85,7 @@ struct gpu_options {
     bool debug;                   /* debug context, messages to the log */
     struct gpu_measured measured; /* of this device by an earlier context; not known: of the disk */
     bool compiles;           /* no program is taken from the disk, where all that are compiled go nevertheless */
-    uint64_t binaries_bytes; /* of programs on the disk at most; 0: no limit */
+    uint64_t binaries_bytes; /* the most that programs may take on the disk; 0: no limit */
 };
 
 /* Devices that give an OpenGL 4.5 core context; each is opened for a moment to be asked its name.

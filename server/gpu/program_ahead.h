@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* Programs that are compiled ahead of their first use, by threads with GL contexts of their own on the device's
- * display. They share no objects with it: a thread hands over the binary, which the device's thread loads as it
- * loads one from the disk. So whatever befalls a thread's context, the device's stays as it is.
+/* Compiles programs before their first use, by threads with GL contexts of their own on the device's display.
+ * These contexts share no objects with the device's: a thread hands over the binary, and the device's thread loads
+ * it like one from the disk. So a thread's context that fails leaves the device's as it is.
  *
- * The threads and their contexts are there only while something is to be compiled. Without contexts or binaries
- * nothing is done ahead. */
+ * The threads and their contexts exist only while there are programs to compile. Where the driver gives no further
+ * contexts or no binaries, nothing is compiled ahead. */
 #ifndef FARLIGHT_GPU_PROGRAM_AHEAD_H
 #define FARLIGHT_GPU_PROGRAM_AHEAD_H
 
