@@ -82,8 +82,8 @@ static const struct option options[] = {
      "Device memory; 0: 70 % of the device's own, of the host's for software GL, 85 % of what is free where the driver "
      "tells no more, 2 GiB (at most a quarter of the host's) where it tells nothing"},
     {"memory", "programs", START, OPTION_BYTES, AT(program_bytes), "256M", 0, 16 * TIB, "bytes",
-     "Size of the compiled programs that are kept on the disk, in the folder farlight of $XDG_CACHE_HOME or ~/.cache; beyond it, those that were used "
-     "longest ago are removed. 0: no limit"},
+     "Size of the compiled programs that are kept on the disk, in the folder farlight of $XDG_CACHE_HOME or ~/.cache; "
+     "beyond it, those that were used longest ago are removed. 0: no limit"},
 #define MEMORY_LIMIT(tracer, doc)                                                                                 \
     {"memory", #tracer, ANYTIME, OPTION_MEBIBYTES, AT(limits.tracers.tracer##_mebibytes), "0", 0, 16 * TIB, "bytes", \
      "The part of the device memory for " doc ". 0: no limit of its own"},

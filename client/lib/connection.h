@@ -51,7 +51,7 @@ bool fl_connection_break(struct fl_connection *connection, struct fl_error *erro
 /* False, with the reason, if the connection is broken. */
 bool fl_connection_check(const struct fl_connection *connection, struct fl_error *error);
 uint32_t fl_connection_next_request(struct fl_connection *connection);
-/* In place of what an older daemon does not know, what it would do by itself. */
+/* Replaces the primary `auto`, which an older daemon refuses, by the one that such a daemon uses by default. */
 void fl_connection_fit_render(const struct fl_connection *connection, struct message_render *render);
 
 /* Sends one message and waits until the kernel has it. */

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "base/timeline.h"
 
+#include "base/file_io.h"
 #include "base/log.h"
 #include "protocol/common/trace_event.h"
 
@@ -44,20 +45,6 @@ struct timeline {
 
 /* ---- writing ------------------------------------------------------------------------------------------ */
 
-static bool write_all(int fd, const char *bytes, size_t count)
-{
-    while (count > 0) {
-        ssize_t written = write(fd, bytes, count);
-        if (written < 0 && errno != EINTR)
-            return false;
-        if (written > 0) {
-            bytes += written;
-            count -= (size_t)written;
-        }
-    }
-    return true;
-}
-
 static void *write_waiting(void *context)
 {
     struct timeline *timeline = context;
@@ -74,7 +61,7 @@ static void *write_waiting(void *context)
         timeline->waiting_bytes = 0;
         mine = full;
         pthread_mutex_unlock(&timeline->mutex);
-        bool ok = write_all(timeline->fd, mine, count);
+        bool ok = file_write_all(timeline->fd, mine, count);
         if (!ok)
             log_write(LOG_WARNING, "trace-file", "cannot be written: %s; nothing more is", strerror(errno));
         pthread_mutex_lock(&timeline->mutex);
@@ -206,7 +193,7 @@ struct timeline *timeline_create(const char *path, uint64_t limit_bytes, struct 
     /* Not blocking: a FIFO without a reader is an error and not a daemon that never starts. */
     timeline->fd = open(path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NONBLOCK | O_NOCTTY, 0644);
     int failure = timeline->fd < 0 ? errno : 0;
-    if (!failure && !write_all(timeline->fd, head, sizeof(head) - 1))
+    if (!failure && !file_write_all(timeline->fd, head, sizeof(head) - 1))
         failure = errno;
     if (!failure)
         failure = pthread_create(&timeline->thread, NULL, write_waiting, timeline);
@@ -231,7 +218,7 @@ void timeline_destroy(struct timeline *timeline)
     pthread_cond_signal(&timeline->changed);
     pthread_mutex_unlock(&timeline->mutex);
     pthread_join(timeline->thread, NULL);
-    if (!timeline->failed && !write_all(timeline->fd, tail, sizeof(tail) - 1))
+    if (!timeline->failed && !file_write_all(timeline->fd, tail, sizeof(tail) - 1))
         log_write(LOG_WARNING, "trace-file", "cannot be ended: %s", strerror(errno));
     close(timeline->fd);
     if (timeline->left_out > 0)

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 #include "gpu/binary_cache.h"
 
+#include "base/file_io.h"
+
 #include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -17,11 +19,11 @@
 #define NAME_BYTES 64
 #define ENDING ".program"
 #define ENDING_FRESH ".fresh" /* not yet whole */
-/* A frame's programs are about twenty: the limit is passed by no more than those of two. */
+/* A frame has about twenty programs, so the limit is exceeded by the programs of two frames at most. */
 #define WRITES_BETWEEN_TRIMS 32
-/* Of one trim, so that its time has a bound; the rest is left to the next. */
+/* Entries that one trim looks at, so that its time has a bound; the next trim goes on. */
 #define ENTRIES_MAX 8192u
-/* What a process that was killed left behind; none writes for so long. */
+/* An older unfinished file is of a process that was killed: writing one takes far less. */
 #define FRESH_SECONDS_MAX 600
 
 /* A file is this header and the driver's bytes. */
@@ -55,7 +57,8 @@ bool gpu_cache_folder(char *path, size_t size)
     return mkdir(path, 0700) == 0 || errno == EEXIST;
 }
 
-/* Binaries are code: nobody else may write here. What others may read is closed to them. */
+/* Binaries are code: a folder that other users may write to is refused. One that they may read is closed to them.
+ */
 static bool is_ours_alone(int folder)
 {
     struct stat found;
@@ -108,27 +111,16 @@ bool gpu_binary_is_there(const struct gpu_binary_cache *cache, const struct gpu_
     return fstatat(cache->folder, name, &found, AT_SYMLINK_NOFOLLOW) == 0 && is_good(&found);
 }
 
-static bool read_all(int file, void *to, size_t bytes)
-{
-    for (size_t done = 0; done < bytes;) {
-        const ssize_t n = read(file, (char *)to + done, bytes - done);
-        if (n <= 0 && !(n < 0 && errno == EINTR))
-            return false;
-        done += n > 0 ? (size_t)n : 0;
-    }
-    return true;
-}
-
 static bool read_file(int file, const struct gpu_binary_key *key, struct gpu_binary *binary)
 {
     struct header header;
     struct stat found;
-    if (fstat(file, &found) != 0 || !is_good(&found) || !read_all(file, &header, sizeof(header)) ||
+    if (fstat(file, &found) != 0 || !is_good(&found) || !file_read_all(file, &header, sizeof(header)) ||
         memcmp(header.magic, magic, sizeof(magic)) != 0 || header.key.low != key->low ||
         header.key.high != key->high || header.size_bytes != (uint64_t)found.st_size - sizeof(header))
         return false;
     *binary = (struct gpu_binary){header.format, header.size_bytes, malloc(header.size_bytes)};
-    if (binary->data && read_all(file, binary->data, header.size_bytes) &&
+    if (binary->data && file_read_all(file, binary->data, header.size_bytes) &&
         XXH3_64bits(binary->data, header.size_bytes) == header.checksum)
         return true;
     gpu_binary_finish(binary);
@@ -143,7 +135,7 @@ bool gpu_binary_read(const struct gpu_binary_cache *cache, const struct gpu_bina
     if (!cache)
         return false;
     file_name(name, key);
-    /* Without waiting, should the name be that of a pipe. */
+    /* O_NONBLOCK: opening a pipe of that name must not wait. */
     const int file = openat(cache->folder, name, O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK);
     if (file < 0)
         return false;
@@ -176,7 +168,7 @@ static bool ends_with(const char *name, const char *ending)
     return length < NAME_BYTES && length > ending_length && strcmp(name + length - ending_length, ending) == 0;
 }
 
-/* Adds the programs; removes what was never made whole. */
+/* Lists the programs; removes files that were never finished. */
 static size_t list_entries(int folder, DIR *listing, struct entry *entries)
 {
     const time_t now = time(NULL);
@@ -225,17 +217,6 @@ static void trim(const struct gpu_binary_cache *cache)
 
 /* ---- writing ---- */
 
-static bool write_all(int file, const void *from, size_t bytes)
-{
-    for (size_t done = 0; done < bytes;) {
-        const ssize_t n = write(file, (const char *)from + done, bytes - done);
-        if (n <= 0 && !(n < 0 && errno == EINTR))
-            return false;
-        done += n > 0 ? (size_t)n : 0;
-    }
-    return true;
-}
-
 void gpu_binary_write(struct gpu_binary_cache *cache, const struct gpu_binary_key *key,
                       const struct gpu_binary *binary)
 {
@@ -253,7 +234,8 @@ void gpu_binary_write(struct gpu_binary_cache *cache, const struct gpu_binary_ke
     const int file = openat(cache->folder, fresh, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, 0600);
     if (file < 0)
         return;
-    bool written = write_all(file, &header, sizeof(header)) && write_all(file, binary->data, binary->size_bytes);
+    bool written =
+        file_write_all(file, &header, sizeof(header)) && file_write_all(file, binary->data, binary->size_bytes);
     written = close(file) == 0 && written && renameat(cache->folder, fresh, cache->folder, name) == 0;
     if (!written)
         (void)unlinkat(cache->folder, fresh, 0);

@@ -2,9 +2,8 @@
 /* Binaries of programs on the disk, below $XDG_CACHE_HOME/farlight or ~/.cache/farlight. Knows no GL.
  *
  * A file's name is its key, a hash of all that the binary depends on, so files of other versions of farlight or of
- * the driver lie beside it and are never read. A file of another owner, a link, and one that was cut short or
- * changed are as good as none, and are replaced. Several processes may use one folder, and several threads one
- * cache. */
+ * the driver lie beside it and are never read. A file of another owner, a link, and a file that was cut short or
+ * changed are ignored and replaced. Several processes may use one folder, and several threads one cache. */
 #ifndef FARLIGHT_GPU_BINARY_CACHE_H
 #define FARLIGHT_GPU_BINARY_CACHE_H
 
@@ -23,17 +22,18 @@ struct gpu_binary {
 
 struct gpu_binary_cache;
 
-/* Where files are kept between runs; made if it is not there. False: nowhere. */
+/* The folder of files that are kept between runs; made if it is missing. False: there is none. */
 bool gpu_cache_folder(char *path, size_t size);
 
-/* NULL: there is no folder that is ours alone, and nothing is kept. All that follows accepts NULL. */
+/* NULL, and no binary is kept: others may write to the folder, or it cannot be made. The other functions accept
+ * NULL. */
 struct gpu_binary_cache *gpu_binary_cache_open(uint64_t limit_bytes); /* 0: no limit */
 void gpu_binary_cache_close(struct gpu_binary_cache *cache);
 
 bool gpu_binary_is_there(const struct gpu_binary_cache *cache, const struct gpu_binary_key *key);
 bool gpu_binary_read(const struct gpu_binary_cache *cache, const struct gpu_binary_key *key,
                      struct gpu_binary *binary);
-/* From time to time also removes the files that were read longest ago, until the rest is within the limit. */
+/* Sometimes also removes the files that were read longest ago, until the rest is within the limit. */
 void gpu_binary_write(struct gpu_binary_cache *cache, const struct gpu_binary_key *key,
                       const struct gpu_binary *binary);
 void gpu_binary_finish(struct gpu_binary *binary);

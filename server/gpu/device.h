@@ -28,6 +28,7 @@ struct gpu_facts {
     bool robust;   /* context tells of its loss */
     bool debug_output;
     bool has_program_binary;
+    bool compiles_together;   /* the driver compiles several programs at a time, in threads of its own */
     uint32_t time_stamp_bits; /* 0: the device does not measure its time */
     uint64_t texture_buffer_texels_max;
     uint64_t storage_block_bytes_max;
@@ -59,7 +60,7 @@ struct gpu_device {
     struct gpu_registry *registry;      /* every GL object that lives, see registry.h */
     struct gpu_program_cache *programs; /* private to program.c */
     struct gpu_binary_cache *binaries;  /* on the disk; NULL: none are kept */
-    struct gpu_ahead *ahead;            /* what compiles ahead */
+    struct gpu_ahead *ahead;            /* compiles programs before their first use */
     bool announces;                     /* see gpu_program_announce */
     unsigned empty_buffer;              /* 256 zero bytes, bound in place of an empty buffer */
     struct gpu_uniform_ring uniform_ring;
@@ -84,7 +85,7 @@ struct gpu_options {
     bool debug;                   /* debug context, messages to the log */
     struct gpu_measured measured; /* of this device by an earlier context; not known: of the disk */
     bool compiles;           /* no program is taken from the disk, where all that are compiled go nevertheless */
-    uint64_t binaries_bytes; /* of programs on the disk at most; 0: no limit */
+    uint64_t binaries_bytes; /* the most that programs may take on the disk; 0: no limit */
 };
 
 /* Devices that give an OpenGL 4.5 core context; each is opened for a moment to be asked its name.

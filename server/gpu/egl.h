@@ -27,8 +27,8 @@ struct gpu_egl {
 size_t gpu_egl_places(struct gpu_egl_place *places, size_t max);
 /* Opens a display, makes an OpenGL 4.5 core context and makes it current. On failure nothing is left. */
 bool gpu_egl_open(struct gpu_egl *egl, const struct gpu_egl_place *place, bool debug, struct error *error);
-/* Another context on the same display, which shares no objects, current on the calling thread, which closes it
- * too, before the display is closed. */
+/* Makes another context on the same display and makes it current on the calling thread. It shares no objects. The
+ * same thread closes it, before the display is closed. */
 bool gpu_egl_open_beside(struct gpu_egl *beside, const struct gpu_egl *egl);
 void gpu_egl_close_beside(struct gpu_egl *beside);
 /* Leaves neither context nor display. */

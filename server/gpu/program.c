@@ -199,18 +199,15 @@ static const struct gpu_program *create_program(struct gpu_device *device, const
     return &program->program;
 }
 
-/* Unless it is on the disk, from where it is loaded in no time. Software GL compiles at a program's first
- * dispatch, and hardly anything before: contexts for it cost more than they gain. */
+/* A program that is on the disk is not compiled, as it is loaded in no time. Software GL compiles at a program's
+ * first dispatch, and hardly anything before: contexts for it cost more than they gain. */
 static void announce(struct gpu_device *device, const struct gpu_program_source *source, const struct key *key)
 {
     struct gpu_build build;
     if (device->facts.software || !device->facts.has_program_binary || device->compiles ||
         gpu_ahead_knows(device->ahead, key->text) || !gpu_build_prepare(&build, device, source, NULL))
         return;
-    if (gpu_binary_is_there(device->binaries, &build.key))
-        gpu_build_finish(&build);
-    else
-        gpu_ahead_add(device->ahead, key->text, &build);
+    gpu_ahead_add(device->ahead, key->text, &build, !gpu_binary_is_there(device->binaries, &build.key));
 }
 
 void gpu_program_announce(struct gpu_device *device, bool begin)

@@ -37,12 +37,12 @@ struct gpu_program {
 const struct gpu_program *gpu_program_get(struct gpu_device *device, const struct gpu_program_source *source,
                                           struct error *error);
 
-/* From true to false, what is got is only announced: gpu_program_get() returns NULL without an error and looks up
- * nothing, and the programs that are not known yet are compiled by threads until they are got in earnest
- * (gpu/program_ahead.h). In the order of need; what may not be needed is not announced. */
+/* Between true and false, gpu_program_get() only announces a program: it returns NULL without an error, and
+ * threads compile the program if the device does not have it (gpu/program_ahead.h). A later gpu_program_get()
+ * returns it. Announce programs in the order of their need, and none that may not be needed. */
 void gpu_program_announce(struct gpu_device *device, bool begin);
 
-/* A program that the device has, for who looks it over. */
+/* A program that the device has, for the device check. */
 struct gpu_program_stat {
     const char *key;   /* files and defines, each followed by ';'; as long as the device lives */
     unsigned name;     /* GL program */

@@ -10,7 +10,7 @@
 
 /* Compilers are single threads. More would need more memory and gain little: a frame has a few large programs. */
 #define THREADS_MAX 2
-/* Where the driver has threads of its own for them. */
+/* Of a driver that compiles several together. */
 #define TOGETHER_MAX 32
 
 enum state { WAITING, BEGUN, DONE };
@@ -23,26 +23,26 @@ struct item {
     char key[]; /* files and defines */
 };
 
+struct worker {
+    struct gpu_ahead *ahead;
+    pthread_t thread;
+    bool started; /* and not joined */
+    bool ended;
+};
+
 struct gpu_ahead {
     const struct gpu_device *device;
-    bool together;        /* the driver compiles several at a time */
     pthread_mutex_t lock; /* of all that follows */
     pthread_cond_t changed;
     struct item *first, **end;
-    pthread_t threads[THREADS_MAX];
-    bool started[THREADS_MAX], ended[THREADS_MAX];
+    struct worker workers[THREADS_MAX];
     bool ends, unavailable; /* no context can be had */
-};
-
-struct worker {
-    struct gpu_ahead *ahead;
-    size_t number;
 };
 
 /* Locked. The next ones that wait; 0: there are none. */
 static size_t begin_items(struct gpu_ahead *ahead, struct item **items)
 {
-    const size_t max = ahead->together ? TOGETHER_MAX : 1;
+    const size_t max = ahead->device->facts.compiles_together ? TOGETHER_MAX : 1;
     size_t count = 0;
     for (struct item *at = ahead->first; at && !ahead->ends && count < max; at = at->next)
         if (at->state == WAITING) {
@@ -87,17 +87,16 @@ static void compile_items(struct gpu_ahead *ahead)
 
 static void *run(void *context)
 {
-    struct worker worker = *(struct worker *)context;
-    struct gpu_ahead *ahead = worker.ahead;
+    struct worker *worker = context;
+    struct gpu_ahead *ahead = worker->ahead;
     struct gpu_egl beside;
-    free(context);
     const bool opened = gpu_egl_open_beside(&beside, ahead->device->egl);
     if (opened) {
         compile_items(ahead);
         gpu_egl_close_beside(&beside);
     }
     pthread_mutex_lock(&ahead->lock);
-    ahead->ended[worker.number] = true;
+    worker->ended = true;
     ahead->unavailable |= !opened;
     pthread_mutex_unlock(&ahead->lock);
     return NULL;
@@ -110,6 +109,8 @@ struct gpu_ahead *gpu_ahead_create(const struct gpu_device *device)
         return NULL;
     ahead->device = device;
     ahead->end = &ahead->first;
+    for (size_t i = 0; i < THREADS_MAX; i++)
+        ahead->workers[i].ahead = ahead;
     pthread_mutex_init(&ahead->lock, NULL);
     pthread_cond_init(&ahead->changed, NULL);
     return ahead;
@@ -123,8 +124,8 @@ void gpu_ahead_destroy(struct gpu_ahead *ahead)
     ahead->ends = true;
     pthread_mutex_unlock(&ahead->lock);
     for (size_t i = 0; i < THREADS_MAX; i++)
-        if (ahead->started[i])
-            pthread_join(ahead->threads[i], NULL);
+        if (ahead->workers[i].started)
+            pthread_join(ahead->workers[i].thread, NULL);
     for (struct item *next, *at = ahead->first; at; at = next) {
         next = at->next;
         gpu_build_finish(&at->build);
@@ -154,25 +155,19 @@ bool gpu_ahead_knows(struct gpu_ahead *ahead, const char *key)
 }
 
 /* Locked. */
-static void start_thread(struct gpu_ahead *ahead, size_t number)
+static void start(struct worker *worker)
 {
-    if (ahead->started[number] && ahead->ended[number]) {
-        pthread_join(ahead->threads[number], NULL); /* which does no more than return */
-        ahead->started[number] = false;
-    }
-    struct worker *worker = ahead->started[number] ? NULL : malloc(sizeof(*worker));
-    if (!worker)
+    if (worker->started && !worker->ended)
         return;
-    *worker = (struct worker){ahead, number};
-    ahead->ended[number] = false;
-    ahead->started[number] = pthread_create(&ahead->threads[number], NULL, run, worker) == 0;
-    if (ahead->started[number])
-        pthread_setname_np(ahead->threads[number], "compile");
-    else
-        free(worker);
+    if (worker->started)
+        pthread_join(worker->thread, NULL); /* which does no more than return */
+    worker->ended = false;
+    worker->started = pthread_create(&worker->thread, NULL, run, worker) == 0;
+    if (worker->started)
+        pthread_setname_np(worker->thread, "compile");
 }
 
-void gpu_ahead_add(struct gpu_ahead *ahead, const char *key, struct gpu_build *build)
+void gpu_ahead_add(struct gpu_ahead *ahead, const char *key, struct gpu_build *build, bool compiles)
 {
     const size_t key_bytes = strlen(key) + 1;
     struct item *item = malloc(sizeof(*item) + key_bytes);
@@ -180,16 +175,15 @@ void gpu_ahead_add(struct gpu_ahead *ahead, const char *key, struct gpu_build *b
         gpu_build_finish(build);
         return;
     }
-    *item = (struct item){.build = *build};
+    *item = (struct item){.build = *build, .state = compiles ? WAITING : DONE};
     memcpy(item->key, key, key_bytes);
     *build = (struct gpu_build){0};
     pthread_mutex_lock(&ahead->lock);
-    if (!ahead->first)
-        ahead->together = epoxy_has_gl_extension("GL_KHR_parallel_shader_compile");
     *ahead->end = item;
     ahead->end = &item->next;
-    for (size_t i = 0; i < (ahead->together ? 1 : THREADS_MAX); i++)
-        start_thread(ahead, i);
+    const size_t threads = !compiles ? 0 : ahead->device->facts.compiles_together ? 1 : THREADS_MAX;
+    for (size_t i = 0; i < threads; i++)
+        start(&ahead->workers[i]);
     pthread_mutex_unlock(&ahead->lock);
 }
 

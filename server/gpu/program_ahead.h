@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* Programs that are compiled ahead of their first use, by threads with GL contexts of their own on the device's
- * display. They share no objects with it: a thread hands over the binary, which the device's thread loads as it
- * loads one from the disk. So whatever befalls a thread's context, the device's stays as it is.
+/* Compiles programs before their first use, by threads with GL contexts of their own on the device's display.
+ * These contexts share no objects with the device's: a thread hands over the binary, and the device's thread loads
+ * it like one from the disk. So a thread's context that fails leaves the device's as it is.
  *
- * The threads and their contexts are there only while something is to be compiled. Without contexts or binaries
- * nothing is done ahead. */
+ * The threads and their contexts exist only while there are programs to compile. Where the driver gives no further
+ * contexts or no binaries, nothing is compiled ahead. */
 #ifndef FARLIGHT_GPU_PROGRAM_AHEAD_H
 #define FARLIGHT_GPU_PROGRAM_AHEAD_H
 
@@ -19,14 +19,19 @@ struct gpu_ahead;
 struct gpu_ahead *gpu_ahead_create(const struct gpu_device *device); /* NULL: out of memory */
 /* Waits for what is being compiled and drops the rest. Accepts NULL. */
 void gpu_ahead_destroy(struct gpu_ahead *ahead);
-/* The thread of the device calls these three. A program is known by its files and defines, as program.c writes
+
+/* The thread of the device calls the rest. The key of a program is its files and defines, as program.c writes
  * them. */
-bool gpu_ahead_knows(struct gpu_ahead *ahead, const char *key); /* or cannot be had */
-void gpu_ahead_add(struct gpu_ahead *ahead, const char *key,
-                   struct gpu_build *build);    /* takes what is in *build */
-size_t gpu_ahead_left(struct gpu_ahead *ahead); /* added and not taken */
-/* What was added, after a wait if it has begun. The caller owns both; the binary is empty if it was not compiled:
- * it had not begun, or failed. False: it was not added. */
+
+/* Whether there is nothing to add: the program was added already, or no context can be made. */
+bool gpu_ahead_knows(struct gpu_ahead *ahead, const char *key);
+/* Takes what is in *build. False for `compiles`: its texts are kept until the program is taken, no more, as its
+ * binary is on the disk. */
+void gpu_ahead_add(struct gpu_ahead *ahead, const char *key, struct gpu_build *build, bool compiles);
+/* How many programs were added and not taken. */
+size_t gpu_ahead_left(struct gpu_ahead *ahead);
+/* Takes a program that was added; waits if a thread is compiling it. The caller owns *build and *binary. The
+ * binary is empty if compiling failed or had not begun. False: the program was not added. */
 bool gpu_ahead_take(struct gpu_ahead *ahead, const char *key, struct gpu_build *build, struct gpu_binary *binary);
 
 #endif

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A program on its way from sources to a linked one. The texts are made on one thread; compiling and linking may
- * be done on another, in a context of its own. */
+/* Builds a program from its sources. The thread of the device makes the texts; another thread may compile and link
+ * them, in a context of its own. */
 #ifndef FARLIGHT_GPU_PROGRAM_BUILD_H
 #define FARLIGHT_GPU_PROGRAM_BUILD_H
 
@@ -23,19 +23,19 @@ struct gpu_stage {
 struct gpu_build {
     struct gpu_stage stages[GPU_STAGES_MAX];
     unsigned stage_count;
-    struct gpu_program program; /* but for its name and the size of its groups */
+    struct gpu_program program; /* without its name and the size of its groups */
     struct gpu_binary_key key;
 };
 
-/* The texts, the uniforms, and the key. On failure nothing is left. */
+/* Makes the texts, the uniforms and the key. On failure nothing is left. */
 bool gpu_build_prepare(struct gpu_build *build, const struct gpu_device *device,
                        const struct gpu_program_source *source, struct error *error);
 /* Compiles and links in the current context and asks for no result, which would wait for it. */
 void gpu_build_start(struct gpu_build *build, unsigned program);
-/* The result. False: *error has the compiler's log. */
+/* Waits for the result. False: *error has the compiler's log. */
 bool gpu_build_end(struct gpu_build *build, unsigned program, struct error *error);
-/* Of a linked program; false: the driver gives none. */
+/* Gets the binary of a linked program. False: the driver gives none. */
 bool gpu_build_binary(struct gpu_binary *binary, unsigned program);
-void gpu_build_finish(struct gpu_build *build); /* all that is zero is accepted */
+void gpu_build_finish(struct gpu_build *build); /* accepts zeros */
 
 #endif

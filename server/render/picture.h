@@ -40,9 +40,9 @@ bool picture_accumulate(struct picture *picture, struct render_context *context,
                         struct gpu_buffer *sums, uint32_t first_sum, struct error *error);
 /* Before the first band is read; may be put off (gpu_reserve_begin). */
 bool picture_reserve_pixels(struct picture *picture, const struct render_context *context, struct error *error);
+/* Announces the programs that accumulate and resolve (gpu_program_announce). */
+void picture_announce(const struct picture *picture, struct render_context *context);
 /* resolve.c: band of a plane -> picture->resolved; readback.c: from there to picture->pixels. */
-/* Announces what accumulates and resolves (gpu_program_announce). */
-void picture_announce(struct picture *picture, struct render_context *context);
 bool picture_resolve_band(struct picture *picture, struct render_context *context, uint32_t plane, uint32_t band,
                           struct error *error);
 bool picture_read_band(struct picture *picture, struct render_context *context, uint32_t plane, uint32_t band,

@@ -349,9 +349,10 @@ void primary_announce(struct render_context *context, bool rasterised)
             (void)get_program(context, kind_of_sort[sort], has_cutout(context, sort), NULL);
     (void)rays_program(rasterised, context, NULL);
     context->sampled_hits = !rasterised && context->tracer->impl->sampled;
-    const struct wave wave = camera_wave(context);
-    if (rasterised)
+    if (rasterised) {
         (void)fill_program(context, NULL);
-    else
+    } else {
+        const struct wave wave = camera_wave(context);
         wave_announce(context, &wave, true);
+    }
 }

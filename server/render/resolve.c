@@ -43,12 +43,17 @@ static const struct gpu_program *use_ycbcr(struct render_context *context, uint3
     return program;
 }
 
-void picture_announce(struct picture *picture, struct render_context *context)
+static bool is_ycbcr(const struct render_context *context, enum layer layer)
+{
+    return layer == LAYER_BEAUTY && context->request.ycbcr != YCBCR_NONE;
+}
+
+void picture_announce(const struct picture *picture, struct render_context *context)
 {
     (void)context_use(context, "render/accumulate.comp", NULL);
     for (uint32_t plane = 0; plane < picture->plane_count; plane++) {
         const enum layer layer = picture_plane_layer(picture, plane);
-        if (layer == LAYER_BEAUTY && context->request.ycbcr != YCBCR_NONE)
+        if (is_ycbcr(context, layer))
             (void)use_ycbcr(context, 0, NULL);
         else
             (void)use_pixels(context, layer, 0, NULL);
@@ -61,7 +66,7 @@ bool picture_resolve_band(struct picture *picture, struct render_context *contex
     enum layer layer = picture_plane_layer(picture, plane);
     const struct frame_request *request = &context->request;
     uint32_t rows = picture_band_row_count(picture, band), pixel_count = rows * picture->width;
-    bool as_ycbcr = layer == LAYER_BEAUTY && request->ycbcr != YCBCR_NONE;
+    const bool as_ycbcr = is_ycbcr(context, layer);
     size_t bytes = (size_t)frame_request_plane_bytes(request, layer, rows);
     if (!gpu_buffer_reserve(context->device, &picture->resolved, bytes, error))
         return false;

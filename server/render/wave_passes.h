@@ -31,10 +31,10 @@ uint64_t wave_passes_device_bytes(const struct wave_passes *passes);
 enum wave_progress wave_passes_shade(struct wave_passes *passes, struct render_context *context,
                                      struct error *error);
 
-/* Announces the programs that every frame of the integrator needs (gpu_program_announce): those of its first wave.
- */
+/* Announces the programs that every frame of the integrator needs (gpu_program_announce): those of its first wave,
+ * and of its bounces where there will be some. */
 void wave_passes_announce(struct wave_passes *passes, struct render_context *context);
-/* And those of the shadow rays of its first hits, which take longest to compile. */
+/* Announces those that trace the shadow rays of its first hits, which take longest to compile. */
 void wave_passes_announce_shadows(struct wave_passes *passes, struct render_context *context);
 
 #endif

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 #include "store/files.h"
 
+#include "base/file_io.h"
+
 #include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -42,18 +44,17 @@ int store_folder_open(int at, const char *path, struct error *error)
     return -1;
 }
 
-static bool write_all(int fd, const char *at, size_t size_bytes, const atomic_bool *abandoned, struct error *error)
+static bool write_chunks(int fd, const char *at, size_t size_bytes, const atomic_bool *abandoned,
+                         struct error *error)
 {
     for (size_t left_bytes = size_bytes; left_bytes;) {
         if (abandoned && atomic_load(abandoned))
             return error_set(error, ERROR_CANCELLED, "", "the daemon stops");
-        ssize_t written_bytes = write(fd, at, left_bytes < CHUNK_BYTES ? left_bytes : CHUNK_BYTES);
-        if (written_bytes < 0 && errno == EINTR)
-            continue;
-        if (written_bytes < 0)
+        const size_t chunk_bytes = left_bytes < CHUNK_BYTES ? left_bytes : CHUNK_BYTES;
+        if (!file_write_all(fd, at, chunk_bytes))
             return error_set(error, ERROR_INTERNAL, "", "%s", strerror(errno));
-        at += written_bytes;
-        left_bytes -= (size_t)written_bytes;
+        at += chunk_bytes;
+        left_bytes -= chunk_bytes;
     }
     return true;
 }
@@ -67,7 +68,7 @@ bool store_file_write(int folder, const char *name, const void *data, size_t siz
     int fd = openat(folder, new_name, O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, S_IRUSR | S_IWUSR);
     if (fd < 0)
         return error_set(error, ERROR_INTERNAL, name, "%s", strerror(errno));
-    bool written = write_all(fd, data, size_bytes, abandoned, error);
+    bool written = write_chunks(fd, data, size_bytes, abandoned, error);
     if (written && fdatasync(fd) < 0)
         written = error_set(error, ERROR_INTERNAL, name, "%s", strerror(errno));
     if (close(fd) < 0 && written)
@@ -88,28 +89,14 @@ bool store_file_size(int folder, const char *name, uint64_t *size_bytes)
     return true;
 }
 
-static bool read_all(int fd, char *data, size_t size_bytes)
-{
-    while (size_bytes) {
-        ssize_t read_bytes = read(fd, data, size_bytes);
-        if (read_bytes < 0 && errno == EINTR)
-            continue;
-        if (read_bytes <= 0)
-            return false;
-        data += read_bytes;
-        size_bytes -= (size_t)read_bytes;
-    }
-    char beyond;
-    return read(fd, &beyond, 1) == 0;
-}
-
 bool store_file_read(int folder, const char *name, void *data, size_t size_bytes, struct error *error)
 {
     /* Nobody waits for a pipe that was put there. */
     int fd = openat(folder, name, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
     if (fd < 0)
         return error_set(error, ERROR_INTERNAL, name, "%s", strerror(errno));
-    bool complete = read_all(fd, data, size_bytes);
+    char beyond;
+    const bool complete = file_read_all(fd, data, size_bytes) && read(fd, &beyond, 1) == 0;
     close(fd);
     return complete || error_set(error, ERROR_INTERNAL, name, "the file has not the %zu bytes that it should have",
                                  size_bytes);

@@ -25,11 +25,11 @@ struct trace_program_source {
 
 /* Whether rays of the wave meet things that move. */
 bool trace_has_motion(const struct gpu_scene *scene, const struct wave *wave);
-/* What a program that looks at the rays of the wave and the primitives of the scene is compiled with: at most
- * TRACE_WAVE_DEFINES to `defines`, as shaders/trace/wave.comp lists them. Returns how many. */
+/* Defines of a program that reads the rays of the wave and the primitives of the scene: at most TRACE_WAVE_DEFINES
+ * to `defines`, as shaders/trace/wave.comp lists them. Returns how many. */
 #define TRACE_WAVE_DEFINES 10
 size_t trace_wave_defines(const struct gpu_scene *scene, const struct wave *wave, struct gpu_define *defines);
-/* Rays, and their times where these count, as texels. */
+/* Binds the rays as texels, and their times if the program is compiled with HAS_MOTION. */
 void trace_bind_rays(const struct gpu_scene *scene, const struct wave *wave);
 
 /* Compiled for what the scene has (spheres, cutouts, translucent surfaces, motion where the wave has times) and
@@ -37,9 +37,9 @@ void trace_bind_rays(const struct gpu_scene *scene, const struct wave *wave);
  * trace_program_run. */
 const struct gpu_program *trace_program_get(const struct gpu_scene *scene, const struct wave *wave,
                                             const struct trace_program_source *source, struct error *error);
-/* How many rays a dispatch may have, for trace_program_source, of a traversal whose rays take no more rounds of
- * its loops than that: all but of the densest of structures as many as fill any GPU. Even then its driver has no
- * reason to end it. */
+/* How many rays a dispatch of a traversal may have (trace_program_source.rays_a_dispatch), so that it is short
+ * enough for every driver even if each ray takes `rounds_of_a_ray` rounds of the traversal's loops. Except in the
+ * densest structures they are enough to fill any GPU. */
 uint32_t trace_rays_a_dispatch(const struct gpu_device *device, uint64_t rounds_of_a_ray);
 /* Binds the wave's buffers, sets `first_ray`, `ray_count`, `disc_count` and `instance_count`, and dispatches: the
  * rays of the range get their intersections or visibilities. The scene's buffers and the tracer's own are bound

@@ -13,7 +13,7 @@ from farlight_test import Case, Daemon, bundled_scenes, farlight, read_exr
 
 OTHER = {**os.environ, "GALLIUM_DRIVER": "llvmpipe"}
 SIZE = ["--size", "64x48"]
-TRACERS = ("bvh", "reference", "ldc", "abuffer")  # naive takes no scene of this size
+TRACERS = ("bvh", "reference", "ldc", "abuffer", "rayspace")  # naive takes no scene of this size
 INTEGRATORS = ("raycast", "whitted", "distributed", "ao", "path")
 PSNR_MIN = 50  # dB, in linear light with a peak of 1
 BEYOND_MAX = 0.005  # share of the pixels that differ by more than 0.01

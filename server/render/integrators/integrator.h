@@ -12,9 +12,10 @@ struct integrator {
     const char *shader;      /* over the hits; shaders/render/shade.glsl says what it writes */
     uint32_t children_a_hit; /* at most */
     bool scatters;           /* children in many directions, at most one a hit: a wave of them may be sorted */
-    bool always_bounces;     /* some hit has children, but for depth 0 */
-    bool mirrors;            /* hits of materials that send a ray on have children */
-    bool shadows_together;   /* shadow rays of neighbouring hits go side by side, as a rule */
+    /* These three say only what is compiled ahead: */
+    bool always_bounces;     /* hits of any material may have children, unless the depth is 0 */
+    bool mirrors;            /* hits of scene_features.mirrors have children */
+    bool shadows_together;   /* shadow rays of neighbouring hits usually go side by side */
     uint32_t shadow_waves;   /* how many waves of shadow rays the buffers hold; no more are traced at once */
     uint32_t straight_waves; /* waves beyond the depth that are left to rays which go straight on */
     uint32_t (*shadow_rays_a_hit)(const struct render_context *context); /* of the current frame */

@@ -2,6 +2,7 @@
 /* Programs that are compiled ahead are those that would be compiled anyway, each once; what goes wrong there is as
  * if nothing had been tried. */
 #include "gpu/program.h"
+#include "gpu/program_ahead.h"
 #include "tests/fixtures/device.h"
 #include "tests/harness/test.h"
 
@@ -96,18 +97,28 @@ TEST(a_second_start_compiles_nothing)
         assert_non_null(gpu_program_get(device, &sources[i], NULL));
     assert_int_equal(known_programs(&compiled), COUNT);
     assert_int_equal(compiled, 0);
+    assert_int_equal(gpu_ahead_left(device->ahead), 0);
 }
 
-TEST(a_driver_that_compiles_several_together_is_given_them_together)
+static void assert_all_compile_ahead(bool together)
 {
     size_t compiled;
-    close_device(NULL);
-    open_device(NULL);
-    device->facts.software = false;
+    device->facts.compiles_together = together;
     announce_all();
     for (size_t i = 0; i < COUNT; i++)
         assert_non_null(gpu_program_get(device, &sources[i], NULL));
     assert_int_equal(known_programs(&compiled), COUNT);
+    assert_int_equal(compiled, COUNT);
+}
+
+TEST(a_driver_that_compiles_several_together_is_given_them_together)
+{
+    assert_all_compile_ahead(true);
+}
+
+TEST(a_driver_that_compiles_one_at_a_time_is_given_them_by_several_threads)
+{
+    assert_all_compile_ahead(false);
 }
 
 TEST(a_shader_that_does_not_compile_ahead_says_where_when_it_is_got)
