@@ -135,7 +135,7 @@ void add_child(uint j, path parent, surface s, float distance_, vec3 direction, 
     c.weight_b = weight.b;
     c.sample_slot = parent.sample_slot;
     vec2 cone = cone_at(parent, distance_);
-#ifdef HAS_TEXTURES // else nobody asks for it
+#ifdef HAS_TEXTURES // only they are filtered by it
     if (!straight)
         cone = cone_sent_on(cone, s, direction, solid_angle);
 #endif

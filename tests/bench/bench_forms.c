@@ -54,14 +54,6 @@ json_t *bench_structure_json(const struct structure_rows *rows)
     return object;
 }
 
-json_t *bench_times_json(const struct bench_runs *runs)
-{
-    json_t *list = json_array();
-    for (unsigned i = 0; i < runs->count; i++)
-        json_array_append_new(list, json_integer((json_int_t)runs->times_ns[i]));
-    return list;
-}
-
 static bool print(const struct bench_forms *bench, json_t *forms)
 {
     const struct bench_scene *scene = &bench->scene;

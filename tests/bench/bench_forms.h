@@ -45,7 +45,6 @@ json_t *bench_forms_frames(struct bench_forms *bench, struct error *error);
 /* The tracer that a form is of, NULL and *error: there is none. */
 const struct tracer_impl *bench_form_impl(const struct bench_form *form, struct error *error);
 json_t *bench_structure_json(const struct structure_rows *rows);
-json_t *bench_times_json(const struct bench_runs *runs);
 /* "NAME" or "NAME:KEY=VALUE,..": a tracer with options. `text` is changed; the form's name is to be freed. */
 bool bench_form_parse(struct bench_form *form, char *text);
 

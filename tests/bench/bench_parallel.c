@@ -135,12 +135,10 @@ static json_t *measure(struct bench *bench, enum order order, const struct ray *
     }
     for (int bounds = 0; bounds < BOUNDS; bounds++) {
         for (size_t n = 0; n < NUMBER_COUNT; n++) {
-            json_t *all = json_array();
-            for (unsigned i = 0; i < bench->runs[bounds][n].count; i++)
-                json_array_append_new(all, json_integer((json_int_t)bench->runs[bounds][n].times_ns[i]));
             json_array_append_new(rows, json_pack("{s:s, s:s, s:i, s:i, s:o}", "order", order_names[order],
                                                   "bounds", bounds == BOXES ? "boxes" : "spheres", "packet",
-                                                  (int)numbers[n], "rays", (int)count, "runs_ns", all));
+                                                  (int)numbers[n], "rays", (int)count, "runs_ns",
+                                                  bench_times_json(&bench->runs[bounds][n])));
         }
     }
     free(expected);

@@ -16,7 +16,6 @@
 #include <epoxy/gl.h>
 #include <getopt.h>
 #include <jansson.h>
-#include <time.h>
 
 static const char usage[] =
     "usage: bench rayspace --model FILE | --family TRIANGLES [options]\n"
@@ -69,13 +68,6 @@ struct bench {
     struct rayspace_control control;
     uint32_t differing;
 };
-
-static uint64_t processor_ns(void)
-{
-    struct timespec now;
-    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
-    return (uint64_t)now.tv_sec * 1000000000u + (uint64_t)now.tv_nsec;
-}
 
 /* ---- the mirror ---- */
 
@@ -345,12 +337,12 @@ static bool build_nodes(struct bench *bench, struct error *error)
 {
     struct rayspace_state *state = (struct rayspace_state *)bench->tracers[0]->state;
     gpu_buffer_read(bench->device, &state->control, 0, &bench->control, sizeof(bench->control));
-    const uint64_t start_ns = processor_ns();
+    const uint64_t start_ns = bench_processor_ns();
     for (unsigned i = 0; i < BUILDS_A_RUN; i++)
         if (!rayspace_nodes_build(state, &bench->scene.gpu, false, error))
             return false;
     glFinish();
-    bench_add(&bench->nodes, (processor_ns() - start_ns) / BUILDS_A_RUN);
+    bench_add(&bench->nodes, (bench_processor_ns() - start_ns) / BUILDS_A_RUN);
     return true;
 }
 
@@ -372,10 +364,10 @@ static bool run(struct bench *bench, struct error *error)
         glFinish();
         for (unsigned turn = 0; ok && turn < bench->tracer_count; turn++) {
             const unsigned i = (turn + round) % bench->tracer_count;
-            const uint64_t start_ns = processor_ns();
+            const uint64_t start_ns = bench_processor_ns();
             ok = trace(bench, i, error);
             if (round > 0)
-                bench_add(&bench->times[i], processor_ns() - start_ns);
+                bench_add(&bench->times[i], bench_processor_ns() - start_ns);
             else if (i < 2)
                 gpu_buffer_read(bench->device, &bench->answers, 0, answers[i], rays * sizeof(struct hit));
             if (ok && i == 0 && round > 0)

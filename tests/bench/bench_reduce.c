@@ -3,9 +3,8 @@
  * shader as its paper does, and Horn's, which that one is compared with. bench reduce ELEMENTS [RUNS]
  *
  * Elements are slots of 16 bytes (shaders/rayspace/reduce.h), a third of which are not empty. All ways take turns,
- * run by run. One JSON object on standard output: {"elements", "kept", "rows": [{way, runs_ns, cpu_ns}]}; cpu: of
- * all threads together, which other work on the machine makes hardly longer. Exit status 1 if something fails or a
- * way leaves other elements than those that are not empty. */
+ * run by run. One JSON object on standard output: {"elements", "kept", "rows": [{way, runs_ns, cpu_ns}]}. Exit
+ * status 1 if something fails or a way leaves other elements than those that are not empty. */
 #include "tests/accuracy/test_scenes.h"
 #include "tests/bench/bench.h"
 #include "tests/bench/bench_stats.h"
@@ -20,7 +19,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
 #define ELEMENTS_MAX (1u << 25)
 #define GROUPS_X 65535u /* of a dispatch, at most */
@@ -148,13 +146,6 @@ static void reduce(struct bench *bench, enum way way)
 
 /* ---- measuring ---- */
 
-static uint64_t cpu_now_ns(void)
-{
-    struct timespec now;
-    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
-    return (uint64_t)now.tv_sec * 1000000000u + (uint64_t)now.tv_nsec;
-}
-
 static void begin(struct bench *bench)
 {
     gpu_buffer_write(bench->device, &bench->control, 0, &bench->before, sizeof(bench->before));
@@ -187,18 +178,10 @@ static bool is_right(struct bench *bench, enum way way)
 static void measure(struct bench *bench, enum way way)
 {
     begin(bench);
-    const uint64_t start_ns = clock_now_ns(), start_cpu_ns = cpu_now_ns();
+    const uint64_t start_ns = clock_now_ns(), start_cpu_ns = bench_processor_ns();
     reduce(bench, way);
     bench_add(&bench->runs[way], clock_now_ns() - start_ns);
-    bench_add(&bench->cpu[way], cpu_now_ns() - start_cpu_ns);
-}
-
-static json_t *times_of(const struct bench_runs *runs)
-{
-    json_t *times = json_array();
-    for (unsigned i = 0; i < runs->count; i++)
-        json_array_append_new(times, json_integer((json_int_t)runs->times_ns[i]));
-    return times;
+    bench_add(&bench->cpu[way], bench_processor_ns() - start_cpu_ns);
 }
 
 static void tell(const struct bench *bench)
@@ -206,7 +189,8 @@ static void tell(const struct bench *bench)
     json_t *rows = json_array();
     for (int way = 0; way < WAYS; way++)
         json_array_append_new(rows, json_pack("{s:s, s:o, s:o}", "way", way_names[way], "runs_ns",
-                                              times_of(&bench->runs[way]), "cpu_ns", times_of(&bench->cpu[way])));
+                                              bench_times_json(&bench->runs[way]), "cpu_ns",
+                                              bench_times_json(&bench->cpu[way])));
     json_t *whole = json_pack("{s:I, s:I, s:o}", "elements", (json_int_t)bench->slot_count, "kept",
                               (json_int_t)bench->kept_count, "rows", rows);
     json_dumpf(whole, stdout, JSON_INDENT(1));

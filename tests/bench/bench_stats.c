@@ -3,6 +3,7 @@
 
 #include <math.h>
 #include <stdlib.h>
+#include <time.h>
 
 void bench_add(struct bench_runs *runs, uint64_t time_ns)
 {
@@ -37,4 +38,19 @@ struct bench_figure bench_figure(const struct bench_runs *runs)
         values[i] = fabs(values[i] - figure.median_ns);
     figure.deviation_ns = median(values, runs->count);
     return figure;
+}
+
+json_t *bench_times_json(const struct bench_runs *runs)
+{
+    json_t *list = json_array();
+    for (unsigned i = 0; i < runs->count; i++)
+        json_array_append_new(list, json_integer((json_int_t)runs->times_ns[i]));
+    return list;
+}
+
+uint64_t bench_processor_ns(void)
+{
+    struct timespec now;
+    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+    return (uint64_t)now.tv_sec * 1000000000u + (uint64_t)now.tv_nsec;
 }

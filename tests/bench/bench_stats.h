@@ -3,6 +3,7 @@
 #ifndef FARLIGHT_TESTS_BENCH_STATS_H
 #define FARLIGHT_TESTS_BENCH_STATS_H
 
+#include <jansson.h>
 #include <stdint.h>
 
 #define BENCH_RUNS_MAX 64
@@ -19,5 +20,9 @@ struct bench_figure {
 
 void bench_add(struct bench_runs *runs, uint64_t time_ns);       /* beyond BENCH_RUNS_MAX: forgotten */
 struct bench_figure bench_figure(const struct bench_runs *runs); /* all zero where there are no runs */
+json_t *bench_times_json(const struct bench_runs *runs);         /* an array of them */
+
+/* Processor time of all threads of this process, which other work on the machine hardly makes longer. */
+uint64_t bench_processor_ns(void);
 
 #endif

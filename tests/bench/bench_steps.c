@@ -10,6 +10,7 @@
  * stage "all" has the steps of all. A frame is left after so many seconds (30): whole says whether it was
  * finished. cpu: of all threads together, which other work on the machine makes hardly longer. */
 #include "tests/bench/bench.h"
+#include "tests/bench/bench_stats.h"
 #include "tests/bench/bench_options.h"
 
 #include "base/clock.h"
@@ -20,7 +21,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
 enum { ALL = PHASE_IDLE, SHADOW = PHASE_RESOLVE + 1, STAGES };
 static const char *const stage_names[STAGES] = {
@@ -55,13 +55,6 @@ struct steps {
     struct step *list;
     size_t count, capacity;
 };
-
-static uint64_t cpu_now_ns(void)
-{
-    struct timespec now;
-    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
-    return (uint64_t)now.tv_sec * 1000000000u + (uint64_t)now.tv_nsec;
-}
 
 static bool add_step(struct steps *steps, const struct step *step)
 {
@@ -127,9 +120,9 @@ static bool step(struct bench *bench, struct steps *steps, bool *whole, struct e
     enum frame_progress progress = FRAME_MORE;
     while (progress == FRAME_MORE && clock_now_ns() < end_ns) {
         struct step now = {.stage = next_stage(bench->renderer)};
-        const uint64_t start_ns = clock_now_ns(), cpu_start_ns = cpu_now_ns();
+        const uint64_t start_ns = clock_now_ns(), cpu_start_ns = bench_processor_ns();
         progress = frame_step(bench->renderer, &result, error);
-        now.cpu_ns = cpu_now_ns() - cpu_start_ns;
+        now.cpu_ns = bench_processor_ns() - cpu_start_ns;
         now.ns = clock_now_ns() - start_ns;
         if (!add_step(steps, &now))
             return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the steps");
@@ -155,12 +148,12 @@ static bool measure(struct bench *bench, unsigned tracer, enum integrator_kind i
     bool whole = false;
     bool good = begin(bench, &request, &first_begin_ns, error) && step(bench, &first, &whole, error) &&
                 begin(bench, &request, &begin_ns, error);
-    const uint64_t start_ns = clock_now_ns(), cpu_start_ns = cpu_now_ns();
+    const uint64_t start_ns = clock_now_ns(), cpu_start_ns = bench_processor_ns();
     good = good && step(bench, &steps, &whole, error);
     if (good) {
         json_t *stages = json_array(), *first_stages = json_array();
         json_int_t frame_ns = (json_int_t)(clock_now_ns() - start_ns);
-        json_int_t cpu_ns = (json_int_t)(cpu_now_ns() - cpu_start_ns);
+        json_int_t cpu_ns = (json_int_t)(bench_processor_ns() - cpu_start_ns);
         for (int stage = 0; stage < STAGES; stage++) {
             describe_stage(stages, &steps, stage);
             describe_stage(first_stages, &first, stage);

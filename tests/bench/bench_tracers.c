@@ -142,11 +142,9 @@ static bool build_all(struct bench *bench, struct error *error)
 static json_t *figure_json(const struct bench_runs *runs)
 {
     const struct bench_figure figure = bench_figure(runs);
-    json_t *all = json_array();
-    for (unsigned i = 0; i < runs->count; i++)
-        json_array_append_new(all, json_integer((json_int_t)runs->times_ns[i]));
     return json_pack("{s:f, s:f, s:f, s:f, s:o}", "median_ns", figure.median_ns, "deviation_ns",
-                     figure.deviation_ns, "min_ns", figure.min_ns, "max_ns", figure.max_ns, "runs_ns", all);
+                     figure.deviation_ns, "min_ns", figure.min_ns, "max_ns", figure.max_ns, "runs_ns",
+                     bench_times_json(runs));
 }
 
 static json_t *structures_json(const struct bench *bench)
