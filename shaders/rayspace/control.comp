@@ -33,8 +33,10 @@ void main()
             waiting[last_later] += c.put_off;
             c.leaves += c.leaves_written;
             c.limit = min(c.limit * 2u, limit_max);
+            c.failed_in_turn = 0u;
         } else {
             c.halvings++;
+            c.failed_in_turn++;
             c.limit = max(c.taken / 2u, 1u);
         }
         c.passes++;

@@ -71,9 +71,11 @@ struct rayspace_control {
     float band;                      /* metres; what is farther away from its node than this is put off */
     uint cone_tests, triangle_tests; /* so far */
     uint pairs_max, passes, halvings;
-    uint left_over; /* not 0: some batch was not traced to its end */
+    uint left_over;      /* not 0: some batch was not traced to its end */
+    uint failed_in_turn; /* passes, up to the last one */
+    uint pad0, pad1, pad2;
 };
-SHARED_SIZE(rayspace_control, 128)
+SHARED_SIZE(rayspace_control, 144)
 
 /* After which pass control.comp runs: no other one is taken yet. Of a batch or of the wave, what then waits is
  * left over, and stops the slice. */

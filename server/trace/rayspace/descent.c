@@ -28,6 +28,8 @@
 #define PASSES_JOINT 64u
 #define PASSES_FLAT 16u
 #define PASSES_A_TEST 8u
+/* From all pairs of a stack to one it takes fewer halvings. */
+#define FAILED_IN_TURN_MAX 64u
 #define LEAVES_ALL 0u
 #define LEAVES_NONE UINT32_MAX
 
@@ -104,13 +106,24 @@ static uint32_t at_most(uint32_t number, uint32_t maximum)
     return number < maximum ? number : maximum;
 }
 
+/* Pairs that each stack has room for. */
+static uint32_t capacity_of(const struct rayspace_state *state)
+{
+    const uint32_t rays = state->base.wave.ray_count, asked = state->base.options.bench.rayspace_pairs;
+    const uint32_t wanted =
+        rays < PAIRS_MIN / PAIRS_A_RAY ? PAIRS_MIN : at_most(rays, PAIRS_MAX / PAIRS_A_RAY) * PAIRS_A_RAY;
+    return asked ? asked : wanted;
+}
+
+/* Of them, for passes of one pair. */
+static uint32_t reserved_of(const struct rayspace_state *state)
+{
+    return at_most(PAIRS_RESERVED, state->capacity / 4);
+}
+
 static bool reserve(struct rayspace_state *state, struct gpu_device *device, struct error *error)
 {
     const uint32_t rays = state->base.wave.ray_count;
-    const uint32_t wanted =
-        rays < PAIRS_MIN / PAIRS_A_RAY ? PAIRS_MIN : at_most(rays, PAIRS_MAX / PAIRS_A_RAY) * PAIRS_A_RAY;
-    state->capacity = state->base.options.bench.rayspace_pairs ? state->base.options.bench.rayspace_pairs : wanted;
-    state->leaves_capacity = state->capacity;
     const size_t pair_bytes = (size_t)state->capacity * RAYSPACE_PAIR_BYTES;
     bool good = true;
     for (unsigned i = 0; i < RAYSPACE_STACKS && good; i++)
@@ -144,7 +157,10 @@ bool rayspace_descent_begin(struct rayspace *rayspace, struct gpu_scene *scene, 
     struct gpu_device *device = scene->device;
     const struct wave *wave = &state->base.wave;
     state->levels = rayspace_levels_over(wave->ray_count);
-    state->batch_max = at_most(batch_of(state, ITEMS_MAX), rayspace->rank_count);
+    state->capacity = state->leaves_capacity = capacity_of(state);
+    /* All items of a batch are put onto one stack, as by a pass. */
+    const uint32_t room = state->capacity - reserved_of(state);
+    state->batch_max = at_most(batch_of(state, at_most(room, ITEMS_MAX)), rayspace->rank_count);
     if (!reserve(state, device, error))
         return false;
     if (leaves_slots(state) &&
@@ -193,7 +209,7 @@ static bool dispatch_control(struct rayspace_state *state, const struct gpu_scen
     gpu_uniform_uint(program, "leaves_capacity", state->leaves_capacity);
     gpu_uniform_uint(program, "leaves_wanted", leaves_wanted);
     gpu_uniform_uint(program, "limit_max", pass_max(state, scene->device));
-    gpu_uniform_uint(program, "reserve", at_most(PAIRS_RESERVED, state->capacity / 4));
+    gpu_uniform_uint(program, "reserve", reserved_of(state));
     gpu_uniform_float(program, "band", band_of(state, scene));
     gpu_uniform_uint(program, "seeds", state->seeds);
     gpu_uniform_uint(program, "ends", end);
@@ -381,6 +397,10 @@ static enum tracer_progress descend_waiting(struct rayspace *rayspace, struct gp
         gpu_buffer_read(scene->device, &state->control, 0, control, sizeof(*control));
         if (scene->device->lost)
             return tracer_progress_of(gpu_check(scene->device, "tracing", error));
+        if (control->failed_in_turn > FAILED_IN_TURN_MAX) { /* no pass ever ends: a mistake of ours */
+            error_set(error, ERROR_INTERNAL, NULL, "rayspace: no room for the children of one pair");
+            return TRACER_FAILED;
+        }
         if (control->leaves_taken > 0 && !dispatch_leaves(rayspace, scene, state, error))
             return TRACER_FAILED;
         if (control->taken > 0 && !dispatch_pass(rayspace, scene, state, error))

@@ -19,11 +19,15 @@ struct pair {
     struct fixture naive, rayspace; /* of scenes that are alike */
 };
 
+static void pair_init_by(struct pair *pair, struct scene *(*create)(void), const struct tracer_options *options)
+{
+    fixture_init_by(&pair->naive, NAIVE_NUMBER, create(), NULL);
+    fixture_init_by(&pair->rayspace, RAYSPACE_NUMBER, create(), options);
+}
+
 static void pair_init(struct pair *pair, struct scene *(*create)(void), uint32_t batch)
 {
-    const struct tracer_options options = {.rayspace.batch = batch};
-    fixture_init_by(&pair->naive, NAIVE_NUMBER, create(), NULL);
-    fixture_init_by(&pair->rayspace, RAYSPACE_NUMBER, create(), &options);
+    pair_init_by(pair, create, &(struct tracer_options){.rayspace.batch = batch});
 }
 
 static void pair_finish(struct pair *pair)
@@ -127,6 +131,19 @@ TEST(answers_are_those_of_brute_force_to_the_bit_in_batches_of_any_size)
         }
     }
     free(rays);
+}
+
+/* Each primitive begins as a pair of its own. */
+TEST(more_primitives_than_a_stack_has_room_for_come_in_batches)
+{
+    const struct tracer_options options = {.rayspace.mode = RAYSPACE_MODE_FLAT, .bench.rayspace_pairs = 256};
+    struct ray rays[512];
+    struct pair pair;
+    random_rays(rays, 512, 9);
+    pair_init_by(&pair, test_scene_soup, &options);
+    assert_true(((const struct rayspace *)pair.rayspace.tracer)->rank_count > options.bench.rayspace_pairs);
+    expect_same_answers(&pair, rays, 512, "flat, with little room");
+    pair_finish(&pair);
 }
 
 TEST(waves_of_few_rays_have_all_their_answers)
