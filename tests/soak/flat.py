@@ -8,12 +8,11 @@ import time
 import farlight_test
 
 KIB, MIB = 1 << 10, 1 << 20
-# Memory that comes and goes while nothing leaks: the allocator has an arena for each of some ten threads, and how full
-# they are depends on which thread came first; a program that the driver compiles late takes 5 MiB of them.
+# Memory that comes and goes while nothing leaks: a program that the driver compiles late takes 5 MiB.
 WOBBLE_BYTES = 8 * MIB
 # What one round of 10 connects, one upload and 100 frames may leave behind for ever, once there are enough samples to
 # tell. Resident: 10 bytes for each frame, or 100 for each connect, less than the smallest struct that any of them has. Data
-# counts as well what arenas have reserved and not used; they fill slower and slower, at last by 1.7 KiB a round.
+# counts as well what the allocator has reserved and not used.
 MEMORY = {"rss": 1 * KIB, "data": 4 * KIB}
 SAMPLES_MIN = 7  # beside the first
 BLOB_CACHE_BYTES = 1 * MIB  # as the daemon is told
@@ -54,8 +53,8 @@ def settle(daemon, descriptors):
 
 
 def slope(values):
-    """Of the straight line through them, a step: the median of those through any two (Theil and Sen), so that arenas that
-    grow once do not look like a leak, which goes on."""
+    """Of the straight line through them, a step: the median of those through any two (Theil and Sen), so that what grows
+    once does not look like a leak, which goes on."""
     return statistics.median((values[j] - values[i]) / (j - i) for j in range(len(values)) for i in range(j))
 
 
