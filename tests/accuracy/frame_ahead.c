@@ -58,6 +58,8 @@ TEST(every_integrator_and_tracer_gives_the_same_picture_and_waits_once)
 {
     struct fixture *fixture = *state;
     fixture_mixture(fixture);
+    fixture->request.width = 48;
+    fixture->request.height = 36;
     static const struct form {
         unsigned integrator, depth, samples;
     } forms[] = {{INTEGRATOR_WHITTED, 4, 1},
