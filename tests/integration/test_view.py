@@ -143,7 +143,8 @@ class WithoutAWindow(Viewer):
                               {"key": "]"}, rest(), {"state": "brighter"}, {"screenshot": "brighter.png"},
                               {"key": "["}, {"key": "["}, {"key": "["}, {"key": "t", "shift": True}, rest(),
                               {"state": "other"}, {"key": "t"}, {"key": "i", "shift": True}, rest(), {"state": "path"},
-                              {"key": "i"}, {"key": "m"}, rest(), {"state": "back"}])
+                              {"key": "i"}, {"key": "m"}, rest(), {"state": "back"}],
+                             size=(160, 90))
         self.assertEqual([states[name]["tracer"] for name in ("first", "brighter", "other", "path", "back")],
                          ["bvh", "bvh", tracers()[-1]["name"], "bvh", "bvh"])
         self.assertEqual([states[name]["integrator"] for name in ("first", "other", "path", "back")],
@@ -173,14 +174,14 @@ class WithoutAWindow(Viewer):
     def test_the_error_map_is_black_where_the_tracer_is_exact(self):
         states = self.replay([{"key": "x"}, rest(4), {"state": "bvh"}, *HIDE, {"screenshot": "bvh.png"}, {"key": "x"},
                               rest(4), {"state": "off"}, {"key": "x"}, {"key": "t"}, {"key": "t"}, rest(4),
-                              {"state": "ldc"}])
+                              {"state": "ldc"}], size=(160, 90))
         self.assertEqual(states["ldc"]["tracer"], "ldc")
         self.assertNotIn("errors", states["off"])
         # The bvh differs from the reference by rounding alone; samples along axes do not.
         self.assertLess(states["bvh"]["errors"]["mean"], 1e-4)
         self.assertGreater(states["ldc"]["errors"]["mean"], 10 * states["bvh"]["errors"]["mean"])
         rows, channels = read_png(self.folder / "bvh.png")[2:]
-        middle = rows[SIZE[1] // 2]
+        middle = rows[len(rows) // 2]
         self.assertLess(max(middle[0::channels]), 64)
 
     def test_keys_cycle_through_cameras_and_clips(self):
