@@ -12,6 +12,7 @@ import struct
 import subprocess
 import tempfile
 import threading
+import time
 import unittest
 
 from farlight_test import BIN, TIMEOUT_S, Case, Daemon, bundled_scenes, farlight, read_png, tracers
@@ -336,7 +337,7 @@ class OnADaemon(Viewer):
                 if lines[-1]["state"] == "before":
                     break
             while not (self.folder / "before.png").exists() and process.poll() is None:
-                pass
+                time.sleep(0.01)
             first.stop(signal.SIGKILL)
             pathlib.Path(first.path).unlink(missing_ok=True)
             with Daemon(listen=first.address):
