@@ -278,7 +278,7 @@ static void print_structure(const struct cli_timings *timings)
         const struct part *part = &timings->parts[i];
         if (!part->seen)
             continue;
-        fprintf(timings->out, "  %-9s %-8s%s", title, part->last.name, part->last.text);
+        fprintf(timings->out, "  %-9s %-10s%s", title, part->last.name, part->last.text);
         if (part->last.is_kept)
             fprintf(timings->out, "; built for %" PRIu64 " of %" PRIu64 " frame%s", part->builds, timings->frames,
                     timings->frames == 1 ? "" : "s");

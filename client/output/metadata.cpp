@@ -26,16 +26,17 @@ void add_count(std::vector<metadata_entry> &entries, const char *name, uint64_t 
     add_text(entries, name, std::to_string(value));
 }
 
-// Lengths and warnings belong to the picture; numbers tell what was built for it, which depends on earlier frames.
+// Lengths and warnings belong to the picture; numbers and means tell what was done for it, which depends on
+// earlier frames and on the machine.
 void add_structure(std::vector<metadata_entry> &entries, const struct message_frame_end &end, bool full)
 {
     for (uint32_t i = 0; i < end.structure_count; i++) {
         const struct record_structure_row &row = end.structure[i];
         const std::string name = std::string("structure/") + row.name;
-        const bool is_length = row.unit == PROTOCOL_UNIT_METRES;
-        if (!is_length && full)
+        const bool is_length = row.unit == PROTOCOL_UNIT_METRES, is_mean = row.unit == PROTOCOL_UNIT_PER_RAY;
+        if (!is_length && !is_mean && full)
             add_count(entries, name.c_str(), row.number);
-        if (is_length)
+        if (is_length || (is_mean && full))
             add_number(entries, (name + "_" + protocol_unit_text(row.unit)).c_str(),
                        static_cast<double>(row.measure));
         if (row.warning[0])

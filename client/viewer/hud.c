@@ -12,7 +12,9 @@
 #define ROW 12.0 /* of the timeline */
 #define TIMELINE_FRAMES 8u
 #define TIMELINE_MIN_NS 20e6
-#define STRUCTURE_SHARE_MAX 0.6 /* of the width of the window: longer lines are left out */
+/* Of the window's width and height, for what a tracer says: longer lines are broken, those below are left out. */
+#define STRUCTURE_SHARE_MAX 0.6
+#define STRUCTURE_LINES_MAX 10u
 
 static const struct hud_colour panel = {14, 17, 22, 205}, ink = {232, 236, 241, 255}, faint = {148, 158, 170, 255},
                                accent = {255, 190, 92, 255}, alarm = {255, 110, 92, 255},
@@ -126,12 +128,46 @@ struct corner {
     double right, bottom;
 };
 
+/* As much of a text as fits into a line, behind which commas follow or nothing; at least up to the first one. */
+static size_t line_length(const struct layout *layout, const char *said)
+{
+    size_t length = 0, next;
+    char line[HUD_TEXT_MAX];
+    do {
+        next = length + strspn(said + length, ", ");
+        next += strcspn(said + next, ",");
+        if (length > 0 && next >= HUD_TEXT_MAX)
+            break;
+        snprintf(line, sizeof(line), "%.*s", (int)next, said);
+        if (length > 0 && text_width(layout, HUD_PLAIN, line) >= STRUCTURE_SHARE_MAX * layout->state->width)
+            break;
+        length = next;
+    } while (said[length] != '\0');
+    return length;
+}
+
+/* Adds rows that say it. */
+static size_t break_structure(const struct layout *layout, const char *said, struct row *rows, size_t room)
+{
+    size_t count = 0;
+    while (*said != '\0' && count < room) {
+        const size_t length = line_length(layout, said);
+        snprintf(rows[count].value, HUD_TEXT_MAX, "%.*s", (int)length, said);
+        said += length + strspn(said + length, ", ");
+        if (text_width(layout, HUD_PLAIN, rows[count].value) >= STRUCTURE_SHARE_MAX * layout->state->width)
+            continue;
+        rows[count].name = count == 0 ? "structure" : "";
+        count++;
+    }
+    return count;
+}
+
 static struct corner draw_scene(struct layout *layout)
 {
     const struct hud_state *state = layout->state;
     const struct settings *settings = state->settings;
     const double s = layout->scale, line = LINE * s;
-    struct row rows[6 + HUD_STRUCTURE_MAX];
+    struct row rows[6 + STRUCTURE_LINES_MAX];
     size_t count = 0;
     snprintf(rows[count].value, HUD_TEXT_MAX, "%s, %s", protocol_tracer_text(settings->tracer),
              protocol_integrator_text(settings->integrator));
@@ -149,11 +185,10 @@ static struct corner draw_scene(struct layout *layout)
     }
     print_samples(state, rows[count].value, HUD_TEXT_MAX);
     rows[count++].name = "picture";
-    for (size_t i = 0; i < HUD_STRUCTURE_MAX && state->structure[i]; i++) {
-        snprintf(rows[count].value, HUD_TEXT_MAX, "%s", state->structure[i]);
-        if (text_width(layout, HUD_PLAIN, rows[count].value) < STRUCTURE_SHARE_MAX * state->width)
-            rows[count++].name = "structure";
-    }
+    const double lines = fmax(STRUCTURE_SHARE_MAX * state->height / line - (double)count - 1, 1);
+    const size_t end = count + (size_t)fmin(lines, STRUCTURE_LINES_MAX);
+    for (size_t i = 0; i < HUD_STRUCTURE_MAX && state->structure[i]; i++)
+        count += break_structure(layout, state->structure[i], rows + count, end - count);
     double names = 0, widest = text_width(layout, HUD_BOLD, state->scene);
     for (size_t i = 0; i < count; i++)
         names = fmax(names, text_width(layout, HUD_PLAIN, rows[i].name));

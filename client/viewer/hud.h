@@ -11,7 +11,8 @@
 
 #define HUD_MARKS_MAX 2048u
 #define HUD_TEXT_MAX 128u
-#define HUD_STRUCTURE_MAX 2u
+#define HUD_STRUCTURE_MAX 4u /* parts */
+#define HUD_STRUCTURE_TEXT_MAX 256u
 
 struct hud_colour {
     uint8_t r, g, b, a; /* straight */

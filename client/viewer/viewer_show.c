@@ -108,7 +108,7 @@ static void take_structure(struct viewer *viewer, const struct fl_frame *frame)
     struct fl_structure_part part;
     viewer->structure_count = 0;
     for (size_t at = 0; viewer->structure_count < HUD_STRUCTURE_MAX && fl_structure_next(frame, &at, &part);)
-        snprintf(viewer->structure[viewer->structure_count++], HUD_TEXT_MAX, "%.20s%s%.100s", part.name,
+        snprintf(viewer->structure[viewer->structure_count++], HUD_STRUCTURE_TEXT_MAX, "%.20s%s%.200s", part.name,
                  part.name[0] != '\0' ? ": " : "", part.text);
 }
 

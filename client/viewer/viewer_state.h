@@ -46,9 +46,9 @@ struct viewer {
     bool told_moving, has_looked;
 
     struct decoder *decoder;
-    struct pixmap live;                              /* the last frame */
-    struct fl_frame frame;                           /* what it told, without its arrays */
-    char structure[HUD_STRUCTURE_MAX][HUD_TEXT_MAX]; /* of its tracer */
+    struct pixmap live;                                        /* the last frame */
+    struct fl_frame frame;                                     /* what it told, without its arrays */
+    char structure[HUD_STRUCTURE_MAX][HUD_STRUCTURE_TEXT_MAX]; /* of its tracer */
     size_t structure_count;
     uint64_t frames;
     struct metrics metrics;

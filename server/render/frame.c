@@ -183,9 +183,11 @@ static bool land_all(struct frame_renderer *renderer, struct error *error)
     bool again = false;
     if (!land(renderer, &again, error))
         return false;
-    if (!again && renderer->work->ahead.count == 0)
-        renderer->phase = PHASE_RESOLVE;
-    return true;
+    if (again || renderer->work->ahead.count > 0)
+        return true;
+    renderer->phase = PHASE_RESOLVE;
+    /* It is there when the picture is, which is copied behind it. */
+    return trace_state_copy_counts(renderer->work->trace_state, error);
 }
 
 static bool begin_slice(struct frame_renderer *renderer, struct error *error)
@@ -380,6 +382,8 @@ static bool hand_out(struct frame_renderer *renderer, struct frame_result *resul
     const struct frame_request *request = &context->request;
     if (context->comparison && !comparison_take(context->comparison, &renderer->result.comparisons,
                                                 &renderer->result.comparison_count, error))
+        return false;
+    if (!trace_state_tell(renderer->work->trace_state, &renderer->result.structure, error))
         return false;
     context_collect(context);
     stage_times_add(&context->times, STAGE_FRAME, CLOCK_CPU, 0, context->times.origin_ns,

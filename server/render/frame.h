@@ -100,7 +100,7 @@ struct frame_result {
     uint32_t sorted_waves; /* whose rays were brought into the order of their directions */
     uint32_t device_waits; /* how often the host has waited for the device, bringing the scene there included */
     uint64_t uploaded_bytes, structure_bytes;
-    struct structure_rows structure; /* what the tracer says of it */
+    struct structure_rows structure; /* what the tracer says of it, and of its waves */
     struct stage_times times;
     struct wave_comparison *comparisons; /* owned; ascending by wave and kind; NULL: nothing was compared */
     uint32_t comparison_count;

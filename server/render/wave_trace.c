@@ -6,15 +6,13 @@
 
 #include <epoxy/gl.h>
 
-#define BOUNCES_APART 8u /* the last family of a kind is of all bounces that follow */
-
-_Static_assert(RAY_COUNT *BOUNCES_APART <= WAVE_FAMILIES, "a family for each kind and bounce");
+_Static_assert(RAY_COUNT <= WAVE_RAY_KINDS, "a family for each kind and bounce");
 
 /* Rays of one kind and bounce cost about the same from slice to slice. */
 static unsigned family_of(const struct render_context *context, enum ray_kind kind)
 {
-    const uint32_t bounce = context->wave_number < BOUNCES_APART ? context->wave_number : BOUNCES_APART - 1;
-    return (unsigned)kind * BOUNCES_APART + bounce;
+    const uint32_t bounce = context->wave_number < WAVE_BOUNCES ? context->wave_number : WAVE_BOUNCES - 1;
+    return (unsigned)kind * WAVE_BOUNCES + bounce;
 }
 
 static enum tracer_progress trace_step(struct render_context *context, enum ray_kind kind, const struct wave *wave,

@@ -28,6 +28,13 @@ struct structure_row *structure_metres(struct structure_rows *rows, const char *
     return row;
 }
 
+struct structure_row *structure_per_ray(struct structure_rows *rows, const char *name, float mean)
+{
+    struct structure_row *row = add(rows, name, UNIT_PER_RAY);
+    row->measure = mean;
+    return row;
+}
+
 void structure_built(struct structure_rows *rows, bool built)
 {
     add(rows, "built", UNIT_BUILT)->number = built;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The description of a tracer's structure: rows in the tracer's own words, on which no other room depends. They
- * are sent as in protocol/messages.def (structure_row). */
+/* The description of a tracer's structure and of its waves: rows in the tracer's own words, on which no other room
+ * depends. They are sent as in protocol/messages.def (structure_row). */
 #ifndef FARLIGHT_TRACE_STRUCTURE_H
 #define FARLIGHT_TRACE_STRUCTURE_H
 
@@ -9,7 +9,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#define STRUCTURE_ROWS_MAX 16u
+#define STRUCTURE_ROWS_MAX 32u
 
 struct structure_row {
     char name[48]; /* "static/resolution" */
@@ -31,6 +31,7 @@ struct structure_rows {
 /* These add a row and return it, for a warning. Rows beyond STRUCTURE_ROWS_MAX overwrite the last one. */
 struct structure_row *structure_number(struct structure_rows *rows, const char *name, uint64_t number);
 struct structure_row *structure_metres(struct structure_rows *rows, const char *name, float metres);
+struct structure_row *structure_per_ray(struct structure_rows *rows, const char *name, float mean);
 /* Whether the part was built by the last update: then the times of a build with its number are its own. */
 void structure_built(struct structure_rows *rows, bool built);
 

@@ -100,6 +100,7 @@ struct trace_state {
     /* by the wrappers: */
     struct wave wave; /* in progress */
     bool in_progress; /* the wave has begun and is not traced to its end */
+    bool has_traced;  /* a wave, to its end, since the reset */
     bool patient;     /* rays were too long to be queued: the tracer waits for each dispatch, until the reset */
     uint32_t traced_rays; /* rays before this one have their final answers */
     /* Of the range being traced: when the step ends, and the range, which trace_range() may end before its end, at
@@ -155,6 +156,10 @@ struct tracer_impl {
                                         struct error *error);
     void (*state_destroy)(struct trace_state *state);
     uint64_t (*state_device_bytes)(const struct trace_state *state);
+    /* What the waves since the reset were like, of which there is one at least: begins to copy what the device has
+     * counted; adds rows of what was copied, without waiting for more than the copy. Both NULL: nothing. */
+    bool (*state_copy_counts)(struct trace_state *state, struct error *error);
+    bool (*state_tell)(struct trace_state *state, struct structure_rows *rows, struct error *error);
     /* Begins state->wave: decides what holds for all of it. NULL: there is nothing to do. */
     bool (*trace_begin)(struct tracer *tracer, struct gpu_scene *scene, struct trace_state *state,
                         struct error *error);
@@ -229,7 +234,8 @@ void trace_state_destroy(struct trace_state *state); /* accepts NULL */
 bool trace_state_fits(const struct trace_state *state, const struct tracer_impl *impl,
                       const struct tracer_options *options);
 uint64_t trace_state_device_bytes(const struct trace_state *state);
-/* Drops the wave in progress, if any, and what was learnt of the cost of rays: for the beginning of a frame. */
+/* Drops the wave in progress, if any, what was learnt of the cost of rays, and what was counted: for the beginning
+ * of a frame. */
 void trace_state_reset(struct trace_state *state);
 /* Begins a wave, which must fit its buffers (checked; ERROR_INTERNAL). A wave in progress is dropped. */
 bool tracer_trace_begin(struct tracer *tracer, struct gpu_scene *scene, const struct wave *wave,
@@ -240,6 +246,11 @@ bool tracer_trace_begin(struct tracer *tracer, struct gpu_scene *scene, const st
  * wave is in progress. */
 enum tracer_progress tracer_trace_step(struct tracer *tracer, struct gpu_scene *scene, struct trace_state *state,
                                        uint64_t step_ns, struct error *error);
+
+/* Begins to copy what was counted of the waves since the reset. */
+bool trace_state_copy_counts(struct trace_state *state, struct error *error);
+/* Adds rows of what was copied. It does not wait where the host has waited for a later command. */
+bool trace_state_tell(struct trace_state *state, struct structure_rows *rows, struct error *error);
 
 /* Announces the programs of such a wave (gpu_program_announce), of which the buffers may be missing. */
 void tracer_announce(struct tracer *tracer, struct gpu_scene *scene, const struct wave *wave, bool coherent);

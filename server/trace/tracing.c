@@ -53,9 +53,19 @@ uint64_t trace_state_device_bytes(const struct trace_state *state)
 
 void trace_state_reset(struct trace_state *state)
 {
-    state->in_progress = state->patient = false;
+    state->in_progress = state->patient = state->has_traced = false;
     for (unsigned i = 0; i < WAVE_FAMILIES; i++)
         state->step_rays[i] = 0;
+}
+
+bool trace_state_copy_counts(struct trace_state *state, struct error *error)
+{
+    return !state->impl->state_copy_counts || !state->has_traced || state->impl->state_copy_counts(state, error);
+}
+
+bool trace_state_tell(struct trace_state *state, struct structure_rows *rows, struct error *error)
+{
+    return !state->impl->state_tell || !state->has_traced || state->impl->state_tell(state, rows, error);
 }
 
 /* ---- checks ---- */
@@ -196,6 +206,7 @@ static enum tracer_progress do_step(struct tracer *tracer, struct gpu_scene *sce
         progress = TRACER_FAILED;
     gpu_pop_group(tracer->device);
     state->in_progress = progress == TRACER_MORE;
+    state->has_traced |= progress == TRACER_DONE;
     if (progress == TRACER_FAILED)
         return TRACER_FAILED;
     if (rays.first < rays.end && !tracer->impl->trace_step && step_ns > 0 && step_ns != STEP_WITHOUT_END)

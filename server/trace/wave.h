@@ -17,6 +17,10 @@ enum wave_kind {
 /* Waves of one family have rays of one kind and bounce, which cost about the same: what a tracer learnt from one
  * of them (how many rays fit a step, how large a buffer has to be) is a good guess for the next. */
 #define WAVE_FAMILIES 32u
+/* Families of one kind of rays (enum ray_kind) follow one another, one for each bounce; the last one is of all
+ * bounces that follow. */
+#define WAVE_BOUNCES 8u
+#define WAVE_RAY_KINDS (WAVE_FAMILIES / WAVE_BOUNCES)
 
 /* Describes a wave; owns nothing. The buffers are the caller's and stay as they are until the wave is traced. */
 struct wave {

@@ -77,6 +77,17 @@ struct rayspace_control {
 };
 SHARED_SIZE(rayspace_control, 144)
 
+/* Of the waves of one kind in a frame, with those that were done again. Sums of tests have 64 bits. */
+struct rayspace_counts {
+    uint waves, sorted, turned; /* waves with rays; those of which the rays were sorted; turned round */
+    uint passes, halvings;
+    uint pairs_max; /* of any wave */
+    uint rays_low, rays_high;
+    uint cone_tests_low, cone_tests_high;
+    uint triangle_tests_low, triangle_tests_high;
+};
+SHARED_SIZE(rayspace_counts, 48)
+
 /* After which pass control.comp runs: no other one is taken yet. Of a batch or of the wave, what then waits is
  * left over, and stops the slice. */
 #define RAYSPACE_END_NOTHING 0u
@@ -91,6 +102,7 @@ SHARED_SIZE(rayspace_control, 144)
 #define BIND_RAYSPACE_NODES BIND_PASS_4   /* of the pass that makes them */
 #define BIND_RAYSPACE_PUT_OFF BIND_PASS_4 /* of passes */
 #define BIND_RAYSPACE_STOPPED BIND_PASS_4 /* of control.comp */
+#define BIND_RAYSPACE_COUNTS BIND_PASS_4  /* of count.comp */
 #define BIND_RAYSPACE_ORDER BIND_PASS_4   /* of the sort */
 #define BIND_RAYSPACE_BINS BIND_PASS_2
 #define BIND_RAYSPACE_ITEMS BIND_PASS_4 /* of the pass that makes them */

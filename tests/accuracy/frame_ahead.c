@@ -5,6 +5,7 @@
 #include "render/frame_state.h"
 #include "render/layers.h"
 #include "tests/accuracy/render_fixture.h"
+#include "tests/fixtures/structure.h"
 #include "tests/harness/test.h"
 
 #define PANES 24 /* more than the waves that are queued at first */
@@ -79,6 +80,42 @@ TEST(every_integrator_and_tracer_gives_the_same_picture_and_waits_once)
             snprintf(what, sizeof(what), "integrator %u, tracer %u", forms[i].integrator, tracers[k]);
             assert_ahead_is_as_waiting(fixture, what);
         }
+}
+
+/* Only the device knows how many rays there are. Slices have other sizes where they are queued: a hierarchy of its
+ * own each, so tests differ a little. */
+TEST(what_a_tracer_counts_of_the_waves_comes_with_the_picture)
+{
+    struct fixture *fixture = *state;
+    fixture_mixture(fixture);
+    fixture->request.tracer = TRACER_RAYSPACE;
+    fixture->request.integrator = INTEGRATOR_WHITTED;
+    fixture->request.depth = 4;
+    fixture->request.primary = PRIMARY_TRACE;
+    static const char *const kinds[RAY_COUNT] = {"primary", "secondary", "shadow"};
+    for (uint32_t mode = RAYSPACE_MODE_JOINT; mode <= RAYSPACE_MODE_FLAT; mode++) {
+        fixture->request.tracer_options.rayspace.mode = mode;
+        struct frame_result waiting = render(fixture, false), ahead = render(fixture, true);
+        assert_in_range(ahead.device_waits, 0, 1);
+        assert_int_equal(ahead.structure.count, waiting.structure.count);
+        for (unsigned kind = 0; kind < RAY_COUNT; kind++) {
+            char name[32];
+            snprintf(name, sizeof(name), "%s/cone_tests", kinds[kind]);
+            const struct structure_row a = structure_row(&waiting.structure, name);
+            const struct structure_row b = structure_row(&ahead.structure, name);
+            if (!(a.measure > 1) || fabsf(a.measure - b.measure) > 0.1f * a.measure)
+                fail_msg("mode %u, %s: %g a ray, and %g where waves are queued", mode, name, (double)a.measure,
+                         (double)b.measure);
+            assert_int_equal(b.part, 1 + kind);
+        }
+        frame_result_finish(&waiting);
+        frame_result_finish(&ahead);
+    }
+    fixture->request.primary = PRIMARY_RASTER;
+    struct frame_result rasterised = render(fixture, true);
+    assert_int_equal(structure_row(&rasterised.structure, "primary/waves").number, 0);
+    assert_in_range(structure_row(&rasterised.structure, "shadow/waves").number, 1, 1000);
+    frame_result_finish(&rasterised);
 }
 
 /* Other sizes of slices, and lists that are made by other scans. */

@@ -110,6 +110,8 @@ static void rayspace_state_destroy(struct trace_state *state)
     rayspace_reduction_finish(state->device, &own->reduction);
     gpu_buffer_finish(state->device, &own->order);
     gpu_buffer_finish(state->device, &own->bins);
+    gpu_buffer_finish(state->device, &own->counts);
+    gpu_readback_finish(state->device, &own->copied_counts);
     gpu_buffer_finish(state->device, &own->items);
     free(own);
 }
@@ -119,7 +121,8 @@ static uint64_t rayspace_state_bytes(const struct trace_state *state)
     const struct rayspace_state *own = (const struct rayspace_state *)state;
     uint64_t bytes = own->nodes.capacity_bytes + own->answers.capacity_bytes + own->leaves.capacity_bytes +
                      own->control.capacity_bytes + own->order.capacity_bytes + own->bins.capacity_bytes +
-                     own->items.capacity_bytes + rayspace_reduction_bytes(&own->reduction);
+                     own->counts.capacity_bytes + own->copied_counts.capacity_bytes + own->items.capacity_bytes +
+                     rayspace_reduction_bytes(&own->reduction);
     for (unsigned i = 0; i < RAYSPACE_STACKS; i++)
         bytes += own->stacks[i].capacity_bytes;
     return bytes;
@@ -140,7 +143,8 @@ static enum tracer_progress rayspace_trace_step(struct tracer *tracer, struct gp
     const enum tracer_progress progress = rayspace_descent_step(rayspace, scene, own, step_end_ns, error);
     if (progress != TRACER_DONE)
         return progress;
-    return tracer_progress_of(rayspace_descent_finish(rayspace, scene, own, error));
+    return tracer_progress_of(rayspace_descent_finish(rayspace, scene, own, error) &&
+                              rayspace_counts_add(own, scene, error));
 }
 
 const struct tracer_impl tracer_rayspace_impl = {
@@ -155,6 +159,8 @@ const struct tracer_impl tracer_rayspace_impl = {
     .state_create = rayspace_state_create,
     .state_destroy = rayspace_state_destroy,
     .state_device_bytes = rayspace_state_bytes,
+    .state_copy_counts = rayspace_counts_copy,
+    .state_tell = rayspace_counts_tell,
     .trace_begin = rayspace_trace_begin,
     .trace_step = rayspace_trace_step,
 };

@@ -5,6 +5,7 @@
 #define FARLIGHT_TRACE_RAYSPACE_TRACER_H
 
 #include "gpu/program.h"
+#include "gpu/readback.h"
 #include "rayspace/layout.h"
 #include "trace/rayspace/reduce.h"
 #include "trace/tracer.h"
@@ -34,6 +35,8 @@ struct rayspace_state {
     struct rayspace_levels levels;
     struct gpu_buffer nodes, answers, stacks[RAYSPACE_STACKS], leaves, control;
     struct gpu_buffer order, bins;      /* of the sort */
+    struct gpu_buffer counts;           /* of the frame, by kinds of rays */
+    struct gpu_readback copied_counts;  /* on their way to the host */
     struct gpu_buffer items;            /* of the flat descent: of the batch in hand */
     uint32_t capacity, leaves_capacity; /* pairs */
     struct rayspace_reduction reduction;
@@ -64,6 +67,11 @@ struct rayspace_levels rayspace_levels_over(uint32_t ray_count);
 bool rayspace_nodes_build(struct rayspace_state *state, struct gpu_scene *scene, bool ends, struct error *error);
 /* Decides whether the rays are sorted and turned round, and sorts them. The control is there. */
 bool rayspace_order_rays(struct rayspace_state *state, struct gpu_scene *scene, struct error *error);
+
+/* Adds what the wave that was traced has cost to the sums of the frame; the other two are as tracer_impl says. */
+bool rayspace_counts_add(struct rayspace_state *state, struct gpu_scene *scene, struct error *error);
+bool rayspace_counts_copy(struct trace_state *state, struct error *error);
+bool rayspace_counts_tell(struct trace_state *state, struct structure_rows *rows, struct error *error);
 
 /* Whether all of a wave is queued without the host seeing how far it has come. */
 bool rayspace_is_ahead(const struct rayspace_state *state);

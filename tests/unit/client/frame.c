@@ -432,6 +432,28 @@ TEST(comparisons_of_waves_arrive)
     fl_frame_destroy(frame);
 }
 
+TEST(a_part_of_a_structure_is_one_line_with_its_units)
+{
+    static struct record_structure_row rows[] = {
+        {.unit = PROTOCOL_UNIT_NUMBER, .number = 1856, .name = "nodes"},
+        {.part = 3, .unit = PROTOCOL_UNIT_PER_RAY, .measure = 69.44f, .name = "shadow/cone_tests"},
+        {.part = 3, .unit = PROTOCOL_UNIT_PER_RAY, .measure = 12345.6f, .name = "shadow/triangle_tests"},
+        {.part = 3, .unit = PROTOCOL_UNIT_NUMBER, .number = 12, .name = "shadow/turned"},
+    };
+    const struct fl_frame frame = {.structure = rows, .structure_count = sizeof(rows) / sizeof(rows[0])};
+    struct fl_structure_part part;
+    size_t at = 0;
+    assert_true(fl_structure_next(&frame, &at, &part));
+    assert_string_equal(part.name, "");
+    assert_string_equal(part.text, "nodes 1856");
+    assert_true(fl_structure_next(&frame, &at, &part));
+    assert_int_equal(part.number, 3);
+    assert_string_equal(part.name, "shadow");
+    assert_string_equal(part.text, "cone tests 69.4 a ray, triangle tests 12346 a ray, turned 12");
+    assert_false(part.is_kept);
+    assert_false(fl_structure_next(&frame, &at, &part));
+}
+
 TEST(what_a_tracer_says_of_its_structure_outlives_the_message)
 {
     struct fl_assembly assembly = some_assembly(PROTOCOL_ENCODING_RAW);

@@ -227,6 +227,12 @@ TEST(the_overlay_shows_its_figures_within_the_window)
     hud_layout(&hud, &shown, measure, NULL);
     check_within(&shown);
     assert_true(tells("structure") && tells("nodes 10806"));
+    shown.structure[1] =
+        "shadow: cone tests 69.4 a ray, triangle tests 28.1 a ray, waves 12, sorted 0, turned 12, "
+        "pairs max 16777216, passes 1234, halvings 0";
+    hud_layout(&hud, &shown, measure, NULL);
+    check_within(&shown);
+    assert_true(tells("shadow: cone tests 69.4 a ray") && tells("halvings 0"));
     settings.help = settings.error_map = true;
     shown.heat = HUD_HEAT_SHOWN;
     shown.heat_figures.mean = 0.125;

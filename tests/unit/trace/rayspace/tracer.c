@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /* What only the tracer `rayspace` promises: its answers are brute force's to the bit, in batches of any size, also
- * where these are halved, and in a scene of which everything moves. */
+ * where these are halved, and in a scene of which everything moves. And what it says of its waves. */
 #include "tests/unit/trace/tracer_fixture.h"
 
 #include "shared/wave.h"
+#include "tests/fixtures/structure.h"
 #include "trace/rayspace/tracer.h"
 
 #define BVH_NUMBER 0u
@@ -266,6 +267,93 @@ TEST(a_pass_that_overflows_is_halved_and_no_answer_is_lost)
     assert_in_range(control.pairs_max, STACK_PAIRS / 2, 3 * STACK_PAIRS);
     pair_finish(&pair);
     free(rays);
+}
+
+/* ---- what is said of waves ---- */
+
+static bool trace_shadows(void *user, const struct wave *wave, struct error *error)
+{
+    struct wave own = *wave;
+    own.family = RAY_SHADOW * WAVE_BOUNCES + 3; /* of some bounce */
+    return trace_by_tracer(user, &own, error);
+}
+
+static struct structure_rows rows_of(struct fixture *fixture)
+{
+    struct structure_rows rows = {0};
+    struct error error = {0};
+    expect_ok(trace_state_copy_counts(fixture->tracer->state, &error), &error);
+    expect_ok(trace_state_tell(fixture->tracer->state, &rows, &error), &error);
+    return rows;
+}
+
+/* Rows are floats. */
+static void expect_mean(const struct structure_rows *rows, const char *name, uint32_t sum, uint32_t count)
+{
+    const struct structure_row row = structure_row(rows, name);
+    const double wanted = (double)sum / count;
+    assert_int_equal(row.unit, UNIT_PER_RAY);
+    if (wanted <= 0 || fabs((double)row.measure - wanted) > 1e-6 * wanted)
+        fail_msg("%s: %.9g for %.9g", name, (double)row.measure, wanted);
+}
+
+TEST(waves_of_each_kind_are_told_apart_until_the_reset)
+{
+    struct ray rays[512];
+    struct hit hits[512];
+    uint32_t visibility[512];
+    random_rays(rays, 512, 17);
+    for (uint32_t mode = RAYSPACE_MODE_JOINT; mode <= RAYSPACE_MODE_FLAT; mode++)
+        for (uint32_t turn = RAYSPACE_CHANCE_ON; turn <= RAYSPACE_CHANCE_OFF; turn++) {
+            const struct tracer_options options = {
+                .rayspace = {.mode = mode, .turn = turn, .sort = RAYSPACE_CHANCE_OFF}};
+            struct fixture fixture;
+            fixture_init_by(&fixture, RAYSPACE_NUMBER, test_scene_soup(), &options);
+            trace_rays(trace_by_tracer, &fixture, WAVE_CLOSEST, rays, 512, hits, NULL);
+            const struct rayspace_control closest = control_of(&fixture);
+            trace_rays(trace_shadows, &fixture, WAVE_ANY, rays, 512, NULL, visibility);
+            const struct rayspace_control first = control_of(&fixture);
+            trace_rays(trace_shadows, &fixture, WAVE_ANY, rays, 256, NULL, visibility);
+            const struct rayspace_control second = control_of(&fixture);
+            const struct structure_rows rows = rows_of(&fixture);
+            expect_mean(&rows, "primary/cone_tests", closest.cone_tests, 512);
+            expect_mean(&rows, "primary/triangle_tests", closest.triangle_tests, 512);
+            expect_mean(&rows, "shadow/cone_tests", first.cone_tests + second.cone_tests, 512 + 256);
+            expect_mean(&rows, "shadow/triangle_tests", first.triangle_tests + second.triangle_tests, 512 + 256);
+            assert_int_equal(structure_row(&rows, "primary/waves").number, 1);
+            assert_int_equal(structure_row(&rows, "shadow/waves").number, 2);
+            assert_int_equal(structure_row(&rows, "shadow/passes").number, first.passes + second.passes);
+            assert_int_equal(structure_row(&rows, "shadow/pairs_max").number, first.pairs_max);
+            assert_int_equal(structure_row(&rows, "shadow/turned").number, turn == RAYSPACE_CHANCE_ON ? 2 : 0);
+            assert_int_equal(structure_row(&rows, "primary/turned").number, 0); /* they have no end in common */
+            assert_int_equal(structure_row(&rows, "shadow/sorted").number, 0);
+            assert_int_equal(rows.count, 2 * 8);
+            trace_state_reset(fixture.tracer->state);
+            assert_int_equal(rows_of(&fixture).count, 0);
+            trace_rays(trace_shadows, &fixture, WAVE_ANY, rays, 256, NULL, visibility);
+            const struct structure_rows after = rows_of(&fixture);
+            expect_mean(&after, "shadow/cone_tests", second.cone_tests, 256);
+            assert_int_equal(after.count, 8);
+            fixture_finish(&fixture);
+        }
+}
+
+TEST(a_wave_that_was_sorted_or_halved_says_so)
+{
+    const struct tracer_options options = {.rayspace.sort = RAYSPACE_CHANCE_ON, .bench.rayspace_pairs = 256};
+    struct ray rays[512];
+    struct hit hits[512];
+    struct fixture fixture;
+    random_rays(rays, 512, 19);
+    fixture_init_by(&fixture, RAYSPACE_NUMBER, test_scene_soup(), &options);
+    trace_rays(trace_by_tracer, &fixture, WAVE_CLOSEST, rays, 512, hits, NULL);
+    const struct structure_rows rows = rows_of(&fixture);
+    assert_int_equal(structure_row(&rows, "primary/sorted").number, 1);
+    assert_in_range(structure_row(&rows, "primary/halvings").number, 1,
+                    structure_row(&rows, "primary/passes").number);
+    /* Two stacks and the leaves. */
+    assert_in_range(structure_row(&rows, "primary/pairs_max").number, 128, 3 * 256);
+    fixture_finish(&fixture);
 }
 
 /* ---- everything moves ---- */
