@@ -151,6 +151,21 @@ static uint32_t pass_max(const struct rayspace_state *state, const struct gpu_de
     return leaves_slots(state) ? rayspace_reduction_pairs(device, pairs) : pairs;
 }
 
+/* Rays end at the discs that they hit. */
+static bool test_discs(struct gpu_scene *scene, struct rayspace_state *state, struct error *error)
+{
+    struct gpu_define defines[TRACE_WAVE_DEFINES + 1] = {0};
+    trace_wave_defines(scene, &state->base.wave, defines);
+    const struct gpu_program_source source = {.compute = "rayspace/discs.comp", .defines = defines};
+    const struct gpu_program *program = gpu_program_get(scene->device, &source, error);
+    if (!program)
+        return false;
+    rayspace_bind_wave(scene, state, program);
+    gpu_uniform_uint(program, "disc_count", scene->disc_count);
+    gpu_dispatch(scene->device, program, state->base.wave.ray_count);
+    return true;
+}
+
 bool rayspace_descent_begin(struct rayspace *rayspace, struct gpu_scene *scene, struct rayspace_state *state,
                             struct error *error)
 {
@@ -174,6 +189,8 @@ bool rayspace_descent_begin(struct rayspace *rayspace, struct gpu_scene *scene, 
                     wave->kind == WAVE_ANY ? no_light_lost : no_hit);
     const struct rayspace_control control = {.limit = pass_max(state, device)};
     gpu_buffer_write(device, &state->control, 0, &control, sizeof(control));
+    if (scene->disc_count > 0 && !test_discs(scene, state, error))
+        return false;
     state->round = state->next_rank = state->seeds = 0;
     state->turn = false;
     if (!is_flat(state) && rayspace->tree.top.element_count > 0) {

@@ -162,6 +162,89 @@ TEST(waves_of_few_rays_have_all_their_answers)
     pair_finish(&pair);
 }
 
+/* ---- discs ---- */
+
+/* A soup, and above it a disc that hides it from rays near its axis, and of glass a second one above that. */
+static struct scene *scene_below_disc(float radius)
+{
+    struct test_edits edits = {.scene = test_scene_create()};
+    test_material(&edits, 1, 0.9f, 0.95f, 0.9f);
+    struct scene_material *pane = test_material(&edits, 2, 0.4f, 0.5f, 0.6f);
+    pane->alpha_mode = ALPHA_BLEND;
+    pane->base_colour[3] = 0.4f;
+    test_soup_mesh(&edits, 10, 600, 0.3f, 29);
+    test_node(&edits, 1, 0, NODE_MESH, 10, NULL);
+    for (uint32_t i = 0; i < 2; i++) {
+        struct scene_disc *disc = &test_add(&edits, OBJECT_DISC)->set.disc;
+        disc->base.id = i + 1;
+        disc->material = i + 1;
+        disc->centre_world[2] = 1.5f + 0.5f * (float)i;
+        disc->normal_world[2] = 1.0f;
+        disc->radius = radius;
+    }
+    test_commit(&edits);
+    return edits.scene;
+}
+
+static struct scene *scene_below_small_disc(void)
+{
+    return scene_below_disc(0.01f);
+}
+
+static struct scene *scene_below_disc_of_a_half(void)
+{
+    return scene_below_disc(0.8f);
+}
+
+static struct scene *scene_below_large_disc(void)
+{
+    return scene_below_disc(100);
+}
+
+TEST(rays_do_not_descend_beyond_a_disc)
+{
+    static const struct {
+        struct scene *(*create)(void);
+        const char *name;
+    } scenes[] = {{scene_below_small_disc, "a small disc"},
+                  {scene_below_disc_of_a_half, "a disc above a half"},
+                  {scene_below_large_disc, "a disc above all"}};
+    static const enum wave_kind kinds[] = {WAVE_CLOSEST, WAVE_ANY};
+    struct ray *rays = malloc(RAY_COUNT * sizeof(*rays));
+    uint64_t seed = 31;
+    for (uint32_t i = 0; i < RAY_COUNT; i++)
+        rays[i] = (struct ray){{test_uniform(&seed, -1, 1), test_uniform(&seed, -1, 1), 3, 0},
+                               {test_uniform(&seed, -0.1f, 0.1f), test_uniform(&seed, -0.1f, 0.1f), -1, 1e30f}};
+    for (unsigned kind = 0; kind < 2; kind++) {
+        uint32_t cone_tests[3], triangle_tests[3];
+        for (unsigned i = 0; i < 3; i++) {
+            struct hit *hits = calloc(RAY_COUNT, sizeof(*hits)), *expected = calloc(RAY_COUNT, sizeof(*hits));
+            uint32_t *seen = calloc(RAY_COUNT, sizeof(*seen)), *expected_seen = calloc(RAY_COUNT, sizeof(*seen));
+            struct pair pair;
+            pair_init(&pair, scenes[i].create, 0);
+            trace_rays(trace_by_tracer, &pair.naive, kinds[kind], rays, RAY_COUNT, expected, expected_seen);
+            trace_rays(trace_by_tracer, &pair.rayspace, kinds[kind], rays, RAY_COUNT, hits, seen);
+            assert_memory_equal(hits, expected, RAY_COUNT * sizeof(*hits));
+            assert_memory_equal(seen, expected_seen, RAY_COUNT * sizeof(*seen));
+            cone_tests[i] = control_of(&pair.rayspace).cone_tests;
+            triangle_tests[i] = control_of(&pair.rayspace).triangle_tests;
+            print_message("%s: %u cone tests, %u triangle tests\n", scenes[i].name, cone_tests[i],
+                          triangle_tests[i]);
+            pair_finish(&pair);
+            free(hits);
+            free(expected);
+            free(seen);
+            free(expected_seen);
+        }
+        /* A half of the rays are above the disc, whose neighbours often are not: nodes of both go on. */
+        assert_true(cone_tests[1] < cone_tests[0]);
+        assert_true(triangle_tests[1] < triangle_tests[0] * 3 / 4);
+        assert_true(cone_tests[2] < cone_tests[0] / 100);
+        assert_int_equal(triangle_tests[2], 0);
+    }
+    free(rays);
+}
+
 /* ---- queued whole ---- */
 
 /* With a word that a wave sets where it was not traced to its end: then no pass is waited for. */
