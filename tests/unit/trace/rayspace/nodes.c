@@ -565,6 +565,7 @@ static void build_nodes(struct run *run, const struct fuzz *fuzz, enum way way)
     const struct rayspace_control control = {0};
     gpu_buffer_write(device, &state->control, 0, &control, sizeof(control));
     expect_ok(gpu_buffer_upload(device, &run->rays, fuzz->rays, sizeof(fuzz->rays), &error) &&
+                  rayspace_order_reserve(state, device, &error) && rayspace_nodes_reserve(state, device, &error) &&
                   rayspace_order_rays(state, &run->fixture.gpu, &error) &&
                   rayspace_nodes_build(state, &run->fixture.gpu, false, &error),
               &error);

@@ -351,6 +351,30 @@ TEST(a_pass_that_overflows_is_halved_and_no_answer_is_lost)
     free(rays);
 }
 
+/* ---- little memory ---- */
+
+TEST(stacks_are_smaller_where_memory_is_short)
+{
+    static const enum rayspace_mode modes[] = {RAYSPACE_MODE_JOINT, RAYSPACE_MODE_FLAT};
+    const uint64_t limit = device->memory_limit_bytes;
+    struct ray *rays = malloc(RAY_COUNT * sizeof(*rays));
+    random_rays(rays, RAY_COUNT, 5);
+    for (size_t i = 0; i < 2; i++) {
+        struct pair pair;
+        pair_init_by(&pair, test_scene_soup, &(struct tracer_options){.rayspace.mode = modes[i]});
+        struct answers expected = ask(&pair.naive, rays, RAY_COUNT);
+        /* Three stacks and the leaves take 4 MiB; rays, hits and nodes less than 1 MiB. */
+        device->memory_limit_bytes = device->memory_used_bytes + ((uint64_t)2 << 20);
+        const struct answers found = ask(&pair.rayspace, rays, RAY_COUNT);
+        const struct rayspace_state *own = (const struct rayspace_state *)pair.rayspace.tracer->state;
+        assert_in_range(own->capacity, 1, STACK_PAIRS / 2);
+        expect_alike(found, expected, RAY_COUNT, 0, "little memory");
+        device->memory_limit_bytes = limit;
+        pair_finish(&pair);
+    }
+    free(rays);
+}
+
 /* ---- everything moves ---- */
 
 #define FRAMES 3u
