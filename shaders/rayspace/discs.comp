@@ -2,12 +2,12 @@
 // Before the descent: rays end at the nearest disc, or have no light left behind one, so that nodes do not go on beyond
 // it. The answer itself is made at the end (trace/wave.comp), where discs come before primitives at one distance.
 //
-// Defines: those of trace/discs.glsl and rayspace/trace_ray.glsl.
+// Defines: those of common/discs.glsl and rayspace/trace_ray.glsl.
 #include "common/dispatch.glsl"
 #include "common/range.glsl"
 #include "rayspace/answer.glsl"
 #include "rayspace/trace_ray.glsl"
-#include "trace/discs.glsl"
+#include "common/discs.glsl"
 
 void main()
 {

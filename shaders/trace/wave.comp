@@ -40,7 +40,7 @@
 #include "common/dispatch.glsl"
 #include "common/range.glsl"
 #include "common/candidate.glsl"
-#include "trace/discs.glsl"
+#include "common/discs.glsl"
 
 #ifndef PACKET_RAYS
 #define PACKET_RAYS 1
