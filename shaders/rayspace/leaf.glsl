@@ -6,30 +6,13 @@
 #include "rayspace/answer.glsl"
 #include "rayspace/item.glsl"
 #include "rayspace/rank.glsl"
-#include "rayspace/ray.glsl"
+#include "rayspace/trace_ray.glsl"
 #include "tree/layout.h"
 
 #ifndef RAYSPACE_FLAT
 layout(binding = UNIT_TRACER_1) uniform usamplerBuffer tree_transforms;
 layout(binding = UNIT_TRACER_2) uniform usamplerBuffer tree_primitives;
 #endif
-#ifdef HAS_MOTION
-layout(binding = UNIT_RAY_TIMES) uniform samplerBuffer ray_times;
-#endif
-
-trace_ray trace_ray_of(uint ray)
-{
-    vec4 origin_t_min = texelFetch(rays, int(2u * ray)), direction_t_max = texelFetch(rays, int(2u * ray + 1u));
-    trace_ray r;
-    r.origin = origin_t_min.xyz;
-    r.direction = direction_t_max.xyz;
-    r.t_min = origin_t_min.w;
-    r.t_max = direction_t_max.w;
-#ifdef HAS_MOTION
-    r.time = texelFetch(ray_times, int(ray)).x;
-#endif
-    return r;
-}
 
 struct leaf_range {
     uint instance_index, first_primitive;

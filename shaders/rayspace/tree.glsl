@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Elements of the trees over the scene (tree/layout.h), bounded in world space. All are read from the copy of octant 0.
+// Elements of the trees over the scene (tree/layout.h), bounded in world space. They are in one order.
 //
 // Defines: RAYSPACE_PACKED boxes are on a grid, else in floats.
 #include "rayspace/meet.glsl"
@@ -48,7 +48,7 @@ tree_place tree_of(uint instance_index)
     int texel = int(instance_index) * BVH_TRANSFORM_TEXELS;
     instance i = instance_at(instance_index);
     uvec4 place = texelFetch(tree_transforms, texel + 5);
-    tree.first = place.x * BVH_OCTANTS;
+    tree.first = place.x;
     tree.count = place.y;
     tree.world_from_object = i.world_from_object;
     tree.motion = i.motion;

@@ -40,6 +40,7 @@
 #include "common/dispatch.glsl"
 #include "common/range.glsl"
 #include "common/candidate.glsl"
+#include "common/discs.glsl"
 
 #ifndef PACKET_RAYS
 #define PACKET_RAYS 1
@@ -72,13 +73,6 @@ layout(std430, binding = BIND_OPTICAL_DEPTHS) buffer depth_block { vec4 optical_
 #endif
 #endif
 
-uniform uint disc_count;
-#ifdef HAS_DISCS
-#define DISC_COUNT disc_count
-#else
-#define DISC_COUNT 0u
-#endif
-
 bool is_alive(trace_ray r)
 {
     return r.t_max > r.t_min;
@@ -108,19 +102,6 @@ trace_ray load_ray(uint ray_index)
 
 #ifdef ANY_HIT
 
-bool discs_any(trace_ray r, inout vec3 optical_depth)
-{
-    for (uint i = 0u; i < DISC_COUNT; i++) {
-        candidate found = candidate(0.0, i, HIT_NO_PRIMITIVE, vec2(0.0));
-        disc d = discs[i];
-        if (intersect_disc(r.origin, r.direction, d.centre_radius.xyz, d.normal.xyz, d.centre_radius.w,
-                           found.distance) &&
-            offer_any(r, found, optical_depth))
-            return true;
-    }
-    return false;
-}
-
 vec3 found_before(uint ray_index, trace_ray r)
 {
 #ifdef RAYS_GO_ON
@@ -143,17 +124,6 @@ void store_visibility(uint ray_index, vec3 optical_depth)
 }
 
 #else
-
-void discs_closest(trace_ray r, inout candidate best)
-{
-    for (uint i = 0u; i < DISC_COUNT; i++) {
-        candidate found = candidate(0.0, i, HIT_NO_PRIMITIVE, vec2(0.0));
-        disc d = discs[i];
-        if (intersect_disc(r.origin, r.direction, d.centre_radius.xyz, d.normal.xyz, d.centre_radius.w,
-                           found.distance))
-            offer_closest(r, found, best);
-    }
-}
 
 candidate found_before(uint ray_index, trace_ray r)
 {

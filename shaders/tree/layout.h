@@ -6,6 +6,7 @@
  * the depth-first order that meets nearer children first. So the element that follows a hit is the next one, and
  * an element needs one link alone: where to go on after a miss (a leaf goes on at the next either way). Octant o:
  * bit 0: x is negative, 1: y, 2: z. A tree that begins at element f has octant o's copy at BVH_OCTANTS f + o n.
+ * Trees that no ray traverses by its direction (trace/rayspace) have octant 0's copy alone, at f.
  *
  * Two forms of element. Packed: boxes on a grid of 65536 cells an axis that spans the tree, one texel. Whole:
  * boxes or spheres in floats, two texels; for spheres, and for a scene with a tree that has more detail than its

@@ -2,7 +2,7 @@
 // From boxes (refit_bounds.comp) to elements as the traversal reads them, in all octants' copies. The C twin is
 // bvh_write_element() in trace/tree/build_element.c.
 //
-// Defines: BVH_PACKED, BVH_SPHERES as in traverse.glsl, one of them or none.
+// Defines: BVH_PACKED, BVH_SPHERES as in traverse.glsl, one of them or none; BVH_ONE_ORDER there is octant 0's copy alone.
 #include "tree/layout.h"
 #include "common/dispatch.glsl"
 #include "shared/bindings.h"
@@ -15,6 +15,11 @@ uniform uint first_box;
 uniform uint first_texel; // of the tree's elements
 uniform vec3 grid_lower, cells_per_unit;
 
+#ifdef BVH_ONE_ORDER
+const uint COPIES = 1u;
+#else
+const uint COPIES = BVH_OCTANTS;
+#endif
 const float PAD_RELATIVE = 4.76837158203125e-7; // 2^-21, the builder's BVH_PAD_RELATIVE
 const float PAD_MIN = 1.17549435e-38;
 // The builder's GRID_PAD, which is computed in doubles, and the rounding error of floats on coordinates of up to 65535
@@ -61,7 +66,7 @@ void main()
     uvec4 second_half = uvec4(floatBitsToUint(upper), 0u);
 #endif
 #endif
-    for (uint octant = 0u; octant < BVH_OCTANTS; octant++) {
+    for (uint octant = 0u; octant < COPIES; octant++) {
         uint place = octant < 4u ? places_0123[octant] : places_4567[octant & 3u];
         uint link = record.z != 0u ? record.z : place + record.y;
         uint element = octant * record_count + place;

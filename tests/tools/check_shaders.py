@@ -40,7 +40,7 @@ TRACERS = [{"TRAVERSE": '"naive/traverse.glsl"', "TRACER_NAIVE": "1", "PACKET_RA
     for traversal, tree in (("traverse", {"SVO_TOP_SHIFT": "8"}), ("tile_traverse", {"SVO_LEVELS": "10"}))]
 CHOICES = {
     "trace/wave.comp": [TRACERS, [{}, {"ANY_HIT": "1"}]],
-    "tree/refit_write.comp": [[{"BVH_PACKED": "1"}, {}, {"BVH_SPHERES": "1"}]],
+    "tree/refit_write.comp": [[{"BVH_PACKED": "1"}, {}, {"BVH_SPHERES": "1"}], [{}, {"BVH_ONE_ORDER": "1"}]],
     "reduce/horn.comp": [[{"HORN_" + stage: "1"} for stage in "COUNT ADD GATHER".split()]],
     "rayspace/leaves.comp": [[{"LEAVES_" + stage: "1"} for stage in "TEST RANK SETTLE".split()]],
     "abuffer/voxels.comp": [[{"VOXELS_" + stage: "1"} for stage in "JUDGE REACH_X REACH_Y REACH_Z".split()]],

@@ -17,6 +17,7 @@
 #define PAIRS_A_RAY 8u
 #define PAIRS_MIN (1u << 16)
 #define PAIRS_MAX (1u << 22)
+#define PAIRS_LEAST (1u << 12) /* where memory is short */
 /* See shaders/rayspace/control.comp: a pass of one pair leaves four more behind, at each of some hundred levels.
  */
 #define PAIRS_RESERVED (1u << 12)
@@ -106,35 +107,19 @@ static uint32_t at_most(uint32_t number, uint32_t maximum)
     return number < maximum ? number : maximum;
 }
 
-/* Pairs that each stack has room for. */
+/* Pairs that each stack has room for, if memory allows. */
 static uint32_t capacity_of(const struct rayspace_state *state)
 {
     const uint32_t rays = state->base.wave.ray_count, asked = state->base.options.bench.rayspace_pairs;
     const uint32_t wanted =
         rays < PAIRS_MIN / PAIRS_A_RAY ? PAIRS_MIN : at_most(rays, PAIRS_MAX / PAIRS_A_RAY) * PAIRS_A_RAY;
-    return asked ? asked : wanted;
+    return at_most(asked ? asked : wanted, state->capacity_fits ? state->capacity_fits : UINT32_MAX);
 }
 
 /* Of them, for passes of one pair. */
 static uint32_t reserved_of(const struct rayspace_state *state)
 {
     return at_most(PAIRS_RESERVED, state->capacity / 4);
-}
-
-static bool reserve(struct rayspace_state *state, struct gpu_device *device, struct error *error)
-{
-    const uint32_t rays = state->base.wave.ray_count;
-    const size_t pair_bytes = (size_t)state->capacity * RAYSPACE_PAIR_BYTES;
-    bool good = true;
-    for (unsigned i = 0; i < RAYSPACE_STACKS && good; i++)
-        good = gpu_buffer_reserve(device, &state->stacks[i], pair_bytes, error);
-    if (is_flat(state))
-        good = good && gpu_buffer_reserve(device, &state->items,
-                                          (size_t)state->batch_max * RAYSPACE_ITEM_TEXELS * sizeof(vec4), error);
-    return good && gpu_buffer_reserve(device, &state->answers, (size_t)rays * RAYSPACE_ANSWER_BYTES, error) &&
-           gpu_buffer_reserve(device, &state->leaves, (size_t)state->leaves_capacity * RAYSPACE_PAIR_BYTES,
-                              error) &&
-           gpu_buffer_reserve(device, &state->control, sizeof(struct rayspace_control), error);
 }
 
 /* Pairs of a pass, and items of a batch. What was halved for the last waves of the family is taken halved. */
@@ -151,22 +136,80 @@ static uint32_t pass_max(const struct rayspace_state *state, const struct gpu_de
     return leaves_slots(state) ? rayspace_reduction_pairs(device, pairs) : pairs;
 }
 
+/* What each ray needs comes first: it cannot be less. */
+static bool try_to_reserve(struct rayspace_state *state, struct gpu_device *device, struct error *error)
+{
+    const uint32_t rays = state->base.wave.ray_count;
+    const size_t pair_bytes = (size_t)state->capacity * RAYSPACE_PAIR_BYTES;
+    bool good = gpu_buffer_reserve(device, &state->answers, (size_t)rays * RAYSPACE_ANSWER_BYTES, error) &&
+                gpu_buffer_reserve(device, &state->control, sizeof(struct rayspace_control), error) &&
+                rayspace_nodes_reserve(state, device, error) && rayspace_order_reserve(state, device, error);
+    for (unsigned i = 0; i < RAYSPACE_STACKS && good; i++)
+        good = gpu_buffer_reserve(device, &state->stacks[i], pair_bytes, error);
+    if (is_flat(state))
+        good = good && gpu_buffer_reserve(device, &state->items,
+                                          (size_t)state->batch_max * RAYSPACE_ITEM_TEXELS * sizeof(vec4), error);
+    if (leaves_slots(state))
+        good = good && rayspace_reduction_reserve(device, &state->reduction,
+                                                  (enum rayspace_reduce)state->base.options.rayspace.reduce,
+                                                  pass_max(state, device), error);
+    return good &&
+           gpu_buffer_reserve(device, &state->leaves, (size_t)state->leaves_capacity * RAYSPACE_PAIR_BYTES, error);
+}
+
+static void release_stacks(struct rayspace_state *state, struct gpu_device *device)
+{
+    for (unsigned i = 0; i < RAYSPACE_STACKS; i++)
+        gpu_buffer_finish(device, &state->stacks[i]);
+    gpu_buffer_finish(device, &state->leaves);
+    gpu_buffer_finish(device, &state->items);
+    rayspace_reduction_finish(device, &state->reduction);
+    state->reduction = (struct rayspace_reduction){0};
+}
+
+/* Stacks that memory has no room for are halved, and stay so: passes then take fewer pairs. */
+static bool reserve(const struct rayspace *rayspace, struct rayspace_state *state, struct gpu_device *device,
+                    struct error *error)
+{
+    for (;;) {
+        struct error own = {0};
+        state->capacity = state->leaves_capacity = capacity_of(state);
+        /* All items of a batch are put onto one stack, as by a pass. */
+        const uint32_t room = state->capacity - reserved_of(state);
+        state->batch_max = at_most(batch_of(state, at_most(room, ITEMS_MAX)), rayspace->rank_count);
+        if (try_to_reserve(state, device, &own))
+            return true;
+        if (own.kind != ERROR_OUT_OF_MEMORY || state->capacity <= PAIRS_LEAST) {
+            *error = own;
+            return false;
+        }
+        release_stacks(state, device);
+        state->capacity_fits = state->capacity / 2;
+    }
+}
+
+/* Rays end at the discs that they hit. */
+static bool test_discs(struct gpu_scene *scene, struct rayspace_state *state, struct error *error)
+{
+    struct gpu_define defines[TRACE_WAVE_DEFINES + 1] = {0};
+    trace_wave_defines(scene, &state->base.wave, defines);
+    const struct gpu_program_source source = {.compute = "rayspace/discs.comp", .defines = defines};
+    const struct gpu_program *program = gpu_program_get(scene->device, &source, error);
+    if (!program)
+        return false;
+    rayspace_bind_wave(scene, state, program);
+    gpu_uniform_uint(program, "disc_count", scene->disc_count);
+    gpu_dispatch(scene->device, program, state->base.wave.ray_count);
+    return true;
+}
+
 bool rayspace_descent_begin(struct rayspace *rayspace, struct gpu_scene *scene, struct rayspace_state *state,
                             struct error *error)
 {
     struct gpu_device *device = scene->device;
     const struct wave *wave = &state->base.wave;
     state->levels = rayspace_levels_over(wave->ray_count);
-    state->capacity = state->leaves_capacity = capacity_of(state);
-    /* All items of a batch are put onto one stack, as by a pass. */
-    const uint32_t room = state->capacity - reserved_of(state);
-    state->batch_max = at_most(batch_of(state, at_most(room, ITEMS_MAX)), rayspace->rank_count);
-    if (!reserve(state, device, error))
-        return false;
-    if (leaves_slots(state) &&
-        !rayspace_reduction_reserve(device, &state->reduction,
-                                    (enum rayspace_reduce)state->base.options.rayspace.reduce,
-                                    pass_max(state, device), error))
+    if (!reserve(rayspace, state, device, error))
         return false;
     const uint32_t no_light_lost[4] = {0},
                    no_hit[4] = {UINT32_MAX, RAYSPACE_NO_RANK, UINT32_MAX, RAYSPACE_NO_RANK};
@@ -174,6 +217,8 @@ bool rayspace_descent_begin(struct rayspace *rayspace, struct gpu_scene *scene, 
                     wave->kind == WAVE_ANY ? no_light_lost : no_hit);
     const struct rayspace_control control = {.limit = pass_max(state, device)};
     gpu_buffer_write(device, &state->control, 0, &control, sizeof(control));
+    if (scene->disc_count > 0 && !test_discs(scene, state, error))
+        return false;
     state->round = state->next_rank = state->seeds = 0;
     state->turn = false;
     if (!is_flat(state) && rayspace->tree.top.element_count > 0) {

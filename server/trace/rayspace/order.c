@@ -72,17 +72,20 @@ static bool sort(struct rayspace_state *state, struct gpu_scene *scene, struct e
     return true;
 }
 
+bool rayspace_order_reserve(struct rayspace_state *state, struct gpu_device *device, struct error *error)
+{
+    return gpu_buffer_reserve(device, &state->order, state->base.wave.ray_count * sizeof(uint32_t), error) &&
+           gpu_buffer_reserve(device, &state->bins, bins_bytes(state), error);
+}
+
 bool rayspace_order_rays(struct rayspace_state *state, struct gpu_scene *scene, struct error *error)
 {
-    struct gpu_device *device = scene->device;
-    const uint32_t rays = state->base.wave.ray_count;
-    if (!gpu_buffer_reserve(device, &state->order, rays * sizeof(uint32_t), error) ||
-        !gpu_buffer_reserve(device, &state->bins, bins_bytes(state), error) || !sample(state, scene, error))
+    if (!sample(state, scene, error))
         return false;
     if (state->base.options.rayspace.sort == RAYSPACE_CHANCE_OFF)
         return true;
     if (!rayspace_is_ahead(state)) {
-        gpu_buffer_read(device, &state->control, 0, &state->told, sizeof(state->told));
+        gpu_buffer_read(scene->device, &state->control, 0, &state->told, sizeof(state->told));
         if (!state->told.sorted)
             return true;
     }

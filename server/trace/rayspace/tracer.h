@@ -39,6 +39,7 @@ struct rayspace_state {
     struct gpu_readback copied_counts;  /* on their way to the host */
     struct gpu_buffer items;            /* of the flat descent: of the batch in hand */
     uint32_t capacity, leaves_capacity; /* pairs */
+    uint32_t capacity_fits;             /* at most so many, as memory was short; 0: it was not */
     struct rayspace_reduction reduction;
     uint32_t batch_max; /* items */
     uint32_t next_rank; /* the first primitive of the next batch */
@@ -63,7 +64,10 @@ void rayspace_bind_wave(const struct gpu_scene *scene, struct rayspace_state *st
 
 /* Levels over so many rays. */
 struct rayspace_levels rayspace_levels_over(uint32_t ray_count);
-/* Reserves the nodes, and builds them. `ends`: only how far rays go on. */
+/* Memory for the nodes of the levels, and for the order of the rays. */
+bool rayspace_nodes_reserve(struct rayspace_state *state, struct gpu_device *device, struct error *error);
+bool rayspace_order_reserve(struct rayspace_state *state, struct gpu_device *device, struct error *error);
+/* Builds the nodes. `ends`: only how far rays go on. */
 bool rayspace_nodes_build(struct rayspace_state *state, struct gpu_scene *scene, bool ends, struct error *error);
 /* Decides whether the rays are sorted and turned round, and sorts them. The control is there. */
 bool rayspace_order_rays(struct rayspace_state *state, struct gpu_scene *scene, struct error *error);

@@ -18,7 +18,7 @@
 
 uint32_t bvh_octants(const struct bvh_form *settings)
 {
-    return settings->plain ? 1 : BVH_OCTANTS;
+    return settings->plain || settings->one_order ? 1 : BVH_OCTANTS;
 }
 
 bool bvh_is_packed(const struct bvh_form *settings)
@@ -132,9 +132,9 @@ static void write_packed(uint32_t *elements, const struct bvh_baked *baked, cons
 {
     uint32_t cells[3][2];
     bvh_grid_cells(grid, bound->lower, bound->upper, cells);
-    for (uint32_t octant = 0; octant < BVH_OCTANTS; octant++) {
+    for (uint32_t octant = 0; octant < (baked->place ? BVH_OCTANTS : 1); octant++) {
         size_t count = baked->element_count;
-        uint32_t place = baked->place[octant * count + e];
+        uint32_t place = baked->place ? baked->place[octant * count + e] : e;
         uint32_t *out = elements + 4 * (octant * count + place);
         for (uint32_t i = 0; i < 3; i++) {
             uint32_t near = octant >> i & 1;

@@ -77,8 +77,8 @@ static void fill_records(struct bvh_refit_plan *plan, const struct bvh_baked *ba
     for (uint32_t e = 0; e < baked->element_count; e++) {
         struct bvh_refit_record *record = &plan->records[next[heights->of[e]]++];
         *record = (struct bvh_refit_record){.element = e, .size = baked->size[e], .leaf = leaves[e]};
-        for (uint32_t octant = 0; octant < BVH_OCTANTS; octant++) {
-            uint32_t place = baked->place[(size_t)octant * baked->element_count + e];
+        for (uint32_t octant = 0; octant < (baked->place ? BVH_OCTANTS : 1); octant++) {
+            uint32_t place = baked->place ? baked->place[(size_t)octant * baked->element_count + e] : e;
             (octant < 4 ? record->places_0123 : record->places_4567)[octant % 4] = place;
         }
     }

@@ -339,7 +339,7 @@ static bool build(struct work *work)
     parallel_run(threads, chunk_count(count), chunk_primitives, work);
     if (is_stopped(work))
         return false;
-    if (work->shape->deforms && bvh_octants(work->settings) == BVH_OCTANTS)
+    if (work->shape->deforms && !work->settings->plain)
         return make_plan(work);
     return true;
 }

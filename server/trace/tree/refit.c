@@ -90,11 +90,14 @@ bool bvh_refit_bounds(struct bvh_refit *refit, struct gpu_device *device, const 
 bool bvh_refit_write(struct bvh_refit *refit, struct gpu_device *device, const struct bvh_refit_place *place,
                      const struct bvh_form *settings, const struct bvh_grid *grid, struct error *error)
 {
-    struct gpu_define defines[2] = {{NULL, NULL}};
+    struct gpu_define defines[3] = {{NULL, NULL}};
+    size_t n = 0;
     if (settings->bounds == BVH_BOUNDS_SPHERE)
-        defines[0] = (struct gpu_define){"BVH_SPHERES", "1"};
+        defines[n++] = (struct gpu_define){"BVH_SPHERES", "1"};
     else if (bvh_is_packed(settings))
-        defines[0] = (struct gpu_define){"BVH_PACKED", "1"};
+        defines[n++] = (struct gpu_define){"BVH_PACKED", "1"};
+    if (settings->one_order)
+        defines[n++] = (struct gpu_define){"BVH_ONE_ORDER", "1"};
     const struct gpu_program_source source = {.compute = "tree/refit_write.comp", .defines = defines};
     const struct gpu_program *program = gpu_program_get(device, &source, error);
     if (!program)

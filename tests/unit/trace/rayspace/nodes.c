@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Bounds of the rays of a wave: what a ray hits in exact arithmetic is culled at no level. The device's own
- * functions are run (rayspace/nodes.comp, rayspace/meet.glsl), on rays and triangles as hostile as can be. */
+/* Bounds of the rays of a wave: what a ray hits in exact arithmetic is culled at no level, whichever way the wave
+ * is taken. The device's own programs are run (rayspace/sort.comp, nodes.comp, meet.glsl, items.comp), on rays and
+ * triangles as hostile as can be. */
 #include "tests/unit/trace/tracer_fixture.h"
 
 #include "shared/bindings.h"
@@ -13,8 +14,8 @@
 #define RAYSPACE_NUMBER 5u
 #define RAYS 1024u
 #define ELEMENTS 256u
-/* Half of the elements have a sphere about their box, as those of a tree; half one about their triangle. */
-#define CASES 32u
+#define CASES 40u /* a multiple of FORMS and of 4 */
+#define MESH 10u
 
 ALL_TESTS(open_device, close_device)
 
@@ -55,20 +56,27 @@ enum form {
     OPPOSED, /* directions of neighbours sum to zero */
     ALONG_AXES,
     FROM_BEHIND, /* t_min is negative */
+    TO_A_POINT,  /* shadow rays, which end at a light */
+    TO_AN_AREA,
     FORMS
 };
 
-static const char *const form_names[FORMS] = {"from a point", "parallel", "mirrored",   "wide",
-                                              "incoherent",   "opposed",  "along axes", "from behind"};
+static const char *const form_names[FORMS] = {"from a point", "parallel",  "mirrored",   "wide",
+                                              "incoherent",   "opposed",   "along axes", "from behind",
+                                              "to a point",   "to an area"};
 
+/* In the world; exact, also where an instance has moved it. */
 struct triangle {
-    float v[3][3];
+    double v[3][3];
 };
 
 struct fuzz {
     enum form form;
     uint64_t seed;
     double scale, offset[3];
+    double object_offset[3];
+    float objects[ELEMENTS][3][3]; /* the triangles in the space of their mesh */
+    float world_from_object[12];
     struct triangle triangles[ELEMENTS];
     struct ray rays[RAYS];
 };
@@ -91,17 +99,42 @@ static void random_unit(struct fuzz *fuzz, double v[3])
     v[2] = z;
 }
 
-/* To the world of the case. */
-static void place(const struct fuzz *fuzz, const double p[3], float out[3])
+/* As it is in every second pair of cases; else stretched, turned, mirrored. The mesh comes to the place of the
+ * rays.
+ */
+static void choose_transform(struct fuzz *fuzz, bool moved)
 {
+    float *m = fuzz->world_from_object;
+    test_transform(m, 1, 1, 1, 0, 0, 0, 0, 0);
+    if (moved)
+        test_transform(m, (float)uniform(fuzz, 0.2, 5), (float)uniform(fuzz, -5, -0.2),
+                       (float)uniform(fuzz, 0.2, 5), (int)(test_random(&fuzz->seed) % 3),
+                       (float)uniform(fuzz, 0, 6), 0, 0, 0);
+    for (int row = 0; row < 3; row++) {
+        fuzz->object_offset[row] = fuzz->offset[row];
+        for (int k = 0; k < 3 && moved; k++)
+            m[4 * row + 3] -= (float)(m[4 * row + k] * fuzz->offset[k]);
+        m[4 * row + 3] += moved ? (float)fuzz->offset[row] : 0;
+    }
+}
+
+static void place(struct fuzz *fuzz, const double p[3], uint32_t number, int vertex)
+{
+    float *object = fuzz->objects[number][vertex];
     for (int k = 0; k < 3; k++)
-        out[k] = (float)(p[k] * fuzz->scale + fuzz->offset[k]);
+        object[k] = (float)(p[k] * fuzz->scale + fuzz->object_offset[k]);
+    for (int row = 0; row < 3; row++) {
+        const float *m = &fuzz->world_from_object[(size_t)row * 4];
+        double world = m[3];
+        for (int k = 0; k < 3; k++)
+            world += (double)m[k] * object[k];
+        fuzz->triangles[number].v[vertex][row] = world;
+    }
 }
 
 /* Tiny, middling, needles, huge, flat in an axis, without an area, points. */
 static void make_triangle(struct fuzz *fuzz, uint32_t number)
 {
-    struct triangle *t = &fuzz->triangles[number];
     double centre[3], corner[3][3];
     for (int k = 0; k < 3; k++)
         centre[k] = uniform(fuzz, -1, 1);
@@ -128,7 +161,7 @@ static void make_triangle(struct fuzz *fuzz, uint32_t number)
             corner[1][k] = corner[2][k] = corner[0][k];
     }
     for (int v = 0; v < 3; v++)
-        place(fuzz, corner[v], t->v[v]);
+        place(fuzz, corner[v], number, v);
 }
 
 /* A point of a triangle, often a corner or on an edge. */
@@ -144,7 +177,7 @@ static void target_on(struct fuzz *fuzz, const struct triangle *t, double out[3]
     if (one_in(fuzz, 4))
         b = a == 0 && one_in(fuzz, 2) ? 1 : 0;
     for (int k = 0; k < 3; k++)
-        out[k] = t->v[0][k] + a * ((double)t->v[1][k] - t->v[0][k]) + b * ((double)t->v[2][k] - t->v[0][k]);
+        out[k] = t->v[0][k] + a * (t->v[1][k] - t->v[0][k]) + b * (t->v[2][k] - t->v[0][k]);
 }
 
 static double length_of(const double v[3])
@@ -152,16 +185,23 @@ static double length_of(const double v[3])
     return sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
 }
 
-/* An origin, and the way to the target or elsewhere; not unit. */
-static void choose_way(struct fuzz *fuzz, const double shared[2][3], const double target[3], double origin[3],
-                       double way[3])
+/* An origin, and the way to the target or elsewhere; not unit. Of rays that end at a light: how many times as far
+ * as the target that is, else 0. */
+static double choose_way(struct fuzz *fuzz, const double shared[2][3], const double target[3], double origin[3],
+                         double way[3])
 {
     double unit[3];
     random_unit(fuzz, unit);
-    const double reach = fuzz->scale * pow(10, uniform(fuzz, -2, 1));
+    const double reach = fuzz->scale * pow(10, uniform(fuzz, -2, 1)), beyond = pow(10, uniform(fuzz, -4, 1)),
+                 extent = fuzz->form == TO_AN_AREA ? uniform(fuzz, -0.3, 0.3) : 0;
+    const double far_behind = fuzz->form == FROM_BEHIND && one_in(fuzz, 2) ? 1e5 : 1;
     for (int k = 0; k < 3; k++) {
-        const double far = fuzz->offset[k] + fuzz->scale * 3 * shared[0][k];
+        const double far = fuzz->offset[k] + fuzz->scale * (3 * shared[0][k] + extent * shared[1][k]);
         switch (fuzz->form) {
+        case TO_A_POINT:
+        case TO_AN_AREA:
+            origin[k] = target[k] + beyond * (target[k] - far);
+            break;
         case FROM_A_POINT:
             origin[k] = far;
             break;
@@ -176,7 +216,7 @@ static void choose_way(struct fuzz *fuzz, const double shared[2][3], const doubl
             origin[k] = fuzz->offset[k] + fuzz->scale * 0.1 * shared[0][k];
             break;
         default:
-            origin[k] = target[k] - reach * unit[k];
+            origin[k] = target[k] - far_behind * reach * unit[k];
         }
         origin[k] = (float)origin[k];
         way[k] = target[k] - origin[k];
@@ -196,10 +236,12 @@ static void choose_way(struct fuzz *fuzz, const double shared[2][3], const doubl
             way[k] = k == axis ? target[k] - origin[k] : one_in(fuzz, 2) ? 0.0 : -0.0;
         }
     }
+    return fuzz->form == TO_A_POINT || fuzz->form == TO_AN_AREA ? (1 + beyond) / beyond : 0;
 }
 
-/* How far the ray goes: without end, just to its target and a little less or more, nowhere. */
-static void choose_ends(struct fuzz *fuzz, struct ray *ray, double target_t)
+/* How far the ray goes: without end, just to its target and a little less or more, to a light or almost, nowhere.
+ */
+static void choose_ends(struct fuzz *fuzz, struct ray *ray, double target_t, double light_t)
 {
     float *t_min = &ray->origin_t_min[3], *t_max = &ray->direction_t_max[3];
     *t_min = one_in(fuzz, 4) ? (float)(target_t * uniform(fuzz, 0, 1.01)) : 0.0f;
@@ -216,8 +258,11 @@ static void choose_ends(struct fuzz *fuzz, struct ray *ray, double target_t)
     default:
         *t_max = (float)(target_t * uniform(fuzz, 0.5, 3));
     }
-    if (fuzz->form == FROM_BEHIND)
-        *t_min = (float)(-target_t * pow(10, uniform(fuzz, -3, 3)));
+    if (light_t > 0)
+        *t_max = (float)(light_t * (one_in(fuzz, 2) ? 1 : uniform(fuzz, 0.999, 1)));
+    if (fuzz->form == FROM_BEHIND) /* far before the target, or just before it */
+        *t_min =
+            (float)(-target_t * (one_in(fuzz, 2) ? pow(10, uniform(fuzz, -3, 3)) : 1 + uniform(fuzz, 0, 1e-4)));
     if (one_in(fuzz, 16))
         *t_max = one_in(fuzz, 2) ? *t_min : -1.0f;
 }
@@ -233,7 +278,7 @@ static void make_rays(struct fuzz *fuzz)
         const uint32_t aimed = (i / group * 2654435761u >> 8) % ELEMENTS;
         double target[3], origin[3], way[3];
         target_on(fuzz, &fuzz->triangles[aimed], target);
-        choose_way(fuzz, (const double(*)[3])shared, target, origin, way);
+        const double to_light = choose_way(fuzz, (const double(*)[3])shared, target, origin, way);
         /* Not of unit length, and where it is of none the ray is dead. */
         const double length = length_of(way), of_unit = pow(10, uniform(fuzz, -3, 3));
         struct ray *ray = &fuzz->rays[i];
@@ -242,24 +287,26 @@ static void make_rays(struct fuzz *fuzz)
             ray->origin_t_min[k] = (float)origin[k];
             ray->direction_t_max[k] = length > 0 ? (float)(way[k] / length * of_unit) : 0.0f;
         }
-        if (fuzz->form == FROM_BEHIND)
-            for (int k = 0; k < 3; k++) /* the target lies behind the origin */
-                ray->direction_t_max[k] = one_in(fuzz, 2) ? ray->direction_t_max[k] : -ray->direction_t_max[k];
+        const bool behind = fuzz->form == FROM_BEHIND && one_in(fuzz, 2); /* so lies the target */
+        for (int k = 0; k < 3 && behind; k++)
+            ray->direction_t_max[k] = -ray->direction_t_max[k];
         if (fuzz->form == OPPOSED && i % 2)
             for (int k = 0; k < 3; k++)
                 ray->direction_t_max[k] = -fuzz->rays[i - 1].direction_t_max[k];
-        choose_ends(fuzz, ray, length / of_unit);
+        choose_ends(fuzz, ray, length / of_unit, to_light * length / of_unit);
     }
 }
 
 static void fuzz_init(struct fuzz *fuzz, uint32_t number)
 {
     *fuzz = (struct fuzz){.form = (enum form)(number % FORMS), .seed = 1000 + number};
-    fuzz->scale = number % 16 < FORMS ? 1 : pow(10, uniform(fuzz, -6, 6));
+    const uint32_t world = number / FORMS;
+    fuzz->scale = world % 2 == 0 ? 1 : pow(10, uniform(fuzz, -6, 6));
     double away[3];
     random_unit(fuzz, away);
-    for (int k = 0; k < 3 && number % 32 >= 16; k++)
+    for (int k = 0; k < 3 && world / 2 % 2 > 0; k++)
         fuzz->offset[k] = 1e4 * fuzz->scale * away[k];
+    choose_transform(fuzz, (number + world) % 2 > 0);
     for (uint32_t i = 0; i < ELEMENTS; i++)
         make_triangle(fuzz, i);
     make_rays(fuzz);
@@ -290,9 +337,9 @@ static bool hits(const struct ray *ray, const struct triangle *t)
     double d[3], edges[2][3], from[3], p[3], q[3];
     for (int k = 0; k < 3; k++) {
         d[k] = ray->direction_t_max[k];
-        edges[0][k] = (double)t->v[1][k] - t->v[0][k];
-        edges[1][k] = (double)t->v[2][k] - t->v[0][k];
-        from[k] = (double)ray->origin_t_min[k] - t->v[0][k];
+        edges[0][k] = t->v[1][k] - t->v[0][k];
+        edges[1][k] = t->v[2][k] - t->v[0][k];
+        from[k] = ray->origin_t_min[k] - t->v[0][k];
     }
     cross(d, edges[1], p);
     cross(from, edges[0], q);
@@ -309,12 +356,17 @@ struct element {
     float centre_radius[4], lower[4], upper[4];
 };
 
+static float round_down(double value)
+{
+    return (double)(float)value > value ? nextafterf((float)value, -INFINITY) : (float)value;
+}
+
 static void bound_by_box(const struct triangle *t, struct element *e)
 {
     float squared = 0;
     for (int k = 0; k < 3; k++) {
-        e->lower[k] = fminf(t->v[0][k], fminf(t->v[1][k], t->v[2][k]));
-        e->upper[k] = fmaxf(t->v[0][k], fmaxf(t->v[1][k], t->v[2][k]));
+        e->lower[k] = round_down(fmin(t->v[0][k], fmin(t->v[1][k], t->v[2][k])));
+        e->upper[k] = -round_down(-fmax(t->v[0][k], fmax(t->v[1][k], t->v[2][k])));
         const float half = 0.5f * e->upper[k] - 0.5f * e->lower[k];
         e->centre_radius[k] = e->lower[k] + half;
         squared += half * half;
@@ -329,19 +381,19 @@ static void bound_by_sphere(const struct triangle *t, struct element *e)
     for (int v = 0; v < 3; v++) {
         double edge[3];
         for (int k = 0; k < 3; k++)
-            edge[k] = (double)t->v[(v + 1) % 3][k] - t->v[v][k];
+            edge[k] = t->v[(v + 1) % 3][k] - t->v[v][k];
         if (length_of(edge) <= longest)
             continue;
         longest = length_of(edge);
         for (int k = 0; k < 3; k++)
-            centre[k] = 0.5 * ((double)t->v[(v + 1) % 3][k] + t->v[v][k]);
+            centre[k] = 0.5 * (t->v[(v + 1) % 3][k] + t->v[v][k]);
     }
     for (int k = 0; k < 3; k++)
         e->centre_radius[k] = (float)centre[k];
     for (int v = 0; v < 3; v++) {
         double away[3];
         for (int k = 0; k < 3; k++)
-            away[k] = (double)t->v[v][k] - e->centre_radius[k];
+            away[k] = t->v[v][k] - e->centre_radius[k];
         radius = fmax(radius, length_of(away));
     }
     e->centre_radius[3] = nextafterf((float)radius, INFINITY);
@@ -375,22 +427,59 @@ static const char probe_text[] =
     "             uint(b.end >= 0.0) << 3;\n"
     "}\n";
 
+/* How a wave is taken. */
+enum way { AS_IT_COMES, TURNED, SORTED, TURNED_AND_SORTED, WAYS };
+
+static const char *const way_names[WAYS] = {"as it comes", "turned", "sorted", "turned and sorted"};
+
+static bool is_turned(enum way way)
+{
+    return way == TURNED || way == TURNED_AND_SORTED;
+}
+
+static bool is_sorted(enum way way)
+{
+    return way == SORTED || way == TURNED_AND_SORTED;
+}
+
 struct run {
-    struct fixture fixture; /* a scene of any kind: rays alone matter */
-    struct gpu_program program;
+    struct fixture fixture;         /* its scene is the mesh of the case */
+    struct gpu_program programs[2]; /* for closest hits, and for shadow rays, which alone are turned round */
     struct rayspace_state state;
-    struct gpu_buffer rays, elements, met;
-    uint32_t node_count; /* with the rays themselves */
+    struct gpu_buffer rays, elements, pairs, met;
+    uint32_t places[RAYS]; /* of each ray, in level 0 */
+    uint32_t node_count;   /* with the rays themselves */
     struct rayspace_node *nodes;
     uint32_t *words;
 };
 
-static void run_init(struct run *run)
+static void set_mesh(struct test_edits *edits, const struct fuzz *fuzz)
+{
+    uint32_t indices[3 * ELEMENTS];
+    for (uint32_t i = 0; i < 3 * ELEMENTS; i++)
+        indices[i] = i;
+    test_mesh(edits, MESH, fuzz->objects[0], 3 * ELEMENTS, indices, ELEMENTS);
+    test_node(edits, 1, 0, NODE_MESH, MESH, fuzz->world_from_object);
+}
+
+static struct scene *scene_of(const struct fuzz *fuzz)
+{
+    struct test_edits edits = {.scene = test_scene_create()};
+    set_mesh(&edits, fuzz);
+    test_commit(&edits);
+    return edits.scene;
+}
+
+static void run_init(struct run *run, struct fuzz *fuzz)
 {
     struct error error = {0};
+    const struct tracer_options options = {.rayspace.mode = RAYSPACE_MODE_FLAT}; /* nothing is built */
+    static const struct gpu_define any_hit[] = {{"ANY_HIT", "1"}, {0}};
     *run = (struct run){.state.levels = rayspace_levels_over(RAYS)};
-    fixture_init_by(&run->fixture, RAYSPACE_NUMBER, test_scene_soup(), NULL);
-    run->program = shader_probe_compile(probe_text, NULL);
+    fuzz_init(fuzz, 0);
+    fixture_init_by(&run->fixture, RAYSPACE_NUMBER, scene_of(fuzz), &options);
+    run->programs[0] = shader_probe_compile(probe_text, NULL);
+    run->programs[1] = shader_probe_compile(probe_text, any_hit);
     run->state.base.wave = (struct wave){.ray_count = RAYS, .rays = &run->rays};
     run->state.base.device = device;
     run->node_count = RAYS + run->state.levels.first[run->state.levels.top] + 1;
@@ -398,12 +487,12 @@ static void run_init(struct run *run)
     run->nodes = malloc(run->node_count * sizeof(*run->nodes));
     run->words = malloc(pairs * sizeof(*run->words));
     expect_ok(gpu_buffer_reserve(device, &run->state.answers, answer_bytes, &error) &&
-                  gpu_buffer_reserve(device, &run->met, pairs * sizeof(*run->words), &error),
+                  gpu_buffer_reserve(device, &run->met, pairs * sizeof(*run->words), &error) &&
+                  gpu_buffer_reserve(device, &run->elements, ELEMENTS * sizeof(struct element), &error) &&
+                  gpu_buffer_reserve(device, &run->pairs, ELEMENTS * RAYSPACE_PAIR_BYTES, &error),
               &error);
-    const struct rayspace_control control = {0}; /* neither sorted nor turned round */
+    const struct rayspace_control control = {0};
     expect_ok(gpu_buffer_upload(device, &run->state.control, &control, sizeof(control), &error), &error);
-    const uint32_t no_hit[4] = {UINT32_MAX, RAYSPACE_NO_RANK, UINT32_MAX, RAYSPACE_NO_RANK};
-    gpu_buffer_fill(device, &run->state.answers, 0, answer_bytes, no_hit);
 }
 
 static void run_finish(struct run *run)
@@ -412,15 +501,20 @@ static void run_finish(struct run *run)
     gpu_buffer_finish(device, &run->state.control);
     gpu_buffer_finish(device, &run->state.nodes);
     gpu_buffer_finish(device, &run->rays);
+    gpu_buffer_finish(device, &run->state.order);
+    gpu_buffer_finish(device, &run->state.bins);
     gpu_buffer_finish(device, &run->elements);
+    gpu_buffer_finish(device, &run->pairs);
     gpu_buffer_finish(device, &run->met);
-    shader_probe_finish(&run->program);
+    shader_probe_finish(&run->programs[0]);
+    shader_probe_finish(&run->programs[1]);
     fixture_finish(&run->fixture);
     free(run->nodes);
     free(run->words);
 }
 
-static void run_case(struct run *run, const struct fuzz *fuzz)
+/* Half of the elements have a sphere about their box, as those of a tree; half one about their triangle. */
+static void bound_as_a_tree(struct run *run, const struct fuzz *fuzz)
 {
     struct error error = {0};
     struct element elements[ELEMENTS] = {0};
@@ -429,23 +523,73 @@ static void run_case(struct run *run, const struct fuzz *fuzz)
         if (i / 8 % 2)
             bound_by_sphere(&fuzz->triangles[i], &elements[i]);
     }
+    expect_ok(gpu_buffer_upload(device, &run->elements, elements, sizeof(elements), &error), &error);
+}
+
+/* As the flat descent does. The mesh of the case is on the device. */
+static void bound_flat(struct run *run, const struct fuzz *fuzz)
+{
+    struct error error = {0};
+    struct gpu_scene *scene = &run->fixture.gpu;
+    struct rayspace *rayspace = (struct rayspace *)run->fixture.tracer;
+    assert_int_equal(rayspace->rank_count, ELEMENTS);
+    for (int k = 0; k < 12; k++)
+        assert_true(scene->instances[0].world_from_object[k / 4][k % 4] == fuzz->world_from_object[k]);
+    const struct gpu_program_source source = {.compute = "rayspace/items.comp"};
+    const struct gpu_program *program = gpu_program_get(device, &source, &error);
+    expect_ok(program != NULL, &error);
+    gpu_scene_bind(scene);
+    gpu_buffer_bind_texels(device, &rayspace->ranks, UNIT_RAYSPACE_RANKS, GL_R32UI);
+    gpu_buffer_bind_storage(&run->elements, BIND_RAYSPACE_ITEMS);
+    gpu_buffer_bind_storage(&run->pairs, BIND_RAYSPACE_PAIRS);
+    gpu_uniform_uint(program, "instance_count", scene->instance_count);
+    gpu_uniform_uint(program, "batch_first", 0);
+    gpu_uniform_uint(program, "batch_count", ELEMENTS);
+    gpu_uniform_uint(program, "root", 0);
+    gpu_dispatch(device, program, ELEMENTS);
+}
+
+/* The hierarchy over the rays as the tracer makes it. */
+static void build_nodes(struct run *run, const struct fuzz *fuzz, enum way way)
+{
+    struct error error = {0};
+    struct rayspace_state *state = &run->state;
+    struct rayspace_settings *settings = &state->base.options.rayspace;
+    const uint32_t no_hit[4] = {UINT32_MAX, RAYSPACE_NO_RANK, UINT32_MAX, RAYSPACE_NO_RANK},
+                   no_light_lost[4] = {0};
+    state->base.wave.kind = is_turned(way) ? WAVE_ANY : WAVE_CLOSEST;
+    settings->turn = is_turned(way) ? RAYSPACE_CHANCE_ON : RAYSPACE_CHANCE_OFF;
+    settings->sort = is_sorted(way) ? RAYSPACE_CHANCE_ON : RAYSPACE_CHANCE_OFF;
+    gpu_buffer_fill(device, &state->answers, 0, RAYS * RAYSPACE_ANSWER_BYTES,
+                    is_turned(way) ? no_light_lost : no_hit);
+    const struct rayspace_control control = {0};
+    gpu_buffer_write(device, &state->control, 0, &control, sizeof(control));
     expect_ok(gpu_buffer_upload(device, &run->rays, fuzz->rays, sizeof(fuzz->rays), &error) &&
-                  gpu_buffer_upload(device, &run->elements, elements, sizeof(elements), &error) &&
-                  rayspace_nodes_build(&run->state, &run->fixture.gpu, false, &error),
+                  rayspace_order_reserve(state, device, &error) && rayspace_nodes_reserve(state, device, &error) &&
+                  rayspace_order_rays(state, &run->fixture.gpu, &error) &&
+                  rayspace_nodes_build(state, &run->fixture.gpu, false, &error),
               &error);
-    const uint32_t stored = run->node_count - RAYS;
-    gpu_buffer_read(device, &run->state.nodes, 0, run->nodes, stored * sizeof(*run->nodes));
-    trace_bind_rays(&run->fixture.gpu, &run->state.base.wave);
+    const size_t stored = run->node_count - RAYS;
+    gpu_buffer_read(device, &state->nodes, 0, run->nodes, stored * sizeof(*run->nodes));
+    uint32_t order[RAYS];
+    gpu_buffer_read(device, &state->order, 0, order, sizeof(order));
+    for (uint32_t place = 0; place < RAYS; place++)
+        run->places[is_sorted(way) ? order[place] : place] = place;
+}
+
+static void run_case(struct run *run, const struct fuzz *fuzz, enum way way)
+{
+    struct error error = {0};
+    build_nodes(run, fuzz, way);
+    const struct gpu_program *program = &run->programs[is_turned(way)];
+    rayspace_bind_wave(&run->fixture.gpu, &run->state, program);
     gpu_buffer_bind_texels(device, &run->state.nodes, UNIT_RAYSPACE_NODES, GL_RGBA32F);
-    gpu_buffer_bind_storage(&run->state.answers, BIND_RAYSPACE_ANSWERS);
     gpu_buffer_bind_storage(&run->elements, BIND_RAYSPACE_PAIRS);
     gpu_buffer_bind_storage(&run->met, BIND_RAYSPACE_LEAVES);
-    gpu_buffer_bind_storage(&run->state.control, BIND_RAYSPACE_CONTROL);
-    gpu_uniform_uint(&run->program, "ray_count", RAYS);
-    gpu_uniform_uint(&run->program, "node_count", run->node_count);
-    gpu_uniform_uint(&run->program, "element_count", ELEMENTS);
+    gpu_uniform_uint(program, "node_count", run->node_count);
+    gpu_uniform_uint(program, "element_count", ELEMENTS);
     const size_t pairs = (size_t)run->node_count * ELEMENTS;
-    gpu_dispatch(device, &run->program, pairs);
+    gpu_dispatch(device, program, pairs);
     gpu_buffer_read(device, &run->met, 0, run->words, pairs * sizeof(*run->words));
     expect_ok(gpu_check(device, "nodes", &error), &error);
 }
@@ -456,65 +600,103 @@ struct tally {
     uint64_t pairs, hit, culled;
 };
 
-/* The node of a level that has the ray, among all, the rays first. */
-static uint32_t node_over(const struct rayspace_levels *levels, uint32_t level, uint32_t ray)
+static void tally_add(struct tally *sum, const struct tally *tally)
 {
-    return level == 0 ? ray : RAYS + levels->first[level] + (ray >> 2 * level);
+    sum->pairs += tally->pairs;
+    sum->hit += tally->hit;
+    sum->culled += tally->culled;
 }
 
-static void expect_no_hit_culled(struct run *run, const struct fuzz *fuzz, uint32_t number, struct tally *tally)
+static void tally_print(const struct tally *tally, const char *name)
+{
+    print_message("%-18s %9llu pairs, %5.2f %% of them hits, %5.1f %% culled\n", name,
+                  (unsigned long long)tally->pairs, 100.0 * (double)tally->hit / (double)tally->pairs,
+                  100.0 * (double)tally->culled / (double)tally->pairs);
+}
+
+/* The node of a level that has the ray at a place, among all, the rays first. */
+static uint32_t node_over(const struct rayspace_levels *levels, uint32_t level, uint32_t place)
+{
+    return level == 0 ? place : RAYS + levels->first[level] + (place >> 2 * level);
+}
+
+/* What each ray hits. */
+static void find_hits(const struct fuzz *fuzz, bool *found)
+{
+    for (uint32_t ray = 0; ray < RAYS; ray++)
+        for (uint32_t e = 0; e < ELEMENTS; e++)
+            found[ray * ELEMENTS + e] = !is_dead(&fuzz->rays[ray]) && hits(&fuzz->rays[ray], &fuzz->triangles[e]);
+}
+
+/* `what`: the case, in words. */
+static struct tally expect_no_hit_culled(struct run *run, const bool *found, const char *what)
 {
     const struct rayspace_levels *levels = &run->state.levels;
-    bool *hit = calloc((size_t)run->node_count * ELEMENTS, sizeof(*hit));
-    for (uint32_t ray = 0; ray < RAYS; ray++) {
-        for (uint32_t e = 0; e < ELEMENTS; e++) {
-            if (is_dead(&fuzz->rays[ray]) || !hits(&fuzz->rays[ray], &fuzz->triangles[e]))
-                continue;
-            for (uint32_t level = 0; level <= levels->top; level++) {
-                const size_t pair = (size_t)node_over(levels, level, ray) * ELEMENTS + e;
-                hit[pair] = true;
-                if (run->words[pair] != 15)
-                    fail_msg("case %u, %s, scale %g: ray %u hits triangle %u, and its node of level %u is culled: "
-                             "cone %u, slabs %u, both %u, alive %u",
-                             number, form_names[fuzz->form], fuzz->scale, ray, e, level, run->words[pair] & 1,
-                             run->words[pair] >> 1 & 1, run->words[pair] >> 2 & 1, run->words[pair] >> 3);
-            }
+    const size_t pairs = (size_t)run->node_count * ELEMENTS;
+    struct tally tally = {.pairs = pairs};
+    bool *hit = calloc(pairs, sizeof(*hit));
+    for (uint32_t i = 0; i < RAYS * ELEMENTS; i++) {
+        const uint32_t ray = i / ELEMENTS, e = i % ELEMENTS;
+        for (uint32_t level = 0; found[i] && level <= levels->top; level++) {
+            const size_t pair = (size_t)node_over(levels, level, run->places[ray]) * ELEMENTS + e;
+            hit[pair] = true;
+            if (run->words[pair] != 15)
+                fail_msg("%s: ray %u hits triangle %u, and its node of level %u is culled: cone %u, slabs %u, "
+                         "both %u, alive %u",
+                         what, ray, e, level, run->words[pair] & 1, run->words[pair] >> 1 & 1,
+                         run->words[pair] >> 2 & 1, run->words[pair] >> 3);
         }
     }
-    for (size_t pair = 0; pair < (size_t)run->node_count * ELEMENTS; pair++) {
-        tally->hit += hit[pair];
-        tally->culled += !(run->words[pair] >> 2 & 1);
+    for (size_t pair = 0; pair < pairs; pair++) {
+        tally.hit += hit[pair];
+        tally.culled += !(run->words[pair] >> 2 & 1);
     }
-    tally->pairs += (uint64_t)run->node_count * ELEMENTS;
     free(hit);
+    return tally;
 }
 
 TEST(no_triangle_that_a_ray_hits_is_culled_from_its_nodes)
 {
     struct run run;
     struct fuzz *fuzz = malloc(sizeof(*fuzz));
-    struct tally tallies[FORMS] = {0}, all = {0};
+    bool *found = malloc((size_t)RAYS * ELEMENTS * sizeof(*found));
+    struct tally of_form[FORMS] = {0}, of_way[WAYS] = {0}, of_bounds[2] = {0};
     const uint32_t case_count = getenv("FARLIGHT_TEST_LONG") ? 16 * CASES : CASES;
-    run_init(&run);
+    run_init(&run, fuzz);
     for (uint32_t number = 0; number < case_count; number++) {
         fuzz_init(fuzz, number);
-        run_case(&run, fuzz);
-        expect_no_hit_culled(&run, fuzz, number, &tallies[fuzz->form]);
+        set_mesh(&run.fixture.edits, fuzz);
+        update(&run.fixture);
+        find_hits(fuzz, found);
+        for (enum way way = 0; way < WAYS; way++) {
+            const bool flat = (number / FORMS + way / 2) % 2;
+            char what[128];
+            snprintf(what, sizeof(what), "case %u, %s, %s, scale %g, bounds %s", number, form_names[fuzz->form],
+                     way_names[way], fuzz->scale, flat ? "of the flat descent" : "as a tree's");
+            if (flat)
+                bound_flat(&run, fuzz);
+            else
+                bound_as_a_tree(&run, fuzz);
+            run_case(&run, fuzz, way);
+            const struct tally tally = expect_no_hit_culled(&run, found, what);
+            tally_add(&of_form[fuzz->form], &tally);
+            tally_add(&of_way[way], &tally);
+            tally_add(&of_bounds[flat], &tally);
+        }
     }
-    for (int form = 0; form < FORMS; form++) {
-        const struct tally *tally = &tallies[form];
-        print_message("%-12s %9llu pairs, %5.2f %% of them hits, %5.1f %% culled\n", form_names[form],
-                      (unsigned long long)tally->pairs, 100.0 * (double)tally->hit / (double)tally->pairs,
-                      100.0 * (double)tally->culled / (double)tally->pairs);
-        all.pairs += tally->pairs;
-        all.hit += tally->hit;
-        all.culled += tally->culled;
+    for (int form = 0; form < FORMS; form++)
+        tally_print(&of_form[form], form_names[form]);
+    for (int way = 0; way < WAYS; way++) {
+        tally_print(&of_way[way], way_names[way]);
+        assert_true(of_way[way].pairs >= 10000000);
+        /* The test has seen both. */
+        assert_true(of_way[way].hit > of_way[way].pairs / 200);
+        assert_true(of_way[way].culled > of_way[way].pairs / 4);
     }
-    assert_true(all.pairs >= 10000000);
-    /* The test has seen both. */
-    assert_true(all.hit > all.pairs / 200);
-    assert_true(all.culled > all.pairs / 4);
+    tally_print(&of_bounds[0], "as a tree's");
+    tally_print(&of_bounds[1], "flat");
     run_finish(&run);
+    free(found);
     free(fuzz);
 }
 
@@ -564,11 +746,11 @@ TEST(every_level_bounds_the_rays_and_the_level_below)
 {
     struct run run;
     struct fuzz *fuzz = malloc(sizeof(*fuzz));
-    run_init(&run);
+    run_init(&run, fuzz);
     const struct rayspace_levels *levels = &run.state.levels;
     for (uint32_t number = 0; number < CASES; number++) {
         fuzz_init(fuzz, number);
-        run_case(&run, fuzz);
+        build_nodes(&run, fuzz, AS_IT_COMES);
         for (uint32_t level = 1; level <= levels->top; level++) {
             for (uint32_t ray = 0; ray < RAYS; ray++) {
                 const struct rayspace_node *node = &run.nodes[levels->first[level] + (ray >> 2 * level)];
@@ -593,12 +775,13 @@ TEST(a_node_of_dead_rays_meets_nothing)
 {
     struct run run;
     struct fuzz *fuzz = malloc(sizeof(*fuzz));
-    run_init(&run);
+    run_init(&run, fuzz);
     fuzz_init(fuzz, INCOHERENT);
     for (uint32_t ray = 0; ray < RAYS; ray++)
         if (ray != RAYS - 1)
             fuzz->rays[ray].direction_t_max[3] = fuzz->rays[ray].origin_t_min[3];
-    run_case(&run, fuzz);
+    bound_as_a_tree(&run, fuzz);
+    run_case(&run, fuzz, AS_IT_COMES);
     const struct rayspace_levels *levels = &run.state.levels;
     for (uint32_t level = 0; level <= levels->top; level++)
         for (uint32_t ray = 0; ray < RAYS - 1; ray++)

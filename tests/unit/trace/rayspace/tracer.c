@@ -163,6 +163,89 @@ TEST(waves_of_few_rays_have_all_their_answers)
     pair_finish(&pair);
 }
 
+/* ---- discs ---- */
+
+/* A soup, and above it a disc that hides it from rays near its axis, and of glass a second one above that. */
+static struct scene *scene_below_disc(float radius)
+{
+    struct test_edits edits = {.scene = test_scene_create()};
+    test_material(&edits, 1, 0.9f, 0.95f, 0.9f);
+    struct scene_material *pane = test_material(&edits, 2, 0.4f, 0.5f, 0.6f);
+    pane->alpha_mode = ALPHA_BLEND;
+    pane->base_colour[3] = 0.4f;
+    test_soup_mesh(&edits, 10, 600, 0.3f, 29);
+    test_node(&edits, 1, 0, NODE_MESH, 10, NULL);
+    for (uint32_t i = 0; i < 2; i++) {
+        struct scene_disc *disc = &test_add(&edits, OBJECT_DISC)->set.disc;
+        disc->base.id = i + 1;
+        disc->material = i + 1;
+        disc->centre_world[2] = 1.5f + 0.5f * (float)i;
+        disc->normal_world[2] = 1.0f;
+        disc->radius = radius;
+    }
+    test_commit(&edits);
+    return edits.scene;
+}
+
+static struct scene *scene_below_small_disc(void)
+{
+    return scene_below_disc(0.01f);
+}
+
+static struct scene *scene_below_disc_of_a_half(void)
+{
+    return scene_below_disc(0.8f);
+}
+
+static struct scene *scene_below_large_disc(void)
+{
+    return scene_below_disc(100);
+}
+
+TEST(rays_do_not_descend_beyond_a_disc)
+{
+    static const struct {
+        struct scene *(*create)(void);
+        const char *name;
+    } scenes[] = {{scene_below_small_disc, "a small disc"},
+                  {scene_below_disc_of_a_half, "a disc above a half"},
+                  {scene_below_large_disc, "a disc above all"}};
+    static const enum wave_kind kinds[] = {WAVE_CLOSEST, WAVE_ANY};
+    struct ray *rays = malloc(RAY_COUNT * sizeof(*rays));
+    uint64_t seed = 31;
+    for (uint32_t i = 0; i < RAY_COUNT; i++)
+        rays[i] = (struct ray){{test_uniform(&seed, -1, 1), test_uniform(&seed, -1, 1), 3, 0},
+                               {test_uniform(&seed, -0.1f, 0.1f), test_uniform(&seed, -0.1f, 0.1f), -1, 1e30f}};
+    for (unsigned kind = 0; kind < 2; kind++) {
+        uint32_t cone_tests[3], triangle_tests[3];
+        for (unsigned i = 0; i < 3; i++) {
+            struct hit *hits = calloc(RAY_COUNT, sizeof(*hits)), *expected = calloc(RAY_COUNT, sizeof(*hits));
+            uint32_t *seen = calloc(RAY_COUNT, sizeof(*seen)), *expected_seen = calloc(RAY_COUNT, sizeof(*seen));
+            struct pair pair;
+            pair_init(&pair, scenes[i].create, 0);
+            trace_rays(trace_by_tracer, &pair.naive, kinds[kind], rays, RAY_COUNT, expected, expected_seen);
+            trace_rays(trace_by_tracer, &pair.rayspace, kinds[kind], rays, RAY_COUNT, hits, seen);
+            assert_memory_equal(hits, expected, RAY_COUNT * sizeof(*hits));
+            assert_memory_equal(seen, expected_seen, RAY_COUNT * sizeof(*seen));
+            cone_tests[i] = control_of(&pair.rayspace).cone_tests;
+            triangle_tests[i] = control_of(&pair.rayspace).triangle_tests;
+            print_message("%s: %u cone tests, %u triangle tests\n", scenes[i].name, cone_tests[i],
+                          triangle_tests[i]);
+            pair_finish(&pair);
+            free(hits);
+            free(expected);
+            free(seen);
+            free(expected_seen);
+        }
+        /* A half of the rays are above the disc, whose neighbours often are not: nodes of both go on. */
+        assert_true(cone_tests[1] < cone_tests[0]);
+        assert_true(triangle_tests[1] < triangle_tests[0] * 3 / 4);
+        assert_true(cone_tests[2] < cone_tests[0] / 100);
+        assert_int_equal(triangle_tests[2], 0);
+    }
+    free(rays);
+}
+
 /* ---- queued whole ---- */
 
 /* With a word that a wave sets where it was not traced to its end: then no pass is waited for. */
@@ -356,6 +439,30 @@ TEST(a_wave_that_was_sorted_or_halved_says_so)
     fixture_finish(&fixture);
 }
 
+/* ---- little memory ---- */
+
+TEST(stacks_are_smaller_where_memory_is_short)
+{
+    static const enum rayspace_mode modes[] = {RAYSPACE_MODE_JOINT, RAYSPACE_MODE_FLAT};
+    const uint64_t limit = device->memory_limit_bytes;
+    struct ray *rays = malloc(RAY_COUNT * sizeof(*rays));
+    random_rays(rays, RAY_COUNT, 5);
+    for (size_t i = 0; i < 2; i++) {
+        struct pair pair;
+        pair_init_by(&pair, test_scene_soup, &(struct tracer_options){.rayspace.mode = modes[i]});
+        struct answers expected = ask(&pair.naive, rays, RAY_COUNT);
+        /* Three stacks and the leaves take 4 MiB; rays, hits and nodes less than 1 MiB. */
+        device->memory_limit_bytes = device->memory_used_bytes + ((uint64_t)2 << 20);
+        const struct answers found = ask(&pair.rayspace, rays, RAY_COUNT);
+        const struct rayspace_state *own = (const struct rayspace_state *)pair.rayspace.tracer->state;
+        assert_in_range(own->capacity, 1, STACK_PAIRS / 2);
+        expect_alike(found, expected, RAY_COUNT, 0, "little memory");
+        device->memory_limit_bytes = limit;
+        pair_finish(&pair);
+    }
+    free(rays);
+}
+
 /* ---- everything moves ---- */
 
 #define FRAMES 3u
@@ -436,4 +543,22 @@ TEST(a_scene_whose_every_vertex_moves_is_traced_as_it_is_in_each_frame)
     expect_frames_alike(NAIVE_NUMBER, 179, 192, 0);
     /* 199,712 triangles, and brute force's answers from bvh: its distances may differ in the last places. */
     expect_frames_alike(BVH_NUMBER, 316, RAY_COUNT, 1e-6f);
+}
+
+static uint64_t device_bytes_by(unsigned tracer)
+{
+    struct fixture fixture;
+    fixture_init_by(&fixture, tracer, scene_of_cloth(100), NULL);
+    const uint64_t bytes = fixture.tracer->stats.device_bytes;
+    fixture_finish(&fixture);
+    return bytes;
+}
+
+/* bvh keeps its elements in eight orders, one for each octant of directions. Of 20,000 triangles these are
+ * somewhat less than one half of its bytes, of which one eighth stays; the rest are triangles, which both keep. */
+TEST(a_tree_is_kept_in_one_order)
+{
+    const uint64_t own = device_bytes_by(RAYSPACE_NUMBER), bvh = device_bytes_by(BVH_NUMBER);
+    print_message("%llu bytes, of bvh %llu\n", (unsigned long long)own, (unsigned long long)bvh);
+    assert_true(own < bvh / 3 * 2);
 }

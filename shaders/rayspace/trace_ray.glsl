@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: MIT
+// A ray of a wave as the tests of primitives take it.
+//
+// Defines: HAS_MOTION.
+#include "common/candidate.glsl"
+#include "rayspace/ray.glsl"
+
+#ifdef HAS_MOTION
+layout(binding = UNIT_RAY_TIMES) uniform samplerBuffer ray_times;
+#endif
+
+trace_ray trace_ray_of(uint ray)
+{
+    vec4 origin_t_min = texelFetch(rays, int(2u * ray)), direction_t_max = texelFetch(rays, int(2u * ray + 1u));
+    trace_ray r;
+    r.origin = origin_t_min.xyz;
+    r.direction = direction_t_max.xyz;
+    r.t_min = origin_t_min.w;
+    r.t_max = direction_t_max.w;
+#ifdef HAS_MOTION
+    r.time = texelFetch(ray_times, int(ray)).x;
+#endif
+    return r;
+}
