@@ -1,11 +1,13 @@
 /* SPDX-License-Identifier: MIT */
 /* Waves by `rayspace`: what it counts, and its time beside other tracers on the same rays. Prints one JSON object:
  * {"scene", "triangles", "device", "software", "wave", "width", "height", "rays", "cone_tests", "triangle_tests",
- * "pairs_max", "passes", "halvings", "nodes", "nodes_ns", "differing", "tracers": [{"name", "cpu_ns"}]}. Times are
+ * "pairs_max", "passes", "halvings", "nodes", "nodes_ns", "first_ns", "differing", "tracers": [{"name",
+ * "cpu_ns"}]}. first_ns: with --frames, of the first frame of each run, while cpu_ns has the last one. Times are
  * of the processor, all threads of the process: the machine may do other work meanwhile. Exit status: 1 failed, or
  * more than 0.01 % of the rays have another distance than by the second tracer; 2 usage. */
 #include "tests/accuracy/motion_scenes.h"
 #include "tests/bench/bench.h"
+#include "tests/bench/bench_cut.h"
 #include "tests/bench/bench_forms.h"
 #include "tests/bench/bench_options.h"
 #include "tests/bench/bench_stats.h"
@@ -24,10 +26,19 @@ static const char usage[] =
     "                  ball: mirrored by a ball that stands before the camera, and is not in the scene;\n"
     "                  mirror: mirrored by the model --mirror, which stands there\n"
     "  --mirror FILE   its first mesh, 2.4 wide\n"
+    "  --after N       reflection, bounce, shadow, turned: so many reflections are between the camera's rays and "
+    "the\n"
+    "                  wave; default 0\n"
     "  --light X,Y,Z   else one is chosen\n"
-    "  --beside LIST   of bvh, reference; default: bvh\n"
+    "  --cut EDGE      all triangles are cut until no edge is longer\n"
+    "  --mode joint|flat, --bounds both|sphere, --rounds N   settings of rayspace\n"
+    "  --beside LIST   of bvh, reference, flat (rayspace with --mode flat); default: bvh\n"
+    "  --frames N      each run has a tracer of its own, which traces the wave so many times; default: all runs "
+    "share\n"
+    "                  one\n"
     "  --moves         of --family: all vertices move before each run, which then has the update of the tracer in "
     "it\n"
+    "  --anew          with --moves: the structures that rayspace is beside are built anew, not refitted\n"
     "  --size WxH      multiples of 8; default 256x256\n"
     "  --eye X,Y,Z --look-at X,Y,Z [--up X,Y,Z] [--fov DEGREES]\n"
     "  --runs N        after one warm-up; default 3, at most 64\n";
@@ -42,11 +53,25 @@ static const char usage[] =
 #define MIRROR_OFFSET 1e-4f
 #define DISTANCE_TOLERANCE 1e-4f /* of a distance: surfaces that lie in each other */
 #define BUILDS_A_RUN 8u
-#define TRACERS 3u
+#define TRACERS 4u
+#define FRAMES_MAX 1000u
+#define AFTER_MAX 8u
 
 enum wave_name { PRIMARY, REFLECTION, BOUNCE, SHADOW, TURNED, BALL, MIRROR, WAVE_NAMES };
 static const char *const wave_names[WAVE_NAMES] = {"primary", "reflection", "bounce", "shadow",
                                                    "turned",  "ball",       "mirror"};
+
+/* What takes turns. The first is what is measured, the second tells where rays go on, and what is right. */
+static const struct {
+    const char *name;
+    unsigned number;
+    bool is_flat;
+} contenders[TRACERS] = {
+    {"rayspace", TRACER_RAYSPACE, false},
+    {"bvh", TRACER_BVH, false},
+    {"reference", TRACER_REFERENCE, false},
+    {"flat", TRACER_RAYSPACE, true},
+};
 
 struct bench {
     struct gpu_device *device;
@@ -56,14 +81,17 @@ struct bench {
     unsigned changed;           /* by it */
     const char *mirror, *beside;
     float light[3];
-    bool has_light, moves;
-    uint32_t width, height, runs;
+    bool has_light, moves, anew;
+    float cut; /* the longest edge; 0: as the model has them */
+    struct tracer_options options;
+    uint32_t width, height, runs, frames, after;
     enum wave_name name;
     struct ray *rays;
     struct gpu_buffer ray_buffer, answers;
     struct wave wave;
-    struct tracer *tracers[TRACERS]; /* the first is rayspace */
-    struct bench_runs times[TRACERS], nodes;
+    struct tracer *tracers[TRACERS]; /* of the contenders that are asked for, in their order */
+    unsigned which[TRACERS];         /* of the contenders */
+    struct bench_runs times[TRACERS], nodes, first;
     unsigned tracer_count;
     struct rayspace_control control;
     uint32_t differing;
@@ -155,6 +183,22 @@ static bool add_mirror(struct bench *bench, struct error *error)
     }
     load_model_finish(&model);
     return mesh && gpu_scene_update(&bench->scene.gpu, bench->scene.loaded.scene, NULL, &changes, NULL, error);
+}
+
+/* ---- what is cut ---- */
+
+static bool cut(struct bench *bench, struct error *error)
+{
+    struct bench_scene *scene = &bench->scene;
+    struct scene_changes changes;
+    struct scene *small = bench_cut_scene(&scene->gpu, bench->cut, &scene->triangle_count, error);
+    if (!small)
+        return false;
+    gpu_scene_finish(&scene->gpu);
+    load_model_finish(&scene->loaded);
+    gpu_scene_init(&scene->gpu, bench->device);
+    scene->loaded = (struct loaded_model){.scene = small};
+    return gpu_scene_update(&scene->gpu, small, NULL, &changes, NULL, error);
 }
 
 /* ---- what moves ---- */
@@ -265,30 +309,57 @@ static bool shadow_of(const struct bench *bench, const struct ray *from, const s
     return true;
 }
 
-static uint32_t make_rays(struct bench *bench, const struct ray *camera, const struct hit *hits, uint32_t pixels)
+/* Those of the wave into bench->rays, from what other rays hit. */
+static uint32_t make_rays(struct bench *bench, enum wave_name name, const struct ray *from, const struct hit *hits,
+                          uint32_t from_count)
 {
     uint32_t count = 0;
-    if (bench->name == REFLECTION || bench->name == BOUNCE)
-        return bench_secondary_rays(bench->rays, bench->name == BOUNCE ? BENCH_BOUNCE : BENCH_REFLECTION, camera,
-                                    hits, pixels, 1, &bench->scene);
-    for (uint32_t i = 0; i < pixels; i++) {
+    if (name == REFLECTION || name == BOUNCE)
+        return bench_secondary_rays(bench->rays, name == BOUNCE ? BENCH_BOUNCE : BENCH_REFLECTION, from, hits,
+                                    from_count, 1, &bench->scene);
+    for (uint32_t i = 0; i < from_count; i++) {
         struct ray *ray = &bench->rays[count];
-        if (bench->name == PRIMARY)
-            *ray = camera[i];
-        count += bench->name == PRIMARY  ? true
-                 : bench->name == BALL   ? meet_ball(bench, &camera[i], ray)
-                 : bench->name == MIRROR ? meet_mirror(bench, &camera[i], &hits[i], ray)
-                                         : shadow_of(bench, &camera[i], &hits[i], ray);
+        if (name == PRIMARY)
+            *ray = from[i];
+        count += name == PRIMARY  ? true
+                 : name == BALL   ? meet_ball(bench, &from[i], ray)
+                 : name == MIRROR ? meet_mirror(bench, &from[i], &hits[i], ray)
+                                  : shadow_of(bench, &from[i], &hits[i], ray);
     }
     return count;
 }
 
 /* ---- tracing ---- */
 
+static struct tracer *make_tracer(struct bench *bench, unsigned contender, struct error *error)
+{
+    struct tracer_options options = bench->options;
+    if (contenders[contender].is_flat)
+        options.rayspace.mode = RAYSPACE_MODE_FLAT;
+    const struct tracer_impl *impl = tracer_find(contenders[contender].number, "--beside", error);
+    struct tracer *tracer = impl ? tracer_create(impl, bench->device, &options, error) : NULL;
+    if (tracer && !tracer_update(tracer, &bench->scene.gpu, &(struct tracer_update){0}, error)) {
+        tracer_destroy(tracer);
+        return NULL;
+    }
+    return tracer;
+}
+
+/* After all vertices have moved. */
+static bool update(struct bench *bench, unsigned tracer, struct error *error)
+{
+    struct tracer **tracers = bench->tracers;
+    if (!bench->anew || tracer == 0)
+        return tracer_update(tracers[tracer], &bench->scene.gpu,
+                             &(struct tracer_update){.changed = bench->changed}, error);
+    tracer_destroy(tracers[tracer]);
+    tracers[tracer] = make_tracer(bench, bench->which[tracer], error);
+    return tracers[tracer] != NULL;
+}
+
 static bool trace(struct bench *bench, unsigned tracer, struct error *error)
 {
-    if (bench->moves && !tracer_update(bench->tracers[tracer], &bench->scene.gpu,
-                                       &(struct tracer_update){.changed = bench->changed}, error))
+    if (bench->moves && !update(bench, tracer, error))
         return false;
     gpu_scene_bind(&bench->scene.gpu);
     const bool ok = bench->wave.kind == WAVE_ANY
@@ -310,25 +381,48 @@ static bool upload_wave(struct bench *bench, uint32_t count, bool is_any, struct
            gpu_buffer_reserve(bench->device, &bench->answers, count * sizeof(struct hit), error);
 }
 
+/* Of the wave in hand, by the second tracer: its rays and where they end. */
+static bool trace_on(struct bench *bench, uint32_t count, struct ray *from, struct hit *hits, struct error *error)
+{
+    gpu_scene_bind(&bench->scene.gpu);
+    if (!upload_wave(bench, count, false, error) ||
+        !tracer_trace(bench->tracers[1], &bench->scene.gpu, &bench->wave, error))
+        return false;
+    memcpy(from, bench->rays, count * sizeof(*from));
+    gpu_buffer_read(bench->device, &bench->answers, 0, hits, count * sizeof(*hits));
+    return true;
+}
+
 static bool prepare_rays(struct bench *bench, struct error *error)
 {
-    const uint32_t pixels = bench->width * bench->height;
-    struct ray *camera = malloc(pixels * sizeof(*camera));
-    struct hit *hits = malloc(pixels * sizeof(*hits));
-    bench->rays = malloc(pixels * sizeof(*bench->rays));
-    bench_camera_rays(camera, &bench->scene.camera, bench->width, bench->height);
-    memcpy(bench->rays, camera, pixels * sizeof(*camera));
-    gpu_scene_bind(&bench->scene.gpu);
-    bool ok = upload_wave(bench, pixels, false, error) &&
-              tracer_trace(bench->tracers[1], &bench->scene.gpu, &bench->wave, error);
-    if (ok) {
-        gpu_buffer_read(bench->device, &bench->answers, 0, hits, pixels * sizeof(*hits));
-        const uint32_t count = make_rays(bench, camera, hits, pixels);
-        ok = (count > 0 || error_set(error, ERROR_INVALID, "--wave", "no ray hits what the wave begins at")) &&
-             upload_wave(bench, count, bench->name == SHADOW || bench->name == TURNED, error);
+    uint32_t count = bench->width * bench->height;
+    struct ray *from = malloc(count * sizeof(*from));
+    struct hit *hits = malloc(count * sizeof(*hits));
+    bench->rays = malloc(count * sizeof(*bench->rays));
+    bench_camera_rays(bench->rays, &bench->scene.camera, bench->width, bench->height);
+    bool ok = true;
+    for (uint32_t i = 0; ok && i <= bench->after; i++) {
+        ok = trace_on(bench, count, from, hits, error);
+        if (ok)
+            count = make_rays(bench, i < bench->after ? REFLECTION : bench->name, from, hits, count);
+        ok = ok && (count > 0 || error_set(error, ERROR_INVALID, "--wave", "no ray hits what the wave begins at"));
     }
-    free(camera);
+    free(from);
     free(hits);
+    return ok && upload_wave(bench, count, bench->name == SHADOW || bench->name == TURNED, error);
+}
+
+/* The first tracer from nothing to its last frame but one, whose time is that of the run. */
+static bool trace_first_frames(struct bench *bench, bool is_counted, struct error *error)
+{
+    tracer_destroy(bench->tracers[0]);
+    const uint64_t start_ns = bench_processor_ns();
+    bench->tracers[0] = make_tracer(bench, 0, error);
+    bool ok = bench->tracers[0] && trace(bench, 0, error);
+    if (is_counted)
+        bench_add(&bench->first, bench_processor_ns() - start_ns);
+    for (uint32_t i = 2; ok && i < bench->frames; i++)
+        ok = trace(bench, 0, error);
     return ok;
 }
 
@@ -364,6 +458,8 @@ static bool run(struct bench *bench, struct error *error)
         glFinish();
         for (unsigned turn = 0; ok && turn < bench->tracer_count; turn++) {
             const unsigned i = (turn + round) % bench->tracer_count;
+            if (i == 0 && bench->frames > 1 && !trace_first_frames(bench, round > 0, error))
+                return false;
             const uint64_t start_ns = bench_processor_ns();
             ok = trace(bench, i, error);
             if (round > 0)
@@ -383,10 +479,9 @@ static bool run(struct bench *bench, struct error *error)
 
 static bool prepare(struct bench *bench, struct error *error)
 {
-    static const unsigned numbers[TRACERS] = {TRACER_RAYSPACE, TRACER_BVH, TRACER_REFERENCE};
     bench->scene_options.aspect = (float)bench->width / (float)bench->height;
     if (!bench_scene_init(&bench->scene, bench->device, &bench->scene_options, error) ||
-        (bench->mirror && !add_mirror(bench, error)))
+        (bench->cut > 0 && !cut(bench, error)) || (bench->mirror && !add_mirror(bench, error)))
         return false;
     if (bench->moves) {
         add_target(bench);
@@ -396,14 +491,12 @@ static bool prepare(struct bench *bench, struct error *error)
     if (bench->has_light)
         memcpy(bench->scene.light_world, bench->light, sizeof(bench->light));
     for (unsigned i = 0; i < TRACERS; i++) {
-        const struct tracer_impl *impl = tracer_find(numbers[i], "--beside", error);
-        if (!impl)
-            return false;
-        if (i > 0 && !bench_is_named(bench->beside, impl->name))
+        if (i > 0 && !bench_is_named(bench->beside, contenders[i].name))
             continue;
-        struct tracer **made = &bench->tracers[bench->tracer_count++];
-        *made = tracer_create(impl, bench->device, NULL, error);
-        if (!*made || !tracer_update(*made, &bench->scene.gpu, &(struct tracer_update){0}, error))
+        const unsigned made = bench->tracer_count++;
+        bench->which[made] = i;
+        bench->tracers[made] = make_tracer(bench, i, error);
+        if (!bench->tracers[made])
             return false;
     }
     return (bench->tracer_count > 1 || error_set(error, ERROR_INVALID, "--beside", "names no tracer")) &&
@@ -418,26 +511,43 @@ static bool print(const struct bench *bench)
     const struct rayspace_levels levels = rayspace_levels_over(bench->wave.ray_count);
     json_t *tracers = json_array();
     for (unsigned i = 0; i < bench->tracer_count; i++)
-        json_array_append_new(tracers, json_pack("{s:s, s:o}", "name", bench->tracers[i]->impl->name, "cpu_ns",
+        json_array_append_new(tracers, json_pack("{s:s, s:o}", "name", contenders[bench->which[i]].name, "cpu_ns",
                                                  bench_times_json(&bench->times[i])));
-    json_t *all =
-        json_pack("{s:s, s:I, s:s, s:b, s:s, s:i, s:i, s:i, s:I, s:I, s:I, s:i, s:i, s:i, s:o, s:i, s:o}", "scene",
-                  bench->scene_options.model ? bench->scene_options.model : "family", "triangles",
-                  (json_int_t)bench->scene.triangle_count, "device", bench->device->info.name, "software",
-                  bench->device->facts.software, "wave", wave_names[bench->name], "width", (int)bench->width,
-                  "height", (int)bench->height, "rays", (int)bench->wave.ray_count, "cone_tests",
-                  (json_int_t)control->cone_tests, "triangle_tests", (json_int_t)control->triangle_tests,
-                  "pairs_max", (json_int_t)control->pairs_max, "passes", (int)control->passes, "halvings",
-                  (int)control->halvings, "nodes", (int)(levels.first[levels.top] + 1), "nodes_ns",
-                  bench_times_json(&bench->nodes), "differing", (int)bench->differing, "tracers", tracers);
+    json_t *all = json_pack(
+        "{s:s, s:I, s:s, s:b, s:s, s:i, s:i, s:i, s:I, s:I, s:I, s:i, s:i, s:i, s:o, s:o, s:i, s:o}", "scene",
+        bench->scene_options.model ? bench->scene_options.model : "family", "triangles",
+        (json_int_t)bench->scene.triangle_count, "device", bench->device->info.name, "software",
+        bench->device->facts.software, "wave", wave_names[bench->name], "width", (int)bench->width, "height",
+        (int)bench->height, "rays", (int)bench->wave.ray_count, "cone_tests", (json_int_t)control->cone_tests,
+        "triangle_tests", (json_int_t)control->triangle_tests, "pairs_max", (json_int_t)control->pairs_max,
+        "passes", (int)control->passes, "halvings", (int)control->halvings, "nodes",
+        (int)(levels.first[levels.top] + 1), "nodes_ns", bench_times_json(&bench->nodes), "first_ns",
+        bench_times_json(&bench->first), "differing", (int)bench->differing, "tracers", tracers);
     const bool done = all && json_dumpf(all, stdout, 0) == 0 && putchar('\n') == '\n' && fflush(stdout) == 0;
     json_decref(all);
     return done;
 }
 
+static bool parse_setting(struct bench *bench, int option, const char *text)
+{
+    static const char *const modes[] = {"joint", "flat"}, *const bounds[] = {"both", "sphere"};
+    struct rayspace_settings *settings = &bench->options.rayspace;
+    switch (option) {
+    case 'M':
+        return bench_parse_word(text, modes, 2, &settings->mode);
+    case 'B':
+        return bench_parse_word(text, bounds, 2, &settings->bounds);
+    case 'R':
+        return bench_parse_number(text, 1, 16, &settings->rounds);
+    default:
+        return bench_parse_scene(option, text, &bench->scene_options);
+    }
+}
+
 static bool parse_option(struct bench *bench, int option, const char *text)
 {
     uint32_t word;
+    char *end;
     switch (option) {
     case 'w':
         if (!bench_parse_word(text, wave_names, WAVE_NAMES, &word))
@@ -454,22 +564,33 @@ static bool parse_option(struct bench *bench, int option, const char *text)
         return true;
     case 'o':
         return bench->moves = true;
+    case 'a':
+        return bench->anew = true;
+    case 'c':
+        bench->cut = strtof(text, &end);
+        return *end == '\0' && bench->cut > 0;
+    case 'F':
+        return bench_parse_number(text, 2, FRAMES_MAX, &bench->frames);
+    case 'A':
+        return bench_parse_number(text, 0, AFTER_MAX, &bench->after);
     case 's':
         return bench_parse_size(text, &bench->width, &bench->height);
     case 'r':
         return bench_parse_number(text, 1, BENCH_RUNS_MAX, &bench->runs);
     default:
-        return bench_parse_scene(option, text, &bench->scene_options);
+        return parse_setting(bench, option, text);
     }
 }
 
 static bool parse(struct bench *bench, int argc, char **argv)
 {
     static const struct option names[] = {
-        {"model", 1, NULL, 'm'},   {"family", 1, NULL, 'f'}, {"wave", 1, NULL, 'w'}, {"mirror", 1, NULL, 'i'},
-        {"light", 1, NULL, 'g'},   {"beside", 1, NULL, 'd'}, {"size", 1, NULL, 's'}, {"eye", 1, NULL, 'e'},
-        {"look-at", 1, NULL, 'l'}, {"up", 1, NULL, 'u'},     {"fov", 1, NULL, 'v'},  {"runs", 1, NULL, 'r'},
-        {"moves", 0, NULL, 'o'},   {NULL, 0, NULL, 0},
+        {"model", 1, NULL, 'm'},   {"family", 1, NULL, 'f'}, {"wave", 1, NULL, 'w'},  {"mirror", 1, NULL, 'i'},
+        {"light", 1, NULL, 'g'},   {"beside", 1, NULL, 'd'}, {"size", 1, NULL, 's'},  {"eye", 1, NULL, 'e'},
+        {"look-at", 1, NULL, 'l'}, {"up", 1, NULL, 'u'},     {"fov", 1, NULL, 'v'},   {"runs", 1, NULL, 'r'},
+        {"moves", 0, NULL, 'o'},   {"anew", 0, NULL, 'a'},   {"cut", 1, NULL, 'c'},   {"mode", 1, NULL, 'M'},
+        {"bounds", 1, NULL, 'B'},  {"rounds", 1, NULL, 'R'}, {"after", 1, NULL, 'A'}, {"frames", 1, NULL, 'F'},
+        {NULL, 0, NULL, 0},
     };
     *bench = (struct bench){.beside = "bvh", .width = 256, .height = 256, .runs = 3};
     bench->scene_options.up[1] = 1;
@@ -478,7 +599,9 @@ static bool parse(struct bench *bench, int argc, char **argv)
         if (option == '?' || !parse_option(bench, option, optarg))
             return false;
     return (bench->scene_options.model != NULL) != (bench->scene_options.family_triangles > 0) &&
-           (bench->name == MIRROR) == (bench->mirror != NULL) && !(bench->moves && bench->scene_options.model) &&
+           (bench->name == MIRROR) == (bench->mirror != NULL) &&
+           !(bench->moves && (bench->scene_options.model || bench->cut > 0)) && !(bench->anew && !bench->moves) &&
+           !(bench->after > 0 && (bench->name == PRIMARY || bench->name == BALL || bench->name == MIRROR)) &&
            optind == argc;
 }
 
