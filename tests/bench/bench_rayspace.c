@@ -31,8 +31,9 @@ static const char usage[] =
     "                  wave; default 0\n"
     "  --light X,Y,Z   else one is chosen\n"
     "  --cut EDGE      all triangles are cut until no edge is longer\n"
-    "  --mode joint|flat, --bounds both|sphere, --rounds N   settings of rayspace\n"
-    "  --beside LIST   of bvh, reference, flat (rayspace with --mode flat); default: bvh\n"
+    "  --mode joint|flat, --bounds both|sphere, --rounds N, --turn auto|on|off   settings of rayspace\n"
+    "  --beside LIST   of bvh, reference, and of rayspace with --mode flat or --turn off: flat, unturned; "
+    "default: bvh\n"
     "  --frames N      each run has a tracer of its own, which traces the wave so many times; default: all runs "
     "share\n"
     "                  one\n"
@@ -53,7 +54,7 @@ static const char usage[] =
 #define MIRROR_OFFSET 1e-4f
 #define DISTANCE_TOLERANCE 1e-4f /* of a distance: surfaces that lie in each other */
 #define BUILDS_A_RUN 8u
-#define TRACERS 4u
+#define TRACERS 5u
 #define FRAMES_MAX 1000u
 #define AFTER_MAX 8u
 
@@ -65,12 +66,13 @@ static const char *const wave_names[WAVE_NAMES] = {"primary", "reflection", "bou
 static const struct {
     const char *name;
     unsigned number;
-    bool is_flat;
+    bool is_flat, is_unturned;
 } contenders[TRACERS] = {
-    {"rayspace", TRACER_RAYSPACE, false},
-    {"bvh", TRACER_BVH, false},
-    {"reference", TRACER_REFERENCE, false},
-    {"flat", TRACER_RAYSPACE, true},
+    {.name = "rayspace", .number = TRACER_RAYSPACE},
+    {.name = "bvh", .number = TRACER_BVH},
+    {.name = "reference", .number = TRACER_REFERENCE},
+    {.name = "flat", .number = TRACER_RAYSPACE, .is_flat = true},
+    {.name = "unturned", .number = TRACER_RAYSPACE, .is_unturned = true},
 };
 
 struct bench {
@@ -336,6 +338,8 @@ static struct tracer *make_tracer(struct bench *bench, unsigned contender, struc
     struct tracer_options options = bench->options;
     if (contenders[contender].is_flat)
         options.rayspace.mode = RAYSPACE_MODE_FLAT;
+    if (contenders[contender].is_unturned)
+        options.rayspace.turn = RAYSPACE_CHANCE_OFF;
     const struct tracer_impl *impl = tracer_find(contenders[contender].number, "--beside", error);
     struct tracer *tracer = impl ? tracer_create(impl, bench->device, &options, error) : NULL;
     if (tracer && !tracer_update(tracer, &bench->scene.gpu, &(struct tracer_update){0}, error)) {
@@ -530,7 +534,8 @@ static bool print(const struct bench *bench)
 
 static bool parse_setting(struct bench *bench, int option, const char *text)
 {
-    static const char *const modes[] = {"joint", "flat"}, *const bounds[] = {"both", "sphere"};
+    static const char *const modes[] = {"joint", "flat"}, *const bounds[] = {"both", "sphere"},
+                             *const chances[] = {"auto", "on", "off"};
     struct rayspace_settings *settings = &bench->options.rayspace;
     switch (option) {
     case 'M':
@@ -539,6 +544,8 @@ static bool parse_setting(struct bench *bench, int option, const char *text)
         return bench_parse_word(text, bounds, 2, &settings->bounds);
     case 'R':
         return bench_parse_number(text, 1, 16, &settings->rounds);
+    case 'T':
+        return bench_parse_word(text, chances, 3, &settings->turn);
     default:
         return bench_parse_scene(option, text, &bench->scene_options);
     }
@@ -590,7 +597,7 @@ static bool parse(struct bench *bench, int argc, char **argv)
         {"look-at", 1, NULL, 'l'}, {"up", 1, NULL, 'u'},     {"fov", 1, NULL, 'v'},   {"runs", 1, NULL, 'r'},
         {"moves", 0, NULL, 'o'},   {"anew", 0, NULL, 'a'},   {"cut", 1, NULL, 'c'},   {"mode", 1, NULL, 'M'},
         {"bounds", 1, NULL, 'B'},  {"rounds", 1, NULL, 'R'}, {"after", 1, NULL, 'A'}, {"frames", 1, NULL, 'F'},
-        {NULL, 0, NULL, 0},
+        {"turn", 1, NULL, 'T'},    {NULL, 0, NULL, 0},
     };
     *bench = (struct bench){.beside = "bvh", .width = 256, .height = 256, .runs = 3};
     bench->scene_options.up[1] = 1;

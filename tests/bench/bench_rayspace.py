@@ -11,6 +11,7 @@ Hierarchy on the GPU'), its counts and laws, beside `bvh` and `reference`. Its J
   paper    of each of PAPER that is there, by the names of BOUNCES: likewise, two reflections, the first one's shadow rays
   reflectors  likewise, mirrors in the kitchen
   rounds   likewise, the waves of `counts` in ROUNDS rounds
+  turned   likewise, shadow rays that are turned round, beside those that are not
   over     likewise, small pictures, beside the flat descent
   frames   likewise, flat: first_ns and cpu_ns are the first and the tenth frame of a tracer
   cut      likewise, the kitchen in triangles of CUT_EDGE, flat, spheres
@@ -38,6 +39,7 @@ SCENES = [("bunny 1185", "rayspace/bunny-1185.glb"), ("bunny 5187", "rayspace/bu
 FAMILY, MOVING = 147000, 200000
 BUILD_PERCENT_MAX, PIXELS_MAX, SPREAD_MAX, BESIDE_BVH, MOVING_MAX = 1, 2.2, 1.3, 0.125, 1.5
 ROUNDS, ROUNDS_MAX = 8, {"primary": 25, "ball": 30, "mirror": 65, "shadow": 25, "turned": 25}
+TURNED_MAX = 0.8
 OVER_FLAT, FIRST_PERCENT, FRAMES = 20, 5, 10
 CUT_EDGE, CUT_TESTS = 0.1, (2.5, 4.5)
 ANEW = (5000, 20000)
@@ -138,6 +140,7 @@ def measure(bench):
     left_out = []
     data = {"counts": [measure_wave(bench, wave, pixels, left_out) for wave, (pixels, *_) in COUNTS.items()],
             "rounds": [measure_wave(bench, wave, pixels, left_out, "--rounds", ROUNDS) for wave, (pixels, *_) in COUNTS.items()],
+            "turned": [measure_wave(bench, "shadow", COUNTS["shadow"][0], left_out, "--turn", "on", "--beside", "bvh,unturned")],
             "pixels": [measure_wave(bench, wave, 2 * COUNTS[wave][0], left_out) for wave in ("primary", "ball")],
             "scenes": measure_scenes(bench, left_out),
             "beside": [call(bench, "kitchen", 9, *kitchen(bench, left_out), "--beside", "bvh,reference", "--size",
@@ -191,6 +194,10 @@ def over_flat(result):
     return paired_ratio(times(result, "flat"), times(result))
 
 
+def over_unturned(result):
+    return paired_ratio(times(result), times(result, "unturned"))
+
+
 def first_over_last(result):
     """Per cent by which a tracer's first frame takes longer than its tenth."""
     return figure([100 * (first / last - 1) for first, last in zip(result["first_ns"], times(result))])
@@ -211,6 +218,8 @@ def wanted(data):
             for r in data["counts"]]
     rows += [row(f"rayspace, cone tests a ray, {ROUNDS} rounds: {r['title']}", ROUNDS_MAX[r["wave"]], once(a_ray(r)),
                  f"kitchen, {r['width']}x{r['height']}", at_most=True) for r in data["rounds"]]
+    rows += [row("rayspace, turned shadow rays / unturned, time", TURNED_MAX, over_unturned(r),
+                 f"kitchen, {r['width']}x{r['height']}; the prototype 0.62 to 0.77", at_most=True) for r in data["turned"]]
     tests = data["cut"][0]
     rows.append(row("rayspace, triangle tests a ray: flat, spheres", CUT_TESTS[1], once(a_ray(tests, "triangle_tests")),
                     f"kitchen, edges at most {CUT_EDGE} m, {tests['triangles']} triangles, {tests['width']}x{tests['height']}; "
