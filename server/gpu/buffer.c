@@ -10,6 +10,7 @@
 #define STORAGE_FLAGS (GL_DYNAMIC_STORAGE_BIT | GL_MAP_WRITE_BIT)
 /* Small buffers start at one page. */
 #define CAPACITY_MIN_BYTES 4096
+#define STEP_BYTES ((size_t)256)
 
 static void release(struct gpu_device *device, struct gpu_buffer *buffer)
 {
@@ -19,6 +20,17 @@ static void release(struct gpu_device *device, struct gpu_buffer *buffer)
     *buffer = (struct gpu_buffer){0};
 }
 
+/* llvmpipe compiles a program for what is bound: for buffer textures whose memory is a power of two or not, and
+ * whose size has a first or second byte of 0 or not, as it takes these for levels. Bound to others, the program is
+ * compiled again, which takes up to a second. So all capacities are alike in this. */
+static size_t alike(size_t bytes)
+{
+    size_t capacity = (bytes + STEP_BYTES - 1) & ~(STEP_BYTES - 1);
+    while ((capacity & 0xff00) == 0 || (capacity & (capacity - 1)) == 0)
+        capacity += STEP_BYTES;
+    return capacity;
+}
+
 static size_t grown_capacity(size_t old_bytes, size_t size_bytes)
 {
     /* A first allocation is exact: most buffers are filled once. One that grows will grow again. */
@@ -26,8 +38,8 @@ static size_t grown_capacity(size_t old_bytes, size_t size_bytes)
     if (capacity < size_bytes)
         capacity = size_bytes;
     if (capacity < CAPACITY_MIN_BYTES)
-        return CAPACITY_MIN_BYTES;
-    return capacity > SIZE_MAX - 255 ? capacity : (capacity + 255) & ~(size_t)255;
+        capacity = CAPACITY_MIN_BYTES;
+    return capacity > PTRDIFF_MAX ? capacity : alike(capacity);
 }
 
 static bool allocate(struct gpu_device *device, struct gpu_buffer *buffer, size_t capacity, struct error *error)
@@ -181,16 +193,21 @@ void gpu_buffer_bind_uniform(const struct gpu_buffer *buffer, unsigned binding)
     glBindBufferBase(GL_UNIFORM_BUFFER, binding, name_or_empty(buffer));
 }
 
+static size_t spanned_bytes(const struct gpu_device *device, const struct gpu_buffer *buffer)
+{
+    if (!buffer->name || !buffer->size_bytes)
+        return GPU_EMPTY_BUFFER_BYTES;
+    return device->facts.software ? buffer->capacity_bytes : buffer->size_bytes;
+}
+
 static void need_texture(struct gpu_device *device, struct gpu_buffer *buffer, unsigned texel_format)
 {
     if (!buffer->texture || buffer->texel_format != texel_format) {
         gpu_object_destroy(device->registry, GPU_TEXTURE_BUFFER, buffer->texture);
         buffer->texture = gpu_object_create(device->registry, GPU_TEXTURE_BUFFER);
         buffer->texel_format = texel_format;
-        if (buffer->name && buffer->size_bytes)
-            glTextureBufferRange(buffer->texture, texel_format, buffer->name, 0, (GLsizeiptr)buffer->size_bytes);
-        else
-            glTextureBufferRange(buffer->texture, texel_format, device->empty_buffer, 0, 16);
+        glTextureBufferRange(buffer->texture, texel_format, name_or_empty(buffer), 0,
+                             (GLsizeiptr)spanned_bytes(device, buffer));
     }
 }
 

@@ -54,7 +54,8 @@ void gpu_buffer_finish(struct gpu_device *device, struct gpu_buffer *buffer); /*
 void gpu_buffer_bind_storage(const struct gpu_buffer *buffer, unsigned binding);
 void gpu_buffer_bind_uniform(const struct gpu_buffer *buffer, unsigned binding); /* UBO */
 /* As a samplerBuffer / usamplerBuffer of `texel_format` (GL_RGBA32F, GL_RGBA32UI, GL_RG32UI, GL_R32UI,
- * GL_RGBA8 ..) on a texture unit. An empty buffer is bound as one of a single zero texel. */
+ * GL_RGBA8 ..) on a texture unit. An empty buffer is bound as one of zeros. What a shader reads behind
+ * size_bytes is undefined. */
 void gpu_buffer_bind_texels(struct gpu_device *device, struct gpu_buffer *buffer, unsigned unit,
                             unsigned texel_format);
 /* Likewise as a uimageBuffer / imageBuffer, which can be written to, on an image unit. */

@@ -20,7 +20,6 @@
 
 /* glGetError keeps one flag for each of a few kinds; after a loss it may report one for ever. */
 #define GL_ERRORS_READ_MAX 8
-#define EMPTY_BUFFER_BYTES 256
 
 static _Thread_local struct gpu_device *current_device;
 
@@ -163,7 +162,7 @@ static bool open_place(struct gpu_egl *egl, struct gpu_egl_place *chosen, const 
 /* The state that every pass may rely on. */
 static bool create_defaults(struct gpu_device *device, struct error *error)
 {
-    static const unsigned char zeros[EMPTY_BUFFER_BYTES];
+    static const unsigned char zeros[GPU_EMPTY_BUFFER_BYTES];
     unsigned vertex_array = gpu_object_create(device->registry, GPU_VERTEX_ARRAY);
     device->empty_buffer = gpu_object_create(device->registry, GPU_BUFFER);
     if (!vertex_array || !device->empty_buffer || !gpu_uniforms_start(device))

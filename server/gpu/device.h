@@ -53,6 +53,8 @@ struct gpu_unseen {
     bool are_together;
 };
 
+#define GPU_EMPTY_BUFFER_BYTES 768 /* a capacity like those of buffers: see buffer.c */
+
 struct gpu_device {
     struct gpu_device_info info;
     struct gpu_facts facts;
@@ -62,7 +64,7 @@ struct gpu_device {
     struct gpu_binary_cache *binaries;  /* on the disk; NULL: none are kept */
     struct gpu_ahead *ahead;            /* compiles programs before their first use */
     bool announces;                     /* see gpu_program_announce */
-    unsigned empty_buffer;              /* 256 zero bytes, bound in place of an empty buffer */
+    unsigned empty_buffer;              /* zeros, bound in place of an empty buffer */
     struct gpu_uniform_ring uniform_ring;
     struct gpu_unseen unseen;
     const char *misused_uniform;  /* one that was given a value of another type; NULL: none */

@@ -193,7 +193,7 @@ TEST(a_large_reservation_waits_for_its_memory_and_is_made_in_a_later_step)
         while (!made && gpu_reserve_waits(device, awaited_bytes))
             sched_yield();
     }
-    assert_int_equal(device->memory_used_bytes, before + 4096 + bytes);
+    assert_int_equal(device->memory_used_bytes, before + small.capacity_bytes + large.capacity_bytes);
     device->memory_limit_bytes = device->memory_used_bytes + bytes;
     gpu_reserve_begin(device, UINT64_C(60000000000));
     error = (struct error){0};
@@ -343,6 +343,47 @@ TEST(an_empty_buffer_is_bound_as_zeros)
     assert_int_equal(gpu_device_objects(device), before + 1); /* a texture over the zeros */
     gpu_buffer_finish(device, &empty);
     assert_int_equal(gpu_device_objects(device), before);
+}
+
+static int64_t texture_value(unsigned texture, GLenum name)
+{
+    GLint value = 0;
+    glGetTextureLevelParameteriv(texture, 0, name, &value);
+    return value;
+}
+
+/* What llvmpipe compiles a program for, see gpu/buffer.c. */
+static void assert_as_all_others(struct gpu_buffer *buffer)
+{
+    GLint64 memory = 0;
+    gpu_buffer_bind_texels(device, buffer, 0, GL_R32UI);
+    glGetNamedBufferParameteri64v((GLuint)texture_value(buffer->texture, GL_TEXTURE_BUFFER_DATA_STORE_BINDING),
+                                  GL_BUFFER_SIZE, &memory);
+    const int64_t range = texture_value(buffer->texture, GL_TEXTURE_BUFFER_SIZE);
+    assert_in_range(range, buffer->size_bytes, memory);
+    assert_int_not_equal(memory & (memory - 1), 0);
+    if (!device->facts.software)
+        return;
+    assert_int_equal(range & 0xff, 0);
+    assert_int_not_equal(range >> 8 & 0xff, 0);
+}
+
+TEST(software_gl_keeps_its_programs_for_texel_buffers_of_any_size)
+{
+    static const size_t sizes[] = {0, 256, 4096, 4097, 65280, 65281, 65536, 1000000, 1 << 24};
+    struct error error = {0};
+    struct gpu_buffer growing = {0};
+    for (size_t i = 0; i < sizeof(sizes) / sizeof(sizes[0]); i++) {
+        struct gpu_buffer exact = {0};
+        assert_true(gpu_buffer_reserve(device, &exact, sizes[i], &error));
+        assert_true(gpu_buffer_reserve(device, &growing, sizes[i], &error));
+        assert_as_all_others(&exact);
+        assert_as_all_others(&growing);
+        assert_in_range(exact.capacity_bytes, sizes[i], (sizes[i] > 4096 ? sizes[i] : 4096) + 512);
+        gpu_buffer_finish(device, &exact);
+    }
+    gpu_buffer_finish(device, &growing);
+    assert_true(gpu_check(device, "texel buffers", &error));
 }
 
 TEST(destroying_a_device_takes_every_object_with_it)
