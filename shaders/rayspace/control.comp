@@ -16,6 +16,7 @@ uniform uint limit_max;        // pairs of a pass
 // The last places of a stack are for passes of one pair: one after another, these go down to the leaves with few.
 uniform uint reserve;
 uniform float band;
+uniform uint children; // that a pass has room for, of each pair that it takes; 0: it takes what it can
 uniform uint seeds;        // pairs that were put onto stack `from` since
 uniform uint ends;         // RAYSPACE_END_*
 uniform uint stopped_word; // in `stopped`; 0xffffffff: the slice cannot be stopped
@@ -48,9 +49,11 @@ void main()
     c.leaves_taken = is_due && leaves_wanted != 0xffffffffu ? c.leaves : 0u;
     c.leaves -= c.leaves_taken;
     c.taken = ends != RAYSPACE_END_NOTHING ? 0u : min(waiting[from], c.limit);
+    uint free = capacity - waiting[to], unreserved = free - min(free, reserve);
+    if (children > 0u && c.taken > 1u)
+        c.taken = clamp(unreserved / children, 1u, c.taken);
+    c.room = c.taken <= 1u ? free : unreserved;
     c.first = waiting[from] - c.taken;
-    uint free = capacity - waiting[to];
-    c.room = c.taken <= 1u ? free : free - min(free, reserve);
     // Where there is hardly room for what is put off, nothing is.
     c.put_off_room = capacity - waiting[later];
     c.band = c.put_off_room > capacity / 2u ? band : 3e38;

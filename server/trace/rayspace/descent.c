@@ -232,6 +232,14 @@ bool rayspace_descent_begin(struct rayspace *rayspace, struct gpu_scene *scene, 
 
 /* ---- passes ---- */
 
+/* Pairs of a flat batch have nearly as many children as there can be, near the root: a pass that takes all of them
+ * is done in vain, and one of half of them again. Where waves are queued ahead, passes are few and take what they
+ * can: batches that do not fit are halved for the next wave. In the joint descent hardly any pass fails. */
+static uint32_t children_with_room(const struct rayspace_state *state)
+{
+    return is_flat(state) && !rayspace_is_ahead(state) ? RAYSPACE_CHILDREN : 0;
+}
+
 static bool dispatch_control(struct rayspace_state *state, const struct gpu_scene *scene, uint32_t leaves_wanted,
                              uint32_t end, struct error *error)
 {
@@ -256,6 +264,7 @@ static bool dispatch_control(struct rayspace_state *state, const struct gpu_scen
     gpu_uniform_uint(program, "limit_max", pass_max(state, scene->device));
     gpu_uniform_uint(program, "reserve", reserved_of(state));
     gpu_uniform_float(program, "band", band_of(state, scene));
+    gpu_uniform_uint(program, "children", children_with_room(state));
     gpu_uniform_uint(program, "seeds", state->seeds);
     gpu_uniform_uint(program, "ends", end);
     gpu_uniform_uint(program, "stopped_word", rayspace_is_ahead(state) ? wave->stopped_word : UINT32_MAX);
