@@ -303,7 +303,7 @@ static void note_geometry(struct gpu_scene *gpu, uint32_t use_index, uint32_t *c
     *close_vertex += geometry->device.vertex_count;
     if (geometry->device.close_offset != close_offset) {
         geometry->device.close_offset = close_offset;
-        gpu->state->stale_geometries = true;
+        gpu->state->stale_tables = true;
     }
     geometry->deformed_revision = use->revision;
     memcpy(geometry->lower, use->box.lower, sizeof(geometry->lower));

@@ -427,7 +427,7 @@ bool gpu_scene_list_geometry(struct gpu_scene *gpu, const struct scene *scene, s
         return false;
     struct totals totals = lay_out(gpu);
     gpu->state->close_vertex = (uint32_t)totals.vertices;
-    gpu->state->stale_geometries = true;
+    gpu->state->stale_tables = true;
     gpu->state->brought.bits |= CHANGED_GEOMETRY;
     gpu->state->shapes_signature = signature;
     if (!check_totals(gpu, &totals, error))
@@ -476,7 +476,7 @@ void gpu_scene_classify_geometry(struct gpu_scene *gpu, const struct scene *scen
             if (ranges[k].count > 0)
                 classify_material(gpu, scene, pose, ranges[k].material, &flags);
         if (flags != geometry->device.flags)
-            gpu->state->stale_geometries = true;
+            gpu->state->stale_tables = true;
         geometry->device.flags = flags;
         gpu->has_texcoords |= (flags & (GEOMETRY_HAS_TEXCOORDS_0 | GEOMETRY_HAS_TEXCOORDS_1)) != 0;
         gpu->has_colours |= (flags & GEOMETRY_HAS_COLOURS) != 0;
@@ -488,20 +488,4 @@ void gpu_scene_classify_geometry(struct gpu_scene *gpu, const struct scene *scen
     uint32_t ignored = 0;
     while (hashmap_next(&scene->objects[OBJECT_DISC], &cursor, &id, &value))
         classify_material(gpu, scene, pose, ((const struct scene_disc *)value)->material, &ignored);
-}
-
-bool gpu_scene_upload_geometry_table(struct gpu_scene *gpu, struct scene_changes *changes, struct error *error)
-{
-    size_t bytes = gpu->geometry_count * sizeof(struct geometry);
-    if (!gpu->state->stale_geometries)
-        return true;
-    struct geometry *out = gpu_buffer_map(gpu->device, &gpu->geometry_buffer, bytes, error);
-    if (!out)
-        return false;
-    for (uint32_t i = 0; i < gpu->geometry_count; i++)
-        out[i] = gpu->geometries[i].device;
-    gpu_buffer_unmap(gpu->device, &gpu->geometry_buffer);
-    changes->uploaded_bytes += bytes;
-    gpu->state->stale_geometries = false;
-    return true;
 }

@@ -267,8 +267,8 @@ static void pack_disc(const struct gpu_scene *gpu, const struct scene_disc *in, 
         out->normal[i] = length > 0.0f ? in->normal_world[i] / length : 0.0f;
 }
 
-bool gpu_scene_upload_discs(struct gpu_scene *gpu, const struct scene *scene, struct scene_changes *changes,
-                            struct error *error)
+bool gpu_scene_pack_discs(struct gpu_scene *gpu, const struct scene *scene, struct scene_changes *changes,
+                          struct error *error)
 {
     uint64_t signature = gpu_scene_signature(scene, OBJECT_DISC), id;
     size_t count = scene->objects[OBJECT_DISC].count, cursor = 0, n = 0;
@@ -287,7 +287,7 @@ bool gpu_scene_upload_discs(struct gpu_scene *gpu, const struct scene *scene, st
     for (size_t i = 0; i < n; i++)
         pack_disc(gpu, sorted[i], &discs[i]);
     free(sorted);
-    if (!ok || !gpu_buffer_upload(gpu->device, &gpu->disc_buffer, discs, count * sizeof(*discs), error)) {
+    if (!ok) {
         free(discs);
         return false;
     }
@@ -295,8 +295,8 @@ bool gpu_scene_upload_discs(struct gpu_scene *gpu, const struct scene *scene, st
     gpu->discs = discs;
     gpu->disc_count = (uint32_t)count;
     gpu->state->discs_signature = signature;
+    gpu->state->stale_tables = true;
     changes->bits |= CHANGED_DISCS;
-    changes->uploaded_bytes += count * sizeof(*discs);
     return true;
 }
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Materials and their texture slots into the buffers of shared/material.h. */
+/* Materials and their texture slots as shared/material.h has them. */
 #include "gpu_scene/state.h"
 
 #include "shared/material.h"
@@ -132,30 +132,6 @@ static void pack_default(struct material *out)
     };
 }
 
-/* The items from the first that differs from the mirror to the last; all of them where the number is another. */
-static bool upload_changed(struct gpu_scene *gpu, struct gpu_buffer *buffer, const void *fresh, const void *mirror,
-                           size_t item_bytes, size_t count, struct scene_changes *changes, struct error *error)
-{
-    const char *now = fresh, *before = mirror;
-    if (!mirror || buffer->size_bytes != count * item_bytes) {
-        changes->bits |= CHANGED_SHADING;
-        changes->uploaded_bytes += count * item_bytes;
-        return gpu_buffer_upload(gpu->device, buffer, fresh, count * item_bytes, error);
-    }
-    size_t first = 0, end = count;
-    while (first < count && memcmp(now + first * item_bytes, before + first * item_bytes, item_bytes) == 0)
-        first++;
-    while (end > first && memcmp(now + (end - 1) * item_bytes, before + (end - 1) * item_bytes, item_bytes) == 0)
-        end--;
-    if (first == end)
-        return true;
-    changes->bits |= CHANGED_SHADING;
-    changes->uploaded_bytes += (end - first) * item_bytes;
-    gpu_buffer_write(gpu->device, buffer, first * item_bytes, now + first * item_bytes,
-                     (end - first) * item_bytes);
-    return true;
-}
-
 static bool same_textures(const struct material *a, const struct material *b)
 {
     return a->texture_base_colour == b->texture_base_colour && a->texture_normal == b->texture_normal &&
@@ -174,24 +150,31 @@ static bool same_surface(const struct material *a, const struct material *b)
            (a->base_colour[3] == b->base_colour[3] && a->alpha_cutoff == b->alpha_cutoff);
 }
 
-/* Against the mirrors. Materials that are new do not count: no surface that was there has one. */
-static bool same_surfaces(const struct gpu_scene *gpu, const struct material *materials, uint32_t count,
-                          const struct texture_slot *slots, uint32_t slot_count)
+/* Whether the slots are those of the last update. */
+static bool same_slots(const struct gpu_scene_state *state, const struct texture_slot *slots, uint32_t slot_count)
 {
-    const struct gpu_scene_state *state = gpu->state;
-    size_t slot_bytes = slot_count * sizeof(*slots);
-    if (!state->materials || gpu->texture_slots.size_bytes != slot_bytes ||
-        memcmp(slots, state->texture_slots, slot_bytes) != 0)
-        return false;
-    for (uint32_t i = 0; i < count && i < gpu->material_count; i++)
-        if (!same_surface(&materials[i], &state->materials[i]))
-            return false;
-    return true;
+    return state->texture_slots && state->texture_slot_count == slot_count &&
+           memcmp(slots, state->texture_slots, slot_count * sizeof(*slots)) == 0;
 }
 
-bool gpu_scene_upload_materials(struct gpu_scene *gpu, const struct scene *scene,
-                                const struct scene_motion *motion, struct scene_changes *changes,
-                                struct error *error)
+/* What differs from the last update. Materials that are new do not count as other surfaces: none that was there
+ * has one. */
+static unsigned changes_of(const struct gpu_scene *gpu, const struct material *materials, uint32_t count,
+                           const struct texture_slot *slots, uint32_t slot_count)
+{
+    const struct gpu_scene_state *state = gpu->state;
+    if (!same_slots(state, slots, slot_count))
+        return CHANGED_SHADING | CHANGED_SURFACES;
+    for (uint32_t i = 0; i < count && i < gpu->material_count; i++)
+        if (!same_surface(&materials[i], &state->materials[i]))
+            return CHANGED_SHADING | CHANGED_SURFACES;
+    return count == gpu->material_count && memcmp(materials, state->materials, count * sizeof(*materials)) == 0
+               ? 0
+               : CHANGED_SHADING;
+}
+
+bool gpu_scene_pack_materials(struct gpu_scene *gpu, const struct scene *scene, const struct scene_motion *motion,
+                              struct scene_changes *changes, struct error *error)
 {
     const struct scene_pose *pose = motion ? &motion->poses[0] : NULL;
     struct gpu_scene_state *state = gpu->state;
@@ -201,24 +184,23 @@ bool gpu_scene_upload_materials(struct gpu_scene *gpu, const struct scene *scene
     struct texture_slot *slots = calloc(slot_max, sizeof(*slots));
     uint64_t id;
     void *value;
-    bool ok = packed && slots;
-    if (!ok)
-        error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for %u materials", count);
-    else
-        pack_default(&packed[0]);
-    while (ok && hashmap_next(&scene->objects[OBJECT_MATERIAL], &cursor, &id, &value))
+    if (!packed || !slots) {
+        free(packed);
+        free(slots);
+        return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for %u materials", count);
+    }
+    pack_default(&packed[0]);
+    while (hashmap_next(&scene->objects[OBJECT_MATERIAL], &cursor, &id, &value))
         pack_material(gpu, scene_pose_material(pose, value), &packed[gpu_scene_material_index(gpu, (uint32_t)id)],
                       slots, &slot_count);
-    if (ok && !same_surfaces(gpu, packed, count, slots, slot_count))
-        changes->bits |= CHANGED_SURFACES;
-    ok = ok &&
-         upload_changed(gpu, &gpu->materials, packed, state->materials, sizeof(*packed), count, changes, error) &&
-         upload_changed(gpu, &gpu->texture_slots, slots, state->texture_slots, sizeof(*slots), slot_count, changes,
-                        error);
+    unsigned bits = changes_of(gpu, packed, count, slots, slot_count);
+    changes->bits |= bits;
+    state->stale_tables |= bits != 0;
     free(state->materials);
     free(state->texture_slots);
     state->materials = packed;
     state->texture_slots = slots;
+    state->texture_slot_count = slot_count;
     gpu->material_count = count;
-    return ok;
+    return true;
 }

@@ -14,16 +14,15 @@ void gpu_scene_init(struct gpu_scene *gpu, struct gpu_device *device)
     *gpu = (struct gpu_scene){.device = device};
 }
 
-#define BUFFERS_MAX (17 + DEFORM_BUFFERS_MAX)
+#define BUFFERS_MAX (13 + DEFORM_BUFFERS_MAX)
 
 /* All of them; returns how many. */
 static size_t list_buffers(struct gpu_scene *gpu, struct gpu_buffer *buffers[BUFFERS_MAX])
 {
     struct gpu_buffer *own[] = {
-        &gpu->triangles,        &gpu->positions,       &gpu->normals,     &gpu->tangents, &gpu->texcoords,
-        &gpu->colours,          &gpu->spheres,         &gpu->materials,   &gpu->textures, &gpu->texels,
-        &gpu->instance_buffer,  &gpu->geometry_buffer, &gpu->disc_buffer, &gpu->lights,   &gpu->texture_slots,
-        &gpu->sphere_materials, &gpu->motion_buffer,
+        &gpu->triangles, &gpu->positions, &gpu->normals,          &gpu->tangents,        &gpu->texcoords,
+        &gpu->colours,   &gpu->spheres,   &gpu->sphere_materials, &gpu->instance_buffer, &gpu->motion_buffer,
+        &gpu->tables,    &gpu->texels,    &gpu->lights,
     };
     size_t count = sizeof(own) / sizeof(own[0]);
     memcpy(buffers, own, sizeof(own));
@@ -51,6 +50,8 @@ void gpu_scene_finish(struct gpu_scene *gpu)
         free(gpu->state->material_indices.free);
         free(gpu->state->materials);
         free(gpu->state->texture_slots);
+        free(gpu->state->textures);
+        free(gpu->state->tables);
         free(gpu->state->lights);
         free(gpu->state);
     }
@@ -105,7 +106,7 @@ static bool update_shading(struct gpu_scene *gpu, const struct scene *scene, con
                            bool edited, struct scene_changes *changes, struct error *error)
 {
     changes->bits |= edited ? CHANGED_SHADING : 0;
-    return gpu_scene_upload_materials(gpu, scene, motion, changes, error);
+    return gpu_scene_pack_materials(gpu, scene, motion, changes, error);
 }
 
 /* `posed`: the kinds that poses change, now or in the last update. */
@@ -120,13 +121,13 @@ static bool update_parts(struct gpu_scene *gpu, const struct scene *scene, const
     bool lights = fresh || gpu->lights_revision != scene->lights_revision || (posed & POSED_LIGHTS);
     if (shading && !update_shading(gpu, scene, motion, shading_edited, changes, error))
         return false;
-    if (geometry && !gpu_scene_upload_discs(gpu, scene, changes, error))
+    if (geometry && !gpu_scene_pack_discs(gpu, scene, changes, error))
         return false;
     if (geometry || shading || (changes->bits & CHANGED_GEOMETRY))
         gpu_scene_classify_geometry(gpu, scene, motion);
     if ((geometry || nodes || (posed & POSED_MORPHS)) && !gpu_scene_deform(gpu, scene, motion, changes, error))
         return false;
-    if (!gpu_scene_upload_geometry_table(gpu, changes, error))
+    if (!gpu_scene_upload_tables(gpu, changes, error))
         return false;
     if ((geometry || nodes) && !gpu_scene_upload_instances(gpu, scene, motion, changes, error))
         return false;
@@ -270,11 +271,7 @@ void gpu_scene_bind(struct gpu_scene *gpu)
     struct gpu_device *device = gpu->device;
     gpu_buffer_bind_texels(gpu->device, &gpu->instance_buffer, UNIT_INSTANCES, GL_RGBA32UI);
     gpu_buffer_bind_texels(gpu->device, &gpu->motion_buffer, UNIT_MOTIONS, GL_RGBA32F);
-    gpu_buffer_bind_texels(gpu->device, &gpu->geometry_buffer, UNIT_GEOMETRIES, GL_RGBA32UI);
-    gpu_buffer_bind_storage(&gpu->materials, BIND_MATERIALS);
-    gpu_buffer_bind_storage(&gpu->texture_slots, BIND_TEXTURE_SLOTS);
-    gpu_buffer_bind_storage(&gpu->textures, BIND_TEXTURES);
-    gpu_buffer_bind_storage(&gpu->disc_buffer, BIND_DISCS);
+    gpu_buffer_bind_texels(gpu->device, &gpu->tables, UNIT_TABLES, GL_RGBA32UI);
     gpu_buffer_bind_texels(device, &gpu->triangles, UNIT_TRIANGLES, GL_RGBA32UI);
     gpu_buffer_bind_texels(device, &gpu->positions, UNIT_POSITIONS, GL_RGBA32F);
     gpu_buffer_bind_texels(device, &gpu->normals, UNIT_NORMALS, GL_RGBA32F);

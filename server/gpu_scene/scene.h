@@ -11,6 +11,7 @@
 #include "scene/pose.h"
 #include "scene/scene.h"
 #include "shared/geometry.h"
+#include "shared/tables.h"
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -84,10 +85,10 @@ struct gpu_scene {
     bool has_environment_image;
     float lower_world[3], upper_world[3]; /* all instances and lights with a place; discs left out */
     float diagonal;                       /* of these bounds */
-    /* buffers as shared/geometry.h and shared/material.h describe them */
+    /* buffers as shared/geometry.h, shared/tables.h and shared/material.h describe them */
     struct gpu_buffer triangles, positions, normals, tangents, texcoords, colours, spheres, sphere_materials;
-    struct gpu_buffer instance_buffer, motion_buffer, geometry_buffer, disc_buffer;
-    struct gpu_buffer materials, texture_slots, textures, texels, lights;
+    struct gpu_buffer instance_buffer, motion_buffer, tables, texels, lights;
+    struct table_starts table_starts; /* mirror of the head of `tables` */
     struct gpu_texture environment;
     float environment_colour[3], environment_rotation;
     uint64_t geometry_revision, instances_revision, shading_revision, lights_revision; /* of what is there */

@@ -20,13 +20,19 @@ enum posed_part { POSED_NODES = 1, POSED_MORPHS = 2, POSED_LIGHTS = 4, POSED_MAT
 
 struct material;
 struct texture_slot;
+struct texture_info;
 struct light;
 
 struct gpu_scene_state {
     /* Mirrors of buffers. */
+    char *tables; /* NULL: none are there yet */
+    struct light *lights;
+    /* Tables, beside the geometries and the discs of the scene. */
     struct material *materials;
     struct texture_slot *texture_slots;
-    struct light *lights;
+    struct texture_info *textures;
+    uint32_t texture_slot_count, texture_count;
+    bool stale_tables; /* those on the device are not what these say */
     struct material_indices material_indices;
     uint64_t shapes_signature; /* of the meshes and sphere sets that are packed */
     uint64_t discs_signature;
@@ -37,9 +43,8 @@ struct gpu_scene_state {
     uint32_t rigid_count;               /* geometries that do not deform: the first ones */
     uint32_t close_vertex;              /* where the deforming geometries' vertices as the shutter closes begin */
     struct gpu_scene_deform deform;
-    bool stale_geometries; /* the table on the device is not what `geometries` says */
-    unsigned posed_parts;  /* POSED_*, by the last update: without poses they are elsewhere again */
-    bool any_update;       /* false: nothing is there yet */
+    unsigned posed_parts; /* POSED_*, by the last update: without poses they are elsewhere again */
+    bool any_update;      /* false: nothing is there yet */
     /* What gpu_scene_bring() is at, and what it has changed since the last update. */
     bool is_bringing, has_brought;
     uint64_t brought_revision; /* of the scene, with `has_brought` */
@@ -59,10 +64,8 @@ bool gpu_scene_check_texels(const struct gpu_scene *gpu, uint64_t count, const c
 /* material.c. Indices first: geometry is packed with them. */
 bool gpu_scene_index_materials(struct gpu_scene *gpu, const struct scene *scene, struct error *error);
 uint32_t gpu_scene_material_index(const struct gpu_scene *gpu, uint32_t material_id); /* 0: the default */
-/* What differs from the mirrors. */
-bool gpu_scene_upload_materials(struct gpu_scene *gpu, const struct scene *scene,
-                                const struct scene_motion *motion, struct scene_changes *changes,
-                                struct error *error);
+bool gpu_scene_pack_materials(struct gpu_scene *gpu, const struct scene *scene, const struct scene_motion *motion,
+                              struct scene_changes *changes, struct error *error);
 /* texture.c. Lists what is to be packed, nothing where no texture changed; the second, once it is. */
 bool gpu_scene_list_textures(struct gpu_scene *gpu, const struct scene *scene, struct error *error);
 bool gpu_scene_finish_textures(struct gpu_scene *gpu, struct error *error);
@@ -73,8 +76,6 @@ bool gpu_scene_list_geometry(struct gpu_scene *gpu, const struct scene *scene, s
 /* Which geometry has cutouts, what the scene has of special materials. */
 void gpu_scene_classify_geometry(struct gpu_scene *gpu, const struct scene *scene,
                                  const struct scene_motion *motion);
-/* The table of geometries, where it is stale. */
-bool gpu_scene_upload_geometry_table(struct gpu_scene *gpu, struct scene_changes *changes, struct error *error);
 /* deform.c. Brings the vertices of what deforms to the first pose and to the last. */
 bool gpu_scene_deform(struct gpu_scene *gpu, const struct scene *scene, const struct scene_motion *motion,
                       struct scene_changes *changes, struct error *error);
@@ -84,10 +85,12 @@ bool gpu_scene_any_closes(const struct gpu_scene *gpu);
 bool gpu_scene_upload_instances(struct gpu_scene *gpu, const struct scene *scene,
                                 const struct scene_motion *motion, struct scene_changes *changes,
                                 struct error *error);
-bool gpu_scene_upload_discs(struct gpu_scene *gpu, const struct scene *scene, struct scene_changes *changes,
-                            struct error *error);
+bool gpu_scene_pack_discs(struct gpu_scene *gpu, const struct scene *scene, struct scene_changes *changes,
+                          struct error *error);
 /* Of the instances; empty (lower above upper) if there are none. */
 void gpu_scene_all_instance_bounds(const struct gpu_scene *gpu, float lower[3], float upper[3]);
+/* tables.c. What differs from the mirror, where they are stale. */
+bool gpu_scene_upload_tables(struct gpu_scene *gpu, struct scene_changes *changes, struct error *error);
 /* light.c. As the shutter opens; the bounds too. */
 bool gpu_scene_upload_lights(struct gpu_scene *gpu, const struct scene *scene, const struct scene_motion *motion,
                              struct scene_changes *changes, struct error *error);

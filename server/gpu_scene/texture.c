@@ -219,12 +219,6 @@ static void write_texels(const struct gpu_scene *gpu, const struct packing_part 
     parallel_run(threads > PACK_THREADS_MAX ? PACK_THREADS_MAX : threads, packing->count, pack_one, &run);
 }
 
-static void write_infos(const struct gpu_scene *gpu, const struct packing_part *part, const atomic_bool *stop)
-{
-    (void)stop;
-    memcpy(part->out, gpu->state->texture_packing->infos, part->bytes);
-}
-
 void gpu_scene_drop_texture_packing(struct gpu_scene *gpu)
 {
     struct texture_packing *packing = gpu->state->texture_packing;
@@ -268,18 +262,21 @@ bool gpu_scene_list_textures(struct gpu_scene *gpu, const struct scene *scene, s
     packing_add(&gpu->state->packing, &(struct packing_part){.buffer = &gpu->texels,
                                                              .bytes = (size_t)packing->texel_count * 4,
                                                              .write = write_texels});
-    packing_add(&gpu->state->packing, &(struct packing_part){.buffer = &gpu->textures,
-                                                             .bytes = packing->count * sizeof(*packing->infos),
-                                                             .write = write_infos});
     return true;
 }
 
 bool gpu_scene_finish_textures(struct gpu_scene *gpu, struct error *error)
 {
-    const struct texture_packing *packing = gpu->state->texture_packing;
+    struct gpu_scene_state *state = gpu->state;
+    struct texture_packing *packing = state->texture_packing;
     if (!packing)
         return true;
     const bool failed = atomic_load(&packing->failed);
+    free(state->textures);
+    state->textures = packing->infos;
+    state->texture_count = packing->count;
+    state->stale_tables = true;
+    packing->infos = NULL;
     gpu_scene_drop_texture_packing(gpu);
     return !failed || error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory to halve textures in");
 }

@@ -7,7 +7,7 @@
 uint material_index_of(candidate found)
 {
     if (found.instance_index == HIT_NO_PRIMITIVE)
-        return discs[found.primitive].material;
+        return disc_at(found.primitive).material;
 #ifdef HAS_SPHERES
     if (geometry_at(instance_at(found.instance_index).geometry).kind == GEOMETRY_SPHERES)
         return texelFetch(sphere_materials, int(found.primitive)).x;
@@ -27,7 +27,7 @@ surface_point point_of(candidate found, vec3 origin_world, vec3 direction_world,
     return surface_point(vec4(0.0), vec4(1.0));
 #else
     if (found.instance_index == HIT_NO_PRIMITIVE)
-        return surface_point(disc_texcoords(discs[found.primitive],
+        return surface_point(disc_texcoords(disc_at(found.primitive),
                                             origin_world + found.distance * direction_world),
                              vec4(1.0));
     instance i = instance_at_time(found.instance_index, time);
@@ -60,7 +60,7 @@ vec4 base_colour_at(material m, surface_point point)
 bool is_cut_out(candidate found, vec3 origin_world, vec3 direction_world, float time)
 {
 #ifdef HAS_CUTOUT
-    material m = materials[material_index_of(found)];
+    material m = material_at(material_index_of(found));
     if ((m.flags & MATERIAL_ALPHA_MASK) == 0u)
         return false;
     return base_colour_at(m, point_of(found, origin_world, direction_world, time)).a < m.alpha_cutoff;
@@ -74,7 +74,7 @@ bool is_cut_out(candidate found, vec3 origin_world, vec3 direction_world, float 
 vec3 transmittance_of(candidate found, vec3 origin_world, vec3 direction_world, float time)
 {
 #if defined HAS_CUTOUT || defined HAS_TRANSLUCENT
-    material m = materials[material_index_of(found)];
+    material m = material_at(material_index_of(found));
     bool is_mask = (m.flags & MATERIAL_ALPHA_MASK) != 0u;
     bool is_blend = (m.flags & MATERIAL_ALPHA_BLEND) != 0u;
     if (!is_mask && !is_blend && m.transmission == 0.0)

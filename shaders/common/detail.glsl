@@ -54,7 +54,7 @@ surface_detail detail_at(hit h)
     if (h.primitive == HIT_NO_PRIMITIVE)
         return detail;
     if (h.instance == HIT_NO_PRIMITIVE) { // texture coordinates run 0..1 across the disc
-        detail.texcoords_per_metre = vec2(0.5 / discs[h.primitive].centre_radius.w);
+        detail.texcoords_per_metre = vec2(0.5 / disc_at(h.primitive).centre_radius.w);
         return detail;
     }
     instance i = instance_at(h.instance);

@@ -17,7 +17,7 @@ bool discs_any(trace_ray r, inout vec3 optical_depth)
 {
     for (uint i = 0u; i < DISC_COUNT; i++) {
         candidate found = candidate(0.0, i, HIT_NO_PRIMITIVE, vec2(0.0));
-        disc d = discs[i];
+        disc d = disc_at(i);
         if (intersect_disc(r.origin, r.direction, d.centre_radius.xyz, d.normal.xyz, d.centre_radius.w,
                            found.distance) &&
             offer_any(r, found, optical_depth))
@@ -32,7 +32,7 @@ void discs_closest(trace_ray r, inout candidate best)
 {
     for (uint i = 0u; i < DISC_COUNT; i++) {
         candidate found = candidate(0.0, i, HIT_NO_PRIMITIVE, vec2(0.0));
-        disc d = discs[i];
+        disc d = disc_at(i);
         if (intersect_disc(r.origin, r.direction, d.centre_radius.xyz, d.normal.xyz, d.centre_radius.w,
                            found.distance))
             offer_closest(r, found, best);

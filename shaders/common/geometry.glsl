@@ -2,6 +2,7 @@
 // The scene's geometry on the device: what gpu_scene_bind() binds. Layouts: shared/geometry.h.
 #include "shared/bindings.h"
 #include "shared/geometry.h"
+#include "common/tables.glsl"
 
 layout(binding = UNIT_TRIANGLES) uniform usamplerBuffer triangles;       // i0 i1 i2 material
 layout(binding = UNIT_POSITIONS) uniform samplerBuffer positions;        // xyz, object space
@@ -10,12 +11,8 @@ layout(binding = UNIT_COLOURS) uniform samplerBuffer colours;            // rgba
 layout(binding = UNIT_SPHERES) uniform samplerBuffer spheres;            // centre, radius
 layout(binding = UNIT_SPHERE_MATERIALS) uniform usamplerBuffer sphere_materials;
 
-// Structs in texels: software GL reads a storage buffer a word and a lane at a time.
-layout(binding = UNIT_INSTANCES) uniform usamplerBuffer instances;
-layout(binding = UNIT_GEOMETRIES) uniform usamplerBuffer geometries;
-layout(std430, binding = BIND_DISCS) readonly buffer disc_block { disc discs[]; };
+layout(binding = UNIT_INSTANCES) uniform usamplerBuffer instances;       // struct instance
 
-// Unused members of a struct are not fetched.
 instance instance_at(uint index)
 {
     int texel = int(index) * INSTANCE_TEXELS;
@@ -30,11 +27,4 @@ instance instance_at(uint index)
     i.flags = last.z;
     i.motion = last.w;
     return i;
-}
-
-geometry geometry_at(uint index)
-{
-    int texel = int(index) * GEOMETRY_TEXELS;
-    uvec4 first = texelFetch(geometries, texel), second = texelFetch(geometries, texel + 1);
-    return geometry(first.x, first.y, first.z, first.w, second.x, second.y, second.z, second.w);
 }

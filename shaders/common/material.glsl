@@ -38,7 +38,7 @@ vec2 footprint_of(surface_detail detail, vec3 geometric, vec3 direction, float w
 // Of the two nearest levels the nearer one: half the work of blending them.
 int use_level(texture_slot slot, vec2 footprint_uv)
 {
-    int last = int(textures[slot.texture & 0x7fffffffu].flags >> TEXTURE_LEVELS_SHIFT) - 1;
+    int last = int(texture_at(slot.texture & 0x7fffffffu).flags >> TEXTURE_LEVELS_SHIFT) - 1;
     return clamp(int(slot_level(slot, footprint_uv) + 0.5), 0, last);
 }
 
@@ -50,7 +50,7 @@ bool surface_derivatives(hit h, texture_slot slot, out vec3 along_u, out vec3 al
     if (h.primitive == HIT_NO_PRIMITIVE)
         return false;
     if (h.instance == HIT_NO_PRIMITIVE) {
-        disc d = discs[h.primitive];
+        disc d = disc_at(h.primitive);
         vec3 tangent, bitangent;
         tangent_frame(d.normal.xyz, tangent, bitangent);
         along_u = 2.0 * d.centre_radius.w * tangent; // texture coordinates run 0..1 across the disc
@@ -88,11 +88,11 @@ bool surface_derivatives(hit h, texture_slot slot, out vec3 along_u, out vec3 al
 // differences over one texel of the level that the footprint sees.
 vec3 bump_normal(hit h, uint slot_index, vec3 normal, vec4 uv01, vec2 footprint_uv)
 {
-    texture_slot slot = texture_slots[slot_index];
+    texture_slot slot = texture_slot_at(slot_index);
     vec3 along_u, along_v;
     if (!surface_derivatives(h, slot, along_u, along_v))
         return normal;
-    texture_info info = textures[slot.texture & 0x7fffffffu];
+    texture_info info = texture_at(slot.texture & 0x7fffffffu);
     int level = use_level(slot, footprint_uv);
     vec2 uv = slot_texcoords(slot, uv01), texel = 1.0 / vec2(find_level(info, level).size);
     float height_u = 0.0, height_v = 0.0;
@@ -142,8 +142,8 @@ void apply_textures(inout surface s, inout vec4 colour, hit h, material m, vec4 
     while (used != 0u) { // not a loop over all: software GL would sample for the missing ones, too
         int i = findLSB(used);
         used &= used - 1u;
-        texture_slot slot = texture_slots[uses[i]];
-        texture_info info = textures[slot.texture & 0x7fffffffu];
+        texture_slot slot = texture_slot_at(uses[i]);
+        texture_info info = texture_at(slot.texture & 0x7fffffffu);
         vec4 texel = sample_level(info, use_level(slot, footprint_uv), slot_texcoords(slot, uv01));
         if (i == BASE_COLOUR) {
             colour *= texel;
@@ -185,7 +185,7 @@ void apply_sample(inout surface s, inout vec4 colour, uvec4 words)
 // `width`: of the ray's cone at the hit.
 surface surface_at(hit h, vec3 origin, vec3 direction, float width)
 {
-    material m = materials[h.material & HIT_MATERIAL_MASK];
+    material m = material_at(h.material & HIT_MATERIAL_MASK);
     vec4 uv01 = uintBitsToFloat(h.uv01_or_sample);
     surface s;
     s.position = origin + h.distance * direction;

@@ -71,11 +71,11 @@ bool triangle_tangent(uvec4 triangle, vec3 corners[3], geometry g, float time, v
         tangent_object = vec4(sum, handedness);
         return handedness != 0.0 && dot(sum, sum) > 0.0;
     }
-    material m = materials[triangle.w & HIT_MATERIAL_MASK];
+    material m = material_at(triangle.w & HIT_MATERIAL_MASK);
     uint slot_index = m.texture_normal != 0u ? m.texture_normal : m.texture_bump;
     if (slot_index == 0u && m.anisotropy == 0.0 || (g.flags & (GEOMETRY_HAS_TEXCOORDS_0 | GEOMETRY_HAS_TEXCOORDS_1)) == 0u)
         return false;
-    bool second = slot_index != 0u && (texture_slots[slot_index].texture & 0x80000000u) != 0u;
+    bool second = slot_index != 0u && (texture_slot_at(slot_index).texture & 0x80000000u) != 0u;
     return texture_tangent(triangle, corners, second, normal_object, tangent_object);
 #endif
 }
@@ -159,7 +159,7 @@ hit surface_sphere(uint instance_index, uint primitive, float distance, vec3 ori
 
 hit surface_disc(uint disc_index, float distance, vec3 origin_world, vec3 direction_world)
 {
-    disc d = discs[disc_index];
+    disc d = disc_at(disc_index);
     vec3 tangent, bitangent;
     tangent_frame(d.normal.xyz, tangent, bitangent);
     hit h = finish_hit(d.material, distance, direction_world, d.normal.xyz, d.normal.xyz,

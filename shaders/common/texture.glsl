@@ -1,14 +1,10 @@
 // SPDX-License-Identifier: MIT
-// Materials, and textures from the one texel buffer that holds them all. Layouts: shared/material.h.
+// Textures, from the one texel buffer that holds them all. Layouts: shared/material.h.
 #include "shared/bindings.h"
-#include "shared/material.h"
 #include "common/colour.glsl"
+#include "common/tables.glsl"
 
 layout(binding = UNIT_TEXELS) uniform samplerBuffer texels; // RGBA8 unorm, as stored
-
-layout(std430, binding = BIND_MATERIALS) readonly buffer material_block { material materials[]; };
-layout(std430, binding = BIND_TEXTURE_SLOTS) readonly buffer texture_slot_block { texture_slot texture_slots[]; };
-layout(std430, binding = BIND_TEXTURES) readonly buffer texture_block { texture_info textures[]; };
 
 // Modes: 0 repeat, 1 clamp, 2 mirror.
 float wrap_coordinate(float u, uint mode)
@@ -83,7 +79,7 @@ vec2 slot_texcoords(texture_slot slot, vec4 uv01)
 // matrix.
 float slot_level(texture_slot slot, vec2 footprint_uv)
 {
-    texture_info info = textures[slot.texture & 0x7fffffffu];
+    texture_info info = texture_at(slot.texture & 0x7fffffffu);
     float footprint = (slot.texture & 0x80000000u) != 0u ? footprint_uv.y : footprint_uv.x;
     float scale = sqrt(abs(determinant(mat2(slot.uv_matrix.xy, slot.uv_matrix.zw))));
     float texels_wide = footprint * scale * sqrt(float(info.width) * float(info.height));
@@ -93,6 +89,6 @@ float slot_level(texture_slot slot, vec2 footprint_uv)
 // A material's input in full detail: `slot_index` is one of its texture_* fields and not 0.
 vec4 sample_slot(uint slot_index, vec4 uv01)
 {
-    texture_slot slot = texture_slots[slot_index];
-    return sample_level(textures[slot.texture & 0x7fffffffu], 0, slot_texcoords(slot, uv01));
+    texture_slot slot = texture_slot_at(slot_index);
+    return sample_level(texture_at(slot.texture & 0x7fffffffu), 0, slot_texcoords(slot, uv01));
 }

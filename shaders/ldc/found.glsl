@@ -27,7 +27,7 @@ struct ldc_found {
 // away have no samples.
 vec3 transmittance_of_sample(uvec4 words)
 {
-    material m = materials[sample_material(words)];
+    material m = material_at(sample_material(words));
     vec3 through = vec3(0.0);
 #ifdef HAS_TRANSMISSION
     float transmission = m.transmission * (1.0 - m.metallic) * sample_transmission(words);

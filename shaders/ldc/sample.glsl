@@ -148,7 +148,7 @@ void describe(point p, out uvec2 geometry_words, out uvec4 surface_words)
     s.geometric = unpack_unit(h.normal_geometric);
     s.normal = unpack_unit(h.normal_shading);
     vec4 colour = unpackUnorm4x8(h.colour);
-    material m = materials[h.material & HIT_MATERIAL_MASK];
+    material m = material_at(h.material & HIT_MATERIAL_MASK);
     vec4 uv01 = uintBitsToFloat(h.uv01_or_sample);
 #ifdef HAS_TEXTURES
     apply_textures(s, colour, h, m, uv01, footprint_of(detail_at(h), s.geometric, direction, cell_world));

@@ -48,7 +48,7 @@ void main()
     if (path_sample(p) == 0u) {
         depth = vec4(vec3(-view_from_world_point(place).z), 1.0);
         position = vec4(place, 1.0);
-        id = vec4(node_of(h), materials[h.material & HIT_MATERIAL_MASK].id, 0.0, 1.0);
+        id = vec4(node_of(h), material_at(h.material & HIT_MATERIAL_MASK).id, 0.0, 1.0);
     }
     put(LAYER_BIT_DEPTH, k, depth);
     put(LAYER_BIT_POSITION, k, position);

@@ -229,7 +229,7 @@ void main()
     vec3 along, across;
     float anisotropy = 0.0;
 #ifdef HAS_ANISOTROPY
-    material m = materials[h.material & HIT_MATERIAL_MASK];
+    material m = material_at(h.material & HIT_MATERIAL_MASK);
     anisotropy = m.anisotropy;
     along = grain_of(h, e.s, m);
 #else

@@ -48,8 +48,8 @@ void main()
 #else
     uint primitive = first_primitive + uint(gl_PrimitiveID) / 2u;
     candidate found = candidate_disc(primitive, origin, direction);
-    vec3 from_centre = origin + found.distance * direction - discs[primitive].centre_radius.xyz;
-    float radius = discs[primitive].centre_radius.w;
+    vec3 from_centre = origin + found.distance * direction - disc_at(primitive).centre_radius.xyz;
+    float radius = disc_at(primitive).centre_radius.w;
     if (dot(from_centre, from_centre) > radius * radius || is_cut_out(found, origin, direction, 0.0))
         discard;
     visible = uvec2(VISIBLE_DISC, primitive);

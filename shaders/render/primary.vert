@@ -33,7 +33,7 @@ void main()
     vec3 object = sphere.xyz + outward * (sphere.w * BOX_MARGIN);
     vec3 world = affine_point(instance_at(instance_index).world_from_object, object);
 #else
-    disc d = discs[first_primitive + uint(gl_VertexID) / 6u];
+    disc d = disc_at(first_primitive + uint(gl_VertexID) / 6u);
     uint corner = uint[6](0u, 1u, 2u, 2u, 1u, 3u)[gl_VertexID % 6];
     vec3 tangent, bitangent;
     tangent_frame(d.normal.xyz, tangent, bitangent);

@@ -32,7 +32,7 @@ candidate candidate_sphere(uint instance_index, uint primitive, vec3 origin, vec
 
 candidate candidate_disc(uint disc_index, vec3 origin, vec3 direction)
 {
-    disc d = discs[disc_index];
+    disc d = disc_at(disc_index);
     candidate found = candidate(0.0, disc_index, HIT_NO_PRIMITIVE, vec2(0.0));
     intersect_disc(origin, direction, d.centre_radius.xyz, d.normal.xyz, d.centre_radius.w, found.distance);
     return found;

@@ -59,7 +59,7 @@ void main()
     surface s = surface_of_path(p, h, r);
     float transmission = s.transmission * (1.0 - s.metallic), opacity = s.alpha * (1.0 - transmission);
     vec3 through = mix(vec3(1.0), transmission * s.base, s.alpha);
-    if ((materials[h.material & HIT_MATERIAL_MASK].flags & MATERIAL_ALPHA_BLEND) == 0u && transmission == 0.0) {
+    if ((material_at(h.material & HIT_MATERIAL_MASK).flags & MATERIAL_ALPHA_BLEND) == 0u && transmission == 0.0) {
         opacity = layer_opacity;
         through = vec3(1.0 - layer_opacity);
     }

@@ -10,11 +10,7 @@
 #define BIND_VISIBILITY 2 /* any-hit waves: unorm 4x8 transmittance, 0: occluded */
 #define BIND_WAVE 3       /* struct wave_state */
 #define BIND_RAY_TIMES 4  /* in passes that make rays; tracers have UNIT_RAY_TIMES */
-#define BIND_MATERIALS 6
-#define BIND_TEXTURE_SLOTS 7
-#define BIND_TEXTURES 8
-#define BIND_DISCS 10
-#define BIND_TRACER_0 11 /* the tracer's own */
+#define BIND_TRACER_0 11  /* the tracer's own */
 #define BIND_TRACER_1 12
 #define BIND_OPTICAL_DEPTHS 13 /* trace/wave.comp */
 #define BIND_PASS_0 11         /* the integrator's own, in passes without a tracer */
@@ -67,7 +63,7 @@
 #define UNIT_PASS_1 17
 #define UNIT_RAYS 18
 #define UNIT_INSTANCES 19
-#define UNIT_GEOMETRIES 20
+#define UNIT_TABLES 20
 #define UNIT_MOTIONS 21
 #define UNIT_TRACER_6 23
 #define UNIT_TRACER_7 24

@@ -34,7 +34,6 @@ struct geometry {
     uint pad0;
 };
 SHARED_SIZE(geometry, 32)
-#define GEOMETRY_TEXELS 2 /* RGBA32UI */
 #define GEOMETRY_MESH 0u
 #define GEOMETRY_SPHERES 1u
 #define GEOMETRY_HAS_NORMALS 1u

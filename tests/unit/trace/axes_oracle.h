@@ -42,7 +42,8 @@ struct oracle_scene {
     uint8_t (*colours)[4];
     float (*spheres)[4];
     uint32_t *sphere_materials;
-    struct material *materials;
+    char *tables;
+    const struct material *materials; /* in these */
 };
 
 enum oracle_images {
@@ -74,7 +75,8 @@ static inline void oracle_scene_init(struct oracle_scene *scene, const struct gp
     scene->colours = oracle_read(gpu->device, &gpu->colours);
     scene->spheres = oracle_read(gpu->device, &gpu->spheres);
     scene->sphere_materials = oracle_read(gpu->device, &gpu->sphere_materials);
-    scene->materials = oracle_read(gpu->device, &gpu->materials);
+    scene->tables = oracle_read(gpu->device, &gpu->tables);
+    scene->materials = (const struct material *)(scene->tables + (size_t)gpu->table_starts.materials * 16);
 }
 
 static inline void oracle_scene_finish(struct oracle_scene *scene)
@@ -85,7 +87,7 @@ static inline void oracle_scene_finish(struct oracle_scene *scene)
     free(scene->colours);
     free(scene->spheres);
     free(scene->sphere_materials);
-    free(scene->materials);
+    free(scene->tables);
 }
 
 static inline void oracle_finish(struct oracle *oracle)

@@ -1,0 +1,91 @@
+/* SPDX-License-Identifier: MIT */
+/* The tables of shared/tables.h: what is small of a scene, in one buffer. */
+#include "gpu_scene/state.h"
+
+#include "shared/material.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#define TEXEL_BYTES 16u
+
+_Static_assert(sizeof(struct geometry) == GEOMETRY_TEXELS * TEXEL_BYTES, "geometry");
+_Static_assert(sizeof(struct material) == MATERIAL_TEXELS * TEXEL_BYTES, "material");
+_Static_assert(sizeof(struct texture_slot) == TEXTURE_SLOT_TEXELS * TEXEL_BYTES, "texture_slot");
+_Static_assert(sizeof(struct texture_info) == TEXTURE_TEXELS * TEXEL_BYTES, "texture_info");
+_Static_assert(sizeof(struct disc) == DISC_TEXELS * TEXEL_BYTES, "disc");
+
+/* Sets the starts; returns the texels of all. */
+static uint64_t lay_out(const struct gpu_scene *gpu, struct table_starts *starts)
+{
+    const struct gpu_scene_state *state = gpu->state;
+    uint64_t materials = TABLES_HEAD_TEXELS + (uint64_t)gpu->geometry_count * GEOMETRY_TEXELS;
+    uint64_t texture_slots = materials + (uint64_t)gpu->material_count * MATERIAL_TEXELS;
+    uint64_t textures = texture_slots + (uint64_t)state->texture_slot_count * TEXTURE_SLOT_TEXELS;
+    uint64_t discs = textures + (uint64_t)state->texture_count * TEXTURE_TEXELS;
+    *starts =
+        (struct table_starts){(uint32_t)materials, (uint32_t)texture_slots, (uint32_t)textures, (uint32_t)discs};
+    return discs + (uint64_t)gpu->disc_count * DISC_TEXELS;
+}
+
+/* Tables that nothing is in yet may be NULL. */
+static void fill(char *tables, uint32_t first_texel, const void *items, size_t bytes)
+{
+    if (bytes > 0)
+        memcpy(tables + (size_t)first_texel * TEXEL_BYTES, items, bytes);
+}
+
+static void pack(const struct gpu_scene *gpu, const struct table_starts *starts, char *tables)
+{
+    const struct gpu_scene_state *state = gpu->state;
+    struct geometry *geometries = (struct geometry *)(void *)(tables + TABLES_HEAD_TEXELS * TEXEL_BYTES);
+    memcpy(tables, starts, sizeof(*starts));
+    for (uint32_t i = 0; i < gpu->geometry_count; i++)
+        geometries[i] = gpu->geometries[i].device;
+    fill(tables, starts->materials, state->materials, gpu->material_count * sizeof(struct material));
+    fill(tables, starts->texture_slots, state->texture_slots,
+         state->texture_slot_count * sizeof(struct texture_slot));
+    fill(tables, starts->textures, state->textures, state->texture_count * sizeof(struct texture_info));
+    fill(tables, starts->discs, gpu->discs, gpu->disc_count * sizeof(struct disc));
+}
+
+/* From the first texel that differs from the mirror to the last; all of them where the number is another. */
+static bool upload(struct gpu_scene *gpu, const char *now, size_t bytes, struct scene_changes *changes,
+                   struct error *error)
+{
+    const char *before = gpu->state->tables;
+    size_t first = 0, end = bytes;
+    if (!before || gpu->tables.size_bytes != bytes) {
+        changes->uploaded_bytes += bytes;
+        return gpu_buffer_upload(gpu->device, &gpu->tables, now, bytes, error);
+    }
+    while (first < end && memcmp(now + first, before + first, TEXEL_BYTES) == 0)
+        first += TEXEL_BYTES;
+    while (end > first && memcmp(now + end - TEXEL_BYTES, before + end - TEXEL_BYTES, TEXEL_BYTES) == 0)
+        end -= TEXEL_BYTES;
+    if (first == end)
+        return true;
+    changes->uploaded_bytes += end - first;
+    gpu_buffer_write(gpu->device, &gpu->tables, first, now + first, end - first);
+    return true;
+}
+
+bool gpu_scene_upload_tables(struct gpu_scene *gpu, struct scene_changes *changes, struct error *error)
+{
+    struct gpu_scene_state *state = gpu->state;
+    if (!state->stale_tables)
+        return true;
+    uint64_t texels = lay_out(gpu, &gpu->table_starts);
+    if (!gpu_scene_check_texels(gpu, texels, "texels of geometries, materials, textures and discs", error))
+        return false;
+    size_t bytes = (size_t)texels * TEXEL_BYTES;
+    char *tables = malloc(bytes);
+    if (!tables)
+        return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the tables of a scene");
+    pack(gpu, &gpu->table_starts, tables);
+    bool ok = upload(gpu, tables, bytes, changes, error);
+    free(state->tables);
+    state->tables = tables;
+    state->stale_tables = !ok;
+    return ok;
+}
