@@ -4,20 +4,20 @@
 #ifndef FARLIGHT_SHARED_BINDINGS_H
 #define FARLIGHT_SHARED_BINDINGS_H
 
-/* storage buffers; software GL has 16 a stage */
-#define BIND_RAYS 0
-#define BIND_HITS 1
-#define BIND_VISIBILITY 2 /* any-hit waves: unorm 4x8 transmittance, 0: occluded */
-#define BIND_WAVE 3       /* struct wave_state */
-#define BIND_RAY_TIMES 4  /* in passes that make rays; tracers have UNIT_RAY_TIMES */
-#define BIND_TRACER_0 11  /* the tracer's own */
-#define BIND_TRACER_1 12
-#define BIND_OPTICAL_DEPTHS 13 /* trace/wave.comp */
-#define BIND_PASS_0 11         /* the integrator's own, in passes without a tracer */
-#define BIND_PASS_1 12
-#define BIND_PASS_2 13
-#define BIND_PASS_3 14
-#define BIND_PASS_4 15
+/* Storage buffers. OpenGL promises eight points, of which some have two meanings: no pass has a use for both. */
+#define BIND_RAYS 0       /* in passes that make rays; tracers have UNIT_RAYS */
+#define BIND_VISIBILITY 0 /* any-hit waves: unorm 4x8 transmittance, 0: occluded */
+#define BIND_HITS 1       /* in passes without radiance; tracers have IMAGE_HITS */
+#define BIND_WAVE 2       /* struct wave_state */
+#define BIND_RAY_TIMES 3  /* in passes that make rays; tracers have UNIT_RAY_TIMES */
+#define BIND_TRACER_0 4   /* the tracer's own */
+#define BIND_TRACER_1 1
+#define BIND_OPTICAL_DEPTHS 5 /* trace/wave.comp */
+#define BIND_PASS_0 4         /* the integrator's own, in passes without a tracer */
+#define BIND_PASS_1 1
+#define BIND_PASS_2 5
+#define BIND_PASS_3 6
+#define BIND_PASS_4 7
 
 /* image units */
 #define IMAGE_HITS 0

@@ -81,6 +81,8 @@ COUNTED = {
                {".comp": "MAX_COMPUTE_IMAGE_UNIFORMS", ".frag": "MAX_FRAGMENT_IMAGE_UNIFORMS"}),
     "colours": (re.compile(r"\bout\s+\w+\s+\w+\s*;"), {".frag": None}),
 }
+STORAGE_POINT = re.compile(r"\bbinding\s*=\s*(\d+)\s*\)[^;{}()]*\bbuffer\s+\w+\s*\{")
+POINTS_LIMIT = "MAX_SHADER_STORAGE_BUFFER_BINDINGS"
 WRITTEN, WRITTEN_LIMIT = ("storage blocks", "images", "colours"), "MAX_COMBINED_SHADER_OUTPUT_RESOURCES"
 
 # What GLSL allows and this project does not: of the text of a file without comments.
@@ -194,17 +196,18 @@ def complaints_in(log, files_of, programs):
 
 
 def declared(paths):
-    """Of each file the numbers of COUNTED, once the preprocessor is through with it."""
+    """Of each file the numbers of COUNTED and its storage blocks' points, once the preprocessor is through with it."""
     parts = run(["-E", *paths])[1].split(END_OF_FILE)
-    return [{what: len(pattern.findall(part)) for what, (pattern, _) in COUNTED.items()}
-            for part in parts[:len(paths)]]
+    return [({what: len(pattern.findall(part)) for what, (pattern, _) in COUNTED.items()},
+             [int(point) for point in STORAGE_POINT.findall(part)]) for part in parts[:len(paths)]]
 
 
 def needs_of(paths, files):
     """What the programs ask of a driver: (limit, number, of which file). The colours of a stage before the last are none."""
     needs, written = [], {}
-    for path, counts in zip(paths, files):
+    for path, (counts, points) in zip(paths, files):
         suffix, program = pathlib.Path(path).suffix, pathlib.Path(path).stem
+        needs += [(POINTS_LIMIT, 1 + max(points), path)] if points else []
         for what, count in counts.items():
             limits = COUNTED[what][1]
             if count and suffix in limits and limits[suffix]:
@@ -229,7 +232,11 @@ def complaints_of(batch):
                 path = os.path.join(folder, f"variant{number}" + pathlib.Path(stage).suffix)
                 pathlib.Path(path).write_text(f"{text}\nstruct {END_OF_FILE} {{ int unused; }};\n")
                 files_of[path], programs[path] = names, f"{stages[0]} [{shown}]"
-        for limit, count, path in needs_of(files_of, declared(files_of)):
+        files = declared(files_of)
+        complaints += [f"{programs[path]}: two storage blocks have one binding, or one has none: {points}"
+                       for path, (counts, points) in zip(files_of, files)
+                       if not len(set(points)) == len(points) == counts["storage blocks"]]
+        for limit, count, path in needs_of(files_of, files):
             needed[limit] = max(count, needed.get(limit, 0))
             if count > limits.get(limit, 0):
                 complaints.append(f"{programs[path]}: needs {count} of {limit}; {LIMITS} asks for {limits.get(limit, 0)}")

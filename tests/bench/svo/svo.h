@@ -31,6 +31,7 @@
  * 1, then distances, SVO_DISTANCE_UNIT for a cell, times SVO_SUM_COUNT, plus their number */
 #ifndef FARLIGHT_TESTS_BENCH_SVO_SVO_H
 #define FARLIGHT_TESTS_BENCH_SVO_SVO_H
+#include "shared/bindings.h"
 #include "shared/types.h"
 
 #define SVO_SIDE_MAX 1024 /* cells; a cell's place has 30 bits */
@@ -51,11 +52,11 @@ struct svo_counts {
 };
 SHARED_SIZE(svo_counts, 16)
 
-/* Bindings, behind those of the scene. */
-#define BIND_SVO_COUNTS 11
-#define BIND_SVO_MARKS 12     /* the records, word by word */
-#define IMAGE_SVO_FRAGMENTS 0 /* svo/voxelise.frag */
-#define IMAGE_SVO_RECORDS 0   /* svo/allocate.comp */
+/* Bindings */
+#define BIND_SVO_COUNTS BIND_TRACER_0
+#define BIND_SVO_MARKS BIND_TRACER_1 /* the records, word by word */
+#define IMAGE_SVO_FRAGMENTS 0        /* svo/voxelise.frag */
+#define IMAGE_SVO_RECORDS 0          /* svo/allocate.comp */
 #define IMAGE_SVO_CURRENT 1
 #define IMAGE_SVO_IDS 2
 #define IMAGE_SVO_SUMS 3
