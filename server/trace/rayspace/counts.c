@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/* What the waves of a frame have cost. The device adds it up, so that nobody waits for the counts of a wave. */
+/* What the waves of a frame have cost. The device adds it up, so that no frame waits for the counts of a wave. */
 #include "trace/rayspace/tracer.h"
 
 #include "protocol/words.h"
