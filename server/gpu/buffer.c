@@ -80,7 +80,7 @@ bool gpu_buffer_reserve(struct gpu_device *device, struct gpu_buffer *buffer, si
         if (!allocate(device, buffer, grown_capacity(old_bytes, size_bytes), error))
             return false;
     } else if (size_bytes != buffer->size_bytes) {
-        /* The buffer texture spans the used bytes; the next bind makes it again. */
+        /* What the buffer texture spans goes by the used bytes; the next bind makes it again. */
         gpu_object_destroy(device->registry, GPU_TEXTURE_BUFFER, buffer->texture);
         buffer->texture = 0;
     }

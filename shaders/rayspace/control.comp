@@ -9,8 +9,7 @@ layout(std430, binding = BIND_RAYSPACE_STOPPED) buffer stopped_block { uint stop
 
 uniform uint last_from, last_to, last_later; // the stacks of the last pass
 uniform uint from, to, later;                // and of the next one
-uniform uint capacity;         // pairs of a stack
-uniform uint leaves_capacity;  // pairs
+uniform uint capacity;         // pairs of a stack, and of the leaves
 uniform uint leaves_wanted;    // so many are worth a dispatch; 0: all are tested, 0xffffffff: none can be now
 uniform uint limit_max;        // pairs of a pass
 // The last places of a stack are for passes of one pair: one after another, these go down to the leaves with few.
@@ -57,7 +56,7 @@ void main()
     // Where there is hardly room for what is put off, nothing is.
     c.put_off_room = capacity - waiting[later];
     c.band = c.put_off_room > capacity / 2u ? band : 3e38;
-    c.leaves_room = leaves_capacity - c.leaves;
+    c.leaves_room = capacity - c.leaves;
     c.written = c.put_off = c.leaves_written = 0u;
     c.waiting_0 = waiting[0];
     c.waiting_1 = waiting[1];

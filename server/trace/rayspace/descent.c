@@ -153,8 +153,7 @@ static bool try_to_reserve(struct rayspace_state *state, struct gpu_device *devi
         good = good && rayspace_reduction_reserve(device, &state->reduction,
                                                   (enum rayspace_reduce)state->base.options.rayspace.reduce,
                                                   pass_max(state, device), error);
-    return good &&
-           gpu_buffer_reserve(device, &state->leaves, (size_t)state->leaves_capacity * RAYSPACE_PAIR_BYTES, error);
+    return good && gpu_buffer_reserve(device, &state->leaves, pair_bytes, error);
 }
 
 static void release_stacks(struct rayspace_state *state, struct gpu_device *device)
@@ -173,7 +172,7 @@ static bool reserve(const struct rayspace *rayspace, struct rayspace_state *stat
 {
     for (;;) {
         struct error own = {0};
-        state->capacity = state->leaves_capacity = capacity_of(state);
+        state->capacity = capacity_of(state);
         /* All items of a batch are put onto one stack, as by a pass. */
         const uint32_t room = state->capacity - reserved_of(state);
         state->batch_max = at_most(batch_of(state, at_most(room, ITEMS_MAX)), rayspace->rank_count);
@@ -259,7 +258,6 @@ static bool dispatch_control(struct rayspace_state *state, const struct gpu_scen
     gpu_uniform_uint(program, "to", next.to);
     gpu_uniform_uint(program, "later", next.later);
     gpu_uniform_uint(program, "capacity", state->capacity);
-    gpu_uniform_uint(program, "leaves_capacity", state->leaves_capacity);
     gpu_uniform_uint(program, "leaves_wanted", leaves_wanted);
     gpu_uniform_uint(program, "limit_max", pass_max(state, scene->device));
     gpu_uniform_uint(program, "reserve", reserved_of(state));
@@ -446,7 +444,7 @@ static enum tracer_progress descend_waiting(struct rayspace *rayspace, struct gp
 {
     struct rayspace_control *control = &state->told;
     for (;;) {
-        if (!dispatch_control(state, scene, state->leaves_capacity / 2, RAYSPACE_END_NOTHING, error))
+        if (!dispatch_control(state, scene, state->capacity / 2, RAYSPACE_END_NOTHING, error))
             return TRACER_FAILED;
         gpu_buffer_read(scene->device, &state->control, 0, control, sizeof(*control));
         if (scene->device->lost)

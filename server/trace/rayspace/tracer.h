@@ -34,12 +34,12 @@ struct rayspace_state {
     struct trace_state base;
     struct rayspace_levels levels;
     struct gpu_buffer nodes, answers, stacks[RAYSPACE_STACKS], leaves, control;
-    struct gpu_buffer order, bins;      /* of the sort */
-    struct gpu_buffer counts;           /* of the frame, by kinds of rays */
-    struct gpu_readback copied_counts;  /* on their way to the host */
-    struct gpu_buffer items;            /* of the flat descent: of the batch in hand */
-    uint32_t capacity, leaves_capacity; /* pairs */
-    uint32_t capacity_fits;             /* at most so many, as memory was short; 0: it was not */
+    struct gpu_buffer order, bins;     /* of the sort */
+    struct gpu_buffer counts;          /* of the frame, by kinds of rays */
+    struct gpu_readback copied_counts; /* on their way to the host */
+    struct gpu_buffer items;           /* of the flat descent: of the batch in hand */
+    uint32_t capacity;                 /* pairs, of each stack and of the leaves */
+    uint32_t capacity_fits;            /* at most so many, as memory was short; 0: it was not */
     struct rayspace_reduction reduction;
     uint32_t batch_max; /* items */
     uint32_t next_rank; /* the first primitive of the next batch */
