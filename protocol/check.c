@@ -73,7 +73,8 @@ static bool check_reals(const struct field_desc *field, const void *place, const
         if (!isfinite(value)) {
             return check_fail(error, PROTOCOL_ERROR_INVALID, &path, "%g is no finite number", (double)value);
         }
-        if (value < field->real_min || value > field->real_max) {
+        const bool is_default = field->zero_is_default && !(value > 0.0f || value < 0.0f);
+        if (!is_default && (value < field->real_min || value > field->real_max)) {
             return check_fail(error, PROTOCOL_ERROR_INVALID, &path, "%.9g is not within %g .. %g", (double)value,
                               (double)field->real_min, (double)field->real_max);
         }

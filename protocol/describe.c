@@ -131,7 +131,8 @@ enum enum_index {
      .zero_is_default = true, .default_int = default_value, .unit = field_unit},
 #define SETTING_REAL(owned, field, min_value, max_value, default_value, field_unit, mark, field_doc)              \
     {SETTING(owned, field, mark, field_doc), .kind = FIELD_REAL, .real_min = (float)(min_value),                  \
-     .real_max = (float)(max_value), .default_real = (float)(default_value), .unit = field_unit},
+     .real_max = (float)(max_value), .zero_is_default = (min_value) > 0, .default_real = (float)(default_value),  \
+     .unit = field_unit},
 #define SETTING_CHOICE(owned, field, choices, mark, field_doc)                                                    \
     {SETTING(owned, field, mark, field_doc), .kind = FIELD_ENUM, .enumeration = &protocol_enums[enum_index_##choices]},
 #include "protocol/messages.def"

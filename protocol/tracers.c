@@ -126,7 +126,7 @@ bool tracer_settings_check(const struct tracer_settings *settings, const char *p
 void tracer_settings_resolve(struct tracer_settings *settings)
 {
     for (const struct field_desc *field = carrier()->fields; field->name; field++) {
-        if (field->tracer && field->kind == FIELD_INT && is_zero(field, place_of(settings, field))) {
+        if (field->tracer && field->zero_is_default && is_zero(field, place_of(settings, field))) {
             field_default(field, place_of(settings, field));
         }
     }

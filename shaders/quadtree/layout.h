@@ -1,0 +1,57 @@
+/* SPDX-License-Identifier: MIT */
+/* The structure of the tracer `quadtree` on the device: quadtrees over the surfaces that a view sees, nearest first.
+ * Widmer, Pajak, Schulz, Pulli, Kautz, Goesele, Luebke. An Adaptive Acceleration Structure for Screen-space Ray
+ * Tracing. 2015, sections 3.2 to 3.4.
+ *
+ * A view is one face, or six: those of a cube round the eye. A face has a right, a down and a forward direction; a
+ * point at (X, Y, Z) along these from the eye lies at the texel coordinates (x, y) = centre + scale * (X, Y) / Z, and
+ * has the depth w = near / Z: in (x, y, w) planes are planes and rays are segments, and w grows towards the eye. Of
+ * an orthographic view (x, y) = centre + scale * (X, Y) and w = (far - Z) / (far - near). Texel (i, j) covers
+ * [i, i + 1) x [j, j + 1); row 0 is the uppermost.
+ *
+ * Each face has up to three layers: layer l holds at each texel's centre the surface that l others hide. A slice is
+ * one layer of one face, number face * layers + layer. It is padded to a multiple of QUADTREE_SIDE texels along both
+ * sides, and has levels 0 (texels) to QUADTREE_TOP; node (x, y) of a level covers the texels from (x, y) << level on.
+ *
+ *   visible  RG32UI array texture, a layer a slice: instance + 1 and scene-wide primitive, as render's visibility
+ *            buffer has them (VISIBLE_NOTHING, VISIBLE_DISC of shared/path.h)
+ *   nodes    RG32UI texel buffer: slice after slice, level after level, row after row. A node is one of
+ *     plane  x: sign bit set; w at the node's centre without its lowest bit; lowest bit: a texel beside it, or one of
+ *               its own, holds a surface that does not go on from this one (the paper's flag O)
+ *            y: slopes of w per texel along x (low half) and y, times QUADTREE_SLOPE_SCALE, half floats
+ *     box    x: greatest w, y: least w, both floats
+ *   Where nothing is there is a plane of w = 0: no ray reaches it. */
+#ifndef FARLIGHT_SHADERS_QUADTREE_LAYOUT_H
+#define FARLIGHT_SHADERS_QUADTREE_LAYOUT_H
+#include "shared/bindings.h"
+#include "shared/types.h"
+
+#define QUADTREE_TOP 7 /* the paper has nine levels at most, besides the root */
+#define QUADTREE_SIDE 128u
+#define QUADTREE_FACES_MAX 6u
+#define QUADTREE_LAYERS_MAX 3u
+#define QUADTREE_SLOPE_SCALE 1024.0f
+
+/* The uniforms of every pass of the tracer; a std140 block. */
+struct quadtree_uniforms {
+    vec4 face_from_world[18]; /* three rows a face: right, down, forward, of unit length */
+    vec4 eye_world;           /* w unused */
+    vec4 scale_centre;        /* xy: texels a unit of X / Z, or of X; zw: where the axis of the view is */
+    vec4 depths;              /* x: near, metres; y: far, beyond which there is nothing; z: 1 if orthographic */
+    vec4 bounds;              /* x: the greatest difference of w that a plane over several texels may have; y: cosine
+                                 of the greatest angle between it and theirs; z: 1 if both grow with distance */
+    uint width, height;       /* of a face, texels */
+    uint padded_width, padded_height;
+    uint faces, layers;
+    uint slice_nodes; /* nodes of a slice */
+    uint pad0;
+};
+SHARED_SIZE(quadtree_uniforms, 384)
+
+#define UNIFORM_QUADTREE 3
+#define UNIT_QUADTREE_VISIBLE UNIT_TRACER_0
+#define UNIT_QUADTREE_NODES UNIT_TRACER_1
+#define UNIT_QUADTREE_DEPTH UNIT_TRACER_2 /* of the layer before the one that is drawn */
+#define IMAGE_QUADTREE_NODES 0            /* passes that build */
+
+#endif
