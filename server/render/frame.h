@@ -18,6 +18,8 @@
 /* Formats of attachments alone, which follow those of the wire. */
 enum { PIXEL_FORMAT_DEPTH32F = PIXEL_FORMAT_COUNT, PIXEL_FORMAT_NORMAL8 };
 
+enum view_source { VIEW_SOURCE_RENDER, VIEW_SOURCE_LAYERS };
+
 struct frame_camera {
     float world_from_view[12]; /* rigid; looks along -z, y up */
     float fov_y;               /* radians, of the whole picture's height; 0: orthographic */
@@ -40,12 +42,16 @@ struct frame_request {
     float aperture; /* diameter of the lens, metres; 0: everything is sharp, or the camera has none */
     float focus;    /* distance along the view of the plane that is sharp, metres; 0: middle of the scene */
     enum pixel_filter filter;
-    enum brdf brdf;       /* of rough surfaces; integrator path */
-    float ao_distance;    /* metres; 0: a tenth of the scene's diagonal */
-    float ao_falloff;     /* as a power of 1 - distance / ao_distance; 0: all counts the same */
-    uint32_t ao_rays;     /* a sample; 0: 8 */
-    float layer_opacity;  /* of opaque surfaces, integrator raycast; 0: 0.5 */
-    uint32_t layers;      /* bits; 0: the picture alone. More than it need PIXEL_FORMAT_RGBA32F */
+    enum brdf brdf;      /* of rough surfaces; integrator path */
+    float ao_distance;   /* metres; 0: a tenth of the scene's diagonal */
+    float ao_falloff;    /* as a power of 1 - distance / ao_distance; 0: all counts the same */
+    uint32_t ao_rays;    /* a sample; 0: 8 */
+    float layer_opacity; /* of opaque surfaces, integrator raycast; 0: 0.5 */
+    uint32_t layers;     /* bits; 0: the picture alone. More than it need PIXEL_FORMAT_RGBA32F */
+    enum view_source view_source;
+    uint32_t views_across, views_down; /* 0: 1 */
+    bool has_key;
+    struct frame_camera key_camera;
     uint32_t attachments; /* bits; beside the picture alone, in any format of it */
     /* RGBA8 of the picture alone: it comes as these planes, which are less to read back, and which its encoder
      * need not make of it. */

@@ -136,6 +136,9 @@ bool frame_request_check(const struct frame_request *request, struct error *erro
     if (request->format > PIXEL_FORMAT_RGBA32F)
         return error_set(error, ERROR_UNSUPPORTED, "format", "there is no pixel format number %u",
                          (unsigned)request->format);
+    if (request->view_source == VIEW_SOURCE_LAYERS && request->compare)
+        return error_set(error, ERROR_UNSUPPORTED, "compare",
+                         "views made from layers are not traced by a second tracer; compare rendered ones");
     return check_integrator(request, error) && check_layers(request, error) && check_camera(request, error);
 }
 
@@ -158,10 +161,15 @@ static bool same_light(const struct frame_request *a, const struct frame_request
            a->ao_falloff == b->ao_falloff && a->ao_rays == b->ao_rays && a->layer_opacity == b->layer_opacity;
 }
 
+bool frame_request_same_radiance(const struct frame_request *a, const struct frame_request *b)
+{
+    return a->depth == b->depth && a->seed == b->seed && same_light(a, b) && same_tracer(a, b);
+}
+
 bool frame_request_adds_to(const struct frame_request *a, const struct frame_request *b)
 {
     return a->accumulate && b->accumulate && a->width == b->width && a->height == b->height &&
-           a->depth == b->depth && a->seed == b->seed && same_light(a, b) && a->aperture == b->aperture &&
+           frame_request_same_radiance(a, b) && a->view_source == b->view_source && a->aperture == b->aperture &&
            a->focus == b->focus && a->filter == b->filter && same_camera(&a->camera, &b->camera) &&
-           same_tracer(a, b) && frame_request_planes(a) == frame_request_planes(b);
+           frame_request_planes(a) == frame_request_planes(b);
 }
