@@ -43,9 +43,11 @@ static bool begin_layers(struct frame_renderer *renderer, const struct trace_vie
 {
     struct key_view *key = &renderer->key;
     key->is_made = false;
-    renderer->pass = 0;
     picture_restart(&key->sums);
-    return key_view_reserve(key, renderer->device, texels, layer_count, error);
+    if (!key_view_reserve(key, renderer->device, texels, layer_count, error))
+        return false; /* it may have been put off: the choice is made again */
+    renderer->pass = 0;
+    return true;
 }
 
 /* Which passes the frame needs. */
