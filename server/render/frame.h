@@ -18,7 +18,7 @@
 /* Formats of attachments alone, which follow those of the wire. */
 enum { PIXEL_FORMAT_DEPTH32F = PIXEL_FORMAT_COUNT, PIXEL_FORMAT_NORMAL8 };
 
-enum view_source { VIEW_SOURCE_RENDER, VIEW_SOURCE_LAYERS };
+enum view_source { VIEW_SOURCE_RAYS, VIEW_SOURCE_LAYERS };
 
 struct frame_camera {
     float world_from_view[12]; /* rigid; looks along -z, y up */

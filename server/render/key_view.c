@@ -40,7 +40,7 @@ struct frame_request key_view_layer_request(const struct key_view *key, const st
 {
     const struct trace_view *texels = &key->texels;
     struct frame_request own = *request;
-    own.view_source = VIEW_SOURCE_RENDER;
+    own.view_source = VIEW_SOURCE_RAYS;
     own.views_across = own.views_down = 0;
     own.has_key = false;
     own.width = texels->width;

@@ -68,20 +68,6 @@ EACH_TEST(clear, NULL)
 
 /* ---- pictures ---- */
 
-/* Of linear values up to 1, in dB. */
-static double psnr(const struct frame_result *a, const struct frame_result *b)
-{
-    const float *p = (const float *)(const void *)a->pixels, *q = (const float *)(const void *)b->pixels;
-    double sum = 0;
-    const size_t count = (size_t)a->width * a->height;
-    for (size_t i = 0; i < count; i++)
-        for (size_t c = 0; c < 3; c++) {
-            double d = (double)fminf(p[4 * i + c], 1.0f) - (double)fminf(q[4 * i + c], 1.0f);
-            sum += d * d;
-        }
-    return -10.0 * log10(sum / (double)(3 * count) + 1e-20);
-}
-
 static struct frame_result render_from(struct fixture *fixture, enum view_source source)
 {
     fixture->request.view_source = source;
@@ -106,56 +92,99 @@ static double unknown_of(const struct frame_result *result)
     return -1;
 }
 
+/* Of the mixture, with lights of which each pixel sees the same: a texel of the key view is no pixel of the
+ * picture, so that samples of an area light differ. `plain`: without mirror, glass and veil, which look different
+ * from aside. */
+static void mix(struct fixture *fixture, bool plain)
+{
+    fixture_mixture(fixture);
+    for (size_t i = 0; i < fixture->edit_count; i++) {
+        struct scene_edit *edit = &fixture->edits[i];
+        if (edit->object == OBJECT_LIGHT)
+            edit->set.light.kind = LIGHT_POINT;
+        if (!plain || edit->kind != EDIT_SET || edit->object != OBJECT_MATERIAL)
+            continue;
+        struct scene_material *material = &edit->set.material;
+        material->transmission = material->metallic = 0.0f;
+        material->alpha_mode = ALPHA_OPAQUE;
+        material->roughness = material->ior = 1.0f;
+    }
+}
+
+static void assert_like(const struct frame_result *made, const struct frame_result *rendered, float tolerance)
+{
+    for (uint32_t y = 0; y < made->height; y++)
+        for (uint32_t x = 0; x < made->width; x++)
+            for (int c = 0; c < 4; c++)
+                assert_near(fixture_pixel(made, x, y)[c], fixture_pixel(rendered, x, y)[c], tolerance);
+}
+
+/* The eye is that of the key view, and pixels' centres are those of texels: what is left is the rounding of
+ * places, some 1e-5 of a texel, times what a texel differs from the next one, at most 4 in the mirrored lights. */
 TEST(a_picture_made_from_layers_of_its_own_view_is_the_rendered_one)
 {
     struct fixture *fixture = *state;
-    fixture_mixture(fixture);
-    struct frame_result rendered = render_from(fixture, VIEW_SOURCE_RENDER);
+    mix(fixture, false);
+    struct frame_result rendered = render_from(fixture, VIEW_SOURCE_RAYS);
     struct frame_result made = render_from(fixture, VIEW_SOURCE_LAYERS);
-    print_message("%.1f dB, unknown %g\n", psnr(&rendered, &made), unknown_of(&made));
-    for (uint32_t y = 0; y < made.height; y++)
-        for (uint32_t x = 0; x < made.width; x++)
-            for (int c = 0; c < 3; c++)
-                assert_near(fixture_pixel(&made, x, y)[c], fixture_pixel(&rendered, x, y)[c], 1e-3);
+    assert_like(&made, &rendered, 1e-3f);
+    assert_near(unknown_of(&made), 0, 0);
+    assert_near(unknown_of(&rendered), -1, 0); /* there is no such row */
     frame_result_finish(&rendered);
     frame_result_finish(&made);
 }
 
-static struct frame_result made_aside(struct fixture *fixture, double *likeness)
+/* PSNR of the pixels that are known, in dB, of values up to 1. `made` has LAYER_UNKNOWN behind its beauty. */
+static double psnr_known(const struct frame_result *made, const struct frame_result *rendered)
 {
-    struct frame_result rendered = render_from(fixture, VIEW_SOURCE_RENDER);
-    struct frame_result made = render_from(fixture, VIEW_SOURCE_LAYERS);
-    *likeness = psnr(&rendered, &made);
-    frame_result_finish(&rendered);
-    return made;
+    const size_t pixels = (size_t)made->width * made->height;
+    const float *a = fixture_pixel(made, 0, 0), *b = fixture_pixel(rendered, 0, 0), *unknown = a + 4 * pixels;
+    double sum = 0, count = 1e-9;
+    for (size_t i = 0; i < 4 * pixels; i++) {
+        if (i % 4 == 3 || unknown[i - i % 4] > 0)
+            continue;
+        const double d = (double)fminf(a[i], 1.0f) - (double)fminf(b[i], 1.0f);
+        sum += d * d;
+        count++;
+    }
+    return -10.0 * log10(sum / count + 1e-20);
 }
 
-TEST(an_eye_aside_is_like_the_rendered_one)
+static void expect_like_from_aside(struct fixture *fixture, double least_db, double most_unknown)
+{
+    fixture->request.layers = 1u << LAYER_BEAUTY | 1u << LAYER_UNKNOWN;
+    struct frame_result made = render_from(fixture, VIEW_SOURCE_LAYERS);
+    fixture->request.layers = 0;
+    struct frame_result rendered = render_from(fixture, VIEW_SOURCE_RAYS);
+    const double likeness = psnr_known(&made, &rendered), unknown = unknown_of(&made);
+    print_message("%u samples, lens %g: %.1f dB where known, %.2f %% unknown\n", fixture->request.samples,
+                  (double)fixture->request.aperture, likeness, 100 * unknown);
+    assert_true(likeness >= least_db);
+    assert_true(unknown > 0 && unknown <= most_unknown); /* behind the spheres' left edges */
+    frame_result_finish(&rendered);
+    frame_result_finish(&made);
+}
+
+/* One sample a texel is interpolated between texels' centres: it blurs edges of shadows by half a texel, no more.
+ * The issue's 35 dB are of whole pictures of a room; here is no texture, and unknown pixels are left out. */
+TEST(an_eye_aside_is_like_the_rendered_one_where_the_key_view_knows)
 {
     struct fixture *fixture = *state;
-    fixture_mixture(fixture);
+    mix(fixture, true);
     fixture->request.width = 320;
     fixture->request.height = 240;
     step_aside(fixture, 0.065f);
-    double likeness;
-    struct frame_result made = made_aside(fixture, &likeness);
-    print_message("%.1f dB, unknown %g\n", likeness, unknown_of(&made));
-    frame_result_finish(&made);
-    fixture->request.samples = 4;
-    made = made_aside(fixture, &likeness);
-    print_message("4 samples %.1f dB, unknown %g\n", likeness, unknown_of(&made));
-    frame_result_finish(&made);
+    expect_like_from_aside(fixture, 40, 0.005);
     fixture->request.samples = 16;
-    fixture->request.aperture = 0.1f;
-    made = made_aside(fixture, &likeness);
-    print_message("lens, 16 samples %.1f dB, unknown %g\n", likeness, unknown_of(&made));
-    frame_result_finish(&made);
+    expect_like_from_aside(fixture, 40, 0.005);
+    fixture->request.aperture = 0.05f;
+    expect_like_from_aside(fixture, 40, 0.005);
 }
 
 TEST(layers_are_rendered_once_for_all_eyes_of_a_key_view)
 {
     struct fixture *fixture = *state;
-    fixture_mixture(fixture);
+    mix(fixture, false);
     step_aside(fixture, 0.05f);
     struct frame_result first = render_from(fixture, VIEW_SOURCE_LAYERS);
     const unsigned passes = layer_passes;
@@ -165,10 +194,90 @@ TEST(layers_are_rendered_once_for_all_eyes_of_a_key_view)
     assert_int_equal(layer_passes, passes);
     assert_int_equal(again.shadow_rays, 0);
     assert_same_picture(&first, &again);
-    fixture->request.seed = 7; /* other samples */
-    struct frame_result other = render_from(fixture, VIEW_SOURCE_LAYERS);
+    frame_result_finish(&again);
+    fixture->request.depth = 1; /* they would be others */
+    again = render_from(fixture, VIEW_SOURCE_LAYERS);
     assert_true(layer_passes > passes);
+    frame_result_finish(&again);
+    fixture->request.depth = 4;
+    const unsigned before = layer_passes;
+    fixture_environment(fixture, 1.0f, 0.0f, 0.0f); /* the scene is another one */
+    again = render_from(fixture, VIEW_SOURCE_LAYERS);
+    assert_true(layer_passes > before);
     frame_result_finish(&first);
     frame_result_finish(&again);
-    frame_result_finish(&other);
+}
+
+TEST(a_frame_cut_into_small_slices_is_the_same)
+{
+    struct fixture *fixture = *state;
+    mix(fixture, false);
+    step_aside(fixture, 0.05f);
+    fixture->request.samples = 2;
+    fixture->request.layers = 1u << LAYER_BEAUTY | 1u << LAYER_UNKNOWN;
+    struct frame_result whole = render_from(fixture, VIEW_SOURCE_LAYERS);
+    for (int ahead = 0; ahead < 2; ahead++) {
+        fixture->request.seed++; /* lights are points: the layers are rendered again, and the same */
+        fixture->request.seed %= 2;
+        frame_renderer_set_capacity(fixture->renderer, 500, 2000);
+        frame_renderer_queue_ahead(fixture->renderer, ahead);
+        struct frame_result cut = render_from(fixture, VIEW_SOURCE_LAYERS);
+        if (fixture->request.seed == 0)
+            assert_same_picture(&whole, &cut);
+        frame_result_finish(&cut);
+    }
+    frame_result_finish(&whole);
+}
+
+TEST(samples_of_eyes_add_up_from_frame_to_frame)
+{
+    struct fixture *fixture = *state;
+    mix(fixture, false);
+    step_aside(fixture, 0.05f);
+    fixture->request.accumulate = true;
+    fixture->request.samples = 4;
+    struct frame_result at_once = render_from(fixture, VIEW_SOURCE_LAYERS);
+    struct frame_result result = {0};
+    fixture->request.samples = 2;
+    step_aside(fixture, 0.0f); /* another key view: it begins anew */
+    for (int i = 0; i < 2; i++) {
+        frame_result_finish(&result);
+        result = render_from(fixture, VIEW_SOURCE_LAYERS);
+        assert_int_equal(result.samples, 2 * (i + 1));
+    }
+    frame_result_finish(&result);
+    frame_result_finish(&at_once);
+}
+
+/* Beside the beauty they are of what the eyes' own rays hit. */
+TEST(other_layers_of_a_made_picture_are_those_of_the_rendered_one)
+{
+    struct fixture *fixture = *state;
+    const uint32_t others = 1u << LAYER_ALBEDO | 1u << LAYER_NORMAL | 1u << LAYER_DEPTH | 1u << LAYER_ID;
+    mix(fixture, false);
+    fixture->request.primary = PRIMARY_TRACE;
+    step_aside(fixture, 0.05f);
+    fixture->request.layers = others;
+    struct frame_result rendered = render_from(fixture, VIEW_SOURCE_RAYS);
+    struct frame_result made = render_from(fixture, VIEW_SOURCE_LAYERS);
+    assert_same_picture(&made, &rendered);
+    frame_result_finish(&rendered);
+    frame_result_finish(&made);
+}
+
+TEST(what_cannot_be_made_from_layers_is_refused_by_name)
+{
+    struct fixture *fixture = *state;
+    struct error error = {0};
+    mix(fixture, false);
+    fixture_commit(fixture);
+    fixture->request.view_source = VIEW_SOURCE_LAYERS;
+    fixture->request.compare = true;
+    assert_false(frame_begin(fixture->renderer, fixture->scene, NULL, &fixture->request, &error));
+    assert_string_equal(error.field, "compare");
+    fixture->request.compare = false;
+    all_knowing.texel_view = NULL;
+    error = (struct error){0};
+    assert_false(frame_begin(fixture->renderer, fixture->scene, NULL, &fixture->request, &error));
+    assert_string_equal(error.field, "view_source");
 }
