@@ -18,8 +18,6 @@
 /* Formats of attachments alone, which follow those of the wire. */
 enum { PIXEL_FORMAT_DEPTH32F = PIXEL_FORMAT_COUNT, PIXEL_FORMAT_NORMAL8 };
 
-enum view_source { VIEW_SOURCE_RAYS, VIEW_SOURCE_LAYERS };
-
 struct frame_camera {
     float world_from_view[12]; /* rigid; looks along -z, y up */
     float fov_y;               /* radians, of the whole picture's height; 0: orthographic */
@@ -28,7 +26,15 @@ struct frame_camera {
 };
 
 struct frame_request {
-    uint32_t width, height;
+    uint32_t width, height; /* of the whole picture */
+    /* Views in it, of the same size, row by row; 0: 1. Each is that of an eye of its own, see frame_view_eye(). */
+    uint32_t views_across, views_down;
+    float baseline; /* metres between neighbouring eyes */
+    bool eyes_over; /* views one below the other are those of eyes side by side */
+    enum view_source view_source;
+    /* What is rendered is seen by another camera than the picture's; only with VIEW_SOURCE_LAYERS. */
+    bool has_key;
+    struct frame_camera key_camera;
     uint32_t samples, depth;
     uint64_t seed;
     struct frame_camera camera;
@@ -42,16 +48,12 @@ struct frame_request {
     float aperture; /* diameter of the lens, metres; 0: everything is sharp, or the camera has none */
     float focus;    /* distance along the view of the plane that is sharp, metres; 0: middle of the scene */
     enum pixel_filter filter;
-    enum brdf brdf;      /* of rough surfaces; integrator path */
-    float ao_distance;   /* metres; 0: a tenth of the scene's diagonal */
-    float ao_falloff;    /* as a power of 1 - distance / ao_distance; 0: all counts the same */
-    uint32_t ao_rays;    /* a sample; 0: 8 */
-    float layer_opacity; /* of opaque surfaces, integrator raycast; 0: 0.5 */
-    uint32_t layers;     /* bits; 0: the picture alone. More than it need PIXEL_FORMAT_RGBA32F */
-    enum view_source view_source;
-    uint32_t views_across, views_down; /* 0: 1 */
-    bool has_key;
-    struct frame_camera key_camera;
+    enum brdf brdf;       /* of rough surfaces; integrator path */
+    float ao_distance;    /* metres; 0: a tenth of the scene's diagonal */
+    float ao_falloff;     /* as a power of 1 - distance / ao_distance; 0: all counts the same */
+    uint32_t ao_rays;     /* a sample; 0: 8 */
+    float layer_opacity;  /* of opaque surfaces, integrator raycast; 0: 0.5 */
+    uint32_t layers;      /* bits; 0: the picture alone. More than it need PIXEL_FORMAT_RGBA32F */
     uint32_t attachments; /* bits; beside the picture alone, in any format of it */
     /* RGBA8 of the picture alone: it comes as these planes, which are less to read back, and which its encoder
      * need not make of it. */
@@ -71,9 +73,10 @@ struct frame_request {
 };
 
 /* Of one sample, that is not to be added to, the place is the pixel's middle; several are spread by the filter.
- * With a lens, or where something moves, first hits are traced whatever `primary` says. What PRIMARY_AUTO chooses
- * follows from tracer, scene, size, whether there are several samples, and device: for a device it is measured
- * once. Where something moves, a tracer of stored samples is refused: ERROR_UNSUPPORTED, "shutter".
+ * With a lens, several views, or where something moves, first hits are traced whatever `primary` says. What
+ * PRIMARY_AUTO chooses follows from tracer, scene, size, whether there are several samples, and device: for a
+ * device it is measured once. Where something moves, a tracer of stored samples is refused: ERROR_UNSUPPORTED,
+ * "shutter".
  *
  * What a picture holds:
  *   linear formats  mean radiance of the samples times 2^exposure_stops, premultiplied by alpha
@@ -169,6 +172,11 @@ void frame_renderer_stand_in(struct frame_renderer *renderer, unsigned number, c
 
 /* A camera that sees all of the bounds, from the front right above, as `--camera auto` does. */
 void frame_camera_auto(struct frame_camera *camera, const float lower[3], const float upper[3], float aspect);
+/* Pixels of one view. */
+void frame_view_size(const struct frame_request *request, uint32_t *width, uint32_t *height);
+bool frame_has_views(const struct frame_request *request); /* more than one */
+/* How far the eye of view (across, down) lies from the camera, along its right and up; metres. */
+void frame_view_eye(const struct frame_request *request, uint32_t across, uint32_t down, float eye[2]);
 /* From eye, target and up; false if they do not span a view. */
 bool frame_camera_look_at(struct frame_camera *camera, const float eye[3], const float look_at[3],
                           const float up[3], float fov_y);

@@ -429,9 +429,8 @@ static struct trace_view view_of(const struct frame_request *request)
         .fov_y = camera.fov_y,
         .ortho_height = camera.ortho_height,
         .near = camera.near,
-        .width = request->width / at_least(request->views_across, 1),
-        .height = request->height / at_least(request->views_down, 1),
     };
+    frame_view_size(request, &view.width, &view.height);
     memcpy(view.world_from_view, camera.world_from_view, sizeof(view.world_from_view));
     return view;
 }

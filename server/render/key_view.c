@@ -42,6 +42,7 @@ struct frame_request key_view_layer_request(const struct key_view *key, const st
     struct frame_request own = *request;
     own.view_source = VIEW_SOURCE_RAYS;
     own.views_across = own.views_down = 0;
+    own.baseline = 0.0f;
     own.has_key = false;
     own.width = texels->width;
     own.height = texels->height;

@@ -29,7 +29,7 @@ static uint64_t frame_bytes_of(const struct message_render *render)
     uint32_t layers = render->layers ? render->layers : BEAUTY_ALONE;
     uint32_t pixel_bytes = protocol_pixel_format_bytes(render->format) * (uint32_t)__builtin_popcount(layers) +
                            ATTACHMENT_PIXEL_BYTES * (uint32_t)__builtin_popcount(render->attachments);
-    return (uint64_t)render->width * render->height * pixel_bytes;
+    return (uint64_t)render->width * render->views_across * render->height * render->views_down * pixel_bytes;
 }
 
 static bool check_layers(const struct message_render *render, struct error *error)
@@ -271,8 +271,13 @@ static void fill_rest(struct engine_job *job, const struct session *session, con
         .time_origin_frame = render->time_origin_frame,
         .frame =
             {
-                .width = render->width,
-                .height = render->height,
+                .width = render->width * render->views_across,
+                .height = render->height * render->views_down,
+                .views_across = render->views_across,
+                .views_down = render->views_down,
+                .baseline = render->baseline,
+                .eyes_over = render->eyes_over != 0,
+                .view_source = (enum view_source)render->view_source,
                 .samples = render->samples,
                 .depth = render->depth,
                 .seed = render->seed,
@@ -305,6 +310,7 @@ static void fill_rest(struct engine_job *job, const struct session *session, con
         .camera_node = render->camera_node,
         .orbit_turn = render->orbit_turn,
         .orbit_seconds = render->orbit_seconds,
+        .upsample = render->upsample,
         .pass_samples = render->pass_samples,
         .still_encoding = (enum encoding)render->still_encoding,
         .weight = weight,

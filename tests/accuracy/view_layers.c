@@ -181,6 +181,27 @@ TEST(an_eye_aside_is_like_the_rendered_one_where_the_key_view_knows)
     expect_like_from_aside(fixture, 40, 0.005);
 }
 
+/* Each view is the picture that an eye aside sees alone, from the same key view. */
+TEST(views_side_by_side_are_those_of_eyes_side_by_side)
+{
+    struct fixture *fixture = *state;
+    mix(fixture, true);
+    fixture->request.views_across = 3;
+    fixture->request.views_down = 2;
+    fixture->request.baseline = 0.05f;
+    fixture->request.width *= 3;
+    fixture->request.height *= 2;
+    struct frame_result rendered = render_from(fixture, VIEW_SOURCE_RAYS);
+    fixture->request.layers = 1u << LAYER_BEAUTY | 1u << LAYER_UNKNOWN;
+    struct frame_result made = render_from(fixture, VIEW_SOURCE_LAYERS);
+    const double likeness = psnr_known(&made, &rendered);
+    print_message("%.1f dB where known, %.2f %% unknown\n", likeness, 100 * unknown_of(&made));
+    assert_true(likeness >= 40);
+    assert_true(unknown_of(&made) < 0.01);
+    frame_result_finish(&rendered);
+    frame_result_finish(&made);
+}
+
 TEST(layers_are_rendered_once_for_all_eyes_of_a_key_view)
 {
     struct fixture *fixture = *state;
