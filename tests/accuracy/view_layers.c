@@ -189,8 +189,8 @@ TEST(views_side_by_side_are_those_of_eyes_side_by_side)
     fixture->request.views_across = 3;
     fixture->request.views_down = 2;
     fixture->request.baseline = 0.05f;
-    fixture->request.width *= 3;
-    fixture->request.height *= 2;
+    fixture->request.width = 3 * 320;
+    fixture->request.height = 2 * 240;
     struct frame_result rendered = render_from(fixture, VIEW_SOURCE_RAYS);
     fixture->request.layers = 1u << LAYER_BEAUTY | 1u << LAYER_UNKNOWN;
     struct frame_result made = render_from(fixture, VIEW_SOURCE_LAYERS);
