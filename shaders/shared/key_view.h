@@ -11,8 +11,9 @@
 #define KEY_NOTHING (-1.0f)
 #define KEY_INFINITE 0.0f
 
-#define BIND_KEY_LAYER BIND_PASS_1  /* keep_layer.comp */
-#define BIND_KEY_DEPTHS BIND_PASS_2 /* likewise: sums of LAYER_DEPTH; those of the beauty are BIND_ACCUMULATION   \
+#define BIND_KEY_LAYER BIND_PASS_1 /* keep_layer.comp */
+#define BIND_KEY_DEPTHS                                                                                           \
+    BIND_PASS_2                     /* likewise: sums of LAYER_DEPTH; those of the beauty are BIND_ACCUMULATION   \
                                      */
 #define BIND_KEY_COUNTS BIND_PASS_3 /* gather_views.comp: one uint, the samples that no layer shows */
 #define UNIT_KEY_LAYER_0 UNIT_TRACER_1
