@@ -31,6 +31,7 @@
 #define QUADTREE_FACES_MAX 6u
 #define QUADTREE_LAYERS_MAX 3u
 #define QUADTREE_SLOPE_SCALE 1024.0f
+#define QUADTREE_SLOPE_MAX 65504.0f /* after the scale: the greatest half float */
 
 /* The uniforms of every pass of the tracer; a std140 block. */
 struct quadtree_uniforms {
