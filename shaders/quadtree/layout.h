@@ -36,7 +36,7 @@
 /* The uniforms of every pass of the tracer; a std140 block. */
 struct quadtree_uniforms {
     vec4 face_from_world[18]; /* three rows a face: right, down, forward, of unit length */
-    vec4 eye_world;           /* w unused */
+    vec4 eye_world;           /* w: of the sphere round it within which other eyes may be, radius, metres */
     vec4 scale_centre;        /* xy: texels a unit of X / Z, or of X; zw: where the axis of the view is */
     vec4 depths;              /* x: near, metres; y: far, beyond which there is nothing; z: 1 if orthographic */
     vec4 bounds;              /* x: the greatest difference of w that a plane over several texels may have; y: cosine
@@ -49,6 +49,22 @@ struct quadtree_uniforms {
 };
 SHARED_SIZE(quadtree_uniforms, 384)
 
+/* What a frame's rays of one kind came to. */
+struct quadtree_counts {
+    uint rays;
+    uint behind_first, behind_second; /* that were behind the first layer somewhere, and the second */
+    uint behind_last;                 /* that found nothing before they came behind the last one */
+    uint outside;                     /* that found nothing in what the view sees, and left it */
+    uint pad0, pad1, pad2;
+};
+SHARED_SIZE(quadtree_counts, 32)
+
+/* A ray that is within so many texels of its origin may pass the extension of a plane beside the surface that it began
+ * on, and one that is behind a plane may be before the next: half a texel, and its diagonal's. */
+#define QUADTREE_OWN_WAY 1.5f
+#define QUADTREE_DEEP 0.05f /* of w: what is so far behind a plane is behind the surface */
+
+#define BIND_QUADTREE_COUNTS BIND_TRACER_0
 #define UNIFORM_QUADTREE 3
 #define UNIT_QUADTREE_VISIBLE UNIT_TRACER_0
 #define UNIT_QUADTREE_NODES UNIT_TRACER_1
