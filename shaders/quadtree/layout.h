@@ -59,6 +59,10 @@ struct quadtree_counts {
 };
 SHARED_SIZE(quadtree_counts, 32)
 
+/* Two texels side by side show surfaces that go on from one another if their planes differ by no more than this share
+ * of w and bounds.x, in the middle of their common border. Prototypes had cracks up to it. */
+#define QUADTREE_EDGE_SHARE 0.001953125f
+
 /* A ray that is within so many texels of its origin may pass the extension of a plane beside the surface that it began
  * on, and one that is behind a plane may be before the next: half a texel, and its diagonal's. */
 #define QUADTREE_OWN_WAY 1.5f

@@ -9,6 +9,7 @@
 // from texel to texel, not by the tree; QUADTREE_COUNT_STEPS hits are counts: nodes looked at, and layers.
 #define INTERSECTION_FLAGS walk_flags
 
+#include "shared/path.h"
 #include "quadtree/face.glsl"
 
 layout(binding = UNIT_QUADTREE_VISIBLE) uniform usampler2DArray quadtree_visible;
@@ -116,7 +117,7 @@ bool is_own_surface(layer_walk walk, vec3 place, vec2 slopes)
 {
     vec3 away = abs(place - walk.origin);
     return walk.origin.z >= 0.0 && max(away.x, away.y) < QUADTREE_OWN_WAY &&
-           away.z <= QUADTREE_OWN_WAY * (abs(slopes.x) + abs(slopes.y)) + QUADTREE_SLACK * place.z;
+           away.z <= QUADTREE_OWN_WAY * (abs(slopes.x) + abs(slopes.y)) + QUADTREE_EDGE_SHARE * place.z;
 }
 
 // The ray meets the plane of a node at u. True: it ends.
@@ -188,7 +189,7 @@ bool walk_layer(trace_ray r, face_segment s, inout layer_walk walk, inout found_
             float u_meet = NEVER;
             if ((gap_in > 0.0) != (gap_out > 0.0))
                 u_meet = mix(walk.u, u_out, clamp(gap_in / (gap_in - gap_out), 0.0, 1.0));
-            else if (is_before && gap_in > 0.0 && gap_in <= QUADTREE_SLACK * w_in + quadtree.bounds.x)
+            else if (is_before && gap_in > 0.0 && gap_in <= QUADTREE_EDGE_SHARE * w_in + quadtree.bounds.x)
                 u_meet = walk.u; // between two planes that do not quite meet
             if (u_meet != NEVER) {
                 if (meet(r, s, u_meet, node, walk, found))
