@@ -39,8 +39,10 @@ struct quadtree_uniforms {
     vec4 eye_world;           /* w: of the sphere round it within which other eyes may be, radius, metres */
     vec4 scale_centre;        /* xy: texels a unit of X / Z, or of X; zw: where the axis of the view is */
     vec4 depths;              /* x: near, metres; y: far, beyond which there is nothing; z: 1 if orthographic */
-    vec4 bounds;              /* x: the greatest difference of w that a plane over several texels may have; y: cosine
-                                 of the greatest angle between it and theirs; z: 1 if both grow with distance */
+    vec4 bounds;              /* x: the greatest difference of w that a plane over several texels may have, from an eye
+                                 far from it: near pixels / (f radius); y: cosine of the greatest angle between it and
+                                 those of its children, 0: any; z: w at the distance where both are twice as much, 0:
+                                 they do not grow; w: radius / near, of the sphere of eyes for which x holds */
     uint width, height;       /* of a face, texels */
     uint padded_width, padded_height;
     uint faces, layers;
@@ -73,6 +75,18 @@ SHARED_SIZE(quadtree_counts, 32)
 #define UNIT_QUADTREE_VISIBLE UNIT_TRACER_0
 #define UNIT_QUADTREE_NODES UNIT_TRACER_1
 #define UNIT_QUADTREE_DEPTH UNIT_TRACER_2 /* of the layer before the one that is drawn */
-#define IMAGE_QUADTREE_NODES 0            /* passes that build */
+/* Passes that build. Of one slice: its leaves as planes without flags; of all, the levels above the leaves: how far a
+ * plane is from those of the leaves at most. */
+#define UNIT_QUADTREE_PLANES UNIT_TRACER_3
+#define UNIT_QUADTREE_ERRORS UNIT_TRACER_4
+#define IMAGE_QUADTREE_NODES 0
+#define IMAGE_QUADTREE_PLANES 1
+#define IMAGE_QUADTREE_ERRORS 2
+
+/* Two texels side by side show surfaces that go on from one another if their planes differ by no more than this share
+ * of w and bounds.x, in the middle of their common border. Prototypes had cracks up to it. */
+#define QUADTREE_EDGE_SHARE 0.001953125f
+/* The tolerance may grow with distance up to so many times. */
+#define QUADTREE_GROWTH_MAX 4.0f
 
 #endif
