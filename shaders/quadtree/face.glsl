@@ -55,7 +55,7 @@ vec2 clip_to_face(vec3 origin, vec3 direction, vec2 t)
     vec2 far_side = vec2(quadtree.width, quadtree.height) - centre;
     vec2 low_a = scale * origin.xy + centre * origin_z, low_b = scale * direction.xy + centre * direction_z;
     vec2 high_a = far_side * origin_z - scale * origin.xy, high_b = far_side * direction_z - scale * direction.xy;
-    clip_range(origin.z - quadtree.depths.x, direction.z, t);
+    clip_range(origin.z - quadtree.depths.w, direction.z, t);
     clip_range(low_a.x, low_b.x, t);
     clip_range(low_a.y, low_b.y, t);
     clip_range(high_a.x, high_b.x, t);

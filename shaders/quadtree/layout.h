@@ -5,7 +5,8 @@
  *
  * A view is one face, or six: those of a cube round the eye. A face has a right, a down and a forward direction; a
  * point at (X, Y, Z) along these from the eye lies at the texel coordinates (x, y) = centre + scale * (X, Y) / Z, and
- * has the depth w = near / Z: in (x, y, w) planes are planes and rays are segments, and w grows towards the eye. Of
+ * has the depth w = unit / Z, where the unit is a share of
+ * the scene's size that suits half floats: in (x, y, w) planes are planes and rays are segments, and w grows towards the eye. Of
  * an orthographic view (x, y) = centre + scale * (X, Y) and w = (far - Z) / (far - near). Texel (i, j) covers
  * [i, i + 1) x [j, j + 1); row 0 is the uppermost.
  *
@@ -38,11 +39,12 @@ struct quadtree_uniforms {
     vec4 face_from_world[18]; /* three rows a face: right, down, forward, of unit length */
     vec4 eye_world;           /* w: of the sphere round it within which other eyes may be, radius, metres */
     vec4 scale_centre;        /* xy: texels a unit of X / Z, or of X; zw: where the axis of the view is */
-    vec4 depths;              /* x: near, metres; y: far, beyond which there is nothing; z: 1 if orthographic */
+    vec4 depths;              /* x: the unit, the distance at which w is 1, metres, or near if orthographic; y: far,
+                                 beyond which there is nothing but discs; z: 1 if orthographic; w: near */
     vec4 bounds;              /* x: the greatest difference of w that a plane over several texels may have, from an eye
-                                 far from it: near pixels / (f radius); y: cosine of the greatest angle between it and
+                                 far from it: unit pixels / (f radius); y: cosine of the greatest angle between it and
                                  those of its children, 0: any; z: w at the distance where both are twice as much, 0:
-                                 they do not grow; w: radius / near, of the sphere of eyes for which x holds */
+                                 they do not grow; w: radius / unit, of the sphere of eyes for which x holds */
     uint width, height;       /* of a face, texels */
     uint padded_width, padded_height;
     uint faces, layers;
@@ -60,10 +62,6 @@ struct quadtree_counts {
     uint pad0, pad1, pad2;
 };
 SHARED_SIZE(quadtree_counts, 32)
-
-/* Two texels side by side show surfaces that go on from one another if their planes differ by no more than this share
- * of w and bounds.x, in the middle of their common border. Prototypes had cracks up to it. */
-#define QUADTREE_EDGE_SHARE 0.001953125f
 
 /* A ray that is within so many texels of its origin may pass the extension of a plane beside the surface that it began
  * on, and one that is behind a plane may be before the next: half a texel, and its diagonal's. */

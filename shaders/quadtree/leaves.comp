@@ -51,7 +51,7 @@ sight_line sight_line_of(uvec2 place)
 float w_of(float z)
 {
     return is_orthographic() ? (quadtree.depths.y - z) / (quadtree.depths.y - quadtree.depths.x)
-                             : quadtree.depths.x / max(z, quadtree.depths.x);
+                             : quadtree.depths.x / max(z, quadtree.depths.w);
 }
 
 float z_of(float w)

@@ -326,7 +326,7 @@ bool walk_view(trace_ray r, inout view_walk seen, inout found_type found)
         vec3 origin = face_vector(face, from_eye), direction = face_vector(face, r.direction);
         vec2 t = clip_to_face(origin, direction, vec2(r.t_min, t_end));
         if (t.x < t.y) {
-            bool is_inside = origin.z >= quadtree.depths.x;
+            bool is_inside = origin.z >= quadtree.depths.w;
             vec3 place = is_inside ? face_place(origin, face_q(origin)) : vec3(-1.0);
             if (walk_face(r, face, segment_of(origin, direction, t), place, seen, found))
                 return true;

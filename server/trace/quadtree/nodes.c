@@ -41,7 +41,7 @@ bool quadtree_nodes_begin(struct quadtree_node_build *build, struct quadtree_sto
     const uint64_t count = quadtree_nodes_count(uniforms);
     const uint64_t above = count - (uint64_t)slice_count(uniforms) * slice_texels(uniforms);
     if (count > device->facts.texture_buffer_texels_max || count > INT32_MAX) {
-        error_set(error, ERROR_LIMIT, "options.quadtree_resolution", "%llu nodes are more than the device takes",
+        error_set(error, ERROR_LIMIT, "quadtree_resolution", "%llu nodes are more than the device takes",
                   (unsigned long long)count);
         return error_remedy(error, "take a lower resolution, or fewer layers");
     }

@@ -176,31 +176,20 @@ static void fill_uniforms(struct quadtree_uniforms *u, const struct gpu_scene *s
 
 /* ---- room ---- */
 
-static bool check_room(const struct quadtree_store *store, struct error *error)
-{
-    const struct gpu_facts *facts = &store->device->facts;
-    const struct quadtree_uniforms *u = &store->uniforms;
-    const uint64_t nodes = (uint64_t)u->faces * u->layers * u->slice_nodes;
-    const uint32_t longer = u->padded_width > u->padded_height ? u->padded_width : u->padded_height;
-    if (nodes <= facts->texture_buffer_texels_max && longer <= facts->texture_size_max)
-        return true;
-    error_set(error, ERROR_LIMIT, "quadtree_resolution",
-              "%u faces of %u x %u texels in %u layers are more than the device holds", u->faces, u->width,
-              u->height, u->layers);
-    return error_remedy(error, "choose a smaller quadtree_resolution, or fewer quadtree_layers");
-}
-
 bool quadtree_store_place(struct quadtree_store *store, const struct gpu_scene *scene, const struct trace_view *view,
                           const struct quadtree_settings *settings, struct error *error)
 {
     struct quadtree_uniforms *u = &store->uniforms;
     fill_uniforms(u, scene, view, settings);
-    const size_t nodes = (size_t)u->faces * u->layers * u->slice_nodes;
-    return check_room(store, error) &&
-           gpu_buffer_upload(store->device, &store->uniform_buffer, u, sizeof(*u), error) &&
+    const uint32_t longer = u->padded_width > u->padded_height ? u->padded_width : u->padded_height;
+    if (longer > store->device->facts.texture_size_max) {
+        error_set(error, ERROR_LIMIT, "quadtree_resolution", "%u texels along a side; the device holds %u", longer,
+                  store->device->facts.texture_size_max);
+        return error_remedy(error, "choose a smaller quadtree_resolution");
+    }
+    return gpu_buffer_upload(store->device, &store->uniform_buffer, u, sizeof(*u), error) &&
            gpu_texture_reserve_array(store->device, &store->visible, GL_RG32UI, u->padded_width, u->padded_height,
-                                     u->faces * u->layers, error) &&
-           gpu_buffer_reserve(store->device, &store->nodes, nodes * 2 * sizeof(uint32_t), error);
+                                     u->faces * u->layers, error);
 }
 
 void quadtree_face_view(const struct quadtree_store *store, uint32_t face, float world_from_view[12],

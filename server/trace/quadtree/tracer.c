@@ -21,7 +21,7 @@ struct quadtree {
     enum quadtree_phase phase;
     struct quadtree_store store;
     struct quadtree_layers layers;
-    struct quadtree_nodes nodes;
+    struct quadtree_node_build nodes;
     struct trace_view texels; /* of the structure, where it is of a view */
     struct gpu_timer *timer;
 };
@@ -34,7 +34,7 @@ static void quadtree_destroy(struct tracer *tracer)
     if (!quadtree)
         return;
     quadtree_layers_finish(&quadtree->layers);
-    quadtree_nodes_finish(&quadtree->nodes);
+    quadtree_nodes_finish(&quadtree->nodes, quadtree->store.device);
     quadtree_store_finish(&quadtree->store);
     gpu_timer_destroy(quadtree->timer);
     free(quadtree);
@@ -64,7 +64,7 @@ static void reset(struct quadtree *quadtree)
 {
     quadtree->phase = QUADTREE_IDLE;
     quadtree_layers_finish(&quadtree->layers);
-    quadtree_nodes_finish(&quadtree->nodes);
+    quadtree_nodes_finish(&quadtree->nodes, quadtree->store.device);
     quadtree_store_finish(&quadtree->store);
 }
 
@@ -72,7 +72,7 @@ static void fill_stats(struct quadtree *quadtree)
 {
     const struct quadtree_uniforms *u = &quadtree->store.uniforms;
     struct tracer_stats *stats = &quadtree->base.stats;
-    stats->nodes = (uint64_t)u->faces * u->layers * u->slice_nodes;
+    stats->nodes = quadtree_nodes_count(u);
     stats->device_bytes = quadtree_store_bytes(&quadtree->store) + quadtree_layers_bytes(&quadtree->layers) +
                           quadtree_nodes_bytes(&quadtree->nodes);
 }
@@ -93,12 +93,13 @@ static enum tracer_progress do_unit(struct quadtree *quadtree, struct gpu_scene 
     const struct quadtree_settings *settings = &quadtree->base.options.quadtree;
     const bool at_once = quadtree->base.step_end_ns == STEP_WITHOUT_END;
     if (quadtree->phase == QUADTREE_BUILD)
-        return quadtree_nodes_go_on(&quadtree->nodes, scene, error);
+        return quadtree_nodes_go_on(&quadtree->nodes, &quadtree->store, scene,
+                                    settings->nodes == QUADTREE_NODES_MINMAX, error);
     const enum tracer_progress progress = quadtree_layers_go_on(&quadtree->layers, scene, at_once, error);
     if (progress != TRACER_DONE)
         return progress;
     quadtree->phase = QUADTREE_BUILD;
-    return quadtree_nodes_begin(&quadtree->nodes, &quadtree->store, settings, error) ? TRACER_MORE : TRACER_FAILED;
+    return quadtree_nodes_begin(&quadtree->nodes, &quadtree->store, error) ? TRACER_MORE : TRACER_FAILED;
 }
 
 /* Units of one phase; the CPU's clock is to tell when the device is through with them. */
