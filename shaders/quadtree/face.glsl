@@ -82,8 +82,11 @@ float distance_at(face_segment s, float u)
     return (s.t_from * from + s.t_to * to) / (from + to);
 }
 
+// The place of a distance that is not before the segment.
 float place_at(face_segment s, float t)
 {
+    if (t >= s.t_to)
+        return 1.0;
     float from = s.q_from * (t - s.t_from), to = s.q_to * (s.t_to - t);
-    return clamp(from / (from + to), 0.0, 1.0);
+    return max(from / (from + to), 0.0);
 }

@@ -97,7 +97,7 @@ uvec2 triangle_node(sight_line line, uint instance_index, uint triangle)
 float sphere_depth(vec2 depths, uvec2 place, uvec2 what)
 {
     uvec2 before = uvec2(VISIBLE_NOTHING);
-    float z_before = quadtree.depths.x;
+    float z_before = quadtree.depths.w;
     if (layer > 0u) {
         before = texelFetch(visible, ivec3(place, slice - 1u), 0).xy;
         z_before = z_of(plane_w(texelFetch(nodes, int(node_index(slice - 1u, 0u, place))).xy));
