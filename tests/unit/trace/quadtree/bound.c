@@ -50,18 +50,21 @@ static double pixels_between(double focal, const double a[3], const double b[3],
     return focal * atan2(sqrt(dot3(normal, normal)), dot3(to_a, to_b));
 }
 
-/* The plane nodes that rays come to, as a share of the texels. */
+/* Nodes that are planes below boxes, for each texel that shows a surface. */
 static double share_of_leaves(const struct layers *layers)
 {
     const struct quadtree_uniforms *u = &layers->store.uniforms;
-    double leaves = 0;
+    double leaves = 0, texels = 0;
     for (uint32_t slice = 0; slice < u->faces * u->layers; slice++)
         for (uint32_t i = 0; i < u->width * u->height; i++) {
+            const uint32_t x = i % u->width, y = i / u->width;
             struct tree_plane plane;
-            leaves +=
-                pow(0.25, tree_find(u, (const void *)layers->nodes, slice, i % u->width, i / u->width, &plane));
+            if (surface_at(layers, slice, x, y)->z < 0)
+                continue;
+            leaves += pow(0.25, tree_find(u, (const void *)layers->nodes, slice, x, y, &plane));
+            texels++;
         }
-    return leaves / ((double)u->width * u->height * u->faces * u->layers);
+    return leaves / texels;
 }
 
 struct proof {
