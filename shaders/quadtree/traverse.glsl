@@ -25,20 +25,40 @@ uniform uint ray_kind;
 #endif
 
 const float NEVER = 2.0; // beyond the end of a segment
+const int STEPS_TOGETHER = 16; // of rays side by side, before what some of them have met is looked at
 
-// What a walk through one layer is about, and what it has found.
+// A ray on its way through a layer of a face.
 struct layer_walk {
-    uint slice, layer;
-    float u, u_end;    // where the ray is, and where it ends, as far as is known
-    float u_behind;    // where it came behind this layer, for more than a texel; NEVER: it did not
-    ivec2 last_before; // the texel over which it was last before the layer; negative: it was not
-    ivec2 behind_texel; // the same when it came behind
-    vec3 origin;       // x, y, w of the ray's origin; w below 0: it is not in this face
-    vec2 offered;      // distances of the last two intersections, none of which counts twice
+    face_segment s;
+    vec3 origin;  // x, y, w of the ray's origin; w below 0: it is not in this face
+    vec2 inverse; // of s.along.xy
+    uint turn, face, layer;
+    float u, u_end; // where the ray is, and where it ends, as far as is known
+    ivec2 cell;     // of the node that it is in
+    int level;
+    bool is_before, is_behind; // neither: it has just begun
+    float u_before;            // where it was last before the layer
+    float u_since;             // since when it is behind it; NEVER: it is not
+    float u_behind, u_fill; // where it came behind it for more than a texel, and where it was last before then
+    candidate beside;       // where it first met a plane beside the surface that the plane stands for
+    vec2 offered;           // distances of the last two intersections, none of which counts twice
+};
+
+// Where a ray is in a node.
+struct node_passage {
+    uvec2 node;
+    bool is_plane;
+    float u_out, w_out;
+    float gap_in, gap_out; // how far the surface is before the ray there, in w: above 0 the ray is behind it
 };
 
 uint walk_flags = 0u;
 uint walk_steps = 0u;
+
+uint slice_of(layer_walk walk)
+{
+    return walk.face * quadtree.layers + walk.layer;
+}
 
 // ---- hits ----
 
@@ -104,7 +124,7 @@ bool offer_primitives(trace_ray r, vec2 place, float near, bool all_four, inout 
     for (int i = 0; i < 4 && (all_four || !has_met); i++) {
         uvec2 visible;
         candidate met;
-        if (!visible_at(texel + ivec2(i & 1, i >> 1) * towards, walk.slice, visible) || visible == tried)
+        if (!visible_at(texel + ivec2(i & 1, i >> 1) * towards, slice_of(walk), visible) || visible == tried)
             continue;
         tried = visible;
         if (intersect_visible(r, visible, near, met) && met.distance > r.t_min) {
@@ -124,139 +144,161 @@ bool is_own_surface(layer_walk walk, vec3 place, vec2 slopes)
 }
 
 // The ray meets the plane of a node at u. True: it ends.
-bool meet(trace_ray r, face_segment s, float u, uvec2 node, inout layer_walk walk, inout found_type found)
+bool meet(trace_ray r, float u, uvec2 node, inout layer_walk walk, inout found_type found)
 {
-    vec3 place = s.from + u * s.along;
-    float near = distance_at(s, u);
+    vec3 place = walk.s.from + u * walk.s.along;
+    float near = distance_at(walk.s, u);
 #ifndef QUADTREE_PLANES
     bool has_met;
     if (offer_primitives(r, place.xy, near, plane_is_at_edge(node), walk, found, has_met))
         return true;
-    if (has_met || plane_is_at_edge(node))
+    if (has_met)
         return false;
 #endif
     uvec2 visible;
-    if (is_own_surface(walk, place, plane_slopes(node)) || !visible_at(ivec2(floor(place.xy)), walk.slice, visible))
+    if (is_own_surface(walk, place, plane_slopes(node)) || !visible_at(ivec2(floor(place.xy)), slice_of(walk), visible))
         return false;
-    bool ends_ = offer(r, candidate(near, visible.y, visible.x - 1u, vec2(0.0)), walk, found);
-    walk_flags |= 0x40000000u;
-    return ends_;
+    candidate met = candidate(near, visible.y, visible.x - 1u, vec2(0.0));
+#ifndef QUADTREE_PLANES
+    // Beside the edge of the surface there may be another one behind it, or nothing.
+    if (plane_is_at_edge(node)) {
+        if (near < walk.beside.distance && near > r.t_min)
+            walk.beside = met;
+        return false;
+    }
+#endif
+    return offer(r, met, walk, found);
+}
+
+// Where the ray's w passes from before the node to behind it, or back: true.
+bool is_met(node_passage p)
+{
+    return p.is_plane && (p.gap_in > 0.0) != (p.gap_out > 0.0);
+}
+
+// What the ray meets in a node whose plane it passes, or beside whose edge it is. True: it ends.
+bool meet_in(trace_ray r, node_passage p, inout layer_walk walk, inout found_type found)
+{
+    bool goes_on = walk.is_before && p.gap_in <= QUADTREE_EDGE_SHARE * plane_w(p.node) + quadtree.bounds.x;
+    if (is_met(p))
+        return meet(r, mix(walk.u, p.u_out, clamp(p.gap_in / (p.gap_in - p.gap_out), 0.0, 1.0)), p.node, walk, found);
+    if (goes_on) // between two planes that do not quite meet
+        return meet(r, walk.u, p.node, walk, found);
+#ifndef QUADTREE_PLANES
+    // Within a texel of an edge, of which its middle sees the other side.
+    bool has_met;
+    vec3 place = walk.s.from + walk.u * walk.s.along;
+    return offer_primitives(r, place.xy, distance_at(walk.s, walk.u), true, walk, found, has_met);
+#else
+    return false;
+#endif
 }
 
 // ---- the walk through a layer ----
 
-// A ray that is behind a plane's extension beyond the surface comes before its neighbour's within a texel: it counts as
-// behind the layer where it stays so.
-void note_behind(face_segment s, float gap, float w, float u_in, float u_out, inout float u_since, inout layer_walk walk)
+void begin_layer(uint layer, float u, inout layer_walk walk)
 {
-    u_since = min(u_since, u_in);
-    vec2 way = abs(s.along.xy) * (u_out - u_since);
-    if (gap > QUADTREE_DEEP * w || max(way.x, way.y) > QUADTREE_OWN_WAY)
-        if (u_since < walk.u_behind) {
-            walk.u_behind = u_since;
-            walk.behind_texel = walk.last_before;
-        }
+    ivec2 last = ivec2(quadtree.padded_width, quadtree.padded_height) - 1;
+#ifdef QUADTREE_DDA
+    walk.level = 0;
+#else
+    walk.level = QUADTREE_TOP;
+#endif
+    walk.layer = layer;
+    walk.u = u;
+    walk.cell = clamp(ivec2(floor(walk.s.from.xy + walk.s.along.xy * u)), ivec2(0), last) >> walk.level;
+    walk.is_before = walk.is_behind = false;
+    walk.u_before = walk.u_since = walk.u_behind = walk.u_fill = NEVER;
 }
 
-#ifdef ANY_HIT
-#define SHORTEN(s, walk, found)
-#else
-#define SHORTEN(s, walk, found) walk.u_end = min(walk.u_end, place_at(s, found.distance))
-#endif
-
-// True: the ray ends.
-bool walk_layer(trace_ray r, face_segment s, inout layer_walk walk, inout found_type found)
+vec2 exits_of(layer_walk walk)
 {
-    const uint slice_first = walk.slice * quadtree.slice_nodes;
-    vec2 along = mix(s.along.xy, vec2(1e-9), lessThan(abs(s.along.xy), vec2(1e-9)));
-    vec2 inverse = 1.0 / along;
-    ivec2 forward = ivec2(greaterThan(along, vec2(0.0))), size = ivec2(quadtree.padded_width, quadtree.padded_height);
-    ivec2 texel = clamp(ivec2(floor(s.from.xy + s.along.xy * walk.u)), ivec2(0), size - 1);
+    ivec2 forward = ivec2(greaterThan(walk.inverse, vec2(0.0)));
+    return (vec2((walk.cell + forward) << walk.level) - walk.s.from.xy) * walk.inverse;
+}
+
+node_passage look(layer_walk walk)
+{
+    node_passage p;
+    p.node = texelFetch(quadtree_nodes, int(node_index(slice_of(walk), uint(walk.level), uvec2(walk.cell)))).xy;
+    p.is_plane = node_is_plane(p.node);
+    vec2 exits = exits_of(walk);
+    p.u_out = clamp(min(exits.x, exits.y), walk.u, walk.u_end);
+    float w_in = walk.s.from.z + walk.s.along.z * walk.u;
+    p.w_out = walk.s.from.z + walk.s.along.z * p.u_out;
+    vec2 slopes = plane_slopes(p.node), centre = node_centre(uint(walk.level), uvec2(walk.cell));
+    float w = plane_w(p.node) + dot(slopes, walk.s.from.xy - centre), growth = dot(slopes, walk.s.along.xy);
+    vec2 range = box_range(p.node), of_ray = vec2(min(w_in, p.w_out), max(w_in, p.w_out));
+    float gap = of_ray.x > range.x ? -1.0 : of_ray.y < range.y ? range.y - of_ray.y : 0.0; // of a box; 0: in it
+    p.gap_in = p.is_plane ? w + growth * walk.u - w_in : gap;
+    p.gap_out = p.is_plane ? w + growth * p.u_out - p.w_out : gap;
+    return p;
+}
+
+void go_down(inout layer_walk walk)
+{
+    walk.level--;
+    ivec2 low = walk.cell * 2;
+    walk.cell = clamp(ivec2(floor(walk.s.from.xy + walk.s.along.xy * walk.u)) >> walk.level, low, low + 1);
+}
+
+// A ray that is behind a plane's extension beyond the surface comes before its neighbour's within a texel: it counts as
+// behind the layer where it stays so.
+void note_side(node_passage p, inout layer_walk walk)
+{
+    walk.is_before = p.gap_out <= 0.0;
+    walk.is_behind = !walk.is_before;
+    if (walk.is_before) {
+        walk.u_before = mix(walk.u, p.u_out, 0.999);
+        walk.u_since = NEVER;
+        return;
+    }
+    float u_in = p.gap_in > 0.0 ? walk.u : mix(walk.u, p.u_out, clamp(p.gap_in / (p.gap_in - p.gap_out), 0.0, 1.0));
+    walk.u_since = min(walk.u_since, u_in);
+    vec2 way = abs(walk.s.along.xy) * (p.u_out - walk.u_since);
+    bool stays = p.gap_out > QUADTREE_DEEP * p.w_out || max(way.x, way.y) > QUADTREE_OWN_WAY;
+    if (stays && walk.u_since < walk.u_behind) {
+        walk.u_behind = walk.u_since;
+        walk.u_fill = walk.u_before;
+    }
+}
+
+// To the successor across the side that the ray leaves the node by, one level below the last node that both are in.
+void leave(node_passage p, inout layer_walk walk)
+{
+    ivec2 size = ivec2(quadtree.padded_width, quadtree.padded_height), next = walk.cell;
+    vec2 exits = exits_of(walk);
+    if (exits.x < exits.y)
+        next.x += walk.inverse.x > 0.0 ? 1 : -1;
+    else
+        next.y += walk.inverse.y > 0.0 ? 1 : -1;
+    walk.u = p.u_out;
+    if (any(lessThan(next, ivec2(0))) || any(greaterThanEqual(next << walk.level, size)))
+        walk.u = walk.u_end;
 #ifdef QUADTREE_DDA
-    int level = 0;
+    walk.cell = next;
 #else
-    int level = QUADTREE_TOP;
+    int up = min(findMSB((walk.cell.x ^ next.x) | (walk.cell.y ^ next.y)), QUADTREE_TOP - walk.level);
+    walk.level += up;
+    walk.cell = next >> up;
 #endif
-    ivec2 cell = texel >> level;
-    bool is_before = false, is_behind = false; // neither: it has just begun
-    float u_since = NEVER; // since when it is behind
-    walk.last_before = ivec2(-1);
-    while (walk.u < walk.u_end) {
+}
+
+// Nodes that the ray passes, until it meets something in one of them: true.
+bool walk_on(inout layer_walk walk, out node_passage p)
+{
+    for (int i = 0; i < STEPS_TOGETHER && walk.u < walk.u_end; i++) {
         walk_steps++;
-        uvec2 node = texelFetch(quadtree_nodes, int(slice_first + node_index(0u, uint(level), uvec2(cell)))).xy;
-        vec2 exits = (vec2((cell + forward) << level) - s.from.xy) * inverse;
-        float u_out = clamp(min(exits.x, exits.y), walk.u, walk.u_end);
-        float w_in = s.from.z + s.along.z * walk.u, w_out = s.from.z + s.along.z * u_out;
-        if (node_is_plane(node)) {
-            vec2 slopes = plane_slopes(node), centre = (vec2(cell) + 0.5) * float(1 << level);
-            float w = plane_w(node) + dot(slopes, s.from.xy - centre), growth = dot(slopes, s.along.xy);
-            float gap_in = w + growth * walk.u - w_in, gap_out = w + growth * u_out - w_out; // above 0: it is behind
-            float u_meet = NEVER;
-            if ((gap_in > 0.0) != (gap_out > 0.0))
-                u_meet = mix(walk.u, u_out, clamp(gap_in / (gap_in - gap_out), 0.0, 1.0));
-            else if (is_before && gap_in > 0.0 && gap_in <= QUADTREE_EDGE_SHARE * w_in + quadtree.bounds.x)
-                u_meet = walk.u; // between two planes that do not quite meet
-#ifndef QUADTREE_PLANES
-            // Within a texel of an edge, of which its middle sees the other side.
-            else if (gap_in > 0.0 ? !is_behind : !is_before) {
-                bool has_met;
-                if (offer_primitives(r, (s.from + walk.u * s.along).xy, distance_at(s, walk.u), true, walk, found, has_met))
-                    return true;
-                SHORTEN(s, walk, found);
-                if (walk.u_end <= u_out)
-                    return false;
-            }
-#endif
-            if (u_meet != NEVER) {
-                if (meet(r, s, u_meet, node, walk, found))
-                    return true;
-                SHORTEN(s, walk, found);
-                if (walk.u_end <= u_out)
-                    return false;
-            }
-            is_before = gap_out <= 0.0;
-            is_behind = !is_before;
-            if (is_before) {
-                u_since = NEVER;
-                walk.last_before = clamp(ivec2(floor(s.from.xy + s.along.xy * mix(walk.u, u_out, 0.999))), cell << level,
-                                         ((cell + 1) << level) - 1);
-            } else {
-                note_behind(s, gap_out, w_out, gap_in > 0.0 ? walk.u : u_meet, u_out, u_since, walk);
-            }
-        } else {
-            vec2 range = box_range(node);
-            if (min(w_in, w_out) <= range.x && max(w_in, w_out) >= range.y) {
-                level--;
-                ivec2 low = cell * 2;
-                cell = clamp(ivec2(floor(s.from.xy + s.along.xy * walk.u)) >> level, low, low + 1);
-                continue;
-            }
-            is_before = min(w_in, w_out) > range.x;
-            is_behind = !is_before;
-            if (is_before) {
-                u_since = NEVER;
-                walk.last_before = clamp(ivec2(floor(s.from.xy + s.along.xy * mix(walk.u, u_out, 0.999))), cell << level,
-                                         ((cell + 1) << level) - 1);
-            } else {
-                note_behind(s, range.y - max(w_in, w_out), w_out, walk.u, u_out, u_since, walk);
-            }
+        p = look(walk);
+        if (!p.is_plane && p.gap_in == 0.0) {
+            go_down(walk);
+            continue;
         }
-        ivec2 next = cell;
-        if (exits.x < exits.y)
-            next.x += forward.x * 2 - 1;
-        else
-            next.y += forward.y * 2 - 1;
-        walk.u = u_out;
-        if (any(lessThan(next, ivec2(0))) || any(greaterThanEqual(next << level, size)))
-            break;
-#ifdef QUADTREE_DDA
-        cell = next;
-#else
-        // One level below the last node that both are in.
-        int up = min(findMSB((cell.x ^ next.x) | (cell.y ^ next.y)), QUADTREE_TOP - level);
-        level += up;
-        cell = next >> up;
-#endif
+        bool is_other_side = p.gap_in > 0.0 ? !walk.is_behind : !walk.is_before;
+        if (p.is_plane && (is_met(p) || is_other_side))
+            return true;
+        note_side(p, walk);
+        leave(p, walk);
     }
     return false;
 }
@@ -271,35 +313,6 @@ struct view_walk {
     uint fill_slice; // where it was last before a surface
     ivec2 fill_texel;
 };
-
-// Through the layers of a face, from one to the next where the ray is behind it. True: the ray ends.
-bool walk_face(trace_ray r, uint face, face_segment s, vec3 origin, inout view_walk seen, inout found_type found)
-{
-    layer_walk walk;
-    float u_from = 0.0, u_end = 1.0;
-    walk.offered = vec2(-1.0);
-    walk.origin = origin;
-    for (uint layer = 0u; layer < quadtree.layers && u_from < u_end; layer++) {
-        walk.layer = layer;
-        walk.slice = face * quadtree.layers + layer;
-        walk.u = u_from;
-        walk.u_end = u_end;
-        walk.u_behind = NEVER;
-        seen.layers = max(seen.layers, layer + 1u);
-        if (walk_layer(r, s, walk, found))
-            return true;
-        u_end = walk.u_end;
-        u_from = walk.u_behind;
-    }
-    float t = distance_at(s, min(u_from, 1.0));
-    if (u_from < u_end && t < seen.t_unknown) {
-        seen.t_unknown = t;
-        seen.has_left = false;
-        seen.fill_slice = walk.slice;
-        seen.fill_texel = walk.behind_texel;
-    }
-    return false;
-}
 
 // A view does not see what is beside it. But what lies between another eye near its own and its pyramid is taken to
 // be empty.
@@ -330,35 +343,111 @@ uint face_towards(vec3 p)
 
 #ifdef ANY_HIT
 #define NEAREST(found, r) r.t_max
+#define SHORTEN(walk, found)
 #else
 #define NEAREST(found, r) found.distance
+#define SHORTEN(walk, found) walk.u_end = min(walk.u_end, place_at(walk.s, found.distance))
 #endif
 
-bool walk_view(trace_ray r, inout view_walk seen, inout found_type found)
+// A ray that meets nothing else in a face has met the surface that it passed the edge of.
+void offer_beside(trace_ray r, layer_walk walk, inout found_type found)
+{
+#ifndef ANY_HIT
+    if (found.primitive == HIT_NO_PRIMITIVE && walk.beside.distance < found.distance) {
+        walk_flags = (walk.layer + 1u) << HIT_LAYER_SHIFT;
+        offer_closest(r, walk.beside, found);
+    }
+#endif
+}
+
+// The first layer of the next face that the ray passes; the face in which it begins is the first one.
+bool begin_face(trace_ray r, found_type found, inout layer_walk walk, inout view_walk seen)
 {
     vec3 from_eye = r.origin - quadtree.eye_world.xyz;
     float t_last = last_distance(r);
     uint first = face_towards(from_eye + r.t_min * r.direction);
-    for (uint i = 0u; i < quadtree.faces; i++) {
-        uint face = i == 0u ? first : i <= first ? i - 1u : i;
-        float t_end = min(t_last, NEAREST(found, r));
-        vec3 origin = face_vector(face, from_eye), direction = face_vector(face, r.direction);
-        vec2 t = clip_to_face(origin, direction, vec2(r.t_min, t_end));
-        if (t.x < t.y) {
-            bool is_inside = origin.z >= quadtree.depths.w;
-            vec3 place = is_inside ? face_place(origin, face_q(origin)) : vec3(-1.0);
-            if (walk_face(r, face, segment_of(origin, direction, t), place, seen, found))
-                return true;
-        }
-        if (quadtree.faces == 1u)
-            note_outside(r, t, min(t_last, NEAREST(found, r)), seen);
+    for (; walk.turn < quadtree.faces; walk.turn++) {
+        walk.face = walk.turn == 0u ? first : walk.turn <= first ? walk.turn - 1u : walk.turn;
+        vec3 origin = face_vector(walk.face, from_eye), direction = face_vector(walk.face, r.direction);
+        vec2 t = clip_to_face(origin, direction, vec2(r.t_min, min(t_last, NEAREST(found, r))));
+        if (!(t.x < t.y))
+            continue;
+        walk.turn++;
+        walk.s = segment_of(origin, direction, t);
+        walk.origin = origin.z >= quadtree.depths.w ? face_place(origin, face_q(origin)) : vec3(-1.0);
+        vec2 along = walk.s.along.xy;
+        walk.inverse = 1.0 / mix(along, vec2(1e-9), lessThan(abs(along), vec2(1e-9)));
+        walk.beside = candidate_none(1e30);
+        walk.offered = vec2(-1.0);
+        walk.u_end = 1.0;
+        begin_layer(0u, 0.0, walk);
+        return true;
     }
     return false;
 }
 
+void end_face(trace_ray r, layer_walk walk, inout found_type found, inout view_walk seen)
+{
+    offer_beside(r, walk, found);
+    float t = distance_at(walk.s, min(walk.u_behind, 1.0));
+    if (walk.u_behind >= walk.u_end || t >= seen.t_unknown)
+        return;
+    vec2 place = walk.s.from.xy + walk.s.along.xy * walk.u_fill;
+    seen.t_unknown = t;
+    seen.fill_slice = slice_of(walk);
+    seen.fill_texel = walk.u_fill == NEVER ? ivec2(-1) : ivec2(floor(place));
+}
+
+// The next layer where the ray is behind this one, or the next face. False: it has been through all.
+bool begin_next(trace_ray r, inout layer_walk walk, inout found_type found, inout view_walk seen)
+{
+    if (walk.u_behind < walk.u_end && walk.layer + 1u < quadtree.layers) {
+        begin_layer(walk.layer + 1u, walk.u_behind, walk);
+        seen.layers = max(seen.layers, walk.layer + 1u);
+        return true;
+    }
+    end_face(r, walk, found, seen);
+    return begin_face(r, found, walk, seen);
+}
+
+// True: the ray ends before its end.
+bool walk_view(trace_ray r, inout view_walk seen, inout found_type found)
+{
+    layer_walk walk;
+    node_passage p;
+    walk.turn = 0u;
+    bool has_layer = begin_face(r, found, walk, seen);
+    while (has_layer) {
+        if (walk_on(walk, p)) {
+            if (meet_in(r, p, walk, found))
+                return true;
+            SHORTEN(walk, found);
+            if (walk.u_end <= p.u_out) {
+                walk.u = walk.u_end;
+            } else {
+                note_side(p, walk);
+                leave(p, walk);
+            }
+        }
+        if (walk.u >= walk.u_end)
+            has_layer = begin_next(r, walk, found, seen);
+    }
+    return false;
+}
+
+// What lies outside a view, of which there is one face.
+void look_beside_view(trace_ray r, float t_end, inout view_walk seen)
+{
+    if (quadtree.faces > 1u)
+        return;
+    t_end = min(last_distance(r), t_end);
+    vec3 origin = face_vector(0u, r.origin - quadtree.eye_world.xyz), direction = face_vector(0u, r.direction);
+    note_outside(r, clip_to_face(origin, direction, vec2(r.t_min, t_end)), t_end, seen);
+}
+
 view_walk begin_view_walk()
 {
-    return view_walk(1e30, 0u, false, 0u, ivec2(-1));
+    return view_walk(1e30, 1u, false, 0u, ivec2(-1));
 }
 
 void count(view_walk seen, bool is_unknown)
@@ -382,6 +471,7 @@ bool trace_any(trace_ray r, inout vec3 optical_depth)
 {
     view_walk seen = begin_view_walk();
     bool is_stopped = walk_view(r, seen, optical_depth);
+    look_beside_view(r, r.t_max, seen);
     count(seen, !is_stopped && seen.t_unknown < r.t_max);
     return is_stopped;
 }
@@ -403,6 +493,7 @@ void trace_closest(trace_ray r, inout candidate best)
     view_walk seen = begin_view_walk();
     walk_flags = walk_steps = 0u;
     walk_view(r, seen, best);
+    look_beside_view(r, best.distance, seen);
     bool is_unknown = seen.t_unknown < best.distance;
     count(seen, is_unknown);
     if (is_unknown) {
