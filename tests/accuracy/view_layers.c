@@ -302,3 +302,58 @@ TEST(what_cannot_be_made_from_layers_is_refused_by_name)
     assert_false(frame_begin(fixture->renderer, fixture->scene, NULL, &fixture->request, &error));
     assert_string_equal(error.field, "view_source");
 }
+
+/* ---- the structure itself ---- */
+
+/* A room of triangles: floor, wall, and panels at different distances. */
+static void panels(struct fixture *fixture)
+{
+    static const float colours[5][3] = {
+        {0.8f, 0.3f, 0.2f}, {0.2f, 0.7f, 0.3f}, {0.2f, 0.3f, 0.8f}, {0.8f, 0.8f, 0.2f}, {0.7f, 0.7f, 0.7f}};
+    uint32_t materials[5];
+    for (int i = 0; i < 5; i++) {
+        struct scene_material *material = fixture_material(fixture);
+        memcpy(material->base_colour, colours[i], sizeof(colours[i]));
+        materials[i] = material->base.id;
+    }
+    const float floor_transform[12] = {1, 0, 0, 0, 0, 0, 1, -0.6f, 0, -1, 0, 0};
+    const float wall_transform[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, -3};
+    fixture_square(fixture, 4.0f, materials[4], floor_transform);
+    fixture_square(fixture, 4.0f, materials[3], wall_transform);
+    for (int i = 0; i < 4; i++) {
+        const float c = cosf(0.3f * (float)i), s = sinf(0.3f * (float)i);
+        const float transform[12] = {c,  0, s, -1.2f + 0.8f * (float)i, 0, 1, 0, 0.1f,
+                                     -s, 0, c, 0.7f * (float)i - 1.5f};
+        fixture_square(fixture, 0.3f, materials[i % 3], transform);
+    }
+    fixture_light(fixture, LIGHT_POINT, -2.0f, 3.0f, 3.0f, 60.0f);
+    fixture_environment(fixture, 0.3f, 0.4f, 0.5f);
+    fixture->request.width = 320;
+    fixture->request.height = 240;
+    fixture_look(fixture, 0.5f, 0.6f, 4.0f, 0.7f);
+}
+
+TEST(the_quadtree_of_a_view_shows_eyes_aside_as_they_are_rendered)
+{
+    struct fixture *fixture = *state;
+    panels(fixture);
+    frame_renderer_stand_in(fixture->renderer, 0, NULL);
+    fixture->request.tracer = TRACER_BVH;
+    struct frame_result rendered = render_from(fixture, VIEW_SOURCE_RAYS);
+    fixture->request.layers = 1u << LAYER_BEAUTY | 1u << LAYER_UNKNOWN;
+    struct frame_result made = render_from(fixture, VIEW_SOURCE_LAYERS);
+    print_message("own view: %.1f dB, %.2f %%\n", psnr_known(&made, &rendered), 100 * unknown_of(&made));
+    fixture->request.layers = 0;
+    frame_result_finish(&rendered);
+    frame_result_finish(&made);
+    step_aside(fixture, 0.065f);
+    for (uint32_t layers = 1; layers <= 3; layers++) {
+        fixture->request.tracer_options.quadtree.layers = layers;
+        expect_like_from_aside(fixture, 20, 0.5);
+    }
+    fixture->request.format = PIXEL_FORMAT_RGBA8;
+    made = render_from(fixture, VIEW_SOURCE_LAYERS);
+    fixture_keep(&made, "made2");
+    made = render_from(fixture, VIEW_SOURCE_RAYS);
+    fixture_keep(&made, "true2");
+}
