@@ -73,9 +73,10 @@ struct frame_request {
 };
 
 /* Of one sample, that is not to be added to, the place is the pixel's middle; several are spread by the filter.
- * With a lens, several views, or where something moves, first hits are traced whatever `primary` says. What PRIMARY_AUTO chooses
- * follows from tracer, scene, size, whether there are several samples, and device: for a device it is measured
- * once. Where something moves, a tracer of stored samples is refused: ERROR_UNSUPPORTED, "shutter".
+ * With a lens, several views, or where something moves, first hits are traced whatever `primary` says. What
+ * PRIMARY_AUTO chooses follows from tracer, scene, size, whether there are several samples, and device: for a
+ * device it is measured once. Where something moves, a tracer of stored samples is refused: ERROR_UNSUPPORTED,
+ * "shutter".
  *
  * What a picture holds:
  *   linear formats  mean radiance of the samples times 2^exposure_stops, premultiplied by alpha

@@ -154,7 +154,8 @@ bool frame_request_check(const struct frame_request *request, struct error *erro
     if (request->format > PIXEL_FORMAT_RGBA32F)
         return error_set(error, ERROR_UNSUPPORTED, "format", "there is no pixel format number %u",
                          (unsigned)request->format);
-    return check_views(request, error) && check_integrator(request, error) && check_layers(request, error) && check_camera(request, error);
+    return check_views(request, error) && check_integrator(request, error) && check_layers(request, error) &&
+           check_camera(request, error);
 }
 
 static bool same_camera(const struct frame_camera *a, const struct frame_camera *b)
@@ -185,8 +186,8 @@ static bool same_light(const struct frame_request *a, const struct frame_request
 
 bool frame_request_adds_to(const struct frame_request *a, const struct frame_request *b)
 {
-    return a->accumulate && b->accumulate && a->width == b->width && a->height == b->height &&
-           same_views(a, b) && a->depth == b->depth && a->seed == b->seed && same_light(a, b) && a->aperture == b->aperture &&
+    return a->accumulate && b->accumulate && a->width == b->width && a->height == b->height && same_views(a, b) &&
+           a->depth == b->depth && a->seed == b->seed && same_light(a, b) && a->aperture == b->aperture &&
            a->focus == b->focus && a->filter == b->filter && same_camera(&a->camera, &b->camera) &&
            same_tracer(a, b) && frame_request_planes(a) == frame_request_planes(b);
 }
