@@ -401,9 +401,8 @@ static struct trace_view view_of(const struct frame_request *request)
         .fov_y = request->camera.fov_y,
         .ortho_height = request->camera.ortho_height,
         .near = request->camera.near,
-        .width = request->width,
-        .height = request->height,
     };
+    frame_view_size(request, &view.width, &view.height);
     memcpy(view.world_from_view, request->camera.world_from_view, sizeof(view.world_from_view));
     return view;
 }

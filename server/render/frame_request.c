@@ -122,6 +122,24 @@ static bool check_layers(const struct frame_request *request, struct error *erro
     return true;
 }
 
+/* Of views and of where they come from. */
+static bool check_views(const struct frame_request *request, struct error *error)
+{
+    const uint32_t across = request->views_across ? request->views_across : 1;
+    const uint32_t down = request->views_down ? request->views_down : 1;
+    if (request->width % across || request->height % down)
+        return error_set(error, ERROR_INVALID, request->width % across ? "views_across" : "views_down",
+                         "%u x %u views do not fill %ux%u pixels", across, down, request->width, request->height);
+    if (!(request->baseline >= 0.0f && isfinite(request->baseline)))
+        return error_set(error, ERROR_INVALID, "baseline", "%g metres; 0 and more are possible",
+                         (double)request->baseline);
+    if (request->view_source != VIEW_SOURCE_RAYS) {
+        error_set(error, ERROR_UNSUPPORTED, "view_source", "pictures are not made of layers here");
+        return error_remedy(error, "use rays: each view is rendered");
+    }
+    return true;
+}
+
 bool frame_request_check(const struct frame_request *request, struct error *error)
 {
     if (request->width == 0 || request->height == 0 || request->width > SIZE_MAX_PIXELS ||
@@ -136,13 +154,21 @@ bool frame_request_check(const struct frame_request *request, struct error *erro
     if (request->format > PIXEL_FORMAT_RGBA32F)
         return error_set(error, ERROR_UNSUPPORTED, "format", "there is no pixel format number %u",
                          (unsigned)request->format);
-    return check_integrator(request, error) && check_layers(request, error) && check_camera(request, error);
+    return check_views(request, error) && check_integrator(request, error) && check_layers(request, error) &&
+           check_camera(request, error);
 }
 
 static bool same_camera(const struct frame_camera *a, const struct frame_camera *b)
 {
     return memcmp(a->world_from_view, b->world_from_view, sizeof(a->world_from_view)) == 0 &&
            a->fov_y == b->fov_y && a->ortho_height == b->ortho_height && a->near == b->near;
+}
+
+static bool same_views(const struct frame_request *a, const struct frame_request *b)
+{
+    return a->views_across == b->views_across && a->views_down == b->views_down && a->baseline == b->baseline &&
+           a->eyes_over == b->eyes_over && a->view_source == b->view_source && a->has_key == b->has_key &&
+           (!a->has_key || same_camera(&a->key_camera, &b->key_camera));
 }
 
 static bool same_tracer(const struct frame_request *a, const struct frame_request *b)
@@ -160,7 +186,7 @@ static bool same_light(const struct frame_request *a, const struct frame_request
 
 bool frame_request_adds_to(const struct frame_request *a, const struct frame_request *b)
 {
-    return a->accumulate && b->accumulate && a->width == b->width && a->height == b->height &&
+    return a->accumulate && b->accumulate && a->width == b->width && a->height == b->height && same_views(a, b) &&
            a->depth == b->depth && a->seed == b->seed && same_light(a, b) && a->aperture == b->aperture &&
            a->focus == b->focus && a->filter == b->filter && same_camera(&a->camera, &b->camera) &&
            same_tracer(a, b) && frame_request_planes(a) == frame_request_planes(b);
