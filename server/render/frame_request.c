@@ -10,18 +10,28 @@
 #define SIZE_MAX_PIXELS 16384u /* width and height; keeps the number of a pixel in 32 bits */
 #define AO_RAYS_MAX 65536u     /* keeps the number of a sample's rays in 32 bits */
 
-static bool check_camera(const struct frame_request *request, struct error *error)
+/* `fields`: of its transform, its angle and its height. */
+static bool check_view(const struct frame_camera *camera, const char *const fields[3], struct error *error)
 {
-    const struct frame_camera *camera = &request->camera;
     for (int i = 0; i < 12; i++)
         if (!isfinite(camera->world_from_view[i]))
-            return error_set(error, ERROR_INVALID, "camera", "its transform is not finite");
+            return error_set(error, ERROR_INVALID, fields[0], "its transform is not finite");
     if (!(camera->fov_y >= 0.0f && camera->fov_y < 3.14159f))
-        return error_set(error, ERROR_INVALID, "camera.fov_y", "%g radians; 0 to below pi are possible",
+        return error_set(error, ERROR_INVALID, fields[1], "%g radians; 0 to below pi are possible",
                          (double)camera->fov_y);
     if (camera->fov_y == 0.0f && !(camera->ortho_height > 0.0f && isfinite(camera->ortho_height)))
-        return error_set(error, ERROR_INVALID, "camera.height", "an orthographic camera of height %g",
+        return error_set(error, ERROR_INVALID, fields[2], "an orthographic camera of height %g",
                          (double)camera->ortho_height);
+    return true;
+}
+
+static bool check_camera(const struct frame_request *request, struct error *error)
+{
+    static const char *const own[3] = {"camera", "camera.fov_y", "camera.height"};
+    static const char *const key[3] = {"key_camera", "key_camera.fov_y", "key_camera.height"};
+    if (!check_view(&request->camera, own, error) ||
+        (request->has_key && !check_view(&request->key_camera, key, error)))
+        return false;
     if (!(request->aperture >= 0.0f && isfinite(request->aperture)))
         return error_set(error, ERROR_INVALID, "aperture", "a lens of %g metres", (double)request->aperture);
     if (!(request->focus >= 0.0f && isfinite(request->focus)))
@@ -133,10 +143,9 @@ static bool check_views(const struct frame_request *request, struct error *error
     if (!(request->baseline >= 0.0f && isfinite(request->baseline)))
         return error_set(error, ERROR_INVALID, "baseline", "%g metres; 0 and more are possible",
                          (double)request->baseline);
-    if (request->view_source != VIEW_SOURCE_RAYS) {
-        error_set(error, ERROR_UNSUPPORTED, "view_source", "pictures are not made of layers here");
-        return error_remedy(error, "use rays: each view is rendered");
-    }
+    if (request->view_source == VIEW_SOURCE_LAYERS && request->compare)
+        return error_set(error, ERROR_UNSUPPORTED, "compare",
+                         "views made from layers are not traced by a second tracer; compare rendered ones");
     return true;
 }
 
@@ -184,10 +193,15 @@ static bool same_light(const struct frame_request *a, const struct frame_request
            a->ao_falloff == b->ao_falloff && a->ao_rays == b->ao_rays && a->layer_opacity == b->layer_opacity;
 }
 
+bool frame_request_same_radiance(const struct frame_request *a, const struct frame_request *b)
+{
+    return a->depth == b->depth && a->seed == b->seed && same_light(a, b) && same_tracer(a, b);
+}
+
 bool frame_request_adds_to(const struct frame_request *a, const struct frame_request *b)
 {
     return a->accumulate && b->accumulate && a->width == b->width && a->height == b->height && same_views(a, b) &&
-           a->depth == b->depth && a->seed == b->seed && same_light(a, b) && a->aperture == b->aperture &&
-           a->focus == b->focus && a->filter == b->filter && same_camera(&a->camera, &b->camera) &&
-           same_tracer(a, b) && frame_request_planes(a) == frame_request_planes(b);
+           frame_request_same_radiance(a, b) && a->aperture == b->aperture && a->focus == b->focus &&
+           a->filter == b->filter && same_camera(&a->camera, &b->camera) &&
+           frame_request_planes(a) == frame_request_planes(b);
 }

@@ -300,10 +300,22 @@ static struct wave camera_wave(struct render_context *context)
     };
 }
 
+static bool find_layer(struct render_context *context, const struct wave *wave, bool *done, struct error *error)
+{
+    *done = true;
+    context_span_begin(context, STAGE_PRIMARY);
+    context_bind(context);
+    bool found = tracer_layer_hits(context->layer_tracer, context->scene, wave, context->layer, error);
+    context_span_end(context);
+    return found;
+}
+
 static bool trace_hits(struct render_context *context, bool *done, struct error *error)
 {
     struct wave wave = camera_wave(context);
     compact_rays(context, &wave);
+    if (context->layer_tracer)
+        return find_layer(context, &wave, done, error);
     return wave_trace(context, RAY_PRIMARY, &wave, done, error);
 }
 
@@ -311,10 +323,30 @@ bool primary_begin_slice(const struct primary *primary, struct render_context *c
 {
     context->ray_count = context->slice.slot_count << context->uniforms.sample_shift;
     context->wave_number = context->asked = context->asking = 0;
-    context->sampled_hits = !primary && context->tracer->impl->sampled;
+    const struct tracer *tracer = context->layer_tracer ? context->layer_tracer : context->tracer;
+    context->sampled_hits = !primary && tracer->impl->sampled;
     compact_begin(context);
     context_span_begin(context, STAGE_PRIMARY);
     bool made = make_rays(primary, context, error);
+    context_span_end(context);
+    return made;
+}
+
+bool primary_intersect(struct render_context *context, bool *done, struct error *error)
+{
+    struct wave wave = camera_wave(context);
+    wave.bare = true;
+    compact_rays(context, &wave);
+    return wave_trace(context, RAY_PRIMARY, &wave, done, error);
+}
+
+bool primary_make_surfaces(struct render_context *context, struct error *error)
+{
+    struct wave wave = camera_wave(context);
+    compact_rays(context, &wave);
+    context_span_begin(context, STAGE_PRIMARY);
+    context_bind(context);
+    bool made = tracer_surfaces(context->tracer, context->scene, &wave, error) && compact_hits(context, error);
     context_span_end(context);
     return made;
 }

@@ -33,6 +33,10 @@ bool primary_rasterise(struct primary *primary, struct render_context *context, 
 bool primary_begin_slice(const struct primary *primary, struct render_context *context, struct error *error);
 /* Its hits, from the visibility buffer, or, where `primary` is NULL, a part of them a call from the tracer. */
 bool primary_find(const struct primary *primary, struct render_context *context, bool *done, struct error *error);
+/* In place of that, for rays that only ask where they hit: their intersections, a part of them a call; and then,
+ * if their surfaces are asked for after all, hits of them and the list of these. */
+bool primary_intersect(struct render_context *context, bool *done, struct error *error);
+bool primary_make_surfaces(struct render_context *context, struct error *error);
 /* Announces the programs of the first hits (gpu_program_announce). */
 void primary_announce(struct render_context *context, bool rasterised);
 void primary_finish(struct primary *primary, struct gpu_device *device);
