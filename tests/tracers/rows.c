@@ -6,6 +6,12 @@
  * ray may pass between their samples. */
 #define BORDERS "planes of samples overlap or leave gaps where images meet"
 
+/* Layers are ordered by what is at a texel's centre; where surfaces cross, the order turns round within the texel.
+ */
+#define CROSSINGS "where surfaces cross, a texel has them in one order"
+#define SEEN_STILL "it holds what is seen as the shutter opens"
+#define QUADTREE_OFF (0.25 / (128 * 100.0))
+
 #define STILL "it holds samples of the scene as the shutter opens"
 
 static const struct tracer_row rows[] = {
@@ -67,5 +73,19 @@ static const struct tracer_row rows[] = {
              .rayspace.reduce = RAYSPACE_REDUCE_SEGMENTS),
     RAYSPACE(" with little room, in two rounds, reduced by a geometry shader", .bench.rayspace_pairs = 512,
              .rayspace.rounds = 2, .rayspace.reduce = RAYSPACE_REDUCE_GEOMETRY),
+/* 256 texels along a face: those of a scene 3 metres before the eye are 2 cm wide. A plane may be off by 1/4 pixel
+ * for an eye 100 metres aside, which is 1/4 / (128 * 100) of 1 / depth: less than 1 mm at 3 metres. */
+#define QUADTREE(form, count, one_face, off_, judged, ...)                                                        \
+    {                                                                                                             \
+        .name = "quadtree" form, .number = 6, .is_form = sizeof(form) > 1,                                        \
+        .options.quadtree = {.layers = count, .resolution = 256, .radius = 100, __VA_ARGS__},                     \
+        .seen = {count, 256, one_face, off_, 0.005, judged, CROSSINGS}, .refuses_motion = SEEN_STILL              \
+    }
+    QUADTREE("", 3, false, 0, 200, .faces = QUADTREE_FACES_CUBE),
+    QUADTREE(", of the view", 3, true, 0, 60, .faces = QUADTREE_FACES_VIEW),
+    QUADTREE(", of one layer", 1, false, 0, 60, .adaptive = QUADTREE_ADAPTIVE_OFF),
+    QUADTREE(", planes", 3, false, QUADTREE_OFF, 200, .hits = QUADTREE_HITS_PLANE),
+    QUADTREE(", of boxes", 3, false, 0, 200, .nodes = QUADTREE_NODES_MINMAX),
+    QUADTREE(", texel by texel", 3, false, 0, 200, .walk = QUADTREE_WALK_DDA),
 };
 TRACER_ROWS(rows)
