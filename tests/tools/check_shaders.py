@@ -33,7 +33,8 @@ TRACERS = [{"TRAVERSE": '"naive/traverse.glsl"', "TRACER_NAIVE": "1", "PACKET_RA
     for cubes, layers, packet, bits, levels in (
         ("1", "4", "1", "0", {"LDC_CELLS": "1"}), ("2", "4", "4", "0", {"LDC_CELLS": "1"}),
         ("2", "1", "4", "2", {}), ("1", "4", "1", "3", {"LDC_BLOCKS": "1"}))] + [
-    {"TRAVERSE": '"rayspace/traverse.glsl"', "TRACER_RAYSPACE": "1", "PACKET_RAYS": "1"}] + [
+    {"TRAVERSE": '"rayspace/traverse.glsl"', "TRACER_RAYSPACE": "1", "PACKET_RAYS": "1"},
+    {"TRAVERSE": '"quadtree/traverse.glsl"', "TRACER_QUADTREE": "1", "PACKET_RAYS": "1"}] + [
     {"TRAVERSE": '"abuffer/traverse.glsl"', "TRACER_ABUFFER": "1", "PACKET_RAYS": "1", **search}
     for search in ({}, {"ABUFFER_STEPS": "3"}, {"ABUFFER_STEPS": "1"})] + [
     {"TRAVERSE": f'"svo/{traversal}.glsl"', "TRACER_SVO": "1", "PACKET_RAYS": "1", **tree}
@@ -57,7 +58,7 @@ CHOICES = {
 # Defines that come only with others.
 WITH = {"BVH_DEFORMS_IN_SHUTTER": ("BVH_DEFORMS", "HAS_MOTION"), "BVH_RESUMES": ("BVH_BUDGET",)}
 # Defines that never come with others: tracers that know the scene as the shutter opens refuse rays with times.
-WITHOUT = {tracer: ("HAS_MOTION",) for tracer in ("TRACER_LDC", "TRACER_ABUFFER", "TRACER_SVO")}
+WITHOUT = {tracer: ("HAS_MOTION",) for tracer in ("TRACER_LDC", "TRACER_ABUFFER", "TRACER_QUADTREE", "TRACER_SVO")}
 # And in programs of a folder: what moves is met by tracers, and shaded where it was met.
 WITHOUT_IN = {"render": ("HAS_MOTION",)}
 STAGES = {"render/primary.vert": ["render/primary.vert", "render/primary.frag"],
