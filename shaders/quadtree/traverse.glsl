@@ -258,6 +258,7 @@ bool walk_face(trace_ray r, uint face, face_segment s, vec3 origin, inout view_w
 {
     layer_walk walk;
     float u_from = 0.0, u_end = 1.0;
+    bool has_hit = false;
     walk.offered = vec2(-1.0);
     walk.origin = origin;
     for (uint layer = 0u; layer < quadtree.layers && u_from < u_end; layer++) {
@@ -267,8 +268,14 @@ bool walk_face(trace_ray r, uint face, face_segment s, vec3 origin, inout view_w
         walk.u_end = u_end;
         walk.u_behind = NEVER;
         seen.layers = max(seen.layers, layer + 1u);
-        if (walk_layer(r, s, walk, found))
+        if (walk_layer(r, s, walk, found)) {
+#ifdef ANY_HIT
             return true;
+#else
+            has_hit = true; // but where the ray was behind the layer before, something may be in the next one
+            walk.u_end = min(walk.u_end, place_at(s, found.distance));
+#endif
+        }
         u_end = walk.u_end;
         u_from = walk.u_behind;
     }
@@ -279,7 +286,7 @@ bool walk_face(trace_ray r, uint face, face_segment s, vec3 origin, inout view_w
         seen.fill_slice = walk.slice;
         seen.fill_texel = walk.behind_texel;
     }
-    return false;
+    return has_hit;
 }
 
 // A view does not see what is beside it. But what lies between another eye near its own and its pyramid is taken to
@@ -328,11 +335,14 @@ bool walk_view(trace_ray r, inout view_walk seen, inout found_type found)
         if (t.x < t.y) {
             bool is_inside = origin.z >= quadtree.depths.w;
             vec3 place = is_inside ? face_place(origin, face_q(origin)) : vec3(-1.0);
-            if (walk_face(r, face, segment_of(origin, direction, t), place, seen, found))
+            bool has_ended = walk_face(r, face, segment_of(origin, direction, t), place, seen, found);
+            if (quadtree.faces == 1u)
+                note_outside(r, t, min(t_last, NEAREST(found, r)), seen);
+            if (has_ended)
                 return true;
-        }
-        if (quadtree.faces == 1u)
+        } else if (quadtree.faces == 1u) {
             note_outside(r, t, min(t_last, NEAREST(found, r)), seen);
+        }
     }
     return false;
 }
