@@ -46,6 +46,7 @@ struct tracer_row {
     struct {
         uint32_t layers, resolution; /* as its options say; of a face */
         bool is_one_face;            /* what is beside it, and behind the eye, is not known */
+        double margin;               /* of one face: so much more it sees on each side, in halves of the view */
         double off;                  /* of planes it hits: how far 1 / depth may be off, 1 / metres */
         double wrong_max;            /* but for this share of the rays that pass no outline within a texel */
         uint32_t judged_min;         /* of RAY_COUNT rays through a scene; brute force says which are known */

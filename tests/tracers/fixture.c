@@ -48,9 +48,14 @@ static void tell_view(struct fixture *fixture)
         eye[k] = (double)fixture->view.world_from_view[4 * k + 3];
     fixture->seen_view = (struct seen_view){.layers = row->seen.layers};
     seen_view_of_cube(&fixture->seen_view, eye, row->seen.resolution);
+    fixture->seen_view.is_bounded = true;
+    for (int k = 0; k < 3; k++) {
+        fixture->seen_view.lower[k] = (double)fixture->gpu.lower_world[k];
+        fixture->seen_view.upper[k] = (double)fixture->gpu.upper_world[k];
+    }
     if (row->seen.is_one_face) {
         fixture->seen_view.faces = 1;
-        fixture->seen_view.half += 2 * (double)fixture->tracer->options.quadtree.margin; /* 1 is the view's own */
+        fixture->seen_view.half += row->seen.margin; /* 1 is the view's own */
     }
 }
 
@@ -65,7 +70,7 @@ static void forget_seen(struct fixture *fixture)
 
 struct seen_answer fixture_seen(struct fixture *fixture, const struct ray *ray)
 {
-    struct seen_answer answer = {INFINITY, INFINITY, INFINITY};
+    struct seen_answer answer = {INFINITY, INFINITY, INFINITY, (double)ray->direction_t_max[3]};
     if (fixture->row->seen.layers == 0)
         return answer;
     if (!fixture->seen) {
@@ -86,8 +91,10 @@ static double slack_of(double distance)
 enum knowledge seen_judges(const struct seen_answer *seen, const struct hit *hit, double until)
 {
     const bool claims = !(hit->material & HIT_UNKNOWN);
-    if (seen->unknown < fmin(until, seen->edge) - slack_of(until))
-        return claims ? CLAIMS_TO_KNOW : IS_NOT_JUDGED;
+    /* Whatever it has met or missed before, it goes on where nothing is known. */
+    const double claimed = hit->distance < 0 ? seen->end : (double)hit->distance;
+    if (claims && seen->unknown < claimed - slack_of(claimed))
+        return CLAIMS_TO_KNOW;
     if (!seen_knows(seen, until))
         return IS_NOT_JUDGED;
     return claims ? IS_JUDGED : KNOWS_TOO_LITTLE;

@@ -10,7 +10,6 @@
  */
 #define CROSSINGS "where surfaces cross, a texel has them in one order"
 #define SEEN_STILL "it holds what is seen as the shutter opens"
-#define QUADTREE_OFF (0.25 / (128 * 100.0))
 
 #define STILL "it holds samples of the scene as the shutter opens"
 
@@ -75,17 +74,26 @@ static const struct tracer_row rows[] = {
              .rayspace.rounds = 2, .rayspace.reduce = RAYSPACE_REDUCE_GEOMETRY),
 /* 256 texels along a face: those of a scene 3 metres before the eye are 2 cm wide. A plane may be off by 1/4 pixel
  * for an eye 100 metres aside, which is 1/4 / (128 * 100) of 1 / depth: less than 1 mm at 3 metres. */
-#define QUADTREE(form, count, one_face, off_, judged, ...)                                                        \
+#define QUADTREE(form, ...)                                                                                       \
     {                                                                                                             \
-        .name = "quadtree" form, .number = 6, .is_form = sizeof(form) > 1,                                        \
-        .options.quadtree = {.layers = count, .resolution = 256, .radius = 100, __VA_ARGS__},                     \
-        .seen = {count, 256, one_face, off_, 0.005, judged, CROSSINGS}, .refuses_motion = SEEN_STILL              \
+        .name = "quadtree" form, .number = 6, .is_form = sizeof(form) > 1, .refuses_motion = SEEN_STILL,          \
+        __VA_ARGS__                                                                                               \
     }
-    QUADTREE("", 3, false, 0, 200, .faces = QUADTREE_FACES_CUBE),
-    QUADTREE(", of the view", 3, true, 0, 60, .faces = QUADTREE_FACES_VIEW),
-    QUADTREE(", of one layer", 1, false, 0, 60, .adaptive = QUADTREE_ADAPTIVE_OFF),
-    QUADTREE(", planes", 3, false, QUADTREE_OFF, 200, .hits = QUADTREE_HITS_PLANE),
-    QUADTREE(", of boxes", 3, false, 0, 200, .nodes = QUADTREE_NODES_MINMAX),
-    QUADTREE(", texel by texel", 3, false, 0, 200, .walk = QUADTREE_WALK_DDA),
+#define QUADTREE_OPTIONS(...) QUADTREE_BOUND(0.25f, 100, __VA_ARGS__)
+#define QUADTREE_BOUND(e, r, ...) .options.quadtree = {.resolution = 256, .pixels = e, .radius = r, __VA_ARGS__}
+#define QUADTREE_SEEN(judged, ...)                                                                                \
+    .seen = {.resolution = 256, .wrong_max = 0.005, .judged_min = judged, .reason = CROSSINGS, __VA_ARGS__}
+    QUADTREE("", QUADTREE_OPTIONS(.layers = 3), QUADTREE_SEEN(200, .layers = 3)),
+    QUADTREE(", of one layer", QUADTREE_OPTIONS(.layers = 1), QUADTREE_SEEN(60, .layers = 1)),
+    /* The same planes, for eyes nearby: what lies before the view is taken to be empty where a ray begins there.
+     */
+    QUADTREE(", of the view", QUADTREE_BOUND(0.001f, 0.4f, .layers = 3, .faces = QUADTREE_FACES_VIEW),
+             QUADTREE_SEEN(60, .layers = 3, .is_one_face = true, .margin = 2 * 26 / 256.0)),
+    QUADTREE(", planes", QUADTREE_OPTIONS(.layers = 3, .hits = QUADTREE_HITS_PLANE),
+             QUADTREE_SEEN(200, .layers = 3, .off = 0.25 / (128 * 100.0))),
+    QUADTREE(", of boxes", QUADTREE_OPTIONS(.layers = 3, .nodes = QUADTREE_NODES_MINMAX),
+             QUADTREE_SEEN(200, .layers = 3)),
+    QUADTREE(", texel by texel", QUADTREE_OPTIONS(.layers = 3, .walk = QUADTREE_WALK_DDA),
+             QUADTREE_SEEN(200, .layers = 3)),
 };
 TRACER_ROWS(rows)

@@ -14,6 +14,7 @@
 #include <stdio.h>
 
 #define SEEN_TEXELS 0.75 /* sqrt(1/2), and what floats round */
+#define SEEN_RUN 3.0     /* texels: what is hidden for longer surely is; 1.5 and their diagonals */
 #define SEEN_EVENTS_MAX 16384
 
 struct seen_view {
@@ -22,6 +23,9 @@ struct seen_view {
     uint32_t faces, layers;
     double half;  /* of a face at distance 1 */
     double texel; /* likewise */
+    /* What bounds the scene: beyond the farthest point of it from the eye, that nothing is there is known. */
+    bool is_bounded;
+    double lower[3], upper[3];
 };
 
 /* Faces of a cube of so many texels. */
@@ -43,6 +47,7 @@ struct seen_answer {
     double maybe_unknown, unknown;
     /* Of the nearest surface that the ray meets within a texel of its outline. */
     double edge;
+    double end; /* of the ray */
 };
 
 struct seen_interval {
@@ -67,6 +72,7 @@ struct seen {
     struct seen_event events[SEEN_EVENTS_MAX];
     uint32_t event_count;
     double edge;
+    double surely_within, maybe_within; /* distances, up to which something may be there */
 };
 
 static inline bool seen_is_whole(const struct seen *seen, uint32_t material)
@@ -365,22 +371,39 @@ static inline int seen_by_place(const void *a, const void *b)
     return x < y ? -1 : x > y;
 }
 
+/* How far apart two points of the ray are to the eye, in texels at least. */
+static inline double seen_texels_between(const struct seen *seen, double from, double to)
+{
+    double a[3], b[3], across[3];
+    to = fmin(to, 1e9 * (1 + fabs(from))); /* the end of a ray may be at infinity */
+    for (int k = 0; k < 3; k++) {
+        a[k] = seen->origin[k] + from * seen->direction[k];
+        b[k] = seen->origin[k] + to * seen->direction[k];
+    }
+    twin_cross(across, a, b);
+    return atan2(sqrt(twin_dot(across, across)), twin_dot(a, b)) / seen->view->texel;
+}
+
 /* From where on as many hide it as there are layers, for longer than rounding: two faces meet in a place that each
- * computes. */
+ * computes. Surely hidden is what is so for longer than a tracer may take a ray for one beside the surface that it
+ * began on, or to the end of the ray. */
 static inline void seen_sweep(const struct seen *seen, struct seen_answer *answer)
 {
     const int layers = (int)seen->view->layers;
     int wide = 0, narrow = 0;
+    double since = INFINITY;
     for (uint32_t i = 0; i < seen->event_count; i++) {
         const double at = seen->events[i].at, next = i + 1 < seen->event_count ? seen->events[i + 1].at : INFINITY;
         wide += seen->events[i].wide;
         narrow += seen->events[i].narrow;
         if (!(next - at > 1e-7 * (1 + fabs(at))))
             continue;
-        if (wide >= layers)
+        if (wide >= layers && at < seen->maybe_within)
             answer->maybe_unknown = fmin(answer->maybe_unknown, at);
-        if (narrow >= layers)
-            answer->unknown = fmin(answer->unknown, at);
+        since = narrow >= layers ? fmin(since, at) : INFINITY;
+        const double end = fmin(next, seen->surely_within);
+        if (since < fmin(answer->unknown, end) && seen_texels_between(seen, since, end) > SEEN_RUN)
+            answer->unknown = since;
     }
 }
 
@@ -422,17 +445,37 @@ static inline void seen_leave(const struct seen *seen, struct seen_answer *answe
                                maybe = seen_in_face(seen, seen->view->half + off);
     const bool is_in = surely.from <= seen->t_min && surely.from < surely.to,
                may_be_in = maybe.from <= seen->t_min && maybe.from < maybe.to;
-    answer->maybe_unknown = fmin(answer->maybe_unknown, !is_in                    ? seen->t_min
-                                                        : surely.to < seen->t_max ? surely.to
-                                                                                  : INFINITY);
-    answer->unknown = fmin(answer->unknown, !may_be_in               ? seen->t_min
-                                            : maybe.to < seen->t_max ? maybe.to
-                                                                     : INFINITY);
+    const double surely_out = !may_be_in ? seen->t_min : maybe.to, maybe_out = !is_in ? seen->t_min : surely.to;
+    if (surely_out < fmin(seen->t_max, seen->surely_within))
+        answer->unknown = fmin(answer->unknown, surely_out);
+    if (maybe_out < fmin(seen->t_max, seen->maybe_within))
+        answer->maybe_unknown = fmin(answer->maybe_unknown, maybe_out);
+}
+
+/* Surely something may be there in the box that bounds the scene; a tracer may look as far from the eye as its farthest
+ * corner is. */
+static inline void seen_bound(struct seen *seen)
+{
+    const struct seen_view *view = seen->view;
+    struct seen_interval box = {-INFINITY, INFINITY};
+    double far = 0;
+    seen->surely_within = seen->maybe_within = INFINITY;
+    if (!view->is_bounded)
+        return;
+    for (int k = 0; k < 3; k++) {
+        const double low = view->lower[k] - view->eye[k], high = view->upper[k] - view->eye[k];
+        seen_clip(&box, seen->origin[k] - low, seen->direction[k]);
+        seen_clip(&box, high - seen->origin[k], -seen->direction[k]);
+        far += fmax(low * low, high * high);
+    }
+    seen->surely_within = box.from < box.to ? box.to : -INFINITY;
+    seen->maybe_within = 1.01 * (sqrt(twin_dot(seen->origin, seen->origin)) + sqrt(far)) /
+                         sqrt(twin_dot(seen->direction, seen->direction));
 }
 
 static inline void seen_trace(struct seen_answer *answer, struct seen *seen, const struct ray *ray)
 {
-    *answer = (struct seen_answer){INFINITY, INFINITY, INFINITY};
+    *answer = (struct seen_answer){INFINITY, INFINITY, INFINITY, (double)ray->direction_t_max[3]};
     seen->t_min = ray->origin_t_min[3];
     seen->t_max = ray->direction_t_max[3];
     seen->event_count = 0;
@@ -443,6 +486,7 @@ static inline void seen_trace(struct seen_answer *answer, struct seen *seen, con
     }
     if (!(seen->t_max > seen->t_min) || !isfinite(twin_dot(seen->origin, seen->direction)))
         return;
+    seen_bound(seen);
     for (uint32_t face = 0; face < seen->view->faces; face++) {
         seen->axes = seen->view->axes[face];
         seen->inside = seen_in_face(seen, seen->view->half);
