@@ -46,7 +46,7 @@ static void tell_view(struct fixture *fixture)
     double eye[3];
     for (int k = 0; k < 3; k++)
         eye[k] = (double)fixture->view.world_from_view[4 * k + 3];
-    fixture->seen_view = (struct seen_view){.layers = row->seen.layers};
+    fixture->seen_view = (struct seen_view){.layers = row->seen.layers, .blind = row->seen.blind};
     seen_view_of_cube(&fixture->seen_view, eye, row->seen.resolution);
     fixture->seen_view.is_bounded = true;
     for (int k = 0; k < 3; k++) {

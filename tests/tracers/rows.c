@@ -89,8 +89,10 @@ static const struct tracer_row rows[] = {
      */
     QUADTREE(", of the view", QUADTREE_BOUND(0.001f, 0.4f, .layers = 3, .faces = QUADTREE_FACES_VIEW),
              QUADTREE_SEEN(60, .layers = 3, .is_one_face = true, .margin = 2 * 26 / 256.0)),
+    /* A plane that a ray meets within 1.5 texels across and down may be that of its own surface, gone on beyond
+       it. */
     QUADTREE(", planes", QUADTREE_OPTIONS(.layers = 3, .hits = QUADTREE_HITS_PLANE),
-             QUADTREE_SEEN(200, .layers = 3, .off = 0.25 / (128 * 100.0))),
+             QUADTREE_SEEN(200, .layers = 3, .off = 0.25 / (128 * 100.0), .blind = 2.2)),
     QUADTREE(", of boxes", QUADTREE_OPTIONS(.layers = 3, .nodes = QUADTREE_NODES_MINMAX),
              QUADTREE_SEEN(200, .layers = 3)),
     QUADTREE(", texel by texel", QUADTREE_OPTIONS(.layers = 3, .walk = QUADTREE_WALK_DDA),

@@ -23,6 +23,7 @@ struct seen_view {
     uint32_t faces, layers;
     double half;  /* of a face at distance 1 */
     double texel; /* likewise */
+    double blind; /* texels: what a ray meets within them may be taken for what it begins on */
     /* What bounds the scene: beyond the farthest point of it from the eye, that nothing is there is known. */
     bool is_bounded;
     double lower[3], upper[3];
@@ -54,6 +55,14 @@ struct seen_interval {
     double from, to;
 };
 
+/* Where the ray meets a triangle: the point, and the triangle's plane, normal * p = height. */
+struct seen_meeting {
+    double at, point[3], normal[3], height;
+    size_t triangle;
+    const double (*axes)[3];
+};
+#define SEEN_MEETINGS_MAX 256
+
 struct seen_event {
     double at;
     int wide, narrow; /* how many more hide what follows */
@@ -71,6 +80,8 @@ struct seen {
     struct seen_interval inside;                  /* of the ray, in the face in hand */
     struct seen_event events[SEEN_EVENTS_MAX];
     uint32_t event_count;
+    struct seen_meeting meetings[SEEN_MEETINGS_MAX];
+    uint32_t meeting_count;
     double edge;
     double surely_within, maybe_within; /* distances, up to which something may be there */
 };
@@ -212,6 +223,43 @@ static inline void seen_triangle(struct seen *seen, size_t i)
         seen_hide(seen, narrow, 0, 1);
     if (is_wide && !is_narrow)
         seen_edge(seen, at);
+    if (is_narrow && at >= seen->inside.from && at <= seen->inside.to && seen->meeting_count < SEEN_MEETINGS_MAX) {
+        struct seen_meeting *meeting = &seen->meetings[seen->meeting_count++];
+        *meeting = (struct seen_meeting){.at = at, .height = height, .triangle = i, .axes = seen->axes};
+        memcpy(meeting->normal, normal, sizeof(normal));
+        for (int k = 0; k < 3; k++)
+            meeting->point[k] = o[k] + at * d[k];
+    }
+}
+
+/* Whether another triangle crosses the one that the ray meets within a texel of there: which of them is the first
+ * is decided for the texel. 1 / depth of each is linear in a texel's place; its slope is that of normal / height.
+ */
+static inline bool seen_crosses(const struct seen *seen, const struct seen_meeting *meeting, size_t i)
+{
+    const double(*corner)[3] = (const double(*)[3])seen->triangles[i];
+    const double *p = meeting->point, off = SEEN_TEXELS * seen->view->texel;
+    double e1[3], e2[3], normal[3], apart[3];
+    for (int k = 0; k < 3; k++) {
+        e1[k] = corner[1][k] - corner[0][k];
+        e2[k] = corner[2][k] - corner[0][k];
+    }
+    twin_cross(normal, e1, e2);
+    const double height = twin_dot(normal, corner[0]), side = height > 0 ? 1 : -1,
+                 z = twin_dot(meeting->axes[2], p);
+    if (height == 0 || twin_dot(normal, p) / height <= 0)
+        return false;
+    for (int v = 0; v < 3; v++) {
+        double n[3];
+        twin_cross(n, corner[v], corner[(v + 1) % 3]);
+        const double across = hypot(twin_dot(n, meeting->axes[0]), twin_dot(n, meeting->axes[1]));
+        if (side * twin_dot(n, p) + off * across * z < 0)
+            return false;
+    }
+    for (int k = 0; k < 3; k++)
+        apart[k] = meeting->normal[k] / meeting->height - normal[k] / height;
+    const double slope = hypot(twin_dot(apart, meeting->axes[0]), twin_dot(apart, meeting->axes[1]));
+    return fabs(twin_dot(apart, p) / z) < off * slope;
 }
 
 /* A ball round `c` as the eye at `e` sees it along o + t * d: what it hides, with an outline of another radius. */
@@ -384,6 +432,20 @@ static inline double seen_texels_between(const struct seen *seen, double from, d
     return atan2(sqrt(twin_dot(across, across)), twin_dot(a, b)) / seen->view->texel;
 }
 
+static inline void seen_meet_all(struct seen *seen)
+{
+    for (uint32_t m = 0; m < seen->meeting_count; m++) {
+        const struct seen_meeting *meeting = &seen->meetings[m];
+        if (meeting->at > seen->t_min && meeting->at < fmin(seen->t_max, seen->edge) &&
+            seen_texels_between(seen, seen->t_min, meeting->at) < seen->view->blind)
+            seen->edge = meeting->at;
+        for (size_t i = 0; i < seen->triangle_count; i++)
+            if (i != meeting->triangle && meeting->at > seen->t_min &&
+                meeting->at < fmin(seen->t_max, seen->edge) && seen_crosses(seen, meeting, i))
+                seen->edge = meeting->at;
+    }
+}
+
 /* From where on as many hide it as there are layers, for longer than rounding: two faces meet in a place that each
  * computes. Surely hidden is what is so for longer than a tracer may take a ray for one beside the surface that it
  * began on, or to the end of the ray. */
@@ -452,8 +514,8 @@ static inline void seen_leave(const struct seen *seen, struct seen_answer *answe
         answer->maybe_unknown = fmin(answer->maybe_unknown, maybe_out);
 }
 
-/* Surely something may be there in the box that bounds the scene; a tracer may look as far from the eye as its farthest
- * corner is. */
+/* Surely something may be there in the box that bounds the scene; a tracer may look as far from the eye as its
+ * farthest corner is. */
 static inline void seen_bound(struct seen *seen)
 {
     const struct seen_view *view = seen->view;
@@ -478,7 +540,7 @@ static inline void seen_trace(struct seen_answer *answer, struct seen *seen, con
     *answer = (struct seen_answer){INFINITY, INFINITY, INFINITY, (double)ray->direction_t_max[3]};
     seen->t_min = ray->origin_t_min[3];
     seen->t_max = ray->direction_t_max[3];
-    seen->event_count = 0;
+    seen->event_count = seen->meeting_count = 0;
     seen->edge = INFINITY;
     for (int k = 0; k < 3; k++) {
         seen->origin[k] = ray->origin_t_min[k] - seen->view->eye[k];
@@ -495,6 +557,7 @@ static inline void seen_trace(struct seen_answer *answer, struct seen *seen, con
         if (seen->view->faces == 1)
             seen_leave(seen, answer);
     }
+    seen_meet_all(seen);
     qsort(seen->events, seen->event_count, sizeof(seen->events[0]), seen_by_place);
     seen_sweep(seen, answer);
     answer->edge = seen->edge;
