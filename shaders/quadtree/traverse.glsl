@@ -62,7 +62,7 @@ bool offer(trace_ray r, candidate met, inout layer_walk walk, inout found_type f
     if (found.distance >= before)
         return false;
     walk_flags = (walk.layer + 1u) << HIT_LAYER_SHIFT;
-    return true;
+    return false; // the walk ends where the ray now does
 #endif
 }
 
@@ -92,24 +92,27 @@ bool intersect_visible(trace_ray r, uvec2 visible, float near, out candidate met
     return intersect_primitive(r, o, visible.y, visible.x - 1u, met);
 }
 
-// The primitives of the texel and of those beside it on the side of the place. True: the ray ends.
-bool offer_primitives(trace_ray r, vec2 place, float near, inout layer_walk walk, inout found_type found,
+// The primitives of the texel and of those beside it on the side of the place; the first that is met is enough where
+// surfaces go on from texel to texel. True: the ray ends.
+bool offer_primitives(trace_ray r, vec2 place, float near, bool all_four, inout layer_walk walk, inout found_type found,
                       out bool has_met)
 {
     ivec2 texel = ivec2(floor(place)), towards = ivec2(greaterThan(fract(place), vec2(0.5))) * 2 - 1;
     uvec2 tried = uvec2(VISIBLE_NOTHING);
     has_met = false;
-    for (int i = 0; i < 4 && !has_met; i++) {
+    bool ends = false;
+    for (int i = 0; i < 4 && (all_four || !has_met); i++) {
         uvec2 visible;
         candidate met;
         if (!visible_at(texel + ivec2(i & 1, i >> 1) * towards, walk.slice, visible) || visible == tried)
             continue;
         tried = visible;
-        has_met = intersect_visible(r, visible, near, met) && met.distance > r.t_min;
-        if (has_met && offer(r, met, walk, found))
-            return true;
+        if (intersect_visible(r, visible, near, met) && met.distance > r.t_min) {
+            has_met = true;
+            ends = offer(r, met, walk, found) || ends;
+        }
     }
-    return false;
+    return ends;
 }
 
 // A plane through a neighbour of the surface that the ray begins on may pass beside its origin: no hit.
@@ -127,7 +130,7 @@ bool meet(trace_ray r, face_segment s, float u, uvec2 node, inout layer_walk wal
     float near = distance_at(s, u);
 #ifndef QUADTREE_PLANES
     bool has_met;
-    if (offer_primitives(r, place.xy, near, walk, found, has_met))
+    if (offer_primitives(r, place.xy, near, plane_is_at_edge(node), walk, found, has_met))
         return true;
     if (has_met || plane_is_at_edge(node))
         return false;
@@ -135,7 +138,9 @@ bool meet(trace_ray r, face_segment s, float u, uvec2 node, inout layer_walk wal
     uvec2 visible;
     if (is_own_surface(walk, place, plane_slopes(node)) || !visible_at(ivec2(floor(place.xy)), walk.slice, visible))
         return false;
-    return offer(r, candidate(near, visible.y, visible.x - 1u, vec2(0.0)), walk, found);
+    bool ends_ = offer(r, candidate(near, visible.y, visible.x - 1u, vec2(0.0)), walk, found);
+    walk_flags |= 0x40000000u;
+    return ends_;
 }
 
 // ---- the walk through a layer ----
@@ -146,7 +151,7 @@ void note_behind(face_segment s, float gap, float w, float u_in, float u_out, in
 {
     u_since = min(u_since, u_in);
     vec2 way = abs(s.along.xy) * (u_out - u_since);
-    if (gap > QUADTREE_DEEP * w || max(way.x, way.y) > QUADTREE_OWN_WAY || u_out >= walk.u_end)
+    if (gap > QUADTREE_DEEP * w || max(way.x, way.y) > QUADTREE_OWN_WAY)
         if (u_since < walk.u_behind) {
             walk.u_behind = u_since;
             walk.behind_texel = walk.last_before;
@@ -173,7 +178,7 @@ bool walk_layer(trace_ray r, face_segment s, inout layer_walk walk, inout found_
     int level = QUADTREE_TOP;
 #endif
     ivec2 cell = texel >> level;
-    bool is_before = false;
+    bool is_before = false, is_behind = false; // neither: it has just begun
     float u_since = NEVER; // since when it is behind
     walk.last_before = ivec2(-1);
     while (walk.u < walk.u_end) {
@@ -191,13 +196,26 @@ bool walk_layer(trace_ray r, face_segment s, inout layer_walk walk, inout found_
                 u_meet = mix(walk.u, u_out, clamp(gap_in / (gap_in - gap_out), 0.0, 1.0));
             else if (is_before && gap_in > 0.0 && gap_in <= QUADTREE_EDGE_SHARE * w_in + quadtree.bounds.x)
                 u_meet = walk.u; // between two planes that do not quite meet
+#ifndef QUADTREE_PLANES
+            // Within a texel of an edge, of which its middle sees the other side.
+            else if (gap_in > 0.0 ? !is_behind : !is_before) {
+                bool has_met;
+                if (offer_primitives(r, (s.from + walk.u * s.along).xy, distance_at(s, walk.u), true, walk, found, has_met))
+                    return true;
+                SHORTEN(s, walk, found);
+                if (walk.u_end <= u_out)
+                    return false;
+            }
+#endif
             if (u_meet != NEVER) {
                 if (meet(r, s, u_meet, node, walk, found))
                     return true;
                 SHORTEN(s, walk, found);
-                u_out = min(u_out, max(walk.u_end, walk.u));
+                if (walk.u_end <= u_out)
+                    return false;
             }
             is_before = gap_out <= 0.0;
+            is_behind = !is_before;
             if (is_before) {
                 u_since = NEVER;
                 walk.last_before = clamp(ivec2(floor(s.from.xy + s.along.xy * mix(walk.u, u_out, 0.999))), cell << level,
@@ -214,6 +232,7 @@ bool walk_layer(trace_ray r, face_segment s, inout layer_walk walk, inout found_
                 continue;
             }
             is_before = min(w_in, w_out) > range.x;
+            is_behind = !is_before;
             if (is_before) {
                 u_since = NEVER;
                 walk.last_before = clamp(ivec2(floor(s.from.xy + s.along.xy * mix(walk.u, u_out, 0.999))), cell << level,
