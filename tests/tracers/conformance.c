@@ -225,6 +225,10 @@ static void judge_hit(struct fault *fault, const struct fixture *fixture, const 
         expect_near(fault, "primitive of a sample", got->primitive, HIT_NO_PRIMITIVE, 0);
         expect_sample(fault, fixture, got, expected);
     } else if (expected->node) { /* a disc's texture coordinates are its own affair */
+        if (got->instance >= fixture->gpu.instance_count && fixture->row->seen.layers > 0) {
+            expect_near(fault, "whether it is a disc", 1, 0, 0); /* seen through a gap between texels */
+            return;
+        }
         if (got->instance >= fixture->gpu.instance_count)
             fail_msg("instance %u of %u", got->instance, fixture->gpu.instance_count);
         expect_near(fault, "node", fixture->gpu.instances[got->instance].node, expected->node, 0);

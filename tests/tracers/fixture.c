@@ -357,14 +357,6 @@ void fixture_trace_rays(struct fixture *fixture, enum wave_kind kind, const stru
               &error);
 }
 
-float distance_below(struct fixture *fixture, float x, float y)
-{
-    struct hit hit;
-    const struct ray ray = {{x + 0.013f, y + 0.017f, 10, 0}, {0, 0, -1, 1e9f}};
-    fixture_trace_rays(fixture, WAVE_CLOSEST, &ray, 1, &hit);
-    return hit.material & HIT_UNKNOWN ? NAN : hit.distance;
-}
-
 /* ---- boxes ---- */
 
 void add_box_mesh(struct test_edits *edits, uint32_t id)
