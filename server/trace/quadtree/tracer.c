@@ -188,6 +188,21 @@ static void announce(struct tracer *tracer, struct gpu_scene *scene, const struc
     quadtree_announce(scene, wave, &tracer->options);
 }
 
+static bool texel_view(const struct tracer *tracer, struct trace_view *texels, uint32_t *layers)
+{
+    const struct quadtree *quadtree = (const struct quadtree *)tracer;
+    *texels = quadtree->texels;
+    *layers = quadtree->store.uniforms.layers;
+    return quadtree->store.uniforms.faces == 1;
+}
+
+static bool layer_hits(struct tracer *tracer, struct gpu_scene *scene, const struct wave *wave,
+                       const struct ray_range *rays, uint32_t layer, struct error *error)
+{
+    (void)wave;
+    return quadtree_layer_hits(&((struct quadtree *)tracer)->store, scene, rays, layer, error);
+}
+
 const struct tracer_impl tracer_quadtree_impl = {
     .name = "quadtree",
     .depends_on = CHANGED_GEOMETRY | CHANGED_DEFORMED | CHANGED_INSTANCES | CHANGED_SURFACES | CHANGED_DISCS |
@@ -207,4 +222,6 @@ const struct tracer_impl tracer_quadtree_impl = {
     .trace_begin = trace_begin,
     .trace_range = trace_range,
     .announce = announce,
+    .texel_view = texel_view,
+    .layer_hits = layer_hits,
 };
