@@ -258,7 +258,7 @@ CONTRACT_OBJ := $(call obj,$(filter-out tests/tracers/test_%,$(wildcard tests/tr
 $(CONTRACT): %: %.o $(CONTRACT_OBJ) $(SERVER_OBJ) $(PROTOCOL_OBJ) $(LIB_OBJ)
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(TEST_LIBS) -o $@
 MODEL_OBJ := $(B)/tests/bench/load_model.o
-RIVAL_OBJ := $(call obj,$(addprefix tests/bench/svo,.c _build.c _tiles.c)) $(RIVAL_SOURCES)
+RIVAL_OBJ := $(call obj,$(addprefix tests/bench/svo,.c _build.c _tiles.c) tests/bench/bench_warps.c) $(RIVAL_SOURCES)
 CONTEST_OBJ := $(MODEL_OBJ) $(call obj,$(addprefix tests/bench/bench_,contest.c embree.c scene.c sheets.c stats.c waves.c))
 # Sessions live in a time of their own.
 SERVING_OBJ := $(call obj,$(addprefix tests/fuzz/,engine_recorder.c serving.c))

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 #include "render/camera.h"
 
+#include "trace/raster/view.h"
+
 #include <math.h>
 #include <string.h>
 
@@ -176,15 +178,16 @@ void camera_fill_uniforms(struct frame_uniforms *uniforms, const struct frame_re
     if (near <= 0.0f)
         near = orthographic ? 0.0f
                             : fmaxf(scene->diagonal > 0.0f ? scene->diagonal * NEAR_OF_DIAGONAL : 1e-4f, 1e-6f);
-    memcpy(uniforms->world_from_view, camera->world_from_view, sizeof(camera->world_from_view));
-    uniforms->extent_near[0] = half_height * aspect;
-    uniforms->extent_near[1] = half_height;
-    uniforms->extent_near[2] = near;
-    uniforms->extent_near[3] = orthographic ? 1.0f : 0.0f;
-    uniforms->far_width[0] = far_distance(camera, scene, near);
+    struct raster_camera view = {
+        .extent = {half_height * aspect, half_height},
+        .near = near,
+        .far = far_distance(camera, scene, near),
+        .orthographic = orthographic,
+        .width = request->width,
+        .height = request->height,
+    };
+    memcpy(view.world_from_view, camera->world_from_view, sizeof(view.world_from_view));
+    raster_camera_fill(uniforms, &view);
     uniforms->lens[0] = request->aperture / 2.0f;
     uniforms->lens[1] = request->focus > 0.0f ? request->focus : focus_distance(camera, scene);
-    uniforms->width = request->width;
-    uniforms->height = request->height;
-    uniforms->tiles_across = (request->width + 7) / 8;
 }

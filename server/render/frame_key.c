@@ -24,6 +24,8 @@ bool frame_key_take(struct frame_renderer *renderer, struct error *error)
     const struct tracer_impl *impl = frame_find_tracer(renderer, TRACER_QUADTREE, "view_source", error);
     struct tracer_options options = request->tracer_options;
     options.quadtree.faces = QUADTREE_FACES_VIEW;
+    if (options.quadtree.hits == QUADTREE_HITS_AUTO)
+        options.quadtree.hits = QUADTREE_HITS_PLANE; /* what is thinner than a texel is there as well */
     if (!impl || !tracer_check_motion(impl, &renderer->shared->copy, error))
         return false;
     if (!impl->texel_view || !impl->layer_hits)

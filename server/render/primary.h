@@ -5,6 +5,7 @@
 
 #include "gpu/texture.h"
 #include "render/context.h"
+#include "trace/raster/view.h"
 
 /* The visibility buffer: which primitive of which instance each pixel sees, in a layer for each of the current
  * samples. It has a strip of the picture's rows at a time, so that no picture needs more than some memory at once.
@@ -17,9 +18,9 @@ struct primary {
     uint32_t first_row;                                        /* of the strip, in the picture */
     uint32_t layer_count;                                      /* that are drawn */
     /* where drawing goes on */
-    uint32_t layer, sort, instance, primitive;
+    uint32_t layer;
+    struct raster_view view;
     bool cleared;
-    uint32_t part_vertices; /* that are drawn in one step on software GL; 0: not known yet */
 };
 
 /* Makes room for strips of that many rows of the request's picture, and for that many samples. */

@@ -25,7 +25,7 @@ uniform uint ray_kind;
 #endif
 
 const float NEVER = 2.0; // beyond the end of a segment
-const int STEPS_TOGETHER = 16; // of rays side by side, before what some of them have met is looked at
+const int STEPS_TOGETHER = 32; // of rays side by side, before what some of them have met is looked at
 
 // A ray on its way through a layer of a face.
 struct layer_walk {
@@ -53,7 +53,7 @@ struct node_passage {
 };
 
 uint walk_flags = 0u;
-uint walk_steps = 0u;
+uint walk_steps = 0u, walk_meetings = 0u;
 
 uint slice_of(layer_walk walk)
 {
@@ -419,6 +419,7 @@ bool walk_view(trace_ray r, inout view_walk seen, inout found_type found)
     bool has_layer = begin_face(r, found, walk, seen);
     while (has_layer) {
         if (walk_on(walk, p)) {
+            walk_meetings++;
             if (meet_in(r, p, walk, found))
                 return true;
             SHORTEN(walk, found);
@@ -491,7 +492,7 @@ void fill(view_walk seen, inout candidate best)
 void trace_closest(trace_ray r, inout candidate best)
 {
     view_walk seen = begin_view_walk();
-    walk_flags = walk_steps = 0u;
+    walk_flags = walk_steps = walk_meetings = 0u;
     walk_view(r, seen, best);
     look_beside_view(r, best.distance, seen);
     bool is_unknown = seen.t_unknown < best.distance;
@@ -502,7 +503,7 @@ void trace_closest(trace_ray r, inout candidate best)
             fill(seen, best);
     }
 #ifdef QUADTREE_COUNT_STEPS
-    best = candidate(float(walk_steps), seen.layers, 0u, vec2(0.0));
+    best = candidate(float(walk_steps), seen.layers, walk_meetings, vec2(0.0));
 #endif
 }
 

@@ -92,6 +92,13 @@ BENCH(dev)
         if (!tracer_intersect(qt, &scene.gpu, &wave, &error)) die(&error);
         double b = cpu();
         gpu_buffer_read(device, &hb, 0, got, c * sizeof *hits);
+        qt->options.bench.quadtree_count_steps = 1;
+        if (!tracer_intersect(qt, &scene.gpu, &wave, &error)) die(&error);
+        qt->options.bench.quadtree_count_steps = 0;
+        struct hit *cnt = calloc(n, sizeof *cnt); double ss = 0, ll = 0, mm = 0; float mx = 0;
+        gpu_buffer_read(device, &hb, 0, cnt, c * sizeof *cnt);
+        for (uint32_t i = 0; i < c; i++) { ss += (double)cnt[i].distance; ll += cnt[i].primitive; mm += cnt[i].instance; if (cnt[i].distance > mx) mx = cnt[i].distance; }
+        printf("steps %.1f (max %.0f), layers %.2f, meetings %.2f a ray\n", ss / c, (double)mx, ll / c, mm / c);
         uint32_t known = 0, right = 0, near = 0, far = 0, missed = 0, only = 0, guess = 0, guess_ok = 0, lucky = 0, same_prim = 0, layer[4] = {0}; int shown = 0;
         for (uint32_t i = 0; i < c; i++) {
             uint32_t flags = got[i].material;

@@ -48,7 +48,7 @@ CHOICES = {
     "ldc/levels.comp": [[{"LDC_LEVEL_BITS": "2"}]],
     "ldc/cells.comp": [[{"CELLS_" + stage: "1"} for stage in
                         "LIST BLOCKS PLACE MARK COUNT FILL FURTHER SORT REACH_X REACH_Y REACH_Z".split()]],
-    "render/primary.vert": [[{"PRIMITIVE_KIND": kind, "HAS_SPHERES": "1"} for kind in "012"]],
+    "raster/view.vert": [[{"PRIMITIVE_KIND": kind, "HAS_SPHERES": "1"} for kind in "012"]],
     "ldc/build.frag": [[{"PRIMITIVE_KIND": "0"}, {"PRIMITIVE_KIND": "1", "HAS_SPHERES": "1"}],
                        [{"BUILD_PASS": number} for number in "012"]],
     "abuffer/build.frag": [[{"PRIMITIVE_KIND": "0", "ALL_IMAGES": "1"},
@@ -61,7 +61,7 @@ WITH = {"BVH_DEFORMS_IN_SHUTTER": ("BVH_DEFORMS", "HAS_MOTION"), "BVH_RESUMES": 
 WITHOUT = {tracer: ("HAS_MOTION",) for tracer in ("TRACER_LDC", "TRACER_ABUFFER", "TRACER_QUADTREE", "TRACER_SVO")}
 # And in programs of a folder: what moves is met by tracers, and shaded where it was met.
 WITHOUT_IN = {"render": ("HAS_MOTION",)}
-STAGES = {"render/primary.vert": ["render/primary.vert", "render/primary.frag"],
+STAGES = {"raster/view.vert": ["raster/view.vert", "raster/view.frag"],
           "rayspace/reduce.vert": ["rayspace/reduce.vert", "rayspace/reduce.geom"],
           "ldc/build.frag": ["raster/draw.vert", "raster/draw.geom", "ldc/build.frag"],
           "abuffer/build.frag": ["raster/draw.vert", "raster/draw.geom", "abuffer/build.frag"],

@@ -113,6 +113,10 @@ static uint32_t cube_texels(const struct trace_view *view, const struct quadtree
     return whole > CUBE_TEXELS_MIN ? whole : CUBE_TEXELS_MIN;
 }
 
+/* A plane that is not the hit leads to the primitive that is: where it is off, rays that graze it meet another texel.
+ */
+#define ERROR_TO_PRIMITIVES (1.0f / 64.0f)
+
 /* An error of w of so much moves what an eye within the radius sees by the pixels that are allowed: e / (f R) in
  * 1 / Z. An orthographic view has no parallax; there it is a depth of so many pixels. */
 static float error_of_w(const struct quadtree_uniforms *u, const struct trace_view *view,
@@ -164,7 +168,8 @@ static void fill_uniforms(struct quadtree_uniforms *u, const struct gpu_scene *s
     u->scale_centre[2] = (float)u->width / 2.0f;
     u->scale_centre[3] = (float)u->height / 2.0f;
     place_depths(u, scene, view);
-    u->bounds[0] = error_of_w(u, view, settings);
+    u->bounds[0] =
+        error_of_w(u, view, settings) * (settings->hits == QUADTREE_HITS_PLANE ? 1.0f : ERROR_TO_PRIMITIVES);
     u->bounds[1] = settings->angle < 90.0f ? cosf(settings->angle * 0.0174532925f) : 0.0f;
     u->bounds[2] = settings->adaptive == QUADTREE_ADAPTIVE_ON ? u->depths[0] / (DOUBLED_AT * diagonal_of(scene)) : 0.0f;
     u->bounds[3] = settings->radius / u->depths[0];

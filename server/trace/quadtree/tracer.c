@@ -188,8 +188,6 @@ static void announce(struct tracer *tracer, struct gpu_scene *scene, const struc
     quadtree_announce(scene, wave, &tracer->options);
 }
 
-/* ---- layers ---- */
-
 static bool texel_view(const struct tracer *tracer, struct trace_view *texels, uint32_t *layers)
 {
     const struct quadtree *quadtree = (const struct quadtree *)tracer;
