@@ -28,6 +28,8 @@ void raster_camera_fill(struct frame_uniforms *uniforms, const struct raster_cam
     uniforms->width = camera->width;
     uniforms->height = camera->height;
     uniforms->tiles_across = (camera->width + 7) / 8;
+    uniforms->view_width = camera->width; /* one view, unless the caller says otherwise */
+    uniforms->view_height = camera->height;
 }
 
 static const struct gpu_program *get_program(struct gpu_device *device, enum primitive_kind kind, bool cutout,
