@@ -144,6 +144,8 @@ bool frame_key_tell(struct frame_renderer *renderer, struct error *error)
     if (!key_view_take_count(&renderer->key, renderer->device, &unknown, error))
         return false;
     const uint64_t samples = (uint64_t)request->width * request->height * renderer->work->context.request.samples;
+    rows->part = 0;
+    rows->part_name = NULL;
     structure_per_ray(rows, "views/unknown", (float)unknown / (float)samples);
     return true;
 }
