@@ -19,7 +19,8 @@ enum key {
     KEY_SCRIPT,
     KEY_LOSSLESS,
     KEY_DRY_RUN,
-    KEY_SCENE
+    KEY_SCENE,
+    KEY_UPSAMPLE
 };
 
 struct animation {
@@ -45,6 +46,9 @@ static const struct argp_option options[] = {
      0},
     {"keys", KEY_KEYS, "FILE.json", 0,
      "Read camera keys: array of {\"time\", \"eye\", \"look_at\", \"up\", \"fov\"}; seconds, degrees", 0},
+    {"upsample", KEY_UPSAMPLE, "N", 0,
+     "Render every N-th frame, up to 64, and make those between from the depth layers of the nearest (default 1)",
+     0},
     {"lossless", KEY_LOSSLESS, NULL, 0, "Write a lossless video, for .mkv", 0},
     {NULL, 0, NULL, 0, "Parts:", -1},
     {"shard", KEY_SHARD, "K/N", 0, "Render only every N-th frame of the range, beginning with the K-th", 0},
@@ -64,6 +68,7 @@ static error_t parse_series(struct cli_job *job, int key, const char *value)
 {
     struct cli_series *series = &job->series;
     double real = 0;
+    uint64_t whole = 1;
     error_t status = 0;
     switch (key) {
     case KEY_FRAMES:
@@ -84,6 +89,10 @@ static error_t parse_series(struct cli_job *job, int key, const char *value)
     case KEY_RESUME:
         series->resume = true;
         return 0;
+    case KEY_UPSAMPLE:
+        status = named(job, fl_text_integer(value, 1, 64, &whole, &job->error), "--upsample");
+        job->options.upsample = (uint32_t)whole;
+        return status;
     case KEY_LOSSLESS:
         job->lossless = true;
         return 0;

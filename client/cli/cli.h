@@ -166,6 +166,15 @@ struct cli_clip {
 };
 #define CLI_CLIPS_MAX 15 /* the protocol's, and one of our own */
 
+/* Several views in a picture, as typed. */
+struct cli_views {
+    bool has_stereo, has_light_field, has_baseline, has_layout, has_views, has_lens;
+    enum cli_stereo { CLI_STEREO_SIDE, CLI_STEREO_OVER, CLI_STEREO_FILES } layout;
+    float stereo_m, baseline_m; /* between the eyes */
+    uint32_t across, down;      /* of a light field */
+    enum protocol_view_source views, lens;
+};
+
 struct fl_json;
 struct fl_json_place;
 
@@ -204,6 +213,7 @@ struct cli_job {
     bool lossless;         /* of a video */
     bool full_metadata;    /* with times and paths */
     bool has_aperture, has_focus;
+    struct cli_views views;
     bool has_eye, has_look_at, has_up, has_fov; /* in `key` */
     bool float_pixels, half_pixels, has_encoding, has_primary, has_quality, has_integrator, quiet, is_orbit;
     bool has_samples;
@@ -214,6 +224,15 @@ struct cli_job {
     struct message_render options;
     struct fl_error error; /* of what was typed */
 };
+
+/* ---- job_views.c: several views in a picture, lenses and frames by depth layers ---- */
+
+/* Sets what an option of views says; ARGP_ERR_UNKNOWN: it is none of them. */
+error_t cli_views_set(struct cli_job *job, const char *option, const char *value);
+/* Their fields of `render`, once all options are read. `is_series`: frames may be made from others. */
+bool cli_views_complete(struct cli_job *job, bool is_series);
+/* Whether each view is a file of its own. */
+bool cli_views_are_files(const struct cli_job *job);
 
 /* A child parser; its input is a struct cli_job. */
 const struct argp *cli_job_argp(void);

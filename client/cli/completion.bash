@@ -23,6 +23,8 @@ _farlight()
         --still-encoding) words="raw zstd predicted jpeg" ;;
         --format) words="png jpeg exr hdr mp4 mkv y4m" ;;
         --metadata) words="stable full" ;;
+        --stereo-layout) words="side over files" ;;
+        --views | --lens) words="rays quadtree" ;;
         --layout) words="heat side" ;;
         --fail-above) words="psnr= mean= rms= max= beyond= ssim= butteraugli= visible= nonfinite= agree=" ;;
         --*) words=$("$program" complete "$before" 2>/dev/null) ;;

@@ -64,7 +64,8 @@ static bool is_linear(enum cli_image image)
 static bool complete_layers(struct cli_job *job)
 {
     struct message_render *wanted = &job->options;
-    const uint64_t bytes = (uint64_t)wanted->width * wanted->height * 16;
+    const uint64_t bytes =
+        (uint64_t)wanted->width * wanted->views_across * wanted->height * wanted->views_down * 16;
     if (wanted->layers == 0)
         return true;
     for (size_t i = 0; i < job->output_count; i++) {
@@ -275,8 +276,8 @@ bool cli_job_complete(struct cli_job *job, bool is_series)
         return false;
     complete_samples(job);
     complete_integrator(job);
-    return complete_tracer(job) && complete_clips(job) && complete_outputs(job, is_series) &&
-           complete_encoding(job) && complete_camera(job);
+    return cli_views_complete(job, is_series) && complete_tracer(job) && complete_clips(job) &&
+           complete_outputs(job, is_series) && complete_encoding(job) && complete_camera(job);
 }
 
 bool cli_job_complete_view(struct cli_job *job)
@@ -289,5 +290,5 @@ bool cli_job_complete_view(struct cli_job *job)
         wanted->integrator = PROTOCOL_INTEGRATOR_DISTRIBUTED;
     if (wanted->encoding == PROTOCOL_ENCODING_ZSTD && wanted->quality > 19)
         return cli_usage(job, "--quality", "zstd has levels 1 to 19") == 0;
-    return complete_tracer(job) && complete_clips(job) && complete_camera(job);
+    return cli_views_complete(job, false) && complete_tracer(job) && complete_clips(job) && complete_camera(job);
 }

@@ -41,6 +41,8 @@ enum key {
     KEY_RETRY_FOR,
     KEY_RETRIES,
     KEY_METADATA,
+    KEY_VIEWS, /* cli_views_set() has those that follow */
+    KEY_VIEWS_END = KEY_VIEWS + 6,
     KEY_FIELD = 0x200 /* and its index */
 };
 
@@ -79,6 +81,20 @@ static const struct argp_option special[] = {
     {"look-at", KEY_LOOK_AT, "X,Y,Z", 0, "What is in the middle of the picture", CLI_GROUP_OUTPUT},
     {"up", KEY_UP, "X,Y,Z", 0, "Upward direction (default 0,1,0)", CLI_GROUP_OUTPUT},
     {"fov", KEY_FOV, "DEGREES", 0, "Vertical field of view (default 45)", CLI_GROUP_OUTPUT},
+    {NULL, 0, NULL, 0, "Several views in one picture, each of --size:", CLI_GROUP_VIEWS},
+    {"stereo", KEY_VIEWS, "METRES", 0, "Two views, from eyes this far apart, such as 0.065", CLI_GROUP_OUTPUT},
+    {"stereo-layout", KEY_VIEWS + 1, "side|over|files", 0,
+     "Left of each other (default), the left one above, or in files of their own: pair-left.png, pair-right.png",
+     CLI_GROUP_OUTPUT},
+    {"light-field", KEY_VIEWS + 2, "NxM", 0,
+     "N x M views, up to 64 each way, from a grid of eyes; needs --baseline", CLI_GROUP_OUTPUT},
+    {"baseline", KEY_VIEWS + 3, "METRES", 0, "Distance of neighbouring eyes of --light-field", CLI_GROUP_OUTPUT},
+    {"views", KEY_VIEWS + 4, "rays|quadtree", 0,
+     "Render every view, or make all of them from one and its depth layers, by the tracer quadtree (default)",
+     CLI_GROUP_OUTPUT},
+    {"lens", KEY_VIEWS + 5, "rays|quadtree", 0,
+     "What rays through the lens of --aperture meet: the scene (default), or depth layers of a sharp picture",
+     CLI_GROUP_OUTPUT},
     {NULL, 0, NULL, 0, "Clips of the model ('farlight info' lists them):", CLI_GROUP_CLIPS},
     {"clip", KEY_CLIP, "NAME|INDEX", 0,
      "Play it; may be repeated, the later one counts where both move the same node", CLI_GROUP_OUTPUT},
@@ -253,6 +269,8 @@ static error_t set_option(struct cli_job *job, int key, const char *field, const
     case KEY_RETRIES:
         return set_retries(job, field, value);
     default:
+        if (key >= KEY_VIEWS && key < KEY_VIEWS_END)
+            return cli_views_set(job, field, value);
         return key >= KEY_FIELD && cli_field_at((size_t)(key - KEY_FIELD))
                    ? cli_field_set(job, cli_field_at((size_t)(key - KEY_FIELD)), field, value)
                    : ARGP_ERR_UNKNOWN;
@@ -357,9 +375,10 @@ const struct argp *cli_job_argp(void)
 
 const struct argp *cli_picture_argp(void)
 {
-    static const char *const left_out[] = {"output",    "format",  "half",     "float",      "tone-map",
-                                           "tracer",    "primary", "timings",  "trace-file", "layers",
-                                           "retry-for", "retries", "metadata", NULL};
+    static const char *const left_out[] = {"output",      "format",   "half",     "float",      "tone-map",
+                                           "tracer",      "primary",  "timings",  "trace-file", "layers",
+                                           "retry-for",   "retries",  "metadata", "stereo",     "stereo-layout",
+                                           "light-field", "baseline", "views",    "lens",       NULL};
     static struct argp_option kept[OPTIONS_MAX];
     static const struct argp argp = {.options = kept, .parser = parse};
     keep(kept, left_out);
@@ -369,8 +388,9 @@ const struct argp *cli_picture_argp(void)
 const struct argp *cli_view_argp(void)
 {
     static const char *const left_out[] = {
-        "output", "format",    "half",       "float",    "samples",   "integrator", "timings",  "trace-file",
-        "layers", "clip-once", "clip-start", "encoding", "retry-for", "retries",    "metadata", NULL};
+        "output",     "format", "half",          "float",       "samples",  "integrator", "timings",
+        "trace-file", "layers", "clip-once",     "clip-start",  "encoding", "retry-for",  "retries",
+        "metadata",   "stereo", "stereo-layout", "light-field", "baseline", "views",      NULL};
     static struct argp_option kept[OPTIONS_MAX];
     static const struct argp argp = {.options = kept, .parser = parse};
     keep(kept, left_out);

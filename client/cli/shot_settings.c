@@ -26,6 +26,13 @@ static const struct setting {
     {"format", "format", WORD, "\"exr\""},
     {"half", "half", FLAG, "true"},
     {"float", "float", FLAG, "true"},
+    {"stereo", "stereo", REAL, "0.065"},
+    {"stereo_layout", "stereo-layout", WORD, "\"side\""},
+    {"light_field", "light-field", SIZE, "[5, 5]"},
+    {"baseline", "baseline", REAL, "0.1"},
+    {"views", "views", WORD, "\"quadtree\""},
+    {"lens", "lens", WORD, "\"quadtree\""},
+    {"upsample", "upsample", WHOLE, "4"},
     {"lossless", "lossless", FLAG, "true"},
 };
 #define SETTING_COUNT (sizeof(settings) / sizeof(settings[0]))

@@ -15,6 +15,10 @@
 static bool prepare_stdout(struct cli_sink *sink, struct fl_error *error)
 {
     sink->to_stdout = true;
+    if (sink->part != CLI_PART_ALL) {
+        fl_error_set(error, FL_ERROR_ARGUMENT, "--stereo-layout", "standard output is a single file");
+        return fl_error_remedy(error, "name a file, or use the layout side");
+    }
     if (isatty(STDOUT_FILENO) == 1) {
         const bool is_video = cli_image_is_video(sink->output.image);
         fl_error_set(error, FL_ERROR_ARGUMENT, "--output", "%s would be written to the terminal",
@@ -53,16 +57,36 @@ static bool prepare(struct cli_sink *sink, struct fl_error *error)
     return false;
 }
 
+/* "pair.png" becomes "pair-left.png", "frames/%04d.exr" "frames/%04d-left.exr". */
+static bool name_part(struct cli_sink *sink, struct fl_error *error)
+{
+    const char *path = sink->output.path, *slash = strrchr(path, '/'), *dot = strrchr(path, '.');
+    if (sink->part == CLI_PART_ALL || strcmp(path, "-") == 0)
+        return true;
+    if (!dot || (slash && dot < slash))
+        dot = path + strlen(path);
+    const int length = snprintf(sink->part_path, sizeof(sink->part_path), "%.*s-%s%s", (int)(dot - path), path,
+                                sink->part == CLI_PART_LEFT ? "left" : "right", dot);
+    if (length < 0 || (size_t)length >= sizeof(sink->part_path))
+        return fl_error_set(error, FL_ERROR_FILE, "", "the path of the image is too long");
+    sink->output.path = sink->part_path;
+    return true;
+}
+
 bool cli_sinks_prepare(struct cli_sinks *sinks, const struct cli_job *job, bool is_series, struct fl_error *error)
 {
-    sinks->items = calloc(job->output_count, sizeof(*sinks->items));
+    const bool are_parts = cli_views_are_files(job);
+    sinks->items = calloc(job->output_count * (are_parts ? 2 : 1), sizeof(*sinks->items));
     if (!sinks->items)
         return fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
     for (size_t i = 0; i < job->output_count; i++) {
-        struct cli_sink *sink = &sinks->items[sinks->count++];
-        *sink = (struct cli_sink){.job = job, .output = job->outputs[i], .is_series = is_series};
-        if (!prepare(sink, error))
-            return false;
+        const enum cli_part last = are_parts ? CLI_PART_RIGHT : CLI_PART_ALL;
+        for (enum cli_part part = are_parts ? CLI_PART_LEFT : CLI_PART_ALL; part <= last; part++) {
+            struct cli_sink *sink = &sinks->items[sinks->count++];
+            *sink = (struct cli_sink){.job = job, .output = job->outputs[i], .is_series = is_series, .part = part};
+            if (!name_part(sink, error) || !prepare(sink, error))
+                return false;
+        }
     }
     return true;
 }
@@ -141,9 +165,11 @@ bool cli_sinks_start(struct cli_sinks *sinks, struct fl_error *error)
 static bool have(struct cli_sink *sink, uint32_t frame)
 {
     const struct message_render *wanted = &sink->job->options;
+    const uint32_t across = sink->part == CLI_PART_ALL ? wanted->views_across : 1;
     uint32_t width = 0, height = 0;
     return sink->is_series && fl_pattern_path(&sink->pattern, frame, sink->path, sizeof(sink->path)) &&
-           fl_image_size(sink->path, &width, &height) && width == wanted->width && height == wanted->height;
+           fl_image_size(sink->path, &width, &height) && width == wanted->width * across &&
+           height == wanted->height * wanted->views_down;
 }
 
 bool cli_sinks_have(struct cli_sinks *sinks, uint32_t frame)
@@ -168,14 +194,33 @@ static bool write_image(struct cli_sink *sink, const struct fl_frame *frame, str
     return fl_exporter_write(sink->exporter, frame, &options, error);
 }
 
+static bool write_all(struct cli_sink *sink, const struct fl_frame *frame, struct fl_error *error)
+{
+    return sink->y4m     ? fl_y4m_write(sink->y4m, frame, error)
+           : sink->video ? fl_video_write(sink->video, frame, error)
+                         : write_image(sink, frame, error);
+}
+
+/* One of two views. */
+static bool write_part(struct cli_sink *sink, const struct fl_frame *frame, struct fl_error *error)
+{
+    const bool is_right = sink->part == CLI_PART_RIGHT;
+    const float aside = sink->job->options.baseline / 2;
+    const struct fl_frame_part part = {.x = is_right ? frame->width / 2 : 0,
+                                       .width = frame->width / 2,
+                                       .height = frame->height,
+                                       .eye = {is_right ? aside : -aside, 0}};
+    struct fl_frame *cut = fl_frame_cut(frame, &part, error);
+    const bool written = cut && write_all(sink, cut, error);
+    fl_frame_destroy(cut);
+    return written;
+}
+
 bool cli_sinks_write(struct cli_sinks *sinks, const struct fl_frame *frame, struct fl_error *error)
 {
     for (size_t i = 0; i < sinks->count; i++) {
         struct cli_sink *sink = &sinks->items[i];
-        const bool written = sink->y4m     ? fl_y4m_write(sink->y4m, frame, error)
-                             : sink->video ? fl_video_write(sink->video, frame, error)
-                                           : write_image(sink, frame, error);
-        if (!written)
+        if (!(sink->part == CLI_PART_ALL ? write_all : write_part)(sink, frame, error))
             return false;
     }
     return true;

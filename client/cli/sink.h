@@ -6,10 +6,15 @@
 #include "cli/cli.h"
 #include "lib/text.h"
 
+/* Of a frame: all of it, or one of two views side by side. */
+enum cli_part { CLI_PART_ALL, CLI_PART_LEFT, CLI_PART_RIGHT };
+
 struct cli_sink {
     const struct cli_job *job;
     struct cli_output output;
     bool is_series, to_stdout;
+    enum cli_part part;
+    char part_path[4096];          /* of a part, the output's path */
     struct fl_pattern pattern;     /* of a series */
     char folder[4096], path[4352]; /* the image's path; of a series, that of the current frame */
     bool has_temporary;            /* `folder` is to be removed */

@@ -41,6 +41,8 @@ static void append_row(char *text, size_t text_bytes, const struct record_struct
     plain_text_copy(name, sizeof(name), name); /* text from a daemon must not control the terminal */
     if (row->unit == PROTOCOL_UNIT_METRES)
         print_length(value, sizeof(value), (double)row->measure);
+    else if (row->unit == PROTOCOL_UNIT_PIXELS)
+        snprintf(value, sizeof(value), "%.3g pixels", (double)row->measure);
     else if (row->unit == PROTOCOL_UNIT_PER_RAY)
         snprintf(value, sizeof(value), row->measure < 100 ? "%.3g a ray" : "%.0f a ray", (double)row->measure);
     else

@@ -84,8 +84,8 @@ static bool ask(struct fl_view *view, const struct message_render *wanted, struc
     struct asked *asked = &view->asked[view->asked_count];
     asked->request = fl_connection_next_request(view->connection);
     asked->change = view->changes;
-    asked->expected = (struct fl_frame_expected){.width = render->width,
-                                                 .height = render->height,
+    asked->expected = (struct fl_frame_expected){.width = render->width * render->views_across,
+                                                 .height = render->height * render->views_down,
                                                  .format = render->format,
                                                  .encoding = render->encoding,
                                                  .still_encoding = render->still_encoding,

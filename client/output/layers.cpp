@@ -37,7 +37,8 @@ const layer_channel known[] = {{PROTOCOL_LAYER_BEAUTY, 0, "R", content::colour},
                                {PROTOCOL_LAYER_POSITION, 2, "position.Z", content::exact},
                                {PROTOCOL_LAYER_AO, 0, "ao.Y", content::colour},
                                {PROTOCOL_LAYER_ID, 0, "id.node", content::number},
-                               {PROTOCOL_LAYER_ID, 1, "id.material", content::number}};
+                               {PROTOCOL_LAYER_ID, 1, "id.material", content::number},
+                               {PROTOCOL_LAYER_UNKNOWN, 0, "unknown.Y", content::colour}};
 
 constexpr float half_max = 65504.0f;
 constexpr int band_rows = 64; // a multiple of the rows that are compressed together

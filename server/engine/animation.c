@@ -134,7 +134,9 @@ static bool auto_camera(const struct engine_job *job, const struct scene *scene,
 {
     if (!find_bounds(job, scene, bounds, error))
         return false;
-    frame_camera_auto(camera, bounds->lower, bounds->upper, (float)job->frame.width / (float)job->frame.height);
+    uint32_t width, height;
+    frame_view_size(&job->frame, &width, &height);
+    frame_camera_auto(camera, bounds->lower, bounds->upper, (float)width / (float)height);
     return true;
 }
 

@@ -63,17 +63,29 @@ static bool shot_begin(struct shot *shot, const struct engine_job *job, const st
     return motion_make(shot, job, scene, time_s, error);
 }
 
-bool shot_make(struct shot *shot, const struct engine_job *job, const struct scene *scene, uint32_t frame,
-               struct animation_bounds *bounds, struct error *error)
+/* What a picture does not need is not made of layers: one sharp view from where it is rendered. */
+static void set_source(struct frame_request *request)
+{
+    if (!frame_has_views(request) && !(request->aperture > 0.0f) && !request->has_key)
+        request->view_source = VIEW_SOURCE_RAYS;
+}
+
+static bool check_time(uint32_t frame, double time_s, struct error *error)
+{
+    if (fabs(time_s) <= ANIMATION_TIME_MAX_S)
+        return true;
+    error_set(error, ERROR_INVALID, "render.frames_per_second", "frame %u is at %g s, beyond %g s", frame, time_s,
+              ANIMATION_TIME_MAX_S);
+    return error_remedy(error, "use more frames a second, or smaller frame numbers");
+}
+
+/* A frame that is rendered. */
+static bool make_alone(struct shot *shot, const struct engine_job *job, const struct scene *scene, uint32_t frame,
+                       struct animation_bounds *bounds, struct error *error)
 {
     static const struct pose_view nothing = {0};
     double time_s = animation_time_s(job, frame);
-    if (!(fabs(time_s) <= ANIMATION_TIME_MAX_S)) {
-        error_set(error, ERROR_INVALID, "render.frames_per_second", "frame %u is at %g s, beyond %g s", frame,
-                  time_s, ANIMATION_TIME_MAX_S);
-        return error_remedy(error, "use more frames a second, or smaller frame numbers");
-    }
-    if (!shot_begin(shot, job, scene, time_s, error))
+    if (!check_time(frame, time_s, error) || !shot_begin(shot, job, scene, time_s, error))
         return false;
     const struct scene_pose *pose = shot->motion.pose_count ? &shot->motion.poses[0] : NULL;
     struct animation_view view;
@@ -83,8 +95,41 @@ bool shot_make(struct shot *shot, const struct engine_job *job, const struct sce
     }
     shot->request.camera = view.camera;
     set_lens(&shot->request, &view, pose ? &pose->view : &nothing);
+    set_source(&shot->request);
     if (!shot->request.accumulate)
         shot->request.seed = shot_seed(job->frame.seed, frame);
+    return true;
+}
+
+uint32_t shot_key_frame(const struct engine_job *job, uint32_t frame)
+{
+    const int64_t every = job->upsample > 1 ? job->upsample : 1, origin = job->time_origin_frame;
+    const int64_t below = (((int64_t)frame - origin) % every + every) % every; /* from the last one on */
+    const bool is_next = 2 * below > every || below > (int64_t)frame;          /* there is no frame below 0 */
+    return (uint32_t)((int64_t)frame - below + (is_next ? every : 0));
+}
+
+bool shot_make(struct shot *shot, const struct engine_job *job, const struct scene *scene, uint32_t frame,
+               struct animation_bounds *bounds, struct error *error)
+{
+    struct shot own;
+    const uint32_t key = shot_key_frame(job, frame);
+    if (key == frame)
+        return make_alone(shot, job, scene, frame, bounds, error);
+    /* The camera and its lens are the frame's own; poses, shutter and noise are those of the key. */
+    if (!make_alone(&own, job, scene, frame, bounds, error))
+        return false;
+    shot_finish(&own);
+    if (!make_alone(shot, job, scene, key, bounds, error))
+        return false;
+    const uint64_t seed = shot->request.seed;
+    const struct frame_camera key_camera = shot->request.camera;
+    shot->request = own.request;
+    shot->request.seed = seed;
+    shot->request.has_key = true;
+    shot->request.key_camera = key_camera;
+    shot->request.view_source = job->frame.view_source;
+    shot->time_s = own.time_s;
     return true;
 }
 
@@ -126,6 +171,7 @@ bool shot_look(struct shot *shot, const struct engine_job *job, const struct sce
     }
     shot->request.camera = view.camera;
     set_lens(&shot->request, &view, pose ? &pose->view : &nothing);
+    set_source(&shot->request);
     return true;
 }
 

@@ -13,6 +13,9 @@ struct shot {
     float time_s, shutter_s;
 };
 
+/* The frame that `frame` is made from where only every how manyth is rendered; itself, if it is rendered. It
+ * follows from the two numbers alone: a range may begin, and be divided, anywhere. */
+uint32_t shot_key_frame(const struct engine_job *job, uint32_t frame);
 /* `bounds` may be kept from frame to frame, or NULL. On failure there is nothing to finish. */
 bool shot_make(struct shot *shot, const struct engine_job *job, const struct scene *scene, uint32_t frame,
                struct animation_bounds *bounds, struct error *error);

@@ -93,8 +93,11 @@ static void apply_effort(const struct job *job, struct frame_request *request)
     uint32_t scale = wish->effort.scale_eighths;
     if (!job->spec.adapt || !wish->camera.moving || !scale || scale >= 8)
         return;
-    request->width = request->width * scale >= 8 ? request->width * scale / 8 : 1;
-    request->height = request->height * scale >= 8 ? request->height * scale / 8 : 1;
+    uint32_t width, height;
+    frame_view_size(request, &width, &height);
+    const uint32_t across = request->width / width, down = request->height / height;
+    request->width = across * (width * scale >= 8 ? width * scale / 8 : 1);
+    request->height = down * (height * scale >= 8 ? height * scale / 8 : 1);
 }
 
 bool view_take_up(struct job *job, struct shot *shot, struct error *error)

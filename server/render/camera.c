@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 #include "render/camera.h"
 
+#include "trace/raster/view.h"
+
 #include <math.h>
 #include <string.h>
 
@@ -125,26 +127,67 @@ static float focus_distance(const struct frame_camera *camera, const struct gpu_
     return distance;
 }
 
+void frame_view_size(const struct frame_request *request, uint32_t *width, uint32_t *height)
+{
+    *width = request->width / (request->views_across ? request->views_across : 1);
+    *height = request->height / (request->views_down ? request->views_down : 1);
+}
+
+bool frame_has_views(const struct frame_request *request)
+{
+    return request->views_across > 1 || request->views_down > 1;
+}
+
+/* From the first eye to the camera, in views. */
+static void eyes_middle(const struct frame_request *request, float middle[2])
+{
+    middle[0] = request->views_across > 1 ? (float)(request->views_across - 1) / 2.0f : 0.0f;
+    middle[1] = request->views_down > 1 ? (float)(request->views_down - 1) / 2.0f : 0.0f;
+}
+
+/* From an eye to that of the next view to the right, and to that of the next one below. */
+static void eye_steps(const struct frame_request *request, float steps[4])
+{
+    const float baseline = frame_has_views(request) ? request->baseline : 0.0f;
+    steps[0] = baseline;
+    steps[1] = 0.0f;
+    steps[2] = request->eyes_over ? baseline : 0.0f;
+    steps[3] = request->eyes_over ? 0.0f : -baseline;
+}
+
+void frame_view_eye(const struct frame_request *request, uint32_t across, uint32_t down, float eye[2])
+{
+    float middle[2], steps[4];
+    eyes_middle(request, middle);
+    eye_steps(request, steps);
+    for (int i = 0; i < 2; i++)
+        eye[i] = ((float)across - middle[0]) * steps[i] + ((float)down - middle[1]) * steps[2 + i];
+}
+
 void camera_fill_uniforms(struct frame_uniforms *uniforms, const struct frame_request *request,
                           const struct gpu_scene *scene)
 {
     const struct frame_camera *camera = &request->camera;
     bool orthographic = camera->fov_y == 0.0f;
-    float aspect = (float)request->width / (float)request->height;
+    frame_view_size(request, &uniforms->view_width, &uniforms->view_height);
+    eyes_middle(request, uniforms->eyes_middle);
+    eye_steps(request, uniforms->eye_steps);
+    float aspect = (float)uniforms->view_width / (float)uniforms->view_height;
     float half_height = orthographic ? camera->ortho_height / 2.0f : tanf(camera->fov_y / 2.0f);
     float near = camera->near;
     if (near <= 0.0f)
         near = orthographic ? 0.0f
                             : fmaxf(scene->diagonal > 0.0f ? scene->diagonal * NEAR_OF_DIAGONAL : 1e-4f, 1e-6f);
-    memcpy(uniforms->world_from_view, camera->world_from_view, sizeof(camera->world_from_view));
-    uniforms->extent_near[0] = half_height * aspect;
-    uniforms->extent_near[1] = half_height;
-    uniforms->extent_near[2] = near;
-    uniforms->extent_near[3] = orthographic ? 1.0f : 0.0f;
-    uniforms->far_width[0] = far_distance(camera, scene, near);
+    struct raster_camera view = {
+        .extent = {half_height * aspect, half_height},
+        .near = near,
+        .far = far_distance(camera, scene, near),
+        .orthographic = orthographic,
+        .width = request->width,
+        .height = request->height,
+    };
+    memcpy(view.world_from_view, camera->world_from_view, sizeof(view.world_from_view));
+    raster_camera_fill(uniforms, &view);
     uniforms->lens[0] = request->aperture / 2.0f;
     uniforms->lens[1] = request->focus > 0.0f ? request->focus : focus_distance(camera, scene);
-    uniforms->width = request->width;
-    uniforms->height = request->height;
-    uniforms->tiles_across = (request->width + 7) / 8;
 }

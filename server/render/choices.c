@@ -59,7 +59,7 @@ static bool traces_first_hits(const struct render_context *context)
 bool choices_rasterise(const struct render_context *context)
 {
     const struct frame_request *request = &context->request;
-    const bool flat = !(request->aperture > 0.0f) && !context->scene->has_motion;
+    const bool flat = !(request->aperture > 0.0f) && !context->scene->has_motion && !frame_has_views(request);
     return flat && !request->compare &&
            (request->primary == PRIMARY_RASTER ||
             (request->primary == PRIMARY_AUTO && !traces_first_hits(context)));

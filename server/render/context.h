@@ -29,7 +29,9 @@ struct render_context {
     struct environment_choice *environment_choice; /* which the integrator path keeps up */
     struct tracer *tracer;
     struct trace_state *trace_state; /* of the wave in hand, by that tracer */
-    struct comparison *comparison;   /* of the current frame; NULL: nothing is compared */
+    struct tracer *layer_tracer;     /* first hits are those of a layer of its structure; NULL: they are not */
+    uint32_t layer;
+    struct comparison *comparison; /* of the current frame; NULL: nothing is compared */
     struct gpu_timer *timer;
     struct frame_request request;
     struct stage_times times;

@@ -115,9 +115,9 @@ static bool do_again(struct frame_renderer *renderer, const struct slice_ahead *
     renderer->slices = stopped->slices;
     renderer->sample = stopped->sample;
     if (!set_sample(renderer, error) ||
-        !slices_take(&renderer->slices, &renderer->picture, context->uniforms.sample_shift, &context->slice))
+        !slices_take(&renderer->slices, renderer->target, context->uniforms.sample_shift, &context->slice))
         return error_set(error, ERROR_INTERNAL, NULL, "a slice to be done again is not there");
-    const uint32_t row = picture_row_of(&renderer->picture, context->slice.first_slot);
+    const uint32_t row = picture_row_of(renderer->target, context->slice.first_slot);
     if (why == WAVE_STOPPED_FULL && !split_slice(renderer, error))
         return false;
     if (why != WAVE_STOPPED_FULL) {
@@ -185,9 +185,11 @@ static bool land_all(struct frame_renderer *renderer, struct error *error)
         return false;
     if (again || renderer->work->ahead.count > 0)
         return true;
-    renderer->phase = PHASE_RESOLVE;
+    renderer->phase = frame_is_layer_pass(renderer) ? PHASE_KEEP : PHASE_RESOLVE;
+    if (frame_is_eyes_pass(renderer) && !key_view_copy_count(&renderer->key, renderer->device, error))
+        return false;
     /* It is there when the picture is, which is copied behind it. */
-    return trace_state_copy_counts(renderer->work->trace_state, error);
+    return trace_state_copy_counts(renderer->work->context.trace_state, error);
 }
 
 static bool begin_slice(struct frame_renderer *renderer, struct error *error)
@@ -201,31 +203,21 @@ static bool begin_slice(struct frame_renderer *renderer, struct error *error)
     uint32_t sample_shift = context->uniforms.sample_shift;
     if (!context->counts_on_host)
         begin_ahead(renderer);
-    if (!slices_take(&renderer->slices, &renderer->picture, sample_shift, &context->slice)) {
+    if (!slices_take(&renderer->slices, renderer->target, sample_shift, &context->slice)) {
         renderer->sample += 1u << sample_shift;
         renderer->phase = renderer->sample < context->request.samples ? PHASE_SAMPLE : PHASE_LAND;
         return true;
     }
-    uint32_t row = picture_row_of(&renderer->picture, context->slice.first_slot);
+    uint32_t row = picture_row_of(renderer->target, context->slice.first_slot);
     if (renderer->rasterise && row - renderer->work->primary.first_row >= renderer->strip_rows) {
         slices_put_back(&renderer->slices, &context->slice); /* it is the first of the next strip */
         begin_strip(renderer, row);
         return true;
     }
-    layers_begin_slice(&renderer->work->layers);
+    layers_begin_slice(&renderer->work->layers, context);
     renderer->phase = PHASE_PRIMARY;
     return primary_begin_slice(rasterised(renderer), context, error) &&
            gpu_check_reset(renderer->device, "primary rays", error);
-}
-
-static bool find_primary(struct frame_renderer *renderer, struct error *error)
-{
-    bool done = false;
-    if (!primary_find(rasterised(renderer), &renderer->work->context, &done, error))
-        return false;
-    if (done)
-        renderer->phase = renderer->work->layers.wanted ? PHASE_LAYERS : PHASE_SHADE;
-    return gpu_check(renderer->device, "primary hits", error);
 }
 
 static bool trace_wave(struct frame_renderer *renderer, struct error *error)
@@ -254,10 +246,11 @@ static bool trace_wave(struct frame_renderer *renderer, struct error *error)
 static bool accumulate(struct frame_renderer *renderer, struct error *error)
 {
     struct render_context *context = &renderer->work->context;
-    bool has_beauty = renderer->picture.layers & 1u << LAYER_BEAUTY; /* then it is the first plane */
+    struct picture *picture = renderer->target;
+    bool has_beauty = picture->layers & 1u << LAYER_BEAUTY; /* then it is the first plane */
     return (!context->comparison || comparison_keep_slice(context->comparison, error)) &&
-           (!has_beauty || picture_accumulate(&renderer->picture, context, 0, &context->slice_sums, 0, error)) &&
-           layers_accumulate(&renderer->work->layers, &renderer->picture, context, error);
+           (!has_beauty || picture_accumulate(picture, context, 0, &context->slice_sums, 0, error)) &&
+           layers_accumulate(&renderer->work->layers, picture, context, error);
 }
 
 static bool finish_slice(struct frame_renderer *renderer, struct error *error)
@@ -274,6 +267,31 @@ static bool finish_slice(struct frame_renderer *renderer, struct error *error)
     return true;
 }
 
+static bool find_eyes(struct frame_renderer *renderer, struct error *error)
+{
+    bool done = false;
+    if (!frame_key_find(renderer, &done, error))
+        return false;
+    if (!done)
+        return true;
+    if (!renderer->work->layers.noting)
+        return finish_slice(renderer, error);
+    renderer->phase = PHASE_LAYERS;
+    return true;
+}
+
+static bool find_primary(struct frame_renderer *renderer, struct error *error)
+{
+    bool done = false;
+    if (frame_is_eyes_pass(renderer))
+        return find_eyes(renderer, error);
+    if (!primary_find(rasterised(renderer), &renderer->work->context, &done, error))
+        return false;
+    if (done)
+        renderer->phase = renderer->work->layers.wanted ? PHASE_LAYERS : PHASE_SHADE;
+    return gpu_check(renderer->device, "primary hits", error);
+}
+
 static bool note_layers(struct frame_renderer *renderer, struct error *error)
 {
     bool done = false;
@@ -281,7 +299,7 @@ static bool note_layers(struct frame_renderer *renderer, struct error *error)
         return false;
     if (!done)
         return true;
-    if (!(renderer->picture.layers & 1u << LAYER_BEAUTY))
+    if (!(renderer->target->layers & 1u << LAYER_BEAUTY) || frame_is_eyes_pass(renderer))
         return finish_slice(renderer, error);
     renderer->phase = PHASE_SHADE;
     return true;
@@ -353,9 +371,10 @@ static bool read_band(struct frame_renderer *renderer, struct error *error)
 
 bool frame_step_waits(const struct frame_renderer *renderer)
 {
-    struct tracer *building = !renderer->built          ? renderer->tracer
-                              : !renderer->second_built ? renderer->second
-                                                        : NULL;
+    struct tracer *building = !renderer->built                              ? renderer->tracer
+                              : !renderer->second_built && renderer->second ? renderer->second
+                              : !renderer->key_built                        ? renderer->key_tracer
+                                                                            : NULL;
     if (renderer->phase == PHASE_BUILD && building)
         return tracer_update_waits(building);
     if (renderer->phase == PHASE_UPDATE && gpu_scene_bring_waits(&renderer->shared->copy))
@@ -383,7 +402,8 @@ static bool hand_out(struct frame_renderer *renderer, struct frame_result *resul
     if (context->comparison && !comparison_take(context->comparison, &renderer->result.comparisons,
                                                 &renderer->result.comparison_count, error))
         return false;
-    if (!trace_state_tell(renderer->work->trace_state, &renderer->result.structure, error))
+    if (!trace_state_tell(renderer->work->trace_state, &renderer->result.structure, error) ||
+        (renderer->key_tracer && !frame_key_tell(renderer, error)))
         return false;
     context_collect(context);
     stage_times_add(&context->times, STAGE_FRAME, CLOCK_CPU, 0, context->times.origin_ns,
@@ -399,7 +419,7 @@ static bool hand_out(struct frame_renderer *renderer, struct frame_result *resul
     result->format = request->format;
     result->ycbcr = request->ycbcr;
     result->samples = renderer->picture.samples;
-    result->primary_rays = (uint64_t)request->width * request->height * request->samples;
+    result->primary_rays += (uint64_t)request->width * request->height * request->samples;
     result->times = context->times;
     renderer->kept_request = *request;
     renderer->kept_samples = result->samples;
@@ -445,6 +465,9 @@ enum frame_progress frame_step(struct frame_renderer *renderer, struct frame_res
         break;
     case PHASE_LAND:
         good = land_all(renderer, error);
+        break;
+    case PHASE_KEEP:
+        good = frame_key_keep(renderer, error);
         break;
     case PHASE_RESOLVE:
         good = read_band(renderer, error);

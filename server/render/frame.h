@@ -26,7 +26,15 @@ struct frame_camera {
 };
 
 struct frame_request {
-    uint32_t width, height;
+    uint32_t width, height; /* of the whole picture */
+    /* Views in it, of the same size, row by row; 0: 1. Each is that of an eye of its own, see frame_view_eye(). */
+    uint32_t views_across, views_down;
+    float baseline; /* metres between neighbouring eyes */
+    bool eyes_over; /* views one below the other are those of eyes side by side */
+    enum view_source view_source;
+    /* What is rendered is seen by another camera than the picture's; only with VIEW_SOURCE_LAYERS. */
+    bool has_key;
+    struct frame_camera key_camera;
     uint32_t samples, depth;
     uint64_t seed;
     struct frame_camera camera;
@@ -65,9 +73,10 @@ struct frame_request {
 };
 
 /* Of one sample, that is not to be added to, the place is the pixel's middle; several are spread by the filter.
- * With a lens, or where something moves, first hits are traced whatever `primary` says. What PRIMARY_AUTO chooses
- * follows from tracer, scene, size, whether there are several samples, and device: for a device it is measured
- * once. Where something moves, a tracer of stored samples is refused: ERROR_UNSUPPORTED, "shutter".
+ * With a lens, several views, or where something moves, first hits are traced whatever `primary` says. What
+ * PRIMARY_AUTO chooses follows from tracer, scene, size, whether there are several samples, and device: for a
+ * device it is measured once. Where something moves, a tracer of stored samples is refused: ERROR_UNSUPPORTED,
+ * "shutter".
  *
  * What a picture holds:
  *   linear formats  mean radiance of the samples times 2^exposure_stops, premultiplied by alpha
@@ -163,6 +172,11 @@ void frame_renderer_stand_in(struct frame_renderer *renderer, unsigned number, c
 
 /* A camera that sees all of the bounds, from the front right above, as `--camera auto` does. */
 void frame_camera_auto(struct frame_camera *camera, const float lower[3], const float upper[3], float aspect);
+/* Pixels of one view. */
+void frame_view_size(const struct frame_request *request, uint32_t *width, uint32_t *height);
+bool frame_has_views(const struct frame_request *request); /* more than one */
+/* How far the eye of view (across, down) lies from the camera, along its right and up; metres. */
+void frame_view_eye(const struct frame_request *request, uint32_t across, uint32_t down, float eye[2]);
 /* From eye, target and up; false if they do not span a view. */
 bool frame_camera_look_at(struct frame_camera *camera, const float eye[3], const float look_at[3],
                           const float up[3], float fov_y);

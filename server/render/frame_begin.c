@@ -28,8 +28,8 @@
 /* The number of samples that texture filtering assumes for a picture that accumulates without an end. */
 #define SAMPLES_GOING_ON 16
 
-static const struct tracer_impl *find_tracer(const struct frame_renderer *renderer, unsigned number,
-                                             const char *field, struct error *error)
+const struct tracer_impl *frame_find_tracer(const struct frame_renderer *renderer, unsigned number,
+                                            const char *field, struct error *error)
 {
     bool stands_in = renderer->stand_in && renderer->stand_in_number == number;
     return stands_in ? renderer->stand_in : tracer_find(number, field, error);
@@ -38,8 +38,8 @@ static const struct tracer_impl *find_tracer(const struct frame_renderer *render
 static bool check_request(const struct frame_renderer *renderer, const struct frame_request *request,
                           struct error *error)
 {
-    return frame_request_check(request, error) && find_tracer(renderer, request->tracer, "tracer", error) &&
-           (!request->compare || find_tracer(renderer, request->compare_with, "compare_with", error));
+    return frame_request_check(request, error) && frame_find_tracer(renderer, request->tracer, "tracer", error) &&
+           (!request->compare || frame_find_tracer(renderer, request->compare_with, "compare_with", error));
 }
 
 /* Whether the kept picture shows the same as this frame, once the scene has been updated. */
@@ -59,8 +59,8 @@ bool frame_may_begin(const struct frame_renderer *renderer, const struct scene *
 {
     struct error refused = {0}; /* by frame_begin, before it changes anything */
     const struct tracer_impl *const wanted[] = {
-        find_tracer(renderer, request->tracer, "tracer", &refused),
-        request->compare ? find_tracer(renderer, request->compare_with, "compare_with", &refused) : NULL,
+        frame_find_tracer(renderer, request->tracer, "tracer", &refused),
+        request->compare ? frame_find_tracer(renderer, request->compare_with, "compare_with", &refused) : NULL,
     };
     if (is_alone(renderer) || refused.kind != ERROR_NONE)
         return true;
@@ -117,7 +117,7 @@ static bool update_environment(struct frame_renderer *renderer, bool *done, stru
 static struct tracer *take_tracer(struct frame_renderer *renderer, unsigned number, const char *field,
                                   struct error *error)
 {
-    const struct tracer_impl *impl = find_tracer(renderer, number, field, error);
+    const struct tracer_impl *impl = frame_find_tracer(renderer, number, field, error);
     if (!tracer_check_motion(impl, &renderer->shared->copy, error))
         return NULL;
     return tracer_set_take(frame_tracers(renderer, impl), renderer->device, impl,
@@ -129,8 +129,11 @@ static bool take_tracers(struct frame_renderer *renderer, struct error *error)
     struct render_context *context = &renderer->work->context;
     const struct frame_request *request = &context->request;
     renderer->tracer = context->tracer = take_tracer(renderer, request->tracer, "tracer", error);
-    if (!renderer->tracer || !frame_work_trace_by(renderer->work, renderer->tracer, error))
+    if (!renderer->tracer ||
+        !frame_work_trace_by(renderer->work, &renderer->work->trace_state, renderer->tracer, error))
         return false;
+    if (frame_is_from_layers(request))
+        return frame_key_take(renderer, error);
     if (!request->compare)
         return true;
     struct tracer_set *tracers = frame_tracers(renderer, renderer->tracer->impl);
@@ -158,7 +161,8 @@ void frame_end(struct frame_renderer *renderer)
 {
     give_tracer(renderer, renderer->tracer);
     give_tracer(renderer, renderer->second);
-    renderer->tracer = renderer->second = NULL;
+    give_tracer(renderer, renderer->key_tracer);
+    renderer->tracer = renderer->second = renderer->key_tracer = NULL;
     if (renderer->phase == PHASE_UPDATE)
         give_up_update(renderer->shared);
     if (renderer->phase != PHASE_IDLE)
@@ -238,16 +242,16 @@ static uint32_t sample_shift_max(const struct frame_renderer *renderer)
 static bool reserve_frame(struct frame_renderer *renderer, struct error *error)
 {
     struct render_context *context = &renderer->work->context;
-    if (!picture_begin(&renderer->picture, context, renderer->samples_before, error))
+    if (!picture_begin(renderer->target, context, renderer->samples_before, error))
         return false;
-    renderer->rasterise = choices_rasterise(context);
-    renderer->strip_rows = picture_strip_rows(&renderer->picture, STRIP_PIXELS_MAX);
+    renderer->rasterise = !renderer->key_tracer && choices_rasterise(context);
+    renderer->strip_rows = picture_strip_rows(renderer->target, STRIP_PIXELS_MAX);
     renderer->sample_shift_max = sample_shift_max(renderer);
     if (renderer->rasterise && !primary_reserve(&renderer->work->primary, context, renderer->strip_rows,
                                                 1u << renderer->sample_shift_max, error))
         return false;
     uint32_t rays = slice_rays(renderer);
-    uint64_t all = (uint64_t)picture_slot_count(&renderer->picture) << renderer->sample_shift_max;
+    uint64_t all = (uint64_t)picture_slot_count(renderer->target) << renderer->sample_shift_max;
     rays = rays < all ? rays : (uint32_t)all;
     renderer->slice_rays_max = renderer->slices.slice_rays = rays;
     uint32_t wave_rays = rays * CHOICES_WAVE_PER_SLICE;
@@ -292,10 +296,14 @@ static void announce_programs(struct frame_renderer *renderer)
     struct wave_passes *passes = &renderer->work->passes;
     gpu_program_announce(renderer->device, true);
     /* What takes longest begins first; the rest is in the order of its use. */
-    wave_passes_announce_shadows(passes, context);
+    if (!frame_is_eyes_pass(renderer))
+        wave_passes_announce_shadows(passes, context);
     primary_announce(context, renderer->rasterise);
-    wave_passes_announce(passes, context);
-    picture_announce(&renderer->picture, context);
+    if (frame_is_eyes_pass(renderer))
+        key_view_announce(context, renderer->work->layers.wanted & 1u << LAYER_UNKNOWN);
+    else
+        wave_passes_announce(passes, context);
+    picture_announce(renderer->target, context);
     gpu_program_announce(renderer->device, false);
 }
 
@@ -304,15 +312,16 @@ static bool get_ready(struct frame_renderer *renderer, struct error *error)
 {
     struct render_context *context = &renderer->work->context;
     const struct frame_request *request = &context->request;
-    if (!begin_comparison(renderer, error))
+    if (!begin_comparison(renderer, error) || (renderer->key_tracer && !frame_key_set_pass(renderer, error)))
         return false;
     limit_samples(renderer, &context->request);
     camera_fill_uniforms(&context->uniforms, request, &renderer->shared->copy);
     environment_fill_uniforms(context->environment, &context->uniforms, &renderer->shared->copy);
     context->uniforms.depth = request->depth;
+    /* Those of a texel of a layer all pass through its middle. */
+    context->spread = !frame_is_layer_pass(renderer) && (request->samples > 1 || request->accumulate);
     context->uniforms.far_width[1] =
-        1.0f / sqrtf(request->accumulate ? SAMPLES_GOING_ON : (float)request->samples);
-    context->spread = request->samples > 1 || request->accumulate;
+        context->spread ? 1.0f / sqrtf(request->accumulate ? SAMPLES_GOING_ON : (float)request->samples) : 1.0f;
     fill_filter(context);
     context->uniforms.seed = (uint32_t)(request->seed ^ request->seed >> 32);
     if (!reserve_frame(renderer, error) || !gpu_check_reset(renderer->device, "beginning a frame", error))
@@ -339,7 +348,7 @@ static enum tracer_progress bring(struct frame_renderer *renderer, const struct 
     const struct tracer_update update = {.view = &renderer->view, .times = spans};
     enum tracer_progress progress = tracer_set_bring(frame_tracers(renderer, tracer->impl), tracer, &shared->copy,
                                                      &update, shared->step_ns, error);
-    if (tracer == renderer->tracer)
+    if (tracer != renderer->second || tracer == renderer->tracer)
         context_add_times(context, spans);
     else /* a structure that is no part of what the frame's own tracer cost */
         context_add_cpu_time(context, STAGE_COMPARE, start_ns);
@@ -373,6 +382,21 @@ bool frame_reserve_pixels(struct frame_renderer *renderer, struct error *error)
     return end_reserving(renderer, reserved, &failed, error);
 }
 
+static enum tracer_progress bring_key(struct frame_renderer *renderer, struct error *error)
+{
+    const struct tracer *tracer = renderer->key_tracer;
+    enum tracer_progress progress = bring(renderer, tracer, error);
+    if (progress != TRACER_DONE)
+        return progress;
+    renderer->key_built = true;
+    if (tracer == renderer->tracer)
+        return progress;
+    renderer->result.uploaded_bytes += tracer->stats.uploaded_bytes;
+    renderer->result.structure_bytes += tracer->stats.device_bytes;
+    tracer_tell(tracer, &renderer->result.structure);
+    return progress;
+}
+
 bool frame_build(struct frame_renderer *renderer, struct error *error)
 {
     const struct tracer_stats *stats = &renderer->tracer->stats;
@@ -390,21 +414,24 @@ bool frame_build(struct frame_renderer *renderer, struct error *error)
         progress = bring(renderer, renderer->second, error);
         renderer->second_built = progress == TRACER_DONE;
     }
+    if (renderer->key_tracer && !renderer->key_built)
+        progress = bring_key(renderer, error);
     if (progress != TRACER_DONE)
         return progress == TRACER_MORE;
     return get_ready_in_steps(renderer, error);
 }
 
+/* Of a frame of several views that of one; of one whose eyes are made from layers the key view. */
 static struct trace_view view_of(const struct frame_request *request)
 {
+    const struct frame_camera camera = frame_key_camera(request);
     struct trace_view view = {
-        .fov_y = request->camera.fov_y,
-        .ortho_height = request->camera.ortho_height,
-        .near = request->camera.near,
-        .width = request->width,
-        .height = request->height,
+        .fov_y = camera.fov_y,
+        .ortho_height = camera.ortho_height,
+        .near = camera.near,
     };
-    memcpy(view.world_from_view, request->camera.world_from_view, sizeof(view.world_from_view));
+    frame_view_size(request, &view.width, &view.height);
+    memcpy(view.world_from_view, camera.world_from_view, sizeof(view.world_from_view));
     return view;
 }
 
@@ -417,7 +444,10 @@ static bool begin(struct frame_renderer *renderer, const struct scene *scene, co
     if (!renderer->work)
         return false;
     struct render_context *context = &renderer->work->context;
-    context->request = *request;
+    context->request = renderer->request = *request;
+    context->layer_tracer = NULL;
+    renderer->pass = PASS_UNKNOWN;
+    renderer->target = &renderer->picture;
     renderer->result = (struct frame_result){0};
     renderer->view = view_of(request);
     renderer->samples_before = may_go_on(renderer, request) ? renderer->kept_samples : 0;
@@ -432,11 +462,15 @@ static bool begin(struct frame_renderer *renderer, const struct scene *scene, co
 /* The first step of each, which may read the scene's motion. */
 static bool begin_tracers(struct frame_renderer *renderer, struct error *error)
 {
-    renderer->built = renderer->second_built = false;
+    renderer->built = renderer->second_built = renderer->key_built = false;
     picture_restart(&renderer->picture);
     if (!frame_build(renderer, error))
         return false;
-    return renderer->built || !renderer->second || bring(renderer, renderer->second, error) != TRACER_FAILED;
+    if (renderer->built)
+        return true;
+    return (!renderer->second || bring(renderer, renderer->second, error) != TRACER_FAILED) &&
+           (!renderer->key_tracer || renderer->key_tracer == renderer->tracer ||
+            bring(renderer, renderer->key_tracer, error) != TRACER_FAILED);
 }
 
 static bool bring_scene(struct frame_renderer *renderer, bool *done, struct error *error)

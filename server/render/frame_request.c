@@ -10,18 +10,28 @@
 #define SIZE_MAX_PIXELS 16384u /* width and height; keeps the number of a pixel in 32 bits */
 #define AO_RAYS_MAX 65536u     /* keeps the number of a sample's rays in 32 bits */
 
-static bool check_camera(const struct frame_request *request, struct error *error)
+/* `fields`: of its transform, its angle and its height. */
+static bool check_view(const struct frame_camera *camera, const char *const fields[3], struct error *error)
 {
-    const struct frame_camera *camera = &request->camera;
     for (int i = 0; i < 12; i++)
         if (!isfinite(camera->world_from_view[i]))
-            return error_set(error, ERROR_INVALID, "camera", "its transform is not finite");
+            return error_set(error, ERROR_INVALID, fields[0], "its transform is not finite");
     if (!(camera->fov_y >= 0.0f && camera->fov_y < 3.14159f))
-        return error_set(error, ERROR_INVALID, "camera.fov_y", "%g radians; 0 to below pi are possible",
+        return error_set(error, ERROR_INVALID, fields[1], "%g radians; 0 to below pi are possible",
                          (double)camera->fov_y);
     if (camera->fov_y == 0.0f && !(camera->ortho_height > 0.0f && isfinite(camera->ortho_height)))
-        return error_set(error, ERROR_INVALID, "camera.height", "an orthographic camera of height %g",
+        return error_set(error, ERROR_INVALID, fields[2], "an orthographic camera of height %g",
                          (double)camera->ortho_height);
+    return true;
+}
+
+static bool check_camera(const struct frame_request *request, struct error *error)
+{
+    static const char *const own[3] = {"camera", "camera.fov_y", "camera.height"};
+    static const char *const key[3] = {"key_camera", "key_camera.fov_y", "key_camera.height"};
+    if (!check_view(&request->camera, own, error) ||
+        (request->has_key && !check_view(&request->key_camera, key, error)))
+        return false;
     if (!(request->aperture >= 0.0f && isfinite(request->aperture)))
         return error_set(error, ERROR_INVALID, "aperture", "a lens of %g metres", (double)request->aperture);
     if (!(request->focus >= 0.0f && isfinite(request->focus)))
@@ -122,6 +132,23 @@ static bool check_layers(const struct frame_request *request, struct error *erro
     return true;
 }
 
+/* Of views and of where they come from. */
+static bool check_views(const struct frame_request *request, struct error *error)
+{
+    const uint32_t across = request->views_across ? request->views_across : 1;
+    const uint32_t down = request->views_down ? request->views_down : 1;
+    if (request->width % across || request->height % down)
+        return error_set(error, ERROR_INVALID, request->width % across ? "views_across" : "views_down",
+                         "%u x %u views do not fill %ux%u pixels", across, down, request->width, request->height);
+    if (!(request->baseline >= 0.0f && isfinite(request->baseline)))
+        return error_set(error, ERROR_INVALID, "baseline", "%g metres; 0 and more are possible",
+                         (double)request->baseline);
+    if (request->view_source == VIEW_SOURCE_LAYERS && request->compare)
+        return error_set(error, ERROR_UNSUPPORTED, "compare",
+                         "views made from layers are not traced by a second tracer; compare rendered ones");
+    return true;
+}
+
 bool frame_request_check(const struct frame_request *request, struct error *error)
 {
     if (request->width == 0 || request->height == 0 || request->width > SIZE_MAX_PIXELS ||
@@ -136,13 +163,21 @@ bool frame_request_check(const struct frame_request *request, struct error *erro
     if (request->format > PIXEL_FORMAT_RGBA32F)
         return error_set(error, ERROR_UNSUPPORTED, "format", "there is no pixel format number %u",
                          (unsigned)request->format);
-    return check_integrator(request, error) && check_layers(request, error) && check_camera(request, error);
+    return check_views(request, error) && check_integrator(request, error) && check_layers(request, error) &&
+           check_camera(request, error);
 }
 
 static bool same_camera(const struct frame_camera *a, const struct frame_camera *b)
 {
     return memcmp(a->world_from_view, b->world_from_view, sizeof(a->world_from_view)) == 0 &&
            a->fov_y == b->fov_y && a->ortho_height == b->ortho_height && a->near == b->near;
+}
+
+static bool same_views(const struct frame_request *a, const struct frame_request *b)
+{
+    return a->views_across == b->views_across && a->views_down == b->views_down && a->baseline == b->baseline &&
+           a->eyes_over == b->eyes_over && a->view_source == b->view_source && a->has_key == b->has_key &&
+           (!a->has_key || same_camera(&a->key_camera, &b->key_camera));
 }
 
 static bool same_tracer(const struct frame_request *a, const struct frame_request *b)
@@ -158,10 +193,15 @@ static bool same_light(const struct frame_request *a, const struct frame_request
            a->ao_falloff == b->ao_falloff && a->ao_rays == b->ao_rays && a->layer_opacity == b->layer_opacity;
 }
 
+bool frame_request_same_radiance(const struct frame_request *a, const struct frame_request *b)
+{
+    return a->depth == b->depth && a->seed == b->seed && same_light(a, b) && same_tracer(a, b);
+}
+
 bool frame_request_adds_to(const struct frame_request *a, const struct frame_request *b)
 {
-    return a->accumulate && b->accumulate && a->width == b->width && a->height == b->height &&
-           a->depth == b->depth && a->seed == b->seed && same_light(a, b) && a->aperture == b->aperture &&
-           a->focus == b->focus && a->filter == b->filter && same_camera(&a->camera, &b->camera) &&
-           same_tracer(a, b) && frame_request_planes(a) == frame_request_planes(b);
+    return a->accumulate && b->accumulate && a->width == b->width && a->height == b->height && same_views(a, b) &&
+           frame_request_same_radiance(a, b) && a->aperture == b->aperture && a->focus == b->focus &&
+           a->filter == b->filter && same_camera(&a->camera, &b->camera) &&
+           frame_request_planes(a) == frame_request_planes(b);
 }

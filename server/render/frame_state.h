@@ -7,6 +7,7 @@
 #include "render/compare/waves.h"
 #include "render/context.h"
 #include "render/frame.h"
+#include "render/key_view.h"
 #include "render/layers.h"
 #include "render/picture.h"
 #include "render/primary.h"
@@ -27,6 +28,7 @@ enum frame_phase {
     PHASE_SHADE,
     PHASE_TRACE,
     PHASE_LAND,
+    PHASE_KEEP,
     PHASE_RESOLVE
 };
 
@@ -48,7 +50,8 @@ struct frame_scene {
 struct frame_work {
     struct frame_work *next; /* idle */
     struct wave_passes passes;
-    struct trace_state *trace_state; /* of its waves; NULL: no frame has traced any yet */
+    struct trace_state *trace_state;     /* of its waves; NULL: no frame has traced any yet */
+    struct trace_state *key_trace_state; /* of the rays of eyes that are made from layers; likewise */
     struct render_context context;
     struct primary primary;
     struct layers layers;
@@ -62,6 +65,7 @@ struct frame_renderer {
     struct gpu_device *device;
     struct frame_scene *shared;
     struct picture picture;
+    struct key_view key;       /* of frames whose eyes are made from layers */
     struct tracer_set tracers; /* that depend on the view: no other renderer's frames may use them */
     const struct tracer_impl *stand_in;
     unsigned stand_in_number;
@@ -75,9 +79,15 @@ struct frame_renderer {
     const struct scene *scene;         /* until the copy is of it */
     const struct scene_motion *motion; /* the same; NULL: nothing moves */
     struct tracer *tracer, *second;    /* held; NULL: none */
+    struct tracer *key_tracer;         /* likewise, of the structure that eyes are made from */
     bool built;                        /* `tracer` is what the scene is */
     bool second_built;                 /* the same of `second` */
-    size_t awaited_bytes;              /* of a reservation that was put off, see gpu_reserve_waits(); 0: of none */
+    bool key_built;                    /* and of `key_tracer` */
+    struct frame_request request;      /* the frame's; the context has that of the pass in hand (frame_key.c) */
+    uint32_t pass;          /* with a key tracer: the layer that is rendered, or, behind the last, the eyes */
+    struct picture *target; /* that gets the samples: `picture`, or the sums of the key view */
+    uint32_t eyes_samples_before; /* samples_before, while layers are rendered */
+    size_t awaited_bytes;         /* of a reservation that was put off, see gpu_reserve_waits(); 0: of none */
     bool rasterise;
     uint32_t strip_rows; /* that are rasterised together */
     uint32_t sample_shift_max;
@@ -100,11 +110,31 @@ struct frame_work *frame_work_take(struct frame_scene *shared, const struct inte
                                    struct error *error);
 void frame_work_give(struct frame_scene *shared, struct frame_work *work); /* accepts NULL */
 void frame_work_finish(struct frame_scene *shared);                        /* all that are idle */
-/* Makes the work's trace state one for these, where it is not. */
-bool frame_work_trace_by(struct frame_work *work, const struct tracer *tracer, struct error *error);
+/* Makes one of the work's trace states one for these, where it is not. */
+bool frame_work_trace_by(struct frame_work *work, struct trace_state **state, const struct tracer *tracer,
+                         struct error *error);
 uint64_t frame_work_device_bytes(const struct frame_work *work);
 /* frame_renderer.c. Which set a tracer belongs to follows from what it depends on. */
 struct tracer_set *frame_tracers(struct frame_renderer *renderer, const struct tracer_impl *impl);
+/* frame_begin.c. Its stand-in, if it has one. */
+const struct tracer_impl *frame_find_tracer(const struct frame_renderer *renderer, unsigned number,
+                                            const char *field, struct error *error);
+/* frame_key.c */
+#define PASS_UNKNOWN UINT32_MAX
+bool frame_is_from_layers(const struct frame_request *request);
+struct frame_camera frame_key_camera(const struct frame_request *request);
+bool frame_is_layer_pass(const struct frame_renderer *renderer);
+bool frame_is_eyes_pass(const struct frame_renderer *renderer);
+/* Takes the tracer of the key view's structure. */
+bool frame_key_take(struct frame_renderer *renderer, struct error *error);
+/* Sets the context to the pass in hand, once the tracers are built: request, tracer, and what gets the samples. */
+bool frame_key_set_pass(struct frame_renderer *renderer, struct error *error);
+/* A step of keeping a layer whose samples are all there; then the next pass. */
+bool frame_key_keep(struct frame_renderer *renderer, struct error *error);
+/* A step of finding the radiance of a slice of eyes. */
+bool frame_key_find(struct frame_renderer *renderer, bool *done, struct error *error);
+/* Rows of the structure: what the eyes' rays were like. */
+bool frame_key_tell(struct frame_renderer *renderer, struct error *error);
 /* frame_begin.c. A step of bringing the tracers to the scene; the last one leaves the frame ready for its first
  * sample. */
 bool frame_build(struct frame_renderer *renderer, struct error *error);

@@ -9,6 +9,7 @@ static void work_destroy(struct frame_work *work, struct gpu_device *device)
 {
     wave_passes_finish(&work->passes, device);
     trace_state_destroy(work->trace_state);
+    trace_state_destroy(work->key_trace_state);
     comparison_destroy(work->comparison);
     primary_finish(&work->primary, device);
     layers_finish(&work->layers, device);
@@ -91,17 +92,18 @@ void frame_work_finish(struct frame_scene *shared)
     shared->idle_count = 0;
 }
 
-bool frame_work_trace_by(struct frame_work *work, const struct tracer *tracer, struct error *error)
+bool frame_work_trace_by(struct frame_work *work, struct trace_state **state, const struct tracer *tracer,
+                         struct error *error)
 {
-    if (!work->trace_state || !trace_state_fits(work->trace_state, tracer->impl, &tracer->options)) {
-        trace_state_destroy(work->trace_state);
-        work->trace_state = trace_state_create(tracer->impl, tracer->device, &tracer->options, error);
+    if (!*state || !trace_state_fits(*state, tracer->impl, &tracer->options)) {
+        trace_state_destroy(*state);
+        *state = trace_state_create(tracer->impl, tracer->device, &tracer->options, error);
         slices_ahead_forget(&work->ahead);
     }
-    work->context.trace_state = work->trace_state;
-    if (work->trace_state)
-        trace_state_reset(work->trace_state);
-    return work->trace_state;
+    work->context.trace_state = *state;
+    if (*state)
+        trace_state_reset(*state);
+    return *state;
 }
 
 uint64_t frame_work_device_bytes(const struct frame_work *work)
@@ -112,6 +114,8 @@ uint64_t frame_work_device_bytes(const struct frame_work *work)
                    wave_passes_device_bytes(&work->passes);
     if (work->trace_state)
         sum += trace_state_device_bytes(work->trace_state);
+    if (work->key_trace_state)
+        sum += trace_state_device_bytes(work->key_trace_state);
     if (work->comparison)
         sum += comparison_device_bytes(work->comparison);
     return sum;

@@ -10,7 +10,8 @@
 _Static_assert(LAYER_BIT_BEAUTY == 1 << LAYER_BEAUTY && LAYER_BIT_ALBEDO == 1 << LAYER_ALBEDO &&
                    LAYER_BIT_NORMAL == 1 << LAYER_NORMAL && LAYER_BIT_DEPTH == 1 << LAYER_DEPTH &&
                    LAYER_BIT_POSITION == 1 << LAYER_POSITION && LAYER_BIT_AO == 1 << LAYER_AO &&
-                   LAYER_BIT_ID == 1 << LAYER_ID && LAYER_ID + 1 == LAYER_COUNT,
+                   LAYER_BIT_ID == 1 << LAYER_ID && LAYER_BIT_UNKNOWN == 1 << LAYER_UNKNOWN &&
+                   LAYER_UNKNOWN + 1 == LAYER_COUNT,
                "shaders know the layers by other numbers");
 
 bool layers_of_first_sample(enum layer layer)
@@ -36,10 +37,19 @@ bool layers_reserve(struct layers *layers, struct render_context *context, uint3
            gpu_buffer_reserve(device, &layers->ao_visibility, rays * sizeof(uint), error);
 }
 
-void layers_begin_slice(struct layers *layers)
+void layers_begin_slice(struct layers *layers, const struct render_context *context)
 {
     layers->noted = false;
+    layers->noting = layers->wanted;
     layers->asked = layers->asking = 0;
+    layers->plane_samples = context->slice.slot_count << context->uniforms.sample_shift;
+}
+
+uint32_t layers_take_unknown(struct layers *layers)
+{
+    layers->noting = layers->wanted & ~LAYER_BIT_UNKNOWN;
+    const uint32_t planes_before = (uint32_t)__builtin_popcount(layers->noting);
+    return layers->noting == layers->wanted ? UINT32_MAX : planes_before * layers->plane_samples;
 }
 
 /* A program that reads hits, in use, with all that these have bound; `own`: a define of its own, or NULL. */
@@ -63,15 +73,14 @@ static const struct gpu_program *use(struct render_context *context, const char 
 /* All but how open a place is, which begins with 0. */
 static bool note_hits(struct layers *layers, struct render_context *context, struct error *error)
 {
-    bool needs_surface = layers->wanted & (LAYER_BIT_ALBEDO | LAYER_BIT_NORMAL);
-    layers->plane_samples = context->ray_count;
+    bool needs_surface = layers->noting & (LAYER_BIT_ALBEDO | LAYER_BIT_NORMAL);
     context_span_begin(context, STAGE_SHADE);
     const struct gpu_program *program =
         use(context, "render/layers.comp", needs_surface ? "NEEDS_SURFACE" : NULL, error);
     if (program) {
         gpu_buffer_bind_storage(&layers->sums, BIND_LAYER_SUMS);
         gpu_uniform_uint(program, "ray_count", context->ray_count);
-        gpu_uniform_uint(program, "layers", layers->wanted);
+        gpu_uniform_uint(program, "layers", layers->noting);
         gpu_dispatch(context->device, program, context->ray_count);
     }
     context_span_end(context);
@@ -144,7 +153,7 @@ static bool adds(const struct render_context *context, enum layer layer)
 static bool any_adds(const struct layers *layers, const struct render_context *context)
 {
     for (enum layer layer = LAYER_ALBEDO; layer < LAYER_COUNT; layer++)
-        if (layers->wanted & 1u << layer && adds(context, layer))
+        if (layers->noting & 1u << layer && adds(context, layer))
             return true;
     return false;
 }

@@ -12,6 +12,7 @@ struct layers {
     uint32_t wanted;        /* bits, without LAYER_BEAUTY; 0: nothing is done, and no memory is held */
     struct gpu_buffer sums; /* shared/layers.h */
     struct gpu_buffer ao_rays, ao_times, ao_visibility;
+    uint32_t noting;        /* of the current slice: those that hits are noted in */
     bool noted;             /* of the current slice: properties of its hits */
     uint32_t asked;         /* likewise: rays of ao that each hit has been given */
     uint32_t asking;        /* likewise: and that are made and not traced to the end; 0: none */
@@ -22,7 +23,10 @@ struct layers {
 bool layers_reserve(struct layers *layers, struct render_context *context, uint32_t slice_samples,
                     struct error *error);
 /* The context has rays and hits of a new slice. */
-void layers_begin_slice(struct layers *layers);
+void layers_begin_slice(struct layers *layers, const struct render_context *context);
+/* Of the current slice LAYER_UNKNOWN is the caller's to write: where in the sums its plane begins; UINT32_MAX: it
+ * is not wanted. layers->noting: what is left to note. */
+uint32_t layers_take_unknown(struct layers *layers);
 /* A short part of a slice's work; *done: there is no more. Leaves rays and hits as they are, and
  * the rays that it traces count as shadow rays. Inside no span. */
 bool layers_step(struct layers *layers, struct render_context *context, bool *done, struct error *error);

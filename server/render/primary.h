@@ -5,6 +5,7 @@
 
 #include "gpu/texture.h"
 #include "render/context.h"
+#include "trace/raster/view.h"
 
 /* The visibility buffer: which primitive of which instance each pixel sees, in a layer for each of the current
  * samples. It has a strip of the picture's rows at a time, so that no picture needs more than some memory at once.
@@ -17,9 +18,9 @@ struct primary {
     uint32_t first_row;                                        /* of the strip, in the picture */
     uint32_t layer_count;                                      /* that are drawn */
     /* where drawing goes on */
-    uint32_t layer, sort, instance, primitive;
+    uint32_t layer;
+    struct raster_view view;
     bool cleared;
-    uint32_t part_vertices; /* that are drawn in one step on software GL; 0: not known yet */
 };
 
 /* Makes room for strips of that many rows of the request's picture, and for that many samples. */
@@ -33,6 +34,10 @@ bool primary_rasterise(struct primary *primary, struct render_context *context, 
 bool primary_begin_slice(const struct primary *primary, struct render_context *context, struct error *error);
 /* Its hits, from the visibility buffer, or, where `primary` is NULL, a part of them a call from the tracer. */
 bool primary_find(const struct primary *primary, struct render_context *context, bool *done, struct error *error);
+/* In place of that, for rays that only ask where they hit: their intersections, a part of them a call; and then,
+ * if their surfaces are asked for after all, hits of them and the list of these. */
+bool primary_intersect(struct render_context *context, bool *done, struct error *error);
+bool primary_make_surfaces(struct render_context *context, struct error *error);
 /* Announces the programs of the first hits (gpu_program_announce). */
 void primary_announce(struct render_context *context, bool rasterised);
 void primary_finish(struct primary *primary, struct gpu_device *device);

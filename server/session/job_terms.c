@@ -29,7 +29,7 @@ static uint64_t frame_bytes_of(const struct message_render *render)
     uint32_t layers = render->layers ? render->layers : BEAUTY_ALONE;
     uint32_t pixel_bytes = protocol_pixel_format_bytes(render->format) * (uint32_t)__builtin_popcount(layers) +
                            ATTACHMENT_PIXEL_BYTES * (uint32_t)__builtin_popcount(render->attachments);
-    return (uint64_t)render->width * render->height * pixel_bytes;
+    return (uint64_t)render->width * render->views_across * render->height * render->views_down * pixel_bytes;
 }
 
 static bool check_layers(const struct message_render *render, struct error *error)
@@ -59,17 +59,96 @@ struct job *job_replaced_by(const struct session *session, const struct message_
     return render->kind == PROTOCOL_JOB_VIEW && job && job->view && !job->cancelled ? job : NULL;
 }
 
+static bool has_views(const struct message_render *render)
+{
+    return render->views_across > 1 || render->views_down > 1;
+}
+
+/* Several views in a picture. */
+static bool check_eyes(const struct message_render *render, struct error *error)
+{
+    if (render->eyes_over && (render->views_across != 1 || render->views_down < 2)) {
+        error_set(error, ERROR_INVALID, "render.eyes_over",
+                  "%u x %u views; those of eyes side by side are one below the other", render->views_across,
+                  render->views_down);
+        return error_remedy(error, "set views_across to 1 and views_down to 2, or eyes_over to 0");
+    }
+    if (!has_views(render) || render->baseline > 0.0f)
+        return true;
+    error_set(error, ERROR_INVALID, "render.baseline", "all %u views would be from one place",
+              render->views_across * render->views_down);
+    return error_remedy(error, "give the distance of neighbouring eyes in metres");
+}
+
+/* Frames between those that are rendered. */
+static bool check_upsample(const struct message_render *render, struct error *error)
+{
+    if (render->upsample == 1)
+        return true;
+    if (render->kind == PROTOCOL_JOB_VIEW) {
+        error_set(error, ERROR_UNSUPPORTED, "render.upsample", "the next frames of a view are not known");
+        return error_remedy(error, "set it to 1; a batch has frames between those that are rendered");
+    }
+    if (render->view_source != PROTOCOL_VIEW_SOURCE_LAYERS) {
+        error_set(error, ERROR_INVALID, "render.upsample",
+                  "frames between those that are rendered are not made of rays");
+        return error_remedy(error, "set view_source to layers, or upsample to 1");
+    }
+    if (!render->accumulate)
+        return true;
+    error_set(error, ERROR_UNSUPPORTED, "render.upsample", "such frames do not add to one another");
+    return error_remedy(error, "set accumulate to 0, or upsample to 1");
+}
+
+static bool check_views(const struct message_render *render, struct error *error)
+{
+    if (!check_eyes(render, error) || !check_upsample(render, error))
+        return false;
+    if (render->view_source != PROTOCOL_VIEW_SOURCE_LAYERS)
+        return true;
+    if (render->compare) {
+        error_set(error, ERROR_UNSUPPORTED, "render.compare",
+                  "tracers are not compared in pictures that are made of layers");
+        return error_remedy(error, "set view_source to rays, or compare to 0");
+    }
+    if (!(render->shutter > 0.0f))
+        return true;
+    error_set(error, ERROR_UNSUPPORTED, "render.shutter", "layers show the scene at one time");
+    return error_remedy(error, "set view_source to rays, or shutter to 0");
+}
+
+/* The width and height of all views together. */
+static bool check_size(const struct session_limits *limits, const struct message_render *render,
+                       struct error *error)
+{
+    const uint32_t width = render->width * render->views_across, height = render->height * render->views_down;
+    const bool is_wide = width > limits->width_pixels;
+    if (!is_wide && height <= limits->height_pixels)
+        return true;
+    const char *field = is_wide ? "render.width" : "render.height";
+    if (has_views(render)) {
+        const uint32_t views = is_wide ? render->views_across : render->views_down;
+        field = views > 1 ? is_wide ? "render.views_across" : "render.views_down" : field;
+        error_set(error, ERROR_LIMIT, field, "%u x %u views of %u x %u pixels are %u x %u, the limit is %u x %u",
+                  render->views_across, render->views_down, render->width, render->height, width, height,
+                  limits->width_pixels, limits->height_pixels);
+        return error_remedy(error,
+                            "ask for fewer or smaller views, or raise [limits] in the daemon's configuration");
+    }
+    error_set(error, ERROR_LIMIT, field, "%u x %u pixels, the limit is %u x %u", width, height,
+              limits->width_pixels, limits->height_pixels);
+    return error_remedy(error, "ask for less, or raise [limits] in the daemon's configuration");
+}
+
 static bool check_limits(const struct session *session, const struct message_render *render, struct error *error)
 {
     const struct session_limits *limits = &session->hub->options.limits;
-    if (render->width > limits->width_pixels || render->height > limits->height_pixels)
-        error_set(error, ERROR_LIMIT, render->width > limits->width_pixels ? "render.width" : "render.height",
-                  "%u x %u pixels, the limit is %u x %u", render->width, render->height, limits->width_pixels,
-                  limits->height_pixels);
-    else if (render->samples > limits->samples)
+    if (!check_size(limits, render, error))
+        return false;
+    if (render->samples > limits->samples) {
         error_set(error, ERROR_LIMIT, "render.samples", "%u, the limit is %u", render->samples, limits->samples);
-    if (error->kind == ERROR_LIMIT)
         return error_remedy(error, "ask for less, or raise [limits] in the daemon's configuration");
+    }
     if (session->job_count >= limits->jobs_per_client && !job_replaced_by(session, render)) {
         error_set(error, ERROR_LIMIT, "render", "%u jobs are running, the limit", session->job_count);
         error_remedy(error, "wait for one to end, cancel one, or raise limits.jobs in the daemon's configuration");
@@ -189,7 +268,7 @@ bool job_check(const struct session *session, const struct message_render *rende
         return error_set(error, ERROR_UNKNOWN_ID, "render.scene", "there is no scene %u", render->scene);
     if (jobs_find(session, render->channel) && !job_replaced_by(session, render))
         return error_set(error, ERROR_INVALID, "render.channel", "a running job has channel %u", render->channel);
-    if (!check_kind(session, render, error) || !check_layers(render, error))
+    if (!check_kind(session, render, error) || !check_views(render, error) || !check_layers(render, error))
         return false;
     if (!check_encoding(session, render, render->encoding, "render.encoding", error))
         return false;
@@ -271,8 +350,13 @@ static void fill_rest(struct engine_job *job, const struct session *session, con
         .time_origin_frame = render->time_origin_frame,
         .frame =
             {
-                .width = render->width,
-                .height = render->height,
+                .width = render->width * render->views_across,
+                .height = render->height * render->views_down,
+                .views_across = render->views_across,
+                .views_down = render->views_down,
+                .baseline = render->baseline,
+                .eyes_over = render->eyes_over != 0,
+                .view_source = (enum view_source)render->view_source,
                 .samples = render->samples,
                 .depth = render->depth,
                 .seed = render->seed,
@@ -305,6 +389,7 @@ static void fill_rest(struct engine_job *job, const struct session *session, con
         .camera_node = render->camera_node,
         .orbit_turn = render->orbit_turn,
         .orbit_seconds = render->orbit_seconds,
+        .upsample = render->upsample,
         .pass_samples = render->pass_samples,
         .still_encoding = (enum encoding)render->still_encoding,
         .weight = weight,

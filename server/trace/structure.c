@@ -28,6 +28,13 @@ struct structure_row *structure_metres(struct structure_rows *rows, const char *
     return row;
 }
 
+struct structure_row *structure_pixels(struct structure_rows *rows, const char *name, float pixels)
+{
+    struct structure_row *row = add(rows, name, UNIT_PIXELS);
+    row->measure = pixels;
+    return row;
+}
+
 struct structure_row *structure_per_ray(struct structure_rows *rows, const char *name, float mean)
 {
     struct structure_row *row = add(rows, name, UNIT_PER_RAY);

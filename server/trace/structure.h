@@ -31,6 +31,7 @@ struct structure_rows {
 /* These add a row and return it, for a warning. Rows beyond STRUCTURE_ROWS_MAX overwrite the last one. */
 struct structure_row *structure_number(struct structure_rows *rows, const char *name, uint64_t number);
 struct structure_row *structure_metres(struct structure_rows *rows, const char *name, float metres);
+struct structure_row *structure_pixels(struct structure_rows *rows, const char *name, float pixels);
 struct structure_row *structure_per_ray(struct structure_rows *rows, const char *name, float mean);
 /* Whether the part was built by the last update: then the times of a build with its number are its own. */
 void structure_built(struct structure_rows *rows, bool built);

@@ -183,6 +183,17 @@ struct tracer_impl {
      * it. Sampled tracers run a program of their own, shaders/<tracer>/surface.comp. */
     bool (*surfaces)(struct tracer *tracer, struct gpu_scene *scene, const struct ray_range *rays,
                      struct error *error);
+
+    /* ---- layers: of a tracer whose structure is a picture of what a view sees; both NULL: it is none ---- */
+
+    /* The view whose pixels are the texels of the layers, as of the last update: the eye and direction of the one
+     * that was asked for, and a margin round it. And how many layers there are. False: with these options the
+     * structure is no picture of one view. */
+    bool (*texel_view)(const struct tracer *tracer, struct trace_view *texels, uint32_t *layers);
+    /* Of rays that begin at the eye of that view, which may be dead: the intersections with the surfaces that the
+     * layer holds at the texels they pass through. A miss where it holds none. */
+    bool (*layer_hits)(struct tracer *tracer, struct gpu_scene *scene, const struct wave *wave,
+                       const struct ray_range *rays, uint32_t layer, struct error *error);
 };
 
 /* tracer_bvh_impl and its like, one for each row of tracers.def; weak, as a build may leave a tracer out. */
@@ -252,6 +263,11 @@ enum tracer_progress tracer_trace_step(struct tracer *tracer, struct gpu_scene *
 bool trace_state_copy_counts(struct trace_state *state, struct error *error);
 /* Adds rows of what was copied. It does not wait where the host has waited for a later command. */
 bool trace_state_tell(struct trace_state *state, struct structure_rows *rows, struct error *error);
+
+/* Hits of the rays of a wave with one layer of a structure that is a picture of a view (tracer_impl.layer_hits).
+ * The scene's buffers are bound. */
+bool tracer_layer_hits(struct tracer *tracer, struct gpu_scene *scene, const struct wave *wave, uint32_t layer,
+                       struct error *error);
 
 /* Announces the programs of such a wave (gpu_program_announce), of which the buffers may be missing. */
 void tracer_announce(struct tracer *tracer, struct gpu_scene *scene, const struct wave *wave, bool coherent);

@@ -156,7 +156,7 @@ static void learn(struct trace_state *state, uint32_t rays, uint64_t step_ns, ui
 static bool make_surfaces(struct tracer *tracer, struct gpu_scene *scene, const struct ray_range *rays,
                           struct error *error)
 {
-    if (rays->wave->kind == WAVE_ANY)
+    if (rays->wave->kind == WAVE_ANY || rays->wave->bare)
         return true;
     return tracer->impl->surfaces ? tracer->impl->surfaces(tracer, scene, rays, error)
                                   : trace_surfaces(scene, rays, error);
@@ -235,6 +235,22 @@ void tracer_announce(struct tracer *tracer, struct gpu_scene *scene, const struc
         return;
     tracer->impl->announce(tracer, scene, wave, coherent);
     (void)make_surfaces(tracer, scene, &rays, NULL);
+}
+
+/* ---- layers of a view ---- */
+
+bool tracer_layer_hits(struct tracer *tracer, struct gpu_scene *scene, const struct wave *wave, uint32_t layer,
+                       struct error *error)
+{
+    const struct tracer_impl *impl = tracer->impl;
+    const struct ray_range all = {.wave = wave, .end = wave->ray_count};
+    if (!check_wave(tracer, scene, wave, error) || !check_updated(tracer, error))
+        return false;
+    gpu_push_group(tracer->device, impl->name);
+    bool found = impl->layer_hits(tracer, scene, wave, &all, layer, error) &&
+                 make_surfaces(tracer, scene, &all, error) && gpu_check(tracer->device, impl->name, error);
+    gpu_pop_group(tracer->device);
+    return found;
 }
 
 /* ---- at once ---- */

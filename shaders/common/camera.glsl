@@ -24,6 +24,33 @@ uint slot_of_pixel(uvec2 pixel)
     return (tile.y * frame.tiles_across + tile.x) << 6 | m;
 }
 
+// The view of the picture that a pixel belongs to: its number from the left and from above.
+uvec2 view_of_pixel(uvec2 pixel)
+{
+    if (frame.view_width == frame.width && frame.view_height == frame.height)
+        return uvec2(0u);
+    return pixel / uvec2(frame.view_width, frame.view_height);
+}
+
+// A pixel within its view.
+uvec2 pixel_in_view(uvec2 pixel)
+{
+    return pixel - view_of_pixel(pixel) * uvec2(frame.view_width, frame.view_height);
+}
+
+// A view's pixels have the same random numbers as those of a picture that shows it alone.
+uint number_in_view(uvec2 pixel)
+{
+    return pixel.y * frame.view_width + pixel.x;
+}
+
+// How far a view's eye is from the camera's, in view space.
+vec2 eye_of_view(uvec2 view)
+{
+    vec2 steps = vec2(view) - frame.eyes_middle.xy;
+    return steps.x * frame.eye_steps.xy + steps.y * frame.eye_steps.zw;
+}
+
 vec3 world_from_view_vector(vec3 v)
 {
     return vec3(dot(frame.world_from_view[0].xyz, v), dot(frame.world_from_view[1].xyz, v),
@@ -43,11 +70,11 @@ vec3 view_from_world_point(vec3 p)
            d.z * vec3(frame.world_from_view[2].x, frame.world_from_view[2].y, frame.world_from_view[2].z);
 }
 
-// The ray through a point of the picture, in pixels from its top left, from the centre of the lens; unit direction,
-// t_min at the near plane.
-void camera_ray_through(vec2 picture_place, out vec3 origin, out vec3 direction, out float t_min)
+// The ray through a point of a view, in pixels from its top left, from the centre of the lens; unit direction, t_min at
+// the near plane. The eye is the camera's: those of several views look in parallel to it.
+void camera_ray_through(vec2 view_place, out vec3 origin, out vec3 direction, out float t_min)
 {
-    vec2 place = picture_place / vec2(frame.width, frame.height) * 2.0 - 1.0;
+    vec2 place = view_place / vec2(frame.view_width, frame.view_height) * 2.0 - 1.0;
     place *= vec2(frame.extent_near.x, -frame.extent_near.y);
     if (frame.extent_near.w != 0.0) {
         origin = eye_world() + world_from_view_vector(vec3(place, 0.0));
@@ -83,9 +110,9 @@ vec2 disc_from_square(vec2 u)
 
 // Through a thin lens, which leads all rays of one point of the picture through one point of the plane in focus (Cook,
 // Porter, Carpenter. Distributed Ray Tracing. 1984). `on_lens`: where they meet it, on the unit disc.
-void camera_ray_lens(vec2 picture_place, vec2 on_lens, out vec3 origin, out vec3 direction, out float t_min)
+void camera_ray_lens(vec2 view_place, vec2 on_lens, out vec3 origin, out vec3 direction, out float t_min)
 {
-    vec2 place = picture_place / vec2(frame.width, frame.height) * 2.0 - 1.0;
+    vec2 place = view_place / vec2(frame.view_width, frame.view_height) * 2.0 - 1.0;
     place *= vec2(frame.extent_near.x, -frame.extent_near.y);
     float focus = frame.lens.y;
     bool orthographic = frame.extent_near.w != 0.0;
@@ -118,7 +145,7 @@ float filter_offset(float number)
 vec4 clip_from_world_point(vec3 p, vec2 place)
 {
     vec3 v = view_from_world_point(p);
-    vec2 shift = (1.0 - 2.0 * place) / vec2(frame.width, frame.height);
+    vec2 shift = (1.0 - 2.0 * place) / vec2(frame.view_width, frame.view_height);
     vec2 scaled = v.xy / vec2(frame.extent_near.x, -frame.extent_near.y);
     float near = frame.extent_near.z;
     if (frame.extent_near.w != 0.0) {
@@ -131,6 +158,6 @@ vec4 clip_from_world_point(vec3 p, vec2 place)
 // Ray cone of a primary ray: width at the origin and growth per length. Many samples share a pixel.
 vec2 camera_cone()
 {
-    float step = 2.0 * frame.extent_near.y / float(frame.height) * frame.far_width.y;
+    float step = 2.0 * frame.extent_near.y / float(frame.view_height) * frame.far_width.y;
     return frame.extent_near.w != 0.0 ? vec2(step, 0.0) : vec2(0.0, step);
 }

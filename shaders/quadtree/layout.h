@@ -5,7 +5,8 @@
  *
  * A view is one face, or six: those of a cube round the eye. A face has a right, a down and a forward direction; a
  * point at (X, Y, Z) along these from the eye lies at the texel coordinates (x, y) = centre + scale * (X, Y) / Z, and
- * has the depth w = near / Z: in (x, y, w) planes are planes and rays are segments, and w grows towards the eye. Of
+ * has the depth w = unit / Z, where the unit is a share of
+ * the scene's size that suits half floats: in (x, y, w) planes are planes and rays are segments, and w grows towards the eye. Of
  * an orthographic view (x, y) = centre + scale * (X, Y) and w = (far - Z) / (far - near). Texel (i, j) covers
  * [i, i + 1) x [j, j + 1); row 0 is the uppermost.
  *
@@ -31,15 +32,19 @@
 #define QUADTREE_FACES_MAX 6u
 #define QUADTREE_LAYERS_MAX 3u
 #define QUADTREE_SLOPE_SCALE 1024.0f
+#define QUADTREE_SLOPE_MAX 65504.0f /* after the scale: the greatest half float */
 
 /* The uniforms of every pass of the tracer; a std140 block. */
 struct quadtree_uniforms {
     vec4 face_from_world[18]; /* three rows a face: right, down, forward, of unit length */
-    vec4 eye_world;           /* w unused */
+    vec4 eye_world;           /* w: of the sphere round it within which other eyes may be, radius, metres */
     vec4 scale_centre;        /* xy: texels a unit of X / Z, or of X; zw: where the axis of the view is */
-    vec4 depths;              /* x: near, metres; y: far, beyond which there is nothing; z: 1 if orthographic */
-    vec4 bounds;              /* x: the greatest difference of w that a plane over several texels may have; y: cosine
-                                 of the greatest angle between it and theirs; z: 1 if both grow with distance */
+    vec4 depths;              /* x: the unit, the distance at which w is 1, metres, or near if orthographic; y: far,
+                                 beyond which there is nothing but discs; z: 1 if orthographic; w: near */
+    vec4 bounds;              /* x: the greatest difference of w that a plane over several texels may have, from an eye
+                                 far from it: unit pixels / (f radius); y: cosine of the greatest angle between it and
+                                 those of its children, 0: any; z: w at the distance where both are twice as much, 0:
+                                 they do not grow; w: radius / unit, of the sphere of eyes for which x holds */
     uint width, height;       /* of a face, texels */
     uint padded_width, padded_height;
     uint faces, layers;
@@ -48,10 +53,38 @@ struct quadtree_uniforms {
 };
 SHARED_SIZE(quadtree_uniforms, 384)
 
+/* What a frame's rays of one kind came to. */
+struct quadtree_counts {
+    uint rays;
+    uint behind_first, behind_second; /* that were behind the first layer somewhere, and the second */
+    uint behind_last;                 /* that found nothing before they came behind the last one */
+    uint outside;                     /* that found nothing in what the view sees, and left it */
+    uint pad0, pad1, pad2;
+};
+SHARED_SIZE(quadtree_counts, 32)
+
+/* A ray that is within so many texels of its origin may pass the extension of a plane beside the surface that it began
+ * on, and one that is behind a plane may be before the next: half a texel, and its diagonal's. */
+#define QUADTREE_OWN_WAY 1.5f
+#define QUADTREE_DEEP 0.05f /* of w: what is so far behind a plane is behind the surface */
+
+#define BIND_QUADTREE_COUNTS BIND_TRACER_0
 #define UNIFORM_QUADTREE 3
 #define UNIT_QUADTREE_VISIBLE UNIT_TRACER_0
 #define UNIT_QUADTREE_NODES UNIT_TRACER_1
 #define UNIT_QUADTREE_DEPTH UNIT_TRACER_2 /* of the layer before the one that is drawn */
-#define IMAGE_QUADTREE_NODES 0            /* passes that build */
+/* Passes that build. Of one slice: its leaves as planes without flags; of all, the levels above the leaves: how far a
+ * plane is from those of the leaves at most. */
+#define UNIT_QUADTREE_PLANES UNIT_TRACER_3
+#define UNIT_QUADTREE_ERRORS UNIT_TRACER_4
+#define IMAGE_QUADTREE_NODES 0
+#define IMAGE_QUADTREE_PLANES 1
+#define IMAGE_QUADTREE_ERRORS 2
+
+/* Two texels side by side show surfaces that go on from one another if their planes differ by no more than this share
+ * of w and bounds.x, in the middle of their common border. Prototypes had cracks up to it. */
+#define QUADTREE_EDGE_SHARE 0.001953125f
+/* The tolerance may grow with distance up to so many times. */
+#define QUADTREE_GROWTH_MAX 4.0f
 
 #endif

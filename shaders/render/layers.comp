@@ -32,7 +32,7 @@ void main()
         return;
     hit h = hit_at(k);
     if (!(h.distance >= 0.0)) {
-        for (uint layer_bit = LAYER_BIT_ALBEDO; layer_bit <= LAYER_BIT_ID; layer_bit <<= 1)
+        for (uint layer_bit = LAYER_BIT_ALBEDO; layer_bit <= LAYER_BIT_UNKNOWN; layer_bit <<= 1)
             put(layer_bit, k, vec4(0.0));
         return;
     }
@@ -54,4 +54,5 @@ void main()
     put(LAYER_BIT_POSITION, k, position);
     put(LAYER_BIT_AO, k, vec4(vec3(0.0), 1.0)); // layers_gather.comp adds
     put(LAYER_BIT_ID, k, id);
+    put(LAYER_BIT_UNKNOWN, k, vec4(0.0)); // gather_views.comp knows better
 }

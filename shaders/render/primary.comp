@@ -35,13 +35,14 @@ void main()
         return;
     uvec2 pixel = pixel_of_slot(first_slot + (k >> frame.sample_shift));
     bool in_picture = pixel.x < frame.width && pixel.y < frame.height;
-    uint seed = sequence_seed(pixel.y * frame.width + pixel.x, frame.seed);
+    uvec2 in_view = pixel_in_view(pixel);
+    uint seed = sequence_seed(number_in_view(in_view), frame.seed);
     uint sample_ = k & (1u << frame.sample_shift) - 1u, index = frame.sample_index + sample_;
 #ifdef SPREAD
     vec2 u = sequence_pair(seed, SEQUENCE_PIXEL, index);
-    vec2 place = vec2(pixel) + 0.5 + vec2(filter_offset(u.x), filter_offset(u.y));
+    vec2 place = vec2(in_view) + 0.5 + vec2(filter_offset(u.x), filter_offset(u.y));
 #else
-    vec2 place = vec2(pixel) + sample_place(sample_);
+    vec2 place = vec2(in_view) + sample_place(sample_);
 #endif
     vec3 origin, direction;
     float t_min, time = 0.0;
@@ -50,6 +51,7 @@ void main()
 #else
     camera_ray_through(place, origin, direction, t_min);
 #endif
+    origin += world_from_view_vector(vec3(eye_of_view(view_of_pixel(pixel)), 0.0));
 #ifdef HAS_TIMES
     time = sequence_number(seed, SEQUENCE_TIME, index);
     times[k] = time;

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
 // Fills the hits of a slice whose primitives the rasteriser found (primary.comp has noted them).
-// Defines: those of render/primary_hit.glsl.
+// Defines: those of common/primary_hit.glsl.
 
 #include "shared/path.h"
 #include "shared/ray.h"
 #include "shared/hit.h"
 #include "common/dispatch.glsl"
 #include "common/surface.glsl"
-#include "render/primary_hit.glsl"
+#include "common/primary_hit.glsl"
 #include "render/wave.glsl"
 
 layout(local_size_x = 64) in;

@@ -59,7 +59,7 @@ path path_at(uint k)
 uint path_seed(path p)
 {
     uvec2 pixel = pixel_of_slot(first_slot + (p.sample_slot >> frame.sample_shift));
-    return sequence_seed(pixel.y * frame.width + pixel.x, frame.seed);
+    return sequence_seed(number_in_view(pixel_in_view(pixel)), frame.seed);
 }
 
 uint path_sample(path p)

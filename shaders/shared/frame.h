@@ -16,11 +16,14 @@ struct frame_uniforms {
     /* Of the current samples, two in each: their positions from each pixel's top left, if these are the same in
      * all pixels. */
     vec4 sample_places[8];
+    /* xy: in view space, from the eye of a view to that of the next one to the right; zw: to that of the next one
+     * below. eyes_middle: xy: the number of views across and down from the first eye to the camera; z, w unused */
+    vec4 eye_steps, eyes_middle;
     vec4 lens; /* x: radius, 0: a pinhole; y: distance of the plane in focus along the view; z, w unused */
     vec4 environment_colour; /* radiance, or the image's factor; w: rotation about +y, radians */
     vec4 irradiance[9];      /* rgb: of the environment, divided by pi: harmonics of a world-space normal */
     vec4 filter_places[17];  /* of the pixel filter, see server/render/pixel_filter.h */
-    uint width, height;      /* pixels */
+    uint width, height;      /* pixels of the picture */
     uint tiles_across;
     uint sample_index;     /* the first of the current ones */
     uint sample_shift;     /* 2 to its power samples of each pixel are traced together, adjacent in a wave */
@@ -29,9 +32,9 @@ struct frame_uniforms {
     uint depth; /* bounces after the first hit */
     uint seed;
     uint group_shift; /* 2 to its power samples of a pixel have their lights in order: sequence_pair_sorted */
-    uint pad0, pad1;
+    uint view_width, view_height; /* pixels of each of its views, which lie in it row by row */
 };
-SHARED_SIZE(frame_uniforms, 704)
+SHARED_SIZE(frame_uniforms, 736)
 
 #define ENVIRONMENT_NONE 0u /* black; leaves the picture transparent */
 #define ENVIRONMENT_CONSTANT 1u

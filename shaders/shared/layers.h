@@ -12,6 +12,7 @@
 #define LAYER_BIT_POSITION 16u
 #define LAYER_BIT_AO 32u
 #define LAYER_BIT_ID 64u
+#define LAYER_BIT_UNKNOWN 128u /* the last: its plane comes behind all others */
 
 /* Storage buffer: a plane for each layer of the frame but the beauty, in their order; in it a vec4 for each sample
  * of the slice. */

@@ -41,7 +41,8 @@ void main()
         found.barycentrics =
             candidate_triangle(found.instance_index, found.primitive, origin, direction, time).barycentrics;
     hit h = surface_of(found, origin, direction, time);
-    imageStore(hits, int(3u * k), uvec4(floatBitsToUint(h.distance), h.material, h.primitive, h.instance));
+    uint known = intersection.y & (HIT_UNKNOWN | HIT_LAYER_MASK); // of a tracer that knows what a view sees, else 0
+    imageStore(hits, int(3u * k), uvec4(floatBitsToUint(h.distance), h.material | known, h.primitive, h.instance));
     imageStore(hits, int(3u * k + 1u), h.uv01_or_sample);
     imageStore(hits, int(3u * k + 2u), uvec4(h.normal_geometric, h.normal_shading, h.tangent, h.colour));
 }

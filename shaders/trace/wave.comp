@@ -52,6 +52,11 @@
 #endif
 #include TRAVERSE
 
+// A traverse.glsl may define INTERSECTION_FLAGS, what the second word of an intersection is (shared/hit.h).
+#ifndef INTERSECTION_FLAGS
+#define INTERSECTION_FLAGS 0u
+#endif
+
 layout(binding = UNIT_RAYS) uniform samplerBuffer rays; // two texels each: software GL fetches those faster
 #ifdef HAS_MOTION
 layout(binding = UNIT_RAY_TIMES) uniform samplerBuffer ray_times;
@@ -143,7 +148,7 @@ void store_intersection(uint ray_index, candidate best)
         return;
     float distance_ = best.primitive == HIT_NO_PRIMITIVE ? -1.0 : best.distance;
     imageStore(intersections, int(3u * ray_index),
-               uvec4(floatBitsToUint(distance_), 0u, best.primitive, best.instance_index));
+               uvec4(floatBitsToUint(distance_), INTERSECTION_FLAGS, best.primitive, best.instance_index));
 }
 
 #endif

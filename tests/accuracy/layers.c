@@ -465,7 +465,7 @@ TEST(layers_that_there_are_not_or_no_pixel_holds_are_refused)
 {
     struct fixture *fixture = *state;
     fixture->request.layers = BIT(LAYER_COUNT);
-    expect_refused(fixture, "number 7");
+    expect_refused(fixture, "number 8");
     fixture->request.layers = BIT(LAYER_DEPTH);
     fixture->request.format = PIXEL_FORMAT_RGBA16F;
     expect_refused(fixture, "rgba32f");

@@ -33,7 +33,8 @@ TRACERS = [{"TRAVERSE": '"naive/traverse.glsl"', "TRACER_NAIVE": "1", "PACKET_RA
     for cubes, layers, packet, bits, levels in (
         ("1", "4", "1", "0", {"LDC_CELLS": "1"}), ("2", "4", "4", "0", {"LDC_CELLS": "1"}),
         ("2", "1", "4", "2", {}), ("1", "4", "1", "3", {"LDC_BLOCKS": "1"}))] + [
-    {"TRAVERSE": '"rayspace/traverse.glsl"', "TRACER_RAYSPACE": "1", "PACKET_RAYS": "1"}] + [
+    {"TRAVERSE": '"rayspace/traverse.glsl"', "TRACER_RAYSPACE": "1", "PACKET_RAYS": "1"},
+    {"TRAVERSE": '"quadtree/traverse.glsl"', "TRACER_QUADTREE": "1", "PACKET_RAYS": "1"}] + [
     {"TRAVERSE": '"abuffer/traverse.glsl"', "TRACER_ABUFFER": "1", "PACKET_RAYS": "1", **search}
     for search in ({}, {"ABUFFER_STEPS": "3"}, {"ABUFFER_STEPS": "1"})] + [
     {"TRAVERSE": f'"svo/{traversal}.glsl"', "TRACER_SVO": "1", "PACKET_RAYS": "1", **tree}
@@ -47,7 +48,7 @@ CHOICES = {
     "ldc/levels.comp": [[{"LDC_LEVEL_BITS": "2"}]],
     "ldc/cells.comp": [[{"CELLS_" + stage: "1"} for stage in
                         "LIST BLOCKS PLACE MARK COUNT FILL FURTHER SORT REACH_X REACH_Y REACH_Z".split()]],
-    "render/primary.vert": [[{"PRIMITIVE_KIND": kind, "HAS_SPHERES": "1"} for kind in "012"]],
+    "raster/view.vert": [[{"PRIMITIVE_KIND": kind, "HAS_SPHERES": "1"} for kind in "012"]],
     "ldc/build.frag": [[{"PRIMITIVE_KIND": "0"}, {"PRIMITIVE_KIND": "1", "HAS_SPHERES": "1"}],
                        [{"BUILD_PASS": number} for number in "012"]],
     "abuffer/build.frag": [[{"PRIMITIVE_KIND": "0", "ALL_IMAGES": "1"},
@@ -57,10 +58,10 @@ CHOICES = {
 # Defines that come only with others.
 WITH = {"BVH_DEFORMS_IN_SHUTTER": ("BVH_DEFORMS", "HAS_MOTION"), "BVH_RESUMES": ("BVH_BUDGET",)}
 # Defines that never come with others: tracers that know the scene as the shutter opens refuse rays with times.
-WITHOUT = {tracer: ("HAS_MOTION",) for tracer in ("TRACER_LDC", "TRACER_ABUFFER", "TRACER_SVO")}
+WITHOUT = {tracer: ("HAS_MOTION",) for tracer in ("TRACER_LDC", "TRACER_ABUFFER", "TRACER_QUADTREE", "TRACER_SVO")}
 # And in programs of a folder: what moves is met by tracers, and shaded where it was met.
 WITHOUT_IN = {"render": ("HAS_MOTION",)}
-STAGES = {"render/primary.vert": ["render/primary.vert", "render/primary.frag"],
+STAGES = {"raster/view.vert": ["raster/view.vert", "raster/view.frag"],
           "rayspace/reduce.vert": ["rayspace/reduce.vert", "rayspace/reduce.geom"],
           "ldc/build.frag": ["raster/draw.vert", "raster/draw.geom", "ldc/build.frag"],
           "abuffer/build.frag": ["raster/draw.vert", "raster/draw.geom", "abuffer/build.frag"],

@@ -8,6 +8,7 @@
 #define FARLIGHT_TESTS_TRACERS_CONTRACT_H
 
 #include "tests/tracers/naive_twin.h"
+#include "tests/tracers/seen.h"
 
 #include "tests/accuracy/motion_scenes.h"
 #include "tests/accuracy/test_scenes.h"
@@ -40,6 +41,18 @@ struct tracer_row {
         double wrong_max;    /* ... but for this share of the rays that pass no edge within BLUR_CELLS */
         const char *reason;
     } sampled;
+    /* A tracer that knows what a view sees, and marks what it guesses (HIT_UNKNOWN). 0 layers: it knows
+     * everything. Its answers are judged where it is to know them (seen.h), and it must say that it does. */
+    struct {
+        uint32_t layers, resolution; /* as its options say; of a face */
+        bool is_one_face;            /* what is beside it, and behind the eye, is not known */
+        double margin;               /* of one face: so much more it sees on each side, in halves of the view */
+        double blind; /* texels from a ray's origin within which it may take a hit for the origin's own surface */
+        double off;   /* of planes it hits: how far 1 / depth may be off, 1 / metres */
+        double wrong_max;    /* but for this share of the rays that pass no outline within a texel */
+        uint32_t judged_min; /* of RAY_COUNT rays through a scene; brute force says which are known */
+        const char *reason;
+    } seen;
     /* What it refuses with an error, and why; NULL: it does not. */
     const char *refuses_motion; /* while the shutter is open */
     const char *refuses_sizes;  /* scenes of extreme ones */
@@ -108,6 +121,11 @@ struct fixture {
     struct scene_motion motion;
     struct gpu_scene gpu;
     struct tracer *tracer;
+    struct trace_view view; /* of tracers that depend on one */
+    bool is_eye_set;        /* the view stays; else it is renewed with each update, in front of all there is */
+    struct twin twin;       /* what is seen, as of the last update; made when it is asked for */
+    struct seen_view seen_view;
+    struct seen *seen;
     struct stage_times times; /* of the last update */
     struct gpu_buffer rays, ray_times, answers;
     struct ray *host_rays;       /* RAY_COUNT */
@@ -124,6 +142,9 @@ void expect_ok(bool ok, const struct error *error);
 void fixture_init(struct fixture *fixture, const struct tracer_row *row, struct scene *scene);
 /* As above, with what moves while the shutter is open. */
 void fixture_init_moving(struct fixture *fixture, const struct tracer_row *row, const struct scene_row *scene);
+/* As the first, with an eye of the test's own for a tracer that depends on a view. */
+void fixture_init_seen_from(struct fixture *fixture, const struct tracer_row *row, struct scene *scene, float x,
+                            float y, float z);
 /* Nothing of it is left on the device. */
 void fixture_finish(struct fixture *fixture);
 
@@ -132,6 +153,8 @@ void fixture_commit(struct fixture *fixture, struct scene_changes *changes);
 /* That and the tracer. */
 bool fixture_try_update(struct fixture *fixture, struct error *error);
 void fixture_update(struct fixture *fixture);
+/* What an update of the tracer is told where that of the scene has changed, and the view with it. */
+struct tracer_update fixture_tracer_update(struct fixture *fixture, unsigned changed);
 /* The tracer alone, from nothing, in steps as short as can be; stops after `steps_max`. `steps`: those made; may
  * be NULL. */
 enum tracer_progress fixture_update_in_steps(struct fixture *fixture, uint32_t steps_max, uint32_t *steps,
@@ -151,6 +174,17 @@ void fixture_trace_rays(struct fixture *fixture, enum wave_kind kind, const stru
 
 /* Of a tracer that samples; 0: an exact one. */
 double fixture_cell_metres(const struct fixture *fixture);
+/* Of a texel of a view at the farthest corner of the scene; 0: of a tracer that knows all. */
+double fixture_texel_metres(const struct fixture *fixture);
+
+/* What of a ray is to be known, as of the last update. */
+struct seen_answer fixture_seen(struct fixture *fixture, const struct ray *ray);
+void what_a_view_sees_is_what_brute_force_counts(void **state); /* a test of its own */
+/* What the closest hit of a ray is worth whose true way ends after so far: at a surface, or its end. */
+enum knowledge { IS_JUDGED, IS_NOT_JUDGED, CLAIMS_TO_KNOW, KNOWS_TOO_LITTLE };
+enum knowledge seen_judges(const struct seen_answer *seen, const struct hit *hit, double until);
+/* Whether all that it passes until then is to be known, and no outline is within a texel. */
+bool seen_knows(const struct seen_answer *seen, double until);
 
 static inline struct ray ray_from(const float origin[3], const float direction[3], float t_min, float t_max)
 {
@@ -158,9 +192,11 @@ static inline struct ray ray_from(const float origin[3], const float direction[3
                         .direction_t_max = {direction[0], direction[1], direction[2], t_max}};
 }
 
-/* How far something is below a point at a height of 10, a little askew so that no ray lies on an edge between
- * cells; negative where nothing is. */
-float distance_below(struct fixture *fixture, float x, float y);
+/* Down from a point at a height of 10, a little askew so that no ray lies on an edge between cells. */
+static inline struct ray ray_down(float x, float y)
+{
+    return (struct ray){{x + 0.013f, y + 0.017f, 10, 0}, {0, 0, -1, 1e9f}};
+}
 
 /* A box of one unit round the origin; boxes of it, shown by node i + 1 at x = 2 i. */
 void add_box_mesh(struct test_edits *edits, uint32_t id);

@@ -5,10 +5,104 @@
 
 struct gpu_device *device;
 
+#define VIEW_PIXELS 256u
+#define VIEW_FOV (float)(TWIN_PI / 2)
+
 void expect_ok(bool ok, const struct error *error)
 {
     if (!ok)
         fail_msg("%s: %s", error->field, error->text);
+}
+
+/* ---- the view ---- */
+
+static void look_along_z_from(struct fixture *fixture, const float eye[3])
+{
+    fixture->view = (struct trace_view){.world_from_view = {1, 0, 0, eye[0], 0, 1, 0, eye[1], 0, 0, 1, eye[2]},
+                                        .fov_y = VIEW_FOV,
+                                        .width = VIEW_PIXELS,
+                                        .height = VIEW_PIXELS};
+}
+
+/* In front of all there is, a little askew, so that no edge of a face lies in a plane of the scene. */
+static void place_view(struct fixture *fixture)
+{
+    const float *low = fixture->gpu.lower_world, *high = fixture->gpu.upper_world;
+    static const float askew[3] = {0.031f, 0.043f, 1.3f};
+    float size = 0, eye[3];
+    if (fixture->is_eye_set)
+        return;
+    for (int k = 0; k < 3; k++)
+        size = fmaxf(size, high[k] - low[k]);
+    for (int k = 0; k < 3; k++)
+        eye[k] = 0.5f * (low[k] + high[k]) + askew[k] * (size > 0 ? size : 4);
+    look_along_z_from(fixture, eye);
+}
+
+/* The faces of a cube; or the first of them, which looks as the view does, with a margin on either side. */
+static void tell_view(struct fixture *fixture)
+{
+    const struct tracer_row *row = fixture->row;
+    double eye[3];
+    for (int k = 0; k < 3; k++)
+        eye[k] = (double)fixture->view.world_from_view[4 * k + 3];
+    fixture->seen_view = (struct seen_view){.layers = row->seen.layers, .blind = row->seen.blind};
+    seen_view_of_cube(&fixture->seen_view, eye, row->seen.resolution);
+    fixture->seen_view.is_bounded = true;
+    for (int k = 0; k < 3; k++) {
+        fixture->seen_view.lower[k] = (double)fixture->gpu.lower_world[k];
+        fixture->seen_view.upper[k] = (double)fixture->gpu.upper_world[k];
+    }
+    if (row->seen.is_one_face) {
+        fixture->seen_view.faces = 1;
+        fixture->seen_view.half += row->seen.margin; /* 1 is the view's own */
+    }
+}
+
+static void forget_seen(struct fixture *fixture)
+{
+    if (!fixture->seen)
+        return;
+    seen_destroy(fixture->seen);
+    twin_finish(&fixture->twin);
+    fixture->seen = NULL;
+}
+
+struct seen_answer fixture_seen(struct fixture *fixture, const struct ray *ray)
+{
+    struct seen_answer answer = {INFINITY, INFINITY, INFINITY, (double)ray->direction_t_max[3]};
+    if (fixture->row->seen.layers == 0)
+        return answer;
+    if (!fixture->seen) {
+        tell_view(fixture);
+        twin_init_moving(&fixture->twin, fixture->scene, fixture->motion.pose_count ? &fixture->motion : NULL);
+        fixture->seen = seen_create(&fixture->twin, &fixture->seen_view);
+    }
+    seen_trace(&answer, fixture->seen, ray);
+    return answer;
+}
+
+/* A float may take what is on a surface for what is behind it. */
+static double slack_of(double distance)
+{
+    return 1e-4 * (1 + fabs(distance));
+}
+
+enum knowledge seen_judges(const struct seen_answer *seen, const struct hit *hit, double until)
+{
+    const bool claims = !(hit->material & HIT_UNKNOWN);
+    /* Whatever it has met or missed before, it goes on where nothing is known. */
+    const double claimed = hit->distance < 0 ? seen->end : (double)hit->distance;
+    if (claims && seen->unknown < claimed - slack_of(claimed))
+        return CLAIMS_TO_KNOW;
+    if (!seen_knows(seen, until))
+        return IS_NOT_JUDGED;
+    return claims ? IS_JUDGED : KNOWS_TOO_LITTLE;
+}
+
+bool seen_knows(const struct seen_answer *seen, double until)
+{
+    return seen->maybe_unknown >= until - slack_of(until) && seen->edge > until + slack_of(until);
 }
 
 /* ---- the scene and its tracer ---- */
@@ -16,6 +110,7 @@ void expect_ok(bool ok, const struct error *error)
 void fixture_commit(struct fixture *fixture, struct scene_changes *changes)
 {
     struct error error = {0};
+    forget_seen(fixture);
     if (fixture->edits.count > 0)
         test_commit(&fixture->edits);
     const struct scene_motion *motion = fixture->motion.pose_count ? &fixture->motion : NULL;
@@ -26,13 +121,24 @@ void fixture_commit(struct fixture *fixture, struct scene_changes *changes)
                     fixture->materials, bytes);
 }
 
+struct tracer_update fixture_tracer_update(struct fixture *fixture, unsigned changed)
+{
+    const struct trace_view before = fixture->view;
+    place_view(fixture);
+    if (memcmp(&before, &fixture->view, sizeof(before)) != 0)
+        changed |= CHANGED_VIEW;
+    return (struct tracer_update){.changed = changed,
+                                  .view = fixture->tracer->impl->depends_on & CHANGED_VIEW ? &fixture->view : NULL,
+                                  .times = &fixture->times};
+}
+
 bool fixture_try_update(struct fixture *fixture, struct error *error)
 {
     struct scene_changes changes;
     fixture_commit(fixture, &changes);
+    const struct tracer_update update = fixture_tracer_update(fixture, changes.bits);
     stage_times_begin(&fixture->times);
-    return tracer_update(fixture->tracer, &fixture->gpu,
-                         &(struct tracer_update){.changed = changes.bits, .times = &fixture->times}, error);
+    return tracer_update(fixture->tracer, &fixture->gpu, &update, error);
 }
 
 void fixture_update(struct fixture *fixture)
@@ -45,7 +151,7 @@ enum tracer_progress fixture_update_in_steps(struct fixture *fixture, uint32_t s
                                              struct error *error)
 {
     /* The tracer is outdated, and takes everything as changed. */
-    const struct tracer_update update = {.times = &fixture->times};
+    const struct tracer_update update = fixture_tracer_update(fixture, 0);
     enum tracer_progress progress = TRACER_MORE;
     uint32_t made = 0;
     stage_times_begin(&fixture->times);
@@ -119,17 +225,27 @@ void fixture_init(struct fixture *fixture, const struct tracer_row *row, struct 
     init(fixture);
 }
 
+void fixture_init_seen_from(struct fixture *fixture, const struct tracer_row *row, struct scene *scene, float x,
+                            float y, float z)
+{
+    *fixture = (struct fixture){.row = row, .scene = scene, .is_eye_set = true};
+    look_along_z_from(fixture, (const float[3]){x, y, z});
+    init(fixture);
+}
+
 void fixture_init_moving(struct fixture *fixture, const struct tracer_row *row, const struct scene_row *scene)
 {
     *fixture = (struct fixture){.row = row, .scene = scene->create()};
     if (scene->pose_count > 0)
         scene->move(&fixture->motion, scene->pose_count);
     init(fixture);
+    fixture->is_eye_set = true; /* edits follow one another before the same eye */
 }
 
 void fixture_finish(struct fixture *fixture)
 {
     size_t objects[16] = {0};
+    forget_seen(fixture);
     gpu_buffer_finish(device, &fixture->rays);
     gpu_buffer_finish(device, &fixture->ray_times);
     gpu_buffer_finish(device, &fixture->answers);
@@ -154,6 +270,19 @@ double fixture_cell_metres(const struct fixture *fixture)
     for (int k = 0; k < 3; k++)
         longest = fmax(longest, (double)(fixture->gpu.upper_world[k] - fixture->gpu.lower_world[k]));
     return longest / (fixture->row->sampled.resolution - 2.0); /* a cell on either side is no part of the scene */
+}
+
+double fixture_texel_metres(const struct fixture *fixture)
+{
+    double squared = 0;
+    if (fixture->row->seen.layers == 0)
+        return 0;
+    for (int k = 0; k < 3; k++) {
+        const float eye = fixture->view.world_from_view[4 * k + 3];
+        const double away = (double)fmaxf(eye - fixture->gpu.lower_world[k], fixture->gpu.upper_world[k] - eye);
+        squared += away * away;
+    }
+    return sqrt(squared) * 2 / fixture->row->seen.resolution;
 }
 
 /* ---- waves ---- */
@@ -226,14 +355,6 @@ void fixture_trace_rays(struct fixture *fixture, enum wave_kind kind, const stru
     gpu_buffer_read(device, &fixture->answers, 0, answers, count * answer_bytes(kind));
     expect_ok(gpu_buffer_upload(device, &fixture->rays, fixture->host_rays, RAY_COUNT * sizeof(*rays), &error),
               &error);
-}
-
-float distance_below(struct fixture *fixture, float x, float y)
-{
-    struct hit hit;
-    const struct ray ray = {{x + 0.013f, y + 0.017f, 10, 0}, {0, 0, -1, 1e9f}};
-    fixture_trace_rays(fixture, WAVE_CLOSEST, &ray, 1, &hit);
-    return hit.distance;
 }
 
 /* ---- boxes ---- */

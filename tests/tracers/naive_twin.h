@@ -76,6 +76,7 @@ struct twin_answer {
     double close_distance;              /* of the nearest such test that a cell may decide */
     bool is_close;                      /* the surface in hand is such a test */
     bool is_opaque;                     /* some surface surely stops all light */
+    double opaque_distance;             /* of the first one; INFINITY: there is none */
     double surfaces[TWIN_SURFACES_MAX]; /* distances; with blur only */
     uint32_t surface_count;
 };
@@ -297,8 +298,11 @@ static inline void twin_add_intersection(struct twin_answer *answer, struct twin
         answer->surfaces[answer->surface_count++] = hit->distance;
     if (intersection->cut_out)
         return;
-    answer->is_opaque |= !answer->is_close && intersection->transmittance[0] == 0 &&
-                         intersection->transmittance[1] == 0 && intersection->transmittance[2] == 0;
+    if (!answer->is_close && intersection->transmittance[0] == 0 && intersection->transmittance[1] == 0 &&
+        intersection->transmittance[2] == 0) {
+        answer->is_opaque = true;
+        answer->opaque_distance = fmin(answer->opaque_distance, hit->distance);
+    }
     hit->back_face = twin_dot(answer->direction, hit->normal_geometric) > 0;
     if (answer->closest.distance < 0 || hit->distance < answer->closest.distance) {
         if (answer->closest.distance >= 0)
@@ -526,6 +530,7 @@ static inline void twin_trace_at(struct twin_answer *answer, const struct twin *
                                    .closest = {.distance = -1},
                                    .second_distance = INFINITY,
                                    .close_distance = INFINITY,
+                                   .opaque_distance = INFINITY,
                                    .transmittance = {1, 1, 1}};
     for (int k = 0; k < 3; k++) {
         answer->origin[k] = ray->origin_t_min[k];

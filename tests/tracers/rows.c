@@ -6,6 +6,11 @@
  * ray may pass between their samples. */
 #define BORDERS "planes of samples overlap or leave gaps where images meet"
 
+/* Layers are ordered by what is at a texel's centre; where surfaces cross, the order turns round within the texel.
+ */
+#define CROSSINGS "where surfaces cross, a texel has them in one order"
+#define SEEN_STILL "it holds what is seen as the shutter opens"
+
 #define STILL "it holds samples of the scene as the shutter opens"
 
 static const struct tracer_row rows[] = {
@@ -67,5 +72,30 @@ static const struct tracer_row rows[] = {
              .rayspace.reduce = RAYSPACE_REDUCE_SEGMENTS),
     RAYSPACE(" with little room, in two rounds, reduced by a geometry shader", .bench.rayspace_pairs = 512,
              .rayspace.rounds = 2, .rayspace.reduce = RAYSPACE_REDUCE_GEOMETRY),
+/* 256 texels along a face: those of a scene 3 metres before the eye are 2 cm wide. A plane may be off by 1/4 pixel
+ * for an eye 100 metres aside, which is 1/4 / (128 * 100) of 1 / depth: less than 1 mm at 3 metres. */
+#define QUADTREE(form, ...)                                                                                       \
+    {                                                                                                             \
+        .name = "quadtree" form, .number = 6, .is_form = sizeof(form) > 1, .refuses_motion = SEEN_STILL,          \
+        __VA_ARGS__                                                                                               \
+    }
+#define QUADTREE_OPTIONS(...) QUADTREE_BOUND(0.25f, 100, __VA_ARGS__)
+#define QUADTREE_BOUND(e, r, ...) .options.quadtree = {.resolution = 256, .pixels = e, .radius = r, __VA_ARGS__}
+#define QUADTREE_SEEN(judged, ...)                                                                                \
+    .seen = {.resolution = 256, .wrong_max = 0.005, .judged_min = judged, .reason = CROSSINGS, __VA_ARGS__}
+    QUADTREE("", QUADTREE_OPTIONS(.layers = 3), QUADTREE_SEEN(200, .layers = 3)),
+    QUADTREE(", of one layer", QUADTREE_OPTIONS(.layers = 1), QUADTREE_SEEN(60, .layers = 1)),
+    /* The same planes, for eyes nearby: what lies before the view is taken to be empty where a ray begins there.
+     */
+    QUADTREE(", of the view", QUADTREE_BOUND(0.001f, 0.4f, .layers = 3, .faces = QUADTREE_FACES_VIEW),
+             QUADTREE_SEEN(60, .layers = 3, .is_one_face = true, .margin = 2 * 26 / 256.0)),
+    /* A plane that a ray meets within 1.5 texels across and down may be that of its own surface, gone on beyond
+       it. */
+    QUADTREE(", planes", QUADTREE_OPTIONS(.layers = 3, .hits = QUADTREE_HITS_PLANE),
+             QUADTREE_SEEN(200, .layers = 3, .off = 0.25 / (128 * 100.0), .blind = 2.2)),
+    QUADTREE(", of boxes", QUADTREE_OPTIONS(.layers = 3, .nodes = QUADTREE_NODES_MINMAX),
+             QUADTREE_SEEN(200, .layers = 3)),
+    QUADTREE(", texel by texel", QUADTREE_OPTIONS(.layers = 3, .walk = QUADTREE_WALK_DDA),
+             QUADTREE_SEEN(200, .layers = 3)),
 };
 TRACER_ROWS(rows)

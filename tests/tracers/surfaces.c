@@ -112,22 +112,51 @@ static struct scene *scene_of(struct mesh_builder *built, bool closed, bool is_g
     return edits.scene;
 }
 
-/* Of a tracer that samples, a few rays in a thousand may meet a gap where images meet. */
+/* Of a tracer that samples, a few rays in a thousand may meet a gap where images or texels meet. */
 static uint32_t wrong_max(const struct fixture *fixture)
 {
-    return fixture->row->sampled.resolution ? RAY_COUNT / 500 : 0;
+    return fixture->row->sampled.resolution || fixture->row->seen.layers ? RAY_COUNT / 500 : 0;
 }
 
 struct answered {
     struct ray rays[RAY_COUNT];
     struct hit hits[RAY_COUNT];
     uint32_t visibilities[RAY_COUNT];
+    struct seen_answer seen[RAY_COUNT];
+    uint32_t judged, strange; /* of a tracer that knows what a view sees */
 };
 
 static void answer(struct fixture *fixture, struct answered *a)
 {
     fixture_trace_rays(fixture, WAVE_CLOSEST, a->rays, RAY_COUNT, a->hits);
     fixture_trace_rays(fixture, WAVE_ANY, a->rays, RAY_COUNT, a->visibilities);
+    for (uint32_t i = 0; i < RAY_COUNT; i++)
+        a->seen[i] = fixture_seen(fixture, &a->rays[i]);
+    a->judged = a->strange = 0;
+}
+
+/* Whether all is to be known that a ray passes until it has gone so far. Then the tracer must say that it knows
+ * it. */
+static bool is_judged(const struct fixture *fixture, struct answered *a, uint32_t ray, double until)
+{
+    if (fixture->row->seen.layers == 0)
+        return true;
+    const enum knowledge knowledge = seen_judges(&a->seen[ray], &a->hits[ray], until);
+    a->strange += knowledge == CLAIMS_TO_KNOW || knowledge == KNOWS_TOO_LITTLE;
+    if (a->strange > wrong_max(fixture))
+        fail_msg(
+            "ray %u: after %u others it is not known what is seen, or known what is not: %g along, hidden from %g "
+            "on, perhaps from %g",
+            ray, a->strange - 1, until, a->seen[ray].unknown, a->seen[ray].maybe_unknown);
+    a->judged += knowledge == IS_JUDGED;
+    return knowledge == IS_JUDGED;
+}
+
+/* All round an eye, no more than two surfaces hide what these checks ask for. */
+static void expect_judged(const struct fixture *fixture, const struct answered *a, uint32_t minimum)
+{
+    if (fixture->row->seen.layers == 3 && !fixture->row->seen.is_one_face && fixture->row->seen.blind == 0)
+        assert_in_range(a->judged, minimum, RAY_COUNT);
 }
 
 /* ---- balls ---- */
@@ -161,6 +190,12 @@ static struct scene *scene_of_ball(enum ball ball, bool is_glass)
     test_node(&edits, 1, 0, NODE_SPHERES, 20, NULL);
     test_commit(&edits);
     return edits.scene;
+}
+
+/* With the eye within, beside the middle. */
+static void init_in_ball(struct fixture *fixture, const struct tracer_row *row, struct scene *scene)
+{
+    fixture_init_seen_from(fixture, row, scene, ball_centre[0] + 7, ball_centre[1] - 5, ball_centre[2] + 11);
 }
 
 /* As integrators move origins off surfaces: by 2^-16 of the coordinates, here of the size of the scene. */
@@ -202,7 +237,8 @@ static void expect_ball_left(struct fixture *fixture, struct answered *a, bool i
     answer(fixture, a);
     for (uint32_t i = 0; i < RAY_COUNT; i++) {
         double length, chord = chord_of(&a->rays[i], &length);
-        if (inwards && chord * length <= 4) /* a chord of a few cells says nothing */
+        if ((inwards && chord * length <= 4) || /* a chord of a few cells says nothing */
+            !is_judged(fixture, a, i, inwards ? chord : (double)FAR))
             continue;
         const bool is_left =
             inwards ? fabs((double)a->hits[i].distance - chord) * length < 0.5 : a->hits[i].distance < 0;
@@ -220,7 +256,7 @@ CHECK(a_ray_does_not_hit_the_ball_that_it_leaves, CHECK_FORMS)
     struct answered *a = malloc(sizeof(*a));
     for (enum ball ball = first_ball(of->tracer); ball < BALL_COUNT; ball++) {
         struct fixture fixture;
-        fixture_init(&fixture, of->tracer, scene_of_ball(ball, false));
+        init_in_ball(&fixture, of->tracer, scene_of_ball(ball, false));
         expect_ball_left(&fixture, a, false, 3); /* steep; any; almost along the surface */
         expect_ball_left(&fixture, a, false, 1);
         expect_ball_left(&fixture, a, false, 0.02);
@@ -241,7 +277,7 @@ CHECK(rays_from_afar_meet_what_is_small, CHECK_FORMS)
     struct fixture fixture;
     uint64_t seed = 41;
     uint32_t wrong = 0;
-    fixture_init(&fixture, of->tracer,
+    init_in_ball(&fixture, of->tracer,
                  scene_of_ball(of->tracer->sampled.resolution ? BALL_CLOSED : BALL_SPHERE, false));
     for (uint32_t i = 0; i < RAY_COUNT; i++) {
         float o[3], d[3], length = 0;
@@ -257,7 +293,9 @@ CHECK(rays_from_afar_meet_what_is_small, CHECK_FORMS)
     }
     answer(&fixture, a);
     for (uint32_t i = 0; i < RAY_COUNT; i++) {
-        double from_centre = 0, along = 0;
+        double from_centre = 0, along = 0, length;
+        if (!is_judged(&fixture, a, i, chord_of(&a->rays[i], &length) - 2 * BALL_RADIUS / length))
+            continue;
         for (int k = 0; k < 3; k++) {
             const double off = (double)a->rays[i].origin_t_min[k] +
                                (double)a->hits[i].distance * (double)a->rays[i].direction_t_max[k] -
@@ -296,7 +334,7 @@ CHECK(what_stands_on_a_floor_is_met_from_a_cell_on, CHECK_FORMS)
         else
             add_quad(&mesh, floor_);
         add_box_between(&mesh, (const float[3]){wall, low, 80.2f}, (const float[3]){182.7f, 120.2f, 160.3f});
-        fixture_init(&fixture, of->tracer, scene_of(&mesh, closed, false));
+        fixture_init_seen_from(&fixture, of->tracer, scene_of(&mesh, closed, false), 70, 80, 260);
         for (uint32_t i = 0; i < RAY_COUNT; i++) {
             const float away = i % 2 ? test_uniform(&seed, 1, 4) : test_uniform(&seed, 4, 110);
             const float o[3] = {wall - away, low + CELLS / 65536, test_uniform(&seed, 96, 144)};
@@ -307,12 +345,14 @@ CHECK(what_stands_on_a_floor_is_met_from_a_cell_on, CHECK_FORMS)
         answer(&fixture, a);
         for (uint32_t i = 0; i < RAY_COUNT; i++) {
             const float way = wall - a->rays[i].origin_t_min[0];
-            if (way * a->rays[i].direction_t_max[1] > 78) /* above the box, or at its edge */
+            if (way * a->rays[i].direction_t_max[1] > 78 || /* above the box, or at its edge */
+                !is_judged(&fixture, a, i, (double)way))
                 continue;
             wrong += !(fabsf(a->hits[i].distance - way) < 0.01f + 1e-3f * way) || a->visibilities[i] != 0;
         }
-        if (wrong > 0)
+        if (wrong > (of->tracer->seen.layers ? wrong_max(&fixture) : 0))
             fail_msg("closed %d: %u rays are wrong", closed, wrong);
+        expect_judged(&fixture, a, RAY_COUNT / 2);
         fixture_finish(&fixture);
     }
     free(a);
@@ -341,7 +381,7 @@ CHECK(a_wall_beside_the_origin_is_not_passed, CHECK_FORMS)
             add_quad(&mesh, floor_);
             add_quad(&mesh, side);
         }
-        fixture_init(&fixture, of->tracer, scene_of(&mesh, closed, false));
+        fixture_init_seen_from(&fixture, of->tracer, scene_of(&mesh, closed, false), 130, 90, 260);
         for (uint32_t i = 0; i < RAY_COUNT; i++) {
             const float o[3] = {wall + test_uniform(&seed, 0.25f, 1), low + CELLS / 65536,
                                 test_uniform(&seed, 40, 200)};
@@ -351,13 +391,17 @@ CHECK(a_wall_beside_the_origin_is_not_passed, CHECK_FORMS)
         answer(&fixture, a);
         for (uint32_t i = 0; i < RAY_COUNT; i++) {
             const float away = a->rays[i].origin_t_min[0] - wall, above = away * a->rays[i].direction_t_max[1];
+            if (!is_judged(&fixture, a, i, (double)away))
+                continue;
             /* Below, the wall may have no sample: it begins within the cell. */
             const bool is_known = above > 1 || !of->tracer->sampled.resolution;
             wrong += is_known && !(fabsf(a->hits[i].distance - away) < 0.01f);
             open += (is_known || closed) && a->visibilities[i] != 0;
         }
-        if (wrong > 0 || open > 0)
+        const uint32_t allowed = of->tracer->seen.layers ? wrong_max(&fixture) : 0;
+        if (wrong > allowed || open > allowed)
             fail_msg("closed %d: %u closest hits are wrong, %u rays pass the wall", closed, wrong, open);
+        expect_judged(&fixture, a, RAY_COUNT / 4); /* many meet it within a texel of its foot */
         fixture_finish(&fixture);
     }
     free(a);
@@ -367,11 +411,18 @@ CHECK(a_wall_beside_the_origin_is_not_passed, CHECK_FORMS)
 
 static void expect_tints(struct fixture *fixture, struct answered *a, int surfaces, uint32_t allowed)
 {
-    uint32_t wrong = 0;
+    uint32_t wrong = 0, judged = 0;
     assert_true(fixture->gpu.has_transmission);
     fixture_trace_rays(fixture, WAVE_ANY, a->rays, RAY_COUNT, a->visibilities);
-    for (uint32_t i = 0; i < RAY_COUNT; i++)
+    for (uint32_t i = 0; i < RAY_COUNT; i++) {
+        const struct seen_answer seen = fixture_seen(fixture, &a->rays[i]);
+        if (!seen_knows(&seen, (double)FAR))
+            continue;
         wrong += !is_tint(a->visibilities[i], surfaces);
+        judged++;
+    }
+    a->judged = judged;
+    expect_judged(fixture, a, RAY_COUNT / 2);
     if (wrong > allowed)
         fail_msg("%u rays are not tinted %d times", wrong, surfaces);
 }
@@ -390,13 +441,13 @@ CHECK(a_pane_of_glass_tints_once, CHECK_FORMS)
             {x - lean, 0, 0}, {x - lean, 0, CELLS}, {x + lean, CELLS, CELLS}, {x + lean, CELLS, 0}};
         add_quad(&mesh, p);
     }
-    fixture_init(&fixture, of->tracer, scene_of(&mesh, false, true));
+    fixture_init_seen_from(&fixture, of->tracer, scene_of(&mesh, false, true), 130, 127, 120);
     for (uint32_t i = 0; i < RAY_COUNT; i++) {
         const float o[3] = {2, test_uniform(&seed, 80, 160), test_uniform(&seed, 80, 160)};
         a->rays[i] = ray_from(
             o, (const float[3]){1, test_uniform(&seed, -0.3f, 0.3f), test_uniform(&seed, -0.3f, 0.3f)}, 0, FAR);
     }
-    expect_tints(&fixture, a, 3, 0);
+    expect_tints(&fixture, a, 3, of->tracer->seen.layers ? wrong_max(&fixture) : 0);
     fixture_finish(&fixture);
     free(a);
 }
@@ -409,7 +460,7 @@ CHECK(a_ball_of_glass_tints_twice, CHECK_FORMS)
     for (enum ball ball = first_ball(of->tracer); ball < BALL_COUNT; ball++) {
         struct fixture fixture;
         uint64_t seed = 95;
-        fixture_init(&fixture, of->tracer, scene_of_ball(ball, true));
+        init_in_ball(&fixture, of->tracer, scene_of_ball(ball, true));
         for (uint32_t i = 0; i < RAY_COUNT; i++) {
             float o[3], d[3], squared = 0;
             for (int k = 0; k < 3; k++) {
@@ -422,7 +473,8 @@ CHECK(a_ball_of_glass_tints_twice, CHECK_FORMS)
             }
             a->rays[i] = ray_from(o, d, 0, FAR);
         }
-        expect_tints(&fixture, a, 2, of->tracer->sampled.resolution ? RAY_COUNT / 200 : 0);
+        expect_tints(&fixture, a, 2,
+                     of->tracer->sampled.resolution || of->tracer->seen.layers ? RAY_COUNT / 200 : 0);
         fixture_finish(&fixture);
     }
     free(a);

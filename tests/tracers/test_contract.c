@@ -44,6 +44,8 @@ static void every_tracer_has_a_row_that_says_what_it_is(void **state)
         assert_string_equal(row->name, impl->name);
         assert_int_equal(row->refuses_motion != NULL, impl->still);
         assert_int_equal(row->sampled.reason != NULL, row->sampled.resolution > 0);
+        assert_int_equal(row->seen.layers > 0, (impl->depends_on & CHANGED_VIEW) != 0);
+        assert_int_equal(row->seen.reason != NULL, row->seen.layers > 0);
     }
 }
 
@@ -113,6 +115,8 @@ int main(int argc, char **argv)
         return list_rows();
     add_test("the table", "every tracer has a row that says what it is", NULL,
              every_tracer_has_a_row_that_says_what_it_is, (struct contract_case){0});
+    add_test("the table", "what a view sees is what brute force counts", NULL,
+             what_a_view_sees_is_what_brute_force_counts, (struct contract_case){0});
     for (size_t r = 0; r < row_count; r++)
         add_tests_of(rows[r]);
     if (argc > 1) {

@@ -103,6 +103,12 @@ CHECK(dead_rays_and_directions_that_are_none_hit_nothing, CHECK_FORMS)
     fixture_trace_rays(&fixture, WAVE_CLOSEST, rays, count, hits);
     fixture_trace_rays(&fixture, WAVE_ANY, rays, count, visibilities);
     for (uint32_t i = 0; i < known; i++) {
+        if (hits[i].material & HIT_UNKNOWN) { /* a view may not see there */
+            const struct seen_answer seen = fixture_seen(&fixture, &rays[i]);
+            if (seen_knows(&seen, i < living ? (double)rays[i].direction_t_max[3] : 0.4))
+                fail_msg("ray %u: it is not known", i);
+            continue;
+        }
         if ((hits[i].distance < 0) != (i < living))
             fail_msg("ray %u: distance %g", i, (double)hits[i].distance);
         if (visibilities[i] != (i < living ? 0xffffffffu : 0))

@@ -269,7 +269,7 @@ TEST(layers_become_channels_by_name)
         {(1u << PROTOCOL_LAYER_COUNT) - 1, true,
          "A:1 B:1 G:1 R:1 Z:2 albedo.B:1 albedo.G:1 albedo.R:1 ao.Y:1 id.material:0 id.node:0 normal.X:1 "
          "normal.Y:1 "
-         "normal.Z:1 position.X:2 position.Y:2 position.Z:2"},
+         "normal.Z:1 position.X:2 position.Y:2 position.Z:2 unknown.Y:1"},
     };
     if (!find_exporter()) {
         print_message("skipped: farlight-export is not built\n");

@@ -162,6 +162,75 @@ TEST(a_camera_at_a_node_moves_with_it)
     scene_destroy(scene);
 }
 
+/* ---- frames between those that are rendered ------------------------------------------------------ */
+
+TEST(the_key_of_a_frame_is_the_nearest_one_and_of_two_the_earlier)
+{
+    const struct {
+        uint32_t upsample, origin, frame, key;
+    } cases[] = {{0, 0, 7, 7}, {1, 0, 7, 7},    {4, 0, 0, 0},   {4, 0, 1, 0},  {4, 0, 2, 0},
+                 {4, 0, 3, 4}, {4, 0, 4, 4},    {4, 1, 4, 5},   {4, 1, 3, 1},  {3, 0, 1, 0},
+                 {3, 0, 2, 3}, {2, 0, 5, 4},    {4, 10, 9, 10}, {4, 10, 8, 6}, {4, 10, 0, 2},
+                 {4, 3, 0, 3}, {64, 0, 33, 64}, {64, 0, 32, 0}, {4, 7, 11, 11}};
+    struct engine_job job = job_of(CAMERA_KEYS, NULL, 0);
+    for (size_t i = 0; i < sizeof(cases) / sizeof(cases[0]); i++) {
+        job.upsample = cases[i].upsample;
+        job.time_origin_frame = cases[i].origin;
+        assert_int_equal(shot_key_frame(&job, cases[i].frame), cases[i].key);
+        job.first_frame = cases[i].frame; /* a range that begins there has the same key */
+        assert_int_equal(shot_key_frame(&job, cases[i].frame), cases[i].key);
+        job.first_frame = 0;
+    }
+}
+
+TEST(a_frame_that_is_made_from_its_key_has_a_camera_of_its_own_and_the_rest_of_the_key)
+{
+    struct scene *scene = turning_scene(90);
+    struct clip_use use = {.clip = 1, .speed = 1};
+    struct engine_job job = job_of(CAMERA_NODE, &use, 1);
+    job.frames_per_second = 1000;
+    job.frame.view_source = VIEW_SOURCE_LAYERS;
+    struct shot key = shot_at(&job, scene, 4), own = shot_at(&job, scene, 6);
+    assert_false(own.request.has_key);
+    job.upsample = 4;
+    struct shot made = shot_at(&job, scene, 6), rendered = shot_at(&job, scene, 4);
+    assert_true(made.request.has_key && made.request.view_source == VIEW_SOURCE_LAYERS);
+    assert_memory_equal(made.request.camera.world_from_view, own.request.camera.world_from_view, 48);
+    assert_memory_equal(made.request.key_camera.world_from_view, key.request.camera.world_from_view, 48);
+    assert_true(made.request.camera.world_from_view[3] > made.request.key_camera.world_from_view[3]);
+    assert_true(made.time_s == own.time_s && made.request.seed == key.request.seed);
+    assert_memory_equal(made.motion.poses[0].nodes[0].parent_from_node,
+                        key.motion.poses[0].nodes[0].parent_from_node, 48);
+    /* The key itself is rendered like any frame. */
+    assert_true(!rendered.request.has_key && rendered.request.view_source == VIEW_SOURCE_RAYS);
+    assert_memory_equal(rendered.request.camera.world_from_view, key.request.camera.world_from_view, 48);
+    shot_finish(&key);
+    shot_finish(&own);
+    shot_finish(&made);
+    shot_finish(&rendered);
+    scene_destroy(scene);
+}
+
+TEST(layers_are_asked_for_where_a_picture_needs_them)
+{
+    struct scene *scene = turning_scene(90);
+    struct engine_job job = job_of(CAMERA_KEYS, NULL, 0);
+    job.frame.view_source = VIEW_SOURCE_LAYERS;
+    struct shot shot = shot_at(&job, scene, 0);
+    assert_int_equal(shot.request.view_source, VIEW_SOURCE_RAYS);
+    shot_finish(&shot);
+    job.frame.aperture = 0.1f;
+    shot = shot_at(&job, scene, 0);
+    assert_int_equal(shot.request.view_source, VIEW_SOURCE_LAYERS);
+    shot_finish(&shot);
+    job.frame.aperture = 0;
+    job.frame.views_across = 2;
+    shot = shot_at(&job, scene, 0);
+    assert_int_equal(shot.request.view_source, VIEW_SOURCE_LAYERS);
+    shot_finish(&shot);
+    scene_destroy(scene);
+}
+
 TEST(clips_move_the_view_of_a_camera_with_keys)
 {
     struct scene *scene = turning_scene(90);

@@ -42,7 +42,7 @@ static const struct gpu_program_source sources[] = {
     {.compute = "trace/wave.comp", .defines = naive},
     {.compute = "render/hit_count.comp"},
     {.compute = "render/gather.comp"},
-    {.vertex = "render/primary.vert", .fragment = "render/primary.frag"},
+    {.vertex = "raster/view.vert", .fragment = "raster/view.frag"},
 };
 #define COUNT (sizeof(sources) / sizeof(sources[0]))
 

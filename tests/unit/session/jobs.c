@@ -277,6 +277,90 @@ SESSION_TEST(layers_that_pixels_or_messages_do_not_hold_are_refused)
     }
 }
 
+/* Of a render: the fields of several views, and of pictures that are made of layers. */
+struct views_case {
+    uint32_t across, down, eyes_over, upsample, accumulate, compare, width;
+    float baseline, shutter;
+    enum protocol_view_source source;
+    enum protocol_job_kind kind;
+    const char *field, *remedy;
+    enum protocol_error_code code;
+};
+
+static struct message views_message(const struct views_case *given)
+{
+    struct message message = render_message(0, 1);
+    struct message_render *render = &message.render;
+    render->views_across = given->across ? given->across : 1;
+    render->views_down = given->down ? given->down : 1;
+    render->eyes_over = given->eyes_over;
+    render->upsample = given->upsample ? given->upsample : 1;
+    render->accumulate = given->accumulate;
+    render->compare = given->compare;
+    render->width = given->width ? given->width : render->width;
+    render->baseline = given->baseline;
+    render->shutter = given->shutter;
+    render->view_source = given->source;
+    render->kind = given->kind;
+    return message;
+}
+
+SESSION_TEST(views_that_cannot_be_are_refused_by_their_field)
+{
+    static const struct views_case cases[] = {
+        {.across = 2, .field = "render.baseline", .remedy = "distance", .code = PROTOCOL_ERROR_INVALID},
+        {.down = 2, .field = "render.baseline", .remedy = "distance", .code = PROTOCOL_ERROR_INVALID},
+        {.across = 2,
+         .down = 2,
+         .eyes_over = 1,
+         .baseline = 1,
+         .field = "render.eyes_over",
+         .remedy = "views_across to 1",
+         .code = PROTOCOL_ERROR_INVALID},
+        {.eyes_over = 1, .field = "render.eyes_over", .remedy = "views_down to 2", .code = PROTOCOL_ERROR_INVALID},
+        {.across = 3,
+         .width = 4096,
+         .baseline = 1,
+         .field = "render.views_across",
+         .remedy = "smaller views",
+         .code = PROTOCOL_ERROR_LIMIT},
+        {.upsample = 4,
+         .field = "render.upsample",
+         .remedy = "view_source to layers",
+         .code = PROTOCOL_ERROR_INVALID},
+        {.upsample = 4,
+         .source = PROTOCOL_VIEW_SOURCE_LAYERS,
+         .kind = PROTOCOL_JOB_VIEW,
+         .field = "render.upsample",
+         .remedy = "set it to 1",
+         .code = PROTOCOL_ERROR_UNSUPPORTED},
+        {.upsample = 4,
+         .source = PROTOCOL_VIEW_SOURCE_LAYERS,
+         .accumulate = 1,
+         .field = "render.upsample",
+         .remedy = "accumulate to 0",
+         .code = PROTOCOL_ERROR_UNSUPPORTED},
+        {.source = PROTOCOL_VIEW_SOURCE_LAYERS,
+         .compare = 1,
+         .field = "render.compare",
+         .remedy = "view_source to rays",
+         .code = PROTOCOL_ERROR_UNSUPPORTED},
+        {.source = PROTOCOL_VIEW_SOURCE_LAYERS,
+         .shutter = 0.5f,
+         .field = "render.shutter",
+         .remedy = "view_source to rays",
+         .code = PROTOCOL_ERROR_UNSUPPORTED},
+    };
+    open_scene(1, 1);
+    for (uint32_t i = 0; i < sizeof(cases) / sizeof(cases[0]); i++) {
+        const struct message message = views_message(&cases[i]);
+        send_message(2 + i, 0, &message);
+        expect_error(2 + i, cases[i].code);
+        assert_string_equal(client.message.error.field, cases[i].field);
+        assert_non_null(strstr(client.message.error.remedy, cases[i].remedy));
+    }
+}
+
 SESSION_TEST(settings_that_no_cube_has_are_refused_by_their_field)
 {
     static const struct {

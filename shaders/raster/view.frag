@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-// Which primitive a pixel sees: its instance + 1 and its scene-wide number. PRIMITIVE_KIND as in primary.vert;
-// HAS_CUTOUT: it may have holes.
+// Which primitive a pixel sees: its instance + 1 and its scene-wide number. PRIMITIVE_KIND as in view.vert;
+// HAS_CUTOUT: it may have holes; HAS_LAYERS: what lies behind the layer before, if there is one.
 
 #include "shared/path.h"
 #include "common/camera.glsl"
-#include "render/primary_hit.glsl"
+#include "common/primary_hit.glsl"
 
 uniform uint instance_index;
 uniform uint first_primitive;
@@ -12,6 +12,22 @@ uniform uint first_row; // of the strip that is drawn, in the picture
 uniform uint layer;     // the sample that is drawn, of the current ones
 
 layout(location = 0) out uvec2 visible;
+
+#ifdef HAS_LAYERS
+// One program draws all layers, so that a surface compares equal to itself in the next one.
+layout(binding = UNIT_TRACER_2) uniform sampler2D depths_before;
+uniform uint has_before;
+#endif
+
+// Whether the layer before does not show it, nor anything behind it. Depth is reversed.
+bool is_behind(float depth)
+{
+#ifdef HAS_LAYERS
+    return has_before == 0u || depth < texelFetch(depths_before, ivec2(gl_FragCoord.xy), 0).x;
+#else
+    return true;
+#endif
+}
 
 #if PRIMITIVE_KIND == 1
 // As clip_from_world_point() computes it.
@@ -32,6 +48,10 @@ void main()
     camera_ray_through(vec2(uvec2(gl_FragCoord.xy) + uvec2(0u, first_row)) + sample_place(layer), origin, direction, t_min);
 #if PRIMITIVE_KIND == 0
     uint primitive = first_primitive + uint(gl_PrimitiveID);
+#ifdef HAS_LAYERS
+    if (!is_behind(gl_FragCoord.z))
+        discard;
+#endif
 #ifdef HAS_CUTOUT
     if (is_cut_out(candidate_triangle(instance_index, primitive, origin, direction, 0.0), origin, direction,
                    0.0))
@@ -41,12 +61,23 @@ void main()
 #elif PRIMITIVE_KIND == 1
     uint primitive = first_primitive + uint(gl_PrimitiveID) / 12u;
     candidate found = candidate_sphere(instance_index, primitive, origin, direction, t_min);
-    if (found.distance < 0.0)
+    float depth = depth_of(found.distance, direction);
+#ifdef HAS_LAYERS
+    if (found.distance >= 0.0 && !is_behind(depth)) { // the sphere's far side is a surface of its own
+        found = candidate_sphere(instance_index, primitive, origin, direction, found.distance);
+        depth = depth_of(found.distance, direction);
+    }
+#endif
+    if (found.distance < 0.0 || !is_behind(depth))
         discard;
-    gl_FragDepth = depth_of(found.distance, direction);
+    gl_FragDepth = depth;
     visible = uvec2(instance_index + 1u, primitive);
 #else
     uint primitive = first_primitive + uint(gl_PrimitiveID) / 2u;
+#ifdef HAS_LAYERS
+    if (!is_behind(gl_FragCoord.z))
+        discard;
+#endif
     candidate found = candidate_disc(primitive, origin, direction);
     vec3 from_centre = origin + found.distance * direction - disc_at(primitive).centre_radius.xyz;
     float radius = disc_at(primitive).centre_radius.w;

@@ -1,0 +1,68 @@
+/* SPDX-License-Identifier: MIT */
+/* A part of a frame as a frame of its own, such as one of several views. */
+#include "lib/farlight.h"
+
+#include "protocol/messages.h"
+
+#include <stdlib.h>
+#include <string.h>
+#include <xxhash.h>
+
+/* Rows of all layers, of `pixel_bytes` each. */
+static void copy_rows(uint8_t *to, const struct fl_frame *frame, const struct fl_frame_part *part,
+                      size_t pixel_bytes)
+{
+    const size_t row_bytes = part->width * pixel_bytes;
+    const size_t layers = frame->layers ? (size_t)__builtin_popcount(frame->layers) : 1;
+    for (size_t layer = 0; layer < layers; layer++) {
+        for (size_t y = 0; y < part->height; y++, to += row_bytes) {
+            const size_t row = layer * frame->height + part->y + y;
+            memcpy(to, frame->pixels + (row * frame->width + part->x) * pixel_bytes, row_bytes);
+        }
+    }
+}
+
+struct fl_frame *fl_frame_cut(const struct fl_frame *frame, const struct fl_frame_part *part,
+                              struct fl_error *error)
+{
+    if (!frame->pixels || !part->width || !part->height || part->width > frame->width ||
+        part->height > frame->height || part->x > frame->width - part->width ||
+        part->y > frame->height - part->height) {
+        fl_error_set(error, FL_ERROR_ARGUMENT, "", "the frame has no such part");
+        return NULL;
+    }
+    const size_t pixel_bytes = protocol_pixel_format_bytes(frame->format);
+    const size_t layers = frame->layers ? (size_t)__builtin_popcount(frame->layers) : 1;
+    const size_t bytes = layers * part->width * part->height * pixel_bytes;
+    struct fl_frame *cut = malloc(sizeof(*cut));
+    uint8_t *pixels = malloc(bytes);
+    if (!cut || !pixels) {
+        free(cut);
+        free(pixels);
+        fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
+        return NULL;
+    }
+    copy_rows(pixels, frame, part, pixel_bytes);
+    *cut = *frame;
+    cut->width = part->width;
+    cut->height = part->height;
+    cut->pixels = pixels;
+    cut->pixels_bytes = bytes;
+    cut->digest = XXH3_64bits(pixels, bytes);
+    /* What belongs to the whole frame stays with it. */
+    cut->stages = NULL;
+    cut->stage_count = 0;
+    cut->wave_comparisons = NULL;
+    cut->wave_comparison_count = 0;
+    cut->structure = NULL;
+    cut->structure_count = 0;
+    cut->encoded = NULL;
+    cut->encoded_bytes = 0;
+    cut->depth = NULL;
+    cut->normals = NULL;
+    for (int row = 0; row < 3; row++) {
+        float *to = cut->world_from_view + (size_t)(4 * row);
+        to[3] += to[0] * part->eye[0] + to[1] * part->eye[1];
+    }
+    return cut;
+}

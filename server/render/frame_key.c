@@ -1,0 +1,149 @@
+/* SPDX-License-Identifier: MIT */
+/* Frames whose eyes are made from a key view's layers (key_view.h): which of a frame's passes is in hand. First,
+ * where the kept layers are of something else, each layer is rendered, as a picture of its own by the frame's
+ * tracer and integrator; then the eyes. Each pass goes through the frame's phases from its first sample on. */
+#include "render/frame_state.h"
+
+#include "render/compact.h"
+
+#include <string.h>
+
+bool frame_is_from_layers(const struct frame_request *request)
+{
+    return request->view_source == VIEW_SOURCE_LAYERS;
+}
+
+struct frame_camera frame_key_camera(const struct frame_request *request)
+{
+    return frame_is_from_layers(request) && request->has_key ? request->key_camera : request->camera;
+}
+
+bool frame_key_take(struct frame_renderer *renderer, struct error *error)
+{
+    const struct frame_request *request = &renderer->request;
+    const struct tracer_impl *impl = frame_find_tracer(renderer, TRACER_QUADTREE, "view_source", error);
+    struct tracer_options options = request->tracer_options;
+    options.quadtree.faces = QUADTREE_FACES_VIEW;
+    if (options.quadtree.hits == QUADTREE_HITS_AUTO)
+        options.quadtree.hits = QUADTREE_HITS_PLANE; /* what is thinner than a texel is there as well */
+    if (!impl || !tracer_check_motion(impl, &renderer->shared->copy, error))
+        return false;
+    if (!impl->texel_view || !impl->layer_hits)
+        return error_set(error, ERROR_UNSUPPORTED, "view_source", "the tracer %s has no layers to make views of",
+                         impl->name);
+    struct tracer_set *set = frame_tracers(renderer, impl);
+    renderer->key_tracer =
+        renderer->tracer->impl == impl && tracer_options_same(&request->tracer_options, &options)
+            ? tracer_set_take_again(set, renderer->tracer)
+            : tracer_set_take(set, renderer->device, impl, &options, error);
+    return renderer->key_tracer &&
+           frame_work_trace_by(renderer->work, &renderer->work->key_trace_state, renderer->key_tracer, error);
+}
+
+static bool begin_layers(struct frame_renderer *renderer, const struct trace_view *texels, uint32_t layer_count,
+                         struct error *error)
+{
+    struct key_view *key = &renderer->key;
+    key->is_made = false;
+    picture_restart(&key->sums);
+    if (!key_view_reserve(key, renderer->device, texels, layer_count, error))
+        return false; /* it may have been put off: the choice is made again */
+    renderer->pass = 0;
+    return true;
+}
+
+/* Which passes the frame needs. */
+static bool choose_first(struct frame_renderer *renderer, struct error *error)
+{
+    struct key_view *key = &renderer->key;
+    struct trace_view texels;
+    uint32_t layer_count = 0;
+    if (!renderer->key_tracer->impl->texel_view(renderer->key_tracer, &texels, &layer_count))
+        return error_set(error, ERROR_INTERNAL, NULL, "%s: the structure of a view tells no layers",
+                         renderer->key_tracer->impl->name);
+    renderer->eyes_samples_before = renderer->samples_before;
+    if (!key_view_count_anew(key, renderer->device, error))
+        return false;
+    if (!key_view_is_of(key, &renderer->view, &renderer->request, renderer->shared->showing))
+        return begin_layers(renderer, &texels, layer_count, error);
+    renderer->pass = key->layer_count;
+    return true;
+}
+
+bool frame_is_layer_pass(const struct frame_renderer *renderer)
+{
+    return renderer->key_tracer && renderer->pass < renderer->key.layer_count;
+}
+
+bool frame_is_eyes_pass(const struct frame_renderer *renderer)
+{
+    return renderer->key_tracer && !frame_is_layer_pass(renderer);
+}
+
+bool frame_key_set_pass(struct frame_renderer *renderer, struct error *error)
+{
+    struct render_context *context = &renderer->work->context;
+    if (renderer->pass == PASS_UNKNOWN && !choose_first(renderer, error))
+        return false;
+    const bool is_layer = frame_is_layer_pass(renderer);
+    context->request = is_layer ? key_view_layer_request(&renderer->key, &renderer->request) : renderer->request;
+    context->tracer = is_layer ? renderer->tracer : renderer->key_tracer;
+    context->trace_state = is_layer ? renderer->work->trace_state : renderer->work->key_trace_state;
+    context->layer_tracer = is_layer ? renderer->key_tracer : NULL;
+    context->layer = is_layer ? renderer->pass : 0;
+    renderer->target = is_layer ? &renderer->key.sums : &renderer->picture;
+    renderer->samples_before = is_layer ? 0 : renderer->eyes_samples_before;
+    slices_ahead_forget(&renderer->work->ahead); /* rays of another pass cost something else */
+    return true;
+}
+
+/* All of the layer's samples are in its sums. */
+bool frame_key_keep(struct frame_renderer *renderer, struct error *error)
+{
+    struct key_view *key = &renderer->key;
+    struct render_context *context = &renderer->work->context;
+    if (!key_view_keep_band(key, context, renderer->pass, renderer->band, error))
+        return false;
+    if (++renderer->band < key->sums.band_count)
+        return true;
+    renderer->result.primary_rays +=
+        (uint64_t)context->request.width * context->request.height * context->request.samples;
+    picture_restart(&key->sums);
+    renderer->phase = PHASE_BUILD; /* the next pass gets ready */
+    if (++renderer->pass < key->layer_count)
+        return true;
+    key->view = renderer->view;
+    key->request = renderer->request;
+    key->showing = renderer->shared->showing;
+    key->is_made = true;
+    return true;
+}
+
+bool frame_key_find(struct frame_renderer *renderer, bool *done, struct error *error)
+{
+    struct render_context *context = &renderer->work->context;
+    struct layers *layers = &renderer->work->layers;
+    if (!primary_intersect(context, done, error))
+        return false;
+    if (!*done)
+        return true;
+    return key_view_gather(&renderer->key, context, layers, error) &&
+           (!layers->noting || primary_make_surfaces(context, error));
+}
+
+bool frame_key_tell(struct frame_renderer *renderer, struct error *error)
+{
+    const struct frame_request *request = &renderer->request;
+    struct structure_rows *rows = &renderer->result.structure;
+    uint32_t unknown = 0;
+    if (!trace_state_tell(renderer->work->key_trace_state, rows, error))
+        return false;
+    /* A picture that had all its samples has asked for none. */
+    if (renderer->work->context.request.samples == 0)
+        return true;
+    if (!key_view_take_count(&renderer->key, renderer->device, &unknown, error))
+        return false;
+    const uint64_t samples = (uint64_t)request->width * request->height * renderer->work->context.request.samples;
+    structure_per_ray(rows, "views/unknown", (float)unknown / (float)samples);
+    return true;
+}

@@ -1,0 +1,178 @@
+/* SPDX-License-Identifier: MIT */
+#include "trace/quadtree/layers.h"
+
+#include "base/clock.h"
+#include "shared/path.h"
+
+#include <epoxy/gl.h>
+#include <stdlib.h>
+#include <string.h>
+
+bool quadtree_layers_begin(struct quadtree_layers *layers, struct quadtree_store *store, struct error *error)
+{
+    const struct quadtree_uniforms *u = &store->uniforms;
+    layers->store = store;
+    layers->face = layers->layer = 0;
+    layers->begun = false;
+    for (int i = 0; i < 2; i++)
+        if (!gpu_texture_reserve(store->device, &layers->depths[i], GL_DEPTH_COMPONENT32F, u->padded_width,
+                                 u->padded_height, error))
+            return false;
+    return true;
+}
+
+static struct raster_camera camera_of(const struct quadtree_store *store, uint32_t face)
+{
+    struct raster_camera camera = {
+        .near = store->uniforms.depths[0],
+        .far = store->uniforms.depths[1],
+        .orthographic = store->uniforms.depths[2] != 0.0f,
+        .width = store->uniforms.width,
+        .height = store->uniforms.height,
+    };
+    quadtree_face_view(store, face, camera.world_from_view, camera.extent);
+    return camera;
+}
+
+/* Sides of the frustum, as bits, that a point lies beyond. */
+static unsigned beyond(const struct raster_camera *camera, const float world[3])
+{
+    const float *m = camera->world_from_view;
+    float v[3];
+    for (int k = 0; k < 3; k++)
+        v[k] = (world[0] - m[3]) * m[k] + (world[1] - m[7]) * m[4 + k] + (world[2] - m[11]) * m[8 + k];
+    /* A little wider, for rounding. */
+    float reach = (camera->orthographic ? 1.0f : -v[2]) * 1.0001f;
+    float x = camera->extent[0] * reach, y = camera->extent[1] * reach;
+    return (v[0] < -x) | (v[0] > x) << 1 | (v[1] < -y) << 2 | (v[1] > y) << 3 | (-v[2] < camera->near) << 4;
+}
+
+static bool is_beside(const struct gpu_scene *scene, uint32_t instance, const struct raster_camera *camera)
+{
+    float bounds[2][3];
+    unsigned all = ~0u;
+    gpu_scene_instance_bounds(scene, instance, bounds[0], bounds[1]);
+    for (int corner = 0; corner < 8; corner++) {
+        const float point[3] = {bounds[corner & 1][0], bounds[corner >> 1 & 1][1], bounds[corner >> 2][2]};
+        all &= beyond(camera, point);
+    }
+    return all != 0;
+}
+
+static bool reserve_left_out(struct quadtree_layers *layers, uint32_t count, struct error *error)
+{
+    if (count <= layers->left_out_capacity)
+        return true;
+    bool *larger = realloc(layers->left_out, count * sizeof(bool));
+    if (!larger)
+        return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the instances of a face");
+    layers->left_out = larger;
+    layers->left_out_capacity = count;
+    return true;
+}
+
+static bool begin_face(struct quadtree_layers *layers, const struct gpu_scene *scene, struct error *error)
+{
+    const struct raster_camera camera = camera_of(layers->store, layers->face);
+    struct frame_uniforms uniforms = {.sample_places = {{0.5f, 0.5f}}};
+    raster_camera_fill(&uniforms, &camera);
+    if (!reserve_left_out(layers, scene->instance_count, error))
+        return false;
+    for (uint32_t i = 0; i < scene->instance_count; i++)
+        layers->left_out[i] = is_beside(scene, i, &camera);
+    return gpu_buffer_upload(layers->store->device, &layers->frame, &uniforms, sizeof(uniforms), error);
+}
+
+static bool begin_layer(struct quadtree_layers *layers, const struct gpu_scene *scene, struct error *error)
+{
+    static const GLuint nothing[4] = {VISIBLE_NOTHING};
+    static const GLfloat farthest = 0.0f;
+    struct quadtree_store *store = layers->store;
+    if (layers->layer == 0 && !begin_face(layers, scene, error))
+        return false;
+    gpu_framebuffer_finish(store->device, &layers->framebuffer);
+    if (!gpu_framebuffer_create_layer(store->device, &layers->framebuffer, &store->visible,
+                                      layers->face * store->uniforms.layers + layers->layer,
+                                      &layers->depths[layers->layer & 1], error))
+        return false;
+    glDisable(GL_SCISSOR_TEST); /* clearing heeds both */
+    glDepthMask(GL_TRUE);
+    glClearNamedFramebufferuiv(layers->framebuffer.name, GL_COLOR, 0, nothing);
+    glClearNamedFramebufferfv(layers->framebuffer.name, GL_DEPTH, 0, &farthest);
+    raster_view_begin(&layers->drawing);
+    layers->begun = true;
+    return true;
+}
+
+static bool draw_part(struct quadtree_layers *layers, struct gpu_scene *scene, bool *whole, struct error *error)
+{
+    const struct raster_view_target target = {
+        .device = layers->store->device,
+        .scene = scene,
+        .layered = true,
+        .has_before = layers->layer > 0,
+        .left_out = layers->left_out,
+    };
+    gpu_scene_bind(scene);
+    gpu_buffer_bind_uniform(&layers->frame, UNIFORM_FRAME);
+    gpu_texture_bind(&layers->depths[~layers->layer & 1], UNIT_QUADTREE_DEPTH);
+    glBindFramebuffer(GL_FRAMEBUFFER, layers->framebuffer.name);
+    glViewport(0, 0, (GLsizei)layers->store->uniforms.width, (GLsizei)layers->store->uniforms.height);
+    bool drawn = raster_view_draw(&layers->drawing, &target, whole, error);
+    glBindFramebuffer(GL_FRAMEBUFFER, 0);
+    return drawn;
+}
+
+static bool go_on(struct quadtree_layers *layers, struct gpu_scene *scene, struct error *error)
+{
+    const uint64_t start_ns = clock_now_ns();
+    bool whole = false;
+    if ((!layers->begun && !begin_layer(layers, scene, error)) || !draw_part(layers, scene, &whole, error))
+        return false;
+    gpu_finish(layers->store->device); /* else all parts would be waited for at the end, at once */
+    raster_view_learn(&layers->drawing, clock_now_ns() - start_ns, STEP_NS);
+    if (!whole)
+        return true;
+    layers->begun = false;
+    if (++layers->layer == layers->store->uniforms.layers) {
+        layers->layer = 0;
+        layers->face++;
+    }
+    return true;
+}
+
+enum tracer_progress quadtree_layers_go_on(struct quadtree_layers *layers, struct gpu_scene *scene, bool at_once,
+                                           struct error *error)
+{
+    struct gpu_device *device = layers->store->device;
+    const uint64_t end_ns = at_once ? STEP_WITHOUT_END : clock_now_ns() + STEP_BATCH_NS;
+    bool good = true;
+    gpu_push_group(device, "layers of the view");
+    while (good && layers->face < layers->store->uniforms.faces) {
+        good = go_on(layers, scene, error);
+        if (step_is_over(end_ns))
+            break;
+    }
+    gpu_pop_group(device);
+    if (!good || !gpu_check(device, "drawing the layers of a view", error))
+        return TRACER_FAILED;
+    return layers->face < layers->store->uniforms.faces ? TRACER_MORE : TRACER_DONE;
+}
+
+void quadtree_layers_finish(struct quadtree_layers *layers)
+{
+    if (layers->store) {
+        struct gpu_device *device = layers->store->device;
+        gpu_framebuffer_finish(device, &layers->framebuffer);
+        for (int i = 0; i < 2; i++)
+            gpu_texture_finish(device, &layers->depths[i]);
+        gpu_buffer_finish(device, &layers->frame);
+    }
+    free(layers->left_out);
+    *layers = (struct quadtree_layers){0};
+}
+
+uint64_t quadtree_layers_bytes(const struct quadtree_layers *layers)
+{
+    return layers->depths[0].size_bytes + layers->depths[1].size_bytes + layers->frame.size_bytes;
+}

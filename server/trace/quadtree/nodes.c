@@ -1,0 +1,137 @@
+/* SPDX-License-Identifier: MIT */
+#include "trace/quadtree/nodes.h"
+
+#include "gpu/program.h"
+
+#include <epoxy/gl.h>
+
+#define NODE_BYTES 8u
+#define ERROR_BYTES 4u
+
+static uint32_t slice_count(const struct quadtree_uniforms *uniforms)
+{
+    return uniforms->faces * uniforms->layers;
+}
+
+static uint32_t slice_texels(const struct quadtree_uniforms *uniforms)
+{
+    return uniforms->padded_width * uniforms->padded_height;
+}
+
+uint64_t quadtree_nodes_count(const struct quadtree_uniforms *uniforms)
+{
+    return (uint64_t)slice_count(uniforms) * uniforms->slice_nodes;
+}
+
+/* Leaves and level 1 of each slice. */
+static uint32_t slice_units(const struct quadtree_uniforms *uniforms)
+{
+    return 2 * slice_count(uniforms);
+}
+
+uint32_t quadtree_nodes_units(const struct quadtree_uniforms *uniforms)
+{
+    return slice_units(uniforms) + QUADTREE_TOP - 1;
+}
+
+bool quadtree_nodes_begin(struct quadtree_node_build *build, struct quadtree_store *store, struct error *error)
+{
+    const struct quadtree_uniforms *uniforms = &store->uniforms;
+    struct gpu_device *device = store->device;
+    const uint64_t count = quadtree_nodes_count(uniforms);
+    const uint64_t above = count - (uint64_t)slice_count(uniforms) * slice_texels(uniforms);
+    if (count > device->facts.texture_buffer_texels_max || count > INT32_MAX) {
+        error_set(error, ERROR_LIMIT, "quadtree_resolution", "%llu nodes are more than the device takes",
+                  (unsigned long long)count);
+        return error_remedy(error, "take a lower resolution, or fewer layers");
+    }
+    build->unit = 0;
+    return gpu_buffer_reserve(device, &store->nodes, count * NODE_BYTES, error) &&
+           gpu_buffer_reserve(device, &build->planes, (size_t)slice_texels(uniforms) * NODE_BYTES, error) &&
+           gpu_buffer_reserve(device, &build->errors, above * ERROR_BYTES, error);
+}
+
+static const struct gpu_program *program_get(const struct quadtree_store *store, const char *path,
+                                             const struct gpu_define *defines, struct error *error)
+{
+    const struct gpu_program_source source = {.compute = path, .defines = defines};
+    return gpu_program_get(store->device, &source, error);
+}
+
+static bool make_leaves(struct quadtree_node_build *build, struct quadtree_store *store, struct gpu_scene *scene,
+                        uint32_t slice, struct error *error)
+{
+    struct gpu_define defines[3] = {{0}};
+    unsigned n = 0;
+    if (scene->has_spheres)
+        defines[n++] = (struct gpu_define){"HAS_SPHERES", "1"};
+    if (scene->disc_count > 0)
+        defines[n++] = (struct gpu_define){"HAS_DISCS", "1"};
+    const struct gpu_program *program = program_get(store, "quadtree/leaves.comp", defines, error);
+    if (!program)
+        return false;
+    gpu_scene_bind(scene);
+    gpu_texture_bind(&store->visible, UNIT_QUADTREE_VISIBLE);
+    gpu_buffer_bind_texels(store->device, &store->nodes, UNIT_QUADTREE_NODES, GL_RG32UI);
+    gpu_buffer_bind_image(store->device, &build->planes, IMAGE_QUADTREE_PLANES, GL_RG32UI);
+    gpu_uniform_uint(program, "slice", slice);
+    gpu_uniform_uint(program, "layer", slice % store->uniforms.layers);
+    gpu_dispatch(store->device, program, slice_texels(&store->uniforms));
+    return true;
+}
+
+/* Level 1: of one slice, with its leaves. */
+static bool make_level(struct quadtree_node_build *build, struct quadtree_store *store, uint32_t slice,
+                       uint32_t level, bool minmax, struct error *error)
+{
+    struct gpu_define defines[3] = {{0}};
+    unsigned n = 0;
+    if (level == 1)
+        defines[n++] = (struct gpu_define){"NODES_OF_LEAVES", "1"};
+    if (minmax)
+        defines[n++] = (struct gpu_define){"QUADTREE_MINMAX", "1"};
+    const struct gpu_program *program = program_get(store, "quadtree/nodes.comp", defines, error);
+    if (!program)
+        return false;
+    gpu_buffer_bind_texels(store->device, &build->planes, UNIT_QUADTREE_PLANES, GL_RG32UI);
+    gpu_buffer_bind_texels(store->device, &store->nodes, UNIT_QUADTREE_NODES, GL_RG32UI);
+    gpu_buffer_bind_texels(store->device, &build->errors, UNIT_QUADTREE_ERRORS, GL_R32F);
+    gpu_buffer_bind_image(store->device, &store->nodes, IMAGE_QUADTREE_NODES, GL_RG32UI);
+    gpu_buffer_bind_image(store->device, &build->errors, IMAGE_QUADTREE_ERRORS, GL_R32F);
+    gpu_uniform_uint(program, "slice", slice);
+    gpu_uniform_uint(program, "level", level);
+    const uint64_t of_slice = slice_texels(&store->uniforms) >> 2 * level;
+    gpu_dispatch(store->device, program, level == 1 ? of_slice : of_slice * slice_count(&store->uniforms));
+    return true;
+}
+
+enum tracer_progress quadtree_nodes_go_on(struct quadtree_node_build *build, struct quadtree_store *store,
+                                          struct gpu_scene *scene, bool minmax, struct error *error)
+{
+    const uint32_t slices = slice_units(&store->uniforms), unit = build->unit++;
+    gpu_push_group(store->device, "quadtree nodes");
+    gpu_buffer_bind_uniform(&store->uniform_buffer, UNIFORM_QUADTREE);
+    bool good;
+    if (unit < slices && unit % 2 == 0)
+        good = make_leaves(build, store, scene, unit / 2, error);
+    else if (unit < slices)
+        good = make_level(build, store, unit / 2, 1, minmax, error);
+    else
+        good = make_level(build, store, 0, unit - slices + 2, minmax, error);
+    gpu_pop_group(store->device);
+    if (!good)
+        return TRACER_FAILED;
+    return build->unit < quadtree_nodes_units(&store->uniforms) ? TRACER_MORE : TRACER_DONE;
+}
+
+void quadtree_nodes_finish(struct quadtree_node_build *build, struct gpu_device *device)
+{
+    gpu_buffer_finish(device, &build->planes);
+    gpu_buffer_finish(device, &build->errors);
+    *build = (struct quadtree_node_build){0};
+}
+
+uint64_t quadtree_nodes_bytes(const struct quadtree_node_build *build)
+{
+    return (uint64_t)build->planes.capacity_bytes + build->errors.capacity_bytes;
+}

@@ -1,0 +1,220 @@
+/* SPDX-License-Identifier: MIT */
+#include "trace/quadtree/store.h"
+
+#include "protocol/words.h"
+
+#include <epoxy/gl.h>
+#include <math.h>
+#include <string.h>
+
+#define NEAR_OF_DIAGONAL 1e-5f /* as of any camera (render/camera.c) */
+#define UNIT_OF_DIAGONAL 0.05f /* where w is 1: slopes of w then have all bits of half floats */
+#define DOUBLED_AT 0.25f /* diagonals: where bounds that grow with distance are twice as large */
+#define CUBE_TEXELS_MAX 1024u
+#define CUBE_TEXELS_MIN 128u
+
+void quadtree_store_finish(struct quadtree_store *store)
+{
+    struct gpu_device *device = store->device;
+    gpu_buffer_finish(device, &store->uniform_buffer);
+    gpu_buffer_finish(device, &store->nodes);
+    gpu_texture_finish(device, &store->visible);
+    *store = (struct quadtree_store){.device = device};
+}
+
+uint64_t quadtree_store_bytes(const struct quadtree_store *store)
+{
+    return store->uniform_buffer.capacity_bytes + store->nodes.capacity_bytes + store->visible.size_bytes;
+}
+
+/* ---- where the faces lie ---- */
+
+static uint32_t scaled(uint32_t pixels, double scale)
+{
+    const double texels = floor(pixels * scale + 0.5);
+    return texels < 1 ? 1 : (uint32_t)texels;
+}
+
+void quadtree_texel_view(struct trace_view *texels, const struct trace_view *view,
+                         const struct quadtree_settings *settings)
+{
+    const uint32_t longer = view->width > view->height ? view->width : view->height;
+    const double scale = settings->resolution ? (double)settings->resolution / longer : 1.0;
+    const uint32_t margin = scaled(longer, scale * (double)settings->margin);
+    const uint32_t height = scaled(view->height, scale);
+    const double wider = (height + 2.0 * margin) / height;
+    *texels = *view;
+    texels->width = scaled(view->width, scale) + 2 * margin;
+    texels->height = height + 2 * margin;
+    texels->ortho_height = (float)((double)view->ortho_height * wider);
+    if (view->fov_y > 0.0f)
+        texels->fov_y = (float)(2.0 * atan(tan((double)view->fov_y / 2.0) * wider));
+}
+
+static float distance_from(const float eye[3], const float lower[3], const float upper[3])
+{
+    float squared = 0.0f;
+    for (int i = 0; i < 3; i++) {
+        const float way = fmaxf(fabsf(lower[i] - eye[i]), fabsf(upper[i] - eye[i]));
+        squared += way * way;
+    }
+    return sqrtf(squared);
+}
+
+/* Beyond it there is nothing but discs, which are no part of what bounds a scene. */
+static float far_distance(const struct gpu_scene *scene, const float eye[3], bool orthographic)
+{
+    float far = scene->instance_count > 0 ? distance_from(eye, scene->lower_world, scene->upper_world) : 0.0f;
+    for (uint32_t i = 0; orthographic && i < scene->disc_count; i++) {
+        const float *disc = scene->discs[i].centre_radius;
+        far = fmaxf(far, distance_from(eye, disc, disc) + disc[3]);
+    }
+    return far * 1.001f + 1e-6f;
+}
+
+static void place_view(struct quadtree_uniforms *u, const struct trace_view *texels)
+{
+    const float *m = texels->world_from_view;
+    const bool orthographic = texels->fov_y == 0.0f;
+    const float half_height = orthographic ? texels->ortho_height / 2.0f : tanf(texels->fov_y / 2.0f);
+    for (int i = 0; i < 3; i++) {
+        u->face_from_world[0][i] = m[4 * i];
+        u->face_from_world[1][i] = -m[4 * i + 1];
+        u->face_from_world[2][i] = -m[4 * i + 2];
+    }
+    u->faces = 1;
+    u->width = texels->width;
+    u->height = texels->height;
+    u->scale_centre[0] = u->scale_centre[1] = (float)texels->height / 2.0f / half_height;
+}
+
+/* Face 2 a looks along axis a, face 2 a + 1 against it; right, down and forward are right-handed. */
+static void place_cube(struct quadtree_uniforms *u, uint32_t texels)
+{
+    for (int face = 0; face < 6; face++) {
+        const int axis = face / 2, side = face % 2;
+        u->face_from_world[3 * face][(axis + 1 + side) % 3] = 1.0f;
+        u->face_from_world[3 * face + 1][(axis + 2 - side) % 3] = 1.0f;
+        u->face_from_world[3 * face + 2][axis] = side ? -1.0f : 1.0f;
+    }
+    u->faces = 6;
+    u->width = u->height = texels;
+    u->scale_centre[0] = u->scale_centre[1] = (float)texels / 2.0f;
+}
+
+/* Texels that are as fine as the picture's pixels in its middle. */
+static uint32_t cube_texels(const struct trace_view *view, const struct quadtree_settings *settings)
+{
+    if (settings->resolution)
+        return settings->resolution;
+    const float tangent = view->fov_y > 0.0f ? tanf(view->fov_y / 2.0f) : 1.0f;
+    const float texels = fminf((float)view->height / tangent, (float)CUBE_TEXELS_MAX);
+    const uint32_t whole = ((uint32_t)texels + CUBE_TEXELS_MIN - 1) / CUBE_TEXELS_MIN * CUBE_TEXELS_MIN;
+    return whole > CUBE_TEXELS_MIN ? whole : CUBE_TEXELS_MIN;
+}
+
+/* A plane that is not the hit leads to the primitive that is: where it is off, rays that graze it meet another texel.
+ */
+#define ERROR_TO_PRIMITIVES (1.0f / 64.0f)
+
+/* An error of w of so much moves what an eye within the radius sees by the pixels that are allowed: e / (f R) in
+ * 1 / Z. An orthographic view has no parallax; there it is a depth of so many pixels. */
+static float error_of_w(const struct quadtree_uniforms *u, const struct trace_view *view,
+                        const struct quadtree_settings *settings)
+{
+    if (view->fov_y == 0.0f)
+        return settings->pixels * view->ortho_height / (float)view->height / (u->depths[1] - u->depths[0]);
+    const float focal_pixels = (float)view->height / 2.0f / tanf(view->fov_y / 2.0f);
+    return u->depths[0] * settings->pixels / (focal_pixels * settings->radius);
+}
+
+static float diagonal_of(const struct gpu_scene *scene)
+{
+    return scene->diagonal > 0.0f && isfinite(scene->diagonal) ? scene->diagonal : 1.0f;
+}
+
+static void place_depths(struct quadtree_uniforms *u, const struct gpu_scene *scene, const struct trace_view *view)
+{
+    const bool orthographic = view->fov_y == 0.0f && u->faces == 1;
+    const float diagonal = diagonal_of(scene);
+    float near = u->faces == 1 ? view->near : 0.0f; /* what the picture cuts off may be seen in a mirror */
+    if (near <= 0.0f && !orthographic)
+        near = fmaxf(diagonal * NEAR_OF_DIAGONAL, 1e-6f);
+    u->depths[0] = orthographic ? near : fmaxf(diagonal * UNIT_OF_DIAGONAL, 1e-6f);
+    u->depths[1] = fmaxf(far_distance(scene, u->eye_world, orthographic), 2.0f * near);
+    u->depths[2] = orthographic ? 1.0f : 0.0f;
+    u->depths[3] = near;
+}
+
+static uint32_t padded(uint32_t texels)
+{
+    return (texels + QUADTREE_SIDE - 1) / QUADTREE_SIDE * QUADTREE_SIDE;
+}
+
+static void fill_uniforms(struct quadtree_uniforms *u, const struct gpu_scene *scene,
+                          const struct trace_view *view, const struct quadtree_settings *settings)
+{
+    *u = (struct quadtree_uniforms){.layers = settings->layers};
+    for (int i = 0; i < 3; i++)
+        u->eye_world[i] = view->world_from_view[4 * i + 3];
+    u->eye_world[3] = settings->radius;
+    if (settings->faces == QUADTREE_FACES_VIEW) {
+        struct trace_view texels;
+        quadtree_texel_view(&texels, view, settings);
+        place_view(u, &texels);
+    } else {
+        place_cube(u, cube_texels(view, settings));
+    }
+    u->scale_centre[2] = (float)u->width / 2.0f;
+    u->scale_centre[3] = (float)u->height / 2.0f;
+    place_depths(u, scene, view);
+    u->bounds[0] =
+        error_of_w(u, view, settings) * (settings->hits == QUADTREE_HITS_PLANE ? 1.0f : ERROR_TO_PRIMITIVES);
+    u->bounds[1] = settings->angle < 90.0f ? cosf(settings->angle * 0.0174532925f) : 0.0f;
+    u->bounds[2] = settings->adaptive == QUADTREE_ADAPTIVE_ON ? u->depths[0] / (DOUBLED_AT * diagonal_of(scene)) : 0.0f;
+    u->bounds[3] = settings->radius / u->depths[0];
+    u->padded_width = padded(u->width);
+    u->padded_height = padded(u->height);
+    for (uint32_t level = 0; level <= QUADTREE_TOP; level++)
+        u->slice_nodes += (u->padded_width >> level) * (u->padded_height >> level);
+}
+
+/* ---- room ---- */
+
+bool quadtree_store_place(struct quadtree_store *store, const struct gpu_scene *scene, const struct trace_view *view,
+                          const struct quadtree_settings *settings, struct error *error)
+{
+    struct quadtree_uniforms *u = &store->uniforms;
+    fill_uniforms(u, scene, view, settings);
+    const uint32_t longer = u->padded_width > u->padded_height ? u->padded_width : u->padded_height;
+    if (longer > store->device->facts.texture_size_max) {
+        error_set(error, ERROR_LIMIT, "quadtree_resolution", "%u texels along a side; the device holds %u", longer,
+                  store->device->facts.texture_size_max);
+        return error_remedy(error, "choose a smaller quadtree_resolution");
+    }
+    return gpu_buffer_upload(store->device, &store->uniform_buffer, u, sizeof(*u), error) &&
+           gpu_texture_reserve_array(store->device, &store->visible, GL_RG32UI, u->padded_width, u->padded_height,
+                                     u->faces * u->layers, error);
+}
+
+void quadtree_face_view(const struct quadtree_store *store, uint32_t face, float world_from_view[12],
+                        float extent[2])
+{
+    const struct quadtree_uniforms *u = &store->uniforms;
+    const vec4 *rows = &u->face_from_world[(size_t)face * 3];
+    for (int i = 0; i < 3; i++) {
+        world_from_view[4 * i] = rows[0][i];
+        world_from_view[4 * i + 1] = -rows[1][i];
+        world_from_view[4 * i + 2] = -rows[2][i];
+        world_from_view[4 * i + 3] = u->eye_world[i];
+    }
+    extent[0] = (float)u->width / 2.0f / u->scale_centre[0];
+    extent[1] = (float)u->height / 2.0f / u->scale_centre[1];
+}
+
+void quadtree_store_bind(struct quadtree_store *store)
+{
+    gpu_buffer_bind_uniform(&store->uniform_buffer, UNIFORM_QUADTREE);
+    gpu_texture_bind(&store->visible, UNIT_QUADTREE_VISIBLE);
+    gpu_buffer_bind_texels(store->device, &store->nodes, UNIT_QUADTREE_NODES, GL_RG32UI);
+}

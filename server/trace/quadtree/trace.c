@@ -1,0 +1,138 @@
+/* SPDX-License-Identifier: MIT */
+#include "trace/quadtree/trace.h"
+
+#include "protocol/words.h"
+#include "shared/hit.h"
+#include "trace/program.h"
+
+#include <stdlib.h>
+
+#define COUNTS_BYTES (WAVE_RAY_KINDS * sizeof(struct quadtree_counts))
+
+/* ---- state ---- */
+
+struct trace_state *quadtree_state_create(struct gpu_device *device, const struct tracer_options *options,
+                                          struct error *error)
+{
+    (void)device, (void)options;
+    struct quadtree_state *state = calloc(1, sizeof(*state));
+    if (!state)
+        error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the state of a wave");
+    return state ? &state->base : NULL;
+}
+
+void quadtree_state_destroy(struct trace_state *state)
+{
+    struct quadtree_state *own = (struct quadtree_state *)state;
+    gpu_buffer_finish(state->device, &own->counts);
+    gpu_readback_finish(state->device, &own->copied_counts);
+    free(own);
+}
+
+uint64_t quadtree_state_device_bytes(const struct trace_state *state)
+{
+    const struct quadtree_state *own = (const struct quadtree_state *)state;
+    return own->counts.capacity_bytes + own->copied_counts.capacity_bytes;
+}
+
+bool quadtree_state_copy_counts(struct trace_state *state, struct error *error)
+{
+    struct quadtree_state *own = (struct quadtree_state *)state;
+    return gpu_readback_copy(state->device, &own->copied_counts, &own->counts, COUNTS_BYTES, error) &&
+           gpu_readback_fence(&own->copied_counts, error);
+}
+
+static void tell_kind(const struct quadtree_counts *counts, enum ray_kind kind, uint32_t layers,
+                      struct structure_rows *rows)
+{
+    const float rays = (float)counts->rays;
+    rows->part = 1 + (uint32_t)kind;
+    rows->part_name = protocol_ray_kind_text((enum protocol_ray_kind)kind);
+    if (layers > 1)
+        structure_per_ray(rows, "behind_layer_1", (float)counts->behind_first / rays);
+    if (layers > 2)
+        structure_per_ray(rows, "behind_layer_2", (float)counts->behind_second / rays);
+    structure_per_ray(rows, "unknown_behind", (float)counts->behind_last / rays);
+    structure_per_ray(rows, "unknown_outside", (float)counts->outside / rays);
+}
+
+bool quadtree_state_tell(struct trace_state *state, struct structure_rows *rows, struct error *error)
+{
+    struct quadtree_counts counts[WAVE_RAY_KINDS];
+    if (!gpu_readback_take(state->device, &((struct quadtree_state *)state)->copied_counts, counts, error))
+        return false;
+    for (unsigned kind = 0; kind < RAY_COUNT; kind++)
+        if (counts[kind].rays > 0)
+            tell_kind(&counts[kind], (enum ray_kind)kind, state->options.quadtree.layers, rows);
+    return true;
+}
+
+/* ---- waves ---- */
+
+bool quadtree_trace_begin(struct trace_state *state, struct error *error)
+{
+    struct quadtree_state *own = (struct quadtree_state *)state;
+    if (!gpu_buffer_reserve(state->device, &own->counts, COUNTS_BYTES, error))
+        return false;
+    if (!state->has_traced) /* the first wave of the frame */
+        gpu_buffer_clear_part(state->device, &own->counts, 0, COUNTS_BYTES, 0);
+    return true;
+}
+
+static struct trace_program_source source_of(const struct tracer_options *options, struct gpu_define defines[5])
+{
+    size_t n = 0;
+    defines[n++] = (struct gpu_define){"TRACER_QUADTREE", "1"};
+    if (options->quadtree.hits == QUADTREE_HITS_PLANE)
+        defines[n++] = (struct gpu_define){"QUADTREE_PLANES", "1"};
+    if (options->quadtree.walk == QUADTREE_WALK_DDA)
+        defines[n++] = (struct gpu_define){"QUADTREE_DDA", "1"};
+    if (options->bench.quadtree_count_steps)
+        defines[n++] = (struct gpu_define){"QUADTREE_COUNT_STEPS", "1"};
+    return (struct trace_program_source){.traverse = "quadtree/traverse.glsl", .defines = defines};
+}
+
+/* A ray passes a texel of each column and each row, by a node of each level at most. */
+static uint64_t rounds_of_a_ray(const struct quadtree_store *store)
+{
+    const struct quadtree_uniforms *u = &store->uniforms;
+    return (uint64_t)u->faces * u->layers * (u->padded_width + u->padded_height) * 2;
+}
+
+bool quadtree_intersect(struct quadtree_store *store, struct gpu_scene *scene, struct quadtree_state *state,
+                        const struct ray_range *rays, const struct tracer_options *options, struct error *error)
+{
+    struct gpu_define defines[5] = {0};
+    struct trace_program_source source = source_of(options, defines);
+    const struct gpu_program *program = trace_program_get(scene, rays->wave, &source, error);
+    if (!program)
+        return false;
+    source.rays_a_dispatch = trace_rays_a_dispatch(store->device, rounds_of_a_ray(store));
+    quadtree_store_bind(store);
+    gpu_buffer_bind_storage(&state->counts, BIND_QUADTREE_COUNTS);
+    gpu_uniform_uint(program, "ray_kind", rays->wave->family / WAVE_BOUNCES);
+    trace_program_run(program, scene, rays, &source);
+    return true;
+}
+
+bool quadtree_layer_hits(struct quadtree_store *store, struct gpu_scene *scene, const struct ray_range *rays,
+                         uint32_t layer, struct error *error)
+{
+    const struct gpu_define defines[] = {{scene->has_spheres ? "HAS_SPHERES" : NULL, "1"}, {NULL, NULL}};
+    const struct gpu_program *program =
+        trace_surface_program_get(scene, rays->wave, "quadtree/layer_hits.comp", defines, error);
+    if (!program)
+        return false;
+    quadtree_store_bind(store);
+    gpu_uniform_uint(program, "layer", layer);
+    trace_surface_program_run(program, scene, rays);
+    return true;
+}
+
+void quadtree_announce(struct gpu_scene *scene, const struct wave *wave,
+                       const struct tracer_options *options)
+{
+    struct gpu_define defines[5] = {0};
+    const struct trace_program_source source = source_of(options, defines);
+    (void)trace_program_get(scene, wave, &source, NULL);
+}

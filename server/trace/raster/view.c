@@ -1,0 +1,181 @@
+/* SPDX-License-Identifier: MIT */
+#include "trace/raster/view.h"
+
+#include "gpu/program.h"
+
+#include <epoxy/gl.h>
+#include <string.h>
+
+/* Vertices that one part draws. On a GPU nearly as many as an int can number. On software GL at most
+ * what takes some ten milliseconds if triangles are small, and fewer where that takes longer than a step should:
+ * larger triangles, other work on the machine. Each part costs something of its own, so only then. */
+#define DRAW_VERTICES_HARDWARE (3u << 24)
+#define DRAW_VERTICES_SOFTWARE (3u << 16)
+#define DRAW_VERTICES_FIRST (3u << 14) /* nothing is known of the scene yet */
+#define DRAW_VERTICES_MIN (3u << 12)
+
+enum primitive_kind { PRIMITIVE_TRIANGLES, PRIMITIVE_SPHERES, PRIMITIVE_DISCS };
+static const unsigned vertices_per_primitive[] = {3, 36, 6};
+
+void raster_camera_fill(struct frame_uniforms *uniforms, const struct raster_camera *camera)
+{
+    memcpy(uniforms->world_from_view, camera->world_from_view, sizeof(camera->world_from_view));
+    uniforms->extent_near[0] = camera->extent[0];
+    uniforms->extent_near[1] = camera->extent[1];
+    uniforms->extent_near[2] = camera->near;
+    uniforms->extent_near[3] = camera->orthographic ? 1.0f : 0.0f;
+    uniforms->far_width[0] = camera->far;
+    uniforms->width = camera->width;
+    uniforms->height = camera->height;
+    uniforms->tiles_across = (camera->width + 7) / 8;
+}
+
+static const struct gpu_program *get_program(struct gpu_device *device, enum primitive_kind kind, bool cutout,
+                                             bool layered, struct error *error)
+{
+    static const char *const numbers[] = {"0", "1", "2"};
+    struct gpu_define defines[] = {
+        {"PRIMITIVE_KIND", numbers[kind]},
+        {"HAS_SPHERES", "1"}, /* costs nothing where it is not called */
+        {NULL, NULL},
+        {NULL, NULL},
+        {NULL, NULL},
+    };
+    size_t n = 2;
+    if (cutout)
+        defines[n++] = (struct gpu_define){"HAS_CUTOUT", "1"};
+    if (layered)
+        defines[n++] = (struct gpu_define){"HAS_LAYERS", "1"};
+    const struct gpu_program_source source = {
+        .vertex = "raster/view.vert", .fragment = "raster/view.frag", .defines = defines};
+    return gpu_program_get(device, &source, error);
+}
+
+/* What is drawn one after the other, each under one program. */
+enum primitive_sort { SORT_WHOLE, SORT_WITH_HOLES, SORT_DISCS, SORT_SPHERES, SORT_COUNT };
+static const enum primitive_kind kind_of_sort[SORT_COUNT] = {PRIMITIVE_TRIANGLES, PRIMITIVE_TRIANGLES,
+                                                             PRIMITIVE_DISCS, PRIMITIVE_SPHERES};
+
+/* Primitives of an instance (all discs count as one) that are of a sort. */
+static uint32_t primitives_of(const struct gpu_scene *scene, enum primitive_sort sort, uint32_t instance,
+                              uint32_t *first)
+{
+    *first = 0;
+    if (sort == SORT_DISCS)
+        return scene->disc_count;
+    const struct geometry *geometry = &scene->geometries[scene->instances[instance].geometry].device;
+    enum primitive_sort own = SORT_SPHERES;
+    if (geometry->kind != GEOMETRY_SPHERES)
+        own = geometry->flags & GEOMETRY_HAS_CUTOUT ? SORT_WITH_HOLES : SORT_WHOLE;
+    *first = geometry->first_primitive;
+    return own == sort ? geometry->primitive_count : 0;
+}
+
+static bool has_cutout(const struct gpu_scene *scene, enum primitive_sort sort)
+{
+    return sort == SORT_WITH_HOLES || (sort != SORT_WHOLE && scene->has_cutout);
+}
+
+/* Goes on with a sort where the last part ended; what is left of `budget` vertices comes back. */
+static bool draw_sort(struct raster_view *view, const struct raster_view_target *target, uint32_t *budget,
+                      struct error *error)
+{
+    const struct gpu_scene *scene = target->scene;
+    enum primitive_sort sort = (enum primitive_sort)view->sort;
+    enum primitive_kind kind = kind_of_sort[sort];
+    uint32_t end = sort == SORT_DISCS ? 1 : scene->instance_count;
+    const struct gpu_program *program = NULL;
+    for (; view->instance < end; view->instance++, view->primitive = 0) {
+        uint32_t first, count = primitives_of(scene, sort, view->instance, &first) - view->primitive;
+        if (count == 0 || (sort != SORT_DISCS && target->left_out && target->left_out[view->instance]))
+            continue;
+        if (!program &&
+            !(program = get_program(target->device, kind, has_cutout(scene, sort), target->layered, error)))
+            return false;
+        uint32_t maximum = *budget / vertices_per_primitive[kind], part = count < maximum ? count : maximum;
+        if (sort == SORT_SPHERES) /* the picture's y runs down, which turns every winding round */
+            glFrontFace(scene->instances[view->instance].flags & INSTANCE_MIRRORED ? GL_CCW : GL_CW);
+        gpu_uniform_uint(program, "instance_index", view->instance);
+        gpu_uniform_uint(program, "first_primitive", first + view->primitive);
+        gpu_uniform_uint(program, "first_row", target->first_row);
+        gpu_uniform_uint(program, "layer", target->sample);
+        if (target->layered)
+            gpu_uniform_uint(program, "has_before", target->has_before);
+        gpu_program_use(target->device, program);
+        if (part > 0)
+            glDrawArrays(GL_TRIANGLES, 0, (GLsizei)(part * vertices_per_primitive[kind]));
+        *budget -= part * vertices_per_primitive[kind];
+        view->primitive += part;
+        if (part < count) {
+            *budget = 0;
+            return true;
+        }
+    }
+    view->instance = 0;
+    view->sort++;
+    return true;
+}
+
+static bool draw_sorts(struct raster_view *view, const struct raster_view_target *target, uint32_t *budget,
+                       struct error *error)
+{
+    bool drawn = true;
+    while (drawn && *budget > 0 && view->sort < SORT_COUNT) {
+        if (view->sort == SORT_SPHERES) { /* of a sphere's box the inner sides: they are there also when the eye
+                                           * is in the box */
+            glEnable(GL_CULL_FACE);
+            glCullFace(GL_FRONT);
+        }
+        drawn = draw_sort(view, target, budget, error);
+        glDisable(GL_CULL_FACE);
+    }
+    return drawn;
+}
+
+void raster_view_begin(struct raster_view *view)
+{
+    view->sort = SORT_WHOLE;
+    view->instance = view->primitive = 0;
+}
+
+bool raster_view_draw(struct raster_view *view, const struct raster_view_target *target, bool *whole,
+                      struct error *error)
+{
+    if (view->part_vertices == 0)
+        view->part_vertices = DRAW_VERTICES_FIRST;
+    uint32_t budget = target->device->facts.software ? view->part_vertices : DRAW_VERTICES_HARDWARE;
+    glDisable(GL_BLEND);
+    glDisable(GL_SCISSOR_TEST);
+    glEnable(GL_DEPTH_TEST);
+    glDepthMask(GL_TRUE);
+    glDepthFunc(GL_GREATER);
+    glClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);
+    bool drawn = draw_sorts(view, target, &budget, error);
+    glDisable(GL_DEPTH_TEST);
+    *whole = view->sort == SORT_COUNT;
+    return drawn;
+}
+
+void raster_view_learn(struct raster_view *view, uint64_t took_ns, uint64_t step_ns)
+{
+    if (took_ns > step_ns && view->part_vertices > DRAW_VERTICES_MIN)
+        view->part_vertices /= 2;
+    else if (took_ns < step_ns / 8 && view->part_vertices < DRAW_VERTICES_SOFTWARE)
+        view->part_vertices *= 2;
+}
+
+static bool has_sort(const struct gpu_scene *scene, enum primitive_sort sort)
+{
+    uint32_t first;
+    for (uint32_t i = 0; i < scene->instance_count; i++)
+        if (primitives_of(scene, sort, i, &first) > 0)
+            return true;
+    return sort == SORT_DISCS && scene->disc_count > 0;
+}
+
+void raster_view_announce(struct gpu_device *device, const struct gpu_scene *scene, bool layered)
+{
+    for (enum primitive_sort sort = 0; sort < SORT_COUNT; sort++)
+        if (has_sort(scene, sort))
+            (void)get_program(device, kind_of_sort[sort], has_cutout(scene, sort), layered, NULL);
+}

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: MIT
+// Nodes of the quadtrees: where they lie and what their 64 bits mean (quadtree/layout.h).
+#include "quadtree/layout.h"
+
+layout(std140, binding = UNIFORM_QUADTREE) uniform quadtree_block { quadtree_uniforms quadtree; };
+
+// The first node of a level, counted from the first of its slice. A slice is a multiple of 4^QUADTREE_TOP texels, so
+// that no division leaves a rest: S + S / 4 + S / 16 .. below the level.
+uint node_level_first(uint level)
+{
+    uint texels = quadtree.padded_width * quadtree.padded_height;
+    return (texels - (texels >> (2u * level))) / 3u * 4u;
+}
+
+// Of node `place` of a level, by column and row. Of one slice the index grows by node_row(level) from row to row.
+uint node_row(uint level)
+{
+    return quadtree.padded_width >> level;
+}
+
+uint node_index(uint slice, uint level, uvec2 place)
+{
+    return slice * quadtree.slice_nodes + node_level_first(level) + place.y * node_row(level) + place.x;
+}
+
+// In texel coordinates of the face.
+vec2 node_centre(uint level, uvec2 place)
+{
+    return (vec2(place) + 0.5) * float(1u << level);
+}
+
+bool node_is_plane(uvec2 node)
+{
+    return int(node.x) < 0;
+}
+
+// ---- planes ----
+
+// w at the node's centre; 0: there is no surface.
+float plane_w(uvec2 node)
+{
+    return uintBitsToFloat(node.x & 0x7ffffffeu);
+}
+
+// dw / dx and dw / dy, per texel.
+vec2 plane_slopes(uvec2 node)
+{
+    return unpackHalf2x16(node.y) * (1.0 / QUADTREE_SLOPE_SCALE);
+}
+
+// The paper's flag O.
+bool plane_is_at_edge(uvec2 node)
+{
+    return (node.x & 1u) != 0u;
+}
+
+// `w` not negative. Slopes beyond the range of half floats are limited to it.
+uvec2 plane_node(float w, vec2 slopes, bool at_edge)
+{
+    vec2 scaled = clamp(slopes * QUADTREE_SLOPE_SCALE, vec2(-QUADTREE_SLOPE_MAX), vec2(QUADTREE_SLOPE_MAX));
+    return uvec2((floatBitsToUint(w) & 0x7ffffffeu) | 0x80000000u | uint(at_edge), packHalf2x16(scaled));
+}
+
+// ---- boxes ----
+
+// Greatest and least w.
+vec2 box_range(uvec2 node)
+{
+    return uintBitsToFloat(node);
+}
+
+uvec2 box_node(float w_max, float w_min)
+{
+    return floatBitsToUint(vec2(w_max, w_min)) & 0x7fffffffu;
+}

@@ -1,0 +1,510 @@
+// SPDX-License-Identifier: MIT
+// Rays through the surfaces that a view sees (quadtree/layout.h). Widmer, Pajak, Schulz, Pulli, Kautz, Goesele, Luebke.
+// An Adaptive Acceleration Structure for Screen-space Ray Tracing. 2015, section 4.
+//
+// A ray is traced through the first layer of a face. Where it is behind what that layer holds, what it may hit there is
+// in the next one, and only there is it traced through that. Where it is behind the last layer, nothing is known.
+//
+// Defines: QUADTREE_PLANES a hit is where the ray meets a node's plane, else where it meets the primitive; QUADTREE_DDA
+// from texel to texel, not by the tree; QUADTREE_COUNT_STEPS hits are counts: nodes looked at, and layers.
+#define INTERSECTION_FLAGS walk_flags
+
+#include "shared/path.h"
+#include "quadtree/face.glsl"
+
+layout(binding = UNIT_QUADTREE_VISIBLE) uniform usampler2DArray quadtree_visible;
+layout(binding = UNIT_QUADTREE_NODES) uniform usamplerBuffer quadtree_nodes;
+layout(std430, binding = BIND_QUADTREE_COUNTS) buffer quadtree_counts_block { quadtree_counts counts_of_kinds[]; };
+
+uniform uint ray_kind;
+
+#ifdef ANY_HIT
+#define found_type vec3 // optical depth
+#else
+#define found_type candidate
+#endif
+
+const float NEVER = 2.0; // beyond the end of a segment
+const int STEPS_TOGETHER = 32; // of rays side by side, before what some of them have met is looked at
+
+// A ray on its way through a layer of a face.
+struct layer_walk {
+    face_segment s;
+    vec3 origin;  // x, y, w of the ray's origin; w below 0: it is not in this face
+    vec2 inverse; // of s.along.xy
+    uint turn, face, layer;
+    float u, u_end; // where the ray is, and where it ends, as far as is known
+    ivec2 cell;     // of the node that it is in
+    int level;
+    bool is_before, is_behind; // neither: it has just begun
+    float u_before;            // where it was last before the layer
+    float u_since;             // since when it is behind it; NEVER: it is not
+    float u_behind, u_fill; // where it came behind it for more than a texel, and where it was last before then
+    candidate beside;       // where it first met a plane beside the surface that the plane stands for
+    vec2 offered;           // distances of the last two intersections, none of which counts twice
+};
+
+// Where a ray is in a node.
+struct node_passage {
+    uvec2 node;
+    bool is_plane;
+    float u_out, w_out;
+    float gap_in, gap_out; // how far the surface is before the ray there, in w: above 0 the ray is behind it
+};
+
+uint walk_flags = 0u;
+uint walk_steps = 0u, walk_meetings = 0u;
+
+uint slice_of(layer_walk walk)
+{
+    return walk.face * quadtree.layers + walk.layer;
+}
+
+// ---- hits ----
+
+bool is_met_before(layer_walk walk, float distance_)
+{
+    vec2 apart = abs(walk.offered - distance_);
+    return min(apart.x, apart.y) <= 1e-5 * abs(distance_);
+}
+
+// True if the ray ends there.
+bool offer(trace_ray r, candidate met, inout layer_walk walk, inout found_type found)
+{
+#ifdef ANY_HIT
+    if (is_met_before(walk, met.distance))
+        return false;
+    walk.offered = vec2(met.distance, walk.offered.x);
+    return offer_any(r, met, found);
+#else
+    float before = found.distance;
+    offer_closest(r, met, found);
+    if (found.distance >= before)
+        return false;
+    walk_flags = (walk.layer + 1u) << HIT_LAYER_SHIFT;
+    return false; // the walk ends where the ray now does
+#endif
+}
+
+// The primitive that a texel shows; false: none that is a hit of its own.
+bool visible_at(ivec2 texel, uint slice, out uvec2 visible)
+{
+    ivec2 last = ivec2(quadtree.width, quadtree.height) - 1;
+    visible = texelFetch(quadtree_visible, ivec3(clamp(texel, ivec2(0), last), int(slice)), 0).xy;
+    return visible.x != VISIBLE_NOTHING && visible.x != VISIBLE_DISC;
+}
+
+// Of a sphere the root that is nearer to `near`.
+bool intersect_visible(trace_ray r, uvec2 visible, float near, out candidate met)
+{
+    object_ray o = object_from_world_ray(r, visible.x - 1u);
+    met = candidate(0.0, visible.y, visible.x - 1u, vec2(0.0));
+#ifdef HAS_SPHERES
+    if (geometry_at(instance_at(visible.x - 1u).geometry).kind == GEOMETRY_SPHERES) {
+        vec4 sphere = texelFetch(spheres, int(visible.y));
+        vec2 distances;
+        if (!intersect_sphere(o.origin, o.direction, sphere.xyz, sphere.w, distances))
+            return false;
+        met.distance = abs(distances.x - near) < abs(distances.y - near) ? distances.x : distances.y;
+        return true;
+    }
+#endif
+    return intersect_primitive(r, o, visible.y, visible.x - 1u, met);
+}
+
+// The primitives of the texel and of those beside it on the side of the place; the first that is met is enough where
+// surfaces go on from texel to texel. True: the ray ends.
+bool offer_primitives(trace_ray r, vec2 place, float near, bool all_four, inout layer_walk walk, inout found_type found,
+                      out bool has_met)
+{
+    ivec2 texel = ivec2(floor(place)), towards = ivec2(greaterThan(fract(place), vec2(0.5))) * 2 - 1;
+    uvec2 tried = uvec2(VISIBLE_NOTHING);
+    has_met = false;
+    bool ends = false;
+    for (int i = 0; i < 4 && (all_four || !has_met); i++) {
+        uvec2 visible;
+        candidate met;
+        if (!visible_at(texel + ivec2(i & 1, i >> 1) * towards, slice_of(walk), visible) || visible == tried)
+            continue;
+        tried = visible;
+        if (intersect_visible(r, visible, near, met) && met.distance > r.t_min) {
+            has_met = true;
+            ends = offer(r, met, walk, found) || ends;
+        }
+    }
+    return ends;
+}
+
+// A plane through a neighbour of the surface that the ray begins on may pass beside its origin: no hit.
+bool is_own_surface(layer_walk walk, vec3 place, vec2 slopes)
+{
+    vec3 away = abs(place - walk.origin);
+    return walk.origin.z >= 0.0 && max(away.x, away.y) < QUADTREE_OWN_WAY &&
+           away.z <= QUADTREE_OWN_WAY * (abs(slopes.x) + abs(slopes.y)) + QUADTREE_EDGE_SHARE * place.z;
+}
+
+// The ray meets the plane of a node at u. True: it ends.
+bool meet(trace_ray r, float u, uvec2 node, inout layer_walk walk, inout found_type found)
+{
+    vec3 place = walk.s.from + u * walk.s.along;
+    float near = distance_at(walk.s, u);
+#ifndef QUADTREE_PLANES
+    bool has_met;
+    if (offer_primitives(r, place.xy, near, plane_is_at_edge(node), walk, found, has_met))
+        return true;
+    if (has_met)
+        return false;
+#endif
+    uvec2 visible;
+    if (is_own_surface(walk, place, plane_slopes(node)) || !visible_at(ivec2(floor(place.xy)), slice_of(walk), visible))
+        return false;
+    candidate met = candidate(near, visible.y, visible.x - 1u, vec2(0.0));
+#ifndef QUADTREE_PLANES
+    // Beside the edge of the surface there may be another one behind it, or nothing.
+    if (plane_is_at_edge(node)) {
+        if (near < walk.beside.distance && near > r.t_min)
+            walk.beside = met;
+        return false;
+    }
+#endif
+    return offer(r, met, walk, found);
+}
+
+// Where the ray's w passes from before the node to behind it, or back: true.
+bool is_met(node_passage p)
+{
+    return p.is_plane && (p.gap_in > 0.0) != (p.gap_out > 0.0);
+}
+
+// What the ray meets in a node whose plane it passes, or beside whose edge it is. True: it ends.
+bool meet_in(trace_ray r, node_passage p, inout layer_walk walk, inout found_type found)
+{
+    bool goes_on = walk.is_before && p.gap_in <= QUADTREE_EDGE_SHARE * plane_w(p.node) + quadtree.bounds.x;
+    if (is_met(p))
+        return meet(r, mix(walk.u, p.u_out, clamp(p.gap_in / (p.gap_in - p.gap_out), 0.0, 1.0)), p.node, walk, found);
+    if (goes_on) // between two planes that do not quite meet
+        return meet(r, walk.u, p.node, walk, found);
+#ifndef QUADTREE_PLANES
+    // Within a texel of an edge, of which its middle sees the other side.
+    bool has_met;
+    vec3 place = walk.s.from + walk.u * walk.s.along;
+    return offer_primitives(r, place.xy, distance_at(walk.s, walk.u), true, walk, found, has_met);
+#else
+    return false;
+#endif
+}
+
+// ---- the walk through a layer ----
+
+void begin_layer(uint layer, float u, inout layer_walk walk)
+{
+    ivec2 last = ivec2(quadtree.padded_width, quadtree.padded_height) - 1;
+#ifdef QUADTREE_DDA
+    walk.level = 0;
+#else
+    walk.level = QUADTREE_TOP;
+#endif
+    walk.layer = layer;
+    walk.u = u;
+    walk.cell = clamp(ivec2(floor(walk.s.from.xy + walk.s.along.xy * u)), ivec2(0), last) >> walk.level;
+    walk.is_before = walk.is_behind = false;
+    walk.u_before = walk.u_since = walk.u_behind = walk.u_fill = NEVER;
+}
+
+vec2 exits_of(layer_walk walk)
+{
+    ivec2 forward = ivec2(greaterThan(walk.inverse, vec2(0.0)));
+    return (vec2((walk.cell + forward) << walk.level) - walk.s.from.xy) * walk.inverse;
+}
+
+node_passage look(layer_walk walk)
+{
+    node_passage p;
+    p.node = texelFetch(quadtree_nodes, int(node_index(slice_of(walk), uint(walk.level), uvec2(walk.cell)))).xy;
+    p.is_plane = node_is_plane(p.node);
+    vec2 exits = exits_of(walk);
+    p.u_out = clamp(min(exits.x, exits.y), walk.u, walk.u_end);
+    float w_in = walk.s.from.z + walk.s.along.z * walk.u;
+    p.w_out = walk.s.from.z + walk.s.along.z * p.u_out;
+    vec2 slopes = plane_slopes(p.node), centre = node_centre(uint(walk.level), uvec2(walk.cell));
+    float w = plane_w(p.node) + dot(slopes, walk.s.from.xy - centre), growth = dot(slopes, walk.s.along.xy);
+    vec2 range = box_range(p.node), of_ray = vec2(min(w_in, p.w_out), max(w_in, p.w_out));
+    float gap = of_ray.x > range.x ? -1.0 : of_ray.y < range.y ? range.y - of_ray.y : 0.0; // of a box; 0: in it
+    p.gap_in = p.is_plane ? w + growth * walk.u - w_in : gap;
+    p.gap_out = p.is_plane ? w + growth * p.u_out - p.w_out : gap;
+    return p;
+}
+
+void go_down(inout layer_walk walk)
+{
+    walk.level--;
+    ivec2 low = walk.cell * 2;
+    walk.cell = clamp(ivec2(floor(walk.s.from.xy + walk.s.along.xy * walk.u)) >> walk.level, low, low + 1);
+}
+
+// A ray that is behind a plane's extension beyond the surface comes before its neighbour's within a texel: it counts as
+// behind the layer where it stays so.
+void note_side(node_passage p, inout layer_walk walk)
+{
+    walk.is_before = p.gap_out <= 0.0;
+    walk.is_behind = !walk.is_before;
+    if (walk.is_before) {
+        walk.u_before = mix(walk.u, p.u_out, 0.999);
+        walk.u_since = NEVER;
+        return;
+    }
+    float u_in = p.gap_in > 0.0 ? walk.u : mix(walk.u, p.u_out, clamp(p.gap_in / (p.gap_in - p.gap_out), 0.0, 1.0));
+    walk.u_since = min(walk.u_since, u_in);
+    vec2 way = abs(walk.s.along.xy) * (p.u_out - walk.u_since);
+    bool stays = p.gap_out > QUADTREE_DEEP * p.w_out || max(way.x, way.y) > QUADTREE_OWN_WAY;
+    if (stays && walk.u_since < walk.u_behind) {
+        walk.u_behind = walk.u_since;
+        walk.u_fill = walk.u_before;
+    }
+}
+
+// To the successor across the side that the ray leaves the node by, one level below the last node that both are in.
+void leave(node_passage p, inout layer_walk walk)
+{
+    ivec2 size = ivec2(quadtree.padded_width, quadtree.padded_height), next = walk.cell;
+    vec2 exits = exits_of(walk);
+    if (exits.x < exits.y)
+        next.x += walk.inverse.x > 0.0 ? 1 : -1;
+    else
+        next.y += walk.inverse.y > 0.0 ? 1 : -1;
+    walk.u = p.u_out;
+    if (any(lessThan(next, ivec2(0))) || any(greaterThanEqual(next << walk.level, size)))
+        walk.u = walk.u_end;
+#ifdef QUADTREE_DDA
+    walk.cell = next;
+#else
+    int up = min(findMSB((walk.cell.x ^ next.x) | (walk.cell.y ^ next.y)), QUADTREE_TOP - walk.level);
+    walk.level += up;
+    walk.cell = next >> up;
+#endif
+}
+
+// Nodes that the ray passes, until it meets something in one of them: true.
+bool walk_on(inout layer_walk walk, out node_passage p)
+{
+    for (int i = 0; i < STEPS_TOGETHER && walk.u < walk.u_end; i++) {
+        walk_steps++;
+        p = look(walk);
+        if (!p.is_plane && p.gap_in == 0.0) {
+            go_down(walk);
+            continue;
+        }
+        bool is_other_side = p.gap_in > 0.0 ? !walk.is_behind : !walk.is_before;
+        if (p.is_plane && (is_met(p) || is_other_side))
+            return true;
+        note_side(p, walk);
+        leave(p, walk);
+    }
+    return false;
+}
+
+// ---- faces ----
+
+// What is known of a ray in all faces.
+struct view_walk {
+    float t_unknown; // from where on nothing is; 1e30: all is known
+    uint layers;     // that it had to look at
+    bool has_left;   // it is unknown as the ray is outside what the view sees
+    uint fill_slice; // where it was last before a surface
+    ivec2 fill_texel;
+};
+
+// A view does not see what is beside it. But what lies between another eye near its own and its pyramid is taken to
+// be empty.
+void note_outside(trace_ray r, vec2 t, float t_end, inout view_walk seen)
+{
+    bool is_eye = distance(r.origin, quadtree.eye_world.xyz) <= quadtree.eye_world.w;
+    float t_outside = !(t.x < t.y) || (t.x > r.t_min && !is_eye) ? r.t_min : t.y < t_end ? t.y : 1e30;
+    if (t_outside < seen.t_unknown) {
+        seen.t_unknown = t_outside;
+        seen.has_left = true;
+    }
+}
+
+// How far along a ray something may be that the view sees.
+float last_distance(trace_ray r)
+{
+    return (length(r.origin - quadtree.eye_world.xyz) + quadtree.depths.y) / length(r.direction);
+}
+
+uint face_towards(vec3 p)
+{
+    if (quadtree.faces == 1u)
+        return 0u;
+    vec3 size = abs(p);
+    uint axis = size.x >= max(size.y, size.z) ? 0u : size.y >= size.z ? 1u : 2u;
+    return 2u * axis + uint(p[axis] < 0.0);
+}
+
+#ifdef ANY_HIT
+#define NEAREST(found, r) r.t_max
+#define SHORTEN(walk, found)
+#else
+#define NEAREST(found, r) found.distance
+#define SHORTEN(walk, found) walk.u_end = min(walk.u_end, place_at(walk.s, found.distance))
+#endif
+
+// A ray that meets nothing else in a face has met the surface that it passed the edge of.
+void offer_beside(trace_ray r, layer_walk walk, inout found_type found)
+{
+#ifndef ANY_HIT
+    if (found.primitive == HIT_NO_PRIMITIVE && walk.beside.distance < found.distance) {
+        walk_flags = (walk.layer + 1u) << HIT_LAYER_SHIFT;
+        offer_closest(r, walk.beside, found);
+    }
+#endif
+}
+
+// The first layer of the next face that the ray passes; the face in which it begins is the first one.
+bool begin_face(trace_ray r, found_type found, inout layer_walk walk, inout view_walk seen)
+{
+    vec3 from_eye = r.origin - quadtree.eye_world.xyz;
+    float t_last = last_distance(r);
+    uint first = face_towards(from_eye + r.t_min * r.direction);
+    for (; walk.turn < quadtree.faces; walk.turn++) {
+        walk.face = walk.turn == 0u ? first : walk.turn <= first ? walk.turn - 1u : walk.turn;
+        vec3 origin = face_vector(walk.face, from_eye), direction = face_vector(walk.face, r.direction);
+        vec2 t = clip_to_face(origin, direction, vec2(r.t_min, min(t_last, NEAREST(found, r))));
+        if (!(t.x < t.y))
+            continue;
+        walk.turn++;
+        walk.s = segment_of(origin, direction, t);
+        walk.origin = origin.z >= quadtree.depths.w ? face_place(origin, face_q(origin)) : vec3(-1.0);
+        vec2 along = walk.s.along.xy;
+        walk.inverse = 1.0 / mix(along, vec2(1e-9), lessThan(abs(along), vec2(1e-9)));
+        walk.beside = candidate_none(1e30);
+        walk.offered = vec2(-1.0);
+        walk.u_end = 1.0;
+        begin_layer(0u, 0.0, walk);
+        return true;
+    }
+    return false;
+}
+
+void end_face(trace_ray r, layer_walk walk, inout found_type found, inout view_walk seen)
+{
+    offer_beside(r, walk, found);
+    float t = distance_at(walk.s, min(walk.u_behind, 1.0));
+    if (walk.u_behind >= walk.u_end || t >= seen.t_unknown)
+        return;
+    vec2 place = walk.s.from.xy + walk.s.along.xy * walk.u_fill;
+    seen.t_unknown = t;
+    seen.fill_slice = slice_of(walk);
+    seen.fill_texel = walk.u_fill == NEVER ? ivec2(-1) : ivec2(floor(place));
+}
+
+// The next layer where the ray is behind this one, or the next face. False: it has been through all.
+bool begin_next(trace_ray r, inout layer_walk walk, inout found_type found, inout view_walk seen)
+{
+    if (walk.u_behind < walk.u_end && walk.layer + 1u < quadtree.layers) {
+        begin_layer(walk.layer + 1u, walk.u_behind, walk);
+        seen.layers = max(seen.layers, walk.layer + 1u);
+        return true;
+    }
+    end_face(r, walk, found, seen);
+    return begin_face(r, found, walk, seen);
+}
+
+// True: the ray ends before its end.
+bool walk_view(trace_ray r, inout view_walk seen, inout found_type found)
+{
+    layer_walk walk;
+    node_passage p;
+    walk.turn = 0u;
+    bool has_layer = begin_face(r, found, walk, seen);
+    while (has_layer) {
+        if (walk_on(walk, p)) {
+            walk_meetings++;
+            if (meet_in(r, p, walk, found))
+                return true;
+            SHORTEN(walk, found);
+            if (walk.u_end <= p.u_out) {
+                walk.u = walk.u_end;
+            } else {
+                note_side(p, walk);
+                leave(p, walk);
+            }
+        }
+        if (walk.u >= walk.u_end)
+            has_layer = begin_next(r, walk, found, seen);
+    }
+    return false;
+}
+
+// What lies outside a view, of which there is one face.
+void look_beside_view(trace_ray r, float t_end, inout view_walk seen)
+{
+    if (quadtree.faces > 1u)
+        return;
+    t_end = min(last_distance(r), t_end);
+    vec3 origin = face_vector(0u, r.origin - quadtree.eye_world.xyz), direction = face_vector(0u, r.direction);
+    note_outside(r, clip_to_face(origin, direction, vec2(r.t_min, t_end)), t_end, seen);
+}
+
+view_walk begin_view_walk()
+{
+    return view_walk(1e30, 1u, false, 0u, ivec2(-1));
+}
+
+void count(view_walk seen, bool is_unknown)
+{
+    atomicAdd(counts_of_kinds[ray_kind].rays, 1u);
+    if (seen.layers > 1u)
+        atomicAdd(counts_of_kinds[ray_kind].behind_first, 1u);
+    if (seen.layers > 2u)
+        atomicAdd(counts_of_kinds[ray_kind].behind_second, 1u);
+    if (is_unknown && seen.has_left)
+        atomicAdd(counts_of_kinds[ray_kind].outside, 1u);
+    else if (is_unknown)
+        atomicAdd(counts_of_kinds[ray_kind].behind_last, 1u);
+}
+
+// ---- called by trace/wave.comp ----
+
+#ifdef ANY_HIT
+
+bool trace_any(trace_ray r, inout vec3 optical_depth)
+{
+    view_walk seen = begin_view_walk();
+    bool is_stopped = walk_view(r, seen, optical_depth);
+    look_beside_view(r, r.t_max, seen);
+    count(seen, !is_stopped && seen.t_unknown < r.t_max);
+    return is_stopped;
+}
+
+#else
+
+// What is unknown is filled with what the ray was last before: the background of what hides it (section 4.1).
+void fill(view_walk seen, inout candidate best)
+{
+    uvec2 visible;
+    if (seen.fill_texel.x < 0 || !visible_at(seen.fill_texel, seen.fill_slice, visible))
+        return;
+    best = candidate(seen.t_unknown, visible.y, visible.x - 1u, vec2(0.0));
+    walk_flags |= (seen.fill_slice % quadtree.layers + 1u) << HIT_LAYER_SHIFT;
+}
+
+void trace_closest(trace_ray r, inout candidate best)
+{
+    view_walk seen = begin_view_walk();
+    walk_flags = walk_steps = walk_meetings = 0u;
+    walk_view(r, seen, best);
+    look_beside_view(r, best.distance, seen);
+    bool is_unknown = seen.t_unknown < best.distance;
+    count(seen, is_unknown);
+    if (is_unknown) {
+        walk_flags |= HIT_UNKNOWN;
+        if (best.primitive == HIT_NO_PRIMITIVE)
+            fill(seen, best);
+    }
+#ifdef QUADTREE_COUNT_STEPS
+    best = candidate(float(walk_steps), seen.layers, walk_meetings, vec2(0.0));
+#endif
+}
+
+#endif

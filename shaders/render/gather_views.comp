@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: MIT
+// The radiance of an eye's samples from the pictures of a key view's layers (shared/key_view.h): of the intersection
+// of its ray with the structure of that view, which names the layer; of a ray that met nothing, the environment.
+// Widmer and others. An Adaptive Acceleration Structure for Screen-space Ray Tracing. 2015, section 5.1.
+//
+// Coverage is 1 wherever there is a surface: what blended surfaces leave open is in the layer's radiance.
+//
+// Defines: those of common/environment.glsl; OPEN in place of the environment is 1; HAS_UNKNOWN the share of samples
+// that the key view does not show is a layer of the picture.
+
+#include "shared/key_view.h"
+#include "shared/hit.h"
+#include "shared/layers.h"
+#include "common/dispatch.glsl"
+#include "common/environment.glsl"
+#include "render/wave.glsl"
+
+layout(local_size_x = 64) in;
+
+uniform vec3 key_right, key_up, key_back, key_eye; // axes of the key view in the world, and where it is
+uniform vec2 key_extent;                           // half width and height at distance 1, or of an orthographic view
+uniform uint key_orthographic;
+uniform uint key_width, key_height, key_layers;
+uniform float key_bound; // how far inverse distances of the structure may be off, 1 / metres
+#ifdef HAS_UNKNOWN
+uniform uint first_unknown; // in the sums
+#endif
+
+layout(binding = UNIT_RAYS) uniform samplerBuffer rays;
+layout(binding = UNIT_SHADE_HITS) uniform usamplerBuffer hits;
+layout(binding = UNIT_KEY_LAYER_0) uniform samplerBuffer key_layer_0;
+layout(binding = UNIT_KEY_LAYER_1) uniform samplerBuffer key_layer_1;
+layout(binding = UNIT_KEY_LAYER_2) uniform samplerBuffer key_layer_2;
+layout(std430, binding = BIND_SLICE_SUMS) writeonly buffer sum_block { vec4 slice_sums[]; };
+layout(std430, binding = BIND_KEY_COUNTS) buffer count_block { uint unknown_count; };
+#ifdef HAS_UNKNOWN
+layout(std430, binding = BIND_LAYER_SUMS) writeonly buffer layer_block { vec4 layer_sums[]; };
+#endif
+
+// A surface is met where inverse distances agree within this share, beside the structure's own bound: those of
+// surfaces that are some centimetres apart differ by more at the distances of a room.
+const float SURFACE_SHARE = 0.01;
+
+vec4 key_texel(uint layer, ivec2 p)
+{
+    p = clamp(p, ivec2(0), ivec2(key_width, key_height) - 1);
+    int place = p.y * int(key_width) + p.x;
+    if (layer == 0u)
+        return texelFetch(key_layer_0, place);
+    return layer == 1u ? texelFetch(key_layer_1, place) : texelFetch(key_layer_2, place);
+}
+
+// Straight in the picture's coordinates on every plane. Of an orthographic view distances themselves are.
+float straight(float distance_)
+{
+    if (key_orthographic != 0u)
+        return distance_;
+    return distance_ == KEY_INFINITE ? 0.0 : 1.0 / distance_;
+}
+
+// From the four texels round a place, of which those count that agree with what a ray met there. `known`: one at least does.
+vec3 key_radiance(uint layer, vec2 place, float met, out bool known)
+{
+    vec2 corner = floor(place - 0.5), f = place - 0.5 - corner;
+    ivec2 p = ivec2(corner);
+    vec4 a = key_texel(layer, p), b = key_texel(layer, p + ivec2(1, 0));
+    vec4 c = key_texel(layer, p + ivec2(0, 1)), d = key_texel(layer, p + ivec2(1, 1));
+    vec4 there = vec4(greaterThanEqual(vec4(a.w, b.w, c.w, d.w), vec4(0.0)));
+    vec4 depths = vec4(straight(a.w), straight(b.w), straight(c.w), straight(d.w));
+    vec4 weights = vec4((1.0 - f.x) * (1.0 - f.y), f.x * (1.0 - f.y), (1.0 - f.x) * f.y, f.x * f.y);
+    float tolerance = SURFACE_SHARE * abs(met) + key_bound;
+    // Four texels of one plane pass through what was met, however steep it is.
+    float fold = abs(depths.x - depths.y - depths.z + depths.w);
+    bool plane = dot(there, vec4(1.0)) == 4.0 && fold <= tolerance && abs(dot(weights, depths) - met) <= tolerance;
+    vec4 misfit = abs(depths - met) + (1.0 - there) * 1e30;
+    float best = min(min(misfit.x, misfit.y), min(misfit.z, misfit.w));
+    // Else those that fit as well as the best one, by as much as a steep surface may differ from texel to texel.
+    vec4 fits = vec4(lessThanEqual(misfit, vec4(best + tolerance))) * there;
+    vec4 own = plane ? weights : fits * max(weights, vec4(1e-6));
+    known = plane || best <= 0.1 * abs(met) + key_bound;
+    float sum = max(dot(own, vec4(1.0)), 1e-30);
+    return (own.x * a.rgb + own.y * b.rgb + own.z * c.rgb + own.w * d.rgb) / sum;
+}
+
+vec4 missed(vec3 direction)
+{
+    float coverage = frame.environment_kind != ENVIRONMENT_NONE ? 1.0 : 0.0;
+#ifdef OPEN
+    return vec4(vec3(1.0), coverage);
+#else
+    return vec4(environment_radiance(direction), coverage);
+#endif
+}
+
+// Of the point that a ray met.
+vec3 met_radiance(vec3 point, uint bits, out bool known)
+{
+    vec3 d = point - key_eye, v = vec3(dot(d, key_right), dot(d, key_up), -dot(d, key_back));
+    vec2 on_view = (key_orthographic != 0u ? v.xy : v.xy / v.z) / key_extent;
+    vec2 place = (vec2(on_view.x, -on_view.y) * 0.5 + 0.5) * vec2(key_width, key_height);
+    uint layer = max((bits & HIT_LAYER_MASK) >> HIT_LAYER_SHIFT, 1u) - 1u;
+    vec3 radiance = key_radiance(min(layer, key_layers - 1u), place, key_orthographic != 0u ? v.z : 1.0 / v.z, known);
+    known = known && (bits & HIT_UNKNOWN) == 0u;
+    return radiance;
+}
+
+void main()
+{
+    uint k = item_index();
+    if (k >= wave.rays.count)
+        return;
+    vec4 origin = texelFetch(rays, int(2u * k)), direction = texelFetch(rays, int(2u * k + 1u));
+    uvec4 met = texelFetch(hits, int(3u * k));
+    float distance_ = uintBitsToFloat(met.x);
+    bool known = true;
+    vec4 sum = vec4(0.0); // a pixel beyond the picture's edge
+    if (distance_ >= 0.0)
+        sum = vec4(met_radiance(origin.xyz + distance_ * direction.xyz, met.y, known), 1.0);
+    else if (direction.w > origin.w)
+        sum = missed(direction.xyz);
+    slice_sums[k] = sum;
+#ifdef HAS_UNKNOWN
+    layer_sums[first_unknown + k] = vec4(vec3(known ? 0.0 : 1.0), 1.0);
+#endif
+    if (!known && wave.stopped == 0u)
+        atomicAdd(unknown_count, 1u);
+}

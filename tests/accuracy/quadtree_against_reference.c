@@ -1,0 +1,291 @@
+/* SPDX-License-Identifier: MIT */
+/* What the tracer quadtree says that it has seen is the first hit of the reference: for eyes round the view that
+ * its structure belongs to, and all pixels that each of them sees. Models are those of the folder FARLIGHT_SCENES.
+ * Each test prints what share of the pixels is known, by layers. */
+#include "tests/accuracy/test_scenes.h"
+#include "tests/bench/load_model.h"
+#include "tests/fixtures/device.h"
+
+#include "gpu_scene/scene.h"
+#include "shared/hit.h"
+#include "shared/ray.h"
+#include "trace/tracer.h"
+
+#include <unistd.h>
+
+#define SIDE 256u
+#define PIXELS (SIDE * SIDE)
+#define EYES 8u
+#define FOV 1.05f
+#define LAYERS 3u
+#define BOUND_PIXELS 0.25f /* of planes */
+/* Of what is known, the share that is the first hit or what is a pixel beside it: an outline lies where a texel's
+ * middle has it, so on either side of it is what belongs to the other one. */
+#define SEEN_MIN 0.998
+#define BESIDE 0.01 /* of 1 / depth, by which a surface may change from one pixel to the next */
+
+struct room {
+    struct gpu_scene gpu;
+    struct tracer *exact;
+    struct trace_view view;
+    float radius; /* metres, of the sphere in which eyes are */
+    struct gpu_buffer rays, answers;
+    struct ray host_rays[PIXELS];
+    struct hit hits[PIXELS], expected[EYES][PIXELS];
+};
+
+static void expect_ok(bool ok, const struct error *error)
+{
+    if (!ok)
+        fail_msg("%s: %s", error->field, error->text);
+}
+
+ALL_TESTS(open_device, close_device)
+
+/* ---- scenes ---- */
+
+static void add_box_at(struct test_edits *edits, uint32_t node, float x, float y, float z, float turn)
+{
+    float m[12];
+    test_transform(m, 0.3f, 0.6f, 0.3f, 1, turn, x, y, z);
+    test_node(edits, node, 0, NODE_MESH, 2, m);
+}
+
+/* A floor and a wall, boxes before one another, and a soup of small things. */
+static struct scene *scene_of_a_room(void)
+{
+    static const float corners[8][3] = {{-1, -1, -1}, {1, -1, -1}, {-1, 1, -1}, {1, 1, -1},
+                                        {-1, -1, 1},  {1, -1, 1},  {-1, 1, 1},  {1, 1, 1}};
+    static const uint32_t sides[36] = {0, 4, 6, 0, 6, 2, 1, 3, 7, 1, 7, 5, 0, 1, 5, 0, 5, 4,
+                                       2, 6, 7, 2, 7, 3, 0, 2, 3, 0, 3, 1, 4, 5, 7, 4, 7, 6};
+    struct test_edits edits = {.scene = test_scene_create()};
+    float m[12];
+    test_material(&edits, 1, 0.1f, 0.2f, 0.3f);
+    test_material(&edits, 2, 0.4f, 0.5f, 0.6f);
+    test_mesh(&edits, 2, corners, 8, sides, 12);
+    test_soup_mesh(&edits, 3, 60, 0.25f, 11);
+    test_transform(m, 4, 3, 4, 1, 0, 0, 1.5f, 0);
+    test_node(&edits, 1, 0, NODE_MESH, 2, m); /* the room itself */
+    for (uint32_t i = 0; i < 6; i++)
+        add_box_at(&edits, 10 + i, -2 + 0.8f * (float)i, -0.9f, -1.2f - 0.9f * (float)(i % 3), 0.4f * (float)i);
+    test_transform(m, 0.8f, 0.8f, 0.8f, 0, 0.5f, 0.4f, 1.2f, -1.5f);
+    test_node(&edits, 20, 0, NODE_MESH, 3, m);
+    test_commit(&edits);
+    return edits.scene;
+}
+
+/* ---- rays ---- */
+
+static void look_from(struct room *room, float x, float y, float z)
+{
+    room->view = (struct trace_view){
+        .world_from_view = {1, 0, 0, x, 0, 1, 0, y, 0, 0, 1, z}, .fov_y = FOV, .width = SIDE, .height = SIDE};
+}
+
+/* Through the middles of the pixels, from so far beside the eye. */
+static void make_rays(struct room *room, const float beside[3])
+{
+    const float tangent = tanf(FOV / 2);
+    for (uint32_t i = 0; i < PIXELS; i++) {
+        struct ray *ray = &room->host_rays[i];
+        for (int k = 0; k < 3; k++)
+            ray->origin_t_min[k] = room->view.world_from_view[4 * k + 3] + beside[k];
+        ray->origin_t_min[3] = 0;
+        ray->direction_t_max[0] = tangent * (2 * ((float)(i % SIDE) + 0.5f) / SIDE - 1);
+        ray->direction_t_max[1] = tangent * (1 - 2 * ((float)(i / SIDE) + 0.5f) / SIDE);
+        ray->direction_t_max[2] = -1;
+        ray->direction_t_max[3] = 1e6f;
+    }
+}
+
+static void eye_beside(uint32_t eye, float radius, float beside[3])
+{
+    uint64_t seed = 77 + eye;
+    float squared = 2;
+    while (squared > 1) {
+        squared = 0;
+        for (int k = 0; k < 3; k++) {
+            beside[k] = test_uniform(&seed, -1, 1);
+            squared += beside[k] * beside[k];
+        }
+    }
+    for (int k = 0; k < 3; k++)
+        beside[k] *= radius;
+}
+
+static void trace(struct room *room, struct tracer *tracer, struct hit *hits)
+{
+    struct error error = {0};
+    expect_ok(gpu_buffer_upload(device, &room->rays, room->host_rays, sizeof(room->host_rays), &error), &error);
+    const struct wave wave = {
+        .kind = WAVE_CLOSEST, .ray_count = PIXELS, .rays = &room->rays, .hits = &room->answers};
+    gpu_scene_bind(&room->gpu);
+    expect_ok(tracer_trace(tracer, &room->gpu, &wave, &error), &error);
+    gpu_buffer_read(device, &room->answers, 0, hits, PIXELS * sizeof(*hits));
+}
+
+static struct tracer *bring(struct room *room, unsigned number, const struct tracer_options *options)
+{
+    struct error error = {0};
+    struct tracer *tracer = tracer_create(tracer_impl_by_number(number), device, options, &error);
+    expect_ok(tracer != NULL, &error);
+    const struct tracer_update update = {.changed = CHANGED_ALL, .view = &room->view};
+    expect_ok(tracer_update(tracer, &room->gpu, &update, &error), &error);
+    return tracer;
+}
+
+/* ---- comparing ---- */
+
+/* Distances are depths here. `off`: how far 1 / depth may be off where a surface is seen straight on; a plane that
+ * is seen at a slant is off by more along the ray, and so is one that a texel's rounding moves. */
+static bool is_same(const struct hit *got, const struct hit *expected, double off)
+{
+    if (got->distance < 0 || expected->distance < 0)
+        return got->distance < 0 && expected->distance < 0;
+    const double apart = fabs(1 / (double)got->distance - 1 / (double)expected->distance);
+    return apart < 4 * off + 1e-4 / (double)expected->distance;
+}
+
+static bool is_beside(const struct hit *got, const struct hit *expected, uint32_t pixel)
+{
+    for (uint32_t i = 0; i < 9; i++) {
+        const uint32_t x = pixel % SIDE + i % 3, y = pixel / SIDE + i / 3; /* one more than they are */
+        if (x < 1 || x > SIDE || y < 1 || y > SIDE)
+            continue;
+        const struct hit *one = &expected[(y - 1) * SIDE + x - 1];
+        if (is_same(got, one, one->distance > 0 ? BESIDE / 4 / (double)one->distance : 0))
+            return true;
+    }
+    return false;
+}
+
+struct share {
+    uint64_t known, right, beside;
+};
+
+static struct share compare(struct room *room, struct tracer *tracer, double off)
+{
+    struct share share = {0, 0, 0};
+    for (uint32_t eye = 0; eye < EYES; eye++) {
+        float beside[3];
+        eye_beside(eye, room->radius, beside);
+        make_rays(room, beside);
+        trace(room, tracer, room->hits);
+        for (uint32_t i = 0; i < PIXELS; i++) {
+            if (room->hits[i].material & HIT_UNKNOWN)
+                continue;
+            share.known++;
+            const bool is_right = is_same(&room->hits[i], &room->expected[eye][i], off);
+            share.right += is_right;
+            share.beside += !is_right && is_beside(&room->hits[i], room->expected[eye], i);
+        }
+    }
+    return share;
+}
+
+static void expect_seen_is_first(struct room *room, const char *name)
+{
+    for (int planes = 0; planes < 2; planes++) {
+        uint64_t known_before = 0;
+        for (uint32_t layers = 1; layers <= LAYERS; layers++) {
+            const struct tracer_options options = {
+                .quadtree = {.layers = layers,
+                             .faces = QUADTREE_FACES_VIEW,
+                             .pixels = BOUND_PIXELS,
+                             .radius = room->radius,
+                             .hits = planes ? QUADTREE_HITS_PLANE : QUADTREE_HITS_PRIMITIVE}};
+            const double focal_pixels = SIDE / 2.0 / tan((double)FOV / 2);
+            const double off = (double)BOUND_PIXELS / (focal_pixels * (double)room->radius);
+            struct tracer *tracer = bring(room, TRACER_QUADTREE, &options);
+            const struct share share = compare(room, tracer, off);
+            const double known = (double)share.known, right = (double)(share.right + share.beside) / known;
+            tracer_destroy(tracer);
+            printf(
+                "%s, hits of %s, %u layers: %.2f %% of the pixels are known, of which %.3f %% are the first hit, "
+                "%.3f %% one beside it\n",
+                name, planes ? "planes" : "primitives", layers, 100 * known / (EYES * PIXELS),
+                100 * (double)share.right / known, 100 * (double)share.beside / known);
+            if (!(right >= SEEN_MIN))
+                fail_msg("%s: %.3f %% of what is known is the first hit", name, 100 * right);
+            assert_true(share.known >= EYES * PIXELS / 2); /* else it says little */
+            assert_true(share.known >= known_before);
+            known_before = share.known;
+        }
+    }
+}
+
+/* With the eye at a share of what bounds the scene, looking against the third axis; eyes are within a share of its
+ * longest side. */
+static void expect_seen_of(struct scene *scene, const char *name, const float place[3], float radius)
+{
+    struct room *room = calloc(1, sizeof(*room));
+    struct scene_changes changes;
+    struct error error = {0};
+    float eye[3], longest = 0;
+    if (!tracer_impl_by_number(TRACER_QUADTREE)) {
+        printf("the build leaves the tracer out\n");
+        skip();
+    }
+    gpu_scene_init(&room->gpu, device);
+    expect_ok(gpu_scene_update(&room->gpu, scene, NULL, &changes, NULL, &error), &error);
+    for (int k = 0; k < 3; k++) {
+        const float size = room->gpu.upper_world[k] - room->gpu.lower_world[k];
+        eye[k] = room->gpu.lower_world[k] + place[k] * size;
+        longest = fmaxf(longest, size);
+    }
+    look_from(room, eye[0], eye[1], eye[2]);
+    room->radius = radius * longest;
+    expect_ok(gpu_buffer_reserve(device, &room->answers, PIXELS * sizeof(struct hit), &error), &error);
+    room->exact = bring(room, tracer_impl_by_number(TRACER_REFERENCE) ? TRACER_REFERENCE : TRACER_BVH,
+                        &(struct tracer_options){0});
+    for (uint32_t i = 0; i < EYES; i++) {
+        float beside[3];
+        eye_beside(i, room->radius, beside);
+        make_rays(room, beside);
+        trace(room, room->exact, room->expected[i]);
+    }
+    expect_seen_is_first(room, name);
+    tracer_destroy(room->exact);
+    gpu_buffer_finish(device, &room->rays);
+    gpu_buffer_finish(device, &room->answers);
+    gpu_scene_finish(&room->gpu);
+    free(room);
+}
+
+TEST(what_is_seen_of_a_room_is_the_first_hit_of_the_reference)
+{
+    (void)state;
+    struct scene *scene = scene_of_a_room();
+    expect_seen_of(scene, "a room", (const float[3]){0.51f, 0.4f, 0.9f}, 0.02f);
+    scene_destroy(scene);
+}
+
+/* Inside of the one, with no more than air beside the eye: what is so near beside a view is taken to be empty. In
+ * front of the other. */
+TEST(what_is_seen_of_models_is_the_first_hit_of_the_reference)
+{
+    static const struct {
+        const char *path;
+        float place[3], radius;
+    } models[] = {{"screenspace/classroom.obj", {0.55f, 0.55f, 0.7f}, 0.015f},
+                  {"common/dragon-47k.glb", {0.5f, 0.6f, 3.0f}, 0.05f}};
+    const char *folder = getenv("FARLIGHT_SCENES");
+    (void)state;
+    if (!folder) {
+        printf("FARLIGHT_SCENES names no folder of models\n");
+        skip();
+    }
+    for (size_t i = 0; i < sizeof(models) / sizeof(models[0]); i++) {
+        char path[512];
+        struct loaded_model model;
+        struct error error = {0};
+        snprintf(path, sizeof(path), "%s/%s", folder, models[i].path);
+        if (access(path, R_OK) != 0) {
+            printf("%s is not there\n", path);
+            continue;
+        }
+        expect_ok(load_model(&model, path, &error), &error);
+        expect_seen_of(model.scene, models[i].path, models[i].place, models[i].radius);
+        load_model_finish(&model);
+    }
+}
