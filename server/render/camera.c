@@ -169,11 +169,9 @@ void camera_fill_uniforms(struct frame_uniforms *uniforms, const struct frame_re
 {
     const struct frame_camera *camera = &request->camera;
     bool orthographic = camera->fov_y == 0.0f;
-    uint32_t view_width, view_height;
-    frame_view_size(request, &view_width, &view_height);
-    eyes_middle(request, uniforms->eyes_middle);
-    eye_steps(request, uniforms->eye_steps);
-    float aspect = (float)view_width / (float)view_height;
+    uint32_t width, height;
+    frame_view_size(request, &width, &height);
+    float aspect = (float)width / (float)height;
     float half_height = orthographic ? camera->ortho_height / 2.0f : tanf(camera->fov_y / 2.0f);
     float near = camera->near;
     if (near <= 0.0f)
@@ -184,13 +182,16 @@ void camera_fill_uniforms(struct frame_uniforms *uniforms, const struct frame_re
         .near = near,
         .far = far_distance(camera, scene, near),
         .orthographic = orthographic,
-        .width = request->width,
-        .height = request->height,
+        .width = width,
+        .height = height,
     };
     memcpy(view.world_from_view, camera->world_from_view, sizeof(view.world_from_view));
     raster_camera_fill(uniforms, &view);
-    uniforms->view_width = view_width;
-    uniforms->view_height = view_height;
+    uniforms->width = request->width;
+    uniforms->height = request->height;
+    uniforms->tiles_across = (request->width + 7) / 8;
+    eyes_middle(request, uniforms->eyes_middle);
+    eye_steps(request, uniforms->eye_steps);
     uniforms->lens[0] = request->aperture / 2.0f;
     uniforms->lens[1] = request->focus > 0.0f ? request->focus : focus_distance(camera, scene);
 }

@@ -24,7 +24,7 @@ bool quadtree_layers_begin(struct quadtree_layers *layers, struct quadtree_store
 static struct raster_camera camera_of(const struct quadtree_store *store, uint32_t face)
 {
     struct raster_camera camera = {
-        .near = store->uniforms.depths[0],
+        .near = store->uniforms.depths[3],
         .far = store->uniforms.depths[1],
         .orthographic = store->uniforms.depths[2] != 0.0f,
         .width = store->uniforms.width,

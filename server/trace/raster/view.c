@@ -25,11 +25,9 @@ void raster_camera_fill(struct frame_uniforms *uniforms, const struct raster_cam
     uniforms->extent_near[2] = camera->near;
     uniforms->extent_near[3] = camera->orthographic ? 1.0f : 0.0f;
     uniforms->far_width[0] = camera->far;
-    uniforms->width = camera->width;
-    uniforms->height = camera->height;
+    uniforms->width = uniforms->view_width = camera->width;
+    uniforms->height = uniforms->view_height = camera->height;
     uniforms->tiles_across = (camera->width + 7) / 8;
-    uniforms->view_width = camera->width; /* one view, unless the caller says otherwise */
-    uniforms->view_height = camera->height;
 }
 
 static const struct gpu_program *get_program(struct gpu_device *device, enum primitive_kind kind, bool cutout,

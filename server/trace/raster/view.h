@@ -20,7 +20,7 @@ struct raster_camera {
     bool orthographic;
     uint32_t width, height;
 };
-/* Fills the camera's part of the uniforms, and no other. */
+/* Fills the camera's part of the uniforms, and no other: of a picture that has one view. */
 void raster_camera_fill(struct frame_uniforms *uniforms, const struct raster_camera *camera);
 
 /* Where drawing goes on, and how large a part is. All-zero is valid; it keeps what it has learnt. */
