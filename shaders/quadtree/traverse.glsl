@@ -39,7 +39,9 @@ struct layer_walk {
     bool is_before, is_behind; // neither: it has just begun
     float u_before;            // where it was last before the layer
     float u_since;             // since when it is behind it; NEVER: it is not
-    float u_behind, u_fill; // where it came behind it for more than a texel, and where it was last before then
+    float u_behind;         // where it came behind it for more than a texel
+    float u_fill;           // where it was last before the first layer that it came behind: before the background
+    uint fill_layer;        // that layer
     candidate beside;       // where it first met a plane beside the surface that the plane stands for
     vec2 offered;           // distances of the last two intersections, none of which counts twice
 };
@@ -208,7 +210,7 @@ void begin_layer(uint layer, float u, inout layer_walk walk)
     walk.u = u;
     walk.cell = clamp(ivec2(floor(walk.s.from.xy + walk.s.along.xy * u)), ivec2(0), last) >> walk.level;
     walk.is_before = walk.is_behind = false;
-    walk.u_before = walk.u_since = walk.u_behind = walk.u_fill = NEVER;
+    walk.u_before = walk.u_since = walk.u_behind = NEVER;
 }
 
 vec2 exits_of(layer_walk walk)
@@ -249,7 +251,7 @@ void note_side(node_passage p, inout layer_walk walk)
     walk.is_before = p.gap_out <= 0.0;
     walk.is_behind = !walk.is_before;
     if (walk.is_before) {
-        walk.u_before = mix(walk.u, p.u_out, 0.999);
+        walk.u_before = mix(walk.u, p.u_out, 0.99);
         walk.u_since = NEVER;
         return;
     }
@@ -259,7 +261,10 @@ void note_side(node_passage p, inout layer_walk walk)
     bool stays = p.gap_out > QUADTREE_DEEP * p.w_out || max(way.x, way.y) > QUADTREE_OWN_WAY;
     if (stays && walk.u_since < walk.u_behind) {
         walk.u_behind = walk.u_since;
-        walk.u_fill = walk.u_before;
+        if (walk.u_before != NEVER && walk.u_fill == NEVER) {
+            walk.u_fill = walk.u_before;
+            walk.fill_layer = walk.layer;
+        }
     }
 }
 
@@ -310,7 +315,8 @@ struct view_walk {
     float t_unknown; // from where on nothing is; 1e30: all is known
     uint layers;     // that it had to look at
     bool has_left;   // it is unknown as the ray is outside what the view sees
-    uint fill_slice; // where it was last before a surface
+    float t_fill;    // where it was last before a surface, and the texel that shows that
+    uint fill_slice;
     ivec2 fill_texel;
 };
 
@@ -380,6 +386,7 @@ bool begin_face(trace_ray r, found_type found, inout layer_walk walk, inout view
         walk.beside = candidate_none(1e30);
         walk.offered = vec2(-1.0);
         walk.u_end = 1.0;
+        walk.u_fill = NEVER;
         begin_layer(0u, 0.0, walk);
         return true;
     }
@@ -394,7 +401,8 @@ void end_face(trace_ray r, layer_walk walk, inout found_type found, inout view_w
         return;
     vec2 place = walk.s.from.xy + walk.s.along.xy * walk.u_fill;
     seen.t_unknown = t;
-    seen.fill_slice = slice_of(walk);
+    seen.t_fill = distance_at(walk.s, min(walk.u_fill, 1.0));
+    seen.fill_slice = walk.face * quadtree.layers + walk.fill_layer;
     seen.fill_texel = walk.u_fill == NEVER ? ivec2(-1) : ivec2(floor(place));
 }
 
@@ -448,7 +456,7 @@ void look_beside_view(trace_ray r, float t_end, inout view_walk seen)
 
 view_walk begin_view_walk()
 {
-    return view_walk(1e30, 1u, false, 0u, ivec2(-1));
+    return view_walk(1e30, 1u, false, 0.0, 0u, ivec2(-1));
 }
 
 void count(view_walk seen, bool is_unknown)
@@ -485,7 +493,7 @@ void fill(view_walk seen, inout candidate best)
     uvec2 visible;
     if (seen.fill_texel.x < 0 || !visible_at(seen.fill_texel, seen.fill_slice, visible))
         return;
-    best = candidate(seen.t_unknown, visible.y, visible.x - 1u, vec2(0.0));
+    best = candidate(seen.t_fill, visible.y, visible.x - 1u, vec2(0.0));
     walk_flags |= (seen.fill_slice % quadtree.layers + 1u) << HIT_LAYER_SHIFT;
 }
 

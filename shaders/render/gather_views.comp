@@ -121,9 +121,10 @@ vec3 met_radiance(vec3 point, uint bits, out bool known)
     vec3 d = point - key_eye, v = vec3(dot(d, key_right), dot(d, key_up), -dot(d, key_back));
     vec2 on_view = (key_orthographic != 0u ? v.xy : v.xy / v.z) / key_extent;
     vec2 place = (vec2(on_view.x, -on_view.y) * 0.5 + 0.5) * vec2(key_width, key_height);
-    vec3 radiance = key_radiance(layer_of(bits), place, key_orthographic != 0u ? v.z : 1.0 / v.z, known);
-    known = known && (bits & HIT_UNKNOWN) == 0u;
-    return radiance;
+    known = false;
+    if ((bits & HIT_UNKNOWN) != 0u) // the background beside what hides it, however far the point is from it
+        return key_texel(layer_of(bits), ivec2(floor(place))).rgb;
+    return key_radiance(layer_of(bits), place, key_orthographic != 0u ? v.z : 1.0 / v.z, known);
 }
 
 #ifdef HAS_LENS
@@ -174,7 +175,7 @@ void main()
     vec4 origin = texelFetch(rays, int(2u * k)), direction = texelFetch(rays, int(2u * k + 1u));
     uvec4 met = texelFetch(hits, int(3u * k));
     float distance_ = uintBitsToFloat(met.x);
-    bool known = true;
+    bool known = (met.y & HIT_UNKNOWN) == 0u;
     vec4 sum = vec4(0.0); // a pixel beyond the picture's edge
     if (distance_ >= 0.0)
         sum = vec4(met_radiance(origin.xyz + distance_ * direction.xyz, met.y, known), 1.0);
