@@ -23,6 +23,12 @@ uint node_index(uint slice, uint level, uvec2 place)
     return slice * quadtree.slice_nodes + node_level_first(level) + place.y * node_row(level) + place.x;
 }
 
+// What is said of a face as a whole lies behind the nodes.
+uint face_index(uint face)
+{
+    return quadtree.faces * quadtree.layers * quadtree.slice_nodes + face;
+}
+
 // In texel coordinates of the face.
 vec2 node_centre(uint level, uvec2 place)
 {

@@ -366,6 +366,14 @@ void offer_beside(trace_ray r, layer_walk walk, inout found_type found)
 #endif
 }
 
+// To where surfaces of the face may be: before the nearest one there is nothing.
+void clip_to_surfaces(uint face, vec3 origin, vec3 direction, inout vec2 t)
+{
+    float w = uintBitsToFloat(texelFetch(quadtree_nodes, int(face_index(face))).x);
+    float far = quadtree.depths.y, z = is_orthographic() ? far - w * (far - quadtree.depths.x) : quadtree.depths.x / w;
+    clip_range(origin.z - z, direction.z, t);
+}
+
 // The first layer of the next face that the ray passes; the face in which it begins is the first one.
 bool begin_face(trace_ray r, found_type found, inout layer_walk walk, inout view_walk seen)
 {
@@ -376,6 +384,7 @@ bool begin_face(trace_ray r, found_type found, inout layer_walk walk, inout view
         walk.face = walk.turn == 0u ? first : walk.turn <= first ? walk.turn - 1u : walk.turn;
         vec3 origin = face_vector(walk.face, from_eye), direction = face_vector(walk.face, r.direction);
         vec2 t = clip_to_face(origin, direction, vec2(r.t_min, min(t_last, NEAREST(found, r))));
+        clip_to_surfaces(walk.face, origin, direction, t);
         if (!(t.x < t.y))
             continue;
         walk.turn++;
