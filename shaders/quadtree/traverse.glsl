@@ -24,6 +24,7 @@ uniform uint ray_kind;
 #define found_type candidate
 #endif
 
+const float SAME_DISTANCE = 1e-5; // the share by which intersections with one surface differ at most
 const float NEVER = 2.0; // beyond the end of a segment
 const int STEPS_TOGETHER = 32; // of rays side by side, before what some of them have met is looked at
 
@@ -67,14 +68,21 @@ uint slice_of(layer_walk walk)
 bool is_met_before(layer_walk walk, float distance_)
 {
     vec2 apart = abs(walk.offered - distance_);
-    return min(apart.x, apart.y) <= 1e-5 * abs(distance_);
+    return min(apart.x, apart.y) <= SAME_DISTANCE * abs(distance_);
+}
+
+// What the ray meets elsewhere counts there.
+bool is_in_face(layer_walk walk, float distance_)
+{
+    float slack = SAME_DISTANCE * abs(distance_);
+    return distance_ >= walk.s.t_from - slack && distance_ <= walk.s.t_to + slack;
 }
 
 // True if the ray ends there.
 bool offer(trace_ray r, candidate met, inout layer_walk walk, inout found_type found)
 {
 #ifdef ANY_HIT
-    if (is_met_before(walk, met.distance))
+    if (is_met_before(walk, met.distance) || !is_in_face(walk, met.distance))
         return false;
     walk.offered = vec2(met.distance, walk.offered.x);
     return offer_any(r, met, found);
@@ -393,7 +401,6 @@ bool begin_face(trace_ray r, found_type found, inout layer_walk walk, inout view
         vec2 along = walk.s.along.xy;
         walk.inverse = 1.0 / mix(along, vec2(1e-9), lessThan(abs(along), vec2(1e-9)));
         walk.beside = candidate_none(1e30);
-        walk.offered = vec2(-1.0);
         walk.u_end = 1.0;
         walk.u_fill = NEVER;
         begin_layer(0u, 0.0, walk);
@@ -433,6 +440,7 @@ bool walk_view(trace_ray r, inout view_walk seen, inout found_type found)
     layer_walk walk;
     node_passage p;
     walk.turn = 0u;
+    walk.offered = vec2(-1.0);
     bool has_layer = begin_face(r, found, walk, seen);
     while (has_layer) {
         if (walk_on(walk, p)) {
