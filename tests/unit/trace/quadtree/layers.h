@@ -95,7 +95,7 @@ static inline void insert_surface(struct layers *layers, uint32_t face, uint32_t
     const struct quadtree_uniforms *u = &layers->store.uniforms;
     const size_t slice = (size_t)u->padded_width * u->padded_height;
     struct surface *at = layers->surfaces + face * u->layers * slice + texel;
-    if (surface.z < (double)u->depths[0] || surface.z > (double)u->depths[1])
+    if (surface.z < (double)u->depths[3] || surface.z > (double)u->depths[1])
         return;
     for (uint32_t layer = 0; layer < u->layers; layer++, at += slice)
         if (at->z < 0 || surface.z < at->z) {
@@ -325,7 +325,7 @@ static inline struct quadtree_uniforms uniforms_of(const struct layers_view *vie
         .eye_world = {view->eye[0], view->eye[1], view->eye[2], 0},
         .scale_centre = {(float)view->focal, (float)view->focal, 0.5f * (float)view->width,
                          0.5f * (float)view->height},
-        .depths = {(float)view->near, (float)view->far, view->orthographic ? 1 : 0, 0},
+        .depths = {(float)view->near, (float)view->far, view->orthographic ? 1 : 0, (float)view->near},
         .bounds = {(float)(view->near * view->pixels / (view->focal * view->radius)), 0, 0,
                    (float)(view->radius / view->near)},
         .width = view->width,
