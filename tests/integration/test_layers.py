@@ -108,7 +108,7 @@ class Layers(OneDaemon):
         digests = set()
         for encoding in ("raw", "zstd", "predicted"):
             frame, = frames_of(self.render("--layers", ALL, "--encoding", encoding)[1])
-            self.assertEqual((frame["encoding"], frame["pixels_bytes"]), (encoding, 48 * 40 * 16 * 7))
+            self.assertEqual((frame["encoding"], frame["pixels_bytes"]), (encoding, 48 * 40 * 16 * 8))
             self.assertEqual(frame["wire_bytes"] < frame["pixels_bytes"], encoding != "raw")
             digests.add(frame["digest"])
         self.assertEqual(len(digests), 1)
