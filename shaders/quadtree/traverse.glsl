@@ -25,6 +25,7 @@ uniform uint ray_kind;
 #endif
 
 const float SAME_DISTANCE = 1e-5; // the share by which intersections with one surface differ at most
+const float FLOAT_MAX = 3.4e38;
 const float NEVER = 2.0; // beyond the end of a segment
 const int STEPS_TOGETHER = 32; // of rays side by side, before what some of them have met is looked at
 
@@ -434,6 +435,13 @@ bool begin_next(trace_ray r, inout layer_walk walk, inout found_type found, inou
     return begin_face(r, found, walk, seen);
 }
 
+// What has no direction meets nothing.
+bool is_ray(trace_ray r)
+{
+    return all(lessThan(abs(r.origin), vec3(FLOAT_MAX))) && all(lessThan(abs(r.direction), vec3(FLOAT_MAX))) &&
+           r.direction != vec3(0.0);
+}
+
 // True: the ray ends before its end.
 bool walk_view(trace_ray r, inout view_walk seen, inout found_type found)
 {
@@ -495,6 +503,8 @@ void count(view_walk seen, bool is_unknown)
 
 bool trace_any(trace_ray r, inout vec3 optical_depth)
 {
+    if (!is_ray(r))
+        return false;
     view_walk seen = begin_view_walk();
     bool is_stopped = walk_view(r, seen, optical_depth);
     look_beside_view(r, r.t_max, seen);
@@ -516,6 +526,8 @@ void fill(view_walk seen, inout candidate best)
 
 void trace_closest(trace_ray r, inout candidate best)
 {
+    if (!is_ray(r))
+        return;
     view_walk seen = begin_view_walk();
     walk_flags = walk_steps = walk_meetings = 0u;
     walk_view(r, seen, best);
