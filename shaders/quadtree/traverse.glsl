@@ -44,7 +44,7 @@ struct layer_walk {
     float u_behind;         // where it came behind it for more than a texel
     float u_fill;           // where it was last before the first layer that it came behind: before the background
     uint fill_layer;        // that layer
-    candidate beside;       // where it first met a plane beside the surface that the plane stands for
+    float u_beside;         // where it last met a plane at an edge, but none of the primitives there
     vec2 offered;           // distances of the last two intersections, none of which counts twice
 };
 
@@ -171,10 +171,9 @@ bool meet(trace_ray r, float u, uvec2 node, inout layer_walk walk, inout found_t
         return false;
     candidate met = candidate(near, visible.y, visible.x - 1u, vec2(0.0));
 #ifndef QUADTREE_PLANES
-    // Beside the edge of the surface there may be another one behind it, or nothing.
+    // Beside the edge of the surface, or through primitives that are finer than texels.
     if (plane_is_at_edge(node)) {
-        if (near < walk.beside.distance && near > r.t_min)
-            walk.beside = met;
+        walk.u_beside = u;
         return false;
     }
 #endif
@@ -219,7 +218,7 @@ void begin_layer(uint layer, float u, inout layer_walk walk)
     walk.u = u;
     walk.cell = clamp(ivec2(floor(walk.s.from.xy + walk.s.along.xy * u)), ivec2(0), last) >> walk.level;
     walk.is_before = walk.is_behind = false;
-    walk.u_before = walk.u_since = walk.u_behind = NEVER;
+    walk.u_before = walk.u_since = walk.u_behind = walk.u_beside = NEVER;
 }
 
 vec2 exits_of(layer_walk walk)
@@ -364,15 +363,18 @@ uint face_towards(vec3 p)
 #define SHORTEN(walk, found) walk.u_end = min(walk.u_end, place_at(walk.s, found.distance))
 #endif
 
-// A ray that meets nothing else in a face has met the surface that it passed the edge of.
-void offer_beside(trace_ray r, layer_walk walk, inout found_type found)
+// A ray that stays behind a layer has met it, also where it passed between its primitives: these are finer than texels.
+// True: it ends.
+bool meet_beside(trace_ray r, inout layer_walk walk, inout found_type found)
 {
-#ifndef ANY_HIT
-    if (found.primitive == HIT_NO_PRIMITIVE && walk.beside.distance < found.distance) {
-        walk_flags = (walk.layer + 1u) << HIT_LAYER_SHIFT;
-        offer_closest(r, walk.beside, found);
-    }
-#endif
+    if (!(walk.u_behind < walk.u_end) || walk.u_behind != walk.u_beside)
+        return false;
+    uvec2 visible;
+    vec2 place = walk.s.from.xy + walk.u_beside * walk.s.along.xy;
+    if (!visible_at(ivec2(floor(place)), slice_of(walk), visible))
+        return false;
+    walk.u_behind = NEVER;
+    return offer(r, candidate(distance_at(walk.s, walk.u_beside), visible.y, visible.x - 1u, vec2(0.0)), walk, found);
 }
 
 // To where surfaces of the face may be: before the nearest one there is nothing.
@@ -401,7 +403,6 @@ bool begin_face(trace_ray r, found_type found, inout layer_walk walk, inout view
         walk.origin = origin.z >= quadtree.depths.w ? face_place(origin, face_q(origin)) : vec3(-1.0);
         vec2 along = walk.s.along.xy;
         walk.inverse = 1.0 / mix(along, vec2(1e-9), lessThan(abs(along), vec2(1e-9)));
-        walk.beside = candidate_none(1e30);
         walk.u_end = 1.0;
         walk.u_fill = NEVER;
         begin_layer(0u, 0.0, walk);
@@ -412,7 +413,6 @@ bool begin_face(trace_ray r, found_type found, inout layer_walk walk, inout view
 
 void end_face(trace_ray r, layer_walk walk, inout found_type found, inout view_walk seen)
 {
-    offer_beside(r, walk, found);
     float t = distance_at(walk.s, min(walk.u_behind, 1.0));
     if (walk.u_behind >= walk.u_end || t >= seen.t_unknown)
         return;
@@ -463,8 +463,11 @@ bool walk_view(trace_ray r, inout view_walk seen, inout found_type found)
                 leave(p, walk);
             }
         }
-        if (walk.u >= walk.u_end)
-            has_layer = begin_next(r, walk, found, seen);
+        if (walk.u < walk.u_end)
+            continue;
+        if (meet_beside(r, walk, found))
+            return true;
+        has_layer = begin_next(r, walk, found, seen);
     }
     return false;
 }
