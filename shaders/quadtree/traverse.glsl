@@ -456,7 +456,7 @@ bool walk_view(trace_ray r, inout view_walk seen, inout found_type found)
             if (meet_in(r, p, walk, found))
                 return true;
             SHORTEN(walk, found);
-            if (walk.u_end <= p.u_out) {
+            if (walk.u_end < p.u_out) {
                 walk.u = walk.u_end;
             } else {
                 note_side(p, walk);
