@@ -25,6 +25,7 @@ uniform uint ray_kind;
 #endif
 
 const float SAME_DISTANCE = 1e-5; // the share by which intersections with one surface differ at most
+const float FLOAT_MAX = 3.4e38;
 const float NEVER = 2.0; // beyond the end of a segment
 const int STEPS_TOGETHER = 32; // of rays side by side, before what some of them have met is looked at
 
@@ -43,7 +44,7 @@ struct layer_walk {
     float u_behind;         // where it came behind it for more than a texel
     float u_fill;           // where it was last before the first layer that it came behind: before the background
     uint fill_layer;        // that layer
-    candidate beside;       // where it first met a plane beside the surface that the plane stands for
+    float u_beside;         // where it last met a plane at an edge, but none of the primitives there
     vec2 offered;           // distances of the last two intersections, none of which counts twice
 };
 
@@ -170,10 +171,9 @@ bool meet(trace_ray r, float u, uvec2 node, inout layer_walk walk, inout found_t
         return false;
     candidate met = candidate(near, visible.y, visible.x - 1u, vec2(0.0));
 #ifndef QUADTREE_PLANES
-    // Beside the edge of the surface there may be another one behind it, or nothing.
+    // Beside the edge of the surface, or through primitives that are finer than texels.
     if (plane_is_at_edge(node)) {
-        if (near < walk.beside.distance && near > r.t_min)
-            walk.beside = met;
+        walk.u_beside = u;
         return false;
     }
 #endif
@@ -218,7 +218,7 @@ void begin_layer(uint layer, float u, inout layer_walk walk)
     walk.u = u;
     walk.cell = clamp(ivec2(floor(walk.s.from.xy + walk.s.along.xy * u)), ivec2(0), last) >> walk.level;
     walk.is_before = walk.is_behind = false;
-    walk.u_before = walk.u_since = walk.u_behind = NEVER;
+    walk.u_before = walk.u_since = walk.u_behind = walk.u_beside = NEVER;
 }
 
 vec2 exits_of(layer_walk walk)
@@ -363,15 +363,18 @@ uint face_towards(vec3 p)
 #define SHORTEN(walk, found) walk.u_end = min(walk.u_end, place_at(walk.s, found.distance))
 #endif
 
-// A ray that meets nothing else in a face has met the surface that it passed the edge of.
-void offer_beside(trace_ray r, layer_walk walk, inout found_type found)
+// A ray that stays behind a layer has met it, also where it passed between its primitives: these are finer than texels.
+// True: it ends.
+bool meet_beside(trace_ray r, inout layer_walk walk, inout found_type found)
 {
-#ifndef ANY_HIT
-    if (found.primitive == HIT_NO_PRIMITIVE && walk.beside.distance < found.distance) {
-        walk_flags = (walk.layer + 1u) << HIT_LAYER_SHIFT;
-        offer_closest(r, walk.beside, found);
-    }
-#endif
+    if (!(walk.u_behind < walk.u_end) || walk.u_behind != walk.u_beside)
+        return false;
+    uvec2 visible;
+    vec2 place = walk.s.from.xy + walk.u_beside * walk.s.along.xy;
+    if (!visible_at(ivec2(floor(place)), slice_of(walk), visible))
+        return false;
+    walk.u_behind = NEVER;
+    return offer(r, candidate(distance_at(walk.s, walk.u_beside), visible.y, visible.x - 1u, vec2(0.0)), walk, found);
 }
 
 // To where surfaces of the face may be: before the nearest one there is nothing.
@@ -400,7 +403,6 @@ bool begin_face(trace_ray r, found_type found, inout layer_walk walk, inout view
         walk.origin = origin.z >= quadtree.depths.w ? face_place(origin, face_q(origin)) : vec3(-1.0);
         vec2 along = walk.s.along.xy;
         walk.inverse = 1.0 / mix(along, vec2(1e-9), lessThan(abs(along), vec2(1e-9)));
-        walk.beside = candidate_none(1e30);
         walk.u_end = 1.0;
         walk.u_fill = NEVER;
         begin_layer(0u, 0.0, walk);
@@ -411,7 +413,6 @@ bool begin_face(trace_ray r, found_type found, inout layer_walk walk, inout view
 
 void end_face(trace_ray r, layer_walk walk, inout found_type found, inout view_walk seen)
 {
-    offer_beside(r, walk, found);
     float t = distance_at(walk.s, min(walk.u_behind, 1.0));
     if (walk.u_behind >= walk.u_end || t >= seen.t_unknown)
         return;
@@ -434,6 +435,13 @@ bool begin_next(trace_ray r, inout layer_walk walk, inout found_type found, inou
     return begin_face(r, found, walk, seen);
 }
 
+// What has no direction meets nothing.
+bool is_ray(trace_ray r)
+{
+    return all(lessThan(abs(r.origin), vec3(FLOAT_MAX))) && all(lessThan(abs(r.direction), vec3(FLOAT_MAX))) &&
+           r.direction != vec3(0.0);
+}
+
 // True: the ray ends before its end.
 bool walk_view(trace_ray r, inout view_walk seen, inout found_type found)
 {
@@ -448,15 +456,18 @@ bool walk_view(trace_ray r, inout view_walk seen, inout found_type found)
             if (meet_in(r, p, walk, found))
                 return true;
             SHORTEN(walk, found);
-            if (walk.u_end <= p.u_out) {
+            if (walk.u_end < p.u_out) {
                 walk.u = walk.u_end;
             } else {
                 note_side(p, walk);
                 leave(p, walk);
             }
         }
-        if (walk.u >= walk.u_end)
-            has_layer = begin_next(r, walk, found, seen);
+        if (walk.u < walk.u_end)
+            continue;
+        if (meet_beside(r, walk, found))
+            return true;
+        has_layer = begin_next(r, walk, found, seen);
     }
     return false;
 }
@@ -495,6 +506,8 @@ void count(view_walk seen, bool is_unknown)
 
 bool trace_any(trace_ray r, inout vec3 optical_depth)
 {
+    if (!is_ray(r))
+        return false;
     view_walk seen = begin_view_walk();
     bool is_stopped = walk_view(r, seen, optical_depth);
     look_beside_view(r, r.t_max, seen);
@@ -516,6 +529,8 @@ void fill(view_walk seen, inout candidate best)
 
 void trace_closest(trace_ray r, inout candidate best)
 {
+    if (!is_ray(r))
+        return;
     view_walk seen = begin_view_walk();
     walk_flags = walk_steps = walk_meetings = 0u;
     walk_view(r, seen, best);
