@@ -129,8 +129,10 @@ static bool go_on(struct quadtree_layers *layers, struct gpu_scene *scene, struc
     bool whole = false;
     if ((!layers->begun && !begin_layer(layers, scene, error)) || !draw_part(layers, scene, &whole, error))
         return false;
-    gpu_finish(layers->store->device); /* else all parts would be waited for at the end, at once */
-    raster_view_learn(&layers->drawing, clock_now_ns() - start_ns, STEP_NS);
+    if (layers->store->device->facts.software) {
+        gpu_finish(layers->store->device); /* else all parts would be waited for at the end, at once */
+        raster_view_learn(&layers->drawing, clock_now_ns() - start_ns, STEP_NS);
+    }
     if (!whole)
         return true;
     layers->begun = false;

@@ -146,6 +146,7 @@ bool raster_view_draw(struct raster_view *view, const struct raster_view_target 
     uint32_t budget = target->device->facts.software ? view->part_vertices : DRAW_VERTICES_HARDWARE;
     glDisable(GL_BLEND);
     glDisable(GL_SCISSOR_TEST);
+    glDisable(GL_CULL_FACE);
     glEnable(GL_DEPTH_TEST);
     glDepthMask(GL_TRUE);
     glDepthFunc(GL_GREATER);

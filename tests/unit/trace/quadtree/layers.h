@@ -95,7 +95,8 @@ static inline void insert_surface(struct layers *layers, uint32_t face, uint32_t
     const struct quadtree_uniforms *u = &layers->store.uniforms;
     const size_t slice = (size_t)u->padded_width * u->padded_height;
     struct surface *at = layers->surfaces + face * u->layers * slice + texel;
-    if (surface.z < (double)u->depths[3] || surface.z > (double)u->depths[1])
+    const bool is_beyond = surface.z > (double)u->depths[1] && surface.what[0] != VISIBLE_DISC;
+    if (!(surface.z >= (double)u->depths[3]) || is_beyond)
         return;
     for (uint32_t layer = 0; layer < u->layers; layer++, at += slice)
         if (at->z < 0 || surface.z < at->z) {

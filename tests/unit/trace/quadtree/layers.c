@@ -1,0 +1,384 @@
+/* SPDX-License-Identifier: MIT */
+/* The layers that are drawn of a view's faces against what a computation in double precision finds along the rays
+ * through the texels' centres. */
+#include "tests/unit/trace/quadtree/layers.h"
+#include "tests/unit/trace/quadtree/scenes.h"
+
+#include "trace/quadtree/layers.h"
+
+ALL_TESTS(open_device, close_device)
+
+static const struct layers_view usual = {.width = 320,
+                                         .height = 200,
+                                         .faces = 1,
+                                         .layers = 3,
+                                         .focal = 230,
+                                         .near = 0.05,
+                                         .far = 1000,
+                                         .pixels = 0.25,
+                                         .radius = 0.15};
+
+/* Vertices are rounded to 1/256 texel or finer, and so are edges. */
+#define EDGE_TEXELS 0.0079
+/* Depths closer than this share may change places: floats, interpolated. */
+#define DEPTH_SHARE 4e-6
+#define SHIFTS 5
+
+struct drawn {
+    struct layers seen; /* by the host, one layer more than are drawn */
+    struct quadtree_store store;
+    struct quadtree_layers layers;
+    uint32_t (*visible)[2]; /* read back, slice after slice, padded */
+    struct surface *shifted[SHIFTS];
+};
+
+static size_t texels_of(const struct quadtree_uniforms *u)
+{
+    return (size_t)u->padded_width * u->padded_height * u->faces * u->layers;
+}
+
+static void read_back(struct drawn *drawn)
+{
+    const size_t bytes = texels_of(&drawn->store.uniforms) * sizeof(*drawn->visible);
+    drawn->visible = drawn->visible ? drawn->visible : malloc(bytes);
+    glGetTextureImage(drawn->store.visible.name, 0, GL_RG_INTEGER, GL_UNSIGNED_INT, (GLsizei)bytes,
+                      drawn->visible);
+}
+
+static void draw(struct drawn *drawn, bool at_once)
+{
+    struct error error = {0};
+    enum tracer_progress progress;
+    expect_ok(quadtree_layers_begin(&drawn->layers, &drawn->store, &error), &error);
+    do
+        progress = quadtree_layers_go_on(&drawn->layers, &drawn->seen.gpu, at_once, &error);
+    while (progress == TRACER_MORE);
+    expect_ok(progress == TRACER_DONE, &error);
+    read_back(drawn);
+}
+
+/* What the host sees at places about the texels' centres, of which the first are the centres themselves. */
+static void see_shifted(struct drawn *drawn)
+{
+    static const double shifts[SHIFTS][2] = {{0, 0}, {1, 1}, {-1, 1}, {1, -1}, {-1, -1}};
+    struct layers *seen = &drawn->seen;
+    const struct quadtree_uniforms uniforms = drawn->store.uniforms;
+    for (int i = 0; i < SHIFTS; i++) {
+        seen->store.uniforms = uniforms;
+        seen->store.uniforms.layers++;
+        for (int k = 0; k < 2; k++)
+            seen->store.uniforms.scale_centre[2 + k] += (float)(EDGE_TEXELS * shifts[i][k]);
+        see_all(seen);
+        drawn->shifted[i] = seen->surfaces;
+    }
+}
+
+/* Owns the scene. */
+static void drawn_init(struct drawn *drawn, struct scene *scene, const struct quadtree_uniforms *u)
+{
+    struct error error = {0};
+    struct scene_changes changes;
+    *drawn = (struct drawn){.seen = {.scene = scene, .memory_before_bytes = device->memory_used_bytes}};
+    drawn->store = (struct quadtree_store){.device = device, .uniforms = *u};
+    drawn->seen.store = (struct quadtree_store){.device = device, .uniforms = *u};
+    gpu_scene_init(&drawn->seen.gpu, device);
+    expect_ok(gpu_scene_update(&drawn->seen.gpu, scene, NULL, &changes, NULL, &error), &error);
+    expect_ok(gpu_texture_reserve_array(device, &drawn->store.visible, GL_RG32UI, u->padded_width,
+                                        u->padded_height, u->faces * u->layers, &error),
+              &error);
+}
+
+static void drawn_finish(struct drawn *drawn)
+{
+    for (int i = 0; i < SHIFTS; i++)
+        free(drawn->shifted[i]);
+    drawn->seen.surfaces = NULL;
+    quadtree_layers_finish(&drawn->layers);
+    gpu_texture_finish(device, &drawn->store.visible);
+    free(drawn->visible);
+    layers_finish(&drawn->seen);
+}
+
+static struct quadtree_uniforms uniforms_to_draw(const struct layers_view *view)
+{
+    struct quadtree_uniforms u = uniforms_of(view);
+    u.depths[3] = (float)view->near;
+    return u;
+}
+
+/* ---- against the host ---- */
+
+/* Whether the surfaces round a texel's centre are the same, and far enough from one another. */
+static bool is_settled(const struct drawn *drawn, uint32_t face, uint32_t texel)
+{
+    const struct quadtree_uniforms *u = &drawn->store.uniforms;
+    const size_t slice = (size_t)u->padded_width * u->padded_height;
+    double before = 0;
+    for (uint32_t layer = 0; layer <= u->layers; layer++) {
+        const size_t at = (face * (u->layers + 1) + layer) * slice + texel;
+        const struct surface *own = &drawn->shifted[0][at];
+        for (int i = 1; i < SHIFTS; i++)
+            if (memcmp(drawn->shifted[i][at].what, own->what, sizeof(own->what)) != 0)
+                return false;
+        if (own->z > 0 && own->z - before < DEPTH_SHARE * own->z)
+            return false;
+        before = own->z;
+    }
+    return true;
+}
+
+/* Of a texel: true if all layers are as the host has them. */
+static bool is_right(const struct drawn *drawn, uint32_t face, uint32_t texel)
+{
+    const struct quadtree_uniforms *u = &drawn->store.uniforms;
+    const size_t slice = (size_t)u->padded_width * u->padded_height;
+    bool right = true;
+    for (uint32_t layer = 0; layer < u->layers; layer++) {
+        const uint32_t *found = drawn->visible[(face * u->layers + layer) * slice + texel];
+        const struct surface *own = &drawn->shifted[0][(face * (u->layers + 1) + layer) * slice + texel];
+        right = right && memcmp(found, own->what, sizeof(own->what)) == 0;
+    }
+    return right;
+}
+
+static void print_texel(const struct drawn *drawn, uint32_t face, uint32_t texel)
+{
+    const struct quadtree_uniforms *u = &drawn->store.uniforms;
+    const size_t slice = (size_t)u->padded_width * u->padded_height;
+    for (uint32_t layer = 0; layer < u->layers; layer++) {
+        const uint32_t *found = drawn->visible[(face * u->layers + layer) * slice + texel];
+        const struct surface *own = &drawn->shifted[0][(face * (u->layers + 1) + layer) * slice + texel];
+        print_message("face %u texel %u %u layer %u: %u %u is to be %u %u (z %.9g)\n", face,
+                      texel % u->padded_width, texel / u->padded_width, layer, found[0], found[1], own->what[0],
+                      own->what[1], own->z);
+    }
+}
+
+/* Texels at edges are not compared: a tenth at most. */
+static void expect_drawn(struct scene *scene, const struct quadtree_uniforms *u, uint32_t settled_min)
+{
+    struct drawn drawn;
+    uint32_t settled = 0, wrong = 0, texels = u->width * u->height * u->faces;
+    drawn_init(&drawn, scene, u);
+    draw(&drawn, true);
+    see_shifted(&drawn);
+    for (uint32_t i = 0; i < texels; i++) {
+        const uint32_t face = i / (u->width * u->height), in_face = i % (u->width * u->height);
+        const uint32_t texel = in_face / u->width * u->padded_width + in_face % u->width;
+        if (!is_settled(&drawn, face, texel))
+            continue;
+        settled++;
+        if (!is_right(&drawn, face, texel) && ++wrong < 5)
+            print_texel(&drawn, face, texel);
+    }
+    print_message("%u of %u texels settled, %u wrong\n", settled, texels, wrong);
+    assert_int_equal(wrong, 0);
+    assert_in_range(settled, settled_min, texels);
+    drawn_finish(&drawn);
+}
+
+/* Triangles, spheres, mirrored instances and a disc. */
+TEST(layers_show_the_first_surfaces_along_the_ray_in_order)
+{
+    const struct quadtree_uniforms u = uniforms_to_draw(&usual);
+    expect_drawn(curved_scene(), &u, u.width * u.height / 10 * 9);
+    expect_drawn(flat_scene(), &u, u.width * u.height / 10 * 9);
+}
+
+TEST(layers_of_an_orthographic_view_show_the_first_surfaces_in_order)
+{
+    struct layers_view view = usual;
+    view.orthographic = true;
+    view.focal = 60;
+    view.far = 20;
+    const struct quadtree_uniforms u = uniforms_to_draw(&view);
+    expect_drawn(curved_scene(), &u, u.width * u.height / 10 * 9);
+}
+
+TEST(far_sides_of_spheres_are_layers_of_their_own)
+{
+    struct layers_view view = usual;
+    view.eye[2] = 3;
+    struct quadtree_uniforms u = uniforms_to_draw(&view);
+    expect_drawn(test_scene_spheres(), &u, u.width * u.height / 10 * 9);
+    view.eye[2] = 0; /* among them */
+    u = uniforms_to_draw(&view);
+    expect_drawn(test_scene_spheres(), &u, u.width * u.height / 10 * 9);
+}
+
+/* Placed as the tracer does it. */
+TEST(layers_of_all_faces_of_a_cube_show_the_first_surfaces_in_order)
+{
+    struct error error = {0};
+    struct scene_changes changes;
+    struct gpu_scene gpu;
+    struct quadtree_store store = {.device = device};
+    struct scene *scene = curved_scene();
+    const struct trace_view view = {
+        .world_from_view = {1, 0, 0, 0.1f, 0, 1, 0, 0.6f, 0, 0, 1, -1.8f}, .fov_y = 1, .width = 64, .height = 64};
+    const struct quadtree_settings settings = {
+        .faces = QUADTREE_FACES_CUBE, .layers = 3, .resolution = 128, .pixels = 0.5f, .radius = 0.1f};
+    gpu_scene_init(&gpu, device);
+    expect_ok(gpu_scene_update(&gpu, scene, NULL, &changes, NULL, &error), &error);
+    expect_ok(quadtree_store_place(&store, &gpu, &view, &settings, &error), &error);
+    const struct quadtree_uniforms u = store.uniforms;
+    gpu_scene_finish(&gpu);
+    quadtree_store_finish(&store);
+    assert_int_equal(u.faces, 6);
+    expect_drawn(scene, &u, u.width * u.height * 6 / 10 * 9);
+}
+
+/* ---- sheets ---- */
+
+/* Squares that face the eye, or lean back, at these distances; each an instance of its own. */
+static struct scene *sheets(const float *distances, uint32_t count, float lean)
+{
+    struct test_edits edits = {.scene = test_scene_create()};
+    static const uint32_t indices[6] = {0, 1, 2, 2, 1, 3};
+    for (uint32_t i = 0; i < count; i++) {
+        const float z = -distances[i];
+        const float positions[4][3] = {{-4, -4, z + lean}, {4, -4, z + lean}, {-4, 4, z - lean}, {4, 4, z - lean}};
+        test_mesh(&edits, 10 + i, positions, 4, indices, 2);
+        test_node(&edits, 1 + i, 0, NODE_MESH, 10 + i, NULL);
+    }
+    test_commit(&edits);
+    return edits.scene;
+}
+
+/* Draws sheets; of how many texels within them the instances are such in layers 0, 1, 2. */
+static uint32_t texels_with(struct scene *scene, const uint32_t instances[3], uint32_t *covered)
+{
+    struct drawn drawn;
+    const struct quadtree_uniforms u = uniforms_to_draw(&usual);
+    const size_t slice = (size_t)u.padded_width * u.padded_height;
+    uint32_t count = 0;
+    *covered = 0;
+    drawn_init(&drawn, scene, &u);
+    draw(&drawn, true);
+    for (size_t i = 0; i < slice; i++) {
+        const uint32_t layers[3] = {drawn.visible[i][0], drawn.visible[slice + i][0],
+                                    drawn.visible[2 * slice + i][0]};
+        *covered += layers[0] != 0;
+        count += memcmp(layers, instances, sizeof(layers)) == 0;
+    }
+    drawn.seen.store.visible = (struct gpu_texture){0};
+    drawn_finish(&drawn);
+    return count;
+}
+
+TEST(two_sides_of_a_sheet_are_two_layers)
+{
+    static const float distances[3] = {1.000001f, 1, 2};
+    static const uint32_t order[3] = {2, 1, 3};
+    uint32_t covered, count = texels_with(sheets(distances, 3, 0), order, &covered);
+    print_message("%u of %u texels\n", count, covered);
+    assert_in_range(covered, 60000, 64000);
+    assert_int_equal(count, covered);
+    count = texels_with(sheets(distances, 3, 0.3f), order, &covered);
+    print_message("leaning: %u of %u texels\n", count, covered);
+}
+
+TEST(of_surfaces_that_coincide_one_is_kept)
+{
+    static const float distances[3] = {1, 1, 2};
+    static const uint32_t one[3] = {1, 3, 0}, other[3] = {2, 3, 0};
+    uint32_t covered, count = texels_with(sheets(distances, 3, 0.3f), one, &covered);
+    count += texels_with(sheets(distances, 3, 0.3f), other, &covered);
+    assert_in_range(covered, 40000, 64000);
+    print_message("%u of %u texels\n", count, covered);
+    assert_int_equal(count, covered);
+}
+
+/* ---- cutouts ---- */
+
+/* What is cut out altogether is not there, nor are halves of a sphere. */
+TEST(what_is_cut_out_is_in_no_layer)
+{
+    const struct quadtree_uniforms u = uniforms_to_draw(&usual);
+    struct test_edits edits = {.scene = test_scene_create()};
+    static const float sphere[1][4] = {{0, 0, -2, 0.9f}},
+                       positions[3][3] = {{-9, -9, -1}, {9, -9, -1}, {0, 9, -1}};
+    static const float behind[3][3] = {{-9, -9, -4}, {9, -9, -4}, {0, 9, -4}};
+    static const uint32_t indices[3] = {0, 1, 2};
+    struct drawn drawn;
+    struct scene_material *cutout = test_material(&edits, 1, 0.4f, 0.5f, 0.6f);
+    cutout->alpha_mode = ALPHA_MASK;
+    cutout->base_colour[3] = 0.25f;
+    test_material(&edits, 2, 0.4f, 0.5f, 0.6f);
+    const struct material_range holes = {0, 1, 1};
+    struct scene_mesh *mesh = test_mesh(&edits, 10, positions, 3, indices, 1);
+    mesh->ranges = test_ranges(&holes, 1);
+    mesh->range_count = 1;
+    struct scene_spheres *spheres = test_spheres(&edits, 20, sphere, 1);
+    spheres->ranges = test_ranges(&holes, 1);
+    spheres->range_count = 1;
+    test_mesh(&edits, 11, behind, 3, indices, 1);
+    test_node(&edits, 1, 0, NODE_MESH, 10, NULL);
+    test_node(&edits, 2, 0, NODE_SPHERES, 20, NULL);
+    test_node(&edits, 3, 0, NODE_MESH, 11, NULL);
+    test_commit(&edits);
+    drawn_init(&drawn, edits.scene, &u);
+    uint32_t geometry = 0;
+    while (drawn.seen.gpu.geometries[geometry].device.flags & GEOMETRY_HAS_CUTOUT)
+        geometry++;
+    draw(&drawn, true);
+    const size_t slice = (size_t)u.padded_width * u.padded_height;
+    uint32_t covered = 0;
+    for (size_t i = 0; i < slice; i++) {
+        const uint32_t instance = drawn.visible[i][0];
+        covered += instance > 0;
+        if (instance > 0)
+            assert_int_equal(drawn.seen.gpu.instances[instance - 1].geometry, geometry);
+        assert_int_equal(drawn.visible[slice + i][0], 0);
+    }
+    assert_in_range(covered, 50000, 64000);
+    drawn_finish(&drawn);
+}
+
+/* ---- steps ---- */
+
+/* What another job of the same context may leave behind. */
+static void do_something_else(void)
+{
+    glEnable(GL_SCISSOR_TEST);
+    glScissor(3, 5, 7, 9);
+    glEnable(GL_BLEND);
+    glEnable(GL_CULL_FACE);
+    glCullFace(GL_BACK);
+    glFrontFace(GL_CW);
+    glDepthFunc(GL_LESS);
+    glDepthMask(GL_FALSE);
+    glClipControl(GL_UPPER_LEFT, GL_NEGATIVE_ONE_TO_ONE);
+    glViewport(1, 2, 3, 4);
+    glBindFramebuffer(GL_FRAMEBUFFER, 0);
+    glBindTextureUnit(UNIT_QUADTREE_DEPTH, 0);
+    glBindBufferBase(GL_UNIFORM_BUFFER, UNIFORM_FRAME, 0);
+}
+
+TEST(parts_with_other_work_between_them_give_the_same_layers)
+{
+    struct error error = {0};
+    struct drawn drawn;
+    const struct quadtree_uniforms u = uniforms_to_draw(&usual);
+    const size_t bytes = texels_of(&u) * sizeof(*drawn.visible);
+    enum tracer_progress progress;
+    uint32_t parts = 0;
+    drawn_init(&drawn, curved_scene(), &u);
+    draw(&drawn, true);
+    uint32_t(*at_once)[2] = malloc(bytes);
+    memcpy(at_once, drawn.visible, bytes);
+    expect_ok(quadtree_layers_begin(&drawn.layers, &drawn.store, &error), &error);
+    do {
+        do_something_else();
+        drawn.layers.drawing.part_vertices = 3000;
+        progress = quadtree_layers_go_on(&drawn.layers, &drawn.seen.gpu, false, &error);
+        parts++;
+    } while (progress == TRACER_MORE);
+    expect_ok(progress == TRACER_DONE, &error);
+    read_back(&drawn);
+    print_message("%u steps\n", parts);
+    assert_in_range(parts, 6, 1000);
+    assert_memory_equal(drawn.visible, at_once, bytes);
+    free(at_once);
+    drawn_finish(&drawn);
+}
