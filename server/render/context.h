@@ -31,6 +31,7 @@ struct render_context {
     struct trace_state *trace_state; /* of the wave in hand, by that tracer */
     struct tracer *layer_tracer;     /* first hits are those of a layer of its structure; NULL: they are not */
     uint32_t layer;
+    struct gpu_buffer *key_marks; /* of what the texels of layers are looked at by; NULL: all of them matter */
     struct comparison *comparison; /* of the current frame; NULL: nothing is compared */
     struct gpu_timer *timer;
     struct frame_request request;

@@ -300,7 +300,7 @@ static void announce_programs(struct frame_renderer *renderer)
         wave_passes_announce_shadows(passes, context);
     primary_announce(context, renderer->rasterise);
     if (frame_is_eyes_pass(renderer))
-        key_view_announce(context, renderer->work->layers.wanted & 1u << LAYER_UNKNOWN);
+        key_view_announce(context, renderer->work->layers.wanted & 1u << LAYER_UNKNOWN, frame_key_gather(renderer));
     else
         wave_passes_announce(passes, context);
     picture_announce(renderer->target, context);
@@ -446,6 +446,7 @@ static bool begin(struct frame_renderer *renderer, const struct scene *scene, co
     struct render_context *context = &renderer->work->context;
     context->request = renderer->request = *request;
     context->layer_tracer = NULL;
+    context->key_marks = NULL;
     renderer->pass = PASS_UNKNOWN;
     renderer->target = &renderer->picture;
     renderer->result = (struct frame_result){0};

@@ -86,12 +86,32 @@ bool key_view_keep_band(struct key_view *key, struct render_context *context, ui
 
 /* ---- eyes ---- */
 
+bool key_view_mark_anew(struct key_view *key, struct gpu_device *device, struct error *error)
+{
+    const size_t texels = (size_t)key->texels.width * key->texels.height;
+    if (!gpu_buffer_reserve(device, &key->marks, texels * key->layer_count * sizeof(uint32_t), error))
+        return false;
+    gpu_buffer_clear(device, &key->marks, 0);
+    return true;
+}
+
+void key_view_take_marks(struct key_view *key, struct gpu_device *device)
+{
+    struct key_counts counts;
+    gpu_buffer_read(device, &key->counts, 0, &counts, sizeof(counts));
+    key->looked_at = 1;
+    for (uint32_t i = 1; i < key->layer_count; i++)
+        key->looked_at |= counts.is_looked_at[i] << i;
+}
+
 static const struct gpu_program *gather_program(struct render_context *context, bool has_unknown,
-                                                struct error *error)
+                                                enum key_gather what, struct error *error)
 {
     const struct integrator *integrator = integrator_by_number(context->request.integrator);
-    struct gpu_define defines[4] = {0};
+    struct gpu_define defines[5] = {0};
     size_t n = 0;
+    if (what != KEY_GATHER)
+        defines[n++] = (struct gpu_define){what == KEY_GATHER_MARK ? "MARK" : "KEPT", "1"};
     if (context->environment->kind == ENVIRONMENT_IMAGE)
         defines[n++] = (struct gpu_define){"HAS_ENVIRONMENT_IMAGE", "1"};
     if (integrator->left_scene && strcmp(integrator->left_scene, "OPEN") == 0)
@@ -136,21 +156,35 @@ static void bind_layers(struct key_view *key, struct gpu_device *device)
         gpu_buffer_bind_texels(device, &key->layers[i < key->layer_count ? i : 0], units[i], GL_RGBA32F);
 }
 
+static void bind_eyes(struct key_view *key, struct render_context *context, const struct picture *picture,
+                      enum key_gather what, const struct gpu_program *program)
+{
+    uint32_t first_slot = 0;
+    struct gpu_buffer *band = picture_slice_band(picture, &context->slice, &first_slot);
+    gpu_buffer_bind_texels(context->device, &context->rays, UNIT_RAYS, GL_RGBA32F);
+    gpu_buffer_bind_texels(context->device, &context->hits, UNIT_SHADE_HITS, GL_RGBA32UI);
+    gpu_buffer_bind_storage(&context->slice_sums, BIND_SLICE_SUMS);
+    gpu_buffer_bind_storage(&key->counts, BIND_KEY_COUNTS);
+    if (what == KEY_GATHER_MARK)
+        gpu_buffer_bind_storage(&key->marks, BIND_KEY_MARKS);
+    if (what == KEY_GATHER_KEPT) {
+        gpu_buffer_bind_storage(band, BIND_ACCUMULATION);
+        gpu_uniform_uint(program, "first_slot", first_slot);
+    }
+}
+
 bool key_view_gather(struct key_view *key, struct render_context *context, struct layers *layers,
-                     struct error *error)
+                     const struct picture *picture, enum key_gather what, struct error *error)
 {
     const uint32_t first_unknown = layers_take_unknown(layers);
     const bool has_unknown = first_unknown != UINT32_MAX;
-    const struct gpu_program *program = gather_program(context, has_unknown, error);
+    const struct gpu_program *program = gather_program(context, has_unknown, what, error);
     if (!program)
         return false;
     context_span_begin(context, STAGE_SHADE);
     context_bind(context);
-    gpu_buffer_bind_texels(context->device, &context->rays, UNIT_RAYS, GL_RGBA32F);
-    gpu_buffer_bind_texels(context->device, &context->hits, UNIT_SHADE_HITS, GL_RGBA32UI);
+    bind_eyes(key, context, picture, what, program);
     bind_layers(key, context->device);
-    gpu_buffer_bind_storage(&context->slice_sums, BIND_SLICE_SUMS);
-    gpu_buffer_bind_storage(&key->counts, BIND_KEY_COUNTS);
     if (has_unknown) {
         gpu_buffer_bind_storage(&layers->sums, BIND_LAYER_SUMS);
         gpu_uniform_uint(program, "first_unknown", first_unknown);
@@ -161,9 +195,9 @@ bool key_view_gather(struct key_view *key, struct render_context *context, struc
     return gpu_check(context->device, "gathering from a key view", error);
 }
 
-void key_view_announce(struct render_context *context, bool has_unknown)
+void key_view_announce(struct render_context *context, bool has_unknown, enum key_gather what)
 {
-    (void)gather_program(context, has_unknown, NULL);
+    (void)gather_program(context, has_unknown, what, NULL);
 }
 
 /* ---- counts ---- */
@@ -171,7 +205,7 @@ void key_view_announce(struct render_context *context, bool has_unknown)
 bool key_view_count_anew(struct key_view *key, struct gpu_device *device, struct error *error)
 {
     gpu_readback_drop(&key->copy);
-    if (!gpu_buffer_reserve(device, &key->counts, sizeof(uint32_t), error))
+    if (!gpu_buffer_reserve(device, &key->counts, sizeof(struct key_counts), error))
         return false;
     gpu_buffer_clear(device, &key->counts, 0);
     return true;
@@ -190,7 +224,8 @@ bool key_view_take_count(struct key_view *key, struct gpu_device *device, uint32
 
 uint64_t key_view_device_bytes(const struct key_view *key)
 {
-    uint64_t sum = picture_device_bytes(&key->sums) + key->counts.capacity_bytes + key->copy.capacity_bytes;
+    uint64_t sum = picture_device_bytes(&key->sums) + key->counts.capacity_bytes +
+                   key->marks.capacity_bytes + key->copy.capacity_bytes;
     for (int i = 0; i < KEY_LAYERS_MAX; i++)
         sum += key->layers[i].capacity_bytes;
     return sum;
@@ -202,6 +237,7 @@ void key_view_finish(struct key_view *key, struct gpu_device *device)
     for (int i = 0; i < KEY_LAYERS_MAX; i++)
         gpu_buffer_finish(device, &key->layers[i]);
     gpu_buffer_finish(device, &key->counts);
+    gpu_buffer_finish(device, &key->marks);
     gpu_readback_finish(device, &key->copy);
     *key = (struct key_view){0};
 }

@@ -165,6 +165,14 @@ bool picture_accumulate(struct picture *picture, struct render_context *context,
     return true;
 }
 
+struct gpu_buffer *picture_slice_band(const struct picture *picture, const struct slice *slice,
+                                      uint32_t *first_slot)
+{
+    const uint32_t band = slice->first_slot / band_slots(picture);
+    *first_slot = slice->first_slot - band * band_slots(picture);
+    return picture_band(picture, 0, band);
+}
+
 void picture_drop_pixels(struct picture *picture)
 {
     free(picture->pixels);

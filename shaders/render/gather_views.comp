@@ -6,7 +6,8 @@
 // Coverage is 1 wherever there is a surface: what blended surfaces leave open is in the layer's radiance.
 //
 // Defines: those of common/environment.glsl; OPEN in place of the environment is 1; HAS_UNKNOWN the share of samples
-// that the key view does not show is a layer of the picture.
+// that the key view does not show is a layer of the picture; MARK intersections are kept in place of radiance, and texels
+// that have to be there before it can be taken are marked; KEPT the picture has such intersections.
 
 #include "shared/key_view.h"
 #include "shared/hit.h"
@@ -32,7 +33,14 @@ layout(binding = UNIT_KEY_LAYER_0) uniform samplerBuffer key_layer_0;
 layout(binding = UNIT_KEY_LAYER_1) uniform samplerBuffer key_layer_1;
 layout(binding = UNIT_KEY_LAYER_2) uniform samplerBuffer key_layer_2;
 layout(std430, binding = BIND_SLICE_SUMS) writeonly buffer sum_block { vec4 slice_sums[]; };
-layout(std430, binding = BIND_KEY_COUNTS) buffer count_block { uint unknown_count; };
+layout(std430, binding = BIND_KEY_COUNTS) buffer count_block { key_counts counts; };
+#ifdef MARK
+layout(std430, binding = BIND_KEY_MARKS) writeonly buffer mark_block { uint marks[]; };
+#endif
+#ifdef KEPT
+layout(std430, binding = BIND_ACCUMULATION) buffer accumulation_block { vec4 accumulation[]; };
+uniform uint first_slot; // of the slice, in its band
+#endif
 #ifdef HAS_UNKNOWN
 layout(std430, binding = BIND_LAYER_SUMS) writeonly buffer layer_block { vec4 layer_sums[]; };
 #endif
@@ -40,6 +48,7 @@ layout(std430, binding = BIND_LAYER_SUMS) writeonly buffer layer_block { vec4 la
 // A surface is met where inverse distances agree within this share, beside the structure's own bound: those of
 // surfaces that are some centimetres apart differ by more at the distances of a room.
 const float SURFACE_SHARE = 0.01;
+const uint KEPT_SHIFT = 27u; // all bits of an intersection lie above
 
 vec4 key_texel(uint layer, ivec2 p)
 {
@@ -92,16 +101,59 @@ vec4 missed(vec3 direction)
 #endif
 }
 
+// Along the axes of the key view, forward in place of back.
+vec3 key_view_vector(vec3 point)
+{
+    vec3 d = point - key_eye;
+    return vec3(dot(d, key_right), dot(d, key_up), -dot(d, key_back));
+}
+
+vec2 key_place(vec3 v)
+{
+    vec2 on_view = (key_orthographic != 0u ? v.xy : v.xy / v.z) / key_extent;
+    return (vec2(on_view.x, -on_view.y) * 0.5 + 0.5) * vec2(key_width, key_height);
+}
+
+uint layer_of(uint bits)
+{
+    return min(max((bits & HIT_LAYER_MASK) >> HIT_LAYER_SHIFT, 1u) - 1u, key_layers - 1u);
+}
+
 // Of the point that a ray met.
 vec3 met_radiance(vec3 point, uint bits, out bool known)
 {
-    vec3 d = point - key_eye, v = vec3(dot(d, key_right), dot(d, key_up), -dot(d, key_back));
-    vec2 on_view = (key_orthographic != 0u ? v.xy : v.xy / v.z) / key_extent;
-    vec2 place = (vec2(on_view.x, -on_view.y) * 0.5 + 0.5) * vec2(key_width, key_height);
-    uint layer = max((bits & HIT_LAYER_MASK) >> HIT_LAYER_SHIFT, 1u) - 1u;
-    vec3 radiance = key_radiance(min(layer, key_layers - 1u), place, key_orthographic != 0u ? v.z : 1.0 / v.z, known);
+    vec3 v = key_view_vector(point);
+    vec3 radiance = key_radiance(layer_of(bits), key_place(v), key_orthographic != 0u ? v.z : 1.0 / v.z, known);
     known = known && (bits & HIT_UNKNOWN) == 0u;
     return radiance;
+}
+
+#ifdef MARK
+// The four texels that key_radiance() reads.
+void mark(vec3 point, uint bits)
+{
+    ivec2 corner = ivec2(floor(key_place(key_view_vector(point)) - 0.5)), last = ivec2(key_width, key_height) - 1;
+    ivec2 low = clamp(corner, ivec2(0), last), high = clamp(corner + 1, ivec2(0), last);
+    uint layer = layer_of(bits), width = key_width, first = layer * width * key_height;
+    marks[first + uint(low.y) * width + uint(low.x)] = 1u;
+    marks[first + uint(low.y) * width + uint(high.x)] = 1u;
+    marks[first + uint(high.y) * width + uint(low.x)] = 1u;
+    marks[first + uint(high.y) * width + uint(high.x)] = 1u;
+    if (layer > 0u)
+        counts.is_looked_at[layer] = 1u;
+}
+#endif
+
+// Distance, HIT_UNKNOWN and HIT_LAYER bits. As a pixel has them the bits are a number, which no device changes.
+uvec2 met_by(uint k)
+{
+#ifdef KEPT
+    vec4 kept = accumulation[first_slot + k];
+    accumulation[first_slot + k] = vec4(0.0);
+    return uvec2(floatBitsToUint(kept.x), uint(kept.y) << KEPT_SHIFT);
+#else
+    return texelFetch(hits, int(3u * k)).xy;
+#endif
 }
 
 void main()
@@ -110,8 +162,13 @@ void main()
     if (k >= wave.rays.count)
         return;
     vec4 origin = texelFetch(rays, int(2u * k)), direction = texelFetch(rays, int(2u * k + 1u));
-    uvec4 met = texelFetch(hits, int(3u * k));
+    uvec2 met = met_by(k);
     float distance_ = uintBitsToFloat(met.x);
+#ifdef MARK
+    if (distance_ >= 0.0)
+        mark(origin.xyz + distance_ * direction.xyz, met.y);
+    slice_sums[k] = vec4(distance_, float(met.y >> KEPT_SHIFT), 0.0, 0.0);
+#else
     bool known = true;
     vec4 sum = vec4(0.0); // a pixel beyond the picture's edge
     if (distance_ >= 0.0)
@@ -123,5 +180,6 @@ void main()
     layer_sums[first_unknown + k] = vec4(vec3(known ? 0.0 : 1.0), 1.0);
 #endif
     if (!known && wave.stopped == 0u)
-        atomicAdd(unknown_count, 1u);
+        atomicAdd(counts.unknown, 1u);
+#endif
 }

@@ -4,6 +4,7 @@
 //   VISIBILITY  what the rasteriser saw is noted in the hits, for primary_fill.comp; else they are left to a tracer
 //   SPREAD      each pixel has its samples where its own numbers say; else all have them where frame.sample_places says
 //   HAS_LENS    rays start on a lens and meet in the plane in focus
+//   HAS_MARKS   of the texels of a key view, rays through those that no eye looks at are dead
 //   HAS_TIMES   something moves: rays have a time
 
 #include "shared/path.h"
@@ -12,9 +13,14 @@
 #include "common/camera.glsl"
 #include "common/dispatch.glsl"
 #include "common/sequence.glsl"
+#include "shared/key_view.h"
 layout(local_size_x = 64) in;
 
 uniform uint first_slot, slot_count;
+#ifdef HAS_MARKS
+layout(binding = UNIT_KEY_MARKS) uniform usamplerBuffer key_marks;
+uniform uint first_mark; // of the layer
+#endif
 
 layout(std430, binding = BIND_RAYS) writeonly buffer ray_block { ray rays[]; };
 layout(std430, binding = BIND_PATHS) writeonly buffer path_block { path paths[]; };
@@ -55,6 +61,9 @@ void main()
 #ifdef HAS_TIMES
     time = sequence_number(seed, SEQUENCE_TIME, index);
     times[k] = time;
+#endif
+#ifdef HAS_MARKS
+    in_picture = in_picture && texelFetch(key_marks, int(first_mark + pixel.y * frame.width + pixel.x)).x != 0u;
 #endif
     vec2 cone = camera_cone();
     float weight = in_picture ? 1.0 : 0.0;
