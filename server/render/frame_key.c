@@ -57,7 +57,6 @@ static bool begin_layers(struct frame_renderer *renderer, const struct trace_vie
     picture_restart(&key->sums);
     if (!key_view_reserve(key, renderer->device, texels, layer_count, error))
         return false; /* it may have been put off: the choice is made again */
-    key->looked_at = ~0u;
     key->is_marked = is_for_these_eyes(&renderer->request);
     if (key->is_marked && !key_view_mark_anew(key, renderer->device, error))
         return false;
@@ -111,6 +110,8 @@ bool frame_key_set_pass(struct frame_renderer *renderer, struct error *error)
     context->layer_tracer = is_layer ? renderer->key_tracer : NULL;
     context->layer = is_layer ? renderer->pass : 0;
     context->key_marks = is_layer && renderer->key.is_marked ? &renderer->key.marks : NULL;
+    context->key_tiles = context->key_marks ? &renderer->key.tiles : NULL;
+    context->first_tile = context->key_tiles ? renderer->key.first_tile[renderer->pass] : 0;
     renderer->target = is_layer ? &renderer->key.sums : &renderer->picture;
     renderer->samples_before = is_layer ? 0 : renderer->eyes_samples_before;
     slices_ahead_forget(&renderer->work->ahead); /* rays of another pass cost something else */
@@ -119,16 +120,24 @@ bool frame_key_set_pass(struct frame_renderer *renderer, struct error *error)
 
 static uint32_t next_layer(const struct key_view *key, uint32_t layer)
 {
-    while (layer < key->layer_count && !(key->looked_at >> layer & 1))
+    while (layer < key->layer_count && key->is_marked && key->tile_rows[layer] == 0)
         layer++;
     return layer;
 }
 
-void frame_key_end_marks(struct frame_renderer *renderer)
+bool frame_key_end_marks(struct frame_renderer *renderer, struct error *error)
 {
-    key_view_take_marks(&renderer->key, renderer->device);
+    if (!key_view_list_tiles(&renderer->key, renderer->device, error))
+        return false;
     renderer->phase = PHASE_BUILD; /* the next pass gets ready */
     renderer->pass = next_layer(&renderer->key, 0);
+    return true;
+}
+
+void frame_key_limit_rows(const struct frame_renderer *renderer, struct frame_request *request)
+{
+    if (frame_is_layer_pass(renderer) && renderer->key.is_marked)
+        request->height = renderer->key.tile_rows[renderer->pass] * 8;
 }
 
 /* All of the layer's samples are in its sums. */

@@ -130,7 +130,9 @@ bool frame_is_eyes_pass(const struct frame_renderer *renderer);
 /* What the pass over the eyes does. */
 enum key_gather frame_key_gather(const struct frame_renderer *renderer);
 /* All eyes are intersected: goes on to the layers. */
-void frame_key_end_marks(struct frame_renderer *renderer);
+bool frame_key_end_marks(struct frame_renderer *renderer, struct error *error);
+/* Of a layer of which only tiles are rendered: as many rows as the picture of those has. */
+void frame_key_limit_rows(const struct frame_renderer *renderer, struct frame_request *request);
 /* Takes the tracer of the key view's structure. */
 bool frame_key_take(struct frame_renderer *renderer, struct error *error);
 /* Sets the context to the pass in hand, once the tracers are built: request, tracer, and what gets the samples. */

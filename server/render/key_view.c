@@ -8,6 +8,7 @@
 
 #include <epoxy/gl.h>
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 bool key_view_is_of(const struct key_view *key, const struct trace_view *view, const struct frame_request *request,
@@ -62,24 +63,32 @@ struct frame_request key_view_layer_request(const struct key_view *key, const st
 
 /* ---- layers ---- */
 
+static const struct gpu_program *keep_program(struct render_context *context, struct error *error)
+{
+    const struct gpu_define defines[] = {{context->key_tiles ? "HAS_TILES" : NULL, "1"}, {NULL, NULL}};
+    return context_use_with(context, "render/keep_layer.comp", defines, error);
+}
+
 bool key_view_keep_band(struct key_view *key, struct render_context *context, uint32_t layer, uint32_t band,
                         struct error *error)
 {
     struct picture *sums = &key->sums;
-    const struct gpu_program *program = context_use(context, "render/keep_layer.comp", error);
+    const struct gpu_program *program = keep_program(context, error);
     if (!program)
         return false;
-    const uint32_t texels = picture_band_row_count(sums, band) * sums->width;
+    uint32_t first_slot = 0;
+    const uint32_t slots = picture_band_slots(sums, band, &first_slot);
     context_span_begin(context, STAGE_RESOLVE);
     context_bind(context);
     gpu_buffer_bind_storage(picture_band(sums, 0, band), BIND_ACCUMULATION); /* the beauty; then the depth */
     gpu_buffer_bind_storage(picture_band(sums, 1, band), BIND_KEY_DEPTHS);
     gpu_buffer_bind_storage(&key->layers[layer], BIND_KEY_LAYER);
-    gpu_uniform_uint(program, "texel_count", texels);
-    gpu_uniform_uint(program, "first_texel", picture_band_first_row(sums, band) * sums->width);
+    context_bind_tiles(context, program);
+    gpu_uniform_uint(program, "slot_count", slots);
+    gpu_uniform_uint(program, "first_slot", first_slot);
     gpu_uniform_float(program, "scale", 1.0f / (float)sums->samples);
     gpu_uniform_uint(program, "shows_environment", layer == 0);
-    gpu_dispatch(context->device, program, texels);
+    gpu_dispatch(context->device, program, slots);
     context_span_end(context);
     return gpu_check(context->device, "keeping a layer", error);
 }
@@ -92,16 +101,55 @@ bool key_view_mark_anew(struct key_view *key, struct gpu_device *device, struct 
     if (!gpu_buffer_reserve(device, &key->marks, texels * key->layer_count * sizeof(uint32_t), error))
         return false;
     gpu_buffer_clear(device, &key->marks, 0);
+    /* Where rounding takes a texel that is not marked: it must be a number. */
+    for (uint32_t i = 0; i < key->layer_count; i++)
+        gpu_buffer_clear(device, &key->layers[i], 0);
     return true;
 }
 
-void key_view_take_marks(struct key_view *key, struct gpu_device *device)
+static bool is_tile_marked(const uint32_t *marks, const struct trace_view *texels, uint32_t x, uint32_t y)
 {
-    struct key_counts counts;
-    gpu_buffer_read(device, &key->counts, 0, &counts, sizeof(counts));
-    key->looked_at = 1;
-    for (uint32_t i = 1; i < key->layer_count; i++)
-        key->looked_at |= counts.is_looked_at[i] << i;
+    const uint32_t end_x = x + 8 < texels->width ? x + 8 : texels->width;
+    const uint32_t end_y = y + 8 < texels->height ? y + 8 : texels->height;
+    uint32_t any = 0;
+    for (uint32_t j = y; j < end_y; j++)
+        for (uint32_t i = x; i < end_x; i++)
+            any |= marks[(size_t)j * texels->width + i];
+    return any != 0;
+}
+
+/* Behind those that are marked ones beyond the layer, to the end of a row. Returns how many in all. */
+static uint32_t list_tiles(const uint32_t *marks, const struct trace_view *texels, uint32_t *tiles)
+{
+    const uint32_t across = (texels->width + 7) / 8, down = (texels->height + 7) / 8;
+    uint32_t count = 0;
+    for (uint32_t tile = 0; tile < across * down; tile++)
+        if (is_tile_marked(marks, texels, tile % across * 8, tile / across * 8))
+            tiles[count++] = tile;
+    while (count % across != 0)
+        tiles[count++] = across * down;
+    return count;
+}
+
+bool key_view_list_tiles(struct key_view *key, struct gpu_device *device, struct error *error)
+{
+    const struct trace_view *texels = &key->texels;
+    const uint32_t across = (texels->width + 7) / 8, down = (texels->height + 7) / 8;
+    const size_t mark_bytes = (size_t)texels->width * texels->height * sizeof(uint32_t);
+    uint32_t *marks = malloc(mark_bytes), count = 0;
+    uint32_t *tiles = malloc((size_t)across * down * key->layer_count * sizeof(uint32_t));
+    bool good = marks && tiles;
+    for (uint32_t layer = 0; good && layer < key->layer_count; layer++) {
+        gpu_buffer_read(device, &key->marks, layer * mark_bytes, marks, mark_bytes);
+        key->first_tile[layer] = count;
+        key->tile_rows[layer] = list_tiles(marks, texels, tiles + count) / across;
+        count += key->tile_rows[layer] * across;
+    }
+    good = good ? gpu_buffer_upload(device, &key->tiles, tiles, (count ? count : 1) * sizeof(uint32_t), error)
+                : error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the tiles of a key view");
+    free(marks);
+    free(tiles);
+    return good;
 }
 
 static const struct gpu_program *gather_program(struct render_context *context, bool has_unknown,
@@ -205,7 +253,7 @@ void key_view_announce(struct render_context *context, bool has_unknown, enum ke
 bool key_view_count_anew(struct key_view *key, struct gpu_device *device, struct error *error)
 {
     gpu_readback_drop(&key->copy);
-    if (!gpu_buffer_reserve(device, &key->counts, sizeof(struct key_counts), error))
+    if (!gpu_buffer_reserve(device, &key->counts, sizeof(uint32_t), error))
         return false;
     gpu_buffer_clear(device, &key->counts, 0);
     return true;
@@ -225,7 +273,7 @@ bool key_view_take_count(struct key_view *key, struct gpu_device *device, uint32
 uint64_t key_view_device_bytes(const struct key_view *key)
 {
     uint64_t sum = picture_device_bytes(&key->sums) + key->counts.capacity_bytes +
-                   key->marks.capacity_bytes + key->copy.capacity_bytes;
+                   key->marks.capacity_bytes + key->tiles.capacity_bytes + key->copy.capacity_bytes;
     for (int i = 0; i < KEY_LAYERS_MAX; i++)
         sum += key->layers[i].capacity_bytes;
     return sum;
@@ -238,6 +286,7 @@ void key_view_finish(struct key_view *key, struct gpu_device *device)
         gpu_buffer_finish(device, &key->layers[i]);
     gpu_buffer_finish(device, &key->counts);
     gpu_buffer_finish(device, &key->marks);
+    gpu_buffer_finish(device, &key->tiles);
     gpu_readback_finish(device, &key->copy);
     *key = (struct key_view){0};
 }

@@ -15,8 +15,8 @@
 struct key_view {
     struct picture sums;                      /* of the layer in hand */
     struct gpu_buffer layers[KEY_LAYERS_MAX]; /* shared/key_view.h */
-    struct gpu_buffer counts;                 /* struct key_counts, of the frame in hand */
-    struct gpu_buffer marks;                  /* shared/key_view.h: texels that eyes look at */
+    struct gpu_buffer counts;                 /* uint: samples of eyes that no layer shows, of the frame in hand */
+    struct gpu_buffer marks, tiles;           /* shared/key_view.h: texels that eyes look at, of all layers */
     struct gpu_readback copy;                 /* of them */
     /* What the layers are of, if they are: */
     bool is_made;
@@ -24,8 +24,9 @@ struct key_view {
     struct frame_request request;   /* the frame's that they were rendered for */
     uint64_t showing;               /* of the scene, see frame_state.h */
     uint32_t layer_count;
-    bool is_marked;   /* only what the eyes of the frame in hand look at is rendered: of no use to others */
-    uint32_t looked_at; /* layers, as bits, that are */
+    bool is_marked; /* only what the eyes of the frame in hand look at is rendered: of no use to others */
+    uint32_t first_tile[KEY_LAYERS_MAX]; /* then, of each layer, in `tiles` */
+    uint32_t tile_rows[KEY_LAYERS_MAX];
 };
 
 /* What a pass over the eyes does. */
@@ -48,8 +49,8 @@ bool key_view_keep_band(struct key_view *key, struct render_context *context, ui
                         struct error *error);
 /* Nothing is looked at yet. */
 bool key_view_mark_anew(struct key_view *key, struct gpu_device *device, struct error *error);
-/* Sets looked_at; waits for the device. */
-void key_view_take_marks(struct key_view *key, struct gpu_device *device);
+/* Lists the tiles; waits for the device. */
+bool key_view_list_tiles(struct key_view *key, struct gpu_device *device, struct error *error);
 /* Of the slice in hand, of that picture. LAYER_UNKNOWN is written too, if it is wanted. */
 bool key_view_gather(struct key_view *key, struct render_context *context, struct layers *layers,
                      const struct picture *picture, enum key_gather what, struct error *error);

@@ -165,6 +165,12 @@ bool picture_accumulate(struct picture *picture, struct render_context *context,
     return true;
 }
 
+uint32_t picture_band_slots(const struct picture *picture, uint32_t band, uint32_t *first)
+{
+    *first = band * band_slots(picture);
+    return picture_band_end(picture, *first) - *first;
+}
+
 struct gpu_buffer *picture_slice_band(const struct picture *picture, const struct slice *slice,
                                       uint32_t *first_slot)
 {

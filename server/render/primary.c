@@ -115,8 +115,8 @@ static const struct gpu_program *rays_program(bool rasterised, struct render_con
 {
     struct gpu_define defines[6] = {0};
     size_t n = 0;
-    if (context->key_marks)
-        defines[n++] = (struct gpu_define){"HAS_MARKS", "1"};
+    if (context->key_tiles)
+        defines[n++] = (struct gpu_define){"HAS_TILES", "1"};
     if (rasterised)
         defines[n++] = (struct gpu_define){"VISIBILITY", "1"};
     else if (context->spread)
@@ -148,8 +148,10 @@ static bool make_rays(const struct primary *primary, struct render_context *cont
         gpu_buffer_bind_storage(&context->ray_times, BIND_RAY_TIMES);
     if (context->key_marks) {
         gpu_buffer_bind_texels(context->device, context->key_marks, UNIT_KEY_MARKS, GL_R32UI);
-        gpu_uniform_uint(program, "first_mark", context->layer * context->request.width * context->request.height);
+        gpu_uniform_uint(program, "first_mark",
+                         context->layer * context->uniforms.width * context->uniforms.height);
     }
+    context_bind_tiles(context, program);
     gpu_uniform_uint(program, "first_slot", context->slice.first_slot);
     gpu_uniform_uint(program, "slot_count", context->slice.slot_count);
     gpu_dispatch(context->device, program, context->ray_count);

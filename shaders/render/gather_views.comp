@@ -33,7 +33,7 @@ layout(binding = UNIT_KEY_LAYER_0) uniform samplerBuffer key_layer_0;
 layout(binding = UNIT_KEY_LAYER_1) uniform samplerBuffer key_layer_1;
 layout(binding = UNIT_KEY_LAYER_2) uniform samplerBuffer key_layer_2;
 layout(std430, binding = BIND_SLICE_SUMS) writeonly buffer sum_block { vec4 slice_sums[]; };
-layout(std430, binding = BIND_KEY_COUNTS) buffer count_block { key_counts counts; };
+layout(std430, binding = BIND_KEY_COUNTS) buffer count_block { uint unknown_count; };
 #ifdef MARK
 layout(std430, binding = BIND_KEY_MARKS) writeonly buffer mark_block { uint marks[]; };
 #endif
@@ -139,8 +139,6 @@ void mark(vec3 point, uint bits)
     marks[first + uint(low.y) * width + uint(high.x)] = 1u;
     marks[first + uint(high.y) * width + uint(low.x)] = 1u;
     marks[first + uint(high.y) * width + uint(high.x)] = 1u;
-    if (layer > 0u)
-        counts.is_looked_at[layer] = 1u;
 }
 #endif
 
@@ -180,6 +178,6 @@ void main()
     layer_sums[first_unknown + k] = vec4(vec3(known ? 0.0 : 1.0), 1.0);
 #endif
     if (!known && wave.stopped == 0u)
-        atomicAdd(counts.unknown, 1u);
+        atomicAdd(unknown_count, 1u);
 #endif
 }

@@ -11,19 +11,16 @@
 #define KEY_NOTHING (-1.0f)
 #define KEY_INFINITE 0.0f
 
-struct key_counts {
-    uint unknown;             /* samples of eyes that no layer shows */
-    uint is_looked_at[3];     /* 1: some texel of the layer is */
-};
-SHARED_SIZE(key_counts, 16)
-
 #define BIND_KEY_LAYER BIND_PASS_1 /* keep_layer.comp */
 #define BIND_KEY_DEPTHS                                                                                           \
     BIND_PASS_2                     /* likewise: sums of LAYER_DEPTH; those of the beauty are BIND_ACCUMULATION   \
                                      */
-#define BIND_KEY_COUNTS BIND_PASS_3 /* gather_views.comp: struct key_counts */
+#define BIND_KEY_COUNTS BIND_PASS_3 /* gather_views.comp: one uint, the samples that no layer shows */
 #define BIND_KEY_MARKS BIND_PASS_1  /* likewise: layer after layer a uint a texel, 1 where an eye looks at it */
-#define UNIT_KEY_MARKS UNIT_PASS_1  /* primary.comp */
+/* Passes over those texels of a layer. Its picture has only the tiles of the layer that hold some, in their order;
+ * behind them, to the end of a row of tiles, it has tiles that lie beyond the layer. */
+#define UNIT_KEY_MARKS UNIT_PASS_1
+#define UNIT_KEY_TILES UNIT_RAY_TILES
 #define UNIT_KEY_LAYER_0 UNIT_TRACER_1
 #define UNIT_KEY_LAYER_1 UNIT_TRACER_2
 #define UNIT_KEY_LAYER_2 UNIT_TRACER_3
