@@ -84,7 +84,7 @@ static const struct argp_option special[] = {
     {NULL, 0, NULL, 0, "Several views in one picture, each of --size:", CLI_GROUP_VIEWS},
     {"stereo", KEY_VIEWS, "METRES", 0, "Two views, from eyes this far apart, such as 0.065", CLI_GROUP_OUTPUT},
     {"stereo-layout", KEY_VIEWS + 1, "side|over|files", 0,
-     "Left of each other (default), the left one above, or in files of their own: pair-left.png, pair-right.png",
+     "Side by side (default), the left one above, or in files of their own: pair-left.png, pair-right.png",
      CLI_GROUP_OUTPUT},
     {"light-field", KEY_VIEWS + 2, "NxM", 0,
      "N x M views, up to 64 each way, from a grid of eyes; needs --baseline", CLI_GROUP_OUTPUT},

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "cli/sink.h"
+#include "lib/frame_part.h"
 #include "lib/image_size.h"
 
 #include <errno.h>

@@ -361,16 +361,6 @@ FL_API struct fl_frame *fl_render_next(struct fl_job *job, struct fl_error *erro
 FL_API struct fl_frame *fl_render_poll(struct fl_job *job, unsigned timeout_ms, bool *done,
                                        struct fl_error *error);
 FL_API void fl_frame_destroy(struct fl_frame *frame);
-
-/* Of a frame, in pixels from its top left; `eye`: how far its eye is from the frame's, along its right and up. */
-struct fl_frame_part {
-    uint32_t x, y, width, height;
-    float eye[2];
-};
-/* A copy of a part of all layers of a decoded frame, such as one of several views; without times, comparisons,
- * structure and attachments. */
-FL_API struct fl_frame *fl_frame_cut(const struct fl_frame *frame, const struct fl_frame_part *part,
-                                     struct fl_error *error);
 /* Ends the job early and waits until the daemon confirms it; what was sent meanwhile is dropped. */
 FL_API bool fl_render_cancel(struct fl_job *job, struct fl_error *error);
 FL_API void fl_render_destroy(struct fl_job *job); /* cancels what still runs */

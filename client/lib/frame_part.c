@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A part of a frame as a frame of its own, such as one of several views. */
-#include "lib/farlight.h"
+#include "lib/frame_part.h"
 
 #include "protocol/messages.h"
 

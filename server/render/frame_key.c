@@ -42,10 +42,10 @@ bool frame_key_take(struct frame_renderer *renderer, struct error *error)
 }
 
 /* Other eyes that the layers would serve do not follow: what those of the frame do not look at need not be rendered.
- * The picture has room for the intersection of one sample a pixel. */
+ * The picture has room for the intersection of one sample a pixel; other points of a lens look at other texels. */
 static bool is_for_these_eyes(const struct frame_request *request)
 {
-    return request->samples == 1 && !request->accumulate && !request->has_key &&
+    return request->samples == 1 && !request->accumulate && !request->has_key && request->aperture == 0.0f &&
            frame_request_planes(request) == 1u << LAYER_BEAUTY;
 }
 
@@ -197,6 +197,8 @@ bool frame_key_tell(struct frame_renderer *renderer, struct error *error)
     if (!key_view_take_count(&renderer->key, renderer->device, &unknown, error))
         return false;
     const uint64_t samples = (uint64_t)request->width * request->height * renderer->work->context.request.samples;
+    rows->part = 0;
+    rows->part_name = NULL;
     structure_per_ray(rows, "views/unknown", (float)unknown / (float)samples);
     return true;
 }

@@ -11,6 +11,11 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* Samples of a lens that are not traced, beside each that is: gather_views.comp. Of panels before a chequered
+ * wall, by software GL, three give 4 samples a pixel the noise of 12 (41.9 dB in place of 36.3, 16 have 44.0) for
+ * 14 % more time; seven 0.3 dB more for another 12 %, one 39.9 for 11 %. */
+#define LENS_MORE 3
+
 bool key_view_is_of(const struct key_view *key, const struct trace_view *view, const struct frame_request *request,
                     uint64_t showing)
 {
@@ -164,6 +169,8 @@ static const struct gpu_program *gather_program(struct render_context *context, 
         defines[n++] = (struct gpu_define){"HAS_ENVIRONMENT_IMAGE", "1"};
     if (integrator->left_scene && strcmp(integrator->left_scene, "OPEN") == 0)
         defines[n++] = (struct gpu_define){"OPEN", "1"};
+    if (context->uniforms.lens[0] > 0.0f)
+        defines[n++] = (struct gpu_define){"HAS_LENS", "1"};
     if (has_unknown)
         defines[n++] = (struct gpu_define){"HAS_UNKNOWN", "1"};
     return context_use_with(context, "render/gather_views.comp", defines, error);
@@ -217,7 +224,7 @@ static void bind_eyes(struct key_view *key, struct render_context *context, cons
         gpu_buffer_bind_storage(&key->marks, BIND_KEY_MARKS);
     if (what == KEY_GATHER_KEPT) {
         gpu_buffer_bind_storage(band, BIND_ACCUMULATION);
-        gpu_uniform_uint(program, "first_slot", first_slot);
+        gpu_uniform_uint(program, "first_kept", first_slot);
     }
 }
 
@@ -236,6 +243,10 @@ bool key_view_gather(struct key_view *key, struct render_context *context, struc
     if (has_unknown) {
         gpu_buffer_bind_storage(&layers->sums, BIND_LAYER_SUMS);
         gpu_uniform_uint(program, "first_unknown", first_unknown);
+    }
+    if (context->uniforms.lens[0] > 0.0f) {
+        gpu_uniform_uint(program, "lens_more", LENS_MORE);
+        gpu_uniform_uint(program, "first_slot", context->slice.first_slot);
     }
     set_view(key, &context->tracer->options.quadtree, program);
     compact_dispatch(context, program, WAVE_RAYS);

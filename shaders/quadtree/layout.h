@@ -21,7 +21,8 @@
  *               its own, holds a surface that does not go on from this one (the paper's flag O)
  *            y: slopes of w per texel along x (low half) and y, times QUADTREE_SLOPE_SCALE, half floats
  *     box    x: greatest w, y: least w, both floats
- *   Where nothing is there is a plane of w = 0: no ray reaches it. */
+ *   Where nothing is there is a plane of w = 0: no ray reaches it.
+ *   Behind all nodes, for each face: x: the greatest w of its first layer; y unused */
 #ifndef FARLIGHT_SHADERS_QUADTREE_LAYOUT_H
 #define FARLIGHT_SHADERS_QUADTREE_LAYOUT_H
 #include "shared/bindings.h"

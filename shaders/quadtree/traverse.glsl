@@ -6,7 +6,7 @@
 // in the next one, and only there is it traced through that. Where it is behind the last layer, nothing is known.
 //
 // Defines: QUADTREE_PLANES a hit is where the ray meets a node's plane, else where it meets the primitive; QUADTREE_DDA
-// from texel to texel, not by the tree; QUADTREE_COUNT_STEPS hits are counts: nodes looked at, and layers.
+// from texel to texel, not by the tree; QUADTREE_VIEW there is one face; QUADTREE_COUNT_STEPS hits are counts: nodes looked at, and layers.
 #define INTERSECTION_FLAGS walk_flags
 
 #include "shared/path.h"
@@ -24,6 +24,8 @@ uniform uint ray_kind;
 #define found_type candidate
 #endif
 
+const float SAME_DISTANCE = 1e-5; // the share by which intersections with one surface differ at most
+const float FLOAT_MAX = 3.4e38;
 const float NEVER = 2.0; // beyond the end of a segment
 const int STEPS_TOGETHER = 32; // of rays side by side, before what some of them have met is looked at
 
@@ -39,8 +41,10 @@ struct layer_walk {
     bool is_before, is_behind; // neither: it has just begun
     float u_before;            // where it was last before the layer
     float u_since;             // since when it is behind it; NEVER: it is not
-    float u_behind, u_fill; // where it came behind it for more than a texel, and where it was last before then
-    candidate beside;       // where it first met a plane beside the surface that the plane stands for
+    float u_behind;         // where it came behind it for more than a texel
+    float u_fill;           // where it was last before the first layer that it came behind: before the background
+    uint fill_layer;        // that layer
+    float u_beside;         // where it last met a plane at an edge, but none of the primitives there
     vec2 offered;           // distances of the last two intersections, none of which counts twice
 };
 
@@ -57,7 +61,7 @@ uint walk_steps = 0u, walk_meetings = 0u;
 
 uint slice_of(layer_walk walk)
 {
-    return walk.face * quadtree.layers + walk.layer;
+    return FACE(walk.face) * quadtree.layers + walk.layer;
 }
 
 // ---- hits ----
@@ -65,14 +69,21 @@ uint slice_of(layer_walk walk)
 bool is_met_before(layer_walk walk, float distance_)
 {
     vec2 apart = abs(walk.offered - distance_);
-    return min(apart.x, apart.y) <= 1e-5 * abs(distance_);
+    return min(apart.x, apart.y) <= SAME_DISTANCE * abs(distance_);
+}
+
+// What the ray meets elsewhere counts there.
+bool is_in_face(layer_walk walk, float distance_)
+{
+    float slack = SAME_DISTANCE * abs(distance_);
+    return distance_ >= walk.s.t_from - slack && distance_ <= walk.s.t_to + slack;
 }
 
 // True if the ray ends there.
 bool offer(trace_ray r, candidate met, inout layer_walk walk, inout found_type found)
 {
 #ifdef ANY_HIT
-    if (is_met_before(walk, met.distance))
+    if (is_met_before(walk, met.distance) || !is_in_face(walk, met.distance))
         return false;
     walk.offered = vec2(met.distance, walk.offered.x);
     return offer_any(r, met, found);
@@ -160,10 +171,9 @@ bool meet(trace_ray r, float u, uvec2 node, inout layer_walk walk, inout found_t
         return false;
     candidate met = candidate(near, visible.y, visible.x - 1u, vec2(0.0));
 #ifndef QUADTREE_PLANES
-    // Beside the edge of the surface there may be another one behind it, or nothing.
+    // Beside the edge of the surface, or through primitives that are finer than texels.
     if (plane_is_at_edge(node)) {
-        if (near < walk.beside.distance && near > r.t_min)
-            walk.beside = met;
+        walk.u_beside = u;
         return false;
     }
 #endif
@@ -208,7 +218,7 @@ void begin_layer(uint layer, float u, inout layer_walk walk)
     walk.u = u;
     walk.cell = clamp(ivec2(floor(walk.s.from.xy + walk.s.along.xy * u)), ivec2(0), last) >> walk.level;
     walk.is_before = walk.is_behind = false;
-    walk.u_before = walk.u_since = walk.u_behind = walk.u_fill = NEVER;
+    walk.u_before = walk.u_since = walk.u_behind = walk.u_beside = NEVER;
 }
 
 vec2 exits_of(layer_walk walk)
@@ -249,7 +259,7 @@ void note_side(node_passage p, inout layer_walk walk)
     walk.is_before = p.gap_out <= 0.0;
     walk.is_behind = !walk.is_before;
     if (walk.is_before) {
-        walk.u_before = mix(walk.u, p.u_out, 0.999);
+        walk.u_before = mix(walk.u, p.u_out, 0.99);
         walk.u_since = NEVER;
         return;
     }
@@ -259,7 +269,10 @@ void note_side(node_passage p, inout layer_walk walk)
     bool stays = p.gap_out > QUADTREE_DEEP * p.w_out || max(way.x, way.y) > QUADTREE_OWN_WAY;
     if (stays && walk.u_since < walk.u_behind) {
         walk.u_behind = walk.u_since;
-        walk.u_fill = walk.u_before;
+        if (walk.u_before != NEVER && walk.u_fill == NEVER) {
+            walk.u_fill = walk.u_before;
+            walk.fill_layer = walk.layer;
+        }
     }
 }
 
@@ -310,7 +323,8 @@ struct view_walk {
     float t_unknown; // from where on nothing is; 1e30: all is known
     uint layers;     // that it had to look at
     bool has_left;   // it is unknown as the ray is outside what the view sees
-    uint fill_slice; // where it was last before a surface
+    float t_fill;    // where it was last before a surface, and the texel that shows that
+    uint fill_slice;
     ivec2 fill_texel;
 };
 
@@ -334,7 +348,7 @@ float last_distance(trace_ray r)
 
 uint face_towards(vec3 p)
 {
-    if (quadtree.faces == 1u)
+    if (FACES == 1u)
         return 0u;
     vec3 size = abs(p);
     uint axis = size.x >= max(size.y, size.z) ? 0u : size.y >= size.z ? 1u : 2u;
@@ -349,15 +363,26 @@ uint face_towards(vec3 p)
 #define SHORTEN(walk, found) walk.u_end = min(walk.u_end, place_at(walk.s, found.distance))
 #endif
 
-// A ray that meets nothing else in a face has met the surface that it passed the edge of.
-void offer_beside(trace_ray r, layer_walk walk, inout found_type found)
+// A ray that stays behind a layer has met it, also where it passed between its primitives: these are finer than texels.
+// True: it ends.
+bool meet_beside(trace_ray r, inout layer_walk walk, inout found_type found)
 {
-#ifndef ANY_HIT
-    if (found.primitive == HIT_NO_PRIMITIVE && walk.beside.distance < found.distance) {
-        walk_flags = (walk.layer + 1u) << HIT_LAYER_SHIFT;
-        offer_closest(r, walk.beside, found);
-    }
-#endif
+    if (!(walk.u_behind < walk.u_end) || walk.u_behind != walk.u_beside)
+        return false;
+    uvec2 visible;
+    vec2 place = walk.s.from.xy + walk.u_beside * walk.s.along.xy;
+    if (!visible_at(ivec2(floor(place)), slice_of(walk), visible))
+        return false;
+    walk.u_behind = NEVER;
+    return offer(r, candidate(distance_at(walk.s, walk.u_beside), visible.y, visible.x - 1u, vec2(0.0)), walk, found);
+}
+
+// To where surfaces of the face may be: before the nearest one there is nothing.
+void clip_to_surfaces(uint face, vec3 origin, vec3 direction, inout vec2 t)
+{
+    float w = uintBitsToFloat(texelFetch(quadtree_nodes, int(face_index(FACE(face)))).x);
+    float far = quadtree.depths.y, z = is_orthographic() ? far - w * (far - quadtree.depths.x) : quadtree.depths.x / w;
+    clip_range(origin.z - z, direction.z, t);
 }
 
 // The first layer of the next face that the ray passes; the face in which it begins is the first one.
@@ -366,10 +391,11 @@ bool begin_face(trace_ray r, found_type found, inout layer_walk walk, inout view
     vec3 from_eye = r.origin - quadtree.eye_world.xyz;
     float t_last = last_distance(r);
     uint first = face_towards(from_eye + r.t_min * r.direction);
-    for (; walk.turn < quadtree.faces; walk.turn++) {
+    for (; walk.turn < FACES; walk.turn++) {
         walk.face = walk.turn == 0u ? first : walk.turn <= first ? walk.turn - 1u : walk.turn;
         vec3 origin = face_vector(walk.face, from_eye), direction = face_vector(walk.face, r.direction);
         vec2 t = clip_to_face(origin, direction, vec2(r.t_min, min(t_last, NEAREST(found, r))));
+        clip_to_surfaces(walk.face, origin, direction, t);
         if (!(t.x < t.y))
             continue;
         walk.turn++;
@@ -377,9 +403,8 @@ bool begin_face(trace_ray r, found_type found, inout layer_walk walk, inout view
         walk.origin = origin.z >= quadtree.depths.w ? face_place(origin, face_q(origin)) : vec3(-1.0);
         vec2 along = walk.s.along.xy;
         walk.inverse = 1.0 / mix(along, vec2(1e-9), lessThan(abs(along), vec2(1e-9)));
-        walk.beside = candidate_none(1e30);
-        walk.offered = vec2(-1.0);
         walk.u_end = 1.0;
+        walk.u_fill = NEVER;
         begin_layer(0u, 0.0, walk);
         return true;
     }
@@ -388,13 +413,13 @@ bool begin_face(trace_ray r, found_type found, inout layer_walk walk, inout view
 
 void end_face(trace_ray r, layer_walk walk, inout found_type found, inout view_walk seen)
 {
-    offer_beside(r, walk, found);
     float t = distance_at(walk.s, min(walk.u_behind, 1.0));
     if (walk.u_behind >= walk.u_end || t >= seen.t_unknown)
         return;
     vec2 place = walk.s.from.xy + walk.s.along.xy * walk.u_fill;
     seen.t_unknown = t;
-    seen.fill_slice = slice_of(walk);
+    seen.t_fill = distance_at(walk.s, min(walk.u_fill, 1.0));
+    seen.fill_slice = FACE(walk.face) * quadtree.layers + walk.fill_layer;
     seen.fill_texel = walk.u_fill == NEVER ? ivec2(-1) : ivec2(floor(place));
 }
 
@@ -410,12 +435,20 @@ bool begin_next(trace_ray r, inout layer_walk walk, inout found_type found, inou
     return begin_face(r, found, walk, seen);
 }
 
+// What has no direction meets nothing.
+bool is_ray(trace_ray r)
+{
+    return all(lessThan(abs(r.origin), vec3(FLOAT_MAX))) && all(lessThan(abs(r.direction), vec3(FLOAT_MAX))) &&
+           r.direction != vec3(0.0);
+}
+
 // True: the ray ends before its end.
 bool walk_view(trace_ray r, inout view_walk seen, inout found_type found)
 {
     layer_walk walk;
     node_passage p;
     walk.turn = 0u;
+    walk.offered = vec2(-1.0);
     bool has_layer = begin_face(r, found, walk, seen);
     while (has_layer) {
         if (walk_on(walk, p)) {
@@ -423,15 +456,18 @@ bool walk_view(trace_ray r, inout view_walk seen, inout found_type found)
             if (meet_in(r, p, walk, found))
                 return true;
             SHORTEN(walk, found);
-            if (walk.u_end <= p.u_out) {
+            if (walk.u_end < p.u_out) {
                 walk.u = walk.u_end;
             } else {
                 note_side(p, walk);
                 leave(p, walk);
             }
         }
-        if (walk.u >= walk.u_end)
-            has_layer = begin_next(r, walk, found, seen);
+        if (walk.u < walk.u_end)
+            continue;
+        if (meet_beside(r, walk, found))
+            return true;
+        has_layer = begin_next(r, walk, found, seen);
     }
     return false;
 }
@@ -439,7 +475,7 @@ bool walk_view(trace_ray r, inout view_walk seen, inout found_type found)
 // What lies outside a view, of which there is one face.
 void look_beside_view(trace_ray r, float t_end, inout view_walk seen)
 {
-    if (quadtree.faces > 1u)
+    if (FACES > 1u)
         return;
     t_end = min(last_distance(r), t_end);
     vec3 origin = face_vector(0u, r.origin - quadtree.eye_world.xyz), direction = face_vector(0u, r.direction);
@@ -448,7 +484,7 @@ void look_beside_view(trace_ray r, float t_end, inout view_walk seen)
 
 view_walk begin_view_walk()
 {
-    return view_walk(1e30, 1u, false, 0u, ivec2(-1));
+    return view_walk(1e30, 1u, false, 0.0, 0u, ivec2(-1));
 }
 
 void count(view_walk seen, bool is_unknown)
@@ -470,6 +506,8 @@ void count(view_walk seen, bool is_unknown)
 
 bool trace_any(trace_ray r, inout vec3 optical_depth)
 {
+    if (!is_ray(r))
+        return false;
     view_walk seen = begin_view_walk();
     bool is_stopped = walk_view(r, seen, optical_depth);
     look_beside_view(r, r.t_max, seen);
@@ -485,12 +523,14 @@ void fill(view_walk seen, inout candidate best)
     uvec2 visible;
     if (seen.fill_texel.x < 0 || !visible_at(seen.fill_texel, seen.fill_slice, visible))
         return;
-    best = candidate(seen.t_unknown, visible.y, visible.x - 1u, vec2(0.0));
+    best = candidate(seen.t_fill, visible.y, visible.x - 1u, vec2(0.0));
     walk_flags |= (seen.fill_slice % quadtree.layers + 1u) << HIT_LAYER_SHIFT;
 }
 
 void trace_closest(trace_ray r, inout candidate best)
 {
+    if (!is_ray(r))
+        return;
     view_walk seen = begin_view_walk();
     walk_flags = walk_steps = walk_meetings = 0u;
     walk_view(r, seen, best);

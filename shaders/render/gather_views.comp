@@ -6,8 +6,9 @@
 // Coverage is 1 wherever there is a surface: what blended surfaces leave open is in the layer's radiance.
 //
 // Defines: those of common/environment.glsl; OPEN in place of the environment is 1; HAS_UNKNOWN the share of samples
-// that the key view does not show is a layer of the picture; MARK intersections are kept in place of radiance, and texels
-// that have to be there before it can be taken are marked; KEPT the picture has such intersections.
+// that the key view does not show is a layer of the picture; HAS_LENS rays begin on a lens; MARK
+// intersections are kept in place of radiance, and texels that have to be there before it can be taken are marked; KEPT the
+// picture has such intersections.
 
 #include "shared/key_view.h"
 #include "shared/hit.h"
@@ -39,7 +40,7 @@ layout(std430, binding = BIND_KEY_MARKS) writeonly buffer mark_block { uint mark
 #endif
 #ifdef KEPT
 layout(std430, binding = BIND_ACCUMULATION) buffer accumulation_block { vec4 accumulation[]; };
-uniform uint first_slot; // of the slice, in its band
+uniform uint first_kept; // of the slice, in its band
 #endif
 #ifdef HAS_UNKNOWN
 layout(std430, binding = BIND_LAYER_SUMS) writeonly buffer layer_block { vec4 layer_sums[]; };
@@ -67,6 +68,20 @@ float straight(float distance_)
     return distance_ == KEY_INFINITE ? 0.0 : 1.0 / distance_;
 }
 
+#ifdef HAS_LENS
+vec3 met_plane; // of what was met last, in the key view: right, up and forward; a point on it has the product 1
+bool has_plane = false;
+
+// `depths` lie at a place and its neighbours to the right and below, and change evenly.
+void note_plane(vec4 depths, vec2 place, float met)
+{
+    vec2 slope = vec2(depths.y - depths.x + depths.w - depths.z, depths.z - depths.x + depths.w - depths.y) * 0.5;
+    vec2 half_size = vec2(key_width, key_height) * 0.5, scale = half_size / key_extent;
+    met_plane = vec3(slope.x * scale.x, -slope.y * scale.y, met + dot(slope, half_size - place));
+    has_plane = key_orthographic == 0u;
+}
+#endif
+
 // From the four texels round a place, of which those count that agree with what a ray met there. `known`: one at least does.
 vec3 key_radiance(uint layer, vec2 place, float met, out bool known)
 {
@@ -81,6 +96,10 @@ vec3 key_radiance(uint layer, vec2 place, float met, out bool known)
     // Four texels of one plane pass through what was met, however steep it is.
     float fold = abs(depths.x - depths.y - depths.z + depths.w);
     bool plane = dot(there, vec4(1.0)) == 4.0 && fold <= tolerance && abs(dot(weights, depths) - met) <= tolerance;
+#ifdef HAS_LENS
+    if (plane)
+        note_plane(depths, place, met);
+#endif
     vec4 misfit = abs(depths - met) + (1.0 - there) * 1e30;
     float best = min(min(misfit.x, misfit.y), min(misfit.z, misfit.w));
     // Else those that fit as well as the best one, by as much as a steep surface may differ from texel to texel.
@@ -101,13 +120,12 @@ vec4 missed(vec3 direction)
 #endif
 }
 
-// Along the axes of the key view, forward in place of back.
-vec3 key_view_vector(vec3 point)
+vec3 key_from_world(vec3 d)
 {
-    vec3 d = point - key_eye;
     return vec3(dot(d, key_right), dot(d, key_up), -dot(d, key_back));
 }
 
+// In texels, of a point along the axes of the key view from its eye.
 vec2 key_place(vec3 v)
 {
     vec2 on_view = (key_orthographic != 0u ? v.xy : v.xy / v.z) / key_extent;
@@ -116,23 +134,60 @@ vec2 key_place(vec3 v)
 
 uint layer_of(uint bits)
 {
-    return min(max((bits & HIT_LAYER_MASK) >> HIT_LAYER_SHIFT, 1u) - 1u, key_layers - 1u);
+    return clamp((bits & HIT_LAYER_MASK) >> HIT_LAYER_SHIFT, 1u, key_layers) - 1u;
 }
 
 // Of the point that a ray met.
 vec3 met_radiance(vec3 point, uint bits, out bool known)
 {
-    vec3 v = key_view_vector(point);
-    vec3 radiance = key_radiance(layer_of(bits), key_place(v), key_orthographic != 0u ? v.z : 1.0 / v.z, known);
-    known = known && (bits & HIT_UNKNOWN) == 0u;
-    return radiance;
+    vec3 v = key_from_world(point - key_eye);
+    vec2 place = key_place(v);
+    known = false;
+    if ((bits & HIT_UNKNOWN) != 0u) // the background beside what hides it, however far the point is from it
+        return key_texel(layer_of(bits), ivec2(floor(place))).rgb;
+    return key_radiance(layer_of(bits), place, key_orthographic != 0u ? v.z : 1.0 / v.z, known);
 }
+
+#ifdef HAS_LENS
+uniform uint lens_more;  // samples of the lens beside that of the ray
+uniform uint first_slot; // of the slice
+
+// Other points of the lens look at the plane that a ray has met, without being traced: section 5.2 of the paper. They
+// count as far as the layer shows that plane where they meet it. They lie round the lens's centre, as far from it.
+vec3 with_lens(uint k, vec3 origin, vec3 direction, uint layer, vec3 radiance)
+{
+    uvec2 pixel = pixel_of_slot(first_slot + (k >> frame.sample_shift));
+    vec2 eye = eye_of_view(view_of_pixel(pixel)), on_lens = view_from_world_point(origin).xy - eye;
+    vec3 forward = world_from_view_vector(vec3(0.0, 0.0, -1.0)), plane = met_plane;
+    vec3 in_focus = key_from_world(origin + direction * (frame.lens.y / dot(direction, forward)) - key_eye);
+    vec4 sum = vec4(radiance, 1.0);
+    for (uint i = 1u; i <= lens_more; i++) {
+        float angle = TWO_PI * float(i) / float(lens_more + 1u), c = cos(angle), s = sin(angle);
+        vec2 turned = vec2(c * on_lens.x - s * on_lens.y, s * on_lens.x + c * on_lens.y);
+        vec3 from = key_from_world(eye_world() + world_from_view_vector(vec3(eye + turned, 0.0)) - key_eye);
+        vec3 towards = in_focus - from;
+        float t = (1.0 - dot(plane, from)) / dot(plane, towards);
+        vec3 p = from + t * towards;
+        if (!(t > 0.0 && p.z > 0.0))
+            continue;
+        vec2 on_view = p.xy / p.z / key_extent;
+        vec2 place = (vec2(on_view.x, -on_view.y) * 0.5 + 0.5) * vec2(key_width, key_height);
+        vec4 there = key_texel(layer, ivec2(floor(place)));
+        bool known;
+        vec3 more = key_radiance(layer, place, 1.0 / p.z, known);
+        float off = (straight(there.w) - 1.0 / p.z) / (SURFACE_SHARE / p.z + key_bound);
+        float weight = known && there.w > 0.0 ? exp(-off * off) : 0.0;
+        sum += vec4(more, 1.0) * weight;
+    }
+    return sum.rgb / sum.a;
+}
+#endif
 
 #ifdef MARK
 // The four texels that key_radiance() reads.
 void mark(vec3 point, uint bits)
 {
-    ivec2 corner = ivec2(floor(key_place(key_view_vector(point)) - 0.5)), last = ivec2(key_width, key_height) - 1;
+    ivec2 corner = ivec2(floor(key_place(key_from_world(point - key_eye)) - 0.5)), last = ivec2(key_width, key_height) - 1;
     ivec2 low = clamp(corner, ivec2(0), last), high = clamp(corner + 1, ivec2(0), last);
     uint layer = layer_of(bits), width = key_width, first = layer * width * key_height;
     marks[first + uint(low.y) * width + uint(low.x)] = 1u;
@@ -146,8 +201,8 @@ void mark(vec3 point, uint bits)
 uvec2 met_by(uint k)
 {
 #ifdef KEPT
-    vec4 kept = accumulation[first_slot + k];
-    accumulation[first_slot + k] = vec4(0.0);
+    vec4 kept = accumulation[first_kept + k];
+    accumulation[first_kept + k] = vec4(0.0);
     return uvec2(floatBitsToUint(kept.x), uint(kept.y) << KEPT_SHIFT);
 #else
     return texelFetch(hits, int(3u * k)).xy;
@@ -167,11 +222,15 @@ void main()
         mark(origin.xyz + distance_ * direction.xyz, met.y);
     slice_sums[k] = vec4(distance_, float(met.y >> KEPT_SHIFT), 0.0, 0.0);
 #else
-    bool known = true;
+    bool known = (met.y & HIT_UNKNOWN) == 0u;
     vec4 sum = vec4(0.0); // a pixel beyond the picture's edge
     if (distance_ >= 0.0)
         sum = vec4(met_radiance(origin.xyz + distance_ * direction.xyz, met.y, known), 1.0);
-    else if (direction.w > origin.w)
+#ifdef HAS_LENS
+    if (has_plane && known)
+        sum.rgb = with_lens(k, origin.xyz, direction.xyz, layer_of(met.y), sum.rgb);
+#endif
+    if (!(distance_ >= 0.0) && direction.w > origin.w)
         sum = missed(direction.xyz);
     slice_sums[k] = sum;
 #ifdef HAS_UNKNOWN

@@ -41,16 +41,26 @@ struct bench {
 
 /* ---- structures ---- */
 
+static struct trace_view view_of(const struct bench *bench)
+{
+    const struct frame_camera *camera = &bench->scene.camera;
+    struct trace_view view = {
+        .fov_y = camera->fov_y, .width = bench->options.width, .height = bench->options.height};
+    memcpy(view.world_from_view, camera->world_from_view, sizeof(view.world_from_view));
+    return view;
+}
+
 static bool build_tracer(struct bench *bench, struct structure *structure, const struct tracer_impl *impl,
                          const struct tracer_options *options, struct error *error)
 {
+    const struct trace_view view = view_of(bench);
     for (unsigned i = 0; i < BUILDS_MAX && i < bench->options.runs; i++) {
         tracer_destroy(structure->made);
         structure->made = tracer_create(impl, bench->device, options, error);
         if (!structure->made)
             return false;
         const uint64_t start_ns = clock_now_ns();
-        bool ok = tracer_update(structure->made, &bench->scene.gpu, &(struct tracer_update){0}, error);
+        bool ok = tracer_update(structure->made, &bench->scene.gpu, &(struct tracer_update){.view = &view}, error);
         glFinish();
         bench_add(&structure->builds, clock_now_ns() - start_ns);
         if (!ok)

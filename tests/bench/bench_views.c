@@ -124,22 +124,8 @@ static void write_picture(const struct bench *bench, uint32_t move, const char *
 {
     char path[512];
     snprintf(path, sizeof(path), "%s/%u-%s.ppm", bench->pictures, move, name);
-    FILE *file = fopen(path, "wb");
-    if (!file) {
+    if (!warp_write(path, bench->width, bench->height, colours, seen))
         fprintf(stderr, "bench views: %s cannot be written\n", path);
-        return;
-    }
-    fprintf(file, "P6\n%u %u\n255\n", bench->width, bench->height);
-    for (uint32_t i = 0; i < bench->width * bench->height; i++) {
-        uint8_t rgb[3] = {(uint8_t)colours[i], (uint8_t)(colours[i] >> 8), (uint8_t)(colours[i] >> 16)};
-        if (seen && !seen[i]) {
-            rgb[0] = 255;
-            rgb[1] /= 2;
-            rgb[2] /= 2;
-        }
-        fwrite(rgb, 1, 3, file);
-    }
-    fclose(file);
 }
 
 static json_t *decibels(double db)

@@ -4,6 +4,7 @@
 #include "tests/bench/bench_warps.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
@@ -345,4 +346,23 @@ double warp_psnr_db(const uint32_t *a, const uint32_t *b, const uint8_t *seen, u
         values += 3;
     }
     return squares == 0 ? (double)INFINITY : 10 * log10(255.0 * 255.0 * (double)values / (double)squares);
+}
+
+bool warp_write(const char *path, uint32_t width, uint32_t height, const uint32_t *colours, const uint8_t *seen)
+{
+    FILE *file = fopen(path, "wb");
+    if (!file)
+        return false;
+    fprintf(file, "P6\n%u %u\n255\n", width, height);
+    for (uint32_t i = 0; i < width * height; i++) {
+        uint8_t rgb[3] = {(uint8_t)colours[i], (uint8_t)(colours[i] >> 8), (uint8_t)(colours[i] >> 16)};
+        if (seen && !seen[i]) {
+            rgb[0] = 255;
+            rgb[1] /= 2;
+            rgb[2] /= 2;
+        }
+        fwrite(rgb, 1, 3, file);
+    }
+    const bool is_whole = !ferror(file);
+    return fclose(file) == 0 && is_whole;
 }

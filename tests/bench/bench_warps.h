@@ -61,4 +61,7 @@ bool warp_point(const struct warp_view *view, const float from[3], float to[3]);
  * all. Same pictures: infinite. */
 double warp_psnr_db(const uint32_t *a, const uint32_t *b, const uint8_t *seen, uint32_t count);
 
+/* As PPM, what is not seen in red; `seen` NULL: all is. False: it cannot be written. */
+bool warp_write(const char *path, uint32_t width, uint32_t height, const uint32_t *colours, const uint8_t *seen);
+
 #endif

@@ -24,7 +24,7 @@ import bench_view  # noqa: E402  pylint: disable=wrong-import-position
 
 TRACED = ("tracers", "family", "pixels", "rays", "flake", "reach")  # results of `bench tracers`
 PARTS = ("frames", "distributed", "steps", "link", "view", "tracers", "family", "pixels", "rays", "parallel", "instances",
-         "refit", "flake", "ldc", "abuffer", "rayspace", "reach")
+         "refit", "flake", "ldc", "abuffer", "rayspace", "quadtree", "reach")
 
 
 class Figures(unittest.TestCase):
@@ -131,6 +131,15 @@ class Benchmark(unittest.TestCase):
         self.assertGreater(refit["rebuild_ms"]["min"], 0)
         self.assertLess(instances["update_ms"]["min"], instances["frame_ms"]["min"])
         self.assertEqual([row["spheres"] for row in self.document["parts"]["flake"]["frames"]], [91, 820, 7381])
+
+    def test_quadtrees_have_the_papers_tables_and_the_ways_of_others(self):
+        data = self.document["parts"]["quadtree"]
+        self.assertEqual({c["name"] for c in data["stereo"][0]["contenders"]}, {"bvh", "reference", "quadtree", "dda", "minmax"})
+        for warps, eyes in zip(data["warps"]["moves"], data["eyes"]["moves"]):
+            self.assertEqual(warps["name"], eyes["name"])
+            self.assertLessEqual({"iterative", "splat", "mesh"}, {m["name"] for m in warps["methods"]})
+            self.assertEqual([f["name"] for f in eyes["forms"]], ["one", "two", "three", "adaptive"])
+        self.assertEqual([r["samples"] for r in data["lens"]], [4, 8, 16])
 
     def test_cubes_have_the_papers_table_and_are_held_against_bvh_and_the_reference(self):
         data = self.document["parts"]["ldc"]

@@ -8,7 +8,7 @@ from farlight_test import Daemon, OneDaemon, bundled_scenes, exr_attributes, exr
 
 EYE, LOOK_AT = (0.3, 1.1, 3.1), (0.0, 0.9, 0.0)
 VIEW = ["--size", "48x40", "--eye", ",".join(map(str, EYE)), "--look-at", ",".join(map(str, LOOK_AT)), "--fov", "50"]
-ALL = "beauty,albedo,normal,depth,position,ao,id"
+ALL = "beauty,albedo,normal,depth,position,ao,id,unknown"
 UINT, HALF, FLOAT = 0, 1, 2
 CHANNELS = {
     "beauty": {"R": HALF, "G": HALF, "B": HALF, "A": HALF},
@@ -18,6 +18,7 @@ CHANNELS = {
     "position": {"position.X": FLOAT, "position.Y": FLOAT, "position.Z": FLOAT},
     "ao": {"ao.Y": HALF},
     "id": {"id.node": UINT, "id.material": UINT},
+    "unknown": {"unknown.Y": HALF},
 }
 
 
@@ -133,7 +134,7 @@ class Layers(OneDaemon):
                 ("x.png", [], "write an .exr file, or leave out --layers"), ("x.hdr", [], "write an .exr file"),
                 ("x.jpg", [], "write an .exr file"), ("x.exr", ["--encoding", "jpeg"], "raw, zstd or predicted"),
                 ("x.exr", ["--size", "8192x8192"], "some of them at a time"),
-                ("x.exr", ["--layers", "beauty,z"], "known: beauty, albedo, normal, depth, position, ao, id"),
+                ("x.exr", ["--layers", "beauty,z"], "known: beauty, albedo, normal, depth, position, ao, id, unknown"),
                 ("x.exr", ["--layers", ""], "known: beauty")):
             with self.subTest(output=output, options=options):
                 result = self.expect(farlight("render", missing, "-o", self.folder / output, "--layers", ALL, *options), 2)

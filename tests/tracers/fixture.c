@@ -82,7 +82,7 @@ struct seen_answer fixture_seen(struct fixture *fixture, const struct ray *ray)
     return answer;
 }
 
-/* A float may take what is on a surface for what is behind it. */
+/* What the distance of a hit may be off. */
 static double slack_of(double distance)
 {
     return 1e-4 * (1 + fabs(distance));
@@ -102,7 +102,9 @@ enum knowledge seen_judges(const struct seen_answer *seen, const struct hit *hit
 
 bool seen_knows(const struct seen_answer *seen, double until)
 {
-    return seen->maybe_unknown >= until - slack_of(until) && seen->edge > until + slack_of(until);
+    /* The surface at the end of the way may be what hides all behind it, and that is in double where it is. */
+    const double rounding = 1e-6 * (1 + fabs(until));
+    return seen->maybe_unknown >= until - rounding && seen->edge > until + slack_of(until);
 }
 
 /* ---- the scene and its tracer ---- */

@@ -44,7 +44,7 @@ static inline void seen_view_of_cube(struct seen_view *view, const double eye[3]
 
 struct seen_answer {
     /* Distances from where on a point of the ray may be hidden by all layers, or outside the view, and from where
-     * on it surely is; INFINITY: nowhere. */
+     * on a tracer must know that it is; INFINITY: nowhere. */
     double maybe_unknown, unknown;
     /* Of the nearest surface that the ray meets within a texel of its outline. */
     double edge;
@@ -313,7 +313,8 @@ static inline void seen_shadow_of_ball(struct seen *seen, const struct seen_ball
     }
 }
 
-static inline void seen_sphere(struct seen *seen, const struct scene_instance *instance, const float sphere[4])
+static inline void seen_sphere(struct seen *seen, const struct scene_instance *instance, const float sphere[4],
+                               bool is_whole)
 {
     const float *m = instance->object_from_world;
     struct seen_ball ball = {.radius = sphere[3]};
@@ -335,13 +336,13 @@ static inline void seen_sphere(struct seen *seen, const struct scene_instance *i
                  c = twin_dot(from, from) - r * r;
     ball.within = seen_roots(a, b, c);
     if (twin_dot(ball.c, ball.c) < r * r) { /* seen from within */
-        seen_hide(seen, (struct seen_interval){-INFINITY, fmin(ball.within.from, INFINITY)}, 1, 1);
+        seen_hide(seen, (struct seen_interval){-INFINITY, fmin(ball.within.from, INFINITY)}, 1, is_whole);
         if (ball.within.from < ball.within.to)
-            seen_hide(seen, (struct seen_interval){ball.within.to, INFINITY}, 1, 1);
+            seen_hide(seen, (struct seen_interval){ball.within.to, INFINITY}, 1, is_whole);
     } else {
         const double off = SEEN_TEXELS * seen->view->texel * sqrt(apart) * shrink;
         seen_shadow_of_ball(seen, &ball, r + off, 1, 0);
-        seen_shadow_of_ball(seen, &ball, r - off, 0, 1);
+        seen_shadow_of_ball(seen, &ball, r - off, 0, is_whole);
         /* Where a tangent plane stands for it: near the outline of the eye, and of the ray. */
         const double ends[2] = {ball.within.from, ball.within.to};
         for (int i = 0; i < 2 && ball.within.from < ball.within.to; i++) {
@@ -379,6 +380,7 @@ static inline void seen_disc(struct seen *seen, const struct scene_disc *disc)
         u[k] = seen->origin[k] * height - c[k] * on;
         v[k] = seen->direction[k] * height - c[k] * dn;
     }
+    const bool is_whole = seen_is_whole(seen, disc->material);
     for (int i = 0; i < 2; i++) {
         const double radius = disc->radius + (i == 0 ? off : -off);
         struct seen_interval beyond = seen->inside;
@@ -389,7 +391,7 @@ static inline void seen_disc(struct seen *seen, const struct scene_disc *disc)
                      b = twin_dot(u, v) - radius * radius * on * dn,
                      q = twin_dot(u, u) - radius * radius * on * on;
         if (a > 0) {
-            seen_hide(seen, seen_both(beyond, seen_roots(a, b, q)), i == 0, i == 1);
+            seen_hide(seen, seen_both(beyond, seen_roots(a, b, q)), i == 0, i == 1 && is_whole);
             continue;
         }
         /* It stays inside for good: outside between the roots. */
@@ -397,9 +399,9 @@ static inline void seen_disc(struct seen *seen, const struct scene_disc *disc)
         struct seen_interval before = beyond, after = beyond;
         before.to = fmin(before.to, outside.from);
         after.from = fmax(after.from, outside.to);
-        seen_hide(seen, before, i == 0, i == 1);
+        seen_hide(seen, before, i == 0, i == 1 && is_whole);
         if (outside.from < outside.to)
-            seen_hide(seen, after, i == 0, i == 1);
+            seen_hide(seen, after, i == 0, i == 1 && is_whole);
     }
     const double at = (height - on) / dn;
     double squared = 0;
@@ -430,6 +432,23 @@ static inline double seen_texels_between(const struct seen *seen, double from, d
     }
     twin_cross(across, a, b);
     return atan2(sqrt(twin_dot(across, across)), twin_dot(a, b)) / seen->view->texel;
+}
+
+/* Where the ray, hidden since `from`, has been so for as long as a tracer may take to see that; after `to`: it
+ * comes out before. */
+static inline double seen_surely_hidden(const struct seen *seen, double from, double to)
+{
+    double low = from, high = fmin(to, 1e9 * (1 + fabs(from)));
+    if (!(seen_texels_between(seen, from, to) > SEEN_RUN))
+        return INFINITY;
+    for (int i = 0; i < 50; i++) {
+        const double middle = (low + high) / 2;
+        if (seen_texels_between(seen, from, middle) > SEEN_RUN)
+            high = middle;
+        else
+            low = middle;
+    }
+    return high;
 }
 
 static inline void seen_meet_all(struct seen *seen)
@@ -464,8 +483,8 @@ static inline void seen_sweep(const struct seen *seen, struct seen_answer *answe
             answer->maybe_unknown = fmin(answer->maybe_unknown, at);
         since = narrow >= layers ? fmin(since, at) : INFINITY;
         const double end = fmin(next, seen->surely_within);
-        if (since < fmin(answer->unknown, end) && seen_texels_between(seen, since, end) > SEEN_RUN)
-            answer->unknown = since;
+        if (since < fmin(answer->unknown, end))
+            answer->unknown = fmin(answer->unknown, seen_surely_hidden(seen, since, end));
     }
 }
 
@@ -480,7 +499,8 @@ static inline void seen_surfaces(struct seen *seen)
         const struct scene_instance instance = twin_instance_at(seen->twin, 1, i, 0);
         const struct scene_spheres *set = scene_spheres(seen->twin->scene, instance.node->object);
         for (uint32_t p = 0; set && !instance.singular && p < set->sphere_count; p++)
-            seen_sphere(seen, &instance, (const float *)(const void *)set->centres_radii->data + 4 * (size_t)p);
+            seen_sphere(seen, &instance, (const float *)(const void *)set->centres_radii->data + 4 * (size_t)p,
+                        seen_is_whole(seen, twin_range_material(set->ranges, set->range_count, p)));
     }
     while (hashmap_next(&seen->twin->scene->objects[OBJECT_DISC], &cursor, &id, &value))
         seen_disc(seen, value);

@@ -215,8 +215,8 @@ static struct ray ray_on_ball(bool inwards, double grazing, uint64_t *seed)
     return ray_from(o, d, 0, FAR);
 }
 
-/* How far it is to where the ray leaves the ball, in lengths of the direction. */
-static double chord_of(const struct ray *ray, double *length)
+/* How far it is to where the ray leaves the ball, and to where it comes to it, in lengths of the direction. */
+static double chord_of(const struct ray *ray, double *length, double *begin)
 {
     double a = 0, b = 0, c = 0;
     for (int k = 0; k < 3; k++) {
@@ -225,7 +225,9 @@ static double chord_of(const struct ray *ray, double *length)
         a += d * d, b += from * d, c += from * from;
     }
     *length = sqrt(a);
-    return (-b + sqrt(fmax(b * b - a * (c - BALL_RADIUS * BALL_RADIUS), 0))) / a;
+    const double half = sqrt(fmax(b * b - a * (c - BALL_RADIUS * BALL_RADIUS), 0));
+    *begin = (-b - half) / a;
+    return (-b + half) / a;
 }
 
 static void expect_ball_left(struct fixture *fixture, struct answered *a, bool inwards, double grazing)
@@ -236,7 +238,7 @@ static void expect_ball_left(struct fixture *fixture, struct answered *a, bool i
         a->rays[i] = ray_on_ball(inwards, grazing, &seed);
     answer(fixture, a);
     for (uint32_t i = 0; i < RAY_COUNT; i++) {
-        double length, chord = chord_of(&a->rays[i], &length);
+        double length, begin, chord = chord_of(&a->rays[i], &length, &begin);
         if ((inwards && chord * length <= 4) || /* a chord of a few cells says nothing */
             !is_judged(fixture, a, i, inwards ? chord : (double)FAR))
             continue;
@@ -293,8 +295,9 @@ CHECK(rays_from_afar_meet_what_is_small, CHECK_FORMS)
     }
     answer(&fixture, a);
     for (uint32_t i = 0; i < RAY_COUNT; i++) {
-        double from_centre = 0, along = 0, length;
-        if (!is_judged(&fixture, a, i, chord_of(&a->rays[i], &length) - 2 * BALL_RADIUS / length))
+        double from_centre = 0, along = 0, length, begin;
+        (void)chord_of(&a->rays[i], &length, &begin);
+        if (!is_judged(&fixture, a, i, begin))
             continue;
         for (int k = 0; k < 3; k++) {
             const double off = (double)a->rays[i].origin_t_min[k] +

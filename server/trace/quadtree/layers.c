@@ -174,5 +174,5 @@ void quadtree_layers_finish(struct quadtree_layers *layers)
 
 uint64_t quadtree_layers_bytes(const struct quadtree_layers *layers)
 {
-    return layers->depths[0].size_bytes + layers->depths[1].size_bytes + layers->frame.size_bytes;
+    return layers->depths[0].size_bytes + layers->depths[1].size_bytes + layers->frame.capacity_bytes;
 }

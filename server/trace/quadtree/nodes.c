@@ -31,7 +31,7 @@ static uint32_t slice_units(const struct quadtree_uniforms *uniforms)
 
 uint32_t quadtree_nodes_units(const struct quadtree_uniforms *uniforms)
 {
-    return slice_units(uniforms) + QUADTREE_TOP - 1;
+    return slice_units(uniforms) + QUADTREE_TOP - 1 + 1;
 }
 
 bool quadtree_nodes_begin(struct quadtree_node_build *build, struct quadtree_store *store, struct error *error)
@@ -40,13 +40,13 @@ bool quadtree_nodes_begin(struct quadtree_node_build *build, struct quadtree_sto
     struct gpu_device *device = store->device;
     const uint64_t count = quadtree_nodes_count(uniforms);
     const uint64_t above = count - (uint64_t)slice_count(uniforms) * slice_texels(uniforms);
-    if (count > device->facts.texture_buffer_texels_max || count > INT32_MAX) {
+    if (count + uniforms->faces > device->facts.texture_buffer_texels_max || count > INT32_MAX / 2) {
         error_set(error, ERROR_LIMIT, "quadtree_resolution", "%llu nodes are more than the device takes",
                   (unsigned long long)count);
         return error_remedy(error, "take a lower resolution, or fewer layers");
     }
     build->unit = 0;
-    return gpu_buffer_reserve(device, &store->nodes, count * NODE_BYTES, error) &&
+    return gpu_buffer_reserve(device, &store->nodes, (count + uniforms->faces) * NODE_BYTES, error) &&
            gpu_buffer_reserve(device, &build->planes, (size_t)slice_texels(uniforms) * NODE_BYTES, error) &&
            gpu_buffer_reserve(device, &build->errors, above * ERROR_BYTES, error);
 }
@@ -105,6 +105,18 @@ static bool make_level(struct quadtree_node_build *build, struct quadtree_store 
     return true;
 }
 
+/* How near the surfaces of each face come. */
+static bool find_nearest(struct quadtree_store *store, struct error *error)
+{
+    const struct gpu_program *program = program_get(store, "quadtree/nearest.comp", NULL, error);
+    if (!program)
+        return false;
+    gpu_buffer_bind_texels(store->device, &store->nodes, UNIT_QUADTREE_NODES, GL_RG32UI);
+    gpu_buffer_bind_image(store->device, &store->nodes, IMAGE_QUADTREE_NODES, GL_RG32UI);
+    gpu_dispatch(store->device, program, store->uniforms.faces);
+    return true;
+}
+
 enum tracer_progress quadtree_nodes_go_on(struct quadtree_node_build *build, struct quadtree_store *store,
                                           struct gpu_scene *scene, bool minmax, struct error *error)
 {
@@ -116,8 +128,10 @@ enum tracer_progress quadtree_nodes_go_on(struct quadtree_node_build *build, str
         good = make_leaves(build, store, scene, unit / 2, error);
     else if (unit < slices)
         good = make_level(build, store, unit / 2, 1, minmax, error);
-    else
+    else if (unit < slices + QUADTREE_TOP - 1)
         good = make_level(build, store, 0, unit - slices + 2, minmax, error);
+    else
+        good = find_nearest(store, error);
     gpu_pop_group(store->device);
     if (!good)
         return TRACER_FAILED;

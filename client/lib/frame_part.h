@@ -1,0 +1,19 @@
+/* SPDX-License-Identifier: MIT */
+/* A part of a frame as a frame of its own, such as one of several views. */
+#ifndef FARLIGHT_CLIENT_LIB_FRAME_PART_H
+#define FARLIGHT_CLIENT_LIB_FRAME_PART_H
+
+#include "lib/farlight.h"
+
+/* In pixels from the frame's top left; `eye`: how far its eye is from the frame's, along its right and up. */
+struct fl_frame_part {
+    uint32_t x, y, width, height;
+    float eye[2];
+};
+
+/* A copy of a part of all layers of a decoded frame, without times, comparisons, structure and attachments. NULL:
+ * there is no such part, or no memory. */
+struct fl_frame *fl_frame_cut(const struct fl_frame *frame, const struct fl_frame_part *part,
+                              struct fl_error *error);
+
+#endif
