@@ -4,6 +4,7 @@
 #include "base/clock.h"
 #include "shared/bindings.h"
 #include "shared/hit.h"
+#include "shared/key_view.h"
 #include "shared/path.h"
 #include "shared/ray.h"
 #include "shared/wave.h"
@@ -96,6 +97,14 @@ const struct gpu_program *context_use_with(struct render_context *context, const
 const struct gpu_program *context_use(struct render_context *context, const char *compute, struct error *error)
 {
     return context_use_with(context, compute, NULL, error);
+}
+
+void context_bind_tiles(const struct render_context *context, const struct gpu_program *program)
+{
+    if (!context->key_tiles)
+        return;
+    gpu_buffer_bind_texels(context->device, context->key_tiles, UNIT_KEY_TILES, GL_R32UI);
+    gpu_uniform_uint(program, "first_tile", context->first_tile);
 }
 
 void context_bind(struct render_context *context)

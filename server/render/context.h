@@ -31,6 +31,8 @@ struct render_context {
     struct trace_state *trace_state; /* of the wave in hand, by that tracer */
     struct tracer *layer_tracer;     /* first hits are those of a layer of its structure; NULL: they are not */
     uint32_t layer;
+    struct gpu_buffer *key_marks, *key_tiles; /* which texels of it are rendered (key_view.h); NULL: all are */
+    uint32_t first_tile;                      /* of the layer */
     struct comparison *comparison; /* of the current frame; NULL: nothing is compared */
     struct gpu_timer *timer;
     struct frame_request request;
@@ -80,6 +82,8 @@ const struct gpu_program *context_use(struct render_context *context, const char
 /* `defines` ends with {0}. */
 const struct gpu_program *context_use_with(struct render_context *context, const char *compute,
                                            const struct gpu_define *defines, struct error *error);
+/* To programs that have HAS_TILES: which pixels the picture has, where those are not all. */
+void context_bind_tiles(const struct render_context *context, const struct gpu_program *program);
 /* The scene, the lights and the frame's uniforms at their places. */
 void context_bind(struct render_context *context);
 bool context_upload_uniforms(struct render_context *context, struct error *error);

@@ -185,6 +185,8 @@ static bool land_all(struct frame_renderer *renderer, struct error *error)
         return false;
     if (again || renderer->work->ahead.count > 0)
         return true;
+    if (frame_is_mark_pass(renderer))
+        return frame_key_end_marks(renderer, error);
     renderer->phase = frame_is_layer_pass(renderer) ? PHASE_KEEP : PHASE_RESOLVE;
     if (frame_is_eyes_pass(renderer) && !key_view_copy_count(&renderer->key, renderer->device, error))
         return false;

@@ -300,7 +300,7 @@ static void announce_programs(struct frame_renderer *renderer)
         wave_passes_announce_shadows(passes, context);
     primary_announce(context, renderer->rasterise);
     if (frame_is_eyes_pass(renderer))
-        key_view_announce(context, renderer->work->layers.wanted & 1u << LAYER_UNKNOWN);
+        key_view_announce(context, renderer->work->layers.wanted & 1u << LAYER_UNKNOWN, frame_key_gather(renderer));
     else
         wave_passes_announce(passes, context);
     picture_announce(renderer->target, context);
@@ -316,6 +316,7 @@ static bool get_ready(struct frame_renderer *renderer, struct error *error)
         return false;
     limit_samples(renderer, &context->request);
     camera_fill_uniforms(&context->uniforms, request, &renderer->shared->copy);
+    frame_key_limit_rows(renderer, &context->request); /* the camera is that of all of them */
     environment_fill_uniforms(context->environment, &context->uniforms, &renderer->shared->copy);
     context->uniforms.depth = request->depth;
     /* Those of a texel of a layer all pass through its middle. */
@@ -446,6 +447,7 @@ static bool begin(struct frame_renderer *renderer, const struct scene *scene, co
     struct render_context *context = &renderer->work->context;
     context->request = renderer->request = *request;
     context->layer_tracer = NULL;
+    context->key_marks = context->key_tiles = NULL;
     renderer->pass = PASS_UNKNOWN;
     renderer->target = &renderer->picture;
     renderer->result = (struct frame_result){0};

@@ -5,6 +5,7 @@
 #include "render/frame_state.h"
 
 #include "render/compact.h"
+#include "render/frame_request.h"
 
 #include <string.h>
 
@@ -40,6 +41,14 @@ bool frame_key_take(struct frame_renderer *renderer, struct error *error)
            frame_work_trace_by(renderer->work, &renderer->work->key_trace_state, renderer->key_tracer, error);
 }
 
+/* Other eyes that the layers would serve do not follow: what those of the frame do not look at need not be rendered.
+ * The picture has room for the intersection of one sample a pixel; other points of a lens look at other texels. */
+static bool is_for_these_eyes(const struct frame_request *request)
+{
+    return request->samples == 1 && !request->accumulate && !request->has_key && request->aperture == 0.0f &&
+           frame_request_planes(request) == 1u << LAYER_BEAUTY;
+}
+
 static bool begin_layers(struct frame_renderer *renderer, const struct trace_view *texels, uint32_t layer_count,
                          struct error *error)
 {
@@ -48,7 +57,10 @@ static bool begin_layers(struct frame_renderer *renderer, const struct trace_vie
     picture_restart(&key->sums);
     if (!key_view_reserve(key, renderer->device, texels, layer_count, error))
         return false; /* it may have been put off: the choice is made again */
-    renderer->pass = 0;
+    key->is_marked = is_for_these_eyes(&renderer->request);
+    if (key->is_marked && !key_view_mark_anew(key, renderer->device, error))
+        return false;
+    renderer->pass = key->is_marked ? PASS_MARK : 0;
     return true;
 }
 
@@ -66,6 +78,7 @@ static bool choose_first(struct frame_renderer *renderer, struct error *error)
         return false;
     if (!key_view_is_of(key, &renderer->view, &renderer->request, renderer->shared->showing))
         return begin_layers(renderer, &texels, layer_count, error);
+    key->is_marked = false;
     renderer->pass = key->layer_count;
     return true;
 }
@@ -73,6 +86,11 @@ static bool choose_first(struct frame_renderer *renderer, struct error *error)
 bool frame_is_layer_pass(const struct frame_renderer *renderer)
 {
     return renderer->key_tracer && renderer->pass < renderer->key.layer_count;
+}
+
+bool frame_is_mark_pass(const struct frame_renderer *renderer)
+{
+    return renderer->key_tracer && renderer->pass == PASS_MARK;
 }
 
 bool frame_is_eyes_pass(const struct frame_renderer *renderer)
@@ -91,10 +109,35 @@ bool frame_key_set_pass(struct frame_renderer *renderer, struct error *error)
     context->trace_state = is_layer ? renderer->work->trace_state : renderer->work->key_trace_state;
     context->layer_tracer = is_layer ? renderer->key_tracer : NULL;
     context->layer = is_layer ? renderer->pass : 0;
+    context->key_marks = is_layer && renderer->key.is_marked ? &renderer->key.marks : NULL;
+    context->key_tiles = context->key_marks ? &renderer->key.tiles : NULL;
+    context->first_tile = context->key_tiles ? renderer->key.first_tile[renderer->pass] : 0;
     renderer->target = is_layer ? &renderer->key.sums : &renderer->picture;
     renderer->samples_before = is_layer ? 0 : renderer->eyes_samples_before;
     slices_ahead_forget(&renderer->work->ahead); /* rays of another pass cost something else */
     return true;
+}
+
+static uint32_t next_layer(const struct key_view *key, uint32_t layer)
+{
+    while (layer < key->layer_count && key->is_marked && key->tile_rows[layer] == 0)
+        layer++;
+    return layer;
+}
+
+bool frame_key_end_marks(struct frame_renderer *renderer, struct error *error)
+{
+    if (!key_view_list_tiles(&renderer->key, renderer->device, error))
+        return false;
+    renderer->phase = PHASE_BUILD; /* the next pass gets ready */
+    renderer->pass = next_layer(&renderer->key, 0);
+    return true;
+}
+
+void frame_key_limit_rows(const struct frame_renderer *renderer, struct frame_request *request)
+{
+    if (frame_is_layer_pass(renderer) && renderer->key.is_marked)
+        request->height = renderer->key.tile_rows[renderer->pass] * 8;
 }
 
 /* All of the layer's samples are in its sums. */
@@ -110,24 +153,34 @@ bool frame_key_keep(struct frame_renderer *renderer, struct error *error)
         (uint64_t)context->request.width * context->request.height * context->request.samples;
     picture_restart(&key->sums);
     renderer->phase = PHASE_BUILD; /* the next pass gets ready */
-    if (++renderer->pass < key->layer_count)
+    renderer->pass = next_layer(key, renderer->pass + 1);
+    if (renderer->pass < key->layer_count)
         return true;
     key->view = renderer->view;
     key->request = renderer->request;
     key->showing = renderer->shared->showing;
-    key->is_made = true;
+    key->is_made = !key->is_marked;
     return true;
+}
+
+enum key_gather frame_key_gather(const struct frame_renderer *renderer)
+{
+    return frame_is_mark_pass(renderer) ? KEY_GATHER_MARK
+           : renderer->key.is_marked    ? KEY_GATHER_KEPT
+                                        : KEY_GATHER;
 }
 
 bool frame_key_find(struct frame_renderer *renderer, bool *done, struct error *error)
 {
     struct render_context *context = &renderer->work->context;
     struct layers *layers = &renderer->work->layers;
-    if (!primary_intersect(context, done, error))
+    const enum key_gather what = frame_key_gather(renderer);
+    *done = true;
+    if (what != KEY_GATHER_KEPT && !primary_intersect(context, done, error))
         return false;
     if (!*done)
         return true;
-    return key_view_gather(&renderer->key, context, layers, error) &&
+    return key_view_gather(&renderer->key, context, layers, &renderer->picture, what, error) &&
            (!layers->noting || primary_make_surfaces(context, error));
 }
 

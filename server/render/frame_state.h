@@ -121,10 +121,18 @@ const struct tracer_impl *frame_find_tracer(const struct frame_renderer *rendere
                                             const char *field, struct error *error);
 /* frame_key.c */
 #define PASS_UNKNOWN UINT32_MAX
+#define PASS_MARK (UINT32_MAX - 1) /* eyes are intersected, to know what they look at, before it is rendered */
 bool frame_is_from_layers(const struct frame_request *request);
 struct frame_camera frame_key_camera(const struct frame_request *request);
 bool frame_is_layer_pass(const struct frame_renderer *renderer);
+bool frame_is_mark_pass(const struct frame_renderer *renderer); /* a pass over the eyes as well */
 bool frame_is_eyes_pass(const struct frame_renderer *renderer);
+/* What the pass over the eyes does. */
+enum key_gather frame_key_gather(const struct frame_renderer *renderer);
+/* All eyes are intersected: goes on to the layers. */
+bool frame_key_end_marks(struct frame_renderer *renderer, struct error *error);
+/* Of a layer of which only tiles are rendered: as many rows as the picture of those has. */
+void frame_key_limit_rows(const struct frame_renderer *renderer, struct frame_request *request);
 /* Takes the tracer of the key view's structure. */
 bool frame_key_take(struct frame_renderer *renderer, struct error *error);
 /* Sets the context to the pass in hand, once the tracers are built: request, tracer, and what gets the samples. */

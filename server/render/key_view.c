@@ -8,6 +8,7 @@
 
 #include <epoxy/gl.h>
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 /* Samples of a lens that are not traced, beside each that is: gather_views.comp. Of panels before a chequered
@@ -67,36 +68,103 @@ struct frame_request key_view_layer_request(const struct key_view *key, const st
 
 /* ---- layers ---- */
 
+static const struct gpu_program *keep_program(struct render_context *context, struct error *error)
+{
+    const struct gpu_define defines[] = {{context->key_tiles ? "HAS_TILES" : NULL, "1"}, {NULL, NULL}};
+    return context_use_with(context, "render/keep_layer.comp", defines, error);
+}
+
 bool key_view_keep_band(struct key_view *key, struct render_context *context, uint32_t layer, uint32_t band,
                         struct error *error)
 {
     struct picture *sums = &key->sums;
-    const struct gpu_program *program = context_use(context, "render/keep_layer.comp", error);
+    const struct gpu_program *program = keep_program(context, error);
     if (!program)
         return false;
-    const uint32_t texels = picture_band_row_count(sums, band) * sums->width;
+    uint32_t first_slot = 0;
+    const uint32_t slots = picture_band_slots(sums, band, &first_slot);
     context_span_begin(context, STAGE_RESOLVE);
     context_bind(context);
     gpu_buffer_bind_storage(picture_band(sums, 0, band), BIND_ACCUMULATION); /* the beauty; then the depth */
     gpu_buffer_bind_storage(picture_band(sums, 1, band), BIND_KEY_DEPTHS);
     gpu_buffer_bind_storage(&key->layers[layer], BIND_KEY_LAYER);
-    gpu_uniform_uint(program, "texel_count", texels);
-    gpu_uniform_uint(program, "first_texel", picture_band_first_row(sums, band) * sums->width);
+    context_bind_tiles(context, program);
+    gpu_uniform_uint(program, "slot_count", slots);
+    gpu_uniform_uint(program, "first_slot", first_slot);
     gpu_uniform_float(program, "scale", 1.0f / (float)sums->samples);
     gpu_uniform_uint(program, "shows_environment", layer == 0);
-    gpu_dispatch(context->device, program, texels);
+    gpu_dispatch(context->device, program, slots);
     context_span_end(context);
     return gpu_check(context->device, "keeping a layer", error);
 }
 
 /* ---- eyes ---- */
 
+bool key_view_mark_anew(struct key_view *key, struct gpu_device *device, struct error *error)
+{
+    const size_t texels = (size_t)key->texels.width * key->texels.height;
+    if (!gpu_buffer_reserve(device, &key->marks, texels * key->layer_count * sizeof(uint32_t), error))
+        return false;
+    gpu_buffer_clear(device, &key->marks, 0);
+    /* Where rounding takes a texel that is not marked: it must be a number. */
+    for (uint32_t i = 0; i < key->layer_count; i++)
+        gpu_buffer_clear(device, &key->layers[i], 0);
+    return true;
+}
+
+static bool is_tile_marked(const uint32_t *marks, const struct trace_view *texels, uint32_t x, uint32_t y)
+{
+    const uint32_t end_x = x + 8 < texels->width ? x + 8 : texels->width;
+    const uint32_t end_y = y + 8 < texels->height ? y + 8 : texels->height;
+    uint32_t any = 0;
+    for (uint32_t j = y; j < end_y; j++)
+        for (uint32_t i = x; i < end_x; i++)
+            any |= marks[(size_t)j * texels->width + i];
+    return any != 0;
+}
+
+/* Behind those that are marked ones beyond the layer, to the end of a row. Returns how many in all. */
+static uint32_t list_tiles(const uint32_t *marks, const struct trace_view *texels, uint32_t *tiles)
+{
+    const uint32_t across = (texels->width + 7) / 8, down = (texels->height + 7) / 8;
+    uint32_t count = 0;
+    for (uint32_t tile = 0; tile < across * down; tile++)
+        if (is_tile_marked(marks, texels, tile % across * 8, tile / across * 8))
+            tiles[count++] = tile;
+    while (count % across != 0)
+        tiles[count++] = across * down;
+    return count;
+}
+
+bool key_view_list_tiles(struct key_view *key, struct gpu_device *device, struct error *error)
+{
+    const struct trace_view *texels = &key->texels;
+    const uint32_t across = (texels->width + 7) / 8, down = (texels->height + 7) / 8;
+    const size_t mark_bytes = (size_t)texels->width * texels->height * sizeof(uint32_t);
+    uint32_t *marks = malloc(mark_bytes), count = 0;
+    uint32_t *tiles = malloc((size_t)across * down * key->layer_count * sizeof(uint32_t));
+    bool good = marks && tiles;
+    for (uint32_t layer = 0; good && layer < key->layer_count; layer++) {
+        gpu_buffer_read(device, &key->marks, layer * mark_bytes, marks, mark_bytes);
+        key->first_tile[layer] = count;
+        key->tile_rows[layer] = list_tiles(marks, texels, tiles + count) / across;
+        count += key->tile_rows[layer] * across;
+    }
+    good = good ? gpu_buffer_upload(device, &key->tiles, tiles, (count ? count : 1) * sizeof(uint32_t), error)
+                : error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the tiles of a key view");
+    free(marks);
+    free(tiles);
+    return good;
+}
+
 static const struct gpu_program *gather_program(struct render_context *context, bool has_unknown,
-                                                struct error *error)
+                                                enum key_gather what, struct error *error)
 {
     const struct integrator *integrator = integrator_by_number(context->request.integrator);
     struct gpu_define defines[5] = {0};
     size_t n = 0;
+    if (what != KEY_GATHER)
+        defines[n++] = (struct gpu_define){what == KEY_GATHER_MARK ? "MARK" : "KEPT", "1"};
     if (context->environment->kind == ENVIRONMENT_IMAGE)
         defines[n++] = (struct gpu_define){"HAS_ENVIRONMENT_IMAGE", "1"};
     if (integrator->left_scene && strcmp(integrator->left_scene, "OPEN") == 0)
@@ -143,21 +211,35 @@ static void bind_layers(struct key_view *key, struct gpu_device *device)
         gpu_buffer_bind_texels(device, &key->layers[i < key->layer_count ? i : 0], units[i], GL_RGBA32F);
 }
 
+static void bind_eyes(struct key_view *key, struct render_context *context, const struct picture *picture,
+                      enum key_gather what, const struct gpu_program *program)
+{
+    uint32_t first_slot = 0;
+    struct gpu_buffer *band = picture_slice_band(picture, &context->slice, &first_slot);
+    gpu_buffer_bind_texels(context->device, &context->rays, UNIT_RAYS, GL_RGBA32F);
+    gpu_buffer_bind_texels(context->device, &context->hits, UNIT_SHADE_HITS, GL_RGBA32UI);
+    gpu_buffer_bind_storage(&context->slice_sums, BIND_SLICE_SUMS);
+    gpu_buffer_bind_storage(&key->counts, BIND_KEY_COUNTS);
+    if (what == KEY_GATHER_MARK)
+        gpu_buffer_bind_storage(&key->marks, BIND_KEY_MARKS);
+    if (what == KEY_GATHER_KEPT) {
+        gpu_buffer_bind_storage(band, BIND_ACCUMULATION);
+        gpu_uniform_uint(program, "first_kept", first_slot);
+    }
+}
+
 bool key_view_gather(struct key_view *key, struct render_context *context, struct layers *layers,
-                     struct error *error)
+                     const struct picture *picture, enum key_gather what, struct error *error)
 {
     const uint32_t first_unknown = layers_take_unknown(layers);
     const bool has_unknown = first_unknown != UINT32_MAX;
-    const struct gpu_program *program = gather_program(context, has_unknown, error);
+    const struct gpu_program *program = gather_program(context, has_unknown, what, error);
     if (!program)
         return false;
     context_span_begin(context, STAGE_SHADE);
     context_bind(context);
-    gpu_buffer_bind_texels(context->device, &context->rays, UNIT_RAYS, GL_RGBA32F);
-    gpu_buffer_bind_texels(context->device, &context->hits, UNIT_SHADE_HITS, GL_RGBA32UI);
+    bind_eyes(key, context, picture, what, program);
     bind_layers(key, context->device);
-    gpu_buffer_bind_storage(&context->slice_sums, BIND_SLICE_SUMS);
-    gpu_buffer_bind_storage(&key->counts, BIND_KEY_COUNTS);
     if (has_unknown) {
         gpu_buffer_bind_storage(&layers->sums, BIND_LAYER_SUMS);
         gpu_uniform_uint(program, "first_unknown", first_unknown);
@@ -172,9 +254,9 @@ bool key_view_gather(struct key_view *key, struct render_context *context, struc
     return gpu_check(context->device, "gathering from a key view", error);
 }
 
-void key_view_announce(struct render_context *context, bool has_unknown)
+void key_view_announce(struct render_context *context, bool has_unknown, enum key_gather what)
 {
-    (void)gather_program(context, has_unknown, NULL);
+    (void)gather_program(context, has_unknown, what, NULL);
 }
 
 /* ---- counts ---- */
@@ -201,7 +283,8 @@ bool key_view_take_count(struct key_view *key, struct gpu_device *device, uint32
 
 uint64_t key_view_device_bytes(const struct key_view *key)
 {
-    uint64_t sum = picture_device_bytes(&key->sums) + key->counts.capacity_bytes + key->copy.capacity_bytes;
+    uint64_t sum = picture_device_bytes(&key->sums) + key->counts.capacity_bytes +
+                   key->marks.capacity_bytes + key->tiles.capacity_bytes + key->copy.capacity_bytes;
     for (int i = 0; i < KEY_LAYERS_MAX; i++)
         sum += key->layers[i].capacity_bytes;
     return sum;
@@ -213,6 +296,8 @@ void key_view_finish(struct key_view *key, struct gpu_device *device)
     for (int i = 0; i < KEY_LAYERS_MAX; i++)
         gpu_buffer_finish(device, &key->layers[i]);
     gpu_buffer_finish(device, &key->counts);
+    gpu_buffer_finish(device, &key->marks);
+    gpu_buffer_finish(device, &key->tiles);
     gpu_readback_finish(device, &key->copy);
     *key = (struct key_view){0};
 }

@@ -16,6 +16,7 @@ struct key_view {
     struct picture sums;                      /* of the layer in hand */
     struct gpu_buffer layers[KEY_LAYERS_MAX]; /* shared/key_view.h */
     struct gpu_buffer counts;                 /* uint: samples of eyes that no layer shows, of the frame in hand */
+    struct gpu_buffer marks, tiles;           /* shared/key_view.h: texels that eyes look at, of all layers */
     struct gpu_readback copy;                 /* of them */
     /* What the layers are of, if they are: */
     bool is_made;
@@ -23,6 +24,16 @@ struct key_view {
     struct frame_request request;   /* the frame's that they were rendered for */
     uint64_t showing;               /* of the scene, see frame_state.h */
     uint32_t layer_count;
+    bool is_marked; /* only what the eyes of the frame in hand look at is rendered: of no use to others */
+    uint32_t first_tile[KEY_LAYERS_MAX]; /* then, of each layer, in `tiles` */
+    uint32_t tile_rows[KEY_LAYERS_MAX];
+};
+
+/* What a pass over the eyes does. */
+enum key_gather {
+    KEY_GATHER,      /* from intersections of the slice's rays to its sums */
+    KEY_GATHER_MARK, /* keeps intersections as sums, and marks texels */
+    KEY_GATHER_KEPT, /* takes such from the picture, and leaves black there */
 };
 
 /* Whether they show what that frame asks for. */
@@ -36,10 +47,14 @@ struct frame_request key_view_layer_request(const struct key_view *key, const st
 /* Keeps a band of the layer's picture, which is key->sums. */
 bool key_view_keep_band(struct key_view *key, struct render_context *context, uint32_t layer, uint32_t band,
                         struct error *error);
-/* From intersections of the slice's rays to its sums. LAYER_UNKNOWN is written too, if it is wanted. */
+/* Nothing is looked at yet. */
+bool key_view_mark_anew(struct key_view *key, struct gpu_device *device, struct error *error);
+/* Lists the tiles; waits for the device. */
+bool key_view_list_tiles(struct key_view *key, struct gpu_device *device, struct error *error);
+/* Of the slice in hand, of that picture. LAYER_UNKNOWN is written too, if it is wanted. */
 bool key_view_gather(struct key_view *key, struct render_context *context, struct layers *layers,
-                     struct error *error);
-void key_view_announce(struct render_context *context, bool has_unknown);
+                     const struct picture *picture, enum key_gather what, struct error *error);
+void key_view_announce(struct render_context *context, bool has_unknown, enum key_gather what);
 /* The samples of the frame that no layer shows: clears their count, begins to copy it, and takes the copy. */
 bool key_view_count_anew(struct key_view *key, struct gpu_device *device, struct error *error);
 bool key_view_copy_count(struct key_view *key, struct gpu_device *device, struct error *error);

@@ -165,6 +165,20 @@ bool picture_accumulate(struct picture *picture, struct render_context *context,
     return true;
 }
 
+uint32_t picture_band_slots(const struct picture *picture, uint32_t band, uint32_t *first)
+{
+    *first = band * band_slots(picture);
+    return picture_band_end(picture, *first) - *first;
+}
+
+struct gpu_buffer *picture_slice_band(const struct picture *picture, const struct slice *slice,
+                                      uint32_t *first_slot)
+{
+    const uint32_t band = slice->first_slot / band_slots(picture);
+    *first_slot = slice->first_slot - band * band_slots(picture);
+    return picture_band(picture, 0, band);
+}
+
 void picture_drop_pixels(struct picture *picture)
 {
     free(picture->pixels);

@@ -5,6 +5,7 @@
 #include "render/compact.h"
 #include "render/wave_trace.h"
 #include "shared/bindings.h"
+#include "shared/key_view.h"
 #include "shared/path.h"
 #include "trace/program.h"
 #include "trace/step.h"
@@ -112,8 +113,10 @@ bool primary_rasterise(struct primary *primary, struct render_context *context, 
 
 static const struct gpu_program *rays_program(bool rasterised, struct render_context *context, struct error *error)
 {
-    struct gpu_define defines[5] = {0};
+    struct gpu_define defines[6] = {0};
     size_t n = 0;
+    if (context->key_tiles)
+        defines[n++] = (struct gpu_define){"HAS_TILES", "1"};
     if (rasterised)
         defines[n++] = (struct gpu_define){"VISIBILITY", "1"};
     else if (context->spread)
@@ -143,6 +146,12 @@ static bool make_rays(const struct primary *primary, struct render_context *cont
     gpu_buffer_bind_storage(&context->slice_sums, BIND_SLICE_SUMS);
     if (context->scene->has_motion)
         gpu_buffer_bind_storage(&context->ray_times, BIND_RAY_TIMES);
+    if (context->key_marks) {
+        gpu_buffer_bind_texels(context->device, context->key_marks, UNIT_KEY_MARKS, GL_R32UI);
+        gpu_uniform_uint(program, "first_mark",
+                         context->layer * context->uniforms.width * context->uniforms.height);
+    }
+    context_bind_tiles(context, program);
     gpu_uniform_uint(program, "first_slot", context->slice.first_slot);
     gpu_uniform_uint(program, "slot_count", context->slice.slot_count);
     gpu_dispatch(context->device, program, context->ray_count);

@@ -12,8 +12,9 @@ struct face_segment {
 
 vec3 face_vector(uint face, vec3 v)
 {
-    return vec3(dot(quadtree.face_from_world[face * 3u].xyz, v), dot(quadtree.face_from_world[face * 3u + 1u].xyz, v),
-                dot(quadtree.face_from_world[face * 3u + 2u].xyz, v));
+    uint row = FACE(face) * 3u;
+    return vec3(dot(quadtree.face_from_world[row].xyz, v), dot(quadtree.face_from_world[row + 1u].xyz, v),
+                dot(quadtree.face_from_world[row + 2u].xyz, v));
 }
 
 bool is_orthographic()

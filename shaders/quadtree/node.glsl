@@ -4,12 +4,21 @@
 
 layout(std140, binding = UNIFORM_QUADTREE) uniform quadtree_block { quadtree_uniforms quadtree; };
 
+// A define where it is known that there is one face.
+#ifdef QUADTREE_VIEW
+#define FACES 1u
+#define FACE(face) 0u
+#else
+#define FACES quadtree.faces
+#define FACE(face) (face)
+#endif
+
 // The first node of a level, counted from the first of its slice. A slice is a multiple of 4^QUADTREE_TOP texels, so
-// that no division leaves a rest: S + S / 4 + S / 16 .. below the level.
+// that no division leaves a rest: S + S / 4 + S / 16 .. below the level. Of a multiple of 3 a third is a product.
 uint node_level_first(uint level)
 {
     uint texels = quadtree.padded_width * quadtree.padded_height;
-    return (texels - (texels >> (2u * level))) / 3u * 4u;
+    return (texels - (texels >> (2u * level))) * 0xaaaaaaabu * 4u;
 }
 
 // Of node `place` of a level, by column and row. Of one slice the index grows by node_row(level) from row to row.

@@ -6,7 +6,7 @@
 // in the next one, and only there is it traced through that. Where it is behind the last layer, nothing is known.
 //
 // Defines: QUADTREE_PLANES a hit is where the ray meets a node's plane, else where it meets the primitive; QUADTREE_DDA
-// from texel to texel, not by the tree; QUADTREE_COUNT_STEPS hits are counts: nodes looked at, and layers.
+// from texel to texel, not by the tree; QUADTREE_VIEW there is one face; QUADTREE_COUNT_STEPS hits are counts: nodes looked at, and layers.
 #define INTERSECTION_FLAGS walk_flags
 
 #include "shared/path.h"
@@ -61,7 +61,7 @@ uint walk_steps = 0u, walk_meetings = 0u;
 
 uint slice_of(layer_walk walk)
 {
-    return walk.face * quadtree.layers + walk.layer;
+    return FACE(walk.face) * quadtree.layers + walk.layer;
 }
 
 // ---- hits ----
@@ -348,7 +348,7 @@ float last_distance(trace_ray r)
 
 uint face_towards(vec3 p)
 {
-    if (quadtree.faces == 1u)
+    if (FACES == 1u)
         return 0u;
     vec3 size = abs(p);
     uint axis = size.x >= max(size.y, size.z) ? 0u : size.y >= size.z ? 1u : 2u;
@@ -380,7 +380,7 @@ bool meet_beside(trace_ray r, inout layer_walk walk, inout found_type found)
 // To where surfaces of the face may be: before the nearest one there is nothing.
 void clip_to_surfaces(uint face, vec3 origin, vec3 direction, inout vec2 t)
 {
-    float w = uintBitsToFloat(texelFetch(quadtree_nodes, int(face_index(face))).x);
+    float w = uintBitsToFloat(texelFetch(quadtree_nodes, int(face_index(FACE(face)))).x);
     float far = quadtree.depths.y, z = is_orthographic() ? far - w * (far - quadtree.depths.x) : quadtree.depths.x / w;
     clip_range(origin.z - z, direction.z, t);
 }
@@ -391,7 +391,7 @@ bool begin_face(trace_ray r, found_type found, inout layer_walk walk, inout view
     vec3 from_eye = r.origin - quadtree.eye_world.xyz;
     float t_last = last_distance(r);
     uint first = face_towards(from_eye + r.t_min * r.direction);
-    for (; walk.turn < quadtree.faces; walk.turn++) {
+    for (; walk.turn < FACES; walk.turn++) {
         walk.face = walk.turn == 0u ? first : walk.turn <= first ? walk.turn - 1u : walk.turn;
         vec3 origin = face_vector(walk.face, from_eye), direction = face_vector(walk.face, r.direction);
         vec2 t = clip_to_face(origin, direction, vec2(r.t_min, min(t_last, NEAREST(found, r))));
@@ -419,7 +419,7 @@ void end_face(trace_ray r, layer_walk walk, inout found_type found, inout view_w
     vec2 place = walk.s.from.xy + walk.s.along.xy * walk.u_fill;
     seen.t_unknown = t;
     seen.t_fill = distance_at(walk.s, min(walk.u_fill, 1.0));
-    seen.fill_slice = walk.face * quadtree.layers + walk.fill_layer;
+    seen.fill_slice = FACE(walk.face) * quadtree.layers + walk.fill_layer;
     seen.fill_texel = walk.u_fill == NEVER ? ivec2(-1) : ivec2(floor(place));
 }
 
@@ -475,7 +475,7 @@ bool walk_view(trace_ray r, inout view_walk seen, inout found_type found)
 // What lies outside a view, of which there is one face.
 void look_beside_view(trace_ray r, float t_end, inout view_walk seen)
 {
-    if (quadtree.faces > 1u)
+    if (FACES > 1u)
         return;
     t_end = min(last_distance(r), t_end);
     vec3 origin = face_vector(0u, r.origin - quadtree.eye_world.xyz), direction = face_vector(0u, r.direction);

@@ -6,7 +6,9 @@
 // Coverage is 1 wherever there is a surface: what blended surfaces leave open is in the layer's radiance.
 //
 // Defines: those of common/environment.glsl; OPEN in place of the environment is 1; HAS_UNKNOWN the share of samples
-// that the key view does not show is a layer of the picture; HAS_LENS rays begin on a lens.
+// that the key view does not show is a layer of the picture; HAS_LENS rays begin on a lens; MARK
+// intersections are kept in place of radiance, and texels that have to be there before it can be taken are marked; KEPT the
+// picture has such intersections.
 
 #include "shared/key_view.h"
 #include "shared/hit.h"
@@ -33,6 +35,13 @@ layout(binding = UNIT_KEY_LAYER_1) uniform samplerBuffer key_layer_1;
 layout(binding = UNIT_KEY_LAYER_2) uniform samplerBuffer key_layer_2;
 layout(std430, binding = BIND_SLICE_SUMS) writeonly buffer sum_block { vec4 slice_sums[]; };
 layout(std430, binding = BIND_KEY_COUNTS) buffer count_block { uint unknown_count; };
+#ifdef MARK
+layout(std430, binding = BIND_KEY_MARKS) writeonly buffer mark_block { uint marks[]; };
+#endif
+#ifdef KEPT
+layout(std430, binding = BIND_ACCUMULATION) buffer accumulation_block { vec4 accumulation[]; };
+uniform uint first_kept; // of the slice, in its band
+#endif
 #ifdef HAS_UNKNOWN
 layout(std430, binding = BIND_LAYER_SUMS) writeonly buffer layer_block { vec4 layer_sums[]; };
 #endif
@@ -40,6 +49,7 @@ layout(std430, binding = BIND_LAYER_SUMS) writeonly buffer layer_block { vec4 la
 // A surface is met where inverse distances agree within this share, beside the structure's own bound: those of
 // surfaces that are some centimetres apart differ by more at the distances of a room.
 const float SURFACE_SHARE = 0.01;
+const uint KEPT_SHIFT = 27u; // all bits of an intersection lie above
 
 vec4 key_texel(uint layer, ivec2 p)
 {
@@ -110,6 +120,18 @@ vec4 missed(vec3 direction)
 #endif
 }
 
+vec3 key_from_world(vec3 d)
+{
+    return vec3(dot(d, key_right), dot(d, key_up), -dot(d, key_back));
+}
+
+// In texels, of a point along the axes of the key view from its eye.
+vec2 key_place(vec3 v)
+{
+    vec2 on_view = (key_orthographic != 0u ? v.xy : v.xy / v.z) / key_extent;
+    return (vec2(on_view.x, -on_view.y) * 0.5 + 0.5) * vec2(key_width, key_height);
+}
+
 uint layer_of(uint bits)
 {
     return clamp((bits & HIT_LAYER_MASK) >> HIT_LAYER_SHIFT, 1u, key_layers) - 1u;
@@ -118,9 +140,8 @@ uint layer_of(uint bits)
 // Of the point that a ray met.
 vec3 met_radiance(vec3 point, uint bits, out bool known)
 {
-    vec3 d = point - key_eye, v = vec3(dot(d, key_right), dot(d, key_up), -dot(d, key_back));
-    vec2 on_view = (key_orthographic != 0u ? v.xy : v.xy / v.z) / key_extent;
-    vec2 place = (vec2(on_view.x, -on_view.y) * 0.5 + 0.5) * vec2(key_width, key_height);
+    vec3 v = key_from_world(point - key_eye);
+    vec2 place = key_place(v);
     known = false;
     if ((bits & HIT_UNKNOWN) != 0u) // the background beside what hides it, however far the point is from it
         return key_texel(layer_of(bits), ivec2(floor(place))).rgb;
@@ -130,11 +151,6 @@ vec3 met_radiance(vec3 point, uint bits, out bool known)
 #ifdef HAS_LENS
 uniform uint lens_more;  // samples of the lens beside that of the ray
 uniform uint first_slot; // of the slice
-
-vec3 key_from_world(vec3 d)
-{
-    return vec3(dot(d, key_right), dot(d, key_up), -dot(d, key_back));
-}
 
 // Other points of the lens look at the plane that a ray has met, without being traced: section 5.2 of the paper. They
 // count as far as the layer shows that plane where they meet it. They lie round the lens's centre, as far from it.
@@ -167,14 +183,45 @@ vec3 with_lens(uint k, vec3 origin, vec3 direction, uint layer, vec3 radiance)
 }
 #endif
 
+#ifdef MARK
+// The four texels that key_radiance() reads.
+void mark(vec3 point, uint bits)
+{
+    ivec2 corner = ivec2(floor(key_place(key_from_world(point - key_eye)) - 0.5)), last = ivec2(key_width, key_height) - 1;
+    ivec2 low = clamp(corner, ivec2(0), last), high = clamp(corner + 1, ivec2(0), last);
+    uint layer = layer_of(bits), width = key_width, first = layer * width * key_height;
+    marks[first + uint(low.y) * width + uint(low.x)] = 1u;
+    marks[first + uint(low.y) * width + uint(high.x)] = 1u;
+    marks[first + uint(high.y) * width + uint(low.x)] = 1u;
+    marks[first + uint(high.y) * width + uint(high.x)] = 1u;
+}
+#endif
+
+// Distance, HIT_UNKNOWN and HIT_LAYER bits. As a pixel has them the bits are a number, which no device changes.
+uvec2 met_by(uint k)
+{
+#ifdef KEPT
+    vec4 kept = accumulation[first_kept + k];
+    accumulation[first_kept + k] = vec4(0.0);
+    return uvec2(floatBitsToUint(kept.x), uint(kept.y) << KEPT_SHIFT);
+#else
+    return texelFetch(hits, int(3u * k)).xy;
+#endif
+}
+
 void main()
 {
     uint k = item_index();
     if (k >= wave.rays.count)
         return;
     vec4 origin = texelFetch(rays, int(2u * k)), direction = texelFetch(rays, int(2u * k + 1u));
-    uvec4 met = texelFetch(hits, int(3u * k));
+    uvec2 met = met_by(k);
     float distance_ = uintBitsToFloat(met.x);
+#ifdef MARK
+    if (distance_ >= 0.0)
+        mark(origin.xyz + distance_ * direction.xyz, met.y);
+    slice_sums[k] = vec4(distance_, float(met.y >> KEPT_SHIFT), 0.0, 0.0);
+#else
     bool known = (met.y & HIT_UNKNOWN) == 0u;
     vec4 sum = vec4(0.0); // a pixel beyond the picture's edge
     if (distance_ >= 0.0)
@@ -191,4 +238,5 @@ void main()
 #endif
     if (!known && wave.stopped == 0u)
         atomicAdd(unknown_count, 1u);
+#endif
 }

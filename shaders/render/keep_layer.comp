@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: MIT
 // From the sums of a layer's picture, a band of it, to texels of the key view (shared/key_view.h).
+//
+// Defines: HAS_TILES as of render/tiles.glsl.
 
 #include "shared/key_view.h"
-#include "common/camera.glsl"
+#include "render/tiles.glsl"
 #include "common/dispatch.glsl"
 
 layout(local_size_x = 64) in;
 
-uniform uint texel_count, first_texel; // of the band
+uniform uint slot_count, first_slot; // of the band
 uniform float scale;                   // 1 / samples
 uniform uint shows_environment;        // where no surface is: 1 in the first layer
 
@@ -18,10 +20,12 @@ layout(std430, binding = BIND_KEY_LAYER) writeonly buffer key_block { vec4 key_l
 void main()
 {
     uint k = item_index();
-    if (k >= texel_count)
+    if (k >= slot_count)
         return;
-    uint slot = slot_of_pixel(uvec2(k % frame.width, k / frame.width));
-    vec4 depth = depths[slot];
+    uvec2 pixel = pixel_of_picture_slot(first_slot + k);
+    if (pixel.x >= frame.width || pixel.y >= frame.height)
+        return;
+    vec4 depth = depths[k];
     float nothing = shows_environment != 0u ? KEY_INFINITE : KEY_NOTHING;
-    key_layer[first_texel + k] = vec4(accumulation[slot].rgb * scale, depth.a > 0.0 ? depth.r : nothing);
+    key_layer[pixel.y * frame.width + pixel.x] = vec4(accumulation[k].rgb * scale, depth.a > 0.0 ? depth.r : nothing);
 }

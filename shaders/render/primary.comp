@@ -4,17 +4,22 @@
 //   VISIBILITY  what the rasteriser saw is noted in the hits, for primary_fill.comp; else they are left to a tracer
 //   SPREAD      each pixel has its samples where its own numbers say; else all have them where frame.sample_places says
 //   HAS_LENS    rays start on a lens and meet in the plane in focus
+//   HAS_TILES   of the texels of a key view, rays through those that no eye looks at are dead (render/tiles.glsl)
 //   HAS_TIMES   something moves: rays have a time
 
 #include "shared/path.h"
 #include "shared/ray.h"
 #include "shared/hit.h"
-#include "common/camera.glsl"
 #include "common/dispatch.glsl"
 #include "common/sequence.glsl"
+#include "render/tiles.glsl"
 layout(local_size_x = 64) in;
 
 uniform uint first_slot, slot_count;
+#ifdef HAS_TILES
+layout(binding = UNIT_KEY_MARKS) uniform usamplerBuffer key_marks;
+uniform uint first_mark; // of the layer
+#endif
 
 layout(std430, binding = BIND_RAYS) writeonly buffer ray_block { ray rays[]; };
 layout(std430, binding = BIND_PATHS) writeonly buffer path_block { path paths[]; };
@@ -33,7 +38,7 @@ void main()
     uint k = item_index();
     if (k >= slot_count << frame.sample_shift)
         return;
-    uvec2 pixel = pixel_of_slot(first_slot + (k >> frame.sample_shift));
+    uvec2 pixel = pixel_of_picture_slot(first_slot + (k >> frame.sample_shift));
     bool in_picture = pixel.x < frame.width && pixel.y < frame.height;
     uvec2 in_view = pixel_in_view(pixel);
     uint seed = sequence_seed(number_in_view(in_view), frame.seed);
@@ -55,6 +60,10 @@ void main()
 #ifdef HAS_TIMES
     time = sequence_number(seed, SEQUENCE_TIME, index);
     times[k] = time;
+#endif
+#ifdef HAS_TILES
+    if (in_picture)
+        in_picture = texelFetch(key_marks, int(first_mark + pixel.y * frame.width + pixel.x)).x != 0u;
 #endif
     vec2 cone = camera_cone();
     float weight = in_picture ? 1.0 : 0.0;

@@ -67,6 +67,7 @@
 #define UNIT_MOTIONS 21
 #define UNIT_TRACER_6 23
 #define UNIT_TRACER_7 24
+#define UNIT_RAY_TILES 25 /* in passes over a part of a picture: shared/key_view.h */
 #define UNIT_RAY_TIMES 22 /* R32F, one per ray: 0 the shutter opens .. 1 it closes */
 
 #endif

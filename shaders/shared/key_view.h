@@ -16,6 +16,11 @@
     BIND_PASS_2                     /* likewise: sums of LAYER_DEPTH; those of the beauty are BIND_ACCUMULATION   \
                                      */
 #define BIND_KEY_COUNTS BIND_PASS_3 /* gather_views.comp: one uint, the samples that no layer shows */
+#define BIND_KEY_MARKS BIND_PASS_1  /* likewise: layer after layer a uint a texel, 1 where an eye looks at it */
+/* Passes over those texels of a layer. Its picture has only the tiles of the layer that hold some, in their order;
+ * behind them, to the end of a row of tiles, it has tiles that lie beyond the layer. */
+#define UNIT_KEY_MARKS UNIT_PASS_1
+#define UNIT_KEY_TILES UNIT_RAY_TILES
 #define UNIT_KEY_LAYER_0 UNIT_TRACER_1
 #define UNIT_KEY_LAYER_1 UNIT_TRACER_2
 #define UNIT_KEY_LAYER_2 UNIT_TRACER_3

@@ -79,12 +79,14 @@ bool quadtree_trace_begin(struct trace_state *state, struct error *error)
     return true;
 }
 
-static struct trace_program_source source_of(const struct tracer_options *options, struct gpu_define defines[5])
+static struct trace_program_source source_of(const struct tracer_options *options, struct gpu_define defines[6])
 {
     size_t n = 0;
     defines[n++] = (struct gpu_define){"TRACER_QUADTREE", "1"};
     if (options->quadtree.hits == QUADTREE_HITS_PLANE)
         defines[n++] = (struct gpu_define){"QUADTREE_PLANES", "1"};
+    if (options->quadtree.faces == QUADTREE_FACES_VIEW)
+        defines[n++] = (struct gpu_define){"QUADTREE_VIEW", "1"};
     if (options->quadtree.walk == QUADTREE_WALK_DDA)
         defines[n++] = (struct gpu_define){"QUADTREE_DDA", "1"};
     if (options->bench.quadtree_count_steps)
@@ -102,7 +104,7 @@ static uint64_t rounds_of_a_ray(const struct quadtree_store *store)
 bool quadtree_intersect(struct quadtree_store *store, struct gpu_scene *scene, struct quadtree_state *state,
                         const struct ray_range *rays, const struct tracer_options *options, struct error *error)
 {
-    struct gpu_define defines[5] = {0};
+    struct gpu_define defines[6] = {0};
     struct trace_program_source source = source_of(options, defines);
     const struct gpu_program *program = trace_program_get(scene, rays->wave, &source, error);
     if (!program)
@@ -131,7 +133,7 @@ bool quadtree_layer_hits(struct quadtree_store *store, struct gpu_scene *scene, 
 
 void quadtree_announce(struct gpu_scene *scene, const struct wave *wave, const struct tracer_options *options)
 {
-    struct gpu_define defines[5] = {0};
+    struct gpu_define defines[6] = {0};
     const struct trace_program_source source = source_of(options, defines);
     (void)trace_program_get(scene, wave, &source, NULL);
 }
