@@ -39,8 +39,8 @@ bool is_from_layers(const struct message_frame_end &end)
     return std::any_of(end.structure, end.structure + end.structure_count, is_share_unknown);
 }
 
-// Lengths, warnings and the share that is unknown belong to the picture; other numbers and means tell what was done
-// for it, which depends on earlier frames and on the machine.
+// Lengths, warnings and the share that is unknown belong to the picture; other numbers and means tell what was
+// done for it, which depends on earlier frames and on the machine.
 void add_structure(std::vector<metadata_entry> &entries, const struct message_frame_end &end, bool full)
 {
     for (uint32_t i = 0; i < end.structure_count; i++) {
