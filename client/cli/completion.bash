@@ -18,7 +18,7 @@ _farlight()
         words="$("$program" help 2>/dev/null | sed -n 's/^  \([a-z]*\) .*/\1/p') --version"
     else
         case $before in
-        --layers) words="beauty,albedo,normal beauty,depth beauty,albedo,normal,depth,position,ao,id" ;;
+        --layers) words="beauty,albedo,normal beauty,depth beauty,albedo,normal,depth,position,ao,id beauty,unknown" ;;
         --scale) words="1 2 4 8" ;;
         --still-encoding) words="raw zstd predicted jpeg" ;;
         --format) words="png jpeg exr hdr mp4 mkv y4m" ;;

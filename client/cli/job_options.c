@@ -72,7 +72,7 @@ static const struct argp_option special[] = {
     {"environment", KEY_ENVIRONMENT, "FILE", 0, "Equirectangular image (HDR or EXR) that lights the scene",
      CLI_GROUP_OUTPUT},
     {"layers", KEY_LAYERS, "NAME,..", 0,
-     "What an EXR file has: beauty (the picture, default), albedo, normal, depth, position, ao, id",
+     "What an EXR file has: beauty (the picture, default), albedo, normal, depth, position, ao, id, unknown",
      CLI_GROUP_OUTPUT},
     {NULL, 0, NULL, 0, "Camera (default: the model's first, else one that sees all of it):", CLI_GROUP_CAMERA},
     {"camera", KEY_CAMERA, "NAME|INDEX", 0, "A camera of the model ('farlight info' lists them)",

@@ -2,8 +2,10 @@
 #include "metadata.hpp"
 #include "layers.hpp"
 
+#include <algorithm>
 #include <cinttypes>
 #include <cstdio>
+#include <cstring>
 
 namespace
 {
@@ -26,8 +28,19 @@ void add_count(std::vector<metadata_entry> &entries, const char *name, uint64_t 
     add_text(entries, name, std::to_string(value));
 }
 
-// Lengths and warnings belong to the picture; numbers and means tell what was done for it, which depends on
-// earlier frames and on the machine.
+// A picture that is made from depth layers has this row: the share of its samples that they do not show.
+bool is_share_unknown(const struct record_structure_row &row)
+{
+    return std::strcmp(row.name, "views/unknown") == 0;
+}
+
+bool is_from_layers(const struct message_frame_end &end)
+{
+    return std::any_of(end.structure, end.structure + end.structure_count, is_share_unknown);
+}
+
+// Lengths, warnings and the share that is unknown belong to the picture; other numbers and means tell what was
+// done for it, which depends on earlier frames and on the machine.
 void add_structure(std::vector<metadata_entry> &entries, const struct message_frame_end &end, bool full)
 {
     for (uint32_t i = 0; i < end.structure_count; i++) {
@@ -36,7 +49,7 @@ void add_structure(std::vector<metadata_entry> &entries, const struct message_fr
         const bool is_length = row.unit == PROTOCOL_UNIT_METRES, is_mean = row.unit == PROTOCOL_UNIT_PER_RAY;
         if (!is_length && !is_mean && full)
             add_count(entries, name.c_str(), row.number);
-        if (is_length || (is_mean && full))
+        if (is_length || (is_mean && (full || is_share_unknown(row))))
             add_number(entries, (name + "_" + protocol_unit_text(row.unit)).c_str(),
                        static_cast<double>(row.measure));
         if (row.warning[0])
@@ -86,9 +99,11 @@ std::vector<metadata_entry> metadata_of(const struct image &image)
     add_number(entries, "exposure_stops", static_cast<double>(begin.exposure_stops));
     add_number(entries, "time_s", static_cast<double>(begin.time_s));
     add_number(entries, "fov_y_degrees", static_cast<double>(begin.fov_y * degrees_per_radian));
-    add_count(entries, "primary_rays", end.primary_rays);
-    add_count(entries, "shadow_rays", end.shadow_rays);
-    add_count(entries, "secondary_rays", end.secondary_rays);
+    if (image.full_metadata || !is_from_layers(end)) { // an earlier frame may have left its layers
+        add_count(entries, "primary_rays", end.primary_rays);
+        add_count(entries, "shadow_rays", end.shadow_rays);
+        add_count(entries, "secondary_rays", end.secondary_rays);
+    }
     add_structure(entries, end, image.full_metadata);
     if (image.full_metadata)
         add_stages(entries, end);

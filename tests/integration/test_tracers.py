@@ -15,7 +15,7 @@ class Tracers(farlight_test.Case):
 
     def test_every_tracer_says_what_it_is(self):
         names = [tracer["name"] for tracer in tracers()]
-        self.assertEqual(names, ["bvh", "naive", "reference", "ldc", "abuffer", "rayspace"])
+        self.assertEqual(names, ["bvh", "naive", "reference", "ldc", "abuffer", "rayspace", "quadtree"])
         text = self.expect(farlight("tracers"), 0).stdout
         for tracer in tracers():
             self.assertIn(f"{tracer['name']}: {tracer['doc']}", text)

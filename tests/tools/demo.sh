@@ -110,6 +110,10 @@ pictures() {
         render "$teapot" --environment "$sky" --size 400x225 --integrator path --samples 16 --progressive=4
     picture 2 layers.exr 'albedo, normals, depth and objects as channels' \
         render "$teapot" --environment "$sky" --size 480x270 --layers beauty,albedo,normal,depth,id
+    picture 6 quadtree.png 'reflections and shadows by the depth layers of a cube round the eye' \
+        render "$teapot" --environment "$sky" --size 480x270 --tracer quadtree
+    picture 3 stereo.png 'two eyes, made from the depth layers of one view' \
+        render "$teapot" --environment "$sky" --size 480x270 --stereo 0.065
     picture 54 shot.mp4 'a shot script that moves camera, focus and light' \
         animate --script "$private/scenes/shot.json" --fps 8 --frames 1-24 --size 320x180 --samples 6
     picture 104 carousel.mp4 'a clip with soft shadows, gloss and motion blur' \
