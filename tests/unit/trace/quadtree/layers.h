@@ -95,7 +95,7 @@ static inline void insert_surface(struct layers *layers, uint32_t face, uint32_t
     const struct quadtree_uniforms *u = &layers->store.uniforms;
     const size_t slice = (size_t)u->padded_width * u->padded_height;
     struct surface *at = layers->surfaces + face * u->layers * slice + texel;
-    const double near = (double)(u->depths[3] > 0 ? u->depths[3] : u->depths[0]);
+    const double near = (double)u->depths[3];
     const bool is_beyond = surface.z > (double)u->depths[1] && surface.what[0] != VISIBLE_DISC;
     if (!(surface.z >= near) || is_beyond)
         return;
@@ -327,7 +327,7 @@ static inline struct quadtree_uniforms uniforms_of(const struct layers_view *vie
         .eye_world = {view->eye[0], view->eye[1], view->eye[2], 0},
         .scale_centre = {(float)view->focal, (float)view->focal, 0.5f * (float)view->width,
                          0.5f * (float)view->height},
-        .depths = {(float)view->near, (float)view->far, view->orthographic ? 1 : 0, 0},
+        .depths = {(float)view->near, (float)view->far, view->orthographic ? 1 : 0, (float)view->near},
         .bounds = {(float)(view->near * view->pixels / (view->focal * view->radius)), 0, 0,
                    (float)(view->radius / view->near)},
         .width = view->width,
