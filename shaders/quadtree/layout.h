@@ -1,26 +1,26 @@
 /* SPDX-License-Identifier: MIT */
-/* The structure of the tracer `quadtree` on the device: quadtrees over the surfaces that a view sees, nearest first.
- * Widmer, Pajak, Schulz, Pulli, Kautz, Goesele, Luebke. An Adaptive Acceleration Structure for Screen-space Ray
- * Tracing. 2015, sections 3.2 to 3.4.
+/* The structure of the tracer `quadtree` on the device: quadtrees over the surfaces that a view sees, nearest
+ * first. Widmer, Pajak, Schulz, Pulli, Kautz, Goesele, Luebke. An Adaptive Acceleration Structure for Screen-space
+ * Ray Tracing. 2015, sections 3.2 to 3.4.
  *
  * A view is one face, or six: those of a cube round the eye. A face has a right, a down and a forward direction; a
- * point at (X, Y, Z) along these from the eye lies at the texel coordinates (x, y) = centre + scale * (X, Y) / Z, and
- * has the depth w = unit / Z, where the unit is a share of
- * the scene's size that suits half floats: in (x, y, w) planes are planes and rays are segments, and w grows towards the eye. Of
- * an orthographic view (x, y) = centre + scale * (X, Y) and w = (far - Z) / (far - near). Texel (i, j) covers
- * [i, i + 1) x [j, j + 1); row 0 is the uppermost.
+ * point at (X, Y, Z) along these from the eye lies at the texel coordinates (x, y) = centre + scale * (X, Y) / Z,
+ * and has the depth w = unit / Z, where the unit is a share of the scene's size that suits half floats: in (x, y,
+ * w) planes are planes and rays are segments, and w grows towards the eye. Of an orthographic view (x, y) = centre
+ * + scale * (X, Y) and w = (far - Z) / (far - near). Texel (i, j) covers [i, i + 1) x [j, j + 1); row 0 is the
+ * uppermost.
  *
- * Each face has up to three layers: layer l holds at each texel's centre the surface that l others hide. A slice is
- * one layer of one face, number face * layers + layer. It is padded to a multiple of QUADTREE_SIDE texels along both
- * sides, and has levels 0 (texels) to QUADTREE_TOP; node (x, y) of a level covers the texels from (x, y) << level on.
+ * Each face has up to three layers: layer l holds at each texel's centre the surface that l others hide. A slice
+ * is one layer of one face, number face * layers + layer. It is padded to a multiple of QUADTREE_SIDE texels along
+ * both sides, and has levels 0 (texels) to QUADTREE_TOP; node (x, y) of a level covers the texels from (x, y) <<
+ * level on.
  *
  *   visible  RG32UI array texture, a layer a slice: instance + 1 and scene-wide primitive, as render's visibility
  *            buffer has them (VISIBLE_NOTHING, VISIBLE_DISC of shared/path.h)
  *   nodes    RG32UI texel buffer: slice after slice, level after level, row after row. A node is one of
- *     plane  x: sign bit set; w at the node's centre without its lowest bit; lowest bit: a texel beside it, or one of
- *               its own, holds a surface that does not go on from this one (the paper's flag O)
- *            y: slopes of w per texel along x (low half) and y, times QUADTREE_SLOPE_SCALE, half floats
- *     box    x: greatest w, y: least w, both floats
+ *     plane  x: sign bit set; w at the node's centre without its lowest bit; lowest bit: a texel beside it, or one
+ * of its own, holds a surface that does not go on from this one (the paper's flag O) y: slopes of w per texel
+ * along x (low half) and y, times QUADTREE_SLOPE_SCALE, half floats box    x: greatest w, y: least w, both floats
  *   Where nothing is there is a plane of w = 0: no ray reaches it. */
 #ifndef FARLIGHT_SHADERS_QUADTREE_LAYOUT_H
 #define FARLIGHT_SHADERS_QUADTREE_LAYOUT_H
@@ -39,13 +39,13 @@ struct quadtree_uniforms {
     vec4 face_from_world[18]; /* three rows a face: right, down, forward, of unit length */
     vec4 eye_world;           /* w: of the sphere round it within which other eyes may be, radius, metres */
     vec4 scale_centre;        /* xy: texels a unit of X / Z, or of X; zw: where the axis of the view is */
-    vec4 depths;              /* x: the unit, the distance at which w is 1, metres, or near if orthographic; y: far,
-                                 beyond which there is nothing but discs; z: 1 if orthographic; w: near */
-    vec4 bounds;              /* x: the greatest difference of w that a plane over several texels may have, from an eye
-                                 far from it: unit pixels / (f radius); y: cosine of the greatest angle between it and
-                                 those of its children, 0: any; z: w at the distance where both are twice as much, 0:
-                                 they do not grow; w: radius / unit, of the sphere of eyes for which x holds */
-    uint width, height;       /* of a face, texels */
+    vec4 depths;        /* x: the unit, the distance at which w is 1, metres, or near if orthographic; y: far,
+                           beyond which there is nothing but discs; z: 1 if orthographic; w: near */
+    vec4 bounds;        /* x: the greatest difference of w that a plane over several texels may have, from an eye
+                           far from it: unit pixels / (f radius); y: cosine of the greatest angle between it and
+                           those of its children, 0: any; z: w at the distance where both are twice as much, 0:
+                           they do not grow; w: radius / unit, of the sphere of eyes for which x holds */
+    uint width, height; /* of a face, texels */
     uint padded_width, padded_height;
     uint faces, layers;
     uint slice_nodes; /* nodes of a slice */
@@ -63,8 +63,8 @@ struct quadtree_counts {
 };
 SHARED_SIZE(quadtree_counts, 32)
 
-/* A ray that is within so many texels of its origin may pass the extension of a plane beside the surface that it began
- * on, and one that is behind a plane may be before the next: half a texel, and its diagonal's. */
+/* A ray that is within so many texels of its origin may pass the extension of a plane beside the surface that it
+ * began on, and one that is behind a plane may be before the next: half a texel, and its diagonal's. */
 #define QUADTREE_OWN_WAY 1.5f
 #define QUADTREE_DEEP 0.05f /* of w: what is so far behind a plane is behind the surface */
 
@@ -73,16 +73,16 @@ SHARED_SIZE(quadtree_counts, 32)
 #define UNIT_QUADTREE_VISIBLE UNIT_TRACER_0
 #define UNIT_QUADTREE_NODES UNIT_TRACER_1
 #define UNIT_QUADTREE_DEPTH UNIT_TRACER_2 /* of the layer before the one that is drawn */
-/* Passes that build. Of one slice: its leaves as planes without flags; of all, the levels above the leaves: how far a
- * plane is from those of the leaves at most. */
+/* Passes that build. Of one slice: its leaves as planes without flags; of all, the levels above the leaves: how
+ * far a plane is from those of the leaves at most. */
 #define UNIT_QUADTREE_PLANES UNIT_TRACER_3
 #define UNIT_QUADTREE_ERRORS UNIT_TRACER_4
 #define IMAGE_QUADTREE_NODES 0
 #define IMAGE_QUADTREE_PLANES 1
 #define IMAGE_QUADTREE_ERRORS 2
 
-/* Two texels side by side show surfaces that go on from one another if their planes differ by no more than this share
- * of w and bounds.x, in the middle of their common border. Prototypes had cracks up to it. */
+/* Two texels side by side show surfaces that go on from one another if their planes differ by no more than this
+ * share of w and bounds.x, in the middle of their common border. Prototypes had cracks up to it. */
 #define QUADTREE_EDGE_SHARE 0.001953125f
 /* The tolerance may grow with distance up to so many times. */
 #define QUADTREE_GROWTH_MAX 4.0f

@@ -17,8 +17,8 @@ struct hit {
     uint colour;           /* vertex colour times what a sampled tracer stored, unorm 4x8, linear */
 };
 SHARED_SIZE(hit, 48)
-/* An intersection is a hit of which only the first four words are known yet: distance (< 0: a miss), HIT_UNKNOWN and
- * HIT_LAYER bits or 0, primitive (of a disc its number; HIT_NO_PRIMITIVE: a miss), instance. */
+/* An intersection is a hit of which only the first four words are known yet: distance (< 0: a miss), HIT_UNKNOWN
+ * and HIT_LAYER bits or 0, primitive (of a disc its number; HIT_NO_PRIMITIVE: a miss), instance. */
 
 #define HIT_MATERIAL_MASK 0x00ffffffu
 #define HIT_BACK_FACE 0x01000000u /* the ray came from inside */
@@ -28,8 +28,9 @@ SHARED_SIZE(hit, 48)
  * flush them to zero or make one NaN of another. `primitive` and `instance` are HIT_NO_PRIMITIVE, `colour` is
  * white. */
 #define HIT_SAMPLED 0x04000000u
-/* Of a tracer whose structure is what a view sees: the ray has come to where that view sees nothing, and the answer is
- * a guess, where it went on from what the view saw last; and the layer of the view that has the surface, from 1 on. */
+/* Of a tracer whose structure is what a view sees: the ray has come to where that view sees nothing, and the
+ * answer is a guess, where it went on from what the view saw last; and the layer of the view that has the surface,
+ * from 1 on. */
 #define HIT_UNKNOWN 0x08000000u
 #define HIT_LAYER_SHIFT 28u
 #define HIT_LAYER_MASK 0x30000000u

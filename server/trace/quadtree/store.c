@@ -9,7 +9,7 @@
 
 #define NEAR_OF_DIAGONAL 1e-5f /* as of any camera (render/camera.c) */
 #define UNIT_OF_DIAGONAL 0.05f /* where w is 1: slopes of w then have all bits of half floats */
-#define DOUBLED_AT 0.25f /* diagonals: where bounds that grow with distance are twice as large */
+#define DOUBLED_AT 0.25f       /* diagonals: where bounds that grow with distance are twice as large */
 #define CUBE_TEXELS_MAX 1024u
 #define CUBE_TEXELS_MIN 128u
 
@@ -113,7 +113,8 @@ static uint32_t cube_texels(const struct trace_view *view, const struct quadtree
     return whole > CUBE_TEXELS_MIN ? whole : CUBE_TEXELS_MIN;
 }
 
-/* A plane that is not the hit leads to the primitive that is: where it is off, rays that graze it meet another texel.
+/* A plane that is not the hit leads to the primitive that is: where it is off, rays that graze it meet another
+ * texel.
  */
 #define ERROR_TO_PRIMITIVES (1.0f / 64.0f)
 
@@ -171,7 +172,8 @@ static void fill_uniforms(struct quadtree_uniforms *u, const struct gpu_scene *s
     u->bounds[0] =
         error_of_w(u, view, settings) * (settings->hits == QUADTREE_HITS_PLANE ? 1.0f : ERROR_TO_PRIMITIVES);
     u->bounds[1] = settings->angle < 90.0f ? cosf(settings->angle * 0.0174532925f) : 0.0f;
-    u->bounds[2] = settings->adaptive == QUADTREE_ADAPTIVE_ON ? u->depths[0] / (DOUBLED_AT * diagonal_of(scene)) : 0.0f;
+    u->bounds[2] =
+        settings->adaptive == QUADTREE_ADAPTIVE_ON ? u->depths[0] / (DOUBLED_AT * diagonal_of(scene)) : 0.0f;
     u->bounds[3] = settings->radius / u->depths[0];
     u->padded_width = padded(u->width);
     u->padded_height = padded(u->height);
@@ -181,8 +183,9 @@ static void fill_uniforms(struct quadtree_uniforms *u, const struct gpu_scene *s
 
 /* ---- room ---- */
 
-bool quadtree_store_place(struct quadtree_store *store, const struct gpu_scene *scene, const struct trace_view *view,
-                          const struct quadtree_settings *settings, struct error *error)
+bool quadtree_store_place(struct quadtree_store *store, const struct gpu_scene *scene,
+                          const struct trace_view *view, const struct quadtree_settings *settings,
+                          struct error *error)
 {
     struct quadtree_uniforms *u = &store->uniforms;
     fill_uniforms(u, scene, view, settings);

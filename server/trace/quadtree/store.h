@@ -26,16 +26,17 @@ struct quadtree_store {
 
 void quadtree_store_finish(struct quadtree_store *store); /* leaves it empty */
 uint64_t quadtree_store_bytes(const struct quadtree_store *store);
-/* The view whose pixels are the texels of a view's face: `view` with its margin, at the resolution that is asked for.
- * The same eye and direction; larger, and with a wider angle. */
+/* The view whose pixels are the texels of a view's face: `view` with its margin, at the resolution that is asked
+ * for. The same eye and direction; larger, and with a wider angle. */
 void quadtree_texel_view(struct trace_view *texels, const struct trace_view *view,
                          const struct quadtree_settings *settings);
-/* Where the faces of such a view lie, and how large they are: fills store->uniforms, uploads them, and makes room for
- * the slices. */
-bool quadtree_store_place(struct quadtree_store *store, const struct gpu_scene *scene, const struct trace_view *view,
-                          const struct quadtree_settings *settings, struct error *error);
-/* The view of a face as a rigid transform (looks along -z, y up), to draw it: three rows of four; and half its width
- * and height at distance 1, or of an orthographic one itself. */
+/* Where the faces of such a view lie, and how large they are: fills store->uniforms, uploads them, and makes room
+ * for the slices. */
+bool quadtree_store_place(struct quadtree_store *store, const struct gpu_scene *scene,
+                          const struct trace_view *view, const struct quadtree_settings *settings,
+                          struct error *error);
+/* The view of a face as a rigid transform (looks along -z, y up), to draw it: three rows of four; and half its
+ * width and height at distance 1, or of an orthographic one itself. */
 void quadtree_face_view(const struct quadtree_store *store, uint32_t face, float world_from_view[12],
                         float extent[2]);
 /* Binds uniforms, `visible` and `nodes` at their places. */

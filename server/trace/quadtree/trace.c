@@ -129,8 +129,7 @@ bool quadtree_layer_hits(struct quadtree_store *store, struct gpu_scene *scene, 
     return true;
 }
 
-void quadtree_announce(struct gpu_scene *scene, const struct wave *wave,
-                       const struct tracer_options *options)
+void quadtree_announce(struct gpu_scene *scene, const struct wave *wave, const struct tracer_options *options)
 {
     struct gpu_define defines[5] = {0};
     const struct trace_program_source source = source_of(options, defines);

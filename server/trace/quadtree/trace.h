@@ -29,7 +29,6 @@ bool quadtree_intersect(struct quadtree_store *store, struct gpu_scene *scene, s
 bool quadtree_layer_hits(struct quadtree_store *store, struct gpu_scene *scene, const struct ray_range *rays,
                          uint32_t layer, struct error *error);
 /* As tracer_impl.announce. */
-void quadtree_announce(struct gpu_scene *scene, const struct wave *wave,
-                       const struct tracer_options *options);
+void quadtree_announce(struct gpu_scene *scene, const struct wave *wave, const struct tracer_options *options);
 
 #endif

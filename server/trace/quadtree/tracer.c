@@ -205,8 +205,8 @@ static bool layer_hits(struct tracer *tracer, struct gpu_scene *scene, const str
 
 const struct tracer_impl tracer_quadtree_impl = {
     .name = "quadtree",
-    .depends_on = CHANGED_GEOMETRY | CHANGED_DEFORMED | CHANGED_INSTANCES | CHANGED_SURFACES | CHANGED_DISCS |
-                  CHANGED_VIEW,
+    .depends_on =
+        CHANGED_GEOMETRY | CHANGED_DEFORMED | CHANGED_INSTANCES | CHANGED_SURFACES | CHANGED_DISCS | CHANGED_VIEW,
     .still = true,
     .minimum_rays = 192,
     .create = quadtree_create,
