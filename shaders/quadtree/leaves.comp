@@ -3,8 +3,9 @@
 // itself and not from differences of depths (section 3.2 of the paper, "g-buffer normals"). nodes.comp writes them to the
 // tree, with their flags. An invocation makes a leaf.
 //
-// Defines: HAS_SPHERES, HAS_DISCS as the scene has them.
+// Defines: HAS_SPHERES, HAS_DISCS as the scene has them; HAS_CUTOUT if spheres may have holes.
 #include "shared/path.h"
+#include "common/alpha.glsl"
 #include "common/dispatch.glsl"
 #include "common/geometry.glsl"
 #include "common/intersect.glsl"
@@ -93,9 +94,11 @@ uvec2 triangle_node(sight_line line, uint instance_index, uint triangle)
 }
 
 #ifdef HAS_SPHERES
-// The nearer intersection, unless the layer before shows it at this texel, or shows what is behind it.
-float sphere_depth(vec2 depths, uvec2 place, uvec2 what)
+// The nearer intersection, unless it is cut out, or the layer before shows it at this texel or what is behind it.
+float sphere_depth(vec2 depths, uvec2 place, uvec2 what, vec3 begin_world, vec3 step_world)
 {
+    if (is_cut_out(candidate(depths.x, what.y, what.x - 1u, vec2(0.0)), begin_world, step_world, 0.0))
+        return depths.y;
     uvec2 before = uvec2(VISIBLE_NOTHING);
     float z_before = quadtree.depths.w;
     if (layer > 0u) {
@@ -115,11 +118,12 @@ uvec2 sphere_node(sight_line line, uvec2 place, uvec2 what)
     vec3 begin = quadtree.face_from_world[row].xyz * line.begin.x + quadtree.face_from_world[row + 1u].xyz * line.begin.y;
     vec3 step = quadtree.face_from_world[row].xyz * line.step.x + quadtree.face_from_world[row + 1u].xyz * line.step.y +
                 quadtree.face_from_world[row + 2u].xyz;
-    vec3 origin = affine_point(i.object_from_world, quadtree.eye_world.xyz + begin);
+    begin += quadtree.eye_world.xyz;
+    vec3 origin = affine_point(i.object_from_world, begin);
     vec3 direction = affine_vector(i.object_from_world, step);
     vec2 depths;
     bool is_hit = intersect_sphere(origin, direction, sphere.xyz, sphere.w, depths);
-    float z = is_hit ? sphere_depth(depths, place, what)
+    float z = is_hit ? sphere_depth(depths, place, what, begin, step)
                      : dot(sphere.xyz - origin, direction) / dot(direction, direction);
     vec3 normal = is_hit ? face_vector(affine_covector(i.object_from_world, origin + z * direction - sphere.xyz))
                          : vec3(0.0, 0.0, 1.0);

@@ -61,10 +61,12 @@ static const struct gpu_program *program_get(const struct quadtree_store *store,
 static bool make_leaves(struct quadtree_node_build *build, struct quadtree_store *store, struct gpu_scene *scene,
                         uint32_t slice, struct error *error)
 {
-    struct gpu_define defines[3] = {{0}};
+    struct gpu_define defines[4] = {{0}};
     unsigned n = 0;
     if (scene->has_spheres)
         defines[n++] = (struct gpu_define){"HAS_SPHERES", "1"};
+    if (scene->has_spheres && scene->has_cutout)
+        defines[n++] = (struct gpu_define){"HAS_CUTOUT", "1"};
     if (scene->disc_count > 0)
         defines[n++] = (struct gpu_define){"HAS_DISCS", "1"};
     const struct gpu_program *program = program_get(store, "quadtree/leaves.comp", defines, error);
