@@ -7,7 +7,10 @@
 #include "render/compact.h"
 #include "render/frame_request.h"
 
+#include <math.h>
 #include <string.h>
+
+#define RADIUS_MAX 1e6f /* as protocol/tracers.def has it */
 
 bool frame_is_from_layers(const struct frame_request *request)
 {
@@ -19,12 +22,54 @@ struct frame_camera frame_key_camera(const struct frame_request *request)
     return frame_is_from_layers(request) && request->has_key ? request->key_camera : request->camera;
 }
 
+/* Other eyes that the layers would serve do not follow: what those of the frame do not look at need not be rendered.
+ * The picture has room for the intersection of one sample a pixel; other points of a lens look at other texels. */
+static bool is_for_these_eyes(const struct frame_request *request)
+{
+    return request->samples == 1 && !request->accumulate && !request->has_key && request->aperture == 0.0f &&
+           frame_request_planes(request) == 1u << LAYER_BEAUTY;
+}
+
+static float distance_between(const struct frame_camera *a, const struct frame_camera *b)
+{
+    float squared = 0.0f;
+    for (int i = 0; i < 3; i++) {
+        const float way = a->world_from_view[4 * i + 3] - b->world_from_view[4 * i + 3];
+        squared += way * way;
+    }
+    return sqrtf(squared);
+}
+
+/* How far an eye of the picture may be from that of the key view. */
+static float farthest_eye(const struct frame_request *request)
+{
+    float eye[2];
+    frame_view_eye(request, 0, 0, eye); /* in a corner of the grid */
+    const float lens = request->aperture > 0.0f ? request->aperture / 2.0f : 0.0f;
+    const float apart = request->has_key ? distance_between(&request->camera, &request->key_camera) : 0.0f;
+    return sqrtf(eye[0] * eye[0] + eye[1] * eye[1]) + lens + apart;
+}
+
+/* The bound holds for all eyes of the picture. Doubled, so that those of the pictures that follow rarely need another
+ * structure. */
+static float radius_for(const struct frame_request *request)
+{
+    float radius = request->tracer_options.quadtree.radius;
+    const float farthest = farthest_eye(request) * 1.001f;
+    while (radius < farthest && radius < RADIUS_MAX)
+        radius *= 2.0f;
+    return radius;
+}
+
 bool frame_key_take(struct frame_renderer *renderer, struct error *error)
 {
     const struct frame_request *request = &renderer->request;
     const struct tracer_impl *impl = frame_find_tracer(renderer, TRACER_QUADTREE, "view_source", error);
     struct tracer_options options = request->tracer_options;
     options.quadtree.faces = QUADTREE_FACES_VIEW;
+    options.quadtree.radius = radius_for(request);
+    if (options.quadtree.layers == 0 && !is_for_these_eyes(request))
+        options.quadtree.layers = 1; /* what little another one shows would be rendered as a whole */
     if (options.quadtree.hits == QUADTREE_HITS_AUTO)
         options.quadtree.hits = QUADTREE_HITS_PLANE; /* what is thinner than a texel is there as well */
     if (!impl || !tracer_check_motion(impl, &renderer->shared->copy, error))
@@ -39,14 +84,6 @@ bool frame_key_take(struct frame_renderer *renderer, struct error *error)
             : tracer_set_take(set, renderer->device, impl, &options, error);
     return renderer->key_tracer &&
            frame_work_trace_by(renderer->work, &renderer->work->key_trace_state, renderer->key_tracer, error);
-}
-
-/* Other eyes that the layers would serve do not follow: what those of the frame do not look at need not be rendered.
- * The picture has room for the intersection of one sample a pixel; other points of a lens look at other texels. */
-static bool is_for_these_eyes(const struct frame_request *request)
-{
-    return request->samples == 1 && !request->accumulate && !request->has_key && request->aperture == 0.0f &&
-           frame_request_planes(request) == 1u << LAYER_BEAUTY;
 }
 
 static bool begin_layers(struct frame_renderer *renderer, const struct trace_view *texels, uint32_t layer_count,

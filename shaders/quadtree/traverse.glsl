@@ -26,6 +26,7 @@ uniform uint ray_kind;
 
 const float SAME_DISTANCE = 1e-5; // the share by which intersections with one surface differ at most
 const float FLOAT_MAX = 3.4e38;
+const float PLANES_APART = 2.0; // of w, in bounds: a plane and the extension of another one through a texel
 const float NEVER = 2.0; // beyond the end of a segment
 const int STEPS_TOGETHER = 32; // of rays side by side, before what some of them have met is looked at
 
@@ -340,10 +341,15 @@ void note_outside(trace_ray r, vec2 t, float t_end, inout view_walk seen)
     }
 }
 
-// How far along a ray something may be that the view sees.
+// How far along a ray something may be that the view sees: planes may lie beyond the surfaces by the bound.
 float last_distance(trace_ray r)
 {
-    return (length(r.origin - quadtree.eye_world.xyz) + quadtree.depths.y) / length(r.direction);
+    float far = quadtree.depths.y;
+    if (is_orthographic())
+        far += quadtree.bounds.x * (far - quadtree.depths.x);
+    else
+        far = quadtree.depths.x / max(quadtree.depths.x / far - PLANES_APART * quadtree.bounds.x, quadtree.depths.x / far / 16.0);
+    return (length(r.origin - quadtree.eye_world.xyz) + far) / length(r.direction);
 }
 
 uint face_towards(vec3 p)
@@ -426,6 +432,12 @@ void end_face(trace_ray r, layer_walk walk, inout found_type found, inout view_w
 // The next layer where the ray is behind this one, or the next face. False: it has been through all.
 bool begin_next(trace_ray r, inout layer_walk walk, inout found_type found, inout view_walk seen)
 {
+    // A ray that comes into the view behind what is seen has passed that beside the view.
+    if (FACES == 1u && walk.layer == 0u && walk.u_behind == 0.0 && walk.s.t_from > r.t_min &&
+        walk.s.t_from < seen.t_unknown) {
+        seen.t_unknown = walk.s.t_from;
+        seen.has_left = true;
+    }
     if (walk.u_behind < walk.u_end && walk.layer + 1u < quadtree.layers) {
         begin_layer(walk.layer + 1u, walk.u_behind, walk);
         seen.layers = max(seen.layers, walk.layer + 1u);

@@ -13,6 +13,11 @@
 #define CUBE_TEXELS_MAX 1024u
 #define CUBE_TEXELS_MIN 128u
 
+uint32_t quadtree_layer_count(const struct quadtree_settings *settings)
+{
+    return settings->layers ? settings->layers : QUADTREE_LAYERS_MAX;
+}
+
 void quadtree_store_finish(struct quadtree_store *store)
 {
     struct gpu_device *device = store->device;
@@ -155,7 +160,7 @@ static uint32_t padded(uint32_t texels)
 static void fill_uniforms(struct quadtree_uniforms *u, const struct gpu_scene *scene,
                           const struct trace_view *view, const struct quadtree_settings *settings)
 {
-    *u = (struct quadtree_uniforms){.layers = settings->layers};
+    *u = (struct quadtree_uniforms){.layers = quadtree_layer_count(settings)};
     for (int i = 0; i < 3; i++)
         u->eye_world[i] = view->world_from_view[4 * i + 3];
     u->eye_world[3] = settings->radius;

@@ -63,7 +63,7 @@ bool quadtree_state_tell(struct trace_state *state, struct structure_rows *rows,
         return false;
     for (unsigned kind = 0; kind < RAY_COUNT; kind++)
         if (counts[kind].rays > 0)
-            tell_kind(&counts[kind], (enum ray_kind)kind, state->options.quadtree.layers, rows);
+            tell_kind(&counts[kind], (enum ray_kind)kind, quadtree_layer_count(&state->options.quadtree), rows);
     return true;
 }
 
