@@ -184,19 +184,29 @@ static void expect_sample(struct fault *fault, const struct fixture *fixture, co
     }
 }
 
-/* A plane that is off by so much of 1 / depth: how far along the ray that is. */
+/* A plane that is off by so much of 1 / depth, and tangent to what bends at the middle of a texel: how far along the
+ * ray that is. */
 static double off_plane(const struct fixture *fixture, const struct ray *ray, const struct twin_hit *expected)
 {
     double from_eye[3], direction[3];
+    if (fixture->row->seen.off == 0)
+        return 0;
     for (int k = 0; k < 3; k++) {
         direction[k] = (double)ray->direction_t_max[k];
         from_eye[k] = (double)ray->origin_t_min[k] + expected->distance * direction[k] -
                       (double)fixture->view.world_from_view[4 * k + 3];
     }
+    const double away = sqrt(twin_dot(from_eye, from_eye)), length = sqrt(twin_dot(direction, direction)),
+                 seen = fabs(twin_dot(from_eye, expected->normal_geometric)) / away,
+                 met = fabs(twin_dot(direction, expected->normal_geometric)) / length;
+    /* What half the diagonal of a texel is on the surface, and by how much that falls off there. */
+    const double texel = SEEN_TEXELS * fixture->seen_view.texel * away / seen;
+    const double below = texel * texel * expected->bend / 2, slope = met - texel * expected->bend;
+    if (slope <= 0)
+        return INFINITY; /* where the tangent plane may be met, the surface is not */
     /* 1 / depth off by `off` is depth^2 * off along the way from the eye, whose part along the normal the ray
      * makes up for along its own. */
-    return fixture->row->seen.off * sqrt(twin_dot(from_eye, from_eye)) *
-           fabs(twin_dot(from_eye, expected->normal_geometric) / twin_dot(direction, expected->normal_geometric));
+    return (fixture->row->seen.off * away * away * seen / met + below / slope) / length;
 }
 
 static void judge_hit(struct fault *fault, const struct fixture *fixture, const struct ray *ray,
