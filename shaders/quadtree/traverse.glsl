@@ -363,7 +363,7 @@ uint face_towards(vec3 p)
 #define SHORTEN(walk, found) walk.u_end = min(walk.u_end, place_at(walk.s, found.distance))
 #endif
 
-// Whether the middles of texels may pass by the neighbours of a primitive. Those of a larger one they see.
+// Whether neighbours of a primitive may lie between the middles of texels, seen by none: one as narrow as it.
 bool is_finer_than_texels(uint face, uvec2 visible)
 {
 #ifdef HAS_SPHERES
@@ -372,15 +372,17 @@ bool is_finer_than_texels(uint face, uvec2 visible)
 #endif
     vec4 rows[3] = instance_at(visible.x - 1u).world_from_object;
     uvec3 corners = texelFetch(triangles, int(visible.y)).xyz;
-    vec2 low = vec2(1e30), high = vec2(-1e30);
+    vec2 places[3];
     for (int i = 0; i < 3; i++) {
         vec3 world = affine_point(rows, texelFetch(positions, int(corners[i])).xyz);
         vec3 p = face_vector(face, world - quadtree.eye_world.xyz);
-        vec2 place = p.z < quadtree.depths.w ? vec2(1e20) : face_place(p, face_q(p)).xy;
-        low = min(low, place);
-        high = max(high, place);
+        if (p.z < quadtree.depths.w)
+            return false;
+        places[i] = face_place(p, face_q(p)).xy;
     }
-    return all(lessThan(high - low, vec2(QUADTREE_FINE))) && high.x < 1e20;
+    vec2 a = places[1] - places[0], b = places[2] - places[0], c = b - a;
+    float longest = sqrt(max(dot(a, a), max(dot(b, b), dot(c, c))));
+    return abs(a.x * b.y - a.y * b.x) < QUADTREE_FINE * longest;
 }
 
 // A ray that stays behind a layer has met it, also where it passed between primitives that are finer than texels. True: it

@@ -367,8 +367,8 @@ static inline void seen_sphere(struct seen *seen, const struct scene_instance *i
             /* The outline is where the way from the eye is tangent; so far inside it lies a texel. */
             const double cosine = fabs(twin_dot(p, normal)) / sqrt(twin_dot(p, p)),
                          inside = r * (1 - sqrt(fmax(1 - cosine * cosine, 0)));
-            const bool is_own = ends[i] > seen->t_min &&
-                                seen_texels_between(seen, seen->t_min, ends[i]) < seen->view->blind;
+            const bool is_own =
+                ends[i] > seen->t_min && seen_texels_between(seen, seen->t_min, ends[i]) < seen->view->blind;
             if (inside < 2 * off || is_own)
                 seen_edge(seen, ends[i]);
         }
