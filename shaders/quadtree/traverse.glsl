@@ -363,15 +363,37 @@ uint face_towards(vec3 p)
 #define SHORTEN(walk, found) walk.u_end = min(walk.u_end, place_at(walk.s, found.distance))
 #endif
 
-// A ray that stays behind a layer has met it, also where it passed between its primitives: these are finer than texels.
-// True: it ends.
+// Whether neighbours of a primitive may lie between the middles of texels, seen by none: one as narrow as it.
+bool is_finer_than_texels(uint face, uvec2 visible)
+{
+#ifdef HAS_SPHERES
+    if (geometry_at(instance_at(visible.x - 1u).geometry).kind == GEOMETRY_SPHERES)
+        return false;
+#endif
+    vec4 rows[3] = instance_at(visible.x - 1u).world_from_object;
+    uvec3 corners = texelFetch(triangles, int(visible.y)).xyz;
+    vec2 places[3];
+    for (int i = 0; i < 3; i++) {
+        vec3 world = affine_point(rows, texelFetch(positions, int(corners[i])).xyz);
+        vec3 p = face_vector(face, world - quadtree.eye_world.xyz);
+        if (p.z < quadtree.depths.w)
+            return false;
+        places[i] = face_place(p, face_q(p)).xy;
+    }
+    vec2 a = places[1] - places[0], b = places[2] - places[0], c = b - a;
+    float longest = sqrt(max(dot(a, a), max(dot(b, b), dot(c, c))));
+    return abs(a.x * b.y - a.y * b.x) < QUADTREE_FINE * longest;
+}
+
+// A ray that stays behind a layer has met it, also where it passed between primitives that are finer than texels. True: it
+// ends.
 bool meet_beside(trace_ray r, inout layer_walk walk, inout found_type found)
 {
     if (!(walk.u_behind < walk.u_end) || walk.u_behind != walk.u_beside)
         return false;
     uvec2 visible;
     vec2 place = walk.s.from.xy + walk.u_beside * walk.s.along.xy;
-    if (!visible_at(ivec2(floor(place)), slice_of(walk), visible))
+    if (!visible_at(ivec2(floor(place)), slice_of(walk), visible) || !is_finer_than_texels(walk.face, visible))
         return false;
     walk.u_behind = NEVER;
     return offer(r, candidate(distance_at(walk.s, walk.u_beside), visible.y, visible.x - 1u, vec2(0.0)), walk, found);

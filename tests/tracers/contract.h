@@ -49,7 +49,7 @@ struct tracer_row {
         double margin;               /* of one face: so much more it sees on each side, in halves of the view */
         double blind; /* texels from a ray's origin within which it may take a hit for the origin's own surface */
         double off;   /* of planes it hits: how far 1 / depth may be off, 1 / metres */
-        double wrong_max;    /* but for this share of the rays that pass no outline within a texel */
+        double wrong_max;    /* but for this share of the rays judged, which pass no outline within a texel */
         uint32_t judged_min; /* of RAY_COUNT rays through a scene; brute force says which are known */
         const char *reason;
     } seen;

@@ -24,6 +24,7 @@ struct twin_hit {
     uint32_t material; /* id; 0: the default */
     uint32_t node;     /* 0: a disc */
     bool back_face;
+    double bend; /* of a ball, how much its surface curves at most, 1 / metres in the world */
 };
 
 /* One surface that the ray's line intersects. */
@@ -433,6 +434,22 @@ static inline void twin_triangle(struct twin_answer *answer, const struct scene_
     twin_add_intersection(answer, &intersection);
 }
 
+/* The most by which a transform lengthens: the greatest singular value. */
+static inline double twin_stretch(const float m[12])
+{
+    double v[3] = {0.61, 0.53, 0.59}, length = 1;
+    for (int i = 0; i < 40; i++) {
+        double image[3], back[3];
+        twin_transform(image, m, v, 0);
+        for (int k = 0; k < 3; k++)
+            back[k] = (double)m[k] * image[0] + (double)m[4 + k] * image[1] + (double)m[8 + k] * image[2];
+        length = sqrt(twin_dot(back, back));
+        for (int k = 0; k < 3 && length > 0; k++)
+            v[k] = back[k] / length;
+    }
+    return sqrt(length);
+}
+
 static inline void twin_sphere(struct twin_answer *answer, const struct scene_instance *instance,
                                const struct scene_spheres *set, uint32_t primitive)
 {
@@ -452,6 +469,9 @@ static inline void twin_sphere(struct twin_answer *answer, const struct scene_in
         shrink =
             fmax(shrink, sqrt((double)m[k] * m[k] + (double)m[4 + k] * m[4 + k] + (double)m[8 + k] * m[8 + k]));
     }
+    /* The longest half axis of the ellipsoid by the square of the shortest. */
+    const double bend = twin_stretch(instance->world_from_object) *
+                        pow(twin_stretch(instance->object_from_world), 2) / (double)sphere[3];
     double beside = sqrt(fmax(twin_dot(from, from) - b * b / a, 0)) - sphere[3];
     if (fabs(beside) < answer->twin->blur.near_world * shrink)
         twin_is_close(answer, fmin(fmax(-b / a, answer->t_min), answer->t_max));
@@ -463,6 +483,7 @@ static inline void twin_sphere(struct twin_answer *answer, const struct scene_in
         hit->distance = (-b + side * sqrt(discriminant)) / a;
         for (int k = 0; k < 3; k++)
             hit->normal_geometric[k] = (from[k] + hit->distance * direction[k]) / sphere[3];
+        hit->bend = bend;
         hit->uv[0] = 0.5 + atan2(hit->normal_geometric[0], hit->normal_geometric[2]) / (2 * TWIN_PI);
         hit->uv[1] = acos(fmax(-1, fmin(1, hit->normal_geometric[1]))) / TWIN_PI;
         twin_normal_to_world(hit->normal_geometric, instance->object_from_world);

@@ -9,6 +9,8 @@
 /* Layers are ordered by what is at a texel's centre; where surfaces cross, the order turns round within the texel.
  */
 #define CROSSINGS "where surfaces cross, a texel has them in one order"
+#define BEYOND                                                                                                    \
+    "a plane goes on to the end of its texel, beyond the outline of its surface and to the crease with the next"
 #define SEEN_STILL "it holds what is seen as the shutter opens"
 
 #define STILL "it holds samples of the scene as the shutter opens"
@@ -82,7 +84,7 @@ static const struct tracer_row rows[] = {
 #define QUADTREE_OPTIONS(...) QUADTREE_BOUND(0.25f, 100, __VA_ARGS__)
 #define QUADTREE_BOUND(e, r, ...) .options.quadtree = {.resolution = 256, .pixels = e, .radius = r, __VA_ARGS__}
 #define QUADTREE_SEEN(judged, ...)                                                                                \
-    .seen = {.resolution = 256, .wrong_max = 0.005, .judged_min = judged, .reason = CROSSINGS, __VA_ARGS__}
+    .seen = {.resolution = 256, .wrong_max = 0.0025, .judged_min = judged, .reason = CROSSINGS, __VA_ARGS__}
     QUADTREE("", QUADTREE_OPTIONS(.layers = 3), QUADTREE_SEEN(200, .layers = 3)),
     QUADTREE(", of one layer", QUADTREE_OPTIONS(.layers = 1), QUADTREE_SEEN(60, .layers = 1)),
     /* The same planes, for eyes nearby: what lies before the view is taken to be empty where a ray begins there.
@@ -92,7 +94,13 @@ static const struct tracer_row rows[] = {
     /* A plane that a ray meets within 1.5 texels across and down may be that of its own surface, gone on beyond
        it. */
     QUADTREE(", planes", QUADTREE_OPTIONS(.layers = 3, .hits = QUADTREE_HITS_PLANE),
-             QUADTREE_SEEN(200, .layers = 3, .off = 0.25 / (128 * 100.0), .blind = 2.2)),
+             .seen = {.resolution = 256,
+                      .wrong_max = 0.01,
+                      .judged_min = 200,
+                      .reason = BEYOND,
+                      .layers = 3,
+                      .off = 0.25 / (128 * 100.0),
+                      .blind = 2.2}),
     QUADTREE(", of boxes", QUADTREE_OPTIONS(.layers = 3, .nodes = QUADTREE_NODES_MINMAX),
              QUADTREE_SEEN(200, .layers = 3)),
     QUADTREE(", texel by texel", QUADTREE_OPTIONS(.layers = 3, .walk = QUADTREE_WALK_DDA),

@@ -182,6 +182,19 @@ static inline void seen_edge(struct seen *seen, double at)
         seen->edge = fmin(seen->edge, at);
 }
 
+/* How far apart two points of the ray are to the eye, in texels at least. */
+static inline double seen_texels_between(const struct seen *seen, double from, double to)
+{
+    double a[3], b[3], across[3];
+    to = fmin(to, 1e9 * (1 + fabs(from))); /* the end of a ray may be at infinity */
+    for (int k = 0; k < 3; k++) {
+        a[k] = seen->origin[k] + from * seen->direction[k];
+        b[k] = seen->origin[k] + to * seen->direction[k];
+    }
+    twin_cross(across, a, b);
+    return atan2(sqrt(twin_dot(across, across)), twin_dot(a, b)) / seen->view->texel;
+}
+
 /* ---- surfaces ---- */
 
 static inline void seen_triangle(struct seen *seen, size_t i)
@@ -354,7 +367,9 @@ static inline void seen_sphere(struct seen *seen, const struct scene_instance *i
             /* The outline is where the way from the eye is tangent; so far inside it lies a texel. */
             const double cosine = fabs(twin_dot(p, normal)) / sqrt(twin_dot(p, p)),
                          inside = r * (1 - sqrt(fmax(1 - cosine * cosine, 0)));
-            if (inside < 2 * off)
+            const bool is_own =
+                ends[i] > seen->t_min && seen_texels_between(seen, seen->t_min, ends[i]) < seen->view->blind;
+            if (inside < 2 * off || is_own)
                 seen_edge(seen, ends[i]);
         }
     }
@@ -419,19 +434,6 @@ static inline int seen_by_place(const void *a, const void *b)
 {
     const double x = ((const struct seen_event *)a)->at, y = ((const struct seen_event *)b)->at;
     return x < y ? -1 : x > y;
-}
-
-/* How far apart two points of the ray are to the eye, in texels at least. */
-static inline double seen_texels_between(const struct seen *seen, double from, double to)
-{
-    double a[3], b[3], across[3];
-    to = fmin(to, 1e9 * (1 + fabs(from))); /* the end of a ray may be at infinity */
-    for (int k = 0; k < 3; k++) {
-        a[k] = seen->origin[k] + from * seen->direction[k];
-        b[k] = seen->origin[k] + to * seen->direction[k];
-    }
-    twin_cross(across, a, b);
-    return atan2(sqrt(twin_dot(across, across)), twin_dot(a, b)) / seen->view->texel;
 }
 
 /* Where the ray, hidden since `from`, has been so for as long as a tracer may take to see that; after `to`: it
