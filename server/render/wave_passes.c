@@ -11,7 +11,7 @@
 
 #include <epoxy/gl.h>
 
-#define DEFINES_MAX 13
+#define DEFINES_MAX 12
 
 bool wave_passes_reserve(struct wave_passes *passes, struct render_context *context, struct error *error)
 {
@@ -77,8 +77,6 @@ static const struct gpu_program *shade_program(struct wave_passes *passes, struc
         defines[n++] = (struct gpu_define){"HAS_AREA_LIGHTS", "1"};
     if (context->scene->has_motion)
         defines[n++] = (struct gpu_define){"HAS_TIMES", "1"};
-    if (context->key_tiles)
-        defines[n++] = (struct gpu_define){"HAS_TILES", "1"};
     const struct gpu_program *program = context_use_with(context, integrator->shader, defines, error);
     if (!program)
         return NULL;
@@ -89,7 +87,6 @@ static const struct gpu_program *shade_program(struct wave_passes *passes, struc
     gpu_uniform_uint(program, "children_a_hit", integrator->children_a_hit);
     gpu_uniform_uint(program, "shadow_rays_a_hit", integrator->shadow_rays_a_hit(context));
     bind_shading(passes, context);
-    context_bind_tiles(context, program);
     return program;
 }
 

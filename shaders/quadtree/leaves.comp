@@ -16,6 +16,7 @@ layout(binding = UNIT_QUADTREE_VISIBLE) uniform usampler2DArray visible;
 layout(binding = UNIT_QUADTREE_NODES) uniform usamplerBuffer nodes;
 layout(binding = IMAGE_QUADTREE_PLANES, rg32ui) writeonly uniform uimageBuffer planes;
 
+uniform uint first_item; // of the dispatch
 uniform uint slice;
 uniform uint layer; // of the face; its slice comes just behind that of the layer before
 
@@ -142,7 +143,7 @@ uvec2 disc_node(sight_line line, uint index)
 
 void main()
 {
-    uint item = item_index();
+    uint item = first_item + item_index();
     uvec2 place = uvec2(item % quadtree.padded_width, item / quadtree.padded_width);
     if (place.y >= quadtree.padded_height)
         return;

@@ -24,6 +24,7 @@ layout(binding = IMAGE_QUADTREE_NODES, rg32ui) writeonly uniform uimageBuffer ma
 layout(binding = IMAGE_QUADTREE_ERRORS, r32f) writeonly uniform imageBuffer made_errors;
 
 uniform uint level;
+uniform uint first_item; // of the dispatch
 
 // Of w, for what rounds where a plane is made and evaluated.
 const float ROUNDING = 2.384e-7; // 2^-22
@@ -165,7 +166,7 @@ bool is_turned(vec2 centre, float h, float w, vec2 slopes, vec4 w4, vec4 sx, vec
 
 void main()
 {
-    uint item = item_index(), width = node_row(level), height = quadtree.padded_height >> level;
+    uint item = first_item + item_index(), width = node_row(level), height = quadtree.padded_height >> level;
     uvec2 place = uvec2(item % width, item / width);
 #ifdef NODES_OF_LEAVES
     if (place.y >= height)

@@ -2,11 +2,11 @@
 // Shared by the integrators' shading passes: a hit of the wave in; its children and shadow rays out, with the light
 // that these bring if nothing is in the way. Hits are in the order of the list, j is the place in it.
 //
-// Defines: HAS_TIMES something moves: rays have a time; HAS_TILES as of render/tiles.glsl.
+// Defines: HAS_TIMES something moves: rays have a time.
 
 #include "shared/path.h"
 #include "shared/ray.h"
-#include "render/tiles.glsl"
+#include "common/camera.glsl"
 #include "common/cone.glsl"
 #include "common/dispatch.glsl"
 #include "common/material.glsl"
@@ -55,10 +55,11 @@ path path_at(uint k)
                 c.x, uintBitsToFloat(c.y), uintBitsToFloat(c.z), uintBitsToFloat(c.w));
 }
 
-// The pixel and sample of a path, for common/sequence.glsl.
+// The pixel and sample of a path, for common/sequence.glsl. Of a picture of tiles (render/tiles.glsl) it is another pixel,
+// but no two have the same.
 uint path_seed(path p)
 {
-    uvec2 pixel = pixel_of_picture_slot(first_slot + (p.sample_slot >> frame.sample_shift));
+    uvec2 pixel = pixel_of_slot(first_slot + (p.sample_slot >> frame.sample_shift));
     return sequence_seed(number_in_view(pixel_in_view(pixel)), frame.seed);
 }
 

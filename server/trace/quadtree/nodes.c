@@ -7,6 +7,9 @@
 
 #define NODE_BYTES 8u
 #define ERROR_BYTES 4u
+/* Nodes of a unit: some milliseconds. */
+#define UNIT_ITEMS_SOFTWARE (1u << 17)
+#define UNIT_ITEMS (1u << 23)
 
 static uint32_t slice_count(const struct quadtree_uniforms *uniforms)
 {
@@ -23,15 +26,43 @@ uint64_t quadtree_nodes_count(const struct quadtree_uniforms *uniforms)
     return (uint64_t)slice_count(uniforms) * uniforms->slice_nodes;
 }
 
-/* Leaves and level 1 of each slice. */
-static uint32_t slice_units(const struct quadtree_uniforms *uniforms)
+/* Stages are the leaves and level 1 of each slice, then each level above of all slices, then what is nearest. */
+static uint32_t slice_stages(const struct quadtree_uniforms *uniforms)
 {
     return 2 * slice_count(uniforms);
 }
 
-uint32_t quadtree_nodes_units(const struct quadtree_uniforms *uniforms)
+static uint32_t stage_count(const struct quadtree_uniforms *uniforms)
 {
-    return slice_units(uniforms) + QUADTREE_TOP - 1 + 1;
+    return slice_stages(uniforms) + QUADTREE_TOP - 1 + 1;
+}
+
+static uint32_t stage_level(const struct quadtree_uniforms *uniforms, uint32_t stage)
+{
+    return stage < slice_stages(uniforms) ? stage % 2 : stage - slice_stages(uniforms) + 2;
+}
+
+/* Invocations; the last stage has a few. */
+static uint64_t stage_items(const struct quadtree_uniforms *uniforms, uint32_t stage)
+{
+    const uint32_t slices = stage < slice_stages(uniforms) ? 1 : slice_count(uniforms);
+    return stage + 1 == stage_count(uniforms)
+               ? uniforms->faces
+               : (uint64_t)(slice_texels(uniforms) >> 2 * stage_level(uniforms, stage)) * slices;
+}
+
+static uint32_t unit_items(const struct quadtree_store *store)
+{
+    return store->device->facts.software ? UNIT_ITEMS_SOFTWARE : UNIT_ITEMS;
+}
+
+uint32_t quadtree_nodes_units(const struct quadtree_store *store)
+{
+    const uint32_t items = unit_items(store);
+    uint64_t units = 0;
+    for (uint32_t stage = 0; stage < stage_count(&store->uniforms); stage++)
+        units += (stage_items(&store->uniforms, stage) + items - 1) / items;
+    return (uint32_t)units;
 }
 
 bool quadtree_nodes_begin(struct quadtree_node_build *build, struct quadtree_store *store, struct error *error)
@@ -45,7 +76,8 @@ bool quadtree_nodes_begin(struct quadtree_node_build *build, struct quadtree_sto
                   (unsigned long long)count);
         return error_remedy(error, "take a lower resolution, or fewer layers");
     }
-    build->unit = 0;
+    build->stage = 0;
+    build->first = 0;
     return gpu_buffer_reserve(device, &store->nodes, (count + uniforms->faces) * NODE_BYTES, error) &&
            gpu_buffer_reserve(device, &build->planes, (size_t)slice_texels(uniforms) * NODE_BYTES, error) &&
            gpu_buffer_reserve(device, &build->errors, above * ERROR_BYTES, error);
@@ -59,7 +91,7 @@ static const struct gpu_program *program_get(const struct quadtree_store *store,
 }
 
 static bool make_leaves(struct quadtree_node_build *build, struct quadtree_store *store, struct gpu_scene *scene,
-                        uint32_t slice, struct error *error)
+                        uint32_t slice, uint64_t count, struct error *error)
 {
     struct gpu_define defines[4] = {{0}};
     unsigned n = 0;
@@ -78,13 +110,14 @@ static bool make_leaves(struct quadtree_node_build *build, struct quadtree_store
     gpu_buffer_bind_image(store->device, &build->planes, IMAGE_QUADTREE_PLANES, GL_RG32UI);
     gpu_uniform_uint(program, "slice", slice);
     gpu_uniform_uint(program, "layer", slice % store->uniforms.layers);
-    gpu_dispatch(store->device, program, slice_texels(&store->uniforms));
+    gpu_uniform_uint(program, "first_item", (uint32_t)build->first);
+    gpu_dispatch(store->device, program, count);
     return true;
 }
 
 /* Level 1: of one slice, with its leaves. */
 static bool make_level(struct quadtree_node_build *build, struct quadtree_store *store, uint32_t slice,
-                       uint32_t level, bool minmax, struct error *error)
+                       uint32_t level, uint64_t count, bool minmax, struct error *error)
 {
     struct gpu_define defines[3] = {{0}};
     unsigned n = 0;
@@ -102,8 +135,8 @@ static bool make_level(struct quadtree_node_build *build, struct quadtree_store 
     gpu_buffer_bind_image(store->device, &build->errors, IMAGE_QUADTREE_ERRORS, GL_R32F);
     gpu_uniform_uint(program, "slice", slice);
     gpu_uniform_uint(program, "level", level);
-    const uint64_t of_slice = slice_texels(&store->uniforms) >> 2 * level;
-    gpu_dispatch(store->device, program, level == 1 ? of_slice : of_slice * slice_count(&store->uniforms));
+    gpu_uniform_uint(program, "first_item", (uint32_t)build->first);
+    gpu_dispatch(store->device, program, count);
     return true;
 }
 
@@ -122,22 +155,26 @@ static bool find_nearest(struct quadtree_store *store, struct error *error)
 enum tracer_progress quadtree_nodes_go_on(struct quadtree_node_build *build, struct quadtree_store *store,
                                           struct gpu_scene *scene, bool minmax, struct error *error)
 {
-    const uint32_t slices = slice_units(&store->uniforms), unit = build->unit++;
+    const struct quadtree_uniforms *uniforms = &store->uniforms;
+    const uint32_t slices = slice_stages(uniforms), slice = build->stage < slices ? build->stage / 2 : 0;
+    const uint32_t level = stage_level(uniforms, build->stage);
+    const uint64_t left = stage_items(uniforms, build->stage) - build->first;
+    const uint64_t count = left < unit_items(store) ? left : unit_items(store);
+    bool good;
     gpu_push_group(store->device, "quadtree nodes");
     gpu_buffer_bind_uniform(&store->uniform_buffer, UNIFORM_QUADTREE);
-    bool good;
-    if (unit < slices && unit % 2 == 0)
-        good = make_leaves(build, store, scene, unit / 2, error);
-    else if (unit < slices)
-        good = make_level(build, store, unit / 2, 1, minmax, error);
-    else if (unit < slices + QUADTREE_TOP - 1)
-        good = make_level(build, store, 0, unit - slices + 2, minmax, error);
+    if (level == 0)
+        good = make_leaves(build, store, scene, slice, count, error);
+    else if (build->stage + 1 < stage_count(uniforms))
+        good = make_level(build, store, slice, level, count, minmax, error);
     else
         good = find_nearest(store, error);
     gpu_pop_group(store->device);
     if (!good)
         return TRACER_FAILED;
-    return build->unit < quadtree_nodes_units(&store->uniforms) ? TRACER_MORE : TRACER_DONE;
+    build->first = count < left ? build->first + count : 0;
+    build->stage += count == left;
+    return build->stage < stage_count(uniforms) ? TRACER_MORE : TRACER_DONE;
 }
 
 void quadtree_nodes_finish(struct quadtree_node_build *build, struct gpu_device *device)

@@ -20,12 +20,13 @@
 /* All-zero: nothing is reserved. The buffers stay from build to build. */
 struct quadtree_node_build {
     struct gpu_buffer planes, errors; /* quadtree/layout.h */
-    uint32_t unit;                    /* the next one */
+    uint32_t stage;                   /* what the next unit is of */
+    uint64_t first;                   /* its first node there */
 };
 
 /* The nodes of all slices of a store. */
 uint64_t quadtree_nodes_count(const struct quadtree_uniforms *uniforms);
-uint32_t quadtree_nodes_units(const struct quadtree_uniforms *uniforms);
+uint32_t quadtree_nodes_units(const struct quadtree_store *store);
 /* Reserves store->nodes and what the build needs, before the first unit. */
 bool quadtree_nodes_begin(struct quadtree_node_build *build, struct quadtree_store *store, struct error *error);
 /* A unit; queues the work. `minmax`: boxes only, but for leaves and where nothing is. */

@@ -363,7 +363,7 @@ static inline void layers_build(struct layers *layers, bool minmax)
         units++;
     } while (progress == TRACER_MORE);
     expect_ok(progress == TRACER_DONE && gpu_check(device, "nodes", &error), &error);
-    assert_int_equal(units, quadtree_nodes_units(&store->uniforms));
+    assert_int_equal(units, quadtree_nodes_units(store));
     free(layers->nodes);
     layers->nodes = malloc(bytes);
     gpu_buffer_read(device, &store->nodes, 0, layers->nodes, bytes);
