@@ -54,11 +54,11 @@ static float farthest_eye(const struct frame_request *request)
  * structure. */
 static float radius_for(const struct frame_request *request)
 {
-    float radius = request->tracer_options.quadtree.radius;
-    const float farthest = farthest_eye(request) * 1.001f;
-    while (radius < farthest && radius < RADIUS_MAX)
-        radius *= 2.0f;
-    return radius;
+    const float asked = request->tracer_options.quadtree.radius, farthest = farthest_eye(request) * 1.001f;
+    if (!(asked < farthest))
+        return asked;
+    const float doublings = asked > 0.0f ? ceilf(log2f(farthest / asked)) : 0.0f;
+    return fminf(asked > 0.0f ? ldexpf(asked, (int)doublings) : farthest, RADIUS_MAX);
 }
 
 bool frame_key_take(struct frame_renderer *renderer, struct error *error)

@@ -269,7 +269,7 @@ TEST(samples_of_eyes_add_up_from_frame_to_frame)
         result = render_from(fixture, VIEW_SOURCE_LAYERS);
         assert_int_equal(result.samples, 2 * i);
         if (i == 2)
-            assert_like(&result, &at_once, 1e-4f); /* the sums are of other numbers of samples: rounding */
+            assert_like(&result, &at_once, 1e-3f); /* cones of rays are narrower where a texel has more samples */
         frame_result_finish(&result);
     }
     frame_result_finish(&at_once);
@@ -353,11 +353,12 @@ TEST(the_quadtree_of_a_view_shows_eyes_aside_as_they_are_rendered)
     frame_result_finish(&rendered);
     frame_result_finish(&made);
     step_aside(fixture, 0.065f);
-    /* One layer lacks what the panels hide, two of this room lack nothing. 35 dB is what is asked of whole
-     * pictures. */
+    /* One layer lacks what the panels hide: 0.6 m high, 3.4 to 5.5 m away and 1.5 to 3.6 m before the wall, they
+     * hide strips of 0.8 to 3.2 pixels, 380 of 76,800 together: 0.49 %. Two lack nothing. 35 dB is what is asked
+     * of whole pictures. */
     for (uint32_t layers = 1; layers <= 3; layers++) {
         fixture->request.tracer_options.quadtree.layers = layers;
-        expect_like_from_aside(fixture, 35, layers == 1 ? 0.004 : 0.001);
+        expect_like_from_aside(fixture, 35, layers == 1 ? 0.006 : 0.001);
     }
     fixture->request.format = PIXEL_FORMAT_RGBA8;
     made = render_from(fixture, VIEW_SOURCE_LAYERS);
