@@ -89,7 +89,8 @@ static const struct tracer_row rows[] = {
     QUADTREE(", of one layer", QUADTREE_OPTIONS(.layers = 1), QUADTREE_SEEN(60, .layers = 1)),
     /* The same planes, for eyes nearby: what lies before the view is taken to be empty where a ray begins there.
      */
-    QUADTREE(", of the view", QUADTREE_BOUND(0.001f, 0.4f, .layers = 3, .faces = QUADTREE_FACES_VIEW),
+    QUADTREE(", of the view",
+             QUADTREE_BOUND(0.001f, 0.4f, .layers = 3, .margin = 0.1f, .faces = QUADTREE_FACES_VIEW),
              QUADTREE_SEEN(60, .layers = 3, .is_one_face = true, .margin = 2 * 26 / 256.0)),
     /* A plane that a ray meets within 1.5 texels across and down may be that of its own surface, gone on beyond
        it. */
