@@ -35,7 +35,8 @@ struct tracer_bench {
     uint32_t ldc_count_steps;           /* 1: hits hold counts of the traversal (shaders/ldc/cube.glsl) */
     uint32_t abuffer_count_steps;       /* likewise */
     uint32_t rayspace_pairs;            /* of a stack of it; 0: chosen */
-    uint32_t quadtree_count_steps;      /* hits hold counts of the traversal (shaders/quadtree/traverse.glsl) */
+    uint32_t quadtree_stack; /* 1: the traversal keeps the ancestors of a node (shaders/quadtree/traverse.glsl) */
+    uint32_t quadtree_count_steps; /* hits hold counts of the traversal (shaders/quadtree/traverse.glsl) */
     uint32_t
         baseline_side; /* texels or cells along a side, of a structure of the benchmark's own; 0: its maximum */
 };

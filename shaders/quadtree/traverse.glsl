@@ -6,7 +6,8 @@
 // in the next one, and only there is it traced through that. Where it is behind the last layer, nothing is known.
 //
 // Defines: QUADTREE_PLANES a hit is where the ray meets a node's plane, else where it meets the primitive; QUADTREE_DDA
-// from texel to texel, not by the tree; QUADTREE_VIEW there is one face; QUADTREE_COUNT_STEPS hits are counts: nodes looked at, and layers.
+// from texel to texel, not by the tree; QUADTREE_STACK the way back up the tree is by a stack, to compare with;
+// QUADTREE_VIEW there is one face; QUADTREE_COUNT_STEPS hits are counts: nodes looked at, and layers.
 #define INTERSECTION_FLAGS walk_flags
 
 #include "shared/path.h"
@@ -246,8 +247,20 @@ node_passage look(layer_walk walk)
     return p;
 }
 
+#ifdef QUADTREE_STACK
+uint walk_ancestors[QUADTREE_TOP + 1]; // of the node that the ray is in, by level
+
+uint packed_cell(ivec2 cell)
+{
+    return uint(cell.x) | uint(cell.y) << 16;
+}
+#endif
+
 void go_down(inout layer_walk walk)
 {
+#ifdef QUADTREE_STACK
+    walk_ancestors[walk.level] = packed_cell(walk.cell);
+#endif
     walk.level--;
     ivec2 low = walk.cell * 2;
     walk.cell = clamp(ivec2(floor(walk.s.from.xy + walk.s.along.xy * walk.u)) >> walk.level, low, low + 1);
@@ -291,6 +304,12 @@ void leave(node_passage p, inout layer_walk walk)
         walk.u = walk.u_end;
 #ifdef QUADTREE_DDA
     walk.cell = next;
+#elif defined QUADTREE_STACK
+    walk.cell = next;
+    while (walk.level < QUADTREE_TOP && walk_ancestors[walk.level + 1] != packed_cell(walk.cell >> 1)) {
+        walk.cell >>= 1;
+        walk.level++;
+    }
 #else
     int up = min(findMSB((walk.cell.x ^ next.x) | (walk.cell.y ^ next.y)), QUADTREE_TOP - walk.level);
     walk.level += up;

@@ -35,8 +35,8 @@ static const char usage[] =
     "  --after N       reflection, bounce: so many reflections are between the camera's rays and the wave; "
     "default "
     "0\n"
-    "  --forms LIST    of one, two, three (layers), quadtree, dda, minmax, planes, adaptive, bvh, reference;\n"
-    "                  default quadtree,dda,minmax\n"
+    "  --forms LIST    of one, two, three (layers), quadtree, dda, minmax, stack, adaptive, bvh, reference, and\n"
+    "                  primitives, which moved eyes hit in place of planes; default quadtree,dda,minmax\n"
     "  --layers N, --resolution N, --faces cube|view, --pixels E, --radius R, --margin M   settings of quadtree;\n"
     "                  default: 2 layers, the view, the picture's resolution\n"
     "  --size WxH      multiples of 8; default 1280x720\n"
@@ -53,7 +53,7 @@ static const struct form {
     const char *name;
     unsigned tracer;
     uint32_t layers; /* 0: as --layers says */
-    uint32_t nodes, walk, adaptive, hits;
+    uint32_t nodes, walk, adaptive, hits, stack;
 } forms[] = {
     {.name = "bvh", .tracer = TRACER_BVH}, /* tells where rays go on, and what is right */
     {.name = "reference", .tracer = TRACER_REFERENCE},
@@ -63,7 +63,8 @@ static const struct form {
     {.name = "three", .tracer = TRACER_QUADTREE, .layers = 3},
     {.name = "dda", .tracer = TRACER_QUADTREE, .walk = QUADTREE_WALK_DDA},
     {.name = "minmax", .tracer = TRACER_QUADTREE, .nodes = QUADTREE_NODES_MINMAX},
-    {.name = "planes", .tracer = TRACER_QUADTREE, .hits = QUADTREE_HITS_PLANE},
+    {.name = "primitives", .tracer = TRACER_QUADTREE, .hits = QUADTREE_HITS_PRIMITIVE},
+    {.name = "stack", .tracer = TRACER_QUADTREE, .stack = 1},
     {.name = "adaptive", .tracer = TRACER_QUADTREE, .adaptive = QUADTREE_ADAPTIVE_ON},
 };
 enum { FORMS = sizeof(forms) / sizeof(forms[0]) };
@@ -110,7 +111,8 @@ static bool make(struct bench *bench, const struct form *form, struct error *err
     settings->nodes = form->nodes;
     settings->walk = form->walk;
     settings->adaptive = form->adaptive;
-    settings->hits = form->hits;
+    settings->hits = form->hits ? form->hits : bench->wave_name == MOVED ? QUADTREE_HITS_PLANE : 0;
+    options.bench.quadtree_stack = form->stack;
     const struct tracer_impl *impl = tracer_find(form->tracer, "--forms", error);
     contender->form = form;
     contender->tracer = impl ? tracer_create(impl, bench->device, &options, error) : NULL;

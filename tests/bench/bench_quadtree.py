@@ -65,7 +65,7 @@ def measure_rays(bench, room):
     stereo = ["--move", ASIDE, *size(bench, STEREO_SIZE)]
     return {"stereo": [call(bench, "quadtree", f"{n} layer{'s' * (n > 1)}", 5, *room, *stereo, "--layers", n, "--forms",
                             STEREO + ",reference") for n in (1, 2)],
-            "layers": call(bench, "quadtree", "layers", 5, *room, *stereo, "--forms", "one,two,three,adaptive,planes"),
+            "layers": call(bench, "quadtree", "layers", 5, *room, *stereo, "--forms", "one,two,three,adaptive,stack,primitives"),
             "reflections": [call(bench, "quadtree", title, 3, *room, *size(bench, SIZE), "--wave", "reflection", "--after", after,
                                  "--faces", "cube", "--forms", "one,two,reference")
                             for title, after in (("first reflection", 0), ("third", 2))]}

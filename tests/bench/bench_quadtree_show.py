@@ -19,7 +19,7 @@ PAPER_LENS = {"dda": {4: (6.56, 876.97), 8: (9.34, 1233.4)}, "one": {4: (2.8, 20
 PAPER_REFLECTIONS = {"1/8/1": (2.38, 1.974, 5.15, 4.91), "3/8/1": (2.39, 6.96, 5.20, 13.5), "3/4/3": (2.33, 10.25, 5.19, 22.96),
                      "3/8/3": (2.35, 12.38, 5.27, 24.75)}
 NAMES = {"one": "1 layer", "two": "2 layers", "three": "3 layers", "adaptive": "adaptive, 2 layers", "minmax": "minmax, 2 layers",
-         "dda": "dda, 2 layers", "planes": "hits on planes, 2 layers"}
+         "dda": "dda, 2 layers", "stack": "with a stack, 2 layers", "primitives": "hits on primitives, 2 layers"}
 
 
 def ms(times):
@@ -78,7 +78,7 @@ def show_stereo(data):
 def show_layers(data):
     result = data["layers"]
     lines = []
-    for name in ("one", "two", "three", "adaptive", "planes"):
+    for name in ("one", "two", "three", "adaptive", "stack", "primitives"):
         contender = form_of(result, name)
         lines.append((NAMES[name], ms(contender["update_ns"]), ms(contender["trace_ns"]), number(contender["steps"]),
                       number(contender["layers"]), *agrees(result, contender)))

@@ -7,6 +7,7 @@
 
 #include <stdlib.h>
 
+#define SOURCE_DEFINES 7
 #define COUNTS_BYTES (WAVE_RAY_KINDS * sizeof(struct quadtree_counts))
 
 /* ---- state ---- */
@@ -79,7 +80,8 @@ bool quadtree_trace_begin(struct trace_state *state, struct error *error)
     return true;
 }
 
-static struct trace_program_source source_of(const struct tracer_options *options, struct gpu_define defines[6])
+static struct trace_program_source source_of(const struct tracer_options *options,
+                                             struct gpu_define defines[SOURCE_DEFINES])
 {
     size_t n = 0;
     defines[n++] = (struct gpu_define){"TRACER_QUADTREE", "1"};
@@ -89,6 +91,8 @@ static struct trace_program_source source_of(const struct tracer_options *option
         defines[n++] = (struct gpu_define){"QUADTREE_VIEW", "1"};
     if (options->quadtree.walk == QUADTREE_WALK_DDA)
         defines[n++] = (struct gpu_define){"QUADTREE_DDA", "1"};
+    if (options->bench.quadtree_stack)
+        defines[n++] = (struct gpu_define){"QUADTREE_STACK", "1"};
     if (options->bench.quadtree_count_steps)
         defines[n++] = (struct gpu_define){"QUADTREE_COUNT_STEPS", "1"};
     return (struct trace_program_source){.traverse = "quadtree/traverse.glsl", .defines = defines};
@@ -104,7 +108,7 @@ static uint64_t rounds_of_a_ray(const struct quadtree_store *store)
 bool quadtree_intersect(struct quadtree_store *store, struct gpu_scene *scene, struct quadtree_state *state,
                         const struct ray_range *rays, const struct tracer_options *options, struct error *error)
 {
-    struct gpu_define defines[6] = {0};
+    struct gpu_define defines[SOURCE_DEFINES] = {0};
     struct trace_program_source source = source_of(options, defines);
     const struct gpu_program *program = trace_program_get(scene, rays->wave, &source, error);
     if (!program)
@@ -133,7 +137,7 @@ bool quadtree_layer_hits(struct quadtree_store *store, struct gpu_scene *scene, 
 
 void quadtree_announce(struct gpu_scene *scene, const struct wave *wave, const struct tracer_options *options)
 {
-    struct gpu_define defines[6] = {0};
+    struct gpu_define defines[SOURCE_DEFINES] = {0};
     const struct trace_program_source source = source_of(options, defines);
     (void)trace_program_get(scene, wave, &source, NULL);
 }
