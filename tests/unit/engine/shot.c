@@ -201,8 +201,9 @@ TEST(a_frame_that_is_made_from_its_key_has_a_camera_of_its_own_and_the_rest_of_t
     assert_true(made.time_s == own.time_s && made.request.seed == key.request.seed);
     assert_memory_equal(made.motion.poses[0].nodes[0].parent_from_node,
                         key.motion.poses[0].nodes[0].parent_from_node, 48);
-    /* The key itself is rendered like any frame. */
-    assert_true(!rendered.request.has_key && rendered.request.view_source == VIEW_SOURCE_RAYS);
+    /* The key itself is made from the layers that the others need anyway. */
+    assert_true(rendered.request.has_key && rendered.request.view_source == VIEW_SOURCE_LAYERS);
+    assert_memory_equal(rendered.request.key_camera.world_from_view, key.request.camera.world_from_view, 48);
     assert_memory_equal(rendered.request.camera.world_from_view, key.request.camera.world_from_view, 48);
     shot_finish(&key);
     shot_finish(&own);
