@@ -7,7 +7,8 @@
 //
 // Defines: QUADTREE_PLANES a hit is where the ray meets a node's plane, else where it meets the primitive; QUADTREE_DDA
 // from texel to texel, not by the tree; QUADTREE_STACK the way back up the tree is by a stack, to compare with;
-// QUADTREE_VIEW there is one face; QUADTREE_COUNT_STEPS hits are counts: nodes looked at, and layers.
+// QUADTREE_VIEW there is one face; QUADTREE_COUNT_STEPS hits are counts: nodes, layers, and primitives
+// looked for.
 #define INTERSECTION_FLAGS walk_flags
 
 #include "shared/path.h"
@@ -28,6 +29,7 @@ uniform uint ray_kind;
 const float SAME_DISTANCE = 1e-5; // the share by which intersections with one surface differ at most
 const float FLOAT_MAX = 3.4e38;
 const float PLANES_APART = 2.0; // of w, in bounds: a plane and the extension of another one through a texel
+const float FARTHER_MAX = 16.0;  // so many times, by that
 const float NEVER = 2.0; // beyond the end of a segment
 const int STEPS_TOGETHER = 32; // of rays side by side, before what some of them have met is looked at
 
@@ -43,11 +45,11 @@ struct layer_walk {
     bool is_before, is_behind; // neither: it has just begun
     float u_before;            // where it was last before the layer
     float u_since;             // since when it is behind it; NEVER: it is not
-    float u_behind;         // where it came behind it for more than a texel
-    float u_fill;           // where it was last before the first layer that it came behind: before the background
-    uint fill_layer;        // that layer
-    float u_beside;         // where it last met a plane at an edge, but none of the primitives there
-    vec2 offered;           // distances of the last two intersections, none of which counts twice
+    float u_behind;            // where it came behind it for more than a texel
+    float u_fill;              // where it was last before the first layer that it came behind: before the background
+    uint fill_layer;           // that layer
+    float u_beside;            // where it last met a plane at an edge, but none of the primitives there
+    vec2 offered;              // distances of the last two intersections, none of which counts twice
 };
 
 // Where a ray is in a node.
@@ -367,7 +369,7 @@ float last_distance(trace_ray r)
     if (is_orthographic())
         far += quadtree.bounds.x * (far - quadtree.depths.x);
     else
-        far = quadtree.depths.x / max(quadtree.depths.x / far - PLANES_APART * quadtree.bounds.x, quadtree.depths.x / far / 16.0);
+        far = 1.0 / max(1.0 / far - PLANES_APART * quadtree.bounds.x / quadtree.depths.x, 1.0 / (FARTHER_MAX * far));
     return (length(r.origin - quadtree.eye_world.xyz) + far) / length(r.direction);
 }
 
@@ -452,6 +454,7 @@ bool begin_face(trace_ray r, found_type found, inout layer_walk walk, inout view
         walk.inverse = 1.0 / mix(along, vec2(1e-9), lessThan(abs(along), vec2(1e-9)));
         walk.u_end = 1.0;
         walk.u_fill = NEVER;
+        walk.fill_layer = 0u;
         begin_layer(0u, 0.0, walk);
         return true;
     }
