@@ -116,8 +116,8 @@ bool shot_make(struct shot *shot, const struct engine_job *job, const struct sce
     const uint32_t key = shot_key_frame(job, frame);
     if (key == frame && job->upsample <= 1)
         return make_alone(shot, job, scene, frame, bounds, error);
-    /* The camera and its lens are the frame's own; poses, shutter and noise are those of the key. The key itself is
-     * made in this way, too: its layers are rendered for the others anyway, and look like it. */
+    /* The camera and its lens are the frame's own; poses, shutter and noise are those of the key. The key itself
+     * is made in this way, too: its layers are rendered for the others anyway, and look like it. */
     if (!make_alone(&own, job, scene, frame, bounds, error))
         return false;
     shot_finish(&own);

@@ -33,7 +33,7 @@ struct render_context {
     uint32_t layer;
     struct gpu_buffer *key_marks, *key_tiles; /* which texels of it are rendered (key_view.h); NULL: all are */
     uint32_t first_tile;                      /* of the layer */
-    struct comparison *comparison; /* of the current frame; NULL: nothing is compared */
+    struct comparison *comparison;            /* of the current frame; NULL: nothing is compared */
     struct gpu_timer *timer;
     struct frame_request request;
     struct stage_times times;

@@ -300,7 +300,8 @@ static void announce_programs(struct frame_renderer *renderer)
         wave_passes_announce_shadows(passes, context);
     primary_announce(context, renderer->rasterise);
     if (frame_is_eyes_pass(renderer))
-        key_view_announce(context, renderer->work->layers.wanted & 1u << LAYER_UNKNOWN, frame_key_gather(renderer));
+        key_view_announce(context, renderer->work->layers.wanted & 1u << LAYER_UNKNOWN,
+                          frame_key_gather(renderer));
     else
         wave_passes_announce(passes, context);
     picture_announce(renderer->target, context);

@@ -22,8 +22,9 @@ struct frame_camera frame_key_camera(const struct frame_request *request)
     return frame_is_from_layers(request) && request->has_key ? request->key_camera : request->camera;
 }
 
-/* Other eyes that the layers would serve do not follow: what those of the frame do not look at need not be rendered.
- * The picture has room for the intersection of one sample a pixel; other points of a lens look at other texels. */
+/* Other eyes that the layers would serve do not follow: what those of the frame do not look at need not be
+ * rendered. The picture has room for the intersection of one sample a pixel; other points of a lens look at other
+ * texels. */
 static bool is_for_these_eyes(const struct frame_request *request)
 {
     return request->samples == 1 && !request->accumulate && !request->has_key && request->aperture == 0.0f &&
@@ -50,8 +51,8 @@ static float farthest_eye(const struct frame_request *request)
     return sqrtf(eye[0] * eye[0] + eye[1] * eye[1]) + lens + apart;
 }
 
-/* The bound holds for all eyes of the picture. Doubled, so that those of the pictures that follow rarely need another
- * structure. */
+/* The bound holds for all eyes of the picture. Doubled, so that those of the pictures that follow rarely need
+ * another structure. */
 static float radius_for(const struct frame_request *request)
 {
     const float asked = request->tracer_options.quadtree.radius, farthest = farthest_eye(request) * 1.001f;
@@ -202,9 +203,7 @@ bool frame_key_keep(struct frame_renderer *renderer, struct error *error)
 
 enum key_gather frame_key_gather(const struct frame_renderer *renderer)
 {
-    return frame_is_mark_pass(renderer) ? KEY_GATHER_MARK
-           : renderer->key.is_marked    ? KEY_GATHER_KEPT
-                                        : KEY_GATHER;
+    return frame_is_mark_pass(renderer) ? KEY_GATHER_MARK : renderer->key.is_marked ? KEY_GATHER_KEPT : KEY_GATHER;
 }
 
 bool frame_key_find(struct frame_renderer *renderer, bool *done, struct error *error)

@@ -283,8 +283,8 @@ bool key_view_take_count(struct key_view *key, struct gpu_device *device, uint32
 
 uint64_t key_view_device_bytes(const struct key_view *key)
 {
-    uint64_t sum = picture_device_bytes(&key->sums) + key->counts.capacity_bytes +
-                   key->marks.capacity_bytes + key->tiles.capacity_bytes + key->copy.capacity_bytes;
+    uint64_t sum = picture_device_bytes(&key->sums) + key->counts.capacity_bytes + key->marks.capacity_bytes +
+                   key->tiles.capacity_bytes + key->copy.capacity_bytes;
     for (int i = 0; i < KEY_LAYERS_MAX; i++)
         sum += key->layers[i].capacity_bytes;
     return sum;

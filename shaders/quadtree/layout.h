@@ -67,7 +67,8 @@ SHARED_SIZE(quadtree_counts, 32)
 /* A ray that is within so many texels of its origin may pass the extension of a plane beside the surface that it
  * began on, and one that is behind a plane may be before the next: half a texel, and its diagonal's. */
 #define QUADTREE_OWN_WAY 1.5f
-#define QUADTREE_FINE 2.0f /* texels: primitives as narrow may lie between the middles of texels, and be seen by none */
+#define QUADTREE_FINE                                                                                             \
+    2.0f /* texels: primitives as narrow may lie between the middles of texels, and be seen by none */
 #define QUADTREE_DEEP 0.05f /* of w: what is so far behind a plane is behind the surface */
 
 #define BIND_QUADTREE_COUNTS BIND_TRACER_0
