@@ -44,7 +44,11 @@ static unsigned beyond(const struct raster_camera *camera, const float world[3])
     /* A little wider, for rounding. */
     float reach = (camera->orthographic ? 1.0f : -v[2]) * 1.0001f;
     float x = camera->extent[0] * reach, y = camera->extent[1] * reach;
-    return (v[0] < -x) | (v[0] > x) << 1 | (v[1] < -y) << 2 | (v[1] > y) << 3 | (-v[2] < camera->near) << 4;
+    const bool is_beyond[] = {v[0]<-x, v[0]> x, v[1]<-y, v[1]> y, -v[2] < camera->near};
+    unsigned sides = 0;
+    for (unsigned i = 0; i < sizeof(is_beyond) / sizeof(is_beyond[0]); i++)
+        sides |= is_beyond[i] ? 1u << i : 0;
+    return sides;
 }
 
 static bool is_beside(const struct gpu_scene *scene, uint32_t instance, const struct raster_camera *camera)
