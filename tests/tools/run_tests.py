@@ -44,7 +44,7 @@ EXPECTED_SKIPS = (
 # (their rooms' unit tests stay), and programs from end to end where pictures are compared.
 NOT_SANITIZED = re.compile(
     r"accuracy/(?!render_frame|tracer_owners|wave_comparison)"
-    r"|contract/(.*(ray alone|packets of|rays? a call)|ldc|abuffer)"
+    r"|contract/(.*(ray alone|packets of|rays? a call)|ldc|abuffer|quadtree)"
     r"|test_(abuffer|animate|compare|import_animation|layers|ldc|light|models|poses|shot|siege|view)$")
 # Where no times of an earlier run are known: what takes longest begins first.
 LONGEST_FIRST = ("accuracy/sampled_against_reference", "test_import", "test_light", "test_models", "test_view", "test_compare",
@@ -64,7 +64,7 @@ ON_A_STACK = re.compile(r"accuracy/|contract/|unit/(gpu|gpu_scene|render|trace)/
 # what the host does; what fills memory up to limits; commands that differ from those of test_stacks in files and options.
 LONG_ON_A_STACK = re.compile(
     r"accuracy/(bsdf|sampling|sampled_against_reference|shading_.*|path_light|depth_of_field|frame_steps)"
-    r"|contract/(bvh, (one ray alone|packets of)|reference, |ldc by|abuffer, )"
+    r"|contract/(bvh, (one ray alone|packets of)|reference, |ldc by|abuffer, |quadtree, (of one layer|of boxes|texel by texel))"
     r"|unit/trace/(abuffer|ldc)/(limits|traversal)|unit/trace/bvh/history"
     r"|test_(render|ldc|abuffer|animate|carousel|light|poses)$")
 # Compares two stacks.
