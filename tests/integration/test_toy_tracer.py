@@ -82,10 +82,10 @@ class AddedTracer(Case):
                   {"state": "after"}]
         (self.folder / "replay.json").write_text(json.dumps(events))
         result = farlight("view", bundled_scenes() / "teapot.glb", "--replay", self.folder / "replay.json", "--headless",
-                          "--size", "64x48", "--samples", "1", "--tracer", "rayspace")
+                          "--size", "64x48", "--samples", "1", "--tracer", "quadtree")
         self.expect(result, 0)
         states = {state["state"]: state for state in map(json.loads, result.stdout.splitlines())}
-        self.assertEqual({name: state["tracer"] for name, state in states.items()}, {"before": "rayspace", "after": "toy"})
+        self.assertEqual({name: state["tracer"] for name, state in states.items()}, {"before": "quadtree", "after": "toy"})
         self.assertEqual(states["after"]["settings"], {"toy_batch": "4096", "toy_order": "forward"})
         self.assertRegex(states["after"]["structure"][0], r"^instances looked at \d+$")
 
