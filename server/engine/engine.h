@@ -93,7 +93,7 @@ struct engine_job {
     /* Of a view, see engine/view_wishes.h; owned: a reference. It takes the place of a view that has the same
      * wishes, which ends with ENGINE_DONE; frame numbers, counted from first_frame on, go on. */
     struct view_wishes *wishes;
-    uint32_t upsample;     /* of a batch: every how manyth frame is rendered, from time_origin_frame on; 0: 1 */
+    uint32_t upsample;     /* of a batch: layers are rendered of every how manyth frame, from time 0 on; 0: 1 */
     uint32_t pass_samples; /* that a frame of a view adds, up to frame.samples */
     enum encoding still_encoding;
     unsigned weight; /* its share of the device's time among the jobs of its client, and of its owner; 0: 1 */

@@ -13,7 +13,7 @@ struct shot {
     float time_s, shutter_s;
 };
 
-/* The frame that `frame` is made from where only every how manyth is rendered; itself, if it is rendered. It
+/* The frame that `frame` is made from where layers of only every how manyth are rendered; itself, if its are. It
  * follows from the two numbers alone: a range may begin, and be divided, anywhere. */
 uint32_t shot_key_frame(const struct engine_job *job, uint32_t frame);
 /* `bounds` may be kept from frame to frame, or NULL. On failure there is nothing to finish. */

@@ -6,9 +6,6 @@
 #include <math.h>
 #include <string.h>
 
-/* Reversed floating-point depth keeps its precision however small the near distance is, so this only has to be
- * small enough never to cut anything: a share of the scene's diagonal. */
-#define NEAR_OF_DIAGONAL 1e-5f
 #define AUTO_FOV_Y 0.7f   /* radians; about 40 degrees, a portrait lens */
 #define AUTO_MARGIN 1.06f /* of the distance at which the bounds touch the picture's edge */
 
@@ -173,10 +170,7 @@ void camera_fill_uniforms(struct frame_uniforms *uniforms, const struct frame_re
     frame_view_size(request, &width, &height);
     float aspect = (float)width / (float)height;
     float half_height = orthographic ? camera->ortho_height / 2.0f : tanf(camera->fov_y / 2.0f);
-    float near = camera->near;
-    if (near <= 0.0f)
-        near = orthographic ? 0.0f
-                            : fmaxf(scene->diagonal > 0.0f ? scene->diagonal * NEAR_OF_DIAGONAL : 1e-4f, 1e-6f);
+    const float near = raster_near(scene, camera->near, orthographic);
     struct raster_camera view = {
         .extent = {half_height * aspect, half_height},
         .near = near,

@@ -10,8 +10,6 @@
 #include <math.h>
 #include <string.h>
 
-#define RADIUS_MAX 1e6f /* as protocol/tracers.def has it */
-
 bool frame_is_from_layers(const struct frame_request *request)
 {
     return request->view_source == VIEW_SOURCE_LAYERS;
@@ -58,8 +56,7 @@ static float radius_for(const struct frame_request *request)
     const float asked = request->tracer_options.quadtree.radius, farthest = farthest_eye(request) * 1.001f;
     if (!(asked < farthest))
         return asked;
-    const float doublings = asked > 0.0f ? ceilf(log2f(farthest / asked)) : 0.0f;
-    return fminf(asked > 0.0f ? ldexpf(asked, (int)doublings) : farthest, RADIUS_MAX);
+    return asked > 0.0f ? ldexpf(asked, (int)ceilf(log2f(farthest / asked))) : farthest;
 }
 
 bool frame_key_take(struct frame_renderer *renderer, struct error *error)

@@ -193,8 +193,8 @@ struct tracer_impl {
     bool (*texel_view)(const struct tracer *tracer, struct trace_view *texels, uint32_t *layers);
     /* Of rays that begin at the eye of that view, which may be dead: the intersections with the surfaces that the
      * layer holds at the texels they pass through. A miss where it holds none. */
-    bool (*layer_hits)(struct tracer *tracer, struct gpu_scene *scene, const struct wave *wave,
-                       const struct ray_range *rays, uint32_t layer, struct error *error);
+    bool (*layer_hits)(struct tracer *tracer, struct gpu_scene *scene, const struct ray_range *rays,
+                       uint32_t layer, struct error *error);
 };
 
 /* tracer_bvh_impl and its like, one for each row of tracers.def; weak, as a build may leave a tracer out. */

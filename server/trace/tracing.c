@@ -247,7 +247,7 @@ bool tracer_layer_hits(struct tracer *tracer, struct gpu_scene *scene, const str
     if (!check_wave(tracer, scene, wave, error) || !check_updated(tracer, error))
         return false;
     gpu_push_group(tracer->device, impl->name);
-    bool found = impl->layer_hits(tracer, scene, wave, &all, layer, error) &&
+    bool found = impl->layer_hits(tracer, scene, &all, layer, error) &&
                  make_surfaces(tracer, scene, &all, error) && gpu_check(tracer->device, impl->name, error);
     gpu_pop_group(tracer->device);
     return found;

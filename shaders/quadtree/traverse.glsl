@@ -342,6 +342,8 @@ bool walk_on(inout layer_walk walk, out node_passage p)
 
 // What is known of a ray in all faces.
 struct view_walk {
+    float t_last;    // how far along the ray something may be that the view sees
+    vec2 t_face;     // where it is in the face, of which there is one
     float t_unknown; // from where on nothing is; 1e30: all is known
     uint layers;     // that it had to look at
     bool has_left;   // it is unknown as the ray is outside what the view sees
@@ -350,12 +352,17 @@ struct view_walk {
     ivec2 fill_texel;
 };
 
-// A view does not see what is beside it. But what lies between another eye near its own and its pyramid is taken to
-// be empty.
-void note_outside(trace_ray r, vec2 t, float t_end, inout view_walk seen)
+// A view, which is one face, does not see what is beside it. But what lies between another eye near its own and its
+// pyramid is taken to be empty.
+void note_outside(trace_ray r, float t_end, inout view_walk seen)
 {
+    if (FACES > 1u)
+        return;
+    vec2 t = seen.t_face;
     bool is_eye = distance(r.origin, quadtree.eye_world.xyz) <= quadtree.eye_world.w;
-    float t_outside = !(t.x < t.y) || (t.x > r.t_min && !is_eye) ? r.t_min : t.y < t_end ? t.y : 1e30;
+    float t_outside = !(t.x < t.y) || (t.x > r.t_min && !is_eye) ? r.t_min
+                      : t.y < min(seen.t_last, t_end)            ? t.y
+                                                                 : 1e30;
     if (t_outside < seen.t_unknown) {
         seen.t_unknown = t_outside;
         seen.has_left = true;
@@ -438,12 +445,12 @@ void clip_to_surfaces(uint face, vec3 origin, vec3 direction, inout vec2 t)
 bool begin_face(trace_ray r, found_type found, inout layer_walk walk, inout view_walk seen)
 {
     vec3 from_eye = r.origin - quadtree.eye_world.xyz;
-    float t_last = last_distance(r);
     uint first = face_towards(from_eye + r.t_min * r.direction);
     for (; walk.turn < FACES; walk.turn++) {
         walk.face = walk.turn == 0u ? first : walk.turn <= first ? walk.turn - 1u : walk.turn;
         vec3 origin = face_vector(walk.face, from_eye), direction = face_vector(walk.face, r.direction);
-        vec2 t = clip_to_face(origin, direction, vec2(r.t_min, min(t_last, NEAREST(found, r))));
+        vec2 t = clip_to_face(origin, direction, vec2(r.t_min, min(seen.t_last, NEAREST(found, r))));
+        seen.t_face = t;
         clip_to_surfaces(walk.face, origin, direction, t);
         if (!(t.x < t.y))
             continue;
@@ -528,19 +535,9 @@ bool walk_view(trace_ray r, inout view_walk seen, inout found_type found)
     return false;
 }
 
-// What lies outside a view, of which there is one face.
-void look_beside_view(trace_ray r, float t_end, inout view_walk seen)
+view_walk begin_view_walk(trace_ray r)
 {
-    if (FACES > 1u)
-        return;
-    t_end = min(last_distance(r), t_end);
-    vec3 origin = face_vector(0u, r.origin - quadtree.eye_world.xyz), direction = face_vector(0u, r.direction);
-    note_outside(r, clip_to_face(origin, direction, vec2(r.t_min, t_end)), t_end, seen);
-}
-
-view_walk begin_view_walk()
-{
-    return view_walk(1e30, 1u, false, 0.0, 0u, ivec2(-1));
+    return view_walk(last_distance(r), vec2(1.0, 0.0), 1e30, 1u, false, 0.0, 0u, ivec2(-1));
 }
 
 void count(view_walk seen, bool is_unknown)
@@ -564,9 +561,9 @@ bool trace_any(trace_ray r, inout vec3 optical_depth)
 {
     if (!is_ray(r))
         return false;
-    view_walk seen = begin_view_walk();
+    view_walk seen = begin_view_walk(r);
     bool is_stopped = walk_view(r, seen, optical_depth);
-    look_beside_view(r, r.t_max, seen);
+    note_outside(r, r.t_max, seen);
     count(seen, !is_stopped && seen.t_unknown < r.t_max);
     return is_stopped;
 }
@@ -587,10 +584,10 @@ void trace_closest(trace_ray r, inout candidate best)
 {
     if (!is_ray(r))
         return;
-    view_walk seen = begin_view_walk();
+    view_walk seen = begin_view_walk(r);
     walk_flags = walk_steps = walk_meetings = 0u;
     walk_view(r, seen, best);
-    look_beside_view(r, best.distance, seen);
+    note_outside(r, best.distance, seen);
     bool is_unknown = seen.t_unknown < best.distance;
     count(seen, is_unknown);
     if (is_unknown) {

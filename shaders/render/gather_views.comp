@@ -170,8 +170,7 @@ vec3 with_lens(uint k, vec3 origin, vec3 direction, uint layer, vec3 radiance)
         vec3 p = from + t * towards;
         if (!(t > 0.0 && p.z > 0.0))
             continue;
-        vec2 on_view = p.xy / p.z / key_extent;
-        vec2 place = (vec2(on_view.x, -on_view.y) * 0.5 + 0.5) * vec2(key_width, key_height);
+        vec2 place = key_place(p);
         vec4 there = key_texel(layer, ivec2(floor(place)));
         bool known;
         vec3 more = key_radiance(layer, place, 1.0 / p.z, known);

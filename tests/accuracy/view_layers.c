@@ -33,13 +33,13 @@ static bool texel_view(const struct tracer *tracer, struct trace_view *texels, u
     return true;
 }
 
-static bool layer_hits(struct tracer *tracer, struct gpu_scene *scene, const struct wave *wave,
-                       const struct ray_range *rays, uint32_t layer, struct error *error)
+static bool layer_hits(struct tracer *tracer, struct gpu_scene *scene, const struct ray_range *rays,
+                       uint32_t layer, struct error *error)
 {
     struct trace_state state = {
         .impl = tracer->impl,
         .device = tracer->device,
-        .wave = *wave,
+        .wave = *rays->wave,
         .step_end_ns = STEP_WITHOUT_END,
         .range_end = rays->end,
     };

@@ -276,13 +276,6 @@ static bool print(const struct bench *bench)
     return done;
 }
 
-static bool parse_metres(const char *text, float *metres)
-{
-    char *end;
-    *metres = strtof(text, &end);
-    return end != text && *end == '\0' && *metres > 0;
-}
-
 static bool parse_option(struct bench *bench, int option, const char *text)
 {
     switch (option) {
@@ -299,9 +292,9 @@ static bool parse_option(struct bench *bench, int option, const char *text)
     case 'T':
         return bench_parse_number(text, 1, 4096, &bench->true_samples);
     case 'A':
-        return parse_metres(text, &bench->aperture);
+        return bench_parse_real(text, &bench->aperture);
     case 'F':
-        return parse_metres(text, &bench->focus);
+        return bench_parse_real(text, &bench->focus);
     case 's':
         return bench_parse_size(text, &bench->width, &bench->height);
     case 'r':

@@ -46,6 +46,13 @@ bool bench_parse_number(const char *text, uint32_t minimum, uint32_t maximum, ui
     return *text >= '0' && *text <= '9' && *end == '\0' && parsed >= minimum && parsed <= maximum;
 }
 
+bool bench_parse_real(const char *text, float *value)
+{
+    char *end;
+    *value = strtof(text, &end);
+    return end != text && *end == '\0' && *value > 0;
+}
+
 bool bench_parse_word(const char *text, const char *const words[], uint32_t count, uint32_t *found)
 {
     for (*found = 0; *found < count; ++*found)

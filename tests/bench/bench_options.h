@@ -26,6 +26,7 @@ bool bench_parse(int argc, char **argv, struct bench_options *options, struct gp
 /* Values of options; false: the text is none. */
 bool bench_parse_vector(const char *text, float v[3]);
 bool bench_parse_number(const char *text, uint32_t minimum, uint32_t maximum, uint32_t *value);
+bool bench_parse_real(const char *text, float *value);                      /* above 0 */
 bool bench_parse_size(const char *text, uint32_t *width, uint32_t *height); /* WxH, multiples of 8 up to 4096 */
 bool bench_parse_waves(const char *text, bool waves[BENCH_WAVE_KINDS]);     /* names with commas in between */
 /* --model m, --family f, --eye e, --look-at l, --up u and --fov v; false for others, too. */

@@ -333,13 +333,6 @@ static bool print(const struct bench *bench)
     return done;
 }
 
-static bool parse_real(const char *text, float *value)
-{
-    char *end;
-    *value = strtof(text, &end);
-    return end != text && *end == '\0' && *value > 0;
-}
-
 static bool parse_setting(struct bench *bench, int option, const char *text)
 {
     static const char *const faces[] = {"cube", "view"};
@@ -352,11 +345,11 @@ static bool parse_setting(struct bench *bench, int option, const char *text)
     case 'F':
         return bench_parse_word(text, faces, 2, &settings->faces);
     case 'P':
-        return parse_real(text, &settings->pixels);
+        return bench_parse_real(text, &settings->pixels);
     case 'D':
-        return parse_real(text, &settings->radius);
+        return bench_parse_real(text, &settings->radius);
     case 'G':
-        return parse_real(text, &settings->margin);
+        return bench_parse_real(text, &settings->margin);
     default:
         return bench_parse_scene(option, text, &bench->scene_options);
     }

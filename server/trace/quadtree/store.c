@@ -2,12 +2,12 @@
 #include "trace/quadtree/store.h"
 
 #include "protocol/words.h"
+#include "trace/raster/view.h"
 
 #include <epoxy/gl.h>
 #include <math.h>
 #include <string.h>
 
-#define NEAR_OF_DIAGONAL 1e-5f /* as of any camera (render/camera.c) */
 #define UNIT_OF_DIAGONAL 0.05f /* where w is 1: slopes of w then have all bits of half floats */
 #define DOUBLED_AT 0.25f       /* diagonals: where bounds that grow with distance are twice as large */
 #define CUBE_TEXELS_MAX 1024u
@@ -142,11 +142,9 @@ static float diagonal_of(const struct gpu_scene *scene)
 static void place_depths(struct quadtree_uniforms *u, const struct gpu_scene *scene, const struct trace_view *view)
 {
     const bool orthographic = view->fov_y == 0.0f && u->faces == 1;
-    const float diagonal = diagonal_of(scene);
-    float near = u->faces == 1 ? view->near : 0.0f; /* what the picture cuts off may be seen in a mirror */
-    if (near <= 0.0f && !orthographic)
-        near = fmaxf(diagonal * NEAR_OF_DIAGONAL, 1e-6f);
-    u->depths[0] = orthographic ? near : fmaxf(diagonal * UNIT_OF_DIAGONAL, 1e-6f);
+    /* What the picture cuts off may be seen in a mirror. */
+    const float near = raster_near(scene, u->faces == 1 ? view->near : 0.0f, orthographic);
+    u->depths[0] = orthographic ? near : fmaxf(diagonal_of(scene) * UNIT_OF_DIAGONAL, 1e-6f);
     u->depths[1] = fmaxf(far_distance(scene, u->eye_world, orthographic), 2.0f * near);
     u->depths[2] = orthographic ? 1.0f : 0.0f;
     u->depths[3] = near;

@@ -196,10 +196,9 @@ static bool texel_view(const struct tracer *tracer, struct trace_view *texels, u
     return quadtree->store.uniforms.faces == 1;
 }
 
-static bool layer_hits(struct tracer *tracer, struct gpu_scene *scene, const struct wave *wave,
-                       const struct ray_range *rays, uint32_t layer, struct error *error)
+static bool layer_hits(struct tracer *tracer, struct gpu_scene *scene, const struct ray_range *rays,
+                       uint32_t layer, struct error *error)
 {
-    (void)wave;
     return quadtree_layer_hits(&((struct quadtree *)tracer)->store, scene, rays, layer, error);
 }
 

@@ -4,7 +4,12 @@
 #include "gpu/program.h"
 
 #include <epoxy/gl.h>
+#include <math.h>
 #include <string.h>
+
+/* Reversed floating-point depth keeps its precision however small the near distance is, so this only has to be
+ * small enough never to cut anything: a share of the scene's diagonal. */
+#define NEAR_OF_DIAGONAL 1e-5f
 
 /* Vertices that one part draws. On a GPU nearly as many as an int can number. On software GL at most
  * what takes some ten milliseconds if triangles are small, and fewer where that takes longer than a step should:
@@ -16,6 +21,14 @@
 
 enum primitive_kind { PRIMITIVE_TRIANGLES, PRIMITIVE_SPHERES, PRIMITIVE_DISCS };
 static const unsigned vertices_per_primitive[] = {3, 36, 6};
+
+float raster_near(const struct gpu_scene *scene, float near, bool orthographic)
+{
+    if (near > 0.0f || orthographic)
+        return fmaxf(near, 0.0f);
+    return fmaxf(scene->diagonal > 0.0f && isfinite(scene->diagonal) ? scene->diagonal * NEAR_OF_DIAGONAL : 1e-4f,
+                 1e-6f);
+}
 
 void raster_camera_fill(struct frame_uniforms *uniforms, const struct raster_camera *camera)
 {

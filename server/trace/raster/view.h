@@ -23,6 +23,9 @@ struct raster_camera {
 /* Fills the camera's part of the uniforms, and no other: of a picture that has one view. */
 void raster_camera_fill(struct frame_uniforms *uniforms, const struct raster_camera *camera);
 
+/* The near distance of a view, metres; where `near` is 0 one that cuts nothing off. */
+float raster_near(const struct gpu_scene *scene, float near, bool orthographic);
+
 /* Where drawing goes on, and how large a part is. All-zero is valid; it keeps what it has learnt. */
 struct raster_view {
     uint32_t sort, instance, primitive;
