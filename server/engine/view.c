@@ -7,6 +7,8 @@
 
 #include "base/clock.h"
 
+#include <math.h>
+
 #define SECOND_NS 1e9
 /* How long before the encoder is expected to be free a frame is finished: it is hardly older for that, and an
  * encoder that is faster than last time need not wait. */
@@ -100,6 +102,23 @@ static void apply_effort(const struct job *job, struct frame_request *request)
     request->height = down * (height * scale >= 8 ? height * scale / 8 : 1);
 }
 
+/* While it moves: so that a client has something to show beside the edges of the picture. */
+static void add_margin(struct job *job, struct frame_request *request)
+{
+    struct view *view = &job->view;
+    view->margin_x = view->margin_y = 0;
+    if (!view->wish.camera.moving || !(job->spec.margin > 0.0f))
+        return;
+    view->margin_x = (uint32_t)(job->spec.margin * (float)request->width);
+    view->margin_y = (uint32_t)(job->spec.margin * (float)request->height);
+    const float growth = (float)(request->height + 2 * view->margin_y) / (float)request->height;
+    struct frame_camera *camera = &request->camera;
+    camera->fov_y = 2.0f * atanf(growth * tanf(camera->fov_y / 2.0f));
+    camera->ortho_height *= growth;
+    request->width += 2 * view->margin_x;
+    request->height += 2 * view->margin_y;
+}
+
 bool view_take_up(struct job *job, struct shot *shot, struct error *error)
 {
     struct view *view = &job->view;
@@ -118,6 +137,7 @@ bool view_take_up(struct job *job, struct shot *shot, struct error *error)
     shot->request.samples = samples_of_next(job);
     shot->request.samples_max = job->spec.frame.samples; /* one that is complete may be wished again */
     apply_effort(job, &shot->request);
+    add_margin(job, &shot->request);
     return true;
 }
 
@@ -161,6 +181,9 @@ void view_done(struct job *job, struct engine_frame *frame)
     view->owes_key_frame |= view->wish.key_frame;
     view->wish.key_frame = false;
     frame->quality = quality_of(job);
+    frame->depth = job->spec.depth;
+    frame->margin_x = view->margin_x;
+    frame->margin_y = view->margin_y;
     if (camera->moving && job->spec.adapt) {
         const struct view_effort *effort = &view->wish.effort;
         frame->scale_eighths = effort->scale_eighths;

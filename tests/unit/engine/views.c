@@ -8,6 +8,8 @@
 #include "engine/engine_private.h"
 #include "tests/harness/test.h"
 
+#include <math.h>
+
 #define MS UINT64_C(1000000)
 
 /* An engine in which client 1 has opened scene 1, and what that client wishes to see. */
@@ -493,6 +495,34 @@ TEST(a_view_that_adapts_is_smaller_while_it_moves)
     look(watching, 2, false);
     frame = take(expect_frame(watching->engine, 1, 2, 3));
     assert_int_equal(frame->result.height, 48);
+    drop(frame);
+}
+
+/* Of 80x48 at 3/8, a tenth on each side; and the field of view that keeps as many pixels a radian. */
+TEST(a_frame_has_a_margin_while_it_moves)
+{
+    struct watching *watching = *state;
+    struct engine_command *made = with_samples(view(2, watching->wishes), 1, 1);
+    made->job.adapt = true;
+    made->job.margin = 0.1f;
+    made->job.frame.width = 80;
+    made->job.frame.height = 48;
+    view_wishes_set_effort(watching->wishes, &(struct view_effort){3, 55, 1234, true});
+    look(watching, 1, false);
+    submit(watching->engine, made);
+    struct engine_frame *frame = take(expect_frame(watching->engine, 1, 2, 0));
+    const float fov_y = frame->request.camera.fov_y;
+    assert_true(frame->result.width == 80 && frame->margin_x == 0 && frame->margin_y == 0);
+    drop(frame);
+    look(watching, 2, true);
+    frame = take(expect_frame(watching->engine, 1, 2, 1));
+    assert_true(frame->margin_x == 3 && frame->margin_y == 1);
+    assert_true(frame->result.width == 30 + 6 && frame->result.height == 18 + 2);
+    assert_float_equal(tanf(frame->request.camera.fov_y / 2.0f) / tanf(fov_y / 2.0f), 20.0f / 18.0f, 1e-5f);
+    drop(frame);
+    look(watching, 3, false);
+    frame = take(expect_frame(watching->engine, 1, 2, 2));
+    assert_true(frame->result.width == 80 && frame->margin_x == 0);
     drop(frame);
 }
 
