@@ -370,8 +370,10 @@ static bool copy_structure(struct fl_frame *frame, const struct message_frame_en
     size_t bytes = end->structure_count * sizeof(*frame->structure);
     for (uint32_t i = 0; i < end->structure_count; i++)
         bytes += strlen(end->structure[i].name) + strlen(end->structure[i].warning) + 2;
-    struct record_structure_row *rows = bytes > 0 ? malloc(bytes) : NULL;
-    if (bytes > 0 && !rows)
+    if (bytes == 0)
+        return true;
+    struct record_structure_row *rows = malloc(bytes);
+    if (!rows)
         return false;
     char *string = (char *)(rows + end->structure_count);
     for (uint32_t i = 0; i < end->structure_count; i++) {
