@@ -332,7 +332,13 @@ struct fl_frame {
     unsigned frame_quality; /* as encoded; 0: lossless */
     uint8_t *encoded;       /* H.264 access unit; NULL: pixels are decoded */
     size_t encoded_bytes;
-    float *depth;        /* width * height, metres along the view; 0 where nothing is; NULL: none */
+    float *depth;     /* width * height, metres along the view; 0 where nothing is; NULL: none */
+    float depth_step; /* 1 / depth was rounded to multiples of it, 1 / metres; 0: it was not */
+    /* Of what moves: pixels on each side beyond the picture that was asked for; width, height and fov_y are of
+     * all. */
+    uint32_t margin_x, margin_y;
+    uint32_t hidden_layer; /* how many surfaces hide what it shows, of the picture of_frame; 0: it is a picture */
+    uint32_t of_frame;
     uint8_t *normals;    /* width * height * 4; see messages.def; NULL: none */
     size_t pixels_bytes; /* layers times width * height * 4, 8 or 16 */
     uint8_t *pixels;     /* rows from the top, without gaps, in `format` */

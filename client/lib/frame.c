@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "lib/frame.h"
 #include "lib/stream.h"
+#include "protocol/pixels/inverse_depth.h"
 #include "protocol/pixels/predicted.h"
 #include "protocol/common/clock.h"
 
@@ -83,6 +84,10 @@ static bool check_attachments(const struct fl_assembly *assembly, const struct m
     if (has_depth != (begin->depth_bytes > 0) || begin->depth_bytes > maximum)
         return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_begin.depth_bytes", "%llu bytes cannot be depths",
                             (unsigned long long)begin->depth_bytes);
+    if ((begin->depth_form == PROTOCOL_DEPTH_FORM_INVERSE) != (begin->depth_step > 0.0f) ||
+        (begin->depth_step > 0.0f && !has_depth))
+        return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_begin.depth_step", "depths cannot have the step %g",
+                            (double)begin->depth_step);
     return (has_normals == (begin->normal_bytes > 0) && begin->normal_bytes <= maximum) ||
            fl_error_set(error, FL_ERROR_PROTOCOL, "frame_begin.normal_bytes", "%llu bytes cannot be normals",
                         (unsigned long long)begin->normal_bytes);
@@ -91,8 +96,18 @@ static bool check_attachments(const struct fl_assembly *assembly, const struct m
 static bool is_expected_size(const struct fl_frame_expected *expected, const struct message_frame_begin *begin)
 {
     if (expected->is_view)
-        return begin->width <= expected->width && begin->height <= expected->height;
+        return begin->margin_x <= expected->margin_x_max && begin->margin_y <= expected->margin_y_max &&
+               begin->width > 2 * begin->margin_x && begin->width - 2 * begin->margin_x <= expected->width &&
+               begin->height > 2 * begin->margin_y && begin->height - 2 * begin->margin_y <= expected->height;
     return begin->width == expected->width && begin->height == expected->height;
+}
+
+static bool is_expected_encoding(const struct fl_frame_expected *expected, const struct message_frame_begin *begin)
+{
+    if (begin->hidden_layer > 0 && expected->encoding == PROTOCOL_ENCODING_H264)
+        return begin->encoding == PROTOCOL_ENCODING_JPEG;
+    return begin->encoding == expected->encoding ||
+           (expected->is_view && begin->encoding == expected->still_encoding);
 }
 
 static bool check_begin(const struct fl_assembly *assembly, const struct message_frame_begin *begin,
@@ -106,13 +121,17 @@ static bool check_begin(const struct fl_assembly *assembly, const struct message
         return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_begin.frame",
                             "frame %u arrived, but frame %u was expected", begin->frame, number);
     if (!is_expected_size(expected, begin) || begin->format != expected->format ||
-        (begin->encoding != expected->encoding &&
-         (!expected->is_view || begin->encoding != expected->still_encoding)))
+        !is_expected_encoding(expected, begin))
         return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_begin",
                             "%ux%u %s %s arrived, but %ux%u %s %s was expected", begin->width, begin->height,
                             protocol_pixel_format_text(begin->format), protocol_encoding_text(begin->encoding),
                             expected->width, expected->height, protocol_pixel_format_text(expected->format),
                             protocol_encoding_text(expected->encoding));
+    if (begin->hidden_layer > expected->hidden_layers ||
+        (begin->hidden_layer > 0 && begin->of_frame >= begin->frame))
+        return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_begin.hidden_layer",
+                            "hidden layer %u of frame %u arrived, but %u were expected", begin->hidden_layer,
+                            begin->of_frame, expected->hidden_layers);
     if (begin->layers != expected->layers)
         return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_begin.layers",
                             "layers %#x arrived, but %#x were expected", begin->layers, expected->layers);
@@ -157,6 +176,11 @@ static struct fl_frame *new_frame(const struct message_frame_begin *begin)
     frame->moving = begin->moving != 0;
     frame->key_frame = begin->key_frame != 0;
     frame->frame_quality = begin->quality;
+    frame->depth_step = begin->depth_step;
+    frame->margin_x = begin->margin_x;
+    frame->margin_y = begin->margin_y;
+    frame->hidden_layer = begin->hidden_layer;
+    frame->of_frame = begin->of_frame;
     frame->wire_bytes = begin->size_bytes + begin->depth_bytes + begin->normal_bytes;
     if (begin->encoding == PROTOCOL_ENCODING_H264)
         return frame;
@@ -246,11 +270,11 @@ static bool decode_predicted_pixels(const struct fl_assembly *assembly, struct f
 
 /* malloc'ed; NULL on failure. */
 static void *decode_attachment(const struct fl_assembly *assembly, uint64_t offset_bytes, uint64_t bytes,
-                               struct fl_error *error)
+                               uint32_t pixel_bytes, struct fl_error *error)
 {
     const struct fl_frame *frame = assembly->frame;
-    const struct predicted_form form = {frame->width, frame->height, ATTACHMENT_PIXEL_BYTES};
-    uint8_t *made = malloc((size_t)frame->width * frame->height * ATTACHMENT_PIXEL_BYTES);
+    const struct predicted_form form = {frame->width, frame->height, pixel_bytes};
+    uint8_t *made = malloc((size_t)frame->width * frame->height * pixel_bytes);
     if (!made)
         fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
     if (made && decode_predicted(&form, assembly->encoded + offset_bytes, bytes, made, error))
@@ -259,14 +283,31 @@ static void *decode_attachment(const struct fl_assembly *assembly, uint64_t offs
     return NULL;
 }
 
+static float *decode_depth(const struct fl_assembly *assembly, uint64_t offset_bytes, struct fl_error *error)
+{
+    const struct fl_frame *frame = assembly->frame;
+    const size_t count = (size_t)frame->width * frame->height;
+    if (!(frame->depth_step > 0.0f))
+        return decode_attachment(assembly, offset_bytes, assembly->depth_bytes, ATTACHMENT_PIXEL_BYTES, error);
+    uint16_t *rounded = decode_attachment(assembly, offset_bytes, assembly->depth_bytes, sizeof(*rounded), error);
+    float *depth = rounded ? malloc(count * sizeof(*depth)) : NULL;
+    if (depth)
+        inverse_depth_restore(rounded, count, frame->depth_step, depth);
+    else if (rounded)
+        fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
+    free(rounded);
+    return depth;
+}
+
 static bool decode_attachments(const struct fl_assembly *assembly, struct fl_error *error)
 {
     struct fl_frame *frame = assembly->frame;
     const uint64_t pixels_end = picture_bytes(assembly), depth_end = pixels_end + assembly->depth_bytes;
     if (assembly->depth_bytes > 0)
-        frame->depth = decode_attachment(assembly, pixels_end, assembly->depth_bytes, error);
+        frame->depth = decode_depth(assembly, pixels_end, error);
     if (assembly->normal_bytes > 0 && error->code == FL_ERROR_NONE)
-        frame->normals = decode_attachment(assembly, depth_end, assembly->normal_bytes, error);
+        frame->normals =
+            decode_attachment(assembly, depth_end, assembly->normal_bytes, ATTACHMENT_PIXEL_BYTES, error);
     return error->code == FL_ERROR_NONE;
 }
 
@@ -329,8 +370,10 @@ static bool copy_structure(struct fl_frame *frame, const struct message_frame_en
     size_t bytes = end->structure_count * sizeof(*frame->structure);
     for (uint32_t i = 0; i < end->structure_count; i++)
         bytes += strlen(end->structure[i].name) + strlen(end->structure[i].warning) + 2;
-    struct record_structure_row *rows = bytes > 0 ? malloc(bytes) : NULL;
-    if (bytes > 0 && !rows)
+    if (bytes == 0)
+        return true;
+    struct record_structure_row *rows = malloc(bytes);
+    if (!rows)
         return false;
     char *string = (char *)(rows + end->structure_count);
     for (uint32_t i = 0; i < end->structure_count; i++) {

@@ -297,6 +297,20 @@ static void print_predicted(void)
         "prediction from the bytes that it has restored.\n\n");
 }
 
+static void print_depth(void)
+{
+    printf(
+        "## Depth of the form `inverse`\n\n"
+        "`predicted` with two bytes per pixel, the lower one first: a number n. The depth is 1 / (n depth_step),\n"
+        "and 1 / depth is off by half of depth_step at most. Where n is 0 nothing is, or nothing nearer than\n"
+        "2 / depth_step. With f = height / (2 tan(fov_y / 2)) pixels, an eye within the radius R of the frame's\n"
+        "eye sees a point at the distance d from it no more than\n\n"
+        "    depth_step / 2 * f * R / (1 - R / d)^2\n\n"
+        "pixels from where it is; depth_step is 2 depth_pixels / (f depth_radius), f of the frame with its "
+        "margin,\n"
+        "which has as many pixels a radian as the picture that was asked for.\n\n");
+}
+
 static void print_h264(void)
 {
     printf("## The encoding `h264`\n\n"
@@ -354,6 +368,7 @@ int main(int argument_count, char **arguments)
         print_message(&protocol_messages[i]);
     }
     print_predicted();
+    print_depth();
     print_h264();
     docgen_print_example();
     return ferror(stdout) || fflush(stdout) != 0 ? 1 : 0;

@@ -194,7 +194,9 @@ static void add_predictions(const struct predicted_form *form, const uint8_t *re
     size_t width = form->width, step = form->pixel_bytes, plane_bytes = width * form->rows;
     const uint8_t *above = zeros;
     for (uint32_t y = 0; y < form->rows; y++, residuals += width) {
-        if (step == 4)
+        if (step == 2)
+            add_row(pixels, above, residuals, plane_bytes, width, 2);
+        else if (step == 4)
             add_row(pixels, above, residuals, plane_bytes, width, 4);
         else if (step == 8)
             add_row(pixels, above, residuals, plane_bytes, width, 8);

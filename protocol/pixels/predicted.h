@@ -49,7 +49,7 @@ struct predicted_source {
 size_t predicted_bound(const struct predicted_form *form);
 /* Fails where `capacity` is too small. */
 struct predicted_result predicted_encode(const struct predicted_source *source, uint8_t *out, size_t capacity);
-/* Fills width * rows * pixel_bytes bytes. Pixels have 4, 8 or 16 bytes. Fails where `encoded` is damaged, or of
+/* Fills width * rows * pixel_bytes bytes. Pixels have 2, 4, 8 or 16 bytes. Fails where `encoded` is damaged, or of
  * another size. */
 struct predicted_result predicted_decode(const struct predicted_form *form, const uint8_t *encoded,
                                          size_t encoded_bytes, uint8_t *pixels);

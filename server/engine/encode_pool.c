@@ -4,7 +4,9 @@
 #include "base/clock.h"
 #include "base/log.h"
 #include "base/parallel.h"
+#include "encode/sparse.h"
 #include "encode/stream.h"
+#include "protocol/pixels/inverse_depth.h"
 
 #include <pthread.h>
 #include <stdatomic.h>
@@ -151,22 +153,51 @@ static bool encode_pixels(struct encode_lane *lane, const struct picture *pictur
     return encoder_encode(frame->encoding, picture, frame->quality, &frame->bytes, &frame->size_bytes, error);
 }
 
-/* Appends to the queue. */
-static bool append_attachment(const struct encode_task *task, enum attachment which, size_t *added_bytes,
-                              struct error *error)
+/* ---- attachments: behind the picture ---- */
+
+static bool no_memory_for_attachments(struct error *error)
 {
-    struct engine_frame *frame = task->frame;
+    return error_set(error, ERROR_OUT_OF_MEMORY, "encoding", "out of memory for a frame's attachments");
+}
+
+static struct picture picture_of(const struct encode_task *task, const uint8_t *pixels, uint32_t pixel_bytes)
+{
+    return (struct picture){.width = task->frame->result.width,
+                            .height = task->frame->result.height,
+                            .bytes_per_pixel = pixel_bytes,
+                            .pixels = pixels,
+                            .is_given_up = is_given_up,
+                            .given_up_context = task};
+}
+
+/* *rounded: malloc'ed; NULL: metres are what the frame can have. */
+static bool round_depth(struct engine_frame *frame, uint16_t **rounded, struct error *error)
+{
     const struct frame_result *result = &frame->result;
-    if (!(result->attachments & 1u << which))
+    const size_t count = (size_t)result->width * result->height;
+    const float fov_y = frame->request.camera.fov_y;
+    *rounded = NULL;
+    if (frame->depth.form != DEPTH_FORM_INVERSE || !(fov_y > 0.0f))
         return true;
-    const struct picture picture = {.width = result->width,
-                                    .height = result->height,
-                                    .bytes_per_pixel = ATTACHMENT_PIXEL_BYTES,
-                                    .pixels = frame_result_attachment(result, which),
-                                    .is_given_up = is_given_up,
-                                    .given_up_context = task};
+    const float step = inverse_depth_step(frame->depth.pixels, frame->depth.radius, result->height, fov_y);
+    uint16_t *made = malloc(count * sizeof(*made));
+    if (!made)
+        return no_memory_for_attachments(error);
+    if (inverse_depth_round((const float *)(const void *)frame_result_attachment(result, ATTACHMENT_DEPTH), count,
+                            step, made)) {
+        frame->depth_step = step;
+        *rounded = made;
+    } else {
+        free(made);
+    }
+    return true;
+}
+
+static bool append(struct engine_frame *frame, const struct picture *picture, size_t *added_bytes,
+                   struct error *error)
+{
     uint8_t *encoded;
-    if (!encoder_encode(ENCODING_PREDICTED, &picture, 1, &encoded, added_bytes, error))
+    if (!encoder_encode(ENCODING_PREDICTED, picture, 1, &encoded, added_bytes, error))
         return false;
     uint8_t *bytes = realloc(frame->bytes, frame->size_bytes + *added_bytes);
     if (bytes) {
@@ -175,7 +206,34 @@ static bool append_attachment(const struct encode_task *task, enum attachment wh
         frame->size_bytes += *added_bytes;
     }
     free(encoded);
-    return bytes || error_set(error, ERROR_OUT_OF_MEMORY, "encoding", "out of memory for a frame's attachments");
+    return bytes || no_memory_for_attachments(error);
+}
+
+static bool append_depth(const struct encode_task *task, struct error *error)
+{
+    struct engine_frame *frame = task->frame;
+    uint16_t *rounded;
+    if (!(frame->result.attachments & 1u << ATTACHMENT_DEPTH))
+        return true;
+    if (!round_depth(frame, &rounded, error))
+        return false;
+    const struct picture picture =
+        rounded
+            ? picture_of(task, (const uint8_t *)rounded, sizeof(*rounded))
+            : picture_of(task, frame_result_attachment(&frame->result, ATTACHMENT_DEPTH), ATTACHMENT_PIXEL_BYTES);
+    const bool done = append(frame, &picture, &frame->depth_bytes, error);
+    free(rounded);
+    return done;
+}
+
+static bool append_normals(const struct encode_task *task, struct error *error)
+{
+    struct engine_frame *frame = task->frame;
+    if (!(frame->result.attachments & 1u << ATTACHMENT_NORMALS))
+        return true;
+    const struct picture picture =
+        picture_of(task, frame_result_attachment(&frame->result, ATTACHMENT_NORMALS), ATTACHMENT_PIXEL_BYTES);
+    return append(frame, &picture, &frame->normal_bytes, error);
 }
 
 static bool make_digest(const struct encode_task *task, struct error *error)
@@ -194,6 +252,16 @@ static bool make_digest(const struct encode_task *task, struct error *error)
     task->frame->digest = XXH3_64bits_digest(state);
     XXH3_freeState(state);
     return done == result->size_bytes || encoder_given_up(error);
+}
+
+/* What no eye sees past what hides it is not there. */
+static void fill_hidden(const struct engine_frame *frame)
+{
+    const struct frame_result *result = &frame->result;
+    if (frame->request.hidden_layer > 0 && result->format == PIXEL_FORMAT_RGBA8 &&
+        result->attachments & 1u << ATTACHMENT_DEPTH)
+        sparse_fill(result->pixels, (const float *)(const void *)frame_result_attachment(result, ATTACHMENT_DEPTH),
+                    result->width, result->height);
 }
 
 static bool encode(const struct encode_task *task, struct error *error)
@@ -218,9 +286,9 @@ static bool encode(const struct encode_task *task, struct error *error)
     picture.is_given_up = is_given_up;
     picture.given_up_context = task;
     uint64_t start_ns = clock_now_ns();
+    fill_hidden(frame);
     if (!make_digest(task, error) || !encode_pixels(task->lane, &picture, frame, error) ||
-        !append_attachment(task, ATTACHMENT_DEPTH, &frame->depth_bytes, error) ||
-        !append_attachment(task, ATTACHMENT_NORMALS, &frame->normal_bytes, error))
+        !append_depth(task, error) || !append_normals(task, error))
         return false;
     if (!encoder_loses(frame->encoding))
         frame->quality = 0; /* a level, which costs no picture */

@@ -68,6 +68,12 @@ struct camera_key {
     float fov_y;
 };
 
+/* How attached depth travels. */
+struct view_depth {
+    enum depth_form form;
+    float pixels, radius; /* inverse: the bound, see protocol/pixels/inverse_depth.h */
+};
+
 /* A job's terms; engine/shot.h makes the request and the poses of each frame from them. */
 struct engine_job {
     enum job_kind kind;
@@ -99,6 +105,9 @@ struct engine_job {
     unsigned weight; /* its share of the device's time among the jobs of its client, and of its owner; 0: 1 */
     unsigned granted_weight; /* the same among all owners; 0: weight */
     bool adapt;              /* view: quality and size follow the link */
+    struct view_depth depth; /* view: of what is attached */
+    float margin;            /* view: of frames while it moves, share of width and height on each side */
+    uint32_t hidden_layers;  /* view: frames of what is hidden that follow each while it moves */
 };
 
 enum engine_command_kind {
@@ -227,6 +236,10 @@ struct engine_frame {
     bool wants_key;                   /* it is to be encoded so that it can be decoded without those before .. */
     bool key_frame;                   /* .. and so it was */
     size_t depth_bytes, normal_bytes; /* of attachments, encoded: the last ones of size_bytes, in that order */
+    struct view_depth depth;          /* as it is to be encoded .. */
+    float depth_step;                 /* .. and as it was: 1 / metres; 0: metres */
+    uint32_t margin_x, margin_y;      /* pixels on each side beyond what the job asks for */
+    uint32_t of_frame;                /* of request.hidden_layer above 0: which it belongs to */
     /* Of a view: the newest of its client's wishes that it shows; all 0 before the first wish. */
     uint64_t command, received_ns;
     bool moving;

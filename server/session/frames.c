@@ -160,6 +160,12 @@ static void fill_begin(struct message_frame_begin *begin, const struct engine_fr
     begin->attachments = frame->result.attachments;
     begin->depth_bytes = frame->depth_bytes;
     begin->normal_bytes = frame->normal_bytes;
+    begin->depth_form = frame->depth_step > 0.0f ? PROTOCOL_DEPTH_FORM_INVERSE : PROTOCOL_DEPTH_FORM_METRES;
+    begin->depth_step = frame->depth_step;
+    begin->margin_x = frame->margin_x;
+    begin->margin_y = frame->margin_y;
+    begin->hidden_layer = frame->request.hidden_layer;
+    begin->of_frame = frame->of_frame;
     begin->format = (enum protocol_pixel_format)frame->request.format;
     begin->encoding = (enum protocol_encoding)frame->encoding;
     begin->tracer = (enum protocol_tracer)frame->request.tracer;

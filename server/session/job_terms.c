@@ -24,12 +24,19 @@
 
 /* ---- checks ------------------------------------------------------------------------------------------ */
 
+/* Of a view's frame while it moves. */
+static uint32_t with_margin(const struct message_render *render, uint32_t pixels)
+{
+    return pixels + 2 * (uint32_t)(render->margin * (float)pixels);
+}
+
 static uint64_t frame_bytes_of(const struct message_render *render)
 {
     uint32_t layers = render->layers ? render->layers : BEAUTY_ALONE;
     uint32_t pixel_bytes = protocol_pixel_format_bytes(render->format) * (uint32_t)__builtin_popcount(layers) +
                            ATTACHMENT_PIXEL_BYTES * (uint32_t)__builtin_popcount(render->attachments);
-    return (uint64_t)render->width * render->views_across * render->height * render->views_down * pixel_bytes;
+    return (uint64_t)with_margin(render, render->width * render->views_across) *
+           with_margin(render, render->height * render->views_down) * pixel_bytes;
 }
 
 static bool check_layers(const struct message_render *render, struct error *error)
@@ -100,9 +107,30 @@ static bool check_upsample(const struct message_render *render, struct error *er
     return error_remedy(error, "set accumulate to 0, or upsample to 1");
 }
 
+static bool check_hidden(const struct message_render *render, struct error *error)
+{
+    if (!render->hidden_layers)
+        return true;
+    if (render->kind == PROTOCOL_JOB_BATCH || has_views(render)) {
+        error_set(error, ERROR_UNSUPPORTED, "render.hidden_layers",
+                  "only pictures of a view of one eye have some");
+        return error_remedy(error, "set it to 0");
+    }
+    if (!(render->attachments & 1u << PROTOCOL_ATTACHMENT_DEPTH)) {
+        error_set(error, ERROR_INVALID, "render.hidden_layers", "without depth nobody knows where something is");
+        return error_remedy(error, "add depth to attachments");
+    }
+    if (render->aperture > 0.0f || render->shutter > 0.0f || render->compare) {
+        error_set(error, ERROR_UNSUPPORTED, "render.hidden_layers",
+                  "what is hidden is that of one time and place of an eye, and is traced by no second tracer");
+        return error_remedy(error, "set it to 0, or aperture, shutter and compare");
+    }
+    return true;
+}
+
 static bool check_views(const struct message_render *render, struct error *error)
 {
-    if (!check_eyes(render, error) || !check_upsample(render, error))
+    if (!check_eyes(render, error) || !check_upsample(render, error) || !check_hidden(render, error))
         return false;
     if (render->view_source != PROTOCOL_VIEW_SOURCE_LAYERS)
         return true;
@@ -121,10 +149,16 @@ static bool check_views(const struct message_render *render, struct error *error
 static bool check_size(const struct session_limits *limits, const struct message_render *render,
                        struct error *error)
 {
-    const uint32_t width = render->width * render->views_across, height = render->height * render->views_down;
+    const uint32_t width = with_margin(render, render->width * render->views_across);
+    const uint32_t height = with_margin(render, render->height * render->views_down);
     const bool is_wide = width > limits->width_pixels;
     if (!is_wide && height <= limits->height_pixels)
         return true;
+    if (render->margin > 0.0f) {
+        error_set(error, ERROR_LIMIT, "render.margin", "%u x %u pixels with it, the limit is %u x %u", width,
+                  height, limits->width_pixels, limits->height_pixels);
+        return error_remedy(error, "ask for less, or raise [limits] in the daemon's configuration");
+    }
     const char *field = is_wide ? "render.width" : "render.height";
     if (has_views(render)) {
         const uint32_t views = is_wide ? render->views_across : render->views_down;
@@ -242,6 +276,10 @@ static bool check_tracers(const struct message_render *render, struct error *err
 /* What is different with views. */
 static bool check_kind(const struct session *session, const struct message_render *render, struct error *error)
 {
+    if (render->margin > 0.0f && (render->kind == PROTOCOL_JOB_BATCH || has_views(render))) {
+        error_set(error, ERROR_UNSUPPORTED, "render.margin", "only a view of one eye has it, while it moves");
+        return error_remedy(error, "set it to 0, or ask for a larger picture and field of view");
+    }
     if (render->kind == PROTOCOL_JOB_BATCH) {
         if (render->attachments) {
             error_set(error, ERROR_UNSUPPORTED, "render.attachments", "frames of a batch have none");
@@ -395,6 +433,9 @@ static void fill_rest(struct engine_job *job, const struct session *session, con
         .weight = weight,
         .granted_weight = weight < granted ? weight : granted,
         .adapt = render->adapt != 0,
+        .depth = {(enum depth_form)render->depth_form, render->depth_pixels, render->depth_radius},
+        .hidden_layers = render->hidden_layers,
+        .margin = is_view ? render->margin : 0.0f,
     };
 }
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """That protocol.md is enough to write a client: one that was written from it puts up a scene, renders and looks on, and
 the session that the document writes out byte by byte is what a daemon really says."""
+import ctypes
 import json
 import math
 import re
@@ -40,12 +41,66 @@ def grid_scene():
     return blobs, edits
 
 
+def document():
+    return (farlight_test.BIN / "protocol.md").read_text()
+
+
+def fields_of(message):
+    """name: (offset, struct's letter, default), by the document; without the counted ones."""
+    text = document()
+    table = text[re.search(rf"^### 0x[0-9a-f]+ {message}$", text, re.M).end():]
+    table = table[:table.index("\n### ")]
+    letters = {"u8": "B", "u16": "H", "u32": "I", "u64": "Q", "f32": "f"}
+    fields = {}
+    for offset, name, kind, allowed in re.findall(r"^\| (\d+) \| `(\w+)` \| (.*?) \| (.*?) \|", table, re.M):
+        given = re.search(r"default ([-+.\de]+)$", allowed)
+        lowest = re.match(r"([-+.\de]+) \.\.", allowed)
+        default = float(given[1] if given else lowest[1] if lowest and float(lowest[1]) > 0 else 0)
+        letter = letters.get(kind.split()[0], "I")
+        fields[name] = int(offset), letter, default if letter == "f" else int(default)
+    return fields
+
+
+def fixed_part(message, **values):
+    fields = fields_of(message)
+    fixed = bytearray(max(offset + struct.calcsize("<" + letter) for offset, letter, _ in fields.values()) - 2)
+    for name, (offset, letter, default) in fields.items():
+        struct.pack_into("<" + letter, fixed, offset - 2, values.get(name, default))
+    return bytes(fixed)
+
+
+def unpack_zstd(data, size):
+    library = ctypes.CDLL("libzstd.so.1")
+    library.ZSTD_decompress.restype = ctypes.c_size_t
+    unpacked = ctypes.create_string_buffer(size)
+    made = library.ZSTD_decompress(unpacked, ctypes.c_size_t(size), data, ctypes.c_size_t(len(data)))
+    assert made == size, made
+    return unpacked.raw
+
+
+def restore_predicted(data, width, height, pixel_bytes):
+    """The planes of bytes."""
+    stored, plane = unpack_zstd(data, width * height * pixel_bytes), width * height
+    planes = []
+    for b in range(pixel_bytes):
+        out = bytearray(plane)
+        for i in range(plane):
+            left = out[i - 1] if i % width else 0
+            above = out[i - width] if i >= width else 0
+            corner = out[i - width - 1] if i % width and i >= width else 0
+            low, high = min(left, above), max(left, above)
+            guess = low if corner >= high else high if corner <= low else left + above - corner
+            out[i] = (stored[b * plane + i] + guess) % 256
+        planes.append(out)
+    return planes
+
+
 class Document(Case):
     """The session at the end of protocol.md."""
 
     def steps(self):
         """(what, bytes) of each step."""
-        text = (farlight_test.BIN / "protocol.md").read_text()
+        text = document()
         session = text[text.index("## A session, byte by byte"):]
         found = re.findall(r"^([^\n]+):\n\n```\n([^`]*)```$", session, re.M)
         self.assertGreater(len(found), 20)
@@ -201,6 +256,52 @@ class Session(Case):
         client.wait(client.render(1, 2, (32, 24), LEFT, kind=BATCH))
         self.assertEqual(client.frames[-1].command, 0)
         self.assertEqual(client.say_goodbye(), b"")
+
+    def test_inverse_depths_are_what_the_document_says(self):
+        """The triangle is the plane z = 0, seen by cameras at z = 5: 1 / depth of a pixel follows from its ray."""
+        client, (width, height) = self.connect(tiny_client.triangle()), (32, 24)
+        fixed = fixed_part("render", scene=1, kind=VIEW, channel=2, width=width, height=height, attachments=1, depth_form=1,
+                           depth_pixels=0.5, depth_radius=0.2, margin=0.25, camera_path=tiny_client.CAMERA_PATH_KEYS, credit=9)
+        client.acknowledged.add(2)
+        client.ask(tiny_client.RENDER, tiny_client.payload(
+            fixed, tiny_client.array([struct.pack("<f", 0) + tiny_client.camera_bytes(ABOVE)]), tiny_client.array([])))
+        client.next_frame()
+        client.look(2, 1, LEFT, moving=True)
+        frame = client.next_frame()
+        while frame.command != 1:
+            frame = client.next_frame()
+        begin = {name: struct.unpack_from("<" + letter, frame.fixed, offset - 2)[0]
+                 for name, (offset, letter, _) in fields_of("frame_begin").items()}
+        self.assertEqual((begin["margin_x"], begin["margin_y"], frame.width, frame.height), (8, 6, 48, 36))
+        focal = height / (2 * math.tan(LEFT[3] / 2))
+        self.assertAlmostEqual(frame.height / (2 * math.tan(begin["fov_y"] / 2)), focal, delta=1e-4)
+        self.assertAlmostEqual(begin["depth_step"], 2 * 0.5 / (focal * 0.2), delta=1e-6)
+        low, high = restore_predicted(bytes(frame.pixels[frame.size_bytes:]), frame.width, frame.height, 2)
+        eye = LEFT[0]
+        forward = [-v / math.dist(eye, (0, 0, 0)) for v in eye]
+        right = [-forward[2], 0, forward[0]]
+        right = [v / math.hypot(*right) for v in right]
+        up = [right[1] * forward[2] - right[2] * forward[1], right[2] * forward[0] - right[0] * forward[2],
+              right[0] * forward[1] - right[1] * forward[0]]
+        seen = 0
+        for y in range(frame.height):
+            for x in range(frame.width):
+                across, over = (x + 0.5 - frame.width / 2) / focal, (frame.height / 2 - y - 0.5) / focal
+                ray = [f + across * r + over * u for f, r, u in zip(forward, right, up)]
+                inverse = -ray[2] / eye[2]  # of the depth along `forward`
+                place = [e + v / inverse for e, v in zip(eye, ray)]
+                inside = min(place[0] + 1, place[1] + 1, 2 - place[0] - place[1])
+                if abs(inside) < 0.3:  # a pixel is some 0.2 m wide, and its sample may be off the middle
+                    continue
+                number = low[y * frame.width + x] + 256 * high[y * frame.width + x]
+                if inside < 0:
+                    self.assertEqual(number, 0)
+                    continue
+                seen += 1
+                # Samples lie within half a pixel of the middle; 1 / depth is linear over the picture.
+                slack = (abs(right[2]) + abs(up[2])) / focal / eye[2] / 2
+                self.assertLess(abs(number * begin["depth_step"] - inverse), begin["depth_step"] / 2 + slack + 1e-6)
+        self.assertGreater(seen, 100)
 
     def test_blobs_that_are_there_are_not_sent_again(self):
         client = self.connect(grid_scene())

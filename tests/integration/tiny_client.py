@@ -71,7 +71,7 @@ class Frame:
 
     def __init__(self, request, channel, body):
         fixed, _ = fixed_of(body)
-        self.request, self.channel, self.pixels, self.complete = request, channel, bytearray(), False
+        self.request, self.channel, self.pixels, self.complete, self.fixed = request, channel, bytearray(), False, fixed
         (self.number, self.width, self.height, self.samples, self.revision, self.size_bytes, self.format, self.encoding,
          self.tracer, self.integrator, self.digest) = struct.unpack_from("<4I2Q4IQ", fixed)
         self.command, = struct.unpack_from("<Q", fixed, 136)

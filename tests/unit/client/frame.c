@@ -227,6 +227,77 @@ TEST(what_is_attached_arrives_beside_any_encoding)
     }
 }
 
+/* Halves of a step, which 1 / depth of a quarter and of a half are; the third is nothing. */
+static struct message_frame_begin make_inverse(uint8_t **bytes, size_t *count)
+{
+    uint16_t rounded[WIDTH * HEIGHT];
+    for (size_t i = 0; i < WIDTH * HEIGHT; i++)
+        rounded[i] = (uint16_t)(i % 3 == 2 ? 0 : 8 >> i % 3);
+    struct picture depth = picture_of((const uint8_t *)rounded);
+    depth.bytes_per_pixel = 2;
+    uint8_t *encoded;
+    size_t depth_bytes;
+    struct error failure;
+    assert_true(encoder_encode(ENCODING_PREDICTED, &depth, 1, &encoded, &depth_bytes, &failure));
+    *count = PIXELS_BYTES + depth_bytes;
+    *bytes = malloc(*count);
+    assert_non_null(*bytes);
+    memcpy(*bytes, pixels, PIXELS_BYTES);
+    memcpy(*bytes + PIXELS_BYTES, encoded, depth_bytes);
+    free(encoded);
+    struct message_frame_begin message = some_begin(PROTOCOL_ENCODING_RAW, PIXELS_BYTES);
+    message.attachments = FL_ATTACH_DEPTH;
+    message.depth_bytes = depth_bytes;
+    message.depth_form = PROTOCOL_DEPTH_FORM_INVERSE;
+    message.depth_step = 0.5f;
+    return message;
+}
+
+TEST(inverse_depths_arrive_in_metres)
+{
+    const float depths[3] = {0.25f, 0.5f, 0.0f};
+    struct fl_assembly assembly = some_assembly(PROTOCOL_ENCODING_RAW);
+    assembly.expected.attachments = FL_ATTACH_DEPTH;
+    uint8_t *bytes;
+    size_t count;
+    const struct message_frame_begin message = make_inverse(&bytes, &count);
+    assert_true(begin(&assembly, &message) && give(&assembly, bytes, count, 0));
+    struct fl_frame *frame = end(&assembly);
+    assert_non_null(frame);
+    assert_true(frame->depth_step == 0.5f);
+    for (size_t i = 0; i < WIDTH * HEIGHT; i++)
+        assert_true(frame->depth[i] == depths[i % 3]);
+    fl_frame_destroy(frame);
+    fl_assembly_finish(&assembly);
+    free(bytes);
+}
+
+TEST(depths_margins_and_hidden_layers_that_cannot_be_are_refused)
+{
+    uint8_t *bytes;
+    size_t count;
+    for (unsigned i = 0; i < 7; i++) {
+        struct fl_assembly assembly = some_assembly(PROTOCOL_ENCODING_RAW);
+        assembly.expected.is_view = true;
+        assembly.expected.hidden_layers = 1;
+        assembly.expected.attachments = FL_ATTACH_DEPTH;
+        assembly.expected.margin_x_max = 1;
+        struct message_frame_begin message = make_inverse(&bytes, &count);
+        message.depth_step = i == 0 ? 0.0f : message.depth_step;
+        message.depth_form = i == 1 ? PROTOCOL_DEPTH_FORM_METRES : message.depth_form;
+        message.margin_x = i == 2 ? 2 : 0;
+        message.margin_y = i == 3 ? 1 : 0;
+        message.width += i == 4; /* without a margin */
+        message.hidden_layer = i == 5 ? 2 : i == 6;
+        message.of_frame = i == 6 ? message.frame : 0; /* itself */
+        if (begin(&assembly, &message))
+            fail_msg("change %u was not noticed", i);
+        assert_int_equal(error.code, FL_ERROR_PROTOCOL);
+        fl_assembly_finish(&assembly);
+        free(bytes);
+    }
+}
+
 TEST(attachments_that_cannot_be_are_refused)
 {
     for (unsigned i = 0; i < 6; i++) {

@@ -2,6 +2,9 @@
 /* Many threads encode, and still a stream is one: each picture by what is different from the one before. */
 #include "engine/encode_pool.h"
 
+#include "protocol/pixels/inverse_depth.h"
+#include "protocol/pixels/predicted.h"
+
 #include "tests/unit/encode/h264_player.h"
 #include "tests/harness/test.h"
 
@@ -145,6 +148,61 @@ TEST(what_is_attached_lies_behind_the_picture)
             assert_memory_equal(behind, magic, sizeof(magic));
         if (frame->normal_bytes)
             assert_memory_equal(behind + frame->depth_bytes, magic, sizeof(magic));
+        engine_event_destroy(event);
+    }
+    end(&fixture);
+}
+
+static float depth_of(size_t pixel)
+{
+    return pixel % 7 == 0 ? 0.0f : 0.5f + 0.25f * (float)pixel;
+}
+
+static struct engine_frame *frame_with_depth(float fov_y, float nearest)
+{
+    const size_t plane_bytes = (size_t)4 * WIDTH * HEIGHT;
+    struct engine_frame *made = new_frame(ENCODING_RAW, 0);
+    made->result.attachments = 1u << ATTACHMENT_DEPTH;
+    made->result.pixels = realloc(made->result.pixels, 2 * plane_bytes);
+    assert_non_null(made->result.pixels);
+    for (size_t i = 0; i < plane_bytes / 4; i++)
+        memcpy(made->result.pixels + plane_bytes + 4 * i, &(float){i == 1 ? nearest : depth_of(i)}, 4);
+    made->request.camera.fov_y = fov_y;
+    made->depth = (struct view_depth){DEPTH_FORM_INVERSE, 0.5f, 0.2f};
+    return made;
+}
+
+/* A depth is off by what the bound allows: half a pixel seen from 20 cm aside. What is no inverse is in metres. */
+TEST(inverse_depths_keep_the_bound_that_was_asked_for)
+{
+    const struct {
+        float fov_y, nearest;
+        bool is_inverse;
+    } cases[] = {{1.0f, 0.4f, true}, {0.0f, 0.4f, false}, {1.0f, 1e-5f, false}};
+    struct fixture fixture;
+    begin(&fixture, 2);
+    for (size_t i = 0; i < sizeof(cases) / sizeof(cases[0]); i++) {
+        struct engine_frame *made = frame_with_depth(cases[i].fov_y, cases[i].nearest);
+        uint64_t position = job_output_reserve(fixture.output);
+        assert_true(encode_pool_submit(fixture.pool, fixture.output, NULL, position, made));
+        struct engine_event *event = next(&fixture);
+        const struct engine_frame *frame = event->frame;
+        assert_int_equal(frame->depth_step > 0.0f, cases[i].is_inverse);
+        if (cases[i].is_inverse) {
+            const struct predicted_form form = {WIDTH, HEIGHT, 2};
+            uint16_t rounded[WIDTH * HEIGHT];
+            float depths[WIDTH * HEIGHT];
+            const uint8_t *encoded = frame->bytes + frame->size_bytes - frame->depth_bytes;
+            assert_int_equal(predicted_decode(&form, encoded, frame->depth_bytes, (uint8_t *)rounded).status,
+                             PREDICTED_DONE);
+            inverse_depth_restore(rounded, WIDTH * HEIGHT, frame->depth_step, depths);
+            const double pixels_a_radian = HEIGHT / (2 * tan(0.5));
+            for (size_t k = 2; k < WIDTH * HEIGHT; k++) {
+                const double was = depth_of(k) > 0.0f ? 1 / (double)depth_of(k) : 0;
+                const double is = depths[k] > 0.0f ? 1 / (double)depths[k] : 0;
+                assert_true(fabs(is - was) * pixels_a_radian * 0.2 < 0.5 * (1 + 1e-5)); /* rounding of floats */
+            }
+        }
         engine_event_destroy(event);
     }
     end(&fixture);

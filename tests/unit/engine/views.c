@@ -8,6 +8,8 @@
 #include "engine/engine_private.h"
 #include "tests/harness/test.h"
 
+#include <math.h>
+
 #define MS UINT64_C(1000000)
 
 /* An engine in which client 1 has opened scene 1, and what that client wishes to see. */
@@ -494,6 +496,71 @@ TEST(a_view_that_adapts_is_smaller_while_it_moves)
     frame = take(expect_frame(watching->engine, 1, 2, 3));
     assert_int_equal(frame->result.height, 48);
     drop(frame);
+}
+
+/* Of 80x48 at 3/8, a tenth on each side; and the field of view that keeps as many pixels a radian. */
+TEST(a_frame_has_a_margin_while_it_moves)
+{
+    struct watching *watching = *state;
+    struct engine_command *made = with_samples(view(2, watching->wishes), 1, 1);
+    made->job.adapt = true;
+    made->job.margin = 0.1f;
+    made->job.frame.width = 80;
+    made->job.frame.height = 48;
+    view_wishes_set_effort(watching->wishes, &(struct view_effort){3, 55, 1234, true});
+    look(watching, 1, false);
+    submit(watching->engine, made);
+    struct engine_frame *frame = take(expect_frame(watching->engine, 1, 2, 0));
+    const float fov_y = frame->request.camera.fov_y;
+    assert_true(frame->result.width == 80 && frame->margin_x == 0 && frame->margin_y == 0);
+    drop(frame);
+    look(watching, 2, true);
+    frame = take(expect_frame(watching->engine, 1, 2, 1));
+    assert_true(frame->margin_x == 3 && frame->margin_y == 1);
+    assert_true(frame->result.width == 30 + 6 && frame->result.height == 18 + 2);
+    assert_float_equal(tanf(frame->request.camera.fov_y / 2.0f) / tanf(fov_y / 2.0f), 20.0f / 18.0f, 1e-5f);
+    drop(frame);
+    look(watching, 3, false);
+    frame = take(expect_frame(watching->engine, 1, 2, 2));
+    assert_true(frame->result.width == 80 && frame->margin_x == 0);
+    drop(frame);
+}
+
+static void expect_layer(struct watching *watching, uint32_t number, uint64_t command, uint32_t layer,
+                         uint32_t of_frame, enum encoding encoding)
+{
+    struct engine_frame *frame = take(expect_frame(watching->engine, 1, 2, number));
+    assert_int_equal(frame->command, command);
+    assert_int_equal(frame->request.hidden_layer, layer);
+    assert_int_equal(frame->of_frame, of_frame);
+    assert_int_equal(frame->encoding, encoding);
+    assert_int_equal(frame->result.samples, layer ? 1 : frame->request.samples);
+    drop(frame);
+}
+
+/* A stream has pictures alone: what they hide is coded as pictures that stand alone. */
+TEST(what_a_picture_hides_follows_it_while_it_moves)
+{
+    struct watching *watching = *state;
+    struct engine_command *made = with_samples(view(2, watching->wishes), 1, 1);
+    made->job.hidden_layers = 2;
+    made->job.encoding = ENCODING_H264;
+    made->job.still_encoding = ENCODING_RAW;
+    made->job.frame.format = PIXEL_FORMAT_RGBA8;
+    made->job.frame.width = made->job.frame.height = 64;
+    look(watching, 1, true);
+    submit(watching->engine, made);
+    expect_layer(watching, 0, 1, 0, 0, ENCODING_H264);
+    expect_layer(watching, 1, 1, 1, 0, ENCODING_JPEG);
+    expect_layer(watching, 2, 1, 2, 0, ENCODING_JPEG);
+    expect_silence(watching->engine);
+    look(watching, 2, true);
+    expect_layer(watching, 3, 2, 0, 0, ENCODING_H264);
+    expect_layer(watching, 4, 2, 1, 3, ENCODING_JPEG);
+    expect_layer(watching, 5, 2, 2, 3, ENCODING_JPEG);
+    look(watching, 3, false);
+    expect_layer(watching, 6, 3, 0, 0, ENCODING_RAW);
+    expect_silence(watching->engine);
 }
 
 static void expect_form(struct engine_frame *frame, enum encoding encoding, enum ycbcr form)

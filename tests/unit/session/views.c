@@ -134,6 +134,9 @@ static void say_frame_with(uint32_t request, uint32_t number, size_t depth_bytes
     made->frame->result.attachments = 1u << ATTACHMENT_DEPTH | 1u << ATTACHMENT_NORMALS;
     made->frame->depth_bytes = depth_bytes;
     made->frame->normal_bytes = normal_bytes;
+    made->frame->depth_step = 0.25f;
+    made->frame->margin_x = 7;
+    made->frame->margin_y = 5;
     port_say(made);
 }
 
@@ -860,8 +863,13 @@ SESSION_TEST(attachments_of_a_view_are_forwarded_and_announced)
     expect_refused(2, &message, PROTOCOL_ERROR_UNSUPPORTED, "render.attachments");
     message = view_message(4);
     message.render.attachments = 3;
+    message.render.depth_form = PROTOCOL_DEPTH_FORM_INVERSE;
+    message.render.depth_pixels = 2;
+    message.render.depth_radius = 0.5f;
     send_message(3, 0, &message);
     struct engine_command *command = told(ENGINE_JOB_START);
+    assert_int_equal(command->job.depth.form, DEPTH_FORM_INVERSE);
+    assert_true(command->job.depth.pixels == 2.0f && command->job.depth.radius == 0.5f);
     assert_int_equal(command->job.frame.attachments, 1u << ATTACHMENT_DEPTH | 1u << ATTACHMENT_NORMALS);
     engine_command_destroy(command);
     say_frame_with(3, 1, 30, 20);
@@ -871,6 +879,56 @@ SESSION_TEST(attachments_of_a_view_are_forwarded_and_announced)
     assert_int_equal(begin.size_bytes, FRAME_BYTES - 50);
     assert_int_equal(begin.depth_bytes, 30);
     assert_int_equal(begin.normal_bytes, 20);
+    assert_int_equal(begin.depth_form, PROTOCOL_DEPTH_FORM_INVERSE);
+    assert_true(begin.depth_step == 0.25f);
+    assert_true(begin.margin_x == 7 && begin.margin_y == 5);
+}
+
+SESSION_TEST(a_margin_is_for_views_of_one_eye_within_the_limits)
+{
+    open_scene(1, 1);
+    struct message message = made(MESSAGE_RENDER);
+    message.render.scene = 1;
+    message.render.channel = CHANNEL;
+    message.render.margin = 0.1f;
+    expect_refused(2, &message, PROTOCOL_ERROR_UNSUPPORTED, "render.margin");
+    message = view_message(4);
+    message.render.margin = 0.1f;
+    message.render.views_across = 2;
+    message.render.baseline = 1;
+    expect_refused(3, &message, PROTOCOL_ERROR_UNSUPPORTED, "render.margin");
+    message = view_message(4);
+    message.render.margin = 0.25f;
+    send_message(4, 0, &message);
+    struct engine_command *command = told(ENGINE_JOB_START);
+    assert_true(command->job.margin == 0.25f);
+    engine_command_destroy(command);
+}
+
+SESSION_TEST(what_has_no_hidden_layers_is_refused)
+{
+    open_scene(1, 1);
+    struct message message = made(MESSAGE_RENDER);
+    message.render.scene = 1;
+    message.render.channel = CHANNEL;
+    message.render.hidden_layers = 1;
+    expect_refused(2, &message, PROTOCOL_ERROR_UNSUPPORTED, "render.hidden_layers");
+    for (uint32_t i = 0; i < 3; i++) {
+        message = view_message(4);
+        message.render.hidden_layers = 1;
+        message.render.attachments = i == 0 ? 2 : 1;
+        message.render.aperture = i == 1 ? 0.1f : 0.0f;
+        message.render.shutter = i == 2 ? 0.5f : 0.0f;
+        expect_refused(3 + i, &message, i == 0 ? PROTOCOL_ERROR_INVALID : PROTOCOL_ERROR_UNSUPPORTED,
+                       "render.hidden_layers");
+    }
+    message = view_message(4);
+    message.render.hidden_layers = 2;
+    message.render.attachments = 1;
+    send_message(9, 0, &message);
+    struct engine_command *command = told(ENGINE_JOB_START);
+    assert_int_equal(command->job.hidden_layers, 2);
+    engine_command_destroy(command);
 }
 
 SESSION_TEST(video_without_the_word_for_it_is_refused)
