@@ -90,6 +90,7 @@ static void ask_facts(struct gpu_facts *facts, bool software, bool robust, bool 
         .debug_output = debug,
         .has_program_binary = get_integer(GL_NUM_PROGRAM_BINARY_FORMATS) > 0,
         .compiles_together = epoxy_has_gl_extension("GL_KHR_parallel_shader_compile"),
+        .fetches_framebuffer = epoxy_has_gl_extension("GL_EXT_shader_framebuffer_fetch"),
         .time_stamp_bits = (uint32_t)time_stamp_bits,
         .storage_block_bytes_max = get_integer(GL_MAX_SHADER_STORAGE_BLOCK_SIZE),
         .work_groups_max = groups > 0 ? (uint32_t)groups : 65535,

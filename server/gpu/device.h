@@ -29,6 +29,7 @@ struct gpu_facts {
     bool debug_output;
     bool has_program_binary;
     bool compiles_together;   /* the driver compiles several programs at a time, in threads of its own */
+    bool fetches_framebuffer; /* fragments read what is in their place: GL_EXT_shader_framebuffer_fetch */
     uint32_t time_stamp_bits; /* 0: the device does not measure its time */
     uint64_t texture_buffer_texels_max;
     uint64_t storage_block_bytes_max;

@@ -181,7 +181,9 @@ bool gpu_source_expand(struct gpu_source_text *text, gpu_source_lookup lookup, c
     bool ok = append_format(text, error, "#version 450 core\n");
     for (const struct gpu_define *define = defines; ok && define && define->name; define++) {
         const char *value = define->value ? define->value : "1";
-        if (value[0] != '"')
+        if (strcmp(define->name, "EXTENSION") == 0)
+            ok = append_format(text, error, "#extension %s : require\n", value);
+        else if (value[0] != '"')
             ok = append_format(text, error, "#define %s %s\n", define->name, value);
     }
     if (ok && !expand_file(&expansion, path, strlen(path)))

@@ -180,14 +180,20 @@ bool gpu_framebuffer_create(struct gpu_device *device, struct gpu_framebuffer *f
     return complete_framebuffer(device, framebuffer, depth, colour_count, error);
 }
 
-bool gpu_framebuffer_create_layer(struct gpu_device *device, struct gpu_framebuffer *framebuffer,
-                                  const struct gpu_texture *colour, uint32_t layer,
-                                  const struct gpu_texture *depth, struct error *error)
+bool gpu_framebuffer_create_layers(struct gpu_device *device, struct gpu_framebuffer *framebuffer,
+                                   const struct gpu_layer_target *target, struct error *error)
 {
+    const unsigned colour_count = target->count + (target->last ? 1 : 0);
+    if (colour_count > COLOURS_MAX)
+        return error_set(error, ERROR_INTERNAL, NULL, "a framebuffer with %u colours", colour_count);
     if (!create_framebuffer(device, framebuffer, error))
         return false;
-    glNamedFramebufferTextureLayer(framebuffer->name, GL_COLOR_ATTACHMENT0, colour->name, 0, (GLint)layer);
-    return complete_framebuffer(device, framebuffer, depth, 1, error);
+    for (uint32_t i = 0; i < target->count; i++)
+        glNamedFramebufferTextureLayer(framebuffer->name, GL_COLOR_ATTACHMENT0 + i, target->colours->name, 0,
+                                       (GLint)(target->first + i));
+    if (target->last)
+        glNamedFramebufferTexture(framebuffer->name, GL_COLOR_ATTACHMENT0 + target->count, target->last->name, 0);
+    return complete_framebuffer(device, framebuffer, target->depth, colour_count, error);
 }
 
 void gpu_framebuffer_finish(struct gpu_device *device, struct gpu_framebuffer *framebuffer)

@@ -37,10 +37,15 @@ struct gpu_framebuffer {
 bool gpu_framebuffer_create(struct gpu_device *device, struct gpu_framebuffer *framebuffer,
                             const struct gpu_texture *colours, unsigned colour_count,
                             const struct gpu_texture *depth, struct error *error);
-/* Of one layer of an array, and a texture of depths that is none. */
-bool gpu_framebuffer_create_layer(struct gpu_device *device, struct gpu_framebuffer *framebuffer,
-                                  const struct gpu_texture *colour, uint32_t layer,
-                                  const struct gpu_texture *depth, struct error *error);
+/* Layers of an array, and textures that are none. */
+struct gpu_layer_target {
+    const struct gpu_texture *colours; /* the array */
+    uint32_t first, count;             /* its layers: the first colours */
+    const struct gpu_texture *last;    /* the colour behind them; NULL: there is none */
+    const struct gpu_texture *depth;   /* NULL: there is none */
+};
+bool gpu_framebuffer_create_layers(struct gpu_device *device, struct gpu_framebuffer *framebuffer,
+                                   const struct gpu_layer_target *target, struct error *error);
 void gpu_framebuffer_finish(struct gpu_device *device, struct gpu_framebuffer *framebuffer);
 
 #endif

@@ -143,8 +143,8 @@ bool gpu_uniforms_put(const struct gpu_uniforms *uniforms, struct gpu_source_tex
 {
     char block[MEMBERS_MAX * (NAME_BYTES + 32)];
     size_t length = 0;
-    const char *first_line_end = text->text ? strchr(text->text, '\n') : NULL;
-    if (uniforms->count == 0 || !first_line_end)
+    const char *files = text->text ? strstr(text->text, "#line ") : NULL; /* behind what must come first */
+    if (uniforms->count == 0 || !files)
         return true;
     length += (size_t)snprintf(block, sizeof(block), "layout(std140, binding = %d) uniform pass_block {\n",
                                GPU_UNIFORMS_BINDING);
@@ -157,7 +157,7 @@ bool gpu_uniforms_put(const struct gpu_uniforms *uniforms, struct gpu_source_tex
         length += (size_t)snprintf(block + length, sizeof(block) - length, ";\n");
     }
     length += (size_t)snprintf(block + length, sizeof(block) - length, "};\n");
-    return gpu_source_insert(text, (size_t)(first_line_end + 1 - text->text), block, length, error);
+    return gpu_source_insert(text, (size_t)(files - text->text), block, length, error);
 }
 
 /* ---- values ---- */

@@ -26,7 +26,7 @@ void gpu_uniforms_destroy(struct gpu_uniforms *uniforms); /* accepts NULL */
 /* Takes the declarations out of the text. The size of an array is a number or one of the defines. */
 bool gpu_uniforms_take(struct gpu_uniforms *uniforms, struct gpu_source_text *text,
                        const struct gpu_define *defines, struct error *error);
-/* Puts the block of all that was taken behind the text's first line. */
+/* Puts the block of all that was taken in front of the text's first file. */
 bool gpu_uniforms_put(const struct gpu_uniforms *uniforms, struct gpu_source_text *text, struct error *error);
 /* Where a value lies in the block, false: there is none of that name ("lights[1]" of an array). */
 bool gpu_uniforms_find(const struct gpu_uniforms *uniforms, const char *name, uint32_t *offset_bytes);

@@ -34,9 +34,11 @@ bool primary_reserve(struct primary *primary, struct render_context *context, ui
     finish_framebuffers(primary, device);
     bool made = gpu_texture_reserve_array(device, &primary->visible, GL_RG32UI, width, rows, samples, error) &&
                 gpu_texture_reserve(device, &primary->depth, GL_DEPTH_COMPONENT32F, width, rows, error);
-    for (uint32_t i = 0; made && i < samples; i++)
-        made = gpu_framebuffer_create_layer(device, &primary->framebuffers[i], &primary->visible, i,
-                                            &primary->depth, error);
+    for (uint32_t i = 0; made && i < samples; i++) {
+        const struct gpu_layer_target target = {
+            .colours = &primary->visible, .first = i, .count = 1, .depth = &primary->depth};
+        made = gpu_framebuffer_create_layers(device, &primary->framebuffers[i], &target, error);
+    }
     return made;
 }
 
@@ -262,7 +264,7 @@ bool primary_find(const struct primary *primary, struct render_context *context,
 void primary_announce(struct render_context *context, bool rasterised)
 {
     if (rasterised)
-        raster_view_announce(context->device, context->scene, false);
+        raster_view_announce(context->device, context->scene);
     (void)rays_program(rasterised, context, NULL);
     context->sampled_hits = !rasterised && context->tracer->impl->sampled;
     if (rasterised) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The leaves of one slice: at each texel the plane of the primitive that is seen there, in (x, y, w), from the primitive
 // itself and not from differences of depths (section 3.2 of the paper, "g-buffer normals"). nodes.comp writes them to the
-// tree, with their flags. An invocation makes a leaf.
+// tree, with their flags. An invocation makes four leaves: most often they show one primitive, which is fetched once.
 //
 // Defines: HAS_SPHERES, HAS_DISCS as the scene has them; HAS_CUTOUT if spheres may have holes.
 #include "shared/path.h"
@@ -38,6 +38,12 @@ bool is_orthographic()
     return quadtree.depths.z != 0.0;
 }
 
+// X / Z in the middle of a texel, or X of an orthographic view, and Y likewise.
+vec2 across_of(uvec2 place)
+{
+    return (vec2(place) + 0.5 - quadtree.scale_centre.zw) / quadtree.scale_centre.xy;
+}
+
 // What is seen along the middle of a texel: the points `begin` + Z * `step` of the face.
 struct sight_line {
     vec3 begin, step;
@@ -45,7 +51,7 @@ struct sight_line {
 
 sight_line sight_line_of(uvec2 place)
 {
-    vec2 across = (vec2(place) + 0.5 - quadtree.scale_centre.zw) / quadtree.scale_centre.xy;
+    vec2 across = across_of(place);
     return is_orthographic() ? sight_line(vec3(across, 0.0), vec3(0.0, 0.0, 1.0))
                              : sight_line(vec3(0.0), vec3(across, 1.0));
 }
@@ -61,27 +67,39 @@ float z_of(float w)
     return is_orthographic() ? quadtree.depths.y - w * (quadtree.depths.y - quadtree.depths.x) : quadtree.depths.x / w;
 }
 
-// The plane with this normal through a point of it, where the surface has depths between z_min and z_max. Seen on edge
-// it is none: then w is in the range nevertheless, and the slopes are 0.
-uvec2 node_of(sight_line line, vec3 normal, vec3 point, float z_min, float z_max)
+// Of a primitive, along the axes of the face from the eye: its plane, and the range of its depths.
+struct plane {
+    vec3 normal, point;
+    float z_min, z_max;
+};
+
+// Of the texel at `place`, that to the right of it, and those below: both words of their nodes, if they show this plane.
+// Seen on edge it is none: then w is in the range nevertheless, and the slopes are 0.
+void nodes_of(plane p, uvec2 place, out uvec4 heads, out uvec4 tails)
 {
-    float along = dot(normal, point), w, steepness;
+    vec2 first = across_of(place), last = across_of(place + 1u);
+    vec4 rise = p.normal.x * vec4(first.x, last.x, first.x, last.x) + p.normal.y * vec4(first.y, first.y, last.y, last.y);
+    float along = dot(p.normal, p.point), steepness;
+    vec4 w;
     if (is_orthographic()) {
-        w = w_of((along - dot(normal, line.begin)) / normal.z);
-        steepness = 1.0 / (normal.z * (quadtree.depths.y - quadtree.depths.x));
+        float depth = quadtree.depths.y - quadtree.depths.x;
+        w = (quadtree.depths.y - (along - rise) / p.normal.z) / depth;
+        steepness = 1.0 / (p.normal.z * depth);
     } else {
         steepness = quadtree.depths.x / along;
-        w = steepness * dot(normal, line.step);
+        w = steepness * (rise + p.normal.z);
     }
-    vec2 slopes = normal.xy / quadtree.scale_centre.xy * steepness;
-    float w_min = w_of(z_max), w_max = w_of(z_min), slack = PLANE_SHARE * w_max;
-    bool is_plane = w > w_min - slack && w < w_max + slack && abs(slopes.x) + abs(slopes.y) < 1e30;
-    w = w > w_min ? w : w_min; // in this order: not a number is none
-    w = w < w_max ? w : w_max;
-    return plane_node(max(w, 0.0), is_plane ? slopes : vec2(0.0), false);
+    vec2 slopes = p.normal.xy / quadtree.scale_centre.xy * steepness;
+    float w_min = w_of(p.z_max), w_max = w_of(p.z_min), slack = PLANE_SHARE * w_max;
+    uint tail = plane_tail(abs(slopes.x) + abs(slopes.y) < 1e30 ? slopes : vec2(0.0));
+    tails = mix(uvec4(0u), uvec4(tail), greaterThan(w, vec4(w_min - slack)));
+    tails = mix(uvec4(0u), tails, lessThan(w, vec4(w_max + slack)));
+    w = mix(vec4(w_min), w, greaterThan(w, vec4(w_min))); // in this order: not a number is none
+    w = mix(vec4(w_max), w, lessThan(w, vec4(w_max)));
+    heads = plane_heads(max(w, 0.0));
 }
 
-uvec2 triangle_node(sight_line line, uint instance_index, uint triangle)
+plane triangle_plane(uint instance_index, uint triangle)
 {
     uvec3 corners = texelFetch(triangles, int(triangle)).xyz;
     int texel = int(instance_index) * INSTANCE_TEXELS;
@@ -91,7 +109,7 @@ uvec2 triangle_node(sight_line line, uint instance_index, uint triangle)
     vec3 p0 = face_vector(affine_point(rows, texelFetch(positions, int(corners.x)).xyz) - quadtree.eye_world.xyz);
     vec3 p1 = face_vector(affine_point(rows, texelFetch(positions, int(corners.y)).xyz) - quadtree.eye_world.xyz);
     vec3 p2 = face_vector(affine_point(rows, texelFetch(positions, int(corners.z)).xyz) - quadtree.eye_world.xyz);
-    return node_of(line, cross(p1 - p0, p2 - p0), p0, min(p0.z, min(p1.z, p2.z)), max(p0.z, max(p1.z, p2.z)));
+    return plane(cross(p1 - p0, p2 - p0), p0, min(p0.z, min(p1.z, p2.z)), max(p0.z, max(p1.z, p2.z)));
 }
 
 #ifdef HAS_SPHERES
@@ -111,8 +129,9 @@ float sphere_depth(vec2 depths, uvec2 place, uvec2 what, vec3 begin_world, vec3 
 }
 
 // Tangent at the point that is seen. Where rounding lets the line miss, that is where the line comes closest.
-uvec2 sphere_node(sight_line line, uvec2 place, uvec2 what)
+plane sphere_plane(uvec2 place, uvec2 what)
 {
+    sight_line line = sight_line_of(place);
     instance i = instance_at(what.x - 1u);
     vec4 sphere = texelFetch(spheres, int(what.y));
     uint row = 3u * (slice / quadtree.layers);
@@ -128,41 +147,65 @@ uvec2 sphere_node(sight_line line, uvec2 place, uvec2 what)
                      : dot(sphere.xyz - origin, direction) / dot(direction, direction);
     vec3 normal = is_hit ? face_vector(affine_covector(i.object_from_world, origin + z * direction - sphere.xyz))
                          : vec3(0.0, 0.0, 1.0);
-    return node_of(line, normal, line.begin + z * line.step, z, z);
+    return plane(normal, line.begin + z * line.step, z, z);
 }
 #endif
 
 #ifdef HAS_DISCS
-uvec2 disc_node(sight_line line, uint index)
+plane disc_plane(uint index)
 {
     disc d = disc_at(index);
     vec3 centre = face_vector(d.centre_radius.xyz - quadtree.eye_world.xyz);
-    return node_of(line, face_vector(d.normal.xyz), centre, centre.z - d.centre_radius.w, centre.z + d.centre_radius.w);
+    return plane(face_vector(d.normal.xyz), centre, centre.z - d.centre_radius.w, centre.z + d.centre_radius.w);
 }
 #endif
 
+plane flat_plane(uvec2 what)
+{
+#ifdef HAS_DISCS
+    if (what.x == VISIBLE_DISC)
+        return disc_plane(what.y);
+#endif
+    return triangle_plane(what.x - 1u, what.y);
+}
+
+uvec2 what_at(uvec2 place)
+{
+    bool is_inside = all(lessThan(place, uvec2(quadtree.width, quadtree.height)));
+    return is_inside ? texelFetch(visible, ivec3(place, slice), 0).xy : uvec2(VISIBLE_NOTHING);
+}
+
 void main()
 {
-    uint item = first_item + item_index();
-    uvec2 place = uvec2(item % quadtree.padded_width, item / quadtree.padded_width);
+    uint item = first_item + item_index(), row = quadtree.padded_width / 2u;
+    uvec2 place = 2u * uvec2(item % row, item / row);
     if (place.y >= quadtree.padded_height)
         return;
-    uvec2 node = plane_node(0.0, vec2(0.0), false);
-    if (all(lessThan(place, uvec2(quadtree.width, quadtree.height)))) {
-        uvec2 what = texelFetch(visible, ivec3(place, slice), 0).xy;
-        sight_line line = sight_line_of(place);
-        if (what.x == VISIBLE_DISC) {
-#ifdef HAS_DISCS
-            node = disc_node(line, what.y);
-#endif
-        } else if (what.x != VISIBLE_NOTHING) {
+    uvec2 a = what_at(place), b = what_at(place + uvec2(1u, 0u)), c = what_at(place + uvec2(0u, 1u)), d = what_at(place + 1u);
+    uvec4 instances_left = uvec4(a.x, b.x, c.x, d.x), primitives = uvec4(a.y, b.y, c.y, d.y);
+    uvec4 heads = plane_heads(vec4(0.0)), tails = uvec4(0u), own_heads, own_tails;
+    // A turn for each primitive, or texel of a sphere.
+    while (instances_left != uvec4(VISIBLE_NOTHING)) {
+        bvec4 is_left = notEqual(instances_left, uvec4(VISIBLE_NOTHING));
+        uint first = is_left.x ? 0u : is_left.y ? 1u : is_left.z ? 2u : 3u;
+        uvec2 what = uvec2(instances_left[first], primitives[first]);
+        bvec4 is_own = equal((instances_left ^ what.x) | (primitives ^ what.y), uvec4(0u));
+        plane p;
 #ifdef HAS_SPHERES
-            if (geometry_at(instance_at(what.x - 1u).geometry).kind == GEOMETRY_SPHERES)
-                node = sphere_node(line, place, what);
-            else
+        if (what.x != VISIBLE_DISC && geometry_at(instance_at(what.x - 1u).geometry).kind == GEOMETRY_SPHERES) {
+            is_own = equal(uvec4(0u, 1u, 2u, 3u), uvec4(first));
+            p = sphere_plane(place + uvec2(first & 1u, first >> 1), what);
+        } else
 #endif
-                node = triangle_node(line, what.x - 1u, what.y);
-        }
+            p = flat_plane(what);
+        nodes_of(p, place, own_heads, own_tails);
+        heads = mix(heads, own_heads, is_own);
+        tails = mix(tails, own_tails, is_own);
+        instances_left = mix(instances_left, uvec4(VISIBLE_NOTHING), is_own);
     }
-    imageStore(planes, int(item), uvec4(node, 0u, 0u));
+    int at = int(place.y * quadtree.padded_width + place.x), below = at + int(quadtree.padded_width);
+    imageStore(planes, at, uvec4(heads.x, tails.x, 0u, 0u));
+    imageStore(planes, at + 1, uvec4(heads.y, tails.y, 0u, 0u));
+    imageStore(planes, below, uvec4(heads.z, tails.z, 0u, 0u));
+    imageStore(planes, below + 1, uvec4(heads.w, tails.w, 0u, 0u));
 }

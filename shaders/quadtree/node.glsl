@@ -69,11 +69,21 @@ bool plane_is_at_edge(uvec2 node)
     return (node.x & 1u) != 0u;
 }
 
-// `w` not negative. Slopes beyond the range of half floats are limited to it.
+// The first words of planes without flags; `w` not negative.
+uvec4 plane_heads(vec4 w)
+{
+    return (floatBitsToUint(w) & 0x7ffffffeu) | 0x80000000u;
+}
+
+// Slopes beyond the range of half floats are limited to it.
+uint plane_tail(vec2 slopes)
+{
+    return packHalf2x16(clamp(slopes * QUADTREE_SLOPE_SCALE, vec2(-QUADTREE_SLOPE_MAX), vec2(QUADTREE_SLOPE_MAX)));
+}
+
 uvec2 plane_node(float w, vec2 slopes, bool at_edge)
 {
-    vec2 scaled = clamp(slopes * QUADTREE_SLOPE_SCALE, vec2(-QUADTREE_SLOPE_MAX), vec2(QUADTREE_SLOPE_MAX));
-    return uvec2((floatBitsToUint(w) & 0x7ffffffeu) | 0x80000000u | uint(at_edge), packHalf2x16(scaled));
+    return uvec2(plane_heads(vec4(w)).x | uint(at_edge), plane_tail(slopes));
 }
 
 // ---- boxes ----

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: MIT
 // Which primitive a pixel sees: its instance + 1 and its scene-wide number. PRIMITIVE_KIND as in view.vert;
-// HAS_CUTOUT: it may have holes; HAS_LAYERS: what lies behind the layer before, if there is one.
+// HAS_CUTOUT: it may have holes. Of layers, where a surface counts once at each depth, the one drawn first:
+//   HAS_LAYERS   what lies behind the layer before, if there is one (depth peeling)
+//   K_BUFFER     the first 2 or 3 of them, in one pass, without a test of depth. Bavoil, Callahan, Lefohn, Comba, Silva.
+//                Multi-Fragment Effects on the GPU using the k-Buffer. 2007.
 
 #include "shared/path.h"
 #include "common/camera.glsl"
@@ -11,7 +14,23 @@ uniform uint first_primitive;
 uniform uint first_row; // of the strip that is drawn, in the picture
 uniform uint layer;     // the sample that is drawn, of the current ones
 
+#ifdef K_BUFFER
+#ifdef GL_EXT_shader_framebuffer_fetch
+#define KEPT inout
+#else
+#define KEPT out // to check the rest of the program
+#endif
+layout(location = 0) KEPT uvec2 visible;
+layout(location = 1) KEPT uvec2 visible_second;
+#if K_BUFFER == 2
+layout(location = 2) KEPT vec2 depths;
+#else
+layout(location = 2) KEPT uvec2 visible_third;
+layout(location = 3) KEPT vec4 depths;
+#endif
+#else
 layout(location = 0) out uvec2 visible;
+#endif
 
 #ifdef HAS_LAYERS
 // One program draws all layers, so that a surface compares equal to itself in the next one.
@@ -19,13 +38,38 @@ layout(binding = UNIT_TRACER_2) uniform sampler2D depths_before;
 uniform uint has_before;
 #endif
 
-// Whether the layer before does not show it, nor anything behind it. Depth is reversed.
-bool is_behind(float depth)
+// Whether it may be seen there. Depth is reversed.
+bool is_wanted(float depth)
 {
-#ifdef HAS_LAYERS
+#ifdef K_BUFFER
+    return depth > depths[K_BUFFER - 1];
+#elif defined(HAS_LAYERS)
     return has_before == 0u || depth < texelFetch(depths_before, ivec2(gl_FragCoord.xy), 0).x;
 #else
     return true;
+#endif
+}
+
+void see(float depth, uvec2 what)
+{
+#ifdef K_BUFFER
+    if (!is_wanted(depth))
+        return;
+    depth = min(depth, 1.0); // as a depth buffer has it
+    bool is_first = depth > depths.x, is_second = depth > depths.y;
+    if (depth == depths.x || depth == depths.y)
+        return;
+#if K_BUFFER == 2
+    depths = vec2(is_first ? depth : depths.x, is_first ? depths.x : depth);
+#else
+    visible_third = is_second ? visible_second : what;
+    depths.xyz = vec3(is_first ? depth : depths.x, is_first ? depths.x : is_second ? depth : depths.y,
+                      is_second ? depths.y : depth);
+#endif
+    visible_second = is_first ? visible : is_second ? what : visible_second;
+    visible = is_first ? what : visible;
+#else
+    visible = what;
 #endif
 }
 
@@ -48,8 +92,8 @@ void main()
     camera_ray_through(vec2(uvec2(gl_FragCoord.xy) + uvec2(0u, first_row)) + sample_place(layer), origin, direction, t_min);
 #if PRIMITIVE_KIND == 0
     uint primitive = first_primitive + uint(gl_PrimitiveID);
-#ifdef HAS_LAYERS
-    if (!is_behind(gl_FragCoord.z))
+#if defined(HAS_LAYERS) || defined(K_BUFFER)
+    if (!is_wanted(gl_FragCoord.z))
         discard;
 #endif
 #ifdef HAS_CUTOUT
@@ -57,25 +101,36 @@ void main()
                    0.0))
         discard;
 #endif
-    visible = uvec2(instance_index + 1u, primitive);
+    see(gl_FragCoord.z, uvec2(instance_index + 1u, primitive));
 #elif PRIMITIVE_KIND == 1
     uint primitive = first_primitive + uint(gl_PrimitiveID) / 12u;
+    uvec2 what = uvec2(instance_index + 1u, primitive);
     candidate found = candidate_sphere(instance_index, primitive, origin, direction, t_min);
     float depth = depth_of(found.distance, direction);
+#ifdef K_BUFFER
+    if (found.distance < 0.0 || !is_wanted(depth))
+        discard;
+    see(depth, what);
+    // The far side is a surface of its own.
+    found = candidate_sphere(instance_index, primitive, origin, direction, found.distance);
+    if (found.distance >= 0.0)
+        see(depth_of(found.distance, direction), what);
+#else
 #ifdef HAS_LAYERS
-    if (found.distance >= 0.0 && !is_behind(depth)) { // the sphere's far side is a surface of its own
+    if (found.distance >= 0.0 && !is_wanted(depth)) { // the sphere's far side is a surface of its own
         found = candidate_sphere(instance_index, primitive, origin, direction, found.distance);
         depth = depth_of(found.distance, direction);
     }
 #endif
-    if (found.distance < 0.0 || !is_behind(depth))
+    if (found.distance < 0.0 || !is_wanted(depth))
         discard;
     gl_FragDepth = depth;
-    visible = uvec2(instance_index + 1u, primitive);
+    visible = what;
+#endif
 #else
     uint primitive = first_primitive + uint(gl_PrimitiveID) / 2u;
-#ifdef HAS_LAYERS
-    if (!is_behind(gl_FragCoord.z))
+#if defined(HAS_LAYERS) || defined(K_BUFFER)
+    if (!is_wanted(gl_FragCoord.z))
         discard;
 #endif
     candidate found = candidate_disc(primitive, origin, direction);
@@ -83,6 +138,6 @@ void main()
     float radius = disc_at(primitive).centre_radius.w;
     if (dot(from_centre, from_centre) > radius * radius || is_cut_out(found, origin, direction, 0.0))
         discard;
-    visible = uvec2(VISIBLE_DISC, primitive);
+    see(gl_FragCoord.z, uvec2(VISIBLE_DISC, primitive));
 #endif
 }

@@ -8,15 +8,20 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* By the layers of a pass. */
+static const GLenum formats_of_depths[] = {0, GL_DEPTH_COMPONENT32F, GL_RG32F, GL_RGBA32F};
+
 bool quadtree_layers_begin(struct quadtree_layers *layers, struct quadtree_store *store, struct error *error)
 {
     const struct quadtree_uniforms *u = &store->uniforms;
     layers->store = store;
     layers->face = layers->layer = 0;
     layers->begun = false;
-    for (int i = 0; i < 2; i++)
-        if (!gpu_texture_reserve(store->device, &layers->depths[i], GL_DEPTH_COMPONENT32F, u->padded_width,
-                                 u->padded_height, error))
+    layers->pass_layers = store->device->facts.fetches_framebuffer ? u->layers : 1;
+    const GLenum formats[2] = {formats_of_depths[layers->pass_layers], GL_DEPTH_COMPONENT32F};
+    for (uint32_t i = 0; i < (layers->pass_layers < u->layers ? 2 : 1); i++)
+        if (!gpu_texture_reserve(store->device, &layers->depths[i], formats[i], u->padded_width, u->padded_height,
+                                 error))
             return false;
     return true;
 }
@@ -87,22 +92,38 @@ static bool begin_face(struct quadtree_layers *layers, const struct gpu_scene *s
     return gpu_buffer_upload(layers->store->device, &layers->frame, &uniforms, sizeof(uniforms), error);
 }
 
-static bool begin_layer(struct quadtree_layers *layers, const struct gpu_scene *scene, struct error *error)
+static void clear(const struct quadtree_layers *layers)
 {
     static const GLuint nothing[4] = {VISIBLE_NOTHING};
-    static const GLfloat farthest = 0.0f;
+    static const GLfloat farthest[4] = {0.0f};
+    const GLint count = (GLint)layers->pass_layers;
+    glDisable(GL_SCISSOR_TEST); /* clearing heeds both */
+    glDepthMask(GL_TRUE);
+    for (GLint i = 0; i < count; i++)
+        glClearNamedFramebufferuiv(layers->framebuffer.name, GL_COLOR, i, nothing);
+    if (count > 1)
+        glClearNamedFramebufferfv(layers->framebuffer.name, GL_COLOR, count, farthest);
+    else
+        glClearNamedFramebufferfv(layers->framebuffer.name, GL_DEPTH, 0, farthest);
+}
+
+static bool begin_pass(struct quadtree_layers *layers, const struct gpu_scene *scene, struct error *error)
+{
     struct quadtree_store *store = layers->store;
     if (layers->layer == 0 && !begin_face(layers, scene, error))
         return false;
+    const struct gpu_texture *depths = &layers->depths[layers->layer & 1];
+    const struct gpu_layer_target target = {
+        .colours = &store->visible,
+        .first = layers->face * store->uniforms.layers + layers->layer,
+        .count = layers->pass_layers,
+        .last = layers->pass_layers > 1 ? depths : NULL,
+        .depth = layers->pass_layers > 1 ? NULL : depths,
+    };
     gpu_framebuffer_finish(store->device, &layers->framebuffer);
-    if (!gpu_framebuffer_create_layer(store->device, &layers->framebuffer, &store->visible,
-                                      layers->face * store->uniforms.layers + layers->layer,
-                                      &layers->depths[layers->layer & 1], error))
+    if (!gpu_framebuffer_create_layers(store->device, &layers->framebuffer, &target, error))
         return false;
-    glDisable(GL_SCISSOR_TEST); /* clearing heeds both */
-    glDepthMask(GL_TRUE);
-    glClearNamedFramebufferuiv(layers->framebuffer.name, GL_COLOR, 0, nothing);
-    glClearNamedFramebufferfv(layers->framebuffer.name, GL_DEPTH, 0, &farthest);
+    clear(layers);
     raster_view_begin(&layers->drawing);
     layers->begun = true;
     return true;
@@ -113,7 +134,7 @@ static bool draw_part(struct quadtree_layers *layers, struct gpu_scene *scene, b
     const struct raster_view_target target = {
         .device = layers->store->device,
         .scene = scene,
-        .layered = true,
+        .layers = layers->pass_layers,
         .has_before = layers->layer > 0,
         .left_out = layers->left_out,
     };
@@ -131,7 +152,7 @@ static bool go_on(struct quadtree_layers *layers, struct gpu_scene *scene, struc
 {
     const uint64_t start_ns = clock_now_ns();
     bool whole = false;
-    if ((!layers->begun && !begin_layer(layers, scene, error)) || !draw_part(layers, scene, &whole, error))
+    if ((!layers->begun && !begin_pass(layers, scene, error)) || !draw_part(layers, scene, &whole, error))
         return false;
     if (layers->store->device->facts.software) {
         gpu_finish(layers->store->device); /* else all parts would be waited for at the end, at once */
@@ -140,7 +161,8 @@ static bool go_on(struct quadtree_layers *layers, struct gpu_scene *scene, struc
     if (!whole)
         return true;
     layers->begun = false;
-    if (++layers->layer == layers->store->uniforms.layers) {
+    layers->layer += layers->pass_layers;
+    if (layers->layer == layers->store->uniforms.layers) {
         layers->layer = 0;
         layers->face++;
     }

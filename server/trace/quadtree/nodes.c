@@ -46,9 +46,10 @@ static uint32_t stage_level(const struct quadtree_uniforms *uniforms, uint32_t s
 static uint64_t stage_items(const struct quadtree_uniforms *uniforms, uint32_t stage)
 {
     const uint32_t slices = stage < slice_stages(uniforms) ? 1 : slice_count(uniforms);
+    const uint32_t level = stage_level(uniforms, stage);
     return stage + 1 == stage_count(uniforms)
                ? uniforms->faces
-               : (uint64_t)(slice_texels(uniforms) >> 2 * stage_level(uniforms, stage)) * slices;
+               : (uint64_t)(slice_texels(uniforms) >> 2 * (level > 0 ? level : 1)) * slices; /* four leaves each */
 }
 
 static uint32_t unit_items(const struct quadtree_store *store)

@@ -44,21 +44,21 @@ void raster_camera_fill(struct frame_uniforms *uniforms, const struct raster_cam
 }
 
 static const struct gpu_program *get_program(struct gpu_device *device, enum primitive_kind kind, bool cutout,
-                                             bool layered, struct error *error)
+                                             uint32_t layers, struct error *error)
 {
-    static const char *const numbers[] = {"0", "1", "2"};
-    struct gpu_define defines[] = {
-        {"PRIMITIVE_KIND", numbers[kind]},
-        {"HAS_SPHERES", "1"}, /* costs nothing where it is not called */
-        {NULL, NULL},
-        {NULL, NULL},
-        {NULL, NULL},
+    static const char *const numbers[] = {"0", "1", "2", "3"};
+    struct gpu_define defines[6] = {
+        {"PRIMITIVE_KIND", numbers[kind]}, {"HAS_SPHERES", "1"}, /* costs nothing where it is not called */
     };
     size_t n = 2;
     if (cutout)
         defines[n++] = (struct gpu_define){"HAS_CUTOUT", "1"};
-    if (layered)
+    if (layers == 1)
         defines[n++] = (struct gpu_define){"HAS_LAYERS", "1"};
+    if (layers > 1) {
+        defines[n++] = (struct gpu_define){"K_BUFFER", numbers[layers]};
+        defines[n++] = (struct gpu_define){"EXTENSION", "GL_EXT_shader_framebuffer_fetch"};
+    }
     const struct gpu_program_source source = {
         .vertex = "raster/view.vert", .fragment = "raster/view.frag", .defines = defines};
     return gpu_program_get(device, &source, error);
@@ -103,7 +103,7 @@ static bool draw_sort(struct raster_view *view, const struct raster_view_target 
         if (count == 0 || (sort != SORT_DISCS && target->left_out && target->left_out[view->instance]))
             continue;
         if (!program &&
-            !(program = get_program(target->device, kind, has_cutout(scene, sort), target->layered, error)))
+            !(program = get_program(target->device, kind, has_cutout(scene, sort), target->layers, error)))
             return false;
         uint32_t maximum = *budget / vertices_per_primitive[kind], part = count < maximum ? count : maximum;
         if (sort == SORT_SPHERES) /* the picture's y runs down, which turns every winding round */
@@ -112,7 +112,7 @@ static bool draw_sort(struct raster_view *view, const struct raster_view_target 
         gpu_uniform_uint(program, "first_primitive", first + view->primitive);
         gpu_uniform_uint(program, "first_row", target->first_row);
         gpu_uniform_uint(program, "layer", target->sample);
-        if (target->layered)
+        if (target->layers == 1)
             gpu_uniform_uint(program, "has_before", target->has_before);
         gpu_program_use(target->device, program);
         if (part > 0)
@@ -160,7 +160,10 @@ bool raster_view_draw(struct raster_view *view, const struct raster_view_target 
     glDisable(GL_BLEND);
     glDisable(GL_SCISSOR_TEST);
     glDisable(GL_CULL_FACE);
-    glEnable(GL_DEPTH_TEST);
+    if (target->layers < 2)
+        glEnable(GL_DEPTH_TEST);
+    else
+        glDisable(GL_DEPTH_TEST);
     glDepthMask(GL_TRUE);
     glDepthFunc(GL_GREATER);
     glClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);
@@ -187,9 +190,9 @@ static bool has_sort(const struct gpu_scene *scene, enum primitive_sort sort)
     return sort == SORT_DISCS && scene->disc_count > 0;
 }
 
-void raster_view_announce(struct gpu_device *device, const struct gpu_scene *scene, bool layered)
+void raster_view_announce(struct gpu_device *device, const struct gpu_scene *scene)
 {
     for (enum primitive_sort sort = 0; sort < SORT_COUNT; sort++)
         if (has_sort(scene, sort))
-            (void)get_program(device, kind_of_sort[sort], has_cutout(scene, sort), layered, NULL);
+            (void)get_program(device, kind_of_sort[sort], has_cutout(scene, sort), 0, NULL);
 }

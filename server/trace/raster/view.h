@@ -35,10 +35,14 @@ struct raster_view {
 struct raster_view_target {
     struct gpu_device *device;
     const struct gpu_scene *scene;
-    uint32_t first_row;   /* of the framebuffer, in the view's picture */
-    uint32_t sample;      /* of frame_uniforms.sample_places */
-    bool layered;         /* the program of layers, the same for all of them: a surface has one depth in each */
-    bool has_before;      /* only what lies behind the depths at UNIT_TRACER_2 */
+    uint32_t first_row; /* of the framebuffer, in the view's picture */
+    uint32_t sample;    /* of frame_uniforms.sample_places */
+    /* That are drawn now. 0: what is nearest, and no layer will follow. 1: the nearest of what lies behind the
+     * depths at UNIT_TRACER_2, if has_before. 2 or 3: so many colours, of layers from the nearest on, and behind
+     * them a colour of as many depths, all cleared to 0; there are no depths to test, and the device
+     * fetches_framebuffer. */
+    uint32_t layers;
+    bool has_before;
     const bool *left_out; /* instances; NULL: none */
 };
 
@@ -49,7 +53,7 @@ bool raster_view_draw(struct raster_view *view, const struct raster_view_target 
                       struct error *error);
 /* From the time that a part took, where step_ns is what it should take at most. */
 void raster_view_learn(struct raster_view *view, uint64_t took_ns, uint64_t step_ns);
-/* Gets the programs that a scene needs, to announce them (gpu_program_announce). */
-void raster_view_announce(struct gpu_device *device, const struct gpu_scene *scene, bool layered);
+/* Gets the programs that what is nearest needs of a scene, to announce them (gpu_program_announce). */
+void raster_view_announce(struct gpu_device *device, const struct gpu_scene *scene);
 
 #endif

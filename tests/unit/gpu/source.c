@@ -70,6 +70,14 @@ TEST(defines_stand_in_front_and_a_path_among_them_is_not_seen_by_glsl)
                 "#line 3 0\nint last;\n");
 }
 
+TEST(a_required_extension_stands_in_front)
+{
+    const struct gpu_define defines[] = {{"ANY_HIT", NULL}, {"EXTENSION", "GL_EXT_some"}, {0}};
+    expect_text("a.glsl", defines,
+                "#version 450 core\n#define ANY_HIT 1\n#extension GL_EXT_some : require\n"
+                "#line 1 0\nint a1;\n#line 1 1\n#ifndef C_H\n\nint c3;\n#endif\n#line 3 0\nint a3;\n");
+}
+
 TEST(a_file_that_includes_itself_is_expanded_once)
 {
     expect_text("circle.comp", NULL, "#version 450 core\n#line 1 0\n\n#line 2 0\nint once;\n");

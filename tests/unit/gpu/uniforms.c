@@ -57,14 +57,15 @@ TEST(values_lie_where_the_driver_looks_for_them)
 TEST(the_stages_of_a_program_share_one_block_and_its_lines_keep_their_numbers)
 {
     struct gpu_uniforms *uniforms = gpu_uniforms_create();
-    struct gpu_source_text first = text_of("#version 450 core\n#line 1 0\nuniform int a; // one\n"),
+    struct gpu_source_text first = text_of("#version 450 core\n#extension GL_EXT_some : require\n"
+                                           "#line 1 0\nuniform int a; // one\n"),
                            second =
                                text_of("#version 450 core\n#line 1 0\n  uniform uint b, c;\nuniform int a;\n");
     assert_true(gpu_uniforms_take(uniforms, &first, NULL, NULL) &&
                 gpu_uniforms_take(uniforms, &second, NULL, NULL));
     assert_true(gpu_uniforms_put(uniforms, &first, NULL) && gpu_uniforms_put(uniforms, &second, NULL));
     assert_string_equal(first.text,
-                        "#version 450 core\n"
+                        "#version 450 core\n#extension GL_EXT_some : require\n"
                         "layout(std140, binding = 2) uniform pass_block {\nint a;\nuint b;\nuint c;\n};\n"
                         "#line 1 0\n               // one\n");
     assert_string_equal(second.text,

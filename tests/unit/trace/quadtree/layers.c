@@ -45,16 +45,61 @@ static void read_back(struct drawn *drawn)
                       drawn->visible);
 }
 
-static void draw(struct drawn *drawn, bool at_once)
+static void draw_one_way(struct drawn *drawn)
 {
     struct error error = {0};
     enum tracer_progress progress;
     expect_ok(quadtree_layers_begin(&drawn->layers, &drawn->store, &error), &error);
     do
-        progress = quadtree_layers_go_on(&drawn->layers, &drawn->seen.gpu, at_once, &error);
+        progress = quadtree_layers_go_on(&drawn->layers, &drawn->seen.gpu, true, &error);
     while (progress == TRACER_MORE);
     expect_ok(progress == TRACER_DONE, &error);
     read_back(drawn);
+}
+
+static float *read_depths(const struct gpu_texture *texture, GLenum format, uint32_t components)
+{
+    const size_t bytes = (size_t)texture->width * texture->height * components * sizeof(float);
+    float *depths = malloc(bytes);
+    glGetTextureImage(texture->name, 0, format, GL_FLOAT, (GLsizei)bytes, depths);
+    return depths;
+}
+
+/* In one pass, and then peeled. Both compare the same depths, in the same order, and keep of those that are equal
+ * the first one: no texel may differ. Peels leave the depths of their last two layers. */
+static void draw_both_ways(struct drawn *drawn)
+{
+    const struct quadtree_uniforms *u = &drawn->store.uniforms;
+    const size_t bytes = texels_of(u) * sizeof(*drawn->visible),
+                 slice = (size_t)u->padded_width * u->padded_height;
+    draw_one_way(drawn);
+    assert_int_equal(drawn->layers.pass_layers, u->layers);
+    uint32_t(*at_once)[2] = malloc(bytes);
+    memcpy(at_once, drawn->visible, bytes);
+    float *depths_at_once =
+        read_depths(drawn->layers.depths, u->layers == 2 ? GL_RG : GL_RGBA, u->layers == 2 ? 2 : 4);
+    device->facts.fetches_framebuffer = false;
+    draw_one_way(drawn);
+    device->facts.fetches_framebuffer = true;
+    assert_int_equal(drawn->layers.pass_layers, 1);
+    assert_memory_equal(drawn->visible, at_once, bytes);
+    for (uint32_t layer = u->layers - 2; layer < u->layers; layer++) {
+        float *depths = read_depths(&drawn->layers.depths[layer & 1], GL_DEPTH_COMPONENT, 1);
+        for (size_t i = 0; i < slice; i++)
+            assert_true(depths[i] == depths_at_once[(u->layers == 2 ? 2 : 4) * i + layer]);
+        free(depths);
+    }
+    free(depths_at_once);
+    free(at_once);
+}
+
+/* In all ways that the device has, which give the same. */
+static void draw(struct drawn *drawn)
+{
+    if (device->facts.fetches_framebuffer && drawn->store.uniforms.layers > 1)
+        draw_both_ways(drawn);
+    else
+        draw_one_way(drawn);
 }
 
 /* What the host sees at places about the texels' centres, of which the first are the centres themselves. */
@@ -153,7 +198,7 @@ static void expect_drawn(struct scene *scene, const struct quadtree_uniforms *u,
     struct drawn drawn;
     uint32_t settled = 0, wrong = 0, texels = u->width * u->height * u->faces;
     drawn_init(&drawn, scene, u);
-    draw(&drawn, true);
+    draw(&drawn);
     see_shifted(&drawn);
     for (uint32_t i = 0; i < texels; i++) {
         const uint32_t face = i / (u->width * u->height), in_face = i % (u->width * u->height);
@@ -186,6 +231,24 @@ TEST(layers_of_an_orthographic_view_show_the_first_surfaces_in_order)
     view.far = 20;
     const struct quadtree_uniforms u = uniforms_of(&view);
     expect_drawn(curved_scene(), &u, u.width * u.height / 10 * 9);
+}
+
+/* Through balls, spheres and hills: of spheres it leaves the far sides. */
+TEST(what_the_near_distance_cuts_off_is_in_no_layer)
+{
+    struct layers_view view = usual;
+    view.near = 2;
+    const struct quadtree_uniforms u = uniforms_of(&view);
+    expect_drawn(curved_scene(), &u, u.width * u.height / 10 * 9);
+}
+
+TEST(two_layers_are_the_first_two_surfaces)
+{
+    struct layers_view view = usual;
+    view.layers = 2;
+    const struct quadtree_uniforms u = uniforms_of(&view);
+    expect_drawn(curved_scene(), &u, u.width * u.height / 10 * 9);
+    expect_drawn(test_scene_spheres(), &u, u.width * u.height / 10 * 9);
 }
 
 TEST(far_sides_of_spheres_are_layers_of_their_own)
@@ -247,7 +310,7 @@ static uint32_t texels_with(struct scene *scene, const uint32_t instances[3], ui
     uint32_t count = 0;
     *covered = 0;
     drawn_init(&drawn, scene, &u);
-    draw(&drawn, true);
+    draw(&drawn);
     for (size_t i = 0; i < slice; i++) {
         const uint32_t layers[3] = {drawn.visible[i][0], drawn.visible[slice + i][0],
                                     drawn.visible[2 * slice + i][0]};
@@ -314,7 +377,7 @@ TEST(what_is_cut_out_is_in_no_layer)
     uint32_t geometry = 0;
     while (drawn.seen.gpu.geometries[geometry].device.flags & GEOMETRY_HAS_CUTOUT)
         geometry++;
-    draw(&drawn, true);
+    draw(&drawn);
     const size_t slice = (size_t)u.padded_width * u.padded_height;
     uint32_t covered = 0;
     for (size_t i = 0; i < slice; i++) {
@@ -353,10 +416,9 @@ static struct scene *half_sphere(bool far_half)
 static void count_halves(struct scene *scene, uint32_t counts[2])
 {
     struct drawn drawn;
-    struct quadtree_uniforms u = uniforms_of(&usual);
-    u.layers = 1;
+    const struct quadtree_uniforms u = uniforms_of(&usual);
     drawn_init(&drawn, scene, &u);
-    draw(&drawn, true);
+    draw(&drawn);
     struct gpu_texture visible = drawn.seen.store.visible;
     drawn.seen.store.visible = drawn.store.visible;
     layers_build(&drawn.seen, false);
@@ -405,30 +467,43 @@ static void do_something_else(void)
     glBindBufferBase(GL_UNIFORM_BUFFER, UNIFORM_FRAME, 0);
 }
 
-TEST(parts_with_other_work_between_them_give_the_same_layers)
+static void expect_parts_alike(struct drawn *drawn)
 {
     struct error error = {0};
-    struct drawn drawn;
-    const struct quadtree_uniforms u = uniforms_of(&usual);
-    const size_t bytes = texels_of(&u) * sizeof(*drawn.visible);
+    const size_t bytes = texels_of(&drawn->store.uniforms) * sizeof(*drawn->visible);
     enum tracer_progress progress;
-    uint32_t parts = 0;
-    drawn_init(&drawn, curved_scene(), &u);
-    draw(&drawn, true);
+    uint32_t steps = 0;
+    draw_one_way(drawn);
     uint32_t(*at_once)[2] = malloc(bytes);
-    memcpy(at_once, drawn.visible, bytes);
-    expect_ok(quadtree_layers_begin(&drawn.layers, &drawn.store, &error), &error);
+    memcpy(at_once, drawn->visible, bytes);
+    expect_ok(quadtree_layers_begin(&drawn->layers, &drawn->store, &error), &error);
     do {
         do_something_else();
-        drawn.layers.drawing.part_vertices = 300;
-        progress = quadtree_layers_go_on(&drawn.layers, &drawn.seen.gpu, false, &error);
-        parts++;
+        drawn->layers.drawing.part_vertices = 300;
+        progress = quadtree_layers_go_on(&drawn->layers, &drawn->seen.gpu, false, &error);
+        steps++;
     } while (progress == TRACER_MORE);
     expect_ok(progress == TRACER_DONE, &error);
-    read_back(&drawn);
-    print_message("%u steps\n", parts);
-    assert_in_range(parts, 3, 1000); /* a step has as many parts as fit into some milliseconds */
-    assert_memory_equal(drawn.visible, at_once, bytes);
+    read_back(drawn);
+    print_message("%u steps, %u layers a pass\n", steps, drawn->layers.pass_layers);
+    assert_in_range(steps, 3, 1000); /* a step has as many parts as fit into some milliseconds */
+    assert_memory_equal(drawn->visible, at_once, bytes);
     free(at_once);
+}
+
+TEST(parts_with_other_work_between_them_give_the_same_layers)
+{
+    struct layers_view view = usual;
+    struct drawn drawn;
+    view.width *= 4; /* a pass takes some steps */
+    view.height *= 4;
+    view.focal *= 4;
+    const struct quadtree_uniforms u = uniforms_of(&view);
+    const bool fetches_framebuffer = device->facts.fetches_framebuffer;
+    drawn_init(&drawn, curved_scene(), &u);
+    expect_parts_alike(&drawn);
+    device->facts.fetches_framebuffer = false;
+    expect_parts_alike(&drawn);
+    device->facts.fetches_framebuffer = fetches_framebuffer;
     drawn_finish(&drawn);
 }
