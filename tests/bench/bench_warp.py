@@ -198,7 +198,7 @@ def measure(bench):
     data = {"size": size, "seconds": seconds, "hertz": HERTZ, "links": []}
     with Daemon(bench, tcp=True) as daemon, tempfile.TemporaryDirectory(prefix="farlight-bench-") as name:
         truths = Truths(bench, daemon, size, pathlib.Path(name))
-        server = subprocess.Popen([bench.program("farlight"), "serve", bundled(bench, "teapot.glb"), "--name", SCENE, "--server",
+        server = subprocess.Popen([bench.program("farlight"), "serve", bundled(bench, "carousel.glb"), "--name", SCENE, "--server",
                                    daemon.address], stdout=subprocess.PIPE, text=True)
         try:
             if not server.stdout.readline():
@@ -218,7 +218,7 @@ def show(data):
              with_spread(link["displayed_per_s"]), significant(link["latency_ms"]["median"]), significant(link["latency_99_ms"]),
              significant(link["kbyte_per_s"]), significant(link["psnr_db"]["median"]), significant(link["psnr_db"]["min"]),
              f"{100 * link['unseen']['median']:.1f}" if link["unseen"] else "-", link["lost"]) for link in data["links"]]
-    return (f"The teapot at {data['size'][0]}x{data['size'][1]}, a walk of {data['seconds']} s whose camera moves {data['hertz']} times a "
+    return (f"The carousel, at rest, at {data['size'][0]}x{data['size'][1]}, a walk of {data['seconds']} s whose camera moves {data['hertz']} times a "
             f"second; PSNR against true renders of {TRUE_SAMPLES} samples\nof where the camera is when a picture is shown.\n\n" +
             table([("link", "views", "displayed", "latency", "99 %", "sent", "PSNR", "lowest", "unseen", "lost"),
                    ("rate, round trip, resets", "", "pictures/s", "ms", "ms", "KB/s", "dB", "dB", "%", "")], rows))
