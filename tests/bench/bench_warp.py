@@ -218,7 +218,8 @@ def show(data):
              with_spread(link["displayed_per_s"]), significant(link["latency_ms"]["median"]), significant(link["latency_99_ms"]),
              significant(link["kbyte_per_s"]), significant(link["psnr_db"]["median"]), significant(link["psnr_db"]["min"]),
              f"{100 * link['unseen']['median']:.1f}" if link["unseen"] else "-", link["lost"]) for link in data["links"]]
-    return (f"The carousel, at rest, at {data['size'][0]}x{data['size'][1]}, a walk of {data['seconds']} s whose camera moves {data['hertz']} times a "
+    width, height = data["size"]
+    return (f"The carousel, at rest, at {width}x{height}, a walk of {data['seconds']} s whose camera moves {data['hertz']} times a "
             f"second; PSNR against true renders of {TRUE_SAMPLES} samples\nof where the camera is when a picture is shown.\n\n" +
             table([("link", "views", "displayed", "latency", "99 %", "sent", "PSNR", "lowest", "unseen", "lost"),
                    ("rate, round trip, resets", "", "pictures/s", "ms", "ms", "KB/s", "dB", "dB", "%", "")], rows))
