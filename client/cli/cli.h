@@ -188,7 +188,7 @@ struct cli_channel {
 
 struct cli_job {
     const char *scene; /* a shared scene of the server, in place of the model */
-    const char *model, *server, *key_file, *environment, *output, *camera, *keys_file, *trace_file;
+    const char *model, *server, *key_file, *link, *environment, *output, *camera, *keys_file, *trace_file;
     enum cli_image image;
     struct cli_output
         outputs[CLI_OUTPUTS_MAX]; /* destinations of the pictures: `output`, or several of a script */
@@ -294,10 +294,15 @@ bool cli_retry_wait(uint32_t pause_ms, struct fl_error *error); /* false: interr
 
 /* ---- daemon.c: commands that only query a daemon ---- */
 
+/* Of the option that all commands with --server have. */
+#define CLI_LINK_HELP                                                                                             \
+    "Try a slow link out, such as 2mbit,100ms,1%: rate, round trip, chance that the connection is reset in each " \
+    "second (default: FARLIGHT_LINK)"
+
 struct cli_daemon {
-    const char *server, *key_file; /* as typed */
+    const char *server, *key_file, *link; /* as typed */
 };
-/* --server and --key: a child parser; its input is a struct cli_daemon. */
+/* --server, --key and --link: a child parser; its input is a struct cli_daemon. */
 extern const struct argp cli_daemon_argp;
 /* Interruptible from then on. Without --server FARLIGHT_SERVER counts; if neither names a daemon, a private one is
  * started, or (`must_be_named`) it is FL_ERROR_ARGUMENT. */

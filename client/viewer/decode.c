@@ -6,12 +6,18 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* libswscale writes the pixels of a row in groups, up to as many as this with the widest instructions, and the
+ * last group whole: past the end of a row of another width. */
+#define GROUP_PIXELS 64
+
 struct decoder {
     AVCodecContext *context;
     AVPacket *packet;
     AVFrame *frame;
     struct SwsContext *colours; /* of the last frame's size and form */
-    bool lost;                  /* until the next key frame */
+    uint8_t *padded;            /* owned: rows of whole groups; NULL: not needed so far */
+    size_t padded_bytes;
+    bool lost; /* until the next key frame */
 };
 
 struct decoder *decoder_create(struct fl_error *error)
@@ -40,6 +46,16 @@ struct decoder *decoder_create(struct fl_error *error)
     return NULL;
 }
 
+static bool reserve(struct decoder *decoder, size_t bytes, struct fl_error *error)
+{
+    if (bytes <= decoder->padded_bytes)
+        return true;
+    free(decoder->padded);
+    decoder->padded = malloc(bytes);
+    decoder->padded_bytes = decoder->padded ? bytes : 0;
+    return decoder->padded || fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
+}
+
 static bool to_pixels(struct decoder *decoder, struct pixmap *picture, struct fl_error *error)
 {
     const AVFrame *frame = decoder->frame;
@@ -52,10 +68,17 @@ static bool to_pixels(struct decoder *decoder, struct pixmap *picture, struct fl
     if (!decoder->colours ||
         sws_setColorspaceDetails(decoder->colours, matrix, is_full, matrix, 1, 0, 1 << 16, 1 << 16) < 0)
         return fl_error_set(error, FL_ERROR_SYSTEM, "", "a frame in H.264 has an unknown colour space");
-    uint8_t *const planes[] = {picture->pixels};
-    const int strides[] = {picture->width * 4};
+    const int row_bytes = picture->width * 4, group_bytes = GROUP_PIXELS * 4;
+    const int stride_bytes = (row_bytes + group_bytes - 1) / group_bytes * group_bytes;
+    const bool is_padded = stride_bytes != row_bytes;
+    if (is_padded && !reserve(decoder, (size_t)stride_bytes * (size_t)picture->height, error))
+        return false;
+    uint8_t *const planes[] = {is_padded ? decoder->padded : picture->pixels};
     sws_scale(decoder->colours, (const uint8_t *const *)frame->data, frame->linesize, 0, picture->height, planes,
-              strides);
+              &stride_bytes);
+    for (size_t y = 0; is_padded && y < (size_t)picture->height; y++)
+        memcpy(picture->pixels + y * (size_t)row_bytes, decoder->padded + y * (size_t)stride_bytes,
+               (size_t)row_bytes);
     return true;
 }
 
@@ -90,6 +113,7 @@ void decoder_destroy(struct decoder *decoder)
 {
     if (!decoder)
         return;
+    free(decoder->padded);
     sws_freeContext(decoder->colours);
     av_frame_free(&decoder->frame);
     av_packet_free(&decoder->packet);

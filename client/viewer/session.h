@@ -9,9 +9,9 @@
 struct session;
 
 struct session_options {
-    const char *server, *key_file;   /* as of fl_connect_options */
-    const char *model, *environment; /* that are loaded .. */
-    const char *scene_name;          /* .. or, not NULL, the scene to attach to */
+    const char *server, *key_file, *link; /* as of fl_connect_options */
+    const char *model, *environment;      /* that are loaded .. */
+    const char *scene_name;               /* .. or, not NULL, the scene to attach to */
     int interrupt_fd;
     void (*note)(void *user, const struct fl_note *note); /* of the first load; called from another thread */
     void *user;

@@ -166,6 +166,7 @@ static bool open_viewer(struct viewer *viewer, struct fl_error *error)
     const struct viewer_options *options = viewer->options;
     const struct session_options session = {.server = options->server,
                                             .key_file = options->key_file,
+                                            .link = options->link,
                                             .model = options->model,
                                             .environment = options->environment,
                                             .scene_name = options->scene_name,

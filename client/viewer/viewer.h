@@ -7,7 +7,7 @@
 #include "lib/farlight.h"
 
 struct viewer_options {
-    const char *server, *key_file, *model, *environment, *scene_name; /* as of session_options */
+    const char *server, *key_file, *link, *model, *environment, *scene_name; /* as of session_options */
     /* From the command line; width and height are the window's, in pixels of the desktop. */
     struct message_render view;
     bool has_encoding, has_still_encoding, has_primary, has_integrator;

@@ -23,17 +23,22 @@ def stage_ms(frame, stage, clock="cpu"):
 
 
 class Daemon:
-    """A warm daemon on a socket of its own; a context manager."""
+    """A warm daemon on a socket of its own and, if wanted, on a TCP port of this host; a context manager."""
 
-    def __init__(self, bench):
+    def __init__(self, bench, tcp=False):
         self.folder = tempfile.mkdtemp(prefix="farlight-bench-")
         self.address = f"unix:{self.folder}/socket"
-        self.process = subprocess.Popen([bench.program("farlightd"), "--listen", self.address], stdout=subprocess.PIPE,
+        self.tcp = "tcp:127.0.0.1:0" if tcp else None
+        self.process = subprocess.Popen([bench.program("farlightd"), "--listen", self.address,
+                                         *(["--listen", self.tcp] if tcp else [])], stdout=subprocess.PIPE,
                                         stderr=subprocess.DEVNULL, text=True)
 
     def __enter__(self):
-        for line in self.process.stdout:
+        for line in self.process.stdout:  # READY and an address, one line each
+            if self.tcp and not line.startswith("READY tcp:"):
+                continue
             if line.startswith("READY"):
+                self.tcp = line.split()[-1] if self.tcp else None
                 return self
         self.__exit__()
         raise Failure("the daemon did not start")

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """What is wanted, held against what was measured: derived from the parts `reach`, `family`, `tracers`, `distributed`,
-`view`, `ldc`, `abuffer`, `rayspace` and `quadtree`."""
+`view`, `warp`, `ldc`, `abuffer`, `rayspace` and `quadtree`."""
 from bench_common import significant, table, with_spread
 from bench_frames import distributed_row
 from bench_rays import CURVES, exponents, find_measure, find_wave, times_as_fast
@@ -84,7 +84,7 @@ def derive(parts):
     if "distributed" in parts:
         line, wanted, measured, where = distributed_row(parts["distributed"])
         rows.append(row(line, wanted, measured, where, at_most=True))
-    rows = [r for r in rows if r] + [r for part in ("view", "ldc", "abuffer", "rayspace", "quadtree") for r in parts.get(part, {}).get("wanted", [])]
+    rows = [r for r in rows if r] + [r for part in ("view", "warp", "ldc", "abuffer", "rayspace", "quadtree") for r in parts.get(part, {}).get("wanted", [])]
     if not rows:
         return None
     return {"rows": rows, "gpu": list(bandwidth_rows(scenes))}

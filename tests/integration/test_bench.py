@@ -21,9 +21,10 @@ import bench_plot  # noqa: E402  pylint: disable=wrong-import-position
 import bench_rays  # noqa: E402  pylint: disable=wrong-import-position
 import bench_reach  # noqa: E402  pylint: disable=wrong-import-position
 import bench_view  # noqa: E402  pylint: disable=wrong-import-position
+import bench_warp  # noqa: E402  pylint: disable=wrong-import-position
 
 TRACED = ("tracers", "family", "pixels", "rays", "flake", "reach")  # results of `bench tracers`
-PARTS = ("frames", "distributed", "steps", "link", "view", "tracers", "family", "pixels", "rays", "parallel", "instances",
+PARTS = ("frames", "distributed", "steps", "link", "view", "warp", "tracers", "family", "pixels", "rays", "parallel", "instances",
          "refit", "flake", "ldc", "abuffer", "rayspace", "quadtree", "reach")
 
 
@@ -209,6 +210,19 @@ class Benchmark(unittest.TestCase):
         text = (self.out / "bench.txt").read_text()
         for row in data["wanted"]:
             self.assertIn(row["line"], text)
+
+    def test_a_walk_over_a_link_is_measured_to_the_displayed_picture(self):
+        data = self.document["parts"]["warp"]
+        straight, reset = (next(link for link in data["links"] if link["resets"] == n and link["views"] == "off")
+                           for n in bench_warp.RESETS)
+        self.assertEqual(straight["lost"], 0)
+        self.assertGreaterEqual(straight["latency_ms"]["min"], straight["round_trip_ms"])
+        self.assertGreater(straight["displayed_per_s"]["max"], 0)
+        self.assertLess(0, straight["kbyte_per_s"])
+        self.assertGreater(straight["kbit_per_s"] / 8, straight["kbyte_per_s"])
+        for link in (straight, reset):
+            self.assertEqual(len(link["psnr_at"]), data["seconds"])  # one each second
+            self.assertGreater(link["psnr_db"]["min"], 5)  # below that of a grey picture: it shows something else
 
     def test_steps_are_reported_by_stage(self):
         forms = self.document["parts"]["steps"]["results"][0]["forms"]

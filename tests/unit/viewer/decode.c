@@ -153,6 +153,26 @@ TEST(after_a_damaged_frame_nothing_is_shown_before_a_key_frame)
     decoder_destroy(decoder);
 }
 
+/* Groups of pixels that exceed a row are the conversion's own affair. */
+TEST(nothing_is_written_past_the_pixels_of_a_picture_of_an_odd_width)
+{
+    enum { BYTES = (WIDTH - 1) * HEIGHT * 4, MARGIN = 1024 };
+    if (!packets[0])
+        skip();
+    struct decoder *decoder = decoder_create(&error);
+    struct pixmap picture = {.width = WIDTH - 1, .height = HEIGHT, .pixels = malloc(BYTES + MARGIN)};
+    struct fl_frame frame = frame_of(0);
+    assert_non_null(picture.pixels);
+    memset(picture.pixels, 0xa5, BYTES + MARGIN);
+    frame.width = WIDTH - 1; /* H.264 has even ones, of which the last column is not part of the picture */
+    assert_true(decode(decoder, &frame, &picture));
+    for (size_t i = BYTES; i < BYTES + MARGIN; i++)
+        assert_int_equal(picture.pixels[i], 0xa5);
+    assert_int_equal(picture.pixels[BYTES - 1], 255);
+    pixmap_finish(&picture);
+    decoder_destroy(decoder);
+}
+
 TEST(a_frame_of_another_size_than_announced_is_refused)
 {
     if (!packets[0])
