@@ -1,27 +1,35 @@
 // SPDX-License-Identifier: MIT
 // Where the rays of a tile of an eye's pixels may meet something first: with all before that left out, a ray looks at
-// a third of the nodes. Of each tile an RG32F texel: the greatest w at which there may be something, and
-// QUADTREE_BEAM_* bits with the level of the nodes that are about as large as what the tile sees.
+// a third of the nodes. Of each tile an RGBA32F texel: the greatest w at which there may be something; the level of the
+// node that rays begin in, and QUADTREE_BEAM_INSIDE; the w beyond which there is nothing; unused.
 //
 // The rays of a tile pass through a rectangle at each w. Between two of them lies what they may meet; what the nodes
 // there hold brings these two closer, and so on.
+//
+// Defines: QUADTREE_DDA as traverse.glsl has it: rays begin at the nearest surface.
 #include "common/dispatch.glsl"
 #include "common/camera.glsl"
 #include "quadtree/eye.glsl"
 
-layout(binding = IMAGE_QUADTREE_BEAMS, rg32f) writeonly uniform imageBuffer beams;
+layout(binding = IMAGE_QUADTREE_BEAMS, rgba32f) writeonly uniform imageBuffer beams;
 layout(binding = UNIT_QUADTREE_NODES) uniform usamplerBuffer quadtree_nodes;
 
 uniform uint first_tile, tile_count;
 uniform float eye_reach; // how far samples are from the middles of their pixels, pixels
+uniform float eye_near; // where rays begin, along the eye's view, metres
+uniform float eye_far;  // beyond all that the face sees, from its eye, metres
 
+#ifdef QUADTREE_DDA
+const int ROUNDS = 0;
+#else
 const int ROUNDS = 6;
+#endif
 const float ROUNDING = 1e-3; // a share of w, and a texel
 
 struct beam {
-    vec4 far; // least and greatest
-    vec2 along_of_eye; // with the share of the place, the rays' along
-    float eye_z, w_near, w_least;
+    vec4 far;  // of its rays: least and greatest
+    vec3 eye;  // in units
+    float w_near, w_last; // where they begin, or come before the eye of the face; beyond which there is nothing
 };
 
 beam beam_through(uvec2 first, uvec2 last)
@@ -29,11 +37,16 @@ beam beam_through(uvec2 first, uvec2 last)
     uvec2 view = view_of_pixel(first);
     vec3 eye = eye_of(view);
     vec2 low = vec2(pixel_in_view(first)) + 0.5 - eye_reach, high = low + vec2(last - first) + 2.0 * eye_reach;
-    beam b = beam(vec4(1e30, 1e30, -1e30, -1e30), eye.xy / quadtree.depths.x, eye.z / quadtree.depths.x, 0.0, 0.0);
+    float unit = quadtree.depths.x, near = quadtree.depths.w;
+    vec2 scale = quadtree.scale_centre.xy;
+    beam b = beam(vec4(1e30, 1e30, -1e30, -1e30), eye / unit, 0.0, 1e30);
     for (int i = 0; i < 4; i++) {
-        eye_line line = line_through(eye, vec2((i & 1) != 0 ? high.x : low.x, (i & 2) != 0 ? high.y : low.y));
-        b.far = vec4(min(b.far.xy, line.far), max(b.far.zw, line.far));
-        b.w_near = max(b.w_near, line.w_near);
+        vec3 direction = direction_through(vec2((i & 1) != 0 ? high.x : low.x, (i & 2) != 0 ? high.y : low.y));
+        vec2 far = line_of(eye, direction).far;
+        float reach = (length(vec3(eye.xy / scale, eye.z)) + eye_far) / length(vec3(direction.xy / scale, direction.z));
+        b.far = vec4(min(b.far.xy, far), max(b.far.zw, far));
+        b.w_near = max(b.w_near, unit / max(eye.z + eye_near * direction.z, near));
+        b.w_last = min(b.w_last, unit / max(eye.z + reach * direction.z, near));
     }
     return b;
 }
@@ -42,8 +55,8 @@ beam beam_through(uvec2 first, uvec2 last)
 vec4 places_at(beam b, float w)
 {
     vec4 middle = quadtree.scale_centre.zwzw;
-    float shrinks = max(1.0 - w * b.eye_z, 0.0);
-    return middle + (b.far - middle) * shrinks + w * b.along_of_eye.xyxy + ROUNDING * vec4(-1.0, -1.0, 1.0, 1.0);
+    float shrinks = max(1.0 - w * b.eye.z, 0.0);
+    return middle + (b.far - middle) * shrinks + w * b.eye.xyxy + ROUNDING * vec4(-1.0, -1.0, 1.0, 1.0);
 }
 
 // Least and greatest w of a node.
@@ -61,7 +74,7 @@ void main()
     if (item >= tile_count)
         return;
     uvec2 first = pixel_of_slot(tile << 6), last = first + 7u;
-    ivec2 size = ivec2(quadtree.width, quadtree.height), padded = ivec2(quadtree.padded_width, quadtree.padded_height);
+    ivec2 size = ivec2(quadtree.width, quadtree.height);
     beam b = beam_through(first, last);
     float w_greatest = min(b.w_near, uintBitsToFloat(texelFetch(quadtree_nodes, int(face_index(0u))).x)), w_least = 0.0;
     int level = QUADTREE_TOP;
@@ -73,7 +86,7 @@ void main()
         ivec2 apart = texels.zw - texels.xy;
         level = findMSB(max(max(apart.x, apart.y), 1)) + 1;
         if (level > QUADTREE_TOP) {
-            level = QUADTREE_TOP;
+            level = QUADTREE_TOP + 1;
             break;
         }
         ivec4 corners = texels >> level;
@@ -87,5 +100,10 @@ void main()
     }
     vec4 start = places_at(b, w_greatest);
     bool is_inside = is_one_view && all(greaterThanEqual(start.xy, vec2(0.0))) && all(lessThan(start.zw, vec2(size)));
-    imageStore(beams, int(item), vec4(w_greatest, float(level + (is_inside ? QUADTREE_BEAM_INSIDE : 0)), 0.0, 0.0));
+#ifdef QUADTREE_DDA
+    int begins = 0;
+#else
+    int begins = (is_one_view ? level - 1 : QUADTREE_TOP) + (is_inside ? QUADTREE_BEAM_INSIDE : 0);
+#endif
+    imageStore(beams, int(item), vec4(w_greatest, float(begins), b.w_last, 0.0));
 }

@@ -2,7 +2,8 @@
 // Where the rays of pinhole eyes meet the layers of a view (shared/eye_hit.h): what traverse.glsl finds, of rays that
 // are made on the way from planes alone.
 //
-// Defines: SPREAD as common/sample_place.glsl has it; QUADTREE_DDA as traverse.glsl has it.
+// Defines: SPREAD as common/sample_place.glsl has it; QUADTREE_DDA as traverse.glsl has it; QUADTREE_LAYERS how many layers
+// the face has.
 #include "shared/eye_hit.h"
 #include "common/dispatch.glsl"
 #include "common/sample_place.glsl"
@@ -10,9 +11,7 @@
 
 layout(binding = IMAGE_HITS, rgba32f) writeonly uniform imageBuffer eye_hits;
 layout(binding = UNIT_QUADTREE_NODES) uniform usamplerBuffer quadtree_nodes;
-#ifndef QUADTREE_DDA
 layout(binding = UNIT_QUADTREE_BEAMS) uniform samplerBuffer beams;
-#endif
 layout(std430, binding = BIND_QUADTREE_COUNTS) buffer count_block
 {
     quadtree_counts counts_of_kinds[QUADTREE_KINDS];
@@ -30,7 +29,7 @@ const float NEVER = -1.0; // of a w: behind all that a ray may meet
 
 // A ray on its way through a layer, from greater w to lesser.
 struct eye_walk {
-    eye_line line;
+    vec2 far, along, inverse; // a place of it is far + w * along
     float w, w_end;
     int level; // of the first node
     bool is_before;
@@ -42,21 +41,20 @@ struct eye_walk {
 
 void walk_layer(uint layer, inout eye_walk walk)
 {
-    eye_line line = walk.line;
-    vec2 along = mix(line.along, vec2(1e-9), lessThan(abs(line.along), vec2(1e-9))), inverse = 1.0 / along;
+    vec2 far = walk.far, along = walk.along;
     ivec2 forward = ivec2(lessThan(along, vec2(0.0))), padded = ivec2(quadtree.padded_width, quadtree.padded_height);
     float w = walk.w, w_end = walk.w_end, w_since = NEVER, w_before = walk.is_before ? w : NEVER;
     bool is_before = walk.is_before, is_met = false;
     int level = walk.level, first = int(layer * quadtree.slice_nodes);
-    ivec2 cell = clamp(ivec2(floor(line.far + w * along)), ivec2(0), padded - 1) >> level;
+    ivec2 cell = clamp(ivec2(floor(far + w * along)), ivec2(0), padded - 1) >> level;
     walk.w_met = walk.w_behind = NEVER;
     while (w > w_end && !is_met) {
         uvec2 node = texelFetch(quadtree_nodes, first + int(node_index(0u, uint(level), uvec2(cell)))).xy;
-        vec2 exits = (vec2((cell + forward) << level) - line.far) * inverse;
+        vec2 exits = (vec2((cell + forward) << level) - far) * walk.inverse;
         float w_out = clamp(max(exits.x, exits.y), w_end, w);
         bool is_plane = node_is_plane(node);
         vec2 slopes = plane_slopes(node), range = box_range(node);
-        float height = plane_w(node) + dot(slopes, line.far - node_centre(uint(level), uvec2(cell)));
+        float height = plane_w(node) + dot(slopes, far - node_centre(uint(level), uvec2(cell)));
         float growth = dot(slopes, along) - 1.0;
         float gap = w_out > range.x ? -1.0 : w < range.y ? range.y - w : 0.0; // of a box; 0: in it
         float gap_in = is_plane ? height + growth * w : gap, gap_out = is_plane ? height + growth * w_out : gap;
@@ -93,27 +91,26 @@ void walk_layer(uint layer, inout eye_walk walk)
 #else
         int up = min(findMSB((cell.x ^ next.x) | (cell.y ^ next.y)), QUADTREE_TOP - level);
 #endif
-        ivec2 below = clamp(ivec2(floor(line.far + w * along)) >> max(level - 1, 0), low, low + 1);
+        ivec2 below = clamp(ivec2(floor(far + w * along)) >> max(level - 1, 0), low, low + 1);
         cell = goes_down ? below : next >> up;
         level += goes_down ? -1 : up;
         w = goes_down ? w : is_out ? w_end : w_out;
     }
 }
 
-// The texel of a sample; `code`: what is counted of it.
-vec4 look(eye_line line, vec2 start, out uint code)
+// The texel of a sample; `beam`: of its tile; `code`: what is counted of it.
+vec4 look(eye_line line, vec4 beam, out uint code)
 {
-    vec2 size = vec2(quadtree.width, quadtree.height);
-    vec2 along = mix(line.along, vec2(1e-9), lessThan(abs(line.along), vec2(1e-9)));
-    vec2 a = -line.far / along, b = (size - line.far) / along, near_sides = max(a, b), far_sides = min(a, b);
-    float w_enters = min(line.w_near, min(near_sides.x, near_sides.y));
-    float w_side = max(far_sides.x, far_sides.y), w_leaves = max(line.w_last, w_side);
-    bool is_seen = w_enters > w_leaves;
     eye_walk walk;
-    walk.line = line;
-    walk.w = min(w_enters, start.x);
-    walk.w_end = is_seen ? w_leaves : 1e30;
-    int bits = int(start.y);
+    walk.far = line.far;
+    walk.along = mix(line.along, vec2(1e-9), lessThan(abs(line.along), vec2(1e-9)));
+    walk.inverse = 1.0 / walk.along;
+    vec2 a = -line.far * walk.inverse, b = (vec2(quadtree.width, quadtree.height) - line.far) * walk.inverse;
+    vec2 near_sides = max(a, b), far_sides = min(a, b);
+    float w_enters = min(near_sides.x, near_sides.y), w_leaves = max(far_sides.x, far_sides.y);
+    walk.w = min(w_enters, beam.x);
+    walk.w_end = max(w_leaves, beam.z);
+    int bits = int(beam.y);
     walk.level = bits & QUADTREE_BEAM_LEVEL;
     walk.is_before = (bits & QUADTREE_BEAM_INSIDE) != 0;
     walk.w_fill = NEVER;
@@ -121,11 +118,11 @@ vec4 look(eye_line line, vec2 start, out uint code)
     float w_hit = NEVER, w_unknown = NEVER, w_first = walk.w;
     uint hit_layer = 0u, layers = 1u;
     bool has_left = false, goes_on = true;
-    for (uint layer = 0u; layer < quadtree.layers && goes_on; layer++) {
+    for (uint layer = 0u; layer < QUADTREE_LAYERS && goes_on; layer++) {
         layers = layer + 1u;
         walk_layer(layer, walk);
         // A ray that comes into the view behind what is seen has passed that beside the view.
-        has_left = has_left || layer == 0u && walk.w_behind == w_first && w_first < line.w_near;
+        has_left = has_left || layer == 0u && walk.w_behind == w_first && w_enters < beam.x;
         if (walk.w_met > walk.w_end) {
             walk.w_end = w_hit = walk.w_met;
             hit_layer = layer;
@@ -136,14 +133,14 @@ vec4 look(eye_line line, vec2 start, out uint code)
         walk.level = START;
         walk.is_before = false;
     }
-    bool is_outside = !is_seen || w_hit == NEVER && w_side > line.w_last;
+    bool is_outside = w_hit == NEVER && (w_leaves > beam.z || w_enters <= beam.z);
     has_left = has_left || is_outside && w_unknown == NEVER;
     bool is_unknown = has_left || w_unknown > w_hit;
     bool is_filled = w_hit == NEVER && !has_left && walk.w_fill != NEVER;
     float w = is_filled ? walk.w_fill : w_hit;
     uint layer = is_filled ? walk.fill_layer : hit_layer;
     code = layers - 1u + (is_unknown ? has_left ? QUADTREE_OUTSIDE : QUADTREE_BEHIND : 0u);
-    return vec4(line.far + w * along, w / quadtree.depths.x,
+    return vec4(walk.far + w * walk.along, w * (1.0 / quadtree.depths.x),
                 float((w == NEVER ? 0u : (layer + 1u) * EYE_LAYER) + (is_unknown ? EYE_UNKNOWN : 0u)));
 }
 
@@ -156,15 +153,11 @@ void main()
     uvec2 pixel = pixel_of_slot(slot);
     uint code = QUADTREE_DEAD;
     vec4 found = vec4(0.0, 0.0, 0.0, float(EYE_DEAD));
-#ifdef QUADTREE_DDA
-    vec2 start = vec2(uintBitsToFloat(texelFetch(quadtree_nodes, int(face_index(0u))).x), 0.0);
-#else
-    vec2 start = texelFetch(beams, int((slot >> 6) - (first_slot >> 6))).xy;
-#endif
-    if (pixel.x < frame.width && pixel.y < frame.height)
-        found = look(line_through(eye_of(view_of_pixel(pixel)),
-                                  place_of_sample(pixel_in_view(pixel), k & (1u << frame.sample_shift) - 1u)),
-                     start, code);
+    if (pixel.x < frame.width && pixel.y < frame.height) {
+        vec2 place = place_of_sample(pixel_in_view(pixel), k & (1u << frame.sample_shift) - 1u);
+        eye_line line = line_of(eye_of(view_of_pixel(pixel)), direction_through(place));
+        found = look(line, texelFetch(beams, int((slot >> 6) - (first_slot >> 6))), code);
+    }
     imageStore(eye_hits, int(k), found);
     if (code != 0u)
         atomicAdd(outcomes[code], 1u);

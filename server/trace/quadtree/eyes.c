@@ -128,32 +128,31 @@ static void set_eyes(const struct gpu_program *program, const struct quadtree_un
     eye_of_view(u, frame, 0, 1, other);
     difference(other, first, 1.0f, other);
     set_vector(program, "eye_below", u, other);
-    const float far = u->depths[1], w_of_far = 1.0f / far - PLANES_APART * u->bounds[0] / u->depths[0];
-    gpu_uniform_float(program, "eye_near", frame->extent_near[2]);
-    gpu_uniform_float(program, "eye_far", 1.0f / fmaxf(w_of_far, 1.0f / (FARTHER_MAX * far)));
 }
 
 /* ---- passes ---- */
 
 struct programs {
-    const struct gpu_program *beams, *eyes; /* from texel to texel there are no beams */
+    const struct gpu_program *beams, *eyes;
 };
 
 /* Both may be announced. */
 static bool get_programs(const struct quadtree_store *store, bool spread, bool dda, struct programs *programs,
                          struct error *error)
 {
-    const struct gpu_program_source beams = {.compute = "quadtree/beams.comp"};
-    struct gpu_define defines[3] = {0};
+    static const char *const numbers[QUADTREE_LAYERS_MAX + 1] = {"0", "1", "2", "3"};
+    struct gpu_define defines[4] = {0};
     size_t n = 0;
-    if (spread)
-        defines[n++] = (struct gpu_define){"SPREAD", "1"};
     if (dda)
         defines[n++] = (struct gpu_define){"QUADTREE_DDA", "1"};
+    const struct gpu_program_source beams = {.compute = "quadtree/beams.comp", .defines = defines};
+    programs->beams = gpu_program_get(store->device, &beams, error);
+    defines[n++] = (struct gpu_define){"QUADTREE_LAYERS", numbers[store->uniforms.layers]};
+    if (spread)
+        defines[n++] = (struct gpu_define){"SPREAD", "1"};
     const struct gpu_program_source eyes = {.compute = "quadtree/eyes.comp", .defines = defines};
     programs->eyes = gpu_program_get(store->device, &eyes, error);
-    programs->beams = dda ? NULL : gpu_program_get(store->device, &beams, error);
-    return programs->eyes && (dda || programs->beams);
+    return programs->eyes && programs->beams;
 }
 
 /* Where the rays of each tile begin. */
@@ -161,15 +160,19 @@ static bool make_beams(const struct quadtree_store *store, struct quadtree_state
                        const struct eye_rays *rays, const struct gpu_program *program, struct error *error)
 {
     const uint32_t first = rays->first_slot / 64, end = (rays->first_slot + rays->slot_count + 63) / 64;
-    if (!gpu_buffer_reserve(store->device, &state->beams, (end - first) * 2 * sizeof(float), error))
+    const struct quadtree_uniforms *u = &store->uniforms;
+    const float far = u->depths[1], w_of_far = 1.0f / far - PLANES_APART * u->bounds[0] / u->depths[0];
+    if (!gpu_buffer_reserve(store->device, &state->beams, (end - first) * sizeof(vec4), error))
         return false;
-    set_eyes(program, &store->uniforms, rays->frame);
+    set_eyes(program, u, rays->frame);
+    gpu_uniform_float(program, "eye_near", rays->frame->extent_near[2]);
+    gpu_uniform_float(program, "eye_far", 1.0f / fmaxf(w_of_far, 1.0f / (FARTHER_MAX * far)));
     gpu_uniform_float(program, "eye_reach", rays->reach);
     gpu_uniform_uint(program, "first_tile", first);
     gpu_uniform_uint(program, "tile_count", end - first);
-    gpu_buffer_bind_image(store->device, &state->beams, IMAGE_QUADTREE_BEAMS, GL_RG32F);
+    gpu_buffer_bind_image(store->device, &state->beams, IMAGE_QUADTREE_BEAMS, GL_RGBA32F);
     gpu_dispatch(store->device, program, end - first);
-    gpu_buffer_bind_texels(store->device, &state->beams, UNIT_QUADTREE_BEAMS, GL_RG32F);
+    gpu_buffer_bind_texels(store->device, &state->beams, UNIT_QUADTREE_BEAMS, GL_RGBA32F);
     return true;
 }
 
@@ -198,7 +201,7 @@ bool quadtree_eye_hits(struct quadtree_store *store, struct quadtree_state *stat
     if (!get_programs(store, rays->spread, dda, &programs, error) || !quadtree_trace_begin(&state->base, error))
         return false;
     quadtree_store_bind(store);
-    if (!dda && !make_beams(store, state, rays, programs.beams, error))
+    if (!make_beams(store, state, rays, programs.beams, error))
         return false;
     set_eyes(programs.eyes, &store->uniforms, rays->frame);
     gpu_uniform_uint(programs.eyes, "first_slot", rays->first_slot);
