@@ -55,7 +55,7 @@ struct wave {
 struct eye_rays {
     const struct frame_uniforms *frame;
     uint32_t first_slot, slot_count; /* pixels, of each of which there are 2 to the power of frame->sample_shift */
-    bool spread;                     /* their samples are where common/sample_place.glsl says with SPREAD */
+    bool spread;                     /* SPREAD of common/sample_place.glsl */
     float reach;                     /* so far from a pixel's centre at most, pixels */
     struct gpu_buffer *hits;         /* RGBA32F texels, shared/eye_hit.h */
 };

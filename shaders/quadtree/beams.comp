@@ -103,7 +103,8 @@ void main()
 #ifdef QUADTREE_DDA
     int begins = 0;
 #else
-    int begins = (is_one_view ? level - 1 : QUADTREE_TOP) + (is_inside ? QUADTREE_BEAM_INSIDE : 0);
+    // Somewhat smaller than what the tile sees: such nodes are nearer to the surface than large ones, and seen as fast.
+    int begins = (is_one_view ? max(level - 2, 0) : QUADTREE_TOP) + (is_inside ? QUADTREE_BEAM_INSIDE : 0);
 #endif
     imageStore(beams, int(item), vec4(w_greatest, float(begins), b.w_last, 0.0));
 }

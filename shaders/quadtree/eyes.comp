@@ -48,7 +48,8 @@ void walk_layer(uint layer, inout eye_walk walk)
     int level = walk.level, first = int(layer * quadtree.slice_nodes);
     ivec2 cell = clamp(ivec2(floor(far + w * along)), ivec2(0), padded - 1) >> level;
     walk.w_met = walk.w_behind = NEVER;
-    while (w > w_end && !is_met) {
+    while (true) { // XX
+        bool is_on_way = w > w_end;
         uvec2 node = texelFetch(quadtree_nodes, first + int(node_index(0u, uint(level), uvec2(cell)))).xy;
         vec2 exits = (vec2((cell + forward) << level) - far) * walk.inverse;
         float w_out = clamp(max(exits.x, exits.y), w_end, w);
@@ -60,16 +61,19 @@ void walk_layer(uint layer, inout eye_walk walk)
         float gap_in = is_plane ? height + growth * w : gap, gap_out = is_plane ? height + growth * w_out : gap;
         bool goes_down = !is_plane && gap == 0.0, passes = (gap_in > 0.0) != (gap_out > 0.0);
         // Or between two planes that do not quite meet.
-        is_met = is_plane && (passes || is_before && gap_in > 0.0 &&
+        is_met = is_on_way && is_plane && (passes || is_before && gap_in > 0.0 &&
                                             gap_in <= QUADTREE_EDGE_SHARE * plane_w(node) + quadtree.bounds.x);
-        walk.w_met = is_met ? (passes ? mix(w, w_out, clamp(gap_in / (gap_in - gap_out), 0.0, 1.0)) : w) : NEVER;
+        if (is_met) {
+            walk.w_met = passes ? mix(w, w_out, clamp(gap_in / (gap_in - gap_out), 0.0, 1.0)) : w;
+            break;
+        }
 
         if (!goes_down) {
             is_before = gap_out <= 0.0;
             w_before = is_before ? mix(w, w_out, 0.99) : w_before;
             w_since = is_before ? NEVER : max(w_since, w);
             vec2 way = abs(along) * (w_since - w_out);
-            bool stays = !is_met && !is_before &&
+            bool stays = is_on_way && !is_before &&
                          (gap_out > QUADTREE_DEEP * w_out || max(way.x, way.y) > QUADTREE_OWN_WAY);
             if (stays && w_since > walk.w_behind) {
                 walk.w_behind = w_since;
@@ -95,6 +99,8 @@ void walk_layer(uint layer, inout eye_walk walk)
         cell = goes_down ? below : next >> up;
         level += goes_down ? -1 : up;
         w = goes_down ? w : is_out ? w_end : w_out;
+        if (!(w > w_end))
+            break;
     }
 }
 

@@ -2,7 +2,7 @@
 // Rays and paths of a slice's samples, those of one pixel side by side; the slice's sums are set to black.
 // Defines:
 //   VISIBILITY  what the rasteriser saw is noted in the hits, for primary_fill.comp; else they are left to a tracer
-//   SPREAD      as common/sample_place.glsl has it
+//   SPREAD      each pixel has its samples where its own numbers say; else all have them where frame.sample_places says
 //   HAS_LENS    rays start on a lens and meet in the plane in focus
 //   HAS_TILES   of the texels of a key view, rays through those that no eye looks at are dead (render/tiles.glsl)
 //   HAS_TIMES   something moves: rays have a time
@@ -43,7 +43,11 @@ void main()
     uvec2 in_view = pixel_in_view(pixel);
     uint seed = sequence_seed(number_in_view(in_view), frame.seed);
     uint sample_ = k & (1u << frame.sample_shift) - 1u, index = frame.sample_index + sample_;
+#ifdef SPREAD
     vec2 place = place_of_sample(in_view, sample_);
+#else
+    vec2 place = vec2(in_view) + sample_place(sample_);
+#endif
     vec3 origin, direction;
     float t_min, time = 0.0;
 #ifdef HAS_LENS
