@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Where the rays of a tile of an eye's pixels may meet something first: with all before that left out, a ray looks at
 // a third of the nodes. Of each tile an RGBA32F texel: the greatest w at which there may be something; the level of the
-// node that rays begin in, and QUADTREE_BEAM_INSIDE; the w beyond which there is nothing; unused.
+// node that rays begin in, and QUADTREE_BEAM_INSIDE; how far along them there is something, metres; unused.
 //
 // The rays of a tile pass through a rectangle at each w. Between two of them lies what they may meet; what the nodes
 // there hold brings these two closer, and so on.
@@ -29,7 +29,7 @@ const float ROUNDING = 1e-3; // a share of w, and a texel
 struct beam {
     vec4 far;  // of its rays: least and greatest
     vec3 eye;  // in units
-    float w_near, w_last; // where they begin, or come before the eye of the face; beyond which there is nothing
+    float w_near; // where they begin, or come before the eye of the face
 };
 
 beam beam_through(uvec2 first, uvec2 last)
@@ -38,15 +38,12 @@ beam beam_through(uvec2 first, uvec2 last)
     vec3 eye = eye_of(view);
     vec2 low = vec2(pixel_in_view(first)) + 0.5 - eye_reach, high = low + vec2(last - first) + 2.0 * eye_reach;
     float unit = quadtree.depths.x, near = quadtree.depths.w;
-    vec2 scale = quadtree.scale_centre.xy;
-    beam b = beam(vec4(1e30, 1e30, -1e30, -1e30), eye / unit, 0.0, 1e30);
+    beam b = beam(vec4(1e30, 1e30, -1e30, -1e30), eye / unit, 0.0);
     for (int i = 0; i < 4; i++) {
         vec3 direction = direction_through(vec2((i & 1) != 0 ? high.x : low.x, (i & 2) != 0 ? high.y : low.y));
         vec2 far = line_of(eye, direction).far;
-        float reach = (length(vec3(eye.xy / scale, eye.z)) + eye_far) / length(vec3(direction.xy / scale, direction.z));
         b.far = vec4(min(b.far.xy, far), max(b.far.zw, far));
         b.w_near = max(b.w_near, unit / max(eye.z + eye_near * direction.z, near));
-        b.w_last = min(b.w_last, unit / max(eye.z + reach * direction.z, near));
     }
     return b;
 }
@@ -106,5 +103,7 @@ void main()
     // Somewhat smaller than what the tile sees: such nodes are nearer to the surface than large ones, and seen as fast.
     int begins = (is_one_view ? max(level - 2, 0) : QUADTREE_TOP) + (is_inside ? QUADTREE_BEAM_INSIDE : 0);
 #endif
-    imageStore(beams, int(item), vec4(w_greatest, float(begins), b.w_last, 0.0));
+    vec3 eye = eye_of(view_of_pixel(first));
+    float reach = length(vec3(eye.xy / quadtree.scale_centre.xy, eye.z)) + eye_far;
+    imageStore(beams, int(item), vec4(w_greatest, float(begins), reach, 0.0));
 }

@@ -12,6 +12,7 @@ uniform vec3 eye_first, eye_across, eye_below;
 
 struct eye_line {
     vec2 far, along;
+    float cosine; // of its angle with the forward direction
 };
 
 vec3 eye_of(uvec2 view)
@@ -27,5 +28,7 @@ vec3 direction_through(vec2 place)
 eye_line line_of(vec3 eye, vec3 direction)
 {
     vec2 heading = direction.xy * (1.0 / direction.z);
-    return eye_line(quadtree.scale_centre.zw + heading, (eye.xy - eye.z * heading) * (1.0 / quadtree.depths.x));
+    vec2 aside = heading / quadtree.scale_centre.xy;
+    return eye_line(quadtree.scale_centre.zw + heading, (eye.xy - eye.z * heading) * (1.0 / quadtree.depths.x),
+                    inversesqrt(1.0 + dot(aside, aside)));
 }

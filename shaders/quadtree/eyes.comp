@@ -105,8 +105,10 @@ void walk_layer(uint layer, inout eye_walk walk)
 }
 
 // The texel of a sample; `beam`: of its tile; `code`: what is counted of it.
-vec4 look(eye_line line, vec4 beam, out uint code)
+vec4 look(vec3 eye, vec2 place, vec4 beam, out uint code)
 {
+    eye_line line = line_of(eye, direction_through(place));
+    float w_last = quadtree.depths.x / max(eye.z + beam.z * line.cosine, quadtree.depths.w);
     eye_walk walk;
     walk.far = line.far;
     walk.along = mix(line.along, vec2(1e-9), lessThan(abs(line.along), vec2(1e-9)));
@@ -115,7 +117,7 @@ vec4 look(eye_line line, vec4 beam, out uint code)
     vec2 near_sides = max(a, b), far_sides = min(a, b);
     float w_enters = min(near_sides.x, near_sides.y), w_leaves = max(far_sides.x, far_sides.y);
     walk.w = min(w_enters, beam.x);
-    walk.w_end = max(w_leaves, beam.z);
+    walk.w_end = max(w_leaves, w_last);
     int bits = int(beam.y);
     walk.level = bits & QUADTREE_BEAM_LEVEL;
     walk.is_before = (bits & QUADTREE_BEAM_INSIDE) != 0;
@@ -139,10 +141,10 @@ vec4 look(eye_line line, vec4 beam, out uint code)
         walk.level = START;
         walk.is_before = false;
     }
-    bool is_outside = w_hit == NEVER && (w_leaves > beam.z || w_enters <= beam.z);
+    bool is_outside = w_hit == NEVER && (w_leaves > w_last || w_enters <= w_last);
     has_left = has_left || is_outside && w_unknown == NEVER;
     bool is_unknown = has_left || w_unknown > w_hit;
-    bool is_filled = w_hit == NEVER && !has_left && walk.w_fill != NEVER;
+    bool is_filled = w_hit == NEVER && w_unknown != NEVER && !has_left && walk.w_fill != NEVER;
     float w = is_filled ? walk.w_fill : w_hit;
     uint layer = is_filled ? walk.fill_layer : hit_layer;
     code = layers - 1u + (is_unknown ? has_left ? QUADTREE_OUTSIDE : QUADTREE_BEHIND : 0u);
@@ -161,8 +163,8 @@ void main()
     vec4 found = vec4(0.0, 0.0, 0.0, float(EYE_DEAD));
     if (pixel.x < frame.width && pixel.y < frame.height) {
         vec2 place = place_of_sample(pixel_in_view(pixel), k & (1u << frame.sample_shift) - 1u);
-        eye_line line = line_of(eye_of(view_of_pixel(pixel)), direction_through(place));
-        found = look(line, texelFetch(beams, int((slot >> 6) - (first_slot >> 6))), code);
+        vec4 beam = texelFetch(beams, int((slot >> 6) - (first_slot >> 6)));
+        found = look(eye_of(view_of_pixel(pixel)), place, beam, code);
     }
     imageStore(eye_hits, int(k), found);
     if (code != 0u)

@@ -56,8 +56,7 @@ bool bench_eye_pass_is_short(const struct bench_eye_pass *pass, const struct tra
 
 static bool run_short(struct bench_eye_pass *pass, struct tracer *tracer, struct error *error)
 {
-    const struct eye_rays eyes = {
-        .frame = &pass->uniforms, .slot_count = pixels_of(pass), .hits = &pass->hits};
+    const struct eye_rays eyes = {.frame = &pass->uniforms, .slot_count = pixels_of(pass), .hits = &pass->hits};
     if (!tracer->state)
         tracer->state = trace_state_create(tracer->impl, tracer->device, &tracer->options, error);
     return tracer->state && tracer_eye_hits(tracer, pass->scene, tracer->state, &eyes, error);
@@ -86,8 +85,8 @@ bool bench_eye_pass_run(struct bench_eye_pass *pass, struct tracer *tracer, stru
 {
     gpu_scene_bind(pass->scene);
     gpu_buffer_bind_uniform(&pass->uniform_buffer, UNIFORM_FRAME);
-    const bool done = bench_eye_pass_is_short(pass, tracer) ? run_short(pass, tracer, error)
-                                                            : run_rays(pass, tracer, error);
+    const bool done =
+        bench_eye_pass_is_short(pass, tracer) ? run_short(pass, tracer, error) : run_rays(pass, tracer, error);
     glFinish();
     return done;
 }

@@ -335,7 +335,8 @@ static json_t *contender_json(const struct bench *bench, const struct contender 
         bench_times_json(&contender->phases[NODES]), "trace_ns", bench_times_json(&contender->trace),
         "traversal_ns", bench_times_json(&contender->traversal), "unknown", (int)contender->unknown, "known",
         (int)known, "agree", (int)contender->agree);
-    const bool has_steps = is_quadtree(contender), is_short = bench_eye_pass_is_short(&bench->eye, contender->tracer);
+    const bool has_steps = is_quadtree(contender),
+               is_short = bench_eye_pass_is_short(&bench->eye, contender->tracer);
     json_object_set_new(object, "eye_ns", bench_times_json(&contender->eye));
     json_object_set_new(object, "eye_unknown", is_short ? json_integer(contender->eye_unknown) : json_null());
     json_object_set_new(object, "eye_agree", is_short ? json_integer(contender->eye_agree) : json_null());

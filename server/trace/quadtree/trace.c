@@ -88,7 +88,8 @@ bool quadtree_state_tell(struct trace_state *state, struct structure_rows *rows,
     add_eyes(&counts, own->eye_samples);
     for (unsigned kind = 0; kind < RAY_COUNT; kind++)
         if (counts.kinds[kind].rays > 0)
-            tell_kind(&counts.kinds[kind], (enum ray_kind)kind, quadtree_layer_count(&state->options.quadtree), rows);
+            tell_kind(&counts.kinds[kind], (enum ray_kind)kind, quadtree_layer_count(&state->options.quadtree),
+                      rows);
     return true;
 }
 
