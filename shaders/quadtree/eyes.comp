@@ -44,11 +44,13 @@ void walk_layer(uint layer, inout eye_walk walk)
     vec2 far = walk.far, along = walk.along;
     ivec2 forward = ivec2(lessThan(along, vec2(0.0))), padded = ivec2(quadtree.padded_width, quadtree.padded_height);
     float w = walk.w, w_end = walk.w_end, w_since = NEVER, w_before = walk.is_before ? w : NEVER;
-    bool is_before = walk.is_before, is_met = false;
+    bool is_before = walk.is_before;
     int level = walk.level, first = int(layer * quadtree.slice_nodes);
     ivec2 cell = clamp(ivec2(floor(far + w * along)), ivec2(0), padded - 1) >> level;
     walk.w_met = walk.w_behind = NEVER;
-    while (true) { // XX
+    // Where lanes go side by side, a loop that begins with its condition does all once more for the last of them. And Mesa's
+    // llvmpipe (22.3) takes what a loop has computed from its last round of any lane, unless different ways out assign it.
+    while (true) {
         bool is_on_way = w > w_end;
         uvec2 node = texelFetch(quadtree_nodes, first + int(node_index(0u, uint(level), uvec2(cell)))).xy;
         vec2 exits = (vec2((cell + forward) << level) - far) * walk.inverse;
@@ -61,7 +63,7 @@ void walk_layer(uint layer, inout eye_walk walk)
         float gap_in = is_plane ? height + growth * w : gap, gap_out = is_plane ? height + growth * w_out : gap;
         bool goes_down = !is_plane && gap == 0.0, passes = (gap_in > 0.0) != (gap_out > 0.0);
         // Or between two planes that do not quite meet.
-        is_met = is_on_way && is_plane && (passes || is_before && gap_in > 0.0 &&
+        bool is_met = is_on_way && is_plane && (passes || is_before && gap_in > 0.0 &&
                                             gap_in <= QUADTREE_EDGE_SHARE * plane_w(node) + quadtree.bounds.x);
         if (is_met) {
             walk.w_met = passes ? mix(w, w_out, clamp(gap_in / (gap_in - gap_out), 0.0, 1.0)) : w;

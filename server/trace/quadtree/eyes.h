@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* The rays of pinhole eyes near the view's own (shaders/quadtree/eyes.comp), of which neither rays nor hits are
- * buffers: a third of the time. */
+ * buffers: a quarter of the time. */
 #ifndef FARLIGHT_TRACE_QUADTREE_EYES_H
 #define FARLIGHT_TRACE_QUADTREE_EYES_H
 
