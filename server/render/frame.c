@@ -218,8 +218,9 @@ static bool begin_slice(struct frame_renderer *renderer, struct error *error)
     }
     layers_begin_slice(&renderer->work->layers, context);
     renderer->phase = PHASE_PRIMARY;
-    return primary_begin_slice(rasterised(renderer), context, error) &&
-           gpu_check_reset(renderer->device, "primary rays", error);
+    const bool begun = frame_is_eyes_pass(renderer) ? frame_key_begin_slice(renderer, error)
+                                                    : primary_begin_slice(rasterised(renderer), context, error);
+    return begun && gpu_check_reset(renderer->device, "primary rays", error);
 }
 
 static bool trace_wave(struct frame_renderer *renderer, struct error *error)

@@ -296,14 +296,13 @@ static void announce_programs(struct frame_renderer *renderer)
     struct wave_passes *passes = &renderer->work->passes;
     gpu_program_announce(renderer->device, true);
     /* What takes longest begins first; the rest is in the order of its use. */
-    if (!frame_is_eyes_pass(renderer))
+    if (frame_is_eyes_pass(renderer)) {
+        frame_key_announce(renderer);
+    } else {
         wave_passes_announce_shadows(passes, context);
-    primary_announce(context, renderer->rasterise);
-    if (frame_is_eyes_pass(renderer))
-        key_view_announce(context, renderer->work->layers.wanted & 1u << LAYER_UNKNOWN,
-                          frame_key_gather(renderer));
-    else
+        primary_announce(context, renderer->rasterise);
         wave_passes_announce(passes, context);
+    }
     picture_announce(renderer->target, context);
     gpu_program_announce(renderer->device, false);
 }

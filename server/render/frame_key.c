@@ -6,6 +6,7 @@
 
 #include "render/compact.h"
 #include "render/frame_request.h"
+#include "shared/layers.h"
 
 #include <math.h>
 #include <string.h>
@@ -222,22 +223,61 @@ bool frame_key_keep(struct frame_renderer *renderer, struct error *error)
     return true;
 }
 
-enum key_gather frame_key_gather(const struct frame_renderer *renderer)
+/* Other layers of the picture are made from the surfaces that rays hit. */
+static bool are_found(const struct frame_renderer *renderer)
 {
-    return frame_is_mark_pass(renderer) ? KEY_GATHER_MARK : renderer->key.is_marked ? KEY_GATHER_KEPT : KEY_GATHER;
+    const struct render_context *context = &renderer->work->context;
+    return !(renderer->work->layers.wanted & ~LAYER_BIT_UNKNOWN) && !context->comparison &&
+           tracer_finds_eyes(context->tracer, context->scene, &context->uniforms);
+}
+
+struct key_eyes frame_key_eyes(const struct frame_renderer *renderer)
+{
+    if (frame_is_mark_pass(renderer))
+        return (struct key_eyes){KEY_GATHER_MARK, are_found(renderer)};
+    if (renderer->key.is_marked)
+        return (struct key_eyes){KEY_GATHER_KEPT, true};
+    return (struct key_eyes){KEY_GATHER, are_found(renderer)};
+}
+
+void frame_key_announce(struct frame_renderer *renderer)
+{
+    struct render_context *context = &renderer->work->context;
+    const struct key_eyes eyes = frame_key_eyes(renderer);
+    if (!eyes.are_found)
+        primary_announce(context, false);
+    else if (eyes.what != KEY_GATHER_KEPT)
+        (void)primary_find_eyes(context, NULL);
+    key_view_announce(&renderer->key, context, renderer->work->layers.wanted & LAYER_BIT_UNKNOWN, &eyes);
+}
+
+bool frame_key_begin_slice(struct frame_renderer *renderer, struct error *error)
+{
+    struct render_context *context = &renderer->work->context;
+    if (!frame_key_eyes(renderer).are_found)
+        return primary_begin_slice(NULL, context, error);
+    primary_begin_eyes(context);
+    return true;
+}
+
+static bool intersect(struct render_context *context, const struct key_eyes *eyes, bool *done, struct error *error)
+{
+    *done = true;
+    if (eyes->what == KEY_GATHER_KEPT)
+        return true;
+    return eyes->are_found ? primary_find_eyes(context, error) : primary_intersect(context, done, error);
 }
 
 bool frame_key_find(struct frame_renderer *renderer, bool *done, struct error *error)
 {
     struct render_context *context = &renderer->work->context;
     struct layers *layers = &renderer->work->layers;
-    const enum key_gather what = frame_key_gather(renderer);
-    *done = true;
-    if (what != KEY_GATHER_KEPT && !primary_intersect(context, done, error))
+    const struct key_eyes eyes = frame_key_eyes(renderer);
+    if (!intersect(context, &eyes, done, error))
         return false;
     if (!*done)
         return true;
-    return key_view_gather(&renderer->key, context, layers, &renderer->picture, what, error) &&
+    return key_view_gather(&renderer->key, context, layers, &renderer->picture, &eyes, error) &&
            (!layers->noting || primary_make_surfaces(context, error));
 }
 

@@ -127,8 +127,10 @@ struct frame_camera frame_key_camera(const struct frame_request *request);
 bool frame_is_layer_pass(const struct frame_renderer *renderer);
 bool frame_is_mark_pass(const struct frame_renderer *renderer); /* a pass over the eyes as well */
 bool frame_is_eyes_pass(const struct frame_renderer *renderer);
-/* What the pass over the eyes does. */
-enum key_gather frame_key_gather(const struct frame_renderer *renderer);
+/* The pass over the eyes, once the frame is ready for it. */
+struct key_eyes frame_key_eyes(const struct frame_renderer *renderer);
+void frame_key_announce(struct frame_renderer *renderer);
+bool frame_key_begin_slice(struct frame_renderer *renderer, struct error *error);
 /* All eyes are intersected: goes on to the layers. */
 bool frame_key_end_marks(struct frame_renderer *renderer, struct error *error);
 /* Of a layer of which only tiles are rendered: as many rows as the picture of those has. */

@@ -157,14 +157,20 @@ bool key_view_list_tiles(struct key_view *key, struct gpu_device *device, struct
     return good;
 }
 
-static const struct gpu_program *gather_program(struct render_context *context, bool has_unknown,
-                                                enum key_gather what, struct error *error)
+static const struct gpu_program *gather_program(const struct key_view *key, struct render_context *context,
+                                                bool has_unknown, const struct key_eyes *eyes, struct error *error)
 {
+    static const char *const numbers[KEY_LAYERS_MAX + 1] = {"0", "1", "2", "3"};
     const struct integrator *integrator = integrator_by_number(context->request.integrator);
-    struct gpu_define defines[5] = {0};
+    struct gpu_define defines[9] = {0};
     size_t n = 0;
-    if (what != KEY_GATHER)
-        defines[n++] = (struct gpu_define){what == KEY_GATHER_MARK ? "MARK" : "KEPT", "1"};
+    defines[n++] = (struct gpu_define){"KEY_LAYERS", numbers[key->layer_count]};
+    if (eyes->what != KEY_GATHER)
+        defines[n++] = (struct gpu_define){eyes->what == KEY_GATHER_MARK ? "MARK" : "KEPT", "1"};
+    if (eyes->are_found && eyes->what != KEY_GATHER_KEPT)
+        defines[n++] = (struct gpu_define){"EYES", "1"};
+    if (context->spread)
+        defines[n++] = (struct gpu_define){"SPREAD", "1"};
     if (context->environment->kind == ENVIRONMENT_IMAGE)
         defines[n++] = (struct gpu_define){"HAS_ENVIRONMENT_IMAGE", "1"};
     if (integrator->left_scene && strcmp(integrator->left_scene, "OPEN") == 0)
@@ -200,63 +206,64 @@ static void set_view(const struct key_view *key, const struct quadtree_settings 
     gpu_uniform_uint(program, "key_orthographic", orthographic);
     gpu_uniform_uint(program, "key_width", view->width);
     gpu_uniform_uint(program, "key_height", view->height);
-    gpu_uniform_uint(program, "key_layers", key->layer_count);
     gpu_uniform_float(program, "key_bound", bound_of(key, settings, half_height));
 }
 
 static void bind_layers(struct key_view *key, struct gpu_device *device)
 {
     static const unsigned units[KEY_LAYERS_MAX] = {UNIT_KEY_LAYER_0, UNIT_KEY_LAYER_1, UNIT_KEY_LAYER_2};
-    for (uint32_t i = 0; i < KEY_LAYERS_MAX; i++) /* those that are not there are not read */
-        gpu_buffer_bind_texels(device, &key->layers[i < key->layer_count ? i : 0], units[i], GL_RGBA32F);
+    for (uint32_t i = 0; i < key->layer_count; i++)
+        gpu_buffer_bind_texels(device, &key->layers[i], units[i], GL_RGBA32F);
 }
 
 static void bind_eyes(struct key_view *key, struct render_context *context, const struct picture *picture,
-                      enum key_gather what, const struct gpu_program *program)
+                      const struct key_eyes *eyes, const struct gpu_program *program)
 {
     uint32_t first_slot = 0;
     struct gpu_buffer *band = picture_slice_band(picture, &context->slice, &first_slot);
-    gpu_buffer_bind_texels(context->device, &context->rays, UNIT_RAYS, GL_RGBA32F);
-    gpu_buffer_bind_texels(context->device, &context->hits, UNIT_SHADE_HITS, GL_RGBA32UI);
+    if (!eyes->are_found)
+        gpu_buffer_bind_texels(context->device, &context->rays, UNIT_RAYS, GL_RGBA32F);
+    gpu_buffer_bind_texels(context->device, &context->hits, UNIT_SHADE_HITS,
+                           eyes->are_found ? GL_RGBA32F : GL_RGBA32UI);
     gpu_buffer_bind_storage(&context->slice_sums, BIND_SLICE_SUMS);
     gpu_buffer_bind_storage(&key->counts, BIND_KEY_COUNTS);
-    if (what == KEY_GATHER_MARK)
+    gpu_uniform_uint(program, "first_slot", context->slice.first_slot);
+    if (eyes->what == KEY_GATHER_MARK)
         gpu_buffer_bind_storage(&key->marks, BIND_KEY_MARKS);
-    if (what == KEY_GATHER_KEPT) {
+    if (eyes->what == KEY_GATHER_KEPT) {
         gpu_buffer_bind_storage(band, BIND_ACCUMULATION);
         gpu_uniform_uint(program, "first_kept", first_slot);
     }
 }
 
 bool key_view_gather(struct key_view *key, struct render_context *context, struct layers *layers,
-                     const struct picture *picture, enum key_gather what, struct error *error)
+                     const struct picture *picture, const struct key_eyes *eyes, struct error *error)
 {
     const uint32_t first_unknown = layers_take_unknown(layers);
     const bool has_unknown = first_unknown != UINT32_MAX;
-    const struct gpu_program *program = gather_program(context, has_unknown, what, error);
+    const struct gpu_program *program = gather_program(key, context, has_unknown, eyes, error);
     if (!program)
         return false;
     context_span_begin(context, STAGE_SHADE);
     context_bind(context);
-    bind_eyes(key, context, picture, what, program);
+    bind_eyes(key, context, picture, eyes, program);
     bind_layers(key, context->device);
     if (has_unknown) {
         gpu_buffer_bind_storage(&layers->sums, BIND_LAYER_SUMS);
         gpu_uniform_uint(program, "first_unknown", first_unknown);
     }
-    if (context->uniforms.lens[0] > 0.0f) {
+    if (context->uniforms.lens[0] > 0.0f)
         gpu_uniform_uint(program, "lens_more", LENS_MORE);
-        gpu_uniform_uint(program, "first_slot", context->slice.first_slot);
-    }
     set_view(key, &context->tracer->options.quadtree, program);
     compact_dispatch(context, program, WAVE_RAYS);
     context_span_end(context);
     return gpu_check(context->device, "gathering from a key view", error);
 }
 
-void key_view_announce(struct render_context *context, bool has_unknown, enum key_gather what)
+void key_view_announce(const struct key_view *key, struct render_context *context, bool has_unknown,
+                       const struct key_eyes *eyes)
 {
-    (void)gather_program(context, has_unknown, what, NULL);
+    (void)gather_program(key, context, has_unknown, eyes, NULL);
 }
 
 /* ---- counts ---- */

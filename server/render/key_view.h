@@ -29,11 +29,14 @@ struct key_view {
     uint32_t tile_rows[KEY_LAYERS_MAX];
 };
 
-/* What a pass over the eyes does. */
-enum key_gather {
-    KEY_GATHER,      /* from intersections of the slice's rays to its sums */
-    KEY_GATHER_MARK, /* keeps intersections as sums, and marks texels */
-    KEY_GATHER_KEPT, /* takes such from the picture, and leaves black there */
+/* A pass over the eyes. */
+struct key_eyes {
+    enum key_gather {
+        KEY_GATHER,      /* from where the slice's rays meet layers to its sums */
+        KEY_GATHER_MARK, /* keeps that as sums, and marks texels */
+        KEY_GATHER_KEPT, /* takes it from the picture, and leaves black there */
+    } what;
+    bool are_found; /* context->hits have what shared/eye_hit.h says; else there are rays and intersections */
 };
 
 /* Whether they show what that frame asks for. */
@@ -53,8 +56,9 @@ bool key_view_mark_anew(struct key_view *key, struct gpu_device *device, struct 
 bool key_view_list_tiles(struct key_view *key, struct gpu_device *device, struct error *error);
 /* Of the slice in hand, of that picture. LAYER_UNKNOWN is written too, if it is wanted. */
 bool key_view_gather(struct key_view *key, struct render_context *context, struct layers *layers,
-                     const struct picture *picture, enum key_gather what, struct error *error);
-void key_view_announce(struct render_context *context, bool has_unknown, enum key_gather what);
+                     const struct picture *picture, const struct key_eyes *eyes, struct error *error);
+void key_view_announce(const struct key_view *key, struct render_context *context, bool has_unknown,
+                       const struct key_eyes *eyes);
 /* The samples of the frame that no layer shows: clears their count, begins to copy it, and takes the copy. */
 bool key_view_count_anew(struct key_view *key, struct gpu_device *device, struct error *error);
 bool key_view_copy_count(struct key_view *key, struct gpu_device *device, struct error *error);

@@ -3,6 +3,7 @@
 
 #include "base/clock.h"
 #include "render/compact.h"
+#include "render/pixel_filter.h"
 #include "render/wave_trace.h"
 #include "shared/bindings.h"
 #include "shared/key_view.h"
@@ -215,17 +216,44 @@ static bool trace_hits(struct render_context *context, bool *done, struct error 
     return wave_trace(context, RAY_PRIMARY, &wave, done, error);
 }
 
-bool primary_begin_slice(const struct primary *primary, struct render_context *context, struct error *error)
+static void begin_wave(struct render_context *context, bool sampled)
 {
     context->ray_count = context->slice.slot_count << context->uniforms.sample_shift;
     context->wave_number = context->asked = context->asking = 0;
-    const struct tracer *tracer = context->layer_tracer ? context->layer_tracer : context->tracer;
-    context->sampled_hits = !primary && tracer->impl->sampled;
+    context->sampled_hits = sampled;
     compact_begin(context);
+}
+
+bool primary_begin_slice(const struct primary *primary, struct render_context *context, struct error *error)
+{
+    const struct tracer *tracer = context->layer_tracer ? context->layer_tracer : context->tracer;
+    begin_wave(context, !primary && tracer->impl->sampled);
     context_span_begin(context, STAGE_PRIMARY);
     bool made = make_rays(primary, context, error);
     context_span_end(context);
     return made;
+}
+
+void primary_begin_eyes(struct render_context *context)
+{
+    begin_wave(context, false);
+}
+
+bool primary_find_eyes(struct render_context *context, struct error *error)
+{
+    const struct eye_rays rays = {
+        .frame = &context->uniforms,
+        .first_slot = context->slice.first_slot,
+        .slot_count = context->slice.slot_count,
+        .spread = context->spread,
+        .reach = context->spread ? (float)pixel_filter_radius(context->request.filter) : 0.0f,
+        .hits = &context->hits,
+    };
+    context_span_begin(context, STAGE_PRIMARY);
+    context_bind(context);
+    const bool found = tracer_eye_hits(context->tracer, context->scene, context->trace_state, &rays, error);
+    context_span_end(context);
+    return found;
 }
 
 bool primary_intersect(struct render_context *context, bool *done, struct error *error)

@@ -38,6 +38,10 @@ bool primary_find(const struct primary *primary, struct render_context *context,
  * if their surfaces are asked for after all, hits of them and the list of these. */
 bool primary_intersect(struct render_context *context, bool *done, struct error *error);
 bool primary_make_surfaces(struct render_context *context, struct error *error);
+/* In place of all that, where the tracer has a shorter way to where eyes look (tracer_finds_eyes): begins a slice;
+ * and shared/eye_hit.h in place of its hits. */
+void primary_begin_eyes(struct render_context *context);
+bool primary_find_eyes(struct render_context *context, struct error *error);
 /* Announces the programs of the first hits (gpu_program_announce). */
 void primary_announce(struct render_context *context, bool rasterised);
 void primary_finish(struct primary *primary, struct gpu_device *device);

@@ -196,6 +196,12 @@ struct tracer_impl {
      * eye within the radius of the structure sees them. */
     bool (*layer_hits)(struct tracer *tracer, struct gpu_scene *scene, const struct ray_range *rays,
                        uint32_t layer, struct error *error);
+    /* A shorter way than trace_range() to where the rays of some eyes meet the layers. Both NULL: there is none.
+     * finds_eyes: whether it is open to such eyes. eye_hits: queues it. */
+    bool (*finds_eyes)(const struct tracer *tracer, const struct gpu_scene *scene,
+                       const struct frame_uniforms *frame);
+    bool (*eye_hits)(struct tracer *tracer, struct gpu_scene *scene, struct trace_state *state,
+                     const struct eye_rays *rays, struct error *error);
 };
 
 /* tracer_bvh_impl and its like, one for each row of tracers.def; weak, as a build may leave a tracer out. */
@@ -270,6 +276,14 @@ bool trace_state_tell(struct trace_state *state, struct structure_rows *rows, st
  * The scene's buffers are bound. */
 bool tracer_layer_hits(struct tracer *tracer, struct gpu_scene *scene, const struct wave *wave, uint32_t layer,
                        struct error *error);
+
+/* Whether tracer_eye_hits() is for such eyes. */
+bool tracer_finds_eyes(const struct tracer *tracer, const struct gpu_scene *scene,
+                       const struct frame_uniforms *frame);
+/* Where their rays meet the layers of the view (tracer_impl.eye_hits), counted in the state. The scene's buffers
+ * are bound. */
+bool tracer_eye_hits(struct tracer *tracer, struct gpu_scene *scene, struct trace_state *state,
+                     const struct eye_rays *rays, struct error *error);
 
 /* Announces the programs of such a wave (gpu_program_announce), of which the buffers may be missing. */
 void tracer_announce(struct tracer *tracer, struct gpu_scene *scene, const struct wave *wave, bool coherent);

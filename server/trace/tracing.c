@@ -253,6 +253,29 @@ bool tracer_layer_hits(struct tracer *tracer, struct gpu_scene *scene, const str
     return found;
 }
 
+/* ---- eyes ---- */
+
+bool tracer_finds_eyes(const struct tracer *tracer, const struct gpu_scene *scene,
+                       const struct frame_uniforms *frame)
+{
+    const struct tracer_impl *impl = tracer->impl;
+    return impl->finds_eyes && impl->finds_eyes(tracer, scene, frame);
+}
+
+bool tracer_eye_hits(struct tracer *tracer, struct gpu_scene *scene, struct trace_state *state,
+                     const struct eye_rays *rays, struct error *error)
+{
+    const struct tracer_impl *impl = tracer->impl;
+    if (!check_updated(tracer, error))
+        return false;
+    gpu_push_group(tracer->device, impl->name);
+    const bool found =
+        impl->eye_hits(tracer, scene, state, rays, error) && gpu_check(tracer->device, impl->name, error);
+    gpu_pop_group(tracer->device);
+    state->has_traced |= found;
+    return found;
+}
+
 /* ---- at once ---- */
 
 static bool trace_at_once(struct tracer *tracer, struct gpu_scene *scene, const struct wave *wave, bool surfaces,

@@ -4,6 +4,7 @@
 #define FARLIGHT_TRACE_WAVE_H
 
 #include "gpu/buffer.h"
+#include "shared/frame.h"
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -49,6 +50,15 @@ struct wave {
     bool within_reach;             /* of a layer: without what is hidden from all eyes that it is for */
     bool bare;                     /* closest: intersections are enough, no surfaces are made of them */
     float origin_spread;           /* or all on a disc of this diameter, a lens: metres; 0: nothing is known */
+};
+
+/* The rays of pinhole eyes, as a frame has them (shared/frame.h); its uniforms are bound. */
+struct eye_rays {
+    const struct frame_uniforms *frame;
+    uint32_t first_slot, slot_count; /* pixels, of each of which there are 2 to the power of frame->sample_shift */
+    bool spread;                     /* SPREAD of common/sample_place.glsl */
+    float reach;                     /* so far from a pixel's centre at most, pixels */
+    struct gpu_buffer *hits;         /* RGBA32F texels, shared/eye_hit.h */
 };
 
 /* Consecutive rays of a wave, at least one. */

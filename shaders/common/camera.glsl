@@ -14,7 +14,8 @@ uvec2 pixel_of_slot(uint slot)
 {
     uint tile = slot >> 6, m = slot & 63u;
     uvec2 in_tile = uvec2((m & 1u) | (m >> 1 & 2u) | (m >> 2 & 4u), (m >> 1 & 1u) | (m >> 2 & 2u) | (m >> 3 & 4u));
-    return uvec2(tile % frame.tiles_across, tile / frame.tiles_across) * 8u + in_tile;
+    uint row = quotient(tile, frame.tiles_across);
+    return uvec2(tile - row * frame.tiles_across, row) * 8u + in_tile;
 }
 
 uint slot_of_pixel(uvec2 pixel)
@@ -29,7 +30,7 @@ uvec2 view_of_pixel(uvec2 pixel)
 {
     if (frame.view_width == frame.width && frame.view_height == frame.height)
         return uvec2(0u);
-    return pixel / uvec2(frame.view_width, frame.view_height);
+    return uvec2(quotient(pixel.x, frame.view_width), quotient(pixel.y, frame.view_height));
 }
 
 // A pixel within its view.

@@ -10,6 +10,15 @@ float square(float x)
     return x * x;
 }
 
+// a / b of whole numbers below 2^24. Software GL divides whole numbers one by one, and floats side by side: rounding can
+// take the quotient to the next number.
+uint quotient(uint a, uint b)
+{
+    uint q = uint(float(a) / float(b));
+    int rest = int(a - q * b);
+    return rest < 0 ? q - 1u : rest >= int(b) ? q + 1u : q;
+}
+
 // atan(y, x), and 0 if both are 0: GLSL leaves this undefined, and some drivers return NaN.
 float azimuth(float y, float x)
 {

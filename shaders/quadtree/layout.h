@@ -63,6 +63,13 @@ struct quadtree_counts {
     uint pad0, pad1, pad2;
 };
 SHARED_SIZE(quadtree_counts, 32)
+#define QUADTREE_KINDS 4 /* of rays; behind their counts in the buffer are those of eyes.comp: */
+/* By number, the eyes' rays that came to something else than what they meet in the first layer: 1 or 2, they were
+ * behind that many layers, and one of these. They are too many to count all of them. */
+#define QUADTREE_DEAD 3u /* beyond the picture's edge */
+#define QUADTREE_BEHIND 4u
+#define QUADTREE_OUTSIDE 8u
+#define QUADTREE_OUTCOMES 12
 
 /* A ray that is within so many texels of its origin may pass the extension of a plane beside the surface that it
  * began on, and one that is behind a plane may be before the next: half a texel, and its diagonal's. */
@@ -71,10 +78,15 @@ SHARED_SIZE(quadtree_counts, 32)
     2.0f /* texels: primitives as narrow may lie between the middles of texels, and be seen by none */
 #define QUADTREE_DEEP 0.05f /* of w: what is so far behind a plane is behind the surface */
 
+/* What beams.comp says of a tile: the level at which its rays begin, and whether all of them do so in the view. */
+#define QUADTREE_BEAM_LEVEL 7
+#define QUADTREE_BEAM_INSIDE 8
+
 #define BIND_QUADTREE_COUNTS BIND_TRACER_0
 #define UNIFORM_QUADTREE 3
 #define UNIT_QUADTREE_VISIBLE UNIT_TRACER_0
 #define UNIT_QUADTREE_NODES UNIT_TRACER_1
+#define UNIT_QUADTREE_BEAMS UNIT_TRACER_5
 #define UNIT_QUADTREE_DEPTH UNIT_TRACER_2 /* of the layer before the one that is drawn */
 /* Passes that build. Of one slice: its leaves as planes without flags; of all, the levels above the leaves: how
  * far a plane is from those of the leaves at most. */
@@ -83,6 +95,7 @@ SHARED_SIZE(quadtree_counts, 32)
 #define IMAGE_QUADTREE_NODES 0
 #define IMAGE_QUADTREE_PLANES 1
 #define IMAGE_QUADTREE_ERRORS 2
+#define IMAGE_QUADTREE_BEAMS 0
 
 /* Two texels side by side show surfaces that go on from one another if their planes differ by no more than this
  * share of w and bounds.x, in the middle of their common border. Prototypes had cracks up to it. */

@@ -6,15 +6,18 @@
 // Coverage is 1 wherever there is a surface: what blended surfaces leave open is in the layer's radiance.
 //
 // Defines: those of common/environment.glsl; OPEN in place of the environment is 1; HAS_UNKNOWN the share of samples
-// that the key view does not show is a layer of the picture; HAS_LENS rays begin on a lens; MARK
-// intersections are kept in place of radiance, and texels that have to be there before it can be taken are marked; KEPT the
-// picture has such intersections.
+// that the key view does not show is a layer of the picture; EYES where the rays meet the layers is known as
+// shared/eye_hit.h has it, in place of rays and intersections, and SPREAD as common/sample_place.glsl has it; HAS_LENS
+// rays begin on a lens; KEY_LAYERS how many layers there are; MARK where rays meet layers is kept in place of radiance,
+// and texels that have to be there before it can be taken are marked; KEPT the picture has such places.
 
 #include "shared/key_view.h"
+#include "shared/eye_hit.h"
 #include "shared/hit.h"
 #include "shared/layers.h"
 #include "common/dispatch.glsl"
 #include "common/environment.glsl"
+#include "common/sample_place.glsl"
 #include "render/wave.glsl"
 
 layout(local_size_x = 64) in;
@@ -22,17 +25,26 @@ layout(local_size_x = 64) in;
 uniform vec3 key_right, key_up, key_back, key_eye; // axes of the key view in the world, and where it is
 uniform vec2 key_extent;                           // half width and height at distance 1, or of an orthographic view
 uniform uint key_orthographic;
-uniform uint key_width, key_height, key_layers;
+uniform uint key_width, key_height;
+uniform uint first_slot; // of the slice
 uniform float key_bound; // how far inverse distances of the structure may be off, 1 / metres
 #ifdef HAS_UNKNOWN
 uniform uint first_unknown; // in the sums
 #endif
 
+#ifdef EYES
+layout(binding = UNIT_SHADE_HITS) uniform samplerBuffer eye_hits;
+#elif !defined KEPT
 layout(binding = UNIT_RAYS) uniform samplerBuffer rays;
 layout(binding = UNIT_SHADE_HITS) uniform usamplerBuffer hits;
+#endif
 layout(binding = UNIT_KEY_LAYER_0) uniform samplerBuffer key_layer_0;
+#if KEY_LAYERS > 1
 layout(binding = UNIT_KEY_LAYER_1) uniform samplerBuffer key_layer_1;
+#endif
+#if KEY_LAYERS > 2
 layout(binding = UNIT_KEY_LAYER_2) uniform samplerBuffer key_layer_2;
+#endif
 layout(std430, binding = BIND_SLICE_SUMS) writeonly buffer sum_block { vec4 slice_sums[]; };
 layout(std430, binding = BIND_KEY_COUNTS) buffer count_block { uint unknown_count; };
 #ifdef MARK
@@ -49,15 +61,20 @@ layout(std430, binding = BIND_LAYER_SUMS) writeonly buffer layer_block { vec4 la
 // A surface is met where inverse distances agree within this share, beside the structure's own bound: those of
 // surfaces that are some centimetres apart differ by more at the distances of a room.
 const float SURFACE_SHARE = 0.01;
-const uint KEPT_SHIFT = 27u; // all bits of an intersection lie above
 
 vec4 key_texel(uint layer, ivec2 p)
 {
     p = clamp(p, ivec2(0), ivec2(key_width, key_height) - 1);
     int place = p.y * int(key_width) + p.x;
-    if (layer == 0u)
-        return texelFetch(key_layer_0, place);
-    return layer == 1u ? texelFetch(key_layer_1, place) : texelFetch(key_layer_2, place);
+#if KEY_LAYERS > 2
+    if (layer == 2u)
+        return texelFetch(key_layer_2, place);
+#endif
+#if KEY_LAYERS > 1
+    if (layer == 1u)
+        return texelFetch(key_layer_1, place);
+#endif
+    return texelFetch(key_layer_0, place);
 }
 
 // Straight in the picture's coordinates on every plane. Of an orthographic view distances themselves are.
@@ -132,25 +149,20 @@ vec2 key_place(vec3 v)
     return (vec2(on_view.x, -on_view.y) * 0.5 + 0.5) * vec2(key_width, key_height);
 }
 
-uint layer_of(uint bits)
+// Of what a ray met there. `known`: it is what the layer shows; false where the place is a guess, at which there may be
+// nothing.
+vec3 met_radiance(vec4 met, uint layer, inout bool known, inout bool is_met)
 {
-    return clamp((bits & HIT_LAYER_MASK) >> HIT_LAYER_SHIFT, 1u, key_layers) - 1u;
-}
-
-// Of the point that a ray met.
-vec3 met_radiance(vec3 point, uint bits, out bool known)
-{
-    vec3 v = key_from_world(point - key_eye);
-    vec2 place = key_place(v);
-    known = false;
-    if ((bits & HIT_UNKNOWN) != 0u) // the background beside what hides it, however far the point is from it
-        return key_texel(layer_of(bits), ivec2(floor(place))).rgb;
-    return key_radiance(layer_of(bits), place, key_orthographic != 0u ? v.z : 1.0 / v.z, known);
+    if (!known) { // the background beside what hides it, however far the point is from it
+        vec4 shown = key_texel(layer, ivec2(floor(met.xy)));
+        is_met = is_met && shown.w > 0.0;
+        return shown.rgb;
+    }
+    return key_radiance(layer, met.xy, met.z, known);
 }
 
 #ifdef HAS_LENS
-uniform uint lens_more;  // samples of the lens beside that of the ray
-uniform uint first_slot; // of the slice
+uniform uint lens_more; // samples of the lens beside that of the ray
 
 // Other points of the lens look at the plane that a ray has met, without being traced: section 5.2 of the paper. They
 // count as far as the layer shows that plane where they meet it. They lie round the lens's centre, as far from it.
@@ -184,11 +196,11 @@ vec3 with_lens(uint k, vec3 origin, vec3 direction, uint layer, vec3 radiance)
 
 #ifdef MARK
 // The four texels that key_radiance() reads.
-void mark(vec3 point, uint bits)
+void mark(vec2 place, uint layer)
 {
-    ivec2 corner = ivec2(floor(key_place(key_from_world(point - key_eye)) - 0.5)), last = ivec2(key_width, key_height) - 1;
+    ivec2 corner = ivec2(floor(place - 0.5)), last = ivec2(key_width, key_height) - 1;
     ivec2 low = clamp(corner, ivec2(0), last), high = clamp(corner + 1, ivec2(0), last);
-    uint layer = layer_of(bits), width = key_width, first = layer * width * key_height;
+    uint width = key_width, first = layer * width * key_height;
     marks[first + uint(low.y) * width + uint(low.x)] = 1u;
     marks[first + uint(low.y) * width + uint(high.x)] = 1u;
     marks[first + uint(high.y) * width + uint(low.x)] = 1u;
@@ -196,15 +208,50 @@ void mark(vec3 point, uint bits)
 }
 #endif
 
-// Distance, HIT_UNKNOWN and HIT_LAYER bits. As a pixel has them the bits are a number, which no device changes.
-uvec2 met_by(uint k)
+#if !defined EYES && !defined KEPT
+vec4 origin, direction; // of the ray
+
+// What an intersection is, as shared/eye_hit.h has it.
+vec4 eye_hit_of(uint k)
+{
+    origin = texelFetch(rays, int(2u * k));
+    direction = texelFetch(rays, int(2u * k + 1u));
+    uvec2 met = texelFetch(hits, int(3u * k)).xy;
+    float distance_ = uintBitsToFloat(met.x);
+    uint unknown = (met.y & HIT_UNKNOWN) != 0u ? EYE_UNKNOWN : 0u;
+    if (!(direction.w > origin.w))
+        return vec4(0.0, 0.0, 0.0, float(EYE_DEAD));
+    if (!(distance_ >= 0.0))
+        return vec4(0.0, 0.0, 0.0, float(unknown));
+    vec3 v = key_from_world(origin.xyz + distance_ * direction.xyz - key_eye);
+    uint layer = clamp((met.y & HIT_LAYER_MASK) >> HIT_LAYER_SHIFT, 1u, uint(KEY_LAYERS));
+    return vec4(key_place(v), key_orthographic != 0u ? v.z : 1.0 / v.z, float(layer * EYE_LAYER + unknown));
+}
+#endif
+
+vec4 met_by(uint k)
 {
 #ifdef KEPT
     vec4 kept = accumulation[first_kept + k];
     accumulation[first_kept + k] = vec4(0.0);
-    return uvec2(floatBitsToUint(kept.x), uint(kept.y) << KEPT_SHIFT);
+    return kept;
+#elif defined EYES
+    return texelFetch(eye_hits, int(k));
 #else
-    return texelFetch(hits, int(3u * k)).xy;
+    return eye_hit_of(k);
+#endif
+}
+
+vec3 direction_of(uint k)
+{
+#if defined KEPT || defined EYES
+    vec3 from, towards;
+    float t_min;
+    uvec2 in_view = pixel_in_view(pixel_of_slot(first_slot + (k >> frame.sample_shift)));
+    camera_ray_through(place_of_sample(in_view, k & (1u << frame.sample_shift) - 1u), from, towards, t_min);
+    return towards;
+#else
+    return direction.xyz;
 #endif
 }
 
@@ -213,24 +260,23 @@ void main()
     uint k = item_index();
     if (k >= wave.rays.count)
         return;
-    vec4 origin = texelFetch(rays, int(2u * k)), direction = texelFetch(rays, int(2u * k + 1u));
-    uvec2 met = met_by(k);
-    float distance_ = uintBitsToFloat(met.x);
+    vec4 met = met_by(k);
+    uint bits = uint(met.w), layer = max(bits & EYE_LAYER_MASK, 1u) - 1u;
+    bool is_met = (bits & EYE_LAYER_MASK) != 0u, known = (bits & EYE_UNKNOWN) == 0u;
 #ifdef MARK
-    if (distance_ >= 0.0)
-        mark(origin.xyz + distance_ * direction.xyz, met.y);
-    slice_sums[k] = vec4(distance_, float(met.y >> KEPT_SHIFT), 0.0, 0.0);
+    if (is_met)
+        mark(met.xy, layer);
+    slice_sums[k] = met;
 #else
-    bool known = (met.y & HIT_UNKNOWN) == 0u;
     vec4 sum = vec4(0.0); // a pixel beyond the picture's edge
-    if (distance_ >= 0.0)
-        sum = vec4(met_radiance(origin.xyz + distance_ * direction.xyz, met.y, known), 1.0);
+    if (is_met)
+        sum = vec4(met_radiance(met, layer, known, is_met), 1.0);
 #ifdef HAS_LENS
     if (has_plane && known)
-        sum.rgb = with_lens(k, origin.xyz, direction.xyz, layer_of(met.y), sum.rgb);
+        sum.rgb = with_lens(k, origin.xyz, direction.xyz, layer, sum.rgb);
 #endif
-    if (!(distance_ >= 0.0) && direction.w > origin.w)
-        sum = missed(direction.xyz);
+    if (!is_met && (bits & EYE_DEAD) == 0u)
+        sum = missed(direction_of(k));
     slice_sums[k] = sum;
 #ifdef HAS_UNKNOWN
     layer_sums[first_unknown + k] = vec4(vec3(known ? 0.0 : 1.0), 1.0);

@@ -11,7 +11,7 @@
 #include "shared/ray.h"
 #include "shared/hit.h"
 #include "common/dispatch.glsl"
-#include "common/sequence.glsl"
+#include "common/sample_place.glsl"
 #include "render/tiles.glsl"
 layout(local_size_x = 64) in;
 
@@ -44,8 +44,7 @@ void main()
     uint seed = sequence_seed(number_in_view(in_view), frame.seed);
     uint sample_ = k & (1u << frame.sample_shift) - 1u, index = frame.sample_index + sample_;
 #ifdef SPREAD
-    vec2 u = sequence_pair(seed, SEQUENCE_PIXEL, index);
-    vec2 place = vec2(in_view) + 0.5 + vec2(filter_offset(u.x), filter_offset(u.y));
+    vec2 place = place_of_sample(in_view, sample_);
 #else
     vec2 place = vec2(in_view) + sample_place(sample_);
 #endif

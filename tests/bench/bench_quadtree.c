@@ -2,10 +2,12 @@
 /* Rays through the tracer `quadtree`: building its structure for a view, and waves of rays, in its forms and
  * beside other tracers. Prints one JSON object: {"scene", "triangles", "device", "software", "wave", "width",
  * "height", "rays", "contenders": [{"name", "nodes", "bytes", "update_ns", "draw_ns", "nodes_ns", "trace_ns",
- * "traversal_ns", "steps", "layers", "unknown", "known", "agree"}]}.
+ * "traversal_ns", "eye_ns", "steps", "layers", "unknown", "known", "agree", "eye_unknown", "eye_agree"}]}.
  *
  *   update_ns  bringing the structure to the view, all of it; draw_ns and nodes_ns of another update, in steps:
  *              drawing the layers, and building the nodes of them. Of `bvh` and `reference`: []
+ *   eye_ns     moved: from the camera to hits, without a picture; of bvh and reference, and forms that
+ *              need them, rays are made as frames make them; eye_unknown and eye_agree as below, or null of these
  *   steps      nodes that a ray looks at, and layers: means; null of `bvh` and `reference`
  *   unknown    rays that ended where the view sees nothing; known: the others, or misses
  *   agree      of those, the ones with the distance of `bvh`
@@ -13,6 +15,7 @@
  * Times are of the processor, all threads of the process, one a run; traversal_ns of `reference` is Embree's own,
  * by the clock. Exit status: 1 failed, 2 usage. */
 #include "tests/bench/bench.h"
+#include "tests/bench/bench_eye_pass.h"
 #include "tests/bench/bench_options.h"
 #include "tests/bench/bench_stats.h"
 #include "tests/bench/bench_waves.h"
@@ -72,9 +75,9 @@ enum { FORMS = sizeof(forms) / sizeof(forms[0]) };
 struct contender {
     const struct form *form;
     struct tracer *tracer;
-    struct bench_runs update, phases[PHASES], trace, traversal;
+    struct bench_runs update, phases[PHASES], trace, traversal, eye;
     double steps, layers;
-    uint32_t unknown, agree;
+    uint32_t unknown, agree, eye_unknown, eye_agree;
 };
 
 struct bench {
@@ -91,6 +94,7 @@ struct bench {
     struct hit *truth, *answers;
     struct gpu_buffer ray_buffer, answer_buffer;
     struct wave wave;
+    struct bench_eye_pass eye;
     struct contender contenders[FORMS];
     unsigned count;
 };
@@ -214,7 +218,7 @@ static bool prepare_rays(struct bench *bench, struct error *error)
     for (int k = 0; k < 3 && bench->wave_name == MOVED; k++)
         m[4 * k + 3] += bench->way[0] * m[4 * k] + bench->way[1] * m[4 * k + 1] - bench->way[2] * m[4 * k + 2];
     bench_camera_rays(bench->rays, &camera, bench->width, bench->height);
-    bool done = true;
+    bool done = bench_eye_pass_init(&bench->eye, bench->device, &bench->scene, &camera, &bench->view, error);
     for (uint32_t i = 0; done && bench->wave_name != MOVED && i <= bench->after; i++)
         done = go_on(bench, i < bench->after || bench->wave_name == REFLECTION ? BENCH_REFLECTION : BENCH_BOUNCE,
                      &count, error);
@@ -246,15 +250,16 @@ static bool prepare(struct bench *bench, struct error *error)
 
 /* ---- what comes of it ---- */
 
-static void compare(const struct bench *bench, struct contender *contender)
+static void compare(const struct bench *bench, const struct contender *contender, uint32_t *unknown,
+                    uint32_t *agree)
 {
     for (uint32_t i = 0; i < bench->wave.ray_count; i++) {
         const struct hit *answer = &bench->answers[i];
         const float x = answer->distance, y = bench->truth[i].distance;
         if (is_quadtree(contender) && (answer->material & HIT_UNKNOWN))
-            contender->unknown++;
+            ++*unknown;
         else
-            contender->agree += (x < 0) == (y < 0) && fabsf(x - y) <= DISTANCE_TOLERANCE * fabsf(y);
+            *agree += (x < 0) == (y < 0) && fabsf(x - y) <= DISTANCE_TOLERANCE * fabsf(y);
     }
 }
 
@@ -271,9 +276,28 @@ static bool count_steps(struct bench *bench, struct contender *contender, struct
     return done;
 }
 
+static bool run_eye(struct bench *bench, struct contender *contender, bool is_counted, struct error *error)
+{
+    if (bench->wave_name != MOVED)
+        return true;
+    const uint64_t start_ns = bench_processor_ns();
+    if (!bench_eye_pass_run(&bench->eye, contender->tracer, error))
+        return false;
+    if (is_counted)
+        bench_add(&contender->eye, bench_processor_ns() - start_ns);
+    if (is_counted || !bench_eye_pass_is_short(&bench->eye, contender->tracer))
+        return true;
+    if (!bench_eye_pass_read(&bench->eye, bench->rays, bench->answers, error))
+        return false;
+    compare(bench, contender, &contender->eye_unknown, &contender->eye_agree);
+    return true;
+}
+
 static bool run_once(struct bench *bench, struct contender *contender, bool is_counted, struct error *error)
 {
     if (is_quadtree(contender) && !build(bench, contender, is_counted, error))
+        return false;
+    if (!run_eye(bench, contender, is_counted, error))
         return false;
     const uint64_t start_ns = bench_processor_ns();
     if (!trace(bench, contender, error))
@@ -285,7 +309,7 @@ static bool run_once(struct bench *bench, struct contender *contender, bool is_c
         return true;
     }
     read_answers(bench, bench->answers);
-    compare(bench, contender);
+    compare(bench, contender, &contender->unknown, &contender->agree);
     return !is_quadtree(contender) || count_steps(bench, contender, error);
 }
 
@@ -311,7 +335,11 @@ static json_t *contender_json(const struct bench *bench, const struct contender 
         bench_times_json(&contender->phases[NODES]), "trace_ns", bench_times_json(&contender->trace),
         "traversal_ns", bench_times_json(&contender->traversal), "unknown", (int)contender->unknown, "known",
         (int)known, "agree", (int)contender->agree);
-    const bool has_steps = is_quadtree(contender);
+    const bool has_steps = is_quadtree(contender),
+               is_short = bench_eye_pass_is_short(&bench->eye, contender->tracer);
+    json_object_set_new(object, "eye_ns", bench_times_json(&contender->eye));
+    json_object_set_new(object, "eye_unknown", is_short ? json_integer(contender->eye_unknown) : json_null());
+    json_object_set_new(object, "eye_agree", is_short ? json_integer(contender->eye_agree) : json_null());
     json_object_set_new(object, "steps", has_steps ? json_real(contender->steps) : json_null());
     json_object_set_new(object, "layers", has_steps ? json_real(contender->layers) : json_null());
     return object;
@@ -411,6 +439,7 @@ static void finish(struct bench *bench)
         tracer_destroy(bench->contenders[i].tracer);
     gpu_buffer_finish(bench->device, &bench->ray_buffer);
     gpu_buffer_finish(bench->device, &bench->answer_buffer);
+    bench_eye_pass_finish(&bench->eye);
     bench_scene_finish(&bench->scene);
     gpu_device_destroy(bench->device);
     free(bench->rays);

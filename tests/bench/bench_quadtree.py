@@ -105,9 +105,9 @@ def build_ns(contender):
 
 
 def stereo_ns(contender):
-    """Of a pair of pictures: building, and the rays of two eyes."""
+    """Of a pair of pictures: building, and two eyes, each from the camera to its hits."""
     builds = build_ns(contender)
-    return [build + 2 * rays for build, rays in zip(builds, contender["trace_ns"])]
+    return [build + 2 * eye for build, eye in zip(builds, contender["eye_ns"])]
 
 
 def percent_spread(results):

@@ -48,7 +48,9 @@ CHOICES = {
     "ldc/levels.comp": [[{"LDC_LEVEL_BITS": "2"}]],
     "ldc/cells.comp": [[{"CELLS_" + stage: "1"} for stage in
                         "LIST BLOCKS PLACE MARK COUNT FILL FURTHER SORT REACH_X REACH_Y REACH_Z".split()]],
-    "render/gather_views.comp": [[{}, {"MARK": "1"}, {"KEPT": "1"}]],
+    "render/gather_views.comp": [[{}, {"MARK": "1"}, {"KEPT": "1"}], [{}, {"EYES": "1"}],
+                                 [{"KEY_LAYERS": number} for number in "123"]],
+    "quadtree/eyes.comp": [[{"QUADTREE_LAYERS": number} for number in "123"]],
     "raster/view.vert": [[{"PRIMITIVE_KIND": kind, "HAS_SPHERES": "1"} for kind in "012"],
                          [{}, {"HAS_LAYERS": "1"}, {"K_BUFFER": "2"}, {"K_BUFFER": "3"}]],
     "ldc/build.frag": [[{"PRIMITIVE_KIND": "0"}, {"PRIMITIVE_KIND": "1", "HAS_SPHERES": "1"}],
@@ -63,6 +65,7 @@ WITH = {"BVH_DEFORMS_IN_SHUTTER": ("BVH_DEFORMS", "HAS_MOTION"), "BVH_RESUMES": 
 WITHOUT = {tracer: ("HAS_MOTION",) for tracer in ("TRACER_LDC", "TRACER_ABUFFER", "TRACER_QUADTREE", "TRACER_SVO")}
 # Of a sample a pixel, without a lens and other layers of the picture.
 WITHOUT |= {what: ("HAS_UNKNOWN", "HAS_LENS") for what in ("MARK", "KEPT")}
+WITHOUT["EYES"] = ("HAS_LENS",)  # these need rays
 # And in programs of a folder: what moves is met by tracers, and shaded where it was met.
 WITHOUT_IN = {"render": ("HAS_MOTION",)}
 STAGES = {"raster/view.vert": ["raster/view.vert", "raster/view.frag"],

@@ -8,7 +8,14 @@
 #include <stdlib.h>
 
 #define SOURCE_DEFINES 7
-#define COUNTS_BYTES (WAVE_RAY_KINDS * sizeof(struct quadtree_counts))
+
+/* The buffer of counts. */
+struct counts {
+    struct quadtree_counts kinds[QUADTREE_KINDS];
+    uint32_t outcomes[QUADTREE_OUTCOMES];
+};
+
+_Static_assert(QUADTREE_KINDS == WAVE_RAY_KINDS, "counts for each kind of rays");
 
 /* ---- state ---- */
 
@@ -27,19 +34,20 @@ void quadtree_state_destroy(struct trace_state *state)
     struct quadtree_state *own = (struct quadtree_state *)state;
     gpu_buffer_finish(state->device, &own->counts);
     gpu_readback_finish(state->device, &own->copied_counts);
+    gpu_buffer_finish(state->device, &own->beams);
     free(own);
 }
 
 uint64_t quadtree_state_device_bytes(const struct trace_state *state)
 {
     const struct quadtree_state *own = (const struct quadtree_state *)state;
-    return own->counts.capacity_bytes + own->copied_counts.capacity_bytes;
+    return own->counts.capacity_bytes + own->copied_counts.capacity_bytes + own->beams.capacity_bytes;
 }
 
 bool quadtree_state_copy_counts(struct trace_state *state, struct error *error)
 {
     struct quadtree_state *own = (struct quadtree_state *)state;
-    return gpu_readback_copy(state->device, &own->copied_counts, &own->counts, COUNTS_BYTES, error) &&
+    return gpu_readback_copy(state->device, &own->copied_counts, &own->counts, sizeof(struct counts), error) &&
            gpu_readback_fence(&own->copied_counts, error);
 }
 
@@ -57,14 +65,31 @@ static void tell_kind(const struct quadtree_counts *counts, enum ray_kind kind, 
     structure_per_ray(rows, "unknown_outside", (float)counts->outside / rays);
 }
 
+/* What is counted of the rays of eyes by their number, as of those of a kind. */
+static void add_eyes(struct counts *counts, uint64_t samples)
+{
+    struct quadtree_counts *sums = &counts->kinds[RAY_PRIMARY];
+    sums->rays += (uint32_t)samples - counts->outcomes[QUADTREE_DEAD];
+    for (unsigned number = 0; number < QUADTREE_OUTCOMES; number++) {
+        const uint32_t count = number != QUADTREE_DEAD ? counts->outcomes[number] : 0, behind = number % 4;
+        sums->behind_first += behind > 0 ? count : 0;
+        sums->behind_second += behind > 1 ? count : 0;
+        sums->behind_last += number & QUADTREE_BEHIND ? count : 0;
+        sums->outside += number & QUADTREE_OUTSIDE ? count : 0;
+    }
+}
+
 bool quadtree_state_tell(struct trace_state *state, struct structure_rows *rows, struct error *error)
 {
-    struct quadtree_counts counts[WAVE_RAY_KINDS];
-    if (!gpu_readback_take(state->device, &((struct quadtree_state *)state)->copied_counts, counts, error))
+    struct quadtree_state *own = (struct quadtree_state *)state;
+    struct counts counts;
+    if (!gpu_readback_take(state->device, &own->copied_counts, &counts, error))
         return false;
+    add_eyes(&counts, own->eye_samples);
     for (unsigned kind = 0; kind < RAY_COUNT; kind++)
-        if (counts[kind].rays > 0)
-            tell_kind(&counts[kind], (enum ray_kind)kind, quadtree_layer_count(&state->options.quadtree), rows);
+        if (counts.kinds[kind].rays > 0)
+            tell_kind(&counts.kinds[kind], (enum ray_kind)kind, quadtree_layer_count(&state->options.quadtree),
+                      rows);
     return true;
 }
 
@@ -73,10 +98,12 @@ bool quadtree_state_tell(struct trace_state *state, struct structure_rows *rows,
 bool quadtree_trace_begin(struct trace_state *state, struct error *error)
 {
     struct quadtree_state *own = (struct quadtree_state *)state;
-    if (!gpu_buffer_reserve(state->device, &own->counts, COUNTS_BYTES, error))
+    if (!gpu_buffer_reserve(state->device, &own->counts, sizeof(struct counts), error))
         return false;
-    if (!state->has_traced) /* the first wave of the frame */
-        gpu_buffer_clear_part(state->device, &own->counts, 0, COUNTS_BYTES, 0);
+    if (state->has_traced)
+        return true;
+    own->eye_samples = 0; /* the first wave of the frame */
+    gpu_buffer_clear_part(state->device, &own->counts, 0, sizeof(struct counts), 0);
     return true;
 }
 

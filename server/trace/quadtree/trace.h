@@ -11,6 +11,8 @@ struct quadtree_state {
     struct trace_state base;
     struct gpu_buffer counts; /* struct quadtree_counts for each kind of rays, of the frame */
     struct gpu_readback copied_counts;
+    struct gpu_buffer beams; /* of eyes.h */
+    uint64_t eye_samples;    /* that eyes.h was asked for, of the frame */
 };
 
 struct trace_state *quadtree_state_create(struct gpu_device *device, const struct tracer_options *options,

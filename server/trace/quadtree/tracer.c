@@ -5,6 +5,7 @@
  * Tracing. 2015. */
 #include "gpu/timer.h"
 #include "trace/program.h"
+#include "trace/quadtree/eyes.h"
 #include "trace/quadtree/layers.h"
 #include "trace/quadtree/nodes.h"
 #include "trace/quadtree/store.h"
@@ -202,6 +203,20 @@ static bool layer_hits(struct tracer *tracer, struct gpu_scene *scene, const str
     return quadtree_layer_hits(&((struct quadtree *)tracer)->store, scene, rays, layer, error);
 }
 
+static bool finds_eyes(const struct tracer *tracer, const struct gpu_scene *scene,
+                       const struct frame_uniforms *frame)
+{
+    return quadtree_finds_eyes(&((const struct quadtree *)tracer)->store, scene, frame, &tracer->options);
+}
+
+static bool eye_hits(struct tracer *tracer, struct gpu_scene *scene, struct trace_state *state,
+                     const struct eye_rays *rays, struct error *error)
+{
+    (void)scene;
+    return quadtree_eye_hits(&((struct quadtree *)tracer)->store, (struct quadtree_state *)state, rays,
+                             &tracer->options, error);
+}
+
 const struct tracer_impl tracer_quadtree_impl = {
     .name = "quadtree",
     .depends_on =
@@ -223,4 +238,6 @@ const struct tracer_impl tracer_quadtree_impl = {
     .announce = announce,
     .texel_view = texel_view,
     .layer_hits = layer_hits,
+    .finds_eyes = finds_eyes,
+    .eye_hits = eye_hits,
 };

@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: MIT
+// Where in its view one of a pixel's current samples is, in pixels from the top left, if nothing is rasterised.
+//
+// Defines: SPREAD each pixel has its samples where its own numbers say; else they are in its middle.
+#include "common/camera.glsl"
+#include "common/sequence.glsl"
+
+vec2 place_of_sample(uvec2 in_view, uint sample_)
+{
+    vec2 middle = vec2(in_view) + 0.5;
+#ifdef SPREAD
+    uint seed = sequence_seed(number_in_view(in_view), frame.seed);
+    vec2 u = sequence_pair(seed, SEQUENCE_PIXEL, frame.sample_index + sample_);
+    return middle + vec2(filter_offset(u.x), filter_offset(u.y));
+#else
+    return middle;
+#endif
+}

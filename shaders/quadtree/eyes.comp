@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: MIT
+// Where the rays of pinhole eyes meet the layers of a view (shared/eye_hit.h): what traverse.glsl finds, of rays that
+// are made on the way from planes alone.
+//
+// Defines: SPREAD as common/sample_place.glsl has it; QUADTREE_DDA as traverse.glsl has it; QUADTREE_LAYERS how many layers
+// the face has.
+#include "shared/eye_hit.h"
+#include "common/dispatch.glsl"
+#include "common/sample_place.glsl"
+#include "quadtree/eye.glsl"
+
+layout(binding = IMAGE_HITS, rgba32f) writeonly uniform imageBuffer eye_hits;
+layout(binding = UNIT_QUADTREE_NODES) uniform usamplerBuffer quadtree_nodes;
+layout(binding = UNIT_QUADTREE_BEAMS) uniform samplerBuffer beams;
+layout(std430, binding = BIND_QUADTREE_COUNTS) buffer count_block
+{
+    quadtree_counts counts_of_kinds[QUADTREE_KINDS];
+    uint outcomes[QUADTREE_OUTCOMES];
+};
+
+uniform uint first_slot, first_item, end_item;
+
+#ifdef QUADTREE_DDA
+const int START = 0;
+#else
+const int START = QUADTREE_TOP;
+#endif
+const float NEVER = -1.0; // of a w: behind all that a ray may meet
+
+// A ray on its way through a layer, from greater w to lesser.
+struct eye_walk {
+    vec2 far, along, inverse; // a place of it is far + w * along
+    float w, w_end;
+    int level; // of the first node
+    bool is_before;
+    float w_met; // where it meets a plane
+    float w_behind; // where it came behind the layer for more than a texel
+    float w_fill; // where it was last before the first layer that it came behind
+    uint fill_layer;
+};
+
+void walk_layer(uint layer, inout eye_walk walk)
+{
+    vec2 far = walk.far, along = walk.along;
+    ivec2 forward = ivec2(lessThan(along, vec2(0.0))), padded = ivec2(quadtree.padded_width, quadtree.padded_height);
+    float w = walk.w, w_end = walk.w_end, w_since = NEVER, w_before = walk.is_before ? w : NEVER;
+    bool is_before = walk.is_before;
+    int level = walk.level, first = int(layer * quadtree.slice_nodes);
+    ivec2 cell = clamp(ivec2(floor(far + w * along)), ivec2(0), padded - 1) >> level;
+    walk.w_met = walk.w_behind = NEVER;
+    // Where lanes go side by side, a loop that begins with its condition does all once more for the last of them. And Mesa's
+    // llvmpipe (22.3) takes what a loop has computed from its last round of any lane, unless different ways out assign it.
+    while (true) {
+        bool is_on_way = w > w_end;
+        uvec2 node = texelFetch(quadtree_nodes, first + int(node_index(0u, uint(level), uvec2(cell)))).xy;
+        vec2 exits = (vec2((cell + forward) << level) - far) * walk.inverse;
+        float w_out = clamp(max(exits.x, exits.y), w_end, w);
+        bool is_plane = node_is_plane(node);
+        vec2 slopes = plane_slopes(node), range = box_range(node);
+        float height = plane_w(node) + dot(slopes, far - node_centre(uint(level), uvec2(cell)));
+        float growth = dot(slopes, along) - 1.0;
+        float gap = w_out > range.x ? -1.0 : w < range.y ? range.y - w : 0.0; // of a box; 0: in it
+        float gap_in = is_plane ? height + growth * w : gap, gap_out = is_plane ? height + growth * w_out : gap;
+        bool goes_down = !is_plane && gap == 0.0, passes = (gap_in > 0.0) != (gap_out > 0.0);
+        // Or between two planes that do not quite meet.
+        bool is_met = is_on_way && is_plane && (passes || is_before && gap_in > 0.0 &&
+                                            gap_in <= QUADTREE_EDGE_SHARE * plane_w(node) + quadtree.bounds.x);
+        if (is_met) {
+            walk.w_met = passes ? mix(w, w_out, clamp(gap_in / (gap_in - gap_out), 0.0, 1.0)) : w;
+            break;
+        }
+
+        if (!goes_down) {
+            is_before = gap_out <= 0.0;
+            w_before = is_before ? mix(w, w_out, 0.99) : w_before;
+            w_since = is_before ? NEVER : max(w_since, w);
+            vec2 way = abs(along) * (w_since - w_out);
+            bool stays = is_on_way && !is_before &&
+                         (gap_out > QUADTREE_DEEP * w_out || max(way.x, way.y) > QUADTREE_OWN_WAY);
+            if (stays && w_since > walk.w_behind) {
+                walk.w_behind = w_since;
+                if (walk.w_fill == NEVER && w_before != NEVER) {
+                    walk.w_fill = w_before;
+                    walk.fill_layer = layer;
+                }
+            }
+        }
+
+#ifdef QUADTREE_DDA
+        goes_down = false;
+#endif
+        ivec2 low = cell * 2, step_ = exits.x > exits.y ? ivec2(2 * forward.x - 1, 0) : ivec2(0, 2 * forward.y - 1);
+        ivec2 next = cell + step_;
+        bool is_out = any(lessThan(next, ivec2(0))) || any(greaterThanEqual(next << level, padded));
+#ifdef QUADTREE_DDA
+        int up = 0;
+#else
+        int up = min(findMSB((cell.x ^ next.x) | (cell.y ^ next.y)), QUADTREE_TOP - level);
+#endif
+        ivec2 below = clamp(ivec2(floor(far + w * along)) >> max(level - 1, 0), low, low + 1);
+        cell = goes_down ? below : next >> up;
+        level += goes_down ? -1 : up;
+        w = goes_down ? w : is_out ? w_end : w_out;
+        if (!(w > w_end))
+            break;
+    }
+}
+
+// The texel of a sample; `beam`: of its tile; `code`: what is counted of it.
+vec4 look(vec3 eye, vec2 place, vec4 beam, out uint code)
+{
+    eye_line line = line_of(eye, direction_through(place));
+    float w_last = quadtree.depths.x / max(eye.z + beam.z * line.cosine, quadtree.depths.w);
+    eye_walk walk;
+    walk.far = line.far;
+    walk.along = mix(line.along, vec2(1e-9), lessThan(abs(line.along), vec2(1e-9)));
+    walk.inverse = 1.0 / walk.along;
+    vec2 a = -line.far * walk.inverse, b = (vec2(quadtree.width, quadtree.height) - line.far) * walk.inverse;
+    vec2 near_sides = max(a, b), far_sides = min(a, b);
+    float w_enters = min(near_sides.x, near_sides.y), w_leaves = max(far_sides.x, far_sides.y);
+    walk.w = min(w_enters, beam.x);
+    walk.w_end = max(w_leaves, w_last);
+    int bits = int(beam.y);
+    walk.level = bits & QUADTREE_BEAM_LEVEL;
+    walk.is_before = (bits & QUADTREE_BEAM_INSIDE) != 0;
+    walk.w_fill = NEVER;
+    walk.fill_layer = 0u;
+    float w_hit = NEVER, w_unknown = NEVER, w_first = walk.w;
+    uint hit_layer = 0u, layers = 1u;
+    bool has_left = false, goes_on = true;
+    for (uint layer = 0u; layer < QUADTREE_LAYERS && goes_on; layer++) {
+        layers = layer + 1u;
+        walk_layer(layer, walk);
+        // A ray that comes into the view behind what is seen has passed that beside the view.
+        has_left = has_left || layer == 0u && walk.w_behind == w_first && w_enters < beam.x;
+        if (walk.w_met > walk.w_end) {
+            walk.w_end = w_hit = walk.w_met;
+            hit_layer = layer;
+        }
+        goes_on = walk.w_behind > walk.w_end;
+        w_unknown = goes_on ? walk.w_behind : NEVER;
+        walk.w = walk.w_behind;
+        walk.level = START;
+        walk.is_before = false;
+    }
+    bool is_outside = w_hit == NEVER && (w_leaves > w_last || w_enters <= w_last);
+    has_left = has_left || is_outside && w_unknown == NEVER;
+    bool is_unknown = has_left || w_unknown > w_hit;
+    bool is_filled = w_hit == NEVER && w_unknown != NEVER && !has_left && walk.w_fill != NEVER;
+    float w = is_filled ? walk.w_fill : w_hit;
+    uint layer = is_filled ? walk.fill_layer : hit_layer;
+    code = layers - 1u + (is_unknown ? has_left ? QUADTREE_OUTSIDE : QUADTREE_BEHIND : 0u);
+    return vec4(walk.far + w * walk.along, w * (1.0 / quadtree.depths.x),
+                float((w == NEVER ? 0u : (layer + 1u) * EYE_LAYER) + (is_unknown ? EYE_UNKNOWN : 0u)));
+}
+
+void main()
+{
+    uint k = first_item + item_index();
+    if (k >= end_item)
+        return;
+    uint slot = first_slot + (k >> frame.sample_shift);
+    uvec2 pixel = pixel_of_slot(slot);
+    uint code = QUADTREE_DEAD;
+    vec4 found = vec4(0.0, 0.0, 0.0, float(EYE_DEAD));
+    if (pixel.x < frame.width && pixel.y < frame.height) {
+        vec2 place = place_of_sample(pixel_in_view(pixel), k & (1u << frame.sample_shift) - 1u);
+        vec4 beam = texelFetch(beams, int((slot >> 6) - (first_slot >> 6)));
+        found = look(eye_of(view_of_pixel(pixel)), place, beam, code);
+    }
+    imageStore(eye_hits, int(k), found);
+    if (code != 0u)
+        atomicAdd(outcomes[code], 1u);
+}
