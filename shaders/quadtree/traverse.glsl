@@ -352,15 +352,24 @@ struct view_walk {
     ivec2 fill_texel;
 };
 
-// A view, which is one face, does not see what is beside it. But what lies between another eye near its own and its
-// pyramid is taken to be empty.
+// Whether a ray that comes into the view at t has passed nothing that the view does not see. Of one from an eye within
+// the radius that is taken for granted, but no farther than QUADTREE_FREE_RADII from the view's own eye, and before the
+// near plane.
+bool is_free_before(trace_ray r, float t)
+{
+    vec3 from_eye = r.origin - quadtree.eye_world.xyz, entry = from_eye + t * r.direction;
+    float radius = quadtree.eye_world.w, z = dot(quadtree.face_from_world[2].xyz, entry);
+    return length(from_eye) <= radius &&
+           (length(entry) <= QUADTREE_FREE_RADII * radius || z <= quadtree.depths.w * (1.0 + SAME_DISTANCE));
+}
+
+// A view, which is one face, does not see what is beside it.
 void note_outside(trace_ray r, float t_end, inout view_walk seen)
 {
     if (FACES > 1u)
         return;
     vec2 t = seen.t_face;
-    bool is_eye = distance(r.origin, quadtree.eye_world.xyz) <= quadtree.eye_world.w;
-    float t_outside = !(t.x < t.y) || (t.x > r.t_min && !is_eye) ? r.t_min
+    float t_outside = !(t.x < t.y) || (t.x > r.t_min && !is_free_before(r, t.x)) ? r.t_min
                       : t.y < min(seen.t_last, t_end)            ? t.y
                                                                  : 1e30;
     if (t_outside < seen.t_unknown) {
