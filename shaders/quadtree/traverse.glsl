@@ -497,10 +497,10 @@ void end_face(trace_ray r, layer_walk walk, inout found_type found, inout view_w
 
 void note_end(layer_walk walk, inout view_walk seen)
 {
-    if (walk.s.t_to > seen.t_end) {
-        seen.t_end = walk.s.t_to;
-        seen.ends_behind = walk.is_behind;
-    }
+    if (FACES > 1u && walk.s.t_to <= seen.t_end)
+        return;
+    seen.t_end = walk.s.t_to;
+    seen.ends_behind = walk.is_behind;
 }
 
 // The next layer where the ray is behind this one, or the next face. False: it has been through all.
