@@ -243,7 +243,7 @@ static bool trace_wave(struct frame_renderer *renderer, struct error *error)
     context_span_begin(context, STAGE_SHADE);
     bool listed = compact_hits(context, error);
     context_span_end(context);
-    return listed;
+    return listed && layers_mark_unknown(&renderer->work->layers, context, error);
 }
 
 static bool accumulate(struct frame_renderer *renderer, struct error *error)

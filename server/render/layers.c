@@ -144,6 +144,23 @@ static bool gather_ao(struct layers *layers, struct render_context *context, uin
     return program && gpu_check(context->device, "ambient occlusion", error);
 }
 
+bool layers_mark_unknown(struct layers *layers, struct render_context *context, struct error *error)
+{
+    const bool may_be_unknown = context->tracer->impl->depends_on & CHANGED_VIEW;
+    if (!(layers->wanted & LAYER_BIT_UNKNOWN) || !may_be_unknown)
+        return true;
+    context_span_begin(context, STAGE_SHADE);
+    const struct gpu_program *program = context_use(context, "render/layers_unknown.comp", error);
+    if (program) {
+        context_bind_hits(context);
+        gpu_buffer_bind_storage(&layers->sums, BIND_LAYER_SUMS);
+        gpu_uniform_uint(program, "first_sum", plane_of(layers, LAYER_BIT_UNKNOWN) * layers->plane_samples);
+        compact_dispatch(context, program, WAVE_RAYS);
+    }
+    context_span_end(context);
+    return program && gpu_check(context->device, "unknown rays", error);
+}
+
 /* Whether the current slice has anything to add: for some layers, samples after the first are zero. */
 static bool adds(const struct render_context *context, enum layer layer)
 {

@@ -30,6 +30,9 @@ uint32_t layers_take_unknown(struct layers *layers);
 /* A short part of a slice's work; *done: there is no more. Leaves rays and hits as they are, and
  * the rays that it traces count as shadow rays. Inside no span. */
 bool layers_step(struct layers *layers, struct render_context *context, bool *done, struct error *error);
+/* Of a wave of secondary rays that is traced, and whose hits are listed: those that came to where the tracer knows
+ * nothing. Inside no span. */
+bool layers_mark_unknown(struct layers *layers, struct render_context *context, struct error *error);
 /* Adds the current slice to the picture. Call it once the slice cannot be repeated. */
 bool layers_accumulate(struct layers *layers, struct picture *picture, struct render_context *context,
                        struct error *error);

@@ -82,6 +82,14 @@ SHARED_SIZE(quadtree_counts, 32)
 #define QUADTREE_BEAM_LEVEL 7
 #define QUADTREE_BEAM_INSIDE 8
 
+/* Of a view that is one face: an eye beside its own looks past what that does not see, until its rays come into
+ * the view. Within so many radii of the view's eye that is taken to be empty, and farther away it is unknown. Of
+ * an eye that is s aside, and a view whose outermost ray has the tangent t, a ray with the tangent a comes in at
+ * s sqrt(1 + t^2) / (t - a) from the view's eye. With 8, which is 1.2 m of the usual radius, an eye 65 mm aside
+ * sees all of its picture by a view 16 to 9 of 50 degrees with the usual margin, at 1.06 m; both of a pair do down
+ * to 20 degrees. */
+#define QUADTREE_FREE_RADII 8.0f
+
 #define BIND_QUADTREE_COUNTS BIND_TRACER_0
 #define UNIFORM_QUADTREE 3
 #define UNIT_QUADTREE_VISIBLE UNIT_TRACER_0

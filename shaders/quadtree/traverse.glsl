@@ -31,6 +31,7 @@ const float FLOAT_MAX = 3.4e38;
 const float PLANES_APART = 2.0; // of w, in bounds: a plane and the extension of another one through a texel
 const float FARTHER_MAX = 16.0;  // so many times, by that
 const float NEVER = 2.0; // beyond the end of a segment
+const float ALMOST_END = 0.999;
 const int STEPS_TOGETHER = 32; // of rays side by side, before what some of them have met is looked at
 
 // A ray on its way through a layer of a face.
@@ -347,20 +348,31 @@ struct view_walk {
     float t_unknown; // from where on nothing is; 1e30: all is known
     uint layers;     // that it had to look at
     bool has_left;   // it is unknown as the ray is outside what the view sees
-    float t_fill;    // where it was last before a surface, and the texel that shows that
+    float t_end;     // of its part in a face, the last one
+    bool ends_behind; // there, what the view sees first
+    float t_fill;    // where it is taken to meet what a texel shows, and which
     uint fill_slice;
     ivec2 fill_texel;
 };
 
-// A view, which is one face, does not see what is beside it. But what lies between another eye near its own and its
-// pyramid is taken to be empty.
+// Whether a ray that comes into the view at t has passed nothing that the view does not see. Of one from an eye within
+// the radius that is taken for granted, but no farther than QUADTREE_FREE_RADII from the view's own eye, and before the
+// near plane.
+bool is_free_before(trace_ray r, float t)
+{
+    vec3 from_eye = r.origin - quadtree.eye_world.xyz, entry = from_eye + t * r.direction;
+    float radius = quadtree.eye_world.w, z = dot(quadtree.face_from_world[2].xyz, entry);
+    return length(from_eye) <= radius &&
+           (length(entry) <= QUADTREE_FREE_RADII * radius || z <= quadtree.depths.w * (1.0 + SAME_DISTANCE));
+}
+
+// A view, which is one face, does not see what is beside it.
 void note_outside(trace_ray r, float t_end, inout view_walk seen)
 {
     if (FACES > 1u)
         return;
     vec2 t = seen.t_face;
-    bool is_eye = distance(r.origin, quadtree.eye_world.xyz) <= quadtree.eye_world.w;
-    float t_outside = !(t.x < t.y) || (t.x > r.t_min && !is_eye) ? r.t_min
+    float t_outside = !(t.x < t.y) || (t.x > r.t_min && !is_free_before(r, t.x)) ? r.t_min
                       : t.y < min(seen.t_last, t_end)            ? t.y
                                                                  : 1e30;
     if (t_outside < seen.t_unknown) {
@@ -468,16 +480,27 @@ bool begin_face(trace_ray r, found_type found, inout layer_walk walk, inout view
     return false;
 }
 
+// What is unknown is filled with what the ray was last before: the background of what hides it (section 4.1). One that
+// was before nothing, with what hides it where it ends.
 void end_face(trace_ray r, layer_walk walk, inout found_type found, inout view_walk seen)
 {
     float t = distance_at(walk.s, min(walk.u_behind, 1.0));
     if (walk.u_behind >= walk.u_end || t >= seen.t_unknown)
         return;
-    vec2 place = walk.s.from.xy + walk.s.along.xy * walk.u_fill;
+    bool was_before = walk.u_fill != NEVER;
+    vec2 place = walk.s.from.xy + walk.s.along.xy * (was_before ? walk.u_fill : ALMOST_END);
     seen.t_unknown = t;
-    seen.t_fill = distance_at(walk.s, min(walk.u_fill, 1.0));
+    seen.t_fill = was_before ? distance_at(walk.s, walk.u_fill) : t;
     seen.fill_slice = FACE(walk.face) * quadtree.layers + walk.fill_layer;
-    seen.fill_texel = walk.u_fill == NEVER ? ivec2(-1) : ivec2(floor(place));
+    seen.fill_texel = ivec2(floor(place));
+}
+
+void note_end(layer_walk walk, inout view_walk seen)
+{
+    if (FACES > 1u && walk.s.t_to <= seen.t_end)
+        return;
+    seen.t_end = walk.s.t_to;
+    seen.ends_behind = walk.is_behind;
 }
 
 // The next layer where the ray is behind this one, or the next face. False: it has been through all.
@@ -489,6 +512,8 @@ bool begin_next(trace_ray r, inout layer_walk walk, inout found_type found, inou
         seen.t_unknown = walk.s.t_from;
         seen.has_left = true;
     }
+    if (walk.layer == 0u)
+        note_end(walk, seen);
     if (walk.u_behind < walk.u_end && walk.layer + 1u < quadtree.layers) {
         begin_layer(walk.layer + 1u, walk.u_behind, walk);
         seen.layers = max(seen.layers, walk.layer + 1u);
@@ -537,7 +562,7 @@ bool walk_view(trace_ray r, inout view_walk seen, inout found_type found)
 
 view_walk begin_view_walk(trace_ray r)
 {
-    return view_walk(last_distance(r), vec2(1.0, 0.0), 1e30, 1u, false, 0.0, 0u, ivec2(-1));
+    return view_walk(last_distance(r), vec2(1.0, 0.0), 1e30, 1u, false, 0.0, false, 0.0, 0u, ivec2(0));
 }
 
 void count(view_walk seen, bool is_unknown)
@@ -557,6 +582,8 @@ void count(view_walk seen, bool is_unknown)
 
 #ifdef ANY_HIT
 
+// Of rays that came where nothing is known, those that come out again are taken to pass, and those that end behind what
+// the view sees first to be stopped.
 bool trace_any(trace_ray r, inout vec3 optical_depth)
 {
     if (!is_ray(r))
@@ -564,17 +591,18 @@ bool trace_any(trace_ray r, inout vec3 optical_depth)
     view_walk seen = begin_view_walk(r);
     bool is_stopped = walk_view(r, seen, optical_depth);
     note_outside(r, r.t_max, seen);
-    count(seen, !is_stopped && seen.t_unknown < r.t_max);
-    return is_stopped;
+    bool is_unknown = !is_stopped && seen.t_unknown < r.t_max;
+    count(seen, is_unknown);
+    return is_stopped || (is_unknown && seen.ends_behind);
 }
 
 #else
 
-// What is unknown is filled with what the ray was last before: the background of what hides it (section 4.1).
+// A ray that met nothing. If it came out again from behind what the view sees, it has left the scene, as far as is known.
 void fill(view_walk seen, inout candidate best)
 {
     uvec2 visible;
-    if (seen.fill_texel.x < 0 || !visible_at(seen.fill_texel, seen.fill_slice, visible))
+    if (!seen.ends_behind || !visible_at(seen.fill_texel, seen.fill_slice, visible))
         return;
     best = candidate(seen.t_fill, visible.y, visible.x - 1u, vec2(0.0));
     walk_flags |= (seen.fill_slice % quadtree.layers + 1u) << HIT_LAYER_SHIFT;

@@ -31,8 +31,10 @@ void main()
     if (k >= ray_count)
         return;
     hit h = hit_at(k);
+    // Those of later waves: layers_unknown.comp. Of pictures made from a key view: gather_views.comp.
+    put(LAYER_BIT_UNKNOWN, k, vec4(vec3((h.material & HIT_UNKNOWN) != 0u ? 1.0 : 0.0), 1.0));
     if (!(h.distance >= 0.0)) {
-        for (uint layer_bit = LAYER_BIT_ALBEDO; layer_bit <= LAYER_BIT_UNKNOWN; layer_bit <<= 1)
+        for (uint layer_bit = LAYER_BIT_ALBEDO; layer_bit <= LAYER_BIT_ID; layer_bit <<= 1)
             put(layer_bit, k, vec4(0.0));
         return;
     }
@@ -54,5 +56,4 @@ void main()
     put(LAYER_BIT_POSITION, k, position);
     put(LAYER_BIT_AO, k, vec4(vec3(0.0), 1.0)); // layers_gather.comp adds
     put(LAYER_BIT_ID, k, id);
-    put(LAYER_BIT_UNKNOWN, k, vec4(0.0)); // gather_views.comp knows better
 }

@@ -357,10 +357,13 @@ TEST(the_quadtree_of_a_view_shows_eyes_aside_as_they_are_rendered)
     step_aside(fixture, 0.065f);
     /* One layer lacks what the panels hide: 0.6 m high, 3.4 to 5.5 m away and 1.5 to 3.6 m before the wall, they
      * hide strips of 0.8 to 3.2 pixels, 380 of 76,800 together: 0.49 %. Two lack nothing. 35 dB is what is asked
-     * of whole pictures. */
+     * of whole pictures. The picture ends at a tangent of 0.487, the view with its margin at 0.535. Rays from
+     * aside that come into it farther than 1.2 m away are unknown, which are those above 0.535 - 0.065 / 1.2 (1 +
+     * 0.535^2)^0.5 = 0.474: of 320 columns the last 5, 1.56 %. */
+    const double outside = 0.0156;
     for (uint32_t layers = 1; layers <= 3; layers++) {
         fixture->request.tracer_options.quadtree.layers = layers;
-        expect_like_from_aside(fixture, 35, layers == 1 ? 0.006 : 0.001);
+        expect_like_from_aside(fixture, 35, outside + (layers == 1 ? 0.006 : 0.001));
     }
     fixture->request.format = PIXEL_FORMAT_RGBA8;
     made = render_from(fixture, VIEW_SOURCE_LAYERS);

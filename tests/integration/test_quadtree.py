@@ -61,6 +61,24 @@ class Quadtree(OneDaemon):
         path, _ = self.render("rays.exr", "--stereo", "1", "--views", "rays", "--layers", "beauty,unknown")
         self.assertEqual(set(read_exr(path)[2]["unknown.Y"]), {0})
 
+    def test_mirrored_and_refracted_rays_that_are_unknown_are_marked_in_the_picture(self):
+        """A pixel's sample sends on one ray of either kind, so that two unknown ones mark the same pixel at most."""
+        path = self.folder / "glass.exr"
+        once = ["--layers", "beauty,unknown", "--depth", "1", "--quadtree-layers", "1", "--timings=json"]
+        result = self.expect(farlight("render", bundled_scenes() / ROOM, "-o", path, *SMALL, *once, "--tracer", "quadtree"), 0)
+        frame = frames_of(result)[0]
+        share = sum(frame["structure"][f"secondary/unknown_{where}_per_ray"] for where in ("behind", "outside"))
+        unknown = round(share * frame["secondary_rays"])
+        marks = read_exr(path)[2]["unknown.Y"]
+        marked = sum(mark > 0 for mark in marks)
+        self.assertGreater(marked, 10)
+        self.assertTrue(marked <= unknown <= 2 * marked, (marked, unknown))
+        # By how much they count: glass mirrors a part of the light, and lets the rest through.
+        self.assertTrue(all(0 <= mark <= 1 for mark in marks))
+        self.assertTrue(any(0 < mark < 0.5 for mark in marks))
+        self.expect(farlight("render", bundled_scenes() / ROOM, "-o", path, *SMALL, *once), 0)
+        self.assertEqual(set(read_exr(path)[2]["unknown.Y"]), {0})
+
     def test_light_fields_and_lenses_are_made_from_layers(self):
         field, said = self.render("field.png", "--light-field", "3x2", "--baseline", "0.05")
         self.assertEqual(read_png(field)[:2], (3 * 48, 2 * 36))

@@ -24,7 +24,8 @@ bool quadtree_state_tell(struct trace_state *state, struct structure_rows *rows,
 
 /* Before a wave: the counts are there, those of a frame's first wave zero. */
 bool quadtree_trace_begin(struct trace_state *state, struct error *error);
-/* Intersections with HIT_UNKNOWN and HIT_LAYER bits, or transmittances: what is unknown stops no light. */
+/* Intersections with HIT_UNKNOWN and HIT_LAYER bits, or transmittances: of rays that are unknown those that end
+ * behind what the view sees first are stopped. */
 bool quadtree_intersect(struct quadtree_store *store, struct gpu_scene *scene, struct quadtree_state *state,
                         const struct ray_range *rays, const struct tracer_options *options, struct error *error);
 /* As tracer_impl.layer_hits. */
