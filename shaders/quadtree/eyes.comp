@@ -26,6 +26,7 @@ const int START = 0;
 const int START = QUADTREE_TOP;
 #endif
 const float NEVER = -1.0; // of a w: behind all that a ray may meet
+const float ALMOST_END = 0.999;
 
 // A ray on its way through a layer, from greater w to lesser.
 struct eye_walk {
@@ -37,6 +38,7 @@ struct eye_walk {
     float w_behind; // where it came behind the layer for more than a texel
     float w_fill; // where it was last before the first layer that it came behind
     uint fill_layer;
+    bool ends_behind; // the first layer
 };
 
 void walk_layer(uint layer, inout eye_walk walk)
@@ -74,6 +76,8 @@ void walk_layer(uint layer, inout eye_walk walk)
             is_before = gap_out <= 0.0;
             w_before = is_before ? mix(w, w_out, 0.99) : w_before;
             w_since = is_before ? NEVER : max(w_since, w);
+            if (is_on_way && layer == 0u)
+                walk.ends_behind = !is_before;
             vec2 way = abs(along) * (w_since - w_out);
             bool stays = is_on_way && !is_before &&
                          (gap_out > QUADTREE_DEEP * w_out || max(way.x, way.y) > QUADTREE_OWN_WAY);
@@ -106,6 +110,15 @@ void walk_layer(uint layer, inout eye_walk walk)
     }
 }
 
+// As traverse.glsl has it: nothing is taken to be before the view where the ray comes in near it, or by the near plane.
+bool is_free_before(eye_walk walk, float w_enters, float w_begins)
+{
+    if (w_enters >= w_begins)
+        return true;
+    vec2 place = (walk.far + w_enters * walk.along - quadtree.scale_centre.zw) / quadtree.scale_centre.xy;
+    return length(vec3(place, 1.0)) <= QUADTREE_FREE_RADII * quadtree.bounds.w * w_enters;
+}
+
 // The texel of a sample; `beam`: of its tile; `code`: what is counted of it.
 vec4 look(vec3 eye, vec2 place, vec4 beam, out uint code)
 {
@@ -125,6 +138,8 @@ vec4 look(vec3 eye, vec2 place, vec4 beam, out uint code)
     walk.is_before = (bits & QUADTREE_BEAM_INSIDE) != 0;
     walk.w_fill = NEVER;
     walk.fill_layer = 0u;
+    walk.ends_behind = false;
+    float w_leaves_or_ends = walk.w_end;
     float w_hit = NEVER, w_unknown = NEVER, w_first = walk.w;
     uint hit_layer = 0u, layers = 1u;
     bool has_left = false, goes_on = true;
@@ -144,10 +159,12 @@ vec4 look(vec3 eye, vec2 place, vec4 beam, out uint code)
         walk.is_before = false;
     }
     bool is_outside = w_hit == NEVER && (w_leaves > w_last || w_enters <= w_last);
-    has_left = has_left || is_outside && w_unknown == NEVER;
+    bool is_filled = w_hit == NEVER && w_unknown != NEVER && !has_left && walk.ends_behind;
+    bool is_free = is_free_before(walk, w_enters, quadtree.depths.x / max(eye.z, quadtree.depths.w));
+    has_left = has_left || !is_free || is_outside && w_unknown == NEVER;
     bool is_unknown = has_left || w_unknown > w_hit;
-    bool is_filled = w_hit == NEVER && w_unknown != NEVER && !has_left && walk.w_fill != NEVER;
-    float w = is_filled ? walk.w_fill : w_hit;
+    float w_fill = walk.w_fill != NEVER ? walk.w_fill : mix(w_first, w_leaves_or_ends, ALMOST_END);
+    float w = is_filled ? w_fill : w_hit;
     uint layer = is_filled ? walk.fill_layer : hit_layer;
     code = layers - 1u + (is_unknown ? has_left ? QUADTREE_OUTSIDE : QUADTREE_BEHIND : 0u);
     return vec4(walk.far + w * walk.along, w * (1.0 / quadtree.depths.x),

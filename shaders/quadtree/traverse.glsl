@@ -562,7 +562,7 @@ bool walk_view(trace_ray r, inout view_walk seen, inout found_type found)
 
 view_walk begin_view_walk(trace_ray r)
 {
-    return view_walk(last_distance(r), vec2(1.0, 0.0), 1e30, 1u, false, 0.0, false, 0.0, 0u, ivec2(0));
+    return view_walk(last_distance(r), vec2(1.0, 0.0), 1e30, 1u, false, 0.0, false, 0.0, 0u, ivec2(-1));
 }
 
 void count(view_walk seen, bool is_unknown)
@@ -602,7 +602,7 @@ bool trace_any(trace_ray r, inout vec3 optical_depth)
 void fill(view_walk seen, inout candidate best)
 {
     uvec2 visible;
-    if (!seen.ends_behind || !visible_at(seen.fill_texel, seen.fill_slice, visible))
+    if (!seen.ends_behind || seen.fill_texel.x < 0 || !visible_at(seen.fill_texel, seen.fill_slice, visible))
         return;
     best = candidate(seen.t_fill, visible.y, visible.x - 1u, vec2(0.0));
     walk_flags |= (seen.fill_slice % quadtree.layers + 1u) << HIT_LAYER_SHIFT;
