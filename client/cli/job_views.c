@@ -136,7 +136,7 @@ static bool complete_source(struct cli_job *job)
     const bool has_lens = wanted->aperture > 0 || job->lens_changes;
     if (views->has_views && !has_views)
         return refuse(job, "--views", "the picture has a single view",
-                      "add --stereo 0.065 or --light-field 5x5, or --upsample 4 to an animation");
+                      "add --stereo 0.065; a picture may have --light-field 5x5, an animation --upsample 4");
     if (views->has_lens && !has_lens)
         return refuse(job, "--lens", "everything is sharp", "add --aperture 0.05");
     if (views->has_views && views->has_lens && views->views != views->lens)
