@@ -8,7 +8,10 @@
 #include "render/frame_request.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
+
+#define UNKNOWN_WARNED 0.5f /* share of a picture; 50 cm aside in a room, 0.2 to 0.3 are not known */
 
 bool frame_is_from_layers(const struct frame_request *request)
 {
@@ -217,6 +220,21 @@ bool frame_key_find(struct frame_renderer *renderer, bool *done, struct error *e
            (!layers->noting || primary_make_surfaces(context, error));
 }
 
+/* Where most of a picture is filled from the background, what was asked for is hardly meant. */
+static void warn_of_unknown(struct structure_row *row, const struct frame_request *request)
+{
+    if (row->measure < UNKNOWN_WARNED)
+        return;
+    snprintf(
+        row->warning, sizeof(row->warning),
+        "no depth layer shows %.0f %% of the picture, whose eyes are up to %.3g m from the view that is rendered "
+        "(%s)",
+        (double)row->measure * 100.0, (double)farthest_eye(request),
+        request->has_key           ? "choose a smaller --upsample"
+        : frame_has_views(request) ? "bring the eyes nearer together, or choose --views rays"
+                                   : "choose a smaller --aperture, or --lens rays");
+}
+
 bool frame_key_tell(struct frame_renderer *renderer, struct error *error)
 {
     const struct frame_request *request = &renderer->request;
@@ -232,6 +250,6 @@ bool frame_key_tell(struct frame_renderer *renderer, struct error *error)
     const uint64_t samples = (uint64_t)request->width * request->height * renderer->work->context.request.samples;
     rows->part = 0;
     rows->part_name = NULL;
-    structure_per_ray(rows, "views/unknown", (float)unknown / (float)samples);
+    warn_of_unknown(structure_per_ray(rows, "views/unknown", (float)unknown / (float)samples), request);
     return true;
 }

@@ -61,6 +61,20 @@ class Quadtree(OneDaemon):
         path, _ = self.render("rays.exr", "--stereo", "1", "--views", "rays", "--layers", "beauty,unknown")
         self.assertEqual(set(read_exr(path)[2]["unknown.Y"]), {0})
 
+    def test_a_picture_that_is_mostly_unknown_is_warned_of(self):
+        """Its eyes are outside the room, or look away from what was rendered."""
+        for options, remedy in ((["--stereo", "1000"], "--views rays"), (["--stereo", "0.065"], None),
+                                (["--aperture", "100", "--focus", "3", "--lens", "quadtree"], "--lens rays")):
+            path = self.folder / "far.png"
+            result = self.expect(farlight("render", bundled_scenes() / ROOM, "-o", path, *SMALL, *options), 0)
+            self.assertEqual("no depth layer shows" in result.stderr, remedy is not None, result.stderr)
+            self.assertIn(remedy or "", result.stderr)
+        (self.folder / "far").mkdir()
+        result = self.expect(farlight("animate", bundled_scenes() / ROOM, *SMALL, "--eye", "0,1,0", "--look-at", "0,1,-1",
+                                      "--orbit", "--frames", "1-3", "--upsample", "3", "-o", self.folder / "far" / "%d.png"), 0)
+        self.assertEqual(result.stderr.count("no depth layer shows"), 1)  # once, however many frames
+        self.assertIn("a smaller --upsample", result.stderr)
+
     def test_light_fields_and_lenses_are_made_from_layers(self):
         field, said = self.render("field.png", "--light-field", "3x2", "--baseline", "0.05")
         self.assertEqual(read_png(field)[:2], (3 * 48, 2 * 36))
