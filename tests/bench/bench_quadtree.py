@@ -29,7 +29,8 @@ ASIDE = "0.065,0,0"
 STEREO = "quadtree,dda,minmax"
 # A walk at 1.4 m/s, shown at 60 frames a second of which 15 are rendered.
 WALK = [f"0,0,{1.4 * k / 60:.4f}" for k in (1, 2, 3)]
-SAMPLES, TRUE_SAMPLES = (4, 8, 16), 256
+# Of the true pictures, whose noise is measured and taken off: with 16 to 128 of them all PSNR agree within 0.5 dB.
+SAMPLES, TRUE_SAMPLES = (4, 8, 16), 64
 LENS = ["--move", "0,0,0", "--aperture", "0.1", "--focus", "4"]
 SPREAD_MAX, BUILD_MAX, STEPS_MAX, LAYER_MAX, ADAPTIVE_MAX = 3, 1 / 3, 0.6, 1.25, 0.9
 OVER = {"reference": 1.8, "dda": 3, "minmax": 1.4}
