@@ -147,9 +147,7 @@ bool frame_key_set_pass(struct frame_renderer *renderer, struct error *error)
     context->trace_state = is_layer ? renderer->work->trace_state : renderer->work->key_trace_state;
     context->layer_tracer = is_layer ? renderer->key_tracer : NULL;
     context->layer = is_layer ? renderer->pass : 0;
-    context->key_marks = is_layer && renderer->key.is_marked ? &renderer->key.marks : NULL;
-    context->key_tiles = context->key_marks ? &renderer->key.tiles : NULL;
-    context->first_tile = context->key_tiles ? renderer->key.first_tile[renderer->pass] : 0;
+    context->marked_key = is_layer && renderer->key.is_marked ? &renderer->key : NULL;
     renderer->target = is_layer ? &renderer->key.sums : &renderer->picture;
     renderer->samples_before = is_layer ? 0 : renderer->eyes_samples_before;
     slices_ahead_forget(&renderer->work->ahead); /* rays of another pass cost something else */

@@ -77,7 +77,7 @@ struct frame_request key_view_layer_request(const struct key_view *key, const st
 
 static const struct gpu_program *keep_program(struct render_context *context, struct error *error)
 {
-    const struct gpu_define defines[] = {{context->key_tiles ? "HAS_TILES" : NULL, "1"}, {NULL, NULL}};
+    const struct gpu_define defines[] = {{context->marked_key ? "HAS_TILES" : NULL, "1"}, {NULL, NULL}};
     return context_use_with(context, "render/keep_layer.comp", defines, error);
 }
 
