@@ -70,15 +70,6 @@ struct bench {
 
 /* ---- frames ---- */
 
-static struct frame_camera moved(const struct frame_camera *camera, const float way[3])
-{
-    struct frame_camera to = *camera;
-    float *m = to.world_from_view;
-    for (int k = 0; k < 3; k++)
-        m[4 * k + 3] += way[0] * m[4 * k] + way[1] * m[4 * k + 1] - way[2] * m[4 * k + 2];
-    return to;
-}
-
 static struct frame_request request_of(const struct bench *bench, const float way[3])
 {
     return (struct frame_request){.width = bench->width,
@@ -88,7 +79,7 @@ static struct frame_request request_of(const struct bench *bench, const float wa
                                   .integrator = bench->samples > 1 ? INTEGRATOR_DISTRIBUTED : INTEGRATOR_WHITTED,
                                   .aperture = bench->aperture,
                                   .focus = bench->focus,
-                                  .camera = moved(&bench->scene.camera, way),
+                                  .camera = bench_moved(&bench->scene.camera, way),
                                   .tracer = TRACER_BVH};
 }
 
@@ -195,7 +186,7 @@ static bool make_once(struct bench *bench, const struct form *form, const float 
     request.tracer_options.quadtree = form->settings;
     request.view_source = VIEW_SOURCE_LAYERS;
     request.has_key = true;
-    request.key_camera = moved(&bench->scene.camera, (float[3]){KEY_STEP * (float)++bench->keys, 0, 0});
+    request.key_camera = bench_moved(&bench->scene.camera, (float[3]){KEY_STEP * (float)++bench->keys, 0, 0});
     if (!render(bench, &request, &first, &cold_ns, error) ||
         !render_colours(bench, &request, bench->colours, &warm_ns, error))
         return false;
@@ -207,11 +198,6 @@ static bool make_once(struct bench *bench, const struct form *form, const float 
     }
     frame_result_finish(&first);
     return is_counted || find_seen(bench, request, results, error);
-}
-
-static json_t *decibels(double db)
-{
-    return isfinite(db) ? json_real(db) : json_null();
 }
 
 static void write_picture(const struct bench *bench, const char *move, const char *name, const uint32_t *colours,
@@ -231,8 +217,8 @@ static json_t *results_json(const struct bench *bench, const struct form *form, 
             json_object_set_new(stages, stage_name(stage), bench_times_json(&results->stages[stage]));
     return json_pack("{s:s, s:o, s:o, s:o, s:o, s:o, s:f}", "name", form->name, "cold_ns",
                      bench_times_json(&results->cold), "warm_ns", bench_times_json(&results->warm), "stages_ns",
-                     stages, "psnr_db", decibels(psnr_db(bench, NULL)), "seen_psnr_db",
-                     decibels(psnr_db(bench, bench->seen)), "unseen", results->unseen);
+                     stages, "psnr_db", bench_decibels(psnr_db(bench, NULL)), "seen_psnr_db",
+                     bench_decibels(psnr_db(bench, bench->seen)), "unseen", results->unseen);
 }
 
 static bool make(struct bench *bench, const struct form *form, const float way[3], json_t *list,
@@ -264,9 +250,9 @@ static bool run_move(struct bench *bench, const float way[3], struct error *erro
     snprintf(name, sizeof(name), "%g,%g,%g", (double)way[0], (double)way[1], (double)way[2]);
     json_t *list = json_array();
     json_array_append_new(bench->moves, json_pack("{s:s, s:o, s:o, s:o, s:o}", "name", name, "true_psnr_db",
-                                                  decibels(true_psnr_db(bench, NULL)), "rendered_ns",
+                                                  bench_decibels(true_psnr_db(bench, NULL)), "rendered_ns",
                                                   bench_times_json(&rendered), "psnr_db",
-                                                  decibels(psnr_db(bench, NULL)), "forms", list));
+                                                  bench_decibels(psnr_db(bench, NULL)), "forms", list));
     if (bench->pictures)
         write_picture(bench, name, "true", bench->truth, NULL);
     for (unsigned i = 0; i < FORMS; i++) {
@@ -309,15 +295,11 @@ static bool run(struct bench *bench, struct error *error)
 
 static bool print(const struct bench *bench)
 {
-    json_t *all = json_pack("{s:s, s:I, s:s, s:b, s:i, s:i, s:i, s:i, s:f, s:O}", "scene",
-                            bench->scene_options.model ? bench->scene_options.model : "family", "triangles",
-                            (json_int_t)bench->scene.triangle_count, "device", bench->device->info.name,
-                            "software", bench->device->facts.software, "width", (int)bench->width, "height",
-                            (int)bench->height, "samples", (int)bench->samples, "true_samples",
-                            (int)bench->true_samples, "aperture", (double)bench->aperture, "moves", bench->moves);
-    const bool done = all && json_dumpf(all, stdout, 0) == 0 && putchar('\n') == '\n' && fflush(stdout) == 0;
-    json_decref(all);
-    return done;
+    json_t *measured =
+        json_pack("{s:i, s:i, s:i, s:i, s:f, s:O}", "width", (int)bench->width, "height", (int)bench->height,
+                  "samples", (int)bench->samples, "true_samples", (int)bench->true_samples, "aperture",
+                  (double)bench->aperture, "moves", bench->moves);
+    return bench_scene_print(&bench->scene, &bench->scene_options, bench->device, measured);
 }
 
 static bool parse_option(struct bench *bench, int option, const char *text)
