@@ -102,6 +102,14 @@ static bool begin_layers(struct frame_renderer *renderer, const struct trace_vie
     return true;
 }
 
+/* Frames that add to one another have layers with noise of their own each, or that of the first would stay. */
+static bool is_noise_new(const struct frame_renderer *renderer)
+{
+    const enum integrator_kind integrator = renderer->request.integrator;
+    return integrator == INTEGRATOR_WHITTED || integrator == INTEGRATOR_RAYCAST ||
+           renderer->key.first_sample == renderer->eyes_samples_before;
+}
+
 /* Which passes the frame needs. */
 static bool choose_first(struct frame_renderer *renderer, struct error *error)
 {
@@ -114,7 +122,8 @@ static bool choose_first(struct frame_renderer *renderer, struct error *error)
     renderer->eyes_samples_before = renderer->samples_before;
     if (!key_view_count_anew(key, renderer->device, error))
         return false;
-    if (!key_view_is_of(key, &renderer->view, &renderer->request, renderer->shared->showing))
+    if (!key_view_is_of(key, &renderer->view, &renderer->request, renderer->shared->showing) ||
+        !is_noise_new(renderer))
         return begin_layers(renderer, &texels, layer_count, error);
     key->is_marked = false;
     renderer->pass = key->layer_count;
@@ -196,6 +205,7 @@ bool frame_key_keep(struct frame_renderer *renderer, struct error *error)
     key->request = renderer->request;
     key->showing = renderer->shared->showing;
     key->is_made = !key->is_marked;
+    key->first_sample = renderer->eyes_samples_before;
     return true;
 }
 
