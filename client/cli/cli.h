@@ -25,6 +25,7 @@ int cli_animate(int argc, char **argv);
 int cli_info(int argc, char **argv);
 int cli_compare(int argc, char **argv);
 int cli_compare_tracers(int argc, char **argv); /* where cli_compare finds --tracers */
+int cli_compare_views(int argc, char **argv);   /* likewise --stereo and what else is made of depth layers */
 int cli_serve(int argc, char **argv);
 int cli_scenes(int argc, char **argv);
 int cli_stats(int argc, char **argv);
@@ -151,6 +152,7 @@ struct cli_series {
     struct fl_frame_run range;
     uint32_t shard_part, shard_parts; /* 0 parts: all frames */
     bool resume;                      /* frames whose files exist are not rendered again */
+    struct record_camera_key *keys;   /* of the job's keys_file, once all options are read */
     double orbit_degrees;
     double orbit_seconds; /* for these degrees; 0: the range */
     float *dolly_times;   /* two keys of the camera's path, the second one at: */
@@ -225,12 +227,24 @@ struct cli_job {
     struct fl_error error; /* of what was typed */
 };
 
+/* ---- job_series.c: a series of frames ---- */
+
+/* A child parser; its input is a struct cli_job. */
+const struct argp *cli_series_argp(void);
+/* As if "--OPTION VALUE" had been typed. ARGP_ERR_UNKNOWN: there is none. */
+error_t cli_series_set(struct cli_job *job, const char *option, const char *value);
+/* cli_job_complete() for a series, and what only a series has. */
+bool cli_series_complete(struct cli_job *job);
+void cli_series_finish(struct cli_job *job);
+
 /* ---- job_views.c: several views in a picture, lenses and frames by depth layers ---- */
 
 /* Sets what an option of views says; ARGP_ERR_UNKNOWN: it is none of them. */
 error_t cli_views_set(struct cli_job *job, const char *option, const char *value);
 /* Their fields of `render`, once all options are read. `is_series`: frames may be made from others. */
 bool cli_views_complete(struct cli_job *job, bool is_series);
+/* Whether the range, which is known, has frames to be made from others, if that is asked for. */
+bool cli_views_check_range(const struct cli_job *job, struct fl_error *error);
 /* Whether each view is a file of its own. */
 bool cli_views_are_files(const struct cli_job *job);
 
@@ -238,6 +252,8 @@ bool cli_views_are_files(const struct cli_job *job);
 const struct argp *cli_job_argp(void);
 /* Likewise, without the options of output, tracer and first hits. */
 const struct argp *cli_picture_argp(void);
+/* Likewise, without the options of output. */
+const struct argp *cli_views_argp(void);
 /* Likewise for a window, without the options of files; samples, integrator and encoding have other defaults
  * there. */
 const struct argp *cli_view_argp(void);

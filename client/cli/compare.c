@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The command line decides what is compared: two image files, or with --tracers two tracers. */
+/* The command line decides what is compared: two image files, with --tracers two tracers, or with an option of
+ * views what is made of depth layers with what is rendered. */
 #include "cli/cli.h"
 #include "cli/comparison.h"
 #include "lib/text.h"
@@ -145,28 +146,46 @@ static int compare_images(struct comparing *comparing)
     return cli_limits_hold(&comparing->limits, &comparison) ? CLI_DONE : CLI_FAILED;
 }
 
-/* Abbreviations count, as everywhere; so does "--tracer". */
-static bool is_about_tracers(int argc, char **argv)
+/* Abbreviations count, as everywhere: down to `shortest` characters. */
+struct form {
+    const char *option;
+    size_t shortest; /* that no other option of images begins with; so does "--tracer" */
+    int (*run)(int argc, char **argv);
+};
+static const struct form forms[] = {
+    {"--tracers", 4, cli_compare_tracers},   {"--stereo", 3, cli_compare_views},
+    {"--light-field", 4, cli_compare_views}, {"--lens", 4, cli_compare_views},
+    {"--views", 4, cli_compare_views},       {"--upsample", 4, cli_compare_views},
+};
+
+/* What another form than that of two images is called by; NULL: none. */
+static const struct form *find_form(int argc, char **argv)
 {
-    static const char option[] = "--tracers";
-    for (int i = 1; i < argc && strcmp(argv[i], "--") != 0; i++) {
-        const size_t length = strcspn(argv[i], "=");
-        if (length >= strlen("--tr") && length < sizeof(option) && strncmp(argv[i], option, length) == 0)
-            return true;
-    }
-    return false;
+    for (size_t k = 0; k < sizeof(forms) / sizeof(forms[0]); k++)
+        for (int i = 1; i < argc && strcmp(argv[i], "--") != 0; i++) {
+            const size_t length = strcspn(argv[i], "=");
+            if (length >= forms[k].shortest && length <= strlen(forms[k].option) &&
+                strncmp(argv[i], forms[k].option, length) == 0)
+                return &forms[k];
+        }
+    return NULL;
 }
 
 int cli_compare(int argc, char **argv)
 {
-    if (is_about_tracers(argc, argv))
-        return cli_compare_tracers(argc, argv);
+    const struct form *form = find_form(argc, argv);
+    if (form)
+        return form->run(argc, argv);
     static const struct argp argp = {
         .options = options,
         .parser = parse,
-        .args_doc = "IMAGE IMAGE\nMODEL --tracers A,B",
-        .doc = "Measure the difference of two images of one size, or of two tracers on a model, ray by ray.\v"
-               "Options of the second form: 'farlight compare --tracers bvh,reference --help'. "
+        .args_doc = "IMAGE IMAGE\nMODEL --tracers A,B\nMODEL --stereo METRES|--light-field NxM|--lens "
+                    "quadtree|--upsample N",
+        .doc = "Measure the difference of two images of one size, of two tracers on a model, ray by ray, or of "
+               "pictures "
+               "that are made of depth layers and rendered ones.\v"
+               "Options of the second form: 'farlight compare --tracers bvh,reference --help', of the third: "
+               "'farlight compare --stereo 0.065 --help'. "
                "Images are EXR, HDR, PNG or JPEG. EXR and HDR files are compared in linear light, others as a "
                "screen shows them, 0 to 1. Exit status: 0 within all limits, 1 beyond a limit, 2 not compared."};
     struct comparing comparing = {0};
@@ -174,8 +193,10 @@ int cli_compare(int argc, char **argv)
         return cli_trouble(&comparing.job.error);
     if (comparing.operand_count < 2) {
         cli_usage(&comparing.job, "IMAGE", "two image files are needed");
-        fl_error_remedy(&comparing.job.error,
-                        "name them, or compare tracers on a model with --tracers bvh,reference");
+        fl_error_remedy(
+            &comparing.job.error,
+            "name them, or compare tracers on a model with --tracers bvh,reference, or what is made of "
+            "depth layers with --stereo 0.065");
         return cli_trouble(&comparing.job.error);
     }
     return compare_images(&comparing);

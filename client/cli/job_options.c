@@ -14,6 +14,7 @@
 #include <string.h>
 
 #define RADIANS_PER_DEGREE 0.017453292519943295
+#define TURN_DEGREES 360.0
 #define OPTIONS_MAX 160
 #define RETRY_MAX_S 2592000.0 /* 30 days */
 
@@ -391,12 +392,23 @@ const struct argp *cli_picture_argp(void)
     return &argp;
 }
 
+const struct argp *cli_views_argp(void)
+{
+    static const char *const left_out[] = {"output",  "format",     "half",          "float",
+                                           "timings", "trace-file", "layers",        "retry-for",
+                                           "retries", "metadata",   "stereo-layout", NULL};
+    static struct argp_option kept[OPTIONS_MAX];
+    static const struct argp argp = {.options = kept, .parser = parse};
+    keep(kept, left_out);
+    return &argp;
+}
+
 const struct argp *cli_view_argp(void)
 {
-    static const char *const left_out[] = {
-        "output",     "format", "half",          "float",       "samples",  "integrator", "timings",
-        "trace-file", "layers", "clip-once",     "clip-start",  "encoding", "retry-for",  "retries",
-        "metadata",   "stereo", "stereo-layout", "light-field", "baseline", "views",      NULL};
+    static const char *const left_out[] = {"output",      "format",   "half",       "float",   "samples",
+                                           "integrator",  "timings",  "trace-file", "layers",  "clip-once",
+                                           "clip-start",  "encoding", "retry-for",  "retries", "metadata",
+                                           "light-field", "baseline", NULL};
     static struct argp_option kept[OPTIONS_MAX];
     static const struct argp argp = {.options = kept, .parser = parse};
     keep(kept, left_out);
@@ -430,6 +442,7 @@ static bool read_environment(struct cli_job *job)
 bool cli_job_begin(struct cli_job *job, struct message_render defaults)
 {
     *job = (struct cli_job){.key = {.up_world = {0, 1, 0}, .fov_y = (float)(45 * RADIANS_PER_DEGREE)},
+                            .series = {.orbit_degrees = TURN_DEGREES},
                             .options = defaults};
     return read_environment(job);
 }

@@ -136,7 +136,7 @@ static bool complete_source(struct cli_job *job)
     const bool has_lens = wanted->aperture > 0 || job->lens_changes;
     if (views->has_views && !has_views)
         return refuse(job, "--views", "the picture has a single view",
-                      "add --stereo 0.065 or --light-field 5x5, or --upsample 4 to an animation");
+                      "add --stereo 0.065; a picture may have --light-field 5x5, an animation --upsample 4");
     if (views->has_lens && !has_lens)
         return refuse(job, "--lens", "everything is sharp", "add --aperture 0.05");
     if (views->has_views && views->has_lens && views->views != views->lens)
@@ -159,11 +159,21 @@ static bool complete_source(struct cli_job *job)
     return true;
 }
 
+bool cli_views_check_range(const struct cli_job *job, struct fl_error *error)
+{
+    if (job->options.upsample == 1 || fl_frame_run_count(&job->series.range) > 1)
+        return true;
+    fl_error_set(error, FL_ERROR_ARGUMENT, "--upsample", "a single frame is rendered: there are none between");
+    return fl_error_remedy(error, "leave it out, or use a range of --frames such as 1-120");
+}
+
 /* Every N-th frame of a range that itself has only every M-th. */
 static bool complete_upsample(struct cli_job *job)
 {
     const struct cli_series *series = &job->series;
     struct message_render *wanted = &job->options;
+    if (series->has_range && !cli_views_check_range(job, &job->error))
+        return false;
     const uint64_t step = series->has_range ? series->range.step : 1, frames = wanted->upsample * step;
     if (wanted->upsample == 1)
         return true;

@@ -151,7 +151,7 @@ bool cli_settle(struct cli_job *job, struct fl_scene *scene, bool is_series, str
     if (!settle_clips(job, scene, &clips_s, error))
         return false;
     if (is_series) {
-        if (!choose_range(job, clips_s, error))
+        if (!choose_range(job, clips_s, error) || !cli_views_check_range(job, error))
             return false;
         settle_camera(job);
     }

@@ -167,7 +167,7 @@ static struct corner draw_scene(struct layout *layout)
     const struct hud_state *state = layout->state;
     const struct settings *settings = state->settings;
     const double s = layout->scale, line = LINE * s;
-    struct row rows[6 + STRUCTURE_LINES_MAX];
+    struct row rows[7 + STRUCTURE_LINES_MAX];
     size_t count = 0;
     snprintf(rows[count].value, HUD_TEXT_MAX, "%s, %s", protocol_tracer_text(settings->tracer),
              protocol_integrator_text(settings->integrator));
@@ -175,6 +175,11 @@ static struct corner draw_scene(struct layout *layout)
     snprintf(rows[count].value, HUD_TEXT_MAX, "%+.1f stops, %s", state->exposure_stops,
              protocol_tone_map_text(settings->tone_map));
     rows[count++].name = "exposure";
+    if (settings->stereo) {
+        snprintf(rows[count].value, HUD_TEXT_MAX, "%.4g mm apart, %s", state->stereo_m * 1e3,
+                 settings->views == PROTOCOL_VIEW_SOURCE_RAYS ? "rendered" : "from layers");
+        rows[count++].name = "views";
+    }
     if (state->camera[0] != '\0') {
         snprintf(rows[count].value, HUD_TEXT_MAX, "%s", state->camera);
         rows[count++].name = "camera";

@@ -47,6 +47,7 @@ struct hud_state {
     const char *camera, *clip; /* names; empty: none */
     const struct settings *settings;
     double exposure_stops;
+    double stereo_m; /* between both eyes, where there are two */
     const struct tour *tour;
     const struct metrics *metrics;
     uint64_t now_ns;

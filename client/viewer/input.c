@@ -32,6 +32,7 @@ const struct binding input_bindings[] = {
     {NULL, "up", ACTION_UP, ACTION_UP, NULL},
     {NULL, "down", ACTION_DOWN, ACTION_DOWN, NULL},
     {"I, Shift+I", "i", ACTION_NEXT_INTEGRATOR, ACTION_PREVIOUS_INTEGRATOR, "next, previous integrator"},
+    {"B, Shift+B", "b", ACTION_STEREO, ACTION_VIEW_SOURCE, "both eyes, or one; from layers, or rendered"},
     {"[ ]", "[", ACTION_DARKER, ACTION_DARKER, "darker, brighter by a third of a stop"},
     {NULL, "]", ACTION_BRIGHTER, ACTION_BRIGHTER, NULL},
     {"M", "m", ACTION_NEXT_TONE_MAP, ACTION_NEXT_TONE_MAP, "next tone map"},

@@ -14,6 +14,8 @@
 /* The C library looks for it by name, past our hidden visibility. */
 __attribute__((visibility("default"))) const char *argp_program_version = "farlight-view " FARLIGHT_VERSION;
 
+#define STEREO_DEFAULT_M 0.065f /* between the eyes of people */
+
 enum key {
     KEY_SCENE = 0x500,
     KEY_HEADLESS,
@@ -201,6 +203,10 @@ static bool complete(struct command_line *line)
     struct viewer_options *viewer = &line->viewer;
     if (viewer->headless && !viewer->replay)
         return cli_usage(job, "--headless", "without a window --replay is needed") == 0;
+    if (cli_views_are_files(job)) {
+        cli_usage(job, "--stereo-layout", "a window is no pair of files");
+        return fl_error_remedy(&job->error, "use side or over");
+    }
     if (job->clip_count > 1)
         return cli_usage(job, "--clip", "only one clip can be played") == 0;
     if ((job->model && !cli_check_input(job->model, &job->error)) ||
@@ -226,6 +232,14 @@ static void fill(struct command_line *line)
     viewer->environment = job->environment;
     viewer->scene_name = job->scene;
     viewer->view = job->options;
+    viewer->view.views_across = viewer->view.views_down = 1;
+    viewer->view.eyes_over = 0;
+    viewer->view.baseline = 0;
+    viewer->view.view_source = job->views.has_lens ? job->views.lens : PROTOCOL_VIEW_SOURCE_RAYS;
+    viewer->stereo = job->views.has_stereo;
+    viewer->stereo_m = job->views.has_stereo ? job->views.stereo_m : STEREO_DEFAULT_M;
+    viewer->stereo_over = job->views.layout == CLI_STEREO_OVER;
+    viewer->views = job->views.has_stereo ? job->options.view_source : PROTOCOL_VIEW_SOURCE_LAYERS;
     viewer->has_encoding = job->has_encoding;
     viewer->has_primary = job->has_primary;
     viewer->has_integrator = job->has_integrator;

@@ -72,6 +72,13 @@ static bool change_view(struct settings *settings, enum action action)
     case ACTION_FINER:
         settings->coarser -= settings->coarser > 0;
         return settings->coarser != before.coarser;
+    case ACTION_STEREO:
+        settings->stereo = !settings->stereo;
+        return true;
+    case ACTION_VIEW_SOURCE:
+        settings->views =
+            settings->views == PROTOCOL_VIEW_SOURCE_RAYS ? PROTOCOL_VIEW_SOURCE_LAYERS : PROTOCOL_VIEW_SOURCE_RAYS;
+        return settings->stereo;
     default:
         return false;
     }

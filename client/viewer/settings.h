@@ -12,11 +12,13 @@ struct settings {
     enum protocol_tracer tracer;
     enum protocol_integrator integrator;
     enum protocol_tone_map tone_map;
-    int exposure_thirds;            /* of a stop, added to that of the command line */
-    int coarser;                    /* pixels along an edge are divided by 2 to this power */
-    struct tracer_settings tracers; /* their settings */
-    bool panel;                     /* lists those of the tracer .. */
-    size_t setting;                 /* .. of which this one is chosen */
+    int exposure_thirds;             /* of a stop, added to that of the command line */
+    int coarser;                     /* pixels along an edge are divided by 2 to this power */
+    struct tracer_settings tracers;  /* their settings */
+    bool stereo;                     /* two views in the picture .. */
+    enum protocol_view_source views; /* .. of this origin */
+    bool panel;                      /* lists those of the tracer .. */
+    size_t setting;                  /* .. of which this one is chosen */
     bool error_map, help;
     enum overlay_mode overlay;
 };

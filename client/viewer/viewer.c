@@ -216,7 +216,9 @@ bool viewer_run(const struct viewer_options *options, struct fl_error *error)
                                          .integrator = options->view.integrator,
                                          .tone_map = options->view.tone_map,
                                          .tracers = options->view.settings,
-                                         .coarser = (int)options->coarser};
+                                         .coarser = (int)options->coarser,
+                                         .stereo = options->stereo,
+                                         .views = options->views};
     const bool opened = open_viewer(viewer, error);
     const bool done = opened && run(viewer);
     if (opened && !done)

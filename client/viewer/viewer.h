@@ -9,7 +9,10 @@
 struct viewer_options {
     const char *server, *key_file, *link, *model, *environment, *scene_name; /* as of session_options */
     /* From the command line; width and height are the window's, in pixels of the desktop. */
-    struct message_render view;
+    struct message_render view;      /* of one eye */
+    bool stereo, stereo_over;        /* two views from the beginning; the left one above the other */
+    float stereo_m;                  /* between the eyes */
+    enum protocol_view_source views; /* of two eyes */
     bool has_encoding, has_still_encoding, has_primary, has_integrator;
     bool always_adapt, never_adapt;
     const char *camera, *clip; /* names or numbers; NULL: none is named */

@@ -51,6 +51,10 @@ static void focus(struct viewer *viewer)
         return;
     viewer->focus_x = viewer->pointer_x / viewer->width;
     viewer->focus_y = viewer->pointer_y / viewer->height;
+    /* In the view that the pointer is in; what an eye sees there is about what is seen from between them. */
+    double *along = viewer->options->stereo_over ? &viewer->focus_y : &viewer->focus_x;
+    if (viewer->settings.stereo)
+        *along = 2 * *along - (*along < 0.5 ? 0 : 1);
     viewer->wanted = TASK_FOCUS;
 }
 

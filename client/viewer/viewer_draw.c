@@ -67,6 +67,7 @@ void viewer_hud(struct viewer *viewer, struct hud_state *state)
                                 .settings = &viewer->settings,
                                 .exposure_stops =
                                     (double)viewer->view.exposure_stops + viewer->settings.exposure_thirds / 3.0,
+                                .stereo_m = (double)viewer->options->stereo_m,
                                 .tour = &viewer->tour,
                                 .metrics = &viewer->metrics,
                                 .now_ns = monotonic_now_ns(),
@@ -138,7 +139,7 @@ void viewer_print_state(struct viewer *viewer, const char *name)
     metrics_summarise(&viewer->metrics, state.now_ns, &summary);
     json_t *line = json_pack(
         "{s:s, s:s, s:s, s:s, s:s, s:s, s:f, s:i, s:i, s:b, s:i, s:i, s:I, s:i, s:I, s:s, s:s, s:f, s:b, s:o, "
-        "s:o, s:o, s:o, s:f, s:f, s:f}",
+        "s:o, s:o, s:o, s:f, s:f, s:f, s:b, s:s}",
         "state", name, "status", statuses[state.status], "tracer", protocol_tracer_text(viewer->frame.tracer),
         "integrator", protocol_integrator_text(viewer->frame.integrator), "tone_map",
         protocol_tone_map_text(viewer->settings.tone_map), "encoding",
@@ -150,7 +151,8 @@ void viewer_print_state(struct viewer *viewer, const char *name)
         (int)viewer->tour.playing, "eye", vector_json(viewer->camera.eye), "look_at",
         vector_json(viewer->camera.look_at), "settings", settings_json(&viewer->settings), "structure",
         structure_json(viewer), "fov_y", viewer->camera.fov_y, "frames_per_second", summary.frames_per_second,
-        "latency_s", summary.latency_s);
+        "latency_s", summary.latency_s, "stereo", (int)viewer->settings.stereo, "views",
+        protocol_view_source_text(viewer->settings.views));
     if (line && viewer->has_heat)
         json_object_set_new(line, "errors",
                             json_pack("{s:f, s:f, s:f}", "mean", viewer->heat_figures.mean, "max",

@@ -9,16 +9,36 @@
 #define LOOK_PAUSE_NS 4000000ull   /* between cameras: no screen shows more */
 #define REST_PAUSE_NS 120000000ull /* without movement: that was all of it */
 #define EDGE_MIN 16u
+#define EDGE_MAX 8192u
 #define FRAMES_AT_ONCE 4u /* then people have their turn */
 
-/* Even edges: the chroma of a video is subsampled by 2. */
+/* Of `views` beside one another, each with an even edge: the chroma of a video is subsampled by 2. */
+static uint32_t edge_of(uint32_t pixels, uint32_t views)
+{
+    const uint32_t edge = (pixels / views) & ~1u, maximum = EDGE_MAX / views;
+    return views * (edge > EDGE_MIN ? edge < maximum ? edge : maximum : EDGE_MIN);
+}
+
 void viewer_render_size(const struct viewer *viewer, uint32_t *width, uint32_t *height)
 {
+    const bool stereo = viewer->settings.stereo, over = viewer->options->stereo_over;
     const uint32_t divisor = 1u << viewer->settings.coarser;
-    *width = ((uint32_t)viewer->width / divisor) & ~1u;
-    *height = ((uint32_t)viewer->height / divisor) & ~1u;
-    *width = *width > EDGE_MIN ? *width < 8192 ? *width : 8192 : EDGE_MIN;
-    *height = *height > EDGE_MIN ? *height < 8192 ? *height : 8192 : EDGE_MIN;
+    *width = edge_of((uint32_t)viewer->width / divisor, stereo && !over ? 2 : 1);
+    *height = edge_of((uint32_t)viewer->height / divisor, stereo && over ? 2 : 1);
+}
+
+void viewer_use_eyes(const struct viewer *viewer, struct message_render *view)
+{
+    const struct viewer_options *options = viewer->options;
+    if (!viewer->settings.stereo)
+        return;
+    view->eyes_over = options->stereo_over;
+    view->views_across = options->stereo_over ? 1 : 2;
+    view->views_down = options->stereo_over ? 2 : 1;
+    view->width /= view->views_across;
+    view->height /= view->views_down;
+    view->baseline = options->stereo_m;
+    view->view_source = viewer->settings.views;
 }
 
 /* On this machine pixels travel as they are; over a network as video while they move, and without loss at rest. */
@@ -44,6 +64,7 @@ static void show(struct viewer *viewer)
         viewer->tour.clip != TOUR_NONE ? fl_scene_clip(session_scene(viewer->session), (size_t)viewer->tour.clip)
                                        : NULL;
     viewer_render_size(viewer, &view.width, &view.height);
+    viewer_use_eyes(viewer, &view);
     choose_encodings(viewer, &view);
     view.tracer = settings->tracer;
     view.integrator = settings->integrator;

@@ -21,7 +21,7 @@ enum viewer_task {
 
 struct viewer {
     const struct viewer_options *options;
-    struct message_render view; /* from the options, completed by the scene */
+    struct message_render view; /* of one eye: from the options, completed by the scene */
     struct session *session;
     unsigned times_live;   /* of the session, as of when its view was started */
     struct window *window; /* NULL: headless */
@@ -85,7 +85,9 @@ void viewer_tell(struct viewer *viewer, uint64_t now_ns); /* of the view and the
 void viewer_receive(struct viewer *viewer, unsigned timeout_ms);
 /* The frame shows the last request, and will not get more than `samples` samples (0: all). */
 bool viewer_is_at_rest(const struct viewer *viewer, unsigned samples);
-/* The pixels that the daemon renders for the window. */
+/* Makes a request for a picture of width x height pixels one of both eyes, where there are two. */
+void viewer_use_eyes(const struct viewer *viewer, struct message_render *view);
+/* The pixels that the daemon renders for the window, for one eye or two. */
 void viewer_render_size(const struct viewer *viewer, uint32_t *width, uint32_t *height);
 
 /* ---- viewer_tasks.c ---- */

@@ -100,8 +100,9 @@ static void aim(const struct viewer *viewer, struct record_camera_key *key)
 {
     struct viewer_camera camera = viewer->camera;
     double direction[3];
-    camera_ray(&camera, (double)viewer->live.width / viewer->live.height, viewer->focus_x, viewer->focus_y,
-               direction);
+    struct message_render view = {.width = (uint32_t)viewer->live.width, .height = (uint32_t)viewer->live.height};
+    viewer_use_eyes(viewer, &view);
+    camera_ray(&camera, (double)view.width / view.height, viewer->focus_x, viewer->focus_y, direction);
     const double distance = camera_distance(&camera);
     for (int i = 0; i < 3; i++)
         camera.look_at[i] = camera.eye[i] + direction[i] * distance;
@@ -121,6 +122,8 @@ static void fill_reference(const struct viewer *viewer, struct message_render *j
     job->tone_map = viewer->settings.tone_map;
     job->exposure_stops += (float)viewer->settings.exposure_thirds / 3;
     job->accumulate = true; /* with the random numbers of a view */
+    viewer_use_eyes(viewer, job);
+    job->view_source = PROTOCOL_VIEW_SOURCE_RAYS; /* what layers lack is an error, too */
     job->encoding = session_is_local(viewer->session) ? PROTOCOL_ENCODING_RAW : PROTOCOL_ENCODING_PREDICTED;
     fill_key(&viewer->camera, key);
     if (viewer_follows(viewer))

@@ -2,6 +2,7 @@
 #include "render/context.h"
 
 #include "base/clock.h"
+#include "render/key_view.h"
 #include "shared/bindings.h"
 #include "shared/hit.h"
 #include "shared/key_view.h"
@@ -101,10 +102,11 @@ const struct gpu_program *context_use(struct render_context *context, const char
 
 void context_bind_tiles(const struct render_context *context, const struct gpu_program *program)
 {
-    if (!context->key_tiles)
+    struct key_view *key = context->marked_key;
+    if (!key)
         return;
-    gpu_buffer_bind_texels(context->device, context->key_tiles, UNIT_KEY_TILES, GL_R32UI);
-    gpu_uniform_uint(program, "first_tile", context->first_tile);
+    gpu_buffer_bind_texels(context->device, &key->tiles, UNIT_KEY_TILES, GL_R32UI);
+    gpu_uniform_uint(program, "first_tile", key->first_tile[context->layer]);
 }
 
 void context_bind(struct render_context *context)

@@ -22,6 +22,8 @@ struct slice {
     uint32_t first_slot, slot_count;
 };
 
+struct key_view;
+
 struct render_context {
     struct gpu_device *device;
     struct gpu_scene *scene; /* shared with other frames, as are the next three */
@@ -31,9 +33,8 @@ struct render_context {
     struct trace_state *trace_state; /* of the wave in hand, by that tracer */
     struct tracer *layer_tracer;     /* first hits are those of a layer of its structure; NULL: they are not */
     uint32_t layer;
-    struct gpu_buffer *key_marks, *key_tiles; /* which texels of it are rendered (key_view.h); NULL: all are */
-    uint32_t first_tile;                      /* of the layer */
-    struct comparison *comparison;            /* of the current frame; NULL: nothing is compared */
+    struct key_view *marked_key;   /* whose marks say which texels of it are rendered; NULL: all are */
+    struct comparison *comparison; /* of the current frame; NULL: nothing is compared */
     struct gpu_timer *timer;
     struct frame_request request;
     struct stage_times times;

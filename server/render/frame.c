@@ -42,7 +42,9 @@ static bool set_sample(struct frame_renderer *renderer, struct error *error)
                    "a place for each sample");
     struct render_context *context = &renderer->work->context;
     uint32_t left = context->request.samples - renderer->sample;
-    context->uniforms.sample_index = renderer->samples_before + renderer->sample;
+    context->uniforms.sample_index =
+        (frame_is_layer_pass(renderer) ? renderer->eyes_samples_before : renderer->samples_before) +
+        renderer->sample;
     const uint32_t shift = slices_sample_shift(&renderer->slices, left);
     context->uniforms.sample_shift = shift < renderer->sample_shift_max ? shift : renderer->sample_shift_max;
     /* A sample that is added to others has no group of its own. */

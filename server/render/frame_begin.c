@@ -447,7 +447,7 @@ static bool begin(struct frame_renderer *renderer, const struct scene *scene, co
     struct render_context *context = &renderer->work->context;
     context->request = renderer->request = *request;
     context->layer_tracer = NULL;
-    context->key_marks = context->key_tiles = NULL;
+    context->marked_key = NULL;
     renderer->pass = PASS_UNKNOWN;
     renderer->target = &renderer->picture;
     renderer->result = (struct frame_result){0};

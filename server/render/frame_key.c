@@ -9,7 +9,10 @@
 #include "shared/layers.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
+
+#define UNKNOWN_WARNED 0.5f /* share of a picture; 50 cm aside in a room, 0.2 to 0.3 are not known */
 
 bool frame_is_from_layers(const struct frame_request *request)
 {
@@ -117,6 +120,14 @@ static bool begin_layers(struct frame_renderer *renderer, const struct trace_vie
     return true;
 }
 
+/* Frames that add to one another have layers with noise of their own each, or that of the first would stay. */
+static bool is_noise_new(const struct frame_renderer *renderer)
+{
+    const enum integrator_kind integrator = renderer->request.integrator;
+    return integrator == INTEGRATOR_WHITTED || integrator == INTEGRATOR_RAYCAST ||
+           renderer->key.first_sample == renderer->eyes_samples_before;
+}
+
 /* Which passes the frame needs. */
 static bool choose_first(struct frame_renderer *renderer, struct error *error)
 {
@@ -129,7 +140,8 @@ static bool choose_first(struct frame_renderer *renderer, struct error *error)
     renderer->eyes_samples_before = renderer->samples_before;
     if (!key_view_count_anew(key, renderer->device, error))
         return false;
-    if (!key_view_is_of(key, &renderer->view, &renderer->request, renderer->shared->showing))
+    if (!key_view_is_of(key, &renderer->view, &renderer->request, renderer->shared->showing) ||
+        !is_noise_new(renderer))
         return begin_layers(renderer, &texels, layer_count, error);
     key->is_marked = false;
     renderer->pass = key->layer_count;
@@ -169,9 +181,7 @@ bool frame_key_set_pass(struct frame_renderer *renderer, struct error *error)
     context->trace_state = is_layer ? renderer->work->trace_state : renderer->work->key_trace_state;
     context->layer_tracer = is_layer ? renderer->key_tracer : NULL;
     context->layer = is_layer ? renderer->pass : 0;
-    context->key_marks = is_layer && renderer->key.is_marked ? &renderer->key.marks : NULL;
-    context->key_tiles = context->key_marks ? &renderer->key.tiles : NULL;
-    context->first_tile = context->key_tiles ? renderer->key.first_tile[renderer->pass] : 0;
+    context->marked_key = is_layer && renderer->key.is_marked ? &renderer->key : NULL;
     renderer->target = is_layer ? &renderer->key.sums : &renderer->picture;
     renderer->samples_before = is_layer ? 0 : renderer->eyes_samples_before;
     slices_ahead_forget(&renderer->work->ahead); /* rays of another pass cost something else */
@@ -220,6 +230,7 @@ bool frame_key_keep(struct frame_renderer *renderer, struct error *error)
     key->request = renderer->request;
     key->showing = renderer->shared->showing;
     key->is_made = !key->is_marked;
+    key->first_sample = renderer->eyes_samples_before;
     return true;
 }
 
@@ -281,6 +292,21 @@ bool frame_key_find(struct frame_renderer *renderer, bool *done, struct error *e
            (!layers->noting || primary_make_surfaces(context, error));
 }
 
+/* Where most of a picture is filled from the background, what was asked for is hardly meant. */
+static void warn_of_unknown(struct structure_row *row, const struct frame_request *request)
+{
+    if (row->measure < UNKNOWN_WARNED)
+        return;
+    snprintf(
+        row->warning, sizeof(row->warning),
+        "no depth layer shows %.0f %% of the picture, whose eyes are up to %.3g m from the view that is rendered "
+        "(%s)",
+        (double)row->measure * 100.0, (double)farthest_eye(request),
+        request->has_key           ? "choose a smaller --upsample"
+        : frame_has_views(request) ? "bring the eyes nearer together, or choose --views rays"
+                                   : "choose a smaller --aperture, or --lens rays");
+}
+
 bool frame_key_tell(struct frame_renderer *renderer, struct error *error)
 {
     const struct frame_request *request = &renderer->request;
@@ -296,6 +322,6 @@ bool frame_key_tell(struct frame_renderer *renderer, struct error *error)
     const uint64_t samples = (uint64_t)request->width * request->height * renderer->work->context.request.samples;
     rows->part = 0;
     rows->part_name = NULL;
-    structure_per_ray(rows, "views/unknown", (float)unknown / (float)samples);
+    warn_of_unknown(structure_per_ray(rows, "views/unknown", (float)unknown / (float)samples), request);
     return true;
 }

@@ -16,6 +16,12 @@
  * 14 % more time; seven 0.3 dB more for another 12 %, one 39.9 for 11 %. */
 #define LENS_MORE 3
 
+/* Samples of a pixel for each of a texel. A pixel's samples, spread by its filter, look at four texels each, so
+ * that a quarter of them in a texel gives the noise of a picture that is rendered with all: of a sharp classroom
+ * and 16 samples a squared error of 3.1e-4, rendered 3.2e-4 (as many in a texel: 0.8e-4 for twice the time),
+ * beside 2.1e-4 of blurred texels. Through a lens of 10 cm it is 35.6 dB, rendered 33.8. */
+#define PIXEL_SAMPLES 4u
+
 bool key_view_is_of(const struct key_view *key, const struct trace_view *view, const struct frame_request *request,
                     uint64_t showing)
 {
@@ -52,6 +58,7 @@ struct frame_request key_view_layer_request(const struct key_view *key, const st
     own.has_key = false;
     own.width = texels->width;
     own.height = texels->height;
+    own.samples = (request->samples + PIXEL_SAMPLES - 1) / PIXEL_SAMPLES;
     own.camera.fov_y = texels->fov_y;
     own.camera.ortho_height = texels->ortho_height;
     own.camera.near = texels->near;
@@ -70,7 +77,7 @@ struct frame_request key_view_layer_request(const struct key_view *key, const st
 
 static const struct gpu_program *keep_program(struct render_context *context, struct error *error)
 {
-    const struct gpu_define defines[] = {{context->key_tiles ? "HAS_TILES" : NULL, "1"}, {NULL, NULL}};
+    const struct gpu_define defines[] = {{context->marked_key ? "HAS_TILES" : NULL, "1"}, {NULL, NULL}};
     return context_use_with(context, "render/keep_layer.comp", defines, error);
 }
 

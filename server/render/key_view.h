@@ -20,6 +20,7 @@ struct key_view {
     struct gpu_readback copy;                 /* of them */
     /* What the layers are of, if they are: */
     bool is_made;
+    uint32_t first_sample;          /* of the pixels' that were the texels' */
     struct trace_view view, texels; /* what was asked for; and the one whose pixels are texels */
     struct frame_request request;   /* the frame's that they were rendered for */
     uint64_t showing;               /* of the scene, see frame_state.h */

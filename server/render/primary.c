@@ -3,6 +3,7 @@
 
 #include "base/clock.h"
 #include "render/compact.h"
+#include "render/key_view.h"
 #include "render/pixel_filter.h"
 #include "render/wave_trace.h"
 #include "shared/bindings.h"
@@ -118,7 +119,7 @@ static const struct gpu_program *rays_program(bool rasterised, struct render_con
 {
     struct gpu_define defines[6] = {0};
     size_t n = 0;
-    if (context->key_tiles)
+    if (context->marked_key)
         defines[n++] = (struct gpu_define){"HAS_TILES", "1"};
     if (rasterised)
         defines[n++] = (struct gpu_define){"VISIBILITY", "1"};
@@ -149,8 +150,8 @@ static bool make_rays(const struct primary *primary, struct render_context *cont
     gpu_buffer_bind_storage(&context->slice_sums, BIND_SLICE_SUMS);
     if (context->scene->has_motion)
         gpu_buffer_bind_storage(&context->ray_times, BIND_RAY_TIMES);
-    if (context->key_marks) {
-        gpu_buffer_bind_texels(context->device, context->key_marks, UNIT_KEY_MARKS, GL_R32UI);
+    if (context->marked_key) {
+        gpu_buffer_bind_texels(context->device, &context->marked_key->marks, UNIT_KEY_MARKS, GL_R32UI);
         gpu_uniform_uint(program, "first_mark",
                          context->layer * context->uniforms.width * context->uniforms.height);
     }

@@ -1,13 +1,16 @@
 /* SPDX-License-Identifier: MIT */
 /* Frames of eyes that are made from the layers of a key view (render/key_view.h), beside rendered ones. Prints one
  * JSON object: {"scene", "triangles", "device", "software", "width", "height", "samples", "true_samples",
- * "aperture", "moves": [{"name", "rendered_ns", "psnr_db", "forms": [{"name", "cold_ns", "warm_ns", "stages_ns":
- * {STAGE: [..]}, "psnr_db", "seen_psnr_db", "unseen"}]}]}.
+ * "aperture", "moves": [{"name", "true_psnr_db", "rendered_ns", "psnr_db", "forms": [{"name", "cold_ns",
+ * "warm_ns", "stages_ns": {STAGE: [..]}, "psnr_db", "seen_psnr_db", "unseen"}]}]}.
  *
- *   rendered_ns  a frame by `bvh`, and its psnr_db beside the true picture, of true_samples
- *   cold_ns      the first frame from a key view: its layers and their structure are made too; stages_ns of it, by
- * the clock warm_ns      another frame from the same key view unseen       the share of samples that the key view
- * does not show
+ *   true_psnr_db of the true picture, of true_samples, beside one without noise; null: it has none. psnr_db of all
+ *                others are beside one without noise, too
+ *   rendered_ns  a frame by `bvh`
+ *   cold_ns      the first frame from a key view: its layers and their structure are made, too; stages_ns: by the
+ *                clock
+ *   warm_ns      another frame from the same key view
+ *   unseen       the share of samples that the key view does not show
  *
  * Times are of the processor, all threads of the process, one a run. Exit status: 1 failed, 2 usage. */
 #include "tests/bench/bench.h"
@@ -34,7 +37,8 @@ static const char usage[] = "usage: bench eyes --model FILE | --family TRIANGLES
                             "  --runs N        after one warm-up; default 3, at most 64\n";
 
 #define MOVES_MAX 8u
-#define KEY_STEP 1e-5f /* metres: no run has the key view of another one */
+#define TRUE_SEED 1000u /* and the next one: no run has them */
+#define KEY_STEP 1e-5f  /* metres: no run has the key view of another one */
 
 static const struct form {
     const char *name;
@@ -59,21 +63,12 @@ struct bench {
     uint32_t width, height, runs, samples, true_samples, move_count, keys;
     float aperture, focus;
     float ways[MOVES_MAX][3]; /* right, up, ahead */
-    uint32_t *truth, *colours;
+    uint32_t *truth, *halves[2], *colours;
     uint8_t *seen;
     json_t *moves;
 };
 
 /* ---- frames ---- */
-
-static struct frame_camera moved(const struct frame_camera *camera, const float way[3])
-{
-    struct frame_camera to = *camera;
-    float *m = to.world_from_view;
-    for (int k = 0; k < 3; k++)
-        m[4 * k + 3] += way[0] * m[4 * k] + way[1] * m[4 * k + 1] - way[2] * m[4 * k + 2];
-    return to;
-}
 
 static struct frame_request request_of(const struct bench *bench, const float way[3])
 {
@@ -84,7 +79,7 @@ static struct frame_request request_of(const struct bench *bench, const float wa
                                   .integrator = bench->samples > 1 ? INTEGRATOR_DISTRIBUTED : INTEGRATOR_WHITTED,
                                   .aperture = bench->aperture,
                                   .focus = bench->focus,
-                                  .camera = moved(&bench->scene.camera, way),
+                                  .camera = bench_moved(&bench->scene.camera, way),
                                   .tracer = TRACER_BVH};
 }
 
@@ -111,6 +106,48 @@ static bool render_colours(struct bench *bench, const struct frame_request *requ
         memcpy(colours, result.pixels, (size_t)bench->width * bench->height * sizeof(*colours));
     frame_result_finish(&result);
     return done;
+}
+
+/* ---- the true picture ---- */
+
+/* Two halves, each with random numbers of its own: the truth is their mean. Where it has no noise they are one. */
+static bool find_truth(struct bench *bench, struct frame_request request, struct error *error)
+{
+    const size_t count = (size_t)bench->width * bench->height;
+    uint64_t time_ns;
+    request.samples = bench->true_samples > 1 ? bench->true_samples / 2 : 1;
+    for (unsigned half = 0; half < 2; half++) {
+        request.seed = TRUE_SEED + half;
+        if (!render_colours(bench, &request, bench->halves[half], &time_ns, error))
+            return false;
+    }
+    for (size_t i = 0; i < count; i++) {
+        const uint32_t a = bench->halves[0][i], b = bench->halves[1][i];
+        bench->truth[i] = (a & b) + (((a ^ b) & 0xfefefefeu) >> 1); /* of each byte */
+    }
+    return true;
+}
+
+static double squares_of(double psnr_db)
+{
+    return pow(10, -psnr_db / 10);
+}
+
+/* The truth's own, beside a picture without noise: the squared error of the mean is a quarter of the halves'
+ * squared difference. */
+static double true_psnr_db(const struct bench *bench, const uint8_t *seen)
+{
+    return warp_psnr_db(bench->halves[0], bench->halves[1], seen, bench->width * bench->height) + 20 * log10(2);
+}
+
+/* bench->colours beside a picture without noise: its random numbers are not the truth's, whose squared error is
+ * therefore added to its own. */
+static double psnr_db(const struct bench *bench, const uint8_t *seen)
+{
+    const double squares =
+        squares_of(warp_psnr_db(bench->colours, bench->truth, seen, bench->width * bench->height)) -
+        squares_of(true_psnr_db(bench, seen));
+    return squares > 0 ? -10 * log10(squares) : (double)INFINITY;
 }
 
 /* ---- frames from layers ---- */
@@ -149,7 +186,7 @@ static bool make_once(struct bench *bench, const struct form *form, const float 
     request.tracer_options.quadtree = form->settings;
     request.view_source = VIEW_SOURCE_LAYERS;
     request.has_key = true;
-    request.key_camera = moved(&bench->scene.camera, (float[3]){KEY_STEP * (float)++bench->keys, 0, 0});
+    request.key_camera = bench_moved(&bench->scene.camera, (float[3]){KEY_STEP * (float)++bench->keys, 0, 0});
     if (!render(bench, &request, &first, &cold_ns, error) ||
         !render_colours(bench, &request, bench->colours, &warm_ns, error))
         return false;
@@ -163,11 +200,6 @@ static bool make_once(struct bench *bench, const struct form *form, const float 
     return is_counted || find_seen(bench, request, results, error);
 }
 
-static json_t *decibels(double db)
-{
-    return isfinite(db) ? json_real(db) : json_null();
-}
-
 static void write_picture(const struct bench *bench, const char *move, const char *name, const uint32_t *colours,
                           const uint8_t *seen)
 {
@@ -179,16 +211,14 @@ static void write_picture(const struct bench *bench, const char *move, const cha
 
 static json_t *results_json(const struct bench *bench, const struct form *form, const struct results *results)
 {
-    const uint32_t count = bench->width * bench->height;
     json_t *stages = json_object();
     for (enum stage stage = 0; stage < STAGE_COUNT; stage++)
         if (stage != STAGE_FRAME && bench_figure(&results->stages[stage]).max_ns > 0)
             json_object_set_new(stages, stage_name(stage), bench_times_json(&results->stages[stage]));
     return json_pack("{s:s, s:o, s:o, s:o, s:o, s:o, s:f}", "name", form->name, "cold_ns",
                      bench_times_json(&results->cold), "warm_ns", bench_times_json(&results->warm), "stages_ns",
-                     stages, "psnr_db", decibels(warp_psnr_db(bench->colours, bench->truth, NULL, count)),
-                     "seen_psnr_db", decibels(warp_psnr_db(bench->colours, bench->truth, bench->seen, count)),
-                     "unseen", results->unseen);
+                     stages, "psnr_db", bench_decibels(psnr_db(bench, NULL)), "seen_psnr_db",
+                     bench_decibels(psnr_db(bench, bench->seen)), "unseen", results->unseen);
 }
 
 static bool make(struct bench *bench, const struct form *form, const float way[3], json_t *list,
@@ -208,10 +238,8 @@ static bool run_move(struct bench *bench, const float way[3], struct error *erro
     struct bench_runs rendered = {0};
     uint64_t time_ns;
     char name[96];
-    request.samples = bench->true_samples;
-    if (!render_colours(bench, &request, bench->truth, &time_ns, error))
+    if (!find_truth(bench, request, error))
         return false;
-    request.samples = bench->samples;
     for (unsigned run = 0; run <= bench->runs; run++) {
         request.seed = run;
         if (!render_colours(bench, &request, bench->colours, &time_ns, error))
@@ -221,11 +249,10 @@ static bool run_move(struct bench *bench, const float way[3], struct error *erro
     }
     snprintf(name, sizeof(name), "%g,%g,%g", (double)way[0], (double)way[1], (double)way[2]);
     json_t *list = json_array();
-    json_array_append_new(
-        bench->moves,
-        json_pack("{s:s, s:o, s:o, s:o}", "name", name, "rendered_ns", bench_times_json(&rendered), "psnr_db",
-                  decibels(warp_psnr_db(bench->colours, bench->truth, NULL, bench->width * bench->height)),
-                  "forms", list));
+    json_array_append_new(bench->moves, json_pack("{s:s, s:o, s:o, s:o, s:o}", "name", name, "true_psnr_db",
+                                                  bench_decibels(true_psnr_db(bench, NULL)), "rendered_ns",
+                                                  bench_times_json(&rendered), "psnr_db",
+                                                  bench_decibels(psnr_db(bench, NULL)), "forms", list));
     if (bench->pictures)
         write_picture(bench, name, "true", bench->truth, NULL);
     for (unsigned i = 0; i < FORMS; i++) {
@@ -248,12 +275,15 @@ static bool run(struct bench *bench, struct error *error)
     bench->shared = frame_scene_create(bench->device, error);
     bench->renderer = bench->shared ? frame_renderer_create(bench->shared, error) : NULL;
     bench->truth = calloc(count, sizeof(*bench->truth));
+    for (unsigned half = 0; half < 2; half++)
+        bench->halves[half] = calloc(count, sizeof(*bench->halves[half]));
     bench->colours = calloc(count, sizeof(*bench->colours));
     bench->seen = calloc(count, sizeof(*bench->seen));
     bench->moves = json_array();
     if (!bench->renderer)
         return false;
-    if (!bench->truth || !bench->colours || !bench->seen || !bench->moves)
+    if (!bench->truth || !bench->halves[0] || !bench->halves[1] || !bench->colours || !bench->seen ||
+        !bench->moves)
         return error_set(error, ERROR_OUT_OF_MEMORY, "--size", "no memory for the pictures");
     for (uint32_t i = 0; i < bench->move_count; i++)
         if (!run_move(bench, bench->ways[i], error))
@@ -265,15 +295,11 @@ static bool run(struct bench *bench, struct error *error)
 
 static bool print(const struct bench *bench)
 {
-    json_t *all = json_pack("{s:s, s:I, s:s, s:b, s:i, s:i, s:i, s:i, s:f, s:O}", "scene",
-                            bench->scene_options.model ? bench->scene_options.model : "family", "triangles",
-                            (json_int_t)bench->scene.triangle_count, "device", bench->device->info.name,
-                            "software", bench->device->facts.software, "width", (int)bench->width, "height",
-                            (int)bench->height, "samples", (int)bench->samples, "true_samples",
-                            (int)bench->true_samples, "aperture", (double)bench->aperture, "moves", bench->moves);
-    const bool done = all && json_dumpf(all, stdout, 0) == 0 && putchar('\n') == '\n' && fflush(stdout) == 0;
-    json_decref(all);
-    return done;
+    json_t *measured =
+        json_pack("{s:i, s:i, s:i, s:i, s:f, s:O}", "width", (int)bench->width, "height", (int)bench->height,
+                  "samples", (int)bench->samples, "true_samples", (int)bench->true_samples, "aperture",
+                  (double)bench->aperture, "moves", bench->moves);
+    return bench_scene_print(&bench->scene, &bench->scene_options, bench->device, measured);
 }
 
 static bool parse_option(struct bench *bench, int option, const char *text)
@@ -335,6 +361,8 @@ static void finish(struct bench *bench)
 {
     json_decref(bench->moves);
     free(bench->truth);
+    free(bench->halves[0]);
+    free(bench->halves[1]);
     free(bench->colours);
     free(bench->seen);
     frame_renderer_destroy(bench->renderer);

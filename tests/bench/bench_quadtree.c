@@ -213,10 +213,8 @@ static bool go_on(struct bench *bench, enum bench_wave_kind kind, uint32_t *coun
 static bool prepare_rays(struct bench *bench, struct error *error)
 {
     uint32_t count = bench->width * bench->height;
-    struct frame_camera camera = bench->scene.camera;
-    float *m = camera.world_from_view;
-    for (int k = 0; k < 3 && bench->wave_name == MOVED; k++)
-        m[4 * k + 3] += bench->way[0] * m[4 * k] + bench->way[1] * m[4 * k + 1] - bench->way[2] * m[4 * k + 2];
+    const struct frame_camera camera =
+        bench->wave_name == MOVED ? bench_moved(&bench->scene.camera, bench->way) : bench->scene.camera;
     bench_camera_rays(bench->rays, &camera, bench->width, bench->height);
     bool done = bench_eye_pass_init(&bench->eye, bench->device, &bench->scene, &camera, &bench->view, error);
     for (uint32_t i = 0; done && bench->wave_name != MOVED && i <= bench->after; i++)
@@ -350,15 +348,10 @@ static bool print(const struct bench *bench)
     json_t *contenders = json_array();
     for (unsigned i = 0; i < bench->count; i++)
         json_array_append_new(contenders, contender_json(bench, &bench->contenders[i]));
-    json_t *all =
-        json_pack("{s:s, s:I, s:s, s:b, s:s, s:i, s:i, s:i, s:o}", "scene",
-                  bench->scene_options.model ? bench->scene_options.model : "family", "triangles",
-                  (json_int_t)bench->scene.triangle_count, "device", bench->device->info.name, "software",
-                  bench->device->facts.software, "wave", wave_names[bench->wave_name], "width", (int)bench->width,
+    json_t *measured =
+        json_pack("{s:s, s:i, s:i, s:i, s:o}", "wave", wave_names[bench->wave_name], "width", (int)bench->width,
                   "height", (int)bench->height, "rays", (int)bench->wave.ray_count, "contenders", contenders);
-    const bool done = all && json_dumpf(all, stdout, 0) == 0 && putchar('\n') == '\n' && fflush(stdout) == 0;
-    json_decref(all);
-    return done;
+    return bench_scene_print(&bench->scene, &bench->scene_options, bench->device, measured);
 }
 
 static bool parse_setting(struct bench *bench, int option, const char *text)

@@ -112,7 +112,8 @@ def show_lens(data):
             lines.append((NAMES[name], result["samples"], *map(number, paper), ms(form["cold_ns"]), ms(form["warm_ns"]),
                           mrays(rays, form["warm_ns"]), ms(move["rendered_ns"]), number(form["psnr_db"]), number(move["psnr_db"]),
                           percent(form["unseen"])))
-    return ("Depth of field, whole frames; one colour sample a ray. The paper: Sponza.\n\n" +
+    size = f"{data['lens'][0]['width']}x{data['lens'][0]['height']}"
+    return (f"Depth of field, whole frames, {size}; one colour sample a ray. The paper: Sponza.\n\n" +
             table([("", "rays", "paper:", "M rays", "first", "next", "M rays", "rendered,", "PSNR,", "rendered,", "unseen,"),
                    ("", "a pixel", "ms", "/ s", "frame, ms", "frame, ms", "/ s", "ms", "dB", "dB", "%")], lines))
 

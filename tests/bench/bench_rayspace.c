@@ -517,19 +517,14 @@ static bool print(const struct bench *bench)
     for (unsigned i = 0; i < bench->tracer_count; i++)
         json_array_append_new(tracers, json_pack("{s:s, s:o}", "name", contenders[bench->which[i]].name, "cpu_ns",
                                                  bench_times_json(&bench->times[i])));
-    json_t *all = json_pack(
-        "{s:s, s:I, s:s, s:b, s:s, s:i, s:i, s:i, s:I, s:I, s:I, s:i, s:i, s:i, s:o, s:o, s:i, s:o}", "scene",
-        bench->scene_options.model ? bench->scene_options.model : "family", "triangles",
-        (json_int_t)bench->scene.triangle_count, "device", bench->device->info.name, "software",
-        bench->device->facts.software, "wave", wave_names[bench->name], "width", (int)bench->width, "height",
-        (int)bench->height, "rays", (int)bench->wave.ray_count, "cone_tests", (json_int_t)control->cone_tests,
-        "triangle_tests", (json_int_t)control->triangle_tests, "pairs_max", (json_int_t)control->pairs_max,
-        "passes", (int)control->passes, "halvings", (int)control->halvings, "nodes",
-        (int)(levels.first[levels.top] + 1), "nodes_ns", bench_times_json(&bench->nodes), "first_ns",
+    json_t *measured = json_pack(
+        "{s:s, s:i, s:i, s:i, s:I, s:I, s:I, s:i, s:i, s:i, s:o, s:o, s:i, s:o}", "wave", wave_names[bench->name],
+        "width", (int)bench->width, "height", (int)bench->height, "rays", (int)bench->wave.ray_count, "cone_tests",
+        (json_int_t)control->cone_tests, "triangle_tests", (json_int_t)control->triangle_tests, "pairs_max",
+        (json_int_t)control->pairs_max, "passes", (int)control->passes, "halvings", (int)control->halvings,
+        "nodes", (int)(levels.first[levels.top] + 1), "nodes_ns", bench_times_json(&bench->nodes), "first_ns",
         bench_times_json(&bench->first), "differing", (int)bench->differing, "tracers", tracers);
-    const bool done = all && json_dumpf(all, stdout, 0) == 0 && putchar('\n') == '\n' && fflush(stdout) == 0;
-    json_decref(all);
-    return done;
+    return bench_scene_print(&bench->scene, &bench->scene_options, bench->device, measured);
 }
 
 static bool parse_setting(struct bench *bench, int option, const char *text)

@@ -143,3 +143,25 @@ void bench_scene_finish(struct bench_scene *scene)
     gpu_scene_finish(&scene->gpu);
     load_model_finish(&scene->loaded);
 }
+
+bool bench_scene_print(const struct bench_scene *scene, const struct bench_scene_options *options,
+                       const struct gpu_device *device, json_t *measured)
+{
+    json_t *all = json_pack("{s:s, s:I, s:s, s:b}", "scene", options->model ? options->model : "family",
+                            "triangles", (json_int_t)scene->triangle_count, "device", device->info.name,
+                            "software", device->facts.software);
+    const bool done = json_object_update(all, measured) == 0 && json_dumpf(all, stdout, 0) == 0 &&
+                      putchar('\n') == '\n' && fflush(stdout) == 0;
+    json_decref(all);
+    json_decref(measured);
+    return done;
+}
+
+struct frame_camera bench_moved(const struct frame_camera *camera, const float way[3])
+{
+    struct frame_camera to = *camera;
+    float *m = to.world_from_view;
+    for (int k = 0; k < 3; k++)
+        m[4 * k + 3] += way[0] * m[4 * k] + way[1] * m[4 * k + 1] - way[2] * m[4 * k + 2];
+    return to;
+}

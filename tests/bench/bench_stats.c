@@ -54,3 +54,8 @@ uint64_t bench_processor_ns(void)
     clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
     return (uint64_t)now.tv_sec * 1000000000u + (uint64_t)now.tv_nsec;
 }
+
+json_t *bench_decibels(double db)
+{
+    return isfinite(db) ? json_real(db) : json_null();
+}

@@ -92,15 +92,6 @@ static bool render_runs(struct bench *bench, const struct frame_camera *camera, 
     return true;
 }
 
-static struct frame_camera moved(const struct frame_camera *camera, const float way[3])
-{
-    struct frame_camera to = *camera;
-    float *m = to.world_from_view;
-    for (int k = 0; k < 3; k++)
-        m[4 * k + 3] += way[0] * m[4 * k] + way[1] * m[4 * k + 1] - way[2] * m[4 * k + 2];
-    return to;
-}
-
 static bool prepare(struct bench *bench, struct error *error)
 {
     const size_t count = (size_t)bench->width * bench->height;
@@ -128,11 +119,6 @@ static void write_picture(const struct bench *bench, uint32_t move, const char *
         fprintf(stderr, "bench views: %s cannot be written\n", path);
 }
 
-static json_t *decibels(double db)
-{
-    return isfinite(db) ? json_real(db) : json_null();
-}
-
 /* bench->picture beside the truth. */
 static void note(const struct bench *bench, struct move *move, const char *name, uint32_t layers,
                  const struct bench_runs *times)
@@ -142,12 +128,12 @@ static void note(const struct bench *bench, struct move *move, const char *name,
     uint32_t unseen = 0;
     for (uint32_t i = 0; i < count; i++)
         unseen += !picture->seen[i];
-    json_array_append_new(move->methods,
-                          json_pack("{s:s, s:i, s:o, s:o, s:f, s:o}", "name", name, "layers", (int)layers,
-                                    "psnr_db", decibels(warp_psnr_db(picture->colours, move->truth, NULL, count)),
-                                    "seen_psnr_db",
-                                    decibels(warp_psnr_db(picture->colours, move->truth, picture->seen, count)),
-                                    "unseen", (double)unseen / count, "cpu_ns", bench_times_json(times)));
+    json_array_append_new(
+        move->methods,
+        json_pack("{s:s, s:i, s:o, s:o, s:f, s:o}", "name", name, "layers", (int)layers, "psnr_db",
+                  bench_decibels(warp_psnr_db(picture->colours, move->truth, NULL, count)), "seen_psnr_db",
+                  bench_decibels(warp_psnr_db(picture->colours, move->truth, picture->seen, count)), "unseen",
+                  (double)unseen / count, "cpu_ns", bench_times_json(times)));
     if (bench->pictures)
         write_picture(bench, (uint32_t)(move - bench->moves), name, picture->colours, picture->seen);
 }
@@ -157,7 +143,7 @@ static void warp(struct bench *bench, struct move *move)
     const struct warp_view view = {.width = bench->width,
                                    .height = bench->height,
                                    .from = bench->scene.camera,
-                                   .to = moved(&bench->scene.camera, move->way),
+                                   .to = bench_moved(&bench->scene.camera, move->way),
                                    .layer_count = 1,
                                    .layers = {{bench->key, bench->w}}};
     for (enum warp_method method = 0; method < WARP_METHODS; method++) {
@@ -175,7 +161,7 @@ static bool run(struct bench *bench, struct error *error)
 {
     for (uint32_t i = 0; i < bench->move_count; i++) {
         struct move *move = &bench->moves[i];
-        const struct frame_camera to = moved(&bench->scene.camera, move->way);
+        const struct frame_camera to = bench_moved(&bench->scene.camera, move->way);
         move->methods = json_array();
         move->truth = calloc((size_t)bench->width * bench->height, sizeof(*move->truth));
         if (!move->truth)
@@ -204,14 +190,9 @@ static bool print(const struct bench *bench)
     json_t *moves = json_array();
     for (uint32_t i = 0; i < bench->move_count; i++)
         json_array_append_new(moves, move_json(&bench->moves[i]));
-    json_t *all = json_pack("{s:s, s:I, s:s, s:b, s:i, s:i, s:o, s:o}", "scene",
-                            bench->scene_options.model ? bench->scene_options.model : "family", "triangles",
-                            (json_int_t)bench->scene.triangle_count, "device", bench->device->info.name,
-                            "software", bench->device->facts.software, "width", (int)bench->width, "height",
-                            (int)bench->height, "key_ns", bench_times_json(&bench->key_times), "moves", moves);
-    const bool done = all && json_dumpf(all, stdout, 0) == 0 && putchar('\n') == '\n' && fflush(stdout) == 0;
-    json_decref(all);
-    return done;
+    json_t *measured = json_pack("{s:i, s:i, s:o, s:o}", "width", (int)bench->width, "height", (int)bench->height,
+                                 "key_ns", bench_times_json(&bench->key_times), "moves", moves);
+    return bench_scene_print(&bench->scene, &bench->scene_options, bench->device, measured);
 }
 
 static bool parse_option(struct bench *bench, int option, const char *text)

@@ -109,6 +109,57 @@ class WithoutAWindow(Viewer):
         # Rounding in the order of the passes: a step of 8 bits here and there.
         self.assertLess(difference(self.folder / "view.png", self.folder / "render.png"), 0.05)
 
+    def test_a_key_shows_both_eyes_and_one(self):
+        """Each is the picture that render makes, beside or above the other; the reference renders both."""
+        eyes = ["--stereo", "0.25", "--integrator", "whitted"]
+        for layout, parts in (("side", (2, 1)), ("over", (1, 2))):
+            with self.subTest(layout=layout):
+                states = self.replay([rest(8), {"state": "from layers"}, {"key": "b", "shift": True}, rest(8),
+                                      {"state": "rendered"}, *HIDE, {"screenshot": "view.png"}, {"key": "b"}, rest(8),
+                                      {"state": "one"}], *eyes, "--stereo-layout", layout)
+                self.assertEqual([(state["stereo"], state["views"]) for state in states.values()],
+                                 [(True, "layers"), (True, "rays"), (False, "rays")])
+                self.assertEqual([any(line.startswith("views: unknown ") for line in state["structure"])
+                                  for state in states.values()], [True, False, False])
+                for state in states.values():
+                    self.assertEqual((state["width"], state["height"]), SIZE)
+                self.expect(farlight("render", bundled_scenes() / "teapot.glb", "-q", "-o", self.folder / "render.png",
+                                     "--size", f"{SIZE[0] // parts[0]}x{SIZE[1] // parts[1]}", "--samples", "8",
+                                     "--progressive", "--stereo-layout", layout, "--views", "rays", *eyes), 0)
+                self.assertLess(difference(self.folder / "view.png", self.folder / "render.png"), 0.05)
+
+    def test_with_both_eyes_errors_are_those_against_rendered_views(self):
+        states = self.replay([{"key": "b"}, {"key": "x"}, rest(4), {"state": "from layers"}, {"key": "b", "shift": True},
+                              rest(4), {"state": "rendered"}], size=(160, 90))
+        self.assertLess(states["rendered"]["errors"]["mean"], 1e-4)
+        self.assertGreater(states["from layers"]["errors"]["mean"], 10 * states["rendered"]["errors"]["mean"])
+
+    def test_the_view_of_either_eye_can_be_pointed_at(self):
+        """The middle of each view is what the camera looks at."""
+        clicks = [{"mouse": "down", "button": "left", "y": 90, "clicks": 2}, {"mouse": "up", "button": "left", "y": 90}]
+        states = self.replay([rest(1), {"state": "first"},
+                              *[event for x in (80, 240) for event in
+                                [*({**click, "x": x} for click in clicks), rest(1), {"state": str(x)}]]],
+                             "--stereo", "0.05")
+        for x in ("80", "240"):
+            turned = [[to - eye for to, eye in zip(states[name]["look_at"], states[name]["eye"])] for name in ("first", x)]
+            lengths = [math.hypot(*way) for way in turned]
+            along = sum(a * b for a, b in zip(*turned)) / (lengths[0] * lengths[1])
+            self.assertGreater(along, 1 - 1e-6)
+            self.assertIn("focus: ", states[x]["notice"])
+
+    def test_both_eyes_are_not_shown_where_they_cannot_be_made(self):
+        states = self.replay([rest(1), {"key": "b"}, {"after": 0.5}, rest(1), {"state": "refused"}, {"key": "b"},
+                              {"key": "b", "shift": True}, rest(1), {"state": "rendered"}],
+                             "--shutter", "0.5", size=(160, 90))
+        self.assertFalse(states["refused"]["stereo"])
+        self.assertIn("layers show the scene at one time", states["refused"]["notice"])
+        for options, words in ((["--stereo", "0.1", "--stereo-layout", "files"], "--stereo-layout: a window"),
+                               (["--views", "rays"], "--views: the picture has a single view"),
+                               (["--stereo", "0.1", "--shutter", "0.5"], "--shutter: depth layers")):
+            self.replay([rest(1)], *options, status=2)
+            self.assertIn(words, self.errors)
+
     def test_motion_may_travel_as_video_and_rest_without_loss(self):
         """It moves for a second or so, a little at a time: what is shown then has been a stream, afterwards not."""
         moves = [{"mouse": "move", "x": 220 + step / 10, "y": 110, "after": 0.03} for step in range(40)]

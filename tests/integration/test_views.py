@@ -115,4 +115,7 @@ class Views(OneDaemon):
         animation = farlight("animate", bundled_scenes() / "cornell.glb", "--frames", "1-9:3", "-o",
                              self.folder / "%d.png", "--upsample", "32")
         self.assertIn("--upsample: every 32-th of every 3-th frame", self.expect(animation, 2).stderr)
+        animation = farlight("animate", bundled_scenes() / "cornell.glb", "--frames", "7", "-o", self.folder / "%d.png",
+                             "--upsample", "4")
+        self.assertIn("--upsample: a single frame is rendered", self.expect(animation, 2).stderr)
         self.assertEqual(self.leftovers(), [])

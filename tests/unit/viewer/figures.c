@@ -232,7 +232,16 @@ TEST(the_overlay_shows_its_figures_within_the_window)
         "pairs max 16777216, passes 1234, halvings 0";
     hud_layout(&hud, &shown, measure, NULL);
     check_within(&shown);
-    assert_true(tells("shadow: cone tests 69.4 a ray") && tells("halvings 0"));
+    assert_true(tells("shadow: cone tests 69.4 a ray") && tells("halvings 0") && !tells("apart"));
+    settings.stereo = true;
+    settings.views = PROTOCOL_VIEW_SOURCE_LAYERS;
+    shown.stereo_m = 0.065;
+    hud_layout(&hud, &shown, measure, NULL);
+    check_within(&shown);
+    assert_true(tells("65 mm apart, from layers"));
+    settings.views = PROTOCOL_VIEW_SOURCE_RAYS;
+    hud_layout(&hud, &shown, measure, NULL);
+    assert_true(tells("65 mm apart, rendered"));
     settings.help = settings.error_map = true;
     shown.heat = HUD_HEAT_SHOWN;
     shown.heat_figures.mean = 0.125;
