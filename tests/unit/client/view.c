@@ -630,7 +630,7 @@ TEST(a_frame_of_motion_that_is_abandoned_breaks_the_connection)
     struct viewing viewing;
     struct fl_view *view = begin_view(&viewing, play_abandoned);
     assert_null(fl_view_next(view, 10000, &error));
-    check_error(FL_ERROR_PROTOCOL, "which is allowed only for a picture at rest");
+    check_error(FL_ERROR_PROTOCOL, "which is allowed only at rest");
     end_view(&viewing, view);
 }
 
