@@ -80,6 +80,7 @@ ifneq ($(EMBREE),1)
 SERVER_SRC := $(filter-out server/trace/reference/%,$(SERVER_SRC))
 endif
 LIB_SRC := $(call sources,client/lib,c)
+WARP_SRC := $(call sources,client/warp,c)
 CLI_SRC := $(call sources,client/cli,c)
 IMPORT_C := $(call sources,client/import,c)
 # Modules of the helper programs need hundreds of libraries, and are loaded only when they are used.
@@ -113,6 +114,7 @@ SEALED_OBJ := $(call obj,$(SEALED_SRC))
 PIXELS_OBJ := $(call obj,$(PIXELS_SRC))
 COMMON_OBJ := $(call obj,$(COMMON_SRC))
 SERVER_OBJ := $(call obj,$(SERVER_SRC)) $(B)/shader_sources.o $(SEALED_OBJ) $(PIXELS_OBJ) $(COMMON_OBJ)
+WARP_OBJ := $(call obj,$(WARP_SRC))
 LIB_OBJ := $(call obj,$(LIB_SRC)) $(SEALED_OBJ) $(PIXELS_OBJ) $(COMMON_OBJ)
 CLI_OBJ := $(call obj,$(CLI_SRC))
 # What the helper programs share is linked to each of them, as an archive: each takes what it needs.
@@ -146,6 +148,10 @@ $(EMBREE_STAMP):
 $(B)/server/trace/tracer.o: $(EMBREE_STAMP)
 $(B)/shader_sources.o: INCLUDES = -Iserver
 $(B)/client/%.o: INCLUDES = -Iclient $(CLIENT_CFLAGS)
+# Loops over lanes (client/warp/lanes.h) become vector instructions with -O3; with -O2 a view takes several times as long.
+# Without contraction all processors have the same results. clang says which loops it leaves as they are.
+$(B)/client/warp/%.o: INCLUDES = -Iclient -Ishaders
+$(B)/client/warp/%.o: CFLAGS_ALL += -fopenmp-simd -ffp-contract=off -Wno-pass-failed $(if $(filter release,$(config)),-O3 -DLANES_CLONES)
 $(B)/client/import/%.opp $(B)/client/import/%.o $(B)/pic/client/import/%.opp: INCLUDES = -Iclient $(IMPORT_CFLAGS)
 $(B)/client/output/%.opp $(B)/client/output/%.o $(B)/pic/client/output/%.opp: INCLUDES = -Iclient $(EXPORT_CFLAGS)
 $(B)/client/video/%.o: INCLUDES = -Iclient $(VIDEO_CFLAGS)
@@ -282,12 +288,12 @@ $(B)/tests/unit/corpus_tests: TEST_LIBS += $(SERVING_WRAP) $(READERS_LIBS) -lstd
 $(B)/tests/unit/media_tests: $(patsubst %,$(B)/client/viewer/%.o,camera decode heat hud input metrics paint panel pixmap replay settings tour window)
 $(B)/tests/unit/media_tests: TEST_LIBS += $(VIEWER_LIBS) -Wl,--wrap=libav_load
 $(B)/tests/unit/unit_tests: TEST_LIBS += $(call pkg_libs,libseccomp)
-$(B)/tests/unit/unit_tests: $(B)/client/helper/sandbox.o $(addprefix $(B)/client/import/,closed.o spline.o) $(MODEL_OBJ) $(RIVAL_OBJ) $(if $(filter 1,$(EMBREE)),$(CONTEST_OBJ))
+$(B)/tests/unit/unit_tests: $(WARP_OBJ) $(B)/client/helper/sandbox.o $(addprefix $(B)/client/import/,closed.o spline.o) $(MODEL_OBJ) $(RIVAL_OBJ) $(if $(filter 1,$(EMBREE)),$(CONTEST_OBJ))
 # Measurements of the benchmark register themselves (tests/bench/bench.h). Those that hold us against Embree need it.
 EMBREE_BENCH_SRC := $(addprefix tests/bench/,embree_build.c $(addprefix bench_,contest.c embree.c forms.c forms_frames.c forms_parse.c forms_rays.c forms_samples.c parallel.c rayspace.c tracers.c))
 BENCH_SRC := $(filter-out tests/bench/shaped_link.c $(if $(filter 0,$(EMBREE)),$(EMBREE_BENCH_SRC)),$(wildcard tests/bench/*.c))
 BENCH_PROGRAM := $(B)/tests/bench/bench
-$(BENCH_PROGRAM): $(call obj,$(BENCH_SRC) $(addprefix client/viewer/,camera.c decode.c pixmap.c)) $(RIVAL_SOURCES) $(SERVER_OBJ) $(PROTOCOL_OBJ) $(LIB_OBJ)
+$(BENCH_PROGRAM): $(call obj,$(BENCH_SRC) $(addprefix client/viewer/,camera.c decode.c pixmap.c)) $(WARP_OBJ) $(RIVAL_SOURCES) $(SERVER_OBJ) $(PROTOCOL_OBJ) $(LIB_OBJ)
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $(LINKED) $(TEST_LIBS) $(VIEWER_LIBS) -o $@
 # A link to look over.
 SHAPED_LINK := $(B)/tests/bench/shaped_link
@@ -408,7 +414,7 @@ check:
 	@$(MAKE) -j$(JOBS) $(B)/tests/unit/unit_tests
 	@python3 tests/tools/run_tests.py $(B) $(PURE_TESTS)
 # Tests that need no GPU, no daemon and no file outside the checkout.
-PURE_TESTS := /base/ /net/ /protocol/ /scene/ /client/catalogue /client/frames /client/json /client/keys /client/text /client/y4m \
+PURE_TESTS := /base/ /net/ /protocol/ /scene/ /client/catalogue /client/frames /client/json /client/keys /client/text /client/y4m /warp/ \
     /engine/camera_path /engine/scheduler /render/sequence /session/config /session/edits /session/limits /session/pacing
 # How each source is compiled, for editors and clang's tools; from our own rules.
 .PHONY: compile_commands.json
@@ -420,7 +426,7 @@ analyze: analyze-packages
 	python3 tests/tools/compile_commands.py --tidy server/ protocol/ client/
 	$(MAKE) -j$(JOBS) CC=gcc CXX=g++ B=build/analyze CFLAGS='$(ANALYZE_FLAGS)' $(patsubst $(B)/%,build/analyze/%,$(ANALYZED))
 ANALYZE_FLAGS := -fanalyzer
-ANALYZED = $(filter-out $(B)/shader_sources.o %.opp %.a,$(sort $(SERVER_OBJ) $(PROTOCOL_OBJ) $(LIB_OBJ) $(CLI_OBJ) $(VIEWER_OBJ) \
+ANALYZED = $(filter-out $(B)/shader_sources.o %.opp %.a,$(sort $(SERVER_OBJ) $(PROTOCOL_OBJ) $(LIB_OBJ) $(WARP_OBJ) $(CLI_OBJ) $(VIEWER_OBJ) \
     $(HELPER_OBJ) $(IMPORT_OBJ) $(EXPORT_OBJ) $(VIDEO_OBJ)))
 # Lines that tests reach, as HTML; TESTS chooses among them.
 coverage: coverage-packages

@@ -28,6 +28,7 @@ MAY_INCLUDE = {
     "shaders/trace": (SHARED, COMMON),
     "shaders/render": (SHARED, COMMON),
     "shaders/tree": (SHARED, COMMON),
+    "shaders/quadtree": (SHARED, COMMON),  # a row of its own, as the client has the layout of nodes too
     "shaders/*": (SHARED, COMMON, "shaders/raster", "shaders/tree"),
     BASE: ("protocol/common",),
     GPU: (BASE,),
@@ -48,6 +49,7 @@ MAY_INCLUDE = {
     "server/session": (BASE, SCENE, "server/encode", "server/net", "server/store", "server/engine", "protocol"),
     "server": (BASE, GPU, "server/check", "server/store", "server/engine", "server/session"),
     "client/lib": ("protocol", "protocol/sealed", "protocol/common", "protocol/pixels"),
+    "client/warp": ("shaders/quadtree",),  # no protocol, GL, window or socket
     "client/helper": ("protocol",),
     "client/import": ("protocol", "protocol/common", "client/helper"),
     "client/output": ("protocol", "client/helper"),
