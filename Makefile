@@ -115,7 +115,7 @@ PIXELS_OBJ := $(call obj,$(PIXELS_SRC))
 COMMON_OBJ := $(call obj,$(COMMON_SRC))
 SERVER_OBJ := $(call obj,$(SERVER_SRC)) $(B)/shader_sources.o $(SEALED_OBJ) $(PIXELS_OBJ) $(COMMON_OBJ)
 WARP_OBJ := $(call obj,$(WARP_SRC))
-LIB_OBJ := $(call obj,$(LIB_SRC)) $(SEALED_OBJ) $(PIXELS_OBJ) $(COMMON_OBJ)
+LIB_OBJ := $(call obj,$(LIB_SRC)) $(WARP_OBJ) $(SEALED_OBJ) $(PIXELS_OBJ) $(COMMON_OBJ)
 CLI_OBJ := $(call obj,$(CLI_SRC))
 # What the helper programs share is linked to each of them, as an archive: each takes what it needs.
 HELPER_OBJ := $(call obj,$(call sources,client/helper,c))
@@ -129,7 +129,7 @@ VIEWER_OBJ := $(call obj,$(VIEWER_C) $(addprefix client/cli/,image_path.c interr
 
 # The library for others' programs: position-independent, only what farlight.h declares is visible.
 SONAME := libfarlight.so.$(firstword $(subst ., ,$(VERSION)))
-LIB_PIC := $(patsubst %.c,$(B)/pic/%.o,$(LIB_SRC) $(PROTOCOL_SRC) $(SEALED_SRC) $(PIXELS_SRC) $(COMMON_SRC))
+LIB_PIC := $(patsubst %.c,$(B)/pic/%.o,$(LIB_SRC) $(WARP_SRC) $(PROTOCOL_SRC) $(SEALED_SRC) $(PIXELS_SRC) $(COMMON_SRC))
 
 MODULES := $(B)/farlight-textures.so $(B)/farlight-images.so
 PROGRAMS := $(B)/farlightd $(B)/farlight $(B)/farlight-import $(B)/farlight-export $(B)/farlight-video $(B)/farlight-view
@@ -150,8 +150,8 @@ $(B)/shader_sources.o: INCLUDES = -Iserver
 $(B)/client/%.o: INCLUDES = -Iclient $(CLIENT_CFLAGS)
 # Loops over lanes (client/warp/lanes.h) become vector instructions with -O3; with -O2 a view takes several times as long.
 # Without contraction all processors have the same results. clang says which loops it leaves as they are.
-$(B)/client/warp/%.o: INCLUDES = -Iclient -Ishaders
-$(B)/client/warp/%.o: CFLAGS_ALL += -fopenmp-simd -ffp-contract=off -Wno-pass-failed $(if $(filter release,$(config)),-O3 -DLANES_CLONES)
+$(B)/client/warp/%.o $(B)/pic/client/warp/%.o: CPPFLAGS_ALL += -Ishaders
+$(B)/client/warp/%.o $(B)/pic/client/warp/%.o: CFLAGS_ALL += -fopenmp-simd -ffp-contract=off -Wno-pass-failed $(if $(filter release,$(config)),-O3 -DLANES_CLONES)
 $(B)/client/import/%.opp $(B)/client/import/%.o $(B)/pic/client/import/%.opp: INCLUDES = -Iclient $(IMPORT_CFLAGS)
 $(B)/client/output/%.opp $(B)/client/output/%.o $(B)/pic/client/output/%.opp: INCLUDES = -Iclient $(EXPORT_CFLAGS)
 $(B)/client/video/%.o: INCLUDES = -Iclient $(VIDEO_CFLAGS)
@@ -176,7 +176,8 @@ $(B)/%.opp: %.cpp
 $(B)/pic/%.opp: %.cpp
 	@mkdir -p $(@D)
 	$(call say,CXX)$(CXX) $(CPPFLAGS_ALL) $(INCLUDES) $(OPT) $(CXXFLAGS_ALL) -fPIC $(WARN) $(CPPFLAGS) $(CXXFLAGS) -c $< -o $@
-$(B)/pic/protocol/%.o: VISIBILITY = -fvisibility=default
+# The library's map of symbols chooses among them.
+$(B)/pic/protocol/%.o $(B)/pic/client/warp/%.o: VISIBILITY = -fvisibility=default
 $(B)/pic/%.o: %.c
 	@mkdir -p $(@D)
 	$(call say,CC)$(CC) $(CPPFLAGS_ALL) -Iclient $(CLIENT_CFLAGS) $(OPT) $(CFLAGS_ALL) -fPIC $(VISIBILITY) $(WARN_C) $(CPPFLAGS) $(CFLAGS) -c $< -o $@
@@ -288,12 +289,12 @@ $(B)/tests/unit/corpus_tests: TEST_LIBS += $(SERVING_WRAP) $(READERS_LIBS) -lstd
 $(B)/tests/unit/media_tests: $(patsubst %,$(B)/client/viewer/%.o,camera decode heat hud input metrics paint panel pixmap replay settings tour window)
 $(B)/tests/unit/media_tests: TEST_LIBS += $(VIEWER_LIBS) -Wl,--wrap=libav_load
 $(B)/tests/unit/unit_tests: TEST_LIBS += $(call pkg_libs,libseccomp)
-$(B)/tests/unit/unit_tests: $(WARP_OBJ) $(B)/client/helper/sandbox.o $(addprefix $(B)/client/import/,closed.o spline.o) $(MODEL_OBJ) $(RIVAL_OBJ) $(if $(filter 1,$(EMBREE)),$(CONTEST_OBJ))
+$(B)/tests/unit/unit_tests: $(B)/client/helper/sandbox.o $(addprefix $(B)/client/import/,closed.o spline.o) $(MODEL_OBJ) $(RIVAL_OBJ) $(if $(filter 1,$(EMBREE)),$(CONTEST_OBJ))
 # Measurements of the benchmark register themselves (tests/bench/bench.h). Those that hold us against Embree need it.
 EMBREE_BENCH_SRC := $(addprefix tests/bench/,embree_build.c $(addprefix bench_,contest.c embree.c forms.c forms_frames.c forms_parse.c forms_rays.c forms_samples.c parallel.c rayspace.c tracers.c))
 BENCH_SRC := $(filter-out tests/bench/shaped_link.c $(if $(filter 0,$(EMBREE)),$(EMBREE_BENCH_SRC)),$(wildcard tests/bench/*.c))
 BENCH_PROGRAM := $(B)/tests/bench/bench
-$(BENCH_PROGRAM): $(call obj,$(BENCH_SRC) $(addprefix client/viewer/,camera.c decode.c pixmap.c)) $(WARP_OBJ) $(RIVAL_SOURCES) $(SERVER_OBJ) $(PROTOCOL_OBJ) $(LIB_OBJ)
+$(BENCH_PROGRAM): $(call obj,$(BENCH_SRC) $(addprefix client/viewer/,camera.c decode.c pixmap.c)) $(RIVAL_SOURCES) $(SERVER_OBJ) $(PROTOCOL_OBJ) $(LIB_OBJ)
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $(LINKED) $(TEST_LIBS) $(VIEWER_LIBS) -o $@
 # A link to look over.
 SHAPED_LINK := $(B)/tests/bench/shaped_link
@@ -426,7 +427,7 @@ analyze: analyze-packages
 	python3 tests/tools/compile_commands.py --tidy server/ protocol/ client/
 	$(MAKE) -j$(JOBS) CC=gcc CXX=g++ B=build/analyze CFLAGS='$(ANALYZE_FLAGS)' $(patsubst $(B)/%,build/analyze/%,$(ANALYZED))
 ANALYZE_FLAGS := -fanalyzer
-ANALYZED = $(filter-out $(B)/shader_sources.o %.opp %.a,$(sort $(SERVER_OBJ) $(PROTOCOL_OBJ) $(LIB_OBJ) $(WARP_OBJ) $(CLI_OBJ) $(VIEWER_OBJ) \
+ANALYZED = $(filter-out $(B)/shader_sources.o %.opp %.a,$(sort $(SERVER_OBJ) $(PROTOCOL_OBJ) $(LIB_OBJ) $(CLI_OBJ) $(VIEWER_OBJ) \
     $(HELPER_OBJ) $(IMPORT_OBJ) $(EXPORT_OBJ) $(VIDEO_OBJ)))
 # Lines that tests reach, as HTML; TESTS chooses among them.
 coverage: coverage-packages
@@ -443,13 +444,15 @@ install: all
 	    $(DESTDIR)$(PREFIX)/share/doc/farlight/examples $(DESTDIR)/etc/farlight \
 	    $(DESTDIR)$(PREFIX)/lib/systemd/system $(DESTDIR)$(PREFIX)/lib/sysusers.d
 	install -d $(DESTDIR)$(PREFIX)/lib/pkgconfig $(DESTDIR)$(PREFIX)/include/farlight/lib \
-	    $(DESTDIR)$(PREFIX)/include/farlight/protocol $(DESTDIR)$(PREFIX)/share/bash-completion/completions
+	    $(DESTDIR)$(PREFIX)/include/farlight/protocol $(DESTDIR)$(PREFIX)/include/farlight/warp \
+	    $(DESTDIR)$(PREFIX)/share/bash-completion/completions
 	install -m 755 $(PROGRAMS) $(DESTDIR)$(PREFIX)/bin
 	install -d $(DESTDIR)$(PREFIX)/lib/farlight
 	install -m 644 $(MODULES) $(DESTDIR)$(PREFIX)/lib/farlight
 	install -m 755 $(B)/$(SONAME) $(DESTDIR)$(PREFIX)/lib
 	ln -sf $(SONAME) $(DESTDIR)$(PREFIX)/lib/libfarlight.so
 	install -m 644 client/lib/farlight.h $(DESTDIR)$(PREFIX)/include/farlight/lib
+	install -m 644 client/warp/warp.h $(DESTDIR)$(PREFIX)/include/farlight/warp
 	install -m 644 $(addprefix protocol/,messages.h messages.def tracers.h tracers.def words.h words.def) $(DESTDIR)$(PREFIX)/include/farlight/protocol
 	sed 's#@PREFIX@#$(PREFIX)#; s#@VERSION@#$(VERSION)#' conf/farlight.pc.in \
 	    >$(DESTDIR)$(PREFIX)/lib/pkgconfig/farlight.pc

@@ -48,8 +48,8 @@ MAY_INCLUDE = {
     "server/store": (BASE, "protocol"),
     "server/session": (BASE, SCENE, "server/encode", "server/net", "server/store", "server/engine", "protocol"),
     "server": (BASE, GPU, "server/check", "server/store", "server/engine", "server/session"),
-    "client/lib": ("protocol", "protocol/sealed", "protocol/common", "protocol/pixels"),
     "client/warp": ("shaders/quadtree",),  # no protocol, GL, window or socket
+    "client/lib": ("protocol", "protocol/sealed", "protocol/common", "protocol/pixels", "client/warp"),
     "client/helper": ("protocol",),
     "client/import": ("protocol", "protocol/common", "client/helper"),
     "client/output": ("protocol", "client/helper"),
