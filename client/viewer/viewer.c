@@ -69,6 +69,7 @@ static void begin_showing(struct viewer *viewer)
     viewer->has_looked = viewer->told_moving = false;
     viewer->frame.command = 0;
     viewer->must_show = true;
+    viewer_forget_local(viewer);
 }
 
 /* ---- the loop ---- */
@@ -150,6 +151,7 @@ static bool run(struct viewer *viewer)
         const uint64_t now_ns = monotonic_now_ns();
         take_input(viewer, now_ns);
         tick(viewer, now_ns);
+        viewer_step_local(viewer, now_ns);
         serve(viewer, now_ns);
         draw(viewer);
         viewer->must_draw = false;
@@ -195,6 +197,9 @@ static void close_viewer(struct viewer *viewer)
     window_destroy(viewer->window);
     session_destroy(viewer->session);
     decoder_destroy(viewer->decoder);
+    views_destroy(viewer->views);
+    pixmap_finish(&viewer->arrived);
+    pixmap_finish(&viewer->made);
     pixmap_finish(&viewer->live);
     pixmap_finish(&viewer->compared);
     pixmap_finish(&viewer->heat);
@@ -215,7 +220,9 @@ bool viewer_run(const struct viewer_options *options, struct fl_error *error)
                                          .integrator = options->view.integrator,
                                          .tone_map = options->view.tone_map,
                                          .tracers = options->view.settings,
-                                         .coarser = (int)options->coarser};
+                                         .coarser = (int)options->coarser,
+                                         .local = options->local,
+                                         .holes = options->holes};
     const bool opened = open_viewer(viewer, error);
     const bool done = opened && run(viewer);
     if (opened && !done)

@@ -56,7 +56,7 @@ MAY_INCLUDE = {
     "client/output/library": ("protocol/common", "client/output"),
     "client/video": ("protocol", "protocol/pixels", "client/helper", "client/lib"),  # of lib: rate
     "client/cli": ("protocol", "protocol/common", "protocol/sealed", "client/lib"),
-    "client/viewer": ("protocol", "protocol/common", "client/lib", "client/cli"),  # the command line is parsed as that of render
+    "client/viewer": ("protocol", "protocol/common", "client/warp", "client/lib", "client/cli"),  # the command line is parsed as that of render
 }
 # Files that every room may include.
 FOR_EVERYBODY = re.compile(r"^protocol/((version|plain_text)\.h|(words|tracers)\.(h|def))$")
