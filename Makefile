@@ -525,8 +525,8 @@ FUZZ_SEED := $(B)/tests/fuzz/seed
 FUZZ_DICTIONARY := $(B)/seed/protocol.dict
 KEPT_BYTES := 1600
 KEPT_BYTES_OF_ALL := 65536
-$(FUZZ_SEED): %: %.o $(B)/tests/fuzz/recorded_session.o $(COMMON_OBJ) $(PROTOCOL_OBJ) $(SEALED_OBJ)
-	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(call pkg_libs,libsodium) -o $@
+$(FUZZ_SEED): %: %.o $(B)/tests/fuzz/recorded_session.o $(COMMON_OBJ) $(PROTOCOL_OBJ) $(PIXELS_OBJ) $(SEALED_OBJ)
+	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(call pkg_libs,libsodium libzstd libxxhash) -lm -o $@
 $(addprefix $(B)/tests/fuzz/fuzz_,$(FUZZERS)): %: %.o $(PROTOCOL_OBJ)
 	$(call say,LINK)$(CXX) $(OPT) -fsanitize=fuzzer $(LDFLAGS_ALL) $^ $(FUZZ_LIBS) -o $@
 $(B)/tests/fuzz/fuzz_scene $(B)/tests/fuzz/fuzz_transaction: $(filter $(B)/server/scene/% $(B)/server/base/%,$(SERVER_OBJ)) $(COMMON_OBJ)
@@ -534,6 +534,8 @@ $(B)/tests/fuzz/fuzz_sealed: $(SEALED_OBJ)
 $(addprefix $(B)/tests/fuzz/fuzz_,scene sealed transaction): FUZZ_LIBS = $(call pkg_libs,libsodium libxxhash) -lm
 $(B)/tests/fuzz/fuzz_session: $(SERVING_OBJ) $(SERVER_OBJ)
 $(B)/tests/fuzz/fuzz_session: FUZZ_LIBS = $(SERVER_LIBS) $(SERVING_WRAP)
+$(B)/tests/fuzz/fuzz_frame: $(LIB_OBJ)
+$(B)/tests/fuzz/fuzz_frame: FUZZ_LIBS = $(call pkg_libs,$(CLIENT_PKGS)) -lm
 $(addprefix $(B)/tests/fuzz/fuzz_,aff gltf nff obj): $(READERS_OBJ)
 $(addprefix $(B)/tests/fuzz/fuzz_,aff gltf nff obj): FUZZ_LIBS = $(READERS_LIBS)
 # OpenImageIO loses memory with broken images; the importer lives for one model only.

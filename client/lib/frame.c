@@ -102,6 +102,14 @@ static bool is_expected_size(const struct fl_frame_expected *expected, const str
     return begin->width == expected->width && begin->height == expected->height;
 }
 
+static bool is_expected_encoding(const struct fl_frame_expected *expected, const struct message_frame_begin *begin)
+{
+    if (begin->hidden_layer > 0 && expected->encoding == PROTOCOL_ENCODING_H264)
+        return begin->encoding == PROTOCOL_ENCODING_JPEG;
+    return begin->encoding == expected->encoding ||
+           (expected->is_view && begin->encoding == expected->still_encoding);
+}
+
 static bool check_begin(const struct fl_assembly *assembly, const struct message_frame_begin *begin,
                         uint32_t number, struct fl_error *error)
 {
@@ -113,13 +121,17 @@ static bool check_begin(const struct fl_assembly *assembly, const struct message
         return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_begin.frame",
                             "frame %u arrived, but frame %u was expected", begin->frame, number);
     if (!is_expected_size(expected, begin) || begin->format != expected->format ||
-        (begin->encoding != expected->encoding &&
-         (!expected->is_view || begin->encoding != expected->still_encoding)))
+        !is_expected_encoding(expected, begin))
         return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_begin",
                             "%ux%u %s %s arrived, but %ux%u %s %s was expected", begin->width, begin->height,
                             protocol_pixel_format_text(begin->format), protocol_encoding_text(begin->encoding),
                             expected->width, expected->height, protocol_pixel_format_text(expected->format),
                             protocol_encoding_text(expected->encoding));
+    if (begin->hidden_layer > expected->hidden_layers ||
+        (begin->hidden_layer > 0 && begin->of_frame >= begin->frame))
+        return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_begin.hidden_layer",
+                            "hidden layer %u of frame %u arrived, but %u were expected", begin->hidden_layer,
+                            begin->of_frame, expected->hidden_layers);
     if (begin->layers != expected->layers)
         return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_begin.layers",
                             "layers %#x arrived, but %#x were expected", begin->layers, expected->layers);
@@ -168,6 +180,8 @@ static struct fl_frame *new_frame(const struct message_frame_begin *begin)
     frame->margin_x = begin->margin_x;
     frame->margin_y = begin->margin_y;
     frame->depth_bytes = begin->depth_bytes;
+    frame->hidden_layer = begin->hidden_layer;
+    frame->of_frame = begin->of_frame;
     frame->wire_bytes = begin->size_bytes + begin->depth_bytes + begin->normal_bytes;
     if (begin->encoding == PROTOCOL_ENCODING_H264)
         return frame;
@@ -357,8 +371,10 @@ static bool copy_structure(struct fl_frame *frame, const struct message_frame_en
     size_t bytes = end->structure_count * sizeof(*frame->structure);
     for (uint32_t i = 0; i < end->structure_count; i++)
         bytes += strlen(end->structure[i].name) + strlen(end->structure[i].warning) + 2;
-    struct record_structure_row *rows = bytes > 0 ? malloc(bytes) : NULL;
-    if (bytes > 0 && !rows)
+    if (bytes == 0)
+        return true;
+    struct record_structure_row *rows = malloc(bytes);
+    if (!rows)
         return false;
     char *string = (char *)(rows + end->structure_count);
     for (uint32_t i = 0; i < end->structure_count; i++) {

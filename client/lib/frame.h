@@ -15,7 +15,7 @@ struct fl_frame_expected {
     /* Of a view: frames may be smaller and skip numbers, and those at rest have another encoding. */
     bool is_view;
     enum protocol_encoding still_encoding;
-    uint32_t margin_x_max, margin_y_max;
+    uint32_t margin_x_max, margin_y_max, hidden_layers;
 };
 
 struct fl_assembly {

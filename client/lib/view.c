@@ -98,6 +98,7 @@ static bool ask(struct fl_view *view, const struct message_render *wanted, struc
                                                  .attachments = render->attachments,
                                                  .is_view = true,
                                                  .margin_x_max = margin_of(render, render->width),
+                                                 .hidden_layers = render->hidden_layers,
                                                  .margin_y_max = margin_of(render, render->height)};
     if (!fl_connection_send(view->connection, asked->request, 0, &message, error))
         return false;
@@ -227,9 +228,11 @@ static bool send_owed(struct fl_view *view, struct fl_error *error)
 static bool abandon(struct fl_view *view, uint32_t number, struct fl_error *error)
 {
     const struct fl_frame *frame = view->assembly.frame;
-    if (!frame || frame->frame != number || frame->moving || frame->encoding == PROTOCOL_ENCODING_H264)
+    if (!frame || frame->frame != number || (frame->moving && frame->hidden_layer == 0) ||
+        frame->encoding == PROTOCOL_ENCODING_H264)
         return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_end.abandoned",
-                            "frame %u ended incomplete, which is allowed only for a picture at rest", number);
+                            "frame %u ended incomplete, which is allowed only at rest and for what is hidden",
+                            number);
     fl_assembly_finish(&view->assembly);
     return true;
 }

@@ -4,6 +4,7 @@
 #include "base/clock.h"
 #include "base/log.h"
 #include "base/parallel.h"
+#include "encode/sparse.h"
 #include "encode/stream.h"
 #include "protocol/pixels/inverse_depth.h"
 
@@ -253,6 +254,16 @@ static bool make_digest(const struct encode_task *task, struct error *error)
     return done == result->size_bytes || encoder_given_up(error);
 }
 
+/* What no eye sees past what hides it is not there. */
+static void fill_hidden(const struct engine_frame *frame)
+{
+    const struct frame_result *result = &frame->result;
+    if (frame->request.hidden_layer > 0 && result->format == PIXEL_FORMAT_RGBA8 &&
+        result->attachments & 1u << ATTACHMENT_DEPTH)
+        sparse_fill(result->pixels, (const float *)(const void *)frame_result_attachment(result, ATTACHMENT_DEPTH),
+                    result->width, result->height);
+}
+
 static bool encode(const struct encode_task *task, struct error *error)
 {
     struct engine_frame *frame = task->frame;
@@ -275,6 +286,7 @@ static bool encode(const struct encode_task *task, struct error *error)
     picture.is_given_up = is_given_up;
     picture.given_up_context = task;
     uint64_t start_ns = clock_now_ns();
+    fill_hidden(frame);
     if (!make_digest(task, error) || !encode_pixels(task->lane, &picture, frame, error) ||
         !append_depth(task, error) || !append_normals(task, error))
         return false;

@@ -107,6 +107,7 @@ struct engine_job {
     bool adapt;              /* view: quality and size follow the link */
     struct view_depth depth; /* view: of what is attached */
     float margin;            /* view: of frames while it moves, share of width and height on each side */
+    uint32_t hidden_layers;  /* view: frames of what is hidden that follow each while it moves */
 };
 
 enum engine_command_kind {
@@ -238,6 +239,7 @@ struct engine_frame {
     struct view_depth depth;          /* as it is to be encoded .. */
     float depth_step;                 /* .. and as it was: 1 / metres; 0: metres */
     uint32_t margin_x, margin_y;      /* pixels on each side beyond what the job asks for */
+    uint32_t of_frame;                /* of request.hidden_layer above 0: which it belongs to */
     /* Of a view: the newest of its client's wishes that it shows; all 0 before the first wish. */
     uint64_t command, received_ns;
     bool moving;

@@ -98,6 +98,8 @@ struct view {
     struct view_wish wish;
     bool refining;               /* it shows nothing that was not shown */
     uint32_t margin_x, margin_y; /* pixels on each side */
+    uint32_t hidden_layer;       /* of the frame in progress, or the next one */
+    uint32_t picture;            /* number of the last frame that was none of a hidden layer */
     /* If some of its frames are a stream; NULL: none are. */
     struct encode_lane *lane;
     bool owes_key_frame; /* it was wished and has not come */

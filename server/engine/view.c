@@ -13,6 +13,8 @@
 /* How long before the encoder is expected to be free a frame is finished: it is hardly older for that, and an
  * encoder that is faster than last time need not wait. */
 #define EARLY_NS UINT64_C(500000)
+/* While pictures take longer than that, what is hidden in one does not keep a newer one waiting. */
+#define HIDDEN_WAIT_NS UINT64_C(250000000)
 
 void view_follow(struct job *job, const struct job *before)
 {
@@ -43,6 +45,14 @@ bool view_has_news(const struct job *job)
     return has_news(job, &wish);
 }
 
+/* Whether what is hidden in the last picture is to be shown before another one is. */
+static bool has_hidden(const struct job *job, const struct view_wish *wish)
+{
+    const struct view *view = &job->view;
+    return view->hidden_layer > 0 && job->scene->known.revision == view->shown_revision &&
+           (view->render_ns < HIDDEN_WAIT_NS || !has_news(job, wish));
+}
+
 static bool may_refine(const struct job *job)
 {
     const struct view *view = &job->view;
@@ -66,10 +76,11 @@ uint64_t view_due_ns(const struct job *job)
 {
     /* Seen in any case, or the engine would not be told of the next wish. */
     struct view_wish wish = view_wishes_see(job->spec.wishes);
-    if (job->view.made >= job->view.credit || !(has_news(job, &wish) || may_refine(job)))
+    const bool hidden = has_hidden(job, &wish);
+    if (job->view.made >= job->view.credit || !(hidden || has_news(job, &wish) || may_refine(job)))
         return UINT64_MAX;
     uint64_t encoder_ns = encoder_due_ns(job);
-    return encoder_ns > job->view.due_ns ? encoder_ns : job->view.due_ns;
+    return hidden || encoder_ns > job->view.due_ns ? encoder_ns : job->view.due_ns;
 }
 
 /* Frames begin at even intervals where possible, and never more often. */
@@ -119,10 +130,33 @@ static void add_margin(struct job *job, struct frame_request *request)
     request->height += 2 * view->margin_y;
 }
 
+/* By the camera of the last picture. */
+static bool take_up_hidden(struct job *job, struct shot *shot, struct error *error)
+{
+    struct view *view = &job->view;
+    struct frame_request *request = &shot->request;
+    if (!shot_look(shot, &job->spec, job->scene->scene, &view->wish.camera, &job->bounds, error))
+        return false;
+    view->refining = false;
+    request->seed = job->spec.frame.seed;
+    request->accumulate = false;
+    request->samples = 1;
+    request->hidden_layer = view->hidden_layer;
+    request->hidden_layers = job->spec.hidden_layers;
+    request->hidden_radius = job->spec.depth.radius;
+    apply_effort(job, request);
+    add_margin(job, request);
+    return true;
+}
+
 bool view_take_up(struct job *job, struct shot *shot, struct error *error)
 {
     struct view *view = &job->view;
     const struct scene *scene = job->scene->scene;
+    const struct view_wish seen = view_wishes_see(job->spec.wishes);
+    if (has_hidden(job, &seen))
+        return take_up_hidden(job, shot, error);
+    view->hidden_layer = 0;
     bool key_frame = view->wish.key_frame; /* of a frame that was not finished */
     view->wish = view_wishes_take(job->spec.wishes);
     view->wish.key_frame |= key_frame;
@@ -149,8 +183,16 @@ static unsigned quality_of(const struct job *job)
     return adapts ? wish->effort.quality : job->spec.quality;
 }
 
+/* A stream of pictures has none of what they hide. */
+static enum encoding encoding_of_hidden(const struct job *job)
+{
+    return job->spec.encoding == ENCODING_H264 ? ENCODING_JPEG : job->spec.encoding;
+}
+
 enum ycbcr view_ycbcr(const struct job *job)
 {
+    if (job->view.hidden_layer > 0)
+        return YCBCR_NONE; /* what is not there is filled first */
     /* At rest the samples that are held decide how the frame is encoded, once it is there. */
     bool certain = job->view.wish.camera.moving || job->spec.still_encoding == job->spec.encoding;
     return certain ? encoder_takes(job->spec.encoding, quality_of(job)) : YCBCR_NONE;
@@ -159,31 +201,53 @@ enum ycbcr view_ycbcr(const struct job *job)
 bool view_is_stale(const struct job *job)
 {
     struct view_wish wish = view_wishes_see(job->spec.wishes);
+    if (job->view.hidden_layer > 0)
+        return !has_hidden(job, &wish);
     return job->view.refining && (has_news(job, &wish) || job->scene->waiting_count > 0);
+}
+
+static void note_camera(struct job *job, struct engine_frame *frame)
+{
+    const struct view *view = &job->view;
+    frame->command = view->wish.camera.command;
+    frame->received_ns = view->wish.camera.received_ns;
+    frame->moving = view->wish.camera.moving;
+    frame->quality = quality_of(job);
+    frame->depth = job->spec.depth;
+    frame->margin_x = view->margin_x;
+    frame->margin_y = view->margin_y;
+}
+
+static void hidden_done(struct job *job, struct engine_frame *frame)
+{
+    struct view *view = &job->view;
+    frame->encoding = encoding_of_hidden(job);
+    frame->of_frame = view->picture;
+    view->hidden_layer = view->hidden_layer < job->spec.hidden_layers ? view->hidden_layer + 1 : 0;
 }
 
 void view_done(struct job *job, struct engine_frame *frame)
 {
     struct view *view = &job->view;
     const struct view_camera *camera = &view->wish.camera;
-    set_due(job);
-    view->render_ns = frame->rendered_ns - frame->applied_ns;
     view->rendered_ns = frame->rendered_ns;
     view->made++;
+    note_camera(job, frame);
+    if (frame->request.hidden_layer > 0) {
+        hidden_done(job, frame);
+        return;
+    }
+    set_due(job);
+    view->render_ns = frame->rendered_ns - frame->applied_ns;
+    view->picture = frame->frame;
+    view->hidden_layer = camera->moving && job->spec.hidden_layers > 0;
     view->shown = true;
     view->shown_command = camera->command;
     view->shown_revision = frame->result.revision;
     view->shown_moving = camera->moving;
     view->held_samples = frame->result.samples;
-    frame->command = camera->command;
-    frame->received_ns = camera->received_ns;
-    frame->moving = camera->moving;
     view->owes_key_frame |= view->wish.key_frame;
     view->wish.key_frame = false;
-    frame->quality = quality_of(job);
-    frame->depth = job->spec.depth;
-    frame->margin_x = view->margin_x;
-    frame->margin_y = view->margin_y;
     if (camera->moving && job->spec.adapt) {
         const struct view_effort *effort = &view->wish.effort;
         frame->scale_eighths = effort->scale_eighths;

@@ -405,7 +405,7 @@ static bool hand_out(struct frame_renderer *renderer, struct frame_result *resul
                                                 &renderer->result.comparison_count, error))
         return false;
     if (!trace_state_tell(renderer->work->trace_state, &renderer->result.structure, error) ||
-        (renderer->key_tracer && !frame_key_tell(renderer, error)))
+        (frame_is_from_layers(&renderer->request) && !frame_key_tell(renderer, error)))
         return false;
     context_collect(context);
     stage_times_add(&context->times, STAGE_FRAME, CLOCK_CPU, 0, context->times.origin_ns,

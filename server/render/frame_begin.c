@@ -132,7 +132,7 @@ static bool take_tracers(struct frame_renderer *renderer, struct error *error)
     if (!renderer->tracer ||
         !frame_work_trace_by(renderer->work, &renderer->work->trace_state, renderer->tracer, error))
         return false;
-    if (frame_is_from_layers(request))
+    if (frame_is_from_layers(request) || request->hidden_layer)
         return frame_key_take(renderer, error);
     if (!request->compare)
         return true;

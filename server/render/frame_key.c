@@ -59,15 +59,32 @@ static float radius_for(const struct frame_request *request)
     return asked > 0.0f ? ldexpf(asked, (int)ceilf(log2f(farthest / asked))) : farthest;
 }
 
+/* One texel a pixel, of the picture's own eye. */
+static void set_hidden(const struct frame_request *request, struct quadtree_settings *settings)
+{
+    settings->layers = KEY_LAYERS_MAX;
+    settings->radius = request->hidden_radius;
+    settings->resolution = 0;
+    settings->margin = 0.0f;
+}
+
+static void set_layers(const struct frame_request *request, struct quadtree_settings *settings)
+{
+    settings->radius = radius_for(request);
+    if (settings->layers == 0 && !is_for_these_eyes(request))
+        settings->layers = 1; /* what little another one shows would be rendered as a whole */
+}
+
 bool frame_key_take(struct frame_renderer *renderer, struct error *error)
 {
     const struct frame_request *request = &renderer->request;
     const struct tracer_impl *impl = frame_find_tracer(renderer, TRACER_QUADTREE, "view_source", error);
     struct tracer_options options = request->tracer_options;
     options.quadtree.faces = QUADTREE_FACES_VIEW;
-    options.quadtree.radius = radius_for(request);
-    if (options.quadtree.layers == 0 && !is_for_these_eyes(request))
-        options.quadtree.layers = 1; /* what little another one shows would be rendered as a whole */
+    if (request->hidden_layer)
+        set_hidden(request, &options.quadtree);
+    else
+        set_layers(request, &options.quadtree);
     if (options.quadtree.hits == QUADTREE_HITS_AUTO)
         options.quadtree.hits = QUADTREE_HITS_PLANE; /* what is thinner than a texel is there as well */
     if (!impl || !tracer_check_motion(impl, &renderer->shared->copy, error))
@@ -120,22 +137,29 @@ static bool choose_first(struct frame_renderer *renderer, struct error *error)
 
 bool frame_is_layer_pass(const struct frame_renderer *renderer)
 {
-    return renderer->key_tracer && renderer->pass < renderer->key.layer_count;
+    return frame_is_from_layers(&renderer->request) && renderer->key_tracer &&
+           renderer->pass < renderer->key.layer_count;
 }
 
 bool frame_is_mark_pass(const struct frame_renderer *renderer)
 {
-    return renderer->key_tracer && renderer->pass == PASS_MARK;
+    return frame_is_from_layers(&renderer->request) && renderer->pass == PASS_MARK;
 }
 
 bool frame_is_eyes_pass(const struct frame_renderer *renderer)
 {
-    return renderer->key_tracer && !frame_is_layer_pass(renderer);
+    return frame_is_from_layers(&renderer->request) && !frame_is_layer_pass(renderer);
 }
 
 bool frame_key_set_pass(struct frame_renderer *renderer, struct error *error)
 {
     struct render_context *context = &renderer->work->context;
+    if (renderer->request.hidden_layer) { /* its only pass */
+        context->trace_state = renderer->work->trace_state;
+        context->layer_tracer = renderer->key_tracer;
+        context->layer = renderer->request.hidden_layer;
+        return true;
+    }
     if (renderer->pass == PASS_UNKNOWN && !choose_first(renderer, error))
         return false;
     const bool is_layer = frame_is_layer_pass(renderer);

@@ -193,9 +193,10 @@ static struct wave camera_wave(struct render_context *context)
     };
 }
 
-static bool find_layer(struct render_context *context, const struct wave *wave, bool *done, struct error *error)
+static bool find_layer(struct render_context *context, struct wave *wave, bool *done, struct error *error)
 {
     *done = true;
+    wave->within_reach = context->request.hidden_layer > 0;
     context_span_begin(context, STAGE_PRIMARY);
     context_bind(context);
     bool found = tracer_layer_hits(context->layer_tracer, context->scene, wave, context->layer, error);

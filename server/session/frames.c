@@ -164,6 +164,8 @@ static void fill_begin(struct message_frame_begin *begin, const struct engine_fr
     begin->depth_step = frame->depth_step;
     begin->margin_x = frame->margin_x;
     begin->margin_y = frame->margin_y;
+    begin->hidden_layer = frame->request.hidden_layer;
+    begin->of_frame = frame->of_frame;
     begin->format = (enum protocol_pixel_format)frame->request.format;
     begin->encoding = (enum protocol_encoding)frame->encoding;
     begin->tracer = (enum protocol_tracer)frame->request.tracer;

@@ -107,9 +107,30 @@ static bool check_upsample(const struct message_render *render, struct error *er
     return error_remedy(error, "set accumulate to 0, or upsample to 1");
 }
 
+static bool check_hidden(const struct message_render *render, struct error *error)
+{
+    if (!render->hidden_layers)
+        return true;
+    if (render->kind == PROTOCOL_JOB_BATCH || has_views(render)) {
+        error_set(error, ERROR_UNSUPPORTED, "render.hidden_layers",
+                  "only pictures of a view of one eye have some");
+        return error_remedy(error, "set it to 0");
+    }
+    if (!(render->attachments & 1u << PROTOCOL_ATTACHMENT_DEPTH)) {
+        error_set(error, ERROR_INVALID, "render.hidden_layers", "without depth nobody knows where something is");
+        return error_remedy(error, "add depth to attachments");
+    }
+    if (render->aperture > 0.0f || render->shutter > 0.0f || render->compare) {
+        error_set(error, ERROR_UNSUPPORTED, "render.hidden_layers",
+                  "what is hidden is that of one time and place of an eye, and is traced by no second tracer");
+        return error_remedy(error, "set it to 0, or aperture, shutter and compare");
+    }
+    return true;
+}
+
 static bool check_views(const struct message_render *render, struct error *error)
 {
-    if (!check_eyes(render, error) || !check_upsample(render, error))
+    if (!check_eyes(render, error) || !check_upsample(render, error) || !check_hidden(render, error))
         return false;
     if (render->view_source != PROTOCOL_VIEW_SOURCE_LAYERS)
         return true;
@@ -413,6 +434,7 @@ static void fill_rest(struct engine_job *job, const struct session *session, con
         .granted_weight = weight < granted ? weight : granted,
         .adapt = render->adapt != 0,
         .depth = {(enum depth_form)render->depth_form, render->depth_pixels, render->depth_radius},
+        .hidden_layers = render->hidden_layers,
         .margin = is_view ? render->margin : 0.0f,
     };
 }

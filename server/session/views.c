@@ -219,6 +219,8 @@ static void adapt(struct session_view *view, const struct engine_frame *frame)
 void view_frame_made(struct job *job, const struct engine_frame *frame)
 {
     struct session_view *view = job->view;
+    if (frame->request.hidden_layer > 0) /* says nothing of what a picture costs */
+        return;
     view->made_ns = frame->encoded_ns > frame->applied_ns ? frame->encoded_ns - frame->applied_ns : 0;
     if (frame->moving)
         pacing_learn(&view->pacing, frame->scale_eighths ? frame->scale_eighths : PACING_SCALE_FULL,
@@ -237,7 +239,8 @@ static bool may_be_given_up(const struct session_view *view, const struct engine
 bool view_is_overtaken(const struct job *job, const struct engine_frame *frame)
 {
     const struct session_view *view = job->view;
-    return !frame->moving && view->last_moving && view->given_up < GIVEN_UP_MAX && may_be_given_up(view, frame);
+    const bool may_wait = frame->request.hidden_layer > 0 || (!frame->moving && view->last_moving);
+    return may_wait && view->given_up < GIVEN_UP_MAX && may_be_given_up(view, frame);
 }
 
 bool view_is_outdated(const struct job *job, const struct engine_frame *frame)

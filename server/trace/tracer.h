@@ -192,7 +192,8 @@ struct tracer_impl {
      * structure is no picture of one view. */
     bool (*texel_view)(const struct tracer *tracer, struct trace_view *texels, uint32_t *layers);
     /* Of rays that begin at the eye of that view, which may be dead: the intersections with the surfaces that the
-     * layer holds at the texels they pass through. A miss where it holds none. */
+     * layer holds at the texels they pass through. A miss where it holds none, and with wave.within_reach where no
+     * eye within the radius of the structure sees them. */
     bool (*layer_hits)(struct tracer *tracer, struct gpu_scene *scene, const struct ray_range *rays,
                        uint32_t layer, struct error *error);
 };

@@ -14,7 +14,6 @@ struct trace_view {
     float ortho_height;        /* metres, of an orthographic camera */
     float near;                /* metres along the view; 0: chosen from the scene */
     uint32_t width, height;    /* pixels */
-    uint32_t depth_layers; /* surfaces behind one another that the structure is to keep; 0: as its options say */
 };
 
 #endif

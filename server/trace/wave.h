@@ -46,6 +46,7 @@ struct wave {
     struct gpu_buffer *visibility; /* uint; any */
     struct gpu_buffer *times;      /* float a ray: when, 0: the shutter opens, 1: it closes; NULL: all at 0 */
     bool shared_origin;            /* all rays begin at one point */
+    bool within_reach;             /* of a layer: without what is hidden from all eyes that it is for */
     bool bare;                     /* closest: intersections are enough, no surfaces are made of them */
     float origin_spread;           /* or all on a disc of this diameter, a lens: metres; 0: nothing is known */
 };

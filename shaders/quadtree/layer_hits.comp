@@ -7,6 +7,7 @@
 #include "common/dispatch.glsl"
 #include "common/range.glsl"
 #include "common/intersection.glsl"
+#include "common/math.glsl"
 #include "quadtree/face.glsl"
 
 layout(binding = UNIT_RAYS) uniform samplerBuffer rays; // two texels each
@@ -15,11 +16,66 @@ layout(binding = UNIT_QUADTREE_VISIBLE) uniform usampler2DArray quadtree_visible
 layout(binding = UNIT_QUADTREE_NODES) uniform usamplerBuffer quadtree_nodes;
 
 uniform uint layer;
+uniform uint only_within_reach; // 1: of the layers behind the first, what some eye within the radius sees: the layer'th
+
+uvec2 leaf(uint slice, ivec2 texel)
+{
+    ivec2 last = ivec2(quadtree.width, quadtree.height) - 1;
+    return texelFetch(quadtree_nodes, int(node_index(slice, 0u, uvec2(clamp(texel, ivec2(0), last))))).xy;
+}
+
+const uint NO_LAYER = 0xffffffffu;
+const int DIRECTIONS = 16;
+const int DISTANCES = 4;
+const float REACH_MAX = 128.0; // texels
+
+// Along a ray from a hidden surface towards an eye at the radius w grows by `growth` a texel, until it meets the plane of
+// what hides that surface. The eye sees past that if the ray is before what is seen somewhere on that way: there is an
+// edge between. Looked for at some places: what that misses is narrow.
+bool is_seen_past(uint hiding, ivec2 texel, vec2 towards, float w, float growth)
+{
+    uvec2 hides = leaf(hiding, texel);
+    float reach = min((plane_w(hides) - w) / max(growth - dot(plane_slopes(hides), towards), 1e-9), REACH_MAX);
+    for (int k = 1; k <= DISTANCES; k++) {
+        ivec2 way = ivec2(towards * (reach * float(k) / float(DISTANCES))); // no farther than it
+        float of_ray = w + length(vec2(way)) * growth;
+        float of_plane = plane_w(hides) + dot(plane_slopes(hides), vec2(way));
+        if (of_ray < of_plane && plane_w(leaf(hiding, texel + way)) < of_ray)
+            return true;
+    }
+    return false;
+}
+
+bool is_within_reach(uint hidden, ivec2 texel)
+{
+    float growth = 1.0 / (quadtree.scale_centre.x * quadtree.bounds.w), w = plane_w(leaf(hidden, texel));
+    for (int i = 0; i < DIRECTIONS && w > 0.0; i++) {
+        float angle = TWO_PI * float(i) / float(DIRECTIONS);
+        vec2 towards = vec2(cos(angle), sin(angle));
+        if (is_seen_past(0u, texel, towards, w, growth) && (hidden < 2u || is_seen_past(1u, texel, towards, w, growth)))
+            return true;
+    }
+    return false;
+}
+
+// Bodies have two sides: the far one of what is seen is next behind it, but few eyes see that.
+uint shown_layer(ivec2 texel)
+{
+    if (only_within_reach == 0u)
+        return layer;
+    uint found = 0u;
+    for (uint hidden = 1u; hidden < quadtree.layers; hidden++) {
+        found += uint(is_within_reach(hidden, texel));
+        if (found == layer)
+            return hidden;
+    }
+    return NO_LAYER;
+}
 
 // How far along the ray the plane of the texel is.
-float leaf_distance(vec3 origin, vec3 direction, uvec2 texel)
+float leaf_distance(uint slice, vec3 origin, vec3 direction, uvec2 texel)
 {
-    float w = plane_w(texelFetch(quadtree_nodes, int(node_index(layer, 0u, texel))).xy);
+    float w = plane_w(texelFetch(quadtree_nodes, int(node_index(slice, 0u, texel))).xy);
     float z = is_orthographic() ? quadtree.depths.y - w * (quadtree.depths.y - quadtree.depths.x) : quadtree.depths.x / w;
     return (z - origin.z) / direction.z;
 }
@@ -55,12 +111,14 @@ void main()
     ivec2 texel = ivec2(floor(face_place(point, face_q(point)).xy));
     bool is_inside = all(greaterThanEqual(texel, ivec2(0))) &&
                      all(lessThan(texel, ivec2(quadtree.width, quadtree.height))) && direction_t_max.w > origin_t_min.w;
-    uvec2 visible = is_inside ? texelFetch(quadtree_visible, ivec3(texel, layer), 0).xy : uvec2(VISIBLE_NOTHING);
+    uint shown = is_inside ? shown_layer(texel) : NO_LAYER;
+    uvec2 visible =
+        shown != NO_LAYER ? texelFetch(quadtree_visible, ivec3(texel, int(shown)), 0).xy : uvec2(VISIBLE_NOTHING);
     uvec4 intersection = uvec4(floatBitsToUint(-1.0), 0u, HIT_NO_PRIMITIVE, HIT_NO_PRIMITIVE);
     if (visible.x != VISIBLE_NOTHING) {
-        float near = leaf_distance(origin, direction, uvec2(texel));
+        float near = leaf_distance(shown, origin, direction, uvec2(texel));
         float distance_ = surface_distance(visible, origin_t_min.xyz, direction_t_max.xyz, near);
-        intersection = uvec4(floatBitsToUint(max(distance_, origin_t_min.w)), (layer + 1u) << HIT_LAYER_SHIFT, visible.y,
+        intersection = uvec4(floatBitsToUint(max(distance_, origin_t_min.w)), (shown + 1u) << HIT_LAYER_SHIFT, visible.y,
                              visible.x == VISIBLE_DISC ? HIT_NO_PRIMITIVE : visible.x - 1u);
     }
     imageStore(hits, int(3u * k), intersection);

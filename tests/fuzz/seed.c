@@ -1,13 +1,15 @@
 /* SPDX-License-Identifier: MIT */
 /* Writes what the fuzzers start from: seed FOLDER makes FOLDER/protocol.dict out of the table, and valid inputs in
  * FOLDER/codec, FOLDER/framing, FOLDER/handshake and FOLDER/sealed, noise in FOLDER/scene, sessions in
- * FOLDER/session, models in FOLDER/aff, FOLDER/gltf, FOLDER/obj and FOLDER/nff. */
+ * FOLDER/session, frames in FOLDER/frame, models in FOLDER/aff, FOLDER/gltf, FOLDER/obj and FOLDER/nff. */
 #include <errno.h>
 #include <inttypes.h>
 #include <stdlib.h>
 #include <sys/stat.h>
+#include <xxhash.h>
 
 #include "protocol/handshake.h"
+#include "protocol/pixels/predicted.h"
 #include "tests/fuzz/recorded_session.h"
 #include "tests/fuzz/sealed_random.h"
 #include "tests/unit/protocol/cases.h"
@@ -368,6 +370,60 @@ static const char aff_model[] =
     "scale 4 -1 1 1 1 0 0 0 0 1 1 1 0 0 0 1 2 1 1 0 0 0 2 1 1 1 0 0 0 visibility 2 0 1 1 0 }\n"
     "k camera { transl 4 0 0 0 5 0 0 0 0 0 0 5 0 0 0 1 0 0 6 0 0 0 2 0 0 5 0 0 0 }\n";
 
+/* A picture of 8x4 in each of some encodings, with depth in both forms. */
+static bool write_frame(const char *folder, int number, enum protocol_encoding encoding, bool inverse)
+{
+    enum { WIDTH = 8, HEIGHT = 4, COUNT = WIDTH * HEIGHT };
+    static const struct predicted_form rgba = {WIDTH, HEIGHT, 4}, rounded = {WIDTH, HEIGHT, 2};
+    uint8_t pixels[4 * COUNT], depth[4 * COUNT], bytes[2048];
+    for (size_t i = 0; i < sizeof(pixels); i++)
+        pixels[i] = (uint8_t)(i * 5);
+    for (size_t i = 0; i < sizeof(depth); i++)
+        depth[i] = (uint8_t)(inverse ? i % 2 ? 0 : i : i % 4 == 3 ? 0x3f : 0x80);
+    struct message message = {.type = MESSAGE_FRAME_BEGIN};
+    message_init(&message, MESSAGE_FRAME_BEGIN);
+    struct message_frame_begin *begin = &message.frame_begin;
+    begin->frame = 7;
+    begin->width = WIDTH;
+    begin->height = HEIGHT;
+    begin->encoding = encoding;
+    begin->digest = XXH3_64bits(pixels, sizeof(pixels));
+    begin->attachments = 1;
+    begin->depth_form = inverse ? PROTOCOL_DEPTH_FORM_INVERSE : PROTOCOL_DEPTH_FORM_METRES;
+    begin->depth_step = inverse ? 0.01f : 0.0f;
+    begin->margin_x = begin->margin_y = 1;
+    begin->hidden_layer = (uint32_t)number % 3;
+    begin->of_frame = begin->hidden_layer ? 6 : 0;
+    uint8_t encoded[1024];
+    size_t used = sizeof(pixels);
+    memcpy(encoded, pixels, used);
+    if (encoding == PROTOCOL_ENCODING_PREDICTED)
+        used =
+            predicted_encode(&(struct predicted_source){.form = rgba, .pixels = pixels, .level = 1}, encoded, 512)
+                .bytes;
+    begin->size_bytes = used;
+    begin->depth_bytes =
+        predicted_encode(&(struct predicted_source){.form = inverse ? rounded : rgba, .pixels = depth, .level = 1},
+                         encoded + used, sizeof(encoded) - used)
+            .bytes;
+    used += begin->depth_bytes;
+    struct writer writer;
+    writer_init(&writer, bytes + 2, sizeof(bytes) - 2 - used);
+    if (!message_encode(&writer, &message))
+        return false;
+    bytes[0] = (uint8_t)writer.used_bytes;
+    bytes[1] = (uint8_t)(writer.used_bytes >> 8);
+    memcpy(bytes + 2 + writer.used_bytes, encoded, used);
+    return write_file(folder, "frame", "frame", number, bytes, 2 + writer.used_bytes + used);
+}
+
+static bool write_frames(const char *folder)
+{
+    return write_frame(folder, 0, PROTOCOL_ENCODING_RAW, false) &&
+           write_frame(folder, 1, PROTOCOL_ENCODING_RAW, true) &&
+           write_frame(folder, 2, PROTOCOL_ENCODING_PREDICTED, true);
+}
+
 static bool write_models(const char *folder)
 {
     return write_file(folder, "aff", "model", 0, aff_model, sizeof(aff_model) - 1) &&
@@ -384,6 +440,6 @@ int main(int argument_count, char **arguments)
     }
     bool ok = make_folder(arguments[1]) && write_dictionary(arguments[1]) && write_messages(arguments[1]) &&
               write_handshakes(arguments[1]) && write_sealed(arguments[1]) && write_noise(arguments[1]) &&
-              write_sessions(arguments[1]) && write_models(arguments[1]);
+              write_sessions(arguments[1]) && write_frames(arguments[1]) && write_models(arguments[1]);
     return ok ? 0 : 1;
 }

@@ -131,6 +131,7 @@ bool quadtree_layer_hits(struct quadtree_store *store, struct gpu_scene *scene, 
         return false;
     quadtree_store_bind(store);
     gpu_uniform_uint(program, "layer", layer);
+    gpu_uniform_uint(program, "only_within_reach", rays->wave->within_reach && layer > 0);
     trace_surface_program_run(program, scene, rays);
     return true;
 }

@@ -272,13 +272,14 @@ TEST(inverse_depths_arrive_in_metres)
     free(bytes);
 }
 
-TEST(depth_forms_and_margins_that_cannot_be_are_refused)
+TEST(depths_margins_and_hidden_layers_that_cannot_be_are_refused)
 {
     uint8_t *bytes;
     size_t count;
-    for (unsigned i = 0; i < 5; i++) {
+    for (unsigned i = 0; i < 7; i++) {
         struct fl_assembly assembly = some_assembly(PROTOCOL_ENCODING_RAW);
         assembly.expected.is_view = true;
+        assembly.expected.hidden_layers = 1;
         assembly.expected.attachments = FL_ATTACH_DEPTH;
         assembly.expected.margin_x_max = 1;
         struct message_frame_begin message = make_inverse(&bytes, &count);
@@ -287,6 +288,8 @@ TEST(depth_forms_and_margins_that_cannot_be_are_refused)
         message.margin_x = i == 2 ? 2 : 0;
         message.margin_y = i == 3 ? 1 : 0;
         message.width += i == 4; /* without a margin */
+        message.hidden_layer = i == 5 ? 2 : i == 6;
+        message.of_frame = i == 6 ? message.frame : 0; /* itself */
         if (begin(&assembly, &message))
             fail_msg("change %u was not noticed", i);
         assert_int_equal(error.code, FL_ERROR_PROTOCOL);

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* What is encoded comes back: exactly from raw, zstd and predicted, close enough from JPEG. */
 #include "encode/encoder.h"
+#include "encode/sparse.h"
 #include "protocol/pixels/predicted.h"
 
 #include "tests/accuracy/ycbcr_exact.h"
@@ -156,6 +157,27 @@ TEST(predicted_leaves_what_the_rule_says)
     assert_int_equal(ZSTD_decompress(planes, sizeof(planes), out, bytes), sizeof(planes));
     assert_memory_equal(planes, left, sizeof(left));
     free(out);
+}
+
+/* Of blocks of eight: what is there stays, what is not has the mean beside it, or behind it in the row. */
+TEST(what_is_not_there_is_filled_block_by_block)
+{
+    enum { WIDE = 20, HIGH = 9 };
+    static const uint8_t first[4] = {10, 20, 30, 255}, second[4] = {20, 40, 61, 255}, mean[4] = {15, 30, 46, 255};
+    static const uint8_t below[4] = {1, 2, 3, 4};
+    uint8_t filled[WIDE * HIGH * 4];
+    float depths[WIDE * HIGH] = {0};
+    memset(filled, 200, sizeof(filled));
+    depths[0] = depths[1] = 1.0f;
+    memcpy(filled, first, 4);
+    memcpy(filled + 4, second, 4);
+    depths[8 * WIDE] = 2.0f;
+    memcpy(filled + (size_t)4 * 8 * WIDE, below, 4);
+    sparse_fill(filled, depths, WIDE, HIGH);
+    for (size_t i = 0; i < WIDE * HIGH; i++) {
+        const uint8_t *expected = i == 0 ? first : i == 1 ? second : i < (size_t)8 * WIDE ? mean : below;
+        assert_memory_equal(filled + 4 * i, expected, 4);
+    }
 }
 
 TEST(predicted_is_smaller_than_zstd_where_a_picture_is_smooth)

@@ -526,6 +526,43 @@ TEST(a_frame_has_a_margin_while_it_moves)
     drop(frame);
 }
 
+static void expect_layer(struct watching *watching, uint32_t number, uint64_t command, uint32_t layer,
+                         uint32_t of_frame, enum encoding encoding)
+{
+    struct engine_frame *frame = take(expect_frame(watching->engine, 1, 2, number));
+    assert_int_equal(frame->command, command);
+    assert_int_equal(frame->request.hidden_layer, layer);
+    assert_int_equal(frame->of_frame, of_frame);
+    assert_int_equal(frame->encoding, encoding);
+    assert_int_equal(frame->result.samples, layer ? 1 : frame->request.samples);
+    drop(frame);
+}
+
+/* A stream has pictures alone: what they hide is coded as pictures that stand alone. */
+TEST(what_a_picture_hides_follows_it_while_it_moves)
+{
+    struct watching *watching = *state;
+    struct engine_command *made = with_samples(view(2, watching->wishes), 1, 1);
+    made->job.hidden_layers = 2;
+    made->job.encoding = ENCODING_H264;
+    made->job.still_encoding = ENCODING_RAW;
+    made->job.frame.format = PIXEL_FORMAT_RGBA8;
+    made->job.frame.width = made->job.frame.height = 64;
+    look(watching, 1, true);
+    submit(watching->engine, made);
+    expect_layer(watching, 0, 1, 0, 0, ENCODING_H264);
+    expect_layer(watching, 1, 1, 1, 0, ENCODING_JPEG);
+    expect_layer(watching, 2, 1, 2, 0, ENCODING_JPEG);
+    expect_silence(watching->engine);
+    look(watching, 2, true);
+    expect_layer(watching, 3, 2, 0, 0, ENCODING_H264);
+    expect_layer(watching, 4, 2, 1, 3, ENCODING_JPEG);
+    expect_layer(watching, 5, 2, 2, 3, ENCODING_JPEG);
+    look(watching, 3, false);
+    expect_layer(watching, 6, 3, 0, 0, ENCODING_RAW);
+    expect_silence(watching->engine);
+}
+
 static void expect_form(struct engine_frame *frame, enum encoding encoding, enum ycbcr form)
 {
     assert_int_equal(frame->encoding, encoding);

@@ -905,6 +905,32 @@ SESSION_TEST(a_margin_is_for_views_of_one_eye_within_the_limits)
     engine_command_destroy(command);
 }
 
+SESSION_TEST(what_has_no_hidden_layers_is_refused)
+{
+    open_scene(1, 1);
+    struct message message = made(MESSAGE_RENDER);
+    message.render.scene = 1;
+    message.render.channel = CHANNEL;
+    message.render.hidden_layers = 1;
+    expect_refused(2, &message, PROTOCOL_ERROR_UNSUPPORTED, "render.hidden_layers");
+    for (uint32_t i = 0; i < 3; i++) {
+        message = view_message(4);
+        message.render.hidden_layers = 1;
+        message.render.attachments = i == 0 ? 2 : 1;
+        message.render.aperture = i == 1 ? 0.1f : 0.0f;
+        message.render.shutter = i == 2 ? 0.5f : 0.0f;
+        expect_refused(3 + i, &message, i == 0 ? PROTOCOL_ERROR_INVALID : PROTOCOL_ERROR_UNSUPPORTED,
+                       "render.hidden_layers");
+    }
+    message = view_message(4);
+    message.render.hidden_layers = 2;
+    message.render.attachments = 1;
+    send_message(9, 0, &message);
+    struct engine_command *command = told(ENGINE_JOB_START);
+    assert_int_equal(command->job.hidden_layers, 2);
+    engine_command_destroy(command);
+}
+
 SESSION_TEST(video_without_the_word_for_it_is_refused)
 {
     open_scene(1, 1);
