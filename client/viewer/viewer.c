@@ -118,7 +118,7 @@ static void serve(struct viewer *viewer, uint64_t now_ns)
         return;
     }
     if (state != SESSION_LIVE) {
-        poll(NULL, 0, (int)IDLE_WAIT_MS);
+        poll(NULL, 0, (int)wait_ms); /* views are made of what is there */
         return;
     }
     if (viewer->times_live != session_times_live(viewer->session))

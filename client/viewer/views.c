@@ -11,6 +11,7 @@
 #define THREADS 2u      /* that make a view: the decoder, the window and often the daemon want the others */
 #define KEY_PIXELS 0.5f /* that planes may be off beside the rounding of depths: it is not seen in motion */
 #define SECOND_NS UINT64_C(1000000000)
+#define STILL_NS UINT64_C(80000000) /* without another wish: then there is time for a better view */
 
 struct views {
     pthread_t thread;
@@ -21,7 +22,8 @@ struct views {
     uint64_t keys;          /* that were given */
     bool forgets, wants;
     struct views_wish wish;
-    uint64_t wishes;     /* number of `wish` */
+    uint64_t wishes; /* number of `wish` */
+    uint64_t wished_ns;
     uint64_t first_wish; /* since which some view was wanted all the time */
     struct pixmap made_picture;
     struct views_made made;
@@ -144,6 +146,13 @@ static bool wants_view(const struct views *views)
            (!is_of_now(views, &views->last) || views->last.quality != FL_WARP_TREE);
 }
 
+/* A view in time is made again as well as possible, if no other is wanted for a while. */
+static uint64_t due_ns(const struct views *views)
+{
+    const uint64_t next_ns = views->begun_ns + views->wish.frame_ns, still_ns = views->wished_ns + STILL_NS;
+    return is_of_now(views, &views->last) && still_ns > next_ns ? still_ns : next_ns;
+}
+
 static void take_key(struct views *views)
 {
     struct views_key came = views->given;
@@ -163,7 +172,6 @@ static void take_wish(struct views *views)
     const struct views_wish wish = views->wish;
     const uint64_t number = views->wishes;
     struct fl_warp_error error = {0};
-    /* A view in time is made again as well as possible, if nobody has wanted another meanwhile. */
     const bool again = is_of_now(views, &views->last);
     const enum fl_warp_quality quality = again ? FL_WARP_TREE : views->rung.quality;
     pthread_mutex_unlock(&views->lock);
@@ -198,7 +206,6 @@ static void *work(void *argument)
     struct views *views = argument;
     pthread_mutex_lock(&views->lock);
     while (!views->quit) {
-        const uint64_t due_ns = views->begun_ns + views->wish.frame_ns;
         if (views->forgets) {
             views->key_number = 0;
             views->forgets = false;
@@ -207,8 +214,8 @@ static void *work(void *argument)
             take_key(views);
         else if (!wants_view(views))
             pthread_cond_wait(&views->changed, &views->lock);
-        else if (monotonic_now_ns() < due_ns)
-            wait_until(views, due_ns);
+        else if (monotonic_now_ns() < due_ns(views))
+            wait_until(views, due_ns(views));
         else
             take_wish(views);
     }
@@ -248,6 +255,7 @@ uint64_t views_want(struct views *views, const struct views_wish *wish)
     if (!views->wants)
         views->first_wish = number;
     views->wish = *wish;
+    views->wished_ns = monotonic_now_ns();
     views->wants = true;
     pthread_cond_signal(&views->changed);
     pthread_mutex_unlock(&views->lock);
