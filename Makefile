@@ -282,7 +282,7 @@ READERS_LIBS = $(IMPORT_LIBS) $(call pkg_libs,$(TEXTURE_PKGS))
 $(B)/tests/unit/fault_tests: $(SERVING_OBJ) $(B)/tests/fuzz/recorded_session.o
 $(B)/tests/unit/fault_tests: TEST_LIBS += $(SERVING_WRAP) -Wl,--wrap=malloc,--wrap=calloc,--wrap=realloc
 # What the fuzzers have found.
-$(B)/tests/unit/corpus_tests: $(KEPT_OBJ) $(SERVING_OBJ) $(READERS_OBJ)
+$(B)/tests/unit/corpus_tests: $(KEPT_OBJ) $(SERVING_OBJ) $(READERS_OBJ) $(WARP_OBJ)
 $(B)/tests/unit/corpus_tests: TEST_LIBS += $(SERVING_WRAP) $(READERS_LIBS) -lstdc++
 # What the daemon encodes is decoded by the library itself.
 $(B)/tests/unit/media_tests: $(patsubst %,$(B)/client/viewer/%.o,camera decode heat hud input metrics paint panel pixmap replay settings tour window)
@@ -531,6 +531,8 @@ $(B)/tests/fuzz/fuzz_sealed: $(SEALED_OBJ)
 $(addprefix $(B)/tests/fuzz/fuzz_,scene sealed transaction): FUZZ_LIBS = $(call pkg_libs,libsodium libxxhash) -lm
 $(B)/tests/fuzz/fuzz_session: $(SERVING_OBJ) $(SERVER_OBJ)
 $(B)/tests/fuzz/fuzz_session: FUZZ_LIBS = $(SERVER_LIBS) $(SERVING_WRAP)
+$(B)/tests/fuzz/fuzz_warp: $(WARP_OBJ)
+$(B)/tests/fuzz/fuzz_warp: FUZZ_LIBS = -lm
 $(addprefix $(B)/tests/fuzz/fuzz_,aff gltf nff obj): $(READERS_OBJ)
 $(addprefix $(B)/tests/fuzz/fuzz_,aff gltf nff obj): FUZZ_LIBS = $(READERS_LIBS)
 # OpenImageIO loses memory with broken images; the importer lives for one model only.

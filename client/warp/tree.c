@@ -97,17 +97,26 @@ size_t warp_layer_scratch(const struct warp_layer *layer)
     return (size_t)SCRATCH_ROWS * layer->padded_width;
 }
 
+static struct slope_row slope_row_of(float *memory, size_t row)
+{
+    return (struct slope_row){memory, memory + row, (uint32_t *)(void *)(memory + 2 * row)};
+}
+
 static struct scratch scratch_of(const struct warp_layer *layer, float *memory)
 {
     const size_t row = layer->padded_width;
-    struct scratch scratch;
-    for (int i = 0; i < 3; i++, memory += 3 * row)
-        scratch.rows[i] = (struct slope_row){memory, memory + row, (uint32_t *)(void *)(memory + 2 * row)};
-    scratch.w_min = memory;
-    scratch.w_max = memory + row;
-    scratch.steep_x = memory + 2 * row;
-    scratch.steep_y = memory + 3 * row;
-    return scratch;
+    return (struct scratch){.rows = {slope_row_of(memory, row), slope_row_of(memory + 3 * row, row),
+                                     slope_row_of(memory + 6 * row, row)},
+                            .w_min = memory + 9 * row,
+                            .w_max = memory + 10 * row,
+                            .steep_x = memory + 11 * row,
+                            .steep_y = memory + 12 * row};
+}
+
+/* The rows take turns. */
+static const struct slope_row *slopes_at(const struct scratch *scratch, uint32_t y)
+{
+    return &scratch->rows[y % 3];
 }
 
 /* Of w at a texel from the differences to its neighbours: from the one before it and to the one after it. */
@@ -211,20 +220,21 @@ LANES_KERNEL static void make_inner_leaves(const struct leaf_row *given, struct 
         make_leaf(&row, x, x - 1, x + 1);
 }
 
-static struct leaf_row leaf_row_of(const struct warp_layer *layer, const struct slope_row rows[3], uint32_t y)
+static struct leaf_row leaf_row_of(const struct warp_layer *layer, const struct scratch *scratch, uint32_t y)
 {
+    const struct slope_row *here = slopes_at(scratch, y), *next = slopes_at(scratch, y + 1);
     const size_t across = layer->padded_width;
     const float *w = layer->w + y * across;
     const bool has_above = y > 0, has_below = y + 1 < layer->height;
     return (struct leaf_row){.above = has_above ? w - across : w,
                              .w = w,
                              .below = has_below ? w + across : w,
-                             .up = rows[0].y,
-                             .along_y = rows[1].y,
-                             .down = rows[2].y,
-                             .along_x = rows[1].x,
-                             .along_x_below = rows[2].x,
-                             .tails = rows[1].tails,
+                             .up = slopes_at(scratch, y + 2)->y, /* of y - 1 */
+                             .along_y = here->y,
+                             .down = next->y,
+                             .along_x = here->x,
+                             .along_x_below = next->x,
+                             .tails = here->tails,
                              .has_above = mask_of(has_above),
                              .has_below = mask_of(has_below),
                              .slack = layer->tolerance + 2 * layer->noise,
@@ -288,7 +298,7 @@ LANES_KERNEL static void gather_row(const struct warp_layer *layer, const struct
     const size_t across = layer->padded_width;
     const int last = (int)layer->width - 1;
     const float *w = layer->w + y * across, *below = y + 1 < layer->height ? w + across : w;
-    const float *slope_x = scratch->rows[1].x, *slope_y = scratch->rows[1].y;
+    const float *slope_x = slopes_at(scratch, y)->x, *slope_y = slopes_at(scratch, y)->y;
     float *restrict w_min = scratch->w_min, *restrict w_max = scratch->w_max;
     float *restrict steep_x = scratch->steep_x, *restrict steep_y = scratch->steep_y;
     const int is_first = y % (1u << WARP_BLOCK_LOW) == 0;
@@ -451,17 +461,6 @@ struct warp_rectangle warp_layer_parts(const struct warp_layer *layer, const str
         .bottom = padded(bottom < layer->height ? bottom : layer->height) / QUADTREE_SIDE};
 }
 
-/* The rows of slopes turn: the oldest becomes the newest. */
-static void next_slopes(const struct warp_layer *layer, struct scratch *scratch, uint32_t y, struct span span)
-{
-    const struct slope_row oldest = scratch->rows[0];
-    scratch->rows[0] = scratch->rows[1];
-    scratch->rows[1] = scratch->rows[2];
-    scratch->rows[2] = oldest;
-    if (y < layer->height)
-        find_slopes(layer, &scratch->rows[2], y, span);
-}
-
 void warp_layer_build(struct warp_layer *layer, uint32_t row, uint32_t left, uint32_t right, float *scratch_memory)
 {
     struct scratch scratch = scratch_of(layer, scratch_memory);
@@ -473,11 +472,12 @@ void warp_layer_build(struct warp_layer *layer, uint32_t row, uint32_t left, uin
                                 texels.end < width ? texels.end + 1 : width};
     const uint32_t block = 1u << WARP_BLOCK_LOW;
     if (first > 0)
-        next_slopes(layer, &scratch, first - 1, slopes);
-    next_slopes(layer, &scratch, first, slopes);
+        find_slopes(layer, slopes_at(&scratch, first - 1), first - 1, slopes);
+    find_slopes(layer, slopes_at(&scratch, first), first, slopes);
     for (uint32_t y = first; y < end && y < layer->height; y++) {
-        next_slopes(layer, &scratch, y + 1, slopes);
-        const struct leaf_row leaves = leaf_row_of(layer, scratch.rows, y);
+        if (y + 1 < layer->height)
+            find_slopes(layer, slopes_at(&scratch, y + 1), y + 1, slopes);
+        const struct leaf_row leaves = leaf_row_of(layer, &scratch, y);
         make_leaves(&leaves, texels, width - 1);
         join_texels(&leaves, layer->joined + (size_t)y * (layer->padded_width / WORD), texels, width - 1);
         gather_row(layer, &scratch, y, texels);
