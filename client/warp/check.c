@@ -79,7 +79,12 @@ static bool check_w(const float *w, size_t count, uint32_t width, struct fl_warp
 
 bool warp_check_key(const struct fl_warp_key *key, struct fl_warp_error *error)
 {
-    if (!check_size(key->width, key->height, error) || !check_camera(&key->camera, error) ||
+    if (!check_size(key->width, key->height, error))
+        return false;
+    if (key->width * key->height > FL_WARP_TEXELS_MAX)
+        return warp_error_set(error, FL_WARP_ERROR_ARGUMENT, "size", "%ux%u are more than %u texels", key->width,
+                              key->height, FL_WARP_TEXELS_MAX);
+    if (!check_camera(&key->camera, error) ||
         (key->unit != 0 && !check_number(key->unit, LENGTH_MIN, PLACE_MAX, "unit", error)) ||
         !check_number(key->w_error, 0, W_MAX, "w_error", error) ||
         !check_number(key->radius, LENGTH_MIN, PLACE_MAX, "radius", error) ||
