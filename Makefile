@@ -536,6 +536,8 @@ $(B)/tests/fuzz/fuzz_session: $(SERVING_OBJ) $(SERVER_OBJ)
 $(B)/tests/fuzz/fuzz_session: FUZZ_LIBS = $(SERVER_LIBS) $(SERVING_WRAP)
 $(B)/tests/fuzz/fuzz_frame: $(LIB_OBJ)
 $(B)/tests/fuzz/fuzz_frame: FUZZ_LIBS = $(call pkg_libs,$(CLIENT_PKGS)) -lm
+$(B)/tests/fuzz/fuzz_warp: $(WARP_OBJ)
+$(B)/tests/fuzz/fuzz_warp: FUZZ_LIBS = -lm
 $(addprefix $(B)/tests/fuzz/fuzz_,aff gltf nff obj): $(READERS_OBJ)
 $(addprefix $(B)/tests/fuzz/fuzz_,aff gltf nff obj): FUZZ_LIBS = $(READERS_LIBS)
 # OpenImageIO loses memory with broken images; the importer lives for one model only.

@@ -21,8 +21,8 @@ static inline void load_w(const float *w, const int places[LANES], float loaded[
 }
 
 /* From (x, y) of the picture on. */
-LANES_KERNEL static void search_pixels(const struct warp_rays *rays, const struct warp_layer *layer,
-                                       const float place[2], struct search *restrict search)
+LANES_KERNEL_OF_LOADS static void search_pixels(const struct warp_rays *rays, const struct warp_layer *layer,
+                                                const float place[2], struct search *restrict search)
 {
     const float right = (float)((int)layer->width), bottom = (float)((int)layer->height), limit = rays->w_limit;
     const int across = (int)layer->padded_width, last_x = (int)layer->width - 1, last_y = (int)layer->height - 1;

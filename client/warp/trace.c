@@ -15,7 +15,7 @@
 #define NARROWINGS_MAX 4
 #define NARROWING_LEAST 0.8f /* of the range before: what narrows less has come to its end */
 #define RANGE_SLACK 0.001f   /* of w */
-#define BLOCKS_ACROSS 3u     /* along the longer side of a rectangle, about */
+#define BLOCKS_ACROSS 4u     /* along the longer side of a rectangle, about */
 /* How far neighbouring texels may come apart in the picture, in texels, where rays meet one surface: from 1 on one
  * may hide the other. Below it the solution's iteration closes in by this factor. */
 #define STRETCH_MAX 0.5f
@@ -131,9 +131,8 @@ LANES_KERNEL static void place_packet(const struct warp_rays *rays, struct warp_
 {
 #pragma omp simd
     for (int k = 0; k < LANES; k++) {
-        const float at_x = x + (float)(k % (int)PACKET_COLUMNS) + 0.5f,
-                    at_y = y + (float)(k / (int)PACKET_COLUMNS) + 0.5f;
-        const struct warp_ray ray = rays_at(rays, at_x, at_y);
+        const int column = k % (int)PACKET_COLUMNS, row = k / (int)PACKET_COLUMNS;
+        const struct warp_ray ray = rays_at(rays, x + (float)column + 0.5f, y + (float)row + 0.5f);
         packet->x[k] = ray.x;
         packet->y[k] = ray.y;
         packet->shift_x[k] = ray.shift_x;

@@ -1,22 +1,14 @@
 /* SPDX-License-Identifier: MIT */
 /* Widmer and others, section 3.3, as nodes.comp of the tracer `quadtree` has it, level by level: node for node the
- * same bits, if the leaves are. These come from differences of depths here, as the client knows no primitives. */
+ * same bits, if the leaves are. */
 #include "warp/tree.h"
 
 #include "warp/lanes.h"
+#include "warp/leaves.h"
 #include "warp/node.h"
 
 #include <stdlib.h>
 
-/* Two differences of w to the neighbours on both sides are one slope if they are as different as this share of the
- * smaller one: then it is their mean. */
-#define SLOPE_SHARE 0.5f
-/* Else the surface goes on to one side, where the difference is smaller, if that is no more than this share of w:
- * more is a step on both sides. */
-#define STEP_SHARE 0.02f
-/* Of the greatest w of four texels: they show one surface if they differ by no more. */
-#define JOINED_SHARE 0.03f
-#define WORD 32 /* texels whose `joined` share a word */
 /* As in nodes.comp. */
 #define ROUNDING 2.384e-7f
 #define SLOPE_ROUNDING 9.766e-4f
@@ -49,7 +41,7 @@ bool warp_layer_init(struct warp_layer *layer, uint32_t width, uint32_t height)
     layer->colours = calloc((size_t)texels + layer->padded_width + 1,
                             sizeof(*layer->colours)); /* the next texel, and the next row */
     layer->w = calloc(texels, sizeof(*layer->w));
-    layer->joined = calloc(texels / WORD, sizeof(*layer->joined));
+    layer->joined = calloc(texels / WARP_JOINED_WORD, sizeof(*layer->joined));
     layer->nodes = calloc(nodes, 2 * sizeof(*layer->nodes));
     layer->errors = calloc(nodes - texels, sizeof(*layer->errors));
     layer->blocks = calloc(blocks, sizeof(*layer->blocks));
@@ -71,18 +63,7 @@ void warp_layer_finish(struct warp_layer *layer)
     *layer = (struct warp_layer){0};
 }
 
-/* ---- leaves ---- */
-
-/* Of a row, `left` to `right`: slopes as they are in nodes, and the words that hold them. */
-struct slope_row {
-    float *x, *y;
-    uint32_t *tails;
-};
-
-/* Columns of a row. */
-struct span {
-    int first, end;
-};
+/* ---- rows ---- */
 
 /* Rows of slopes round the one whose leaves are made, and what blocks need. */
 struct scratch {
@@ -97,187 +78,26 @@ size_t warp_layer_scratch(const struct warp_layer *layer)
     return (size_t)SCRATCH_ROWS * layer->padded_width;
 }
 
+static struct slope_row slope_row_of(float *memory, size_t row)
+{
+    return (struct slope_row){memory, memory + row, (uint32_t *)(void *)(memory + 2 * row)};
+}
+
 static struct scratch scratch_of(const struct warp_layer *layer, float *memory)
 {
     const size_t row = layer->padded_width;
-    struct scratch scratch;
-    for (int i = 0; i < 3; i++, memory += 3 * row)
-        scratch.rows[i] = (struct slope_row){memory, memory + row, (uint32_t *)(void *)(memory + 2 * row)};
-    scratch.w_min = memory;
-    scratch.w_max = memory + row;
-    scratch.steep_x = memory + 2 * row;
-    scratch.steep_y = memory + 3 * row;
-    return scratch;
+    return (struct scratch){.rows = {slope_row_of(memory, row), slope_row_of(memory + 3 * row, row),
+                                     slope_row_of(memory + 6 * row, row)},
+                            .w_min = memory + 9 * row,
+                            .w_max = memory + 10 * row,
+                            .steep_x = memory + 11 * row,
+                            .steep_y = memory + 12 * row};
 }
 
-/* Of w at a texel from the differences to its neighbours: from the one before it and to the one after it. */
-LANES_INLINE float slope_of(float w, float before, float after, float noise)
+/* The rows take turns. */
+static const struct slope_row *slopes_at(const struct scratch *scratch, uint32_t y)
 {
-    const float a = magnitude(before), b = magnitude(after), smaller = a < b ? before : after;
-    const int is_one = magnitude(before - after) <= SLOPE_SHARE * min_of(a, b) + noise;
-    const int is_step = min_of(a, b) > STEP_SHARE * w;
-    return is_one ? 0.5f * (before + after) : is_step ? 0 : smaller;
-}
-
-/* The word with the slopes at a texel, of w there, and to the left, to the right, above and below. */
-LANES_INLINE uint32_t slopes_of(float w, float left, float right, float above, float below, float noise)
-{
-    const float x = slope_of(w, w - left, right - w, noise), y = slope_of(w, w - above, below - w, noise);
-    return w > 0 ? plane_tail(x, y) : 0;
-}
-
-/* Beyond the border the surface goes on as it is on this side. */
-static void find_slope_at_border(const struct warp_layer *layer, const struct slope_row *row, uint32_t x,
-                                 uint32_t y)
-{
-    const size_t across = layer->padded_width;
-    const float *w = layer->w + y * across + x;
-    const float *left = x > 0 ? w - 1 : w, *right = x + 1 < layer->width ? w + 1 : w;
-    const float *above = y > 0 ? w - across : w, *below = y + 1 < layer->height ? w + across : w;
-    const float l = left == w ? *w + *w - *right : *left, r = right == w ? *w + *w - *left : *right;
-    const float a = above == w ? *w + *w - *below : *above, b = below == w ? *w + *w - *above : *below;
-    const uint32_t tail = slopes_of(*w, l, r, a, b, 2 * layer->noise);
-    row->tails[x] = tail;
-    row->x[x] = plane_slope_x(tail);
-    row->y[x] = plane_slope_y(tail);
-}
-
-LANES_KERNEL static void find_inner_slopes(const struct warp_layer *layer, const struct slope_row *row, uint32_t y,
-                                           struct span span)
-{
-    const size_t across = layer->padded_width;
-    const float *w = layer->w + y * across, *above = w - across, *below = w + across, noise = 2 * layer->noise;
-    float *restrict slopes_x = row->x, *restrict slopes_y = row->y;
-    uint32_t *restrict tails = row->tails;
-#pragma omp simd
-    for (int x = span.first; x < span.end; x++) {
-        const uint32_t tail = slopes_of(w[x], w[x - 1], w[x + 1], above[x], below[x], noise);
-        tails[x] = tail;
-        slopes_x[x] = plane_slope_x(tail);
-        slopes_y[x] = plane_slope_y(tail);
-    }
-}
-
-static void find_slopes(const struct warp_layer *layer, const struct slope_row *row, uint32_t y, struct span span)
-{
-    const int last = (int)layer->width - 1;
-    const bool is_border = y == 0 || y + 1 == layer->height;
-    struct span inner = {span.first > 0 ? span.first : 1, span.end < last ? span.end : last};
-    if (is_border || inner.first > inner.end)
-        inner.first = inner.end = span.end;
-    else
-        find_inner_slopes(layer, row, y, inner);
-    for (int x = span.first; x < span.end; x++)
-        if (x < inner.first || x >= inner.end)
-            find_slope_at_border(layer, row, (uint32_t)x, y);
-}
-
-/* How far the planes of two leaves differ in the middle of their border; b lies to the right of a, or below. */
-LANES_INLINE uint32_t is_edge(float w_a, float w_b, float slope_a, float slope_b, float slack)
-{
-    return mask_of(magnitude(w_b - w_a - 0.5f * (slope_a + slope_b)) >
-                   QUADTREE_EDGE_SHARE * max_of(w_a, w_b) + slack);
-}
-
-/* What the leaves of a row are made of. Of a row of texels that is not there: the row itself, with a mask of no
- * bits. */
-struct leaf_row {
-    const float *above, *w, *below;
-    const float *up, *along_y, *down;     /* slopes along y, of the three rows */
-    const float *along_x, *along_x_below; /* along x */
-    const uint32_t *tails;
-    uint32_t has_above, has_below;
-    float slack, noise;
-    uint32_t *nodes;
-};
-
-/* A neighbour that is not there is the texel itself. */
-LANES_INLINE void make_leaf(const struct leaf_row *row, int x, int left, int right)
-{
-    const float *w = row->w, *across = row->along_x, slack = row->slack;
-    const uint32_t edge = (is_edge(w[left], w[x], across[left], across[x], slack) & mask_of(left < x)) |
-                          (is_edge(w[x], w[right], across[x], across[right], slack) & mask_of(right > x)) |
-                          (is_edge(row->above[x], w[x], row->up[x], row->along_y[x], slack) & row->has_above) |
-                          (is_edge(w[x], row->below[x], row->along_y[x], row->down[x], slack) & row->has_below);
-    row->nodes[2 * x] = plane_head(w[x], edge & mask_of(w[x] > 0) & 1u);
-    row->nodes[2 * x + 1] = row->tails[x];
-}
-
-LANES_KERNEL static void make_inner_leaves(const struct leaf_row *given, struct span span)
-{
-    const struct leaf_row row = *given;
-#pragma omp simd
-    for (int x = span.first; x < span.end; x++)
-        make_leaf(&row, x, x - 1, x + 1);
-}
-
-static struct leaf_row leaf_row_of(const struct warp_layer *layer, const struct slope_row rows[3], uint32_t y)
-{
-    const size_t across = layer->padded_width;
-    const float *w = layer->w + y * across;
-    const bool has_above = y > 0, has_below = y + 1 < layer->height;
-    return (struct leaf_row){.above = has_above ? w - across : w,
-                             .w = w,
-                             .below = has_below ? w + across : w,
-                             .up = rows[0].y,
-                             .along_y = rows[1].y,
-                             .down = rows[2].y,
-                             .along_x = rows[1].x,
-                             .along_x_below = rows[2].x,
-                             .tails = rows[1].tails,
-                             .has_above = mask_of(has_above),
-                             .has_below = mask_of(has_below),
-                             .slack = layer->tolerance + 2 * layer->noise,
-                             .noise = 2 * layer->noise,
-                             .nodes = layer->nodes + 2 * y * across};
-}
-
-static void make_leaves(const struct leaf_row *row, struct span span, int last)
-{
-    const bool has_first = span.first == 0, has_last = span.end == last + 1;
-    make_inner_leaves(row, (struct span){span.first + has_first, span.end - has_last});
-    if (has_first)
-        make_leaf(row, 0, 0, last > 0 ? 1 : 0);
-    if (has_last && last > 0)
-        make_leaf(row, last, last - 1, last);
-}
-
-/* Whether four texels show one surface: they are close to one another, or go on from one another however steeply.
- */
-LANES_INLINE uint32_t is_joined(const struct leaf_row *row, int x)
-{
-    const float a = row->w[x], b = row->w[x + 1], c = row->below[x], d = row->below[x + 1], slack = row->slack;
-    const float high = max_of(max_of(a, b), max_of(c, d)), low = min_of(min_of(a, b), min_of(c, d));
-    const uint32_t edge = is_edge(a, b, row->along_x[x], row->along_x[x + 1], slack) |
-                          is_edge(c, d, row->along_x_below[x], row->along_x_below[x + 1], slack) |
-                          is_edge(a, c, row->along_y[x], row->down[x], slack) |
-                          is_edge(b, d, row->along_y[x + 1], row->down[x + 1], slack);
-    return mask_of(high - low <= JOINED_SHARE * high + row->noise) | (~edge & mask_of(low > 0));
-}
-
-/* Of a word's texels from the first on, all of which have neighbours. */
-LANES_KERNEL static uint32_t join_word(const struct leaf_row *given, int first)
-{
-    const struct leaf_row row = *given;
-    uint32_t word = 0;
-#pragma omp simd reduction(| : word)
-    for (int i = 0; i < WORD; i++)
-        word |= (is_joined(&row, first + i) & 1u) << i;
-    return word;
-}
-
-/* The last texel of a row, and all of the last row, have no neighbours. */
-static void join_texels(const struct leaf_row *row, uint32_t *words, struct span span, int last)
-{
-    for (int x = span.first; x < span.end; x += WORD) {
-        uint32_t word = 0;
-        if (row->has_below && x + WORD <= last)
-            word = join_word(row, x);
-        else
-            for (int i = 0; row->has_below && i < WORD && x + i < last; i++)
-                word |= (is_joined(row, x + i) & 1u) << i;
-        words[x / WORD] = word;
-    }
+    return &scratch->rows[y % 3];
 }
 
 /* ---- blocks ---- */
@@ -288,7 +108,7 @@ LANES_KERNEL static void gather_row(const struct warp_layer *layer, const struct
     const size_t across = layer->padded_width;
     const int last = (int)layer->width - 1;
     const float *w = layer->w + y * across, *below = y + 1 < layer->height ? w + across : w;
-    const float *slope_x = scratch->rows[1].x, *slope_y = scratch->rows[1].y;
+    const float *slope_x = slopes_at(scratch, y)->x, *slope_y = slopes_at(scratch, y)->y;
     float *restrict w_min = scratch->w_min, *restrict w_max = scratch->w_max;
     float *restrict steep_x = scratch->steep_x, *restrict steep_y = scratch->steep_y;
     const int is_first = y % (1u << WARP_BLOCK_LOW) == 0;
@@ -451,17 +271,6 @@ struct warp_rectangle warp_layer_parts(const struct warp_layer *layer, const str
         .bottom = padded(bottom < layer->height ? bottom : layer->height) / QUADTREE_SIDE};
 }
 
-/* The rows of slopes turn: the oldest becomes the newest. */
-static void next_slopes(const struct warp_layer *layer, struct scratch *scratch, uint32_t y, struct span span)
-{
-    const struct slope_row oldest = scratch->rows[0];
-    scratch->rows[0] = scratch->rows[1];
-    scratch->rows[1] = scratch->rows[2];
-    scratch->rows[2] = oldest;
-    if (y < layer->height)
-        find_slopes(layer, &scratch->rows[2], y, span);
-}
-
 void warp_layer_build(struct warp_layer *layer, uint32_t row, uint32_t left, uint32_t right, float *scratch_memory)
 {
     struct scratch scratch = scratch_of(layer, scratch_memory);
@@ -473,13 +282,14 @@ void warp_layer_build(struct warp_layer *layer, uint32_t row, uint32_t left, uin
                                 texels.end < width ? texels.end + 1 : width};
     const uint32_t block = 1u << WARP_BLOCK_LOW;
     if (first > 0)
-        next_slopes(layer, &scratch, first - 1, slopes);
-    next_slopes(layer, &scratch, first, slopes);
+        warp_find_slopes(layer, slopes_at(&scratch, first - 1), first - 1, slopes);
+    warp_find_slopes(layer, slopes_at(&scratch, first), first, slopes);
     for (uint32_t y = first; y < end && y < layer->height; y++) {
-        next_slopes(layer, &scratch, y + 1, slopes);
-        const struct leaf_row leaves = leaf_row_of(layer, scratch.rows, y);
-        make_leaves(&leaves, texels, width - 1);
-        join_texels(&leaves, layer->joined + (size_t)y * (layer->padded_width / WORD), texels, width - 1);
+        if (y + 1 < layer->height)
+            warp_find_slopes(layer, slopes_at(&scratch, y + 1), y + 1, slopes);
+        const struct slope_rows rows = {slopes_at(&scratch, y + 2), slopes_at(&scratch, y),
+                                        slopes_at(&scratch, y + 1)};
+        warp_make_leaves(layer, &rows, y, texels);
         gather_row(layer, &scratch, y, texels);
         if (y % block == block - 1 || y + 1 == layer->height)
             make_low_blocks(layer, &scratch, y, texels);

@@ -10,7 +10,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#define WARP_BLOCK_LOW 2u /* the level of the smallest blocks, 4x4 texels */
+#define WARP_JOINED_WORD 32 /* texels whose `joined` share a word */
+#define WARP_BLOCK_LOW 2u   /* the level of the smallest blocks, 4x4 texels */
 
 /* Of the texels of a block. */
 struct warp_block {

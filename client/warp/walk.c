@@ -125,7 +125,7 @@ LANES_INLINE uint32_t step(const struct ground *ground, const struct warp_packet
     const int next_x = x + pick_int(is_across, 2 * to_right - 1, 0),
               next_y = y + pick_int(is_across, 0, 2 * to_below - 1);
     const uint32_t ends = is_last | mask_of(next_x < 0) | mask_of(next_y < 0) |
-                          mask_of(next_x << level > ground->last_x) | mask_of(next_y << level > ground->last_y);
+                          mask_of(next_x > ground->last_x >> level) | mask_of(next_y > ground->last_y >> level);
     const int differ = ((x ^ next_x) | (y ^ next_y)) & NODE_COLUMNS_MASK;
     const int up = (int)(bits_of((float)differ) >> 23) - 127; /* the highest bit that is set */
     const int higher = min_int(level + up, QUADTREE_TOP), by = higher - level;

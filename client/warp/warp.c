@@ -1,21 +1,14 @@
 /* SPDX-License-Identifier: MIT */
 #include "warp/warp.h"
 
+#include "warp/check.h"
 #include "warp/pool.h"
 #include "warp/trace.h"
 #include "warp/tree.h"
 
 #include <math.h>
-#include <stdarg.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-#define RIGID_SLACK 1e-3f /* of products of the camera's axes: what comes as floats is rounded */
-#define PLACE_MAX 1e9f    /* metres */
-#define LENGTH_MIN 1e-9f  /* metres */
-#define FOV_MAX 3.0f      /* radians */
-#define W_MAX 1e9f
 
 struct fl_warp {
     struct warp_pool *pool;
@@ -27,109 +20,23 @@ struct fl_warp {
     uint64_t build_ns;
 };
 
-/* ---- errors ---- */
-
-static bool fail(struct fl_warp_error *error, enum fl_warp_error_code code, const char *field, const char *format,
-                 ...) __attribute__((format(printf, 4, 5)));
-
-static bool fail(struct fl_warp_error *error, enum fl_warp_error_code code, const char *field, const char *format,
-                 ...)
-{
-    if (!error)
-        return false;
-    va_list arguments;
-    va_start(arguments, format);
-    error->code = code;
-    snprintf(error->field, sizeof(error->field), "%s", field);
-    vsnprintf(error->text, sizeof(error->text), format, arguments);
-    va_end(arguments);
-    return false;
-}
-
-/* ---- checks ---- */
-
-static bool check_size(uint32_t width, uint32_t height, struct fl_warp_error *error)
-{
-    if (width >= 1 && height >= 1 && width <= FL_WARP_SIDE_MAX && height <= FL_WARP_SIDE_MAX)
-        return true;
-    return fail(error, FL_WARP_ERROR_ARGUMENT, "size", "%ux%u is not between 1x1 and %ux%u", width, height,
-                FL_WARP_SIDE_MAX, FL_WARP_SIDE_MAX);
-}
-
-static bool check_number(float value, float least, float greatest, const char *field, struct fl_warp_error *error)
-{
-    if (value >= least && value <= greatest)
-        return true;
-    return fail(error, FL_WARP_ERROR_ARGUMENT, field, "%g is not between %g and %g", (double)value, (double)least,
-                (double)greatest);
-}
-
-static bool check_camera(const struct fl_warp_camera *camera, struct fl_warp_error *error)
-{
-    const float *m = camera->world_from_view;
-    for (int i = 0; i < 12; i++)
-        if (!check_number(m[i], -PLACE_MAX, PLACE_MAX, "camera.world_from_view", error))
-            return false;
-    for (int a = 0; a < 3; a++)
-        for (int b = a; b < 3; b++) {
-            const float product = m[a] * m[b] + m[4 + a] * m[4 + b] + m[8 + a] * m[8 + b];
-            if (!(fabsf(product - (a == b ? 1.0f : 0.0f)) <= RIGID_SLACK))
-                return fail(
-                    error, FL_WARP_ERROR_ARGUMENT, "camera.world_from_view",
-                    "axes %d and %d have the product %g; a rigid camera has axes of length 1 at right angles", a,
-                    b, (double)product);
-        }
-    return check_number(camera->fov_y, 1e-3f, FOV_MAX, "camera.fov_y", error);
-}
-
-static bool check_w(const float *w, size_t count, uint32_t width, struct fl_warp_error *error)
-{
-    uint32_t wrong = 0;
-    for (size_t i = 0; i < count; i++)
-        wrong |= !(w[i] >= 0 && w[i] <= W_MAX);
-    for (size_t i = 0; wrong && i < count; i++)
-        if (!(w[i] >= 0 && w[i] <= W_MAX))
-            return fail(error, FL_WARP_ERROR_ARGUMENT, "w", "%g at column %zu of row %zu is not between 0 and %g",
-                        (double)w[i], i % width, i / width, (double)W_MAX);
-    return true;
-}
-
-static bool check_key(const struct fl_warp_key *key, struct fl_warp_error *error)
-{
-    if (!check_size(key->width, key->height, error) || !check_camera(&key->camera, error) ||
-        (key->unit != 0 && !check_number(key->unit, LENGTH_MIN, PLACE_MAX, "unit", error)) ||
-        !check_number(key->w_error, 0, W_MAX, "w_error", error) ||
-        !check_number(key->radius, LENGTH_MIN, PLACE_MAX, "radius", error) ||
-        !check_number(key->pixels, 1e-3f, (float)FL_WARP_SIDE_MAX, "pixels", error))
-        return false;
-    if (key->layer_count < 1 || key->layer_count > FL_WARP_LAYERS_MAX)
-        return fail(error, FL_WARP_ERROR_ARGUMENT, "layer_count", "%u is not between 1 and %u", key->layer_count,
-                    FL_WARP_LAYERS_MAX);
-    for (uint32_t l = 0; l < key->layer_count; l++) {
-        if (!key->layers[l].colours || !key->layers[l].w)
-            return fail(error, FL_WARP_ERROR_ARGUMENT, "layers", "layer %u has no colours, or no depths", l);
-        if (!check_w(key->layers[l].w, (size_t)key->width * key->height, key->width, error))
-            return false;
-    }
-    return true;
-}
-
 /* ---- contexts ---- */
 
 struct fl_warp *fl_warp_create(unsigned threads, struct fl_warp_error *error)
 {
     if (threads < 1 || threads > FL_WARP_THREADS_MAX) {
-        fail(error, FL_WARP_ERROR_ARGUMENT, "threads", "%u is not between 1 and %u", threads, FL_WARP_THREADS_MAX);
+        warp_error_set(error, FL_WARP_ERROR_ARGUMENT, "threads", "%u is not between 1 and %u", threads,
+                       FL_WARP_THREADS_MAX);
         return NULL;
     }
     struct fl_warp *warp = calloc(1, sizeof(*warp));
     if (!warp) {
-        fail(error, FL_WARP_ERROR_MEMORY, "threads", "there is no memory for a context");
+        warp_error_set(error, FL_WARP_ERROR_MEMORY, "threads", "there is no memory for a context");
         return NULL;
     }
     warp->pool = warp_pool_create(threads);
     if (!warp->pool) {
-        fail(error, FL_WARP_ERROR_SYSTEM, "threads", "%u threads cannot be started", threads);
+        warp_error_set(error, FL_WARP_ERROR_SYSTEM, "threads", "%u threads cannot be started", threads);
         fl_warp_destroy(warp);
         return NULL;
     }
@@ -203,8 +110,11 @@ static bool have_layers(struct fl_warp *warp, const struct fl_warp_key *key, str
         scratch = calloc(warp_pool_threads(warp->pool) * warp_layer_scratch(&layers[0]), sizeof(*scratch));
     if (!done || !scratch) {
         forget_layers(layers, 0);
-        return fail(error, FL_WARP_ERROR_MEMORY, "size", "there is no memory for %u layers of %ux%u texels",
-                    key->layer_count, key->width, key->height);
+        if (!fits)
+            free(scratch);
+        return warp_error_set(error, FL_WARP_ERROR_MEMORY, "size",
+                              "there is no memory for %u layers of %ux%u texels", key->layer_count, key->width,
+                              key->height);
     }
     if (!fits) {
         forget_layers(warp->layers, 0);
@@ -220,7 +130,7 @@ static bool have_layers(struct fl_warp *warp, const struct fl_warp_key *key, str
 
 bool fl_warp_set_key(struct fl_warp *warp, const struct fl_warp_key *key, struct fl_warp_error *error)
 {
-    if (!check_key(key, error) || !have_layers(warp, key, error))
+    if (!warp_check_key(key, error) || !have_layers(warp, key, error))
         return false;
     const float focal = focal_of(&key->camera, key->height);
     const struct warp_rectangle all = {0, 0, key->width, key->height};
@@ -243,17 +153,12 @@ bool fl_warp_set_key(struct fl_warp *warp, const struct fl_warp_key *key, struct
 bool fl_warp_update(struct fl_warp *warp, const struct fl_warp_part *part, struct fl_warp_error *error)
 {
     if (warp->layer_count == 0)
-        return fail(error, FL_WARP_ERROR_ARGUMENT, "part", "there is no key view; set one first");
+        return warp_error_set(error, FL_WARP_ERROR_ARGUMENT, "part", "there is no key view; set one first");
     if (part->layer >= warp->layer_count)
-        return fail(error, FL_WARP_ERROR_ARGUMENT, "layer", "%u is not below %u", part->layer, warp->layer_count);
+        return warp_error_set(error, FL_WARP_ERROR_ARGUMENT, "layer", "%u is not below %u", part->layer,
+                              warp->layer_count);
     struct warp_layer *layer = &warp->layers[part->layer];
-    if (part->width < 1 || part->height < 1 || part->x >= layer->width || part->y >= layer->height ||
-        part->width > layer->width - part->x || part->height > layer->height - part->y)
-        return fail(error, FL_WARP_ERROR_ARGUMENT, "part", "%ux%u texels at %u, %u are not some of %ux%u",
-                    part->width, part->height, part->x, part->y, layer->width, layer->height);
-    if (!part->texels.colours || !part->texels.w)
-        return fail(error, FL_WARP_ERROR_ARGUMENT, "texels", "the part has no colours, or no depths");
-    if (!check_w(part->texels.w, (size_t)part->width * part->height, part->width, error))
+    if (!warp_check_part(part, layer->width, layer->height, error))
         return false;
     const struct warp_rectangle texels = {part->x, part->y, part->x + part->width, part->y + part->height};
     copy_texels(layer, &part->texels, &texels);
@@ -367,15 +272,9 @@ bool fl_warp_make(struct fl_warp *warp, const struct fl_warp_view *view, struct 
                   struct fl_warp_error *error)
 {
     if (warp->layer_count == 0)
-        return fail(error, FL_WARP_ERROR_ARGUMENT, "view", "there is no key view; set one first");
-    if (!check_size(view->width, view->height, error) || !check_camera(&view->camera, error))
+        return warp_error_set(error, FL_WARP_ERROR_ARGUMENT, "view", "there is no key view; set one first");
+    if (!warp_check_view(view, picture, error))
         return false;
-    if (view->quality > FL_WARP_ITERATIVE)
-        return fail(error, FL_WARP_ERROR_ARGUMENT, "quality", "%d is none", (int)view->quality);
-    if (view->holes > FL_WARP_PATTERN)
-        return fail(error, FL_WARP_ERROR_ARGUMENT, "holes", "%d is no way to show them", (int)view->holes);
-    if (!picture->colours || !picture->mask)
-        return fail(error, FL_WARP_ERROR_ARGUMENT, "picture", "it has no colours, or no mask");
     struct view_work work = {.task = {.layers = warp->layers,
                                       .layer_count = warp->layer_count,
                                       .rays = rays_of(warp, view),

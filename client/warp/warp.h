@@ -13,9 +13,9 @@
  * [j, j + 1), its value is that at its centre, row 0 is the top. w is 0 where nothing is there: in the first layer
  * that is the environment, infinitely far away; in the others nothing is known there.
  *
- * What may be off: from an eye within the radius of the key view's each point lies within `pixels` (texels of the
- * key view) of where the w that was given puts it; and within unit * w_error more of where it truly is, for w in
- * 1 / metre (struct fl_warp_counts says the sum).
+ * What may be off: from an eye within the radius of the key view's, each point is seen within `pixels` of where
+ * the w that was given puts it. Where w was rounded, a point truly lies up to f * radius * w_error / unit further
+ * off, f being the focal length in texels; struct fl_warp_counts says the sum.
  *
  * Everything that is given may come from a stranger: it is checked where it comes in, completely, and what is
  * wrong ends in an error that names it. A refused call changes nothing. A context belongs to one thread at a time;
@@ -31,6 +31,7 @@
 
 #define FL_WARP_LAYERS_MAX 3u
 #define FL_WARP_SIDE_MAX 8192u /* texels or pixels along a side: their coordinates keep 1 / 1024 as floats */
+#define FL_WARP_TEXELS_MAX (1u << 24) /* of a layer, which takes some 25 bytes for each */
 #define FL_WARP_THREADS_MAX 64u
 
 enum fl_warp_error_code {

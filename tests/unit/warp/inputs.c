@@ -97,9 +97,13 @@ TEST(a_key_view_that_cannot_be_is_refused_and_the_old_one_stays)
             }
         }
     }
-    static const uint32_t sizes[][2] = {
-        {0, 1}, {1, 0}, {FL_WARP_SIDE_MAX + 1, 1}, {1, FL_WARP_SIDE_MAX + 1}, {0x10000, 0x10000}};
-    for (int i = 0; i < 5; i++) {
+    static const uint32_t sizes[][2] = {{0, 1},
+                                        {1, 0},
+                                        {FL_WARP_SIDE_MAX + 1, 1},
+                                        {1, FL_WARP_SIDE_MAX + 1},
+                                        {0x10000, 0x10000},
+                                        {FL_WARP_SIDE_MAX, FL_WARP_TEXELS_MAX / FL_WARP_SIDE_MAX + 1}};
+    for (size_t i = 0; i < sizeof(sizes) / sizeof(sizes[0]); i++) {
         struct fl_warp_key key = good;
         key.width = sizes[i][0];
         key.height = sizes[i][1];
