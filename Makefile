@@ -80,6 +80,7 @@ ifneq ($(EMBREE),1)
 SERVER_SRC := $(filter-out server/trace/reference/%,$(SERVER_SRC))
 endif
 LIB_SRC := $(call sources,client/lib,c)
+WARP_SRC := $(call sources,client/warp,c)
 CLI_SRC := $(call sources,client/cli,c)
 IMPORT_C := $(call sources,client/import,c)
 # Modules of the helper programs need hundreds of libraries, and are loaded only when they are used.
@@ -113,7 +114,8 @@ SEALED_OBJ := $(call obj,$(SEALED_SRC))
 PIXELS_OBJ := $(call obj,$(PIXELS_SRC))
 COMMON_OBJ := $(call obj,$(COMMON_SRC))
 SERVER_OBJ := $(call obj,$(SERVER_SRC)) $(B)/shader_sources.o $(SEALED_OBJ) $(PIXELS_OBJ) $(COMMON_OBJ)
-LIB_OBJ := $(call obj,$(LIB_SRC)) $(SEALED_OBJ) $(PIXELS_OBJ) $(COMMON_OBJ)
+WARP_OBJ := $(call obj,$(WARP_SRC))
+LIB_OBJ := $(call obj,$(LIB_SRC)) $(WARP_OBJ) $(SEALED_OBJ) $(PIXELS_OBJ) $(COMMON_OBJ)
 CLI_OBJ := $(call obj,$(CLI_SRC))
 # What the helper programs share is linked to each of them, as an archive: each takes what it needs.
 HELPER_OBJ := $(call obj,$(call sources,client/helper,c))
@@ -127,7 +129,7 @@ VIEWER_OBJ := $(call obj,$(VIEWER_C) $(addprefix client/cli/,image_path.c interr
 
 # The library for others' programs: position-independent, only what farlight.h declares is visible.
 SONAME := libfarlight.so.$(firstword $(subst ., ,$(VERSION)))
-LIB_PIC := $(patsubst %.c,$(B)/pic/%.o,$(LIB_SRC) $(PROTOCOL_SRC) $(SEALED_SRC) $(PIXELS_SRC) $(COMMON_SRC))
+LIB_PIC := $(patsubst %.c,$(B)/pic/%.o,$(LIB_SRC) $(WARP_SRC) $(PROTOCOL_SRC) $(SEALED_SRC) $(PIXELS_SRC) $(COMMON_SRC))
 
 MODULES := $(B)/farlight-textures.so $(B)/farlight-images.so
 PROGRAMS := $(B)/farlightd $(B)/farlight $(B)/farlight-import $(B)/farlight-export $(B)/farlight-video $(B)/farlight-view
@@ -146,6 +148,10 @@ $(EMBREE_STAMP):
 $(B)/server/trace/tracer.o: $(EMBREE_STAMP)
 $(B)/shader_sources.o: INCLUDES = -Iserver
 $(B)/client/%.o: INCLUDES = -Iclient $(CLIENT_CFLAGS)
+# Loops over lanes (client/warp/lanes.h) become vector instructions with -O3; with -O2 a view takes several times as long.
+# Without contraction all processors have the same results. clang says which loops it leaves as they are.
+$(B)/client/warp/%.o $(B)/pic/client/warp/%.o: CPPFLAGS_ALL += -Ishaders
+$(B)/client/warp/%.o $(B)/pic/client/warp/%.o: CFLAGS_ALL += -fopenmp-simd -ffp-contract=off -Wno-pass-failed $(if $(filter release,$(config)),-O3 -DLANES_CLONES)
 $(B)/client/import/%.opp $(B)/client/import/%.o $(B)/pic/client/import/%.opp: INCLUDES = -Iclient $(IMPORT_CFLAGS)
 $(B)/client/output/%.opp $(B)/client/output/%.o $(B)/pic/client/output/%.opp: INCLUDES = -Iclient $(EXPORT_CFLAGS)
 $(B)/client/video/%.o: INCLUDES = -Iclient $(VIDEO_CFLAGS)
@@ -170,7 +176,8 @@ $(B)/%.opp: %.cpp
 $(B)/pic/%.opp: %.cpp
 	@mkdir -p $(@D)
 	$(call say,CXX)$(CXX) $(CPPFLAGS_ALL) $(INCLUDES) $(OPT) $(CXXFLAGS_ALL) -fPIC $(WARN) $(CPPFLAGS) $(CXXFLAGS) -c $< -o $@
-$(B)/pic/protocol/%.o: VISIBILITY = -fvisibility=default
+# The library's map of symbols chooses among them.
+$(B)/pic/protocol/%.o $(B)/pic/client/warp/%.o: VISIBILITY = -fvisibility=default
 $(B)/pic/%.o: %.c
 	@mkdir -p $(@D)
 	$(call say,CC)$(CC) $(CPPFLAGS_ALL) -Iclient $(CLIENT_CFLAGS) $(OPT) $(CFLAGS_ALL) -fPIC $(VISIBILITY) $(WARN_C) $(CPPFLAGS) $(CFLAGS) -c $< -o $@
@@ -279,7 +286,7 @@ $(B)/tests/unit/fault_tests: TEST_LIBS += $(SERVING_WRAP) -Wl,--wrap=malloc,--wr
 $(B)/tests/unit/corpus_tests: $(KEPT_OBJ) $(SERVING_OBJ) $(READERS_OBJ)
 $(B)/tests/unit/corpus_tests: TEST_LIBS += $(SERVING_WRAP) $(READERS_LIBS) -lstdc++
 # What the daemon encodes is decoded by the library itself.
-$(B)/tests/unit/media_tests: $(patsubst %,$(B)/client/viewer/%.o,camera decode heat hud input metrics paint panel pixmap replay settings tour window)
+$(B)/tests/unit/media_tests: $(patsubst %,$(B)/client/viewer/%.o,camera decode heat hud input metrics paint panel pixmap plan replay settings tour views window)
 $(B)/tests/unit/media_tests: TEST_LIBS += $(VIEWER_LIBS) -Wl,--wrap=libav_load
 $(B)/tests/unit/unit_tests: TEST_LIBS += $(call pkg_libs,libseccomp)
 $(B)/tests/unit/unit_tests: $(B)/client/helper/sandbox.o $(addprefix $(B)/client/import/,closed.o spline.o) $(MODEL_OBJ) $(RIVAL_OBJ) $(if $(filter 1,$(EMBREE)),$(CONTEST_OBJ))
@@ -408,7 +415,7 @@ check:
 	@$(MAKE) -j$(JOBS) $(B)/tests/unit/unit_tests
 	@python3 tests/tools/run_tests.py $(B) $(PURE_TESTS)
 # Tests that need no GPU, no daemon and no file outside the checkout.
-PURE_TESTS := /base/ /net/ /protocol/ /scene/ /client/catalogue /client/frames /client/json /client/keys /client/text /client/y4m \
+PURE_TESTS := /base/ /net/ /protocol/ /scene/ /client/catalogue /client/frames /client/json /client/keys /client/text /client/y4m /warp/ \
     /engine/camera_path /engine/scheduler /render/sequence /session/config /session/edits /session/limits /session/pacing
 # How each source is compiled, for editors and clang's tools; from our own rules.
 .PHONY: compile_commands.json
@@ -437,13 +444,15 @@ install: all
 	    $(DESTDIR)$(PREFIX)/share/doc/farlight/examples $(DESTDIR)/etc/farlight \
 	    $(DESTDIR)$(PREFIX)/lib/systemd/system $(DESTDIR)$(PREFIX)/lib/sysusers.d
 	install -d $(DESTDIR)$(PREFIX)/lib/pkgconfig $(DESTDIR)$(PREFIX)/include/farlight/lib \
-	    $(DESTDIR)$(PREFIX)/include/farlight/protocol $(DESTDIR)$(PREFIX)/share/bash-completion/completions
+	    $(DESTDIR)$(PREFIX)/include/farlight/protocol $(DESTDIR)$(PREFIX)/include/farlight/warp \
+	    $(DESTDIR)$(PREFIX)/share/bash-completion/completions
 	install -m 755 $(PROGRAMS) $(DESTDIR)$(PREFIX)/bin
 	install -d $(DESTDIR)$(PREFIX)/lib/farlight
 	install -m 644 $(MODULES) $(DESTDIR)$(PREFIX)/lib/farlight
 	install -m 755 $(B)/$(SONAME) $(DESTDIR)$(PREFIX)/lib
 	ln -sf $(SONAME) $(DESTDIR)$(PREFIX)/lib/libfarlight.so
 	install -m 644 client/lib/farlight.h $(DESTDIR)$(PREFIX)/include/farlight/lib
+	install -m 644 client/warp/warp.h $(DESTDIR)$(PREFIX)/include/farlight/warp
 	install -m 644 $(addprefix protocol/,messages.h messages.def tracers.h tracers.def words.h words.def) $(DESTDIR)$(PREFIX)/include/farlight/protocol
 	sed 's#@PREFIX@#$(PREFIX)#; s#@VERSION@#$(VERSION)#' conf/farlight.pc.in \
 	    >$(DESTDIR)$(PREFIX)/lib/pkgconfig/farlight.pc
@@ -527,6 +536,8 @@ $(B)/tests/fuzz/fuzz_session: $(SERVING_OBJ) $(SERVER_OBJ)
 $(B)/tests/fuzz/fuzz_session: FUZZ_LIBS = $(SERVER_LIBS) $(SERVING_WRAP)
 $(B)/tests/fuzz/fuzz_frame: $(LIB_OBJ)
 $(B)/tests/fuzz/fuzz_frame: FUZZ_LIBS = $(call pkg_libs,$(CLIENT_PKGS)) -lm
+$(B)/tests/fuzz/fuzz_warp: $(WARP_OBJ)
+$(B)/tests/fuzz/fuzz_warp: FUZZ_LIBS = -lm
 $(addprefix $(B)/tests/fuzz/fuzz_,aff gltf nff obj): $(READERS_OBJ)
 $(addprefix $(B)/tests/fuzz/fuzz_,aff gltf nff obj): FUZZ_LIBS = $(READERS_LIBS)
 # OpenImageIO loses memory with broken images; the importer lives for one model only.

@@ -25,7 +25,9 @@ _farlight()
         --format) words="png jpeg exr hdr mp4 mkv y4m" ;;
         --metadata) words="stable full" ;;
         --stereo-layout) words="side over files" ;;
-        --views | --lens) words="rays quadtree" ;;
+        --views) [ "$subcommand" = view ] && words="off auto on" || words="rays quadtree" ;;
+        --lens | --eyes) words="rays quadtree" ;;
+        --holes) words="fill pattern" ;;
         --layout) words="heat side" ;;
         --fail-above) words="psnr= mean= rms= max= beyond= ssim= butteraugli= visible= nonfinite= agree=" ;;
         --*) words=$("$program" complete "$before" 2>/dev/null) ;;

@@ -408,7 +408,7 @@ const struct argp *cli_view_argp(void)
     static const char *const left_out[] = {"output",      "format",   "half",       "float",   "samples",
                                            "integrator",  "timings",  "trace-file", "layers",  "clip-once",
                                            "clip-start",  "encoding", "retry-for",  "retries", "metadata",
-                                           "light-field", "baseline", NULL};
+                                           "light-field", "baseline", "views",      NULL};
     static struct argp_option kept[OPTIONS_MAX];
     static const struct argp argp = {.options = kept, .parser = parse};
     keep(kept, left_out);

@@ -82,7 +82,7 @@ error_t cli_views_set(struct cli_job *job, const char *option, const char *value
         views->has_baseline = true;
         return set_distance(job, option, value, &views->baseline_m);
     }
-    if (strcmp(name, "views") == 0) {
+    if (strcmp(name, "views") == 0 || strcmp(name, "eyes") == 0) { /* the latter of the viewer */
         views->has_views = true;
         return set_source(job, option, value, &views->views);
     }

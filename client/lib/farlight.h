@@ -35,6 +35,8 @@
 extern "C" {
 #endif
 
+#include "warp/warp.h" /* views that a client makes */
+
 #define FL_API __attribute__((visibility("default")))
 
 /* ---- errors -------------------------------------------------------------------------------------- */
@@ -315,6 +317,7 @@ struct fl_frame {
     uint64_t primary_rays, shadow_rays, secondary_rays, splits, uploaded_bytes, structure_bytes;
     uint32_t device_waits;          /* how often the daemon has waited for the device */
     uint64_t wire_bytes;            /* of the encoded pixels and what is attached */
+    uint64_t depth_bytes;           /* the depths' share of it */
     uint64_t receive_ns, decode_ns; /* first byte to last; decoding and checking */
     uint64_t wait_ns;               /* how long fl_render_next waited for it */
     size_t stage_count;
@@ -413,6 +416,11 @@ FL_API struct fl_frame *fl_view_next(struct fl_view *view, unsigned timeout_ms, 
 /* Reports that the caller could not decode a frame: the next one will be a key frame. */
 FL_API bool fl_view_want_key_frame(struct fl_view *view, struct fl_error *error);
 FL_API void fl_view_destroy(struct fl_view *view);
+/* Views that the caller makes from a frame: `fl_warp_*` of warp/warp.h, with no connection, window or GL. Ask for
+ * FL_ATTACH_DEPTH, and for depth_form inverse, with depth_pixels and depth_radius for a bound, and a margin. Then
+ * the key view has the frame's width, height and camera (world_from_view, fov_y), its pixels in RGBA8 as colours,
+ * and w = unit / depth (0 where depth is 0) with w_error = unit * depth_step / 2. */
+
 /* For the caller's own poll(): readable when something may have arrived. The connection keeps it. */
 FL_API int fl_connection_fd(const struct fl_connection *connection);
 

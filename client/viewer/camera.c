@@ -202,3 +202,15 @@ void camera_export(const struct viewer_camera *camera, struct fl_view_camera *ou
     }
     out->fov_y = (float)camera->fov_y;
 }
+
+void camera_pose(const struct viewer_camera *camera, float world_from_view[12])
+{
+    double right[3], above[3], into[3];
+    axes(camera, right, above, into);
+    for (int i = 0; i < 3; i++) {
+        world_from_view[i * 4] = (float)right[i];
+        world_from_view[i * 4 + 1] = (float)above[i];
+        world_from_view[i * 4 + 2] = (float)-into[i];
+        world_from_view[i * 4 + 3] = (float)camera->eye[i];
+    }
+}

@@ -36,6 +36,8 @@ void camera_from_frame(struct viewer_camera *camera, const struct fl_frame *fram
 /* Interpolates between two cameras, share 0 to 1, easing in and out. */
 void camera_between(const struct viewer_camera *from, const struct viewer_camera *to, double share,
                     struct viewer_camera *camera);
+/* Rows of the matrix from the view's space (along -z, y upwards) to the world's. */
+void camera_pose(const struct viewer_camera *camera, float world_from_view[12]);
 void camera_export(const struct viewer_camera *camera, struct fl_view_camera *out); /* time and moving stay */
 
 #endif

@@ -178,7 +178,7 @@ static struct corner draw_scene(struct layout *layout)
     if (settings->stereo) {
         snprintf(rows[count].value, HUD_TEXT_MAX, "%.4g mm apart, %s", state->stereo_m * 1e3,
                  settings->views == PROTOCOL_VIEW_SOURCE_RAYS ? "rendered" : "from layers");
-        rows[count++].name = "views";
+        rows[count++].name = "eyes";
     }
     if (state->camera[0] != '\0') {
         snprintf(rows[count].value, HUD_TEXT_MAX, "%s", state->camera);
@@ -229,14 +229,50 @@ static void print_amount(double amount, const char *unit, char *out, size_t byte
     snprintf(out, bytes, amount < 9.95 && factor > 0 ? "%.1f %s%s" : "%.0f %s%s", amount, factors[factor], unit);
 }
 
+/* Its bytes by part, and how the picture was encoded. */
+static void print_frame(const struct hud_state *state, char out[HUD_TEXT_MAX])
+{
+    char amount[40], depth[40];
+    print_amount((double)(state->wire_bytes - state->local.depth_bytes), "B", amount, sizeof(amount));
+    print_amount((double)state->local.depth_bytes, "B", depth, sizeof(depth));
+    int length = snprintf(out, HUD_TEXT_MAX, "%s, %s", amount, protocol_encoding_text(state->encoding));
+    if (state->quality > 0)
+        length += snprintf(out + length, HUD_TEXT_MAX - (size_t)length, " %u", state->quality);
+    if (state->local.depth_bytes > 0)
+        snprintf(out + length, HUD_TEXT_MAX - (size_t)length, "; depth %s", depth);
+}
+
+#define LOCAL_ROWS 3u
+
+/* What is made here: how many rows. */
+static size_t print_local(const struct hud_state *state, const struct metrics_summary *summary, struct row *rows)
+{
+    const struct hud_local *local = &state->local;
+    if (!local->on)
+        return 0;
+    rows[0].name = "views made here";
+    snprintf(rows[0].value, HUD_TEXT_MAX, "none: the newest picture");
+    if (!local->shown)
+        return 1;
+    snprintf(rows[0].value, HUD_TEXT_MAX, "%.0f a second, %.1f ms%s", summary->views_per_second,
+             summary->view_latency_s * 1e3, local->quality == FL_WARP_TREE ? "" : ", iterative");
+    rows[1].name = "from a picture";
+    const bool has_bound = local->bound_pixels < 1e3;
+    const int length = snprintf(rows[1].value, HUD_TEXT_MAX, "%.2f s old, ", local->age_s);
+    snprintf(rows[1].value + length, HUD_TEXT_MAX - (size_t)length, has_bound ? "off by %.2g pixels" : "no bound",
+             local->bound_pixels);
+    rows[2].name = "not seen yet";
+    snprintf(rows[2].value, HUD_TEXT_MAX, "%.1f %%", local->unseen * 100);
+    return LOCAL_ROWS;
+}
+
 /* Its bottom; not drawn where it does not fit beside `left`. */
 static double draw_figures(struct layout *layout, double left)
 {
     const struct hud_state *state = layout->state;
     const double s = layout->scale, line = LINE * s, inner = PADDING * s;
     struct metrics_summary summary;
-    struct row rows[6];
-    char amount[40];
+    struct row rows[6 + LOCAL_ROWS];
     size_t count = 0;
     metrics_summarise(state->metrics, state->now_ns, &summary);
     snprintf(rows[count].value, HUD_TEXT_MAX, "%.0f", summary.frames_per_second);
@@ -248,13 +284,9 @@ static double draw_figures(struct layout *layout, double left)
     rows[count++].name = "input to picture";
     print_amount(summary.bits_per_second, "bit/s", rows[count].value, HUD_TEXT_MAX);
     rows[count++].name = "bandwidth";
-    print_amount((double)state->wire_bytes, "B", amount, sizeof(amount));
-    if (state->quality > 0)
-        snprintf(rows[count].value, HUD_TEXT_MAX, "%s, %s %u", amount, protocol_encoding_text(state->encoding),
-                 state->quality);
-    else
-        snprintf(rows[count].value, HUD_TEXT_MAX, "%s, %s", amount, protocol_encoding_text(state->encoding));
+    print_frame(state, rows[count].value);
     rows[count++].name = "frame";
+    count += print_local(state, &summary, rows + count);
     snprintf(rows[count].value, HUD_TEXT_MAX, "%ux%u", state->picture_width, state->picture_height);
     rows[count++].name = "size";
     snprintf(rows[count].value, HUD_TEXT_MAX, "%llu", (unsigned long long)state->revision);

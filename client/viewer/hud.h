@@ -36,6 +36,16 @@ struct hud {
 
 enum hud_status { HUD_LOADING, HUD_LIVE, HUD_LOST };
 
+/* Views that are made here. */
+struct hud_local {
+    bool on, shown; /* they are made; one is what is seen */
+    double age_s;   /* of the picture that it was made from */
+    double bound_pixels, unseen;
+    double view_s;        /* that it took */
+    uint64_t depth_bytes; /* of the last frame's bytes */
+    enum fl_warp_quality quality;
+};
+
 /* What it tells of. */
 struct hud_state {
     double width, height, scale; /* of the window, pixels; pixels of it in one of the desktop's */
@@ -57,6 +67,7 @@ struct hud_state {
     const char *structure[HUD_STRUCTURE_MAX]; /* what its tracer says of its parts; NULL: no more */
     enum protocol_encoding encoding;
     unsigned quality;
+    struct hud_local local;
     enum { HUD_HEAT_NONE, HUD_HEAT_WAITING, HUD_HEAT_SHOWN } heat;
     struct heat_figures heat_figures;
     double heat_top;

@@ -38,6 +38,7 @@ const struct binding input_bindings[] = {
     {"M", "m", ACTION_NEXT_TONE_MAP, ACTION_NEXT_TONE_MAP, "next tone map"},
     {"- =", "-", ACTION_COARSER, ACTION_COARSER, "fewer, more pixels"},
     {NULL, "=", ACTION_FINER, ACTION_FINER, NULL},
+    {"L, Shift+L", "l", ACTION_LOCAL, ACTION_HOLES, "views made here: off, auto, on; mark holes"},
     {"X", "x", ACTION_ERROR_MAP, ACTION_ERROR_MAP, "errors against the reference, as heat"},
     {"O", "o", ACTION_OVERLAY, ACTION_OVERLAY, "figures and timeline, figures alone, nothing"},
     {"F1", "f1", ACTION_HELP, ACTION_HELP, "this list"},

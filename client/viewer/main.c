@@ -29,7 +29,10 @@ enum key {
     KEY_SCALE,
     KEY_ADAPT,
     KEY_NO_ADAPT,
-    KEY_WEIGHT
+    KEY_WEIGHT,
+    KEY_EYES,
+    KEY_VIEWS,
+    KEY_HOLES
 };
 
 static const struct argp_option options[] = {
@@ -56,6 +59,14 @@ static const struct argp_option options[] = {
     {"no-adapt", KEY_NO_ADAPT, NULL, 0, "Keep quality and size; a slow link gets fewer frames", -2},
     {"weight", KEY_WEIGHT, "N", 0,
      "Set this client's share of the device relative to others, 1 to 16 (default: the daemon's)", -2},
+    {"eyes", KEY_EYES, "rays|quadtree", 0,
+     "Render both eyes of --stereo, or make them on the daemon from depth layers (default)", -2},
+    {"views", KEY_VIEWS, "off|auto|on", 0,
+     "Make views here while the camera moves, from the newest picture and its depths, at the display's rate "
+     "(auto, the default: where the daemon and the link take longer than a frame of the display)",
+     -2},
+    {"holes", KEY_HOLES, "fill|pattern", 0,
+     "Fill what no picture shows yet from what lies around it (default), or mark it", -2},
     {"replay", KEY_REPLAY, "INPUT.json", 0, "Read timed input events from this file; exit after the last", -2},
     {"headless", KEY_HEADLESS, NULL, 0, "Open no window; needs --replay", -2},
     {0}};
@@ -111,6 +122,35 @@ static error_t set_still_encoding(struct command_line *line, const char *value)
     return cli_usage(&line->job, "--still-encoding", "'%s' is not raw, predicted, zstd or jpeg", value);
 }
 
+/* *choice: the index of the name. */
+static error_t set_choice(struct command_line *line, const char *option, const char *const names[],
+                          const char *value, int *choice)
+{
+    for (int i = 0; names[i]; i++)
+        if (strcmp(value, names[i]) == 0) {
+            *choice = i;
+            return 0;
+        }
+    return cli_usage(&line->job, option, "'%s' is none of its values, see --help", value);
+}
+
+static error_t set_views(struct command_line *line, const char *value)
+{
+    int choice = LOCAL_AUTO;
+    const error_t status = set_choice(line, "--views", local_views_names, value, &choice);
+    line->viewer.local = (enum local_views)choice;
+    return status;
+}
+
+static error_t set_holes(struct command_line *line, const char *value)
+{
+    static const char *const names[] = {"fill", "pattern", NULL}; /* enum fl_warp_holes */
+    int choice = FL_WARP_FILL;
+    const error_t status = set_choice(line, "--holes", names, value, &choice);
+    line->viewer.holes = (enum fl_warp_holes)choice;
+    return status;
+}
+
 static error_t set_integrator(struct command_line *line, const char *value)
 {
     line->job.has_integrator = true;
@@ -143,6 +183,7 @@ static error_t parse(int key, char *value, struct argp_state *state)
     switch (key) {
     case ARGP_KEY_INIT:
         state->child_inputs[0] = &line->job;
+        viewer->local = LOCAL_AUTO;
         return 0;
     case ARGP_KEY_ARG:
         return set_model(line, value);
@@ -177,6 +218,12 @@ static error_t parse(int key, char *value, struct argp_state *state)
         return set_encoding(line, value);
     case KEY_STILL_ENCODING:
         return set_still_encoding(line, value);
+    case KEY_EYES:
+        return cli_views_set(&line->job, "--eyes", value);
+    case KEY_VIEWS:
+        return set_views(line, value);
+    case KEY_HOLES:
+        return set_holes(line, value);
     default:
         return ARGP_ERR_UNKNOWN;
     }

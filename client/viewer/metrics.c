@@ -4,6 +4,7 @@
 #include <stdlib.h>
 
 #define SECOND_NS 1000000000ull
+#define ROUNDS_MAX 7u /* what holds for the next picture: few enough to be of now */
 
 const char *const lane_names[LANE_COUNT] = {"input",   "scene",  "primary", "trace",  "shade",
                                             "resolve", "encode", "receive", "decode", "show"};
@@ -86,6 +87,14 @@ void metrics_add(struct metrics *metrics, const struct fl_frame *frame, uint64_t
     metrics->unshown += metrics->unshown < METRICS_FRAMES;
 }
 
+void metrics_add_view(struct metrics *metrics, uint64_t moved_ns, uint64_t made_ns)
+{
+    metrics->views[metrics->next_view] = (struct metrics_view){.moved_ns = moved_ns, .shown_ns = made_ns};
+    metrics->next_view = (metrics->next_view + 1) % METRICS_VIEWS;
+    metrics->view_count += metrics->view_count < METRICS_VIEWS;
+    metrics->unshown_views += metrics->unshown_views < METRICS_VIEWS;
+}
+
 void metrics_show(struct metrics *metrics, uint64_t shown_ns)
 {
     for (; metrics->unshown > 0; metrics->unshown--) {
@@ -94,6 +103,9 @@ void metrics_show(struct metrics *metrics, uint64_t shown_ns)
         frame->spans[LANE_SHOW] = (struct span){(int64_t)frame->shown_ns, (int64_t)shown_ns};
         frame->shown_ns = shown_ns;
     }
+    for (; metrics->unshown_views > 0; metrics->unshown_views--)
+        metrics->views[(metrics->next_view + METRICS_VIEWS - metrics->unshown_views) % METRICS_VIEWS].shown_ns =
+            shown_ns;
 }
 
 const struct metrics_frame *metrics_frame(const struct metrics *metrics, size_t back)
@@ -136,6 +148,38 @@ static int by_value(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
+static void summarise_rounds(const struct metrics *metrics, struct metrics_summary *summary)
+{
+    double rounds[ROUNDS_MAX];
+    size_t count = 0;
+    for (size_t back = 0; back < metrics->count && count < ROUNDS_MAX; back++) {
+        const struct metrics_frame *frame = metrics_frame(metrics, back);
+        if (frame->first_of_command)
+            rounds[count++] = (double)(frame->whole_ns - frame->command_sent_ns) * 1e-9;
+    }
+    qsort(rounds, count, sizeof(rounds[0]), by_value);
+    summary->round_frames = count;
+    summary->round_s = count > 0 ? rounds[count / 2] : 0;
+}
+
+static void summarise_views(const struct metrics *metrics, uint64_t now_ns, struct metrics_summary *summary)
+{
+    double latencies[METRICS_VIEWS];
+    size_t count = 0;
+    for (size_t i = 0; i < metrics->view_count; i++) {
+        const struct metrics_view *view = &metrics->views[i];
+        const bool is_recent = view->shown_ns + SECOND_NS > now_ns;
+        summary->views_per_second += is_recent;
+        if (is_recent && view->moved_ns > 0)
+            latencies[count++] = (double)(view->shown_ns - view->moved_ns) * 1e-9;
+    }
+    if (count == 0)
+        return;
+    qsort(latencies, count, sizeof(latencies[0]), by_value);
+    summary->view_latency_s = latencies[count / 2];
+    summary->view_latency_99_s = latencies[(count * 99 + 99) / 100 - 1];
+}
+
 void metrics_summarise(const struct metrics *metrics, uint64_t now_ns, struct metrics_summary *summary)
 {
     double latencies[METRICS_FRAMES];
@@ -151,6 +195,8 @@ void metrics_summarise(const struct metrics *metrics, uint64_t now_ns, struct me
         if (frame->first_of_command && (is_recent || latency_count == 0))
             latencies[latency_count++] = (double)(frame->shown_ns - frame->command_sent_ns) * 1e-9;
     }
+    summarise_rounds(metrics, summary);
+    summarise_views(metrics, now_ns, summary);
     if (latency_count == 0)
         return;
     qsort(latencies, latency_count, sizeof(latencies[0]), by_value);

@@ -7,6 +7,7 @@
 #include "lib/farlight.h"
 
 #define METRICS_FRAMES 128u
+#define METRICS_VIEWS 256u
 
 /* Rows of the timeline, in the order of the data's path. */
 enum lane {
@@ -40,16 +41,26 @@ struct metrics_frame {
     struct span spans[LANE_COUNT]; /* as they were measured: see metrics_span() */
 };
 
+/* A picture that was made here. */
+struct metrics_view {
+    uint64_t moved_ns; /* when its camera was moved there; 0: an earlier view shows that camera */
+    uint64_t shown_ns;
+};
+
 struct metrics {
     struct metrics_frame frames[METRICS_FRAMES]; /* a ring */
     size_t next, count;
     size_t unshown; /* of the last ones */
     uint64_t last_command;
+    struct metrics_view views[METRICS_VIEWS]; /* a ring, likewise */
+    size_t next_view, view_count, unshown_views;
 };
 
 /* A frame that came and was decoded at `decoded_ns`; it counts as shown until metrics_show() says when it was. */
 void metrics_add(struct metrics *metrics, const struct fl_frame *frame, uint64_t decoded_ns);
-/* Marks the frames since the last call as shown now. */
+/* A view that was made here, likewise. */
+void metrics_add_view(struct metrics *metrics, uint64_t moved_ns, uint64_t made_ns);
+/* Marks the frames and views since the last call as shown now. */
 void metrics_show(struct metrics *metrics, uint64_t shown_ns);
 /* The frame with this number of frames after it; NULL: it is not remembered. */
 const struct metrics_frame *metrics_frame(const struct metrics *metrics, size_t back);
@@ -64,6 +75,12 @@ struct metrics_summary {
     double frames_per_second, bits_per_second; /* over the last second */
     bool has_latency;
     double latency_s; /* from camera to picture, median of the last second; else the last one */
+    /* From camera to decoded picture, of the last few that were the first of their camera; 0 frames: unknown. */
+    size_t round_frames;
+    double round_s;
+    double views_per_second; /* made here; and from the camera's move until they were shown, over the last second
+                                .. */
+    double view_latency_s, view_latency_99_s; /* .. the median, and what 99 in 100 do not exceed */
 };
 void metrics_summarise(const struct metrics *metrics, uint64_t now_ns, struct metrics_summary *summary);
 

@@ -45,6 +45,26 @@ bool pixmap_copy(struct pixmap *to, const struct pixmap *from, struct fl_error *
     return true;
 }
 
+bool pixmap_crop(struct pixmap *to, const struct pixmap *from, int margin_x, int margin_y, struct fl_error *error)
+{
+    if (!pixmap_resize(to, from->width - 2 * margin_x, from->height - 2 * margin_y, error))
+        return false;
+    const size_t row_bytes = (size_t)to->width * 4, from_bytes = (size_t)from->width * 4;
+    const uint8_t *row = from->pixels + (size_t)margin_y * from_bytes + (size_t)margin_x * 4;
+    for (int y = 0; y < to->height; y++, row += from_bytes)
+        memcpy(to->pixels + (size_t)y * row_bytes, row, row_bytes);
+    return true;
+}
+
+void pixmap_exchange(struct pixmap *a, struct pixmap *b)
+{
+    const struct pixmap before = *a;
+    *a = *b;
+    *b = before;
+    b->version = a->version + 1;
+    a->version = before.version + 1;
+}
+
 void pixmap_finish(struct pixmap *picture)
 {
     free(picture->pixels);

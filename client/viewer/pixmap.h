@@ -16,6 +16,9 @@ bool pixmap_resize(struct pixmap *picture, int width, int height, struct fl_erro
 /* Copies a frame's pixels; transparent ones are composited over black. */
 void pixmap_take(struct pixmap *picture, struct fl_frame *frame);
 bool pixmap_copy(struct pixmap *to, const struct pixmap *from, struct fl_error *error);
+/* Copies what is left of it without so many pixels on each side. */
+bool pixmap_crop(struct pixmap *to, const struct pixmap *from, int margin_x, int margin_y, struct fl_error *error);
+void pixmap_exchange(struct pixmap *a, struct pixmap *b); /* each is another version of itself then */
 void pixmap_finish(struct pixmap *picture);
 
 #endif

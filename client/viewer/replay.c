@@ -75,19 +75,19 @@ static bool read_mouse(struct reader *reader, const json_t *json, struct replay_
 
 static bool read_wait(struct reader *reader, const json_t *json, struct replay_event *event)
 {
-    static const char *const names[] = {"rest", "live", "lost"};
+    static const char *const names[] = {"rest", "live", "lost", "camera"};
     const char *name = json_string_value(json_object_get(json, "wait"));
     double samples = 0;
     if (!read_number(reader, json, "samples", 1, 65536, &samples) ||
         !read_number(reader, json, "timeout", 0, SECONDS_MAX, &event->timeout_s))
         return false;
     event->samples = (unsigned)samples;
-    for (int i = 0; i < 3 && name; i++)
+    for (int i = 0; i < 4 && name; i++)
         if (strcmp(name, names[i]) == 0) {
             event->kind = (enum replay_kind)(REPLAY_REST + i);
             return true;
         }
-    return refuse(reader, "wait", "is not one of rest, live, lost");
+    return refuse(reader, "wait", "is not one of rest, live, lost, camera");
 }
 
 static bool read_resize(struct reader *reader, const json_t *json, struct replay_event *event)

@@ -11,6 +11,7 @@ enum replay_kind {
                           arrived */
     REPLAY_LIVE,       /* wait until the scene is there */
     REPLAY_LOST,       /* wait until the connection is lost */
+    REPLAY_CAMERA,     /* wait until the picture is of the newest camera, the daemon's own or made here */
     REPLAY_SCREENSHOT, /* into `path` */
     REPLAY_STATE       /* one line of JSON on standard output */
 };
@@ -35,6 +36,7 @@ struct replay {
  *    {"mouse": "move", "x": 120, "y": 80, "after": 0.02}, {"mouse": "up", "button": "left", "x": 120, "y": 80},
  *    {"wheel": 2}, {"key": "t", "shift": true}, {"key": "w", "hold": 0.5},
  *    {"resize": [640, 360]}, {"wait": "rest", "samples": 8, "timeout": 60}, {"wait": "live"}, {"wait": "lost"},
+ * {"wait": "camera"},
  *    {"screenshot": "a.png"}, {"state": "name"}]
  * "after" is in seconds since the previous event was finished, default 0. Errors name the file, the line and the
  * event.

@@ -97,6 +97,12 @@ enum settings_change settings_act(struct settings *settings, enum action action)
     case ACTION_PANEL:
         settings->panel = !settings->panel;
         return SETTINGS_DRAWN;
+    case ACTION_LOCAL: /* the daemon is told when something moves: what rests goes on being refined */
+        settings->local = (enum local_views)around((int)settings->local, 1, LOCAL_VIEWS_COUNT);
+        return SETTINGS_DRAWN;
+    case ACTION_HOLES:
+        settings->holes = settings->holes == FL_WARP_FILL ? FL_WARP_PATTERN : FL_WARP_FILL;
+        return SETTINGS_DRAWN;
     case ACTION_ERROR_MAP:
         settings->error_map = !settings->error_map;
         return SETTINGS_DRAWN;

@@ -5,6 +5,7 @@
 
 #include "viewer/input.h"
 #include "viewer/panel.h"
+#include "viewer/plan.h"
 
 enum overlay_mode { OVERLAY_ALL, OVERLAY_FIGURES, OVERLAY_NONE, OVERLAY_MODE_COUNT };
 
@@ -19,6 +20,8 @@ struct settings {
     enum protocol_view_source views; /* .. of this origin */
     bool panel;                      /* lists those of the tracer .. */
     size_t setting;                  /* .. of which this one is chosen */
+    enum local_views local;          /* whether views are made here .. */
+    enum fl_warp_holes holes;        /* .. and how they show what nobody has seen yet */
     bool error_map, help;
     enum overlay_mode overlay;
 };

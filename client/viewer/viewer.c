@@ -69,6 +69,7 @@ static void begin_showing(struct viewer *viewer)
     viewer->has_looked = viewer->told_moving = false;
     viewer->frame.command = 0;
     viewer->must_show = true;
+    viewer_forget_local(viewer);
 }
 
 /* ---- the loop ---- */
@@ -117,7 +118,7 @@ static void serve(struct viewer *viewer, uint64_t now_ns)
         return;
     }
     if (state != SESSION_LIVE) {
-        poll(NULL, 0, (int)IDLE_WAIT_MS);
+        poll(NULL, 0, (int)wait_ms); /* views are made of what is there */
         return;
     }
     if (viewer->times_live != session_times_live(viewer->session))
@@ -150,6 +151,7 @@ static bool run(struct viewer *viewer)
         const uint64_t now_ns = monotonic_now_ns();
         take_input(viewer, now_ns);
         tick(viewer, now_ns);
+        viewer_step_local(viewer, now_ns);
         serve(viewer, now_ns);
         draw(viewer);
         viewer->must_draw = false;
@@ -196,6 +198,9 @@ static void close_viewer(struct viewer *viewer)
     window_destroy(viewer->window);
     session_destroy(viewer->session);
     decoder_destroy(viewer->decoder);
+    views_destroy(viewer->views);
+    pixmap_finish(&viewer->arrived);
+    pixmap_finish(&viewer->made);
     pixmap_finish(&viewer->live);
     pixmap_finish(&viewer->compared);
     pixmap_finish(&viewer->heat);
@@ -218,7 +223,9 @@ bool viewer_run(const struct viewer_options *options, struct fl_error *error)
                                          .tracers = options->view.settings,
                                          .coarser = (int)options->coarser,
                                          .stereo = options->stereo,
-                                         .views = options->views};
+                                         .views = options->views,
+                                         .local = options->local,
+                                         .holes = options->holes};
     const bool opened = open_viewer(viewer, error);
     const bool done = opened && run(viewer);
     if (opened && !done)

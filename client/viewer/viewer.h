@@ -4,7 +4,7 @@
 #ifndef FARLIGHT_CLIENT_VIEWER_VIEWER_H
 #define FARLIGHT_CLIENT_VIEWER_VIEWER_H
 
-#include "lib/farlight.h"
+#include "viewer/plan.h"
 
 struct viewer_options {
     const char *server, *key_file, *link, *model, *environment, *scene_name; /* as of session_options */
@@ -18,6 +18,8 @@ struct viewer_options {
     const char *camera, *clip; /* names or numbers; NULL: none is named */
     double speed;              /* of the clip */
     unsigned coarser;          /* as of struct settings */
+    enum local_views local;    /* likewise */
+    enum fl_warp_holes holes;
     bool headless;
     const char *replay; /* path; NULL: a person */
     bool quiet;

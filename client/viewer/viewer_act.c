@@ -190,6 +190,8 @@ static bool has_come(const struct viewer *viewer, const struct replay_event *eve
         return is_live && viewer->has_camera && viewer->frames > 0;
     case REPLAY_LOST:
         return viewer->times_live > 0 && !session_scene(viewer->session);
+    case REPLAY_CAMERA:
+        return viewer_shows_camera(viewer);
     default:
         return true;
     }

@@ -6,13 +6,14 @@
 #include "protocol/common/clock.h"
 
 #include <jansson.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 const struct pixmap *viewer_picture(const struct viewer *viewer)
 {
-    return viewer->has_heat ? &viewer->heat : &viewer->live;
+    return viewer->has_heat ? &viewer->heat : viewer->shows_made ? &viewer->made : &viewer->live;
 }
 
 static const char *file_name(const char *path)
@@ -58,6 +59,21 @@ static void fill_status(struct viewer *viewer, struct hud_state *state)
     snprintf(text, sizeof(text), "%s%.100s", was_live ? "trying again: " : "", what);
 }
 
+static void fill_local(const struct viewer *viewer, struct hud_state *state)
+{
+    const struct views_made *made = &viewer->made_of;
+    state->local = (struct hud_local){.on = viewer_has_local(viewer),
+                                      .shown = viewer->shows_made,
+                                      .depth_bytes = viewer->frame.depth_bytes,
+                                      .quality = made->quality};
+    if (!viewer->shows_made)
+        return;
+    state->local.age_s = (double)(state->now_ns - made->key_came_ns) * 1e-9;
+    state->local.bound_pixels = (double)made->counts.bound_pixels;
+    state->local.unseen = (double)(made->counts.behind + made->counts.outside);
+    state->local.view_s = (double)made->counts.processor_ns * 1e-9;
+}
+
 void viewer_hud(struct viewer *viewer, struct hud_state *state)
 {
     *state = (struct hud_state){.width = viewer->width,
@@ -89,6 +105,7 @@ void viewer_hud(struct viewer *viewer, struct hud_state *state)
         state->structure[i] = viewer->structure[i];
     fill_names(viewer, state);
     fill_status(viewer, state);
+    fill_local(viewer, state);
     if (viewer->notice_ns > state->now_ns)
         state->notice = viewer->notice;
 }
@@ -130,6 +147,29 @@ static json_t *structure_json(const struct viewer *viewer)
     return list;
 }
 
+static json_t *local_json(const struct viewer *viewer, const struct hud_state *state,
+                          const struct metrics_summary *summary)
+{
+    const struct hud_local *local = &state->local;
+    json_t *object = json_pack(
+        "{s:s, s:b, s:b, s:I, s:f, s:f, s:f, s:s, s:I, s:I}", "views", local_views_names[viewer->settings.local],
+        "on", (int)local->on, "shown", (int)local->shown, "made", (json_int_t)viewer->local_views,
+        "views_per_second", summary->views_per_second, "latency_s", summary->view_latency_s, "latency_99_s",
+        summary->view_latency_99_s, "holes", viewer->settings.holes == FL_WARP_FILL ? "fill" : "pattern",
+        "picture_bytes", (json_int_t)(state->wire_bytes - local->depth_bytes), "depth_bytes",
+        (json_int_t)local->depth_bytes);
+    if (!object || !local->shown)
+        return object;
+    json_object_set_new(object, "quality", json_string(local->quality == FL_WARP_TREE ? "tree" : "iterative"));
+    json_object_set_new(object, "age_s", json_real(local->age_s));
+    json_object_set_new(object, "unseen", json_real(local->unseen));
+    json_object_set_new(object, "processor_s", json_real(local->view_s));
+    json_object_set_new(object, "build_s", json_real((double)viewer->made_of.build_ns * 1e-9));
+    if (isfinite(local->bound_pixels))
+        json_object_set_new(object, "bound_pixels", json_real(local->bound_pixels));
+    return object;
+}
+
 void viewer_print_state(struct viewer *viewer, const char *name)
 {
     static const char *const statuses[] = {"loading", "live", "lost"};
@@ -139,7 +179,7 @@ void viewer_print_state(struct viewer *viewer, const char *name)
     metrics_summarise(&viewer->metrics, state.now_ns, &summary);
     json_t *line = json_pack(
         "{s:s, s:s, s:s, s:s, s:s, s:s, s:f, s:i, s:i, s:b, s:i, s:i, s:I, s:i, s:I, s:s, s:s, s:f, s:b, s:o, "
-        "s:o, s:o, s:o, s:f, s:f, s:f, s:b, s:s}",
+        "s:o, s:o, s:o, s:f, s:f, s:f, s:b, s:s, s:o}",
         "state", name, "status", statuses[state.status], "tracer", protocol_tracer_text(viewer->frame.tracer),
         "integrator", protocol_integrator_text(viewer->frame.integrator), "tone_map",
         protocol_tone_map_text(viewer->settings.tone_map), "encoding",
@@ -151,8 +191,8 @@ void viewer_print_state(struct viewer *viewer, const char *name)
         (int)viewer->tour.playing, "eye", vector_json(viewer->camera.eye), "look_at",
         vector_json(viewer->camera.look_at), "settings", settings_json(&viewer->settings), "structure",
         structure_json(viewer), "fov_y", viewer->camera.fov_y, "frames_per_second", summary.frames_per_second,
-        "latency_s", summary.latency_s, "stereo", (int)viewer->settings.stereo, "views",
-        protocol_view_source_text(viewer->settings.views));
+        "latency_s", summary.latency_s, "stereo", (int)viewer->settings.stereo, "eyes",
+        protocol_view_source_text(viewer->settings.views), "local", local_json(viewer, &state, &summary));
     if (line && viewer->has_heat)
         json_object_set_new(line, "errors",
                             json_pack("{s:f, s:f, s:f}", "mean", viewer->heat_figures.mean, "max",

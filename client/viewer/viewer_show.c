@@ -77,6 +77,7 @@ static void show(struct viewer *viewer)
         view.clips = &use;
         view.clips_count = 1;
     }
+    viewer_ask_local(viewer, &view);
     viewer->must_show = !session_show(viewer->session, &view, &viewer->change);
     viewer->must_look = true; /* frames name a camera from which on they are the new ones */
 }
@@ -84,7 +85,8 @@ static void show(struct viewer *viewer)
 static void look(struct viewer *viewer, bool moving, uint64_t now_ns)
 {
     struct fl_view_camera camera = {.time_s = (float)viewer->tour.time_s, .moving = moving};
-    camera_export(&viewer->camera, &camera);
+    viewer_aim(viewer, moving, now_ns, &viewer->asked);
+    camera_export(&viewer->asked, &camera);
     camera.node = viewer_follows(viewer) ? viewer->followed : 0;
     if (!session_look(viewer->session, &camera, &viewer->command))
         return;
@@ -96,12 +98,14 @@ static void look(struct viewer *viewer, bool moving, uint64_t now_ns)
 
 void viewer_tell(struct viewer *viewer, uint64_t now_ns)
 {
-    if (viewer->must_show)
+    const bool is_moving = viewer->moved_ns + REST_PAUSE_NS > now_ns;
+    /* At rest another stream would begin the picture from new. */
+    if (viewer->must_show || (is_moving && viewer_asks_otherwise(viewer)))
         show(viewer);
     if (!viewer->has_camera)
         return;
-    const bool is_moving = viewer->moved_ns + REST_PAUSE_NS > now_ns;
-    if (viewer->must_look && now_ns >= viewer->looked_ns + LOOK_PAUSE_NS)
+    const bool is_needed = !is_moving || !viewer->local_asked || viewer_needs_picture(viewer, now_ns);
+    if (viewer->must_look && is_needed && now_ns >= viewer->looked_ns + LOOK_PAUSE_NS)
         look(viewer, is_moving, now_ns);
     else if (viewer->told_moving && !is_moving)
         look(viewer, false, now_ns);
@@ -113,12 +117,12 @@ static bool decode(struct viewer *viewer, struct fl_frame *frame)
 {
     struct fl_error error = {0};
     if (!frame->encoded) {
-        pixmap_take(&viewer->live, frame);
+        pixmap_take(&viewer->arrived, frame);
         return true;
     }
     if (!viewer->decoder)
         viewer->decoder = decoder_create(&viewer->failure);
-    if (viewer->decoder && decoder_decode(viewer->decoder, frame, &viewer->live, &error))
+    if (viewer->decoder && decoder_decode(viewer->decoder, frame, &viewer->arrived, &error))
         return true;
     session_want_key_frame(viewer->session);
     return false;
@@ -135,7 +139,7 @@ static void take_structure(struct viewer *viewer, const struct fl_frame *frame)
 
 static void take(struct viewer *viewer, struct fl_frame *frame)
 {
-    if (!decode(viewer, frame))
+    if (!decode(viewer, frame) || !viewer_take_picture(viewer, frame))
         return;
     metrics_add(&viewer->metrics, frame, monotonic_now_ns());
     take_structure(viewer, frame);
@@ -152,6 +156,7 @@ static void take(struct viewer *viewer, struct fl_frame *frame)
     viewer->frames++;
     viewer->taken = viewer->settings;
     viewer->must_draw = true;
+    viewer_plan_local(viewer, monotonic_now_ns());
 }
 
 /* A change that the daemon refuses is reverted. */
@@ -163,6 +168,7 @@ static void refuse(struct viewer *viewer, const struct fl_error *refusal)
     }
     viewer_say(viewer, "not possible: %s", refusal->text);
     viewer->settings = viewer->taken;
+    viewer_refuse_local(viewer);
     viewer->followed = 0; /* somebody may have taken its node away */
     viewer->must_show = true;
 }

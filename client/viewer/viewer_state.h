@@ -8,6 +8,7 @@
 #include "viewer/replay.h"
 #include "viewer/session.h"
 #include "viewer/viewer.h"
+#include "viewer/views.h"
 #include "viewer/window.h"
 
 /* What a job beside the view is for. */
@@ -46,7 +47,8 @@ struct viewer {
     bool told_moving, has_looked;
 
     struct decoder *decoder;
-    struct pixmap live;                                        /* the last frame */
+    struct pixmap arrived;                                     /* the last frame, while it is decided on .. */
+    struct pixmap live;                                        /* .. and the last one that can be shown */
     struct fl_frame frame;                                     /* what it told, without its arrays */
     char structure[HUD_STRUCTURE_MAX][HUD_STRUCTURE_TEXT_MAX]; /* of its tracer */
     size_t structure_count;
@@ -54,6 +56,24 @@ struct viewer {
     struct metrics metrics;
     bool must_draw;
     uint64_t drawn_ns;
+
+    /* Views that are made here. */
+    struct plan_switch local_switch;
+    struct plan_motion motion; /* up to .. */
+    struct viewer_camera followed_camera;
+    uint64_t round_ns;               /* from camera to picture, lately */
+    bool local_asked, local_granted; /* the stream was asked to have depths; it has had them since then */
+    bool has_keys;                   /* views can be made */
+    float local_radius;              /* of the sphere that their bound holds in */
+    struct viewer_camera asked;      /* that the daemon was told last: where it was going to be */
+    bool is_live;                    /* the last frame is in `live` */
+    struct views *views;             /* NULL: none was needed */
+    struct views_wish wished;
+    uint64_t wish; /* its number; 0: none */
+    struct pixmap made;
+    struct views_made made_of;
+    bool shows_made;      /* in place of `live` */
+    uint64_t local_views; /* so many */
 
     enum viewer_task task, wanted; /* the current one; the next one */
     double focus_x, focus_y;       /* shares of the picture */
@@ -89,6 +109,27 @@ bool viewer_is_at_rest(const struct viewer *viewer, unsigned samples);
 void viewer_use_eyes(const struct viewer *viewer, struct message_render *view);
 /* The pixels that the daemon renders for the window, for one eye or two. */
 void viewer_render_size(const struct viewer *viewer, uint32_t *width, uint32_t *height);
+
+/* ---- viewer_local.c ---- */
+
+bool viewer_has_local(const struct viewer *viewer); /* views are made while the camera moves */
+/* Decides it, after a frame. */
+void viewer_plan_local(struct viewer *viewer, uint64_t now_ns);
+/* Completes a request for a view with what is needed for them. */
+void viewer_ask_local(struct viewer *viewer, struct message_render *view);
+bool viewer_asks_otherwise(const struct viewer *viewer); /* than it did */
+/* Takes back what may be why the view was refused. */
+void viewer_refuse_local(struct viewer *viewer);
+/* The camera that the daemon is told: while it moves, where it will be when the picture is here. */
+void viewer_aim(const struct viewer *viewer, bool moving, uint64_t now_ns, struct viewer_camera *camera);
+bool viewer_needs_picture(const struct viewer *viewer, uint64_t now_ns); /* while it moves */
+/* The frame that has `arrived`, which is without its margin afterwards. */
+bool viewer_take_picture(struct viewer *viewer, struct fl_frame *frame);
+/* Wants a view where it is needed, and shows what has been made. */
+void viewer_step_local(struct viewer *viewer, uint64_t now_ns);
+void viewer_forget_local(struct viewer *viewer); /* of a connection that is gone */
+/* The picture is of the newest camera, and the best one until another frame comes. */
+bool viewer_shows_camera(const struct viewer *viewer);
 
 /* ---- viewer_tasks.c ---- */
 

@@ -32,6 +32,7 @@ void viewer_go(struct viewer *viewer, const struct viewer_camera *camera, uint32
     if (!viewer->has_camera || viewer->options->replay) {
         viewer->camera = *camera;
         viewer->glide_begin_ns = 0;
+        viewer->motion = (struct plan_motion){0}; /* a jump has no velocity */
     } else {
         viewer->glide_from = viewer->camera;
         viewer->glide_to = *camera;

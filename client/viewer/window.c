@@ -65,6 +65,14 @@ void window_size(const struct window *window, int *width, int *height, double *s
     *scale = desktop_width > 0 ? (double)*width / desktop_width : 1;
 }
 
+uint64_t window_frame_ns(const struct window *window)
+{
+    SDL_DisplayMode mode;
+    const int display = SDL_GetWindowDisplayIndex(window->window);
+    const bool known = display >= 0 && SDL_GetCurrentDisplayMode(display, &mode) == 0 && mode.refresh_rate > 0;
+    return UINT64_C(1000000000) / (uint64_t)(known ? mode.refresh_rate : 60);
+}
+
 /* ---- what happens ---- */
 
 static void take_key(const SDL_Event *event, struct input *input)

@@ -14,6 +14,7 @@ struct window *window_create(const char *title, int width, int height, struct fl
 bool window_poll(struct window *window, struct input *input);
 /* Whether the window must be redrawn though nothing of ours has changed, as after it was covered. */
 bool window_wants_drawing(struct window *window);
+uint64_t window_frame_ns(const struct window *window); /* between two pictures of its display */
 void window_size(const struct window *window, int *width, int *height, double *scale); /* as of struct input */
 /* Draws and shows it: waits for the screen. */
 void window_show(struct window *window, const struct pixmap *picture, const struct hud_state *state);

@@ -2,9 +2,10 @@
 /* Pictures of other eyes, made of one picture with depths: by the tracer `quadtree` and by bench_warps.h, beside
  * true pictures. Prints one JSON object: {"scene", "triangles", "device", "software", "width", "height", "key_ns",
  * "moves":
- * [{"name", "true_ns", "methods": [{"name", "layers", "psnr_db", "seen_psnr_db", "unseen", "cpu_ns"}]}]}. `unseen`
- * is a share of the pixels; times are of the processor, all threads of the process, one a run: key_ns and true_ns
- * of a whole picture by `bvh`, cpu_ns of making a picture of it. Exit status: 1 failed, 2 usage. */
+ * [{"name", "true_ns", "methods": [{"name", "layers", "psnr_db", "seen_psnr_db", "unseen", "cpu_ns",
+ * "build_ns"}]}]}. `unseen` is a share of the pixels; times are of the processor, all threads of the process, one
+ * a run: key_ns and true_ns of a whole picture by `bvh`, cpu_ns of making a picture of it, build_ns of the
+ * structure that serves all pictures of a key view, where there is one. Exit status: 1 failed, 2 usage. */
 #include "tests/bench/bench.h"
 #include "tests/bench/bench_options.h"
 #include "tests/bench/bench_scene.h"
@@ -120,9 +121,10 @@ static void write_picture(const struct bench *bench, uint32_t move, const char *
 }
 
 /* bench->picture beside the truth. */
-static void note(const struct bench *bench, struct move *move, const char *name, uint32_t layers,
-                 const struct bench_runs *times)
+static void note(const struct bench *bench, struct move *move, enum warp_method method,
+                 const struct bench_runs *times, const struct bench_runs *builds)
 {
+    const char *name = warp_method_names[method];
     const struct warp_picture *picture = &bench->picture;
     const uint32_t count = bench->width * bench->height;
     uint32_t unseen = 0;
@@ -130,15 +132,16 @@ static void note(const struct bench *bench, struct move *move, const char *name,
         unseen += !picture->seen[i];
     json_array_append_new(
         move->methods,
-        json_pack("{s:s, s:i, s:o, s:o, s:f, s:o}", "name", name, "layers", (int)layers, "psnr_db",
+        json_pack("{s:s, s:i, s:o, s:o, s:f, s:o, s:o}", "name", name, "layers", 1, "psnr_db",
                   bench_decibels(warp_psnr_db(picture->colours, move->truth, NULL, count)), "seen_psnr_db",
                   bench_decibels(warp_psnr_db(picture->colours, move->truth, picture->seen, count)), "unseen",
-                  (double)unseen / count, "cpu_ns", bench_times_json(times)));
+                  (double)unseen / count, "cpu_ns", bench_times_json(times), "build_ns",
+                  bench_times_json(builds)));
     if (bench->pictures)
         write_picture(bench, (uint32_t)(move - bench->moves), name, picture->colours, picture->seen);
 }
 
-static void warp(struct bench *bench, struct move *move)
+static bool warp(struct bench *bench, struct move *move, struct error *error)
 {
     const struct warp_view view = {.width = bench->width,
                                    .height = bench->height,
@@ -147,14 +150,18 @@ static void warp(struct bench *bench, struct move *move)
                                    .layer_count = 1,
                                    .layers = {{bench->key, bench->w}}};
     for (enum warp_method method = 0; method < WARP_METHODS; method++) {
-        struct bench_runs times = {0};
+        struct bench_runs times = {0}, builds = {0};
         for (unsigned run = 0; run <= bench->runs; run++) {
-            warp_picture_make(&bench->picture, &view, method);
+            if (!warp_picture_make(&bench->picture, &view, method))
+                return error_set(error, ERROR_INVALID, "--move", "no picture can be made of it");
             if (run > 0)
                 bench_add(&times, bench->picture.processor_ns);
+            if (run > 0 && bench->picture.build_ns > 0)
+                bench_add(&builds, bench->picture.build_ns);
         }
-        note(bench, move, warp_method_names[method], 1, &times);
+        note(bench, move, method, &times, &builds);
     }
+    return true;
 }
 
 static bool run(struct bench *bench, struct error *error)
@@ -170,7 +177,8 @@ static bool run(struct bench *bench, struct error *error)
             return false;
         if (bench->pictures)
             write_picture(bench, i, "true", move->truth, NULL);
-        warp(bench, move);
+        if (!warp(bench, move, error))
+            return false;
     }
     return gpu_check(bench->device, "bench", error);
 }

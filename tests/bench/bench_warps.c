@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Mesh: W. Mark, L. McMillan, G. Bishop. Post-Rendering 3D Warping. 1997. Iteration: H. Bowles and others.
- * Iterative Image Warping. 2012. */
+/* Mesh: W. Mark, L. McMillan, G. Bishop. Post-Rendering 3D Warping. 1997. */
 #include "tests/bench/bench_warps.h"
 
 #include <math.h>
@@ -12,15 +11,16 @@
 /* Of the greatest w of four neighbours: what differs by more is not one surface. Less cuts floors that are seen at
  * a grazing angle, more draws skins between near and far. */
 #define CUT_SHARE 0.04f
-#define ITERATIONS 3
-/* An iteration that has not come closer, in pixels, has found nothing. */
-#define ITERATION_ERROR 1.0f
+/* Eyes of client/warp: within so many metres they see surfaces within so many pixels. */
+#define RADIUS 0.15f
+#define PIXELS 0.25f
 /* Of a barycentric, or in pixels: a pixel's centre on an edge is in the triangle, however this is rounded. Where
  * the eye moves aside, the centres of whole rows are on edges. */
 #define EDGE 1e-3f
 #define BLACK 0xff000000u
 
-const char *const warp_method_names[WARP_METHODS] = {"as it is", "iterative", "splat", "splat, both ways", "mesh"};
+const char *const warp_method_names[WARP_METHODS] = {"as it is", "iterative",        "quadtree, client",
+                                                     "splat",    "splat, both ways", "mesh"};
 
 /* ---- the map ---- */
 
@@ -140,35 +140,38 @@ static void fill(const struct warp_view *view, struct warp_picture *picture, uin
 
 /* ---- the methods ---- */
 
-static float clamp_to(float x, float size)
+static struct fl_warp_camera client_camera(const struct frame_camera *camera)
 {
-    return fminf(fmaxf(x, 0), size - 1);
+    struct fl_warp_camera client = {.fov_y = camera->fov_y};
+    memcpy(client.world_from_view, camera->world_from_view, sizeof(client.world_from_view));
+    return client;
 }
 
-/* s := s + (q - map(s)) until s comes to lie at q. */
-static void iterate(const struct warp_view *view, struct warp_picture *picture)
+static bool make_by_client(const struct warp_view *view, struct warp_picture *picture,
+                           enum fl_warp_quality quality)
 {
-    const struct map map = map_of(view);
-    const float width = (float)view->width, height = (float)view->height;
-    for (uint32_t i = 0; i < view->width * view->height; i++) {
-        const float q[2] = {(float)(i % view->width) + 0.5f, (float)(i / view->width) + 0.5f};
-        float s[2] = {q[0], q[1]}, squared = INFINITY, to[3];
-        uint32_t at = i;
-        for (int k = 0; k < ITERATIONS; k++) {
-            if (!map_point(&map, s[0], s[1], view->layers[0].w[at], to)) {
-                squared = INFINITY;
-                break;
-            }
-            const float error[2] = {q[0] - to[0], q[1] - to[1]};
-            s[0] += error[0];
-            s[1] += error[1];
-            squared = error[0] * error[0] + error[1] * error[1];
-            at = (uint32_t)clamp_to(s[1], height) * view->width + (uint32_t)clamp_to(s[0], width);
-        }
-        picture->colours[i] = view->layers[0].colours[at];
-        picture->seen[i] =
-            squared < ITERATION_ERROR * ITERATION_ERROR && s[0] >= 0 && s[1] >= 0 && s[0] < width && s[1] < height;
+    struct fl_warp_key key = {.width = view->width,
+                              .height = view->height,
+                              .camera = client_camera(&view->from),
+                              .radius = RADIUS,
+                              .pixels = PIXELS,
+                              .layer_count = view->layer_count};
+    for (uint32_t l = 0; l < view->layer_count; l++)
+        key.layers[l] = (struct fl_warp_layer){view->layers[l].colours, view->layers[l].w};
+    const struct fl_warp_view wanted = {
+        .width = view->width, .height = view->height, .camera = client_camera(&view->to), .quality = quality};
+    struct fl_warp_picture made = {.colours = picture->colours, .mask = picture->seen};
+    struct fl_warp_error error = {0};
+    if (!fl_warp_set_key(picture->client, &key, &error) ||
+        !fl_warp_make(picture->client, &wanted, &made, &error)) {
+        fprintf(stderr, "%s: %s\n", error.field, error.text);
+        return false;
     }
+    for (uint32_t i = 0; i < view->width * view->height; i++)
+        picture->seen[i] = picture->seen[i] == FL_WARP_KNOWN;
+    picture->build_ns = fl_warp_build_ns(picture->client);
+    picture->processor_ns = made.counts.processor_ns;
+    return true;
 }
 
 static void splat(const struct warp_view *view, const struct warp_layer *layer, struct warp_picture *picture)
@@ -283,10 +286,6 @@ static void make(struct warp_picture *picture, const struct warp_view *view, enu
         memset(picture->seen, 1, count);
         return;
     }
-    if (method == WARP_ITERATIVE) {
-        iterate(view, picture);
-        return;
-    }
     clear(view, picture);
     for (uint32_t l = 0; l < view->layer_count; l++)
         (method == WARP_MESH ? draw_mesh : splat)(view, &view->layers[l], picture);
@@ -303,8 +302,9 @@ bool warp_picture_init(struct warp_picture *picture, uint32_t width, uint32_t he
     *picture = (struct warp_picture){.colours = calloc(count, sizeof(*picture->colours)),
                                      .seen = calloc(count, sizeof(*picture->seen)),
                                      .w = calloc(count, sizeof(*picture->w)),
-                                     .vertices = calloc(count, 3 * sizeof(*picture->vertices))};
-    if (picture->colours && picture->seen && picture->w && picture->vertices)
+                                     .vertices = calloc(count, 3 * sizeof(*picture->vertices)),
+                                     .client = fl_warp_create(1, NULL)};
+    if (picture->colours && picture->seen && picture->w && picture->vertices && picture->client)
         return true;
     warp_picture_finish(picture);
     return false;
@@ -316,6 +316,7 @@ void warp_picture_finish(struct warp_picture *picture)
     free(picture->seen);
     free(picture->w);
     free(picture->vertices);
+    fl_warp_destroy(picture->client);
     *picture = (struct warp_picture){0};
 }
 
@@ -326,11 +327,15 @@ static uint64_t thread_ns(void)
     return (uint64_t)now.tv_sec * 1000000000u + (uint64_t)now.tv_nsec;
 }
 
-void warp_picture_make(struct warp_picture *picture, const struct warp_view *view, enum warp_method method)
+bool warp_picture_make(struct warp_picture *picture, const struct warp_view *view, enum warp_method method)
 {
+    picture->build_ns = 0;
+    if (method == WARP_ITERATIVE || method == WARP_QUADTREE)
+        return make_by_client(view, picture, method == WARP_QUADTREE ? FL_WARP_TREE : FL_WARP_ITERATIVE);
     const uint64_t start_ns = thread_ns();
     make(picture, view, method);
     picture->processor_ns = thread_ns() - start_ns;
+    return true;
 }
 
 double warp_psnr_db(const uint32_t *a, const uint32_t *b, const uint8_t *seen, uint32_t count)

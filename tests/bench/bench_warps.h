@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Pictures of another eye, made of a picture with depths in three ways that others take: the baselines of the
- * pictures that the tracer `quadtree` makes. Plain C, one thread.
+/* Pictures of another eye, made of a picture with depths: by client/warp, and in two ways that others take, its
+ * baselines and those of the tracer `quadtree`. Plain C, one thread.
  *
  * A pixel holds a colour and w = 1 / Z, where Z is the distance along the view; w is 0 where there is nothing but
  * the environment, which is infinitely far away. In (x, y, w) the way from one perspective camera to another is a
@@ -10,11 +10,12 @@
 #define FARLIGHT_TESTS_BENCH_WARPS_H
 
 #include "render/frame.h"
+#include "warp/warp.h"
 
 #include <stdbool.h>
 #include <stdint.h>
 
-#define WARP_LAYERS_MAX 3u
+#define WARP_LAYERS_MAX FL_WARP_LAYERS_MAX
 
 struct warp_layer {
     const uint32_t *colours; /* RGBA8, the red in the lowest byte */
@@ -36,11 +37,15 @@ struct warp_picture {
     float *w;        /* of mesh and splats: of what is here; negative: nothing was drawn */
     float *vertices; /* of the mesh: x, y and w of each pixel; w negative: behind the eye */
     uint64_t processor_ns;
+    uint64_t
+        build_ns; /* of client/warp: the structure, which serves all pictures of a key view; not in the other */
+    struct fl_warp *client;
 };
 
 enum warp_method {
     WARP_NONE,       /* the picture as it is, all of it seen */
-    WARP_ITERATIVE,  /* the pixel that comes to lie at this one, by a fixed-point iteration */
+    WARP_ITERATIVE,  /* client/warp: the pixel that comes to lie at this one, by a fixed-point iteration */
+    WARP_QUADTREE,   /* client/warp: rays through a quadtree of planes */
     WARP_SPLAT,      /* each pixel is drawn as one pixel; cracks one pixel wide are closed along rows */
     WARP_SPLAT_BOTH, /* cracks are closed along columns too */
     WARP_MESH,       /* a vertex a pixel, two triangles between four, but across discontinuities */
@@ -50,9 +55,9 @@ extern const char *const warp_method_names[WARP_METHODS];
 
 bool warp_picture_init(struct warp_picture *picture, uint32_t width, uint32_t height); /* false: no memory */
 void warp_picture_finish(struct warp_picture *picture);
-/* Of the layers WARP_NONE and WARP_ITERATIVE take the first. Holes have the colour of the farther end of their
- * row. */
-void warp_picture_make(struct warp_picture *picture, const struct warp_view *view, enum warp_method method);
+/* Of the layers WARP_NONE and WARP_ITERATIVE take the first. Holes of splats and of the mesh have the colour of
+ * the farther end of their row. False: client/warp refuses the view. */
+bool warp_picture_make(struct warp_picture *picture, const struct warp_view *view, enum warp_method method);
 
 /* Where a point of the first picture comes to lie in the second; false: behind its eye. */
 bool warp_point(const struct warp_view *view, const float from[3], float to[3]);

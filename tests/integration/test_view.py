@@ -117,7 +117,7 @@ class WithoutAWindow(Viewer):
                 states = self.replay([rest(8), {"state": "from layers"}, {"key": "b", "shift": True}, rest(8),
                                       {"state": "rendered"}, *HIDE, {"screenshot": "view.png"}, {"key": "b"}, rest(8),
                                       {"state": "one"}], *eyes, "--stereo-layout", layout)
-                self.assertEqual([(state["stereo"], state["views"]) for state in states.values()],
+                self.assertEqual([(state["stereo"], state["eyes"]) for state in states.values()],
                                  [(True, "layers"), (True, "rays"), (False, "rays")])
                 self.assertEqual([any(line.startswith("views: unknown ") for line in state["structure"])
                                   for state in states.values()], [True, False, False])
@@ -302,7 +302,7 @@ class WithoutAWindow(Viewer):
         for arguments, part in (([], "MODEL"), ([scene, "--headless"], "--replay"), ([scene, "--scene", "a"], "--scene"),
                                 (["--scene", "a"], "--server"), ([scene, "--scale", "3"], "--scale"),
                                 ([scene, "--integrator", "x"], "--integrator"), ([scene, "--encoding", "x"], "--encoding"),
-                                ([scene, "--still-encoding", "h264"], "--still-encoding"), ([scene, "--samples", "0"], "--samples"),
+                                ([scene, "--still-encoding", "h264"], "--still-encoding"), ([scene, "--samples", "0"], "--samples"), ([scene, "--views", "x"], "--views"), ([scene, "--holes", "x"], "--holes"),
                                 ([scene, scene], "one model")):
             result = self.expect(farlight("view", *arguments, env={**os.environ, "DISPLAY": ""}), 2)
             self.assertIn(part, result.stderr)
@@ -320,6 +320,86 @@ class WithoutAWindow(Viewer):
             for part in ("Shift+T", "next, previous tracer", "--replay", "--tracer", "Double click"):
                 self.assertIn(part, text)
             self.assertNotIn("--output", text)
+
+
+def crop(rows, first, last):
+    return [row for y, row in enumerate(rows) if y < first or y >= last]
+
+
+class MadeHere(Viewer):
+    """Views that the viewer makes while the camera moves."""
+
+    def moved_while_lost(self, name, *options, size):
+        """A view from beside the last picture, made when the daemon is gone: nothing newer can come. Its state, the rows of the
+        last picture and of the view without the middle, in which the viewer says what has happened."""
+        events = [rest(8), *HIDE, {"screenshot": "before.png"}, {"state": "before"}, {"wait": "lost"},
+                  *drag(160, 90, 6, 2), {"wait": "camera"}, {"state": "after"}, {"screenshot": f"{name}.png"}]
+        with Daemon() as daemon:
+            process = self.start(events, "--headless", "--server", daemon.address, "--views", "on", *options, scene="cornell.glb",
+                                 size=size)
+            self.assertIn("before", process.stdout.readline())
+            daemon.stop(signal.SIGKILL)
+            state = self.end(process)["after"]
+        return state, *(crop(read_png(self.folder / f"{of}.png")[2], size[1] // 2 - 60, size[1] // 2 + 60)
+                        for of in ("before", name))
+
+    def test_a_view_is_near_to_what_is_rendered_from_there(self):
+        size = (320, 360)
+        state, before, made = self.moved_while_lost("made", size=size)
+        self.assertEqual((state["status"], state["local"]["shown"], state["local"]["quality"]), ("lost", True, "tree"))
+        self.assertGreater(state["local"]["made"], 0)
+        camera = [f"--{name}={','.join(f'{x:.9g}' for x in state[key])}" for name, key in (("eye", "eye"), ("look-at", "look_at"))]
+        result = farlight("render", bundled_scenes() / "cornell.glb", "-q", "-o", self.folder / "true.png", "--size",
+                          f"{size[0]}x{size[1]}", "--samples", "8", "--integrator", "whitted", "--progressive", *camera, "--fov",
+                          f"{math.degrees(state['fov_y']):.9g}")
+        self.expect(result, 0)
+        true = crop(read_png(self.folder / "true.png")[2], size[1] // 2 - 60, size[1] // 2 + 60)
+
+        def error(rows):
+            return sum(abs(a - b) for row, other in zip(rows, true) for a, b in zip(row, other))
+        # Less than a third of the error: what 10 dB are; the prototype has that in a room, a hand's breadth aside.
+        self.assertLess(error(made), error(before) / 3)
+        # The same once more: it depends on the last picture and the camera alone; what nobody has seen may be marked.
+        self.assertEqual(self.moved_while_lost("again", size=size)[2], made)
+        self.assertNotEqual(self.moved_while_lost("marked", "--holes", "pattern", size=size)[2], made)
+
+    def test_views_come_faster_than_pictures_of_a_slow_daemon_and_end_in_its_own(self):
+        """Path tracing with many samples a frame takes many frames of a display, on any machine of today."""
+        slow = ["--integrator", "path", "--samples", "64", "--pass-samples", "64"]
+        moves = [{"mouse": "move", "x": 160 + step, "y": 90, "after": 0.02} for step in range(1, 101)]
+        events = [rest(8), {"state": "first"}, drag(160, 90, 0, 0)[0], *moves, {"state": "moving"},
+                  {"mouse": "up", "button": "left", "x": 260, "y": 90}, rest(64), {"state": "rested"}, *HIDE,
+                  {"screenshot": "rested.png"}]
+        states = self.replay(events, "--views", "on", *slow)
+        moving = states["moving"]["local"]
+        self.assertTrue(moving["on"] and moving["shown"])
+        self.assertGreater(moving["made"], 3 * (states["moving"]["frames"] - states["first"]["frames"]))
+        self.assertGreater(moving["latency_99_s"], 0)
+        self.assertFalse(states["rested"]["local"]["shown"])
+        (self.folder / "rested.png").rename(self.folder / "with.png")
+        without = self.replay(events, "--views", "off", *slow)
+        self.assertEqual((without["moving"]["local"]["on"], without["moving"]["local"]["made"],
+                          without["moving"]["local"]["depth_bytes"]), (False, 0, 0))
+        self.assertEqual(states["rested"]["eye"], without["rested"]["eye"])
+        self.assertEqual(difference(self.folder / "with.png", self.folder / "rested.png"), 0)
+
+    def test_auto_makes_views_once_pictures_are_known_to_be_slow(self):
+        moves = [event for step in range(4) for event in (*drag(160, 90, 20 + step, 0), rest(1))]
+        states = self.replay([rest(), {"state": "first"}, *moves, {"state": "known"}, {"key": "l"}, {"state": "on"}, {"key": "l"},
+                              {"state": "off"}], "--integrator", "path", "--samples", "64", "--pass-samples", "64")
+        self.assertEqual([states[name]["local"]["views"] for name in ("first", "known", "on", "off")],
+                         ["auto", "auto", "on", "off"])
+        self.assertEqual([states[name]["local"]["on"] for name in ("first", "known", "on", "off")], [False, True, True, False])
+
+    def test_views_are_made_from_pictures_that_travelled_as_video(self):
+        moves = [{"mouse": "move", "x": 160 + step, "y": 90, "after": 0.02} for step in range(1, 101)]
+        states = self.replay([rest(8), drag(160, 90, 0, 0)[0], *moves, {"state": "moving"}, {"mouse": "up", "button": "left", "x": 260, "y": 90},
+                              {"wait": "camera"}, rest(8), {"state": "rested"}],
+                             "--views", "on", "--encoding", "h264", "--still-encoding", "predicted", "--no-adapt")
+        self.assertGreater(states["moving"]["local"]["depth_bytes"], 0)
+        self.assertGreater(states["moving"]["local"]["made"], 0)
+        self.assertEqual((states["moving"]["width"], states["moving"]["height"]), SIZE)  # without the margin
+        self.assertFalse(states["rested"]["local"]["shown"])
 
 
 class Relay:

@@ -28,6 +28,7 @@ MAY_INCLUDE = {
     "shaders/trace": (SHARED, COMMON),
     "shaders/render": (SHARED, COMMON),
     "shaders/tree": (SHARED, COMMON),
+    "shaders/quadtree": (SHARED, COMMON),  # a row of its own, as the client has the layout of nodes too
     "shaders/*": (SHARED, COMMON, "shaders/raster", "shaders/tree"),
     BASE: ("protocol/common",),
     GPU: (BASE,),
@@ -47,14 +48,15 @@ MAY_INCLUDE = {
     "server/store": (BASE, "protocol"),
     "server/session": (BASE, SCENE, "server/encode", "server/net", "server/store", "server/engine", "protocol"),
     "server": (BASE, GPU, "server/check", "server/store", "server/engine", "server/session"),
-    "client/lib": ("protocol", "protocol/sealed", "protocol/common", "protocol/pixels"),
+    "client/warp": ("shaders/quadtree",),  # no protocol, GL, window or socket
+    "client/lib": ("protocol", "protocol/sealed", "protocol/common", "protocol/pixels", "client/warp"),
     "client/helper": ("protocol",),
     "client/import": ("protocol", "protocol/common", "client/helper"),
     "client/output": ("protocol", "client/helper"),
     "client/output/library": ("protocol/common", "client/output"),
     "client/video": ("protocol", "protocol/pixels", "client/helper", "client/lib"),  # of lib: rate
     "client/cli": ("protocol", "protocol/common", "protocol/sealed", "client/lib"),
-    "client/viewer": ("protocol", "protocol/common", "client/lib", "client/cli"),  # the command line is parsed as that of render
+    "client/viewer": ("protocol", "protocol/common", "client/warp", "client/lib", "client/cli"),  # the command line is parsed as that of render
 }
 # Files that every room may include.
 FOR_EVERYBODY = re.compile(r"^protocol/((version|plain_text)\.h|(words|tracers)\.(h|def))$")

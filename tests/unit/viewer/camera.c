@@ -139,6 +139,21 @@ TEST(a_frames_camera_is_found_again)
     assert_true(fabs(2 * tan(camera.fov_y / 2) * camera_distance(&camera) - 2) < 1e-6);
 }
 
+TEST(a_pose_is_that_of_the_frame_that_the_camera_is_from)
+{
+    struct viewer_camera camera = some_camera();
+    float pose[12], again[12];
+    camera_turn(&camera, 0.3, 0.2);
+    camera_pose(&camera, pose);
+    struct fl_frame frame = {.fov_y = 0.8f};
+    memcpy(frame.world_from_view, pose, sizeof(pose));
+    camera_from_frame(&camera, &frame, 5);
+    camera_pose(&camera, again);
+    for (int i = 0; i < 12; i++)
+        assert_true(fabsf(pose[i] - again[i]) < 1e-6f); /* single precision once */
+    assert_true(pose[3] == 0 && pose[11] == 5);
+}
+
 TEST(between_two_cameras_the_ends_are_the_cameras)
 {
     const struct viewer_camera from = some_camera();
@@ -365,5 +380,14 @@ TEST(keys_switch_and_come_back)
     assert_in_range(settings.exposure_thirds, 3, 3 * 60); /* the protocol has 64 stops */
     assert_int_equal(settings_act(&settings, ACTION_ERROR_MAP), SETTINGS_DRAWN);
     assert_true(settings.error_map);
+    for (int i = 0; i < LOCAL_VIEWS_COUNT; i++) {
+        assert_int_equal(settings.local, i);
+        assert_int_equal(settings_act(&settings, ACTION_LOCAL), SETTINGS_DRAWN);
+    }
+    assert_int_equal(settings.local, LOCAL_OFF);
+    settings_act(&settings, ACTION_HOLES);
+    assert_int_equal(settings.holes, FL_WARP_PATTERN);
+    settings_act(&settings, ACTION_HOLES);
+    assert_int_equal(settings.holes, FL_WARP_FILL);
     assert_int_equal(settings_act(&settings, ACTION_PLAY), SETTINGS_SAME);
 }

@@ -62,6 +62,37 @@ TEST(rates_and_latency_are_those_of_the_last_second)
     assert_true(summary.frames_per_second == 0 && fabs(summary.latency_s - 0.012) < 1e-9);
 }
 
+TEST(what_a_picture_takes_on_its_way_is_that_of_the_last_ones)
+{
+    struct metrics_summary summary;
+    metrics_summarise(&metrics, 1000 * MS, &summary);
+    assert_int_equal(summary.round_frames, 0);
+    for (uint32_t i = 0; i < 20; i++) {
+        add(i, i + 1, (1000 + i * 100) * MS);
+        metrics_show(&metrics, (1000 + i * 100 + 50) * MS); /* when it is shown does not matter */
+    }
+    metrics_summarise(&metrics, 3000 * MS, &summary);
+    assert_in_range(summary.round_frames, 3, 20);
+    assert_true(fabs(summary.round_s - 0.008) < 1e-9);
+}
+
+TEST(views_that_are_made_here_have_a_rate_and_a_latency_of_their_own)
+{
+    struct metrics_summary summary;
+    add(0, 1, 1000 * MS);
+    for (uint64_t i = 0; i < 300; i++) { /* more than are remembered, 100 a second */
+        const uint64_t moved_ns = (1000 + 10 * i) * MS;
+        metrics_add_view(&metrics, i % 2 == 0 ? moved_ns : 0, moved_ns + 5 * MS);
+        metrics_show(&metrics, moved_ns + (i == 298 ? 40 : 7) * MS);
+    }
+    metrics_summarise(&metrics, 4000 * MS, &summary);
+    assert_true(summary.views_per_second == 100 && summary.frames_per_second == 0);
+    assert_true(fabs(summary.view_latency_s - 0.007) < 1e-9);
+    assert_true(fabs(summary.view_latency_99_s - 0.040) < 1e-9);
+    metrics_summarise(&metrics, 9000 * MS, &summary);
+    assert_true(summary.views_per_second == 0 && summary.view_latency_s == 0);
+}
+
 TEST(frames_that_refine_have_no_latency)
 {
     struct metrics_summary summary;
@@ -223,6 +254,20 @@ TEST(the_overlay_shows_its_figures_within_the_window)
     check_within(&shown);
     assert_true(tells("teapot.glb") && tells("bvh, whitted") && tells("refining: 3 of 16 samples"));
     assert_true(tells("8.0 ms") && tells("640x360") && tells("trace") && !tells("errors"));
+    assert_false(tells("views made here") || tells("depth"));
+    shown.local = (struct hud_local){.on = true};
+    hud_layout(&hud, &shown, measure, NULL);
+    assert_true(tells("none: the newest picture") && !tells("not seen yet"));
+    shown.local = (struct hud_local){
+        .on = true, .shown = true, .age_s = 0.25, .bound_pixels = 0.75, .unseen = 0.031, .depth_bytes = 12000};
+    shown.wire_bytes = 46000;
+    hud_layout(&hud, &shown, measure, NULL);
+    check_within(&shown);
+    assert_true(tells("0.25 s old, off by 0.75 pixels") && tells("3.1 %") && tells("34 kB, raw; depth 12 kB"));
+    shown.local.bound_pixels = INFINITY;
+    hud_layout(&hud, &shown, measure, NULL);
+    assert_true(tells("0.25 s old, no bound"));
+    shown.local = (struct hud_local){0};
     shown.structure[0] = "nodes 10806";
     hud_layout(&hud, &shown, measure, NULL);
     check_within(&shown);

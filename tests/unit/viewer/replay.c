@@ -31,10 +31,10 @@ TEST(every_kind_of_event_is_read)
               " {\"mouse\": \"move\", \"x\": 11, \"y\": 21, \"after\": 0.25}, {\"mouse\": \"up\"},\n"
               " {\"wheel\": -2}, {\"key\": \"t\", \"shift\": true}, {\"key\": \"w\", \"hold\": 0.5},\n"
               " {\"resize\": [640, 360]}, {\"wait\": \"rest\", \"samples\": 8, \"timeout\": 3}, {\"wait\": "
-              "\"lost\"},\n"
+              "\"lost\"}, {\"wait\": \"camera\"},\n"
               " {\"screenshot\": \"a/b.png\"}, {\"state\": \"here\"}, {\"after\": 2}]"))
         fail_msg("%s", error.text);
-    assert_int_equal(replay.count, 14); /* a key is two: down and up */
+    assert_int_equal(replay.count, 15); /* a key is two: down and up */
     const struct replay_event *event = replay.events;
     assert_int_equal(event[0].input.kind, INPUT_BUTTON_DOWN);
     assert_int_equal(event[0].input.button, INPUT_RIGHT);
@@ -53,10 +53,11 @@ TEST(every_kind_of_event_is_read)
     assert_true(event[9].kind == REPLAY_REST && event[9].samples == 8 && event[9].timeout_s == 3);
     assert_true(event[10].kind == REPLAY_LOST && event[10].samples == 0 && event[10].timeout_s == 120);
     assert_int_equal(event[10].number, 8); /* in the file */
-    assert_true(event[11].kind == REPLAY_SCREENSHOT);
-    assert_string_equal(event[11].path, "a/b.png");
-    assert_true(event[12].kind == REPLAY_STATE);
-    assert_true(event[13].kind == REPLAY_INPUT && event[13].after_s == 2);
+    assert_true(event[11].kind == REPLAY_CAMERA);
+    assert_true(event[12].kind == REPLAY_SCREENSHOT);
+    assert_string_equal(event[12].path, "a/b.png");
+    assert_true(event[13].kind == REPLAY_STATE);
+    assert_true(event[14].kind == REPLAY_INPUT && event[14].after_s == 2);
     replay_finish(&replay);
 }
 

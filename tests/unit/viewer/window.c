@@ -184,6 +184,24 @@ TEST(a_picture_is_painted_pixel_by_pixel_or_as_large_as_it_fits)
     pixmap_finish(&made);
 }
 
+TEST(a_picture_without_its_margin_is_its_middle)
+{
+    struct pixmap whole = {0}, middle = {0};
+    assert_true(pixmap_resize(&whole, 7, 5, &error));
+    for (int i = 0; i < 7 * 5 * 4; i++)
+        whole.pixels[i] = (uint8_t)i;
+    assert_true(pixmap_crop(&middle, &whole, 2, 1, &error));
+    assert_true(middle.width == 3 && middle.height == 3);
+    for (int y = 0; y < 3; y++)
+        assert_memory_equal(middle.pixels + y * 3 * 4, whole.pixels + ((y + 1) * 7 + 2) * 4, 3 * 4);
+    const uint64_t versions[] = {whole.version, middle.version};
+    pixmap_exchange(&whole, &middle);
+    assert_true(whole.width == 3 && middle.width == 7);
+    assert_true(whole.version > versions[0] && middle.version > versions[1]);
+    pixmap_finish(&whole);
+    pixmap_finish(&middle);
+}
+
 TEST(the_overlay_is_painted_over_the_picture)
 {
     struct pixmap picture = {0}, made = {0};

@@ -1,0 +1,255 @@
+/* SPDX-License-Identifier: MIT */
+/* Views that are made here while the camera moves: what the daemon is asked for, and which picture is shown. */
+#include "viewer/viewer_state.h"
+#include "protocol/common/clock.h"
+
+#include <math.h>
+#include <string.h>
+
+#define MARGIN 0.1f        /* share of the picture's edges on each side */
+#define DEPTH_PIXELS 0.25f /* that the rounding of depths may move what an eye within the radius sees */
+#define RADIUS_FACTOR 4    /* another distance of what is looked at is another radius, if it is so much */
+#define ROUNDS_MIN 3u      /* frames before it is decided: the first ones are of structures that are built */
+/* Between the daemon's camera and the same one here, both in floats: less than a hundredth of a pixel. */
+#define SAME 1e-5
+
+/* ---- whether ---- */
+
+bool viewer_has_local(const struct viewer *viewer)
+{
+    const enum local_views mode = viewer->settings.local;
+    /* Where a clip moves the camera, only the daemon knows where it is; a picture of two eyes is no key view. */
+    return (mode == LOCAL_ON || (mode == LOCAL_AUTO && viewer->local_switch.on)) && !viewer_follows(viewer) &&
+           !viewer->settings.stereo;
+}
+
+void viewer_plan_local(struct viewer *viewer, uint64_t now_ns)
+{
+    struct metrics_summary summary;
+    metrics_summarise(&viewer->metrics, now_ns, &summary);
+    viewer->round_ns = (uint64_t)(summary.round_s * 1e9);
+    if (summary.round_frames >= ROUNDS_MIN)
+        plan_switch(&viewer->local_switch, summary.round_s, now_ns);
+}
+
+/* ---- what the daemon is asked for ---- */
+
+static float radius_of(const struct viewer *viewer)
+{
+    return viewer->has_camera ? (float)(PLAN_RADIUS_SHARE * camera_distance(&viewer->camera)) : 0;
+}
+
+void viewer_ask_local(struct viewer *viewer, struct message_render *view)
+{
+    viewer->local_asked = viewer_has_local(viewer);
+    viewer->local_granted = false;
+    if (!viewer->local_asked)
+        return;
+    if (radius_of(viewer) > 0)
+        view->depth_radius = radius_of(viewer);
+    viewer->local_radius = view->depth_radius;
+    view->attachments |= FL_ATTACH_DEPTH;
+    view->depth_form = PROTOCOL_DEPTH_FORM_INVERSE;
+    view->depth_pixels = DEPTH_PIXELS;
+    view->margin = MARGIN;
+}
+
+bool viewer_asks_otherwise(const struct viewer *viewer)
+{
+    const float radius = radius_of(viewer), asked = viewer->local_radius;
+    if (viewer_has_local(viewer) != viewer->local_asked)
+        return true;
+    return viewer->local_asked && radius > 0 && (radius > asked * RADIUS_FACTOR || radius < asked / RADIUS_FACTOR);
+}
+
+void viewer_refuse_local(struct viewer *viewer)
+{
+    if (viewer->local_asked && !viewer->local_granted)
+        viewer->settings.local = LOCAL_OFF;
+}
+
+/* ---- of which camera, and when ---- */
+
+static void follow_motion(struct viewer *viewer, uint64_t now_ns)
+{
+    if (!viewer->has_camera || memcmp(&viewer->followed_camera, &viewer->camera, sizeof(viewer->camera)) == 0)
+        return;
+    plan_motion_add(&viewer->motion, &viewer->camera, now_ns);
+    viewer->followed_camera = viewer->camera;
+}
+
+void viewer_aim(const struct viewer *viewer, bool moving, uint64_t now_ns, struct viewer_camera *camera)
+{
+    *camera = viewer->camera;
+    if (moving && viewer->local_asked)
+        plan_motion_predict(&viewer->motion, now_ns, viewer->round_ns, camera);
+}
+
+static double distance(const double a[3], const double b[3])
+{
+    return sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) + (a[2] - b[2]) * (a[2] - b[2]));
+}
+
+bool viewer_needs_picture(const struct viewer *viewer, uint64_t now_ns)
+{
+    struct viewer_camera next;
+    if (!viewer->shows_made || viewer->tour.playing)
+        return true;
+    viewer_aim(viewer, true, now_ns, &next);
+    const struct fl_warp_counts *counts = &viewer->made_of.counts;
+    return plan_is_due(&(struct plan_need){.since_asked_ns = now_ns - viewer->looked_ns,
+                                           .gone = distance(next.eye, viewer->asked.eye),
+                                           .radius = (double)viewer->local_radius,
+                                           .unseen = (double)(counts->behind + counts->outside)});
+}
+
+/* ---- what comes ---- */
+
+/* What is left without the margin. */
+static void leave_margin(struct fl_frame *frame)
+{
+    const double inner = (double)(frame->height - 2 * frame->margin_y) / frame->height;
+    frame->width -= 2 * frame->margin_x;
+    frame->height -= 2 * frame->margin_y;
+    frame->fov_y = (float)(2 * atan(inner * tan((double)frame->fov_y / 2)));
+    frame->ortho_height *= (float)inner;
+}
+
+/* The pictures of motion are for views; one at rest is shown as well. Leaves the picture to the key where it can.
+ */
+static bool give_key(struct viewer *viewer, struct fl_frame *frame, bool is_shown)
+{
+    struct views_key key = {.depth_step = frame->depth_step,
+                            .radius = viewer->local_radius,
+                            .is_final = !frame->moving && frame->samples >= viewer->view.samples,
+                            .came_ns = monotonic_now_ns()};
+    if (!viewer->views)
+        viewer->views = views_create(&viewer->failure);
+    if (!viewer->views || (is_shown && !pixmap_copy(&key.picture, &viewer->arrived, &viewer->failure)))
+        return false;
+    if (!is_shown)
+        pixmap_exchange(&key.picture, &viewer->arrived);
+    memcpy(key.camera.world_from_view, frame->world_from_view, sizeof(key.camera.world_from_view));
+    key.camera.fov_y = frame->fov_y;
+    key.depth = frame->depth;
+    frame->depth = NULL;
+    views_give_key(viewer->views, &key);
+    viewer->has_keys = viewer->local_granted = true;
+    return true;
+}
+
+bool viewer_take_picture(struct viewer *viewer, struct fl_frame *frame)
+{
+    const bool has_margin = frame->margin_x > 0 || frame->margin_y > 0;
+    const bool is_key = frame->depth && frame->fov_y > 0 && viewer_has_local(viewer);
+    const bool is_shown = !has_margin || !is_key || viewer->live.width == 0;
+    viewer->is_live = is_shown;
+    if (is_key && !give_key(viewer, frame, is_shown))
+        return false;
+    const int margin_x = (int)frame->margin_x, margin_y = (int)frame->margin_y;
+    if (is_shown && has_margin &&
+        !pixmap_crop(&viewer->live, &viewer->arrived, margin_x, margin_y, &viewer->failure))
+        return false;
+    if (is_shown && !has_margin)
+        pixmap_exchange(&viewer->live, &viewer->arrived);
+    leave_margin(frame);
+    return true;
+}
+
+/* ---- what is shown ---- */
+
+void viewer_forget_local(struct viewer *viewer)
+{
+    viewer->must_draw |= viewer->shows_made;
+    viewer->has_keys = viewer->shows_made = false;
+    viewer->wish = 0;
+    if (viewer->views)
+        views_forget_keys(viewer->views);
+}
+
+static bool same_camera(const struct viewer *viewer)
+{
+    const struct fl_frame *frame = &viewer->frame;
+    const double eye_scale = camera_distance(&viewer->camera);
+    float pose[12];
+    camera_pose(&viewer->camera, pose);
+    bool same = fabs((double)frame->fov_y - viewer->camera.fov_y) < SAME;
+    for (int i = 0; i < 12; i++)
+        same &= fabs((double)(pose[i] - frame->world_from_view[i])) < SAME * (i % 4 == 3 ? eye_scale : 1);
+    return same;
+}
+
+/* The last frame itself shows what the camera sees. */
+static bool is_newest(const struct viewer *viewer)
+{
+    const bool is_asked = viewer->frame.command == viewer->command && !viewer->must_look;
+    return viewer->is_live && ((is_asked && !viewer->frame.moving) || same_camera(viewer));
+}
+
+static struct views_wish wish_of(const struct viewer *viewer)
+{
+    struct views_wish wish = {.holes = viewer->settings.holes,
+                              .frame_ns = viewer->window ? window_frame_ns(viewer->window) : PLAN_FRAME_NS,
+                              .moved_ns = viewer->moved_ns};
+    viewer_render_size(viewer, &wish.width, &wish.height);
+    camera_pose(&viewer->camera, wish.camera.world_from_view);
+    wish.camera.fov_y = (float)viewer->camera.fov_y;
+    return wish;
+}
+
+static bool is_wanted(const struct viewer *viewer, const struct views_wish *wish)
+{
+    const struct views_wish *before = &viewer->wished;
+    return viewer->wish != 0 && memcmp(&wish->camera, &before->camera, sizeof(wish->camera)) == 0 &&
+           wish->width == before->width && wish->height == before->height && wish->holes == before->holes;
+}
+
+static void want(struct viewer *viewer)
+{
+    const struct views_wish wish = wish_of(viewer);
+    if (is_wanted(viewer, &wish))
+        return;
+    viewer->wished = wish;
+    viewer->wish = views_want(viewer->views, &wish);
+}
+
+static void show_view(struct viewer *viewer)
+{
+    const uint64_t before = viewer->shows_made ? viewer->made_of.wish : 0;
+    if (!views_take(viewer->views, &viewer->made, &viewer->made_of))
+        return;
+    /* One from a newer key is no answer to a move. */
+    const uint64_t moved_ns = viewer->made_of.wish != before ? viewer->made_of.moved_ns : 0;
+    metrics_add_view(&viewer->metrics, moved_ns, monotonic_now_ns());
+    viewer->shows_made = viewer->must_draw = true;
+    viewer->local_views++;
+}
+
+void viewer_step_local(struct viewer *viewer, uint64_t now_ns)
+{
+    struct fl_warp_error why;
+    follow_motion(viewer, now_ns);
+    if (!viewer->views)
+        return;
+    if (viewer->has_keys && !viewer_has_local(viewer))
+        viewer_forget_local(viewer); /* they would be old when views are made again */
+    if (!viewer->has_camera || !viewer->has_keys || is_newest(viewer)) {
+        views_want_none(viewer->views);
+        viewer->wish = 0;
+        viewer->must_draw |= viewer->shows_made;
+        viewer->shows_made = false;
+        return;
+    }
+    want(viewer);
+    show_view(viewer);
+    if (views_take_error(viewer->views, &why))
+        viewer_say(viewer, "no view can be made: %s %s", why.field, why.text);
+}
+
+bool viewer_shows_camera(const struct viewer *viewer)
+{
+    const struct views_wish wish = wish_of(viewer);
+    if (viewer->shows_made)
+        return is_wanted(viewer, &wish) && views_is_best(viewer->views, &viewer->made_of, viewer->wish);
+    return viewer->frames > 0 && is_newest(viewer);
+}

@@ -1,0 +1,175 @@
+/* SPDX-License-Identifier: MIT */
+/* When views are made here, of which camera the daemon is asked for a picture and when, and in which quality. */
+#include "viewer/plan.h"
+#include "tests/harness/test.h"
+
+#include <math.h>
+
+#define MS UINT64_C(1000000)
+#define SECOND (1000 * MS)
+/* Rounding of a few dozen operations on numbers of about ten. */
+#define CLOSE 1e-12
+
+static struct viewer_camera some_camera(double x)
+{
+    return (struct viewer_camera){.eye = {x, 0, 5}, .look_at = {x, 0, 0}, .up = {0, 1, 0}, .fov_y = 0.8};
+}
+
+/* ---- whether ---- */
+
+TEST(views_begin_where_a_picture_takes_longer_than_a_frame_and_end_after_a_while_of_fast_ones)
+{
+    struct plan_switch plan = {0};
+    assert_false(plan_switch(&plan, 0.016, 1 * SECOND));
+    assert_false(plan.on);
+    assert_true(plan_switch(&plan, 0.020, 2 * SECOND));
+    assert_true(plan.on);
+    /* Nearly a frame is no reason to end. */
+    for (uint64_t at = 3; at < 20; at++)
+        assert_false(plan_switch(&plan, 0.015, at * SECOND));
+    assert_true(plan.on);
+    /* Nor is a short time of fast ones, with a slower one in between. */
+    assert_false(plan_switch(&plan, 0.005, 20 * SECOND));
+    assert_false(plan_switch(&plan, 0.012, 21 * SECOND));
+    assert_false(plan_switch(&plan, 0.005, 22 * SECOND));
+    assert_false(plan_switch(&plan, 0.005, 23 * SECOND));
+    assert_true(plan_switch(&plan, 0.005, 24 * SECOND));
+    assert_false(plan.on);
+    /* Off, the same time does not begin them again. */
+    assert_false(plan_switch(&plan, 0.015, 25 * SECOND));
+    assert_false(plan.on);
+}
+
+/* ---- of which camera ---- */
+
+TEST(a_steady_flight_is_foreseen)
+{
+    struct plan_motion motion = {0};
+    struct viewer_camera camera = {0};
+    for (uint64_t at = 0; at <= 200; at += 4) /* 2 m/s */
+        plan_motion_add(&motion,
+                        &(struct viewer_camera){.eye = {(double)at * 0.002, 0, 5},
+                                                .look_at = {(double)at * 0.002, 0, 0},
+                                                .up = {0, 1, 0},
+                                                .fov_y = 0.8},
+                        SECOND + at * MS);
+    plan_motion_predict(&motion, SECOND + 200 * MS, 100 * MS, &camera);
+    assert_true(fabs(camera.eye[0] - 0.6) < CLOSE && fabs(camera.look_at[0] - 0.6) < CLOSE);
+    assert_true(camera.eye[2] == 5 && camera.fov_y == 0.8);
+    /* Beyond a quarter of a second nobody knows. */
+    plan_motion_predict(&motion, SECOND + 200 * MS, 5 * SECOND, &camera);
+    assert_true(fabs(camera.eye[0] - 0.9) < CLOSE);
+}
+
+TEST(what_has_stopped_is_foreseen_where_it_is)
+{
+    struct plan_motion motion = {0};
+    struct viewer_camera camera = some_camera(-1);
+    plan_motion_predict(&motion, SECOND, 100 * MS, &camera);
+    assert_true(camera.eye[0] == -1); /* nothing was added: it stays */
+    for (uint64_t at = 0; at <= 100; at += 4) {
+        camera = some_camera((double)at);
+        plan_motion_add(&motion, &camera, SECOND + at * MS);
+    }
+    plan_motion_predict(&motion, SECOND + 300 * MS, 100 * MS, &camera);
+    assert_true(camera.eye[0] == 100 && camera.look_at[0] == 100);
+}
+
+/* After a pause nothing is known of the time before. */
+TEST(a_beginning_motion_is_not_exaggerated)
+{
+    struct plan_motion motion = {0};
+    struct viewer_camera camera = some_camera(0);
+    plan_motion_add(&motion, &camera, SECOND);
+    camera = some_camera(0.1);
+    plan_motion_add(&motion, &camera, 9 * SECOND);
+    plan_motion_predict(&motion, 9 * SECOND, 100 * MS, &camera);
+    assert_true(camera.eye[0] > 0.1 && camera.eye[0] <= 0.2 + CLOSE);
+}
+
+TEST(a_turn_is_foreseen_at_the_same_distance)
+{
+    struct plan_motion motion = {0};
+    struct viewer_camera camera = some_camera(0);
+    for (uint64_t at = 0; at <= 100; at += 4) {
+        plan_motion_add(&motion, &camera, SECOND + at * MS);
+        if (at < 100)
+            camera_turn(&camera, 0.004, 0); /* a radian a second */
+    }
+    plan_motion_predict(&motion, SECOND + 100 * MS, 200 * MS, &camera);
+    assert_true(fabs(camera_distance(&camera) - 5) < CLOSE);
+    const double angle = atan2(camera.look_at[0] - camera.eye[0], camera.eye[2] - camera.look_at[2]);
+    /* 0.3 radians; it goes straight on from 0.1, along the chord of the last 0.1: off by the curvature, half the
+     * square of the way, at most. */
+    assert_true(fabs(angle - 0.3) < 0.5 * 0.3 * 0.3);
+    assert_true(camera.eye[0] == 0 && camera.eye[2] == 5);
+}
+
+TEST(a_camera_that_would_turn_over_is_not_foreseen)
+{
+    struct plan_motion motion = {0};
+    struct viewer_camera camera = some_camera(0), newest;
+    for (uint64_t at = 0; at <= 100; at += 4) {
+        plan_motion_add(&motion, &camera, SECOND + at * MS);
+        newest = camera;
+        camera.look_at[1] += 1e5; /* nearly along `up` */
+    }
+    plan_motion_predict(&motion, SECOND + 100 * MS, 200 * MS, &camera);
+    assert_memory_equal(&camera, &newest, sizeof(camera));
+}
+
+/* ---- when ---- */
+
+TEST(a_picture_is_due_by_time_by_way_and_by_what_is_not_seen)
+{
+    const struct plan_need none = {.since_asked_ns = 249 * MS, .gone = 0.049, .radius = 0.1, .unseen = 0.03};
+    struct plan_need need = none;
+    assert_false(plan_is_due(&need));
+    need.since_asked_ns = 250 * MS;
+    assert_true(plan_is_due(&need));
+    need = none;
+    need.gone = 0.05;
+    assert_true(plan_is_due(&need));
+    need = none;
+    need.unseen = 0.031;
+    assert_true(plan_is_due(&need));
+}
+
+/* ---- in which quality ---- */
+
+TEST(slow_views_step_down_and_the_tree_is_tried_less_and_less_often)
+{
+    struct plan_rung rung = {0};
+    uint64_t now_ns = 10 * SECOND;
+    assert_int_equal(rung.quality, FL_WARP_TREE);
+    /* A view in time, and one that is a little late now and then, change nothing. */
+    for (int i = 0; i < 100; i++, now_ns += 17 * MS)
+        plan_rung(&rung, i % 2 == 0 ? 12 * MS : 40 * MS, PLAN_FRAME_NS, now_ns);
+    assert_int_equal(rung.quality, FL_WARP_TREE);
+    uint64_t pause_ns = SECOND;
+    for (int tries = 0; tries < 8; tries++) {
+        plan_rung(&rung, 60 * MS, PLAN_FRAME_NS, now_ns);
+        assert_int_equal(rung.quality, FL_WARP_ITERATIVE);
+        plan_rung(&rung, 5 * MS, PLAN_FRAME_NS, now_ns + pause_ns - 1);
+        assert_int_equal(rung.quality, FL_WARP_ITERATIVE);
+        now_ns += pause_ns;
+        plan_rung(&rung, 5 * MS, PLAN_FRAME_NS, now_ns);
+        assert_int_equal(rung.quality, FL_WARP_TREE);
+        now_ns += 60 * MS;
+        pause_ns = pause_ns < 16 * SECOND ? pause_ns * 2 : pause_ns;
+    }
+    /* Once the tree has been in time for a second, it is as at first. */
+    for (int i = 0; i < 100; i++, now_ns += 17 * MS)
+        plan_rung(&rung, 12 * MS, PLAN_FRAME_NS, now_ns);
+    plan_rung(&rung, 60 * MS, PLAN_FRAME_NS, now_ns);
+    plan_rung(&rung, 5 * MS, PLAN_FRAME_NS, now_ns + SECOND);
+    assert_int_equal(rung.quality, FL_WARP_TREE);
+}
+
+TEST(views_that_are_all_a_little_late_step_down)
+{
+    struct plan_rung rung = {0};
+    for (int i = 0; i < 6; i++) /* half a frame late each */
+        plan_rung(&rung, 25 * MS, PLAN_FRAME_NS, SECOND + (uint64_t)i * 25 * MS);
+    assert_int_equal(rung.quality, FL_WARP_ITERATIVE);
+}

@@ -1,0 +1,137 @@
+/* SPDX-License-Identifier: MIT */
+/* The thread that makes views: which ones come out, from which picture and of which camera. */
+#include "viewer/views.h"
+#include "tests/harness/test.h"
+#include "protocol/common/clock.h"
+
+#include <math.h>
+#include <poll.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define EDGE 64
+#define PATIENCE_NS UINT64_C(60000000000) /* on a busy machine */
+
+static struct fl_warp_camera camera_at(float x)
+{
+    return (struct fl_warp_camera){.world_from_view = {1, 0, 0, x, 0, 1, 0, 0, 0, 0, 1, 0}, .fov_y = 1};
+}
+
+/* A wall of one grey, two metres away. */
+static struct views_key some_key(uint8_t grey)
+{
+    struct fl_error error;
+    struct views_key key = {.camera = camera_at(0), .radius = 0.2f, .is_final = true};
+    assert_true(pixmap_resize(&key.picture, EDGE, EDGE, &error));
+    memset(key.picture.pixels, grey, EDGE * EDGE * 4);
+    key.depth = malloc(EDGE * EDGE * sizeof(*key.depth));
+    assert_non_null(key.depth);
+    for (int i = 0; i < EDGE * EDGE; i++)
+        key.depth[i] = 2;
+    return key;
+}
+
+static uint64_t want(struct views *views, float x)
+{
+    const struct views_wish wish = {.width = EDGE, .height = EDGE, .camera = camera_at(x), .frame_ns = 1000000};
+    return views_want(views, &wish);
+}
+
+static void wait_for(struct views *views, struct pixmap *picture, struct views_made *made)
+{
+    const uint64_t end_ns = monotonic_now_ns() + PATIENCE_NS;
+    while (!views_take(views, picture, made)) {
+        assert_true(monotonic_now_ns() < end_ns);
+        poll(NULL, 0, 1);
+    }
+}
+
+static int grey_of(const struct pixmap *picture)
+{
+    return picture->pixels[(EDGE / 2 * EDGE + EDGE / 2) * 4];
+}
+
+TEST(a_view_is_of_the_newest_picture_and_the_newest_camera)
+{
+    struct fl_error error;
+    struct views *views = views_create(&error);
+    struct pixmap picture = {0};
+    struct views_made made = {0};
+    struct views_key key = some_key(100);
+    assert_non_null(views);
+    const uint64_t first = want(views, 0);
+    assert_false(views_take(views, &picture, &made)); /* of what? */
+    views_give_key(views, &key);
+    assert_true(!key.depth && !key.picture.pixels); /* taken over */
+    do
+        wait_for(views, &picture, &made);
+    while (!views_is_best(views, &made, first));
+    assert_true(made.wish == first && made.quality == FL_WARP_TREE);
+    assert_true(picture.width == EDGE && picture.height == EDGE && grey_of(&picture) == 100);
+    assert_true(made.counts.known > 0.99f);
+    /* A newer camera, a newer picture: each makes another view, at last of both. */
+    const uint64_t second = want(views, 0.1f);
+    key = some_key(50);
+    views_give_key(views, &key);
+    assert_false(views_is_best(views, &made, first));
+    do
+        wait_for(views, &picture, &made);
+    while (!views_is_best(views, &made, second));
+    assert_int_equal(grey_of(&picture), 50);
+    assert_true(made.counts.outside > 0.01f); /* the wall's right edge was not seen */
+    pixmap_finish(&picture);
+    views_destroy(views);
+}
+
+TEST(a_view_of_an_earlier_motion_does_not_come_in_a_later_one)
+{
+    struct fl_error error;
+    struct views *views = views_create(&error);
+    struct pixmap picture = {0};
+    struct views_made made = {0};
+    struct views_key key = some_key(100);
+    assert_non_null(views);
+    views_give_key(views, &key);
+    for (int motion = 0; motion < 20; motion++) {
+        want(views, 0.05f);
+        poll(NULL, 0, motion % 4); /* it is made, or it is not */
+        views_want_none(views);
+        assert_false(views_take(views, &picture, &made));
+        const uint64_t wish = want(views, -0.05f);
+        wait_for(views, &picture, &made);
+        assert_true(made.wish == wish);
+        views_want_none(views);
+    }
+    views_forget_keys(views);
+    want(views, 0);
+    poll(NULL, 0, 5);
+    assert_false(views_take(views, &picture, &made));
+    pixmap_finish(&picture);
+    views_destroy(views);
+}
+
+TEST(a_picture_of_which_no_view_can_be_made_is_reported_and_the_next_one_helps)
+{
+    struct fl_error error;
+    struct fl_warp_error why = {0};
+    struct views *views = views_create(&error);
+    struct pixmap picture = {0};
+    struct views_made made = {0};
+    struct views_key key = some_key(100);
+    assert_non_null(views);
+    key.camera.world_from_view[0] = NAN;
+    want(views, 0);
+    views_give_key(views, &key);
+    const uint64_t end_ns = monotonic_now_ns() + PATIENCE_NS;
+    while (!views_take_error(views, &why) && monotonic_now_ns() < end_ns)
+        poll(NULL, 0, 1);
+    assert_int_equal(why.code, FL_WARP_ERROR_ARGUMENT);
+    assert_false(views_take_error(views, &why) || views_take(views, &picture, &made));
+    key = some_key(100);
+    key.depth[0] = NAN; /* nothing is known there */
+    views_give_key(views, &key);
+    wait_for(views, &picture, &made);
+    assert_int_equal(grey_of(&picture), 100);
+    pixmap_finish(&picture);
+    views_destroy(views);
+}
