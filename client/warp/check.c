@@ -77,6 +77,14 @@ static bool check_w(const float *w, size_t count, uint32_t width, struct fl_warp
     return true;
 }
 
+bool warp_check_layer(const struct fl_warp_layer *layer, uint32_t width, uint32_t height,
+                      struct fl_warp_error *error)
+{
+    if (!layer->colours || !layer->w)
+        return warp_error_set(error, FL_WARP_ERROR_ARGUMENT, "layers", "a layer has no colours, or no depths");
+    return check_w(layer->w, (size_t)width * height, width, error);
+}
+
 bool warp_check_key(const struct fl_warp_key *key, struct fl_warp_error *error)
 {
     if (!check_size(key->width, key->height, error))
@@ -93,14 +101,10 @@ bool warp_check_key(const struct fl_warp_key *key, struct fl_warp_error *error)
     if (key->layer_count < 1 || key->layer_count > FL_WARP_LAYERS_MAX)
         return warp_error_set(error, FL_WARP_ERROR_ARGUMENT, "layer_count", "%u is not between 1 and %u",
                               key->layer_count, FL_WARP_LAYERS_MAX);
-    for (uint32_t l = 0; l < key->layer_count; l++) {
-        if (!key->layers[l].colours || !key->layers[l].w)
-            return warp_error_set(error, FL_WARP_ERROR_ARGUMENT, "layers", "layer %u has no colours, or no depths",
-                                  l);
-        if (!check_w(key->layers[l].w, (size_t)key->width * key->height, key->width, error))
-            return false;
-    }
-    return true;
+    bool good = true;
+    for (uint32_t l = 0; good && l < key->layer_count; l++)
+        good = warp_check_layer(&key->layers[l], key->width, key->height, error);
+    return good;
 }
 
 bool warp_check_part(const struct fl_warp_part *part, uint32_t width, uint32_t height, struct fl_warp_error *error)

@@ -11,6 +11,8 @@ bool warp_error_set(struct fl_warp_error *error, enum fl_warp_error_code code, c
 
 /* False: the error says what is wrong. */
 bool warp_check_key(const struct fl_warp_key *key, struct fl_warp_error *error);
+bool warp_check_layer(const struct fl_warp_layer *layer, uint32_t width, uint32_t height,
+                      struct fl_warp_error *error);
 /* Of a layer of this size. */
 bool warp_check_part(const struct fl_warp_part *part, uint32_t width, uint32_t height,
                      struct fl_warp_error *error);

@@ -38,8 +38,8 @@ static inline void load_texels(const struct warp_layer *layer, const int places[
     }
 }
 
-LANES_KERNEL void warp_colour(const struct warp_layer *layer, const float x[LANES], const float y[LANES],
-                              uint32_t colours[LANES])
+LANES_KERNEL static void colour_places(const struct warp_layer *layer, const float *x, const float *y,
+                                       uint32_t *colours)
 {
     const float last_x = (float)((int)layer->width - 1), last_y = (float)((int)layer->height - 1);
     const int across = (int)layer->padded_width;
@@ -64,4 +64,10 @@ LANES_KERNEL void warp_colour(const struct warp_layer *layer, const float x[LANE
         const uint32_t share_y = (shares_y[k] & joined) | (nearest_y & ~joined);
         colours[k] = mix_four(texels.above[k], texels.below[k], share_x, share_y);
     }
+}
+
+void warp_colour(const struct warp_layer *layer, const float x[LANES], const float y[LANES],
+                 uint32_t colours[LANES])
+{
+    colour_places(layer, x, y, colours);
 }

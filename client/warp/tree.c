@@ -43,7 +43,7 @@ bool warp_layer_init(struct warp_layer *layer, uint32_t width, uint32_t height)
     layer->w = calloc(texels, sizeof(*layer->w));
     layer->joined = calloc(texels / WARP_JOINED_WORD, sizeof(*layer->joined));
     layer->nodes = calloc(nodes, 2 * sizeof(*layer->nodes));
-    layer->errors = calloc(nodes - texels, sizeof(*layer->errors));
+    layer->errors = calloc((size_t)nodes - texels + layer->padded_width, sizeof(*layer->errors));
     layer->blocks = calloc(blocks, sizeof(*layer->blocks));
     if (!layer->colours || !layer->w || !layer->joined || !layer->nodes || !layer->errors || !layer->blocks)
         return false;
@@ -173,7 +173,7 @@ static void make_blocks(struct warp_layer *layer, uint32_t level, uint32_t y, st
 struct merge_terms {
     float h; /* half a side of a child: also from the centre of the node to those of the children */
     float tolerance, nearness;
-    float of_leaves, of_nodes;                /* 1 where the children are these, else 0: no branches in lanes */
+    float of_leaves;                          /* 1 where the children are leaves, else 0: no branches in lanes */
     const uint32_t *upper, *lower;            /* two rows of children: their words .. */
     const float *upper_errors, *lower_errors; /* .. and how far their planes are off at most */
 };
@@ -202,7 +202,7 @@ LANES_INLINE void merge(const struct merge_terms *terms, int x, uint32_t *node, 
         reach[i] = (magnitude(sx[i]) + magnitude(sy[i])) * h;
         /* Rounding of the leaves themselves, whose exact planes are known no more. */
         const float rounding = w4[i] * ROUNDING + (reach[i] * SLOPE_ROUNDING + 2 * h * SLOPE_STEP);
-        error[i] = terms->of_nodes * child_error[i] + terms->of_leaves * (w4[i] > 0 ? rounding : 0);
+        error[i] = child_error[i] + terms->of_leaves * (w4[i] > 0 ? rounding : 0);
         all_planes &= node_is_plane(head[i]);
         all_something &= w4[i] > 0;
         any_something |= w4[i] > 0;
@@ -232,18 +232,22 @@ LANES_INLINE void merge(const struct merge_terms *terms, int x, uint32_t *node, 
     *node_error = merges ? worst : 0;
 }
 
+/* A row of zeros behind the errors. */
+static const float *leaf_errors(const struct warp_layer *layer)
+{
+    return layer->errors + (warp_layer_nodes(layer) - layer->padded_width * layer->padded_height);
+}
+
 LANES_KERNEL static void merge_row(struct warp_layer *layer, uint32_t level, uint32_t y, struct span span)
 {
     const uint32_t texels = layer->padded_width * layer->padded_height, across = layer->padded_width >> level;
     const size_t below = node_level_first(texels, level - 1) + (size_t)4 * across * y;
     const size_t here = node_level_first(texels, level) + (size_t)across * y;
-    /* Leaves have no errors: any others are read in their place, and do not count. */
-    const float *child_errors = layer->errors + (level == 1 ? 0 : below - texels);
+    const float *child_errors = level == 1 ? leaf_errors(layer) : layer->errors + (below - texels);
     const struct merge_terms terms = {.h = 0.25f * (float)(1u << level),
                                       .tolerance = layer->tolerance,
                                       .nearness = layer->nearness,
                                       .of_leaves = level == 1,
-                                      .of_nodes = level > 1,
                                       .upper = layer->nodes + 2 * below,
                                       .lower = layer->nodes + 2 * (below + 2 * across),
                                       .upper_errors = child_errors,

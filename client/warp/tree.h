@@ -31,7 +31,8 @@ struct warp_layer {
     float *w;
     uint32_t *joined; /* a bit a texel: it, the one to the right, and those below them show one surface */
     uint32_t *nodes;  /* two words each */
-    float *errors;    /* of the levels above the lowest: how far a plane is from those of the leaves at most */
+    float *errors; /* of the levels above the lowest: how far a plane is from those of the leaves at most; then a
+                      row of zeros */
     struct warp_block *blocks;
     uint32_t block_first[QUADTREE_TOP + 1]; /* of a level */
 };

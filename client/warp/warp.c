@@ -16,7 +16,8 @@ struct fl_warp {
     uint32_t layer_count; /* 0: there is no key view */
     struct fl_warp_camera camera;
     float unit, radius, pixels, off_pixels; /* off_pixels: of w_error, from an eye at the radius */
-    float *scratch;                         /* of each thread */
+    float w_error;
+    float *scratch; /* of each thread */
     uint64_t build_ns;
 };
 
@@ -94,7 +95,7 @@ static float focal_of(const struct fl_warp_camera *camera, uint32_t height)
     return 0.5f * (float)height / tanf(0.5f * camera->fov_y);
 }
 
-/* As many as the key view needs, of its size; those that there are stay where they are. */
+/* As many as the key view needs at least, of its size; those that there are stay where they are. */
 static bool have_layers(struct fl_warp *warp, const struct fl_warp_key *key, struct fl_warp_error *error)
 {
     struct warp_layer layers[FL_WARP_LAYERS_MAX] = {{0}};
@@ -123,30 +124,57 @@ static bool have_layers(struct fl_warp *warp, const struct fl_warp_key *key, str
     }
     for (uint32_t l = first; l < key->layer_count; l++)
         warp->layers[l] = layers[l];
-    forget_layers(warp->layers, key->layer_count);
     warp->layer_count = key->layer_count;
     return true;
+}
+
+/* All of it, by the bounds of the key view. */
+static void fill_layer(const struct fl_warp *warp, struct warp_layer *layer, const struct fl_warp_layer *texels)
+{
+    const struct warp_rectangle all = {0, 0, layer->width, layer->height};
+    layer->tolerance = warp->unit * warp->pixels / (focal_of(&warp->camera, layer->height) * warp->radius);
+    layer->nearness = warp->radius / warp->unit;
+    layer->noise = warp->w_error;
+    copy_texels(layer, texels, &all);
 }
 
 bool fl_warp_set_key(struct fl_warp *warp, const struct fl_warp_key *key, struct fl_warp_error *error)
 {
     if (!warp_check_key(key, error) || !have_layers(warp, key, error))
         return false;
-    const float focal = focal_of(&key->camera, key->height);
     const struct warp_rectangle all = {0, 0, key->width, key->height};
     warp->camera = key->camera;
     warp->unit = key->unit != 0 ? key->unit : 1;
     warp->radius = key->radius;
     warp->pixels = key->pixels;
-    warp->off_pixels = key->w_error * key->radius / warp->unit * focal;
-    for (uint32_t l = 0; l < key->layer_count; l++) {
-        warp->layers[l].tolerance = warp->unit * key->pixels / (focal * key->radius);
-        warp->layers[l].nearness = key->radius / warp->unit;
-        warp->layers[l].noise = key->w_error;
-        copy_texels(&warp->layers[l], &key->layers[l], &all);
-    }
+    warp->w_error = key->w_error;
+    warp->off_pixels = key->w_error * key->radius / warp->unit * focal_of(&key->camera, key->height);
+    for (uint32_t l = 0; l < key->layer_count; l++)
+        fill_layer(warp, &warp->layers[l], &key->layers[l]);
     struct build build = {.warp = warp, .parts = warp_layer_parts(&warp->layers[0], &all)};
     warp->build_ns = warp_pool_run(warp->pool, build_row, &build, key->layer_count * build.parts.bottom);
+    return true;
+}
+
+bool fl_warp_add_layer(struct fl_warp *warp, const struct fl_warp_layer *texels, struct fl_warp_error *error)
+{
+    const uint32_t number = warp->layer_count;
+    if (number == 0)
+        return warp_error_set(error, FL_WARP_ERROR_ARGUMENT, "layer", "there is no key view; set one first");
+    if (number == FL_WARP_LAYERS_MAX)
+        return warp_error_set(error, FL_WARP_ERROR_ARGUMENT, "layer", "there are %u layers, the limit", number);
+    struct warp_layer *layer = &warp->layers[number];
+    const uint32_t width = warp->layers[0].width, height = warp->layers[0].height;
+    if (!warp_check_layer(texels, width, height, error))
+        return false;
+    if (!layer->w && !warp_layer_init(layer, width, height))
+        return warp_error_set(error, FL_WARP_ERROR_MEMORY, "size",
+                              "there is no memory for a layer of %ux%u texels", width, height);
+    fill_layer(warp, layer, texels);
+    warp->layer_count = number + 1;
+    const struct warp_rectangle all = {0, 0, width, height};
+    struct build build = {.warp = warp, .layer = number, .parts = warp_layer_parts(layer, &all)};
+    warp->build_ns = warp_pool_run(warp->pool, build_row, &build, build.parts.bottom);
     return true;
 }
 

@@ -121,6 +121,8 @@ void fl_warp_destroy(struct fl_warp *warp);
 
 /* Replaces the key view. */
 bool fl_warp_set_key(struct fl_warp *warp, const struct fl_warp_key *key, struct fl_warp_error *error);
+/* One more layer of the key view that was set: what comes behind the last one. */
+bool fl_warp_add_layer(struct fl_warp *warp, const struct fl_warp_layer *texels, struct fl_warp_error *error);
 /* Of the key view that was set; the structure is what it would be if all had been set at once. */
 bool fl_warp_update(struct fl_warp *warp, const struct fl_warp_part *part, struct fl_warp_error *error);
 /* Of all threads, for the last fl_warp_set_key() or fl_warp_update(). */

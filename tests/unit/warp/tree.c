@@ -324,3 +324,24 @@ TEST(a_key_view_takes_the_place_of_another_one)
     fl_warp_destroy(warp);
     fl_warp_destroy(anew);
 }
+
+TEST(a_layer_that_comes_later_equals_one_that_was_there)
+{
+    set_surfaces(0);
+    set_surfaces(1);
+    struct fl_warp_key first = key_of(1), both = key_of(2);
+    struct fl_warp *warp = warp_with(2, &both), *anew = warp_with(1, &both);
+    struct fl_warp_error error = {0};
+    uint32_t count;
+    const struct fl_warp_layer none = {key_colours[1], NULL};
+    assert_true(fl_warp_set_key(warp, &first, &error) && !fl_warp_nodes(warp, 1, &count));
+    assert_false(fl_warp_add_layer(warp, &none, &error));
+    assert_string_equal(error.field, "layers");
+    assert_true(fl_warp_add_layer(warp, &both.layers[1], &error));
+    expect_same(warp, anew, 2);
+    assert_true(fl_warp_add_layer(warp, &both.layers[1], &error)); /* the last that there may be */
+    assert_false(fl_warp_add_layer(warp, &both.layers[1], &error));
+    assert_string_equal(error.field, "layer");
+    fl_warp_destroy(warp);
+    fl_warp_destroy(anew);
+}
