@@ -4,9 +4,9 @@
 #include "base/clock.h"
 #include "base/log.h"
 #include "base/parallel.h"
+#include "encode/depth.h"
 #include "encode/sparse.h"
 #include "encode/stream.h"
-#include "protocol/pixels/inverse_depth.h"
 
 #include <pthread.h>
 #include <stdatomic.h>
@@ -170,27 +170,23 @@ static struct picture picture_of(const struct encode_task *task, const uint8_t *
                             .given_up_context = task};
 }
 
-/* *rounded: malloc'ed; NULL: metres are what the frame can have. */
-static bool round_depth(struct engine_frame *frame, uint16_t **rounded, struct error *error)
+static const float *depths_of(const struct frame_result *result)
+{
+    return (const float *)(const void *)frame_result_attachment(result, ATTACHMENT_DEPTH);
+}
+
+/* *rounded: malloc'ed; NULL: metres are what the frame has. */
+static bool round_depths(struct engine_frame *frame, uint16_t **rounded, struct error *error)
 {
     const struct frame_result *result = &frame->result;
-    const size_t count = (size_t)result->width * result->height;
-    const float fov_y = frame->request.camera.fov_y;
+    const struct depth_picture picture = {.depths = depths_of(result),
+                                          .width = result->width,
+                                          .height = result->height,
+                                          .fov_y = frame->request.camera.fov_y,
+                                          .pixels = frame->depth.pixels,
+                                          .radius = frame->depth.radius};
     *rounded = NULL;
-    if (frame->depth.form != DEPTH_FORM_INVERSE || !(fov_y > 0.0f))
-        return true;
-    const float step = inverse_depth_step(frame->depth.pixels, frame->depth.radius, result->height, fov_y);
-    uint16_t *made = malloc(count * sizeof(*made));
-    if (!made)
-        return no_memory_for_attachments(error);
-    if (inverse_depth_round((const float *)(const void *)frame_result_attachment(result, ATTACHMENT_DEPTH), count,
-                            step, made)) {
-        frame->depth_step = step;
-        *rounded = made;
-    } else {
-        free(made);
-    }
-    return true;
+    return frame->depth.form != DEPTH_FORM_INVERSE || depth_round(&picture, rounded, &frame->depth_step, error);
 }
 
 static bool append(struct engine_frame *frame, const struct picture *picture, size_t *added_bytes,
@@ -215,7 +211,7 @@ static bool append_depth(const struct encode_task *task, struct error *error)
     uint16_t *rounded;
     if (!(frame->result.attachments & 1u << ATTACHMENT_DEPTH))
         return true;
-    if (!round_depth(frame, &rounded, error))
+    if (!round_depths(frame, &rounded, error))
         return false;
     const struct picture picture =
         rounded
@@ -260,8 +256,7 @@ static void fill_hidden(const struct engine_frame *frame)
     const struct frame_result *result = &frame->result;
     if (frame->request.hidden_layer > 0 && result->format == PIXEL_FORMAT_RGBA8 &&
         result->attachments & 1u << ATTACHMENT_DEPTH)
-        sparse_fill(result->pixels, (const float *)(const void *)frame_result_attachment(result, ATTACHMENT_DEPTH),
-                    result->width, result->height);
+        sparse_fill(result->pixels, depths_of(result), result->width, result->height);
 }
 
 static bool encode(const struct encode_task *task, struct error *error)
