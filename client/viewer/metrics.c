@@ -108,6 +108,12 @@ void metrics_show(struct metrics *metrics, uint64_t shown_ns)
             shown_ns;
 }
 
+void metrics_add_bytes(struct metrics *metrics, uint64_t bytes)
+{
+    if (metrics->count > 0)
+        metrics->frames[(metrics->next + METRICS_FRAMES - 1) % METRICS_FRAMES].wire_bytes += bytes;
+}
+
 const struct metrics_frame *metrics_frame(const struct metrics *metrics, size_t back)
 {
     if (back >= metrics->count)

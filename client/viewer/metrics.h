@@ -58,6 +58,8 @@ struct metrics {
 
 /* A frame that came and was decoded at `decoded_ns`; it counts as shown until metrics_show() says when it was. */
 void metrics_add(struct metrics *metrics, const struct fl_frame *frame, uint64_t decoded_ns);
+/* That have come for the last frame beside it. */
+void metrics_add_bytes(struct metrics *metrics, uint64_t bytes);
 /* A view that was made here, likewise. */
 void metrics_add_view(struct metrics *metrics, uint64_t moved_ns, uint64_t made_ns);
 /* Marks the frames and views since the last call as shown now. */

@@ -151,13 +151,14 @@ static json_t *local_json(const struct viewer *viewer, const struct hud_state *s
                           const struct metrics_summary *summary)
 {
     const struct hud_local *local = &state->local;
-    json_t *object = json_pack(
-        "{s:s, s:b, s:b, s:I, s:f, s:f, s:f, s:s, s:I, s:I}", "views", local_views_names[viewer->settings.local],
-        "on", (int)local->on, "shown", (int)local->shown, "made", (json_int_t)viewer->local_views,
-        "views_per_second", summary->views_per_second, "latency_s", summary->view_latency_s, "latency_99_s",
-        summary->view_latency_99_s, "holes", viewer->settings.holes == FL_WARP_FILL ? "fill" : "pattern",
-        "picture_bytes", (json_int_t)(state->wire_bytes - local->depth_bytes), "depth_bytes",
-        (json_int_t)local->depth_bytes);
+    json_t *object =
+        json_pack("{s:s, s:b, s:b, s:I, s:f, s:f, s:f, s:s, s:I, s:I, s:i}", "views",
+                  local_views_names[viewer->settings.local], "on", (int)local->on, "shown", (int)local->shown,
+                  "made", (json_int_t)viewer->local_views, "views_per_second", summary->views_per_second,
+                  "latency_s", summary->view_latency_s, "latency_99_s", summary->view_latency_99_s, "holes",
+                  viewer->settings.holes == FL_WARP_FILL ? "fill" : "pattern", "picture_bytes",
+                  (json_int_t)(state->wire_bytes - local->depth_bytes), "depth_bytes",
+                  (json_int_t)local->depth_bytes, "layers", (int)viewer->made_of.layers);
     if (!object || !local->shown)
         return object;
     json_object_set_new(object, "quality", json_string(local->quality == FL_WARP_TREE ? "tree" : "iterative"));

@@ -8,6 +8,7 @@
 
 #define MARGIN 0.1f        /* share of the picture's edges on each side */
 #define DEPTH_PIXELS 0.25f /* that the rounding of depths may move what an eye within the radius sees */
+#define HIDDEN_LAYERS 1    /* has most of what eyes see past edges; a second one would halve what is left */
 #define RADIUS_FACTOR 4    /* another distance of what is looked at is another radius, if it is so much */
 #define ROUNDS_MIN 3u      /* frames before it is decided: the first ones are of structures that are built */
 /* Between the daemon's camera and the same one here, both in floats: less than a hundredth of a pixel. */
@@ -52,6 +53,8 @@ void viewer_ask_local(struct viewer *viewer, struct message_render *view)
     view->depth_form = PROTOCOL_DEPTH_FORM_INVERSE;
     view->depth_pixels = DEPTH_PIXELS;
     view->margin = MARGIN;
+    /* Of a lens or an open shutter the daemon has none. */
+    view->hidden_layers = view->aperture > 0 || view->shutter > 0 ? 0 : HIDDEN_LAYERS;
 }
 
 bool viewer_asks_otherwise(const struct viewer *viewer)
@@ -134,6 +137,7 @@ static bool give_key(struct viewer *viewer, struct fl_frame *frame, bool is_show
     key.depth = frame->depth;
     frame->depth = NULL;
     views_give_key(viewer->views, &key);
+    viewer->key_frame = frame->frame;
     viewer->has_keys = viewer->local_granted = true;
     return true;
 }
@@ -154,6 +158,18 @@ bool viewer_take_picture(struct viewer *viewer, struct fl_frame *frame)
         pixmap_exchange(&viewer->live, &viewer->arrived);
     leave_margin(frame);
     return true;
+}
+
+void viewer_take_hidden(struct viewer *viewer, struct fl_frame *frame)
+{
+    struct views_layer layer = {0};
+    metrics_add_bytes(&viewer->metrics, frame->wire_bytes);
+    if (!viewer->has_keys || frame->of_frame != viewer->key_frame || !frame->depth || !frame->pixels)
+        return;
+    pixmap_take(&layer.picture, frame);
+    layer.depth = frame->depth;
+    frame->depth = NULL;
+    views_give_layer(viewer->views, &layer);
 }
 
 /* ---- what is shown ---- */

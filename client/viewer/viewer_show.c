@@ -139,6 +139,10 @@ static void take_structure(struct viewer *viewer, const struct fl_frame *frame)
 
 static void take(struct viewer *viewer, struct fl_frame *frame)
 {
+    if (frame->hidden_layer > 0) {
+        viewer_take_hidden(viewer, frame);
+        return;
+    }
     if (!decode(viewer, frame) || !viewer_take_picture(viewer, frame))
         return;
     metrics_add(&viewer->metrics, frame, monotonic_now_ns());

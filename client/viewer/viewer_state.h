@@ -64,6 +64,7 @@ struct viewer {
     uint64_t round_ns;               /* from camera to picture, lately */
     bool local_asked, local_granted; /* the stream was asked to have depths; it has had them since then */
     bool has_keys;                   /* views can be made */
+    uint32_t key_frame;              /* number of the frame that the last key was */
     float local_radius;              /* of the sphere that their bound holds in */
     struct viewer_camera asked;      /* that the daemon was told last: where it was going to be */
     bool is_live;                    /* the last frame is in `live` */
@@ -123,6 +124,8 @@ void viewer_refuse_local(struct viewer *viewer);
 /* The camera that the daemon is told: while it moves, where it will be when the picture is here. */
 void viewer_aim(const struct viewer *viewer, bool moving, uint64_t now_ns, struct viewer_camera *camera);
 bool viewer_needs_picture(const struct viewer *viewer, uint64_t now_ns); /* while it moves */
+/* What the picture of a key hides. */
+void viewer_take_hidden(struct viewer *viewer, struct fl_frame *frame);
 /* The frame that has `arrived`, which is without its margin afterwards. */
 bool viewer_take_picture(struct viewer *viewer, struct fl_frame *frame);
 /* Wants a view where it is needed, and shows what has been made. */

@@ -20,6 +20,8 @@ struct views {
     bool quit;
     struct views_key given; /* the newest that was not taken; no depth: there is none */
     uint64_t keys;          /* that were given */
+    struct views_layer given_layers[FL_WARP_LAYERS_MAX - 1]; /* of the last one, that were not taken */
+    uint32_t given_layer_count;
     bool forgets, wants;
     struct views_wish wish;
     uint64_t wishes; /* number of `wish` */
@@ -36,7 +38,9 @@ struct views {
     uint8_t *mask;
     size_t mask_bytes;
     struct views_key key; /* that the warp has, without picture and depths */
-    uint64_t key_number;  /* 0: it has none */
+    int key_width, key_height;
+    uint64_t key_number; /* 0: it has none */
+    uint32_t key_layers;
     struct views_made last;
     struct plan_rung rung;
     uint64_t begun_ns; /* the last view */
@@ -49,6 +53,20 @@ static void key_finish(struct views_key *key)
     key->depth = NULL;
 }
 
+static void layer_finish(struct views_layer *layer)
+{
+    pixmap_finish(&layer->picture);
+    free(layer->depth);
+    layer->depth = NULL;
+}
+
+/* With the lock. */
+static void drop_layers(struct views *views)
+{
+    while (views->given_layer_count > 0)
+        layer_finish(&views->given_layers[--views->given_layer_count]);
+}
+
 /* ---- in the thread, without the lock ---- */
 
 /* In place. */
@@ -58,11 +76,20 @@ static void invert(float *depths, size_t count, float unit)
         depths[i] = depths[i] > 0 ? unit / depths[i] : 0;
 }
 
-/* From what has come to what views are made from. The unit makes numbers of the order of one. */
+/* Makes numbers of the order of one. */
+static float unit_of(const struct views_key *key)
+{
+    return key->radius / (float)PLAN_RADIUS_SHARE;
+}
+
+/* From what has come to what views are made from. */
 static bool set_key(struct views *views, struct views_key *came, struct fl_warp_error *error)
 {
     const struct pixmap *picture = &came->picture;
-    const float unit = came->radius / (float)PLAN_RADIUS_SHARE;
+    const float unit = unit_of(came);
+    views->key_width = picture->width;
+    views->key_height = picture->height;
+    views->key_layers = 1;
     invert(came->depth, (size_t)picture->width * (size_t)picture->height, unit);
     const struct fl_warp_key key = {
         .width = (uint32_t)picture->width,
@@ -78,6 +105,19 @@ static bool set_key(struct views *views, struct views_key *came, struct fl_warp_
     key_finish(came);
     views->key = *came;
     return set;
+}
+
+static bool add_layer(struct views *views, struct views_layer *came, struct fl_warp_error *error)
+{
+    const struct pixmap *picture = &came->picture;
+    const bool fits = picture->width == views->key_width && picture->height == views->key_height;
+    const struct fl_warp_layer layer = {(const uint32_t *)(const void *)picture->pixels, came->depth};
+    if (fits)
+        invert(came->depth, (size_t)picture->width * (size_t)picture->height, unit_of(&views->key));
+    const bool added = !fits || fl_warp_add_layer(views->warp, &layer, error);
+    views->key_layers += fits && added;
+    layer_finish(came);
+    return added;
 }
 
 static bool reserve(struct views *views, const struct views_wish *wish, struct fl_warp_error *error)
@@ -137,7 +177,12 @@ static bool wants_key(const struct views *views)
 
 static bool is_of_now(const struct views *views, const struct views_made *made)
 {
-    return made->wish == views->wishes && made->key == views->key_number;
+    return made->wish == views->wishes && made->key == views->key_number && made->layers == views->key_layers;
+}
+
+static bool wants_layer(const struct views *views)
+{
+    return views->given_layer_count > 0 && views->key_number == views->keys;
 }
 
 static bool wants_view(const struct views *views)
@@ -167,6 +212,18 @@ static void take_key(struct views *views)
         views->error = error;
 }
 
+static void take_layer(struct views *views)
+{
+    struct views_layer came = views->given_layers[0];
+    struct fl_warp_error error = {0};
+    views->given_layers[0] = views->given_layers[--views->given_layer_count];
+    pthread_mutex_unlock(&views->lock);
+    const bool added = add_layer(views, &came, &error);
+    pthread_mutex_lock(&views->lock);
+    if (!added)
+        views->error = error;
+}
+
 static void take_wish(struct views *views)
 {
     const struct views_wish wish = views->wish;
@@ -187,6 +244,7 @@ static void take_wish(struct views *views)
     }
     views->last.wish = number;
     views->last.key = views->key_number;
+    views->last.layers = views->key_layers;
     if (number < views->first_wish) /* another motion's */
         return;
     pixmap_exchange(&views->made_picture, &views->picture);
@@ -212,6 +270,8 @@ static void *work(void *argument)
         }
         if (wants_key(views))
             take_key(views);
+        else if (wants_layer(views))
+            take_layer(views);
         else if (!wants_view(views))
             pthread_cond_wait(&views->changed, &views->lock);
         else if (monotonic_now_ns() < due_ns(views))
@@ -231,10 +291,23 @@ void views_give_key(struct views *views, struct views_key *key)
     struct views_key outdated = views->given;
     views->given = *key;
     views->keys++;
+    drop_layers(views);
     pthread_cond_signal(&views->changed);
     pthread_mutex_unlock(&views->lock);
     key_finish(&outdated);
     *key = (struct views_key){0};
+}
+
+void views_give_layer(struct views *views, struct views_layer *layer)
+{
+    pthread_mutex_lock(&views->lock);
+    if (views->given_layer_count < FL_WARP_LAYERS_MAX - 1)
+        views->given_layers[views->given_layer_count++] = *layer;
+    else
+        layer_finish(layer);
+    pthread_cond_signal(&views->changed);
+    pthread_mutex_unlock(&views->lock);
+    *layer = (struct views_layer){0};
 }
 
 void views_forget_keys(struct views *views)
@@ -242,6 +315,7 @@ void views_forget_keys(struct views *views)
     pthread_mutex_lock(&views->lock);
     struct views_key outdated = views->given;
     views->given = (struct views_key){0};
+    drop_layers(views);
     views->forgets = true;
     views->wants = views->has_made = false;
     pthread_mutex_unlock(&views->lock);
@@ -285,7 +359,8 @@ bool views_take(struct views *views, struct pixmap *picture, struct views_made *
 bool views_is_best(struct views *views, const struct views_made *made, uint64_t wish)
 {
     pthread_mutex_lock(&views->lock);
-    const bool is_best = made->wish == wish && made->key == views->keys && made->quality == FL_WARP_TREE;
+    const bool is_best = made->wish == wish && made->key == views->keys && made->layers == views->key_layers &&
+                         views->given_layer_count == 0 && made->quality == FL_WARP_TREE;
     pthread_mutex_unlock(&views->lock);
     return is_best;
 }
@@ -344,6 +419,7 @@ void views_destroy(struct views *views)
     pthread_mutex_destroy(&views->lock);
     pthread_cond_destroy(&views->changed);
     fl_warp_destroy(views->warp);
+    drop_layers(views);
     key_finish(&views->given);
     pixmap_finish(&views->made_picture);
     pixmap_finish(&views->picture);

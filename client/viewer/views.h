@@ -20,6 +20,12 @@ struct views_key {
     uint64_t came_ns; /* when it had arrived */
 };
 
+/* What surfaces hide from the camera of a key: one texel for each of its own. */
+struct views_layer {
+    struct pixmap picture;
+    float *depth; /* malloc'ed */
+};
+
 /* What is wanted. */
 struct views_wish {
     uint32_t width, height;
@@ -32,6 +38,7 @@ struct views_wish {
 /* Of the last view. */
 struct views_made {
     uint64_t wish, key; /* their numbers, counted from 1 */
+    uint32_t layers;    /* of the key, with which it was made */
     uint64_t moved_ns, key_came_ns;
     enum fl_warp_quality quality;
     struct fl_warp_counts counts;
@@ -43,6 +50,8 @@ void views_destroy(struct views *views);
 
 /* Takes over the picture's pixels and the depths; what came before is outdated. */
 void views_give_key(struct views *views, struct views_key *key);
+/* Of the last key that was given; likewise. One of another size is dropped. */
+void views_give_layer(struct views *views, struct views_layer *layer);
 void views_forget_keys(struct views *views); /* of a connection that is gone */
 /* Views of it are made until another is wanted or none: one for each key; first one in time, then the best.
  * Returns its number. */

@@ -69,7 +69,7 @@ static void set_hidden(const struct frame_request *request, struct quadtree_sett
     settings->layers = KEY_LAYERS_MAX;
     settings->radius = request->hidden_radius;
     settings->resolution = 0;
-    settings->margin = 0.0f;
+    settings->margin = 0.001f; /* the least that there is */
 }
 
 static void set_layers(const struct frame_request *request, struct quadtree_settings *settings)

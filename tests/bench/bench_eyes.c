@@ -183,7 +183,9 @@ static bool make_once(struct bench *bench, const struct form *form, const float 
     struct frame_request request = request_of(bench, way);
     struct frame_result first = {0};
     uint64_t cold_ns, warm_ns;
-    request.tracer_options.quadtree = form->settings;
+    struct tracer_settings settings = {.quadtree = form->settings};
+    tracer_settings_resolve(&settings); /* as every request has them */
+    request.tracer_options.quadtree = settings.quadtree;
     request.view_source = VIEW_SOURCE_LAYERS;
     request.has_key = true;
     request.key_camera = bench_moved(&bench->scene.camera, (float[3]){KEY_STEP * (float)++bench->keys, 0, 0});

@@ -45,7 +45,7 @@ void quadtree_texel_view(struct trace_view *texels, const struct trace_view *vie
 {
     const uint32_t longer = view->width > view->height ? view->width : view->height;
     const double scale = settings->resolution ? (double)settings->resolution / longer : 1.0;
-    const uint32_t margin = settings->margin > 0.0f ? scaled(longer, scale * (double)settings->margin) : 0;
+    const uint32_t margin = scaled(longer, scale * (double)settings->margin);
     const uint32_t height = scaled(view->height, scale);
     const double wider = (height + 2.0 * margin) / height;
     *texels = *view;
