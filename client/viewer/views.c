@@ -22,6 +22,8 @@ struct views {
     uint64_t keys;          /* that were given */
     struct views_layer given_layers[FL_WARP_LAYERS_MAX - 1]; /* of the last one, that were not taken */
     uint32_t given_layer_count;
+    bool is_adding;      /* one of them to the key .. */
+    uint32_t key_layers; /* .. that the thread has */
     bool forgets, wants;
     struct views_wish wish;
     uint64_t wishes; /* number of `wish` */
@@ -40,7 +42,6 @@ struct views {
     struct views_key key; /* that the warp has, without picture and depths */
     int key_width, key_height;
     uint64_t key_number; /* 0: it has none */
-    uint32_t key_layers;
     struct views_made last;
     struct plan_rung rung;
     uint64_t begun_ns; /* the last view */
@@ -89,7 +90,6 @@ static bool set_key(struct views *views, struct views_key *came, struct fl_warp_
     const float unit = unit_of(came);
     views->key_width = picture->width;
     views->key_height = picture->height;
-    views->key_layers = 1;
     invert(came->depth, (size_t)picture->width * (size_t)picture->height, unit);
     const struct fl_warp_key key = {
         .width = (uint32_t)picture->width,
@@ -107,17 +107,17 @@ static bool set_key(struct views *views, struct views_key *came, struct fl_warp_
     return set;
 }
 
-static bool add_layer(struct views *views, struct views_layer *came, struct fl_warp_error *error)
+/* *added: it is of the key. */
+static bool add_layer(struct views *views, struct views_layer *came, bool *added, struct fl_warp_error *error)
 {
     const struct pixmap *picture = &came->picture;
     const bool fits = picture->width == views->key_width && picture->height == views->key_height;
     const struct fl_warp_layer layer = {(const uint32_t *)(const void *)picture->pixels, came->depth};
     if (fits)
         invert(came->depth, (size_t)picture->width * (size_t)picture->height, unit_of(&views->key));
-    const bool added = !fits || fl_warp_add_layer(views->warp, &layer, error);
-    views->key_layers += fits && added;
+    *added = fits && fl_warp_add_layer(views->warp, &layer, error);
     layer_finish(came);
-    return added;
+    return *added || !fits;
 }
 
 static bool reserve(struct views *views, const struct views_wish *wish, struct fl_warp_error *error)
@@ -208,6 +208,7 @@ static void take_key(struct views *views)
     const bool set = set_key(views, &came, &error);
     pthread_mutex_lock(&views->lock);
     views->key_number = set ? number : 0;
+    views->key_layers = 1;
     if (!set)
         views->error = error;
 }
@@ -216,11 +217,15 @@ static void take_layer(struct views *views)
 {
     struct views_layer came = views->given_layers[0];
     struct fl_warp_error error = {0};
+    bool added = false;
+    views->is_adding = true;
     views->given_layers[0] = views->given_layers[--views->given_layer_count];
     pthread_mutex_unlock(&views->lock);
-    const bool added = add_layer(views, &came, &error);
+    const bool good = add_layer(views, &came, &added, &error);
     pthread_mutex_lock(&views->lock);
-    if (!added)
+    views->is_adding = false;
+    views->key_layers += added;
+    if (!good)
         views->error = error;
 }
 
@@ -360,7 +365,7 @@ bool views_is_best(struct views *views, const struct views_made *made, uint64_t 
 {
     pthread_mutex_lock(&views->lock);
     const bool is_best = made->wish == wish && made->key == views->keys && made->layers == views->key_layers &&
-                         views->given_layer_count == 0 && made->quality == FL_WARP_TREE;
+                         views->given_layer_count == 0 && !views->is_adding && made->quality == FL_WARP_TREE;
     pthread_mutex_unlock(&views->lock);
     return is_best;
 }

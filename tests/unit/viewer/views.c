@@ -83,6 +83,59 @@ TEST(a_view_is_of_the_newest_picture_and_the_newest_camera)
     views_destroy(views);
 }
 
+/* Nearer than the wall, in the middle of it. */
+static bool is_post(int i)
+{
+    return i % EDGE >= EDGE * 3 / 8 && i % EDGE < EDGE * 5 / 8;
+}
+
+/* What comes may make the last view the best without another one. */
+static void wait_for_best(struct views *views, struct views_made *made, uint64_t wish)
+{
+    const uint64_t end_ns = monotonic_now_ns() + PATIENCE_NS;
+    struct pixmap picture = {0};
+    while (views_take(views, &picture, made) || !views_is_best(views, made, wish)) {
+        assert_true(monotonic_now_ns() < end_ns);
+        poll(NULL, 0, 1);
+    }
+    pixmap_finish(&picture);
+}
+
+TEST(what_a_picture_hides_is_seen_once_it_has_come)
+{
+    struct fl_error error;
+    struct views *views = views_create(&error);
+    struct views_made made = {0};
+    struct views_key key = some_key(100);
+    assert_non_null(views);
+    for (int i = 0; i < EDGE * EDGE; i++)
+        key.depth[i] = is_post(i) ? 0.5f : 2;
+    views_give_key(views, &key);
+    const uint64_t wish = want(views, 0.05f);
+    wait_for_best(views, &made, wish);
+    assert_true(made.layers == 1 && made.counts.behind > 0.01f);
+    /* The wall behind the post. */
+    struct views_key like = some_key(200);
+    struct views_layer layer = {like.picture, like.depth};
+    for (int i = 0; i < EDGE * EDGE; i++)
+        layer.depth[i] = is_post(i) ? 2 : 0;
+    views_give_layer(views, &layer);
+    assert_true(!layer.depth && !layer.picture.pixels);
+    assert_false(views_is_best(views, &made, wish));
+    wait_for_best(views, &made, wish);
+    assert_true(made.layers == 2 && made.counts.behind == 0 && made.counts.deeper > 0.01f);
+    /* A new key has none; one of another size is not of it. */
+    key = some_key(100);
+    views_give_key(views, &key);
+    like = some_key(200);
+    layer = (struct views_layer){like.picture, like.depth};
+    layer.picture.width /= 2;
+    views_give_layer(views, &layer);
+    wait_for_best(views, &made, wish);
+    assert_int_equal(made.layers, 1);
+    views_destroy(views);
+}
+
 TEST(a_view_of_an_earlier_motion_does_not_come_in_a_later_one)
 {
     struct fl_error error;
