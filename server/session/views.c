@@ -21,6 +21,9 @@
 #define SILENCE_NS UINT64_C(250000000)
 /* A frame that a link takes longer for than that is not sent again and again while a picture is refined. */
 #define SPARING_NS 250000000.0
+/* Between pictures with a margin at least: who has them makes views in between, which a better picture helps more
+ * than a newer one. */
+#define KEY_NS UINT64_C(100000000)
 #define SECOND_NS 1e9
 
 /* ---- life -------------------------------------------------------------------------------------------- */
@@ -30,8 +33,9 @@ static void on_silence_timer(void *context);
 
 struct view_terms view_terms_of(const struct message_render *render)
 {
+    const uint64_t frame_ns = (uint64_t)(SECOND_NS / (double)render->frames_per_second);
     return (struct view_terms){
-        .frame_ns = (uint64_t)(SECOND_NS / (double)render->frames_per_second),
+        .frame_ns = render->margin > 0.0f && frame_ns < KEY_NS ? KEY_NS : frame_ns,
         .samples = render->samples,
         .still_encoding = (enum encoding)render->still_encoding,
         .quality = encoder_loses((enum encoding)render->encoding) ? render->quality : 0,

@@ -16,7 +16,7 @@
 
 /* A view's terms, as its render has them. */
 struct view_terms {
-    uint64_t frame_ns; /* minimum interval between frames */
+    uint64_t frame_ns; /* that frames are adapted to: the interval between them */
     uint32_t samples;  /* that a picture is to have */
     enum encoding still_encoding;
     unsigned quality; /* of motion; 0: lossless */

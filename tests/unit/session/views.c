@@ -589,6 +589,27 @@ SESSION_TEST(a_view_that_adapts_tells_the_engine_what_the_link_carries)
     engine_command_destroy(start);
 }
 
+/* What is 3 KB a picture at 1000 a second is most of 300 at ten. */
+SESSION_TEST(pictures_with_a_margin_are_adapted_to_ten_a_second)
+{
+    open_scene(1, 1);
+    struct message message = view_message(100);
+    message.render.adapt = 1;
+    message.render.frames_per_second = 1000;
+    message.render.margin = 0.1f;
+    send_message(2, 0, &message);
+    struct engine_command *start = told(ENGINE_JOB_START);
+    say_frame(2, 0, 1); /* 300 KB and moving */
+    take_frame(2, 0);
+    usleep(100000);
+    send_ack(0, true, false);
+    told_and_forgotten(ENGINE_JOB_CREDIT);
+    say_frame(2, 1, 3);
+    take_frame(2, 1);
+    assert_true(view_wishes_see(start->job.wishes).effort.bytes > FRAME_BYTES / 4);
+    engine_command_destroy(start);
+}
+
 /* ---- one view in the place of another ---------------------------------------------------------------- */
 
 static struct engine_command *replace_view(uint32_t request, uint32_t width)
