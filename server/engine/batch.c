@@ -317,7 +317,8 @@ static void frame_failed(struct engine *engine, struct job *job, struct error *e
         device_lost(engine, job);
         return;
     }
-    if (error->kind != ERROR_OUT_OF_MEMORY || !engine_make_room(engine, job, error))
+    const bool has_room = error->kind == ERROR_OUT_OF_MEMORY && engine_make_room(engine, job, error);
+    if (!has_room && !(job->spec.kind == JOB_VIEW && view_goes_without(job, error)))
         job_finish(job, error);
 }
 

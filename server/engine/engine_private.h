@@ -280,6 +280,8 @@ enum ycbcr view_ycbcr(const struct job *job);
 bool view_is_stale(const struct job *job);
 /* After rendering: fills in the fields of a view's frame. */
 void view_done(struct job *job, struct engine_frame *frame);
+/* A frame of what is hidden has failed: the view has none of them from now on. False: it was no such frame. */
+bool view_goes_without(struct job *job, const struct error *error);
 
 /* device.c: the device and the scenes' resources on it. */
 bool engine_open_device(struct engine *engine, struct error *error);

@@ -6,6 +6,7 @@
 #include "engine/engine_private.h"
 
 #include "base/clock.h"
+#include "base/log.h"
 
 #include <math.h>
 
@@ -224,6 +225,15 @@ static void hidden_done(struct job *job, struct engine_frame *frame)
     frame->encoding = encoding_of_hidden(job);
     frame->of_frame = view->picture;
     view->hidden_layer = view->hidden_layer < job->spec.hidden_layers ? view->hidden_layer + 1 : 0;
+}
+
+bool view_goes_without(struct job *job, const struct error *error)
+{
+    if (job->view.hidden_layer == 0)
+        return false;
+    log_write(LOG_WARNING, "engine", "a view goes on without what its pictures hide: %s", error->text);
+    job->view.hidden_layer = job->spec.hidden_layers = 0;
+    return true;
 }
 
 void view_done(struct job *job, struct engine_frame *frame)

@@ -563,6 +563,23 @@ TEST(what_a_picture_hides_follows_it_while_it_moves)
     expect_silence(watching->engine);
 }
 
+TEST(a_view_that_cannot_have_what_is_hidden_goes_on_without)
+{
+    struct watching *watching = *state;
+    struct engine_command *made = with_samples(view(2, watching->wishes), 1, 1);
+    made->job.hidden_layers = 1;
+    atomic_store(&fake.fail_kind, ERROR_LIMIT);
+    atomic_store(&fake.fail_from_frame, atomic_load(&fake.frames_begun) + 2);
+    look(watching, 1, true);
+    submit(watching->engine, made);
+    expect_layer(watching, 0, 1, 0, 0, ENCODING_JPEG);
+    expect_silence(watching->engine);
+    atomic_store(&fake.fail_from_frame, 0);
+    look(watching, 2, true);
+    expect_layer(watching, 1, 2, 0, 0, ENCODING_JPEG);
+    expect_silence(watching->engine);
+}
+
 static void expect_form(struct engine_frame *frame, enum encoding encoding, enum ycbcr form)
 {
     assert_int_equal(frame->encoding, encoding);
