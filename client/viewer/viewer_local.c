@@ -8,9 +8,10 @@
 
 #define MARGIN 0.1f        /* share of the picture's edges on each side */
 #define DEPTH_PIXELS 0.25f /* that the rounding of depths may move what an eye within the radius sees */
-#define HIDDEN_LAYERS 1    /* has most of what eyes see past edges; a second one would halve what is left */
-#define RADIUS_FACTOR 4    /* another distance of what is looked at is another radius, if it is so much */
-#define ROUNDS_MIN 3u      /* frames before it is decided: the first ones are of structures that are built */
+#define HIDDEN_LAYERS                                                                                             \
+    1 /* has most of what eyes see past edges: of a class room two thirds, a second one a tenth */
+#define RADIUS_FACTOR 4 /* another distance of what is looked at is another radius, if it is so much */
+#define ROUNDS_MIN 3u   /* frames before it is decided: the first ones are of structures that are built */
 /* Between the daemon's camera and the same one here, both in floats: less than a hundredth of a pixel. */
 #define SAME 1e-5
 

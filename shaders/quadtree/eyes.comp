@@ -50,8 +50,9 @@ void walk_layer(uint layer, inout eye_walk walk)
     int level = walk.level, first = int(layer * quadtree.slice_nodes);
     ivec2 cell = clamp(ivec2(floor(far + w * along)), ivec2(0), padded - 1) >> level;
     walk.w_met = walk.w_behind = NEVER;
-    // Where lanes go side by side, a loop that begins with its condition does all once more for the last of them. And Mesa's
-    // llvmpipe (22.3) takes what a loop has computed from its last round of any lane, unless different ways out assign it.
+    // Where lanes go side by side, a loop that begins with its condition does all once more for the last of them. Two ways
+    // out, which assign w_met differently: with one at the end, lanes that were done sooner had wrong values behind the loop
+    // (Mesa's llvmpipe 22.3).
     while (true) {
         bool is_on_way = w > w_end;
         uvec2 node = texelFetch(quadtree_nodes, first + int(node_index(0u, uint(level), uvec2(cell)))).xy;
