@@ -385,9 +385,10 @@ class MadeHere(Viewer):
         self.assertEqual(difference(self.folder / "with.png", self.folder / "rested.png"), 0)
 
     def test_auto_makes_views_once_pictures_are_known_to_be_slow(self):
+        """Over a link that takes some frames of a display."""
         moves = [event for step in range(4) for event in (*drag(60, 45, 20 + step, 0), rest(1))]
         states = self.replay([rest(), {"state": "first"}, *moves, {"state": "known"}, {"key": "l"}, {"state": "on"}, {"key": "l"},
-                              {"state": "off"}], "--integrator", "path", "--samples", "64", "--pass-samples", "64", size=(160, 90))
+                              {"state": "off"}], "--link", "1gbit,60ms", size=(160, 90))
         self.assertEqual([states[name]["local"]["views"] for name in ("first", "known", "on", "off")],
                          ["auto", "auto", "on", "off"])
         self.assertEqual([states[name]["local"]["on"] for name in ("first", "known", "on", "off")], [False, True, True, False])
