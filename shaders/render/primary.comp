@@ -77,5 +77,7 @@ void main()
     hits[k].distance = visible.x != VISIBLE_NOTHING ? 0.0 : -1.0;
     hits[k].instance = visible.x == VISIBLE_DISC ? HIT_NO_PRIMITIVE : visible.x - 1u;
     hits[k].primitive = visible.y;
+    if (visible.x == VISIBLE_NOTHING)
+        hits[k].material = 0u; // layers.comp looks at the bits of misses too
 #endif
 }
