@@ -264,6 +264,8 @@ error_t cli_job_set(struct cli_job *job, const char *option, const char *value);
 /* Sets the job's error and returns EINVAL. */
 error_t cli_usage(struct cli_job *job, const char *field, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
+/* An argument that is no option. */
+error_t cli_set_model(struct cli_job *job, const char *path);
 /* After the command line: settings that depend on several options. `is_series`: output is a pattern. */
 bool cli_job_complete(struct cli_job *job, bool is_series);
 /* The same for a window: there is no output. */

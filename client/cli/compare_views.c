@@ -55,10 +55,7 @@ static error_t parse(int key, char *value, struct argp_state *state)
     case KEY_FAIL_ABOVE:
         return cli_pair_set_limit(&comparison->pair, "unknown", value, &comparison->max_unknown);
     case ARGP_KEY_ARG:
-        if (job->model)
-            return cli_usage(job, value, "only one model can be rendered");
-        job->model = value;
-        return 0;
+        return cli_set_model(job, value);
     default:
         return ARGP_ERR_UNKNOWN;
     }

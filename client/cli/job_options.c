@@ -127,6 +127,14 @@ error_t cli_usage(struct cli_job *job, const char *field, const char *format, ..
     return EINVAL;
 }
 
+error_t cli_set_model(struct cli_job *job, const char *path)
+{
+    if (job->model)
+        return cli_usage(job, path, "only one model can be rendered");
+    job->model = path;
+    return 0;
+}
+
 /* An error of lib/text.h gets the option's name. */
 static error_t name_field(struct cli_job *job, const char *field)
 {

@@ -40,10 +40,7 @@ static error_t parse(int key, char *value, struct argp_state *state)
         job->scene = value;
         return 0;
     case ARGP_KEY_ARG:
-        if (job->model)
-            return cli_usage(job, value, "only one model can be rendered");
-        job->model = value;
-        return 0;
+        return cli_set_model(job, value);
     default:
         return ARGP_ERR_UNKNOWN;
     }
