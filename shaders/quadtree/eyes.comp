@@ -26,7 +26,6 @@ const int START = 0;
 const int START = QUADTREE_TOP;
 #endif
 const float NEVER = -1.0; // of a w: behind all that a ray may meet
-const float ALMOST_END = 0.999;
 
 // A ray on its way through a layer, from greater w to lesser.
 struct eye_walk {
@@ -164,7 +163,7 @@ vec4 look(vec3 eye, vec2 place, vec4 beam, out uint code)
     bool is_free = is_free_before(walk, w_enters, quadtree.depths.x / max(eye.z, quadtree.depths.w));
     has_left = has_left || !is_free || is_outside && w_unknown == NEVER;
     bool is_unknown = has_left || w_unknown > w_hit;
-    float w_fill = walk.w_fill != NEVER ? walk.w_fill : mix(w_first, w_leaves_or_ends, ALMOST_END);
+    float w_fill = walk.w_fill != NEVER ? walk.w_fill : mix(w_first, w_leaves_or_ends, QUADTREE_ALMOST_END);
     float w = is_filled ? w_fill : w_hit;
     uint layer = is_filled ? walk.fill_layer : hit_layer;
     code = layers - 1u + (is_unknown ? has_left ? QUADTREE_OUTSIDE : QUADTREE_BEHIND : 0u);

@@ -78,6 +78,13 @@ SHARED_SIZE(quadtree_counts, 32)
     2.0f /* texels: primitives as narrow may lie between the middles of texels, and be seen by none */
 #define QUADTREE_DEEP 0.05f /* of w: what is so far behind a plane is behind the surface */
 
+/* Of w, in bounds: a plane and the extension of another one through a texel are no farther apart. What lies behind
+ * the farthest surface by that is at most so many times as far. */
+#define QUADTREE_PLANES_APART 2.0f
+#define QUADTREE_FARTHER_MAX 16.0f
+/* Where a ray is taken to end that was before nothing: a share of its way through the view. */
+#define QUADTREE_ALMOST_END 0.999f
+
 /* What beams.comp says of a tile: the level at which its rays begin, and whether all of them do so in the view. */
 #define QUADTREE_BEAM_LEVEL 7
 #define QUADTREE_BEAM_INSIDE 8

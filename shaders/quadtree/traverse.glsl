@@ -28,10 +28,7 @@ uniform uint ray_kind;
 
 const float SAME_DISTANCE = 1e-5; // the share by which intersections with one surface differ at most
 const float FLOAT_MAX = 3.4e38;
-const float PLANES_APART = 2.0; // of w, in bounds: a plane and the extension of another one through a texel
-const float FARTHER_MAX = 16.0;  // so many times, by that
 const float NEVER = 2.0; // beyond the end of a segment
-const float ALMOST_END = 0.999;
 const int STEPS_TOGETHER = 32; // of rays side by side, before what some of them have met is looked at
 
 // A ray on its way through a layer of a face.
@@ -388,7 +385,8 @@ float last_distance(trace_ray r)
     if (is_orthographic())
         far += quadtree.bounds.x * (far - quadtree.depths.x);
     else
-        far = 1.0 / max(1.0 / far - PLANES_APART * quadtree.bounds.x / quadtree.depths.x, 1.0 / (FARTHER_MAX * far));
+        far = 1.0 / max(1.0 / far - QUADTREE_PLANES_APART * quadtree.bounds.x / quadtree.depths.x,
+                        1.0 / (QUADTREE_FARTHER_MAX * far));
     return (length(r.origin - quadtree.eye_world.xyz) + far) / length(r.direction);
 }
 
@@ -488,7 +486,7 @@ void end_face(trace_ray r, layer_walk walk, inout found_type found, inout view_w
     if (walk.u_behind >= walk.u_end || t >= seen.t_unknown)
         return;
     bool was_before = walk.u_fill != NEVER;
-    vec2 place = walk.s.from.xy + walk.s.along.xy * (was_before ? walk.u_fill : ALMOST_END);
+    vec2 place = walk.s.from.xy + walk.s.along.xy * (was_before ? walk.u_fill : QUADTREE_ALMOST_END);
     seen.t_unknown = t;
     seen.t_fill = was_before ? distance_at(walk.s, walk.u_fill) : t;
     seen.fill_slice = FACE(walk.face) * quadtree.layers + walk.fill_layer;

@@ -10,9 +10,6 @@
 /* The cosine of the angle between an eye's ray and the direction of the view, at the least: numbers of what goes
  * nearly across it grow beyond what floats tell apart. */
 #define COSINE_MIN 0.1f
-/* As last_distance() of traverse.glsl has them. */
-#define PLANES_APART 2.0f
-#define FARTHER_MAX 16.0f
 
 /* ---- an eye in the face ---- */
 
@@ -161,12 +158,12 @@ static bool make_beams(const struct quadtree_store *store, struct quadtree_state
 {
     const uint32_t first = rays->first_slot / 64, end = (rays->first_slot + rays->slot_count + 63) / 64;
     const struct quadtree_uniforms *u = &store->uniforms;
-    const float far = u->depths[1], w_of_far = 1.0f / far - PLANES_APART * u->bounds[0] / u->depths[0];
+    const float far = u->depths[1], w_of_far = 1.0f / far - QUADTREE_PLANES_APART * u->bounds[0] / u->depths[0];
     if (!gpu_buffer_reserve(store->device, &state->beams, (end - first) * sizeof(vec4), error))
         return false;
     set_eyes(program, u, rays->frame);
     gpu_uniform_float(program, "eye_near", rays->frame->extent_near[2]);
-    gpu_uniform_float(program, "eye_far", 1.0f / fmaxf(w_of_far, 1.0f / (FARTHER_MAX * far)));
+    gpu_uniform_float(program, "eye_far", 1.0f / fmaxf(w_of_far, 1.0f / (QUADTREE_FARTHER_MAX * far)));
     gpu_uniform_float(program, "eye_reach", rays->reach);
     gpu_uniform_uint(program, "first_tile", first);
     gpu_uniform_uint(program, "tile_count", end - first);
@@ -179,9 +176,7 @@ static bool make_beams(const struct quadtree_store *store, struct quadtree_state
 /* A GPU's driver ends what takes long (trace/program.h). */
 static void dispatch(const struct quadtree_store *store, const struct gpu_program *program, uint32_t samples)
 {
-    const struct quadtree_uniforms *u = &store->uniforms;
-    const uint32_t together =
-        trace_rays_a_dispatch(store->device, (uint64_t)u->layers * (u->padded_width + u->padded_height) * 2);
+    const uint32_t together = trace_rays_a_dispatch(store->device, quadtree_rounds_of_a_ray(store));
     for (uint32_t first = 0, part; first < samples; first += part) {
         part = together && together < samples - first ? together : samples - first;
         gpu_uniform_uint(program, "first_item", first);

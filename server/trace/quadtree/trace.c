@@ -125,8 +125,7 @@ static struct trace_program_source source_of(const struct tracer_options *option
     return (struct trace_program_source){.traverse = "quadtree/traverse.glsl", .defines = defines};
 }
 
-/* A ray passes a texel of each column and each row, by a node of each level at most. */
-static uint64_t rounds_of_a_ray(const struct quadtree_store *store)
+uint64_t quadtree_rounds_of_a_ray(const struct quadtree_store *store)
 {
     const struct quadtree_uniforms *u = &store->uniforms;
     return (uint64_t)u->faces * u->layers * (u->padded_width + u->padded_height) * 2;
@@ -140,7 +139,7 @@ bool quadtree_intersect(struct quadtree_store *store, struct gpu_scene *scene, s
     const struct gpu_program *program = trace_program_get(scene, rays->wave, &source, error);
     if (!program)
         return false;
-    source.rays_a_dispatch = trace_rays_a_dispatch(store->device, rounds_of_a_ray(store));
+    source.rays_a_dispatch = trace_rays_a_dispatch(store->device, quadtree_rounds_of_a_ray(store));
     quadtree_store_bind(store);
     gpu_buffer_bind_storage(&state->counts, BIND_QUADTREE_COUNTS);
     gpu_uniform_uint(program, "ray_kind", rays->wave->family / WAVE_BOUNCES);

@@ -28,6 +28,8 @@ bool quadtree_trace_begin(struct trace_state *state, struct error *error);
  * behind what the view sees first are stopped. */
 bool quadtree_intersect(struct quadtree_store *store, struct gpu_scene *scene, struct quadtree_state *state,
                         const struct ray_range *rays, const struct tracer_options *options, struct error *error);
+/* A ray passes a texel of each column and each row, by a node of each level at most. */
+uint64_t quadtree_rounds_of_a_ray(const struct quadtree_store *store);
 /* As tracer_impl.layer_hits. */
 bool quadtree_layer_hits(struct quadtree_store *store, struct gpu_scene *scene, const struct ray_range *rays,
                          uint32_t layer, struct error *error);
