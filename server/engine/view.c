@@ -143,7 +143,6 @@ static bool take_up_hidden(struct job *job, struct shot *shot, struct error *err
     request->accumulate = false;
     request->samples = 1;
     request->hidden_layer = view->hidden_layer;
-    request->hidden_layers = job->spec.hidden_layers;
     request->hidden_radius = job->spec.depth.radius;
     apply_effort(job, request);
     add_margin(job, request);

@@ -35,10 +35,9 @@ struct frame_request {
     /* What is rendered is seen by another camera than the picture's; only with VIEW_SOURCE_LAYERS. */
     bool has_key;
     struct frame_camera key_camera;
-    /* 0: what is seen. Else: the surfaces that so many others hide, where an eye within
-     * hidden_radius may see them; elsewhere there is nothing. `hidden_layers`: how many of them are going to be
-     * asked for of the same camera, which then have one structure. */
-    uint32_t hidden_layer, hidden_layers;
+    /* 0: what is seen. 1, 2: of the surfaces that it hides, the first and the second at each pixel that an eye
+     * within hidden_radius sees past what hides them; elsewhere there is nothing. */
+    uint32_t hidden_layer;
     float hidden_radius; /* metres; of that */
     uint32_t samples, depth;
     uint64_t seed;

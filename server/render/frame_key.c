@@ -6,6 +6,7 @@
 
 #include "render/compact.h"
 #include "render/frame_request.h"
+#include "render/integrators/integrator.h"
 #include "shared/layers.h"
 
 #include <math.h>
@@ -123,8 +124,7 @@ static bool begin_layers(struct frame_renderer *renderer, const struct trace_vie
 /* Frames that add to one another have layers with noise of their own each, or that of the first would stay. */
 static bool is_noise_new(const struct frame_renderer *renderer)
 {
-    const enum integrator_kind integrator = renderer->request.integrator;
-    return integrator == INTEGRATOR_WHITTED || integrator == INTEGRATOR_RAYCAST ||
+    return !integrator_by_number(renderer->request.integrator)->random ||
            renderer->key.first_sample == renderer->eyes_samples_before;
 }
 

@@ -147,9 +147,9 @@ static bool check_views(const struct frame_request *request, struct error *error
     if (request->view_source == VIEW_SOURCE_LAYERS && request->compare)
         return error_set(error, ERROR_UNSUPPORTED, "compare",
                          "views made from layers are not traced by a second tracer; compare rendered ones");
-    if (request->hidden_layer > request->hidden_layers || request->hidden_layers >= KEY_LAYERS_MAX)
-        return error_set(error, ERROR_INVALID, "hidden_layers", "layer %u of %u; the structure has %u",
-                         request->hidden_layer, request->hidden_layers, KEY_LAYERS_MAX - 1);
+    if (request->hidden_layer >= KEY_LAYERS_MAX)
+        return error_set(error, ERROR_INVALID, "hidden_layers", "layer %u; there are %u", request->hidden_layer,
+                         KEY_LAYERS_MAX - 1);
     if (request->hidden_layer && (request->view_source == VIEW_SOURCE_LAYERS || request->compare ||
                                   request->accumulate || request->aperture > 0.0f || frame_has_views(request)))
         return error_set(error, ERROR_UNSUPPORTED, "hidden_layers",

@@ -117,7 +117,8 @@ static bool check_hidden(const struct message_render *render, struct error *erro
         return error_remedy(error, "set it to 0");
     }
     if (!(render->attachments & 1u << PROTOCOL_ATTACHMENT_DEPTH)) {
-        error_set(error, ERROR_INVALID, "render.hidden_layers", "without depth nobody knows where something is");
+        error_set(error, ERROR_INVALID, "render.hidden_layers",
+                  "they need depth, which says where there is a surface");
         return error_remedy(error, "add depth to attachments");
     }
     if (render->aperture > 0.0f || render->shutter > 0.0f || render->compare) {

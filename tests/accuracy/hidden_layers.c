@@ -37,7 +37,6 @@ static void set_up(struct fixture *fixture, double plate_half, double plate)
 
 static const float *render_hidden(struct fixture *fixture, uint32_t layer, struct frame_result *result)
 {
-    fixture->request.hidden_layers = 2;
     fixture->request.hidden_layer = layer;
     *result = fixture_render(fixture);
     return (const float *)(const void *)frame_result_attachment(result, ATTACHMENT_DEPTH);
@@ -141,7 +140,6 @@ TEST(hidden_layers_that_cannot_be_are_refused)
         struct frame_request *request = &fixture->request;
         struct error error = {0};
         *request = good;
-        request->hidden_layers = 2;
         request->hidden_layer = i == 0 ? 3 : 1;
         request->accumulate = i == 1;
         request->aperture = i == 2 ? 0.1f : 0.0f;
