@@ -209,9 +209,9 @@ LANES_INLINE void merge(const struct merge_terms *terms, int x, uint32_t *node, 
     }
     /* Least squares of w at the four centres. */
     const uint32_t flag = (head[0] | head[1] | head[2] | head[3]) & 1u;
-    const uint32_t merged_tail = plane_tail((((w4[1] - w4[0]) - w4[2]) + w4[3]) * (0.25f / h),
-                                            (((w4[2] - w4[0]) - w4[1]) + w4[3]) * (0.25f / h));
-    const uint32_t merged_head = plane_head((((w4[0] + w4[1]) + w4[2]) + w4[3]) * 0.25f, flag);
+    const uint32_t merged_tail = plane_tail(((w4[1] - w4[0]) + (w4[3] - w4[2])) * (0.25f / h),
+                                            ((w4[2] - w4[0]) + (w4[3] - w4[1])) * (0.25f / h));
+    const uint32_t merged_head = plane_head(((w4[0] + w4[1]) + (w4[2] + w4[3])) * 0.25f, flag);
     const float w = plane_w(merged_head), slope_x = plane_slope_x(merged_tail),
                 slope_y = plane_slope_y(merged_tail);
     float off[4], high[4], low[4];

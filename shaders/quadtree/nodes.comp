@@ -193,9 +193,9 @@ void main()
     // Rounding of the leaves themselves, whose exact planes are known no more.
     four.error = mix(vec4(0.0), w4 * ROUNDING + (reach * SLOPE_ROUNDING + 2.0 * h * SLOPE_STEP), is_something);
 #endif
-    // Least squares of w at the four centres.
-    float w = dot(w4, vec4(0.25));
-    vec2 slopes = vec2(dot(w4, side_x), dot(w4, side_y)) * (0.25 / h);
+    // Least squares of w at the four centres, summed up in the order of client/warp.
+    float w = ((w4.x + w4.y) + (w4.z + w4.w)) * 0.25;
+    vec2 slopes = vec2((w4.y - w4.x) + (w4.w - w4.z), (w4.z - w4.x) + (w4.w - w4.y)) * (0.25 / h);
     uvec2 node = plane_node(w, slopes, any(notEqual(four.head & 1u, uvec4(0u))));
     w = plane_w(node);
     slopes = plane_slopes(node);
