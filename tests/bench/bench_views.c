@@ -28,6 +28,7 @@ static const char usage[] = "usage: bench views --model FILE | --family TRIANGLE
                             "  --runs N        after one warm-up; default 3, at most 64\n";
 
 #define MOVES_MAX 8u
+#define RADIUS 0.15f /* metres, of the bound: the usual one */
 
 struct move {
     float way[3]; /* right, up, ahead */
@@ -103,7 +104,8 @@ static bool prepare(struct bench *bench, struct error *error)
     bench->renderer = bench->shared ? frame_renderer_create(bench->shared, error) : NULL;
     bench->key = calloc(count, sizeof(*bench->key));
     bench->w = calloc(count, sizeof(*bench->w));
-    if (!bench->key || !bench->w || !warp_picture_init(&bench->picture, bench->width, bench->height))
+    if (!bench->key || !bench->w ||
+        !warp_picture_init(&bench->picture, bench->width, bench->height, (uint32_t)count))
         return error_set(error, ERROR_OUT_OF_MEMORY, "--size", "no memory for the pictures");
     return bench->renderer &&
            render_runs(bench, &bench->scene.camera, bench->key, bench->w, &bench->key_times, error);
@@ -145,6 +147,9 @@ static bool warp(struct bench *bench, struct move *move, struct error *error)
 {
     const struct warp_view view = {.width = bench->width,
                                    .height = bench->height,
+                                   .key_width = bench->width,
+                                   .key_height = bench->height,
+                                   .radius = RADIUS,
                                    .from = bench->scene.camera,
                                    .to = bench_moved(&bench->scene.camera, move->way),
                                    .layer_count = 1,

@@ -11,16 +11,15 @@
 /* Of the greatest w of four neighbours: what differs by more is not one surface. Less cuts floors that are seen at
  * a grazing angle, more draws skins between near and far. */
 #define CUT_SHARE 0.04f
-/* Eyes of client/warp: within so many metres they see surfaces within so many pixels. */
-#define RADIUS 0.15f
+/* Eyes of client/warp that are within the radius see surfaces within so many pixels. */
 #define PIXELS 0.25f
 /* Of a barycentric, or in pixels: a pixel's centre on an edge is in the triangle, however this is rounded. Where
  * the eye moves aside, the centres of whole rows are on edges. */
 #define EDGE 1e-3f
 #define BLACK 0xff000000u
 
-const char *const warp_method_names[WARP_METHODS] = {"as it is", "iterative",        "quadtree, client",
-                                                     "splat",    "splat, both ways", "mesh"};
+const char *const warp_method_names[WARP_METHODS] = {
+    "as it is", "rotation", "iterative", "quadtree, client", "splat", "splat, both ways", "mesh"};
 
 /* ---- the map ---- */
 
@@ -46,22 +45,24 @@ static void axes_of(const struct frame_camera *camera, float axes[3][3])
 
 static struct map map_of(const struct warp_view *view)
 {
-    const float half[2] = {(float)view->width / 2, (float)view->height / 2};
-    const float focal_from = half[1] / tanf(view->from.fov_y / 2), focal_to = half[1] / tanf(view->to.fov_y / 2);
+    const float half_from[2] = {(float)view->key_width / 2, (float)view->key_height / 2};
+    const float half_to[2] = {(float)view->width / 2, (float)view->height / 2};
+    const float focal_from = half_from[1] / tanf(view->from.fov_y / 2);
+    const float focal_to = half_to[1] / tanf(view->to.fov_y / 2);
     float from[3][3], to[3][3], columns[4][3];
     axes_of(&view->from, from);
     axes_of(&view->to, to);
     for (int k = 0; k < 3; k++) {
         columns[0][k] = from[0][k] / focal_from;
         columns[1][k] = from[1][k] / focal_from;
-        columns[2][k] = from[2][k] - half[0] * columns[0][k] - half[1] * columns[1][k];
+        columns[2][k] = from[2][k] - half_from[0] * columns[0][k] - half_from[1] * columns[1][k];
         columns[3][k] = view->from.world_from_view[4 * k + 3] - view->to.world_from_view[4 * k + 3];
     }
     struct map map;
     for (int c = 0; c < 4; c++) {
         map.rows[2][c] = dot3(to[2], columns[c]);
         for (int r = 0; r < 2; r++)
-            map.rows[r][c] = focal_to * dot3(to[r], columns[c]) + half[r] * map.rows[2][c];
+            map.rows[r][c] = focal_to * dot3(to[r], columns[c]) + half_to[r] * map.rows[2][c];
     }
     return map;
 }
@@ -150,10 +151,10 @@ static struct fl_warp_camera client_camera(const struct frame_camera *camera)
 static bool make_by_client(const struct warp_view *view, struct warp_picture *picture,
                            enum fl_warp_quality quality)
 {
-    struct fl_warp_key key = {.width = view->width,
-                              .height = view->height,
+    struct fl_warp_key key = {.width = view->key_width,
+                              .height = view->key_height,
                               .camera = client_camera(&view->from),
-                              .radius = RADIUS,
+                              .radius = view->radius,
                               .pixels = PIXELS,
                               .layer_count = view->layer_count};
     for (uint32_t l = 0; l < view->layer_count; l++)
@@ -179,8 +180,8 @@ static void splat(const struct warp_view *view, const struct warp_layer *layer, 
     const struct map map = map_of(view);
     const float width = (float)view->width, height = (float)view->height;
     float to[3];
-    for (uint32_t y = 0, i = 0; y < view->height; y++)
-        for (uint32_t x = 0; x < view->width; x++, i++) {
+    for (uint32_t y = 0, i = 0; y < view->key_height; y++)
+        for (uint32_t x = 0; x < view->key_width; x++, i++) {
             if (!map_point(&map, (float)x + 0.5f, (float)y + 0.5f, layer->w[i], to) || to[0] < 0 || to[1] < 0 ||
                 to[0] >= width || to[1] >= height)
                 continue;
@@ -253,17 +254,17 @@ static void place_vertices(const struct warp_view *view, const struct warp_layer
 {
     const struct map map = map_of(view);
     float *to = picture->vertices;
-    for (uint32_t y = 0, i = 0; y < view->height; y++)
-        for (uint32_t x = 0; x < view->width; x++, i++, to += 3)
+    for (uint32_t y = 0, i = 0; y < view->key_height; y++)
+        for (uint32_t x = 0; x < view->key_width; x++, i++, to += 3)
             if (!map_point(&map, (float)x + 0.5f, (float)y + 0.5f, layer->w[i], to))
                 to[2] = -1;
 }
 
 static void draw_mesh(const struct warp_view *view, const struct warp_layer *layer, struct warp_picture *picture)
 {
-    const uint32_t width = view->width;
+    const uint32_t width = view->key_width;
     place_vertices(view, layer, picture);
-    for (uint32_t y = 0; y + 1 < view->height; y++)
+    for (uint32_t y = 0; y + 1 < view->key_height; y++)
         for (uint32_t x = 0; x + 1 < width; x++) {
             const uint32_t i = y * width + x, at[4] = {i, i + 1, i + width, i + width + 1};
             const float *w = layer->w;
@@ -278,15 +279,67 @@ static void draw_mesh(const struct warp_view *view, const struct warp_layer *lay
         }
 }
 
+static void crop(const struct warp_view *view, struct warp_picture *picture)
+{
+    const uint32_t left = (view->key_width - view->width) / 2, top = (view->key_height - view->height) / 2;
+    for (uint32_t y = 0; y < view->height; y++)
+        memcpy(picture->colours + y * view->width, view->layers[0].colours + (top + y) * view->key_width + left,
+               view->width * sizeof(*picture->colours));
+    memset(picture->seen, 1, view->width * view->height);
+}
+
+/* Between the centres of four texels; beyond the border it is as at it. */
+static uint32_t between_texels(const struct warp_view *view, float x, float y)
+{
+    const float last_x = (float)(view->key_width - 1), last_y = (float)(view->key_height - 1);
+    const float left = fminf(fmaxf(x - 0.5f, 0), last_x), top = fminf(fmaxf(y - 0.5f, 0), last_y);
+    const uint32_t i = (uint32_t)top * view->key_width + (uint32_t)left;
+    const uint32_t right = left < last_x, below = top < last_y ? view->key_width : 0;
+    const float share_x = left - floorf(left), share_y = top - floorf(top);
+    const uint32_t *at = view->layers[0].colours + i;
+    uint32_t colour = BLACK;
+    for (int shift = 0; shift < 24; shift += 8) {
+        const float above =
+            (float)(at[0] >> shift & 255) * (1 - share_x) + (float)(at[right] >> shift & 255) * share_x;
+        const float under = (float)(at[below] >> shift & 255) * (1 - share_x) +
+                            (float)(at[below + right] >> shift & 255) * share_x;
+        colour |= (uint32_t)(above * (1 - share_y) + under * share_y + 0.5f) << shift;
+    }
+    return colour;
+}
+
+/* From each pixel back to the key, whose w is 0 everywhere. */
+static void turn(const struct warp_view *view, struct warp_picture *picture)
+{
+    const struct warp_view back = {.width = view->key_width,
+                                   .height = view->key_height,
+                                   .key_width = view->width,
+                                   .key_height = view->height,
+                                   .from = view->to,
+                                   .to = view->from};
+    const struct map map = map_of(&back);
+    const float width = (float)view->key_width, height = (float)view->key_height;
+    float place[3];
+    for (uint32_t y = 0, i = 0; y < view->height; y++)
+        for (uint32_t x = 0; x < view->width; x++, i++) {
+            if (!map_point(&map, (float)x + 0.5f, (float)y + 0.5f, 0, place))
+                continue;
+            picture->colours[i] = between_texels(view, place[0], place[1]);
+            picture->seen[i] = place[0] >= 0 && place[1] >= 0 && place[0] < width && place[1] < height;
+        }
+}
+
 static void make(struct warp_picture *picture, const struct warp_view *view, enum warp_method method)
 {
-    const uint32_t count = view->width * view->height;
     if (method == WARP_NONE) {
-        memcpy(picture->colours, view->layers[0].colours, count * sizeof(*picture->colours));
-        memset(picture->seen, 1, count);
+        crop(view, picture);
         return;
     }
     clear(view, picture);
+    if (method == WARP_ROTATION) {
+        turn(view, picture);
+        return;
+    }
     for (uint32_t l = 0; l < view->layer_count; l++)
         (method == WARP_MESH ? draw_mesh : splat)(view, &view->layers[l], picture);
     if (method == WARP_SPLAT_BOTH)
@@ -296,13 +349,13 @@ static void make(struct warp_picture *picture, const struct warp_view *view, enu
 
 /* ---- the interface ---- */
 
-bool warp_picture_init(struct warp_picture *picture, uint32_t width, uint32_t height)
+bool warp_picture_init(struct warp_picture *picture, uint32_t width, uint32_t height, uint32_t key_texels)
 {
     const size_t count = (size_t)width * height;
     *picture = (struct warp_picture){.colours = calloc(count, sizeof(*picture->colours)),
                                      .seen = calloc(count, sizeof(*picture->seen)),
                                      .w = calloc(count, sizeof(*picture->w)),
-                                     .vertices = calloc(count, 3 * sizeof(*picture->vertices)),
+                                     .vertices = calloc(key_texels, 3 * sizeof(*picture->vertices)),
                                      .client = fl_warp_create(1, NULL)};
     if (picture->colours && picture->seen && picture->w && picture->vertices && picture->client)
         return true;

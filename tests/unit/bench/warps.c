@@ -34,7 +34,14 @@ static struct warp_view view_from(float right, float ahead)
 {
     struct frame_camera camera = {.world_from_view = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0},
                                   .fov_y = 2 * atanf(0.5f * (float)HEIGHT / FOCAL)};
-    struct warp_view view = {.width = WIDTH, .height = HEIGHT, .from = camera, .to = camera, .layer_count = 1};
+    struct warp_view view = {.width = WIDTH,
+                             .height = HEIGHT,
+                             .key_width = WIDTH,
+                             .key_height = HEIGHT,
+                             .from = camera,
+                             .to = camera,
+                             .radius = 0.15f,
+                             .layer_count = 1};
     view.to.world_from_view[3] = right;
     view.to.world_from_view[11] = -ahead;
     view.layers[0] = (struct warp_layer){colours, w};
@@ -53,7 +60,7 @@ static int begin(void **state)
         colours[i] = colour_of(i);
         w[i] = is_near(i % WIDTH) ? 1 / NEAR : 1 / FAR;
     }
-    return warp_picture_init(&picture, WIDTH, HEIGHT) ? 0 : -1;
+    return warp_picture_init(&picture, WIDTH, HEIGHT, COUNT) ? 0 : -1;
 }
 
 static int end(void **state)
@@ -110,6 +117,60 @@ TEST(the_picture_as_it_is_stays_and_counts_as_seen)
     assert_memory_equal(picture.colours, colours, sizeof(colours));
     for (uint32_t i = 0; i < COUNT; i++)
         assert_int_equal(picture.seen[i], 1);
+}
+
+/* Half a turn about the axis of the view brings pixels onto pixels. */
+TEST(rotation_alone_turns_the_picture_and_leaves_a_move_aside_out)
+{
+    struct warp_view view = view_from(ASIDE, 0);
+    warp_picture_make(&picture, &view, WARP_ROTATION);
+    assert_memory_equal(picture.colours, colours, sizeof(colours));
+    view.to.world_from_view[0] = view.to.world_from_view[5] = -1;
+    warp_picture_make(&picture, &view, WARP_ROTATION);
+    for (uint32_t i = 0; i < COUNT; i++) {
+        assert_int_equal(picture.seen[i], 1);
+        assert_int_equal(picture.colours[i], colour_of(COUNT - 1 - i));
+    }
+}
+
+/* An eighth to the right, of a focal length of half a picture: pixels that were beyond the border are not seen. */
+TEST(rotation_alone_tells_what_is_beyond_the_border)
+{
+    struct warp_view view = view_from(0, 0);
+    const float c = 0.70710678f, turned[12] = {c, 0, -c, 0, 0, 1, 0, 0, c, 0, c, 0};
+    memcpy(view.to.world_from_view, turned, sizeof(turned));
+    warp_picture_make(&picture, &view, WARP_ROTATION);
+    const uint32_t middle = HEIGHT / 2 * WIDTH; /* the axis is at the border of what was seen */
+    for (uint32_t x = 0; x < WIDTH; x++)
+        assert_int_equal(picture.seen[middle + x], x < WIDTH / 2);
+}
+
+TEST(a_margin_is_cut_off_from_the_picture_as_it_is)
+{
+    struct warp_view view = view_from(ASIDE, 0);
+    view.width = WIDTH - 8;
+    view.height = HEIGHT - 4;
+    warp_picture_make(&picture, &view, WARP_NONE);
+    for (uint32_t i = 0; i < view.width * view.height; i++)
+        assert_int_equal(picture.colours[i], colour_of((i / view.width + 2) * WIDTH + i % view.width + 4));
+}
+
+/* Of a key with a margin the inner part has the same focal length: both show the same. */
+TEST(a_margin_brings_what_lies_beside_the_picture)
+{
+    struct warp_view view = view_from(ASIDE, 0);
+    view.width = WIDTH - 2 * NEAR_SHIFT;
+    view.to.fov_y = 2 * atanf(0.5f * (float)HEIGHT / FOCAL);
+    static const enum warp_method methods[] = {WARP_SPLAT, WARP_SPLAT_BOTH, WARP_MESH};
+    for (int k = 0; k < 3; k++) {
+        warp_picture_make(&picture, &view, methods[k]);
+        for (uint32_t i = 0; i < view.width * view.height; i++) {
+            const uint32_t x = i % view.width + NEAR_SHIFT, from = truth(x);
+            assert_int_equal(picture.seen[i], from != UNKNOWN);
+            if (from != UNKNOWN)
+                assert_int_equal(picture.colours[i], colour_of(i / view.width * WIDTH + from));
+        }
+    }
 }
 
 /* Pixels and vertices come to lie at centres of pixels, so that nothing is interpolated. */
