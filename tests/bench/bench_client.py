@@ -23,24 +23,32 @@ def stage_ms(frame, stage, clock="cpu"):
 
 
 class Daemon:
-    """A warm daemon on a socket of its own and, if wanted, on a TCP port of this host; a context manager."""
+    """A warm daemon on a socket of its own and, if wanted, on a TCP port of this host; a context manager. `yields`: it stands
+    for one of another machine, and takes of this one's processors what the programs beside it leave."""
 
-    def __init__(self, bench, tcp=False):
+    def __init__(self, bench, tcp=False, yields=False):
         self.folder = tempfile.mkdtemp(prefix="farlight-bench-")
         self.address = f"unix:{self.folder}/socket"
         self.tcp = "tcp:127.0.0.1:0" if tcp else None
-        self.process = subprocess.Popen([bench.program("farlightd"), "--listen", self.address,
-                                         *(["--listen", self.tcp] if tcp else [])], stdout=subprocess.PIPE,
+        self.process = subprocess.Popen([*(["nice", "-n", "19"] if yields else []), bench.program("farlightd"), "--listen",
+                                         self.address, *(["--listen", self.tcp] if tcp else [])], stdout=subprocess.PIPE,
                                         stderr=subprocess.DEVNULL, text=True)
 
     def __enter__(self):
+        try:
+            self.wait_until_ready()
+        except BaseException:  # nobody calls __exit__() then
+            self.__exit__()
+            raise
+        return self
+
+    def wait_until_ready(self):
         for line in self.process.stdout:  # READY and an address, one line each
             if self.tcp and not line.startswith("READY tcp:"):
                 continue
             if line.startswith("READY"):
                 self.tcp = line.split()[-1] if self.tcp else None
-                return self
-        self.__exit__()
+                return
         raise Failure("the daemon did not start")
 
     def __exit__(self, *_):

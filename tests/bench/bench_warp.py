@@ -28,7 +28,8 @@ KBITS_PER_S, ROUND_TRIPS_MS, RESETS = (2000, 10000, 50000), (0, 50, 100), (0, 1)
 SEED = 458  # with 1 % the first connection is reset after 8 s, the second after minutes
 HERTZ = 60
 STATES_EVERY_S, PICTURES_EVERY_S = 0.5, 1
-INTEGRATOR = "raycast"  # so that the link, and not the rendering, is what takes long
+# So that the link, and not the rendering, is what takes long: nearest surfaces alone, lit without shadows.
+LIGHT = ("--integrator", "raycast", "--layer-opacity", 1)
 TRUE_SAMPLES = 4
 PSNR_SAME_DB = 100  # of pictures without a difference, in place of an infinite one
 DISPLAY_MIN, LATENCY_MS_MAX, GAIN_DB_MIN = 60, 1000 / 60 + 12, 6
@@ -90,15 +91,19 @@ def sent_bytes(bench, daemon):
 def watch(bench, daemon, link, views, size, folder):
     """The states of the walk; each has "sent", what was sent so far by connection."""
     arguments = [bench.program("farlight"), "view", "--scene", SCENE, "--server", daemon.tcp, "--link", link, "--headless",
-                 "--replay", folder / "replay.json", "--size", f"{size[0]}x{size[1]}", "--integrator", INTEGRATOR,
+                 "--replay", folder / "replay.json", "--size", f"{size[0]}x{size[1]}", *LIGHT,
                  *([] if views is None else ["--views", views])]
     states = []
     with subprocess.Popen(list(map(str, arguments)), cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as viewer:
-        for line in viewer.stdout:
-            states.append(json.loads(line))
-            if not states[-1]["state"].startswith("picture"):
-                states[-1]["sent"] = sent_bytes(bench, daemon)
-        errors = viewer.stderr.read()
+        try:
+            for line in viewer.stdout:
+                states.append(json.loads(line))
+                if not states[-1]["state"].startswith("picture"):
+                    states[-1]["sent"] = sent_bytes(bench, daemon)
+            errors = viewer.stderr.read()
+        except BaseException:  # else it would walk to its end
+            viewer.kill()
+            raise
     if viewer.returncode != 0:
         raise Failure(f"over {link}: {errors.strip()}")
     return states
@@ -141,7 +146,7 @@ class Truths:
             path = self.folder / f"true-{len(self.paths)}.png"
             command(self.bench.program("farlight"), "render", "--scene", SCENE, "--server", self.daemon.address, "-q", "-o", path,
                     f"--eye={eye}", f"--look-at={look_at}", "--fov", f"{state['fov_y'] * 57.29577951308232:.7g}", "--size",
-                    f"{self.size[0]}x{self.size[1]}", "--integrator", INTEGRATOR, "--samples", TRUE_SAMPLES)
+                    f"{self.size[0]}x{self.size[1]}", *LIGHT, "--samples", TRUE_SAMPLES)
             self.paths[eye, look_at] = path
         return self.paths[eye, look_at]
 
@@ -196,7 +201,7 @@ def measure(bench):
     grid = [(50000, 50, resets) for resets in RESETS] if bench.tiny else [
         (kbit, ms, resets) for kbit in KBITS_PER_S for ms in ROUND_TRIPS_MS for resets in RESETS]
     data = {"size": size, "seconds": seconds, "hertz": HERTZ, "links": []}
-    with Daemon(bench, tcp=True) as daemon, tempfile.TemporaryDirectory(prefix="farlight-bench-") as name:
+    with Daemon(bench, tcp=True, yields=True) as daemon, tempfile.TemporaryDirectory(prefix="farlight-bench-") as name:
         truths = Truths(bench, daemon, size, pathlib.Path(name))
         server = subprocess.Popen([bench.program("farlight"), "serve", bundled(bench, "carousel.glb"), "--name", SCENE, "--server",
                                    daemon.address], stdout=subprocess.PIPE, text=True)
@@ -220,6 +225,7 @@ def show(data):
              f"{100 * link['unseen']['median']:.1f}" if link["unseen"] else "-", link["lost"]) for link in data["links"]]
     width, height = data["size"]
     return (f"The carousel, at rest, at {width}x{height}, a walk of {data['seconds']} s whose camera moves {data['hertz']} times a "
-            f"second; PSNR against true renders of {TRUE_SAMPLES} samples\nof where the camera is when a picture is shown.\n\n" +
+            f"second; PSNR against true renders of {TRUE_SAMPLES} samples\nof where the camera is when a picture is shown. The daemon, "
+            "which stands for one of another machine, runs with nice -n 19 beside\nthe viewer.\n\n" +
             table([("link", "views", "displayed", "latency", "99 %", "sent", "PSNR", "lowest", "unseen", "lost"),
                    ("rate, round trip, resets", "", "pictures/s", "ms", "ms", "KB/s", "dB", "dB", "%", "")], rows))

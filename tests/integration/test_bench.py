@@ -1,12 +1,15 @@
 # SPDX-License-Identifier: MIT
 """The benchmark itself, on the smallest scenes: that it runs, and that its JSON has what is documented."""
+import contextlib
 import json
 import os
 import pathlib
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
+import time
 import unittest
 
 from farlight_test import BIN, ROOT, TIMEOUT_S, long_test
@@ -21,10 +24,11 @@ import bench_plot  # noqa: E402  pylint: disable=wrong-import-position
 import bench_rays  # noqa: E402  pylint: disable=wrong-import-position
 import bench_reach  # noqa: E402  pylint: disable=wrong-import-position
 import bench_view  # noqa: E402  pylint: disable=wrong-import-position
+import bench_walk  # noqa: E402  pylint: disable=wrong-import-position
 import bench_warp  # noqa: E402  pylint: disable=wrong-import-position
 
 TRACED = ("tracers", "family", "pixels", "rays", "flake", "reach")  # results of `bench tracers`
-PARTS = ("frames", "distributed", "steps", "link", "view", "warp", "tracers", "family", "pixels", "rays", "parallel", "instances",
+PARTS = ("frames", "distributed", "steps", "link", "view", "walk", "warp", "tracers", "family", "pixels", "rays", "parallel", "instances",
          "refit", "flake", "ldc", "abuffer", "rayspace", "quadtree", "reach")
 
 
@@ -77,6 +81,32 @@ def measures(name):
     program = BIN / "tests/bench/bench"
     return program.is_file() and name in subprocess.run([program, "--list"], stdout=subprocess.PIPE, text=True,
                                                         check=True).stdout.split()
+
+
+def children(process):
+    """Of a program that runs: number -> name."""
+    found = {}
+    with contextlib.suppress(OSError):  # one may end meanwhile
+        for number in pathlib.Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split():
+            found[number] = pathlib.Path(f"/proc/{number}/comm").read_text().strip()
+    return found
+
+
+@long_test
+@unittest.skipUnless(measures("tracers"), "built without Embree, which the benchmark compares with")
+class EndedEarly(unittest.TestCase):
+    def test_a_run_that_is_ended_leaves_no_daemon(self):
+        with tempfile.TemporaryDirectory(prefix="farlight-bench-") as out, subprocess.Popen(
+                [sys.executable, BENCH / "bench.py", BIN, "frames", "--tiny", "--out", out], stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL, cwd=ROOT, env={**os.environ, "PYTHONDONTWRITEBYTECODE": "1"}) as bench:
+            daemon, end = None, time.monotonic() + TIMEOUT_S
+            while not daemon and bench.poll() is None and time.monotonic() < end:
+                daemon = next((number for number, name in children(bench).items() if name == "farlightd"), None)
+                time.sleep(0.01)
+            self.assertTrue(daemon)
+            bench.terminate()
+            self.assertEqual(bench.wait(TIMEOUT_S), 128 + signal.SIGTERM)
+            self.assertFalse(pathlib.Path(f"/proc/{daemon}").exists())
 
 
 @long_test
@@ -223,6 +253,21 @@ class Benchmark(unittest.TestCase):
         for link in (straight, reset):
             self.assertEqual(len(link["psnr_at"]), data["seconds"])  # one each second
             self.assertGreater(link["psnr_db"]["min"], 5)  # below that of a grey picture: it shows something else
+
+    def test_what_is_made_of_late_pictures_is_held_against_true_ones(self):
+        data = self.document["parts"]["walk"]
+        methods = {method["name"]: method for method in data["methods"]}
+        self.assertLessEqual(set(bench_walk.NAMES), set(methods))
+        self.assertEqual(set(data["part"]), set(range(len(bench_walk.PARTS))))
+        oldest_ms = data["round_trip_ms"] + 1000 / data["keys_per_s"]
+        for age in data["age_ms"][1:]:
+            self.assertTrue(data["round_trip_ms"] <= age < oldest_ms, age)
+        count = len(data["at_s"])
+        for method in methods.values():
+            self.assertEqual((len(method["psnr_db"]), len(method["unseen"])), (count, count))
+        self.assertEqual(max(methods["as it is"]["unseen"]), 0)
+        tree, still = (sum(bench_walk.psnr_of(methods[name], range(count))) for name in ("quadtree, client", "as it is"))
+        self.assertGreater(tree, still)
 
     def test_steps_are_reported_by_stage(self):
         forms = self.document["parts"]["steps"]["results"][0]["forms"]
