@@ -197,7 +197,7 @@ def wanted(data):
 
 
 def measure(bench):
-    size, seconds = ((160, 90), 2) if bench.tiny else ((1280, 720), 12)
+    size, seconds = ((160, 90), 2) if bench.tiny else ((1280, 720), 8)
     grid = [(50000, 50, resets) for resets in RESETS] if bench.tiny else [
         (kbit, ms, resets) for kbit in KBITS_PER_S for ms in ROUND_TRIPS_MS for resets in RESETS]
     data = {"size": size, "seconds": seconds, "hertz": HERTZ, "links": []}
