@@ -155,12 +155,11 @@ def measure(bench, names, document, out):
         print(part_section(name, document["parts"][name]), flush=True)
 
 
-def run(build, names, out, runs=None, tiny=False, link_seconds=60):
+def run(bench, names, out):
     """Measures, writes, prints. Returns what went wrong, as texts."""
-    bench = Bench(build, runs, tiny, link_seconds)
     folder = pathlib.Path(tempfile.mkdtemp(prefix="farlight-bench-"))
     try:
-        command(bench.program("tests/tools/make_scenes"), folder, *([] if tiny else ["150"]))
+        command(bench.program("tests/tools/make_scenes"), folder, *([] if bench.tiny else ["150"]))
         bench.scenes = folder
         facts = environment(bench)
         before = load(out / "bench.json")
@@ -184,6 +183,7 @@ def main():
     parser.add_argument("--out", type=pathlib.Path, default=OUT, help="where the tables go (out)")
     parser.add_argument("--runs", type=int, help="how many runs a figure has (3 to 9)")
     parser.add_argument("--link-seconds", type=int, default=60, help="how long the part view looks over a slow link (60)")
+    parser.add_argument("--goals", action="store_true", help="of the part warp only the links that goals are set for: a minute")
     parser.add_argument("--tiny", action="store_true", help="the smallest scenes only: shows that it works, measures nothing")
     arguments = parser.parse_args()
     unknown = [name for name in arguments.parts if name not in PARTS]
@@ -194,8 +194,8 @@ def main():
     if not 2 <= arguments.link_seconds <= 3600:
         parser.error("between 2 and 3600 seconds")
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))  # what was started is ended on the way out
-    faults = run(arguments.build, arguments.parts or list(PARTS), arguments.out, arguments.runs, arguments.tiny,
-                 arguments.link_seconds)
+    bench = Bench(arguments.build, arguments.runs, arguments.tiny, arguments.link_seconds, arguments.goals)
+    faults = run(bench, arguments.parts or list(PARTS), arguments.out)
     document = load(arguments.out / "bench.json")
     if document and not arguments.tiny and arguments.out == OUT:
         write_readme(document)

@@ -19,12 +19,13 @@ class Failure(Exception):
 class Bench:
     """One run of the benchmark: where the programs lie, how often, and what went wrong on the way."""
 
-    def __init__(self, build, runs=None, tiny=False, link_seconds=60):
+    def __init__(self, build, runs=None, tiny=False, link_seconds=60, goals=False):
         self.build = pathlib.Path(build).resolve()
         self.shared = pathlib.Path(os.environ.get("FARLIGHT_SCENES", ROOT.parent / "shared" / "scenes"))
         self.runs = runs
         self.tiny = tiny  # the smallest scene and one run: for the test of the benchmark itself
         self.link_seconds = link_seconds  # of a view over a slow link
+        self.goals = goals  # of the part `warp` those links alone that goals are set for
         self.scenes = None  # folder of the bundled scenes
         self.faults = []
         os.environ.setdefault("FARLIGHT_LIBEXEC", str(self.build))  # for clients among the programs below it

@@ -12,7 +12,7 @@ import sys
 import tempfile
 
 import bench
-from bench_common import Failure, figure, fit_exponent
+from bench_common import Bench, Failure, figure, fit_exponent
 from bench_rays import CURVES, curve
 
 # One colour a contender, told apart without colour vision too (Okabe and Ito 2008); one dash and mark a kind of ray.
@@ -150,7 +150,7 @@ def main():
     arguments = parser.parse_args()
     document = bench.load(arguments.out / "bench.json")
     needed = [name for name in ("family", "pixels", "rays") if not document or name not in document["parts"]]
-    faults = bench.run(arguments.build, needed, arguments.out) if needed else []
+    faults = bench.run(Bench(arguments.build), needed, arguments.out) if needed else []
     try:
         document = bench.load(arguments.out / "bench.json")
         missing = [name for name in ("family", "pixels", "rays") if not document or name not in document["parts"]]

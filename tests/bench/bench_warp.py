@@ -196,10 +196,18 @@ def wanted(data):
                 figure([middle["latency_99_ms"]]), "views made by the client", at_most=True)]
 
 
+def grid_of(bench):
+    """(kbit/s, ms, % of resets, kinds of views)"""
+    kinds = kinds_of_views(bench)
+    if bench.tiny:
+        return [(50000, 50, resets, kinds) for resets in RESETS]
+    if bench.goals:
+        return [(2000, 100, 0, kinds), (10000, 100, 0, kinds[-1:])]
+    return [(kbit, ms, resets, kinds) for kbit in KBITS_PER_S for ms in ROUND_TRIPS_MS for resets in RESETS]
+
+
 def measure(bench):
     size, seconds = ((160, 90), 2) if bench.tiny else ((1280, 720), 8)
-    grid = [(50000, 50, resets) for resets in RESETS] if bench.tiny else [
-        (kbit, ms, resets) for kbit in KBITS_PER_S for ms in ROUND_TRIPS_MS for resets in RESETS]
     data = {"size": size, "seconds": seconds, "hertz": HERTZ, "links": []}
     with Daemon(bench, tcp=True, yields=True) as daemon, tempfile.TemporaryDirectory(prefix="farlight-bench-") as name:
         truths = Truths(bench, daemon, size, pathlib.Path(name))
@@ -208,8 +216,8 @@ def measure(bench):
         try:
             if not server.stdout.readline():
                 raise Failure("the scene was not served")
-            for cell in grid:
-                data["links"] += [measure_link(bench, daemon, truths, cell, views, seconds) for views in kinds_of_views(bench)]
+            for *cell, kinds in grid_of(bench):
+                data["links"] += [measure_link(bench, daemon, truths, cell, views, seconds) for views in kinds]
         finally:
             server.terminate()
             server.wait()
