@@ -20,7 +20,7 @@ struct input {
     size_t size;
 };
 
-static bool take_message(struct input *input, enum message_type type, bool *in_parts, struct message *message)
+static bool take_message(struct input *input, uint16_t type, bool *in_parts, struct message *message)
 {
     struct scratch scratch;
     struct decode_error error;
