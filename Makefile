@@ -525,7 +525,7 @@ FUZZ_SEED := $(B)/tests/fuzz/seed
 FUZZ_DICTIONARY := $(B)/seed/protocol.dict
 KEPT_BYTES := 1600
 KEPT_BYTES_OF_ALL := 65536
-$(FUZZ_SEED): %: %.o $(B)/tests/fuzz/recorded_session.o $(COMMON_OBJ) $(PROTOCOL_OBJ) $(PIXELS_OBJ) $(SEALED_OBJ)
+$(FUZZ_SEED): %: %.o $(B)/tests/fuzz/seed_frames.o $(B)/tests/fuzz/recorded_session.o $(COMMON_OBJ) $(PROTOCOL_OBJ) $(PIXELS_OBJ) $(SEALED_OBJ)
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(call pkg_libs,libsodium libzstd libxxhash libturbojpeg) -lm -o $@
 $(addprefix $(B)/tests/fuzz/fuzz_,$(FUZZERS)): %: %.o $(PROTOCOL_OBJ)
 	$(call say,LINK)$(CXX) $(OPT) -fsanitize=fuzzer $(LDFLAGS_ALL) $^ $(FUZZ_LIBS) -o $@
