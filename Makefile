@@ -525,8 +525,8 @@ FUZZ_SEED := $(B)/tests/fuzz/seed
 FUZZ_DICTIONARY := $(B)/seed/protocol.dict
 KEPT_BYTES := 1600
 KEPT_BYTES_OF_ALL := 65536
-$(FUZZ_SEED): %: %.o $(B)/tests/fuzz/recorded_session.o $(COMMON_OBJ) $(PROTOCOL_OBJ) $(PIXELS_OBJ) $(SEALED_OBJ)
-	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(call pkg_libs,libsodium libzstd libxxhash) -lm -o $@
+$(FUZZ_SEED): %: %.o $(B)/tests/fuzz/seed_frames.o $(B)/tests/fuzz/recorded_session.o $(COMMON_OBJ) $(PROTOCOL_OBJ) $(PIXELS_OBJ) $(SEALED_OBJ)
+	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(call pkg_libs,libsodium libzstd libxxhash libturbojpeg) -lm -o $@
 $(addprefix $(B)/tests/fuzz/fuzz_,$(FUZZERS)): %: %.o $(PROTOCOL_OBJ)
 	$(call say,LINK)$(CXX) $(OPT) -fsanitize=fuzzer $(LDFLAGS_ALL) $^ $(FUZZ_LIBS) -o $@
 $(B)/tests/fuzz/fuzz_scene $(B)/tests/fuzz/fuzz_transaction: $(filter $(B)/server/scene/% $(B)/server/base/%,$(SERVER_OBJ)) $(COMMON_OBJ)

@@ -288,7 +288,7 @@ static bool shake_hands(struct fl_connection *connection, const char *name, uint
 {
     struct fl_stream *stream = &connection->stream;
     struct handshake_hello hello = {.version_min = HANDSHAKE_VERSION_MIN, .version_max = HANDSHAKE_VERSION_MAX};
-    hello.capabilities = HANDSHAKE_CAN_ABANDON | HANDSHAKE_CAN_CHOOSE_PRIMARY;
+    hello.capabilities = HANDSHAKE_CAN_ABANDON | HANDSHAKE_CAN_CHOOSE_PRIMARY | HANDSHAKE_CAN_SEND_PARTS;
     hello.capabilities |= connection->can_h264 ? HANDSHAKE_CAN_H264 : 0;
     snprintf(hello.name, sizeof(hello.name), "%s", name);
     if (getrandom(hello.nonce, sizeof(hello.nonce), 0) != (ssize_t)sizeof(hello.nonce))

@@ -315,9 +315,13 @@ struct fl_frame {
     float shutter_s;       /* how long the shutter was open, seconds */
     unsigned layers;       /* set of layers that `pixels` has, in the order of their numbers */
     uint64_t primary_rays, shadow_rays, secondary_rays, splits, uploaded_bytes, structure_bytes;
-    uint32_t device_waits;          /* how often the daemon has waited for the device */
-    uint64_t wire_bytes;            /* of the encoded pixels and what is attached */
-    uint64_t depth_bytes;           /* the depths' share of it */
+    uint32_t device_waits; /* how often the daemon has waited for the device */
+    uint64_t wire_bytes;   /* of the encoded pixels and what is attached */
+    uint64_t depth_bytes;  /* the depths' share of it */
+    /* A frame in parts comes coarse first, and may end after any: what is there is decoded. With fewer than all
+     * colours are coarser, depths may be, and normals may be missing. */
+    unsigned parts_come, parts;     /* 1 of 1: it came as a whole */
+    bool more_follows;              /* it comes again with more parts: see fl_view_deliver_parts */
     uint64_t receive_ns, decode_ns; /* first byte to last; decoding and checking */
     uint64_t wait_ns;               /* how long fl_render_next waited for it */
     size_t stage_count;
@@ -338,8 +342,12 @@ struct fl_frame {
     unsigned frame_quality; /* as encoded; 0: lossless */
     uint8_t *encoded;       /* H.264 access unit; NULL: pixels are decoded */
     size_t encoded_bytes;
-    float *depth;     /* width * height, metres along the view; 0 where nothing is; NULL: none */
-    float depth_step; /* 1 / depth was rounded to multiples of it, 1 / metres; 0: it was not */
+    float *depth;         /* width * height, metres along the view; 0 where nothing is; NULL: none */
+    float depth_step;     /* 1 / depth was rounded to multiples of it, 1 / metres; 0: it was not */
+    bool depth_is_coarse; /* of a frame's first parts: bilinear where the surface is one, else that of what is
+                             nearest in 8 x 8 pixels */
+    float depth_error; /* 1 / depth is off by at most this, 1 / metres: half a step, or, where it is coarse, that
+                          at the worst edge: it is no noise */
     /* Of what moves: pixels on each side beyond the picture that was asked for; width, height and fov_y are of
      * all. */
     uint32_t margin_x, margin_y;
@@ -413,6 +421,10 @@ FL_API bool fl_view_look(struct fl_view *view, const struct fl_view_camera *came
 /* The next complete frame; waits at most timeout_ms for it, 0: not at all. NULL with error->code FL_ERROR_NONE:
  * none so far. The caller destroys it. A frame in H.264 comes undecoded: `encoded` instead of `pixels`. */
 FL_API struct fl_frame *fl_view_next(struct fl_view *view, unsigned timeout_ms, struct fl_error *error);
+/* From now on, if the view asks for parts: a frame comes as soon as its first parts show something, with
+ * more_follows, and again with all that has come, under the same number. Those in H.264 come once. It costs a
+ * second decoding. */
+FL_API void fl_view_deliver_parts(struct fl_view *view, bool deliver);
 /* Reports that the caller could not decode a frame: the next one will be a key frame. */
 FL_API bool fl_view_want_key_frame(struct fl_view *view, struct fl_error *error);
 FL_API void fl_view_destroy(struct fl_view *view);

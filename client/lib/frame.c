@@ -1,14 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 #include "lib/frame.h"
+#include "lib/frame_decode.h"
 #include "lib/stream.h"
-#include "protocol/pixels/inverse_depth.h"
-#include "protocol/pixels/predicted.h"
 #include "protocol/common/clock.h"
 
 #include <stdlib.h>
 #include <string.h>
 #include <turbojpeg.h>
-#include <xxhash.h>
 #include <zstd.h>
 
 /* The size of a JPEG beyond the worst case of its pixels: tables and markers. */
@@ -183,6 +181,7 @@ static struct fl_frame *new_frame(const struct message_frame_begin *begin)
     frame->hidden_layer = begin->hidden_layer;
     frame->of_frame = begin->of_frame;
     frame->wire_bytes = begin->size_bytes + begin->depth_bytes + begin->normal_bytes;
+    frame->parts = 1;
     if (begin->encoding == PROTOCOL_ENCODING_H264)
         return frame;
     frame->pixels_bytes = pixels_bytes_of(begin);
@@ -206,11 +205,29 @@ bool fl_assembly_begin(struct fl_assembly *assembly, const struct message_frame_
     if (!assembly->frame || !assembly->encoded)
         return fl_error_set(error, FL_ERROR_MEMORY, "", "no memory for a picture of %ux%u", begin->width,
                             begin->height);
+    assembly->begin = *begin;
     assembly->encoded_bytes = assembly->frame->wire_bytes;
-    assembly->depth_bytes = begin->depth_bytes;
-    assembly->normal_bytes = begin->normal_bytes;
     assembly->received_bytes = 0;
+    fl_parts_init(&assembly->parts, begin);
     assembly->frame->begun_ns = now_ns;
+    return true;
+}
+
+bool fl_assembly_parts(struct fl_assembly *assembly, const struct message_frame_parts *told,
+                       struct fl_error *error)
+{
+    if (!assembly->frame || !assembly->expected.parts)
+        return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_parts", "parts of a frame arrived unasked");
+    if (!fl_parts_tell(&assembly->parts, &assembly->begin, told, error))
+        return false;
+    const uint64_t bytes = fl_parts_sum(&assembly->parts);
+    uint8_t *encoded =
+        bytes > assembly->encoded_bytes ? realloc(assembly->encoded, (size_t)bytes) : assembly->encoded;
+    if (!encoded)
+        return fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
+    assembly->encoded = encoded;
+    assembly->encoded_bytes = bytes;
+    assembly->frame->parts = told->parts_count;
     return true;
 }
 
@@ -224,135 +241,8 @@ bool fl_assembly_data(struct fl_assembly *assembly, const struct message_frame_d
                             "%u bytes arrived for offset %llu, but %llu of %llu bytes are there", data->data_bytes,
                             (unsigned long long)data->offset_bytes, (unsigned long long)assembly->received_bytes,
                             (unsigned long long)assembly->encoded_bytes);
-    if (data->data_bytes > 0)
-        memcpy(assembly->encoded + assembly->received_bytes, data->data, data->data_bytes);
+    fl_parts_put(&assembly->parts, assembly->encoded, data->data, data->data_bytes);
     assembly->received_bytes += data->data_bytes;
-    return true;
-}
-
-/* The pixels' share of the encoded bytes. */
-static size_t picture_bytes(const struct fl_assembly *assembly)
-{
-    return (size_t)(assembly->encoded_bytes - assembly->depth_bytes - assembly->normal_bytes);
-}
-
-static bool decode_zstd(const struct fl_assembly *assembly, struct fl_error *error)
-{
-    struct fl_frame *frame = assembly->frame;
-    const size_t made =
-        ZSTD_decompress(frame->pixels, frame->pixels_bytes, assembly->encoded, picture_bytes(assembly));
-    if (ZSTD_isError(made))
-        return fl_error_set(error, FL_ERROR_PROTOCOL, "frame", "cannot be decompressed: %s",
-                            ZSTD_getErrorName(made));
-    if (made != frame->pixels_bytes)
-        return fl_error_set(error, FL_ERROR_PROTOCOL, "frame", "it decompresses to %zu bytes, not %zu", made,
-                            frame->pixels_bytes);
-    return true;
-}
-
-static bool decode_predicted(const struct predicted_form *form, const uint8_t *encoded, uint64_t encoded_bytes,
-                             uint8_t *pixels, struct fl_error *error)
-{
-    const struct predicted_result result = predicted_decode(form, encoded, (size_t)encoded_bytes, pixels);
-    if (result.status == PREDICTED_NO_MEMORY)
-        return fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
-    return result.status == PREDICTED_DONE ||
-           fl_error_set(error, FL_ERROR_PROTOCOL, "frame", "cannot be decompressed: %s", result.reason);
-}
-
-static bool decode_predicted_pixels(const struct fl_assembly *assembly, struct fl_error *error)
-{
-    const struct fl_frame *frame = assembly->frame;
-    const struct predicted_form form = {.width = frame->width,
-                                        .rows = frame->height * (uint32_t)__builtin_popcount(frame->layers),
-                                        .pixel_bytes = fl_bytes_per_pixel(frame->format)};
-    return decode_predicted(&form, assembly->encoded, picture_bytes(assembly), frame->pixels, error);
-}
-
-/* malloc'ed; NULL on failure. */
-static void *decode_attachment(const struct fl_assembly *assembly, uint64_t offset_bytes, uint64_t bytes,
-                               uint32_t pixel_bytes, struct fl_error *error)
-{
-    const struct fl_frame *frame = assembly->frame;
-    const struct predicted_form form = {frame->width, frame->height, pixel_bytes};
-    uint8_t *made = malloc((size_t)frame->width * frame->height * pixel_bytes);
-    if (!made)
-        fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
-    if (made && decode_predicted(&form, assembly->encoded + offset_bytes, bytes, made, error))
-        return made;
-    free(made);
-    return NULL;
-}
-
-static float *decode_depth(const struct fl_assembly *assembly, uint64_t offset_bytes, struct fl_error *error)
-{
-    const struct fl_frame *frame = assembly->frame;
-    const size_t count = (size_t)frame->width * frame->height;
-    if (!(frame->depth_step > 0.0f))
-        return decode_attachment(assembly, offset_bytes, assembly->depth_bytes, ATTACHMENT_PIXEL_BYTES, error);
-    uint16_t *rounded = decode_attachment(assembly, offset_bytes, assembly->depth_bytes, sizeof(*rounded), error);
-    float *depth = rounded ? malloc(count * sizeof(*depth)) : NULL;
-    if (depth)
-        inverse_depth_restore(rounded, count, frame->depth_step, depth);
-    else if (rounded)
-        fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
-    free(rounded);
-    return depth;
-}
-
-static bool decode_attachments(const struct fl_assembly *assembly, struct fl_error *error)
-{
-    struct fl_frame *frame = assembly->frame;
-    const uint64_t pixels_end = picture_bytes(assembly), depth_end = pixels_end + assembly->depth_bytes;
-    if (assembly->depth_bytes > 0)
-        frame->depth = decode_depth(assembly, pixels_end, error);
-    if (assembly->normal_bytes > 0 && error->code == FL_ERROR_NONE)
-        frame->normals =
-            decode_attachment(assembly, depth_end, assembly->normal_bytes, ATTACHMENT_PIXEL_BYTES, error);
-    return error->code == FL_ERROR_NONE;
-}
-
-static bool decode_jpeg(const struct fl_assembly *assembly, struct fl_error *error)
-{
-    struct fl_frame *frame = assembly->frame;
-    const tjhandle decoder = tjInitDecompress();
-    if (!decoder)
-        return fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
-    int width = 0, height = 0, subsampling = 0, colours = 0;
-    const unsigned long bytes = (unsigned long)picture_bytes(assembly);
-    bool good =
-        tjDecompressHeader3(decoder, assembly->encoded, bytes, &width, &height, &subsampling, &colours) == 0;
-    if (good && (width != (int)frame->width || height != (int)frame->height)) {
-        fl_error_set(error, FL_ERROR_PROTOCOL, "frame", "a JPEG of %dx%d arrived, but %ux%u was expected", width,
-                     height, frame->width, frame->height);
-    } else {
-        good = good && tjDecompress2(decoder, assembly->encoded, bytes, frame->pixels, width, 0, height, TJPF_RGBA,
-                                     TJFLAG_STOPONWARNING) == 0;
-        if (!good)
-            fl_error_set(error, FL_ERROR_PROTOCOL, "frame", "the JPEG is damaged: %s", tjGetErrorStr2(decoder));
-    }
-    good = good && error->code == FL_ERROR_NONE;
-    tjDestroy(decoder);
-    return good;
-}
-
-static bool decode_pixels(const struct fl_assembly *assembly, struct fl_error *error)
-{
-    struct fl_frame *frame = assembly->frame;
-    if (frame->encoding == PROTOCOL_ENCODING_H264) /* the caller decodes it */
-        return true;
-    if (frame->encoding == PROTOCOL_ENCODING_JPEG)
-        return decode_jpeg(assembly, error);
-    if (frame->encoding == PROTOCOL_ENCODING_RAW && assembly->encoded != frame->pixels)
-        memcpy(frame->pixels, assembly->encoded, frame->pixels_bytes);
-    if (frame->encoding == PROTOCOL_ENCODING_ZSTD && !decode_zstd(assembly, error))
-        return false;
-    if (frame->encoding == PROTOCOL_ENCODING_PREDICTED && !decode_predicted_pixels(assembly, error))
-        return false;
-    if (XXH3_64bits(frame->pixels, frame->pixels_bytes) != frame->digest)
-        return fl_error_set(error, FL_ERROR_PROTOCOL, "frame.digest",
-                            "the pixels of frame %u differ from those that were rendered", frame->frame);
-    frame->digest_checked = true;
     return true;
 }
 
@@ -408,25 +298,77 @@ static bool take_costs(struct fl_frame *frame, const struct message_frame_end *e
     return true;
 }
 
+/* What has come so far. */
+static bool decode(const struct fl_assembly *assembly, struct fl_frame *frame, struct fl_error *error)
+{
+    const uint64_t begin_ns = monotonic_now_ns();
+    const struct fl_parts *parts = &assembly->parts;
+    const uint8_t *depth = assembly->encoded + parts->bytes.of[PROTOCOL_FRAME_PART_COLOURS];
+    const uint8_t *normals = depth + parts->bytes.of[PROTOCOL_FRAME_PART_DEPTH];
+    const struct fl_encoded encoded = {.colours = assembly->encoded,
+                                       .depth = depth,
+                                       .normals = normals,
+                                       .coarse_depth = normals + parts->bytes.of[PROTOCOL_FRAME_PART_NORMALS],
+                                       .come = fl_parts_come(parts),
+                                       .all = parts->bytes};
+    frame->parts_come = parts->told ? parts->come : 1;
+    frame->wire_bytes = assembly->received_bytes;
+    frame->depth_bytes =
+        encoded.come.of[PROTOCOL_FRAME_PART_DEPTH] + encoded.come.of[PROTOCOL_FRAME_PART_COARSE_DEPTH];
+    if (!fl_frame_decode(frame, &encoded, error))
+        return false;
+    frame->whole_ns = monotonic_now_ns();
+    frame->decode_ns = frame->whole_ns - begin_ns;
+    return true;
+}
+
+bool fl_assembly_has_first_parts(const struct fl_assembly *assembly)
+{
+    return assembly->frame && assembly->frame->pixels && assembly->parts.told &&
+           assembly->parts.come < assembly->parts.count && fl_parts_are_enough(&assembly->parts);
+}
+
+struct fl_frame *fl_assembly_show(const struct fl_assembly *assembly, uint64_t now_ns, struct fl_error *error)
+{
+    struct fl_frame *frame = malloc(sizeof(*frame));
+    uint8_t *pixels = malloc(assembly->frame->pixels_bytes);
+    if (!frame || !pixels) {
+        free(frame);
+        free(pixels);
+        fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
+        return NULL;
+    }
+    *frame = *assembly->frame;
+    frame->pixels = pixels;
+    frame->more_follows = true;
+    frame->receive_ns = now_ns - frame->begun_ns;
+    if (decode(assembly, frame, error))
+        return frame;
+    fl_frame_destroy(frame);
+    return NULL;
+}
+
+bool fl_assembly_is_void(const struct fl_assembly *assembly)
+{
+    return !fl_parts_are_enough(&assembly->parts);
+}
+
 struct fl_frame *fl_assembly_end(struct fl_assembly *assembly, const struct message_frame_end *end,
                                  uint64_t now_ns, struct fl_error *error)
 {
     struct fl_frame *frame = assembly->frame;
-    if (!frame || end->frame != frame->frame || end->abandoned != 0 ||
-        assembly->received_bytes != assembly->encoded_bytes) {
+    const bool is_whole = frame && assembly->received_bytes == assembly->encoded_bytes;
+    if (!frame || end->frame != frame->frame || is_whole == (end->abandoned != 0) ||
+        fl_assembly_is_void(assembly)) {
         fl_error_set(error, FL_ERROR_PROTOCOL, "frame_end", "an incomplete frame ended");
         return NULL;
     }
-    const uint64_t decode_begin_ns = monotonic_now_ns();
-    *error = (struct fl_error){0};
-    if (!take_costs(frame, end, error) || !decode_pixels(assembly, error) || !decode_attachments(assembly, error))
+    if (!take_costs(frame, end, error) || !decode(assembly, frame, error))
         return NULL;
-    frame->whole_ns = monotonic_now_ns();
     frame->receive_ns = now_ns - frame->begun_ns;
-    frame->decode_ns = frame->whole_ns - decode_begin_ns;
     if (frame->encoding == PROTOCOL_ENCODING_H264) {
         frame->encoded = assembly->encoded;
-        frame->encoded_bytes = picture_bytes(assembly);
+        frame->encoded_bytes = (size_t)assembly->parts.bytes.of[PROTOCOL_FRAME_PART_COLOURS];
     } else if (assembly->encoded != frame->pixels) {
         free(assembly->encoded);
     }
@@ -445,6 +387,12 @@ bool fl_frame_queue_init(struct fl_frame_queue *queue, size_t capacity, struct f
 
 bool fl_frame_queue_push(struct fl_frame_queue *queue, struct fl_frame *frame, struct fl_error *error)
 {
+    struct fl_frame **last = &queue->frames[(queue->first + queue->count + queue->capacity - 1) % queue->capacity];
+    if (queue->count > 0 && (*last)->more_follows && (*last)->frame == frame->frame) {
+        fl_frame_destroy(*last);
+        *last = frame;
+        return true;
+    }
     if (queue->count == queue->capacity) {
         fl_frame_destroy(frame);
         return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_end", "more frames arrived than were requested");

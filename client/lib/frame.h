@@ -3,7 +3,7 @@
 #ifndef FARLIGHT_CLIENT_LIB_FRAME_H
 #define FARLIGHT_CLIENT_LIB_FRAME_H
 
-#include "lib/farlight.h"
+#include "lib/parts.h"
 
 /* What was asked for; a frame must be that. */
 struct fl_frame_expected {
@@ -16,6 +16,7 @@ struct fl_frame_expected {
     bool is_view;
     enum protocol_encoding still_encoding;
     uint32_t margin_x_max, margin_y_max, hidden_layers;
+    bool parts;
 };
 
 struct fl_assembly {
@@ -23,14 +24,23 @@ struct fl_assembly {
     struct fl_frame *frame; /* begun; NULL: none */
     uint8_t *encoded;       /* where its bytes go: the pixels themselves when raw and alone */
     uint64_t encoded_bytes, received_bytes;
-    uint64_t depth_bytes, normal_bytes; /* the last ones of encoded_bytes, in that order */
+    struct message_frame_begin begin;
+    struct fl_parts parts;
 };
 
 /* Each returns false on what is not allowed; the assembly must then be finished. `number` is the frame's; for a
  * view its minimum. */
 bool fl_assembly_begin(struct fl_assembly *assembly, const struct message_frame_begin *begin, uint32_t number,
                        uint64_t now_ns, struct fl_error *error);
+bool fl_assembly_parts(struct fl_assembly *assembly, const struct message_frame_parts *told,
+                       struct fl_error *error);
 bool fl_assembly_data(struct fl_assembly *assembly, const struct message_frame_data *data, struct fl_error *error);
+/* It is in parts of which enough have come to show something, but not all. Not of H.264, which is decoded once. */
+bool fl_assembly_has_first_parts(const struct fl_assembly *assembly);
+/* That, as a frame without costs; NULL on failure. */
+struct fl_frame *fl_assembly_show(const struct fl_assembly *assembly, uint64_t now_ns, struct fl_error *error);
+/* Of a frame that ends early: what has come shows nothing. */
+bool fl_assembly_is_void(const struct fl_assembly *assembly);
 /* The frame is decoded and checked, and the caller's; NULL on failure. */
 struct fl_frame *fl_assembly_end(struct fl_assembly *assembly, const struct message_frame_end *end,
                                  uint64_t now_ns, struct fl_error *error);
@@ -43,7 +53,8 @@ struct fl_frame_queue {
 };
 
 bool fl_frame_queue_init(struct fl_frame_queue *queue, size_t capacity, struct fl_error *error);
-/* Takes the frame over, also on failure: more frames arrived than credit was given for. */
+/* Takes the frame over, also on failure: more frames arrived than credit was given for. It takes the place of its
+ * own first parts, where they wait still. */
 bool fl_frame_queue_push(struct fl_frame_queue *queue, struct fl_frame *frame, struct fl_error *error);
 struct fl_frame *fl_frame_queue_pop(struct fl_frame_queue *queue); /* NULL: there is none */
 void fl_frame_queue_clear(struct fl_frame_queue *queue);

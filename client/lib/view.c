@@ -40,6 +40,8 @@ struct fl_view {
     struct fl_error failure; /* why a render was refused; reported once while an older one continues */
     struct fl_assembly assembly;
     uint32_t assembled_request;
+    bool delivers_parts;        /* as soon as they show something .. */
+    bool delivered;             /* .. as the frame's that is assembled */
     struct fl_frame_queue done; /* that nobody has asked for yet */
 };
 
@@ -99,6 +101,7 @@ static bool ask(struct fl_view *view, const struct message_render *wanted, struc
                                                  .is_view = true,
                                                  .margin_x_max = margin_of(render, render->width),
                                                  .hidden_layers = render->hidden_layers,
+                                                 .parts = render->parts != 0,
                                                  .margin_y_max = margin_of(render, render->height)};
     if (!fl_connection_send(view->connection, asked->request, 0, &message, error))
         return false;
@@ -224,7 +227,12 @@ static bool send_owed(struct fl_view *view, struct fl_error *error)
     return true;
 }
 
-/* The rest of it will not come. */
+void fl_view_deliver_parts(struct fl_view *view, bool deliver)
+{
+    view->delivers_parts = deliver;
+}
+
+/* It shows nothing. */
 static bool abandon(struct fl_view *view, uint32_t number, struct fl_error *error)
 {
     const struct fl_frame *frame = view->assembly.frame;
@@ -237,21 +245,9 @@ static bool abandon(struct fl_view *view, uint32_t number, struct fl_error *erro
     return true;
 }
 
-static bool take_end(struct fl_view *view, uint64_t change, const struct message *message, struct fl_error *error)
+/* A frame to be asked for; NULL: it failed. */
+static bool deliver(struct fl_view *view, uint64_t change, struct fl_frame *frame, struct fl_error *error)
 {
-    const uint64_t now_ns = monotonic_now_ns();
-    const uint32_t number = message->frame_end.frame;
-    if (view->assembly.frame)
-        view->next_frame = number < UINT32_MAX ? number + 1 : number;
-    if (message->frame_end.abandoned != 0)
-        return abandon(view, number, error);
-    if (view->assembly.frame) {
-        view->last_frame = number;
-        view->has_frame = true;
-        if (!acknowledge(view, number, true, error))
-            return false;
-    }
-    struct fl_frame *frame = fl_assembly_end(&view->assembly, &message->frame_end, now_ns, error);
     if (!frame)
         return false;
     frame->change = change;
@@ -259,6 +255,33 @@ static bool take_end(struct fl_view *view, uint64_t change, const struct message
         view->last_command - frame->command < COMMANDS_REMEMBERED)
         frame->command_sent_ns = view->command_sent_ns[frame->command % COMMANDS_REMEMBERED];
     return fl_frame_queue_push(&view->done, frame, error);
+}
+
+static bool take_data(struct fl_view *view, uint64_t change, const struct message *message, struct fl_error *error)
+{
+    if (!fl_assembly_data(&view->assembly, &message->frame_data, error))
+        return false;
+    if (!view->delivers_parts || view->delivered || !fl_assembly_has_first_parts(&view->assembly))
+        return true;
+    view->delivered = true;
+    return deliver(view, change, fl_assembly_show(&view->assembly, monotonic_now_ns(), error), error);
+}
+
+static bool take_end(struct fl_view *view, uint64_t change, const struct message *message, struct fl_error *error)
+{
+    const uint64_t now_ns = monotonic_now_ns();
+    const uint32_t number = message->frame_end.frame;
+    if (view->assembly.frame)
+        view->next_frame = number < UINT32_MAX ? number + 1 : number;
+    if (message->frame_end.abandoned != 0 && (!view->assembly.frame || fl_assembly_is_void(&view->assembly)))
+        return abandon(view, number, error);
+    if (view->assembly.frame) {
+        view->last_frame = number;
+        view->has_frame = true;
+        if (!acknowledge(view, number, true, error))
+            return false;
+    }
+    return deliver(view, change, fl_assembly_end(&view->assembly, &message->frame_end, now_ns, error), error);
 }
 
 /* The only answer to a render: ok if a newer one replaced it. */
@@ -285,16 +308,20 @@ static bool take(struct fl_view *view, size_t index, const struct message *messa
         if (!view->assembly.frame) {
             view->assembly.expected = view->asked[index].expected;
             view->assembled_request = request;
+            view->delivered = false;
         }
         return fl_assembly_begin(&view->assembly, &message->frame_begin, view->next_frame, monotonic_now_ns(),
                                  error) &&
                acknowledge(view, message->frame_begin.frame, false, error);
+    case MESSAGE_FRAME_PARTS:
     case MESSAGE_FRAME_DATA:
     case MESSAGE_FRAME_END:
         if (request != view->assembled_request)
             return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_data", "data of two frames arrived mixed");
+        if (message->type == MESSAGE_FRAME_PARTS)
+            return fl_assembly_parts(&view->assembly, &message->frame_parts, error);
         if (message->type == MESSAGE_FRAME_DATA)
-            return fl_assembly_data(&view->assembly, &message->frame_data, error);
+            return take_data(view, view->asked[index].change, message, error);
         return take_end(view, view->asked[index].change, message, error);
     case MESSAGE_OK:
     case MESSAGE_ERROR:
@@ -345,6 +372,8 @@ struct fl_frame *fl_view_next(struct fl_view *view, unsigned timeout_ms, struct 
     frame->wait_ns = monotonic_now_ns() - begin_ns;
     /* The next call reports a lost connection. */
     struct fl_error ignored;
+    if (frame->more_follows)
+        return frame;
     view->credit++;
     view->owes_credit = !tell_credit(view, &ignored);
     return frame;

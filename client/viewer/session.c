@@ -294,6 +294,12 @@ void session_want_key_frame(struct session *session)
         fail(session, &error, &ignored);
 }
 
+void session_deliver_parts(struct session *session, bool deliver)
+{
+    if (session->view)
+        fl_view_deliver_parts(session->view, deliver);
+}
+
 struct fl_frame *session_next(struct session *session, unsigned timeout_ms, struct fl_error *refusal)
 {
     struct fl_error error = {0};

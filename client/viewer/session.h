@@ -45,6 +45,7 @@ bool session_can_h264(const struct session *session);
 bool session_show(struct session *session, const struct message_render *options, uint64_t *change);
 bool session_look(struct session *session, const struct fl_view_camera *camera, uint64_t *command);
 void session_want_key_frame(struct session *session);
+void session_deliver_parts(struct session *session, bool deliver); /* as fl_view_deliver_parts */
 /* The next frame; NULL: none within the time, or *refusal (code not NONE) says that the view or its last change
  * was refused. A view that was refused is shown no more. */
 struct fl_frame *session_next(struct session *session, unsigned timeout_ms, struct fl_error *refusal);

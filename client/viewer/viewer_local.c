@@ -125,7 +125,8 @@ static bool give_key(struct viewer *viewer, struct fl_frame *frame, bool is_show
 {
     struct views_key key = {.depth_step = frame->depth_step,
                             .radius = viewer->local_radius,
-                            .is_final = !frame->moving && frame->samples >= viewer->view.samples,
+                            .is_final =
+                                !frame->moving && !frame->more_follows && frame->samples >= viewer->view.samples,
                             .came_ns = monotonic_now_ns()};
     if (!viewer->views)
         viewer->views = views_create(&viewer->failure);

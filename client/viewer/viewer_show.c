@@ -11,6 +11,8 @@
 #define EDGE_MIN 16u
 #define EDGE_MAX 8192u
 #define FRAMES_AT_ONCE 4u /* then people have their turn */
+/* Where a frame takes so long to come, its first parts are worth decoding by themselves, and making a key of. */
+#define PARTS_NS 100000000ull
 
 /* Of `views` beside one another, each with an even edge: the chroma of a video is subsampled by 2. */
 static uint32_t edge_of(uint32_t pixels, uint32_t views)
@@ -53,6 +55,7 @@ static void choose_encodings(const struct viewer *viewer, struct message_render 
     if (!options->has_still_encoding)
         view->still_encoding = is_local ? PROTOCOL_ENCODING_RAW : PROTOCOL_ENCODING_PREDICTED;
     view->adapt = options->always_adapt || (!is_local && !options->never_adapt);
+    view->parts = !is_local;
 }
 
 static void show(struct viewer *viewer)
@@ -140,13 +143,18 @@ static void take_structure(struct viewer *viewer, const struct fl_frame *frame)
 static void take(struct viewer *viewer, struct fl_frame *frame)
 {
     if (frame->hidden_layer > 0) {
-        viewer_take_hidden(viewer, frame);
+        if (!frame->more_follows)
+            viewer_take_hidden(viewer, frame);
         return;
     }
     if (!decode(viewer, frame) || !viewer_take_picture(viewer, frame))
         return;
-    metrics_add(&viewer->metrics, frame, monotonic_now_ns());
-    take_structure(viewer, frame);
+    if (!frame->more_follows) { /* it is one frame, whose costs come with its end */
+        metrics_add(&viewer->metrics, frame, monotonic_now_ns());
+        take_structure(viewer, frame);
+        session_deliver_parts(viewer->session, frame->receive_ns > PARTS_NS);
+        viewer->frames++;
+    }
     viewer->frame = *frame;
     viewer->frame.stages = NULL;
     viewer->frame.wave_comparisons = NULL;
@@ -157,7 +165,6 @@ static void take(struct viewer *viewer, struct fl_frame *frame)
     viewer->frame.pixels = NULL;
     if (viewer_follows(viewer)) /* for a hand to begin there */
         camera_from_frame(&viewer->camera, frame, camera_distance(&viewer->camera));
-    viewer->frames++;
     viewer->taken = viewer->settings;
     viewer->must_draw = true;
     viewer_plan_local(viewer, monotonic_now_ns());
@@ -196,5 +203,5 @@ bool viewer_is_at_rest(const struct viewer *viewer, unsigned samples)
     return viewer->has_camera && viewer->has_looked && !viewer->must_show && !viewer->must_look &&
            !viewer->told_moving && viewer->glide_begin_ns == 0 && viewer->frames > 0 &&
            viewer->frame.command == viewer->command && viewer->frame.change == viewer->change &&
-           !viewer->frame.moving && viewer->frame.samples >= enough;
+           !viewer->frame.moving && !viewer->frame.more_follows && viewer->frame.samples >= enough;
 }

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "encode/depth.h"
 
+#include "protocol/pixels/coarse_depth.h"
 #include "protocol/pixels/inverse_depth.h"
 
 #include <stdlib.h>
@@ -23,4 +24,22 @@ bool depth_round(const struct depth_picture *picture, uint16_t **rounded, float 
         free(made);
     }
     return true;
+}
+
+bool depth_encode_coarse(const uint16_t *rounded, uint32_t width, uint32_t height, uint8_t **out,
+                         size_t *out_bytes, struct error *error)
+{
+    const struct predicted_source source = {
+        .form = {width, height, sizeof(*rounded)}, .pixels = (const uint8_t *)rounded, .level = 1};
+    const size_t capacity = coarse_depth_bound(width, height);
+    *out = capacity ? malloc(capacity) : NULL;
+    if (!*out)
+        return error_set(error, ERROR_OUT_OF_MEMORY, "encoding", "out of memory for the coarse depths of a frame");
+    const struct predicted_result result = coarse_depth_encode(&source, *out, capacity);
+    *out_bytes = result.bytes;
+    if (result.status == PREDICTED_DONE)
+        return true;
+    free(*out);
+    *out = NULL;
+    return error_set(error, ERROR_INTERNAL, "encoding", "coarse depths: %s", result.reason);
 }

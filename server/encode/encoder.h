@@ -18,6 +18,7 @@ struct picture {
      */
     enum ycbcr ycbcr;
     struct ycbcr_planes planes;
+    bool in_scans; /* of a JPEG: its beginning is a coarser picture. Takes four times as long, and fewer bytes */
     /* Asked every few milliseconds by encoders that may take seconds: the bytes are not wanted any more. NULL:
      * they always are. */
     bool (*is_given_up)(const void *context);

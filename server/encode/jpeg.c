@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Baseline JPEG through libjpeg-turbo. Alpha is dropped. Planes, which have half the chroma, are taken where that
- * is all that the JPEG will have. */
+/* JPEG, baseline or progressive, through libjpeg-turbo. Alpha is dropped. Planes, which have half the chroma, are
+ * taken where that is all that the JPEG will have. */
 #include "encode/encoder.h"
 
 #include <limits.h>
@@ -37,14 +37,14 @@ static int compress(tjhandle handle, const struct picture *picture, uint8_t *out
                     int quality)
 {
     int width = (int)picture->width, height = (int)picture->height, chroma = subsampling((unsigned)quality);
+    int flags = TJFLAG_NOREALLOC | (picture->in_scans ? TJFLAG_PROGRESSIVE : 0);
     if (picture->ycbcr == YCBCR_NONE)
         return tjCompress2(handle, picture->pixels, width, 0, height, TJPF_RGBX, &out, bytes, chroma, quality,
-                           TJFLAG_NOREALLOC);
+                           flags);
     const struct ycbcr_planes *planes = &picture->planes;
     const unsigned char *starts[] = {planes->y, planes->cb, planes->cr};
     int c_stride = (int)planes->c_stride_bytes, strides[] = {(int)planes->y_stride_bytes, c_stride, c_stride};
-    return tjCompressFromYUVPlanes(handle, starts, width, strides, height, chroma, &out, bytes, quality,
-                                   TJFLAG_NOREALLOC);
+    return tjCompressFromYUVPlanes(handle, starts, width, strides, height, chroma, &out, bytes, quality, flags);
 }
 
 static size_t jpeg_encode(const struct picture *picture, unsigned quality, uint8_t *out, size_t capacity,

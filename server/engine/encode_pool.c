@@ -4,9 +4,9 @@
 #include "base/clock.h"
 #include "base/log.h"
 #include "base/parallel.h"
-#include "encode/depth.h"
 #include "encode/sparse.h"
 #include "encode/stream.h"
+#include "engine/attachments.h"
 
 #include <pthread.h>
 #include <stdatomic.h>
@@ -20,7 +20,6 @@
 #define THREADS_AUTO_MAX 4
 /* Bytes that are hashed between two looks at whether they are wanted. */
 #define DIGEST_STEP_BYTES ((size_t)16 << 20)
-#define ATTACHMENT_PIXEL_BYTES 4
 
 struct encode_task {
     struct job_output *output;
@@ -153,85 +152,6 @@ static bool encode_pixels(struct encode_lane *lane, const struct picture *pictur
     return encoder_encode(frame->encoding, picture, frame->quality, &frame->bytes, &frame->size_bytes, error);
 }
 
-/* ---- attachments: behind the picture ---- */
-
-static bool no_memory_for_attachments(struct error *error)
-{
-    return error_set(error, ERROR_OUT_OF_MEMORY, "encoding", "out of memory for a frame's attachments");
-}
-
-static struct picture picture_of(const struct encode_task *task, const uint8_t *pixels, uint32_t pixel_bytes)
-{
-    return (struct picture){.width = task->frame->result.width,
-                            .height = task->frame->result.height,
-                            .bytes_per_pixel = pixel_bytes,
-                            .pixels = pixels,
-                            .is_given_up = is_given_up,
-                            .given_up_context = task};
-}
-
-static const float *depths_of(const struct frame_result *result)
-{
-    return (const float *)(const void *)frame_result_attachment(result, ATTACHMENT_DEPTH);
-}
-
-/* *rounded: malloc'ed; NULL: metres are what the frame has. */
-static bool round_depths(struct engine_frame *frame, uint16_t **rounded, struct error *error)
-{
-    const struct frame_result *result = &frame->result;
-    const struct depth_picture picture = {.depths = depths_of(result),
-                                          .width = result->width,
-                                          .height = result->height,
-                                          .fov_y = frame->request.camera.fov_y,
-                                          .pixels = frame->depth.pixels,
-                                          .radius = frame->depth.radius};
-    *rounded = NULL;
-    return frame->depth.form != DEPTH_FORM_INVERSE || depth_round(&picture, rounded, &frame->depth_step, error);
-}
-
-static bool append(struct engine_frame *frame, const struct picture *picture, size_t *added_bytes,
-                   struct error *error)
-{
-    uint8_t *encoded;
-    if (!encoder_encode(ENCODING_PREDICTED, picture, 1, &encoded, added_bytes, error))
-        return false;
-    uint8_t *bytes = realloc(frame->bytes, frame->size_bytes + *added_bytes);
-    if (bytes) {
-        memcpy(bytes + frame->size_bytes, encoded, *added_bytes);
-        frame->bytes = bytes;
-        frame->size_bytes += *added_bytes;
-    }
-    free(encoded);
-    return bytes || no_memory_for_attachments(error);
-}
-
-static bool append_depth(const struct encode_task *task, struct error *error)
-{
-    struct engine_frame *frame = task->frame;
-    uint16_t *rounded;
-    if (!(frame->result.attachments & 1u << ATTACHMENT_DEPTH))
-        return true;
-    if (!round_depths(frame, &rounded, error))
-        return false;
-    const struct picture picture =
-        rounded
-            ? picture_of(task, (const uint8_t *)rounded, sizeof(*rounded))
-            : picture_of(task, frame_result_attachment(&frame->result, ATTACHMENT_DEPTH), ATTACHMENT_PIXEL_BYTES);
-    const bool done = append(frame, &picture, &frame->depth_bytes, error);
-    free(rounded);
-    return done;
-}
-
-static bool append_normals(const struct encode_task *task, struct error *error)
-{
-    struct engine_frame *frame = task->frame;
-    if (!(frame->result.attachments & 1u << ATTACHMENT_NORMALS))
-        return true;
-    const struct picture picture =
-        picture_of(task, frame_result_attachment(&frame->result, ATTACHMENT_NORMALS), ATTACHMENT_PIXEL_BYTES);
-    return append(frame, &picture, &frame->normal_bytes, error);
-}
-
 static bool make_digest(const struct encode_task *task, struct error *error)
 {
     const struct frame_result *result = &task->frame->result;
@@ -256,7 +176,7 @@ static void fill_hidden(const struct engine_frame *frame)
     const struct frame_result *result = &frame->result;
     if (frame->request.hidden_layer > 0 && result->format == PIXEL_FORMAT_RGBA8 &&
         result->attachments & 1u << ATTACHMENT_DEPTH)
-        sparse_fill(result->pixels, depths_of(result), result->width, result->height);
+        sparse_fill(result->pixels, attachments_depths(result), result->width, result->height);
 }
 
 static bool encode(const struct encode_task *task, struct error *error)
@@ -280,10 +200,11 @@ static bool encode(const struct encode_task *task, struct error *error)
                                    .planes = ycbcr_planes_at(result->pixels, result->width)};
     picture.is_given_up = is_given_up;
     picture.given_up_context = task;
+    picture.in_scans = frame->in_parts;
     uint64_t start_ns = clock_now_ns();
     fill_hidden(frame);
     if (!make_digest(task, error) || !encode_pixels(task->lane, &picture, frame, error) ||
-        !append_depth(task, error) || !append_normals(task, error))
+        !attachments_append(frame, &picture, error))
         return false;
     if (!encoder_loses(frame->encoding))
         frame->quality = 0; /* a level, which costs no picture */

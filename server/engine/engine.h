@@ -10,6 +10,7 @@
 #include "base/error.h"
 #include "base/stage_times.h"
 #include "encode/encoder.h"
+#include "encode/parts.h"
 #include "gpu/device.h"
 #include "render/frame.h"
 #include "scene/pose.h"
@@ -108,6 +109,7 @@ struct engine_job {
     struct view_depth depth; /* view: of what is attached */
     float margin;            /* view: of frames while it moves, share of width and height on each side */
     uint32_t hidden_layers;  /* view: frames of what is hidden that follow each while it moves */
+    bool parts;              /* view: frames may come in parts, as its wishes say */
 };
 
 enum engine_command_kind {
@@ -235,7 +237,10 @@ struct engine_frame {
     uint64_t wanted_bytes;            /* that it may have, for an encoder that can be told; 0: not known */
     bool wants_key;                   /* it is to be encoded so that it can be decoded without those before .. */
     bool key_frame;                   /* .. and so it was */
-    size_t depth_bytes, normal_bytes; /* of attachments, encoded: the last ones of size_bytes, in that order */
+    size_t depth_bytes, normal_bytes; /* of attachments, encoded: the last ones of size_bytes, in that order .. */
+    bool in_parts;                    /* .. unless it is to be encoded in parts .. */
+    struct part_list parts;           /* .. which then say what the bytes are; none: it could not be cut */
+    size_t coarse_bytes;              /* of its coarse depths, likewise of size_bytes */
     struct view_depth depth;          /* as it is to be encoded .. */
     float depth_step;                 /* .. and as it was: 1 / metres; 0: metres */
     uint32_t margin_x, margin_y;      /* pixels on each side beyond what the job asks for */

@@ -216,6 +216,8 @@ static void note_camera(struct job *job, struct engine_frame *frame)
     frame->depth = job->spec.depth;
     frame->margin_x = view->margin_x;
     frame->margin_y = view->margin_y;
+    const struct view_effort *effort = &view->wish.effort;
+    frame->in_parts = job->spec.parts && (frame->moving ? effort->parts : effort->still_parts);
 }
 
 static void hidden_done(struct job *job, struct engine_frame *frame)

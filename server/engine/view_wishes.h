@@ -37,6 +37,8 @@ struct view_effort {
     /* Frames in the encoding of rest would occupy the link when motion begins: only the frame with all samples
      * uses it. */
     bool sparing;
+    /* Frames while it moves, and those at rest, take the link so long that they are to come in parts. */
+    bool parts, still_parts;
 };
 /* Nothing is to be told: it counts when the next frame is begun for another reason. */
 void view_wishes_set_effort(struct view_wishes *wishes, const struct view_effort *effort);

@@ -176,20 +176,27 @@ void out_queue_advance(struct out_queue *queue, size_t bytes, uint64_t before_ns
     }
 }
 
-enum drop {
+enum drop_kind {
     DROP_OF_ALL,
     DROP_OF_REQUEST,
     DROP_UNBEGUN_OF_REQUEST, /* a begun message is kept */
 };
 
+struct drop {
+    enum drop_kind kind;
+    uint32_t request;
+    size_t from_bytes;
+};
+
 /* Drops bulk messages (those with a body or a completion) of the request, or of any request, from one list. */
-static void drop_from(struct out_queue *queue, struct out_list *list, enum drop drop, uint32_t request)
+static void drop_from(struct out_queue *queue, struct out_list *list, struct drop drop)
 {
     struct out_list kept;
     size_t taken_bytes = list == &queue->sending ? queue->taken_bytes : 0;
     list_init(&kept);
     for (struct out_message *message; (message = list_take(list));) {
-        bool concerned = (message->body || message->sent) && (drop == DROP_OF_ALL || message->request == request);
+        bool concerned = (message->body || message->sent) && message->body_offset_bytes >= drop.from_bytes &&
+                         (drop.kind == DROP_OF_ALL || message->request == drop.request);
         size_t left_bytes = out_message_bytes(message) - message->sent_bytes;
         bool begun = message->sent_bytes || taken_bytes;
         taken_bytes -= left_bytes < taken_bytes ? left_bytes : taken_bytes;
@@ -202,7 +209,7 @@ static void drop_from(struct out_queue *queue, struct out_list *list, enum drop 
             destroy(message);
             continue;
         }
-        if (concerned && drop != DROP_UNBEGUN_OF_REQUEST)
+        if (concerned && drop.kind != DROP_UNBEGUN_OF_REQUEST)
             message->sent = NULL;
         list_append(&kept, message);
     }
@@ -210,22 +217,38 @@ static void drop_from(struct out_queue *queue, struct out_list *list, enum drop 
         list_append(list, list_take(&kept));
 }
 
-void out_queue_drop_bulk(struct out_queue *queue, uint32_t request)
+static void drop(struct out_queue *queue, struct drop what)
 {
-    drop_from(queue, &queue->sending, DROP_OF_REQUEST, request);
-    drop_from(queue, &queue->bulk, DROP_OF_REQUEST, request);
+    drop_from(queue, &queue->sending, what);
+    drop_from(queue, &queue->bulk, what);
 }
 
-size_t out_queue_drop_unbegun(struct out_queue *queue, uint32_t request)
+void out_queue_drop_bulk(struct out_queue *queue, uint32_t request)
+{
+    drop(queue, (struct drop){.kind = DROP_OF_REQUEST, .request = request});
+}
+
+size_t out_queue_drop_unbegun(struct out_queue *queue, uint32_t request, size_t from_bytes)
 {
     size_t before_bytes = queue->queued_bytes;
-    drop_from(queue, &queue->sending, DROP_UNBEGUN_OF_REQUEST, request);
-    drop_from(queue, &queue->bulk, DROP_UNBEGUN_OF_REQUEST, request);
+    drop(queue, (struct drop){.kind = DROP_UNBEGUN_OF_REQUEST, .request = request, .from_bytes = from_bytes});
     return before_bytes - queue->queued_bytes;
 }
 
 void out_queue_drop_all_bulk(struct out_queue *queue)
 {
-    drop_from(queue, &queue->sending, DROP_OF_ALL, 0);
-    drop_from(queue, &queue->bulk, DROP_OF_ALL, 0);
+    drop(queue, (struct drop){.kind = DROP_OF_ALL});
+}
+
+size_t out_queue_begun_end(const struct out_queue *queue, uint32_t request)
+{
+    size_t end = 0, taken_bytes = queue->taken_bytes;
+    const struct out_message *message = queue->sending.first;
+    for (; message && (message->sent_bytes || taken_bytes); message = message->next) {
+        size_t left_bytes = out_message_bytes(message) - message->sent_bytes;
+        taken_bytes -= left_bytes < taken_bytes ? left_bytes : taken_bytes;
+        if (message->body && message->request == request)
+            end = message->body_offset_bytes + message->body_bytes;
+    }
+    return end;
 }

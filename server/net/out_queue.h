@@ -68,7 +68,10 @@ void out_queue_advance(struct out_queue *queue, size_t bytes, uint64_t before_ns
 /* Drops the request's messages that were not begun, and the `sent` call of one that was. Control messages stay. */
 void out_queue_drop_bulk(struct out_queue *queue, uint32_t request);
 void out_queue_drop_all_bulk(struct out_queue *queue);
-/* As above, but a begun message keeps its `sent`. Returns the number of dropped bytes. */
-size_t out_queue_drop_unbegun(struct out_queue *queue, uint32_t request);
+/* As above, but only those whose body begins at `from_bytes` or behind, and a begun message keeps its `sent`.
+ * Returns the number of dropped bytes. */
+size_t out_queue_drop_unbegun(struct out_queue *queue, uint32_t request, size_t from_bytes);
+/* Where the body of the request's last begun message ends; 0: none of its messages here was begun. */
+size_t out_queue_begun_end(const struct out_queue *queue, uint32_t request);
 
 #endif

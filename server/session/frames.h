@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Sends rendered frames to the client without a copy: FRAME_BEGIN, chunks that refer to the frame's bytes, and
- * FRAME_END once the kernel has accepted the last of them, so that it can contain the times. */
+ * FRAME_END once the kernel has accepted the last of them, so that it can contain the times. Frames in parts are
+ * cut where something better waits behind them. */
 #ifndef FARLIGHT_SESSION_FRAMES_H
 #define FARLIGHT_SESSION_FRAMES_H
 
@@ -16,8 +17,6 @@ struct session;
 #define FRAME_PIECE_BYTES ((size_t)256 << 10)
 /* The chunk size of a picture at rest: a moving frame that overtakes it waits for one chunk. */
 #define FRAME_PIECE_AT_REST_BYTES ((size_t)32 << 10)
-/* Header and fixed part of a frame_data message, up to the bytes themselves. */
-#define FRAME_DATA_HEAD_BYTES 32u
 
 /* Takes the frame over, in any case. */
 void frames_add(struct job *job, struct engine_frame *frame);
@@ -32,12 +31,11 @@ unsigned frames_of_before(const struct job *job);
 uint64_t frames_bytes_of_before(const struct job *job);
 /* Its frames whose first byte has gone, but not the last: 0 or 1. */
 unsigned frames_on_the_wire(const struct job *job);
-/* Abandons the rest of the view's frame on the wire, if motion has overtaken it and the client understands that.
- */
-void frames_abandon(struct job *job);
+/* Ends the view's frame on the wire early if it has been overtaken: one at rest, or of what is hidden, by motion;
+ * one of motion by a newer picture that waits. In parts it ends after the one under way, else it is abandoned if
+ * the client understands that, and if it is not of motion. */
+void frames_overtake(struct job *job);
 /* Queues chunks while the connection wants bulk; jobs take turns. */
 void frames_pump(struct session *session);
-void frame_data_head(uint8_t head[FRAME_DATA_HEAD_BYTES], uint32_t request, uint32_t channel,
-                     uint64_t offset_bytes, uint32_t data_bytes);
 
 #endif

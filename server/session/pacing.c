@@ -146,6 +146,11 @@ bool pacing_is_long(const struct pacing *pacing, uint64_t bytes)
     return (double)bytes * pacing->carried_ns >= (double)pacing->frame_ns * pacing->carried_bytes;
 }
 
+bool pacing_takes_longer(const struct pacing *pacing, uint64_t bytes, uint64_t than_ns)
+{
+    return (double)bytes * pacing->carried_ns > (double)than_ns * pacing->carried_bytes;
+}
+
 void pacing_abandoned(struct pacing *pacing, uint32_t frame)
 {
     size_t kept = 0;
@@ -158,6 +163,17 @@ void pacing_abandoned(struct pacing *pacing, uint32_t frame)
     pacing->in_flight_count = kept;
     /* The next one is not like it. */
     pacing->last_bytes = kept ? pacing->in_flight[kept - 1].bytes : 0;
+}
+
+void pacing_cut(struct pacing *pacing, uint32_t frame, uint64_t bytes)
+{
+    for (size_t i = 0; i < pacing->in_flight_count; i++) {
+        struct pacing_frame *cut = &pacing->in_flight[i];
+        if (cut->frame != frame)
+            continue;
+        pacing->in_flight_bytes -= cut->bytes - bytes;
+        cut->bytes = bytes;
+    }
 }
 
 void pacing_forget(struct pacing *pacing)

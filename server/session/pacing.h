@@ -68,6 +68,10 @@ void pacing_sent(struct pacing *pacing, uint32_t frame, uint64_t bytes, uint64_t
 void pacing_acknowledged(struct pacing *pacing, uint32_t frame, bool whole, uint64_t now_ns);
 /* Whether the rest of a frame keeps the link for longer than the next frame should wait. */
 bool pacing_is_long(const struct pacing *pacing, uint64_t bytes);
+/* Whether the link would take so long for the bytes. One that is not known yet would not. */
+bool pacing_takes_longer(const struct pacing *pacing, uint64_t bytes, uint64_t than_ns);
+/* Of the frame only so many bytes will go. The next one is expected to be like all of it. */
+void pacing_cut(struct pacing *pacing, uint32_t frame, uint64_t bytes);
 /* The rest of the frame is abandoned. Its sent bytes are ahead of the next frame at any time, so the next need not
  * wait. */
 void pacing_abandoned(struct pacing *pacing, uint32_t frame);

@@ -21,6 +21,7 @@ struct view_terms {
     enum encoding still_encoding;
     unsigned quality; /* of motion; 0: lossless */
     bool adapt;
+    bool parts; /* frames may come in parts */
 };
 
 /* A view that is to take the place of the one that is there. */
@@ -85,7 +86,10 @@ bool view_is_long(const struct job *job, uint64_t left_bytes);
 void view_frame_dropped(struct job *job);
 /* The rest of a begun frame is abandoned. */
 void view_frame_abandoned(struct job *job, const struct engine_frame *frame);
-void view_frame_begun(struct job *job, const struct engine_frame *frame, uint64_t begun_ns);
+/* It ends before its end: nothing waits for one that gives way to motion. */
+void view_frame_cut(struct job *job, const struct engine_frame *frame, size_t end_bytes, bool gives_way);
+/* `end_bytes` of it are to go. */
+void view_frame_begun(struct job *job, const struct engine_frame *frame, size_t end_bytes, uint64_t begun_ns);
 void view_frame_sent(struct job *job);
 
 /* VIEW_CAMERA and FRAME_ACK */

@@ -10,6 +10,7 @@
 #include "net/connection.h"
 #include "net/listen.h"
 #include "protocol/sealed/key.h"
+#include "session/frame_messages.h"
 #include "session/frames.h"
 
 #include <inttypes.h>

@@ -6,12 +6,11 @@
 #include <inttypes.h>
 #include <stdlib.h>
 #include <sys/stat.h>
-#include <xxhash.h>
 
 #include "protocol/handshake.h"
-#include "protocol/pixels/predicted.h"
 #include "tests/fuzz/recorded_session.h"
 #include "tests/fuzz/sealed_random.h"
+#include "tests/fuzz/seed_frames.h"
 #include "tests/unit/protocol/cases.h"
 
 static struct case_maker maker;
@@ -26,8 +25,8 @@ static bool make_folder(const char *path)
     return true;
 }
 
-static bool write_file(const char *folder, const char *what, const char *name, int number, const void *bytes,
-                       size_t count)
+bool seed_write_file(const char *folder, const char *what, const char *name, int number, const void *bytes,
+                     size_t count)
 {
     char path[4096];
     snprintf(path, sizeof(path), "%s/%s", folder, what);
@@ -121,7 +120,7 @@ static bool write_messages(const char *folder)
             input[0] = (uint8_t)i;
             input[1] = (uint8_t)(i >> 8);
             memcpy(input + 2, plain.data, plain.count);
-            bool ok = write_file(folder, "codec", name, (int)mode, input, plain.count + 2);
+            bool ok = seed_write_file(folder, "codec", name, (int)mode, input, plain.count + 2);
             free(input);
             writer_init(&writer, framed, sizeof(framed));
             writer_put_u8(&writer, 7);
@@ -130,7 +129,7 @@ static bool write_messages(const char *folder)
                 fprintf(stderr, "%s: %s\n", writer.error.field, writer.error.text);
                 return false;
             }
-            if (!ok || !write_file(folder, "framing", name, (int)mode, framed, writer.used_bytes)) {
+            if (!ok || !seed_write_file(folder, "framing", name, (int)mode, framed, writer.used_bytes)) {
                 return false;
             }
         }
@@ -144,9 +143,9 @@ static bool write_handshakes(const char *folder)
     struct handshake_hello hello = {.version_min = 1, .version_max = 2, .name = "a client"};
     struct handshake_reply reply = {.version = 1, .name = "farlightd"};
     struct handshake_reply refusal = {.version = 0, .name = "farlightd", .text = "none in common"};
-    return write_file(folder, "handshake", "hello", 0, bytes, handshake_hello_encode(bytes, &hello)) &&
-           write_file(folder, "handshake", "reply", 0, bytes, handshake_reply_encode(bytes, &reply)) &&
-           write_file(folder, "handshake", "reply", 1, bytes, handshake_reply_encode(bytes, &refusal));
+    return seed_write_file(folder, "handshake", "hello", 0, bytes, handshake_hello_encode(bytes, &hello)) &&
+           seed_write_file(folder, "handshake", "reply", 0, bytes, handshake_reply_encode(bytes, &reply)) &&
+           seed_write_file(folder, "handshake", "reply", 1, bytes, handshake_reply_encode(bytes, &refusal));
 }
 
 /* ---- sealed ---- */
@@ -192,8 +191,8 @@ static bool write_sealed(const char *folder)
          sealed_link_seal_last(server) && pass(client, server, 1, &up) && pass(server, client, 0, &down);
     sealed_link_destroy(client);
     sealed_link_destroy(server);
-    return ok && write_file(folder, "sealed", "up", 0, up.bytes, up.count) &&
-           write_file(folder, "sealed", "down", 0, down.bytes, down.count);
+    return ok && seed_write_file(folder, "sealed", "up", 0, up.bytes, up.count) &&
+           seed_write_file(folder, "sealed", "down", 0, down.bytes, down.count);
 }
 
 /* Bytes that a generator makes, for fuzzers that read any as something. */
@@ -206,7 +205,7 @@ static bool write_noise(const char *folder)
             state = state * 1664525u + 1013904223u; /* Numerical Recipes */
             bytes[i] = (uint8_t)(state >> 24);
         }
-        if (!write_file(folder, "scene", "noise", number, bytes, sizeof(bytes))) {
+        if (!seed_write_file(folder, "scene", "noise", number, bytes, sizeof(bytes))) {
             return false;
         }
     }
@@ -305,7 +304,7 @@ static bool write_session(const char *folder, int number, unsigned settle, unsig
     put_circumstance(&seed, circumstance);
     session(put_message, &seed);
     put_circumstance(&seed, STOP);
-    return write_file(folder, "session", "session", number, seed.bytes, seed.writer.used_bytes);
+    return seed_write_file(folder, "session", "session", number, seed.bytes, seed.writer.used_bytes);
 }
 
 static bool write_sessions(const char *folder)
@@ -370,66 +369,12 @@ static const char aff_model[] =
     "scale 4 -1 1 1 1 0 0 0 0 1 1 1 0 0 0 1 2 1 1 0 0 0 2 1 1 1 0 0 0 visibility 2 0 1 1 0 }\n"
     "k camera { transl 4 0 0 0 5 0 0 0 0 0 0 5 0 0 0 1 0 0 6 0 0 0 2 0 0 5 0 0 0 }\n";
 
-/* A picture of 8x4 in each of some encodings, with depth in both forms. */
-static bool write_frame(const char *folder, int number, enum protocol_encoding encoding, bool inverse)
-{
-    enum { WIDTH = 8, HEIGHT = 4, COUNT = WIDTH * HEIGHT };
-    static const struct predicted_form rgba = {WIDTH, HEIGHT, 4}, rounded = {WIDTH, HEIGHT, 2};
-    uint8_t pixels[4 * COUNT], depth[4 * COUNT], bytes[2048];
-    for (size_t i = 0; i < sizeof(pixels); i++)
-        pixels[i] = (uint8_t)(i * 5);
-    for (size_t i = 0; i < sizeof(depth); i++)
-        depth[i] = (uint8_t)(inverse ? i % 2 ? 0 : i : i % 4 == 3 ? 0x3f : 0x80);
-    struct message message = {.type = MESSAGE_FRAME_BEGIN};
-    message_init(&message, MESSAGE_FRAME_BEGIN);
-    struct message_frame_begin *begin = &message.frame_begin;
-    begin->frame = 7;
-    begin->width = WIDTH;
-    begin->height = HEIGHT;
-    begin->encoding = encoding;
-    begin->digest = XXH3_64bits(pixels, sizeof(pixels));
-    begin->attachments = 1;
-    begin->depth_form = inverse ? PROTOCOL_DEPTH_FORM_INVERSE : PROTOCOL_DEPTH_FORM_METRES;
-    begin->depth_step = inverse ? 0.01f : 0.0f;
-    begin->margin_x = begin->margin_y = 1;
-    begin->hidden_layer = (uint32_t)number % 3;
-    begin->of_frame = begin->hidden_layer ? 6 : 0;
-    uint8_t encoded[1024];
-    size_t used = sizeof(pixels);
-    memcpy(encoded, pixels, used);
-    if (encoding == PROTOCOL_ENCODING_PREDICTED)
-        used =
-            predicted_encode(&(struct predicted_source){.form = rgba, .pixels = pixels, .level = 1}, encoded, 512)
-                .bytes;
-    begin->size_bytes = used;
-    begin->depth_bytes =
-        predicted_encode(&(struct predicted_source){.form = inverse ? rounded : rgba, .pixels = depth, .level = 1},
-                         encoded + used, sizeof(encoded) - used)
-            .bytes;
-    used += begin->depth_bytes;
-    struct writer writer;
-    writer_init(&writer, bytes + 2, sizeof(bytes) - 2 - used);
-    if (!message_encode(&writer, &message))
-        return false;
-    bytes[0] = (uint8_t)writer.used_bytes;
-    bytes[1] = (uint8_t)(writer.used_bytes >> 8);
-    memcpy(bytes + 2 + writer.used_bytes, encoded, used);
-    return write_file(folder, "frame", "frame", number, bytes, 2 + writer.used_bytes + used);
-}
-
-static bool write_frames(const char *folder)
-{
-    return write_frame(folder, 0, PROTOCOL_ENCODING_RAW, false) &&
-           write_frame(folder, 1, PROTOCOL_ENCODING_RAW, true) &&
-           write_frame(folder, 2, PROTOCOL_ENCODING_PREDICTED, true);
-}
-
 static bool write_models(const char *folder)
 {
-    return write_file(folder, "aff", "model", 0, aff_model, sizeof(aff_model) - 1) &&
-           write_file(folder, "gltf", "model", 0, gltf_model, sizeof(gltf_model) - 1) &&
-           write_file(folder, "obj", "model", 0, obj_model, sizeof(obj_model) - 1) &&
-           write_file(folder, "nff", "model", 0, nff_model, sizeof(nff_model) - 1);
+    return seed_write_file(folder, "aff", "model", 0, aff_model, sizeof(aff_model) - 1) &&
+           seed_write_file(folder, "gltf", "model", 0, gltf_model, sizeof(gltf_model) - 1) &&
+           seed_write_file(folder, "obj", "model", 0, obj_model, sizeof(obj_model) - 1) &&
+           seed_write_file(folder, "nff", "model", 0, nff_model, sizeof(nff_model) - 1);
 }
 
 int main(int argument_count, char **arguments)
@@ -440,6 +385,6 @@ int main(int argument_count, char **arguments)
     }
     bool ok = make_folder(arguments[1]) && write_dictionary(arguments[1]) && write_messages(arguments[1]) &&
               write_handshakes(arguments[1]) && write_sealed(arguments[1]) && write_noise(arguments[1]) &&
-              write_sessions(arguments[1]) && write_frames(arguments[1]) && write_models(arguments[1]);
+              write_sessions(arguments[1]) && seed_write_frames(arguments[1]) && write_models(arguments[1]);
     return ok ? 0 : 1;
 }

@@ -14,6 +14,9 @@ from farlight_test import Case, Daemon, farlight, frames_of
 from tiny_client import BATCH, CANCELLED, SHARED, VIEW, Client
 
 ABOVE, LEFT = ((0, 1, 5), (0, 0, 0), (0, 1, 0), 0.8), ((-1, 1, 5), (0, 0, 0), (0, 1, 0), 0.8)
+JPEG = 2  # encoding
+COLOURS, DEPTH, NORMALS, COARSE_DEPTH = 0, 1, 2, 3  # frame_part_kind
+TAKES_PARTS = 1 << 6  # capabilities
 GRID = 300  # 90,601 vertices: positions of more than a megabyte
 
 
@@ -93,6 +96,38 @@ def restore_predicted(data, width, height, pixel_bytes):
             out[i] = (stored[b * plane + i] + guess) % 256
         planes.append(out)
     return planes
+
+
+def restore_coarse_depth(data, width, height):
+    """The numbers of all pixels, and by how much none of them is off."""
+    off, = struct.unpack_from("<H", data)
+    across, down = (width + 7) // 8, (height + 7) // 8
+    low, high = restore_predicted(data[2:], across, down, 2)
+    squares = [a + 256 * b for a, b in zip(low, high)]
+    numbers = []
+    for y in range(height):
+        j, v = (y + 4) // 8, 2 * ((y + 4) % 8) + 1
+        rows = [max(j - 1, 0) * across, min(j, down - 1) * across]
+        for x in range(width):
+            i, u = (x + 4) // 8, 2 * ((x + 4) % 8) + 1
+            columns = max(i - 1, 0), min(i, across - 1)
+            a, b, c, d = (squares[row + column] for row in rows for column in columns)
+            if (max(a, b, c, d) - min(a, b, c, d)) * 8 <= max(a, b, c, d):
+                numbers.append(((a * (16 - v) + c * v) * (16 - u) + (b * (16 - v) + d * v) * u + 128) // 256)
+            else:
+                numbers.append(squares[y // 8 * across + x // 8])
+    return numbers, off
+
+
+def decode_jpeg(data, width, height):
+    library = ctypes.CDLL("libturbojpeg.so.0")
+    library.tjInitDecompress.restype = ctypes.c_void_p
+    pixels, decoder = ctypes.create_string_buffer(3 * width * height), ctypes.c_void_p(library.tjInitDecompress())
+    stop_on_warning = 8192
+    failed = library.tjDecompress2(decoder, data, ctypes.c_ulong(len(data)), pixels, width, 0, height, 0, stop_on_warning)
+    library.tjDestroy(decoder)
+    assert not failed
+    return pixels.raw
 
 
 class Document(Case):
@@ -302,6 +337,47 @@ class Session(Case):
                 slack = (abs(right[2]) + abs(up[2])) / focal / eye[2] / 2
                 self.assertLess(abs(number * begin["depth_step"] - inverse), begin["depth_step"] / 2 + slack + 1e-6)
         self.assertGreater(seen, 100)
+
+    def test_every_prefix_of_parts_is_what_the_document_says(self):
+        """The link seems to take long for each frame, so that they come in parts."""
+        client, (width, height) = self.connect(grid_scene(), capabilities=TAKES_PARTS), (96, 64)
+        fixed = fixed_part("render", scene=1, kind=VIEW, channel=2, width=width, height=height, encoding=JPEG, quality=75,
+                           still_encoding=JPEG, attachments=3, depth_form=1, depth_pixels=0.5, depth_radius=0.2, parts=1,
+                           camera_path=tiny_client.CAMERA_PATH_KEYS, credit=99)
+        client.acknowledged.add(2)
+        client.takes_s = 0.1
+        client.ask(tiny_client.RENDER, tiny_client.payload(
+            fixed, tiny_client.array([struct.pack("<f", 0) + tiny_client.camera_bytes(ABOVE)]), tiny_client.array([])))
+        frame = client.next_frame()
+        self.assertEqual(frame.parts, [])  # nothing is known of the link
+        for command in range(1, 20):
+            client.look(2, command, (LEFT, ABOVE)[command % 2], moving=True)
+            frame = client.next_frame()
+            if frame.parts and not frame.abandoned:
+                break
+        self.assertEqual([kind for kind, _ in frame.parts], [COLOURS, COARSE_DEPTH, COLOURS, DEPTH, COLOURS, NORMALS])
+        came = {}
+        prefixes = []
+        at = 0
+        for kind, size in frame.parts:
+            came[kind] = came.get(kind, b"") + bytes(frame.pixels[at:at + size])
+            at += size
+            prefixes.append(dict(came))
+        self.assertEqual(len(came[COLOURS]), frame.size_bytes)
+        self.assertEqual(len(came[DEPTH]) + len(came[NORMALS]), frame.attached_bytes)
+        low, high = restore_predicted(came[DEPTH], width, height, 2)
+        depth = [a + 256 * b for a, b in zip(low, high)]
+        coarse, off = restore_coarse_depth(came[COARSE_DEPTH], width, height)
+        self.assertEqual(max(abs(a - b) for a, b in zip(coarse, depth)), off)
+        picture = decode_jpeg(came[COLOURS], width, height)
+        before = None
+        for prefix in prefixes:
+            is_all = len(prefix[COLOURS]) == frame.size_bytes
+            colours = decode_jpeg(prefix[COLOURS] + (b"" if is_all else b"\xff\xd9"), width, height)
+            error = sum((a - b)**2 for a, b in zip(colours, picture))
+            self.assertLessEqual(error, error if before is None else before)
+            before = error
+        self.assertEqual(before, 0)
 
     def test_blobs_that_are_there_are_not_sent_again(self):
         client = self.connect(grid_scene())

@@ -6,11 +6,13 @@ import hashlib
 import socket
 import struct
 import sys
+import time
 
 OK, ERROR, PING, PONG, GOODBYE, CANCEL, CREDIT, BLOCKED = 0x0001, 0x0002, 0x0003, 0x0004, 0x0005, 0x0006, 0x0007, 0x8008
 SCENE_OPEN, SCENE_CHANGED, BLOB_OFFER, BLOB_NEED, BLOB_DATA = 0x0101, 0x8108, 0x0110, 0x0111, 0x0112
 EDIT_BEGIN, EDIT_COMMIT, SET_NODE, SET_MESH, SET_MATERIAL, SET_LIGHT = 0x0120, 0x0121, 0x0130, 0x0131, 0x0134, 0x0136
 RENDER, VIEW_CAMERA, FRAME_BEGIN, FRAME_DATA, FRAME_END, FRAME_ACK = 0x0201, 0x0202, 0x0210, 0x0211, 0x0212, 0x0213
+FRAME_PARTS = 0x0214
 
 BATCH, VIEW = 0, 1  # job_kind
 PRIVATE, KEPT, SHARED = 0, 1, 2  # sharing
@@ -76,6 +78,8 @@ class Frame:
          self.tracer, self.integrator, self.digest) = struct.unpack_from("<4I2Q4IQ", fixed)
         self.command, = struct.unpack_from("<Q", fixed, 136)
         self.attached_bytes = sum(struct.unpack_from("<2Q", fixed, 184))  # depth and normals, behind the pixels
+        self.parts = []  # (kind, bytes) of a frame in parts, in the order of its bytes
+        self.abandoned = False
 
 
 class Client:
@@ -90,6 +94,7 @@ class Client:
         self.frames, self.goodbye = [], None  # complete ones that nobody has taken
         self.begun = {}  # channel -> frame that is not complete
         self.acknowledged = set()  # channels of views
+        self.takes_s = 0  # that a frame seems to be on its way from its begin to its end
         self.changes = []  # (scene, revision)
         self.greet(name, capabilities)
 
@@ -165,12 +170,19 @@ class Client:
         elif kind == FRAME_BEGIN:
             self.begun[channel] = Frame(request, channel, body)
             self.acknowledge(self.begun[channel], 0)
+        elif kind == FRAME_PARTS:
+            count, = struct.unpack_from("<I", rest)
+            self.begun[channel].parts = list(struct.iter_unpack("<IQ", rest[4:4 + 12 * count]))
         elif kind == FRAME_DATA:
             self.take_piece(self.begun[channel], fixed, rest, len(body))
         elif kind == FRAME_END:
             frame = self.begun.pop(channel)
-            assert len(frame.pixels) == frame.size_bytes + frame.attached_bytes and struct.unpack_from("<I", fixed) == (frame.number,)
+            assert struct.unpack_from("<I", fixed) == (frame.number,)
+            frame.abandoned = bool(struct.unpack_from("<I", fixed, 52)[0])
+            whole = sum(size for _, size in frame.parts) or frame.size_bytes + frame.attached_bytes
+            assert (len(frame.pixels) < whole) == frame.abandoned
             self.frames.append(frame)
+            time.sleep(self.takes_s)
             self.acknowledge(frame, 1)
         elif kind not in (BLOCKED,):
             self.answers[request] = kind, body

@@ -623,6 +623,63 @@ TEST(a_frame_that_is_abandoned_is_not_seen_and_not_acknowledged)
     assert_int_equal(seen.credit, seen.first.credit + 1); /* for the one that was seen */
 }
 
+/* A frame of motion in two parts; it ends without the second one when a camera comes. */
+static void play_parts(struct daemon *daemon)
+{
+    struct framing_header header;
+    struct message message;
+    struct record_frame_part parts[] = {{PROTOCOL_FRAME_PART_COLOURS, FRAME_BYTES},
+                                        {PROTOCOL_FRAME_PART_NORMALS, 100}};
+    struct message_frame_begin frame = some_frame(0, 0);
+    uint32_t request = 0;
+    frame.moving = 1;
+    frame.attachments = FL_ATTACH_NORMALS;
+    frame.normal_bytes = 100;
+    greet(daemon);
+    while (look(daemon, &header, &message)) {
+        struct message next = {.type = MESSAGE_FRAME_PARTS};
+        if (message.type == MESSAGE_RENDER && message.render.parts) {
+            request = header.request;
+            next.frame_parts.parts = parts;
+            next.frame_parts.parts_count = 2;
+            tell_begin(daemon, request, &frame);
+            tell(daemon, request, &next);
+            next = (struct message){.type = MESSAGE_FRAME_DATA};
+            next.frame_data.data = pixels;
+            next.frame_data.data_bytes = FRAME_BYTES;
+            tell(daemon, request, &next);
+        } else if (message.type == MESSAGE_VIEW_CAMERA) {
+            next = (struct message){.type = MESSAGE_FRAME_END};
+            next.frame_end.abandoned = 1;
+            tell(daemon, request, &next);
+        }
+    }
+}
+
+TEST(first_parts_are_delivered_at_once_and_again_at_the_end_for_one_credit)
+{
+    struct viewing viewing;
+    struct fl_view *view = begin_view(&viewing, play_parts);
+    usual_options.attachments = FL_ATTACH_NORMALS;
+    usual_options.parts = 1;
+    fl_view_deliver_parts(view, true);
+    assert_true(fl_view_change(view, &usual_options, &error));
+    for (int i = 0; i < 2; i++) {
+        struct fl_frame *frame = next_frame(view);
+        assert_int_equal(frame->frame, 0);
+        assert_int_equal(frame->more_follows, i == 0);
+        assert_true(frame->parts_come == 1 && frame->parts == 2);
+        assert_memory_equal(frame->pixels, pixels, FRAME_BYTES);
+        assert_null(frame->normals);
+        fl_frame_destroy(frame);
+        assert_true(i > 0 || fl_view_look(view, &some_camera, NULL, &error));
+    }
+    end_view(&viewing, view);
+    assert_int_equal(seen.begun_acks, 1);
+    assert_int_equal(seen.acks, 1);
+    assert_int_equal(seen.credit, seen.first.credit + 1);
+}
+
 TEST(a_frame_of_motion_that_is_abandoned_breaks_the_connection)
 {
     wrong_frame = some_frame(4, 0);

@@ -268,6 +268,31 @@ TEST(jpeg_comes_close_and_keeps_full_chroma_from_quality_90)
     assert_true(jpeg_psnr_at(17, 9, 0, &subsampling) > 5); /* out of range: the lowest there is */
 }
 
+/* Noise takes the most bytes that there are: the bound holds for scans, too. */
+TEST(jpeg_in_scans_is_the_same_picture_of_any_content)
+{
+    for (size_t i = 0; i < sizeof(sizes) / sizeof(sizes[0]); i++) {
+        struct picture picture = make_picture(sizes[i][0], sizes[i][1], 4);
+        uint8_t *pixels = malloc(picture_bytes(&picture));
+        assert_non_null(pixels);
+        for (size_t k = 0, random = 1; k < picture_bytes(&picture); k++, random = random * 69069 + 1)
+            pixels[k] = (uint8_t)(random >> 16);
+        struct picture noise = picture;
+        noise.pixels = pixels;
+        const struct picture *const pictures[] = {&picture, &noise};
+        for (int k = 0; k < 4; k++) {
+            struct picture in_scans = *pictures[k / 2];
+            in_scans.in_scans = true;
+            const unsigned quality = k % 2 ? 100 : 75;
+            int subsampling;
+            const double plain = jpeg_psnr(pictures[k / 2], pictures[k / 2], quality, &subsampling);
+            assert_true(jpeg_psnr(&in_scans, pictures[k / 2], quality, &subsampling) == plain);
+        }
+        free(pixels);
+        drop_picture(&picture);
+    }
+}
+
 TEST(jpeg_of_planes_looks_like_that_of_their_pixels)
 {
     static const uint32_t odd_sizes[][2] = {{1, 1}, {7, 3}, {16, 17}, {321, 199}};

@@ -262,3 +262,52 @@ TEST(frames_of_a_closed_output_are_not_encoded)
         submit(&fixture, ENCODING_H264, i);
     end(&fixture);
 }
+
+/* Coarse depths come beside those of the picture, which is as long as it was. */
+TEST(a_frame_in_parts_has_first_colours_and_coarse_depth_first)
+{
+    static const enum frame_part_kind order[] = {FRAME_PART_COLOURS, FRAME_PART_COARSE_DEPTH, FRAME_PART_COLOURS,
+                                                 FRAME_PART_DEPTH, FRAME_PART_COLOURS};
+    struct fixture fixture;
+    begin(&fixture, 2);
+    struct engine_frame *made = frame_with_depth(1.0f, 0.4f);
+    made->encoding = ENCODING_JPEG;
+    made->in_parts = true;
+    uint64_t position = job_output_reserve(fixture.output);
+    assert_true(encode_pool_submit(fixture.pool, fixture.output, NULL, position, made));
+    struct engine_event *event = next(&fixture);
+    const struct engine_frame *frame = event->frame;
+    size_t sums[FRAME_PART_COUNT] = {0}, bytes = 0;
+    assert_int_equal(frame->parts.count, sizeof(order) / sizeof(order[0]));
+    for (uint32_t i = 0; i < frame->parts.count; i++) {
+        assert_int_equal(frame->parts.parts[i].kind, order[i]);
+        sums[order[i]] += frame->parts.parts[i].bytes;
+        bytes += frame->parts.parts[i].bytes;
+    }
+    assert_int_equal(bytes, frame->size_bytes);
+    assert_int_equal(sums[FRAME_PART_DEPTH], frame->depth_bytes);
+    assert_int_equal(sums[FRAME_PART_COARSE_DEPTH], frame->coarse_bytes);
+    const size_t needed = frame->parts.parts[0].bytes + frame->parts.parts[1].bytes;
+    assert_int_equal(parts_needed_bytes(&frame->parts), needed);
+    assert_int_equal(parts_end(&frame->parts, 0), frame->parts.parts[0].bytes);
+    assert_int_equal(parts_end(&frame->parts, needed), needed);
+    assert_int_equal(parts_end(&frame->parts, needed + 1), needed + frame->parts.parts[2].bytes);
+    engine_event_destroy(event);
+    end(&fixture);
+}
+
+/* What cannot be cut comes as it ever did. */
+TEST(a_frame_of_one_part_is_in_no_parts)
+{
+    struct fixture fixture;
+    begin(&fixture, 2);
+    struct engine_frame *made = new_frame(ENCODING_RAW, 7);
+    made->in_parts = true;
+    uint64_t position = job_output_reserve(fixture.output);
+    assert_true(encode_pool_submit(fixture.pool, fixture.output, NULL, position, made));
+    struct engine_event *event = next(&fixture);
+    assert_int_equal(event->frame->parts.count, 0);
+    assert_int_equal(event->frame->bytes[5], 40 + 4 * 7);
+    engine_event_destroy(event);
+    end(&fixture);
+}

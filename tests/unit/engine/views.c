@@ -476,7 +476,9 @@ TEST(a_view_that_adapts_is_smaller_while_it_moves)
     made->job.adapt = true;
     made->job.frame.width = 80;
     made->job.frame.height = 48;
-    view_wishes_set_effort(watching->wishes, &(struct view_effort){3, 55, 1234, true});
+    view_wishes_set_effort(
+        watching->wishes,
+        &(struct view_effort){.scale_eighths = 3, .quality = 55, .bytes = 1234, .sparing = true});
     submit(watching->engine, made);
     struct engine_frame *frame = take(expect_frame(watching->engine, 1, 2, 0));
     assert_int_equal(frame->result.width, 80);
@@ -507,7 +509,9 @@ TEST(a_frame_has_a_margin_while_it_moves)
     made->job.margin = 0.1f;
     made->job.frame.width = 80;
     made->job.frame.height = 48;
-    view_wishes_set_effort(watching->wishes, &(struct view_effort){3, 55, 1234, true});
+    view_wishes_set_effort(
+        watching->wishes,
+        &(struct view_effort){.scale_eighths = 3, .quality = 55, .bytes = 1234, .sparing = true});
     look(watching, 1, false);
     submit(watching->engine, made);
     struct engine_frame *frame = take(expect_frame(watching->engine, 1, 2, 0));
@@ -594,14 +598,16 @@ TEST(frames_come_in_the_form_that_their_encoder_takes)
     struct engine *engine = watching->engine;
     struct engine_command *made = with_samples(view(2, watching->wishes), 2, 1);
     made->job.adapt = true;
-    view_wishes_set_effort(watching->wishes, &(struct view_effort){0, 95, 0, true});
+    view_wishes_set_effort(watching->wishes,
+                           &(struct view_effort){.scale_eighths = 0, .quality = 95, .bytes = 0, .sparing = true});
     submit(engine, made);
     /* Of rest only its samples tell whether it will be one that loses. */
     expect_form(take(expect_frame(engine, 1, 2, 0)), ENCODING_JPEG, YCBCR_NONE);
     expect_form(take(expect_frame(engine, 1, 2, 1)), ENCODING_RAW, YCBCR_NONE);
     look(watching, 1, true);
     expect_form(take(expect_frame(engine, 1, 2, 2)), ENCODING_JPEG, YCBCR_NONE); /* full chroma */
-    view_wishes_set_effort(watching->wishes, &(struct view_effort){0, 55, 0, true});
+    view_wishes_set_effort(watching->wishes,
+                           &(struct view_effort){.scale_eighths = 0, .quality = 55, .bytes = 0, .sparing = true});
     look(watching, 2, true);
     expect_form(take(expect_frame(engine, 1, 2, 3)), ENCODING_JPEG, YCBCR_JPEG);
     look(watching, 3, false);
@@ -623,7 +629,9 @@ TEST(a_view_that_does_not_adapt_keeps_its_requested_settings)
 {
     struct watching *watching = *state;
     struct engine_command *made = with_samples(view(2, watching->wishes), 2, 1);
-    view_wishes_set_effort(watching->wishes, &(struct view_effort){3, 55, 1234, true});
+    view_wishes_set_effort(
+        watching->wishes,
+        &(struct view_effort){.scale_eighths = 3, .quality = 55, .bytes = 1234, .sparing = true});
     submit(watching->engine, made);
     expect_picture(watching, 2, 0, 0, 1, ENCODING_RAW);
     expect_picture(watching, 2, 1, 0, 2, ENCODING_RAW);

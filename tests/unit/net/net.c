@@ -517,8 +517,8 @@ TEST(a_begun_item_is_sent_and_reported_when_the_rest_is_dropped)
     out_queue_gather(&scene.queue, parts, 16);
     out_queue_advance(&scene.queue, 3, 1, 2);
     push(&scene.queue, "B3", 7, &scene.body, true);
-    assert_int_equal(out_queue_drop_unbegun(&scene.queue, 7), 14);
-    assert_int_equal(out_queue_drop_unbegun(&scene.queue, 7), 0);
+    assert_int_equal(out_queue_drop_unbegun(&scene.queue, 7, 0), 14);
+    assert_int_equal(out_queue_drop_unbegun(&scene.queue, 7, 0), 0);
     push(&scene.queue, "C1", 7, NULL, false);
     drain(&scene.queue, 100, text);
     assert_string_equal(text, "cd..O1bcd..C1");

@@ -4,6 +4,7 @@
 #include "tests/unit/session/answering_engine.h"
 #include "tests/unit/protocol/cases.h"
 
+#include "session/frame_messages.h"
 #include "session/frames.h"
 #include "session/session.h"
 #include "tests/harness/test.h"

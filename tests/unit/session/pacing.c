@@ -392,6 +392,28 @@ TEST(motion_does_not_wait_for_what_was_abandoned)
     assert_false(pacing_may_send(&pacing));
 }
 
+/* A link of 1 MB a second: what was cut has come as soon, and says as much of the link, as a frame of that size.
+ */
+TEST(bytes_that_are_cut_are_neither_waited_for_nor_learned)
+{
+    struct pacing cut, small;
+    pacing_init(&cut, 100 * MS);
+    pacing_init(&small, 100 * MS);
+    pacing_sent(&cut, 0, 1000000, S);
+    pacing_cut(&cut, 0, 50000);
+    pacing_sent(&small, 0, 50000, S);
+    struct pacing *both[] = {&cut, &small};
+    for (int i = 0; i < 2; i++) {
+        pacing_acknowledged(both[i], 0, false, S + 20 * MS);
+        pacing_acknowledged(both[i], 0, true, S + 70 * MS);
+        assert_int_equal(both[i]->in_flight_bytes, 0);
+    }
+    assert_int_equal(pacing_bytes_per_second(&cut), pacing_bytes_per_second(&small));
+    assert_int_equal(pacing_bytes_per_second(&cut), 1000000);
+    assert_true(pacing_takes_longer(&cut, 50000, 49 * MS));
+    assert_false(pacing_takes_longer(&cut, 50000, 51 * MS));
+}
+
 TEST(a_wait_beyond_all_measure_is_still_one)
 {
     const uint64_t month_ns = 30 * 86400 * S;

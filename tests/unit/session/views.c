@@ -527,6 +527,148 @@ TEST_WITH(a_client_that_does_not_allow_abandoned_frames_gets_complete_frames, se
     engine_command_destroy(start);
 }
 
+/* ---- parts ---- */
+
+/* Adds the bytes of a frame that come before the answer with that error. */
+static void expect_error_within_frame(uint32_t request, enum protocol_error_code code, uint64_t *bytes)
+{
+    while (receive()->type == MESSAGE_FRAME_DATA)
+        *bytes += client.message.frame_data.data_bytes;
+    assert_int_equal(client.message.type, MESSAGE_ERROR);
+    assert_int_equal(client.header.request, request);
+    assert_int_equal(client.message.error.code, code);
+}
+
+/* Colours, coarse depth and the colours that refine them; the last part is most of it. */
+static void say_parts(uint32_t request, uint32_t number, uint64_t command, size_t second_bytes)
+{
+    struct engine_event *made = frame_of(request, number, command, LARGE_FRAME_BYTES);
+    struct engine_frame *frame = made->frame;
+    const size_t first_bytes = 1000, coarse_bytes = 200;
+    frame->coarse_bytes = coarse_bytes;
+    frame->parts = (struct part_list){
+        .parts = {{FRAME_PART_COLOURS, first_bytes},
+                  {FRAME_PART_COARSE_DEPTH, coarse_bytes},
+                  {FRAME_PART_COLOURS, second_bytes},
+                  {FRAME_PART_COLOURS, LARGE_FRAME_BYTES - first_bytes - coarse_bytes - second_bytes}},
+        .count = 4};
+    port_say(made);
+}
+
+static struct engine_command *start_view_in_parts(uint64_t capabilities, uint32_t credit)
+{
+    assert_int_equal(greet_with(capabilities) & HANDSHAKE_CAN_SEND_PARTS, capabilities & HANDSHAKE_CAN_SEND_PARTS);
+    open_scene(1, 1);
+    struct message message = view_message(credit);
+    message.render.parts = 1;
+    send_message(2, 0, &message);
+    return told(ENGINE_JOB_START);
+}
+
+static void expect_parts(uint32_t request, uint32_t number)
+{
+    expect(MESSAGE_FRAME_BEGIN, request);
+    expect(MESSAGE_FRAME_PARTS, request);
+    const struct message_frame_parts *parts = &client.message.frame_parts;
+    assert_int_equal(parts->frame, number);
+    assert_int_equal(parts->parts_count, 4);
+    assert_int_equal(parts->parts[1].kind, PROTOCOL_FRAME_PART_COARSE_DEPTH);
+    assert_int_equal(parts->parts[1].size_bytes, 200);
+}
+
+/* The data of a frame that ends early, and its end; how many bytes came. */
+static size_t take_cut(uint32_t number)
+{
+    size_t came_bytes = 0;
+    while (receive()->type == MESSAGE_FRAME_DATA) {
+        assert_int_equal(client.message.frame_data.offset_bytes, came_bytes);
+        came_bytes += client.message.frame_data.data_bytes;
+    }
+    assert_int_equal(client.message.type, MESSAGE_FRAME_END);
+    assert_int_equal(client.message.frame_end.frame, number);
+    assert_int_equal(client.message.frame_end.abandoned, came_bytes < LARGE_FRAME_BYTES);
+    return came_bytes;
+}
+
+TEST_WITH(only_a_client_that_takes_parts_gets_them, set_up_ungreeted, tear_down)
+{
+    struct engine_command *start = start_view_in_parts(HANDSHAKE_CAN_ABANDON, 8);
+    assert_false(start->job.parts); /* and what is no frame in parts begins as it ever did */
+    say_frame(2, 0, 1);
+    take_frame(2, 0);
+    engine_command_destroy(start);
+}
+
+/* It is shown, so that it uses credit; and the motion that it gives way to does not wait. */
+TEST_WITH(a_picture_at_rest_in_parts_that_motion_overtakes_keeps_what_has_come, set_up_ungreeted, tear_down)
+{
+    struct engine_command *start = start_view_in_parts(HANDSHAKE_CAN_ABANDON | HANDSHAKE_CAN_SEND_PARTS, 1);
+    assert_true(start->job.parts);
+    say_parts(2, 0, 0, 10000);
+    expect_parts(2, 0);
+    send_camera(7, true);
+    told_and_forgotten(ENGINE_VIEW_LOOK);
+    wait_until_read();
+    assert_in_range(take_cut(0), 1200, LARGE_FRAME_BYTES - 1);
+    told_nothing();
+    send_credit(2);
+    told_credit(2, 2);
+    say_frame(2, 1, 7);
+    take_frame(2, 1); /* though nothing was acknowledged */
+    engine_command_destroy(start);
+}
+
+/* The second colours are more than sockets and queues hold, so that they are under way. */
+TEST_WITH(a_picture_of_motion_that_a_newer_one_overtakes_ends_with_the_part_under_way, set_up_ungreeted, tear_down)
+{
+    const size_t second_bytes = LARGE_FRAME_BYTES - (1 << 20);
+    struct engine_command *start = start_view_in_parts(HANDSHAKE_CAN_ABANDON | HANDSHAKE_CAN_SEND_PARTS, 8);
+    say_parts(2, 0, 1, second_bytes);
+    expect_parts(2, 0);
+    say_frame(2, 1, 3);
+    struct message message = made(MESSAGE_STATS);
+    send_message(4, 0, &message);
+    told_and_forgotten(ENGINE_STATS);
+    say(ENGINE_FAILED, 4, ERROR_OUT_OF_MEMORY); /* so that it is known when the frame before it has come */
+    uint64_t bytes = 0;
+    expect_error_within_frame(4, PROTOCOL_ERROR_OUT_OF_MEMORY, &bytes);
+    while (receive()->type == MESSAGE_FRAME_DATA)
+        bytes += client.message.frame_data.data_bytes;
+    assert_int_equal(client.message.type, MESSAGE_FRAME_END);
+    assert_int_equal(client.message.frame_end.abandoned, 1);
+    assert_int_equal(bytes, 1200 + second_bytes);
+    send_ack(0, true, false);
+    take_frame(2, 1);
+    engine_command_destroy(start);
+}
+
+/* Refinement that nothing better waits for is sent. */
+TEST_WITH(a_frame_in_parts_comes_whole_if_nothing_overtakes_it, set_up_ungreeted, tear_down)
+{
+    struct engine_command *start = start_view_in_parts(HANDSHAKE_CAN_ABANDON | HANDSHAKE_CAN_SEND_PARTS, 8);
+    say_parts(2, 0, 1, 10000);
+    expect_parts(2, 0);
+    send_camera(5, true); /* no picture of it is there */
+    assert_int_equal(take_cut(0), LARGE_FRAME_BYTES);
+    engine_command_destroy(start);
+}
+
+TEST_WITH(frames_are_wished_in_parts_where_the_link_takes_long_for_them, set_up_ungreeted, tear_down)
+{
+    struct engine_command *start = start_view_in_parts(HANDSHAKE_CAN_SEND_PARTS, 100);
+    say_frame(2, 0, 1);
+    take_frame(2, 0);
+    usleep(100000);
+    send_ack(0, true, false); /* so long it took, as far as the daemon knows */
+    told_and_forgotten(ENGINE_JOB_CREDIT);
+    assert_false(view_wishes_see(start->job.wishes).effort.parts);
+    say_frame(2, 1, 3);
+    take_frame(2, 1);
+    assert_true(view_wishes_see(start->job.wishes).effort.parts);
+    assert_false(view_wishes_see(start->job.wishes).effort.still_parts);
+    engine_command_destroy(start);
+}
+
 /* Who moves on each time just before the picture at rest is there sees one now and then. */
 SESSION_TEST(not_every_picture_at_rest_is_abandoned)
 {
@@ -672,16 +814,6 @@ SESSION_TEST(a_frame_being_sent_is_completed_before_the_answer)
     expect(MESSAGE_OK, 2);
     send_ack(1, true, false); /* else the next one waits where the link was found to be slow */
     take_frame(3, 3);
-}
-
-/* Adds the bytes of a frame that come before the answer with that error. */
-static void expect_error_within_frame(uint32_t request, enum protocol_error_code code, uint64_t *bytes)
-{
-    while (receive()->type == MESSAGE_FRAME_DATA)
-        *bytes += client.message.frame_data.data_bytes;
-    assert_int_equal(client.message.type, MESSAGE_ERROR);
-    assert_int_equal(client.header.request, request);
-    assert_int_equal(client.message.error.code, code);
 }
 
 SESSION_TEST(a_frame_under_way_of_a_view_that_was_replaced_still_takes_room)
