@@ -534,6 +534,8 @@ $(B)/tests/fuzz/fuzz_sealed: $(SEALED_OBJ)
 $(addprefix $(B)/tests/fuzz/fuzz_,scene sealed transaction): FUZZ_LIBS = $(call pkg_libs,libsodium libxxhash) -lm
 $(B)/tests/fuzz/fuzz_session: $(SERVING_OBJ) $(SERVER_OBJ)
 $(B)/tests/fuzz/fuzz_session: FUZZ_LIBS = $(SERVER_LIBS) $(SERVING_WRAP)
+$(B)/tests/fuzz/fuzz_coarse_depth: $(PIXELS_OBJ)
+$(B)/tests/fuzz/fuzz_coarse_depth: FUZZ_LIBS = $(call pkg_libs,libzstd) -lm
 $(B)/tests/fuzz/fuzz_frame: $(LIB_OBJ)
 $(B)/tests/fuzz/fuzz_frame: FUZZ_LIBS = $(call pkg_libs,$(CLIENT_PKGS)) -lm
 $(B)/tests/fuzz/fuzz_warp: $(WARP_OBJ)
