@@ -43,6 +43,7 @@ extern "C" {
 #define HANDSHAKE_TRY_AGAIN (UINT64_C(1) << 4)     /* reply of version 0: there may be a place later */
 #define HANDSHAKE_CAN_ABANDON (UINT64_C(1) << 3)   /* frames of views may end unfinished, as frame_end says */
 #define HANDSHAKE_CAN_CHOOSE_PRIMARY (UINT64_C(1) << 5) /* `auto` of primary is known; 0.1.0 lacks it */
+#define HANDSHAKE_CAN_MARK_STICKING (UINT64_C(1) << 7)  /* so is the attachment `sticking` */
 
 struct handshake_hello {
     uint16_t version_min;

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "lib/frame.h"
+#include "lib/sticking.h"
 #include "lib/stream.h"
 #include "protocol/pixels/inverse_depth.h"
 #include "protocol/pixels/predicted.h"
@@ -40,6 +41,7 @@ void fl_frame_destroy(struct fl_frame *frame)
     free(frame->encoded);
     free(frame->depth);
     free(frame->normals);
+    free(frame->sticking);
     free(frame);
 }
 
@@ -70,13 +72,14 @@ static uint64_t encoded_bytes_max(const struct message_frame_begin *begin, size_
     }
 }
 
-/* Whether the sizes of attachments match the flags; `maximum` is the maximum of one. */
+/* Whether the sizes of attachments match the flags; `maximum` is that of the largest. */
 static bool check_attachments(const struct fl_assembly *assembly, const struct message_frame_begin *begin,
                               struct fl_error *error)
 {
     const uint64_t maximum = ZSTD_compressBound((size_t)begin->width * begin->height * ATTACHMENT_PIXEL_BYTES);
     const bool has_depth = (begin->attachments & FL_ATTACH_DEPTH) != 0;
     const bool has_normals = (begin->attachments & FL_ATTACH_NORMALS) != 0;
+    const bool has_sticking = (begin->attachments & FL_ATTACH_STICKING) != 0;
     if (begin->attachments != assembly->expected.attachments)
         return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_begin.attachments",
                             "attachments %#x arrived, but %#x were expected", begin->attachments,
@@ -88,9 +91,12 @@ static bool check_attachments(const struct fl_assembly *assembly, const struct m
         (begin->depth_step > 0.0f && !has_depth))
         return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_begin.depth_step", "depths cannot have the step %g",
                             (double)begin->depth_step);
-    return (has_normals == (begin->normal_bytes > 0) && begin->normal_bytes <= maximum) ||
-           fl_error_set(error, FL_ERROR_PROTOCOL, "frame_begin.normal_bytes", "%llu bytes cannot be normals",
-                        (unsigned long long)begin->normal_bytes);
+    if (has_normals != (begin->normal_bytes > 0) || begin->normal_bytes > maximum)
+        return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_begin.normal_bytes", "%llu bytes cannot be normals",
+                            (unsigned long long)begin->normal_bytes);
+    return (has_sticking == (begin->sticking_bytes > 0) && begin->sticking_bytes <= maximum) ||
+           fl_error_set(error, FL_ERROR_PROTOCOL, "frame_begin.sticking_bytes",
+                        "%llu bytes cannot say what sticks", (unsigned long long)begin->sticking_bytes);
 }
 
 static bool is_expected_size(const struct fl_frame_expected *expected, const struct message_frame_begin *begin)
@@ -182,7 +188,7 @@ static struct fl_frame *new_frame(const struct message_frame_begin *begin)
     frame->depth_bytes = begin->depth_bytes;
     frame->hidden_layer = begin->hidden_layer;
     frame->of_frame = begin->of_frame;
-    frame->wire_bytes = begin->size_bytes + begin->depth_bytes + begin->normal_bytes;
+    frame->wire_bytes = begin->size_bytes + begin->depth_bytes + begin->normal_bytes + begin->sticking_bytes;
     if (begin->encoding == PROTOCOL_ENCODING_H264)
         return frame;
     frame->pixels_bytes = pixels_bytes_of(begin);
@@ -209,6 +215,7 @@ bool fl_assembly_begin(struct fl_assembly *assembly, const struct message_frame_
     assembly->encoded_bytes = assembly->frame->wire_bytes;
     assembly->depth_bytes = begin->depth_bytes;
     assembly->normal_bytes = begin->normal_bytes;
+    assembly->sticking_bytes = begin->sticking_bytes;
     assembly->received_bytes = 0;
     assembly->frame->begun_ns = now_ns;
     return true;
@@ -233,7 +240,8 @@ bool fl_assembly_data(struct fl_assembly *assembly, const struct message_frame_d
 /* The pixels' share of the encoded bytes. */
 static size_t picture_bytes(const struct fl_assembly *assembly)
 {
-    return (size_t)(assembly->encoded_bytes - assembly->depth_bytes - assembly->normal_bytes);
+    return (size_t)(assembly->encoded_bytes - assembly->depth_bytes - assembly->normal_bytes -
+                    assembly->sticking_bytes);
 }
 
 static bool decode_zstd(const struct fl_assembly *assembly, struct fl_error *error)
@@ -304,11 +312,15 @@ static bool decode_attachments(const struct fl_assembly *assembly, struct fl_err
 {
     struct fl_frame *frame = assembly->frame;
     const uint64_t pixels_end = picture_bytes(assembly), depth_end = pixels_end + assembly->depth_bytes;
+    const uint64_t normals_end = depth_end + assembly->normal_bytes;
     if (assembly->depth_bytes > 0)
         frame->depth = decode_depth(assembly, pixels_end, error);
     if (assembly->normal_bytes > 0 && error->code == FL_ERROR_NONE)
         frame->normals =
             decode_attachment(assembly, depth_end, assembly->normal_bytes, ATTACHMENT_PIXEL_BYTES, error);
+    if (assembly->sticking_bytes > 0 && error->code == FL_ERROR_NONE)
+        frame->sticking = fl_sticking_decode(assembly->encoded + normals_end, assembly->sticking_bytes,
+                                             frame->width, frame->height, error);
     return error->code == FL_ERROR_NONE;
 }
 

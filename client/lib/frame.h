@@ -23,7 +23,7 @@ struct fl_assembly {
     struct fl_frame *frame; /* begun; NULL: none */
     uint8_t *encoded;       /* where its bytes go: the pixels themselves when raw and alone */
     uint64_t encoded_bytes, received_bytes;
-    uint64_t depth_bytes, normal_bytes; /* the last ones of encoded_bytes, in that order */
+    uint64_t depth_bytes, normal_bytes, sticking_bytes; /* the last ones of encoded_bytes, in that order */
 };
 
 /* Each returns false on what is not allowed; the assembly must then be finished. `number` is the frame's; for a

@@ -44,10 +44,12 @@ static void print_capabilities(void)
            "| %d | of a reply of version 0: only sealed connections are accepted |\n"
            "| %d | of a reply of version 0: there may be a place later |\n"
            "| %d | of a client: frames of views may end unfinished, as `frame_end` says; of a reply: they will |\n"
-           "| %d | `auto` of `primary` is known; without it in the reply, `auto` is refused by the daemon |\n\n",
+           "| %d | `auto` of `primary` is known; without it in the reply, `auto` is refused by the daemon |\n"
+           "| %d | likewise the attachment `sticking` |\n\n",
            __builtin_ctzll(HANDSHAKE_CAN_H264), __builtin_ctzll(HANDSHAKE_CAN_READ_ONLY),
            __builtin_ctzll(HANDSHAKE_NEEDS_KEY), __builtin_ctzll(HANDSHAKE_TRY_AGAIN),
-           __builtin_ctzll(HANDSHAKE_CAN_ABANDON), __builtin_ctzll(HANDSHAKE_CAN_CHOOSE_PRIMARY));
+           __builtin_ctzll(HANDSHAKE_CAN_ABANDON), __builtin_ctzll(HANDSHAKE_CAN_CHOOSE_PRIMARY),
+           __builtin_ctzll(HANDSHAKE_CAN_MARK_STICKING));
 }
 
 static void print_handshake(void)

@@ -6,6 +6,7 @@
 #include "base/parallel.h"
 #include "encode/depth.h"
 #include "encode/sparse.h"
+#include "encode/sticking.h"
 #include "encode/stream.h"
 
 #include <pthread.h>
@@ -189,20 +190,25 @@ static bool round_depths(struct engine_frame *frame, uint16_t **rounded, struct 
     return frame->depth.form != DEPTH_FORM_INVERSE || depth_round(&picture, rounded, &frame->depth_step, error);
 }
 
+/* Takes over what was encoded. */
+static bool take_bytes(struct engine_frame *frame, uint8_t *encoded, size_t added_bytes, struct error *error)
+{
+    uint8_t *bytes = realloc(frame->bytes, frame->size_bytes + added_bytes);
+    if (bytes) {
+        memcpy(bytes + frame->size_bytes, encoded, added_bytes);
+        frame->bytes = bytes;
+        frame->size_bytes += added_bytes;
+    }
+    free(encoded);
+    return bytes || no_memory_for_attachments(error);
+}
+
 static bool append(struct engine_frame *frame, const struct picture *picture, size_t *added_bytes,
                    struct error *error)
 {
     uint8_t *encoded;
-    if (!encoder_encode(ENCODING_PREDICTED, picture, 1, &encoded, added_bytes, error))
-        return false;
-    uint8_t *bytes = realloc(frame->bytes, frame->size_bytes + *added_bytes);
-    if (bytes) {
-        memcpy(bytes + frame->size_bytes, encoded, *added_bytes);
-        frame->bytes = bytes;
-        frame->size_bytes += *added_bytes;
-    }
-    free(encoded);
-    return bytes || no_memory_for_attachments(error);
+    return encoder_encode(ENCODING_PREDICTED, picture, 1, &encoded, added_bytes, error) &&
+           take_bytes(frame, encoded, *added_bytes, error);
 }
 
 static bool append_depth(const struct encode_task *task, struct error *error)
@@ -230,6 +236,18 @@ static bool append_normals(const struct encode_task *task, struct error *error)
     const struct picture picture =
         picture_of(task, frame_result_attachment(&frame->result, ATTACHMENT_NORMALS), ATTACHMENT_PIXEL_BYTES);
     return append(frame, &picture, &frame->normal_bytes, error);
+}
+
+static bool append_sticking(const struct encode_task *task, struct error *error)
+{
+    struct engine_frame *frame = task->frame;
+    const struct frame_result *result = &frame->result;
+    uint8_t *encoded;
+    if (!(result->attachments & 1u << ATTACHMENT_STICKING))
+        return true;
+    return sticking_encode(frame_result_attachment(result, ATTACHMENT_STICKING), ATTACHMENT_PIXEL_BYTES,
+                           result->width, result->height, &encoded, &frame->sticking_bytes, error) &&
+           take_bytes(frame, encoded, frame->sticking_bytes, error);
 }
 
 static bool make_digest(const struct encode_task *task, struct error *error)
@@ -283,7 +301,7 @@ static bool encode(const struct encode_task *task, struct error *error)
     uint64_t start_ns = clock_now_ns();
     fill_hidden(frame);
     if (!make_digest(task, error) || !encode_pixels(task->lane, &picture, frame, error) ||
-        !append_depth(task, error) || !append_normals(task, error))
+        !append_depth(task, error) || !append_normals(task, error) || !append_sticking(task, error))
         return false;
     if (!encoder_loses(frame->encoding))
         frame->quality = 0; /* a level, which costs no picture */

@@ -236,6 +236,7 @@ struct engine_frame {
     bool wants_key;                   /* it is to be encoded so that it can be decoded without those before .. */
     bool key_frame;                   /* .. and so it was */
     size_t depth_bytes, normal_bytes; /* of attachments, encoded: the last ones of size_bytes, in that order */
+    size_t sticking_bytes;            /* likewise, behind those */
     struct view_depth depth;          /* as it is to be encoded .. */
     float depth_step;                 /* .. and as it was: 1 / metres; 0: metres */
     uint32_t margin_x, margin_y;      /* pixels on each side beyond what the job asks for */

@@ -3,15 +3,18 @@
 
 #include "render/compact.h"
 #include "render/frame_request.h"
+#include "render/integrators/integrator.h"
 #include "render/wave_trace.h"
 #include "shared/layers.h"
 #include "shared/ray.h"
+
+#include <epoxy/gl.h>
 
 _Static_assert(LAYER_BIT_BEAUTY == 1 << LAYER_BEAUTY && LAYER_BIT_ALBEDO == 1 << LAYER_ALBEDO &&
                    LAYER_BIT_NORMAL == 1 << LAYER_NORMAL && LAYER_BIT_DEPTH == 1 << LAYER_DEPTH &&
                    LAYER_BIT_POSITION == 1 << LAYER_POSITION && LAYER_BIT_AO == 1 << LAYER_AO &&
                    LAYER_BIT_ID == 1 << LAYER_ID && LAYER_BIT_UNKNOWN == 1 << LAYER_UNKNOWN &&
-                   LAYER_UNKNOWN + 1 == LAYER_COUNT,
+                   LAYER_UNKNOWN + 1 == LAYER_COUNT && LAYER_BIT_STICKING == 1 << LAYER_STICKING,
                "shaders know the layers by other numbers");
 
 bool layers_of_first_sample(enum layer layer)
@@ -52,14 +55,17 @@ uint32_t layers_take_unknown(struct layers *layers)
     return layers->noting == layers->wanted ? UINT32_MAX : planes_before * layers->plane_samples;
 }
 
-/* A program that reads hits, in use, with all that these have bound; `own`: a define of its own, or NULL. */
-static const struct gpu_program *use(struct render_context *context, const char *compute, const char *own,
-                                     struct error *error)
+/* A program that reads hits, in use, with all that these have bound; `own`: defines of its own, at most
+ * OWN_DEFINES, each NULL or one. */
+#define OWN_DEFINES 3
+static const struct gpu_program *use(struct render_context *context, const char *compute,
+                                     const char *const own[OWN_DEFINES], struct error *error)
 {
-    struct gpu_define defines[CONTEXT_SURFACE_DEFINES + 3] = {0};
+    struct gpu_define defines[CONTEXT_SURFACE_DEFINES + OWN_DEFINES + 2] = {0};
     size_t n = context_surface_defines(context, defines);
-    if (own)
-        defines[n++] = (struct gpu_define){own, "1"};
+    for (int i = 0; i < OWN_DEFINES; i++)
+        if (own[i])
+            defines[n++] = (struct gpu_define){own[i], "1"};
     if (context->scene->has_motion)
         defines[n++] = (struct gpu_define){"HAS_TIMES", "1"};
     const struct gpu_program *program = context_use_with(context, compute, defines, error);
@@ -73,11 +79,17 @@ static const struct gpu_program *use(struct render_context *context, const char 
 /* All but how open a place is, which begins with 0. */
 static bool note_hits(struct layers *layers, struct render_context *context, struct error *error)
 {
-    bool needs_surface = layers->noting & (LAYER_BIT_ALBEDO | LAYER_BIT_NORMAL);
+    const bool sticks =
+        layers->noting & LAYER_BIT_STICKING && integrator_by_number(context->request.integrator)->follows_eye;
+    const bool needs_surface = sticks || layers->noting & (LAYER_BIT_ALBEDO | LAYER_BIT_NORMAL);
+    const char *const defines[OWN_DEFINES] = {needs_surface ? "NEEDS_SURFACE" : NULL, sticks ? "STICKS" : NULL,
+                                              sticks && context->features.area_lights ? "HAS_AREA_LIGHTS" : NULL};
     context_span_begin(context, STAGE_SHADE);
-    const struct gpu_program *program =
-        use(context, "render/layers.comp", needs_surface ? "NEEDS_SURFACE" : NULL, error);
+    const struct gpu_program *program = use(context, "render/layers.comp", defines, error);
     if (program) {
+        if (sticks)
+            gpu_buffer_bind_texels(context->device, environment_lights(context->environment, context->scene),
+                                   UNIT_SHADE_LIGHTS, GL_RGBA32F);
         gpu_buffer_bind_storage(&layers->sums, BIND_LAYER_SUMS);
         gpu_uniform_uint(program, "ray_count", context->ray_count);
         gpu_uniform_uint(program, "layers", layers->noting);
@@ -91,7 +103,8 @@ static bool make_ao_rays(struct layers *layers, struct render_context *context, 
                          struct error *error)
 {
     context_span_begin(context, STAGE_SHADE);
-    const struct gpu_program *program = use(context, "render/layers_ao.comp", NULL, error);
+    const struct gpu_program *program =
+        use(context, "render/layers_ao.comp", (const char *const[OWN_DEFINES]){NULL}, error);
     if (program) {
         gpu_buffer_bind_storage(&layers->ao_rays, BIND_SHADOW_RAYS);
         if (context->scene->has_motion)
@@ -169,7 +182,7 @@ static bool adds(const struct render_context *context, enum layer layer)
 
 static bool any_adds(const struct layers *layers, const struct render_context *context)
 {
-    for (enum layer layer = LAYER_ALBEDO; layer < LAYER_COUNT; layer++)
+    for (enum layer layer = LAYER_ALBEDO; layer <= LAYER_STICKING; layer++)
         if (layers->noting & 1u << layer && adds(context, layer))
             return true;
     return false;
