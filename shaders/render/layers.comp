@@ -2,11 +2,9 @@
 // The layers of each sample of a slice: those of the first surface that its ray hit, opaque or not. They are 0 for a
 // sample that hit nothing, and, in layers of the first sample only, for all others.
 //
-// Defines: NEEDS_SURFACE albedo, normal or sticking are among them; STICKS sticking is, and there is some; those of
-// common/material.glsl and common/light.glsl.
+// Defines: NEEDS_SURFACE albedo or normal are among them; those of common/material.glsl.
 
 #include "shared/layers.h"
-#include "common/sticking.glsl"
 #include "render/shade.glsl"
 
 uniform uint ray_count;
@@ -38,7 +36,6 @@ void main()
     if (!(h.distance >= 0.0)) {
         for (uint layer_bit = LAYER_BIT_ALBEDO; layer_bit <= LAYER_BIT_ID; layer_bit <<= 1)
             put(layer_bit, k, vec4(0.0));
-        put(LAYER_BIT_STICKING, k, vec4(0.0));
         return;
     }
     path p = path_at(k);
@@ -49,11 +46,6 @@ void main()
     put(LAYER_BIT_ALBEDO, k, vec4(s.base, 1.0));
     put(LAYER_BIT_NORMAL, k, vec4(s.normal, 1.0));
 #endif
-    float sticking = 0.0;
-#ifdef STICKS
-    sticking = sticking_of(s, r.direction_t_max.xyz);
-#endif
-    put(LAYER_BIT_STICKING, k, vec4(vec3(sticking), 1.0));
     vec4 depth = vec4(0.0), position = vec4(0.0), id = vec4(0.0);
     if (path_sample(p) == 0u) {
         depth = vec4(vec3(-view_from_world_point(place).z), 1.0);
