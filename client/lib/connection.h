@@ -34,6 +34,7 @@ struct fl_connection {
     bool read_only;                   /* the daemon lets it change nothing */
     bool can_h264;                    /* this client and the daemon */
     bool can_choose_primary;          /* likewise */
+    bool can_mark_sticking;           /* likewise */
     struct fl_error broken;           /* why the connection is broken; code NONE: it works */
     struct message_stats_reply stats; /* the last answer */
     uint64_t start_ns;

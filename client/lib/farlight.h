@@ -354,6 +354,7 @@ struct fl_frame {
     uint32_t hidden_layer; /* how many surfaces hide what it shows, of the picture of_frame; 0: it is a picture */
     uint32_t of_frame;
     uint8_t *normals;    /* width * height * 4; see messages.def; NULL: none */
+    uint8_t *sticking;   /* width * height; likewise */
     size_t pixels_bytes; /* layers times width * height * 4, 8 or 16 */
     uint8_t *pixels;     /* rows from the top, without gaps, in `format` */
 };
@@ -393,7 +394,9 @@ struct fl_view;
 
 enum fl_attachment { /* bits */
                      FL_ATTACH_DEPTH = 1 << PROTOCOL_ATTACHMENT_DEPTH,
-                     FL_ATTACH_NORMALS = 1 << PROTOCOL_ATTACHMENT_NORMALS
+                     FL_ATTACH_NORMALS = 1 << PROTOCOL_ATTACHMENT_NORMALS,
+                     /* A daemon that does not know it leaves it out. */
+                     FL_ATTACH_STICKING = 1 << PROTOCOL_ATTACHMENT_STICKING
 };
 
 /* Likewise of a view. Of the fields that only a range of frames has, none is used; `frames_per_second` is the most
@@ -431,7 +434,8 @@ FL_API void fl_view_destroy(struct fl_view *view);
 /* Views that the caller makes from a frame: `fl_warp_*` of warp/warp.h, with no connection, window or GL. Ask for
  * FL_ATTACH_DEPTH, and for depth_form inverse, with depth_pixels and depth_radius for a bound, and a margin. Then
  * the key view has the frame's width, height and camera (world_from_view, fov_y), its pixels in RGBA8 as colours,
- * and w = unit / depth (0 where depth is 0) with w_error = unit * depth_step / 2. */
+ * and w = unit / depth (0 where depth is 0) with w_error = unit * depth_step / 2. With FL_ATTACH_STICKING its
+ * layer has `sticking` as well, and views are marked where their colours stick. */
 
 /* For the caller's own poll(): readable when something may have arrived. The connection keeps it. */
 FL_API int fl_connection_fd(const struct fl_connection *connection);

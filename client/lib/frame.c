@@ -38,6 +38,7 @@ void fl_frame_destroy(struct fl_frame *frame)
     free(frame->encoded);
     free(frame->depth);
     free(frame->normals);
+    free(frame->sticking);
     free(frame);
 }
 
@@ -68,13 +69,14 @@ static uint64_t encoded_bytes_max(const struct message_frame_begin *begin, size_
     }
 }
 
-/* Whether the sizes of attachments match the flags; `maximum` is the maximum of one. */
+/* Whether the sizes of attachments match the flags; `maximum` is that of the largest. */
 static bool check_attachments(const struct fl_assembly *assembly, const struct message_frame_begin *begin,
                               struct fl_error *error)
 {
     const uint64_t maximum = ZSTD_compressBound((size_t)begin->width * begin->height * ATTACHMENT_PIXEL_BYTES);
     const bool has_depth = (begin->attachments & FL_ATTACH_DEPTH) != 0;
     const bool has_normals = (begin->attachments & FL_ATTACH_NORMALS) != 0;
+    const bool has_sticking = (begin->attachments & FL_ATTACH_STICKING) != 0;
     if (begin->attachments != assembly->expected.attachments)
         return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_begin.attachments",
                             "attachments %#x arrived, but %#x were expected", begin->attachments,
@@ -86,9 +88,12 @@ static bool check_attachments(const struct fl_assembly *assembly, const struct m
         (begin->depth_step > 0.0f && !has_depth))
         return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_begin.depth_step", "depths cannot have the step %g",
                             (double)begin->depth_step);
-    return (has_normals == (begin->normal_bytes > 0) && begin->normal_bytes <= maximum) ||
-           fl_error_set(error, FL_ERROR_PROTOCOL, "frame_begin.normal_bytes", "%llu bytes cannot be normals",
-                        (unsigned long long)begin->normal_bytes);
+    if (has_normals != (begin->normal_bytes > 0) || begin->normal_bytes > maximum)
+        return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_begin.normal_bytes", "%llu bytes cannot be normals",
+                            (unsigned long long)begin->normal_bytes);
+    return (has_sticking == (begin->sticking_bytes > 0) && begin->sticking_bytes <= maximum) ||
+           fl_error_set(error, FL_ERROR_PROTOCOL, "frame_begin.sticking_bytes",
+                        "%llu bytes cannot say what sticks", (unsigned long long)begin->sticking_bytes);
 }
 
 static bool is_expected_size(const struct fl_frame_expected *expected, const struct message_frame_begin *begin)
@@ -180,7 +185,7 @@ static struct fl_frame *new_frame(const struct message_frame_begin *begin)
     frame->depth_bytes = begin->depth_bytes;
     frame->hidden_layer = begin->hidden_layer;
     frame->of_frame = begin->of_frame;
-    frame->wire_bytes = begin->size_bytes + begin->depth_bytes + begin->normal_bytes;
+    frame->wire_bytes = begin->size_bytes + begin->depth_bytes + begin->normal_bytes + begin->sticking_bytes;
     frame->parts = 1;
     if (begin->encoding == PROTOCOL_ENCODING_H264)
         return frame;
@@ -305,10 +310,13 @@ static bool decode(const struct fl_assembly *assembly, struct fl_frame *frame, s
     const struct fl_parts *parts = &assembly->parts;
     const uint8_t *depth = assembly->encoded + parts->bytes.of[PROTOCOL_FRAME_PART_COLOURS];
     const uint8_t *normals = depth + parts->bytes.of[PROTOCOL_FRAME_PART_DEPTH];
+    const uint8_t *coarse_depth = normals + parts->bytes.of[PROTOCOL_FRAME_PART_NORMALS];
     const struct fl_encoded encoded = {.colours = assembly->encoded,
                                        .depth = depth,
                                        .normals = normals,
-                                       .coarse_depth = normals + parts->bytes.of[PROTOCOL_FRAME_PART_NORMALS],
+                                       .coarse_depth = coarse_depth,
+                                       .sticking =
+                                           coarse_depth + parts->bytes.of[PROTOCOL_FRAME_PART_COARSE_DEPTH],
                                        .come = fl_parts_come(parts),
                                        .all = parts->bytes};
     frame->parts_come = parts->told ? parts->come : 1;

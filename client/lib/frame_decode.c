@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "lib/frame_decode.h"
 
+#include "lib/sticking.h"
 #include "protocol/pixels/coarse_depth.h"
 #include "protocol/pixels/inverse_depth.h"
 #include "protocol/pixels/predicted.h"
@@ -172,10 +173,14 @@ static bool decode_attachments(struct fl_frame *frame, const struct fl_encoded *
     const bool has_depth = bytes[PROTOCOL_FRAME_PART_DEPTH] > 0 || bytes[PROTOCOL_FRAME_PART_COARSE_DEPTH] > 0;
     if (has_depth && !(frame->depth = decode_depth(frame, encoded, error)))
         return false;
-    if (bytes[PROTOCOL_FRAME_PART_NORMALS] > 0)
-        frame->normals = decode_attachment(frame, encoded->normals, bytes[PROTOCOL_FRAME_PART_NORMALS],
-                                           ATTACHMENT_PIXEL_BYTES, error);
-    return frame->normals || bytes[PROTOCOL_FRAME_PART_NORMALS] == 0;
+    if (bytes[PROTOCOL_FRAME_PART_NORMALS] > 0 &&
+        !(frame->normals = decode_attachment(frame, encoded->normals, bytes[PROTOCOL_FRAME_PART_NORMALS],
+                                             ATTACHMENT_PIXEL_BYTES, error)))
+        return false;
+    if (bytes[PROTOCOL_FRAME_PART_STICKING] > 0)
+        frame->sticking = fl_sticking_decode(encoded->sticking, bytes[PROTOCOL_FRAME_PART_STICKING], frame->width,
+                                             frame->height, error);
+    return frame->sticking || bytes[PROTOCOL_FRAME_PART_STICKING] == 0;
 }
 
 bool fl_frame_decode(struct fl_frame *frame, const struct fl_encoded *encoded, struct fl_error *error)

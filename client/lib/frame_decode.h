@@ -7,11 +7,11 @@
 
 /* Where the bytes of each kind begin. */
 struct fl_encoded {
-    const uint8_t *colours, *depth, *normals, *coarse_depth;
+    const uint8_t *colours, *depth, *normals, *coarse_depth, *sticking;
     struct fl_parts_bytes come, all;
 };
 
-/* Fills pixels, which have their memory already and are none for H.264, depth and normals. */
+/* Fills pixels, which have their memory already and are none for H.264, and attachments. */
 bool fl_frame_decode(struct fl_frame *frame, const struct fl_encoded *encoded, struct fl_error *error);
 
 #endif

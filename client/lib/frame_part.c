@@ -59,6 +59,7 @@ struct fl_frame *fl_frame_cut(const struct fl_frame *frame, const struct fl_fram
     cut->encoded_bytes = 0;
     cut->depth = NULL;
     cut->normals = NULL;
+    cut->sticking = NULL;
     for (int row = 0; row < 3; row++) {
         float *to = cut->world_from_view + (size_t)(4 * row);
         to[3] += to[0] * part->eye[0] + to[1] * part->eye[1];

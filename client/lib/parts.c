@@ -19,6 +19,7 @@ void fl_parts_init(struct fl_parts *parts, const struct message_frame_begin *beg
     add(parts, PROTOCOL_FRAME_PART_COLOURS, begin->size_bytes);
     add(parts, PROTOCOL_FRAME_PART_DEPTH, begin->depth_bytes);
     add(parts, PROTOCOL_FRAME_PART_NORMALS, begin->normal_bytes);
+    add(parts, PROTOCOL_FRAME_PART_STICKING, begin->sticking_bytes);
 }
 
 /* ---- what is told ---- */

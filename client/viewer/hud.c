@@ -242,7 +242,7 @@ static void print_frame(const struct hud_state *state, char out[HUD_TEXT_MAX])
         snprintf(out + length, HUD_TEXT_MAX - (size_t)length, "; depth %s", depth);
 }
 
-#define LOCAL_ROWS 3u
+#define LOCAL_ROWS 4u
 
 /* What is made here: how many rows. */
 static size_t print_local(const struct hud_state *state, const struct metrics_summary *summary, struct row *rows)
@@ -263,6 +263,8 @@ static size_t print_local(const struct hud_state *state, const struct metrics_su
              local->bound_pixels);
     rows[2].name = "not seen yet";
     snprintf(rows[2].value, HUD_TEXT_MAX, "%.1f %%", local->unseen * 100);
+    rows[3].name = "mirrors, glass";
+    snprintf(rows[3].value, HUD_TEXT_MAX, "%.1f %%", local->sticking * 100);
     return LOCAL_ROWS;
 }
 

@@ -40,7 +40,7 @@ enum hud_status { HUD_LOADING, HUD_LIVE, HUD_LOST };
 struct hud_local {
     bool on, shown; /* they are made; one is what is seen */
     double age_s;   /* of the picture that it was made from */
-    double bound_pixels, unseen;
+    double bound_pixels, unseen, sticking;
     double view_s;        /* that it took */
     uint64_t depth_bytes; /* of the last frame's bytes */
     enum fl_warp_quality quality;

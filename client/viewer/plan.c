@@ -93,7 +93,10 @@ void plan_motion_predict(const struct plan_motion *motion, uint64_t now_ns, uint
 
 bool plan_is_due(const struct plan_need *need)
 {
-    return need->since_asked_ns >= PLAN_KEY_NS || need->gone >= need->radius / 2 || need->unseen > PLAN_UNSEEN_MAX;
+    const double least = (double)PLAN_STICKING_KEY_NS / (double)PLAN_KEY_NS;
+    const double sooner = 1 - (1 - least) * fmin(need->sticking / PLAN_STICKING_FULL, 1);
+    return (double)need->since_asked_ns >= sooner * (double)PLAN_KEY_NS ||
+           need->gone >= sooner * need->radius / 2 || need->unseen > PLAN_UNSEEN_MAX;
 }
 
 /* ---- in which quality ---- */

@@ -13,6 +13,10 @@
 #define PLAN_RADIUS_SHARE 0.1            /* of the distance of what is looked at: that of a key view's sphere */
 #define PLAN_UNSEEN_MAX 0.03             /* share of a view's pixels */
 #define PLAN_KEY_NS UINT64_C(250000000)  /* the oldest picture that views are made from while it moves */
+/* Of a view in whose colours mirrors, glass and highlights have this share, or more: as often as pictures of
+ * motion come at most. What sticks is wrong from the first step of the eye on, and by no stated bound. */
+#define PLAN_STICKING_KEY_NS UINT64_C(100000000)
+#define PLAN_STICKING_FULL 0.5
 
 /* ---- whether ---- */
 
@@ -54,10 +58,13 @@ struct plan_need {
     uint64_t since_asked_ns; /* since the daemon was told of a camera */
     double gone;             /* of the eye, from the one that was asked for last */
     double radius;
-    double unseen; /* share of the last view's pixels */
+    double unseen;   /* share of the last view's pixels */
+    double sticking; /* likewise */
 };
 
-/* Whether a new picture is needed while it moves: else the link is spared. */
+/* Whether a new picture is needed while it moves: else the link is spared. It is needed after PLAN_KEY_NS, when
+ * the eye has gone half of the radius, and when more than PLAN_UNSEEN_MAX is unseen; both the first come sooner,
+ * by the same factor, the more sticks: at PLAN_STICKING_FULL after PLAN_STICKING_KEY_NS. */
 bool plan_is_due(const struct plan_need *need);
 
 /* ---- in which quality ---- */

@@ -71,6 +71,7 @@ static void fill_local(const struct viewer *viewer, struct hud_state *state)
     state->local.age_s = (double)(state->now_ns - made->key_came_ns) * 1e-9;
     state->local.bound_pixels = (double)made->counts.bound_pixels;
     state->local.unseen = (double)(made->counts.behind + made->counts.outside);
+    state->local.sticking = (double)made->counts.sticking;
     state->local.view_s = (double)made->counts.processor_ns * 1e-9;
 }
 
@@ -164,6 +165,7 @@ static json_t *local_json(const struct viewer *viewer, const struct hud_state *s
     json_object_set_new(object, "quality", json_string(local->quality == FL_WARP_TREE ? "tree" : "iterative"));
     json_object_set_new(object, "age_s", json_real(local->age_s));
     json_object_set_new(object, "unseen", json_real(local->unseen));
+    json_object_set_new(object, "sticking", json_real(local->sticking));
     json_object_set_new(object, "processor_s", json_real(local->view_s));
     json_object_set_new(object, "build_s", json_real((double)viewer->made_of.build_ns * 1e-9));
     if (isfinite(local->bound_pixels))

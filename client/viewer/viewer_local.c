@@ -50,7 +50,7 @@ void viewer_ask_local(struct viewer *viewer, struct message_render *view)
     if (radius_of(viewer) > 0)
         view->depth_radius = radius_of(viewer);
     viewer->local_radius = view->depth_radius;
-    view->attachments |= FL_ATTACH_DEPTH;
+    view->attachments |= FL_ATTACH_DEPTH | FL_ATTACH_STICKING;
     view->depth_form = PROTOCOL_DEPTH_FORM_INVERSE;
     view->depth_pixels = DEPTH_PIXELS;
     view->margin = MARGIN;
@@ -104,7 +104,8 @@ bool viewer_needs_picture(const struct viewer *viewer, uint64_t now_ns)
     return plan_is_due(&(struct plan_need){.since_asked_ns = now_ns - viewer->looked_ns,
                                            .gone = distance(next.eye, viewer->asked.eye),
                                            .radius = (double)viewer->local_radius,
-                                           .unseen = (double)(counts->behind + counts->outside)});
+                                           .unseen = (double)(counts->behind + counts->outside),
+                                           .sticking = (double)counts->sticking});
 }
 
 /* ---- what comes ---- */
@@ -137,7 +138,9 @@ static bool give_key(struct viewer *viewer, struct fl_frame *frame, bool is_show
     memcpy(key.camera.world_from_view, frame->world_from_view, sizeof(key.camera.world_from_view));
     key.camera.fov_y = frame->fov_y;
     key.depth = frame->depth;
+    key.sticking = frame->sticking;
     frame->depth = NULL;
+    frame->sticking = NULL;
     views_give_key(viewer->views, &key);
     viewer->key_frame = frame->frame;
     viewer->has_keys = viewer->local_granted = true;

@@ -51,7 +51,9 @@ static void key_finish(struct views_key *key)
 {
     pixmap_finish(&key->picture);
     free(key->depth);
+    free(key->sticking);
     key->depth = NULL;
+    key->sticking = NULL;
 }
 
 static void layer_finish(struct views_layer *layer)
@@ -91,16 +93,17 @@ static bool set_key(struct views *views, struct views_key *came, struct fl_warp_
     views->key_width = picture->width;
     views->key_height = picture->height;
     invert(came->depth, (size_t)picture->width * (size_t)picture->height, unit);
-    const struct fl_warp_key key = {
-        .width = (uint32_t)picture->width,
-        .height = (uint32_t)picture->height,
-        .camera = came->camera,
-        .unit = unit,
-        .w_error = unit * came->depth_step / 2,
-        .radius = came->radius,
-        .pixels = KEY_PIXELS,
-        .layer_count = 1,
-        .layers[0] = {.colours = (const uint32_t *)(const void *)picture->pixels, .w = came->depth}};
+    const struct fl_warp_key key = {.width = (uint32_t)picture->width,
+                                    .height = (uint32_t)picture->height,
+                                    .camera = came->camera,
+                                    .unit = unit,
+                                    .w_error = unit * came->depth_step / 2,
+                                    .radius = came->radius,
+                                    .pixels = KEY_PIXELS,
+                                    .layer_count = 1,
+                                    .layers[0] = {.colours = (const uint32_t *)(const void *)picture->pixels,
+                                                  .w = came->depth,
+                                                  .sticking = came->sticking}};
     const bool set = fl_warp_set_key(views->warp, &key, error);
     key_finish(came);
     views->key = *came;
@@ -112,7 +115,8 @@ static bool add_layer(struct views *views, struct views_layer *came, bool *added
 {
     const struct pixmap *picture = &came->picture;
     const bool fits = picture->width == views->key_width && picture->height == views->key_height;
-    const struct fl_warp_layer layer = {(const uint32_t *)(const void *)picture->pixels, came->depth};
+    const struct fl_warp_layer layer = {.colours = (const uint32_t *)(const void *)picture->pixels,
+                                        .w = came->depth};
     if (fits)
         invert(came->depth, (size_t)picture->width * (size_t)picture->height, unit_of(&views->key));
     *added = fits && fl_warp_add_layer(views->warp, &layer, error);

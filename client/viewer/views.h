@@ -13,6 +13,7 @@ struct views;
 struct views_key {
     struct pixmap picture; /* a margin included */
     float *depth;          /* malloc'ed, as many, metres along the view; 0: nothing is there */
+    uint8_t *sticking;     /* malloc'ed, as of struct fl_frame; NULL: nothing is known of it */
     struct fl_warp_camera camera;
     float depth_step; /* as of struct fl_frame */
     float radius;     /* metres round its eye */

@@ -1,6 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 #include "warp/colour.h"
 
+#include "warp/rays.h"
+
+#include <string.h>
+
 #define SHARES 256 /* of a texel: weights are whole numbers of them */
 
 /* Two values of 8 bits each, in bits 0 to 7 and 16 to 23, from two such pairs. */
@@ -70,4 +74,24 @@ void warp_colour(const struct warp_layer *layer, const float x[LANES], const flo
                  uint32_t colours[LANES])
 {
     colour_places(layer, x, y, colours);
+}
+
+LANES_KERNEL static void find_texels(const struct warp_layer *layer, const float *x, const float *y, int *texels)
+{
+    const int last_x = (int)layer->width - 1, last_y = (int)layer->height - 1, across = (int)layer->padded_width;
+#pragma omp simd
+    for (int k = 0; k < LANES; k++)
+        texels[k] = texel_of(y[k], last_y) * across + texel_of(x[k], last_x);
+}
+
+void warp_sticking(const struct warp_layer *layer, const float x[LANES], const float y[LANES],
+                   uint8_t sticking[LANES])
+{
+    int texels[LANES];
+    memset(sticking, 0, LANES);
+    if (!layer->sticks)
+        return;
+    find_texels(layer, x, y, texels);
+    for (int k = 0; k < LANES; k++)
+        sticking[k] = layer->sticking[texels[k]];
 }

@@ -11,4 +11,8 @@
 void warp_colour(const struct warp_layer *layer, const float x[LANES], const float y[LANES],
                  uint32_t colours[LANES]);
 
+/* Of the texel that each place lies in. */
+void warp_sticking(const struct warp_layer *layer, const float x[LANES], const float y[LANES],
+                   uint8_t sticking[LANES]);
+
 #endif

@@ -12,12 +12,19 @@
 struct search {
     float x[LANES], y[LANES], way[LANES];
     uint32_t mask[LANES], colours[LANES];
+    uint8_t sticking[LANES];
 };
 
 static inline void load_w(const float *w, const int places[LANES], float loaded[LANES])
 {
     for (int k = 0; k < LANES; k++)
         loaded[k] = w[places[k]];
+}
+
+static inline void load_sticking(const uint8_t *sticking, const int places[LANES], uint8_t loaded[LANES])
+{
+    for (int k = 0; k < LANES; k++)
+        loaded[k] = sticking[places[k]];
 }
 
 /* From (x, y) of the picture on. */
@@ -52,6 +59,8 @@ LANES_KERNEL_OF_LOADS static void search_pixels(const struct warp_rays *rays, co
             search->y[k] = y;
         }
     }
+    if (layer->sticks) /* in the last place that was looked at, which is within a texel of where it was found */
+        load_sticking(layer->sticking, places, search->sticking);
 #pragma omp simd
     for (int k = 0; k < LANES; k++) {
         const float x = search->x[k], y = search->y[k];
@@ -64,11 +73,12 @@ LANES_KERNEL_OF_LOADS static void search_pixels(const struct warp_rays *rays, co
 void warp_iterate_row(const struct warp_task *task, uint32_t row, struct warp_tally *tally)
 {
     const struct warp_layer *layer = &task->layers[0];
-    struct search search;
+    struct search search = {.sticking = {0}};
     for (uint32_t y = row * WARP_TILE; y < (row + 1) * WARP_TILE && y < task->height; y++)
         for (uint32_t x = 0; x < task->width; x += LANES) {
             search_pixels(&task->rays, layer, (const float[2]){(float)x, (float)y}, &search);
             warp_colour(layer, search.x, search.y, search.colours);
-            warp_store(task, x, y, &(struct warp_pixels){LANES, search.colours, search.mask}, tally);
+            const struct warp_pixels pixels = {LANES, search.colours, search.mask, search.sticking};
+            warp_store(task, x, y, &pixels, tally);
         }
 }

@@ -143,6 +143,7 @@ LANES_KERNEL static void place_packet(const struct warp_rays *rays, struct warp_
 /* What becomes of a packet. */
 struct result {
     uint32_t colours[LANES], mask[LANES], deeper;
+    uint8_t sticking[LANES];
 };
 
 /* Those that came behind the layers before go on in this one. */
@@ -152,6 +153,7 @@ static void walk_deeper(const struct warp_task *task, uint32_t l, const struct w
     const struct warp_layer *layer = &task->layers[l];
     struct warp_walk walk = {.x = {0}};
     uint32_t colours[LANES];
+    uint8_t sticking[LANES];
     for (int k = 0; k < LANES; k++) {
         walk.state[k] = result->mask[k] == FL_WARP_BEHIND ? WALK_ON : WALK_IDLE;
         walk.w[k] = min_of(w_begin[k], task->ranges[l][1]);
@@ -166,9 +168,12 @@ static void walk_deeper(const struct warp_task *task, uint32_t l, const struct w
             w_begin[k] = walk.w[k];
     }
     warp_colour(layer, walk.x, walk.y, colours);
+    if (task->sticks)
+        warp_sticking(layer, walk.x, walk.y, sticking);
     for (int k = 0; k < LANES; k++)
         if (walk.state[k] == WALK_HIT) {
             result->colours[k] = colours[k];
+            result->sticking[k] = task->sticks ? sticking[k] : 0;
             result->mask[k] = FL_WARP_KNOWN;
             result->deeper++;
         }
@@ -194,6 +199,8 @@ static void walk_packet(const struct warp_task *task, const struct tile *tile, c
         any_behind |= walk.state[k] == WALK_BEHIND;
     }
     warp_colour(layer, walk.x, walk.y, result->colours);
+    if (task->sticks)
+        warp_sticking(layer, walk.x, walk.y, result->sticking);
     for (uint32_t l = 1; l < task->layer_count && any_behind; l++)
         walk_deeper(task, l, packet, walk.w, result);
 }
@@ -205,6 +212,17 @@ static uint32_t under_pattern(uint32_t colour, uint32_t x, uint32_t y)
 {
     const uint32_t grey = (x >> 3 ^ y >> 3) & 1 ? 0x505050u : 0x303030u;
     return (colour & 0xff000000u) | ((colour >> 1 & 0x7f7f7fu) + grey);
+}
+
+static void store_sticking(const struct warp_task *task, size_t first, const struct warp_pixels *pixels,
+                           uint32_t count, struct warp_tally *tally)
+{
+    uint32_t sum = 0;
+    for (uint32_t k = 0; k < count; k++)
+        sum += pixels->mask[k] == FL_WARP_KNOWN ? pixels->sticking[k] : 0;
+    tally->sticking += sum;
+    for (uint32_t k = 0; task->sticking && k < count; k++)
+        task->sticking[first + k] = pixels->mask[k] == FL_WARP_KNOWN ? pixels->sticking[k] : 0;
 }
 
 void warp_store(const struct warp_task *task, uint32_t x, uint32_t y, const struct warp_pixels *pixels,
@@ -224,6 +242,8 @@ void warp_store(const struct warp_task *task, uint32_t x, uint32_t y, const stru
     tally->by_mask[FL_WARP_KNOWN] += count - behind - outside;
     tally->by_mask[FL_WARP_BEHIND] += behind;
     tally->by_mask[FL_WARP_OUTSIDE] += outside;
+    if (task->sticks)
+        store_sticking(task, (size_t)y * task->width + x, pixels, count, tally);
     if (task->holes != FL_WARP_PATTERN || behind + outside == 0)
         return;
     for (uint32_t k = 0; k < count; k++)
@@ -232,12 +252,19 @@ void warp_store(const struct warp_task *task, uint32_t x, uint32_t y, const stru
 }
 
 /* All of which is known, within the picture. */
-static void store_known(const struct warp_task *task, uint32_t x, uint32_t y, const uint32_t colours[LANES],
+static void store_known(const struct warp_task *task, uint32_t x, uint32_t y, const struct result *result,
                         struct warp_tally *tally)
 {
     const size_t i = (size_t)y * task->width + x;
+    const uint32_t *colours = result->colours;
     memcpy(task->colours + i, colours, PACKET_COLUMNS * sizeof(*colours));
     memcpy(task->colours + i + task->width, colours + PACKET_COLUMNS, PACKET_COLUMNS * sizeof(*colours));
+    if (task->sticks && task->sticking) {
+        memcpy(task->sticking + i, result->sticking, PACKET_COLUMNS);
+        memcpy(task->sticking + i + task->width, result->sticking + PACKET_COLUMNS, PACKET_COLUMNS);
+    }
+    for (int k = 0; task->sticks && k < LANES; k++)
+        tally->sticking += result->sticking[k];
     memset(task->mask + i, FL_WARP_KNOWN, PACKET_COLUMNS);
     memset(task->mask + i + task->width, FL_WARP_KNOWN, PACKET_COLUMNS);
     tally->by_mask[FL_WARP_KNOWN] += LANES;
@@ -256,8 +283,10 @@ static void trace_packet(const struct warp_task *task, const struct tile *tile, 
     const bool is_solved = is_smooth && warp_solve(&task->layers[0], &packet, tile->range, &walk);
     if (is_solved)
         warp_colour(&task->layers[0], walk.x, walk.y, result.colours);
+    if (is_solved && task->sticks)
+        warp_sticking(&task->layers[0], walk.x, walk.y, result.sticking);
     if (is_solved && is_whole) {
-        store_known(task, x, y, result.colours, tally);
+        store_known(task, x, y, &result, tally);
         return;
     }
     memset(result.mask, FL_WARP_KNOWN, sizeof(result.mask));
@@ -269,7 +298,8 @@ static void trace_packet(const struct warp_task *task, const struct tile *tile, 
     }
     for (uint32_t row = 0; row < PACKET_ROWS; row++) {
         const uint32_t first = row * PACKET_COLUMNS;
-        const struct warp_pixels pixels = {PACKET_COLUMNS, result.colours + first, result.mask + first};
+        const struct warp_pixels pixels = {PACKET_COLUMNS, result.colours + first, result.mask + first,
+                                           result.sticking + first};
         warp_store(task, x, y + row, &pixels, tally);
     }
 }

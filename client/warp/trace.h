@@ -18,18 +18,21 @@ struct warp_task {
     uint32_t width, height;
     enum fl_warp_holes holes;
     uint32_t *colours;
-    uint8_t *mask;
+    uint8_t *mask, *sticking; /* the latter may be NULL */
+    bool sticks;              /* something, in some layer; else what sticks is not asked for */
 };
 
 /* Pixels. */
 struct warp_tally {
     uint64_t by_mask[FL_WARP_OUTSIDE + 1], deeper, walked;
+    uint64_t sticking; /* sum of 255 times their shares */
 };
 
 /* Side by side in a row. */
 struct warp_pixels {
     uint32_t count;
     const uint32_t *colours, *mask;
+    const uint8_t *sticking; /* counts where the mask says known; only read if something sticks */
 };
 
 /* Writes those that are in the picture, under a pattern where that is wanted. */

@@ -41,11 +41,13 @@ bool warp_layer_init(struct warp_layer *layer, uint32_t width, uint32_t height)
     layer->colours = calloc((size_t)texels + layer->padded_width + 1,
                             sizeof(*layer->colours)); /* the next texel, and the next row */
     layer->w = calloc(texels, sizeof(*layer->w));
+    layer->sticking = calloc(texels, sizeof(*layer->sticking));
     layer->joined = calloc(texels / WARP_JOINED_WORD, sizeof(*layer->joined));
     layer->nodes = calloc(nodes, 2 * sizeof(*layer->nodes));
     layer->errors = calloc((size_t)nodes - texels + layer->padded_width, sizeof(*layer->errors));
     layer->blocks = calloc(blocks, sizeof(*layer->blocks));
-    if (!layer->colours || !layer->w || !layer->joined || !layer->nodes || !layer->errors || !layer->blocks)
+    if (!layer->colours || !layer->w || !layer->sticking || !layer->joined || !layer->nodes || !layer->errors ||
+        !layer->blocks)
         return false;
     for (uint32_t i = 0; i < nodes; i++)
         layer->nodes[2 * (size_t)i] = NODE_NOTHING;
@@ -56,6 +58,7 @@ void warp_layer_finish(struct warp_layer *layer)
 {
     free(layer->colours);
     free(layer->w);
+    free(layer->sticking);
     free(layer->joined);
     free(layer->nodes);
     free(layer->errors);

@@ -29,6 +29,8 @@ struct warp_layer {
     float noise;     /* the given w is at most so far from the true one */
     uint32_t *colours;
     float *w;
+    uint8_t *sticking;
+    bool sticks;      /* else that holds nothing */
     uint32_t *joined; /* a bit a texel: it, the one to the right, and those below them show one surface */
     uint32_t *nodes;  /* two words each */
     float *errors; /* of the levels above the lowest: how far a plane is from those of the leaves at most; then a

@@ -79,6 +79,25 @@ static void build_row(void *context, unsigned item, unsigned worker)
                      build->warp->scratch + worker * warp_layer_scratch(layer));
 }
 
+/* Of texels that are given without any nothing sticks. */
+static void copy_sticking(struct warp_layer *layer, const uint8_t *sticking,
+                          const struct warp_rectangle *rectangle)
+{
+    const size_t width = rectangle->right - rectangle->left;
+    if (!sticking && !layer->sticks)
+        return;
+    if (!layer->sticks)
+        memset(layer->sticking, 0, (size_t)layer->padded_width * layer->padded_height);
+    layer->sticks = true;
+    for (uint32_t y = rectangle->top; y < rectangle->bottom; y++) {
+        uint8_t *row = layer->sticking + (size_t)y * layer->padded_width + rectangle->left;
+        if (sticking)
+            memcpy(row, sticking + (y - rectangle->top) * width, width);
+        else
+            memset(row, 0, width);
+    }
+}
+
 static void copy_texels(struct warp_layer *layer, const struct fl_warp_layer *texels,
                         const struct warp_rectangle *rectangle)
 {
@@ -88,6 +107,7 @@ static void copy_texels(struct warp_layer *layer, const struct fl_warp_layer *te
         memcpy(layer->colours + to, texels->colours + from, width * sizeof(*layer->colours));
         memcpy(layer->w + to, texels->w + from, width * sizeof(*layer->w));
     }
+    copy_sticking(layer, texels->sticking, rectangle);
 }
 
 static float focal_of(const struct fl_warp_camera *camera, uint32_t height)
@@ -135,6 +155,7 @@ static void fill_layer(const struct fl_warp *warp, struct warp_layer *layer, con
     layer->tolerance = warp->unit * warp->pixels / (focal_of(&warp->camera, layer->height) * warp->radius);
     layer->nearness = warp->radius / warp->unit;
     layer->noise = warp->w_error;
+    layer->sticks = false;
     copy_texels(layer, texels, &all);
 }
 
@@ -270,6 +291,7 @@ static void make_row(void *context, unsigned item, unsigned worker)
         sum->by_mask[i] += tally.by_mask[i];
     sum->deeper += tally.deeper;
     sum->walked += tally.walked;
+    sum->sticking += tally.sticking;
 }
 
 static struct fl_warp_counts counts_of(const struct fl_warp *warp, const struct fl_warp_view *view,
@@ -281,6 +303,7 @@ static struct fl_warp_counts counts_of(const struct fl_warp *warp, const struct 
             sum.by_mask[i] += work->tallies[w].by_mask[i];
         sum.deeper += work->tallies[w].deeper;
         sum.walked += work->tallies[w].walked;
+        sum.sticking += work->tallies[w].sticking;
     }
     const float *a = warp->camera.world_from_view, *b = view->camera.world_from_view;
     const float away = hypotf(hypotf(a[3] - b[3], a[7] - b[7]), a[11] - b[11]);
@@ -291,6 +314,7 @@ static struct fl_warp_counts counts_of(const struct fl_warp *warp, const struct 
         .outside = (float)((double)sum.by_mask[FL_WARP_OUTSIDE] / pixels),
         .deeper = (float)((double)sum.deeper / pixels),
         .walked = (float)((double)sum.walked / pixels),
+        .sticking = (float)((double)sum.sticking / (255 * pixels)),
         .bound_pixels =
             view->quality == FL_WARP_TREE && away <= warp->radius ? warp->pixels + warp->off_pixels : INFINITY,
     };
@@ -310,8 +334,13 @@ bool fl_warp_make(struct fl_warp *warp, const struct fl_warp_view *view, struct 
                                       .height = view->height,
                                       .holes = view->holes,
                                       .colours = picture->colours,
-                                      .mask = picture->mask},
+                                      .mask = picture->mask,
+                                      .sticking = picture->sticking},
                              .quality = view->quality};
+    for (uint32_t l = 0; l < warp->layer_count; l++)
+        work.task.sticks |= warp->layers[l].sticks;
+    if (picture->sticking && !work.task.sticks)
+        memset(picture->sticking, 0, (size_t)view->width * view->height);
     warp_task_find_ranges(&work.task);
     const uint64_t time_ns =
         warp_pool_run(warp->pool, make_row, &work, (view->height + WARP_TILE - 1) / WARP_TILE);

@@ -56,6 +56,7 @@ struct fl_warp_camera {
 struct fl_warp_layer {
     const uint32_t *colours; /* RGBA8, red in the lowest byte; rows without gaps */
     const float *w;          /* not negative */
+    const uint8_t *sticking; /* 255 times the share of a colour that follows the eye; NULL: nothing does */
 };
 
 /* What the arrays hold is copied. */
@@ -103,6 +104,7 @@ struct fl_warp_counts {
     float known, behind, outside; /* shares of the pixels */
     float deeper;                 /* of all pixels: known from the second or the third layer */
     float walked;                 /* of all pixels: rays that were traced node by node */
+    float sticking;               /* mean of the pixels' shares that follow the eye: those of what is known */
     float bound_pixels;    /* texels of the key view that a known point may be off, from this eye; infinite for an
                               eye beyond the radius, and for FL_WARP_ITERATIVE */
     uint64_t processor_ns; /* of all threads */
@@ -112,6 +114,7 @@ struct fl_warp_counts {
 struct fl_warp_picture {
     uint32_t *colours; /* as in layers */
     uint8_t *mask;     /* enum fl_warp_mask */
+    uint8_t *sticking; /* as in layers, of the texel that is seen; 0 where none is known; NULL: not wanted */
     struct fl_warp_counts counts;
 };
 

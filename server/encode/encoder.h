@@ -12,7 +12,7 @@
 
 struct picture {
     uint32_t width, height;
-    uint32_t bytes_per_pixel; /* 4, 8 or 16; four channels. Of rounded depths 2, which `predicted` takes */
+    uint32_t bytes_per_pixel; /* 4, 8 or 16; four channels. Of attachments 1 and 2, where an encoder takes them */
     const uint8_t *pixels;    /* rows from the top, without gaps */
     /* Other than none: of RGBA8 these planes are given, and no pixels. Only what encoder_takes() says is encoded.
      */

@@ -100,6 +100,7 @@ void parts_arrange(const struct parts_source *source, uint8_t *out, struct part_
     if (count == 1 && has_coarse)
         add_all(&arrangement, source, FRAME_PART_DEPTH);
     add_all(&arrangement, source, FRAME_PART_NORMALS);
+    add_all(&arrangement, source, FRAME_PART_STICKING);
 }
 
 size_t parts_end(const struct part_list *list, size_t at_bytes)
@@ -116,7 +117,8 @@ size_t parts_needed_bytes(const struct part_list *list)
     bool has_colours = false, has_depth = false;
     for (uint32_t i = 0; i < list->count; i++) {
         const enum frame_part_kind kind = list->parts[i].kind;
-        bool *has = kind == FRAME_PART_COLOURS ? &has_colours : kind == FRAME_PART_NORMALS ? NULL : &has_depth;
+        const bool is_depth = kind == FRAME_PART_DEPTH || kind == FRAME_PART_COARSE_DEPTH;
+        bool *has = kind == FRAME_PART_COLOURS ? &has_colours : is_depth ? &has_depth : NULL;
         end += list->parts[i].bytes;
         if (has && !*has)
             needed = end;

@@ -3,6 +3,7 @@
 
 #include "encode/depth.h"
 #include "encode/parts.h"
+#include "encode/sticking.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -103,21 +104,34 @@ static bool append_normals(struct engine_frame *frame, const struct picture *lik
     return append(frame, &picture, &frame->normal_bytes, error);
 }
 
+static bool append_sticking(struct engine_frame *frame, struct error *error)
+{
+    const struct frame_result *result = &frame->result;
+    uint8_t *encoded;
+    if (!(result->attachments & 1u << ATTACHMENT_STICKING))
+        return true;
+    return sticking_encode(frame_result_attachment(result, ATTACHMENT_STICKING), ATTACHMENT_PIXEL_BYTES,
+                           result->width, result->height, &encoded, &frame->sticking_bytes, error) &&
+           append_bytes(frame, encoded, frame->sticking_bytes, error);
+}
+
 static bool put_in_parts(struct engine_frame *frame, struct error *error)
 {
     const size_t depths_bytes = frame->coarse_bytes + frame->depth_bytes;
-    const size_t colours_bytes = frame->size_bytes - depths_bytes - frame->normal_bytes;
-    const uint8_t *coarse = frame->bytes + colours_bytes;
+    const size_t colours_bytes = frame->size_bytes - depths_bytes - frame->normal_bytes - frame->sticking_bytes;
+    const uint8_t *coarse = frame->bytes + colours_bytes, *normals = coarse + depths_bytes;
     const struct parts_source source = {
         .encoding = frame->encoding,
         .bytes = {[FRAME_PART_COLOURS] = frame->bytes,
                   [FRAME_PART_COARSE_DEPTH] = coarse,
                   [FRAME_PART_DEPTH] = coarse + frame->coarse_bytes,
-                  [FRAME_PART_NORMALS] = coarse + depths_bytes},
+                  [FRAME_PART_NORMALS] = normals,
+                  [FRAME_PART_STICKING] = normals + frame->normal_bytes},
         .size_bytes = {[FRAME_PART_COLOURS] = colours_bytes,
                        [FRAME_PART_COARSE_DEPTH] = frame->coarse_bytes,
                        [FRAME_PART_DEPTH] = frame->depth_bytes,
-                       [FRAME_PART_NORMALS] = frame->normal_bytes},
+                       [FRAME_PART_NORMALS] = frame->normal_bytes,
+                       [FRAME_PART_STICKING] = frame->sticking_bytes},
     };
     if (!frame->in_parts)
         return true;
@@ -135,5 +149,5 @@ static bool put_in_parts(struct engine_frame *frame, struct error *error)
 bool attachments_append(struct engine_frame *frame, const struct picture *picture, struct error *error)
 {
     return append_depth(frame, picture, error) && append_normals(frame, picture, error) &&
-           put_in_parts(frame, error);
+           append_sticking(frame, error) && put_in_parts(frame, error);
 }

@@ -237,7 +237,8 @@ struct engine_frame {
     uint64_t wanted_bytes;            /* that it may have, for an encoder that can be told; 0: not known */
     bool wants_key;                   /* it is to be encoded so that it can be decoded without those before .. */
     bool key_frame;                   /* .. and so it was */
-    size_t depth_bytes, normal_bytes; /* of attachments, encoded: the last ones of size_bytes, in that order .. */
+    size_t depth_bytes, normal_bytes; /* of attachments, encoded: the last ones of size_bytes, in that order, .. */
+    size_t sticking_bytes;            /* .. with these behind them .. */
     bool in_parts;                    /* .. unless it is to be encoded in parts .. */
     struct part_list parts;           /* .. which then say what the bytes are; none: it could not be cut */
     size_t coarse_bytes;              /* of its coarse depths, likewise of size_bytes */

@@ -16,7 +16,7 @@
 #include <stdint.h>
 
 /* Formats of attachments alone, which follow those of the wire. */
-enum { PIXEL_FORMAT_DEPTH32F = PIXEL_FORMAT_COUNT, PIXEL_FORMAT_NORMAL8 };
+enum { PIXEL_FORMAT_DEPTH32F = PIXEL_FORMAT_COUNT, PIXEL_FORMAT_NORMAL8, PIXEL_FORMAT_SHARE8 };
 
 struct frame_camera {
     float world_from_view[12]; /* rigid; looks along -z, y up */
@@ -121,7 +121,9 @@ struct frame_result {
 void frame_result_finish(struct frame_result *result);
 /* Of width x height: DEPTH f32, metres along the view to the first surface that the pixel's first sample met, 0
  * where there is none; NORMALS 4 u8, (n / 2 + 1/2) * 255 of the mean of the samples in world space, then 255, all
- * 0 where there is none. Valid as long as the pixels; `which` is one of the result's attachments. */
+ * 0 where there is none; STICKING 4 u8, the first: 255 times the mean of the samples' shares that mirrors, glass
+ * and highlights have in them (shaders/common/sticking.glsl), of each 2 x 2 pixels the first one's, the others 0.
+ * Valid as long as the pixels; `which` is one of the result's attachments. */
 const uint8_t *frame_result_attachment(const struct frame_result *result, enum attachment which);
 
 /* The device's resources of a scene that all its viewers share: its copy, its light, and the tracers in use. */

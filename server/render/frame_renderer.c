@@ -16,8 +16,10 @@ const uint8_t *frame_result_attachment(const struct frame_result *result, enum a
 {
     size_t bytes = (size_t)result->width * result->height * frame_format_bytes(PIXEL_FORMAT_DEPTH32F);
     /* As planes they come in the order of their layers. */
-    bool is_second = which == ATTACHMENT_DEPTH && result->attachments & 1u << ATTACHMENT_NORMALS;
-    return result->pixels + result->size_bytes + (is_second ? bytes : 0);
+    static const uint32_t before[] = {[ATTACHMENT_DEPTH] = 1u << ATTACHMENT_NORMALS,
+                                      [ATTACHMENT_STICKING] = 1u << ATTACHMENT_DEPTH | 1u << ATTACHMENT_NORMALS};
+    return result->pixels + result->size_bytes +
+           bytes * (size_t)__builtin_popcount(result->attachments & before[which]);
 }
 
 struct frame_scene *frame_scene_create(struct gpu_device *device, struct error *error)

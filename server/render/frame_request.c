@@ -73,7 +73,8 @@ uint32_t frame_request_planes(const struct frame_request *request)
 {
     return frame_request_layers(request) |
            (request->attachments & 1u << ATTACHMENT_DEPTH ? 1u << LAYER_DEPTH : 0) |
-           (request->attachments & 1u << ATTACHMENT_NORMALS ? 1u << LAYER_NORMAL : 0);
+           (request->attachments & 1u << ATTACHMENT_NORMALS ? 1u << LAYER_NORMAL : 0) |
+           (request->attachments & 1u << ATTACHMENT_STICKING ? 1u << LAYER_STICKING : 0);
 }
 
 uint32_t frame_format_bytes(unsigned format)
@@ -82,6 +83,7 @@ uint32_t frame_format_bytes(unsigned format)
     case PIXEL_FORMAT_RGBA8:
     case PIXEL_FORMAT_DEPTH32F:
     case PIXEL_FORMAT_NORMAL8:
+    case PIXEL_FORMAT_SHARE8:
         return 4;
     case PIXEL_FORMAT_RGBA16F:
         return 8;
@@ -97,6 +99,8 @@ unsigned frame_request_plane_format(const struct frame_request *request, enum la
         return PIXEL_FORMAT_DEPTH32F;
     if (request->attachments & 1u << ATTACHMENT_NORMALS && layer == LAYER_NORMAL)
         return PIXEL_FORMAT_NORMAL8;
+    if (layer == LAYER_STICKING)
+        return PIXEL_FORMAT_SHARE8;
     return request->format;
 }
 
@@ -122,7 +126,7 @@ static bool check_layers(const struct frame_request *request, struct error *erro
                          31 - __builtin_clz(request->layers));
     if (frame_request_layers(request) != 1u << LAYER_BEAUTY && request->format != PIXEL_FORMAT_RGBA32F)
         return error_set(error, ERROR_UNSUPPORTED, "layers", "layers beside the beauty need the format rgba32f");
-    if (request->attachments & ~(uint32_t)(1u << ATTACHMENT_DEPTH | 1u << ATTACHMENT_NORMALS))
+    if (request->attachments >= 1u << ATTACHMENT_COUNT)
         return error_set(error, ERROR_UNSUPPORTED, "attachments", "there is no such set of attachments: %#x",
                          request->attachments);
     if (request->attachments && frame_request_layers(request) != 1u << LAYER_BEAUTY)

@@ -3,15 +3,18 @@
 
 #include "render/compact.h"
 #include "render/frame_request.h"
+#include "render/integrators/integrator.h"
 #include "render/wave_trace.h"
 #include "shared/layers.h"
 #include "shared/ray.h"
+
+#include <epoxy/gl.h>
 
 _Static_assert(LAYER_BIT_BEAUTY == 1 << LAYER_BEAUTY && LAYER_BIT_ALBEDO == 1 << LAYER_ALBEDO &&
                    LAYER_BIT_NORMAL == 1 << LAYER_NORMAL && LAYER_BIT_DEPTH == 1 << LAYER_DEPTH &&
                    LAYER_BIT_POSITION == 1 << LAYER_POSITION && LAYER_BIT_AO == 1 << LAYER_AO &&
                    LAYER_BIT_ID == 1 << LAYER_ID && LAYER_BIT_UNKNOWN == 1 << LAYER_UNKNOWN &&
-                   LAYER_UNKNOWN + 1 == LAYER_COUNT,
+                   LAYER_UNKNOWN + 1 == LAYER_COUNT && LAYER_BIT_STICKING == 1 << LAYER_STICKING,
                "shaders know the layers by other numbers");
 
 bool layers_of_first_sample(enum layer layer)
@@ -52,14 +55,16 @@ uint32_t layers_take_unknown(struct layers *layers)
     return layers->noting == layers->wanted ? UINT32_MAX : planes_before * layers->plane_samples;
 }
 
-/* A program that reads hits, in use, with all that these have bound; `own`: a define of its own, or NULL. */
-static const struct gpu_program *use(struct render_context *context, const char *compute, const char *own,
+/* A program that reads hits, in use, with all that these have bound; each of `own`: a define of its own, or NULL.
+ */
+static const struct gpu_program *use(struct render_context *context, const char *compute, const char *const own[2],
                                      struct error *error)
 {
-    struct gpu_define defines[CONTEXT_SURFACE_DEFINES + 3] = {0};
+    struct gpu_define defines[CONTEXT_SURFACE_DEFINES + 4] = {0};
     size_t n = context_surface_defines(context, defines);
-    if (own)
-        defines[n++] = (struct gpu_define){own, "1"};
+    for (int i = 0; i < 2; i++)
+        if (own[i])
+            defines[n++] = (struct gpu_define){own[i], "1"};
     if (context->scene->has_motion)
         defines[n++] = (struct gpu_define){"HAS_TIMES", "1"};
     const struct gpu_program *program = context_use_with(context, compute, defines, error);
@@ -70,13 +75,38 @@ static const struct gpu_program *use(struct render_context *context, const char 
     return program;
 }
 
+static uint32_t plane_of(const struct layers *layers, uint32_t layer_bit)
+{
+    return (uint32_t)__builtin_popcount(layers->wanted & (layer_bit - 1));
+}
+
+static bool note_sticking(struct layers *layers, struct render_context *context, struct error *error)
+{
+    const bool sticks = integrator_by_number(context->request.integrator)->follows_eye;
+    const char *const own[2] = {sticks ? "STICKS" : NULL,
+                                context->features.area_lights ? "HAS_AREA_LIGHTS" : NULL};
+    const uint32_t first = context->slice.first_slot, end = first + context->slice.slot_count;
+    context_span_begin(context, STAGE_SHADE);
+    const struct gpu_program *program = use(context, "render/sticking.comp", own, error);
+    if (program) {
+        gpu_buffer_bind_texels(context->device, environment_lights(context->environment, context->scene),
+                               UNIT_SHADE_LIGHTS, GL_RGBA32F);
+        gpu_buffer_bind_storage(&layers->sums, BIND_LAYER_SUMS);
+        gpu_uniform_uint(program, "slot_count", context->slice.slot_count);
+        gpu_uniform_uint(program, "first_sum", plane_of(layers, LAYER_BIT_STICKING) * layers->plane_samples);
+        gpu_dispatch(context->device, program, ((end + 3) / 4 - first / 4) << context->uniforms.sample_shift);
+    }
+    context_span_end(context);
+    return program && gpu_check(context->device, "what sticks", error);
+}
+
 /* All but how open a place is, which begins with 0. */
 static bool note_hits(struct layers *layers, struct render_context *context, struct error *error)
 {
     bool needs_surface = layers->noting & (LAYER_BIT_ALBEDO | LAYER_BIT_NORMAL);
     context_span_begin(context, STAGE_SHADE);
     const struct gpu_program *program =
-        use(context, "render/layers.comp", needs_surface ? "NEEDS_SURFACE" : NULL, error);
+        use(context, "render/layers.comp", (const char *const[2]){needs_surface ? "NEEDS_SURFACE" : NULL}, error);
     if (program) {
         gpu_buffer_bind_storage(&layers->sums, BIND_LAYER_SUMS);
         gpu_uniform_uint(program, "ray_count", context->ray_count);
@@ -91,7 +121,7 @@ static bool make_ao_rays(struct layers *layers, struct render_context *context, 
                          struct error *error)
 {
     context_span_begin(context, STAGE_SHADE);
-    const struct gpu_program *program = use(context, "render/layers_ao.comp", NULL, error);
+    const struct gpu_program *program = use(context, "render/layers_ao.comp", (const char *const[2]){NULL}, error);
     if (program) {
         gpu_buffer_bind_storage(&layers->ao_rays, BIND_SHADOW_RAYS);
         if (context->scene->has_motion)
@@ -119,11 +149,6 @@ static bool trace_ao_rays(struct layers *layers, struct render_context *context,
     const bool begins = !context->trace_state->in_progress; /* its rays are counted once */
     return compact_shadow_rays(context, layers->asking, begins, &wave, error) &&
            wave_trace(context, RAY_SHADOW, &wave, done, error);
-}
-
-static uint32_t plane_of(const struct layers *layers, uint32_t layer_bit)
-{
-    return (uint32_t)__builtin_popcount(layers->wanted & (layer_bit - 1));
 }
 
 static bool gather_ao(struct layers *layers, struct render_context *context, uint32_t count, struct error *error)
@@ -169,7 +194,7 @@ static bool adds(const struct render_context *context, enum layer layer)
 
 static bool any_adds(const struct layers *layers, const struct render_context *context)
 {
-    for (enum layer layer = LAYER_ALBEDO; layer < LAYER_COUNT; layer++)
+    for (enum layer layer = LAYER_ALBEDO; layer <= LAYER_STICKING; layer++)
         if (layers->noting & 1u << layer && adds(context, layer))
             return true;
     return false;
@@ -181,7 +206,8 @@ bool layers_step(struct layers *layers, struct render_context *context, bool *do
     if (!layers->noted) {
         layers->noted = true;
         *done = all == 0;
-        return !any_adds(layers, context) || note_hits(layers, context, error);
+        return (!any_adds(layers, context) || note_hits(layers, context, error)) &&
+               (!(layers->noting & LAYER_BIT_STICKING) || note_sticking(layers, context, error));
     }
     if (layers->asking == 0) {
         uint32_t left = all - layers->asked, together = context->wave_capacity / context->hit_count;

@@ -20,11 +20,9 @@ static float scale_of(const struct picture *picture, const struct frame_request 
 static const struct gpu_program *use_pixels(struct render_context *context, enum layer layer, uint32_t pixel_count,
                                             struct error *error)
 {
-    static const char *const numbers[] = {[PIXEL_FORMAT_RGBA8] = "0",
-                                          [PIXEL_FORMAT_RGBA16F] = "1",
-                                          [PIXEL_FORMAT_RGBA32F] = "2",
-                                          [PIXEL_FORMAT_DEPTH32F] = "3",
-                                          [PIXEL_FORMAT_NORMAL8] = "4"};
+    static const char *const numbers[] = {
+        [PIXEL_FORMAT_RGBA8] = "0",    [PIXEL_FORMAT_RGBA16F] = "1", [PIXEL_FORMAT_RGBA32F] = "2",
+        [PIXEL_FORMAT_DEPTH32F] = "3", [PIXEL_FORMAT_NORMAL8] = "4", [PIXEL_FORMAT_SHARE8] = "5"};
     unsigned format = frame_request_plane_format(&context->request, layer);
     const struct gpu_define defines[] = {{"FORMAT", numbers[format]}, {0}};
     const struct gpu_program *program = context_use_with(context, "render/resolve.comp", defines, error);

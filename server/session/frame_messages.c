@@ -39,10 +39,12 @@ void frame_fill_begin(struct message_frame_begin *begin, const struct engine_fra
     begin->height = frame->request.height;
     begin->samples = frame->result.samples;
     begin->revision = frame->result.revision;
-    begin->size_bytes = frame->size_bytes - frame->coarse_bytes - frame->depth_bytes - frame->normal_bytes;
+    begin->size_bytes =
+        frame->size_bytes - frame->coarse_bytes - frame->depth_bytes - frame->normal_bytes - frame->sticking_bytes;
     begin->attachments = frame->result.attachments;
     begin->depth_bytes = frame->depth_bytes;
     begin->normal_bytes = frame->normal_bytes;
+    begin->sticking_bytes = frame->sticking_bytes;
     begin->depth_form = frame->depth_step > 0.0f ? PROTOCOL_DEPTH_FORM_INVERSE : PROTOCOL_DEPTH_FORM_METRES;
     begin->depth_step = frame->depth_step;
     begin->margin_x = frame->margin_x;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // From sums of samples to pixels of the output's format, rows from the top. Linear formats are premultiplied by
-// alpha, RGBA8 is straight, tone-mapped and sRGB. Attachments: depth as it is, normals as unit vectors in 8 bits.
+// alpha, RGBA8 is straight, tone-mapped and sRGB. Attachments: depth as it is, normals as unit vectors in 8 bits, shares too.
 
 // The host sets the define FORMAT to one of those below: software GL would run all of them for each pixel.
 
@@ -13,6 +13,7 @@
 #define FORMAT_RGBA32F 2
 #define FORMAT_DEPTH32F 3
 #define FORMAT_NORMAL8 4
+#define FORMAT_SHARE8 5
 
 uniform uint pixel_count; // of the band
 
@@ -42,5 +43,7 @@ void main()
     float extent = length(sum.xyz); // 0 also where normals cancel each other out
     vec3 normal = extent > 0.0 ? sum.xyz / extent : vec3(0.0);
     resolved[k] = sum.a > 0.0 ? packUnorm4x8(vec4(normal * 0.5 + 0.5, 1.0)) : 0u;
+#elif FORMAT == FORMAT_SHARE8
+    resolved[k] = packUnorm4x8(vec4(colour.r, 0.0, 0.0, 0.0));
 #endif
 }

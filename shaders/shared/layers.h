@@ -13,6 +13,8 @@
 #define LAYER_BIT_AO 32u
 #define LAYER_BIT_ID 64u
 #define LAYER_BIT_UNKNOWN 128u /* the last: its plane comes behind all others */
+/* Of an attachment, which no layer beside the beauty goes with: no LAYER. */
+#define LAYER_BIT_STICKING 256u
 
 /* Storage buffer: a plane for each layer of the frame but the beauty, in their order; in it a vec4 for each sample
  * of the slice. */

@@ -110,7 +110,7 @@ static inline void build_by_client(struct sides *sides)
     for (uint32_t l = 0; l < LAYERS; l++) {
         for (uint32_t i = 0; i < COUNT; i++)
             sides->colours[l][i] = place_colour(l, i, sides->w[l][i]);
-        key->layers[l] = (struct fl_warp_layer){sides->colours[l], sides->w[l]};
+        key->layers[l] = (struct fl_warp_layer){sides->colours[l], sides->w[l], NULL};
     }
     u->bounds[0] = key->unit * PIXELS / (0.5f * (float)HEIGHT / tanf(0.5f * FOV) * sides->radius);
     u->bounds[3] = sides->radius / key->unit;

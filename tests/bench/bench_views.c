@@ -2,10 +2,13 @@
 /* Pictures of other eyes, made of one picture with depths: by the tracer `quadtree` and by bench_warps.h, beside
  * true pictures. Prints one JSON object: {"scene", "triangles", "device", "software", "width", "height", "key_ns",
  * "moves":
- * [{"name", "true_ns", "methods": [{"name", "layers", "psnr_db", "seen_psnr_db", "unseen", "cpu_ns",
- * "build_ns"}]}]}. `unseen` is a share of the pixels; times are of the processor, all threads of the process, one
- * a run: key_ns and true_ns of a whole picture by `bvh`, cpu_ns of making a picture of it, build_ns of the
- * structure that serves all pictures of a key view, where there is one. Exit status: 1 failed, 2 usage. */
+ * [{"name", "true_ns", "sticking": {"share", "correlation", "bins": [{"pixels", "rms"}]}, "methods": [{"name",
+ * "layers", "psnr_db", "seen_psnr_db", "unseen", "cpu_ns", "build_ns"}]}]}. `sticking`: of the picture by
+ * client/warp how much of it follows the eye, how its pixels' shares and their errors correlate, and of shares
+ * from 0 to 1 in BINS steps how many of the seen pixels have them and their error in levels of 255. `unseen` is a
+ * share of the pixels; times are of the processor, all threads of the process, one a run: key_ns and true_ns of a
+ * whole picture by `bvh`, cpu_ns of making a picture of it, build_ns of the structure that serves all pictures of
+ * a key view, where there is one. Exit status: 1 failed, 2 usage. */
 #include "tests/bench/bench.h"
 #include "tests/bench/bench_options.h"
 #include "tests/bench/bench_scene.h"
@@ -29,12 +32,13 @@ static const char usage[] = "usage: bench views --model FILE | --family TRIANGLE
 
 #define MOVES_MAX 8u
 #define RADIUS 0.15f /* metres, of the bound: the usual one */
+#define BINS 5u
 
 struct move {
     float way[3]; /* right, up, ahead */
     struct bench_runs true_times;
     uint32_t *truth;
-    json_t *methods;
+    json_t *methods, *sticking;
 };
 
 struct bench {
@@ -48,6 +52,7 @@ struct bench {
     struct bench_runs key_times;
     uint32_t *key;
     float *w;
+    uint8_t *sticking;
     struct move moves[MOVES_MAX];
     struct warp_picture picture;
 };
@@ -63,7 +68,7 @@ static bool render(struct bench *bench, const struct frame_camera *camera, struc
                                           .depth = 4,
                                           .camera = *camera,
                                           .tracer = TRACER_BVH,
-                                          .attachments = 1u << ATTACHMENT_DEPTH};
+                                          .attachments = 1u << ATTACHMENT_DEPTH | 1u << ATTACHMENT_STICKING};
     if (!frame_begin(bench->renderer, bench->scene.loaded.scene, NULL, &request, error))
         return false;
     enum frame_progress progress;
@@ -72,9 +77,9 @@ static bool render(struct bench *bench, const struct frame_camera *camera, struc
     return progress == FRAME_DONE;
 }
 
-/* Colours, and w where that is asked for; the first run is a warm-up. */
+/* Colours, and w and what sticks where that is asked for; the first run is a warm-up. */
 static bool render_runs(struct bench *bench, const struct frame_camera *camera, uint32_t *colours, float *w,
-                        struct bench_runs *times, struct error *error)
+                        uint8_t *sticking, struct bench_runs *times, struct error *error)
 {
     const uint32_t count = bench->width * bench->height;
     for (unsigned run = 0; run <= bench->runs; run++) {
@@ -87,6 +92,8 @@ static bool render_runs(struct bench *bench, const struct frame_camera *camera, 
         memcpy(colours, result.pixels, count * sizeof(*colours));
         if (w)
             memcpy(w, frame_result_attachment(&result, ATTACHMENT_DEPTH), count * sizeof(*w));
+        for (uint32_t i = 0; sticking && i < count; i++)
+            sticking[i] = frame_result_attachment(&result, ATTACHMENT_STICKING)[4 * (size_t)i];
         frame_result_finish(&result);
     }
     for (uint32_t i = 0; w && i < count; i++)
@@ -104,11 +111,12 @@ static bool prepare(struct bench *bench, struct error *error)
     bench->renderer = bench->shared ? frame_renderer_create(bench->shared, error) : NULL;
     bench->key = calloc(count, sizeof(*bench->key));
     bench->w = calloc(count, sizeof(*bench->w));
-    if (!bench->key || !bench->w ||
+    bench->sticking = calloc(count, sizeof(*bench->sticking));
+    if (!bench->key || !bench->w || !bench->sticking ||
         !warp_picture_init(&bench->picture, bench->width, bench->height, (uint32_t)count))
         return error_set(error, ERROR_OUT_OF_MEMORY, "--size", "no memory for the pictures");
-    return bench->renderer &&
-           render_runs(bench, &bench->scene.camera, bench->key, bench->w, &bench->key_times, error);
+    return bench->renderer && render_runs(bench, &bench->scene.camera, bench->key, bench->w, bench->sticking,
+                                          &bench->key_times, error);
 }
 
 /* ---- what is made ---- */
@@ -120,6 +128,44 @@ static void write_picture(const struct bench *bench, uint32_t move, const char *
     snprintf(path, sizeof(path), "%s/%u-%s.ppm", bench->pictures, move, name);
     if (!warp_write(path, bench->width, bench->height, colours, seen))
         fprintf(stderr, "bench views: %s cannot be written\n", path);
+}
+
+/* Of a pixel: the sum of the channels' squared differences. */
+static double squares_of(uint32_t a, uint32_t b)
+{
+    double sum = 0;
+    for (int shift = 0; shift < 24; shift += 8) {
+        const double difference = (double)(a >> shift & 255) - (double)(b >> shift & 255);
+        sum += difference * difference;
+    }
+    return sum;
+}
+
+static json_t *sticking_json(const struct bench *bench, const struct move *move)
+{
+    const struct warp_picture *picture = &bench->picture;
+    double counts[BINS] = {0}, squares[BINS] = {0}, n = 0, x = 0, y = 0, xx = 0, xy = 0, yy = 0;
+    for (uint32_t i = 0; i < bench->width * bench->height; i++) {
+        const double share = picture->sticking[i] / 255.0, error = squares_of(picture->colours[i], move->truth[i]);
+        const uint32_t bin = (uint32_t)(share * (BINS - 1e-9));
+        if (!picture->seen[i])
+            continue;
+        counts[bin]++;
+        squares[bin] += error;
+        n++;
+        x += share;
+        y += sqrt(error);
+        xx += share * share;
+        xy += share * sqrt(error);
+        yy += error;
+    }
+    json_t *bins = json_array();
+    for (uint32_t bin = 0; bin < BINS; bin++)
+        json_array_append_new(bins, json_pack("{s:f, s:f}", "pixels", counts[bin] / n, "rms",
+                                              counts[bin] > 0 ? sqrt(squares[bin] / (3 * counts[bin])) : 0));
+    const double spread = sqrt((n * xx - x * x) * (n * yy - y * y));
+    return json_pack("{s:f, s:f, s:o}", "share", x / n, "correlation", spread > 0 ? (n * xy - x * y) / spread : 0,
+                     "bins", bins);
 }
 
 /* bench->picture beside the truth. */
@@ -153,7 +199,7 @@ static bool warp(struct bench *bench, struct move *move, struct error *error)
                                    .from = bench->scene.camera,
                                    .to = bench_moved(&bench->scene.camera, move->way),
                                    .layer_count = 1,
-                                   .layers = {{bench->key, bench->w}}};
+                                   .layers = {{bench->key, bench->w, bench->sticking}}};
     for (enum warp_method method = 0; method < WARP_METHODS; method++) {
         struct bench_runs times = {0}, builds = {0};
         for (unsigned run = 0; run <= bench->runs; run++) {
@@ -165,6 +211,8 @@ static bool warp(struct bench *bench, struct move *move, struct error *error)
                 bench_add(&builds, bench->picture.build_ns);
         }
         note(bench, move, method, &times, &builds);
+        if (method == WARP_QUADTREE)
+            move->sticking = sticking_json(bench, move);
     }
     return true;
 }
@@ -178,7 +226,7 @@ static bool run(struct bench *bench, struct error *error)
         move->truth = calloc((size_t)bench->width * bench->height, sizeof(*move->truth));
         if (!move->truth)
             return error_set(error, ERROR_OUT_OF_MEMORY, "--size", "no memory for the pictures");
-        if (!render_runs(bench, &to, move->truth, NULL, &move->true_times, error))
+        if (!render_runs(bench, &to, move->truth, NULL, NULL, &move->true_times, error))
             return false;
         if (bench->pictures)
             write_picture(bench, i, "true", move->truth, NULL);
@@ -194,8 +242,8 @@ static json_t *move_json(const struct move *move)
 {
     char name[96];
     snprintf(name, sizeof(name), "%g,%g,%g", (double)move->way[0], (double)move->way[1], (double)move->way[2]);
-    return json_pack("{s:s, s:o, s:O}", "name", name, "true_ns", bench_times_json(&move->true_times), "methods",
-                     move->methods);
+    return json_pack("{s:s, s:o, s:O, s:O}", "name", name, "true_ns", bench_times_json(&move->true_times),
+                     "sticking", move->sticking, "methods", move->methods);
 }
 
 static bool print(const struct bench *bench)
@@ -251,11 +299,13 @@ static void finish(struct bench *bench)
 {
     for (uint32_t i = 0; i < bench->move_count; i++) {
         json_decref(bench->moves[i].methods);
+        json_decref(bench->moves[i].sticking);
         free(bench->moves[i].truth);
     }
     warp_picture_finish(&bench->picture);
     free(bench->key);
     free(bench->w);
+    free(bench->sticking);
     frame_renderer_destroy(bench->renderer);
     frame_scene_destroy(bench->shared);
     bench_scene_finish(&bench->scene);

@@ -280,7 +280,7 @@ static bool reserve(struct bench *bench, struct error *error)
     for (uint32_t layer = 0; layer < LAYERS; layer++) {
         bench->colours[layer] = calloc(count, sizeof(*bench->colours[layer]));
         bench->w[layer] = calloc(count, sizeof(*bench->w[layer]));
-        view->layers[layer] = (struct warp_layer){bench->colours[layer], bench->w[layer]};
+        view->layers[layer] = (struct warp_layer){bench->colours[layer], bench->w[layer], NULL};
         done = done && bench->colours[layer] && bench->w[layer];
     }
     bench->truth = calloc((size_t)bench->width * bench->height, sizeof(*bench->truth));

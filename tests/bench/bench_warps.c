@@ -158,10 +158,12 @@ static bool make_by_client(const struct warp_view *view, struct warp_picture *pi
                               .pixels = PIXELS,
                               .layer_count = view->layer_count};
     for (uint32_t l = 0; l < view->layer_count; l++)
-        key.layers[l] = (struct fl_warp_layer){view->layers[l].colours, view->layers[l].w};
+        key.layers[l] =
+            (struct fl_warp_layer){view->layers[l].colours, view->layers[l].w, view->layers[l].sticking};
     const struct fl_warp_view wanted = {
         .width = view->width, .height = view->height, .camera = client_camera(&view->to), .quality = quality};
-    struct fl_warp_picture made = {.colours = picture->colours, .mask = picture->seen};
+    struct fl_warp_picture made = {
+        .colours = picture->colours, .mask = picture->seen, .sticking = picture->sticking};
     struct fl_warp_error error = {0};
     if (!fl_warp_set_key(picture->client, &key, &error) ||
         !fl_warp_make(picture->client, &wanted, &made, &error)) {
@@ -354,10 +356,12 @@ bool warp_picture_init(struct warp_picture *picture, uint32_t width, uint32_t he
     const size_t count = (size_t)width * height;
     *picture = (struct warp_picture){.colours = calloc(count, sizeof(*picture->colours)),
                                      .seen = calloc(count, sizeof(*picture->seen)),
+                                     .sticking = calloc(count, sizeof(*picture->sticking)),
                                      .w = calloc(count, sizeof(*picture->w)),
                                      .vertices = calloc(key_texels, 3 * sizeof(*picture->vertices)),
                                      .client = fl_warp_create(1, NULL)};
-    if (picture->colours && picture->seen && picture->w && picture->vertices && picture->client)
+    if (picture->colours && picture->seen && picture->sticking && picture->w && picture->vertices &&
+        picture->client)
         return true;
     warp_picture_finish(picture);
     return false;
@@ -367,6 +371,7 @@ void warp_picture_finish(struct warp_picture *picture)
 {
     free(picture->colours);
     free(picture->seen);
+    free(picture->sticking);
     free(picture->w);
     free(picture->vertices);
     fl_warp_destroy(picture->client);

@@ -20,6 +20,7 @@
 struct warp_layer {
     const uint32_t *colours; /* RGBA8, the red in the lowest byte */
     const float *w;          /* not negative */
+    const uint8_t *sticking; /* as of client/warp; NULL: nothing does */
 };
 
 /* What there is, and what is wanted; the caller owns the arrays. */
@@ -35,9 +36,10 @@ struct warp_view {
 /* What was made. */
 struct warp_picture {
     uint32_t *colours;
-    uint8_t *seen;   /* 1: some pixel of the view has what is here; 0: the colour is a guess */
-    float *w;        /* of mesh and splats: of what is here; negative: nothing was drawn */
-    float *vertices; /* of the mesh: x, y and w of each pixel of the key; w negative: behind the eye */
+    uint8_t *seen;     /* 1: some pixel of the view has what is here; 0: the colour is a guess */
+    uint8_t *sticking; /* of client/warp: as of its pictures */
+    float *w;          /* of mesh and splats: of what is here; negative: nothing was drawn */
+    float *vertices;   /* of the mesh: x, y and w of each pixel of the key; w negative: behind the eye */
     uint64_t processor_ns;
     uint64_t
         build_ns; /* of client/warp: the structure, which serves all pictures of a key view; not in the other */

@@ -54,6 +54,16 @@ static struct fl_frame_expected expect(const struct message_frame_begin *begin)
                                       .parts = true};
 }
 
+/* The share of a pixel is that of the first one of its block. */
+static bool whole_blocks(const struct fl_frame *frame)
+{
+    for (uint32_t y = 0; frame->sticking && y < frame->height; y++)
+        for (uint32_t x = 0; x < frame->width; x++)
+            if (frame->sticking[y * frame->width + x] != frame->sticking[(y & ~3u) * frame->width + (x & ~3u)])
+                return false;
+    return true;
+}
+
 static void check(const struct fl_frame *frame)
 {
     const size_t count = (size_t)frame->width * frame->height;
@@ -62,6 +72,7 @@ static void check(const struct fl_frame *frame)
     FUZZ_REQUIRE(!(frame->depth_step > 0.0f) || frame->depth);
     FUZZ_REQUIRE(frame->parts_come > 0 && frame->parts_come <= frame->parts);
     FUZZ_REQUIRE(!frame->depth_is_coarse || (frame->parts_come < frame->parts && frame->depth_step > 0.0f));
+    FUZZ_REQUIRE(whole_blocks(frame));
     FUZZ_REQUIRE((frame->encoded != NULL) != (frame->pixels != NULL));
     for (size_t i = 0; frame->depth && frame->depth_step > 0.0f && i < count; i++) {
         const double steps =

@@ -17,6 +17,7 @@
 
 static uint32_t colours[FL_WARP_LAYERS_MAX][SIDE_MAX * SIDE_MAX], part_colours[SIDE_MAX * SIDE_MAX];
 static float w[FL_WARP_LAYERS_MAX][SIDE_MAX * SIDE_MAX], part_w[SIDE_MAX * SIDE_MAX];
+static uint8_t sticking[SIDE_MAX * SIDE_MAX]; /* of any layer, and of parts */
 
 struct input {
     const uint8_t *next, *end;
@@ -79,23 +80,29 @@ static void require_reason(bool done, const struct fl_warp_error *error)
 static void make_view(struct fl_warp *warp, struct input *input)
 {
     static uint32_t made[PIXELS_MAX * PIXELS_MAX];
-    static uint8_t mask[PIXELS_MAX * PIXELS_MAX];
-    struct fl_warp_picture picture = {.colours = made, .mask = mask};
+    static uint8_t mask[PIXELS_MAX * PIXELS_MAX], sticks[PIXELS_MAX * PIXELS_MAX];
+    struct fl_warp_picture picture = {.colours = made, .mask = mask, .sticking = sticks};
     struct fl_warp_error error = {0};
     const struct fl_warp_view view = {.width = take(input) % PIXELS_MAX,
                                       .height = take(input) % PIXELS_MAX,
                                       .camera = take_camera(input),
                                       .quality = take(input) % 3,
                                       .holes = take(input) % 3};
-    uint32_t known = 0;
+    uint32_t known = 0, sticking_sum = 0;
     memset(mask, UNWRITTEN, sizeof(mask));
     const bool done = fl_warp_make(warp, &view, &picture, &error);
     require_reason(done, &error);
     for (uint32_t i = 0; i < sizeof(mask); i++) {
         FUZZ_REQUIRE(done && i < view.width * view.height ? mask[i] <= FL_WARP_OUTSIDE : mask[i] == UNWRITTEN);
         known += mask[i] == FL_WARP_KNOWN;
+        if (mask[i] <= FL_WARP_OUTSIDE) {
+            FUZZ_REQUIRE(mask[i] == FL_WARP_KNOWN || sticks[i] == 0);
+            sticking_sum += sticks[i];
+        }
     }
-    FUZZ_REQUIRE(!done || picture.counts.known == (float)((double)known / ((double)view.width * view.height)));
+    const double pixels = (double)view.width * view.height;
+    FUZZ_REQUIRE(!done || (picture.counts.known == (float)((double)known / pixels) &&
+                           picture.counts.sticking == (float)((double)sticking_sum / (255 * pixels))));
 }
 
 /* What was taken stands in `key`, too. */
@@ -107,7 +114,7 @@ static void update(struct fl_warp *warp, struct input *input, const struct fl_wa
                                       .y = take(input),
                                       .width = take(input) % (SIDE_MAX + 1),
                                       .height = take(input) % (SIDE_MAX + 1),
-                                      .texels = {part_colours, part_w}};
+                                      .texels = {part_colours, part_w, take(input) & 1 ? sticking : NULL}};
     take_texels(input, part.width * part.height, part_colours, part_w);
     const bool done = fl_warp_update(warp, &part, &error);
     require_reason(done, &error);
@@ -144,9 +151,11 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
                               .radius = 0.2f + take_float(&input, 0.2f),
                               .pixels = 0.5f + take_float(&input, 0.5f),
                               .layer_count = take(&input) % 5};
+    for (uint32_t i = 0; i < SIDE_MAX * SIDE_MAX; i++)
+        sticking[i] = (uint8_t)i;
     for (uint32_t l = 0; l < FL_WARP_LAYERS_MAX; l++) {
         take_texels(&input, key.width * key.height, colours[l], w[l]);
-        key.layers[l] = (struct fl_warp_layer){colours[l], w[l]};
+        key.layers[l] = (struct fl_warp_layer){colours[l], w[l], l & 1 ? sticking : NULL};
     }
     const bool is_set = fl_warp_set_key(warp, &key, &error);
     require_reason(is_set, &error);

@@ -8,8 +8,9 @@
 #include <string.h>
 #include <turbojpeg.h>
 #include <xxhash.h>
+#include <zstd.h>
 
-/* A picture of 8x4 in each of some encodings, with depth in both forms. */
+/* A picture of 8x4 in each of some encodings, with depth in both forms, one with what sticks. */
 static bool write_frame(const char *folder, int number, enum protocol_encoding encoding, bool inverse)
 {
     enum { WIDTH = 8, HEIGHT = 4, COUNT = WIDTH * HEIGHT };
@@ -46,6 +47,12 @@ static bool write_frame(const char *folder, int number, enum protocol_encoding e
                          encoded + used, sizeof(encoded) - used)
             .bytes;
     used += begin->depth_bytes;
+    if (number == 2) {
+        const uint8_t blocks[2] = {7, 3};
+        begin->attachments |= 4;
+        begin->sticking_bytes = ZSTD_compress(encoded + used, sizeof(encoded) - used, blocks, sizeof(blocks), 1);
+        used += begin->sticking_bytes;
+    }
     struct writer writer;
     writer_init(&writer, bytes + 2, sizeof(bytes) - 2 - used);
     if (!message_encode(&writer, &message))

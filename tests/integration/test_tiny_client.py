@@ -13,6 +13,7 @@ import tiny_client
 from farlight_test import Case, Daemon, farlight, frames_of
 from tiny_client import BATCH, CANCELLED, SHARED, VIEW, Client
 
+STRAIGHT = ((0, 0, 5), (0, 0, 0), (0, 1, 0), 0.8)
 ABOVE, LEFT = ((0, 1, 5), (0, 0, 0), (0, 1, 0), 0.8), ((-1, 1, 5), (0, 0, 0), (0, 1, 0), 0.8)
 JPEG = 2  # encoding
 COLOURS, DEPTH, NORMALS, COARSE_DEPTH = 0, 1, 2, 3  # frame_part_kind
@@ -378,6 +379,35 @@ class Session(Case):
             self.assertLessEqual(error, error if before is None else before)
             before = error
         self.assertEqual(before, 0)
+    def test_what_sticks_is_what_the_document_says(self):
+        """The triangle as a mirror, and as what scatters all light. Blocks at its edges, or a pixel off, are left out."""
+        for metallic, roughness, inside in ((1, 0, 7), (1, 1, 0), (0, 1, 0)):
+            blobs, edits = tiny_client.triangle()
+            mirror = tiny_client.set_material(1, (0.9, 0.9, 0.9), metallic=metallic, roughness=roughness)
+            client, (width, height) = self.connect((blobs, [mirror] + edits[1:])), (30, 21)
+            fixed = fixed_part("render", scene=1, kind=VIEW, channel=2, width=width, height=height, attachments=4,
+                               camera_path=tiny_client.CAMERA_PATH_KEYS, credit=1)
+            client.acknowledged.add(2)
+            client.ask(tiny_client.RENDER, tiny_client.payload(
+                fixed, tiny_client.array([struct.pack("<f", 0) + tiny_client.camera_bytes(STRAIGHT)]), tiny_client.array([])))
+            frame = client.next_frame()
+            begin = {name: struct.unpack_from("<" + letter, frame.fixed, offset - 2)[0]
+                     for name, (offset, letter, _) in fields_of("frame_begin").items()}
+            across, down = -(-width // 4), -(-height // 4)
+            packed = bytes(frame.pixels[frame.size_bytes:])
+            self.assertEqual((begin["attachments"], begin["sticking_bytes"]), (4, len(packed)))
+            blocks = unpack_zstd(packed, across * down)
+            pixel = 5 * 2 * math.tan(STRAIGHT[3] / 2) / height  # metres, at the triangle
+            seen = set()
+            for i, share in enumerate(blocks):
+                left, top = i % across * 4 - 1, i // across * 4 - 1
+                points = [((x - width / 2) * pixel, (height / 2 - y) * pixel) for x in range(left, left + 7)
+                          for y in range(top, top + 7)]
+                insides = {min(x + 1, y + 1, 2 - x - y) > 0 for x, y in points}
+                if len(insides) == 1:
+                    self.assertEqual(share, inside if True in insides else 0, i)
+                    seen |= insides
+            self.assertEqual(seen, {True, False})
 
     def test_blobs_that_are_there_are_not_sent_again(self):
         client = self.connect(grid_scene())

@@ -77,7 +77,7 @@ class Frame:
         (self.number, self.width, self.height, self.samples, self.revision, self.size_bytes, self.format, self.encoding,
          self.tracer, self.integrator, self.digest) = struct.unpack_from("<4I2Q4IQ", fixed)
         self.command, = struct.unpack_from("<Q", fixed, 136)
-        self.attached_bytes = sum(struct.unpack_from("<2Q", fixed, 184))  # depth and normals, behind the pixels
+        self.attached_bytes = sum(struct.unpack_from("<2Q24xQ", fixed, 184))  # depth, normals, sticking, behind the pixels
         self.parts = []  # (kind, bytes) of a frame in parts, in the order of its bytes
         self.abandoned = False
 
@@ -293,9 +293,9 @@ def camera_bytes(camera):
 
 # ---- edits
 
-def set_material(material, base_colour, roughness=1, unlit=0):
+def set_material(material, base_colour, roughness=1, unlit=0, metallic=0):
     fixed = struct.pack("<4I", material, 0, 0, unlit)
-    fixed += struct.pack("<14f", *base_colour, 1, 0, 0, 0, 0, roughness, 0, 1.5, 0, 0, 0)
+    fixed += struct.pack("<14f", *base_colour, 1, 0, 0, 0, metallic, roughness, 0, 1.5, 0, 0, 0)
     return SET_MATERIAL, payload(fixed, array([]), string(""))
 
 

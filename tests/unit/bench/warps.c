@@ -44,7 +44,7 @@ static struct warp_view view_from(float right, float ahead)
                              .layer_count = 1};
     view.to.world_from_view[3] = right;
     view.to.world_from_view[11] = -ahead;
-    view.layers[0] = (struct warp_layer){colours, w};
+    view.layers[0] = (struct warp_layer){colours, w, NULL};
     return view;
 }
 
@@ -205,7 +205,7 @@ TEST(a_second_layer_is_seen_where_the_first_one_has_a_hole)
         behind_w[i] = 1 / FAR;
     }
     view.layer_count = 2;
-    view.layers[1] = (struct warp_layer){behind, behind_w};
+    view.layers[1] = (struct warp_layer){behind, behind_w, NULL};
     for (enum warp_method method = WARP_SPLAT; method <= WARP_MESH; method++) {
         warp_picture_make(&picture, &view, method);
         for (uint32_t i = 0; i < COUNT; i++) {

@@ -3,8 +3,11 @@
 #include "lib/frame.h"
 
 #include "encode/encoder.h"
+#include "encode/sticking.h"
+#include "protocol/pixels/sticking.h"
 #include "tests/harness/test.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include <turbojpeg.h>
@@ -166,20 +169,22 @@ TEST(a_damaged_predicted_frame_is_refused)
 
 /* A frame with what is attached: *bytes is malloc'ed. */
 static struct message_frame_begin make_attached(enum protocol_encoding encoding, unsigned attachments,
-                                                const uint8_t *depth, const uint8_t *normals, uint8_t **bytes)
+                                                const uint8_t *depth, const uint8_t *normals,
+                                                const uint8_t *sticking, uint8_t **bytes)
 {
     const enum encoding numbers[] = {ENCODING_RAW, ENCODING_ZSTD, ENCODING_JPEG, ENCODING_RAW, ENCODING_PREDICTED};
     const struct picture parts[3] = {picture_of(pixels), picture_of(depth), picture_of(normals)};
-    size_t counts[3] = {0}, used = 0;
+    size_t counts[4] = {0}, used = 0;
     *bytes = malloc(4 * PIXELS_BYTES);
     assert_non_null(*bytes);
-    for (unsigned i = 0; i < 3; i++) {
+    for (unsigned i = 0; i < 4; i++) {
         uint8_t *encoded = NULL;
         struct error failure = {0};
-        if (i > 0 && (attachments & i) == 0)
+        if (i > 0 && (attachments & 1u << (i - 1)) == 0)
             continue;
-        assert_true(encoder_encode(i == 0 ? numbers[encoding] : ENCODING_PREDICTED, &parts[i], 1, &encoded,
-                                   &counts[i], &failure));
+        assert_true(i == 3 ? sticking_encode(sticking, 1, WIDTH, HEIGHT, &encoded, &counts[i], &failure)
+                           : encoder_encode(i == 0 ? numbers[encoding] : ENCODING_PREDICTED, &parts[i], 1,
+                                            &encoded, &counts[i], &failure));
         memcpy(*bytes + used, encoded, counts[i]);
         used += counts[i];
         free(encoded);
@@ -188,31 +193,38 @@ static struct message_frame_begin make_attached(enum protocol_encoding encoding,
     message.attachments = attachments;
     message.depth_bytes = counts[1];
     message.normal_bytes = counts[2];
+    message.sticking_bytes = counts[3];
     return message;
 }
 
 TEST(what_is_attached_arrives_beside_any_encoding)
 {
     float depth[WIDTH * HEIGHT];
-    uint8_t normals[PIXELS_BYTES];
-    for (size_t i = 0; i < WIDTH * HEIGHT; i++)
+    uint8_t normals[PIXELS_BYTES], sticking[WIDTH * HEIGHT];
+    for (size_t i = 0; i < WIDTH * HEIGHT; i++) {
         depth[i] = 1.5f + (float)(i % WIDTH) / 7;
+        sticking[i] = i % WIDTH < WIDTH / 2 ? 255 : 0; /* blocks of one share, which come as they are */
+    }
     for (size_t i = 0; i < sizeof(normals); i++)
         normals[i] = (uint8_t)(i * 3);
-    for (unsigned i = 0; i < 4 * PROTOCOL_ENCODING_COUNT; i++) {
-        const enum protocol_encoding encoding = (enum protocol_encoding)(i / 4);
+    for (unsigned i = 0; i < 8 * PROTOCOL_ENCODING_COUNT; i++) {
+        const enum protocol_encoding encoding = (enum protocol_encoding)(i / 8);
         struct fl_assembly assembly = some_assembly(encoding);
-        assembly.expected.attachments = i % 4;
+        assembly.expected.attachments = i % 8;
         uint8_t *bytes;
         const struct message_frame_begin message =
-            make_attached(encoding, i % 4, (const uint8_t *)depth, normals, &bytes);
-        const size_t count = (size_t)(message.size_bytes + message.depth_bytes + message.normal_bytes);
+            make_attached(encoding, i % 8, (const uint8_t *)depth, normals, sticking, &bytes);
+        const size_t count =
+            (size_t)(message.size_bytes + message.depth_bytes + message.normal_bytes + message.sticking_bytes);
         assert_true(begin(&assembly, &message) && give(&assembly, bytes, count, 0));
         struct fl_frame *frame = end(&assembly);
         assert_non_null(frame);
         assert_int_equal(frame->wire_bytes, count);
         assert_int_equal(frame->depth != NULL, (i & FL_ATTACH_DEPTH) != 0);
         assert_int_equal(frame->normals != NULL, (i & FL_ATTACH_NORMALS) != 0);
+        assert_int_equal(frame->sticking != NULL, (i & FL_ATTACH_STICKING) != 0);
+        if (frame->sticking)
+            assert_memory_equal(frame->sticking, sticking, sizeof(sticking));
         if (frame->depth)
             assert_memory_equal(frame->depth, depth, sizeof(depth));
         if (frame->normals)
@@ -305,7 +317,7 @@ TEST(attachments_that_cannot_be_are_refused)
         assembly.expected.attachments = FL_ATTACH_DEPTH;
         uint8_t *bytes;
         struct message_frame_begin message =
-            make_attached(PROTOCOL_ENCODING_RAW, FL_ATTACH_DEPTH, pixels, pixels, &bytes);
+            make_attached(PROTOCOL_ENCODING_RAW, FL_ATTACH_DEPTH, pixels, pixels, pixels, &bytes);
         message.attachments = i == 0 ? 0 : i == 1 ? 3 : message.attachments;
         message.depth_bytes = i == 2 ? 0 : i == 3 ? 4 * PIXELS_BYTES : message.depth_bytes;
         message.normal_bytes = i == 4 ? 10 : 0;
@@ -321,6 +333,69 @@ TEST(attachments_that_cannot_be_are_refused)
         fl_assembly_finish(&assembly);
         free(bytes);
     }
+}
+
+/* Behind a raw picture. */
+static struct message_frame_begin make_sticking(const uint8_t *blocks, size_t count, uint8_t **bytes)
+{
+    const size_t bound = ZSTD_compressBound(count);
+    *bytes = malloc(PIXELS_BYTES + bound);
+    assert_non_null(*bytes);
+    memcpy(*bytes, pixels, PIXELS_BYTES);
+    struct message_frame_begin message = some_begin(PROTOCOL_ENCODING_RAW, PIXELS_BYTES);
+    message.attachments = FL_ATTACH_STICKING;
+    message.sticking_bytes = ZSTD_compress(*bytes + PIXELS_BYTES, bound, blocks, count, 1);
+    return message;
+}
+
+TEST(what_cannot_be_sticking_is_refused)
+{
+    enum { BLOCKS = WIDTH / 4 * HEIGHT / 4 };
+    for (unsigned i = 0; i <= 6; i++) {
+        uint8_t blocks[BLOCKS + 1] = {0}, *bytes;
+        blocks[BLOCKS - 1] = i == 1 ? 8 : 7; /* sevenths */
+        struct fl_assembly assembly = some_assembly(PROTOCOL_ENCODING_RAW);
+        assembly.expected.attachments = FL_ATTACH_STICKING;
+        struct message_frame_begin message = make_sticking(blocks,
+                                                           i == 2   ? BLOCKS - 1
+                                                           : i == 3 ? BLOCKS + 1
+                                                                    : BLOCKS,
+                                                           &bytes);
+        bytes[PIXELS_BYTES] ^= i == 4 ? 0xff : 0;
+        message.sticking_bytes = i == 5 ? 0 : i == 6 ? UINT32_MAX : message.sticking_bytes;
+        struct fl_frame *frame = NULL;
+        if (begin(&assembly, &message) &&
+            give(&assembly, bytes, (size_t)(message.size_bytes + message.sticking_bytes), 0))
+            frame = end(&assembly);
+        assert_int_equal(frame != NULL, i == 0);
+        assert_int_equal(error.code, i == 0 ? FL_ERROR_NONE : FL_ERROR_PROTOCOL);
+        if (frame)
+            assert_true(frame->sticking[WIDTH * HEIGHT - 1] == 255 && frame->sticking[0] == 0);
+        fl_frame_destroy(frame);
+        fl_assembly_finish(&assembly);
+        free(bytes);
+    }
+}
+
+/* Blocks at the edges have what is left of the picture. */
+TEST(shares_come_as_the_means_of_their_blocks_within_half_a_step)
+{
+    enum { ACROSS = 13, DOWN = 7 };
+    uint8_t shares[2 * ACROSS * DOWN], blocks[4 * 2], restored[ACROSS * DOWN];
+    for (uint32_t i = 0; i < ACROSS * DOWN; i++)
+        shares[2 * i] = (uint8_t)(i * 37);
+    sticking_round(shares, 2, ACROSS, DOWN, blocks);
+    assert_true(sticking_restore(blocks, ACROSS, DOWN, restored));
+    for (uint32_t y = 0; y < DOWN; y++)
+        for (uint32_t x = 0; x < ACROSS; x++) {
+            double sum = 0, count = 0;
+            for (uint32_t i = 0; i < ACROSS * DOWN; i++)
+                if (i % ACROSS / 4 == x / 4 && i / ACROSS / 4 == y / 4) {
+                    sum += shares[2 * i];
+                    count++;
+                }
+            assert_true(fabs(restored[y * ACROSS + x] - sum / count) <= 255 / 14.0 + 0.5);
+        }
 }
 
 static unsigned long make_jpeg(unsigned width, unsigned height, uint8_t **packed)

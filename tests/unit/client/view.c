@@ -369,6 +369,28 @@ TEST(how_first_hits_are_found_is_left_to_a_daemon_that_can_choose)
     }
 }
 
+static void play_marking(struct daemon *daemon)
+{
+    play_with(daemon, HANDSHAKE_CAN_MARK_STICKING);
+}
+
+TEST(a_daemon_that_cannot_mark_what_sticks_is_not_asked_to)
+{
+    for (int can = 0; can <= 1; can++) {
+        struct daemon *daemon = start(can ? play_marking : play_older);
+        struct fl_scene scene = {.connection = connect_to(daemon), .scene = 1};
+        struct message_render options = fl_view_defaults();
+        options.attachments = FL_ATTACH_DEPTH | FL_ATTACH_STICKING;
+        memset(&seen, 0, sizeof(seen));
+        struct fl_view *view = fl_view_start(&scene, &options, &error);
+        assert_non_null(view);
+        fl_view_destroy(view);
+        fl_connection_destroy(scene.connection);
+        stop(daemon);
+        assert_int_equal(seen.first.attachments, can ? FL_ATTACH_DEPTH | FL_ATTACH_STICKING : FL_ATTACH_DEPTH);
+    }
+}
+
 TEST(a_job_runs_beside_a_view_and_each_gets_its_own_frames)
 {
     struct viewing viewing;

@@ -126,21 +126,24 @@ TEST(what_is_attached_lies_behind_the_picture)
 {
     struct fixture fixture;
     begin(&fixture, 2);
-    for (uint32_t attachments = 0; attachments <= 3; attachments++) {
+    for (uint32_t attachments = 0; attachments <= 7; attachments++) {
         struct engine_frame *made = new_frame(attachments % 2 ? ENCODING_H264 : ENCODING_RAW, attachments);
         const size_t plane_bytes = (size_t)4 * WIDTH * HEIGHT;
         made->result.attachments = attachments;
-        made->result.pixels = realloc(made->result.pixels, 3 * plane_bytes);
+        made->result.pixels = realloc(made->result.pixels, 4 * plane_bytes);
         assert_non_null(made->result.pixels);
-        memset(made->result.pixels + plane_bytes, 3, 2 * plane_bytes);
+        memset(made->result.pixels + plane_bytes, 3, 3 * plane_bytes);
         uint64_t position = job_output_reserve(fixture.output);
         assert_true(encode_pool_submit(fixture.pool, fixture.output, fixture.lane, position, made));
         struct engine_event *event = next(&fixture);
         const struct engine_frame *frame = event->frame;
         assert_int_equal(frame->depth_bytes > 0, (attachments & 1u << ATTACHMENT_DEPTH) != 0);
         assert_int_equal(frame->normal_bytes > 0, (attachments & 1u << ATTACHMENT_NORMALS) != 0);
-        assert_true(frame->depth_bytes < 200 && frame->normal_bytes < 200); /* planes that are the same all over */
-        size_t picture_bytes = frame->size_bytes - frame->depth_bytes - frame->normal_bytes;
+        assert_int_equal(frame->sticking_bytes > 0, (attachments & 1u << ATTACHMENT_STICKING) != 0);
+        /* Planes that are the same all over. */
+        assert_true(frame->depth_bytes < 200 && frame->normal_bytes < 200 && frame->sticking_bytes < 200);
+        size_t picture_bytes =
+            frame->size_bytes - frame->depth_bytes - frame->normal_bytes - frame->sticking_bytes;
         if (frame->encoding == ENCODING_RAW)
             assert_int_equal(picture_bytes, plane_bytes);
         const uint8_t *behind = frame->bytes + picture_bytes, magic[] = {0x28, 0xb5, 0x2f, 0xfd}; /* Zstandard's */
@@ -148,6 +151,8 @@ TEST(what_is_attached_lies_behind_the_picture)
             assert_memory_equal(behind, magic, sizeof(magic));
         if (frame->normal_bytes)
             assert_memory_equal(behind + frame->depth_bytes, magic, sizeof(magic));
+        if (frame->sticking_bytes)
+            assert_memory_equal(behind + frame->depth_bytes + frame->normal_bytes, magic, sizeof(magic));
         engine_event_destroy(event);
     }
     end(&fixture);

@@ -128,12 +128,14 @@ static void say_frame_of(uint32_t request, uint32_t number, uint64_t command, si
     port_say(frame_of(request, number, command, bytes));
 }
 
-static void say_frame_with(uint32_t request, uint32_t number, size_t depth_bytes, size_t normal_bytes)
+static void say_frame_with(uint32_t request, uint32_t number, size_t depth_bytes, size_t normal_bytes,
+                           size_t sticking_bytes)
 {
     struct engine_event *made = frame_of(request, number, 0, FRAME_BYTES);
-    made->frame->result.attachments = 1u << ATTACHMENT_DEPTH | 1u << ATTACHMENT_NORMALS;
+    made->frame->result.attachments = (1u << ATTACHMENT_COUNT) - 1;
     made->frame->depth_bytes = depth_bytes;
     made->frame->normal_bytes = normal_bytes;
+    made->frame->sticking_bytes = sticking_bytes;
     made->frame->depth_step = 0.25f;
     made->frame->margin_x = 7;
     made->frame->margin_y = 5;
@@ -517,6 +519,11 @@ SESSION_TEST(a_frame_that_is_still_needed_is_not_abandoned)
 TEST_WITH(a_daemon_says_that_it_can_choose_how_first_hits_are_found, set_up_ungreeted, tear_down)
 {
     assert_true(greet_with(HANDSHAKE_CAN_CHOOSE_PRIMARY) & HANDSHAKE_CAN_CHOOSE_PRIMARY);
+}
+
+TEST_WITH(a_daemon_says_that_it_can_mark_what_sticks, set_up_ungreeted, tear_down)
+{
+    assert_true(greet_with(HANDSHAKE_CAN_MARK_STICKING) & HANDSHAKE_CAN_MARK_STICKING);
 }
 
 TEST_WITH(a_client_that_does_not_allow_abandoned_frames_gets_complete_frames, set_up_ungreeted, tear_down)
@@ -1015,7 +1022,7 @@ SESSION_TEST(attachments_of_a_view_are_forwarded_and_announced)
     message.render.attachments = 1;
     expect_refused(2, &message, PROTOCOL_ERROR_UNSUPPORTED, "render.attachments");
     message = view_message(4);
-    message.render.attachments = 3;
+    message.render.attachments = 7;
     message.render.depth_form = PROTOCOL_DEPTH_FORM_INVERSE;
     message.render.depth_pixels = 2;
     message.render.depth_radius = 0.5f;
@@ -1023,15 +1030,17 @@ SESSION_TEST(attachments_of_a_view_are_forwarded_and_announced)
     struct engine_command *command = told(ENGINE_JOB_START);
     assert_int_equal(command->job.depth.form, DEPTH_FORM_INVERSE);
     assert_true(command->job.depth.pixels == 2.0f && command->job.depth.radius == 0.5f);
-    assert_int_equal(command->job.frame.attachments, 1u << ATTACHMENT_DEPTH | 1u << ATTACHMENT_NORMALS);
+    assert_int_equal(command->job.frame.attachments,
+                     1u << ATTACHMENT_DEPTH | 1u << ATTACHMENT_NORMALS | 1u << ATTACHMENT_STICKING);
     engine_command_destroy(command);
-    say_frame_with(3, 1, 30, 20);
+    say_frame_with(3, 1, 30, 20, 10);
     struct message_frame_begin begin;
     expect_frame(3, 1, &begin);
-    assert_int_equal(begin.attachments, 3);
-    assert_int_equal(begin.size_bytes, FRAME_BYTES - 50);
+    assert_int_equal(begin.attachments, 7);
+    assert_int_equal(begin.size_bytes, FRAME_BYTES - 60);
     assert_int_equal(begin.depth_bytes, 30);
     assert_int_equal(begin.normal_bytes, 20);
+    assert_int_equal(begin.sticking_bytes, 10);
     assert_int_equal(begin.depth_form, PROTOCOL_DEPTH_FORM_INVERSE);
     assert_true(begin.depth_step == 0.25f);
     assert_true(begin.margin_x == 7 && begin.margin_y == 5);

@@ -135,6 +135,30 @@ TEST(a_picture_is_due_by_time_by_way_and_by_what_is_not_seen)
     assert_true(plan_is_due(&need));
 }
 
+/* At half of the colours and more as often as pictures of motion come at most; unseen pixels count as before. */
+TEST(a_picture_is_due_sooner_where_mirrors_and_glass_fill_it)
+{
+    const struct {
+        double sticking;
+        uint64_t ns;
+        double gone;
+    } rows[] = {{0, 250 * MS, 0.5}, {0.25, 175 * MS, 0.35}, {0.5, 100 * MS, 0.2}, {1, 100 * MS, 0.2}};
+    for (size_t i = 0; i < sizeof(rows) / sizeof(rows[0]); i++) {
+        struct plan_need need = {.radius = 1, .sticking = rows[i].sticking};
+        need.since_asked_ns = rows[i].ns - MS;
+        need.gone = rows[i].gone - 0.01;
+        assert_false(plan_is_due(&need));
+        need.since_asked_ns += 2 * MS;
+        assert_true(plan_is_due(&need));
+        need.since_asked_ns = 0;
+        need.gone += 0.02;
+        assert_true(plan_is_due(&need));
+        need.gone = 0;
+        need.unseen = 0.031;
+        assert_true(plan_is_due(&need));
+    }
+}
+
 /* ---- in which quality ---- */
 
 TEST(slow_views_step_down_and_the_tree_is_tried_less_and_less_often)

@@ -61,14 +61,18 @@ TEST(a_view_is_of_the_newest_picture_and_the_newest_camera)
     assert_non_null(views);
     const uint64_t first = want(views, 0);
     assert_false(views_take(views, &picture, &made)); /* of what? */
+    key.sticking = malloc(EDGE * EDGE);
+    assert_non_null(key.sticking);
+    memset(key.sticking, 51, EDGE * EDGE); /* a fifth */
     views_give_key(views, &key);
-    assert_true(!key.depth && !key.picture.pixels); /* taken over */
+    assert_true(!key.depth && !key.sticking && !key.picture.pixels); /* taken over */
     do
         wait_for(views, &picture, &made);
     while (!views_is_best(views, &made, first));
     assert_true(made.wish == first && made.quality == FL_WARP_TREE);
     assert_true(picture.width == EDGE && picture.height == EDGE && grey_of(&picture) == 100);
     assert_true(made.counts.known > 0.99f);
+    assert_float_equal(made.counts.sticking, 0.2f, 0.01f);
     /* A newer camera, a newer picture: each makes another view, at last of both. */
     const uint64_t second = want(views, 0.1f);
     key = some_key(50);

@@ -38,7 +38,7 @@ TEST(a_context_without_a_key_view_makes_nothing)
     static struct made made;
     struct fl_warp_picture picture = {.colours = made.colours, .mask = made.mask};
     const struct fl_warp_view view = view_of(camera_turned(0, 0), FL_WARP_TREE);
-    const struct fl_warp_part part = {.width = 1, .height = 1, .texels = {key_colours[0], key_w[0]}};
+    const struct fl_warp_part part = {.width = 1, .height = 1, .texels = {key_colours[0], key_w[0], NULL}};
     uint32_t count;
     expect_refused(fl_warp_make(warp, &view, &picture, &error), &error, "view");
     expect_refused(fl_warp_update(warp, &part, &error), &error, "part");
@@ -153,16 +153,16 @@ TEST(a_part_beyond_the_layer_is_refused_and_changes_nothing)
     };
     for (size_t i = 0; i < sizeof(wrong) / sizeof(wrong[0]); i++) {
         struct fl_warp_part part = wrong[i];
-        part.texels = (struct fl_warp_layer){key_colours[0], key_w[0]};
+        part.texels = (struct fl_warp_layer){key_colours[0], key_w[0], NULL};
         expect_refused(fl_warp_update(warp, &part, &error), &error, "part");
     }
-    struct fl_warp_part part = {.layer = 2, .width = 1, .height = 1, .texels = {key_colours[0], key_w[0]}};
+    struct fl_warp_part part = {.layer = 2, .width = 1, .height = 1, .texels = {key_colours[0], key_w[0], NULL}};
     expect_refused(fl_warp_update(warp, &part, &error), &error, "layer");
     part = (struct fl_warp_part){.width = 2, .height = 2};
     expect_refused(fl_warp_update(warp, &part, &error), &error, "texels");
     static const uint32_t colours[4] = {1, 2, 3, 4};
     static const float w[4] = {0.5f, 0.5f, 0.5f, NAN};
-    part.texels = (struct fl_warp_layer){colours, w};
+    part.texels = (struct fl_warp_layer){colours, w, NULL};
     expect_refused(fl_warp_update(warp, &part, &error), &error, "w");
     make(warp, &view, &after);
     assert_memory_equal(before.colours, after.colours, sizeof(before.colours));

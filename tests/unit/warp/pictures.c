@@ -204,6 +204,65 @@ TEST(a_hole_has_the_colour_of_the_background_and_a_pattern_if_that_is_wanted)
     fl_warp_destroy(warp);
 }
 
+/* What of the mask is known is as in the test above; where nothing is known nothing sticks. Left of where the near
+ * plane was the iteration may find it or the wall. */
+TEST(what_sticks_moves_with_its_texels)
+{
+    static uint8_t given[COUNT], sticking[COUNT];
+    set_screen();
+    for (uint32_t i = 0; i < COUNT; i++)
+        given[i] = (uint8_t)(is_near(i % WIDTH) ? 55 + i % 200 : 10);
+    struct fl_warp_key key = key_of(1);
+    key.layers[0].sticking = given;
+    struct fl_warp *warp = warp_with(1, &key);
+    struct fl_warp_error error = {0};
+    struct fl_warp_picture picture = {.colours = made.colours, .mask = made.mask, .sticking = sticking};
+    for (enum fl_warp_quality quality = FL_WARP_TREE; quality <= FL_WARP_ITERATIVE; quality++) {
+        const struct fl_warp_view view = view_of(camera_at(ASIDE, 0, 0), quality);
+        const uint32_t left = quality == FL_WARP_TREE ? NEAR_LEFT - NEAR_SHIFT : NEAR_LEFT;
+        double sum = 0;
+        assert_true(fl_warp_make(warp, &view, &picture, &error));
+        for (uint32_t i = 0; i < COUNT; i++) {
+            const uint32_t x = i % WIDTH;
+            sum += sticking[i];
+            if (x >= left && x < NEAR_RIGHT - NEAR_SHIFT - 1) /* its last column may be the wall */
+                assert_int_equal(sticking[i], given[i + NEAR_SHIFT]);
+            else if (made.mask[i] != FL_WARP_KNOWN)
+                assert_int_equal(sticking[i], 0);
+            else if (x < NEAR_LEFT - NEAR_SHIFT - 1 || x > NEAR_RIGHT)
+                assert_int_equal(sticking[i], 10);
+        }
+        assert_true(fabs((double)picture.counts.sticking - sum / (255.0 * COUNT)) < 1e-6);
+    }
+    fl_warp_destroy(warp);
+}
+
+TEST(a_part_that_comes_without_marks_does_not_stick)
+{
+    static uint8_t given[COUNT], sticking[COUNT];
+    set_plane((const double[3]){0.4, 0, 0});
+    memset(given, 255, sizeof(given));
+    struct fl_warp_key key = key_of(1);
+    struct fl_warp *warp = warp_with(1, &key);
+    struct fl_warp_error error = {0};
+    struct fl_warp_picture picture = {.colours = made.colours, .mask = made.mask, .sticking = sticking};
+    const struct fl_warp_view view = view_of(key.camera, FL_WARP_TREE);
+    struct fl_warp_part part = {
+        .width = WIDTH, .height = 20, .texels = {.colours = key_colours[0], .w = key_w[0], .sticking = given}};
+    assert_true(fl_warp_make(warp, &view, &picture, &error) && picture.counts.sticking == 0);
+    assert_true(fl_warp_update(warp, &part, &error));
+    part.height = 10;
+    part.texels.sticking = NULL;
+    assert_true(fl_warp_update(warp, &part, &error) && fl_warp_make(warp, &view, &picture, &error));
+    for (uint32_t i = 0; i < COUNT; i++)
+        assert_int_equal(sticking[i], i / WIDTH >= 10 && i / WIDTH < 20 ? 255 : 0);
+    assert_float_equal(picture.counts.sticking, 10.0 / HEIGHT, 1e-6);
+    /* Nor do those of another key. */
+    assert_true(fl_warp_set_key(warp, &key, &error) && fl_warp_make(warp, &view, &picture, &error));
+    assert_true(picture.counts.sticking == 0);
+    fl_warp_destroy(warp);
+}
+
 TEST(no_colour_crosses_the_edge_of_a_surface)
 {
     set_screen();

@@ -281,7 +281,7 @@ TEST(an_update_of_a_rectangle_equals_the_build_anew)
     struct fl_warp_key key = key_of(2);
     struct fl_warp *warp = warp_with(2, &key);
     for (int round = 0; round < 60; round++) {
-        struct fl_warp_part part = {.layer = random_bits(&seed) & 1, .texels = {colours, w}};
+        struct fl_warp_part part = {.layer = random_bits(&seed) & 1, .texels = {colours, w, NULL}};
         struct fl_warp_error error = {0};
         part.x = random_bits(&seed) % WIDTH;
         part.y = random_bits(&seed) % HEIGHT;
@@ -333,7 +333,7 @@ TEST(a_layer_that_comes_later_equals_one_that_was_there)
     struct fl_warp *warp = warp_with(2, &both), *anew = warp_with(1, &both);
     struct fl_warp_error error = {0};
     uint32_t count;
-    const struct fl_warp_layer none = {key_colours[1], NULL};
+    const struct fl_warp_layer none = {key_colours[1], NULL, NULL};
     assert_true(fl_warp_set_key(warp, &first, &error) && !fl_warp_nodes(warp, 1, &count));
     assert_false(fl_warp_add_layer(warp, &none, &error));
     assert_string_equal(error.field, "layers");

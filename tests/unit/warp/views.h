@@ -59,7 +59,7 @@ static inline struct fl_warp_key key_of(uint32_t layers)
                               .pixels = 0.25f,
                               .layer_count = layers};
     for (uint32_t l = 0; l < layers; l++)
-        key.layers[l] = (struct fl_warp_layer){key_colours[l], key_w[l]};
+        key.layers[l] = (struct fl_warp_layer){key_colours[l], key_w[l], NULL};
     return key;
 }
 

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: MIT
+// How much of what is seen of a surface follows the eye: the share of its radiance that mirrors, glass and highlights
+// have in it, if
+//
+//   all lights shine without shadows, from their middles,
+//   and as much light as they and the environment bring there comes from all around, in equal parts
+//
+// What is mirrored counts by the share that the mirror ray carries: the rough rest is blurred, and hardly changes within
+// the radius of a key view. What is refracted counts whole, as a window turns light by a fraction of what its facets are
+// turned. What blended surfaces let through counts as well: it lies behind the surface.
+//
+// Defines: those of common/material.glsl and common/light.glsl.
+
+#include "common/environment.glsl"
+#include "common/light.glsl"
+#include "common/scattering.glsl"
+
+float luminance(vec3 colour)
+{
+    return dot(colour, vec3(0.2126, 0.7152, 0.0722));
+}
+
+// Of a surface that is not glass seen from inside: the highlights, and what the lights bring from all around together.
+vec2 light_of_lights(surface s, split parts, vec3 view, float NoV)
+{
+    vec2 sum = vec2(0.0);
+    parts.scattered = vec3(0.0);
+    for (uint i = 0u; i < frame.light_count; i++) {
+        light_sample sampled = light_sample_at(i, s.position, vec2(0.5));
+        vec3 irradiance = sampled.irradiance * max(dot(s.normal, sampled.direction), 0.0);
+        sum += vec2(luminance(brdf(s, parts, view, NoV, sampled.direction) * irradiance),
+                    luminance(irradiance) * INVERSE_PI);
+    }
+    return sum;
+}
+
+float sticking_of(surface s, vec3 direction)
+{
+    if (s.unlit)
+        return 1.0 - s.alpha;
+    float NoV = clamp(-dot(s.normal, direction), 1e-4, 1.0); // a shading normal may lean away
+    split parts = split_light(s, NoV);
+    vec2 lit = s.inside && s.transmission > 0.0 ? vec2(0.0) : light_of_lights(s, parts, -direction, NoV);
+    float around = lit.y + luminance(environment_irradiance(s.normal));
+    around = around > 0.0 ? around : 1.0;
+    float mirrored = around * luminance(parts.mirror) + lit.x, refracted = around * luminance(parts.refracted);
+    float all = mirrored + refracted + around * luminance(parts.scattered) + luminance(s.emission);
+    float sticks = parts.mirror_ray * mirrored + refracted;
+    return 1.0 - s.alpha * (1.0 - (all > 0.0 ? min(sticks / all, 1.0) : 0.0)); // also if it is NaN
+}
