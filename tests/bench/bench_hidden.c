@@ -6,6 +6,8 @@
  * one a run; the contenders take turns, and each run is of another camera, so that nothing is kept. Views are made
  * by client/warp from raycast pictures without a margin. Exit status: 1 failed, 2 usage. */
 #include "tests/bench/bench.h"
+#include "encode/depth.h"
+#include "encode/encoder.h"
 #include "tests/bench/bench_options.h"
 #include "tests/bench/bench_scene.h"
 #include "tests/bench/bench_stats.h"
@@ -24,6 +26,7 @@ static const char usage[] = "usage: bench hidden --model FILE | --family TRIANGL
 
 #define MARGIN 0.1f
 #define RADIUS 0.15f
+#define PIXELS 0.25f
 #define STEP_M 0.001f /* between the cameras of two runs */
 
 struct contender {
@@ -44,6 +47,8 @@ static const struct contender contenders[] = {
 static const float moves[][3] = {{0.065f, 0.0f, 0.0f}, {0.15f, 0.0f, 0.05f}};
 #define MOVES (sizeof(moves) / sizeof(moves[0]))
 
+#define WITH_MARGIN 2u /* of them */
+
 struct bench {
     struct gpu_device *device;
     struct bench_scene_options scene_options;
@@ -51,7 +56,7 @@ struct bench {
     struct frame_scene *shared;
     struct frame_renderer *renderer;
     uint32_t width, height, runs;
-    struct bench_runs costs[CONTENDERS];
+    struct bench_runs costs[CONTENDERS], coding; /* of the depths with a margin */
 };
 
 /* ---- pictures ---- */
@@ -89,6 +94,37 @@ static bool render(struct bench *bench, const struct contender *what, const stru
     return progress == FRAME_DONE;
 }
 
+/* As they travel. */
+static bool code_depths(struct bench *bench, const struct frame_result *result, const struct frame_camera *camera,
+                        bool is_noted, struct error *error)
+{
+    const struct depth_picture depths = {
+        .depths = (const float *)(const void *)frame_result_attachment(result, ATTACHMENT_DEPTH),
+        .width = result->width,
+        .height = result->height,
+        .fov_y = camera->fov_y,
+        .pixels = PIXELS,
+        .radius = RADIUS};
+    const uint64_t begin_ns = bench_processor_ns();
+    uint16_t *rounded = NULL;
+    uint8_t *encoded = NULL;
+    size_t bytes = 0;
+    float step;
+    bool good = depth_round(&depths, &rounded, &step, error);
+    if (good && rounded) {
+        const struct picture picture = {.width = result->width,
+                                        .height = result->height,
+                                        .bytes_per_pixel = sizeof(*rounded),
+                                        .pixels = (const uint8_t *)rounded};
+        good = encoder_encode(ENCODING_PREDICTED, &picture, 1, &encoded, &bytes, error);
+    }
+    if (is_noted)
+        bench_add(&bench->coding, bench_processor_ns() - begin_ns);
+    free(rounded);
+    free(encoded);
+    return good;
+}
+
 static bool measure_costs(struct bench *bench, struct error *error)
 {
     for (unsigned run = 0; run <= bench->runs; run++)
@@ -101,7 +137,10 @@ static bool measure_costs(struct bench *bench, struct error *error)
                 return false;
             if (run > 0)
                 bench_add(&bench->costs[i], bench_processor_ns() - begin_ns);
+            const bool good = i != WITH_MARGIN || code_depths(bench, &result, &camera, run > 0, error);
             frame_result_finish(&result);
+            if (!good)
+                return false;
         }
     return true;
 }
@@ -112,6 +151,8 @@ static json_t *costs_json(const struct bench *bench)
     for (size_t i = 0; i < CONTENDERS; i++)
         json_array_append_new(costs, json_pack("{s:s, s:o}", "name", contenders[i].name, "cpu_ns",
                                                bench_times_json(&bench->costs[i])));
+    json_array_append_new(
+        costs, json_pack("{s:s, s:o}", "name", "coding of depths", "cpu_ns", bench_times_json(&bench->coding)));
     return costs;
 }
 
