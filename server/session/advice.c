@@ -150,7 +150,6 @@ static struct limits limits_of(const struct pacing *pacing, double room)
     };
 }
 
-/* With the best quality that fits, where some does; else the least. */
 static void lower_quality(const struct pacing *pacing, const struct limits *limits, unsigned minimum,
                           struct pacing_advice *advice)
 {
@@ -176,25 +175,30 @@ static struct pacing_advice full_advice(const struct pacing *pacing, unsigned qu
         .scale_eighths = PACING_SCALE_FULL, .quality = quality_wanted, .samples = samples_of(pacing)};
 }
 
-/* The best step that fits `room` times. */
+/* With the least quality. */
+static bool fits(const struct pacing *pacing, const struct limits *limits, unsigned minimum,
+                 struct pacing_advice advice)
+{
+    advice.quality = minimum;
+    return render_ns_of(pacing, &advice) <= limits->render_ns &&
+           bytes_of(pacing, &advice) <= limits->smaller_bytes;
+}
+
+/* The best step that fits `room` times; else the smallest. */
 static struct pacing_advice best_that_fits(const struct pacing *pacing, unsigned quality_wanted, double room)
 {
     const struct limits limits = limits_of(pacing, room);
     const unsigned minimum = quality_wanted < PACING_QUALITY_MIN ? quality_wanted : PACING_QUALITY_MIN;
     struct pacing_advice advice = full_advice(pacing, quality_wanted);
-    if (pacing_makes_views(&pacing->terms))
-        give_up_extras(pacing, &limits, &advice);
     for (size_t i = 0; i < SCALES; i++) {
+        advice = full_advice(pacing, quality_wanted);
         advice.scale_eighths = scales_eighths[i];
-        advice.quality = minimum;
-        const bool is_last = i == SCALES - 1;
-        if (is_last || (render_ns_of(pacing, &advice) <= limits.render_ns &&
-                        bytes_of(pacing, &advice) <= limits.smaller_bytes)) {
-            advice.quality = quality_wanted;
-            lower_quality(pacing, &limits, minimum, &advice);
+        if (pacing_makes_views(&pacing->terms))
+            give_up_extras(pacing, &limits, &advice); /* a smaller picture may have what a larger one did not */
+        if (fits(pacing, &limits, minimum, advice))
             break;
-        }
     }
+    lower_quality(pacing, &limits, minimum, &advice);
     return advice;
 }
 

@@ -510,6 +510,9 @@ TEST(pictures_for_views_are_smaller_only_where_they_take_a_quarter_of_a_second)
     assert_true(advice.margin_halves_less == 2 && advice.scale_eighths == 8);
     advice = settle_on_renderer(400e6);
     assert_true(advice.margin_halves_less == 2 && advice.scale_eighths == 6 && advice.quality == 90);
+    advice =
+        settle_on_renderer(600e6); /* 338 ms at three quarters; half of the size with all of its margin is 216 */
+    assert_true(advice.margin_halves_less == 0 && advice.scale_eighths == 4 && advice.samples == 1);
 }
 
 /* Where the link is just enough for a step, and pictures differ by a tenth, steps do not alternate. */
