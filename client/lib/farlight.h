@@ -351,7 +351,9 @@ struct fl_frame {
     /* Of what moves: pixels on each side beyond the picture that was asked for; width, height and fov_y are of
      * all. */
     uint32_t margin_x, margin_y;
-    uint32_t hidden_layer; /* how many surfaces hide what it shows, of the picture of_frame; 0: it is a picture */
+    /* How many surfaces hide what it shows, of the picture of_frame, at half of its width and height, rounded up;
+     * 0: it is a picture. */
+    uint32_t hidden_layer;
     uint32_t of_frame;
     uint8_t *normals;    /* width * height * 4; see messages.def; NULL: none */
     uint8_t *sticking;   /* width * height; likewise */

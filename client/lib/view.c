@@ -3,6 +3,7 @@
 #include "lib/frame.h"
 #include "lib/scene.h"
 #include "protocol/common/clock.h"
+#include "protocol/common/margin.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -76,11 +77,6 @@ static bool tell_credit(struct fl_view *view, struct fl_error *error)
     return fl_connection_send(view->connection, 0, 0, &credit, error);
 }
 
-static uint32_t margin_of(const struct message_render *render, uint32_t pixels)
-{
-    return (uint32_t)(render->margin * (float)pixels);
-}
-
 /* One more render on the view's channel. */
 static bool ask(struct fl_view *view, const struct message_render *wanted, struct fl_error *error)
 {
@@ -99,10 +95,10 @@ static bool ask(struct fl_view *view, const struct message_render *wanted, struc
                                                  .layers = FL_LAYERS_PICTURE,
                                                  .attachments = render->attachments,
                                                  .is_view = true,
-                                                 .margin_x_max = margin_of(render, render->width),
+                                                 .margin_x_max = margin_pixels(render->margin, render->width),
                                                  .hidden_layers = render->hidden_layers,
                                                  .parts = render->parts != 0,
-                                                 .margin_y_max = margin_of(render, render->height)};
+                                                 .margin_y_max = margin_pixels(render->margin, render->height)};
     if (!fl_connection_send(view->connection, asked->request, 0, &message, error))
         return false;
     view->asked_count++;

@@ -56,18 +56,11 @@ static void key_finish(struct views_key *key)
     key->sticking = NULL;
 }
 
-static void layer_finish(struct views_layer *layer)
-{
-    pixmap_finish(&layer->picture);
-    free(layer->depth);
-    layer->depth = NULL;
-}
-
 /* With the lock. */
 static void drop_layers(struct views *views)
 {
     while (views->given_layer_count > 0)
-        layer_finish(&views->given_layers[--views->given_layer_count]);
+        views_layer_finish(&views->given_layers[--views->given_layer_count]);
 }
 
 /* ---- in the thread, without the lock ---- */
@@ -114,13 +107,13 @@ static bool set_key(struct views *views, struct views_key *came, struct fl_warp_
 static bool add_layer(struct views *views, struct views_layer *came, bool *added, struct fl_warp_error *error)
 {
     const struct pixmap *picture = &came->picture;
-    const bool fits = picture->width == views->key_width && picture->height == views->key_height;
+    const bool fits = views_layer_fit(came, views->key_width, views->key_height);
     const struct fl_warp_layer layer = {.colours = (const uint32_t *)(const void *)picture->pixels,
                                         .w = came->depth};
     if (fits)
         invert(came->depth, (size_t)picture->width * (size_t)picture->height, unit_of(&views->key));
     *added = fits && fl_warp_add_layer(views->warp, &layer, error);
-    layer_finish(came);
+    views_layer_finish(came);
     return *added || !fits;
 }
 
@@ -313,7 +306,7 @@ void views_give_layer(struct views *views, struct views_layer *layer)
     if (views->given_layer_count < FL_WARP_LAYERS_MAX - 1)
         views->given_layers[views->given_layer_count++] = *layer;
     else
-        layer_finish(layer);
+        views_layer_finish(layer);
     pthread_cond_signal(&views->changed);
     pthread_mutex_unlock(&views->lock);
     *layer = (struct views_layer){0};

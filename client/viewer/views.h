@@ -4,6 +4,7 @@
 #ifndef FARLIGHT_CLIENT_VIEWER_VIEWS_H
 #define FARLIGHT_CLIENT_VIEWER_VIEWS_H
 
+#include "viewer/layer.h"
 #include "viewer/pixmap.h"
 #include "viewer/plan.h"
 
@@ -19,12 +20,6 @@ struct views_key {
     float radius;     /* metres round its eye */
     bool is_final;    /* nothing better of this camera will come */
     uint64_t came_ns; /* when it had arrived */
-};
-
-/* What surfaces hide from the camera of a key: one texel for each of its own. */
-struct views_layer {
-    struct pixmap picture;
-    float *depth; /* malloc'ed */
 };
 
 /* What is wanted. */
@@ -51,7 +46,7 @@ void views_destroy(struct views *views);
 
 /* Takes over the picture's pixels and the depths; what came before is outdated. */
 void views_give_key(struct views *views, struct views_key *key);
-/* Of the last key that was given; likewise. One of another size is dropped. */
+/* Of the last key that was given; likewise. One that does not fit it is dropped. */
 void views_give_layer(struct views *views, struct views_layer *layer);
 void views_forget_keys(struct views *views); /* of a connection that is gone */
 /* Views of it are made until another is wanted or none: one for each key; first one in time, then the best.

@@ -234,6 +234,7 @@ struct engine_frame {
     uint64_t encoded_ns;              /* clock_now_ns() when it was ready to be sent */
     unsigned quality;                 /* it was encoded with; 0: lossless */
     unsigned scale_eighths;           /* of the width and height that the job asks for; 0: all of it */
+    unsigned margin_halves_less;      /* of the job's margin, as of struct view_effort */
     uint64_t wanted_bytes;            /* that it may have, for an encoder that can be told; 0: not known */
     bool wants_key;                   /* it is to be encoded so that it can be decoded without those before .. */
     bool key_frame;                   /* .. and so it was */

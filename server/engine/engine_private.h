@@ -11,6 +11,7 @@
 #include "engine/backend.h"
 #include "engine/encode_pool.h"
 #include "engine/engine.h"
+#include "engine/hidden_budget.h"
 #include "engine/keep.h"
 #include "engine/output.h"
 #include "engine/scheduler.h"
@@ -99,7 +100,11 @@ struct view {
     bool refining;               /* it shows nothing that was not shown */
     uint32_t margin_x, margin_y; /* pixels on each side */
     uint32_t hidden_layer;       /* of the frame in progress, or the next one */
-    uint32_t picture;            /* number of the last frame that was none of a hidden layer */
+    bool hidden_is_paid;         /* such frames need not wait until nothing else is to be done */
+    struct hidden_budget hidden_budget;
+    uint64_t hidden_ns; /* that the layers of this picture took so far */
+    uint64_t begun_ns;  /* of the last picture while it moved; 0: none */
+    uint32_t picture;   /* number of the last frame that was none of a hidden layer */
     /* If some of its frames are a stream; NULL: none are. */
     struct encode_lane *lane;
     bool owes_key_frame; /* it was wished and has not come */

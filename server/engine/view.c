@@ -7,6 +7,7 @@
 
 #include "base/clock.h"
 #include "base/log.h"
+#include "protocol/common/margin.h"
 
 #include <math.h>
 
@@ -14,14 +15,16 @@
 /* How long before the encoder is expected to be free a frame is finished: it is hardly older for that, and an
  * encoder that is faster than last time need not wait. */
 #define EARLY_NS UINT64_C(500000)
-/* While pictures take longer than that, what is hidden in one does not keep a newer one waiting. */
-#define HIDDEN_WAIT_NS UINT64_C(250000000)
+/* Nothing was wished for so long that motion is about to end: what a picture hides then costs nobody's time. */
+#define HIDDEN_IDLE_NS UINT64_C(100000000)
 
 void view_follow(struct job *job, const struct job *before)
 {
     job->next_frame = before->next_frame;
     job->view.due_ns = before->view.due_ns;
     job->view.render_ns = before->view.render_ns;
+    job->view.hidden_budget = before->view.hidden_budget;
+    job->view.begun_ns = before->view.begun_ns;
 }
 
 /* One frame has all the samples that are wanted: it is rendered like one of a batch. */
@@ -51,7 +54,13 @@ static bool has_hidden(const struct job *job, const struct view_wish *wish)
 {
     const struct view *view = &job->view;
     return view->hidden_layer > 0 && job->scene->known.revision == view->shown_revision &&
-           (view->render_ns < HIDDEN_WAIT_NS || !has_news(job, wish));
+           (view->hidden_is_paid || !has_news(job, wish));
+}
+
+/* Of the layers of a picture the second comes just behind the first. */
+static uint64_t hidden_due_ns(const struct view *view)
+{
+    return view->hidden_is_paid || view->hidden_layer > 1 ? 0 : view->rendered_ns + HIDDEN_IDLE_NS;
 }
 
 static bool may_refine(const struct job *job)
@@ -80,8 +89,9 @@ uint64_t view_due_ns(const struct job *job)
     const bool hidden = has_hidden(job, &wish);
     if (job->view.made >= job->view.credit || !(hidden || has_news(job, &wish) || may_refine(job)))
         return UINT64_MAX;
-    uint64_t encoder_ns = encoder_due_ns(job);
-    return hidden || encoder_ns > job->view.due_ns ? encoder_ns : job->view.due_ns;
+    const uint64_t encoder_ns = encoder_due_ns(job);
+    const uint64_t due_ns = hidden ? hidden_due_ns(&job->view) : job->view.due_ns;
+    return encoder_ns > due_ns ? encoder_ns : due_ns;
 }
 
 /* Frames begin at even intervals where possible, and never more often. */
@@ -92,12 +102,20 @@ static void set_due(struct job *job)
     job->view.due_ns = due_ns > job->begin_ns ? due_ns : job->begin_ns + period_ns;
 }
 
+/* While it moves. */
+static bool adapts(const struct job *job)
+{
+    return job->spec.adapt && job->view.wish.camera.moving;
+}
+
 static uint32_t samples_of_next(const struct job *job)
 {
     const struct view *view = &job->view;
     uint32_t samples = job->spec.frame.samples;
     uint32_t wanted = view->refining ? samples - view->held_samples : samples;
-    return wanted < job->spec.pass_samples ? wanted : job->spec.pass_samples;
+    wanted = wanted < job->spec.pass_samples ? wanted : job->spec.pass_samples;
+    const bool limited = adapts(job) && view->wish.effort.samples > 0 && view->wish.effort.samples < wanted;
+    return limited ? view->wish.effort.samples : wanted;
 }
 
 /* Smaller while it moves, if the rate requires it. */
@@ -105,13 +123,26 @@ static void apply_effort(const struct job *job, struct frame_request *request)
 {
     const struct view_wish *wish = &job->view.wish;
     uint32_t scale = wish->effort.scale_eighths;
-    if (!job->spec.adapt || !wish->camera.moving || !scale || scale >= 8)
+    if (!adapts(job) || !scale || scale >= 8)
         return;
     uint32_t width, height;
     frame_view_size(request, &width, &height);
     const uint32_t across = request->width / width, down = request->height / height;
     request->width = across * (width * scale >= 8 ? width * scale / 8 : 1);
     request->height = down * (height * scale >= 8 ? height * scale / 8 : 1);
+}
+
+/* The camera's view for a picture that is so many times as high, in pixels of the same size. */
+static void widen(struct frame_camera *camera, float growth)
+{
+    camera->fov_y = 2.0f * atanf(growth * tanf(camera->fov_y / 2.0f));
+    camera->ortho_height *= growth;
+}
+
+static float margin_share(const struct job *job)
+{
+    const unsigned halves_less = adapts(job) ? job->view.wish.effort.margin_halves_less : 0;
+    return halves_less < 2 ? job->spec.margin * (float)(2 - halves_less) / 2.0f : 0.0f;
 }
 
 /* While it moves: so that a client has something to show beside the edges of the picture. */
@@ -121,14 +152,23 @@ static void add_margin(struct job *job, struct frame_request *request)
     view->margin_x = view->margin_y = 0;
     if (!view->wish.camera.moving || !(job->spec.margin > 0.0f))
         return;
-    view->margin_x = (uint32_t)(job->spec.margin * (float)request->width);
-    view->margin_y = (uint32_t)(job->spec.margin * (float)request->height);
-    const float growth = (float)(request->height + 2 * view->margin_y) / (float)request->height;
-    struct frame_camera *camera = &request->camera;
-    camera->fov_y = 2.0f * atanf(growth * tanf(camera->fov_y / 2.0f));
-    camera->ortho_height *= growth;
+    view->margin_x = margin_pixels(margin_share(job), request->width);
+    view->margin_y = margin_pixels(margin_share(job), request->height);
+    widen(&request->camera, (float)(request->height + 2 * view->margin_y) / (float)request->height);
     request->width += 2 * view->margin_x;
     request->height += 2 * view->margin_y;
+}
+
+/* What is hidden is mostly seen in narrow strips: one pixel for two by two of the picture costs a fifth, and views
+ * made from it are hardly worse. */
+static void halve(struct view *view, struct frame_request *request)
+{
+    const uint32_t height = (request->height + 1) / 2;
+    widen(&request->camera, 2.0f * (float)height / (float)request->height);
+    request->width = (request->width + 1) / 2;
+    request->height = height;
+    view->margin_x /= 2;
+    view->margin_y /= 2;
 }
 
 /* By the camera of the last picture. */
@@ -146,6 +186,7 @@ static bool take_up_hidden(struct job *job, struct shot *shot, struct error *err
     request->hidden_radius = job->spec.depth.radius;
     apply_effort(job, request);
     add_margin(job, request);
+    halve(view, request);
     return true;
 }
 
@@ -178,9 +219,8 @@ bool view_take_up(struct job *job, struct shot *shot, struct error *error)
 /* While it moves; at rest it is the job's. */
 static unsigned quality_of(const struct job *job)
 {
-    const struct view_wish *wish = &job->view.wish;
-    bool adapts = wish->camera.moving && job->spec.adapt && wish->effort.quality;
-    return adapts ? wish->effort.quality : job->spec.quality;
+    const unsigned quality = job->view.wish.effort.quality;
+    return adapts(job) && quality ? quality : job->spec.quality;
 }
 
 /* A stream of pictures has none of what they hide. */
@@ -225,7 +265,25 @@ static void hidden_done(struct job *job, struct engine_frame *frame)
     struct view *view = &job->view;
     frame->encoding = encoding_of_hidden(job);
     frame->of_frame = view->picture;
+    view->hidden_ns += frame->rendered_ns - frame->applied_ns;
     view->hidden_layer = view->hidden_layer < job->spec.hidden_layers ? view->hidden_layer + 1 : 0;
+    if (view->hidden_layer == 0)
+        hidden_budget_spend(&view->hidden_budget, view->hidden_ns, !view->hidden_is_paid);
+}
+
+/* Behind a picture. */
+static void plan_hidden(struct job *job, const struct engine_frame *frame)
+{
+    struct view *view = &job->view;
+    view->hidden_layer = 0;
+    if (!view->wish.camera.moving || job->spec.hidden_layers == 0)
+        return;
+    hidden_budget_earn(&view->hidden_budget, frame->applied_ns - view->begun_ns);
+    view->begun_ns = frame->applied_ns;
+    view->hidden_is_paid =
+        hidden_budget_suffices(&view->hidden_budget) && !(adapts(job) && view->wish.effort.no_hidden);
+    view->hidden_ns = 0;
+    view->hidden_layer = 1;
 }
 
 bool view_goes_without(struct job *job, const struct error *error)
@@ -251,7 +309,7 @@ void view_done(struct job *job, struct engine_frame *frame)
     set_due(job);
     view->render_ns = frame->rendered_ns - frame->applied_ns;
     view->picture = frame->frame;
-    view->hidden_layer = camera->moving && job->spec.hidden_layers > 0;
+    plan_hidden(job, frame);
     view->shown = true;
     view->shown_command = camera->command;
     view->shown_revision = frame->result.revision;
@@ -262,6 +320,7 @@ void view_done(struct job *job, struct engine_frame *frame)
     if (camera->moving && job->spec.adapt) {
         const struct view_effort *effort = &view->wish.effort;
         frame->scale_eighths = effort->scale_eighths;
+        frame->margin_halves_less = effort->margin_halves_less;
         frame->wanted_bytes = effort->bytes;
     }
     bool spares = job->spec.adapt && view->wish.effort.sparing && view->held_samples < job->spec.frame.samples;

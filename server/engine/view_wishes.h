@@ -34,6 +34,10 @@ struct view_effort {
     unsigned scale_eighths; /* of width and height; 0: as the job says */
     unsigned quality;       /* 0: as the job says */
     uint64_t bytes;         /* that a frame may have; 0: not known */
+    unsigned samples;       /* at most; 0: as the job says */
+    /* Of what a client makes its own views from, not what the job says: */
+    unsigned margin_halves_less; /* 1: half of the margin, 2: none */
+    bool no_hidden;              /* what is hidden waits until nothing else is to be done */
     /* Frames in the encoding of rest would occupy the link when motion begins: only the frame with all samples
      * uses it. */
     bool sparing;

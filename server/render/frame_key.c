@@ -65,8 +65,10 @@ static float radius_for(const struct frame_request *request)
 }
 
 /* One texel a pixel, of the picture's own eye. */
-static void set_hidden(const struct frame_request *request, struct quadtree_settings *settings)
+static void set_hidden(const struct frame_request *request, struct tracer_options *options)
 {
+    struct quadtree_settings *settings = &options->quadtree;
+    options->quadtree_leaves = 1;
     settings->layers = KEY_LAYERS_MAX;
     settings->radius = request->hidden_radius;
     settings->resolution = 0;
@@ -87,7 +89,7 @@ bool frame_key_take(struct frame_renderer *renderer, struct error *error)
     struct tracer_options options = request->tracer_options;
     options.quadtree.faces = QUADTREE_FACES_VIEW;
     if (request->hidden_layer)
-        set_hidden(request, &options.quadtree);
+        set_hidden(request, &options);
     else
         set_layers(request, &options.quadtree);
     if (options.quadtree.hits == QUADTREE_HITS_AUTO)

@@ -4,6 +4,7 @@
 #include "session/frames.h"
 #include "session/jobs.h"
 #include "session/session.h"
+#include "protocol/common/margin.h"
 
 #include <inttypes.h>
 #include <stdlib.h>
@@ -27,7 +28,7 @@
 /* Of a view's frame while it moves. */
 static uint32_t with_margin(const struct message_render *render, uint32_t pixels)
 {
-    return pixels + 2 * (uint32_t)(render->margin * (float)pixels);
+    return pixels + 2 * margin_pixels(render->margin, pixels);
 }
 
 static uint64_t frame_bytes_of(const struct message_render *render)

@@ -23,6 +23,22 @@ struct pacing_frame {
     uint64_t begun_ns; /* acknowledgement of its first message; 0: none yet */
 };
 
+/* What a view's client has asked for, of frames while it moves. All-zero: nothing but pictures of one sample. */
+struct pacing_terms {
+    float margin;           /* share on each side */
+    uint32_t hidden_layers; /* that follow each picture */
+    uint32_t samples;
+};
+
+/* What the next frame is to be. */
+struct pacing_advice {
+    unsigned scale_eighths; /* of width and height: 8, 6, 4, 3, 2 */
+    unsigned quality;       /* as JPEG has it, PACING_QUALITY_MIN .. the wanted one */
+    uint64_t bytes;         /* that a frame may have, for an encoder that can be told */
+    unsigned margin_halves_less, samples;
+    bool no_hidden;
+};
+
 struct pacing {
     uint64_t frame_ns;                                   /* between frames, as the client asked for */
     struct pacing_frame in_flight[PACING_IN_FLIGHT_MAX]; /* oldest first */
@@ -40,21 +56,21 @@ struct pacing {
     /* Rendering takes a part that does not depend on the picture's size, and one that grows with its area, of
      * which the full picture has 1. Sums over the frames so far, older ones fading. */
     double render_frames, render_areas, render_ns, render_areas_areas, render_areas_ns;
-    double render_fixed_ns;          /* as far as frames of several sizes have shown it */
-    unsigned scale_eighths, quality; /* last advice */
-    unsigned better_count;           /* times in a row that a better one would have been possible */
-};
-
-struct pacing_advice {
-    unsigned scale_eighths; /* of width and height: 8, 6, 4, 3, 2 */
-    unsigned quality;       /* as JPEG has it, PACING_QUALITY_MIN .. the wanted one */
-    uint64_t bytes;         /* that a frame may have, for an encoder that can be told */
+    double render_fixed_ns; /* as far as frames of several sizes have shown it */
+    double hidden_bytes;    /* of a layer of what a picture hides; 0: not known */
+    struct pacing_terms terms;
+    struct pacing_advice advised; /* last */
+    unsigned better_count;        /* times in a row that a better one would have been possible */
 };
 
 #define PACING_QUALITY_MIN 40
 #define PACING_QUALITY_REFERENCE 75
 
 void pacing_init(struct pacing *pacing, uint64_t frame_ns);
+/* What is known of link and renderer stays. */
+void pacing_set_terms(struct pacing *pacing, uint64_t frame_ns, const struct pacing_terms *terms);
+/* Its client makes views of its own. */
+bool pacing_makes_views(const struct pacing_terms *terms);
 
 /* Whether the next frame may begin. False: an acknowledgement will change that. A client that has never
  * acknowledged a frame gets one at a time, and its credit releases the next; call pacing_forget() then. */
@@ -81,13 +97,23 @@ void pacing_forget(struct pacing *pacing);
 /* 0: not known yet. */
 uint64_t pacing_bytes_per_second(const struct pacing *pacing);
 uint64_t pacing_round_trip_ns(const struct pacing *pacing);
+/* Bytes that the link drains in one frame time and the minimum round trip; of a link that is known. */
+double pacing_room_bytes(const struct pacing *pacing);
 
 /* What a frame of that size took to render, and what came of it at that quality (0: lossless, not learned from).
  */
 void pacing_learn(struct pacing *pacing, unsigned scale_eighths, unsigned quality, uint64_t render_ns,
                   uint64_t bytes);
+/* The same of a frame as it was advised, and of a layer that followed one. */
+void pacing_learn_picture(struct pacing *pacing, const struct pacing_advice *made, uint64_t render_ns,
+                          uint64_t bytes);
+void pacing_learn_hidden(struct pacing *pacing, uint64_t bytes);
 /* Size and quality of the next frame while things move, so that frame_ns is met by the renderer and by the link;
- * at most `quality_wanted`. Worse at once, better step by step, so that it does not flicker between two. */
+ * at most `quality_wanted`. Worse at once, better step by step, so that it does not flicker between two.
+ *
+ * For a client that makes its own views (it has asked for a margin or hidden layers) a late picture is better than
+ * a tiny one. What it does not need first goes first: samples beyond one, what is hidden, half of the margin, all
+ * of it, quality; and size only where a picture would take longer than a quarter of a second. */
 struct pacing_advice pacing_advise(struct pacing *pacing, unsigned quality_wanted);
 
 #endif

@@ -37,9 +37,11 @@ static void on_silence_timer(void *context);
 struct view_terms view_terms_of(const struct message_render *render)
 {
     const uint64_t frame_ns = (uint64_t)(SECOND_NS / (double)render->frames_per_second);
+    const uint32_t samples = render->samples < render->pass_samples ? render->samples : render->pass_samples;
     return (struct view_terms){
         .frame_ns = render->margin > 0.0f && frame_ns < KEY_NS ? KEY_NS : frame_ns,
         .samples = render->samples,
+        .moving = {.margin = render->margin, .hidden_layers = render->hidden_layers, .samples = samples},
         .still_encoding = (enum encoding)render->still_encoding,
         .quality = encoder_loses((enum encoding)render->encoding) ? render->quality : 0,
         .adapt = render->adapt != 0,
@@ -55,6 +57,7 @@ struct session_view *session_view_create(const struct view_terms *terms)
     view->terms = *terms;
     view->changes_end = &view->changes;
     pacing_init(&view->pacing, terms->frame_ns);
+    pacing_set_terms(&view->pacing, terms->frame_ns, &terms->moving);
     view->wishes = view_wishes_create();
     if (view->wishes)
         return view;
@@ -133,14 +136,16 @@ void view_switch(struct job *job)
     job->rendered = false;
     job->cancelled = change->cancelled;
     view->terms = change->terms;
-    view->pacing.frame_ns = change->terms.frame_ns;
+    pacing_set_terms(&view->pacing, view->terms.frame_ns, &view->terms.moving);
     view->shown_samples = 0;
     free(change);
 }
 
 void view_forget_frames(struct job *job)
 {
-    pacing_init(&job->view->pacing, job->view->terms.frame_ns);
+    struct session_view *view = job->view;
+    pacing_init(&view->pacing, view->terms.frame_ns);
+    pacing_set_terms(&view->pacing, view->terms.frame_ns, &view->terms.moving);
 }
 
 /* ---- pace -------------------------------------------------------------------------------------------- */
@@ -216,6 +221,9 @@ static void adapt(struct session_view *view, const struct engine_frame *frame)
         view->effort.scale_eighths = advice.scale_eighths;
         view->effort.quality = view->terms.quality ? advice.quality : 0;
         view->effort.bytes = advice.bytes;
+        view->effort.samples = advice.samples;
+        view->effort.margin_halves_less = advice.margin_halves_less;
+        view->effort.no_hidden = advice.no_hidden;
     } else if (frame->encoding == view->terms.still_encoding) {
         double bytes_per_second = (double)pacing_bytes_per_second(&view->pacing);
         if (bytes_per_second > 0.0)
@@ -232,15 +240,28 @@ static void choose_parts(struct session_view *view, const struct engine_frame *f
         view->effort.still_parts = parts;
 }
 
+/* As it was advised, which may be some frames ago. */
+static void learn(struct session_view *view, const struct engine_frame *frame)
+{
+    const struct pacing_advice made = {
+        .scale_eighths = frame->scale_eighths ? frame->scale_eighths : PACING_SCALE_FULL,
+        .quality = frame->quality,
+        .margin_halves_less = frame->margin_halves_less,
+        .samples = frame->result.samples,
+    };
+    pacing_learn_picture(&view->pacing, &made, frame->rendered_ns - frame->applied_ns, frame->size_bytes);
+}
+
 void view_frame_made(struct job *job, const struct engine_frame *frame)
 {
     struct session_view *view = job->view;
-    if (frame->request.hidden_layer > 0) /* says nothing of what a picture costs */
+    if (frame->request.hidden_layer > 0) { /* says nothing of what a picture costs */
+        pacing_learn_hidden(&view->pacing, frame->size_bytes);
         return;
+    }
     view->made_ns = frame->encoded_ns > frame->applied_ns ? frame->encoded_ns - frame->applied_ns : 0;
     if (frame->moving)
-        pacing_learn(&view->pacing, frame->scale_eighths ? frame->scale_eighths : PACING_SCALE_FULL,
-                     frame->quality, frame->rendered_ns - frame->applied_ns, frame->size_bytes);
+        learn(view, frame);
     if (view->terms.adapt)
         adapt(view, frame);
     if (view->terms.parts)

@@ -18,6 +18,7 @@
 struct view_terms {
     uint64_t frame_ns; /* that frames are adapted to: the interval between them */
     uint32_t samples;  /* that a picture is to have */
+    struct pacing_terms moving;
     enum encoding still_encoding;
     unsigned quality; /* of motion; 0: lossless */
     bool adapt;

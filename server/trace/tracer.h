@@ -49,6 +49,7 @@ struct tracer_options {
 #define SETTINGS(tracer) struct tracer##_settings tracer;
 #include "protocol/tracers.def"
     struct tracer_limits limits;
+    uint32_t quadtree_leaves; /* 1: its layers will be asked for, and no ray traced */
     struct tracer_bench bench;
 };
 /* clang-format on */

@@ -25,7 +25,9 @@ uvec2 leaf(uint slice, ivec2 texel)
 }
 
 const uint NO_LAYER = 0xffffffffu;
-const int DIRECTIONS = 16;
+const int DIRECTIONS = 8;
+const vec2 TURN = vec2(cos(TWO_PI / float(DIRECTIONS)), sin(TWO_PI / float(DIRECTIONS)));
+const mat2 NEXT_DIRECTION = mat2(TURN, vec2(-TURN.y, TURN.x));
 const int DISTANCES = 4;
 const float REACH_MAX = 128.0; // texels
 
@@ -49,9 +51,9 @@ bool is_seen_past(uint hiding, ivec2 texel, vec2 towards, float w, float growth)
 bool is_within_reach(uint hidden, ivec2 texel)
 {
     float growth = 1.0 / (quadtree.scale_centre.x * quadtree.bounds.w), w = plane_w(leaf(hidden, texel));
+    vec2 towards = vec2(1.0, 0.0);
     for (int i = 0; i < DIRECTIONS && w > 0.0; i++) {
-        float angle = TWO_PI * float(i) / float(DIRECTIONS);
-        vec2 towards = vec2(cos(angle), sin(angle));
+        towards = NEXT_DIRECTION * towards; // angles would take longer than what is looked up along them
         if (is_seen_past(0u, texel, towards, w, growth) && (hidden < 2u || is_seen_past(1u, texel, towards, w, growth)))
             return true;
     }

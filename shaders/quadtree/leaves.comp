@@ -17,6 +17,7 @@ layout(binding = UNIT_QUADTREE_NODES) uniform usamplerBuffer nodes;
 layout(binding = IMAGE_QUADTREE_PLANES, rg32ui) writeonly uniform uimageBuffer planes;
 
 uniform uint first_item; // of the dispatch
+uniform uint first_leaf; // in `planes`
 uniform uint slice;
 uniform uint layer; // of the face; its slice comes just behind that of the layer before
 
@@ -203,7 +204,7 @@ void main()
         tails = mix(tails, own_tails, is_own);
         instances_left = mix(instances_left, uvec4(VISIBLE_NOTHING), is_own);
     }
-    int at = int(place.y * quadtree.padded_width + place.x), below = at + int(quadtree.padded_width);
+    int at = int(first_leaf + place.y * quadtree.padded_width + place.x), below = at + int(quadtree.padded_width);
     imageStore(planes, at, uvec4(heads.x, tails.x, 0u, 0u));
     imageStore(planes, at + 1, uvec4(heads.y, tails.y, 0u, 0u));
     imageStore(planes, below, uvec4(heads.z, tails.z, 0u, 0u));

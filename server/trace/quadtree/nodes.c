@@ -26,20 +26,32 @@ uint64_t quadtree_nodes_count(const struct quadtree_uniforms *uniforms)
     return (uint64_t)slice_count(uniforms) * uniforms->slice_nodes;
 }
 
-/* Stages are the leaves and level 1 of each slice, then each level above of all slices, then what is nearest. */
+static bool has_levels(const struct quadtree_uniforms *uniforms)
+{
+    return uniforms->slice_nodes > slice_texels(uniforms);
+}
+
+/* Stages are the leaves and level 1 of each slice, then each level above of all slices, then what is nearest; or
+ * the leaves of each slice alone. */
+static uint32_t stages_a_slice(const struct quadtree_uniforms *uniforms)
+{
+    return has_levels(uniforms) ? 2 : 1;
+}
+
 static uint32_t slice_stages(const struct quadtree_uniforms *uniforms)
 {
-    return 2 * slice_count(uniforms);
+    return stages_a_slice(uniforms) * slice_count(uniforms);
 }
 
 static uint32_t stage_count(const struct quadtree_uniforms *uniforms)
 {
-    return slice_stages(uniforms) + QUADTREE_TOP - 1 + 1;
+    return slice_stages(uniforms) + (has_levels(uniforms) ? QUADTREE_TOP - 1 + 1 : 0);
 }
 
 static uint32_t stage_level(const struct quadtree_uniforms *uniforms, uint32_t stage)
 {
-    return stage < slice_stages(uniforms) ? stage % 2 : stage - slice_stages(uniforms) + 2;
+    const uint32_t slices = slice_stages(uniforms);
+    return stage < slices ? stage % stages_a_slice(uniforms) : stage - slices + 2;
 }
 
 /* Invocations; the last stage has a few. */
@@ -47,7 +59,7 @@ static uint64_t stage_items(const struct quadtree_uniforms *uniforms, uint32_t s
 {
     const uint32_t slices = stage < slice_stages(uniforms) ? 1 : slice_count(uniforms);
     const uint32_t level = stage_level(uniforms, stage);
-    return stage + 1 == stage_count(uniforms)
+    return has_levels(uniforms) && stage + 1 == stage_count(uniforms)
                ? uniforms->faces
                : (uint64_t)(slice_texels(uniforms) >> 2 * (level > 0 ? level : 1)) * slices; /* four leaves each */
 }
@@ -108,7 +120,9 @@ static bool make_leaves(struct quadtree_node_build *build, struct quadtree_store
     gpu_scene_bind(scene);
     gpu_texture_bind(&store->visible, UNIT_QUADTREE_VISIBLE);
     gpu_buffer_bind_texels(store->device, &store->nodes, UNIT_QUADTREE_NODES, GL_RG32UI);
-    gpu_buffer_bind_image(store->device, &build->planes, IMAGE_QUADTREE_PLANES, GL_RG32UI);
+    const bool apart = has_levels(&store->uniforms); /* the next stage writes them to the tree */
+    gpu_buffer_bind_image(store->device, apart ? &build->planes : &store->nodes, IMAGE_QUADTREE_PLANES, GL_RG32UI);
+    gpu_uniform_uint(program, "first_leaf", apart ? 0 : slice * store->uniforms.slice_nodes);
     gpu_uniform_uint(program, "slice", slice);
     gpu_uniform_uint(program, "layer", slice % store->uniforms.layers);
     gpu_uniform_uint(program, "first_item", (uint32_t)build->first);
@@ -157,7 +171,8 @@ enum tracer_progress quadtree_nodes_go_on(struct quadtree_node_build *build, str
                                           struct gpu_scene *scene, bool minmax, struct error *error)
 {
     const struct quadtree_uniforms *uniforms = &store->uniforms;
-    const uint32_t slices = slice_stages(uniforms), slice = build->stage < slices ? build->stage / 2 : 0;
+    const uint32_t slices = slice_stages(uniforms),
+                   slice = build->stage < slices ? build->stage / stages_a_slice(uniforms) : 0;
     const uint32_t level = stage_level(uniforms, build->stage);
     const uint64_t left = stage_items(uniforms, build->stage) - build->first;
     const uint64_t count = left < unit_items(store) ? left : unit_items(store);

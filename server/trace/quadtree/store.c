@@ -156,7 +156,8 @@ static uint32_t padded(uint32_t texels)
 }
 
 static void fill_uniforms(struct quadtree_uniforms *u, const struct gpu_scene *scene,
-                          const struct trace_view *view, const struct quadtree_settings *settings)
+                          const struct trace_view *view, const struct quadtree_settings *settings,
+                          bool only_leaves)
 {
     *u = (struct quadtree_uniforms){.layers = quadtree_layer_count(settings)};
     for (int i = 0; i < 3; i++)
@@ -180,7 +181,7 @@ static void fill_uniforms(struct quadtree_uniforms *u, const struct gpu_scene *s
     u->bounds[3] = settings->radius / u->depths[0];
     u->padded_width = padded(u->width);
     u->padded_height = padded(u->height);
-    for (uint32_t level = 0; level <= QUADTREE_TOP; level++)
+    for (uint32_t level = 0; level <= (only_leaves ? 0 : QUADTREE_TOP); level++)
         u->slice_nodes += (u->padded_width >> level) * (u->padded_height >> level);
 }
 
@@ -191,7 +192,7 @@ bool quadtree_store_place(struct quadtree_store *store, const struct gpu_scene *
                           struct error *error)
 {
     struct quadtree_uniforms *u = &store->uniforms;
-    fill_uniforms(u, scene, view, settings);
+    fill_uniforms(u, scene, view, settings, store->only_leaves);
     const uint32_t longer = u->padded_width > u->padded_height ? u->padded_width : u->padded_height;
     if (longer > store->device->facts.texture_size_max) {
         error_set(error, ERROR_LIMIT, "quadtree_resolution", "%u texels along a side; the device holds %u", longer,

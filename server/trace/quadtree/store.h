@@ -18,6 +18,7 @@
 /* All-zero, but for the device, is empty. */
 struct quadtree_store {
     struct gpu_device *device;
+    bool only_leaves; /* no nodes above them: for those who look at layers, and trace no rays */
     struct quadtree_uniforms uniforms;
     struct gpu_buffer uniform_buffer;
     struct gpu_texture visible; /* GL_RG32UI array: a layer a slice, padded size */
@@ -33,7 +34,7 @@ uint64_t quadtree_store_bytes(const struct quadtree_store *store);
 void quadtree_texel_view(struct trace_view *texels, const struct trace_view *view,
                          const struct quadtree_settings *settings);
 /* Where the faces of such a view lie, and how large they are: fills store->uniforms, uploads them, and makes room
- * for the slices. */
+ * for the slices, with store->only_leaves as it is. */
 bool quadtree_store_place(struct quadtree_store *store, const struct gpu_scene *scene,
                           const struct trace_view *view, const struct quadtree_settings *settings,
                           struct error *error);

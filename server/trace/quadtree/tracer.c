@@ -82,6 +82,7 @@ static bool begin_update(struct quadtree *quadtree, const struct gpu_scene *scen
                          struct error *error)
 {
     const struct quadtree_settings *settings = &quadtree->base.options.quadtree;
+    quadtree->store.only_leaves = quadtree->base.options.quadtree_leaves != 0;
     if (!quadtree_store_place(&quadtree->store, scene, view, settings, error))
         return false;
     quadtree_texel_view(&quadtree->texels, view, settings);

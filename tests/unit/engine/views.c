@@ -567,6 +567,64 @@ TEST(what_a_picture_hides_follows_it_while_it_moves)
     expect_silence(watching->engine);
 }
 
+/* A camera waits whenever a picture ends. What is hidden in one takes as long as that here. */
+TEST(what_is_hidden_takes_no_more_than_its_share_while_cameras_come)
+{
+    struct watching *watching = *state;
+    atomic_store(&fake.step_us, 2000);
+    struct engine_command *made = with_samples(view(2, watching->wishes), 1, 1);
+    made->job.hidden_layers = 1;
+    look(watching, 1, true);
+    submit(watching->engine, made);
+    uint64_t hidden_ns = 0, begin_ns = 0, end_ns = 0, pictures = 0, longest_ns = 0;
+    for (uint64_t number = 2; number <= 100; number++) {
+        look(watching, number, true);
+        struct engine_frame *frame = take(expect_frame(watching->engine, 1, 2, (uint32_t)number - 2));
+        const uint64_t took_ns = frame->rendered_ns - frame->applied_ns;
+        begin_ns = begin_ns ? begin_ns : frame->applied_ns;
+        end_ns = frame->rendered_ns;
+        hidden_ns += frame->request.hidden_layer ? took_ns : 0;
+        longest_ns = frame->request.hidden_layer && took_ns > longest_ns ? took_ns : longest_ns;
+        pictures += !frame->request.hidden_layer;
+        drop(frame);
+    }
+    print_message("%.1f %% of the time\n", 100.0 * (double)hidden_ns / (double)(end_ns - begin_ns));
+    assert_true(hidden_ns > 0 && pictures > 70);
+    /* The first one, and one that takes longer than the one before it, are not saved for. */
+    assert_true((double)hidden_ns < 0.15 * (double)(end_ns - begin_ns) + 2.0 * (double)longest_ns);
+}
+
+TEST(less_is_made_for_views_of_the_client_where_time_or_the_link_is_short)
+{
+    struct watching *watching = *state;
+    struct engine_command *made = with_samples(view(2, watching->wishes), 4, 4);
+    made->job.adapt = true;
+    made->job.margin = 0.25f;
+    made->job.hidden_layers = 1;
+    made->job.frame.width = made->job.frame.height = 64;
+    view_wishes_set_effort(watching->wishes,
+                           &(struct view_effort){.samples = 2, .margin_halves_less = 1, .no_hidden = true});
+    look(watching, 1, true);
+    submit(watching->engine, made);
+    struct engine_frame *frame = take(expect_frame(watching->engine, 1, 2, 0));
+    assert_int_equal(frame->margin_x, 8);
+    assert_int_equal(frame->margin_halves_less, 1);
+    assert_int_equal(frame->result.samples, 2);
+    const uint64_t rendered_ns = frame->rendered_ns;
+    drop(frame);
+    frame = take(expect_frame(watching->engine, 1, 2, 1));
+    assert_int_equal(frame->request.hidden_layer, 1);
+    assert_int_equal(frame->request.width, 40);               /* half of 64 and its margins */
+    assert_true(frame->applied_ns - rendered_ns >= 100 * MS); /* nobody has wished anything since */
+    drop(frame);
+    view_wishes_set_effort(watching->wishes, &(struct view_effort){.margin_halves_less = 2});
+    look(watching, 2, true);
+    frame = take(expect_frame(watching->engine, 1, 2, 2));
+    assert_int_equal(frame->margin_x, 0);
+    assert_int_equal(frame->result.samples, 4);
+    drop(frame);
+}
+
 TEST(a_view_that_cannot_have_what_is_hidden_goes_on_without)
 {
     struct watching *watching = *state;
@@ -598,16 +656,14 @@ TEST(frames_come_in_the_form_that_their_encoder_takes)
     struct engine *engine = watching->engine;
     struct engine_command *made = with_samples(view(2, watching->wishes), 2, 1);
     made->job.adapt = true;
-    view_wishes_set_effort(watching->wishes,
-                           &(struct view_effort){.scale_eighths = 0, .quality = 95, .bytes = 0, .sparing = true});
+    view_wishes_set_effort(watching->wishes, &(struct view_effort){.quality = 95, .sparing = true});
     submit(engine, made);
     /* Of rest only its samples tell whether it will be one that loses. */
     expect_form(take(expect_frame(engine, 1, 2, 0)), ENCODING_JPEG, YCBCR_NONE);
     expect_form(take(expect_frame(engine, 1, 2, 1)), ENCODING_RAW, YCBCR_NONE);
     look(watching, 1, true);
     expect_form(take(expect_frame(engine, 1, 2, 2)), ENCODING_JPEG, YCBCR_NONE); /* full chroma */
-    view_wishes_set_effort(watching->wishes,
-                           &(struct view_effort){.scale_eighths = 0, .quality = 55, .bytes = 0, .sparing = true});
+    view_wishes_set_effort(watching->wishes, &(struct view_effort){.quality = 55, .sparing = true});
     look(watching, 2, true);
     expect_form(take(expect_frame(engine, 1, 2, 3)), ENCODING_JPEG, YCBCR_JPEG);
     look(watching, 3, false);

@@ -4,6 +4,7 @@
 #include "session/pacing.h"
 #include "tests/harness/test.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -423,4 +424,134 @@ TEST(a_wait_beyond_all_measure_is_still_one)
     pacing_acknowledged(&pacing, 0, true, month_ns); /* one byte in a month */
     pacing_sent(&pacing, 1, UINT32_MAX, month_ns);
     assert_in_range(pacing_wait_ns(&pacing, 1), month_ns, UINT64_MAX / 4);
+}
+
+/* ---- clients that make their own views --------------------------------------------------------------- */
+
+#define KEY_NS (S / 10)
+#define HIDDEN_BYTES 20000.0
+
+static const struct pacing_terms for_views = {.margin = 0.1f, .hidden_layers = 1, .samples = 4};
+
+/* A link of that rate, and a renderer that takes `sample_ns` for each sample of a picture without a margin. */
+struct key_views {
+    struct pacing pacing;
+    double bytes_per_second, sample_ns, bytes_full; /* at the quality of 90 */
+    uint32_t frame;
+    uint64_t now_ns;
+};
+
+static struct key_views key_views_of(double bytes_per_second, double sample_ns, double bytes_full)
+{
+    struct key_views views = {
+        .bytes_per_second = bytes_per_second, .sample_ns = sample_ns, .bytes_full = bytes_full, .now_ns = S};
+    pacing_init(&views.pacing, KEY_NS);
+    pacing_set_terms(&views.pacing, KEY_NS, &for_views);
+    return views;
+}
+
+static double key_area(const struct pacing_advice *advice)
+{
+    const double side = advice->scale_eighths / 8.0, grown = 1.0 + 0.1 * (2 - advice->margin_halves_less);
+    return side * side * grown * grown;
+}
+
+static double key_bytes(const struct key_views *views, const struct pacing_advice *advice)
+{
+    return views->bytes_full * key_area(advice) * pow(1.35, (advice->quality - 90.0) / 12.0);
+}
+
+static double key_render_ns(const struct key_views *views, const struct pacing_advice *advice)
+{
+    return views->sample_ns * key_area(advice) * advice->samples;
+}
+
+/* After so many pictures as it advises, each of which the link carries before the next one. */
+static struct pacing_advice settle(struct key_views *views, unsigned frames)
+{
+    struct pacing *pacing = &views->pacing;
+    struct pacing_advice advice = {0};
+    for (unsigned i = 0; i < frames; i++) {
+        advice = pacing_advise(pacing, 90);
+        const double bytes = key_bytes(views, &advice);
+        pacing_sent(pacing, views->frame, (uint64_t)bytes, views->now_ns);
+        pacing_acknowledged(pacing, views->frame, false, views->now_ns + MS);
+        views->now_ns += MS + (uint64_t)(bytes / views->bytes_per_second * 1e9);
+        pacing_acknowledged(pacing, views->frame++, true, views->now_ns);
+        pacing_learn_picture(pacing, &advice, (uint64_t)key_render_ns(views, &advice), (uint64_t)bytes);
+        pacing_learn_hidden(pacing, (uint64_t)HIDDEN_BYTES);
+    }
+    return advice;
+}
+
+/* A tenth of a second of the link carries that many times what a picture with everything takes. */
+static struct pacing_advice settle_on_link(double times)
+{
+    const double bytes = 100000.0, whole = bytes * 1.44 + HIDDEN_BYTES;
+    struct key_views views = key_views_of(times * whole * 10.0 / 0.9, 1e6, bytes);
+    return settle(&views, 60);
+}
+
+TEST(on_a_link_too_slow_what_views_need_least_goes_first)
+{
+    struct pacing_advice advice = settle_on_link(1.5);
+    assert_true(!advice.no_hidden && advice.margin_halves_less == 0 && advice.quality == 90);
+    advice = settle_on_link(0.9); /* 148 KB of 164; a picture with its margin is 144 */
+    assert_true(advice.no_hidden && advice.margin_halves_less == 0 && advice.quality == 90);
+    advice = settle_on_link(0.8); /* 131 KB; with half of it 121 */
+    assert_true(advice.no_hidden && advice.margin_halves_less == 1 && advice.quality == 90);
+    advice = settle_on_link(0.65); /* 107 KB; without 100 */
+    assert_true(advice.no_hidden && advice.margin_halves_less == 2 && advice.quality == 90);
+    advice = settle_on_link(0.4); /* 66 KB */
+    assert_true(advice.margin_halves_less == 2 && advice.quality < 90 && advice.quality > PACING_QUALITY_MIN);
+    assert_int_equal(advice.scale_eighths, 8);
+    advice = settle_on_link(0.1); /* 16 KB: one of 29 is twice as late as it should be, and no more */
+    assert_true(advice.quality == PACING_QUALITY_MIN && advice.scale_eighths == 8);
+    advice = settle_on_link(0.05); /* a quarter of a second carries 20 KB */
+    assert_true(advice.quality == PACING_QUALITY_MIN && advice.scale_eighths < 8);
+}
+
+static struct pacing_advice settle_on_renderer(double sample_ns)
+{
+    struct key_views views = key_views_of(1e9, sample_ns, 100000.0);
+    return settle(&views, 60);
+}
+
+/* A margin is 1.44 times the work, half of one 1.21. */
+TEST(pictures_for_views_are_smaller_only_where_they_take_a_quarter_of_a_second)
+{
+    struct pacing_advice advice = settle_on_renderer(10e6);
+    assert_true(advice.samples == 4 && advice.margin_halves_less == 0);
+    advice = settle_on_renderer(30e6);
+    assert_true(advice.samples == 2 && advice.margin_halves_less == 0 && !advice.no_hidden);
+    advice = settle_on_renderer(150e6); /* 216 ms */
+    assert_true(advice.samples == 1 && advice.margin_halves_less == 0);
+    advice = settle_on_renderer(190e6);
+    assert_true(advice.samples == 1 && advice.margin_halves_less == 1 && advice.scale_eighths == 8);
+    advice = settle_on_renderer(230e6);
+    assert_true(advice.margin_halves_less == 2 && advice.scale_eighths == 8);
+    advice = settle_on_renderer(400e6);
+    assert_true(advice.margin_halves_less == 2 && advice.scale_eighths == 6 && advice.quality == 90);
+    advice =
+        settle_on_renderer(600e6); /* 338 ms at three quarters; half of the size with all of its margin is 216 */
+    assert_true(advice.margin_halves_less == 0 && advice.scale_eighths == 4 && advice.samples == 1);
+}
+
+/* Where the link is just enough for a step, and pictures differ by a tenth, steps do not alternate. */
+TEST(what_views_are_made_from_does_not_flicker)
+{
+    const double bytes = 100000.0;
+    for (double times = 0.3; times < 1.3; times += 0.05) {
+        struct key_views views = key_views_of(times * bytes * 14.4 / 0.9, 30e6, bytes);
+        struct pacing_advice before = settle(&views, 60);
+        unsigned changes = 0;
+        for (unsigned i = 0; i < 200; i++) {
+            views.bytes_full = bytes * (0.95 + 0.1 * (i * 7 % 11) / 11.0);
+            const struct pacing_advice advice = settle(&views, 1);
+            changes += advice.margin_halves_less != before.margin_halves_less ||
+                       advice.no_hidden != before.no_hidden || advice.samples != before.samples;
+            before = advice;
+        }
+        assert_true(changes <= 4); /* it settles */
+    }
 }

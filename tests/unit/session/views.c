@@ -759,6 +759,31 @@ SESSION_TEST(pictures_with_a_margin_are_adapted_to_ten_a_second)
     engine_command_destroy(start);
 }
 
+/* 300 KB in 0.1 s: neither a picture of 300 KB with what it hides fits ten a second, nor one with its margin. */
+SESSION_TEST(the_engine_is_told_what_a_client_with_its_own_views_goes_without)
+{
+    open_scene(1, 1);
+    struct message message = view_message(100);
+    message.render.adapt = 1;
+    message.render.quality = 90;
+    message.render.frames_per_second = 1000;
+    message.render.margin = 0.1f;
+    send_message(2, 0, &message);
+    struct engine_command *start = told(ENGINE_JOB_START);
+    say_frame(2, 0, 1);
+    take_frame(2, 0);
+    usleep(150000);
+    send_ack(0, true, false);
+    told_and_forgotten(ENGINE_JOB_CREDIT);
+    say_frame(2, 1, 3);
+    take_frame(2, 1);
+    const struct view_effort effort = view_wishes_see(start->job.wishes).effort;
+    assert_int_equal(effort.margin_halves_less, 2);
+    assert_true(effort.quality < 90);
+    assert_int_equal(effort.scale_eighths, 8);
+    engine_command_destroy(start);
+}
+
 /* ---- one view in the place of another ---------------------------------------------------------------- */
 
 static struct engine_command *replace_view(uint32_t request, uint32_t width)

@@ -128,6 +128,15 @@ TEST(what_a_picture_hides_is_seen_once_it_has_come)
     assert_false(views_is_best(views, &made, wish));
     wait_for_best(views, &made, wish);
     assert_true(made.layers == 2 && made.counts.behind == 0 && made.counts.deeper > 0.01f);
+    /* A second one, of half the size: one of its pixels for two by two. */
+    like = some_key(200);
+    layer = (struct views_layer){like.picture, like.depth};
+    layer.picture.width = layer.picture.height = EDGE / 2;
+    for (int i = 0; i < EDGE / 2 * (EDGE / 2); i++)
+        layer.depth[i] = 3;
+    views_give_layer(views, &layer);
+    wait_for_best(views, &made, wish);
+    assert_int_equal(made.layers, 3);
     /* A new key has none; one of another size is not of it. */
     key = some_key(100);
     views_give_key(views, &key);
@@ -191,4 +200,30 @@ TEST(a_picture_of_which_no_view_can_be_made_is_reported_and_the_next_one_helps)
     assert_int_equal(grey_of(&picture), 100);
     pixmap_finish(&picture);
     views_destroy(views);
+}
+
+static float fitted_depth(int width, int height, int x, int y)
+{
+    const int half_width = (width + 1) / 2, half_height = (height + 1) / 2;
+    struct views_layer layer = {.depth = malloc(sizeof(float) * (size_t)(half_width * half_height))};
+    struct fl_error error;
+    assert_true(layer.depth && pixmap_resize(&layer.picture, half_width, half_height, &error));
+    memset(layer.picture.pixels, 0, 4 * (size_t)(half_width * half_height));
+    for (int i = 0; i < half_width * half_height; i++)
+        layer.depth[i] = (float)i;
+    assert_true(views_layer_fit(&layer, width, height));
+    assert_int_equal(layer.picture.width, width);
+    const float depth = layer.depth[y * width + x];
+    views_layer_finish(&layer);
+    return depth;
+}
+
+/* Both axes go through the middle: where the side is odd the outer pixels cover half of one beyond it. */
+TEST(a_layer_of_half_the_size_becomes_one_of_the_whole)
+{
+    const int even[] = {0, 0, 1, 1, 2, 2}, odd[] = {0, 1, 1, 2, 2};
+    for (int x = 0; x < 6; x++)
+        assert_true(fitted_depth(6, 4, x, 3) == (float)(3 + even[x]));
+    for (int x = 0; x < 5; x++)
+        assert_true(fitted_depth(5, 3, x, 1) == (float)(3 + odd[x]));
 }

@@ -327,3 +327,25 @@ TEST(settings_make_more_planes_or_fewer_and_minmax_makes_none)
     assert_true(adaptive > plain && turned < plain && turned > 0);
     layers_finish(&layers);
 }
+
+TEST(leaves_alone_are_those_of_the_tree_without_flags)
+{
+    struct layers layers;
+    layers_init(&layers, curved_scene(), &usual);
+    struct quadtree_uniforms *u = &layers.store.uniforms;
+    const uint32_t texels = u->padded_width * u->padded_height, slices = u->faces * u->layers;
+    const uint32_t whole_slice = u->slice_nodes;
+    const size_t bytes = quadtree_nodes_count(u) * sizeof(*layers.nodes);
+    uint32_t(*whole)[2] = malloc(bytes);
+    memcpy(whole, layers.nodes, bytes);
+    u->slice_nodes = texels;
+    layers_build(&layers, false);
+    for (uint32_t slice = 0; slice < slices; slice++)
+        for (uint32_t i = 0; i < texels; i++) {
+            const uint32_t *leaf = layers.nodes[slice * texels + i], *of_tree = whole[slice * whole_slice + i];
+            assert_int_equal(leaf[0], of_tree[0] & ~1u);
+            assert_int_equal(leaf[1], of_tree[1]);
+        }
+    free(whole);
+    layers_finish(&layers);
+}

@@ -1,0 +1,27 @@
+/* SPDX-License-Identifier: MIT */
+#include "engine/hidden_budget.h"
+
+/* Of a long time between two pictures no more counts. */
+#define PASSED_MAX_NS UINT64_C(1000000000)
+
+void hidden_budget_earn(struct hidden_budget *budget, uint64_t passed_ns)
+{
+    const uint64_t counted_ns = passed_ns < PASSED_MAX_NS ? passed_ns : PASSED_MAX_NS;
+    const int64_t saved_max_ns = (int64_t)budget->cost_ns * 2; /* or many would follow one another */
+    budget->saved_ns += (int64_t)(counted_ns * HIDDEN_SHARE_PERCENT / 100);
+    if (budget->saved_ns > saved_max_ns)
+        budget->saved_ns = saved_max_ns;
+}
+
+bool hidden_budget_suffices(const struct hidden_budget *budget)
+{
+    return budget->saved_ns >= (int64_t)budget->cost_ns;
+}
+
+void hidden_budget_spend(struct hidden_budget *budget, uint64_t cost_ns, bool spare)
+{
+    const bool was_known = budget->cost_ns > 0;
+    budget->cost_ns = cost_ns;
+    if (was_known && !spare)
+        budget->saved_ns -= (int64_t)cost_ns;
+}

@@ -1,0 +1,241 @@
+/* SPDX-License-Identifier: MIT */
+/* What pictures cost, and which the next one is to be: one deadline for rendering and bytes together. */
+#include "session/pacing.h"
+
+#include <math.h>
+
+/* Share of the link that frames may fill: the rest drains other queues, and the connection's own. */
+#define LINK_SHARE 0.9
+#define LEARN_SHARE 0.25
+/* Share of the rendering estimate that stays with each frame. */
+#define RENDER_FADES 0.9
+/* Frames have shown how much of rendering depends on their size when their areas deviate by this part of the mean.
+ */
+#define AREA_DEVIATION 0.25
+/* Factor by which a frame may take longer than the time that no size can reduce. */
+#define OF_FIXED 1.5
+/* How many times in a row the next better step must fit, with this room. */
+#define BETTER_TIMES 8
+#define BETTER_ROOM 1.25
+/* A client that makes its own views asks for a picture that often at least while it moves: one that is there by
+ * then is better large than early. */
+#define LATE_NS 250e6
+
+static const unsigned scales_eighths[] = {8, 6, 4, 3, 2};
+#define SCALES (sizeof(scales_eighths) / sizeof(scales_eighths[0]))
+
+/* ---- what pictures cost ------------------------------------------------------------------------------ */
+
+/* Bytes of a JPEG beside those at PACING_QUALITY_REFERENCE: each step of 12 is a factor of about 1.35 (rendered
+ * pictures, libjpeg-turbo, 4:2:0). */
+static double bytes_of_quality(unsigned quality)
+{
+    return pow(1.35, ((double)quality - PACING_QUALITY_REFERENCE) / 12.0);
+}
+
+/* Beside that of a full picture without a margin. */
+static double area_of(const struct pacing *pacing, const struct pacing_advice *advice)
+{
+    const double side = (double)advice->scale_eighths / PACING_SCALE_FULL;
+    const double grown = 1.0 + (double)pacing->terms.margin * (2 - advice->margin_halves_less);
+    return side * side * grown * grown;
+}
+
+static unsigned samples_of(const struct pacing *pacing)
+{
+    return pacing->terms.samples > 1 ? pacing->terms.samples : 1;
+}
+
+/* Beside that of a full picture with all samples. */
+static double work_of(const struct pacing *pacing, const struct pacing_advice *advice)
+{
+    const unsigned samples = samples_of(pacing);
+    const unsigned taken = advice->samples > 0 && advice->samples < samples ? advice->samples : samples;
+    return area_of(pacing, advice) * taken / samples;
+}
+
+static void learn(double *known, double seen)
+{
+    *known = *known > 0.0 ? *known + LEARN_SHARE * (seen - *known) : seen;
+}
+
+/* A straight line through the times by area, as soon as there are times of different areas. */
+static void learn_render(struct pacing *pacing, double area, double render_ns)
+{
+    pacing->render_frames = pacing->render_frames * RENDER_FADES + 1.0;
+    pacing->render_areas = pacing->render_areas * RENDER_FADES + area;
+    pacing->render_ns = pacing->render_ns * RENDER_FADES + render_ns;
+    pacing->render_areas_areas = pacing->render_areas_areas * RENDER_FADES + area * area;
+    pacing->render_areas_ns = pacing->render_areas_ns * RENDER_FADES + area * render_ns;
+    double mean_area = pacing->render_areas / pacing->render_frames;
+    double mean_ns = pacing->render_ns / pacing->render_frames;
+    double variance = pacing->render_areas_areas / pacing->render_frames - mean_area * mean_area;
+    double minimum = AREA_DEVIATION * mean_area;
+    if (variance > minimum * minimum) {
+        double slope = (pacing->render_areas_ns / pacing->render_frames - mean_area * mean_ns) / variance;
+        pacing->render_fixed_ns = fmax(mean_ns - slope * mean_area, 0.0);
+    }
+    pacing->render_fixed_ns = fmin(pacing->render_fixed_ns, mean_ns);
+}
+
+void pacing_learn_picture(struct pacing *pacing, const struct pacing_advice *made, uint64_t render_ns,
+                          uint64_t bytes)
+{
+    learn_render(pacing, work_of(pacing, made), (double)render_ns);
+    if (made->quality)
+        learn(&pacing->bytes_full, (double)bytes / area_of(pacing, made) / bytes_of_quality(made->quality));
+}
+
+void pacing_learn(struct pacing *pacing, unsigned scale_eighths, unsigned quality, uint64_t render_ns,
+                  uint64_t bytes)
+{
+    const struct pacing_advice made = {.scale_eighths = scale_eighths, .quality = quality};
+    pacing_learn_picture(pacing, &made, render_ns, bytes);
+}
+
+void pacing_learn_hidden(struct pacing *pacing, uint64_t bytes)
+{
+    learn(&pacing->hidden_bytes, (double)bytes);
+}
+
+static double render_ns_of(const struct pacing *pacing, const struct pacing_advice *advice)
+{
+    if (!(pacing->render_frames > 0.0))
+        return 0.0;
+    double mean_ns = pacing->render_ns / pacing->render_frames;
+    double mean_area = pacing->render_areas / pacing->render_frames;
+    return pacing->render_fixed_ns + (mean_ns - pacing->render_fixed_ns) / mean_area * work_of(pacing, advice);
+}
+
+/* With the layers that follow it. */
+static double bytes_of(const struct pacing *pacing, const struct pacing_advice *advice)
+{
+    const double hidden = advice->no_hidden ? 0.0 : pacing->hidden_bytes * pacing->terms.hidden_layers;
+    return pacing->bytes_full * area_of(pacing, advice) * bytes_of_quality(advice->quality) + hidden;
+}
+
+/* So that the sending rule passes one frame in each frame time: earlier frames that are not acknowledged yet must
+ * fit too. */
+static double bytes_a_frame(const struct pacing *pacing)
+{
+    if (!(pacing->carried_ns > 0.0))
+        return INFINITY;
+    double of_link = LINK_SHARE * pacing->carried_bytes / pacing->carried_ns * (double)pacing->frame_ns;
+    double way_frames = (double)pacing_round_trip_ns(pacing) / (double)pacing->frame_ns;
+    double of_room = LINK_SHARE * pacing_room_bytes(pacing) / (floor(LINK_SHARE + way_frames) + 1.0);
+    return fmin(of_link, of_room);
+}
+
+/* ---- what is given up, and in which order ------------------------------------------------------------ */
+
+/* What a picture has to fit. */
+struct limits {
+    double bytes;
+    double render_ns;
+    double samples_ns;    /* of one with more than one sample */
+    double smaller_bytes; /* beyond which it is made smaller */
+};
+
+static struct limits limits_of(const struct pacing *pacing, double room)
+{
+    const double frame_ns = (double)pacing->frame_ns, bytes = bytes_a_frame(pacing) / room;
+    const bool makes_views = pacing_makes_views(&pacing->terms);
+    const double late_ns = makes_views ? fmax(frame_ns, LATE_NS) : frame_ns;
+    return (struct limits){
+        .bytes = bytes,
+        /* Where even the smallest picture would be late, it would not be worth its size. */
+        .render_ns = fmax(late_ns, OF_FIXED * pacing->render_fixed_ns) / room,
+        .samples_ns = frame_ns / room,
+        .smaller_bytes = bytes * late_ns / frame_ns,
+    };
+}
+
+static void lower_quality(const struct pacing *pacing, const struct limits *limits, unsigned minimum,
+                          struct pacing_advice *advice)
+{
+    while (advice->quality > minimum && bytes_of(pacing, advice) > limits->bytes)
+        advice->quality--;
+}
+
+/* Samples, layers of what is hidden, and the margin, until the rest fits; some fits nothing. */
+static void give_up_extras(const struct pacing *pacing, const struct limits *limits, struct pacing_advice *advice)
+{
+    const bool has_margin = pacing->terms.margin > 0.0f;
+    while (advice->samples > 1 && render_ns_of(pacing, advice) > limits->samples_ns)
+        advice->samples--;
+    advice->no_hidden = pacing->terms.hidden_layers > 0 && bytes_of(pacing, advice) > limits->bytes;
+    while (has_margin && advice->margin_halves_less < 2 &&
+           (bytes_of(pacing, advice) > limits->bytes || render_ns_of(pacing, advice) > limits->render_ns))
+        advice->margin_halves_less++;
+}
+
+static struct pacing_advice full_advice(const struct pacing *pacing, unsigned quality_wanted)
+{
+    return (struct pacing_advice){
+        .scale_eighths = PACING_SCALE_FULL, .quality = quality_wanted, .samples = samples_of(pacing)};
+}
+
+/* With the least quality. */
+static bool fits(const struct pacing *pacing, const struct limits *limits, unsigned minimum,
+                 struct pacing_advice advice)
+{
+    advice.quality = minimum;
+    return render_ns_of(pacing, &advice) <= limits->render_ns &&
+           bytes_of(pacing, &advice) <= limits->smaller_bytes;
+}
+
+/* The best step that fits `room` times; else the smallest. */
+static struct pacing_advice best_that_fits(const struct pacing *pacing, unsigned quality_wanted, double room)
+{
+    const struct limits limits = limits_of(pacing, room);
+    const unsigned minimum = quality_wanted < PACING_QUALITY_MIN ? quality_wanted : PACING_QUALITY_MIN;
+    struct pacing_advice advice = full_advice(pacing, quality_wanted);
+    for (size_t i = 0; i < SCALES; i++) {
+        advice = full_advice(pacing, quality_wanted);
+        advice.scale_eighths = scales_eighths[i];
+        if (pacing_makes_views(&pacing->terms))
+            give_up_extras(pacing, &limits, &advice); /* a smaller picture may have what a larger one did not */
+        if (fits(pacing, &limits, minimum, advice))
+            break;
+    }
+    lower_quality(pacing, &limits, minimum, &advice);
+    return advice;
+}
+
+/* ---- steadily ---------------------------------------------------------------------------------------- */
+
+/* What is given up last counts first. */
+static bool is_better(const struct pacing_advice *a, const struct pacing_advice *b)
+{
+    if (a->scale_eighths != b->scale_eighths)
+        return a->scale_eighths > b->scale_eighths;
+    if (a->quality != b->quality)
+        return a->quality > b->quality;
+    if (a->margin_halves_less != b->margin_halves_less)
+        return a->margin_halves_less < b->margin_halves_less;
+    if (a->no_hidden != b->no_hidden)
+        return b->no_hidden;
+    return a->samples > b->samples;
+}
+
+struct pacing_advice pacing_advise(struct pacing *pacing, unsigned quality_wanted)
+{
+    if (!pacing->advised.quality)
+        pacing->advised = full_advice(pacing, quality_wanted);
+    struct pacing_advice now = best_that_fits(pacing, quality_wanted, 1.0);
+    const struct pacing_advice with_room = best_that_fits(pacing, quality_wanted, BETTER_ROOM);
+    if (!is_better(&now, &pacing->advised)) {
+        pacing->better_count = 0;
+    } else if (!is_better(&with_room, &pacing->advised)) {
+        pacing->better_count = 0;
+        now = pacing->advised;
+    } else if (++pacing->better_count < BETTER_TIMES) {
+        now = pacing->advised;
+    } else {
+        pacing->better_count = 0;
+        now = with_room;
+    }
+    now.bytes = (uint64_t)fmin(bytes_a_frame(pacing), 0x1p40);
+    pacing->advised = now;
+    return now;
+}
