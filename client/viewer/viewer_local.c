@@ -101,10 +101,12 @@ bool viewer_needs_picture(const struct viewer *viewer, uint64_t now_ns)
         return true;
     viewer_aim(viewer, true, now_ns, &next);
     const struct fl_warp_counts *counts = &viewer->made_of.counts;
+    /* What the iteration has not found may well be seen. */
+    const float behind = viewer->made_of.quality == FL_WARP_TREE ? counts->behind : 0;
     return plan_is_due(&(struct plan_need){.since_asked_ns = now_ns - viewer->looked_ns,
                                            .gone = distance(next.eye, viewer->asked.eye),
                                            .radius = (double)viewer->local_radius,
-                                           .unseen = (double)(counts->behind + counts->outside)});
+                                           .unseen = (double)(behind + counts->outside)});
 }
 
 /* ---- what comes ---- */

@@ -38,7 +38,8 @@ enum fl_warp_error_code {
     FL_WARP_ERROR_NONE,
     FL_WARP_ERROR_ARGUMENT, /* what was given cannot be meant */
     FL_WARP_ERROR_MEMORY,
-    FL_WARP_ERROR_SYSTEM /* no thread could be started */
+    FL_WARP_ERROR_SYSTEM,  /* no thread could be started */
+    FL_WARP_ERROR_GIVEN_UP /* the caller said so */
 };
 
 struct fl_warp_error {
@@ -97,6 +98,10 @@ struct fl_warp_view {
     struct fl_warp_camera camera;
     enum fl_warp_quality quality;
     enum fl_warp_holes holes;
+    /* NULL: never. Asked from time to time, by several threads; true: the call ends in FL_WARP_ERROR_GIVEN_UP,
+     * with a part of the picture. */
+    bool (*is_given_up)(const void *context);
+    const void *given_up_context;
 };
 
 struct fl_warp_counts {
