@@ -16,6 +16,7 @@ struct fl_frame_expected {
     bool is_view;
     enum protocol_encoding still_encoding;
     uint32_t margin_x_max, margin_y_max, hidden_layers;
+    bool is_bare_at_rest; /* without attachments then, as it shows several views */
 };
 
 struct fl_assembly {

@@ -20,9 +20,8 @@
 bool viewer_has_local(const struct viewer *viewer)
 {
     const enum local_views mode = viewer->settings.local;
-    /* Where a clip moves the camera, only the daemon knows where it is; a picture of two eyes is no key view. */
-    return (mode == LOCAL_ON || (mode == LOCAL_AUTO && viewer->local_switch.on)) && !viewer_follows(viewer) &&
-           !viewer->settings.stereo;
+    /* Where a clip moves the camera, only the daemon knows where it is. */
+    return (mode == LOCAL_ON || (mode == LOCAL_AUTO && viewer->local_switch.on)) && !viewer_follows(viewer);
 }
 
 void viewer_plan_local(struct viewer *viewer, uint64_t now_ns)
@@ -36,9 +35,17 @@ void viewer_plan_local(struct viewer *viewer, uint64_t now_ns)
 
 /* ---- what the daemon is asked for ---- */
 
+/* Between both eyes; 0: there is one. */
+static float baseline_of(const struct viewer *viewer)
+{
+    return viewer->settings.stereo ? viewer->options->stereo_m : 0;
+}
+
 static float radius_of(const struct viewer *viewer)
 {
-    return viewer->has_camera ? (float)(PLAN_RADIUS_SHARE * camera_distance(&viewer->camera)) : 0;
+    return viewer->has_camera
+               ? (float)(PLAN_RADIUS_SHARE * camera_distance(&viewer->camera)) + baseline_of(viewer) / 2
+               : 0;
 }
 
 void viewer_ask_local(struct viewer *viewer, struct message_render *view)
@@ -208,6 +215,8 @@ static bool is_newest(const struct viewer *viewer)
 static struct views_wish wish_of(const struct viewer *viewer)
 {
     struct views_wish wish = {.holes = viewer->settings.holes,
+                              .baseline = baseline_of(viewer),
+                              .over = viewer->options->stereo_over,
                               .frame_ns = viewer->window ? window_frame_ns(viewer->window) : PLAN_FRAME_NS,
                               .moved_ns = viewer->moved_ns};
     viewer_render_size(viewer, &wish.width, &wish.height);
@@ -220,7 +229,8 @@ static bool is_wanted(const struct viewer *viewer, const struct views_wish *wish
 {
     const struct views_wish *before = &viewer->wished;
     return viewer->wish != 0 && memcmp(&wish->camera, &before->camera, sizeof(wish->camera)) == 0 &&
-           wish->width == before->width && wish->height == before->height && wish->holes == before->holes;
+           wish->width == before->width && wish->height == before->height && wish->holes == before->holes &&
+           (wish->baseline > 0) == (before->baseline > 0);
 }
 
 static void want(struct viewer *viewer)

@@ -83,28 +83,58 @@ static bool is_overtaken(const void *context)
     return atomic_load(&views->wishes) != views->making;
 }
 
+/* `share` of all pixels. */
+static void add_counts(struct fl_warp_counts *sum, const struct fl_warp_counts *of_eye, float share)
+{
+    sum->known += share * of_eye->known;
+    sum->behind += share * of_eye->behind;
+    sum->outside += share * of_eye->outside;
+    sum->deeper += share * of_eye->deeper;
+    sum->walked += share * of_eye->walked;
+    sum->bound_pixels = of_eye->bound_pixels > sum->bound_pixels ? of_eye->bound_pixels : sum->bound_pixels;
+    sum->processor_ns += of_eye->processor_ns;
+}
+
+/* One of `count` into its part of the picture. */
+static bool make_eye(struct views *views, const struct views_wish *wish, unsigned eye, unsigned count,
+                     struct fl_warp_view view, struct fl_warp_error *error)
+{
+    const float right = count > 1 ? wish->baseline * ((float)eye - 0.5f) : 0;
+    const size_t first = (size_t)eye * (wish->over ? (size_t)view.height * wish->width : view.width);
+    struct fl_warp_picture picture = {.stride = wish->width,
+                                      .colours = (uint32_t *)(void *)views->picture.pixels + first,
+                                      .mask = views->mask + first};
+    for (int row = 0; row < 3; row++)
+        view.camera.world_from_view[4 * row + 3] += right * view.camera.world_from_view[4 * row];
+    if (!fl_warp_make(views->current.warp, &view, &picture, error))
+        return false;
+    add_counts(&views->last.counts, &picture.counts, 1 / (float)count);
+    return true;
+}
+
 /* Into `picture` and `last`. `may_end`: it is given up when another one is wanted. */
 static bool make(struct views *views, const struct views_wish *wish, enum fl_warp_quality quality, bool may_end,
                  struct fl_warp_error *error)
 {
     if (!reserve(views, wish, error))
         return false;
-    const struct fl_warp_view view = {.width = wish->width,
-                                      .height = wish->height,
+    const unsigned eyes = wish->baseline > 0 ? 2 : 1;
+    const struct fl_warp_view view = {.width = wish->over ? wish->width : wish->width / eyes,
+                                      .height = wish->over ? wish->height / eyes : wish->height,
                                       .camera = wish->camera,
                                       .quality = quality,
                                       .holes = wish->holes,
                                       .is_given_up = may_end ? is_overtaken : NULL,
                                       .given_up_context = views};
-    struct fl_warp_picture picture = {.colours = (uint32_t *)(void *)views->picture.pixels, .mask = views->mask};
     const uint64_t begin_ns = monotonic_now_ns();
-    if (!fl_warp_make(views->current.warp, &view, &picture, error))
-        return false;
+    views->last.counts = (struct fl_warp_counts){0};
+    for (unsigned eye = 0; eye < eyes; eye++)
+        if (!make_eye(views, wish, eye, eyes, view, error))
+            return false;
     views->begun_ns = begin_ns;
     views->last.moved_ns = wish->moved_ns;
     views->last.key_came_ns = views->current.key.came_ns;
     views->last.quality = quality;
-    views->last.counts = picture.counts;
     views->last.took_ns = monotonic_now_ns() - begin_ns;
     views->last.build_ns = fl_warp_build_ns(views->current.warp);
     return true;

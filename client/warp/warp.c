@@ -317,6 +317,7 @@ bool fl_warp_make(struct fl_warp *warp, const struct fl_warp_view *view, struct 
                                       .rays = rays_of(warp, view),
                                       .width = view->width,
                                       .height = view->height,
+                                      .stride = picture->stride > 0 ? picture->stride : view->width,
                                       .holes = view->holes,
                                       .colours = picture->colours,
                                       .mask = picture->mask},

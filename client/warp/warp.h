@@ -113,8 +113,9 @@ struct fl_warp_counts {
     uint64_t processor_ns; /* of all threads */
 };
 
-/* The caller has the memory: width * height of each. */
+/* The caller has the memory: width * height of each, or more with a stride. */
 struct fl_warp_picture {
+    uint32_t stride;   /* pixels from a row to the next one, of both; 0: the width */
     uint32_t *colours; /* as in layers */
     uint8_t *mask;     /* enum fl_warp_mask */
     struct fl_warp_counts counts;
