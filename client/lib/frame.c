@@ -77,10 +77,11 @@ static bool check_attachments(const struct fl_assembly *assembly, const struct m
     const bool has_depth = (begin->attachments & FL_ATTACH_DEPTH) != 0;
     const bool has_normals = (begin->attachments & FL_ATTACH_NORMALS) != 0;
     const bool has_sticking = (begin->attachments & FL_ATTACH_STICKING) != 0;
-    if (begin->attachments != assembly->expected.attachments)
+    const struct fl_frame_expected *const wanted = &assembly->expected;
+    const unsigned expected = wanted->is_bare_at_rest && !begin->moving ? 0 : wanted->attachments;
+    if (begin->attachments != expected)
         return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_begin.attachments",
-                            "attachments %#x arrived, but %#x were expected", begin->attachments,
-                            assembly->expected.attachments);
+                            "attachments %#x arrived, but %#x were expected", begin->attachments, expected);
     if (has_depth != (begin->depth_bytes > 0) || begin->depth_bytes > maximum)
         return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_begin.depth_bytes", "%llu bytes cannot be depths",
                             (unsigned long long)begin->depth_bytes);

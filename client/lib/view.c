@@ -84,6 +84,7 @@ static bool ask(struct fl_view *view, const struct message_render *wanted, struc
     struct message_render *render = &message.render;
     fill_render(render, view);
     fl_connection_fit_render(view->connection, render);
+    const uint32_t eyes = render->views_across * render->views_down;
     struct asked *asked = &view->asked[view->asked_count];
     asked->request = fl_connection_next_request(view->connection);
     asked->change = view->changes;
@@ -98,6 +99,7 @@ static bool ask(struct fl_view *view, const struct message_render *wanted, struc
                                                  .margin_x_max = margin_pixels(render->margin, render->width),
                                                  .hidden_layers = render->hidden_layers,
                                                  .parts = render->parts != 0,
+                                                 .is_bare_at_rest = render->margin > 0 && eyes > 1,
                                                  .margin_y_max = margin_pixels(render->margin, render->height)};
     if (!fl_connection_send(view->connection, asked->request, 0, &message, error))
         return false;

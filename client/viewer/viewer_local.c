@@ -20,9 +20,8 @@
 bool viewer_has_local(const struct viewer *viewer)
 {
     const enum local_views mode = viewer->settings.local;
-    /* Where a clip moves the camera, only the daemon knows where it is; a picture of two eyes is no key view. */
-    return (mode == LOCAL_ON || (mode == LOCAL_AUTO && viewer->local_switch.on)) && !viewer_follows(viewer) &&
-           !viewer->settings.stereo;
+    /* Where a clip moves the camera, only the daemon knows where it is. */
+    return (mode == LOCAL_ON || (mode == LOCAL_AUTO && viewer->local_switch.on)) && !viewer_follows(viewer);
 }
 
 void viewer_plan_local(struct viewer *viewer, uint64_t now_ns)
@@ -36,9 +35,17 @@ void viewer_plan_local(struct viewer *viewer, uint64_t now_ns)
 
 /* ---- what the daemon is asked for ---- */
 
+/* Between both eyes; 0: there is one. */
+static float baseline_of(const struct viewer *viewer)
+{
+    return viewer->settings.stereo ? viewer->options->stereo_m : 0;
+}
+
 static float radius_of(const struct viewer *viewer)
 {
-    return viewer->has_camera ? (float)(PLAN_RADIUS_SHARE * camera_distance(&viewer->camera)) : 0;
+    return viewer->has_camera
+               ? (float)(PLAN_RADIUS_SHARE * camera_distance(&viewer->camera)) + baseline_of(viewer) / 2
+               : 0;
 }
 
 void viewer_ask_local(struct viewer *viewer, struct message_render *view)
@@ -101,10 +108,12 @@ bool viewer_needs_picture(const struct viewer *viewer, uint64_t now_ns)
         return true;
     viewer_aim(viewer, true, now_ns, &next);
     const struct fl_warp_counts *counts = &viewer->made_of.counts;
+    /* What the iteration has not found may well be seen. */
+    const float behind = viewer->made_of.quality == FL_WARP_TREE ? counts->behind : 0;
     return plan_is_due(&(struct plan_need){.since_asked_ns = now_ns - viewer->looked_ns,
                                            .gone = distance(next.eye, viewer->asked.eye),
                                            .radius = (double)viewer->local_radius,
-                                           .unseen = (double)(counts->behind + counts->outside),
+                                           .unseen = (double)(behind + counts->outside),
                                            .sticking = (double)counts->sticking});
 }
 
@@ -151,7 +160,7 @@ bool viewer_take_picture(struct viewer *viewer, struct fl_frame *frame)
 {
     const bool has_margin = frame->margin_x > 0 || frame->margin_y > 0;
     const bool is_key = frame->depth && frame->fov_y > 0 && viewer_has_local(viewer);
-    const bool is_shown = !has_margin || !is_key || viewer->live.width == 0;
+    const bool is_shown = !frame->moving || !is_key || viewer->live.width == 0;
     viewer->is_live = is_shown;
     if (is_key && !give_key(viewer, frame, is_shown))
         return false;
@@ -210,6 +219,8 @@ static bool is_newest(const struct viewer *viewer)
 static struct views_wish wish_of(const struct viewer *viewer)
 {
     struct views_wish wish = {.holes = viewer->settings.holes,
+                              .baseline = baseline_of(viewer),
+                              .over = viewer->options->stereo_over,
                               .frame_ns = viewer->window ? window_frame_ns(viewer->window) : PLAN_FRAME_NS,
                               .moved_ns = viewer->moved_ns};
     viewer_render_size(viewer, &wish.width, &wish.height);
@@ -222,7 +233,8 @@ static bool is_wanted(const struct viewer *viewer, const struct views_wish *wish
 {
     const struct views_wish *before = &viewer->wished;
     return viewer->wish != 0 && memcmp(&wish->camera, &before->camera, sizeof(wish->camera)) == 0 &&
-           wish->width == before->width && wish->height == before->height && wish->holes == before->holes;
+           wish->width == before->width && wish->height == before->height && wish->holes == before->holes &&
+           (wish->baseline > 0) == (before->baseline > 0);
 }
 
 static void want(struct viewer *viewer)

@@ -1,21 +1,24 @@
 /* SPDX-License-Identifier: MIT */
-#include "viewer/views.h"
+#include "viewer/warped_key.h"
 #include "protocol/common/clock.h"
 
 #include <errno.h>
 #include <pthread.h>
+#include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/resource.h>
 #include <time.h>
+#include <unistd.h>
 
-#define THREADS 2u      /* that make a view: the decoder, the window and often the daemon want the others */
-#define KEY_PIXELS 0.5f /* that planes may be off beside the rounding of depths: it is not seen in motion */
+#define THREADS 2u /* that make a view: the decoder, the window and often the daemon want the others */
+#define KEY_NICE 5 /* of the thread that prepares keys: views are more urgent */
 #define SECOND_NS UINT64_C(1000000000)
 #define STILL_NS UINT64_C(80000000) /* without another wish: then there is time for a better view */
 
 struct views {
-    pthread_t thread;
-    pthread_mutex_t lock; /* guards what follows, up to the thread's own */
+    pthread_t thread, key_thread;
+    pthread_mutex_t lock; /* guards what follows, up to the threads' own */
     pthread_cond_t changed;
     bool quit;
     struct views_key given; /* the newest that was not taken; no depth: there is none */
@@ -24,9 +27,11 @@ struct views {
     uint32_t given_layer_count;
     bool is_adding;      /* one of them to the key .. */
     uint32_t key_layers; /* .. that the thread has */
-    bool forgets, wants;
+    uint64_t first_key;  /* since which none is forgotten */
+    bool is_prepared;    /* `next` is to become `current` */
+    bool wants;
     struct views_wish wish;
-    uint64_t wishes; /* number of `wish` */
+    atomic_uint_fast64_t wishes; /* number of `wish`; read without the lock, too */
     uint64_t wished_ns;
     uint64_t first_wish; /* since which some view was wanted all the time */
     struct pixmap made_picture;
@@ -34,27 +39,18 @@ struct views {
     bool has_made; /* that was not taken */
     struct fl_warp_error error;
 
-    /* The thread's own. */
-    struct fl_warp *warp;
+    struct warped_key next;    /* the key thread's own, unless it is prepared; its number is guarded */
+    struct warped_key current; /* the view thread's own, likewise */
+
+    /* The view thread's own. */
+    uint64_t making;       /* number of the wish whose view is made */
     struct pixmap picture; /* that is made */
     uint8_t *mask;
     size_t mask_bytes;
-    struct views_key key; /* that the warp has, without picture and depths */
-    int key_width, key_height;
-    uint64_t key_number; /* 0: it has none */
     struct views_made last;
     struct plan_rung rung;
     uint64_t begun_ns; /* the last view */
 };
-
-static void key_finish(struct views_key *key)
-{
-    pixmap_finish(&key->picture);
-    free(key->depth);
-    free(key->sticking);
-    key->depth = NULL;
-    key->sticking = NULL;
-}
 
 /* With the lock. */
 static void drop_layers(struct views *views)
@@ -63,59 +59,7 @@ static void drop_layers(struct views *views)
         views_layer_finish(&views->given_layers[--views->given_layer_count]);
 }
 
-/* ---- in the thread, without the lock ---- */
-
-/* In place. */
-static void invert(float *depths, size_t count, float unit)
-{
-    for (size_t i = 0; i < count; i++)
-        depths[i] = depths[i] > 0 ? unit / depths[i] : 0;
-}
-
-/* Makes numbers of the order of one. */
-static float unit_of(const struct views_key *key)
-{
-    return key->radius / (float)PLAN_RADIUS_SHARE;
-}
-
-/* From what has come to what views are made from. */
-static bool set_key(struct views *views, struct views_key *came, struct fl_warp_error *error)
-{
-    const struct pixmap *picture = &came->picture;
-    const float unit = unit_of(came);
-    views->key_width = picture->width;
-    views->key_height = picture->height;
-    invert(came->depth, (size_t)picture->width * (size_t)picture->height, unit);
-    const struct fl_warp_key key = {.width = (uint32_t)picture->width,
-                                    .height = (uint32_t)picture->height,
-                                    .camera = came->camera,
-                                    .unit = unit,
-                                    .w_error = unit * came->depth_step / 2,
-                                    .radius = came->radius,
-                                    .pixels = KEY_PIXELS,
-                                    .layer_count = 1,
-                                    .layers[0] = {.colours = (const uint32_t *)(const void *)picture->pixels,
-                                                  .w = came->depth,
-                                                  .sticking = came->sticking}};
-    const bool set = fl_warp_set_key(views->warp, &key, error);
-    key_finish(came);
-    views->key = *came;
-    return set;
-}
-
-/* *added: it is of the key. */
-static bool add_layer(struct views *views, struct views_layer *came, bool *added, struct fl_warp_error *error)
-{
-    const struct pixmap *picture = &came->picture;
-    const bool fits = views_layer_fit(came, views->key_width, views->key_height);
-    const struct fl_warp_layer layer = {.colours = (const uint32_t *)(const void *)picture->pixels,
-                                        .w = came->depth};
-    if (fits)
-        invert(came->depth, (size_t)picture->width * (size_t)picture->height, unit_of(&views->key));
-    *added = fits && fl_warp_add_layer(views->warp, &layer, error);
-    views_layer_finish(came);
-    return *added || !fits;
-}
+/* ---- in the view thread, without the lock ---- */
 
 static bool reserve(struct views *views, const struct views_wish *wish, struct fl_warp_error *error)
 {
@@ -133,32 +77,71 @@ static bool reserve(struct views *views, const struct views_wish *wish, struct f
     return good;
 }
 
-/* Into `picture` and `last`. */
-static bool make(struct views *views, const struct views_wish *wish, enum fl_warp_quality quality,
+static bool is_overtaken(const void *context)
+{
+    const struct views *views = context;
+    return atomic_load(&views->wishes) != views->making;
+}
+
+/* `share` of all pixels. */
+static void add_counts(struct fl_warp_counts *sum, const struct fl_warp_counts *of_eye, float share)
+{
+    sum->known += share * of_eye->known;
+    sum->behind += share * of_eye->behind;
+    sum->outside += share * of_eye->outside;
+    sum->deeper += share * of_eye->deeper;
+    sum->walked += share * of_eye->walked;
+    sum->sticking += share * of_eye->sticking;
+    sum->bound_pixels = of_eye->bound_pixels > sum->bound_pixels ? of_eye->bound_pixels : sum->bound_pixels;
+    sum->processor_ns += of_eye->processor_ns;
+}
+
+/* One of `count` into its part of the picture. */
+static bool make_eye(struct views *views, const struct views_wish *wish, unsigned eye, unsigned count,
+                     struct fl_warp_view view, struct fl_warp_error *error)
+{
+    const float right = count > 1 ? wish->baseline * ((float)eye - 0.5f) : 0;
+    const size_t first = (size_t)eye * (wish->over ? (size_t)view.height * wish->width : view.width);
+    struct fl_warp_picture picture = {.stride = wish->width,
+                                      .colours = (uint32_t *)(void *)views->picture.pixels + first,
+                                      .mask = views->mask + first};
+    for (int row = 0; row < 3; row++)
+        view.camera.world_from_view[4 * row + 3] += right * view.camera.world_from_view[4 * row];
+    if (!fl_warp_make(views->current.warp, &view, &picture, error))
+        return false;
+    add_counts(&views->last.counts, &picture.counts, 1 / (float)count);
+    return true;
+}
+
+/* Into `picture` and `last`. `may_end`: it is given up when another one is wanted. */
+static bool make(struct views *views, const struct views_wish *wish, enum fl_warp_quality quality, bool may_end,
                  struct fl_warp_error *error)
 {
     if (!reserve(views, wish, error))
         return false;
-    const struct fl_warp_view view = {.width = wish->width,
-                                      .height = wish->height,
+    const unsigned eyes = wish->baseline > 0 ? 2 : 1;
+    const struct fl_warp_view view = {.width = wish->over ? wish->width : wish->width / eyes,
+                                      .height = wish->over ? wish->height / eyes : wish->height,
                                       .camera = wish->camera,
                                       .quality = quality,
-                                      .holes = wish->holes};
-    struct fl_warp_picture picture = {.colours = (uint32_t *)(void *)views->picture.pixels, .mask = views->mask};
+                                      .holes = wish->holes,
+                                      .is_given_up = may_end ? is_overtaken : NULL,
+                                      .given_up_context = views};
     const uint64_t begin_ns = monotonic_now_ns();
-    if (!fl_warp_make(views->warp, &view, &picture, error))
-        return false;
+    views->last.counts = (struct fl_warp_counts){0};
+    for (unsigned eye = 0; eye < eyes; eye++)
+        if (!make_eye(views, wish, eye, eyes, view, error))
+            return false;
     views->begun_ns = begin_ns;
     views->last.moved_ns = wish->moved_ns;
-    views->last.key_came_ns = views->key.came_ns;
+    views->last.key_came_ns = views->current.key.came_ns;
     views->last.quality = quality;
-    views->last.counts = picture.counts;
     views->last.took_ns = monotonic_now_ns() - begin_ns;
-    views->last.build_ns = fl_warp_build_ns(views->warp);
+    views->last.build_ns = fl_warp_build_ns(views->current.warp);
     return true;
 }
 
-/* ---- in the thread, with the lock ---- */
+/* ---- in the threads, with the lock ---- */
 
 static bool same_camera(const struct fl_warp_camera *a, const struct fl_warp_camera *b)
 {
@@ -168,23 +151,23 @@ static bool same_camera(const struct fl_warp_camera *a, const struct fl_warp_cam
 /* At rest the first picture of a camera and the last one are prepared, so that motion begins with a view. */
 static bool wants_key(const struct views *views)
 {
-    return views->given.depth && (views->wants || views->given.is_final || views->key_number == 0 ||
-                                  !same_camera(&views->given.camera, &views->key.camera));
+    return views->given.depth && (views->wants || views->given.is_final || views->current.number == 0 ||
+                                  !same_camera(&views->given.camera, &views->current.key.camera));
 }
 
 static bool is_of_now(const struct views *views, const struct views_made *made)
 {
-    return made->wish == views->wishes && made->key == views->key_number && made->layers == views->key_layers;
+    return made->wish == views->wishes && made->key == views->current.number && made->layers == views->key_layers;
 }
 
 static bool wants_layer(const struct views *views)
 {
-    return views->given_layer_count > 0 && views->key_number == views->keys;
+    return views->given_layer_count > 0 && views->current.number == views->keys;
 }
 
 static bool wants_view(const struct views *views)
 {
-    return views->wants && views->key_number != 0 &&
+    return views->wants && views->current.number != 0 &&
            (!is_of_now(views, &views->last) || views->last.quality != FL_WARP_TREE);
 }
 
@@ -195,19 +178,30 @@ static uint64_t due_ns(const struct views *views)
     return is_of_now(views, &views->last) && still_ns > next_ns ? still_ns : next_ns;
 }
 
-static void take_key(struct views *views)
+static void prepare_key(struct views *views)
 {
     struct views_key came = views->given;
     struct fl_warp_error error = {0};
     const uint64_t number = views->keys;
     views->given = (struct views_key){0};
     pthread_mutex_unlock(&views->lock);
-    const bool set = set_key(views, &came, &error);
+    const bool set = warped_key_set(&views->next, &came, &error);
     pthread_mutex_lock(&views->lock);
-    views->key_number = set ? number : 0;
-    views->key_layers = 1;
+    views->next.number = set ? number : 0;
+    views->is_prepared = true;
     if (!set)
         views->error = error;
+    pthread_cond_broadcast(&views->changed);
+}
+
+static void take_key(struct views *views)
+{
+    const struct warped_key before = views->current;
+    views->current = views->next;
+    views->next = before;
+    views->is_prepared = false;
+    views->key_layers = 1;
+    pthread_cond_broadcast(&views->changed);
 }
 
 static void take_layer(struct views *views)
@@ -218,7 +212,7 @@ static void take_layer(struct views *views)
     views->is_adding = true;
     views->given_layers[0] = views->given_layers[--views->given_layer_count];
     pthread_mutex_unlock(&views->lock);
-    const bool good = add_layer(views, &came, &added, &error);
+    const bool good = warped_key_add(&views->current, &came, &added, &error);
     pthread_mutex_lock(&views->lock);
     views->is_adding = false;
     views->key_layers += added;
@@ -234,18 +228,21 @@ static void take_wish(struct views *views)
     const bool again = is_of_now(views, &views->last);
     const enum fl_warp_quality quality = again ? FL_WARP_TREE : views->rung.quality;
     pthread_mutex_unlock(&views->lock);
-    const bool done = make(views, &wish, quality, &error);
+    views->making = number;
+    const bool done = make(views, &wish, quality, again, &error);
     if (done && !again)
         plan_rung(&views->rung, views->last.took_ns, wish.frame_ns, monotonic_now_ns());
     pthread_mutex_lock(&views->lock);
+    if (error.code == FL_WARP_ERROR_GIVEN_UP)
+        return;
     /* What fails is not tried again before there is another key. */
-    views->key_number = done ? views->key_number : 0;
+    views->current.number = done ? views->current.number : 0;
     if (!done) {
         views->error = error;
         return;
     }
     views->last.wish = number;
-    views->last.key = views->key_number;
+    views->last.key = views->current.number;
     views->last.layers = views->key_layers;
     if (number < views->first_wish) /* another motion's */
         return;
@@ -261,16 +258,30 @@ static void wait_until(struct views *views, uint64_t until_ns)
     pthread_cond_timedwait(&views->changed, &views->lock, &until);
 }
 
-static void *work(void *argument)
+static void *prepare_keys(void *argument)
+{
+    struct views *views = argument;
+    const id_t own = (id_t)gettid();
+    setpriority(PRIO_PROCESS, own, getpriority(PRIO_PROCESS, own) + KEY_NICE);
+    pthread_mutex_lock(&views->lock);
+    while (!views->quit) {
+        if (!views->is_prepared && wants_key(views))
+            prepare_key(views);
+        else
+            pthread_cond_wait(&views->changed, &views->lock);
+    }
+    pthread_mutex_unlock(&views->lock);
+    return NULL;
+}
+
+static void *make_views(void *argument)
 {
     struct views *views = argument;
     pthread_mutex_lock(&views->lock);
     while (!views->quit) {
-        if (views->forgets) {
-            views->key_number = 0;
-            views->forgets = false;
-        }
-        if (wants_key(views))
+        if (views->current.number < views->first_key)
+            views->current.number = 0;
+        if (views->is_prepared)
             take_key(views);
         else if (wants_layer(views))
             take_layer(views);
@@ -294,9 +305,9 @@ void views_give_key(struct views *views, struct views_key *key)
     views->given = *key;
     views->keys++;
     drop_layers(views);
-    pthread_cond_signal(&views->changed);
+    pthread_cond_broadcast(&views->changed);
     pthread_mutex_unlock(&views->lock);
-    key_finish(&outdated);
+    views_key_finish(&outdated);
     *key = (struct views_key){0};
 }
 
@@ -307,7 +318,7 @@ void views_give_layer(struct views *views, struct views_layer *layer)
         views->given_layers[views->given_layer_count++] = *layer;
     else
         views_layer_finish(layer);
-    pthread_cond_signal(&views->changed);
+    pthread_cond_broadcast(&views->changed);
     pthread_mutex_unlock(&views->lock);
     *layer = (struct views_layer){0};
 }
@@ -318,10 +329,10 @@ void views_forget_keys(struct views *views)
     struct views_key outdated = views->given;
     views->given = (struct views_key){0};
     drop_layers(views);
-    views->forgets = true;
+    views->first_key = views->keys + 1;
     views->wants = views->has_made = false;
     pthread_mutex_unlock(&views->lock);
-    key_finish(&outdated);
+    views_key_finish(&outdated);
 }
 
 uint64_t views_want(struct views *views, const struct views_wish *wish)
@@ -333,7 +344,7 @@ uint64_t views_want(struct views *views, const struct views_wish *wish)
     views->wish = *wish;
     views->wished_ns = monotonic_now_ns();
     views->wants = true;
-    pthread_cond_signal(&views->changed);
+    pthread_cond_broadcast(&views->changed);
     pthread_mutex_unlock(&views->lock);
     return number;
 }
@@ -378,6 +389,14 @@ bool views_take_error(struct views *views, struct fl_warp_error *error)
 
 /* ---- beginning and end ---- */
 
+static void end(struct views *views)
+{
+    pthread_mutex_lock(&views->lock);
+    views->quit = true;
+    pthread_cond_broadcast(&views->changed);
+    pthread_mutex_unlock(&views->lock);
+}
+
 static bool start(struct views *views)
 {
     pthread_condattr_t attributes;
@@ -386,8 +405,13 @@ static bool start(struct views *views)
     pthread_cond_init(&views->changed, &attributes);
     pthread_condattr_destroy(&attributes);
     pthread_mutex_init(&views->lock, NULL);
-    if (pthread_create(&views->thread, NULL, work, views) == 0)
-        return true;
+    views->first_key = 1;
+    if (pthread_create(&views->thread, NULL, make_views, views) == 0) {
+        if (pthread_create(&views->key_thread, NULL, prepare_keys, views) == 0)
+            return true;
+        end(views);
+        pthread_join(views->thread, NULL);
+    }
     pthread_mutex_destroy(&views->lock);
     pthread_cond_destroy(&views->changed);
     return false;
@@ -397,14 +421,18 @@ struct views *views_create(struct fl_error *error)
 {
     struct fl_warp_error why = {0};
     struct views *views = calloc(1, sizeof(*views));
-    if (views)
-        views->warp = fl_warp_create(THREADS, &why);
-    if (views && views->warp && start(views))
+    if (views) {
+        views->current.warp = fl_warp_create(THREADS, &why);
+        views->next.warp = fl_warp_create(THREADS, &why);
+    }
+    if (views && views->current.warp && views->next.warp && start(views))
         return views;
     fl_error_set(error, FL_ERROR_SYSTEM, "", "views cannot be made here: %s",
                  why.code != FL_WARP_ERROR_NONE ? why.text : "no memory, or no thread");
-    if (views)
-        fl_warp_destroy(views->warp);
+    if (views) {
+        fl_warp_destroy(views->current.warp);
+        fl_warp_destroy(views->next.warp);
+    }
     free(views);
     return NULL;
 }
@@ -413,16 +441,15 @@ void views_destroy(struct views *views)
 {
     if (!views)
         return;
-    pthread_mutex_lock(&views->lock);
-    views->quit = true;
-    pthread_cond_signal(&views->changed);
-    pthread_mutex_unlock(&views->lock);
+    end(views);
     pthread_join(views->thread, NULL);
+    pthread_join(views->key_thread, NULL);
     pthread_mutex_destroy(&views->lock);
     pthread_cond_destroy(&views->changed);
-    fl_warp_destroy(views->warp);
+    fl_warp_destroy(views->current.warp);
+    fl_warp_destroy(views->next.warp);
     drop_layers(views);
-    key_finish(&views->given);
+    views_key_finish(&views->given);
     pixmap_finish(&views->made_picture);
     pixmap_finish(&views->picture);
     free(views->mask);

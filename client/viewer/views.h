@@ -24,8 +24,10 @@ struct views_key {
 
 /* What is wanted. */
 struct views_wish {
-    uint32_t width, height;
+    uint32_t width, height; /* of the picture, all eyes */
     struct fl_warp_camera camera;
+    float baseline; /* metres between both eyes, which the camera is in the middle of; 0: it is the only one */
+    bool over;      /* the left one above the other, not beside it */
     enum fl_warp_holes holes;
     uint64_t frame_ns; /* of the display: at most one view is made in it */
     uint64_t moved_ns; /* when it was moved there */

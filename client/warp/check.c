@@ -129,6 +129,9 @@ bool warp_check_view(const struct fl_warp_view *view, const struct fl_warp_pictu
     if ((unsigned)view->holes > FL_WARP_PATTERN)
         return warp_error_set(error, FL_WARP_ERROR_ARGUMENT, "holes", "%d is no way to show them",
                               (int)view->holes);
+    if (picture->stride > 0 && picture->stride < view->width)
+        return warp_error_set(error, FL_WARP_ERROR_ARGUMENT, "stride", "%u is less than the width, %u",
+                              picture->stride, view->width);
     if (!picture->colours || !picture->mask)
         return warp_error_set(error, FL_WARP_ERROR_ARGUMENT, "picture", "it has no colours, or no mask");
     return true;

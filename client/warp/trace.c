@@ -231,8 +231,8 @@ void warp_store(const struct warp_task *task, uint32_t x, uint32_t y, const stru
     if (x >= task->width || y >= task->height)
         return;
     const uint32_t count = pixels->count < task->width - x ? pixels->count : task->width - x;
-    uint32_t *colours = task->colours + (size_t)y * task->width + x, behind = 0, outside = 0;
-    uint8_t *mask = task->mask + (size_t)y * task->width + x;
+    uint32_t *colours = task->colours + (size_t)y * task->stride + x, behind = 0, outside = 0;
+    uint8_t *mask = task->mask + (size_t)y * task->stride + x;
     memcpy(colours, pixels->colours, count * sizeof(*colours));
     for (uint32_t k = 0; k < count; k++) {
         mask[k] = (uint8_t)pixels->mask[k];
@@ -243,7 +243,7 @@ void warp_store(const struct warp_task *task, uint32_t x, uint32_t y, const stru
     tally->by_mask[FL_WARP_BEHIND] += behind;
     tally->by_mask[FL_WARP_OUTSIDE] += outside;
     if (task->sticks)
-        store_sticking(task, (size_t)y * task->width + x, pixels, count, tally);
+        store_sticking(task, (size_t)y * task->stride + x, pixels, count, tally);
     if (task->holes != FL_WARP_PATTERN || behind + outside == 0)
         return;
     for (uint32_t k = 0; k < count; k++)
@@ -255,18 +255,18 @@ void warp_store(const struct warp_task *task, uint32_t x, uint32_t y, const stru
 static void store_known(const struct warp_task *task, uint32_t x, uint32_t y, const struct result *result,
                         struct warp_tally *tally)
 {
-    const size_t i = (size_t)y * task->width + x;
+    const size_t i = (size_t)y * task->stride + x;
     const uint32_t *colours = result->colours;
     memcpy(task->colours + i, colours, PACKET_COLUMNS * sizeof(*colours));
-    memcpy(task->colours + i + task->width, colours + PACKET_COLUMNS, PACKET_COLUMNS * sizeof(*colours));
+    memcpy(task->colours + i + task->stride, colours + PACKET_COLUMNS, PACKET_COLUMNS * sizeof(*colours));
     if (task->sticks && task->sticking) {
         memcpy(task->sticking + i, result->sticking, PACKET_COLUMNS);
-        memcpy(task->sticking + i + task->width, result->sticking + PACKET_COLUMNS, PACKET_COLUMNS);
+        memcpy(task->sticking + i + task->stride, result->sticking + PACKET_COLUMNS, PACKET_COLUMNS);
     }
     for (int k = 0; task->sticks && k < LANES; k++)
         tally->sticking += result->sticking[k];
     memset(task->mask + i, FL_WARP_KNOWN, PACKET_COLUMNS);
-    memset(task->mask + i + task->width, FL_WARP_KNOWN, PACKET_COLUMNS);
+    memset(task->mask + i + task->stride, FL_WARP_KNOWN, PACKET_COLUMNS);
     tally->by_mask[FL_WARP_KNOWN] += LANES;
 }
 

@@ -15,7 +15,7 @@ struct warp_task {
     uint32_t layer_count;
     struct warp_rays rays;
     float ranges[FL_WARP_LAYERS_MAX][2]; /* least and greatest w of each layer that a ray may meet */
-    uint32_t width, height;
+    uint32_t width, height, stride;      /* of what is written, pixels */
     enum fl_warp_holes holes;
     uint32_t *colours;
     uint8_t *mask, *sticking; /* the latter may be NULL */

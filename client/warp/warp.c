@@ -7,6 +7,7 @@
 #include "warp/tree.h"
 
 #include <math.h>
+#include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -277,15 +278,23 @@ static struct warp_rays rays_of(const struct fl_warp *warp, const struct fl_warp
 
 struct view_work {
     struct warp_task task;
-    enum fl_warp_quality quality;
+    const struct fl_warp_view *view;
+    atomic_bool given_up;
     struct warp_tally tallies[FL_WARP_THREADS_MAX];
 };
 
 static void make_row(void *context, unsigned item, unsigned worker)
 {
     struct view_work *work = context;
+    const struct fl_warp_view *view = work->view;
     struct warp_tally tally = {.by_mask = {0}};
-    (work->quality == FL_WARP_TREE ? warp_trace_row : warp_iterate_row)(&work->task, item, &tally);
+    if (atomic_load(&work->given_up))
+        return;
+    if (view->is_given_up && view->is_given_up(view->given_up_context)) {
+        atomic_store(&work->given_up, true);
+        return;
+    }
+    (view->quality == FL_WARP_TREE ? warp_trace_row : warp_iterate_row)(&work->task, item, &tally);
     struct warp_tally *sum = &work->tallies[worker];
     for (int i = 0; i <= FL_WARP_OUTSIDE; i++)
         sum->by_mask[i] += tally.by_mask[i];
@@ -332,18 +341,21 @@ bool fl_warp_make(struct fl_warp *warp, const struct fl_warp_view *view, struct 
                                       .rays = rays_of(warp, view),
                                       .width = view->width,
                                       .height = view->height,
+                                      .stride = picture->stride > 0 ? picture->stride : view->width,
                                       .holes = view->holes,
                                       .colours = picture->colours,
                                       .mask = picture->mask,
                                       .sticking = picture->sticking},
-                             .quality = view->quality};
+                             .view = view};
     for (uint32_t l = 0; l < warp->layer_count; l++)
         work.task.sticks |= warp->layers[l].sticks;
-    if (picture->sticking && !work.task.sticks)
-        memset(picture->sticking, 0, (size_t)view->width * view->height);
+    for (uint32_t y = 0; y < view->height && picture->sticking && !work.task.sticks; y++)
+        memset(picture->sticking + (size_t)y * work.task.stride, 0, view->width);
     warp_task_find_ranges(&work.task);
     const uint64_t time_ns =
         warp_pool_run(warp->pool, make_row, &work, (view->height + WARP_TILE - 1) / WARP_TILE);
+    if (atomic_load(&work.given_up))
+        return warp_error_set(error, FL_WARP_ERROR_GIVEN_UP, "view", "it was given up");
     picture->counts = counts_of(warp, view, &work);
     picture->counts.processor_ns = time_ns;
     return true;

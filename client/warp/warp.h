@@ -38,7 +38,8 @@ enum fl_warp_error_code {
     FL_WARP_ERROR_NONE,
     FL_WARP_ERROR_ARGUMENT, /* what was given cannot be meant */
     FL_WARP_ERROR_MEMORY,
-    FL_WARP_ERROR_SYSTEM /* no thread could be started */
+    FL_WARP_ERROR_SYSTEM,  /* no thread could be started */
+    FL_WARP_ERROR_GIVEN_UP /* the caller said so */
 };
 
 struct fl_warp_error {
@@ -98,6 +99,10 @@ struct fl_warp_view {
     struct fl_warp_camera camera;
     enum fl_warp_quality quality;
     enum fl_warp_holes holes;
+    /* NULL: never. Asked from time to time, by several threads; true: the call ends in FL_WARP_ERROR_GIVEN_UP,
+     * with a part of the picture. */
+    bool (*is_given_up)(const void *context);
+    const void *given_up_context;
 };
 
 struct fl_warp_counts {
@@ -110,8 +115,9 @@ struct fl_warp_counts {
     uint64_t processor_ns; /* of all threads */
 };
 
-/* The caller has the memory: width * height of each. */
+/* The caller has the memory: width * height of each, or more with a stride. */
 struct fl_warp_picture {
+    uint32_t stride;   /* pixels from a row to the next one, of both; 0: the width */
     uint32_t *colours; /* as in layers */
     uint8_t *mask;     /* enum fl_warp_mask */
     uint8_t *sticking; /* as in layers, of the texel that is seen; 0 where none is known; NULL: not wanted */

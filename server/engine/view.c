@@ -145,6 +145,22 @@ static float margin_share(const struct job *job)
     return halves_less < 2 ? job->spec.margin * (float)(2 - halves_less) / 2.0f : 0.0f;
 }
 
+/* While it moves a client that makes views of its own makes all eyes of the one in the middle. */
+static void choose_eyes(const struct job *job, struct frame_request *request)
+{
+    if (!(job->spec.margin > 0.0f) || !frame_has_views(request))
+        return;
+    if (!job->view.wish.camera.moving) {
+        request->attachments = 0;
+        return;
+    }
+    frame_view_size(request, &request->width, &request->height);
+    request->views_across = request->views_down = 1;
+    request->eyes_over = false;
+    request->baseline = 0.0f;
+    request->view_source = VIEW_SOURCE_RAYS;
+}
+
 /* While it moves: so that a client has something to show beside the edges of the picture. */
 static void add_margin(struct job *job, struct frame_request *request)
 {
@@ -184,6 +200,7 @@ static bool take_up_hidden(struct job *job, struct shot *shot, struct error *err
     request->samples = 1;
     request->hidden_layer = view->hidden_layer;
     request->hidden_radius = job->spec.depth.radius;
+    choose_eyes(job, request);
     apply_effort(job, request);
     add_margin(job, request);
     halve(view, request);
@@ -211,6 +228,7 @@ bool view_take_up(struct job *job, struct shot *shot, struct error *error)
     shot->request.accumulate = adds_up(job);
     shot->request.samples = samples_of_next(job);
     shot->request.samples_max = job->spec.frame.samples; /* one that is complete may be wished again */
+    choose_eyes(job, &shot->request);
     apply_effort(job, &shot->request);
     add_margin(job, &shot->request);
     return true;

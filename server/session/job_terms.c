@@ -112,7 +112,7 @@ static bool check_hidden(const struct message_render *render, struct error *erro
 {
     if (!render->hidden_layers)
         return true;
-    if (render->kind == PROTOCOL_JOB_BATCH || has_views(render)) {
+    if (render->kind == PROTOCOL_JOB_BATCH || (has_views(render) && !(render->margin > 0.0f))) {
         error_set(error, ERROR_UNSUPPORTED, "render.hidden_layers",
                   "only pictures of a view of one eye have some");
         return error_remedy(error, "set it to 0");
@@ -278,8 +278,8 @@ static bool check_tracers(const struct message_render *render, struct error *err
 /* What is different with views. */
 static bool check_kind(const struct session *session, const struct message_render *render, struct error *error)
 {
-    if (render->margin > 0.0f && (render->kind == PROTOCOL_JOB_BATCH || has_views(render))) {
-        error_set(error, ERROR_UNSUPPORTED, "render.margin", "only a view of one eye has it, while it moves");
+    if (render->margin > 0.0f && render->kind == PROTOCOL_JOB_BATCH) {
+        error_set(error, ERROR_UNSUPPORTED, "render.margin", "only a view has it, while it moves");
         return error_remedy(error, "set it to 0, or ask for a larger picture and field of view");
     }
     if (render->kind == PROTOCOL_JOB_BATCH) {

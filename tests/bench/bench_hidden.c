@@ -227,7 +227,7 @@ static bool measure_views(struct bench *bench, json_t *told, struct error *error
     const size_t count = (size_t)bench->width * bench->height;
     struct texels texels[KINDS + 1] = {{0}};
     struct warp_picture picture = {0};
-    bool good = warp_picture_init(&picture, bench->width, bench->height);
+    bool good = warp_picture_init(&picture, bench->width, bench->height, (uint32_t)count);
     for (size_t i = 0; i <= KINDS; i++) {
         texels[i] = (struct texels){calloc(count, sizeof(uint32_t)), calloc(count, sizeof(float))};
         good &= texels[i].colours && texels[i].w;

@@ -1071,7 +1071,7 @@ SESSION_TEST(attachments_of_a_view_are_forwarded_and_announced)
     assert_true(begin.margin_x == 7 && begin.margin_y == 5);
 }
 
-SESSION_TEST(a_margin_is_for_views_of_one_eye_within_the_limits)
+SESSION_TEST(a_margin_is_for_views)
 {
     open_scene(1, 1);
     struct message message = made(MESSAGE_RENDER);
@@ -1080,15 +1080,12 @@ SESSION_TEST(a_margin_is_for_views_of_one_eye_within_the_limits)
     message.render.margin = 0.1f;
     expect_refused(2, &message, PROTOCOL_ERROR_UNSUPPORTED, "render.margin");
     message = view_message(4);
-    message.render.margin = 0.1f;
+    message.render.margin = 0.25f;
     message.render.views_across = 2;
     message.render.baseline = 1;
-    expect_refused(3, &message, PROTOCOL_ERROR_UNSUPPORTED, "render.margin");
-    message = view_message(4);
-    message.render.margin = 0.25f;
     send_message(4, 0, &message);
     struct engine_command *command = told(ENGINE_JOB_START);
-    assert_true(command->job.margin == 0.25f);
+    assert_true(command->job.margin == 0.25f && command->job.frame.views_across == 2);
     engine_command_destroy(command);
 }
 

@@ -3,6 +3,7 @@
 #include "tests/unit/warp/views.h"
 
 #include <float.h>
+#include <limits.h>
 
 static void set_texels(void)
 {
@@ -200,6 +201,43 @@ TEST(a_view_that_cannot_be_is_refused)
     }
     picture.mask = NULL;
     expect_refused(fl_warp_make(warp, &good, &picture, &error), &error, "picture");
+    fl_warp_destroy(warp);
+}
+
+/* Of one thread: a number that each question takes one of. */
+struct patience {
+    int *questions;
+};
+
+static bool is_out_of_patience(const void *context)
+{
+    const struct patience *patience = context;
+    return (*patience->questions)-- == 0;
+}
+
+TEST(a_view_that_is_given_up_says_so_and_the_next_one_is_whole)
+{
+    static struct made whole, again;
+    set_texels();
+    const struct fl_warp_key key = key_of(1);
+    struct fl_warp *warp = warp_with(1, &key);
+    struct fl_warp_view view = view_of(camera_at(0.02, 0, 0), FL_WARP_TREE);
+    make(warp, &view, &whole);
+    view.is_given_up = is_out_of_patience;
+    for (int asked = 0; asked < 3; asked++) {
+        int questions = asked;
+        const struct patience patience = {&questions};
+        struct fl_warp_picture picture = {.colours = again.colours, .mask = again.mask};
+        struct fl_warp_error error = {0};
+        view.given_up_context = &patience;
+        assert_false(fl_warp_make(warp, &view, &picture, &error));
+        assert_int_equal(error.code, FL_WARP_ERROR_GIVEN_UP);
+        assert_int_equal(questions, -1); /* it is not asked again */
+    }
+    int questions = INT_MAX;
+    view.given_up_context = &(const struct patience){&questions};
+    make(warp, &view, &again);
+    assert_memory_equal(whole.colours, again.colours, sizeof(whole.colours));
     fl_warp_destroy(warp);
 }
 
