@@ -1,4 +1,7 @@
 /* SPDX-License-Identifier: MIT */
+#include "viewer/views.h"
+
+#include "viewer/layer.h"
 #include "viewer/warped_key.h"
 #include "protocol/common/clock.h"
 

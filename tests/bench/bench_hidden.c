@@ -213,7 +213,7 @@ static bool make_views(struct bench *bench, const float way[3], struct texels te
             .from = bench->scene.camera,
             .to = to,
             .layer_count = i > 0 ? 2 : 1,
-            .layers = {{texels[0].colours, texels[0].w}, {texels[i].colours, texels[i].w}},
+            .layers = {{texels[0].colours, texels[0].w, NULL}, {texels[i].colours, texels[i].w, NULL}},
         };
         if (!warp_picture_make(picture, &view, WARP_QUADTREE))
             return error_set(error, ERROR_INVALID, "moves", "no view can be made of it");
