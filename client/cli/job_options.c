@@ -26,6 +26,7 @@ enum key {
     KEY_LINK,
     KEY_SIZE,
     KEY_ENVIRONMENT,
+    KEY_ENVIRONMENT_ROTATION,
     KEY_CAMERA,
     KEY_EYE,
     KEY_LOOK_AT,
@@ -75,6 +76,8 @@ static const struct argp_option special[] = {
     {"size", KEY_SIZE, "WxH", 0, "Pixels (default 1280x720)", CLI_GROUP_OUTPUT},
     {"environment", KEY_ENVIRONMENT, "FILE", 0, "Equirectangular image (HDR or EXR) that lights the scene",
      CLI_GROUP_OUTPUT},
+    {"environment-rotation", KEY_ENVIRONMENT_ROTATION, "DEGREES", 0,
+     "Turn it about +y by -360 to 360 (default 0: its middle column is +x)", CLI_GROUP_OUTPUT},
     {"layers", KEY_LAYERS, "NAME,..", 0,
      "What an EXR file has: beauty (the picture, default), albedo, normal, depth, position, ao, id, unknown",
      CLI_GROUP_OUTPUT},
@@ -171,6 +174,11 @@ static error_t set_fov(struct cli_job *job, const char *field, const char *value
     return status;
 }
 
+error_t cli_set_environment_rotation(struct cli_job *job, const char *field, const char *value)
+{
+    return set_real(job, field, value, -360, 360, &job->environment_degrees);
+}
+
 /* "beauty,depth". The picture alone is 0, as without the option. */
 static error_t set_layers(struct cli_job *job, const char *field, const char *value)
 {
@@ -226,6 +234,8 @@ static error_t set_option(struct cli_job *job, int key, const char *field, const
     case KEY_ENVIRONMENT:
         job->environment = value;
         return 0;
+    case KEY_ENVIRONMENT_ROTATION:
+        return cli_set_environment_rotation(job, field, value);
     case KEY_CAMERA:
         job->camera = value;
         return 0;
@@ -440,7 +450,7 @@ static bool read_environment(struct cli_job *job)
     for (const struct argp_option *option = all_options(); option->name || option->doc; option++) {
         const bool has_variable = option->key == KEY_SERVER || option->key == KEY_LINK ||
                                   option->key == KEY_SIZE || option->key == KEY_ENVIRONMENT ||
-                                  option->key >= KEY_FIELD;
+                                  option->key == KEY_ENVIRONMENT_ROTATION || option->key >= KEY_FIELD;
         if (option->name && has_variable && !read_variable(job, option))
             return false;
     }

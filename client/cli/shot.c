@@ -192,6 +192,7 @@ static bool apply_members(const struct shot_reader *reader, const struct shot_va
     const struct cli_shot_given *given = reader->given;
     struct cli_job *job = reader->job;
     const struct shot_value model = shot_member(root, "model"), environment = shot_member(root, "environment"),
+                            rotation = shot_member(root, "environment_rotation"),
                             camera = shot_member(root, "camera"), clips = shot_member(root, "clips"),
                             output = shot_member(root, "output"), outputs = shot_member(root, "outputs"),
                             about = shot_member(root, "description"), schema = shot_member(root, "$schema");
@@ -201,6 +202,7 @@ static bool apply_members(const struct shot_reader *reader, const struct shot_va
             return shot_wrong(reader, texts[i], "leave it out", "must be a string");
     if ((model.value && !shot_path(reader, &model, &job->model)) ||
         (environment.value && !shot_path(reader, &environment, &job->environment)) ||
+        (rotation.value && !shot_number(reader, &rotation, -360, 360, &job->environment_degrees)) ||
         (camera.value && !shot_camera(reader, &camera)) || (clips.value && !apply_clips(reader, &clips)))
         return false;
     for (size_t i = 0; i < GROUP_COUNT; i++) {
@@ -225,8 +227,9 @@ static bool apply_members(const struct shot_reader *reader, const struct shot_va
 bool cli_shot_apply(struct cli_shot *shot, struct cli_job *job, const struct cli_shot_given *given,
                     cli_shot_set *set, void *user)
 {
-    static const char *const others[] = {"$schema", "description", "model", "environment", "camera",  "clips",
-                                         "lights",  "materials",   "nodes", "output",      "outputs", NULL};
+    static const char *const others[] = {"$schema", "description", "model",  "environment", "environment_rotation",
+                                         "camera",  "clips",       "lights", "materials",   "nodes",
+                                         "output",  "outputs",     NULL};
     const struct shot_reader reader = {.shot = shot, .job = job, .given = given, .set = set, .user = user};
     const struct shot_value root = {.value = shot->json.root};
     const char *known[SHOT_SETTINGS_MAX + sizeof(others) / sizeof(others[0])];
