@@ -265,6 +265,8 @@ error_t cli_job_set(struct cli_job *job, const char *option, const char *value);
 /* Sets the job's error and returns EINVAL. */
 error_t cli_usage(struct cli_job *job, const char *field, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
+/* "environment", "transparent" or a colour: "#rrggbb". */
+error_t cli_set_background(struct cli_job *job, const char *field, const char *value);
 error_t cli_set_environment_rotation(struct cli_job *job, const char *field, const char *value);
 /* An argument that is no option. */
 error_t cli_set_model(struct cli_job *job, const char *path);

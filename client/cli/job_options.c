@@ -4,6 +4,7 @@
 #include "cli/job_fields.h"
 #include "lib/link.h"
 #include "lib/text.h"
+#include "protocol/common/srgb.h"
 
 #include <ctype.h>
 #include <errno.h>
@@ -27,6 +28,7 @@ enum key {
     KEY_SIZE,
     KEY_ENVIRONMENT,
     KEY_ENVIRONMENT_ROTATION,
+    KEY_BACKGROUND,
     KEY_CAMERA,
     KEY_EYE,
     KEY_LOOK_AT,
@@ -78,6 +80,9 @@ static const struct argp_option special[] = {
      CLI_GROUP_OUTPUT},
     {"environment-rotation", KEY_ENVIRONMENT_ROTATION, "DEGREES", 0,
      "Turn it about +y by -360 to 360 (default 0: its middle column is +x)", CLI_GROUP_OUTPUT},
+    {"background", KEY_BACKGROUND, "NAME|#RRGGBB", 0,
+     "Behind all surfaces: the environment (default), transparent, or a colour such as '#ffffff'",
+     CLI_GROUP_OUTPUT},
     {"layers", KEY_LAYERS, "NAME,..", 0,
      "What an EXR file has: beauty (the picture, default), albedo, normal, depth, position, ao, id, unknown",
      CLI_GROUP_OUTPUT},
@@ -174,6 +179,33 @@ static error_t set_fov(struct cli_job *job, const char *field, const char *value
     return status;
 }
 
+/* "#rrggbb", as displays have it. */
+static bool parse_colour(const char *value, float linear[3])
+{
+    unsigned codes[3];
+    int length = 0;
+    if (sscanf(value, "#%2x%2x%2x%n", &codes[0], &codes[1], &codes[2], &length) != 3 || length != 7 ||
+        value[length] != '\0' || strspn(value + 1, "0123456789abcdefABCDEF") != 6)
+        return false;
+    for (int c = 0; c < 3; c++)
+        linear[c] = linear_from_srgb_f((float)codes[c] / 255.0f);
+    return true;
+}
+
+error_t cli_set_background(struct cli_job *job, const char *field, const char *value)
+{
+    struct message_render *options = &job->options;
+    if (parse_colour(value, options->background_colour)) {
+        options->background = PROTOCOL_BACKGROUND_COLOUR;
+        return 0;
+    }
+    if (protocol_background_parse(value, &options->background) &&
+        options->background != PROTOCOL_BACKGROUND_COLOUR)
+        return 0;
+    return cli_usage(job, field, "'%s' is no background: use environment, transparent or a colour as #ffffff",
+                     value);
+}
+
 error_t cli_set_environment_rotation(struct cli_job *job, const char *field, const char *value)
 {
     return set_real(job, field, value, -360, 360, &job->environment_degrees);
@@ -236,6 +268,8 @@ static error_t set_option(struct cli_job *job, int key, const char *field, const
         return 0;
     case KEY_ENVIRONMENT_ROTATION:
         return cli_set_environment_rotation(job, field, value);
+    case KEY_BACKGROUND:
+        return cli_set_background(job, field, value);
     case KEY_CAMERA:
         job->camera = value;
         return 0;

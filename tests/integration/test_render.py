@@ -109,6 +109,21 @@ class Pictures(OneDaemon):
                 middle = rows[4][4 * channels:4 * channels + 3]
                 self.assertEqual(max(range(3), key=lambda c: middle[c]), channel, middle)
 
+    def test_a_background_lies_behind_all_surfaces(self):
+        """A colour is that of the display, whatever the exposure; what stands before it is as before the environment."""
+        def corner_and_middle(background):
+            path = self.folder / "background.png"
+            self.expect(farlight("render", bundled_scenes() / "carousel.glb", "-o", path, "--size", "80x60", "--exposure", "1",
+                                 "--integrator", "whitted", "--background", background), 0)
+            width, height, rows, channels = read_png(path)
+            return [tuple(rows[y][x * channels:(x + 1) * channels]) for x, y in ((0, 0), (width // 2, height // 2))]
+        _, carousel = corner_and_middle("environment")
+        self.assertEqual(corner_and_middle("transparent"), [(0, 0, 0, 0), carousel])
+        colour, before = corner_and_middle("#2040a0")
+        self.assertEqual((colour[:3], before), ((0x20, 0x40, 0xa0), carousel))
+        result = self.expect(render_picture("teapot", self.folder / "none.png", "--background", "#2040a"), 2)
+        self.assertIn("#ffffff", result.stderr)
+
     def test_the_same_seed_gives_the_same_bytes(self):
         paths = [self.folder / "a.png", self.folder / "b.png"]
         for path in paths:
