@@ -23,7 +23,11 @@ void main()
     if (k >= wave.rays.count || hit_places[k] != HIT_PLACE_NONE)
         return;
     path p = paths[k];
-    bool seen = (p.flags & PATH_STRAIGHT) != 0u && frame.environment_kind != ENVIRONMENT_NONE;
+    bool straight = (p.flags & PATH_STRAIGHT) != 0u, seen = straight && frame.environment_kind != ENVIRONMENT_NONE;
+    if (straight && environment_is_hidden()) {
+        radiance[k] = vec4(0.0);
+        return;
+    }
     vec3 arriving = vec3(1.0);
 #ifndef OPEN
     arriving = environment_radiance(rays[k].direction_t_max.xyz);
