@@ -7,11 +7,11 @@
 //               common/scattering.glsl
 //   mirrored    GGX facets, each a smooth mirror by Fresnel's equations (metal: Schlick); or Ward's lobe with the same
 //               reflectances
-//   refracted   GGX facets as windows: also of what they would mirror into another facet
+//   refracted   GGX facets as windows: also for what they would mirror into another facet
 //
 // The last two may be stretched along a grain. Where they are smooth they are a mirror and a window, which nothing but
-// bsdf_choose() finds; nor does anything else find what goes on inside of glass, where both are GGX's. Radiance on the other side is divided by the square of the index, so that a window neither dims
-// nor brightens the view through it.
+// bsdf_choose() finds; nor does anything else find what goes on inside of glass, where both are GGX's. Radiance on the
+// other side is divided by the square of the index, so that a window neither dims nor brightens the view through it.
 //
 // Defines: those of common/material.glsl; HAS_ANISOTROPY some material has a grain; WARD.
 

@@ -42,6 +42,24 @@ float again_share(split parts, float cosine, float alpha)
     return facets_lost(stretched_cosine(cosine, alpha), alpha) / max(parts.again_mean, 1e-9);
 }
 
+// A facet of a rough surface that is seen along the direction. `angle`: 1 / the density with which it was chosen.
+vec3 facet_seen(surface s, float NoV, vec3 direction, vec2 u, out float angle)
+{
+    vec2 alpha = vec2(square(s.roughness));
+    vec3 x, y;
+    tangent_frame(s.normal, x, y);
+    vec3 view = normalize(vec3(-dot(direction, x), -dot(direction, y), NoV));
+    vec3 facet = visible_facet(view, alpha, u);
+    angle = 1.0 / visible_facet_density(facet, view, clamp(dot(view, facet), 1e-4, 1.0), alpha);
+    return facet.x * x + facet.y * y + facet.z * s.normal;
+}
+
+// Where the flat surface would send what a facet sends into another one. `side`: the unit normal of the right side.
+vec3 turned_to(vec3 direction, vec3 side)
+{
+    return direction - 2.0 * min(dot(direction, side), 0.0) * side;
+}
+
 // `parts`: split_light() of the same surface and NoV. `choice` chooses between mirror, window and several mirrors in
 // turn, and comes back stretched; `u` chooses the facet.
 lobe lobe_choose(surface s, split parts, float NoV, vec3 direction, inout float choice, vec2 u)
@@ -50,21 +68,15 @@ lobe lobe_choose(surface s, split parts, float NoV, vec3 direction, inout float 
     bool rough = alpha > FACET_ALPHA_MIN, leaves = s.inside && s.transmission > 0.0;
     vec3 facet = s.normal;
     float facet_angle = 0.0;
-    if (rough) {
-        vec3 x, y;
-        tangent_frame(s.normal, x, y);
-        vec3 view = normalize(vec3(-dot(direction, x), -dot(direction, y), NoV));
-        vec3 found = visible_facet(view, vec2(alpha), u);
-        facet = found.x * x + found.y * y + found.z * s.normal;
-        facet_angle = 1.0 / visible_facet_density(found, view, clamp(dot(view, found), 1e-4, 1.0), vec2(alpha));
-    }
+    if (rough)
+        facet = facet_seen(s, NoV, direction, u, facet_angle);
     float VoH = rough ? clamp(-dot(direction, facet), 1e-4, 1.0) : NoV;
     float dielectric = fresnel_dielectric(VoH, leaves ? 1.0 / s.ior : s.ior), lit = 1.0;
     vec3 reflected = reflect(direction, facet);
     vec3 bent = refract(direction, facet, s.inside ? s.ior : 1.0 / s.ior);
     if (rough && leaves) {
-        reflected += (abs(dot(reflected, s.normal)) - dot(reflected, s.normal)) * s.normal;
-        bent -= (abs(dot(bent, s.normal)) + dot(bent, s.normal)) * s.normal;
+        reflected = turned_to(reflected, s.normal);
+        bent = turned_to(bent, -s.normal);
     } else if (rough) {
         lit = lit_share(NoV, dot(reflected, s.normal), alpha);
     }

@@ -49,7 +49,7 @@ static struct scene_material *a_thing(struct fixture *fixture, const struct kind
 }
 
 /* Fits of what facets mirror are off by 0.007, at a few degrees to the horizon by more; of a ball of glass a rough
- * wall keeps some paths for more than 32 bounces. So much for 0.98. What is above 1 is noise: blocks have 256
+ * wall keeps some paths for more than 32 bounces. So much for 0.98. What is above 1 is noise: blocks have 128
  * samples of which few are above 1.5, and fits are too high by 1e-3 at most. */
 static void expect_furnace(struct fixture *fixture, const struct way *way, const struct kind *kind,
                            float roughness)
@@ -60,7 +60,7 @@ static void expect_furnace(struct fixture *fixture, const struct way *way, const
     fixture_environment(fixture, 1.0f, 1.0f, 1.0f);
     fixture->request.integrator = way->integrator;
     fixture->request.brdf = way->brdf;
-    fixture->request.samples = way->integrator == INTEGRATOR_WHITTED ? 1 : 16;
+    fixture->request.samples = way->integrator == INTEGRATOR_WHITTED ? 1 : 8;
     struct frame_result result = fixture_render(fixture);
     double blocks[BLOCKS] = {0}, minimum = INFINITY;
     for (uint32_t i = 0; i < PIXELS; i++)
@@ -68,7 +68,7 @@ static void expect_furnace(struct fixture *fixture, const struct way *way, const
             (double)fixture_pixel(&result, i % EDGE, i / EDGE)[1] / 16;
     for (size_t i = 0; i < BLOCKS; i++) {
         minimum = fmin(minimum, blocks[i]);
-        assert_true(blocks[i] < 1.0 + 1e-3 + 5.0 * 0.5 / 16.0);
+        assert_true(blocks[i] < 1.0 + 1e-3 + 5.0 * 0.5 / sqrt(128.0));
     }
     struct mean mean = mean_of(blocks, BLOCKS);
     print_message("%-11s %-13s roughness %.1f: mean %.4f (standard error %.4f), minimum %.3f\n", way->name,
@@ -111,14 +111,15 @@ TEST(lamps_light_rough_things_alike_in_all_integrators)
     struct fixture *fixture = *state;
     for (size_t k = 0; k < 2; k++)
         for (int step = 0; step < 3; step++) {
-            double means[COUNT(ways)];
+            double means[COUNT(ways)] = {0};
             path_begin(fixture, TRACER_REFERENCE, 4);
             struct scene_material *material = a_thing(fixture, &kinds[k], 0.4f + 0.3f * (float)step);
             material->base_colour[1] = 0.7f;
             fixture_light(fixture, LIGHT_POINT, 3.0f, 1.0f, 3.0f, 50.0f);
             fixture_light(fixture, LIGHT_POINT, -2.0f, 2.0f, 1.0f, 20.0f);
             for (size_t w = 0; w < COUNT(ways); w++)
-                means[w] = mean_by(fixture, &ways[w], 64).value;
+                if (ways[w].brdf == BRDF_GGX)
+                    means[w] = mean_by(fixture, &ways[w], 64).value;
             print_message("%s, roughness %.1f: path %.4f, distributed %.4f, whitted %.4f\n", kinds[k].name,
                           0.4 + 0.3 * step, means[0], means[2], means[3]);
             assert_near(means[0], means[3], 0.005 * means[3]);
@@ -150,14 +151,15 @@ TEST(a_sky_lights_rough_things_alike_in_all_integrators)
     static const double off[COUNT(kinds)][2] = {{0.01, 0.1}, {0.01, 0.1}, {0.02, 0.0}};
     for (size_t k = 0; k < 3; k++)
         for (int step = 0; step < 3; step++) {
-            struct mean means[COUNT(ways)];
+            struct mean means[COUNT(ways)] = {0};
             path_begin(fixture, TRACER_REFERENCE, 16);
             struct scene_material *material = a_thing(fixture, &kinds[k], 0.2f + 0.4f * (float)step);
             material->base_colour[1] = 0.8f;
             fixture_look(fixture, 0.0f, 1.0f, 3.0f, 0.6f);
             a_bright_sky(fixture);
             for (size_t w = 0; w < COUNT(ways); w++)
-                means[w] = mean_by(fixture, &ways[w], 256);
+                if (ways[w].brdf == BRDF_GGX)
+                    means[w] = mean_by(fixture, &ways[w], 256);
             double path = means[0].value;
             print_message("%s, roughness %.1f: path %.4f, distributed %.4f, whitted %.4f\n", kinds[k].name,
                           0.2 + 0.4 * step, path, means[2].value, means[3].value);
