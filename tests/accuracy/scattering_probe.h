@@ -73,7 +73,8 @@ static const char probe_text[] =
     "    split parts = split_light(s, view.z);\n"
     "    values[i] = brdf(s, parts, view, view.z, light).g;\n"
     "    if (j == 0u)\n"
-    "        splits[k] = vec4(parts.mirror.g, parts.scattered.g + parts.again.g, parts.refracted.g, parts.mirror_ray);\n"
+    "        splits[k] = vec4(parts.mirror.g, parts.scattered.g + parts.again.g, parts.refracted.g, "
+    "parts.mirror_ray);\n"
     "}\n";
 
 static inline void probe_init(struct probe *probe, struct gpu_device *device)
