@@ -15,7 +15,7 @@ struct light_receiver {
 light_receiver light_receiver_of(surface s, split parts, vec3 position, vec3 view, float NoV)
 {
     // A slanted mirror is dim at its own angle, but not at that of every facet: never 0.
-    return light_receiver(position, s.normal, view, max_component(parts.scattered) * INVERSE_PI,
+    return light_receiver(position, s.normal, view, max_component(parts.scattered + parts.again) * INVERSE_PI,
                           (max_component(parts.mirror) + 1e-3) * 0.25 / max(NoV, 0.1),
                           square(max(s.roughness, ROUGHNESS_MIN_LIGHT)));
 }

@@ -6,7 +6,7 @@
 //   radiance    emission, and a constant ambient term as in whitted.comp
 //   shadow ray  one, to one point of one light
 //   child       at most one: straight on (alpha blending), mirrored or refracted, in a direction that a facet of the
-//               rough surface sends it
+//               rough surface sends it, or several in turn
 //
 // Defines: those of common/material.glsl, common/light.glsl, common/environment.glsl and render/shade.glsl.
 
@@ -27,9 +27,8 @@ float path_roughness(path p)
     return float(p.flags >> PATH_ROUGHNESS_SHIFT) / 65535.0;
 }
 
-void add_lobe(uint j, path p, surface s, float NoV, float distance_, vec3 direction, vec3 weight, float choice, vec2 u)
+void add_lobe(uint j, path p, surface s, float distance_, lobe chosen, vec3 weight, float choice)
 {
-    lobe chosen = lobe_choose(s, NoV, direction, choice, u);
     vec3 carried = weight * chosen.weight;
     float survival = max_component(carried) / ROULETTE;
     if (!(choice < survival)) // also if it is NaN
@@ -40,11 +39,12 @@ void add_lobe(uint j, path p, surface s, float NoV, float distance_, vec3 direct
               sample_solid_angle(chosen.solid_angle));
 }
 
-bool ask_for_light(uint j, path p, surface s, split parts, vec3 view, float NoV, vec3 weight, float distance_, vec2 u)
+bool ask_for_light(uint j, path p, surface s, vec3 view, float NoV, vec3 weight, float distance_, vec2 u)
 {
     vec3 origin = off_surface(s, distance_, s.geometric);
     float probability, all_lights;
     s.roughness = max(s.roughness, path_roughness(p));
+    split parts = split_light(s, NoV);
     light_receiver receiver = light_receiver_of(s, parts, origin, view, NoV);
     uint index = light_choose(receiver, frame.light_count, u.x, probability, all_lights);
     if (probability <= 0.0) {
@@ -70,7 +70,6 @@ void main()
     vec3 direction = r.direction_t_max.xyz, view = -direction;
     surface s = surface_of_path(p, h, r);
     float NoV = clamp(dot(s.normal, view), 1e-4, 1.0); // a shading normal may lean away
-    split parts = split_light(s, NoV);
     uint seed = path_seed(p), index = path_sample(p), dimension = SEQUENCE_WAVE + wave_number * SEQUENCE_WAVE_SIZE;
     float choice = sequence_number(seed, dimension + SEQUENCE_LOBE, index);
     vec3 sent = vec3(0.0);
@@ -82,14 +81,15 @@ void main()
         sent = s.base;
         no_shadow_ray(j);
     } else {
-        sent = s.emission + s.occlusion * parts.scattered * environment_irradiance(s.normal);
         choice = min(choice / s.alpha, 0.99999994);
-        add_lobe(j, p, s, NoV, h.distance, direction, weight, choice,
-                 sequence_pair(seed, dimension + SEQUENCE_LOBE_DIRECTION, index));
+        lobe chosen = lobe_choose(s, split_light(s, NoV), NoV, direction, choice,
+                                  sequence_pair(seed, dimension + SEQUENCE_LOBE_DIRECTION, index));
+        sent = s.emission + s.occlusion * chosen.scattered * environment_irradiance(s.normal);
+        add_lobe(j, p, s, h.distance, chosen, weight, choice);
         if (s.inside && s.transmission > 0.0)
             no_shadow_ray(j);
         else
-            asked = ask_for_light(j, p, s, parts, view, NoV, weight, h.distance,
+            asked = ask_for_light(j, p, s, view, NoV, weight, h.distance,
                                   sequence_pair_sorted(seed, dimension + SEQUENCE_LIGHT, index, frame.group_shift));
     }
     bool seen = !straight && (p.flags & PATH_STRAIGHT) != 0u;

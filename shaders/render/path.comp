@@ -225,7 +225,6 @@ void main()
     e.last = last_wave != 0u || (e.p.flags & PATH_BOUNCES_MASK) >= frame.depth;
     e.all_lights = 0.0;
     float NoV = clamp(dot(e.s.normal, view), 1e-4, 1.0); // a shading normal may lean away
-    split parts = split_light(e.s, NoV);
     vec3 along, across;
     float anisotropy = 0.0;
 #ifdef HAS_ANISOTROPY
@@ -235,8 +234,8 @@ void main()
 #else
     tangent_frame(e.s.normal, along, across);
 #endif
-    e.b = bsdf_of(e.s, parts, view, NoV, along, anisotropy);
-    e.receiver = light_receiver_of(e.s, parts, e.origin, view, NoV);
+    e.b = bsdf_of(e.s, view, NoV, along, anisotropy);
+    e.receiver = light_receiver_of(e.s, e.b.parts, e.origin, view, NoV);
     uint seed = path_seed(e.p), index = path_sample(e.p);
     float choice = sequence_number(seed, numbers_of(SEQUENCE_PATH_LOBE), index);
     bool straight = choice >= e.s.alpha;
