@@ -50,6 +50,14 @@ vec3 mirror_direction(surface s, vec3 direction)
     return dot(mirrored, s.geometric) > 0.0 ? mirrored : reflect(direction, s.geometric);
 }
 
+// Of brdf() what is scattered, not mirrored; NoL > 0.
+vec3 brdf_scattered(surface s, split parts, float NoL)
+{
+    float enters = 1.0 - fresnel_rough_dielectric(NoL, s.ior, s.roughness);
+    float enters_mean = 1.0 - fresnel_rough_dielectric_mean(s.ior, s.roughness);
+    return parts.scattered * (enters / enters_mean * INVERSE_PI);
+}
+
 // Share of the irradiance from a direction (of a light, unit) that goes to the eye, per steradian; without the cosine.
 // 0 from below the horizon, and for glass seen from inside, where no light is sampled. Reciprocal. `parts`: of the same
 // surface and NoV.
@@ -68,7 +76,5 @@ vec3 brdf(surface s, split parts, vec3 view, float NoV, vec3 light)
     vec3 mirror = mix(vec3(fresnel_dielectric(VoH, s.ior)), fresnel_schlick(s.base, VoH), s.metallic);
     float alpha = square(max(s.roughness, ROUGHNESS_MIN_LIGHT));
     vec3 specular = mirror * (D_GGX(NoH, dot(across, across), alpha) * V_SmithGGXCorrelated(NoV, NoL, alpha));
-    float enters = 1.0 - fresnel_rough_dielectric(NoL, s.ior, s.roughness);
-    float enters_mean = 1.0 - fresnel_rough_dielectric_mean(s.ior, s.roughness);
-    return parts.scattered * (enters / enters_mean * INVERSE_PI) + specular;
+    return brdf_scattered(s, parts, NoL) + specular;
 }

@@ -4,12 +4,17 @@
 // mean of the samples is right however few rays each has.
 //
 //   radiance    emission, and a constant ambient term as in whitted.comp
-//   shadow ray  one, to one point of one light
+//   shadow ray  one, to one point of one light or emissive triangle
 //   child       at most one: straight on (alpha blending), mirrored or refracted, in a direction that a facet of the
 //               rough surface sends it
 //
-// Defines: those of common/material.glsl, common/light.glsl, common/environment.glsl and render/shade.glsl.
+// Emissive triangles are asked for the light that is scattered alone: what a surface mirrors or refracts of them its
+// children see, however rough it is.
+//
+// Defines: those of common/material.glsl, common/light.glsl, common/environment.glsl and render/shade.glsl; HAS_EMITTERS
+// there are emissive triangles that are sampled, and those of common/emitter.glsl.
 
+#include "common/emitter.glsl"
 #include "common/environment.glsl"
 #include "common/light_choice.glsl"
 #include "common/lobe.glsl"
@@ -40,6 +45,18 @@ void add_lobe(uint j, path p, surface s, float NoV, float distance_, vec3 direct
               sample_solid_angle(chosen.solid_angle));
 }
 
+#ifdef HAS_EMITTERS
+bool ask_for_emitter(uint j, path p, surface s, split parts, vec3 weight, vec3 origin, float chance, vec2 u)
+{
+    emitter_sample sampled = emitter_sample_at(origin, s.normal, u, p.time);
+    float NoL = dot(s.normal, sampled.direction);
+    vec3 arriving = vec3(0.0);
+    if (sampled.probability > 0.0 && NoL > 0.0 && dot(s.geometric, sampled.direction) > 0.0)
+        arriving = weight * brdf_scattered(s, parts, NoL) * sampled.radiance * (NoL / (sampled.probability * chance));
+    return add_shadow_ray(j, p, origin, sampled.direction, sampled.distance_, arriving);
+}
+#endif
+
 bool ask_for_light(uint j, path p, surface s, split parts, vec3 view, float NoV, vec3 weight, float distance_, vec2 u)
 {
     vec3 origin = off_surface(s, distance_, s.geometric);
@@ -47,6 +64,16 @@ bool ask_for_light(uint j, path p, surface s, split parts, vec3 view, float NoV,
     s.roughness = max(s.roughness, path_roughness(p));
     light_receiver receiver = light_receiver_of(s, parts, origin, view, NoV);
     uint index = light_choose(receiver, frame.light_count, u.x, probability, all_lights);
+#ifdef HAS_EMITTERS
+    receiver.mirrored = 0.0;
+    float lights_chance = lights_share(receiver, all_lights, emitter_estimate(origin, s.normal));
+    if (u.x >= lights_chance) {
+        u.x = min((u.x - lights_chance) / (1.0 - lights_chance), 0.99999994);
+        return ask_for_emitter(j, p, s, parts, weight, origin, 1.0 - lights_chance, u);
+    }
+    u.x = min(u.x / lights_chance, 0.99999994);
+    probability *= lights_chance;
+#endif
     if (probability <= 0.0) {
         no_shadow_ray(j);
         return false;
