@@ -196,14 +196,17 @@ static void spread_cone(struct emitter_cluster *cluster, const struct source *so
     bounds->spread = length > 0.0f && isfinite(length) ? 0.0f : HALF_PI;
     for (int k = 0; k < 3; k++)
         bounds->axis[k] = bounds->spread == 0.0f ? bounds->axis[k] / length : (k == 2);
-    for (uint32_t i = 0; i < cluster->count && bounds->spread < HALF_PI; i++) {
+    if (bounds->spread > 0.0f || cluster->count == 1)
+        return;
+    float minimum = 1.0f;
+    for (uint32_t i = 0; i < cluster->count; i++) {
         float area[3];
         area_vector(source, first + i, area);
         const float own = length3(area);
         const float cosine = area[0] * bounds->axis[0] + area[1] * bounds->axis[1] + area[2] * bounds->axis[2];
-        if (own > 0.0f)
-            bounds->spread = fmaxf(bounds->spread, acosf(fminf(fabsf(cosine) / own, 1.0f)));
+        minimum = own > 0.0f ? fminf(minimum, fabsf(cosine) / own) : minimum;
     }
+    bounds->spread = acosf(minimum);
 }
 
 /* ---- clusters ---- */

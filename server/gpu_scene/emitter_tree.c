@@ -62,14 +62,49 @@ static float orientation_cost(float spread)
            HALF_PI * (2.0f * far * sine - cosf(spread - 2.0f * far) - 2.0f * spread * sine + cosine);
 }
 
-static float cost_of(const struct emitter_bounds *bounds)
+/* Bounds with a sum of axes times power in place of a cone: a split is judged by means, which are quick to add up.
+ */
+struct rough_bounds {
+    float lower[3], upper[3], axes[3], power;
+};
+
+static void add_rough(struct rough_bounds *sum, const float lower[3], const float upper[3], const float axes[3],
+                      float power)
+{
+    if (!(power > 0.0f))
+        return;
+    const bool first = !(sum->power > 0.0f);
+    const float side = dot3(sum->axes, axes) < 0.0f ? -1.0f : 1.0f;
+    for (int k = 0; k < 3; k++) {
+        sum->lower[k] = first || lower[k] < sum->lower[k] ? lower[k] : sum->lower[k];
+        sum->upper[k] = first || upper[k] > sum->upper[k] ? upper[k] : sum->upper[k];
+        sum->axes[k] += side * axes[k];
+    }
+    sum->power += power;
+}
+
+static void add_leaf(struct rough_bounds *sum, const struct emitter_bounds *leaf)
+{
+    const float weight = leaf->power * cosf(leaf->spread);
+    const float axes[3] = {weight * leaf->axis[0], weight * leaf->axis[1], weight * leaf->axis[2]};
+    add_rough(sum, leaf->lower, leaf->upper, axes, leaf->power);
+}
+
+static void add_bin(struct rough_bounds *sum, const struct rough_bounds *bin)
+{
+    add_rough(sum, bin->lower, bin->upper, bin->axes, bin->power);
+}
+
+static float cost_of(const struct rough_bounds *bounds)
 {
     if (!(bounds->power > 0.0f))
         return 0.0f;
     const float x = bounds->upper[0] - bounds->lower[0], y = bounds->upper[1] - bounds->lower[1],
                 z = bounds->upper[2] - bounds->lower[2];
+    const float mean = sqrtf(dot3(bounds->axes, bounds->axes)) / bounds->power;
     /* With the square of the diagonal, as what is flat or in one line has no surface. */
-    return bounds->power * (x * y + y * z + z * x + x * x + y * y + z * z) * orientation_cost(bounds->spread);
+    return bounds->power * (x * y + y * z + z * x + x * x + y * y + z * z) *
+           orientation_cost(acosf(fminf(mean, 1.0f)));
 }
 
 /* ---- the tree ---- */
@@ -113,7 +148,7 @@ struct split {
 
 static void try_axis(const struct build *build, uint32_t first, uint32_t count, int axis, struct split *best)
 {
-    struct emitter_bounds bins[BINS] = {0}, after[BINS] = {0}, before = {0};
+    struct rough_bounds bins[BINS] = {0}, after[BINS] = {0}, before = {0};
     uint32_t counts[BINS] = {0}, counted = 0;
     float range[2];
     centre_range(build, first, count, axis, range);
@@ -122,14 +157,16 @@ static void try_axis(const struct build *build, uint32_t first, uint32_t count, 
     for (uint32_t i = first; i < first + count; i++) {
         const struct emitter_bounds *leaf = &build->leaves[build->order[i]];
         const uint32_t bin = bin_of(middle_of(leaf, axis), range);
-        bins[bin] = emitter_bounds_union(&bins[bin], leaf);
+        add_leaf(&bins[bin], leaf);
         counts[bin]++;
     }
     after[BINS - 1] = bins[BINS - 1];
-    for (uint32_t b = BINS - 1; b-- > 0;)
-        after[b] = emitter_bounds_union(&bins[b], &after[b + 1]);
+    for (uint32_t b = BINS - 1; b-- > 0;) {
+        after[b] = after[b + 1];
+        add_bin(&after[b], &bins[b]);
+    }
     for (uint32_t b = 1; b < BINS; b++) {
-        before = emitter_bounds_union(&before, &bins[b - 1]);
+        add_bin(&before, &bins[b - 1]);
         counted += counts[b - 1];
         const float cost = cost_of(&before) + cost_of(&after[b]);
         if (counted > 0 && counted < count && cost < best->cost)

@@ -142,7 +142,7 @@ TEST(lights_illuminate_a_floor_as_their_closed_forms_say)
                       sampled ? "both ways" : "met alone", means[sampled].value, means[sampled].error);
         assert_mean(means[sampled], 0.0, PIXEL_CURVATURE);
     }
-    assert_true(means[1].error < 0.2 * means[0].error); /* SAYS */
+    assert_true(means[1].error < 0.05 * means[0].error); /* measured: 0.012 */
 }
 
 /* ---- glossy floors ---- */
