@@ -169,19 +169,23 @@ static void bound_leaves(const struct emitters *emitters, const struct gpu_scene
     }
 }
 
-static struct emitter_bounds *bounds_of(const struct emitters *emitters, const struct gpu_scene *gpu,
+static struct emitter_bounds *bounds_of(struct emitters *emitters, const struct gpu_scene *gpu,
                                         const struct scene *scene, const struct scene_pose *pose)
 {
     struct emitter_bounds *bounds = malloc(emitters->leaf_count * sizeof(*bounds));
     uint32_t leaf = 0;
+    double area = 0.0;
     for (uint32_t i = 0; bounds && i < gpu->instance_count; i++) {
         uint32_t first, count = surfaces_of(emitters, gpu->instances[i].geometry, &first);
         for (uint32_t s = first; s < first + count; s++) {
             const struct emitter_surface *surface = &emitters->surfaces[s];
-            bound_leaves(emitters, gpu, i, surface, emission_of(scene, pose, surface->material), bounds + leaf);
-            leaf += surface->cluster_count;
+            const float emission = emission_of(scene, pose, surface->material);
+            bound_leaves(emitters, gpu, i, surface, emission, bounds + leaf);
+            for (uint32_t end = leaf + surface->cluster_count; leaf < end; leaf++)
+                area += (double)(bounds[leaf].power / emission);
         }
     }
+    emitters->area = (float)area;
     return bounds;
 }
 
@@ -248,6 +252,7 @@ bool gpu_scene_update_emitters(struct gpu_scene *gpu, const struct scene *scene,
     bool changed;
     if (!emitters_list_surfaces(emitters, gpu, scene, pose, &changed, error))
         return false;
+    gpu->has_emissive_spheres = emitters_any_spheres(gpu, scene, pose);
     bool ok = list_leaves(emitters, gpu, &listed);
     ok = ok && update_tree(emitters, &listed, gpu, scene, pose);
     free(listed.leaves);

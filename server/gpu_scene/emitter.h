@@ -37,11 +37,14 @@ struct emitters {
     struct emitter_node *nodes; /* 2 * leaf_count - 1 */
     struct emitter_run *runs;
     uint32_t leaf_count, run_count;
+    float area; /* emitter_starts.area */
 };
 
 void emitters_finish(struct emitters *emitters); /* leaves it all-zero */
 /* Brings the surfaces up to date. *changed: the clusters are others. */
 bool emitters_list_surfaces(struct emitters *emitters, const struct gpu_scene *gpu, const struct scene *scene,
                             const struct scene_pose *pose, bool *changed, struct error *error);
+/* Whether spheres have a material that would make triangles emitters. */
+bool emitters_any_spheres(const struct gpu_scene *gpu, const struct scene *scene, const struct scene_pose *pose);
 
 #endif

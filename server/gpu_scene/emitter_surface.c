@@ -48,6 +48,17 @@ static void add_surfaces(const struct gpu_scene *gpu, uint32_t geometry, const s
     }
 }
 
+bool emitters_any_spheres(const struct gpu_scene *gpu, const struct scene *scene, const struct scene_pose *pose)
+{
+    for (uint32_t g = 0; g < gpu->geometry_count; g++) {
+        const struct scene_spheres *set = gpu->geometries[g].spheres;
+        for (uint32_t r = 0; set && r < set->range_count; r++)
+            if (set->ranges[r].count > 0 && shines(material_of(scene, pose, set->ranges[r].material)))
+                return true;
+    }
+    return false;
+}
+
 static bool list(const struct gpu_scene *gpu, const struct scene *scene, const struct scene_pose *pose,
                  struct emitter_surface **surfaces, uint32_t *count)
 {

@@ -46,7 +46,8 @@ static uint64_t lay_out(const struct gpu_scene *gpu, struct table_starts *starts
                                               .runs = (uint32_t)runs,
                                               .shares = (uint32_t)shares,
                                               .run_count = emitters->run_count,
-                                              .cluster_size = emitters->cluster_size};
+                                              .cluster_size = emitters->cluster_size,
+                                              .area = emitters->area};
     return shares + (emitters->share_count + 3) / 4;
 }
 

@@ -11,7 +11,7 @@
 
 #include <epoxy/gl.h>
 
-#define DEFINES_MAX 15
+#define DEFINES_MAX 16
 
 bool wave_passes_reserve(struct wave_passes *passes, struct render_context *context, struct error *error)
 {

@@ -23,7 +23,7 @@ struct emitter_sample {
 emitter_starts find_emitters()
 {
     uvec4 first = texelFetch(tables, 1), second = texelFetch(tables, 2);
-    return emitter_starts(first.x, first.y, first.z, first.w, second.x, second.y, 0u, 0u);
+    return emitter_starts(first.x, first.y, first.z, first.w, second.x, second.y, uintBitsToFloat(second.z), 0u);
 }
 
 emitter_node emitter_node_at(uint first_texel, uint index)
@@ -195,6 +195,13 @@ emitter_sample emitter_sample_at(vec3 position, vec3 normal, vec2 u, float time)
     result.probability = probability * emitter_density(t.across, result.direction, result.distance_);
     result.radiance = emitter_radiance(t.indices_material, weights);
     return result;
+}
+
+// In the place of emitter_probability() where hits do not tell which triangle they are of: the density of a point that is
+// uniform on all emitters, as if it faced the ray.
+float emitter_rough_probability(float distance_)
+{
+    return square(distance_) / max(find_emitters().area, 1e-30);
 }
 
 // The last run that begins at or before a triangle of an instance.

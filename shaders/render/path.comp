@@ -24,7 +24,8 @@
 // through glass. Surfaces of glass ask for no light from inside.
 //
 // Defines: those of common/bsdf.glsl, common/light.glsl, common/environment_choice.glsl and render/shade.glsl;
-// HAS_EMITTERS there are emissive triangles that are sampled, and those of common/emitter.glsl.
+// HAS_EMITTERS there are emissive triangles that are sampled, and those of common/emitter.glsl; EMITTERS_BY_DISTANCE hits
+// do not tell which of them they are of, so both ways are weighed by a density that the distance alone says.
 
 #include "common/bsdf.glsl"
 #include "common/emitter.glsl"
@@ -119,8 +120,12 @@ bool ask_for_emitter(eye_hit e, uint place, vec2 u)
     vec3 arriving = vec3(0.0), sent = bsdf_evaluate(e.b, e.s, sampled.direction, found);
     if (sampled.probability > 0.0)
         arriving = e.weight * sent * sampled.radiance / (sampled.probability * chance);
+    float probability = sampled.probability;
+#ifdef EMITTERS_BY_DISTANCE
+    probability = emitter_rough_probability(sampled.distance_);
+#endif
     if (found > 0.0)
-        arriving *= heuristic(ratio_of(ratio_code(chance, found)) * sampled.probability, 1.0);
+        arriving *= heuristic(ratio_of(ratio_code(chance, found)) * probability, 1.0);
     return add_shadow_ray_from(place, e.p, e.origin, sampled.direction, RAY_STOPS_T_MIN, sampled.distance_, arriving);
 }
 
@@ -128,9 +133,16 @@ bool ask_for_emitter(eye_hit e, uint place, vec2 u)
 float emission_share(path p, hit h, ray r, vec3 emission)
 {
     uint code = p.light_number >> PATH_LIGHT_BITS;
+#ifdef EMITTERS_BY_DISTANCE
+    const uint LEFT_OUT = MATERIAL_ALPHA_MASK | MATERIAL_ALPHA_BLEND | MATERIAL_UNLIT;
+    bool asked = code != 0u && (h.material & HIT_SAMPLED) != 0u &&
+                 (material_at(h.material & HIT_MATERIAL_MASK).flags & LEFT_OUT) == 0u;
+    float probability = asked ? emitter_rough_probability(h.distance) : 0.0;
+#else
     bool asked = code != 0u && max_component(emission) > 0.0 && h.instance != HIT_NO_PRIMITIVE;
     float probability = emitter_probability(r.origin_t_min.xyz, unpack_ray_normal(p.flags >> PATH_NORMAL_SHIFT),
                                             h.instance, h.primitive, r.direction_t_max.xyz, h.distance, p.time, asked);
+#endif
     return probability > 0.0 ? heuristic(1.0, ratio_of(code) * probability) : 1.0;
 }
 #endif

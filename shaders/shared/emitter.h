@@ -10,7 +10,8 @@ struct emitter_starts {
     uint nodes, leaves, runs, shares; /* shares: four in a texel */
     uint run_count;
     uint cluster_size; /* consecutive triangles of a run that are one leaf; the last one has what is left */
-    uint pad0, pad1;
+    float area;        /* of all of them, world space, each as much as its texture shines */
+    uint pad0;
 };
 SHARED_SIZE(emitter_starts, 32)
 

@@ -150,6 +150,25 @@ TEST(the_picture_is_that_of_the_rays_that_hit_the_lamps_alone)
         }
 }
 
+/* Stored samples are off the surfaces by a cell or so, lamps too. */
+TEST(stored_samples_show_as_much_light)
+{
+    struct fixture *fixture = *state;
+    static const enum kind kinds[] = {PLAIN, VEIL};
+    for (size_t i = 0; i < COUNT(kinds); i++) {
+        struct mean means[2];
+        for (int sampled = 0; sampled < 2; sampled++) {
+            path_begin(fixture, TRACER_LDC, 3);
+            a_scene(fixture, kinds[i], sampled);
+            fixture->request.samples = sampled ? 8 : 32;
+            means[sampled] = mean_of_seeds(fixture, whole);
+        }
+        print_message("ldc, %s: met alone %.5f (%.0e), sampled %.5f (%.0e)\n", kind_names[kinds[i]],
+                      means[0].value, means[0].error, means[1].value, means[1].error);
+        assert_mean(means[1], means[0].value, 5.0 * means[0].error + 0.02 * means[0].value);
+    }
+}
+
 /* ---- noise ---- */
 
 static float *render_pixels(struct fixture *fixture, uint32_t samples, uint64_t seed)

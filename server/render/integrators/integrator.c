@@ -57,17 +57,20 @@ static void set_raycast(struct render_context *context, const struct gpu_program
     gpu_uniform_float(program, "layer_opacity", opacity > 0.0f ? opacity : OPACITY_DEFAULT);
 }
 
-/* At most 3. */
+/* At most 4. */
 static size_t emitter_defines(const struct render_context *context, struct gpu_define *defines)
 {
     size_t n = 0;
     if (!context_samples_emitters(context))
         return 0;
     defines[n++] = (struct gpu_define){"HAS_EMITTERS", "1"};
+    if (context->tracer->impl->sampled)
+        defines[n++] = (struct gpu_define){"EMITTERS_BY_DISTANCE", "1"};
     if (!context->scene->has_motion)
         return n;
     defines[n++] = (struct gpu_define){"HAS_MOTION", "1"};
-    defines[n++] = (struct gpu_define){"NO_COLOURS", "1"}; /* not read here, and there is no sampler left for them */
+    defines[n++] =
+        (struct gpu_define){"NO_COLOURS", "1"}; /* not read here, and there is no sampler left for them */
     return n;
 }
 
