@@ -3,6 +3,7 @@
  * less noise. A material with a mask that cuts nothing out looks the same and is not sampled; so both are compared
  * in one program. */
 #include "tests/accuracy/path_fixture.h"
+#include "scene/pose.h"
 #include "tests/harness/test.h"
 
 ALL_TESTS(fixture_setup, fixture_teardown)
@@ -338,4 +339,36 @@ TEST(a_lamp_that_moves_or_is_switched_lights_from_where_it_is)
                   means[1].error);
     assert_mean(means[1], means[0].value, 5.0 * means[0].error);
     assert_true(means[1].error < 2.0 * means[0].error);
+}
+
+/* A lamp that crosses the box while the shutter is open, and casts light from where it is at each ray's time. */
+TEST(a_lamp_lights_along_its_way_while_the_shutter_is_open)
+{
+    struct fixture *fixture = *state;
+    static const unsigned tracers[] = {TRACER_REFERENCE, TRACER_BVH};
+    struct mean means[2];
+    for (int sampled = 0; sampled < 2; sampled++) {
+        path_begin(fixture, tracers[sampled], 2);
+        a_scene(fixture, PLAIN, sampled);
+        fixture->request.samples = sampled ? 8 : 32;
+        struct pose_node open = {.node = fixture->next_id - 1,
+                                 .parent_from_node = {1, 0, 0, -0.7f, 0, 0, -1, 0.5f, 0, 1, 0, 0}};
+        struct pose_node close = open;
+        close.parent_from_node[3] = 0.7f;
+        close.parent_from_node[11] = 0.5f;
+        struct scene_pose poses[] = {{.nodes = &open, .node_count = 1}, {.nodes = &close, .node_count = 1}};
+        const struct scene_motion motion = {.poses = poses, .pose_count = 2};
+        double values[SEEDS];
+        for (uint64_t seed = 0; seed < SEEDS; seed++) {
+            fixture->request.seed = seed;
+            struct frame_result result = fixture_render_motion(fixture, &motion);
+            values[seed] = whole(&result);
+            frame_result_finish(&result);
+        }
+        means[sampled] = mean_of(values, SEEDS);
+    }
+    print_message("met alone %.5f (%.0e), sampled %.5f (%.0e)\n", means[0].value, means[0].error, means[1].value,
+                  means[1].error);
+    assert_mean(means[1], means[0].value, 5.0 * means[0].error);
+    assert_true(means[1].error < 0.02 * means[1].value);
 }
