@@ -6,8 +6,8 @@
 
 /* ---- closed rooms ---- */
 
-/* A box of squares about the eye, 2 m wide, everywhere of one albedo and with an emission of 1. Its material has a mask
- * that cuts nothing out, so its triangles are not sampled as lights, and every path brings the same. */
+/* A box of squares about the eye, 2 m wide, everywhere of one albedo and with an emission of 1. Its material has a
+ * mask that cuts nothing out, so its triangles are not sampled as lights, and every path brings the same. */
 static void a_glowing_room(struct fixture *fixture, float albedo)
 {
     static const float walls[6][12] = {
