@@ -52,6 +52,15 @@ float light_estimate(uint index, light_receiver r)
     return cosine + reach > 0.0 ? power * (r.scattered * min(cosine + reach, 1.0) + highlight) : 0.0;
 }
 
+// Where there are emitters beside the lights (common/emitter.glsl): the probability of asking for a light. By the
+// estimates of both, which are rough: neither is asked for in less than a tenth of all cases.
+float lights_share(light_receiver r, float all_lights, float emitters)
+{
+    const float SHARE_MIN = 0.1;
+    float other = emitters * (r.scattered + r.mirrored), share = all_lights / max(all_lights + other, 1e-30);
+    return all_lights > 0.0 ? (other > 0.0 ? clamp(share, SHARE_MIN, 1.0 - SHARE_MIN) : 1.0) : 0.0;
+}
+
 // Chooses a light with a probability in proportion to its estimate. `number` in [0, 1) chooses it and comes back
 // stretched to [0, 1) again. Probability 0: no light arrives here.
 uint light_choose(light_receiver r, uint light_count, inout float number, out float probability, out float sum)

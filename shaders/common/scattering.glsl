@@ -58,14 +58,19 @@ split split_light(surface s, float NoV)
     return split_facets(s, NoV, alpha, facets_lost(stretched_cosine(NoV, alpha), alpha));
 }
 
-// What goes to the eye of the light from a direction that enters or is mirrored again, per steradian. `loss`: of that
-// direction; reciprocal, as `parts` have the same factors for the view. Shirley et al. A Practitioners' Assessment of
-// Light Reflection Models. 1997; Kulla, Conty 2017.
-vec3 spread_out(surface s, split parts, float NoL, float alpha, float loss)
+// What goes to the eye of the light from a direction that enters, per steradian. `loss`: facets_lost() of that direction;
+// reciprocal, as `parts` have the same factors for the view. Shirley et al. A Practitioners' Assessment of Light
+// Reflection Models. 1997.
+vec3 spread_scattered(surface s, split parts, float NoL, float alpha, float loss)
 {
     float enters = 1.0 - facets_dielectric(facets_cosine(NoL, alpha), loss, alpha, s.ior);
-    return INVERSE_PI * (parts.scattered * (enters / parts.enters_mean) +
-                         parts.again * (loss / max(parts.again_mean, 1e-9)));
+    return parts.scattered * (enters / parts.enters_mean * INVERSE_PI);
+}
+
+// What enters or is mirrored again. Kulla, Conty 2017.
+vec3 spread_out(surface s, split parts, float NoL, float alpha, float loss)
+{
+    return spread_scattered(s, parts, NoL, alpha, loss) + parts.again * (loss / max(parts.again_mean, 1e-9) * INVERSE_PI);
 }
 
 // The mirrored direction; about the geometric normal where the shading normal would send it into the surface.
@@ -73,6 +78,13 @@ vec3 mirror_direction(surface s, vec3 direction)
 {
     vec3 mirrored = reflect(direction, s.normal);
     return dot(mirrored, s.geometric) > 0.0 ? mirrored : reflect(direction, s.geometric);
+}
+
+// Of brdf() what is scattered, not mirrored, be it once or again; NoL > 0.
+vec3 brdf_scattered(surface s, split parts, float NoL)
+{
+    float alpha = square(s.roughness);
+    return spread_scattered(s, parts, NoL, alpha, facets_lost(stretched_cosine(NoL, alpha), alpha));
 }
 
 // Share of the irradiance from a direction (of a light, unit) that goes to the eye, per steradian; without the cosine.

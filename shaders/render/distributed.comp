@@ -4,12 +4,17 @@
 // mean of the samples is right however few rays each has.
 //
 //   radiance    emission, and a constant ambient term as in whitted.comp
-//   shadow ray  one, to one point of one light
+//   shadow ray  one, to one point of one light or emissive triangle
 //   child       at most one: straight on (alpha blending), mirrored or refracted, in a direction that a facet of the
 //               rough surface sends it, or several in turn
 //
-// Defines: those of common/material.glsl, common/light.glsl, common/environment.glsl and render/shade.glsl.
+// Emissive triangles are asked for the light that is scattered alone: what a surface mirrors or refracts of them its
+// children see, however rough it is.
+//
+// Defines: those of common/material.glsl, common/light.glsl, common/environment.glsl and render/shade.glsl; HAS_EMITTERS
+// there are emissive triangles that are sampled, and those of common/emitter.glsl.
 
+#include "common/emitter.glsl"
 #include "common/environment.glsl"
 #include "common/light_choice.glsl"
 #include "common/lobe.glsl"
@@ -39,21 +44,46 @@ void add_lobe(uint j, path p, surface s, float distance_, lobe chosen, vec3 weig
               sample_solid_angle(chosen.solid_angle));
 }
 
-bool ask_for_light(uint j, path p, surface s, vec3 view, float NoV, vec3 weight, float distance_, vec2 u)
+#ifdef HAS_EMITTERS
+bool ask_for_emitter(uint j, path p, surface s, split parts, vec3 weight, vec3 origin, float chance, vec2 u)
+{
+    emitter_sample sampled = emitter_sample_at(origin, s.normal, u, p.time);
+    float NoL = dot(s.normal, sampled.direction);
+    vec3 arriving = vec3(0.0);
+    if (sampled.probability > 0.0 && NoL > 0.0 && dot(s.geometric, sampled.direction) > 0.0)
+        arriving = weight * brdf_scattered(s, parts, NoL) * sampled.radiance * (NoL / (sampled.probability * chance));
+    return add_shadow_ray(j, p, origin, sampled.direction, sampled.distance_, arriving);
+}
+#endif
+
+bool ask_for_light(uint j, path p, surface s, split parts, vec3 view, float NoV, vec3 weight, float distance_, vec2 u)
 {
     vec3 origin = off_surface(s, distance_, s.geometric);
     float probability, all_lights;
-    s.roughness = max(s.roughness, path_roughness(p));
-    split parts = split_light(s, NoV);
-    light_receiver receiver = light_receiver_of(s, parts, origin, view, NoV);
+    surface blurred = s;
+    blurred.roughness = max(s.roughness, path_roughness(p));
+    split blurred_parts = split_light(blurred, NoV);
+    light_receiver receiver = light_receiver_of(blurred, blurred_parts, origin, view, NoV);
     uint index = light_choose(receiver, frame.light_count, u.x, probability, all_lights);
+#ifdef HAS_EMITTERS
+    receiver.scattered = max_component(parts.scattered) * INVERSE_PI;
+    receiver.mirrored = 0.0;
+    float lights_chance = lights_share(receiver, all_lights, emitter_estimate(origin, s.normal));
+    if (u.x >= lights_chance) {
+        u.x = min((u.x - lights_chance) / (1.0 - lights_chance), 0.99999994);
+        return ask_for_emitter(j, p, s, parts, weight, origin, 1.0 - lights_chance, u);
+    }
+    u.x = min(u.x / lights_chance, 0.99999994);
+    probability *= lights_chance;
+#endif
     if (probability <= 0.0) {
         no_shadow_ray(j);
         return false;
     }
     light_sample sampled = light_sample_at(index, origin, u);
     float NoL = dot(s.normal, sampled.direction);
-    vec3 arriving = weight * (brdf(s, parts, view, NoV, sampled.direction) * sampled.irradiance * (NoL / probability));
+    vec3 sent = brdf(blurred, blurred_parts, view, NoV, sampled.direction);
+    vec3 arriving = weight * (sent * sampled.irradiance * (NoL / probability));
     return add_shadow_ray(j, p, origin, sampled.direction, sampled.distance_, arriving);
 }
 
@@ -82,14 +112,15 @@ void main()
         no_shadow_ray(j);
     } else {
         choice = min(choice / s.alpha, 0.99999994);
-        lobe chosen = lobe_choose(s, split_light(s, NoV), NoV, direction, choice,
+        split parts = split_light(s, NoV);
+        lobe chosen = lobe_choose(s, parts, NoV, direction, choice,
                                   sequence_pair(seed, dimension + SEQUENCE_LOBE_DIRECTION, index));
         sent = s.emission + s.occlusion * chosen.scattered * environment_irradiance(s.normal);
         add_lobe(j, p, s, h.distance, chosen, weight, choice);
         if (s.inside && s.transmission > 0.0)
             no_shadow_ray(j);
         else
-            asked = ask_for_light(j, p, s, view, NoV, weight, h.distance,
+            asked = ask_for_light(j, p, s, parts, view, NoV, weight, h.distance,
                                   sequence_pair_sorted(seed, dimension + SEQUENCE_LIGHT, index, frame.group_shift));
     }
     bool seen = !straight && (p.flags & PATH_STRAIGHT) != 0u;
