@@ -191,6 +191,7 @@ struct cli_channel {
 struct cli_job {
     const char *scene; /* a shared scene of the server, in place of the model */
     const char *model, *server, *key_file, *link, *environment, *output, *camera, *keys_file, *trace_file;
+    double environment_degrees; /* as of fl_load_options */
     enum cli_image image;
     struct cli_output
         outputs[CLI_OUTPUTS_MAX]; /* destinations of the pictures: `output`, or several of a script */
@@ -264,6 +265,9 @@ error_t cli_job_set(struct cli_job *job, const char *option, const char *value);
 /* Sets the job's error and returns EINVAL. */
 error_t cli_usage(struct cli_job *job, const char *field, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
+/* "environment", "transparent" or a colour: "#rrggbb". */
+error_t cli_set_background(struct cli_job *job, const char *field, const char *value);
+error_t cli_set_environment_rotation(struct cli_job *job, const char *field, const char *value);
 /* An argument that is no option. */
 error_t cli_set_model(struct cli_job *job, const char *path);
 /* After the command line: settings that depend on several options. `is_series`: output is a pattern. */

@@ -4,6 +4,7 @@
 #include "cli/job_fields.h"
 #include "lib/link.h"
 #include "lib/text.h"
+#include "protocol/common/srgb.h"
 
 #include <ctype.h>
 #include <errno.h>
@@ -26,6 +27,8 @@ enum key {
     KEY_LINK,
     KEY_SIZE,
     KEY_ENVIRONMENT,
+    KEY_ENVIRONMENT_ROTATION,
+    KEY_BACKGROUND,
     KEY_CAMERA,
     KEY_EYE,
     KEY_LOOK_AT,
@@ -74,6 +77,11 @@ static const struct argp_option special[] = {
     {NULL, 0, NULL, 0, "Picture:", CLI_GROUP_PICTURE},
     {"size", KEY_SIZE, "WxH", 0, "Pixels (default 1280x720)", CLI_GROUP_OUTPUT},
     {"environment", KEY_ENVIRONMENT, "FILE", 0, "Equirectangular image (HDR or EXR) that lights the scene",
+     CLI_GROUP_OUTPUT},
+    {"environment-rotation", KEY_ENVIRONMENT_ROTATION, "DEGREES", 0,
+     "Turn it about +y by -360 to 360 (default 0: its middle column is +x)", CLI_GROUP_OUTPUT},
+    {"background", KEY_BACKGROUND, "NAME|#RRGGBB", 0,
+     "Behind all surfaces: the environment (default), transparent, or a colour such as '#ffffff'",
      CLI_GROUP_OUTPUT},
     {"layers", KEY_LAYERS, "NAME,..", 0,
      "What an EXR file has: beauty (the picture, default), albedo, normal, depth, position, ao, id, unknown",
@@ -171,6 +179,38 @@ static error_t set_fov(struct cli_job *job, const char *field, const char *value
     return status;
 }
 
+/* "#rrggbb", as displays have it. */
+static bool parse_colour(const char *value, float linear[3])
+{
+    unsigned codes[3];
+    int length = 0;
+    if (sscanf(value, "#%2x%2x%2x%n", &codes[0], &codes[1], &codes[2], &length) != 3 || length != 7 ||
+        value[length] != '\0' || strspn(value + 1, "0123456789abcdefABCDEF") != 6)
+        return false;
+    for (int c = 0; c < 3; c++)
+        linear[c] = linear_from_srgb_f((float)codes[c] / 255.0f);
+    return true;
+}
+
+error_t cli_set_background(struct cli_job *job, const char *field, const char *value)
+{
+    struct message_render *options = &job->options;
+    if (parse_colour(value, options->background_colour)) {
+        options->background = PROTOCOL_BACKGROUND_COLOUR;
+        return 0;
+    }
+    if (protocol_background_parse(value, &options->background) &&
+        options->background != PROTOCOL_BACKGROUND_COLOUR)
+        return 0;
+    return cli_usage(job, field, "'%s' is no background: use environment, transparent or a colour as #ffffff",
+                     value);
+}
+
+error_t cli_set_environment_rotation(struct cli_job *job, const char *field, const char *value)
+{
+    return set_real(job, field, value, -360, 360, &job->environment_degrees);
+}
+
 /* "beauty,depth". The picture alone is 0, as without the option. */
 static error_t set_layers(struct cli_job *job, const char *field, const char *value)
 {
@@ -226,6 +266,10 @@ static error_t set_option(struct cli_job *job, int key, const char *field, const
     case KEY_ENVIRONMENT:
         job->environment = value;
         return 0;
+    case KEY_ENVIRONMENT_ROTATION:
+        return cli_set_environment_rotation(job, field, value);
+    case KEY_BACKGROUND:
+        return cli_set_background(job, field, value);
     case KEY_CAMERA:
         job->camera = value;
         return 0;
@@ -440,7 +484,7 @@ static bool read_environment(struct cli_job *job)
     for (const struct argp_option *option = all_options(); option->name || option->doc; option++) {
         const bool has_variable = option->key == KEY_SERVER || option->key == KEY_LINK ||
                                   option->key == KEY_SIZE || option->key == KEY_ENVIRONMENT ||
-                                  option->key >= KEY_FIELD;
+                                  option->key == KEY_ENVIRONMENT_ROTATION || option->key >= KEY_FIELD;
         if (option->name && has_variable && !read_variable(job, option))
             return false;
     }

@@ -48,6 +48,7 @@ bool cli_loading_begin(struct cli_loading *loading, struct fl_error *error)
         return false;
     loading->load = (struct fl_load_options){.model = job->model,
                                              .environment = job->environment,
+                                             .environment_degrees = job->environment_degrees,
                                              .note = on_note,
                                              .progress = on_progress,
                                              .user = loading,

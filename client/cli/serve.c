@@ -14,6 +14,7 @@
 #define KEY_LISTEN 0x400
 #define KEY_NAME 0x401
 #define KEY_ENVIRONMENT 0x402
+#define KEY_ENVIRONMENT_ROTATION 0x404
 #define KEY_KEY 0x403
 
 #define LISTENS_MAX 8
@@ -42,6 +43,8 @@ static const struct argp_option options[] = {
      "Use this key for TCP beyond this host ('farlight key' creates one), for the new daemon or for --server", 0},
     {"name", KEY_NAME, "NAME", 0, "Set the scene's name for other clients (default: the model's file name)", 0},
     {"environment", KEY_ENVIRONMENT, "FILE", 0, "Light the scene with this equirectangular image (HDR or EXR)", 0},
+    {"environment-rotation", KEY_ENVIRONMENT_ROTATION, "DEGREES", 0,
+     "Turn it about +y by -360 to 360 (default 0: its middle column is +x)", 0},
     {"quiet", 'q', NULL, 0, "Print no progress and no notes about the model", 0},
     {0}};
 
@@ -87,6 +90,8 @@ static error_t parse(int key, char *value, struct argp_state *state)
     case KEY_ENVIRONMENT:
         job->environment = value;
         return 0;
+    case KEY_ENVIRONMENT_ROTATION:
+        return cli_set_environment_rotation(job, "--environment-rotation", value);
     case 'q':
         job->quiet = true;
         return 0;

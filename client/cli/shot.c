@@ -185,6 +185,14 @@ static bool apply_outputs(const struct shot_reader *reader, const struct shot_va
     return true;
 }
 
+static bool apply_background(const struct shot_reader *reader, const struct shot_value *at)
+{
+    const char *written = json_string_value(at->value);
+    return (written && cli_set_background(reader->job, "", written) == 0) ||
+           shot_wrong(reader, at, "use \"transparent\", \"environment\" or a colour: \"#ffffff\"",
+                      "is no background");
+}
+
 /* ---- all of it ---- */
 
 static bool apply_members(const struct shot_reader *reader, const struct shot_value *root)
@@ -192,6 +200,8 @@ static bool apply_members(const struct shot_reader *reader, const struct shot_va
     const struct cli_shot_given *given = reader->given;
     struct cli_job *job = reader->job;
     const struct shot_value model = shot_member(root, "model"), environment = shot_member(root, "environment"),
+                            background = shot_member(root, "background"),
+                            rotation = shot_member(root, "environment_rotation"),
                             camera = shot_member(root, "camera"), clips = shot_member(root, "clips"),
                             output = shot_member(root, "output"), outputs = shot_member(root, "outputs"),
                             about = shot_member(root, "description"), schema = shot_member(root, "$schema");
@@ -201,6 +211,8 @@ static bool apply_members(const struct shot_reader *reader, const struct shot_va
             return shot_wrong(reader, texts[i], "leave it out", "must be a string");
     if ((model.value && !shot_path(reader, &model, &job->model)) ||
         (environment.value && !shot_path(reader, &environment, &job->environment)) ||
+        (background.value && !apply_background(reader, &background)) ||
+        (rotation.value && !shot_number(reader, &rotation, -360, 360, &job->environment_degrees)) ||
         (camera.value && !shot_camera(reader, &camera)) || (clips.value && !apply_clips(reader, &clips)))
         return false;
     for (size_t i = 0; i < GROUP_COUNT; i++) {
@@ -225,8 +237,10 @@ static bool apply_members(const struct shot_reader *reader, const struct shot_va
 bool cli_shot_apply(struct cli_shot *shot, struct cli_job *job, const struct cli_shot_given *given,
                     cli_shot_set *set, void *user)
 {
-    static const char *const others[] = {"$schema", "description", "model", "environment", "camera",  "clips",
-                                         "lights",  "materials",   "nodes", "output",      "outputs", NULL};
+    static const char *const others[] = {
+        "$schema",    "description", "model",   "environment", "environment_rotation",
+        "background", "camera",      "clips",   "lights",      "materials",
+        "nodes",      "output",      "outputs", NULL};
     const struct shot_reader reader = {.shot = shot, .job = job, .given = given, .set = set, .user = user};
     const struct shot_value root = {.value = shot->json.root};
     const char *known[SHOT_SETTINGS_MAX + sizeof(others) / sizeof(others[0])];

@@ -13,6 +13,7 @@
 
 #include <argp.h>
 #include <errno.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -29,17 +30,22 @@ struct options {
     int socket;
     uint32_t scene;
     const char *environment;
+    double environment_degrees;
     bool no_model;
     const char *model;
 };
 
-enum { OPTION_FD = 256, OPTION_SCENE, OPTION_ENVIRONMENT, OPTION_NO_MODEL };
+#define RADIANS_PER_DEGREE 0.017453292519943295
+
+enum { OPTION_FD = 256, OPTION_SCENE, OPTION_ENVIRONMENT, OPTION_ROTATION, OPTION_NO_MODEL };
 
 static const struct argp_option option_rows[] = {
     {"fd", OPTION_FD, "N", 0, "use this connected stream socket (required)", 0},
     {"scene", OPTION_SCENE, "ID", 0, "edit this scene (default 1)", 0},
     {"environment", OPTION_ENVIRONMENT, "FILE", 0, "light the scene with this equirectangular image, HDR or EXR",
      0},
+    {"environment-rotation", OPTION_ROTATION, "DEGREES", 0,
+     "turn it about +y by -360 to 360 (default 0: its middle column is +x)", 0},
     {"no-model", OPTION_NO_MODEL, NULL, 0, "send the environment only; MODEL is not needed", 0},
     {0}};
 
@@ -55,6 +61,16 @@ static uint32_t parse_number(struct argp_state *state, const char *name, const c
     return (uint32_t)value;
 }
 
+static double parse_degrees(struct argp_state *state, const char *text)
+{
+    char *end;
+    const double degrees = strtod(text, &end);
+
+    if (end == text || *end != '\0' || !(fabs(degrees) <= 360))
+        argp_error(state, "--environment-rotation: '%s' is not a number from -360 to 360", text);
+    return degrees;
+}
+
 static error_t parse_option(int key, char *argument, struct argp_state *state)
 {
     struct options *options = state->input;
@@ -68,6 +84,9 @@ static error_t parse_option(int key, char *argument, struct argp_state *state)
         return 0;
     case OPTION_ENVIRONMENT:
         options->environment = argument;
+        return 0;
+    case OPTION_ROTATION:
+        options->environment_degrees = parse_degrees(state, argument);
         return 0;
     case OPTION_NO_MODEL:
         options->no_model = true;
@@ -197,9 +216,15 @@ static bool parse_model(struct import_scene *scene, struct files *files, const c
                        dot ? dot : "(no ending)");
 }
 
-static bool import_environment(struct import_scene *scene, struct files *files, const char *file)
+/* The protocol's middle column is -z. */
+static float turn_of(double degrees)
 {
-    struct message_set_environment environment = {.colour = {1, 1, 1}};
+    return (float)((degrees - 90) * RADIANS_PER_DEGREE);
+}
+
+static bool import_environment(struct import_scene *scene, struct files *files, const char *file, double degrees)
+{
+    struct message_set_environment environment = {.colour = {1, 1, 1}, .rotation = turn_of(degrees)};
     struct texture_job job = {0};
     char reason[FILES_REASON_BYTES] = "";
     unsigned char *bytes = files_read_descriptor(files, files->environment, &job.size_bytes, reason);
@@ -233,7 +258,7 @@ static bool import_all(struct import_scene *scene, struct files *files, struct s
             import_note(scene, PROTOCOL_SEVERITY_WARNING, NULL, "it contains nothing that can be shown");
     }
     if (imported && options->environment)
-        imported = import_environment(scene, files, file_part(options->environment));
+        imported = import_environment(scene, files, file_part(options->environment), options->environment_degrees);
     return imported && !scene->failed;
 }
 

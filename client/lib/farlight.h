@@ -163,9 +163,11 @@ struct fl_note {
 struct fl_import;
 
 struct fl_load_options {
-    const char *model;       /* path */
-    const char *environment; /* image file all around, or NULL; alone (model NULL) allowed */
-    unsigned timeout_ms;     /* after this the importer is killed; 0: 10 minutes */
+    const char *model;          /* path */
+    const char *environment;    /* equirectangular image file all around, or NULL; alone (model NULL) allowed */
+    double environment_degrees; /* its turn about +y, -360 to 360; 0: its middle column is +x, as glTF viewers have
+                                   it */
+    unsigned timeout_ms;        /* after this the importer is killed; 0: 10 minutes */
     /* Called during the load; may be NULL. Strings live as long as the call. */
     void (*note)(void *user, const struct fl_note *note);
     void (*progress)(void *user, uint64_t done_bytes, uint64_t total_bytes, const char *what);
@@ -173,7 +175,7 @@ struct fl_load_options {
     enum protocol_sharing sharing; /* who else can come to the scene .. */
     const char *scene_name;        /* .. and by what name; NULL: the model's file name */
     struct fl_import *started;     /* by fl_import_start; the load takes it over, also when it fails. `model`,
-                                      `environment` and `timeout_ms` are those given at its start */
+                                      its environment and `timeout_ms` are those given at its start */
 };
 
 /* The options' strings must live until the load. Destroy an importer that is not loaded. */

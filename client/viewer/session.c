@@ -76,6 +76,7 @@ static struct fl_scene *come_to_scene(struct session *session, struct fl_error *
     /* A private daemon ends with its connection, and its scenes with it. */
     const struct fl_load_options load = {.model = options->model,
                                          .environment = options->environment,
+                                         .environment_degrees = options->environment_degrees,
                                          .note = on_note,
                                          .progress = on_progress,
                                          .user = session,

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Meshes and sphere sets into the scene-wide buffers of shared/geometry.h. */
 #include "gpu_scene/state.h"
+#include "gpu_scene/unit_vector.h"
 
 #include "shared/material.h"
 
@@ -237,24 +238,6 @@ static void pack_normals(const struct gpu_scene_geometry *geometry, float *out)
     }
 }
 
-/* The C twin of pack_unit() in shaders/common/math.glsl. */
-static uint32_t pack_unit(const float v[3])
-{
-    float sum = fabsf(v[0]) + fabsf(v[1]) + fabsf(v[2]);
-    if (!(sum > 0.0f) || !isfinite(sum))
-        return 0;
-    float p[2] = {v[0] / sum, v[1] / sum};
-    if (v[2] < 0.0f) {
-        float x = p[0], y = p[1];
-        p[0] = (1.0f - fabsf(y)) * (x >= 0.0f ? 1.0f : -1.0f);
-        p[1] = (1.0f - fabsf(x)) * (y >= 0.0f ? 1.0f : -1.0f);
-    }
-    uint32_t packed[2];
-    for (int i = 0; i < 2; i++)
-        packed[i] = (uint32_t)(int32_t)lrintf(fminf(fmaxf(p[i], -1.0f), 1.0f) * 32767.0f) & 0xffffu;
-    return packed[0] | packed[1] << 16;
-}
-
 static void pack_tangents(const struct gpu_scene_geometry *geometry, uint32_t *out)
 {
     const struct scene_mesh *mesh = geometry->mesh;
@@ -267,7 +250,7 @@ static void pack_tangents(const struct gpu_scene_geometry *geometry, uint32_t *o
         return;
     const float *in = (const float *)(const void *)mesh->arrays[MESH_TANGENTS]->data;
     for (size_t i = 0; i < mesh->vertex_count; i++)
-        out[i] = pack_unit(&in[4 * i]);
+        out[i] = unit_vector_pack(&in[4 * i]);
 }
 
 static void pack_texcoords(const struct gpu_scene_geometry *geometry, float *out)

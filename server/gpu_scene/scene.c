@@ -45,6 +45,7 @@ void gpu_scene_finish(struct gpu_scene *gpu)
     if (gpu->state) {
         gpu_scene_drop_texture_packing(gpu);
         gpu_scene_deform_finish(&gpu->state->deform, gpu->device);
+        emitters_finish(&gpu->state->emitters);
         hashmap_finish(&gpu->state->material_indices.index_by_id);
         hashmap_finish(&gpu->state->texture_index_by_id);
         free(gpu->state->material_indices.free);
@@ -127,9 +128,12 @@ static bool update_parts(struct gpu_scene *gpu, const struct scene *scene, const
         gpu_scene_classify_geometry(gpu, scene, motion);
     if ((geometry || nodes || (posed & POSED_MORPHS)) && !gpu_scene_deform(gpu, scene, motion, changes, error))
         return false;
-    if (!gpu_scene_upload_tables(gpu, changes, error))
-        return false;
     if ((geometry || nodes) && !gpu_scene_upload_instances(gpu, scene, motion, changes, error))
+        return false;
+    if ((geometry || nodes || shading || (changes->bits & (CHANGED_GEOMETRY | CHANGED_DEFORMED))) &&
+        !gpu_scene_update_emitters(gpu, scene, motion, error))
+        return false;
+    if (!gpu_scene_upload_tables(gpu, changes, error))
         return false;
     /* The bounds are of geometry, instances and lights together; lights see to them last. */
     if ((geometry || nodes || lights || (changes->bits & CHANGED_DEFORMED)) &&

@@ -82,6 +82,8 @@ struct gpu_scene {
     bool has_tangents;     /* some mesh has tangents, or some material in use asks for those of its texture
                               coordinates: normal or bump map, anisotropy */
     bool has_motion;       /* something moves while the shutter is open: tracers must look at the rays' times */
+    bool has_emitters;     /* some emissive triangle is in the tables of shared/emitter.h */
+    bool has_emissive_spheres; /* some material of spheres would make triangles such */
     bool has_environment_image;
     float lower_world[3], upper_world[3]; /* all instances and lights with a place; discs left out */
     float diagonal;                       /* of these bounds */

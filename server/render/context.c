@@ -141,6 +141,13 @@ void context_bind_hits(struct render_context *context)
     gpu_buffer_bind_storage(&context->hit_list, BIND_HIT_LIST);
 }
 
+/* Numbers of lights share a word with what paths know of emitters. */
+bool context_samples_emitters(const struct render_context *context)
+{
+    return context->scene->has_emitters && context->scene->light_count < PATH_LIGHT_MASK &&
+           !(context->tracer->impl->sampled && context->scene->has_emissive_spheres);
+}
+
 uint32_t context_ao_rays(const struct render_context *context)
 {
     return context->request.ao_rays > 0 ? context->request.ao_rays : AO_RAYS_DEFAULT;

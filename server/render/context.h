@@ -95,6 +95,9 @@ uint64_t context_device_bytes(const struct render_context *context);
 size_t context_surface_defines(const struct render_context *context, struct gpu_define *defines);
 /* The same, with the scene, the frame's uniforms, and the rays, hits, paths and hit list of the current wave. */
 void context_bind_hits(struct render_context *context);
+/* Whether emissive triangles are sampled as lights. Stored samples do not tell spheres from triangles, so where
+ * these shine, too, such a tracer's rays find all of it as they hit it. */
+bool context_samples_emitters(const struct render_context *context);
 /* Of ambient occlusion: rays a sample, and how far they look, metres. */
 uint32_t context_ao_rays(const struct render_context *context);
 float context_ao_distance(const struct render_context *context);

@@ -49,8 +49,10 @@ struct frame_request {
     enum tone_map tone_map;
     enum pixel_format format;
     float exposure_stops;
-    float aperture; /* diameter of the lens, metres; 0: everything is sharp, or the camera has none */
-    float focus;    /* distance along the view of the plane that is sharp, metres; 0: middle of the scene */
+    enum background background;
+    float background_colour[3]; /* linear, 0 .. 1; BACKGROUND_COLOUR */
+    float aperture;             /* diameter of the lens, metres; 0: everything is sharp, or the camera has none */
+    float focus; /* distance along the view of the plane that is sharp, metres; 0: middle of the scene */
     enum pixel_filter filter;
     enum brdf brdf;       /* of rough surfaces; integrator path */
     float ao_distance;    /* metres; 0: a tenth of the scene's diagonal */
@@ -90,7 +92,7 @@ struct frame_request {
  *                   exposure
  *   attachments     those layers in 4 bytes a pixel, see frame_result_attachment()
  *   alpha           1 where there is a surface (what blended surfaces leave open goes on to what lies behind) and
- *                   where the environment is seen; 0 where there is neither
+ *                   where a background is seen; 0 where there is neither
  * What integrators do with `depth`: whitted, distributed and path bounce so often after the first hit (path: and
  * ask for light at the last hit too); raycast and ao do not bounce, and going straight on through layers is no
  * bounce. What `ao` shows is how open a first hit is, 1 where nothing is hit; all else show radiance. A scene with

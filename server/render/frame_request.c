@@ -41,6 +41,18 @@ static bool check_camera(const struct frame_request *request, struct error *erro
     return true;
 }
 
+static bool check_background(const struct frame_request *request, struct error *error)
+{
+    if (request->background >= BACKGROUND_COUNT)
+        return error_set(error, ERROR_UNSUPPORTED, "background", "there is no background number %u",
+                         (unsigned)request->background);
+    for (int c = 0; c < 3; c++)
+        if (!(request->background_colour[c] >= 0.0f && request->background_colour[c] <= 1.0f))
+            return error_set(error, ERROR_INVALID, "background_colour", "%g; 0 to 1 are possible",
+                             (double)request->background_colour[c]);
+    return true;
+}
+
 static bool check_integrator(const struct frame_request *request, struct error *error)
 {
     if (!integrator_by_number(request->integrator))
@@ -175,8 +187,8 @@ bool frame_request_check(const struct frame_request *request, struct error *erro
     if (request->format > PIXEL_FORMAT_RGBA32F)
         return error_set(error, ERROR_UNSUPPORTED, "format", "there is no pixel format number %u",
                          (unsigned)request->format);
-    return check_views(request, error) && check_integrator(request, error) && check_layers(request, error) &&
-           check_camera(request, error);
+    return check_views(request, error) && check_background(request, error) && check_integrator(request, error) &&
+           check_layers(request, error) && check_camera(request, error);
 }
 
 static bool same_camera(const struct frame_camera *a, const struct frame_camera *b)
@@ -205,9 +217,15 @@ static bool same_light(const struct frame_request *a, const struct frame_request
            a->ao_falloff == b->ao_falloff && a->ao_rays == b->ao_rays && a->layer_opacity == b->layer_opacity;
 }
 
+bool frame_request_hides_environment(const struct frame_request *request)
+{
+    return request->background != BACKGROUND_ENVIRONMENT;
+}
+
 bool frame_request_same_radiance(const struct frame_request *a, const struct frame_request *b)
 {
-    return a->depth == b->depth && a->seed == b->seed && same_light(a, b) && same_tracer(a, b);
+    return a->depth == b->depth && a->seed == b->seed && same_light(a, b) && same_tracer(a, b) &&
+           frame_request_hides_environment(a) == frame_request_hides_environment(b);
 }
 
 bool frame_request_adds_to(const struct frame_request *a, const struct frame_request *b)

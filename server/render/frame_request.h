@@ -21,6 +21,8 @@ uint32_t frame_format_bytes(unsigned format); /* of a pixel */
 uint64_t frame_request_plane_bytes(const struct frame_request *request, enum layer layer, uint32_t rows);
 /* Of the frame's pixels, all planes. */
 uint64_t frame_request_bytes(const struct frame_request *request);
+/* Behind the surfaces of the picture. */
+bool frame_request_hides_environment(const struct frame_request *request);
 /* Whether the same ray brings the same radiance. */
 bool frame_request_same_radiance(const struct frame_request *a, const struct frame_request *b);
 /* Whether their samples may be added up: they are equal but for their number and the use of the sum. */

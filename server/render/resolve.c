@@ -41,6 +41,16 @@ static const struct gpu_program *use_ycbcr(struct render_context *context, uint3
     return program;
 }
 
+/* Layers beside the picture have none. */
+static void set_background(const struct gpu_program *program, const struct frame_request *request,
+                           enum layer layer)
+{
+    const bool has_colour = layer == LAYER_BEAUTY && request->background == BACKGROUND_COLOUR;
+    const float *colour = request->background_colour;
+    const float background[4] = {colour[0], colour[1], colour[2], 1.0f}, none[4] = {0};
+    gpu_uniform_vec(program, "background", 4, has_colour ? background : none);
+}
+
 static bool is_ycbcr(const struct render_context *context, enum layer layer)
 {
     return layer == LAYER_BEAUTY && context->request.ycbcr != YCBCR_NONE;
@@ -79,6 +89,7 @@ bool picture_resolve_band(struct picture *picture, struct render_context *contex
         gpu_uniform_uint(program, "tone_map_kind", request->tone_map);
         gpu_uniform_float(program, "scale", scale_of(picture, request, layer));
         gpu_uniform_float(program, "coverage_scale", coverage_scale);
+        set_background(program, request, layer);
         gpu_dispatch(context->device, program, as_ycbcr ? picture->tiles_across * ((rows + 1) / 2) : pixel_count);
     }
     context_span_end(context);

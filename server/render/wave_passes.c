@@ -11,7 +11,7 @@
 
 #include <epoxy/gl.h>
 
-#define DEFINES_MAX 12
+#define DEFINES_MAX 16
 
 bool wave_passes_reserve(struct wave_passes *passes, struct render_context *context, struct error *error)
 {
@@ -111,7 +111,7 @@ static bool shade_hits(struct wave_passes *passes, struct render_context *contex
 static const struct gpu_program *left_scene_program(const struct wave_passes *passes,
                                                     struct render_context *context, struct error *error)
 {
-    struct gpu_define defines[4] = {0};
+    struct gpu_define defines[5] = {0};
     size_t n = 0;
     if (context->environment->kind == ENVIRONMENT_IMAGE)
         defines[n++] = (struct gpu_define){"HAS_ENVIRONMENT_IMAGE", "1"};
@@ -119,6 +119,8 @@ static const struct gpu_program *left_scene_program(const struct wave_passes *pa
         defines[n++] = (struct gpu_define){passes->integrator->left_scene, "1"};
     if (passes->integrator->left_scene && context->features.area_lights)
         defines[n++] = (struct gpu_define){"HAS_AREA_LIGHTS", "1"};
+    if (passes->integrator->left_scene && context_samples_emitters(context))
+        defines[n++] = (struct gpu_define){"HAS_EMITTERS", "1"};
     return context_use_with(context, "render/left_scene.comp", defines, error);
 }
 
@@ -285,7 +287,8 @@ enum wave_progress wave_passes_shade(struct wave_passes *passes, struct render_c
 void wave_passes_announce_shadows(struct wave_passes *passes, struct render_context *context)
 {
     /* Towards points on a light that each hit chooses for itself they go all ways. */
-    const bool coherent = passes->integrator->shadows_together && !context->features.area_lights;
+    const bool coherent = passes->integrator->shadows_together && !context->features.area_lights &&
+                          !context_samples_emitters(context);
     const struct wave shadows = {.kind = WAVE_ANY,
                                  .times = context->scene->has_motion ? &passes->shadow_times : NULL};
     if (passes->integrator->shadow_rays_a_hit(context) > 0)

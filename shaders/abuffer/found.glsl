@@ -35,7 +35,7 @@ void offer_sample(trace_ray r, inout abuffer_found found, int sample_index, floa
     candidate c = candidate_of_sample(sample_index, distance_);
     c.barycentrics = nearest_barycentrics(c, r.origin, r.direction);
     add_intersected(found.intersected, found.optical_depth, material_index_of(c), distance_, side, near,
-                    transmittance_of(c, r.origin, r.direction, 0.0));
+                    transmittance_of(c, r.origin, r.direction, 0.0, r.t_min == RAY_STOPS_T_MIN));
     if (min_component(found.optical_depth) >= OPTICAL_DEPTH_BLACK)
         found.end = -1.0;
 #else

@@ -70,8 +70,9 @@ bool is_cut_out(candidate found, vec3 origin_world, vec3 direction_world, float 
 }
 
 // The transmittance of the surface for a shadow ray: 0 if it is opaque, 1 if it is cut away; the base colour tints
-// transmitted light, and the share that alpha blending leaves open passes untinted.
-vec3 transmittance_of(candidate found, vec3 origin_world, vec3 direction_world, float time)
+// transmitted light, and the share that alpha blending leaves open passes untinted. `stops`: only what is cut away lets
+// the ray pass.
+vec3 transmittance_of(candidate found, vec3 origin_world, vec3 direction_world, float time, bool stops)
 {
 #if defined HAS_CUTOUT || defined HAS_TRANSLUCENT
     material m = material_at(material_index_of(found));
@@ -83,6 +84,8 @@ vec3 transmittance_of(candidate found, vec3 origin_world, vec3 direction_world, 
     vec4 colour = base_colour_at(m, point);
     if (is_mask && colour.a < m.alpha_cutoff)
         return vec3(1.0);
+    if (stops)
+        return vec3(0.0);
     vec3 through = vec3(0.0);
 #ifdef HAS_TRANSMISSION // else only alpha is needed, and no colour is decoded
     float transmission = m.transmission * (1.0 - m.metallic);

@@ -20,30 +20,9 @@ float fresnel_dielectric(float cos_i, float eta)
     return 0.5 * (perpendicular * perpendicular + parallel * parallel);
 }
 
-float rough_fade(float roughness)
+float schlick_grazing(vec3 f0)
 {
-    return 0.9 * smoothstep(0.2, 0.8, roughness);
-}
-
-// Share that a rough boundary reflects: Fresnel's rise at grazing angles fades, as the facets that are seen there
-// face the viewer. At middle angles a rough boundary reflects a little more than a smooth one, hence the lesser
-// cosine (not so where the index is so high that F falls before it rises). The constants are chosen so that for
-// eta in 1..10 and any angle it is at least what D_GGX and V_SmithGGXCorrelated reflect with Fresnel's equations:
-// what it leaves for other lobes then never makes more than 1.
-float fresnel_rough_dielectric(float cos_i, float eta, float roughness)
-{
-    float f0 = square((eta - 1.0) / (eta + 1.0));
-    float lower = 1.0 - 0.5 * square(roughness * (1.0 - f0));
-    return mix(fresnel_dielectric(cos_i * lower, eta), f0, rough_fade(roughness));
-}
-
-// The mean of it over the hemisphere, cosine-weighted, or up to 0.004 less. The smooth boundary's is a polynomial
-// fitted from below for eta in 1..10.
-float fresnel_rough_dielectric_mean(float eta, float roughness)
-{
-    float s = (eta - 1.0) / (eta + 1.0);
-    float mean = s * (0.4524 + s * (-0.1282 + s * 0.6494));
-    return mix(mean, s * s, rough_fade(roughness));
+    return clamp(50.0 * max_component(f0), 0.0, 1.0);
 }
 
 // Schlick. An Inexpensive BRDF Model for Physically-Based Rendering. 1994; for metals. What reflects less than any
@@ -52,8 +31,13 @@ float fresnel_rough_dielectric_mean(float eta, float roughness)
 vec3 fresnel_schlick(vec3 f0, float cos_i)
 {
     float m = clamp(1.0 - cos_i, 0.0, 1.0), m2 = m * m;
-    float f90 = clamp(50.0 * max_component(f0), 0.0, 1.0);
-    return f0 + (f90 - f0) * (m2 * m2 * m);
+    return f0 + (schlick_grazing(f0) - f0) * (m2 * m2 * m);
+}
+
+// The mean of it over the hemisphere, cosine-weighted.
+vec3 fresnel_schlick_mean(vec3 f0)
+{
+    return f0 + (schlick_grazing(f0) - f0) / 21.0;
 }
 
 // Walter et al. Microfacet Models for Refraction through Rough Surfaces. 2007. Equation 33. `sin2_NoH`: squared

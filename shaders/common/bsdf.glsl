@@ -3,14 +3,15 @@
 // and bsdf_choose() implement one model, and bsdf_evaluate() returns the density with which bsdf_choose() samples a
 // direction.
 //
-//   scattered   Lambert, diminished by the boundary both ways, as in brdf() of common/scattering.glsl
+//   scattered   Lambert, diminished by the boundary both ways, and what metal mirrors more than once, as in brdf() of
+//               common/scattering.glsl
 //   mirrored    GGX facets, each a smooth mirror by Fresnel's equations (metal: Schlick); or Ward's lobe with the same
 //               reflectances
-//   refracted   GGX facets as windows
+//   refracted   GGX facets as windows: also for what they would mirror into another facet
 //
 // The last two may be stretched along a grain. Where they are smooth they are a mirror and a window, which nothing but
-// bsdf_choose() finds. Radiance on the other side is divided by the square of the index, so that a window neither dims
-// nor brightens the view through it.
+// bsdf_choose() finds; nor does anything else find what goes on inside of glass, where both are GGX's. Radiance on the
+// other side is divided by the square of the index, so that a window neither dims nor brightens the view through it.
 //
 // Defines: those of common/material.glsl; HAS_ANISOTROPY some material has a grain; WARD.
 
@@ -27,7 +28,7 @@ struct bsdf {
     bool rough;             // else mirror and window are smooth
     bool leaves;            // the ray comes from inside of glass
     float eta;              // index behind / index before
-    vec3 scattered;         // as in struct split, divided by pi and the mean share that enters
+    split parts;            // none is scattered from inside of glass: bsdf_choose() does that by facets
     float scattered_chance; // of choosing that lobe
     float mirror_chance;    // WARD: of choosing the mirror otherwise
 };
@@ -68,29 +69,25 @@ vec3 bsdf_world(bsdf b, vec3 local)
     return local.x * b.x + local.y * b.y + local.z * b.z;
 }
 
-// The share that the boundary reflects and so withholds from scattering, and its mean. Ward's facets do not hide each
-// other at grazing angles, so Fresnel's rise there does not fade as it does with GGX's.
-float boundary_share(float cosine, float ior, float roughness)
+// The facets' alpha for polynomials that know only one, and how much of what these say is surely lost.
+vec2 facet_alpha_mean(vec2 alpha)
 {
-#ifdef WARD
-    float f0 = square((ior - 1.0) / (ior + 1.0));
-    return fresnel_dielectric(cosine * (1.0 - 0.5 * square(roughness * (1.0 - f0))), ior);
+#ifdef HAS_ANISOTROPY
+    float mean = 0.5 * (alpha.x + alpha.y), squares = sqrt(0.5 * dot(alpha, alpha));
+    return vec2(0.5 * (mean + squares), 0.9 + 0.1 * alpha.y / max(alpha.x, FACET_ALPHA_MIN));
 #else
-    return fresnel_rough_dielectric(cosine, ior, roughness);
+    return vec2(alpha.x, 1.0);
 #endif
 }
 
-float boundary_share_mean(float ior, float roughness)
+float bsdf_lost(bsdf b, vec3 direction)
 {
-#ifdef WARD
-    return fresnel_rough_dielectric_mean(ior, 0.0);
-#else
-    return fresnel_rough_dielectric_mean(ior, roughness);
-#endif
+    vec2 mean = facet_alpha_mean(b.alpha);
+    return mean.y * facets_lost(facet_stretched(direction, b.alpha), mean.x);
 }
 
-// `view`: towards the eye; `parts`: split_light() of the same surface and NoV, which is not 0.
-bsdf bsdf_of(surface s, split parts, vec3 view, float NoV, vec3 along, float anisotropy)
+// `view`: towards the eye, as NoV, which is not 0.
+bsdf bsdf_of(surface s, vec3 view, float NoV, vec3 along, float anisotropy)
 {
     bsdf b;
     b.x = along;
@@ -100,30 +97,33 @@ bsdf bsdf_of(surface s, split parts, vec3 view, float NoV, vec3 along, float ani
     b.view = normalize(vec3(local.xy, NoV));
     b.alpha = facet_alpha(s.roughness, anisotropy);
     b.rough = b.alpha.x > FACET_ALPHA_MIN;
-    b.alpha = max(b.alpha, vec2(FACET_ALPHA_MIN));
     b.leaves = s.inside && s.transmission > 0.0;
     b.eta = b.leaves ? 1.0 / s.ior : s.ior;
-    if (!b.leaves)
-        parts.scattered = s.base * ((1.0 - s.metallic) * (1.0 - s.transmission) *
-                                    (1.0 - boundary_share(NoV, s.ior, s.roughness)));
-    float enters_mean = b.leaves ? 1.0 : 1.0 - boundary_share_mean(s.ior, s.roughness);
-    b.scattered = parts.scattered * (INVERSE_PI / enters_mean);
-    float scattered = max_component(parts.scattered);
-    float facets = max_component(parts.mirror) + max_component(parts.refracted);
-    facets = facets > 0.0 ? max(facets, LOBE_CHANCE_MIN) : 0.0;
-    b.scattered_chance = scattered + facets > 0.0 ? scattered / (scattered + facets) : 1.0;
-    b.mirror_chance = max(max_component(parts.mirror), LOBE_CHANCE_MIN) /
-                      (max(max_component(parts.mirror), LOBE_CHANCE_MIN) + max_component(parts.refracted));
+    float loss = b.rough ? bsdf_lost(b, b.view) : 0.0;
+    b.parts = split_facets(s, NoV, facet_alpha_mean(b.alpha).x, loss);
+    b.alpha = max(b.alpha, vec2(FACET_ALPHA_MIN));
+    if (b.leaves)
+        b.parts.scattered = b.parts.again = vec3(0.0);
+    float scattered = max_component(b.parts.scattered + b.parts.again);
+    float mirror = max_component(b.parts.mirror), refracted = max_component(b.parts.refracted);
+    float facets = mirror + refracted > 0.0 ? max(mirror + refracted, LOBE_CHANCE_MIN) : 0.0;
+    b.scattered_chance = b.leaves ? 0.0 : scattered + facets > 0.0 ? scattered / (scattered + facets) : 1.0;
+    b.mirror_chance = max(mirror, LOBE_CHANCE_MIN) / (max(mirror, LOBE_CHANCE_MIN) + refracted);
     return b;
 }
 
-// The reflectance and transmittance of a facet.
-void facet_parts(bsdf b, surface s, float VoH, out vec3 mirror, out vec3 window)
+// The reflectance and transmittance of a facet. `lit`: the share of its mirror's light that no other facet catches.
+void facet_parts(bsdf b, surface s, float VoH, float lit, out vec3 mirror, out vec3 window)
 {
-    float dielectric = fresnel_dielectric(VoH, b.eta);
-    mirror = mix(vec3(dielectric), fresnel_schlick(s.base, VoH), s.metallic);
-    // Glass is tinted once, where light enters it.
-    window = (b.leaves ? vec3(1.0) : s.base) * ((1.0 - dielectric) * (1.0 - s.metallic) * s.transmission);
+    float dielectric = fresnel_dielectric(VoH, b.eta), mirrored = dielectric * lit;
+#ifdef WARD
+    if (!b.leaves && b.rough) // whose mirror has other facets than the window
+        mirrored = b.parts.dielectric;
+#endif
+    mirror = mix(vec3(dielectric), fresnel_schlick(s.base, VoH), s.metallic) * lit;
+    // Glass is tinted once, where light enters it. From inside, also what is scattered is left to it.
+    vec3 through = b.leaves ? mix(s.base, vec3(1.0), s.transmission) : s.base * s.transmission;
+    window = through * ((1.0 - mirrored) * (1.0 - s.metallic));
 }
 
 // The probability of choosing the mirror over the window. Ward's lobe has other facets than the window, so it is chosen
@@ -131,11 +131,21 @@ void facet_parts(bsdf b, surface s, float VoH, out vec3 mirror, out vec3 window)
 float facet_mirror_chance(bsdf b, vec3 mirror, vec3 window)
 {
 #ifdef WARD
-    return b.mirror_chance;
-#else
+    if (!b.leaves)
+        return b.mirror_chance;
+#endif
     float size = max_component(mirror), both = size + max_component(window);
     return both > 0.0 ? size / both : 1.0;
+}
+
+// The share of the light mirrored by a facet that no other one catches; what comes from inside of glass stays there.
+float bsdf_lit(bsdf b, vec3 light)
+{
+#ifndef WARD
+    if (b.rough && !b.leaves)
+        return light.z > 0.0 ? facet_both_share(b.view, light, b.alpha) : 0.0;
 #endif
+    return 1.0;
 }
 
 // The reflectance from a direction on the same side (unit) to the eye, per steradian, times the cosine; and the
@@ -144,23 +154,22 @@ vec3 bsdf_evaluate(bsdf b, surface s, vec3 light_world, out float probability)
 {
     vec3 light = bsdf_local(b, light_world);
     probability = 0.0;
-    if (light.z <= 0.0 || dot(s.geometric, light_world) <= 0.0)
+    if (light.z <= 0.0 || dot(s.geometric, light_world) <= 0.0 || b.leaves)
         return vec3(0.0);
-    float enters = b.leaves ? 1.0 : 1.0 - boundary_share(light.z, s.ior, s.roughness);
-    vec3 sent = b.scattered * (enters * light.z);
+    vec3 sent = spread_out(s, b.parts, light.z, facet_alpha_mean(b.alpha).x, bsdf_lost(b, light)) * light.z;
     probability = b.scattered_chance * light.z * INVERSE_PI;
     if (!b.rough)
         return sent;
     vec3 facet = normalize(b.view + light), mirror, window;
     float VoH = clamp(dot(b.view, facet), 1e-6, 1.0);
-    facet_parts(b, s, VoH, mirror, window);
+    facet_parts(b, s, VoH, bsdf_lit(b, light), mirror, window);
     float chance = (1.0 - b.scattered_chance) * facet_mirror_chance(b, mirror, window);
 #ifdef WARD
     float lobe_density = ward_density(facet, VoH, b.alpha);
     sent += mirror * (ward_weight(b.view, light, facet, VoH) * lobe_density);
 #else
     float lobe_density = visible_facet_density(facet, b.view, VoH, b.alpha) / (4.0 * VoH);
-    sent += mirror * (facet_both_share(b.view, light, b.alpha) * lobe_density);
+    sent += mirror * lobe_density;
 #endif
     probability += chance * lobe_density;
     return sent;
@@ -177,6 +186,27 @@ struct bsdf_choice {
     uint lobe;         // BSDF_*
 };
 
+vec3 direction_by_cosine(vec2 u)
+{
+    float sine = sqrt(u.x), phi = TWO_PI * u.y;
+    return vec3(sine * cos(phi), sine * sin(phi), sqrt(1.0 - u.x));
+}
+
+// Of the light that meets glass from inside, chosen to be no mirror's: whether it is scattered. One number makes two
+// for its direction: its upper and its lower bits.
+bool scattered_inside(surface s, inout float choice, inout vec3 window, inout vec3 local)
+{
+    vec3 rest = s.base * (1.0 - s.transmission);
+    float size = max_component(rest), chance = size / (size + s.transmission);
+    bool scattered = choice < chance;
+    choice = min(scattered ? choice / chance : (choice - chance) / (1.0 - chance), 0.99999994);
+    vec3 whole = mix(s.base, vec3(1.0), s.transmission);
+    window *= (scattered ? rest / chance : vec3(s.transmission / (1.0 - chance))) / whole;
+    if (scattered)
+        local = direction_by_cosine(vec2(choice, fract(choice * 4096.0)));
+    return scattered;
+}
+
 // `choice` chooses the lobe and comes back stretched; `u` the direction.
 bsdf_choice bsdf_choose(bsdf b, surface s, inout float choice, vec2 u)
 {
@@ -186,7 +216,8 @@ bsdf_choice bsdf_choose(bsdf b, surface s, inout float choice, vec2 u)
     choice = min((scattered ? choice : choice - b.scattered_chance) / first, 0.99999994);
     vec3 facet = b.rough ? visible_facet(b.view, b.alpha, u) : vec3(0.0, 0.0, 1.0), mirror, window;
     float VoH = clamp(dot(b.view, facet), 1e-6, 1.0);
-    facet_parts(b, s, VoH, mirror, window);
+    vec3 mirrored_at = reflect(-b.view, facet);
+    facet_parts(b, s, VoH, bsdf_lit(b, mirrored_at), mirror, window);
     vec3 bent = refract(-b.view, facet, 1.0 / b.eta);
     if (!b.rough && dot(bsdf_world(b, bent), s.geometric) >= 0.0) { // totally reflected, or a tilted normal sends it back
         mirror += window;
@@ -198,25 +229,28 @@ bsdf_choice bsdf_choose(bsdf b, surface s, inout float choice, vec2 u)
         choice = min((mirrored ? choice : choice - chance) / (mirrored ? chance : 1.0 - chance), 0.99999994);
     vec3 local;
     if (scattered) {
-        float sine = sqrt(u.x), phi = TWO_PI * u.y;
-        local = vec3(sine * cos(phi), sine * sin(phi), sqrt(1.0 - u.x));
+        local = direction_by_cosine(u);
     } else if (mirrored) {
 #ifdef WARD
-        if (b.rough)
-            facet = ward_facet(b.alpha, u);
+        if (b.rough && !b.leaves)
+            mirrored_at = reflect(-b.view, ward_facet(b.alpha, u));
 #endif
-        local = reflect(-b.view, facet);
+        local = mirrored_at;
         result.lobe = BSDF_MIRRORED;
     } else {
         local = bent;
         result.lobe = BSDF_REFRACTED;
     }
+    if (b.rough && b.leaves) // what would meet another facet goes where the flat surface would send it
+        local.z = mirrored ? abs(local.z) : -abs(local.z);
+    bool diffuse = b.leaves && !mirrored && scattered_inside(s, choice, window, local);
+    if (diffuse)
+        result.lobe = BSDF_SCATTERED;
     result.direction = normalize(bsdf_world(b, local));
-    if (result.lobe == BSDF_REFRACTED) {
-        bool out_ = dot(result.direction, s.geometric) < 0.0 && dot(local, local) > 0.5;
-        float passes = b.rough ? facet_share(vec3(local.xy, -local.z), b.alpha) : 1.0;
-        result.weight = out_ && local.z < 0.0 ? window * (passes / (first * (1.0 - chance))) : vec3(0.0);
-    } else if (result.lobe == BSDF_MIRRORED && !b.rough) {
+    if (diffuse || result.lobe == BSDF_REFRACTED) {
+        bool out_ = dot(result.direction, s.geometric) * local.z > 0.0 && dot(local, local) > 0.5;
+        result.weight = out_ ? window / (first * (1.0 - chance)) : vec3(0.0);
+    } else if (result.lobe == BSDF_MIRRORED && (!b.rough || b.leaves)) {
         if (dot(result.direction, s.geometric) <= 0.0) // about the surface itself, as in mirror_direction()
             result.direction = reflect(-bsdf_world(b, b.view), s.geometric);
         result.weight = mirror / (first * chance);

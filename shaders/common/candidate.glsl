@@ -3,6 +3,7 @@
 #include "common/alpha.glsl"
 #include "common/intersect.glsl"
 #include "common/optical_depth.glsl"
+#include "shared/ray.h"
 
 // A ray during traversal. World space; `t_max` shrinks to the closest hit so far.
 struct trace_ray {
@@ -57,7 +58,7 @@ bool offer_any(trace_ray r, candidate found, inout vec3 optical_depth)
     if (!(found.distance > r.t_min && found.distance < r.t_max))
         return false;
 #if defined HAS_CUTOUT || defined HAS_TRANSLUCENT
-    vec3 transmittance = transmittance_of(found, r.origin, r.direction, time_of(r));
+    vec3 transmittance = transmittance_of(found, r.origin, r.direction, time_of(r), r.t_min == RAY_STOPS_T_MIN);
     optical_depth = min(optical_depth + optical_depth_of(transmittance), vec3(OPTICAL_DEPTH_MAX));
     return min_component(optical_depth) >= OPTICAL_DEPTH_BLACK;
 #else

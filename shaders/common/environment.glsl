@@ -62,6 +62,12 @@ vec3 environment_radiance(vec3 direction)
     return frame.environment_kind == ENVIRONMENT_CONSTANT ? frame.environment_colour.rgb : vec3(0.0);
 }
 
+// Behind the surfaces of the picture; not in mirrors and glass.
+bool environment_is_hidden()
+{
+    return frame.far_width.z != 0.0;
+}
+
 // Irradiance / pi on a surface with the normal n: the radiance of a white Lambert surface. Ramamoorthi and Hanrahan. An
 // Efficient Representation for Irradiance Environment Maps. 2001; the constants of their equation 13 are folded into
 // the coefficients.

@@ -14,6 +14,13 @@ float facet_lambda(vec3 direction, vec2 alpha)
     return 0.5 * (sqrt(1.0 + dot(a, a) / max(square(direction.z), 1e-14)) - 1.0);
 }
 
+// The cosine of a direction where the surface is stretched as its facets are.
+float facet_stretched(vec3 direction, vec2 alpha)
+{
+    vec2 a = alpha * direction.xy;
+    return direction.z * inversesqrt(square(direction.z) + dot(a, a));
+}
+
 // The visible share of the facets that face a direction. Z > 0.
 float facet_share(vec3 direction, vec2 alpha)
 {

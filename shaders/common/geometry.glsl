@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The scene's geometry on the device: what gpu_scene_bind() binds. Layouts: shared/geometry.h.
+// The scene's geometry on the device: what gpu_scene_bind() binds. Layouts: shared/geometry.h. NO_COLOURS: see
+// common/attributes.glsl.
 #include "shared/bindings.h"
 #include "shared/geometry.h"
 #include "common/tables.glsl"
@@ -7,7 +8,9 @@
 layout(binding = UNIT_TRIANGLES) uniform usamplerBuffer triangles;       // i0 i1 i2 material
 layout(binding = UNIT_POSITIONS) uniform samplerBuffer positions;        // xyz, object space
 layout(binding = UNIT_TEXCOORDS) uniform samplerBuffer texcoords;        // u0 v0 u1 v1
+#ifndef NO_COLOURS
 layout(binding = UNIT_COLOURS) uniform samplerBuffer colours;            // rgba, linear
+#endif
 layout(binding = UNIT_SPHERES) uniform samplerBuffer spheres;            // centre, radius
 layout(binding = UNIT_SPHERE_MATERIALS) uniform usamplerBuffer sphere_materials;
 

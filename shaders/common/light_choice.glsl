@@ -15,7 +15,7 @@ struct light_receiver {
 light_receiver light_receiver_of(surface s, split parts, vec3 position, vec3 view, float NoV)
 {
     // A slanted mirror is dim at its own angle, but not at that of every facet: never 0.
-    return light_receiver(position, s.normal, view, max_component(parts.scattered) * INVERSE_PI,
+    return light_receiver(position, s.normal, view, max_component(parts.scattered + parts.again) * INVERSE_PI,
                           (max_component(parts.mirror) + 1e-3) * 0.25 / max(NoV, 0.1),
                           square(max(s.roughness, ROUGHNESS_MIN_LIGHT)));
 }
@@ -50,6 +50,15 @@ float light_estimate(uint index, light_receiver r)
     float wide = alpha * alpha, spread = 1.0 + NoH * NoH * (wide - 1.0) + 1e-6;
     float highlight = r.mirrored * wide / (PI * spread * spread);
     return cosine + reach > 0.0 ? power * (r.scattered * min(cosine + reach, 1.0) + highlight) : 0.0;
+}
+
+// Where there are emitters beside the lights (common/emitter.glsl): the probability of asking for a light. By the
+// estimates of both, which are rough: neither is asked for in less than a tenth of all cases.
+float lights_share(light_receiver r, float all_lights, float emitters)
+{
+    const float SHARE_MIN = 0.1;
+    float other = emitters * (r.scattered + r.mirrored), share = all_lights / max(all_lights + other, 1e-30);
+    return all_lights > 0.0 ? (other > 0.0 ? clamp(share, SHARE_MIN, 1.0 - SHARE_MIN) : 1.0) : 0.0;
 }
 
 // Chooses a light with a probability in proportion to its estimate. `number` in [0, 1) chooses it and comes back

@@ -2,16 +2,18 @@
 // How a surface scatters light: the shares of the light along the view that it reflects, scatters and refracts, and its
 // reflectance from a light to the eye.
 //
-// A dielectric reflects by Fresnel's equations, a metal by Schlick's approximation. A rough surface has no one mirror
-// direction, and one ray cannot blur: as the roughness grows, its mirror ray is faded out and what it carried is
-// replaced by the irradiance about that direction, and Fresnel's rise at grazing angles is faded out too. What is
-// reflected, refracted and scattered never adds up to more than what arrives, be it from all around (struct split) or
-// from a light (brdf); tests/accuracy/shading_energy.c holds both to it.
+// A dielectric reflects by Fresnel's equations, a metal by Schlick's approximation, both from rough facets. What a facet
+// sends into another one is not lost: a metal mirrors it again until it comes out, in all directions; at a dielectric it
+// enters. A rough surface has no one mirror direction, and one ray cannot blur: as the roughness grows, its mirror ray is
+// faded out and what it carried is replaced by the irradiance about that direction. What is reflected, refracted and
+// scattered adds up to what arrives and never to more, be it from all around (struct split) or from a light (brdf);
+// tests/accuracy/shading_energy.c holds both to it.
 //
 // Defines: those of common/material.glsl.
 
 #include "shared/material.h"
 #include "common/brdf.glsl"
+#include "common/facet_albedo.glsl"
 #include "common/material.glsl"
 
 // Roughness at which the mirror ray begins to fade; at MIRROR_ROUGHNESS_GONE it is gone.
@@ -19,28 +21,56 @@ const float MIRROR_ROUGHNESS_SHARP = 0.1;
 
 // How a surface splits the light along the view.
 struct split {
-    vec3 mirror;      // Fresnel reflectance
-    vec3 scattered;   // Lambert's albedo times what is not mirrored
+    vec3 mirror;       // reflectance of the facets at the first go
+    vec3 again;        // what they mirror more than once
+    vec3 scattered;    // Lambert's albedo times what enters
     vec3 refracted;
-    float mirror_ray; // share of `mirror` that the mirror ray carries; the rest is blurred
+    float dielectric;  // share that does not enter
+    float mirror_ray;  // share of `mirror` that the mirror ray carries; the rest is blurred
+    float again_mean;  // facets_lost_mean()
+    float enters_mean; // share of the light from all around that enters
 };
 
-split split_light(surface s, float NoV)
+// `loss`: facets_lost() of the view.
+split split_facets(surface s, float NoV, float alpha, float loss)
 {
     bool leaves = s.inside && s.transmission > 0.0;
-    // Total reflection does not depend on roughness.
-    float dielectric = leaves ? fresnel_rough_dielectric(NoV, 1.0 / s.ior, s.roughness * (1.0 - s.transmission))
-                              : fresnel_rough_dielectric(NoV, s.ior, s.roughness);
-    vec3 metal = mix(fresnel_schlick(s.base, NoV), s.base, s.roughness);
+    float mean = facets_cosine(NoV, alpha);
     split result;
-    result.mirror = mix(vec3(dielectric), metal, s.metallic);
-    vec3 rest = s.base * ((1.0 - dielectric) * (1.0 - s.metallic));
-    result.scattered = rest * (1.0 - s.transmission);
+    // From inside of one direction: total reflection begins at an angle.
+    result.dielectric = leaves ? fresnel_dielectric(NoV, 1.0 / s.ior) : facets_dielectric(mean, loss, alpha, s.ior);
+    result.again_mean = facets_lost_mean(alpha);
+    result.enters_mean = 1.0 - facets_dielectric_mean(alpha, s.ior);
+    result.mirror = mix(vec3(result.dielectric), fresnel_schlick(s.base, mean) * (1.0 - loss), s.metallic);
+    result.again = metal_again(s.base, result.again_mean) * (loss * s.metallic);
+    float enters = (1.0 - result.dielectric) * (1.0 - s.metallic);
+    result.scattered = s.base * (enters * (1.0 - s.transmission));
     // Glass is tinted once, where light enters it.
-    result.refracted = (leaves ? vec3((1.0 - dielectric) * (1.0 - s.metallic)) : rest) * s.transmission;
+    result.refracted = (leaves ? vec3(1.0) : s.base) * (enters * s.transmission);
     float blurred = smoothstep(MIRROR_ROUGHNESS_SHARP, MIRROR_ROUGHNESS_GONE, s.roughness);
     result.mirror_ray = leaves ? 1.0 : 1.0 - blurred;
     return result;
+}
+
+split split_light(surface s, float NoV)
+{
+    float alpha = square(s.roughness);
+    return split_facets(s, NoV, alpha, facets_lost(stretched_cosine(NoV, alpha), alpha));
+}
+
+// What goes to the eye of the light from a direction that enters, per steradian. `loss`: facets_lost() of that direction;
+// reciprocal, as `parts` have the same factors for the view. Shirley et al. A Practitioners' Assessment of Light
+// Reflection Models. 1997.
+vec3 spread_scattered(surface s, split parts, float NoL, float alpha, float loss)
+{
+    float enters = 1.0 - facets_dielectric(facets_cosine(NoL, alpha), loss, alpha, s.ior);
+    return parts.scattered * (enters / parts.enters_mean * INVERSE_PI);
+}
+
+// What enters or is mirrored again. Kulla, Conty 2017.
+vec3 spread_out(surface s, split parts, float NoL, float alpha, float loss)
+{
+    return spread_scattered(s, parts, NoL, alpha, loss) + parts.again * (loss / max(parts.again_mean, 1e-9) * INVERSE_PI);
 }
 
 // The mirrored direction; about the geometric normal where the shading normal would send it into the surface.
@@ -50,14 +80,19 @@ vec3 mirror_direction(surface s, vec3 direction)
     return dot(mirrored, s.geometric) > 0.0 ? mirrored : reflect(direction, s.geometric);
 }
 
+// Of brdf() what is scattered, not mirrored, be it once or again; NoL > 0.
+vec3 brdf_scattered(surface s, split parts, float NoL)
+{
+    float alpha = square(s.roughness);
+    return spread_scattered(s, parts, NoL, alpha, facets_lost(stretched_cosine(NoL, alpha), alpha));
+}
+
 // Share of the irradiance from a direction (of a light, unit) that goes to the eye, per steradian; without the cosine.
 // 0 from below the horizon, and for glass seen from inside, where no light is sampled. Reciprocal. `parts`: of the same
 // surface and NoV.
 //
-// What is mirrored: Cook and Torrance 1982 with GGX. Scattered light passed the boundary twice and is diminished both
-// times: Shirley et al. A Practitioners' Assessment of Light Reflection Models. 1997, with our reflectance in the place
-// of Schlick's. (1 - F) of the half-way vector alone, as often seen, would give out up to 1.7 of what arrives at
-// grazing angles.
+// What is mirrored: Cook and Torrance 1982 with GGX. (1 - F) of the half-way vector alone, as often seen for scattered
+// light, would give out up to 1.7 of what arrives at grazing angles.
 vec3 brdf(surface s, split parts, vec3 view, float NoV, vec3 light)
 {
     float NoL = dot(s.normal, light);
@@ -66,9 +101,8 @@ vec3 brdf(surface s, split parts, vec3 view, float NoV, vec3 light)
     vec3 half_way = normalize(view + light), across = cross(s.normal, half_way);
     float NoH = clamp(dot(s.normal, half_way), 0.0, 1.0), VoH = clamp(dot(view, half_way), 0.0, 1.0);
     vec3 mirror = mix(vec3(fresnel_dielectric(VoH, s.ior)), fresnel_schlick(s.base, VoH), s.metallic);
-    float alpha = square(max(s.roughness, ROUGHNESS_MIN_LIGHT));
-    vec3 specular = mirror * (D_GGX(NoH, dot(across, across), alpha) * V_SmithGGXCorrelated(NoV, NoL, alpha));
-    float enters = 1.0 - fresnel_rough_dielectric(NoL, s.ior, s.roughness);
-    float enters_mean = 1.0 - fresnel_rough_dielectric_mean(s.ior, s.roughness);
-    return parts.scattered * (enters / enters_mean * INVERSE_PI) + specular;
+    float wide = square(max(s.roughness, ROUGHNESS_MIN_LIGHT)), alpha = square(s.roughness);
+    vec3 specular = mirror * (D_GGX(NoH, dot(across, across), wide) * V_SmithGGXCorrelated(NoV, NoL, wide));
+    float loss = facets_lost(stretched_cosine(NoL, alpha), alpha);
+    return spread_out(s, parts, NoL, alpha, loss) + specular;
 }

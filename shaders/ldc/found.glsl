@@ -14,6 +14,7 @@ struct ldc_found {
     vec3 optical_depth;
 #ifdef HAS_TRANSLUCENT
     intersected_surfaces intersected;
+    bool stops; // RAY_STOPS_T_MIN
 #endif
 #else
     uint sample_index; // HIT_NO_PRIMITIVE: none
@@ -45,7 +46,7 @@ void offer_sample(inout ldc_found found, uint sample_index, float distance_, flo
 #ifdef HAS_TRANSLUCENT
     uvec4 words = texelFetch(ldc_surface, int(sample_index));
     add_intersected(found.intersected, found.optical_depth, sample_material(words), distance_, side, near,
-                    transmittance_of_sample(words));
+                    found.stops ? vec3(0.0) : transmittance_of_sample(words));
     if (min_component(found.optical_depth) >= OPTICAL_DEPTH_BLACK)
         found.end = -1.0;
 #else
@@ -57,7 +58,7 @@ void offer_sample(inout ldc_found found, uint sample_index, float distance_, flo
 ldc_found ldc_found_of(trace_ray r, vec3 optical_depth)
 {
 #ifdef HAS_TRANSLUCENT
-    return ldc_found(r.t_max, optical_depth, intersected_nothing());
+    return ldc_found(r.t_max, optical_depth, intersected_nothing(), r.t_min == RAY_STOPS_T_MIN);
 #else
     return ldc_found(r.t_max, optical_depth);
 #endif

@@ -129,6 +129,8 @@ vec3 key_radiance(uint layer, vec2 place, float met, out bool known)
 
 vec4 missed(vec3 direction)
 {
+    if (environment_is_hidden())
+        return vec4(0.0);
     float coverage = frame.environment_kind != ENVIRONMENT_NONE ? 1.0 : 0.0;
 #ifdef OPEN
     return vec4(vec3(1.0), coverage);

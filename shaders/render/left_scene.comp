@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 // The radiance of paths that left the scene: the environment.
 // Defines: those of common/environment.glsl; OPEN it is 1 everywhere, whatever the environment; SHARES paths say how
-// much of it counts, and which light they hit; HAS_AREA_LIGHTS with SHARES: there are area lights.
+// much of it counts, and which light they hit; HAS_AREA_LIGHTS with SHARES: there are area lights;
+// HAS_EMITTERS the integrator samples emitters, too.
 
 #include "shared/path.h"
 #include "shared/ray.h"
@@ -23,7 +24,11 @@ void main()
     if (k >= wave.rays.count || hit_places[k] != HIT_PLACE_NONE)
         return;
     path p = paths[k];
-    bool seen = (p.flags & PATH_STRAIGHT) != 0u && frame.environment_kind != ENVIRONMENT_NONE;
+    bool straight = (p.flags & PATH_STRAIGHT) != 0u, seen = straight && frame.environment_kind != ENVIRONMENT_NONE;
+    if (straight && environment_is_hidden()) {
+        radiance[k] = vec4(0.0);
+        return;
+    }
     vec3 arriving = vec3(1.0);
 #ifndef OPEN
     arriving = environment_radiance(rays[k].direction_t_max.xyz);
@@ -31,8 +36,12 @@ void main()
 #ifdef SHARES
     arriving *= p.environment_share;
 #ifdef HAS_AREA_LIGHTS
-    if (p.light_number != 0u)
-        arriving += light_at(p.light_number - 1u).colour.rgb * p.light_share;
+    uint met = p.light_number;
+#ifdef HAS_EMITTERS
+    met &= PATH_LIGHT_MASK;
+#endif
+    if (met != 0u)
+        arriving += light_at(met - 1u).colour.rgb * p.light_share;
 #endif
 #endif
     // Pixels beyond the picture's edge have no weight.

@@ -3,7 +3,7 @@
 // the eye. There is no ambient term: all light arrives over bounces.
 //
 //   radiance    emission; the area light that the ray hit on its way
-//   shadow rays one to one point of one light, and one to the environment. Two, as nothing tells before they are traced
+//   shadow rays one to one point of one light or emissive triangle, and one to the environment. Two, as nothing tells before they are traced
 //               which of them is in the shadow: chosen between, one would often be wasted
 //   child       at most one: straight on (alpha blending), scattered, mirrored or refracted
 //
@@ -12,6 +12,10 @@
 // Guibas. Optimally Combining Sampling Techniques for Monte Carlo Rendering. 1995, with the power heuristic. The last
 // hits of a path have no child; there shadow rays bring everything. Straight rays from the eye hit no area light.
 //
+// Emissive triangles are found both ways, too. Rays that go on see them through glass as it bends light, and through
+// blended surfaces; so translucent surfaces stop the shadow rays towards them, and what is met behind one counts fully.
+// The last hits do not ask for them: their light is that of one bounce more.
+//
 // Glass. Shadow rays go straight through it, tinted (common/alpha.glsl), smooth or not; so a light behind a pane lights
 // a room without waiting for a path to find it. The rays that go on have to find the same light for both ways to be
 // weighed: where one from a place that asked for light meets glass, a shadow ray goes straight on in its place, with
@@ -19,9 +23,12 @@
 // mirrored outside (PATH_COVERED), but for what emissive surfaces send. Paths from the eye, or a mirror, see everything
 // through glass. Surfaces of glass ask for no light from inside.
 //
-// Defines: those of common/bsdf.glsl, common/light.glsl, common/environment_choice.glsl and render/shade.glsl.
+// Defines: those of common/bsdf.glsl, common/light.glsl, common/environment_choice.glsl and render/shade.glsl;
+// HAS_EMITTERS there are emissive triangles that are sampled, and those of common/emitter.glsl; EMITTERS_BY_DISTANCE hits
+// do not tell which of them they are of, so both ways are weighed by a density that the distance alone says.
 
 #include "common/bsdf.glsl"
+#include "common/emitter.glsl"
 #include "common/environment_choice.glsl"
 #include "common/light_choice.glsl"
 #include "render/shade.glsl"
@@ -51,6 +58,13 @@ struct eye_hit {
     bool last;   // no child follows
     light_receiver receiver;
     float all_lights; // sum of their estimates
+    // The light that shadow rays ask for, and the numbers that are left to choose a point of it.
+    uint light_number;
+    float light_chance;
+    vec2 light_u;
+    float lights_chance; // of asking for a light, not for an emitter
+    vec3 emitter_normal; // with which emitters are chosen: `ray_normal` in the path of a child
+    uint ray_normal;
 };
 
 uint numbers_of(uint choice)
@@ -58,19 +72,101 @@ uint numbers_of(uint choice)
     return SEQUENCE_PATH + wave_number * SEQUENCE_PATH_SIZE + choice;
 }
 
-bool ask_for_light(inout eye_hit e, uint place, uint seed, uint index)
+void choose_light(inout eye_hit e, uint seed, uint index)
 {
-    vec2 u = sequence_pair_sorted(seed, numbers_of(SEQUENCE_PATH_LIGHT), index, frame.group_shift);
-    float chance, found;
-    uint number = light_choose(e.receiver, frame.light_count, u.x, chance, e.all_lights);
+    e.light_u = sequence_pair_sorted(seed, numbers_of(SEQUENCE_PATH_LIGHT), index, frame.group_shift);
+    e.light_number = light_choose(e.receiver, frame.light_count, e.light_u.x, e.light_chance, e.all_lights);
+#ifdef HAS_EMITTERS
+    if (!e.last) // what emissive surfaces send is a bounce
+        e.lights_chance = lights_share(e.receiver, e.all_lights, emitter_estimate(e.origin, e.emitter_normal));
+#endif
+}
+
+#ifdef HAS_EMITTERS
+ivec2 ray_normal_of(vec3 normal)
+{
+    return ivec2(round(octahedral_from_unit(normal) * PATH_NORMAL_MAX));
+}
+
+uint pack_ray_normal(vec3 normal)
+{
+    uvec2 bits = uvec2(ray_normal_of(normal)) & (1u << PATH_NORMAL_BITS) - 1u;
+    return bits.x | bits.y << PATH_NORMAL_BITS;
+}
+
+vec3 unpack_ray_normal(uint bits)
+{
+    int width = int(PATH_NORMAL_BITS);
+    ivec2 p = ivec2(bitfieldExtract(int(bits), 0, width), bitfieldExtract(int(bits), width, width));
+    return unit_from_octahedral(vec2(p) / PATH_NORMAL_MAX);
+}
+
+// Of the chance of asking for emitters to the density of a direction, see PATH_RATIO_STEPS.
+uint ratio_code(float chance, float found)
+{
+    float steps = log2(max(chance, 1e-30) / found) * PATH_RATIO_STEPS + PATH_RATIO_ONE;
+    return found > 0.0 && chance > 0.0 ? uint(clamp(steps + 0.5, 1.0, PATH_RATIO_MAX)) : 0u;
+}
+
+float ratio_of(uint code)
+{
+    return exp2((float(code) - PATH_RATIO_ONE) / PATH_RATIO_STEPS);
+}
+
+bool ask_for_emitter(eye_hit e, uint place, vec2 u)
+{
+    float found, chance = 1.0 - e.lights_chance;
+    emitter_sample sampled = emitter_sample_at(e.origin, e.emitter_normal, u, e.p.time);
+    vec3 arriving = vec3(0.0), sent = bsdf_evaluate(e.b, e.s, sampled.direction, found);
+    if (sampled.probability > 0.0)
+        arriving = e.weight * sent * sampled.radiance / (sampled.probability * chance);
+    float probability = sampled.probability;
+#ifdef EMITTERS_BY_DISTANCE
+    probability = emitter_rough_probability(sampled.distance_);
+#endif
+    if (found > 0.0)
+        arriving *= heuristic(ratio_of(ratio_code(chance, found)) * probability, 1.0);
+    return add_shadow_ray_from(place, e.p, e.origin, sampled.direction, RAY_STOPS_T_MIN, sampled.distance_, arriving);
+}
+
+// The share of its emission that a surface sends along a ray, which may have been asked for already.
+float emission_share(path p, hit h, ray r, vec3 emission)
+{
+    uint code = p.light_number >> PATH_LIGHT_BITS;
+#ifdef EMITTERS_BY_DISTANCE
+    const uint LEFT_OUT = MATERIAL_ALPHA_MASK | MATERIAL_ALPHA_BLEND | MATERIAL_UNLIT;
+    bool asked = code != 0u && (h.material & HIT_SAMPLED) != 0u &&
+                 (material_at(h.material & HIT_MATERIAL_MASK).flags & LEFT_OUT) == 0u;
+    float probability = asked ? emitter_rough_probability(h.distance) : 0.0;
+#else
+    bool asked = code != 0u && max_component(emission) > 0.0 && h.instance != HIT_NO_PRIMITIVE;
+    float probability = emitter_probability(r.origin_t_min.xyz, unpack_ray_normal(p.flags >> PATH_NORMAL_SHIFT),
+                                            h.instance, h.primitive, r.direction_t_max.xyz, h.distance, p.time, asked);
+#endif
+    return probability > 0.0 ? heuristic(1.0, ratio_of(code) * probability) : 1.0;
+}
+#endif
+
+bool ask_for_light(eye_hit e, uint place)
+{
+    float found, chance = e.light_chance;
+    vec2 u = e.light_u;
+#ifdef HAS_EMITTERS
+    if (u.x >= e.lights_chance) {
+        u.x = min((u.x - e.lights_chance) / (1.0 - e.lights_chance), 0.99999994);
+        return ask_for_emitter(e, place, u);
+    }
+    u.x = min(u.x / e.lights_chance, 0.99999994);
+    chance *= e.lights_chance;
+#endif
     if (chance <= 0.0) {
         no_shadow_ray(place);
         return false;
     }
-    light_sample sampled = light_sample_at(number, e.origin, u);
+    light_sample sampled = light_sample_at(e.light_number, e.origin, u);
     vec3 arriving = e.weight * bsdf_evaluate(e.b, e.s, sampled.direction, found) * (sampled.irradiance / chance);
 #ifdef HAS_AREA_LIGHTS
-    float probability = chance * light_probability(light_at(number), sampled);
+    float probability = chance * light_probability(light_at(e.light_number), sampled);
     if (!e.last && probability > 0.0)
         arriving *= heuristic(probability, found);
 #endif
@@ -102,7 +198,7 @@ void meet_lights(inout path p, eye_hit e, vec3 origin, vec3 direction, float fou
         if (distance_ < 0.0)
             continue;
         if (found > 0.0 && e.all_lights > 0.0)
-            share = heuristic(found, probability * light_estimate(i, e.receiver) / e.all_lights);
+            share = heuristic(found, probability * light_estimate(i, e.receiver) / e.all_lights * e.lights_chance);
         float size = share * max_component(l.colour.rgb);
         if (!(size > 0.0)) // no contribution, and a divisor
             continue;
@@ -120,6 +216,16 @@ void meet_lights(inout path p, eye_hit e, vec3 origin, vec3 direction, float fou
 }
 #endif
 
+// The area light that a ray hits, plus 1.
+uint met_number(path p)
+{
+#ifdef HAS_EMITTERS
+    return p.light_number & PATH_LIGHT_MASK;
+#else
+    return p.light_number;
+#endif
+}
+
 // The light behind glass straight on, which the ray was to find. Returns the number of its live shadow rays.
 uint ask_straight_on(eye_hit e, vec3 direction, vec3 through)
 {
@@ -129,8 +235,8 @@ uint ask_straight_on(eye_hit e, vec3 direction, vec3 through)
         vec3 arriving = vec3(0.0);
         float rest = e.p.light_distance - e.distance_;
 #ifdef HAS_AREA_LIGHTS
-        if (e.p.light_number != 0u && rest > 0.0)
-            arriving = carried * light_at(e.p.light_number - 1u).colour.rgb * e.p.light_share;
+        if (met_number(e.p) != 0u && rest > 0.0)
+            arriving = carried * light_at(met_number(e.p) - 1u).colour.rgb * e.p.light_share;
 #endif
         if (add_shadow_ray(place, e.p, origin, direction, rest, arriving))
             alive++;
@@ -144,11 +250,11 @@ uint ask_straight_on(eye_hit e, vec3 direction, vec3 through)
     return alive;
 }
 
-uint ask(inout eye_hit e, uint seed, uint index)
+uint ask(eye_hit e, uint seed, uint index)
 {
     uint place = e.j, alive = 0u;
     if (asks_lights != 0u) {
-        if (ask_for_light(e, place, seed, index))
+        if (ask_for_light(e, place))
             alive++;
         place += wave.hits.count;
     }
@@ -192,6 +298,10 @@ void go_on(eye_hit e, uint seed, uint index, bool asked, float choice)
         meet_lights(p, e, off_surface(e.s, e.distance_, side * e.s.geometric), chosen.direction, found,
                    sequence_number(seed, numbers_of(SEQUENCE_PATH_MET_LIGHT), index));
 #endif
+#ifdef HAS_EMITTERS
+    p.flags = p.flags & (1u << PATH_NORMAL_SHIFT) - 1u | e.ray_normal << PATH_NORMAL_SHIFT;
+    p.light_number |= ratio_code(1.0 - e.lights_chance, found) << PATH_LIGHT_BITS;
+#endif
     float angle = chosen.probability > 0.0 ? 1.0 / chosen.probability : rough_solid_angle(e.s, chosen.direction);
     add_child(e.j, p, e.s, e.distance_, chosen.direction, carried / survival, false, sample_solid_angle(angle));
 }
@@ -200,8 +310,8 @@ void go_on(eye_hit e, uint seed, uint index, bool asked, float choice)
 vec3 met_light(path p, float distance_)
 {
 #ifdef HAS_AREA_LIGHTS
-    if (p.light_number != 0u && p.light_distance <= distance_)
-        return light_at(p.light_number - 1u).colour.rgb * p.light_share;
+    if (met_number(p) != 0u && p.light_distance <= distance_)
+        return light_at(met_number(p) - 1u).colour.rgb * p.light_share;
 #endif
     return vec3(0.0);
 }
@@ -224,8 +334,8 @@ void main()
     e.origin = off_surface(e.s, h.distance, e.s.geometric);
     e.last = last_wave != 0u || (e.p.flags & PATH_BOUNCES_MASK) >= frame.depth;
     e.all_lights = 0.0;
+    e.lights_chance = 1.0;
     float NoV = clamp(dot(e.s.normal, view), 1e-4, 1.0); // a shading normal may lean away
-    split parts = split_light(e.s, NoV);
     vec3 along, across;
     float anisotropy = 0.0;
 #ifdef HAS_ANISOTROPY
@@ -235,16 +345,25 @@ void main()
 #else
     tangent_frame(e.s.normal, along, across);
 #endif
-    e.b = bsdf_of(e.s, parts, view, NoV, along, anisotropy);
-    e.receiver = light_receiver_of(e.s, parts, e.origin, view, NoV);
+    e.b = bsdf_of(e.s, view, NoV, along, anisotropy);
+    e.receiver = light_receiver_of(e.s, e.b.parts, e.origin, view, NoV);
     uint seed = path_seed(e.p), index = path_sample(e.p);
     float choice = sequence_number(seed, numbers_of(SEQUENCE_PATH_LOBE), index);
     bool straight = choice >= e.s.alpha;
     vec3 sent = met_light(e.p, h.distance);
     bool asks = !straight && !e.s.unlit && !e.b.leaves;
     uint alive = 0u;
+#ifdef HAS_EMITTERS
+    e.s.emission *= emission_share(e.p, h, r, e.s.emission);
+#endif
     if (!straight)
         sent += e.s.unlit ? e.s.base : e.s.emission;
+#ifdef HAS_EMITTERS
+    e.ray_normal = pack_ray_normal(e.s.normal);
+    e.emitter_normal = unpack_ray_normal(e.ray_normal);
+#endif
+    if (asks)
+        choose_light(e, seed, index);
     float passes = 0.0; // share of its shadow rays that are for light behind it
     vec3 through = e.s.base * (e.s.transmission * (1.0 - e.s.metallic));
     if (!straight && !e.s.unlit && (e.p.flags & PATH_ASKED) != 0u && max_component(through) > 0.0)
@@ -261,7 +380,7 @@ void main()
     }
     e.weight = weight;
     if (straight) {
-        e.p.light_number = e.p.light_distance > h.distance ? e.p.light_number : 0u;
+        e.p.light_number = e.p.light_distance > h.distance ? met_number(e.p) : 0u;
         e.p.light_distance -= h.distance;
         add_child(j, e.p, e.s, h.distance, direction, e.weight, true, 0.0);
     } else if (!e.s.unlit) {

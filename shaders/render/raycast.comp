@@ -26,7 +26,7 @@ vec3 lit(path p, surface s, vec3 direction, float distance_)
     split parts = split_light(s, NoV);
     vec3 origin = off_surface(s, distance_, s.geometric);
     vec3 mirror = parts.mirror + parts.refracted; // as if the scene were as bright behind glass as before it
-    vec3 sum = s.emission + s.occlusion * (parts.scattered * environment_irradiance(s.normal) +
+    vec3 sum = s.emission + s.occlusion * ((parts.scattered + parts.again) * environment_irradiance(s.normal) +
                                            mirror * environment_irradiance(mirror_direction(s, direction)));
     if (s.inside && s.transmission > 0.0)
         return sum; // glass samples no lights from inside

@@ -31,10 +31,11 @@ void main()
 #if FORMAT == FORMAT_RGBA8
     resolved[k] = packUnorm4x8(display_of_linear(colour));
 #elif FORMAT == FORMAT_RGBA16F
-    colour = min(colour, vec4(HALF_MAX));
+    colour = min(over_background(colour), vec4(HALF_MAX));
     resolved[2u * k] = packHalf2x16(colour.rg);
     resolved[2u * k + 1u] = packHalf2x16(colour.ba);
 #elif FORMAT == FORMAT_RGBA32F
+    colour = over_background(colour);
     for (int i = 0; i < 4; i++)
         resolved[4u * k + uint(i)] = floatBitsToUint(colour[i]);
 #elif FORMAT == FORMAT_DEPTH32F

@@ -166,20 +166,25 @@ void no_shadow_ray(uint place)
 #endif
 }
 
-// `arriving`: the radiance at the eye if the ray reaches the light. False if it is zero.
-bool add_shadow_ray(uint place, path p, vec3 origin, vec3 direction, float distance_, vec3 arriving)
+// `arriving`: the radiance at the eye if the ray reaches the light. False if it is zero. `t_min`: 0 or RAY_STOPS_T_MIN.
+bool add_shadow_ray_from(uint place, path p, vec3 origin, vec3 direction, float t_min, float distance_, vec3 arriving)
 {
     if (!(max_component(arriving) > 0.0)) { // also if it is NaN
         no_shadow_ray(place);
         return false;
     }
     // Short of the light, as a model may have a surface at its position.
-    shadow_rays[place] = ray(vec4(origin, 0.0), vec4(direction, distance_ * (1.0 - 4.0 * PATH_OFFSET)));
+    shadow_rays[place] = ray(vec4(origin, t_min), vec4(direction, distance_ * (1.0 - 4.0 * PATH_OFFSET)));
     light_samples[place] = vec4(arriving, 0.0);
 #ifdef HAS_TIMES
     shadow_times[place] = p.time;
 #endif
     return true;
+}
+
+bool add_shadow_ray(uint place, path p, vec3 origin, vec3 direction, float distance_, vec3 arriving)
+{
+    return add_shadow_ray_from(place, p, origin, direction, 0.0, distance_, arriving);
 }
 
 // `first`: the first batch of the wave's shadow rays, which also emits the children.

@@ -68,7 +68,7 @@ vec3 shade(uint j, path p, surface s, split parts, ray r, float distance_, vec3 
     add_child_of_weight(j, p, s, distance_, mirrored, weight * mirror * parts.mirror_ray, false);
     if (through)
         add_child_of_weight(j, p, s, distance_, bent, weight * parts.refracted, false);
-    vec3 ambient = parts.scattered * environment_irradiance(s.normal) +
+    vec3 ambient = (parts.scattered + parts.again) * environment_irradiance(s.normal) +
                    mirror * (1.0 - parts.mirror_ray) * environment_irradiance(mirrored);
     return weight * (s.emission + s.occlusion * ambient);
 }

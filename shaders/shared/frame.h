@@ -12,7 +12,8 @@ struct frame_uniforms {
     vec4 world_from_view[3]; /* rows; rigid; looks along -z, y up */
     vec4 extent_near;        /* xy: half width and half height of the view at distance 1 (perspective) or of
                                 the view itself (orthographic), z: near distance, w: 1 if orthographic */
-    vec4 far_width; /* x: far distance of an orthographic view; y: width of a sample in pixels; z, w unused */
+    vec4 far_width; /* x: far distance of an orthographic view; y: width of a sample in pixels; z: 1: the picture
+                       does not show the environment behind its surfaces; w unused */
     /* Of the current samples, two in each: their positions from each pixel's top left, if these are the same in
      * all pixels. */
     vec4 sample_places[8];

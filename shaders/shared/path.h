@@ -19,7 +19,8 @@ struct path {
     uint flags;                         /* PATH_* */
     float time;                         /* 0: the shutter opens .. 1: it closes */
     /* integrator path: the weights of lights that the ray hits, as shares of their radiance */
-    uint light_number;    /* of the light that it hits, plus 1; 0: none counts */
+    uint light_number;    /* of the light that it hits, plus 1; 0: none counts. With emitters PATH_LIGHT_BITS, and
+                             above them how its origin has sampled these: PATH_RATIO_* */
     float light_distance; /* its distance, if nothing is hit before */
     float light_share, environment_share;
 };
@@ -31,6 +32,18 @@ SHARED_SIZE(path, 48)
 #define PATH_STRAIGHT 0x100u /* only blended surfaces lie before it: counts for the picture's alpha */
 #define PATH_ASKED 0x200u    /* path: its origin has sampled lights and environment */
 #define PATH_COVERED 0x400u  /* path: such an origin has sampled that light already, through the current glass */
+/* path, with emitters: bits 12..31: the normal with which its origin has sampled them, octahedral. */
+#define PATH_NORMAL_SHIFT 12u
+#define PATH_NORMAL_BITS 10u /* of each number; signed */
+#define PATH_NORMAL_MAX 511.0f
+#define PATH_LIGHT_BITS 20u
+#define PATH_LIGHT_MASK 0xfffffu
+/* The probability with which its origin samples emitters, not other lights, by the density with which it was scattered:
+ * steps of the logarithm to the base 2, PATH_RATIO_ONE is 1. 0: all that it hits counts. Both ways of finding an emitter
+ * have it rounded, and so their weights add up to 1. */
+#define PATH_RATIO_STEPS 64.0f
+#define PATH_RATIO_ONE 2048.0f
+#define PATH_RATIO_MAX 4095.0f
 
 /* The minimum weight with which a path of whitted, raycast and ao continues: a third of a step of an 8-bit
  * picture. */

@@ -10,5 +10,7 @@ struct ray {
     vec4 direction_t_max;
 };
 SHARED_SIZE(ray, 32)
+/* The t_min of a ray of an any-hit wave that translucent surfaces stop as opaque ones do: what is not cut out. */
+#define RAY_STOPS_T_MIN (-1e-20f)
 
 #endif

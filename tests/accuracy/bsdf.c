@@ -188,7 +188,7 @@ TEST(sampled_directions_follow_the_stated_density)
 /* ---- how much comes back ---- */
 
 struct albedos {
-    double max, min_metal[2], min_scattering[2], min_glass[2];
+    double max, max_dense, min_even[2], min_grain[2];
     char where[200];
 };
 
@@ -204,27 +204,32 @@ static void sum_up(struct bsdf_probe *probe, const struct bsdf_case *c, bool war
         squares += weight * weight;
     }
     double albedo = sum / NUMBERS, error = sqrt(fmax(squares / NUMBERS - albedo * albedo, 0.0) / NUMBERS);
-    if (albedo - 5.0 * error > albedos->max) {
-        albedos->max = albedo - 5.0 * error;
+    double *max = c->ior > 2.4f ? &albedos->max_dense : &albedos->max;
+    double *min = c->anisotropy > 0.0f ? albedos->min_grain : albedos->min_even;
+    if (max == &albedos->max && albedo - 5.0 * error > *max)
         snprintf(albedos->where, sizeof(albedos->where), "%s", case_name(c, ward));
-    }
-    double *minimum = c->metallic == 1.0f       ? albedos->min_metal
-                      : c->transmission == 0.0f ? albedos->min_scattering
-                                                : albedos->min_glass;
-    minimum[ward] = fmin(minimum[ward], albedo);
+    *max = fmax(*max, albedo - 5.0 * error);
+    min[ward] = fmin(min[ward], albedo + 5.0 * error);
 }
 
-TEST(no_white_material_sends_on_more_than_arrives)
+/* What rough facets send into each other comes out again: as fits of it say, which are within 0.007 (the
+ * polynomials of facet_albedo.glsl), 0.025 where the index is above 2.4. Along a grain a fit for facets without
+ * one stands in: it is off by up to 0.05, and chosen so that no more comes out than went in. */
+TEST(white_materials_send_on_what_arrives_and_no_more)
 {
     static const float roughnesses[] = {0.0f, 0.05f, 0.15f, 0.3f, 0.5f, 0.7f, 0.85f, 1.0f};
-    struct albedos albedos = {.min_metal = {1, 1}, .min_scattering = {1, 1}, .min_glass = {1, 1}};
+    struct albedos albedos = {.min_even = {1, 1}, .min_grain = {1, 1}};
     visit_materials(*state, roughnesses, COUNT(roughnesses), sum_up, &albedos);
-    print_message("maximum albedo, less five standard errors: %.5f (%s)\n", albedos.max, albedos.where);
-    for (int ward = 0; ward < 2; ward++)
-        print_message("%s, minimum albedo of a white metal %.3f, of what scatters %.3f, of glass %.3f\n",
-                      ward ? "ward" : "ggx", albedos.min_metal[ward], albedos.min_scattering[ward],
-                      albedos.min_glass[ward]);
-    assert_true(albedos.max <= 1.0 + 1e-4); /* sums of 2^15 weights in double, each rounded to 6e-8 */
+    print_message("maximum albedo, less five standard errors: %.5f (%s), of an index of 4 %.5f\n", albedos.max,
+                  albedos.where, albedos.max_dense);
+    for (int ward = 0; ward < 2; ward++) {
+        print_message("%s, minimum albedo, and five standard errors: %.3f, with a grain %.3f\n",
+                      ward ? "ward" : "ggx", albedos.min_even[ward], albedos.min_grain[ward]);
+        assert_true(albedos.min_even[ward] > 0.985);
+        assert_true(albedos.min_grain[ward] > 0.945);
+    }
+    assert_true(albedos.max <= 1.0 + 1e-3);
+    assert_true(albedos.max_dense <= 1.0 + 0.025);
 }
 
 /* ---- light and view in each other's place ---- */

@@ -318,41 +318,7 @@ TEST(motion_of_other_content_begins_an_accumulated_picture_from_new)
     }
 }
 
-/* ---- lobes ---- */
-
-/* In an evenly lit world a rough metal mirrors what leaves the first facet that is met, and no more. */
-TEST(a_rough_mirror_in_an_even_light_loses_only_what_a_second_facet_would_catch)
-{
-    static const float roughnesses[] = {0.0f, 0.1f, 0.3f, 0.6f, 1.0f};
-    struct fixture *fixture = *state;
-    double sum = 0.0, before = 1.0 + 1e-5;
-    for (size_t k = 0; k < sizeof(roughnesses) / sizeof(roughnesses[0]); k++) {
-        double values[PIXELS];
-        fixture_clear(state);
-        struct scene_material *metal = fixture_material(fixture);
-        metal->metallic = 1.0f;
-        metal->roughness = roughnesses[k];
-        fixture_square(fixture, 40.0f, metal->base.id, NULL);
-        fixture_environment(fixture, 1.0f, 1.0f, 1.0f);
-        fixture->request.width = fixture->request.height = EDGE;
-        fixture->request.integrator = INTEGRATOR_DISTRIBUTED;
-        fixture->request.primary = PRIMARY_TRACE;
-        fixture->request.camera.fov_y = 1e-4f; /* straight on */
-        picture(fixture, 256, 1, values);
-        sum = 0.0;
-        for (uint32_t i = 0; i < PIXELS; i++)
-            sum += values[i] / PIXELS;
-        print_message("roughness %.1f: %.4f of the light\n", (double)roughnesses[k], sum);
-        assert_true(sum <= before); /* falls */
-        before = sum;
-        if (k == 0)
-            assert_near(sum, 1.0, 1e-5);
-    }
-    /* At roughness 1 facets look everywhere alike: with x the cosine of the mirrored ray, whose density is 1/2,
-     * and the share 2 x / (1 + x) of them lit, the integral from 0 to 1 of x / (1 + x). 65536 samples of at
-     * most 1. */
-    assert_near(sum, 1.0 - log(2.0), 5.0 * 0.5 / 256.0);
-}
+/* ---- counts ---- */
 
 TEST(coverage_is_1_where_translucent_panes_stand_before_a_wall)
 {

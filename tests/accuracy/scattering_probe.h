@@ -30,7 +30,7 @@ _Static_assert(sizeof(struct probe_case) == 48, "the shader reads three vec4 a c
 
 /* What split_light() says of a case. */
 struct probe_split {
-    float mirror, scattered, refracted, mirror_ray;
+    float mirror, scattered, refracted, mirror_ray; /* scattered: also what is mirrored more than once */
 };
 
 struct probe {
@@ -73,7 +73,8 @@ static const char probe_text[] =
     "    split parts = split_light(s, view.z);\n"
     "    values[i] = brdf(s, parts, view, view.z, light).g;\n"
     "    if (j == 0u)\n"
-    "        splits[k] = vec4(parts.mirror.g, parts.scattered.g, parts.refracted.g, parts.mirror_ray);\n"
+    "        splits[k] = vec4(parts.mirror.g, parts.scattered.g + parts.again.g, parts.refracted.g, "
+    "parts.mirror_ray);\n"
     "}\n";
 
 static inline void probe_init(struct probe *probe, struct gpu_device *device)

@@ -38,6 +38,12 @@ struct quadrature {
  * up, at worst about 80 degrees for an index of 10, its mean over the highlight is 4e-4 above what was kept back.
  */
 #define HIGHLIGHT_BLUR 5e-4
+/* Of the fits of what facets mirror (facet_albedo.glsl), which are from the side where no energy is made but
+ * within a few degrees of the horizon, and for indices above 2.4. */
+#define FIT_ERROR(c) ((c)->ior > 2.4f ? 0.05 : (c)->view[2] < 0.08f ? 0.02 : 0.0)
+/* The least that is left of a white light. A highlight on what is smoother than ROUGHNESS_MIN_LIGHT is widened,
+ * and loses as much as single facets do near the horizon. */
+#define LEAST(c) ((c)->view[2] < 0.08f ? 0.95 : (c)->ior > 2.4f ? 0.97 : 0.985)
 
 static struct quadrature fine, coarse;
 static float values[CASES_MAX * DIRECTIONS_MAX];
@@ -114,7 +120,7 @@ static double fresnel(double cosine, double n)
 /* What is looked for in one pass over the grid; each is printed, so that its margin is seen. */
 struct extremes {
     double max, mistake, lambert, mirror, parts;
-    double min_dielectric, min_metal; /* of what a light sends: facets that shadow each other are not followed */
+    double min_dielectric, min_metal;
     char where[160];
 };
 
@@ -122,7 +128,8 @@ static void look_at(const struct probe_case *c, double albedo, double mistake, c
                     struct extremes *extremes)
 {
     double total = albedo + (double)split->refracted;
-    if (!(total <= 1.0 + HORIZON_ERROR + mistake + HIGHLIGHT_BLUR))
+    if (!(total <= 1.0 + HORIZON_ERROR + mistake + HIGHLIGHT_BLUR + FIT_ERROR(c)) ||
+        !(total >= LEAST(c) - HORIZON_ERROR - mistake))
         fail_msg("%s: %.6f of the light is reflected or refracted", case_name(c), total);
     if (total > extremes->max) {
         extremes->max = total;
@@ -158,7 +165,7 @@ static void visit_grid(struct probe *probe, struct extremes *extremes)
         }
 }
 
-TEST(no_material_gives_out_more_than_arrives)
+TEST(white_materials_give_out_what_arrives_and_no_more)
 {
     struct extremes extremes = {.min_dielectric = 1.0, .min_metal = 1.0};
     visit_grid(*state, &extremes);
@@ -170,7 +177,7 @@ TEST(no_material_gives_out_more_than_arrives)
     print_message(
         "of what a light sends a white dielectric reflects at least %.3f (index up to 1.5), a white metal %.3f\n",
         extremes.min_dielectric, extremes.min_metal);
-    assert_true(extremes.mistake < 2e-3); /* else the tolerance above would let faults through */
+    assert_true(extremes.mistake < 3e-3); /* else the tolerance above would let faults through */
     assert_true(extremes.lambert < HORIZON_ERROR);
     assert_true(extremes.mirror < 1e-3); /* the highlight is blurred: alpha^2 = 4e-5 times Fresnel's curvature */
     assert_true(extremes.parts < 1e-6);  /* three roundings */

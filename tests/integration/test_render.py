@@ -94,6 +94,36 @@ class Pictures(OneDaemon):
                 self.assertEqual(read_png(unasked), read_png(paths["reference"]),
                                  "the reference traces first hits, too, unless it is told to rasterise them")
 
+    def test_an_environment_lies_as_in_viewers_of_gltf(self):
+        """Its middle column is +x and what is right of that is +z; a turn of 90 degrees about +y takes +x to -z."""
+        red, green, dark = bytes((255, 16, 16, 129)), bytes((16, 255, 16, 129)), bytes((16, 16, 16, 129))
+        sky = self.folder / "columns.hdr"
+        sky.write_bytes(b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 4 +X 8\n" + (3 * dark + 2 * red + 2 * green + dark) * 4)
+        for towards, rotation, channel in (("1,100,0", 0, 0), ("0,100,1", 0, 1), ("0,100,-1", 90, 0), ("1,100,0", 90, 1)):
+            with self.subTest(towards=towards, rotation=rotation):
+                path = self.folder / "sky.png"
+                self.expect(farlight("render", bundled_scenes() / "teapot.glb", "-o", path, "--size", "8x8", "--fov", "10",
+                                     "--eye", "0,100,0", "--look-at", towards, "--environment", sky,
+                                     "--environment-rotation", rotation), 0)
+                _, _, rows, channels = read_png(path)
+                middle = rows[4][4 * channels:4 * channels + 3]
+                self.assertEqual(max(range(3), key=lambda c: middle[c]), channel, middle)
+
+    def test_a_background_lies_behind_all_surfaces(self):
+        """A colour is that of the display, whatever the exposure; what stands before it is as before the environment."""
+        def corner_and_middle(background):
+            path = self.folder / "background.png"
+            self.expect(farlight("render", bundled_scenes() / "carousel.glb", "-o", path, "--size", "80x60", "--exposure", "1",
+                                 "--integrator", "whitted", "--background", background), 0)
+            width, height, rows, channels = read_png(path)
+            return [tuple(rows[y][x * channels:(x + 1) * channels]) for x, y in ((0, 0), (width // 2, height // 2))]
+        _, carousel = corner_and_middle("environment")
+        self.assertEqual(corner_and_middle("transparent"), [(0, 0, 0, 0), carousel])
+        colour, before = corner_and_middle("#2040a0")
+        self.assertEqual((colour[:3], before), ((0x20, 0x40, 0xa0), carousel))
+        result = self.expect(render_picture("teapot", self.folder / "none.png", "--background", "#2040a"), 2)
+        self.assertIn("#ffffff", result.stderr)
+
     def test_the_same_seed_gives_the_same_bytes(self):
         paths = [self.folder / "a.png", self.folder / "b.png"]
         for path in paths:

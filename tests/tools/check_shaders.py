@@ -66,8 +66,9 @@ WITHOUT = {tracer: ("HAS_MOTION",) for tracer in ("TRACER_LDC", "TRACER_ABUFFER"
 # Of a sample a pixel, without a lens and other layers of the picture.
 WITHOUT |= {what: ("HAS_UNKNOWN", "HAS_LENS") for what in ("MARK", "KEPT")}
 WITHOUT["EYES"] = ("HAS_LENS",)  # these need rays
-# And in programs of a folder: what moves is met by tracers, and shaded where it was met.
+# And in programs of a folder: what moves is met by tracers, and shaded where it was met. Emitters alone are looked for.
 WITHOUT_IN = {"render": ("HAS_MOTION",)}
+MAY_MOVE = ("render/path.comp", "render/distributed.comp")
 STAGES = {"raster/view.vert": ["raster/view.vert", "raster/view.frag"],
           "rayspace/reduce.vert": ["rayspace/reduce.vert", "rayspace/reduce.geom"],
           "ldc/build.frag": ["raster/draw.vert", "raster/draw.geom", "ldc/build.frag"],
@@ -179,7 +180,8 @@ def variants(program):
                     for parts in itertools.product(*CHOICES.get(program, [[{}]]))]
     all_chosen = {name for combination in combinations for name in combination}
     for chosen in combinations:
-        never = [name for one in chosen for name in WITHOUT.get(one, ())] + [*WITHOUT_IN.get(program.split("/")[0], ())]
+        never = [name for one in chosen for name in WITHOUT.get(one, ())] + [
+            *(() if program in MAY_MOVE else WITHOUT_IN.get(program.split("/")[0], ()))]
         optional = [name for name in optional_defines(stages, chosen, all_chosen) if name not in never]
         for on in [[], optional] + [[name] for name in optional if len(optional) > 1]:
             if on or on is not optional:

@@ -128,7 +128,8 @@ static bool write_sphereflake(const char *path, int levels)
     return true;
 }
 
-/* Radiance of the sky in a direction given by its height (sine of the elevation) and azimuth. */
+/* Radiance of the sky in a direction given by its height (sine of the elevation) and azimuth from -z to the right.
+ */
 static void sky_radiance(float rgb[3], float height, float azimuth)
 {
     const float up = fmaxf(height, 0), warm = expf(-6 * up);
@@ -145,6 +146,12 @@ static void sky_radiance(float rgb[3], float height, float azimuth)
             rgb[i] += (const float[3]){2.2f, 2.8f, 3.6f}[i];
 }
 
+/* The middle one is +x. */
+static float azimuth_of_column(float x, float width)
+{
+    return 6.2831853f * ((x + 0.5f) / width - 0.25f);
+}
+
 /* Radiance's own format, without run lengths: https://radsite.lbl.gov/radiance/refer/filefmts.pdf */
 static bool write_sky(const char *path, float strength)
 {
@@ -159,7 +166,7 @@ static bool write_sky(const char *path, float strength)
         for (int x = 0; x < WIDTH; x++) {
             float rgb[3];
             sky_radiance(rgb, cosf(3.14159265f * ((float)y + 0.5f) / HEIGHT),
-                         6.2831853f * (((float)x + 0.5f) / WIDTH - 0.5f));
+                         remainderf(azimuth_of_column((float)x, WIDTH), 6.2831853f));
             for (int i = 0; i < 3; i++)
                 rgb[i] *= strength;
             int exponent;

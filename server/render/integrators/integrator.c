@@ -30,7 +30,7 @@ static uint32_t one_for_each_light(const struct render_context *context)
 
 static uint32_t one_for_all_lights(const struct render_context *context)
 {
-    return context->uniforms.light_count > 0;
+    return context->uniforms.light_count > 0 || context_samples_emitters(context);
 }
 
 static uint32_t one_for_the_environment(const struct render_context *context)
@@ -57,9 +57,26 @@ static void set_raycast(struct render_context *context, const struct gpu_program
     gpu_uniform_float(program, "layer_opacity", opacity > 0.0f ? opacity : OPACITY_DEFAULT);
 }
 
-static size_t path_defines(const struct render_context *context, struct gpu_define *defines)
+/* At most 4. */
+static size_t emitter_defines(const struct render_context *context, struct gpu_define *defines)
 {
     size_t n = 0;
+    if (!context_samples_emitters(context))
+        return 0;
+    defines[n++] = (struct gpu_define){"HAS_EMITTERS", "1"};
+    if (context->tracer->impl->sampled)
+        defines[n++] = (struct gpu_define){"EMITTERS_BY_DISTANCE", "1"};
+    if (!context->scene->has_motion)
+        return n;
+    defines[n++] = (struct gpu_define){"HAS_MOTION", "1"};
+    defines[n++] =
+        (struct gpu_define){"NO_COLOURS", "1"}; /* not read here, and there is no sampler left for them */
+    return n;
+}
+
+static size_t path_defines(const struct render_context *context, struct gpu_define *defines)
+{
+    size_t n = emitter_defines(context, defines);
     if (context->environment->kind == ENVIRONMENT_IMAGE)
         defines[n++] = (struct gpu_define){"HAS_ENVIRONMENT_IMAGE", "1"};
     if (context->environment_choice->rows > 0)
@@ -119,6 +136,7 @@ static const struct integrator integrators[] = {
             .shadow_waves = 1,
             .straight_waves = STRAIGHT_WAVES,
             .shadow_rays_a_hit = one_for_all_lights,
+            .defines = emitter_defines,
         },
     /* Ray casting through all layers: each is lit without shadows and blended over those behind it. */
     [INTEGRATOR_RAYCAST] =

@@ -288,7 +288,7 @@ bool opacity_is_cut_out(const struct opacity_surface *surface, const struct opac
     return colour[3] < material->alpha_cutoff;
 }
 
-void opacity_transmittance(const struct opacity_surface *surface, const struct opacity_point *point,
+void opacity_transmittance(const struct opacity_surface *surface, const struct opacity_point *point, bool stops,
                            float transmittance[3])
 {
     const struct opacity_material *material = material_of(surface, point->primitive);
@@ -304,6 +304,6 @@ void opacity_transmittance(const struct opacity_surface *surface, const struct o
     float alpha = material->alpha_mode == ALPHA_BLEND ? fminf(fmaxf(colour[3], 0.0f), 1.0f) : 1.0f;
     for (int k = 0; k < 3; k++) {
         float through = material->transmission * texel[0] * fminf(fmaxf(colour[k], 0.0f), 1.0f);
-        transmittance[k] = is_open ? 1.0f : (1.0f - alpha) + alpha * through;
+        transmittance[k] = is_open ? 1.0f : stops ? 0.0f : (1.0f - alpha) + alpha * through;
     }
 }

@@ -78,7 +78,7 @@ bool opacity_surface_lets_light_pass(const struct opacity_surface *surface);
 
 /* is_cut_out() and transmittance_of() of alpha.glsl. */
 bool opacity_is_cut_out(const struct opacity_surface *surface, const struct opacity_point *point);
-void opacity_transmittance(const struct opacity_surface *surface, const struct opacity_point *point,
+void opacity_transmittance(const struct opacity_surface *surface, const struct opacity_point *point, bool stops,
                            float transmittance[3]);
 
 #endif

@@ -78,6 +78,7 @@ struct traversal {
 struct traversal_context {
     struct RTCIntersectContext embree; /* first: it comes back by this address */
     float transmittance[CHUNK_RAYS][3];
+    bool stops[CHUNK_RAYS]; /* RAY_STOPS_T_MIN */
 };
 
 /* ---- floating-point mode ---- */
@@ -150,9 +151,9 @@ void reference_filter_any(const struct RTCFilterFunctionNArguments *arguments)
         if (!arguments->valid[lane])
             continue;
         const struct opacity_point point = point_of(arguments, lane);
-        float *left = context->transmittance[ray[RAY_ID * (size_t)arguments->N + lane].u % CHUNK_RAYS];
-        float passes[3], maximum = 0.0f;
-        opacity_transmittance(surface, &point, passes);
+        const uint32_t id = ray[RAY_ID * (size_t)arguments->N + lane].u % CHUNK_RAYS;
+        float *left = context->transmittance[id], passes[3], maximum = 0.0f;
+        opacity_transmittance(surface, &point, context->stops[id], passes);
         for (int k = 0; k < 3; k++) {
             left[k] *= passes[k];
             maximum = fmaxf(maximum, left[k]);
@@ -341,9 +342,11 @@ static void traverse_chunk(void *argument, uint32_t chunk)
     unsigned mode = enter_fast_mode();
     rtcInitIntersectContext(&context.embree);
     if (traversal->rays->wave->kind == WAVE_ANY)
-        for (uint32_t i = 0; i < end - first; i++)
+        for (uint32_t i = 0; i < end - first; i++) {
             for (int k = 0; k < 3; k++)
                 context.transmittance[i][k] = 1.0f;
+            context.stops[i] = traversal->wave->rays[first + i].origin_t_min[3] == RAY_STOPS_T_MIN;
+        }
     switch (traversal->width) {
     case 1:
         traverse_packets(traversal, &context, first, end, 1);
