@@ -114,7 +114,7 @@ static bool check_hidden(const struct message_render *render, struct error *erro
         return true;
     if (render->kind == PROTOCOL_JOB_BATCH || (has_views(render) && !(render->margin > 0.0f))) {
         error_set(error, ERROR_UNSUPPORTED, "render.hidden_layers",
-                  "only pictures of a view of one eye have some");
+                  "a batch has none, nor have several views without a margin");
         return error_remedy(error, "set it to 0");
     }
     if (!(render->attachments & 1u << PROTOCOL_ATTACHMENT_DEPTH)) {

@@ -369,6 +369,21 @@ class MadeHere(Viewer):
                 true = self.rendered(state, eye, *eyes, "--views", "rays")
                 self.assertLess(error_of(made, true), error_of(before, true) / 3)
 
+    def test_both_eyes_at_rest_are_those_of_the_daemon(self):
+        moves = [{"mouse": "move", "x": 80 + step, "y": 45, "after": 0.02} for step in range(1, 51)]
+        events = [rest(8), drag(80, 45, 0, 0)[0], *moves, {"state": "moving"}, {"mouse": "up", "button": "left", "x": 130, "y": 45},
+                  rest(8), {"state": "rested"}, *HIDE, {"screenshot": "rested.png"}]
+        states = {}
+        for mode in ("on", "off"):
+            states[mode] = self.replay(events, "--views", mode, "--stereo", "0.1", size=(160, 90))
+            (self.folder / "rested.png").rename(self.folder / f"{mode}.png")
+        local = states["on"]["moving"]["local"]
+        self.assertTrue(local["shown"] and local["made"] > 0 and local["depth_bytes"] > 0)
+        self.assertEqual(states["off"]["moving"]["local"]["made"], 0)
+        self.assertFalse(states["on"]["rested"]["local"]["shown"])
+        self.assertEqual(states["on"]["rested"]["eye"], states["off"]["rested"]["eye"])
+        self.assertEqual(difference(self.folder / "on.png", self.folder / "off.png"), 0)
+
     def test_a_view_is_near_to_what_is_rendered_from_there(self):
         size = (320, 360)
         state, before, made = self.moved_while_lost("made", size=size)

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* The thread that makes views: which ones come out, from which picture and of which camera. */
-#include "viewer/views.h"
+#include "viewer/warped_key.h"
 #include "tests/harness/test.h"
 #include "protocol/common/clock.h"
 
@@ -31,6 +31,14 @@ static struct views_key some_key(uint8_t grey)
     return key;
 }
 
+static struct views *begin(void)
+{
+    struct fl_error error;
+    struct views *views = views_create(&error);
+    assert_non_null(views);
+    return views;
+}
+
 static uint64_t want(struct views *views, float x)
 {
     const struct views_wish wish = {.width = EDGE, .height = EDGE, .camera = camera_at(x), .frame_ns = 1000000};
@@ -53,12 +61,10 @@ static int grey_of(const struct pixmap *picture)
 
 TEST(a_view_is_of_the_newest_picture_and_the_newest_camera)
 {
-    struct fl_error error;
-    struct views *views = views_create(&error);
+    struct views *views = begin();
     struct pixmap picture = {0};
     struct views_made made = {0};
     struct views_key key = some_key(100);
-    assert_non_null(views);
     const uint64_t first = want(views, 0);
     assert_false(views_take(views, &picture, &made)); /* of what? */
     key.sticking = malloc(EDGE * EDGE);
@@ -107,11 +113,9 @@ static void wait_for_best(struct views *views, struct views_made *made, uint64_t
 
 TEST(what_a_picture_hides_is_seen_once_it_has_come)
 {
-    struct fl_error error;
-    struct views *views = views_create(&error);
+    struct views *views = begin();
     struct views_made made = {0};
     struct views_key key = some_key(100);
-    assert_non_null(views);
     for (int i = 0; i < EDGE * EDGE; i++)
         key.depth[i] = is_post(i) ? 0.5f : 2;
     views_give_key(views, &key);
@@ -149,14 +153,76 @@ TEST(what_a_picture_hides_is_seen_once_it_has_come)
     views_destroy(views);
 }
 
+/* A post before a wall, of colours that tell each texel. */
+static struct views_key varied_key(void)
+{
+    struct views_key key = some_key(0);
+    for (int i = 0; i < EDGE * EDGE; i++) {
+        const uint8_t texel[] = {(uint8_t)(i % EDGE * 4), (uint8_t)(i / EDGE * 4), is_post(i) ? 255 : 0, 255};
+        memcpy(key.picture.pixels + 4 * i, texel, sizeof(texel));
+        key.depth[i] = is_post(i) ? 0.5f : 2;
+    }
+    return key;
+}
+
+/* The part of `picture` from this column and row on is what is seen from there. Returns the share that is behind.
+ */
+static float expect_eye(struct fl_warp *warp, const struct pixmap *picture, int column, int row, uint32_t width,
+                        uint32_t height, float x)
+{
+    static uint32_t colours[EDGE * EDGE];
+    static uint8_t mask[EDGE * EDGE];
+    struct fl_warp_error error = {0};
+    const struct fl_warp_view view = {
+        .width = width, .height = height, .camera = camera_at(x), .quality = FL_WARP_TREE};
+    struct fl_warp_picture alone = {.colours = colours, .mask = mask};
+    assert_true(fl_warp_make(warp, &view, &alone, &error));
+    for (int y = 0; y < (int)height; y++)
+        assert_memory_equal(picture->pixels + ((row + y) * EDGE + column) * 4, colours + y * (int)width,
+                            4 * width);
+    return alone.counts.behind;
+}
+
+TEST(both_eyes_are_those_of_views_half_the_distance_aside)
+{
+    struct fl_warp_error error = {0};
+    struct warped_key alike = {.warp = fl_warp_create(1, &error)};
+    struct views_key key = varied_key();
+    assert_true(alike.warp && warped_key_set(&alike, &key, &error));
+    struct views *views = begin();
+    key = varied_key();
+    views_give_key(views, &key);
+    for (int over = 0; over < 2; over++) {
+        struct pixmap picture = {0};
+        struct views_made made = {0};
+        const struct views_wish wish = {.width = EDGE,
+                                        .height = EDGE,
+                                        .camera = camera_at(0.01f),
+                                        .baseline = 0.1f,
+                                        .over = over,
+                                        .frame_ns = 1000000};
+        const uint64_t number = views_want(views, &wish);
+        do
+            wait_for(views, &picture, &made);
+        while (!views_is_best(views, &made, number));
+        const uint32_t width = over ? EDGE : EDGE / 2, height = over ? EDGE / 2 : EDGE;
+        const float left = expect_eye(alike.warp, &picture, 0, 0, width, height, 0.01f - 0.05f);
+        const float right = expect_eye(alike.warp, &picture, over ? 0 : EDGE / 2, over ? EDGE / 2 : 0, width,
+                                       height, 0.01f + 0.05f);
+        assert_true(left > 0 && right > 0);
+        assert_float_equal(made.counts.behind, (left + right) / 2, 1e-6); /* of both: rounding alone */
+        pixmap_finish(&picture);
+    }
+    views_destroy(views);
+    fl_warp_destroy(alike.warp);
+}
+
 TEST(a_view_of_an_earlier_motion_does_not_come_in_a_later_one)
 {
-    struct fl_error error;
-    struct views *views = views_create(&error);
+    struct views *views = begin();
     struct pixmap picture = {0};
     struct views_made made = {0};
     struct views_key key = some_key(100);
-    assert_non_null(views);
     views_give_key(views, &key);
     for (int motion = 0; motion < 20; motion++) {
         want(views, 0.05f);
@@ -178,13 +244,11 @@ TEST(a_view_of_an_earlier_motion_does_not_come_in_a_later_one)
 
 TEST(a_picture_of_which_no_view_can_be_made_is_reported_and_the_next_one_helps)
 {
-    struct fl_error error;
     struct fl_warp_error why = {0};
-    struct views *views = views_create(&error);
+    struct views *views = begin();
     struct pixmap picture = {0};
     struct views_made made = {0};
     struct views_key key = some_key(100);
-    assert_non_null(views);
     key.camera.world_from_view[0] = NAN;
     want(views, 0);
     views_give_key(views, &key);
