@@ -48,7 +48,7 @@ float cosine_within(float cosine, float other)
     return cosine >= other ? 1.0 : cosine * other + sines;
 }
 
-// The minimum cosine at the receiver: its normal is not known more exactly (receiver_normal of path.comp).
+// The minimum cosine at the receiver: its normal is not known more exactly (emitter_normal of path.comp).
 const float EMITTER_COSINE_SLACK = 0.01;
 
 // An upper estimate of the irradiance of a node's emitters at a point, without shadows: not 0 where any light may arrive.
