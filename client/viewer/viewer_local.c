@@ -133,11 +133,12 @@ static void leave_margin(struct fl_frame *frame)
  */
 static bool give_key(struct viewer *viewer, struct fl_frame *frame, bool is_shown)
 {
-    struct views_key key = {.depth_step = frame->depth_step,
-                            .radius = viewer->local_radius,
-                            .is_final =
-                                !frame->moving && !frame->more_follows && frame->samples >= viewer->view.samples,
-                            .came_ns = monotonic_now_ns()};
+    struct views_key key = {
+        .depth_step = frame->depth_step,
+        .radius = viewer->local_radius,
+        .is_smeared = frame->encoding == PROTOCOL_ENCODING_JPEG || frame->encoding == PROTOCOL_ENCODING_H264,
+        .is_final = !frame->moving && !frame->more_follows && frame->samples >= viewer->view.samples,
+        .came_ns = monotonic_now_ns()};
     if (!viewer->views)
         viewer->views = views_create(&viewer->failure);
     if (!viewer->views || (is_shown && !pixmap_copy(&key.picture, &viewer->arrived, &viewer->failure)))
@@ -160,7 +161,11 @@ bool viewer_take_picture(struct viewer *viewer, struct fl_frame *frame)
 {
     const bool has_margin = frame->margin_x > 0 || frame->margin_y > 0;
     const bool is_key = frame->depth && frame->fov_y > 0 && viewer_has_local(viewer);
-    const bool is_shown = !frame->moving || !is_key || viewer->live.width == 0;
+    /* Of two eyes, whose own picture has no depth. */
+    const bool is_middle = viewer->settings.stereo && frame->depth;
+    const bool is_shown = !frame->moving || !is_key || (viewer->live.width == 0 && !is_middle);
+    if (is_middle && !is_key)
+        return false; /* no view is made of it any more */
     viewer->is_live = is_shown;
     if (is_key && !give_key(viewer, frame, is_shown))
         return false;

@@ -18,6 +18,7 @@ struct views_key {
     struct fl_warp_camera camera;
     float depth_step; /* as of struct fl_frame */
     float radius;     /* metres round its eye */
+    bool is_smeared;  /* as of struct fl_warp_key */
     bool is_final;    /* nothing better of this camera will come */
     uint64_t came_ns; /* when it had arrived */
 };

@@ -43,6 +43,7 @@ bool warped_key_set(struct warped_key *warped, struct views_key *came, struct fl
                                     .w_error = unit * came->depth_step / 2,
                                     .radius = came->radius,
                                     .pixels = KEY_PIXELS,
+                                    .is_smeared = came->is_smeared,
                                     .layer_count = 1,
                                     .layers[0] = {.colours = (const uint32_t *)(const void *)picture->pixels,
                                                   .w = came->depth,

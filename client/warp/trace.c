@@ -19,6 +19,7 @@
 /* How far neighbouring texels may come apart in the picture, in texels, where rays meet one surface: from 1 on one
  * may hide the other. Below it the solution's iteration closes in by this factor. */
 #define STRETCH_MAX 0.5f
+#define SHIFT_MIN 1e-6f   /* texels per unit of w: less is a ray that stays where it is */
 #define NEAR_LIMIT 0.999f /* of the w of the eye's plane */
 
 /* The pixels of a tile, or of a part of one, and what their rays can meet. */
@@ -140,6 +141,18 @@ LANES_KERNEL static void place_packet(const struct warp_rays *rays, struct warp_
     }
 }
 
+/* Where rays that met nothing known have their colours from. */
+static void go_back(const struct warp_packet *packet, float texels, struct warp_walk *walk)
+{
+    for (int k = 0; k < LANES; k++) {
+        const float across = packet->shift_x[k], down = packet->shift_y[k];
+        const float share = texels / max_of(sqrtf(across * across + down * down), SHIFT_MIN);
+        const bool is_hit = walk->state[k] == WALK_HIT;
+        walk->x[k] = is_hit ? walk->x[k] : walk->before_x[k] + share * across;
+        walk->y[k] = is_hit ? walk->y[k] : walk->before_y[k] + share * down;
+    }
+}
+
 /* What becomes of a packet. */
 struct result {
     uint32_t colours[LANES], mask[LANES], deeper;
@@ -193,11 +206,10 @@ static void walk_packet(const struct warp_task *task, const struct tile *tile, c
     warp_walk(layer, packet, &walk, tile->range[0], tile->level);
     for (int k = 0; k < LANES; k++) {
         const bool is_hit = walk.state[k] == WALK_HIT;
-        walk.x[k] = is_hit ? walk.x[k] : walk.before_x[k];
-        walk.y[k] = is_hit ? walk.y[k] : walk.before_y[k];
         result->mask[k] = is_hit ? FL_WARP_KNOWN : walk.state[k] == WALK_BEHIND ? FL_WARP_BEHIND : FL_WARP_OUTSIDE;
         any_behind |= walk.state[k] == WALK_BEHIND;
     }
+    go_back(packet, task->fill_back, &walk);
     warp_colour(layer, walk.x, walk.y, result->colours);
     if (task->sticks)
         warp_sticking(layer, walk.x, walk.y, result->sticking);

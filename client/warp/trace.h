@@ -17,6 +17,7 @@ struct warp_task {
     float ranges[FL_WARP_LAYERS_MAX][2]; /* least and greatest w of each layer that a ray may meet */
     uint32_t width, height, stride;      /* of what is written, pixels */
     enum fl_warp_holes holes;
+    float fill_back; /* texels from where a ray was last before a surface to what it is filled with */
     uint32_t *colours;
     uint8_t *mask, *sticking; /* the latter may be NULL */
     bool sticks;              /* something, in some layer; else what sticks is not asked for */

@@ -11,6 +11,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+#define SMEARED_BACK 0.5f /* texels: helps most where the background is plain, and costs nothing where it is not  \
+                           */
+
 struct fl_warp {
     struct warp_pool *pool;
     struct warp_layer layers[FL_WARP_LAYERS_MAX];
@@ -18,6 +21,7 @@ struct fl_warp {
     struct fl_warp_camera camera;
     float unit, radius, pixels, off_pixels; /* off_pixels: of w_error, from an eye at the radius */
     float w_error;
+    bool is_smeared;
     float *scratch; /* of each thread */
     uint64_t build_ns;
 };
@@ -170,6 +174,7 @@ bool fl_warp_set_key(struct fl_warp *warp, const struct fl_warp_key *key, struct
     warp->radius = key->radius;
     warp->pixels = key->pixels;
     warp->w_error = key->w_error;
+    warp->is_smeared = key->is_smeared;
     warp->off_pixels = key->w_error * key->radius / warp->unit * focal_of(&key->camera, key->height);
     for (uint32_t l = 0; l < key->layer_count; l++)
         fill_layer(warp, &warp->layers[l], &key->layers[l]);
@@ -343,6 +348,7 @@ bool fl_warp_make(struct fl_warp *warp, const struct fl_warp_view *view, struct 
                                       .height = view->height,
                                       .stride = picture->stride > 0 ? picture->stride : view->width,
                                       .holes = view->holes,
+                                      .fill_back = warp->is_smeared ? SMEARED_BACK : 0,
                                       .colours = picture->colours,
                                       .mask = picture->mask,
                                       .sticking = picture->sticking},

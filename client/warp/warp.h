@@ -64,10 +64,11 @@ struct fl_warp_layer {
 struct fl_warp_key {
     uint32_t width, height; /* texels, a margin round the picture included */
     struct fl_warp_camera camera;
-    float unit;    /* metres; 0: one metre. w times QUADTREE_SLOPE_SCALE should suit half floats */
-    float w_error; /* the given w is at most so far from the true one: half the step of rounded w; 0: exact */
-    float radius;  /* metres round the key view's eye: other eyes are within .. */
-    float pixels;  /* .. and see each point off by at most so many texels */
+    float unit;      /* metres; 0: one metre. w times QUADTREE_SLOPE_SCALE should suit half floats */
+    float w_error;   /* the given w is at most so far from the true one: half the step of rounded w; 0: exact */
+    float radius;    /* metres round the key view's eye: other eyes are within .. */
+    float pixels;    /* .. and see each point off by at most so many texels */
+    bool is_smeared; /* colours run over edges, as those of a JPEG or a video do: see FL_WARP_FILL */
     uint32_t layer_count;
     struct fl_warp_layer layers[FL_WARP_LAYERS_MAX]; /* the surface that 0, 1, 2 others hide at a texel */
 };
@@ -84,7 +85,8 @@ enum fl_warp_quality {
 };
 
 enum fl_warp_holes {
-    FL_WARP_FILL,   /* what is not known has the colour of what lies behind it in the picture */
+    FL_WARP_FILL,   /* what is not known has the colour of what lies behind it in the picture, of smeared pictures
+                       half a texel further from the edge */
     FL_WARP_PATTERN /* likewise, under a faint pattern */
 };
 

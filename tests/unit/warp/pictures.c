@@ -204,6 +204,32 @@ TEST(a_hole_has_the_colour_of_the_background_and_a_pattern_if_that_is_wanted)
     fl_warp_destroy(warp);
 }
 
+/* Of the red, in what is filled beside the wall. */
+static double smear_in_holes(bool is_smeared)
+{
+    struct fl_warp_key key = key_of(1);
+    key.is_smeared = is_smeared;
+    struct fl_warp *warp = warp_with(1, &key);
+    const struct fl_warp_view view = view_of(camera_at(ASIDE, 0, 0), FL_WARP_TREE);
+    double sum = 0;
+    make(warp, &view, &made);
+    for (uint32_t i = 0; i < COUNT; i++)
+        sum += i % WIDTH >= NEAR_RIGHT - NEAR_SHIFT && i % WIDTH < NEAR_RIGHT - 3 ? red_of(made.colours[i]) : 0;
+    fl_warp_destroy(warp);
+    return sum;
+}
+
+/* The edge's red runs one texel into the wall, which has none: a bilinear filter half a texel further from its
+ * middle has half of it. */
+TEST(holes_take_less_of_what_runs_over_an_edge)
+{
+    set_screen();
+    for (uint32_t i = 0; i < COUNT; i++)
+        key_colours[0][i] = is_near(i % WIDTH) || i % WIDTH == NEAR_RIGHT ? 0xff0000ffu : 0xffff8000u;
+    const double as_it_is = smear_in_holes(false), mended = smear_in_holes(true);
+    assert_true(as_it_is > 0 && mended < 0.6 * as_it_is);
+}
+
 /* What of the mask is known is as in the test above; where nothing is known nothing sticks. Left of where the near
  * plane was the iteration may find it or the wall. */
 TEST(what_sticks_moves_with_its_texels)
