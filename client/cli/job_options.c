@@ -195,8 +195,12 @@ static bool parse_colour(const char *value, float linear[3])
 error_t cli_set_background(struct cli_job *job, const char *field, const char *value)
 {
     struct message_render *options = &job->options;
-    if (parse_colour(value, options->background_colour)) {
+    float colour[3];
+    if (parse_colour(value, colour)) {
         options->background = PROTOCOL_BACKGROUND_COLOUR;
+        options->background_red = colour[0];
+        options->background_green = colour[1];
+        options->background_blue = colour[2];
         return 0;
     }
     if (protocol_background_parse(value, &options->background) &&
