@@ -22,7 +22,7 @@ static const float positions[] = {-1, -1, 0, 3, -1, 0, -1, 3, 0};
 static const uint32_t indices[] = {0, 1, 2};
 /* Of a base colour of 0.8, 0.4, 0.2, face on in the light that makes white 1: what is left of it beside the 4 %
  * that the surface reflects, as sRGB. */
-static const uint8_t pixels[] = {228, 168, 124, 255, 228, 168, 124, 255, 228, 168, 124, 255, 228, 168, 124, 255};
+static const uint8_t pixels[] = {232, 171, 126, 255, 232, 171, 126, 255, 232, 171, 126, 255, 232, 171, 126, 255};
 
 static void print_bytes(const char *what, const uint8_t *bytes, size_t count)
 {
