@@ -38,9 +38,9 @@ SHARED_SIZE(path, 48)
 #define PATH_NORMAL_MAX 511.0f
 #define PATH_LIGHT_BITS 20u
 #define PATH_LIGHT_MASK 0xfffffu
-/* The probability with which its origin samples emitters, not other lights, by the density with which it was scattered:
- * steps of the logarithm to the base 2, PATH_RATIO_ONE is 1. 0: all that it hits counts. Both ways of finding an emitter
- * have it rounded, and so their weights add up to 1. */
+/* The probability with which its origin samples emitters, not other lights, by the density with which it was
+ * scattered: steps of the logarithm to the base 2, PATH_RATIO_ONE is 1. 0: all that it hits counts. Both ways of
+ * finding an emitter have it rounded, and so their weights add up to 1. */
 #define PATH_RATIO_STEPS 64.0f
 #define PATH_RATIO_ONE 2048.0f
 #define PATH_RATIO_MAX 4095.0f
