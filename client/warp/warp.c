@@ -11,9 +11,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define SMEARED_BACK                                                                                              \
-    0.5f /* texels: helps most where the background is plain, and costs nothing where it is not                   \
-          */
+/* Texels: helps most where the background is plain, and costs nothing where it is not. */
+#define SMEARED_BACK 0.5f
 
 struct fl_warp {
     struct warp_pool *pool;

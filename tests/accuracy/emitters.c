@@ -133,7 +133,7 @@ TEST(the_picture_is_that_of_the_rays_that_hit_the_lamps_alone)
 {
     struct fixture *fixture = *state;
     static const unsigned tracers[] = {TRACER_REFERENCE, TRACER_BVH};
-    for (int kind = 0; kind < KINDS; kind++)
+    for (enum kind kind = 0; kind < KINDS; kind++)
         for (size_t t = 0; t < (kind == VEIL || kind == GLASS ? 2 : 1); t++) {
             struct mean means[2];
             for (int sampled = 0; sampled < 2; sampled++) {
