@@ -15,7 +15,7 @@
 /* How long before the encoder is expected to be free a frame is finished: it is hardly older for that, and an
  * encoder that is faster than last time need not wait. */
 #define EARLY_NS UINT64_C(500000)
-/* Nothing was wished for so long that motion is about to end: what a picture hides then costs nobody's time. */
+/* No camera for so long: motion is about to end, and nobody waits while hidden layers are rendered. */
 #define HIDDEN_IDLE_NS UINT64_C(100000000)
 
 void view_follow(struct job *job, const struct job *before)

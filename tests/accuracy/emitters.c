@@ -44,7 +44,7 @@ static struct scene_material *a_lamp(struct fixture *fixture, float x, float y, 
     return glow;
 }
 
-/* What stands in the box, beside its one lamp. */
+/* What the box contains, apart from its one lamp. */
 enum kind { PLAIN, TEXTURED, MANY, BESIDE_LIGHTS, GLASS, ROUGH_GLASS, VEIL, METAL, MIRRORED, KINDS };
 static const char *const kind_names[] = {"plain",       "textured", "many",  "beside lights", "glass",
                                          "rough glass", "veil",     "metal", "uneven scale"};
@@ -151,7 +151,7 @@ TEST(the_picture_is_that_of_the_rays_that_hit_the_lamps_alone)
         }
 }
 
-/* Stored samples are off the surfaces by a cell or so, lamps too. */
+/* Stored samples lie up to a cell or so off the surfaces, and off lamps as well. */
 TEST(stored_samples_show_as_much_light)
 {
     struct fixture *fixture = *state;
@@ -185,7 +185,7 @@ static float *render_pixels(struct fixture *fixture, uint32_t samples, uint64_t 
     return pixels;
 }
 
-/* The mean of the squares of what 64 samples are off the converged picture; beside the lamp. */
+/* The mean squared error of 64 samples against the converged picture, in all pixels but those of the lamp. */
 static double noise_of(struct fixture *fixture, enum kind kind, enum place where, bool sampled)
 {
     path_begin(fixture, TRACER_REFERENCE, 3);
