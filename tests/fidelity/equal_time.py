@@ -25,7 +25,7 @@ HERE = pathlib.Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent / "integration"))
 
 GOAL, GOAL_DENOISED = 1.5, 0.25  # times Cycles' time to its noise
-DEPTH = 8
+DEPTH = 8  # bounces in Cycles
 TRUTH = 64  # times the fewest samples
 OUTLIERS = 1000  # one pixel of so many, the worst, is left out: else single bright ones would decide
 ROOM_FOV = 58.7  # 90 degrees across 16:9
@@ -95,13 +95,13 @@ def cpu_s(process):
 
 def ours(daemon, name, job, counts, options=()):
     """The same of farlight; the daemon's time, of which programs are compiled before."""
-    environment = job["environment"]
-    if not environment:  # without an image there would be a sky
-        environment = OPTIONS.out / "black.exr"
+    environment, depth = job["environment"], DEPTH
+    if not environment:  # only emissive surfaces, which ours does not ask for light at the last hit
+        environment, depth = OPTIONS.out / "black.exr", DEPTH + 1
         pictures.write(environment, numpy.zeros((2, 4, 3)))
 
     def render(count, seed, output):
-        command = ["render", job["model"], "-o", output, "--float", "--quiet", "--integrator", "path", "--depth", DEPTH,
+        command = ["render", job["model"], "-o", output, "--float", "--quiet", "--integrator", "path", "--depth", depth,
                    "--filter", "box", "--size", OPTIONS.size, "--samples", count, "--seed", seed, "--fov", job["fov"],
                    "--environment", environment, *OPTIONS.option, *options]
         command += [f"--{key.replace('_', '-')}=" + ",".join(map(str, job[key])) for key in ("eye", "look_at", "up")]
