@@ -328,8 +328,11 @@ SYNC_PACKAGES := $(STACK_PACKAGES) libvulkan1 libvulkan-dev vulkan-validationlay
 ANALYZE_PACKAGES := clang clang-tidy python3
 COVERAGE_PACKAGES := gcovr
 FUZZ_PACKAGES := clang libclang-rt-14-dev
+# These come for Debian's own python3.
+FIDELITY_PACKAGES := python3-openimageio python3-numpy
+EQUAL_TIME_PACKAGES := $(FIDELITY_PACKAGES) blender
 
-.PHONY: tests build-packages test-packages stack-packages sync-packages lint-packages analyze-packages coverage-packages fuzz-packages test test-long test-zink check-sync demo bench soak farm-drill siege bench-plot check-headers check-rules lint check analyze coverage format install uninstall clean distclean help
+.PHONY: tests build-packages test-packages stack-packages sync-packages lint-packages analyze-packages coverage-packages fuzz-packages fidelity-packages equal-time-packages test test-long test-zink check-sync demo bench fidelity equal-time soak farm-drill siege bench-plot check-headers check-rules lint check analyze coverage format install uninstall clean distclean help
 tests: $(TEST_PROGRAMS) $(CONTRACT) $(BENCH_PROGRAM) $(SHAPED_LINK) $(B)/tests/tools/make_scenes $(B)/tests/tools/pose_dump $(LOSING_DAEMON)
 
 build-packages:
@@ -348,6 +351,10 @@ coverage-packages:
 	@tests/tools/install_packages.sh $(BUILD_PACKAGES) $(TEST_PACKAGES) $(COVERAGE_PACKAGES)
 fuzz-packages:
 	@tests/tools/install_packages.sh $(BUILD_PACKAGES) $(FUZZ_PACKAGES)
+fidelity-packages:
+	@tests/tools/install_packages.sh $(BUILD_PACKAGES) $(FIDELITY_PACKAGES)
+equal-time-packages:
+	@tests/tools/install_packages.sh $(BUILD_PACKAGES) $(EQUAL_TIME_PACKAGES)
 
 JOBS ?= $(shell nproc)
 # A second make, because packages that were just installed change what pkg-config says.
@@ -377,6 +384,14 @@ BENCHED = all $(BENCH_PROGRAM) $(SHAPED_LINK) $(B)/tests/tools/make_scenes
 bench: test-packages
 	$(MAKE) -j$(JOBS) $(BENCHED)
 	python3 tests/bench/bench.py $(B) $(BENCH)
+# Pictures beside those of known renderers, and noise over time beside Cycles, of models below FARLIGHT_SCENES.
+SAMPLES ?= 256
+fidelity: fidelity-packages
+	$(MAKE) -j$(JOBS) all
+	/usr/bin/python3 tests/fidelity/fidelity.py $(B) --samples $(SAMPLES) --only "$(ONLY)"
+equal-time: equal-time-packages
+	$(MAKE) -j$(JOBS) all $(B)/tests/tools/make_scenes
+	/usr/bin/python3 tests/fidelity/equal_time.py $(B) --only "$(ONLY)" $(OPTIONS)
 # Rounds of 10 connects, one upload and 100 frames; after them a daemon must have what it had.
 ROUNDS ?= 1000
 soak: test-packages
@@ -495,6 +510,8 @@ help:
 	@echo "make test-zink  tracers, frames and layers on another OpenGL stack, and its pictures beside llvmpipe's   [TESTS=part-of-a-name]"
 	@echo 'make check-sync frames under Vulkan synchronisation validation, to find missing memory barriers'
 	@echo 'make bench      measure, into out/bench.txt and out/bench.json   [BENCH="family reach"; see tests/bench/bench.py]'
+	@echo 'make fidelity   compare pictures with those of known renderers, into out/fidelity   [SAMPLES=256 ONLY=scene,scene]'
+	@echo 'make equal-time measure noise over time beside Cycles, into out/equal-time   [ONLY=scene,scene OPTIONS="--denoise"]'
 	@echo 'make soak       use one daemon for some minutes, and see that its memory stays flat   [ROUNDS=1000]'
 	@echo 'make farm-drill kill the daemon or the client of animations at random, and see that no frame is lost   [ROUNDS=1000 SEED=]'
 	@echo 'make siege      attack a daemon as one user, and see that another one does not notice   [ATTACKS="stats pings"]'

@@ -14,6 +14,8 @@
 #define HALF_PI 1.57079632679489662f
 /* More are not sampled; half a second to build. */
 #define LEAVES_LIMIT (1u << 20)
+/* glTF's materials are at most as bright, unless they say that they are brighter, as lamps do. */
+#define LAMP_RADIANCE 1.0f
 
 void emitters_finish(struct emitters *emitters)
 {
@@ -144,6 +146,18 @@ static float emission_of(const struct scene *scene, const struct scene_pose *pos
     return material->emission[0] + material->emission[1] + material->emission[2];
 }
 
+/* Textures take from the material's emission, and add nothing. */
+static bool any_lamps(const struct emitters *emitters, const struct scene *scene, const struct scene_pose *pose)
+{
+    bool found = false;
+    for (uint32_t i = 0; i < emitters->surface_count; i++) {
+        const uint32_t id = emitters->surfaces[i].material;
+        const float *emission = scene_pose_material(pose, scene_material(scene, id))->emission;
+        found |= fmaxf(fmaxf(emission[0], emission[1]), emission[2]) > LAMP_RADIANCE;
+    }
+    return found;
+}
+
 /* The leaves of an instance's surface. What moves while the shutter is open, or is deformed on the device, is
  * bounded by all that it reaches, and may look anywhere. */
 static void bound_leaves(const struct emitters *emitters, const struct gpu_scene *gpu, uint32_t index,
@@ -258,6 +272,7 @@ bool gpu_scene_update_emitters(struct gpu_scene *gpu, const struct scene *scene,
     free(listed.leaves);
     free(listed.runs);
     gpu->has_emitters = ok && emitters->leaf_count > 0;
+    gpu->has_lamps = gpu->has_emitters && any_lamps(emitters, scene, pose);
     gpu->state->stale_tables |= had || gpu->has_emitters || changed;
     return ok || error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the surfaces that shine");
 }

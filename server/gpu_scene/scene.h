@@ -83,6 +83,7 @@ struct gpu_scene {
                               coordinates: normal or bump map, anisotropy */
     bool has_motion;       /* something moves while the shutter is open: tracers must look at the rays' times */
     bool has_emitters;     /* some emissive triangle is in the tables of shared/emitter.h */
+    bool has_lamps;        /* some of these is brighter than 1, what reflects most in the light of 1 */
     bool has_emissive_spheres; /* some material of spheres would make triangles such */
     bool has_environment_image;
     float lower_world[3], upper_world[3]; /* all instances and lights with a place; discs left out */

@@ -109,7 +109,11 @@ static bool update_environment(struct frame_renderer *renderer, bool *done, stru
     bool updated = gpu_scene_upload_environment(copy, end_ns, done, error);
     if (!updated || !*done)
         return updated;
-    updated = environment_update(context->environment, renderer->device, copy, end_ns, done, error);
+    struct environment *environment = &renderer->shared->environment;
+    updated = environment_update(environment, renderer->device, copy, end_ns, done, error);
+    bool lamps =
+        environment->default_light && copy->has_lamps && renderer->work->passes.integrator->lit_by_surfaces;
+    context->environment = lamps ? &renderer->shared->no_environment : environment;
     stage_times_add(&context->times, STAGE_BUILD, CLOCK_CPU, 0, start_ns, clock_now_ns() - start_ns);
     return updated;
 }

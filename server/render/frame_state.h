@@ -35,10 +35,10 @@ enum frame_phase {
 struct frame_scene {
     struct gpu_device *device;
     struct gpu_scene copy;
-    struct change_history changes; /* of the copy */
-    struct tracer_set tracers;     /* that depend on the scene alone */
-    uint64_t step_ns;              /* of bringing them to the scene */
-    struct environment environment;
+    struct change_history changes;                  /* of the copy */
+    struct tracer_set tracers;                      /* that depend on the scene alone */
+    uint64_t step_ns;                               /* of bringing them to the scene */
+    struct environment environment, no_environment; /* the latter for scenes that their lamps light */
     struct environment_choice environment_choice;
     uint64_t showing;        /* counts up when the copy is of something else: a revision, poses */
     uint32_t frames;         /* in progress, of all renderers */

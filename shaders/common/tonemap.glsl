@@ -22,10 +22,14 @@ vec3 tone_map_neutral(vec3 colour)
     return mix(colour, vec3(new_peak), g);
 }
 
-// Narkowicz. ACES Filmic Tone Mapping Curve. 2015.
-vec3 tone_map_aces(vec3 x)
+// Hill. A fit of the ACES reference and output transforms, 2016: to its colours and back, and of light over 0.6, as viewers
+// of glTF have it ("ACESFilmic" of three.js).
+vec3 tone_map_aces(vec3 colour)
 {
-    return x * (2.51 * x + 0.03) / (x * (2.43 * x + 0.59) + 0.14);
+    const mat3 from_linear = mat3(0.59719, 0.07600, 0.02840, 0.35458, 0.90834, 0.13383, 0.04823, 0.01566, 0.83777);
+    const mat3 to_linear = mat3(1.60475, -0.10208, -0.00327, -0.53108, 1.10813, -0.07276, -0.07367, -0.00605, 1.07602);
+    vec3 x = from_linear * (colour / 0.6);
+    return to_linear * ((x * (x + 0.0245786) - 0.000090537) / (x * (0.983729 * x + 0.4329510) + 0.238081));
 }
 
 vec3 tone_map(vec3 colour, uint kind)

@@ -372,3 +372,30 @@ TEST(a_lamp_lights_along_its_way_while_the_shutter_is_open)
     assert_mean(means[1], means[0].value, 5.0 * means[0].error);
     assert_true(means[1].error < 0.02 * means[1].value);
 }
+
+/* The default sky is for scenes without light. */
+TEST(a_scene_that_a_lamp_lights_has_no_sky_where_lamps_are_lights)
+{
+    struct fixture *fixture = *state;
+    static const struct {
+        unsigned integrator;
+        float radiance;
+        bool sky;
+    } cases[] = {{INTEGRATOR_PATH, 2.0f, false},
+                 {INTEGRATOR_DISTRIBUTED, 2.0f, false},
+                 {INTEGRATOR_WHITTED, 2.0f, true},
+                 {INTEGRATOR_PATH, 1.0f, true},
+                 {INTEGRATOR_DISTRIBUTED, 1.0f, true}};
+    for (size_t i = 0; i < COUNT(cases); i++) {
+        path_begin(fixture, TRACER_REFERENCE, 2);
+        fixture->request.integrator = cases[i].integrator;
+        a_lamp(fixture, 0.0f, 0.0f, 0.0f, 0.1f, cases[i].radiance, true);
+        fixture_look(fixture, 0.0f, 0.0f, 3.5f, 0.6f);
+        struct frame_result result = fixture_render(fixture);
+        const float *corner = fixture_pixel(&result, 0, 0);
+        if ((corner[1] > 0.0f) != cases[i].sky)
+            fail_msg("integrator %u, a lamp of %g: behind it is %g", cases[i].integrator,
+                     (double)cases[i].radiance, (double)corner[1]);
+        frame_result_finish(&result);
+    }
+}

@@ -152,9 +152,10 @@ TEST(tone_maps_have_their_known_values)
         enum tone_map tone_map;
         uint8_t expected[3];
     } cases[] = {
-        {{0.5f, 0.25f, 1.0f}, TONE_NONE, {188, 137, 255}},   {{2.0f, 0.002f, 0.0f}, TONE_NONE, {255, 7, 0}},
-        {{0.5f, 0.5f, 0.5f}, TONE_ACES, {206, 206, 206}},    {{0.5f, 0.5f, 0.5f}, TONE_NEUTRAL, {181, 181, 181}},
-        {{4.0f, 4.0f, 4.0f}, TONE_NEUTRAL, {253, 253, 253}}, {{4.0f, 0.04f, 0.04f}, TONE_NEUTRAL, {253, 150, 150}},
+        {{0.5f, 0.25f, 1.0f}, TONE_NONE, {188, 137, 255}},     {{2.0f, 0.002f, 0.0f}, TONE_NONE, {255, 7, 0}},
+        {{0.5f, 0.5f, 0.5f}, TONE_ACES, {197, 197, 197}},      {{2.0f, 0.2f, 0.1f}, TONE_ACES, {255, 165, 116}},
+        {{0.5f, 0.5f, 0.5f}, TONE_NEUTRAL, {181, 181, 181}},   {{4.0f, 4.0f, 4.0f}, TONE_NEUTRAL, {253, 253, 253}},
+        {{4.0f, 0.04f, 0.04f}, TONE_NEUTRAL, {253, 150, 150}},
     };
     for (size_t i = 0; i < sizeof(cases) / sizeof(cases[0]); i++) {
         uint8_t pixel[4];

@@ -13,6 +13,7 @@ struct integrator {
     uint32_t children_a_hit; /* at most */
     bool scatters;           /* children in many directions, at most one a hit: a wave of them may be sorted */
     bool random;             /* radiance differs from sample to sample, beside by the place in the pixel */
+    bool lit_by_surfaces;    /* emissive ones are lights */
     bool follows_eye;        /* mirrors, glass and highlights are seen from where the eye is */
     /* These three say only what is compiled ahead: */
     bool always_bounces;     /* hits of any material may have children, unless the depth is 0 */
