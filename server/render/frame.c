@@ -255,8 +255,8 @@ static bool accumulate(struct frame_renderer *renderer, struct error *error)
     bool has_beauty = picture->layers & 1u << LAYER_BEAUTY; /* then it is the first plane */
     return (!context->comparison || comparison_keep_slice(context->comparison, error)) &&
            (!has_beauty || picture_accumulate(picture, context, 0, &context->slice_sums, 0, error)) &&
-           (!denoise_is_wanted(context) || denoise_accumulate(&renderer->denoise, &renderer->work->denoise.notes,
-                                                              context, picture, error)) &&
+           (!denoise_notes_samples(context) ||
+            denoise_accumulate(&renderer->denoise, &renderer->work->denoise.notes, context, picture, error)) &&
            layers_accumulate(&renderer->work->layers, picture, context, error);
 }
 
@@ -297,7 +297,7 @@ static bool find_primary(struct frame_renderer *renderer, struct error *error)
         return false;
     if (done)
         renderer->phase = renderer->work->layers.wanted ? PHASE_LAYERS : PHASE_SHADE;
-    if (done && denoise_is_wanted(context) && !denoise_note(&renderer->work->denoise.notes, context, error))
+    if (done && denoise_notes_samples(context) && !denoise_note(&renderer->work->denoise.notes, context, error))
         return false;
     return gpu_check(renderer->device, "primary hits", error);
 }
@@ -339,7 +339,7 @@ static bool denoise(struct frame_renderer *renderer, struct error *error)
     struct render_context *context = &renderer->work->context;
     bool done = true;
     context->wave_number = 0;
-    if (denoise_is_wanted(context)) {
+    if (denoise_is_wanted(context) && denoise_strength(&context->request, renderer->picture.samples) > 0.0f) {
         if (!denoise_step(&renderer->work->denoise, &renderer->denoise, context, &renderer->picture, &done, error))
             return false;
         renderer->picture.denoised = denoise_sums_band(&renderer->denoise, DENOISE_SUM_RESULT, 0);

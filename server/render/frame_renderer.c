@@ -121,7 +121,6 @@ void frame_renderer_stand_in(struct frame_renderer *renderer, unsigned number, c
 uint64_t frame_renderer_device_bytes(const struct frame_renderer *renderer)
 {
     return picture_device_bytes(&renderer->picture) + denoise_sums_device_bytes(&renderer->denoise) +
-           key_view_device_bytes(&renderer->key) +
-           tracer_set_device_bytes(&renderer->tracers) +
+           key_view_device_bytes(&renderer->key) + tracer_set_device_bytes(&renderer->tracers) +
            (renderer->work ? frame_work_device_bytes(renderer->work) : 0);
 }

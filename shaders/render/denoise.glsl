@@ -18,7 +18,7 @@ struct halves {
 };
 
 struct guide {
-    vec3 normal;    // 0: nothing is there
+    vec3 normal;    // mean of the samples, shorter than 1 where they see several surfaces; 0: nothing is there
     float nearness; // 1 / depth, which is linear in the picture where the surface is flat; orthographic: depth
     vec2 slope;     // of it, a pixel, as a share of it
     float share;    // that mirrors and glass have in what is seen
@@ -58,14 +58,16 @@ vec3 noise_of(halves h)
 
 uvec4 words_of_guide(guide g)
 {
-    uint normal = g.normal == vec3(0.0) ? DENOISE_NOTHING : packSnorm2x16(octahedral_from_unit(g.normal));
-    return uvec4(normal, floatBitsToUint(g.nearness), packHalf2x16(g.slope), floatBitsToUint(g.share));
+    float extent = length(g.normal);
+    uint normal = extent > 0.0 ? packSnorm2x16(octahedral_from_unit(g.normal / extent)) : DENOISE_NOTHING;
+    return uvec4(normal, floatBitsToUint(g.nearness), packHalf2x16(g.slope), packHalf2x16(vec2(extent, g.share)));
 }
 
 guide guide_of_words(uvec4 words)
 {
-    vec3 normal = words.x == DENOISE_NOTHING ? vec3(0.0) : unit_from_octahedral(unpackSnorm2x16(words.x));
-    return guide(normal, uintBitsToFloat(words.y), unpackHalf2x16(words.z), uintBitsToFloat(words.w));
+    vec2 extent_share = unpackHalf2x16(words.w);
+    vec3 normal = extent_share.x * unit_from_octahedral(unpackSnorm2x16(words.x));
+    return guide(normal, uintBitsToFloat(words.y), unpackHalf2x16(words.z), extent_share.y);
 }
 
 // The pixel of this invocation in the strip; false: it has none.
@@ -95,11 +97,17 @@ bool within(ivec2 pixel, ivec2 lower, ivec2 upper)
     return all(greaterThanEqual(pixel, lower)) && all(lessThan(pixel, upper));
 }
 
+// Whether a neighbour is on a surface that light falls on alike.
+bool is_alike(guide own, guide other)
+{
+    return dot(own.normal, other.normal) > 0.8 * length(own.normal) * length(other.normal);
+}
+
 // How far a neighbour is from the surface that the pixel sees, 0 and up; 1 is about the most that one surface has.
 float off_surface(guide own, guide other, vec2 offset)
 {
     float expected = own.nearness * (1.0 + dot(own.slope, offset));
     float tolerance = own.nearness * (dot(abs(own.slope), abs(offset)) + DENOISE_DEPTH_SHARE);
     return abs(other.nearness - expected) / max(tolerance, 1e-30) +
-           (1.0 - dot(own.normal, other.normal)) * DENOISE_NORMAL_SCALE;
+           (length(own.normal) * length(other.normal) - dot(own.normal, other.normal)) * DENOISE_NORMAL_SCALE;
 }

@@ -25,13 +25,18 @@ void main()
         return;
     bounds_of(pixel, lower, upper);
     vec2 sum = vec2(0.0);
+    float squares = 0.0;
     for (int y = -2; y <= 2; y++) {
         for (int x = -2; x <= 2; x++) {
             ivec2 next = clamp(pixel + ivec2(x, y) * spacing, lower, upper - 1);
-            sum += texelFetch(risks, place_of(next)).xy;
+            vec2 risk = texelFetch(risks, place_of(next)).xy;
+            sum += risk;
+            squares += square(risk.y);
         }
     }
     float share = sum.y > 0.0 ? clamp(sum.x / sum.y, 0.0, 1.0) : 0.0;
+    float witnesses = squares > 0.0 ? square(sum.y) / squares : 0.0;
+    share *= clamp((witnesses - 1.0) / DENOISE_WITNESSES, 0.0, 1.0);
     int place = place_of(pixel);
     halves as_is = halves_of_words(texelFetch(light, place)), filtered = halves_of_words(texelFetch(wider, place));
     halves result = halves(mix(as_is.a, filtered.a, share), mix(as_is.b, filtered.b, share),

@@ -34,7 +34,7 @@ void main()
     guide own = guide_of_words(texelFetch(guides, place));
     halves h = halves_of_words(texelFetch(light, place));
     vec2 own_luminance = vec2(luminance_of(h.a), luminance_of(h.b)), weights = vec2(0.25);
-    float sharpness = 1.0 / (DENOISE_LIGHT_SCALE * h.deviation + 1e-6), variance = square(0.25 * h.deviation);
+    float sharpness = 1.0 / (DENOISE_LIGHT_SCALE * (1.0 - DENOISE_MIRROR_EDGES * own.share) * h.deviation + 1e-6), variance = square(0.25 * h.deviation);
     vec3 sum_a = 0.25 * h.a, sum_b = 0.25 * h.b;
     for (int i = 0; i < 9; i++) {
         ivec2 step_ = ivec2(i % 3 - 1, i / 3 - 1), offset = step_ * spacing;
@@ -54,5 +54,6 @@ void main()
     }
     halves filtered = halves(sum_a / weights.x, sum_b / weights.y, sqrt(variance) / (0.5 * (weights.x + weights.y)));
     wider[place] = words_of_halves(filtered);
-    risks[place] = risk_of(h, filtered, halves_of_words(texelFetch(first_light, place)));
+    bool there = own.nearness > 0.0; // what is not stays as it is, and says nothing of its neighbours
+    risks[place] = there ? risk_of(h, filtered, halves_of_words(texelFetch(first_light, place))) : vec2(0.0);
 }

@@ -4,7 +4,7 @@
 #include "render/denoise.glsl"
 
 uniform uint band_row; // the first row of the band in the picture
-uniform float count, note_count;
+uniform float count, note_count, strength;
 
 layout(binding = UNIT_DENOISE_LIGHT) uniform usamplerBuffer light;
 layout(binding = UNIT_DENOISE_FIRST) uniform usamplerBuffer first_light;
@@ -25,5 +25,5 @@ void main()
     vec3 moved = mean_of(halves_of_words(texelFetch(light, place))) -
                  mean_of(halves_of_words(texelFetch(first_light, place)));
     bool there = texelFetch(guides, place).x != DENOISE_NOTHING;
-    denoised[slot] = vec4(there ? max(sum.rgb + moved * albedo * count, vec3(0.0)) : sum.rgb, sum.a);
+    denoised[slot] = vec4(there ? max(sum.rgb + strength * moved * albedo * count, vec3(0.0)) : sum.rgb, sum.a);
 }

@@ -8,6 +8,7 @@
 
 #include "render/denoise.glsl"
 
+uniform float white;     // 2^-exposure
 uniform uint one_sample; // there are no halves: the difference of neighbours stands for theirs
 
 layout(binding = UNIT_DENOISE_LIGHT) uniform usamplerBuffer light;
@@ -34,12 +35,12 @@ float cap_around(ivec2 pixel, ivec2 lower, ivec2 upper, guide own)
             bool counts = (abs(x) == 2 || abs(y) == 2) && within(next, lower, upper);
             int place = place_of(counts ? next : pixel);
             guide other = guide_of_words(texelFetch(guides, place));
-            float weight = counts && dot(own.normal, other.normal) > 0.8 ? 1.0 : 0.0;
-            sum += weight * luminance_of(mean_of(halves_of_words(texelFetch(light, place))));
+            float weight = counts && is_alike(own, other) ? 1.0 : 0.0;
+            sum += weight * min(luminance_of(mean_of(halves_of_words(texelFetch(light, place)))), DENOISE_CAP * white);
             count += weight;
         }
     }
-    return DENOISE_CAP * sum / max(count, 1.0);
+    return min(DENOISE_CAP * sum / max(count, 1.0), DENOISE_CAP * white);
 }
 
 float smaller(float a, float b)
@@ -69,7 +70,7 @@ void main()
         guide other = guide_of_words(texelFetch(guides, next_place));
         rises[i] = inside ? (other.nearness - own.nearness) * ((i & 1) == 0 ? -1.0 : 1.0) : 1e30;
         vec3 difference = mean - capped(mean_of(halves_of_words(texelFetch(light, next_place))), cap);
-        float size = inside && dot(own.normal, other.normal) > 0.8 ? abs(luminance_of(difference)) : 1e30;
+        float size = inside && is_alike(own, other) ? abs(luminance_of(difference)) : 1e30;
         count += size < 1e30 ? 1.0 : 0.0;
         if (size < least_size) {
             second = least;
@@ -84,9 +85,10 @@ void main()
     vec3 apart = count < 1.0 ? vec3(0.0) : count < 3.0 ? least : second;
     vec3 noise = noise_of(h);
     if (one_sample != 0u) {
-        noise = apart * (1.0 - own.share);
-        h = halves(mean + noise, mean - noise, 0.0);
+        noise = apart;
     }
+    noise *= 1.0 - (one_sample != 0u ? 1.0 : DENOISE_MIRROR_DOUBT) * own.share;
+    h = halves(mean + noise, mean - noise, 0.0);
     own.slope = vec2(smaller(rises.x, rises.y), smaller(rises.z, rises.w));
     own.slope = own.nearness > 0.0 ? mix(own.slope / own.nearness, vec2(0.0), greaterThan(abs(own.slope), vec2(1e29))) : vec2(0.0);
     own.slope = clamp(own.slope, vec2(-1.0), vec2(1.0));

@@ -18,7 +18,7 @@ void main()
     if (k >= ray_count)
         return;
     hit h = hit_at(k);
-    vec4 albedo = vec4(1.0), normal = vec4(0.0);
+    vec4 albedo = vec4(vec3(1.0), DENOISE_LEFT), normal = vec4(0.0);
     if (h.distance >= 0.0) {
         ray r = ray_at(k);
         surface s = surface_of_path(path_at(k), h, r);

@@ -24,7 +24,7 @@ void main()
             bool inside = within(next, lower, upper);
             int next_place = place_of(inside ? next : pixel);
             guide other = guide_of_words(texelFetch(guides, next_place));
-            float weight = inside && dot(own.normal, other.normal) > 0.8 ? 1.0 : 0.0;
+            float weight = inside && is_alike(own, other) ? 1.0 : 0.0;
             sum += weight * texelFetch(risks, next_place).xy;
             weights += weight;
         }

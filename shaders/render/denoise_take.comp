@@ -25,9 +25,9 @@ void main()
     if (second_count > 0.0)
         noise = (first / first_count - (sum - first) / second_count) * (sqrt(first_count * second_count) / count);
     vec3 divisor = max(albedo.rgb, vec3(DENOISE_ALBEDO_MIN));
-    float extent = length(normal.xyz), depth = normal.w;
-    bool there = extent > 0.0 && depth > 0.0;
-    guide g = guide(there ? normal.xyz / extent : vec3(0.0), 0.0, vec2(0.0), albedo.a);
+    float depth = normal.w;
+    bool there = depth > 0.0 && albedo.a <= 1.0; // all of it: what is behind would be spread over the edge, too
+    guide g = guide(there ? normal.xyz : vec3(0.0), 0.0, vec2(0.0), min(albedo.a, 1.0));
     if (there)
         g.nearness = frame.extent_near.w != 0.0 ? depth : 1.0 / depth;
     int place = place_of(pixel);

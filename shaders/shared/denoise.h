@@ -7,6 +7,8 @@
 /* Of each sample of a slice, beside its radiance: albedo and the share of mirrors and glass; normal and depth. */
 #define DENOISE_NOTE_TEXELS 2u
 
+/* In place of the share of mirrors and glass: the sample left the scene. */
+#define DENOISE_LEFT 1e6f
 #define DENOISE_NOTHING 0x80008000u /* in place of a packed normal, which is never that */
 /* Of the depth: a surface is not flatter than this, per pixel. */
 #define DENOISE_DEPTH_SHARE 0.004f
@@ -15,13 +17,21 @@
 /* Light is divided by albedos no darker than this. */
 #define DENOISE_ALBEDO_MIN 0.02f
 
-/* Half the difference of the halves is believed up to twice the noise that neighbours show. */
-#define DENOISE_NEIGHBOURS_TRUST 4.0f
-#define DENOISE_CAP 8.0f
-/* Light counts as like another that differs by this many standard deviations (SVGF: sigma_l). */
-#define DENOISE_LIGHT_SCALE 4.0f
+/* The noise of the halves is believed up to twice the power that neighbours show: sparse noise shows in few of
+ * them. */
+#define DENOISE_NEIGHBOURS_TRUST 2.0f
+/* Of the noise of several samples of mirrors and glass so much is not believed. */
+#define DENOISE_MIRROR_DOUBT 0.5f
+/* What is brighter than so many times what is around it, or than so much of white, is left out of the filter. */
+#define DENOISE_CAP 4.0f
+/* Light counts as like another that differs by this many standard deviations; in mirrors and glass by as much less
+ * as DENOISE_MIRROR_EDGES says. */
+#define DENOISE_LIGHT_SCALE 2.0f
+#define DENOISE_MIRROR_EDGES 0.75f
 /* Errors count by their share of the light, and of darker light as if it were this. */
 #define DENOISE_DARK 0.01f
+/* An estimate that comes from one pixel says nothing, one from so many more all. */
+#define DENOISE_WITNESSES 3.0f
 
 /* storage buffers */
 #define BIND_DENOISE_NOTES BIND_PASS_0  /* vec4, DENOISE_NOTE_TEXELS a sample of the slice */

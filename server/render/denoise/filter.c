@@ -5,11 +5,14 @@
 
 #include <epoxy/gl.h>
 
+#include <math.h>
+
 #define LEVELS 5u /* of the wavelet: the widest sees 31 pixels far */
-/* Rows that a strip's own depend on: each level sees 2^level pixels far and its risk twice that, and noise is looked
- * for 3 pixels around. */
+/* Rows that a strip's own depend on: each level sees 2^level pixels far and its risk twice that, and noise is
+ * looked for 3 pixels around. */
 #define EDGE_ROWS 96u
-/* Pixels of a dispatch: software GL does them within some ten milliseconds; a GPU has no use for more than this. */
+/* Pixels of a dispatch: software GL does them within some ten milliseconds; a GPU has no use for more than this.
+ */
 #define STEP_PIXELS_SOFTWARE (1u << 15)
 #define STEP_PIXELS (1u << 22)
 
@@ -66,8 +69,8 @@ static void bind_texels(struct render_context *context, struct gpu_buffer *buffe
     gpu_buffer_bind_texels(context->device, buffer, unit, GL_RGBA32UI);
 }
 
-static void bind_sums(struct denoise_sums *sums, const struct picture *picture, const struct gpu_program *program,
-                      uint32_t band)
+static void bind_sums(struct denoise_sums *sums, const struct render_context *context,
+                      const struct picture *picture, const struct gpu_program *program, uint32_t band)
 {
     gpu_buffer_bind_storage(picture_band(picture, 0, band), BIND_ACCUMULATION);
     gpu_buffer_bind_storage(denoise_sums_band(sums, DENOISE_SUM_HALF, band), BIND_DENOISE_HALF);
@@ -77,6 +80,7 @@ static void bind_sums(struct denoise_sums *sums, const struct picture *picture, 
     gpu_uniform_float(program, "first_count", (float)denoise_first_half(picture->samples));
     gpu_uniform_float(program, "count", (float)picture->samples);
     gpu_uniform_float(program, "note_count", (float)picture->samples);
+    gpu_uniform_float(program, "strength", denoise_strength(&context->request, picture->samples));
 }
 
 static void bind_take(struct denoise_filter *filter)
@@ -94,8 +98,8 @@ static void bind_give(struct denoise_filter *filter, struct denoise_sums *sums, 
     gpu_buffer_bind_storage(denoise_sums_band(sums, DENOISE_SUM_RESULT, band), BIND_DENOISE_OUT);
 }
 
-static void bind_noise(struct denoise_filter *filter, struct render_context *context, const struct picture *picture,
-                       const struct gpu_program *program)
+static void bind_noise(struct denoise_filter *filter, struct render_context *context,
+                       const struct picture *picture, const struct gpu_program *program)
 {
     bind_texels(context, &filter->first, UNIT_DENOISE_LIGHT);
     bind_texels(context, &filter->guides[0], UNIT_DENOISE_GUIDE);
@@ -103,6 +107,7 @@ static void bind_noise(struct denoise_filter *filter, struct render_context *con
     gpu_buffer_bind_storage(&filter->risks, BIND_DENOISE_OUT);
     gpu_buffer_bind_storage(&filter->wider, BIND_DENOISE_OUT_TOO);
     gpu_uniform_uint(program, "one_sample", picture->samples == 1);
+    gpu_uniform_float(program, "white", exp2f(-context->request.exposure_stops));
 }
 
 static void bind_settle(struct denoise_filter *filter, struct render_context *context)
@@ -153,7 +158,7 @@ static void bind_pass(struct denoise_filter *filter, struct denoise_sums *sums, 
     const uint32_t band = (filter->strip_row + filter->row) / picture->band_rows;
     switch (filter->pass) {
     case PASS_TAKE:
-        bind_sums(sums, picture, program, band);
+        bind_sums(sums, context, picture, program, band);
         bind_take(filter);
         break;
     case PASS_NOISE:
@@ -163,7 +168,7 @@ static void bind_pass(struct denoise_filter *filter, struct denoise_sums *sums, 
         bind_settle(filter, context);
         break;
     case PASS_GIVE:
-        bind_sums(sums, picture, program, band);
+        bind_sums(sums, context, picture, program, band);
         bind_give(filter, sums, context, band);
         break;
     default:

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* From the sums of a picture to those of a denoised one; README.md says how. A strip of the picture at a time, as wide
- * and as high as a storage block holds. */
+/* From the sums of a picture to those of a denoised one; README.md says how. A strip of the picture at a time, as
+ * wide and as high as a storage block holds. */
 #ifndef FARLIGHT_RENDER_DENOISE_FILTER_H
 #define FARLIGHT_RENDER_DENOISE_FILTER_H
 
@@ -9,7 +9,8 @@
 struct denoise_filter {
     struct gpu_buffer notes;     /* of the slice in hand */
     struct gpu_buffer guides[2]; /* without and with slopes */
-    struct gpu_buffer first, wider, levels[2]; /* halves of the light: before any level; filtered; as it was chosen */
+    struct gpu_buffer first, wider,
+        levels[2]; /* halves of the light: before any level; filtered; as it was chosen */
     struct gpu_buffer risks;
     /* progress */
     uint32_t strip_row, strip_rows; /* of the strip in hand, with what its edges depend on */

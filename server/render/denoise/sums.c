@@ -7,10 +7,30 @@
 
 #include <stdlib.h>
 
+/* Of DENOISE_AUTO: up to half of these samples a picture gets all of it, with all of them none
+ * (protocol/words.def). */
+#define AUTO_SAMPLES 64u
+
+float denoise_strength(const struct frame_request *request, uint32_t samples)
+{
+    if (request->denoise != DENOISE_AUTO)
+        return request->denoise == DENOISE_ON ? 1.0f : 0.0f;
+    const float left = 2.0f - 2.0f * (float)samples / (float)AUTO_SAMPLES;
+    return left < 0.0f ? 0.0f : left < 1.0f ? left : 1.0f;
+}
+
+bool denoise_notes_samples(const struct render_context *context)
+{
+    return denoise_is_wanted(context) &&
+           denoise_strength(&context->request, context->uniforms.sample_index) > 0.0f;
+}
+
 bool denoise_is_wanted(const struct render_context *context)
 {
     const struct frame_request *request = &context->request;
-    return request->denoise && integrator_by_number(request->integrator)->random &&
+    /* How many samples come to one that others will be added to is not known. */
+    const uint32_t samples = request->accumulate ? 1 : request->samples;
+    return denoise_strength(request, samples) > 0.0f && integrator_by_number(request->integrator)->random &&
            frame_request_planes(request) & 1u << LAYER_BEAUTY && !request->hidden_layer &&
            request->view_source != VIEW_SOURCE_LAYERS;
 }

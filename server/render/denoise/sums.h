@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What a picture that is denoised has beside its samples' radiance: the radiance of half of them, and what their first
- * hits are. It is noted slice by slice and reaches the sums when the slice reaches the picture. */
+/* What a picture that is denoised has beside its samples' radiance: the radiance of half of them, and what their
+ * first hits are. It is noted slice by slice and reaches the sums when the slice reaches the picture. */
 #ifndef FARLIGHT_RENDER_DENOISE_SUMS_H
 #define FARLIGHT_RENDER_DENOISE_SUMS_H
 
@@ -23,6 +23,10 @@ struct denoise_sums {
 /* Whether the frame has noise, and is to lose it: of those that trace no rays at random, and of pictures made from
  * others, nothing is noted and nothing changes. */
 bool denoise_is_wanted(const struct render_context *context);
+/* The same of the samples in hand: of DENOISE_AUTO those behind the last that it looks at are not noted. */
+bool denoise_notes_samples(const struct render_context *context);
+/* How much of the filtering a picture of that many samples gets, 0 to 1. */
+float denoise_strength(const struct frame_request *request, uint32_t samples);
 /* How many of the first `count` samples of a pixel are of the first half. */
 uint32_t denoise_first_half(uint32_t count);
 /* Behind picture_begin(): reserves the sums, and clears them unless the frame goes on. */
