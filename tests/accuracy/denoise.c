@@ -142,34 +142,37 @@ TEST(with_many_samples_the_denoised_picture_is_the_noisy_one)
     assert_true(before < 0.005);
 }
 
-TEST(a_denoised_picture_is_the_same_however_it_was_cut_and_added_up)
+TEST(a_denoised_picture_is_the_same_however_it_was_cut_queued_and_added_up)
 {
     struct fixture *fixture = *state;
     fixture_mixture(fixture);
     fixture->request.tracer = TRACER_BVH;
     fixture->request.integrator = INTEGRATOR_DISTRIBUTED;
     struct frame_result whole = rendered(fixture, DENOISE_ON, 6, 3);
+    frame_renderer_queue_ahead(fixture->renderer, true);
+    frame_renderer_read_behind(fixture->renderer, true);
+    struct frame_result queued = rendered(fixture, DENOISE_ON, 6, 3);
+    assert_same_picture(&whole, &queued);
     frame_renderer_set_capacity(fixture->renderer, 777, 1000);
     struct frame_result cut = rendered(fixture, DENOISE_ON, 6, 3);
-    frame_renderer_set_capacity(fixture->renderer, 0, 0);
     assert_same_picture(&whole, &cut);
-    fixture->request.accumulate = true;
-    struct frame_result added = rendered(fixture, DENOISE_ON, 6, 3), step = {0};
-    fixture->request.seed = 4;
-    for (uint32_t samples = 1; samples <= 3; samples++) { /* 1 + 2 + 3 */
-        frame_result_finish(&step);
-        step = rendered(fixture, DENOISE_ON, samples, 4);
-    }
-    frame_result_finish(&added);
-    fixture->request.accumulate = true;
-    fixture->request.seed = 5; /* another picture, so that the next begins anew */
-    struct frame_result other = rendered(fixture, DENOISE_ON, 1, 5);
-    added = rendered(fixture, DENOISE_ON, 6, 4);
-    assert_same_picture(&added, &step);
+    frame_renderer_set_capacity(fixture->renderer, 0, 0);
     frame_result_finish(&whole);
+    frame_result_finish(&queued);
     frame_result_finish(&cut);
+
+    fixture->request.accumulate = true;
+    struct frame_result added = {0};
+    for (uint32_t samples = 1; samples <= 3; samples++) { /* 1 + 2 + 3 */
+        frame_result_finish(&added);
+        added = rendered(fixture, DENOISE_ON, samples, 4);
+    }
+    assert_int_equal(added.samples, 6);
+    struct frame_result other = rendered(fixture, DENOISE_ON, 1, 5); /* so that the next begins anew */
+    whole = rendered(fixture, DENOISE_ON, 6, 4);
+    assert_same_picture(&whole, &added);
+    frame_result_finish(&whole);
     frame_result_finish(&added);
-    frame_result_finish(&step);
     frame_result_finish(&other);
 }
 
