@@ -41,12 +41,12 @@ class Denoise(OneDaemon):
                         noisy, denoised = distance(self.picture(*few), truth), distance(self.picture(*few, "--denoise"), truth)
                         self.assertLessEqual(denoised, AS_GOOD * noisy)
 
-    def test_half_of_the_noise_of_a_room_is_gone(self):
-        """Of four samples, as most of what is seen are flat walls."""
+    def test_more_than_a_third_of_the_noise_of_a_room_is_gone(self):
+        """Of four samples. Mirror and glass keep half of theirs, and the truth, a thirty-second of the noise, counts in both."""
         options = ["cornell.glb", "--integrator", "path"]
         truth, noisy, denoised = (self.picture(*options, *more) for more in (
-            ("--samples", "64", "--seed", "7"), ("--samples", "4"), ("--samples", "4", "--denoise")))
-        self.assertLess(distance(denoised, truth), 0.6 * distance(noisy, truth))
+            ("--samples", "128", "--seed", "7"), ("--samples", "4"), ("--samples", "4", "--denoise")))
+        self.assertLess(distance(denoised, truth), 0.65 * distance(noisy, truth))
 
     def test_the_option_says_whether_and_the_same_request_gives_the_same_bytes(self):
         options = ["cornell.glb", "--integrator", "path", "--samples", "2"]
