@@ -16,7 +16,8 @@ layout(binding = UNIT_DENOISE_FIRST) uniform usamplerBuffer first_light;
 layout(std430, binding = BIND_DENOISE_OUT) writeonly buffer light_block { uvec4 wider[]; };
 layout(std430, binding = BIND_DENOISE_OUT_TOO) writeonly buffer risk_block { vec2 risks[]; };
 
-// What better is to be gained: the light as it is, what it would be, and the picture's own.
+// The numerator and the denominator of a pixel's share, as shares of its light: of the light at this level, filtered, and
+// before any level.
 vec2 risk_of(halves as_is, halves filtered, halves own)
 {
     vec3 step_ = mean_of(as_is) - mean_of(filtered), noise_step = noise_of(as_is) - noise_of(filtered);
@@ -34,7 +35,8 @@ void main()
     guide own = guide_of_words(texelFetch(guides, place));
     halves h = halves_of_words(texelFetch(light, place));
     vec2 own_luminance = vec2(luminance_of(h.a), luminance_of(h.b)), weights = vec2(0.25);
-    float sharpness = 1.0 / (DENOISE_LIGHT_SCALE * (1.0 - DENOISE_MIRROR_EDGES * own.share) * h.deviation + 1e-6), variance = square(0.25 * h.deviation);
+    float scale = DENOISE_LIGHT_SCALE * (1.0 - DENOISE_MIRROR_EDGES * own.share), variance = square(0.25 * h.deviation);
+    float sharpness = 1.0 / (scale * h.deviation + 1e-6);
     vec3 sum_a = 0.25 * h.a, sum_b = 0.25 * h.b;
     for (int i = 0; i < 9; i++) {
         ivec2 step_ = ivec2(i % 3 - 1, i / 3 - 1), offset = step_ * spacing;

@@ -84,14 +84,13 @@ void main()
     }
     vec3 apart = count < 1.0 ? vec3(0.0) : count < 3.0 ? least : second;
     vec3 noise = noise_of(h);
-    if (one_sample != 0u) {
+    if (one_sample != 0u)
         noise = apart;
-    }
     noise *= 1.0 - (one_sample != 0u ? 1.0 : DENOISE_MIRROR_DOUBT) * own.share;
     h = halves(mean + noise, mean - noise, 0.0);
-    own.slope = vec2(smaller(rises.x, rises.y), smaller(rises.z, rises.w));
-    own.slope = own.nearness > 0.0 ? mix(own.slope / own.nearness, vec2(0.0), greaterThan(abs(own.slope), vec2(1e29))) : vec2(0.0);
-    own.slope = clamp(own.slope, vec2(-1.0), vec2(1.0));
+    vec2 slope = vec2(smaller(rises.x, rises.y), smaller(rises.z, rises.w));
+    slope = mix(slope, vec2(0.0), greaterThan(abs(slope), vec2(1e29))); // a view one pixel wide
+    own.slope = own.nearness > 0.0 ? clamp(slope / own.nearness, vec2(-1.0), vec2(1.0)) : vec2(0.0);
     sloped_guides[place] = words_of_guide(own);
     noisy_light[place] = words_of_halves(h);
     risks[place] = vec2(square(luminance_of(noise)), square(luminance_of(apart)));

@@ -68,10 +68,10 @@ static double contrast(const struct frame_result *picture, const struct frame_re
     return product / square;
 }
 
-/* The truth has 1024 samples, and so a sixteenth to a hundredth of the noise at most. The contrast is off by the
- * noise that is left, 0.03 of light of 0.6, over 31 root of 2 pixels: 3 % are many times that, and a filter as
- * wide as one pixel would leave half. That less than half of the noise is left is asked of where light is smooth;
- * more than that is gone. */
+/* The contrast of denoised pictures is off by the noise that is left, 5 % of the light at most, over the root of
+ * the number of pixels, which is 32: 3 % are many times that. A filter of three pixels that did not divide by the
+ * albedo would take nearly all contrast of a checker. Light is smooth here, so most of the noise can go, and half
+ * must. */
 TEST(a_texture_keeps_its_detail_while_its_noise_goes)
 {
     struct fixture *fixture = *state;
@@ -134,7 +134,7 @@ TEST(with_many_samples_the_denoised_picture_is_the_noisy_one)
         struct frame_result plain = rendered(fixture, DENOISE_OFF, samples, 0);
         struct frame_result denoised = rendered(fixture, DENOISE_ON, samples, 0);
         const double moved = distance(&plain, &denoised);
-        assert_true(moved < 0.5 * before); /* noise falls by 4 at least */
+        assert_true(moved < 0.5 * before);
         before = moved;
         frame_result_finish(&plain);
         frame_result_finish(&denoised);
