@@ -29,6 +29,7 @@ enum key {
     KEY_ENVIRONMENT,
     KEY_ENVIRONMENT_ROTATION,
     KEY_BACKGROUND,
+    KEY_DENOISE,
     KEY_CAMERA,
     KEY_EYE,
     KEY_LOOK_AT,
@@ -82,6 +83,9 @@ static const struct argp_option special[] = {
      "Turn it about +y by -360 to 360 (default 0: its middle column is +x)", CLI_GROUP_OUTPUT},
     {"background", KEY_BACKGROUND, "NAME|#RRGGBB", 0,
      "Behind all surfaces: the environment (default), transparent, or a colour such as '#ffffff'",
+     CLI_GROUP_OUTPUT},
+    {"denoise", KEY_DENOISE, "on|off|auto", OPTION_ARG_OPTIONAL,
+     "Filter the noise of few samples out of the picture (default: off; of views: auto, up to 64 samples)",
      CLI_GROUP_OUTPUT},
     {"layers", KEY_LAYERS, "NAME,..", 0,
      "What an EXR file has: beauty (the picture, default), albedo, normal, depth, position, ao, id, unknown",
@@ -274,6 +278,10 @@ static error_t set_option(struct cli_job *job, int key, const char *field, const
         return cli_set_environment_rotation(job, field, value);
     case KEY_BACKGROUND:
         return cli_set_background(job, field, value);
+    case KEY_DENOISE:
+        return protocol_denoise_parse(value ? value : "on", &job->options.denoise)
+                   ? 0
+                   : cli_unknown_value(job, field, "denoise", value);
     case KEY_CAMERA:
         job->camera = value;
         return 0;

@@ -22,6 +22,7 @@ static const struct setting {
     {"fps", "fps", REAL, "24"},
     {"shard", "shard", WORD, "\"3/8\""},
     {"size", "size", SIZE, "[1920, 1080]"},
+    {"denoise", "denoise", WORD, "\"on\""},
     {"layers", "layers", WORDS, "[\"beauty\", \"depth\"]"},
     {"format", "format", WORD, "\"exr\""},
     {"half", "half", FLAG, "true"},

@@ -55,6 +55,7 @@ struct message_render fl_view_defaults(void)
     render.samples = DEFAULT_SAMPLES;
     render.frames_per_second = DEFAULT_FRAMES_PER_SECOND;
     render.credit = DEFAULT_FRAMES_IN_FLIGHT;
+    render.denoise = PROTOCOL_DENOISE_AUTO;
     return render;
 }
 

@@ -189,7 +189,7 @@ static bool land_all(struct frame_renderer *renderer, struct error *error)
         return true;
     if (frame_is_mark_pass(renderer))
         return frame_key_end_marks(renderer, error);
-    renderer->phase = frame_is_layer_pass(renderer) ? PHASE_KEEP : PHASE_RESOLVE;
+    renderer->phase = frame_is_layer_pass(renderer) ? PHASE_KEEP : PHASE_DENOISE;
     if (frame_is_eyes_pass(renderer) && !key_view_copy_count(&renderer->key, renderer->device, error))
         return false;
     /* It is there when the picture is, which is copied behind it. */
@@ -255,6 +255,8 @@ static bool accumulate(struct frame_renderer *renderer, struct error *error)
     bool has_beauty = picture->layers & 1u << LAYER_BEAUTY; /* then it is the first plane */
     return (!context->comparison || comparison_keep_slice(context->comparison, error)) &&
            (!has_beauty || picture_accumulate(picture, context, 0, &context->slice_sums, 0, error)) &&
+           (!denoise_notes_samples(context) ||
+            denoise_accumulate(&renderer->denoise, &renderer->work->denoise.notes, context, picture, error)) &&
            layers_accumulate(&renderer->work->layers, picture, context, error);
 }
 
@@ -290,10 +292,13 @@ static bool find_primary(struct frame_renderer *renderer, struct error *error)
     bool done = false;
     if (frame_is_eyes_pass(renderer))
         return find_eyes(renderer, error);
-    if (!primary_find(rasterised(renderer), &renderer->work->context, &done, error))
+    struct render_context *context = &renderer->work->context;
+    if (!primary_find(rasterised(renderer), context, &done, error))
         return false;
     if (done)
         renderer->phase = renderer->work->layers.wanted ? PHASE_LAYERS : PHASE_SHADE;
+    if (done && denoise_notes_samples(context) && !denoise_note(&renderer->work->denoise.notes, context, error))
+        return false;
     return gpu_check(renderer->device, "primary hits", error);
 }
 
@@ -327,6 +332,21 @@ static bool shade_wave(struct frame_renderer *renderer, struct error *error)
         break;
     }
     return false;
+}
+
+static bool denoise(struct frame_renderer *renderer, struct error *error)
+{
+    struct render_context *context = &renderer->work->context;
+    bool done = true;
+    context->wave_number = 0;
+    if (denoise_is_wanted(context) && denoise_strength(&context->request, renderer->picture.samples) > 0.0f) {
+        if (!denoise_step(&renderer->work->denoise, &renderer->denoise, context, &renderer->picture, &done, error))
+            return false;
+        renderer->picture.denoised = denoise_sums_band(&renderer->denoise, DENOISE_SUM_RESULT, 0);
+    }
+    if (done)
+        renderer->phase = PHASE_RESOLVE;
+    return true;
 }
 
 static bool all_resolved(const struct frame_renderer *renderer)
@@ -473,6 +493,9 @@ enum frame_progress frame_step(struct frame_renderer *renderer, struct frame_res
         break;
     case PHASE_KEEP:
         good = frame_key_keep(renderer, error);
+        break;
+    case PHASE_DENOISE:
+        good = denoise(renderer, error);
         break;
     case PHASE_RESOLVE:
         good = read_band(renderer, error);

@@ -71,6 +71,9 @@ struct frame_request {
     /* With `accumulate`: the limit of accumulated samples; of `samples` only those up to it are added. 0: no
      * limit. */
     uint32_t samples_max;
+    /* Random noise is filtered out of the picture that is handed out, not out of the sums (render/denoise/); what
+     * integrators without any show stays as it is, and so does a picture made from layers. */
+    enum denoise denoise;
     /* Every wave is traced by a second tracer too, primary rays included (`primary` is taken to be PRIMARY_TRACE),
      * and the result has what came of it. The picture is that of `tracer`. */
     bool compare;

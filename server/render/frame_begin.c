@@ -246,8 +246,10 @@ static uint32_t sample_shift_max(const struct frame_renderer *renderer)
 static bool reserve_frame(struct frame_renderer *renderer, struct error *error)
 {
     struct render_context *context = &renderer->work->context;
-    if (!picture_begin(renderer->target, context, renderer->samples_before, error))
+    if (!picture_begin(renderer->target, context, renderer->samples_before, error) ||
+        !denoise_sums_begin(&renderer->denoise, context, renderer->target, renderer->samples_before, error))
         return false;
+    renderer->picture.denoised = NULL;
     renderer->rasterise = !renderer->key_tracer && choices_rasterise(context);
     renderer->strip_rows = picture_strip_rows(renderer->target, STRIP_PIXELS_MAX);
     renderer->sample_shift_max = sample_shift_max(renderer);
@@ -336,7 +338,8 @@ static bool get_ready(struct frame_renderer *renderer, struct error *error)
     renderer->sample = renderer->plane = renderer->band = renderer->copied = 0;
     renderer->copying = false;
     /* A picture that has all its samples is only output again. */
-    renderer->phase = request->samples ? PHASE_SAMPLE : PHASE_RESOLVE;
+    renderer->phase = request->samples ? PHASE_SAMPLE : PHASE_DENOISE;
+    denoise_begin(&renderer->work->denoise);
     if (request->samples)
         announce_programs(renderer);
     return request->samples || context_upload_uniforms(context, error);

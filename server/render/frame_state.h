@@ -6,6 +6,7 @@
 
 #include "render/compare/waves.h"
 #include "render/context.h"
+#include "render/denoise/filter.h"
 #include "render/frame.h"
 #include "render/key_view.h"
 #include "render/layers.h"
@@ -29,6 +30,7 @@ enum frame_phase {
     PHASE_TRACE,
     PHASE_LAND,
     PHASE_KEEP,
+    PHASE_DENOISE,
     PHASE_RESOLVE
 };
 
@@ -55,6 +57,7 @@ struct frame_work {
     struct render_context context;
     struct primary primary;
     struct layers layers;
+    struct denoise_filter denoise;
     struct slices_ahead ahead;
     struct comparison *comparison; /* NULL: the last frame asked for none */
     /* Two bands of the picture on their way to the host: while one is fetched, the next is copied. */
@@ -65,8 +68,9 @@ struct frame_renderer {
     struct gpu_device *device;
     struct frame_scene *shared;
     struct picture picture;
-    struct key_view key;       /* of frames whose eyes are made from layers */
-    struct tracer_set tracers; /* that depend on the view: no other renderer's frames may use them */
+    struct denoise_sums denoise; /* of a picture that is denoised */
+    struct key_view key;         /* of frames whose eyes are made from layers */
+    struct tracer_set tracers;   /* that depend on the view: no other renderer's frames may use them */
     const struct tracer_impl *stand_in;
     unsigned stand_in_number;
     uint32_t wanted_slice_pixels, wanted_wave_rays; /* 0: chosen */

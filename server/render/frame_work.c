@@ -13,6 +13,7 @@ static void work_destroy(struct frame_work *work, struct gpu_device *device)
     comparison_destroy(work->comparison);
     primary_finish(&work->primary, device);
     layers_finish(&work->layers, device);
+    denoise_filter_finish(&work->denoise, device);
     slices_ahead_finish(&work->ahead, device);
     for (int i = 0; i < 2; i++)
         gpu_readback_finish(device, &work->copies[i]);
@@ -110,8 +111,8 @@ uint64_t frame_work_device_bytes(const struct frame_work *work)
 {
     uint64_t sum = context_device_bytes(&work->context) + work->primary.visible.size_bytes +
                    work->primary.depth.size_bytes + layers_device_bytes(&work->layers) +
-                   work->copies[0].capacity_bytes + work->copies[1].capacity_bytes +
-                   wave_passes_device_bytes(&work->passes);
+                   denoise_filter_device_bytes(&work->denoise) + work->copies[0].capacity_bytes +
+                   work->copies[1].capacity_bytes + wave_passes_device_bytes(&work->passes);
     if (work->trace_state)
         sum += trace_state_device_bytes(work->trace_state);
     if (work->key_trace_state)

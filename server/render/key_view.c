@@ -70,6 +70,7 @@ struct frame_request key_view_layer_request(const struct key_view *key, const st
     own.layers = 1u << LAYER_BEAUTY | 1u << LAYER_DEPTH;
     own.attachments = 0;
     own.accumulate = false;
+    own.denoise = DENOISE_OFF;
     return own;
 }
 

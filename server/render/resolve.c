@@ -84,7 +84,9 @@ bool picture_resolve_band(struct picture *picture, struct render_context *contex
         as_ycbcr ? use_ycbcr(context, rows, error) : use_pixels(context, layer, pixel_count, error);
     if (program) {
         float coverage_scale = layers_of_first_sample(layer) ? 1.0f : 1.0f / (float)picture->samples;
-        gpu_buffer_bind_storage(picture_band(picture, plane, band), BIND_ACCUMULATION);
+        const bool denoised = layer == LAYER_BEAUTY && picture->denoised;
+        gpu_buffer_bind_storage(denoised ? &picture->denoised[band] : picture_band(picture, plane, band),
+                                BIND_ACCUMULATION);
         gpu_buffer_bind_storage(&picture->resolved, BIND_RESOLVED);
         gpu_uniform_uint(program, "tone_map_kind", request->tone_map);
         gpu_uniform_float(program, "scale", scale_of(picture, request, layer));

@@ -409,6 +409,7 @@ static void fill_rest(struct engine_job *job, const struct session *session, con
                 .exposure_stops = render->exposure_stops,
                 .background = (enum background)render->background,
                 .background_colour = {render->background_red, render->background_green, render->background_blue},
+                .denoise = (enum denoise)render->denoise,
                 .aperture = render->aperture,
                 .focus = render->focus,
                 .filter = (enum pixel_filter)render->pixel_filter,

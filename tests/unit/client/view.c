@@ -366,6 +366,7 @@ TEST(how_first_hits_are_found_is_left_to_a_daemon_that_can_choose)
         stop(daemon);
         assert_int_equal(seen.renders, 1);
         assert_int_equal(seen.first.primary, rows[i / 2].sent);
+        assert_int_equal(seen.first.denoise, is_batch ? PROTOCOL_DENOISE_OFF : PROTOCOL_DENOISE_AUTO);
     }
 }
 

@@ -1,0 +1,145 @@
+/* SPDX-License-Identifier: MIT */
+#include "render/denoise/sums.h"
+
+#include "render/frame_request.h"
+#include "render/integrators/integrator.h"
+#include "shared/denoise.h"
+
+#include <stdlib.h>
+
+/* Of DENOISE_AUTO: up to half of these samples a picture gets all of it, with all of them none
+ * (protocol/words.def). */
+#define AUTO_SAMPLES 64u
+
+float denoise_strength(const struct frame_request *request, uint32_t samples)
+{
+    if (request->denoise != DENOISE_AUTO)
+        return request->denoise == DENOISE_ON ? 1.0f : 0.0f;
+    const float left = 2.0f - 2.0f * (float)samples / (float)AUTO_SAMPLES;
+    return left < 0.0f ? 0.0f : left < 1.0f ? left : 1.0f;
+}
+
+bool denoise_notes_samples(const struct render_context *context)
+{
+    return denoise_is_wanted(context) &&
+           denoise_strength(&context->request, context->uniforms.sample_index) > 0.0f;
+}
+
+bool denoise_is_wanted(const struct render_context *context)
+{
+    const struct frame_request *request = &context->request;
+    /* How many samples come to one that others will be added to is not known. */
+    const uint32_t samples = request->accumulate ? 1 : request->samples;
+    return denoise_strength(request, samples) > 0.0f && integrator_by_number(request->integrator)->random &&
+           frame_request_planes(request) & 1u << LAYER_BEAUTY && !request->hidden_layer &&
+           request->view_source != VIEW_SOURCE_LAYERS;
+}
+
+/* As in denoise_accumulate.comp. Each doubling of the samples is halved in turn, so that both halves are as evenly
+ * spread as all of them; the first four so that both have one of either half of what is chosen. */
+static bool is_of_first_half(uint32_t index)
+{
+    if (index < 4)
+        return index % 3 == 0;
+    const int top = 31 - __builtin_clz(index);
+    return !(index >> (top - 1) & 1);
+}
+
+uint32_t denoise_first_half(uint32_t count)
+{
+    uint32_t first = 0;
+    for (uint32_t index = 0; index < count; index++)
+        first += is_of_first_half(index);
+    return first;
+}
+
+struct gpu_buffer *denoise_sums_band(const struct denoise_sums *sums, enum denoise_sum sum, uint32_t band)
+{
+    return &sums->bands[(uint32_t)sum * sums->band_count + band];
+}
+
+bool denoise_sums_begin(struct denoise_sums *sums, struct render_context *context, const struct picture *picture,
+                        uint32_t samples_before, struct error *error)
+{
+    struct gpu_device *device = context->device;
+    if (sums->band_count != picture->band_count || !denoise_is_wanted(context))
+        denoise_sums_finish(sums, device);
+    if (!denoise_is_wanted(context))
+        return true;
+    if (!sums->bands)
+        sums->bands = calloc((size_t)picture->band_count * DENOISE_SUM_COUNT, sizeof(*sums->bands));
+    if (!sums->bands)
+        return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the sums of a denoised picture");
+    sums->band_count = picture->band_count;
+    for (uint32_t band = 0; band < sums->band_count; band++) {
+        uint32_t first;
+        const size_t bytes = picture_band_slots(picture, band, &first) * sizeof(vec4);
+        for (enum denoise_sum sum = 0; sum < DENOISE_SUM_COUNT; sum++)
+            if (!gpu_buffer_reserve(device, denoise_sums_band(sums, sum, band), bytes, error))
+                return false;
+    }
+    for (uint32_t i = 0; samples_before == 0 && i < sums->band_count * DENOISE_SUM_RESULT; i++)
+        gpu_buffer_clear(device, &sums->bands[i], 0);
+    return true;
+}
+
+bool denoise_note(struct gpu_buffer *notes, struct render_context *context, struct error *error)
+{
+    const size_t bytes = (size_t)context->ray_count * DENOISE_NOTE_TEXELS * sizeof(vec4);
+    struct gpu_define defines[CONTEXT_SURFACE_DEFINES + 1] = {0};
+    (void)context_surface_defines(context, defines);
+    if (!gpu_buffer_reserve(context->device, notes, bytes, error))
+        return false;
+    context_span_begin(context, STAGE_SHADE);
+    const struct gpu_program *program = context_use_with(context, "render/denoise_note.comp", defines, error);
+    if (program) {
+        context_bind_hits(context);
+        gpu_buffer_bind_storage(notes, BIND_DENOISE_NOTES);
+        gpu_uniform_uint(program, "first_slot", context->slice.first_slot);
+        gpu_uniform_uint(program, "ray_count", context->ray_count);
+        gpu_dispatch(context->device, program, context->ray_count);
+    }
+    context_span_end(context);
+    return program && gpu_check(context->device, "what guides the denoiser", error);
+}
+
+bool denoise_accumulate(struct denoise_sums *sums, struct gpu_buffer *notes, struct render_context *context,
+                        const struct picture *picture, struct error *error)
+{
+    uint32_t first_slot;
+    const struct gpu_buffer *own = picture_slice_band(picture, &context->slice, &first_slot);
+    const uint32_t band = (uint32_t)(own - picture->bands);
+    const struct gpu_program *program = context_use(context, "render/denoise_accumulate.comp", error);
+    if (!program)
+        return false;
+    gpu_buffer_bind_storage(&context->slice_sums, BIND_SLICE_SUMS);
+    gpu_buffer_bind_storage(notes, BIND_DENOISE_NOTES);
+    gpu_buffer_bind_storage(denoise_sums_band(sums, DENOISE_SUM_HALF, band), BIND_DENOISE_HALF);
+    gpu_buffer_bind_storage(denoise_sums_band(sums, DENOISE_SUM_ALBEDO, band), BIND_DENOISE_ALBEDO);
+    gpu_buffer_bind_storage(denoise_sums_band(sums, DENOISE_SUM_NORMAL, band), BIND_DENOISE_NORMAL);
+    gpu_buffer_bind_uniform(&context->wave_state, UNIFORM_WAVE);
+    gpu_uniform_uint(program, "first_slot", first_slot);
+    gpu_uniform_uint(program, "slot_count", context->slice.slot_count);
+    gpu_uniform_uint(program, "sample_index", context->uniforms.sample_index);
+    gpu_uniform_uint(program, "sample_shift", context->uniforms.sample_shift);
+    context_span_begin(context, STAGE_SHADE);
+    gpu_dispatch(context->device, program, context->slice.slot_count);
+    context_span_end(context);
+    return true;
+}
+
+uint64_t denoise_sums_device_bytes(const struct denoise_sums *sums)
+{
+    uint64_t bytes = 0;
+    for (uint32_t i = 0; i < sums->band_count * DENOISE_SUM_COUNT; i++)
+        bytes += sums->bands[i].capacity_bytes;
+    return bytes;
+}
+
+void denoise_sums_finish(struct denoise_sums *sums, struct gpu_device *device)
+{
+    for (uint32_t i = 0; i < sums->band_count * DENOISE_SUM_COUNT; i++)
+        gpu_buffer_finish(device, &sums->bands[i]);
+    free(sums->bands);
+    *sums = (struct denoise_sums){0};
+}

@@ -1,0 +1,44 @@
+/* SPDX-License-Identifier: MIT */
+/* What a picture that is denoised has beside its samples' radiance: the radiance of half of them, and what their
+ * first hits are. It is noted slice by slice and reaches the sums when the slice reaches the picture. */
+#ifndef FARLIGHT_RENDER_DENOISE_SUMS_H
+#define FARLIGHT_RENDER_DENOISE_SUMS_H
+
+#include "render/context.h"
+#include "render/picture.h"
+
+enum denoise_sum {
+    DENOISE_SUM_HALF,
+    DENOISE_SUM_ALBEDO,
+    DENOISE_SUM_NORMAL,
+    DENOISE_SUM_RESULT, /* of the denoised picture, as many samples; no sum of slices */
+    DENOISE_SUM_COUNT
+};
+
+struct denoise_sums {
+    struct gpu_buffer *bands; /* owned; sum after sum, as the picture's bands; vec4 a slot */
+    uint32_t band_count;
+};
+
+/* Whether the frame has noise, and is to lose it: of those that trace no rays at random, and of pictures made from
+ * others, nothing is noted and nothing changes. */
+bool denoise_is_wanted(const struct render_context *context);
+/* The same of the samples in hand: of DENOISE_AUTO those behind the last that it looks at are not noted. */
+bool denoise_notes_samples(const struct render_context *context);
+/* How much of the filtering a picture of that many samples gets, 0 to 1. */
+float denoise_strength(const struct frame_request *request, uint32_t samples);
+/* How many of the first `count` samples of a pixel are of the first half. */
+uint32_t denoise_first_half(uint32_t count);
+/* Behind picture_begin(): reserves the sums, and clears them unless the frame goes on. */
+bool denoise_sums_begin(struct denoise_sums *sums, struct render_context *context, const struct picture *picture,
+                        uint32_t samples_before, struct error *error);
+/* The context has hits of a new slice: notes what they are. Inside no span. */
+bool denoise_note(struct gpu_buffer *notes, struct render_context *context, struct error *error);
+/* Adds the current slice. Call it once the slice cannot be repeated, but on the device. */
+bool denoise_accumulate(struct denoise_sums *sums, struct gpu_buffer *notes, struct render_context *context,
+                        const struct picture *picture, struct error *error);
+struct gpu_buffer *denoise_sums_band(const struct denoise_sums *sums, enum denoise_sum sum, uint32_t band);
+uint64_t denoise_sums_device_bytes(const struct denoise_sums *sums);
+void denoise_sums_finish(struct denoise_sums *sums, struct gpu_device *device);
+
+#endif

@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: MIT
+// What the passes of the denoiser share: server/render/denoise/README.md says what they do.
+//
+// A strip of the picture lies row by row. Of each pixel it has what its samples saw, the guide, and two estimates of the
+// light that falls there: the means of two halves of its samples, moved so that their mean is that of all samples and half
+// their difference has the noise of that mean.
+
+#include "shared/denoise.h"
+#include "common/camera.glsl"
+#include "common/dispatch.glsl"
+
+uniform uint first_row, item_count; // of the strip, of this dispatch
+uniform uint strip_row, strip_rows; // the strip's first row in the picture, and its number of rows
+
+struct halves {
+    vec3 a, b;
+    float deviation; // of each, by luminance
+};
+
+struct guide {
+    vec3 normal;    // mean of the samples, shorter than 1 where they see several surfaces; 0: nothing is there
+    float nearness; // 1 / depth, which is linear in the picture where the surface is flat; orthographic: depth
+    vec2 slope;     // of it, a pixel, as a share of it
+    float share;    // that mirrors and glass have in what is seen
+};
+
+const float HALF_FLOAT_MAX = 6e4;
+
+float luminance_of(vec3 colour)
+{
+    return dot(colour, vec3(0.2126, 0.7152, 0.0722));
+}
+
+uvec4 words_of_halves(halves h)
+{
+    h.a = clamp(h.a, -HALF_FLOAT_MAX, HALF_FLOAT_MAX);
+    h.b = clamp(h.b, -HALF_FLOAT_MAX, HALF_FLOAT_MAX);
+    return uvec4(packHalf2x16(h.a.rg), packHalf2x16(vec2(h.a.b, h.b.r)), packHalf2x16(h.b.gb),
+                 floatBitsToUint(h.deviation));
+}
+
+halves halves_of_words(uvec4 words)
+{
+    vec2 middle = unpackHalf2x16(words.y);
+    return halves(vec3(unpackHalf2x16(words.x), middle.x), vec3(middle.y, unpackHalf2x16(words.z)),
+                  uintBitsToFloat(words.w));
+}
+
+vec3 mean_of(halves h)
+{
+    return 0.5 * (h.a + h.b);
+}
+
+vec3 noise_of(halves h)
+{
+    return 0.5 * (h.a - h.b);
+}
+
+uvec4 words_of_guide(guide g)
+{
+    float extent = length(g.normal);
+    uint normal = extent > 0.0 ? packSnorm2x16(octahedral_from_unit(g.normal / extent)) : DENOISE_NOTHING;
+    return uvec4(normal, floatBitsToUint(g.nearness), packHalf2x16(g.slope), packHalf2x16(vec2(extent, g.share)));
+}
+
+guide guide_of_words(uvec4 words)
+{
+    vec2 extent_share = unpackHalf2x16(words.w);
+    vec3 normal = extent_share.x * unit_from_octahedral(unpackSnorm2x16(words.x));
+    return guide(normal, uintBitsToFloat(words.y), unpackHalf2x16(words.z), extent_share.y);
+}
+
+// The pixel of this invocation in the strip; false: it has none.
+bool pixel_of_item(out ivec2 pixel)
+{
+    uint k = item_index(), row = quotient(k, frame.width);
+    pixel = ivec2(k - row * frame.width, first_row + row);
+    return k < item_count;
+}
+
+int place_of(ivec2 pixel)
+{
+    return pixel.y * int(frame.width) + pixel.x;
+}
+
+// The pixels of the strip that belong to the same view as this one: the first, and the one behind the last.
+void bounds_of(ivec2 pixel, out ivec2 lower, out ivec2 upper)
+{
+    ivec2 first = ivec2(view_of_pixel(uvec2(pixel.x, uint(pixel.y) + strip_row)) *
+                        uvec2(frame.view_width, frame.view_height)) - ivec2(0, int(strip_row));
+    lower = max(first, ivec2(0));
+    upper = min(first + ivec2(frame.view_width, frame.view_height), ivec2(frame.width, strip_rows));
+}
+
+bool within(ivec2 pixel, ivec2 lower, ivec2 upper)
+{
+    return all(greaterThanEqual(pixel, lower)) && all(lessThan(pixel, upper));
+}
+
+// Whether a neighbour is on a surface that light falls on alike.
+bool is_alike(guide own, guide other)
+{
+    return dot(own.normal, other.normal) > 0.8 * length(own.normal) * length(other.normal);
+}
+
+// How far a neighbour is from the surface that the pixel sees, 0 and up; 1 is about the most that one surface has.
+float off_surface(guide own, guide other, vec2 offset)
+{
+    float expected = own.nearness * (1.0 + dot(own.slope, offset));
+    float tolerance = own.nearness * (dot(abs(own.slope), abs(offset)) + DENOISE_DEPTH_SHARE);
+    return abs(other.nearness - expected) / max(tolerance, 1e-30) +
+           (length(own.normal) * length(other.normal) - dot(own.normal, other.normal)) * DENOISE_NORMAL_SCALE;
+}

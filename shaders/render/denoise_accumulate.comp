@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: MIT
+// Adds a slice to the sums that the denoiser has beside the picture, unless it must be done again: the radiance of the
+// samples of the first half, and what all of them saw.
+
+#include "shared/denoise.h"
+#include "common/dispatch.glsl"
+#include "render/wave.glsl"
+
+uniform uint slot_count;
+uniform uint first_slot; // of the slice, in its band
+uniform uint sample_index, sample_shift;
+
+layout(std430, binding = BIND_SLICE_SUMS) readonly buffer sum_block { vec4 slice_sums[]; };
+layout(std430, binding = BIND_DENOISE_NOTES) readonly buffer note_block { vec4 notes[]; };
+layout(std430, binding = BIND_DENOISE_HALF) buffer half_block { vec4 first_half[]; };
+layout(std430, binding = BIND_DENOISE_ALBEDO) buffer albedo_block { vec4 albedos[]; };
+layout(std430, binding = BIND_DENOISE_NORMAL) buffer normal_block { vec4 normals[]; };
+
+// render/denoise/denoise.c has the same.
+bool is_of_first_half(uint index)
+{
+    return index < 4u ? index % 3u == 0u : (index >> findMSB(index) - 1 & 1u) == 0u;
+}
+
+void main()
+{
+    uint k = item_index();
+    if (k >= slot_count || wave.stopped != 0u)
+        return;
+    uint begin = k << sample_shift, count = 1u << sample_shift, slot = first_slot + k;
+    vec4 sum = first_half[slot], albedo = albedos[slot], normal = normals[slot];
+    for (uint i = 0u; i < count; i++) {
+        sum += is_of_first_half(sample_index + i) ? slice_sums[begin + i] : vec4(0.0);
+        albedo += notes[DENOISE_NOTE_TEXELS * (begin + i)];
+        normal += notes[DENOISE_NOTE_TEXELS * (begin + i) + 1u];
+    }
+    first_half[slot] = sum;
+    albedos[slot] = albedo;
+    normals[slot] = normal;
+}

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: MIT
+// A level of an edge-avoiding a-trous wavelet (Dammertz et al. Edge-Avoiding A-Trous Wavelet Transform for fast Global
+// Illumination Filtering. HPG 2010), whose light differs by what variance lets expect (Schied et al. Spatiotemporal
+// Variance-Guided Filtering. HPG 2017, 4.4). Each half is weighed by the light of the other, so that no noise chooses
+// itself (Rousselle et al. Adaptive Rendering with Non-Local Means Filtering. 2012).
+//
+// Also the parts of the risk of each pixel, see denoise_choose.comp.
+
+#include "render/denoise.glsl"
+
+uniform int spacing;
+
+layout(binding = UNIT_DENOISE_LIGHT) uniform usamplerBuffer light;
+layout(binding = UNIT_DENOISE_GUIDE) uniform usamplerBuffer guides;
+layout(binding = UNIT_DENOISE_FIRST) uniform usamplerBuffer first_light;
+layout(std430, binding = BIND_DENOISE_OUT) writeonly buffer light_block { uvec4 wider[]; };
+layout(std430, binding = BIND_DENOISE_OUT_TOO) writeonly buffer risk_block { vec2 risks[]; };
+
+// The numerator and the denominator of a pixel's share, as shares of its light: of the light at this level, filtered, and
+// before any level.
+vec2 risk_of(halves as_is, halves filtered, halves own)
+{
+    vec3 step_ = mean_of(as_is) - mean_of(filtered), noise_step = noise_of(as_is) - noise_of(filtered);
+    float gain = dot(mean_of(as_is) - mean_of(own), step_) + dot(noise_of(own), noise_step);
+    return vec2(gain, dot(step_, step_)) / square(luminance_of(abs(mean_of(filtered))) + DENOISE_DARK);
+}
+
+void main()
+{
+    ivec2 pixel, lower, upper;
+    if (!pixel_of_item(pixel))
+        return;
+    bounds_of(pixel, lower, upper);
+    int place = place_of(pixel);
+    guide own = guide_of_words(texelFetch(guides, place));
+    halves h = halves_of_words(texelFetch(light, place));
+    vec2 own_luminance = vec2(luminance_of(h.a), luminance_of(h.b)), weights = vec2(0.25);
+    float scale = DENOISE_LIGHT_SCALE * (1.0 - DENOISE_MIRROR_EDGES * own.share), variance = square(0.25 * h.deviation);
+    float sharpness = 1.0 / (scale * h.deviation + 1e-6);
+    vec3 sum_a = 0.25 * h.a, sum_b = 0.25 * h.b;
+    for (int i = 0; i < 9; i++) {
+        ivec2 step_ = ivec2(i % 3 - 1, i / 3 - 1), offset = step_ * spacing;
+        ivec2 next = pixel + offset;
+        bool counts = i != 4 && within(next, lower, upper);
+        int next_place = place_of(counts ? next : pixel);
+        guide other = guide_of_words(texelFetch(guides, next_place));
+        halves e = halves_of_words(texelFetch(light, next_place));
+        float off = off_surface(own, other, vec2(offset));
+        vec2 apart = abs(vec2(luminance_of(e.b), luminance_of(e.a)) - own_luminance.yx) * sharpness;
+        float kernel = counts ? (step_.x == 0 || step_.y == 0 ? 0.125 : 0.0625) : 0.0;
+        vec2 weight = kernel * exp2(-(off + apart));
+        sum_a += weight.x * e.a;
+        sum_b += weight.y * e.b;
+        weights += weight;
+        variance += square(0.5 * (weight.x + weight.y) * e.deviation);
+    }
+    halves filtered = halves(sum_a / weights.x, sum_b / weights.y, sqrt(variance) / (0.5 * (weights.x + weights.y)));
+    wider[place] = words_of_halves(filtered);
+    bool there = own.nearness > 0.0; // what is not stays as it is, and says nothing of its neighbours
+    risks[place] = there ? risk_of(h, filtered, halves_of_words(texelFetch(first_light, place))) : vec2(0.0);
+}

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: MIT
+// From the strip to the sums of a band: the picture's, moved by as much as filtering has moved the light.
+
+#include "render/denoise.glsl"
+
+uniform uint band_row; // the first row of the band in the picture
+uniform float count, note_count, strength;
+
+layout(binding = UNIT_DENOISE_LIGHT) uniform usamplerBuffer light;
+layout(binding = UNIT_DENOISE_FIRST) uniform usamplerBuffer first_light;
+layout(binding = UNIT_DENOISE_GUIDE) uniform usamplerBuffer guides;
+layout(std430, binding = BIND_ACCUMULATION) readonly buffer accumulation_block { vec4 accumulation[]; };
+layout(std430, binding = BIND_DENOISE_ALBEDO) readonly buffer albedo_block { vec4 albedos[]; };
+layout(std430, binding = BIND_DENOISE_OUT) writeonly buffer band_block { vec4 denoised[]; };
+
+void main()
+{
+    ivec2 pixel;
+    if (!pixel_of_item(pixel))
+        return;
+    int place = place_of(pixel);
+    uint slot = slot_of_pixel(uvec2(pixel.x, uint(pixel.y) + strip_row - band_row));
+    vec4 sum = accumulation[slot];
+    vec3 albedo = max(albedos[slot].rgb / note_count, vec3(DENOISE_ALBEDO_MIN));
+    vec3 moved = mean_of(halves_of_words(texelFetch(light, place))) -
+                 mean_of(halves_of_words(texelFetch(first_light, place)));
+    bool there = texelFetch(guides, place).x != DENOISE_NOTHING;
+    denoised[slot] = vec4(there ? max(sum.rgb + strength * moved * albedo * count, vec3(0.0)) : sum.rgb, sum.a);
+}

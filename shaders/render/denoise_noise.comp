@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: MIT
+// How much noise there is, in two ways: by the difference of the halves, and by how pixels differ from their neighbours.
+// The halves of stratified samples differ more than their mean is wrong (of two lights each half may have one), and edges
+// of shadows and textures seen in mirrors look like noise to a difference of neighbours. So both must find noise.
+//
+// Of neighbours the second smallest difference counts: beside an edge it is that of pixels on one side. Its mean square is
+// the noise's within a tenth where that is Gaussian. Also fills in the slopes of the guide.
+
+#include "render/denoise.glsl"
+
+uniform float white;     // 2^-exposure
+uniform uint one_sample; // there are no halves: the difference of neighbours stands for theirs
+
+layout(binding = UNIT_DENOISE_LIGHT) uniform usamplerBuffer light;
+layout(binding = UNIT_DENOISE_GUIDE) uniform usamplerBuffer guides;
+layout(std430, binding = BIND_DENOISE_OUT) writeonly buffer risk_block { vec2 risks[]; };
+layout(std430, binding = BIND_DENOISE_GUIDE) writeonly buffer guide_block { uvec4 sloped_guides[]; };
+layout(std430, binding = BIND_DENOISE_OUT_TOO) writeonly buffer light_block { uvec4 noisy_light[]; };
+
+const ivec2 NEIGHBOURS[4] = ivec2[4](ivec2(-1, 0), ivec2(1, 0), ivec2(0, -1), ivec2(0, 1));
+
+vec3 capped(vec3 colour, float cap)
+{
+    return colour * min(1.0, cap / max(luminance_of(colour), 1e-30));
+}
+
+// What is brighter than so many times what lies two pixels away is a highlight, or a sample that happened upon a light:
+// spread over its neighbours it would be seen more. What is above stays where it is.
+float cap_around(ivec2 pixel, ivec2 lower, ivec2 upper, guide own)
+{
+    float sum = 0.0, count = 0.0;
+    for (int y = -2; y <= 2; y++) {
+        for (int x = -2; x <= 2; x++) {
+            ivec2 next = pixel + ivec2(x, y);
+            bool counts = (abs(x) == 2 || abs(y) == 2) && within(next, lower, upper);
+            int place = place_of(counts ? next : pixel);
+            guide other = guide_of_words(texelFetch(guides, place));
+            float weight = counts && is_alike(own, other) ? 1.0 : 0.0;
+            sum += weight * min(luminance_of(mean_of(halves_of_words(texelFetch(light, place)))), DENOISE_CAP * white);
+            count += weight;
+        }
+    }
+    return min(DENOISE_CAP * sum / max(count, 1.0), DENOISE_CAP * white);
+}
+
+float smaller(float a, float b)
+{
+    return abs(a) < abs(b) ? a : b;
+}
+
+void main()
+{
+    ivec2 pixel, lower, upper;
+    if (!pixel_of_item(pixel))
+        return;
+    bounds_of(pixel, lower, upper);
+    int place = place_of(pixel);
+    guide own = guide_of_words(texelFetch(guides, place));
+    halves h = halves_of_words(texelFetch(light, place));
+    float cap = cap_around(pixel, lower, upper, own);
+    h.a = capped(h.a, cap);
+    h.b = capped(h.b, cap);
+    vec3 mean = mean_of(h), least = vec3(0.0), second = vec3(0.0);
+    float least_size = 1e30, second_size = 1e30, count = 0.0;
+    vec4 rises = vec4(1e30); // of the nearness towards each neighbour
+    for (int i = 0; i < 4; i++) {
+        ivec2 next = pixel + NEIGHBOURS[i];
+        bool inside = within(next, lower, upper);
+        int next_place = place_of(inside ? next : pixel);
+        guide other = guide_of_words(texelFetch(guides, next_place));
+        rises[i] = inside ? (other.nearness - own.nearness) * ((i & 1) == 0 ? -1.0 : 1.0) : 1e30;
+        vec3 difference = mean - capped(mean_of(halves_of_words(texelFetch(light, next_place))), cap);
+        float size = inside && is_alike(own, other) ? abs(luminance_of(difference)) : 1e30;
+        count += size < 1e30 ? 1.0 : 0.0;
+        if (size < least_size) {
+            second = least;
+            second_size = least_size;
+            least = difference;
+            least_size = size;
+        } else if (size < second_size) {
+            second = difference;
+            second_size = size;
+        }
+    }
+    vec3 apart = count < 1.0 ? vec3(0.0) : count < 3.0 ? least : second;
+    vec3 noise = noise_of(h);
+    if (one_sample != 0u)
+        noise = apart;
+    noise *= 1.0 - (one_sample != 0u ? 1.0 : DENOISE_MIRROR_DOUBT) * own.share;
+    h = halves(mean + noise, mean - noise, 0.0);
+    vec2 slope = vec2(smaller(rises.x, rises.y), smaller(rises.z, rises.w));
+    slope = mix(slope, vec2(0.0), greaterThan(abs(slope), vec2(1e29))); // a view one pixel wide
+    own.slope = own.nearness > 0.0 ? clamp(slope / own.nearness, vec2(-1.0), vec2(1.0)) : vec2(0.0);
+    sloped_guides[place] = words_of_guide(own);
+    noisy_light[place] = words_of_halves(h);
+    risks[place] = vec2(square(luminance_of(noise)), square(luminance_of(apart)));
+}

@@ -1,0 +1,52 @@
+/* SPDX-License-Identifier: MIT */
+/* Bindings and constants of the denoiser (server/render/denoise/README.md). */
+#ifndef FARLIGHT_SHARED_DENOISE_H
+#define FARLIGHT_SHARED_DENOISE_H
+#include "shared/path.h"
+
+/* Of each sample of a slice, beside its radiance: albedo and the share of mirrors and glass; normal and depth. */
+#define DENOISE_NOTE_TEXELS 2u
+
+/* In place of the share of mirrors and glass: the sample left the scene. */
+#define DENOISE_LEFT 1e6f
+#define DENOISE_NOTHING 0x80008000u /* in place of a packed normal, which is never that */
+/* Of the depth: a surface is not flatter than this, per pixel. */
+#define DENOISE_DEPTH_SHARE 0.004f
+/* A turn of the normal by 14 degrees is as far as one surface is expected to go. */
+#define DENOISE_NORMAL_SCALE 32.0f
+/* Light is divided by albedos no darker than this. */
+#define DENOISE_ALBEDO_MIN 0.02f
+
+/* The noise of the halves is believed up to twice the power that neighbours show: sparse noise shows in few of
+ * them. */
+#define DENOISE_NEIGHBOURS_TRUST 2.0f
+/* Of the noise of several samples of mirrors and glass so much is not believed. */
+#define DENOISE_MIRROR_DOUBT 0.5f
+/* What is brighter than so many times what is around it, or than so much of white, is left out of the filter. */
+#define DENOISE_CAP 4.0f
+/* Light counts as like another that differs by this many standard deviations; in mirrors and glass by as much less
+ * as DENOISE_MIRROR_EDGES says. */
+#define DENOISE_LIGHT_SCALE 2.0f
+#define DENOISE_MIRROR_EDGES 0.75f
+/* Errors count by their share of the light, and of darker light as if it were this. */
+#define DENOISE_DARK 0.01f
+/* An estimate that comes from one pixel says nothing, one from so many more all. */
+#define DENOISE_WITNESSES 3.0f
+
+/* storage buffers */
+#define BIND_DENOISE_NOTES BIND_PASS_0  /* vec4, DENOISE_NOTE_TEXELS a sample of the slice */
+#define BIND_DENOISE_HALF BIND_PASS_1   /* vec4 a slot of a band: sums of the first half of the samples */
+#define BIND_DENOISE_ALBEDO BIND_PASS_3 /* vec4 a slot: sums of notes */
+#define BIND_DENOISE_NORMAL BIND_PASS_4 /* the same */
+#define BIND_DENOISE_OUT BIND_PASS_2    /* what a pass over the strip writes */
+#define BIND_DENOISE_GUIDE 0            /* the guide, where it writes that */
+#define BIND_DENOISE_OUT_TOO 3          /* and what it writes beside these */
+
+/* texture units */
+#define UNIT_DENOISE_LIGHT UNIT_TRACER_0 /* halves of the light at this level */
+#define UNIT_DENOISE_GUIDE UNIT_TRACER_1
+#define UNIT_DENOISE_FIRST UNIT_TRACER_2 /* halves of the light before any level */
+#define UNIT_DENOISE_RISK UNIT_TRACER_3
+#define UNIT_DENOISE_WIDER UNIT_TRACER_4 /* halves of the light at the next level */
+
+#endif

@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: MIT
+"""Denoised pictures of all bundled scenes are no farther from converged ones than noisy ones are."""
+import math
+
+from farlight_test import OneDaemon, bundled_scenes, farlight, frames_of, read_exr, read_png
+
+SIZE = ["--size", "80x45"]
+SCENES = ("cornell.glb", "teapot.glb", "carousel.glb", "sphereflake-3.nff")
+# Highlights that few samples miss and many show weigh alike in both pictures, so that what is left of them decides: a
+# thousandth either way. More is never lost where anything is gained.
+AS_GOOD = 1.005
+
+
+def distance(a, b):
+    """Root mean square difference of display values, 0 to 255."""
+    pairs = [(x, y) for p, q in zip(a, b) for x, y in zip(p[:3], q[:3])]
+    return math.sqrt(sum((x - y) ** 2 for x, y in pairs) / len(pairs))
+
+
+class Denoise(OneDaemon):
+    def render(self, scene, *options, name="x.png"):
+        path = self.folder / name
+        result = farlight("render", bundled_scenes() / scene, "-o", path, *SIZE, "--timings=json", *options)
+        return path, frames_of(self.expect(result, 0))[0]
+
+    def picture(self, *arguments):
+        _, _, rows, channels = read_png(self.render(*arguments)[0])
+        return [row[x:x + 3] for row in rows for x in range(0, len(row), channels)]
+
+    def digest(self, *arguments):
+        return self.render(*arguments)[1]["digest"]
+
+    def test_no_scene_is_worse_for_it(self):
+        for scene in SCENES:
+            for integrator in ("path", "distributed"):
+                options = [scene, "--integrator", integrator]
+                truth = self.picture(*options, "--samples", "64", "--seed", "7")
+                for samples in ("1", "4", "16"):
+                    with self.subTest(scene=scene, integrator=integrator, samples=samples):
+                        few = [*options, "--samples", samples]
+                        noisy, denoised = distance(self.picture(*few), truth), distance(self.picture(*few, "--denoise"), truth)
+                        self.assertLessEqual(denoised, AS_GOOD * noisy)
+
+    def test_more_than_a_third_of_the_noise_of_a_room_is_gone(self):
+        """Of four samples. Mirror and glass keep half of theirs, and the truth, a thirty-second of the noise, counts in both."""
+        options = ["cornell.glb", "--integrator", "path"]
+        truth, noisy, denoised = (self.picture(*options, *more) for more in (
+            ("--samples", "128", "--seed", "7"), ("--samples", "4"), ("--samples", "4", "--denoise")))
+        self.assertLess(distance(denoised, truth), 0.65 * distance(noisy, truth))
+
+    def test_the_option_says_whether_and_the_same_request_gives_the_same_bytes(self):
+        options = ["cornell.glb", "--integrator", "path", "--samples", "2"]
+        plain, denoised = self.digest(*options), self.digest(*options, "--denoise")
+        self.assertNotEqual(plain, denoised)
+        for same, words in ((plain, ["--denoise=off"]), (denoised, ["--denoise=on"]), (denoised, ["--denoise=auto"]),
+                            (denoised, ["--denoise"])):
+            self.assertEqual(self.digest(*options, *words), same, words)
+        refused = farlight("render", bundled_scenes() / "cornell.glb", "-o", self.folder / "x.png", "--denoise=much")
+        self.assertIn("known: off, on, auto", self.expect(refused, 2).stderr)
+
+    def test_only_the_beauty_of_layers_is_filtered(self):
+        options = ["cornell.glb", "--integrator", "path", "--samples", "2", "--float", "--layers", "beauty,albedo,normal,depth"]
+        plain, denoised = (read_exr(self.render(*options, *more, name="x.exr")[0])[2] for more in ((), ("--denoise",)))
+        changed = {name for name in plain if plain[name] != denoised[name]}
+        self.assertEqual(changed, {"R", "G", "B"})
