@@ -4,6 +4,7 @@
 //   limited                what a path brings over a rough surface and at least one more is scaled down to a limit. Whole
 //                          stays light that one rough surface alone scatters to the eye, or to smooth mirrors and windows
 //                          before it
+//                          before it; but see SCATTERED_LIMIT of distributed.comp
 //   regularised_roughness  behind a rough surface no sharper one is seen: Kaplanyan, Dachsbacher. Path Space Regularization
 //                          for Holistic and Robust Light Transport. 2013. Angles shrink as the sixth root of the number
 //                          of samples (their section 4), so that noise and bias both vanish

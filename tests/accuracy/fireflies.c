@@ -22,7 +22,7 @@ static struct scene_material *a_square(struct fixture *fixture, float half, floa
 }
 
 /* With a mask no shadow ray asks for it. A light that gives none keeps the default sky away. */
-static void a_lamp(struct fixture *fixture, float half, float x, float z, float radiance)
+static struct scene_material *a_lamp(struct fixture *fixture, float half, float x, float z, float radiance)
 {
     struct scene_material *glow = a_square(fixture, half, x, z, 1.0f);
     for (int c = 0; c < 3; c++) {
@@ -31,6 +31,7 @@ static void a_lamp(struct fixture *fixture, float half, float x, float z, float 
     }
     glow->alpha_mode = ALPHA_MASK;
     fixture_light(fixture, LIGHT_POINT, 0.0f, 0.0f, 9.0f, 0.0f);
+    return glow;
 }
 
 static void begin(struct fixture *fixture, enum integrator_kind integrator, uint32_t depth)
@@ -117,6 +118,20 @@ TEST(a_sample_brings_no_more_than_the_limit)
     assert_true(off.most > 10.0);
     assert_true(on.most <= 2.0 + 1e-5 && on.most > 0.0 && on.mean < off.mean);
     assert_true(fabs(exposed.most - 2.0 * on.most) <= 1e-5);
+}
+
+/* A lamp a centimetre above a floor, which shadow rays alone find. */
+TEST(a_sample_of_a_lamp_brings_a_surface_at_most_four_times_its_radiance)
+{
+    struct fixture *fixture = *state;
+    begin(fixture, INTEGRATOR_DISTRIBUTED, 1);
+    a_square(fixture, 2.0f, 0.0f, 0.0f, 1.0f);
+    a_lamp(fixture, 0.3f, 0.0f, 0.01f, 1.0f)->alpha_mode = ALPHA_OPAQUE;
+    fixture_look(fixture, 1.0f, 0.2f, 0.5f, 0.6f);
+    const struct summary off = summary_of(fixture, 0.0f, 4), on = summary_of(fixture, 10.0f, 4);
+    print_message("maximum %.3f, limited %.3f; mean %.4f, limited %.4f\n", off.most, on.most, off.mean, on.mean);
+    assert_true(off.most > 8.0 && on.most <= 4.0 + 1e-5);
+    assert_near(on.mean, off.mean, 0.1 * off.mean);
 }
 
 /* The noise of a picture: by its mean, of two that differ in nothing else. */
