@@ -3,11 +3,10 @@
 //
 //   limited                what a path brings over a rough surface and at least one more is scaled down to a limit. Whole
 //                          stays light that one rough surface alone scatters to the eye, or to smooth mirrors and windows
-//                          before it
 //                          before it; but see SCATTERED_LIMIT of distributed.comp
 //   regularised_roughness  behind a rough surface no sharper one is seen: Kaplanyan, Dachsbacher. Path Space Regularization
 //                          for Holistic and Robust Light Transport. 2013. Angles shrink as the sixth root of the number
-//                          of samples (their section 4), so that noise and bias both vanish
+//                          of samples, so that noise and bias both vanish
 
 #include "shared/path.h"
 #include "common/math.glsl"
@@ -33,7 +32,7 @@ float regularised_roughness(path p, float roughness, uint index)
     return radiance_limit > 0.0 ? max(roughness, shrunk_roughness(step_, index)) : roughness;
 }
 
-// `bounces`: of which it is not limited: 1 of light that the ray has hit, 0 of light that its hit asks for.
+// Paths with at most `bounces` are not limited: 1 for light that the ray has hit, 0 for light that its hit asks for.
 vec3 limited(path p, uint bounces, vec3 arriving)
 {
     float size = max_component(arriving);
