@@ -218,7 +218,8 @@ struct cli_job {
     bool has_aperture, has_focus;
     struct cli_views views;
     bool has_eye, has_look_at, has_up, has_fov; /* in `key` */
-    bool float_pixels, half_pixels, has_encoding, has_primary, has_quality, has_integrator, quiet, is_orbit;
+    bool float_pixels, half_pixels, has_encoding, has_primary, has_quality, has_integrator, has_clamp, quiet,
+        is_orbit;
     bool has_samples;
     char depth_field[24];  /* the option that set the depth, for messages; empty: none */
     unsigned file_quality; /* of JPEG files; 0: default */

@@ -7,6 +7,7 @@
 #define RADIANS_PER_DEGREE 0.017453292519943295
 #define FRAME_BYTES_MAX (UINT64_C(4080) << 20) /* as the daemon has it */
 #define PATH_SAMPLES 64u                       /* where nothing is said */
+#define CLAMP 10.0f                            /* likewise; times white, as Cycles has it for indirect light */
 #define AO_SAMPLES 16u                         /* of 8 rays: 128 a pixel, as in the paper */
 
 /* ---- where pictures go ---- */
@@ -215,6 +216,8 @@ static void complete_samples(struct cli_job *job)
 {
     struct message_render *wanted = &job->options;
     job->endless = job->progressive && !job->has_samples;
+    if (!job->has_clamp && !job->endless)
+        wanted->clamp = CLAMP;
     if (!job->has_samples && wanted->integrator == PROTOCOL_INTEGRATOR_PATH)
         wanted->samples = PATH_SAMPLES;
     else if (!job->has_samples && wanted->integrator == PROTOCOL_INTEGRATOR_AO)
@@ -285,6 +288,8 @@ bool cli_job_complete_view(struct cli_job *job)
     struct message_render *wanted = &job->options;
     if (!complete_scene(job))
         return false;
+    if (!job->has_clamp)
+        wanted->clamp = CLAMP;
     /* An integrator without noise is better while the camera moves. */
     if (!job->has_integrator && (wanted->aperture > 0 || wanted->shutter > 0))
         wanted->integrator = PROTOCOL_INTEGRATOR_DISTRIBUTED;

@@ -3,10 +3,12 @@
  * instances show the same surfaces the tree keeps its shape, and only its nodes follow what moves. */
 #include "gpu_scene/emitter.h"
 
+#include "base/log.h"
 #include "gpu_scene/state.h"
 #include "scene/affine.h"
 
 #include <float.h>
+#include <inttypes.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -75,6 +77,18 @@ static void add_run(struct emitters *emitters, uint32_t instance, const struct e
     }
 }
 
+static void warn_of_too_many(struct emitters *emitters, uint64_t leaves)
+{
+    const bool too_many = leaves > LEAVES_LIMIT;
+    if (too_many && !emitters->too_many)
+        log_write(LOG_WARNING, "scene",
+                  "emissive triangles are not sampled as lights: their instances have %" PRIu64
+                  " groups of them, more "
+                  "than %u; rays find them by chance, with more noise",
+                  leaves, LEAVES_LIMIT);
+    emitters->too_many = too_many;
+}
+
 /* All but the trails. */
 static bool list_leaves(struct emitters *emitters, const struct gpu_scene *gpu, struct emitters *listed)
 {
@@ -84,6 +98,7 @@ static bool list_leaves(struct emitters *emitters, const struct gpu_scene *gpu, 
     listed->runs = NULL;
     listed->leaf_count = listed->run_count = 0;
     count_all(emitters, gpu, &leaves, &runs);
+    warn_of_too_many(emitters, leaves);
     if (leaves == 0 || leaves > LEAVES_LIMIT)
         return true;
     listed->leaves = malloc((size_t)leaves * sizeof(*listed->leaves));

@@ -37,7 +37,8 @@ struct emitters {
     struct emitter_node *nodes; /* 2 * leaf_count - 1 */
     struct emitter_run *runs;
     uint32_t leaf_count, run_count;
-    float area; /* emitter_starts.area */
+    float area;    /* emitter_starts.area */
+    bool too_many; /* to be sampled, as the log has said */
 };
 
 void emitters_finish(struct emitters *emitters); /* leaves it all-zero */

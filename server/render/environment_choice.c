@@ -13,29 +13,34 @@
 #define ROWS_MAX 1024u
 #define COLUMNS_MAX 2048u
 
-bool environment_choice_sums(float *sums, const float *luminances, uint32_t rows, uint32_t columns)
+/* The table of luminances, those of each row side by side, rows of equal angles from +y down. `sums` has room for
+ * rows + 1 + rows * (columns + 1). Returns the extent; 0: all are 0. */
+static float make_sums(float *sums, const float *luminances, uint32_t rows, uint32_t columns)
 {
-    double *row_sums = calloc(rows + 1, sizeof(*row_sums));
+    double *row_sums = calloc(rows + 1, sizeof(*row_sums)), squares = 0.0;
     if (!row_sums)
-        return false;
+        return 0.0f;
     float *row = sums + rows + 1;
     for (uint32_t v = 0; v < rows; v++, row += columns + 1) {
         const float *own = luminances + (size_t)v * columns;
-        double sum = 0.0, before = 0.0;
-        for (uint32_t u = 0; u < columns; u++)
+        double sum = 0.0, before = 0.0, own_squares = 0.0, height = cos(PI * v / rows) - cos(PI * (v + 1) / rows);
+        for (uint32_t u = 0; u < columns; u++) {
             sum += (double)own[u];
+            own_squares += (double)own[u] * (double)own[u];
+        }
         for (uint32_t u = 0; u <= columns; u++) {
             row[u] = sum > 0.0 ? (float)(before / sum) : (float)u / (float)columns;
             before += u < columns ? (double)own[u] : 0.0;
         }
         row[columns] = 1.0f;
-        row_sums[v + 1] = row_sums[v] + sum * (cos(PI * v / rows) - cos(PI * (v + 1) / rows));
+        row_sums[v + 1] = row_sums[v] + sum * height;
+        squares += own_squares * height;
     }
     double all = row_sums[rows];
     for (uint32_t v = 0; all > 0.0 && v <= rows; v++)
         sums[v] = (float)(row_sums[v] / all);
     free(row_sums);
-    return all > 0.0;
+    return all > 0.0 ? (float)(all / squares * all * 2.0 * PI / columns) : 0.0f;
 }
 
 static float luminance(const float rgb[3])
@@ -119,7 +124,9 @@ static bool make_table(struct environment_choice *choice, struct gpu_device *dev
     else if (!image_luminances(luminances, given, rows, columns))
         made = error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the environment's rows");
     float *sums = luminances + cell_count;
-    if (made && environment_choice_sums(sums, luminances, rows, columns)) {
+    if (made)
+        choice->extent = make_sums(sums, luminances, rows, columns);
+    if (made && choice->extent > 0.0f) {
         made = gpu_buffer_upload(device, &choice->table, sums, sum_count * sizeof(*sums), error);
         choice->rows = rows;
         choice->columns = columns;
@@ -138,6 +145,7 @@ bool environment_choice_update(struct environment_choice *choice, struct gpu_dev
     choice->kind = environment->kind;
     choice->revision = given->revision;
     choice->rows = choice->columns = 0;
+    choice->extent = 0.0f;
     if ((choice->kind == ENVIRONMENT_IMAGE || choice->kind == ENVIRONMENT_SKY) &&
         !make_table(choice, device, given, error))
         return false;

@@ -12,6 +12,7 @@ struct environment_choice {
     uint64_t revision;
     uint32_t kind;          /* ENVIRONMENT_* */
     uint32_t rows, columns; /* of the table; 0: there is none, as all directions are alike or black */
+    float extent; /* steradians over which its light is spread: the square of its sum by the sum of its squares */
     struct gpu_buffer table;
 };
 
@@ -20,9 +21,5 @@ bool environment_choice_update(struct environment_choice *choice, struct gpu_dev
                                const struct environment *environment, const struct scene_environment *given,
                                struct error *error);
 void environment_choice_finish(struct environment_choice *choice, struct gpu_device *device);
-
-/* For tests: the table of luminances, those of each row side by side, rows of equal angles from +y down. `sums`
- * has room for rows + 1 + rows * (columns + 1). False: all are 0. */
-bool environment_choice_sums(float *sums, const float *luminances, uint32_t rows, uint32_t columns);
 
 #endif

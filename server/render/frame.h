@@ -55,6 +55,7 @@ struct frame_request {
     float focus; /* distance along the view of the plane that is sharp, metres; 0: middle of the scene */
     enum pixel_filter filter;
     enum brdf brdf;       /* of rough surfaces; integrator path */
+    float clamp;          /* times 2^-exposure_stops: see shaders/render/fireflies.glsl; 0: nothing is limited */
     float ao_distance;    /* metres; 0: a tenth of the scene's diagonal */
     float ao_falloff;     /* as a power of 1 - distance / ao_distance; 0: all counts the same */
     uint32_t ao_rays;     /* a sample; 0: 8 */

@@ -61,6 +61,8 @@ static bool check_integrator(const struct frame_request *request, struct error *
     if (request->brdf > BRDF_WARD)
         return error_set(error, ERROR_UNSUPPORTED, "brdf", "there is no reflection model number %u",
                          (unsigned)request->brdf);
+    if (!(request->clamp >= 0.0f && isfinite(request->clamp)))
+        return error_set(error, ERROR_INVALID, "clamp", "%g; 0 and more are possible", (double)request->clamp);
     if (!(request->ao_distance >= 0.0f && isfinite(request->ao_distance)))
         return error_set(error, ERROR_INVALID, "ao_distance", "%g metres; 0 and more are possible",
                          (double)request->ao_distance);
@@ -210,11 +212,18 @@ static bool same_tracer(const struct frame_request *a, const struct frame_reques
            a->primary == b->primary && a->compare == b->compare;
 }
 
+float frame_request_radiance_limit(const struct frame_request *request)
+{
+    return request->clamp * exp2f(-request->exposure_stops);
+}
+
 /* Whether or not the integrator asks for them. */
 static bool same_light(const struct frame_request *a, const struct frame_request *b)
 {
-    return a->integrator == b->integrator && a->brdf == b->brdf && a->ao_distance == b->ao_distance &&
-           a->ao_falloff == b->ao_falloff && a->ao_rays == b->ao_rays && a->layer_opacity == b->layer_opacity;
+    return a->integrator == b->integrator && a->brdf == b->brdf &&
+           frame_request_radiance_limit(a) == frame_request_radiance_limit(b) &&
+           a->ao_distance == b->ao_distance && a->ao_falloff == b->ao_falloff && a->ao_rays == b->ao_rays &&
+           a->layer_opacity == b->layer_opacity;
 }
 
 bool frame_request_hides_environment(const struct frame_request *request)

@@ -23,6 +23,8 @@ uint64_t frame_request_plane_bytes(const struct frame_request *request, enum lay
 uint64_t frame_request_bytes(const struct frame_request *request);
 /* Behind the surfaces of the picture. */
 bool frame_request_hides_environment(const struct frame_request *request);
+/* Of its clamp: what the exposure makes of this is the limit; 0: there is none. */
+float frame_request_radiance_limit(const struct frame_request *request);
 /* Whether the same ray brings the same radiance. */
 bool frame_request_same_radiance(const struct frame_request *a, const struct frame_request *b);
 /* Whether their samples may be added up: they are equal but for their number and the use of the sum. */

@@ -86,6 +86,7 @@ static const struct gpu_program *shade_program(struct wave_passes *passes, struc
     gpu_uniform_uint(program, "last_wave", last);
     gpu_uniform_uint(program, "children_a_hit", integrator->children_a_hit);
     gpu_uniform_uint(program, "shadow_rays_a_hit", integrator->shadow_rays_a_hit(context));
+    gpu_uniform_float(program, "radiance_limit", context_radiance_limit(context));
     bind_shading(passes, context);
     return program;
 }
@@ -117,10 +118,11 @@ static const struct gpu_program *left_scene_program(const struct wave_passes *pa
         defines[n++] = (struct gpu_define){"HAS_ENVIRONMENT_IMAGE", "1"};
     if (passes->integrator->left_scene)
         defines[n++] = (struct gpu_define){passes->integrator->left_scene, "1"};
-    if (passes->integrator->left_scene && context->features.area_lights)
+    if (passes->integrator->meets_lights && context->features.area_lights) {
         defines[n++] = (struct gpu_define){"HAS_AREA_LIGHTS", "1"};
-    if (passes->integrator->left_scene && context_samples_emitters(context))
-        defines[n++] = (struct gpu_define){"HAS_EMITTERS", "1"};
+        if (context_samples_emitters(context))
+            defines[n++] = (struct gpu_define){"HAS_EMITTERS", "1"};
+    }
     return context_use_with(context, "render/left_scene.comp", defines, error);
 }
 
@@ -133,6 +135,7 @@ static bool left_scene(struct wave_passes *passes, struct render_context *contex
     if (!program)
         return false;
     context_bind(context);
+    gpu_uniform_float(program, "radiance_limit", context_radiance_limit(context));
     gpu_buffer_bind_texels(context->device, environment_lights(context->environment, context->scene),
                            UNIT_SHADE_LIGHTS, GL_RGBA32F);
     gpu_buffer_bind_storage(&context->rays, BIND_RAYS);

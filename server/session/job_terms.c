@@ -414,6 +414,7 @@ static void fill_rest(struct engine_job *job, const struct session *session, con
                 .focus = render->focus,
                 .filter = (enum pixel_filter)render->pixel_filter,
                 .brdf = (enum brdf)render->brdf,
+                .clamp = render->clamp,
                 .ao_distance = render->ao_distance,
                 .ao_falloff = render->ao_falloff,
                 .ao_rays = render->ao_rays,

@@ -18,6 +18,7 @@ struct lobe {
     vec3 weight;       // of the radiance along it; 0: there is no ray
     float solid_angle; // 1 / the density with which it was chosen, steradians; 0: the surface is smooth
     vec3 scattered;    // of split_light(), of the facet where glass is seen from inside
+    bool back;         // mirrored, once or again
 };
 
 // The lit share of the visible facets, both correlated by height as in V_SmithGGXCorrelated(). 0 below the horizon.
@@ -42,13 +43,19 @@ float again_share(split parts, float cosine, float alpha)
     return facets_lost(stretched_cosine(cosine, alpha), alpha) / max(parts.again_mean, 1e-9);
 }
 
+// The frame of facets, and the view in it.
+vec3 facet_frame(surface s, float NoV, vec3 direction, out vec3 x, out vec3 y)
+{
+    tangent_frame(s.normal, x, y);
+    return normalize(vec3(-dot(direction, x), -dot(direction, y), NoV));
+}
+
 // A facet of a rough surface that is seen along the direction. `angle`: 1 / the density with which it was chosen.
 vec3 facet_seen(surface s, float NoV, vec3 direction, vec2 u, out float angle)
 {
     vec2 alpha = vec2(square(s.roughness));
     vec3 x, y;
-    tangent_frame(s.normal, x, y);
-    vec3 view = normalize(vec3(-dot(direction, x), -dot(direction, y), NoV));
+    vec3 view = facet_frame(s, NoV, direction, x, y);
     vec3 facet = visible_facet(view, alpha, u);
     angle = 1.0 / visible_facet_density(facet, view, clamp(dot(view, facet), 1e-4, 1.0), alpha);
     return facet.x * x + facet.y * y + facet.z * s.normal;
@@ -58,6 +65,39 @@ vec3 facet_seen(surface s, float NoV, vec3 direction, vec2 u, out float angle)
 vec3 turned_to(vec3 direction, vec3 side)
 {
     return direction - 2.0 * min(dot(direction, side), 0.0) * side;
+}
+
+// What a facet, or the smooth surface, does with the light along the view.
+struct facet_lobes {
+    vec3 reflected, bent;       // directions
+    vec3 mirror, again, window; // shares; again: mirrored more than once
+    float enters;               // neither is mirrored nor metal takes it
+};
+
+facet_lobes facet_lobes_of(surface s, split parts, float NoV, vec3 direction, vec3 facet, bool rough)
+{
+    bool leaves = s.inside && s.transmission > 0.0;
+    float VoH = rough ? clamp(-dot(direction, facet), 1e-4, 1.0) : NoV;
+    float dielectric = fresnel_dielectric(VoH, leaves ? 1.0 / s.ior : s.ior), lit = 1.0;
+    facet_lobes f;
+    f.reflected = reflect(direction, facet);
+    f.bent = refract(direction, facet, s.inside ? s.ior : 1.0 / s.ior);
+    if (rough && leaves) {
+        f.reflected = turned_to(f.reflected, s.normal);
+        f.bent = turned_to(f.bent, -s.normal);
+    } else if (rough) {
+        lit = lit_share(NoV, dot(f.reflected, s.normal), square(s.roughness));
+    }
+    f.mirror = mix(vec3(dielectric), fresnel_schlick(s.base, VoH), s.metallic) * lit;
+    f.again = metal_again(s.base, parts.again_mean) * (s.metallic * (1.0 - lit));
+    // Glass is tinted once, where light enters it.
+    f.enters = (1.0 - dielectric * lit) * (1.0 - s.metallic);
+    f.window = (leaves ? vec3(1.0) : s.base) * (f.enters * s.transmission);
+    if (dot(f.bent, s.geometric) >= 0.0) { // totally reflected, or a tilted normal would send it back
+        f.mirror += f.window;
+        f.window = vec3(0.0);
+    }
+    return f;
 }
 
 // `parts`: split_light() of the same surface and NoV. `choice` chooses between mirror, window and several mirrors in
@@ -70,29 +110,11 @@ lobe lobe_choose(surface s, split parts, float NoV, vec3 direction, inout float 
     float facet_angle = 0.0;
     if (rough)
         facet = facet_seen(s, NoV, direction, u, facet_angle);
-    float VoH = rough ? clamp(-dot(direction, facet), 1e-4, 1.0) : NoV;
-    float dielectric = fresnel_dielectric(VoH, leaves ? 1.0 / s.ior : s.ior), lit = 1.0;
-    vec3 reflected = reflect(direction, facet);
-    vec3 bent = refract(direction, facet, s.inside ? s.ior : 1.0 / s.ior);
-    if (rough && leaves) {
-        reflected = turned_to(reflected, s.normal);
-        bent = turned_to(bent, -s.normal);
-    } else if (rough) {
-        lit = lit_share(NoV, dot(reflected, s.normal), alpha);
-    }
-    vec3 mirror = mix(vec3(dielectric), fresnel_schlick(s.base, VoH), s.metallic) * lit;
-    vec3 again = metal_again(s.base, parts.again_mean) * (s.metallic * (1.0 - lit));
-    // Glass is tinted once, where light enters it.
-    float enters = (1.0 - dielectric * lit) * (1.0 - s.metallic);
-    vec3 window = (leaves ? vec3(1.0) : s.base) * (enters * s.transmission);
-    if (dot(bent, s.geometric) >= 0.0) { // totally reflected, or a tilted normal would send it back
-        mirror += window;
-        window = vec3(0.0);
-    }
-    vec3 scattered = leaves ? s.base * (enters * (1.0 - s.transmission)) : parts.scattered;
-    lobe result = lobe(s.normal, vec3(0.0), 0.0, scattered);
-    float mirror_size = max_component(mirror), again_size = max_component(again);
-    float all_ = mirror_size + again_size + max_component(window);
+    facet_lobes f = facet_lobes_of(s, parts, NoV, direction, facet, rough);
+    vec3 scattered = leaves ? s.base * (f.enters * (1.0 - s.transmission)) : parts.scattered;
+    lobe result = lobe(s.normal, vec3(0.0), 0.0, scattered, false);
+    float mirror_size = max_component(f.mirror), again_size = max_component(f.again);
+    float all_ = mirror_size + again_size + max_component(f.window);
     if (!(all_ > 0.0))
         return result;
     float first = mirror_size / all_, second = again_size / all_;
@@ -100,17 +122,38 @@ lobe lobe_choose(surface s, split parts, float NoV, vec3 direction, inout float 
     float before = mirrored ? 0.0 : is_again ? first : first + second;
     float chance = mirrored ? first : is_again ? second : 1.0 - first - second;
     choice = clamp((choice - before) / chance, 0.0, 0.99999994);
-    bool back = mirrored || is_again;
-    result.direction = mirrored ? reflected : is_again ? again_direction(s.normal, choice) : bent;
-    result.weight = (mirrored ? mirror : is_again ? again : window) / chance;
+    result.back = mirrored || is_again;
+    result.direction = mirrored ? f.reflected : is_again ? again_direction(s.normal, choice) : f.bent;
+    result.weight = (mirrored ? f.mirror : is_again ? f.again : f.window) / chance;
     float cosine = dot(result.direction, s.normal);
     if (is_again)
         result.weight *= again_share(parts, cosine, alpha);
-    if (back && !(dot(result.direction, s.geometric) > 0.0)) {
+    if (result.back && !(dot(result.direction, s.geometric) > 0.0)) {
         result.weight = rough ? vec3(0.0) : result.weight;
         result.direction = reflect(direction, s.geometric);
     }
     float turned = facet_angle * square(facet_turn(s.inside ? 1.0 / s.ior : s.ior, mirrored));
     result.solid_angle = is_again ? PI / max(cosine, 1e-3) : turned;
     return result;
+}
+
+// The reflectance of the lobes that send light back, from a direction (of light, unit) to the eye, per steradian, times
+// the cosine; and the density with which lobe_choose() sends a ray that way. Both are 0 where the surface is smooth, and
+// for glass seen from inside. Of light that is mirrored more than once, the density is a mean over the facets.
+vec3 lobe_mirrored(surface s, split parts, float NoV, vec3 view, vec3 light, out float density)
+{
+    float NoL = dot(s.normal, light), alpha = square(s.roughness);
+    density = 0.0;
+    if (alpha <= FACET_ALPHA_MIN || NoL <= 0.0 || dot(s.geometric, light) <= 0.0 || s.inside && s.transmission > 0.0)
+        return vec3(0.0);
+    vec3 facet = normalize(view + light);
+    facet_lobes f = facet_lobes_of(s, parts, NoV, -view, facet, true);
+    float VoH = clamp(dot(view, facet), 1e-4, 1.0), mirror_size = max_component(f.mirror);
+    float all_ = mirror_size + max_component(f.again) + max_component(f.window);
+    vec3 x, y;
+    vec3 local_view = facet_frame(s, NoV, -view, x, y), local = vec3(dot(facet, x), dot(facet, y), dot(facet, s.normal));
+    float mirrored = visible_facet_density(local, local_view, VoH, vec2(alpha)) / (4.0 * VoH);
+    float again_size = max_component(parts.again), again_all = max_component(parts.mirror + parts.refracted) + again_size;
+    density = mirror_size / max(all_, 1e-30) * mirrored + again_size / max(again_all, 1e-30) * NoL * INVERSE_PI;
+    return f.mirror * mirrored + parts.again * (again_share(parts, NoL, alpha) * NoL * INVERSE_PI);
 }

@@ -4,87 +4,200 @@
 // mean of the samples is right however few rays each has.
 //
 //   radiance    emission, and a constant ambient term as in whitted.comp
-//   shadow ray  one, to one point of one light or emissive triangle
+//   shadow ray  one, to one point of one light or emissive triangle, or to the environment
 //   child       at most one: straight on (alpha blending), mirrored or refracted, in a direction that a facet of the
 //               rough surface sends it, or several in turn
 //
-// Emissive triangles are asked for the light that is scattered alone: what a surface mirrors or refracts of them its
-// children see, however rough it is.
+// Emissive triangles are asked for the light that is scattered: no child brings that. What a rough surface mirrors of
+// them, and of the bright parts of an image about the scene, shadow rays and children both find (common/two_ways.glsl).
+// Children see them through glass as it bends light, and through blended surfaces; so translucent surfaces stop the
+// shadow rays for mirrors, and what is met behind one counts fully. The last hits of a path, which have no child, mirror
+// neither. Of other environments, children alone find what is mirrored.
 //
-// Defines: those of common/material.glsl, common/light.glsl, common/environment.glsl and render/shade.glsl; HAS_EMITTERS
-// there are emissive triangles that are sampled, and those of common/emitter.glsl.
+// Defines: those of common/material.glsl, common/light.glsl, common/environment_choice.glsl, common/two_ways.glsl and
+// render/shade.glsl. With HAS_ENVIRONMENT_TABLE shadow rays ask for the environment.
 
-#include "common/emitter.glsl"
-#include "common/environment.glsl"
+#include "common/environment_choice.glsl"
 #include "common/light_choice.glsl"
 #include "common/lobe.glsl"
+#include "common/two_ways.glsl"
+#include "render/fireflies.glsl"
 #include "render/shade.glsl"
 #include "render/wave.glsl"
 
 // A child with a lower weight than this is traced with the probability weight / this, and then has this weight.
 const float ROULETTE = 1.0 / 4.0;
 
+// With radiance_limit: one sample of an emitter brings a surface at most so many times what it would if it were all around.
+const float SCATTERED_LIMIT = 4.0;
+
+#if defined(HAS_EMITTERS) || defined(HAS_ENVIRONMENT_TABLE)
+#define TWO_WAYS
+#endif
+
+// The steradians over which the environment's light is spread: the square of its sum by the sum of its squares.
+uniform float environment_extent;
+
+struct eye_hit {
+    uint j;
+    path p;
+    vec3 weight, view;
+    surface s;
+    split parts;
+    float NoV, distance_;
+    vec3 origin; // of shadow rays
+    // As lights see it, see path_roughness().
+    surface blurred;
+    split blurred_parts;
+};
+
+// What a shadow ray asks for.
+struct shadow_choice {
+    float environment; // the chance of that; of the rest:
+    float lights;      // of a light, else an emitter; of those:
+    float mirrored;    // of what is mirrored of it, not scattered
+    uint light_number;
+    float light_chance; // of that one of the lights
+    vec2 u;             // x: the choice, then both: the place
+    uint ray_normal;    // with which emitters are chosen: packed
+};
+
 // The roughness of the mirrors and windows that a path has met: they blur what it sees. A light's highlight on a smooth
-// surface, which is as bright as it is narrow, is widened to it; else one ray in thousands would hit it, as a firefly.
-// Kaplanyan, Dachsbacher. Path Space Regularization for Holistic and Robust Light Transport. 2013.
+// surface, which is as bright as it is narrow, is widened to it, by less with every sample; else one ray in thousands
+// would hit it, as a firefly.
 float path_roughness(path p)
 {
     return float(p.flags >> PATH_ROUGHNESS_SHIFT) / 65535.0;
 }
 
-void add_lobe(uint j, path p, surface s, float distance_, lobe chosen, vec3 weight, float choice)
+float emitter_chance(shadow_choice c)
 {
-    vec3 carried = weight * chosen.weight;
+    return (1.0 - c.environment) * (1.0 - c.lights);
+}
+
+void add_lobe(eye_hit e, lobe chosen, shadow_choice c, float choice)
+{
+    path p = e.p;
+    vec3 carried = e.weight * chosen.weight;
     float survival = max_component(carried) / ROULETTE;
     if (!(choice < survival)) // also if it is NaN
         return;
-    uint roughness = uint(max(path_roughness(p), s.roughness) * 65535.0 + 0.5);
+    uint roughness = uint(max(path_roughness(p), e.s.roughness) * 65535.0 + 0.5);
+    p.flags = path_sent_on(p.flags, e.s.roughness);
     p.flags = p.flags & (1u << PATH_ROUGHNESS_SHIFT) - 1u | roughness << PATH_ROUGHNESS_SHIFT;
-    add_child(j, p, s, distance_, chosen.direction, carried / min(survival, 1.0), false,
+#ifdef TWO_WAYS
+    float found = 0.0;
+    if (chosen.back)
+        lobe_mirrored(e.s, e.parts, e.NoV, e.view, chosen.direction, found);
+#endif
+#ifdef HAS_EMITTERS
+    p.light_number = c.ray_normal | ratio_code(emitter_chance(c) * c.mirrored, found) << PATH_LIGHT_BITS;
+#endif
+#ifdef HAS_ENVIRONMENT_TABLE
+    float other = c.environment * environment_probability(e.s.normal, chosen.direction);
+    p.environment_share = found > 0.0 ? heuristic(found, other) : 1.0;
+#endif
+    add_child(e.j, p, e.s, e.distance_, chosen.direction, carried / min(survival, 1.0), false,
               sample_solid_angle(chosen.solid_angle));
 }
 
-#ifdef HAS_EMITTERS
-bool ask_for_emitter(uint j, path p, surface s, split parts, vec3 weight, vec3 origin, float chance, vec2 u)
+shadow_choice choose_shadow_ray(eye_hit e, vec2 u)
 {
-    emitter_sample sampled = emitter_sample_at(origin, s.normal, u, p.time);
-    float NoL = dot(s.normal, sampled.direction);
+    shadow_choice c = shadow_choice(0.0, 1.0, 0.0, 0u, 0.0, u, 0u);
+    light_receiver receiver = light_receiver_of(e.blurred, e.blurred_parts, e.origin, e.view, e.NoV);
+    float all_;
+    c.light_number = light_choose(receiver, frame.light_count, c.u.x, c.light_chance, all_);
+#ifdef TWO_WAYS
+    bool mirrors = square(e.s.roughness) > FACET_ALPHA_MIN && last_wave == 0u &&
+                   (e.p.flags & PATH_BOUNCES_MASK) < frame.depth;
+    float mirrored = mirrors ? max_component(e.parts.mirror + e.parts.again) : 0.0;
+#endif
+#ifdef HAS_EMITTERS
+    c.ray_normal = pack_ray_normal(e.s.normal);
+    receiver.scattered = max_component(e.parts.scattered) * INVERSE_PI;
+    receiver.mirrored = mirrored * INVERSE_PI;
+    float estimate = emitter_estimate(e.origin, unpack_ray_normal(c.ray_normal));
+    float both = receiver.scattered + receiver.mirrored;
+    c.lights = both > 0.0 ? lights_share(receiver, all_, estimate) : 1.0;
+    c.mirrored = both > 0.0 ? receiver.mirrored / both : 0.0;
+    all_ += estimate * both;
+#endif
+#ifdef HAS_ENVIRONMENT_TABLE
+    // A lobe that is narrow beside the environment's bright parts finds these well enough alone.
+    float angle = rough_solid_angle(e.s, e.s.geometric), own = mirrored * max_component(frame.irradiance[0].rgb);
+    c.environment = own > 0.0 ? angle / (angle + environment_extent) * own / (own + all_) : 0.0;
+#endif
+    return c;
+}
+
+// Whether a share of the cases is meant, by a number that comes back stretched to [0, 1) again.
+bool is_in(float share, inout float number)
+{
+    bool in_ = number < share;
+    number = min(in_ ? number / share : (number - share) / (1.0 - share), 0.99999994);
+    return in_;
+}
+
+#ifdef HAS_EMITTERS
+bool ask_for_emitter(eye_hit e, shadow_choice c)
+{
+    bool mirrored = is_in(c.mirrored, c.u.x);
+    float chance = emitter_chance(c) * (mirrored ? c.mirrored : 1.0 - c.mirrored), found = 0.0;
+    emitter_sample sampled = emitter_sample_at(e.origin, unpack_ray_normal(c.ray_normal), c.u, e.p.time);
+    float NoL = dot(e.s.normal, sampled.direction);
+    vec3 sent = vec3(0.0);
+    if (mirrored)
+        sent = lobe_mirrored(e.s, e.parts, e.NoV, e.view, sampled.direction, found);
+    else if (NoL > 0.0 && dot(e.s.geometric, sampled.direction) > 0.0)
+        sent = brdf_scattered(e.s, e.parts, NoL) * NoL;
     vec3 arriving = vec3(0.0);
-    if (sampled.probability > 0.0 && NoL > 0.0 && dot(s.geometric, sampled.direction) > 0.0)
-        arriving = weight * brdf_scattered(s, parts, NoL) * sampled.radiance * (NoL / (sampled.probability * chance));
-    return add_shadow_ray(j, p, origin, sampled.direction, sampled.distance_, arriving);
+    if (sampled.probability > 0.0)
+        arriving = e.weight * sent * sampled.radiance * (emitter_share_asked(sampled, chance, found) /
+                                                         (sampled.probability * chance));
+    // Nothing else finds what is scattered of an emitter that all but touches the surface.
+    float stands_for = NoL * INVERSE_PI / max(sampled.probability * chance, 1e-30);
+    if (!mirrored && radiance_limit > 0.0 && stands_for > SCATTERED_LIMIT)
+        arriving *= SCATTERED_LIMIT / stands_for;
+    return add_shadow_ray_from(e.j, e.p, e.origin, sampled.direction, mirrored ? RAY_STOPS_T_MIN : 0.0,
+                               sampled.distance_, limited(e.p, 0u, arriving));
 }
 #endif
 
-bool ask_for_light(uint j, path p, surface s, split parts, vec3 view, float NoV, vec3 weight, float distance_, vec2 u)
+#ifdef HAS_ENVIRONMENT_TABLE
+bool ask_for_environment(eye_hit e, shadow_choice c)
 {
-    vec3 origin = off_surface(s, distance_, s.geometric);
-    float probability, all_lights;
-    surface blurred = s;
-    blurred.roughness = max(s.roughness, path_roughness(p));
-    split blurred_parts = split_light(blurred, NoV);
-    light_receiver receiver = light_receiver_of(blurred, blurred_parts, origin, view, NoV);
-    uint index = light_choose(receiver, frame.light_count, u.x, probability, all_lights);
+    float probability, found;
+    vec3 direction = environment_choose(e.s.normal, c.u, probability);
+    probability *= c.environment;
+    vec3 arriving = vec3(0.0), sent = lobe_mirrored(e.s, e.parts, e.NoV, e.view, direction, found);
+    if (probability > 0.0 && found > 0.0)
+        arriving = e.weight * sent * environment_radiance(direction) * (heuristic(probability, found) / probability);
+    return add_shadow_ray_from(e.j, e.p, e.origin, direction, RAY_STOPS_T_MIN, FAR, limited(e.p, 0u, arriving));
+}
+#endif
+
+bool ask_for_light(eye_hit e, shadow_choice c)
+{
+    float probability = c.light_chance;
+#ifdef HAS_ENVIRONMENT_TABLE
+    if (is_in(c.environment, c.u.x))
+        return ask_for_environment(e, c);
+    probability *= 1.0 - c.environment;
+#endif
 #ifdef HAS_EMITTERS
-    receiver.scattered = max_component(parts.scattered) * INVERSE_PI;
-    receiver.mirrored = 0.0;
-    float lights_chance = lights_share(receiver, all_lights, emitter_estimate(origin, s.normal));
-    if (u.x >= lights_chance) {
-        u.x = min((u.x - lights_chance) / (1.0 - lights_chance), 0.99999994);
-        return ask_for_emitter(j, p, s, parts, weight, origin, 1.0 - lights_chance, u);
-    }
-    u.x = min(u.x / lights_chance, 0.99999994);
-    probability *= lights_chance;
+    if (!is_in(c.lights, c.u.x))
+        return ask_for_emitter(e, c);
+    probability *= c.lights;
 #endif
     if (probability <= 0.0) {
-        no_shadow_ray(j);
+        no_shadow_ray(e.j);
         return false;
     }
-    light_sample sampled = light_sample_at(index, origin, u);
-    float NoL = dot(s.normal, sampled.direction);
-    vec3 sent = brdf(blurred, blurred_parts, view, NoV, sampled.direction);
-    vec3 arriving = weight * (sent * sampled.irradiance * (NoL / probability));
-    return add_shadow_ray(j, p, origin, sampled.direction, sampled.distance_, arriving);
+    light_sample sampled = light_sample_at(c.light_number, e.origin, c.u);
+    float NoL = dot(e.s.normal, sampled.direction);
+    vec3 sent = brdf(e.blurred, e.blurred_parts, e.view, e.NoV, sampled.direction);
+    vec3 arriving = e.weight * (sent * sampled.irradiance * (NoL / probability));
+    return add_shadow_ray(e.j, e.p, e.origin, sampled.direction, sampled.distance_, limited(e.p, 0u, arriving));
 }
 
 void main()
@@ -93,37 +206,56 @@ void main()
     if (j >= wave.hits.count)
         return;
     uint k = hit_list[j];
-    path p = path_at(k);
-    vec3 weight = vec3(p.weight_r, p.weight_g, p.weight_b);
+    eye_hit e;
+    e.j = j;
+    e.p = path_at(k);
+    e.weight = vec3(e.p.weight_r, e.p.weight_g, e.p.weight_b);
     ray r = ray_at(k);
     hit h = hit_at(k);
-    vec3 direction = r.direction_t_max.xyz, view = -direction;
-    surface s = surface_of_path(p, h, r);
-    float NoV = clamp(dot(s.normal, view), 1e-4, 1.0); // a shading normal may lean away
-    uint seed = path_seed(p), index = path_sample(p), dimension = SEQUENCE_WAVE + wave_number * SEQUENCE_WAVE_SIZE;
+    vec3 direction = r.direction_t_max.xyz;
+    e.view = -direction;
+    e.distance_ = h.distance;
+    e.s = surface_of_path(e.p, h, r);
+    uint seed = path_seed(e.p), index = path_sample(e.p), dimension = SEQUENCE_WAVE + wave_number * SEQUENCE_WAVE_SIZE;
+    e.s.roughness = regularised_roughness(e.p, e.s.roughness, index);
+    e.NoV = clamp(dot(e.s.normal, e.view), 1e-4, 1.0); // a shading normal may lean away
     float choice = sequence_number(seed, dimension + SEQUENCE_LOBE, index);
     vec3 sent = vec3(0.0);
-    bool straight = choice >= s.alpha, asked = false;
+    bool straight = choice >= e.s.alpha, asked = false;
+#ifdef HAS_EMITTERS
+    e.s.emission *= emitter_share_met(e.p.light_number >> PATH_LIGHT_BITS, e.p.light_number & PATH_LIGHT_MASK, h, r, e.p.time,
+                                      e.s.emission);
+#endif
+    // Where nothing else is said below, children count in full.
+    e.p.light_number = 0u;
+    e.p.environment_share = 1.0;
     if (straight) {
-        add_child(j, p, s, h.distance, direction, weight, true, 0.0);
+        add_child(j, e.p, e.s, h.distance, direction, e.weight, true, 0.0);
         no_shadow_ray(j);
-    } else if (s.unlit) {
-        sent = s.base;
+    } else if (e.s.unlit) {
+        sent = e.s.base;
         no_shadow_ray(j);
     } else {
-        choice = min(choice / s.alpha, 0.99999994);
-        split parts = split_light(s, NoV);
-        lobe chosen = lobe_choose(s, parts, NoV, direction, choice,
+        choice = min(choice / e.s.alpha, 0.99999994);
+        e.parts = split_light(e.s, e.NoV);
+        e.origin = off_surface(e.s, h.distance, e.s.geometric);
+        e.blurred = e.s;
+        e.blurred.roughness = max(e.s.roughness, shrunk_roughness(path_roughness(e.p), index));
+        e.blurred_parts = split_light(e.blurred, e.NoV);
+        bool asks = !(e.s.inside && e.s.transmission > 0.0);
+        shadow_choice c = shadow_choice(0.0, 1.0, 0.0, 0u, 0.0, vec2(0.0), 0u);
+        if (asks)
+            c = choose_shadow_ray(e, sequence_pair_sorted(seed, dimension + SEQUENCE_LIGHT, index, frame.group_shift));
+        lobe chosen = lobe_choose(e.s, e.parts, e.NoV, direction, choice,
                                   sequence_pair(seed, dimension + SEQUENCE_LOBE_DIRECTION, index));
-        sent = s.emission + s.occlusion * chosen.scattered * environment_irradiance(s.normal);
-        add_lobe(j, p, s, h.distance, chosen, weight, choice);
-        if (s.inside && s.transmission > 0.0)
-            no_shadow_ray(j);
+        sent = e.s.emission + e.s.occlusion * chosen.scattered * environment_irradiance(e.s.normal);
+        add_lobe(e, chosen, c, choice);
+        if (asks)
+            asked = ask_for_light(e, c);
         else
-            asked = ask_for_light(j, p, s, parts, view, NoV, weight, h.distance,
-                                  sequence_pair_sorted(seed, dimension + SEQUENCE_LIGHT, index, frame.group_shift));
+            no_shadow_ray(j);
     }
-    bool seen = !straight && (p.flags & PATH_STRAIGHT) != 0u;
-    radiance[k] = vec4(weight * sent, seen ? p.weight_r : 0.0);
+    bool seen = !straight && (e.p.flags & PATH_STRAIGHT) != 0u;
+    radiance[k] = vec4(limited(e.p, 1u, e.weight * sent), seen ? e.p.weight_r : 0.0);
     note_children(j, true, asked ? 1u : 0u);
 }

@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: MIT
 // The radiance of paths that left the scene: the environment.
 // Defines: those of common/environment.glsl; OPEN it is 1 everywhere, whatever the environment; SHARES paths say how
-// much of it counts, and which light they hit; HAS_AREA_LIGHTS with SHARES: there are area lights;
-// HAS_EMITTERS the integrator samples emitters, too.
+// much of it counts, and may be limited; HAS_AREA_LIGHTS with it: they also say which light they hit; HAS_EMITTERS with
+// that: the integrator samples emitters, too.
 
 #include "shared/path.h"
 #include "shared/ray.h"
 #include "common/dispatch.glsl"
 #include "common/environment.glsl"
 #include "common/light.glsl"
+#include "render/fireflies.glsl"
 #include "render/wave.glsl"
 
 layout(local_size_x = 64) in;
@@ -44,6 +45,9 @@ void main()
         arriving += light_at(met - 1u).colour.rgb * p.light_share;
 #endif
 #endif
-    // Pixels beyond the picture's edge have no weight.
-    radiance[k] = vec4(vec3(p.weight_r, p.weight_g, p.weight_b) * arriving, seen ? p.weight_r : 0.0);
+    vec3 brought = vec3(p.weight_r, p.weight_g, p.weight_b) * arriving; // pixels beyond the picture's edge have no weight
+#ifdef SHARES
+    brought = limited(p, 1u, brought);
+#endif
+    radiance[k] = vec4(brought, seen ? p.weight_r : 0.0);
 }

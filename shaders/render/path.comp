@@ -8,9 +8,8 @@
 //   child       at most one: straight on (alpha blending), scattered, mirrored or refracted
 //
 // Light with an extent is found by shadow rays and by children, at no extra cost: rectangles, spheres and the
-// environment are met by them as they go on. Light that both find is weighted by multiple importance sampling: Veach,
-// Guibas. Optimally Combining Sampling Techniques for Monte Carlo Rendering. 1995, with the power heuristic. The last
-// hits of a path have no child; there shadow rays bring everything. Straight rays from the eye hit no area light.
+// environment are met by them as they go on. Light that both find is weighed (common/two_ways.glsl). The last hits of a
+// path have no child; there shadow rays bring everything. Straight rays from the eye hit no area light.
 //
 // Emissive triangles are found both ways, too. Rays that go on see them through glass as it bends light, and through
 // blended surfaces; so translucent surfaces stop the shadow rays towards them, and what is met behind one counts fully.
@@ -23,14 +22,14 @@
 // mirrored outside (PATH_COVERED), but for what emissive surfaces send. Paths from the eye, or a mirror, see everything
 // through glass. Surfaces of glass ask for no light from inside.
 //
-// Defines: those of common/bsdf.glsl, common/light.glsl, common/environment_choice.glsl and render/shade.glsl;
-// HAS_EMITTERS there are emissive triangles that are sampled, and those of common/emitter.glsl; EMITTERS_BY_DISTANCE hits
-// do not tell which of them they are of, so both ways are weighed by a density that the distance alone says.
+// Defines: those of common/bsdf.glsl, common/light.glsl, common/environment_choice.glsl, common/two_ways.glsl and
+// render/shade.glsl.
 
 #include "common/bsdf.glsl"
-#include "common/emitter.glsl"
 #include "common/environment_choice.glsl"
 #include "common/light_choice.glsl"
+#include "common/two_ways.glsl"
+#include "render/fireflies.glsl"
 #include "render/shade.glsl"
 #include "render/wave.glsl"
 
@@ -39,13 +38,6 @@
 const uint ROULETTE_BOUNCES = 3u;
 
 uniform uint asks_lights, asks_environment; // 1: there are some; their shadow rays come in this order
-
-// The weight of a technique, beside another that might have found the same light.
-float heuristic(float own, float other)
-{
-    float ratio = other / own;
-    return own > 0.0 ? 1.0 / (1.0 + ratio * ratio) : 0.0;
-}
 
 struct eye_hit {
     uint j;
@@ -83,36 +75,6 @@ void choose_light(inout eye_hit e, uint seed, uint index)
 }
 
 #ifdef HAS_EMITTERS
-ivec2 ray_normal_of(vec3 normal)
-{
-    return ivec2(round(octahedral_from_unit(normal) * PATH_NORMAL_MAX));
-}
-
-uint pack_ray_normal(vec3 normal)
-{
-    uvec2 bits = uvec2(ray_normal_of(normal)) & (1u << PATH_NORMAL_BITS) - 1u;
-    return bits.x | bits.y << PATH_NORMAL_BITS;
-}
-
-vec3 unpack_ray_normal(uint bits)
-{
-    int width = int(PATH_NORMAL_BITS);
-    ivec2 p = ivec2(bitfieldExtract(int(bits), 0, width), bitfieldExtract(int(bits), width, width));
-    return unit_from_octahedral(vec2(p) / PATH_NORMAL_MAX);
-}
-
-// Of the chance of asking for emitters to the density of a direction, see PATH_RATIO_STEPS.
-uint ratio_code(float chance, float found)
-{
-    float steps = log2(max(chance, 1e-30) / found) * PATH_RATIO_STEPS + PATH_RATIO_ONE;
-    return found > 0.0 && chance > 0.0 ? uint(clamp(steps + 0.5, 1.0, PATH_RATIO_MAX)) : 0u;
-}
-
-float ratio_of(uint code)
-{
-    return exp2((float(code) - PATH_RATIO_ONE) / PATH_RATIO_STEPS);
-}
-
 bool ask_for_emitter(eye_hit e, uint place, vec2 u)
 {
     float found, chance = 1.0 - e.lights_chance;
@@ -120,30 +82,8 @@ bool ask_for_emitter(eye_hit e, uint place, vec2 u)
     vec3 arriving = vec3(0.0), sent = bsdf_evaluate(e.b, e.s, sampled.direction, found);
     if (sampled.probability > 0.0)
         arriving = e.weight * sent * sampled.radiance / (sampled.probability * chance);
-    float probability = sampled.probability;
-#ifdef EMITTERS_BY_DISTANCE
-    probability = emitter_rough_probability(sampled.distance_);
-#endif
-    if (found > 0.0)
-        arriving *= heuristic(ratio_of(ratio_code(chance, found)) * probability, 1.0);
+    arriving = limited(e.p, 0u, arriving * emitter_share_asked(sampled, chance, found));
     return add_shadow_ray_from(place, e.p, e.origin, sampled.direction, RAY_STOPS_T_MIN, sampled.distance_, arriving);
-}
-
-// The share of its emission that a surface sends along a ray, which may have been asked for already.
-float emission_share(path p, hit h, ray r, vec3 emission)
-{
-    uint code = p.light_number >> PATH_LIGHT_BITS;
-#ifdef EMITTERS_BY_DISTANCE
-    const uint LEFT_OUT = MATERIAL_ALPHA_MASK | MATERIAL_ALPHA_BLEND | MATERIAL_UNLIT;
-    bool asked = code != 0u && (h.material & HIT_SAMPLED) != 0u &&
-                 (material_at(h.material & HIT_MATERIAL_MASK).flags & LEFT_OUT) == 0u;
-    float probability = asked ? emitter_rough_probability(h.distance) : 0.0;
-#else
-    bool asked = code != 0u && max_component(emission) > 0.0 && h.instance != HIT_NO_PRIMITIVE;
-    float probability = emitter_probability(r.origin_t_min.xyz, unpack_ray_normal(p.flags >> PATH_NORMAL_SHIFT),
-                                            h.instance, h.primitive, r.direction_t_max.xyz, h.distance, p.time, asked);
-#endif
-    return probability > 0.0 ? heuristic(1.0, ratio_of(code) * probability) : 1.0;
 }
 #endif
 
@@ -170,7 +110,7 @@ bool ask_for_light(eye_hit e, uint place)
     if (!e.last && probability > 0.0)
         arriving *= heuristic(probability, found);
 #endif
-    return add_shadow_ray(place, e.p, e.origin, sampled.direction, sampled.distance_, arriving);
+    return add_shadow_ray(place, e.p, e.origin, sampled.direction, sampled.distance_, limited(e.p, 0u, arriving));
 }
 
 bool ask_for_environment(eye_hit e, uint place, uint seed, uint index)
@@ -183,7 +123,7 @@ bool ask_for_environment(eye_hit e, uint place, uint seed, uint index)
         arriving = e.weight * sent * environment_radiance(direction) / probability;
     if (!e.last)
         arriving *= heuristic(probability, found);
-    return add_shadow_ray(place, e.p, e.origin, direction, FAR, arriving);
+    return add_shadow_ray(place, e.p, e.origin, direction, FAR, limited(e.p, 0u, arriving));
 }
 
 #ifdef HAS_AREA_LIGHTS
@@ -238,13 +178,13 @@ uint ask_straight_on(eye_hit e, vec3 direction, vec3 through)
         if (met_number(e.p) != 0u && rest > 0.0)
             arriving = carried * light_at(met_number(e.p) - 1u).colour.rgb * e.p.light_share;
 #endif
-        if (add_shadow_ray(place, e.p, origin, direction, rest, arriving))
+        if (add_shadow_ray(place, e.p, origin, direction, rest, limited(e.p, 1u, arriving)))
             alive++;
         place += wave.hits.count;
     }
     if (asks_environment != 0u) {
         vec3 arriving = carried * environment_radiance(direction) * e.p.environment_share;
-        if (add_shadow_ray(place, e.p, origin, direction, FAR, arriving))
+        if (add_shadow_ray(place, e.p, origin, direction, FAR, limited(e.p, 1u, arriving)))
             alive++;
     }
     return alive;
@@ -287,6 +227,7 @@ void go_on(eye_hit e, uint seed, uint index, bool asked, float choice)
     float found = asked && !of_glass ? chosen.probability : 0.0;
     p.flags &= ~(PATH_ASKED | PATH_COVERED);
     p.flags |= (found > 0.0 ? PATH_ASKED : 0u) | (covered ? PATH_COVERED : 0u);
+    p.flags = path_sent_on(p.flags, chosen.lobe == BSDF_SCATTERED ? 1.0 : e.s.roughness);
     p.light_number = 0u;
     p.light_share = 0.0;
     p.environment_share = covered ? 0.0 : 1.0;
@@ -331,6 +272,8 @@ void main()
     vec3 direction = r.direction_t_max.xyz, view = -direction;
     e.distance_ = h.distance;
     e.s = surface_of_path(e.p, h, r);
+    uint seed = path_seed(e.p), index = path_sample(e.p);
+    e.s.roughness = regularised_roughness(e.p, e.s.roughness, index);
     e.origin = off_surface(e.s, h.distance, e.s.geometric);
     e.last = last_wave != 0u || (e.p.flags & PATH_BOUNCES_MASK) >= frame.depth;
     e.all_lights = 0.0;
@@ -347,14 +290,14 @@ void main()
 #endif
     e.b = bsdf_of(e.s, view, NoV, along, anisotropy);
     e.receiver = light_receiver_of(e.s, e.b.parts, e.origin, view, NoV);
-    uint seed = path_seed(e.p), index = path_sample(e.p);
     float choice = sequence_number(seed, numbers_of(SEQUENCE_PATH_LOBE), index);
     bool straight = choice >= e.s.alpha;
     vec3 sent = met_light(e.p, h.distance);
     bool asks = !straight && !e.s.unlit && !e.b.leaves;
     uint alive = 0u;
 #ifdef HAS_EMITTERS
-    e.s.emission *= emission_share(e.p, h, r, e.s.emission);
+    e.s.emission *= emitter_share_met(e.p.light_number >> PATH_LIGHT_BITS, e.p.flags >> PATH_NORMAL_SHIFT, h, r, e.p.time,
+                                      e.s.emission);
 #endif
     if (!straight)
         sent += e.s.unlit ? e.s.base : e.s.emission;
@@ -387,6 +330,6 @@ void main()
         go_on(e, seed, index, asks, min(choice / e.s.alpha, 0.99999994));
     }
     bool seen = !straight && (e.p.flags & PATH_STRAIGHT) != 0u;
-    radiance[k] = vec4(e.weight * sent, seen ? e.p.weight_r : 0.0);
+    radiance[k] = vec4(limited(e.p, 1u, e.weight * sent), seen ? e.p.weight_r : 0.0);
     note_children(j, true, alive);
 }

@@ -18,20 +18,27 @@ struct path {
     float cone_width, cone_spread;      /* at the origin, and per metre: common/cone.glsl */
     uint flags;                         /* PATH_* */
     float time;                         /* 0: the shutter opens .. 1: it closes */
-    /* integrator path: the weights of lights that the ray hits, as shares of their radiance */
-    uint light_number;    /* of the light that it hits, plus 1; 0: none counts. With emitters PATH_LIGHT_BITS, and
-                             above them how its origin has sampled these: PATH_RATIO_* */
+    /* path and distributed: the weights of lights that the ray hits, as shares of their radiance */
+    uint light_number; /* path: of the light that it hits, plus 1; 0: none counts. With emitters PATH_LIGHT_BITS,
+                          and above them how its origin has sampled these: PATH_RATIO_*. distributed: below that
+                          code the normal with which it has */
     float light_distance; /* its distance, if nothing is hit before */
     float light_share, environment_share;
 };
 SHARED_SIZE(path, 48)
 #define PATH_TEXELS 3 /* RGBA32UI */
-#define PATH_BOUNCES_MASK 0xffu
-/* Bits 16..31: distributed: roughness of the surfaces that reflected or refracted it, 65535: 1. */
+#define PATH_BOUNCES_MASK 0x3fu
+#define PATH_STRAIGHT 0x40u /* only blended surfaces lie before it: counts for the picture's alpha */
+#define PATH_ASKED 0x80u    /* path: its origin has sampled lights and environment */
+#define PATH_COVERED 0x100u /* path: such an origin has sampled that light already, through the current glass */
+/* path and distributed, bits 9..11: the maximum roughness of the surfaces that sent it on, in steps, rounded down.
+ * 0: all were smooth or nearly so. */
+#define PATH_STEP_SHIFT 9u
+#define PATH_STEP_MASK 0xe00u
+#define PATH_STEPS 7.0f
+#define PATH_STEPS_ROUGHNESS 0.55f /* of the last one: alpha is 0.3 */
+/* Bits 16..31: distributed: the same, 65535: 1. */
 #define PATH_ROUGHNESS_SHIFT 16u
-#define PATH_STRAIGHT 0x100u /* only blended surfaces lie before it: counts for the picture's alpha */
-#define PATH_ASKED 0x200u    /* path: its origin has sampled lights and environment */
-#define PATH_COVERED 0x400u  /* path: such an origin has sampled that light already, through the current glass */
 /* path, with emitters: bits 12..31: the normal with which its origin has sampled them, octahedral. */
 #define PATH_NORMAL_SHIFT 12u
 #define PATH_NORMAL_BITS 10u /* of each number; signed */

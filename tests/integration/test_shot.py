@@ -20,7 +20,7 @@ EXAMPLES = {
         "exposure": -1.5, "tone_map": "aces", "shutter": 0.5, "filter": "gaussian", "tracer": "bvh",
         "bvh_bounds": "sphere", "bvh_rays": 2, "ldc_resolution": 512, "ldc_block": 4, "ldc_build": "lists",
         "ldc_levels": "pyramid", "ldc_images": "one", "ldc_tolerance": 0.001, "ldc_rays": 4,
-        "abuffer_resolution": 512, "abuffer_voxels": 16, "abuffer_search": "linear3", "brdf": "ward", "ao_distance": 0.5, "ao_falloff": 1,
+        "abuffer_resolution": 512, "abuffer_voxels": 16, "abuffer_search": "linear3", "brdf": "ward", "clamp": 5, "ao_distance": 0.5, "ao_falloff": 1,
         "ao_rays": 4, "layer_opacity": 0.25, "layers": ["beauty", "depth", "id"], "integrator": "path", "primary": "trace", "encoding": "zstd",
         "quality": 3, "format": "exr", "half": True, "float": False, "output": "%04d.exr"},
     "movie": {
@@ -274,6 +274,7 @@ class Schema(Shots):
                 ("stills", ("abuffer_resolution",), (0, 1, 15, 16, 4096, 4097, 512.5)),
                 ("stills", ("abuffer_voxels",), (0, 8, 16, 17, 32, 64, 100, 128, 256, 512, -1, "auto", "all", "64", 16.5)),
                 ("stills", ("abuffer_search",), ("auto", "dda", "linear1", "linear2")),
+                ("stills", ("clamp",), (0, 1e6, 1.1e6, -0.1)),
                 ("stills", ("ao_distance",), (0, 1e12, 1.1e12, -0.1)),
                 ("stills", ("ao_falloff",), (0, 64, 64.5, -0.1)),
                 ("stills", ("ao_rays",), (0, 1, 256, 257)),

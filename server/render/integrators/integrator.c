@@ -33,6 +33,11 @@ static uint32_t one_for_all_lights(const struct render_context *context)
     return context->uniforms.light_count > 0 || context_samples_emitters(context);
 }
 
+static uint32_t one_for_lights_and_image(const struct render_context *context)
+{
+    return one_for_all_lights(context) || context->environment->kind == ENVIRONMENT_IMAGE;
+}
+
 static uint32_t one_for_the_environment(const struct render_context *context)
 {
     return context->environment->kind != ENVIRONMENT_NONE;
@@ -74,6 +79,43 @@ static size_t emitter_defines(const struct render_context *context, struct gpu_d
     return n;
 }
 
+static void set_environment_choice(struct render_context *context, const struct gpu_program *program)
+{
+    struct environment_choice *choice = context->environment_choice;
+    gpu_uniform_uint(program, "environment_rows", choice->rows);
+    gpu_uniform_uint(program, "environment_columns", choice->columns);
+    gpu_uniform_float(program, "environment_extent", choice->extent);
+    gpu_buffer_bind_texels(context->device, &choice->table, UNIT_SHADE_ENVIRONMENT, GL_R32F);
+}
+
+static bool prepare_environment_choice(struct render_context *context, struct error *error)
+{
+    return environment_choice_update(context->environment_choice, context->device, context->environment,
+                                     &context->scene->scene->environment, error);
+}
+
+/* Of an image; what a mirror sees of other environments its own rays find as well. */
+static size_t distributed_defines(const struct render_context *context, struct gpu_define *defines)
+{
+    size_t n = emitter_defines(context, defines);
+    if (context->environment->kind != ENVIRONMENT_IMAGE || context->environment_choice->rows == 0)
+        return n;
+    defines[n++] = (struct gpu_define){"HAS_ENVIRONMENT_IMAGE", "1"};
+    defines[n++] = (struct gpu_define){"HAS_ENVIRONMENT_TABLE", "1"};
+    return n;
+}
+
+static void set_distributed(struct render_context *context, const struct gpu_program *program)
+{
+    if (context->environment->kind == ENVIRONMENT_IMAGE)
+        set_environment_choice(context, program);
+}
+
+static bool prepare_distributed(struct render_context *context, struct error *error)
+{
+    return context->environment->kind != ENVIRONMENT_IMAGE || prepare_environment_choice(context, error);
+}
+
 static size_t path_defines(const struct render_context *context, struct gpu_define *defines)
 {
     size_t n = emitter_defines(context, defines);
@@ -90,18 +132,9 @@ static size_t path_defines(const struct render_context *context, struct gpu_defi
 
 static void set_path(struct render_context *context, const struct gpu_program *program)
 {
-    struct environment_choice *choice = context->environment_choice;
     gpu_uniform_uint(program, "asks_lights", one_for_all_lights(context));
     gpu_uniform_uint(program, "asks_environment", one_for_the_environment(context));
-    gpu_uniform_uint(program, "environment_rows", choice->rows);
-    gpu_uniform_uint(program, "environment_columns", choice->columns);
-    gpu_buffer_bind_texels(context->device, &choice->table, UNIT_SHADE_ENVIRONMENT, GL_R32F);
-}
-
-static bool prepare_path(struct render_context *context, struct error *error)
-{
-    return environment_choice_update(context->environment_choice, context->device, context->environment,
-                                     &context->scene->scene->environment, error);
+    set_environment_choice(context, program);
 }
 
 /* ---- the table ---- */
@@ -136,8 +169,11 @@ static const struct integrator integrators[] = {
             .shadows_together = true,
             .shadow_waves = 1,
             .straight_waves = STRAIGHT_WAVES,
-            .shadow_rays_a_hit = one_for_all_lights,
-            .defines = emitter_defines,
+            .shadow_rays_a_hit = one_for_lights_and_image,
+            .left_scene = "SHARES",
+            .defines = distributed_defines,
+            .set = set_distributed,
+            .prepare = prepare_distributed,
         },
     /* Ray casting through all layers: each is lit without shadows and blended over those behind it. */
     [INTEGRATOR_RAYCAST] =
@@ -181,9 +217,10 @@ static const struct integrator integrators[] = {
             .straight_waves = STRAIGHT_WAVES,
             .shadow_rays_a_hit = one_each_for_lights_and_environment,
             .left_scene = "SHARES",
+            .meets_lights = true,
             .defines = path_defines,
             .set = set_path,
-            .prepare = prepare_path,
+            .prepare = prepare_environment_choice,
         },
 };
 

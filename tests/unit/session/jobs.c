@@ -406,6 +406,7 @@ SESSION_TEST(settings_of_a_buffers_and_light_go_to_the_engine)
     message.render.brdf = PROTOCOL_BRDF_WARD;
     message.render.ao_distance = 2;
     message.render.ao_falloff = 0.5f;
+    message.render.clamp = 8;
     message.render.ao_rays = 256;
     message.render.layer_opacity = 0.75f;
     message.render.format = PROTOCOL_PIXEL_FORMAT_RGBA32F;
@@ -421,6 +422,7 @@ SESSION_TEST(settings_of_a_buffers_and_light_go_to_the_engine)
     assert_int_equal(request->tracer_options.limits.abuffer_mebibytes, 1);
     assert_int_equal(request->integrator, INTEGRATOR_PATH);
     assert_int_equal(request->brdf, BRDF_WARD);
+    assert_true(request->clamp == 8);
     assert_true(request->ao_distance == 2 && request->ao_falloff == 0.5f && request->layer_opacity == 0.75f);
     assert_int_equal(request->ao_rays, 256);
     assert_int_equal(request->layers, message.render.layers);

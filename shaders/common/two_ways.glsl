@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: MIT
+// Light that is found in two ways, by a shadow ray and by a child, and weighed by multiple importance sampling: Veach,
+// Guibas. Optimally Combining Sampling Techniques for Monte Carlo Rendering. 1995, with the power heuristic.
+//
+// A child that hits an emitter has to know how its origin would have asked for it: the normal with which it chooses
+// among them, and of the chance of asking for emitters to the density of the child's direction a code
+// (PATH_RATIO_STEPS). Shadow rays round both alike, so that the weights add up to 1.
+//
+// Defines: those of common/emitter.glsl; EMITTERS_BY_DISTANCE hits do not tell which of them they are of, so both ways are
+// weighed by a density that the distance alone says.
+
+#include "shared/path.h"
+#include "shared/ray.h"
+#include "common/emitter.glsl"
+
+// The weight of a technique, beside another that might have found the same light.
+float heuristic(float own, float other)
+{
+    float ratio = other / own;
+    return own > 0.0 ? 1.0 / (1.0 + ratio * ratio) : 0.0;
+}
+
+#ifdef HAS_EMITTERS
+ivec2 ray_normal_of(vec3 normal)
+{
+    return ivec2(round(octahedral_from_unit(normal) * PATH_NORMAL_MAX));
+}
+
+uint pack_ray_normal(vec3 normal)
+{
+    uvec2 bits = uvec2(ray_normal_of(normal)) & (1u << PATH_NORMAL_BITS) - 1u;
+    return bits.x | bits.y << PATH_NORMAL_BITS;
+}
+
+vec3 unpack_ray_normal(uint bits)
+{
+    int width = int(PATH_NORMAL_BITS);
+    ivec2 p = ivec2(bitfieldExtract(int(bits), 0, width), bitfieldExtract(int(bits), width, width));
+    return unit_from_octahedral(vec2(p) / PATH_NORMAL_MAX);
+}
+
+uint ratio_code(float chance, float found)
+{
+    float steps = log2(max(chance, 1e-30) / found) * PATH_RATIO_STEPS + PATH_RATIO_ONE;
+    return found > 0.0 && chance > 0.0 ? uint(clamp(steps + 0.5, 1.0, PATH_RATIO_MAX)) : 0u;
+}
+
+float ratio_of(uint code)
+{
+    return exp2((float(code) - PATH_RATIO_ONE) / PATH_RATIO_STEPS);
+}
+
+// The share of a shadow ray's light, asked for with that chance, where a child has the density `found`.
+float emitter_share_asked(emitter_sample sampled, float chance, float found)
+{
+    float probability = sampled.probability;
+#ifdef EMITTERS_BY_DISTANCE
+    probability = emitter_rough_probability(sampled.distance_);
+#endif
+    return found > 0.0 ? heuristic(ratio_of(ratio_code(chance, found)) * probability, 1.0) : 1.0;
+}
+
+// The share of its emission that a surface sends along a ray, whose origin may have asked for it already. `normal`: packed.
+float emitter_share_met(uint code, uint normal, hit h, ray r, float time, vec3 emission)
+{
+#ifdef EMITTERS_BY_DISTANCE
+    const uint LEFT_OUT = MATERIAL_ALPHA_MASK | MATERIAL_ALPHA_BLEND | MATERIAL_UNLIT;
+    bool asked = code != 0u && (h.material & HIT_SAMPLED) != 0u &&
+                 (material_at(h.material & HIT_MATERIAL_MASK).flags & LEFT_OUT) == 0u;
+    float probability = asked ? emitter_rough_probability(h.distance) : 0.0;
+#else
+    bool asked = code != 0u && max_component(emission) > 0.0 && h.instance != HIT_NO_PRIMITIVE;
+    float probability = emitter_probability(r.origin_t_min.xyz, unpack_ray_normal(normal), h.instance, h.primitive,
+                                            r.direction_t_max.xyz, h.distance, time, asked);
+#endif
+    return probability > 0.0 ? heuristic(1.0, ratio_of(code) * probability) : 1.0;
+}
+#endif
