@@ -353,6 +353,7 @@ struct fl_frame {
     /* Of what moves: pixels on each side beyond the picture that was asked for; width, height and fov_y are of
      * all. */
     uint32_t margin_x, margin_y;
+    uint32_t depth_less; /* bounces fewer than were asked for, for the moving_rate */
     /* How many surfaces hide what it shows, of the picture of_frame, at half of its width and height, rounded up;
      * 0: it is a picture. */
     uint32_t hidden_layer;

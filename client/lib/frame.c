@@ -185,6 +185,7 @@ static struct fl_frame *new_frame(const struct message_frame_begin *begin)
     frame->margin_y = begin->margin_y;
     frame->depth_bytes = begin->depth_bytes;
     frame->hidden_layer = begin->hidden_layer;
+    frame->depth_less = begin->depth_less;
     frame->of_frame = begin->of_frame;
     frame->wire_bytes = begin->size_bytes + begin->depth_bytes + begin->normal_bytes + begin->sticking_bytes;
     frame->parts = 1;

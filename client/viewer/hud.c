@@ -101,6 +101,8 @@ static void print_samples(const struct hud_state *state, char *out, size_t bytes
 {
     if (state->samples == 0)
         snprintf(out, bytes, "no picture yet");
+    else if (state->moving && state->depth_less > 0)
+        snprintf(out, bytes, "moving: %u of %u bounces", state->depth - state->depth_less, state->depth);
     else if (state->moving)
         snprintf(out, bytes, "moving");
     else if (state->samples < state->samples_wanted)

@@ -62,6 +62,7 @@ struct hud_state {
     const struct metrics *metrics;
     uint64_t now_ns;
     uint32_t picture_width, picture_height, samples, samples_wanted;
+    uint32_t depth, depth_less; /* bounces that were asked for, and how many fewer there are */
     bool moving;
     uint64_t revision, wire_bytes;            /* of the last frame */
     const char *structure[HUD_STRUCTURE_MAX]; /* what its tracer says of its parts; NULL: no more */

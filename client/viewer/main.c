@@ -14,6 +14,7 @@
 /* The C library looks for it by name, past our hidden visibility. */
 __attribute__((visibility("default"))) const char *argp_program_version = "farlight-view " FARLIGHT_VERSION;
 
+#define MOVING_RATE_DEFAULT 15.0f
 #define STEREO_DEFAULT_M 0.065f /* between the eyes of people */
 
 enum key {
@@ -21,6 +22,7 @@ enum key {
     KEY_HEADLESS,
     KEY_REPLAY,
     KEY_RATE,
+    KEY_MOVING_RATE,
     KEY_SAMPLES,
     KEY_INTEGRATOR,
     KEY_PASS,
@@ -44,6 +46,11 @@ static const struct argp_option options[] = {
     {"integrator", KEY_INTEGRATOR, "NAME", 0,
      "Use whitted (default), distributed (default with a lens or a shutter), raycast, ao or path", -2},
     {"fps", KEY_RATE, "N", 0, "Render at most N frames per second (default 60)", -2},
+    {"moving-rate", KEY_MOVING_RATE, "N", 0,
+     "Render N frames per second or more while something moves: bounces and size give way to that; 0: nothing "
+     "does "
+     "(default 15; with --no-adapt 0)",
+     -2},
     {"scale", KEY_SCALE, "N", 0, "Show a rendered pixel as NxN pixels of the window: 1 (default), 2, 4, 8", -2},
     {"encoding", KEY_ENCODING, "NAME", 0,
      "How pixels travel while something moves: raw, h264, jpeg, predicted, zstd (default: raw on this machine, "
@@ -74,6 +81,7 @@ static const struct argp_option options[] = {
 struct command_line {
     struct cli_job job;
     struct viewer_options viewer;
+    bool has_moving_rate;
 };
 
 static error_t name_field(struct cli_job *job, const char *field, bool good)
@@ -168,6 +176,16 @@ static error_t set_rate(struct command_line *line, const char *value)
     return status;
 }
 
+static error_t set_moving_rate(struct command_line *line, const char *value)
+{
+    double real = 0;
+    const error_t status =
+        name_field(&line->job, "--moving-rate", fl_text_real(value, 0, 1000, &real, &line->job.error));
+    line->viewer.moving_rate = (float)real;
+    line->has_moving_rate = true;
+    return status;
+}
+
 static error_t set_model(struct command_line *line, const char *value)
 {
     if (line->job.model)
@@ -202,6 +220,8 @@ static error_t parse(int key, char *value, struct argp_state *state)
     case KEY_NO_ADAPT:
         viewer->never_adapt = true;
         return 0;
+    case KEY_MOVING_RATE:
+        return set_moving_rate(line, value);
     case KEY_RATE:
         return set_rate(line, value);
     case KEY_SAMPLES:
@@ -288,6 +308,8 @@ static void fill(struct command_line *line)
     viewer->stereo_m = job->views.has_stereo ? job->views.stereo_m : STEREO_DEFAULT_M;
     viewer->stereo_over = job->views.layout == CLI_STEREO_OVER;
     viewer->views = job->views.has_stereo ? job->options.view_source : PROTOCOL_VIEW_SOURCE_LAYERS;
+    if (!line->has_moving_rate)
+        viewer->moving_rate = viewer->never_adapt ? 0.0f : MOVING_RATE_DEFAULT;
     viewer->has_encoding = job->has_encoding;
     viewer->has_primary = job->has_primary;
     viewer->has_integrator = job->has_integrator;

@@ -16,6 +16,7 @@ struct viewer_options {
     enum protocol_view_source views; /* of two eyes */
     bool has_encoding, has_still_encoding, has_primary, has_integrator;
     bool always_adapt, never_adapt;
+    float moving_rate;         /* frames a second */
     const char *camera, *clip; /* names or numbers; NULL: none is named */
     double speed;              /* of the clip */
     unsigned coarser;          /* as of struct settings */

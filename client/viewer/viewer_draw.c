@@ -77,31 +77,34 @@ static void fill_local(const struct viewer *viewer, struct hud_state *state)
 
 void viewer_hud(struct viewer *viewer, struct hud_state *state)
 {
-    *state = (struct hud_state){.width = viewer->width,
-                                .height = viewer->height,
-                                .scale = viewer->scale,
-                                .notice = "",
-                                .settings = &viewer->settings,
-                                .exposure_stops =
-                                    (double)viewer->view.exposure_stops + viewer->settings.exposure_thirds / 3.0,
-                                .stereo_m = (double)viewer->options->stereo_m,
-                                .tour = &viewer->tour,
-                                .metrics = &viewer->metrics,
-                                .now_ns = monotonic_now_ns(),
-                                .picture_width = viewer->frame.width,
-                                .picture_height = viewer->frame.height,
-                                .samples = viewer->frame.samples,
-                                .samples_wanted = viewer->view.samples,
-                                .moving = viewer->frame.moving,
-                                .revision = viewer->frame.revision,
-                                .wire_bytes = viewer->frame.wire_bytes,
-                                .encoding = viewer->frame.encoding,
-                                .quality = viewer->frame.frame_quality,
-                                .heat = viewer->has_heat             ? HUD_HEAT_SHOWN
-                                        : viewer->settings.error_map ? HUD_HEAT_WAITING
-                                                                     : HUD_HEAT_NONE,
-                                .heat_figures = viewer->heat_figures,
-                                .heat_top = HEAT_TOP};
+    *state = (struct hud_state){
+        .width = viewer->width,
+        .height = viewer->height,
+        .scale = viewer->scale,
+        .notice = "",
+        .settings = &viewer->settings,
+        .exposure_stops = (double)viewer->view.exposure_stops + viewer->settings.exposure_thirds / 3.0,
+        .stereo_m = (double)viewer->options->stereo_m,
+        .tour = &viewer->tour,
+        .metrics = &viewer->metrics,
+        .now_ns = monotonic_now_ns(),
+        .picture_width = viewer->frame.width,
+        .picture_height = viewer->frame.height,
+        .samples = viewer->frame.samples,
+        .samples_wanted = viewer->view.samples,
+        .depth = viewer->view.depth,
+        .depth_less =
+            viewer->frame.depth_less < viewer->view.depth ? viewer->frame.depth_less : viewer->view.depth,
+        .moving = viewer->frame.moving,
+        .revision = viewer->frame.revision,
+        .wire_bytes = viewer->frame.wire_bytes,
+        .encoding = viewer->frame.encoding,
+        .quality = viewer->frame.frame_quality,
+        .heat = viewer->has_heat             ? HUD_HEAT_SHOWN
+                : viewer->settings.error_map ? HUD_HEAT_WAITING
+                                             : HUD_HEAT_NONE,
+        .heat_figures = viewer->heat_figures,
+        .heat_top = HEAT_TOP};
     for (size_t i = 0; i < viewer->structure_count; i++)
         state->structure[i] = viewer->structure[i];
     fill_names(viewer, state);
@@ -182,7 +185,7 @@ void viewer_print_state(struct viewer *viewer, const char *name)
     metrics_summarise(&viewer->metrics, state.now_ns, &summary);
     json_t *line = json_pack(
         "{s:s, s:s, s:s, s:s, s:s, s:s, s:f, s:i, s:i, s:b, s:i, s:i, s:I, s:i, s:I, s:s, s:s, s:f, s:b, s:o, "
-        "s:o, s:o, s:o, s:f, s:f, s:f, s:b, s:s, s:o}",
+        "s:o, s:o, s:o, s:f, s:f, s:f, s:b, s:s, s:o, s:i}",
         "state", name, "status", statuses[state.status], "tracer", protocol_tracer_text(viewer->frame.tracer),
         "integrator", protocol_integrator_text(viewer->frame.integrator), "tone_map",
         protocol_tone_map_text(viewer->settings.tone_map), "encoding",
@@ -195,7 +198,8 @@ void viewer_print_state(struct viewer *viewer, const char *name)
         vector_json(viewer->camera.look_at), "settings", settings_json(&viewer->settings), "structure",
         structure_json(viewer), "fov_y", viewer->camera.fov_y, "frames_per_second", summary.frames_per_second,
         "latency_s", summary.latency_s, "stereo", (int)viewer->settings.stereo, "eyes",
-        protocol_view_source_text(viewer->settings.views), "local", local_json(viewer, &state, &summary));
+        protocol_view_source_text(viewer->settings.views), "local", local_json(viewer, &state, &summary),
+        "depth_less", (int)state.depth_less);
     if (line && viewer->has_heat)
         json_object_set_new(line, "errors",
                             json_pack("{s:f, s:f, s:f}", "mean", viewer->heat_figures.mean, "max",

@@ -58,6 +58,13 @@ static void choose_encodings(const struct viewer *viewer, struct message_render 
     view->parts = !is_local;
 }
 
+/* Views that are made here move at the display's rate whatever the daemon's take; clips do not move in them. */
+static void choose_rate(const struct viewer *viewer, struct message_render *view)
+{
+    if (!viewer->local_asked || viewer->tour.clip != TOUR_NONE)
+        view->moving_rate = viewer->options->moving_rate;
+}
+
 static void show(struct viewer *viewer)
 {
     struct message_render view = viewer->view;
@@ -81,6 +88,7 @@ static void show(struct viewer *viewer)
         view.clips_count = 1;
     }
     viewer_ask_local(viewer, &view);
+    choose_rate(viewer, &view);
     viewer->must_show = !session_show(viewer->session, &view, &viewer->change);
     viewer->must_look = true; /* frames name a camera from which on they are the new ones */
 }

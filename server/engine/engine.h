@@ -106,6 +106,7 @@ struct engine_job {
     unsigned weight; /* its share of the device's time among the jobs of its client, and of its owner; 0: 1 */
     unsigned granted_weight; /* the same among all owners; 0: weight */
     bool adapt;              /* view: quality and size follow the link */
+    bool keeps_rate;         /* view: what is rendered follows what it takes */
     struct view_depth depth; /* view: of what is attached */
     float margin;            /* view: of frames while it moves, share of width and height on each side */
     uint32_t hidden_layers;  /* view: frames of what is hidden that follow each while it moves */
@@ -235,6 +236,7 @@ struct engine_frame {
     unsigned quality;                 /* it was encoded with; 0: lossless */
     unsigned scale_eighths;           /* of the width and height that the job asks for; 0: all of it */
     unsigned margin_halves_less;      /* of the job's margin, as of struct view_effort */
+    unsigned depth_less;              /* of the job's bounces, likewise */
     uint64_t wanted_bytes;            /* that it may have, for an encoder that can be told; 0: not known */
     bool wants_key;                   /* it is to be encoded so that it can be decoded without those before .. */
     bool key_frame;                   /* .. and so it was */

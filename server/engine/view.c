@@ -105,7 +105,7 @@ static void set_due(struct job *job)
 /* While it moves. */
 static bool adapts(const struct job *job)
 {
-    return job->spec.adapt && job->view.wish.camera.moving;
+    return (job->spec.adapt || job->spec.keeps_rate) && job->view.wish.camera.moving;
 }
 
 static uint32_t samples_of_next(const struct job *job)
@@ -118,11 +118,19 @@ static uint32_t samples_of_next(const struct job *job)
     return limited ? view->wish.effort.samples : wanted;
 }
 
-/* Smaller while it moves, if the rate requires it. */
+/* That it goes without. */
+static uint32_t depth_less(const struct job *job)
+{
+    const uint32_t less = adapts(job) ? job->view.wish.effort.depth_less : 0;
+    return less < job->spec.frame.depth ? less : job->spec.frame.depth;
+}
+
+/* Smaller and with fewer bounces while it moves, if the rate requires it. */
 static void apply_effort(const struct job *job, struct frame_request *request)
 {
     const struct view_wish *wish = &job->view.wish;
     uint32_t scale = wish->effort.scale_eighths;
+    request->depth = job->spec.frame.depth - depth_less(job);
     if (!adapts(job) || !scale || scale >= 8)
         return;
     uint32_t width, height;
@@ -335,10 +343,11 @@ void view_done(struct job *job, struct engine_frame *frame)
     view->held_samples = frame->result.samples;
     view->owes_key_frame |= view->wish.key_frame;
     view->wish.key_frame = false;
-    if (camera->moving && job->spec.adapt) {
+    if (adapts(job)) {
         const struct view_effort *effort = &view->wish.effort;
         frame->scale_eighths = effort->scale_eighths;
         frame->margin_halves_less = effort->margin_halves_less;
+        frame->depth_less = depth_less(job);
         frame->wanted_bytes = effort->bytes;
     }
     bool spares = job->spec.adapt && view->wish.effort.sparing && view->held_samples < job->spec.frame.samples;

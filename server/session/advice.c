@@ -3,6 +3,7 @@
 #include "session/pacing.h"
 
 #include <math.h>
+#include <string.h>
 
 /* Share of the link that frames may fill: the rest drains other queues, and the connection's own. */
 #define LINK_SHARE 0.9
@@ -15,13 +16,21 @@
 /* Factor by which a frame may take longer than the time that no size can reduce. */
 #define OF_FIXED 1.5
 /* How many times in a row the next better step must fit, with this room. */
+/* With as many light goes into glass and out again. */
+#define DEPTH_MIN 2u
 #define BETTER_TIMES 8
 #define BETTER_ROOM 1.25
 /* A client that makes its own views asks for a picture that often at least while it moves: one that is there by
  * then is better large than early. */
 #define LATE_NS 250e6
 
-static const unsigned scales_eighths[] = {8, 6, 4, 3, 2};
+/* Of a deadline: the rest is for the picture's way to its client, which is not rendering. */
+#define DEADLINE_SHARE 0.85
+/* Of two frames in a row that take that many times as long as expected, or as short, the scene is another one; a
+ * single one was disturbed. */
+#define SURPRISE 2.0
+
+static const unsigned scales_eighths[] = {8, 7, 6, 5, 4, 3, 2};
 #define SCALES (sizeof(scales_eighths) / sizeof(scales_eighths[0]))
 
 /* ---- what pictures cost ------------------------------------------------------------------------------ */
@@ -78,12 +87,68 @@ static void learn_render(struct pacing *pacing, double area, double render_ns)
     pacing->render_fixed_ns = fmin(pacing->render_fixed_ns, mean_ns);
 }
 
+static unsigned depth_of(const struct pacing *pacing, const struct pacing_advice *advice)
+{
+    const unsigned depth = pacing->terms.depth < PACING_WAVES ? pacing->terms.depth : PACING_WAVES - 1;
+    return depth - (advice->depth_less < depth ? advice->depth_less : depth);
+}
+
+/* Of a full picture with all samples. */
+static double bounces_ns(const struct pacing *pacing, const struct pacing_advice *advice)
+{
+    double sum_ns = 0.0;
+    for (unsigned wave = 1; wave <= depth_of(pacing, advice); wave++)
+        sum_ns += pacing->bounce_ns[wave];
+    return sum_ns;
+}
+
+static double render_ns_of(const struct pacing *pacing, const struct pacing_advice *advice)
+{
+    if (!(pacing->render_frames > 0.0))
+        return 0.0;
+    double mean_ns = pacing->render_ns / pacing->render_frames;
+    double mean_area = pacing->render_areas / pacing->render_frames;
+    const double of_work_ns = (mean_ns - pacing->render_fixed_ns) / mean_area + bounces_ns(pacing, advice);
+    return pacing->render_fixed_ns + of_work_ns * work_of(pacing, advice);
+}
+
+/* Forgets what no longer holds. */
+static bool is_disturbed(struct pacing *pacing, const struct pacing_advice *made, double render_ns)
+{
+    const double expected_ns = render_ns_of(pacing, made);
+    const bool surprises =
+        expected_ns > 0.0 && (render_ns > SURPRISE * expected_ns || render_ns < expected_ns / SURPRISE);
+    pacing->surprises = surprises ? pacing->surprises + 1 : 0;
+    if (pacing->surprises < 2)
+        return surprises;
+    pacing->surprises = 0;
+    pacing->render_frames = pacing->render_areas = pacing->render_ns = 0.0;
+    pacing->render_areas_areas = pacing->render_areas_ns = 0.0;
+    memset(pacing->bounce_ns, 0, sizeof(pacing->bounce_ns));
+    return false;
+}
+
+void pacing_learn_waves(struct pacing *pacing, const struct pacing_advice *made, uint64_t render_ns,
+                        const uint64_t wave_ns[PACING_WAVES], uint64_t bytes)
+{
+    const double work = work_of(pacing, made);
+    double rest_ns = (double)render_ns;
+    if (made->quality && bytes > 0)
+        learn(&pacing->bytes_full, (double)bytes / area_of(pacing, made) / bytes_of_quality(made->quality));
+    if (pacing->terms.deadline_ns && is_disturbed(pacing, made, (double)render_ns))
+        return;
+    for (unsigned wave = 1; wave <= depth_of(pacing, made); wave++) {
+        learn(&pacing->bounce_ns[wave], (double)wave_ns[wave] / work);
+        rest_ns -= (double)wave_ns[wave];
+    }
+    learn_render(pacing, work, fmax(rest_ns, 0.0));
+}
+
 void pacing_learn_picture(struct pacing *pacing, const struct pacing_advice *made, uint64_t render_ns,
                           uint64_t bytes)
 {
-    learn_render(pacing, work_of(pacing, made), (double)render_ns);
-    if (made->quality)
-        learn(&pacing->bytes_full, (double)bytes / area_of(pacing, made) / bytes_of_quality(made->quality));
+    static const uint64_t unknown[PACING_WAVES];
+    pacing_learn_waves(pacing, made, render_ns, unknown, bytes);
 }
 
 void pacing_learn(struct pacing *pacing, unsigned scale_eighths, unsigned quality, uint64_t render_ns,
@@ -98,15 +163,6 @@ void pacing_learn_hidden(struct pacing *pacing, uint64_t bytes)
     learn(&pacing->hidden_bytes, (double)bytes);
 }
 
-static double render_ns_of(const struct pacing *pacing, const struct pacing_advice *advice)
-{
-    if (!(pacing->render_frames > 0.0))
-        return 0.0;
-    double mean_ns = pacing->render_ns / pacing->render_frames;
-    double mean_area = pacing->render_areas / pacing->render_frames;
-    return pacing->render_fixed_ns + (mean_ns - pacing->render_fixed_ns) / mean_area * work_of(pacing, advice);
-}
-
 /* With the layers that follow it. */
 static double bytes_of(const struct pacing *pacing, const struct pacing_advice *advice)
 {
@@ -118,7 +174,7 @@ static double bytes_of(const struct pacing *pacing, const struct pacing_advice *
  * fit too. */
 static double bytes_a_frame(const struct pacing *pacing)
 {
-    if (!(pacing->carried_ns > 0.0))
+    if (!(pacing->carried_ns > 0.0) || pacing->terms.ignores_link)
         return INFINITY;
     double of_link = LINK_SHARE * pacing->carried_bytes / pacing->carried_ns * (double)pacing->frame_ns;
     double way_frames = (double)pacing_round_trip_ns(pacing) / (double)pacing->frame_ns;
@@ -140,13 +196,14 @@ static struct limits limits_of(const struct pacing *pacing, double room)
 {
     const double frame_ns = (double)pacing->frame_ns, bytes = bytes_a_frame(pacing) / room;
     const bool makes_views = pacing_makes_views(&pacing->terms);
-    const double late_ns = makes_views ? fmax(frame_ns, LATE_NS) : frame_ns;
+    const double deadline_ns = DEADLINE_SHARE * (double)pacing->terms.deadline_ns;
+    const double late_ns = deadline_ns > 0.0 ? deadline_ns : makes_views ? fmax(frame_ns, LATE_NS) : frame_ns;
     return (struct limits){
         .bytes = bytes,
         /* Where even the smallest picture would be late, it would not be worth its size. */
         .render_ns = fmax(late_ns, OF_FIXED * pacing->render_fixed_ns) / room,
-        .samples_ns = frame_ns / room,
-        .smaller_bytes = bytes * late_ns / frame_ns,
+        .samples_ns = (deadline_ns > 0.0 ? deadline_ns : frame_ns) / room,
+        .smaller_bytes = makes_views ? bytes * fmax(frame_ns, LATE_NS) / frame_ns : bytes,
     };
 }
 
@@ -157,12 +214,23 @@ static void lower_quality(const struct pacing *pacing, const struct limits *limi
         advice->quality--;
 }
 
+static void give_up_samples(const struct pacing *pacing, const struct limits *limits, struct pacing_advice *advice)
+{
+    while (advice->samples > 1 && render_ns_of(pacing, advice) > limits->samples_ns)
+        advice->samples--;
+}
+
+static void give_up_bounces(const struct pacing *pacing, const struct limits *limits, struct pacing_advice *advice)
+{
+    while (depth_of(pacing, advice) > DEPTH_MIN && render_ns_of(pacing, advice) > limits->render_ns)
+        advice->depth_less++;
+}
+
 /* Samples, layers of what is hidden, and the margin, until the rest fits; some fits nothing. */
 static void give_up_extras(const struct pacing *pacing, const struct limits *limits, struct pacing_advice *advice)
 {
     const bool has_margin = pacing->terms.margin > 0.0f;
-    while (advice->samples > 1 && render_ns_of(pacing, advice) > limits->samples_ns)
-        advice->samples--;
+    give_up_samples(pacing, limits, advice);
     advice->no_hidden = pacing->terms.hidden_layers > 0 && bytes_of(pacing, advice) > limits->bytes;
     while (has_margin && advice->margin_halves_less < 2 &&
            (bytes_of(pacing, advice) > limits->bytes || render_ns_of(pacing, advice) > limits->render_ns))
@@ -184,6 +252,12 @@ static bool fits(const struct pacing *pacing, const struct limits *limits, unsig
            bytes_of(pacing, &advice) <= limits->smaller_bytes;
 }
 
+/* Others have steps of about a half of the area: each costs a stream of pictures a key frame. */
+static bool is_for_deadlines(unsigned eighths)
+{
+    return eighths == 7 || eighths == 5;
+}
+
 /* The best step that fits `room` times; else the smallest. */
 static struct pacing_advice best_that_fits(const struct pacing *pacing, unsigned quality_wanted, double room)
 {
@@ -191,13 +265,19 @@ static struct pacing_advice best_that_fits(const struct pacing *pacing, unsigned
     const unsigned minimum = quality_wanted < PACING_QUALITY_MIN ? quality_wanted : PACING_QUALITY_MIN;
     struct pacing_advice advice = full_advice(pacing, quality_wanted);
     for (size_t i = 0; i < SCALES; i++) {
+        if (!pacing->terms.deadline_ns && is_for_deadlines(scales_eighths[i]))
+            continue;
         advice = full_advice(pacing, quality_wanted);
         advice.scale_eighths = scales_eighths[i];
         if (pacing_makes_views(&pacing->terms))
             give_up_extras(pacing, &limits, &advice); /* a smaller picture may have what a larger one did not */
+        if (pacing->terms.deadline_ns)
+            give_up_samples(pacing, &limits, &advice);
         if (fits(pacing, &limits, minimum, advice))
             break;
     }
+    if (pacing->terms.deadline_ns)
+        give_up_bounces(pacing, &limits, &advice);
     lower_quality(pacing, &limits, minimum, &advice);
     return advice;
 }
@@ -207,6 +287,8 @@ static struct pacing_advice best_that_fits(const struct pacing *pacing, unsigned
 /* What is given up last counts first. */
 static bool is_better(const struct pacing_advice *a, const struct pacing_advice *b)
 {
+    if (a->depth_less != b->depth_less)
+        return a->depth_less < b->depth_less;
     if (a->scale_eighths != b->scale_eighths)
         return a->scale_eighths > b->scale_eighths;
     if (a->quality != b->quality)

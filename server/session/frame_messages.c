@@ -51,6 +51,7 @@ void frame_fill_begin(struct message_frame_begin *begin, const struct engine_fra
     begin->margin_y = frame->margin_y;
     begin->hidden_layer = frame->request.hidden_layer;
     begin->of_frame = frame->of_frame;
+    begin->depth_less = frame->depth_less;
     begin->format = (enum protocol_pixel_format)frame->request.format;
     begin->encoding = (enum protocol_encoding)frame->encoding;
     begin->tracer = (enum protocol_tracer)frame->request.tracer;

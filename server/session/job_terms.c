@@ -439,6 +439,7 @@ static void fill_rest(struct engine_job *job, const struct session *session, con
         .weight = weight,
         .granted_weight = weight < granted ? weight : granted,
         .adapt = render->adapt != 0,
+        .keeps_rate = render->moving_rate > 0.0f,
         .depth = {(enum depth_form)render->depth_form, render->depth_pixels, render->depth_radius},
         .hidden_layers = render->hidden_layers,
         .parts = render->parts != 0 && session->can_send_parts,

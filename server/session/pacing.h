@@ -15,6 +15,7 @@
 
 #define PACING_IN_FLIGHT_MAX 64
 #define PACING_SCALE_FULL 8 /* of pacing_advice.scale_eighths */
+#define PACING_WAVES 33     /* of a picture: first hits, and one for each bounce */
 
 struct pacing_frame {
     uint32_t frame;
@@ -28,14 +29,17 @@ struct pacing_terms {
     float margin;           /* share on each side */
     uint32_t hidden_layers; /* that follow each picture */
     uint32_t samples;
+    uint32_t depth;       /* bounces */
+    uint64_t deadline_ns; /* that rendering a frame may take; 0: size alone follows frame_ns */
+    bool ignores_link;    /* it is the renderer alone that frames follow */
 };
 
 /* What the next frame is to be. */
 struct pacing_advice {
-    unsigned scale_eighths; /* of width and height: 8, 6, 4, 3, 2 */
+    unsigned scale_eighths; /* of width and height: 8, 6, 4, 3, 2; for a deadline also 7 and 5 */
     unsigned quality;       /* as JPEG has it, PACING_QUALITY_MIN .. the wanted one */
     uint64_t bytes;         /* that a frame may have, for an encoder that can be told */
-    unsigned margin_halves_less, samples;
+    unsigned margin_halves_less, samples, depth_less;
     bool no_hidden;
 };
 
@@ -57,7 +61,11 @@ struct pacing {
      * which the full picture has 1. Sums over the frames so far, older ones fading. */
     double render_frames, render_areas, render_ns, render_areas_areas, render_areas_ns;
     double render_fixed_ns; /* as far as frames of several sizes have shown it */
-    double hidden_bytes;    /* of a layer of what a picture hides; 0: not known */
+    /* Of a full picture with all samples, what each bounce takes; not known: 0. With a deadline the sums above are
+     * of the rest. */
+    double bounce_ns[PACING_WAVES];
+    unsigned surprises;  /* frames in a row that took far more or less than expected */
+    double hidden_bytes; /* of a layer of what a picture hides; 0: not known */
     struct pacing_terms terms;
     struct pacing_advice advised; /* last */
     unsigned better_count;        /* times in a row that a better one would have been possible */
@@ -107,13 +115,22 @@ void pacing_learn(struct pacing *pacing, unsigned scale_eighths, unsigned qualit
 /* The same of a frame as it was advised, and of a layer that followed one. */
 void pacing_learn_picture(struct pacing *pacing, const struct pacing_advice *made, uint64_t render_ns,
                           uint64_t bytes);
+/* The same, of a frame of which the waves took so long; they are what a deadline needs to know. `bytes` 0: nothing
+ * is learned of them. */
+void pacing_learn_waves(struct pacing *pacing, const struct pacing_advice *made, uint64_t render_ns,
+                        const uint64_t wave_ns[PACING_WAVES], uint64_t bytes);
 void pacing_learn_hidden(struct pacing *pacing, uint64_t bytes);
 /* Size and quality of the next frame while things move, so that frame_ns is met by the renderer and by the link;
  * at most `quality_wanted`. Worse at once, better step by step, so that it does not flicker between two.
  *
  * For a client that makes its own views (it has asked for a margin or hidden layers) a late picture is better than
  * a tiny one. What it does not need first goes first: samples beyond one, what is hidden, half of the margin, all
- * of it, quality; and size only where a picture would take longer than a quarter of a second. */
+ * of it, quality; and size only where a picture would take longer than a quarter of a second.
+ *
+ * With a deadline rendering meets that: samples beyond one go first, then size, and bounces only where the
+ * smallest picture is late. Bounces that take time are those that are seen: of the bundled teapot, which is of
+ * glass, two bounces in full size are farther from the picture than all eight in a quarter of the width; of the
+ * carousel two are as good as eight, and take nearly as long. Without any bounce either looks wrong. */
 struct pacing_advice pacing_advise(struct pacing *pacing, unsigned quality_wanted);
 
 #endif

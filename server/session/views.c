@@ -41,7 +41,13 @@ struct view_terms view_terms_of(const struct message_render *render)
     return (struct view_terms){
         .frame_ns = render->margin > 0.0f && frame_ns < KEY_NS ? KEY_NS : frame_ns,
         .samples = render->samples,
-        .moving = {.margin = render->margin, .hidden_layers = render->hidden_layers, .samples = samples},
+        .moving = {.margin = render->margin,
+                   .hidden_layers = render->hidden_layers,
+                   .samples = samples,
+                   .depth = render->depth,
+                   .deadline_ns =
+                       render->moving_rate > 0.0f ? (uint64_t)(SECOND_NS / (double)render->moving_rate) : 0,
+                   .ignores_link = !render->adapt},
         .still_encoding = (enum encoding)render->still_encoding,
         .quality = encoder_loses((enum encoding)render->encoding) ? render->quality : 0,
         .adapt = render->adapt != 0,
@@ -219,12 +225,13 @@ static void adapt(struct session_view *view, const struct engine_frame *frame)
         unsigned wanted = view->terms.quality ? view->terms.quality : PACING_QUALITY_REFERENCE;
         struct pacing_advice advice = pacing_advise(&view->pacing, wanted);
         view->effort.scale_eighths = advice.scale_eighths;
-        view->effort.quality = view->terms.quality ? advice.quality : 0;
-        view->effort.bytes = advice.bytes;
+        view->effort.quality = view->terms.quality && view->terms.adapt ? advice.quality : 0;
+        view->effort.bytes = view->terms.adapt ? advice.bytes : 0;
         view->effort.samples = advice.samples;
+        view->effort.depth_less = advice.depth_less;
         view->effort.margin_halves_less = advice.margin_halves_less;
         view->effort.no_hidden = advice.no_hidden;
-    } else if (frame->encoding == view->terms.still_encoding) {
+    } else if (view->terms.adapt && frame->encoding == view->terms.still_encoding) {
         double bytes_per_second = (double)pacing_bytes_per_second(&view->pacing);
         if (bytes_per_second > 0.0)
             view->effort.sparing = (double)frame->size_bytes * SECOND_NS > SPARING_NS * bytes_per_second;
@@ -240,16 +247,41 @@ static void choose_parts(struct session_view *view, const struct engine_frame *f
         view->effort.still_parts = parts;
 }
 
+/* By the device's clock where it was asked. */
+static void waves_of(const struct stage_times *times, uint64_t wave_ns[PACING_WAVES])
+{
+    bool has_gpu = false;
+    for (uint32_t i = 0; i < times->count; i++)
+        has_gpu |= times->spans[i].clock == CLOCK_GPU;
+    for (uint32_t i = 0; i < times->count; i++) {
+        const struct stage_span *span = &times->spans[i];
+        const bool counts = span->stage == STAGE_TRACE || span->stage == STAGE_SHADE;
+        if (counts && span->wave < PACING_WAVES && span->clock == (has_gpu ? CLOCK_GPU : CLOCK_CPU))
+            wave_ns[span->wave] += span->duration_ns;
+    }
+}
+
 /* As it was advised, which may be some frames ago. */
 static void learn(struct session_view *view, const struct engine_frame *frame)
 {
+    uint64_t wave_ns[PACING_WAVES] = {0};
     const struct pacing_advice made = {
         .scale_eighths = frame->scale_eighths ? frame->scale_eighths : PACING_SCALE_FULL,
         .quality = frame->quality,
         .margin_halves_less = frame->margin_halves_less,
-        .samples = frame->result.samples,
+        .samples = frame->request.samples,
+        .depth_less = frame->depth_less,
     };
-    pacing_learn_picture(&view->pacing, &made, frame->rendered_ns - frame->applied_ns, frame->size_bytes);
+    if (view->terms.moving.deadline_ns)
+        waves_of(&frame->result.times, wave_ns);
+    pacing_learn_waves(&view->pacing, &made, frame->rendered_ns - frame->applied_ns, wave_ns,
+                       frame->moving ? frame->size_bytes : 0);
+}
+
+/* Of a picture at rest the first frames may have built and compiled; those that refine it say what one takes. */
+static bool is_learned_from(const struct session_view *view, const struct engine_frame *frame)
+{
+    return frame->moving || (view->terms.moving.deadline_ns > 0 && frame->result.samples > frame->request.samples);
 }
 
 void view_frame_made(struct job *job, const struct engine_frame *frame)
@@ -260,9 +292,9 @@ void view_frame_made(struct job *job, const struct engine_frame *frame)
         return;
     }
     view->made_ns = frame->encoded_ns > frame->applied_ns ? frame->encoded_ns - frame->applied_ns : 0;
-    if (frame->moving)
+    if (is_learned_from(view, frame))
         learn(view, frame);
-    if (view->terms.adapt)
+    if (view->terms.adapt || view->terms.moving.deadline_ns)
         adapt(view, frame);
     if (view->terms.parts)
         choose_parts(view, frame);

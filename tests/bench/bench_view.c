@@ -32,6 +32,7 @@
 #define WARM_UP_NS SECOND_NS
 #define FIRST_MS 300000u /* the first picture builds and compiles */
 #define SWAY_RADIANS 0.5
+#define CLIP_NS (1000 * SECOND_NS) /* of time, which clips repeat in: seconds stay precise */
 #define SWAY_SECONDS 4.0
 #define SCENE_NAME "bench"
 #define TAU 6.283185307179586
@@ -46,6 +47,10 @@ static const char usage[] =
     "  --viewers N       default 1\n"
     "  --weight N        of each viewer; default: the daemon's\n"
     "  --adapt           quality and size follow the link\n"
+    "  --moving-rate FPS bounces and size follow what rendering takes\n"
+    "  --integrator I    default whitted\n"
+    "  --depth N         bounces; default 4\n"
+    "  --clip N          the model's clip of that number plays\n"
     "  --rest S          after each second of motion it rests so long, in raw pictures\n"
     "  --batch           another client has a batch job rendered meanwhile\n"
     "  --environment F   of the model\n"
@@ -55,8 +60,9 @@ static const char usage[] =
 struct options {
     const char *address, *model, *environment, *key;
     uint32_t width, height, encoding, looks, viewers, weight, pid;
-    double seconds, rate, rest;
-    bool adapt, batch;
+    uint32_t integrator, depth, clip;
+    double seconds, rate, rest, moving_rate;
+    bool adapt, batch, plays;
 };
 
 struct viewer {
@@ -79,6 +85,7 @@ static struct options options = {.width = 1280,
                                  .height = 720,
                                  .encoding = PROTOCOL_ENCODING_JPEG,
                                  .looks = 1000,
+                                 .depth = 4,
                                  .viewers = 1,
                                  .seconds = 5,
                                  .rate = 1000};
@@ -119,7 +126,7 @@ static void add_threads(json_t *threads, int sign)
 
 static const char *const columns[] = {"viewer",   "command", "width",    "height", "bytes",        "sent",
                                       "received", "applied", "rendered", "stages", "encode_begin", "encode",
-                                      "queue",    "send",    "begun",    "whole",  "decode"};
+                                      "queue",    "send",    "begun",    "whole",  "decode",       "depth_less"};
 
 static bool is_of_renderer(enum protocol_stage stage)
 {
@@ -154,7 +161,8 @@ static json_t *row_of(const struct fl_frame *frame, const struct viewer *viewer,
                                taken_ns[PROTOCOL_STAGE_SEND],
                                frame->begun_ns,
                                whole_ns,
-                               decode_ns};
+                               decode_ns,
+                               frame->depth_less};
     _Static_assert(sizeof(values) / sizeof(values[0]) == sizeof(columns) / sizeof(columns[0]), "a value for each");
     json_t *row = json_array();
     for (size_t i = 0; i < sizeof(values) / sizeof(values[0]); i++)
@@ -200,7 +208,9 @@ static bool look(struct viewer *viewer, uint64_t now, struct fl_error *error)
         viewer->resumed_command = viewer->last_command + 1;
         viewer->resumed_ns = now;
     }
-    struct fl_view_camera seen = {.moving = !viewer->rests};
+    struct fl_view_camera seen = {.moving = !viewer->rests,
+                                  .time_s =
+                                      options.plays ? (float)((double)(now % CLIP_NS) / (double)SECOND_NS) : 0};
     camera_orbit(&camera, SWAY_RADIANS * sin(phase), SWAY_RADIANS / 4 * cos(phase));
     camera_export(&camera, &seen);
     viewer->sent_ns[(viewer->last_command + 1) % LOOKS_REMEMBERED] = monotonic_now_ns();
@@ -307,12 +317,23 @@ static bool begin_view(struct viewer *viewer, struct fl_error *error)
     terms.width = options.width;
     terms.height = options.height;
     terms.samples = 1;
-    terms.depth = 4;
+    terms.depth = options.depth;
+    terms.integrator = (enum protocol_integrator)options.integrator;
     terms.encoding = (enum protocol_encoding)options.encoding;
     terms.frames_per_second = (float)options.rate;
     terms.still_encoding = options.rest > 0 ? PROTOCOL_ENCODING_RAW : terms.encoding;
     terms.weight = options.weight;
     terms.adapt = options.adapt;
+    terms.moving_rate = (float)options.moving_rate;
+    struct record_clip_use use = {.speed = 1, .loop = 1};
+    const struct fl_clip_info *clip = options.plays ? fl_scene_clip(viewer->scene, options.clip) : NULL;
+    if (options.plays && !clip)
+        return fl_error_set(error, FL_ERROR_ARGUMENT, "--clip", "the model has no such clip");
+    if (clip) {
+        use.clip = clip->clip;
+        terms.clips = &use;
+        terms.clips_count = 1;
+    }
     struct fl_scene_bounds bounds;
     viewer->view = fl_view_start(viewer->scene, &terms, error);
     struct fl_frame *frame = viewer->view ? fl_view_next(viewer->view, FIRST_MS, error) : NULL;
@@ -413,6 +434,14 @@ static bool parse_encoding(const char *text)
     return false;
 }
 
+static bool parse_integrator(const char *text)
+{
+    enum protocol_integrator integrator = PROTOCOL_INTEGRATOR_WHITTED;
+    const bool known = protocol_integrator_parse(text, &integrator);
+    options.integrator = integrator;
+    return known;
+}
+
 static bool parse_option(int option, const char *text)
 {
     char rest;
@@ -437,6 +466,15 @@ static bool parse_option(int option, const char *text)
         return parse_number(text, 1, INT32_MAX, &options.pid);
     case 'a':
         return options.adapt = true;
+    case 'm':
+        return parse_real(text, &options.moving_rate);
+    case 'i':
+        return parse_integrator(text);
+    case 'd':
+        return parse_number(text, 0, 32, &options.depth);
+    case 'c':
+        options.plays = true;
+        return parse_number(text, 0, 1000, &options.clip);
     case 'b':
         return options.batch = true;
     case 'v':
@@ -453,11 +491,12 @@ static bool parse_option(int option, const char *text)
 static bool parse(int argc, char **argv)
 {
     static const struct option known[] = {
-        {"size", 1, NULL, 's'},   {"encoding", 1, NULL, 'e'}, {"seconds", 1, NULL, 't'},
-        {"rate", 1, NULL, 'r'},   {"looks", 1, NULL, 'l'},    {"viewers", 1, NULL, 'n'},
-        {"weight", 1, NULL, 'w'}, {"adapt", 0, NULL, 'a'},    {"batch", 0, NULL, 'b'},
-        {"key", 1, NULL, 'k'},    {"pid", 1, NULL, 'p'},      {"environment", 1, NULL, 'v'},
-        {"rest", 1, NULL, 'R'},   {NULL, 0, NULL, 0},
+        {"size", 1, NULL, 's'},   {"encoding", 1, NULL, 'e'},    {"seconds", 1, NULL, 't'},
+        {"rate", 1, NULL, 'r'},   {"looks", 1, NULL, 'l'},       {"viewers", 1, NULL, 'n'},
+        {"weight", 1, NULL, 'w'}, {"adapt", 0, NULL, 'a'},       {"batch", 0, NULL, 'b'},
+        {"key", 1, NULL, 'k'},    {"pid", 1, NULL, 'p'},         {"environment", 1, NULL, 'v'},
+        {"rest", 1, NULL, 'R'},   {"moving-rate", 1, NULL, 'm'}, {"integrator", 1, NULL, 'i'},
+        {"depth", 1, NULL, 'd'},  {"clip", 1, NULL, 'c'},        {NULL, 0, NULL, 0},
     };
     int option;
     while ((option = getopt_long(argc, argv, "", known, NULL)) != -1)

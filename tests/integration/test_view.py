@@ -177,6 +177,22 @@ class WithoutAWindow(Viewer):
         # Some of the last steps behind, and what is lost in motion.
         self.assertTrue(0 < difference(moving, rested) < 5)
 
+    def test_what_moves_gives_way_to_the_rate_and_rest_is_the_full_picture(self):
+        """No software renders a thousand frames a second: all that may be given up is, whatever else the machine does."""
+        moves = [{"mouse": "move", "x": 220 + step / 10, "y": 110, "after": 0.03} for step in range(40)]
+        let_go = {"mouse": "up", "button": "left", "x": 224, "y": 110}
+        states = {}
+        for rate in (1000, 0):
+            states[rate] = self.replay([rest(8), *HIDE, drag(160, 90, 0, 0)[0], *moves, {"state": "moving"}, let_go, rest(8),
+                                        {"state": "rested"}, {"screenshot": f"rested-{rate}.png"}],
+                                       "--views", "off", "--moving-rate", rate)
+        self.assertEqual([(states[rate]["moving"]["width"], states[rate]["moving"]["depth_less"]) for rate in (1000, 0)],
+                         [(SIZE[0] // 4, 6), (SIZE[0], 0)])
+        self.assertEqual([(states[rate]["rested"]["width"], states[rate]["rested"]["depth_less"]) for rate in (1000, 0)],
+                         [(SIZE[0], 0)] * 2)
+        self.assertEqual(states[1000]["rested"]["eye"], states[0]["rested"]["eye"])
+        self.assertEqual(difference(*(self.folder / f"rested-{rate}.png" for rate in (1000, 0))), 0)
+
     def test_a_double_click_focuses_on_the_surface_there(self):
         click = [{"mouse": "down", "button": "left", "x": 250, "y": 100, "clicks": clicks} for clicks in (1, 2)]
         states = self.replay([rest(), {"state": "before"}, click[0], {**click[0], "mouse": "up"}, click[1],

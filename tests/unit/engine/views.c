@@ -500,6 +500,30 @@ TEST(a_view_that_adapts_is_smaller_while_it_moves)
     drop(frame);
 }
 
+TEST(a_view_that_keeps_a_rate_goes_without_bounces_while_it_moves)
+{
+    struct watching *watching = *state;
+    struct engine_command *made = with_samples(view(2, watching->wishes), 2, 1);
+    made->job.keeps_rate = true;
+    made->job.frame.depth = 8;
+    made->job.frame.width = made->job.frame.height = 64;
+    view_wishes_set_effort(watching->wishes, &(struct view_effort){.scale_eighths = 5, .depth_less = 6});
+    look(watching, 1, true);
+    submit(watching->engine, made);
+    struct engine_frame *frame = take(expect_frame(watching->engine, 1, 2, 0));
+    assert_int_equal(frame->request.depth, 2);
+    assert_int_equal(frame->depth_less, 6);
+    assert_int_equal(frame->request.width, 40);
+    assert_int_equal(frame->quality, 80); /* the job's */
+    drop(frame);
+    look(watching, 2, false);
+    frame = take(expect_frame(watching->engine, 1, 2, 1));
+    assert_int_equal(frame->request.depth, 8);
+    assert_int_equal(frame->depth_less, 0);
+    assert_int_equal(frame->request.width, 64);
+    drop(frame);
+}
+
 /* Of 80x48 at 3/8, a tenth on each side; and the field of view that keeps as many pixels a radian. */
 TEST(a_frame_has_a_margin_while_it_moves)
 {

@@ -738,6 +738,30 @@ SESSION_TEST(a_view_that_adapts_tells_the_engine_what_the_link_carries)
     engine_command_destroy(start);
 }
 
+/* A frame of 100 ns is in time for no rate that can be asked for; this one took a second. */
+SESSION_TEST(a_view_that_keeps_a_rate_tells_the_engine_what_to_go_without)
+{
+    open_scene(1, 1);
+    struct message message = view_message(100);
+    message.render.moving_rate = 20;
+    message.render.quality = 90;
+    message.render.depth = 8;
+    send_message(2, 0, &message);
+    struct engine_command *start = told(ENGINE_JOB_START);
+    assert_true(start->job.keeps_rate && !start->job.adapt);
+    struct engine_event *slow = frame_of(2, 0, 1, FRAME_BYTES);
+    slow->frame->rendered_ns = slow->frame->applied_ns + UINT64_C(1000000000);
+    slow->frame->encoded_ns = slow->frame->rendered_ns + 100;
+    port_say(slow);
+    take_frame(2, 0);
+    struct view_effort effort = view_wishes_see(start->job.wishes).effort;
+    assert_int_equal(effort.scale_eighths, 2);
+    assert_int_equal(effort.depth_less, 6);
+    assert_int_equal(effort.quality, 0); /* the link is not followed */
+    assert_true(effort.bytes == 0);
+    engine_command_destroy(start);
+}
+
 /* What is 3 KB a picture at 1000 a second is most of 300 at ten. */
 SESSION_TEST(pictures_with_a_margin_are_adapted_to_ten_a_second)
 {

@@ -1,0 +1,168 @@
+/* SPDX-License-Identifier: MIT */
+/* What a view goes without so that it is rendered at the rate that it asks for, with a renderer that is simulated:
+ * a part that every frame takes, one that grows with the area, and bounces that do. */
+#include "session/pacing.h"
+#include "tests/harness/test.h"
+
+#define MS UINT64_C(1000000)
+#define DEADLINE_NS (100 * MS)
+
+struct renderer {
+    uint64_t fixed_ns, area_ns, bounce_ns; /* of a full picture; each bounce half of the one before it */
+    uint32_t chance;
+    unsigned percent; /* up to so much more or less */
+};
+
+static struct pacing begin(uint32_t samples)
+{
+    struct pacing pacing;
+    const struct pacing_terms terms = {
+        .samples = samples, .depth = 8, .deadline_ns = DEADLINE_NS, .ignores_link = true};
+    pacing_init(&pacing, DEADLINE_NS / 4); /* more often than that it may not come */
+    pacing_set_terms(&pacing, DEADLINE_NS / 4, &terms);
+    return pacing;
+}
+
+static uint64_t render(struct renderer *renderer, const struct pacing_advice *advice,
+                       uint64_t wave_ns[PACING_WAVES])
+{
+    const double work = advice->scale_eighths * advice->scale_eighths / 64.0 * advice->samples;
+    renderer->chance = renderer->chance * 1664525u + 1013904223u;
+    const double more = 1.0 + renderer->percent / 100.0 * ((renderer->chance >> 8) / (double)(1 << 23) - 1.0);
+    double sum_ns = (double)renderer->fixed_ns + work * (double)renderer->area_ns;
+    for (unsigned wave = 1; wave <= 8 - advice->depth_less; wave++) {
+        wave_ns[wave] = (uint64_t)(more * work * (double)(renderer->bounce_ns >> wave));
+        sum_ns += work * (double)(renderer->bounce_ns >> wave);
+    }
+    return (uint64_t)(more * sum_ns);
+}
+
+/* Follows its advice for so many frames, of which it says how long the longest took and how often they changed. */
+static struct pacing_advice follow(struct pacing *pacing, struct renderer *renderer, unsigned frames,
+                                   uint64_t *longest_ns, unsigned *changes)
+{
+    struct pacing_advice advice = pacing->advised;
+    *longest_ns = *changes = 0;
+    for (unsigned i = 0; i < frames; i++) {
+        uint64_t wave_ns[PACING_WAVES] = {0};
+        const struct pacing_advice before = advice;
+        advice = pacing_advise(pacing, 90);
+        const uint64_t took_ns = render(renderer, &advice, wave_ns);
+        pacing_learn_waves(pacing, &advice, took_ns, wave_ns, 0);
+        *longest_ns = took_ns > *longest_ns ? took_ns : *longest_ns;
+        *changes += i > 0 && (advice.scale_eighths != before.scale_eighths || advice.samples != before.samples ||
+                              advice.depth_less != before.depth_less);
+    }
+    return advice;
+}
+
+TEST(a_heavy_frame_comes_in_time_from_the_second_on)
+{
+    struct pacing pacing = begin(1);
+    struct renderer heavy = {.fixed_ns = 10 * MS, .area_ns = 300 * MS, .bounce_ns = 200 * MS};
+    uint64_t longest_ns;
+    unsigned changes;
+    follow(&pacing, &heavy, 1, &longest_ns, &changes);
+    assert_true(longest_ns > 5 * DEADLINE_NS);
+    follow(&pacing, &heavy, 1, &longest_ns, &changes);
+    assert_true(longest_ns <= DEADLINE_NS);
+    /* 85 of 100 ms: (3 / 8)^2 of 500 and 10 are 80, (4 / 8)^2 of it would be 135. */
+    const struct pacing_advice advice = follow(&pacing, &heavy, 300, &longest_ns, &changes);
+    assert_int_equal(advice.scale_eighths, 3);
+    assert_int_equal(advice.depth_less, 0);
+    assert_true(longest_ns <= DEADLINE_NS);
+    assert_in_range(changes, 0, 1);
+}
+
+TEST(it_does_not_pump_where_times_vary)
+{
+    for (uint64_t area_ns = 50 * MS; area_ns <= 1000 * MS; area_ns += area_ns / 9) {
+        struct pacing pacing = begin(1);
+        struct renderer renderer = {
+            .fixed_ns = 5 * MS, .area_ns = area_ns, .bounce_ns = area_ns / 3, .percent = 15};
+        uint64_t longest_ns;
+        unsigned changes;
+        follow(&pacing, &renderer, 60, &longest_ns, &changes);
+        follow(&pacing, &renderer, 300, &longest_ns, &changes);
+        /* Half a minute of it: a step worse, and the same back, at most. The mean keeps 85 % of the deadline. */
+        assert_in_range(changes, 0, 2);
+        assert_true((double)longest_ns < 1.15 * 1.15 * (double)DEADLINE_NS);
+    }
+}
+
+TEST(samples_go_first_then_size_then_bounces)
+{
+    struct pacing pacing = begin(8);
+    struct renderer renderer = {.fixed_ns = MS, .area_ns = 16 * MS, .bounce_ns = 8 * MS};
+    uint64_t longest_ns;
+    unsigned changes;
+    struct pacing_advice advice = follow(&pacing, &renderer, 100, &longest_ns, &changes);
+    assert_int_equal(advice.samples, 3); /* 3 of 24 and 1 are 73 of 85 ms */
+    assert_int_equal(advice.scale_eighths, PACING_SCALE_FULL);
+    renderer.area_ns = 160 * MS;
+    advice = follow(&pacing, &renderer, 100, &longest_ns, &changes);
+    assert_int_equal(advice.samples, 1);
+    assert_int_equal(advice.scale_eighths, 5); /* 0.39 of 168 and 1 are 67; 6 / 8: 95 */
+    assert_int_equal(advice.depth_less, 0);
+    renderer = (struct renderer){.fixed_ns = MS, .area_ns = 900 * MS, .bounce_ns = 600 * MS};
+    advice = follow(&pacing, &renderer, 200, &longest_ns, &changes);
+    /* A sixteenth: 57 of the first hits and at most 18, 9, 5 .. of the bounces: the first two leave 84 + 1. */
+    assert_int_equal(advice.scale_eighths, 2);
+    assert_in_range(advice.depth_less, 5, 6);
+}
+
+TEST(one_frame_that_was_disturbed_changes_nothing)
+{
+    struct pacing pacing = begin(1);
+    struct renderer renderer = {.fixed_ns = 10 * MS, .area_ns = 300 * MS, .bounce_ns = 200 * MS};
+    uint64_t longest_ns;
+    unsigned changes;
+    const struct pacing_advice before = follow(&pacing, &renderer, 60, &longest_ns, &changes);
+    for (int i = 0; i < 20; i++) {
+        const uint64_t wave_ns[PACING_WAVES] = {0};
+        pacing_learn_waves(&pacing, &before, 900 * MS, wave_ns, 0);
+        const struct pacing_advice after = follow(&pacing, &renderer, 5, &longest_ns, &changes);
+        assert_int_equal(changes, 0);
+        assert_int_equal(after.scale_eighths, before.scale_eighths);
+    }
+}
+
+TEST(all_comes_back_where_it_becomes_light)
+{
+    struct pacing pacing = begin(1);
+    struct renderer renderer = {.fixed_ns = MS, .area_ns = 2000 * MS, .bounce_ns = 2000 * MS, .percent = 10};
+    uint64_t longest_ns;
+    unsigned changes;
+    struct pacing_advice advice = follow(&pacing, &renderer, 60, &longest_ns, &changes);
+    assert_int_equal(advice.scale_eighths, 2);
+    assert_int_equal(advice.depth_less, 6);
+    renderer.area_ns = renderer.bounce_ns = 20 * MS;
+    advice = follow(&pacing, &renderer, 200, &longest_ns, &changes);
+    assert_int_equal(advice.scale_eighths, PACING_SCALE_FULL);
+    assert_int_equal(advice.depth_less, 0);
+}
+
+TEST(the_first_that_moves_is_right_where_pictures_at_rest_were_seen)
+{
+    struct pacing pacing = begin(1);
+    struct renderer heavy = {.fixed_ns = 10 * MS, .area_ns = 300 * MS, .bounce_ns = 200 * MS};
+    const struct pacing_advice full = {.scale_eighths = PACING_SCALE_FULL, .samples = 1};
+    uint64_t wave_ns[PACING_WAVES] = {0}, longest_ns;
+    unsigned changes;
+    const uint64_t took_ns = render(&heavy, &full, wave_ns);
+    pacing_learn_waves(&pacing, &full, took_ns, wave_ns, 0);
+    follow(&pacing, &heavy, 30, &longest_ns, &changes);
+    assert_true(longest_ns <= DEADLINE_NS);
+}
+
+TEST(without_a_deadline_bounces_stay)
+{
+    struct pacing pacing = begin(1);
+    pacing_set_terms(&pacing, DEADLINE_NS, &(struct pacing_terms){.samples = 1, .depth = 8});
+    struct renderer heavy = {.fixed_ns = MS, .area_ns = 20000 * MS, .bounce_ns = 20000 * MS};
+    uint64_t longest_ns;
+    unsigned changes;
+    const struct pacing_advice advice = follow(&pacing, &heavy, 60, &longest_ns, &changes);
+    assert_int_equal(advice.depth_less, 0);
+    assert_int_equal(advice.scale_eighths, 2);
+}
