@@ -86,7 +86,7 @@ bool next_beside(inout samples_beside b, out int index, out uint id)
             b.columns++;
         }
         uvec2 words;
-        bool is_one = scan_singly(b.column, b.p.z - BESIDE, index, words);
+        bool is_one = scan(b.column, b.p.z - BESIDE, index, words);
         bool is_behind = is_one && depth_of(words) > b.p.z + BESIDE;
         b.column.next = is_behind ? b.column.end : b.column.next;
         id = texelFetch(abuffer_ids, index).x;
