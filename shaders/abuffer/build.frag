@@ -16,7 +16,7 @@ uniform bool has_subvoxels;
 layout(binding = IMAGE_ABUFFER_HEADS, r32ui) uniform uimageBuffer heads;
 layout(binding = IMAGE_ABUFFER_NODES, rgba32ui) writeonly uniform uimageBuffer nodes;
 layout(binding = IMAGE_ABUFFER_SUMS, r32i) uniform iimageBuffer sums;
-layout(binding = IMAGE_ABUFFER_SUBVOXELS, r32ui) uniform uimageBuffer subvoxels; // six per voxel
+layout(binding = IMAGE_ABUFFER_SUBVOXELS, r32ui) uniform uimageBuffer subvoxels;
 layout(std430, binding = BIND_ABUFFER_BUILD_COUNTS) buffer build_block { abuffer_build_counts build; };
 
 uint texel_in_tiles()
@@ -84,7 +84,7 @@ void mark(float min_cells, float max_cells, int bits, int looks_along)
         uint inner = has_subvoxels ? subvoxels_between(first, last, half_) : 0u;
         if ((imageLoad(sums, 4 * voxel + 3).x & bits) != bits)
             imageAtomicOr(sums, 4 * voxel + 3, bits);
-        int word = has_subvoxels ? 6 * voxel + 2 * looks_along + (half_.z & 1) : 0;
+        int word = has_subvoxels ? 2 * (ABUFFER_SUBVOXELS_TEXELS * voxel + looks_along) + (half_.z & 1) : 0;
         if ((imageLoad(subvoxels, word).x & inner) != inner)
             imageAtomicOr(subvoxels, word, inner);
         half_.x++;

@@ -119,19 +119,6 @@ bool scan(inout column_scan c, float depth_min, out int index, out uvec2 words)
     return !is_far && index < c.end && depth_of(words) >= depth_min;
 }
 
-// The same, one sample per round. For loops whose rounds depend on earlier results: with two per round llvmpipe
-// answered a few rays in ten thousand differently if the column began at an odd index, and where it begins is chance.
-bool scan_singly(inout column_scan c, float depth_min, out int index, out uvec2 words)
-{
-    bool is_far = c.bound - c.next > PASSED;
-    index = is_far ? (c.next + c.bound) >> 1 : c.next;
-    words = words_at(index);
-    bool is_before = depth_of(words) < depth_min;
-    c.next = is_far && !is_before ? c.next : index + 1;
-    c.bound = is_far && !is_before ? index : c.bound;
-    return !is_far && !is_before && index < c.end;
-}
-
 // The winding at a point of the image: the number of bodies around it.
 int winding_at(int axis, vec3 p)
 {

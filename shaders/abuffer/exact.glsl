@@ -5,7 +5,7 @@
 // texels around the intersection; if it is not, as triangles are smaller than texels, the plane stands for it.
 #include "abuffer/planes.glsl"
 
-#if !defined ANY_HIT && !defined ABUFFER_STEPS
+#if defined KEEPS_SAMPLE && !defined ABUFFER_STEPS
 
 // How far beyond its texel a sample's plane is tested, in cells. Where surfaces bend by more than ABUFFER_SLACK, rays
 // would pass between planes; intersections are verified with triangles, so the search may reach farther.
@@ -16,6 +16,13 @@ const float AGAIN = 1e-3;
 const float BESIDE = 3.0;
 // How far behind the plane's intersection that of an adjacent triangle may be, in cells.
 const float BESIDE_BEHIND = 4.0;
+
+// On a body as thin as a cell or two, planes go on beyond the surface, and would darken the side that a shadow ray
+// leaves. So shadow rays verify what they intersect within VERIFIED_WAY cells of their origin; farther on, they need not
+// know which triangle it is. There no plane stands for a triangle that is not sampled if it is hit from behind, as by
+// rays that leave a body, or within TRUSTED_WAY: farther on, planes from the front are what a mesh of triangles smaller
+// than texels has.
+const float VERIFIED_WAY = 4.0, TRUSTED_WAY = 2.0;
 
 // The line of a ray, and a triangle of the same instance.
 struct line_intersection {
@@ -86,7 +93,7 @@ bool next_beside(inout samples_beside b, out int index, out uint id)
             b.columns++;
         }
         uvec2 words;
-        bool is_one = scan_singly(b.column, b.p.z - BESIDE, index, words);
+        bool is_one = scan(b.column, b.p.z - BESIDE, index, words);
         bool is_behind = is_one && depth_of(words) > b.p.z + BESIDE;
         b.column.next = is_behind ? b.column.end : b.column.next;
         id = texelFetch(abuffer_ids, index).x;
@@ -139,6 +146,9 @@ bool settle(trace_ray r, voxel_traversal w, float limit, inout abuffer_found fou
         goes_on = !is_hit && !(is_own && is_inside) && next_beside(b, index, id);
         is_own = false;
     } while (goes_on);
+#ifdef ANY_HIT
+    passes = passes || own.from_behind || w.s_limit - w.s_min < TRUSTED_WAY;
+#endif
     return is_hit || !passes && found.is_within;
 }
 
@@ -158,7 +168,7 @@ void search_voxels(trace_ray r, inout voxel_traversal w, inout abuffer_found fou
     }
 }
 
-#ifdef ANY_HIT
+#ifndef KEEPS_SAMPLE
 
 void traverse_planes(trace_ray r, inout voxel_traversal w, inout abuffer_found found)
 {
@@ -167,27 +177,48 @@ void traverse_planes(trace_ray r, inout voxel_traversal w, inout abuffer_found f
 
 #else
 
+// How far beyond its texel a plane is tested at first.
+#ifdef ANY_HIT
+const float BEYOND_FIRST = ABUFFER_SLACK;
+#else
+const float BEYOND_FIRST = BEYOND;
+#endif
+
+bool is_verified(trace_ray r, voxel_traversal w, float limit, inout abuffer_found found)
+{
+#ifdef ANY_HIT
+    bool is_near = w.s_limit - w.s_min < VERIFIED_WAY;
+    return !is_near || settle(r, w, limit, found);
+#else
+    return settle(r, w, limit, found);
+#endif
+}
+
 void traverse_planes(trace_ray r, inout voxel_traversal w, inout abuffer_found found)
 {
-    float s_end = w.s_end, s_limit = w.s_limit, limit = found.end;
+    float s_end = w.s_end, s_limit = w.s_limit;
+    abuffer_found nothing = found;
     bool goes_on;
     int passes = 0;
-    w.beyond = BEYOND;
+    w.beyond = BEYOND_FIRST;
     do {
         search_voxels(r, w, found);
         float s = w.s_limit;
-        goes_on = found.sample_index >= 0 && !settle(r, w, limit, found) && ++passes < PASSES_MAX;
+        goes_on = found.sample_index >= 0 && !is_verified(r, w, nothing.end, found) && ++passes < PASSES_MAX;
         if (goes_on) {
             // A plane that is extended beyond its texel may have hidden that of the next texel at the same point.
             w.s_behind = found.is_within ? s + AGAIN : w.s_behind;
-            w.beyond = found.is_within ? BEYOND : ABUFFER_SLACK;
+            w.beyond = found.is_within ? BEYOND_FIRST : ABUFFER_SLACK;
             w.s = s > w.s_min ? s : w.s_min;
             w.s_end = s_end;
             w.s_limit = s_limit;
             enter(w);
-            found = abuffer_found(limit, -1, false);
+            found = nothing;
         }
     } while (goes_on);
+#ifdef ANY_HIT
+    found.optical_depth = found.sample_index >= 0 ? vec3(OPTICAL_DEPTH_MAX) : found.optical_depth;
+#endif
 }
 
 #endif

@@ -7,6 +7,13 @@
 #include "abuffer/sample_primitive.glsl"
 #include "abuffer/voxel_traversal.glsl"
 
+#if defined ANY_HIT && !defined HAS_TRANSLUCENT
+#define ANYTHING_ENDS // the first intersection is the answer, wherever it is
+#endif
+#if !defined ANY_HIT || defined ANYTHING_ENDS && !defined ABUFFER_STEPS
+#define KEEPS_SAMPLE // the intersected sample is looked at again, behind the search
+#endif
+
 // What a ray has found, and up to where it is still looking.
 struct abuffer_found {
     float end; // in lengths of the direction
@@ -15,15 +22,12 @@ struct abuffer_found {
 #ifdef HAS_TRANSLUCENT
     intersected_surfaces intersected;
 #endif
-#else
+#endif
+#ifdef KEEPS_SAMPLE
     int sample_index; // -1: none
     bool is_within;   // in its texel, or at most ABUFFER_SLACK beside it
 #endif
 };
-
-#if defined ANY_HIT && !defined HAS_TRANSLUCENT
-#define ANYTHING_ENDS // the first intersection is the answer, wherever it is
-#endif
 
 #ifdef ANY_HIT
 
@@ -38,6 +42,9 @@ void offer_sample(trace_ray r, inout abuffer_found found, int sample_index, floa
                     transmittance_of(c, r.origin, r.direction, 0.0, r.t_min == RAY_STOPS_T_MIN));
     if (min_component(found.optical_depth) >= OPTICAL_DEPTH_BLACK)
         found.end = -1.0;
+#elif defined KEEPS_SAMPLE
+    found.end = distance_;
+    found.sample_index = sample_index;
 #else
     found.optical_depth = vec3(OPTICAL_DEPTH_MAX);
     found.end = -1.0;
@@ -48,6 +55,8 @@ abuffer_found found_of(trace_ray r, vec3 optical_depth)
 {
 #ifdef HAS_TRANSLUCENT
     return abuffer_found(r.t_max, optical_depth, intersected_nothing());
+#elif defined KEEPS_SAMPLE
+    return abuffer_found(r.t_max, optical_depth, -1, false);
 #else
     return abuffer_found(r.t_max, optical_depth);
 #endif

@@ -25,10 +25,10 @@
  *   voxels      RGBA32UI, ABUFFER_BLOCK_TEXELS per block of 4 x 4 x 4 voxels, blocks row after row
  *                 0     the occupied ones (raster/layout.h)
  *                 1, 2  4 bits per voxel, ABUFFER_VOXEL_*: voxel i in texel 1 + i / 32, component i / 8 % 4, bits 4 (i % 8)
- *   subvoxels   RG32UI, three per voxel, x fastest: the ones of its 4 x 4 x 4 parts that the planes of samples touch
+ *   subvoxels   RG32UI, ABUFFER_SUBVOXELS_TEXELS per voxel, x fastest: the ones of its 4 x 4 x 4 parts that the planes of samples touch
  *               within their texels, of samples in the images that they lean to; one texel for those of image x, one for
- *               y, one for z: bit x + 4 y + 16 z. If subvoxels would be smaller than texels, or V is more than
- *               ABUFFER_SUBVOXELS_VOXELS_MAX, three for all voxels, all bits set
+ *               y, one for z: bit x + 4 y + 16 z; at ABUFFER_SUBVOXELS_ANY all of them. If subvoxels would be smaller than texels, or V is more than
+ *               ABUFFER_SUBVOXELS_VOXELS_MAX, one voxel's for all, all bits set
  *
  * While it is built, in R32I texels (image atomics), four per voxel, x fastest:
  *   sums        0..2  sum of the geometric normals of the samples in it, ABUFFER_NORMAL_UNIT for 1: it has the average's
@@ -67,7 +67,9 @@
 #define ABUFFER_STEEP FACE_STEEP_BELOW /* of a unit normal's component along the axis: it is steep below */
 
 #define ABUFFER_BLOCK_TEXELS 3
-#define ABUFFER_SUBVOXELS_VOXELS_MAX 128 /* 48 MiB of them */
+#define ABUFFER_SUBVOXELS_VOXELS_MAX 128 /* 64 MiB of them */
+#define ABUFFER_SUBVOXELS_TEXELS 4
+#define ABUFFER_SUBVOXELS_ANY 3
 /* The images that the traversal searches, bits 0..2; by winding if ABUFFER_VOXEL_BODY is set, else by the samples'
  * planes alone. A voxel of bodies whose samples are all visible in the image of the average normal's dominant axis
  * (none is steep there) is searched in that image, by winding. If samples face both ways along an axis, winding

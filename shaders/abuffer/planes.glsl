@@ -64,7 +64,7 @@ bool search_image(trace_ray r, inout voxel_traversal w, inout abuffer_found foun
             if (is_one && !is_behind && is_met && s_plane > w.s_behind && s_plane < w.s_limit &&
                 (!only_leaning || leans(p))) {
                 offer_at(r, w, found, i, s_plane, side);
-#ifndef ANY_HIT
+#ifdef KEEPS_SAMPLE
                 found.is_within = from_middle.x <= 0.5 + ABUFFER_SLACK && from_middle.y <= 0.5 + ABUFFER_SLACK;
 #endif
                 any_intersected = true;

@@ -252,7 +252,11 @@ void pass(trace_ray r, inout voxel_traversal w, inout abuffer_found found, inout
 // On to the next occupied voxel, at most one step.
 void step_to_voxel(inout voxel_traversal w, inout step_traversal t)
 {
-    step_on(w, t.here);
+    voxel_step step_;
+    bool is_found = step_on(w, step_);
+    found_voxel found = found_in(step_);
+    if (is_found)
+        t.here = found;
     float end = t.here.s_out < w.s_limit ? t.here.s_out : w.s_limit;
     t.size = (end - t.here.s_in) * (1.0 / float(ABUFFER_STEPS));
     bool is_body = (t.here.what & ABUFFER_VOXEL_BODY) != 0u;

@@ -72,7 +72,12 @@ int subvoxels_at(uvec3 voxel)
 {
     ivec3 p = ivec3(voxel);
     int along = abuffer_grid << 2;
-    return abuffer_has_subvoxels ? 3 * ((p.z * along + p.y) * along + p.x) : 0;
+    return abuffer_has_subvoxels ? ABUFFER_SUBVOXELS_TEXELS * ((p.z * along + p.y) * along + p.x) : 0;
+}
+
+bool is_set_in(uvec2 bits, uvec3 p)
+{
+    return ((p.z < 2u ? bits.x : bits.y) >> part_bit(p) & 1u) != 0u;
 }
 
 // The bits of an occupied voxel. `b`: its place in the block.
@@ -84,8 +89,14 @@ uint what_of(int block, uvec3 b)
     return ((i & 8u) == 0u ? two.x : two.y) >> 4u * (i & 7u) & 15u;
 }
 
-// Past an occupied subvoxel, which becomes `found`, or past the empty space.
-void step_on(inout voxel_traversal w, inout found_voxel found)
+// A part of the ray in one subvoxel, as it is stored, or in empty space.
+struct voxel_step {
+    uvec3 subvoxel;
+    float s_in, s_out;
+};
+
+// Past an occupied subvoxel, or past empty space. True: it is occupied.
+bool step_on(inout voxel_traversal w, out voxel_step step_)
 {
     ABUFFER_COUNT(x);
     bvec3 down = notEqual(w.flip, ivec3(0));
@@ -93,17 +104,12 @@ void step_on(inout voxel_traversal w, inout found_voxel found)
     int block = block_at(voxel);
     uvec4 words = texelFetch(abuffer_voxels, block);
     uvec3 b = voxel & 3u;
-    uint bit = part_bit(b);
-    bool is_set = ((b.z < 2u ? words.x : words.y) >> bit & 1u) != 0u;
-    int inside = subvoxels_at(voxel);
-    uvec2 in_x = texelFetch(abuffer_subvoxels, inside).xy, in_y = texelFetch(abuffer_subvoxels, inside + 1).xy;
-    uvec2 in_z = texelFetch(abuffer_subvoxels, inside + 2).xy, inner = in_x | in_y | in_z;
+    bool is_set = is_set_in(words.xy, b);
+    uvec2 inner = texelFetch(abuffer_subvoxels, subvoxels_at(voxel) + ABUFFER_SUBVOXELS_ANY).xy;
     bool is_whole = is_set && !abuffer_has_subvoxels;
     // The next of 64 voxels, or of a voxel's 64 subvoxels.
     uvec2 bits = is_set ? inner : words.xy;
     uvec3 p = is_set ? subvoxel & 3u : b;
-    bit = part_bit(p);
-    bool is_found = ((p.z < 2u ? bits.x : bits.y) >> bit & 1u) != 0u;
     int many = is_whole ? 4 : parts_to_pass(bits, p, down);
     int empty = int(words.z >> w.octant_shift & BLOCK_REACH_MAX);
     bool is_empty = (words.x | words.y) == 0u;
@@ -114,25 +120,42 @@ void step_on(inout voxel_traversal w, inout found_voxel found)
     vec3 exits = (vec3(border) - w.o) * w.inverse;
     float s_out = nearest_exit(exits);
     s_out = s_out > w.s ? s_out : w.s;
-    if (is_found)
-        found = found_voxel(what_of(block, b), w.s, s_out);
-    // If one image does not show all of a voxel, the images that show the subvoxel's surfaces best.
-    uvec3 shown = (p.z < 2u ? uvec3(in_x.x, in_y.x, in_z.x) : uvec3(in_x.y, in_y.y, in_z.y)) >> bit & 1u;
-    uint best = shown.x | shown.y << 1 | shown.z << 2;
-    if (is_found && bitCount(found.what & ABUFFER_VOXEL_IMAGES) > 1)
-        found.what &= best | ABUFFER_VOXEL_BODY;
+    step_ = voxel_step(subvoxel, w.s, s_out);
     ivec3 next = cell_behind(w.o, w.d, s_out, exits, w.subvoxel, border);
     w.subvoxel = next;
     w.s = s_out;
     w.s = any(greaterThanEqual(next, ivec3(abuffer_grid << 4))) ? 1e30 : w.s;
+    return is_set && is_set_in(bits, p);
+}
+
+// What an occupied subvoxel is to be searched for. Read behind the loop over empty space, which needs none of it.
+found_voxel found_in(voxel_step step_)
+{
+    uvec3 voxel = step_.subvoxel >> 2u, p = step_.subvoxel & 3u;
+    int inside = subvoxels_at(voxel);
+    uint what = what_of(block_at(voxel), voxel & 3u);
+    // If one image does not show all of a voxel, the images that show the subvoxel's surfaces best.
+    uint best = 0u;
+    for (int axis = 0; axis < 3; axis++)
+        best |= is_set_in(texelFetch(abuffer_subvoxels, inside + axis).xy, p) ? 1u << axis : 0u;
+    what &= bitCount(what & ABUFFER_VOXEL_IMAGES) > 1 ? best | ABUFFER_VOXEL_BODY : 15u;
+    return found_voxel(what, step_.s_in, step_.s_out);
 }
 
 // To the next occupied subvoxel, if there is one.
 found_voxel next_voxel(inout voxel_traversal w)
 {
-    found_voxel found = found_voxel(0u, 0.0, 0.0);
+    voxel_step step_ = voxel_step(uvec3(0u), 0.0, 0.0);
+    bool is_found = false;
+    // Under a condition: without one, llvmpipe gave rays that had found theirs the last step of their neighbours.
     do {
-        step_on(w, found);
-    } while (w.s < w.s_end && found.what == 0u);
+        voxel_step next;
+        if (step_on(w, next)) {
+            step_ = next;
+            is_found = true;
+        }
+    } while (w.s < w.s_end && !is_found);
+    found_voxel found = found_in(step_);
+    found.what = is_found ? found.what : 0u;
     return found;
 }

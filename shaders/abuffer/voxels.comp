@@ -6,8 +6,10 @@
 #include "common/dispatch.glsl"
 
 layout(binding = IMAGE_ABUFFER_VOXELS, rgba32ui) uniform uimageBuffer voxels;
+layout(binding = IMAGE_ABUFFER_SUBVOXELS, rg32ui) uniform uimageBuffer subvoxels;
 
 uniform int grid; // blocks along a side
+uniform bool has_subvoxels;
 uniform uint first_item, end_item; // of the blocks
 
 layout(binding = UNIT_TRACER_0) uniform isamplerBuffer sums; // a voxel's four as one texel
@@ -28,6 +30,19 @@ uint judged(ivec4 sum)
     return body | (shows_all ? 1u << first : leaned);
 }
 
+int voxel_at(ivec3 place, int i)
+{
+    ivec3 voxel = 4 * place + ivec3(i & 3, i >> 2 & 3, i >> 4);
+    return (voxel.z * 4 * grid + voxel.y) * 4 * grid + voxel.x;
+}
+
+void join_subvoxels(int voxel)
+{
+    int first = ABUFFER_SUBVOXELS_TEXELS * voxel;
+    uvec4 any_ = imageLoad(subvoxels, first) | imageLoad(subvoxels, first + 1) | imageLoad(subvoxels, first + 2);
+    imageStore(subvoxels, first + ABUFFER_SUBVOXELS_ANY, any_);
+}
+
 void settle(int at, ivec3 place)
 {
     uvec2 occupied = uvec2(0u);
@@ -35,8 +50,7 @@ void settle(int at, ivec3 place)
         uvec4 words = uvec4(0u);
         uint holds = 0u;
         for (int i = 0; i < 32; i++) {
-            ivec3 voxel = 4 * place + ivec3(i & 3, i >> 2 & 3, 2 * half_ + (i >> 4));
-            uint what = judged(texelFetch(sums, (voxel.z * 4 * grid + voxel.y) * 4 * grid + voxel.x));
+            uint what = judged(texelFetch(sums, voxel_at(place, 32 * half_ + i)));
             uint nibble = what << 4 * (i & 7);
             uvec4 part = uvec4(equal(ivec4(i >> 3), ivec4(0, 1, 2, 3)));
             words |= part * nibble;
@@ -44,6 +58,9 @@ void settle(int at, ivec3 place)
         }
         occupied[half_] = holds;
         imageStore(voxels, at + 1 + half_, words);
+        // Most voxels are empty, and have none.
+        for (uint left = has_subvoxels ? holds : 0u; left != 0u; left &= left - 1u)
+            join_subvoxels(voxel_at(place, 32 * half_ + findLSB(left)));
     }
     imageStore(voxels, at, uvec4(occupied, 0u, 0u));
 }

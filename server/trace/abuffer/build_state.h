@@ -58,7 +58,7 @@ struct abuffer_builder {
 #define ABUFFER_ID_BYTES 4
 #define ABUFFER_NODE_BYTES 16
 #define ABUFFER_SUM_BYTES 16
-#define ABUFFER_SUBVOXELS_BYTES 24 /* a voxel */
+#define ABUFFER_SUBVOXELS_BYTES (8 * ABUFFER_SUBVOXELS_TEXELS) /* a voxel */
 
 /* Of a stage: says how many items it has, with room for what it leaves; does some of them, from all bindings on;
  * looks at what there is when all are done. */

@@ -89,7 +89,7 @@ struct contents {
     uint32_t *ids;
     uint32_t (*drawn)[4];
     int32_t (*sums)[4];
-    uint32_t (*subvoxels)[3][2]; /* by axes */
+    uint32_t (*subvoxels)[ABUFFER_SUBVOXELS_TEXELS][2]; /* by axes */
 };
 
 static inline void *read_all(const struct gpu_buffer *buffer, size_t bytes)
@@ -128,7 +128,7 @@ static inline void contents_read(struct contents *contents, const struct abuffer
     contents->ids = read_all(&store->ids, store->sample_count * 4);
     contents->drawn = read_all(&store->drawn, store->drawn_count * 16);
     size_t subvoxels = abuffer_has_subvoxels(store) ? along * along * along : 1;
-    contents->subvoxels = read_all(&store->subvoxels, subvoxels * 24);
+    contents->subvoxels = read_all(&store->subvoxels, subvoxels * sizeof(*contents->subvoxels));
     contents->sums = read_all(&store->sums, along * along * along * 16);
 }
 
@@ -242,7 +242,8 @@ static inline void expect_same(const struct contents *a, const struct contents *
         assert_memory_equal(&a->ids[first], &b->ids[other], 4 * count);
     }
     assert_memory_equal(a->sums, b->sums, 16 * voxels);
-    assert_memory_equal(a->subvoxels, b->subvoxels, abuffer_has_subvoxels(&a->store) ? 24 * voxels : 24);
+    assert_memory_equal(a->subvoxels, b->subvoxels,
+                        abuffer_has_subvoxels(&a->store) ? sizeof(*a->subvoxels) * voxels : sizeof(*a->subvoxels));
 }
 
 #endif

@@ -140,8 +140,8 @@ static inline uint32_t abuffer_pack_normal(const float n[3])
     return ((uint32_t)lrintf(p[0] * 2047) & 0xfff) | ((uint32_t)lrintf(p[1] * 2047) & 0xfff) << 12;
 }
 
-static inline void abuffer_sum(const struct abuffer_samples *s, int32_t (*sums)[4], uint32_t (*subvoxels)[3][2],
-                               const struct abuffer_sample *at)
+static inline void abuffer_sum(const struct abuffer_samples *s, int32_t (*sums)[4],
+                               uint32_t (*subvoxels)[ABUFFER_SUBVOXELS_TEXELS][2], const struct abuffer_sample *at)
 {
     const uint32_t n = s->resolution, axis = at->texel / (n * n), iu = (axis + 1) % 3, iv = (axis + 2) % 3;
     const float voxel = (float)n / (float)s->voxels_along;
@@ -205,7 +205,7 @@ static inline bool abuffer_upload(struct abuffer_samples *s, struct abuffer_stor
     uint32_t(*texels)[2] = calloc(texel_count, sizeof(*texels));
     uint32_t(*samples)[2] = calloc(s->count + 1, sizeof(*samples)), *ids = calloc(s->count + 1, sizeof(*ids));
     int32_t(*sums)[4] = calloc(voxel_count, sizeof(*sums));
-    uint32_t(*subvoxels)[3][2] = calloc(voxel_count, sizeof(*subvoxels));
+    uint32_t(*subvoxels)[ABUFFER_SUBVOXELS_TEXELS][2] = calloc(voxel_count, sizeof(*subvoxels));
     const uint32_t drawn[4] = {0, 0, 0,
                                DRAWN_SPHERES}; /* no triangles that an intersection would be held against */
     store->cell_world = cell_world;

@@ -7,6 +7,7 @@
 #include "tests/harness/test.h"
 
 #define RESOLUTION 64u
+#define PI_D 3.14159265358979
 #define MARGIN_CELLS 2u /* of the resolution, no part of the scene: one on either side */
 
 static const struct tracer_options small = {.abuffer = {.resolution = RESOLUTION}};
@@ -53,6 +54,73 @@ static struct scene *scene_of_boxes(uint32_t count)
         add_box(&edits, i + 1, 3 * (float)i);
     test_commit(&edits);
     return edits.scene;
+}
+
+/* ---- rods ---- */
+
+enum { ROD_SIDES = 12, ROD_RAYS = 4096 };
+
+static void rod_frame(double along[3], double u[3], double v[3])
+{
+    const double length = sqrt(1 + 0.6 * 0.6 + 0.35 * 0.35), across = sqrt(1 + 0.6 * 0.6);
+    memcpy(along, (double[3]){1 / length, 0.6 / length, 0.35 / length}, 3 * sizeof(double));
+    memcpy(u, (double[3]){-0.6 / across, 1 / across, 0}, 3 * sizeof(double));
+    for (int k = 0; k < 3; k++)
+        v[k] = along[(k + 1) % 3] * u[(k + 2) % 3] - along[(k + 2) % 3] * u[(k + 1) % 3];
+}
+
+static void rod_point(float out[3], double reach, double radius, double angle)
+{
+    double along[3], u[3], v[3];
+    rod_frame(along, u, v);
+    for (int k = 0; k < 3; k++)
+        out[k] = (float)(reach * along[k] + radius * (cos(angle) * u[k] + sin(angle) * v[k]));
+}
+
+/* An open tube, four metres long, askew, from the middle on; and a box that keeps the cube 8 metres wide. */
+static struct scene *scene_of_a_rod(double radius)
+{
+    struct test_edits edits = {.scene = test_scene_create()};
+    float positions[2 * ROD_SIDES][3];
+    uint32_t triangles[2 * ROD_SIDES][3];
+    for (uint32_t i = 0; i < ROD_SIDES; i++) {
+        const uint32_t next = (i + 1) % ROD_SIDES;
+        for (uint32_t end = 0; end < 2; end++)
+            rod_point(positions[2 * i + end], 4.0 * end, radius, 2 * PI_D * i / ROD_SIDES);
+        memcpy(triangles[2 * i], (uint32_t[3]){2 * i, 2 * next, 2 * i + 1}, sizeof(triangles[0]));
+        memcpy(triangles[2 * i + 1], (uint32_t[3]){2 * next, 2 * next + 1, 2 * i + 1}, sizeof(triangles[0]));
+    }
+    test_mesh(&edits, 2, (const float(*)[3])positions, 2 * ROD_SIDES, (const uint32_t *)triangles, 2 * ROD_SIDES);
+    test_node(&edits, 1, 0, NODE_MESH, 2, NULL);
+    add_box_mesh(&edits, 1);
+    add_box(&edits, 2, -4);
+    test_commit(&edits);
+    return edits.scene;
+}
+
+/* From a side, to where that side looks. */
+static struct ray ray_off_the_rod(double radius, uint64_t *seed)
+{
+    double along[3], u[3], v[3], outward[3], aside[3];
+    const uint32_t side = (uint32_t)test_uniform(seed, 0, ROD_SIDES);
+    const double share = (double)test_uniform(seed, 0.02f, 0.98f), step = 2 * PI_D / ROD_SIDES;
+    const double up = (double)test_uniform(seed, 0.05f, 1), turn = (double)test_uniform(seed, 0, 6.28f);
+    const double reach = (double)test_uniform(seed, 0.5f, 3.5f), flat = sqrt(1 - up * up);
+    float a[3], b[3];
+    struct ray ray = {.direction_t_max = {0, 0, 0, 3}};
+    rod_frame(along, u, v);
+    rod_point(a, reach, radius, side * step);
+    rod_point(b, reach, radius, (side + 1) * step);
+    for (int k = 0; k < 3; k++) {
+        outward[k] = cos((side + 0.5) * step) * u[k] + sin((side + 0.5) * step) * v[k];
+        aside[k] = cos((side + 0.5) * step) * v[k] - sin((side + 0.5) * step) * u[k];
+    }
+    for (int k = 0; k < 3; k++) {
+        const double on = (1 - share) * (double)a[k] + share * (double)b[k];
+        ray.origin_t_min[k] = (float)(on + 1e-5 * outward[k]);
+        ray.direction_t_max[k] = (float)(up * outward[k] + flat * (cos(turn) * along[k] + sin(turn) * aside[k]));
+    }
+    return ray;
 }
 
 ALL_TESTS(open_device, close_device)
@@ -222,4 +290,31 @@ TEST(voxels_follow_the_resolution)
         assert_int_equal(chosen.tracer->stats.device_bytes, bytes);
         fixture_finish(&chosen);
     }
+}
+
+/* As thin as a cell or two: the planes of its samples go on beyond its surface, and light that leaves it must not
+ * stop at them. Before shadow rays verified what is near, 34 to 111 of 4096 did; of those that go along the rod
+ * one in five hundred may, as planes are not verified beyond four cells. */
+TEST(a_thin_rod_does_not_darken_itself)
+{
+    static const double radii_cells[] = {0.5, 0.7, 1, 1.4, 2, 3};
+    struct ray *rays = malloc(ROD_RAYS * sizeof(*rays));
+    uint32_t *visibilities = malloc(ROD_RAYS * sizeof(*visibilities));
+    for (size_t i = 0; i < sizeof(radii_cells) / sizeof(radii_cells[0]); i++) {
+        const double radius = radii_cells[i] * 8 / (RESOLUTION - MARGIN_CELLS);
+        struct fixture fixture;
+        uint32_t stopped = 0;
+        uint64_t seed = 11 + i;
+        fixture_init(&fixture, scene_of_a_rod(radius), &small);
+        for (uint32_t k = 0; k < ROD_RAYS; k++)
+            rays[k] = ray_off_the_rod(radius, &seed);
+        trace_rays(trace_by_tracer, &fixture, WAVE_ANY, rays, ROD_RAYS, NULL, visibilities);
+        for (uint32_t k = 0; k < ROD_RAYS; k++)
+            stopped += (visibilities[k] & 0xff) == 0;
+        if (stopped > ROD_RAYS / 500)
+            fail_msg("a radius of %.1f cells: %u of %u rays are stopped", radii_cells[i], stopped, ROD_RAYS);
+        fixture_finish(&fixture);
+    }
+    free(rays);
+    free(visibilities);
 }
