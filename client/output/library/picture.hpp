@@ -2,7 +2,7 @@
 // An image file as floats, as it is stored; and what a screen shows of it.
 #pragma once
 
-#include "protocol/messages.h"
+#include "output/library.h"
 
 #include <OpenImageIO/imagebuf.h>
 
