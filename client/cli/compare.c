@@ -10,7 +10,15 @@
 
 #define OPERANDS_MAX 2u
 
-enum key { KEY_JSON = 0x500, KEY_THRESHOLD, KEY_FAIL_ABOVE, KEY_LAYOUT, KEY_HEAT_TOP, KEY_IGNORE_ALPHA };
+enum key {
+    KEY_JSON = 0x500,
+    KEY_THRESHOLD,
+    KEY_FAIL_ABOVE,
+    KEY_LAYOUT,
+    KEY_HEAT_TOP,
+    KEY_IGNORE_ALPHA,
+    KEY_TONE_MAP
+};
 
 struct comparing {
     const char *operands[OPERANDS_MAX];
@@ -30,9 +38,12 @@ static const struct argp_option options[] = {
     {"threshold", KEY_THRESHOLD, "ERROR", 0, "Count a pixel as beyond if a channel differs by more (default 0.01)",
      0},
     {"fail-above", KEY_FAIL_ABOVE, "[FIGURE=]VALUE", 0,
-     "Exit with 1 if a figure is worse: psnr (dB) and ssim below the value; mean, rms, max, butteraugli, and the "
+     "Exit with 1 if a figure is worse: psnr, shown_psnr (dB) and ssim below the value; mean, rms, max, "
+     "butteraugli, and the "
      "shares beyond, visible and nonfinite (0.001 or 0.1%) above it. Without a name: max. May be repeated",
      0},
+    {"tone-map", KEY_TONE_MAP, "NAME", 0,
+     "Choose how a screen shows linear files: neutral (default), aces or none", 0},
     {"ignore-alpha", KEY_IGNORE_ALPHA, NULL, 0, "Compare colours only", 0},
     {"json", KEY_JSON, NULL, 0, "Print one JSON object on one line", 0},
     {0}};
@@ -72,6 +83,11 @@ static error_t parse(int key, char *value, struct argp_state *state)
     case KEY_LAYOUT:
         if (!protocol_comparison_layout_parse(value, &comparing->options.layout))
             return cli_usage(&comparing->job, "--layout", "'%s' is not known (known: heat, side)", value);
+        return 0;
+    case KEY_TONE_MAP:
+        if (!protocol_tone_map_parse(value, &comparing->options.tone_map))
+            return cli_usage(&comparing->job, "--tone-map", "'%s' is not known (known: neutral, aces, none)",
+                             value);
         return 0;
     case KEY_HEAT_TOP:
         return parse_error(comparing, "--heat-top", value, &comparing->options.heat_top);

@@ -239,7 +239,7 @@ static void print_text(const struct views_comparison *comparison)
         return;
     printf("all frames\n  %-16s%.6g %%\n", "unknown", 100 * total.unknown);
     if (isfinite(total.psnr_db))
-        printf("  %-16s%.3f dB\n", "PSNR", total.psnr_db);
+        printf("  %-16s%.3f dB (peak: white, 1)\n", "PSNR", total.psnr_db);
 }
 
 static json_t *frame_json(const struct views_comparison *comparison, const struct compared_frame *frame)

@@ -13,6 +13,7 @@ static const struct figure {
     double min, max; /* that a limit may be; shares are 0 to 1 */
 } figures[CLI_FIGURE_COUNT] = {
     [CLI_FIGURE_PSNR] = {.name = "psnr", .unit = " dB", .less_fails = true, .min = -1000, .max = 1000},
+    [CLI_FIGURE_SHOWN_PSNR] = {.name = "shown_psnr", .unit = " dB", .less_fails = true, .min = -1000, .max = 1000},
     [CLI_FIGURE_MEAN] = {.name = "mean", .unit = "", .max = 1e30},
     [CLI_FIGURE_RMS] = {.name = "rms", .unit = "", .max = 1e30},
     [CLI_FIGURE_MAX] = {.name = "max", .unit = "", .max = 1e30},
@@ -85,6 +86,8 @@ static double value_of(enum cli_figure figure, const struct fl_comparison *compa
     switch (figure) {
     case CLI_FIGURE_PSNR:
         return comparison->has_errors ? comparison->psnr_db : unknown;
+    case CLI_FIGURE_SHOWN_PSNR:
+        return comparison->has_errors ? comparison->shown_psnr_db : unknown;
     case CLI_FIGURE_MEAN:
         return comparison->has_errors ? comparison->mean_error : unknown;
     case CLI_FIGURE_RMS:
@@ -129,14 +132,23 @@ bool cli_limits_hold(const struct cli_limits *limits, const struct fl_comparison
 
 /* ---- text ---- */
 
+static void print_psnr(FILE *out, double psnr_db, const char *of)
+{
+    if (isfinite(psnr_db))
+        fprintf(out, "  %-16s%.3f dB (%s)\n", "PSNR", psnr_db, of);
+    else
+        fprintf(out, "  %-16sinfinite: no error (%s)\n", "PSNR", of);
+}
+
 static void print_errors(FILE *out, const struct fl_comparison *comparison)
 {
     if (!comparison->has_errors)
         return;
-    if (isfinite(comparison->psnr_db))
-        fprintf(out, "  %-16s%.3f dB (peak: white, 1)\n", "PSNR", comparison->psnr_db);
-    else
-        fprintf(out, "  %-16sinfinite: no error\n", "PSNR");
+    const bool is_linear = comparison->space == PROTOCOL_COMPARISON_SPACE_LINEAR;
+    print_psnr(out, comparison->psnr_db,
+               is_linear ? "of linear light; peak: white, 1, not the highlights" : "peak: white, 1");
+    if (is_linear)
+        print_psnr(out, comparison->shown_psnr_db, "tone-mapped, as a screen shows it; peak: white, 1");
     fprintf(out, "  %-16s%.6g\n", "mean error", comparison->mean_error);
     fprintf(out, "  %-16s%.6g\n", "rms error", comparison->rms_error);
     fprintf(out, "  %-16s%.6g", "maximum error", comparison->max_error);

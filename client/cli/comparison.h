@@ -11,6 +11,7 @@
 /* For most a greater value is worse; for PSNR and SSIM a smaller one. */
 enum cli_figure {
     CLI_FIGURE_PSNR,        /* dB */
+    CLI_FIGURE_SHOWN_PSNR,  /* dB, of what a screen shows */
     CLI_FIGURE_MEAN,        /* mean error */
     CLI_FIGURE_RMS,         /* root mean square error */
     CLI_FIGURE_MAX,         /* maximum error; the figure of a limit without a name */

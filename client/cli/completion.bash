@@ -29,7 +29,7 @@ _farlight()
         --lens | --eyes) words="rays quadtree" ;;
         --holes) words="fill pattern" ;;
         --layout) words="heat side" ;;
-        --fail-above) words="psnr= mean= rms= max= beyond= ssim= butteraugli= visible= nonfinite= agree=" ;;
+        --fail-above) words="psnr= shown_psnr= mean= rms= max= beyond= ssim= butteraugli= visible= nonfinite= agree=" ;;
         --*) words=$("$program" complete "$before" 2>/dev/null) ;;
         esac
         if [[ -z $words && $word == -* ]]; then

@@ -49,28 +49,6 @@ static bool add_groups(struct aff *aff)
     return true;
 }
 
-/* Where lights are as bright as AFF wants them: the middle of the camera's way, or what the view looks at, or the
- * middle of what does not move. */
-static void find_lit_place(struct aff *aff, float lit[3])
-{
-    const struct aff_keys *camera = aff_find_keys(aff, "camera");
-    const struct aff_curve *way = camera ? &camera->curves[AFF_TRANSL] : NULL;
-    const struct shapes *still = &aff->groups[0]->shapes;
-
-    for (int c = 0; c < 3; c++) {
-        double sum = 0;
-
-        for (size_t i = 1; way && i + 1 < way->count; i++)
-            sum += way->keys[i].value[c];
-        if (way && way->count > 0)
-            lit[c] = (float)(sum / (double)(way->count - 2));
-        else if (aff->nff.has_view)
-            lit[c] = aff->nff.look_at[c];
-        else
-            lit[c] = still->lower[c] <= still->upper[c] ? (still->lower[c] + still->upper[c]) / 2 : 0;
-    }
-}
-
 static bool has_shapes(const struct aff *aff)
 {
     for (size_t i = 0; i < aff->group_count; i++) {
@@ -85,7 +63,6 @@ static bool has_shapes(const struct aff *aff)
 bool aff_add_all(struct aff *aff)
 {
     uint32_t *textures;
-    float lit[3];
     bool added;
 
     if (!has_shapes(aff))
@@ -95,8 +72,7 @@ bool aff_add_all(struct aff *aff)
         return import_fail(aff->nff.scene, NULL, "out of memory");
     added = aff_add_textures(aff, textures) && nff_add_materials(&aff->nff, textures);
     free(textures);
-    find_lit_place(aff, lit);
-    if (!added || !nff_add_lights(&aff->nff, lit) || !add_groups(aff) ||
+    if (!added || !nff_add_lights(&aff->nff) || !add_groups(aff) ||
         (aff->nff.has_view && !nff_add_camera(&aff->nff)) || !aff_add_clip(aff))
         return false;
     nff_add_background(&aff->nff);

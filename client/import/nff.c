@@ -245,13 +245,10 @@ void nff_free(struct nff *nff)
 static bool finish(struct nff *nff)
 {
     const struct shapes *shapes = nff->shapes;
-    float middle[3];
 
     if (shapes->sphere_count == 0 && shapes->triangle_count == 0)
         return import_fail(nff->scene, NULL, "it contains nothing that can be shown");
-    for (int c = 0; c < 3; c++)
-        middle[c] = (shapes->lower[c] + shapes->upper[c]) / 2;
-    if (!nff_add_materials(nff, NULL) || !nff_add_lights(nff, nff->has_view ? nff->look_at : middle) ||
+    if (!nff_add_materials(nff, NULL) || !nff_add_lights(nff) ||
         !shapes_finish(nff->shapes, 0, nff->material_ids) || (nff->has_view && !nff_add_camera(nff)))
         return false;
     nff_add_background(nff);

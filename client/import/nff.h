@@ -58,9 +58,11 @@ bool nff_use_fill(struct nff *nff);
 /* Adds the materials that were in use. textures[i] is the identifier of texture i. */
 bool nff_add_materials(struct nff *nff, const uint32_t *textures);
 
+/* NFF's colours are a display's, 0 to 1; ours are linear. */
+float nff_linear(float shown);
+
 bool nff_add_camera(struct nff *nff);
-/* NFF's lights do not weaken with distance, ours do: each is as bright as NFF wants it at the place `lit`. */
-bool nff_add_lights(struct nff *nff, const float lit[3]);
+bool nff_add_lights(struct nff *nff);
 void nff_add_background(struct nff *nff);
 
 #endif

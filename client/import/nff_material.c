@@ -2,6 +2,7 @@
 #include "nff.h"
 
 #include "model.h"
+#include "protocol/common/srgb.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -11,6 +12,11 @@
 static float unit(float value)
 {
     return value < 0 ? 0 : value > 1 ? 1 : value;
+}
+
+float nff_linear(float shown)
+{
+    return linear_from_srgb_f(unit(shown));
 }
 
 static float max_component(const float colour[3])
@@ -37,18 +43,31 @@ static void transmit(struct message_set_material *material, float through, float
     material->ior = ior >= 1 && ior <= 10 ? ior : 1;
 }
 
-/* The colour is that of all three, times their sum, so that each comes out as stated. */
+/* What a surface of the index of refraction 10 mirrors, at most one may have. */
+#define MIRROR_MAX 0.669f
+
+/* NFF's numbers are a display's: where one of the parts is all that is seen, a display shows it times the colour,
+ * and the mirror times what it mirrors, which has a hue of its own. */
 static void from_plain(const float n[8], struct message_set_material *material)
 {
-    float diffuse = unit(n[3]), specular = unit(n[4]), through = unit(n[6]);
+    const float scattered = nff_linear(n[3]), specular = nff_linear(n[4]), through = nff_linear(n[6]);
 
-    reflect(material, diffuse, specular);
-    for (int c = 0; c < 3; c++)
-        material->base_colour[c] = unit(n[c] * unit(diffuse + specular));
     if (through > 0) {
-        transmit(material, through, n[7]);
+        transmit(material, through / (through + scattered), n[7]);
         for (int c = 0; c < 3; c++)
-            material->base_colour[c] = unit(n[c]);
+            material->base_colour[c] = unit(nff_linear(n[c]) * (through + scattered));
+    } else if (specular > MIRROR_MAX) { /* metal; it has the surface's hue */
+        reflect(material, scattered, specular);
+        for (int c = 0; c < 3; c++)
+            material->base_colour[c] = unit(nff_linear(n[c]) * (scattered + specular));
+    } else {
+        const float root = sqrtf(specular); /* Fresnel's equations, straight on */
+
+        reflect(material, 1, 0);
+        material->roughness = specular > 0 ? 0.0f : 1.0f;
+        material->ior = (1 + root) / (1 - root);
+        for (int c = 0; c < 3; c++)
+            material->base_colour[c] = unit(nff_linear(unit(n[c]) * unit(n[3])) / (1 - specular));
     }
 }
 

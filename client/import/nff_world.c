@@ -44,32 +44,24 @@ bool nff_add_camera(struct nff *nff)
     return nff->camera_node != 0;
 }
 
-/* A surface at `lit` that scatters all light sends out what NFF's formula says, Kd times N.L times the light;
- * hence the factor pi. */
-bool nff_add_lights(struct nff *nff, const float lit[3])
+/* A surface that scatters all light sends out what NFF's formula says, Kd times N.L times the light; hence the
+ * factor pi. */
+bool nff_add_lights(struct nff *nff)
 {
     /* NFF: lights without colour share what one would give, less steeply than evenly. */
     float share = (float)(sqrt((double)nff->light_count) / (double)nff->light_count);
 
     for (size_t i = 0; i < nff->light_count; i++) {
         struct nff_light *light = &nff->lights[i];
-        struct message_set_light set = {.kind = PROTOCOL_LIGHT_POINT};
+        struct message_set_light set = {.kind = PROTOCOL_LIGHT_STEADY};
         float matrix[12];
-        double distance2 = 0;
         char name[32];
 
         import_identity(matrix);
         for (int c = 0; c < 3; c++) {
-            double away = (double)light->position[c] - (double)lit[c];
-
             matrix[c * 4 + 3] = light->position[c];
-            distance2 += away * away;
+            set.colour[c] = (float)fmin((double)(light->coloured ? light->colour[c] : share) * PI, 1e12);
         }
-        if (!(distance2 > 1e-12))
-            distance2 = 1;
-        for (int c = 0; c < 3; c++)
-            set.colour[c] =
-                (float)fmin((double)(light->coloured ? light->colour[c] : share) * PI * distance2, 1e12);
         snprintf(name, sizeof(name), "light %zu", i + 1);
         set.name = name;
         light->node = show(nff, PROTOCOL_NODE_LIGHT, import_add_light(nff->scene, &set), matrix, name);
@@ -85,7 +77,9 @@ void nff_add_background(struct nff *nff)
 
     if (!nff->has_background)
         return;
+    /* What a ray sees that leaves; without a light it is the only one. */
+    environment.backdrop = nff->light_count > 0;
     for (int c = 0; c < 3; c++)
-        environment.colour[c] = fminf(fmaxf(nff->background[c], 0), 1e9f);
+        environment.colour[c] = nff_linear(nff->background[c]);
     import_set_environment(nff->scene, &environment, 0);
 }

@@ -87,6 +87,7 @@ static bool send_request(struct judge *judge, struct fl_error *error)
     wanted->threshold = threshold < 0 ? 0 : threshold > 0 ? threshold : FL_THRESHOLD_DEFAULT;
     wanted->heat_top = options->heat_top;
     wanted->layout = options->layout;
+    wanted->tone_map = options->tone_map;
     wanted->a = options->a;
     wanted->b = options->b;
     wanted->picture = options->picture;
@@ -101,6 +102,11 @@ static bool send_request(struct judge *judge, struct fl_error *error)
 }
 
 /* ---- the answer ---- */
+
+static double psnr_db(float rms_error)
+{
+    return rms_error > 0 ? -20 * log10((double)rms_error) : (double)INFINITY;
+}
 
 static void take(struct fl_comparison *to, const struct message_images_compared *from)
 {
@@ -118,7 +124,8 @@ static void take(struct fl_comparison *to, const struct message_images_compared 
     to->identical = from->nonfinite == 0 && !(from->max_error > 0);
     to->mean_error = (double)from->mean_error;
     to->rms_error = (double)from->rms_error;
-    to->psnr_db = from->rms_error > 0 ? -20 * log10((double)from->rms_error) : (double)INFINITY;
+    to->psnr_db = psnr_db(from->rms_error);
+    to->shown_psnr_db = psnr_db(from->shown_rms_error);
     to->max_error = (double)from->max_error;
     to->max_error_x = from->max_error_x;
     to->max_error_y = from->max_error_y;

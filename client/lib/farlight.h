@@ -445,8 +445,8 @@ FL_API void fl_view_destroy(struct fl_view *view);
 /* For the caller's own poll(): readable when something may have arrived. The connection keeps it. */
 FL_API int fl_connection_fd(const struct fl_connection *connection);
 
-/* The share of rays on which both tracers agree, of those that are on no edge; 1 without rays. Shading does not
- * matter. */
+/* The share of rays on which both tracers agree, of those that are on no edge; 1 without rays. A hit on another
+ * surface is no agreement. Shading does not matter. */
 FL_API double fl_wave_agreement(const struct record_wave_comparison *comparison);
 /* Sums of the counts and times of several waves, and their maximum errors; medians and percentiles, which cannot
  * be added, are 0. `into` may be all zero. */
@@ -576,10 +576,11 @@ struct fl_compare_options {
     const char *picture;        /* where the picture of the errors goes, PNG or JPEG; NULL: nowhere */
     const char *picture_format; /* "png" or "jpeg" where the path's ending does not say; may be NULL */
     enum protocol_comparison_layout layout;
-    const char *label_a, *label_b; /* over the pictures of the layout `side`; NULL: the files' names */
-    float heat_top;                /* the error with the brightest colour; 0: the maximum error, at most 1 */
-    unsigned timeout_ms;           /* 0: 10 minutes */
-    int interrupt_fd;              /* as of fl_connect_options */
+    const char *label_a, *label_b;   /* over the pictures of the layout `side`; NULL: the files' names */
+    float heat_top;                  /* the error with the brightest colour; 0: the maximum error, at most 1 */
+    enum protocol_tone_map tone_map; /* by which a screen shows linear files */
+    unsigned timeout_ms;             /* 0: 10 minutes */
+    int interrupt_fd;                /* as of fl_connect_options */
 };
 
 /* The difference of two images. An error is the difference of one channel of one pixel, without sign, in units of
@@ -593,15 +594,17 @@ struct fl_comparison {
     uint64_t pixels;                              /* all of them */
     uint64_t nonfinite_a, nonfinite_b, nonfinite; /* pixels with NaN or infinity; in either */
     uint64_t beyond;                              /* pixels beyond the threshold */
-    bool has_errors;                              /* false: no pixel is finite, the next six mean nothing */
+    bool has_errors;                              /* false: no pixel is finite, the next seven mean nothing */
     bool identical;                               /* no error at all, and no pixel that is not finite */
     double psnr_db; /* peak signal to noise ratio, 20 log10(1 / rms_error): the peak is white, 1, in both spaces;
                        INFINITY without error */
+    double shown_psnr_db; /* the same of the red, green and blue that a screen shows: of linear files through the
+                             tone map and the sRGB curve, so that no highlight exceeds the peak */
     double mean_error, rms_error, max_error;
     uint32_t max_error_x, max_error_y, max_error_channel; /* from the top left; counted from 0 */
     /* Structural similarity (Wang, Bovik, Sheikh, Simoncelli. Image quality assessment: from error visibility to
      * structural similarity. 2004): 11x11 Gaussian window of sigma 1.5, K1 0.01, K2 0.03, range 1, on the luma of
-     * what a screen shows (linear files: neutral tone map and sRGB curve, as in a PNG of the renderer); the mean
+     * what a screen shows (linear files: tone map and sRGB curve, as in a PNG of the renderer); the mean
      * over all windows that lie within the picture. */
     bool has_ssim; /* the picture is at least 11x11 */
     double ssim;

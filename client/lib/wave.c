@@ -11,8 +11,8 @@ double fl_wave_agreement(const struct record_wave_comparison *comparison)
 {
     const double edges = (double)comparison->edges;
     const double rays = larger((double)comparison->rays - edges, 0);
-    const double differing =
-        (double)comparison->only_tracer + (double)comparison->only_reference + (double)comparison->far - edges;
+    const double differing = (double)comparison->only_tracer + (double)comparison->only_reference +
+                             (double)comparison->far + (double)comparison->other_surface - edges;
     return rays > 0 ? larger(1 - larger(differing, 0) / rays, 0) : 1;
 }
 

@@ -129,6 +129,7 @@ Imf::Header make_header(const struct image &image, const std::string &date)
     Imf::Header header(static_cast<int>(image.begin->width), static_cast<int>(image.begin->height));
     header.compression() = Imf::ZIP_COMPRESSION;
     add_channels(header.channels(), image.begin->layers, image.half);
+    Imf::addChromaticities(header, Imf::Chromaticities()); // of Rec. 709 with the white D65
     header.insert("Software", Imf::StringAttribute("farlight " FARLIGHT_VERSION));
     if (!date.empty())
         Imf::addCapDate(header, date);

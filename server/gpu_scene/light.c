@@ -20,6 +20,7 @@ static const int device_kinds[] = {
     [LIGHT_DIRECTIONAL] = LIGHT_KIND_DIRECTIONAL,
     [LIGHT_RECTANGLE] = LIGHT_KIND_RECTANGLE,
     [LIGHT_SPHERE] = LIGHT_KIND_SPHERE,
+    [LIGHT_STEADY] = LIGHT_KIND_STEADY,
 };
 
 static float length3(const float v[3])
@@ -49,7 +50,7 @@ static bool pack_light(const struct scene_light *in, const float world_from_ligh
     };
     affine_vector(direction, world_from_light, forward);
     float length = length3(direction);
-    bool needs_direction = in->kind != LIGHT_POINT && in->kind != LIGHT_SPHERE;
+    bool needs_direction = in->kind == LIGHT_SPOT || in->kind == LIGHT_DIRECTIONAL || in->kind == LIGHT_RECTANGLE;
     if (needs_direction && !(length > 0.0f && isfinite(length)))
         return false;
     for (int k = 0; k < 3; k++)

@@ -152,6 +152,8 @@ bool environment_update(struct environment *environment, struct gpu_device *devi
     uint32_t kind = image ? ENVIRONMENT_IMAGE : ENVIRONMENT_CONSTANT;
     if (is_black(given->colour))
         kind = gpu->light_count == 0 ? ENVIRONMENT_SKY : ENVIRONMENT_NONE;
+    else if (given->backdrop)
+        kind = ENVIRONMENT_BACKDROP;
     environment->default_light = kind == ENVIRONMENT_SKY;
     if (environment->default_light && !make_default_light(environment, device, error))
         return false;

@@ -2,8 +2,8 @@
 /* The light from infinitely far away, and the light of a scene that has none.
  *
  * A diffuse surface sees the environment as irradiance: order-2 spherical harmonics (Ramamoorthi and Hanrahan
- * 2001), integrated on the CPU when the environment changes. A scene without a light and with a black
- * environment is lit by the default of shared/sky.h (frame.h says where lamps replace it). */
+ * 2001), integrated on the CPU when the environment changes; of a backdrop there is none. A scene without a light
+ * and with a black environment is lit by the default of shared/sky.h (frame.h says where lamps replace it). */
 #ifndef FARLIGHT_RENDER_ENVIRONMENT_H
 #define FARLIGHT_RENDER_ENVIRONMENT_H
 

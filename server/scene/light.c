@@ -47,6 +47,8 @@ bool environment_check_shape(const struct scene_environment *environment, const 
                               environment->width, environment->height);
         return true;
     }
+    if (environment->backdrop)
+        return edit_error(place, ERROR_INVALID, ".backdrop", "an image is a light; a backdrop is a colour alone");
     if (!environment->width || !environment->height)
         return edit_error(place, ERROR_INVALID, environment->width ? ".height" : ".width",
                           "an image has at least one texel");

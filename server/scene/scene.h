@@ -174,6 +174,7 @@ struct scene_environment {
     float rotation; /* radians, about +y */
     uint32_t width, height;
     struct blob *texels; /* 4 half floats a texel; NULL: constant colour */
+    bool backdrop;       /* the constant colour is seen and lights nothing */
 };
 
 /* One edit of a transaction. Its pointers (blobs, ranges) pass to the scene with a successful commit and stay with

@@ -196,6 +196,7 @@ static bool from_environment(const struct edit_source *source, const struct mess
     environment->rotation = message->rotation;
     environment->width = message->width;
     environment->height = message->height;
+    environment->backdrop = message->backdrop != 0;
     return take_blob(source, message->arrays, message->arrays_count, 0, "set_environment", 0, &environment->texels,
                      error);
 }

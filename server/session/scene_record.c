@@ -300,6 +300,7 @@ static void put_environment(struct sink *sink, const struct scene_environment *e
     set->rotation = environment->rotation;
     set->width = environment->width;
     set->height = environment->height;
+    set->backdrop = environment->backdrop ? 1 : 0;
     set->arrays = sink->arrays;
     set->arrays_count = put_blobs(sink, &environment->texels, 1);
     put(sink, &message);

@@ -11,7 +11,7 @@
 
 enum wave_kind {
     WAVE_CLOSEST, /* fills `hits` */
-    WAVE_ANY,     /* fills `visibility`: transmittance up to t_max, unorm 4x8 rgb; opaque surfaces stop it,
+    WAVE_ANY,     /* fills `visibility`: transmittance up to t_max (shared/ray.h); opaque surfaces stop it,
                      translucent ones (transmission, blend) tint it */
 };
 

@@ -59,7 +59,7 @@ vec3 environment_radiance(vec3 direction)
 #endif
     if (frame.environment_kind == ENVIRONMENT_SKY)
         return environment_sky(direction.y);
-    return frame.environment_kind == ENVIRONMENT_CONSTANT ? frame.environment_colour.rgb : vec3(0.0);
+    return frame.environment_kind != ENVIRONMENT_NONE ? frame.environment_colour.rgb : vec3(0.0);
 }
 
 // Behind the surfaces of the picture; not in mirrors and glass.

@@ -129,7 +129,9 @@ light_sample light_sample_at(uint index, vec3 position, vec2 u)
     vec3 to_light = l.position_kind.xyz - position;
     float distance_ = length(to_light);
     vec3 direction = to_light / max(distance_, 1e-12);
-    vec3 irradiance = l.colour.rgb * light_falloff(distance_, l.direction_range.w);
+    vec3 irradiance = l.colour.rgb;
+    if (kind != LIGHT_KIND_STEADY)
+        irradiance *= light_falloff(distance_, l.direction_range.w);
     if (kind == LIGHT_KIND_SPOT)
         irradiance *= light_cone(l, direction);
     return light_sample(direction, distance_, irradiance);

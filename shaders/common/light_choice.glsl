@@ -30,7 +30,7 @@ float light_estimate(uint index, light_receiver r)
     float squared = max(dot(to_light, to_light), 1e-12), inverse = inversesqrt(squared);
     vec3 direction = to_light * inverse;
     float power = l.colour.r + l.colour.g + l.colour.b, cosine = dot(r.normal, direction), reach = 0.0;
-    if (!directional)
+    if (!directional && kind != LIGHT_KIND_STEADY)
         power *= light_falloff(squared * inverse, l.direction_range.w);
     if (kind == LIGHT_KIND_SPOT)
         power *= light_cone(l, direction);

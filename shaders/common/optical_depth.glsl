@@ -7,7 +7,7 @@
 // would.
 const float OPTICAL_DEPTH_STEPS = 524288.0;
 const float OPTICAL_DEPTH_MAX = 8388607.0;   // the maximum: twice as much is still a whole number in a float
-const float OPTICAL_DEPTH_BLACK = 4715632.0; // the 8-bit answer rounds to black: transmittance 0.5 / 255
+const float OPTICAL_DEPTH_BLACK = 12.0 * OPTICAL_DEPTH_STEPS; // of VISIBILITY_BLACK
 
 vec3 optical_depth_of(vec3 transmittance)
 {

@@ -7,6 +7,7 @@
 
 #include "shared/path.h"
 #include "common/dispatch.glsl"
+#include "common/visibility.glsl"
 #include "render/wave.glsl"
 
 layout(local_size_x = 64) in;
@@ -39,9 +40,9 @@ vec4 radiance_of(uint k)
         return sum;
     for (uint i = 0u; i < batch_rays; i++) {
         uint place = i * wave.hits.count + j;
-        uint through = visibility[place] & 0xffffffu;
+        uint through = visibility[place];
         if (through != 0u) {
-            vec3 share = unpackUnorm4x8(through).rgb;
+            vec3 share = transmittance_of(through);
 #ifdef GREY
             share = vec3(dot(share, vec3(1.0 / 3.0)));
 #endif

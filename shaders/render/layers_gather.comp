@@ -3,6 +3,7 @@
 
 #include "shared/layers.h"
 #include "common/dispatch.glsl"
+#include "common/visibility.glsl"
 #include "render/wave.glsl"
 
 layout(local_size_x = 64) in;
@@ -23,7 +24,7 @@ void main()
     uint place = plane * ray_count + hit_list[j];
     float open_share = layer_sums[place].r; // ray by ray, so that it is the same however they are batched
     for (uint i = 0u; i < batch_rays; i++) { // the mean of a coloured transmittance
-        vec3 through = unpackUnorm4x8(visibility[i * wave.hits.count + j]).rgb;
+        vec3 through = transmittance_of(visibility[i * wave.hits.count + j]);
         open_share += dot(through, vec3(1.0 / 3.0)) / float(all_rays);
     }
     layer_sums[place].rgb = vec3(open_share);

@@ -231,6 +231,8 @@ void go_on(eye_hit e, uint seed, uint index, bool asked, float choice)
     p.light_number = 0u;
     p.light_share = 0.0;
     p.environment_share = covered ? 0.0 : 1.0;
+    if (frame.environment_kind == ENVIRONMENT_BACKDROP) // nothing that scatters sees it
+        p.environment_share = chosen.lobe == BSDF_SCATTERED ? 0.0 : e.p.environment_share;
     if (found > 0.0 && asks_environment != 0u)
         p.environment_share = heuristic(found, environment_probability(e.s.normal, chosen.direction));
 #ifdef HAS_AREA_LIGHTS

@@ -40,7 +40,8 @@ SHARED_SIZE(frame_uniforms, 736)
 #define ENVIRONMENT_NONE 0u /* black; leaves the picture transparent */
 #define ENVIRONMENT_CONSTANT 1u
 #define ENVIRONMENT_IMAGE 2u
-#define ENVIRONMENT_SKY 3u /* the default of a scene without any light */
+#define ENVIRONMENT_SKY 3u      /* the default of a scene without any light */
+#define ENVIRONMENT_BACKDROP 4u /* a colour that rays see which leave the scene; no light */
 
 /* Dimensions of a sample, see common/sequence.glsl. Those from SEQUENCE_WAVE on come again for each wave of its
  * path, SEQUENCE_WAVE_SIZE later. */

@@ -41,6 +41,7 @@
 #include "common/range.glsl"
 #include "common/candidate.glsl"
 #include "common/discs.glsl"
+#include "common/visibility.glsl"
 
 #ifndef PACKET_RAYS
 #define PACKET_RAYS 1
@@ -125,7 +126,7 @@ void store_visibility(uint ray_index, vec3 optical_depth)
 #endif
     vec3 left = transmittance_left(optical_depth);
     if (ray_index < ray_end)
-        visibilities[ray_index] = packUnorm4x8(vec4(left, max_component(left) > 0.0 ? 1.0 : 0.0));
+        visibilities[ray_index] = visibility_of(left);
 }
 
 #else

@@ -278,11 +278,11 @@ static bool hits_agree(const struct arena *arena, const struct ray *ray, const s
     return fabsf(a->distance - b->distance) <= DISTANCE_STEPS * 0.5f * FLT_EPSILON * size / slant;
 }
 
-/* Transmittances are products of up to some ten factors in 8 bits: the last may round either way. */
+/* Transmittances are products of up to some ten factors: the last step may round either way. */
 static bool visibilities_agree(uint32_t a, uint32_t b)
 {
-    for (int shift = 0; shift < 24; shift += 8)
-        if (abs((int)(a >> shift & 255) - (int)(b >> shift & 255)) > 1)
+    for (unsigned shift = 0; shift < 3 * VISIBILITY_BITS; shift += VISIBILITY_BITS)
+        if (abs((int)(a >> shift & VISIBILITY_MAX) - (int)(b >> shift & VISIBILITY_MAX)) > 1)
             return false;
     return true;
 }

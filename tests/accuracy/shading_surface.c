@@ -1,7 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /* Mirrors, environment, alpha and tone maps against what can be computed by hand. */
 #include "tests/accuracy/render_fixture.h"
+#include "shared/ray.h"
 #include "tests/harness/test.h"
+
+#define PI 3.14159265358979
 
 ALL_TESTS(fixture_setup, fixture_teardown)
 EACH_TEST(fixture_clear, NULL)
@@ -110,6 +113,37 @@ TEST(blended_layers_let_through_what_alpha_leaves)
     assert_near(pixel[2], 0.75 * 0.75 * 0.25, 1e-6);
     assert_near(pixel[3], 1.0 - 0.75 * 0.75 * 0.75, 1e-6);
     frame_result_finish(&result);
+}
+
+/* Behind the camera, between a floor and its light. */
+static double light_below_panes(struct fixture *fixture, int count, float transmittance)
+{
+    fixture_clear((void **)&fixture);
+    fixture_square(fixture, 10.0f, fixture_material(fixture)->base.id, NULL);
+    struct scene_material *pane = fixture_material(fixture);
+    pane->alpha_mode = ALPHA_BLEND;
+    pane->base_colour[3] = 1.0f - transmittance;
+    for (int i = 0; i < count; i++) {
+        const float transform[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 2.0f + 0.01f * (float)i};
+        fixture_square(fixture, 10.0f, pane->base.id, transform);
+    }
+    fixture_light(fixture, LIGHT_DIRECTIONAL, 0.0f, 0.0f, 9.0f, (float)PI);
+    fixture_look(fixture, 0.0f, 0.0f, 1.0f, 0.5f);
+    struct frame_result result = fixture_render(fixture);
+    const double light = (double)fixture_pixel(&result, 16, 16)[0];
+    frame_result_finish(&result);
+    return light;
+}
+
+TEST(light_through_many_panes_is_the_product_of_their_transmittances)
+{
+    static const int counts[] = {0, 1, 2, 10, 30};
+    for (size_t i = 0; i < sizeof(counts) / sizeof(counts[0]); i++) {
+        const double left = pow(0.98, counts[i]);
+        /* Half a step of the cube root as which a shadow ray's answer is stored: 0.15 % of all light. */
+        const double step = 3.0 * pow(left, 2.0 / 3.0) * 0.5 / VISIBILITY_MAX;
+        assert_near(light_below_panes(*state, counts[i], 0.98f), left, step + 1e-5);
+    }
 }
 
 TEST(depth_counts_the_bounces_after_the_first_hit)

@@ -99,13 +99,32 @@ class Figures(Compare):
         for figure in ("mean", "rms", "max"):
             self.assertAlmostEqual(got[figure], 5 / 255, delta=FLOAT, msg=figure)
         self.assertAlmostEqual(got["psnr"], 20 * math.log10(255 / 5), delta=1e-4)
-        self.assertEqual((got["beyond"], got["space"], got["peak"]), (1, "srgb", 1))
+        self.assertEqual((got["beyond"], got["space"], got["peak"], got["shown_psnr"]), (1, "srgb", 1, got["psnr"]))
         self.assertFalse(got["identical"])
 
     def test_linear_files_are_compared_as_they_are_beyond_white_too(self):
         got = self.compare(self.exr("a.exr", [8.0] * 768), self.exr("b.exr", [6.0] * 768))
         self.assertEqual((got["mean"], got["rms"], got["max"], got["space"]), (2, 2, 2, "linear"))
         self.assertAlmostEqual(got["psnr"], 20 * math.log10(1 / 2), delta=1e-5)
+
+    def test_a_highlight_outweighs_linear_light_and_not_what_a_screen_shows(self):
+        a, b = [0.5] * 768, [0.5] * 768
+        a[:3], b[:3] = [400.0] * 3, [500.0] * 3
+        files = self.exr("a.exr", a), self.exr("b.exr", b)
+        got = self.compare(*files)
+        self.assertAlmostEqual(got["psnr"], 20 * math.log10(16 / 100), delta=1e-4)  # one of 256 is off by 100
+
+        def neutral(x):  # the tone mapper's part for light greys: both are nearly white
+            return 1 - 0.24 ** 2 / (x - 0.04 + 0.24 - 0.76)
+        off = [1.055 * neutral(x) ** (1 / 2.4) for x in (400, 500)]
+        # A difference of 1e-5 of floats near 1, which are true to 6e-8: 1 %, 0.1 dB.
+        self.assertAlmostEqual(got["shown_psnr"], 20 * math.log10(16 / (off[1] - off[0])), delta=0.1)
+        self.assertIsNone(self.compare(*files, "--tone-map", "none")["shown_psnr"], "clamped, both are white")
+        self.compare(*files, "--tone-map", "aces", "--fail-above", "shown_psnr=40", status=0)
+        self.compare(*files, "--fail-above", "psnr=40", status=1)
+        lines = self.expect(farlight("compare", *files), 0).stdout.splitlines()
+        self.assertEqual(len([line for line in lines if "PSNR" in line and "peak: white, 1" in line]), 2, lines)
+        self.refused(*files, "--tone-map", "film", says=("--tone-map", "neutral, aces, none"))
 
     def test_one_changed_pixel_is_found_and_is_one_of_all(self):
         values = [100] * 768
@@ -190,7 +209,7 @@ class Figures(Compare):
     def test_images_without_any_number_have_no_errors_but_are_beyond(self):
         a = self.exr("a.exr", [math.nan] * 768)
         got = self.compare(a, self.exr("b.exr", [1.0] * 768))
-        self.assertEqual([got[k] for k in ("psnr", "mean", "rms", "max")], [None] * 4)
+        self.assertEqual([got[k] for k in ("psnr", "shown_psnr", "mean", "rms", "max")], [None] * 5)
         self.assertEqual((got["beyond"], got["nonfinite"], got["nonfinite_pixels_b"]), (1, 1, 0))
 
     def test_the_maximum_floats_do_not_overflow_the_answer(self):

@@ -33,6 +33,29 @@ class Light(Case):
         _, _, channels = read_exr(self.render("--float", *options, name="x.exr")[0])
         return sum(sum(channels[c]) for c in "RGB") / (3 * len(channels["R"]))
 
+    def test_nff_is_shown_as_its_author_does(self):
+        """Its numbers are a display's: a surface that scatters shows colour times Kd times the cosine, a mirror Ks of what it
+        shows, a ray that leaves the background. Nothing else lights a surface, and no distance makes it darker."""
+        view = "b 0.078 0.361 0.753\nv\nfrom 0 0 4\nat 0 0 0\nup 0 1 0\nangle 30\nhither 0.01\nresolution 8 8\n"
+        square, lamp = "p 4\n-9 -9 {0}\n9 -9 {0}\n9 9 {0}\n-9 9 {0}\n", "l 0 0 {}\n"
+        background, scatters = (0.078, 0.361, 0.753), "f 1 0.75 0.33 0.8 0 0 0 1\n"
+        for name, text, wanted, steps in (
+                ("lit", view + lamp.format(7) + scatters + square.format(0), (0.8, 0.6, 0.264), 1),
+                ("far", view + lamp.format(700) + scatters + square.format(0), (0.8, 0.6, 0.264), 1),
+                ("unlit", view + lamp.format(-7) + scatters + square.format(0), (0, 0, 0), 0),
+                ("nothing", view + lamp.format(7) + scatters + square.format(9), background, 1),
+                # A half is 0.214 of the light: of (0.0070, 0.1070, 0.5274) there is (0.0015, 0.0229, 0.1129).
+                ("mirror", view + lamp.format(-7) + "f 1 1 1 0 0.5 9 0 1\n" + square.format(0), (0.0193, 0.1635, 0.3709), 1)):
+            (self.folder / f"{name}.nff").write_text(text)
+            for integrator in ("whitted", "distributed", "path"):
+                with self.subTest(name=name, integrator=integrator):
+                    path = self.render("--integrator", integrator, "--samples", "16", "--tone-map", "none", "--size", "9x9",
+                                       scene=self.folder / f"{name}.nff")[0]
+                    width, _, rows, channels = read_png(path)
+                    middle = rows[4][4 * channels:4 * channels + 3]
+                    for got, value in zip(middle, wanted, strict=True):
+                        self.assertLessEqual(abs(got - 255 * value), steps + 0.5, (width, list(middle), wanted))
+
     def test_noisy_integrators_take_more_samples_by_default(self):
         small = ["--size", "8x6"]
         for integrator, samples in (("whitted", 1), ("raycast", 1), ("ao", 16), ("path", 64)):

@@ -152,6 +152,10 @@ class Outputs(OneDaemon):
         self.assertLessEqual(always | only_full, set(full))
         self.assertEqual(only_full & set(stable), set())
         self.assertEqual(stable["farlight/model"], b"cornell.glb")
+        # ITU-R BT.709: red, green, blue and the white D65; as floats, so to a part in 1e7
+        for got, wanted in zip(struct.unpack("<8f", stable["chromaticities"]),
+                               (0.64, 0.33, 0.3, 0.6, 0.15, 0.06, 0.3127, 0.329), strict=True):
+            self.assertAlmostEqual(got, wanted, delta=1e-6)
         self.assertEqual(full["farlight/model"], str(bundled_scenes() / "cornell.glb").encode())
 
     def test_the_same_request_makes_the_same_bytes_in_every_format(self):

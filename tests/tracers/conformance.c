@@ -2,6 +2,7 @@
 /* Ray by ray, a tracer's answers are those of a plain C tracer in double precision: at first, and after every kind
  * of edit. */
 #include "tests/tracers/contract.h"
+#include "trace/visibility.h"
 
 /* Rays whose answer hangs on a rounding are left out; more of them than this and the test would say nothing. Of a
  * soup of small triangles most rays pass some edge within a few cells. */
@@ -311,8 +312,8 @@ static void judge_any(struct tally *tally, const struct fixture *fixture, uint32
         (fixture->row->seen.layers > 0 && (answer->close_distance <= until || !seen_knows(seen, until))))
         return;
     for (int k = 0; k < 3; k++)
-        expect_near(&fault, "transmittance", (visibility >> (8 * k) & 255) / 255.0, answer->transmittance[k],
-                    fixture->row->sampled.resolution ? 0.1 : 6e-3);
+        expect_near(&fault, "transmittance", visibility_transmittance(visibility, (unsigned)k),
+                    answer->transmittance[k], fixture->row->sampled.resolution ? 0.1 : 6e-3);
     count_fault(tally, ray, &fault);
 }
 

@@ -128,6 +128,22 @@ void measure_errors(struct comparison &each)
     answer.heat_top = each.wanted.heat_top > 0 ? each.wanted.heat_top : std::min(maximum, 1.0f);
 }
 
+// What was set aside is black on both screens.
+void measure_shown_errors(struct comparison &each, const ImageBuf &screen_a, const ImageBuf &screen_b)
+{
+    struct message_images_compared &answer = each.result.answer;
+    const float *a = static_cast<const float *>(screen_a.localpixels());
+    const float *b = static_cast<const float *>(screen_b.localpixels());
+    const size_t values = 3 * each.a.count();
+    const double finite = 3 * static_cast<double>(each.a.count() - answer.nonfinite);
+    double squares = 0;
+    for (size_t i = 0; i < values; i++) {
+        const double error = static_cast<double>(a[i]) - static_cast<double>(b[i]);
+        squares += error * error;
+    }
+    answer.shown_rms_error = finite > 0 ? static_cast<float>(std::sqrt(squares / finite)) : 0;
+}
+
 void measure_likeness(struct comparison &each, const ImageBuf &screen_a, const ImageBuf &screen_b)
 {
     struct message_images_compared &answer = each.result.answer;
@@ -175,10 +191,12 @@ bool compare(struct comparison &each)
     if (!check_alike(each))
         return false;
     set_aside_nonfinite(each);
-    const ImageBuf screen_a = picture_screen_colours(each.a), screen_b = picture_screen_colours(each.b);
+    const enum protocol_tone_map tone_map = each.wanted.tone_map;
+    const ImageBuf screen_a = picture_screen_colours(each.a, tone_map);
+    const ImageBuf screen_b = picture_screen_colours(each.b, tone_map);
     if (each.a.linear != each.b.linear) {
-        picture_to_screen(each.a);
-        picture_to_screen(each.b);
+        picture_to_screen(each.a, tone_map);
+        picture_to_screen(each.b, tone_map);
     }
     answer.width = static_cast<uint32_t>(each.a.width());
     answer.height = static_cast<uint32_t>(each.a.height());
@@ -188,6 +206,7 @@ bool compare(struct comparison &each)
                   each.a.channel_names().c_str());
     answer.channel_names = each.result.channel_names;
     measure_errors(each);
+    measure_shown_errors(each, screen_a, screen_b);
     measure_likeness(each, screen_a, screen_b);
     return each.wanted.picture[0] == '\0' || write_picture(each, screen_a, screen_b);
 }

@@ -124,12 +124,22 @@ void tone_map_neutral(float colour[3])
         colour[c] = colour[c] * (new_peak / peak) * (1 - g) + new_peak * g;
 }
 
+// Narkowicz. ACES Filmic Tone Mapping Curve. 2015.
+void tone_map_aces(float colour[3])
+{
+    for (int c = 0; c < 3; c++)
+        colour[c] = colour[c] * (2.51f * colour[c] + 0.03f) / (colour[c] * (2.43f * colour[c] + 0.59f) + 0.14f);
+}
+
 // The same as the renderer's resolve pass does for 8-bit pixels.
-void screen_from_linear(float colour[3], float alpha)
+void screen_from_linear(float colour[3], float alpha, enum protocol_tone_map tone_map)
 {
     for (int c = 0; c < 3; c++)
         colour[c] = std::clamp(alpha > 0 ? colour[c] / alpha : colour[c], 0.0f, 1e9f);
-    tone_map_neutral(colour);
+    if (tone_map == PROTOCOL_TONE_NEUTRAL)
+        tone_map_neutral(colour);
+    else if (tone_map == PROTOCOL_TONE_ACES)
+        tone_map_aces(colour);
     for (int c = 0; c < 3; c++)
         colour[c] = srgb_from_linear_f(std::clamp(colour[c], 0.0f, 1.0f));
 }
@@ -214,7 +224,7 @@ void picture_drop_alpha(struct picture &picture)
     picture.alpha = -1;
 }
 
-void picture_to_screen(struct picture &picture)
+void picture_to_screen(struct picture &picture, enum protocol_tone_map tone_map)
 {
     if (!picture.linear)
         return;
@@ -222,14 +232,14 @@ void picture_to_screen(struct picture &picture)
     float *pixel = picture.data();
     for (size_t i = 0; i < picture.count(); i++, pixel += picture.channels()) {
         float colour[3] = {pixel[channel[0]], pixel[channel[1]], pixel[channel[2]]};
-        screen_from_linear(colour, alpha_of(picture, pixel));
+        screen_from_linear(colour, alpha_of(picture, pixel), tone_map);
         for (size_t c = 0; c < 3; c++)
             pixel[channel[c]] = colour[c];
     }
     picture.linear = false;
 }
 
-OIIO::ImageBuf picture_screen_colours(const struct picture &picture)
+OIIO::ImageBuf picture_screen_colours(const struct picture &picture, enum protocol_tone_map tone_map)
 {
     OIIO::ImageBuf made = make_plane(picture.width(), picture.height(), 3);
     const std::array<size_t, 3> channel = colour_channels(picture);
@@ -239,7 +249,7 @@ OIIO::ImageBuf picture_screen_colours(const struct picture &picture)
         for (size_t c = 0; c < 3; c++)
             to[c] = from[channel[c]];
         if (picture.linear)
-            screen_from_linear(to, alpha_of(picture, from));
+            screen_from_linear(to, alpha_of(picture, from), tone_map);
         for (size_t c = 0; c < 3; c++)
             to[c] = std::clamp(to[c], 0.0f, 1.0f);
     }

@@ -2,6 +2,8 @@
 // An image file as floats, as it is stored; and what a screen shows of it.
 #pragma once
 
+#include "output/library.h"
+
 #include <OpenImageIO/imagebuf.h>
 
 #include <cstdint>
@@ -48,8 +50,8 @@ bool picture_decode(const uint8_t *file, size_t file_bytes, struct picture &made
 // Leaves the colours alone.
 void picture_drop_alpha(struct picture &picture);
 
-// The colours, alpha aside, become what a PNG of the renderer holds: divided by alpha, through the Khronos PBR
-// Neutral tone mapper (specification 1.0) and the sRGB curve. Does nothing to a picture that is not linear.
-void picture_to_screen(struct picture &picture);
+// The colours, alpha aside, become what a PNG of the renderer holds: divided by alpha, through the tone map and
+// the sRGB curve. Does nothing to a picture that is not linear.
+void picture_to_screen(struct picture &picture, enum protocol_tone_map tone_map);
 // Red, green and blue of what a screen shows, 0 to 1.
-OIIO::ImageBuf picture_screen_colours(const struct picture &picture);
+OIIO::ImageBuf picture_screen_colours(const struct picture &picture, enum protocol_tone_map tone_map);

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 #include "render/compare/rays.h"
 
+#include "trace/visibility.h"
+
 #include <float.h>
 #include <math.h>
 #include <string.h>
@@ -127,7 +129,7 @@ static bool is_hit(const struct hit *hit)
 
 static bool is_shadowed(uint visibility)
 {
-    return (visibility & 0xffffffu) != 0xffffffu;
+    return (visibility & VISIBILITY_LIT) != VISIBILITY_LIT;
 }
 
 static double direction_length(const struct ray *ray)
@@ -156,11 +158,10 @@ static bool distances_agree(const struct wave_compare_settings *settings, const 
 
 static bool transmittances_agree(uint first, uint second)
 {
-    for (int shift = 0; shift < 24; shift += 8) {
-        int difference = (int)(first >> shift & 255u) - (int)(second >> shift & 255u);
-        if (difference > WAVE_FAR_STEPS || difference < -WAVE_FAR_STEPS)
+    for (unsigned k = 0; k < 3; k++)
+        if (fabs(visibility_transmittance(first, k) - visibility_transmittance(second, k)) >
+            WAVE_FAR_TRANSMITTANCE)
             return false;
-    }
     return true;
 }
 

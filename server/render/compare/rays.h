@@ -30,8 +30,8 @@
 /* Default of `far_share`: some hundred times what rounding does, and far below the distance between surfaces that
  * a picture shows apart. */
 #define WAVE_FAR_SHARE 1e-4f
-/* Transmittances are bytes; rounding each of two layers may be a step off. */
-#define WAVE_FAR_STEPS 2
+/* Beyond this two transmittances differ. */
+#define WAVE_FAR_TRANSMITTANCE (2.0 / 255.0)
 /* Beyond this two normals are those of two surfaces. */
 #define WAVE_TURNED_DEGREES 5.0
 
@@ -67,7 +67,7 @@ struct wave_tally {
 void wave_tally_merge(struct wave_tally *into, const struct wave_tally *from);
 
 /* The figures of a tally. A shadow ray hits if it is not fully lit, and is far if the transmittances of both
- * differ by more than WAVE_FAR_STEPS of 255; it has no distance and no normal. */
+ * differ by more than WAVE_FAR_TRANSMITTANCE; it has no distance and no normal. */
 struct wave_comparison {
     uint32_t wave;
     enum ray_kind kind;

@@ -40,7 +40,8 @@ static uint32_t one_for_lights_and_image(const struct render_context *context)
 
 static uint32_t one_for_the_environment(const struct render_context *context)
 {
-    return context->environment->kind != ENVIRONMENT_NONE;
+    const uint32_t kind = context->environment->kind;
+    return kind != ENVIRONMENT_NONE && kind != ENVIRONMENT_BACKDROP;
 }
 
 static uint32_t one_each_for_lights_and_environment(const struct render_context *context)

@@ -20,6 +20,7 @@
 #include "shared/hit.h"
 #include "shared/ray.h"
 #include "trace/step.h"
+#include "trace/visibility.h"
 
 #include <float.h>
 #include <math.h>
@@ -158,7 +159,7 @@ void reference_filter_any(const struct RTCFilterFunctionNArguments *arguments)
             left[k] *= passes[k];
             maximum = fmaxf(maximum, left[k]);
         }
-        if (maximum >= 0.5f / 255.0f) /* below, the 8-bit answer is black */
+        if (maximum >= VISIBILITY_BLACK)
             arguments->valid[lane] = 0;
     }
 }
@@ -233,15 +234,13 @@ static struct hit intersection_of(const struct reference *reference, const struc
     return intersection;
 }
 
-static uint32_t visibility_of(const struct packet *packet, unsigned n, unsigned lane, const float transmittance[3])
+static uint32_t visibility_left(const struct packet *packet, unsigned n, unsigned lane,
+                                const float transmittance[3])
 {
     bool occluded = packet->valid[lane] && packet->lanes[RAY_T_FAR * n + lane].f < 0.0f;
-    uint32_t visibility = 0;
-    if (occluded)
-        return 0;
-    for (unsigned k = 0; k < 3; k++)
-        visibility |= (uint32_t)lrintf(fminf(transmittance[k], 1.0f) * 255.0f) << 8 * k;
-    return visibility | 0xff000000u;
+    const float left[3] = {fminf(transmittance[0], 1.0f), fminf(transmittance[1], 1.0f),
+                           fminf(transmittance[2], 1.0f)};
+    return occluded ? 0 : visibility_of(left);
 }
 
 /* ---- packets ---- */
@@ -325,7 +324,7 @@ static inline __attribute__((always_inline)) void traverse_packets(struct traver
         for (unsigned lane = 0; lane < count; lane++) {
             if (any)
                 ((uint32_t *)traversal->wave->answers)[at + lane] =
-                    visibility_of(&packet, n, lane, context->transmittance[at + lane - first]);
+                    visibility_left(&packet, n, lane, context->transmittance[at + lane - first]);
             else
                 ((struct hit *)traversal->wave->answers)[at + lane] =
                     intersection_of(reference, &packet, n, lane, &traversal->wave->rays[at + lane]);

@@ -112,11 +112,13 @@ TEST(figures_arrive_and_no_error_is_an_infinite_ratio)
     assert_int_equal(comparison.pixels, 12);
     assert_true(fabs(comparison.threshold - FL_THRESHOLD_DEFAULT) <= 0);
     figures.rms_error = 0.1f;
+    figures.shown_rms_error = 0.01f;
     figures.max_error = 0.5f;
     assert_true(compare_answered(&figures));
     assert_false(comparison.identical);
     /* 0.1 is a 32-bit float on the way: 20 dB to 1 part in 1e7. */
     assert_true(fabs(comparison.psnr_db - 20) < 1e-5);
+    assert_true(fabs(comparison.shown_psnr_db - 40) < 1e-5);
 }
 
 TEST(counts_that_no_picture_can_have_are_refused)

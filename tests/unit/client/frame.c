@@ -638,6 +638,8 @@ TEST(agreement_leaves_edges_aside_and_stays_a_share_whatever_a_daemon_says)
                                           .far = 5,
                                           .edges = 5};
     assert_true(fl_wave_agreement(&wave) == 1 - 10.0 / 995);
+    wave.other_surface = 20; /* differ, and are on no edge */
+    assert_true(fl_wave_agreement(&wave) == 1 - 30.0 / 995);
     struct record_wave_comparison sum = {0};
     assert_true(fl_wave_agreement(&sum) == 1);
     wave.distance_max = 0.5f;

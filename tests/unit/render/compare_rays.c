@@ -5,6 +5,7 @@
 
 #include "render/compare/rays.h"
 #include "tests/harness/test.h"
+#include "trace/visibility.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -279,21 +280,27 @@ static void compare_shadow(struct wave_tally *tally, const struct ray *ray, uint
         wave_settle(tally, &settings, &answers, suspect, NULL, all);
 }
 
-TEST(shadows_agree_to_two_steps_of_transmittance)
+static uint veil(double red, double green, double blue)
+{
+    return visibility_of((const float[3]){(float)red, (float)green, (float)blue});
+}
+
+TEST(shadows_agree_to_two_255ths_of_transmittance)
 {
     struct wave_tally *tally = *state;
-    const uint lit = 0xffffffff, dark = 0, veiled = 0xff808080;
+    /* 0.5 is within 0.001 as it is stored */
+    const uint lit = 0xffffffff, dark = 0, veiled = veil(0.5, 0.5, 0.5);
     compare_shadow(tally, &down, lit, lit, lit);
     compare_shadow(tally, &down, dark, dark, dark);
     assert_counts(tally, 1, 1, 0, 0, 0, 0, 0);
     compare_shadow(tally, &down, lit, dark, dark);
     compare_shadow(tally, &down, dark, lit, lit);
     assert_counts(tally, 1, 1, 1, 1, 0, 0, 0);
-    compare_shadow(tally, &down, veiled, 0xff80827e, veiled);
+    compare_shadow(tally, &down, veiled, veil(0.506, 0.5, 0.494), veiled);
     assert_counts(tally, 2, 1, 1, 1, 0, 0, 0);
-    compare_shadow(tally, &down, veiled, 0xff808380, 0xff808380);
+    compare_shadow(tally, &down, veiled, veil(0.5, 0.51, 0.5), veil(0.5, 0.51, 0.5));
     assert_counts(tally, 3, 1, 1, 1, 1, 0, 0);
-    compare_shadow(tally, &down, 0xfffffefe, lit, lit); /* rounding, not a shadow */
+    compare_shadow(tally, &down, veil(0.997, 0.997, 1), lit, lit); /* rounding, not a shadow */
     assert_counts(tally, 3, 2, 1, 1, 1, 0, 0);
     compare_shadow(tally, &down, dark, lit, dark); /* at the shadow's edge */
     assert_counts(tally, 3, 2, 2, 1, 1, 1, 0);
