@@ -15,8 +15,8 @@
 
 #if BUILD_PASS == 2
 uniform float unit_per_cell; // a power of two, so that nothing is rounded
-layout(binding = UNIT_LDC_LAYER) uniform usampler2DArray layer_before; // geometry words
-layout(location = 0) out uvec2 geometry_words;
+layout(binding = UNIT_LDC_LAYER) uniform usampler2DArray layer_before; // geometry and primitive words
+layout(location = 0) out uvec4 geometry_and_primitive;
 layout(location = 1) out uvec4 surface_words;
 #else
 layout(binding = IMAGE_LDC_COUNTS, r32ui) uniform uimageBuffer counts;
@@ -66,8 +66,10 @@ void finish()
     if (nearest_cells == LDC_NO_DEPTH)
         discard;
     gl_FragDepth = nearest_cells * unit_per_cell;
-    describe(make_point(primitive.y, primitive.z, primitive.w, gl_Layer, gl_FragCoord.xy, nearest_cells),
-             geometry_words, surface_words);
+    point p = make_point(primitive.y, primitive.z, primitive.w, gl_Layer, gl_FragCoord.xy, nearest_cells);
+    uvec2 geometry_words;
+    describe(p, geometry_words, surface_words);
+    geometry_and_primitive = uvec4(geometry_words, primitive_words(p));
 #endif
 }
 

@@ -24,8 +24,18 @@ struct cell_traversal {
     float s_min, s_limit; // between which an intersection counts
     float begin, scale; // cell_ray's
     int cube, grid, first_node, octant_shift;
+#ifdef LDC_EXACT
+    float beside_max; // how far beyond its texel a sample's plane extends
+    bool is_within;   // the last intersection: at most LDC_SLACK beyond it
+#endif
     int at, shift; // texel of the current node or block; log2 of the size of its parts: 2 in a node, 0 in a block
 };
+
+#ifdef LDC_EXACT
+#define BESIDE_MAX w.beside_max
+#else
+#define BESIDE_MAX LDC_SLACK
+#endif
 
 // A cell to be tested.
 struct found_cell {
@@ -134,11 +144,14 @@ void test_cell_sample(inout cell_traversal w, int axis, ivec3 cell, uint sample_
     vec3 normal = direction_from_octahedral(normal_bits) * (1.0 + 2.0 * flipped);
     float flip_depth = in_image(flipped, axis).z;
     float turned = flip_depth < 0.0 ? float(w.grid << LDC_NODE_SHIFT) - depth : depth;
-    float s, side;
+    float s, side, beside;
     if (intersect_sample(in_image(w.o, axis), in_image(w.d, axis), w.cube, in_image(vec3(cell), axis).xy, turned,
-                         in_image(normal, axis), s, side) &&
-        s > w.s_min && s < w.s_limit) {
+                         in_image(normal, axis), s, side, beside) &&
+        beside <= BESIDE_MAX && s > w.s_min && s < w.s_limit) {
         offer_sample(found, sample_index, (s + w.begin) / w.scale, side, 1.0 / w.scale);
+#ifdef LDC_EXACT
+        w.is_within = beside <= LDC_SLACK;
+#endif
         w.s_limit = found.end * w.scale - w.begin;
     }
 }

@@ -46,9 +46,10 @@ cell_ray cube_ray_of(trace_ray r, int cube)
     return cell_ray_of(r, ldc_place[CUBE(cube)], float(ldc_resolution[CUBE(cube)]));
 }
 
-// Intersects the ray (o, d in the image) with a sample of a texel, within the texel. `normal` may have any length;
-// `side` is positive if the ray comes from behind.
-bool intersect_sample(vec3 o, vec3 d, int cube, vec2 texel, float depth, vec3 normal, out float s, out float side)
+// Intersects the ray (o, d in the image) with a sample of a texel. `normal` may have any length; `side` is positive if
+// the ray comes from behind; `beside` is how far beyond the texel the intersection is, in cells.
+bool intersect_sample(vec3 o, vec3 d, int cube, vec2 texel, float depth, vec3 normal, out float s, out float side,
+                      out float beside)
 {
     LDC_COUNT(z);
     vec3 to_sample = vec3(texel + 0.5, depth) - o;
@@ -60,11 +61,13 @@ bool intersect_sample(vec3 o, vec3 d, int cube, vec2 texel, float depth, vec3 no
     vec2 a = (to_sample.xy - 0.5) * inverse, b = (to_sample.xy + 0.5) * inverse;
     vec2 near = min(a, b), far = max(a, b);
     s = min(max(to_sample.z / d.z, max(near.x, near.y)), min(far.x, far.y));
+    beside = 0.0;
     bool intersects = abs(s * d.z - to_sample.z) <= ldc_tolerance[CUBE(cube)];
 #else
     s = height / side;
     vec2 from_middle = abs(s * d.xy - to_sample.xy);
-    bool intersects = from_middle.x <= 0.5 + LDC_SLACK && from_middle.y <= 0.5 + LDC_SLACK;
+    beside = max(from_middle.x, from_middle.y) - 0.5;
+    bool intersects = true;
 #endif
     float own = side > 0.0 ? LDC_OWN_BEHIND * LDC_OWN_BEHIND : LDC_OWN_BEFORE * LDC_OWN_BEFORE;
     bool is_own = s < LDC_OWN_WAY && height * height < own * dot(normal, normal);

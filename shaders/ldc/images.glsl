@@ -148,8 +148,9 @@ bool next_texel(inout image_traversal w, out uvec4 words, out float z_min, out f
 void test_sample(inout image_traversal w, uint sample_index, float depth, uint normal_bits, inout ldc_found found)
 {
     vec3 normal = in_image(direction_from_octahedral(normal_bits), w.axis);
-    float s, side;
-    if (intersect_sample(w.o, w.d, w.cube, vec2(w.texel), depth, normal, s, side) && s > w.s_min && s < w.s_limit) {
+    float s, side, beside;
+    if (intersect_sample(w.o, w.d, w.cube, vec2(w.texel), depth, normal, s, side, beside) && beside <= LDC_SLACK &&
+        s > w.s_min && s < w.s_limit) {
         offer_sample(found, sample_index, (s + w.begin) / w.scale, side, 1.0 / w.scale);
         w.s_limit = found.end * w.scale - w.begin;
     }

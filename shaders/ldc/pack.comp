@@ -15,6 +15,7 @@ layout(binding = UNIT_LDC_FOUND) uniform usamplerBuffer found;
 layout(binding = UNIT_LDC_PEELED_SURFACE) uniform usamplerBuffer peeled;
 layout(binding = IMAGE_LDC_GEOMETRY, rg32ui) writeonly uniform uimageBuffer geometry_out;
 layout(binding = IMAGE_LDC_SURFACE, rgba32ui) writeonly uniform uimageBuffer surface_out;
+layout(binding = IMAGE_LDC_PRIMITIVES, rg32ui) writeonly uniform uimageBuffer primitives_out;
 #else
 layout(binding = IMAGE_LDC_VISIBLE, rgba32ui) writeonly uniform uimageBuffer visible;
 #endif
@@ -102,7 +103,9 @@ void emit(run r, uint kept, uint sample_, uint quad)
                       part == 2u ? depth : part == 0u ? LDC_NO_DEPTH : depths.z, part == 3u ? depth : LDC_NO_DEPTH);
 #ifdef PEELED
         imageStore(geometry_out, int(sample_ + taken), uvec4(fragment, 0u, 0u));
-        imageStore(surface_out, int(sample_ + taken), texelFetch(peeled, index_of(r, i)));
+        int place = 2 * index_of(r, i);
+        imageStore(surface_out, int(sample_ + taken), texelFetch(peeled, place));
+        imageStore(primitives_out, int(sample_ + taken), texelFetch(peeled, place + 1));
 #else
         imageStore(visible, int(sample_ - first_sample + taken), uvec4(r.bits, fragment, 0u));
 #endif

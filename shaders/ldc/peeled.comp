@@ -26,15 +26,16 @@ void main()
     if (k >= occupied_count)
         return;
     uint bits = texelFetch(occupied, int(k)).x, u = bits & 4095u, v = bits >> 12 & 4095u, axis = bits >> 24;
-    uvec2 geometry_words = texelFetch(layer_geometry, ivec3(u, v, axis), 0).xy;
-    if (geometry_words.x == LDC_NO_DEPTH_BITS)
+    uvec4 words = texelFetch(layer_geometry, ivec3(u, v, axis), 0);
+    if (words.x == LDC_NO_DEPTH_BITS)
         return;
     int texel = int((axis * texels_along + v) * texels_along + u), place = int(texelFetch(places, texel).x + layer);
     if (layer >= texelFetch(counts, texel).x) {
         atomicAdd(build.samples_lost, 1u);
         return;
     }
-    imageStore(ordered, place, uvec4(geometry_words, 0u, 0u));
-    imageStore(peeled, place, texelFetch(layer_surface, ivec3(u, v, axis), 0));
+    imageStore(ordered, place, uvec4(words.xy, 0u, 0u));
+    imageStore(peeled, 2 * place, texelFetch(layer_surface, ivec3(u, v, axis), 0));
+    imageStore(peeled, 2 * place + 1, uvec4(words.zw, 0u, 0u));
     imageStore(found, texel, uvec4(layer + 1u));
 }

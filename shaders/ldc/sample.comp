@@ -12,6 +12,7 @@ layout(binding = UNIT_LDC_VISIBLE) uniform usamplerBuffer visible;
 layout(binding = UNIT_LDC_DRAWN) uniform usamplerBuffer drawn;
 layout(binding = IMAGE_LDC_GEOMETRY, rg32ui) writeonly uniform uimageBuffer geometry_out;
 layout(binding = IMAGE_LDC_SURFACE, rgba32ui) writeonly uniform uimageBuffer surface_out;
+layout(binding = IMAGE_LDC_PRIMITIVES, rg32ui) writeonly uniform uimageBuffer primitives_out;
 
 // The entry of `drawn` of an id.
 uvec4 drawn_of(uint id)
@@ -36,8 +37,9 @@ void main()
     vec2 middle = vec2(found.x & 4095u, found.x >> 12 & 4095u) + 0.5;
     uvec2 geometry_words;
     uvec4 surface_words;
-    describe(make_point(of.z, found.z - of.y, of.w, int(found.x >> 24), middle, uintBitsToFloat(found.y)),
-             geometry_words, surface_words);
+    point p = make_point(of.z, found.z - of.y, of.w, int(found.x >> 24), middle, uintBitsToFloat(found.y));
+    describe(p, geometry_words, surface_words);
     imageStore(geometry_out, int(first_sample + k), uvec4(geometry_words, 0u, 0u));
     imageStore(surface_out, int(first_sample + k), surface_words);
+    imageStore(primitives_out, int(first_sample + k), uvec4(primitive_words(p), 0u, 0u));
 }

@@ -29,6 +29,12 @@ point make_point(uint instance_index, uint primitive, uint flags, int axis, vec2
                  depth_cells);
 }
 
+// Its words of `primitives`.
+uvec2 primitive_words(point p)
+{
+    return uvec2(p.instance_index | ((p.flags & DRAWN_SPHERES) != 0u ? LDC_OF_SPHERES : 0u), p.primitive);
+}
+
 // A triangle's corners, in cells, and the barycentrics of the point.
 struct placed_triangle {
     uvec4 vertices; // and the material

@@ -8,7 +8,10 @@
 // invocation begin its next ray as soon as one is finished was slower: the code that begins a ray then ran each round.)
 //
 // Define: LDC_CELLS the traversal is that of ldc/cells.glsl, else that of ldc/images.glsl.
-#include "ldc/cells.glsl"
+#if defined LDC_CELLS && !defined LDC_TOLERANCE && !defined ANY_HIT && !defined LDC_COUNT_STEPS
+#define LDC_EXACT
+#endif
+#include "ldc/exact.glsl"
 #include "ldc/images.glsl"
 
 #ifdef ANY_HIT
@@ -27,7 +30,7 @@ const int LDC_PASSES = 3 * LDC_CUBES;
 #define BEGIN begin_image
 #endif
 
-void settle(ldc_found found, inout answer a)
+void conclude(ldc_found found, inout answer a)
 {
 #ifdef ANY_HIT
     a = found.optical_depth;
@@ -42,6 +45,27 @@ void settle(ldc_found found, inout answer a)
 #endif
 }
 
+// Up to the first intersection.
+void traverse_cube(inout TRAVERSAL w, inout ldc_found found)
+{
+    while (w.s < w.s_end) {
+#ifdef LDC_CELLS
+        found_cell at = next_cell(w);
+        if (at.entry != LDC_ENTRY_NONE) {
+            LDC_COUNT(y);
+            test_cell(w, at, found);
+        }
+#else
+        uvec4 words;
+        float z_min, z_max;
+        if (next_texel(w, words, z_min, z_max)) {
+            LDC_COUNT(y);
+            test_texel(w, words, z_min, z_max, found);
+        }
+#endif
+    }
+}
+
 void traverse_rays(trace_ray rays_[PACKET_RAYS], inout answer answers[PACKET_RAYS])
 {
     for (int ray = 0; ray < PACKET_RAYS; ray++) {
@@ -50,24 +74,29 @@ void traverse_rays(trace_ray rays_[PACKET_RAYS], inout answer answers[PACKET_RAY
         for (int pass = 0; pass < LDC_PASSES; pass++) {
             TRAVERSAL w;
             BEGIN(r, found.end, pass, w);
-            while (w.s < w.s_end) {
-#ifdef LDC_CELLS
-                found_cell at = next_cell(w);
-                if (at.entry != LDC_ENTRY_NONE) {
-                    LDC_COUNT(y);
-                    test_cell(w, at, found);
+#ifdef LDC_EXACT
+            ldc_found before = found;
+            float s_end = w.s_end, s_limit = w.s_limit;
+            found.sample_index = HIT_NO_PRIMITIVE;
+            w.beside_max = LDC_BEYOND;
+            bool goes_on = w.s < w.s_end;
+            for (int tries = 0; goes_on; tries++) {
+                traverse_cube(w, found);
+                float s = w.s_limit;
+                goes_on = found.sample_index != HIT_NO_PRIMITIVE && !settle(r, w, before.end, found) && tries < TRIES_MAX;
+                if (goes_on) {
+                    found = ldc_found(before.end, HIT_NO_PRIMITIVE);
+                    w.s_limit = s_limit;
+                    go_on(w, s, s_end);
                 }
-#else
-                uvec4 words;
-                float z_min, z_max;
-                if (next_texel(w, words, z_min, z_max)) {
-                    LDC_COUNT(y);
-                    test_texel(w, words, z_min, z_max, found);
-                }
-#endif
             }
+            if (found.sample_index == HIT_NO_PRIMITIVE)
+                found = before;
+#else
+            traverse_cube(w, found);
+#endif
         }
-        settle(found, answers[ray]);
+        conclude(found, answers[ray]);
     }
 }
 

@@ -7,7 +7,9 @@
 #include "tests/harness/test.h"
 
 #define RESOLUTION 1024u
-#define PSNR_MIN 38.0 /* dB, as sampled_against_reference.c asks */
+/* dB. First hits of its own: the errors of planes alone are below it. Behind mirrors an edge is magnified. */
+#define PSNR_MIN 42.0
+#define PSNR_MIRRORS_MIN 41.0
 
 static void request_cubes(struct fixture *fixture)
 {
@@ -25,7 +27,7 @@ static struct frame_result render(struct fixture *fixture, unsigned tracer, cons
     return result;
 }
 
-static void expect_like_the_reference(struct fixture *fixture, const char *name)
+static void expect_like_the_reference(struct fixture *fixture, const char *name, double psnr_min)
 {
     struct frame_result got = render(fixture, TRACER_LDC, name), expected = render(fixture, exact_tracer(), name);
     double reached = psnr(&got, &expected);
@@ -34,8 +36,8 @@ static void expect_like_the_reference(struct fixture *fixture, const char *name)
     assert_int_equal(structure_row(&got.structure, "dynamic/samples_lost").number, 0);
     frame_result_finish(&got);
     frame_result_finish(&expected);
-    if (!(reached >= PSNR_MIN))
-        fail_msg("%s: PSNR %.2f dB, at least %.1f is asked for", name, reached, PSNR_MIN);
+    if (!(reached >= psnr_min))
+        fail_msg("%s: PSNR %.2f dB, at least %.1f is asked for", name, reached, psnr_min);
 }
 
 ALL_TESTS(fixture_setup, fixture_teardown)
@@ -48,7 +50,7 @@ TEST(distributed_rays_see_what_the_references_see)
     fixture->request.samples = 4;
     add_mirrors(fixture);
     request_cubes(fixture);
-    expect_like_the_reference(fixture, "mirrors, distributed");
+    expect_like_the_reference(fixture, "mirrors, distributed", PSNR_MIRRORS_MIN);
 }
 
 /* What moved lies in a cube of its own: rays see both as one, and each other's reflections and shadows. */
@@ -73,7 +75,61 @@ TEST(what_moves_is_seen_with_what_stands_still)
         assert_true(structure_row(&after.structure, "dynamic/built").number);
         frame_result_finish(&after);
     }
-    expect_like_the_reference(fixture, "two cubes");
+    expect_like_the_reference(fixture, "two cubes", PSNR_MIRRORS_MIN);
+}
+
+/* ---- first hits of its own ---- */
+
+/* Facets of some cells, as of a scan: all bend at their edges, and there is a shadow on them. */
+static void add_facets(struct fixture *fixture)
+{
+    float m[12];
+    uint32_t matte = add_matte(fixture, 0.7f, 0.7f, 0.7f);
+    for (int i = 0; i < 2; i++) {
+        uint32_t mesh = add_shape_mesh(fixture, i ? SHAPE_TORUS : SHAPE_BUMPY, 128, matte);
+        struct scene_mesh *facets = &fixture->edits[fixture->edit_count - 1].set.mesh;
+        blob_unref(facets->arrays[MESH_NORMALS]);
+        facets->arrays[MESH_NORMALS] = NULL;
+        turned(m, 0.9f, 0.5f, 0.8f * (float)i, 0.9f * (float)i, 0.3f * (float)i);
+        fixture_node(fixture, NODE_MESH, mesh, m);
+    }
+    fixture_light(fixture, LIGHT_POINT, 2.5f, 4, 3, 300);
+}
+
+static double share(uint64_t part, const struct wave_comparison *wave)
+{
+    const uint64_t hits = wave->kind == RAY_SHADOW ? wave->rays : wave->both_hit + wave->only_second;
+    assert_true(hits > 5000);
+    return (double)part / (double)hits;
+}
+
+/* The planes of samples alone give 0.06 % of these hits far off, 0.9 % with another facet's normal, and 41 dB.
+ * What is left are triangles without samples, and silhouettes of surfaces that are within a cell of each other. */
+TEST(first_hits_are_those_of_triangles)
+{
+    struct fixture *fixture = *state;
+    add_facets(fixture);
+    request_cubes(fixture);
+    fixture->request.width = fixture->request.height = 256;
+    fixture->request.primary = PRIMARY_TRACE;
+    fixture->request.tracer = TRACER_LDC;
+    fixture->request.compare = true;
+    fixture->request.compare_with = exact_tracer();
+    struct frame_result result = fixture_render(fixture);
+    assert_true(result.comparison_count >= 2);
+    for (uint32_t i = 0; i < result.comparison_count; i++) {
+        const struct wave_comparison *wave = &result.comparisons[i];
+        const bool is_shadow = wave->kind == RAY_SHADOW;
+        printf("wave %u %s: %.3f %% only ldc, %.3f %% only the reference, %.3f %% far, %.3f %% normals\n",
+               wave->wave, is_shadow ? "shadow" : "hits", 100 * share(wave->only_first, wave),
+               100 * share(wave->only_second, wave), 100 * share(wave->far, wave),
+               100 * share(wave->other_surface, wave));
+        assert_true(share(wave->only_second, wave) < 0.002);
+        assert_true(is_shadow || (share(wave->far, wave) < 0.0005 && share(wave->other_surface, wave) < 0.002));
+    }
+    frame_result_finish(&result);
+    fixture->request.compare = false;
+    expect_like_the_reference(fixture, "facets, all traced", PSNR_MIN);
 }
 
 /* ---- frames ---- */

@@ -12,7 +12,7 @@
 
 static uint64_t sample_bytes(uint64_t samples, uint64_t quads)
 {
-    return samples * (LDC_GEOMETRY_BYTES + LDC_SURFACE_BYTES) + quads * LDC_QUAD_BYTES;
+    return samples * (LDC_GEOMETRY_BYTES + LDC_SURFACE_BYTES + LDC_PRIMITIVE_BYTES) + quads * LDC_QUAD_BYTES;
 }
 
 /* Of the device, with what the passes between need. */
@@ -22,13 +22,14 @@ static bool fits_device(const struct ldc_task *task, uint64_t samples, uint64_t 
     const struct ldc_store *store = task->store;
     uint64_t texels_max = device->facts.texture_buffer_texels_max;
     uint64_t present = (uint64_t)store->geometry.capacity_bytes + store->surface.capacity_bytes +
-                       store->quads.capacity_bytes + task->builder->visible.capacity_bytes;
+                       store->primitives.capacity_bytes + store->quads.capacity_bytes +
+                       task->builder->visible.capacity_bytes;
     uint64_t all_samples = task->cube->first_sample + samples, all_quads = task->cube->first_quad + quads;
     uint64_t bytes = sample_bytes(all_samples, all_quads) + samples * LDC_VISIBLE_BYTES;
     if (all_samples > texels_max || all_quads > texels_max || all_quads > LDC_QUADS_MAX)
         return false;
     if (task->slots == 0) /* peeled: they will be in `ordered` and `peeled` */
-        bytes += samples * (LDC_ORDERED_BYTES + LDC_SURFACE_BYTES);
+        bytes += samples * (LDC_ORDERED_BYTES + LDC_PEELED_BYTES);
     return device->memory_limit_bytes == 0 || bytes <= present ||
            device->memory_used_bytes + GROWTH(bytes) <= device->memory_limit_bytes;
 }

@@ -18,6 +18,8 @@ static bool reserve(struct ldc_task *task, uint32_t samples, uint32_t quads, str
                           ((uint64_t)cube->first_sample + samples) * LDC_GEOMETRY_BYTES, error) &&
            ldc_store_grow(device, &store->surface, (uint64_t)cube->first_sample * LDC_SURFACE_BYTES,
                           ((uint64_t)cube->first_sample + samples) * LDC_SURFACE_BYTES, error) &&
+           ldc_store_grow(device, &store->primitives, (uint64_t)cube->first_sample * LDC_PRIMITIVE_BYTES,
+                          ((uint64_t)cube->first_sample + samples) * LDC_PRIMITIVE_BYTES, error) &&
            (task->peeled ||
             gpu_buffer_reserve(device, &task->builder->visible, (size_t)samples * LDC_VISIBLE_BYTES, error));
 }
@@ -67,6 +69,7 @@ static bool sample(struct ldc_task *task, struct error *error)
     gpu_buffer_bind_texels(device, &task->builder->draw.drawn, UNIT_LDC_DRAWN, GL_RGBA32UI);
     gpu_buffer_bind_image(device, &task->store->geometry, IMAGE_LDC_GEOMETRY, GL_RG32UI);
     gpu_buffer_bind_image(device, &task->store->surface, IMAGE_LDC_SURFACE, GL_RGBA32UI);
+    gpu_buffer_bind_image(device, &task->store->primitives, IMAGE_LDC_PRIMITIVES, GL_RG32UI);
     gpu_uniform_uint(program, "sample_count", task->counts.samples);
     gpu_uniform_uint(program, "first_sample", task->cube->first_sample);
     gpu_uniform_uint(program, "drawn_count", task->builder->draw.drawn_count);
@@ -109,6 +112,7 @@ static bool pack(struct ldc_task *task, struct error *error)
         gpu_buffer_bind_texels(device, &builder->peeled, UNIT_LDC_PEELED_SURFACE, GL_RGBA32UI);
         gpu_buffer_bind_image(device, &store->geometry, IMAGE_LDC_GEOMETRY, GL_RG32UI);
         gpu_buffer_bind_image(device, &store->surface, IMAGE_LDC_SURFACE, GL_RGBA32UI);
+        gpu_buffer_bind_image(device, &store->primitives, IMAGE_LDC_PRIMITIVES, GL_RG32UI);
     } else {
         gpu_buffer_bind_image(device, &builder->visible, IMAGE_LDC_VISIBLE, GL_RGBA32UI);
     }

@@ -17,7 +17,7 @@ static bool reserve(struct ldc_task *task, struct error *error)
     struct gpu_device *device = builder->device;
     uint32_t along = task->cube->resolution;
     if (!gpu_buffer_reserve(device, &builder->ordered, (size_t)task->counts.places * LDC_ORDERED_BYTES, error) ||
-        !gpu_buffer_reserve(device, &builder->peeled, (size_t)task->counts.places * LDC_SURFACE_BYTES, error) ||
+        !gpu_buffer_reserve(device, &builder->peeled, (size_t)task->counts.places * LDC_PEELED_BYTES, error) ||
         !gpu_buffer_reserve(device, &builder->found, (size_t)task->texel_count * sizeof(uint32_t), error))
         return false;
     if (builder->depth.name && builder->depth.width == along)
@@ -27,7 +27,7 @@ static bool reserve(struct ldc_task *task, struct error *error)
         gpu_texture_reserve_array(device, &builder->layer_surface, GL_RGBA32UI, along, along, 3, error);
     for (int i = 0; i < 2 && made; i++) {
         gpu_framebuffer_finish(device, &builder->layer_framebuffers[i]);
-        made = gpu_texture_reserve_array(device, &builder->layers[i], GL_RG32UI, along, along, 3, error);
+        made = gpu_texture_reserve_array(device, &builder->layers[i], GL_RGBA32UI, along, along, 3, error);
         const struct gpu_texture targets[] = {builder->layers[i], builder->layer_surface};
         made = made &&
                gpu_framebuffer_create(device, &builder->layer_framebuffers[i], targets, 2, &builder->depth, error);

@@ -82,6 +82,8 @@ void ldc_sample_defines(const struct ldc_task *task, struct gpu_define defines[L
 #define LDC_QUAD_BYTES 16
 #define LDC_GEOMETRY_BYTES 8
 #define LDC_SURFACE_BYTES 16
+#define LDC_PRIMITIVE_BYTES 8
+#define LDC_PEELED_BYTES 32
 #define LDC_ORDERED_BYTES 8
 #define LDC_VISIBLE_BYTES 16
 

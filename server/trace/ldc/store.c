@@ -17,6 +17,7 @@ void ldc_store_finish(struct ldc_store *store)
     gpu_buffer_finish(store->device, &store->quads);
     gpu_buffer_finish(store->device, &store->geometry);
     gpu_buffer_finish(store->device, &store->surface);
+    gpu_buffer_finish(store->device, &store->primitives);
     gpu_buffer_finish(store->device, &store->nodes);
     gpu_buffer_finish(store->device, &store->entries);
     *store = (struct ldc_store){.device = store->device};
@@ -25,7 +26,8 @@ void ldc_store_finish(struct ldc_store *store)
 uint64_t ldc_store_bytes(const struct ldc_store *store)
 {
     return (uint64_t)store->texels.capacity_bytes + store->quads.capacity_bytes + store->geometry.capacity_bytes +
-           store->surface.capacity_bytes + store->nodes.capacity_bytes + store->entries.capacity_bytes;
+           store->surface.capacity_bytes + store->primitives.capacity_bytes + store->nodes.capacity_bytes +
+           store->entries.capacity_bytes;
 }
 
 static void warn_of_lost_samples(const struct ldc_cube *cube, const char *name, struct structure_row *row)

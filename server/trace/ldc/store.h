@@ -29,7 +29,7 @@ struct ldc_cube {
 
 struct ldc_store {
     struct gpu_device *device;
-    struct gpu_buffer texels, quads, geometry, surface, nodes, entries;
+    struct gpu_buffer texels, quads, geometry, surface, primitives, nodes, entries;
     bool no_cells;                        /* levels.c: they were too many, and there are ranges */
     struct ldc_cube cubes[LDC_CUBES_MAX]; /* the static one first: what moves lies behind it */
 };

@@ -49,6 +49,7 @@ static void bind(struct ldc_store *store, bool cells)
     gpu_buffer_bind_texels(store->device, &store->surface, UNIT_TRACER_3, GL_RGBA32UI);
     gpu_buffer_bind_texels(store->device, &store->nodes, UNIT_TRACER_4, cells ? GL_RGBA32UI : GL_RG32F);
     gpu_buffer_bind_texels(store->device, &store->entries, UNIT_TRACER_5, GL_RGBA32UI);
+    gpu_buffer_bind_texels(store->device, &store->primitives, UNIT_TRACER_6, GL_RG32UI);
 }
 
 /* Of each cube, with R cells along a side and at most L samples in a texel: a ray passes 3 R cells, 3 R / 4 blocks
