@@ -30,7 +30,7 @@ static void place_sample(const struct render_context *context, uint32_t index, f
     if (!context->spread)
         return;
     float numbers[2];
-    sequence_pair(numbers, sequence_seed(UINT32_MAX, uniforms->seed), SEQUENCE_PIXEL, index);
+    sequence_pair(numbers, sequence_seed(UINT32_MAX, UINT32_MAX, uniforms->seed), SEQUENCE_PIXEL, index);
     for (int i = 0; i < 2; i++)
         place[i] += pixel_filter_offset((const float *)uniforms->filter_places, numbers[i]);
 }

@@ -100,7 +100,8 @@ void main()
     vec3 direction = r.direction_t_max.xyz, view = -direction;
     surface s = surface_of_path(p, h, r);
     float NoV = clamp(dot(s.normal, view), 1e-4, 1.0); // a shading normal may lean away
-    uint seed = path_seed(p), index = path_sample(p), dimension = SEQUENCE_WAVE + wave_number * SEQUENCE_WAVE_SIZE;
+    uvec2 seed = path_seed(p);
+    uint index = path_sample(p), dimension = SEQUENCE_WAVE + wave_number * SEQUENCE_WAVE_SIZE;
     float choice = sequence_number(seed, dimension + SEQUENCE_LOBE, index);
     vec3 sent = vec3(0.0);
     bool straight = choice >= s.alpha, asked = false;

@@ -41,7 +41,7 @@ void main()
     uvec2 pixel = pixel_of_picture_slot(first_slot + (k >> frame.sample_shift));
     bool in_picture = pixel.x < frame.width && pixel.y < frame.height;
     uvec2 in_view = pixel_in_view(pixel);
-    uint seed = sequence_seed(number_in_view(in_view), frame.seed);
+    uvec2 seed = sequence_seed(in_view, frame.seed);
     uint sample_ = k & (1u << frame.sample_shift) - 1u, index = frame.sample_index + sample_;
 #ifdef SPREAD
     vec2 place = place_of_sample(in_view, sample_);
