@@ -7,6 +7,7 @@
 #define RADIANS_PER_DEGREE 0.017453292519943295
 #define FRAME_BYTES_MAX (UINT64_C(4080) << 20) /* as the daemon has it */
 #define PATH_SAMPLES 64u                       /* where nothing is said */
+#define NOISE_SAMPLES 4096u                    /* likewise with --noise: most pixels need far fewer */
 #define AO_SAMPLES 16u                         /* of 8 rays: 128 a pixel, as in the paper */
 
 /* ---- where pictures go ---- */
@@ -211,11 +212,15 @@ static void complete_integrator(struct cli_job *job)
 
 /* Random choices show as noise in one sample. Pictures that are refined without an end have no number of
  * samples. */
-static void complete_samples(struct cli_job *job)
+static void complete_samples(struct cli_job *job, bool is_series)
 {
     struct message_render *wanted = &job->options;
-    job->endless = job->progressive && !job->has_samples;
-    if (!job->has_samples && wanted->integrator == PROTOCOL_INTEGRATOR_PATH)
+    const bool by_error = wanted->noise > 0.0f;
+    job->endless = job->progressive && !job->has_samples && !by_error;
+    job->by_error = by_error && !is_series;
+    if (!job->has_samples && by_error)
+        wanted->samples = NOISE_SAMPLES;
+    else if (!job->has_samples && wanted->integrator == PROTOCOL_INTEGRATOR_PATH)
         wanted->samples = PATH_SAMPLES;
     else if (!job->has_samples && wanted->integrator == PROTOCOL_INTEGRATOR_AO)
         wanted->samples = AO_SAMPLES;
@@ -274,7 +279,7 @@ bool cli_job_complete(struct cli_job *job, bool is_series)
 {
     if (!complete_scene(job))
         return false;
-    complete_samples(job);
+    complete_samples(job, is_series);
     complete_integrator(job);
     return cli_views_complete(job, is_series) && complete_tracer(job) && complete_clips(job) &&
            complete_outputs(job, is_series) && complete_encoding(job) && complete_camera(job);
@@ -285,6 +290,8 @@ bool cli_job_complete_view(struct cli_job *job)
     struct message_render *wanted = &job->options;
     if (!complete_scene(job))
         return false;
+    if (wanted->noise > 0.0f && !job->has_samples)
+        wanted->samples = NOISE_SAMPLES;
     /* An integrator without noise is better while the camera moves. */
     if (!job->has_integrator && (wanted->aperture > 0 || wanted->shutter > 0))
         wanted->integrator = PROTOCOL_INTEGRATOR_DISTRIBUTED;

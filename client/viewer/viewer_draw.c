@@ -77,31 +77,32 @@ static void fill_local(const struct viewer *viewer, struct hud_state *state)
 
 void viewer_hud(struct viewer *viewer, struct hud_state *state)
 {
-    *state = (struct hud_state){.width = viewer->width,
-                                .height = viewer->height,
-                                .scale = viewer->scale,
-                                .notice = "",
-                                .settings = &viewer->settings,
-                                .exposure_stops =
-                                    (double)viewer->view.exposure_stops + viewer->settings.exposure_thirds / 3.0,
-                                .stereo_m = (double)viewer->options->stereo_m,
-                                .tour = &viewer->tour,
-                                .metrics = &viewer->metrics,
-                                .now_ns = monotonic_now_ns(),
-                                .picture_width = viewer->frame.width,
-                                .picture_height = viewer->frame.height,
-                                .samples = viewer->frame.samples,
-                                .samples_wanted = viewer->view.samples,
-                                .moving = viewer->frame.moving,
-                                .revision = viewer->frame.revision,
-                                .wire_bytes = viewer->frame.wire_bytes,
-                                .encoding = viewer->frame.encoding,
-                                .quality = viewer->frame.frame_quality,
-                                .heat = viewer->has_heat             ? HUD_HEAT_SHOWN
-                                        : viewer->settings.error_map ? HUD_HEAT_WAITING
-                                                                     : HUD_HEAT_NONE,
-                                .heat_figures = viewer->heat_figures,
-                                .heat_top = HEAT_TOP};
+    *state = (struct hud_state){
+        .width = viewer->width,
+        .height = viewer->height,
+        .scale = viewer->scale,
+        .notice = "",
+        .settings = &viewer->settings,
+        .exposure_stops = (double)viewer->view.exposure_stops + viewer->settings.exposure_thirds / 3.0,
+        .stereo_m = (double)viewer->options->stereo_m,
+        .tour = &viewer->tour,
+        .metrics = &viewer->metrics,
+        .now_ns = monotonic_now_ns(),
+        .picture_width = viewer->frame.width,
+        .picture_height = viewer->frame.height,
+        .samples = viewer->frame.samples,
+        .samples_wanted = viewer_has_samples(viewer, &viewer->frame, viewer->view.samples) ? viewer->frame.samples
+                                                                                           : viewer->view.samples,
+        .moving = viewer->frame.moving,
+        .revision = viewer->frame.revision,
+        .wire_bytes = viewer->frame.wire_bytes,
+        .encoding = viewer->frame.encoding,
+        .quality = viewer->frame.frame_quality,
+        .heat = viewer->has_heat             ? HUD_HEAT_SHOWN
+                : viewer->settings.error_map ? HUD_HEAT_WAITING
+                                             : HUD_HEAT_NONE,
+        .heat_figures = viewer->heat_figures,
+        .heat_top = HEAT_TOP};
     for (size_t i = 0; i < viewer->structure_count; i++)
         state->structure[i] = viewer->structure[i];
     fill_names(viewer, state);
