@@ -275,14 +275,27 @@ static bool complete_scene(struct cli_job *job)
     return fl_error_remedy(&job->error, "add --server ADDRESS");
 }
 
+/* Depth layers are rendered with a number of samples. */
+static bool complete_noise(struct cli_job *job)
+{
+    const struct message_render *wanted = &job->options;
+    const bool is_made =
+        wanted->views_across * wanted->views_down > 1 || wanted->aperture > 0 || wanted->upsample > 1;
+    if (!(wanted->noise > 0.0f) || wanted->view_source != PROTOCOL_VIEW_SOURCE_LAYERS || !is_made)
+        return true;
+    cli_usage(job, "--noise", "pictures that are made of depth layers have a number of samples");
+    return fl_error_remedy(&job->error, "give --samples, or render them as they are: --views rays");
+}
+
 bool cli_job_complete(struct cli_job *job, bool is_series)
 {
     if (!complete_scene(job))
         return false;
     complete_samples(job, is_series);
     complete_integrator(job);
-    return cli_views_complete(job, is_series) && complete_tracer(job) && complete_clips(job) &&
-           complete_outputs(job, is_series) && complete_encoding(job) && complete_camera(job);
+    return cli_views_complete(job, is_series) && complete_noise(job) && complete_tracer(job) &&
+           complete_clips(job) && complete_outputs(job, is_series) && complete_encoding(job) &&
+           complete_camera(job);
 }
 
 bool cli_job_complete_view(struct cli_job *job)
@@ -297,5 +310,6 @@ bool cli_job_complete_view(struct cli_job *job)
         wanted->integrator = PROTOCOL_INTEGRATOR_DISTRIBUTED;
     if (wanted->encoding == PROTOCOL_ENCODING_ZSTD && wanted->quality > 19)
         return cli_usage(job, "--quality", "zstd has levels 1 to 19") == 0;
-    return cli_views_complete(job, false) && complete_tracer(job) && complete_clips(job) && complete_camera(job);
+    return cli_views_complete(job, false) && complete_noise(job) && complete_tracer(job) && complete_clips(job) &&
+           complete_camera(job);
 }

@@ -1,4 +1,6 @@
 /* SPDX-License-Identifier: MIT */
+#include "render/picture_noise.h"
+
 #include "render/picture.h"
 
 #include "shared/path.h"
