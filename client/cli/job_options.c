@@ -450,9 +450,9 @@ const struct argp *cli_picture_argp(void)
 
 const struct argp *cli_views_argp(void)
 {
-    static const char *const left_out[] = {"output",  "format",     "half",          "float",
-                                           "timings", "trace-file", "layers",        "retry-for",
-                                           "retries", "metadata",   "stereo-layout", "noise", NULL};
+    static const char *const left_out[] = {"output",        "format", "half",      "float",   "timings",
+                                           "trace-file",    "layers", "retry-for", "retries", "metadata",
+                                           "stereo-layout", "noise",  NULL};
     static struct argp_option kept[OPTIONS_MAX];
     static const struct argp argp = {.options = kept, .parser = parse};
     keep(kept, left_out);
