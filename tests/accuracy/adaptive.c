@@ -147,6 +147,11 @@ TEST(a_picture_stops_alike_however_it_is_cut)
         assert_memory_equal(whole.pixels, cut.pixels, whole.size_bytes);
         assert_int_equal(whole.primary_rays, cut.primary_rays);
         frame_renderer_set_capacity(fixture->renderer, 0, 0);
+        frame_renderer_queue_ahead(fixture->renderer, true);
+        struct frame_result queued = fixture_render(fixture);
+        assert_memory_equal(whole.pixels, queued.pixels, whole.size_bytes);
+        frame_result_finish(&queued);
+        frame_renderer_queue_ahead(fixture->renderer, false);
         fixture->request.accumulate = true;
         fixture->request.samples_max = 64;
         for (uint32_t held = 0; held < 64;) {
