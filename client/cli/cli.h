@@ -111,6 +111,8 @@ struct cli_progress {
     bool drawn;
     uint64_t begin_ns, shown_ns, first_ns;
     uint32_t total;
+    float error;           /* as it was last told, that many seconds after the beginning */
+    double error_s, slope; /* it falls as that power of the time */
 };
 
 void cli_progress_begin(struct cli_progress *progress, bool silent);
@@ -123,6 +125,12 @@ void cli_progress_frames(struct cli_progress *progress, uint32_t done, uint32_t 
 void cli_progress_step(struct cli_progress *progress, uint32_t done, uint32_t total, const char *what);
 /* A progressive picture has `held` samples per pixel; `total` 0: only an interruption ends it. */
 void cli_progress_samples(struct cli_progress *progress, uint32_t held, uint32_t total);
+/* A picture has that error where it is largest, and goes on until it is `wanted`, or all have `total` samples. */
+struct cli_noise {
+    float error, wanted;
+    uint32_t held, total;
+};
+void cli_progress_noise(struct cli_progress *progress, const struct cli_noise *noise);
 /* Removes the bar, so that other output can be written. */
 void cli_progress_clear(struct cli_progress *progress);
 /* The bar of a finished command stays; any other is removed. */
@@ -211,6 +219,7 @@ struct cli_job {
     double time_s;         /* of `render`: the time of the clips */
     bool progressive;      /* of `render`: the picture is written repeatedly, with more samples */
     bool endless;          /* likewise, until it is interrupted */
+    bool by_error;         /* of one picture: sampled in passes until its error is small */
     uint32_t pass_samples; /* more each time; 0: as many as there are */
     bool lens_changes;     /* opened by clips: the integrator must support lenses */
     bool lossless;         /* of a video */

@@ -8,6 +8,7 @@
 #define FRAME_BYTES_MAX (UINT64_C(4080) << 20) /* as the daemon has it */
 #define PATH_SAMPLES 64u                       /* where nothing is said */
 #define CLAMP 10.0f                            /* likewise; times white, as Cycles has it for indirect light */
+#define NOISE_SAMPLES 4096u                    /* likewise with --noise: most pixels need far fewer */
 #define AO_SAMPLES 16u                         /* of 8 rays: 128 a pixel, as in the paper */
 
 /* ---- where pictures go ---- */
@@ -212,13 +213,17 @@ static void complete_integrator(struct cli_job *job)
 
 /* Random choices show as noise in one sample. Pictures that are refined without an end have no number of
  * samples. */
-static void complete_samples(struct cli_job *job)
+static void complete_samples(struct cli_job *job, bool is_series)
 {
     struct message_render *wanted = &job->options;
-    job->endless = job->progressive && !job->has_samples;
+    const bool by_error = wanted->noise > 0.0f;
+    job->endless = job->progressive && !job->has_samples && !by_error;
+    job->by_error = by_error && !is_series;
     if (!job->has_clamp && !job->endless)
         wanted->clamp = CLAMP;
-    if (!job->has_samples && wanted->integrator == PROTOCOL_INTEGRATOR_PATH)
+    if (!job->has_samples && by_error)
+        wanted->samples = NOISE_SAMPLES;
+    else if (!job->has_samples && wanted->integrator == PROTOCOL_INTEGRATOR_PATH)
         wanted->samples = PATH_SAMPLES;
     else if (!job->has_samples && wanted->integrator == PROTOCOL_INTEGRATOR_AO)
         wanted->samples = AO_SAMPLES;
@@ -273,14 +278,27 @@ static bool complete_scene(struct cli_job *job)
     return fl_error_remedy(&job->error, "add --server ADDRESS");
 }
 
+/* Depth layers are rendered with a number of samples. */
+static bool complete_noise(struct cli_job *job)
+{
+    const struct message_render *wanted = &job->options;
+    const bool is_made =
+        wanted->views_across * wanted->views_down > 1 || wanted->aperture > 0 || wanted->upsample > 1;
+    if (!(wanted->noise > 0.0f) || wanted->view_source != PROTOCOL_VIEW_SOURCE_LAYERS || !is_made)
+        return true;
+    cli_usage(job, "--noise", "pictures that are made of depth layers have a number of samples");
+    return fl_error_remedy(&job->error, "give --samples, or render them as they are: --views rays");
+}
+
 bool cli_job_complete(struct cli_job *job, bool is_series)
 {
     if (!complete_scene(job))
         return false;
-    complete_samples(job);
+    complete_samples(job, is_series);
     complete_integrator(job);
-    return cli_views_complete(job, is_series) && complete_tracer(job) && complete_clips(job) &&
-           complete_outputs(job, is_series) && complete_encoding(job) && complete_camera(job);
+    return cli_views_complete(job, is_series) && complete_noise(job) && complete_tracer(job) &&
+           complete_clips(job) && complete_outputs(job, is_series) && complete_encoding(job) &&
+           complete_camera(job);
 }
 
 bool cli_job_complete_view(struct cli_job *job)
@@ -290,10 +308,13 @@ bool cli_job_complete_view(struct cli_job *job)
         return false;
     if (!job->has_clamp)
         wanted->clamp = CLAMP;
+    if (wanted->noise > 0.0f && !job->has_samples)
+        wanted->samples = NOISE_SAMPLES;
     /* An integrator without noise is better while the camera moves. */
     if (!job->has_integrator && (wanted->aperture > 0 || wanted->shutter > 0))
         wanted->integrator = PROTOCOL_INTEGRATOR_DISTRIBUTED;
     if (wanted->encoding == PROTOCOL_ENCODING_ZSTD && wanted->quality > 19)
         return cli_usage(job, "--quality", "zstd has levels 1 to 19") == 0;
-    return cli_views_complete(job, false) && complete_tracer(job) && complete_clips(job) && complete_camera(job);
+    return cli_views_complete(job, false) && complete_noise(job) && complete_tracer(job) && complete_clips(job) &&
+           complete_camera(job);
 }

@@ -20,6 +20,10 @@ static const struct row {
 } rows[] = {
     {"samples", "samples", "N", "Samples per pixel (default 1; 16 for the integrator ao, 64 for path)",
      CLI_GROUP_PICTURE, GIVEN(has_samples), true},
+    {"noise", "noise", "ERROR",
+     "Sample each part of the picture until its error is below this, such as 0.02 for 2 %; --samples is the most "
+     "that a pixel gets (default 4096)",
+     CLI_GROUP_PICTURE, 0, true},
     {"filter", "pixel_filter", "NAME", "How samples are spread about a pixel", CLI_GROUP_PICTURE, 0, true},
     {"seed", "seed", "N", "Same seed, same picture (default 0)", CLI_GROUP_PICTURE, 0, true},
     {"exposure", "exposure_stops", "STOPS", "Multiply the picture by 2 to this power", CLI_GROUP_PICTURE, 0, true},

@@ -446,10 +446,10 @@ const struct argp *cli_job_argp(void)
 
 const struct argp *cli_picture_argp(void)
 {
-    static const char *const left_out[] = {"output",      "format",   "half",     "float",      "tone-map",
-                                           "tracer",      "primary",  "timings",  "trace-file", "layers",
-                                           "retry-for",   "retries",  "metadata", "stereo",     "stereo-layout",
-                                           "light-field", "baseline", "views",    "lens",       NULL};
+    static const char *const left_out[] = {
+        "output",        "format",      "half",     "float",     "tone-map", "tracer",   "primary",
+        "timings",       "trace-file",  "layers",   "retry-for", "retries",  "metadata", "stereo",
+        "stereo-layout", "light-field", "baseline", "views",     "lens",     "noise",    NULL};
     static struct argp_option kept[OPTIONS_MAX];
     static const struct argp argp = {.options = kept, .parser = parse};
     keep(kept, left_out);
@@ -458,9 +458,9 @@ const struct argp *cli_picture_argp(void)
 
 const struct argp *cli_views_argp(void)
 {
-    static const char *const left_out[] = {"output",  "format",     "half",          "float",
-                                           "timings", "trace-file", "layers",        "retry-for",
-                                           "retries", "metadata",   "stereo-layout", NULL};
+    static const char *const left_out[] = {"output",        "format", "half",      "float",   "timings",
+                                           "trace-file",    "layers", "retry-for", "retries", "metadata",
+                                           "stereo-layout", "noise",  NULL};
     static struct argp_option kept[OPTIONS_MAX];
     static const struct argp argp = {.options = kept, .parser = parse};
     keep(kept, left_out);

@@ -2,6 +2,7 @@
 #include "cli/cli.h"
 #include "protocol/common/clock.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 #include <sys/ioctl.h>
@@ -22,7 +23,7 @@ static unsigned columns(void)
 void cli_progress_begin(struct cli_progress *progress, bool silent)
 {
     *progress = (struct cli_progress){
-        .silent = silent, .bar = cli_is_terminal(STDERR_FILENO), .begin_ns = monotonic_now_ns()};
+        .silent = silent, .bar = cli_is_terminal(STDERR_FILENO), .begin_ns = monotonic_now_ns(), .slope = 0.5};
 }
 
 void cli_progress_clear(struct cli_progress *progress)
@@ -127,6 +128,48 @@ void cli_progress_samples(struct cli_progress *progress, uint32_t held, uint32_t
         return;
     }
     draw(progress, held, total, text);
+}
+
+/* Seconds until the error is small enough: it falls as a power of the time, by what was seen of that, n^-1/2 at
+ * first; or until there are no more samples. */
+static double noise_left_s(struct cli_progress *progress, const struct cli_noise *noise, double seconds)
+{
+    const double ratio = (double)noise->error / (double)noise->wanted;
+    const double by_samples = seconds * (noise->total - noise->held) / (noise->held > 0 ? noise->held : 1);
+    if (progress->error > noise->error && seconds > progress->error_s && progress->error_s > 0)
+        progress->slope = log((double)(progress->error / noise->error)) / log(seconds / progress->error_s);
+    const double slope = fmin(fmax(progress->slope, 0.25), 2.0);
+    if (progress->error != noise->error) {
+        progress->error = noise->error;
+        progress->error_s = seconds;
+    }
+    const double by_error = progress->error_s * pow(ratio, 1 / slope) - seconds;
+    return fmin(fmax(by_error, 0), by_samples);
+}
+
+void cli_progress_noise(struct cli_progress *progress, const struct cli_noise *noise)
+{
+    const uint64_t now = monotonic_now_ns();
+    const bool is_known = noise->error < 1e6f,
+               is_last = noise->error <= noise->wanted || noise->held >= noise->total;
+    const double seconds = (double)(now - progress->begin_ns) * 1e-9;
+    const double left_s = is_known && !is_last ? noise_left_s(progress, noise, seconds) : 0;
+    char text[120];
+    if (progress->silent || !is_due(progress, is_last))
+        return;
+    int length = is_known ? snprintf(text, sizeof(text), "error %.2g %%, wanted %.2g %%",
+                                     (double)noise->error * 100, (double)noise->wanted * 100)
+                          : snprintf(text, sizeof(text), "%u samples a pixel", noise->held);
+    if (is_known && !is_last) {
+        length += snprintf(text + length, sizeof(text) - (size_t)length, ", about ");
+        print_duration(text + length, sizeof(text) - (size_t)length, left_s);
+        strncat(text, " left", sizeof(text) - strlen(text) - 1);
+    }
+    if (!progress->bar) {
+        fprintf(stderr, "%s\n", text);
+        return;
+    }
+    draw(progress, (uint32_t)(1000 * seconds / (seconds + left_s)), is_known ? 1000 : 0, text);
 }
 
 void cli_progress_frames(struct cli_progress *progress, uint32_t done, uint32_t total)

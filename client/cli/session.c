@@ -13,6 +13,7 @@
 #include <time.h>
 #include <unistd.h>
 
+#define ERROR_PASS_SAMPLES 16u /* fewer have no error yet */
 #define LONG_PASS_NS 1000000000u
 #define DEFAULT_RETRY_S 300
 #define PASS_SAMPLES_MAX 65536u /* of one request, in the protocol */
@@ -30,6 +31,7 @@ struct session {
     size_t run;        /* the current one of the set */
     bool begun;        /* of this run a frame has been written */
     uint64_t next;     /* once begun: its first frame that has not */
+    float noise;       /* of the last frame that has come */
     uint32_t done;     /* frames written */
     unsigned failures; /* lost connections since the last frame */
     uint64_t lost_ns;  /* when the first of them was lost */
@@ -126,13 +128,26 @@ static void add_export(struct session *session, int64_t frame, uint64_t begin_ns
     cli_trace_span(session->trace, CLI_TRACE_CLIENT, "export", frame, begin_ns, duration_ns);
 }
 
+static bool is_enough(const struct session *session, float noise, uint32_t samples)
+{
+    const struct message_render *options = &session->job->options;
+    return noise <= options->noise || samples >= options->samples;
+}
+
+/* Whether it is more than a step on the way to a picture. */
+static bool is_wanted(const struct session *session, const struct fl_frame *frame)
+{
+    const struct cli_job *job = session->job;
+    return job->progressive || !job->by_error || is_enough(session, frame->noise, frame->samples);
+}
+
 static bool write_frame(struct session *session, const struct fl_frame *frame, struct fl_error *error)
 {
     const uint64_t begin_ns = monotonic_now_ns();
     cli_trace_frame(session->trace, frame, begin_ns);
     cli_timings_frame(session->timings, frame);
     cli_structure_warn(frame, &session->warned, &session->progress);
-    const bool written = cli_sinks_write(&session->sinks, frame, error);
+    const bool written = !is_wanted(session, frame) || cli_sinks_write(&session->sinks, frame, error);
     add_export(session, frame->frame, begin_ns);
     session->sink_failed = !written;
     return written;
@@ -157,17 +172,20 @@ static bool take_frames(struct session *session, const struct fl_frame_run *run,
     struct fl_frame *frame = NULL;
     while ((frame = fl_render_next(session->rendering, error))) {
         const uint64_t next = (uint64_t)frame->frame + run->step;
-        const bool written = write_frame(session, frame, error);
+        const bool written = write_frame(session, frame, error), wanted = is_wanted(session, frame);
+        session->noise = frame->noise;
+        session->failures = 0;
         fl_frame_destroy(frame);
         if (!written)
             return false;
+        if (!wanted)
+            continue;
         /* The previous file is complete; this one is being written. */
         if (session->done > 0)
             show_progress(session);
         session->next = next;
         session->begun = true;
         session->done++;
-        session->failures = 0;
     }
     return error->code == FL_ERROR_NONE;
 }
@@ -177,8 +195,9 @@ static bool take_frames(struct session *session, const struct fl_frame_run *run,
 static uint32_t pass_samples(const struct cli_job *job, uint32_t held, uint32_t total, uint32_t last,
                              uint64_t last_ns)
 {
-    uint32_t samples = job->pass_samples > 0 ? job->pass_samples : held > 0 ? held : 1;
-    if (job->endless && job->pass_samples == 0 && last_ns > LONG_PASS_NS)
+    const uint32_t first = job->by_error && !job->progressive ? ERROR_PASS_SAMPLES : 1;
+    uint32_t samples = job->pass_samples > 0 ? job->pass_samples : held > 0 ? held : first;
+    if ((job->endless || job->by_error) && job->pass_samples == 0 && last_ns > LONG_PASS_NS)
         samples = last;
     samples = samples < PASS_SAMPLES_MAX ? samples : PASS_SAMPLES_MAX;
     return samples < total - held ? samples : total - held;
@@ -196,7 +215,7 @@ static bool end_passes(struct session *session, uint32_t held, struct fl_error *
 {
     const struct cli_job *job = session->job;
     struct fl_error failure = {0};
-    if (error->code != FL_ERROR_INTERRUPTED || held == 0)
+    if (error->code != FL_ERROR_INTERRUPTED || held == 0 || !job->progressive)
         return false;
     if (!finish_sinks(session, &failure)) {
         *error = failure;
@@ -210,7 +229,8 @@ static bool end_passes(struct session *session, uint32_t held, struct fl_error *
     return job->endless;
 }
 
-/* A progressive picture: one job per pass, whose samples the daemon adds to the previous ones. */
+/* A progressive picture, or one that is sampled by its error: one job per pass, whose samples the daemon adds to
+ * the previous ones. */
 static bool render_passes(struct session *session, struct fl_error *error)
 {
     const struct cli_job *job = session->job;
@@ -228,7 +248,16 @@ static bool render_passes(struct session *session, struct fl_error *error)
         fl_render_destroy(session->rendering);
         session->rendering = NULL;
         pass_ns = monotonic_now_ns() - begin_ns;
-        cli_progress_samples(&session->progress, held + options.samples, job->endless ? 0 : total);
+        if (!job->by_error) {
+            cli_progress_samples(&session->progress, held + options.samples, job->endless ? 0 : total);
+            continue;
+        }
+        cli_progress_noise(&session->progress, &(struct cli_noise){.error = session->noise,
+                                                                   .wanted = options.noise,
+                                                                   .held = held + options.samples,
+                                                                   .total = total});
+        if (is_enough(session, session->noise, 0))
+            break;
     }
     return true;
 }
@@ -237,7 +266,7 @@ static bool render_passes(struct session *session, struct fl_error *error)
 static bool render_run(struct session *session, const struct fl_frame_run *run, struct fl_error *error)
 {
     struct message_render options = session->job->options;
-    if (session->job->progressive)
+    if (session->job->progressive || session->job->by_error)
         return render_passes(session, error);
     options.first_frame = session->begun ? (uint32_t)session->next : run->first;
     options.last_frame = run->last;

@@ -305,6 +305,7 @@ FL_API struct message_render fl_render_defaults(void);
 /* One picture and what it cost. */
 struct fl_frame {
     uint32_t frame, width, height, samples;
+    float noise; /* largest error of a tile, if `render` has noise; 1e6: not known yet */
     uint64_t revision;
     enum protocol_pixel_format format;
     enum protocol_encoding encoding; /* as it travelled; pixels are decoded */

@@ -158,6 +158,7 @@ static struct fl_frame *new_frame(const struct message_frame_begin *begin)
     frame->width = begin->width;
     frame->height = begin->height;
     frame->samples = begin->samples;
+    frame->noise = begin->noise;
     frame->revision = begin->revision;
     frame->format = begin->format;
     frame->encoding = begin->encoding;

@@ -88,6 +88,7 @@ static void describe(struct message_frame_begin *begin, const struct fl_frame *f
     begin->width = frame->width;
     begin->height = frame->height;
     begin->samples = frame->samples;
+    begin->noise = frame->noise;
     begin->revision = frame->revision;
     begin->size_bytes = frame->pixels_bytes;
     begin->format = frame->format;

@@ -225,6 +225,7 @@ static error_t parse(int key, char *value, struct argp_state *state)
     case KEY_RATE:
         return set_rate(line, value);
     case KEY_SAMPLES:
+        line->job.has_samples = true;
         return set_integer(&line->job, "--samples", value, 1, 65536, &line->job.options.samples);
     case KEY_PASS:
         return set_integer(&line->job, "--pass-samples", value, 1, 256, &line->job.options.pass_samples);

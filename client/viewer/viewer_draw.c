@@ -91,7 +91,8 @@ void viewer_hud(struct viewer *viewer, struct hud_state *state)
         .picture_width = viewer->frame.width,
         .picture_height = viewer->frame.height,
         .samples = viewer->frame.samples,
-        .samples_wanted = viewer->view.samples,
+        .samples_wanted = viewer_has_samples(viewer, &viewer->frame, viewer->view.samples) ? viewer->frame.samples
+                                                                                           : viewer->view.samples,
         .depth = viewer->view.depth,
         .depth_less =
             viewer->frame.depth_less < viewer->view.depth ? viewer->frame.depth_less : viewer->view.depth,

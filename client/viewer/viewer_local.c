@@ -133,12 +133,13 @@ static void leave_margin(struct fl_frame *frame)
  */
 static bool give_key(struct viewer *viewer, struct fl_frame *frame, bool is_shown)
 {
-    struct views_key key = {
-        .depth_step = frame->depth_step,
-        .radius = viewer->local_radius,
-        .is_smeared = frame->encoding == PROTOCOL_ENCODING_JPEG || frame->encoding == PROTOCOL_ENCODING_H264,
-        .is_final = !frame->moving && !frame->more_follows && frame->samples >= viewer->view.samples,
-        .came_ns = monotonic_now_ns()};
+    struct views_key key = {.depth_step = frame->depth_step,
+                            .radius = viewer->local_radius,
+                            .is_smeared = frame->encoding == PROTOCOL_ENCODING_JPEG ||
+                                          frame->encoding == PROTOCOL_ENCODING_H264,
+                            .is_final = !frame->moving && !frame->more_follows &&
+                                        viewer_has_samples(viewer, frame, viewer->view.samples),
+                            .came_ns = monotonic_now_ns()};
     if (!viewer->views)
         viewer->views = views_create(&viewer->failure);
     if (!viewer->views || (is_shown && !pixmap_copy(&key.picture, &viewer->arrived, &viewer->failure)))

@@ -205,11 +205,18 @@ void viewer_receive(struct viewer *viewer, unsigned timeout_ms)
         refuse(viewer, &refusal);
 }
 
+bool viewer_has_samples(const struct viewer *viewer, const struct fl_frame *frame, unsigned enough)
+{
+    const float noise = viewer->view.noise;
+    return frame->samples >= enough || (noise > 0.0f && frame->noise <= noise);
+}
+
 bool viewer_is_at_rest(const struct viewer *viewer, unsigned samples)
 {
     const unsigned maximum = viewer->view.samples, enough = samples > 0 && samples < maximum ? samples : maximum;
     return viewer->has_camera && viewer->has_looked && !viewer->must_show && !viewer->must_look &&
            !viewer->told_moving && viewer->glide_begin_ns == 0 && viewer->frames > 0 &&
            viewer->frame.command == viewer->command && viewer->frame.change == viewer->change &&
-           !viewer->frame.moving && !viewer->frame.more_follows && viewer->frame.samples >= enough;
+           !viewer->frame.moving && !viewer->frame.more_follows &&
+           viewer_has_samples(viewer, &viewer->frame, enough);
 }

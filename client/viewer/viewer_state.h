@@ -104,6 +104,8 @@ __attribute__((format(printf, 2, 3))) void viewer_say(struct viewer *viewer, con
 
 void viewer_tell(struct viewer *viewer, uint64_t now_ns); /* of the view and the camera, where they changed */
 void viewer_receive(struct viewer *viewer, unsigned timeout_ms);
+/* The frame has that many samples, or an error that is as small as is wanted. */
+bool viewer_has_samples(const struct viewer *viewer, const struct fl_frame *frame, unsigned enough);
 /* The frame shows the last request, and will not get more than `samples` samples (0: all). */
 bool viewer_is_at_rest(const struct viewer *viewer, unsigned samples);
 /* Makes a request for a picture of width x height pixels one of both eyes, where there are two. */

@@ -206,6 +206,7 @@ static bool take_up_hidden(struct job *job, struct shot *shot, struct error *err
     request->seed = job->spec.frame.seed;
     request->accumulate = false;
     request->samples = 1;
+    request->noise = 0.0f;
     request->hidden_layer = view->hidden_layer;
     request->hidden_radius = job->spec.depth.radius;
     choose_eyes(job, request);
@@ -341,6 +342,8 @@ void view_done(struct job *job, struct engine_frame *frame)
     view->shown_revision = frame->result.revision;
     view->shown_moving = camera->moving;
     view->held_samples = frame->result.samples;
+    if (frame->result.noise <= job->spec.frame.noise && job->spec.frame.noise > 0.0f)
+        view->held_samples = job->spec.frame.samples; /* it has enough */
     view->owes_key_frame |= view->wish.key_frame;
     view->wish.key_frame = false;
     if (adapts(job)) {

@@ -30,7 +30,7 @@ static void place_sample(const struct render_context *context, uint32_t index, f
     if (!context->spread)
         return;
     float numbers[2];
-    sequence_pair(numbers, sequence_seed(UINT32_MAX, uniforms->seed), SEQUENCE_PIXEL, index);
+    sequence_pair(numbers, sequence_seed(UINT32_MAX, UINT32_MAX, uniforms->seed), SEQUENCE_PIXEL, index);
     for (int i = 0; i < 2; i++)
         place[i] += pixel_filter_offset((const float *)uniforms->filter_places, numbers[i]);
 }
@@ -42,14 +42,18 @@ static bool set_sample(struct frame_renderer *renderer, struct error *error)
                    "a place for each sample");
     struct render_context *context = &renderer->work->context;
     uint32_t left = context->request.samples - renderer->sample;
+    const uint32_t held = renderer->samples_before + renderer->sample;
+    if (context->request.noise > 0.0f && picture_noise_next(held) - held < left)
+        left = picture_noise_next(held) - held;
     context->uniforms.sample_index =
         (frame_is_layer_pass(renderer) ? renderer->eyes_samples_before : renderer->samples_before) +
         renderer->sample;
     const uint32_t shift = slices_sample_shift(&renderer->slices, left);
     context->uniforms.sample_shift = shift < renderer->sample_shift_max ? shift : renderer->sample_shift_max;
     /* A sample that is added to others has no group of its own. */
-    context->uniforms.group_shift =
-        context->request.accumulate ? 0 : slices_group_shift(context->request.samples, renderer->sample);
+    context->uniforms.group_shift = frame_request_goes_on(&context->request)
+                                        ? 0
+                                        : slices_group_shift(context->request.samples, renderer->sample);
     for (uint32_t i = 0; i < 1u << context->uniforms.sample_shift; i++)
         place_sample(context, context->uniforms.sample_index + i,
                      &context->uniforms.sample_places[i / 2][i % 2 * 2]);
@@ -180,6 +184,23 @@ static bool land(struct frame_renderer *renderer, bool *again, struct error *err
     return true;
 }
 
+/* If it is time to: which tiles have samples enough. If all have, the frame has. */
+static bool measure_noise(struct frame_renderer *renderer, struct error *error)
+{
+    struct render_context *context = &renderer->work->context;
+    struct picture *picture = renderer->target;
+    const uint32_t held = renderer->samples_before + renderer->sample;
+    if (!picture_noise_is_due(picture, held))
+        return true;
+    if (!picture_noise_measure(picture, context, held, error))
+        return false;
+    if (picture->noise.going_on == 0) {
+        context->request.samples = renderer->sample;
+        picture->samples = held;
+    }
+    return true;
+}
+
 static bool land_all(struct frame_renderer *renderer, struct error *error)
 {
     bool again = false;
@@ -187,6 +208,12 @@ static bool land_all(struct frame_renderer *renderer, struct error *error)
         return false;
     if (again || renderer->work->ahead.count > 0)
         return true;
+    if (!measure_noise(renderer, error))
+        return false;
+    if (renderer->sample < renderer->work->context.request.samples) {
+        renderer->phase = PHASE_SAMPLE;
+        return true;
+    }
     if (frame_is_mark_pass(renderer))
         return frame_key_end_marks(renderer, error);
     renderer->phase = frame_is_layer_pass(renderer) ? PHASE_KEEP : PHASE_DENOISE;
@@ -209,7 +236,9 @@ static bool begin_slice(struct frame_renderer *renderer, struct error *error)
         begin_ahead(renderer);
     if (!slices_take(&renderer->slices, renderer->target, sample_shift, &context->slice)) {
         renderer->sample += 1u << sample_shift;
-        renderer->phase = renderer->sample < context->request.samples ? PHASE_SAMPLE : PHASE_LAND;
+        const bool lands = renderer->sample == context->request.samples ||
+                           picture_noise_is_due(renderer->target, renderer->samples_before + renderer->sample);
+        renderer->phase = lands ? PHASE_LAND : PHASE_SAMPLE;
         return true;
     }
     uint32_t row = picture_row_of(renderer->target, context->slice.first_slot);
@@ -444,7 +473,10 @@ static bool hand_out(struct frame_renderer *renderer, struct frame_result *resul
     result->format = request->format;
     result->ycbcr = request->ycbcr;
     result->samples = renderer->picture.samples;
-    result->primary_rays += (uint64_t)request->width * request->height * request->samples;
+    result->noise = renderer->picture.noise.error;
+    result->primary_rays += request->noise > 0.0f
+                                ? picture_noise_rays(&renderer->picture, renderer->samples_before)
+                                : (uint64_t)request->width * request->height * request->samples;
     result->times = context->times;
     renderer->kept_request = *request;
     renderer->kept_samples = result->samples;

@@ -40,6 +40,9 @@ struct frame_request {
     uint32_t hidden_layer;
     float hidden_radius; /* metres; of that */
     uint32_t samples, depth;
+    /* Tiles stop one by one when their error is below that (picture_noise.h); `samples` is the most that one gets.
+     * 0: each gets all. Not with `compare` and VIEW_SOURCE_LAYERS. */
+    float noise;
     uint64_t seed;
     struct frame_camera camera;
     unsigned tracer; /* protocol's number */
@@ -112,7 +115,9 @@ struct frame_result {
     uint32_t attachments;
     size_t size_bytes;
     uint32_t width, height;
-    uint32_t samples; /* held per pixel, with those of the frames before that it goes on from */
+    uint32_t
+        samples; /* held per pixel, with those of the frames before that it goes on from; with noise: at most */
+    float noise; /* with noise in the request: the largest error of a tile, as far as is known; else 0 */
     enum pixel_format format;
     enum ycbcr ycbcr; /* in place of the RGBA8; base/ycbcr.h says how the planes lie in size_bytes */
     uint64_t revision;

@@ -250,6 +250,7 @@ static bool reserve_frame(struct frame_renderer *renderer, struct error *error)
         !denoise_sums_begin(&renderer->denoise, context, renderer->target, renderer->samples_before, error))
         return false;
     renderer->picture.denoised = NULL;
+    context->tile_samples = renderer->target->noise.errors ? &renderer->target->noise.tile_samples : NULL;
     renderer->rasterise = !renderer->key_tracer && choices_rasterise(context);
     renderer->strip_rows = picture_strip_rows(renderer->target, STRIP_PIXELS_MAX);
     renderer->sample_shift_max = sample_shift_max(renderer);
@@ -289,9 +290,11 @@ static void fill_filter(struct render_context *context)
 static void limit_samples(const struct frame_renderer *renderer, struct frame_request *request)
 {
     uint32_t before = renderer->samples_before, maximum = request->samples_max;
-    if (!request->accumulate || !maximum || !before)
+    if (!request->accumulate || !before)
         return;
-    uint32_t lacking = maximum > before ? maximum - before : 0;
+    uint32_t lacking = !maximum ? UINT32_MAX : maximum > before ? maximum - before : 0;
+    if (request->noise > 0.0f && renderer->picture.noise.going_on == 0)
+        lacking = 0;
     request->samples = request->samples < lacking ? request->samples : lacking;
 }
 
@@ -327,9 +330,10 @@ static bool get_ready(struct frame_renderer *renderer, struct error *error)
     context->uniforms.depth = request->depth;
     context->uniforms.far_width[2] = frame_request_hides_environment(request) ? 1.0f : 0.0f;
     /* Those of a texel of a layer all pass through its middle. */
-    context->spread = !frame_is_layer_pass(renderer) && (request->samples > 1 || request->accumulate);
+    context->spread = !frame_is_layer_pass(renderer) && (request->samples > 1 || frame_request_goes_on(request));
     context->uniforms.far_width[1] =
-        context->spread ? 1.0f / sqrtf(request->accumulate ? SAMPLES_GOING_ON : (float)request->samples) : 1.0f;
+        context->spread ? 1.0f / sqrtf(frame_request_goes_on(request) ? SAMPLES_GOING_ON : (float)request->samples)
+                        : 1.0f;
     fill_filter(context);
     context->uniforms.seed = (uint32_t)(request->seed ^ request->seed >> 32);
     if (!reserve_frame(renderer, error) || !gpu_check_reset(renderer->device, "beginning a frame", error))

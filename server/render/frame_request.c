@@ -175,6 +175,22 @@ static bool check_views(const struct frame_request *request, struct error *error
     return true;
 }
 
+static bool check_noise(const struct frame_request *request, struct error *error)
+{
+    if (!(request->noise >= 0.0f && request->noise <= 1.0f))
+        return error_set(error, ERROR_INVALID, "noise", "an error of %g; 0 to 1 are possible",
+                         (double)request->noise);
+    if (request->noise > 0.0f && request->compare)
+        return error_set(error, ERROR_UNSUPPORTED, "noise", "all waves are compared; give a number of samples");
+    if (request->noise > 0.0f && request->denoise == DENOISE_ON)
+        return error_set(error, ERROR_UNSUPPORTED, "noise",
+                         "what is filtered has the same number of samples everywhere");
+    if (request->noise > 0.0f && request->view_source == VIEW_SOURCE_LAYERS)
+        return error_set(error, ERROR_UNSUPPORTED, "noise",
+                         "pictures made from layers have a number of samples; render them as they are");
+    return true;
+}
+
 bool frame_request_check(const struct frame_request *request, struct error *error)
 {
     if (request->width == 0 || request->height == 0 || request->width > SIZE_MAX_PIXELS ||
@@ -189,8 +205,8 @@ bool frame_request_check(const struct frame_request *request, struct error *erro
     if (request->format > PIXEL_FORMAT_RGBA32F)
         return error_set(error, ERROR_UNSUPPORTED, "format", "there is no pixel format number %u",
                          (unsigned)request->format);
-    return check_views(request, error) && check_background(request, error) && check_integrator(request, error) &&
-           check_layers(request, error) && check_camera(request, error);
+    return check_noise(request, error) && check_views(request, error) && check_background(request, error) &&
+           check_integrator(request, error) && check_layers(request, error) && check_camera(request, error);
 }
 
 static bool same_camera(const struct frame_camera *a, const struct frame_camera *b)
@@ -237,10 +253,16 @@ bool frame_request_same_radiance(const struct frame_request *a, const struct fra
            frame_request_hides_environment(a) == frame_request_hides_environment(b);
 }
 
+bool frame_request_goes_on(const struct frame_request *request)
+{
+    return request->accumulate || request->noise > 0.0f;
+}
+
 bool frame_request_adds_to(const struct frame_request *a, const struct frame_request *b)
 {
     return a->accumulate && b->accumulate && a->width == b->width && a->height == b->height && same_views(a, b) &&
            frame_request_same_radiance(a, b) && a->aperture == b->aperture && a->focus == b->focus &&
            a->filter == b->filter && same_camera(&a->camera, &b->camera) &&
-           frame_request_planes(a) == frame_request_planes(b) && a->denoise == b->denoise;
+           frame_request_planes(a) == frame_request_planes(b) && a->denoise == b->denoise &&
+           a->noise == b->noise;
 }

@@ -27,6 +27,8 @@ bool frame_request_hides_environment(const struct frame_request *request);
 float frame_request_radiance_limit(const struct frame_request *request);
 /* Whether the same ray brings the same radiance. */
 bool frame_request_same_radiance(const struct frame_request *a, const struct frame_request *b);
+/* How many samples a pixel will have is not known beforehand. */
+bool frame_request_goes_on(const struct frame_request *request);
 /* Whether their samples may be added up: they are equal but for their number and the use of the sum. */
 bool frame_request_adds_to(const struct frame_request *a, const struct frame_request *b);
 

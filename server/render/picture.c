@@ -4,6 +4,7 @@
 #include "render/frame_request.h"
 #include "shared/path.h"
 
+#include <epoxy/gl.h>
 #include <stdlib.h>
 
 /* Slots of a band: few enough that software GL turns them into pixels within some ten milliseconds, a step of the
@@ -17,6 +18,7 @@ static void free_bands(struct picture *picture, struct gpu_device *device)
     free(picture->bands);
     picture->bands = NULL;
     picture->band_count = 0;
+    picture_noise_finish(&picture->noise, device);
 }
 
 enum layer picture_plane_layer(const struct picture *picture, uint32_t plane)
@@ -34,7 +36,7 @@ struct gpu_buffer *picture_band(const struct picture *picture, uint32_t plane, u
 
 uint64_t picture_device_bytes(const struct picture *picture)
 {
-    uint64_t sum = picture->resolved.capacity_bytes;
+    uint64_t sum = picture->resolved.capacity_bytes + picture_noise_device_bytes(&picture->noise);
     for (uint32_t i = 0; i < picture->band_count * picture->plane_count; i++)
         sum += picture->bands[i].capacity_bytes;
     return sum;
@@ -142,13 +144,26 @@ bool picture_begin(struct picture *picture, struct render_context *context, uint
     }
     picture->samples = samples_before + request->samples;
     return reserve_bands(picture, context->device, error) &&
-           (samples_before > 0 || clear_bands(picture, context->device, error));
+           (samples_before > 0 || clear_bands(picture, context->device, error)) &&
+           picture_noise_begin(picture, context, samples_before, error);
+}
+
+const struct gpu_program *picture_accumulate_program(struct render_context *context, struct error *error)
+{
+    static const struct gpu_define stopping[] = {{"HAS_TILE_SAMPLES", "1"}, {0}};
+    const struct gpu_program *program =
+        context_use_with(context, "render/accumulate.comp", context->tile_samples ? stopping : NULL, error);
+    if (program && context->tile_samples) {
+        gpu_buffer_bind_texels(context->device, context->tile_samples, UNIT_TILE_SAMPLES, GL_R32UI);
+        gpu_uniform_uint(program, "first_picture_slot", context->slice.first_slot);
+    }
+    return program;
 }
 
 bool picture_accumulate(struct picture *picture, struct render_context *context, uint32_t plane,
                         struct gpu_buffer *sums, uint32_t first_sum, struct error *error)
 {
-    const struct gpu_program *program = context_use(context, "render/accumulate.comp", error);
+    const struct gpu_program *program = picture_accumulate_program(context, error);
     if (!program)
         return false;
     uint32_t band = context->slice.first_slot / band_slots(picture);

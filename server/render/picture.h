@@ -5,12 +5,13 @@
 
 #include "gpu/readback.h"
 #include "render/context.h"
+#include "render/picture_noise.h"
 
 /* No storage block holds the largest picture everywhere, so it lies in bands of whole tile rows. */
 struct picture {
     uint32_t width, height;
     uint32_t tiles_across;
-    uint32_t samples;   /* samples per pixel in the sums, those of the current frame included */
+    uint32_t samples;   /* samples per pixel in the sums, those of the current frame included; see noise */
     uint32_t band_rows; /* pixel rows of every band but the last; a multiple of 8 */
     uint32_t cleared;   /* bands that are so for this frame */
     uint32_t band_count;
@@ -18,6 +19,7 @@ struct picture {
     uint32_t plane_count;       /* of them */
     struct gpu_buffer *bands;   /* plane after plane; vec4 a slot, of the beauty radiance and coverage, summed */
     const struct gpu_buffer *denoised; /* bands that are shown in place of those of the first plane; NULL: none */
+    struct picture_noise noise; /* where tiles stop one by one */
     struct gpu_buffer resolved; /* one band of a plane in the output's format */
     uint8_t *pixels;            /* what has been read back so far, plane after plane */
     size_t size_bytes;
@@ -36,6 +38,8 @@ uint32_t picture_strip_rows(const struct picture *picture, uint32_t pixels_max);
 uint32_t picture_slot_count(const struct picture *picture);
 /* First slot of the band after the one that `slot` is in. */
 uint32_t picture_band_end(const struct picture *picture, uint32_t slot);
+/* That adds slices, in use. */
+const struct gpu_program *picture_accumulate_program(struct render_context *context, struct error *error);
 /* Adds the current slice to a plane: the slice's samples in `sums` from first_sum on. */
 bool picture_accumulate(struct picture *picture, struct render_context *context, uint32_t plane,
                         struct gpu_buffer *sums, uint32_t first_sum, struct error *error);

@@ -117,7 +117,7 @@ bool primary_rasterise(struct primary *primary, struct render_context *context, 
 
 static const struct gpu_program *rays_program(bool rasterised, struct render_context *context, struct error *error)
 {
-    struct gpu_define defines[6] = {0};
+    struct gpu_define defines[7] = {0};
     size_t n = 0;
     if (context->marked_key)
         defines[n++] = (struct gpu_define){"HAS_TILES", "1"};
@@ -125,6 +125,8 @@ static const struct gpu_program *rays_program(bool rasterised, struct render_con
         defines[n++] = (struct gpu_define){"VISIBILITY", "1"};
     else if (context->spread)
         defines[n++] = (struct gpu_define){"SPREAD", "1"};
+    if (context->tile_samples)
+        defines[n++] = (struct gpu_define){"HAS_TILE_SAMPLES", "1"};
     if (context->uniforms.lens[0] > 0.0f)
         defines[n++] = (struct gpu_define){"HAS_LENS", "1"};
     if (context->scene->has_motion)
@@ -156,6 +158,8 @@ static bool make_rays(const struct primary *primary, struct render_context *cont
                          context->layer * context->uniforms.width * context->uniforms.height);
     }
     context_bind_tiles(context, program);
+    if (context->tile_samples)
+        gpu_buffer_bind_texels(context->device, context->tile_samples, UNIT_TILE_SAMPLES, GL_R32UI);
     gpu_uniform_uint(program, "first_slot", context->slice.first_slot);
     gpu_uniform_uint(program, "slot_count", context->slice.slot_count);
     gpu_dispatch(context->device, program, context->ray_count);

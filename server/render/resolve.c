@@ -6,6 +6,7 @@
 
 #include "shared/path.h"
 
+#include <epoxy/gl.h>
 #include <math.h>
 
 /* Of the sum of a layer's samples what its pixels show. */
@@ -17,6 +18,12 @@ static float scale_of(const struct picture *picture, const struct frame_request 
     return layers_of_first_sample(layer) ? 1.0f : mean;
 }
 
+/* The define of a program that divides each tile's sums by its own number of samples; NULL: it need not. */
+static const char *counts_tiles(const struct render_context *context, enum layer layer)
+{
+    return context->tile_samples && !layers_of_first_sample(layer) ? "HAS_TILE_SAMPLES" : NULL;
+}
+
 static const struct gpu_program *use_pixels(struct render_context *context, enum layer layer, uint32_t pixel_count,
                                             struct error *error)
 {
@@ -24,7 +31,7 @@ static const struct gpu_program *use_pixels(struct render_context *context, enum
         [PIXEL_FORMAT_RGBA8] = "0",    [PIXEL_FORMAT_RGBA16F] = "1", [PIXEL_FORMAT_RGBA32F] = "2",
         [PIXEL_FORMAT_DEPTH32F] = "3", [PIXEL_FORMAT_NORMAL8] = "4", [PIXEL_FORMAT_SHARE8] = "5"};
     unsigned format = frame_request_plane_format(&context->request, layer);
-    const struct gpu_define defines[] = {{"FORMAT", numbers[format]}, {0}};
+    const struct gpu_define defines[] = {{"FORMAT", numbers[format]}, {counts_tiles(context, layer), "1"}, {0}};
     const struct gpu_program *program = context_use_with(context, "render/resolve.comp", defines, error);
     if (program)
         gpu_uniform_uint(program, "pixel_count", pixel_count);
@@ -33,7 +40,8 @@ static const struct gpu_program *use_pixels(struct render_context *context, enum
 
 static const struct gpu_program *use_ycbcr(struct render_context *context, uint32_t row_count, struct error *error)
 {
-    const struct gpu_program *program = context_use(context, "render/resolve_ycbcr.comp", error);
+    const struct gpu_define defines[] = {{counts_tiles(context, LAYER_BEAUTY), "1"}, {0}};
+    const struct gpu_program *program = context_use_with(context, "render/resolve_ycbcr.comp", defines, error);
     if (program) {
         gpu_uniform_uint(program, "row_count", row_count);
         gpu_uniform_uint(program, "ycbcr", context->request.ycbcr);
@@ -51,6 +59,16 @@ static void set_background(const struct gpu_program *program, const struct frame
     gpu_uniform_vec(program, "background", 4, has_colour ? background : none);
 }
 
+static void set_tiles(const struct gpu_program *program, const struct picture *picture,
+                      struct render_context *context, enum layer layer, uint32_t band)
+{
+    uint32_t first_slot;
+    (void)picture_band_slots(picture, band, &first_slot);
+    gpu_buffer_bind_texels(context->device, context->tile_samples, UNIT_TILE_SAMPLES, GL_R32UI);
+    gpu_uniform_uint(program, "first_tile", first_slot / 64);
+    gpu_uniform_float(program, "exposure", layer == LAYER_BEAUTY ? exp2f(context->request.exposure_stops) : 1.0f);
+}
+
 static bool is_ycbcr(const struct render_context *context, enum layer layer)
 {
     return layer == LAYER_BEAUTY && context->request.ycbcr != YCBCR_NONE;
@@ -58,7 +76,9 @@ static bool is_ycbcr(const struct render_context *context, enum layer layer)
 
 void picture_announce(const struct picture *picture, struct render_context *context)
 {
-    (void)context_use(context, "render/accumulate.comp", NULL);
+    (void)picture_accumulate_program(context, NULL);
+    if (context->tile_samples)
+        (void)context_use(context, "render/tile_error.comp", NULL);
     for (uint32_t plane = 0; plane < picture->plane_count; plane++) {
         const enum layer layer = picture_plane_layer(picture, plane);
         if (is_ycbcr(context, layer))
@@ -92,6 +112,8 @@ bool picture_resolve_band(struct picture *picture, struct render_context *contex
         gpu_uniform_float(program, "scale", scale_of(picture, request, layer));
         gpu_uniform_float(program, "coverage_scale", coverage_scale);
         set_background(program, request, layer);
+        if (counts_tiles(context, layer))
+            set_tiles(program, picture, context, layer, band);
         gpu_dispatch(context->device, program, as_ycbcr ? picture->tiles_across * ((rows + 1) / 2) : pixel_count);
     }
     context_span_end(context);

@@ -22,7 +22,8 @@ uint32_t slices_sample_shift(const struct slices *slices, uint32_t samples);
 uint32_t slices_group_shift(uint32_t samples, uint32_t done);
 /* From the first pixel on. */
 void slices_restart(struct slices *slices);
-/* The next slice for that many samples; false: none is left. */
+/* The next slice for that many samples, of tiles that have not stopped and few that have between them; false: none
+ * is left. */
 bool slices_take(struct slices *slices, const struct picture *picture, uint32_t sample_shift, struct slice *slice);
 /* The slice is done again as two halves; false: it is a single pixel. */
 bool slices_split(struct slices *slices, const struct slice *slice);

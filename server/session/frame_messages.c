@@ -38,6 +38,7 @@ void frame_fill_begin(struct message_frame_begin *begin, const struct engine_fra
     begin->width = frame->request.width;
     begin->height = frame->request.height;
     begin->samples = frame->result.samples;
+    begin->noise = frame->result.noise;
     begin->revision = frame->result.revision;
     begin->size_bytes =
         frame->size_bytes - frame->coarse_bytes - frame->depth_bytes - frame->normal_bytes - frame->sticking_bytes;

@@ -132,6 +132,15 @@ static bool check_hidden(const struct message_render *render, struct error *erro
 
 static bool check_views(const struct message_render *render, struct error *error)
 {
+    if (render->noise > 0.0f && render->compare) {
+        error_set(error, ERROR_UNSUPPORTED, "render.noise", "tracers are compared by a number of samples");
+        return error_remedy(error, "set noise to 0, or compare to 0");
+    }
+    if (render->noise > 0.0f && render->denoise == PROTOCOL_DENOISE_ON) {
+        error_set(error, ERROR_UNSUPPORTED, "render.noise",
+                  "what is filtered has the same number of samples everywhere");
+        return error_remedy(error, "set noise to 0, or denoise to off");
+    }
     if (!check_eyes(render, error) || !check_upsample(render, error) || !check_hidden(render, error))
         return false;
     if (render->view_source != PROTOCOL_VIEW_SOURCE_LAYERS)
@@ -140,6 +149,12 @@ static bool check_views(const struct message_render *render, struct error *error
         error_set(error, ERROR_UNSUPPORTED, "render.compare",
                   "tracers are not compared in pictures that are made of layers");
         return error_remedy(error, "set view_source to rays, or compare to 0");
+    }
+    const bool is_made = has_views(render) || render->aperture > 0.0f || render->upsample > 1;
+    if (render->noise > 0.0f && is_made) {
+        error_set(error, ERROR_UNSUPPORTED, "render.noise",
+                  "pictures that are made of layers have a number of samples");
+        return error_remedy(error, "set view_source to rays, or noise to 0");
     }
     if (!(render->shutter > 0.0f))
         return true;
@@ -398,6 +413,7 @@ static void fill_rest(struct engine_job *job, const struct session *session, con
                 .eyes_over = render->eyes_over != 0,
                 .view_source = (enum view_source)render->view_source,
                 .samples = render->samples,
+                .noise = (float)render->noise,
                 .depth = render->depth,
                 .seed = render->seed,
                 .tracer = render->tracer,

@@ -33,16 +33,10 @@ uvec2 view_of_pixel(uvec2 pixel)
     return uvec2(quotient(pixel.x, frame.view_width), quotient(pixel.y, frame.view_height));
 }
 
-// A pixel within its view.
+// A pixel within its view, which names its random numbers: they are those of a picture that shows the view alone.
 uvec2 pixel_in_view(uvec2 pixel)
 {
     return pixel - view_of_pixel(pixel) * uvec2(frame.view_width, frame.view_height);
-}
-
-// A view's pixels have the same random numbers as those of a picture that shows it alone.
-uint number_in_view(uvec2 pixel)
-{
-    return pixel.y * frame.view_width + pixel.x;
 }
 
 // How far a view's eye is from the camera's, in view space.

@@ -9,7 +9,7 @@ vec2 place_of_sample(uvec2 in_view, uint sample_)
 {
     vec2 middle = vec2(in_view) + 0.5;
 #ifdef SPREAD
-    uint seed = sequence_seed(number_in_view(in_view), frame.seed);
+    uvec2 seed = sequence_seed(in_view, frame.seed);
     vec2 u = sequence_pair(seed, SEQUENCE_PIXEL, frame.sample_index + sample_);
     return middle + vec2(filter_offset(u.x), filter_offset(u.y));
 #else

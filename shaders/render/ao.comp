@@ -19,7 +19,8 @@ uniform float reach, falloff;       // metres; see common/occlusion.glsl
 
 uint ask_for_openness(uint j, path p, surface s, float weight, float distance_)
 {
-    uint seed = path_seed(p), dimension = SEQUENCE_WAVE + wave_number * SEQUENCE_WAVE_SIZE, alive = 0u;
+    uvec2 seed = path_seed(p);
+    uint dimension = SEQUENCE_WAVE + wave_number * SEQUENCE_WAVE_SIZE, alive = 0u;
     vec3 origin = off_surface(s, distance_, s.geometric);
     for (uint i = 0u; i < batch_rays; i++) {
         uint index = path_sample(p) * shadow_rays_a_hit + first_ray + i;

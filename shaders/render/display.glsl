@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The mean of a pixel's samples, and its display value.
+// Defines: HAS_TILE_SAMPLES tiles may have stopped, and have fewer samples (server/render/picture_noise.h).
+#include "shared/path.h"
 #include "common/camera.glsl"
 #include "common/tonemap.glsl"
 
@@ -7,6 +9,12 @@ uniform uint tone_map_kind;
 uniform float scale;          // exposure / samples
 uniform float coverage_scale; // 1 / samples
 uniform vec4 background;      // what lies behind the surfaces: linear; a: 1: a colour, 0: nothing
+
+#ifdef HAS_TILE_SAMPLES
+layout(binding = UNIT_TILE_SAMPLES) uniform usamplerBuffer tile_samples;
+uniform uint first_tile; // of the band
+uniform float exposure;  // scale is that times coverage_scale
+#endif
 
 layout(std430, binding = BIND_ACCUMULATION) readonly buffer accumulation_block { vec4 accumulation[]; };
 
@@ -16,10 +24,16 @@ vec4 sum_of_pixel(uvec2 pixel)
     return accumulation[slot_of_pixel(pixel)];
 }
 
-// Premultiplied by alpha.
-vec4 linear_of_sum(vec4 sum)
+// Of one of the band. Premultiplied by alpha.
+vec4 linear_of_sum(vec4 sum, uvec2 pixel)
 {
-    return vec4(sum.rgb * scale, clamp(sum.a * coverage_scale, 0.0, 1.0));
+    vec2 by = vec2(scale, coverage_scale);
+#ifdef HAS_TILE_SAMPLES
+    uint stopped_at = texelFetch(tile_samples, int(first_tile + (slot_of_pixel(pixel) >> 6))).x;
+    if (stopped_at != 0u)
+        by = vec2(exposure, 1.0) * (1.0 / float(stopped_at));
+#endif
+    return vec4(sum.rgb * by.x, clamp(sum.a * by.y, 0.0, 1.0));
 }
 
 // Before the background. Premultiplied by alpha.

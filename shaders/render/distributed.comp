@@ -216,7 +216,8 @@ void main()
     e.view = -direction;
     e.distance_ = h.distance;
     e.s = surface_of_path(e.p, h, r);
-    uint seed = path_seed(e.p), index = path_sample(e.p), dimension = SEQUENCE_WAVE + wave_number * SEQUENCE_WAVE_SIZE;
+    uvec2 seed = path_seed(e.p);
+    uint index = path_sample(e.p), dimension = SEQUENCE_WAVE + wave_number * SEQUENCE_WAVE_SIZE;
     e.s.roughness = regularised_roughness(e.p, e.s.roughness, index);
     e.NoV = clamp(dot(e.s.normal, e.view), 1e-4, 1.0); // a shading normal may lean away
     float choice = sequence_number(seed, dimension + SEQUENCE_LOBE, index);

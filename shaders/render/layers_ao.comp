@@ -24,7 +24,7 @@ void main()
     surface s = surface_of_path(p, h, r);
     s.normal = same_hemisphere(s.normal, s.geometric);
     vec3 origin = off_surface(s, h.distance, s.geometric);
-    uint seed = path_seed(p);
+    uvec2 seed = path_seed(p);
     for (uint i = 0u; i < batch_rays; i++) {
         uint index = path_sample(p) * all_rays + first_ray + i;
         vec2 u = sequence_pair(seed, SEQUENCE_WAVE + SEQUENCE_LOBE_DIRECTION, index);

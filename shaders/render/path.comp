@@ -64,7 +64,7 @@ uint numbers_of(uint choice)
     return SEQUENCE_PATH + wave_number * SEQUENCE_PATH_SIZE + choice;
 }
 
-void choose_light(inout eye_hit e, uint seed, uint index)
+void choose_light(inout eye_hit e, uvec2 seed, uint index)
 {
     e.light_u = sequence_pair_sorted(seed, numbers_of(SEQUENCE_PATH_LIGHT), index, frame.group_shift);
     e.light_number = light_choose(e.receiver, frame.light_count, e.light_u.x, e.light_chance, e.all_lights);
@@ -113,7 +113,7 @@ bool ask_for_light(eye_hit e, uint place)
     return add_shadow_ray(place, e.p, e.origin, sampled.direction, sampled.distance_, limited(e.p, 0u, arriving));
 }
 
-bool ask_for_environment(eye_hit e, uint place, uint seed, uint index)
+bool ask_for_environment(eye_hit e, uint place, uvec2 seed, uint index)
 {
     float probability, found;
     vec2 u = sequence_pair(seed, numbers_of(SEQUENCE_PATH_ENVIRONMENT), index);
@@ -190,7 +190,7 @@ uint ask_straight_on(eye_hit e, vec3 direction, vec3 through)
     return alive;
 }
 
-uint ask(eye_hit e, uint seed, uint index)
+uint ask(eye_hit e, uvec2 seed, uint index)
 {
     uint place = e.j, alive = 0u;
     if (asks_lights != 0u) {
@@ -210,7 +210,7 @@ void ask_nothing(uint j)
 }
 
 // The child that the surface emits.
-void go_on(eye_hit e, uint seed, uint index, bool asked, float choice)
+void go_on(eye_hit e, uvec2 seed, uint index, bool asked, float choice)
 {
     path p = e.p;
     vec2 u = sequence_pair(seed, numbers_of(SEQUENCE_PATH_DIRECTION), index);
@@ -274,7 +274,8 @@ void main()
     vec3 direction = r.direction_t_max.xyz, view = -direction;
     e.distance_ = h.distance;
     e.s = surface_of_path(e.p, h, r);
-    uint seed = path_seed(e.p), index = path_sample(e.p);
+    uvec2 seed = path_seed(e.p);
+    uint index = path_sample(e.p);
     e.s.roughness = regularised_roughness(e.p, e.s.roughness, index);
     e.origin = off_surface(e.s, h.distance, e.s.geometric);
     e.last = last_wave != 0u || (e.p.flags & PATH_BOUNCES_MASK) >= frame.depth;

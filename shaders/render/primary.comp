@@ -5,6 +5,7 @@
 //   SPREAD      each pixel has its samples where its own numbers say; else all have them where frame.sample_places says
 //   HAS_LENS    rays start on a lens and meet in the plane in focus
 //   HAS_TILES   of the texels of a key view, rays through those that no eye looks at are dead (render/tiles.glsl)
+//   HAS_TILE_SAMPLES tiles may have stopped: their rays are dead (server/render/picture_noise.h)
 //   HAS_TIMES   something moves: rays have a time
 
 #include "shared/path.h"
@@ -19,6 +20,10 @@ uniform uint first_slot, slot_count;
 #ifdef HAS_TILES
 layout(binding = UNIT_KEY_MARKS) uniform usamplerBuffer key_marks;
 uniform uint first_mark; // of the layer
+#endif
+
+#ifdef HAS_TILE_SAMPLES
+layout(binding = UNIT_TILE_SAMPLES) uniform usamplerBuffer tile_samples;
 #endif
 
 layout(std430, binding = BIND_RAYS) writeonly buffer ray_block { ray rays[]; };
@@ -41,7 +46,7 @@ void main()
     uvec2 pixel = pixel_of_picture_slot(first_slot + (k >> frame.sample_shift));
     bool in_picture = pixel.x < frame.width && pixel.y < frame.height;
     uvec2 in_view = pixel_in_view(pixel);
-    uint seed = sequence_seed(number_in_view(in_view), frame.seed);
+    uvec2 seed = sequence_seed(in_view, frame.seed);
     uint sample_ = k & (1u << frame.sample_shift) - 1u, index = frame.sample_index + sample_;
 #ifdef SPREAD
     vec2 place = place_of_sample(in_view, sample_);
@@ -64,9 +69,12 @@ void main()
     if (in_picture)
         in_picture = texelFetch(key_marks, int(first_mark + pixel.y * frame.width + pixel.x)).x != 0u;
 #endif
+#ifdef HAS_TILE_SAMPLES
+    in_picture = in_picture && texelFetch(tile_samples, int(first_slot + (k >> frame.sample_shift) >> 6)).x == 0u;
+#endif
     vec2 cone = camera_cone();
     float weight = in_picture ? 1.0 : 0.0;
-    // Dead beyond the picture's edge.
+    // Dead beyond the picture's edge, and where a tile has stopped.
     rays[k] = ray(vec4(origin, t_min), vec4(direction, in_picture ? 1e30 : -1.0));
     paths[k] = path(weight, weight, weight, k, cone.x, cone.y, PATH_STRAIGHT, time, 0u, 0.0, 0.0, 1.0);
     slice_sums[k] = vec4(0.0);

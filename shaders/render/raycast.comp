@@ -31,7 +31,8 @@ vec3 lit(path p, surface s, vec3 direction, float distance_)
     if (s.inside && s.transmission > 0.0)
         return sum; // glass samples no lights from inside
 #ifdef HAS_AREA_LIGHTS
-    uint seed = path_seed(p), sample_ = path_sample(p);
+    uvec2 seed = path_seed(p);
+    uint sample_ = path_sample(p);
 #endif
     for (uint i = 0u; i < frame.light_count; i++) {
         vec2 u = vec2(0.5);

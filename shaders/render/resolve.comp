@@ -26,8 +26,8 @@ void main()
     uint k = item_index();
     if (k >= pixel_count)
         return;
-    vec4 sum = sum_of_pixel(uvec2(k % frame.width, k / frame.width));
-    vec4 colour = linear_of_sum(sum);
+    uvec2 pixel = uvec2(k % frame.width, k / frame.width);
+    vec4 sum = sum_of_pixel(pixel), colour = linear_of_sum(sum, pixel);
 #if FORMAT == FORMAT_RGBA8
     resolved[k] = packUnorm4x8(display_of_linear(colour));
 #elif FORMAT == FORMAT_RGBA16F

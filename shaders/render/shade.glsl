@@ -57,10 +57,10 @@ path path_at(uint k)
 
 // The pixel and sample of a path, for common/sequence.glsl. Of a picture of tiles (render/tiles.glsl) it is another pixel,
 // but no two have the same.
-uint path_seed(path p)
+uvec2 path_seed(path p)
 {
     uvec2 pixel = pixel_of_slot(first_slot + (p.sample_slot >> frame.sample_shift));
-    return sequence_seed(number_in_view(pixel_in_view(pixel)), frame.seed);
+    return sequence_seed(pixel_in_view(pixel), frame.seed);
 }
 
 uint path_sample(path p)

@@ -31,7 +31,8 @@ uint ask_for_lights(uint j, path parent, surface s, split parts, vec3 view, floa
 {
     vec3 origin = off_surface(s, distance_, s.geometric);
 #ifdef HAS_AREA_LIGHTS
-    uint seed = path_seed(parent), sample_ = path_sample(parent);
+    uvec2 seed = path_seed(parent);
+    uint sample_ = path_sample(parent);
 #endif
     uint alive = 0u;
     for (uint i = 0u; i < batch_rays; i++) {

@@ -105,5 +105,9 @@ SHARED_SIZE(child, 80)
                    are not used */
 #define BIND_ACCUMULATION BIND_PASS_0 /* vec4 per pixel slot of the picture's band; sum of the samples */
 #define BIND_RESOLVED BIND_PASS_1     /* pixels of the output's format, rows from the top */
+/* Of pictures whose tiles stop one by one, see server/render/picture_noise.h. */
+#define BIND_HALVES BIND_PASS_1       /* vec4 like BIND_ACCUMULATION */
+#define BIND_TILE_ERRORS BIND_PASS_2  /* float a tile */
+#define UNIT_TILE_SAMPLES UNIT_PASS_1 /* uint a tile: samples where it has stopped; 0: it goes on */
 
 #endif

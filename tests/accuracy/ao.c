@@ -127,8 +127,9 @@ TEST(nearer_surfaces_occlude_more)
             double mean = mean_of_columns(&result, 0, EDGE);
             print_message("reach %4g, falloff %3g: %.5f, should be %.5f\n", (double)reaches[r],
                           (double)falloffs[f], mean, open);
-            /* The integral's steps, and rays that start a little before the surface: 1e-4. */
-            assert_near(mean, open, five_errors(open, EDGE * EDGE * SAMPLES * RAYS) + 1e-4);
+            /* Rays begin a little before the surface and end a little before their reach: where that is the
+             * diameter, the 8 * 2^-16 of them next to the normal miss, of 32768 these are 4, give or take 2. */
+            assert_near(mean, open, five_errors(open, EDGE * EDGE * SAMPLES * RAYS) + 2e-4);
             if (reaches[r] == FAR_AWAY && falloffs[f] == 0.0f)
                 assert_near(mean, 0.0, 0.0); /* closed is closed */
             frame_result_finish(&result);

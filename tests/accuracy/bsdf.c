@@ -32,8 +32,8 @@ static struct bsdf_answer answers[DIRECTIONS];
 static void ask_numbers(struct bsdf_probe *probe)
 {
     for (uint32_t i = 0; i < NUMBERS; i++) {
-        sequence_pair(questions[i].v, sequence_seed(1, 7), 1, i);
-        questions[i].v[2] = sequence_number(sequence_seed(1, 7), 2, i);
+        sequence_pair(questions[i].v, sequence_seed(1, 0, 7), 1, i);
+        questions[i].v[2] = sequence_number(sequence_seed(1, 0, 7), 2, i);
     }
     bsdf_probe_ask(probe, questions, NUMBERS);
 }

@@ -16,21 +16,21 @@ enum { WIDTH = 48, HEIGHT = 32 };
 
 /* ---- numbers ---- */
 
-static const char twin_text[] =
-    "#include \"shared/bindings.h\"\n"
-    "#include \"common/dispatch.glsl\"\n"
-    "#include \"common/sequence.glsl\"\n"
-    "uniform uint count;\n"
-    "layout(std430, binding = BIND_PASS_0) writeonly buffer b { vec4 values[]; };\n"
-    "void main()\n"
-    "{\n"
-    "    uint i = item_index();\n"
-    "    if (i >= count)\n"
-    "        return;\n"
-    "    uint seed = sequence_seed(i * 77u, i >> 3), index = i * 2654435761u >> (i & 31u);\n"
-    "    values[i] = vec4(sequence_pair(seed, i & 15u, index),\n"
-    "                     sequence_number(seed, i >> 4, index), 0.0);\n"
-    "}\n";
+static const char twin_text[] = "#include \"shared/bindings.h\"\n"
+                                "#include \"common/dispatch.glsl\"\n"
+                                "#include \"common/sequence.glsl\"\n"
+                                "uniform uint count;\n"
+                                "layout(std430, binding = BIND_PASS_0) writeonly buffer b { vec4 values[]; };\n"
+                                "void main()\n"
+                                "{\n"
+                                "    uint i = item_index();\n"
+                                "    if (i >= count)\n"
+                                "        return;\n"
+                                "    uvec2 seed = sequence_seed(uvec2(i * 77u, i & 63u), i >> 3);\n"
+                                "    uint index = i * 2654435761u >> (i & 31u);\n"
+                                "    values[i] = vec4(sequence_pair(seed, i & 15u, index),\n"
+                                "                     sequence_number(seed, i >> 4, index), 0.0);\n"
+                                "}\n";
 
 ALL_TESTS(fixture_setup, fixture_teardown)
 EACH_TEST(fixture_clear, NULL)
@@ -50,7 +50,8 @@ TEST(the_device_has_the_hosts_numbers_to_the_bit)
     gpu_buffer_read(fixture->device, &buffer, 0, values, sizeof(values));
     assert_true(gpu_check(fixture->device, "twin", &error));
     for (uint32_t i = 0; i < COUNT; i++) {
-        uint32_t seed = sequence_seed(i * 77u, i >> 3), index = i * 2654435761u >> (i & 31u);
+        struct sequence_seed seed = sequence_seed(i * 77u, i & 63u, i >> 3);
+        uint32_t index = i * 2654435761u >> (i & 31u);
         float expected[3];
         sequence_pair(expected, seed, i & 15u, index);
         expected[2] = sequence_number(seed, i >> 4, index);

@@ -284,6 +284,36 @@ class BadInput(Case):
             self.assertIn(b"3", lines[-1])
             self.assertLess(max(map(len, lines)), columns, lines)
 
+    def test_noise_ends_a_picture_by_its_error_and_tells_how_far_it_is(self):
+        wanted = ["--size", "64x48", "--integrator", "path", "--noise", "0.3"]
+        self.expect(farlight("render", bundled_scenes() / "cornell.glb", "-o", self.folder / "whole.exr", *wanted), 0)
+        parent, child = pty.openpty()
+        fcntl.ioctl(child, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 100, 0, 0))
+        drawing = subprocess.Popen([BIN / "farlight", "render", bundled_scenes() / "cornell.glb", "-o",
+                                    self.folder / "again.exr", *wanted], stderr=child, env={**os.environ, "TERM": "xterm"})
+        os.close(child)
+        shown = b""
+        with contextlib.suppress(OSError):  # the end of a terminal
+            while data := os.read(parent, 65536):
+                shown += data
+        os.close(parent)
+        self.assertEqual(drawing.wait(farlight_test.TIMEOUT_S), 0, shown)
+        self.assertRegex(shown, rb"error [0-9.]+ %, wanted 30 %")
+        self.assertEqual((self.folder / "whole.exr").read_bytes(), (self.folder / "again.exr").read_bytes())
+
+    def test_noise_counts_only_what_tiles_need(self):
+        """A picture of nothing has 16 samples, however many it might have."""
+        result = self.expect(farlight("render", bundled_scenes() / "teapot.glb", "-o", self.folder / "x.png", "--size", "64x48",
+                                      "--eye", "0,90,0", "--look-at", "0,180,1", "--noise", "0.02", "--quiet", "--timings=json"), 0)
+        self.assertEqual(json.loads(result.stdout.splitlines()[0])["samples"], 16)
+
+    def test_noise_of_pictures_made_of_layers_is_refused_with_a_remedy(self):
+        result = farlight("render", bundled_scenes() / "teapot.glb", "-o", self.folder / "x.png", "--size", "64x48",
+                          "--stereo", "0.065", "--noise", "0.02")
+        self.expect(result, 2)
+        self.assertIn("--noise", result.stderr)
+        self.assertIn("--views rays", result.stderr)
+
     def test_a_model_that_is_no_model_is_refused_by_name(self):
         path = self.folder / "rubbish.glb"
         path.write_bytes(b"glTF\x02\0\0\0" + bytes(range(256)) * 3)

@@ -15,6 +15,8 @@ float denoise_strength(const struct frame_request *request, uint32_t samples)
 {
     if (request->denoise != DENOISE_AUTO)
         return request->denoise == DENOISE_ON ? 1.0f : 0.0f;
+    if (request->noise > 0.0f) /* tiles have different numbers of samples */
+        return 0.0f;
     const float left = 2.0f - 2.0f * (float)samples / (float)AUTO_SAMPLES;
     return left < 0.0f ? 0.0f : left < 1.0f ? left : 1.0f;
 }
