@@ -263,6 +263,5 @@ bool frame_request_adds_to(const struct frame_request *a, const struct frame_req
     return a->accumulate && b->accumulate && a->width == b->width && a->height == b->height && same_views(a, b) &&
            frame_request_same_radiance(a, b) && a->aperture == b->aperture && a->focus == b->focus &&
            a->filter == b->filter && same_camera(&a->camera, &b->camera) &&
-           frame_request_planes(a) == frame_request_planes(b) && a->denoise == b->denoise &&
-           a->noise == b->noise;
+           frame_request_planes(a) == frame_request_planes(b) && a->denoise == b->denoise && a->noise == b->noise;
 }

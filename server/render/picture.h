@@ -15,13 +15,13 @@ struct picture {
     uint32_t band_rows; /* pixel rows of every band but the last; a multiple of 8 */
     uint32_t cleared;   /* bands that are so for this frame */
     uint32_t band_count;
-    uint32_t layers;            /* bits; each layer is a plane, in the order of their numbers */
-    uint32_t plane_count;       /* of them */
-    struct gpu_buffer *bands;   /* plane after plane; vec4 a slot, of the beauty radiance and coverage, summed */
+    uint32_t layers;          /* bits; each layer is a plane, in the order of their numbers */
+    uint32_t plane_count;     /* of them */
+    struct gpu_buffer *bands; /* plane after plane; vec4 a slot, of the beauty radiance and coverage, summed */
     const struct gpu_buffer *denoised; /* bands that are shown in place of those of the first plane; NULL: none */
-    struct picture_noise noise; /* where tiles stop one by one */
-    struct gpu_buffer resolved; /* one band of a plane in the output's format */
-    uint8_t *pixels;            /* what has been read back so far, plane after plane */
+    struct picture_noise noise;        /* where tiles stop one by one */
+    struct gpu_buffer resolved;        /* one band of a plane in the output's format */
+    uint8_t *pixels;                   /* what has been read back so far, plane after plane */
     size_t size_bytes;
 };
 

@@ -55,8 +55,8 @@
  * nearer, rays pass where surfaces bend. On a dragon of 48,000 triangles at 1024 cells 0.05 lets one ray in 300
  * through, 0.25 one in 1300, 0.5 one in 2400, 1 one in 2800. */
 #define LDC_BEYOND 0.5f
-/* A plane that stands for triangles without samples is moved towards the ray's origin, in cells: in a hollow it would
- * lie behind them, and shadow rays from there would begin inside the body. */
+/* A plane that stands for triangles without samples is moved towards the ray's origin, in cells: in a hollow it
+ * would lie behind them, and shadow rays from there would begin inside the body. */
 #define LDC_STANDS_BEFORE 0.03f
 /* A ray that begins on a surface may begin a little beyond a neighbour's plane, and would at once hit the surface
  * that it leaves. So near its origin (LDC_OWN_WAY cells) a ray ignores planes that pass the origin within this
