@@ -21,8 +21,10 @@ uvec3 ldc_counts = uvec3(0u);
 #define LDC_COUNT(what)
 #endif
 
+#ifndef LDC_CELLS
 layout(binding = UNIT_TRACER_0) uniform usamplerBuffer ldc_texels;
 layout(binding = UNIT_TRACER_1) uniform samplerBuffer ldc_quads;
+#endif
 layout(binding = UNIT_TRACER_2) uniform usamplerBuffer ldc_geometry;
 layout(binding = UNIT_TRACER_3) uniform usamplerBuffer ldc_surface;
 
