@@ -157,8 +157,9 @@ void cli_progress_noise(struct cli_progress *progress, const struct cli_noise *n
     char text[120];
     if (progress->silent || !is_due(progress, is_last))
         return;
-    int length = is_known ? snprintf(text, sizeof(text), "error %.2g %%, wanted %.2g %%",
-                                     (double)noise->error * 100, (double)noise->wanted * 100)
+    const double percent = (double)noise->error * 100;
+    int length = is_known ? snprintf(text, sizeof(text), "error %.*f %%, wanted %.2g %%", percent < 10 ? 1 : 0,
+                                     percent, (double)noise->wanted * 100)
                           : snprintf(text, sizeof(text), "%u samples a pixel", noise->held);
     if (is_known && !is_last) {
         length += snprintf(text + length, sizeof(text) - (size_t)length, ", about ");

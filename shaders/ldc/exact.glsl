@@ -105,7 +105,8 @@ bool settle(trace_ray r, cell_traversal w, float limit, inout ldc_found found)
             }
         }
     }
-    found.end = is_hit ? found.end : max(found.end - LDC_STANDS_BEFORE / w.scale, r.t_min);
+    bool stands_before = !is_hit && !own.from_behind; // what leaves a body would begin inside it once more
+    found.end = stands_before ? max(found.end - LDC_STANDS_BEFORE / w.scale, r.t_min) : found.end;
     return is_hit || !passes && w.is_within;
 }
 
