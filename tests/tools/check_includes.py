@@ -35,7 +35,7 @@ MAY_INCLUDE = {
     SCENE: (BASE,),
     GPU_SCENE: ("protocol/common", BASE, GPU, SCENE, SHARED),
     TRACE: (BASE, GPU, GPU_SCENE, SHARED),
-    "server/trace/raster": (BASE, GPU, GPU_SCENE, SHARED, "shaders/raster"),
+    "server/trace/raster": (BASE, GPU, GPU_SCENE, TRACE, SHARED, "shaders/raster"),
     "server/trace/tree": (BASE, GPU, GPU_SCENE, TRACE, SHARED, "shaders/tree"),
     "server/trace/*": (
         "protocol/common", BASE, GPU, SCENE, GPU_SCENE, TRACE, "server/trace/raster", "server/trace/tree", SHARED, "shaders/*",

@@ -13,8 +13,9 @@ struct abuffer_store {
     struct gpu_device *device;
     float lower_world[3];
     float cell_world;
-    uint32_t resolution;   /* N; 0: the scene holds nothing that could be drawn */
-    uint32_t voxels_along; /* V */
+    uint32_t resolution;        /* N; 0: the scene holds nothing that could be drawn */
+    uint32_t resolution_wanted; /* it is lower where there would be too many samples */
+    uint32_t voxels_along;      /* V */
     uint64_t sample_count;
     uint32_t depth_max; /* samples of the texel that has most */
     uint32_t drawn_count;

@@ -8,6 +8,7 @@
 #include "trace/abuffer/trace.h"
 #include "trace/raster/box.h"
 #include "trace/raster/draw.h"
+#include "trace/raster/fit.h"
 #include "trace/tracer.h"
 
 #include <epoxy/gl.h>
@@ -22,8 +23,10 @@ struct abuffer {
     struct abuffer_store store;
     struct abuffer_builder *builder;
     struct gpu_timer *timer;
-    uint32_t resolution, voxels_along;
-    bool had_cutout; /* when it was built last */
+    uint32_t resolution, voxels_along; /* as wanted; no voxels: as many as go with the resolution */
+    uint32_t fitted;                   /* what the resolution was lowered to; 0: not counted yet */
+    uint32_t fitted_instances;         /* that were counted */
+    bool had_cutout;                   /* when it was built last */
 };
 
 /* ---- options ---- */
@@ -61,7 +64,7 @@ static struct tracer *abuffer_create(struct gpu_device *device, const struct tra
     }
     abuffer_store_init(&abuffer->store, device);
     abuffer->resolution = options->abuffer.resolution;
-    abuffer->voxels_along = options->abuffer.voxels ? options->abuffer.voxels : voxels_for(abuffer->resolution);
+    abuffer->voxels_along = options->abuffer.voxels;
     abuffer->timer = gpu_timer_create(device);
     if (!abuffer->timer)
         error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a tracer's timer");
@@ -74,18 +77,47 @@ static struct tracer *abuffer_create(struct gpu_device *device, const struct tra
 
 /* ---- updates ---- */
 
+/* Counts the layers, where the geometry is new, before anything is built. */
+static bool fit(struct abuffer *abuffer, const struct gpu_scene *scene, const uint32_t *instances, uint32_t count,
+                const struct axes_box *box, struct error *error)
+{
+    if (abuffer->fitted != 0 && abuffer->fitted_instances == count)
+        return true;
+    uint32_t fitted = abuffer->resolution;
+    const double longest_world = (double)box->cell_world * abuffer->resolution;
+    const double layers = axes_mean_layers(scene, instances, count, 0, longest_world);
+    if (!axes_fit_resolution(&abuffer->base, layers, &fitted, error))
+        return false;
+    abuffer->fitted = fitted;
+    abuffer->fitted_instances = count;
+    return true;
+}
+
+static uint32_t voxels_of(const struct abuffer *abuffer)
+{
+    uint32_t voxels = abuffer->voxels_along;
+    if (voxels == 0)
+        return voxels_for(abuffer->fitted);
+    while (voxels > abuffer->fitted && voxels > VOXELS_MIN)
+        voxels /= 2;
+    return voxels;
+}
+
 /* Round all that is drawn. */
 static bool place(struct abuffer *abuffer, const struct gpu_scene *scene, const uint32_t *instances,
                   uint32_t count, struct error *error)
 {
     struct abuffer_store *store = &abuffer->store;
     struct axes_box box;
-    if (!axes_box_place(&box, scene, instances, count, abuffer->resolution, error))
+    if (!axes_box_place(&box, scene, instances, count, abuffer->resolution, error) ||
+        !fit(abuffer, scene, instances, count, &box, error) ||
+        !axes_box_place(&box, scene, instances, count, abuffer->fitted, error))
         return false;
     memcpy(store->lower_world, box.lower_world, sizeof(store->lower_world));
     store->cell_world = box.cell_world;
-    store->resolution = abuffer->resolution;
-    store->voxels_along = abuffer->voxels_along;
+    store->resolution = abuffer->fitted;
+    store->resolution_wanted = abuffer->resolution;
+    store->voxels_along = voxels_of(abuffer);
     return true;
 }
 
@@ -134,6 +166,8 @@ static enum tracer_progress abuffer_update(struct tracer *tracer, struct gpu_sce
     if (!abuffer_build_is_on(abuffer->builder) && update->changed == CHANGED_SURFACES && !scene->has_cutout &&
         !abuffer->had_cutout)
         return TRACER_DONE;
+    if (!abuffer_build_is_on(abuffer->builder) && update->changed & CHANGED_GEOMETRY)
+        abuffer->fitted = 0;
     enum tracer_progress progress = do_step(abuffer, scene, update->times, error);
     if (progress == TRACER_FAILED) {
         abuffer_store_finish(&abuffer->store);
@@ -160,7 +194,7 @@ static void abuffer_tell(const struct tracer *tracer, struct structure_rows *row
     const struct abuffer_store *store = &((const struct abuffer *)tracer)->store;
     if (store->resolution == 0)
         return;
-    structure_number(rows, "resolution", store->resolution);
+    axes_fit_tell(structure_number(rows, "resolution", store->resolution), store->resolution_wanted);
     structure_metres(rows, "cell", store->cell_world);
     structure_number(rows, "samples", store->sample_count);
     structure_number(rows, "longest_list", store->depth_max);

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 #include "trace/ldc/parts.h"
 
+#include "trace/raster/fit.h"
+
 #include <stdlib.h>
 #include <string.h>
 
@@ -159,8 +161,38 @@ static bool same_part(const struct ldc_part *a, const struct ldc_part *b)
            (a->count == 0 || memcmp(a->members, b->members, a->count * sizeof(*a->members)) == 0);
 }
 
-bool ldc_parts_update(struct ldc_parts *parts, const struct gpu_scene *scene, uint32_t resolution,
-                      bool geometry_changed, bool stale[LDC_CUBES_MAX], struct error *error)
+/* The same bodies, wherever they are: what moves is not counted again. */
+static bool same_bodies(const struct ldc_part *a, const struct ldc_part *b)
+{
+    bool same = a->count == b->count;
+    for (uint32_t i = 0; same && i < a->count; i++)
+        same = a->members[i].revision == b->members[i].revision && a->members[i].node == b->members[i].node;
+    return same;
+}
+
+/* Places a part's cube, with its layers counted first. */
+static bool place_part(struct ldc_part *fresh, const struct ldc_part *before, const struct gpu_scene *scene,
+                       const struct ldc_parts_settings *settings, struct error *error)
+{
+    const uint32_t *instances = fresh->instances, count = fresh->count;
+    if (!axes_box_place(&fresh->box, scene, instances, count, settings->resolution, error))
+        return false;
+    if (count == 0)
+        return true;
+    fresh->resolution = before->resolution;
+    if (before->resolution == 0 || !same_bodies(before, fresh)) {
+        const double longest_world = (double)fresh->box.cell_world * settings->resolution;
+        const double layers = axes_mean_layers(scene, instances, count, settings->overlap, longest_world);
+        fresh->resolution = settings->resolution;
+        if (!axes_fit_resolution(settings->tracer, layers, &fresh->resolution, error))
+            return false;
+    }
+    return axes_box_place(&fresh->box, scene, instances, count, fresh->resolution, error);
+}
+
+bool ldc_parts_update(struct ldc_parts *parts, const struct gpu_scene *scene,
+                      const struct ldc_parts_settings *settings, bool geometry_changed, bool stale[LDC_CUBES_MAX],
+                      struct error *error)
 {
     struct ldc_part fresh[LDC_CUBES_MAX] = {0};
     bool crowded = parts->record_count > RECORDS_KEPT && parts->record_count / 2 > scene->instance_count;
@@ -170,7 +202,7 @@ bool ldc_parts_update(struct ldc_parts *parts, const struct gpu_scene *scene, ui
         ok = error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the parts of a scene of %u instances",
                        scene->instance_count);
     for (int i = 0; i < LDC_CUBES_MAX; i++) {
-        ok = ok && axes_box_place(&fresh[i].box, scene, fresh[i].instances, fresh[i].count, resolution, error);
+        ok = ok && place_part(&fresh[i], &parts->parts[i], scene, settings, error);
         stale[i] = !same_part(&parts->parts[i], &fresh[i]);
         part_finish(&parts->parts[i]);
         parts->parts[i] = fresh[i];

@@ -13,6 +13,7 @@
 #include "trace/raster/box.h"
 #include "gpu_scene/scene.h"
 #include "trace/ldc/store.h"
+#include "trace/tracer.h"
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -30,6 +31,7 @@ struct ldc_part {
     struct ldc_member *members;
     uint32_t count;
     struct axes_box box; /* the cube's */
+    uint32_t resolution; /* the cube's, no more than is wanted; 0: there are no instances */
 };
 
 /* All-zero is empty. */
@@ -41,10 +43,18 @@ struct ldc_parts {
     uint64_t updates;
 };
 
+struct ldc_parts_settings {
+    const struct tracer *tracer;
+    uint32_t resolution; /* of a cube, as wanted: it is lower where there would be too many samples */
+    float overlap;       /* as axes_pass */
+};
+
 void ldc_parts_finish(struct ldc_parts *parts); /* leaves it empty */
 /* Brings the parts to the scene; `stale` says whose instances or box are others than before. On failure (no
- * memory, or an instance is larger than numbers can tell) nothing is known of them: finish. */
-bool ldc_parts_update(struct ldc_parts *parts, const struct gpu_scene *scene, uint32_t resolution,
-                      bool geometry_changed, bool stale[LDC_CUBES_MAX], struct error *error);
+ * memory, an instance is larger than numbers can tell, or there are too many layers) nothing is known of them:
+ * finish. */
+bool ldc_parts_update(struct ldc_parts *parts, const struct gpu_scene *scene,
+                      const struct ldc_parts_settings *settings, bool geometry_changed, bool stale[LDC_CUBES_MAX],
+                      struct error *error);
 
 #endif

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 #include "trace/ldc/store.h"
 
+#include "trace/raster/fit.h"
+
 #include "ldc/layout.h"
 
 #include <epoxy/gl.h>
@@ -58,7 +60,7 @@ void ldc_cube_tell(const struct ldc_store *store, unsigned which, bool built, st
         return;
     rows->part = which;
     rows->part_name = names[which];
-    structure_number(rows, "resolution", cube->resolution);
+    axes_fit_tell(structure_number(rows, "resolution", cube->resolution), cube->resolution_wanted);
     structure_metres(rows, "cell", cube->cell_world);
     structure_number(rows, "layers_needed", cube->layers_needed);
     struct structure_row *kept = structure_number(rows, "layers_kept", cube->layers_kept);

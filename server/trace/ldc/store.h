@@ -17,8 +17,9 @@ enum { LDC_CUBE_STATIC, LDC_CUBE_DYNAMIC, LDC_CUBES_MAX };
 /* Where a cube stands and where its parts begin in the buffers. */
 struct ldc_cube {
     float lower_world[3];
-    float cell_world;    /* metres */
-    uint32_t resolution; /* texels along a side of each of the three images; 0: there is no cube */
+    float cell_world;           /* metres */
+    uint32_t resolution;        /* texels along a side of each of the three images; 0: there is no cube */
+    uint32_t resolution_wanted; /* it is lower where there would be too many samples; 0: nothing was lowered */
     uint32_t first_texel, first_sample, sample_count, first_quad, quad_count;
     /* levels.c: nodes, entries of cells, and where the cells that have some are */
     uint32_t first_node, node_count, first_entry, entry_count;

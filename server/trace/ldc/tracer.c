@@ -115,7 +115,8 @@ static enum tracer_progress find_cube(struct ldc *ldc)
         memcpy(cube->lower_world, part->box.lower_world, sizeof(cube->lower_world));
         if (part->count == 0)
             continue;
-        cube->resolution = ldc->resolution;
+        cube->resolution = part->resolution;
+        cube->resolution_wanted = ldc->resolution;
         ldc->phase = LDC_CUBE;
         return TRACER_MORE;
     }
@@ -200,8 +201,13 @@ static void fill_stats(struct ldc *ldc)
 static enum tracer_progress begin_update(struct ldc *ldc, const struct gpu_scene *scene, unsigned changed,
                                          struct error *error)
 {
+    const struct ldc_parts_settings settings = {
+        .tracer = &ldc->base,
+        .resolution = ldc->resolution,
+        .overlap = ldc->base.options.ldc.images == LDC_IMAGES_ONE ? 1.0f : AXES_OVERLAP,
+    };
     bool any = changed & CHANGED_SURFACES;
-    if (!ldc_parts_update(&ldc->parts, scene, ldc->resolution, changed & CHANGED_GEOMETRY, ldc->stale, error))
+    if (!ldc_parts_update(&ldc->parts, scene, &settings, changed & CHANGED_GEOMETRY, ldc->stale, error))
         return TRACER_FAILED;
     for (unsigned i = 0; i < LDC_CUBES_MAX; i++) {
         any = any || ldc->stale[i]; /* what lies behind a cube goes with it */

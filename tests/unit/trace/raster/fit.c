@@ -1,0 +1,172 @@
+/* SPDX-License-Identifier: MIT */
+/* Layers are counted before a structure of samples is built: their number is right, deep scenes get a coarser
+ * structure or none, and all others the one that was asked for. */
+#include "tests/unit/trace/tracer_fixture.h"
+
+#include "tests/fixtures/structure.h"
+#include "tests/harness/test.h"
+#include "trace/raster/draw.h"
+#include "trace/raster/fit.h"
+
+#define RESOLUTION 256u
+/* Both scenes have more at this resolution. */
+#define SAMPLES_MAX 1000000u
+/* Of the prediction: texels at silhouettes are in or out. ldc keeps one of the samples that coincide. */
+#define TOLERANCE 0.1
+/* Rods that lie along the texels cover whole rows or none: of 20 places, each covered with a chance of 0.6, the
+ * number has a standard deviation of 0.18 of its mean. */
+#define LATTICE_TOLERANCE 0.4
+
+static const unsigned sampled[] = {TRACER_LDC, TRACER_ABUFFER};
+
+/* ---- scenes ---- */
+
+static void add_shells(struct test_edits *edits, uint32_t count)
+{
+    float(*spheres)[4] = calloc(count, sizeof(*spheres));
+    for (uint32_t i = 0; i < count; i++)
+        spheres[i][3] = (float)(i + 1) / (float)count;
+    test_spheres(edits, 1, (const float(*)[4])spheres, count);
+    test_node(edits, 1, 0, NODE_SPHERES, 1, NULL);
+    free(spheres);
+}
+
+static struct scene *nested_shells(uint32_t count)
+{
+    struct test_edits edits = {.scene = test_scene_create()};
+    add_shells(&edits, count);
+    test_commit(&edits);
+    return edits.scene;
+}
+
+enum { ROD_TRIANGLES = 8 };
+
+/* An open tube of square section, a metre long, along an axis. */
+static void add_rod(struct test_edits *edits, uint32_t id, uint32_t axis, float half_width)
+{
+    float positions[8][3];
+    uint32_t triangles[ROD_TRIANGLES][3];
+    for (uint32_t i = 0; i < 8; i++) {
+        const uint32_t corner = i % 4;
+        positions[i][axis] = i < 4 ? 0.0f : 1.0f;
+        positions[i][(axis + 1) % 3] = corner == 1 || corner == 2 ? half_width : -half_width;
+        positions[i][(axis + 2) % 3] = corner >= 2 ? half_width : -half_width;
+    }
+    for (uint32_t i = 0; i < 4; i++) {
+        const uint32_t next = (i + 1) % 4;
+        memcpy(triangles[2 * i], (uint32_t[3]){i, next, i + 4}, sizeof(triangles[0]));
+        memcpy(triangles[2 * i + 1], (uint32_t[3]){next, next + 4, i + 4}, sizeof(triangles[0]));
+    }
+    test_mesh(edits, id, (const float(*)[3])positions, 8, (const uint32_t *)triangles, ROD_TRIANGLES);
+}
+
+/* Of along x along rods on each axis; a rod is about a texel wide. */
+static struct scene *lattice(uint32_t along)
+{
+    struct test_edits edits = {.scene = test_scene_create()};
+    uint32_t node = 0;
+    for (uint32_t axis = 0; axis < 3; axis++)
+        add_rod(&edits, axis + 1, axis, 0.0017f);
+    for (uint32_t i = 0; i < 3 * along * along; i++) {
+        const uint32_t axis = i % 3;
+        float m[12], place[3] = {0};
+        place[(axis + 1) % 3] = (float)(i / 3 % along) / (float)(along - 1);
+        place[(axis + 2) % 3] = (float)(i / 3 / along) / (float)(along - 1);
+        test_transform(m, 1, 1, 1, 0, 0, place[0], place[1], place[2]);
+        test_node(&edits, ++node, 0, NODE_MESH, axis + 1, m);
+    }
+    test_commit(&edits);
+    return edits.scene;
+}
+
+/* ---- what is told ---- */
+
+static const char *row_of(unsigned tracer, const char *ldc_name)
+{
+    return tracer == TRACER_LDC ? ldc_name : strchr(ldc_name, '/') + 1;
+}
+
+static struct tracer_options options_at(uint32_t resolution, uint32_t samples_max)
+{
+    return (struct tracer_options){.ldc = {.resolution = resolution},
+                                   .abuffer = {.resolution = resolution},
+                                   .bench = {.axes_samples = samples_max}};
+}
+
+static double predicted_samples(const struct fixture *fixture, unsigned tracer)
+{
+    uint32_t *instances = NULL, count = 0;
+    struct error error = {0};
+    const double along = (double)told(fixture->tracer, row_of(tracer, "static/resolution"));
+    const double cell_world = (double)told_metres(fixture->tracer, row_of(tracer, "static/cell"));
+    expect_ok(axes_list_instances(&fixture->gpu, &instances, &count, &error), &error);
+    const double layers = axes_mean_layers(&fixture->gpu, instances, count,
+                                           tracer == TRACER_LDC ? AXES_OVERLAP : 0, along * cell_world);
+    free(instances);
+    return layers * 3 * along * along;
+}
+
+static void expect_predicted(const struct fixture *fixture, unsigned tracer, double tolerance)
+{
+    const double samples = (double)told(fixture->tracer, row_of(tracer, "static/samples"));
+    const double predicted = predicted_samples(fixture, tracer);
+    if (!(fabs(samples - predicted) < tolerance * samples))
+        fail_msg("%s: %.0f samples, where %.0f were predicted", fixture->tracer->impl->name, samples, predicted);
+}
+
+/* ---- tests ---- */
+
+ALL_TESTS(open_device, close_device)
+
+TEST(usual_scenes_have_the_resolution_that_was_asked_for)
+{
+    const struct tracer_options options = options_at(RESOLUTION, 0);
+    for (size_t i = 0; i < 2; i++)
+        for (int which = 0; which < 2; which++) {
+            struct fixture fixture;
+            fixture_init_by(&fixture, sampled[i], which ? test_scene_soup() : test_scene_spheres(), &options);
+            const struct structure_row row = told_row(fixture.tracer, row_of(sampled[i], "static/resolution"));
+            assert_int_equal(row.number, RESOLUTION);
+            assert_string_equal(row.warning, "");
+            expect_predicted(&fixture, sampled[i], TOLERANCE);
+            fixture_finish(&fixture);
+        }
+}
+
+TEST(deep_scenes_have_a_lower_one_and_a_warning)
+{
+    const struct tracer_options options = options_at(RESOLUTION, SAMPLES_MAX);
+    for (size_t i = 0; i < 2; i++)
+        for (int which = 0; which < 2; which++) {
+            const double tolerance = which ? TOLERANCE : LATTICE_TOLERANCE;
+            struct fixture fixture;
+            fixture_init_by(&fixture, sampled[i], which ? nested_shells(30) : lattice(20), &options);
+            const struct structure_row row = told_row(fixture.tracer, row_of(sampled[i], "static/resolution"));
+            assert_in_range(row.number, AXES_FITTED_MIN, RESOLUTION - 1);
+            assert_non_null(strstr(row.warning, "instead of 256 texels"));
+            expect_predicted(&fixture, sampled[i], tolerance);
+            /* As fine as is allowed: a texel more along a side would be less than a hundredth. */
+            const double samples = (double)told(fixture.tracer, row_of(sampled[i], "static/samples"));
+            assert_true(samples < (1 + tolerance) * SAMPLES_MAX);
+            assert_true(samples > (1 - tolerance - 0.02) * SAMPLES_MAX);
+            fixture_finish(&fixture);
+        }
+}
+
+/* Before there is anything of it. */
+TEST(what_is_too_deep_at_any_resolution_is_refused_with_a_remedy)
+{
+    const struct tracer_options options = options_at(1024, 0);
+    for (size_t i = 0; i < 2; i++) {
+        struct fixture fixture;
+        struct error error = {0};
+        fixture_init_by(&fixture, sampled[i], test_scene_create(), &options); /* holds nothing yet */
+        add_shells(&fixture.edits, 2000);
+        assert_false(try_update(&fixture, &error));
+        assert_int_equal(error.kind, ERROR_LIMIT);
+        assert_string_equal(error.field, fixture.tracer->impl->name);
+        assert_non_null(strstr(error.remedy, "another tracer"));
+        assert_in_range(fixture.tracer->stats.device_bytes, 0, 1 << 16);
+        fixture_finish(&fixture);
+    }
+}
