@@ -27,19 +27,18 @@ struct surface {
     bool inside;    // seen from behind
 };
 
-// The footprint of a ray in texture coordinates of both sets. On a slanted surface it is an ellipse; the mean of its
-// axes blurs less than the longer one and flickers less than the shorter.
-vec2 footprint_of(surface_detail detail, vec3 geometric, vec3 direction, float width)
+// What a ray's cone covers of a surface: on a slanted one it is longer in the plane of incidence. Akenine-Moeller et al.
+// 2021 (common/cone.glsl), section 5.
+mat2x3 footprint_edges(vec3 geometric, vec3 direction, float width)
 {
     float slant = max(abs(dot(geometric, direction)), 0.01);
-    return abs(width) * inversesqrt(slant) * detail.texcoords_per_metre;
-}
-
-// Of the two nearest levels the nearer one: half the work of blending them.
-int use_level(texture_slot slot, vec2 footprint_uv)
-{
-    int last = int(texture_at(slot.texture & 0x7fffffffu).flags >> TEXTURE_LEVELS_SHIFT) - 1;
-    return clamp(int(slot_level(slot, footprint_uv) + 0.5), 0, last);
+    vec3 across = cross(geometric, direction), unused;
+    float squared = dot(across, across);
+    if (squared > 1e-8)
+        across *= inversesqrt(squared);
+    else
+        tangent_frame(geometric, across, unused);
+    return mat2x3(cross(across, geometric) * (width / slant), across * width);
 }
 
 #ifdef HAS_BUMP
@@ -86,14 +85,14 @@ bool surface_derivatives(hit h, texture_slot slot, out vec3 along_u, out vec3 al
 // Blinn. Simulation of Wrinkled Surfaces. 1978, in the form of Mikkelsen. Bump Mapping Unparametrized Surfaces on
 // the GPU. 2010: the slope of the height along the surface tilts the normal. The height's derivatives are
 // differences over one texel of the level that the footprint sees.
-vec3 bump_normal(hit h, uint slot_index, vec3 normal, vec4 uv01, vec2 footprint_uv)
+vec3 bump_normal(hit h, uint slot_index, vec3 normal, vec4 uv01, texture_footprint footprint)
 {
     texture_slot slot = texture_slot_at(slot_index);
     vec3 along_u, along_v;
     if (!surface_derivatives(h, slot, along_u, along_v))
         return normal;
     texture_info info = texture_at(slot.texture & 0x7fffffffu);
-    int level = use_level(slot, footprint_uv);
+    int level = slot_level(slot, footprint);
     vec2 uv = slot_texcoords(slot, uv01), texel = 1.0 / vec2(find_level(info, level).size);
     float height_u = 0.0, height_v = 0.0;
     for (int i = 0; i < 4; i++) { // -u, +u, -v, +v
@@ -131,7 +130,8 @@ vec3 mapped_normal(hit h, vec3 normal, vec3 texel, float strength)
 }
 
 // Replaces the inputs that have textures, normal and bump maps included.
-void apply_textures(inout surface s, inout vec4 colour, hit h, material m, vec4 uv01, vec2 footprint_uv)
+void apply_textures(inout surface s, inout vec4 colour, hit h, material m, vec4 uv01,
+                    texture_footprint footprint)
 {
     const int BASE_COLOUR = 0, NORMAL = 1, METALLIC_ROUGHNESS = 2, OCCLUSION = 3, EMISSION = 4, TRANSMISSION = 5;
     uint uses[6] = uint[6](m.texture_base_colour, m.texture_normal, m.texture_metallic_roughness,
@@ -143,8 +143,7 @@ void apply_textures(inout surface s, inout vec4 colour, hit h, material m, vec4 
         int i = findLSB(used);
         used &= used - 1u;
         texture_slot slot = texture_slot_at(uses[i]);
-        texture_info info = texture_at(slot.texture & 0x7fffffffu);
-        vec4 texel = sample_level(info, use_level(slot, footprint_uv), slot_texcoords(slot, uv01));
+        vec4 texel = sample_slot_filtered(slot, uv01, footprint);
         if (i == BASE_COLOUR) {
             colour *= texel;
         } else if (i == NORMAL) {
@@ -163,7 +162,7 @@ void apply_textures(inout surface s, inout vec4 colour, hit h, material m, vec4 
     }
 #ifdef HAS_BUMP
     if (m.texture_bump != 0u)
-        s.normal = bump_normal(h, m.texture_bump, s.normal, uv01, footprint_uv);
+        s.normal = bump_normal(h, m.texture_bump, s.normal, uv01, footprint);
 #endif
 }
 #endif
@@ -208,10 +207,10 @@ surface surface_at(hit h, vec3 origin, vec3 direction, float width)
         apply_sample(s, colour, h.uv01_or_sample);
 #endif
 #ifdef HAS_TEXTURES
-    surface_detail detail = detail_at(h);
+    surface_detail detail = detail_at(h, footprint_edges(s.geometric, direction, width));
     s.curvature = s.inside ? -detail.curvature : detail.curvature;
     if (!is_stored)
-        apply_textures(s, colour, h, m, uv01, footprint_of(detail, s.geometric, direction, width));
+        apply_textures(s, colour, h, m, uv01, detail.footprint);
 #endif
     s.base = clamp(colour.rgb, vec3(0.0), vec3(1.0));
     s.alpha = (m.flags & MATERIAL_ALPHA_BLEND) != 0u ? clamp(colour.a, 0.0, 1.0) : 1.0;

@@ -75,15 +75,57 @@ vec2 slot_texcoords(texture_slot slot, vec4 uv01)
     return vec2(dot(slot.uv_matrix.xy, uv) + slot.offset_u, dot(slot.uv_matrix.zw, uv) + slot.offset_v);
 }
 
-// Level at which a texel is as wide as the footprint, which is in texture coordinates of both sets before the slot's
-// matrix.
-float slot_level(texture_slot slot, vec2 footprint_uv)
+// Where a ray's cone meets a surface, a parallelogram: two edges in texture coordinates, of both sets as uv01 above,
+// before a slot's matrix.
+struct texture_footprint {
+    vec4 along, across;
+};
+
+// The edges in texture coordinates that the slot sees: columns.
+mat2 slot_footprint(texture_slot slot, texture_footprint footprint)
+{
+    bool second = (slot.texture & 0x80000000u) != 0u;
+    mat2 rows = mat2(slot.uv_matrix.xy, slot.uv_matrix.zw);
+    return mat2((second ? footprint.along.zw : footprint.along.xy) * rows,
+                (second ? footprint.across.zw : footprint.across.xy) * rows);
+}
+
+// The level of which a texel is as large as the footprint.
+int slot_level(texture_slot slot, texture_footprint footprint)
 {
     texture_info info = texture_at(slot.texture & 0x7fffffffu);
-    float footprint = (slot.texture & 0x80000000u) != 0u ? footprint_uv.y : footprint_uv.x;
-    float scale = sqrt(abs(determinant(mat2(slot.uv_matrix.xy, slot.uv_matrix.zw))));
-    float texels_wide = footprint * scale * sqrt(float(info.width) * float(info.height));
-    return texels_wide > 1.0 ? log2(texels_wide) : 0.0;
+    float texels = abs(determinant(slot_footprint(slot, footprint))) * float(info.width) * float(info.height);
+    int last = int(info.flags >> TEXTURE_LEVELS_SHIFT) - 1;
+    return clamp(int(0.5 * log2(max(texels, 1.0)) + 0.5), 0, last);
+}
+
+// A footprint that is longer than wide is covered by this many samples at most, which lie along it, each of a level by
+// its width; a longer one is blurred across, as no sample may lie between two others.
+const float FOOTPRINT_SAMPLES_MAX = 8.0;
+
+// The mean over a footprint: samples along its longer edge, each blended between the two levels by its width.
+vec4 sample_slot_filtered(texture_slot slot, vec4 uv01, texture_footprint footprint)
+{
+    texture_info info = texture_at(slot.texture & 0x7fffffffu);
+    mat2 edges = slot_footprint(slot, footprint);
+    vec2 size = vec2(info.width, info.height), first = edges[0] * size, second = edges[1] * size;
+    bool first_longer = dot(first, first) >= dot(second, second);
+    vec2 longer = first_longer ? edges[0] : edges[1];
+    float texels_long = length(first_longer ? first : second);
+    float texels_wide = abs(first.x * second.y - first.y * second.x) / max(texels_long, 1e-20);
+    texels_wide = max(max(texels_wide, 1.0), texels_long / FOOTPRINT_SAMPLES_MAX);
+    float level = min(log2(texels_wide), float(info.flags >> TEXTURE_LEVELS_SHIFT) - 1.0), lower = floor(level);
+    int samples = int(clamp(ceil(texels_long / texels_wide - 0.1), 1.0, FOOTPRINT_SAMPLES_MAX));
+    int levels = level > lower ? 2 : 1;
+    vec2 uv = slot_texcoords(slot, uv01);
+    vec4 sum = vec4(0.0);
+    for (int i = 0; i < samples * levels; i++) {
+        bool upper = i >= samples;
+        float place = (float(upper ? i - samples : i) + 0.5) / float(samples) - 0.5;
+        float weight = upper ? level - lower : 1.0 - (level - lower);
+        sum += weight * sample_level(info, int(lower) + (upper ? 1 : 0), uv + place * longer);
+    }
+    return sum / float(samples);
 }
 
 // A material's input in full detail: `slot_index` is one of its texture_* fields and not 0.

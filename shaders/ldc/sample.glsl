@@ -157,7 +157,8 @@ void describe(point p, out uvec2 geometry_words, out uvec4 surface_words)
     material m = material_at(h.material & HIT_MATERIAL_MASK);
     vec4 uv01 = uintBitsToFloat(h.uv01_or_sample);
 #ifdef HAS_TEXTURES
-    apply_textures(s, colour, h, m, uv01, footprint_of(detail_at(h), s.geometric, direction, cell_world));
+    surface_detail detail = detail_at(h, footprint_edges(s.geometric, direction, cell_world));
+    apply_textures(s, colour, h, m, uv01, detail.footprint);
 #endif
     geometry_words = uvec2(floatBitsToUint(p.depth_cells), h.normal_geometric);
     surface_words = words_of(s, colour, h.material);

@@ -246,19 +246,24 @@ static const char detail_text[] =
     "    h.instance = asked.x;\n"
     "    h.primitive = asked.y;\n"
     "    h.uv01_or_sample.y = asked.z;\n"
-    "    surface_detail detail = detail_at(h);\n"
-    "    answer = vec4(detail.texcoords_per_metre, detail.curvature, 0.0);\n"
+    "    vec3 along = uintBitsToFloat(asked.w) * vec3(1.0, 0.0, 0.0);\n"
+    "    surface_detail detail = detail_at(h, mat2x3(along, vec3(0.0, 1.0, 0.0)));\n"
+    "    answer = vec4(detail.footprint.along.x, detail.footprint.across.y, detail.footprint.along.z, "
+    "detail.curvature);\n"
     "}\n";
 
+/* Texture coordinates per metre: of set 0 to the right and up, of set 1 to the right. */
 struct detail {
-    float texcoords_per_metre[2], curvature, unused;
+    float u, v, second_u, curvature;
 };
 
 static struct detail detail_of(struct fixture *fixture, uint32_t instance, uint32_t primitive, float v)
 {
     static const struct gpu_define defines[] = {{"HAS_SPHERES", "1"}, {NULL, NULL}};
+    const float metre = 1.0f;
     uint32_t asked[4] = {instance, primitive, 0, 0};
     memcpy(&asked[2], &v, sizeof(v));
+    memcpy(&asked[3], &metre, sizeof(metre));
     struct frame_result result = fixture_render(fixture); /* brings the scene to the device */
     frame_result_finish(&result);
     gpu_scene_bind(&fixture->shared->copy);
@@ -307,7 +312,8 @@ TEST(a_triangle_without_normals_is_flat_and_knows_the_size_of_its_texture)
     fixture_square(fixture, 2.0f, fixture_material(fixture)->base.id, three_times);
     struct detail detail = detail_of(fixture, 0, 0, 0.0f);
     assert_near(detail.curvature, 0.0, 0.0);
-    assert_near(detail.texcoords_per_metre[0], 1.0 / 12.0, 1e-6);
+    assert_near(detail.u, 1.0 / 12.0, 1e-6);
+    assert_near(detail.v, -1.0 / 12.0, 1e-6); /* an image's rows go down */
 }
 
 TEST(each_set_of_texture_coordinates_has_its_own_size)
@@ -317,8 +323,8 @@ TEST(each_set_of_texture_coordinates_has_its_own_size)
     const float twice[8] = {0, 2, 2, 2, 2, 0, 0, 0};
     mesh->arrays[MESH_TEXCOORDS_1] = fixture_blob(twice, sizeof(twice));
     struct detail detail = detail_of(fixture, 0, 0, 0.0f);
-    assert_near(detail.texcoords_per_metre[0], 0.25, 1e-6);
-    assert_near(detail.texcoords_per_metre[1], 0.5, 1e-6);
+    assert_near(detail.u, 0.25, 1e-6);
+    assert_near(detail.second_u, 0.5, 1e-6);
 }
 
 TEST(a_sphere_tells_its_radius_and_how_densely_its_texture_lies)
@@ -327,8 +333,9 @@ TEST(a_sphere_tells_its_radius_and_how_densely_its_texture_lies)
     fixture_sphere(fixture, 0.0f, 0.0f, 0.0f, 0.5f, fixture_material(fixture)->base.id);
     struct detail detail = detail_of(fixture, 0, 0, 0.5f);
     assert_near(detail.curvature, 2.0, 1e-5);
-    /* at the equator 1 over pi m along u, over pi / 2 m along v */
-    assert_near(detail.texcoords_per_metre[0], 1.0 / sqrt(PI * PI / 2.0), 1e-5);
+    /* at the equator, with u = 0 behind, where -x is east: 1 over pi m along u, over pi / 2 m along v */
+    assert_near(detail.u, -1.0 / PI, 1e-5);
+    assert_near(detail.v, -2.0 / PI, 1e-5);
 }
 
 /* ---- pictures ---- */
@@ -464,6 +471,37 @@ TEST(a_mirror_ball_does_not_flicker_as_the_camera_moves)
     assert_true(sums[0] < 4.0 * sums[1]); /* twice; 2.8 times as if the ball were flat */
 }
 
+/* A floor of checks that a mirror or a pane of glass, which stands on it, shows at a grazing angle. */
+static void grazing_floor(struct fixture *fixture, bool glass)
+{
+    static const float floor[12] = {1, 0, 0, 0, 0, 0, 1, -1.0f, 0, -1, 0, 0};
+    struct texture_use use = checks(fixture, 64, 16.0f);
+    struct scene_material *plain = fixture_material(fixture);
+    plain->unlit = true;
+    plain->textures[MATERIAL_BASE_COLOUR] = use;
+    fixture_square(fixture, 20.0f, plain->base.id, floor);
+    struct scene_material *pane = fixture_material(fixture);
+    pane->metallic = glass ? 0.0f : 1.0f;
+    pane->transmission = glass ? 1.0f : 0.0f;
+    pane->roughness = 0.0f;
+    pane->ior = 1.5f;
+    fixture_square(fixture, 4.0f, pane->base.id, NULL);
+    fixture_environment(fixture, 0.5f, 0.5f, 0.5f);
+    fixture->request.width = fixture->request.height = 64;
+}
+
+/* What is seen at a grazing angle has a footprint that is much longer than wide. */
+TEST(a_grazing_floor_in_a_mirror_and_behind_glass_shows_with_one_sample_what_many_show)
+{
+    struct fixture *fixture = *state;
+    for (int glass = 0; glass < 2; glass++) {
+        fixture_clear((void **)&fixture);
+        grazing_floor(fixture, glass);
+        /* 17.7 and 18.6 by one level, of the mean of the footprint's length and width: over twice the error */
+        EXPECT_QUALITY(glass ? "glass" : "mirror", quality(fixture, 64), 23.0);
+    }
+}
+
 /* All pixels of a square in the middle of the picture are grey. */
 static void expect_grey(struct fixture *fixture)
 {
@@ -479,7 +517,7 @@ TEST(fine_patterns_on_spheres_and_discs_are_averaged_in_the_distance)
     struct fixture *fixture = *state;
     for (int is_disc = 0; is_disc < 2; is_disc++) {
         fixture_clear((void **)&fixture);
-        struct texture_use use = checks(fixture, 64, 8.0f);
+        struct texture_use use = checks(fixture, 64, 16.0f); /* a pixel has more than a pair of them each way */
         struct scene_material *material = fixture_material(fixture);
         material->unlit = true;
         material->textures[MATERIAL_BASE_COLOUR] = use;

@@ -127,9 +127,15 @@ TEST(mirrors_are_like_the_references)
     expect_scene_like_the_reference(*state, add_mirrors, "mirrors", CLOSED);
 }
 
+/* Stored samples are filtered to a cell, which is narrower than a pixel here, and not to a ray's footprint: with
+ * one sample a pixel they alias more than exact hits, with several both tend to the same picture. */
 TEST(textures_in_a_mirror_are_like_the_references)
 {
-    expect_scene_like_the_reference(*state, add_textured, "textures in a mirror", CLOSED);
+    struct fixture *fixture = *state;
+    add_textured(fixture);
+    request_picture(fixture, 5);
+    fixture->request.samples = 4;
+    expect_like_the_reference(fixture, "textures in a mirror", CLOSED);
 }
 
 TEST(every_sort_of_texture_is_like_the_references)
