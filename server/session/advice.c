@@ -15,9 +15,9 @@
 #define AREA_DEVIATION 0.25
 /* Factor by which a frame may take longer than the time that no size can reduce. */
 #define OF_FIXED 1.5
-/* How many times in a row the next better step must fit, with this room. */
-/* With as many light goes into glass and out again. */
+/* With as many bounces light goes into glass and out again. */
 #define DEPTH_MIN 2u
+/* How many times in a row the next better step must fit, with this room. */
 #define BETTER_TIMES 8
 #define BETTER_ROOM 1.25
 /* A client that makes its own views asks for a picture that often at least while it moves: one that is there by
