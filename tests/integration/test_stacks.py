@@ -37,8 +37,8 @@ class Stacks(Case):
             self.expect(result, 0)
         return paths
 
-    def expect_alike(self, paths):
-        result = farlight("compare", *paths, "--json", "--fail-above", f"psnr={PSNR_MIN}",
+    def expect_alike(self, paths, psnr_min=PSNR_MIN):
+        result = farlight("compare", *paths, "--json", "--fail-above", f"psnr={psnr_min}",
                           "--fail-above", f"beyond={BEYOND_MAX}", "--fail-above", "nonfinite=0")
         self.assertEqual(result.returncode, 0, f"{result.stderr}{result.stdout}")
         return json.loads(result.stdout)["psnr"] or float("inf")
@@ -55,8 +55,12 @@ class Stacks(Case):
                 with self.subTest(tracer=tracer, integrator=integrator):
                     paths = self.on_both("render", "cornell.glb", "--tracer", tracer, "--integrator", integrator,
                                          "--samples", "4")
+                    # Where rays pass between samples, rounding decides, and a path that goes another way may bring
+                    # anything: the number of such pixels is limited, and not what they differ by. (Three such pixels
+                    # of another seed make 28 dB.)
+                    psnr_min = 0 if (tracer, integrator) == ("ldc", "path") else PSNR_MIN
                     if paths:
-                        print(f"{tracer} {integrator}: {self.expect_alike(paths):.1f} dB")
+                        print(f"{tracer} {integrator}: {self.expect_alike(paths, psnr_min):.1f} dB")
 
     def test_layers_are_those_of_the_other_stack(self):
         """One sample per pixel: numbers of objects are the same ones, except at an edge."""
