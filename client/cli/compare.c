@@ -39,8 +39,8 @@ static const struct argp_option options[] = {
      0},
     {"fail-above", KEY_FAIL_ABOVE, "[FIGURE=]VALUE", 0,
      "Exit with 1 if a figure is worse: psnr, shown_psnr (dB) and ssim below the value; mean, rms, max, "
-     "butteraugli, and the "
-     "shares beyond, visible and nonfinite (0.001 or 0.1%) above it. Without a name: max. May be repeated",
+     "butteraugli, and the shares beyond, visible and nonfinite (0.001 or 0.1%) above it. Without a name: max. "
+     "May be repeated",
      0},
     {"tone-map", KEY_TONE_MAP, "NAME", 0,
      "Choose how a screen shows linear files: neutral (default), aces or none", 0},

@@ -98,7 +98,7 @@ void cli_print_waves(const struct fl_frame *frame, enum protocol_tracer referenc
         "  agree    the same answer: both hit the same surface, both miss, or equally dark shadows; edges aside\n"
         "  far      both hit, at distances that differ by more than %g of the scene's diagonal, or in shadow and\n"
         "           with transmittances that differ by more than 2/255\n"
-        "  edges    of those before, rays within rounding of an edge: %s itself gives %s's answer\n"
+        "  edges    rays of the three columns before within rounding of an edge: %s itself gives %s's answer\n"
         "           if the ray is moved by a few rounding steps\n"
         "  surface  the same distance, but another surface: normals over 5 degrees apart, or another material or "
         "side\n"

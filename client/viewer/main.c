@@ -47,9 +47,8 @@ static const struct argp_option options[] = {
      "Use whitted (default), distributed (default with a lens or a shutter), raycast, ao or path", -2},
     {"fps", KEY_RATE, "N", 0, "Render at most N frames per second (default 60)", -2},
     {"moving-rate", KEY_MOVING_RATE, "N", 0,
-     "Render N frames per second or more while something moves: bounces and size give way to that; 0: nothing "
-     "does "
-     "(default 15; with --no-adapt 0)",
+     "Render at least N frames per second while something moves, with fewer samples, pixels and bounces; "
+     "0: render all of them (default 15; with --no-adapt 0)",
      -2},
     {"scale", KEY_SCALE, "N", 0, "Show a rendered pixel as NxN pixels of the window: 1 (default), 2, 4, 8", -2},
     {"encoding", KEY_ENCODING, "NAME", 0,

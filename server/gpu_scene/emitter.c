@@ -82,9 +82,8 @@ static void warn_of_too_many(struct emitters *emitters, uint64_t leaves)
     const bool too_many = leaves > LEAVES_LIMIT;
     if (too_many && !emitters->too_many)
         log_write(LOG_WARNING, "scene",
-                  "emissive triangles are not sampled as lights: their instances have %" PRIu64
-                  " groups of them, more "
-                  "than %u; rays find them by chance, with more noise",
+                  "emissive triangles are not sampled as lights: their instances have %" PRIu64 " groups of them, "
+                  "more than %u; rays find them by chance, with more noise",
                   leaves, LEAVES_LIMIT);
     emitters->too_many = too_many;
 }

@@ -2,7 +2,6 @@
 #include "render/context.h"
 
 #include "base/clock.h"
-#include "render/frame_request.h"
 #include "render/key_view.h"
 #include "shared/bindings.h"
 #include "shared/hit.h"
@@ -152,11 +151,6 @@ bool context_samples_emitters(const struct render_context *context)
 uint32_t context_ao_rays(const struct render_context *context)
 {
     return context->request.ao_rays > 0 ? context->request.ao_rays : AO_RAYS_DEFAULT;
-}
-
-float context_radiance_limit(const struct render_context *context)
-{
-    return frame_request_radiance_limit(&context->request);
 }
 
 float context_ao_distance(const struct render_context *context)

@@ -102,8 +102,6 @@ bool context_samples_emitters(const struct render_context *context);
 /* Of ambient occlusion: rays a sample, and how far they look, metres. */
 uint32_t context_ao_rays(const struct render_context *context);
 float context_ao_distance(const struct render_context *context);
-/* Radiance, of the request's clamp; 0: there is no limit. */
-float context_radiance_limit(const struct render_context *context);
 /* Reserves buffers for slices of `samples` samples and waves of wave_capacity rays. */
 bool context_reserve(struct render_context *context, uint32_t slice_samples, struct error *error);
 /* The times of the current wave's rays; NULL: nothing moves. */

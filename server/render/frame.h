@@ -115,8 +115,8 @@ struct frame_result {
     uint32_t attachments;
     size_t size_bytes;
     uint32_t width, height;
-    uint32_t
-        samples; /* held per pixel, with those of the frames before that it goes on from; with noise: at most */
+    /* Held per pixel, with those of the frames before that it goes on from; with noise: at most. */
+    uint32_t samples;
     float noise; /* with noise in the request: the largest error of a tile, as far as is known; else 0 */
     enum pixel_format format;
     enum ycbcr ycbcr; /* in place of the RGBA8; base/ycbcr.h says how the planes lie in size_bytes */

@@ -23,7 +23,7 @@ uint64_t frame_request_plane_bytes(const struct frame_request *request, enum lay
 uint64_t frame_request_bytes(const struct frame_request *request);
 /* Behind the surfaces of the picture. */
 bool frame_request_hides_environment(const struct frame_request *request);
-/* Of its clamp: what the exposure makes of this is the limit; 0: there is none. */
+/* What its clamp limits radiance to, before exposure; 0: nothing is limited. */
 float frame_request_radiance_limit(const struct frame_request *request);
 /* Whether the same ray brings the same radiance. */
 bool frame_request_same_radiance(const struct frame_request *a, const struct frame_request *b);

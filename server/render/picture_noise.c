@@ -30,7 +30,7 @@ void picture_noise_finish(struct picture_noise *noise, struct gpu_device *device
 static bool allocate(struct picture *picture, struct error *error)
 {
     struct picture_noise *noise = &picture->noise;
-    noise->tile_count = picture_slot_count(picture) / 64;
+    noise->tile_count = picture_slot_count(picture) / TILE_SLOTS;
     noise->halves = calloc(picture->band_count, sizeof(*noise->halves));
     noise->samples = calloc(noise->tile_count, sizeof(*noise->samples));
     noise->errors = calloc(noise->tile_count, sizeof(*noise->errors));
@@ -145,9 +145,9 @@ bool picture_noise_measure(struct picture *picture, struct render_context *conte
         const uint32_t slots = picture_band_slots(picture, band, &first_slot);
         gpu_buffer_bind_storage(picture_band(picture, 0, band), BIND_ACCUMULATION);
         gpu_buffer_bind_storage(&noise->halves[band], BIND_HALVES);
-        gpu_uniform_uint(program, "first_tile", first_slot / 64);
-        gpu_uniform_uint(program, "tile_count", slots / 64);
-        gpu_dispatch(context->device, program, slots / 64);
+        gpu_uniform_uint(program, "first_tile", first_slot / TILE_SLOTS);
+        gpu_uniform_uint(program, "tile_count", slots / TILE_SLOTS);
+        gpu_dispatch(context->device, program, slots / TILE_SLOTS);
     }
     context_span_end(context);
     if (is_first)

@@ -8,7 +8,7 @@
  * independent, their difference would tell the mean's standard error: |mean of all - mean of the first a| * sqrt(a
  * / (n - a)). They are not: they complete each other, and the estimate is rather too high. A tile's error is the
  * root mean square of that over its pixels and channels, after exposure, divided by the tile's mean plus
- * PICTURE_NOISE_DARK of white; or that of alpha, if it is larger. It is looked at when there are 16, 24, 32, 48,
+ * 0.03 of white; or that of alpha, if it is larger. It is looked at when there are 16, 24, 32, 48,
  * 64, 96 .. samples.
  *
  * For what filters pictures by their noise: the same expression, squared, is a variance of each pixel's mean;

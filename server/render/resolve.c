@@ -65,7 +65,7 @@ static void set_tiles(const struct gpu_program *program, const struct picture *p
     uint32_t first_slot;
     (void)picture_band_slots(picture, band, &first_slot);
     gpu_buffer_bind_texels(context->device, context->tile_samples, UNIT_TILE_SAMPLES, GL_R32UI);
-    gpu_uniform_uint(program, "first_tile", first_slot / 64);
+    gpu_uniform_uint(program, "first_tile", first_slot / TILE_SLOTS);
     gpu_uniform_float(program, "exposure", layer == LAYER_BEAUTY ? exp2f(context->request.exposure_stops) : 1.0f);
 }
 

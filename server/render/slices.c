@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 #include "render/slices.h"
 
-#define TILE_SLOTS 64u
+#include "shared/path.h"
+
 /* A dead ray costs some hundredths of one that is traced, and a slice as much as some hundred of these. */
 #define DEAD_PER_LIVE 4u
 

@@ -2,6 +2,7 @@
 #include "render/wave_passes.h"
 
 #include "render/compact.h"
+#include "render/frame_request.h"
 #include "render/wave_trace.h"
 
 #include "shared/bindings.h"
@@ -86,7 +87,7 @@ static const struct gpu_program *shade_program(struct wave_passes *passes, struc
     gpu_uniform_uint(program, "last_wave", last);
     gpu_uniform_uint(program, "children_a_hit", integrator->children_a_hit);
     gpu_uniform_uint(program, "shadow_rays_a_hit", integrator->shadow_rays_a_hit(context));
-    gpu_uniform_float(program, "radiance_limit", context_radiance_limit(context));
+    gpu_uniform_float(program, "radiance_limit", frame_request_radiance_limit(&context->request));
     bind_shading(passes, context);
     return program;
 }
@@ -135,7 +136,7 @@ static bool left_scene(struct wave_passes *passes, struct render_context *contex
     if (!program)
         return false;
     context_bind(context);
-    gpu_uniform_float(program, "radiance_limit", context_radiance_limit(context));
+    gpu_uniform_float(program, "radiance_limit", frame_request_radiance_limit(&context->request));
     gpu_buffer_bind_texels(context->device, environment_lights(context->environment, context->scene),
                            UNIT_SHADE_LIGHTS, GL_RGBA32F);
     gpu_buffer_bind_storage(&context->rays, BIND_RAYS);

@@ -130,17 +130,35 @@ static bool check_hidden(const struct message_render *render, struct error *erro
     return true;
 }
 
-static bool check_views(const struct message_render *render, struct error *error)
+static bool is_made_of_layers(const struct message_render *render)
 {
-    if (render->noise > 0.0f && render->compare) {
+    return render->view_source == PROTOCOL_VIEW_SOURCE_LAYERS &&
+           (has_views(render) || render->aperture > 0.0f || render->upsample > 1);
+}
+
+/* Tiles of their own numbers of samples. */
+static bool check_noise(const struct message_render *render, struct error *error)
+{
+    if (!(render->noise > 0.0f))
+        return true;
+    if (render->compare) {
         error_set(error, ERROR_UNSUPPORTED, "render.noise", "tracers are compared by a number of samples");
         return error_remedy(error, "set noise to 0, or compare to 0");
     }
-    if (render->noise > 0.0f && render->denoise == PROTOCOL_DENOISE_ON) {
+    if (render->denoise == PROTOCOL_DENOISE_ON) {
         error_set(error, ERROR_UNSUPPORTED, "render.noise",
                   "what is filtered has the same number of samples everywhere");
         return error_remedy(error, "set noise to 0, or denoise to off");
     }
+    if (!is_made_of_layers(render))
+        return true;
+    error_set(error, ERROR_UNSUPPORTED, "render.noise",
+              "pictures that are made of layers have a number of samples");
+    return error_remedy(error, "set view_source to rays, or noise to 0");
+}
+
+static bool check_views(const struct message_render *render, struct error *error)
+{
     if (!check_eyes(render, error) || !check_upsample(render, error) || !check_hidden(render, error))
         return false;
     if (render->view_source != PROTOCOL_VIEW_SOURCE_LAYERS)
@@ -149,12 +167,6 @@ static bool check_views(const struct message_render *render, struct error *error
         error_set(error, ERROR_UNSUPPORTED, "render.compare",
                   "tracers are not compared in pictures that are made of layers");
         return error_remedy(error, "set view_source to rays, or compare to 0");
-    }
-    const bool is_made = has_views(render) || render->aperture > 0.0f || render->upsample > 1;
-    if (render->noise > 0.0f && is_made) {
-        error_set(error, ERROR_UNSUPPORTED, "render.noise",
-                  "pictures that are made of layers have a number of samples");
-        return error_remedy(error, "set view_source to rays, or noise to 0");
     }
     if (!(render->shutter > 0.0f))
         return true;
@@ -323,7 +335,8 @@ bool job_check(const struct session *session, const struct message_render *rende
         return error_set(error, ERROR_UNKNOWN_ID, "render.scene", "there is no scene %u", render->scene);
     if (jobs_find(session, render->channel) && !job_replaced_by(session, render))
         return error_set(error, ERROR_INVALID, "render.channel", "a running job has channel %u", render->channel);
-    if (!check_kind(session, render, error) || !check_views(render, error) || !check_layers(render, error))
+    if (!check_kind(session, render, error) || !check_noise(render, error) || !check_views(render, error) ||
+        !check_layers(render, error))
         return false;
     if (!check_encoding(session, render, render->encoding, "render.encoding", error))
         return false;

@@ -1,6 +1,12 @@
 // SPDX-License-Identifier: MIT
 // Between linear light and sRGB. IEC 61966-2-1.
 
+// Of linear light.
+float luminance(vec3 colour)
+{
+    return dot(colour, vec3(0.2126, 0.7152, 0.0722));
+}
+
 vec3 linear_from_srgb(vec3 c)
 {
     return mix(pow((c + 0.055) / 1.055, vec3(2.4)), c / 12.92, lessThanEqual(c, vec3(0.04045)));

@@ -11,14 +11,10 @@
 //
 // Defines: those of common/material.glsl and common/light.glsl.
 
+#include "common/colour.glsl"
 #include "common/environment.glsl"
 #include "common/light.glsl"
 #include "common/scattering.glsl"
-
-float luminance(vec3 colour)
-{
-    return dot(colour, vec3(0.2126, 0.7152, 0.0722));
-}
 
 // Of a surface that is not glass seen from inside: the highlights, and what the lights bring from all around together.
 vec2 light_of_lights(surface s, split parts, vec3 view, float NoV)

@@ -27,7 +27,7 @@ void main()
     if (k >= slot_count || wave.stopped != 0u)
         return;
 #ifdef HAS_TILE_SAMPLES
-    if (texelFetch(tile_samples, int(first_picture_slot + k >> 6)).x != 0u)
+    if (texelFetch(tile_samples, int((first_picture_slot + k) / TILE_SLOTS)).x != 0u)
         return;
 #endif
     vec4 sum = accumulation[first_slot + k];

@@ -7,6 +7,7 @@
 
 #include "shared/denoise.h"
 #include "common/camera.glsl"
+#include "common/colour.glsl"
 #include "common/dispatch.glsl"
 
 uniform uint first_row, item_count; // of the strip, of this dispatch
@@ -18,18 +19,14 @@ struct halves {
 };
 
 struct guide {
-    vec3 normal;    // mean of the samples, shorter than 1 where they see several surfaces; 0: nothing is there
+    vec3 normal;    // unit, of the samples' mean
+    float extent;   // of that mean: below 1 where they see several surfaces; 0: nothing is there
     float nearness; // 1 / depth, which is linear in the picture where the surface is flat; orthographic: depth
     vec2 slope;     // of it, a pixel, as a share of it
     float share;    // that mirrors and glass have in what is seen
 };
 
 const float HALF_FLOAT_MAX = 6e4;
-
-float luminance_of(vec3 colour)
-{
-    return dot(colour, vec3(0.2126, 0.7152, 0.0722));
-}
 
 uvec4 words_of_halves(halves h)
 {
@@ -58,16 +55,15 @@ vec3 noise_of(halves h)
 
 uvec4 words_of_guide(guide g)
 {
-    float extent = length(g.normal);
-    uint normal = extent > 0.0 ? packSnorm2x16(octahedral_from_unit(g.normal / extent)) : DENOISE_NOTHING;
-    return uvec4(normal, floatBitsToUint(g.nearness), packHalf2x16(g.slope), packHalf2x16(vec2(extent, g.share)));
+    uint normal = g.extent > 0.0 ? packSnorm2x16(octahedral_from_unit(g.normal)) : DENOISE_NOTHING;
+    return uvec4(normal, floatBitsToUint(g.nearness), packHalf2x16(g.slope), packHalf2x16(vec2(g.extent, g.share)));
 }
 
 guide guide_of_words(uvec4 words)
 {
     vec2 extent_share = unpackHalf2x16(words.w);
-    vec3 normal = extent_share.x * unit_from_octahedral(unpackSnorm2x16(words.x));
-    return guide(normal, uintBitsToFloat(words.y), unpackHalf2x16(words.z), extent_share.y);
+    return guide(unit_from_octahedral(unpackSnorm2x16(words.x)), extent_share.x, uintBitsToFloat(words.y),
+                 unpackHalf2x16(words.z), extent_share.y);
 }
 
 // The pixel of this invocation in the strip; false: it has none.
@@ -100,7 +96,7 @@ bool within(ivec2 pixel, ivec2 lower, ivec2 upper)
 // Whether a neighbour is on a surface that light falls on alike.
 bool is_alike(guide own, guide other)
 {
-    return dot(own.normal, other.normal) > 0.8 * length(own.normal) * length(other.normal);
+    return own.extent * other.extent > 0.0 && dot(own.normal, other.normal) > 0.8;
 }
 
 // How far a neighbour is from the surface that the pixel sees, 0 and up; 1 is about the most that one surface has.
@@ -109,5 +105,5 @@ float off_surface(guide own, guide other, vec2 offset)
     float expected = own.nearness * (1.0 + dot(own.slope, offset));
     float tolerance = own.nearness * (dot(abs(own.slope), abs(offset)) + DENOISE_DEPTH_SHARE);
     return abs(other.nearness - expected) / max(tolerance, 1e-30) +
-           (length(own.normal) * length(other.normal) - dot(own.normal, other.normal)) * DENOISE_NORMAL_SCALE;
+           own.extent * other.extent * (1.0 - dot(own.normal, other.normal)) * DENOISE_NORMAL_SCALE;
 }

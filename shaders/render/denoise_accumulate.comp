@@ -16,7 +16,7 @@ layout(std430, binding = BIND_DENOISE_HALF) buffer half_block { vec4 first_half[
 layout(std430, binding = BIND_DENOISE_ALBEDO) buffer albedo_block { vec4 albedos[]; };
 layout(std430, binding = BIND_DENOISE_NORMAL) buffer normal_block { vec4 normals[]; };
 
-// render/denoise/denoise.c has the same.
+// render/denoise/sums.c has the same.
 bool is_of_first_half(uint index)
 {
     return index < 4u ? index % 3u == 0u : (index >> findMSB(index) - 1 & 1u) == 0u;

@@ -22,8 +22,11 @@ vec2 risk_of(halves as_is, halves filtered, halves own)
 {
     vec3 step_ = mean_of(as_is) - mean_of(filtered), noise_step = noise_of(as_is) - noise_of(filtered);
     float gain = dot(mean_of(as_is) - mean_of(own), step_) + dot(noise_of(own), noise_step);
-    return vec2(gain, dot(step_, step_)) / square(luminance_of(abs(mean_of(filtered))) + DENOISE_DARK);
+    return vec2(gain, dot(step_, step_)) / square(luminance(abs(mean_of(filtered))) + DENOISE_DARK);
 }
+
+const ivec2 NEIGHBOURS[8] = ivec2[8](ivec2(-1, -1), ivec2(0, -1), ivec2(1, -1), ivec2(-1, 0), ivec2(1, 0), ivec2(-1, 1),
+                                     ivec2(0, 1), ivec2(1, 1));
 
 void main()
 {
@@ -34,19 +37,19 @@ void main()
     int place = place_of(pixel);
     guide own = guide_of_words(texelFetch(guides, place));
     halves h = halves_of_words(texelFetch(light, place));
-    vec2 own_luminance = vec2(luminance_of(h.a), luminance_of(h.b)), weights = vec2(0.25);
+    vec2 own_luminance = vec2(luminance(h.a), luminance(h.b)), weights = vec2(0.25);
     float scale = DENOISE_LIGHT_SCALE * (1.0 - DENOISE_MIRROR_EDGES * own.share), variance = square(0.25 * h.deviation);
     float sharpness = 1.0 / (scale * h.deviation + 1e-6);
     vec3 sum_a = 0.25 * h.a, sum_b = 0.25 * h.b;
-    for (int i = 0; i < 9; i++) {
-        ivec2 step_ = ivec2(i % 3 - 1, i / 3 - 1), offset = step_ * spacing;
+    for (int i = 0; i < 8; i++) {
+        ivec2 step_ = NEIGHBOURS[i], offset = step_ * spacing;
         ivec2 next = pixel + offset;
-        bool counts = i != 4 && within(next, lower, upper);
+        bool counts = within(next, lower, upper);
         int next_place = place_of(counts ? next : pixel);
         guide other = guide_of_words(texelFetch(guides, next_place));
         halves e = halves_of_words(texelFetch(light, next_place));
         float off = off_surface(own, other, vec2(offset));
-        vec2 apart = abs(vec2(luminance_of(e.b), luminance_of(e.a)) - own_luminance.yx) * sharpness;
+        vec2 apart = abs(vec2(luminance(e.b), luminance(e.a)) - own_luminance.yx) * sharpness;
         float kernel = counts ? (step_.x == 0 || step_.y == 0 ? 0.125 : 0.0625) : 0.0;
         vec2 weight = kernel * exp2(-(off + apart));
         sum_a += weight.x * e.a;

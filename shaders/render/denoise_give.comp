@@ -21,7 +21,7 @@ void main()
     int place = place_of(pixel);
     uint slot = slot_of_pixel(uvec2(pixel.x, uint(pixel.y) + strip_row - band_row));
     vec4 sum = accumulation[slot];
-    vec3 albedo = max(albedos[slot].rgb / note_count, vec3(DENOISE_ALBEDO_MIN));
+    vec3 albedo = max(albedos[slot].rgb / count, vec3(DENOISE_ALBEDO_MIN));
     vec3 moved = mean_of(halves_of_words(texelFetch(light, place))) -
                  mean_of(halves_of_words(texelFetch(first_light, place)));
     bool there = texelFetch(guides, place).x != DENOISE_NOTHING;

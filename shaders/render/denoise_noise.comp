@@ -21,7 +21,7 @@ const ivec2 NEIGHBOURS[4] = ivec2[4](ivec2(-1, 0), ivec2(1, 0), ivec2(0, -1), iv
 
 vec3 capped(vec3 colour, float cap)
 {
-    return colour * min(1.0, cap / max(luminance_of(colour), 1e-30));
+    return colour * min(1.0, cap / max(luminance(colour), 1e-30));
 }
 
 // What is brighter than so many times what lies two pixels away is a highlight, or a sample that happened upon a light:
@@ -29,16 +29,15 @@ vec3 capped(vec3 colour, float cap)
 float cap_around(ivec2 pixel, ivec2 lower, ivec2 upper, guide own)
 {
     float sum = 0.0, count = 0.0;
-    for (int y = -2; y <= 2; y++) {
-        for (int x = -2; x <= 2; x++) {
-            ivec2 next = pixel + ivec2(x, y);
-            bool counts = (abs(x) == 2 || abs(y) == 2) && within(next, lower, upper);
-            int place = place_of(counts ? next : pixel);
-            guide other = guide_of_words(texelFetch(guides, place));
-            float weight = counts && is_alike(own, other) ? 1.0 : 0.0;
-            sum += weight * min(luminance_of(mean_of(halves_of_words(texelFetch(light, place)))), DENOISE_CAP * white);
-            count += weight;
-        }
+    for (int i = 0; i < 16; i++) {
+        ivec2 side = ivec2((i & 3) - 2, -2), offset = i < 4 ? side : i < 8 ? -side : i < 12 ? ivec2(2, side.x) : ivec2(-2, -side.x);
+        ivec2 next = pixel + offset;
+        bool counts = within(next, lower, upper);
+        int place = place_of(counts ? next : pixel);
+        guide other = guide_of_words(texelFetch(guides, place));
+        float weight = counts && is_alike(own, other) ? 1.0 : 0.0;
+        sum += weight * min(luminance(mean_of(halves_of_words(texelFetch(light, place)))), DENOISE_CAP * white);
+        count += weight;
     }
     return min(DENOISE_CAP * sum / max(count, 1.0), DENOISE_CAP * white);
 }
@@ -70,7 +69,7 @@ void main()
         guide other = guide_of_words(texelFetch(guides, next_place));
         rises[i] = inside ? (other.nearness - own.nearness) * ((i & 1) == 0 ? -1.0 : 1.0) : 1e30;
         vec3 difference = mean - capped(mean_of(halves_of_words(texelFetch(light, next_place))), cap);
-        float size = inside && is_alike(own, other) ? abs(luminance_of(difference)) : 1e30;
+        float size = inside && is_alike(own, other) ? abs(luminance(difference)) : 1e30;
         count += size < 1e30 ? 1.0 : 0.0;
         if (size < least_size) {
             second = least;
@@ -93,5 +92,5 @@ void main()
     own.slope = own.nearness > 0.0 ? clamp(slope / own.nearness, vec2(-1.0), vec2(1.0)) : vec2(0.0);
     sloped_guides[place] = words_of_guide(own);
     noisy_light[place] = words_of_halves(h);
-    risks[place] = vec2(square(luminance_of(noise)), square(luminance_of(apart)));
+    risks[place] = vec2(square(luminance(noise)), square(luminance(apart)));
 }

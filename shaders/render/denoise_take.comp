@@ -3,8 +3,8 @@
 
 #include "render/denoise.glsl"
 
-uniform uint band_row;                        // the first row of the band in the picture
-uniform float first_count, count, note_count; // samples of the first half, of both, and of those noted
+uniform uint band_row;            // the first row of the band in the picture
+uniform float first_count, count; // samples of the first half, and of both
 
 layout(std430, binding = BIND_ACCUMULATION) readonly buffer accumulation_block { vec4 accumulation[]; };
 layout(std430, binding = BIND_DENOISE_HALF) readonly buffer half_block { vec4 first_half[]; };
@@ -19,7 +19,7 @@ void main()
     if (!pixel_of_item(pixel))
         return;
     uint slot = slot_of_pixel(uvec2(pixel.x, uint(pixel.y) + strip_row - band_row));
-    vec4 albedo = albedos[slot] / note_count, normal = normals[slot] / note_count;
+    vec4 albedo = albedos[slot] / count, normal = normals[slot] / count;
     vec3 sum = accumulation[slot].rgb, first = first_half[slot].rgb, mean = sum / count, noise = vec3(0.0);
     float second_count = count - first_count;
     if (second_count > 0.0)
@@ -27,7 +27,8 @@ void main()
     vec3 divisor = max(albedo.rgb, vec3(DENOISE_ALBEDO_MIN));
     float depth = normal.w;
     bool there = depth > 0.0 && albedo.a <= 1.0; // all of it: what is behind would be spread over the edge, too
-    guide g = guide(there ? normal.xyz : vec3(0.0), 0.0, vec2(0.0), min(albedo.a, 1.0));
+    float extent = there ? length(normal.xyz) : 0.0;
+    guide g = guide(normal.xyz / max(extent, 1e-30), extent, 0.0, vec2(0.0), min(albedo.a, 1.0));
     if (there)
         g.nearness = frame.extent_near.w != 0.0 ? depth : 1.0 / depth;
     int place = place_of(pixel);

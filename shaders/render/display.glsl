@@ -29,7 +29,7 @@ vec4 linear_of_sum(vec4 sum, uvec2 pixel)
 {
     vec2 by = vec2(scale, coverage_scale);
 #ifdef HAS_TILE_SAMPLES
-    uint stopped_at = texelFetch(tile_samples, int(first_tile + (slot_of_pixel(pixel) >> 6))).x;
+    uint stopped_at = texelFetch(tile_samples, int(first_tile + slot_of_pixel(pixel) / TILE_SLOTS)).x;
     if (stopped_at != 0u)
         by = vec2(exposure, 1.0) * (1.0 / float(stopped_at));
 #endif

@@ -25,8 +25,8 @@ void main()
     if (tile >= tile_count || texelFetch(tile_samples, int(first_tile + tile)).x != 0u)
         return;
     float light = 0.0, squares = 0.0, alpha_squares = 0.0, pixels = 0.0;
-    for (uint slot = tile << 6; slot < (tile + 1u) << 6; slot++) {
-        uvec2 pixel = pixel_of_slot((first_tile << 6) + slot);
+    for (uint slot = tile * TILE_SLOTS; slot < (tile + 1u) * TILE_SLOTS; slot++) {
+        uvec2 pixel = pixel_of_slot(first_tile * TILE_SLOTS + slot);
         vec4 sum = accumulation[slot], first = halves[slot];
         if (pixel.x < frame.width && pixel.y < frame.height) {
             vec4 mean = sum / float(samples), off = mean - first / float(max(half_samples, 1u));

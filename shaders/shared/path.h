@@ -108,6 +108,7 @@ SHARED_SIZE(child, 80)
 /* Of pictures whose tiles stop one by one, see server/render/picture_noise.h. */
 #define BIND_HALVES BIND_PASS_1       /* vec4 like BIND_ACCUMULATION */
 #define BIND_TILE_ERRORS BIND_PASS_2  /* float a tile */
+#define TILE_SLOTS 64u                /* 8 x 8 pixels, side by side in the order of slots */
 #define UNIT_TILE_SAMPLES UNIT_PASS_1 /* uint a tile: samples where it has stopped; 0: it goes on */
 
 #endif

@@ -165,36 +165,24 @@ TEST(rough_surfaces_mirror_what_path_finds)
 
 /* ---- noise ---- */
 
-static double *picture(struct fixture *fixture, uint32_t samples, uint64_t seed)
-{
-    double *pixels = malloc(PIXELS * sizeof(*pixels));
-    assert_non_null(pixels);
-    fixture->request.samples = samples;
-    fixture->request.seed = seed;
-    struct frame_result result = fixture_render(fixture);
-    for (uint32_t i = 0; i < PIXELS; i++)
-        pixels[i] = (double)fixture_pixel(&result, i % EDGE, i / EDGE)[1];
-    frame_result_finish(&result);
-    return pixels;
-}
-
 /* The root of the mean squared error by the mean. */
-static double error_of(const double *pixels, const double *truth)
+static double error_of(const float *pixels, const float *truth)
 {
     double squares = 0.0, sum = 0.0;
     for (uint32_t i = 0; i < PIXELS; i++) {
-        squares += (pixels[i] - truth[i]) * (pixels[i] - truth[i]);
-        sum += truth[i];
+        const double error = (double)pixels[i] - (double)truth[i];
+        squares += error * error;
+        sum += (double)truth[i];
     }
     return sqrt(squares / PIXELS) / (sum / PIXELS);
 }
 
-static double noise_of_a_lamp(struct fixture *fixture, float half, bool sampled, const double *truth)
+static double noise_of_a_lamp(struct fixture *fixture, float half, bool sampled, const float *truth)
 {
     begin(fixture, INTEGRATOR_DISTRIBUTED, 16);
     a_floor(fixture, 0.3f, 1.0f);
     a_lamp(fixture, half, 1.0f, sampled);
-    double *noisy = picture(fixture, 16, 1);
+    float *noisy = path_render_pixels(fixture, 16, 1);
     const double error = error_of(noisy, truth);
     free(noisy);
     return error;
@@ -206,7 +194,7 @@ TEST(rough_metal_shows_no_specks_of_lamps)
     begin(fixture, INTEGRATOR_PATH, 1);
     a_floor(fixture, 0.3f, 1.0f);
     a_lamp(fixture, 0.05f, 1.0f, true);
-    double *truth = picture(fixture, 1024, 9);
+    float *truth = path_render_pixels(fixture, 1024, 9);
     const double met = noise_of_a_lamp(fixture, 0.05f, false, truth),
                  both = noise_of_a_lamp(fixture, 0.05f, true, truth);
     free(truth);
@@ -217,12 +205,12 @@ TEST(rough_metal_shows_no_specks_of_lamps)
 TEST(rough_metal_shows_no_specks_of_the_sun)
 {
     struct fixture *fixture = *state;
-    double *pictures[2];
+    float *pictures[2];
     for (int truth = 0; truth < 2; truth++) {
         begin(fixture, truth ? INTEGRATOR_PATH : INTEGRATOR_DISTRIBUTED, 1);
         a_floor(fixture, 0.3f, 1.0f);
         a_sun(fixture);
-        pictures[truth] = picture(fixture, truth ? 1024 : 16, truth ? 9 : 1);
+        pictures[truth] = path_render_pixels(fixture, truth ? 1024 : 16, truth ? 9 : 1);
     }
     const double error = error_of(pictures[0], pictures[1]);
     print_message("error of 16 samples, by the mean: %.3f\n", error);

@@ -172,29 +172,16 @@ TEST(stored_samples_show_as_much_light)
 
 /* ---- noise ---- */
 
-static float *render_pixels(struct fixture *fixture, uint32_t samples, uint64_t seed)
-{
-    float *pixels = malloc(PIXELS * sizeof(*pixels));
-    assert_non_null(pixels);
-    fixture->request.samples = samples;
-    fixture->request.seed = seed;
-    struct frame_result result = fixture_render(fixture);
-    for (uint32_t i = 0; i < PIXELS; i++)
-        pixels[i] = fixture_pixel(&result, i % EDGE, i / EDGE)[1];
-    frame_result_finish(&result);
-    return pixels;
-}
-
 /* The mean squared error of 64 samples against the converged picture, in all pixels but those of the lamp, of
  * which those of its rim and of its texture's edges are dimmer than it is, and noisy however it is sampled. */
 static double noise_of(struct fixture *fixture, enum kind kind, enum place where, bool sampled)
 {
     path_begin(fixture, TRACER_REFERENCE, 3);
     a_scene_with(fixture, kind, where, true);
-    float *truth = render_pixels(fixture, 1024, 77);
+    float *truth = path_render_pixels(fixture, 1024, 77);
     path_begin(fixture, TRACER_REFERENCE, 3);
     a_scene_with(fixture, kind, where, sampled);
-    float *noisy = render_pixels(fixture, 64, 1);
+    float *noisy = path_render_pixels(fixture, 64, 1);
     double sum = 0.0;
     for (uint32_t i = 0; i < PIXELS; i++)
         sum +=

@@ -36,7 +36,22 @@ static inline struct mean mean_of(const double *values, size_t count)
     return (struct mean){sum / (double)count, sqrt(squares / (double)count / (double)(count - 1))};
 }
 
-/* Green of all pixels; pixels have numbers of their own, and what they show is alike where this is asked for. */
+/* Green of all pixels; free(). */
+static inline float *path_render_pixels(struct fixture *fixture, uint32_t samples, uint64_t seed)
+{
+    float *pixels = malloc(PIXELS * sizeof(*pixels));
+    assert_non_null(pixels);
+    fixture->request.samples = samples;
+    fixture->request.seed = seed;
+    struct frame_result result = fixture_render(fixture);
+    for (uint32_t i = 0; i < PIXELS; i++)
+        pixels[i] = fixture_pixel(&result, i % EDGE, i / EDGE)[1];
+    frame_result_finish(&result);
+    return pixels;
+}
+
+/* Green of all pixels, where what they show is alike. Neighbours' errors cancel each other: the mean's is no
+ * larger than is said. */
 static inline struct mean mean_of_picture(const struct frame_result *result)
 {
     double values[PIXELS];

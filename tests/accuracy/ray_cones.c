@@ -356,15 +356,21 @@ static struct texture_use checks(struct fixture *fixture, uint32_t size, float r
         .texture = texture->base.id, .uv_transform = {repeats, 0, 0, 0, repeats, 0}, .strength = 1.0f};
 }
 
-/* A floor of checks of 0.3 m below a ball of radius 1.2. */
-static void checkered_floor(struct fixture *fixture, float metallic, float roughness, float transmission)
+/* Of unlit checks, so far below. */
+static void floor_of_checks(struct fixture *fixture, float depth, float repeats)
 {
-    static const float floor[12] = {1, 0, 0, 0, 0, 0, 1, -1.2f, 0, -1, 0, 0};
-    struct texture_use use = checks(fixture, 64, 8.0f);
+    const float floor[12] = {1, 0, 0, 0, 0, 0, 1, -depth, 0, -1, 0, 0};
+    struct texture_use use = checks(fixture, 64, repeats);
     struct scene_material *plain = fixture_material(fixture);
     plain->unlit = true;
     plain->textures[MATERIAL_BASE_COLOUR] = use;
     fixture_square(fixture, 20.0f, plain->base.id, floor);
+}
+
+/* A floor of checks of 0.3 m below a ball of radius 1.2. */
+static void checkered_floor(struct fixture *fixture, float metallic, float roughness, float transmission)
+{
+    floor_of_checks(fixture, 1.2f, 8.0f);
     struct scene_material *ball = fixture_material(fixture);
     ball->metallic = metallic;
     ball->roughness = roughness;
@@ -474,12 +480,7 @@ TEST(a_mirror_ball_does_not_flicker_as_the_camera_moves)
 /* A floor of checks that a mirror or a pane of glass, which stands on it, shows at a grazing angle. */
 static void grazing_floor(struct fixture *fixture, bool glass)
 {
-    static const float floor[12] = {1, 0, 0, 0, 0, 0, 1, -1.0f, 0, -1, 0, 0};
-    struct texture_use use = checks(fixture, 64, 16.0f);
-    struct scene_material *plain = fixture_material(fixture);
-    plain->unlit = true;
-    plain->textures[MATERIAL_BASE_COLOUR] = use;
-    fixture_square(fixture, 20.0f, plain->base.id, floor);
+    floor_of_checks(fixture, 1.0f, 16.0f);
     struct scene_material *pane = fixture_material(fixture);
     pane->metallic = glass ? 0.0f : 1.0f;
     pane->transmission = glass ? 1.0f : 0.0f;

@@ -219,14 +219,17 @@ class Figures(Compare):
         self.assertLess(got["psnr"], -700)
 
     def test_a_linear_and_an_8_bit_file_of_one_render_agree_as_shown(self):
-        paths = [self.folder / name for name in ("a.exr", "a.png")]
-        for path in paths:
-            self.expect(farlight("render", bundled_scenes() / "teapot.glb", "-o", path, "--size", "64x48", "-q"), 0)
-        got = self.compare(*paths)
-        self.assertEqual(got["space"], "srgb")
-        # Half a step of 8 bits, and half of what half floats round near white (2^-12, steeper by up to 1.2 there).
-        self.assertLess(got["max"], 0.5 / 255 + 0.0006)
-        self.assertGreater(got["ssim"], 0.99)
+        linear = self.folder / "a.exr"
+        for tone_map in ("neutral", "aces", "none"):
+            screen = self.folder / f"{tone_map}.png"
+            for path in (linear, screen):
+                self.expect(farlight("render", bundled_scenes() / "teapot.glb", "-o", path, "--size", "64x48", "--tone-map", tone_map,
+                                     "-q"), 0)
+            got = self.compare(linear, screen, "--tone-map", tone_map)
+            self.assertEqual(got["space"], "srgb")
+            # Half a step of 8 bits, and half of what half floats round near white (2^-12, steeper by up to 1.2 there).
+            self.assertLess(got["max"], 0.5 / 255 + 0.0006, tone_map)
+            self.assertGreater(got["ssim"], 0.99)
 
     def test_every_format_that_is_written_can_be_compared(self):
         for ending in ("exr", "hdr", "png", "jpg"):

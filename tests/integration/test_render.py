@@ -267,30 +267,11 @@ class BadInput(Case):
         self.assertIn("file/%04d.png: ", result.stderr)
         self.assertNotIn("10000000", result.stderr)
 
-    def test_progress_fits_a_narrow_terminal(self):
-        for columns in (10, 30, 60):
-            parent, child = pty.openpty()
-            fcntl.ioctl(child, termios.TIOCSWINSZ, struct.pack("HHHH", 24, columns, 0, 0))
-            drawing = subprocess.Popen([BIN / "farlight", "animate", bundled_scenes() / "cornell.glb", "--frames", "1-3", "--size",
-                                        "16x16", "-o", self.folder / "%d.png"], stderr=child, env={**os.environ, "TERM": "xterm"})
-            os.close(child)
-            shown = b""
-            with contextlib.suppress(OSError):  # the end of a terminal
-                while data := os.read(parent, 65536):
-                    shown += data
-            os.close(parent)
-            self.assertEqual(drawing.wait(farlight_test.TIMEOUT_S), 0, shown)
-            lines = [line for line in re.split(rb"[\r\n]|\x1b\[K", shown) if line]
-            self.assertIn(b"3", lines[-1])
-            self.assertLess(max(map(len, lines)), columns, lines)
-
-    def test_noise_ends_a_picture_by_its_error_and_tells_how_far_it_is(self):
-        wanted = ["--size", "64x48", "--integrator", "path", "--noise", "0.3"]
-        self.expect(farlight("render", bundled_scenes() / "cornell.glb", "-o", self.folder / "whole.exr", *wanted), 0)
+    def shown_by(self, columns, *command):
+        """What the command shows on a terminal that is so wide."""
         parent, child = pty.openpty()
-        fcntl.ioctl(child, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 100, 0, 0))
-        drawing = subprocess.Popen([BIN / "farlight", "render", bundled_scenes() / "cornell.glb", "-o",
-                                    self.folder / "again.exr", *wanted], stderr=child, env={**os.environ, "TERM": "xterm"})
+        fcntl.ioctl(child, termios.TIOCSWINSZ, struct.pack("HHHH", 24, columns, 0, 0))
+        drawing = subprocess.Popen([BIN / "farlight", *command], stderr=child, env={**os.environ, "TERM": "xterm"})
         os.close(child)
         shown = b""
         with contextlib.suppress(OSError):  # the end of a terminal
@@ -298,6 +279,20 @@ class BadInput(Case):
                 shown += data
         os.close(parent)
         self.assertEqual(drawing.wait(farlight_test.TIMEOUT_S), 0, shown)
+        return shown
+
+    def test_progress_fits_a_narrow_terminal(self):
+        for columns in (10, 30, 60):
+            shown = self.shown_by(columns, "animate", bundled_scenes() / "cornell.glb", "--frames", "1-3", "--size", "16x16", "-o",
+                                  self.folder / "%d.png")
+            lines = [line for line in re.split(rb"[\r\n]|\x1b\[K", shown) if line]
+            self.assertIn(b"3", lines[-1])
+            self.assertLess(max(map(len, lines)), columns, lines)
+
+    def test_noise_ends_a_picture_by_its_error_and_tells_how_far_it_is(self):
+        wanted = ["--size", "64x48", "--integrator", "path", "--noise", "0.3"]
+        self.expect(farlight("render", bundled_scenes() / "cornell.glb", "-o", self.folder / "whole.exr", *wanted), 0)
+        shown = self.shown_by(100, "render", bundled_scenes() / "cornell.glb", "-o", self.folder / "again.exr", *wanted)
         self.assertRegex(shown, rb"error [0-9.]+ %, wanted 30 %")
         self.assertEqual((self.folder / "whole.exr").read_bytes(), (self.folder / "again.exr").read_bytes())
 

@@ -124,11 +124,22 @@ void tone_map_neutral(float colour[3])
         colour[c] = colour[c] * (new_peak / peak) * (1 - g) + new_peak * g;
 }
 
-// Narkowicz. ACES Filmic Tone Mapping Curve. 2015.
+// Hill. A fit of the ACES reference and output transforms, 2016; shaders/common/tonemap.glsl is the same.
 void tone_map_aces(float colour[3])
 {
-    for (int c = 0; c < 3; c++)
-        colour[c] = colour[c] * (2.51f * colour[c] + 0.03f) / (colour[c] * (2.43f * colour[c] + 0.59f) + 0.14f);
+    static const float from_linear[3][3] = {
+        {0.59719f, 0.35458f, 0.04823f}, {0.07600f, 0.90834f, 0.01566f}, {0.02840f, 0.13383f, 0.83777f}};
+    static const float to_linear[3][3] = {
+        {1.60475f, -0.53108f, -0.07367f}, {-0.10208f, 1.10813f, -0.00605f}, {-0.00327f, -0.07276f, 1.07602f}};
+    float curved[3];
+    for (int r = 0; r < 3; r++) {
+        float x = 0;
+        for (int c = 0; c < 3; c++)
+            x += from_linear[r][c] * (colour[c] / 0.6f);
+        curved[r] = (x * (x + 0.0245786f) - 0.000090537f) / (x * (0.983729f * x + 0.4329510f) + 0.238081f);
+    }
+    for (int r = 0; r < 3; r++)
+        colour[r] = to_linear[r][0] * curved[0] + to_linear[r][1] * curved[1] + to_linear[r][2] * curved[2];
 }
 
 // The same as the renderer's resolve pass does for 8-bit pixels.

@@ -79,7 +79,6 @@ static void bind_sums(struct denoise_sums *sums, const struct render_context *co
     gpu_uniform_uint(program, "band_row", picture_band_first_row(picture, band));
     gpu_uniform_float(program, "first_count", (float)denoise_first_half(picture->samples));
     gpu_uniform_float(program, "count", (float)picture->samples);
-    gpu_uniform_float(program, "note_count", (float)picture->samples);
     gpu_uniform_float(program, "strength", denoise_strength(&context->request, picture->samples));
 }
 

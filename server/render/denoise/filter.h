@@ -7,10 +7,9 @@
 #include "render/denoise/sums.h"
 
 struct denoise_filter {
-    struct gpu_buffer notes;     /* of the slice in hand */
-    struct gpu_buffer guides[2]; /* without and with slopes */
-    struct gpu_buffer first, wider,
-        levels[2]; /* halves of the light: before any level; filtered; as it was chosen */
+    struct gpu_buffer notes;                   /* of the slice in hand */
+    struct gpu_buffer guides[2];               /* without and with slopes */
+    struct gpu_buffer first, wider, levels[2]; /* halves of the light: at first; filtered; as it was chosen */
     struct gpu_buffer risks;
     /* progress */
     uint32_t strip_row, strip_rows; /* of the strip in hand, with what its edges depend on */

@@ -77,15 +77,13 @@ static struct tracer *abuffer_create(struct gpu_device *device, const struct tra
 
 /* ---- updates ---- */
 
-/* Counts the layers, where the geometry is new, before anything is built. */
+/* Counts the layers before anything is built. `box`: as it is at the wanted resolution. */
 static bool fit(struct abuffer *abuffer, const struct gpu_scene *scene, const uint32_t *instances, uint32_t count,
                 const struct axes_box *box, struct error *error)
 {
-    if (abuffer->fitted != 0 && abuffer->fitted_instances == count)
-        return true;
-    uint32_t fitted = abuffer->resolution;
     const double longest_world = (double)box->cell_world * abuffer->resolution;
     const double layers = axes_mean_layers(scene, instances, count, 0, longest_world);
+    uint32_t fitted = abuffer->resolution;
     if (!axes_fit_resolution(&abuffer->base, layers, &fitted, error))
         return false;
     abuffer->fitted = fitted;
@@ -109,9 +107,11 @@ static bool place(struct abuffer *abuffer, const struct gpu_scene *scene, const 
 {
     struct abuffer_store *store = &abuffer->store;
     struct axes_box box;
-    if (!axes_box_place(&box, scene, instances, count, abuffer->resolution, error) ||
-        !fit(abuffer, scene, instances, count, &box, error) ||
-        !axes_box_place(&box, scene, instances, count, abuffer->fitted, error))
+    if ((abuffer->fitted == 0 || abuffer->fitted_instances != count) &&
+        (!axes_box_place(&box, scene, instances, count, abuffer->resolution, error) ||
+         !fit(abuffer, scene, instances, count, &box, error)))
+        return false;
+    if (!axes_box_place(&box, scene, instances, count, abuffer->fitted, error))
         return false;
     memcpy(store->lower_world, box.lower_world, sizeof(store->lower_world));
     store->cell_world = box.cell_world;

@@ -175,19 +175,19 @@ static bool place_part(struct ldc_part *fresh, const struct ldc_part *before, co
                        const struct ldc_parts_settings *settings, struct error *error)
 {
     const uint32_t *instances = fresh->instances, count = fresh->count;
-    if (!axes_box_place(&fresh->box, scene, instances, count, settings->resolution, error))
+    const bool is_counted = before->resolution > 0 && same_bodies(before, fresh);
+    uint32_t resolution = is_counted ? before->resolution : settings->resolution;
+    if (!axes_box_place(&fresh->box, scene, instances, count, resolution, error))
         return false;
-    if (count == 0)
-        return true;
-    fresh->resolution = before->resolution;
-    if (before->resolution == 0 || !same_bodies(before, fresh)) {
-        const double longest_world = (double)fresh->box.cell_world * settings->resolution;
+    if (count > 0 && !is_counted) {
+        const double longest_world = (double)fresh->box.cell_world * resolution;
         const double layers = axes_mean_layers(scene, instances, count, settings->overlap, longest_world);
-        fresh->resolution = settings->resolution;
-        if (!axes_fit_resolution(settings->tracer, layers, &fresh->resolution, error))
+        if (!axes_fit_resolution(settings->tracer, layers, &resolution, error) ||
+            !axes_box_place(&fresh->box, scene, instances, count, resolution, error))
             return false;
     }
-    return axes_box_place(&fresh->box, scene, instances, count, fresh->resolution, error);
+    fresh->resolution = count > 0 ? resolution : 0;
+    return true;
 }
 
 bool ldc_parts_update(struct ldc_parts *parts, const struct gpu_scene *scene,

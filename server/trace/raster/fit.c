@@ -128,9 +128,9 @@ bool axes_fit_resolution(const struct tracer *tracer, double layers, uint32_t *r
 void axes_fit_tell(struct structure_row *resolution, uint32_t wanted)
 {
     if (resolution->number < wanted)
-        snprintf(
-            resolution->warning, sizeof(resolution->warning),
-            "%llu instead of %u texels along a side, as the scene is too deep: what is smaller than a cell may be "
-            "missing (choose another tracer, such as bvh)",
-            (unsigned long long)resolution->number, wanted);
+        snprintf(resolution->warning, sizeof(resolution->warning),
+                 "%llu instead of %u texels along a side, as the scene has too many layers: what is smaller than "
+                 "a cell may be "
+                 "missing (choose another tracer, such as bvh)",
+                 (unsigned long long)resolution->number, wanted);
 }
