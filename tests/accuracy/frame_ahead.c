@@ -59,12 +59,12 @@ TEST(every_integrator_and_tracer_gives_the_same_picture_and_waits_once)
 {
     struct fixture *fixture = *state;
     fixture_mixture(fixture);
-    fixture->request.width = 48;
-    fixture->request.height = 36;
+    fixture->request.width = 24;
+    fixture->request.height = 18;
     static const struct form {
         unsigned integrator, depth, samples;
     } forms[] = {{INTEGRATOR_WHITTED, 4, 1},
-                 {INTEGRATOR_DISTRIBUTED, 4, 16},
+                 {INTEGRATOR_DISTRIBUTED, 4, 4},
                  {INTEGRATOR_PATH, 4, 3},
                  {INTEGRATOR_AO, 1, 2},
                  {INTEGRATOR_RAYCAST, 4, 1}};
@@ -88,6 +88,8 @@ TEST(what_a_tracer_counts_of_the_waves_comes_with_the_picture)
 {
     struct fixture *fixture = *state;
     fixture_mixture(fixture);
+    fixture->request.width = 48;
+    fixture->request.height = 36;
     fixture->request.tracer = TRACER_RAYSPACE;
     fixture->request.integrator = INTEGRATOR_WHITTED;
     fixture->request.depth = 4;
