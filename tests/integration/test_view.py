@@ -375,8 +375,8 @@ class MadeHere(Viewer):
 
     def test_both_eyes_are_made_from_one_picture(self):
         """Of the middle, from before the daemon was gone: at rest it sends both eyes, which views are not made from."""
-        size = (320, 360)
-        for layout, eye in (("side", (160, 360)), ("over", (320, 180))):
+        size = (240, 270)
+        for layout, eye in (("side", (120, 270)), ("over", (240, 135))):
             with self.subTest(layout=layout):
                 eyes = ["--stereo", "0.1", "--stereo-layout", layout]
                 moves = drag(160, 90, 20, 0)
@@ -538,14 +538,15 @@ class OnADaemon(Viewer):
 
     def test_over_tcp_pictures_travel_encoded_and_rest_without_loss(self):
         # On a busy machine the first frame in motion may take longer than the key is held at first.
-        moves = [event for seconds in (1, 2, 4) for event in ({"key": "d", "hold": seconds}, {"state": f"moving {seconds}"})]
+        size = (160, 90)
+        moves = [event for seconds in (0.5, 1, 2) for event in ({"key": "d", "hold": seconds}, {"state": f"moving {seconds}"})]
         events = [rest(), *moves, {"key": "home"}, rest(8), {"state": "resting"}, *HIDE, {"screenshot": "tcp.png"}]
         with Daemon(listen="tcp:127.0.0.1:0") as daemon:
             address = next(line for line in daemon.ready if "tcp:" in line).split()[-1]
-            states = self.replay(events, "--server", address)
+            states = self.replay(events, "--server", address, size=size)
         self.assertIn(("h264", True), [(state["encoding"], state["moving"]) for name, state in states.items() if "moving " in name])
         self.assertEqual((states["resting"]["encoding"], states["resting"]["moving"]), ("predicted", False))
-        self.replay([rest(8), *HIDE, {"screenshot": "private.png"}])
+        self.replay([rest(8), *HIDE, {"screenshot": "private.png"}], size=size)
         self.assertEqual(difference(self.folder / "tcp.png", self.folder / "private.png"), 0)
 
     def test_a_cut_connection_comes_back_to_the_scene_that_the_daemon_kept(self):
