@@ -47,10 +47,11 @@ NOT_SANITIZED = re.compile(
     r"|contract/(.*(ray alone|packets of|rays? a call)|bvh in the plain|ldc|abuffer|rayspace, |quadtree)"
     r"|test_(abuffer|animate|compare|import_animation|layers|ldc|light|models|poses|shot|siege|view)$")
 # Where no times of an earlier run are known: what takes longest begins first.
-LONGEST_FIRST = ("accuracy/sampled_against_reference", "test_import", "test_light", "test_models", "test_view", "test_compare",
-                 "accuracy/frame_steps", "test_poses", "test_animate", "contract/bvh, packets of eight",
-                 "test_import_animation", "contract/bvh", "test_units", "unit/trace/ldc/limits", "unit/trace/ldc/traversal",
-                 "test_soak")
+LONGEST_FIRST = ("test_view", "test_import", "accuracy/sampled_against_reference", "accuracy/frame_ahead", "accuracy/emitters",
+                 "test_light", "test_models", "test_siege", "accuracy/distributed", "test_animate", "test_compare", "test_drill",
+                 "test_compare_tracers", "test_abuffer", "accuracy/path_light", "contract/quadtree", "unit/trace/ldc/traversal",
+                 "contract/rayspace, flat, by spheres, in batches of 256", "test_check_device", "test_poses", "test_quadtree",
+                 "test_staying_up", "test_sealed", "test_units")
 
 # Driver stacks beside the default one: what chooses it, and what the daemon must then say that it renders with.
 # zink is OpenGL 4.6 over Vulkan, here on lavapipe (mesa-vulkan-drivers).
