@@ -29,6 +29,18 @@ static int take_for_what_it_is(void **state)
 ALL_TESTS(take_for_hardware, take_for_what_it_is)
 EACH_TEST(fixture_clear, NULL)
 
+/* One that waits for its counts, and one that does not. */
+static void render_both(struct fixture *fixture, struct frame_result *waiting, struct frame_result *ahead)
+{
+    frame_renderer_queue_ahead(fixture->renderer, false);
+    *waiting = fixture_render(fixture);
+    frame_renderer_queue_ahead(fixture->renderer, true);
+    *ahead = fixture_render(fixture);
+    assert_same_picture(waiting, ahead);
+    assert_int_equal(ahead->shadow_rays, waiting->shadow_rays);
+    assert_int_equal(ahead->secondary_rays, waiting->secondary_rays);
+}
+
 /* The second of two frames: the first compiles, and brings the scene to the device. */
 static struct frame_result render(struct fixture *fixture, bool ahead)
 {
@@ -59,12 +71,12 @@ TEST(every_integrator_and_tracer_gives_the_same_picture_and_waits_once)
 {
     struct fixture *fixture = *state;
     fixture_mixture(fixture);
-    fixture->request.width = 48;
-    fixture->request.height = 36;
+    fixture->request.width = 24;
+    fixture->request.height = 18;
     static const struct form {
         unsigned integrator, depth, samples;
     } forms[] = {{INTEGRATOR_WHITTED, 4, 1},
-                 {INTEGRATOR_DISTRIBUTED, 4, 16},
+                 {INTEGRATOR_DISTRIBUTED, 4, 4},
                  {INTEGRATOR_PATH, 4, 3},
                  {INTEGRATOR_AO, 1, 2},
                  {INTEGRATOR_RAYCAST, 4, 1}};
@@ -88,6 +100,8 @@ TEST(what_a_tracer_counts_of_the_waves_comes_with_the_picture)
 {
     struct fixture *fixture = *state;
     fixture_mixture(fixture);
+    fixture->request.width = 48;
+    fixture->request.height = 36;
     fixture->request.tracer = TRACER_RAYSPACE;
     fixture->request.integrator = INTEGRATOR_WHITTED;
     fixture->request.depth = 4;
@@ -141,12 +155,8 @@ TEST(layers_are_the_same)
     fixture_mixture(fixture);
     fixture->request.layers = (1u << LAYER_COUNT) - 1;
     fixture->request.samples = 4;
-    frame_renderer_queue_ahead(fixture->renderer, false);
-    struct frame_result waiting = fixture_render(fixture);
-    frame_renderer_queue_ahead(fixture->renderer, true);
-    struct frame_result ahead = fixture_render(fixture);
-    assert_same_picture(&waiting, &ahead);
-    assert_int_equal(ahead.shadow_rays, waiting.shadow_rays);
+    struct frame_result waiting, ahead;
+    render_both(fixture, &waiting, &ahead);
     frame_result_finish(&waiting);
     frame_result_finish(&ahead);
 }
@@ -205,12 +215,8 @@ TEST(rays_behind_the_last_queued_wave_are_not_lost)
     fixture->request.depth = 1;
     fixture->request.integrator = INTEGRATOR_RAYCAST;
     fixture->request.layer_opacity = 0.1f;
-    frame_renderer_queue_ahead(fixture->renderer, false);
-    struct frame_result waiting = fixture_render(fixture);
-    frame_renderer_queue_ahead(fixture->renderer, true);
-    struct frame_result ahead = fixture_render(fixture);
-    assert_same_picture(&waiting, &ahead);
-    assert_int_equal(ahead.secondary_rays, waiting.secondary_rays);
+    struct frame_result waiting, ahead;
+    render_both(fixture, &waiting, &ahead);
     assert_true(waiting.secondary_rays >= PANES);
     frame_result_finish(&waiting);
     frame_result_finish(&ahead);

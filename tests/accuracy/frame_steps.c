@@ -151,6 +151,7 @@ TEST(every_tracer_finds_the_same_in_parts)
     fixture->request.samples = 2;
     fixture->request.integrator = INTEGRATOR_PATH;
     fixture->request.primary = PRIMARY_TRACE;
+    fixture->request.tracer_options.ldc.resolution = fixture->request.tracer_options.abuffer.resolution = 128;
     for (unsigned tracer = 0; tracer < TRACER_COUNT; tracer++)
         if (tracer_impl_by_number(tracer))
             expect_short_steps(fixture, tracer, tracer_impl_by_number(tracer)->name);
@@ -158,35 +159,33 @@ TEST(every_tracer_finds_the_same_in_parts)
 
 /* ---- triangles ---- */
 
-enum { COLUMNS = 400, ROWS = 300, TRIANGLES = COLUMNS * ROWS * 2 };
-
-/* A hilly field of more triangles than are drawn in one step. */
-static void a_field(struct fixture *fixture, uint32_t material)
+/* A hilly field of so many squares, each of two triangles, shown twice. */
+static void a_field(struct fixture *fixture, uint32_t material, uint32_t columns, uint32_t rows)
 {
-    enum { VERTICES = (COLUMNS + 1) * (ROWS + 1) };
-    float(*positions)[3] = malloc(VERTICES * sizeof(*positions));
-    uint32_t(*indices)[6] = malloc((size_t)COLUMNS * ROWS * sizeof(*indices));
+    const uint32_t vertices = (columns + 1) * (rows + 1), squares = columns * rows;
+    float(*positions)[3] = malloc(vertices * sizeof(*positions));
+    uint32_t(*indices)[6] = malloc(squares * sizeof(*indices));
     assert_non_null(positions);
     assert_non_null(indices);
-    for (uint32_t v = 0; v < VERTICES; v++) {
-        float x = (float)(v % (COLUMNS + 1)) / COLUMNS, y = (float)(v / (COLUMNS + 1)) / ROWS;
+    for (uint32_t v = 0; v < vertices; v++) {
+        float x = (float)(v % (columns + 1)) / (float)columns, y = (float)(v / (columns + 1)) / (float)rows;
         positions[v][0] = 4.0f * x - 2.0f;
         positions[v][1] = 4.0f * y - 2.0f;
         positions[v][2] = 0.2f * sinf(9.0f * x) * cosf(7.0f * y);
     }
-    for (uint32_t i = 0; i < COLUMNS * ROWS; i++) {
-        uint32_t a = i / COLUMNS * (COLUMNS + 1) + i % COLUMNS, b = a + COLUMNS + 1;
+    for (uint32_t i = 0; i < squares; i++) {
+        uint32_t a = i / columns * (columns + 1) + i % columns, b = a + columns + 1;
         memcpy(indices[i], (uint32_t[6]){a, a + 1, b, a + 1, b + 1, b}, sizeof(indices[i]));
     }
     struct scene_mesh *mesh = &fixture_edit(fixture, OBJECT_MESH)->set.mesh;
     mesh->base.id = fixture->next_id++;
-    mesh->vertex_count = VERTICES;
-    mesh->triangle_count = TRIANGLES;
-    mesh->arrays[MESH_POSITIONS] = fixture_blob(positions, VERTICES * sizeof(*positions));
-    mesh->arrays[MESH_INDICES] = fixture_blob(indices, (size_t)COLUMNS * ROWS * sizeof(*indices));
+    mesh->vertex_count = vertices;
+    mesh->triangle_count = 2 * squares;
+    mesh->arrays[MESH_POSITIONS] = fixture_blob(positions, vertices * sizeof(*positions));
+    mesh->arrays[MESH_INDICES] = fixture_blob(indices, squares * sizeof(*indices));
     mesh->ranges = calloc(1, sizeof(*mesh->ranges));
     assert_non_null(mesh->ranges);
-    *mesh->ranges = (struct material_range){0, TRIANGLES, material};
+    *mesh->ranges = (struct material_range){0, 2 * squares, material};
     mesh->range_count = 1;
     fixture_node(fixture, NODE_MESH, mesh->base.id, NULL);
     const float above[12] = {0.4f, 0, 0, 0.3f, 0, 0.4f, 0, 0.2f, 0, 0, 0.4f, 0.5f}; /* a second instance */
@@ -220,7 +219,7 @@ TEST(many_triangles_are_drawn_in_parts_and_none_is_left_out)
     struct fixture *fixture = *state;
     struct scene_material *ground = fixture_material(fixture), *ball = fixture_material(fixture);
     ball->base_colour[0] = 0.2f;
-    a_field(fixture, ground->base.id);
+    a_field(fixture, ground->base.id, 400, 300);                     /* more than are drawn in one step */
     fixture_sphere(fixture, -0.8f, 0.4f, 0.4f, 0.4f, ball->base.id); /* drawn after all triangles */
     fixture_light(fixture, LIGHT_DIRECTIONAL, 0.0f, 0.0f, 0.0f, 3.0f);
     fixture_commit(fixture);
@@ -251,7 +250,7 @@ static void a_field_and_a_ball(struct fixture *fixture)
     struct scene_material *ground = fixture_material(fixture), *ball = fixture_material(fixture);
     ball->metallic = 1.0f;
     ball->roughness = 0.1f;
-    a_field(fixture, ground->base.id);
+    a_field(fixture, ground->base.id, 200, 150);
     fixture_sphere(fixture, -0.8f, 0.4f, 0.4f, 0.4f, ball->base.id);
     fixture_light(fixture, LIGHT_DIRECTIONAL, 0.0f, 0.0f, 0.0f, 3.0f);
     fixture_commit(fixture);

@@ -176,7 +176,7 @@ TEST(shadow_rays_and_rays_that_go_on_find_the_same_light)
                 else
                     a_glowing_square(fixture, way == 3);
                 fixture->request.brdf = ward ? BRDF_WARD : BRDF_GGX;
-                fixture->request.samples = way < 2 ? 8 : 32;
+                fixture->request.samples = way == 2 ? 32 : 8; /* what is met alone is noisier */
                 ways[way] = mean_of_seeds(fixture, whole);
             }
             print_message(
@@ -347,7 +347,7 @@ TEST(a_small_bright_sun_converges)
      */
     expected_value = under_the_image(0.125, u, v, 4096.0);
     for (uint32_t depth = 0; depth < 2; depth++)
-        for (uint32_t samples = 2; samples <= 128; samples *= 8) {
+        for (uint32_t samples = 2; samples <= 32; samples *= 4) {
             path_begin(fixture, TRACER_REFERENCE, depth);
             a_floor(fixture, 1.0f);
             an_image(fixture, 0.125f, u, v, 4096.0f);

@@ -111,11 +111,11 @@ class WithoutAWindow(Viewer):
 
     def test_a_key_shows_both_eyes_and_one(self):
         """Each is the picture that render makes, beside or above the other; the reference renders both."""
-        eyes = ["--stereo", "0.25", "--integrator", "whitted"]
+        eyes = ["--stereo", "0.25", "--integrator", "whitted", "--samples", "4"]
         for layout, parts in (("side", (2, 1)), ("over", (1, 2))):
             with self.subTest(layout=layout):
-                states = self.replay([rest(8), {"state": "from layers"}, {"key": "b", "shift": True}, rest(8),
-                                      {"state": "rendered"}, *HIDE, {"screenshot": "view.png"}, {"key": "b"}, rest(8),
+                states = self.replay([rest(4), {"state": "from layers"}, {"key": "b", "shift": True}, rest(4),
+                                      {"state": "rendered"}, *HIDE, {"screenshot": "view.png"}, {"key": "b"}, rest(4),
                                       {"state": "one"}], *eyes, "--stereo-layout", layout)
                 self.assertEqual([(state["stereo"], state["eyes"]) for state in states.values()],
                                  [(True, "layers"), (True, "rays"), (False, "rays")])
@@ -124,8 +124,8 @@ class WithoutAWindow(Viewer):
                 for state in states.values():
                     self.assertEqual((state["width"], state["height"]), SIZE)
                 self.expect(farlight("render", bundled_scenes() / "teapot.glb", "-q", "-o", self.folder / "render.png",
-                                     "--size", f"{SIZE[0] // parts[0]}x{SIZE[1] // parts[1]}", "--samples", "8",
-                                     "--progressive", "--stereo-layout", layout, "--views", "rays", *eyes), 0)
+                                     "--size", f"{SIZE[0] // parts[0]}x{SIZE[1] // parts[1]}", "--progressive",
+                                     "--stereo-layout", layout, "--views", "rays", *eyes), 0)
                 self.assertLess(difference(self.folder / "view.png", self.folder / "render.png"), 0.05)
 
     def test_with_both_eyes_errors_are_those_against_rendered_views(self):
@@ -162,14 +162,14 @@ class WithoutAWindow(Viewer):
 
     def test_motion_may_travel_as_video_and_rest_without_loss(self):
         """It moves for a second or so, a little at a time: what is shown then has been a stream, afterwards not."""
-        moves = [{"mouse": "move", "x": 220 + step / 10, "y": 110, "after": 0.03} for step in range(40)]
-        let_go = {"mouse": "up", "button": "left", "x": 224, "y": 110}
+        moves = [{"mouse": "move", "x": 110 + step / 20, "y": 55, "after": 0.03} for step in range(40)]
+        let_go = {"mouse": "up", "button": "left", "x": 112, "y": 55}
         states = {}
         for motion, still in (("h264", "predicted"), ("raw", "raw")):
-            states[motion] = self.replay([rest(8), *HIDE, drag(160, 90, 0, 0)[0], *moves, {"state": "moving"},
+            states[motion] = self.replay([rest(8), *HIDE, drag(80, 45, 0, 0)[0], *moves, {"state": "moving"},
                                           {"screenshot": f"moving-{motion}.png"}, let_go, rest(8), {"state": "rested"},
                                           {"screenshot": f"rested-{motion}.png"}],
-                                         "--encoding", motion, "--still-encoding", still, "--no-adapt")
+                                         "--encoding", motion, "--still-encoding", still, "--no-adapt", size=(160, 90))
         self.assertEqual([states["h264"][when]["encoding"] for when in ("moving", "rested")], ["h264", "predicted"])
         self.assertEqual(states["h264"]["rested"]["eye"], states["raw"]["rested"]["eye"])
         moving, rested, exact = (self.folder / name for name in ("moving-h264.png", "rested-h264.png", "rested-raw.png"))
@@ -179,17 +179,17 @@ class WithoutAWindow(Viewer):
 
     def test_what_moves_gives_way_to_the_rate_and_rest_is_the_full_picture(self):
         """No software renders a thousand frames a second: all that may be given up is, whatever else the machine does."""
-        moves = [{"mouse": "move", "x": 220 + step / 10, "y": 110, "after": 0.03} for step in range(40)]
-        let_go = {"mouse": "up", "button": "left", "x": 224, "y": 110}
-        states = {}
+        moves = [{"mouse": "move", "x": 110 + step / 20, "y": 55, "after": 0.03} for step in range(40)]
+        let_go = {"mouse": "up", "button": "left", "x": 112, "y": 55}
+        size, states = (160, 90), {}
         for rate in (1000, 0):
-            states[rate] = self.replay([rest(8), *HIDE, drag(160, 90, 0, 0)[0], *moves, {"state": "moving"}, let_go, rest(8),
+            states[rate] = self.replay([rest(8), *HIDE, drag(80, 45, 0, 0)[0], *moves, {"state": "moving"}, let_go, rest(8),
                                         {"state": "rested"}, {"screenshot": f"rested-{rate}.png"}],
-                                       "--views", "off", "--moving-rate", rate)
+                                       "--views", "off", "--moving-rate", rate, size=size)
         self.assertEqual([(states[rate]["moving"]["width"], states[rate]["moving"]["depth_less"]) for rate in (1000, 0)],
-                         [(SIZE[0] // 4, 6), (SIZE[0], 0)])
+                         [(size[0] // 4, 6), (size[0], 0)])
         self.assertEqual([(states[rate]["rested"]["width"], states[rate]["rested"]["depth_less"]) for rate in (1000, 0)],
-                         [(SIZE[0], 0)] * 2)
+                         [(size[0], 0)] * 2)
         self.assertEqual(states[1000]["rested"]["eye"], states[0]["rested"]["eye"])
         self.assertEqual(difference(*(self.folder / f"rested-{rate}.png" for rate in (1000, 0))), 0)
 
@@ -269,20 +269,20 @@ class WithoutAWindow(Viewer):
         self.assertEqual(states["home"]["camera"], "")
 
     def test_a_camera_that_a_clip_moves_is_followed_until_a_hand_leads(self):
-        scene = self.folder / "riding.glb"
+        scene, size = self.folder / "riding.glb", (160, 90)
         riding_camera(bundled_scenes() / "carousel.glb", scene)
         states = self.replay([rest(), {"state": "first"}, {"key": "v"}, {"after": 0.5}, {"key": "space"}, rest(8),
-                              {"state": "ridden"}, *HIDE, {"screenshot": "ridden.png"}, *drag(160, 90, 40, 0), rest(),
+                              {"state": "ridden"}, *HIDE, {"screenshot": "ridden.png"}, *drag(80, 45, 40, 0), rest(),
                               {"state": "led"}, {"key": "right"}, rest(), {"state": "left alone"}, {"key": "c"},
                               rest(), {"state": "back"}, {"key": "right"}, rest(), {"state": "stepped"}, {"key": "x"},
-                              rest(8), {"state": "true"}], scene=scene)
+                              rest(8), {"state": "true"}], scene=scene, size=size)
         self.assertGreater(distance(states["first"]["eye"], states["ridden"]["eye"]), 0.1)
         self.assertGreater(distance(states["ridden"]["eye"], states["led"]["eye"]), 0.1)
         self.assertEqual(states["led"]["eye"], states["left alone"]["eye"])
         self.assertGreater(states["left alone"]["time_s"], states["led"]["time_s"])
         self.assertGreater(distance(states["back"]["eye"], states["stepped"]["eye"]), 0.01)
         self.assertLess(states["true"]["errors"]["mean"], 1e-4)  # the reference looks from there, too
-        result = farlight("render", scene, "-q", "-o", self.folder / "render.png", "--size", f"{SIZE[0]}x{SIZE[1]}",
+        result = farlight("render", scene, "-q", "-o", self.folder / "render.png", "--size", f"{size[0]}x{size[1]}",
                           "--samples", "8", "--integrator", "whitted", "--progressive", "--camera", "camera", "--clip",
                           "ride", "--time", f"{states['ridden']['time_s']:.9g}")
         self.expect(result, 0)
@@ -375,8 +375,8 @@ class MadeHere(Viewer):
 
     def test_both_eyes_are_made_from_one_picture(self):
         """Of the middle, from before the daemon was gone: at rest it sends both eyes, which views are not made from."""
-        size = (320, 360)
-        for layout, eye in (("side", (160, 360)), ("over", (320, 180))):
+        size = (240, 270)
+        for layout, eye in (("side", (120, 270)), ("over", (240, 135))):
             with self.subTest(layout=layout):
                 eyes = ["--stereo", "0.1", "--stereo-layout", layout]
                 moves = drag(160, 90, 20, 0)
@@ -401,7 +401,7 @@ class MadeHere(Viewer):
         self.assertEqual(difference(self.folder / "on.png", self.folder / "off.png"), 0)
 
     def test_a_view_is_near_to_what_is_rendered_from_there(self):
-        size = (320, 360)
+        size = (240, 270)
         state, before, made = self.moved_while_lost("made", size=size)
         self.assertEqual((state["status"], state["local"]["shown"], state["local"]["quality"]), ("lost", True, "tree"))
         self.assertGreater(state["local"]["made"], 0)
@@ -414,10 +414,10 @@ class MadeHere(Viewer):
 
     def test_views_come_faster_than_pictures_of_a_slow_daemon_and_end_in_its_own(self):
         """Path tracing with many samples a frame takes many frames of a display, on any machine of today."""
-        slow = ["--integrator", "path", "--samples", "64", "--pass-samples", "64"]
+        slow = ["--integrator", "path", "--samples", "16", "--pass-samples", "16"]
         moves = [{"mouse": "move", "x": 30 + step, "y": 45, "after": 0.02} for step in range(1, 101)]
-        events = [rest(8), {"state": "first"}, drag(30, 45, 0, 0)[0], *moves, {"state": "moving"},
-                  {"mouse": "up", "button": "left", "x": 130, "y": 45}, rest(64), {"state": "rested"}, *HIDE,
+        events = [rest(1), {"state": "first"}, drag(30, 45, 0, 0)[0], *moves, {"state": "moving"},
+                  {"mouse": "up", "button": "left", "x": 130, "y": 45}, rest(16), {"state": "rested"}, *HIDE,
                   {"screenshot": "rested.png"}]
         states = self.replay(events, "--views", "on", *slow, size=(160, 90))
         moving = states["moving"]["local"]
@@ -538,14 +538,15 @@ class OnADaemon(Viewer):
 
     def test_over_tcp_pictures_travel_encoded_and_rest_without_loss(self):
         # On a busy machine the first frame in motion may take longer than the key is held at first.
-        moves = [event for seconds in (1, 2, 4) for event in ({"key": "d", "hold": seconds}, {"state": f"moving {seconds}"})]
+        size = (160, 90)
+        moves = [event for seconds in (0.5, 1, 2) for event in ({"key": "d", "hold": seconds}, {"state": f"moving {seconds}"})]
         events = [rest(), *moves, {"key": "home"}, rest(8), {"state": "resting"}, *HIDE, {"screenshot": "tcp.png"}]
         with Daemon(listen="tcp:127.0.0.1:0") as daemon:
             address = next(line for line in daemon.ready if "tcp:" in line).split()[-1]
-            states = self.replay(events, "--server", address)
+            states = self.replay(events, "--server", address, size=size)
         self.assertIn(("h264", True), [(state["encoding"], state["moving"]) for name, state in states.items() if "moving " in name])
         self.assertEqual((states["resting"]["encoding"], states["resting"]["moving"]), ("predicted", False))
-        self.replay([rest(8), *HIDE, {"screenshot": "private.png"}])
+        self.replay([rest(8), *HIDE, {"screenshot": "private.png"}], size=size)
         self.assertEqual(difference(self.folder / "tcp.png", self.folder / "private.png"), 0)
 
     def test_a_cut_connection_comes_back_to_the_scene_that_the_daemon_kept(self):

@@ -6,7 +6,7 @@ Usage: run_tests.py BUILD_FOLDER [PART_OF_A_NAME ..]      /scene/ is the folder 
 C tests are cmocka programs below BUILD_FOLDER/tests that hold many files of tests; each file runs in a process of its
 own. Integration tests are unittest modules in tests/integration, which find the programs through FARLIGHT_BIN. The
 rules of the sources are checked first. Files and modules run side by side, as most of them leave processors idle:
-FARLIGHT_TEST_JOBS at a time (default: one more than there are processors, at most 4), those first that took longest
+FARLIGHT_TEST_JOBS at a time (default: two more than there are processors, at most 4), those first that took longest
 the last time. With CI=true in the environment, a skipped test fails unless EXPECTED_SKIPS names its reason.
 FARLIGHT_TEST_SANITIZED=1 leaves out where the sanitizers see little for their time (NOT_SANITIZED).
 FARLIGHT_TEST_STACK=zink runs what depends on the driver on another driver stack than Mesa's default (STACKS): without a
@@ -44,13 +44,14 @@ EXPECTED_SKIPS = (
 # (their rooms' unit tests stay), and programs from end to end where pictures are compared.
 NOT_SANITIZED = re.compile(
     r"accuracy/(?!render_frame|tracer_owners|wave_comparison)"
-    r"|contract/(.*(ray alone|packets of|rays? a call)|ldc|abuffer|quadtree)"
+    r"|contract/(.*(ray alone|packets of|rays? a call)|bvh in the plain|ldc|abuffer|rayspace, |quadtree)"
     r"|test_(abuffer|animate|compare|import_animation|layers|ldc|light|models|poses|shot|siege|view)$")
 # Where no times of an earlier run are known: what takes longest begins first.
-LONGEST_FIRST = ("accuracy/sampled_against_reference", "test_import", "test_light", "test_models", "test_view", "test_compare",
-                 "accuracy/frame_steps", "test_poses", "test_animate", "contract/bvh, packets of eight",
-                 "test_import_animation", "contract/bvh", "test_units", "unit/trace/ldc/limits", "unit/trace/ldc/traversal",
-                 "test_soak")
+LONGEST_FIRST = ("test_view", "test_import", "accuracy/sampled_against_reference", "accuracy/frame_ahead", "accuracy/emitters",
+                 "test_light", "test_models", "test_siege", "accuracy/distributed", "test_animate", "test_compare", "test_drill",
+                 "test_compare_tracers", "test_abuffer", "accuracy/path_light", "contract/quadtree", "unit/trace/ldc/traversal",
+                 "contract/rayspace, flat, by spheres, in batches of 256", "test_check_device", "test_poses", "test_quadtree",
+                 "test_staying_up", "test_sealed", "test_units")
 
 # Driver stacks beside the default one: what chooses it, and what the daemon must then say that it renders with.
 # zink is OpenGL 4.6 over Vulkan, here on lavapipe (mesa-vulkan-drivers).
@@ -63,8 +64,9 @@ ON_A_STACK = re.compile(r"accuracy/|contract/|unit/(gpu|gpu_scene|render|trace)/
 # which is GLSL's arithmetic again; the lengths of steps; forms of a tracer that differ in constants of a shader, or in
 # what the host does; what fills memory up to limits; commands that differ from those of test_stacks in files and options.
 LONG_ON_A_STACK = re.compile(
-    r"accuracy/(bsdf|sampling|sampled_against_reference|shading_.*|path_light|depth_of_field|frame_steps)"
-    r"|contract/(bvh, (one ray alone|packets of)|reference, |ldc by|abuffer, |quadtree, (of one layer|of boxes|texel by texel))"
+    r"accuracy/(bsdf|sampling|sampled_against_reference|shading_.*|path_light|distributed_light|emitters|energy|fireflies"
+    r"|depth_of_field|frame_steps)"
+    r"|contract/(bvh, (one ray alone|packets of)|reference, |ldc by|abuffer, |rayspace, flat, by|quadtree, (of one layer|of boxes|texel by texel))"
     r"|unit/trace/(abuffer|ldc)/(limits|traversal)|unit/trace/bvh/history"
     r"|test_(render|ldc|abuffer|animate|carousel|light|poses)$")
 # Compares two stacks.
@@ -243,7 +245,7 @@ def run_all(build, names):
     if not names and not os.environ.get("FARLIGHT_TEST_STACK"):
         sums.add(run_check("include rules", [sys.executable, "tests/tools/check_includes.py"]))
         sums.add(run_check("headers alone", ["make", "-s", "check-headers"]))
-    jobs = int(os.environ.get("FARLIGHT_TEST_JOBS") or min(JOBS_MAX, len(os.sched_getaffinity(0)) + 1))
+    jobs = int(os.environ.get("FARLIGHT_TEST_JOBS") or min(JOBS_MAX, len(os.sched_getaffinity(0)) + 2))
     times_path = build / f"test_times{os.environ.get('FARLIGHT_TEST_STACK', '')}.json"
     times, todo, took = known_times(times_path), tasks(build, names), {}
     with concurrent.futures.ThreadPoolExecutor(jobs) as pool:

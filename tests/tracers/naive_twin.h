@@ -469,14 +469,14 @@ static inline void twin_sphere(struct twin_answer *answer, const struct scene_in
         shrink =
             fmax(shrink, sqrt((double)m[k] * m[k] + (double)m[4 + k] * m[4 + k] + (double)m[8 + k] * m[8 + k]));
     }
-    /* The longest half axis of the ellipsoid by the square of the shortest. */
-    const double bend = twin_stretch(instance->world_from_object) *
-                        pow(twin_stretch(instance->object_from_world), 2) / (double)sphere[3];
     double beside = sqrt(fmax(twin_dot(from, from) - b * b / a, 0)) - sphere[3];
     if (fabs(beside) < answer->twin->blur.near_world * shrink)
         twin_is_close(answer, fmin(fmax(-b / a, answer->t_min), answer->t_max));
     if (discriminant < 0)
         return;
+    /* The longest half axis of the ellipsoid by the square of the shortest. */
+    const double bend = twin_stretch(instance->world_from_object) *
+                        pow(twin_stretch(instance->object_from_world), 2) / (double)sphere[3];
     for (int side = -1; side <= 1; side += 2) {
         struct twin_intersection intersection = {.hit = {.node = instance->node->base.id, .colour = {1, 1, 1, 1}}};
         struct twin_hit *hit = &intersection.hit;

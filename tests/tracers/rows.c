@@ -67,8 +67,8 @@ static const struct tracer_row rows[] = {
     }
     RAYSPACE("", .rayspace.mode = RAYSPACE_MODE_JOINT),
     RAYSPACE(", flat", .rayspace.mode = RAYSPACE_MODE_FLAT),
-    RAYSPACE(", flat, by spheres, in batches of 64", .rayspace.mode = RAYSPACE_MODE_FLAT,
-             .rayspace.bounds = RAYSPACE_BOUNDS_SPHERE, .rayspace.batch = 64),
+    RAYSPACE(", flat, by spheres, in batches of 256", .rayspace.mode = RAYSPACE_MODE_FLAT,
+             .rayspace.bounds = RAYSPACE_BOUNDS_SPHERE, .rayspace.batch = 256),
     RAYSPACE(", sorted, turned round, in four rounds, reduced by segments", .rayspace.sort = RAYSPACE_CHANCE_ON,
              .rayspace.turn = RAYSPACE_CHANCE_ON, .rayspace.rounds = 4,
              .rayspace.reduce = RAYSPACE_REDUCE_SEGMENTS),

@@ -704,7 +704,9 @@ SESSION_TEST(a_picture_at_rest_that_has_not_begun_is_dropped_when_motion_goes_on
     engine_command_destroy(start);
 }
 
-SESSION_TEST(a_view_that_adapts_tells_the_engine_what_the_link_carries)
+/* A view that adapts, as fast as can be, whose first frame of 300 KB takes so long on its way. In 0.1 s that is a
+ * link of 3 MB a second at most, or 3 KB in a millisecond. */
+static struct engine_command *start_view_on_a_slow_link(float margin, useconds_t way_us)
 {
     open_scene(1, 1);
     struct message message = view_message(100);
@@ -712,13 +714,20 @@ SESSION_TEST(a_view_that_adapts_tells_the_engine_what_the_link_carries)
     message.render.still_encoding = PROTOCOL_ENCODING_RAW;
     message.render.quality = 90;
     message.render.frames_per_second = 1000;
+    message.render.margin = margin;
     send_message(2, 0, &message);
     struct engine_command *start = told(ENGINE_JOB_START);
     assert_true(start->job.adapt);
-    say_frame(2, 0, 1); /* 300 KB and moving */
+    say_frame(2, 0, 1); /* moving */
     take_frame(2, 0);
-    usleep(100000);
-    send_ack(0, true, false); /* 3 MB a second at most, or 3 KB in a millisecond */
+    usleep(way_us);
+    send_ack(0, true, false);
+    return start;
+}
+
+SESSION_TEST(a_view_that_adapts_tells_the_engine_what_the_link_carries)
+{
+    struct engine_command *start = start_view_on_a_slow_link(0.0f, 100000);
     told_credit(2, 2);
     say_frame(2, 1, 3);
     take_frame(2, 1);
@@ -765,17 +774,7 @@ SESSION_TEST(a_view_that_keeps_a_rate_tells_the_engine_what_to_go_without)
 /* What is 3 KB a picture at 1000 a second is most of 300 at ten. */
 SESSION_TEST(pictures_with_a_margin_are_adapted_to_ten_a_second)
 {
-    open_scene(1, 1);
-    struct message message = view_message(100);
-    message.render.adapt = 1;
-    message.render.frames_per_second = 1000;
-    message.render.margin = 0.1f;
-    send_message(2, 0, &message);
-    struct engine_command *start = told(ENGINE_JOB_START);
-    say_frame(2, 0, 1); /* 300 KB and moving */
-    take_frame(2, 0);
-    usleep(100000);
-    send_ack(0, true, false);
+    struct engine_command *start = start_view_on_a_slow_link(0.1f, 100000);
     told_and_forgotten(ENGINE_JOB_CREDIT);
     say_frame(2, 1, 3);
     take_frame(2, 1);
@@ -786,18 +785,7 @@ SESSION_TEST(pictures_with_a_margin_are_adapted_to_ten_a_second)
 /* 300 KB in 0.1 s: neither a picture of 300 KB with what it hides fits ten a second, nor one with its margin. */
 SESSION_TEST(the_engine_is_told_what_a_client_with_its_own_views_goes_without)
 {
-    open_scene(1, 1);
-    struct message message = view_message(100);
-    message.render.adapt = 1;
-    message.render.quality = 90;
-    message.render.frames_per_second = 1000;
-    message.render.margin = 0.1f;
-    send_message(2, 0, &message);
-    struct engine_command *start = told(ENGINE_JOB_START);
-    say_frame(2, 0, 1);
-    take_frame(2, 0);
-    usleep(150000);
-    send_ack(0, true, false);
+    struct engine_command *start = start_view_on_a_slow_link(0.1f, 150000);
     told_and_forgotten(ENGINE_JOB_CREDIT);
     say_frame(2, 1, 3);
     take_frame(2, 1);

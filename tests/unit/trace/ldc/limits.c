@@ -32,12 +32,13 @@ static void expect_both_builds_alike(struct fixture *fixture, uint32_t resolutio
 
 ALL_TESTS(open_device, close_device)
 
-/* In whatever order they come: few for which there are slots, more, many that are sorted apart. */
+/* In whatever order they come: few for which there are slots, more, many that are sorted apart; the most, of which
+ * peeling makes a pass each over all, in one order. */
 TEST(many_layers_are_sorted)
 {
     static const uint32_t counts[] = {3, 9, 30, 120, 251};
     for (size_t i = 0; i < sizeof(counts) / sizeof(counts[0]); i++)
-        for (int order = FRONT_TO_BACK; order <= SHUFFLED; order++) {
+        for (int order = counts[i] > 120 ? SHUFFLED : FRONT_TO_BACK; order <= SHUFFLED; order++) {
             struct fixture fixture;
             fixture_init(&fixture, stack_scene(counts[i], (enum stack_order)order, false));
             expect_both_builds_alike(&fixture, RESOLUTION);
@@ -141,11 +142,11 @@ TEST(the_device_limits_the_layers)
     struct contents all, some;
     uint64_t limit = device->memory_limit_bytes;
     fixture_init(&fixture, stack_scene(250, SHUFFLED, false));
-    build_and_read(&fixture, &all, 4 * RESOLUTION);
+    build_and_read(&fixture, &all, 2 * RESOLUTION);
     fixture_finish(&fixture);
     fixture_init(&fixture, stack_scene(250, SHUFFLED, false));
-    device->memory_limit_bytes = device->memory_used_bytes + ((uint64_t)100 << 20);
-    build_and_read(&fixture, &some, 4 * RESOLUTION);
+    device->memory_limit_bytes = device->memory_used_bytes + ((uint64_t)25 << 20);
+    build_and_read(&fixture, &some, 2 * RESOLUTION);
     assert_in_range(some.cube.layers_kept, 20, 249);
     expect_nearest(&some, &all, some.cube.layers_kept);
     device->memory_limit_bytes = limit;
