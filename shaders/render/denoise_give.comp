@@ -24,6 +24,6 @@ void main()
     vec3 albedo = max(albedos[slot].rgb / count, vec3(DENOISE_ALBEDO_MIN));
     vec3 moved = mean_of(halves_of_words(texelFetch(light, place))) -
                  mean_of(halves_of_words(texelFetch(first_light, place)));
-    bool there = texelFetch(guides, place).x != DENOISE_NOTHING;
+    bool there = uintBitsToFloat(texelFetch(guides, place).y) > 0.0;
     denoised[slot] = vec4(there ? max(sum.rgb + strength * moved * albedo * count, vec3(0.0)) : sum.rgb, sum.a);
 }
