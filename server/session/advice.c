@@ -17,9 +17,11 @@
 #define OF_FIXED 1.5
 /* With as many bounces light goes into glass and out again. */
 #define DEPTH_MIN 2u
-/* How many times in a row the next better step must fit, with this room. */
+/* How many times in a row the next better step must fit, with this room: less than a step of a deadline's sizes
+ * is, or what it leaves unused would stay so. */
 #define BETTER_TIMES 8
 #define BETTER_ROOM 1.25
+#define BETTER_ROOM_OF_DEADLINE 1.1
 /* A client that makes its own views asks for a picture that often at least while it moves: one that is there by
  * then is better large than early. */
 #define LATE_NS 250e6
@@ -301,7 +303,8 @@ struct pacing_advice pacing_advise(struct pacing *pacing, unsigned quality_wante
     if (!pacing->advised.quality)
         pacing->advised = full_advice(pacing, quality_wanted);
     struct pacing_advice now = best_that_fits(pacing, quality_wanted, 1.0);
-    const struct pacing_advice with_room = best_that_fits(pacing, quality_wanted, BETTER_ROOM);
+    const double room = pacing->terms.deadline_ns ? BETTER_ROOM_OF_DEADLINE : BETTER_ROOM;
+    const struct pacing_advice with_room = best_that_fits(pacing, quality_wanted, room);
     if (!is_better(&now, &pacing->advised)) {
         pacing->better_count = 0;
     } else if (!is_better(&with_room, &pacing->advised)) {
