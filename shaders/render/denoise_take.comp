@@ -2,9 +2,9 @@
 // From the sums of a band to the strip: the light that falls at each pixel, as two halves, and the guide.
 
 #include "render/denoise.glsl"
+#include "render/denoise_count.glsl"
 
-uniform uint band_row;            // the first row of the band in the picture
-uniform float first_count, count; // samples of the first half, and of both
+uniform uint band_row; // the first row of the band in the picture
 
 layout(std430, binding = BIND_ACCUMULATION) readonly buffer accumulation_block { vec4 accumulation[]; };
 layout(std430, binding = BIND_DENOISE_HALF) readonly buffer half_block { vec4 first_half[]; };
@@ -19,9 +19,9 @@ void main()
     if (!pixel_of_item(pixel))
         return;
     uint slot = slot_of_pixel(uvec2(pixel.x, uint(pixel.y) + strip_row - band_row));
+    float count = samples_of_slot(slot), first_count = first_half_of(count), second_count = count - first_count;
     vec4 albedo = albedos[slot] / count, normal = normals[slot] / count;
     vec3 sum = accumulation[slot].rgb, first = first_half[slot].rgb, mean = sum / count, noise = vec3(0.0);
-    float second_count = count - first_count;
     if (second_count > 0.0)
         noise = (first / first_count - (sum - first) / second_count) * (sqrt(first_count * second_count) / count);
     vec3 divisor = max(albedo.rgb, vec3(DENOISE_ALBEDO_MIN));

@@ -88,8 +88,12 @@ static void bind_sums(struct denoise_sums *sums, const struct render_context *co
     gpu_buffer_bind_storage(denoise_sums_band(sums, DENOISE_SUM_ALBEDO, band), BIND_DENOISE_ALBEDO);
     gpu_buffer_bind_storage(denoise_sums_band(sums, DENOISE_SUM_NORMAL, band), BIND_DENOISE_NORMAL);
     gpu_uniform_uint(program, "band_row", picture_band_first_row(picture, band));
-    gpu_uniform_float(program, "first_count", (float)denoise_first_half(picture->samples));
-    gpu_uniform_float(program, "count", (float)picture->samples);
+    gpu_uniform_uint(program, "sample_count", picture->samples);
+    if (context->tile_samples) {
+        uint32_t first_slot;
+        (void)picture_band_slots(picture, band, &first_slot);
+        gpu_uniform_uint(program, "first_tile", first_slot / TILE_SLOTS);
+    }
     gpu_uniform_float(program, "strength", denoise_strength(&context->request, picture->samples));
 }
 
@@ -195,6 +199,12 @@ static void rows_of_pass(const struct denoise_filter *filter, uint32_t *begin, u
     *end = gives ? filter->own_end - filter->strip_row : filter->strip_rows;
 }
 
+/* Passes over bands, whose slots are in tiles. */
+static bool has_band(const struct denoise_filter *filter)
+{
+    return filter->pass == PASS_TAKE || filter->pass == PASS_GIVE;
+}
+
 /* From the row in hand on, no farther than the end of its band where bands are bound. */
 static uint32_t rows_of_step(const struct denoise_filter *filter, const struct render_context *context,
                              const struct picture *picture, uint32_t left)
@@ -203,15 +213,16 @@ static uint32_t rows_of_step(const struct denoise_filter *filter, const struct r
     uint32_t rows = pixels / picture->width ? pixels / picture->width : 1;
     const uint32_t row = filter->strip_row + filter->row;
     const uint32_t band_left = picture->band_rows - row % picture->band_rows;
-    const bool has_band = filter->pass == PASS_TAKE || filter->pass == PASS_GIVE;
-    rows = has_band && band_left < rows ? band_left : rows;
+    rows = has_band(filter) && band_left < rows ? band_left : rows;
     return rows < left ? rows : left;
 }
 
 static bool dispatch(struct denoise_filter *filter, struct denoise_sums *sums, struct render_context *context,
                      const struct picture *picture, uint32_t rows, struct error *error)
 {
-    const struct gpu_program *program = context_use(context, shader_of(filter->pass), error);
+    const char *shader = shader_of(filter->pass);
+    const struct gpu_program *program =
+        has_band(filter) ? denoise_use(context, shader, error) : context_use(context, shader, error);
     if (!program)
         return false;
     context_span_begin(context, STAGE_RESOLVE);
