@@ -234,7 +234,7 @@ struct engine_frame {
     float time_s, shutter_s;
     uint64_t encoded_ns;              /* clock_now_ns() when it was ready to be sent */
     unsigned quality;                 /* it was encoded with; 0: lossless */
-    unsigned scale_eighths;           /* of the width and height that the job asks for; 0: all of it */
+    unsigned scale_32nds;             /* of the width and height that the job asks for; 0: all of it */
     unsigned margin_halves_less;      /* of the job's margin, as of struct view_effort */
     unsigned depth_less;              /* of the job's bounces, likewise */
     uint64_t wanted_bytes;            /* that it may have, for an encoder that can be told; 0: not known */

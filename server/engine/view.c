@@ -129,15 +129,15 @@ static uint32_t depth_less(const struct job *job)
 static void apply_effort(const struct job *job, struct frame_request *request)
 {
     const struct view_wish *wish = &job->view.wish;
-    uint32_t scale = wish->effort.scale_eighths;
+    uint32_t scale = wish->effort.scale_32nds;
     request->depth = job->spec.frame.depth - depth_less(job);
-    if (!adapts(job) || !scale || scale >= 8)
+    if (!adapts(job) || !scale || scale >= 32)
         return;
     uint32_t width, height;
     frame_view_size(request, &width, &height);
     const uint32_t across = request->width / width, down = request->height / height;
-    request->width = across * (width * scale >= 8 ? width * scale / 8 : 1);
-    request->height = down * (height * scale >= 8 ? height * scale / 8 : 1);
+    request->width = across * (width * scale >= 32 ? width * scale / 32 : 1);
+    request->height = down * (height * scale >= 32 ? height * scale / 32 : 1);
 }
 
 /* The camera's view for a picture that is so many times as high, in pixels of the same size. */
@@ -348,7 +348,7 @@ void view_done(struct job *job, struct engine_frame *frame)
     view->wish.key_frame = false;
     if (adapts(job)) {
         const struct view_effort *effort = &view->wish.effort;
-        frame->scale_eighths = effort->scale_eighths;
+        frame->scale_32nds = effort->scale_32nds;
         frame->margin_halves_less = effort->margin_halves_less;
         frame->depth_less = depth_less(job);
         frame->wanted_bytes = effort->bytes;

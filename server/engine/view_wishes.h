@@ -31,11 +31,11 @@ bool view_wishes_want_key_frame(struct view_wishes *wishes);
 /* For views that adapt or keep a rate. */
 struct view_effort {
     /* Of frames while it moves. */
-    unsigned scale_eighths; /* of width and height; 0: as the job says */
-    unsigned quality;       /* 0: as the job says */
-    uint64_t bytes;         /* that a frame may have; 0: not known */
-    unsigned samples;       /* at most; 0: as the job says */
-    unsigned depth_less;    /* bounces fewer than the job says */
+    unsigned scale_32nds; /* of width and height; 0: as the job says */
+    unsigned quality;     /* 0: as the job says */
+    uint64_t bytes;       /* that a frame may have; 0: not known */
+    unsigned samples;     /* at most; 0: as the job says */
+    unsigned depth_less;  /* bounces fewer than the job says */
     /* Of what a client makes its own views from, not what the job says: */
     unsigned margin_halves_less; /* 1: half of the margin, 2: none */
     bool no_hidden;              /* what is hidden waits until nothing else is to be done */

@@ -182,9 +182,6 @@ static bool check_noise(const struct frame_request *request, struct error *error
                          (double)request->noise);
     if (request->noise > 0.0f && request->compare)
         return error_set(error, ERROR_UNSUPPORTED, "noise", "all waves are compared; give a number of samples");
-    if (request->noise > 0.0f && request->denoise == DENOISE_ON)
-        return error_set(error, ERROR_UNSUPPORTED, "noise",
-                         "what is filtered has the same number of samples everywhere");
     if (request->noise > 0.0f && request->view_source == VIEW_SOURCE_LAYERS)
         return error_set(error, ERROR_UNSUPPORTED, "noise",
                          "pictures made from layers have a number of samples; render them as they are");

@@ -17,9 +17,11 @@
 #define OF_FIXED 1.5
 /* With as many bounces light goes into glass and out again. */
 #define DEPTH_MIN 2u
-/* How many times in a row the next better step must fit, with this room. */
+/* How many times in a row the next better step must fit, with this room: less than a step of a deadline's sizes
+ * is, or what it leaves unused would stay so. */
 #define BETTER_TIMES 8
 #define BETTER_ROOM 1.25
+#define BETTER_ROOM_OF_DEADLINE 1.1
 /* A client that makes its own views asks for a picture that often at least while it moves: one that is there by
  * then is better large than early. */
 #define LATE_NS 250e6
@@ -30,8 +32,11 @@
  * single one was disturbed. */
 #define SURPRISE 2.0
 
-static const unsigned scales_eighths[] = {8, 7, 6, 5, 4, 3, 2};
-#define SCALES (sizeof(scales_eighths) / sizeof(scales_eighths[0]))
+/* Steps of about a half of the area: each costs a stream of pictures a key frame. */
+static const unsigned scales_32nds[] = {32, 24, 16, 12, 8, 0};
+/* Steps of at most a fifth of it: what a deadline leaves is used. */
+static const unsigned scales_of_deadline_32nds[] = {32, 30, 28, 26, 24, 22, 20, 18, 16,
+                                                    15, 14, 13, 12, 11, 10, 9,  8,  0};
 
 /* ---- what pictures cost ------------------------------------------------------------------------------ */
 
@@ -45,7 +50,7 @@ static double bytes_of_quality(unsigned quality)
 /* Beside that of a full picture without a margin. */
 static double area_of(const struct pacing *pacing, const struct pacing_advice *advice)
 {
-    const double side = (double)advice->scale_eighths / PACING_SCALE_FULL;
+    const double side = (double)advice->scale_32nds / PACING_SCALE_FULL;
     const double grown = 1.0 + (double)pacing->terms.margin * (2 - advice->margin_halves_less);
     return side * side * grown * grown;
 }
@@ -151,10 +156,10 @@ void pacing_learn_picture(struct pacing *pacing, const struct pacing_advice *mad
     pacing_learn_waves(pacing, made, render_ns, unknown, bytes);
 }
 
-void pacing_learn(struct pacing *pacing, unsigned scale_eighths, unsigned quality, uint64_t render_ns,
+void pacing_learn(struct pacing *pacing, unsigned scale_32nds, unsigned quality, uint64_t render_ns,
                   uint64_t bytes)
 {
-    const struct pacing_advice made = {.scale_eighths = scale_eighths, .quality = quality};
+    const struct pacing_advice made = {.scale_32nds = scale_32nds, .quality = quality};
     pacing_learn_picture(pacing, &made, render_ns, bytes);
 }
 
@@ -240,7 +245,7 @@ static void give_up_extras(const struct pacing *pacing, const struct limits *lim
 static struct pacing_advice full_advice(const struct pacing *pacing, unsigned quality_wanted)
 {
     return (struct pacing_advice){
-        .scale_eighths = PACING_SCALE_FULL, .quality = quality_wanted, .samples = samples_of(pacing)};
+        .scale_32nds = PACING_SCALE_FULL, .quality = quality_wanted, .samples = samples_of(pacing)};
 }
 
 /* With the least quality. */
@@ -252,23 +257,16 @@ static bool fits(const struct pacing *pacing, const struct limits *limits, unsig
            bytes_of(pacing, &advice) <= limits->smaller_bytes;
 }
 
-/* Others have steps of about a half of the area: each costs a stream of pictures a key frame. */
-static bool is_for_deadlines(unsigned eighths)
-{
-    return eighths == 7 || eighths == 5;
-}
-
 /* The best step that fits `room` times; else the smallest. */
 static struct pacing_advice best_that_fits(const struct pacing *pacing, unsigned quality_wanted, double room)
 {
     const struct limits limits = limits_of(pacing, room);
     const unsigned minimum = quality_wanted < PACING_QUALITY_MIN ? quality_wanted : PACING_QUALITY_MIN;
     struct pacing_advice advice = full_advice(pacing, quality_wanted);
-    for (size_t i = 0; i < SCALES; i++) {
-        if (!pacing->terms.deadline_ns && is_for_deadlines(scales_eighths[i]))
-            continue;
+    for (const unsigned *scale = pacing->terms.deadline_ns ? scales_of_deadline_32nds : scales_32nds; *scale;
+         scale++) {
         advice = full_advice(pacing, quality_wanted);
-        advice.scale_eighths = scales_eighths[i];
+        advice.scale_32nds = *scale;
         if (pacing_makes_views(&pacing->terms))
             give_up_extras(pacing, &limits, &advice); /* a smaller picture may have what a larger one did not */
         if (pacing->terms.deadline_ns)
@@ -289,8 +287,8 @@ static bool is_better(const struct pacing_advice *a, const struct pacing_advice 
 {
     if (a->depth_less != b->depth_less)
         return a->depth_less < b->depth_less;
-    if (a->scale_eighths != b->scale_eighths)
-        return a->scale_eighths > b->scale_eighths;
+    if (a->scale_32nds != b->scale_32nds)
+        return a->scale_32nds > b->scale_32nds;
     if (a->quality != b->quality)
         return a->quality > b->quality;
     if (a->margin_halves_less != b->margin_halves_less)
@@ -305,7 +303,8 @@ struct pacing_advice pacing_advise(struct pacing *pacing, unsigned quality_wante
     if (!pacing->advised.quality)
         pacing->advised = full_advice(pacing, quality_wanted);
     struct pacing_advice now = best_that_fits(pacing, quality_wanted, 1.0);
-    const struct pacing_advice with_room = best_that_fits(pacing, quality_wanted, BETTER_ROOM);
+    const double room = pacing->terms.deadline_ns ? BETTER_ROOM_OF_DEADLINE : BETTER_ROOM;
+    const struct pacing_advice with_room = best_that_fits(pacing, quality_wanted, room);
     if (!is_better(&now, &pacing->advised)) {
         pacing->better_count = 0;
     } else if (!is_better(&with_room, &pacing->advised)) {

@@ -145,11 +145,6 @@ static bool check_noise(const struct message_render *render, struct error *error
         error_set(error, ERROR_UNSUPPORTED, "render.noise", "tracers are compared by a number of samples");
         return error_remedy(error, "set noise to 0, or compare to 0");
     }
-    if (render->denoise == PROTOCOL_DENOISE_ON) {
-        error_set(error, ERROR_UNSUPPORTED, "render.noise",
-                  "what is filtered has the same number of samples everywhere");
-        return error_remedy(error, "set noise to 0, or denoise to off");
-    }
     if (!is_made_of_layers(render))
         return true;
     error_set(error, ERROR_UNSUPPORTED, "render.noise",

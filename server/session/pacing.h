@@ -14,8 +14,8 @@
 #include <stdint.h>
 
 #define PACING_IN_FLIGHT_MAX 64
-#define PACING_SCALE_FULL 8 /* of pacing_advice.scale_eighths */
-#define PACING_WAVES 33     /* of a picture: first hits, and one for each bounce */
+#define PACING_SCALE_FULL 32 /* of pacing_advice.scale_32nds */
+#define PACING_WAVES 33      /* of a picture: first hits, and one for each bounce */
 
 struct pacing_frame {
     uint32_t frame;
@@ -36,9 +36,9 @@ struct pacing_terms {
 
 /* What the next frame is to be. */
 struct pacing_advice {
-    unsigned scale_eighths; /* of width and height: 8, 6, 4, 3, 2; for a deadline also 7 and 5 */
-    unsigned quality;       /* as JPEG has it, PACING_QUALITY_MIN .. the wanted one */
-    uint64_t bytes;         /* that a frame may have, for an encoder that can be told */
+    unsigned scale_32nds; /* of width and height: 32, 24, 16, 12, 8; for a deadline finer */
+    unsigned quality;     /* as JPEG has it, PACING_QUALITY_MIN .. the wanted one */
+    uint64_t bytes;       /* that a frame may have, for an encoder that can be told */
     unsigned margin_halves_less, samples, depth_less;
     bool no_hidden;
 };
@@ -110,7 +110,7 @@ double pacing_room_bytes(const struct pacing *pacing);
 
 /* What a frame of that size took to render, and what came of it at that quality (0: lossless, not learned from).
  */
-void pacing_learn(struct pacing *pacing, unsigned scale_eighths, unsigned quality, uint64_t render_ns,
+void pacing_learn(struct pacing *pacing, unsigned scale_32nds, unsigned quality, uint64_t render_ns,
                   uint64_t bytes);
 /* The same of a frame as it was advised, and of a layer that followed one. */
 void pacing_learn_picture(struct pacing *pacing, const struct pacing_advice *made, uint64_t render_ns,
@@ -130,7 +130,8 @@ void pacing_learn_hidden(struct pacing *pacing, uint64_t bytes);
  * With a deadline rendering meets that: samples beyond one go first, then size, and bounces only where the
  * smallest picture is late. Bounces that take time are those that are seen: of the bundled teapot, which is of
  * glass, two bounces in full size are farther from the picture than all eight in a quarter of the width; of the
- * carousel two are as good as eight, and take nearly as long. Without any bounce either looks wrong. */
+ * carousel two are as good as eight, and take nearly as long. Without any bounce either looks wrong. The denoiser
+ * stays (server/render/denoise/README.md); what it takes counts as the rest of a picture does, by the area. */
 struct pacing_advice pacing_advise(struct pacing *pacing, unsigned quality_wanted);
 
 #endif

@@ -224,7 +224,7 @@ static void adapt(struct session_view *view, const struct engine_frame *frame)
     if (frame->moving) {
         unsigned wanted = view->terms.quality ? view->terms.quality : PACING_QUALITY_REFERENCE;
         struct pacing_advice advice = pacing_advise(&view->pacing, wanted);
-        view->effort.scale_eighths = advice.scale_eighths;
+        view->effort.scale_32nds = advice.scale_32nds;
         view->effort.quality = view->terms.quality && view->terms.adapt ? advice.quality : 0;
         view->effort.bytes = view->terms.adapt ? advice.bytes : 0;
         view->effort.samples = advice.samples;
@@ -266,7 +266,7 @@ static void learn(struct session_view *view, const struct engine_frame *frame)
 {
     uint64_t wave_ns[PACING_WAVES] = {0};
     const struct pacing_advice made = {
-        .scale_eighths = frame->scale_eighths ? frame->scale_eighths : PACING_SCALE_FULL,
+        .scale_32nds = frame->scale_32nds ? frame->scale_32nds : PACING_SCALE_FULL,
         .quality = frame->quality,
         .margin_halves_less = frame->margin_halves_less,
         .samples = frame->request.samples,

@@ -15,15 +15,13 @@ uniform uint strip_row, strip_rows; // the strip's first row in the picture, and
 
 struct halves {
     vec3 a, b;
-    float deviation; // of each, by luminance
+    float deviation; // of each, by luminance; until it is known, the luminance of their mean
 };
 
 struct guide {
-    vec3 normal;    // unit, of the samples' mean
-    float extent;   // of that mean: below 1 where they see several surfaces; 0: nothing is there
-    float nearness; // 1 / depth, which is linear in the picture where the surface is flat; orthographic: depth
-    vec2 slope;     // of it, a pixel, as a share of it
+    vec3 normal;    // the mean of the samples' unit normals: shorter where they see several surfaces
     float share;    // that mirrors and glass have in what is seen
+    float nearness; // 1 / depth, which is linear in the picture where the surface is flat; orthographic: depth; 0: nothing
 };
 
 const float HALF_FLOAT_MAX = 6e4;
@@ -53,17 +51,17 @@ vec3 noise_of(halves h)
     return 0.5 * (h.a - h.b);
 }
 
-uvec4 words_of_guide(guide g)
+uvec2 words_of_guide(guide g)
 {
-    uint normal = g.extent > 0.0 ? packSnorm2x16(octahedral_from_unit(g.normal)) : DENOISE_NOTHING;
-    return uvec4(normal, floatBitsToUint(g.nearness), packHalf2x16(g.slope), packHalf2x16(vec2(g.extent, g.share)));
+    ivec4 bytes = ivec4(round(vec4(g.normal * 127.0, g.share * 127.0))) & 0xff;
+    return uvec2(bytes.x | bytes.y << 8 | bytes.z << 16 | bytes.w << 24, floatBitsToUint(g.nearness));
 }
 
-guide guide_of_words(uvec4 words)
+guide guide_of_words(uvec2 words)
 {
-    vec2 extent_share = unpackHalf2x16(words.w);
-    return guide(unit_from_octahedral(unpackSnorm2x16(words.x)), extent_share.x, uintBitsToFloat(words.y),
-                 unpackHalf2x16(words.z), extent_share.y);
+    int bytes = int(words.x);
+    vec4 parts = vec4(bytes << 24 >> 24, bytes << 16 >> 24, bytes << 8 >> 24, bytes >> 24) / 127.0;
+    return guide(parts.xyz, parts.w, uintBitsToFloat(words.y));
 }
 
 // The pixel of this invocation in the strip; false: it has none.
@@ -93,17 +91,24 @@ bool within(ivec2 pixel, ivec2 lower, ivec2 upper)
     return all(greaterThanEqual(pixel, lower)) && all(lessThan(pixel, upper));
 }
 
+// Twice 1 - cos of the angle between unit normals.
+float turn_of(guide own, guide other)
+{
+    vec3 apart = own.normal - other.normal;
+    return dot(apart, apart);
+}
+
 // Whether a neighbour is on a surface that light falls on alike.
 bool is_alike(guide own, guide other)
 {
-    return own.extent * other.extent > 0.0 && dot(own.normal, other.normal) > 0.8;
+    return min(own.nearness, other.nearness) > 0.0 && turn_of(own, other) < 0.4;
 }
 
-// How far a neighbour is from the surface that the pixel sees, 0 and up; 1 is about the most that one surface has.
-float off_surface(guide own, guide other, vec2 offset)
+// How far a neighbour is from the surface that the pixel sees, 0 and up; 1 is about the most that one surface has. The
+// slope is that of the nearness, a pixel, as a share of it.
+float off_surface(guide own, vec2 slope, guide other, vec2 offset)
 {
-    float expected = own.nearness * (1.0 + dot(own.slope, offset));
-    float tolerance = own.nearness * (dot(abs(own.slope), abs(offset)) + DENOISE_DEPTH_SHARE);
-    return abs(other.nearness - expected) / max(tolerance, 1e-30) +
-           own.extent * other.extent * (1.0 - dot(own.normal, other.normal)) * DENOISE_NORMAL_SCALE;
+    float expected = own.nearness * (1.0 + dot(slope, offset));
+    float tolerance = own.nearness * (dot(abs(slope), abs(offset)) + DENOISE_DEPTH_SHARE);
+    return abs(other.nearness - expected) / max(tolerance, 1e-30) + 0.5 * DENOISE_NORMAL_SCALE * turn_of(own, other);
 }

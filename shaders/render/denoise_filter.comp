@@ -12,6 +12,7 @@ uniform int spacing;
 
 layout(binding = UNIT_DENOISE_LIGHT) uniform usamplerBuffer light;
 layout(binding = UNIT_DENOISE_GUIDE) uniform usamplerBuffer guides;
+layout(binding = UNIT_DENOISE_SLOPE) uniform usamplerBuffer slopes;
 layout(binding = UNIT_DENOISE_FIRST) uniform usamplerBuffer first_light;
 layout(std430, binding = BIND_DENOISE_OUT) writeonly buffer light_block { uvec4 wider[]; };
 layout(std430, binding = BIND_DENOISE_OUT_TOO) writeonly buffer risk_block { vec2 risks[]; };
@@ -35,7 +36,8 @@ void main()
         return;
     bounds_of(pixel, lower, upper);
     int place = place_of(pixel);
-    guide own = guide_of_words(texelFetch(guides, place));
+    guide own = guide_of_words(texelFetch(guides, place).xy);
+    vec2 slope = unpackHalf2x16(texelFetch(slopes, place).x);
     halves h = halves_of_words(texelFetch(light, place));
     vec2 own_luminance = vec2(luminance(h.a), luminance(h.b)), weights = vec2(0.25);
     float scale = DENOISE_LIGHT_SCALE * (1.0 - DENOISE_MIRROR_EDGES * own.share), variance = square(0.25 * h.deviation);
@@ -46,9 +48,9 @@ void main()
         ivec2 next = pixel + offset;
         bool counts = within(next, lower, upper);
         int next_place = place_of(counts ? next : pixel);
-        guide other = guide_of_words(texelFetch(guides, next_place));
+        guide other = guide_of_words(texelFetch(guides, next_place).xy);
         halves e = halves_of_words(texelFetch(light, next_place));
-        float off = off_surface(own, other, vec2(offset));
+        float off = off_surface(own, slope, other, vec2(offset));
         vec2 apart = abs(vec2(luminance(e.b), luminance(e.a)) - own_luminance.yx) * sharpness;
         float kernel = counts ? (step_.x == 0 || step_.y == 0 ? 0.125 : 0.0625) : 0.0;
         vec2 weight = kernel * exp2(-(off + apart));

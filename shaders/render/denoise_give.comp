@@ -2,9 +2,10 @@
 // From the strip to the sums of a band: the picture's, moved by as much as filtering has moved the light.
 
 #include "render/denoise.glsl"
+#include "render/denoise_count.glsl"
 
 uniform uint band_row; // the first row of the band in the picture
-uniform float count, note_count, strength;
+uniform float strength;
 
 layout(binding = UNIT_DENOISE_LIGHT) uniform usamplerBuffer light;
 layout(binding = UNIT_DENOISE_FIRST) uniform usamplerBuffer first_light;
@@ -20,10 +21,11 @@ void main()
         return;
     int place = place_of(pixel);
     uint slot = slot_of_pixel(uvec2(pixel.x, uint(pixel.y) + strip_row - band_row));
+    float count = samples_of_slot(slot);
     vec4 sum = accumulation[slot];
     vec3 albedo = max(albedos[slot].rgb / count, vec3(DENOISE_ALBEDO_MIN));
     vec3 moved = mean_of(halves_of_words(texelFetch(light, place))) -
                  mean_of(halves_of_words(texelFetch(first_light, place)));
-    bool there = texelFetch(guides, place).x != DENOISE_NOTHING;
+    bool there = uintBitsToFloat(texelFetch(guides, place).y) > 0.0;
     denoised[slot] = vec4(there ? max(sum.rgb + strength * moved * albedo * count, vec3(0.0)) : sum.rgb, sum.a);
 }

@@ -4,7 +4,7 @@
 // of shadows and textures seen in mirrors look like noise to a difference of neighbours. So both must find noise.
 //
 // Of neighbours the second smallest difference counts: beside an edge it is that of pixels on one side. Its mean square is
-// the noise's within a tenth where that is Gaussian. Also fills in the slopes of the guide.
+// the noise's within a tenth where that is Gaussian. Also notes how the surface slopes.
 
 #include "render/denoise.glsl"
 
@@ -14,7 +14,7 @@ uniform uint one_sample; // there are no halves: the difference of neighbours st
 layout(binding = UNIT_DENOISE_LIGHT) uniform usamplerBuffer light;
 layout(binding = UNIT_DENOISE_GUIDE) uniform usamplerBuffer guides;
 layout(std430, binding = BIND_DENOISE_OUT) writeonly buffer risk_block { vec2 risks[]; };
-layout(std430, binding = BIND_DENOISE_GUIDE) writeonly buffer guide_block { uvec4 sloped_guides[]; };
+layout(std430, binding = BIND_DENOISE_SLOPE) writeonly buffer slope_block { uint slopes[]; };
 layout(std430, binding = BIND_DENOISE_OUT_TOO) writeonly buffer light_block { uvec4 noisy_light[]; };
 
 const ivec2 NEIGHBOURS[4] = ivec2[4](ivec2(-1, 0), ivec2(1, 0), ivec2(0, -1), ivec2(0, 1));
@@ -34,9 +34,9 @@ float cap_around(ivec2 pixel, ivec2 lower, ivec2 upper, guide own)
         ivec2 next = pixel + offset;
         bool counts = within(next, lower, upper);
         int place = place_of(counts ? next : pixel);
-        guide other = guide_of_words(texelFetch(guides, place));
+        guide other = guide_of_words(texelFetch(guides, place).xy);
         float weight = counts && is_alike(own, other) ? 1.0 : 0.0;
-        sum += weight * min(luminance(mean_of(halves_of_words(texelFetch(light, place)))), DENOISE_CAP * white);
+        sum += weight * min(uintBitsToFloat(texelFetch(light, place).w), DENOISE_CAP * white);
         count += weight;
     }
     return min(DENOISE_CAP * sum / max(count, 1.0), DENOISE_CAP * white);
@@ -54,7 +54,7 @@ void main()
         return;
     bounds_of(pixel, lower, upper);
     int place = place_of(pixel);
-    guide own = guide_of_words(texelFetch(guides, place));
+    guide own = guide_of_words(texelFetch(guides, place).xy);
     halves h = halves_of_words(texelFetch(light, place));
     float cap = cap_around(pixel, lower, upper, own);
     h.a = capped(h.a, cap);
@@ -66,7 +66,7 @@ void main()
         ivec2 next = pixel + NEIGHBOURS[i];
         bool inside = within(next, lower, upper);
         int next_place = place_of(inside ? next : pixel);
-        guide other = guide_of_words(texelFetch(guides, next_place));
+        guide other = guide_of_words(texelFetch(guides, next_place).xy);
         rises[i] = inside ? (other.nearness - own.nearness) * ((i & 1) == 0 ? -1.0 : 1.0) : 1e30;
         vec3 difference = mean - capped(mean_of(halves_of_words(texelFetch(light, next_place))), cap);
         float size = inside && is_alike(own, other) ? abs(luminance(difference)) : 1e30;
@@ -89,8 +89,9 @@ void main()
     h = halves(mean + noise, mean - noise, 0.0);
     vec2 slope = vec2(smaller(rises.x, rises.y), smaller(rises.z, rises.w));
     slope = mix(slope, vec2(0.0), greaterThan(abs(slope), vec2(1e29))); // a view one pixel wide
-    own.slope = own.nearness > 0.0 ? clamp(slope / own.nearness, vec2(-1.0), vec2(1.0)) : vec2(0.0);
-    sloped_guides[place] = words_of_guide(own);
+    slope = own.nearness > 0.0 ? clamp(slope / own.nearness, vec2(-1.0), vec2(1.0)) : vec2(0.0);
+    slopes[place] = packHalf2x16(slope);
     noisy_light[place] = words_of_halves(h);
-    risks[place] = vec2(square(luminance(noise)), square(luminance(apart)));
+    // Where nothing is nothing is known of noise.
+    risks[place] = own.nearness > 0.0 ? vec2(square(luminance(noise)), square(luminance(apart))) : vec2(-1.0);
 }

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-// Brings the difference of the halves down to the noise that neighbours show, and notes how large it is around a pixel.
+// Brings the difference of the halves down to the noise that neighbours show, and notes how large it is around a pixel, on
+// whatever surface: how noisy light is differs little from one to the next, and more witnesses say more.
 
 #include "render/denoise.glsl"
 
 layout(binding = UNIT_DENOISE_LIGHT) uniform usamplerBuffer light;
-layout(binding = UNIT_DENOISE_GUIDE) uniform usamplerBuffer guides;
 layout(binding = UNIT_DENOISE_RISK) uniform samplerBuffer risks;
 layout(std430, binding = BIND_DENOISE_OUT) writeonly buffer light_block { uvec4 settled[]; };
 
@@ -15,18 +15,14 @@ void main()
         return;
     bounds_of(pixel, lower, upper);
     int place = place_of(pixel);
-    guide own = guide_of_words(texelFetch(guides, place));
     vec2 sum = vec2(0.0);
     float weights = 0.0;
     for (int y = -2; y <= 2; y++) {
         for (int x = -2; x <= 2; x++) {
-            ivec2 offset = ivec2(x, y), next = pixel + offset;
-            bool inside = within(next, lower, upper);
-            int next_place = place_of(inside ? next : pixel);
-            guide other = guide_of_words(texelFetch(guides, next_place));
-            float weight = inside && is_alike(own, other) ? 1.0 : 0.0;
-            sum += weight * texelFetch(risks, next_place).xy;
-            weights += weight;
+            ivec2 next = clamp(pixel + ivec2(x, y), lower, upper - 1);
+            vec2 risk = texelFetch(risks, place_of(next)).xy;
+            sum += max(risk, vec2(0.0));
+            weights += risk.x < 0.0 ? 0.0 : 1.0;
         }
     }
     halves h = halves_of_words(texelFetch(light, place));

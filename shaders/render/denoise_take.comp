@@ -2,15 +2,15 @@
 // From the sums of a band to the strip: the light that falls at each pixel, as two halves, and the guide.
 
 #include "render/denoise.glsl"
+#include "render/denoise_count.glsl"
 
-uniform uint band_row;            // the first row of the band in the picture
-uniform float first_count, count; // samples of the first half, and of both
+uniform uint band_row; // the first row of the band in the picture
 
 layout(std430, binding = BIND_ACCUMULATION) readonly buffer accumulation_block { vec4 accumulation[]; };
 layout(std430, binding = BIND_DENOISE_HALF) readonly buffer half_block { vec4 first_half[]; };
 layout(std430, binding = BIND_DENOISE_ALBEDO) readonly buffer albedo_block { vec4 albedos[]; };
 layout(std430, binding = BIND_DENOISE_NORMAL) readonly buffer normal_block { vec4 normals[]; };
-layout(std430, binding = BIND_DENOISE_GUIDE) writeonly buffer guide_block { uvec4 guides[]; };
+layout(std430, binding = BIND_DENOISE_GUIDE) writeonly buffer guide_block { uvec2 guides[]; };
 layout(std430, binding = BIND_DENOISE_OUT) writeonly buffer light_block { uvec4 light[]; };
 
 void main()
@@ -19,19 +19,18 @@ void main()
     if (!pixel_of_item(pixel))
         return;
     uint slot = slot_of_pixel(uvec2(pixel.x, uint(pixel.y) + strip_row - band_row));
+    float count = samples_of_slot(slot), first_count = first_half_of(count), second_count = count - first_count;
     vec4 albedo = albedos[slot] / count, normal = normals[slot] / count;
     vec3 sum = accumulation[slot].rgb, first = first_half[slot].rgb, mean = sum / count, noise = vec3(0.0);
-    float second_count = count - first_count;
     if (second_count > 0.0)
         noise = (first / first_count - (sum - first) / second_count) * (sqrt(first_count * second_count) / count);
     vec3 divisor = max(albedo.rgb, vec3(DENOISE_ALBEDO_MIN));
     float depth = normal.w;
     bool there = depth > 0.0 && albedo.a <= 1.0; // all of it: what is behind would be spread over the edge, too
-    float extent = there ? length(normal.xyz) : 0.0;
-    guide g = guide(normal.xyz / max(extent, 1e-30), extent, 0.0, vec2(0.0), min(albedo.a, 1.0));
+    guide g = guide(there ? normal.xyz : vec3(0.0), min(albedo.a, 1.0), 0.0);
     if (there)
         g.nearness = frame.extent_near.w != 0.0 ? depth : 1.0 / depth;
     int place = place_of(pixel);
     guides[place] = words_of_guide(g);
-    light[place] = words_of_halves(halves((mean + noise) / divisor, (mean - noise) / divisor, 0.0));
+    light[place] = words_of_halves(halves((mean + noise) / divisor, (mean - noise) / divisor, luminance(mean / divisor)));
 }

@@ -9,7 +9,6 @@
 
 /* In place of the share of mirrors and glass: the sample left the scene. */
 #define DENOISE_LEFT 1e6f
-#define DENOISE_NOTHING 0x80008000u /* in place of a packed normal, which is never that */
 /* Of the depth: a surface is not flatter than this, per pixel. */
 #define DENOISE_DEPTH_SHARE 0.004f
 /* A turn of the normal by 14 degrees is as far as one surface is expected to go. */
@@ -40,6 +39,7 @@
 #define BIND_DENOISE_NORMAL BIND_PASS_4 /* the same */
 #define BIND_DENOISE_OUT BIND_PASS_2    /* what a pass over the strip writes */
 #define BIND_DENOISE_GUIDE 0            /* the guide, where it writes that */
+#define BIND_DENOISE_SLOPE 0            /* the slopes, where it writes those */
 #define BIND_DENOISE_OUT_TOO 3          /* and what it writes beside these */
 
 /* texture units */
@@ -47,6 +47,7 @@
 #define UNIT_DENOISE_GUIDE UNIT_TRACER_1
 #define UNIT_DENOISE_FIRST UNIT_TRACER_2 /* halves of the light before any level */
 #define UNIT_DENOISE_RISK UNIT_TRACER_3
+#define UNIT_DENOISE_SLOPE UNIT_TRACER_5
 #define UNIT_DENOISE_WIDER UNIT_TRACER_4 /* halves of the light at the next level */
 
 #endif

@@ -133,6 +133,42 @@ TEST(the_error_against_the_converged_picture_is_below_the_limit)
     frame_result_finish(&truth);
 }
 
+/* Over all tiles, the root of the mean square. */
+static double error_of_picture(const struct frame_result *result, const struct frame_result *truth)
+{
+    double squares = 0.0;
+    for (uint32_t tile = 0; tile < TILES; tile++)
+        squares += pow(error_of_tile(result, truth, tile), 2.0) / TILES;
+    return sqrt(squares);
+}
+
+/* It stops by the noise of the picture as it is, so both have the same samples; those of a tile that has stopped
+ * are few. Light is stratified, so the gain is small: of pictures with 16 samples everywhere a fifth, with 32 a
+ * fiftieth.
+ */
+TEST(a_picture_that_stops_by_its_noise_is_nearer_to_the_truth_denoised)
+{
+    struct fixture *fixture = *state;
+    half_noisy(fixture);
+    struct frame_result truth = plain(fixture, 1024);
+    struct frame_result noisy = fixture_render(fixture);
+    fixture->request.denoise = DENOISE_ON;
+    struct frame_result denoised = fixture_render(fixture);
+    assert_int_equal(noisy.primary_rays, denoised.primary_rays);
+    assert_near(noisy.noise, denoised.noise, 0.0);
+    const double with = error_of_picture(&denoised, &truth), without = error_of_picture(&noisy, &truth);
+    print_message("off by %.4f, denoised by %.4f\n", without, with);
+    assert_true(with < 0.95 * without);
+    frame_renderer_set_capacity(fixture->renderer, 777, 1000);
+    struct frame_result cut = fixture_render(fixture);
+    assert_memory_equal(denoised.pixels, cut.pixels, denoised.size_bytes);
+    frame_renderer_set_capacity(fixture->renderer, 0, 0);
+    frame_result_finish(&truth);
+    frame_result_finish(&noisy);
+    frame_result_finish(&denoised);
+    frame_result_finish(&cut);
+}
+
 TEST(a_picture_stops_alike_however_it_is_cut)
 {
     struct fixture *fixture = *state;

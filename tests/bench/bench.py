@@ -3,7 +3,7 @@
 """`make bench`: where the time goes, in tables and as JSON. Usage: bench.py BUILD_FOLDER [PART ..] [--out FOLDER]
 
 Parts: start, oneshot, frames, animation, tracers, forms, family, pixels, rays, parallel, instances, refit, flake, distributed,
-steps, link, view, walk, warp, ldc, abuffer, rayspace, quadtree, reduce, reach; all of them where none is named. Each figure is the median of several runs after a
+steps, link, view, deadline, walk, warp, ldc, abuffer, rayspace, quadtree, reduce, reach; all of them where none is named. Each figure is the median of several runs after a
 warm-up, with the median absolute deviation beside it; what is compared takes turns, run by run. Scenes of FARLIGHT_SCENES
 (default: ../shared/scenes beside the checkout) are left out, and named, where missing.
 
@@ -14,7 +14,7 @@ embree, and on a GPU copy_bytes_per_s}, "parts": {NAME: {..}}}. Figures are obje
 and runs; keys end with their unit. tracers, reach, family, pixels and rays have `results`, one for each call of
 bench_tracers: title, triangles, spheres, instances, width, height, rays_per_pixel, `structures` (tracer, form, build,
 memory_bytes) and `waves` (kind, order, any, rays, `measures`: tracer, form, way, time, rays_per_s, agreement).
-`distributed` is described in bench_frames.py, `steps` in bench_steps.py, `link` in bench_link.py, `view` in bench_view.py, `walk` in bench_walk.py, `warp` in bench_warp.py, `ldc` in bench_ldc.py,
+`distributed` is described in bench_frames.py, `steps` in bench_steps.py, `link` in bench_link.py, `view` in bench_view.py, `deadline` in bench_deadline.py, `walk` in bench_walk.py, `warp` in bench_warp.py, `ldc` in bench_ldc.py,
 `abuffer` in bench_abuffer.py, `rayspace` in bench_rayspace.py, `quadtree` in bench_quadtree.py, `reduce` in bench_reduce.py. `wanted` has the lines that are to be reached: line, wanted, measured, met, within_spread
 (missed by no more than twice its deviation), where.
 
@@ -33,6 +33,7 @@ import bench_abuffer
 import bench_abuffer_show
 import bench_animated
 import bench_client
+import bench_deadline
 import bench_frames
 import bench_ldc
 import bench_ldc_show
@@ -70,6 +71,7 @@ PARTS = {
     "steps": ("Steps of a frame", bench_steps.measure, bench_steps.show),
     "link": ("A sealed connection beside an open one", bench_link.measure, bench_link.show),
     "view": ("Views whose camera moves", bench_view.measure, bench_view.show),
+    "deadline": ("Heavy views with a rate to keep", bench_deadline.measure, bench_deadline.show),
     "walk": ("A walk whose pictures come late", bench_walk.measure, bench_walk.show),
     "warp": ("A walk over slow links", bench_warp.measure, bench_warp.show),
     "ldc": ("Layered depth cubes", bench_ldc.measure, bench_ldc_show.show),

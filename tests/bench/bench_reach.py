@@ -84,7 +84,7 @@ def derive(parts):
     if "distributed" in parts:
         line, wanted, measured, where = distributed_row(parts["distributed"])
         rows.append(row(line, wanted, measured, where, at_most=True))
-    rows = [r for r in rows if r] + [r for part in ("view", "warp", "ldc", "abuffer", "rayspace", "quadtree") for r in parts.get(part, {}).get("wanted", [])]
+    rows = [r for r in rows if r] + [r for part in ("view", "deadline", "warp", "ldc", "abuffer", "rayspace", "quadtree") for r in parts.get(part, {}).get("wanted", [])]
     if not rows:
         return None
     return {"rows": rows, "gpu": list(bandwidth_rows(scenes))}

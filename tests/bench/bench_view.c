@@ -124,9 +124,9 @@ static void add_threads(json_t *threads, int sign)
 
 /* ---- frames ------------------------------------------------------------------------------------------ */
 
-static const char *const columns[] = {"viewer",   "command", "width",    "height", "bytes",        "sent",
-                                      "received", "applied", "rendered", "stages", "encode_begin", "encode",
-                                      "queue",    "send",    "begun",    "whole",  "decode",       "depth_less"};
+static const char *const columns[] = {
+    "viewer",       "command", "width", "height", "bytes", "sent",  "received", "applied",    "rendered", "stages",
+    "encode_begin", "encode",  "queue", "send",   "begun", "whole", "decode",   "depth_less", "samples"};
 
 static bool is_of_renderer(enum protocol_stage stage)
 {
@@ -162,7 +162,8 @@ static json_t *row_of(const struct fl_frame *frame, const struct viewer *viewer,
                                frame->begun_ns,
                                whole_ns,
                                decode_ns,
-                               frame->depth_less};
+                               frame->depth_less,
+                               frame->samples};
     _Static_assert(sizeof(values) / sizeof(values[0]) == sizeof(columns) / sizeof(columns[0]), "a value for each");
     json_t *row = json_array();
     for (size_t i = 0; i < sizeof(values) / sizeof(values[0]); i++)

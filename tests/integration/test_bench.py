@@ -28,8 +28,8 @@ import bench_walk  # noqa: E402  pylint: disable=wrong-import-position
 import bench_warp  # noqa: E402  pylint: disable=wrong-import-position
 
 TRACED = ("tracers", "family", "pixels", "rays", "flake", "reach")  # results of `bench tracers`
-PARTS = ("frames", "distributed", "steps", "link", "view", "walk", "warp", "tracers", "family", "pixels", "rays", "parallel", "instances",
-         "refit", "flake", "ldc", "abuffer", "rayspace", "quadtree", "reach")
+PARTS = ("frames", "distributed", "steps", "link", "view", "deadline", "walk", "warp", "tracers", "family", "pixels", "rays", "parallel",
+         "instances", "refit", "flake", "ldc", "abuffer", "rayspace", "quadtree", "reach")
 
 
 class Figures(unittest.TestCase):
@@ -240,6 +240,14 @@ class Benchmark(unittest.TestCase):
         text = (self.out / "bench.txt").read_text()
         for row in data["wanted"]:
             self.assertIn(row["line"], text)
+
+    def test_heavy_views_are_measured_with_a_rate_and_without(self):
+        data = self.document["parts"]["deadline"]
+        self.assertEqual([view["wanted"] is None for view in data["views"]], [True, False])
+        for view in data["views"]:
+            self.assertGreater(view["frames_per_s"]["median"], 0)
+            self.assertLessEqual((view["width"], view["height"], view["depth"]), (64, 36, 8))
+        self.assertEqual(len(data["wanted"]), 1)
 
     def test_a_walk_over_a_link_is_measured_to_the_displayed_picture(self):
         data = self.document["parts"]["warp"]

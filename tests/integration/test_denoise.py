@@ -55,6 +55,8 @@ class Denoise(OneDaemon):
         for same, words in ((plain, ["--denoise=off"]), (denoised, ["--denoise=on"]), (denoised, ["--denoise=auto"]),
                             (denoised, ["--denoise"])):
             self.assertEqual(self.digest(*options, *words), same, words)
+        by_noise = [*options[:-2], "--samples", "64", "--noise", "0.2"]
+        self.assertNotEqual(self.digest(*by_noise), self.digest(*by_noise, "--denoise"))
         refused = farlight("render", bundled_scenes() / "cornell.glb", "-o", self.folder / "x.png", "--denoise=much")
         self.assertIn("known: off, on, auto", self.expect(refused, 2).stderr)
 

@@ -7,10 +7,10 @@
 
 #include <math.h>
 
-#define LEVELS 5u /* of the wavelet: the widest sees 31 pixels far */
+#define LEVELS 4u /* of the wavelet: the widest sees 15 pixels far */
 /* Rows that a strip's own depend on: each level sees 2^level pixels far and its risk twice that, and noise is
- * looked for 3 pixels around. */
-#define EDGE_ROWS 96u
+ * looked for 4 pixels around. */
+#define EDGE_ROWS 49u
 /* Pixels of a dispatch: software GL does them within some ten milliseconds; a GPU has no use for more than this.
  */
 #define STEP_PIXELS_SOFTWARE (1u << 15)
@@ -36,13 +36,14 @@ static bool reserve_strip(struct denoise_filter *filter, struct render_context *
                           struct error *error)
 {
     struct gpu_device *device = context->device;
-    const size_t pixels = (size_t)width * filter->strip_rows, bytes = pixels * sizeof(uvec4);
-    struct gpu_buffer *const all[] = {&filter->guides[0], &filter->guides[1], &filter->first,
-                                      &filter->wider,     &filter->levels[0], &filter->levels[1]};
-    for (size_t i = 0; i < sizeof(all) / sizeof(*all); i++)
-        if (!gpu_buffer_reserve(device, all[i], bytes, error))
+    const size_t pixels = (size_t)width * filter->strip_rows;
+    struct gpu_buffer *const lights[] = {&filter->first, &filter->wider, &filter->levels[0], &filter->levels[1]};
+    for (size_t i = 0; i < sizeof(lights) / sizeof(*lights); i++)
+        if (!gpu_buffer_reserve(device, lights[i], pixels * sizeof(uvec4), error))
             return false;
-    return gpu_buffer_reserve(device, &filter->risks, pixels * 2 * sizeof(float), error);
+    return gpu_buffer_reserve(device, &filter->guides, pixels * 2 * sizeof(uint32_t), error) &&
+           gpu_buffer_reserve(device, &filter->slopes, pixels * sizeof(uint32_t), error) &&
+           gpu_buffer_reserve(device, &filter->risks, pixels * 2 * sizeof(float), error);
 }
 
 /* All of the picture where it fits. */
@@ -64,9 +65,19 @@ static bool begin_strip(struct denoise_filter *filter, struct render_context *co
     return reserve_strip(filter, context, picture->width, error);
 }
 
-static void bind_texels(struct render_context *context, struct gpu_buffer *buffer, unsigned unit)
+static void bind_light(struct render_context *context, struct gpu_buffer *buffer, unsigned unit)
 {
     gpu_buffer_bind_texels(context->device, buffer, unit, GL_RGBA32UI);
+}
+
+static void bind_guides(struct denoise_filter *filter, struct render_context *context)
+{
+    gpu_buffer_bind_texels(context->device, &filter->guides, UNIT_DENOISE_GUIDE, GL_RG32UI);
+}
+
+static void bind_risks(struct denoise_filter *filter, struct render_context *context)
+{
+    gpu_buffer_bind_texels(context->device, &filter->risks, UNIT_DENOISE_RISK, GL_RG32F);
 }
 
 static void bind_sums(struct denoise_sums *sums, const struct render_context *context,
@@ -77,32 +88,36 @@ static void bind_sums(struct denoise_sums *sums, const struct render_context *co
     gpu_buffer_bind_storage(denoise_sums_band(sums, DENOISE_SUM_ALBEDO, band), BIND_DENOISE_ALBEDO);
     gpu_buffer_bind_storage(denoise_sums_band(sums, DENOISE_SUM_NORMAL, band), BIND_DENOISE_NORMAL);
     gpu_uniform_uint(program, "band_row", picture_band_first_row(picture, band));
-    gpu_uniform_float(program, "first_count", (float)denoise_first_half(picture->samples));
-    gpu_uniform_float(program, "count", (float)picture->samples);
+    gpu_uniform_uint(program, "sample_count", picture->samples);
+    if (context->tile_samples) {
+        uint32_t first_slot;
+        (void)picture_band_slots(picture, band, &first_slot);
+        gpu_uniform_uint(program, "first_tile", first_slot / TILE_SLOTS);
+    }
     gpu_uniform_float(program, "strength", denoise_strength(&context->request, picture->samples));
 }
 
 static void bind_take(struct denoise_filter *filter)
 {
-    gpu_buffer_bind_storage(&filter->guides[0], BIND_DENOISE_GUIDE);
+    gpu_buffer_bind_storage(&filter->guides, BIND_DENOISE_GUIDE);
     gpu_buffer_bind_storage(&filter->first, BIND_DENOISE_OUT);
 }
 
 static void bind_give(struct denoise_filter *filter, struct denoise_sums *sums, struct render_context *context,
                       uint32_t band)
 {
-    bind_texels(context, &filter->levels[(LEVELS - 1) % 2], UNIT_DENOISE_LIGHT);
-    bind_texels(context, &filter->first, UNIT_DENOISE_FIRST);
-    bind_texels(context, &filter->guides[1], UNIT_DENOISE_GUIDE);
+    bind_light(context, &filter->levels[(LEVELS - 1) % 2], UNIT_DENOISE_LIGHT);
+    bind_light(context, &filter->first, UNIT_DENOISE_FIRST);
+    bind_guides(filter, context);
     gpu_buffer_bind_storage(denoise_sums_band(sums, DENOISE_SUM_RESULT, band), BIND_DENOISE_OUT);
 }
 
 static void bind_noise(struct denoise_filter *filter, struct render_context *context,
                        const struct picture *picture, const struct gpu_program *program)
 {
-    bind_texels(context, &filter->first, UNIT_DENOISE_LIGHT);
-    bind_texels(context, &filter->guides[0], UNIT_DENOISE_GUIDE);
-    gpu_buffer_bind_storage(&filter->guides[1], BIND_DENOISE_GUIDE);
+    bind_light(context, &filter->first, UNIT_DENOISE_LIGHT);
+    bind_guides(filter, context);
+    gpu_buffer_bind_storage(&filter->slopes, BIND_DENOISE_SLOPE);
     gpu_buffer_bind_storage(&filter->risks, BIND_DENOISE_OUT);
     gpu_buffer_bind_storage(&filter->wider, BIND_DENOISE_OUT_TOO);
     gpu_uniform_uint(program, "one_sample", picture->samples == 1);
@@ -111,9 +126,9 @@ static void bind_noise(struct denoise_filter *filter, struct render_context *con
 
 static void bind_settle(struct denoise_filter *filter, struct render_context *context)
 {
-    bind_texels(context, &filter->wider, UNIT_DENOISE_LIGHT);
-    bind_texels(context, &filter->guides[1], UNIT_DENOISE_GUIDE);
-    gpu_buffer_bind_texels(context->device, &filter->risks, UNIT_DENOISE_RISK, GL_RG32F);
+    bind_light(context, &filter->wider, UNIT_DENOISE_LIGHT);
+    bind_guides(filter, context);
+    bind_risks(filter, context);
     gpu_buffer_bind_storage(&filter->first, BIND_DENOISE_OUT);
 }
 
@@ -122,16 +137,17 @@ static void bind_level(struct denoise_filter *filter, struct render_context *con
 {
     const uint32_t level = (filter->pass - PASS_LEVELS) / 2;
     const bool chooses = (filter->pass - PASS_LEVELS) % 2;
-    bind_texels(context, level > 0 ? &filter->levels[(level - 1) % 2] : &filter->first, UNIT_DENOISE_LIGHT);
+    bind_light(context, level > 0 ? &filter->levels[(level - 1) % 2] : &filter->first, UNIT_DENOISE_LIGHT);
     gpu_uniform_int(program, "spacing", 1 << level);
     if (chooses) {
-        bind_texels(context, &filter->wider, UNIT_DENOISE_WIDER);
-        gpu_buffer_bind_texels(context->device, &filter->risks, UNIT_DENOISE_RISK, GL_RG32F);
+        bind_light(context, &filter->wider, UNIT_DENOISE_WIDER);
+        bind_risks(filter, context);
         gpu_buffer_bind_storage(&filter->levels[level % 2], BIND_DENOISE_OUT);
         return;
     }
-    bind_texels(context, &filter->guides[1], UNIT_DENOISE_GUIDE);
-    bind_texels(context, &filter->first, UNIT_DENOISE_FIRST);
+    bind_guides(filter, context);
+    gpu_buffer_bind_texels(context->device, &filter->slopes, UNIT_DENOISE_SLOPE, GL_R32UI);
+    bind_light(context, &filter->first, UNIT_DENOISE_FIRST);
     gpu_buffer_bind_storage(&filter->wider, BIND_DENOISE_OUT);
     gpu_buffer_bind_storage(&filter->risks, BIND_DENOISE_OUT_TOO);
 }
@@ -183,6 +199,12 @@ static void rows_of_pass(const struct denoise_filter *filter, uint32_t *begin, u
     *end = gives ? filter->own_end - filter->strip_row : filter->strip_rows;
 }
 
+/* Passes over bands, whose slots are in tiles. */
+static bool has_band(const struct denoise_filter *filter)
+{
+    return filter->pass == PASS_TAKE || filter->pass == PASS_GIVE;
+}
+
 /* From the row in hand on, no farther than the end of its band where bands are bound. */
 static uint32_t rows_of_step(const struct denoise_filter *filter, const struct render_context *context,
                              const struct picture *picture, uint32_t left)
@@ -191,15 +213,16 @@ static uint32_t rows_of_step(const struct denoise_filter *filter, const struct r
     uint32_t rows = pixels / picture->width ? pixels / picture->width : 1;
     const uint32_t row = filter->strip_row + filter->row;
     const uint32_t band_left = picture->band_rows - row % picture->band_rows;
-    const bool has_band = filter->pass == PASS_TAKE || filter->pass == PASS_GIVE;
-    rows = has_band && band_left < rows ? band_left : rows;
+    rows = has_band(filter) && band_left < rows ? band_left : rows;
     return rows < left ? rows : left;
 }
 
 static bool dispatch(struct denoise_filter *filter, struct denoise_sums *sums, struct render_context *context,
                      const struct picture *picture, uint32_t rows, struct error *error)
 {
-    const struct gpu_program *program = context_use(context, shader_of(filter->pass), error);
+    const char *shader = shader_of(filter->pass);
+    const struct gpu_program *program =
+        has_band(filter) ? denoise_use(context, shader, error) : context_use(context, shader, error);
     if (!program)
         return false;
     context_span_begin(context, STAGE_RESOLVE);
@@ -239,14 +262,14 @@ bool denoise_step(struct denoise_filter *filter, struct denoise_sums *sums, stru
 
 uint64_t denoise_filter_device_bytes(const struct denoise_filter *filter)
 {
-    return filter->notes.capacity_bytes + filter->guides[0].capacity_bytes + filter->guides[1].capacity_bytes +
+    return filter->notes.capacity_bytes + filter->guides.capacity_bytes + filter->slopes.capacity_bytes +
            filter->first.capacity_bytes + filter->wider.capacity_bytes + filter->levels[0].capacity_bytes +
            filter->levels[1].capacity_bytes + filter->risks.capacity_bytes;
 }
 
 void denoise_filter_finish(struct denoise_filter *filter, struct gpu_device *device)
 {
-    struct gpu_buffer *const all[] = {&filter->notes, &filter->guides[0], &filter->guides[1], &filter->first,
+    struct gpu_buffer *const all[] = {&filter->notes, &filter->guides,    &filter->slopes,    &filter->first,
                                       &filter->wider, &filter->levels[0], &filter->levels[1], &filter->risks};
     for (size_t i = 0; i < sizeof(all) / sizeof(*all); i++)
         gpu_buffer_finish(device, all[i]);

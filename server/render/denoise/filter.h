@@ -8,7 +8,7 @@
 
 struct denoise_filter {
     struct gpu_buffer notes;                   /* of the slice in hand */
-    struct gpu_buffer guides[2];               /* without and with slopes */
+    struct gpu_buffer guides, slopes;          /* of the first hits */
     struct gpu_buffer first, wider, levels[2]; /* halves of the light: at first; filtered; as it was chosen */
     struct gpu_buffer risks;
     /* progress */

@@ -5,6 +5,7 @@
 #include "render/integrators/integrator.h"
 #include "shared/denoise.h"
 
+#include <epoxy/gl.h>
 #include <stdlib.h>
 
 /* Of DENOISE_AUTO: up to half of these samples a picture gets all of it, with all of them none
@@ -15,7 +16,7 @@ float denoise_strength(const struct frame_request *request, uint32_t samples)
 {
     if (request->denoise != DENOISE_AUTO)
         return request->denoise == DENOISE_ON ? 1.0f : 0.0f;
-    if (request->noise > 0.0f) /* tiles have different numbers of samples */
+    if (request->noise > 0.0f) /* it is rendered until that is below what was asked for */
         return 0.0f;
     const float left = 2.0f - 2.0f * (float)samples / (float)AUTO_SAMPLES;
     return left < 0.0f ? 0.0f : left < 1.0f ? left : 1.0f;
@@ -37,22 +38,14 @@ bool denoise_is_wanted(const struct render_context *context)
            request->view_source != VIEW_SOURCE_LAYERS;
 }
 
-/* As in denoise_accumulate.comp. Each doubling of the samples is halved in turn, so that both halves are as evenly
- * spread as all of them; the first four so that both have one of either half of what is chosen. */
-static bool is_of_first_half(uint32_t index)
+const struct gpu_program *denoise_use(struct render_context *context, const char *shader, struct error *error)
 {
-    if (index < 4)
-        return index % 3 == 0;
-    const int top = 31 - __builtin_clz(index);
-    return !(index >> (top - 1) & 1);
-}
-
-uint32_t denoise_first_half(uint32_t count)
-{
-    uint32_t first = 0;
-    for (uint32_t index = 0; index < count; index++)
-        first += is_of_first_half(index);
-    return first;
+    static const struct gpu_define stopping[] = {{"HAS_TILE_SAMPLES", "1"}, {0}};
+    const struct gpu_program *program =
+        context_use_with(context, shader, context->tile_samples ? stopping : NULL, error);
+    if (program && context->tile_samples)
+        gpu_buffer_bind_texels(context->device, context->tile_samples, UNIT_TILE_SAMPLES, GL_R32UI);
+    return program;
 }
 
 struct gpu_buffer *denoise_sums_band(const struct denoise_sums *sums, enum denoise_sum sum, uint32_t band)
@@ -111,9 +104,11 @@ bool denoise_accumulate(struct denoise_sums *sums, struct gpu_buffer *notes, str
     uint32_t first_slot;
     const struct gpu_buffer *own = picture_slice_band(picture, &context->slice, &first_slot);
     const uint32_t band = (uint32_t)(own - picture->bands);
-    const struct gpu_program *program = context_use(context, "render/denoise_accumulate.comp", error);
+    const struct gpu_program *program = denoise_use(context, "render/denoise_accumulate.comp", error);
     if (!program)
         return false;
+    if (context->tile_samples)
+        gpu_uniform_uint(program, "first_picture_slot", context->slice.first_slot);
     gpu_buffer_bind_storage(&context->slice_sums, BIND_SLICE_SUMS);
     gpu_buffer_bind_storage(notes, BIND_DENOISE_NOTES);
     gpu_buffer_bind_storage(denoise_sums_band(sums, DENOISE_SUM_HALF, band), BIND_DENOISE_HALF);

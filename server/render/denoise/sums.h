@@ -27,8 +27,8 @@ bool denoise_is_wanted(const struct render_context *context);
 bool denoise_notes_samples(const struct render_context *context);
 /* How much of the filtering a picture of that many samples gets, 0 to 1. */
 float denoise_strength(const struct frame_request *request, uint32_t samples);
-/* How many of the first `count` samples of a pixel are of the first half. */
-uint32_t denoise_first_half(uint32_t count);
+/* One of the programs that ask how many samples a pixel has: its tile may have stopped. */
+const struct gpu_program *denoise_use(struct render_context *context, const char *shader, struct error *error);
 /* Behind picture_begin(): reserves the sums, and clears them unless the frame goes on. */
 bool denoise_sums_begin(struct denoise_sums *sums, struct render_context *context, const struct picture *picture,
                         uint32_t samples_before, struct error *error);

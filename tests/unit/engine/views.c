@@ -477,8 +477,7 @@ TEST(a_view_that_adapts_is_smaller_while_it_moves)
     made->job.frame.width = 80;
     made->job.frame.height = 48;
     view_wishes_set_effort(
-        watching->wishes,
-        &(struct view_effort){.scale_eighths = 3, .quality = 55, .bytes = 1234, .sparing = true});
+        watching->wishes, &(struct view_effort){.scale_32nds = 12, .quality = 55, .bytes = 1234, .sparing = true});
     submit(watching->engine, made);
     struct engine_frame *frame = take(expect_frame(watching->engine, 1, 2, 0));
     assert_int_equal(frame->result.width, 80);
@@ -490,7 +489,7 @@ TEST(a_view_that_adapts_is_smaller_while_it_moves)
     frame = take(expect_frame(watching->engine, 1, 2, 2));
     assert_int_equal(frame->request.width, 30);
     assert_int_equal(frame->result.height, 18);
-    assert_int_equal(frame->scale_eighths, 3);
+    assert_int_equal(frame->scale_32nds, 12);
     assert_int_equal(frame->quality, 55);
     assert_int_equal(frame->wanted_bytes, 1234);
     drop(frame);
@@ -507,7 +506,7 @@ TEST(a_view_that_keeps_a_rate_goes_without_bounces_while_it_moves)
     made->job.keeps_rate = true;
     made->job.frame.depth = 8;
     made->job.frame.width = made->job.frame.height = 64;
-    view_wishes_set_effort(watching->wishes, &(struct view_effort){.scale_eighths = 5, .depth_less = 6});
+    view_wishes_set_effort(watching->wishes, &(struct view_effort){.scale_32nds = 20, .depth_less = 6});
     look(watching, 1, true);
     submit(watching->engine, made);
     struct engine_frame *frame = take(expect_frame(watching->engine, 1, 2, 0));
@@ -534,8 +533,7 @@ TEST(a_frame_has_a_margin_while_it_moves)
     made->job.frame.width = 80;
     made->job.frame.height = 48;
     view_wishes_set_effort(
-        watching->wishes,
-        &(struct view_effort){.scale_eighths = 3, .quality = 55, .bytes = 1234, .sparing = true});
+        watching->wishes, &(struct view_effort){.scale_32nds = 12, .quality = 55, .bytes = 1234, .sparing = true});
     look(watching, 1, false);
     submit(watching->engine, made);
     struct engine_frame *frame = take(expect_frame(watching->engine, 1, 2, 0));
@@ -710,8 +708,7 @@ TEST(a_view_that_does_not_adapt_keeps_its_requested_settings)
     struct watching *watching = *state;
     struct engine_command *made = with_samples(view(2, watching->wishes), 2, 1);
     view_wishes_set_effort(
-        watching->wishes,
-        &(struct view_effort){.scale_eighths = 3, .quality = 55, .bytes = 1234, .sparing = true});
+        watching->wishes, &(struct view_effort){.scale_32nds = 12, .quality = 55, .bytes = 1234, .sparing = true});
     submit(watching->engine, made);
     expect_picture(watching, 2, 0, 0, 1, ENCODING_RAW);
     expect_picture(watching, 2, 1, 0, 2, ENCODING_RAW);

@@ -26,7 +26,7 @@ static struct pacing begin(uint32_t samples)
 static uint64_t render(struct renderer *renderer, const struct pacing_advice *advice,
                        uint64_t wave_ns[PACING_WAVES])
 {
-    const double work = advice->scale_eighths * advice->scale_eighths / 64.0 * advice->samples;
+    const double work = advice->scale_32nds * advice->scale_32nds / 1024.0 * advice->samples;
     renderer->chance = renderer->chance * 1664525u + 1013904223u;
     const double more = 1.0 + renderer->percent / 100.0 * ((renderer->chance >> 8) / (double)(1 << 23) - 1.0);
     double sum_ns = (double)renderer->fixed_ns + work * (double)renderer->area_ns;
@@ -50,7 +50,7 @@ static struct pacing_advice follow(struct pacing *pacing, struct renderer *rende
         const uint64_t took_ns = render(renderer, &advice, wave_ns);
         pacing_learn_waves(pacing, &advice, took_ns, wave_ns, 0);
         *longest_ns = took_ns > *longest_ns ? took_ns : *longest_ns;
-        *changes += i > 0 && (advice.scale_eighths != before.scale_eighths || advice.samples != before.samples ||
+        *changes += i > 0 && (advice.scale_32nds != before.scale_32nds || advice.samples != before.samples ||
                               advice.depth_less != before.depth_less);
     }
     return advice;
@@ -66,9 +66,9 @@ TEST(a_heavy_frame_comes_in_time_from_the_second_on)
     assert_true(longest_ns > 5 * DEADLINE_NS);
     follow(&pacing, &heavy, 1, &longest_ns, &changes);
     assert_true(longest_ns <= DEADLINE_NS);
-    /* 85 of 100 ms: (3 / 8)^2 of 500 and 10 are 80, (4 / 8)^2 of it would be 135. */
+    /* 85 of 100 ms: (12 / 32)^2 of 500 and 10 are 80, (13 / 32)^2 of it would be 92. */
     const struct pacing_advice advice = follow(&pacing, &heavy, 300, &longest_ns, &changes);
-    assert_int_equal(advice.scale_eighths, 3);
+    assert_int_equal(advice.scale_32nds, 12);
     assert_int_equal(advice.depth_less, 0);
     assert_true(longest_ns <= DEADLINE_NS);
     assert_in_range(changes, 0, 1);
@@ -98,16 +98,16 @@ TEST(samples_go_first_then_size_then_bounces)
     unsigned changes;
     struct pacing_advice advice = follow(&pacing, &renderer, 100, &longest_ns, &changes);
     assert_int_equal(advice.samples, 3); /* 3 of 24 and 1 are 73 of 85 ms */
-    assert_int_equal(advice.scale_eighths, PACING_SCALE_FULL);
+    assert_int_equal(advice.scale_32nds, PACING_SCALE_FULL);
     renderer.area_ns = 160 * MS;
     advice = follow(&pacing, &renderer, 100, &longest_ns, &changes);
     assert_int_equal(advice.samples, 1);
-    assert_int_equal(advice.scale_eighths, 5); /* 0.39 of 168 and 1 are 67; 6 / 8: 95 */
+    assert_int_equal(advice.scale_32nds, 22); /* 0.47 of 168 and 1 are 80; 24 / 32: 95 */
     assert_int_equal(advice.depth_less, 0);
     renderer = (struct renderer){.fixed_ns = MS, .area_ns = 900 * MS, .bounce_ns = 600 * MS};
     advice = follow(&pacing, &renderer, 200, &longest_ns, &changes);
     /* A sixteenth: 57 of the first hits and at most 18, 9, 5 .. of the bounces: the first two leave 84 + 1. */
-    assert_int_equal(advice.scale_eighths, 2);
+    assert_int_equal(advice.scale_32nds, 8);
     assert_in_range(advice.depth_less, 5, 6);
 }
 
@@ -123,7 +123,7 @@ TEST(one_frame_that_was_disturbed_changes_nothing)
         pacing_learn_waves(&pacing, &before, 900 * MS, wave_ns, 0);
         const struct pacing_advice after = follow(&pacing, &renderer, 5, &longest_ns, &changes);
         assert_int_equal(changes, 0);
-        assert_int_equal(after.scale_eighths, before.scale_eighths);
+        assert_int_equal(after.scale_32nds, before.scale_32nds);
     }
 }
 
@@ -134,11 +134,11 @@ TEST(all_comes_back_where_it_becomes_light)
     uint64_t longest_ns;
     unsigned changes;
     struct pacing_advice advice = follow(&pacing, &renderer, 60, &longest_ns, &changes);
-    assert_int_equal(advice.scale_eighths, 2);
+    assert_int_equal(advice.scale_32nds, 8);
     assert_int_equal(advice.depth_less, 6);
     renderer.area_ns = renderer.bounce_ns = 20 * MS;
     advice = follow(&pacing, &renderer, 200, &longest_ns, &changes);
-    assert_int_equal(advice.scale_eighths, PACING_SCALE_FULL);
+    assert_int_equal(advice.scale_32nds, PACING_SCALE_FULL);
     assert_int_equal(advice.depth_less, 0);
 }
 
@@ -146,7 +146,7 @@ TEST(the_first_that_moves_is_right_where_pictures_at_rest_were_seen)
 {
     struct pacing pacing = begin(1);
     struct renderer heavy = {.fixed_ns = 10 * MS, .area_ns = 300 * MS, .bounce_ns = 200 * MS};
-    const struct pacing_advice full = {.scale_eighths = PACING_SCALE_FULL, .samples = 1};
+    const struct pacing_advice full = {.scale_32nds = PACING_SCALE_FULL, .samples = 1};
     uint64_t wave_ns[PACING_WAVES] = {0}, longest_ns;
     unsigned changes;
     const uint64_t took_ns = render(&heavy, &full, wave_ns);
@@ -164,5 +164,5 @@ TEST(without_a_deadline_bounces_stay)
     unsigned changes;
     const struct pacing_advice advice = follow(&pacing, &heavy, 60, &longest_ns, &changes);
     assert_int_equal(advice.depth_less, 0);
-    assert_int_equal(advice.scale_eighths, 2);
+    assert_int_equal(advice.scale_32nds, 8);
 }

@@ -230,7 +230,7 @@ static struct pacing_advice follow(struct pacing *pacing, struct link *link, uin
     static uint32_t frame;
     for (unsigned i = 0; i < frames; i++) {
         advice = pacing_advise(pacing, 90);
-        double area = advice.scale_eighths * advice.scale_eighths / 64.0;
+        double area = advice.scale_32nds * advice.scale_32nds / 1024.0;
         double quality = (advice.quality - 75.0) / 12.0, size = bytes * area;
         for (; quality > 1e-3; quality -= 1.0 / 12)
             size *= 1.0253; /* 1.35 to the twelfth part */
@@ -242,7 +242,7 @@ static struct pacing_advice follow(struct pacing *pacing, struct link *link, uin
             *now_ns += MS;
         pacing_sent(pacing, frame, (uint64_t)size, *now_ns);
         link_send(link, frame++, (uint64_t)size, *now_ns);
-        pacing_learn(pacing, advice.scale_eighths, advice.quality, render_now_ns, (uint64_t)size);
+        pacing_learn(pacing, advice.scale_32nds, advice.quality, render_now_ns, (uint64_t)size);
     }
     return advice;
 }
@@ -254,7 +254,7 @@ TEST(asks_for_everything_where_all_is_fast)
     struct link link = link_of(1000, MS);
     uint64_t now_ns = 0;
     struct pacing_advice advice = follow(&pacing, &link, &now_ns, 5 * MS, 100000, 30);
-    assert_int_equal(advice.scale_eighths, PACING_SCALE_FULL);
+    assert_int_equal(advice.scale_32nds, PACING_SCALE_FULL);
     assert_int_equal(advice.quality, 90);
 }
 
@@ -266,10 +266,10 @@ TEST(makes_frames_smaller_that_take_long_to_render)
     uint64_t now_ns = 0;
     struct pacing_advice advice = follow(&pacing, &link, &now_ns, 100 * MS, 100000, 60);
     /* 33 ms a frame: half of each side is 25 ms, three quarters would be 56. */
-    assert_int_equal(advice.scale_eighths, 4);
+    assert_int_equal(advice.scale_32nds, 16);
     /* The scene becomes simple: back to full. */
     advice = follow(&pacing, &link, &now_ns, 10 * MS, 100000, 60);
-    assert_int_equal(advice.scale_eighths, PACING_SCALE_FULL);
+    assert_int_equal(advice.scale_32nds, PACING_SCALE_FULL);
 }
 
 TEST(makes_frames_fit_the_link)
@@ -284,13 +284,13 @@ TEST(makes_frames_fit_the_link)
     struct pacing_advice advice = follow(&pacing, &link, &now_ns, 5 * MS, 150000, 300);
     double frames_per_second = 300e9 / (double)(now_ns - before_ns);
     assert_true(frames_per_second > 27.0); /* of 30 */
-    assert_true(advice.scale_eighths < PACING_SCALE_FULL);
+    assert_true(advice.scale_32nds < PACING_SCALE_FULL);
     assert_true(advice.quality >= PACING_QUALITY_MIN);
     assert_true((double)advice.bytes <= 10e6 / 8 / 30);
     /* A better link: better frames, and not more than were asked for. */
     link.bytes_per_ns *= 20;
     advice = follow(&pacing, &link, &now_ns, 5 * MS, 150000, 600);
-    assert_int_equal(advice.scale_eighths, PACING_SCALE_FULL);
+    assert_int_equal(advice.scale_32nds, PACING_SCALE_FULL);
     assert_int_equal(advice.quality, 90);
 }
 
@@ -303,10 +303,10 @@ static struct pacing_advice follow_renderer(struct pacing *pacing, uint64_t fixe
     static uint32_t chance;
     for (unsigned i = 0; i < frames; i++) {
         advice = pacing_advise(pacing, 90);
-        double area = advice.scale_eighths * advice.scale_eighths / 64.0;
+        double area = advice.scale_32nds * advice.scale_32nds / 1024.0;
         chance = chance * 1664525u + 1013904223u;
         double more = 0.8 + 0.4 * (chance >> 8) / (1 << 24);
-        pacing_learn(pacing, advice.scale_eighths, advice.quality,
+        pacing_learn(pacing, advice.scale_32nds, advice.quality,
                      (uint64_t)(more * ((double)fixed_ns + (double)area_ns * area)), 1000);
     }
     return advice;
@@ -317,12 +317,12 @@ TEST(does_not_shrink_what_takes_long_at_any_size)
     struct pacing pacing;
     pacing_init(&pacing, FRAME_NS);
     /* 33 ms a frame: 60 ms at least, 70 in full; hardly worth the picture. */
-    assert_int_equal(follow_renderer(&pacing, 60 * MS, 10 * MS, 100).scale_eighths, PACING_SCALE_FULL);
+    assert_int_equal(follow_renderer(&pacing, 60 * MS, 10 * MS, 100).scale_32nds, PACING_SCALE_FULL);
     /* Size is what it costs: the same renderer with a slow light transport. */
     struct pacing_advice advice = follow_renderer(&pacing, 2 * MS, 200 * MS, 100);
-    assert_in_range(advice.scale_eighths, 2, 3); /* 14.5 and 30 ms */
+    assert_in_range(advice.scale_32nds, 8, 12); /* 14.5 and 30 ms */
     /* And back. */
-    assert_int_equal(follow_renderer(&pacing, 2 * MS, 10 * MS, 300).scale_eighths, PACING_SCALE_FULL);
+    assert_int_equal(follow_renderer(&pacing, 2 * MS, 10 * MS, 300).scale_32nds, PACING_SCALE_FULL);
 }
 
 TEST(does_not_flicker)
@@ -335,8 +335,8 @@ TEST(does_not_flicker)
     unsigned changes = 0, scale = 0;
     for (int i = 0; i < 300; i++) {
         struct pacing_advice advice = follow(&pacing, &link, &now_ns, (uint64_t)(i % 2 ? 31 : 36) * MS, 50000, 1);
-        changes += i > 0 && advice.scale_eighths != scale;
-        scale = advice.scale_eighths;
+        changes += i > 0 && advice.scale_32nds != scale;
+        scale = advice.scale_32nds;
     }
     assert_in_range(changes, 0, 2); /* ten seconds */
 }
@@ -452,7 +452,7 @@ static struct key_views key_views_of(double bytes_per_second, double sample_ns, 
 
 static double key_area(const struct pacing_advice *advice)
 {
-    const double side = advice->scale_eighths / 8.0, grown = 1.0 + 0.1 * (2 - advice->margin_halves_less);
+    const double side = advice->scale_32nds / 32.0, grown = 1.0 + 0.1 * (2 - advice->margin_halves_less);
     return side * side * grown * grown;
 }
 
@@ -504,11 +504,11 @@ TEST(on_a_link_too_slow_what_views_need_least_goes_first)
     assert_true(advice.no_hidden && advice.margin_halves_less == 2 && advice.quality == 90);
     advice = settle_on_link(0.4); /* 66 KB */
     assert_true(advice.margin_halves_less == 2 && advice.quality < 90 && advice.quality > PACING_QUALITY_MIN);
-    assert_int_equal(advice.scale_eighths, 8);
+    assert_int_equal(advice.scale_32nds, 32);
     advice = settle_on_link(0.1); /* 16 KB: one of 29 is twice as late as it should be, and no more */
-    assert_true(advice.quality == PACING_QUALITY_MIN && advice.scale_eighths == 8);
+    assert_true(advice.quality == PACING_QUALITY_MIN && advice.scale_32nds == 32);
     advice = settle_on_link(0.05); /* a quarter of a second carries 20 KB */
-    assert_true(advice.quality == PACING_QUALITY_MIN && advice.scale_eighths < 8);
+    assert_true(advice.quality == PACING_QUALITY_MIN && advice.scale_32nds < 32);
 }
 
 static struct pacing_advice settle_on_renderer(double sample_ns)
@@ -527,14 +527,14 @@ TEST(pictures_for_views_are_smaller_only_where_they_take_a_quarter_of_a_second)
     advice = settle_on_renderer(150e6); /* 216 ms */
     assert_true(advice.samples == 1 && advice.margin_halves_less == 0);
     advice = settle_on_renderer(190e6);
-    assert_true(advice.samples == 1 && advice.margin_halves_less == 1 && advice.scale_eighths == 8);
+    assert_true(advice.samples == 1 && advice.margin_halves_less == 1 && advice.scale_32nds == 32);
     advice = settle_on_renderer(230e6);
-    assert_true(advice.margin_halves_less == 2 && advice.scale_eighths == 8);
+    assert_true(advice.margin_halves_less == 2 && advice.scale_32nds == 32);
     advice = settle_on_renderer(400e6);
-    assert_true(advice.margin_halves_less == 2 && advice.scale_eighths == 6 && advice.quality == 90);
+    assert_true(advice.margin_halves_less == 2 && advice.scale_32nds == 24 && advice.quality == 90);
     advice =
         settle_on_renderer(600e6); /* 338 ms at three quarters; half of the size with all of its margin is 216 */
-    assert_true(advice.margin_halves_less == 0 && advice.scale_eighths == 4 && advice.samples == 1);
+    assert_true(advice.margin_halves_less == 0 && advice.scale_32nds == 16 && advice.samples == 1);
 }
 
 /* Where the link is just enough for a step, and pictures differ by a tenth, steps do not alternate. */

@@ -732,7 +732,7 @@ SESSION_TEST(a_view_that_adapts_tells_the_engine_what_the_link_carries)
     say_frame(2, 1, 3);
     take_frame(2, 1);
     const struct view_effort effort = view_wishes_see(start->job.wishes).effort;
-    assert_true(effort.scale_eighths < 8);
+    assert_true(effort.scale_32nds < 32);
     assert_true(effort.quality < 90);
     assert_true(effort.bytes < FRAME_BYTES);
     assert_false(effort.sparing);
@@ -764,7 +764,7 @@ SESSION_TEST(a_view_that_keeps_a_rate_tells_the_engine_what_to_go_without)
     port_say(slow);
     take_frame(2, 0);
     struct view_effort effort = view_wishes_see(start->job.wishes).effort;
-    assert_int_equal(effort.scale_eighths, 2);
+    assert_int_equal(effort.scale_32nds, 8);
     assert_int_equal(effort.depth_less, 6);
     assert_int_equal(effort.quality, 0); /* the link is not followed */
     assert_true(effort.bytes == 0);
@@ -792,7 +792,7 @@ SESSION_TEST(the_engine_is_told_what_a_client_with_its_own_views_goes_without)
     const struct view_effort effort = view_wishes_see(start->job.wishes).effort;
     assert_int_equal(effort.margin_halves_less, 2);
     assert_true(effort.quality < 90);
-    assert_int_equal(effort.scale_eighths, 8);
+    assert_int_equal(effort.scale_32nds, 32);
     engine_command_destroy(start);
 }
 
