@@ -241,6 +241,37 @@ TEST(distributed_lights_a_floor_by_a_lamp_as_by_a_rectangle)
     assert_true(means[0].error < 1e-3 * means[0].value);
 }
 
+/* Directions that are uniform in what the two triangles of a panel take of the half-space bring each sample twice
+ * its cosine, whose standard deviation is 1 / sqrt(3); points that are uniform on 4 square metres at 0.1 m, whose
+ * mean square is 4 / (3 pi 0.1^2), eleven times as much. */
+TEST(a_panel_close_above_a_floor_has_little_noise)
+{
+    enum { SAMPLES = 16 };
+    struct fixture *fixture = *state;
+    const float above[12] = {1, 0, 0, 0, 0, -1, 0, 0, 0, 0, -1, 0.1f};
+    path_begin(fixture, TRACER_REFERENCE, 1);
+    fixture->request.integrator = INTEGRATOR_DISTRIBUTED;
+    struct scene_material *floor = fixture_material(fixture), *glow = fixture_material(fixture);
+    glow->base_colour[0] = glow->base_colour[1] = glow->base_colour[2] = 0.0f;
+    glow->emission[0] = glow->emission[1] = glow->emission[2] = 1.0f;
+    fixture_square(fixture, 50.0f, floor->base.id, NULL);
+    fixture_square(fixture, 1.0f, glow->base.id, above);
+    fixture_light(fixture, LIGHT_POINT, 0.0f, 0.0f, 9.0f, 0.0f); /* keeps the default sky away */
+    fixture_look(fixture, 0.0f, 0.0f, 0.05f, 0.0f);
+    fixture->request.camera.ortho_height = 0.5f;
+    float *one = path_render_pixels(fixture, SAMPLES, 1), *other = path_render_pixels(fixture, SAMPLES, 2);
+    double mean = 0.0, squares = 0.0;
+    for (uint32_t i = 0; i < PIXELS; i++) {
+        mean += (double)(one[i] + other[i]) / (2.0 * PIXELS);
+        squares += (double)(one[i] - other[i]) * (double)(one[i] - other[i]) / (2.0 * PIXELS);
+    }
+    print_message("mean %.4f, standard deviation of a pixel %.3f\n", mean, sqrt(squares));
+    free(one);
+    free(other);
+    assert_near(mean, 0.9919, 0.002); /* the form factor of a square seen from 0.1 m below its centre */
+    assert_true(sqrt(squares) < 1.0 / sqrt(3.0 * SAMPLES));
+}
+
 /* ---- large meshes, and what moves ---- */
 
 /* A ceiling of more triangles than leaves, so that several make one; brighter at one end. */
