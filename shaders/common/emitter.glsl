@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Emissive triangles seen from a point: one is chosen by the tree of shared/emitter.h, by power, distance and the angles
-// on both sides, and a direction to it, or, where it looks small, a point of it by its area. Conty Estevez, Kulla. Importance Sampling of Many Lights with Adaptive
-// Tree Splitting. 2018.
+// on both sides, and a direction to it, or, where it looks small, a point of it by its area. Conty Estevez, Kulla.
+// Importance Sampling of Many Lights with Adaptive Tree Splitting. 2018.
 //
 // Defines: HAS_EMITTERS there are some; those of common/motion.glsl and common/texture.glsl; HAS_TEXTURES some material
 // has a texture.

@@ -272,6 +272,46 @@ TEST(a_panel_close_above_a_floor_has_little_noise)
     assert_true(sqrt(squares) < 1.0 / sqrt(3.0 * SAMPLES));
 }
 
+/* The mean of a floor below a panel that glows, or whose emission is only seen, or 0, beside a light. */
+static double floor_below(struct fixture *fixture, unsigned integrator, bool mirror, float emission,
+                          bool seen_only)
+{
+    const float above[12] = {1, 0, 0, 0, 0, -1, 0, 0, 0, 0, -1, 1.0f};
+    path_begin(fixture, TRACER_BVH, 3);
+    fixture->request.integrator = integrator;
+    struct scene_material *floor = fixture_material(fixture), *glow = fixture_material(fixture);
+    floor->metallic = mirror ? 1.0f : 0.0f;
+    floor->roughness = mirror ? 0.0f : 1.0f;
+    glow->emission[0] = glow->emission[1] = glow->emission[2] = emission;
+    glow->emission_seen_only = seen_only;
+    fixture_square(fixture, 50.0f, floor->base.id, NULL);
+    fixture_square(fixture, 1.0f, glow->base.id, above);
+    fixture_light(fixture, LIGHT_POINT, 0.0f, 0.0f, 0.9f, 1.0f);
+    fixture_look(fixture, 0.0f, 0.0f, 0.5f, 0.0f);
+    fixture->request.camera.ortho_height = 0.5f;
+    fixture->request.samples = 4;
+    struct frame_result result = fixture_render(fixture);
+    const double mean = whole(&result);
+    frame_result_finish(&result);
+    return mean;
+}
+
+/* The random numbers are the same, and so is what does not come from the panel, but for roundings. */
+TEST(emission_that_is_seen_only_shows_in_mirrors_and_lights_nothing)
+{
+    struct fixture *fixture = *state;
+    static const unsigned integrators[] = {INTEGRATOR_PATH, INTEGRATOR_DISTRIBUTED};
+    for (size_t i = 0; i < COUNT(integrators); i++)
+        for (int mirror = 0; mirror < 2; mirror++) {
+            const double dark = floor_below(fixture, integrators[i], mirror, 0.0f, false);
+            const double seen = floor_below(fixture, integrators[i], mirror, 2.0f, true);
+            const double glowing = floor_below(fixture, integrators[i], mirror, 2.0f, false);
+            print_message("dark %.5f, seen only %.5f, glowing %.5f\n", dark, seen, glowing);
+            assert_near(seen, mirror ? dark + 2.0 : dark, 1e-4 * seen);
+            assert_true(glowing > dark + 0.5); /* a panel of this size above a white floor, at least */
+        }
+}
+
 /* ---- large meshes, and what moves ---- */
 
 /* A ceiling of more triangles than leaves, so that several make one; brighter at one end. */
