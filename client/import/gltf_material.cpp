@@ -263,6 +263,16 @@ void transmission(const building &b)
     b.set.unlit = extension(b.source.extensions, "KHR_materials_unlit") != nullptr;
 }
 
+// Of a panel beside the light that stands for it; Blender writes a property of a material there.
+void emission_seen_only(const building &b)
+{
+    static const char key[] = "emission_seen_only";
+    const tinygltf::Value &extras = b.source.extras;
+    const bool is_true =
+        extras.IsObject() && extras.Has(key) && extras.Get(key).IsBool() && extras.Get(key).Get<bool>();
+    b.set.emission_seen_only = is_true || number(extras, key, 0) != 0;
+}
+
 void anisotropy(const building &b)
 {
     const tinygltf::Value *brushed = extension(b.source.extensions, "KHR_materials_anisotropy");
@@ -320,6 +330,7 @@ uint32_t material(reader &r, images &all, int index)
     emission(b);
     alpha(b);
     transmission(b);
+    emission_seen_only(b);
     anisotropy(b);
     specular_glossiness(b);
     if (all.collecting)

@@ -2,7 +2,7 @@
 /* The emissive triangles of the visible instances, for the tables of shared/emitter.h. Private to gpu_scene*.c.
  *
  * Left out, and so found by the rays that hit them alone: spheres and discs, unlit materials, and those that are
- * blended or cut out. */
+ * blended or cut out; and those whose emission lights nothing. */
 #ifndef FARLIGHT_GPU_SCENE_EMITTER_H
 #define FARLIGHT_GPU_SCENE_EMITTER_H
 

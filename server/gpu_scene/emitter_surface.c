@@ -17,7 +17,7 @@
 /* Whether its triangles are sampled as lights. */
 static bool shines(const struct scene_material *material)
 {
-    return material && material->alpha_mode == ALPHA_OPAQUE && !material->unlit &&
+    return material && material->alpha_mode == ALPHA_OPAQUE && !material->unlit && !material->emission_seen_only &&
            material->emission[0] + material->emission[1] + material->emission[2] > 0.0f;
 }
 

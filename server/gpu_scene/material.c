@@ -108,7 +108,8 @@ static void pack_material(const struct gpu_scene *gpu, const struct scene_materi
     memcpy(out->base_colour, in->base_colour, sizeof(out->base_colour));
     out->flags = (in->alpha_mode == ALPHA_MASK ? MATERIAL_ALPHA_MASK : 0) |
                  (in->alpha_mode == ALPHA_BLEND ? MATERIAL_ALPHA_BLEND : 0) |
-                 (in->double_sided ? MATERIAL_DOUBLE_SIDED : 0) | (in->unlit ? MATERIAL_UNLIT : 0);
+                 (in->double_sided ? MATERIAL_DOUBLE_SIDED : 0) | (in->unlit ? MATERIAL_UNLIT : 0) |
+                 (in->emission_seen_only ? MATERIAL_EMISSION_SEEN_ONLY : 0);
     uint32_t *const places[MATERIAL_TEXTURE_COUNT] = {
         [MATERIAL_BASE_COLOUR] = &out->texture_base_colour,
         [MATERIAL_NORMAL] = &out->texture_normal,

@@ -108,6 +108,7 @@ struct scene_material {
     struct scene_object base;
     enum alpha_mode alpha_mode;
     bool double_sided, unlit;
+    bool emission_seen_only; /* a light shines in its place */
     float base_colour[4], emission[3];
     float metallic, roughness, transmission, ior, alpha_cutoff;
     float anisotropy, anisotropy_rotation; /* radians */

@@ -127,6 +127,7 @@ static void from_material(const struct message_set_material *message, struct sce
     material->alpha_cutoff = message->alpha_cutoff;
     material->anisotropy = message->anisotropy;
     material->anisotropy_rotation = message->anisotropy_rotation;
+    material->emission_seen_only = message->emission_seen_only;
     for (uint32_t i = 0; i < message->textures_count && i < MATERIAL_TEXTURE_COUNT; i++) {
         const struct record_texture_use *from = &message->textures[i];
         struct texture_use *use = &material->textures[i];

@@ -189,6 +189,7 @@ static void put_material(struct sink *sink, const struct scene_material *materia
     set->alpha_cutoff = material->alpha_cutoff;
     set->anisotropy = material->anisotropy;
     set->anisotropy_rotation = material->anisotropy_rotation;
+    set->emission_seen_only = material->emission_seen_only;
     for (int i = 0; i < MATERIAL_TEXTURE_COUNT; i++) {
         const struct texture_use *use = &material->textures[i];
         textures[i] = (struct record_texture_use){

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Emissive triangles seen from a point: one is chosen by the tree of shared/emitter.h, by power, distance and the angles
-// on both sides, and a point of it by its area. Conty Estevez, Kulla. Importance Sampling of Many Lights with Adaptive
-// Tree Splitting. 2018.
+// on both sides, and a direction to it, or, where it looks small, a point of it by its area. Conty Estevez, Kulla.
+// Importance Sampling of Many Lights with Adaptive Tree Splitting. 2018.
 //
 // Defines: HAS_EMITTERS there are some; those of common/motion.glsl and common/texture.glsl; HAS_TEXTURES some material
 // has a texture.
@@ -93,11 +93,71 @@ emitter_triangle emitter_triangle_at(uint instance_index, uint primitive, float 
     return t;
 }
 
+// A triangle as a point sees it.
+struct emitter_view {
+    vec3 first, second, third; // unit, towards the corners
+    float solid_angle;         // 0: sampled by its area
+};
+
+// Below this solid angle the area is as good, and the angles of the spherical triangle are not known well; above the
+// other one they are not, either. Steradians.
+const float EMITTER_ANGLE_MIN = 0.01, EMITTER_ANGLE_MAX = 6.25;
+
+// The solid angle: Van Oosterom, Strackee. The Solid Angle of a Plane Triangle. 1983.
+emitter_view emitter_view_of(emitter_triangle t, vec3 position)
+{
+    vec3 first = t.corner - position, second = first + t.first_edge, third = first + t.second_edge;
+    vec3 lengths = vec3(length(first), length(second), length(third));
+    float volume = abs(dot(first, t.across)) / max(lengths.x * lengths.y * lengths.z, 1e-30);
+    first /= max(lengths.x, 1e-30);
+    second /= max(lengths.y, 1e-30);
+    third /= max(lengths.z, 1e-30);
+    float angle = 2.0 * azimuth(volume, 1.0 + dot(first, second) + dot(second, third) + dot(third, first));
+    return emitter_view(first, second, third, angle > EMITTER_ANGLE_MIN && angle < EMITTER_ANGLE_MAX ? angle : 0.0);
+}
+
 // The density per steradian of a point that is uniform on the triangle; 0: seen edge on.
-float emitter_density(vec3 across, vec3 direction, float distance_)
+float emitter_density(emitter_view view, vec3 across, vec3 direction, float distance_)
 {
     float facing = 0.5 * abs(dot(across, direction)); // area times cosine
-    return facing > 1e-7 * dot(across, across) / max(length(across), 1e-30) ? square(distance_) / facing : 0.0;
+    float by_area = facing > 1e-7 * dot(across, across) / max(length(across), 1e-30) ? square(distance_) / facing : 0.0;
+    return view.solid_angle > 0.0 ? 1.0 / view.solid_angle : by_area;
+}
+
+// Between two unit vectors, exact for small ones.
+float angle_between(vec3 a, vec3 b)
+{
+    return azimuth(length(cross(a, b)), dot(a, b));
+}
+
+// A direction that is uniform in the spherical triangle: Arvo. Stratified Sampling of Spherical Triangles. 1995.
+vec3 emitter_direction(emitter_view view, vec2 u)
+{
+    vec3 ab = normalize(cross(view.first, view.second)), bc = normalize(cross(view.second, view.third));
+    vec3 ca = normalize(cross(view.third, view.first));
+    float alpha = angle_between(ab, -ca), sin_alpha = sin(alpha), cos_alpha = cos(alpha);
+    // u.x cuts off a triangle of a part of the area, with the same first two corners; u.y is the way from the second one
+    // to the far side.
+    float area = u.x * (alpha + angle_between(bc, -ab) + angle_between(ca, -bc) - PI);
+    float sine = -sin(area - alpha), cosine = -cos(area - alpha);
+    float k = cosine + cos_alpha, l = sine - sin_alpha * dot(view.first, view.second);
+    float divisor = (l * sine + k * cosine) * sin_alpha;
+    float along = abs(divisor) > 1e-12 ? clamp((l + (l * cosine - k * sine) * cos_alpha) / divisor, -1.0, 1.0) : 1.0;
+    vec3 side = view.third - dot(view.third, view.first) * view.first;
+    vec3 last = along * view.first + sqrt(1.0 - along * along) * normalize(side);
+    float z = 1.0 - u.y * (1.0 - dot(last, view.second));
+    return z * view.second + sqrt(max(1.0 - z * z, 0.0)) * normalize(last - dot(last, view.second) * view.second);
+}
+
+// Of a point of the triangle in a direction: how much of the second and the third corner it has.
+vec2 emitter_weights(emitter_triangle t, vec3 position, vec3 direction)
+{
+    vec3 to_corner = t.corner - position;
+    vec3 from_corner = direction * (dot(to_corner, t.across) / dot(direction, t.across)) - to_corner;
+    vec2 weights = vec2(dot(cross(from_corner, t.second_edge), t.across), dot(cross(t.first_edge, from_corner), t.across)) /
+                   dot(t.across, t.across);
+    weights = clamp(weights, 0.0, 1.0); // NaN: 0
+    return weights / max(weights.x + weights.y, 1.0);
 }
 
 // The leaf of a node's tree that `number` chooses, which comes back stretched to [0, 1) again, and the probability.
@@ -186,13 +246,16 @@ emitter_sample emitter_sample_at(vec3 position, vec3 normal, vec2 u, float time)
     emitter_leaf leaf = emitter_leaf_at(starts.leaves, emitter_choose_leaf(starts.nodes, position, normal, u.x, probability));
     uint primitive = leaf.first_primitive + emitter_choose_triangle(starts.shares, leaf, u.x, probability);
     emitter_triangle t = emitter_triangle_at(leaf.instance, primitive, time);
+    emitter_view view = emitter_view_of(t, position);
     float root = sqrt(u.x);
     vec2 weights = vec2(root * (1.0 - u.y), root * u.y);
+    if (view.solid_angle > 0.0)
+        weights = emitter_weights(t, position, emitter_direction(view, u));
     vec3 to_point = t.corner + weights.x * t.first_edge + weights.y * t.second_edge - position;
     emitter_sample result;
     result.distance_ = length(to_point);
     result.direction = to_point / max(result.distance_, 1e-30);
-    result.probability = probability * emitter_density(t.across, result.direction, result.distance_);
+    result.probability = probability * emitter_density(view, t.across, result.direction, result.distance_);
     result.radiance = emitter_radiance(t.indices_material, weights);
     return result;
 }
@@ -235,7 +298,7 @@ float emitter_probability(vec3 position, vec3 normal, uint instance_index, uint 
     if (leaf.count > 1u)
         probability *= emitter_share(starts.shares, leaf, ordinal - place * starts.cluster_size);
     emitter_triangle t = emitter_triangle_at(instance_index, primitive, time);
-    return probability * emitter_density(t.across, direction, distance_);
+    return probability * emitter_density(emitter_view_of(t, position), t.across, direction, distance_);
 }
 
 #endif

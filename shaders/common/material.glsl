@@ -24,6 +24,7 @@ struct surface {
     float metallic, roughness, transmission, ior, occlusion;
     float curvature; // 1 / metre, above 0: it bulges towards the viewer; 0 if there are no textures to be filtered
     bool unlit;
+    bool emission_seen_only;
     bool inside;    // seen from behind
 };
 
@@ -192,6 +193,7 @@ surface surface_at(hit h, vec3 origin, vec3 direction, float width)
     s.normal = unpack_unit(h.normal_shading);
     s.inside = (h.material & HIT_BACK_FACE) != 0u;
     s.unlit = (m.flags & MATERIAL_UNLIT) != 0u;
+    s.emission_seen_only = (m.flags & MATERIAL_EMISSION_SEEN_ONLY) != 0u;
     s.emission = m.emission_ior.rgb;
     s.ior = m.emission_ior.w;
     s.metallic = m.metallic;

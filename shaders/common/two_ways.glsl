@@ -64,7 +64,7 @@ float emitter_share_asked(emitter_sample sampled, float chance, float found)
 float emitter_share_met(uint code, uint normal, hit h, ray r, float time, vec3 emission)
 {
 #ifdef EMITTERS_BY_DISTANCE
-    const uint LEFT_OUT = MATERIAL_ALPHA_MASK | MATERIAL_ALPHA_BLEND | MATERIAL_UNLIT;
+    const uint LEFT_OUT = MATERIAL_ALPHA_MASK | MATERIAL_ALPHA_BLEND | MATERIAL_UNLIT | MATERIAL_EMISSION_SEEN_ONLY;
     bool asked = code != 0u && (h.material & HIT_SAMPLED) != 0u &&
                  (material_at(h.material & HIT_MATERIAL_MASK).flags & LEFT_OUT) == 0u;
     float probability = asked ? emitter_rough_probability(h.distance) : 0.0;

@@ -75,7 +75,10 @@ vec2 cone_at(path p, float distance_)
 
 surface surface_of_path(path p, hit h, ray r)
 {
-    return surface_at(h, r.origin_t_min.xyz, r.direction_t_max.xyz, cone_at(p, h.distance).x);
+    surface s = surface_at(h, r.origin_t_min.xyz, r.direction_t_max.xyz, cone_at(p, h.distance).x);
+    if (s.emission_seen_only && (p.flags & PATH_STEP_MASK) != 0u) // a rough surface has sent the ray
+        s.emission = vec3(0.0);
+    return s;
 }
 
 float index_ratio(surface s)

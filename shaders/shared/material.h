@@ -20,6 +20,7 @@ SHARED_SIZE(material, 96)
 #define MATERIAL_ALPHA_BLEND 2u
 #define MATERIAL_DOUBLE_SIDED 4u
 #define MATERIAL_UNLIT 8u
+#define MATERIAL_EMISSION_SEEN_ONLY 16u /* a light shines in its place */
 
 /* A texture as one input of a material. Entry 0 is unused. */
 struct texture_slot {

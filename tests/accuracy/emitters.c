@@ -242,6 +242,77 @@ TEST(distributed_lights_a_floor_by_a_lamp_as_by_a_rectangle)
     assert_true(means[0].error < 1e-3 * means[0].value);
 }
 
+/* Directions that are uniform in what the two triangles of a panel take of the half-space bring each sample twice
+ * its cosine, whose standard deviation is 1 / sqrt(3); points that are uniform on 4 square metres at 0.1 m, whose
+ * mean square is 4 / (3 pi 0.1^2), eleven times as much. */
+TEST(a_panel_close_above_a_floor_has_little_noise)
+{
+    enum { SAMPLES = 16 };
+    struct fixture *fixture = *state;
+    const float above[12] = {1, 0, 0, 0, 0, -1, 0, 0, 0, 0, -1, 0.1f};
+    path_begin(fixture, TRACER_REFERENCE, 1);
+    fixture->request.integrator = INTEGRATOR_DISTRIBUTED;
+    struct scene_material *floor = fixture_material(fixture), *glow = fixture_material(fixture);
+    glow->base_colour[0] = glow->base_colour[1] = glow->base_colour[2] = 0.0f;
+    glow->emission[0] = glow->emission[1] = glow->emission[2] = 1.0f;
+    fixture_square(fixture, 50.0f, floor->base.id, NULL);
+    fixture_square(fixture, 1.0f, glow->base.id, above);
+    fixture_light(fixture, LIGHT_POINT, 0.0f, 0.0f, 9.0f, 0.0f); /* keeps the default sky away */
+    fixture_look(fixture, 0.0f, 0.0f, 0.05f, 0.0f);
+    fixture->request.camera.ortho_height = 0.5f;
+    float *one = path_render_pixels(fixture, SAMPLES, 1), *other = path_render_pixels(fixture, SAMPLES, 2);
+    double mean = 0.0, squares = 0.0;
+    for (uint32_t i = 0; i < PIXELS; i++) {
+        mean += (double)(one[i] + other[i]) / (2.0 * PIXELS);
+        squares += (double)(one[i] - other[i]) * (double)(one[i] - other[i]) / (2.0 * PIXELS);
+    }
+    print_message("mean %.4f, standard deviation of a pixel %.3f\n", mean, sqrt(squares));
+    free(one);
+    free(other);
+    assert_near(mean, 0.9919, 0.002); /* the form factor of a square seen from 0.1 m below its centre */
+    assert_true(sqrt(squares) < 1.0 / sqrt(3.0 * SAMPLES));
+}
+
+/* The mean of a floor below a panel that glows, or whose emission is only seen, or 0, beside a light. */
+static double floor_below(struct fixture *fixture, unsigned integrator, bool mirror, float emission,
+                          bool seen_only)
+{
+    const float above[12] = {1, 0, 0, 0, 0, -1, 0, 0, 0, 0, -1, 1.0f};
+    path_begin(fixture, TRACER_BVH, 3);
+    fixture->request.integrator = integrator;
+    struct scene_material *floor = fixture_material(fixture), *glow = fixture_material(fixture);
+    floor->metallic = mirror ? 1.0f : 0.0f;
+    floor->roughness = mirror ? 0.0f : 1.0f;
+    glow->emission[0] = glow->emission[1] = glow->emission[2] = emission;
+    glow->emission_seen_only = seen_only;
+    fixture_square(fixture, 50.0f, floor->base.id, NULL);
+    fixture_square(fixture, 1.0f, glow->base.id, above);
+    fixture_light(fixture, LIGHT_POINT, 0.0f, 0.0f, 0.9f, 1.0f);
+    fixture_look(fixture, 0.0f, 0.0f, 0.5f, 0.0f);
+    fixture->request.camera.ortho_height = 0.5f;
+    fixture->request.samples = 4;
+    struct frame_result result = fixture_render(fixture);
+    const double mean = whole(&result);
+    frame_result_finish(&result);
+    return mean;
+}
+
+/* The random numbers are the same, and so is what does not come from the panel, but for roundings. */
+TEST(emission_that_is_seen_only_shows_in_mirrors_and_lights_nothing)
+{
+    struct fixture *fixture = *state;
+    static const unsigned integrators[] = {INTEGRATOR_PATH, INTEGRATOR_DISTRIBUTED};
+    for (size_t i = 0; i < COUNT(integrators); i++)
+        for (int mirror = 0; mirror < 2; mirror++) {
+            const double dark = floor_below(fixture, integrators[i], mirror, 0.0f, false);
+            const double seen = floor_below(fixture, integrators[i], mirror, 2.0f, true);
+            const double glowing = floor_below(fixture, integrators[i], mirror, 2.0f, false);
+            print_message("dark %.5f, seen only %.5f, glowing %.5f\n", dark, seen, glowing);
+            assert_near(seen, mirror ? dark + 2.0 : dark, 1e-4 * seen);
+            assert_true(glowing > dark + 0.5); /* a panel of this size above a white floor, at least */
+        }
+}
+
 /* ---- large meshes, and what moves ---- */
 
 /* A ceiling of more triangles than leaves, so that several make one; brighter at one end. */

@@ -397,6 +397,13 @@ class Written(importer.Written):
         self.assertAlmostEqual(material["transmission"], 0.9, 6)
         self.assertAlmostEqual(material["ior"], 1.33, 6)
 
+    def test_gltf_emission_that_is_seen_only(self):
+        extras = [{"emission_seen_only": value} for value in (True, False, 1, 0, "yes")] + [{}, 3]
+        result = self.run_gltf({
+            "nodes": [{"mesh": 0}], "materials": [{"emissiveFactor": [1, 1, 1], "extras": one} for one in extras],
+            "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "material": i} for i in range(len(extras))]}]})
+        self.assertEqual([m["seen_only"] for m in result.of(SET_MATERIAL)], [1, 0, 1, 0, 0, 0, 0])
+
     def test_gltf_anisotropy(self):
         def materials(*brushed):
             result = self.run_gltf({

@@ -64,7 +64,7 @@ static void add_looks(struct draft_list *list)
     texture->texels = make_blob(texels, sizeof(texels));
     struct scene_material *material = &add_set(list, OBJECT_MATERIAL, 30)->set.material;
     name_it(&material->base, "material");
-    material->double_sided = material->unlit = true;
+    material->double_sided = material->unlit = material->emission_seen_only = true;
     material->base_colour[0] = 0.25f;
     material->emission[1] = 5;
     material->metallic = 0.5f;
@@ -185,7 +185,8 @@ TEST(a_scene_of_all_kinds_is_the_same_afterwards)
     const struct scene_material *one = scene_material(scene, 30), *other = scene_material(again, 30);
     assert_memory_equal(one->textures, other->textures, sizeof(one->textures));
     assert_true(one->ior == other->ior && one->anisotropy_rotation == other->anisotropy_rotation && other->unlit &&
-                other->double_sided && other->alpha_cutoff == 0.375f && other->emission[1] == 5);
+                other->double_sided && other->emission_seen_only && other->alpha_cutoff == 0.375f &&
+                other->emission[1] == 5);
     assert_string_equal(other->base.name, "material");
     const struct scene_node *node = scene_node(again, 1);
     assert_true(node->parent == 2 && node->hidden && node->skin == 70 && node->weight_count == 1 &&
