@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Links each fragment into its texel's list, and adds it to the voxels that it touches. Hu, Huang, Zhang, Yuan, Li. Ray
 // Tracing via GPU Rasterization. 2014, section 3.1.
-// Defines: those of raster/fragment.glsl; ALL_IMAGES, of raster/draw.geom, always.
+// Defines: those of raster/fragment.glsl; of raster/draw.geom ALL_IMAGES, always, and WITHOUT_STEEP.
 
 #include "abuffer/layout.h"
 #include "shared/bindings.h"
@@ -37,14 +37,6 @@ bool link(float depth_cells, uint bits)
     uint before = imageAtomicExchange(heads, int(texel_in_tiles()), node + 1u);
     imageStore(nodes, int(node), uvec4(before, floatBitsToUint(depth_cells), bits, primitive.x));
     return true;
-}
-
-// The stride between voxels along depth, u and v, in texels of the sums.
-ivec3 strides()
-{
-    int along = int(voxels_along), square_ = along * along;
-    ivec3 s = gl_Layer == 0 ? ivec3(1, along, square_) : gl_Layer == 1 ? ivec3(along, square_, 1) : ivec3(square_, 1, along);
-    return 4 * s;
 }
 
 // Rounding loses no part of a patch, and a patch that ends at a voxel's side does not touch the next voxel. Sides of
@@ -93,6 +85,15 @@ void mark(float min_cells, float max_cells, int bits, int looks_along)
     } while (half_.z <= half_last.z);
 }
 
+#ifndef WITHOUT_STEEP
+// The stride between voxels along depth, u and v, in texels of the sums.
+ivec3 strides()
+{
+    int along = int(voxels_along), square_ = along * along;
+    ivec3 s = gl_Layer == 0 ? ivec3(1, along, square_) : gl_Layer == 1 ? ivec3(along, square_, 1) : ivec3(square_, 1, along);
+    return 4 * s;
+}
+
 // Adds a unit normal's components along depth, u and v, to the voxel of the texel's centre at this depth.
 void add_normal(float depth_cells, vec3 normal_duv)
 {
@@ -108,6 +109,7 @@ void add_normal(float depth_cells, vec3 normal_duv)
     if (units.z != 0)
         imageAtomicAdd(sums, at + v, units.z);
 }
+#endif
 
 // For surfaces that lean to this image's axis: other images sample them no better. `leaves`: the outside faces greater
 // depths.
@@ -144,10 +146,12 @@ void main()
     }
     if ((face & FACE_LEANS << gl_Layer) != 0u)
         mark(min_cells, max_cells, sum_bits(face, (face & FACE_CLOSED) != 0u, leaves), axis_of_plane());
+#ifndef WITHOUT_STEEP
     if ((face & FACE_DOMINANT) != 0u) {
         vec3 normal = vec3(1.0, -plane.xy) * inversesqrt(1.0 + dot(plane.xy, plane.xy));
         add_normal(depth_cells, leaves ? normal : -normal);
     }
+#endif
 }
 #else
 // The range of a sphere's surface in the texel's square, from its intersection with the line through the texel's
@@ -182,13 +186,19 @@ void main()
         depth_cells = depth_in_cube(depth_cells);
         normal = normalize(normal / max_component(abs(normal)));
         uint face = face_of(normal);
+#ifdef WITHOUT_STEEP
+        if (!is_shown(face, axis))
+            continue;
+#endif
         if (!link(depth_cells, face & FACE_NORMAL_MASK | (closed ? ABUFFER_NODE_CLOSED : 0u) |
                                    (side == 1 ? ABUFFER_NODE_LEAVES : 0u)))
             continue;
         if ((face & FACE_LEANS << axis) != 0u)
             mark(min_cells, max_cells, sum_bits(face, closed, side == 1), axis_of(abs(normal)));
+#ifndef WITHOUT_STEEP
         if (axis_of(abs(normal)) == axis)
             add_normal(depth_cells, vec3(normal[axis], normal[u], normal[v]));
+#endif
     }
 }
 #endif

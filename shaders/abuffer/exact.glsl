@@ -94,8 +94,9 @@ bool settle(trace_ray r, voxel_traversal w, float limit, inout abuffer_found fou
     float end = found.end + BESIDE_BEHIND / w.ray.scale;
     end = end < limit ? end : limit;
     line_intersection own;
-    bool is_own = true, passes = false, is_hit, goes_on;
-    do {
+    bool is_own = true, passes = false, is_hit = false, goes_on = true;
+    // The condition is not at the end: there llvmpipe let rays that had left the loop run on with their neighbours.
+    while (goes_on) {
         line_intersection c = intersect_line_triangle(o, d, id - drawn.y);
         if (is_own)
             own = c;
@@ -109,7 +110,7 @@ bool settle(trace_ray r, voxel_traversal w, float limit, inout abuffer_found fou
         }
         goes_on = !is_hit && !(is_own && is_inside) && next_beside(b, index, id);
         is_own = false;
-    } while (goes_on);
+    }
 #ifdef ANY_HIT
     passes = passes || own.from_behind || w.s_limit - w.s_min < TRUSTED_WAY;
 #endif

@@ -6,8 +6,9 @@
  * The structure is a cube of N x N x N cells of one size over a box of the world. It has three A-buffers, one per axis:
  * image a looks along axis a (0 x, 1 y, 2 z) towards greater values; a texel's u runs along axis (a + 1) % 3 and its v
  * along axis (a + 2) % 3. Points are in cells from the cube's lower corner: p_cell = (p_world - lower) / cell; texel
- * (u, v) covers [u, u + 1) x [v, v + 1) and is sampled at its centre. Every triangle is in all three images, so a
- * texel's samples are all surfaces along its line.
+ * (u, v) covers [u, u + 1) x [v, v + 1) and is sampled at its centre. For searches by winding every triangle is in all
+ * three images, so a texel's samples are all surfaces along its line; for those by planes it is not in images where it is
+ * steep.
  *
  * Over the same cube lies a grid of V x V x V voxels, V a power of two, each N / V cells wide.
  *
@@ -33,6 +34,7 @@
  * While it is built, in R32I texels (image atomics), four per voxel, x fastest:
  *   sums        0..2  sum of the geometric normals of the samples in it, ABUFFER_NORMAL_UNIT for 1: it has the average's
  *                     direction. Each sample counts once: in the image of its normal's dominant axis
+ *                     (for searches by planes, none)
  *               3     ABUFFER_SUM_* bits: of samples in the images that they lean to, in each voxel that a sample's plane
  *                     touches within its texel */
 /* clang-format on */

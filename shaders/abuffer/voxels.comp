@@ -10,6 +10,7 @@ layout(binding = IMAGE_ABUFFER_SUBVOXELS, rg32ui) uniform uimageBuffer subvoxels
 
 uniform int grid; // blocks along a side
 uniform bool has_subvoxels;
+uniform bool without_steep; // no image has samples that are steep in it, and no normals are summed
 uniform uint first_item, end_item; // of the blocks
 
 layout(binding = UNIT_TRACER_0) uniform isamplerBuffer sums; // a voxel's four as one texel
@@ -20,6 +21,10 @@ uint judged(ivec4 sum)
     uint bits = uint(sum.w), leaned = bits & ABUFFER_VOXEL_IMAGES;
     if (bits == 0u)
         return 0u;
+    if (without_steep) { // an image that shows all, or those that show something best
+        uint whole = leaned & ~(bits / ABUFFER_SUM_STEEP);
+        return whole != 0u ? 1u << findLSB(whole) : leaned;
+    }
     vec3 average = abs(vec3(sum.xyz));
     uint first = average.x >= average.y && average.x >= average.z ? 0u : average.y >= average.z ? 1u : 2u;
     // Opposite normals of a thin body's sides cancel out.

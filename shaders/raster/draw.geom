@@ -7,6 +7,7 @@
 //   HAS_CUTOUT      triangles may have holes
 //   ALL_IMAGES      a triangle is in all three images, wherever it has an area, and comes with FACE_* bits; it faces the
 //                   front (gl_FrontFacing) where its outside does, towards greater depths
+//   WITHOUT_STEEP   with ALL_IMAGES: only in those that show it well (raster/face.glsl)
 
 #include "shared/bindings.h"
 #include "shared/geometry.h"
@@ -151,6 +152,9 @@ void main()
         int u = axis == 2 ? 0 : axis + 1, v = axis == 0 ? 2 : axis - 1;
 #ifndef ALL_IMAGES
         if (!is_in_image(lean, axis))
+            continue;
+#elif defined WITHOUT_STEEP
+        if (!is_shown(face, axis))
             continue;
 #endif
         if (!may_cover(vec2(corners[0][u], corners[0][v]), vec2(corners[1][u], corners[1][v]),

@@ -16,6 +16,12 @@ uint face_of(vec3 unit)
     return face;
 }
 
+// Whether an image shows it well.
+bool is_shown(uint face, int axis)
+{
+    return (face & FACE_STEEP << axis) == 0u || (face & FACE_LEANS << axis) != 0u;
+}
+
 // The dominant axis, of equal ones the first.
 int axis_of(vec3 lean)
 {

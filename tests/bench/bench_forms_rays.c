@@ -3,12 +3,15 @@
  * Waves: the same, and "waves": [{"kind", "rays", "hits_ns": [..], "traversal_ns": [..]}]: rays to hits on the
  * device, surfaces included, and the traversal alone (of any-hit waves there is none). Closest-hit waves beside
  * the reference also have "agree" (share of the rays that hit with both or miss with both), "only_form",
- * "only_reference", and of rays that hit with both the difference of distances: "error_median", "error_p99", in
- * metres; of ldc and abuffer also what a ray looked at in the mean: "nodes" (abuffer: blocks of voxels), "texels"
- * (or cells) and "samples". Rays begin where the reference's camera rays hit. */
+ * "only_reference", "far" and "normals" (shares of the rays: both hit, farther apart than 0.0001 of the scene's
+ * diagonal; near, but with normals more than five degrees apart, or of another material), and of rays that hit
+ * with both the difference of distances: "error_median", "error_p99", in metres; of ldc and abuffer also what a
+ * ray looked at in the mean: "nodes" (abuffer: blocks of voxels), "texels" (or cells) and "samples". Rays begin
+ * where the reference's camera rays hit. */
 #include "tests/bench/bench_forms.h"
 
 #include "base/clock.h"
+#include "render/compare/rays.h"
 #include "tests/bench/plain_pass.h"
 #include "tests/bench/svo.h"
 
@@ -100,34 +103,35 @@ json_t *bench_forms_builds(struct bench_forms *bench, struct error *error)
 
 /* ---- how far answers are from the truth ---- */
 
-static int by_size(const void *a, const void *b)
+/* Rays within rounding of an edge are not told apart here: they are few, and all forms have the same. */
+static bool compare(json_t *object, const struct bench_wave *wave, float diagonal, const struct hit *truth,
+                    const struct hit *hits, struct error *error)
 {
-    const float x = *(const float *)a, y = *(const float *)b;
-    return (x > y) - (x < y);
-}
-
-static void compare(json_t *object, const struct hit *truth, const struct hit *hits, uint32_t count)
-{
-    uint32_t both = 0, only_form = 0, only_reference = 0;
-    float *errors = malloc((count + 1) * sizeof(*errors));
-    if (!errors)
-        return;
-    for (uint32_t i = 0; i < count; i++) {
-        const bool is_hit = hits[i].distance >= 0, is_truly = truth[i].distance >= 0;
-        if (is_hit && is_truly)
-            errors[both++] = fabsf(hits[i].distance - truth[i].distance);
-        only_form += is_hit && !is_truly;
-        only_reference += !is_hit && is_truly;
+    const struct wave_compare_settings settings = {.diagonal = diagonal, .far_share = WAVE_FAR_SHARE};
+    const struct wave_answers answers = {
+        .count = wave->ray_count, .rays = wave->rays, .first_hits = hits, .second_hits = truth};
+    struct wave_tally *tally = calloc(1, sizeof(*tally));
+    uint32_t *suspects = malloc(wave->ray_count * sizeof(*suspects));
+    const bool done = tally && suspects;
+    if (done) {
+        const uint32_t differ = wave_compare(tally, &settings, &answers, suspects);
+        const uint64_t alone = tally->only_first + tally->only_second, normals = differ - alone - tally->far;
+        const double rays = (double)wave->ray_count, metres = (double)diagonal;
+        json_object_set_new(object, "agree", json_real(1 - (double)alone / rays));
+        json_object_set_new(object, "only_form", json_integer((json_int_t)tally->only_first));
+        json_object_set_new(object, "only_reference", json_integer((json_int_t)tally->only_second));
+        json_object_set_new(object, "far", json_real((double)tally->far / rays));
+        json_object_set_new(object, "normals", json_real((double)normals / rays));
+        if (tally->both_hit > 0) {
+            const float median = error_histogram_percentile(&tally->distance, 0.5);
+            const float p99 = error_histogram_percentile(&tally->distance, 0.99);
+            json_object_set_new(object, "error_median", json_real((double)median * metres));
+            json_object_set_new(object, "error_p99", json_real((double)p99 * metres));
+        }
     }
-    qsort(errors, both, sizeof(*errors), by_size);
-    json_object_set_new(object, "agree", json_real(1 - (double)(only_form + only_reference) / (double)count));
-    json_object_set_new(object, "only_form", json_integer(only_form));
-    json_object_set_new(object, "only_reference", json_integer(only_reference));
-    if (both > 0) {
-        json_object_set_new(object, "error_median", json_real((double)errors[both / 2]));
-        json_object_set_new(object, "error_p99", json_real((double)errors[both - 1 - both / 100]));
-    }
-    free(errors);
+    free(tally);
+    free(suspects);
+    return done || error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory to compare %u rays", wave->ray_count);
 }
 
 /* What the traversal looks at, in the mean of the wave's rays. Intersections are no answers then
@@ -197,7 +201,8 @@ static bool examine(struct waves *waves, struct bench_form *form, const struct b
 {
     if (!bench_contest_hits(&waves->contest, form->made, wave, waves->hits, error))
         return false;
-    compare(object, waves->truth, waves->hits, wave->ray_count);
+    if (!compare(object, wave, waves->bench->scene.gpu.diagonal, waves->truth, waves->hits, error))
+        return false;
     return (form->tracer != TRACER_LDC && form->tracer != TRACER_ABUFFER) ||
            count_steps(&waves->contest, form, wave, waves->hits, object, error);
 }

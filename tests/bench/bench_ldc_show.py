@@ -63,12 +63,13 @@ def show_accuracy(scenes, pictures):
             for kind in ACCURACY_WAVES:
                 wave = wave_of(form, kind)
                 cells += [f"{100 * wave['agree']:.3f}", *(significant(error_cells(form, wave, which)) for which in
-                                                          ("error_median", "error_p99"))]
+                                                          ("error_median", "error_p99")),
+                          *(significant(100 * wave[what]) for what in ("far", "normals"))]
             same = [closed.get((result["title"], how)) for how in PICTURES]
             lines.append((result["title"], form["structure"]["static/resolution"], *cells,
                           *(significant(picture["forms"][i]["psnr_db"] if picture else None) for picture in same)))
-    header = [("scene", "cells", *(["reflection"] * 3), *(["bounce"] * 3), *PICTURES),
-              ("", "", *(["agree %", "error, cells", "of 99 %"] * 2), *(["PSNR, dB"] * len(PICTURES)))]
+    header = [("scene", "cells", *(["reflection"] * 5), *(["bounce"] * 5), *PICTURES),
+              ("", "", *(["agree %", "error, cells", "of 99 %", "far %", "normals %"] * 2), *(["PSNR, dB"] * len(PICTURES)))]
     return table(header, lines)
 
 
@@ -122,7 +123,7 @@ def show(data):
         "Rays to hits, surfaces included, from where the camera's rays hit; beside bvh on the same waves",
         show_scenes(data["scenes"]),
         "How far answers are from the reference's: share of the rays that hit with both or miss with both, and errors of\n"
-        "distance in cells where both hit. Pictures by the Whitted integrator: as the model is, and all of it a mirror.",
+        "distance in cells where both hit; 'far': both hit, more than 0.0001 of the diagonal apart; 'normals': near, but another surface. Pictures by the Whitted integrator: as the model is, and all of it a mirror.",
         show_accuracy(data["scenes"], data["pictures"]),
         f"Time against triangles at {USUAL}", show_family(data["family"]),
         "Peeling, as the paper builds, both targets with each layer, and one pass with lists: from triangles to samples, without\n"

@@ -56,7 +56,7 @@ CHOICES = {
     "ldc/build.frag": [[{"PRIMITIVE_KIND": "0"}, {"PRIMITIVE_KIND": "1", "HAS_SPHERES": "1"}],
                        [{"BUILD_PASS": number} for number in "012"]],
     "abuffer/build.frag": [[{"PRIMITIVE_KIND": "0", "ALL_IMAGES": "1"},
-                            {"PRIMITIVE_KIND": "1", "HAS_SPHERES": "1", "ALL_IMAGES": "1"}]],
+                            {"PRIMITIVE_KIND": "1", "HAS_SPHERES": "1", "ALL_IMAGES": "1"}], [{}, {"WITHOUT_STEEP": "1"}]],
     "svo/voxelise.frag": [[{"PRIMITIVE_KIND": "0"}, {"PRIMITIVE_KIND": "1", "HAS_SPHERES": "1"}]],
 }
 # Defines that come only with others.

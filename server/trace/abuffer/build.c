@@ -3,6 +3,7 @@
 
 #include "base/clock.h"
 #include "trace/abuffer/build_state.h"
+#include "trace/abuffer/trace.h"
 #include "trace/abuffer/voxels.h"
 
 #include <epoxy/gl.h>
@@ -220,6 +221,7 @@ bool abuffer_build_begin(struct abuffer_builder *builder, struct abuffer_store *
         .options = options,
         .texel_count = 3 * tiles_along * tiles_along * ABUFFER_TILE_TEXELS,
     };
+    store->without_steep = !abuffer_is_linear(options);
     store->sample_count = 0;
     store->depth_max = 0;
     builder->passes = 0;

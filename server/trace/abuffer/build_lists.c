@@ -178,13 +178,14 @@ uint32_t abuffer_draw_fit(struct abuffer_task *task, uint32_t first, uint32_t it
 
 bool abuffer_draw_run(struct abuffer_task *task, uint32_t first, uint32_t end, struct error *error)
 {
-    static const struct gpu_define defines[] = {{"ALL_IMAGES", "1"}, {0}};
+    static const struct gpu_define all[] = {{"ALL_IMAGES", "1"}, {0}};
+    static const struct gpu_define shown[] = {{"ALL_IMAGES", "1"}, {"WITHOUT_STEEP", "1"}, {0}};
     struct abuffer_builder *builder = task->builder;
     struct gpu_device *device = builder->device;
     const struct abuffer_store *store = task->store;
     struct axes_pass pass = {
         .fragment = "abuffer/build.frag",
-        .defines = defines,
+        .defines = store->without_steep ? shown : all,
         .cell_world = store->cell_world,
         .resolution = store->resolution,
         .set = set_lists,

@@ -34,7 +34,7 @@ bool abuffer_surfaces(struct abuffer_store *store, const struct gpu_scene *scene
     return true;
 }
 
-static bool is_linear(const struct tracer_options *options)
+bool abuffer_is_linear(const struct tracer_options *options)
 {
     return options->abuffer.search == ABUFFER_SEARCH_LINEAR3 || options->abuffer.search == ABUFFER_SEARCH_LINEAR1;
 }
@@ -46,8 +46,8 @@ static bool is_linear(const struct tracer_options *options)
 uint64_t abuffer_rounds_of_a_ray(const struct abuffer_store *store, const struct tracer_options *options)
 {
     const uint64_t parts = 12 * (uint64_t)store->voxels_along;
-    const uint64_t columns = is_linear(options) ? parts * (STEP_COLUMNS + PASSAGE_COLUMNS)
-                                                : 3 * (2 * (uint64_t)store->resolution + parts);
+    const uint64_t columns = abuffer_is_linear(options) ? parts * (STEP_COLUMNS + PASSAGE_COLUMNS)
+                                                        : 3 * (2 * (uint64_t)store->resolution + parts);
     return parts + parts / 3 + columns * (SCAN_ROUNDS + store->depth_max / 2);
 }
 
@@ -58,7 +58,7 @@ bool abuffer_intersect(struct abuffer_store *store, struct gpu_scene *scene, con
     size_t n = 1;
     if (store->resolution == 0)
         defines[n++] = (struct gpu_define){"ABUFFER_EMPTY", "1"};
-    if (is_linear(options))
+    if (abuffer_is_linear(options))
         defines[n++] =
             (struct gpu_define){"ABUFFER_STEPS", options->abuffer.search == ABUFFER_SEARCH_LINEAR3 ? "3" : "1"};
     if (options->bench.abuffer_count_steps && rays->wave->kind == WAVE_CLOSEST)

@@ -20,4 +20,7 @@ bool abuffer_intersect(struct abuffer_store *store, struct gpu_scene *scene, con
 bool abuffer_surfaces(struct abuffer_store *store, const struct gpu_scene *scene, const struct ray_range *rays,
                       struct error *error);
 
+/* Whether intersections are searched in steps, by the winding behind samples in all images. */
+bool abuffer_is_linear(const struct tracer_options *options);
+
 #endif

@@ -32,6 +32,7 @@ static bool judge(struct abuffer_store *store, uint32_t first, uint32_t end, str
     gpu_buffer_bind_image(store->device, &store->voxels, IMAGE_ABUFFER_VOXELS, GL_RGBA32UI);
     gpu_buffer_bind_image(store->device, &store->subvoxels, IMAGE_ABUFFER_SUBVOXELS, GL_RG32UI);
     gpu_uniform_int(program, "has_subvoxels", abuffer_has_subvoxels(store));
+    gpu_uniform_int(program, "without_steep", store->without_steep);
     gpu_uniform_int(program, "grid", (int32_t)(store->voxels_along / ABUFFER_BLOCK_VOXELS));
     gpu_uniform_uint(program, "first_item", first);
     gpu_uniform_uint(program, "end_item", end);

@@ -333,3 +333,49 @@ TEST(what_is_cut_out_bounds_no_body)
     contents_free(&contents);
     fixture_finish(&fixture);
 }
+
+/* Of a sample in the image of an axis: whether the image shows it well, 1, or not, 0; -1: rounding decides. */
+static int is_shown(const struct contents *contents, uint32_t sample, uint32_t axis)
+{
+    double n[3], maximum = 0;
+    normal_of(n, contents, sample);
+    for (int k = 0; k < 3; k++)
+        maximum = fmax(maximum, fabs(n[k]));
+    const double beyond_steep = fabs(n[axis]) - (double)FACE_STEEP_BELOW;
+    const double leans = fabs(n[axis]) - (double)AXES_OVERLAP * maximum;
+    if (fabs(beyond_steep) < 0.002 || (beyond_steep < 0 && fabs(leans) < 0.002))
+        return -1;
+    return beyond_steep > 0 || leans > 0;
+}
+
+/* The search by planes looks at a surface where it is not steep. */
+TEST(without_windings_no_image_has_steep_samples)
+{
+    struct fixture fixture;
+    struct contents all, some;
+    uint32_t left_out = 0;
+    fixture_init(&fixture, scene_of_bodies_and_others());
+    build(&fixture, RESOLUTION, VOXELS);
+    contents_read(&all, &fixture.store);
+    fixture.options.abuffer.search = ABUFFER_SEARCH_DDA;
+    build(&fixture, RESOLUTION, VOXELS);
+    contents_read(&some, &fixture.store);
+    for (uint32_t texel = 0; texel < texel_count_of(&all); texel++) {
+        const uint32_t axis = texel / (RESOLUTION * RESOLUTION);
+        uint32_t at = some.texels[texel][0], end = at + some.texels[texel][1];
+        for (uint32_t k = all.texels[texel][0]; k < all.texels[texel][0] + all.texels[texel][1]; k++) {
+            const int shown = is_shown(&all, k, axis);
+            const bool is_there =
+                at < end && all.ids[k] == some.ids[at] && all.samples[k][0] == some.samples[at][0];
+            if (shown >= 0)
+                assert_int_equal(is_there, shown);
+            at += is_there;
+            left_out += !is_there;
+        }
+        assert_int_equal(at, end);
+    }
+    assert_true(left_out > all.store.sample_count / 10);
+    contents_free(&all);
+    contents_free(&some);
+    fixture_finish(&fixture);
+}
