@@ -93,8 +93,8 @@ vec3 bump_normal(hit h, uint slot_index, vec3 normal, vec4 uv01, texture_footpri
     if (!surface_derivatives(h, slot, along_u, along_v))
         return normal;
     texture_info info = texture_at(slot.texture & 0x7fffffffu);
-    int level = slot_level(slot, footprint);
-    vec2 uv = slot_texcoords(slot, uv01), texel = 1.0 / vec2(find_level(info, level).size);
+    texture_level level = find_level(info, slot_level(slot, footprint));
+    vec2 uv = slot_texcoords(slot, uv01), texel = 1.0 / vec2(level.size);
     float height_u = 0.0, height_v = 0.0;
     for (int i = 0; i < 4; i++) { // -u, +u, -v, +v
         float side = (i & 1) != 0 ? 0.5 : -0.5;

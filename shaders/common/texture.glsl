@@ -27,13 +27,16 @@ struct texture_level {
     ivec2 size;
 };
 
+texture_level next_level(texture_level level)
+{
+    return texture_level(level.first_texel + level.size.x * level.size.y, max(level.size >> 1, ivec2(1)));
+}
+
 texture_level find_level(texture_info info, int level)
 {
     texture_level found = texture_level(int(info.first_texel), ivec2(info.width, info.height));
-    for (int i = 0; i < level; i++) {
-        found.first_texel += found.size.x * found.size.y;
-        found.size = max(found.size >> 1, ivec2(1));
-    }
+    for (int i = 0; i < level; i++)
+        found = next_level(found);
     return found;
 }
 
@@ -49,9 +52,8 @@ vec4 fetch_texel(texture_info info, texture_level level, ivec2 at)
 
 // The loops here have counts that the compiler cannot know: unrolled and inlined wherever a texture is sampled, the
 // fetches took software GL's compiler seconds.
-vec4 sample_level(texture_info info, int level_number, vec2 uv)
+vec4 sample_level(texture_info info, texture_level level, vec2 uv)
 {
-    texture_level level = find_level(info, level_number);
     bool nearest = (info.flags & TEXTURE_NEAREST) != 0u;
     vec2 wrapped = vec2(wrap_coordinate(uv.x, (info.flags >> TEXTURE_WRAP_U_SHIFT) & 3u),
                         wrap_coordinate(uv.y, (info.flags >> TEXTURE_WRAP_V_SHIFT) & 3u));
@@ -118,12 +120,15 @@ vec4 sample_slot_filtered(texture_slot slot, vec4 uv01, texture_footprint footpr
     int samples = int(clamp(ceil(texels_long / texels_wide - 0.1), 1.0, FOOTPRINT_SAMPLES_MAX));
     int levels = level > lower ? 2 : 1;
     vec2 uv = slot_texcoords(slot, uv01);
+    texture_level read = find_level(info, int(lower));
     vec4 sum = vec4(0.0);
     for (int i = 0; i < samples * levels; i++) {
         bool upper = i >= samples;
+        if (i == samples)
+            read = next_level(read);
         float place = (float(upper ? i - samples : i) + 0.5) / float(samples) - 0.5;
         float weight = upper ? level - lower : 1.0 - (level - lower);
-        sum += weight * sample_level(info, int(lower) + (upper ? 1 : 0), uv + place * longer);
+        sum += weight * sample_level(info, read, uv + place * longer);
     }
     return sum / float(samples);
 }
@@ -132,5 +137,6 @@ vec4 sample_slot_filtered(texture_slot slot, vec4 uv01, texture_footprint footpr
 vec4 sample_slot(uint slot_index, vec4 uv01)
 {
     texture_slot slot = texture_slot_at(slot_index);
-    return sample_level(texture_at(slot.texture & 0x7fffffffu), 0, slot_texcoords(slot, uv01));
+    texture_info info = texture_at(slot.texture & 0x7fffffffu);
+    return sample_level(info, find_level(info, 0), slot_texcoords(slot, uv01));
 }

@@ -109,6 +109,13 @@ class WithoutAWindow(Viewer):
         # Rounding in the order of the passes: a step of 8 bits here and there.
         self.assertLess(difference(self.folder / "view.png", self.folder / "render.png"), 0.05)
 
+    def test_what_rests_is_refined_until_its_error_is_as_small_as_wanted(self):
+        """Not until it has all samples, and nothing is rendered any longer."""
+        states = self.replay([rest(4096), {"state": "rested"}, {"state": "later", "after": 0.5}], "--integrator", "path",
+                             "--noise", "0.5", "--samples", "4096", scene="cornell.glb", size=(64, 48))
+        self.assertIn(states["rested"]["samples"], range(16, 1024))
+        self.assertEqual(states["later"]["frames"], states["rested"]["frames"])
+
     def test_a_key_shows_both_eyes_and_one(self):
         """Each is the picture that render makes, beside or above the other; the reference renders both."""
         eyes = ["--stereo", "0.25", "--integrator", "whitted", "--samples", "4"]

@@ -195,7 +195,7 @@ void shape_tube(struct shape *shape, const float (*path)[3], const float *radii,
             const float angle = two_pi * (float)(i % segments) / (float)segments;
             float normal[3], position[3];
             for (int axis = 0; axis < 3; axis++) {
-                normal[axis] = cosf(angle) * side[axis] - sinf(angle) * up[axis];
+                normal[axis] = cosf(angle) * side[axis] + sinf(angle) * up[axis];
                 position[axis] = path[row][axis] + radii[row] * normal[axis];
             }
             add_vertex(shape, position, normal);

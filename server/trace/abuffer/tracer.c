@@ -81,10 +81,10 @@ static struct tracer *abuffer_create(struct gpu_device *device, const struct tra
 static bool fit(struct abuffer *abuffer, const struct gpu_scene *scene, const uint32_t *instances, uint32_t count,
                 const struct axes_box *box, struct error *error)
 {
-    const double longest_world = (double)box->cell_world * abuffer->resolution;
-    const double layers = axes_mean_layers(scene, instances, count, 0, longest_world);
+    const struct axes_box whole = axes_box_whole(box, abuffer->resolution);
+    const struct axes_layers layers = axes_count_layers(scene, instances, count, 0, &whole);
     uint32_t fitted = abuffer->resolution;
-    if (!axes_fit_resolution(&abuffer->base, layers, &fitted, error))
+    if (!axes_fit_resolution(&abuffer->base, layers.mean, &fitted, error))
         return false;
     abuffer->fitted = fitted;
     abuffer->fitted_instances = count;

@@ -12,6 +12,11 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+/* Fragments of one texel that lists take; where there are more it is peeled, once for each layer that is kept,
+ * which takes minutes. Software GL ends the loops of an invocation after 65,535 rounds: a heap of 2048 takes about
+ * 50,000, and pack.comp goes over eight texels three times. */
+#define LDC_LISTED_LAYERS_MAX 2048u
+
 /* Private buffers and images of the build, kept between builds; all-zero is empty. */
 struct ldc_builder;
 

@@ -14,10 +14,6 @@
 #define SLOTS_BYTES_MAX ((uint64_t)512 << 20)
 /* The accepted share of fragments without a slot. */
 #define UNSLOTTED_SHARE 16
-/* Fragments of one texel. Software GL ends the loops of an invocation after 65,535 rounds: a heap of 2048 takes
- * about 50,000, and pack.comp goes over eight texels three times. */
-#define LISTED_LAYERS_MAX 2048u
-
 /* As many as the last build suggests and memory allows. */
 static uint32_t choose_slots(const struct ldc_task *task)
 {
@@ -120,7 +116,7 @@ static bool can_list(struct ldc_task *task)
 {
     struct ldc_builder *builder = task->builder;
     uint64_t texels_max = builder->device->facts.texture_buffer_texels_max, wanted = task->counts.places;
-    if (task->counts.fragments_wraps > 0 || task->counts.layers_needed > LISTED_LAYERS_MAX ||
+    if (task->counts.fragments_wraps > 0 || task->counts.layers_needed > LDC_LISTED_LAYERS_MAX ||
         (uint64_t)task->slots * task->texel_count + wanted > texels_max)
         return false;
     if (wanted <= builder->fragments_max)

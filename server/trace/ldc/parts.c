@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "trace/ldc/parts.h"
 
+#include "trace/ldc/build.h"
 #include "trace/raster/fit.h"
 
 #include <stdlib.h>
@@ -180,9 +181,10 @@ static bool place_part(struct ldc_part *fresh, const struct ldc_part *before, co
     if (!axes_box_place(&fresh->box, scene, instances, count, resolution, error))
         return false;
     if (count > 0 && !is_counted) {
-        const double longest_world = (double)fresh->box.cell_world * resolution;
-        const double layers = axes_mean_layers(scene, instances, count, settings->overlap, longest_world);
-        if (!axes_fit_resolution(settings->tracer, layers, &resolution, error) ||
+        const struct axes_box whole = axes_box_whole(&fresh->box, resolution);
+        const struct axes_layers layers = axes_count_layers(scene, instances, count, settings->overlap, &whole);
+        if (!axes_fit_depth(settings->tracer, layers.greatest, LDC_LISTED_LAYERS_MAX, error) ||
+            !axes_fit_resolution(settings->tracer, layers.mean, &resolution, error) ||
             !axes_box_place(&fresh->box, scene, instances, count, resolution, error))
             return false;
     }

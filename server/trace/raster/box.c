@@ -49,3 +49,10 @@ bool axes_box_place(struct axes_box *box, const struct gpu_scene *scene, const u
         box->lower_world[k] = (float)(bounds.lower[k] - MARGIN_CELLS * cell);
     return true;
 }
+
+struct axes_box axes_box_whole(const struct axes_box *box, uint32_t resolution)
+{
+    struct axes_box whole = *box;
+    whole.cell_world *= (float)resolution;
+    return whole;
+}

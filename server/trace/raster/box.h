@@ -19,5 +19,7 @@ struct axes_box {
 /* `resolution`: cells along a side. Fails where a place is so far off that squares of distances are no numbers. */
 bool axes_box_place(struct axes_box *box, const struct gpu_scene *scene, const uint32_t *instances, uint32_t count,
                     uint32_t resolution, struct error *error);
+/* Of so many cells along a side, as one cell. */
+struct axes_box axes_box_whole(const struct axes_box *box, uint32_t resolution);
 
 #endif

@@ -3,10 +3,15 @@
 
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 
 #define PI 3.14159265358979
 /* Looked at, of all primitives: about a millisecond's worth. Of each instance at least one is. */
 #define PRIMITIVES_LOOKED_AT (1u << 16)
+/* Blocks along a side of an image, of which each has its number of layers; as steps, they end with one more. */
+#define COUNTED_ALONG 128
+#define COUNTED_ROW (COUNTED_ALONG + 1)
+#define COUNTED_STEPS (COUNTED_ROW * COUNTED_ROW)
 
 /* The transform of normals whose lengths are areas, by an instance's matrix. */
 static void areas_of(double rows[3][3], const struct instance *instance)
@@ -19,36 +24,96 @@ static void areas_of(double rows[3][3], const struct instance *instance)
         }
 }
 
-/* A flat area with this normal in object space, as the images that it is in see it, square metres. */
-static double area_in_images(const double rows[3][3], const double normal[3], double overlap)
+/* What is counted so far. */
+struct counting {
+    const struct axes_box *whole; /* of one cell */
+    double overlap;
+    double each;   /* primitives that the next one stands for */
+    double areas;  /* in all three images, square metres */
+    double *steps; /* of the layers' numbers along u and v: COUNTED_STEPS an image; NULL: only areas are counted */
+};
+
+static int block_of(const struct counting *counting, double place_world, int axis)
 {
-    double lean[3], sum = 0;
-    for (int r = 0; r < 3; r++)
-        lean[r] = fabs(rows[r][0] * normal[0] + rows[r][1] * normal[1] + rows[r][2] * normal[2]);
-    const double maximum = fmax(lean[0], fmax(lean[1], lean[2]));
-    if (overlap == 1)
-        return maximum;
-    for (int r = 0; r < 3; r++)
-        sum += lean[r] >= overlap * maximum ? lean[r] : 0;
-    return sum;
+    const double share =
+        (place_world - (double)counting->whole->lower_world[axis]) / (double)counting->whole->cell_world;
+    return (int)fmin(fmax(share * COUNTED_ALONG, 0), COUNTED_ALONG - 1);
 }
 
-static double area_of_triangle(const double rows[3][3], const struct scene_mesh *mesh, uint32_t triangle,
-                               double overlap)
+/* Areas along the axes, spread evenly over the blocks that the bounds touch: none of them gets more than is there,
+ * and large primitives take no longer than small ones. */
+static void count_areas(struct counting *counting, const double areas[3], const double lower[3],
+                        const double upper[3])
+{
+    const double side = (double)counting->whole->cell_world / COUNTED_ALONG;
+    for (int axis = 0; axis < 3; axis++) {
+        const int u = (axis + 1) % 3, v = (axis + 2) % 3;
+        counting->areas += areas[axis] * counting->each;
+        if (!counting->steps)
+            continue;
+        const int u0 = block_of(counting, lower[u], u), u1 = block_of(counting, upper[u], u) + 1;
+        const int v0 = block_of(counting, lower[v], v), v1 = block_of(counting, upper[v], v) + 1;
+        const double layers = areas[axis] * counting->each / (side * side * (u1 - u0) * (v1 - v0));
+        double *image = counting->steps + (size_t)axis * COUNTED_STEPS;
+        image[v0 * COUNTED_ROW + u0] += layers;
+        image[v0 * COUNTED_ROW + u1] -= layers;
+        image[v1 * COUNTED_ROW + u0] -= layers;
+        image[v1 * COUNTED_ROW + u1] += layers;
+    }
+}
+
+/* The sums of the steps; the greatest of them. */
+static double greatest_of(double *steps)
+{
+    double greatest = 0;
+    for (size_t i = 0; i < 3 * (size_t)COUNTED_STEPS; i++) {
+        const size_t u = i % COUNTED_ROW, v = i / COUNTED_ROW % COUNTED_ROW;
+        steps[i] += (u > 0 ? steps[i - 1] : 0) + (v > 0 ? steps[i - COUNTED_ROW] : 0) -
+                    (u > 0 && v > 0 ? steps[i - COUNTED_ROW - 1] : 0);
+        greatest = fmax(greatest, steps[i]);
+    }
+    return greatest;
+}
+
+/* Of a flat area with this normal in object space, what the images that it is in see, square metres. */
+static void areas_in_images(double areas[3], const double rows[3][3], const double normal[3], double overlap)
+{
+    int dominant = 0;
+    for (int r = 0; r < 3; r++) {
+        areas[r] = fabs(rows[r][0] * normal[0] + rows[r][1] * normal[1] + rows[r][2] * normal[2]);
+        dominant = areas[r] > areas[dominant] ? r : dominant;
+    }
+    const double maximum = areas[dominant];
+    for (int r = 0; r < 3; r++)
+        if (overlap == 1 ? r != dominant : !(areas[r] >= overlap * maximum))
+            areas[r] = 0;
+}
+
+static void count_triangle(struct counting *counting, const struct instance *instance, const double rows[3][3],
+                           const struct scene_mesh *mesh, uint32_t triangle)
 {
     const uint32_t *corner =
         (const uint32_t *)(const void *)mesh->arrays[MESH_INDICES]->data + 3 * (size_t)triangle;
     const float *positions = (const float *)(const void *)mesh->arrays[MESH_POSITIONS]->data;
-    const float *a = positions + 3 * (size_t)corner[0], *b = positions + 3 * (size_t)corner[1];
-    const float *c = positions + 3 * (size_t)corner[2];
-    double ab[3], ac[3], normal[3];
+    double at[3][3], normal[3], areas[3], lower[3], upper[3];
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 3; k++)
+            at[i][k] = (double)positions[3 * (size_t)corner[i] + (size_t)k];
     for (int k = 0; k < 3; k++) {
-        ab[k] = (double)b[k] - (double)a[k];
-        ac[k] = (double)c[k] - (double)a[k];
+        const int k1 = (k + 1) % 3, k2 = (k + 2) % 3;
+        normal[k] = 0.5 * ((at[1][k1] - at[0][k1]) * (at[2][k2] - at[0][k2]) -
+                           (at[1][k2] - at[0][k2]) * (at[2][k1] - at[0][k1]));
     }
-    for (int k = 0; k < 3; k++)
-        normal[k] = 0.5 * (ab[(k + 1) % 3] * ac[(k + 2) % 3] - ab[(k + 2) % 3] * ac[(k + 1) % 3]);
-    return area_in_images(rows, normal, overlap);
+    for (int r = 0; r < 3; r++) {
+        const float *m = instance->world_from_object[r];
+        double world[3];
+        for (int i = 0; i < 3; i++)
+            world[i] = (double)m[0] * at[i][0] + (double)m[1] * at[i][1] + (double)m[2] * at[i][2] + (double)m[3];
+        lower[r] = fmin(world[0], fmin(world[1], world[2]));
+        upper[r] = fmax(world[0], fmax(world[1], world[2]));
+    }
+    areas_in_images(areas, rows, normal, counting->overlap);
+    count_areas(counting, areas, lower, upper);
 }
 
 /* The share of a sphere's projection along an axis within which its normal leans to the axis enough: the
@@ -63,44 +128,63 @@ static double share_of_sphere(double overlap)
 }
 
 /* Both sides; squeezed ones as if the share were theirs too. */
-static double area_of_sphere(const double rows[3][3], const struct scene_spheres *spheres, uint32_t sphere,
-                             double overlap)
+static void count_sphere(struct counting *counting, const struct instance *instance, const double rows[3][3],
+                         const struct scene_spheres *spheres, uint32_t sphere)
 {
-    const double radius =
-        (double)((const float *)(const void *)spheres->centres_radii->data)[4 * (size_t)sphere + 3];
-    double sum = 0;
-    for (int r = 0; r < 3; r++)
-        sum += sqrt(rows[r][0] * rows[r][0] + rows[r][1] * rows[r][1] + rows[r][2] * rows[r][2]);
-    return 2 * PI * radius * radius * sum * share_of_sphere(overlap);
+    const float *at = (const float *)(const void *)spheres->centres_radii->data + 4 * (size_t)sphere;
+    const double radius = (double)at[3], share = share_of_sphere(counting->overlap);
+    double areas[3], lower[3], upper[3];
+    for (int r = 0; r < 3; r++) {
+        const float *m = instance->world_from_object[r];
+        const double centre = (double)m[0] * (double)at[0] + (double)m[1] * (double)at[1] +
+                              (double)m[2] * (double)at[2] + (double)m[3];
+        const double reach =
+            radius * sqrt((double)m[0] * (double)m[0] + (double)m[1] * (double)m[1] + (double)m[2] * (double)m[2]);
+        lower[r] = centre - reach;
+        upper[r] = centre + reach;
+        areas[r] = 2 * PI * radius * radius * share *
+                   sqrt(rows[r][0] * rows[r][0] + rows[r][1] * rows[r][1] + rows[r][2] * rows[r][2]);
+    }
+    count_areas(counting, areas, lower, upper);
 }
 
 /* Every `stride`th primitive stands for those after it. */
-static double area_of_instance(const struct gpu_scene *scene, const struct instance *instance, uint32_t stride,
-                               double overlap)
+static void count_instance(struct counting *counting, const struct gpu_scene *scene,
+                           const struct instance *instance, uint32_t stride)
 {
     const struct gpu_scene_geometry *geometry = &scene->geometries[instance->geometry];
     const uint32_t count = geometry->device.primitive_count;
-    uint32_t seen = 0;
-    double rows[3][3], sum = 0;
+    double rows[3][3];
     areas_of(rows, instance);
-    for (uint64_t i = 0; i < count; i += stride, seen++)
-        sum += geometry->mesh ? area_of_triangle(rows, geometry->mesh, (uint32_t)i, overlap)
-                              : area_of_sphere(rows, geometry->spheres, (uint32_t)i, overlap);
-    return seen > 0 ? sum * count / seen : 0;
+    counting->each = count / ceil((double)count / stride);
+    for (uint64_t i = 0; i < count; i += stride) {
+        if (geometry->mesh)
+            count_triangle(counting, instance, rows, geometry->mesh, (uint32_t)i);
+        else
+            count_sphere(counting, instance, rows, geometry->spheres, (uint32_t)i);
+    }
 }
 
-double axes_mean_layers(const struct gpu_scene *scene, const uint32_t *instances, uint32_t count, float overlap,
-                        double longest_world)
+struct axes_layers axes_count_layers(const struct gpu_scene *scene, const uint32_t *instances, uint32_t count,
+                                     float overlap, const struct axes_box *whole)
 {
+    struct counting counting = {.whole = whole, .overlap = (double)overlap};
+    const double side = (double)whole->cell_world;
+    struct axes_layers layers = {0};
     uint64_t primitives = 0;
-    double sum = 0;
+    if (!(side > 0))
+        return layers;
+    counting.steps = calloc(3 * (size_t)COUNTED_STEPS, sizeof(*counting.steps));
     for (uint32_t i = 0; i < count; i++)
         primitives += scene->geometries[scene->instances[instances[i]].geometry].device.primitive_count;
     /* Odd: the two triangles of a quadrilateral, which often come by turns, are looked at by turns. */
     const uint32_t stride = (uint32_t)(primitives / PRIMITIVES_LOOKED_AT) | 1u;
     for (uint32_t i = 0; i < count; i++)
-        sum += area_of_instance(scene, &scene->instances[instances[i]], stride, (double)overlap);
-    return longest_world > 0 ? sum / (3 * longest_world * longest_world) : 0;
+        count_instance(&counting, scene, &scene->instances[instances[i]], stride);
+    layers.mean = counting.areas / (3 * side * side);
+    layers.greatest = counting.steps ? greatest_of(counting.steps) : 0;
+    free(counting.steps);
+    return layers;
 }
 
 static double samples_max(const struct tracer *tracer)
@@ -123,6 +207,15 @@ bool axes_fit_resolution(const struct tracer *tracer, double layers, uint32_t *r
     }
     *resolution = (uint32_t)fitting;
     return true;
+}
+
+bool axes_fit_depth(const struct tracer *tracer, double layers, uint32_t maximum, struct error *error)
+{
+    if (!(layers > maximum))
+        return true;
+    error_set(error, ERROR_LIMIT, tracer->impl->name,
+              "the scene has %.0f layers in one place, of at most %u: too many to sample", layers, maximum);
+    return error_remedy(error, "choose another tracer, such as bvh");
 }
 
 void axes_fit_tell(struct structure_row *resolution, uint32_t wanted)

@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /* The depth of a scene, counted before anything of it is built: how many samples its images along the axes would
- * have, and so the resolution at which a structure of them stays within bounds. The number is the sum of the
- * primitives' projected areas in texels (Cauchy: what a line meets of a surface is, on average, its projected area
- * over that of the images), so it holds for rods thinner than a texel too, and nothing is drawn for it. */
+ * have, and so the resolution at which a structure of them stays within bounds; and how deep they are where they
+ * are deepest. The number is the sum of the primitives' projected areas in texels (Cauchy: what a line meets of a
+ * surface is, on average, its projected area over that of the images), so it holds for rods thinner than a texel
+ * too, and nothing is drawn for it. */
 #ifndef FARLIGHT_TRACE_RASTER_FIT_H
 #define FARLIGHT_TRACE_RASTER_FIT_H
 
@@ -18,15 +19,23 @@
 /* Coarser than this, a picture would show nothing of what is so deep. */
 #define AXES_FITTED_MIN 128u
 
-/* The layers of the three images, on average over all their texels, at any resolution: within a tenth for surfaces
- * of many primitives. Of large meshes some primitives stand for all; meshes that deform count as if they did not.
- * `overlap`: as axes_pass; 0: every triangle is in all images. `longest_world`: a side of the images, metres. */
-double axes_mean_layers(const struct gpu_scene *scene, const uint32_t *instances, uint32_t count, float overlap,
-                        double longest_world);
+struct axes_layers {
+    double mean;     /* over all texels of the three images, at any resolution: within a tenth for surfaces of many
+                      * primitives */
+    double greatest; /* of 128 x 128 blocks of each image, the mean of the deepest: single texels may be deeper */
+};
 
-/* Lowers *resolution to what `layers` allow the tracer. Fails, with a remedy, where that were less than
- * AXES_FITTED_MIN and less than what was asked for. */
+/* Of large meshes some primitives stand for all; meshes that deform count as if they did not. `overlap`: as
+ * axes_pass; 0: every triangle is in all images. `whole`: the cube, as one cell. */
+struct axes_layers axes_count_layers(const struct gpu_scene *scene, const uint32_t *instances, uint32_t count,
+                                     float overlap, const struct axes_box *whole);
+
+/* Lowers *resolution to what `layers`, on average, allow the tracer. Fails, with a remedy, where that were less
+ * than AXES_FITTED_MIN and less than what was asked for. */
 bool axes_fit_resolution(const struct tracer *tracer, double layers, uint32_t *resolution, struct error *error);
+
+/* Fails, with a remedy, where the greatest number of `layers` is above the maximum. */
+bool axes_fit_depth(const struct tracer *tracer, double layers, uint32_t maximum, struct error *error);
 
 /* Says in the row of a structure's resolution, as a warning, that more was wanted, where it was. */
 void axes_fit_tell(struct structure_row *resolution, uint32_t wanted);

@@ -278,6 +278,7 @@ static inline enum frame_progress fake_step(struct frame_renderer *renderer, str
         .ycbcr = request->ycbcr,
         .revision = renderer->scene->revision,
         .samples = renderer->kept_samples,
+        .noise = 1.0f / (float)renderer->kept_samples,
         .layers = frame_request_layers(request),
         .attachments = request->attachments,
         .primary_rays = 10,

@@ -189,6 +189,24 @@ TEST(a_picture_that_rests_is_refined_until_it_has_its_samples)
     expect_silence(watching->engine);
 }
 
+/* The error of N samples is 1 / N here. */
+TEST(a_picture_that_rests_is_refined_until_its_error_is_as_small_as_wanted)
+{
+    struct watching *watching = *state;
+    struct engine_command *made = with_samples(view(2, watching->wishes), 1000, 3);
+    made->job.frame.noise = 0.12f;
+    submit(watching->engine, made);
+    expect_picture(watching, 2, 0, 0, 3, ENCODING_RAW);
+    expect_picture(watching, 2, 1, 0, 6, ENCODING_RAW);
+    expect_picture(watching, 2, 2, 0, 9, ENCODING_RAW);
+    expect_silence(watching->engine);
+    look(watching, 1, false); /* another place, of which nothing is known */
+    expect_picture(watching, 2, 3, 1, 3, ENCODING_RAW);
+    expect_picture(watching, 2, 4, 1, 6, ENCODING_RAW);
+    expect_picture(watching, 2, 5, 1, 9, ENCODING_RAW);
+    expect_silence(watching->engine);
+}
+
 TEST(an_edit_of_the_scene_begins_anew)
 {
     struct watching *watching = *state;

@@ -79,6 +79,25 @@ static struct scene *lattice(uint32_t along)
     return edits.scene;
 }
 
+/* Plates above each other, of a side, in a corner of a floor a metre wide. */
+static void add_stack(struct test_edits *edits, uint32_t count, float side)
+{
+    static const uint32_t triangles[2][3] = {{0, 1, 2}, {0, 2, 3}};
+    float positions[2][4][3];
+    for (int which = 0; which < 2; which++)
+        for (int i = 0; i < 4; i++) {
+            const float along = which ? side : 1.0f;
+            memcpy(positions[which][i], (float[3]){i == 1 || i == 2 ? along : 0, 0, i > 1 ? along : 0}, 12);
+        }
+    for (uint32_t which = 0; which < 2; which++)
+        test_mesh(edits, which + 1, (const float(*)[3])positions[which], 4, (const uint32_t *)triangles, 2);
+    for (uint32_t i = 0; i <= count; i++) {
+        float m[12];
+        test_transform(m, 1, 1, 1, 0, 0, 0, (float)i / (float)count, 0);
+        test_node(edits, i + 1, 0, NODE_MESH, i == 0 ? 1 : 2, m);
+    }
+}
+
 /* ---- what is told ---- */
 
 static const char *row_of(unsigned tracer, const char *ldc_name)
@@ -93,17 +112,24 @@ static struct tracer_options options_at(uint32_t resolution, uint32_t samples_ma
                                    .bench = {.axes_samples = samples_max}};
 }
 
-static double predicted_samples(const struct fixture *fixture, unsigned tracer)
+static struct axes_layers count_layers(const struct fixture *fixture, float overlap, float longest_world)
 {
+    const struct axes_box whole = {.cell_world = longest_world};
     uint32_t *instances = NULL, count = 0;
     struct error error = {0};
+    expect_ok(axes_list_instances(&fixture->gpu, &instances, &count, &error), &error);
+    const struct axes_layers layers = axes_count_layers(&fixture->gpu, instances, count, overlap, &whole);
+    free(instances);
+    return layers;
+}
+
+static double predicted_samples(const struct fixture *fixture, unsigned tracer)
+{
     const double along = (double)told(fixture->tracer, row_of(tracer, "static/resolution"));
     const double cell_world = (double)told_metres(fixture->tracer, row_of(tracer, "static/cell"));
-    expect_ok(axes_list_instances(&fixture->gpu, &instances, &count, &error), &error);
-    const double layers = axes_mean_layers(&fixture->gpu, instances, count,
-                                           tracer == TRACER_LDC ? AXES_OVERLAP : 0, along * cell_world);
-    free(instances);
-    return layers * 3 * along * along;
+    const struct axes_layers layers =
+        count_layers(fixture, tracer == TRACER_LDC ? AXES_OVERLAP : 0, (float)(along * cell_world));
+    return layers.mean * 3 * along * along;
 }
 
 static void expect_predicted(const struct fixture *fixture, unsigned tracer, double tolerance)
@@ -169,4 +195,35 @@ TEST(what_is_too_deep_at_any_resolution_is_refused_with_a_remedy)
         assert_in_range(fixture.tracer->stats.device_bytes, 0, 1 << 16);
         fixture_finish(&fixture);
     }
+}
+
+/* 10 blocks of the images wide, it touches up to 12: that much less is counted in each. */
+TEST(a_stack_is_as_deep_as_it_has_plates)
+{
+    const struct tracer_options options = options_at(16, 0);
+    struct fixture fixture;
+    struct test_edits edits = {.scene = test_scene_create()};
+    add_stack(&edits, 300, 10.0f / 128);
+    test_commit(&edits);
+    fixture_init_by(&fixture, TRACER_ABUFFER, edits.scene, &options);
+    const struct axes_layers layers = count_layers(&fixture, 0, 1);
+    assert_true(layers.greatest > 301.0 * (10 * 10) / (12 * 12) && layers.greatest < 301.5);
+    assert_true(layers.mean < 1.5);
+    fixture_finish(&fixture);
+}
+
+/* Of ldc, which would peel it for minutes, though its layers are few on average. */
+TEST(what_is_too_deep_in_one_place_is_refused_with_a_remedy)
+{
+    const struct tracer_options options = options_at(1024, 0);
+    struct fixture fixture;
+    struct error error = {0};
+    fixture_init_by(&fixture, TRACER_LDC, test_scene_create(), &options); /* holds nothing yet */
+    add_stack(&fixture.edits, 4000, 1.0f / 32);
+    assert_false(try_update(&fixture, &error));
+    assert_int_equal(error.kind, ERROR_LIMIT);
+    assert_non_null(strstr(error.text, "in one place"));
+    assert_non_null(strstr(error.remedy, "another tracer"));
+    assert_in_range(fixture.tracer->stats.device_bytes, 0, 1 << 16);
+    fixture_finish(&fixture);
 }
