@@ -10,10 +10,18 @@ namespace gltf
 namespace
 {
 const char *const understood[] = {
-    "KHR_lights_punctual",      "KHR_materials_transmission",          "KHR_materials_ior",
-    "KHR_materials_unlit",      "KHR_materials_emissive_strength",     "KHR_texture_transform",
-    "KHR_mesh_quantization",    "KHR_materials_pbrSpecularGlossiness", "EXT_texture_webp",
+    "KHR_lights_punctual",
+    "KHR_materials_transmission",
+    "KHR_materials_ior",
+    "KHR_materials_unlit",
+    "KHR_materials_emissive_strength",
+    "KHR_texture_transform",
+    "KHR_mesh_quantization",
+    "KHR_materials_pbrSpecularGlossiness",
+    "EXT_texture_webp",
     "KHR_materials_anisotropy",
+    "KHR_materials_specular",
+    "KHR_materials_volume",
 };
 // These hold nothing that could be seen.
 const char *const invisible[] = {"KHR_xmp", "KHR_xmp_json_ld", "KHR_animation_pointer", "EXT_mesh_manifold"};

@@ -13,7 +13,18 @@ namespace gltf
 namespace
 {
 constexpr double pi = 3.14159265358979323846;
-enum slot { BASE_COLOUR, NORMAL, METALLIC_ROUGHNESS, OCCLUSION, EMISSION, TRANSMISSION, slot_count };
+// By position in the message set_material.
+enum slot {
+    BASE_COLOUR,
+    NORMAL,
+    METALLIC_ROUGHNESS,
+    OCCLUSION,
+    EMISSION,
+    TRANSMISSION,
+    SPECULAR = 7,
+    SPECULAR_COLOUR,
+    slot_count
+};
 
 // By image and whether it holds colour.
 using image_key = std::pair<int, bool>;
@@ -273,6 +284,34 @@ void emission_seen_only(const building &b)
     b.set.emission_seen_only = is_true || number(extras, key, 0) != 0;
 }
 
+void specular(const building &b)
+{
+    const tinygltf::Value *mirror = extension(b.source.extensions, "KHR_materials_specular");
+    if (!mirror)
+        return;
+    const std::vector<double> colour = numbers(*mirror, "specularColorFactor");
+    float *const channels[] = {&b.set.specular_red, &b.set.specular_green, &b.set.specular_blue};
+    b.set.specular = limited(b.r, b.where, "specularFactor", number(*mirror, "specularFactor", 1), 0, 1);
+    for (size_t c = 0; c < 3 && c < colour.size(); c++)
+        *channels[c] = limited(b.r, b.where, "specularColorFactor", colour[c], 0, 1000);
+    use_texture(b.r, b.all, source_of(*mirror, "specularTexture"), false, b.uses[SPECULAR], b.where);
+    use_texture(b.r, b.all, source_of(*mirror, "specularColorTexture"), true, b.uses[SPECULAR_COLOUR], b.where);
+}
+
+void volume(const building &b)
+{
+    const tinygltf::Value *body = extension(b.source.extensions, "KHR_materials_volume");
+    if (!body)
+        return;
+    const std::vector<double> colour = numbers(*body, "attenuationColor");
+    float *const channels[] = {&b.set.attenuation_red, &b.set.attenuation_green, &b.set.attenuation_blue};
+    b.set.attenuation_distance =
+        limited(b.r, b.where, "attenuationDistance", number(*body, "attenuationDistance", 0), 0, 1e12);
+    for (size_t c = 0; c < 3 && c < colour.size(); c++)
+        *channels[c] = limited(b.r, b.where, "attenuationColor", colour[c], 0, 1);
+    b.set.thickness = limited(b.r, b.where, "thicknessFactor", number(*body, "thicknessFactor", 0), 0, 1e12);
+}
+
 void anisotropy(const building &b)
 {
     const tinygltf::Value *brushed = extension(b.source.extensions, "KHR_materials_anisotropy");
@@ -331,6 +370,8 @@ uint32_t material(reader &r, images &all, int index)
     alpha(b);
     transmission(b);
     emission_seen_only(b);
+    specular(b);
+    volume(b);
     anisotropy(b);
     specular_glossiness(b);
     if (all.collecting)

@@ -274,7 +274,11 @@ uint32_t import_add_material(struct import_scene *scene, const struct message_se
         !within(&material->metallic, 1, 0, 1) || !within(&material->roughness, 1, 0, 1) ||
         !within(&material->transmission, 1, 0, 1) || !within(&material->ior, 1, 1, 10) ||
         !within(&material->alpha_cutoff, 1, 0, 1) || !within(&material->anisotropy, 1, 0, 1) ||
-        !within(&material->anisotropy_rotation, 1, -1000, 1000)) {
+        !within(&material->anisotropy_rotation, 1, -1000, 1000) || !within(&material->specular, 1, 0, 1) ||
+        !within(&material->specular_red, 1, 0, 1000) || !within(&material->specular_green, 1, 0, 1000) ||
+        !within(&material->specular_blue, 1, 0, 1000) || !within(&material->attenuation_distance, 1, 0, 1e12f) ||
+        !within(&material->attenuation_red, 1, 0, 1) || !within(&material->attenuation_green, 1, 0, 1) ||
+        !within(&material->attenuation_blue, 1, 0, 1) || !within(&material->thickness, 1, 0, 1e12f)) {
         import_fail(scene, material->name, "a material has a number that is not allowed");
         return 0;
     }
@@ -390,6 +394,8 @@ void import_material_default(struct message_set_material *material)
     *material = (struct message_set_material){.metallic = 0, .roughness = 1, .ior = 1.5f, .alpha_cutoff = 0.5f};
     for (int i = 0; i < 4; i++)
         material->base_colour[i] = 1;
+    material->attenuation_red = material->attenuation_green = material->attenuation_blue = 1;
+    material->specular = material->specular_red = material->specular_green = material->specular_blue = 1;
 }
 
 void import_texture_use_default(struct record_texture_use *use, uint32_t texture)

@@ -62,8 +62,14 @@ static struct scene_material *add_material(struct builder *builder, enum materia
                                            float blue)
 {
     struct scene_material *material = &add(builder, OBJECT_MATERIAL)->set.material;
-    *material = (struct scene_material){
-        .base.id = id, .base_colour = {red, green, blue, 1}, .roughness = 1, .ior = 1.5f, .alpha_cutoff = 0.5f};
+    *material = (struct scene_material){.base.id = id,
+                                        .base_colour = {red, green, blue, 1},
+                                        .roughness = 1,
+                                        .ior = 1.5f,
+                                        .alpha_cutoff = 0.5f,
+                                        .specular = 1,
+                                        .specular_colour = {1, 1, 1},
+                                        .attenuation = {1, 1, 1}};
     for (int i = 0; i < MATERIAL_TEXTURE_COUNT; i++)
         material->textures[i] = (struct texture_use){.uv_transform = {1, 0, 0, 0, 1, 0}, .strength = 1};
     return material;

@@ -103,9 +103,19 @@ static void pack_material(const struct gpu_scene *gpu, const struct scene_materi
         .alpha_cutoff = in->alpha_cutoff,
         .anisotropy = in->anisotropy,
         .anisotropy_rotation = in->anisotropy_rotation,
+        .specular = in->specular,
+        .specular_red = in->specular_colour[0],
+        .specular_green = in->specular_colour[1],
+        .specular_blue = in->specular_colour[2],
         .id = in->base.id,
     };
     memcpy(out->base_colour, in->base_colour, sizeof(out->base_colour));
+    float *const absorbs[3] = {&out->absorbs_red, &out->absorbs_green, &out->absorbs_blue};
+    float *const body[3] = {&out->body_red, &out->body_green, &out->body_blue};
+    for (int i = 0; i < 3; i++) {
+        *absorbs[i] = scene_material_absorption(in, i);
+        *body[i] = scene_material_body_tint(in, i);
+    }
     out->flags = (in->alpha_mode == ALPHA_MASK ? MATERIAL_ALPHA_MASK : 0) |
                  (in->alpha_mode == ALPHA_BLEND ? MATERIAL_ALPHA_BLEND : 0) |
                  (in->double_sided ? MATERIAL_DOUBLE_SIDED : 0) | (in->unlit ? MATERIAL_UNLIT : 0) |
@@ -118,6 +128,8 @@ static void pack_material(const struct gpu_scene *gpu, const struct scene_materi
         [MATERIAL_EMISSION] = &out->texture_emission,
         [MATERIAL_TRANSMISSION] = &out->texture_transmission,
         [MATERIAL_BUMP] = &out->texture_bump,
+        [MATERIAL_SPECULAR] = &out->texture_specular,
+        [MATERIAL_SPECULAR_COLOUR] = &out->texture_specular_colour,
     };
     for (int i = 0; i < MATERIAL_TEXTURE_COUNT; i++)
         *places[i] = add_slot(gpu, &in->textures[i], slots, slot_count);
@@ -129,6 +141,13 @@ static void pack_default(struct material *out)
         .base_colour = {1.0f, 1.0f, 1.0f, 1.0f},
         .emission_ior = {0.0f, 0.0f, 0.0f, 1.5f},
         .roughness = 1.0f,
+        .specular = 1.0f,
+        .specular_red = 1.0f,
+        .specular_green = 1.0f,
+        .specular_blue = 1.0f,
+        .body_red = 1.0f,
+        .body_green = 1.0f,
+        .body_blue = 1.0f,
         .flags = MATERIAL_DOUBLE_SIDED,
     };
 }

@@ -129,6 +129,10 @@ size_t context_surface_defines(const struct render_context *context, struct gpu_
         defines[n++] = (struct gpu_define){"HAS_BUMP", "1"};
     if (context->features.textures && exact && context->scene->has_spheres)
         defines[n++] = (struct gpu_define){"HAS_SPHERES", "1"};
+    if (context->features.volume)
+        defines[n++] = (struct gpu_define){"HAS_VOLUME", "1"};
+    if (context->features.specular)
+        defines[n++] = (struct gpu_define){"HAS_SPECULAR", "1"};
     return n;
 }
 

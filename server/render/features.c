@@ -3,6 +3,14 @@
 
 #include "shared/material.h"
 
+static bool has_specular(const struct scene_material *material)
+{
+    const float *colour = material->specular_colour;
+    return material->specular != 1.0f || colour[0] != 1.0f || colour[1] != 1.0f || colour[2] != 1.0f ||
+           material->textures[MATERIAL_SPECULAR].texture != 0 ||
+           material->textures[MATERIAL_SPECULAR_COLOUR].texture != 0;
+}
+
 struct scene_features scene_features_of(const struct scene *scene)
 {
     struct scene_features features = {0};
@@ -15,6 +23,8 @@ struct scene_features scene_features_of(const struct scene *scene)
         features.mirrors |= material->roughness < MIRROR_ROUGHNESS_GONE || material->transmission > 0.0f ||
                             material->alpha_mode == ALPHA_BLEND;
         features.anisotropy |= material->anisotropy > 0.0f;
+        features.specular |= has_specular(material);
+        features.volume |= material->transmission > 0.0f && material->attenuation_distance > 0.0f;
         features.bump |= material->textures[MATERIAL_BUMP].texture != 0;
     }
     for (size_t cursor = 0; hashmap_next(&scene->objects[OBJECT_LIGHT], &cursor, &id, &value);) {

@@ -13,6 +13,8 @@ struct scene_features {
     bool bump;        /* one of them is a bump map */
     bool area_lights; /* some light is a rectangle or a sphere */
     bool anisotropy;  /* some material has a grain */
+    bool specular;    /* some material's mirror differs from what Fresnel's equations say */
+    bool volume;      /* some body of glass absorbs light */
     bool mirrors;     /* some material sends a ray on: a smooth one, glass, a blended one */
 };
 

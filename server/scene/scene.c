@@ -3,6 +3,7 @@
 
 #include "scene/edit.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -47,6 +48,19 @@ const struct scene_mesh *scene_mesh(const struct scene *scene, uint32_t id)
 const struct scene_spheres *scene_spheres(const struct scene *scene, uint32_t id)
 {
     return hashmap_get(&scene->objects[OBJECT_SPHERES], id);
+}
+
+float scene_material_absorption(const struct scene_material *material, int channel)
+{
+    const float least = 1e-6f; /* black would be infinite */
+    if (!(material->attenuation_distance > 0.0f))
+        return 0.0f;
+    return -logf(fmaxf(material->attenuation[channel], least)) / material->attenuation_distance;
+}
+
+float scene_material_body_tint(const struct scene_material *material, int channel)
+{
+    return expf(-0.5f * material->thickness * scene_material_absorption(material, channel));
 }
 
 const struct scene_material *scene_material(const struct scene *scene, uint32_t id)

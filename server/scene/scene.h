@@ -43,6 +43,8 @@ enum material_texture {
     MATERIAL_EMISSION,
     MATERIAL_TRANSMISSION,
     MATERIAL_BUMP,
+    MATERIAL_SPECULAR,
+    MATERIAL_SPECULAR_COLOUR,
     MATERIAL_TEXTURE_COUNT
 };
 
@@ -112,6 +114,10 @@ struct scene_material {
     float base_colour[4], emission[3];
     float metallic, roughness, transmission, ior, alpha_cutoff;
     float anisotropy, anisotropy_rotation; /* radians */
+    float specular, specular_colour[3];    /* of a dielectric's mirror; 1: as Fresnel's equations have it */
+    /* What a body of glass lets through on the distance, metres; 0: it is clear. `thickness`: of the body, for
+     * shadow rays, which cross two of its surfaces. */
+    float attenuation[3], attenuation_distance, thickness;
     struct texture_use textures[MATERIAL_TEXTURE_COUNT];
 };
 
@@ -246,6 +252,10 @@ const struct scene_node *scene_node(const struct scene *scene, uint32_t id);
 const struct scene_mesh *scene_mesh(const struct scene *scene, uint32_t id);
 const struct scene_spheres *scene_spheres(const struct scene *scene, uint32_t id);
 const struct scene_material *scene_material(const struct scene *scene, uint32_t id);
+/* What the body behind a material absorbs of a colour channel, 1 / metre. */
+float scene_material_absorption(const struct scene_material *material, int channel);
+/* What one of the body's surfaces takes of a shadow ray's light for what lies between two: 1 where it is clear. */
+float scene_material_body_tint(const struct scene_material *material, int channel);
 const struct scene_texture *scene_texture(const struct scene *scene, uint32_t id);
 const struct scene_light *scene_light(const struct scene *scene, uint32_t id);
 const struct scene_camera *scene_camera(const struct scene *scene, uint32_t id);

@@ -128,6 +128,14 @@ static void from_material(const struct message_set_material *message, struct sce
     material->anisotropy = message->anisotropy;
     material->anisotropy_rotation = message->anisotropy_rotation;
     material->emission_seen_only = message->emission_seen_only;
+    material->specular = message->specular;
+    material->specular_colour[0] = message->specular_red;
+    material->specular_colour[1] = message->specular_green;
+    material->specular_colour[2] = message->specular_blue;
+    const float attenuation[3] = {message->attenuation_red, message->attenuation_green, message->attenuation_blue};
+    memcpy(material->attenuation, attenuation, sizeof(attenuation));
+    material->attenuation_distance = message->attenuation_distance;
+    material->thickness = message->thickness;
     for (uint32_t i = 0; i < message->textures_count && i < MATERIAL_TEXTURE_COUNT; i++) {
         const struct record_texture_use *from = &message->textures[i];
         struct texture_use *use = &material->textures[i];

@@ -190,6 +190,15 @@ static void put_material(struct sink *sink, const struct scene_material *materia
     set->anisotropy = material->anisotropy;
     set->anisotropy_rotation = material->anisotropy_rotation;
     set->emission_seen_only = material->emission_seen_only;
+    set->specular = material->specular;
+    set->specular_red = material->specular_colour[0];
+    set->specular_green = material->specular_colour[1];
+    set->specular_blue = material->specular_colour[2];
+    set->attenuation_distance = material->attenuation_distance;
+    set->attenuation_red = material->attenuation[0];
+    set->attenuation_green = material->attenuation[1];
+    set->attenuation_blue = material->attenuation[2];
+    set->thickness = material->thickness;
     for (int i = 0; i < MATERIAL_TEXTURE_COUNT; i++) {
         const struct texture_use *use = &material->textures[i];
         textures[i] = (struct record_texture_use){

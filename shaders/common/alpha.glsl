@@ -93,7 +93,7 @@ vec3 transmittance_of(candidate found, vec3 origin_world, vec3 direction_world, 
     if (transmission > 0.0 && m.texture_transmission != 0u)
         transmission *= sample_slot(m.texture_transmission, point.uv01).r;
 #endif
-    through = transmission * clamp(colour.rgb, 0.0, 1.0);
+    through = transmission * clamp(colour.rgb, 0.0, 1.0) * vec3(m.body_red, m.body_green, m.body_blue);
 #endif
     return is_blend ? mix(vec3(1.0), through, clamp(colour.a, 0.0, 1.0)) : through;
 #else

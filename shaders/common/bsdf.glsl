@@ -115,7 +115,9 @@ bsdf bsdf_of(surface s, vec3 view, float NoV, vec3 along, float anisotropy)
 // The reflectance and transmittance of a facet. `lit`: the share of its mirror's light that no other facet catches.
 void facet_parts(bsdf b, surface s, float VoH, float lit, out vec3 mirror, out vec3 window)
 {
-    float dielectric = fresnel_dielectric(VoH, b.eta), mirrored = dielectric * lit;
+    SHARE dielectric = b.leaves ? SHARE(fresnel_dielectric(VoH, b.eta))
+                                : outside_mirror(s, fresnel_dielectric(VoH, b.eta), 1.0);
+    SHARE mirrored = dielectric * lit;
 #ifdef WARD
     if (!b.leaves && b.rough) // whose mirror has other facets than the window
         mirrored = b.parts.dielectric;

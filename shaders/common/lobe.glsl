@@ -71,14 +71,15 @@ vec3 turned_to(vec3 direction, vec3 side)
 struct facet_lobes {
     vec3 reflected, bent;       // directions
     vec3 mirror, again, window; // shares; again: mirrored more than once
-    float enters;               // neither is mirrored nor metal takes it
+    SHARE enters;               // neither is mirrored nor metal takes it
 };
 
 facet_lobes facet_lobes_of(surface s, split parts, float NoV, vec3 direction, vec3 facet, bool rough)
 {
     bool leaves = s.inside && s.transmission > 0.0;
     float VoH = rough ? clamp(-dot(direction, facet), 1e-4, 1.0) : NoV;
-    float dielectric = fresnel_dielectric(VoH, leaves ? 1.0 / s.ior : s.ior), lit = 1.0;
+    float exact = fresnel_dielectric(VoH, leaves ? 1.0 / s.ior : s.ior), lit = 1.0;
+    SHARE dielectric = leaves ? SHARE(exact) : outside_mirror(s, exact, 1.0);
     facet_lobes f;
     f.reflected = reflect(direction, facet);
     f.bent = refract(direction, facet, s.inside ? s.ior : 1.0 / s.ior);

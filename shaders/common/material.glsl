@@ -7,8 +7,9 @@
 // Software GL runs both sides of every branch, so features that the scene lacks are left out by defines, and all
 // textures of a material are sampled in one place, in a loop.
 //
-// Defines: HAS_TEXTURES some material has a texture; HAS_BUMP one of them is a bump map; HAS_SPHERES; HAS_SAMPLED the
-// hits of the wave are stored samples, but for those of discs.
+// Defines: HAS_TEXTURES some material has a texture; HAS_BUMP one of them is a bump map; HAS_SPECULAR the mirror of some
+// dielectric differs from what Fresnel's equations say; HAS_VOLUME some body of glass absorbs light; HAS_SPHERES;
+// HAS_SAMPLED the hits of the wave are stored samples, but for those of discs.
 
 #include "shared/hit.h"
 #include "common/sampled.glsl"
@@ -22,6 +23,13 @@ struct surface {
     float alpha;    // opacity; 1 unless it is blended
     vec3 emission;
     float metallic, roughness, transmission, ior, occlusion;
+#ifdef HAS_VOLUME
+    vec3 absorption; // of the body behind it, 1 / metre
+#endif
+#ifdef HAS_SPECULAR
+    vec3 specular_colour; // of a dielectric's mirror, seen from above
+    float specular;       // its share
+#endif
     float curvature; // 1 / metre, above 0: it bulges towards the viewer; 0 if there are no textures to be filtered
     bool unlit;
     bool emission_seen_only;
@@ -130,15 +138,26 @@ vec3 mapped_normal(hit h, vec3 normal, vec3 texel, float strength)
     return squared > 1e-8 ? mapped * inversesqrt(squared) : normal;
 }
 
+#ifdef HAS_SPECULAR
+#define INPUTS 8
+#else
+#define INPUTS 6
+#endif
+
 // Replaces the inputs that have textures, normal and bump maps included.
 void apply_textures(inout surface s, inout vec4 colour, hit h, material m, vec4 uv01,
                     texture_footprint footprint)
 {
-    const int BASE_COLOUR = 0, NORMAL = 1, METALLIC_ROUGHNESS = 2, OCCLUSION = 3, EMISSION = 4, TRANSMISSION = 5;
-    uint uses[6] = uint[6](m.texture_base_colour, m.texture_normal, m.texture_metallic_roughness,
-                           m.texture_occlusion, m.texture_emission, m.texture_transmission);
+    const int BASE_COLOUR = 0, NORMAL = 1, METALLIC_ROUGHNESS = 2, OCCLUSION = 3, EMISSION = 4, TRANSMISSION = 5,
+              SPECULAR = 6, SPECULAR_COLOUR = 7;
+    uint uses[INPUTS] = uint[INPUTS](m.texture_base_colour, m.texture_normal, m.texture_metallic_roughness,
+                                     m.texture_occlusion, m.texture_emission, m.texture_transmission
+#ifdef HAS_SPECULAR
+                                     , m.texture_specular, m.texture_specular_colour
+#endif
+    );
     uint used = 0u;
-    for (int i = 0; i < 6; i++)
+    for (int i = 0; i < INPUTS; i++)
         used |= uses[i] != 0u ? 1u << i : 0u;
     while (used != 0u) { // not a loop over all: software GL would sample for the missing ones, too
         int i = findLSB(used);
@@ -157,6 +176,12 @@ void apply_textures(inout surface s, inout vec4 colour, hit h, material m, vec4 
             s.occlusion = mix(1.0, texel.r, slot.strength);
         } else if (i == EMISSION) {
             s.emission *= texel.rgb;
+#ifdef HAS_SPECULAR
+        } else if (i == SPECULAR) {
+            s.specular *= texel.a;
+        } else if (i == SPECULAR_COLOUR) {
+            s.specular_colour *= texel.rgb;
+#endif
         } else {
             s.transmission *= texel.r;
         }
@@ -200,6 +225,13 @@ surface surface_at(hit h, vec3 origin, vec3 direction, float width)
     s.roughness = m.roughness;
     s.transmission = m.transmission;
     s.occlusion = 1.0;
+#ifdef HAS_VOLUME
+    s.absorption = vec3(m.absorbs_red, m.absorbs_green, m.absorbs_blue);
+#endif
+#ifdef HAS_SPECULAR
+    s.specular_colour = vec3(m.specular_red, m.specular_green, m.specular_blue);
+    s.specular = m.specular;
+#endif
     vec4 colour = m.base_colour * unpackUnorm4x8(h.colour);
     bool is_stored = false;
     s.curvature = 0.0;

@@ -19,16 +19,38 @@
 // Roughness at which the mirror ray begins to fade; at MIRROR_ROUGHNESS_GONE it is gone.
 const float MIRROR_ROUGHNESS_SHARP = 0.1;
 
+// What a dielectric does with light from outside: SHARE is a colour if some mirror has one.
+#ifdef HAS_SPECULAR
+#define SHARE vec3
+
+// KHR_materials_specular: Fresnel's curve from its value at normal incidence up to 1 begins at another one, of a colour,
+// and all of it is less. `exact`: what the equations say that facets mirror; `all_`: what they would if they mirrored
+// all light. As the change is the same line at every angle, it holds for means over facets and angles, too.
+vec3 outside_mirror(surface s, float exact, float all_)
+{
+    float f0 = square((s.ior - 1.0) / (s.ior + 1.0));
+    vec3 begins = min(f0 * s.specular_colour, 1.0);
+    return s.specular * (begins * all_ + (1.0 - begins) * max((exact - f0 * all_) / (1.0 - f0), 0.0));
+}
+#else
+#define SHARE float
+
+float outside_mirror(surface s, float exact, float all_)
+{
+    return exact;
+}
+#endif
+
 // How a surface splits the light along the view.
 struct split {
     vec3 mirror;       // reflectance of the facets at the first go
     vec3 again;        // what they mirror more than once
     vec3 scattered;    // Lambert's albedo times what enters
     vec3 refracted;
-    float dielectric;  // share that does not enter
+    SHARE dielectric;  // share that does not enter
     float mirror_ray;  // share of `mirror` that the mirror ray carries; the rest is blurred
     float again_mean;  // facets_lost_mean()
-    float enters_mean; // share of the light from all around that enters
+    SHARE enters_mean; // share of the light from all around that enters
 };
 
 // `loss`: facets_lost() of the view.
@@ -38,12 +60,14 @@ split split_facets(surface s, float NoV, float alpha, float loss)
     float mean = facets_cosine(NoV, alpha);
     split result;
     // From inside of one direction: total reflection begins at an angle.
-    result.dielectric = leaves ? fresnel_dielectric(NoV, 1.0 / s.ior) : facets_dielectric(mean, loss, alpha, s.ior);
+    result.dielectric = leaves ? SHARE(fresnel_dielectric(NoV, 1.0 / s.ior))
+                               : outside_mirror(s, facets_dielectric(mean, loss, alpha, s.ior), 1.0 - loss);
     result.again_mean = facets_lost_mean(alpha);
-    result.enters_mean = 1.0 - facets_dielectric_mean(alpha, s.ior);
+    SHARE mirrored_mean = outside_mirror(s, facets_dielectric_mean(alpha, s.ior), 1.0 - result.again_mean);
+    result.enters_mean = max(1.0 - mirrored_mean, SHARE(1e-6));
     result.mirror = mix(vec3(result.dielectric), fresnel_schlick(s.base, mean) * (1.0 - loss), s.metallic);
     result.again = metal_again(s.base, result.again_mean) * (loss * s.metallic);
-    float enters = (1.0 - result.dielectric) * (1.0 - s.metallic);
+    SHARE enters = (1.0 - result.dielectric) * (1.0 - s.metallic);
     result.scattered = s.base * (enters * (1.0 - s.transmission));
     // Glass is tinted once, where light enters it.
     result.refracted = (leaves ? vec3(1.0) : s.base) * (enters * s.transmission);
@@ -63,7 +87,7 @@ split split_light(surface s, float NoV)
 // Reflection Models. 1997.
 vec3 spread_scattered(surface s, split parts, float NoL, float alpha, float loss)
 {
-    float enters = 1.0 - facets_dielectric(facets_cosine(NoL, alpha), loss, alpha, s.ior);
+    SHARE enters = 1.0 - outside_mirror(s, facets_dielectric(facets_cosine(NoL, alpha), loss, alpha, s.ior), 1.0 - loss);
     return parts.scattered * (enters / parts.enters_mean * INVERSE_PI);
 }
 
@@ -100,7 +124,7 @@ vec3 brdf(surface s, split parts, vec3 view, float NoV, vec3 light)
         return vec3(0.0);
     vec3 half_way = normalize(view + light), across = cross(s.normal, half_way);
     float NoH = clamp(dot(s.normal, half_way), 0.0, 1.0), VoH = clamp(dot(view, half_way), 0.0, 1.0);
-    vec3 mirror = mix(vec3(fresnel_dielectric(VoH, s.ior)), fresnel_schlick(s.base, VoH), s.metallic);
+    vec3 mirror = mix(vec3(outside_mirror(s, fresnel_dielectric(VoH, s.ior), 1.0)), fresnel_schlick(s.base, VoH), s.metallic);
     float wide = square(max(s.roughness, ROUGHNESS_MIN_LIGHT)), alpha = square(s.roughness);
     vec3 specular = mirror * (D_GGX(NoH, dot(across, across), wide) * V_SmithGGXCorrelated(NoV, NoL, wide));
     float loss = facets_lost(stretched_cosine(NoL, alpha), alpha);

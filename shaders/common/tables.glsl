@@ -46,6 +46,27 @@ material material_at(uint index)
     m.anisotropy = uintBitsToFloat(last.x);
     m.anisotropy_rotation = uintBitsToFloat(last.y);
     m.id = last.z;
+#ifdef HAS_SPECULAR
+    m.texture_specular = last.w;
+    uvec4 specular = texelFetch(tables, texel + 6);
+    m.specular_red = uintBitsToFloat(specular.x);
+    m.specular_green = uintBitsToFloat(specular.y);
+    m.specular_blue = uintBitsToFloat(specular.z);
+    m.specular = uintBitsToFloat(specular.w);
+    m.texture_specular_colour = texelFetch(tables, texel + 7).x;
+#endif
+#ifdef HAS_TRANSMISSION
+    vec4 body = uintBitsToFloat(texelFetch(tables, texel + 7));
+    m.body_red = body.y;
+    m.body_green = body.z;
+    m.body_blue = body.w;
+#endif
+#ifdef HAS_VOLUME
+    vec4 absorbs = uintBitsToFloat(texelFetch(tables, texel + 8));
+    m.absorbs_red = absorbs.x;
+    m.absorbs_green = absorbs.y;
+    m.absorbs_blue = absorbs.z;
+#endif
     return m;
 }
 

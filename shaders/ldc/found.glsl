@@ -33,7 +33,8 @@ vec3 transmittance_of_sample(uvec4 words)
 #ifdef HAS_TRANSMISSION
     float transmission = m.transmission * (1.0 - m.metallic) * sample_transmission(words);
     if (transmission > 0.0)
-        through = transmission * clamp(m.base_colour.rgb * sample_base_colour(words).rgb, 0.0, 1.0);
+        through = transmission * clamp(m.base_colour.rgb * sample_base_colour(words).rgb, 0.0, 1.0) *
+                  vec3(m.body_red, m.body_green, m.body_blue);
 #endif
     float alpha = m.base_colour.a * sample_alpha(words);
     return (m.flags & MATERIAL_ALPHA_BLEND) != 0u ? mix(vec3(1.0), through, clamp(alpha, 0.0, 1.0)) : through;

@@ -209,13 +209,13 @@ void main()
     eye_hit e;
     e.j = j;
     e.p = path_at(k);
-    e.weight = vec3(e.p.weight_r, e.p.weight_g, e.p.weight_b);
     ray r = ray_at(k);
     hit h = hit_at(k);
     vec3 direction = r.direction_t_max.xyz;
     e.view = -direction;
     e.distance_ = h.distance;
     e.s = surface_of_path(e.p, h, r);
+    e.weight = weight_at(e.p, e.s, h.distance);
     uvec2 seed = path_seed(e.p);
     uint index = path_sample(e.p), dimension = SEQUENCE_WAVE + wave_number * SEQUENCE_WAVE_SIZE;
     e.s.roughness = regularised_roughness(e.p, e.s.roughness, index);

@@ -81,6 +81,18 @@ surface surface_of_path(path p, hit h, ray r)
     return s;
 }
 
+// The weight of the light that a surface sends along a path: that of the path, less what the body absorbs whose surface
+// is met from inside. What lies within a body is not told from what lies in air.
+vec3 weight_at(path p, surface s, float distance_)
+{
+    vec3 weight = vec3(p.weight_r, p.weight_g, p.weight_b);
+#ifdef HAS_VOLUME
+    if (s.inside && s.transmission > 0.0)
+        weight *= exp(-s.absorption * distance_);
+#endif
+    return weight;
+}
+
 float index_ratio(surface s)
 {
     return s.inside ? 1.0 / s.ior : s.ior; // behind / before

@@ -81,12 +81,11 @@ void main()
         return;
     uint k = hit_list[j];
     path p = path_at(k);
-    vec3 weight = vec3(p.weight_r, p.weight_g, p.weight_b);
     ray r = ray_at(k);
     hit h = hit_at(k);
     bool first = first_ray == 0u;
     surface s = surface_of_path(p, h, r);
-    vec3 view = -r.direction_t_max.xyz;
+    vec3 view = -r.direction_t_max.xyz, weight = weight_at(p, s, h.distance);
     float NoV = clamp(dot(s.normal, view), 1e-4, 1.0); // a shading normal may lean away
     split parts = split_light(s, NoV);
     if (first) {

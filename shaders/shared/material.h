@@ -13,9 +13,14 @@ struct material {
     uint texture_occlusion, texture_emission, texture_transmission, texture_bump;
     float anisotropy, anisotropy_rotation; /* of rough reflections; radians from the tangent */
     uint id;                               /* the client's; 0: the default material */
+    uint texture_specular;
+    float specular_red, specular_green, specular_blue, specular; /* of a dielectric's mirror */
+    uint texture_specular_colour;
+    float body_red, body_green, body_blue; /* what one of the two surfaces of a body takes of shadow rays' light */
+    float absorbs_red, absorbs_green, absorbs_blue; /* of a body's light, 1 / metre */
     uint pad0;
 };
-SHARED_SIZE(material, 96)
+SHARED_SIZE(material, 144)
 #define MATERIAL_ALPHA_MASK 1u
 #define MATERIAL_ALPHA_BLEND 2u
 #define MATERIAL_DOUBLE_SIDED 4u

@@ -15,7 +15,8 @@
 #define PI 3.14159265358979323846
 #define COUNT(array) (sizeof(array) / sizeof((array)[0]))
 
-enum { SCATTERED, MIRRORED, REFRACTED }; /* BSDF_* */
+enum { SCATTERED, MIRRORED, REFRACTED };   /* BSDF_* */
+enum { GGX, WARD, OTHER_MIRRORS, PROBES }; /* the last: GGX, with KHR_materials_specular */
 enum {
     NUMBERS = 1 << 15,
     ACROSS = 768,
@@ -232,6 +233,40 @@ TEST(white_materials_send_on_what_arrives_and_no_more)
     assert_true(albedos.max_dense <= 1.0 + 0.025);
 }
 
+/* A mirror weaker than Fresnel's equations have it, a stronger one, none, one that takes all, and a weaker one on
+ * glass. */
+TEST(other_mirrors_follow_their_density_and_keep_the_light)
+{
+    static const struct bsdf_case kinds[] = {
+        {.ior = 1.5f, .specular = 0.5f, .specular_colour = 1.0f},
+        {.ior = 1.5f, .specular = 1.0f, .specular_colour = 6.0f},
+        {.ior = 1.5f, .specular = 0.0f, .specular_colour = 1.0f},
+        {.ior = 1.5f, .specular = 1.0f, .specular_colour = 25.0f},
+        {.ior = 1.5f, .transmission = 1.0f, .specular = 0.5f, .specular_colour = 6.0f},
+    };
+    static const float roughnesses[] = {0.1f, 0.5f, 0.9f};
+    struct bsdf_probe *probe = &((struct bsdf_probe *)*state)[OTHER_MIRRORS];
+    struct densities densities = {0};
+    struct albedos albedos = {.min_even = {1, 1}, .min_grain = {1, 1}};
+    for (size_t k = 0; k < COUNT(kinds); k++)
+        for (size_t r = 0; r < COUNT(roughnesses); r++)
+            for (int v = 0; v < 2; v++) {
+                struct bsdf_case c = kinds[k];
+                c.roughness = roughnesses[r];
+                c.base = 1.0f;
+                look_from(&c, v ? 0.3 : 1.0);
+                sum_up(probe, &c, false, &albedos);
+                if (r > 0) /* else a lobe is narrower than the grid of directions */
+                    hold_against_its_density(probe, &c, false, &densities);
+            }
+    print_message("%zu cases: %.1f deviations off at most (%s); albedo %.3f to %.5f (%s)\n", densities.cases,
+                  densities.max_z, densities.where, albedos.min_even[0], albedos.max, albedos.where);
+    assert_true(densities.max_z < 5.5); /* as above */
+    assert_true(densities.max_weight_off < 1e-4);
+    assert_true(albedos.max <= 1.0 + 1e-3);
+    assert_true(albedos.min_even[0] > 0.985);
+}
+
 /* ---- light and view in each other's place ---- */
 
 TEST(reflectance_is_the_same_both_ways)
@@ -240,7 +275,7 @@ TEST(reflectance_is_the_same_both_ways)
     static const float roughnesses[] = {0.2f, 0.5f, 0.9f}, metallics[] = {0.0f, 0.5f, 1.0f};
     enum { VIEWS = 12 };
     double off = 0.0;
-    for (int ward = 0; ward < 2; ward++)
+    for (int p = 0; p < PROBES; p++)
         for (size_t r = 0; r < COUNT(roughnesses); r++)
             for (size_t m = 0; m < COUNT(metallics); m++) {
                 struct bsdf_question directions[VIEWS] = {0};
@@ -251,15 +286,17 @@ TEST(reflectance_is_the_same_both_ways)
                     directions[i].v[1] = (float)(sqrt(1.0 - z * z) * sin(phi));
                     directions[i].v[2] = (float)z;
                 }
-                bsdf_probe_ask(&probes[ward], directions, VIEWS);
+                bsdf_probe_ask(&probes[p], directions, VIEWS);
                 for (int i = 0; i < VIEWS; i++) {
                     struct bsdf_case c = {.roughness = roughnesses[r],
                                           .metallic = metallics[m],
                                           .ior = 1.5f,
                                           .base = 0.8f,
-                                          .anisotropy = 0.5f};
+                                          .anisotropy = 0.5f,
+                                          .specular = 0.5f,
+                                          .specular_colour = 6.0f};
                     memcpy(c.view, directions[i].v, sizeof(c.view));
-                    bsdf_probe_run(&probes[ward], &c, false, VIEWS, there[i]);
+                    bsdf_probe_run(&probes[p], &c, false, VIEWS, there[i]);
                 }
                 for (int i = 0; i < VIEWS; i++)
                     for (int j = 0; j < i; j++) {
@@ -296,12 +333,13 @@ TEST(without_a_grain_ggx_is_that_of_the_other_integrators)
 
 static int setup(void **state)
 {
-    static struct bsdf_probe probes[2];
+    static struct bsdf_probe probes[PROBES];
+    static const char *const defines[PROBES] = {[WARD] = "WARD", [OTHER_MIRRORS] = "HAS_SPECULAR"};
     open_device(state);
     if (!device)
         return 0;
-    for (int ward = 0; ward < 2; ward++)
-        bsdf_probe_init(&probes[ward], device, ward);
+    for (int i = 0; i < PROBES; i++)
+        bsdf_probe_init(&probes[i], device, defines[i]);
     *state = probes;
     return 0;
 }
@@ -309,8 +347,8 @@ static int setup(void **state)
 static int teardown(void **state)
 {
     struct bsdf_probe *probes = *state;
-    for (int ward = 0; ward < 2; ward++)
-        bsdf_probe_finish(&probes[ward]);
+    for (int i = 0; i < PROBES; i++)
+        bsdf_probe_finish(&probes[i]);
     return close_device(state);
 }
 ALL_TESTS(setup, teardown)

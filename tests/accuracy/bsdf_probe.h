@@ -21,8 +21,9 @@
 /* As the shader has it: three vec4. */
 struct bsdf_case {
     float roughness, metallic, transmission, ior;
-    float view[3], base;                 /* unit, towards the eye; base colour, grey */
-    float inside, anisotropy, unused[2]; /* inside 1: seen from behind, as glass is */
+    float view[3], base;             /* unit, towards the eye; base colour, grey */
+    float inside, anisotropy;        /* inside 1: seen from behind, as glass is */
+    float specular, specular_colour; /* of a probe that has them; grey */
 };
 _Static_assert(sizeof(struct bsdf_case) == 48, "the shader reads three vec4 a case");
 
@@ -69,6 +70,10 @@ static const char bsdf_probe_text[] =
     "    s.transmission = material_.z;\n"
     "    s.ior = material_.w;\n"
     "    s.inside = more.x > 0.0;\n"
+    "#ifdef HAS_SPECULAR\n"
+    "    s.specular = more.z;\n"
+    "    s.specular_colour = vec3(more.w);\n"
+    "#endif\n"
     "    vec3 view = view_base.xyz;\n"
     "    split parts = split_light(s, view.z);\n"
     "    bsdf b = bsdf_of(s, view, view.z, vec3(1.0, 0.0, 0.0), more.y);\n"
@@ -85,9 +90,10 @@ static const char bsdf_probe_text[] =
     "    answers[2u * i + 1u] = vec4(chosen.weight.g, probability, sent.g, other);\n"
     "}\n";
 
-static inline void bsdf_probe_init(struct bsdf_probe *probe, struct gpu_device *device, bool ward)
+/* `more`: a define, or NULL. */
+static inline void bsdf_probe_init(struct bsdf_probe *probe, struct gpu_device *device, const char *more)
 {
-    const struct gpu_define defines[] = {{"HAS_ANISOTROPY", "1"}, {ward ? "WARD" : NULL, "1"}, {NULL, NULL}};
+    const struct gpu_define defines[] = {{"HAS_ANISOTROPY", "1"}, {more, "1"}, {NULL, NULL}};
     *probe = (struct bsdf_probe){.device = device, .program = shader_probe_compile(bsdf_probe_text, defines)};
 }
 

@@ -116,6 +116,9 @@ static inline struct scene_material *fixture_material(struct fixture *fixture)
     material->roughness = 1.0f;
     material->ior = 1.0f;
     material->alpha_cutoff = 0.5f;
+    material->specular = material->specular_colour[0] = material->specular_colour[1] =
+        material->specular_colour[2] = 1.0f;
+    material->attenuation[0] = material->attenuation[1] = material->attenuation[2] = 1.0f;
     return material;
 }
 

@@ -63,6 +63,62 @@ TEST(glass_at_a_slant_follows_fresnels_equations)
     frame_result_finish(&result);
 }
 
+/* KHR_materials_specular: the curve begins at 4 % times the colour, ends at 1, and all of it is halved. */
+TEST(a_mirror_may_be_weaker_and_coloured)
+{
+    struct fixture *fixture = *state;
+    static const float colour[3] = {2.0f, 1.0f, 0.25f};
+    for (int slant = 0; slant < 3; slant++) {
+        double angle = 0.7 * slant;
+        fixture_clear(state);
+        struct scene_material *glass = clear_glass(fixture, 1.5);
+        glass->base_colour[0] = glass->base_colour[1] = glass->base_colour[2] = 0.0f;
+        glass->specular = 0.5f;
+        memcpy(glass->specular_colour, colour, sizeof(colour));
+        fixture_square(fixture, 100.0f, glass->base.id, NULL);
+        fixture_environment(fixture, 1.0f, 1.0f, 1.0f);
+        fixture->request.width = fixture->request.height = 9;
+        fixture_look(fixture, 5.0f * (float)sin(angle), 0.0f, 5.0f * (float)cos(angle), 0.01f);
+        struct frame_result result = fixture_render(fixture);
+        double rise = (fresnel(cos(angle), 1.5) - 0.04) / 0.96;
+        for (int channel = 0; channel < 3; channel++) {
+            double begins = 0.04 * (double)colour[channel];
+            assert_near(fixture_pixel(&result, 4, 4)[channel], 0.5 * (begins + (1.0 - begins) * rise),
+                        NORMAL_TOLERANCE);
+        }
+        frame_result_finish(&result);
+    }
+}
+
+/* A pane that neither mirrors nor bends, in a white world: what is left of the light is by the way through it. */
+TEST(a_body_takes_light_by_the_way_through_it)
+{
+    static const float turned[12] = {-1, 0, 0, 0, 0, 1, 0, 0, 0, 0, -1, -0.5f};
+    static const unsigned integrators[] = {INTEGRATOR_WHITTED, INTEGRATOR_DISTRIBUTED, INTEGRATOR_PATH};
+    static const float left[3] = {0.5f, 0.8f, 1.0f}; /* after 0.7 m */
+    struct fixture *fixture = *state;
+    for (int i = 0; i < 3; i++)
+        for (int slant = 0; slant < 90; slant += 40) {
+            double angle = slant * PI / 180.0;
+            fixture_clear(state);
+            struct scene_material *smoke = clear_glass(fixture, 1.0);
+            smoke->attenuation_distance = 0.7f;
+            memcpy(smoke->attenuation, left, sizeof(left));
+            fixture_square(fixture, 1000.0f, smoke->base.id, NULL);
+            fixture_square(fixture, 1000.0f, smoke->base.id, turned);
+            fixture_environment(fixture, 1.0f, 1.0f, 1.0f);
+            fixture->request.integrator = integrators[i];
+            fixture->request.width = fixture->request.height = 3;
+            fixture_look(fixture, (float)(5.0 * sin(angle)), 0.0f, (float)(5.0 * cos(angle)), 0.001f);
+            struct frame_result result = fixture_render(fixture);
+            for (int channel = 0; channel < 3; channel++)
+                /* a pixel's half is 1.7e-4 of the angle, whose tangent is up to 6 */
+                assert_near(fixture_pixel(&result, 1, 1)[channel],
+                            pow((double)left[channel], 0.5 / cos(angle) / 0.7), 2e-3);
+            frame_result_finish(&result);
+        }
+}
+
 TEST(light_is_totally_reflected_inside_glass)
 {
     struct fixture *fixture = *state;

@@ -74,11 +74,12 @@ def decode(kind, payload):
         material, alpha_mode, double_sided, unlit = f.take("4I")
         base, emission = f.take("4f"), f.take("3f")
         metallic, roughness, transmission, ior, cutoff, *anisotropy = f.take("7f")
-        seen_only = f.take("I")
+        seen_only, specular, body = f.take("I"), f.take("4f"), f.take("5f")
         uses = [dict(texture=u[0], texcoord=u[1], transform=u[2:8], strength=u[8]) for u in f.array("2I6ff")]
         return dict(id=material, alpha_mode=alpha_mode, double_sided=double_sided, unlit=unlit, base=base,
                     emission=emission, metallic=metallic, roughness=roughness, transmission=transmission, ior=ior,
-                    cutoff=cutoff, anisotropy=anisotropy, seen_only=seen_only, textures=uses, name=f.string())
+                    cutoff=cutoff, anisotropy=anisotropy, seen_only=seen_only, specular=specular, body=body, textures=uses,
+                    name=f.string())
     if kind == SET_TEXTURE:
         texture, width, height, form, wrap_u, wrap_v, nearest = f.take("7I")
         return dict(id=texture, width=width, height=height, format=form, wrap=(wrap_u, wrap_v), nearest=nearest,

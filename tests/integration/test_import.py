@@ -436,6 +436,21 @@ class Written(importer.Written):
         self.assertIn("texture of anisotropy is not shown", result.text())
         self.assertNotIn("nowhere.png", result.text(), "what is not shown is not read either")
 
+    def test_gltf_specular_and_volume(self):
+        factors = {"KHR_materials_specular": {"specularFactor": 0.25, "specularColorFactor": [2, 1, 0.5]},
+                   "KHR_materials_volume": {"attenuationDistance": 0.5, "attenuationColor": [1, 0.5, 0.25],
+                                            "thicknessFactor": 4}}
+        wrong = {"KHR_materials_specular": {"specularFactor": 3, "specularColorFactor": [-1, 1, 1]},
+                 "KHR_materials_volume": {"attenuationDistance": -1, "attenuationColor": "blue"}}
+        result = self.run_gltf({
+            "nodes": [{"mesh": 0}], "scenes": [{"nodes": [0]}], "extensionsRequired": list(factors),
+            "materials": [{"extensions": each} for each in (factors, {name: {} for name in factors}, wrong)],
+            "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "material": i} for i in range(3)]}]})
+        self.assertEqual([(m["specular"], m["body"]) for m in result.of(SET_MATERIAL)],
+                         [((0.25, 2, 1, 0.5), (0.5, 1, 0.5, 0.25, 4)), ((1, 1, 1, 1), (0, 1, 1, 1, 0)),
+                          ((1, 0, 1, 1), (0, 1, 1, 1, 0))])
+        self.assertEqual(len(result.notes), 3, result.text())
+
     def test_gltf_missing_image_is_marked(self):
         result = self.run_gltf({
             "nodes": [{"mesh": 0}], "images": [{"uri": "nowhere.png"}], "textures": [{"source": 0}],

@@ -78,10 +78,15 @@ static void add_ball(struct mesh_builder *mesh, const float centre[3], double ra
     free(vertices);
 }
 
-/* Glass whose every surface leaves half of red, a quarter of green, all of blue. */
+/* Glass whose every surface leaves half of red, a quarter of green (half of it as the body is green to a thickness
+ * of two metres), all of blue. */
 static void add_glass(struct test_edits *edits)
 {
-    test_material(edits, 1, 0.5f, 0.25f, 1)->transmission = 1;
+    struct scene_material *glass = test_material(edits, 1, 0.5f, 0.5f, 1);
+    glass->transmission = 1;
+    glass->attenuation[1] = 0.5f;
+    glass->attenuation_distance = 1;
+    glass->thickness = 2;
 }
 
 /* Whether that is left of light after so many surfaces. */

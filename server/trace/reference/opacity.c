@@ -35,6 +35,8 @@ static void take_material(struct opacity_material *out, const struct scene *scen
         .transmission = in->transmission * (1.0f - in->metallic),
     };
     memcpy(out->base_colour, in->base_colour, sizeof(out->base_colour));
+    for (int i = 0; i < 3; i++)
+        out->body_tint[i] = scene_material_body_tint(in, i);
     take_texture(&out->base_colour_texture, scene, &in->textures[MATERIAL_BASE_COLOUR]);
     take_texture(&out->transmission_texture, scene, &in->textures[MATERIAL_TRANSMISSION]);
 }
@@ -303,7 +305,8 @@ void opacity_transmittance(const struct opacity_surface *surface, const struct o
         reference_texture_sample(&material->transmission_texture, at.uv, texel);
     float alpha = material->alpha_mode == ALPHA_BLEND ? fminf(fmaxf(colour[3], 0.0f), 1.0f) : 1.0f;
     for (int k = 0; k < 3; k++) {
-        float through = material->transmission * texel[0] * fminf(fmaxf(colour[k], 0.0f), 1.0f);
+        float through =
+            material->transmission * texel[0] * fminf(fmaxf(colour[k], 0.0f), 1.0f) * material->body_tint[k];
         transmittance[k] = is_open ? 1.0f : stops ? 0.0f : (1.0f - alpha) + alpha * through;
     }
 }

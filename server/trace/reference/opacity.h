@@ -25,6 +25,7 @@ struct opacity_material {
     float base_colour[4];
     float alpha_cutoff;
     float transmission; /* of what is not metal */
+    float body_tint[3]; /* scene_material_body_tint() */
     struct opacity_texture base_colour_texture, transmission_texture;
 };
 

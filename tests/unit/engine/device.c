@@ -161,8 +161,13 @@ static void make_scene(uint64_t client, float radius)
     memcpy(spheres->centres_radii->data, (const float[]){0, radius, 0, radius}, 16);
     spheres->ranges = calloc(1, sizeof(*spheres->ranges));
     *spheres->ranges = (struct material_range){0, 1, 1};
-    edits[4].set.material = (struct scene_material){
-        .base.id = 1, .base_colour = {1, 1, 1, 1}, .emission = {0.2f, 0.9f, 0.4f}, .roughness = 1, .ior = 1.5f};
+    edits[4].set.material = (struct scene_material){.base.id = 1,
+                                                    .base_colour = {1, 1, 1, 1},
+                                                    .emission = {0.2f, 0.9f, 0.4f},
+                                                    .roughness = 1,
+                                                    .ior = 1.5f,
+                                                    .specular = 1,
+                                                    .specular_colour = {1, 1, 1}};
     submit((struct engine_command){
         .kind = ENGINE_COMMIT, .client = client, .request = 2, .scene = 1, .edits = edits, .edit_count = 5});
     expect_done();

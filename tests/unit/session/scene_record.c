@@ -74,6 +74,11 @@ static void add_looks(struct draft_list *list)
     material->alpha_cutoff = 0.375f;
     material->anisotropy = 0.625f;
     material->anisotropy_rotation = -2;
+    material->attenuation_distance = 3;
+    material->attenuation[2] = 0.25f;
+    material->thickness = 1.5f;
+    material->specular = 0.75f;
+    material->specular_colour[1] = 2.5f;
     material->textures[MATERIAL_EMISSION] = (struct texture_use){40, 1, {1, 2, 3, 4, 5, 6}, 0.5f};
     struct scene_light *light = &add_set(list, OBJECT_LIGHT, 50)->set.light;
     name_it(&light->base, "light");
@@ -184,8 +189,12 @@ TEST(a_scene_of_all_kinds_is_the_same_afterwards)
     /* Structs are compared but for what they own, and where it is compared by the bytes below. */
     const struct scene_material *one = scene_material(scene, 30), *other = scene_material(again, 30);
     assert_memory_equal(one->textures, other->textures, sizeof(one->textures));
-    assert_true(one->ior == other->ior && one->anisotropy_rotation == other->anisotropy_rotation && other->unlit &&
-                other->double_sided && other->emission_seen_only && other->alpha_cutoff == 0.375f &&
+    assert_true(one->ior == other->ior && one->anisotropy_rotation == other->anisotropy_rotation &&
+                one->specular == other->specular && one->thickness == other->thickness &&
+                one->attenuation_distance == other->attenuation_distance &&
+                memcmp(one->attenuation, other->attenuation, sizeof(one->attenuation)) == 0 &&
+                memcmp(one->specular_colour, other->specular_colour, sizeof(one->specular_colour)) == 0);
+    assert_true(other->unlit && other->double_sided && other->emission_seen_only && other->alpha_cutoff == 0.375f &&
                 other->emission[1] == 5);
     assert_string_equal(other->base.name, "material");
     const struct scene_node *node = scene_node(again, 1);
