@@ -22,6 +22,8 @@ namespace gltf
 namespace
 {
 constexpr int attributes_max = 32, components_max = 4;
+// A plane of a million triangles, all deltas zero, takes a byte for 28 of them at the highest compression.
+constexpr size_t triangles_per_byte_max = 256;
 // Versions of the bitstream before 2.2 have no use in glTF: its encoders write 2.2.
 constexpr uint16_t bitstream_version = DRACO_BITSTREAM_VERSION(2, 2);
 
@@ -50,7 +52,6 @@ template <typename base> class bounded : public base
     {
         draco::DecoderBuffer ahead = *this->buffer();
         uint32_t faces = 0, points = 0;
-        uint8_t traversal = 0;
         const bool edges = std::is_same<base, draco::MeshEdgebreakerDecoder>::value;
 
         if (this->bitstream_version() != bitstream_version) {
@@ -58,9 +59,8 @@ template <typename base> class bounded : public base
             return false;
         }
         // The vertices of edgebreaker are fewer than the points where seams divide them.
-        const bool read = edges ? ahead.Decode(&traversal) && draco::DecodeVarint(&points, &ahead) &&
-                                      draco::DecodeVarint(&faces, &ahead)
-                                : draco::DecodeVarint(&faces, &ahead) && draco::DecodeVarint(&points, &ahead);
+        uint32_t &first = edges ? points : faces, &second = edges ? faces : points;
+        const bool read = draco::DecodeVarint(&first, &ahead) && draco::DecodeVarint(&second, &ahead);
         if (!read)
             return false;
         if (faces != wanted_.faces)
@@ -144,6 +144,9 @@ void decode(decoding &d, const std::map<std::string, uint32_t> &attributes)
             fail(d.r, d.where, "the compressed attributes have different counts");
     if (points > UINT32_MAX / 3 || corners > UINT32_MAX / 3 || corners % 3 != 0 || points > corners)
         fail(d.r, d.where, "%zu vertices of %zu corners are not allowed", points, corners);
+    if (corners / 3 / triangles_per_byte_max > size)
+        fail(d.r, d.where, "%zu triangles in %zu compressed bytes; at most %zu a byte are allowed", corners / 3,
+             size, triangles_per_byte_max);
     // What the library needs besides, for a corner: tables of opposite corners, of vertices and of what was seen.
     check_room(d.r, d.where, corners, 64);
     const uint64_t room = IMPORT_BYTES_MAX - d.r.scene->blob_bytes;

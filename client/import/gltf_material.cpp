@@ -2,6 +2,7 @@
 // Materials and textures. Every material is gone through twice by the same code: first to learn which images are
 // wanted and how, so that they can be decoded side by side, then to be added.
 #include "gltf.hpp"
+#include "gltf_gloss.hpp"
 #include "texture.h"
 
 #include <algorithm>
@@ -21,8 +22,14 @@ using image_key = std::pair<int, bool>;
 struct images {
     std::map<image_key, size_t> numbers; // position in jobs
     std::vector<texture_job> jobs;
-    std::vector<uint32_t> blobs; // by job, once decoded
+    std::vector<uint32_t> blobs; // by job: 0 until its texels are used as they are
     bool collecting = true;
+
+    ~images()
+    {
+        for (const texture_job &job : jobs)
+            free(job.texels);
+    }
 };
 
 struct texture_source {
@@ -76,10 +83,10 @@ void want_image(reader &r, images &all, int image, bool colour)
 }
 
 // An image that cannot be decoded is shown in a conspicuous colour.
-void take_images(reader &r, images &all)
+void decode_images(reader &r, images &all)
 {
     texture_decode(all.jobs.data(), all.jobs.size());
-    all.blobs.resize(all.jobs.size());
+    all.blobs.assign(all.jobs.size(), 0);
     for (const auto &entry : all.numbers) {
         texture_job &job = all.jobs[entry.second];
         if (!job.texels) {
@@ -90,11 +97,30 @@ void take_images(reader &r, images &all)
             job.texels = texture_marker();
             job.width = job.height = 2;
         }
-        all.blobs[entry.second] = import_add_blob(r.scene, job.texels, uint64_t(job.width) * job.height * 4);
-        job.texels = nullptr;
+        if (!job.texels)
+            throw std::bad_alloc();
     }
-    if (r.scene->failed)
-        throw failed();
+}
+
+uint32_t blob_of(reader &r, images &all, size_t number)
+{
+    texture_job &job = all.jobs[number];
+
+    if (all.blobs[number] == 0) {
+        all.blobs[number] = import_add_blob(r.scene, job.texels, uint64_t(job.width) * job.height * 4);
+        job.texels = nullptr;
+        if (r.scene->failed)
+            throw failed();
+    }
+    return all.blobs[number];
+}
+
+gloss_image texels_of(const reader &r, const images &all, size_t number)
+{
+    const texture_job &job = all.jobs[number];
+    const uint32_t blob = all.blobs[number];
+
+    return {blob == 0 ? job.texels : r.scene->blobs[blob - 1].bytes, job.width, job.height};
 }
 
 protocol_wrap wrap_of(int mode)
@@ -104,19 +130,13 @@ protocol_wrap wrap_of(int mode)
                                                            : PROTOCOL_WRAP_REPEAT;
 }
 
-uint32_t texture_id(reader &r, images &all, int texture, int image, bool colour)
+// A texture that is sampled as the file's; its size, whether it is sampled at the nearest texel and its texels are
+// those given.
+uint32_t add_texture(reader &r, int texture, const std::string &name, bool colour, message_set_texture set,
+                     uint32_t blob)
 {
-    const auto found = r.texture_ids.find({texture, colour});
-    if (found != r.texture_ids.end())
-        return found->second;
     const tinygltf::Texture &t = r.model.textures[size_t(texture)];
-    const size_t number = all.numbers.at({image, colour});
-    const std::string name = t.name.empty() ? image_name(r, image) : t.name;
-    message_set_texture set = {};
-    set.width = all.jobs[number].width;
-    set.height = all.jobs[number].height;
     set.format = colour ? PROTOCOL_TEXTURE_RGBA8_SRGB : PROTOCOL_TEXTURE_RGBA8_LINEAR;
-    set.nearest = all.jobs[number].reason[0] != '\0';
     set.name = name.c_str();
     if (t.sampler >= 0) {
         if (size_t(t.sampler) >= r.model.samplers.size())
@@ -126,7 +146,27 @@ uint32_t texture_id(reader &r, images &all, int texture, int image, bool colour)
         set.wrap_v = wrap_of(sampler.wrapT);
         set.nearest |= sampler.magFilter == TINYGLTF_TEXTURE_FILTER_NEAREST;
     }
-    return r.texture_ids[{texture, colour}] = import_add_texture(r.scene, &set, all.blobs[number]);
+    return import_add_texture(r.scene, &set, blob);
+}
+
+std::string texture_name(const reader &r, int texture, int image)
+{
+    const std::string &name = r.model.textures[size_t(texture)].name;
+    return name.empty() ? image_name(r, image) : name;
+}
+
+uint32_t texture_id(reader &r, images &all, int texture, int image, bool colour)
+{
+    const auto found = r.texture_ids.find({texture, colour});
+    if (found != r.texture_ids.end())
+        return found->second;
+    const size_t number = all.numbers.at({image, colour});
+    message_set_texture set = {};
+    set.width = all.jobs[number].width;
+    set.height = all.jobs[number].height;
+    set.nearest = all.jobs[number].reason[0] != '\0';
+    return r.texture_ids[{texture, colour}] =
+               add_texture(r, texture, texture_name(r, texture, image), colour, set, blob_of(r, all, number));
 }
 
 // KHR_texture_transform: translation * rotation * scale, where a positive angle turns the coordinates
@@ -145,22 +185,14 @@ void apply_transform(reader &r, const tinygltf::Value &transform, record_texture
     texcoord = int(number(transform, "texCoord", texcoord));
 }
 
-void use_texture(reader &r, images &all, const texture_source &source, bool colour, record_texture_use &use,
-                 const std::string &where)
+// Where the texture lies on the surface, and how strong it is.
+void place_texture(reader &r, const texture_source &source, uint32_t texture, record_texture_use &use,
+                   const std::string &where)
 {
     const tinygltf::Value *transform = nullptr;
     int texcoord = source.texcoord;
 
-    if (source.index < 0)
-        return;
-    const int image = image_of(r, source.index, where);
-    if (image < 0)
-        return;
-    if (all.collecting) {
-        want_image(r, all, image, colour);
-        return;
-    }
-    import_texture_use_default(&use, texture_id(r, all, source.index, image, colour));
+    import_texture_use_default(&use, texture);
     use.strength = limited(r, where, "the texture's strength", source.strength, -1e6, 1e6);
     if (source.extensions)
         transform = extension(*source.extensions, "KHR_texture_transform");
@@ -175,6 +207,20 @@ void use_texture(reader &r, images &all, const texture_source &source, bool colo
         texcoord = 0;
     }
     use.texcoord_set = uint32_t(texcoord);
+}
+
+void use_texture(reader &r, images &all, const texture_source &source, bool colour, record_texture_use &use,
+                 const std::string &where)
+{
+    if (source.index < 0)
+        return;
+    const int image = image_of(r, source.index, where);
+    if (image < 0)
+        return;
+    if (all.collecting)
+        want_image(r, all, image, colour);
+    else
+        place_texture(r, source, texture_id(r, all, source.index, image, colour), use, where);
 }
 
 texture_source source_of(const tinygltf::TextureInfo &info)
@@ -212,8 +258,11 @@ void core(const building &b)
         b.set.base_colour[c] = limited(b.r, b.where, "the base colour", pbr.baseColorFactor[c], 0, 1);
     b.set.metallic = limited(b.r, b.where, "metallicFactor", pbr.metallicFactor, 0, 1);
     b.set.roughness = limited(b.r, b.where, "roughnessFactor", pbr.roughnessFactor, 0, 1);
-    use_texture(b.r, b.all, source_of(pbr.baseColorTexture), true, b.uses[BASE_COLOUR], b.where);
-    use_texture(b.r, b.all, source_of(pbr.metallicRoughnessTexture), false, b.uses[METALLIC_ROUGHNESS], b.where);
+    if (!extension(b.source.extensions, "KHR_materials_pbrSpecularGlossiness")) { // which is in their place
+        use_texture(b.r, b.all, source_of(pbr.baseColorTexture), true, b.uses[BASE_COLOUR], b.where);
+        use_texture(b.r, b.all, source_of(pbr.metallicRoughnessTexture), false, b.uses[METALLIC_ROUGHNESS],
+                    b.where);
+    }
     const tinygltf::NormalTextureInfo &normal = b.source.normalTexture;
     use_texture(b.r, b.all, {normal.index, normal.texCoord, normal.scale, &normal.extensions, nullptr}, false,
                 b.uses[NORMAL], b.where);
@@ -277,35 +326,109 @@ void anisotropy(const building &b)
                     "a texture of anisotropy is not shown; its strength and rotation are the same everywhere");
 }
 
-// The old model, approximately: reflection above a dielectric's 4 % counts as metal.
+// ---- the old model, converted
+
+struct gloss_maps {
+    texture_source sources[2]; // diffuse; specular and glossiness
+    int images[2] = {-1, -1};
+    record_texture_use uses[2] = {};
+};
+
+// Both are read as colours: the alpha of either is linear. Maps that lie differently on the surface do not become
+// one: then the first one counts.
+gloss_maps maps_of(const building &b, const tinygltf::Value &old)
+{
+    static const char *const names[2] = {"diffuseTexture", "specularGlossinessTexture"};
+    gloss_maps maps;
+
+    for (size_t i = 0; i < 2; i++) {
+        maps.sources[i] = source_of(old, names[i]);
+        if (maps.sources[i].index < 0)
+            continue;
+        maps.images[i] = image_of(b.r, maps.sources[i].index, b.where);
+        if (maps.images[i] >= 0 && b.all.collecting)
+            want_image(b.r, b.all, maps.images[i], true);
+        else if (maps.images[i] >= 0)
+            place_texture(b.r, maps.sources[i], 0, maps.uses[i], b.where);
+    }
+    const record_texture_use &first = maps.uses[0], &second = maps.uses[1];
+    if (maps.images[0] < 0 || maps.images[1] < 0 ||
+        (first.texcoord_set == second.texcoord_set &&
+         std::equal(first.uv_transform, first.uv_transform + 6, second.uv_transform)))
+        return maps;
+    maps.images[1] = -1;
+    import_note(b.r.scene, PROTOCOL_SEVERITY_WARNING, b.where.c_str(),
+                "the texture of specular and glossiness lies otherwise than the diffuse one and is not shown");
+    return maps;
+}
+
+unsigned char *allocate_texels(const building &b, uint32_t width, uint32_t height)
+{
+    check_room(b.r, b.where, uint64_t(width) * height, 4);
+    unsigned char *texels = static_cast<unsigned char *>(malloc(size_t(width) * height * 4));
+    if (!texels)
+        throw std::bad_alloc();
+    return texels;
+}
+
+void use_converted(const building &b, const specular_gloss &factors, const gloss_maps &maps)
+{
+    const size_t main = maps.images[0] >= 0 ? 0 : 1;
+    gloss_image from[2] = {};
+    message_set_texture set = {};
+
+    for (size_t i = 0; i < 2; i++)
+        if (maps.images[i] >= 0) {
+            const size_t number = b.all.numbers.at({maps.images[i], true});
+            from[i] = texels_of(b.r, b.all, number);
+            set.width = std::max(set.width, from[i].width);
+            set.height = std::max(set.height, from[i].height);
+            set.nearest = set.nearest || b.all.jobs[number].reason[0] != '\0';
+        }
+    unsigned char *base = allocate_texels(b, set.width, set.height);
+    const uint64_t bytes = uint64_t(set.width) * set.height * 4;
+    const uint32_t base_blob = import_add_blob(b.r.scene, base, bytes);
+    unsigned char *rough = allocate_texels(b, set.width, set.height);
+    const uint32_t rough_blob = import_add_blob(b.r.scene, rough, bytes);
+    if (b.r.scene->failed)
+        throw failed();
+    metal_texels(factors, from[0], from[1], set.width, set.height, base, rough);
+    const int texture = maps.sources[main].index;
+    const std::string name = texture_name(b.r, texture, maps.images[main]);
+    b.uses[BASE_COLOUR] = b.uses[METALLIC_ROUGHNESS] = maps.uses[main];
+    b.uses[BASE_COLOUR].texture = add_texture(b.r, texture, name, true, set, base_blob);
+    b.uses[METALLIC_ROUGHNESS].texture =
+        add_texture(b.r, texture, name + " metallic roughness", false, set, rough_blob);
+}
+
 void specular_glossiness(const building &b)
 {
     const tinygltf::Value *old = extension(b.source.extensions, "KHR_materials_pbrSpecularGlossiness");
     if (!old)
         return;
-    std::vector<double> diffuse = numbers(*old, "diffuseFactor"), specular = numbers(*old, "specularFactor");
-    if (diffuse.size() != 4)
-        diffuse = {1, 1, 1, 1};
-    if (specular.size() != 3)
-        specular = {1, 1, 1};
-    const bool textured = source_of(*old, "specularGlossinessTexture").index >= 0;
-    const double strongest = std::max({specular[0], specular[1], specular[2]});
-    // A factor with a texture is nearly always 1 and says nothing: dielectric is the better guess then.
-    const double metallic = textured ? 0 : std::min(std::max((strongest - 0.04) / 0.96, 0.0), 1.0);
-
+    const std::vector<double> diffuse = numbers(*old, "diffuseFactor"), specular = numbers(*old, "specularFactor");
+    specular_gloss factors = {{1, 1, 1}, 1, {1, 1, 1}, 1};
+    for (size_t c = 0; c < 3; c++) {
+        if (diffuse.size() == 4)
+            factors.diffuse[c] = double(limited(b.r, b.where, "the diffuse colour", diffuse[c], 0, 1));
+        if (specular.size() == 3)
+            factors.specular[c] = double(limited(b.r, b.where, "the specular colour", specular[c], 0, 1));
+    }
+    if (diffuse.size() == 4)
+        factors.alpha = double(limited(b.r, b.where, "the diffuse colour", diffuse[3], 0, 1));
+    factors.glossiness =
+        double(limited(b.r, b.where, "glossinessFactor", number(*old, "glossinessFactor", 1), 0, 1));
+    const gloss_maps maps = maps_of(b, *old);
+    const bool textured = maps.images[0] >= 0 || maps.images[1] >= 0;
+    const metal_rough metal =
+        textured ? metal_rough{{1, 1, 1}, 1, 1, 1} : metal_of(factors); // the textures have all then
     for (size_t c = 0; c < 3; c++)
-        b.set.base_colour[c] = limited(b.r, b.where, "the diffuse colour",
-                                       diffuse[c] * (1 - metallic) + specular[c] * metallic, 0, 1);
-    b.set.base_colour[3] = limited(b.r, b.where, "the diffuse colour", diffuse[3], 0, 1);
-    b.set.metallic = float(metallic);
-    b.set.roughness =
-        limited(b.r, b.where, "glossinessFactor", textured ? 0.5 : 1 - number(*old, "glossinessFactor", 1), 0, 1);
-    b.uses[BASE_COLOUR] = {};
-    b.uses[METALLIC_ROUGHNESS] = {};
-    use_texture(b.r, b.all, source_of(*old, "diffuseTexture"), true, b.uses[BASE_COLOUR], b.where);
-    if (!b.all.collecting)
-        import_note(b.r.scene, PROTOCOL_SEVERITY_WARNING, b.where.c_str(),
-                    "specular and glossiness are shown as metallic and roughness, approximately");
+        b.set.base_colour[c] = float(metal.base[c]);
+    b.set.base_colour[3] = float(metal.alpha);
+    b.set.metallic = float(metal.metallic);
+    b.set.roughness = float(metal.roughness);
+    if (textured && !b.all.collecting)
+        use_converted(b, factors, maps);
 }
 
 uint32_t material(reader &r, images &all, int index)
@@ -338,7 +461,7 @@ void add_materials(reader &r, const std::set<int> &used)
     for (int index : used)
         if (size_t(index) < r.model.materials.size())
             material(r, all, index);
-    take_images(r, all);
+    decode_images(r, all);
     all.collecting = false;
     for (int index : used)
         if (size_t(index) < r.model.materials.size())
