@@ -2,8 +2,9 @@
 // Views compressed with meshoptimizer. The format is that of KHR_meshopt_compression, of which that of
 // EXT_meshopt_compression is a part; sections and names are those of its appendices A and B. What the header
 // states is held against the compressed bytes, which limit it, before memory is spent.
-#include "gltf.hpp"
 #include "gltf_meshopt.hpp"
+
+#include "gltf.hpp"
 
 #include <meshoptimizer.h>
 

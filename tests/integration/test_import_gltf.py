@@ -18,6 +18,7 @@ import struct
 import unittest
 
 import importer
+from farlight_test import farlight
 from importer import SET_CHANNEL, SET_LIGHT, SET_MATERIAL, SET_MESH, SET_NODE, SET_TEXTURE, Peer, import_files
 
 MEMORY = 1 << 30  # bytes of addresses, of which libraries take a third
@@ -424,6 +425,20 @@ class Instances(Gltf):
 
 
 class Shown(Gltf):
+    def test_a_variant_is_an_option_of_the_commands(self):
+        model = Model().cube()
+        model.json["materials"] = [{"name": "plain"}, {"name": "red", "pbrMetallicRoughness": {"baseColorFactor": [1, 0, 0, 1]}}]
+        model.json["extensions"] = {"KHR_materials_variants": {"variants": [{"name": "-red"}]}}
+        model.primitive.update(material=0, extensions={"KHR_materials_variants": {"mappings": [{"material": 1, "variants": [0]}]}})
+        path = self.write("model.gltf", model.text())
+        info = json.loads(self.expect(farlight("info", "--json", path), 0).stdout)
+        self.assertEqual((info["variants"], info["material_list"][0]["name"]), (["-red"], "plain"))
+        info = json.loads(self.expect(farlight("info", "--json", "--variant=-red", path), 0).stdout)
+        self.assertEqual(info["material_list"][0]["name"], "red")
+        done = farlight("render", path, "--variant", "blue", "-o", str(self.folder / "no.png"))
+        self.assertNotEqual(done.returncode, 0)
+        self.assertIn("no variant 'blue'; it has '-red'", done.stderr)
+
     def test_a_variant_chooses_materials_by_its_name(self):
         model = Model().cube()
         model.json["materials"] = [{"name": name} for name in ("plain", "red", "blue")]
