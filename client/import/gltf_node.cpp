@@ -126,7 +126,7 @@ std::vector<attachment> attachments_of(reader &r, size_t index)
     if (node.camera >= 0)
         found.push_back({PROTOCOL_NODE_CAMERA, camera_id(r, node.camera, where), " camera", 0, {}});
     if (const tinygltf::Value *lights = extension(node.extensions, "KHR_lights_punctual")) {
-        const uint32_t light = light_id(r, int(number(*lights, "light", -1)), where);
+        const uint32_t light = light_id(r, index_of(*lights, "light"), where);
         if (light != 0)
             found.push_back({PROTOCOL_NODE_LIGHT, light, " light", 0, {}});
     }
