@@ -14,11 +14,12 @@ The encoders here write what the formats allow at its plainest. The cube that Dr
 """
 import base64
 import json
+import os
 import struct
 import unittest
 
 import importer
-from farlight_test import farlight
+from farlight_test import SHARED_SCENES, farlight, needs_shared_scenes
 from importer import SET_CHANNEL, SET_LIGHT, SET_MATERIAL, SET_MESH, SET_NODE, SET_TEXTURE, Peer, import_files
 
 MEMORY = 1 << 30  # bytes of addresses, of which libraries take a third
@@ -235,6 +236,21 @@ class Extensions(Gltf):
         notes = [text for _, where, text in self.run_model(model).notes if "extensionsUsed" in where]
         self.assertEqual(len(notes), 1)
         self.assertRegex(notes[0], "not shown: ACME_a, ACME_b$")
+
+
+    @needs_shared_scenes
+    def test_files_of_other_programs_are_imported_but_for_basisu(self):
+        paths = [os.path.join(folder, name) for folder, _, names in os.walk(os.path.join(SHARED_SCENES, "formats"))
+                 for name in sorted(names) if name.endswith((".glb", ".gltf"))]
+        for path, result in import_files(paths):
+            with self.subTest(path):
+                refused = any("KHR_texture_basisu" in text for _, _, text in result.errors())
+                with open(path, "rb") as file:
+                    self.assertEqual(refused, b"KHR_texture_basisu" in file.read())
+                self.assertEqual((result.status, result.faults), (int(refused), []), result.text())
+                self.assertEqual([] if refused else importer.inconsistencies(result), [])
+                self.assertEqual(refused, not result.of(SET_MESH))
+        self.assertGreater(len(paths), 0)
 
 
 class Draco(Gltf):
