@@ -48,6 +48,12 @@ template <typename base> class bounded : public base
             std::to_string(found) + " " + what + ", where the accessors have " + std::to_string(wanted);
         return false;
     }
+    bool exceed(const char *what, uint64_t found, uint64_t maximum)
+    {
+        *wanted_.reason =
+            std::to_string(found) + " " + what + "; at most " + std::to_string(maximum) + " are allowed";
+        return false;
+    }
     bool DecodeConnectivity() override
     {
         draco::DecoderBuffer ahead = *this->buffer();
@@ -78,15 +84,15 @@ template <typename base> class bounded : public base
         const draco::PointCloud &cloud = *this->point_cloud();
         uint64_t bytes = 0;
 
-        for (int i = 0; i < cloud.num_attributes() && i <= attributes_max; i++) {
+        if (cloud.num_attributes() > attributes_max)
+            return exceed("attributes", uint64_t(cloud.num_attributes()), attributes_max);
+        for (int i = 0; i < cloud.num_attributes(); i++) {
             const draco::PointAttribute &attribute = *cloud.attribute(i);
-            if (i == attributes_max || attribute.num_components() > components_max)
-                return refuse("components or attributes",
-                              i == attributes_max ? uint64_t(i) + 1 : uint64_t(attribute.num_components()),
-                              i == attributes_max ? attributes_max : components_max);
+            if (attribute.num_components() > components_max)
+                return exceed("components", uint64_t(attribute.num_components()), components_max);
             bytes += uint64_t(attribute.byte_stride()) * wanted_.points;
         }
-        return bytes <= wanted_.bytes ? base::DecodeAllAttributes() : refuse("bytes", bytes, wanted_.bytes);
+        return bytes <= wanted_.bytes ? base::DecodeAllAttributes() : exceed("bytes", bytes, wanted_.bytes);
     }
 
   private:
