@@ -52,7 +52,7 @@ SERVER_PKGS += $(if $(filter sanitize fuzz,$(config)),,jemalloc)
 # The daemon loads this one when it needs it, so that only its headers are needed here.
 SERVER_LOADED_PKGS := libavcodec libavutil
 CLIENT_PKGS := libzstd libsodium libxxhash libturbojpeg jansson
-IMPORT_PKGS := tinygltf tinyobjloader libsodium libseccomp
+IMPORT_PKGS := tinygltf tinyobjloader draco jansson libsodium libseccomp
 TEXTURE_PKGS := OpenImageIO
 EXPORT_PKGS := libpng OpenEXR libseccomp
 IMAGES_PKGS := OpenImageIO libjxl
@@ -203,7 +203,8 @@ $(B)/tests/bench/shader_sources.o: $(B)/tests/bench/shader_sources.c
 EMBREE_LIBS := $(if $(filter 1,$(EMBREE)),-lembree3)
 SERVER_LIBS = $(call pkg_libs,$(SERVER_PKGS)) $(EMBREE_LIBS) -lm
 CLIENT_LIBS = $(call pkg_libs,$(CLIENT_PKGS)) -lm
-IMPORT_LIBS = $(call pkg_libs,$(IMPORT_PKGS)) -lm
+# meshoptimizer comes without a file for pkg-config.
+IMPORT_LIBS = $(call pkg_libs,$(IMPORT_PKGS)) -lmeshoptimizer -lm
 EXPORT_LIBS = $(call pkg_libs,$(EXPORT_PKGS)) -lm
 VIDEO_LIBS = $(call pkg_libs,$(VIDEO_PKGS)) -lm
 VIEWER_LIBS = $(call pkg_libs,$(VIEWER_PKGS) $(CLIENT_PKGS)) -lm
@@ -319,7 +320,7 @@ $(LOSING_DAEMON): $(B)/tests/tools/lost_gpu.o $(B)/server/main.o $(SERVER_OBJ) $
 # ---- what people call ------------------------------------------------------------------------------
 BUILD_PACKAGES := gcc g++ make pkg-config libepoxy-dev libegl-dev libgl-dev libcglm-dev libturbojpeg0-dev libzstd-dev \
     libsodium-dev libxxhash-dev libinih-dev libjansson-dev libjemalloc-dev libseccomp-dev libopenimageio-dev libpng-dev libopenexr-dev libjxl-dev libtinygltf-dev \
-    libtinyobjloader-dev libembree-dev libavcodec-dev libavformat-dev libavutil-dev libswscale-dev libsdl2-dev libsdl2-ttf-dev fonts-dejavu-core libegl1 libgl1-mesa-dri
+    libtinyobjloader-dev libdraco-dev libmeshoptimizer-dev libembree-dev libavcodec-dev libavformat-dev libavutil-dev libswscale-dev libsdl2-dev libsdl2-ttf-dev fonts-dejavu-core libegl1 libgl1-mesa-dri
 TEST_PACKAGES := libcmocka-dev python3 python3-jsonschema ffmpeg xvfb gnuplot-nox
 LINT_PACKAGES := clang clang-format glslang-tools python3
 # A second driver stack: OpenGL over Vulkan, on the CPU. The validation sees what it does.

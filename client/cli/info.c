@@ -6,10 +6,11 @@
 #include <stdio.h>
 
 #define KEY_JSON 0x400
+#define KEY_VARIANT 0x401
 #define LISTED_MAX 200u
 
 struct info_options {
-    const char *model, *environment;
+    const char *model, *environment, *variant;
     bool json;
     struct cli_job job; /* holds the error of what was typed */
 };
@@ -17,6 +18,7 @@ struct info_options {
 static const struct argp_option options[] = {
     {"json", KEY_JSON, NULL, 0, "Print one JSON object on one line", 0},
     {"environment", 'e', "FILE", 0, "Check this environment image as well", 0},
+    {"variant", KEY_VARIANT, "NAME", 0, "Show the materials of this variant of a glTF model", 0},
     {0}};
 
 static error_t parse(int key, char *value, struct argp_state *state)
@@ -28,6 +30,9 @@ static error_t parse(int key, char *value, struct argp_state *state)
         return 0;
     case 'e':
         wanted->environment = value;
+        return 0;
+    case KEY_VARIANT:
+        wanted->variant = value;
         return 0;
     case ARGP_KEY_ARG:
         if (wanted->model)
@@ -47,7 +52,7 @@ static json_t *string(const char *text)
 
 static json_t *lists(const struct fl_model_info *info)
 {
-    json_t *cameras = json_array(), *clips = json_array(), *notes = json_array();
+    json_t *cameras = json_array(), *clips = json_array(), *notes = json_array(), *variants = json_array();
     for (size_t i = 0; i < info->camera_count; i++)
         json_array_append_new(
             cameras, json_pack("{s:I,s:o}", "index", (json_int_t)i, "name", string(info->cameras[i].name)));
@@ -55,11 +60,14 @@ static json_t *lists(const struct fl_model_info *info)
         json_array_append_new(clips, json_pack("{s:o,s:I,s:f}", "name", string(info->clips[i].name), "channels",
                                                (json_int_t)info->clips[i].channels, "duration_s",
                                                (double)info->clips[i].duration_s));
+    for (size_t i = 0; i < info->variant_count; i++)
+        json_array_append_new(variants, string(info->variants[i].name));
     for (size_t i = 0; i < info->note_count; i++)
         json_array_append_new(notes, json_pack("{s:s,s:o,s:o}", "severity",
                                                protocol_severity_text(info->notes[i].severity), "where",
                                                string(info->notes[i].where), "text", string(info->notes[i].text)));
-    return json_pack("{s:o,s:o,s:o}", "cameras", cameras, "clips", clips, "notes", notes);
+    return json_pack("{s:o,s:o,s:o,s:o}", "cameras", cameras, "clips", clips, "variants", variants, "notes",
+                     notes);
 }
 
 static json_t *bounds(const float lower[3], const float upper[3])
@@ -175,6 +183,11 @@ static void print_table(const struct info_options *wanted, const struct fl_model
         cli_print_name(info->clips[i].name);
         printf(", %.3f s, %u channels\n", (double)info->clips[i].duration_s, info->clips[i].channels);
     }
+    for (size_t i = 0; i < info->variant_count; i++) {
+        printf("  variant %zu: ", i);
+        cli_print_name(info->variants[i].name);
+        putchar('\n');
+    }
     for (size_t i = 0; i < info->note_count; i++) {
         printf("  %s: ", protocol_severity_text(info->notes[i].severity));
         cli_print_name(info->notes[i].where);
@@ -203,9 +216,10 @@ int cli_info(int argc, char **argv)
     struct fl_error error = {0};
     if (!cli_interrupt_begin(&error))
         return cli_report(&error);
-    struct fl_model_info *info =
-        fl_model_info(&(struct fl_load_options){.model = wanted.model, .environment = wanted.environment},
-                      cli_interrupt_fd(), &error);
+    struct fl_model_info *info = fl_model_info(&(struct fl_load_options){.model = wanted.model,
+                                                                         .environment = wanted.environment,
+                                                                         .variant = wanted.variant},
+                                               cli_interrupt_fd(), &error);
     if (!info)
         return cli_report(&error);
     if (wanted.json)

@@ -16,6 +16,7 @@
 #define KEY_ENVIRONMENT 0x402
 #define KEY_ENVIRONMENT_ROTATION 0x404
 #define KEY_KEY 0x403
+#define KEY_VARIANT 0x405
 
 #define LISTENS_MAX 8
 #define DAEMON_WORDS_MAX 28 /* of fl_connect */
@@ -45,6 +46,7 @@ static const struct argp_option options[] = {
     {"environment", KEY_ENVIRONMENT, "FILE", 0, "Light the scene with this equirectangular image (HDR or EXR)", 0},
     {"environment-rotation", KEY_ENVIRONMENT_ROTATION, "DEGREES", 0,
      "Turn it about +y by -360 to 360 (default 0: its middle column is +x)", 0},
+    {"variant", KEY_VARIANT, "NAME", 0, "Show the materials of this variant of a glTF model", 0},
     {"quiet", 'q', NULL, 0, "Print no progress and no notes about the model", 0},
     {0}};
 
@@ -92,6 +94,9 @@ static error_t parse(int key, char *value, struct argp_state *state)
         return 0;
     case KEY_ENVIRONMENT_ROTATION:
         return cli_set_environment_rotation(job, "--environment-rotation", value);
+    case KEY_VARIANT:
+        job->variant = value;
+        return 0;
     case 'q':
         job->quiet = true;
         return 0;

@@ -193,6 +193,12 @@ static bool apply_background(const struct shot_reader *reader, const struct shot
                       "is no background");
 }
 
+static bool apply_variant(const struct shot_reader *reader, const struct shot_value *at)
+{
+    reader->job->variant = json_string_value(at->value);
+    return reader->job->variant || shot_wrong(reader, at, "use the name of a variant", "must be a string");
+}
+
 /* ---- all of it ---- */
 
 static bool apply_members(const struct shot_reader *reader, const struct shot_value *root)
@@ -202,9 +208,10 @@ static bool apply_members(const struct shot_reader *reader, const struct shot_va
     const struct shot_value model = shot_member(root, "model"), environment = shot_member(root, "environment"),
                             background = shot_member(root, "background"),
                             rotation = shot_member(root, "environment_rotation"),
-                            camera = shot_member(root, "camera"), clips = shot_member(root, "clips"),
-                            output = shot_member(root, "output"), outputs = shot_member(root, "outputs"),
-                            about = shot_member(root, "description"), schema = shot_member(root, "$schema");
+                            variant = shot_member(root, "variant"), camera = shot_member(root, "camera"),
+                            clips = shot_member(root, "clips"), output = shot_member(root, "output"),
+                            outputs = shot_member(root, "outputs"), about = shot_member(root, "description"),
+                            schema = shot_member(root, "$schema");
     const struct shot_value *const texts[] = {&about, &schema};
     for (size_t i = 0; i < 2; i++)
         if (texts[i]->value && !json_is_string(texts[i]->value))
@@ -213,7 +220,8 @@ static bool apply_members(const struct shot_reader *reader, const struct shot_va
         (environment.value && !shot_path(reader, &environment, &job->environment)) ||
         (background.value && !apply_background(reader, &background)) ||
         (rotation.value && !shot_number(reader, &rotation, -360, 360, &job->environment_degrees)) ||
-        (camera.value && !shot_camera(reader, &camera)) || (clips.value && !apply_clips(reader, &clips)))
+        (variant.value && !apply_variant(reader, &variant)) || (camera.value && !shot_camera(reader, &camera)) ||
+        (clips.value && !apply_clips(reader, &clips)))
         return false;
     for (size_t i = 0; i < GROUP_COUNT; i++) {
         const struct shot_value group = shot_member(root, groups[i].name);
@@ -238,9 +246,9 @@ bool cli_shot_apply(struct cli_shot *shot, struct cli_job *job, const struct cli
                     cli_shot_set *set, void *user)
 {
     static const char *const others[] = {
-        "$schema",    "description", "model",   "environment", "environment_rotation",
-        "background", "camera",      "clips",   "lights",      "materials",
-        "nodes",      "output",      "outputs", NULL};
+        "$schema",   "description", "model",  "environment", "environment_rotation",
+        "variant",   "background",  "camera", "clips",       "lights",
+        "materials", "nodes",       "output", "outputs",     NULL};
     const struct shot_reader reader = {.shot = shot, .job = job, .given = given, .set = set, .user = user};
     const struct shot_value root = {.value = shot->json.root};
     const char *known[SHOT_SETTINGS_MAX + sizeof(others) / sizeof(others[0])];

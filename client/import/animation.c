@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Skins, clips and channels of the scene under construction. */
+/* Skins, clips, channels and variants of the scene under construction. */
 #include "model.h"
 
 #include <math.h>
@@ -101,4 +101,15 @@ void import_list_clip(struct import_scene *scene, uint32_t clip, const char *nam
     listed->clip = clip;
     listed->channels = channels;
     listed->duration_s = duration_s >= 0 && duration_s <= 1e9 ? (float)duration_s : 0;
+}
+
+void import_list_variant(struct import_scene *scene, const char *name)
+{
+    struct import_variant *grown =
+        import_grow(scene, scene->variants, scene->variant_count, &scene->variant_capacity, sizeof(*grown));
+
+    if (!grown)
+        return;
+    scene->variants = grown;
+    import_copy_text(grown[scene->variant_count++].name, sizeof(grown->name), name);
 }

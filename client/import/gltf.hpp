@@ -40,15 +40,21 @@ struct reader {
     tinygltf::Model model;
     // By index of the glTF material: identifier in the scene, 0 until it is added.
     std::vector<uint32_t> material_ids;
-    std::map<int, shown_mesh> meshes;      // by index of the glTF mesh
-    std::set<int> skinned_meshes;          // those that a shown node has a skin for
-    std::map<int, uint32_t> skin_ids;      // by index of the glTF skin: reserved identifier
-    std::vector<uint32_t> node_ids;        // by node: identifier, 0: it is not part of what is shown
-    std::map<size_t, uint32_t> mesh_nodes; // by node with a mesh: which node of ours shows it
+    std::map<int, shown_mesh> meshes;                   // by index of the glTF mesh
+    std::set<int> skinned_meshes;                       // those that a shown node has a skin for
+    std::map<int, uint32_t> skin_ids;                   // by index of the glTF skin: reserved identifier
+    std::vector<uint32_t> node_ids;                     // by node: identifier, 0: it is not part of what is shown
+    std::map<size_t, std::vector<uint32_t>> mesh_nodes; // by node with a mesh: the nodes of ours that show it
+    std::map<int, std::vector<uint32_t>> light_ids;     // by index of the glTF light: identifiers in the scene
+    size_t instance_count = 0;
+    int variant = -1; // of the materials; -1: as the primitives have them
     // By texture and whether it holds colour: what has been decoded.
     std::map<std::pair<int, bool>, uint32_t> texture_ids;
     std::map<std::string, size_t> buffer_sizes; // by file: how much of it the model asks for, where that is less
     std::vector<int> parents;                   // by node; -1: a root
+    // By view that is compressed: what it holds.
+    std::map<int, std::vector<unsigned char>> decoded_views;
+    size_t draco_buffers = 0; // where buffers begin that Draco has filled for the mesh at hand
 };
 
 [[noreturn]] void fail(reader &r, const std::string &where, const char *format, ...)
@@ -58,6 +64,22 @@ std::string place(const char *array, size_t index);
 
 // ---- gltf_load.cpp: bytes to tinygltf's structures
 void load(reader &r, const unsigned char *bytes, size_t size_bytes);
+
+// ---- gltf_complete.cpp
+// Some extensions let a file leave out what tinygltf insists on: the JSON with that filled in; empty where nothing
+// has to be, or the JSON is none. The indices of a mesh that Draco holds alone are named by the extension then.
+std::string complete_json(const unsigned char *json, size_t size_bytes, bool binary);
+
+// ---- gltf_meshopt.cpp
+// The bytes of a view that is compressed with meshoptimizer (EXT_meshopt_compression, KHR_meshopt_compression),
+// decoded when they are asked for the first time. Null: it is not.
+const std::vector<unsigned char> *decoded_view(reader &r, int view, const std::string &where);
+
+// ---- gltf_draco.cpp
+// Decodes the primitives of a mesh that are compressed with Draco: their accessors are replaced by others, of the
+// decoded bytes, until forget_draco().
+void decode_draco(reader &r, size_t mesh);
+void forget_draco(reader &r);
 
 // ---- gltf_accessor.cpp
 // Number of elements of an accessor of the given type (TINYGLTF_TYPE_..; 0: any vector or scalar), all of whose
@@ -71,6 +93,9 @@ void read_floats(reader &r, int accessor, int components, float fill, float *out
 std::vector<uint32_t> read_integers(reader &r, int accessor, int components, const std::string &where);
 // Bytes of a buffer view, checked to lie within its buffer.
 const unsigned char *view_bytes(reader &r, int view, size_t &size_bytes, const std::string &where);
+// A part of a buffer, checked likewise; `what` names it.
+const unsigned char *buffer_bytes(reader &r, int buffer, size_t offset, size_t size_bytes,
+                                  const std::string &where);
 
 // ---- gltf_material.cpp
 // Adds those of the materials that are used, and their textures.
@@ -111,6 +136,22 @@ size_t read_targets(reader &r, const std::vector<morph_lot> &lots, import_mesh &
 std::vector<record_morph_weight> morph_weights(reader &r, const std::vector<double> &from, size_t count,
                                                const std::string &where);
 
+// ---- gltf_target.cpp
+// What a channel changes, and what becomes of its numbers.
+struct channel_target {
+    protocol_channel_path path;
+    std::vector<uint32_t> objects; // one at least
+    uint32_t width;
+    size_t file_width; // numbers of a value in the file; less than `width`: the first one counts for all
+    int type;          // of the accessor of values
+    int node = -1;     // of the file, if its transform changes
+    float scale[4] = {1, 1, 1, 1}; // of each number, the last one of all further ones; then `offset` is added
+    float offset = 0;
+};
+// False: leave the channel out; a note says why if it is not for the file to be ignored.
+bool find_target(reader &r, const tinygltf::AnimationChannel &channel, const std::string &where,
+                 channel_target &found);
+
 // ---- gltf_clip.cpp
 void add_clips(reader &r);
 
@@ -126,18 +167,46 @@ struct parts {
 };
 parts node_parts(reader &r, size_t node);
 
+matrix matrix_of(const std::vector<double> &translation, const std::vector<double> &rotation,
+                 const std::vector<double> &scale); // of other lengths than 3, 4, 3: none
+// Fails where a number is not finite or beyond 1e12.
+void check_matrix(reader &r, const matrix &m, const std::string &where);
+
+// ---- gltf_instance.cpp
+// Where the node's mesh is shown, in the node's space; none: it is not instanced.
+std::vector<matrix> instances_of(reader &r, size_t node);
+
+// ---- gltf_variant.cpp
+// Tells which there are and finds the one that the user wants.
+void choose_variant(reader &r);
+// The primitive's material in that variant; -1: none.
+int material_of(const reader &r, const tinygltf::Primitive &primitive);
+
 // ---- gltf_node.cpp
 // Checks that the nodes are a forest and fills r.parents.
 void check_hierarchy(reader &r);
 void add_scene(reader &r);
+// What a light's colour is divided by: the disc that a sphere shows, 1 for a light without size.
+double light_disc(const tinygltf::Light &light);
 // Adds a node that is not part of what is shown, and those above it, without what hangs there; returns its
 // identifier.
 uint32_t add_hidden_node(reader &r, size_t node);
 
-// ---- values of extensions; absent or of another type: the default
+// ---- gltf_extension.cpp
+// Fails with the name of an extension that the file requires and that is not understood, and what to do.
+void check_required_extensions(reader &r);
+// One note lists the others that are not understood.
+void note_unknown_extensions(reader &r);
+
+// Values of extensions; absent or of another type: the default.
 const tinygltf::Value *extension(const tinygltf::ExtensionMap &extensions, const char *name);
 double number(const tinygltf::Value &object, const char *key, double otherwise);
 std::vector<double> numbers(const tinygltf::Value &object, const char *key);
+std::string text_of(const tinygltf::Value &object, const char *key);
+// A size or an offset; SIZE_MAX where it is negative or beyond 9e15.
+size_t whole_number(const tinygltf::Value &object, const char *key, size_t otherwise);
+// An index, -1 where there is none.
+int index_of(const tinygltf::Value &object, const char *key);
 // A number within the protocol's limits; beyond them it is cut, with a note.
 float limited(reader &r, const std::string &where, const char *what, double value, double minimum, double maximum);
 } // namespace gltf

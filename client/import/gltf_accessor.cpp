@@ -192,19 +192,30 @@ sparse_elements sparse_of(reader &r, int index, const elements &e, const std::st
 }
 } // namespace
 
+const unsigned char *buffer_bytes(reader &r, int buffer, size_t offset, size_t size_bytes,
+                                  const std::string &where)
+{
+    if (buffer < 0 || size_t(buffer) >= r.model.buffers.size())
+        fail(r, where, "it names buffer %d, which does not exist", buffer);
+    const std::vector<unsigned char> &data = r.model.buffers[size_t(buffer)].data;
+    if (offset > data.size() || size_bytes > data.size() - offset)
+        fail(r, where, "%zu bytes at %zu exceed the %zu bytes of buffers[%d]", size_bytes, offset, data.size(),
+             buffer);
+    return data.data() + offset;
+}
+
 const unsigned char *view_bytes(reader &r, int view, size_t &size_bytes, const std::string &where)
 {
     if (view < 0 || size_t(view) >= r.model.bufferViews.size())
         fail(r, where, "bufferViews[%d] does not exist", view);
+    const std::string here = where + ", " + place("bufferViews", size_t(view));
+    if (const std::vector<unsigned char> *decoded = decoded_view(r, view, here)) {
+        size_bytes = decoded->size();
+        return decoded->data();
+    }
     const tinygltf::BufferView &v = r.model.bufferViews[size_t(view)];
-    if (v.buffer < 0 || size_t(v.buffer) >= r.model.buffers.size())
-        fail(r, where, "bufferViews[%d] names buffer %d, which does not exist", view, v.buffer);
-    const std::vector<unsigned char> &data = r.model.buffers[size_t(v.buffer)].data;
-    if (v.byteOffset > data.size() || v.byteLength > data.size() - v.byteOffset)
-        fail(r, where, "bufferViews[%d] (%zu bytes at %zu) exceeds the %zu bytes of its buffer", view,
-             v.byteLength, v.byteOffset, data.size());
     size_bytes = v.byteLength;
-    return data.data() + v.byteOffset;
+    return buffer_bytes(r, v.buffer, v.byteOffset, v.byteLength, here);
 }
 
 size_t accessor_count(reader &r, int accessor, int type, const std::string &where)

@@ -31,54 +31,12 @@ struct builder {
     double end_s = 0;
     std::vector<float> floats = {};
     std::map<int, key_times> inputs = {}; // by accessor
-    // By input, output and width: where they begin; UINT32_MAX: they are no good, which one look is enough for.
-    std::map<std::tuple<int, int, uint32_t>, uint32_t> values = {};
-    std::map<int, unsigned> nodes = {}; // animated ones: bits of enum protocol_channel_path
+    // By input, output, width and what becomes of the numbers: where they begin; UINT32_MAX: they are no good,
+    // which one look is enough for.
+    std::map<std::tuple<int, int, uint32_t, std::array<float, 5>>, uint32_t> values = {};
+    std::set<std::pair<protocol_channel_path, uint32_t>> changed = {}; // of an object
+    std::map<int, unsigned> nodes = {}; // those whose transform changes: bits of enum protocol_channel_path
 };
-
-// ---- what is animated
-
-struct target {
-    protocol_channel_path path;
-    uint32_t object, width;
-    size_t file_width; // numbers of a value in the file
-    int type;          // of the accessor of values
-};
-
-// False: leave the channel out; a note says why if the file is at fault.
-bool find_target(builder &b, const tinygltf::AnimationChannel &channel, target &found)
-{
-    reader &r = b.r;
-    if (channel.target_path == "pointer" || channel.target_extensions.count("KHR_animation_pointer") > 0) {
-        import_note(r.scene, PROTOCOL_SEVERITY_WARNING, b.where.c_str(),
-                    "channels that point at properties (KHR_animation_pointer) are not played");
-        return false;
-    }
-    if (channel.target_node < 0 || size_t(channel.target_node) >= r.model.nodes.size())
-        return false; // glTF 2.0, 3.11: to be ignored
-    const size_t node = size_t(channel.target_node);
-    if (channel.target_path == "weights") {
-        const auto holder = r.mesh_nodes.find(node);
-        if (holder == r.mesh_nodes.end())
-            return false;
-        const shown_mesh &mesh = mesh_of(r, r.model.nodes[node].mesh);
-        found = {PROTOCOL_CHANNEL_NODE_WEIGHTS, holder->second, mesh.target_count, mesh.file_targets,
-                 TINYGLTF_TYPE_SCALAR};
-        return found.width > 0;
-    }
-    if (r.node_ids[node] == 0)
-        return false; // not part of what is shown
-    if (channel.target_path == "translation")
-        found = {PROTOCOL_CHANNEL_NODE_TRANSLATION, r.node_ids[node], 3, 3, TINYGLTF_TYPE_VEC3};
-    else if (channel.target_path == "rotation")
-        found = {PROTOCOL_CHANNEL_NODE_ROTATION, r.node_ids[node], 4, 4, TINYGLTF_TYPE_VEC4};
-    else if (channel.target_path == "scale")
-        found = {PROTOCOL_CHANNEL_NODE_SCALE, r.node_ids[node], 3, 3, TINYGLTF_TYPE_VEC3};
-    else
-        import_note(r.scene, PROTOCOL_SEVERITY_WARNING, b.where.c_str(), "a channel of the unknown path '%.40s'",
-                    channel.target_path.c_str());
-    return found.width > 0;
-}
 
 bool find_interpolation(const std::string &name, protocol_interpolation &found)
 {
@@ -169,8 +127,8 @@ uint32_t append(builder &b, const std::vector<float> &values)
 
 // The values of the kept keys; `parts` is 3 where a key has tangents. False: the file has not as many as it
 // should.
-bool read_values(builder &b, int accessor, const target &to, const key_times &keys, size_t key_count, size_t parts,
-                 std::vector<float> &out, const std::string &where)
+bool read_values(builder &b, int accessor, const channel_target &to, const key_times &keys, size_t key_count,
+                 size_t parts, std::vector<float> &out, const std::string &where)
 {
     const size_t components = to.type == TINYGLTF_TYPE_SCALAR ? 1 : to.width;
     const size_t count = accessor_count(b.r, accessor, to.type, where);
@@ -188,7 +146,9 @@ bool read_values(builder &b, int accessor, const target &to, const key_times &ke
     for (uint32_t key : keys.kept)
         for (size_t part = 0; part < parts; part++) {
             const float *from = all.data() + (key * parts + part) * to.file_width;
-            out.insert(out.end(), from, from + to.width);
+            const float offset = parts == 1 || part == 1 ? to.offset : 0; // a tangent has none
+            for (size_t i = 0; i < to.width; i++)
+                out.push_back(from[to.file_width < to.width ? 0 : i] * to.scale[std::min<size_t>(i, 3)] + offset);
         }
     if (all_usable(out))
         return true;
@@ -199,18 +159,19 @@ bool read_values(builder &b, int accessor, const target &to, const key_times &ke
 
 // ---- channels
 
-void send_channel(builder &b, const target &to, protocol_interpolation interpolation, uint32_t key_count,
-                  uint32_t first_time, uint32_t first_value)
+void send_channel(builder &b, protocol_channel_path path, uint32_t object, uint32_t width,
+                  protocol_interpolation interpolation, uint32_t key_count, uint32_t first_time,
+                  uint32_t first_value)
 {
     message_set_channel set = {};
 
     if (b.clip == 0)
         b.clip = import_reserve_id(b.r.scene, PROTOCOL_OBJECT_CLIP);
     set.clip = b.clip;
-    set.path = to.path;
-    set.object = to.object;
+    set.path = path;
+    set.object = object;
     set.interpolation = interpolation;
-    set.width = to.width;
+    set.width = width;
     set.key_count = key_count;
     set.first_time = first_time;
     set.first_value = first_value;
@@ -218,7 +179,7 @@ void send_channel(builder &b, const target &to, protocol_interpolation interpola
         throw failed();
 }
 
-void play(builder &b, const tinygltf::AnimationSampler &sampler, const target &to,
+void play(builder &b, const tinygltf::AnimationSampler &sampler, const channel_target &to,
           protocol_interpolation interpolation, const std::string &where)
 {
     const size_t parts = interpolation == PROTOCOL_INTERPOLATION_CUBIC_SPLINE ? 3 : 1;
@@ -226,7 +187,9 @@ void play(builder &b, const tinygltf::AnimationSampler &sampler, const target &t
 
     if (!keys || keys->times.empty())
         return;
-    const auto place_of_values = std::make_tuple(sampler.input, sampler.output, uint32_t(to.width * 4 + parts));
+    const auto place_of_values =
+        std::make_tuple(sampler.input, sampler.output, uint32_t(to.width * 4 + parts),
+                        std::array<float, 5>{to.scale[0], to.scale[1], to.scale[2], to.scale[3], to.offset});
     auto known = b.values.find(place_of_values);
     if (known == b.values.end()) {
         std::vector<float> values;
@@ -241,7 +204,10 @@ void play(builder &b, const tinygltf::AnimationSampler &sampler, const target &t
     uint32_t &first_time = b.inputs[sampler.input].first;
     if (first_time == UINT32_MAX)
         first_time = append(b, keys->times);
-    send_channel(b, to, interpolation, uint32_t(keys->times.size()), first_time, known->second);
+    for (uint32_t object : to.objects)
+        if (b.changed.emplace(to.path, object).second)
+            send_channel(b, to.path, object, to.width, interpolation, uint32_t(keys->times.size()), first_time,
+                         known->second);
     b.end_s = std::max(b.end_s, double(keys->times.back()));
     b.played++;
 }
@@ -249,10 +215,10 @@ void play(builder &b, const tinygltf::AnimationSampler &sampler, const target &t
 void add_channel(builder &b, size_t index)
 {
     const tinygltf::AnimationChannel &channel = b.source.channels[index];
-    target to = {};
+    channel_target to = {};
     protocol_interpolation interpolation;
 
-    if (!find_target(b, channel, to))
+    if (!find_target(b.r, channel, b.where, to))
         return;
     if (channel.sampler < 0 || size_t(channel.sampler) >= b.source.samplers.size()) {
         import_note(b.r.scene, PROTOCOL_SEVERITY_WARNING, b.where.c_str(),
@@ -266,16 +232,16 @@ void add_channel(builder &b, size_t index)
                     "a channel of the unknown interpolation '%.40s' is left out", sampler.interpolation.c_str());
         return;
     }
-    unsigned &seen = b.nodes[channel.target_node];
-    if (seen & 1u << to.path) {
+    if (b.changed.count({to.path, to.objects[0]}) > 0) {
         import_note(b.r.scene, PROTOCOL_SEVERITY_WARNING, where.c_str(),
-                    "a second channel of the same property of a node is left out");
+                    "a second channel of the same property of %s is left out",
+                    to.node >= 0 ? "a node" : "an object");
         return;
     }
     const uint32_t before = b.played;
     play(b, sampler, to, interpolation, where);
-    if (b.played > before)
-        seen |= 1u << to.path;
+    if (b.played > before && to.node >= 0)
+        b.nodes[to.node] |= 1u << to.path;
 }
 
 // The parts of a node's transform that a clip does not change are sent, too, so that no matrix need be decomposed.
@@ -295,8 +261,8 @@ void add_constants(builder &b, int node, unsigned seen)
             continue;
         const uint32_t first_time = append(b, {0.0f}), first_value = append(b, constant.second);
         const uint32_t width = uint32_t(constant.second.size());
-        send_channel(b, {constant.first, b.r.node_ids[size_t(node)], width, width, 0}, PROTOCOL_INTERPOLATION_STEP,
-                     1, first_time, first_value);
+        send_channel(b, constant.first, b.r.node_ids[size_t(node)], width, PROTOCOL_INTERPOLATION_STEP, 1,
+                     first_time, first_value);
     }
 }
 

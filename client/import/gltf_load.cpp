@@ -287,23 +287,34 @@ void load(reader &r, const unsigned char *bytes, size_t size_bytes)
 {
     const bool binary = size_bytes >= 4 && memcmp(bytes, "glTF", 4) == 0;
     std::vector<unsigned char> rebuilt;
-    std::string error;
+    std::string error, completed;
 
     if (binary) {
-        const chunks parts = cut_binary(r, bytes, size_bytes);
+        chunks parts = cut_binary(r, bytes, size_bytes);
         check_json_depth(r, parts.json, parts.json_bytes);
-        if (parts.json_bytes % 4 != 0 || parts.binary_bytes % 4 != 0 || parts.binary_bytes == 0 ||
-            parts.binary != parts.json + parts.json_bytes + 8) {
+        completed = complete_json(parts.json, parts.json_bytes, binary);
+        if (!completed.empty()) {
+            parts.json = reinterpret_cast<const unsigned char *>(completed.data());
+            parts.json_bytes = completed.size();
+        }
+        if (!completed.empty() || parts.json_bytes % 4 != 0 || parts.binary_bytes % 4 != 0 ||
+            parts.binary_bytes == 0 || parts.binary != parts.json + parts.json_bytes + 8) {
             rebuilt = rebuild_binary(parts);
             bytes = rebuilt.data();
             size_bytes = rebuilt.size();
         }
     } else {
         check_json_depth(r, bytes, size_bytes);
+        completed = complete_json(bytes, size_bytes, binary);
+        if (!completed.empty()) {
+            bytes = reinterpret_cast<const unsigned char *>(completed.data());
+            size_bytes = completed.size();
+        }
     }
     bool loaded = load_once(r, bytes, size_bytes, binary, error);
     for (int again = 0; !loaded && again < 16 && learn_buffer_size(r, error); again++)
         loaded = load_once(r, bytes, size_bytes, binary, error);
+    check_required_extensions(r); // an unknown one explains a failure better than the parser
     if (!loaded)
         fail(r, "", "%s", error.empty() ? "the file cannot be parsed" : one_line(error).substr(0, 400).c_str());
     if (!error.empty()) // it went on all the same

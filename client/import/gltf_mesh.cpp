@@ -183,15 +183,16 @@ void add_primitive(builder &b, const tinygltf::Primitive &primitive, size_t numb
                     "a primitive without positions is left out");
         return;
     }
-    if (primitive.material >= 0 && size_t(primitive.material) >= b.r.material_ids.size())
-        fail(b.r, where, "material %d does not exist", primitive.material);
+    const int material = material_of(b.r, primitive);
+    if (material >= 0 && size_t(material) >= b.r.material_ids.size())
+        fail(b.r, where, "material %d does not exist", material);
     const uint32_t lot = lot_of(b, primitive, where);
     range.first = uint32_t(b.indices.size() / 3);
     add_triangles(b, primitive, b.lots[lot], where);
     if (b.indices.size() / 3 > triangles_max)
         fail(b.r, b.where, "more than %llu triangles", static_cast<unsigned long long>(triangles_max));
     range.count = uint32_t(b.indices.size() / 3) - range.first;
-    range.material = primitive.material >= 0 ? b.r.material_ids[size_t(primitive.material)] : 0;
+    range.material = material >= 0 ? b.r.material_ids[size_t(material)] : 0;
     if (range.count > 0)
         b.ranges.push_back(range);
 }
@@ -355,9 +356,11 @@ const shown_mesh &mesh_of(reader &r, int mesh)
     const auto found = r.meshes.find(mesh);
     if (found != r.meshes.end())
         return found->second;
+    decode_draco(r, size_t(mesh));
     const tinygltf::Mesh &source = r.model.meshes[size_t(mesh)];
     builder b = {r, place("meshes", size_t(mesh)), source, r.skinned_meshes.count(mesh) > 0};
     build(b);
+    forget_draco(r);
     return r.meshes[mesh] = b.shown;
 }
 } // namespace gltf

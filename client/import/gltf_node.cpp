@@ -33,9 +33,8 @@ void give_size(reader &r, const tinygltf::Light &light, const std::string &where
         return;
     set.kind = PROTOCOL_LIGHT_SPHERE;
     set.size[0] = limited(r, where, "the light's radius", radius, 1e-6, 1e12);
-    const double disc = 3.14159265358979 * double(set.size[0]) * double(set.size[0]);
     for (float &one : set.colour)
-        one = limited(r, where, "the light's radiance", double(one) / disc, 0, 1e12);
+        one = limited(r, where, "the light's radiance", double(one) / light_disc(light), 0, 1e12);
 }
 
 // Candela become watts per steradian and lux watts per square metre number by number: the renderer works in one
@@ -67,7 +66,9 @@ uint32_t light_id(reader &r, int index, const std::string &where)
                     "a light of unknown type '%.32s' is left out", light.type.c_str());
         return 0;
     }
-    return import_add_light(r.scene, &set);
+    const uint32_t id = import_add_light(r.scene, &set);
+    r.light_ids[index].push_back(id);
+    return id;
 }
 
 uint32_t camera_id(reader &r, int index, const std::string &where)
@@ -125,7 +126,7 @@ std::vector<attachment> attachments_of(reader &r, size_t index)
     if (node.camera >= 0)
         found.push_back({PROTOCOL_NODE_CAMERA, camera_id(r, node.camera, where), " camera", 0, {}});
     if (const tinygltf::Value *lights = extension(node.extensions, "KHR_lights_punctual")) {
-        const uint32_t light = light_id(r, int(number(*lights, "light", -1)), where);
+        const uint32_t light = light_id(r, index_of(*lights, "light"), where);
         if (light != 0)
             found.push_back({PROTOCOL_NODE_LIGHT, light, " light", 0, {}});
     }
@@ -155,20 +156,37 @@ uint32_t add_node(reader &r, uint32_t parent, const matrix &m, const attachment 
     return id;
 }
 
-// A node may hold a mesh, a camera and a light at once; ours hold one thing, so the others hang below it.
+bool is_hidden(const tinygltf::Node &node)
+{
+    const tinygltf::Value *visibility = extension(node.extensions, "KHR_node_visibility");
+
+    return visibility && visibility->Has("visible") && visibility->Get("visible").IsBool() &&
+           !visibility->Get("visible").Get<bool>();
+}
+
+// A node may hold a mesh, a camera and a light at once, or a mesh many times; ours hold one thing, so the others
+// hang below it.
 uint32_t add_one(reader &r, size_t index, uint32_t parent)
 {
     const tinygltf::Node &node = r.model.nodes[index];
     const std::string name = name_of(r, node);
     const std::vector<attachment> found = attachments_of(r, index);
-    const bool single = found.size() == 1;
-    const uint32_t id = add_node(r, parent, node_matrix(r, index), single ? &found[0] : nullptr, name, false);
+    const std::vector<matrix> instances = node.mesh >= 0 ? instances_of(r, index) : std::vector<matrix>();
+    const bool single = found.size() == 1 && instances.empty();
+    const uint32_t id =
+        add_node(r, parent, node_matrix(r, index), single ? &found[0] : nullptr, name, is_hidden(node));
 
     r.node_ids[index] = id;
     for (const attachment &one : found) {
+        const bool is_mesh = one.kind == PROTOCOL_NODE_MESH;
+        if (is_mesh)
+            for (const matrix &instance : instances)
+                r.mesh_nodes[index].push_back(add_node(r, id, instance, &one, "", false));
+        if (is_mesh && !instances.empty())
+            continue;
         const uint32_t holder = single ? id : add_node(r, id, identity(), &one, name + one.suffix, false);
-        if (one.kind == PROTOCOL_NODE_MESH)
-            r.mesh_nodes[index] = holder;
+        if (is_mesh)
+            r.mesh_nodes[index].push_back(holder);
     }
     return id;
 }
@@ -217,8 +235,8 @@ void note_uses(reader &r, const tinygltf::Node &node, std::set<int> &used)
     if (node.mesh < 0 || size_t(node.mesh) >= r.model.meshes.size())
         return;
     for (const tinygltf::Primitive &primitive : r.model.meshes[size_t(node.mesh)].primitives)
-        if (primitive.material >= 0)
-            used.insert(primitive.material);
+        if (material_of(r, primitive) >= 0)
+            used.insert(material_of(r, primitive));
     if (node.skin >= 0)
         r.skinned_meshes.insert(node.mesh);
 }
@@ -242,6 +260,16 @@ template <typename visitor> void traverse(reader &r, const std::vector<int> &roo
     }
 }
 } // namespace
+
+double light_disc(const tinygltf::Light &light)
+{
+    const double radius = light.type == "point" ? number(light.extras, "radius", 0) : 0;
+
+    if (!(radius > 0))
+        return 1;
+    const double allowed = std::min(std::max(radius, 1e-6), 1e12);
+    return 3.14159265358979 * allowed * allowed;
+}
 
 void check_hierarchy(reader &r)
 {

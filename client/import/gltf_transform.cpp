@@ -9,27 +9,6 @@ namespace gltf
 {
 namespace
 {
-matrix from_parts(const std::vector<double> &t, const std::vector<double> &q, const std::vector<double> &s)
-{
-    matrix m = identity();
-
-    if (q.size() == 4) {
-        const double length = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
-        if (length > 0) {
-            const double x = q[0] / length, y = q[1] / length, z = q[2] / length, w = q[3] / length;
-            m[0] = 1 - 2 * (y * y + z * z), m[4] = 2 * (x * y - z * w), m[8] = 2 * (x * z + y * w);
-            m[1] = 2 * (x * y + z * w), m[5] = 1 - 2 * (x * x + z * z), m[9] = 2 * (y * z - x * w);
-            m[2] = 2 * (x * z - y * w), m[6] = 2 * (y * z + x * w), m[10] = 1 - 2 * (x * x + y * y);
-        }
-    }
-    for (size_t column = 0; column < 3 && s.size() == 3; column++)
-        for (size_t row = 0; row < 3; row++)
-            m[column * 4 + row] *= s[column];
-    for (size_t row = 0; row < 3 && t.size() == 3; row++)
-        m[12 + row] = t[row];
-    return m;
-}
-
 struct vector3 {
     double x, y, z;
 };
@@ -150,6 +129,34 @@ void to_rows(const matrix &m, float out[12])
             out[row * 4 + column] = float(m[column * 4 + row]);
 }
 
+matrix matrix_of(const std::vector<double> &t, const std::vector<double> &q, const std::vector<double> &s)
+{
+    matrix m = identity();
+
+    if (q.size() == 4) {
+        const double length = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+        if (length > 0) {
+            const double x = q[0] / length, y = q[1] / length, z = q[2] / length, w = q[3] / length;
+            m[0] = 1 - 2 * (y * y + z * z), m[4] = 2 * (x * y - z * w), m[8] = 2 * (x * z + y * w);
+            m[1] = 2 * (x * y + z * w), m[5] = 1 - 2 * (x * x + z * z), m[9] = 2 * (y * z - x * w);
+            m[2] = 2 * (x * z - y * w), m[6] = 2 * (y * z + x * w), m[10] = 1 - 2 * (x * x + y * y);
+        }
+    }
+    for (size_t column = 0; column < 3 && s.size() == 3; column++)
+        for (size_t row = 0; row < 3; row++)
+            m[column * 4 + row] *= s[column];
+    for (size_t row = 0; row < 3 && t.size() == 3; row++)
+        m[12 + row] = t[row];
+    return m;
+}
+
+void check_matrix(reader &r, const matrix &m, const std::string &where)
+{
+    for (double value : m)
+        if (!std::isfinite(value) || std::fabs(value) > 1e12)
+            fail(r, where, "a transform that is not finite or beyond 1e12");
+}
+
 matrix node_matrix(reader &r, size_t index)
 {
     const tinygltf::Node &node = r.model.nodes[index];
@@ -160,10 +167,8 @@ matrix node_matrix(reader &r, size_t index)
     else if (!node.matrix.empty())
         fail(r, place("nodes", index), "a matrix of %zu numbers", node.matrix.size());
     else
-        m = from_parts(node.translation, node.rotation, node.scale);
-    for (double value : m)
-        if (!std::isfinite(value) || std::fabs(value) > 1e12)
-            fail(r, place("nodes", index), "a transform that is not finite or beyond 1e12");
+        m = matrix_of(node.translation, node.rotation, node.scale);
+    check_matrix(r, m, place("nodes", index));
     return m;
 }
 

@@ -55,6 +55,10 @@ struct import_clip {
     float duration_s;
 };
 
+struct import_variant {
+    char name[IMPORT_NAME_MAX + 1];
+};
+
 /* Of a mesh or a set of spheres, in its own space. */
 struct import_bounds {
     enum protocol_node_kind kind;
@@ -69,6 +73,8 @@ struct import_scene {
     size_t blob_count, blob_capacity;
     struct import_clip *clips;
     size_t clip_count, clip_capacity;
+    struct import_variant *variants;
+    size_t variant_count, variant_capacity;
     struct import_bounds *bounds;
     size_t bounds_count, bounds_capacity;
     struct import_notice notes[IMPORT_NOTES_MAX];
@@ -76,7 +82,9 @@ struct import_scene {
     uint32_t notes_lost; /* distinct ones beyond IMPORT_NOTES_MAX, about */
     uint32_t last_id[PROTOCOL_OBJECT_COUNT];
     uint64_t blob_bytes;
-    char file[257]; /* the model's, as people named it; goes into `where` */
+    char file[257];      /* the model's, as people named it; goes into `where` */
+    const char *variant; /* of the materials, that the user wants; NULL: the file's choice. Readers of formats
+                            without variants need not look */
     bool failed;
     struct import_notice failure;
 };
@@ -123,6 +131,9 @@ uint32_t import_add_channel(struct import_scene *scene, const struct message_set
 /* Announces a clip to the user; `clip` 0: it cannot be played. */
 void import_list_clip(struct import_scene *scene, uint32_t clip, const char *name, uint32_t channels,
                       double duration_s);
+
+/* Announces a variant of the materials to the user. */
+void import_list_variant(struct import_scene *scene, const char *name);
 
 /* Arrays are malloc'd and taken whether it succeeds or not; those but positions and indices may be NULL. */
 struct import_mesh {

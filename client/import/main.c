@@ -31,13 +31,14 @@ struct options {
     uint32_t scene;
     const char *environment;
     double environment_degrees;
+    const char *variant;
     bool no_model;
     const char *model;
 };
 
 #define RADIANS_PER_DEGREE 0.017453292519943295
 
-enum { OPTION_FD = 256, OPTION_SCENE, OPTION_ENVIRONMENT, OPTION_ROTATION, OPTION_NO_MODEL };
+enum { OPTION_FD = 256, OPTION_SCENE, OPTION_ENVIRONMENT, OPTION_ROTATION, OPTION_VARIANT, OPTION_NO_MODEL };
 
 static const struct argp_option option_rows[] = {
     {"fd", OPTION_FD, "N", 0, "use this connected stream socket (required)", 0},
@@ -46,6 +47,7 @@ static const struct argp_option option_rows[] = {
      0},
     {"environment-rotation", OPTION_ROTATION, "DEGREES", 0,
      "turn it about +y by -360 to 360 (default 0: its middle column is +x)", 0},
+    {"variant", OPTION_VARIANT, "NAME", 0, "show the materials of this variant of a glTF model", 0},
     {"no-model", OPTION_NO_MODEL, NULL, 0, "send the environment only; MODEL is not needed", 0},
     {0}};
 
@@ -87,6 +89,9 @@ static error_t parse_option(int key, char *argument, struct argp_state *state)
         return 0;
     case OPTION_ROTATION:
         options->environment_degrees = parse_degrees(state, argument);
+        return 0;
+    case OPTION_VARIANT:
+        options->variant = argument;
         return 0;
     case OPTION_NO_MODEL:
         options->no_model = true;
@@ -206,6 +211,8 @@ static bool parse_model(struct import_scene *scene, struct files *files, const c
         return import_fail(scene, NULL, "the file is empty");
     if (is_gltf(name, bytes, size_bytes))
         return gltf_import(scene, files, bytes, size_bytes);
+    if (scene->variant)
+        return import_fail(scene, NULL, "only glTF has variants, so none can be called '%.100s'", scene->variant);
     if (has_ending(name, ".obj"))
         return obj_import(scene, files, bytes, size_bytes);
     if (has_ending(name, ".nff"))
@@ -337,6 +344,7 @@ int main(int argc, char **argv)
     argp_err_exit_status = EXIT_USAGE;
     argp_parse(&argp, argc, argv, 0, NULL, &options);
     import_scene_init(&scene, file_part(options.model ? options.model : options.environment));
+    scene.variant = options.variant;
     done = sender_init(&sender, options.socket, &scene) && run(&scene, &sender, &options, start_ns);
     if (!done)
         sender_failure(&sender);

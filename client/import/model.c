@@ -101,6 +101,7 @@ void import_scene_finish(struct import_scene *scene)
     free(scene->edits);
     free(scene->blobs);
     free(scene->clips);
+    free(scene->variants);
     free(scene->bounds);
     memset(scene, 0, sizeof(*scene));
 }

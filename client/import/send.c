@@ -256,6 +256,14 @@ bool sender_notes(struct sender *sender)
         if (!put(sender, 0, 0, &message))
             return false;
     }
+    for (size_t i = 0; i < scene->variant_count; i++) {
+        struct message message;
+
+        message_init(&message, MESSAGE_IMPORT_VARIANT);
+        message.import_variant.name = scene->variants[i].name;
+        if (!put(sender, 0, 0, &message))
+            return false;
+    }
     for (size_t i = 0; i < scene->bounds_count; i++) {
         struct message message;
 

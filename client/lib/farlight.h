@@ -176,6 +176,7 @@ struct fl_load_options {
     const char *scene_name;        /* .. and by what name; NULL: the model's file name */
     struct fl_import *started;     /* by fl_import_start; the load takes it over, also when it fails. `model`,
                                       its environment and `timeout_ms` are those given at its start */
+    const char *variant;           /* of the model's materials, by name; NULL: the file's choice */
 };
 
 /* The options' strings must live until the load. Destroy an importer that is not loaded. */
@@ -269,6 +270,10 @@ struct fl_model_object {
     bool has_bounds;  /* a node that shows a mesh or spheres: */
     float lower_world[3], upper_world[3];
 };
+/* A set of materials that fl_load_options.variant may name. */
+struct fl_variant_info {
+    char name[129];
+};
 struct fl_model_info {
     uint64_t nodes, meshes, triangles, sphere_sets, spheres, discs, materials, textures, lights;
     uint64_t skins, joints, morph_targets; /* joints of all skins, targets of all meshes */
@@ -286,6 +291,8 @@ struct fl_model_info {
     /* Of all nodes with meshes or spheres, as they are before clips, skins and morph targets move anything. */
     bool has_bounds;
     float lower_world[3], upper_world[3];
+    size_t variant_count;
+    struct fl_variant_info *variants; /* at most 65536 */
 };
 /* options->note is not called: the notes are in the result. `interrupt_fd` as in the connection's options. */
 FL_API struct fl_model_info *fl_model_info(const struct fl_load_options *options, int interrupt_fd,

@@ -36,7 +36,7 @@ bool fl_importer_start(struct fl_importer *importer, const struct fl_load_option
     if ((options->model && !check_file(options->model, error)) ||
         (options->environment && !check_file(options->environment, error)))
         return false;
-    const char *arguments[10] = {"--scene", "1"};
+    const char *arguments[12] = {"--scene", "1"};
     char degrees[48];
     size_t count = 2;
     if (options->environment) {
@@ -44,6 +44,10 @@ bool fl_importer_start(struct fl_importer *importer, const struct fl_load_option
         arguments[count++] = options->environment;
         snprintf(degrees, sizeof(degrees), "--environment-rotation=%.9g", options->environment_degrees);
         arguments[count++] = degrees;
+    }
+    if (options->variant) {
+        arguments[count++] = "--variant";
+        arguments[count++] = options->variant;
     }
     if (!options->model) {
         arguments[count++] = "--no-model";

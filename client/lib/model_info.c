@@ -9,11 +9,12 @@
 #include <string.h>
 
 #define NOTES_MAX 1000u
+#define VARIANTS_MAX 65536u
 
 struct listing {
     struct fl_importer importer;
     struct fl_model_info *info;
-    size_t note_capacity;
+    size_t note_capacity, variant_capacity;
     struct fl_relay relay; /* the same rules as towards a daemon */
     uint64_t revision;
     struct fl_boxes boxes;
@@ -32,6 +33,20 @@ static bool add_note(struct listing *listing, const struct message_import_note *
     made->severity = note->severity;
     snprintf(made->where, sizeof(made->where), "%s", note->where);
     snprintf(made->text, sizeof(made->text), "%s", note->text);
+    return true;
+}
+
+static bool add_variant(struct listing *listing, const struct message_import_variant *variant,
+                        struct fl_error *error)
+{
+    struct fl_model_info *info = listing->info;
+    if (info->variant_count >= VARIANTS_MAX)
+        return true;
+    if (!fl_grow((void **)&info->variants, &listing->variant_capacity, info->variant_count,
+                 sizeof(*info->variants), error))
+        return false;
+    struct fl_variant_info *made = &info->variants[info->variant_count++];
+    snprintf(made->name, sizeof(made->name), "%s", variant->name);
     return true;
 }
 
@@ -70,6 +85,8 @@ static bool list(struct listing *listing, const struct message *message, struct 
     case MESSAGE_SET_LIGHT:
         info->lights++;
         break;
+    case MESSAGE_IMPORT_VARIANT:
+        return add_variant(listing, &message->import_variant, error);
     case MESSAGE_IMPORT_NOTE:
         return add_note(listing, &message->import_note, error);
     default:
@@ -204,6 +221,7 @@ void fl_model_info_destroy(struct fl_model_info *info)
     free(info->cameras);
     free(info->clips);
     free(info->notes);
+    free(info->variants);
     free(info->node_list);
     free(info->material_list);
     free(info->light_list);

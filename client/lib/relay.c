@@ -29,6 +29,7 @@ static enum fl_relay_verdict kind_of(enum message_type type)
     case MESSAGE_IMPORT_NOTE:
     case MESSAGE_IMPORT_BOUNDS:
     case MESSAGE_IMPORT_CLIP:
+    case MESSAGE_IMPORT_VARIANT:
     case MESSAGE_IMPORT_PROGRESS:
     case MESSAGE_IMPORT_DONE:
         return FL_RELAY_LOCAL;

@@ -298,6 +298,7 @@ static void fill(struct command_line *line)
     viewer->model = job->model;
     viewer->environment = job->environment;
     viewer->environment_degrees = job->environment_degrees;
+    viewer->variant = job->variant;
     viewer->scene_name = job->scene;
     viewer->view = job->options;
     viewer->view.views_across = viewer->view.views_down = 1;

@@ -12,6 +12,7 @@ struct session_options {
     const char *server, *key_file, *link; /* as of fl_connect_options */
     const char *model, *environment;      /* that are loaded .. */
     double environment_degrees;
+    const char *variant;
     const char *scene_name; /* .. or, not NULL, the scene to attach to */
     int interrupt_fd;
     void (*note)(void *user, const struct fl_note *note); /* of the first load; called from another thread */

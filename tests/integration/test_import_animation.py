@@ -233,9 +233,10 @@ class Written(importer.Written):
                 (with_sampler(interpolation="WAVES"), "unknown interpolation 'WAVES'"),
                 (named(9), "sampler that does not exist"), (named(-2), "sampler that does not exist"),
                 (File().channel(None, "pointer", [0, 1], move,
-                                extensions={"KHR_animation_pointer": {"pointer": "/nodes/0/scale"}}), None),
-                (File().channel(0, "pointer", [0, 1], move,
-                                extensions={"KHR_animation_pointer": {"pointer": "/nodes/0/scale"}}), "animation_pointer"),
+                                extensions={"KHR_animation_pointer": {"pointer": "/cameras/0/perspective/yfov"}}),
+                 "'/cameras/0/perspective/yfov', a property that cannot be animated here"),
+                (File().channel(None, "pointer", [0, 1], move,
+                                extensions={"KHR_animation_pointer": {"pointer": "/nodes/77/scale"}}), ""),
                 (File().channel(1, "translation", [0, 1], move), "a second channel")):
             with self.subTest(expected):
                 result = self.run_file(made.channel(1, "translation", [0, 2], [(3, 0, 0), (4, 0, 0)]))

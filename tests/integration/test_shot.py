@@ -15,7 +15,8 @@ EXAMPLES = {
     "stills": {
         "$schema": "https://example.org/shot.schema.json",
         "description": "all settings",
-        "model": "teapot.glb", "environment": "sky.hdr", "environment_rotation": 90, "background": "#10a0ff", "camera": 0,
+        "model": "teapot.glb", "environment": "sky.hdr", "environment_rotation": 90, "variant": "red",
+        "background": "#10a0ff", "camera": 0,
         "frames": "1-240:2", "fps": 23.976, "shard": "3/8", "size": [64, 48], "samples": 4, "depth": 0, "seed": 7,
         "exposure": -1.5, "tone_map": "aces", "shutter": 0.5, "filter": "gaussian", "tracer": "bvh",
         "bvh_bounds": "sphere", "bvh_rays": 2, "ldc_resolution": 512, "ldc_block": 4, "ldc_build": "lists",

@@ -67,6 +67,7 @@ class Tracers(farlight_test.Case):
         self.assertEqual(others("farlight-view", "--tracer", "nai"), ["naive"])
         self.assertEqual(others("farlight-view", "--headl"), ["--headless"])
         self.assertEqual(others("farlight-import", "--env"), ["--environment", "--environment-rotation"])
+        self.assertEqual(others("farlight-import", "--va"), ["--variant"])
         self.assertEqual(others("farlight-export", "--full"), ["--full-metadata"])
         self.assertEqual(others("farlight-video", "--fo"), ["--folder"])
 
