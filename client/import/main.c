@@ -31,13 +31,14 @@ struct options {
     uint32_t scene;
     const char *environment;
     double environment_degrees;
+    double point_size; /* 0: chosen by the points */
     bool no_model;
     const char *model;
 };
 
 #define RADIANS_PER_DEGREE 0.017453292519943295
 
-enum { OPTION_FD = 256, OPTION_SCENE, OPTION_ENVIRONMENT, OPTION_ROTATION, OPTION_NO_MODEL };
+enum { OPTION_FD = 256, OPTION_SCENE, OPTION_ENVIRONMENT, OPTION_ROTATION, OPTION_POINT_SIZE, OPTION_NO_MODEL };
 
 static const struct argp_option option_rows[] = {
     {"fd", OPTION_FD, "N", 0, "use this connected stream socket (required)", 0},
@@ -46,6 +47,8 @@ static const struct argp_option option_rows[] = {
      0},
     {"environment-rotation", OPTION_ROTATION, "DEGREES", 0,
      "turn it about +y by -360 to 360 (default 0: its middle column is +x)", 0},
+    {"point-size", OPTION_POINT_SIZE, "METRES", 0,
+     "show points without faces as spheres of this diameter (default: by their distances)", 0},
     {"no-model", OPTION_NO_MODEL, NULL, 0, "send the environment only; MODEL is not needed", 0},
     {0}};
 
@@ -71,6 +74,16 @@ static double parse_degrees(struct argp_state *state, const char *text)
     return degrees;
 }
 
+static double parse_point_size(struct argp_state *state, const char *text)
+{
+    char *end;
+    const double size = strtod(text, &end);
+
+    if (end == text || *end != '\0' || !(size > 0 && size <= 1e6))
+        argp_error(state, "--point-size: '%s' is not a number above 0, up to 1e6", text);
+    return size;
+}
+
 static error_t parse_option(int key, char *argument, struct argp_state *state)
 {
     struct options *options = state->input;
@@ -87,6 +100,9 @@ static error_t parse_option(int key, char *argument, struct argp_state *state)
         return 0;
     case OPTION_ROTATION:
         options->environment_degrees = parse_degrees(state, argument);
+        return 0;
+    case OPTION_POINT_SIZE:
+        options->point_size = parse_point_size(state, argument);
         return 0;
     case OPTION_NO_MODEL:
         options->no_model = true;
@@ -184,6 +200,23 @@ static bool contains(const unsigned char *bytes, size_t size_bytes, const char *
     return memmem(bytes, size_bytes, text, strlen(text)) != NULL;
 }
 
+/* Whether the letters behind some point are those of an image's name; archives have names unpacked at their end.
+ */
+static bool contains_image_name(const unsigned char *bytes, size_t size_bytes)
+{
+    static const char *const endings[] = {"png", "jpg", "jpe", "tga", "bmp", "tif", "gif",
+                                          "hdr", "exr", "web", "dds", "psd", "ppm"};
+    const unsigned char *at = bytes, *end = bytes + size_bytes;
+
+    while ((at = memchr(at, '.', (size_t)(end - at)))) {
+        at++;
+        for (size_t i = 0; i < sizeof(endings) / sizeof(endings[0]); i++) /* a NUL is behind the last byte */
+            if (strncasecmp((const char *)at, endings[i], 3) == 0)
+                return true;
+    }
+    return false;
+}
+
 /* By the bytes alone, for nothing may be parsed yet. JSON can write the letters of "images" as \u0069 and so on.
  */
 static bool may_name_images(const char *name, const unsigned char *bytes, size_t size_bytes)
@@ -193,14 +226,28 @@ static bool may_name_images(const char *name, const unsigned char *bytes, size_t
     if (is_aff(name)) /* what it includes may name some, too */
         return contains(bytes, size_bytes, "texturecoords") || contains(bytes, size_bytes, "tt") ||
                contains(bytes, size_bytes, ".aff") || contains(bytes, size_bytes, ".nff");
+    if (assimp_format_of(name))
+        return assimp_format_of(name)->may_name_images && contains_image_name(bytes, size_bytes);
     return has_ending(name, ".obj") && contains(bytes, size_bytes, "mtllib");
 }
 
-static bool parse_model(struct import_scene *scene, struct files *files, const char *path,
+/* The endings of all formats, for people. */
+static const char *known_endings(char out[256])
+{
+    size_t used = (size_t)snprintf(out, 256, ".gltf, .glb, .obj, .nff, .aff");
+
+    for (size_t i = 0; assimp_format_at(i) && used < 240; i++)
+        used += (size_t)snprintf(out + used, 256 - used, "%s%s", assimp_format_at(i + 1) ? ", " : " and ",
+                                 assimp_format_at(i)->ending);
+    return out;
+}
+
+static bool parse_model(struct import_scene *scene, struct files *files, const struct options *options,
                         const unsigned char *bytes, size_t size_bytes)
 {
-    const char *name = file_part(path);
+    const char *name = file_part(options->model);
     const char *dot = strrchr(name, '.');
+    char endings[256];
 
     if (size_bytes == 0)
         return import_fail(scene, NULL, "the file is empty");
@@ -212,8 +259,10 @@ static bool parse_model(struct import_scene *scene, struct files *files, const c
         return nff_import(scene, bytes, size_bytes);
     if (is_aff(name))
         return aff_import(scene, files, bytes, size_bytes);
-    return import_fail(scene, NULL, "unknown format %s; known are .gltf, .glb, .obj, .nff and .aff",
-                       dot ? dot : "(no ending)");
+    if (assimp_format_of(name))
+        return assimp_import(scene, files, assimp_format_of(name), options->point_size, bytes, size_bytes);
+    return import_fail(scene, NULL, "unknown format %.40s; known are %s", dot ? dot : "(no ending)",
+                       known_endings(endings));
 }
 
 /* The protocol's middle column is -z. */
@@ -253,7 +302,7 @@ static bool import_all(struct import_scene *scene, struct files *files, struct s
 
     if (options->model) {
         imported = sender_progress(sender, size_bytes, 0, "parsing") &&
-                   parse_model(scene, files, options->model, bytes, size_bytes);
+                   parse_model(scene, files, options, bytes, size_bytes);
         if (imported && scene->edit_count == 0)
             import_note(scene, PROTOCOL_SEVERITY_WARNING, NULL, "it contains nothing that can be shown");
     }
@@ -279,6 +328,9 @@ static bool read_and_import(struct import_scene *scene, struct files *files, str
     }
     if (options->environment || (bytes && may_name_images(file_part(options->model), bytes, size_bytes)))
         texture_load();
+    if (bytes && !is_gltf(file_part(options->model), bytes, size_bytes) &&
+        assimp_format_of(file_part(options->model)))
+        assimp_load();
     imported = enter_sandbox(scene, options) && import_all(scene, files, sender, options, bytes, size_bytes);
     free(bytes);
     return imported;
@@ -323,11 +375,14 @@ static bool run(struct import_scene *scene, struct sender *sender, const struct 
 
 int main(int argc, char **argv)
 {
-    static const struct argp argp = {
-        option_rows, parse_option,
-        "MODEL",     "Turn MODEL (glTF 2.0, GLB, OBJ, NFF, AFF) into messages of farlight's protocol.",
-        NULL,        NULL,
-        NULL};
+    static const struct argp argp = {option_rows,
+                                     parse_option,
+                                     "MODEL",
+                                     "Turn MODEL (glTF 2.0, GLB, OBJ, NFF, AFF, PLY, STL, FBX, COLLADA, 3MF and "
+                                     "more) into messages of farlight's protocol.",
+                                     NULL,
+                                     NULL,
+                                     NULL};
     static struct import_scene scene; /* the table of notes is too large for the stack of a careful program */
     uint64_t start_ns = monotonic_now_ns();
     struct options options = {.socket = -1, .scene = 1};
