@@ -199,7 +199,7 @@ struct cli_channel {
 struct cli_job {
     const char *scene; /* a shared scene of the server, in place of the model */
     const char *model, *server, *key_file, *link, *environment, *output, *camera, *keys_file, *trace_file;
-    double environment_degrees; /* as of fl_load_options */
+    double environment_degrees, point_size; /* as of fl_load_options */
     enum cli_image image;
     struct cli_output
         outputs[CLI_OUTPUTS_MAX]; /* destinations of the pictures: `output`, or several of a script */

@@ -28,6 +28,7 @@ enum key {
     KEY_SIZE,
     KEY_ENVIRONMENT,
     KEY_ENVIRONMENT_ROTATION,
+    KEY_POINT_SIZE,
     KEY_BACKGROUND,
     KEY_DENOISE,
     KEY_CAMERA,
@@ -81,6 +82,8 @@ static const struct argp_option special[] = {
      CLI_GROUP_OUTPUT},
     {"environment-rotation", KEY_ENVIRONMENT_ROTATION, "DEGREES", 0,
      "Turn it about +y by -360 to 360 (default 0: its middle column is +x)", CLI_GROUP_OUTPUT},
+    {"point-size", KEY_POINT_SIZE, "METRES", 0,
+     "Show points without faces as spheres of this diameter (default: by their distances)", CLI_GROUP_OUTPUT},
     {"background", KEY_BACKGROUND, "NAME|#RRGGBB", 0,
      "Behind all surfaces: the environment (default), transparent, or a colour such as '#ffffff'",
      CLI_GROUP_OUTPUT},
@@ -276,6 +279,8 @@ static error_t set_option(struct cli_job *job, int key, const char *field, const
         return 0;
     case KEY_ENVIRONMENT_ROTATION:
         return cli_set_environment_rotation(job, field, value);
+    case KEY_POINT_SIZE:
+        return set_real(job, field, value, 1e-6, 1e6, &job->point_size);
     case KEY_BACKGROUND:
         return cli_set_background(job, field, value);
     case KEY_DENOISE:

@@ -49,6 +49,7 @@ bool cli_loading_begin(struct cli_loading *loading, struct fl_error *error)
     loading->load = (struct fl_load_options){.model = job->model,
                                              .environment = job->environment,
                                              .environment_degrees = job->environment_degrees,
+                                             .point_size = job->point_size,
                                              .note = on_note,
                                              .progress = on_progress,
                                              .user = loading,

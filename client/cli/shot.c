@@ -202,9 +202,10 @@ static bool apply_members(const struct shot_reader *reader, const struct shot_va
     const struct shot_value model = shot_member(root, "model"), environment = shot_member(root, "environment"),
                             background = shot_member(root, "background"),
                             rotation = shot_member(root, "environment_rotation"),
-                            camera = shot_member(root, "camera"), clips = shot_member(root, "clips"),
-                            output = shot_member(root, "output"), outputs = shot_member(root, "outputs"),
-                            about = shot_member(root, "description"), schema = shot_member(root, "$schema");
+                            points = shot_member(root, "point_size"), camera = shot_member(root, "camera"),
+                            clips = shot_member(root, "clips"), output = shot_member(root, "output"),
+                            outputs = shot_member(root, "outputs"), about = shot_member(root, "description"),
+                            schema = shot_member(root, "$schema");
     const struct shot_value *const texts[] = {&about, &schema};
     for (size_t i = 0; i < 2; i++)
         if (texts[i]->value && !json_is_string(texts[i]->value))
@@ -213,6 +214,7 @@ static bool apply_members(const struct shot_reader *reader, const struct shot_va
         (environment.value && !shot_path(reader, &environment, &job->environment)) ||
         (background.value && !apply_background(reader, &background)) ||
         (rotation.value && !shot_number(reader, &rotation, -360, 360, &job->environment_degrees)) ||
+        (points.value && !shot_number(reader, &points, 1e-6, 1e6, &job->point_size)) ||
         (camera.value && !shot_camera(reader, &camera)) || (clips.value && !apply_clips(reader, &clips)))
         return false;
     for (size_t i = 0; i < GROUP_COUNT; i++) {
@@ -240,7 +242,7 @@ bool cli_shot_apply(struct cli_shot *shot, struct cli_job *job, const struct cli
     static const char *const others[] = {
         "$schema",    "description", "model",   "environment", "environment_rotation",
         "background", "camera",      "clips",   "lights",      "materials",
-        "nodes",      "output",      "outputs", NULL};
+        "nodes",      "output",      "outputs", "point_size",  NULL};
     const struct shot_reader reader = {.shot = shot, .job = job, .given = given, .set = set, .user = user};
     const struct shot_value root = {.value = shot->json.root};
     const char *known[SHOT_SETTINGS_MAX + sizeof(others) / sizeof(others[0])];

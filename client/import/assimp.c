@@ -22,7 +22,6 @@ static const struct assimp_format formats[] = {
     {.ending = ".off", .name = "OFF", .metres = 1},
     {.ending = ".ply", .name = "PLY", .metres = 1, .may_name_images = true},
     {.ending = ".stl", .name = "STL", .z_up = true, .metres = 1, .has_facets = true},
-    {.ending = ".x", .name = "DirectX", .metres = 1, .may_name_images = true},
     {.ending = ".x3d", .name = "X3D", .metres = 1, .may_name_images = true},
 };
 

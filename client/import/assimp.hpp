@@ -6,6 +6,7 @@
 
 #include "assimp.h"
 #include "formats.h"
+#include "grouping.h"
 
 #include <assimp/scene.h>
 
@@ -34,12 +35,11 @@ struct reader {
     const aiScene *source = nullptr;
     double metres = 1; // of a unit, when the scene is there
     std::vector<uint32_t> material_ids = {};
-    std::map<std::vector<unsigned>, shown_mesh> meshes = {};          // by places in the scene's list
-    std::map<std::string, uint32_t> node_ids = {};                    // by name: the first one
+    std::map<std::vector<unsigned>, shown_mesh> meshes = {};               // by places in the scene's list
+    std::map<std::string, std::pair<uint32_t, const aiNode *>> nodes = {}; // by name: the first one
     std::map<std::string, std::pair<uint32_t, uint32_t>> morphs = {}; // by node's or mesh's name: node, targets
-    uint32_t root = 0;
-    uint64_t budget = POLYGON_WORK;
-    static constexpr uint64_t POLYGON_WORK = 2000000000ull;
+    uint32_t root = 0; // the first node: where bones without one are held
+    uint64_t budget = POLYGON_BUDGET;
 };
 
 [[noreturn]] void fail(reader &r, const std::string &where, const char *format, ...)

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
+#include <set>
 
 namespace assimp
 {
@@ -22,6 +23,7 @@ struct builder {
     uint32_t played = 0;
     double end_s = 0;
     std::vector<float> floats = {};
+    std::set<uint32_t> moved = {}, morphed = {}; // nodes that have their channels
 };
 
 // A channel under construction: keys whose times ascend.
@@ -87,19 +89,32 @@ keys read_rotations(const builder &b, const aiQuatKey *from, unsigned count)
 
 void add_node_channels(builder &b, const aiNodeAnim &from)
 {
-    const auto node = b.r.node_ids.find(text(from.mNodeName));
+    const auto node = b.r.nodes.find(text(from.mNodeName));
 
-    if (node == b.r.node_ids.end()) {
+    if (node == b.r.nodes.end()) {
         import_note(b.r.scene, PROTOCOL_SEVERITY_WARNING, b.where.c_str(),
                     "a channel names a node that does not exist and is left out");
         return;
     }
-    send(b, PROTOCOL_CHANNEL_NODE_TRANSLATION, node->second, 3,
-         read_vectors(b, from.mPositionKeys, from.mNumPositionKeys));
-    send(b, PROTOCOL_CHANNEL_NODE_ROTATION, node->second, 4,
-         read_rotations(b, from.mRotationKeys, from.mNumRotationKeys));
-    send(b, PROTOCOL_CHANNEL_NODE_SCALE, node->second, 3,
-         read_vectors(b, from.mScalingKeys, from.mNumScalingKeys));
+    const uint32_t id = node->second.first;
+    keys translation = read_vectors(b, from.mPositionKeys, from.mNumPositionKeys);
+    keys rotation = read_rotations(b, from.mRotationKeys, from.mNumRotationKeys);
+    keys scale = read_vectors(b, from.mScalingKeys, from.mNumScalingKeys);
+    if ((translation.times.empty() && rotation.times.empty() && scale.times.empty()) || !b.moved.insert(id).second)
+        return;
+    // What a clip does not change is sent, too, so that no matrix need be decomposed.
+    aiVector3D scaled, moved;
+    aiQuaternion turned;
+    node->second.second->mTransformation.Decompose(scaled, turned, moved);
+    if (translation.times.empty())
+        translation.add(0, {moved.x, moved.y, moved.z});
+    if (rotation.times.empty())
+        rotation.add(0, {turned.x, turned.y, turned.z, turned.w});
+    if (scale.times.empty())
+        scale.add(0, {scaled.x, scaled.y, scaled.z});
+    send(b, PROTOCOL_CHANNEL_NODE_TRANSLATION, id, 3, translation);
+    send(b, PROTOCOL_CHANNEL_NODE_ROTATION, id, 4, rotation);
+    send(b, PROTOCOL_CHANNEL_NODE_SCALE, id, 3, scale);
 }
 
 // A key holds the weights of some targets, by their numbers; of the others they are 0.
@@ -129,7 +144,8 @@ void add_morph_channel(builder &b, const aiMeshMorphAnim &from)
             if (key.mValues[j] < width && std::fabs(key.mWeights[j]) <= 1e6)
                 of.values[of.values.size() - width + key.mValues[j]] = float(key.mWeights[j]);
     }
-    send(b, PROTOCOL_CHANNEL_NODE_WEIGHTS, found->second.first, width, of);
+    if (b.morphed.insert(found->second.first).second)
+        send(b, PROTOCOL_CHANNEL_NODE_WEIGHTS, found->second.first, width, of);
 }
 
 void add_clip(reader &r, unsigned index)

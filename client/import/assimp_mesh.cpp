@@ -2,7 +2,6 @@
 // The library has a mesh for each material. Those of one node that nothing deforms become one again, with a range
 // of triangles for each, so that a body with several materials stays closed.
 #include "assimp.hpp"
-#include "grouping.h"
 
 #include <algorithm>
 #include <cmath>

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <cstring>
 
 namespace assimp
@@ -141,30 +142,58 @@ attachment camera_of(reader &r, const aiCamera &from)
             looking(from.mLookAt, from.mUp, from.mPosition), " camera"};
 }
 
-// These formats have a white surface show the light's colour: hence the factor pi, as for NFF.
+// Whether an FBX file is of a Blender whose lights have watts: 2.80 on.
+bool has_watts(const reader &r)
+{
+    const aiMetadata *all = r.source->mMetaData;
+    int version = 0;
+
+    for (unsigned i = 0; all && i < all->mNumProperties; i++) {
+        if (text(all->mKeys[i]) != "SourceAsset_Generator" || all->mValues[i].mType != AI_AISTRING ||
+            !all->mValues[i].mData)
+            continue;
+        const std::string generator = text(*static_cast<const aiString *>(all->mValues[i].mData));
+        int minor = 0;
+        if (sscanf(generator.c_str(), "Blender (stable FBX IO) - %d.%d", &version, &minor) == 2)
+            version = version * 100 + minor;
+    }
+    return version >= 280;
+}
+
+// What a light of the colour 1 sends. These formats have a white surface show the light's colour: hence the factor
+// pi, as for NFF. An FBX light's fall-off is left to programs, which do without, but for those that mean watts.
+double strength_of(reader &r, const aiLight &from, protocol_light_kind &kind)
+{
+    const bool is_fbx = strcmp(r.format->ending, ".fbx") == 0, is_point = kind == PROTOCOL_LIGHT_POINT;
+    const double constant = from.mAttenuationConstant > 0 ? double(from.mAttenuationConstant) : 1;
+
+    if (is_fbx && has_watts(r))
+        return kind == PROTOCOL_LIGHT_DIRECTIONAL ? 1 : 1 / (4 * pi);
+    if (kind == PROTOCOL_LIGHT_DIRECTIONAL)
+        return pi;
+    if (from.mAttenuationQuadratic > 0 && !(is_fbx && is_point))
+        return pi / double(from.mAttenuationQuadratic) * r.metres * r.metres;
+    if (is_point)
+        kind = PROTOCOL_LIGHT_STEADY;
+    if (!is_point || from.mAttenuationLinear > 0)
+        import_note(r.scene, PROTOCOL_SEVERITY_WARNING, text(from.mName).c_str(),
+                    "the light falls off otherwise than the file says");
+    return pi / constant;
+}
+
 attachment light_of(reader &r, const aiLight &from)
 {
     const std::string name = text(from.mName);
-    const bool squared = from.mAttenuationQuadratic > 0;
-    const double constant = from.mAttenuationConstant > 0 ? double(from.mAttenuationConstant) : 1;
-    double strength = pi / constant;
     message_set_light set = {};
 
     if (from.mType == aiLightSource_AMBIENT || from.mType == aiLightSource_UNDEFINED) {
         import_note(r.scene, PROTOCOL_SEVERITY_WARNING, name.c_str(), "ambient light is left out");
         return {PROTOCOL_NODE_LIGHT, 0, 0, {}, ""};
     }
-    if (from.mType == aiLightSource_DIRECTIONAL)
-        set.kind = PROTOCOL_LIGHT_DIRECTIONAL;
-    else if (from.mType == aiLightSource_SPOT)
-        set.kind = PROTOCOL_LIGHT_SPOT;
-    else
-        set.kind = squared ? PROTOCOL_LIGHT_POINT : PROTOCOL_LIGHT_STEADY;
-    if (squared && set.kind != PROTOCOL_LIGHT_DIRECTIONAL)
-        strength = pi / double(from.mAttenuationQuadratic) * r.metres * r.metres;
-    else if (set.kind == PROTOCOL_LIGHT_SPOT || from.mAttenuationLinear > 0)
-        import_note(r.scene, PROTOCOL_SEVERITY_WARNING, name.c_str(),
-                    "the light falls off otherwise than the file says");
+    set.kind = from.mType == aiLightSource_DIRECTIONAL ? PROTOCOL_LIGHT_DIRECTIONAL
+               : from.mType == aiLightSource_SPOT      ? PROTOCOL_LIGHT_SPOT
+                                                       : PROTOCOL_LIGHT_POINT;
+    const double strength = strength_of(r, from, set.kind);
     if (set.kind == PROTOCOL_LIGHT_SPOT) {
         set.outer_cone = cut(double(from.mAngleOuterCone) / 2, 0, 1.5707);
         set.inner_cone = cut(double(from.mAngleInnerCone) / 2, 0, double(set.outer_cone));
@@ -231,7 +260,7 @@ uint32_t add_one(walk &w, const aiNode &node, uint32_t parent)
                 found.end());
     const bool single = found.size() == 1 && is_identity(found[0].placed);
     const uint32_t id = add_node(r, parent, node.mTransformation, single ? &found[0] : nullptr, name);
-    r.node_ids.emplace(name, id);
+    r.nodes.emplace(name, std::make_pair(id, &node));
     std::vector<uint32_t> holders;
     for (const attachment &one : found)
         holders.push_back(single ? id : add_node(r, id, one.placed, &one, name + one.suffix));

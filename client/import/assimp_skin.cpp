@@ -58,9 +58,9 @@ void add_skin(reader &r, const aiMesh &from, uint32_t skin)
 
     for (unsigned j = 0; joints && joint_from_mesh && j < from.mNumBones; j++) {
         const aiBone *bone = from.mBones[j];
-        const auto node = bone ? r.node_ids.find(text(bone->mName)) : r.node_ids.end();
-        joints[j] = node == r.node_ids.end() ? r.root : node->second;
-        if (node == r.node_ids.end())
+        const auto node = bone ? r.nodes.find(text(bone->mName)) : r.nodes.end();
+        joints[j] = node == r.nodes.end() ? r.root : node->second.first;
+        if (node == r.nodes.end())
             import_note(r.scene, PROTOCOL_SEVERITY_WARNING, name.c_str(), "a bone has no node and stands still");
         const float *rows = bone ? bone->mOffsetMatrix[0] : nullptr; // 4 x 4, the last row being 0 0 0 1
         const bool usable =

@@ -37,13 +37,17 @@ bool fl_importer_start(struct fl_importer *importer, const struct fl_load_option
         (options->environment && !check_file(options->environment, error)))
         return false;
     const char *arguments[10] = {"--scene", "1"};
-    char degrees[48];
+    char degrees[48], point_size[48];
     size_t count = 2;
     if (options->environment) {
         arguments[count++] = "--environment";
         arguments[count++] = options->environment;
         snprintf(degrees, sizeof(degrees), "--environment-rotation=%.9g", options->environment_degrees);
         arguments[count++] = degrees;
+    }
+    if (options->point_size > 0) {
+        snprintf(point_size, sizeof(point_size), "--point-size=%.9g", options->point_size);
+        arguments[count++] = point_size;
     }
     if (!options->model) {
         arguments[count++] = "--no-model";

@@ -77,6 +77,7 @@ static struct fl_scene *come_to_scene(struct session *session, struct fl_error *
     const struct fl_load_options load = {.model = options->model,
                                          .environment = options->environment,
                                          .environment_degrees = options->environment_degrees,
+                                         .point_size = options->point_size,
                                          .note = on_note,
                                          .progress = on_progress,
                                          .user = session,

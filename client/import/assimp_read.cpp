@@ -66,7 +66,45 @@ void check_ply(reader &r, const unsigned char *bytes, size_t size_bytes)
     }
 }
 
+// The library cuts lines at this length, and reads on behind the end of what it has.
+void check_off(reader &r, const unsigned char *bytes, size_t size_bytes)
+{
+    constexpr size_t line_max = 4000;
+    const unsigned char *const end = bytes + size_bytes;
+
+    for (const unsigned char *at = bytes; at < end;) {
+        const void *found = memchr(at, '\n', size_t(end - at));
+        const unsigned char *stop = found ? static_cast<const unsigned char *>(found) : end;
+        if (size_t(stop - at) > line_max)
+            fail(r, "",
+                 "a line of %zu characters; up to %zu are allowed: that is a polygon of some hundred corners",
+                 size_t(stop - at), line_max);
+        at = stop + 1;
+    }
+}
+
+// This version passes over cameras without a name, which COLLADA does not ask for. Empty: there is nothing to
+// mend.
+std::string named_cameras(const unsigned char *bytes, size_t size_bytes)
+{
+    const std::string tag = "<camera ", all(reinterpret_cast<const char *>(bytes), size_bytes);
+    std::string mended;
+    size_t copied = 0;
+
+    for (size_t at = all.find(tag); at != std::string::npos; at = all.find(tag, at + tag.size())) {
+        const size_t name = all.find("name=", at);
+        if (name != std::string::npos && name < all.find('>', at))
+            continue;
+        mended.append(all, copied, at + tag.size() - copied).append("name=\"\" ");
+        copied = at + tag.size();
+    }
+    return copied > 0 ? mended.append(all, copied, std::string::npos) : mended;
+}
+
 // ---- what the library says
+
+const char *const too_large =
+    "the file asks for more memory than a model may have: it is broken, or should be made of parts";
 
 bool begins(const char *words, const char *with)
 {
@@ -76,8 +114,7 @@ bool begins(const char *words, const char *with)
 [[noreturn]] void explain(reader &r, const char *said)
 {
     if (begins(said, "std::bad_alloc") || begins(said, "vector::") || begins(said, "basic_string::"))
-        fail(r, "",
-             "the file asks for more memory than a model may have: it is broken, or should be made of parts");
+        fail(r, "", "%s", too_large);
     if (strstr(said, "old format version"))
         fail(r, "", "%s; write it again with a newer version, or as glTF", said);
     fail(r, "", "the %s file cannot be read: %s; if other programs can, write it with one of them as glTF",
@@ -103,6 +140,19 @@ void import(reader &r, const unsigned char *bytes, size_t size_bytes)
         fail(r, "", "%s", reason);
     if (strcmp(r.format->ending, ".ply") == 0)
         check_ply(r, bytes, size_bytes);
+    if (strcmp(r.format->ending, ".off") == 0)
+        check_off(r, bytes, size_bytes);
+    std::string mended;
+    if (strcmp(r.format->ending, ".dae") == 0) {
+        mended = named_cameras(bytes, size_bytes);
+        if (memmem(bytes, size_bytes, "<morph ", 7))
+            import_note(r.scene, PROTOCOL_SEVERITY_WARNING, "",
+                        "meshes with morph targets of COLLADA files are not shown; write it as glTF");
+    }
+    if (!mended.empty()) {
+        bytes = reinterpret_cast<const unsigned char *>(mended.data());
+        size_bytes = mended.size();
+    }
     r.source = owner.library->read(r.format->ending, r.format, bytes, size_bytes, &owner.keep, reason);
     if (!r.source || !r.source->mRootNode)
         explain(r, reason);
@@ -123,7 +173,7 @@ extern "C" bool assimp_import(struct import_scene *scene, struct files *files, c
     } catch (const assimp::failed &) {
         // said already
     } catch (const std::bad_alloc &) {
-        import_fail(scene, nullptr, "out of memory");
+        import_fail(scene, nullptr, "%s", assimp::too_large);
     } catch (const std::exception &exception) {
         import_fail(scene, nullptr, "the file cannot be parsed: %s", exception.what());
     } catch (...) {
