@@ -565,7 +565,7 @@ $(B)/tests/fuzz/fuzz_warp: FUZZ_LIBS = -lm
 $(addprefix $(B)/tests/fuzz/fuzz_,aff assimp gltf nff obj): $(READERS_OBJ)
 $(addprefix $(B)/tests/fuzz/fuzz_,aff assimp gltf nff obj): FUZZ_LIBS = $(READERS_LIBS)
 # OpenImageIO loses memory with broken images; the importer lives for one model only.
-run-fuzz-assimp run-fuzz-gltf run-fuzz-obj: FUZZ_FLAGS = -detect_leaks=0
+run-fuzz-gltf run-fuzz-obj: FUZZ_FLAGS = -detect_leaks=0
 .PHONY: fuzz fuzz-keep $(addprefix run-fuzz-,$(FUZZERS)) $(addprefix keep-fuzz-,$(FUZZERS))
 ifeq ($(config),fuzz)
 fuzz: $(addprefix run-fuzz-,$(FUZZERS))

@@ -52,6 +52,9 @@ std::string text(const aiString &from);
 // sRGB to linear light, cut to 0..1.
 float linear(float value);
 
+// ---- assimp_check.cpp: what the library would not survive, before it sees the file
+void check_bytes(reader &r, const unsigned char *bytes, size_t size_bytes);
+
 // ---- assimp_scene.cpp
 void add_scene(reader &r);
 

@@ -17,6 +17,15 @@
 #include <memory>
 #include <string>
 
+#if defined(__has_feature)
+#if __has_feature(address_sanitizer)
+#define LEAKS_ARE_SOUGHT
+#endif
+#endif
+#if defined(__SANITIZE_ADDRESS__) || defined(LEAKS_ARE_SOUGHT)
+#include <sanitizer/lsan_interface.h>
+#endif
+
 namespace
 {
 class model_stream : public Assimp::IOStream
@@ -117,6 +126,10 @@ const aiScene *read(const char *name, const assimp_format *format, const unsigne
 const aiScene *read_guarded(const char *name, const assimp_format *format, const unsigned char *bytes,
                             size_t size_bytes, void **keep, char reason[ASSIMP_REASON_BYTES])
 {
+#if defined(__SANITIZE_ADDRESS__) || defined(LEAKS_ARE_SOUGHT)
+    const __lsan::ScopedDisabler
+        disabled; // it loses memory with broken files; the importer lives for one model only
+#endif
     *keep = nullptr;
     try {
         return read(name, format, bytes, size_bytes, keep, reason);

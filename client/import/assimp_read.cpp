@@ -51,38 +51,6 @@ namespace
 {
 // ---- before the library sees the file
 
-// What its head says that follows takes at least a byte each: the library would make room for it first.
-void check_ply(reader &r, const unsigned char *bytes, size_t size_bytes)
-{
-    const std::string head(reinterpret_cast<const char *>(bytes), std::min<size_t>(size_bytes, 1 << 16));
-    const size_t end = head.find("end_header");
-
-    for (size_t at = head.find("element "); at < end; at = head.find("element ", at + 1)) {
-        char name[64];
-        unsigned long long count;
-        if (sscanf(head.c_str() + at, "element %63s %llu", name, &count) == 2 && count > size_bytes)
-            fail(r, "", "its head promises %llu elements '%s', but the file has %zu bytes", count, name,
-                 size_bytes);
-    }
-}
-
-// The library cuts lines at this length, and reads on behind the end of what it has.
-void check_off(reader &r, const unsigned char *bytes, size_t size_bytes)
-{
-    constexpr size_t line_max = 4000;
-    const unsigned char *const end = bytes + size_bytes;
-
-    for (const unsigned char *at = bytes; at < end;) {
-        const void *found = memchr(at, '\n', size_t(end - at));
-        const unsigned char *stop = found ? static_cast<const unsigned char *>(found) : end;
-        if (size_t(stop - at) > line_max)
-            fail(r, "",
-                 "a line of %zu characters; up to %zu are allowed: that is a polygon of some hundred corners",
-                 size_t(stop - at), line_max);
-        at = stop + 1;
-    }
-}
-
 // This version passes over cameras without a name, which COLLADA does not ask for. Empty: there is nothing to
 // mend.
 std::string named_cameras(const unsigned char *bytes, size_t size_bytes)
@@ -138,10 +106,7 @@ void import(reader &r, const unsigned char *bytes, size_t size_bytes)
 
     if (!owner.library)
         fail(r, "", "%s", reason);
-    if (strcmp(r.format->ending, ".ply") == 0)
-        check_ply(r, bytes, size_bytes);
-    if (strcmp(r.format->ending, ".off") == 0)
-        check_off(r, bytes, size_bytes);
+    check_bytes(r, bytes, size_bytes);
     std::string mended;
     if (strcmp(r.format->ending, ".dae") == 0) {
         mended = named_cameras(bytes, size_bytes);

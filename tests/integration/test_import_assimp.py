@@ -344,7 +344,8 @@ class Formats(importer.Written):
                 "a: 0,0,1,0,0,1,0,0,1,0,0,1\n}\nNormals: *12 {\na: 0,0,0,0,0,0,0,0,0,0,0,0\n}\n}\n"
                 'Deformer: 12, "Deformer::", "BlendShape" {\nVersion: 100\n}\n'
                 'Deformer: 13, "SubDeformer::up", "BlendShapeChannel" {\nVersion: 100\nDeformPercent: 0\nFullWeights: *1 {\na: 100\n}\n}\n'
-                'AnimationStack: 40, "AnimStack::lift", "" {\n}\nAnimationLayer: 41, "AnimLayer::base", "" {\n}\n'
+                f'AnimationStack: 40, "AnimStack::lift", "" {{\nProperties70:  {{\nP: "LocalStop", "KTime", "Time", "",{2 * second}\n}}\n}}\n'
+                'AnimationLayer: 41, "AnimLayer::base", "" {\n}\n'
                 'AnimationCurveNode: 42, "AnimCurveNode::DeformPercent", "" {\nProperties70:  {\n'
                 'P: "d|DeformPercent", "Number", "", "A",0\n}\n}\n'
                 'AnimationCurve: 43, "AnimCurve::", "" {\nDefault: 0\nKeyVer: 4008\n'
@@ -365,8 +366,11 @@ class Formats(importer.Written):
     def test_faults_say_what_is_wrong(self):
         for name, model, expected in (
                 ("model.xyz", "1 2 3\n", "unknown format .xyz; known are .gltf, .glb, .obj, .nff, .aff, .3ds, .3mf, .ac, .dae, .fbx"),
-                ("model.ply", "no head\n", "the PLY file cannot be read: "), ("model.stl", "", "the file is empty"),
-                ("many.ply", ply().replace("vertex 4", "vertex 4000000000"), "promises 4000000000 elements 'vertex'"),
+                ("model.ply", "no head\n", "begins with the line 'ply'"), ("model.stl", "", "the file is empty"),
+                ("endless.ply", ply().replace("end_header", "comment"), "line 10: '0 0 0' is no statement"),
+                ("cut.ply", ply()[:150], "does not end within 150 bytes"),
+                ("word.ply", ply().replace("float z", "flow z"), "line 6: 'property flow z' is no statement"),
+                ("many.ply", ply().replace("vertex 4", "vertex 4000000000"), "line 3: it promises 4000000000 elements 'vertex'"),
                 ("short.stl", stl_bytes(CORNERS)[:120], "the STL file cannot be read: "),
                 ("corners.ply", ply([(math.cos(i), math.sin(i), 0) for i in range(70000)], (range(70000),)).replace(
                     "list uchar", "list uint"), "a polygon of 70000 corners; 3 to 65536 are allowed"),
