@@ -85,6 +85,30 @@ void check_off(reader &r, const unsigned char *bytes, size_t size_bytes)
         at = stop + 1;
     }
 }
+// Elements within elements: the library descends by recursion, until it has no stack.
+void check_xml(reader &r, const unsigned char *bytes, size_t size_bytes)
+{
+    constexpr size_t depth_max = 2000;
+    const unsigned char *const end = bytes + size_bytes;
+    size_t depth = 0;
+
+    for (const unsigned char *at = bytes; at < end; at++) {
+        if (*at == '<' && end - at >= 4 && memcmp(at, "<!--", 4) == 0) {
+            const void *stop = memmem(at, size_t(end - at), "-->", 3);
+            if (!stop)
+                return;
+            at = static_cast<const unsigned char *>(stop);
+        } else if (*at == '<' && end - at >= 2 && at[1] == '/') {
+            depth -= depth > 0;
+        } else if (*at == '<' && end - at >= 2 && at[1] != '!' && at[1] != '?') {
+            depth++;
+        } else if (*at == '/' && end - at >= 2 && at[1] == '>') {
+            depth -= depth > 0;
+        }
+        if (depth > depth_max)
+            fail(r, "", "elements are nested more than %zu deep", depth_max);
+    }
+}
 } // namespace
 
 void check_bytes(reader &r, const unsigned char *bytes, size_t size_bytes)
@@ -93,5 +117,7 @@ void check_bytes(reader &r, const unsigned char *bytes, size_t size_bytes)
         check_ply(r, bytes, size_bytes);
     if (strcmp(r.format->ending, ".off") == 0)
         check_off(r, bytes, size_bytes);
+    if (strcmp(r.format->ending, ".dae") == 0 || strcmp(r.format->ending, ".x3d") == 0)
+        check_xml(r, bytes, size_bytes);
 }
 } // namespace assimp

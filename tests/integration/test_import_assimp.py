@@ -10,8 +10,8 @@ import unittest
 import zipfile
 
 import importer
-from farlight_test import Case, daemon_pose, farlight, read_png
-from importer import (SET_CAMERA, SET_CHANNEL, SET_LIGHT, SET_MATERIAL, SET_MESH, SET_NODE, SET_SKIN, SET_SPHERES, SET_TEXTURE)
+from farlight_test import SHARED_SCENES, Case, daemon_pose, farlight, needs_shared_scenes, read_png
+from importer import (SET_CAMERA, SET_LIGHT, SET_MATERIAL, SET_MESH, SET_NODE, SET_SKIN, SET_SPHERES, SET_TEXTURE)
 
 RED, GREEN, BLUE = (255, 0, 0), (0, 255, 0), (0, 0, 255)
 CORNERS = ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0))
@@ -272,7 +272,7 @@ class Formats(importer.Written):
                       "<source>f</source></sampler2D></newparam>")
         self.write("model/red.ppm", PPM)
         self.write("secret.ppm", PPM)
-        self.write("model/.hidden/red2.ppm", PPM) if (self.folder / "model/.hidden").mkdir() is None else None
+        self.write("model/.hidden/red2.ppm", PPM)
         for path, found in (("red.ppm", True), ("C:\\art\\red.ppm", True), ("textures/red.ppm", True), ("../secret.ppm", False),
                             (".hidden/red2.ppm", False)):
             with self.subTest(path):
@@ -301,8 +301,8 @@ class Formats(importer.Written):
         eye = next(node for node in result.of(SET_NODE) if node["kind"] == 4)
         self.assert_near(in_world(result, eye, (0, 0, 0)), (0, 0, 0.5))
         self.assert_near(in_world(result, eye, (0, 0, -1)), (0, 0, 0.4))
-        sun, lamp = sorted(result.of(SET_LIGHT), key=lambda light: light["kind"], reverse=True) \
-            if result.of(SET_LIGHT)[0]["kind"] > result.of(SET_LIGHT)[1]["kind"] else result.of(SET_LIGHT)
+        lights = {light["name"]: light for light in result.of(SET_LIGHT)}
+        sun, lamp = lights["day"], lights["night"]
         self.assert_near(sun["colour"], [math.pi * x for x in (1, 0.5, 0.25)])
         # 0.25 d^2 of units is 25 d^2 of metres: at 1 m a white surface shows 1 / 25.
         self.assert_near(lamp["colour"], [math.pi / 25] * 3)
@@ -376,6 +376,7 @@ class Formats(importer.Written):
                     "list uchar", "list uint"), "a polygon of 70000 corners; 3 to 65536 are allowed"),
                 ("corners.off", off([(math.cos(i), math.sin(i), 0) for i in range(70000)]), "up to 4000 are allowed"),
                 ("deep.dae", dae('<node>' * 300 + QUAD + '</node>' * 300), "nodes are nested more than 254 deep"),
+                ("deeper.dae", dae("<node>" * 100000 + QUAD + "</node>" * 100000), "elements are nested more than 2000 deep"),
                 ("old.fbx", fbx(CORNERS).replace("7300", "6100"), "write it again with a newer version, or as glTF"),
                 ("broken.3mf", three_mf(CORNERS)[:-30], "the 3MF file cannot be read: ")):
             with self.subTest(name):
@@ -386,6 +387,21 @@ class Formats(importer.Written):
     def test_too_little_memory_is_said(self):
         model = ply([(0, 0, 0)], (), form="binary_little_endian").replace(b"vertex 1\n", b"vertex 1000000\n") + bytes(12 * 999999)
         self.assertIn("more memory than a model may have", self.import_text("model.ply", model, 1, memory=64 << 20).text())
+
+
+REFUSED = {"blender_279_ball_6100_ascii.fbx": "old format version", "skin_and_morph.dae": "Unable to resolve library reference"}
+
+
+@needs_shared_scenes
+class Published(Case):
+    def test_published_files_are_read(self):
+        paths = sorted(path for kind in ("3mf", "dae", "fbx", "ply", "stl") for path in (SHARED_SCENES / "formats" / kind).iterdir())
+        for path, result in importer.import_files([str(path) for path in paths]):
+            with self.subTest(path):
+                expected = REFUSED.get(os.path.basename(path))
+                self.assertEqual((result.status, result.faults), (1 if expected else 0, []), result.text())
+                self.assertEqual(importer.inconsistencies(result), [])
+                self.assertIn(expected or "", result.text())
 
 
 class Pictures(Case):
