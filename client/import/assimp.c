@@ -42,6 +42,21 @@ const struct assimp_format *assimp_format_at(size_t number)
     return number < FORMAT_COUNT ? &formats[number] : NULL;
 }
 
+bool assimp_may_name_images(const struct assimp_format *format, const unsigned char *bytes, size_t size_bytes)
+{
+    static const char *const endings[] = {"png", "jpg", "jpe", "tga", "bmp", "tif", "gif",
+                                          "hdr", "exr", "web", "dds", "psd", "ppm"};
+    const unsigned char *at = bytes, *const end = bytes + size_bytes;
+
+    while (format->may_name_images && (at = memchr(at, '.', (size_t)(end - at)))) {
+        at++;
+        for (size_t i = 0; i < sizeof(endings) / sizeof(endings[0]); i++)
+            if (strncasecmp((const char *)at, endings[i], 3) == 0)
+                return true;
+    }
+    return false;
+}
+
 #pragma weak assimp_library
 /* NULL, unless the module is linked to the program itself. */
 static const struct assimp_library *library = &assimp_library;

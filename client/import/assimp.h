@@ -27,6 +27,9 @@ struct assimp_format {
 
 /* By the ending of a file's name; NULL: it is none of them. */
 const struct assimp_format *assimp_format_of(const char *name);
+/* By the letters behind its points alone; archives have the names that they hold unpacked at their end. `bytes`
+ * has a NUL behind it. */
+bool assimp_may_name_images(const struct assimp_format *format, const unsigned char *bytes, size_t size_bytes);
 /* By number, NULL behind the last one. */
 const struct assimp_format *assimp_format_at(size_t number);
 

@@ -200,23 +200,6 @@ static bool contains(const unsigned char *bytes, size_t size_bytes, const char *
     return memmem(bytes, size_bytes, text, strlen(text)) != NULL;
 }
 
-/* Whether the letters behind some point are those of an image's name; archives have names unpacked at their end.
- */
-static bool contains_image_name(const unsigned char *bytes, size_t size_bytes)
-{
-    static const char *const endings[] = {"png", "jpg", "jpe", "tga", "bmp", "tif", "gif",
-                                          "hdr", "exr", "web", "dds", "psd", "ppm"};
-    const unsigned char *at = bytes, *end = bytes + size_bytes;
-
-    while ((at = memchr(at, '.', (size_t)(end - at)))) {
-        at++;
-        for (size_t i = 0; i < sizeof(endings) / sizeof(endings[0]); i++) /* a NUL is behind the last byte */
-            if (strncasecmp((const char *)at, endings[i], 3) == 0)
-                return true;
-    }
-    return false;
-}
-
 /* By the bytes alone, for nothing may be parsed yet. JSON can write the letters of "images" as \u0069 and so on.
  */
 static bool may_name_images(const char *name, const unsigned char *bytes, size_t size_bytes)
@@ -227,7 +210,7 @@ static bool may_name_images(const char *name, const unsigned char *bytes, size_t
         return contains(bytes, size_bytes, "texturecoords") || contains(bytes, size_bytes, "tt") ||
                contains(bytes, size_bytes, ".aff") || contains(bytes, size_bytes, ".nff");
     if (assimp_format_of(name))
-        return assimp_format_of(name)->may_name_images && contains_image_name(bytes, size_bytes);
+        return assimp_may_name_images(assimp_format_of(name), bytes, size_bytes);
     return has_ending(name, ".obj") && contains(bytes, size_bytes, "mtllib");
 }
 
