@@ -54,6 +54,7 @@ SERVER_LOADED_PKGS := libavcodec libavutil
 CLIENT_PKGS := libzstd libsodium libxxhash libturbojpeg jansson
 IMPORT_PKGS := tinygltf tinyobjloader draco jansson libsodium libseccomp
 TEXTURE_PKGS := OpenImageIO
+ASSIMP_PKGS := assimp
 EXPORT_PKGS := libpng OpenEXR libseccomp
 IMAGES_PKGS := OpenImageIO libjxl
 VIDEO_PKGS := libavformat libavcodec libavutil libseccomp
@@ -85,7 +86,8 @@ CLI_SRC := $(call sources,client/cli,c)
 IMPORT_C := $(call sources,client/import,c)
 # Modules of the helper programs need hundreds of libraries, and are loaded only when they are used.
 TEXTURE_CXX := client/import/texture.cpp
-IMPORT_CXX := $(filter-out $(TEXTURE_CXX),$(call sources,client/import,cpp))
+ASSIMP_CXX := client/import/assimp_library.cpp
+IMPORT_CXX := $(filter-out $(TEXTURE_CXX) $(ASSIMP_CXX),$(call sources,client/import,cpp))
 EXPORT_C := $(call sources,client/output,c)
 IMAGES_CXX := $(call sources,client/output/library,cpp)
 EXPORT_CXX := $(filter-out $(IMAGES_CXX),$(call sources,client/output,cpp))
@@ -131,7 +133,7 @@ VIEWER_OBJ := $(call obj,$(VIEWER_C) $(addprefix client/cli/,image_path.c interr
 SONAME := libfarlight.so.$(firstword $(subst ., ,$(VERSION)))
 LIB_PIC := $(patsubst %.c,$(B)/pic/%.o,$(LIB_SRC) $(WARP_SRC) $(PROTOCOL_SRC) $(SEALED_SRC) $(PIXELS_SRC) $(COMMON_SRC))
 
-MODULES := $(B)/farlight-textures.so $(B)/farlight-images.so
+MODULES := $(B)/farlight-textures.so $(B)/farlight-assimp.so $(B)/farlight-images.so
 PROGRAMS := $(B)/farlightd $(B)/farlight $(B)/farlight-import $(B)/farlight-export $(B)/farlight-video $(B)/farlight-view
 
 .PHONY: all
@@ -161,7 +163,7 @@ SERVER_CFLAGS = $(eval SERVER_CFLAGS := $(call pkg_cflags,$(SERVER_PKGS) $(SERVE
 CLIENT_CFLAGS = $(eval CLIENT_CFLAGS := $(call pkg_cflags,$(CLIENT_PKGS)))$(CLIENT_CFLAGS)
 TEST_CFLAGS = $(eval TEST_CFLAGS := $(call pkg_cflags,$(TEST_PKGS)))$(TEST_CFLAGS)
 # Others' C++ headers are system headers: our warnings are for our own files.
-IMPORT_CFLAGS = $(eval IMPORT_CFLAGS := $(patsubst -I%,-isystem %,$(call pkg_cflags,$(IMPORT_PKGS) $(TEXTURE_PKGS))))$(IMPORT_CFLAGS)
+IMPORT_CFLAGS = $(eval IMPORT_CFLAGS := $(patsubst -I%,-isystem %,$(call pkg_cflags,$(IMPORT_PKGS) $(TEXTURE_PKGS) $(ASSIMP_PKGS))))$(IMPORT_CFLAGS)
 VIDEO_CFLAGS = $(eval VIDEO_CFLAGS := $(patsubst -I%,-isystem %,$(call pkg_cflags,$(VIDEO_PKGS))))$(VIDEO_CFLAGS)
 VIEWER_CFLAGS = $(eval VIEWER_CFLAGS := $(patsubst -I%,-isystem %,$(call pkg_cflags,$(VIEWER_PKGS))))$(VIEWER_CFLAGS)
 EXPORT_CFLAGS = $(eval EXPORT_CFLAGS := $(patsubst -I%,-isystem %,$(call pkg_cflags,$(EXPORT_PKGS) $(IMAGES_PKGS))))$(EXPORT_CFLAGS)
@@ -215,10 +217,12 @@ $(B)/farlight: $(CLI_OBJ) $(LIB_OBJ) $(PROTOCOL_OBJ)
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(CLIENT_LIBS) -o $@
 $(B)/helper.a: $(HELPER_OBJ)
 	$(call say,AR)rm -f $@ && $(AR) rcs $@ $^
-$(B)/farlight-import: $(IMPORT_OBJ) $(PROTOCOL_OBJ) | $(B)/farlight-textures.so
+$(B)/farlight-import: $(IMPORT_OBJ) $(PROTOCOL_OBJ) | $(B)/farlight-textures.so $(B)/farlight-assimp.so
 	$(call say,LINK)$(CXX) $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(IMPORT_LIBS) -o $@
 $(B)/farlight-textures.so: $(patsubst %.cpp,$(B)/pic/%.opp,$(TEXTURE_CXX))
 	$(call say,LINK)$(CXX) -shared $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(call pkg_libs,$(TEXTURE_PKGS)) -o $@
+$(B)/farlight-assimp.so: $(patsubst %.cpp,$(B)/pic/%.opp,$(ASSIMP_CXX))
+	$(call say,LINK)$(CXX) -shared $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(call pkg_libs,$(ASSIMP_PKGS)) -o $@
 $(B)/farlight-export: $(EXPORT_OBJ) $(PROTOCOL_OBJ) | $(B)/farlight-images.so
 	$(call say,LINK)$(CXX) $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(EXPORT_LIBS) -o $@
 $(B)/farlight-images.so: $(patsubst %.cpp,$(B)/pic/%.opp,$(IMAGES_CXX))
@@ -278,8 +282,8 @@ $(B)/tests/fuzz/kept_%.o: tests/fuzz/fuzz_%.c
 	@mkdir -p $(@D)
 	$(call say,CC)$(CC) $(CPPFLAGS_ALL) $(INCLUDES) $(OPT) $(CFLAGS_ALL) $(WARN_C) $(CPPFLAGS) $(CFLAGS) -c $< -o $@
 # The importer without its main() and its sandbox.
-READERS_OBJ := $(filter-out $(addprefix $(B)/client/import/,main.o send.o),$(IMPORT_OBJ)) $(call obj,$(TEXTURE_CXX))
-READERS_LIBS = $(IMPORT_LIBS) $(call pkg_libs,$(TEXTURE_PKGS))
+READERS_OBJ := $(filter-out $(addprefix $(B)/client/import/,main.o send.o),$(IMPORT_OBJ)) $(call obj,$(TEXTURE_CXX) $(ASSIMP_CXX))
+READERS_LIBS = $(IMPORT_LIBS) $(call pkg_libs,$(TEXTURE_PKGS) $(ASSIMP_PKGS))
 # Sessions that begin, break and end, with memory that runs out.
 $(B)/tests/unit/fault_tests: $(SERVING_OBJ) $(B)/tests/fuzz/recorded_session.o
 $(B)/tests/unit/fault_tests: TEST_LIBS += $(SERVING_WRAP) -Wl,--wrap=malloc,--wrap=calloc,--wrap=realloc
@@ -320,7 +324,7 @@ $(LOSING_DAEMON): $(B)/tests/tools/lost_gpu.o $(B)/server/main.o $(SERVER_OBJ) $
 # ---- what people call ------------------------------------------------------------------------------
 BUILD_PACKAGES := gcc g++ make pkg-config libepoxy-dev libegl-dev libgl-dev libcglm-dev libturbojpeg0-dev libzstd-dev \
     libsodium-dev libxxhash-dev libinih-dev libjansson-dev libjemalloc-dev libseccomp-dev libopenimageio-dev libpng-dev libopenexr-dev libjxl-dev libtinygltf-dev \
-    libtinyobjloader-dev libdraco-dev libmeshoptimizer-dev libembree-dev libavcodec-dev libavformat-dev libavutil-dev libswscale-dev libsdl2-dev libsdl2-ttf-dev fonts-dejavu-core libegl1 libgl1-mesa-dri
+    libtinyobjloader-dev libdraco-dev libmeshoptimizer-dev libassimp-dev libembree-dev libavcodec-dev libavformat-dev libavutil-dev libswscale-dev libsdl2-dev libsdl2-ttf-dev fonts-dejavu-core libegl1 libgl1-mesa-dri
 TEST_PACKAGES := libcmocka-dev python3 python3-jsonschema ffmpeg xvfb gnuplot-nox
 LINT_PACKAGES := clang clang-format glslang-tools python3
 # A second driver stack: OpenGL over Vulkan, on the CPU. The validation sees what it does.
@@ -559,8 +563,8 @@ $(B)/tests/fuzz/fuzz_frame: $(LIB_OBJ)
 $(B)/tests/fuzz/fuzz_frame: FUZZ_LIBS = $(call pkg_libs,$(CLIENT_PKGS)) -lm
 $(B)/tests/fuzz/fuzz_warp: $(WARP_OBJ)
 $(B)/tests/fuzz/fuzz_warp: FUZZ_LIBS = -lm
-$(addprefix $(B)/tests/fuzz/fuzz_,aff gltf nff obj): $(READERS_OBJ)
-$(addprefix $(B)/tests/fuzz/fuzz_,aff gltf nff obj): FUZZ_LIBS = $(READERS_LIBS)
+$(addprefix $(B)/tests/fuzz/fuzz_,aff assimp gltf nff obj): $(READERS_OBJ)
+$(addprefix $(B)/tests/fuzz/fuzz_,aff assimp gltf nff obj): FUZZ_LIBS = $(READERS_LIBS)
 # OpenImageIO loses memory with broken images; the importer lives for one model only.
 run-fuzz-gltf run-fuzz-obj: FUZZ_FLAGS = -detect_leaks=0
 .PHONY: fuzz fuzz-keep $(addprefix run-fuzz-,$(FUZZERS)) $(addprefix keep-fuzz-,$(FUZZERS))

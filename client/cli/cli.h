@@ -199,8 +199,8 @@ struct cli_channel {
 struct cli_job {
     const char *scene; /* a shared scene of the server, in place of the model */
     const char *model, *server, *key_file, *link, *environment, *output, *camera, *keys_file, *trace_file;
-    double environment_degrees; /* as of fl_load_options */
-    const char *variant;        /* likewise */
+    double environment_degrees, point_size; /* as of fl_load_options */
+    const char *variant;                    /* likewise */
     enum cli_image image;
     struct cli_output
         outputs[CLI_OUTPUTS_MAX]; /* destinations of the pictures: `output`, or several of a script */

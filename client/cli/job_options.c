@@ -29,6 +29,7 @@ enum key {
     KEY_ENVIRONMENT,
     KEY_ENVIRONMENT_ROTATION,
     KEY_VARIANT,
+    KEY_POINT_SIZE,
     KEY_BACKGROUND,
     KEY_DENOISE,
     KEY_CAMERA,
@@ -84,6 +85,8 @@ static const struct argp_option special[] = {
      "Turn it about +y by -360 to 360 (default 0: its middle column is +x)", CLI_GROUP_OUTPUT},
     {"variant", KEY_VARIANT, "NAME", 0, "Materials of this variant of a glTF model ('farlight info' lists them)",
      CLI_GROUP_OUTPUT},
+    {"point-size", KEY_POINT_SIZE, "METRES", 0,
+     "Show points without faces as spheres of this diameter (default: by their distances)", CLI_GROUP_OUTPUT},
     {"background", KEY_BACKGROUND, "NAME|#RRGGBB", 0,
      "Behind all surfaces: the environment (default), transparent, or a colour such as '#ffffff'",
      CLI_GROUP_OUTPUT},
@@ -282,6 +285,8 @@ static error_t set_option(struct cli_job *job, int key, const char *field, const
     case KEY_VARIANT:
         job->variant = value;
         return 0;
+    case KEY_POINT_SIZE:
+        return set_real(job, field, value, 1e-6, 1e6, &job->point_size);
     case KEY_BACKGROUND:
         return cli_set_background(job, field, value);
     case KEY_DENOISE:

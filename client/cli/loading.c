@@ -50,6 +50,7 @@ bool cli_loading_begin(struct cli_loading *loading, struct fl_error *error)
                                              .environment = job->environment,
                                              .environment_degrees = job->environment_degrees,
                                              .variant = job->variant,
+                                             .point_size = job->point_size,
                                              .note = on_note,
                                              .progress = on_progress,
                                              .user = loading,

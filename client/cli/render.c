@@ -72,7 +72,8 @@ int cli_render(int argc, char **argv)
                               .parser = parse,
                               .args_doc = "MODEL -o IMAGE\n--scene NAME --server ADDRESS -o IMAGE",
                               .doc = "Render one picture of a model.\v"
-                                     "MODEL is glTF, GLB, OBJ, NFF or AFF. FARLIGHT_SERVER, FARLIGHT_SIZE, "
+                                     "MODEL is glTF, GLB, OBJ, PLY, STL, FBX, COLLADA, 3MF or of another format "
+                                     "of farlight-import. FARLIGHT_SERVER, FARLIGHT_SIZE, "
                                      "FARLIGHT_SAMPLES and so on give defaults.",
                               .children = children};
     struct cli_job job;

@@ -208,10 +208,10 @@ static bool apply_members(const struct shot_reader *reader, const struct shot_va
     const struct shot_value model = shot_member(root, "model"), environment = shot_member(root, "environment"),
                             background = shot_member(root, "background"),
                             rotation = shot_member(root, "environment_rotation"),
-                            variant = shot_member(root, "variant"), camera = shot_member(root, "camera"),
-                            clips = shot_member(root, "clips"), output = shot_member(root, "output"),
-                            outputs = shot_member(root, "outputs"), about = shot_member(root, "description"),
-                            schema = shot_member(root, "$schema");
+                            variant = shot_member(root, "variant"), points = shot_member(root, "point_size"),
+                            camera = shot_member(root, "camera"), clips = shot_member(root, "clips"),
+                            output = shot_member(root, "output"), outputs = shot_member(root, "outputs"),
+                            about = shot_member(root, "description"), schema = shot_member(root, "$schema");
     const struct shot_value *const texts[] = {&about, &schema};
     for (size_t i = 0; i < 2; i++)
         if (texts[i]->value && !json_is_string(texts[i]->value))
@@ -220,8 +220,9 @@ static bool apply_members(const struct shot_reader *reader, const struct shot_va
         (environment.value && !shot_path(reader, &environment, &job->environment)) ||
         (background.value && !apply_background(reader, &background)) ||
         (rotation.value && !shot_number(reader, &rotation, -360, 360, &job->environment_degrees)) ||
-        (variant.value && !apply_variant(reader, &variant)) || (camera.value && !shot_camera(reader, &camera)) ||
-        (clips.value && !apply_clips(reader, &clips)))
+        (variant.value && !apply_variant(reader, &variant)) ||
+        (points.value && !shot_number(reader, &points, 1e-6, 1e6, &job->point_size)) ||
+        (camera.value && !shot_camera(reader, &camera)) || (clips.value && !apply_clips(reader, &clips)))
         return false;
     for (size_t i = 0; i < GROUP_COUNT; i++) {
         const struct shot_value group = shot_member(root, groups[i].name);
@@ -248,7 +249,8 @@ bool cli_shot_apply(struct cli_shot *shot, struct cli_job *job, const struct cli
     static const char *const others[] = {
         "$schema",   "description", "model",  "environment", "environment_rotation",
         "variant",   "background",  "camera", "clips",       "lights",
-        "materials", "nodes",       "output", "outputs",     NULL};
+        "materials", "nodes",       "output", "outputs",     "point_size",
+        NULL};
     const struct shot_reader reader = {.shot = shot, .job = job, .given = given, .set = set, .user = user};
     const struct shot_value root = {.value = shot->json.root};
     const char *known[SHOT_SETTINGS_MAX + sizeof(others) / sizeof(others[0])];

@@ -5,6 +5,7 @@
 #ifndef FARLIGHT_IMPORT_FORMATS_H
 #define FARLIGHT_IMPORT_FORMATS_H
 
+#include "assimp.h"
 #include "files.h"
 #include "import.h"
 
@@ -20,6 +21,9 @@ bool obj_import(struct import_scene *scene, struct files *files, const unsigned 
 bool aff_import(struct import_scene *scene, struct files *files, const unsigned char *bytes, size_t size_bytes);
 /* Neutral File Format of the Standard Procedural Databases. */
 bool nff_import(struct import_scene *scene, const unsigned char *bytes, size_t size_bytes);
+/* Any of assimp.h's formats. `point_size`: diameter of points without faces, 0: chosen by their distances. */
+bool assimp_import(struct import_scene *scene, struct files *files, const struct assimp_format *format,
+                   double point_size, const unsigned char *bytes, size_t size_bytes);
 
 #ifdef __cplusplus
 }

@@ -32,13 +32,22 @@ struct options {
     const char *environment;
     double environment_degrees;
     const char *variant;
+    double point_size; /* 0: chosen by the points */
     bool no_model;
     const char *model;
 };
 
 #define RADIANS_PER_DEGREE 0.017453292519943295
 
-enum { OPTION_FD = 256, OPTION_SCENE, OPTION_ENVIRONMENT, OPTION_ROTATION, OPTION_VARIANT, OPTION_NO_MODEL };
+enum {
+    OPTION_FD = 256,
+    OPTION_SCENE,
+    OPTION_ENVIRONMENT,
+    OPTION_ROTATION,
+    OPTION_VARIANT,
+    OPTION_POINT_SIZE,
+    OPTION_NO_MODEL
+};
 
 static const struct argp_option option_rows[] = {
     {"fd", OPTION_FD, "N", 0, "use this connected stream socket (required)", 0},
@@ -48,6 +57,8 @@ static const struct argp_option option_rows[] = {
     {"environment-rotation", OPTION_ROTATION, "DEGREES", 0,
      "turn it about +y by -360 to 360 (default 0: its middle column is +x)", 0},
     {"variant", OPTION_VARIANT, "NAME", 0, "show the materials of this variant of a glTF model", 0},
+    {"point-size", OPTION_POINT_SIZE, "METRES", 0,
+     "show points without faces as spheres of this diameter (default: by their distances)", 0},
     {"no-model", OPTION_NO_MODEL, NULL, 0, "send the environment only; MODEL is not needed", 0},
     {0}};
 
@@ -73,6 +84,16 @@ static double parse_degrees(struct argp_state *state, const char *text)
     return degrees;
 }
 
+static double parse_point_size(struct argp_state *state, const char *text)
+{
+    char *end;
+    const double size = strtod(text, &end);
+
+    if (end == text || *end != '\0' || !(size > 0 && size <= 1e6))
+        argp_error(state, "--point-size: '%s' is not a number above 0, up to 1e6", text);
+    return size;
+}
+
 static error_t parse_option(int key, char *argument, struct argp_state *state)
 {
     struct options *options = state->input;
@@ -92,6 +113,9 @@ static error_t parse_option(int key, char *argument, struct argp_state *state)
         return 0;
     case OPTION_VARIANT:
         options->variant = argument;
+        return 0;
+    case OPTION_POINT_SIZE:
+        options->point_size = parse_point_size(state, argument);
         return 0;
     case OPTION_NO_MODEL:
         options->no_model = true;
@@ -198,14 +222,28 @@ static bool may_name_images(const char *name, const unsigned char *bytes, size_t
     if (is_aff(name)) /* what it includes may name some, too */
         return contains(bytes, size_bytes, "texturecoords") || contains(bytes, size_bytes, "tt") ||
                contains(bytes, size_bytes, ".aff") || contains(bytes, size_bytes, ".nff");
+    if (assimp_format_of(name))
+        return assimp_may_name_images(assimp_format_of(name), bytes, size_bytes);
     return has_ending(name, ".obj") && contains(bytes, size_bytes, "mtllib");
 }
 
-static bool parse_model(struct import_scene *scene, struct files *files, const char *path,
+/* The endings of all formats, for people. */
+static const char *known_endings(char out[256])
+{
+    size_t used = (size_t)snprintf(out, 256, ".gltf, .glb, .obj, .nff, .aff");
+
+    for (size_t i = 0; assimp_format_at(i) && used < 240; i++)
+        used += (size_t)snprintf(out + used, 256 - used, "%s%s", assimp_format_at(i + 1) ? ", " : " and ",
+                                 assimp_format_at(i)->ending);
+    return out;
+}
+
+static bool parse_model(struct import_scene *scene, struct files *files, const struct options *options,
                         const unsigned char *bytes, size_t size_bytes)
 {
-    const char *name = file_part(path);
+    const char *name = file_part(options->model);
     const char *dot = strrchr(name, '.');
+    char endings[256];
 
     if (size_bytes == 0)
         return import_fail(scene, NULL, "the file is empty");
@@ -219,8 +257,10 @@ static bool parse_model(struct import_scene *scene, struct files *files, const c
         return nff_import(scene, bytes, size_bytes);
     if (is_aff(name))
         return aff_import(scene, files, bytes, size_bytes);
-    return import_fail(scene, NULL, "unknown format %s; known are .gltf, .glb, .obj, .nff and .aff",
-                       dot ? dot : "(no ending)");
+    if (assimp_format_of(name))
+        return assimp_import(scene, files, assimp_format_of(name), options->point_size, bytes, size_bytes);
+    return import_fail(scene, NULL, "unknown format %.40s; known are %s", dot ? dot : "(no ending)",
+                       known_endings(endings));
 }
 
 /* The protocol's middle column is -z. */
@@ -260,7 +300,7 @@ static bool import_all(struct import_scene *scene, struct files *files, struct s
 
     if (options->model) {
         imported = sender_progress(sender, size_bytes, 0, "parsing") &&
-                   parse_model(scene, files, options->model, bytes, size_bytes);
+                   parse_model(scene, files, options, bytes, size_bytes);
         if (imported && scene->edit_count == 0)
             import_note(scene, PROTOCOL_SEVERITY_WARNING, NULL, "it contains nothing that can be shown");
     }
@@ -286,6 +326,9 @@ static bool read_and_import(struct import_scene *scene, struct files *files, str
     }
     if (options->environment || (bytes && may_name_images(file_part(options->model), bytes, size_bytes)))
         texture_load();
+    if (bytes && !is_gltf(file_part(options->model), bytes, size_bytes) &&
+        assimp_format_of(file_part(options->model)))
+        assimp_load();
     imported = enter_sandbox(scene, options) && import_all(scene, files, sender, options, bytes, size_bytes);
     free(bytes);
     return imported;
@@ -330,11 +373,14 @@ static bool run(struct import_scene *scene, struct sender *sender, const struct 
 
 int main(int argc, char **argv)
 {
-    static const struct argp argp = {
-        option_rows, parse_option,
-        "MODEL",     "Turn MODEL (glTF 2.0, GLB, OBJ, NFF, AFF) into messages of farlight's protocol.",
-        NULL,        NULL,
-        NULL};
+    static const struct argp argp = {option_rows,
+                                     parse_option,
+                                     "MODEL",
+                                     "Turn MODEL (glTF 2.0, GLB, OBJ, NFF, AFF, PLY, STL, FBX, COLLADA, 3MF and "
+                                     "more) into messages of farlight's protocol.",
+                                     NULL,
+                                     NULL,
+                                     NULL};
     static struct import_scene scene; /* the table of notes is too large for the stack of a careful program */
     uint64_t start_ns = monotonic_now_ns();
     struct options options = {.socket = -1, .scene = 1};

@@ -231,9 +231,30 @@ void fill_mesh(const state &s, const std::vector<uint8_t> &colours, import_mesh 
     }
 }
 
+// Of the materials that faces name; 0 for those that no file defines.
+std::vector<uint32_t> material_ids(state &s)
+{
+    std::map<std::string, const tinyobj::material_t *> defined;
+    std::vector<const tinyobj::material_t *> wanted;
+
+    for (const tinyobj::material_t &material : s.materials)
+        defined.emplace(material.name, &material);
+    for (const std::string &name : s.material_names) {
+        const auto found = defined.find(name);
+        if (found == defined.end())
+            import_note(s.r.scene, PROTOCOL_SEVERITY_WARNING, nullptr, "the material '%.100s' is not defined",
+                        name.c_str());
+        wanted.push_back(found == defined.end() ? nullptr : found->second);
+    }
+    const auto read_image = [&](const std::string &name, size_t *size_bytes, char *reason) {
+        return files_read(s.r.files, name.c_str(), size_bytes, reason);
+    };
+    return add_materials(s.r.scene, read_image, wanted);
+}
+
 void add_mesh(state &s, const std::vector<uint8_t> &colours)
 {
-    const std::vector<uint32_t> ids = add_materials(s.r, s.materials, s.material_names);
+    const std::vector<uint32_t> ids = material_ids(s);
     std::vector<uint32_t> materials(s.names.size());
     import_mesh mesh = {};
 

@@ -8,6 +8,7 @@
 
 #include <tiny_obj_loader.h>
 
+#include <functional>
 #include <istream>
 #include <map>
 #include <streambuf>
@@ -68,9 +69,11 @@ class material_reader : public tinyobj::MaterialReader
     reader &r;
     const std::vector<std::string> &libraries;
 };
-// Identifiers by position in `names`; 0 for those that no file defines.
-std::vector<uint32_t> add_materials(reader &r, const std::vector<tinyobj::material_t> &materials,
-                                    const std::vector<std::string> &names);
+// Reads an image by the name that a material has for it, as files_read() does.
+using image_source = std::function<unsigned char *(const std::string &name, size_t *size_bytes, char *reason)>;
+// Also for readers that fill such materials from other formats. Identifiers by position; 0 where there is none.
+std::vector<uint32_t> add_materials(import_scene *scene, const image_source &read_image,
+                                    const std::vector<const tinyobj::material_t *> &materials);
 } // namespace obj
 
 #endif

@@ -33,21 +33,23 @@ struct image {
 };
 
 struct building {
-    reader &r;
+    import_scene *scene;
+    const image_source &read_image;
     std::map<std::string, image> images;      // by file name
     std::map<std::string, uint32_t> textures; // by file name and use
 };
 
 // ---- images
 
-std::set<std::string> image_names(const std::vector<tinyobj::material_t> &materials,
-                                  const std::map<std::string, size_t> &wanted)
+std::set<std::string> image_names(const std::vector<const tinyobj::material_t *> &materials)
 {
     std::set<std::string> names;
-    for (const auto &entry : wanted) {
-        const tinyobj::material_t &m = materials[entry.second];
-        for (const std::string *name : {&m.diffuse_texname, &m.alpha_texname, &m.bump_texname, &m.normal_texname,
-                                        &m.emissive_texname, &m.roughness_texname, &m.metallic_texname})
+    for (const tinyobj::material_t *m : materials) {
+        if (!m)
+            continue;
+        for (const std::string *name :
+             {&m->diffuse_texname, &m->alpha_texname, &m->bump_texname, &m->normal_texname, &m->emissive_texname,
+              &m->roughness_texname, &m->metallic_texname})
             if (!name->empty())
                 names.insert(*name);
     }
@@ -62,7 +64,7 @@ void read_images(building &b, const std::set<std::string> &names)
     for (const std::string &name : names) {
         texture_job job = {};
         char reason[FILES_REASON_BYTES] = "";
-        unsigned char *bytes = files_read(b.r.files, name.c_str(), &job.size_bytes, reason);
+        unsigned char *bytes = b.read_image(name, &job.size_bytes, reason);
         if (!bytes)
             snprintf(job.reason, sizeof(job.reason), "%.199s", reason);
         job.bytes = bytes;
@@ -85,7 +87,7 @@ void read_images(building &b, const std::set<std::string> &names)
             continue;
         }
         i.marked = true;
-        import_note(b.r.scene, PROTOCOL_SEVERITY_WARNING, name.c_str(),
+        import_note(b.scene, PROTOCOL_SEVERITY_WARNING, name.c_str(),
                     "the image '%.100s' cannot be used: %.150s; it is shown in magenta and black", name.c_str(),
                     job.reason);
     }
@@ -116,8 +118,8 @@ uint32_t add_texture(building &b, const std::string &key, const std::string &nam
     set.wrap_u = set.wrap_v = clamp ? PROTOCOL_WRAP_CLAMP : PROTOCOL_WRAP_REPEAT;
     set.nearest = size.marked;
     set.name = name.c_str();
-    const uint32_t blob = import_add_blob(b.r.scene, texels, uint64_t(size.width) * size.height * 4);
-    return b.textures[key] = import_add_texture(b.r.scene, &set, blob);
+    const uint32_t blob = import_add_blob(b.scene, texels, uint64_t(size.width) * size.height * 4);
+    return b.textures[key] = import_add_texture(b.scene, &set, blob);
 }
 
 uint32_t plain_texture(building &b, const std::string &name, bool colour, bool clamp)
@@ -313,7 +315,7 @@ void maps(building &b, const tinyobj::material_t &m, message_set_material &set, 
     uses[at] = use_of(plain_texture(b, m.bump_texname, false, m.bump_texopt.clamp), m.bump_texopt);
     uses[at].strength = float(std::min(std::max(strength, -1e3), 1e3) * (at == BUMP ? bump_height_m : 1));
     if (at == NORMAL)
-        import_note(b.r.scene, PROTOCOL_SEVERITY_INFO, m.bump_texname.c_str(), "a bump map that holds normals");
+        import_note(b.scene, PROTOCOL_SEVERITY_INFO, m.bump_texname.c_str(), "a bump map that holds normals");
 }
 
 void note_unused(building &b, const tinyobj::material_t &m)
@@ -326,7 +328,7 @@ void note_unused(building &b, const tinyobj::material_t &m)
                                                                    {"map_Ps", &m.sheen_texname}};
     for (const auto &entry : unused)
         if (!entry.second->empty())
-            import_note(b.r.scene, PROTOCOL_SEVERITY_WARNING, m.name.c_str(), "maps of kind %s are not shown",
+            import_note(b.scene, PROTOCOL_SEVERITY_WARNING, m.name.c_str(), "maps of kind %s are not shown",
                         entry.first);
 }
 
@@ -347,7 +349,7 @@ uint32_t add_material(building &b, const tinyobj::material_t &m)
     note_unused(b, m);
     set.textures = uses;
     set.textures_count = slot_count;
-    return import_add_material(b.r.scene, &set);
+    return import_add_material(b.scene, &set);
 }
 } // namespace
 
@@ -384,28 +386,15 @@ bool material_reader::operator()(const std::string &name, std::vector<tinyobj::m
     return !materials->empty();
 }
 
-std::vector<uint32_t> add_materials(reader &r, const std::vector<tinyobj::material_t> &materials,
-                                    const std::vector<std::string> &names)
+std::vector<uint32_t> add_materials(import_scene *scene, const image_source &read_image,
+                                    const std::vector<const tinyobj::material_t *> &materials)
 {
-    building b = {r, {}, {}};
-    std::map<std::string, size_t> defined, wanted;
+    building b = {scene, read_image, {}, {}};
     std::vector<uint32_t> ids;
 
-    for (size_t i = 0; i < materials.size(); i++)
-        defined.emplace(materials[i].name, i);
-    for (const std::string &name : names) {
-        const auto found = defined.find(name);
-        if (found != defined.end())
-            wanted[name] = found->second;
-        else
-            import_note(r.scene, PROTOCOL_SEVERITY_WARNING, nullptr, "the material '%.100s' is not defined",
-                        name.c_str());
-    }
-    read_images(b, image_names(materials, wanted));
-    for (const std::string &name : names) {
-        const auto found = wanted.find(name);
-        ids.push_back(found == wanted.end() ? 0 : add_material(b, materials[found->second]));
-    }
+    read_images(b, image_names(materials));
+    for (const tinyobj::material_t *material : materials)
+        ids.push_back(material ? add_material(b, *material) : 0);
     return ids;
 }
 } // namespace obj

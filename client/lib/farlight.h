@@ -167,6 +167,7 @@ struct fl_load_options {
     const char *environment;    /* equirectangular image file all around, or NULL; alone (model NULL) allowed */
     double environment_degrees; /* its turn about +y, -360 to 360; 0: its middle column is +x, as glTF viewers have
                                    it */
+    double point_size;          /* diameter of points without faces, metres; 0: chosen by their distances */
     unsigned timeout_ms;        /* after this the importer is killed; 0: 10 minutes */
     /* Called during the load; may be NULL. Strings live as long as the call. */
     void (*note)(void *user, const struct fl_note *note);

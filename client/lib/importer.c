@@ -36,8 +36,8 @@ bool fl_importer_start(struct fl_importer *importer, const struct fl_load_option
     if ((options->model && !check_file(options->model, error)) ||
         (options->environment && !check_file(options->environment, error)))
         return false;
-    const char *arguments[12] = {"--scene", "1"};
-    char degrees[48];
+    const char *arguments[14] = {"--scene", "1"};
+    char degrees[48], point_size[48];
     size_t count = 2;
     if (options->environment) {
         arguments[count++] = "--environment";
@@ -48,6 +48,10 @@ bool fl_importer_start(struct fl_importer *importer, const struct fl_load_option
     if (options->variant) {
         arguments[count++] = "--variant";
         arguments[count++] = options->variant;
+    }
+    if (options->point_size > 0) {
+        snprintf(point_size, sizeof(point_size), "--point-size=%.9g", options->point_size);
+        arguments[count++] = point_size;
     }
     if (!options->model) {
         arguments[count++] = "--no-model";

@@ -299,6 +299,7 @@ static void fill(struct command_line *line)
     viewer->environment = job->environment;
     viewer->environment_degrees = job->environment_degrees;
     viewer->variant = job->variant;
+    viewer->point_size = job->point_size;
     viewer->scene_name = job->scene;
     viewer->view = job->options;
     viewer->view.views_across = viewer->view.views_down = 1;
@@ -331,7 +332,8 @@ int main(int argc, char **argv)
         .parser = parse,
         .args_doc = "MODEL",
         .doc = "Open a window on a model, or on a shared scene of a daemon.\v"
-               "MODEL is glTF, GLB, OBJ, NFF or AFF. FARLIGHT_SERVER, FARLIGHT_SIZE and so on give defaults.",
+               "MODEL is glTF, GLB, OBJ, PLY, STL, FBX, COLLADA, 3MF or of another format of farlight-import. "
+               "FARLIGHT_SERVER, FARLIGHT_SIZE and so on give defaults.",
         .children = children,
         .help_filter = help_filter};
     static struct command_line line;

@@ -78,6 +78,7 @@ static struct fl_scene *come_to_scene(struct session *session, struct fl_error *
                                          .environment = options->environment,
                                          .environment_degrees = options->environment_degrees,
                                          .variant = options->variant,
+                                         .point_size = options->point_size,
                                          .note = on_note,
                                          .progress = on_progress,
                                          .user = session,

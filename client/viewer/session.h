@@ -11,7 +11,7 @@ struct session;
 struct session_options {
     const char *server, *key_file, *link; /* as of fl_connect_options */
     const char *model, *environment;      /* that are loaded .. */
-    double environment_degrees;
+    double environment_degrees, point_size;
     const char *variant;
     const char *scene_name; /* .. or, not NULL, the scene to attach to */
     int interrupt_fd;

@@ -173,6 +173,7 @@ static bool open_viewer(struct viewer *viewer, struct fl_error *error)
                                             .environment = options->environment,
                                             .environment_degrees = options->environment_degrees,
                                             .variant = options->variant,
+                                            .point_size = options->point_size,
                                             .scene_name = options->scene_name,
                                             .interrupt_fd = options->interrupt_fd,
                                             .note = options->note};

@@ -1,10 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /* Writes what the fuzzers start from: seed FOLDER makes FOLDER/protocol.dict out of the table, and valid inputs in
  * FOLDER/codec, FOLDER/framing, FOLDER/handshake and FOLDER/sealed, noise in FOLDER/scene, sessions in
- * FOLDER/session, frames in FOLDER/frame, models in FOLDER/aff, FOLDER/gltf, FOLDER/obj and FOLDER/nff. */
+ * FOLDER/session, frames in FOLDER/frame, models in FOLDER/aff, FOLDER/assimp, FOLDER/gltf, FOLDER/obj and
+ * FOLDER/nff. */
 #include <errno.h>
 #include <inttypes.h>
 #include <stdlib.h>
+#include <string.h>
 #include <sys/stat.h>
 
 #include "protocol/handshake.h"
@@ -352,6 +354,57 @@ static const char gltf_model[] =
 static const char obj_model[] =
     "mtllib a b.mtl\no thing\nv 0 0 0 1 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 1\n"
     "vn 0 0 1\nusemtl red\ns 1\nf 1/1/1 2/2/1 \\\n3//1 -1\ng other\nl 1 2\np 3\nf 1 2 3\n";
+/* The first letter chooses the format, by its place in the table (import/assimp.c). */
+static const char *const assimp_models[] = {
+    "rply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\nproperty uch"
+    "ar red\nproperty uchar green\nproperty uchar blue\nelement face 1\nproperty list uchar int vertex_indices\ne"
+    "nd_header\n0 0 0 255 0 0\n1 0 0 0 255 0\n1 1 0 0 0 255\n0 1 0 255 255 255\n4 0 1 2 3\n",
+    "rply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\nproperty uch"
+    "ar red\nproperty uchar green\nproperty uchar blue\nend_header\n0 0 0 255 0 0\n1 0 0 0 255 0\n1 1 0 0 0 255\n"
+    "0 1 0 255 255 255\n",
+    "ssolid thing\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\ne"
+    "ndsolid thing\n",
+    "qOFF\n4 1 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3\n",
+    "nAC3Db\nMATERIAL \"red\" rgb 1 0 0  amb 0.2 0.2 0.2  emis 0 0 0  spec 0.5 0.5 0.5  shi 10  trans 0\nOBJECT w"
+    "orld\nkids 1\nOBJECT poly\nname \"quad\"\nloc 0 2 0\nnumvert 4\n0 0 0\n1 0 0\n1 1 0\n0 1 0\nnumsurf 1\nSURF "
+    "0x20\nmat 0\nrefs 4\n0 0 0\n1 1 0\n2 1 1\n3 0 1\nkids 0\n",
+    "t<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<X3D profile=\"Interchange\" version=\"3.3\"><Scene><Transform "
+    "translation=\"0 2 0\"><Shape><Appearance><Material diffuseColor=\"1 0 0\"/></Appearance>\n<IndexedFaceSet co"
+    "ordIndex=\"0 1 2 3 -1\" solid=\"false\"><Coordinate point=\"0 0 0 1 0 0 1 1 0 0 1 0\"/></IndexedFaceSet></Sh"
+    "ape></Transform></Scene></X3D>\n",
+    "o<?xml version=\"1.0\"?>\n<COLLADA xmlns=\"http://www.collada.org/2005/11/COLLADASchema\" version=\"1.4.1\">"
+    "<asset><unit meter=\"0.01\" name=\"centimeter\"/><up_axis>Z_UP</up_axis></asset>\n<library_cameras><camera i"
+    "d=\"cam\"><optics><technique_common><perspective><xfov>60</xfov><aspect_ratio>1.5</aspect_ratio><znear>1</zn"
+    "ear><zfar>1000</zfar></perspective></technique_common></optics></camera></library_cameras>\n<library_lights>"
+    "<light id=\"sun\"><technique_common><directional><color>1 0.5 0.25</color></directional></technique_common><"
+    "/light></library_lights>\n<library_effects><effect id=\"e\"><profile_COMMON><technique sid=\"c\"><phong><dif"
+    "fuse><color>1 0 0 1</color></diffuse><shininess><float>16</float></shininess></phong></technique></profile_C"
+    "OMMON></effect></library_effects>\n<library_materials><material id=\"m\" name=\"red\"><instance_effect url="
+    "\"#e\"/></material></library_materials>\n<library_geometries><geometry id=\"g\"><mesh><source id=\"p\"><floa"
+    "t_array id=\"pa\" count=\"12\">0 0 0 100 0 0 100 0 100 0 0 100</float_array><technique_common><accessor sour"
+    "ce=\"#pa\" count=\"4\" stride=\"3\"><param name=\"X\" type=\"float\"/><param name=\"Y\" type=\"float\"/><par"
+    "am name=\"Z\" type=\"float\"/></accessor></technique_common></source>\n<vertices id=\"v\"><input semantic=\""
+    "POSITION\" source=\"#p\"/></vertices><polylist material=\"s\" count=\"1\"><input semantic=\"VERTEX\" source="
+    "\"#v\" offset=\"0\"/><vcount>4</vcount><p>0 1 2 3</p></polylist></mesh></geometry></library_geometries>\n<li"
+    "brary_visual_scenes><visual_scene id=\"s\"><node id=\"quad\" name=\"quad\"><translate>0 0 200</translate><in"
+    "stance_geometry url=\"#g\"><bind_material><technique_common><instance_material symbol=\"s\" target=\"#m\"/><"
+    "/technique_common></bind_material></instance_geometry></node><node id=\"eye\" name=\"eye\"><instance_camera "
+    "url=\"#cam\"/></node><node id=\"lamp\" name=\"lamp\"><instance_light url=\"#sun\"/></node></visual_scene></l"
+    "ibrary_visual_scenes>\n<scene><instance_visual_scene url=\"#s\"/></scene></COLLADA>\n",
+    "p; FBX 7.3.0 project file\nFBXHeaderExtension:  {\nFBXHeaderVersion: 1003\nFBXVersion: 7300\n}\nGlobalSettin"
+    "gs:  {\nVersion: 1000\nProperties70:  {\nP: \"UpAxis\", \"int\", \"Integer\", \"\",2\nP: \"UpAxisSign\", \"i"
+    "nt\", \"Integer\", \"\",1\nP: \"FrontAxis\", \"int\", \"Integer\", \"\",1\nP: \"FrontAxisSign\", \"int\", \""
+    "Integer\", \"\",-1\nP: \"CoordAxis\", \"int\", \"Integer\", \"\",0\nP: \"CoordAxisSign\", \"int\", \"Integer"
+    "\", \"\",1\nP: \"UnitScaleFactor\", \"double\", \"Number\", \"\",1\n}\n}\nDefinitions:  {\nVersion: 100\nCou"
+    "nt: 2\n}\nObjects:  {\nGeometry: 10, \"Geometry::quad\", \"Mesh\" {\nVertices: *12 {\na: 0,0,0,100,0,0,100,0"
+    ",100,0,0,100\n}\nPolygonVertexIndex: *4 {\na: 0,1,2,-4\n}\nGeometryVersion: 124\nLayerElementMaterial: 0 {\n"
+    "Version: 101\nName: \"\"\nMappingInformationType: \"AllSame\"\nReferenceInformationType: \"IndexToDirect\"\n"
+    "Materials: *1 {\na: 0\n}\n}\nLayer: 0 {\nVersion: 100\nLayerElement:  {\nType: \"LayerElementMaterial\"\nTyp"
+    "edIndex: 0\n}\n}\n}\nModel: 20, \"Model::quad\", \"Mesh\" {\nVersion: 232\nProperties70:  {\nP: \"Lcl Transl"
+    "ation\", \"Lcl Translation\", \"\", \"A\",0,0,200\n}\n}\nMaterial: 30, \"Material::red\", \"\" {\nVersion: 1"
+    "02\nShadingModel: \"phong\"\nProperties70:  {\nP: \"DiffuseColor\", \"Color\", \"\", \"A\",1,0,0\n}\n}\n}\nC"
+    "onnections:  {\nC: \"OO\",20,0\nC: \"OO\",10,20\nC: \"OO\",30,20\n}\n",
+};
 static const char nff_model[] =
     "v\nfrom 0 0 5\nat 0 0 0\nup 0 1 0\nangle 45\nhither 0.1\nresolution 8 8\nb 0.1 0.2 0.3\nl 1 2 3 1 1 1\n"
     "f 1 0.5 0.2 0.8 0.2 20 0.1 1.5\ns 0 0 0 1\nc 0 0 0 1 0 2 0 0.5\np 4\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n"
@@ -371,6 +424,9 @@ static const char aff_model[] =
 
 static bool write_models(const char *folder)
 {
+    for (int i = 0; i < (int)(sizeof(assimp_models) / sizeof(assimp_models[0])); i++)
+        if (!seed_write_file(folder, "assimp", "model", i, assimp_models[i], strlen(assimp_models[i])))
+            return false;
     return seed_write_file(folder, "aff", "model", 0, aff_model, sizeof(aff_model) - 1) &&
            seed_write_file(folder, "gltf", "model", 0, gltf_model, sizeof(gltf_model) - 1) &&
            seed_write_file(folder, "obj", "model", 0, obj_model, sizeof(obj_model) - 1) &&

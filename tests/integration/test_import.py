@@ -109,12 +109,6 @@ class Models(unittest.TestCase):
                 self.assertEqual(len(halves), width * height * 4)
                 self.assertLessEqual(max(halves), 0x7bff, "a half that is not finite or negative")
 
-    @needs_shared_scenes
-    def test_unknown_format_is_named(self):
-        result = import_file(os.path.join(SCENES, "formats", "stl", "colored.stl"))
-        self.assertEqual(result.status, 1)
-        self.assertIn("unknown format .stl", result.text())
-
 
 # Valid by the letter, and yet there is nothing that could be shown of them.
 NOT_TO_BE_HAD = {

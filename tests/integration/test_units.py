@@ -20,7 +20,7 @@ INSTALLED = {"conf/farlightd.service": f"/usr/local/lib/systemd/system/{SERVICE}
              "conf/farlightd.socket": f"/usr/local/lib/systemd/system/{SOCKET}",
              "conf/sysusers.conf": "/usr/local/lib/sysusers.d/farlight.conf",
              "conf/farlightd.conf": CONFIGURATION}
-PROGRAMS = ("farlightd", "farlight", "farlight-import", "farlight-textures.so", "farlight-export",
+PROGRAMS = ("farlightd", "farlight", "farlight-import", "farlight-textures.so", "farlight-assimp.so", "farlight-export",
             "farlight-images.so")
 USERS = "u member -\nm member farlight\nu stranger -\n"
 

@@ -83,6 +83,7 @@ RESTRICTED = {
     r"OpenImageIO/": ("client/import", "client/output/library"),
     r"(png\.h|(OpenEXR|Imath)/)": ("client/output",),
     r"tiny_(gltf|obj_loader)": ("client/import",),
+    r"assimp/": ("client/import",),
     r"(turbojpeg|zstd)\.h": ("server/encode", "client/lib", "protocol/pixels"),
     r"sodium\.h": ("server/session", "server/store", "protocol/common", "protocol/sealed"),
 }

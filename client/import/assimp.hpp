@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: MIT
+// The parts of the reader of what Assimp has read. Its structures are checked like a file: no index, count,
+// pointer or name that they hold is used before it is checked.
+#ifndef FARLIGHT_IMPORT_ASSIMP_HPP
+#define FARLIGHT_IMPORT_ASSIMP_HPP
+
+#include "assimp.h"
+#include "formats.h"
+#include "grouping.h"
+
+#include <assimp/scene.h>
+
+#include <map>
+#include <string>
+#include <vector>
+
+namespace assimp
+{
+// Thrown after import_fail(); caught in assimp_import().
+struct failed {
+};
+
+// What became of meshes of the library that one node shows.
+struct shown_mesh {
+    protocol_node_kind kind = PROTOCOL_NODE_MESH;
+    uint32_t id = 0; // 0: there is nothing to show
+    uint32_t skin = 0, target_count = 0;
+};
+
+struct reader {
+    import_scene *scene;
+    struct files *files;
+    const assimp_format *format;
+    double point_size; // diameter; 0: by the distances of the points
+    const aiScene *source = nullptr;
+    double metres = 1; // of a unit, when the scene is there
+    std::vector<uint32_t> material_ids = {};
+    std::map<std::vector<unsigned>, shown_mesh> meshes = {};               // by places in the scene's list
+    std::map<std::string, std::pair<uint32_t, const aiNode *>> nodes = {}; // by name: the first one
+    std::map<std::string, std::pair<uint32_t, uint32_t>> morphs = {}; // by node's or mesh's name: node, targets
+    uint32_t root = 0; // the first node: where bones without one are held
+    uint64_t budget = POLYGON_BUDGET;
+};
+
+[[noreturn]] void fail(reader &r, const std::string &where, const char *format, ...)
+    __attribute__((format(printf, 3, 4)));
+// Ends the work where the scene has failed.
+void check(reader &r);
+// Fails if the scene would not have room for so many bytes more, before anybody allocates them.
+void check_room(reader &r, const std::string &where, uint64_t count, uint64_t element_bytes);
+std::string text(const aiString &from);
+// sRGB to linear light, cut to 0..1.
+float linear(float value);
+
+// ---- assimp_check.cpp: what the library would not survive, before it sees the file
+void check_bytes(reader &r, const unsigned char *bytes, size_t size_bytes);
+
+// ---- assimp_scene.cpp
+void add_scene(reader &r);
+
+// ---- assimp_mesh.cpp
+// What the meshes become, all of which stand in the same node; adds them when they are asked for the first time.
+const shown_mesh &meshes_of(reader &r, const std::vector<unsigned> &places);
+
+// ---- assimp_points.cpp
+bool is_point_cloud(const aiMesh &mesh);
+shown_mesh add_points(reader &r, const aiMesh &from, const std::string &where);
+
+// ---- assimp_skin.cpp
+// Whether bones of the mesh move it.
+bool has_skin(const aiMesh &from);
+// Joints and weights of its vertices into `mesh`; returns the identifier that the skin will have.
+uint32_t read_skin(reader &r, unsigned place, import_mesh &mesh, const std::string &where);
+// Adds the skins that were asked for, once all nodes are there.
+void add_skins(reader &r);
+
+// ---- assimp_material.cpp
+void add_materials(reader &r);
+
+// ---- assimp_clip.cpp
+void add_clips(reader &r);
+} // namespace assimp
+
+#endif

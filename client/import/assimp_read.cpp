@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: MIT
+#include "assimp.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdarg>
+#include <cstdio>
+#include <cstring>
+#include <memory>
+#include <new>
+
+namespace assimp
+{
+void check(reader &r)
+{
+    if (r.scene->failed)
+        throw failed();
+}
+
+void fail(reader &r, const std::string &where, const char *format, ...)
+{
+    char words[400];
+    va_list arguments;
+
+    va_start(arguments, format);
+    vsnprintf(words, sizeof(words), format, arguments);
+    va_end(arguments);
+    import_fail(r.scene, where.c_str(), "%s", words);
+    throw failed();
+}
+
+void check_room(reader &r, const std::string &where, uint64_t count, uint64_t element_bytes)
+{
+    if (count > (IMPORT_BYTES_MAX - r.scene->blob_bytes) / element_bytes)
+        fail(r, where, "the scene would need more than %llu GiB",
+             static_cast<unsigned long long>(IMPORT_BYTES_MAX >> 30));
+}
+
+std::string text(const aiString &from)
+{
+    return {from.data, std::min<size_t>(from.length, sizeof(from.data) - 1)};
+}
+
+float linear(float value)
+{
+    const float cut = std::min(std::max(value, 0.0f), 1.0f); // NaN becomes 0
+    return cut <= 0.04045f ? cut / 12.92f : std::pow((cut + 0.055f) / 1.055f, 2.4f);
+}
+
+namespace
+{
+// ---- before the library sees the file
+
+// This version passes over cameras without a name, which COLLADA does not ask for. Empty: there is nothing to
+// mend.
+std::string named_cameras(const unsigned char *bytes, size_t size_bytes)
+{
+    const std::string tag = "<camera ", all(reinterpret_cast<const char *>(bytes), size_bytes);
+    std::string mended;
+    size_t copied = 0;
+
+    for (size_t at = all.find(tag); at != std::string::npos; at = all.find(tag, at + tag.size())) {
+        const size_t name = all.find("name=", at);
+        if (name != std::string::npos && name < all.find('>', at))
+            continue;
+        mended.append(all, copied, at + tag.size() - copied).append("name=\"\" ");
+        copied = at + tag.size();
+    }
+    return copied > 0 ? mended.append(all, copied, std::string::npos) : mended;
+}
+
+// ---- what the library says
+
+const char *const too_large =
+    "the file asks for more memory than a model may have: it is broken, or should be made of parts";
+
+bool begins(const char *words, const char *with)
+{
+    return strncmp(words, with, strlen(with)) == 0;
+}
+
+[[noreturn]] void explain(reader &r, const char *said)
+{
+    if (begins(said, "std::bad_alloc") || begins(said, "vector::") || begins(said, "basic_string::"))
+        fail(r, "", "%s", too_large);
+    if (strstr(said, "old format version"))
+        fail(r, "", "%s; write it again with a newer version, or as glTF", said);
+    fail(r, "", "the %s file cannot be read: %s; if other programs can, write it with one of them as glTF",
+         r.format->name, said[0] != '\0' ? said : "the library does not say why");
+}
+
+struct library_scene {
+    const struct assimp_library *library;
+    void *keep = nullptr;
+    ~library_scene()
+    {
+        if (keep)
+            library->release(keep);
+    }
+};
+
+void import(reader &r, const unsigned char *bytes, size_t size_bytes)
+{
+    char reason[ASSIMP_REASON_BYTES] = "";
+    library_scene owner = {assimp_loaded(reason)};
+
+    if (!owner.library)
+        fail(r, "", "%s", reason);
+    check_bytes(r, bytes, size_bytes);
+    std::string mended;
+    if (strcmp(r.format->ending, ".dae") == 0) {
+        mended = named_cameras(bytes, size_bytes);
+        if (memmem(bytes, size_bytes, "<morph ", 7))
+            import_note(r.scene, PROTOCOL_SEVERITY_WARNING, "",
+                        "meshes with morph targets of COLLADA files are not shown; write it as glTF");
+    }
+    if (!mended.empty()) {
+        bytes = reinterpret_cast<const unsigned char *>(mended.data());
+        size_bytes = mended.size();
+    }
+    r.source = owner.library->read(r.format->ending, r.format, bytes, size_bytes, &owner.keep, reason);
+    if (!r.source || !r.source->mRootNode)
+        explain(r, reason);
+    add_materials(r);
+    add_scene(r);
+    add_skins(r);
+    add_clips(r);
+}
+} // namespace
+} // namespace assimp
+
+extern "C" bool assimp_import(struct import_scene *scene, struct files *files, const struct assimp_format *format,
+                              double point_size, const unsigned char *bytes, size_t size_bytes)
+{
+    try {
+        assimp::reader r = {scene, files, format, point_size};
+        assimp::import(r, bytes, size_bytes);
+    } catch (const assimp::failed &) {
+        // said already
+    } catch (const std::bad_alloc &) {
+        import_fail(scene, nullptr, "%s", assimp::too_large);
+    } catch (const std::exception &exception) {
+        import_fail(scene, nullptr, "the file cannot be parsed: %s", exception.what());
+    } catch (...) {
+        import_fail(scene, nullptr, "the file cannot be parsed");
+    }
+    return !scene->failed;
+}
