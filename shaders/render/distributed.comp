@@ -28,9 +28,6 @@
 // A child with a lower weight than this is traced with the probability weight / this, and then has this weight.
 const float ROULETTE = 1.0 / 4.0;
 
-// With radiance_limit: one sample of an emitter brings a surface at most so many times what it would if it were all around.
-const float SCATTERED_LIMIT = 4.0;
-
 #if defined(HAS_EMITTERS) || defined(HAS_ENVIRONMENT_TABLE)
 #define TWO_WAYS
 #endif
@@ -154,10 +151,6 @@ bool ask_for_emitter(eye_hit e, shadow_choice c)
     if (sampled.probability > 0.0)
         arriving = e.weight * sent * sampled.radiance * (emitter_share_asked(sampled, chance, found) /
                                                          (sampled.probability * chance));
-    // Nothing else finds what is scattered of an emitter that all but touches the surface.
-    float stands_for = NoL * INVERSE_PI / max(sampled.probability * chance, 1e-30);
-    if (!mirrored && radiance_limit > 0.0 && stands_for > SCATTERED_LIMIT)
-        arriving *= SCATTERED_LIMIT / stands_for;
     return add_shadow_ray_from(e.j, e.p, e.origin, sampled.direction, mirrored ? RAY_STOPS_T_MIN : 0.0,
                                sampled.distance_, limited(e.p, 0u, arriving));
 }

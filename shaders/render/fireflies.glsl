@@ -3,7 +3,7 @@
 //
 //   limited                what a path brings over a rough surface and at least one more is scaled down to a limit. Whole
 //                          stays light that one rough surface alone scatters to the eye, or to smooth mirrors and windows
-//                          before it; but see SCATTERED_LIMIT of distributed.comp
+//                          before it
 //   regularised_roughness  behind a rough surface no sharper one is seen: Kaplanyan, Dachsbacher. Path Space Regularization
 //                          for Holistic and Robust Light Transport. 2013. Angles shrink as the sixth root of the number
 //                          of samples, so that noise and bias both vanish

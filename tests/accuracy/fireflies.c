@@ -120,8 +120,9 @@ TEST(a_sample_brings_no_more_than_the_limit)
     assert_true(fabs(exposed.most - 2.0 * on.most) <= 1e-5);
 }
 
-/* A lamp a centimetre above a floor, which shadow rays alone find. */
-TEST(a_sample_of_a_lamp_brings_a_surface_at_most_four_times_its_radiance)
+/* A lamp a centimetre above a floor, which shadow rays alone find: as they are spread over its solid angle, at
+ * most half a sphere, and one of its two triangles is chosen, a sample brings at most 2 x 2 times its radiance. */
+TEST(a_lamp_that_nearly_touches_a_surface_makes_no_specks)
 {
     struct fixture *fixture = *state;
     begin(fixture, INTEGRATOR_DISTRIBUTED, 1);
@@ -129,9 +130,9 @@ TEST(a_sample_of_a_lamp_brings_a_surface_at_most_four_times_its_radiance)
     a_lamp(fixture, 0.3f, 0.0f, 0.01f, 1.0f)->alpha_mode = ALPHA_OPAQUE;
     fixture_look(fixture, 1.0f, 0.2f, 0.5f, 0.6f);
     const struct summary off = summary_of(fixture, 0.0f, 4), on = summary_of(fixture, 10.0f, 4);
-    print_message("maximum %.3f, limited %.3f; mean %.4f, limited %.4f\n", off.most, on.most, off.mean, on.mean);
-    assert_true(off.most > 8.0 && on.most <= 4.0 + 1e-5);
-    assert_near(on.mean, off.mean, 0.1 * off.mean);
+    print_message("maximum %.3f, mean %.4f\n", off.most, off.mean);
+    assert_true(off.most <= 4.0 && off.mean > 0.1);
+    assert_true(on.most == off.most && on.mean == off.mean); /* there is nothing to be limited */
 }
 
 /* The noise of a picture: by its mean, of two that differ in nothing else. */

@@ -4,6 +4,7 @@
  * Hu, Huang, Zhang, Yuan, Li. Ray Tracing via GPU Rasterization. 2014. */
 #include "gpu/timer.h"
 #include "trace/abuffer/build.h"
+#include "abuffer/layout.h"
 #include "trace/abuffer/store.h"
 #include "trace/abuffer/trace.h"
 #include "trace/raster/box.h"
@@ -82,7 +83,8 @@ static bool fit(struct abuffer *abuffer, const struct gpu_scene *scene, const ui
                 const struct axes_box *box, struct error *error)
 {
     const struct axes_box whole = axes_box_whole(box, abuffer->resolution);
-    const struct axes_layers layers = axes_count_layers(scene, instances, count, 0, &whole);
+    const float steep = abuffer_is_linear(&abuffer->base.options) ? 0 : ABUFFER_STEEP;
+    const struct axes_layers layers = axes_count_layers(scene, instances, count, 0, steep, &whole);
     uint32_t fitted = abuffer->resolution;
     if (!axes_fit_resolution(&abuffer->base, layers.mean, &fitted, error))
         return false;

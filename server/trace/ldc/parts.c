@@ -182,7 +182,7 @@ static bool place_part(struct ldc_part *fresh, const struct ldc_part *before, co
         return false;
     if (count > 0 && !is_counted) {
         const struct axes_box whole = axes_box_whole(&fresh->box, resolution);
-        const struct axes_layers layers = axes_count_layers(scene, instances, count, settings->overlap, &whole);
+        const struct axes_layers layers = axes_count_layers(scene, instances, count, settings->overlap, 0, &whole);
         if (!axes_fit_depth(settings->tracer, layers.greatest, LDC_LISTED_LAYERS_MAX, error) ||
             !axes_fit_resolution(settings->tracer, layers.mean, &resolution, error) ||
             !axes_box_place(&fresh->box, scene, instances, count, resolution, error))

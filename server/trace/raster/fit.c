@@ -27,7 +27,7 @@ static void areas_of(double rows[3][3], const struct instance *instance)
 /* What is counted so far. */
 struct counting {
     const struct axes_box *whole; /* of one cell */
-    double overlap;
+    double overlap, steep;
     double each;   /* primitives that the next one stands for */
     double areas;  /* in all three images, square metres */
     double *steps; /* of the layers' numbers along u and v: COUNTED_STEPS an image; NULL: only areas are counted */
@@ -76,16 +76,19 @@ static double greatest_of(double *steps)
 }
 
 /* Of a flat area with this normal in object space, what the images that it is in see, square metres. */
-static void areas_in_images(double areas[3], const double rows[3][3], const double normal[3], double overlap)
+static void areas_in_images(double areas[3], const double rows[3][3], const double normal[3], double overlap,
+                            double steep)
 {
     int dominant = 0;
+    double squares = 0;
     for (int r = 0; r < 3; r++) {
         areas[r] = fabs(rows[r][0] * normal[0] + rows[r][1] * normal[1] + rows[r][2] * normal[2]);
         dominant = areas[r] > areas[dominant] ? r : dominant;
+        squares += areas[r] * areas[r];
     }
-    const double maximum = areas[dominant];
+    const double least = fmax(overlap * areas[dominant], steep * sqrt(squares));
     for (int r = 0; r < 3; r++)
-        if (overlap == 1 ? r != dominant : !(areas[r] >= overlap * maximum))
+        if (overlap == 1 ? r != dominant : !(areas[r] >= least))
             areas[r] = 0;
 }
 
@@ -112,17 +115,18 @@ static void count_triangle(struct counting *counting, const struct instance *ins
         lower[r] = fmin(world[0], fmin(world[1], world[2]));
         upper[r] = fmax(world[0], fmax(world[1], world[2]));
     }
-    areas_in_images(areas, rows, normal, counting->overlap);
+    areas_in_images(areas, rows, normal, counting->overlap, counting->steep);
     count_areas(counting, areas, lower, upper);
 }
 
 /* The share of a sphere's projection along an axis within which its normal leans to the axis enough: the
  * directions through a square at distance 1, which reaches 1 / overlap to each side, weighed by their cosine (the
- * form factor of a rectangle). */
-static double share_of_sphere(double overlap)
+ * form factor of a rectangle). Without an overlap: what lies within the sine that belongs to the cosine `steep`.
+ */
+static double share_of_sphere(double overlap, double steep)
 {
     if (overlap == 0)
-        return 1;
+        return 1 - steep * steep;
     const double reach = 1 / overlap, edge = reach / sqrt(1 + reach * reach);
     return 4 / PI * edge * atan(edge);
 }
@@ -132,7 +136,7 @@ static void count_sphere(struct counting *counting, const struct instance *insta
                          const struct scene_spheres *spheres, uint32_t sphere)
 {
     const float *at = (const float *)(const void *)spheres->centres_radii->data + 4 * (size_t)sphere;
-    const double radius = (double)at[3], share = share_of_sphere(counting->overlap);
+    const double radius = (double)at[3], share = share_of_sphere(counting->overlap, counting->steep);
     double areas[3], lower[3], upper[3];
     for (int r = 0; r < 3; r++) {
         const float *m = instance->world_from_object[r];
@@ -166,9 +170,9 @@ static void count_instance(struct counting *counting, const struct gpu_scene *sc
 }
 
 struct axes_layers axes_count_layers(const struct gpu_scene *scene, const uint32_t *instances, uint32_t count,
-                                     float overlap, const struct axes_box *whole)
+                                     float overlap, float steep, const struct axes_box *whole)
 {
-    struct counting counting = {.whole = whole, .overlap = (double)overlap};
+    struct counting counting = {.whole = whole, .overlap = (double)overlap, .steep = (double)steep};
     const double side = (double)whole->cell_world;
     struct axes_layers layers = {0};
     uint64_t primitives = 0;

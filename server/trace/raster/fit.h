@@ -26,9 +26,10 @@ struct axes_layers {
 };
 
 /* Of large meshes some primitives stand for all; meshes that deform count as if they did not. `overlap`: as
- * axes_pass; 0: every triangle is in all images. `whole`: the cube, as one cell. */
+ * axes_pass; 0: every triangle is in all images, but for those whose unit normal has a smaller component than
+ * `steep` along the axis. `whole`: the cube, as one cell. */
 struct axes_layers axes_count_layers(const struct gpu_scene *scene, const uint32_t *instances, uint32_t count,
-                                     float overlap, const struct axes_box *whole);
+                                     float overlap, float steep, const struct axes_box *whole);
 
 /* Lowers *resolution to what `layers`, on average, allow the tracer. Fails, with a remedy, where that were less
  * than AXES_FITTED_MIN and less than what was asked for. */

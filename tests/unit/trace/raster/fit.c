@@ -7,6 +7,7 @@
 #include "tests/harness/test.h"
 #include "trace/raster/draw.h"
 #include "trace/raster/fit.h"
+#include "raster/layout.h"
 
 #define RESOLUTION 256u
 /* Both scenes have more at this resolution. */
@@ -112,13 +113,14 @@ static struct tracer_options options_at(uint32_t resolution, uint32_t samples_ma
                                    .bench = {.axes_samples = samples_max}};
 }
 
-static struct axes_layers count_layers(const struct fixture *fixture, float overlap, float longest_world)
+static struct axes_layers count_layers(const struct fixture *fixture, float overlap, float steep,
+                                       float longest_world)
 {
     const struct axes_box whole = {.cell_world = longest_world};
     uint32_t *instances = NULL, count = 0;
     struct error error = {0};
     expect_ok(axes_list_instances(&fixture->gpu, &instances, &count, &error), &error);
-    const struct axes_layers layers = axes_count_layers(&fixture->gpu, instances, count, overlap, &whole);
+    const struct axes_layers layers = axes_count_layers(&fixture->gpu, instances, count, overlap, steep, &whole);
     free(instances);
     return layers;
 }
@@ -128,7 +130,8 @@ static double predicted_samples(const struct fixture *fixture, unsigned tracer)
     const double along = (double)told(fixture->tracer, row_of(tracer, "static/resolution"));
     const double cell_world = (double)told_metres(fixture->tracer, row_of(tracer, "static/cell"));
     const struct axes_layers layers =
-        count_layers(fixture, tracer == TRACER_LDC ? AXES_OVERLAP : 0, (float)(along * cell_world));
+        tracer == TRACER_LDC ? count_layers(fixture, AXES_OVERLAP, 0, (float)(along * cell_world))
+                             : count_layers(fixture, 0, FACE_STEEP_BELOW, (float)(along * cell_world));
     return layers.mean * 3 * along * along;
 }
 
@@ -206,7 +209,7 @@ TEST(a_stack_is_as_deep_as_it_has_plates)
     add_stack(&edits, 300, 10.0f / 128);
     test_commit(&edits);
     fixture_init_by(&fixture, TRACER_ABUFFER, edits.scene, &options);
-    const struct axes_layers layers = count_layers(&fixture, 0, 1);
+    const struct axes_layers layers = count_layers(&fixture, 0, 0, 1);
     assert_true(layers.greatest > 301.0 * (10 * 10) / (12 * 12) && layers.greatest < 301.5);
     assert_true(layers.mean < 1.5);
     fixture_finish(&fixture);
