@@ -107,7 +107,10 @@ static bool read_all(struct animation *animation, int argc, char **argv)
         .args_doc = "MODEL --frames A-B -o 'DIR/%04d.exr'\nMODEL --clip NAME -o MOVIE.mp4\n"
                     "--scene NAME --server ADDRESS --frames A-B -o 'DIR/%04d.exr'\n--script SHOT.json",
         .doc =
-            "Render a series of pictures or a video of a model, with clips or a moving camera.\v"
+            "Render a series of pictures or a video of a model, with clips or a moving camera. 'farlight "
+            "turntable' does the "
+            "same with --orbit: once around the model, which takes 4 seconds unless something else says how "
+            "long.\v"
             "In the name of the images write %d or %04d for the frame's number and %% for a percent sign. Videos "
             "end "
             "in .mp4, .mkv or .y4m; '-' is standard output, as y4m.",
@@ -136,12 +139,24 @@ static int run(struct animation *animation)
     return cli_dry_run(job);
 }
 
-int cli_animate(int argc, char **argv)
+static int animate(int argc, char **argv, bool is_turntable)
 {
     struct animation animation = {0};
-    const bool good = read_all(&animation, argc, argv) && cli_series_complete(&animation.job);
+    bool good = read_all(&animation, argc, argv);
+    animation.job.is_orbit |= is_turntable;
+    good = good && cli_series_complete(&animation.job);
     const int status = good ? run(&animation) : cli_report(&animation.job.error);
     cli_series_finish(&animation.job);
     cli_shot_finish(&animation.shot);
     return status;
+}
+
+int cli_animate(int argc, char **argv)
+{
+    return animate(argc, argv, false);
+}
+
+int cli_turntable(int argc, char **argv)
+{
+    return animate(argc, argv, true);
 }

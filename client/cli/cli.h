@@ -22,6 +22,7 @@ enum cli_status {
 /* Subcommands: argv[0] is "farlight NAME". They return the exit status. */
 int cli_render(int argc, char **argv);
 int cli_animate(int argc, char **argv);
+int cli_turntable(int argc, char **argv);
 int cli_info(int argc, char **argv);
 int cli_compare(int argc, char **argv);
 int cli_compare_tracers(int argc, char **argv); /* where cli_compare finds --tracers */
@@ -228,6 +229,8 @@ struct cli_job {
     bool has_aperture, has_focus;
     struct cli_views views;
     bool has_eye, has_look_at, has_up, has_fov; /* in `key` */
+    bool has_framing;                           /* something of the automatic camera is given */
+    const char *framed;                         /* node that it shows, name or number; NULL: all */
     bool float_pixels, half_pixels, has_encoding, has_primary, has_quality, has_integrator, has_clamp, quiet,
         is_orbit;
     bool has_samples;
@@ -314,6 +317,10 @@ bool cli_loading_begin(struct cli_loading *loading, struct fl_error *error);
 bool cli_loading_end(struct cli_loading *loading, struct fl_error *error);
 void cli_loading_close(struct cli_loading *loading);
 /* Sets the job's camera if the command line leaves it to the model. */
+/* A camera by name or number; without one the model's first, unless keys or something else place it. `framed`: the
+ * node that is to be in view, name or number; NULL: all. */
+bool cli_find_camera(struct message_render *render, const char *camera, const char *framed, bool is_placed,
+                     const struct fl_scene *scene, struct fl_error *error);
 bool cli_choose_camera(struct cli_job *job, const struct fl_scene *scene, struct fl_error *error);
 
 /* ---- retry.c: lost daemons that may come back ---- */

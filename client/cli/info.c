@@ -170,6 +170,12 @@ static void print_table(const struct info_options *wanted, const struct fl_model
         print_bounds(info->lower_world, info->upper_world);
         putchar('\n');
     }
+    const struct message_render usual = fl_render_defaults();
+    if (info->camera_count > 0)
+        printf("  %-10s camera 0, or --view, --azimuth, --eye\n", "seen by");
+    else
+        printf("  %-10s a camera at azimuth %g and elevation %g degrees that sees all, or --view, --eye\n",
+               "seen by", (double)usual.auto_azimuth, (double)usual.auto_elevation);
     print_objects("node", info->node_list, info->node_list_count);
     print_objects("material", info->material_list, info->material_list_count);
     print_objects("light", info->light_list, info->light_list_count);

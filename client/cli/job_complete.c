@@ -186,10 +186,21 @@ static bool complete_camera(struct cli_job *job)
                          job->has_eye ? "--look-at" : "--eye") == 0;
     if (has_key && job->camera)
         return cli_usage(job, "--camera", "cannot go with --eye and --look-at") == 0;
-    if (!has_key && (job->has_up || job->has_fov))
-        return cli_usage(job, job->has_up ? "--up" : "--fov", "needs --eye and --look-at") == 0;
-    if (!has_key)
+    if (!has_key && job->has_up)
+        return cli_usage(job, "--up", "needs --eye and --look-at") == 0;
+    if (job->has_framing && (has_key || job->camera))
+        return cli_usage(
+                   job, job->camera ? "--camera" : "--eye",
+                   "cannot go with --view, --azimuth, --elevation, --frame, --zoom or --margin, which place the "
+                   "camera, too") == 0;
+    if (job->has_fov && job->camera)
+        return cli_usage(job, "--fov", "cannot go with --camera, which has its own") == 0;
+    if (!has_key) {
+        if (job->has_fov)
+            job->options.auto_fov = (float)((double)job->key.fov_y / RADIANS_PER_DEGREE);
+        job->has_framing |= job->has_fov;
         return true;
+    }
     if (memcmp(job->key.eye_world, job->key.look_at_world, sizeof(job->key.eye_world)) == 0)
         return cli_usage(job, "--look-at", "is where --eye is") == 0;
     if (is_zero(job->key.up_world) || is_degenerate(&job->key))
@@ -197,6 +208,25 @@ static bool complete_camera(struct cli_job *job)
     job->options.camera_path = PROTOCOL_CAMERA_KEYS;
     job->options.keys = &job->key;
     job->options.keys_count = 1;
+    return true;
+}
+
+bool cli_find_camera(struct message_render *render, const char *camera, const char *framed, bool is_placed,
+                     const struct fl_scene *scene, struct fl_error *error)
+{
+    if (framed && !fl_scene_find_object(scene, PROTOCOL_OBJECT_NODE, framed, &render->auto_node, error))
+        return false;
+    if (render->keys_count > 0 || is_placed)
+        return true;
+    if (camera) {
+        render->camera_path = PROTOCOL_CAMERA_NODE;
+        return fl_scene_find_camera(scene, camera, &render->camera_node, error);
+    }
+    const struct fl_camera_info *first = fl_scene_camera(scene, 0);
+    if (first) {
+        render->camera_path = PROTOCOL_CAMERA_NODE;
+        render->camera_node = first->node;
+    }
     return true;
 }
 

@@ -37,6 +37,8 @@ enum key {
     KEY_LOOK_AT,
     KEY_UP,
     KEY_FOV,
+    KEY_VIEW,
+    KEY_FRAME,
     KEY_FORMAT,
     KEY_HALF,
     KEY_FLOAT,
@@ -102,7 +104,13 @@ static const struct argp_option special[] = {
     {"eye", KEY_EYE, "X,Y,Z", 0, "Place of the camera; needs --look-at", CLI_GROUP_OUTPUT},
     {"look-at", KEY_LOOK_AT, "X,Y,Z", 0, "What is in the middle of the picture", CLI_GROUP_OUTPUT},
     {"up", KEY_UP, "X,Y,Z", 0, "Upward direction (default 0,1,0)", CLI_GROUP_OUTPUT},
-    {"fov", KEY_FOV, "DEGREES", 0, "Vertical field of view (default 45)", CLI_GROUP_OUTPUT},
+    {"fov", KEY_FOV, "DEGREES", 0, "Vertical field of view (default 45; 40 of a camera that sees all)",
+     CLI_GROUP_OUTPUT},
+    {"view", KEY_VIEW, "NAME", 0,
+     "See all from the front (+z), back, left (-x), right (+x), top, bottom, or iso: from the front right above",
+     CLI_GROUP_OUTPUT},
+    {"frame", KEY_FRAME, "NODE", 0, "See all of this node and what is below it ('farlight info' lists them)",
+     CLI_GROUP_OUTPUT},
     {NULL, 0, NULL, 0, "Several views in one picture, each of --size:", CLI_GROUP_VIEWS},
     {"stereo", KEY_VIEWS, "METRES", 0, "Two views, from eyes this far apart, such as 0.065", CLI_GROUP_OUTPUT},
     {"stereo-layout", KEY_VIEWS + 1, "side|over|files", 0,
@@ -187,6 +195,24 @@ static error_t set_fov(struct cli_job *job, const char *field, const char *value
     job->key.fov_y = (float)(degrees * RADIANS_PER_DEGREE);
     job->has_fov = true;
     return status;
+}
+
+static error_t set_view(struct cli_job *job, const char *field, const char *value)
+{
+    static const struct {
+        const char *name;
+        float azimuth, elevation;
+    } views[] = {{"front", 0, 0}, {"back", 180, 0},   {"left", -90, 0},      {"right", 90, 0},
+                 {"top", 0, 90},  {"bottom", 0, -90}, {"iso", 45, 35.26439f}}; /* the diagonal of a cube */
+    for (size_t i = 0; i < sizeof(views) / sizeof(views[0]); i++) {
+        if (strcmp(value, views[i].name) != 0)
+            continue;
+        job->options.auto_azimuth = views[i].azimuth;
+        job->options.auto_elevation = views[i].elevation;
+        job->has_framing = true;
+        return 0;
+    }
+    return cli_usage(job, field, "'%s' is not known (known: front, back, left, right, top, bottom, iso)", value);
 }
 
 /* "#rrggbb", as displays have it. */
@@ -335,6 +361,12 @@ static error_t set_option(struct cli_job *job, int key, const char *field, const
         return set_format(job, field, value);
     case KEY_FOV:
         return set_fov(job, field, value);
+    case KEY_VIEW:
+        return set_view(job, field, value);
+    case KEY_FRAME:
+        job->framed = value;
+        job->has_framing = true;
+        return 0;
     case KEY_CLIP_START:
         return set_real(job, field, value, -1e6, 1e6, &job->clip_start_s);
     case KEY_CLIP_SPEED:

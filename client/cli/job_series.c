@@ -94,9 +94,9 @@ static bool load_keys(struct cli_job *job)
 
 bool cli_series_complete(struct cli_job *job)
 {
-    if (!job->series.has_range && job->clip_count == 0 && !job->script) {
+    if (!job->series.has_range && job->clip_count == 0 && !job->script && !job->is_orbit) {
         cli_usage(job, "--frames", "no range of frames is given");
-        return fl_error_remedy(&job->error, "for example --frames 1-120; a clip or a script needs none");
+        return fl_error_remedy(&job->error, "for example --frames 1-120; an orbit, a clip or a script needs none");
     }
     if (!cli_job_complete(job, true))
         return false;

@@ -89,20 +89,8 @@ void cli_loading_close(struct cli_loading *loading)
     loading->connection = NULL;
 }
 
-/* By name or number; without either the model's first camera, unless keys or an orbit set the view. */
 bool cli_choose_camera(struct cli_job *job, const struct fl_scene *scene, struct fl_error *error)
 {
-    struct message_render *options = &job->options;
-    if (options->keys_count > 0 || job->is_orbit)
-        return true;
-    if (job->camera) {
-        options->camera_path = PROTOCOL_CAMERA_NODE;
-        return fl_scene_find_camera(scene, job->camera, &options->camera_node, error);
-    }
-    const struct fl_camera_info *first = fl_scene_camera(scene, 0);
-    if (first) {
-        options->camera_path = PROTOCOL_CAMERA_NODE;
-        options->camera_node = first->node;
-    }
-    return true;
+    return cli_find_camera(&job->options, job->camera, job->framed, job->has_framing || job->is_orbit, scene,
+                           error);
 }

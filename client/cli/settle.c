@@ -10,6 +10,7 @@
 
 #define RADIANS_PER_DEGREE 0.017453292519943295
 #define FRAME_MAX 10000000u
+#define ORBIT_SECONDS 4 /* once around */
 
 /* An error in a script's value names the script. */
 static bool in_script(const struct cli_job *job, unsigned line, const char *path, struct fl_error *error)
@@ -97,20 +98,22 @@ static double last_key_s(const struct cli_job *job)
     return fmax(last_s, job->series.dolly_seconds);
 }
 
-/* Without a range: one pass of the clips, or of the script's keys. A repeated clip begins again one frame after
- * the last. */
+/* Without a range: one pass of the clips, of the script's keys, or of the orbit. A repeated clip and an orbit
+ * begin again one frame after the last. */
 static bool choose_range(struct cli_job *job, double clips_s, struct fl_error *error)
 {
     struct cli_series *series = &job->series;
     const double fps = (double)job->options.frames_per_second, keys_s = last_key_s(job);
-    const bool by_clips = clips_s > 0;
-    bool loops = false;
+    const double orbit_s = series->orbit_seconds > 0 ? series->orbit_seconds : ORBIT_SECONDS;
+    const bool by_clips = clips_s > 0, by_orbit = !by_clips && keys_s <= 0 && job->is_orbit;
+    bool loops = by_orbit;
     for (size_t i = 0; i < job->clip_count; i++)
         loops = loops || job->clips[i].loop;
-    const double frames = floor((by_clips ? clips_s : keys_s) * fps + 0.5) + (by_clips && loops ? 0 : 1);
+    const double seconds = by_clips ? clips_s : by_orbit ? orbit_s : keys_s;
+    const double frames = floor(seconds * fps + 0.5) + ((by_clips || by_orbit) && loops ? 0 : 1);
     if (series->has_range)
         return true;
-    if (!by_clips && keys_s <= 0) {
+    if (!by_clips && !by_orbit && keys_s <= 0) {
         fl_error_set(error, FL_ERROR_ARGUMENT, "--frames",
                      "no range of frames is given, and nothing says how long "
                      "this takes");

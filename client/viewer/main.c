@@ -316,6 +316,8 @@ static void fill(struct command_line *line)
     viewer->has_primary = job->has_primary;
     viewer->has_integrator = job->has_integrator;
     viewer->camera = job->camera;
+    viewer->framed = job->framed;
+    viewer->has_framing = job->has_framing;
     viewer->clip = job->clip_count > 0 ? job->clips[0].which : NULL;
     viewer->speed = job->clip_count > 0 ? job->clips[0].speed : 1;
     viewer->interrupt_fd = cli_interrupt_fd();

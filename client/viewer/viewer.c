@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "viewer/viewer.h"
 #include "viewer/viewer_state.h"
+#include "cli/cli.h"
 #include "protocol/common/clock.h"
 
 #include <errno.h>
@@ -37,18 +38,11 @@ static bool settle(struct viewer *viewer, struct fl_error *error)
     const struct viewer_options *options = viewer->options;
     struct message_render *job = &viewer->view;
     struct fl_scene *scene = session_scene(viewer->session);
-    const struct fl_camera_info *first = fl_scene_camera(scene, 0);
     uint32_t clip = 0;
     tour_begin(&viewer->tour, fl_scene_camera_count(scene), fl_scene_clip_count(scene));
     viewer->tour.speed = options->speed;
-    if (options->camera) {
-        job->camera_path = PROTOCOL_CAMERA_NODE;
-        if (!fl_scene_find_camera(scene, options->camera, &job->camera_node, error))
-            return false;
-    } else if (job->keys_count == 0 && first) {
-        job->camera_path = PROTOCOL_CAMERA_NODE;
-        job->camera_node = first->node;
-    }
+    if (!cli_find_camera(job, options->camera, options->framed, options->has_framing, scene, error))
+        return false;
     if (!options->clip)
         return true;
     if (!fl_scene_find_clip(scene, options->clip, &clip, NULL, error))

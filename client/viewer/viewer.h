@@ -19,6 +19,8 @@ struct viewer_options {
     bool always_adapt, never_adapt;
     float moving_rate;         /* frames a second */
     const char *camera, *clip; /* names or numbers; NULL: none is named */
+    const char *framed;        /* node that is to be in view, likewise */
+    bool has_framing;          /* the camera is placed by the side that it looks from */
     double speed;              /* of the clip */
     unsigned coarser;          /* as of struct settings */
     enum local_views local;    /* likewise */

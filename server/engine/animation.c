@@ -94,18 +94,26 @@ bool animation_turn(struct frame_camera *camera, const float axis_world[3], cons
     return true;
 }
 
-/* Of everything at time 0 of the job. */
+/* Of everything at time 0 of the job, or of the node that is framed. */
 static bool find_bounds(const struct engine_job *job, const struct scene *scene, struct animation_bounds *bounds,
                         struct error *error)
 {
+    if (job->framed_node && !scene_node(scene, job->framed_node))
+        return error_set(error, ERROR_UNKNOWN_ID, "render.auto_node", "node %u does not exist", job->framed_node);
     if (bounds->known && bounds->revision == scene->revision)
         return true;
     struct scene_pose pose;
     if (!scene_pose_evaluate(&pose, scene, job->clips, job->clip_count, 0.0, error))
         return false;
     *bounds = (struct animation_bounds){.known = true, .revision = scene->revision};
-    bool any = scene_bounds(scene, &pose, bounds->lower, bounds->upper);
+    bool any = scene_bounds_below(scene, &pose, job->framed_node, bounds->lower, bounds->upper);
     scene_pose_finish(&pose);
+    if (!any && job->framed_node) {
+        bounds->known = false;
+        error_set(error, ERROR_INVALID, "render.auto_node", "nothing of node %u and what is below it is visible",
+                  job->framed_node);
+        return error_remedy(error, "frame a node that shows a mesh or spheres, or one above it");
+    }
     for (int axis = 0; axis < 3 && !any; axis++) {
         /* Nothing but the environment to see: any place will do. */
         bounds->lower[axis] = -1.0f;
@@ -136,7 +144,9 @@ static bool auto_camera(const struct engine_job *job, const struct scene *scene,
         return false;
     uint32_t width, height;
     frame_view_size(&job->frame, &width, &height);
-    frame_camera_auto(camera, bounds->lower, bounds->upper, (float)width / (float)height);
+    struct frame_framing framing = job->framing;
+    framing.turns = job->path == CAMERA_ORBIT;
+    frame_camera_auto(camera, &framing, bounds->lower, bounds->upper, (float)width / (float)height);
     return true;
 }
 

@@ -88,6 +88,8 @@ struct engine_job {
     unsigned quality;
     enum camera_path path;
     uint32_t camera_node;
+    struct frame_framing framing; /* of the path auto */
+    uint32_t framed_node;         /* 0: all of the scene */
     float orbit_turn, orbit_seconds;
     struct camera_key *keys; /* owned */
     uint32_t key_count;

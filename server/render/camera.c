@@ -6,8 +6,9 @@
 #include <math.h>
 #include <string.h>
 
-#define AUTO_FOV_Y 0.7f   /* radians; about 40 degrees, a portrait lens */
-#define AUTO_MARGIN 1.06f /* of the distance at which the bounds touch the picture's edge */
+#define PI 3.14159265358979323846
+/* Of the bounds' extents: the eye is at least so far before them. */
+#define NEAREST_SHARE 0.01
 
 static double dot3(const double a[3], const double b[3])
 {
@@ -55,37 +56,75 @@ bool frame_camera_look_at(struct frame_camera *camera, const float eye[3], const
     return true;
 }
 
-void frame_camera_auto(struct frame_camera *camera, const float lower[3], const float upper[3], float aspect)
+/* The corners of a box, or points on the two rims of the cylinder that it stands in as it turns. */
+#define POINTS_OF_BOX 8
+#define POINTS_OF_TURN 64
+
+static unsigned points_of(double points[POINTS_OF_TURN][3], const float lower[3], const float upper[3], bool turns)
 {
-    double back[3] = {0.45, 0.35, 1.0}, right[3], above[3], centre[3], half[3];
-    const double up[3] = {0.0, 1.0, 0.0};
-    normalise3(back);
-    cross3(right, up, back);
-    normalise3(right);
-    cross3(above, back, right);
-    double tan_y = tan((double)AUTO_FOV_Y / 2.0), tan_x = tan_y * (double)aspect, distance = 0.0;
+    const unsigned count = turns ? POINTS_OF_TURN : POINTS_OF_BOX;
+    double middle[3], half[3];
     for (int i = 0; i < 3; i++) {
-        centre[i] = ((double)lower[i] + (double)upper[i]) / 2.0;
+        middle[i] = ((double)lower[i] + (double)upper[i]) / 2.0;
         half[i] = ((double)upper[i] - (double)lower[i]) / 2.0;
     }
-    for (int corner = 0; corner < 8; corner++) {
-        double p[3];
-        for (int i = 0; i < 3; i++)
-            p[i] = (corner >> i & 1) ? half[i] : -half[i];
-        double towards = dot3(p, back);
-        distance = fmax(distance, towards + fabs(dot3(p, right)) / tan_x);
-        distance = fmax(distance, towards + fabs(dot3(p, above)) / tan_y);
+    /* Of the polygon about the circle, not in it. */
+    const double radius = hypot(half[0], half[2]) / cos(2.0 * PI / POINTS_OF_TURN);
+    for (unsigned i = 0; i < count; i++) {
+        const double angle = (i / 2) * (4.0 * PI / POINTS_OF_TURN);
+        points[i][0] = middle[0] + (turns ? radius * cos(angle) : (i & 2) ? half[0] : -half[0]);
+        points[i][1] = middle[1] + ((i & 1) ? half[1] : -half[1]);
+        points[i][2] = middle[2] + (turns ? radius * sin(angle) : (i & 4) ? half[2] : -half[2]);
     }
-    distance = distance > 0.0 && isfinite(distance) ? distance * (double)AUTO_MARGIN : 1.0;
-    float eye[3], look_at[3];
-    const float up_world[3] = {0.0f, 1.0f, 0.0f};
-    for (int i = 0; i < 3; i++) {
-        look_at[i] = (float)centre[i];
-        eye[i] = (float)(centre[i] + back[i] * distance);
+    return count;
+}
+
+/* What must fit between two edges of the picture, as seen along one axis of it. */
+struct reach {
+    double most, least; /* where lines through the points, along the edges, meet the plane of the origin */
+};
+
+static void reach_of(struct reach *reach, double across, double behind, double slope)
+{
+    reach->most = fmax(reach->most, across + behind * slope);
+    reach->least = fmin(reach->least, across - behind * slope);
+}
+
+void frame_camera_auto(struct frame_camera *camera, const struct frame_framing *framing, const float lower[3],
+                       const float upper[3], float aspect)
+{
+    const double azimuth = (double)framing->azimuth, elevation = (double)framing->elevation;
+    /* Not by an upward direction: seen from above there is none. */
+    const double right[3] = {cos(azimuth), 0.0, -sin(azimuth)};
+    const double back[3] = {sin(azimuth) * cos(elevation), sin(elevation), cos(azimuth) * cos(elevation)};
+    double above[3], points[POINTS_OF_TURN][3], diagonal = 0.0, nearest = -INFINITY;
+    cross3(above, back, right);
+    const double slope_y = tan((double)framing->fov_y / 2.0) * (1.0 - 2.0 * (double)framing->margin);
+    const double slope_x = slope_y * (double)aspect;
+    struct reach x = {-INFINITY, INFINITY}, y = x;
+    for (int i = 0; i < 3; i++)
+        diagonal += fabs((double)upper[i] - (double)lower[i]);
+    const unsigned count = points_of(points, lower, upper, framing->turns);
+    for (unsigned i = 0; i < count; i++) {
+        const double behind = dot3(points[i], back);
+        reach_of(&x, dot3(points[i], right), behind, slope_x);
+        reach_of(&y, dot3(points[i], above), behind, slope_y);
+        nearest = fmax(nearest, behind);
     }
-    if (!frame_camera_look_at(camera, eye, look_at, up_world, AUTO_FOV_Y)) { /* bounds at the end of the floats */
-        *camera = (struct frame_camera){.fov_y = AUTO_FOV_Y};
-        camera->world_from_view[0] = camera->world_from_view[5] = camera->world_from_view[10] = 1.0f;
+    double eye[3] = {(x.most + x.least) / 2.0, (y.most + y.least) / 2.0};
+    eye[2] = fmax((x.most - x.least) / (2.0 * slope_x), (y.most - y.least) / (2.0 * slope_y));
+    /* Something without an extent across the view, or without any. */
+    eye[2] = fmax(eye[2], nearest + (diagonal > 0.0 ? NEAREST_SHARE * diagonal : 1.0));
+    *camera = (struct frame_camera){
+        .fov_y = (float)(2.0 * atan(tan((double)framing->fov_y / 2.0) / (double)framing->zoom))};
+    float *m = camera->world_from_view;
+    for (int row = 0; row < 3; row++) {
+        m[4 * row] = (float)right[row];
+        m[4 * row + 1] = (float)above[row];
+        m[4 * row + 2] = (float)back[row];
+        m[4 * row + 3] = (float)(eye[0] * right[row] + eye[1] * above[row] + eye[2] * back[row]);
+        if (!isfinite(m[4 * row + 3])) /* bounds at the end of the floats */
+            m[4 * row + 3] = 0.0f;
     }
 }
 

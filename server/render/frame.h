@@ -188,8 +188,18 @@ void frame_renderer_queue_ahead(struct frame_renderer *renderer, bool queues_ahe
 /* For tests: from the next frame on `impl` stands for that number of tracer_impl_by_number(); NULL: none does. */
 void frame_renderer_stand_in(struct frame_renderer *renderer, unsigned number, const struct tracer_impl *impl);
 
-/* A camera that sees all of the bounds, from the front right above, as `--camera auto` does. */
-void frame_camera_auto(struct frame_camera *camera, const float lower[3], const float upper[3], float aspect);
+/* How a camera that sees all of some bounds is placed. Angles in radians. */
+struct frame_framing {
+    float azimuth, elevation; /* of the eye: from +z about +y towards +x, and above the horizon */
+    float fov_y;              /* before the zoom */
+    float margin; /* share of the picture that stays free beside the bounds, at each edge, before the zoom */
+    float zoom;   /* scales the picture about its middle */
+    bool turns;   /* all stays in view where the eye turns about the vertical in the middle of the bounds */
+};
+/* A camera that sees all of the bounds, as near as that allows: they touch two opposite edges of the picture, or
+ * of the margin. */
+void frame_camera_auto(struct frame_camera *camera, const struct frame_framing *framing, const float lower[3],
+                       const float upper[3], float aspect);
 /* Pixels of one view. */
 void frame_view_size(const struct frame_request *request, uint32_t *width, uint32_t *height);
 bool frame_has_views(const struct frame_request *request); /* more than one */

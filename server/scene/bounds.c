@@ -58,8 +58,16 @@ static bool afford(const struct scene_mesh *mesh, uint64_t *left)
     return true;
 }
 
+/* Also the root itself; 0: everything is below it. */
+static bool is_below(const struct scene *scene, const struct scene_node *node, uint32_t root)
+{
+    while (node && root != 0 && node->base.id != root)
+        node = node->parent ? scene_node(scene, node->parent) : NULL;
+    return node != NULL;
+}
+
 static bool extend_by_kind(const struct scene *scene, const struct scene_pose *pose, enum node_kind kind,
-                           float lower[3], float upper[3])
+                           uint32_t root, float lower[3], float upper[3])
 {
     struct scene_instance *instances;
     size_t count;
@@ -68,7 +76,7 @@ static bool extend_by_kind(const struct scene *scene, const struct scene_pose *p
     bool found = false;
     uint64_t left = DEFORM_NUMBERS_MAX;
     for (size_t i = 0; i < count; i++) {
-        if (instances[i].singular)
+        if (instances[i].singular || !is_below(scene, instances[i].node, root))
             continue;
         uint32_t id = instances[i].node->object;
         const float *object_lower, *object_upper;
@@ -112,13 +120,19 @@ static bool extend_by_discs(const struct scene *scene, float lower[3], float upp
     return found;
 }
 
-bool scene_bounds(const struct scene *scene, const struct scene_pose *pose, float lower[3], float upper[3])
+bool scene_bounds_below(const struct scene *scene, const struct scene_pose *pose, uint32_t root, float lower[3],
+                        float upper[3])
 {
     for (int axis = 0; axis < 3; axis++) {
         lower[axis] = FLT_MAX;
         upper[axis] = -FLT_MAX;
     }
-    bool has_meshes = extend_by_kind(scene, pose, NODE_MESH, lower, upper);
-    bool has_spheres = extend_by_kind(scene, pose, NODE_SPHERES, lower, upper);
-    return has_meshes || has_spheres || extend_by_discs(scene, lower, upper);
+    bool has_meshes = extend_by_kind(scene, pose, NODE_MESH, root, lower, upper);
+    bool has_spheres = extend_by_kind(scene, pose, NODE_SPHERES, root, lower, upper);
+    return has_meshes || has_spheres || (root == 0 && extend_by_discs(scene, lower, upper));
+}
+
+bool scene_bounds(const struct scene *scene, const struct scene_pose *pose, float lower[3], float upper[3])
+{
+    return scene_bounds_below(scene, pose, 0, lower, upper);
 }

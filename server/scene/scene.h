@@ -282,5 +282,8 @@ bool scene_world_from_node(const struct scene *scene, const struct scene_pose *p
 /* Bounds in world space of everything visible, without discs unless there is nothing else. Deforming meshes count
  * as in the pose, unless they have hundreds of millions of vertices. False: nothing is visible. */
 bool scene_bounds(const struct scene *scene, const struct scene_pose *pose, float lower[3], float upper[3]);
+/* Likewise of a node and the nodes below it; 0: of all. */
+bool scene_bounds_below(const struct scene *scene, const struct scene_pose *pose, uint32_t root, float lower[3],
+                        float upper[3]);
 
 #endif

@@ -22,6 +22,7 @@
 #define QUALITY_OF_JPEG 90
 #define QUALITY_OF_H264 80
 #define LEVEL_OF_ZSTD 1
+#define DEGREE 0.017453293f
 
 /* ---- checks ------------------------------------------------------------------------------------------ */
 
@@ -455,6 +456,12 @@ static void fill_rest(struct engine_job *job, const struct session *session, con
         .quality = job_quality(render),
         .path = (enum camera_path)render->camera_path,
         .camera_node = render->camera_node,
+        .framing = {.azimuth = render->auto_azimuth * DEGREE,
+                    .elevation = render->auto_elevation * DEGREE,
+                    .fov_y = render->auto_fov * DEGREE,
+                    .margin = render->auto_margin,
+                    .zoom = render->auto_zoom},
+        .framed_node = render->auto_node,
         .orbit_turn = render->orbit_turn,
         .orbit_seconds = render->orbit_seconds,
         .upsample = render->upsample,

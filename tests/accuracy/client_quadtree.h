@@ -9,6 +9,7 @@
 #include "render/frame.h"
 #include "trace/quadtree/layers.h"
 #include "warp/warp.h"
+#include "tests/fixtures/framing.h"
 
 #include <unistd.h>
 
@@ -226,7 +227,7 @@ static inline struct sides *rendered(const struct scene *scene)
     struct layers *daemon = &sides->daemon;
     const struct gpu_scene *gpu = &daemon->gpu;
     struct frame_camera camera;
-    frame_camera_auto(&camera, gpu->lower_world, gpu->upper_world, (float)WIDTH / (float)HEIGHT);
+    frame_camera_auto(&camera, &usual_framing, gpu->lower_world, gpu->upper_world, (float)WIDTH / (float)HEIGHT);
     for (int i = 0; i < 3; i++)
         camera.world_from_view[4 * i + 3] = (gpu->lower_world[i] + gpu->upper_world[i]) / 2 +
                                             AWAY * gpu->diagonal * camera.world_from_view[4 * i + 2];

@@ -2,6 +2,7 @@
 /* The order of a frame: both ways to the primary hits, slices and their splits, seeds, formats, cameras. */
 #include "tests/accuracy/render_fixture.h"
 #include "tests/harness/test.h"
+#include "tests/fixtures/framing.h"
 
 static void primary_hits_agree_however_they_are_found(struct fixture *fixture, double share_allowed)
 {
@@ -287,25 +288,79 @@ TEST(impossible_requests_are_refused_with_the_field)
     assert_string_equal(error.field, "camera");
 }
 
-TEST(the_automatic_camera_sees_all_corners_and_wastes_little)
+/* Where the corners of bounds are in the picture: -1 .. 1 from edge to edge. */
+static void picture_bounds(const struct frame_camera *camera, const float lower[3], const float upper[3],
+                           float aspect, double least[2], double most[2])
 {
-    const float lower[3] = {-3.0f, 1.0f, 2.0f}, upper[3] = {5.0f, 2.0f, 40.0f}, aspect = 1.5f;
-    struct frame_camera camera;
-    frame_camera_auto(&camera, lower, upper, aspect);
-    float maximum = 0.0f;
+    const double tangent = tan((double)camera->fov_y / 2.0);
     for (int corner = 0; corner < 8; corner++) {
-        float d[3], v[3];
+        double v[3] = {0};
         for (int i = 0; i < 3; i++)
-            d[i] = ((corner >> i & 1) ? upper[i] : lower[i]) - camera.world_from_view[i * 4 + 3];
-        for (int i = 0; i < 3; i++)
-            v[i] = d[0] * camera.world_from_view[i] + d[1] * camera.world_from_view[4 + i] +
-                   d[2] * camera.world_from_view[8 + i];
-        assert_true(v[2] < 0.0f);
-        float tangent = tanf(camera.fov_y / 2.0f);
-        maximum = fmaxf(maximum, fmaxf(fabsf(v[0] / -v[2]) / (tangent * aspect), fabsf(v[1] / -v[2]) / tangent));
+            for (int axis = 0; axis < 3; axis++)
+                v[axis] += ((double)((corner >> i & 1) ? upper[i] : lower[i]) -
+                            (double)camera->world_from_view[i * 4 + 3]) *
+                           (double)camera->world_from_view[i * 4 + axis];
+        assert_true(v[2] < 0.0);
+        for (int axis = 0; axis < 2; axis++) {
+            double place = v[axis] / (-v[2] * tangent * (axis == 0 ? (double)aspect : 1.0));
+            least[axis] = corner ? fmin(least[axis], place) : place;
+            most[axis] = corner ? fmax(most[axis], place) : place;
+        }
     }
-    assert_true(maximum <= 1.0f);
-    assert_true(maximum > 0.6f);
+}
+
+/* Bounds touch two opposite edges, less the margin, and pass none. */
+TEST(the_automatic_camera_is_as_near_as_its_margin_allows)
+{
+    const float lower[3] = {-3.0f, 1.0f, 2.0f}, upper[3] = {5.0f, 2.0f, 40.0f};
+    for (int i = 0; i < 5 * 5 * 2 * 2; i++) {
+        struct frame_framing framing = usual_framing;
+        struct frame_camera camera;
+        double least[2], most[2];
+        framing.azimuth = 1.3f * (float)(i % 5);
+        framing.elevation = (float)(i / 5 % 5 - 2) * 0.78539816f; /* up to straight down */
+        framing.margin = i / 25 % 2 ? 0.1f : 0.0f;
+        const float aspect = i / 50 ? 0.4f : 1.5f;
+        const double edge = 1.0 - 2.0 * (double)framing.margin;
+        frame_camera_auto(&camera, &framing, lower, upper, aspect);
+        picture_bounds(&camera, lower, upper, aspect, least, most);
+        bool touches = false;
+        for (int axis = 0; axis < 2; axis++) {
+            assert_true(least[axis] > -edge - 1e-4 && most[axis] < edge + 1e-4); /* floats of a place 40 m away */
+            touches |= least[axis] < -edge + 1e-4 && most[axis] > edge - 1e-4;
+        }
+        assert_true(touches);
+        framing.zoom = 2.0f;
+        double larger_least[2], larger_most[2];
+        frame_camera_auto(&camera, &framing, lower, upper, aspect);
+        picture_bounds(&camera, lower, upper, aspect, larger_least, larger_most);
+        for (int axis = 0; axis < 2; axis++)
+            assert_near(larger_most[axis], 2.0 * most[axis], 1e-3);
+    }
+}
+
+/* A square of 2 m is 2.83 m wide where it is seen by its edge: what is as near as that shows all of it from every
+ * side. */
+TEST(a_camera_that_turns_sees_all_from_every_side)
+{
+    const float lower[3] = {-1.0f, 0.0f, -1.0f}, upper[3] = {1.0f, 0.1f, 1.0f}, around = sqrtf(2.0f);
+    struct frame_framing framing = usual_framing;
+    struct frame_camera turns, wide;
+    framing.azimuth = framing.elevation = 0.0f;
+    frame_camera_auto(&wide, &framing, (float[]){-around, 0.0f, -around}, (float[]){around, 0.1f, around}, 1.0f);
+    framing.turns = true;
+    frame_camera_auto(&turns, &framing, lower, upper, 1.0f);
+    /* nearer than to the square about the circle, whose corners stick out, and farther than to the circle's radius
+     */
+    assert_true(turns.world_from_view[11] < wide.world_from_view[11]);
+    const double half = tan((double)framing.fov_y / 2.0) * 0.94,
+                 circle = (double)around * sqrt(1.0 + 1.0 / (half * half));
+    assert_true((double)turns.world_from_view[11] > circle && (double)turns.world_from_view[11] < 1.01 * circle);
+}
+
+TEST(a_camera_needs_a_view_direction_and_an_upward_one)
+{
+    struct frame_camera camera;
     const float eye[3] = {1, 2, 3}, up[3] = {0, 0, 2};
     assert_false(frame_camera_look_at(&camera, eye, eye, up, 1.0f));
     const float above[3] = {1, 2, 9};

@@ -3,6 +3,7 @@
 
 #include "tests/accuracy/test_scenes.h"
 #include "tests/bench/bench_sheets.h"
+#include "tests/fixtures/framing.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -86,7 +87,8 @@ static bool choose_camera(struct bench_scene *scene, const struct bench_scene_op
     if (!options->model)
         return frame_camera_look_at(&scene->camera, family_eye, family_target, up, 0.846f);
     if (!own_camera(scene))
-        frame_camera_auto(&scene->camera, scene->gpu.lower_world, scene->gpu.upper_world, options->aspect);
+        frame_camera_auto(&scene->camera, &usual_framing, scene->gpu.lower_world, scene->gpu.upper_world,
+                          options->aspect);
     return true;
 }
 

@@ -4,6 +4,7 @@
 #include "engine/view_wishes.h"
 #include "tests/fixtures/structure.h"
 #include "tests/harness/test.h"
+#include "tests/fixtures/framing.h"
 
 #include <poll.h>
 #include <stdatomic.h>
@@ -196,6 +197,7 @@ static void submit_job(uint64_t client, uint32_t request, unsigned tracer)
                 .encoding = ENCODING_ZSTD,
                 .quality = 3,
                 .path = CAMERA_ORBIT,
+                .framing = usual_framing,
                 .orbit_turn = 1,
                 .orbit_seconds = 1,
                 .credit = FRAMES,
@@ -338,6 +340,7 @@ static void submit_view(uint64_t client, uint32_t request, uint32_t view)
         .encoding = ENCODING_ZSTD,
         .quality = 1,
         .path = CAMERA_KEYS,
+        .framing = usual_framing,
         .keys = key,
         .key_count = 1,
         .credit = FRAMES,

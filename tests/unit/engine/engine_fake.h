@@ -7,6 +7,7 @@
 #include "engine/backend.h"
 #include "engine/engine.h"
 #include "render/frame_request.h"
+#include "tests/fixtures/framing.h"
 
 #include <poll.h>
 #include <setjmp.h>
@@ -511,6 +512,7 @@ static inline struct engine_command *render(uint64_t client, uint32_t request, u
         .frame_step = 1,
         .frames_per_second = 24,
         .frame = {.width = 4, .height = 3, .samples = 1, .tracer = 0},
+        .framing = usual_framing,
         .encoding = ENCODING_RAW,
         .quality = 3,
         .credit = 1000,

@@ -5,6 +5,7 @@
 
 #include "engine/shot.h"
 #include "tests/harness/test.h"
+#include "tests/fixtures/framing.h"
 
 #include <math.h>
 
@@ -120,6 +121,7 @@ static struct engine_job job_of(enum camera_path path, struct clip_use *clips, u
         .frame = {.width = 160, .height = 90, .samples = 1, .seed = 77},
         .path = path,
         .camera_node = 3,
+        .framing = usual_framing,
         .keys = has_key ? &home : NULL,
         .key_count = has_key,
         .clips = clips,
@@ -321,7 +323,7 @@ TEST(an_automatic_camera_shows_the_pose_at_time_0_in_all_frames)
     struct engine_job job = job_of(CAMERA_AUTO, &use, 1);
     struct animation_bounds bounds = {0};
     struct frame_camera expected;
-    frame_camera_auto(&expected, (float[]){70, 0, 0}, (float[]){71, 1, 0}, 160.0f / 90);
+    frame_camera_auto(&expected, &usual_framing, (float[]){70, 0, 0}, (float[]){71, 1, 0}, 160.0f / 90);
     for (uint32_t frame = 0; frame < 20; frame += 3) {
         struct shot fresh = shot_at(&job, scene, frame), kept;
         assert_true(shot_make(&kept, &job, scene, frame, &bounds, NULL));

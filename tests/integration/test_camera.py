@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: MIT
+"""Cameras without coordinates: the side that a model is seen from, and how near."""
+from farlight_test import OneDaemon, bundled_scenes, farlight, read_png
+
+COLOURS = {"front": (1, 0, 0), "back": (0, 1, 0), "left": (0, 0, 1), "right": (1, 1, 0), "top": (0, 1, 1), "bottom": (1, 0, 1)}
+# x -2 .. 2, y 0 .. 1, z -0.5 .. 0.5: each side has its colour.
+CORNERS = [(x, y, z) for x in (-2, 2) for y in (0, 1) for z in (-0.5, 0.5)]
+SIDES = {"front": (2, 6, 8, 4), "back": (5, 7, 3, 1), "left": (1, 2, 4, 3), "right": (6, 5, 7, 8), "top": (3, 4, 8, 7),
+         "bottom": (1, 5, 6, 2)}
+
+
+class Sides(OneDaemon):
+    def setUp(self):
+        super().setUp()
+        (self.folder / "box.mtl").write_text("".join(
+            f"newmtl {name}\nKd {' '.join(str(c) for c in colour)}\n" for name, colour in COLOURS.items()))
+        self.box = self.folder / "box.obj"
+        self.box.write_text("mtllib box.mtl\no box\n" + "".join(f"v {x} {y} {z}\n" for x, y, z in CORNERS) + "".join(
+            f"usemtl {name}\nf {' '.join(str(i) for i in corners)}\n" for name, corners in SIDES.items()))
+
+    def render(self, *options, size="96x54"):
+        path = self.folder / "x.png"
+        self.expect(farlight("render", self.box, "-o", path, "--size", size, "--background", "transparent", *options), 0)
+        _, _, rows, channels = read_png(path)
+        self.assertEqual(channels, 4)
+        return [[row[x:x + 4] for x in range(0, len(row), 4)] for row in rows]
+
+    def covered(self, picture):
+        """The first and last column and row that show something."""
+        rows = [y for y, row in enumerate(picture) if any(p[3] > 127 for p in row)]
+        columns = [x for x in range(len(picture[0])) if any(row[x][3] > 127 for row in picture)]
+        return columns[0], columns[-1], rows[0], rows[-1]
+
+    def test_each_side_is_the_one_that_it_is_called(self):
+        for name, colour in COLOURS.items():
+            with self.subTest(view=name):
+                picture = self.render("--view", name)
+                pixel = picture[27][48]
+                self.assertEqual([value > max(pixel[:3]) / 2 for value in pixel[:3]], [bool(c) for c in colour], pixel)
+        self.assertEqual(self.render("--azimuth", "90", "--elevation", "0"), self.render("--view", "right"))
+
+    def test_the_model_fills_the_picture_less_the_margin(self):
+        """Four by one from the front: it touches left and right; and above and below where the picture is a strip. A box's
+        front face is its nearest part, so nothing else reaches as far. Half a pixel is rounded."""
+        for margin in (0.0, 0.1):
+            options = ["--view", "front", "--margin", str(margin)]
+            left, right, _, _ = self.covered(self.render(*options))
+            self.assertAlmostEqual(left, 96 * margin, delta=1)
+            self.assertAlmostEqual(95 - right, 96 * margin, delta=1)
+            _, _, top, bottom = self.covered(self.render(*options, size="320x40"))
+            self.assertAlmostEqual(top, 40 * margin, delta=1)
+            self.assertAlmostEqual(39 - bottom, 40 * margin, delta=1)
+
+    def test_another_field_of_view_and_a_zoom_keep_the_middle(self):
+        for fov in ("10", "90"):
+            left, right, _, _ = self.covered(self.render("--view", "front", "--fov", fov, "--margin", "0"))
+            self.assertAlmostEqual(left, 0, delta=1)
+            self.assertAlmostEqual(right, 95, delta=1)
+        left, right, _, _ = self.covered(self.render("--view", "front", "--margin", "0", "--zoom", "0.5"))
+        self.assertAlmostEqual(left, 24, delta=1)
+        self.assertAlmostEqual(right, 71, delta=1)
+
+    def test_a_node_is_framed_with_what_is_below_it(self):
+        """A pot of copper on an arm of the roundabout, 1.4 m wide beside a floor of 80: in the middle of the picture the mean is
+        red, while the floor is grey."""
+        path = self.folder / "x.png"
+        self.expect(farlight("render", bundled_scenes() / "carousel.glb", "-o", path, "--size", "64x36", "--frame", "copper pot"), 0)
+        rows = read_png(path)[2]
+        red, blue = (sum(row[x * 3 + c] for row in rows[10:20] for x in range(28, 48)) for c in (0, 2))
+        self.assertGreater(red, 1.3 * blue)
+
+    def test_what_contradicts_itself_is_refused_with_a_remedy(self):
+        for options, words in ((["--view", "sideways"], "front, back, left"), (["--frame", "lid"], "box.obj"),
+                               (["--view", "top", "--eye", "1,2,3", "--look-at", "0,0,0"], "cannot go with"),
+                               (["--zoom", "2", "--camera", "0"], "cannot go with"), (["--margin", "0.6"], "0.45")):
+            with self.subTest(options=options):
+                result = farlight("render", self.box, "-o", self.folder / "x.png", *options)
+                self.assertNotEqual(result.returncode, 0)
+                self.assertIn(words, result.stderr)
+
+    def test_info_says_what_will_be_seen(self):
+        told = self.expect(farlight("info", self.box), 0).stdout
+        self.assertIn("seen by", told)
+        self.assertIn("azimuth 24", told)
+
+    def test_a_turntable_goes_once_around_and_repeats(self):
+        """The colours of the sides come one after the other, and what follows the last frame is the first."""
+        out = self.folder / "frames"
+        out.mkdir()
+        self.expect(farlight("turntable", self.box, "-o", out / "%02d.png", "--size", "48x27", "--fps", "2", "--azimuth", "0",
+                             "--elevation", "0"), 0)
+        names = sorted(path.name for path in out.iterdir())
+        self.assertEqual(names, [f"{i:02d}.png" for i in range(1, 9)], "4 seconds")
+        seen = [read_png(out / name)[2][13] for name in names]
+        middle = [[value > max(row[24 * 3:24 * 3 + 3]) / 2 for value in row[24 * 3:24 * 3 + 3]] for row in seen]
+        for frame, side in ((0, "front"), (2, "right"), (4, "back"), (6, "left")):
+            self.assertEqual(middle[frame], [bool(c) for c in COLOURS[side]], (frame, side))
+        self.assertNotEqual(seen[7], seen[0])
