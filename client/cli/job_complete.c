@@ -117,7 +117,9 @@ static bool complete_pixels(struct cli_job *job)
 static bool complete_outputs(struct cli_job *job, bool is_series)
 {
     if (job->output) {
-        job->outputs[0] = (struct cli_output){.path = job->output, .image = job->image};
+        /* It has no folder in which a finished file could replace it. */
+        const char *path = strcmp(job->output, "/dev/stdout") == 0 ? "-" : job->output;
+        job->outputs[0] = (struct cli_output){.path = path, .image = job->image};
         job->output_count = 1;
     }
     if (job->output_count == 0) {

@@ -176,11 +176,12 @@ class Outputs(OneDaemon):
         self.assertTrue((folders[0] / "full.png").read_bytes() != (folders[1] / "full.png").read_bytes())
 
     def test_standard_output_gets_the_picture_and_no_talk(self):
-        result = farlight("render", bundled_scenes() / "cornell.glb", "-o", "-", "--format", "png", "--size", "32x24",
-                          "--timings", text=False)
-        self.assertEqual(result.returncode, 0, result.stderr)
-        self.assertTrue(result.stdout.startswith(b"\x89PNG"), result.stdout[:40])
-        self.assertTrue(result.stdout.endswith(b"IEND\xaeB`\x82"), "text after the picture")
+        for output in ("-", "/dev/stdout"):
+            result = farlight("render", bundled_scenes() / "cornell.glb", "-o", output, "--format", "png", "--size", "32x24",
+                              "--timings", text=False)
+            self.assertEqual(result.returncode, 0, result.stderr)
+            self.assertTrue(result.stdout.startswith(b"\x89PNG"), result.stdout[:40])
+            self.assertTrue(result.stdout.endswith(b"IEND\xaeB`\x82"), "text after the picture")
 
     def test_timings_as_json_name_every_stage(self):
         path = self.folder / "picture.png"

@@ -84,6 +84,12 @@ class Viewer(Case):
 
 
 class WithoutAWindow(Viewer):
+    def test_it_begins_where_a_camera_without_coordinates_stands(self):
+        state = self.replay([rest(1), {"state": "first"}], "--view", "top")["first"]
+        for axis in (0, 2):
+            self.assertAlmostEqual(state["eye"][axis], state["look_at"][axis], 5)
+        self.assertGreater(state["eye"][1], state["look_at"][1])
+
     def test_an_orbit_changes_the_picture_and_rest_refines_it(self):
         states = self.replay([rest(1), {"state": "first"}, rest(4), {"state": "refined"}, *HIDE,
                               {"screenshot": "before.png"}, *drag(160, 90, 60, 20), {"state": "dragged"}, rest(),
