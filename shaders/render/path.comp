@@ -33,8 +33,8 @@
 #include "render/shade.glsl"
 #include "render/wave.glsl"
 
-// A child with a lower weight than this is traced with the probability weight / this, and then has this weight. Noise by
-// time is lowest between 1/4 and 1/2, measured in two rooms; at 1 it is a sixth to a third more.
+// A child with a lower weight than this is traced with the probability weight / this, and then has this weight. Measured in two
+// rooms: 1/4 is as good.
 const float ROULETTE = 1.0 / 2.0;
 
 uniform uint asks_lights, asks_environment; // 1: there are some; their shadow rays come in this order

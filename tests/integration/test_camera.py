@@ -66,7 +66,8 @@ class Sides(OneDaemon):
         def red_share(*options):
             path = self.folder / "x.png"
             self.expect(farlight("render", bundled_scenes() / "carousel.glb", "-o", path, "--size", "64x36", *options), 0)
-            pixels = [row[x:x + 3] for row in read_png(path)[2] for x in range(0, len(row), 3)]
+            _, _, rows, channels = read_png(path)
+            pixels = [row[x:x + 3] for row in rows for x in range(0, len(row), channels)]
             return sum(p[0] > 1.3 * p[2] + 10 for p in pixels) / len(pixels)
         self.assertGreater(red_share("--frame", "copper pot"), 0.05)
         self.assertLess(red_share("--azimuth", "24"), 0.01)
