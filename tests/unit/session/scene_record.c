@@ -194,8 +194,8 @@ TEST(a_scene_of_all_kinds_is_the_same_afterwards)
                 one->attenuation_distance == other->attenuation_distance &&
                 memcmp(one->attenuation, other->attenuation, sizeof(one->attenuation)) == 0 &&
                 memcmp(one->specular_colour, other->specular_colour, sizeof(one->specular_colour)) == 0);
-    assert_true(other->unlit && other->double_sided && other->emission_seen_only && other->alpha_cutoff == 0.375f &&
-                other->emission[1] == 5);
+    assert_true(other->unlit && other->double_sided && other->emission_seen_only &&
+                other->alpha_cutoff == 0.375f && other->emission[1] == 5);
     assert_string_equal(other->base.name, "material");
     const struct scene_node *node = scene_node(again, 1);
     assert_true(node->parent == 2 && node->hidden && node->skin == 70 && node->weight_count == 1 &&
