@@ -388,8 +388,8 @@ class MadeHere(Viewer):
 
     def test_both_eyes_are_made_from_one_picture(self):
         """Of the middle, from before the daemon was gone: at rest it sends both eyes, which views are not made from."""
-        size = (240, 270)
-        for layout, eye in (("side", (120, 270)), ("over", (240, 135))):
+        size = (320, 360)
+        for layout, eye in (("side", (160, 360)), ("over", (320, 180))):
             with self.subTest(layout=layout):
                 eyes = ["--stereo", "0.1", "--stereo-layout", layout]
                 moves = drag(160, 90, 20, 0)
