@@ -296,6 +296,7 @@ def camera_bytes(camera):
 def set_material(material, base_colour, roughness=1, unlit=0, metallic=0):
     fixed = struct.pack("<4I", material, 0, 0, unlit)
     fixed += struct.pack("<14f", *base_colour, 1, 0, 0, 0, metallic, roughness, 0, 1.5, 0, 0, 0)
+    fixed += struct.pack("<I9f", 0, 1, 1, 1, 1, 0, 1, 1, 1, 0)  # emission, mirror and body as usual
     return SET_MATERIAL, payload(fixed, array([]), string(""))
 
 
