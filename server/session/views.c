@@ -6,6 +6,7 @@
 #include "session/session.h"
 
 #include <inttypes.h>
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -28,11 +29,19 @@
  * some 7 ms of processors for 1280x720. */
 #define PARTS_NS UINT64_C(30000000)
 #define SECOND_NS 1e9
+/* Of frames that are asked for so rarely: more would not fit the number. */
+#define DEADLINE_MAX_NS 1e15
 
 /* ---- life -------------------------------------------------------------------------------------------- */
 
 static void on_pace_timer(void *context);
 static void on_silence_timer(void *context);
+
+/* 0: frames have none. */
+static uint64_t deadline_ns_of(float moving_rate)
+{
+    return moving_rate > 0.0f ? (uint64_t)fmin(SECOND_NS / (double)moving_rate, DEADLINE_MAX_NS) : 0;
+}
 
 struct view_terms view_terms_of(const struct message_render *render)
 {
@@ -45,8 +54,7 @@ struct view_terms view_terms_of(const struct message_render *render)
                    .hidden_layers = render->hidden_layers,
                    .samples = samples,
                    .depth = render->depth,
-                   .deadline_ns =
-                       render->moving_rate > 0.0f ? (uint64_t)(SECOND_NS / (double)render->moving_rate) : 0,
+                   .deadline_ns = deadline_ns_of(render->moving_rate),
                    .ignores_link = !render->adapt},
         .still_encoding = (enum encoding)render->still_encoding,
         .quality = encoder_loses((enum encoding)render->encoding) ? render->quality : 0,

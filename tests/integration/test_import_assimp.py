@@ -384,6 +384,7 @@ class Formats(importer.Written):
                 self.assertIn(expected, result.text())
                 self.assertEqual(len(result.errors()), 1)
 
+    @unittest.skipIf(importer.SLOWER > 1, "sanitizers do not run within so little memory")
     def test_too_little_memory_is_said(self):
         model = ply([(0, 0, 0)], (), form="binary_little_endian").replace(b"vertex 1\n", b"vertex 1000000\n") + bytes(12 * 999999)
         self.assertIn("more memory than a model may have", self.import_text("model.ply", model, 1, memory=64 << 20).text())
