@@ -120,8 +120,9 @@ TEST(a_sample_brings_no_more_than_the_limit)
     assert_true(fabs(exposed.most - 2.0 * on.most) <= 1e-5);
 }
 
-/* A lamp a centimetre above a floor, which shadow rays alone find: as they are spread over its solid angle, at
- * most half a sphere, and one of its two triangles is chosen, a sample brings at most 2 x 2 times its radiance. */
+/* An emissive square a centimetre above a floor, which shadow rays alone find: as they are spread over its solid
+ * angle, at most half a sphere, and one of its two triangles is chosen, a sample brings at most 2 x 2 times its
+ * radiance. */
 TEST(a_lamp_that_nearly_touches_a_surface_makes_no_specks)
 {
     struct fixture *fixture = *state;

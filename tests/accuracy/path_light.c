@@ -347,7 +347,7 @@ TEST(a_small_bright_sun_converges)
      */
     expected_value = under_the_image(0.125, u, v, 4096.0);
     for (uint32_t depth = 0; depth < 2; depth++)
-        for (uint32_t samples = 2; samples <= 32; samples *= 4) {
+        for (uint32_t samples = 2; samples <= 128; samples *= 8) {
             path_begin(fixture, TRACER_REFERENCE, depth);
             a_floor(fixture, 1.0f);
             an_image(fixture, 0.125f, u, v, 4096.0f);
