@@ -178,7 +178,7 @@ bool gpu_source_expand(struct gpu_source_text *text, gpu_source_lookup lookup, c
 {
     struct expansion expansion = {.text = text, .lookup = lookup, .defines = defines, .error = error};
     *text = (struct gpu_source_text){0};
-    bool ok = append_format(text, error, "#version 450 core\n");
+    bool ok = append_format(text, error, GPU_SOURCE_HEAD);
     for (const struct gpu_define *define = defines; ok && define && define->name; define++) {
         const char *value = define->value ? define->value : "1";
         if (strcmp(define->name, "EXTENSION") == 0)

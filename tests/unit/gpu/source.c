@@ -49,38 +49,38 @@ static void expect_text(const char *path, const struct gpu_define *defines, cons
 TEST(each_file_is_included_once_and_lines_keep_their_numbers)
 {
     expect_text("main.comp", NULL,
-                "#version 450 core\n"
-                "#line 1 0\n"
-                "\n"
-                "#line 1 1\nint a1;\n"
-                "#line 1 2\n#ifndef C_H\n\nint c3;\n#endif\n"
-                "#line 3 1\nint a3;\n"
-                "#line 3 0\n"
-                "#line 1 3\n\n#line 2 3\nint b2;\n"
-                "#line 4 0\nint last;\n");
+                GPU_SOURCE_HEAD "#line 1 0\n"
+                                "\n"
+                                "#line 1 1\nint a1;\n"
+                                "#line 1 2\n#ifndef C_H\n\nint c3;\n#endif\n"
+                                "#line 3 1\nint a3;\n"
+                                "#line 3 0\n"
+                                "#line 1 3\n\n#line 2 3\nint b2;\n"
+                                "#line 4 0\nint last;\n");
 }
 
 TEST(defines_stand_in_front_and_a_path_among_them_is_not_seen_by_glsl)
 {
     const struct gpu_define defines[] = {{"ANY_HIT", NULL}, {"COUNT", "3"}, {"TRAVERSE", "\"b.glsl\""}, {0}};
     expect_text("named.comp", defines,
-                "#version 450 core\n#define ANY_HIT 1\n#define COUNT 3\n"
-                "#line 1 0\nint first;\n"
-                "#line 1 1\n#line 1 2\n#ifndef C_H\n\nint c3;\n#endif\n#line 2 1\nint b2;\n"
-                "#line 3 0\nint last;\n");
+                GPU_SOURCE_HEAD "#define ANY_HIT 1\n#define COUNT 3\n"
+                                "#line 1 0\nint first;\n"
+                                "#line 1 1\n#line 1 2\n#ifndef C_H\n\nint c3;\n#endif\n#line 2 1\nint b2;\n"
+                                "#line 3 0\nint last;\n");
 }
 
 TEST(a_required_extension_stands_in_front)
 {
     const struct gpu_define defines[] = {{"ANY_HIT", NULL}, {"EXTENSION", "GL_EXT_some"}, {0}};
     expect_text("a.glsl", defines,
-                "#version 450 core\n#define ANY_HIT 1\n#extension GL_EXT_some : require\n"
+                GPU_SOURCE_HEAD
+                "#define ANY_HIT 1\n#extension GL_EXT_some : require\n"
                 "#line 1 0\nint a1;\n#line 1 1\n#ifndef C_H\n\nint c3;\n#endif\n#line 3 0\nint a3;\n");
 }
 
 TEST(a_file_that_includes_itself_is_expanded_once)
 {
-    expect_text("circle.comp", NULL, "#version 450 core\n#line 1 0\n\n#line 2 0\nint once;\n");
+    expect_text("circle.comp", NULL, GPU_SOURCE_HEAD "#line 1 0\n\n#line 2 0\nint once;\n");
 }
 
 static void expect_error(const char *path, const char *expected)
