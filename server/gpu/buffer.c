@@ -98,11 +98,21 @@ bool gpu_buffer_upload(struct gpu_device *device, struct gpu_buffer *buffer, con
     return true;
 }
 
+/* NVIDIA's driver (580) clears a buffer of more than some pages after what is written into it behind the clear:
+ * only glFinish() keeps them in order, no barrier and no flush does. */
+static void let_clear_end(const struct gpu_device *device, struct gpu_buffer *buffer)
+{
+    if (buffer->was_cleared && !device->facts.software)
+        glFinish();
+    buffer->was_cleared = false;
+}
+
 void *gpu_buffer_map(struct gpu_device *device, struct gpu_buffer *buffer, size_t size_bytes, struct error *error)
 {
     if (!gpu_buffer_reserve(device, buffer, size_bytes ? size_bytes : 1, error))
         return NULL;
     gpu_await(device, GL_BUFFER_UPDATE_BARRIER_BIT);
+    let_clear_end(device, buffer);
     void *data = glMapNamedBufferRange(buffer->name, 0, (GLsizeiptr)buffer->size_bytes,
                                        GL_MAP_WRITE_BIT | GL_MAP_INVALIDATE_BUFFER_BIT);
     if (data)
@@ -122,6 +132,7 @@ void gpu_buffer_write(struct gpu_device *device, struct gpu_buffer *buffer, size
                       size_t size_bytes)
 {
     gpu_await(device, GL_BUFFER_UPDATE_BARRIER_BIT);
+    let_clear_end(device, buffer);
     if (size_bytes)
         glNamedBufferSubData(buffer->name, (GLintptr)offset_bytes, (GLsizeiptr)size_bytes, data);
     progress_tell();
@@ -140,6 +151,7 @@ void gpu_buffer_read(struct gpu_device *device, const struct gpu_buffer *buffer,
 void gpu_buffer_clear(struct gpu_device *device, struct gpu_buffer *buffer, uint32_t value)
 {
     gpu_await(device, GL_BUFFER_UPDATE_BARRIER_BIT);
+    buffer->was_cleared = true;
     if (buffer->name)
         glClearNamedBufferData(buffer->name, GL_R32UI, GL_RED_INTEGER, GL_UNSIGNED_INT, &value);
 }
@@ -148,6 +160,7 @@ void gpu_buffer_clear_part(struct gpu_device *device, struct gpu_buffer *buffer,
                            size_t size_bytes, uint32_t value)
 {
     gpu_await(device, GL_BUFFER_UPDATE_BARRIER_BIT);
+    buffer->was_cleared = true;
     if (buffer->name && size_bytes > 0)
         glClearNamedBufferSubData(buffer->name, GL_R32UI, (GLintptr)offset_bytes, (GLsizeiptr)size_bytes,
                                   GL_RED_INTEGER, GL_UNSIGNED_INT, &value);
@@ -157,6 +170,7 @@ void gpu_buffer_fill(struct gpu_device *device, struct gpu_buffer *buffer, size_
                      const uint32_t words[4])
 {
     gpu_await(device, GL_BUFFER_UPDATE_BARRIER_BIT);
+    buffer->was_cleared = true;
     if (buffer->name && size_bytes > 0)
         glClearNamedBufferSubData(buffer->name, GL_RGBA32UI, (GLintptr)offset_bytes, (GLsizeiptr)size_bytes,
                                   GL_RGBA_INTEGER, GL_UNSIGNED_INT, words);

@@ -17,6 +17,7 @@ struct gpu_buffer {
     unsigned texel_format; /* GL_RGBA32F .. of that texture */
     size_t size_bytes;     /* in use */
     size_t capacity_bytes;
+    bool was_cleared; /* since it was last written; private to buffer.c */
 };
 
 /* Reserves at least size_bytes (growth is geometric; contents are lost when it grows). The memory counts in the

@@ -131,6 +131,33 @@ TEST(a_buffer_keeps_what_is_written_and_counts_its_memory)
     assert_true(gpu_check(device, "buffers", &error));
 }
 
+/* Large enough that no driver keeps it with its commands. */
+TEST(what_is_written_behind_a_clear_stays)
+{
+    enum { WORDS = 1 << 18 };
+    struct error error = {0};
+    struct gpu_buffer buffer = {0};
+    uint32_t *words = malloc(WORDS * sizeof(*words)), *back = malloc(WORDS * sizeof(*back));
+    for (uint32_t i = 0; i < WORDS; i++)
+        words[i] = i;
+    assert_true(gpu_buffer_reserve(device, &buffer, WORDS * sizeof(*words), &error));
+    for (int turn = 0; turn < 3; turn++) {
+        gpu_buffer_clear(device, &buffer, 0xdeadbeef);
+        if (turn < 2) {
+            gpu_buffer_write(device, &buffer, 0, words, WORDS * sizeof(*words));
+        } else {
+            memcpy(gpu_buffer_map(device, &buffer, WORDS * sizeof(*words), &error), words, WORDS * sizeof(*words));
+            gpu_buffer_unmap(device, &buffer);
+        }
+        gpu_buffer_read(device, &buffer, 0, back, WORDS * sizeof(*back));
+        assert_memory_equal(back, words, WORDS * sizeof(*words));
+    }
+    free(words);
+    free(back);
+    gpu_buffer_finish(device, &buffer);
+    expect_no_error(&error);
+}
+
 TEST(mapped_memory_reaches_the_buffer)
 {
     struct error error = {0};
