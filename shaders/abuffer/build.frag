@@ -173,7 +173,7 @@ void reach_of(sphere_chord c, vec3 normal, int side, float depth_cells, out floa
 void main()
 {
     sphere_chord chord = chord_of_sphere();
-    if (!(chord.half_chord >= 0.0)) // passes it
+    if (chord.half_chord < 0.0) // passes it
         discard;
     int axis = gl_Layer, u = axis == 2 ? 0 : axis + 1, v = axis == 0 ? 2 : axis - 1;
     bool closed = (primitive.w & DRAWN_CLOSED) != 0u;

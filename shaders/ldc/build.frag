@@ -86,7 +86,7 @@ void main()
 void main()
 {
     sphere_chord chord = chord_of_sphere();
-    if (!(chord.half_chord >= 0.0)) // passes it
+    if (chord.half_chord < 0.0) // passes it
         discard;
     for (int side = 0; side < 2; side++) {
         vec3 normal;

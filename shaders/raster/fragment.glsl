@@ -53,7 +53,7 @@ float triangle_depth_cells()
 struct sphere_chord {
     vec3 origin, direction; // world space; a cell long, as depths are in cells
     vec4 rows[3];           // object_from_world
-    float nearest, half_chord; // cells; not >= 0: the line misses the sphere
+    float nearest, half_chord; // cells; below 0: the line misses the sphere
     vec3 closest, step_object; // from its centre, object space
 };
 
@@ -73,7 +73,9 @@ sphere_chord chord_of_sphere()
     precise float squared = dot(step_object, step_object);
     precise float nearest = -dot(from_centre, step_object) / squared;
     precise vec3 closest = from_centre + nearest * step_object;
-    precise float half_chord = sqrt((sphere.w * sphere.w - dot(closest, closest)) / squared);
+    // Asked before the root is taken: some compilers take a NaN for whatever suits them.
+    precise float half_squared = (sphere.w * sphere.w - dot(closest, closest)) / squared;
+    precise float half_chord = half_squared >= 0.0 && squared > 0.0 ? sqrt(half_squared) : -1.0;
     c.origin = origin;
     c.direction = direction;
     c.nearest = nearest;

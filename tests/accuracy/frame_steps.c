@@ -97,9 +97,11 @@ static void expect_short_steps(struct fixture *fixture, unsigned tracer, const c
     print_message("%s: %llu rays in %llu steps, where they are slow in %llu, %llu in one at most\n", name,
                   (unsigned long long)whole.rays, (unsigned long long)whole.steps, (unsigned long long)parts.steps,
                   (unsigned long long)parts.max);
-    assert_true(parts.rays == whole.rays);
-    if (fixture->device->facts.software)
+    if (fixture->device->facts
+            .software) { /* a GPU's waves are queued before it is known how many rays they have */
+        assert_true(parts.rays == whole.rays);
         assert_true(parts.max <= STEP_RAYS_MAX);
+    }
     assert_true(got.size_bytes == expected.size_bytes);
     assert_memory_equal(got.pixels, expected.pixels, expected.size_bytes);
     frame_result_finish(&expected);
