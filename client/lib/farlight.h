@@ -357,7 +357,8 @@ struct fl_edited {
 };
 /* Applies all assignments, in order, or none, in one transaction. Fields that others change meanwhile stay as they
  * are: the daemon refuses an edit of an object that has changed since it was read, and it is made anew. A clip
- * that plays has precedence over an edit of what it moves. *edited may be NULL. */
+ * that plays has precedence over an edit of what it moves. Waits until the daemon has applied it, which is after
+ * the frame that it is rendering; a view's refinement is given up for it. *edited may be NULL. */
 FL_API bool fl_scene_edit(struct fl_scene *scene, const struct fl_assignment *assignments, size_t count,
                           struct fl_edited *edited, struct fl_error *error);
 

@@ -219,6 +219,12 @@ class Animated(Shared):
         self.edit_for_now("material.cream.base_colour=0,0,1")
         self.assertNotEqual(self.picture(*riding), moving)
 
+    def test_a_light_is_known_by_the_node_that_shows_it(self):
+        before = self.fields("light.key light")["intensity"]
+        self.edit_for_now("light.key light.intensity*=2", "light.*fill light.intensity*=0")
+        self.assertAlmostEqual(self.fields("light.key light")["intensity"], 2 * before, 3)
+        self.assertEqual(self.fields("light.fill light")["intensity"], 0)
+
     def test_an_animation_goes_on_while_its_scene_is_edited(self):
         command = [BIN / "farlight", "animate", "--scene", self.scene, "--clip", "ride", "--frames", "0-23", "--fps", "8",
                    *PICTURE, "-o", self.folder / "%d.png"]
