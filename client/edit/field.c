@@ -159,6 +159,20 @@ size_t fl_fields(enum protocol_object_kind kind, struct fl_field fields[FL_FIELD
     return count;
 }
 
+/* As a remedy: "it has translate, rotate, ..", as far as they fit. */
+static void list_fields(const struct fl_field *fields, size_t count, struct fl_error *error)
+{
+    size_t used = (size_t)snprintf(error->remedy, sizeof(error->remedy), "it has");
+    for (size_t i = 0; i < count; i++) {
+        const size_t room = sizeof(error->remedy) - used;
+        if (strlen(fields[i].name) + sizeof(", ..") + 2 > room) {
+            snprintf(error->remedy + used, room, ", ..");
+            return;
+        }
+        used += (size_t)snprintf(error->remedy + used, room, "%s %s", i > 0 ? "," : "", fields[i].name);
+    }
+}
+
 bool edit_field_find(enum protocol_object_kind kind, const char *name, struct fl_field *field,
                      struct fl_error *error)
 {
@@ -175,12 +189,9 @@ bool edit_field_find(enum protocol_object_kind kind, const char *name, struct fl
     fl_error_set(error, FL_ERROR_ARGUMENT, "", "a %s has no field '%s'", protocol_object_kind_text(kind), name);
     if (nearest.name)
         return fl_error_remedy(error, "did you mean '%s'?", nearest.name);
-    char list[sizeof(error->remedy)];
-    size_t used = 0;
-    list[0] = '\0';
-    for (size_t i = 0; i < count && used < sizeof(list); i++)
-        used += (size_t)snprintf(list + used, sizeof(list) - used, "%s%s", i > 0 ? ", " : "", fields[i].name);
-    return fl_error_remedy(error, "it has %s", list);
+    if (error)
+        list_fields(fields, count, error);
+    return false;
 }
 
 bool edit_field_applies(const struct fl_field *field, const struct message *object)
@@ -257,7 +268,7 @@ void edit_field_load(const struct fl_field *field, const struct message *object,
     case EDIT_ROTATE:
         edit_turn_load(matrix, values, unused);
         for (int i = 0; i < 3; i++)
-            values[i] = rint(values[i] / ANGLE_STEP) * ANGLE_STEP;
+            values[i] = rint(values[i] / ANGLE_STEP) * ANGLE_STEP + 0.0; /* no -0 */
         return;
     case EDIT_SCALE:
         edit_turn_load(matrix, unused, values);

@@ -5,16 +5,11 @@ import os
 import subprocess
 import threading
 
-import farlight_test
 from farlight_test import BIN, TIMEOUT_S, Case, Daemon, bundled_scenes, farlight, read_png
 from test_serve import Serving
 from test_view import HIDE, difference, rest
 
 PICTURE = ["--size", "48x36", "--samples", "1", "--integrator", "whitted", "-q"]
-
-
-def tearDownModule():  # pylint: disable=invalid-name
-    farlight_test.tearDownModule()
 
 
 class Shared(Case):
@@ -116,7 +111,7 @@ class Edits(Shared):
         self.assertFalse(self.fields("node.block")["hidden"])
         file.write_text("hide=block\nmaterial.green.colour=1\n")
         result = self.edit("--from", file, status=2)
-        self.assertIn(f"edits:2: material.green.colour=1: a material has no field 'colour'", result.stderr)
+        self.assertIn("edits:2: material.green.colour=1: a material has no field 'colour'", result.stderr)
         self.assertFalse(self.fields("node.block")["hidden"])
 
     def test_what_is_listed_can_be_read_back(self):
