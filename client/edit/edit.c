@@ -178,6 +178,14 @@ static bool find_blamed(const struct edit *edit, const char *field, size_t *assi
     return false;
 }
 
+/* One message of a transaction, which may have more of them than the buffers hold. */
+static bool send_part(struct fl_connection *connection, uint32_t request, const struct message *message,
+                      struct fl_error *error)
+{
+    return fl_connection_wait_upload(connection, request, 0, monotonic_now_ns() + ANSWER_NS, error) &&
+           fl_connection_send(connection, request, 0, message, error);
+}
+
 /* `base_revision`: of the earliest reading, as what was changed after it may be missing in it. */
 static bool send_all(const struct edit *edit, uint64_t base_revision, uint64_t *revision, struct fl_error *error)
 {
@@ -189,13 +197,12 @@ static bool send_all(const struct edit *edit, uint64_t base_revision, uint64_t *
     message_init(&begin, MESSAGE_EDIT_BEGIN);
     begin.edit_begin.scene = edit->scene->scene;
     begin.edit_begin.base_revision = base_revision;
-    if (!fl_connection_send(connection, request, 0, &begin, error))
+    if (!send_part(connection, request, &begin, error))
         return false;
     for (size_t i = 0; i < edit->target_count; i++)
-        if (edit->targets[i].changed &&
-            !fl_connection_send(connection, request, 0, &edit->targets[i].object.message, error))
+        if (edit->targets[i].changed && !send_part(connection, request, &edit->targets[i].object.message, error))
             return false;
-    if (!fl_connection_send(connection, request, 0, &commit, error) ||
+    if (!send_part(connection, request, &commit, error) ||
         !fl_connection_answer(connection, request, MESSAGE_OK, &received, monotonic_now_ns() + ANSWER_NS, error))
         return false;
     *revision = received.message.ok.revision;

@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: MIT
 """`farlight edit`: materials, nodes, lights and cameras of a scene that several clients share, and `--edit`."""
+import base64
 import json
 import os
+import struct
 import subprocess
 import threading
 
-from farlight_test import BIN, TIMEOUT_S, Case, Daemon, bundled_scenes, farlight, read_png
+from farlight_test import BIN, TIMEOUT_S, Case, Daemon, bundled_scenes, farlight, long_test, read_png
 from test_serve import Serving
 from test_view import HIDE, difference, rest
 
@@ -199,6 +201,28 @@ class Readers(Case):
             where = ["edit", "--scene", "room", "--server", serving.lines[-1].split()[-1]]
             self.assertIn("material.red.metallic=0", self.expect(farlight(*where, "--list", "material.red"), 0).stdout)
             self.assertIn("may only look", self.expect(farlight(*where, "hide=room"), 1).stderr)
+
+
+class Many(Case):
+    @long_test
+    def test_thousands_of_objects_change_in_one_transaction(self):
+        """More than the buffers between two programs hold."""
+        count, model = 12000, self.folder / "many.gltf"
+        corners = base64.b64encode(struct.pack("<9f", 0, 0, 0, 1, 0, 0, 0, 1, 0)).decode()
+        model.write_text(json.dumps({
+            "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": list(range(count))}],
+            "nodes": [{"name": f"n{i}", "mesh": 0, "translation": [i, 0, 0]} for i in range(count)],
+            "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+            "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 0]}],
+            "bufferViews": [{"buffer": 0, "byteLength": 36}],
+            "buffers": [{"byteLength": 36, "uri": f"data:application/octet-stream;base64,{corners}"}]}))
+        with Serving(model, "--name", "many", "--listen", f"unix:{self.folder}/s") as serving:
+            where = ["edit", "--scene", "many", "--server", serving.lines[-1].split()[-1]]
+            undo = self.expect(farlight(*where, "--print-undo", "hide=n*"), 0).stdout
+            self.assertEqual(len(undo.splitlines()), count)
+            self.expect(farlight(*where, "--from", "-", input=undo), 0)
+            scenes = self.expect(farlight("scenes", "--json", "--server", where[-1]), 0).stdout
+            self.assertEqual(json.loads(scenes)["revision"], 3)
 
 
 class Animated(Shared):
