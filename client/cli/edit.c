@@ -356,7 +356,7 @@ int cli_edit(int argc, char **argv)
         .args_doc = "--scene NAME ASSIGNMENT...\n--scene NAME --from FILE\n--scene NAME --list [OBJECT...]",
         .doc = "Change materials, nodes, lights and cameras of a shared scene, for all its clients, in one "
                "transaction.\v"
-               "An ASSIGNMENT is material.Steel.roughness=0.2, node.Door.rotate=0,30,0, light.Sun.intensity*=2, "
+               "An ASSIGNMENT is material.Steel.roughness=0.2, node.Door.rotate=0,30,0, 'light.Sun.intensity*=2', "
                "hide=Roof or show=Roof. Names may have '*'; numbers and #identifiers name objects, too."};
     struct editing editing = {0};
     struct fl_error error = {0};

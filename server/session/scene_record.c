@@ -50,10 +50,11 @@ static bool grow(struct sink *sink, void **array, size_t *capacity, size_t neede
 
 static void put(struct sink *sink, const struct message *message)
 {
-    if (sink->take && !sink->failed)
-        sink->take(sink->context, message);
-    if (sink->take)
+    if (sink->take) {
+        if (!sink->failed)
+            sink->take(sink->context, message);
         return;
+    }
     struct store_record *record = sink->record;
     void *content = record->content;
     size_t message_bytes = message_write_bytes(message);
