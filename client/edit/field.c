@@ -72,10 +72,10 @@ static size_t stem_of_triple(const struct field_desc *wire)
     return (size_t)(suffix - wire->name);
 }
 
+/* Three numbers that cannot be negative, or four with an alpha, are one in all messages of objects. */
 static bool is_colour(const struct fl_field *field)
 {
-    return (field->count == 3 || field->count == 4) &&
-           (strstr(field->name, "colour") || strcmp(field->name, "emission") == 0);
+    return (field->count == 3 || field->count == 4) && field->min >= 0;
 }
 
 static struct fl_field of_wire(const struct field_desc *wire)
