@@ -369,7 +369,8 @@ static bool denoise(struct frame_renderer *renderer, struct error *error)
     bool done = true;
     context->wave_number = 0;
     if (denoise_is_wanted(context) && denoise_strength(&context->request, renderer->picture.samples) > 0.0f) {
-        if (!denoise_step(&renderer->work->denoise, &renderer->denoise, context, &renderer->picture, &done, error))
+        if (!denoise_step(&renderer->work->denoise, &renderer->denoise, &renderer->history, context,
+                          &renderer->picture, &done, error))
             return false;
         renderer->picture.denoised = denoise_sums_band(&renderer->denoise, DENOISE_SUM_RESULT, 0);
     }

@@ -32,6 +32,18 @@
 /* An estimate that comes from one pixel says nothing, one from so many more all. */
 #define DENOISE_WITNESSES 3.0f
 
+/* What a picture before shows counts as the same place where normals differ by less than this (twice 1 - cos), and
+ * where it is no farther off the surface than this, as a share of its depth. */
+#define DENOISE_SAME_TURN 0.1f
+#define DENOISE_SAME_DEPTH 0.01f
+/* It is worth up to so many times the frame's own samples. */
+#define DENOISE_HISTORY_MAX 8.0f
+/* Of mirrors and glass by so much less: they show other things as the eye moves. */
+#define DENOISE_HISTORY_DOUBT 0.5f
+/* It may differ from what is around in the frame, at that distance in pixels, by so many standard deviations. */
+#define DENOISE_CLIP 3.0f
+#define DENOISE_CLIP_SPACING 2
+
 /* storage buffers */
 #define BIND_DENOISE_NOTES BIND_PASS_0  /* vec4, DENOISE_NOTE_TEXELS a sample of the slice */
 #define BIND_DENOISE_HALF BIND_PASS_1   /* vec4 a slot of a band: sums of the first half of the samples */
