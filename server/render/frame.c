@@ -326,7 +326,8 @@ static bool find_primary(struct frame_renderer *renderer, struct error *error)
         return false;
     if (done)
         renderer->phase = renderer->work->layers.wanted ? PHASE_LAYERS : PHASE_SHADE;
-    if (done && denoise_notes_samples(context) && !denoise_note(&renderer->work->denoise.notes, context, error))
+    if (done && denoise_notes_samples(context) &&
+        !denoise_note(&renderer->work->denoise.notes, denoise_history_moved(&renderer->history), context, error))
         return false;
     return gpu_check(renderer->device, "primary hits", error);
 }

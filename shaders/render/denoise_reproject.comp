@@ -100,7 +100,9 @@ void main()
     halves h = halves_of_words(texelFetch(light, place));
     vec3 mean = mean_of(h);
     float count = samples;
-    if (samples_before_max > 0.0 && own.nearness > 0.0) {
+    bool moved = h.deviation < 0.0;
+    h.deviation = abs(h.deviation);
+    if (samples_before_max > 0.0 && own.nearness > 0.0 && !moved) {
         bool orthographic = frame.extent_near.w != 0.0;
         vec3 p = view_place((vec2(pixel) + 0.5) / vec2(frame.view_width, frame.view_height), frame.extent_near.xy,
                             orthographic, own.nearness);

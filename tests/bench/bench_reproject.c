@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A view whose camera moves, frame by frame: noisy, denoised alone, and with what frames before it show, beside
- * converged pictures of the same cameras.
+/* A view whose camera moves, or that plays a clip, frame by frame: noisy, denoised alone, and with what frames
+ * before it show, beside converged pictures of the same cameras.
  *
  * Prints one JSON object: {"scene", "triangles", "device", "software", "width", "height", "samples", "part": [of
  * each frame, by number], "methods": [{"name", "error": [of each frame: root of the mean square difference of
@@ -28,6 +28,7 @@ static const char usage[] =
     "  --true-samples N   of the true pictures; default 256\n"
     "  --integrator NAME  path or distributed; default path\n"
     "  --speed X          of the camera, times that of a hand at 20 frames a second; default 1\n"
+    "  --clip             the first clip plays in place of the camera\n"
     "  --pictures DIR     all pictures go there too\n";
 
 enum method { METHOD_NOISY, METHOD_DENOISED, METHOD_REPROJECTED, METHODS };
@@ -35,6 +36,8 @@ enum method { METHOD_NOISY, METHOD_DENOISED, METHOD_REPROJECTED, METHODS };
 static const char *const names[METHODS] = {"noisy", "denoised", "reprojected"};
 
 #define PARTS 4u
+#define RATE 20
+#define OBJECTS_MAX 100000u
 #define TRUE_STEP 64u /* samples of a pass: what is denoised has fewer */
 
 struct bench {
@@ -46,6 +49,9 @@ struct bench {
     uint32_t width, height, frames, samples, true_samples;
     enum integrator_kind integrator;
     float speed;
+    bool plays;
+    struct clip_use clip;
+    struct scene_motion motion; /* of this frame, where it plays */
     const char *pictures;
     struct viewer_camera camera;
     uint8_t *truth;
@@ -87,7 +93,8 @@ static struct viewer_camera first_camera(const struct bench_scene *scene)
 static bool render(struct bench *bench, uint32_t renderer, const struct frame_request *request,
                    struct frame_result *result, struct error *error)
 {
-    if (!frame_begin(bench->renderers[renderer], bench->scene.loaded.scene, NULL, request, error))
+    if (!frame_begin(bench->renderers[renderer], bench->scene.loaded.scene, bench->plays ? &bench->motion : NULL,
+                     request, error))
         return false;
     enum frame_progress progress;
     while ((progress = frame_step(bench->renderers[renderer], result, error)) == FRAME_MORE)
@@ -227,17 +234,35 @@ static void keep_before(struct bench *bench)
     }
 }
 
+/* The identifiers of a model's objects are small numbers. */
+static bool find_clip(struct bench *bench, struct error *error)
+{
+    for (uint32_t id = 1; id <= OBJECTS_MAX && bench->clip.clip == 0; id++)
+        if (scene_clip(bench->scene.loaded.scene, id))
+            bench->clip = (struct clip_use){.clip = id, .speed = 1.0f, .loop = true};
+    return bench->clip.clip || error_set(error, ERROR_INVALID, "--clip", "the model has none");
+}
+
+static bool pose(struct bench *bench, uint32_t frame, struct error *error)
+{
+    scene_motion_finish(&bench->motion);
+    return !bench->plays || scene_motion_evaluate(&bench->motion, bench->scene.loaded.scene, &bench->clip, 1,
+                                                  (double)bench->speed * frame / RATE, 0.0, error);
+}
+
 static bool run(struct bench *bench, struct error *error)
 {
+    if (bench->plays && !find_clip(bench, error))
+        return false;
     bench->camera = first_camera(&bench->scene);
     for (uint32_t frame = 0; frame < bench->frames; frame++) {
         const uint32_t part = frame * PARTS / bench->frames;
-        if (frame > 0)
+        if (frame > 0 && !bench->plays)
             move(&bench->camera, part, (double)bench->speed);
         bench->cameras[0] = (struct frame_camera){.fov_y = (float)bench->camera.fov_y};
         camera_pose(&bench->camera, bench->cameras[0].world_from_view);
         json_array_append_new(bench->part, json_integer(part));
-        if (!render_truth(bench, error) || !compare(bench, frame, error))
+        if (!pose(bench, frame, error) || !render_truth(bench, error) || !compare(bench, frame, error))
             return false;
         keep_before(bench);
     }
@@ -303,6 +328,9 @@ static bool parse_option(struct bench *bench, int option, const char *text)
         return bench_parse_number(text, TRUE_STEP, 4096, &bench->true_samples);
     case 'x':
         return bench_parse_real(text, &bench->speed);
+    case 'c':
+        bench->plays = true;
+        return true;
     case 'i':
         if (!bench_parse_word(text, integrators, 2, &found))
             return false;
@@ -316,9 +344,11 @@ static bool parse_option(struct bench *bench, int option, const char *text)
 static bool parse(struct bench *bench, int argc, char **argv)
 {
     static const struct option options[] = {
-        {"model", 1, NULL, 'm'},        {"size", 1, NULL, 's'},     {"frames", 1, NULL, 'n'},
-        {"samples", 1, NULL, 'a'},      {"speed", 1, NULL, 'x'},    {"integrator", 1, NULL, 'i'},
-        {"true-samples", 1, NULL, 't'}, {"pictures", 1, NULL, 'p'}, {NULL, 0, NULL, 0},
+        {"model", 1, NULL, 'm'},        {"size", 1, NULL, 's'},
+        {"frames", 1, NULL, 'n'},       {"samples", 1, NULL, 'a'},
+        {"speed", 1, NULL, 'x'},        {"integrator", 1, NULL, 'i'},
+        {"true-samples", 1, NULL, 't'}, {"pictures", 1, NULL, 'p'},
+        {"clip", 0, NULL, 'c'},         {NULL, 0, NULL, 0},
     };
     *bench = (struct bench){.width = 160,
                             .height = 96,
@@ -335,6 +365,7 @@ static bool parse(struct bench *bench, int argc, char **argv)
 
 static void finish(struct bench *bench)
 {
+    scene_motion_finish(&bench->motion);
     json_decref(bench->part);
     free(bench->truth);
     for (uint32_t i = 0; i < 2; i++)

@@ -106,8 +106,10 @@ static void bind_sums(struct denoise_sums *sums, const struct render_context *co
     gpu_uniform_float(program, "strength", denoise_strength(&context->request, picture->samples));
 }
 
-static void bind_take(struct denoise_filter *filter)
+static void bind_take(struct denoise_filter *filter, const struct denoise_history *history,
+                      const struct gpu_program *program)
 {
+    gpu_uniform_uint(program, "notes_moved", history->things_moved);
     gpu_buffer_bind_storage(&filter->guides, BIND_DENOISE_GUIDE);
     gpu_buffer_bind_storage(&filter->first, BIND_DENOISE_OUT);
 }
@@ -199,7 +201,7 @@ static void bind_pass(struct denoise_filter *filter, struct denoise_sums *sums, 
     switch (filter->pass) {
     case PASS_TAKE:
         bind_sums(sums, context, picture, program, band);
-        bind_take(filter);
+        bind_take(filter, history, program);
         break;
     case PASS_REPROJECT:
         bind_reproject(filter, history, context, picture, program);

@@ -7,14 +7,16 @@
 #define FARLIGHT_RENDER_DENOISE_HISTORY_H
 
 #include "render/context.h"
+#include "render/denoise/places.h"
 #include "render/picture.h"
 
 struct denoise_kept {
     struct gpu_buffer pixels; /* uvec4 a pixel, row by row: shaders/render/denoise_reproject.comp */
     struct frame_uniforms uniforms;
     struct frame_request request;
-    uint64_t showing; /* as in frame_scene */
-    bool whole;       /* it has all of a picture */
+    uint64_t showing, revision; /* as in frame_scene, and of the scene */
+    struct denoise_places places;
+    bool whole; /* it has all of a picture */
 };
 
 struct denoise_history {
@@ -23,13 +25,18 @@ struct denoise_history {
     bool is_written; /* by the frame in hand */
     bool is_used;    /* the same */
     uint32_t moving; /* frames so far: each has noise of its own */
-    bool has_moved;  /* the frame in hand, or the last one, is one of them */
+    bool is_moving;  /* the frame in hand, or the last one, is one of them */
+    /* uint an instance, 1: it has moved since the picture before; nothing: none has. */
+    struct gpu_buffer moved;
+    bool things_moved; /* it has something */
 };
 
 /* Once it is known what the frame shows. `goes_on`: it adds samples to the picture that was written last, and
  * follows the one before that. */
-void denoise_history_begin(struct denoise_history *history, struct render_context *context, uint64_t showing,
-                           bool goes_on);
+bool denoise_history_begin(struct denoise_history *history, struct render_context *context, uint64_t showing,
+                           bool goes_on, struct error *error);
+/* NULL: nothing has moved. */
+struct gpu_buffer *denoise_history_moved(struct denoise_history *history);
 /* `fits`: the picture is filtered in one strip; others have no history. False: there is no memory. */
 bool denoise_history_reserve(struct denoise_history *history, struct render_context *context, bool fits,
                              struct error *error);

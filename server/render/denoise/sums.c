@@ -83,11 +83,14 @@ bool denoise_sums_begin(struct denoise_sums *sums, struct render_context *contex
     return true;
 }
 
-bool denoise_note(struct gpu_buffer *notes, struct render_context *context, struct error *error)
+bool denoise_note(struct gpu_buffer *notes, struct gpu_buffer *moved, struct render_context *context,
+                  struct error *error)
 {
     const size_t bytes = (size_t)context->ray_count * DENOISE_NOTE_TEXELS * sizeof(vec4);
-    struct gpu_define defines[CONTEXT_SURFACE_DEFINES + 1] = {0};
-    (void)context_surface_defines(context, defines);
+    struct gpu_define defines[CONTEXT_SURFACE_DEFINES + 2] = {0};
+    const size_t count = context_surface_defines(context, defines);
+    if (moved)
+        defines[count] = (struct gpu_define){"HAS_MOVED", "1"};
     if (!gpu_buffer_reserve(context->device, notes, bytes, error))
         return false;
     context_span_begin(context, STAGE_SHADE);
@@ -95,6 +98,8 @@ bool denoise_note(struct gpu_buffer *notes, struct render_context *context, stru
     if (program) {
         context_bind_hits(context);
         gpu_buffer_bind_storage(notes, BIND_DENOISE_NOTES);
+        if (moved)
+            gpu_buffer_bind_texels(context->device, moved, UNIT_DENOISE_MOVED, GL_R32UI);
         gpu_uniform_uint(program, "first_slot", context->slice.first_slot);
         gpu_uniform_uint(program, "ray_count", context->ray_count);
         gpu_dispatch(context->device, program, context->ray_count);

@@ -34,8 +34,10 @@ const struct gpu_program *denoise_use(struct render_context *context, const char
 /* Behind picture_begin(): reserves the sums, and clears them unless the frame goes on. */
 bool denoise_sums_begin(struct denoise_sums *sums, struct render_context *context, const struct picture *picture,
                         uint32_t samples_before, struct error *error);
-/* The context has hits of a new slice: notes what they are. Inside no span. */
-bool denoise_note(struct gpu_buffer *notes, struct render_context *context, struct error *error);
+/* The context has hits of a new slice: notes what they are. `moved`: of each instance, whether it has moved since
+ * the picture before; NULL: none has. Inside no span. */
+bool denoise_note(struct gpu_buffer *notes, struct gpu_buffer *moved, struct render_context *context,
+                  struct error *error);
 /* Adds the current slice. Call it once the slice cannot be repeated, but on the device. */
 bool denoise_accumulate(struct denoise_sums *sums, struct gpu_buffer *notes, struct render_context *context,
                         const struct picture *picture, struct error *error);
