@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The light of the pixel's own samples, with that of the picture before where it shows the same place (Schied et al.
-// Spatiotemporal Variance-Guided Filtering. HPG 2017, 4.1). Both have what half their difference is wrong by: they take the
-// place of the halves.
+// Spatiotemporal Variance-Guided Filtering. HPG 2017, 4.1). Both take the place of the halves, as their noise is not the same.
 //
 // Of each pixel is kept: rg; b and how many samples it is worth, as half floats; the guide.
 
@@ -118,5 +117,6 @@ void main()
         }
     }
     blended[place] = words_of_halves(h);
-    kept[place] = uvec4(packHalf2x16(min(mean.rg, HALF_FLOAT_MAX)), packHalf2x16(vec2(min(mean.b, HALF_FLOAT_MAX), count)), guide_words);
+    mean = min(mean, vec3(HALF_FLOAT_MAX));
+    kept[place] = uvec4(packHalf2x16(mean.rg), packHalf2x16(vec2(mean.b, min(count, HALF_FLOAT_MAX))), guide_words);
 }

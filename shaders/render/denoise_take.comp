@@ -27,7 +27,7 @@ void main()
         noise = (first / first_count - (sum - first) / second_count) * (sqrt(first_count * second_count) / count);
     vec3 divisor = max(albedo.rgb, vec3(DENOISE_ALBEDO_MIN));
     float depth = normal.w;
-    float moved = notes_moved != 0u ? floor(albedo.a * count / DENOISE_MOVED) : 0.0; // samples
+    float moved = notes_moved != 0u ? floor(albedo.a * count / DENOISE_MOVED + 0.01) : 0.0; // samples
     albedo.a -= moved * DENOISE_MOVED / count;
     bool there = depth > 0.0 && moved <= count && albedo.a <= 1.0; // all of it: what is behind would be spread over the edge, too
     guide g = guide(there ? normal.xyz : vec3(0.0), min(albedo.a, 1.0), 0.0);

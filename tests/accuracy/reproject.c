@@ -119,6 +119,37 @@ TEST(a_view_at_rest_ends_in_the_same_picture_however_it_moved)
     frame_result_finish(&plain);
 }
 
+static double distance_of(const struct frame_result *picture, const struct frame_result *truth)
+{
+    double squares = 0.0;
+    for (uint32_t i = 0; i < picture->width * picture->height; i++) {
+        const uint32_t x = i % picture->width, y = i / picture->width;
+        const double error = (double)(fixture_pixel(picture, x, y)[1] - fixture_pixel(truth, x, y)[1]);
+        squares += error * error;
+    }
+    return sqrt(squares / (double)(picture->width * picture->height));
+}
+
+/* As a view does that keeps a rate. */
+TEST(a_frame_follows_frames_of_another_size)
+{
+    struct fixture *fixture = *state;
+    a_corner(fixture);
+    for (int frame = 0; frame < WARM; frame++) {
+        look(fixture, frame);
+        struct frame_result moving = rendered(fixture, HISTORY_MOVING, 1);
+        frame_result_finish(&moving);
+    }
+    fixture->request.width = fixture->request.height = 3 * EDGE / 4;
+    struct frame_result following = rendered(fixture, HISTORY_MOVING, 1),
+                        alone = rendered(fixture, HISTORY_NONE, 1);
+    struct frame_result truth = rendered(fixture, HISTORY_NONE, 128);
+    assert_true(distance_of(&following, &truth) < 0.75 * distance_of(&alone, &truth));
+    frame_result_finish(&following);
+    frame_result_finish(&alone);
+    frame_result_finish(&truth);
+}
+
 TEST(nothing_is_left_of_frames_before_an_edit)
 {
     struct fixture *fixture = *state;
