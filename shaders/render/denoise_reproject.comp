@@ -73,7 +73,7 @@ vec3 clipped(vec3 colour, ivec2 pixel, ivec2 lower, ivec2 upper, guide own)
     vec3 sum = vec3(0.0), squares = vec3(0.0);
     float count = 0.0;
     for (int i = 0; i < 9; i++) {
-        ivec2 next = clamp(pixel + ivec2(i % 3 - 1, i / 3 - 1) * DENOISE_CLIP_SPACING, lower, upper - 1);
+        ivec2 next = clamp(pixel + ivec2(i % 3 - 1, i / 3 - 1), lower, upper - 1);
         int place = place_of(next);
         guide other = guide_of_words(texelFetch(guides, place).xy);
         float weight = is_alike(own, other) ? 1.0 : 0.0;

@@ -44,10 +44,9 @@
 /* While things move, whose shadows and light fall on others: */
 #define DENOISE_HISTORY_POSED_MAX 3.0f
 /* Of mirrors and glass by so much less: they show other things as the eye moves. */
-#define DENOISE_HISTORY_DOUBT 0.5f
-/* It may differ from what is around in the frame, at that distance in pixels, by so many standard deviations. */
+#define DENOISE_HISTORY_DOUBT 0.25f
+/* It may differ from the pixels around in the frame by so many standard deviations of those. */
 #define DENOISE_CLIP 3.0f
-#define DENOISE_CLIP_SPACING 2
 
 /* storage buffers */
 #define BIND_DENOISE_NOTES BIND_PASS_0  /* vec4, DENOISE_NOTE_TEXELS a sample of the slice */
