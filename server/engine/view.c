@@ -118,6 +118,17 @@ static uint32_t samples_of_next(const struct job *job)
     return limited ? view->wish.effort.samples : wanted;
 }
 
+/* A frame while it moves, and the first ones at rest, have what frames before them show of the same places; one
+ * that has all its samples is that of any other way there. */
+static enum frame_history history_of(const struct job *job, uint32_t samples)
+{
+    const struct view *view = &job->view;
+    if (view->wish.camera.moving)
+        return HISTORY_MOVING;
+    const uint32_t held = samples + (view->refining ? view->held_samples : 0);
+    return held < job->spec.frame.samples ? HISTORY_USED : HISTORY_KEPT;
+}
+
 /* That it goes without. */
 static uint32_t depth_less(const struct job *job)
 {
@@ -237,6 +248,7 @@ bool view_take_up(struct job *job, struct shot *shot, struct error *error)
     shot->request.accumulate = adds_up(job);
     shot->request.samples = samples_of_next(job);
     shot->request.samples_max = job->spec.frame.samples; /* one that is complete may be wished again */
+    shot->request.history = history_of(job, shot->request.samples);
     choose_eyes(job, &shot->request);
     apply_effort(job, &shot->request);
     add_margin(job, &shot->request);

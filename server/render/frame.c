@@ -326,7 +326,8 @@ static bool find_primary(struct frame_renderer *renderer, struct error *error)
         return false;
     if (done)
         renderer->phase = renderer->work->layers.wanted ? PHASE_LAYERS : PHASE_SHADE;
-    if (done && denoise_notes_samples(context) && !denoise_note(&renderer->work->denoise.notes, context, error))
+    if (done && denoise_notes_samples(context) &&
+        !denoise_note(&renderer->work->denoise.notes, denoise_history_moved(&renderer->history), context, error))
         return false;
     return gpu_check(renderer->device, "primary hits", error);
 }
@@ -369,7 +370,8 @@ static bool denoise(struct frame_renderer *renderer, struct error *error)
     bool done = true;
     context->wave_number = 0;
     if (denoise_is_wanted(context) && denoise_strength(&context->request, renderer->picture.samples) > 0.0f) {
-        if (!denoise_step(&renderer->work->denoise, &renderer->denoise, context, &renderer->picture, &done, error))
+        if (!denoise_step(&renderer->work->denoise, &renderer->denoise, &renderer->history, context,
+                          &renderer->picture, &done, error))
             return false;
         renderer->picture.denoised = denoise_sums_band(&renderer->denoise, DENOISE_SUM_RESULT, 0);
     }

@@ -25,6 +25,14 @@ struct frame_camera {
     float near; /* metres; 0: chosen from the scene */
 };
 
+/* Of a view, whose frames follow each other (render/denoise/history.h). */
+enum frame_history {
+    HISTORY_NONE,  /* the frame stands alone, and so does the next one */
+    HISTORY_KEPT,  /* it stands alone, and the next one may follow it */
+    HISTORY_USED,  /* it follows the one before */
+    HISTORY_MOVING /* and has other noise than that, whatever the seed; no samples are added to its own */
+};
+
 struct frame_request {
     uint32_t width, height; /* of the whole picture */
     /* Views in it, of the same size, row by row; 0: 1. Each is that of an eye of its own, see frame_view_eye(). */
@@ -78,6 +86,8 @@ struct frame_request {
     /* Random noise is filtered out of the picture that is handed out, not out of the sums (render/denoise/); what
      * integrators without any show stays as it is, and so does a picture made from layers. */
     enum denoise denoise;
+    /* With that: whether the picture, but not its sums, has what those before it have of the same places. */
+    enum frame_history history;
     /* Every wave is traced by a second tracer too, primary rays included (`primary` is taken to be PRIMARY_TRACE),
      * and the result has what came of it. The picture is that of `tracer`. */
     bool compare;

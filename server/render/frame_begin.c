@@ -45,7 +45,8 @@ static bool check_request(const struct frame_renderer *renderer, const struct fr
 /* Whether the kept picture shows the same as this frame, once the scene has been updated. */
 static bool may_go_on(const struct frame_renderer *renderer, const struct frame_request *request)
 {
-    return renderer->kept_samples > 0 && request->samples <= UINT32_MAX - renderer->kept_samples &&
+    return renderer->kept_samples > 0 && !renderer->history.is_moving &&
+           request->samples <= UINT32_MAX - renderer->kept_samples &&
            frame_request_adds_to(&renderer->kept_request, request);
 }
 
@@ -336,7 +337,9 @@ static bool get_ready(struct frame_renderer *renderer, struct error *error)
                         : 1.0f;
     fill_filter(context);
     context->uniforms.seed = (uint32_t)(request->seed ^ request->seed >> 32);
-    if (!reserve_frame(renderer, error) || !gpu_check_reset(renderer->device, "beginning a frame", error))
+    const bool goes_on = renderer->samples_before > 0;
+    if (!denoise_history_begin(&renderer->history, context, renderer->shared->showing, goes_on, error) ||
+        !reserve_frame(renderer, error) || !gpu_check_reset(renderer->device, "beginning a frame", error))
         return false;
     renderer->result.revision = renderer->shared->copy.revision;
     renderer->sample = renderer->plane = renderer->band = renderer->copied = 0;

@@ -92,6 +92,7 @@ void frame_renderer_destroy(struct frame_renderer *renderer)
     tracer_set_finish(&renderer->tracers);
     picture_finish(&renderer->picture, renderer->device);
     denoise_sums_finish(&renderer->denoise, renderer->device);
+    denoise_history_finish(&renderer->history, renderer->device);
     key_view_finish(&renderer->key, renderer->device);
     free(renderer);
 }
@@ -121,6 +122,7 @@ void frame_renderer_stand_in(struct frame_renderer *renderer, unsigned number, c
 uint64_t frame_renderer_device_bytes(const struct frame_renderer *renderer)
 {
     return picture_device_bytes(&renderer->picture) + denoise_sums_device_bytes(&renderer->denoise) +
-           key_view_device_bytes(&renderer->key) + tracer_set_device_bytes(&renderer->tracers) +
+           denoise_history_device_bytes(&renderer->history) + key_view_device_bytes(&renderer->key) +
+           tracer_set_device_bytes(&renderer->tracers) +
            (renderer->work ? frame_work_device_bytes(renderer->work) : 0);
 }

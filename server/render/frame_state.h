@@ -69,8 +69,9 @@ struct frame_renderer {
     struct frame_scene *shared;
     struct picture picture;
     struct denoise_sums denoise; /* of a picture that is denoised */
-    struct key_view key;         /* of frames whose eyes are made from layers */
-    struct tracer_set tracers;   /* that depend on the view: no other renderer's frames may use them */
+    struct denoise_history history;
+    struct key_view key;       /* of frames whose eyes are made from layers */
+    struct tracer_set tracers; /* that depend on the view: no other renderer's frames may use them */
     const struct tracer_impl *stand_in;
     unsigned stand_in_number;
     uint32_t wanted_slice_pixels, wanted_wave_rays; /* 0: chosen */

@@ -225,25 +225,25 @@ bool view_may_send(const struct job *job)
     return pacing_may_send(&job->view->pacing);
 }
 
-/* Updates the estimates of link and renderer from each frame, and with them the quality and size of the next.
- */
-static void adapt(struct session_view *view, const struct engine_frame *frame)
+/* By what is known of link and renderer. */
+static void choose_effort(struct session_view *view)
 {
-    if (frame->moving) {
-        unsigned wanted = view->terms.quality ? view->terms.quality : PACING_QUALITY_REFERENCE;
-        struct pacing_advice advice = pacing_advise(&view->pacing, wanted);
-        view->effort.scale_32nds = advice.scale_32nds;
-        view->effort.quality = view->terms.quality && view->terms.adapt ? advice.quality : 0;
-        view->effort.bytes = view->terms.adapt ? advice.bytes : 0;
-        view->effort.samples = advice.samples;
-        view->effort.depth_less = advice.depth_less;
-        view->effort.margin_halves_less = advice.margin_halves_less;
-        view->effort.no_hidden = advice.no_hidden;
-    } else if (view->terms.adapt && frame->encoding == view->terms.still_encoding) {
-        double bytes_per_second = (double)pacing_bytes_per_second(&view->pacing);
-        if (bytes_per_second > 0.0)
-            view->effort.sparing = (double)frame->size_bytes * SECOND_NS > SPARING_NS * bytes_per_second;
-    }
+    unsigned wanted = view->terms.quality ? view->terms.quality : PACING_QUALITY_REFERENCE;
+    struct pacing_advice advice = pacing_advise(&view->pacing, wanted);
+    view->effort.scale_32nds = advice.scale_32nds;
+    view->effort.quality = view->terms.quality && view->terms.adapt ? advice.quality : 0;
+    view->effort.bytes = view->terms.adapt ? advice.bytes : 0;
+    view->effort.samples = advice.samples;
+    view->effort.depth_less = advice.depth_less;
+    view->effort.margin_halves_less = advice.margin_halves_less;
+    view->effort.no_hidden = advice.no_hidden;
+}
+
+static void choose_sparing(struct session_view *view, const struct engine_frame *frame)
+{
+    double bytes_per_second = (double)pacing_bytes_per_second(&view->pacing);
+    if (bytes_per_second > 0.0)
+        view->effort.sparing = (double)frame->size_bytes * SECOND_NS > SPARING_NS * bytes_per_second;
 }
 
 static void choose_parts(struct session_view *view, const struct engine_frame *frame)
@@ -300,10 +300,13 @@ void view_frame_made(struct job *job, const struct engine_frame *frame)
         return;
     }
     view->made_ns = frame->encoded_ns > frame->applied_ns ? frame->encoded_ns - frame->applied_ns : 0;
-    if (is_learned_from(view, frame))
+    if (is_learned_from(view, frame)) {
         learn(view, frame);
-    if (view->terms.adapt || view->terms.moving.deadline_ns)
-        adapt(view, frame);
+        if (view->terms.adapt || view->terms.moving.deadline_ns)
+            choose_effort(view); /* also at rest: for the first frame that moves */
+    }
+    if (view->terms.adapt && !frame->moving && frame->encoding == view->terms.still_encoding)
+        choose_sparing(view, frame);
     if (view->terms.parts)
         choose_parts(view, frame);
     view_wishes_set_effort(view->wishes, &view->effort);

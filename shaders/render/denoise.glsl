@@ -15,7 +15,8 @@ uniform uint strip_row, strip_rows; // the strip's first row in the picture, and
 
 struct halves {
     vec3 a, b;
-    float deviation; // of each, by luminance; until it is known, the luminance of their mean
+    float deviation; // of each, by luminance; until it is known, the luminance of their mean, before that negative where
+                     // something has moved since the picture before
 };
 
 struct guide {

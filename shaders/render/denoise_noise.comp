@@ -83,9 +83,9 @@ void main()
     }
     vec3 apart = count < 1.0 ? vec3(0.0) : count < 3.0 ? least : second;
     vec3 noise = noise_of(h);
-    if (one_sample != 0u)
+    if (one_sample != 0u && h.a == h.b)
         noise = apart;
-    noise *= 1.0 - (one_sample != 0u ? 1.0 : DENOISE_MIRROR_DOUBT) * own.share;
+    noise *= 1.0 - (one_sample != 0u && h.a == h.b ? 1.0 : DENOISE_MIRROR_DOUBT) * own.share;
     h = halves(mean + noise, mean - noise, 0.0);
     vec2 slope = vec2(smaller(rises.x, rises.y), smaller(rises.z, rises.w));
     slope = mix(slope, vec2(0.0), greaterThan(abs(slope), vec2(1e29))); // a view one pixel wide

@@ -3,6 +3,7 @@
 // which light is divided so that textures are not blurred; its normal and depth.
 //
 // Defines: those of common/material.glsl.
+//          HAS_MOVED some instances have moved since the picture before.
 
 #include "shared/denoise.h"
 #include "common/scattering.glsl"
@@ -11,6 +12,10 @@
 uniform uint ray_count;
 
 layout(std430, binding = BIND_DENOISE_NOTES) writeonly buffer note_block { vec4 notes[]; };
+
+#ifdef HAS_MOVED
+layout(binding = UNIT_DENOISE_MOVED) uniform usamplerBuffer moved;
+#endif
 
 void main()
 {
@@ -28,6 +33,10 @@ void main()
         float all = max_component(scattered + clear_);
         float share = all > 0.0 ? max_component(clear_) / all : 0.0;
         albedo = vec4(min(s.base + s.emission, vec3(1e6)), 1.0 - s.alpha * (1.0 - clamp(share, 0.0, 1.0)));
+#ifdef HAS_MOVED
+        if (h.instance == HIT_NO_PRIMITIVE || texelFetch(moved, int(h.instance)).x != 0u)
+            albedo.a += DENOISE_MOVED;
+#endif
         vec3 place = r.origin_t_min.xyz + h.distance * r.direction_t_max.xyz;
         normal = vec4(s.normal, -view_from_world_point(place).z);
     }

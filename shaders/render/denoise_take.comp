@@ -5,6 +5,7 @@
 #include "render/denoise_count.glsl"
 
 uniform uint band_row; // the first row of the band in the picture
+uniform uint notes_moved; // 1: samples have DENOISE_MOVED
 
 layout(std430, binding = BIND_ACCUMULATION) readonly buffer accumulation_block { vec4 accumulation[]; };
 layout(std430, binding = BIND_DENOISE_HALF) readonly buffer half_block { vec4 first_half[]; };
@@ -26,11 +27,14 @@ void main()
         noise = (first / first_count - (sum - first) / second_count) * (sqrt(first_count * second_count) / count);
     vec3 divisor = max(albedo.rgb, vec3(DENOISE_ALBEDO_MIN));
     float depth = normal.w;
-    bool there = depth > 0.0 && albedo.a <= 1.0; // all of it: what is behind would be spread over the edge, too
+    float moved = notes_moved != 0u ? floor(albedo.a * count / DENOISE_MOVED + 0.01) : 0.0; // samples
+    albedo.a -= moved * DENOISE_MOVED / count;
+    bool there = depth > 0.0 && moved <= count && albedo.a <= 1.0; // all of it: what is behind would be spread over the edge, too
     guide g = guide(there ? normal.xyz : vec3(0.0), min(albedo.a, 1.0), 0.0);
     if (there)
         g.nearness = frame.extent_near.w != 0.0 ? depth : 1.0 / depth;
     int place = place_of(pixel);
     guides[place] = words_of_guide(g);
-    light[place] = words_of_halves(halves((mean + noise) / divisor, (mean - noise) / divisor, luminance(mean / divisor)));
+    float shown = luminance(mean / divisor);
+    light[place] = words_of_halves(halves((mean + noise) / divisor, (mean - noise) / divisor, moved == 0.0 ? shown : -shown));
 }

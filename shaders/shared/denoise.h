@@ -9,6 +9,9 @@
 
 /* In place of the share of mirrors and glass: the sample left the scene. */
 #define DENOISE_LEFT 1e6f
+/* Added to it: the instance has moved since the picture before. */
+#define DENOISE_MOVED 1e3f
+#define DENOISE_MOVED_SAMPLES_MAX 256u /* so that sums tell how many have */
 /* Of the depth: a surface is not flatter than this, per pixel. */
 #define DENOISE_DEPTH_SHARE 0.004f
 /* A turn of the normal by 14 degrees is as far as one surface is expected to go. */
@@ -32,6 +35,19 @@
 /* An estimate that comes from one pixel says nothing, one from so many more all. */
 #define DENOISE_WITNESSES 3.0f
 
+/* What a picture before shows counts as the same place where normals differ by less than this (twice 1 - cos), and
+ * where it is no farther off the surface than this, as a share of its depth. */
+#define DENOISE_SAME_TURN 0.1f
+#define DENOISE_SAME_DEPTH 0.01f
+/* It is worth up to so many times the frame's own samples. */
+#define DENOISE_HISTORY_MAX 8.0f
+/* While things move, whose shadows and light fall on others: */
+#define DENOISE_HISTORY_POSED_MAX 3.0f
+/* Of mirrors and glass by so much less: they show other things as the eye moves. */
+#define DENOISE_HISTORY_DOUBT 0.25f
+/* It may differ from the pixels around in the frame by so many standard deviations of those. */
+#define DENOISE_CLIP 3.0f
+
 /* storage buffers */
 #define BIND_DENOISE_NOTES BIND_PASS_0  /* vec4, DENOISE_NOTE_TEXELS a sample of the slice */
 #define BIND_DENOISE_HALF BIND_PASS_1   /* vec4 a slot of a band: sums of the first half of the samples */
@@ -43,6 +59,7 @@
 #define BIND_DENOISE_OUT_TOO 3          /* and what it writes beside these */
 
 /* texture units */
+#define UNIT_DENOISE_MOVED UNIT_PASS_0   /* uint an instance, 1: it has moved since the picture before */
 #define UNIT_DENOISE_LIGHT UNIT_TRACER_0 /* halves of the light at this level */
 #define UNIT_DENOISE_GUIDE UNIT_TRACER_1
 #define UNIT_DENOISE_FIRST UNIT_TRACER_2 /* halves of the light before any level */

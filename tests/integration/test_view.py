@@ -191,14 +191,15 @@ class WithoutAWindow(Viewer):
         self.assertTrue(0 < difference(moving, rested) < 5)
 
     def test_what_moves_gives_way_to_the_rate_and_rest_is_the_full_picture(self):
-        """No software renders a thousand frames a second: all that may be given up is, whatever else the machine does."""
+        """No software renders a thousand frames a second: all that may be given up is, whatever else the machine does. What frames
+        while it moves have of those before them is gone at rest."""
         moves = [{"mouse": "move", "x": 110 + step / 20, "y": 55, "after": 0.03} for step in range(40)]
         let_go = {"mouse": "up", "button": "left", "x": 112, "y": 55}
         size, states = (160, 90), {}
         for rate in (1000, 0):
             states[rate] = self.replay([rest(8), *HIDE, drag(80, 45, 0, 0)[0], *moves, {"state": "moving"}, let_go, rest(8),
                                         {"state": "rested"}, {"screenshot": f"rested-{rate}.png"}],
-                                       "--views", "off", "--moving-rate", rate, size=size)
+                                       "--views", "off", "--moving-rate", rate, "--integrator", "path", size=size)
         self.assertEqual([(states[rate]["moving"]["width"], states[rate]["moving"]["depth_less"]) for rate in (1000, 0)],
                          [(size[0] // 4, 6), (size[0], 0)])
         self.assertEqual([(states[rate]["rested"]["width"], states[rate]["rested"]["depth_less"]) for rate in (1000, 0)],

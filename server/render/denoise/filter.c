@@ -16,7 +16,15 @@
 #define STEP_PIXELS_SOFTWARE (1u << 15)
 #define STEP_PIXELS (1u << 22)
 
-enum pass { PASS_TAKE, PASS_NOISE, PASS_SETTLE, PASS_LEVELS, PASS_GIVE = PASS_LEVELS + 2 * LEVELS, PASS_COUNT };
+enum pass {
+    PASS_TAKE,
+    PASS_REPROJECT,
+    PASS_NOISE,
+    PASS_SETTLE,
+    PASS_LEVELS,
+    PASS_GIVE = PASS_LEVELS + 2 * LEVELS,
+    PASS_COUNT
+};
 
 void denoise_begin(struct denoise_filter *filter)
 {
@@ -47,8 +55,8 @@ static bool reserve_strip(struct denoise_filter *filter, struct render_context *
 }
 
 /* All of the picture where it fits. */
-static bool begin_strip(struct denoise_filter *filter, struct render_context *context,
-                        const struct picture *picture, struct error *error)
+static bool begin_strip(struct denoise_filter *filter, struct denoise_history *history,
+                        struct render_context *context, const struct picture *picture, struct error *error)
 {
     const uint64_t most = rows_max(context, picture);
     filter->own_row = filter->own_end;
@@ -62,7 +70,8 @@ static bool begin_strip(struct denoise_filter *filter, struct render_context *co
     filter->strip_row = filter->own_row > EDGE_ROWS ? filter->own_row - EDGE_ROWS : 0;
     const uint64_t end = (uint64_t)filter->own_end + EDGE_ROWS;
     filter->strip_rows = (end < picture->height ? (uint32_t)end : picture->height) - filter->strip_row;
-    return reserve_strip(filter, context, picture->width, error);
+    return reserve_strip(filter, context, picture->width, error) &&
+           denoise_history_reserve(history, context, fits, error);
 }
 
 static void bind_light(struct render_context *context, struct gpu_buffer *buffer, unsigned unit)
@@ -97,25 +106,40 @@ static void bind_sums(struct denoise_sums *sums, const struct render_context *co
     gpu_uniform_float(program, "strength", denoise_strength(&context->request, picture->samples));
 }
 
-static void bind_take(struct denoise_filter *filter)
+static void bind_take(struct denoise_filter *filter, const struct denoise_history *history,
+                      const struct gpu_program *program)
 {
+    gpu_uniform_uint(program, "notes_moved", history->things_moved);
     gpu_buffer_bind_storage(&filter->guides, BIND_DENOISE_GUIDE);
     gpu_buffer_bind_storage(&filter->first, BIND_DENOISE_OUT);
 }
 
-static void bind_give(struct denoise_filter *filter, struct denoise_sums *sums, struct render_context *context,
-                      uint32_t band)
+static void bind_reproject(struct denoise_filter *filter, struct denoise_history *history,
+                           struct render_context *context, const struct picture *picture,
+                           const struct gpu_program *program)
 {
+    bind_light(context, &filter->first, UNIT_DENOISE_LIGHT);
+    bind_guides(filter, context);
+    gpu_buffer_bind_storage(&filter->levels[0], BIND_DENOISE_OUT);
+    denoise_history_bind(history, context, program, picture->samples);
+}
+
+static void bind_give(struct denoise_filter *filter, struct denoise_sums *sums, struct denoise_history *history,
+                      struct render_context *context, uint32_t band)
+{
+    if (history->is_written)
+        bind_light(context, denoise_history_pixels(history), UNIT_DENOISE_WIDER);
     bind_light(context, &filter->levels[(LEVELS - 1) % 2], UNIT_DENOISE_LIGHT);
     bind_light(context, &filter->first, UNIT_DENOISE_FIRST);
     bind_guides(filter, context);
     gpu_buffer_bind_storage(denoise_sums_band(sums, DENOISE_SUM_RESULT, band), BIND_DENOISE_OUT);
 }
 
-static void bind_noise(struct denoise_filter *filter, struct render_context *context,
-                       const struct picture *picture, const struct gpu_program *program)
+static void bind_noise(struct denoise_filter *filter, const struct denoise_history *history,
+                       struct render_context *context, const struct picture *picture,
+                       const struct gpu_program *program)
 {
-    bind_light(context, &filter->first, UNIT_DENOISE_LIGHT);
+    bind_light(context, history->is_written ? &filter->levels[0] : &filter->first, UNIT_DENOISE_LIGHT);
     bind_guides(filter, context);
     gpu_buffer_bind_storage(&filter->slopes, BIND_DENOISE_SLOPE);
     gpu_buffer_bind_storage(&filter->risks, BIND_DENOISE_OUT);
@@ -157,6 +181,8 @@ static const char *shader_of(uint32_t pass)
     switch (pass) {
     case PASS_TAKE:
         return "render/denoise_take.comp";
+    case PASS_REPROJECT:
+        return "render/denoise_reproject.comp";
     case PASS_NOISE:
         return "render/denoise_noise.comp";
     case PASS_SETTLE:
@@ -167,24 +193,28 @@ static const char *shader_of(uint32_t pass)
     return (pass - PASS_LEVELS) % 2 ? "render/denoise_choose.comp" : "render/denoise_filter.comp";
 }
 
-static void bind_pass(struct denoise_filter *filter, struct denoise_sums *sums, struct render_context *context,
-                      const struct picture *picture, const struct gpu_program *program)
+static void bind_pass(struct denoise_filter *filter, struct denoise_sums *sums, struct denoise_history *history,
+                      struct render_context *context, const struct picture *picture,
+                      const struct gpu_program *program)
 {
     const uint32_t band = (filter->strip_row + filter->row) / picture->band_rows;
     switch (filter->pass) {
     case PASS_TAKE:
         bind_sums(sums, context, picture, program, band);
-        bind_take(filter);
+        bind_take(filter, history, program);
+        break;
+    case PASS_REPROJECT:
+        bind_reproject(filter, history, context, picture, program);
         break;
     case PASS_NOISE:
-        bind_noise(filter, context, picture, program);
+        bind_noise(filter, history, context, picture, program);
         break;
     case PASS_SETTLE:
         bind_settle(filter, context);
         break;
     case PASS_GIVE:
         bind_sums(sums, context, picture, program, band);
-        bind_give(filter, sums, context, band);
+        bind_give(filter, sums, history, context, band);
         break;
     default:
         bind_level(filter, context, program);
@@ -217,12 +247,14 @@ static uint32_t rows_of_step(const struct denoise_filter *filter, const struct r
     return rows < left ? rows : left;
 }
 
-static bool dispatch(struct denoise_filter *filter, struct denoise_sums *sums, struct render_context *context,
-                     const struct picture *picture, uint32_t rows, struct error *error)
+static bool dispatch(struct denoise_filter *filter, struct denoise_sums *sums, struct denoise_history *history,
+                     struct render_context *context, const struct picture *picture, uint32_t rows,
+                     struct error *error)
 {
     const char *shader = shader_of(filter->pass);
-    const struct gpu_program *program =
-        has_band(filter) ? denoise_use(context, shader, error) : context_use(context, shader, error);
+    const bool gives_reprojected = filter->pass == PASS_GIVE && history->is_written;
+    const struct gpu_program *program = has_band(filter) ? denoise_use(context, shader, gives_reprojected, error)
+                                                         : context_use(context, shader, error);
     if (!program)
         return false;
     context_span_begin(context, STAGE_RESOLVE);
@@ -231,32 +263,42 @@ static bool dispatch(struct denoise_filter *filter, struct denoise_sums *sums, s
     gpu_uniform_uint(program, "item_count", rows * picture->width);
     gpu_uniform_uint(program, "strip_row", filter->strip_row);
     gpu_uniform_uint(program, "strip_rows", filter->strip_rows);
-    bind_pass(filter, sums, context, picture, program);
+    bind_pass(filter, sums, history, context, picture, program);
     gpu_dispatch(context->device, program, (uint64_t)rows * picture->width);
     context_span_end(context);
     return gpu_check(context->device, "denoising", error);
 }
 
-bool denoise_step(struct denoise_filter *filter, struct denoise_sums *sums, struct render_context *context,
-                  const struct picture *picture, bool *done, struct error *error)
+/* Behind the one in hand. */
+static uint32_t next_pass(const struct denoise_filter *filter, const struct denoise_history *history)
+{
+    const uint32_t next = filter->pass + 1;
+    return next == PASS_REPROJECT && !history->is_written ? next + 1 : next;
+}
+
+bool denoise_step(struct denoise_filter *filter, struct denoise_sums *sums, struct denoise_history *history,
+                  struct render_context *context, const struct picture *picture, bool *done, struct error *error)
 {
     *done = false;
-    if (filter->pass == 0 && filter->row == 0 && !begin_strip(filter, context, picture, error))
+    if (filter->pass == 0 && filter->row == 0 && !begin_strip(filter, history, context, picture, error))
         return false;
     uint32_t begin, end;
     rows_of_pass(filter, &begin, &end);
     filter->row = filter->row > begin ? filter->row : begin;
     const uint32_t rows = rows_of_step(filter, context, picture, end - filter->row);
-    if (!dispatch(filter, sums, context, picture, rows, error))
+    if (!dispatch(filter, sums, history, context, picture, rows, error))
         return false;
     filter->row += rows;
     if (filter->row < end)
         return true;
     filter->row = 0;
-    if (++filter->pass < PASS_COUNT)
+    filter->pass = next_pass(filter, history);
+    if (filter->pass < PASS_COUNT)
         return true;
     filter->pass = 0;
     *done = filter->own_end == picture->height;
+    if (*done)
+        denoise_history_end(history);
     return true;
 }
 

@@ -4,6 +4,7 @@
 #ifndef FARLIGHT_RENDER_DENOISE_FILTER_H
 #define FARLIGHT_RENDER_DENOISE_FILTER_H
 
+#include "render/denoise/history.h"
 #include "render/denoise/sums.h"
 
 struct denoise_filter {
@@ -20,8 +21,8 @@ struct denoise_filter {
 /* Behind the last sample of a frame. */
 void denoise_begin(struct denoise_filter *filter);
 /* A step of some milliseconds, where the device is software; *done: DENOISE_SUM_RESULT has the picture. */
-bool denoise_step(struct denoise_filter *filter, struct denoise_sums *sums, struct render_context *context,
-                  const struct picture *picture, bool *done, struct error *error);
+bool denoise_step(struct denoise_filter *filter, struct denoise_sums *sums, struct denoise_history *history,
+                  struct render_context *context, const struct picture *picture, bool *done, struct error *error);
 uint64_t denoise_filter_device_bytes(const struct denoise_filter *filter);
 void denoise_filter_finish(struct denoise_filter *filter, struct gpu_device *device);
 

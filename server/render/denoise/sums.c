@@ -38,11 +38,16 @@ bool denoise_is_wanted(const struct render_context *context)
            request->view_source != VIEW_SOURCE_LAYERS;
 }
 
-const struct gpu_program *denoise_use(struct render_context *context, const char *shader, struct error *error)
+const struct gpu_program *denoise_use(struct render_context *context, const char *shader, bool reprojected,
+                                      struct error *error)
 {
-    static const struct gpu_define stopping[] = {{"HAS_TILE_SAMPLES", "1"}, {0}};
-    const struct gpu_program *program =
-        context_use_with(context, shader, context->tile_samples ? stopping : NULL, error);
+    struct gpu_define defines[3] = {0};
+    size_t count = 0;
+    if (context->tile_samples)
+        defines[count++] = (struct gpu_define){"HAS_TILE_SAMPLES", "1"};
+    if (reprojected)
+        defines[count++] = (struct gpu_define){"HAS_REPROJECTED", "1"};
+    const struct gpu_program *program = context_use_with(context, shader, defines, error);
     if (program && context->tile_samples)
         gpu_buffer_bind_texels(context->device, context->tile_samples, UNIT_TILE_SAMPLES, GL_R32UI);
     return program;
@@ -78,11 +83,14 @@ bool denoise_sums_begin(struct denoise_sums *sums, struct render_context *contex
     return true;
 }
 
-bool denoise_note(struct gpu_buffer *notes, struct render_context *context, struct error *error)
+bool denoise_note(struct gpu_buffer *notes, struct gpu_buffer *moved, struct render_context *context,
+                  struct error *error)
 {
     const size_t bytes = (size_t)context->ray_count * DENOISE_NOTE_TEXELS * sizeof(vec4);
-    struct gpu_define defines[CONTEXT_SURFACE_DEFINES + 1] = {0};
-    (void)context_surface_defines(context, defines);
+    struct gpu_define defines[CONTEXT_SURFACE_DEFINES + 2] = {0};
+    const size_t count = context_surface_defines(context, defines);
+    if (moved)
+        defines[count] = (struct gpu_define){"HAS_MOVED", "1"};
     if (!gpu_buffer_reserve(context->device, notes, bytes, error))
         return false;
     context_span_begin(context, STAGE_SHADE);
@@ -90,6 +98,8 @@ bool denoise_note(struct gpu_buffer *notes, struct render_context *context, stru
     if (program) {
         context_bind_hits(context);
         gpu_buffer_bind_storage(notes, BIND_DENOISE_NOTES);
+        if (moved)
+            gpu_buffer_bind_texels(context->device, moved, UNIT_DENOISE_MOVED, GL_R32UI);
         gpu_uniform_uint(program, "first_slot", context->slice.first_slot);
         gpu_uniform_uint(program, "ray_count", context->ray_count);
         gpu_dispatch(context->device, program, context->ray_count);
@@ -104,7 +114,7 @@ bool denoise_accumulate(struct denoise_sums *sums, struct gpu_buffer *notes, str
     uint32_t first_slot;
     const struct gpu_buffer *own = picture_slice_band(picture, &context->slice, &first_slot);
     const uint32_t band = (uint32_t)(own - picture->bands);
-    const struct gpu_program *program = denoise_use(context, "render/denoise_accumulate.comp", error);
+    const struct gpu_program *program = denoise_use(context, "render/denoise_accumulate.comp", false, error);
     if (!program)
         return false;
     if (context->tile_samples)

@@ -27,13 +27,17 @@ bool denoise_is_wanted(const struct render_context *context);
 bool denoise_notes_samples(const struct render_context *context);
 /* How much of the filtering a picture of that many samples gets, 0 to 1. */
 float denoise_strength(const struct frame_request *request, uint32_t samples);
-/* One of the programs that ask how many samples a pixel has: its tile may have stopped. */
-const struct gpu_program *denoise_use(struct render_context *context, const char *shader, struct error *error);
+/* One of the programs that ask how many samples a pixel has: its tile may have stopped. `reprojected`: the light
+ * of the picture has that of pictures before in it. */
+const struct gpu_program *denoise_use(struct render_context *context, const char *shader, bool reprojected,
+                                      struct error *error);
 /* Behind picture_begin(): reserves the sums, and clears them unless the frame goes on. */
 bool denoise_sums_begin(struct denoise_sums *sums, struct render_context *context, const struct picture *picture,
                         uint32_t samples_before, struct error *error);
-/* The context has hits of a new slice: notes what they are. Inside no span. */
-bool denoise_note(struct gpu_buffer *notes, struct render_context *context, struct error *error);
+/* The context has hits of a new slice: notes what they are. `moved`: of each instance, whether it has moved since
+ * the picture before; NULL: none has. Inside no span. */
+bool denoise_note(struct gpu_buffer *notes, struct gpu_buffer *moved, struct render_context *context,
+                  struct error *error);
 /* Adds the current slice. Call it once the slice cannot be repeated, but on the device. */
 bool denoise_accumulate(struct denoise_sums *sums, struct gpu_buffer *notes, struct render_context *context,
                         const struct picture *picture, struct error *error);

@@ -771,6 +771,29 @@ SESSION_TEST(a_view_that_keeps_a_rate_tells_the_engine_what_to_go_without)
     engine_command_destroy(start);
 }
 
+/* The first frame at rest may have built what it shows; the second one takes as long as one that moves. */
+SESSION_TEST(the_first_frame_that_moves_follows_what_those_at_rest_took)
+{
+    open_scene(1, 1);
+    struct message message = view_message(100);
+    message.render.moving_rate = 20;
+    message.render.depth = 8;
+    send_message(2, 0, &message);
+    struct engine_command *start = told(ENGINE_JOB_START);
+    for (uint32_t number = 0; number < 2; number++) {
+        struct engine_event *slow = frame_of(2, number, 2, FRAME_BYTES); /* at rest */
+        slow->frame->request.samples = 1;
+        slow->frame->result.samples = number + 1;
+        slow->frame->rendered_ns = slow->frame->applied_ns + UINT64_C(1000000000);
+        slow->frame->encoded_ns = slow->frame->rendered_ns + 100;
+        port_say(slow);
+        take_frame(2, number);
+        const unsigned scale_32nds = view_wishes_see(start->job.wishes).effort.scale_32nds;
+        assert_int_equal(scale_32nds, number == 0 ? 0 : 8);
+    }
+    engine_command_destroy(start);
+}
+
 /* What is 3 KB a picture at 1000 a second is most of 300 at ten. */
 SESSION_TEST(pictures_with_a_margin_are_adapted_to_ten_a_second)
 {

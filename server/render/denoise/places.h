@@ -1,0 +1,28 @@
+/* SPDX-License-Identifier: MIT */
+/* Where instances were in a picture, so that the next one knows which of them have moved since, or have another
+ * shape: while clips play. */
+#ifndef FARLIGHT_RENDER_DENOISE_PLACES_H
+#define FARLIGHT_RENDER_DENOISE_PLACES_H
+
+#include "gpu_scene/scene.h"
+
+struct denoise_place {
+    float world_from_object[12];
+    uint64_t deformed_revision;
+};
+
+struct denoise_places {
+    struct denoise_place *instances; /* owned; NULL: they stay where they are, or are too many */
+    uint32_t count, capacity;
+};
+
+/* Of the scene as it is posed. */
+void denoise_places_note(struct denoise_places *places, const struct gpu_scene *scene);
+/* Whether both are of the same instances. */
+bool denoise_places_match(const struct denoise_places *a, const struct denoise_places *b);
+/* Of those that match, for each instance 1 where it has moved, else 0: to `moved`. */
+void denoise_places_compare(const struct denoise_places *before, const struct denoise_places *now,
+                            uint32_t *moved);
+void denoise_places_finish(struct denoise_places *places);
+
+#endif
