@@ -106,7 +106,7 @@ static size_t line_length(const char *text, size_t width)
     const size_t length = strlen(text);
     if (length <= width)
         return length;
-    for (size_t i = width; i > width / 2; i--)
+    for (size_t i = width; i > width / 4; i--)
         if (text[i] == ' ')
             return i;
     while (width > 1 && ((unsigned char)text[width] & 0xc0) == 0x80) /* within a character */

@@ -98,6 +98,8 @@ class Inputs(OneDaemon):
                     self.assertEqual(read_png(self.folder / "got.png"), read_png(self.folder / "wanted.png"))
 
     def test_what_cannot_be_read_from_standard_input_is_said(self):
+        result = self.expect(farlight("info", "-", input=SQUARE), 0)
+        self.assertRegex(result.stdout, "triangles +2")
         for typed, arguments, status, part in (
                 (b"", ("-",), 1, "is empty"), (b"hello", ("-",), 1, "first bytes"),
                 (b"hello", ("-", "--format", "pmg"), 1, "known are .gltf"),
