@@ -292,6 +292,7 @@ static void fill(struct command_line *line)
     viewer->server = job->server && job->server[0] != '\0' ? job->server : NULL;
     viewer->key_file = cli_key_file(viewer->server, job->key_file);
     viewer->link = job->link;
+    viewer->model = job->model;
     viewer->models = job->models;
     viewer->model_count = job->model_count;
     viewer->input_fd = job->input_fd;

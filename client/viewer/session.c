@@ -69,7 +69,8 @@ static struct fl_scene *load(struct session *session, struct fl_error *error)
 {
     const struct session_options *options = &session->options;
     /* A private daemon ends with its connection, and its scenes with it. */
-    const struct fl_load_options wanted = {.models = options->models,
+    const struct fl_load_options wanted = {.model = options->model,
+                                           .models = options->models,
                                            .model_count = options->model_count,
                                            .input_fd = options->input_fd,
                                            .environment = options->environment,
@@ -243,6 +244,8 @@ static bool begin_watch(struct session *session)
     if (!options->watch)
         return true;
     if (!cli_watch_begin(&session->watch, &session->error))
+        return false;
+    if (options->model && !cli_watch_add(&session->watch, options->model, &session->error))
         return false;
     for (size_t i = 0; i < options->model_count; i++)
         if (!cli_watch_add(&session->watch, options->models[i].path, &session->error))

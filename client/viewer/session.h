@@ -10,10 +10,10 @@ struct session;
 
 struct session_options {
     const char *server, *key_file, *link; /* as of fl_connect_options */
-    const struct fl_model *models;        /* that are loaded, and their environment .. */
+    const char *model, *environment;      /* that are loaded .. */
+    const struct fl_model *models;        /* several, as of fl_load_options */
     size_t model_count;
-    int input_fd; /* as of fl_load_options */
-    const char *environment;
+    int input_fd; /* likewise */
     double environment_degrees, point_size;
     const char *variant;
     const char *scene_name; /* .. or, not NULL, the scene to attach to */

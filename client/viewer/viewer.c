@@ -186,6 +186,7 @@ static bool open_viewer(struct viewer *viewer, struct fl_error *error)
     const struct session_options session = {.server = options->server,
                                             .key_file = options->key_file,
                                             .link = options->link,
+                                            .model = options->model,
                                             .models = options->models,
                                             .model_count = options->model_count,
                                             .input_fd = options->input_fd,
@@ -202,8 +203,8 @@ static bool open_viewer(struct viewer *viewer, struct fl_error *error)
     if (options->replay && !replay_load(&viewer->replay, options->replay, error))
         return false;
     if (!options->headless) {
-        viewer->window = window_create(options->scene_name ? options->scene_name : options->models[0].path,
-                                       viewer->width, viewer->height, error);
+        viewer->window = window_create(options->scene_name ? options->scene_name : options->model, viewer->width,
+                                       viewer->height, error);
         if (!viewer->window)
             return false;
         window_size(viewer->window, &viewer->width, &viewer->height, &viewer->scale);

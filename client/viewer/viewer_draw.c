@@ -27,7 +27,7 @@ static void fill_names(struct viewer *viewer, struct hud_state *state)
     const struct viewer_options *options = viewer->options;
     struct fl_scene *scene = session_scene(viewer->session);
     const struct tour *tour = &viewer->tour;
-    state->scene = options->scene_name ? options->scene_name : file_name(options->models[0].path);
+    state->scene = options->scene_name ? options->scene_name : file_name(options->model);
     state->server = options->server ? options->server : "";
     state->camera = state->clip = "";
     if (scene && tour->camera != TOUR_NONE)
