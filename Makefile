@@ -128,7 +128,8 @@ VIDEO_OBJ := $(call obj,$(VIDEO_C) client/lib/rate.c protocol/pixels/ycbcr.c) $(
 
 # The viewer takes the command line as render does.
 VIEWER_OBJ := $(call obj,$(VIEWER_C) $(addprefix client/cli/,image_path.c interrupt.c job_complete.c job_fields.c job_options.c \
-    job_views.c key.c parse.c retry.c talk.c))
+    job_views.c key.c models.c parse.c retry.c talk.c \
+    watch.c))
 
 # The library for others' programs: position-independent, only what farlight.h declares is visible.
 SONAME := libfarlight.so.$(firstword $(subst ., ,$(VERSION)))

@@ -116,7 +116,8 @@ static bool read_all(struct animation *animation, int argc, char **argv)
             "in .mp4, .mkv or .y4m; '-' is standard output, as y4m.",
         .children = children};
     struct animation typed = {0};
-    bool good = cli_job_begin(&typed.job, fl_render_defaults()) && cli_parse(&argp, argc, argv, 0, &typed) == 0;
+    bool good = cli_job_begin(&typed.job, fl_render_defaults()) &&
+                cli_parse(&argp, argc, argv, ARGP_IN_ORDER, &typed) == 0;
     if (!good || !typed.script_path) {
         *animation = typed;
         return good;
@@ -125,7 +126,7 @@ static bool read_all(struct animation *animation, int argc, char **argv)
     good = cli_job_begin(&animation->job, fl_render_defaults()) && apply_script(animation, &typed);
     const char *model = !typed.job.scene ? animation->job.model : NULL; /* which --scene replaces */
     animation->job.model = NULL;
-    good = good && cli_parse(&argp, argc, argv, 0, animation) == 0;
+    good = good && cli_parse(&argp, argc, argv, ARGP_IN_ORDER, animation) == 0;
     if (!animation->job.model)
         animation->job.model = model;
     return good;

@@ -23,6 +23,7 @@ enum cli_status {
 int cli_render(int argc, char **argv);
 int cli_animate(int argc, char **argv);
 int cli_turntable(int argc, char **argv);
+int cli_thumbnail(int argc, char **argv);
 int cli_info(int argc, char **argv);
 int cli_compare(int argc, char **argv);
 int cli_compare_tracers(int argc, char **argv); /* where cli_compare finds --tracers */
@@ -104,7 +105,24 @@ bool cli_check_error_picture(const char *picture, const char *const *inputs, siz
 bool cli_check_input(const char *path, struct fl_error *error);
 /* A folder in $TMPDIR for a file that is then copied to standard output. */
 bool cli_temporary_folder(char *folder, size_t folder_bytes, struct fl_error *error);
+/* A terminal is refused; `what` would be written: "an image". */
+bool cli_check_stdout(const char *what, struct fl_error *error);
 bool cli_copy_to_stdout(const char *path, struct fl_error *error);
+
+/* ---- models.c: the models of a command line ---- */
+
+struct cli_job;
+
+/* An argument that is no option: "-" is standard input. Its place is set by a later option; one that has a place
+ * is shown once more for each further place. */
+error_t cli_set_model(struct cli_job *job, const char *path);
+error_t cli_set_place(struct cli_job *job, const char *field, const char *value);
+bool cli_has_input(const struct cli_job *job); /* a model is standard input */
+/* Whether the files of models and environment can be read. */
+bool cli_check_models(const struct cli_job *job, struct fl_error *error);
+/* Reads standard input, if a model is that, into a file in memory. Interruptible; refused on a terminal. */
+bool cli_read_input(struct cli_job *job, struct fl_error *error);
+bool cli_open_input(int *input_fd, struct fl_error *error); /* the same without a job */
 
 /* ---- progress.c: progress on standard error ---- */
 
@@ -201,6 +219,12 @@ struct cli_channel {
 
 struct cli_job {
     const char *scene; /* a shared scene of the server, in place of the model */
+    struct fl_model
+        models[FL_MODELS_MAX]; /* of the command line; `model` is the first one's path, or a script's */
+    size_t model_count;
+    int input_fd;             /* of a model "-": its bytes, once cli_read_input() has them */
+    const char *model_format; /* of it; NULL: by its first bytes */
+    bool watch;               /* of `render`: again and again, as its files change */
     const char *model, *server, *key_file, *link, *environment, *output, *camera, *keys_file, *trace_file;
     double environment_degrees, point_size; /* as of fl_load_options */
     const char *variant;                    /* likewise */
@@ -273,6 +297,8 @@ const struct argp *cli_job_argp(void);
 const struct argp *cli_picture_argp(void);
 /* Likewise, without the options of output. */
 const struct argp *cli_views_argp(void);
+/* Likewise, of pictures of many models. */
+const struct argp *cli_thumbnail_argp(void);
 /* Likewise for a window, without the options of files; samples, integrator and encoding have other defaults
  * there. */
 const struct argp *cli_view_argp(void);
@@ -286,8 +312,6 @@ error_t cli_usage(struct cli_job *job, const char *field, const char *format, ..
 /* "environment", "transparent" or a colour: "#rrggbb". */
 error_t cli_set_background(struct cli_job *job, const char *field, const char *value);
 error_t cli_set_environment_rotation(struct cli_job *job, const char *field, const char *value);
-/* An argument that is no option. */
-error_t cli_set_model(struct cli_job *job, const char *path);
 /* After the command line: settings that depend on several options. `is_series`: output is a pattern. */
 bool cli_job_complete(struct cli_job *job, bool is_series);
 /* The same for a window: there is no output. */
@@ -319,6 +343,9 @@ struct cli_loading {
 bool cli_loading_begin(struct cli_loading *loading, struct fl_error *error);
 /* Waits for the scene. */
 bool cli_loading_end(struct cli_loading *loading, struct fl_error *error);
+/* Loads the files again over the same connection: the new scene takes the place of the old one, which stays where
+ * that fails. What the daemon has already is not sent. */
+bool cli_loading_again(struct cli_loading *loading, struct fl_error *error);
 void cli_loading_close(struct cli_loading *loading);
 /* Sets the job's camera if the command line leaves it to the model. */
 /* A camera by name or number; without one the model's first, unless keys or something else place it. `framed`: the

@@ -215,7 +215,7 @@ int cli_compare_tracers(int argc, char **argv)
     struct tracer_comparison comparison = {.pair.image = CLI_IMAGE_EXR, .far_share = FAR_DEFAULT};
     struct fl_error error = {0};
     if (!cli_job_begin(&comparison.pair.job, fl_render_defaults()) ||
-        cli_parse(&argp, argc, argv, 0, &comparison) != 0 || !complete(&comparison))
+        cli_parse(&argp, argc, argv, ARGP_IN_ORDER, &comparison) != 0 || !complete(&comparison))
         return cli_trouble(&comparison.pair.job.error);
     if (!cli_interrupt_begin(&error))
         return cli_trouble(&error);

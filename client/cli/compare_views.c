@@ -299,7 +299,7 @@ int cli_compare_views(int argc, char **argv)
                                           .max_unknown = -1};
     struct fl_error error = {0};
     if (!cli_job_begin(&comparison.pair.job, fl_render_defaults()) ||
-        cli_parse(&argp, argc, argv, 0, &comparison) != 0 || !complete(&comparison)) {
+        cli_parse(&argp, argc, argv, ARGP_IN_ORDER, &comparison) != 0 || !complete(&comparison)) {
         const int status = cli_trouble(&comparison.pair.job.error);
         finish(&comparison);
         return status;

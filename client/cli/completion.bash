@@ -22,13 +22,14 @@ _farlight()
         --layers) words="beauty,albedo,normal beauty,depth beauty,albedo,normal,depth,position,ao,id beauty,unknown" ;;
         --scale) words="1 2 4 8" ;;
         --still-encoding) words="raw zstd predicted jpeg" ;;
-        --format) words="png jpeg exr hdr mp4 mkv y4m" ;;
+        --format) words="png jpeg exr hdr mp4 mkv y4m glb gltf obj ply stl fbx dae 3mf nff" ;;
         --metadata) words="stable full" ;;
         --stereo-layout) words="side over files" ;;
         --views) [ "$subcommand" = view ] && words="off auto on" || words="rays quadtree" ;;
         --lens | --eyes) words="rays quadtree" ;;
         --holes) words="fill pattern" ;;
         --layout) words="heat side" ;;
+        --at) words="0,0,0 0,0,0:0,90,0 0,0,0:0,0,0:1" ;;
         --fail-above) words="psnr= shown_psnr= mean= rms= max= beyond= ssim= butteraugli= visible= nonfinite= agree=" ;;
         --*) words=$("$program" complete "$before" 2>/dev/null) ;;
         esac

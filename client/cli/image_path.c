@@ -182,6 +182,14 @@ bool cli_temporary_folder(char *folder, size_t folder_bytes, struct fl_error *er
     return true;
 }
 
+bool cli_check_stdout(const char *what, struct fl_error *error)
+{
+    if (isatty(STDOUT_FILENO) != 1)
+        return true;
+    fl_error_set(error, FL_ERROR_ARGUMENT, "--output", "%s would be written to the terminal", what);
+    return fl_error_remedy(error, "redirect it, or name a file");
+}
+
 bool cli_copy_to_stdout(const char *path, struct fl_error *error)
 {
     static char piece[65536];

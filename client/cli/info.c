@@ -4,6 +4,7 @@
 #include <inttypes.h>
 #include <jansson.h>
 #include <stdio.h>
+#include <string.h>
 
 #define KEY_JSON 0x400
 #define KEY_VARIANT 0x401
@@ -211,7 +212,8 @@ int cli_info(int argc, char **argv)
         .options = options,
         .parser = parse,
         .args_doc = "MODEL",
-        .doc = "Show what a model file contains, and which parts of it are not supported."};
+        .doc = "Show what a model file contains, and which parts of it are not supported.\v"
+               "'-' is standard input."};
     struct info_options wanted = {0};
     if (cli_parse(&argp, argc, argv, 0, &wanted) != 0)
         return cli_report(&wanted.job.error);
@@ -222,7 +224,11 @@ int cli_info(int argc, char **argv)
     struct fl_error error = {0};
     if (!cli_interrupt_begin(&error))
         return cli_report(&error);
+    int input_fd = 0;
+    if (wanted.model && strcmp(wanted.model, "-") == 0 && !cli_open_input(&input_fd, &error))
+        return cli_report(&error);
     struct fl_model_info *info = fl_model_info(&(struct fl_load_options){.model = wanted.model,
+                                                                         .input_fd = input_fd,
                                                                          .environment = wanted.environment,
                                                                          .variant = wanted.variant},
                                                cli_interrupt_fd(), &error);

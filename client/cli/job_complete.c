@@ -37,7 +37,7 @@ static bool complete_output(struct cli_job *job, struct cli_output *output, bool
         cli_usage(job, output->path, "one picture is no video");
         return fl_error_remedy(&job->error, "use 'farlight animate'");
     }
-    if (to_stdout && is_series && output->image != CLI_IMAGE_Y4M) {
+    if (to_stdout && is_series && !cli_image_is_video(output->image)) {
         cli_usage(job, "--output", "a series of %s files cannot go to standard output",
                   cli_image_name(output->image));
         return fl_error_remedy(&job->error, "-o - writes raw video (y4m); -o 'frames/%%04d.%s' writes files",
@@ -112,6 +112,18 @@ static bool complete_pixels(struct cli_job *job)
     else if (has[CLI_IMAGE_EXR])
         job->options.format = PROTOCOL_PIXEL_FORMAT_RGBA16F;
     return complete_layers(job);
+}
+
+/* One that is none of a picture is that of a model, which files do not need. */
+static bool complete_format(struct cli_job *job)
+{
+    const char *letters = "abcdefghijklmnopqrstuvwxyz0123456789";
+    const size_t length = job->model_format ? strlen(job->model_format) : 1;
+    if (!job->model_format ||
+        (cli_has_input(job) && length > 0 && length < 8 && strspn(job->model_format, letters) == length))
+        return true;
+    return cli_usage(job, "--format", "unknown format '%s' (known: png, jpeg, exr, hdr, mp4, mkv, y4m)",
+                     job->model_format) == 0;
 }
 
 static bool complete_outputs(struct cli_job *job, bool is_series)
@@ -328,7 +340,7 @@ static bool complete_noise(struct cli_job *job)
 
 bool cli_job_complete(struct cli_job *job, bool is_series)
 {
-    if (!complete_scene(job))
+    if (!complete_scene(job) || !complete_format(job))
         return false;
     complete_samples(job, is_series);
     complete_integrator(job);

@@ -52,6 +52,7 @@ enum key {
     KEY_RETRY_FOR,
     KEY_RETRIES,
     KEY_METADATA,
+    KEY_AT,
     KEY_VIEWS, /* cli_views_set() has those that follow */
     KEY_VIEWS_END = KEY_VIEWS + 6,
     KEY_FIELD = 0x200 /* and its index */
@@ -61,7 +62,12 @@ enum key {
 static const struct argp_option special[] = {
     {"output", KEY_OUTPUT, "IMAGE", 0, "Image file; its ending is its format. '-' is standard output",
      CLI_GROUP_OUTPUT},
-    {"format", KEY_FORMAT, "FORMAT", 0, "png, jpeg, exr, hdr, where the ending does not say it", CLI_GROUP_OUTPUT},
+    {"at", KEY_AT, "X,Y,Z[:RX,RY,RZ[:SCALE]]", 0,
+     "Place the MODEL named before: metres, degrees about x, then y, then z, and a factor; again: one more of it",
+     CLI_GROUP_OUTPUT},
+    {"format", KEY_FORMAT, "FORMAT", 0,
+     "png, jpeg, exr, hdr, where the ending does not say it; or of a model from standard input, such as glb",
+     CLI_GROUP_OUTPUT},
     {"half", KEY_HALF, NULL, 0, "EXR of half floats (default)", CLI_GROUP_OUTPUT},
     {"float", KEY_FLOAT, NULL, 0, "EXR of 32-bit floats", CLI_GROUP_OUTPUT},
     {"metadata", KEY_METADATA, "stable|full", 0,
@@ -156,14 +162,6 @@ error_t cli_usage(struct cli_job *job, const char *field, const char *format, ..
     return EINVAL;
 }
 
-error_t cli_set_model(struct cli_job *job, const char *path)
-{
-    if (job->model)
-        return cli_usage(job, path, "only one model can be rendered");
-    job->model = path;
-    return 0;
-}
-
 /* An error of lib/text.h gets the option's name. */
 static error_t name_field(struct cli_job *job, const char *field)
 {
@@ -177,12 +175,15 @@ static error_t set_vector(struct cli_job *job, const char *field, const char *va
     return fl_text_vector(value, vector, &job->error) ? 0 : name_field(job, field);
 }
 
-static error_t set_format(struct cli_job *job, const char *field, const char *value)
+/* Formats of pictures and of models have no name in common. */
+static error_t set_format(struct cli_job *job, const char *value)
 {
-    job->image = cli_image_by_name(value);
-    return job->image != CLI_IMAGE_UNKNOWN
-               ? 0
-               : cli_usage(job, field, "unknown format '%s' (known: png, jpeg, exr, hdr, mp4, mkv, y4m)", value);
+    const enum cli_image image = cli_image_by_name(value);
+    if (image == CLI_IMAGE_UNKNOWN)
+        job->model_format = value; /* cli_job_complete() knows whether there can be one */
+    else
+        job->image = image;
+    return 0;
 }
 
 static error_t set_real(struct cli_job *job, const char *field, const char *value, double minimum, double maximum,
@@ -300,6 +301,8 @@ static error_t set_option(struct cli_job *job, int key, const char *field, const
     case KEY_LINK:
         job->link = value;
         return fl_link_parse(value, &(struct fl_link){0}, &job->error) ? 0 : name_field(job, field);
+    case KEY_AT:
+        return cli_set_place(job, field, value);
     case KEY_OUTPUT:
         job->output = value;
         return 0;
@@ -360,7 +363,7 @@ static error_t set_option(struct cli_job *job, int key, const char *field, const
                    ? 0
                    : name_field(job, field);
     case KEY_FORMAT:
-        return set_format(job, field, value);
+        return set_format(job, value);
     case KEY_FOV:
         return set_fov(job, field, value);
     case KEY_VIEW:
@@ -506,6 +509,18 @@ const struct argp *cli_views_argp(void)
     static const char *const left_out[] = {"output",        "format", "half",      "float",   "timings",
                                            "trace-file",    "layers", "retry-for", "retries", "metadata",
                                            "stereo-layout", "noise",  NULL};
+    static struct argp_option kept[OPTIONS_MAX];
+    static const struct argp argp = {.options = kept, .parser = parse};
+    keep(kept, left_out);
+    return &argp;
+}
+
+const struct argp *cli_thumbnail_argp(void)
+{
+    static const char *const left_out[] = {
+        "output",    "half",          "float",      "timings", "trace-file", "layers",      "retry-for", "retries",
+        "metadata",  "stereo-layout", "noise",      "stereo",  "baseline",   "light-field", "views",     "lens",
+        "clip-once", "clip-start",    "clip-speed", "clip",    "at",         "variant",     "frame",     NULL};
     static struct argp_option kept[OPTIONS_MAX];
     static const struct argp argp = {.options = kept, .parser = parse};
     keep(kept, left_out);

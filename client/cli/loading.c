@@ -38,15 +38,16 @@ static bool connect_to(struct cli_loading *loading, struct fl_error *error)
     return loading->connection != NULL;
 }
 
-bool cli_loading_begin(struct cli_loading *loading, struct fl_error *error)
+static bool start_import(struct cli_loading *loading, struct fl_error *error)
 {
     const struct cli_job *job = loading->job;
-    if (job->scene)
-        return connect_to(loading, error);
-    if ((job->model && !cli_check_input(job->model, error)) ||
-        (job->environment && !cli_check_input(job->environment, error)))
+    if (!cli_check_models(job, error))
         return false;
     loading->load = (struct fl_load_options){.model = job->model,
+                                             .models = job->models,
+                                             .model_count = job->model_count,
+                                             .input_fd = job->input_fd,
+                                             .input_format = job->model_format,
                                              .environment = job->environment,
                                              .environment_degrees = job->environment_degrees,
                                              .variant = job->variant,
@@ -58,9 +59,12 @@ bool cli_loading_begin(struct cli_loading *loading, struct fl_error *error)
                                              .scene_name = loading->scene_name};
     loading->import_begin_ns = monotonic_now_ns();
     loading->load.started = fl_import_start(&loading->load, error);
-    if (!loading->load.started)
-        return false;
-    return connect_to(loading, error);
+    return loading->load.started != NULL;
+}
+
+bool cli_loading_begin(struct cli_loading *loading, struct fl_error *error)
+{
+    return (loading->job->scene || start_import(loading, error)) && connect_to(loading, error);
 }
 
 /* Makes the job's edits in a scene that has just been loaded. */
@@ -87,6 +91,20 @@ bool cli_loading_end(struct cli_loading *loading, struct fl_error *error)
                 loading->warnings - NOTES_SHOWN);
     }
     return loading->scene && apply_edits(loading->job, loading->scene, error);
+}
+
+bool cli_loading_again(struct cli_loading *loading, struct fl_error *error)
+{
+    struct fl_scene *old = loading->scene;
+    loading->warnings = 0;
+    if (!start_import(loading, error))
+        return false;
+    if (!cli_loading_end(loading, error)) {
+        loading->scene = old;
+        return false;
+    }
+    fl_scene_destroy(old);
+    return true;
 }
 
 void cli_loading_close(struct cli_loading *loading)

@@ -110,7 +110,7 @@ bool cli_pair_begin(struct cli_pair *pair, bool is_series, struct fl_error *erro
                                                .model = cli_base_name(job->model),
                                                .interrupt_fd = cli_interrupt_fd(),
                                                .format = cli_image_name(pair->image)};
-    if (!cli_loading_begin(&pair->loading, error))
+    if (!cli_read_input(job, error) || !cli_loading_begin(&pair->loading, error))
         return false;
     pair->exporter = fl_exporter_start(&export, error);
     if (!pair->exporter || !cli_loading_end(&pair->loading, error) ||

@@ -6,7 +6,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-enum key { KEY_TIME = 0x400, KEY_PROGRESSIVE, KEY_SCENE };
+enum key { KEY_TIME = 0x400, KEY_PROGRESSIVE, KEY_SCENE, KEY_WATCH };
 
 static const struct argp_option options[] = {
     {"scene", KEY_SCENE, "NAME", 0,
@@ -16,6 +16,9 @@ static const struct argp_option options[] = {
      "Write the picture again after every N samples (default: after 1, 2, 4, 8 ..) until --samples are reached, "
      "or "
      "without --samples until Ctrl-C",
+     -1},
+    {"watch", KEY_WATCH, NULL, 0,
+     "Render again when the model, or a file that it names, has changed, until Ctrl-C; only what is new is sent",
      -1},
     {0}};
 
@@ -39,6 +42,9 @@ static error_t parse(int key, char *value, struct argp_state *state)
     case KEY_SCENE:
         job->scene = value;
         return 0;
+    case KEY_WATCH:
+        job->watch = true;
+        return 0;
     case ARGP_KEY_ARG:
         return cli_set_model(job, value);
     default:
@@ -50,9 +56,27 @@ static error_t parse(int key, char *value, struct argp_state *state)
     return EINVAL;
 }
 
+/* Only files change, and only a file can be written again. */
+static bool complete_watch(struct cli_job *job)
+{
+    if (!job->watch)
+        return true;
+    if (job->scene || cli_has_input(job))
+        return cli_usage(job, "--watch", "%s does not change as a file does",
+                         job->scene ? "a shared scene" : "standard input") == 0;
+    if (job->endless) {
+        cli_usage(job, "--watch", "a picture that is refined without an end waits for nothing");
+        return fl_error_remedy(&job->error, "say how far by --samples");
+    }
+    if (!cli_writes_to_stdout(job))
+        return true;
+    cli_usage(job, "--watch", "standard output can be written only once");
+    return fl_error_remedy(&job->error, "name a file: it is replaced each time");
+}
+
 static bool complete(struct cli_job *job)
 {
-    if (!cli_job_complete(job, false))
+    if (!cli_job_complete(job, false) || !complete_watch(job))
         return false;
     if (job->progressive && cli_writes_to_stdout(job)) {
         cli_usage(job, "--progressive", "standard output can be written only once");
@@ -68,16 +92,17 @@ static bool complete(struct cli_job *job)
 int cli_render(int argc, char **argv)
 {
     const struct argp_child children[] = {{cli_job_argp(), 0, NULL, 0}, {0}};
-    const struct argp argp = {.options = options,
-                              .parser = parse,
-                              .args_doc = "MODEL -o IMAGE\n--scene NAME --server ADDRESS -o IMAGE",
-                              .doc = "Render one picture of a model.\v"
-                                     "MODEL is glTF, GLB, OBJ, PLY, STL, FBX, COLLADA, 3MF or of another format "
-                                     "of farlight-import. FARLIGHT_SERVER, FARLIGHT_SIZE, "
-                                     "FARLIGHT_SAMPLES and so on give defaults.",
-                              .children = children};
+    const struct argp argp = {
+        .options = options,
+        .parser = parse,
+        .args_doc = "MODEL [--at PLACE] [MODEL [--at PLACE]]... -o IMAGE\n--scene NAME --server ADDRESS -o IMAGE",
+        .doc = "Render one picture of a model.\v"
+               "MODEL is glTF, GLB, OBJ, PLY, STL, FBX, COLLADA, 3MF or of another format "
+               "of farlight-import; '-' is standard input. FARLIGHT_SERVER, FARLIGHT_SIZE, "
+               "FARLIGHT_SAMPLES and so on give defaults.",
+        .children = children};
     struct cli_job job;
-    if (!cli_job_begin(&job, fl_render_defaults()) || cli_parse(&argp, argc, argv, 0, &job) != 0 ||
+    if (!cli_job_begin(&job, fl_render_defaults()) || cli_parse(&argp, argc, argv, ARGP_IN_ORDER, &job) != 0 ||
         !complete(&job))
         return cli_report(&job.error);
     return cli_run_job(&job, false);

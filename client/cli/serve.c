@@ -17,6 +17,7 @@
 #define KEY_ENVIRONMENT_ROTATION 0x404
 #define KEY_KEY 0x403
 #define KEY_VARIANT 0x405
+#define KEY_AT 0x406
 
 #define LISTENS_MAX 8
 #define DAEMON_WORDS_MAX 28 /* of fl_connect */
@@ -46,6 +47,9 @@ static const struct argp_option options[] = {
     {"environment", KEY_ENVIRONMENT, "FILE", 0, "Light the scene with this equirectangular image (HDR or EXR)", 0},
     {"environment-rotation", KEY_ENVIRONMENT_ROTATION, "DEGREES", 0,
      "Turn it about +y by -360 to 360 (default 0: its middle column is +x)", 0},
+    {"at", KEY_AT, "X,Y,Z[:RX,RY,RZ[:SCALE]]", 0,
+     "Place the MODEL named before: metres, degrees about x, then y, then z, and a factor; again: one more of it",
+     0},
     {"variant", KEY_VARIANT, "NAME", 0, "Show the materials of this variant of a glTF model", 0},
     {"quiet", 'q', NULL, 0, "Print no progress and no notes about the model", 0},
     {0}};
@@ -63,11 +67,7 @@ static error_t take_argument(struct serving *serving, char *value, const struct 
 {
     if (state->quoted > 0 && state->next > state->quoted)
         return add_word(serving, value);
-    if (serving->job.model)
-        return cli_usage(&serving->job, value,
-                         "only one model can be given; options of the daemon follow after --");
-    serving->job.model = value;
-    return 0;
+    return cli_set_model(&serving->job, value);
 }
 
 static error_t parse(int key, char *value, struct argp_state *state)
@@ -94,6 +94,8 @@ static error_t parse(int key, char *value, struct argp_state *state)
         return 0;
     case KEY_ENVIRONMENT_ROTATION:
         return cli_set_environment_rotation(job, "--environment-rotation", value);
+    case KEY_AT:
+        return cli_set_place(job, "--at", value);
     case KEY_VARIANT:
         job->variant = value;
         return 0;
@@ -337,7 +339,7 @@ static int serve(struct serving *serving)
                                   .scene_name = serving->name ? serving->name : cli_base_name(serving->job.model),
                                   .daemon_arguments = serving->words};
     cli_progress_begin(&progress, serving->job.quiet);
-    const bool is_up = put_up(serving, &loading, &error);
+    const bool is_up = cli_read_input(&serving->job, &error) && put_up(serving, &loading, &error);
     cli_progress_end(&progress, is_up);
     const bool done = is_up && stay_and_recover(serving, &loading, &error);
     if (loading.connection)
@@ -351,7 +353,7 @@ int cli_serve(int argc, char **argv)
     static const struct argp argp = {
         .options = options,
         .parser = parse,
-        .args_doc = "MODEL [-- OPTION OF FARLIGHTD...]",
+        .args_doc = "MODEL... [-- OPTION OF FARLIGHTD...]",
         .doc = "Share a model for other clients to view, render and edit, until Ctrl-C.\v"
                "Without --server the command starts a daemon, which ends with the command. Arguments after -- are "
                "options of that daemon, for example --device software."};

@@ -3,6 +3,7 @@
  * scene is loaded again, and the first unwritten frame is the next one. */
 #include "cli/sink.h"
 #include "cli/trace_file.h"
+#include "cli/watch.h"
 #include "protocol/common/clock.h"
 #include "protocol/plain_text.h"
 
@@ -24,6 +25,8 @@ struct session {
     struct cli_sinks sinks;
     bool sinks_started, sink_failed;
     struct cli_loading loading;
+    struct cli_watch watch;
+    struct message_render typed; /* the job's options before a scene has settled them */
     struct fl_job *rendering;
     bool was_reached, was_loaded; /* the daemon, once at least; likewise, and it has accepted the scene */
     bool has_set;                 /* which frames are wanted is known */
@@ -65,6 +68,16 @@ static bool start_sinks(struct session *session, struct fl_error *error)
     return !session->sink_failed;
 }
 
+/* Of a scene that has been loaded. */
+static bool settle(struct session *session, struct fl_error *error)
+{
+    struct fl_scene *scene = session->loading.scene;
+    session->job->options = session->typed;
+    return (!session->job->watch || cli_watch_scene(&session->watch, scene, error)) &&
+           cli_choose_camera(session->job, scene, error) &&
+           cli_settle(session->job, scene, session->is_series, error);
+}
+
 /* The importer loads its libraries while the daemon starts, and the exporter while the importer runs: once the
  * scene is loaded the daemon uses all processors. */
 static bool load_scene(struct session *session, struct fl_error *error)
@@ -83,8 +96,7 @@ static bool load_scene(struct session *session, struct fl_error *error)
         cli_trace_import(session->trace, fl_scene_import_stats(loading->scene), loading->import_begin_ns,
                          monotonic_now_ns());
     session->was_loaded = true;
-    return cli_choose_camera(session->job, loading->scene, error) &&
-           cli_settle(session->job, loading->scene, session->is_series, error);
+    return settle(session, error);
 }
 
 /* ---- which frames ---- */
@@ -363,6 +375,77 @@ static bool recover(struct session *session, struct fl_error *error)
     return pause_before_retry(session, error->retry_after_ms, error);
 }
 
+static bool load_and_render(struct session *session, struct fl_error *error)
+{
+    while (!load_scene(session, error) || !choose_frames(session, error) || !render(session, error))
+        if (!recover(session, error))
+            return false;
+    return finish_sinks(session, error);
+}
+
+/* ---- changed files ---- */
+
+/* Before they are read: what changes while that happens has changed. */
+static bool begin_watch(struct session *session, struct fl_error *error)
+{
+    const struct cli_job *job = session->job;
+    if (!job->watch)
+        return true;
+    if (!cli_watch_begin(&session->watch, error))
+        return false;
+    for (size_t i = 0; i < job->model_count; i++)
+        if (!cli_watch_add(&session->watch, job->models[i].path, error))
+            return false;
+    return !job->environment || cli_watch_add(&session->watch, job->environment, error);
+}
+
+static bool render_again(struct session *session, struct fl_error *error)
+{
+    session->begun = false;
+    session->run = 0;
+    session->done = 0;
+    return cli_loading_again(&session->loading, error) && settle(session, error) && render(session, error) &&
+           finish_sinks(session, error);
+}
+
+static void print_sent(const struct session *session)
+{
+    const struct fl_import_stats *stats = fl_scene_import_stats(session->loading.scene);
+    if (session->job->quiet)
+        return;
+    fputs("farlight: ", stderr);
+    plain_text_print(stderr, session->job->outputs[0].path);
+    fprintf(stderr, " is new; sent %.3f of %.3f MB\n", (double)stats->uploaded_bytes * 1e-6,
+            (double)stats->offered_bytes * 1e-6);
+}
+
+/* Until it is interrupted, which is its end. A model that cannot be read is reported, and its last picture stays.
+ */
+static bool follow(struct session *session, struct fl_error *error)
+{
+    if (!session->job->quiet)
+        fprintf(stderr, "farlight: watching %zu files; Ctrl-C ends it\n", session->watch.count);
+    while (cli_watch_wait(&session->watch, session->loading.connection, error)) {
+        if (render_again(session, error)) {
+            cli_progress_clear(&session->progress);
+            print_sent(session);
+            continue;
+        }
+        if (error->code == FL_ERROR_INTERRUPTED || session->sink_failed ||
+            (cli_is_temporary(error) && !(recover(session, error) && load_and_render(session, error))))
+            break;
+        fl_render_destroy(session->rendering);
+        session->rendering = NULL;
+        cli_progress_clear(&session->progress);
+        if (error->code != FL_ERROR_NONE)
+            cli_report(error);
+        *error = (struct fl_error){0};
+    }
+    if (error->code == FL_ERROR_INTERRUPTED)
+        *error = (struct fl_error){0};
+    return error->code == FL_ERROR_NONE;
+}
+
 static bool run(struct session *session, struct fl_error *error)
 {
     if (!cli_sinks_prepare(&session->sinks, session->job, session->is_series, error))
@@ -372,13 +455,10 @@ static bool run(struct session *session, struct fl_error *error)
         return false;
     if (session->has_set && session->set.frame_count == 0)
         return true;
-    while (!load_scene(session, error) || !choose_frames(session, error) || !render(session, error))
-        if (!recover(session, error))
-            return false;
-    if (!finish_sinks(session, error))
+    if (!begin_watch(session, error) || !load_and_render(session, error))
         return false;
     show_progress(session);
-    return true;
+    return !session->job->watch || follow(session, error);
 }
 
 /* ---- end ---- */
@@ -395,6 +475,7 @@ static void print_timings(struct session *session)
 static void close_session(struct session *session)
 {
     close_connection(session);
+    cli_watch_end(&session->watch);
     cli_sinks_close(&session->sinks);
     fl_frame_set_finish(&session->set);
     cli_timings_destroy(session->timings);
@@ -402,14 +483,15 @@ static void close_session(struct session *session)
 
 int cli_run_job(struct cli_job *job, bool is_series)
 {
-    struct session session = {.job = job, .is_series = is_series, .begin_ns = monotonic_now_ns()};
+    struct session session = {
+        .job = job, .is_series = is_series, .typed = job->options, .begin_ns = monotonic_now_ns()};
     struct fl_error error = {0};
     if (!cli_interrupt_begin(&error))
         return cli_report(&error);
     cli_progress_begin(&session.progress, job->quiet);
     if (job->timings != CLI_TIMINGS_NONE)
         session.timings = cli_timings_create(job->timings, cli_writes_to_stdout(job));
-    bool done = begin_trace(&session, &error) && run(&session, &error);
+    bool done = cli_read_input(job, &error) && begin_trace(&session, &error) && run(&session, &error);
     cli_progress_end(&session.progress, done);
     if (done && session.was_loaded)
         print_timings(&session);
@@ -426,9 +508,7 @@ int cli_dry_run(struct cli_job *job)
 {
     struct session session = {.job = job, .is_series = true};
     struct fl_error error = {0};
-    const bool done = (!job->model || cli_check_input(job->model, &error)) &&
-                      (!job->environment || cli_check_input(job->environment, &error)) &&
-                      cli_sinks_prepare(&session.sinks, job, true, &error) &&
+    const bool done = cli_check_models(job, &error) && cli_sinks_prepare(&session.sinks, job, true, &error) &&
                       (!job->series.has_range || choose_frames(&session, &error));
     if (done && session.has_set)
         printf("%u frame%s would be rendered\n", session.set.frame_count, session.set.frame_count == 1 ? "" : "s");

@@ -20,14 +20,10 @@ static bool prepare_stdout(struct cli_sink *sink, struct fl_error *error)
         fl_error_set(error, FL_ERROR_ARGUMENT, "--stereo-layout", "standard output is a single file");
         return fl_error_remedy(error, "name a file, or use the layout side");
     }
-    if (isatty(STDOUT_FILENO) == 1) {
-        const bool is_video = cli_image_is_video(sink->output.image);
-        fl_error_set(error, FL_ERROR_ARGUMENT, "--output", "%s would be written to the terminal",
-                     is_video ? "a video" : "an image");
-        return fl_error_remedy(error, is_video ? "pipe it into a program, for example 'ffmpeg -i - movie.webm'"
-                                               : "redirect it, or name a file");
-    }
-    if (cli_image_is_video(sink->output.image))
+    const bool is_video = cli_image_is_video(sink->output.image);
+    if (!cli_check_stdout(is_video ? "a video" : "an image", error))
+        return is_video && fl_error_remedy(error, "pipe it into a program, for example 'ffmpeg -i - movie.webm'");
+    if (sink->output.image == CLI_IMAGE_Y4M)
         return true;
     if (!cli_temporary_folder(sink->folder, sizeof(sink->folder), error))
         return false;
@@ -109,7 +105,7 @@ static bool open_y4m(struct cli_sink *sink, struct fl_error *error)
 static const char *model_name(const struct cli_job *job)
 {
     const char *model = job->model ? job->model : job->scene;
-    return job->full_metadata ? model : cli_base_name(model);
+    return strcmp(model, "-") == 0 ? "standard input" : job->full_metadata ? model : cli_base_name(model);
 }
 
 static bool start_video(struct cli_sink *sink, struct fl_error *error)
@@ -246,7 +242,7 @@ static bool finish_y4m(struct cli_sink *sink, struct fl_error *error)
 static bool finish(struct cli_sink *sink, struct fl_error *error)
 {
     if (sink->video)
-        return fl_video_finish(sink->video, error);
+        return fl_video_finish(sink->video, error) && (!sink->to_stdout || cli_copy_to_stdout(sink->path, error));
     if (sink->y4m)
         return sink->to_stdout || finish_y4m(sink, error);
     return fl_exporter_wait(sink->exporter, error) && (!sink->to_stdout || cli_copy_to_stdout(sink->path, error));

@@ -97,7 +97,7 @@ void import_list_clip(struct import_scene *scene, uint32_t clip, const char *nam
         return;
     scene->clips = grown;
     listed = &grown[scene->clip_count++];
-    import_copy_text(listed->name, sizeof(listed->name), name);
+    import_prefix_name(scene, listed->name, name);
     listed->clip = clip;
     listed->channels = channels;
     listed->duration_s = duration_s >= 0 && duration_s <= 1e9 ? (float)duration_s : 0;

@@ -38,7 +38,7 @@ static bool is_regular(int descriptor, char reason[FILES_REASON_BYTES])
 
 static int open_regular(const char *path, char reason[FILES_REASON_BYTES])
 {
-    int descriptor = open(path, OPEN_FLAGS);
+    int descriptor = strcmp(path, "-") == 0 ? fcntl(STDIN_FILENO, F_DUPFD_CLOEXEC, 0) : open(path, OPEN_FLAGS);
 
     if (descriptor < 0) {
         snprintf(reason, FILES_REASON_BYTES, "%s", strerror(errno));
@@ -66,8 +66,8 @@ bool files_open(struct files *files, const char *model_path, const char *environ
         char *folder;
 
         files->model = open_regular(model_path, reason);
-        if (files->model < 0)
-            return false;
+        if (files->model < 0 || strcmp(model_path, "-") == 0)
+            return files->model >= 0;
         folder = files_folder_of(model_path);
         if (folder)
             files->folder = open(folder, O_PATH | O_DIRECTORY | O_CLOEXEC);
@@ -101,6 +101,11 @@ void files_finish(struct files *files)
     if (files->images >= 0)
         close(files->images);
     files->folder = files->model = files->environment = files->images = -1;
+    for (size_t i = 0; i < files->named_count; i++)
+        free(files->named[i]);
+    free(files->named);
+    files->named = NULL;
+    files->named_count = 0;
 }
 
 /* Reads until the end; the size that the file system states is only where the buffer begins. */
@@ -279,11 +284,32 @@ static bool may_be_key(int descriptor)
     return fstat(descriptor, &status) == 0 && status.st_size == 32 && (status.st_mode & (S_IRWXG | S_IRWXO)) == 0;
 }
 
+/* Whoever waits for changes must know of it, also if it is not there yet. Best effort: there may be no memory. */
+static void remember(struct files *files, const char *folder, const char *name)
+{
+    char **grown = files->named_count < FILES_NAMED_MAX
+                       ? realloc(files->named, (files->named_count + 1) * sizeof(*grown))
+                       : NULL;
+
+    if (!grown)
+        return;
+    files->named = grown;
+    if (asprintf(&grown[files->named_count], "%s%s", folder, name) >= 0)
+        files->named_count++;
+}
+
 static unsigned char *read_beneath(struct files *files, int folder, const char *name, size_t *size_bytes,
                                    char reason[FILES_REASON_BYTES])
 {
     unsigned char *bytes = NULL;
-    int descriptor = open_beneath(folder, name, reason);
+    int descriptor;
+
+    if (folder < 0) {
+        snprintf(reason, FILES_REASON_BYTES, "cannot be found: a model from standard input has no folder");
+        return NULL;
+    }
+    remember(files, folder == files->images ? FILES_IMAGES_BESIDE "/" : "", name);
+    descriptor = open_beneath(folder, name, reason);
 
     if (descriptor < 0 && strchr(name, '\\')) {
         char *slashed = strdup(name);

@@ -20,17 +20,20 @@ extern "C" {
 #define FILES_BYTES_MAX (2ULL << 30) /* of one file */
 #define FILES_TOTAL_MAX (4ULL << 30) /* of all files of a model */
 #define FILES_REASON_BYTES 256
+#define FILES_NAMED_MAX 4096
 
 struct files {
-    int folder;      /* descriptor of the model's folder */
+    int folder;      /* descriptor of the model's folder, -1: it has none, as it is standard input */
     int model;       /* descriptor of the model file */
     int environment; /* likewise, -1: none */
     int images;      /* descriptor of a folder with further images, -1: none */
+    char **named;    /* what the model named, there or not, relative to its folder */
+    size_t named_count;
     uint64_t read_bytes, read_ns;
 };
 
-/* Opens folder and files by the paths that the user gave (either may be NULL); to be called before the sandbox is
- * entered. False: `reason` names the file and says why. */
+/* Opens folder and files by the paths that the user gave (either may be NULL; "-" is standard input); to be called
+ * before the sandbox is entered. False: `reason` names the file and says why. */
 bool files_open(struct files *files, const char *model_path, const char *environment_path,
                 char reason[FILES_REASON_BYTES]);
 void files_finish(struct files *files);

@@ -20,6 +20,7 @@ extern "C" {
 
 #define IMPORT_NOTES_MAX 200
 #define IMPORT_NAME_MAX 128
+#define IMPORT_PREFIX_MAX 40
 #define IMPORT_RANGES_MAX 4096 /* of one SET_MESH or SET_SPHERES */
 #define IMPORT_ARRAYS_MAX 12
 #define IMPORT_INFLUENCES_MAX 16 /* joints that move one vertex */
@@ -44,6 +45,7 @@ struct import_edit {
 struct import_notice {
     enum protocol_severity severity;
     uint32_t count;
+    char file[257]; /* as of the scene when it was noted */
     char where[257];
     char text[481];
 };
@@ -82,7 +84,10 @@ struct import_scene {
     uint32_t notes_lost; /* distinct ones beyond IMPORT_NOTES_MAX, about */
     uint32_t last_id[PROTOCOL_OBJECT_COUNT];
     uint64_t blob_bytes;
-    char file[257];      /* the model's, as people named it; goes into `where` */
+    char file[257];                     /* the current model's, as people named it; goes into `where` */
+    char prefix[IMPORT_PREFIX_MAX + 1]; /* likewise, of all names; empty: none */
+    uint32_t root;                      /* likewise, the node above all others; 0: none */
+    bool is_added;                      /* it is not the first: its cameras and background are left out */
     const char *variant; /* of the materials, that the user wants; NULL: the file's choice. Readers of formats
                             without variants need not look */
     bool failed;

@@ -2,11 +2,12 @@
 /* farlight-import: turns a model file into the protocol's messages and speaks them over a socket that the program
  * that started it has connected already. A program of its own so that nothing else links the libraries that read
  * hostile files, and so that it can give up its rights before it does. */
-#include "files.h"
 #include "formats.h"
 #include "import.h"
 #include "helper/sandbox.h"
+#include "model.h"
 #include "send.h"
+#include "source.h"
 #include "texture.h"
 #include "protocol/common/clock.h"
 #include "protocol/version.h"
@@ -17,7 +18,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <strings.h>
 #include <unistd.h>
 
 #define EXIT_USAGE 2
@@ -34,7 +34,8 @@ struct options {
     const char *variant;
     double point_size; /* 0: chosen by the points */
     bool no_model;
-    const char *model;
+    struct source *sources;
+    size_t source_count;
 };
 
 #define RADIANS_PER_DEGREE 0.017453292519943295
@@ -46,7 +47,9 @@ enum {
     OPTION_ROTATION,
     OPTION_VARIANT,
     OPTION_POINT_SIZE,
-    OPTION_NO_MODEL
+    OPTION_NO_MODEL,
+    OPTION_AT,
+    OPTION_FORMAT
 };
 
 static const struct argp_option option_rows[] = {
@@ -59,6 +62,10 @@ static const struct argp_option option_rows[] = {
     {"variant", OPTION_VARIANT, "NAME", 0, "show the materials of this variant of a glTF model", 0},
     {"point-size", OPTION_POINT_SIZE, "METRES", 0,
      "show points without faces as spheres of this diameter (default: by their distances)", 0},
+    {"at", OPTION_AT, "X,Y,Z[:RX,RY,RZ[:SCALE]]", 0,
+     "place the MODEL named before: metres, degrees about x, then y, then z, and a factor", 0},
+    {"format", OPTION_FORMAT, "NAME", 0,
+     "take the MODEL named before for such a file, as glb (default: by its name, else its first bytes)", 0},
     {"no-model", OPTION_NO_MODEL, NULL, 0, "send the environment only; MODEL is not needed", 0},
     {0}};
 
@@ -94,6 +101,21 @@ static double parse_point_size(struct argp_state *state, const char *text)
     return size;
 }
 
+static void add_source(struct argp_state *state, struct options *options, const char *path)
+{
+    if (options->source_count == SOURCES_MAX)
+        argp_error(state, "more than %d models", SOURCES_MAX);
+    options->sources[options->source_count++] = (struct source){
+        .path = path, .scale = 1, .files = {.folder = -1, .model = -1, .environment = -1, .images = -1}};
+}
+
+static struct source *last_source(struct argp_state *state, struct options *options, const char *option)
+{
+    if (options->source_count == 0)
+        argp_error(state, "--%s: no MODEL is named before it", option);
+    return &options->sources[options->source_count - 1];
+}
+
 static error_t parse_option(int key, char *argument, struct argp_state *state)
 {
     struct options *options = state->input;
@@ -120,19 +142,24 @@ static error_t parse_option(int key, char *argument, struct argp_state *state)
     case OPTION_NO_MODEL:
         options->no_model = true;
         return 0;
+    case OPTION_AT:
+        if (!source_place(last_source(state, options, "at"), argument))
+            argp_error(state, "--at: '%s' is not X,Y,Z, X,Y,Z:RX,RY,RZ or X,Y,Z:RX,RY,RZ:SCALE", argument);
+        return 0;
+    case OPTION_FORMAT:
+        last_source(state, options, "format")->format = argument;
+        return 0;
     case ARGP_KEY_ARG:
-        if (options->model)
-            argp_error(state, "only one MODEL can be given; '%s' is a second one", argument);
-        options->model = argument;
+        add_source(state, options, argument);
         return 0;
     case ARGP_KEY_END:
         if (options->socket < 0)
             argp_error(state, "--fd is missing: this program is started by the client");
         if (options->no_model)
-            options->model = NULL;
-        else if (!options->model)
+            options->source_count = 0;
+        else if (options->source_count == 0)
             argp_error(state, "MODEL is missing");
-        if (!options->model && !options->environment)
+        if (options->source_count == 0 && !options->environment)
             argp_error(state, "give MODEL or --environment");
         return 0;
     default:
@@ -168,33 +195,29 @@ static void leave_at_once(int status)
 #endif
 }
 
-static bool has_ending(const char *path, const char *ending)
-{
-    size_t path_length = strlen(path), length = strlen(ending);
-
-    return path_length > length && strcasecmp(path + path_length - length, ending) == 0;
-}
-
-static bool is_aff(const char *path)
-{
-    return has_ending(path, ".aff");
-}
-
+/* Of all models, and of AFF the images beside it. */
 static bool enter_sandbox(struct import_scene *scene, const struct options *options)
 {
-    char *folder = options->model ? files_folder_of(options->model) : NULL, *images = NULL;
-    const char *folders[] = {folder, NULL};
-    struct sandbox_options sandbox = {
-        .read_folders = folders, .read_folder_count = 2, .cpu_seconds = CPU_SECONDS_MAX};
+    char *folders[2 * SOURCES_MAX] = {NULL};
+    struct sandbox_options sandbox = {.read_folders = (const char *const *)folders,
+                                      .read_folder_count = 2 * options->source_count,
+                                      .cpu_seconds = CPU_SECONDS_MAX};
     char reason[256];
     bool entered;
 
-    if (folder && is_aff(options->model) && asprintf(&images, "%s/" FILES_IMAGES_BESIDE, folder) < 0)
-        images = NULL;
-    folders[1] = images;
+    for (size_t i = 0; i < options->source_count; i++) {
+        const struct source *source = &options->sources[i];
+
+        if (source->files.folder < 0)
+            continue;
+        folders[2 * i] = files_folder_of(source->path);
+        if (folders[2 * i] && source->of.reader == FORMAT_AFF &&
+            asprintf(&folders[2 * i + 1], "%s/" FILES_IMAGES_BESIDE, folders[2 * i]) < 0)
+            folders[2 * i + 1] = NULL;
+    }
     entered = sandbox_enter(&sandbox, reason, sizeof(reason));
-    free(images);
-    free(folder);
+    for (size_t i = 0; i < 2 * options->source_count; i++)
+        free(folders[i]);
     if (!entered)
         return import_fail(scene, NULL, "the sandbox cannot be entered: %s", reason);
     if (reason[0])
@@ -202,65 +225,35 @@ static bool enter_sandbox(struct import_scene *scene, const struct options *opti
     return true;
 }
 
-static bool is_gltf(const char *name, const unsigned char *bytes, size_t size_bytes)
+static bool parse_model(struct import_scene *scene, struct source *source, double point_size)
 {
-    return has_ending(name, ".gltf") || has_ending(name, ".glb") ||
-           (size_bytes >= 4 && memcmp(bytes, "glTF", 4) == 0);
-}
-
-static bool contains(const unsigned char *bytes, size_t size_bytes, const char *text)
-{
-    return memmem(bytes, size_bytes, text, strlen(text)) != NULL;
-}
-
-/* By the bytes alone, for nothing may be parsed yet. JSON can write the letters of "images" as \u0069 and so on.
- */
-static bool may_name_images(const char *name, const unsigned char *bytes, size_t size_bytes)
-{
-    if (is_gltf(name, bytes, size_bytes))
-        return contains(bytes, size_bytes, "images") || contains(bytes, size_bytes, "\\u00");
-    if (is_aff(name)) /* what it includes may name some, too */
-        return contains(bytes, size_bytes, "texturecoords") || contains(bytes, size_bytes, "tt") ||
-               contains(bytes, size_bytes, ".aff") || contains(bytes, size_bytes, ".nff");
-    if (assimp_format_of(name))
-        return assimp_may_name_images(assimp_format_of(name), bytes, size_bytes);
-    return has_ending(name, ".obj") && contains(bytes, size_bytes, "mtllib");
-}
-
-/* The endings of all formats, for people. */
-static const char *known_endings(char out[256])
-{
-    size_t used = (size_t)snprintf(out, 256, ".gltf, .glb, .obj, .nff, .aff");
-
-    for (size_t i = 0; assimp_format_at(i) && used < 240; i++)
-        used += (size_t)snprintf(out + used, 256 - used, "%s%s", assimp_format_at(i + 1) ? ", " : " and ",
-                                 assimp_format_at(i)->ending);
-    return out;
-}
-
-static bool parse_model(struct import_scene *scene, struct files *files, const struct options *options,
-                        const unsigned char *bytes, size_t size_bytes)
-{
-    const char *name = file_part(options->model);
-    const char *dot = strrchr(name, '.');
+    const char *name = source_name(source), *dot = strrchr(name, '.');
+    const unsigned char *bytes = source->bytes;
+    const size_t size_bytes = source->size_bytes;
     char endings[256];
 
     if (size_bytes == 0)
         return import_fail(scene, NULL, "the file is empty");
-    if (is_gltf(name, bytes, size_bytes))
-        return gltf_import(scene, files, bytes, size_bytes);
+    if (source->of.reader == FORMAT_GLTF)
+        return gltf_import(scene, &source->files, bytes, size_bytes);
     if (scene->variant)
         return import_fail(scene, NULL, "only glTF has variants, so none can be called '%.100s'", scene->variant);
-    if (has_ending(name, ".obj"))
-        return obj_import(scene, files, bytes, size_bytes);
-    if (has_ending(name, ".nff"))
+    switch (source->of.reader) {
+    case FORMAT_OBJ:
+        return obj_import(scene, &source->files, bytes, size_bytes);
+    case FORMAT_NFF:
         return nff_import(scene, bytes, size_bytes);
-    if (is_aff(name))
-        return aff_import(scene, files, bytes, size_bytes);
-    if (assimp_format_of(name))
-        return assimp_import(scene, files, assimp_format_of(name), options->point_size, bytes, size_bytes);
-    return import_fail(scene, NULL, "unknown format %.40s; known are %s", dot ? dot : "(no ending)",
-                       known_endings(endings));
+    case FORMAT_AFF:
+        return aff_import(scene, &source->files, bytes, size_bytes);
+    case FORMAT_ASSIMP:
+        return assimp_import(scene, &source->files, source->of.assimp, point_size, bytes, size_bytes);
+    default:
+        return import_fail(scene, NULL, "unknown format %s%.40s; known are %s", source->format ? "." : "",
+                           source->format ? source->format
+                           : dot          ? dot
+                                          : "(no ending, and its first bytes are of none)",
+                           format_endings(endings));
+    }
 }
 
 /* The protocol's middle column is -z. */
@@ -293,74 +286,105 @@ static bool import_environment(struct import_scene *scene, struct files *files, 
     return !scene->failed;
 }
 
-static bool import_all(struct import_scene *scene, struct files *files, struct sender *sender,
-                       const struct options *options, const unsigned char *bytes, size_t size_bytes)
+static bool import_model(struct import_scene *scene, struct sender *sender, const struct options *options,
+                         size_t index)
 {
-    bool imported = true;
-
-    if (options->model) {
-        imported = sender_progress(sender, size_bytes, 0, "parsing") &&
-                   parse_model(scene, files, options, bytes, size_bytes);
-        if (imported && scene->edit_count == 0)
-            import_note(scene, PROTOCOL_SEVERITY_WARNING, NULL, "it contains nothing that can be shown");
-    }
-    if (imported && options->environment)
-        imported = import_environment(scene, files, file_part(options->environment), options->environment_degrees);
-    return imported && !scene->failed;
-}
-
-/* The model is read before the sandbox is entered and parsed within it: whether the module of images is needed
- * shows in the bytes, and loading it opens more files than the sandbox allows. */
-static bool read_and_import(struct import_scene *scene, struct files *files, struct sender *sender,
-                            const struct options *options)
-{
-    char reason[FILES_REASON_BYTES] = "";
-    unsigned char *bytes = NULL;
-    size_t size_bytes = 0;
+    struct source *source = &options->sources[index];
+    const size_t edits = scene->edit_count;
     bool imported;
 
-    if (options->model) {
-        bytes = files_read_descriptor(files, files->model, &size_bytes, reason);
-        if (!bytes)
-            return import_fail(scene, NULL, "%s", reason);
-    }
-    if (options->environment || (bytes && may_name_images(file_part(options->model), bytes, size_bytes)))
-        texture_load();
-    if (bytes && !is_gltf(file_part(options->model), bytes, size_bytes) &&
-        assimp_format_of(file_part(options->model)))
-        assimp_load();
-    imported = enter_sandbox(scene, options) && import_all(scene, files, sender, options, bytes, size_bytes);
-    free(bytes);
+    if (!sender_progress(sender, source->size_bytes, 0, "parsing"))
+        return false;
+    scene->variant = index == 0 ? options->variant : NULL;
+    if (source_repeat(scene, options->sources, index, options->source_count))
+        return !scene->failed;
+    imported = source_begin(scene, options->sources, index, options->source_count) &&
+               parse_model(scene, source, options->point_size);
+    if (imported && scene->edit_count == edits + (source->root != 0))
+        import_note(scene, PROTOCOL_SEVERITY_WARNING, NULL, "it contains nothing that can be shown");
+    source_end(scene, source);
     return imported;
+}
+
+static bool import_all(struct import_scene *scene, struct files *surroundings, struct sender *sender,
+                       const struct options *options)
+{
+    for (size_t i = 0; i < options->source_count; i++)
+        if (!import_model(scene, sender, options, i))
+            return false;
+    if (options->environment &&
+        !import_environment(scene, surroundings, file_part(options->environment), options->environment_degrees))
+        return false;
+    return !scene->failed;
+}
+
+/* Models are read before the sandbox is entered and parsed within it: whether the module of images is needed
+ * shows in the bytes, and loading it opens more files than the sandbox allows. */
+static bool read_and_import(struct import_scene *scene, struct files *surroundings, struct sender *sender,
+                            const struct options *options)
+{
+    bool needs_images = options->environment != NULL, needs_assimp = false;
+
+    for (size_t i = 0; i < options->source_count; i++) {
+        const struct source *source = &options->sources[i];
+
+        needs_images = needs_images || format_may_name_images(&source->of, source->bytes, source->size_bytes);
+        needs_assimp = needs_assimp || source->of.reader == FORMAT_ASSIMP;
+    }
+    if (needs_images)
+        texture_load();
+    if (needs_assimp)
+        assimp_load();
+    return enter_sandbox(scene, options) && import_all(scene, surroundings, sender, options);
+}
+
+static bool read_files(struct import_scene *scene, struct files *surroundings, const struct options *options)
+{
+    char reason[FILES_REASON_BYTES];
+
+    if (options->environment && !files_open(surroundings, NULL, options->environment, reason))
+        return import_fail(scene, file_part(options->environment), "cannot be opened: %s", reason);
+    for (size_t i = 0; i < options->source_count; i++) {
+        import_copy_text(scene->file, sizeof(scene->file), source_name(&options->sources[i]));
+        if (!source_read(&options->sources[i], reason))
+            return import_fail(scene, NULL, "%s%s",
+                               options->sources[i].files.model < 0 ? "cannot be opened: " : "", reason);
+    }
+    return true;
+}
+
+static bool send_names(struct sender *sender, const struct options *options)
+{
+    for (size_t i = 0; i < options->source_count; i++)
+        for (size_t k = 0; k < options->sources[i].files.named_count; k++)
+            if (!sender_file(sender, (uint32_t)i, options->sources[i].files.named[k]))
+                return false;
+    return true;
 }
 
 static bool run(struct import_scene *scene, struct sender *sender, const struct options *options,
                 uint64_t start_ns)
 {
     struct message_import_done done = {0};
-    struct files files;
-    char reason[FILES_REASON_BYTES];
-    uint64_t parsed_ns, begin_ns;
+    struct files surroundings = {.folder = -1, .model = -1, .environment = -1, .images = -1};
+    uint64_t parsed_ns, begin_ns = monotonic_now_ns();
     bool imported;
 
-    if (!files_open(&files, options->model, options->environment, reason)) {
-        const char *at_fault = options->model && files.folder < 0 ? options->model : options->environment;
-
-        files_finish(&files);
-        return import_fail(scene, file_part(at_fault), "cannot be opened: %s", reason);
-    }
-    if (options->model && is_aff(options->model))
-        files_open_images(&files);
-    begin_ns = monotonic_now_ns();
     silence_libraries();
-    imported = read_and_import(scene, &files, sender, options);
+    imported = read_files(scene, &surroundings, options) && read_and_import(scene, &surroundings, sender, options);
     parsed_ns = monotonic_now_ns();
-    files_finish(&files);
+    done.read_bytes = surroundings.read_bytes;
+    done.read_ns = surroundings.read_ns;
+    files_finish(&surroundings);
+    imported = imported && send_names(sender, options);
+    for (size_t i = 0; i < options->source_count; i++) {
+        done.read_bytes += options->sources[i].files.read_bytes;
+        done.read_ns += options->sources[i].files.read_ns;
+        source_finish(&options->sources[i]);
+    }
     if (!imported || !sender_notes(sender) || !sender_progress(sender, 0, scene->blob_bytes, "hashing"))
         return false;
-    begin_ns += files.read_ns;
-    done.read_bytes = files.read_bytes;
-    done.read_ns = files.read_ns;
+    begin_ns += done.read_ns;
     done.parse_ns = parsed_ns > begin_ns ? parsed_ns - begin_ns : 0;
     if (!import_hash(scene))
         return false;
@@ -373,24 +397,26 @@ static bool run(struct import_scene *scene, struct sender *sender, const struct 
 
 int main(int argc, char **argv)
 {
-    static const struct argp argp = {option_rows,
-                                     parse_option,
-                                     "MODEL",
-                                     "Turn MODEL (glTF 2.0, GLB, OBJ, NFF, AFF, PLY, STL, FBX, COLLADA, 3MF and "
-                                     "more) into messages of farlight's protocol.",
-                                     NULL,
-                                     NULL,
-                                     NULL};
+    static const struct argp argp = {
+        option_rows,
+        parse_option,
+        "MODEL...",
+        "Turn each MODEL (glTF 2.0, GLB, OBJ, NFF, AFF, PLY, STL, FBX, COLLADA, 3MF and "
+        "more) into messages of farlight's protocol.",
+        NULL,
+        NULL,
+        NULL};
     static struct import_scene scene; /* the table of notes is too large for the stack of a careful program */
     uint64_t start_ns = monotonic_now_ns();
-    struct options options = {.socket = -1, .scene = 1};
+    static struct source sources[SOURCES_MAX];
+    struct options options = {.socket = -1, .scene = 1, .sources = sources};
     struct sender sender;
     bool done;
 
     argp_err_exit_status = EXIT_USAGE;
-    argp_parse(&argp, argc, argv, 0, NULL, &options);
-    import_scene_init(&scene, file_part(options.model ? options.model : options.environment));
-    scene.variant = options.variant;
+    argp_parse(&argp, argc, argv, ARGP_IN_ORDER, NULL, &options);
+    import_scene_init(&scene,
+                      options.source_count > 0 ? source_name(&sources[0]) : file_part(options.environment));
     done = sender_init(&sender, options.socket, &scene) && run(&scene, &sender, &options, start_ns);
     if (!done)
         sender_failure(&sender);

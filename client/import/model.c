@@ -36,6 +36,14 @@ void import_copy_text(char *out, size_t out_bytes, const char *text)
     out[used] = '\0';
 }
 
+void import_prefix_name(const struct import_scene *scene, char out[IMPORT_NAME_MAX + 1], const char *name)
+{
+    const size_t length = name && name[0] != '\0' ? strlen(scene->prefix) : 0;
+
+    memcpy(out, scene->prefix, length);
+    import_copy_text(out + length, IMPORT_NAME_MAX + 1 - length, name);
+}
+
 static void format_text(char *out, size_t out_bytes, const char *format, va_list arguments)
 {
     char text[1024];
@@ -115,6 +123,7 @@ bool import_fail(struct import_scene *scene, const char *where, const char *form
     scene->failed = true;
     scene->failure.severity = PROTOCOL_SEVERITY_ERROR;
     scene->failure.count = 1;
+    memcpy(scene->failure.file, scene->file, sizeof(scene->file));
     import_copy_text(scene->failure.where, sizeof(scene->failure.where), where);
     va_start(arguments, format);
     format_text(scene->failure.text, sizeof(scene->failure.text), format, arguments);
@@ -128,12 +137,13 @@ void import_note(struct import_scene *scene, enum protocol_severity severity, co
     struct import_notice note = {.severity = severity, .count = 1};
     va_list arguments;
 
+    memcpy(note.file, scene->file, sizeof(note.file));
     import_copy_text(note.where, sizeof(note.where), where);
     va_start(arguments, format);
     format_text(note.text, sizeof(note.text), format, arguments);
     va_end(arguments);
     for (size_t i = 0; i < scene->note_count; i++) {
-        if (strcmp(scene->notes[i].text, note.text) == 0) {
+        if (strcmp(scene->notes[i].text, note.text) == 0 && strcmp(scene->notes[i].file, note.file) == 0) {
             scene->notes[i].count += scene->notes[i].count < UINT32_MAX;
             return;
         }
@@ -204,7 +214,7 @@ char *import_copy_name(struct import_scene *scene, const char *name)
     char text[IMPORT_NAME_MAX + 1];
     char *copy;
 
-    import_copy_text(text, sizeof(text), name);
+    import_prefix_name(scene, text, name);
     copy = strdup(text);
     if (!copy)
         import_fail(scene, NULL, "out of memory");
@@ -260,6 +270,12 @@ uint32_t import_add_node(struct import_scene *scene, const struct message_set_no
     if (!edit)
         return 0;
     edit->message.set_node = *node;
+    if (node->parent == 0)
+        edit->message.set_node.parent = scene->root;
+    if (scene->is_added && node->kind == PROTOCOL_NODE_CAMERA) {
+        edit->message.set_node.kind = PROTOCOL_NODE_GROUP;
+        edit->message.set_node.object = 0;
+    }
     edit->message.set_node.name = import_copy_name(scene, node->name);
     edit->message.set_node.weights = import_copy_weights(scene, node->weights, node->weights_count);
     return edit->message.set_node.node = import_next_id(scene, PROTOCOL_OBJECT_NODE);
@@ -337,6 +353,8 @@ uint32_t import_add_camera(struct import_scene *scene, const struct message_set_
         import_fail(scene, camera->name, "a camera has a number that is not allowed");
         return 0;
     }
+    if (scene->is_added)
+        return import_next_id(scene, PROTOCOL_OBJECT_CAMERA);
     edit = import_append(scene, MESSAGE_SET_CAMERA);
     if (!edit)
         return 0;
@@ -374,6 +392,8 @@ void import_set_environment(struct import_scene *scene, const struct message_set
         import_fail(scene, NULL, "the background has a number that is not allowed");
         return;
     }
+    if (scene->is_added)
+        return;
     edit = import_append(scene, MESSAGE_SET_ENVIRONMENT);
     if (!edit)
         return;

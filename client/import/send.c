@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 #include "send.h"
 
+#include "model.h"
+
 #include "protocol/framing.h"
 
 #include <errno.h>
@@ -211,15 +213,31 @@ bool sender_progress(struct sender *sender, uint64_t done_bytes, uint64_t total_
     return put(sender, 0, 0, &message) && flush(sender);
 }
 
+bool sender_file(struct sender *sender, uint32_t model, const char *name)
+{
+    struct message message;
+    char text[1025];
+
+    /* A name that is none in the protocol is a file that nobody waits for. */
+    import_copy_text(text, sizeof(text), name);
+    if (strcmp(text, name) != 0)
+        return true;
+    message_init(&message, MESSAGE_IMPORT_FILE);
+    message.import_file.model = model;
+    message.import_file.name = text;
+    return put(sender, 0, 0, &message);
+}
+
 static bool put_note(struct sender *sender, const struct import_notice *note)
 {
     struct message message;
+    const char *file = note->file[0] != '\0' ? note->file : sender->scene->file;
     char where[257], text[513];
 
-    if (note->where[0] && strcmp(note->where, sender->scene->file) != 0)
-        snprintf(where, sizeof(where), "%.120s: %.130s", sender->scene->file, note->where);
+    if (note->where[0] && strcmp(note->where, file) != 0)
+        snprintf(where, sizeof(where), "%.120s: %.130s", file, note->where);
     else
-        snprintf(where, sizeof(where), "%s", sender->scene->file);
+        snprintf(where, sizeof(where), "%s", file);
     if (note->count > 1)
         snprintf(text, sizeof(text), "%s (%u times)", note->text, note->count);
     else

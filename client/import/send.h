@@ -30,6 +30,8 @@ void sender_finish(struct sender *sender);
 
 /* Each false: the scene has failed or the peer is gone. */
 bool sender_progress(struct sender *sender, uint64_t done_bytes, uint64_t total_bytes, const char *text);
+/* A file that the model of that number names, relative to its folder. */
+bool sender_file(struct sender *sender, uint32_t model, const char *name);
 bool sender_notes(struct sender *sender); /* notes and clips */
 bool sender_blobs(struct sender *sender); /* offers, sends what is needed, waits until all are confirmed */
 bool sender_edits(struct sender *sender, uint32_t scene_id); /* one transaction; waits for its answer */

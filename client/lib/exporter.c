@@ -34,6 +34,8 @@ struct fl_exporter *fl_exporter_start(const struct fl_exporter_options *options,
     }
     if (options->full_metadata)
         arguments[count++] = "--full-metadata";
+    if (options->draws_text)
+        arguments[count++] = "--text";
     if (options->format) {
         arguments[count++] = "--format";
         arguments[count++] = options->format;
@@ -64,6 +66,25 @@ bool fl_exporter_wait(struct fl_exporter *exporter, struct fl_error *error)
     return false;
 }
 
+static bool send_texts(struct fl_exporter *exporter, const struct fl_export_options *options,
+                       struct fl_error *error)
+{
+    struct message message = {.type = MESSAGE_EXPORT_TEXT};
+    char text[257];
+    for (size_t i = 0; i < options->text_count; i++) {
+        const struct fl_export_text *wanted = &options->texts[i];
+        fl_text_utf8(wanted->text, text, sizeof(text));
+        message.export_text.x = wanted->x;
+        message.export_text.y = wanted->baseline;
+        message.export_text.width = wanted->width;
+        message.export_text.colour = wanted->colour;
+        message.export_text.text = text;
+        if (!fl_helper_send(&exporter->helper, &message, error))
+            return false;
+    }
+    return true;
+}
+
 bool fl_exporter_write(struct fl_exporter *exporter, const struct fl_frame *frame,
                        const struct fl_export_options *options, struct fl_error *error)
 {
@@ -78,7 +99,7 @@ bool fl_exporter_write(struct fl_exporter *exporter, const struct fl_frame *fram
     fl_shorten_path(options->path, exporter->path, sizeof(exporter->path));
     exporter->helper.request++;
     exporter->waiting = true;
-    return fl_helper_send(&exporter->helper, &message, error) &&
+    return fl_helper_send(&exporter->helper, &message, error) && send_texts(exporter, options, error) &&
            fl_helper_send_frame(&exporter->helper, frame, error) && fl_helper_flush(&exporter->helper, error);
 }
 

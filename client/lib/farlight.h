@@ -162,8 +162,25 @@ struct fl_note {
 /* An importer that was started ahead, to read the model while the daemon starts. */
 struct fl_import;
 
+/* One of several models, and where it stands: turned about x, then y, then z, and scaled. */
+struct fl_model {
+    const char *path;
+    bool is_placed;
+    float position[3]; /* metres */
+    float degrees[3];
+    float scale; /* 0: 1 */
+};
+#define FL_MODELS_MAX 64
+
 struct fl_load_options {
-    const char *model;          /* path */
+    const char *model; /* path */
+    /* Models of one scene, in place of `model`, if there are any; at most FL_MODELS_MAX. Of several, each is below
+     * a node of its own, and all names begin with that node's: "chair/seat", "chair-2/seat". Cameras, variant and
+     * background are the first model's. */
+    const struct fl_model *models;
+    size_t model_count;
+    int input_fd;               /* > 0: a file with the bytes of the model whose path is "-" */
+    const char *input_format;   /* its format, as "glb"; NULL: by its first bytes */
     const char *environment;    /* equirectangular image file all around, or NULL; alone (model NULL) allowed */
     double environment_degrees; /* its turn about +y, -360 to 360; 0: its middle column is +x, as glTF viewers have
                                    it */
@@ -210,6 +227,9 @@ struct fl_scene_bounds {
 FL_API bool fl_scene_get_bounds(struct fl_scene *scene, struct fl_scene_bounds *bounds, struct fl_error *error);
 /* The highest revision that the daemon has reported, of an own edit or another client's. */
 FL_API uint64_t fl_scene_revision(const struct fl_scene *scene);
+/* The path of a file that a loaded scene is made of: its models, its environment, and what the models name, which
+ * need not exist. NULL beyond the last; valid until the scene is destroyed. */
+FL_API const char *fl_scene_file(const struct fl_scene *scene, size_t index);
 FL_API const struct fl_import_stats *fl_scene_import_stats(const struct fl_scene *scene);
 FL_API size_t fl_scene_camera_count(const struct fl_scene *scene);
 FL_API const struct fl_camera_info *fl_scene_camera(const struct fl_scene *scene, size_t index);
@@ -583,12 +603,22 @@ struct fl_exporter_options {
     int interrupt_fd;
     const char *format; /* of all files, as below: some start faster; NULL: any */
     bool full_metadata; /* date, times of stages and revision too: then no two files are the same */
+    bool draws_text;    /* pictures come with text */
+};
+/* A line of text in the middle of a box, of about 14 pixels' height; the beginning of one that is too long for the
+ * box is left out. Without an installed font none is drawn. */
+struct fl_export_text {
+    uint32_t x, baseline, width; /* pixels */
+    uint32_t colour;             /* 0xrrggbb, as a screen has it */
+    const char *text;            /* at most 256 bytes are drawn */
 };
 struct fl_export_options {
     const char *path;
     const char *format; /* "png", "jpeg", "exr", "hdr" where the path's ending does not say; may be NULL */
     bool half;          /* EXR: half floats; layers of distances, positions and object numbers stay 32-bit */
     unsigned quality;   /* JPEG; 0: 95 */
+    const struct fl_export_text *texts; /* to be drawn into it, if it has the format rgba8 */
+    size_t text_count;
 };
 
 FL_API struct fl_exporter *fl_exporter_start(const struct fl_exporter_options *options, struct fl_error *error);

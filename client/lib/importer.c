@@ -3,6 +3,7 @@
 #include "protocol/common/clock.h"
 
 #include <errno.h>
+#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -12,6 +13,8 @@
 #define DEFAULT_TIMEOUT_MS 600000u
 /* Further cameras cannot be chosen by name; this bounds the work that a hostile model can cause. */
 #define CAMERAS_MAX 4096u
+/* Likewise of files that a model names. */
+#define FILES_MAX 65536u
 
 /* Named here, before a program is started for it. */
 static bool check_file(const char *path, struct fl_error *error)
@@ -24,6 +27,148 @@ static bool check_file(const char *path, struct fl_error *error)
     return true;
 }
 
+/* ---- start ---- */
+
+#define ARGUMENTS_MAX (16 + 4 * FL_MODELS_MAX)
+
+/* The program's words; those that are made here are freed with it. */
+struct command {
+    const char *words[ARGUMENTS_MAX];
+    size_t count;
+    char *made[2 + 2 * FL_MODELS_MAX];
+    size_t made_count;
+};
+
+static void add_word(struct command *command, const char *word)
+{
+    command->words[command->count++] = word;
+}
+
+static bool add_made(struct command *command, struct fl_error *error, const char *format, ...)
+    __attribute__((format(printf, 3, 4)));
+
+static bool add_made(struct command *command, struct fl_error *error, const char *format, ...)
+{
+    char *made = NULL;
+    va_list arguments;
+    va_start(arguments, format);
+    const int length = vasprintf(&made, format, arguments);
+    va_end(arguments);
+    if (length < 0)
+        return fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
+    command->made[command->made_count++] = made;
+    add_word(command, made);
+    return true;
+}
+
+static bool is_input(const struct fl_load_options *options, const char *path)
+{
+    return options->input_fd > 0 && strcmp(path, "-") == 0;
+}
+
+/* A name may begin with '-'. */
+static bool add_model(struct command *command, const struct fl_load_options *options, const struct fl_model *model,
+                      struct fl_error *error)
+{
+    const float *p = model->position, *d = model->degrees;
+    const double scale = model->scale > 0 ? (double)model->scale : 1;
+    const bool is_option = model->path[0] == '-' && !is_input(options, model->path);
+    if (!add_made(command, error, "%s%s", is_option ? "./" : "", model->path))
+        return false;
+    if (is_input(options, model->path) && options->input_format) {
+        add_word(command, "--format");
+        add_word(command, options->input_format);
+    }
+    return !model->is_placed ||
+           add_made(command, error, "--at=%.9g,%.9g,%.9g:%.9g,%.9g,%.9g:%.9g", (double)p[0], (double)p[1],
+                    (double)p[2], (double)d[0], (double)d[1], (double)d[2], scale);
+}
+
+static bool fill_command(struct command *command, const struct fl_load_options *options, struct fl_error *error)
+{
+    add_word(command, "--scene");
+    add_word(command, "1");
+    if (options->environment) {
+        add_word(command, "--environment");
+        add_word(command, options->environment);
+        if (!add_made(command, error, "--environment-rotation=%.9g", options->environment_degrees))
+            return false;
+    }
+    if (options->variant) {
+        add_word(command, "--variant");
+        add_word(command, options->variant);
+    }
+    if (options->point_size > 0 && !add_made(command, error, "--point-size=%.9g", options->point_size))
+        return false;
+    if (options->model_count == 0)
+        add_word(command, "--no-model");
+    for (size_t i = 0; i < options->model_count; i++)
+        if (!add_model(command, options, &options->models[i], error))
+            return false;
+    return true;
+}
+
+static bool remember_file(struct fl_importer *importer, const char *folder_of, const char *name,
+                          struct fl_error *error)
+{
+    const char *slash = folder_of ? strrchr(folder_of, '/') : NULL;
+    const int folder_bytes = slash ? (int)(slash - folder_of) + 1 : 0;
+    if (importer->file_count >= FILES_MAX)
+        return true;
+    if (!fl_grow((void **)&importer->files, &importer->file_capacity, importer->file_count,
+                 sizeof(*importer->files), error))
+        return false;
+    if (asprintf(&importer->files[importer->file_count], "%.*s%s", folder_bytes, folder_of ? folder_of : "",
+                 name) < 0)
+        return fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
+    importer->file_count++;
+    return true;
+}
+
+static bool take_model(struct fl_importer *importer, const struct fl_model *model, struct fl_error *error)
+{
+    return is_input(&importer->options, model->path) ||
+           (check_file(model->path, error) && remember_file(importer, NULL, model->path, error));
+}
+
+/* One model is the only one of several. */
+static bool take_models(struct fl_importer *importer, struct fl_error *error)
+{
+    struct fl_load_options *options = &importer->options;
+    importer->only = (struct fl_model){.path = options->model};
+    if (options->model_count == 0 && options->model) {
+        options->models = &importer->only;
+        options->model_count = 1;
+    }
+    if (options->model_count > FL_MODELS_MAX)
+        return fl_error_set(error, FL_ERROR_ARGUMENT, "model", "%zu models; at most %d are allowed",
+                            options->model_count, FL_MODELS_MAX);
+    if (options->model_count == 0 && !options->environment)
+        return fl_error_set(error, FL_ERROR_ARGUMENT, "model", "a file name is needed");
+    for (size_t i = 0; i < options->model_count; i++)
+        if (!take_model(importer, &options->models[i], error))
+            return false;
+    return !options->environment ||
+           (check_file(options->environment, error) && remember_file(importer, NULL, options->environment, error));
+}
+
+static bool start(struct fl_importer *importer, struct fl_error *error)
+{
+    struct command command = {.count = 0};
+    int fd = -1;
+    /* The program reads the bytes from their begin, each time. */
+    importer->process.input_fd = importer->options.input_fd;
+    if (importer->process.input_fd > 0)
+        lseek(importer->process.input_fd, 0, SEEK_SET);
+    const bool started =
+        fill_command(&command, &importer->options, error) &&
+        fl_process_start(&importer->process, "farlight-import", FL_WIRING_DESCRIPTOR, command.words, &fd, error);
+    for (size_t i = 0; i < command.made_count; i++)
+        free(command.made[i]);
+    return started &&
+           fl_stream_init(&importer->stream, fd, MESSAGE_FROM_CLIENT | MESSAGE_FROM_LOCAL, "the importer", error);
+}
+
 bool fl_importer_start(struct fl_importer *importer, const struct fl_load_options *options, struct fl_error *error)
 {
     const unsigned timeout_ms = options->timeout_ms > 0 ? options->timeout_ms : DEFAULT_TIMEOUT_MS;
@@ -31,41 +176,19 @@ bool fl_importer_start(struct fl_importer *importer, const struct fl_load_option
     importer->stream.fd = -1;
     importer->process.talk_fd = -1;
     importer->deadline_ns = importer->begin_ns + timeout_ms * 1000000ull;
-    if (!options->model && !options->environment)
-        return fl_error_set(error, FL_ERROR_ARGUMENT, "model", "a file name is needed");
-    if ((options->model && !check_file(options->model, error)) ||
-        (options->environment && !check_file(options->environment, error)))
-        return false;
-    const char *arguments[14] = {"--scene", "1"};
-    char degrees[48], point_size[48];
-    size_t count = 2;
-    if (options->environment) {
-        arguments[count++] = "--environment";
-        arguments[count++] = options->environment;
-        snprintf(degrees, sizeof(degrees), "--environment-rotation=%.9g", options->environment_degrees);
-        arguments[count++] = degrees;
-    }
-    if (options->variant) {
-        arguments[count++] = "--variant";
-        arguments[count++] = options->variant;
-    }
-    if (options->point_size > 0) {
-        snprintf(point_size, sizeof(point_size), "--point-size=%.9g", options->point_size);
-        arguments[count++] = point_size;
-    }
-    if (!options->model) {
-        arguments[count++] = "--no-model";
-    } else {
-        arguments[count++] = "--"; /* a model's name may begin with '-' */
-        arguments[count++] = options->model;
-    }
-    int fd = -1;
-    if (!fl_process_start(&importer->process, "farlight-import", FL_WIRING_DESCRIPTOR, arguments, &fd, error))
-        return false;
-    if (fl_stream_init(&importer->stream, fd, MESSAGE_FROM_CLIENT | MESSAGE_FROM_LOCAL, "the importer", error))
+    if (take_models(importer, error) && start(importer, error))
         return true;
     fl_importer_finish(importer);
     return false;
+}
+
+/* ---- its messages ---- */
+
+const char *fl_importer_name(const struct fl_importer *importer)
+{
+    const struct fl_load_options *options = &importer->options;
+    const char *path = options->model_count > 0 ? options->models[0].path : options->environment;
+    return is_input(options, path) ? "standard input" : path;
 }
 
 static bool remember_camera(struct fl_importer *importer, const struct message_set_node *node,
@@ -129,6 +252,11 @@ bool fl_importer_observe(struct fl_importer *importer, const struct message *mes
             importer->options.progress(importer->options.user, message->import_progress.done_bytes,
                                        message->import_progress.total_bytes, message->import_progress.text);
         return true;
+    case MESSAGE_IMPORT_FILE:
+        if (message->import_file.model >= importer->options.model_count)
+            return true;
+        return remember_file(importer, importer->options.models[message->import_file.model].path,
+                             message->import_file.name, error);
     case MESSAGE_IMPORT_DONE:
         importer->done = true;
         importer->stats.read_bytes = message->import_done.read_bytes;
@@ -144,15 +272,14 @@ bool fl_importer_observe(struct fl_importer *importer, const struct message *mes
 
 bool fl_importer_explain(struct fl_importer *importer, struct fl_error *error)
 {
-    const char *model = importer->options.model ? importer->options.model : importer->options.environment;
     if (importer->complaint.code != FL_ERROR_NONE) {
         *error = importer->complaint;
         return false;
     }
     char words[520];
     fl_process_last_words(&importer->process, 1000, words, sizeof(words));
-    return fl_error_set(error, FL_ERROR_MODEL, model, "the importer failed without a message%s%s",
-                        words[0] != '\0' ? ": " : "", words);
+    return fl_error_set(error, FL_ERROR_MODEL, fl_importer_name(importer),
+                        "the importer failed without a message%s%s", words[0] != '\0' ? ": " : "", words);
 }
 
 /* Nodes without a name have their camera's. */
@@ -184,6 +311,9 @@ void fl_importer_finish(struct fl_importer *importer)
     free(importer->cameras);
     free(importer->camera_objects);
     free(importer->objects);
+    for (size_t i = 0; i < importer->file_count; i++)
+        free(importer->files[i]);
+    free(importer->files);
     fl_catalogue_finish(&importer->catalogue);
     *importer = (struct fl_importer){.stream = {.fd = -1}, .process = {.talk_fd = -1}};
 }

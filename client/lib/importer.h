@@ -17,7 +17,8 @@ struct fl_camera_object {
 struct fl_importer {
     struct fl_stream stream;
     struct fl_process process;
-    struct fl_load_options options;
+    struct fl_load_options options; /* `model` is one of `models` here */
+    struct fl_model only;           /* which it is then */
     uint64_t begin_ns, deadline_ns;
     bool done; /* it has said that all is well */
     struct fl_import_stats stats;
@@ -27,12 +28,16 @@ struct fl_importer {
     struct fl_camera_object *objects;
     size_t object_count, object_capacity;
     struct fl_catalogue catalogue;
+    char **files; /* paths: what the options name, then what the models name */
+    size_t file_count, file_capacity;
     struct fl_error complaint; /* of its last note of severity error */
 };
 
 /* Starts the program; it begins to read at once and waits only for the answers that it needs. */
 bool fl_importer_start(struct fl_importer *importer, const struct fl_load_options *options,
                        struct fl_error *error);
+/* The path of the first model, or of the environment that is alone, for people. */
+const char *fl_importer_name(const struct fl_importer *importer);
 /* Records cameras, clips and names; notes and progress go to the options' callbacks. */
 bool fl_importer_observe(struct fl_importer *importer, const struct message *message, struct fl_error *error);
 /* Sets the error of a program that ended without `done`: its own message, else its exit status. Returns false. */

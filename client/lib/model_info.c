@@ -147,7 +147,7 @@ static bool run(struct listing *listing, int interrupt_fd, struct fl_error *erro
         struct pollfd polled = {.fd = importer->stream.fd, .events = fl_stream_events(&importer->stream)};
         if (!fl_wait(&polled, 1, interrupt_fd, importer->deadline_ns, error)) {
             if (error->code == FL_ERROR_TIMEOUT)
-                fl_error_set(error, FL_ERROR_TIMEOUT, importer->options.model, "the import timed out");
+                fl_error_set(error, FL_ERROR_TIMEOUT, fl_importer_name(importer), "the import timed out");
             return false;
         }
         if (!fl_stream_transfer(&importer->stream, error))

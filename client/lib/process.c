@@ -20,7 +20,7 @@ extern char **environ;
 
 #define TRY_AGAIN_STATUS 75     /* of our programs */
 #define FIRST_SIGNAL_STATUS 128 /* 128 + signal; ssh: 255 */
-#define ARGUMENTS_MAX 32
+#define ARGUMENTS_MAX 280       /* of an import of many models */
 #define CHILD_SOCKET 3
 
 static bool is_program(const char *folder, size_t folder_bytes, const char *name, char *path, size_t path_bytes)
@@ -55,17 +55,21 @@ bool fl_find_program(const char *name, char *path, size_t path_bytes, struct fl_
 }
 
 /* What the child's descriptors shall be. */
-static bool wire(posix_spawn_file_actions_t *actions, enum fl_wiring wiring, int socket_fd, int talk_fd)
+static bool wire(posix_spawn_file_actions_t *actions, enum fl_wiring wiring, const struct fl_process *process,
+                 int socket_fd)
 {
+    const int talk_fd = process->talk_fd, input_fd = process->input_fd;
     if (wiring == FL_WIRING_STANDARD)
         return posix_spawn_file_actions_adddup2(actions, socket_fd, STDIN_FILENO) == 0 &&
                posix_spawn_file_actions_adddup2(actions, socket_fd, STDOUT_FILENO) == 0;
-    /* The log's descriptor is moved first to where it cannot be overwritten: our descriptors may be 0..3
-     * themselves. */
-    return posix_spawn_file_actions_adddup2(actions, talk_fd, STDOUT_FILENO) == 0 &&
+    /* What is given over was moved to where it cannot be overwritten: our descriptors may be 0..3 themselves. The
+     * input was not, and is the first. */
+    const int has_input = input_fd > 0
+                              ? posix_spawn_file_actions_adddup2(actions, input_fd, STDIN_FILENO)
+                              : posix_spawn_file_actions_addopen(actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
+    return has_input == 0 && posix_spawn_file_actions_adddup2(actions, talk_fd, STDOUT_FILENO) == 0 &&
            posix_spawn_file_actions_adddup2(actions, talk_fd, STDERR_FILENO) == 0 &&
-           posix_spawn_file_actions_adddup2(actions, socket_fd, CHILD_SOCKET) == 0 &&
-           posix_spawn_file_actions_addopen(actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0) == 0;
+           posix_spawn_file_actions_adddup2(actions, socket_fd, CHILD_SOCKET) == 0;
 }
 
 /* The child starts with default signals and, unless it may need the terminal, in a process group of its own: a
@@ -97,7 +101,7 @@ static int spawn(struct fl_process *process, const char *path, char *const *argv
         return failure;
     failure = posix_spawnattr_init(&attributes);
     if (failure == 0) {
-        if (!wire(&actions, wiring, socket_fd, process->talk_fd) || !set_attributes(&attributes, wiring))
+        if (!wire(&actions, wiring, process, socket_fd) || !set_attributes(&attributes, wiring))
             failure = ENOMEM;
         else
             failure = posix_spawn(&process->pid, path, &actions, &attributes, argv, environ);
@@ -136,7 +140,7 @@ static size_t fill_arguments(char *argv[ARGUMENTS_MAX], const char *path, enum f
 bool fl_process_start(struct fl_process *process, const char *name, enum fl_wiring wiring,
                       const char *const *arguments, int *socket_fd, struct fl_error *error)
 {
-    *process = (struct fl_process){.talk_fd = -1};
+    *process = (struct fl_process){.talk_fd = -1, .input_fd = process->input_fd};
     snprintf(process->name, sizeof(process->name), "%s", name);
     char path[4096];
     if (!fl_find_program(name, path, sizeof(path), error))

@@ -30,6 +30,7 @@ static enum fl_relay_verdict kind_of(enum message_type type)
     case MESSAGE_IMPORT_BOUNDS:
     case MESSAGE_IMPORT_CLIP:
     case MESSAGE_IMPORT_VARIANT:
+    case MESSAGE_IMPORT_FILE:
     case MESSAGE_IMPORT_PROGRESS:
     case MESSAGE_IMPORT_DONE:
         return FL_RELAY_LOCAL;

@@ -164,7 +164,7 @@ static bool exchange(struct load *load, struct fl_error *error)
             return true;
         }
         if (error->code == FL_ERROR_TIMEOUT)
-            fl_error_set(error, FL_ERROR_TIMEOUT, load->importer->options.model, "the import timed out");
+            fl_error_set(error, FL_ERROR_TIMEOUT, fl_importer_name(load->importer), "the import timed out");
         return false;
     }
     if (!fl_stream_transfer(daemon, error))
@@ -204,16 +204,14 @@ static const char *base_name(const char *path)
     return slash ? slash + 1 : path;
 }
 
-static bool open_scene(struct fl_connection *connection, uint32_t scene, const struct fl_load_options *options,
+static bool open_scene(struct fl_connection *connection, uint32_t scene, const struct fl_importer *importer,
                        struct fl_error *error)
 {
     struct message open = {.type = MESSAGE_SCENE_OPEN};
+    const struct fl_load_options *options = &importer->options;
     char short_name[129];
-    const char *name = options->scene_name    ? options->scene_name
-                       : options->model       ? base_name(options->model)
-                       : options->environment ? base_name(options->environment)
-                                              : "";
-    fl_text_utf8(name, short_name, sizeof(short_name));
+    fl_text_utf8(options->scene_name ? options->scene_name : base_name(fl_importer_name(importer)), short_name,
+                 sizeof(short_name));
     open.scene_open.scene = scene;
     open.scene_open.sharing = options->sharing;
     open.scene_open.name = short_name;
@@ -227,7 +225,7 @@ static bool open_scene(struct fl_connection *connection, uint32_t scene, const s
 static bool load_with(struct fl_importer *importer, struct fl_scene *scene, struct fl_error *error)
 {
     struct fl_connection *connection = scene->connection;
-    if (!open_scene(connection, scene->scene, &importer->options, error))
+    if (!open_scene(connection, scene->scene, importer, error))
         return false;
     struct load load = {.connection = connection,
                         .importer = importer,
@@ -306,6 +304,10 @@ static struct fl_scene *load_started(struct fl_connection *connection, struct fl
     scene->camera_count = importer->camera_count;
     importer->cameras = NULL;
     importer->camera_count = 0;
+    scene->files = importer->files;
+    scene->file_count = importer->file_count;
+    importer->files = NULL;
+    importer->file_count = 0;
     scene->catalogue = importer->catalogue;
     importer->catalogue = (struct fl_catalogue){0};
     return scene;
@@ -359,6 +361,9 @@ void fl_scene_destroy(struct fl_scene *scene)
     *place = scene->next;
     free(scene->clips);
     free(scene->cameras);
+    for (size_t i = 0; i < scene->file_count; i++)
+        free(scene->files[i]);
+    free(scene->files);
     fl_catalogue_finish(&scene->catalogue);
     free(scene);
 }
@@ -366,6 +371,11 @@ void fl_scene_destroy(struct fl_scene *scene)
 const struct fl_import_stats *fl_scene_import_stats(const struct fl_scene *scene)
 {
     return &scene->stats;
+}
+
+const char *fl_scene_file(const struct fl_scene *scene, size_t index)
+{
+    return index < scene->file_count ? scene->files[index] : NULL;
 }
 
 size_t fl_scene_camera_count(const struct fl_scene *scene)

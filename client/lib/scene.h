@@ -17,6 +17,8 @@ struct fl_scene {
     struct fl_camera_info *cameras;
     size_t camera_count;
     struct fl_catalogue catalogue;
+    char **files;
+    size_t file_count;
 };
 
 /* A new scene of the connection, with its own number; nothing is sent. NULL: out of memory. */

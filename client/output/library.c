@@ -7,11 +7,11 @@
 static const struct image_library *library;
 static char why_none[256] = "cannot be done: this program was started for other formats";
 
-void library_load(bool compares)
+void library_load(bool draws_text)
 {
     const struct image_library *found =
         module_load("farlight-images.so", "image_library", why_none, sizeof(why_none));
-    if (found && found->prepare(compares, why_none, sizeof(why_none)))
+    if (found && found->prepare(draws_text, why_none, sizeof(why_none)))
         library = found;
 }
 

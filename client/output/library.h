@@ -31,18 +31,22 @@ struct library_host {
 /* Exported under the name `image_library`. */
 struct image_library {
     /* Makes the libraries load their plug-ins while that is still allowed. */
-    bool (*prepare)(bool compares, char *reason, size_t reason_bytes);
+    bool (*prepare)(bool draws_text, char *reason, size_t reason_bytes);
     /* *file is malloc'ed. False: `reason` says why. */
     bool (*encode)(const struct library_image *image, uint8_t **file, size_t *file_bytes, char *reason,
                    size_t reason_bytes);
     /* As compare_images. */
     bool (*compare)(const struct library_host *host, const struct message_compare_images *wanted,
                     const struct compare_file *a, const struct compare_file *b, struct compare_result *result);
+    /* Draws a line of text into a picture of bytes with four channels, which is changed; nothing where no font is
+     * installed. */
+    bool (*draw)(const struct raster *raster, const struct message_export_text *wanted, char *reason,
+                 size_t reason_bytes);
 };
 extern const struct image_library image_library __attribute__((visibility("default")));
 
-/* Loads the module, to be called before the sandbox is entered; `compares`: not only for writing. */
-void library_load(bool compares);
+/* Loads the module, to be called before the sandbox is entered; `draws_text`: with a font. */
+void library_load(bool draws_text);
 /* NULL: `reason` says why. */
 const struct image_library *library_loaded(char *reason, size_t reason_bytes);
 

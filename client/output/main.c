@@ -22,13 +22,14 @@
 /* The C library looks for it by name, past our hidden visibility. */
 __attribute__((visibility("default"))) const char *argp_program_version = "farlight-export " FARLIGHT_VERSION;
 
-enum { KEY_FD = 0x100, KEY_FOLDER, KEY_FPS, KEY_FORMAT, KEY_READ, KEY_FULL_METADATA };
+enum { KEY_FD = 0x100, KEY_FOLDER, KEY_FPS, KEY_FORMAT, KEY_READ, KEY_FULL_METADATA, KEY_TEXT };
 
 #define READ_MAX 2u
 
 struct options {
     const char *folder;
     enum image_format format; /* of all files; unknown: any */
+    bool draws_text;
     struct compare_file files[READ_MAX];
     struct serve_options serve;
 };
@@ -61,6 +62,9 @@ static error_t parse(int key, char *value, struct argp_state *state)
     case KEY_FULL_METADATA:
         options->serve.full_metadata = true;
         return 0;
+    case KEY_TEXT:
+        options->draws_text = true;
+        return 0;
     case KEY_FPS:
         options->serve.frames_per_second = strtof(value, &end);
         if (end == value || *end != '\0' || !(options->serve.frames_per_second > 0))
@@ -89,14 +93,16 @@ static void prepare(const struct options *options)
 {
     const bool writes = options->folder != NULL, compares = options->serve.file_count > 0;
     tzset(); /* for dates */
-    if (compares || (writes && image_needs_library(options->format)))
-        library_load(compares);
+    const bool draws_text = compares || options->draws_text;
+    if (draws_text || (writes && image_needs_library(options->format)))
+        library_load(draws_text);
 }
 
 static bool enter_sandbox(struct options *options)
 {
     const char *const write_folders[] = {options->folder};
-    const char *const read_folders[] = {options->serve.file_count > 0 ? COMPARE_FONT_FOLDER : NULL};
+    const bool draws_text = options->draws_text || options->serve.file_count > 0;
+    const char *const read_folders[] = {draws_text ? COMPARE_FONT_FOLDER : NULL};
     const bool writes = options->folder != NULL;
     const struct sandbox_options sandbox = {.read_folders = read_folders,
                                             .read_folder_count = 1,
@@ -123,6 +129,7 @@ int main(int argc, char **argv)
         {"format", KEY_FORMAT, "NAME", 0,
          "What is written: png, jpeg, exr or hdr, only (default: any, which takes longer to start)", 0},
         {"read", KEY_READ, "FILE", 0, "An image that may be read and compared; twice", 0},
+        {"text", KEY_TEXT, NULL, 0, "Text may be drawn into pictures", 0},
         {"fps", KEY_FPS, "N", 0, "Frames per second, for the metadata of EXR files", 0},
         {"full-metadata", KEY_FULL_METADATA, NULL, 0,
          "Store what differs from run to run, too: date, times of stages, revision", 0},

@@ -5,6 +5,7 @@
 #include "helper/file.h"
 #include "image.h"
 #include "helper/incoming.h"
+#include "library.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -12,12 +13,21 @@
 
 #define TEXT_MAX 512
 
+#define TEXTS_MAX 16384u
+
+struct text {
+    struct message_export_text wanted;
+    char text[257];
+};
+
 /* The state of the picture that is being received. */
 struct request {
     uint32_t number;
     char path[4097], format[17], model[4097];
     bool half, named;
     unsigned quality;
+    struct text *texts; /* to be drawn into it */
+    size_t text_count;
     struct incoming incoming;
     char reason[TEXT_MAX]; /* why it fails; empty: it has not failed */
 };
@@ -50,6 +60,45 @@ static bool begin_frame(struct request *request, const struct message_frame_begi
     if (!request->incoming.pixels && request->reason[0] == '\0')
         snprintf(request->reason, sizeof(request->reason), "no memory for a picture of %ux%u", begin->width,
                  begin->height);
+    return true;
+}
+
+/* False: the sender breaks the protocol. */
+static bool take_text(struct request *request, const struct message_export_text *wanted)
+{
+    if (!request->named || request->incoming.begun || request->text_count == TEXTS_MAX)
+        return false;
+    struct text *grown = realloc(request->texts, (request->text_count + 1) * sizeof(*grown));
+    if (!grown) {
+        snprintf(request->reason, sizeof(request->reason), "no memory for text");
+        return true;
+    }
+    request->texts = grown;
+    struct text *text = &grown[request->text_count++];
+    text->wanted = *wanted;
+    snprintf(text->text, sizeof(text->text), "%s", wanted->text);
+    return true;
+}
+
+static bool draw_texts(struct request *request)
+{
+    const struct message_frame_begin *begin = &request->incoming.begin;
+    const struct raster raster = {begin->width, begin->height, 4, 1, request->incoming.pixels};
+    const struct image_library *library =
+        request->text_count > 0 ? library_loaded(request->reason, sizeof(request->reason)) : NULL;
+    if (request->text_count == 0)
+        return true;
+    if (!library)
+        return false;
+    if (begin->format != PROTOCOL_PIXEL_FORMAT_RGBA8) {
+        snprintf(request->reason, sizeof(request->reason), "text can be drawn into 8-bit pictures only");
+        return false;
+    }
+    for (size_t i = 0; i < request->text_count; i++) {
+        request->texts[i].wanted.text = request->texts[i].text;
+        if (!library->draw(&raster, &request->texts[i].wanted, request->reason, sizeof(request->reason)))
+            return false;
+    }
     return true;
 }
 
@@ -87,10 +136,11 @@ static bool end_frame(struct exporter *exporter, const struct message_frame_end 
     struct request *request = &exporter->request;
     if (!incoming_is_whole(&request->incoming))
         return false;
-    if (request->reason[0] == '\0')
+    if (request->reason[0] == '\0' && draw_texts(request))
         write_image(exporter, end);
     const bool answered = answer(exporter);
     incoming_finish(&request->incoming);
+    free(request->texts);
     *request = (struct request){0};
     return answered;
 }
@@ -134,6 +184,8 @@ static bool handle(void *user, uint32_t number, const struct message *message)
             return false;
         start_request(request, number, &message->export_image);
         return true;
+    case MESSAGE_EXPORT_TEXT:
+        return take_text(request, &message->export_text);
     case MESSAGE_FRAME_BEGIN:
         return begin_frame(request, &message->frame_begin);
     case MESSAGE_FRAME_DATA:
@@ -153,5 +205,6 @@ bool serve(const struct serve_options *options)
     /* An unfinished picture is dropped at the end: nothing of it is on the disk. */
     const bool good = channel_run(&exporter.channel);
     incoming_finish(&exporter.request.incoming);
+    free(exporter.request.texts);
     return good;
 }

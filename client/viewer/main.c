@@ -19,6 +19,7 @@ __attribute__((visibility("default"))) const char *argp_program_version = "farli
 
 enum key {
     KEY_SCENE = 0x500,
+    KEY_WATCH,
     KEY_HEADLESS,
     KEY_REPLAY,
     KEY_RATE,
@@ -41,6 +42,7 @@ static const struct argp_option options[] = {
     {NULL, 0, NULL, 0, "Window:", -2},
     {"scene", KEY_SCENE, "NAME", 0,
      "Use a shared scene at --server in place of MODEL ('farlight scenes' lists them)", -2},
+    {"watch", KEY_WATCH, NULL, 0, "Load the model again when it, or a file that it names, has changed", -2},
     {"samples", KEY_SAMPLES, "N", 0, "Render N samples per pixel while nothing moves (default 64)", -2},
     {"pass-samples", KEY_PASS, "N", 0, "Add N of these samples with each frame (default 1)", -2},
     {"integrator", KEY_INTEGRATOR, "NAME", 0,
@@ -185,14 +187,6 @@ static error_t set_moving_rate(struct command_line *line, const char *value)
     return status;
 }
 
-static error_t set_model(struct command_line *line, const char *value)
-{
-    if (line->job.model)
-        return cli_usage(&line->job, value, "only one model can be shown");
-    line->job.model = value;
-    return 0;
-}
-
 static error_t parse(int key, char *value, struct argp_state *state)
 {
     struct command_line *line = state->input;
@@ -203,9 +197,12 @@ static error_t parse(int key, char *value, struct argp_state *state)
         viewer->local = LOCAL_AUTO;
         return 0;
     case ARGP_KEY_ARG:
-        return set_model(line, value);
+        return cli_set_model(&line->job, value);
     case KEY_SCENE:
         line->job.scene = value;
+        return 0;
+    case KEY_WATCH:
+        viewer->watch = true;
         return 0;
     case KEY_HEADLESS:
         viewer->headless = true;
@@ -274,12 +271,12 @@ static bool complete(struct command_line *line)
         cli_usage(job, "--stereo-layout", "a window is no pair of files");
         return fl_error_remedy(&job->error, "use side or over");
     }
+    if (viewer->watch && (job->scene || cli_has_input(job)))
+        return cli_usage(job, "--watch", "%s does not change as a file does",
+                         job->scene ? "a shared scene" : "standard input") == 0;
     if (job->clip_count > 1)
         return cli_usage(job, "--clip", "only one clip can be played") == 0;
-    if ((job->model && !cli_check_input(job->model, &job->error)) ||
-        (job->environment && !cli_check_input(job->environment, &job->error)))
-        return false;
-    return cli_job_complete_view(job);
+    return cli_check_models(job, &job->error) && cli_job_complete_view(job);
 }
 
 static void on_note(void *user, const struct fl_note *note)
@@ -296,6 +293,9 @@ static void fill(struct command_line *line)
     viewer->key_file = cli_key_file(viewer->server, job->key_file);
     viewer->link = job->link;
     viewer->model = job->model;
+    viewer->models = job->models;
+    viewer->model_count = job->model_count;
+    viewer->input_fd = job->input_fd;
     viewer->environment = job->environment;
     viewer->environment_degrees = job->environment_degrees;
     viewer->variant = job->variant;
@@ -329,22 +329,22 @@ int main(int argc, char **argv)
 {
     static struct argp_child children[2];
     children[0].argp = cli_view_argp();
-    static const struct argp argp = {
-        .options = options,
-        .parser = parse,
-        .args_doc = "MODEL",
-        .doc = "Open a window on a model, or on a shared scene of a daemon.\v"
-               "MODEL is glTF, GLB, OBJ, PLY, STL, FBX, COLLADA, 3MF or of another format of farlight-import. "
-               "FARLIGHT_SERVER, FARLIGHT_SIZE and so on give defaults.",
-        .children = children,
-        .help_filter = help_filter};
+    static const struct argp argp = {.options = options,
+                                     .parser = parse,
+                                     .args_doc = "MODEL [--at PLACE] [MODEL [--at PLACE]]...",
+                                     .doc = "Open a window on a model, or on a shared scene of a daemon.\v"
+                                            "MODEL is glTF, GLB, OBJ, PLY, STL, FBX, COLLADA, 3MF or of another "
+                                            "format of farlight-import; '-' is standard input. "
+                                            "FARLIGHT_SERVER, FARLIGHT_SIZE and so on give defaults.",
+                                     .children = children,
+                                     .help_filter = help_filter};
     static struct command_line line;
     argp_err_exit_status = CLI_USAGE;
-    if (!cli_job_begin(&line.job, fl_view_defaults()) || cli_parse(&argp, argc, argv, 0, &line) != 0 ||
+    if (!cli_job_begin(&line.job, fl_view_defaults()) || cli_parse(&argp, argc, argv, ARGP_IN_ORDER, &line) != 0 ||
         !complete(&line))
         return cli_report(&line.job.error);
     struct fl_error error = {0};
-    if (!cli_interrupt_begin(&error))
+    if (!cli_interrupt_begin(&error) || !cli_read_input(&line.job, &error))
         return cli_report(&error);
     fill(&line);
     return viewer_run(&line.viewer, &error) ? CLI_DONE : cli_report(&error);

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "viewer/session.h"
+#include "cli/watch.h"
 
 #include <inttypes.h>
 #include <pthread.h>
@@ -15,7 +16,9 @@
 
 struct session {
     struct session_options options;
+    uint64_t number;    /* of this session, by chance */
     char kept_name[40]; /* by which a scene that we loaded is found again */
+    struct cli_watch watch;
     enum session_state state;
     unsigned times_live;
     struct fl_error error;
@@ -27,6 +30,7 @@ struct session {
     atomic_bool opened; /* the thread is at its end */
     struct fl_connection *connection;
     struct fl_scene *scene;
+    struct fl_scene *fresh; /* of changed files, to take the place of `scene` */
     struct fl_error open_error;
 
     pthread_mutex_t lock; /* guards what follows */
@@ -61,6 +65,27 @@ static void on_note(void *user, const struct fl_note *note)
         session->options.note(session->options.user, note);
 }
 
+static struct fl_scene *load(struct session *session, struct fl_error *error)
+{
+    const struct session_options *options = &session->options;
+    /* A private daemon ends with its connection, and its scenes with it. */
+    const struct fl_load_options wanted = {.model = options->model,
+                                           .models = options->models,
+                                           .model_count = options->model_count,
+                                           .input_fd = options->input_fd,
+                                           .environment = options->environment,
+                                           .environment_degrees = options->environment_degrees,
+                                           .variant = options->variant,
+                                           .point_size = options->point_size,
+                                           .note = on_note,
+                                           .progress = on_progress,
+                                           .user = session,
+                                           .sharing =
+                                               options->server ? PROTOCOL_SHARING_KEPT : PROTOCOL_SHARING_PRIVATE,
+                                           .scene_name = options->server ? session->kept_name : NULL};
+    return fl_scene_load(session->connection, &wanted, error);
+}
+
 /* A daemon that kept running still has the scene; a new one gets it again. */
 static struct fl_scene *come_to_scene(struct session *session, struct fl_error *error)
 {
@@ -73,19 +98,7 @@ static struct fl_scene *come_to_scene(struct session *session, struct fl_error *
     if (scene || error->code == FL_ERROR_CONNECTION || error->code == FL_ERROR_INTERRUPTED)
         return scene;
     *error = (struct fl_error){0};
-    /* A private daemon ends with its connection, and its scenes with it. */
-    const struct fl_load_options load = {.model = options->model,
-                                         .environment = options->environment,
-                                         .environment_degrees = options->environment_degrees,
-                                         .variant = options->variant,
-                                         .point_size = options->point_size,
-                                         .note = on_note,
-                                         .progress = on_progress,
-                                         .user = session,
-                                         .sharing =
-                                             options->server ? PROTOCOL_SHARING_KEPT : PROTOCOL_SHARING_PRIVATE,
-                                         .scene_name = options->server ? session->kept_name : NULL};
-    return fl_scene_load(session->connection, &load, error);
+    return load(session, error);
 }
 
 static void *open_all(void *argument)
@@ -107,12 +120,26 @@ static void *open_all(void *argument)
     return NULL;
 }
 
-static bool begin_opening(struct session *session)
+/* The next scene is another one, of another name: until it is there the old one stays. */
+static void *load_fresh(void *argument)
+{
+    struct session *session = argument;
+    session->fresh = load(session, &session->open_error);
+    atomic_store(&session->opened, true);
+    return NULL;
+}
+
+static void name_scene(struct session *session)
+{
+    snprintf(session->kept_name, sizeof(session->kept_name), "view-%016" PRIx64, session->number++);
+}
+
+static bool begin_opening(struct session *session, void *(*open)(void *))
 {
     session->open_error = (struct fl_error){0};
     session->state = SESSION_OPENING;
     atomic_store(&session->opened, false);
-    session->has_thread = pthread_create(&session->thread, NULL, open_all, session) == 0;
+    session->has_thread = pthread_create(&session->thread, NULL, open, session) == 0;
     return session->has_thread || fl_error_set(&session->error, FL_ERROR_SYSTEM, "", "cannot start a thread");
 }
 
@@ -122,11 +149,12 @@ static void close_all(struct session *session)
 {
     fl_render_destroy(session->job);
     fl_view_destroy(session->view);
+    fl_scene_destroy(session->fresh);
     fl_scene_destroy(session->scene);
     fl_connection_destroy(session->connection);
     session->job = NULL;
     session->view = NULL;
-    session->scene = NULL;
+    session->scene = session->fresh = NULL;
     session->connection = NULL;
 }
 
@@ -143,11 +171,43 @@ static void lose(struct session *session, const struct fl_error *error, uint64_t
     session->pause_ns = session->pause_ns < LONGEST_PAUSE_NS / 2 ? session->pause_ns * 2 : LONGEST_PAUSE_NS;
 }
 
+/* The view of the old scene ends with it. */
+static void take_fresh(struct session *session)
+{
+    fl_render_destroy(session->job);
+    fl_view_destroy(session->view);
+    fl_scene_destroy(session->scene);
+    session->job = NULL;
+    session->view = NULL;
+    session->scene = session->fresh;
+    session->fresh = NULL;
+}
+
+/* A file that cannot be read leaves everything as it was. */
+static bool keeps_scene(struct session *session)
+{
+    const struct fl_error *error = &session->open_error;
+    if (!session->scene || session->fresh || error->code == FL_ERROR_CONNECTION ||
+        error->code == FL_ERROR_INTERRUPTED || error->code == FL_ERROR_NONE)
+        return false;
+    if (session->options.stale)
+        session->options.stale(session->options.user, error);
+    session->state = SESSION_LIVE;
+    return true;
+}
+
 static void end_opening(struct session *session, uint64_t now_ns)
 {
+    struct fl_error ignored; /* files beyond the memory are not watched */
     pthread_join(session->thread, NULL);
     session->has_thread = false;
-    if (!session->scene) {
+    if (keeps_scene(session))
+        return;
+    if (session->fresh)
+        take_fresh(session);
+    if (session->options.watch && session->scene)
+        cli_watch_scene(&session->watch, session->scene, &ignored);
+    if (!session->scene || session->open_error.code != FL_ERROR_NONE) {
         const struct fl_error error = session->open_error;
         lose(session, &error, now_ns);
         return;
@@ -164,8 +224,13 @@ enum session_state session_step(struct session *session, uint64_t now_ns)
     else if (session->state == SESSION_LIVE && session->error.code != FL_ERROR_NONE) {
         const struct fl_error error = session->error;
         lose(session, &error, now_ns);
+    } else if (session->state == SESSION_LIVE && session->options.watch &&
+               cli_watch_has_changed(&session->watch, now_ns)) {
+        name_scene(session);
+        if (!begin_opening(session, load_fresh))
+            session->state = SESSION_LIVE;
     } else if (session->state == SESSION_LOST && now_ns >= session->retry_ns) {
-        if (!begin_opening(session))
+        if (!begin_opening(session, open_all))
             session->state = SESSION_FAILED;
         else
             session->error = (struct fl_error){0};
@@ -173,20 +238,34 @@ enum session_state session_step(struct session *session, uint64_t now_ns)
     return session->state;
 }
 
+static bool begin_watch(struct session *session)
+{
+    const struct session_options *options = &session->options;
+    if (!options->watch)
+        return true;
+    if (!cli_watch_begin(&session->watch, &session->error))
+        return false;
+    if (options->model && !cli_watch_add(&session->watch, options->model, &session->error))
+        return false;
+    for (size_t i = 0; i < options->model_count; i++)
+        if (!cli_watch_add(&session->watch, options->models[i].path, &session->error))
+            return false;
+    return !options->environment || cli_watch_add(&session->watch, options->environment, &session->error);
+}
+
 struct session *session_create(const struct session_options *options, struct fl_error *error)
 {
     struct session *session = calloc(1, sizeof(*session));
-    uint64_t number = 0;
-    if (!session || getrandom(&number, sizeof(number), 0) != (ssize_t)sizeof(number)) {
+    if (!session || getrandom(&session->number, sizeof(session->number), 0) != (ssize_t)sizeof(session->number)) {
         fl_error_set(error, FL_ERROR_SYSTEM, "", "out of memory, or no random numbers");
         free(session);
         return NULL;
     }
     session->options = *options;
     session->pause_ns = FIRST_PAUSE_NS;
-    snprintf(session->kept_name, sizeof(session->kept_name), "view-%016" PRIx64, number);
+    name_scene(session);
     pthread_mutex_init(&session->lock, NULL);
-    if (begin_opening(session))
+    if (begin_watch(session) && begin_opening(session, open_all))
         return session;
     *error = session->error;
     session_destroy(session);
@@ -203,6 +282,7 @@ void session_destroy(struct session *session)
     if (session->connection)
         fl_connection_set_interrupt(session->connection, 0);
     close_all(session);
+    cli_watch_end(&session->watch);
     pthread_mutex_destroy(&session->lock);
     free(session);
 }

@@ -11,11 +11,17 @@ struct session;
 struct session_options {
     const char *server, *key_file, *link; /* as of fl_connect_options */
     const char *model, *environment;      /* that are loaded .. */
+    const struct fl_model *models;        /* several, as of fl_load_options */
+    size_t model_count;
+    int input_fd; /* likewise */
     double environment_degrees, point_size;
     const char *variant;
     const char *scene_name; /* .. or, not NULL, the scene to attach to */
+    bool watch;             /* the files are loaded again when they change: it becomes live anew */
     int interrupt_fd;
     void (*note)(void *user, const struct fl_note *note); /* of the first load; called from another thread */
+    /* Why changed files could not be loaded: the scene stays as it was. */
+    void (*stale)(void *user, const struct fl_error *error);
     void *user;
 };
 
@@ -30,8 +36,8 @@ enum session_state {
 struct session *session_create(const struct session_options *options, struct fl_error *error);
 /* Advances the current state; never waits for long. */
 enum session_state session_step(struct session *session, uint64_t now_ns);
-/* The number of times that it has become live: a new number means a new connection, on which nothing is shown
- * yet. */
+/* The number of times that it has become live: a new number means a new connection, or a new scene, of which
+ * nothing is shown yet. */
 unsigned session_times_live(const struct session *session);
 /* The current activity (valid until the next call) and its progress: 0 to 1, 0 also if it is not known. */
 const char *session_progress(struct session *session, double *share);

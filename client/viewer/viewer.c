@@ -53,10 +53,33 @@ static bool settle(struct viewer *viewer, struct fl_error *error)
     return true;
 }
 
+/* A model that was loaded again may have lost cameras and clips. */
+static void fit_tour(struct viewer *viewer)
+{
+    const struct fl_scene *scene = session_scene(viewer->session);
+    const size_t cameras = fl_scene_camera_count(scene), clips = fl_scene_clip_count(scene);
+    struct tour *tour = &viewer->tour;
+    if (tour->camera_count == cameras && tour->clip_count == clips)
+        return;
+    const double speed = tour->speed;
+    tour_begin(tour, cameras, clips);
+    tour->speed = speed;
+    viewer->followed = 0;
+}
+
+static void say_stale(void *user, const struct fl_error *error)
+{
+    char line[1200];
+    fl_error_print(error, line, sizeof(line));
+    viewer_say(user, "%s", line);
+    cli_report(error);
+}
+
 static void begin_showing(struct viewer *viewer)
 {
     if (viewer->times_live == 0 && !settle(viewer, &viewer->failure))
         return;
+    fit_tour(viewer);
     viewer->times_live = session_times_live(viewer->session);
     viewer_drop_tasks(viewer);
     viewer->metrics = (struct metrics){0}; /* another daemon has another clock */
@@ -164,6 +187,12 @@ static bool open_viewer(struct viewer *viewer, struct fl_error *error)
                                             .key_file = options->key_file,
                                             .link = options->link,
                                             .model = options->model,
+                                            .models = options->models,
+                                            .model_count = options->model_count,
+                                            .input_fd = options->input_fd,
+                                            .watch = options->watch,
+                                            .stale = say_stale,
+                                            .user = viewer,
                                             .environment = options->environment,
                                             .environment_degrees = options->environment_degrees,
                                             .variant = options->variant,

@@ -8,8 +8,12 @@
 
 struct viewer_options {
     const char *server, *key_file, *link, *model, *environment, *scene_name; /* as of session_options */
-    const char *variant;                                                     /* likewise */
-    double environment_degrees, point_size;                                  /* likewise */
+    const struct fl_model *models;
+    size_t model_count;
+    int input_fd;
+    bool watch;
+    const char *variant;                    /* likewise */
+    double environment_degrees, point_size; /* likewise */
     /* From the command line; width and height are the window's, in pixels of the desktop. */
     struct message_render view;      /* of one eye */
     bool stereo, stereo_over;        /* two views from the beginning; the left one above the other */

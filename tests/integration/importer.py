@@ -27,7 +27,7 @@ SET_SKIN, SET_CLIP, SET_CHANNEL = 0x0139, 0x013a, 0x013b
 TRANSLATION, ROTATION, SCALE, WEIGHTS, HIDDEN = 0, 1, 2, 3, 4
 STEP, LINEAR, CUBIC = 0, 1, 2
 IMPORT_NOTE, IMPORT_CLIP, IMPORT_PROGRESS, IMPORT_DONE, IMPORT_BOUNDS = 0x8301, 0x8302, 0x8303, 0x8304, 0x8305
-IMPORT_VARIANT = 0x8306
+IMPORT_VARIANT, IMPORT_FILE = 0x8306, 0x8307
 UPLOAD_CHANNEL = 1
 CHUNK = 1 << 20
 
@@ -110,7 +110,7 @@ def blob_hash(data):
 
 class Result:
     def __init__(self):
-        self.notes, self.clips, self.variants, self.edits = [], [], [], []
+        self.notes, self.clips, self.variants, self.files, self.edits = [], [], [], [], []
         self.blobs = {}
         self.committed = self.done = False
         self.faults = []
@@ -220,6 +220,9 @@ class Peer:
                                      name=fields.string()))
         elif kind == IMPORT_VARIANT:
             result.variants.append(Fields(payload).string())
+        elif kind == IMPORT_FILE:
+            fields = Fields(payload)
+            result.files.append((fields.take("I"), fields.string()))
         elif kind == BLOB_OFFER:
             self.on_offer(request, payload)
         elif kind == BLOB_DATA:

@@ -520,6 +520,31 @@ class Relay:
         self.cut()
 
 
+class Watching(Viewer):
+    def test_a_view_follows_the_file_of_its_model(self):
+        square, red = self.folder / "square.obj", "v -1 -1 0 1 0 0\nv 1 -1 0 1 0 0\nv 1 1 0 1 0 0\nf 1 2 3\n"
+        square.write_text(red)
+        looks = [event for _ in range(400) for event in ({"state": "look"}, {"screenshot": "look.png", "after": 0.25})]
+        process = self.start([rest(), *HIDE, *looks], square, "--watch", "--headless", scene=None)
+        self.addCleanup(process.communicate)
+        self.addCleanup(process.kill)
+        states = map(json.loads, process.stdout)
+        self.assertEqual(next(states)["times_live"], 1)
+        square.write_text("f 1 2 3\n")
+        self.assertIn("square.obj", process.stderr.readline())
+        self.assertEqual(next(states)["status"], "live", "what cannot be read leaves the view as it is")
+        square.write_text(red.replace("1 0 0", "0 1 0"))
+        while (state := next(states))["times_live"] < 2 or not self.is_green(self.folder / "look.png"):
+            self.assertNotEqual(state["status"], "failed")
+        process.send_signal(signal.SIGINT)
+        self.assertEqual(process.wait(), 130)
+
+    def is_green(self, path):
+        _, _, rows, channels = read_png(path)
+        red, green, *_ = rows[SIZE[1] * 6 // 10][SIZE[0] * 6 // 10 * channels:]
+        return green > red
+
+
 class OnADaemon(Viewer):
     def test_a_daemon_that_comes_back_shows_the_scene_again(self):
         events = [rest(), *drag(160, 90, 40, 10), rest(), {"state": "before"}, *HIDE, {"screenshot": "before.png"},

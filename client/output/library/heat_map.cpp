@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "heat_map.hpp"
+#include "caption.hpp"
 #include "picture.hpp"
 #include "protocol/common/srgb.h"
 
@@ -15,44 +16,13 @@ using OIIO::ImageBuf;
 using OIIO::ROI;
 namespace algo = OIIO::ImageBufAlgo;
 
-constexpr int gap = 4;          // pixels between pictures
-constexpr int font_pixels = 14; // height of titles
+constexpr int gap = 4; // pixels between pictures
 constexpr int title_pixels = 22;
 constexpr int title_width_min = 96;
 const float background[3] = {0.5f, 0.5f, 0.5f};
 const float ink[3] = {1, 1, 1};
-const char *const fonts[] = {"DejaVuSans", "LiberationSans-Regular", "NotoSans-Regular", "FreeSans"};
-
-// "" where none is installed.
-std::string find_font()
-{
-    for (const char *name : fonts)
-        if (algo::text_size("x", font_pixels, name).defined())
-            return name;
-    OIIO::geterror();
-    return "";
-}
-
-// The end of a title says most: that of a file's name is shown.
-std::string fit(const std::string &title, int width, const std::string &font)
-{
-    std::string fitting = title;
-    size_t cut = 0;
-    while (cut < title.size() && algo::text_size(fitting, font_pixels, font).width() > width) {
-        cut++;
-        while (cut < title.size() && (static_cast<unsigned char>(title[cut]) & 0xc0) == 0x80) // within a character
-            cut++;
-        fitting = ".." + title.substr(cut);
-    }
-    return fitting;
-}
 
 } // namespace
-
-void heat_map_prepare()
-{
-    find_font();
-}
 
 ImageBuf heat_map(const ImageBuf &errors, float top, const std::vector<bool> &marked)
 {
@@ -74,7 +44,7 @@ ImageBuf heat_map(const ImageBuf &errors, float top, const std::vector<bool> &ma
 ImageBuf side_by_side(const std::vector<const ImageBuf *> &pictures, const std::vector<std::string> &titles)
 {
     const int width = pictures[0]->spec().width, height = pictures[0]->spec().height;
-    const std::string font = width >= title_width_min ? find_font() : "";
+    const std::string font = width >= title_width_min ? caption_font() : "";
     const int top = font.empty() ? 0 : title_pixels;
     const int count = static_cast<int>(pictures.size());
     ImageBuf made = make_plane(count * width + (count - 1) * gap, height + top, 3);
@@ -85,9 +55,8 @@ ImageBuf side_by_side(const std::vector<const ImageBuf *> &pictures, const std::
         if (top == 0)
             continue;
         algo::fill(made, {0.1f, 0.1f, 0.1f}, ROI(left, left + width, 0, top));
-        algo::render_text(made, left + 4, title_pixels - 7, fit(titles[static_cast<size_t>(i)], width - 8, font),
-                          font_pixels, font, ink, algo::TextAlignX::Left, algo::TextAlignY::Baseline, 0,
-                          ROI(left, left + width, 0, top));
+        caption_draw(made, left + 4, title_pixels - 7, titles[static_cast<size_t>(i)], font, ink,
+                     ROI(left, left + width, 0, top));
     }
     return made;
 }

@@ -16,6 +16,3 @@ OIIO::ImageBuf heat_map(const OIIO::ImageBuf &errors, float top, const std::vect
 // are wide enough to read them.
 OIIO::ImageBuf side_by_side(const std::vector<const OIIO::ImageBuf *> &pictures,
                             const std::vector<std::string> &titles);
-
-// Opens what drawing text needs, while that is still allowed.
-void heat_map_prepare();

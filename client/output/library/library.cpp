@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "output/library.h"
+#include "caption.hpp"
 #include "compare.hpp"
-#include "heat_map.hpp"
 #include "protocol/version.h"
 
 #include <OpenImageIO/filesystem.h>
@@ -113,7 +113,7 @@ bool encode(const struct library_image *image, uint8_t **file, size_t *file_byte
     return true;
 }
 
-bool prepare(bool compares, char *reason, size_t reason_bytes)
+bool prepare(bool draws, char *reason, size_t reason_bytes)
 {
     const std::vector<unsigned char> pixels(4 * 4 * 4, 0);
     // One thread: the renderer has use for the others, and the sandbox need not allow more.
@@ -127,11 +127,11 @@ bool prepare(bool compares, char *reason, size_t reason_bytes)
             return false;
         std::free(file);
     }
-    if (compares)
-        heat_map_prepare();
+    if (draws)
+        caption_font();
     return true;
 }
 
 } // namespace
 
-const struct image_library image_library = {prepare, encode, compare_with_library};
+const struct image_library image_library = {prepare, encode, compare_with_library, caption_draw_into};

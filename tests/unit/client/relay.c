@@ -28,9 +28,9 @@ TEST(an_importer_may_send_blobs_edits_and_its_own_messages_only)
         MESSAGE_SET_MESH,   MESSAGE_SET_SPHERES, MESSAGE_SET_DISC,   MESSAGE_SET_MATERIAL,    MESSAGE_SET_TEXTURE,
         MESSAGE_SET_LIGHT,  MESSAGE_SET_CAMERA,  MESSAGE_REMOVE,     MESSAGE_SET_ENVIRONMENT, MESSAGE_SET_SKIN,
         MESSAGE_SET_CLIP,   MESSAGE_SET_CHANNEL};
-    static const enum message_type local[] = {MESSAGE_IMPORT_NOTE,     MESSAGE_IMPORT_BOUNDS,
-                                              MESSAGE_IMPORT_CLIP,     MESSAGE_IMPORT_VARIANT,
-                                              MESSAGE_IMPORT_PROGRESS, MESSAGE_IMPORT_DONE};
+    static const enum message_type local[] = {
+        MESSAGE_IMPORT_NOTE, MESSAGE_IMPORT_BOUNDS,   MESSAGE_IMPORT_CLIP, MESSAGE_IMPORT_VARIANT,
+        MESSAGE_IMPORT_FILE, MESSAGE_IMPORT_PROGRESS, MESSAGE_IMPORT_DONE};
     static const enum message_type all[] = {
 #define MESSAGE(NAME, name, number, from, doc) MESSAGE_##NAME,
 #include "protocol/messages.def"

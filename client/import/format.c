@@ -1,0 +1,164 @@
+/* SPDX-License-Identifier: MIT */
+#include "format.h"
+
+#include <ctype.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <string.h>
+#include <strings.h>
+
+#define HEAD_BYTES 65536u /* of a text that are looked at */
+
+static bool has_ending(const char *path, const char *ending)
+{
+    size_t path_length = strlen(path), length = strlen(ending);
+
+    return path_length > length && strcasecmp(path + path_length - length, ending) == 0;
+}
+
+static bool contains(const unsigned char *bytes, size_t size_bytes, const char *text)
+{
+    return memmem(bytes, size_bytes, text, strlen(text)) != NULL;
+}
+
+static bool begins(const unsigned char *bytes, size_t size_bytes, const char *text)
+{
+    return size_bytes >= strlen(text) && memcmp(bytes, text, strlen(text)) == 0;
+}
+
+struct format format_of_name(const char *name)
+{
+    struct format format = {.reader = FORMAT_UNKNOWN, .assimp = assimp_format_of(name)};
+
+    if (has_ending(name, ".gltf") || has_ending(name, ".glb"))
+        format.reader = FORMAT_GLTF;
+    else if (has_ending(name, ".obj"))
+        format.reader = FORMAT_OBJ;
+    else if (has_ending(name, ".nff"))
+        format.reader = FORMAT_NFF;
+    else if (has_ending(name, ".aff"))
+        format.reader = FORMAT_AFF;
+    else if (format.assimp)
+        format.reader = FORMAT_ASSIMP;
+    return format;
+}
+
+/* ---- by the bytes ---- */
+
+static uint32_t number_at(const unsigned char *bytes)
+{
+    return (uint32_t)bytes[0] | (uint32_t)bytes[1] << 8 | (uint32_t)bytes[2] << 16 | (uint32_t)bytes[3] << 24;
+}
+
+/* A header of 80 bytes, the number of facets, 50 bytes each. Many of them begin with "solid", too. */
+static bool is_binary_stl(const unsigned char *bytes, size_t size_bytes)
+{
+    return size_bytes > 84 && number_at(bytes + 80) > 0 && (size_bytes - 84) / 50 == number_at(bytes + 80) &&
+           (size_bytes - 84) % 50 == 0;
+}
+
+/* A word at the begin of a line, with a blank or the line's end behind it. */
+static bool has_statement(const unsigned char *bytes, size_t size_bytes, const char *word)
+{
+    const unsigned char *const end = bytes + size_bytes;
+    const size_t length = strlen(word);
+
+    for (const unsigned char *line = bytes; line && line < end;) {
+        if ((size_t)(end - line) > length && memcmp(line, word, length) == 0 && isspace(line[length]))
+            return true;
+        line = memchr(line, '\n', (size_t)(end - line));
+        line = line ? line + 1 : NULL;
+    }
+    return false;
+}
+
+/* The ending of a text's format; NULL: none is known. */
+static const char *ending_of_text(const unsigned char *bytes, size_t size_bytes)
+{
+    if (begins(bytes, size_bytes, "\xef\xbb\xbf")) { /* byte order mark */
+        bytes += 3;
+        size_bytes -= 3;
+    }
+    while (size_bytes > 0 && isspace(*bytes)) {
+        bytes++;
+        size_bytes--;
+    }
+    size_bytes = size_bytes < HEAD_BYTES ? size_bytes : HEAD_BYTES;
+    if (begins(bytes, size_bytes, "{"))
+        return ".gltf";
+    if (begins(bytes, size_bytes, "<"))
+        return contains(bytes, size_bytes, "<COLLADA") ? ".dae"
+               : contains(bytes, size_bytes, "<X3D")   ? ".x3d"
+                                                       : NULL;
+    if (begins(bytes, size_bytes, "solid"))
+        return ".stl";
+    if (begins(bytes, size_bytes, "; FBX"))
+        return ".fbx";
+    if (begins(bytes, size_bytes, "OFF") || begins(bytes, size_bytes, "COFF") || begins(bytes, size_bytes, "NOFF"))
+        return ".off";
+    if (has_statement(bytes, size_bytes, "from") && has_statement(bytes, size_bytes, "resolution"))
+        return ".nff";
+    return has_statement(bytes, size_bytes, "v") ? ".obj" : NULL;
+}
+
+static const char *ending_of(const unsigned char *bytes, size_t size_bytes)
+{
+    if (begins(bytes, size_bytes, "ply\n") || begins(bytes, size_bytes, "ply\r"))
+        return ".ply";
+    if (begins(bytes, size_bytes, "Kaydara FBX Binary"))
+        return ".fbx";
+    if (begins(bytes, size_bytes, "PK\3\4"))
+        return ".3mf";
+    if (begins(bytes, size_bytes, "AC3D"))
+        return ".ac";
+    if (size_bytes > 6 && begins(bytes, size_bytes, "MM") && number_at(bytes + 2) == size_bytes)
+        return ".3ds";
+    if (is_binary_stl(bytes, size_bytes))
+        return ".stl";
+    return ending_of_text(bytes, size_bytes);
+}
+
+struct format format_of(const char *name, const unsigned char *bytes, size_t size_bytes)
+{
+    struct format format = format_of_name(name);
+    const char *ending;
+    char model[16];
+
+    if (begins(bytes, size_bytes, "glTF"))
+        return (struct format){.reader = FORMAT_GLTF};
+    if (format.reader != FORMAT_UNKNOWN)
+        return format;
+    ending = ending_of(bytes, size_bytes);
+    if (!ending)
+        return format;
+    snprintf(model, sizeof(model), "model%s", ending);
+    return format_of_name(model);
+}
+
+/* JSON can write the letters of "images" as \u0069 and so on. */
+bool format_may_name_images(const struct format *format, const unsigned char *bytes, size_t size_bytes)
+{
+    switch (format->reader) {
+    case FORMAT_GLTF:
+        return contains(bytes, size_bytes, "images") || contains(bytes, size_bytes, "\\u00");
+    case FORMAT_AFF: /* what it includes may name some, too */
+        return contains(bytes, size_bytes, "texturecoords") || contains(bytes, size_bytes, "tt") ||
+               contains(bytes, size_bytes, ".aff") || contains(bytes, size_bytes, ".nff");
+    case FORMAT_ASSIMP:
+        return assimp_may_name_images(format->assimp, bytes, size_bytes);
+    case FORMAT_OBJ:
+        return contains(bytes, size_bytes, "mtllib");
+    default:
+        return false;
+    }
+}
+
+const char *format_endings(char out[256])
+{
+    size_t used = (size_t)snprintf(out, 256, ".gltf, .glb, .obj, .nff, .aff");
+
+    for (size_t i = 0; assimp_format_at(i) && used < 240; i++)
+        used += (size_t)snprintf(out + used, 256 - used, "%s%s", assimp_format_at(i + 1) ? ", " : " and ",
+                                 assimp_format_at(i)->ending);
+    return out;
+}
