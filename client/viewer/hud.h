@@ -34,7 +34,7 @@ struct hud {
     size_t count;
 };
 
-enum hud_status { HUD_LOADING, HUD_LIVE, HUD_LOST };
+enum hud_status { HUD_LOADING, HUD_LIVE, HUD_LOST, HUD_REFUSED };
 
 /* Views that are made here. */
 struct hud_local {

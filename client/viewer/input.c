@@ -40,7 +40,7 @@ const struct binding input_bindings[] = {
     {NULL, "=", ACTION_FINER, ACTION_FINER, NULL},
     {"L, Shift+L", "l", ACTION_LOCAL, ACTION_HOLES, "views made here: off, auto, on; mark holes"},
     {"X", "x", ACTION_ERROR_MAP, ACTION_ERROR_MAP, "errors against the reference, as heat"},
-    {"O", "o", ACTION_OVERLAY, ACTION_OVERLAY, "figures and timeline, figures alone, nothing"},
+    {"O, Shift+O", "o", ACTION_OVERLAY, ACTION_OVERLAY_BACK, "figures and timeline, figures, nothing, one line"},
     {"F1", "f1", ACTION_HELP, ACTION_HELP, "this list"},
     {"F11", "f11", ACTION_FULL_SCREEN, ACTION_FULL_SCREEN, "full screen"},
     {"F12", "f12", ACTION_SCREENSHOT, ACTION_SCREENSHOT, "write farlight-N.png"},

@@ -17,6 +17,7 @@ enum input_kind {
     INPUT_KEY_UP,
     INPUT_RESIZE,
     INPUT_FOCUS_LOST,
+    INPUT_DROP,
     INPUT_QUIT
 };
 
@@ -32,6 +33,7 @@ struct input {
     bool shift;        /* held */
     int width, height; /* of a window of another size, pixels */
     double scale;      /* pixels of the window per pixel of the desktop, for text */
+    const char *path;  /* of a file that is dropped on the window; until the next event */
 };
 
 /* What a key does at once. */
@@ -40,6 +42,7 @@ enum action {
     ACTION_QUIT,
     ACTION_HELP,
     ACTION_OVERLAY,
+    ACTION_OVERLAY_BACK,
     ACTION_FULL_SCREEN,
     ACTION_SCREENSHOT,
     ACTION_HOME,

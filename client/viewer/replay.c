@@ -135,6 +135,10 @@ static bool read_event(struct reader *reader, const json_t *json, struct replay 
         good = read_resize(reader, json, event);
     } else if (json_object_get(json, "wait")) {
         good = read_wait(reader, json, event);
+    } else if (json_object_get(json, "drop")) {
+        event->input.kind = INPUT_DROP;
+        event->input.path = event->path;
+        good = read_text(reader, json, "drop", event->path, sizeof(event->path));
     } else if (json_object_get(json, "screenshot")) {
         event->kind = REPLAY_SCREENSHOT;
         good = read_text(reader, json, "screenshot", event->path, sizeof(event->path));
@@ -146,7 +150,8 @@ static bool read_event(struct reader *reader, const json_t *json, struct replay 
         event->input.kind = INPUT_KEY_UP;
         good = true;
     } else {
-        return refuse(reader, NULL, "is not one of mouse, wheel, key, resize, wait, screenshot, state, after");
+        return refuse(reader, NULL,
+                      "is not one of mouse, wheel, key, resize, drop, wait, screenshot, state, after");
     }
     replay->count++;
     return good;

@@ -126,6 +126,8 @@ static void act(struct viewer *viewer, enum action action)
         return;
     }
     viewer->must_show |= change == SETTINGS_VIEW;
+    if (change == SETTINGS_VIEW)
+        viewer->refused[0] = '\0'; /* it may be possible now */
     viewer->must_draw = true;
     viewer->has_heat = viewer->has_heat && viewer->settings.error_map;
     if (action == ACTION_QUIT && viewer->settings.help)
@@ -155,6 +157,9 @@ void viewer_input(struct viewer *viewer, const struct input *input)
         viewer->scale = input->scale;
         viewer->must_draw = true;
         return;
+    case INPUT_DROP:
+        viewer_open(viewer, input->path);
+        return;
     case INPUT_KEY_DOWN:
         act(viewer, input_action(input));
         break;
@@ -180,7 +185,8 @@ void viewer_input(struct viewer *viewer, const struct input *input)
 
 static bool has_come(const struct viewer *viewer, const struct replay_event *event)
 {
-    const bool is_live = viewer->times_live > 0 && viewer->times_live == session_times_live(viewer->session);
+    const bool is_live =
+        !viewer->next && viewer->times_live > 0 && viewer->times_live == session_times_live(viewer->session);
     switch (event->kind) {
     case REPLAY_REST:
         return is_live && viewer_is_at_rest(viewer, event->samples) && viewer->task == TASK_NONE &&

@@ -182,7 +182,7 @@ static void take(struct viewer *viewer, struct fl_frame *frame)
 static void refuse(struct viewer *viewer, const struct fl_error *refusal)
 {
     if (viewer->frames == 0) {
-        viewer->failure = *refusal;
+        viewer_refuse_scene(viewer, refusal);
         return;
     }
     viewer_say(viewer, "not possible: %s", refusal->text);

@@ -24,13 +24,18 @@ struct viewer {
     const struct viewer_options *options;
     struct message_render view; /* of one eye: from the options, completed by the scene */
     struct session *session;
-    unsigned times_live;   /* of the session, as of when its view was started */
-    struct window *window; /* NULL: headless */
+    unsigned times_live;        /* of the session, as of when its view was started */
+    char *model;                /* that was dropped, and is shown; NULL: that of the options */
+    struct session *next;       /* that of a dropped model, until it is there; NULL: there is none */
+    char *next_model;           /* its path */
+    char refused[HUD_TEXT_MAX]; /* why a dropped model is not shown, though it is there; empty: it is */
+    struct window *window;      /* NULL: headless */
     int width, height;
     double scale;
     bool quit;
 
     struct settings settings, taken; /* `taken`: with which frames came */
+    struct settings first;           /* as they were at first */
     struct tour tour;
     struct controls controls;
     double pointer_x, pointer_y;
@@ -99,6 +104,18 @@ struct viewer {
 #define HEAT_TOP 0.25 /* a quarter of white is the brightest colour of the error map */
 
 __attribute__((format(printf, 2, 3))) void viewer_say(struct viewer *viewer, const char *format, ...);
+
+/* ---- viewer_open.c ---- */
+
+/* Of a dropped model, whose path must live as long, or NULL: of the command line's. */
+struct session *viewer_open_session(struct viewer *viewer, const char *dropped, struct fl_error *error);
+const char *viewer_scene_name(const struct viewer *viewer);
+/* Begins to open a model in place of the one that is shown. */
+void viewer_open(struct viewer *viewer, const char *path);
+/* It is there, and its first picture is not possible: a dropped one says so and waits for other settings. */
+void viewer_refuse_scene(struct viewer *viewer, const struct fl_error *refusal);
+void viewer_step_opening(struct viewer *viewer, uint64_t now_ns);
+void viewer_abandon_opening(struct viewer *viewer);
 
 /* ---- viewer_show.c ---- */
 

@@ -251,7 +251,7 @@ static void refuse(struct viewer *viewer, enum viewer_task task, const struct fl
     if (task == TASK_REFERENCE)
         viewer->heat_refused = true;
     if (task == TASK_HOME && !viewer->has_camera)
-        viewer->failure = *refusal;
+        viewer_refuse_scene(viewer, refusal);
 }
 
 /* ---- which one ---- */
@@ -270,7 +270,7 @@ static enum viewer_task next_task(struct viewer *viewer)
         return wanted;
     if (viewer->task != TASK_NONE)
         return TASK_NONE;
-    if (!viewer->has_home)
+    if (!viewer->has_home && viewer->refused[0] == '\0')
         return TASK_HOME;
     if (viewer->settings.error_map && !viewer->has_heat && !viewer->heat_refused &&
         viewer_is_at_rest(viewer, COMPARED_SAMPLES))

@@ -201,7 +201,7 @@ static struct hud hud;
 
 static struct hud_state some_state(double width, double height)
 {
-    settings = (struct settings){0};
+    settings = (struct settings){.overlay = OVERLAY_ALL};
     tour = (struct tour){.camera = TOUR_NONE, .clip = TOUR_NONE, .speed = 1};
     return (struct hud_state){.width = width,
                               .height = height,
@@ -322,6 +322,36 @@ TEST(a_small_window_shows_less)
         hud_layout(&hud, &shown, measure, NULL);
         assert_true(tells("ldc_resolution"));
     }
+}
+
+TEST(it_begins_with_one_line_and_the_rest_is_a_key_away)
+{
+    for (uint32_t i = 0; i < 20; i++)
+        add(i, i + 1, (1000 + i * 40) * MS);
+    struct hud_state shown = some_state(1280, 720);
+    settings = (struct settings){0};
+    hud_layout(&hud, &shown, measure, NULL);
+    check_within(&shown);
+    assert_true(tells("20 fps") && tells("teapot.glb") && tells("bvh, whitted") && tells("3 of 16 samples") &&
+                tells("F1"));
+    assert_false(tells("input to picture") || tells("trace"));
+    for (size_t i = 1; i < hud.count; i++) /* behind its panel */
+        assert_true(hud.marks[i].y >= hud.marks[0].y && hud.marks[i].y + hud.marks[i].height < 50);
+    shown.local.shown = true; /* what is seen then are views that are made here: none yet */
+    hud_layout(&hud, &shown, measure, NULL);
+    assert_true(tells("0 fps") && !tells("20 fps"));
+    shown = some_state(200, 100); /* what does not fit is left out */
+    settings = (struct settings){0};
+    shown.notice = "a notice that is longer than the window is wide";
+    hud_layout(&hud, &shown, measure, NULL);
+    check_within(&shown);
+    assert_true(tells("20 fps") && tells("teapot.glb") && !tells("F1") && tells("a notice"));
+    settings_act(&settings, ACTION_OVERLAY);
+    shown = (struct hud_state){0};
+    assert_int_equal(settings.overlay, OVERLAY_ALL);
+    settings_act(&settings, ACTION_OVERLAY_BACK);
+    settings_act(&settings, ACTION_OVERLAY_BACK);
+    assert_int_equal(settings.overlay, OVERLAY_NONE);
 }
 
 TEST(what_is_not_wanted_is_not_drawn_but_a_loss_is)

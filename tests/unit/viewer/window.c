@@ -46,7 +46,8 @@ static struct hud_state some_state(void)
 
 static struct window *open_window(void)
 {
-    struct window *window = window_create("test", WIDTH, HEIGHT, &error);
+    struct window *window =
+        window_create("test", &(struct window_place){.width = WIDTH, .height = HEIGHT}, &error);
     struct input input;
     if (!window)
         fail_msg("%s", error.text);
@@ -153,6 +154,35 @@ TEST(a_window_tells_its_size_and_shows_something)
     const struct pixmap none = {0};
     window_show(window, &none, &shown);
     window_destroy(window);
+}
+
+TEST(a_file_that_is_dropped_comes_with_its_path)
+{
+    struct window *window = open_window();
+    SDL_Event event;
+    for (int i = 0; i < 2; i++) { /* the second is remembered in place of the first */
+        SDL_zero(event);
+        event.type = SDL_DROPFILE;
+        event.drop.file = SDL_strdup(i == 0 ? "/tmp/a b.glb" : "/tmp/c.glb");
+        SDL_PushEvent(&event);
+        const struct input input = next(window);
+        assert_int_equal(input.kind, INPUT_DROP);
+        assert_string_equal(input.path, i == 0 ? "/tmp/a b.glb" : "/tmp/c.glb");
+    }
+    window_destroy(window);
+}
+
+TEST(a_window_is_where_it_was_if_a_display_is_there)
+{
+    struct window_place place = {.width = WIDTH, .height = HEIGHT, .has_place = true, .x = 30, .y = 40}, now = {0};
+    for (int i = 0; i < 2; i++) {
+        struct window *window = window_create("test", &place, &error);
+        assert_non_null(window);
+        assert_true(window_get_place(window, &now) && now.width == WIDTH && now.height == HEIGHT);
+        assert_int_equal(now.x == 30 && now.y == 40, i == 0);
+        window_destroy(window);
+        place.x = place.y = 30000;
+    }
 }
 
 static uint8_t value_at(const struct pixmap *made, int x, int y, int channel)
