@@ -82,6 +82,7 @@ SERVER_SRC := $(filter-out server/trace/reference/%,$(SERVER_SRC))
 endif
 LIB_SRC := $(call sources,client/lib,c)
 WARP_SRC := $(call sources,client/warp,c)
+EDIT_SRC := $(call sources,client/edit,c)
 CLI_SRC := $(call sources,client/cli,c)
 IMPORT_C := $(call sources,client/import,c)
 # Modules of the helper programs need hundreds of libraries, and are loaded only when they are used.
@@ -117,7 +118,7 @@ PIXELS_OBJ := $(call obj,$(PIXELS_SRC))
 COMMON_OBJ := $(call obj,$(COMMON_SRC))
 SERVER_OBJ := $(call obj,$(SERVER_SRC)) $(B)/shader_sources.o $(SEALED_OBJ) $(PIXELS_OBJ) $(COMMON_OBJ)
 WARP_OBJ := $(call obj,$(WARP_SRC))
-LIB_OBJ := $(call obj,$(LIB_SRC)) $(WARP_OBJ) $(SEALED_OBJ) $(PIXELS_OBJ) $(COMMON_OBJ)
+LIB_OBJ := $(call obj,$(LIB_SRC) $(EDIT_SRC)) $(WARP_OBJ) $(SEALED_OBJ) $(PIXELS_OBJ) $(COMMON_OBJ)
 CLI_OBJ := $(call obj,$(CLI_SRC))
 # What the helper programs share is linked to each of them, as an archive: each takes what it needs.
 HELPER_OBJ := $(call obj,$(call sources,client/helper,c))
@@ -131,7 +132,7 @@ VIEWER_OBJ := $(call obj,$(VIEWER_C) $(addprefix client/cli/,image_path.c interr
 
 # The library for others' programs: position-independent, only what farlight.h declares is visible.
 SONAME := libfarlight.so.$(firstword $(subst ., ,$(VERSION)))
-LIB_PIC := $(patsubst %.c,$(B)/pic/%.o,$(LIB_SRC) $(WARP_SRC) $(PROTOCOL_SRC) $(SEALED_SRC) $(PIXELS_SRC) $(COMMON_SRC))
+LIB_PIC := $(patsubst %.c,$(B)/pic/%.o,$(LIB_SRC) $(EDIT_SRC) $(WARP_SRC) $(PROTOCOL_SRC) $(SEALED_SRC) $(PIXELS_SRC) $(COMMON_SRC))
 
 MODULES := $(B)/farlight-textures.so $(B)/farlight-assimp.so $(B)/farlight-images.so
 PROGRAMS := $(B)/farlightd $(B)/farlight $(B)/farlight-import $(B)/farlight-export $(B)/farlight-video $(B)/farlight-view

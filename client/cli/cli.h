@@ -29,6 +29,7 @@ int cli_compare_tracers(int argc, char **argv); /* where cli_compare finds --tra
 int cli_compare_views(int argc, char **argv);   /* likewise --stereo and what else is made of depth layers */
 int cli_serve(int argc, char **argv);
 int cli_scenes(int argc, char **argv);
+int cli_edit(int argc, char **argv);
 int cli_stats(int argc, char **argv);
 int cli_ping(int argc, char **argv);
 int cli_bridge(int argc, char **argv);
@@ -176,6 +177,7 @@ struct cli_clip {
     unsigned line; /* of the script; 0: the command line */
 };
 #define CLI_CLIPS_MAX 15 /* the protocol's, and one of our own */
+#define CLI_EDITS_MAX 64
 
 /* Several views in a picture, as typed. */
 struct cli_views {
@@ -212,6 +214,8 @@ struct cli_job {
     const struct fl_json *script_json;
     struct cli_clip clips[CLI_CLIPS_MAX];
     size_t clip_count;
+    const char *edits[CLI_EDITS_MAX]; /* assignments, of a model's scene */
+    size_t edit_count;
     struct cli_channel *channels; /* the script's */
     size_t channel_count;
     struct record_clip_use clip_uses[CLI_CLIPS_MAX + 1];

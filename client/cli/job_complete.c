@@ -302,6 +302,10 @@ static bool complete_scene(struct cli_job *job)
         return job->model || cli_usage(job, "MODEL", "no model file is named") == 0;
     if (job->model)
         return cli_usage(job, "--scene", "cannot go with the model %s: it is one or the other", job->model) == 0;
+    if (job->edit_count > 0) {
+        cli_usage(job, "--edit", "cannot go with --scene: it would change the scene of all its clients");
+        return fl_error_remedy(&job->error, "'farlight edit' does that");
+    }
     if (job->environment)
         return cli_usage(job, "--environment", "cannot go with --scene: that has its light already") == 0;
     if (job->server)

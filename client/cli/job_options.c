@@ -4,7 +4,6 @@
 #include "cli/job_fields.h"
 #include "lib/link.h"
 #include "lib/text.h"
-#include "protocol/common/srgb.h"
 
 #include <ctype.h>
 #include <errno.h>
@@ -29,6 +28,7 @@ enum key {
     KEY_ENVIRONMENT,
     KEY_ENVIRONMENT_ROTATION,
     KEY_VARIANT,
+    KEY_EDIT,
     KEY_POINT_SIZE,
     KEY_BACKGROUND,
     KEY_DENOISE,
@@ -86,6 +86,9 @@ static const struct argp_option special[] = {
     {"environment-rotation", KEY_ENVIRONMENT_ROTATION, "DEGREES", 0,
      "Turn it about +y by -360 to 360 (default 0: its middle column is +x)", CLI_GROUP_OUTPUT},
     {"variant", KEY_VARIANT, "NAME", 0, "Materials of this variant of a glTF model ('farlight info' lists them)",
+     CLI_GROUP_OUTPUT},
+    {"edit", KEY_EDIT, "ASSIGNMENT", 0,
+     "Change the model, as in material.Steel.roughness=0.2 or hide=Roof; may be repeated ('farlight help edit')",
      CLI_GROUP_OUTPUT},
     {"point-size", KEY_POINT_SIZE, "METRES", 0,
      "Show points without faces as spheres of this diameter (default: by their distances)", CLI_GROUP_OUTPUT},
@@ -188,6 +191,16 @@ static error_t set_real(struct cli_job *job, const char *field, const char *valu
     return fl_text_real(value, minimum, maximum, number, &job->error) ? 0 : name_field(job, field);
 }
 
+/* Read here, so that what is wrong is known early; meant by the scene, which is not there yet. */
+static error_t add_edit(struct cli_job *job, const char *field, const char *value)
+{
+    struct fl_assignment assignment;
+    if (job->edit_count == CLI_EDITS_MAX)
+        return cli_usage(job, field, "more than %d assignments cannot be given", CLI_EDITS_MAX);
+    job->edits[job->edit_count++] = value;
+    return fl_assignment_parse(value, &assignment, &job->error) ? 0 : EINVAL;
+}
+
 static error_t set_fov(struct cli_job *job, const char *field, const char *value)
 {
     double degrees = 0;
@@ -215,24 +228,11 @@ static error_t set_view(struct cli_job *job, const char *field, const char *valu
     return cli_usage(job, field, "'%s' is not known (known: front, back, left, right, top, bottom, iso)", value);
 }
 
-/* "#rrggbb", as displays have it. */
-static bool parse_colour(const char *value, float linear[3])
-{
-    unsigned codes[3];
-    int length = 0;
-    if (sscanf(value, "#%2x%2x%2x%n", &codes[0], &codes[1], &codes[2], &length) != 3 || length != 7 ||
-        value[length] != '\0' || strspn(value + 1, "0123456789abcdefABCDEF") != 6)
-        return false;
-    for (int c = 0; c < 3; c++)
-        linear[c] = linear_from_srgb_f((float)codes[c] / 255.0f);
-    return true;
-}
-
 error_t cli_set_background(struct cli_job *job, const char *field, const char *value)
 {
     struct message_render *options = &job->options;
     float colour[3];
-    if (parse_colour(value, colour)) {
+    if (fl_text_colour(value, colour, NULL)) {
         options->background = PROTOCOL_BACKGROUND_COLOUR;
         options->background_red = colour[0];
         options->background_green = colour[1];
@@ -311,6 +311,8 @@ static error_t set_option(struct cli_job *job, int key, const char *field, const
     case KEY_VARIANT:
         job->variant = value;
         return 0;
+    case KEY_EDIT:
+        return add_edit(job, field, value);
     case KEY_POINT_SIZE:
         return set_real(job, field, value, 1e-6, 1e6, &job->point_size);
     case KEY_BACKGROUND:
@@ -515,7 +517,7 @@ const struct argp *cli_view_argp(void)
     static const char *const left_out[] = {"output",      "format",   "half",       "float",   "samples",
                                            "integrator",  "timings",  "trace-file", "layers",  "clip-once",
                                            "clip-start",  "encoding", "retry-for",  "retries", "metadata",
-                                           "light-field", "baseline", "views",      NULL};
+                                           "light-field", "baseline", "views",      "edit",    NULL};
     static struct argp_option kept[OPTIONS_MAX];
     static const struct argp argp = {.options = kept, .parser = parse};
     keep(kept, left_out);

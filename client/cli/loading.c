@@ -63,6 +63,16 @@ bool cli_loading_begin(struct cli_loading *loading, struct fl_error *error)
     return connect_to(loading, error);
 }
 
+/* Makes the job's edits in a scene that has just been loaded. */
+static bool apply_edits(const struct cli_job *job, struct fl_scene *scene, struct fl_error *error)
+{
+    struct fl_assignment assignments[CLI_EDITS_MAX];
+    for (size_t i = 0; i < job->edit_count; i++)
+        if (!fl_assignment_parse(job->edits[i], &assignments[i], error))
+            return false;
+    return job->edit_count == 0 || fl_scene_edit(scene, assignments, job->edit_count, NULL, error);
+}
+
 bool cli_loading_end(struct cli_loading *loading, struct fl_error *error)
 {
     if (loading->job->scene) {
@@ -76,7 +86,7 @@ bool cli_loading_end(struct cli_loading *loading, struct fl_error *error)
         fprintf(stderr, "farlight: %u more warnings ('farlight info' lists them)\n",
                 loading->warnings - NOTES_SHOWN);
     }
-    return loading->scene != NULL;
+    return loading->scene && apply_edits(loading->job, loading->scene, error);
 }
 
 void cli_loading_close(struct cli_loading *loading)

@@ -21,6 +21,7 @@ static const struct subcommand {
     {"tracers", "farlight tracers", cli_tracers, "list the tracers and their settings"},
     {"serve", "farlight serve", cli_serve, "share a model for other clients"},
     {"scenes", "farlight scenes", cli_scenes, "list the scenes of a daemon to which clients may attach"},
+    {"edit", "farlight edit", cli_edit, "change materials, nodes and lights of a shared scene"},
     {"stats", "farlight stats", cli_stats, "show a daemon's clients, scenes, memory and times"},
     {"ping", "farlight ping", cli_ping, "measure the round-trip time to a daemon"},
     {"key", "farlight key", cli_key, "create a key for sealed connections"},

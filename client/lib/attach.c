@@ -2,22 +2,12 @@
 /* Existing scenes: listed, attached to, described; and their notifications. */
 #include "lib/scene.h"
 #include "lib/text.h"
-#include "protocol/common/clock.h"
 
 #include <stdio.h>
 #include <stdlib.h>
 #include <sys/random.h>
 
-#define ANSWER_NS 30000000000ull
 #define NEW_IDS_FROM 0x80000000u
-
-static bool ask(struct fl_connection *connection, const struct message *question, enum message_type expected,
-                struct fl_received *received, struct fl_error *error)
-{
-    const uint32_t request = fl_connection_next_request(connection);
-    return fl_connection_send(connection, request, 0, question, error) &&
-           fl_connection_answer(connection, request, expected, received, monotonic_now_ns() + ANSWER_NS, error);
-}
 
 /* ---- the list ---- */
 
@@ -28,7 +18,7 @@ bool fl_scene_list(struct fl_connection *connection, struct fl_scene_entry **lis
     struct fl_received received;
     *list = NULL;
     *count = 0;
-    if (!ask(connection, &question, MESSAGE_SCENE_LIST_REPLY, &received, error))
+    if (!fl_connection_ask(connection, &question, MESSAGE_SCENE_LIST_REPLY, &received, error))
         return false;
     const struct message_scene_list_reply *reply = &received.message.scene_list_reply;
     struct fl_scene_entry *entries = calloc(reply->scenes_count + 1u, sizeof(*entries));
@@ -59,7 +49,7 @@ static bool describe(struct fl_scene *scene, struct fl_received *received, struc
 {
     struct message question = {.type = MESSAGE_SCENE_DESCRIBE};
     question.scene_describe.scene = scene->scene;
-    if (!ask(scene->connection, &question, MESSAGE_SCENE_DESCRIPTION, received, error))
+    if (!fl_connection_ask(scene->connection, &question, MESSAGE_SCENE_DESCRIPTION, received, error))
         return false;
     note_revision(scene, received->message.scene_description.revision);
     return true;
@@ -115,7 +105,7 @@ static bool come_to(struct fl_scene *scene, const char *name, struct fl_error *e
     fl_text_utf8(name, short_name, sizeof(short_name));
     question.scene_attach.scene = scene->scene;
     question.scene_attach.name = short_name;
-    if (!ask(scene->connection, &question, MESSAGE_OK, &received, error))
+    if (!fl_connection_ask(scene->connection, &question, MESSAGE_OK, &received, error))
         return false;
     note_revision(scene, received.message.ok.revision);
     scene->attached = true;

@@ -152,15 +152,9 @@ void fl_catalogue_finish(struct fl_catalogue *catalogue)
 
 /* ---- finding ---- */
 
-/* Lists the names, as far as they fit: "it has 3 clips: 'Run', 'Survey', 'Walk'". */
-struct listing {
-    char text[sizeof((struct fl_error *)0)->remedy];
-    size_t used, listed;
-};
-
-static void begin_listing(struct listing *listing, size_t count, const char *what)
+void fl_listing_begin(struct fl_listing *listing, size_t count, const char *what)
 {
-    *listing = (struct listing){.used = 0};
+    *listing = (struct fl_listing){.used = 0};
     if (count == 0)
         listing->used = (size_t)snprintf(listing->text, sizeof(listing->text), "it has no %s at all", what);
     else
@@ -168,7 +162,7 @@ static void begin_listing(struct listing *listing, size_t count, const char *wha
                                          count == 1 ? "" : "s");
 }
 
-static void list_name(struct listing *listing, const char *name)
+void fl_listing_add(struct fl_listing *listing, const char *name)
 {
     const size_t room = sizeof(listing->text) - sizeof ", .." - listing->used;
     char entry[160];
@@ -183,6 +177,11 @@ static void list_name(struct listing *listing, const char *name)
     memcpy(listing->text + listing->used, entry, (size_t)length + 1);
     listing->used += (size_t)length;
     listing->listed++;
+}
+
+bool fl_listing_is_full(const struct fl_listing *listing)
+{
+    return listing->used >= sizeof(listing->text);
 }
 
 static const char *entry_name(const struct fl_catalogue *catalogue, enum fl_catalogue_list list, size_t i)
@@ -205,10 +204,10 @@ static bool find_name(const struct fl_catalogue *catalogue, enum fl_catalogue_li
 static bool unknown_object(const struct fl_catalogue *catalogue, enum fl_catalogue_list list, const char *what,
                            const char *which, struct fl_error *error)
 {
-    struct listing listing;
-    begin_listing(&listing, catalogue->lists[list].count, what);
-    for (size_t i = 0; i < catalogue->lists[list].count && listing.used < sizeof(listing.text); i++)
-        list_name(&listing, entry_name(catalogue, list, i));
+    struct fl_listing listing;
+    fl_listing_begin(&listing, catalogue->lists[list].count, what);
+    for (size_t i = 0; i < catalogue->lists[list].count && !fl_listing_is_full(&listing); i++)
+        fl_listing_add(&listing, entry_name(catalogue, list, i));
     fl_error_set(error, FL_ERROR_ARGUMENT, what, "the model has no %s '%s'", what, which);
     if (catalogue->lists[list].left_out > 0)
         return fl_error_remedy(error, "only its first %zu %ss can be named", catalogue->lists[list].count, what);
@@ -260,10 +259,10 @@ bool fl_catalogue_find_clip(const struct fl_catalogue *catalogue, const char *wh
 {
     const struct fl_clip_info *found = search_clip(catalogue, which);
     if (!found) {
-        struct listing listing;
-        begin_listing(&listing, catalogue->clip_count, "clip");
-        for (size_t i = 0; i < catalogue->clip_count && listing.used < sizeof(listing.text); i++)
-            list_name(&listing, catalogue->clips[i].name);
+        struct fl_listing listing;
+        fl_listing_begin(&listing, catalogue->clip_count, "clip");
+        for (size_t i = 0; i < catalogue->clip_count && !fl_listing_is_full(&listing); i++)
+            fl_listing_add(&listing, catalogue->clips[i].name);
         fl_error_set(error, FL_ERROR_ARGUMENT, "--clip", "the model has no clip '%s'", which);
         return fl_error_remedy(error, "%s", listing.text);
     }

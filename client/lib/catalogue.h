@@ -47,6 +47,15 @@ bool fl_catalogue_light_has_size(const struct fl_catalogue *catalogue, uint32_t 
 /* As fl_scene_new_id(). */
 uint32_t fl_catalogue_new_id(struct fl_catalogue *catalogue, enum protocol_object_kind kind);
 
+/* Lists names, as far as they fit: "it has 3 clips: 'Run', 'Survey', 'Walk'". */
+struct fl_listing {
+    char text[sizeof((struct fl_error *)0)->remedy];
+    size_t used, listed;
+};
+void fl_listing_begin(struct fl_listing *listing, size_t count, const char *what);
+void fl_listing_add(struct fl_listing *listing, const char *name);
+bool fl_listing_is_full(const struct fl_listing *listing);
+
 /* Grows *items to hold one more than `count`; at most 16 M. */
 bool fl_grow(void **items, size_t *capacity, size_t count, size_t item_bytes, struct fl_error *error);
 

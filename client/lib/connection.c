@@ -289,7 +289,7 @@ static bool shake_hands(struct fl_connection *connection, const char *name, uint
     struct fl_stream *stream = &connection->stream;
     struct handshake_hello hello = {.version_min = HANDSHAKE_VERSION_MIN, .version_max = HANDSHAKE_VERSION_MAX};
     hello.capabilities = HANDSHAKE_CAN_ABANDON | HANDSHAKE_CAN_CHOOSE_PRIMARY | HANDSHAKE_CAN_SEND_PARTS |
-                         HANDSHAKE_CAN_MARK_STICKING;
+                         HANDSHAKE_CAN_MARK_STICKING | HANDSHAKE_CAN_READ_OBJECTS;
     hello.capabilities |= connection->can_h264 ? HANDSHAKE_CAN_H264 : 0;
     snprintf(hello.name, sizeof(hello.name), "%s", name);
     if (getrandom(hello.nonce, sizeof(hello.nonce), 0) != (ssize_t)sizeof(hello.nonce))
@@ -330,6 +330,7 @@ static bool shake_hands(struct fl_connection *connection, const char *name, uint
             connection->read_only = (reply.capabilities & HANDSHAKE_CAN_READ_ONLY) != 0;
             connection->can_choose_primary = (reply.capabilities & HANDSHAKE_CAN_CHOOSE_PRIMARY) != 0;
             connection->can_mark_sticking = (reply.capabilities & HANDSHAKE_CAN_MARK_STICKING) != 0;
+            connection->can_read_objects = (reply.capabilities & HANDSHAKE_CAN_READ_OBJECTS) != 0;
             connection->can_h264 = connection->can_h264 && (reply.capabilities & HANDSHAKE_CAN_H264) != 0;
             return true;
         }

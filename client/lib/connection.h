@@ -35,6 +35,7 @@ struct fl_connection {
     bool can_h264;                    /* this client and the daemon */
     bool can_choose_primary;          /* likewise */
     bool can_mark_sticking;           /* likewise */
+    bool can_read_objects;            /* likewise */
     struct fl_error broken;           /* why the connection is broken; code NONE: it works */
     struct message_stats_reply stats; /* the last answer */
     uint64_t start_ns;
@@ -89,6 +90,9 @@ bool fl_connection_wait_upload(struct fl_connection *connection, uint32_t reques
 /* The answer to `request`; other messages are dropped. An ERROR is FL_ERROR_REFUSED. */
 bool fl_connection_answer(struct fl_connection *connection, uint32_t request, enum message_type expected,
                           struct fl_received *received, uint64_t deadline_ns, struct fl_error *error);
+/* Sends a question of one message and waits for its answer, for half a minute. */
+bool fl_connection_ask(struct fl_connection *connection, const struct message *question,
+                       enum message_type expected, struct fl_received *received, struct fl_error *error);
 /* After this time a client sends something, as the daemon disconnects silent clients; and it notices if the daemon
  * is gone. */
 uint64_t fl_connection_silence_ns(const struct fl_connection *connection);

@@ -259,6 +259,108 @@ struct fl_channel {
 FL_API bool fl_scene_add_clip(struct fl_scene *scene, const char *name, const struct fl_channel *channels,
                               size_t channel_count, uint32_t *clip, struct fl_error *error);
 
+/* ---- objects and their fields: what a scene has, whoever made it ---- */
+
+struct fl_object {
+    uint32_t id;
+    uint32_t parent, shows; /* of a node: the one above it, 0: none; the identifier of what it shows .. */
+    enum protocol_node_kind shows_kind; /* .. and its kind */
+    char name[129];
+};
+/* The objects of a kind as the daemon has them now, ascending by id; *objects is malloc'ed. */
+FL_API bool fl_scene_objects(struct fl_scene *scene, enum protocol_object_kind kind, struct fl_object **objects,
+                             size_t *count, struct fl_error *error);
+/* One of them by its identifier, such as a picture's layer `id` has of nodes and materials. */
+FL_API bool fl_scene_object(struct fl_scene *scene, enum protocol_object_kind kind, uint32_t id,
+                            struct fl_object *object, struct fl_error *error);
+
+/* The identifiers of the objects that are meant, at least one; *ids is malloc'ed. `which` is a name, a number or
+ * "#" and an identifier, as of fl_assignment. FL_ERROR_ARGUMENT, field empty: there is none; the remedy has a name
+ * that is near, or all as far as they fit. */
+FL_API bool fl_scene_find_objects(struct fl_scene *scene, enum protocol_object_kind kind, const char *which,
+                                  uint32_t **ids, size_t *count, struct fl_error *error);
+
+#define FL_FIELDS_MAX 64u       /* of one kind of object */
+#define FL_FIELD_VALUES_MAX 12u /* of one field */
+
+enum fl_field_form {
+    FL_FIELD_NUMBERS,
+    FL_FIELD_COLOUR, /* red, green, blue, linear; with a fourth value alpha */
+    FL_FIELD_FLAG,   /* 0 or 1 */
+    FL_FIELD_WORD,   /* the number of a word: fl_field_word */
+};
+
+/* A field that can be edited, of nodes, materials, lights or cameras. Angles are degrees. */
+struct fl_field {
+    char name[48]; /* "roughness" */
+    enum fl_field_form form;
+    unsigned count;         /* values */
+    double min, max;        /* of each */
+    const char *unit, *doc; /* static; may be empty */
+    unsigned source;        /* this and what follows: for the library */
+    double scale;
+    const struct field_desc *wire;
+};
+/* Those of a kind of object, in the order for people; at most FL_FIELDS_MAX. Returns how many there are: 0 of
+ * other kinds. */
+FL_API size_t fl_fields(enum protocol_object_kind kind, struct fl_field fields[FL_FIELDS_MAX]);
+/* "blend"; NULL: there is no word of that number. */
+FL_API const char *fl_field_word(const struct fl_field *field, unsigned number);
+
+struct fl_field_value {
+    struct fl_field field;
+    double values[FL_FIELD_VALUES_MAX];
+};
+/* An object as it is, whatever clips do to it: the fields that it has, such as of a light those of its kind. */
+struct fl_object_state {
+    enum protocol_object_kind kind;
+    uint32_t id;
+    char name[129];
+    uint64_t revision; /* of the scene, when it was read */
+    size_t count;
+    struct fl_field_value fields[FL_FIELDS_MAX];
+};
+FL_API bool fl_scene_read(struct fl_scene *scene, enum protocol_object_kind kind, uint32_t id,
+                          struct fl_object_state *state, struct fl_error *error);
+
+/* ---- edits ---- */
+
+enum fl_assignment_way { FL_ASSIGN, FL_ASSIGN_SUM, FL_ASSIGN_PRODUCT };
+
+/* A field of an object gets a value. */
+struct fl_assignment {
+    enum protocol_object_kind kind; /* node, material, light or camera */
+    uint32_t id;                    /* 0: `which` says which objects */
+    /* A name, or a number counted from 0 by ascending identifiers; a name has precedence over a number, and the
+     * first of several with one name counts. A light or a camera is known by the nodes that show it, too. "*"
+     * stands for any characters, and then all that match are meant. "#7" is the object with identifier 7. */
+    char which[129];
+    char field[48];
+    enum fl_assignment_way way;
+    unsigned count; /* 1 of several values stands for all; 3 of a colour leave its alpha */
+    double values[FL_FIELD_VALUES_MAX];
+};
+/* Reads "material.Steel.roughness=0.2", "light.Sun.intensity*=2", "node.Door.rotate+=0,30,0",
+ * "material.#7.base_colour=#ff8000", "hide=Roof" or "show=Roof". FL_ERROR_ARGUMENT names the
+ * assignment. */
+FL_API bool fl_assignment_parse(const char *text, struct fl_assignment *assignment, struct fl_error *error);
+/* As fl_assignment_parse() reads it; values keep their floats. Cut off where it does not fit. Returns text. */
+FL_API const char *fl_assignment_print(const struct fl_assignment *assignment, char *text, size_t text_bytes);
+
+struct fl_edited {
+    uint64_t revision; /* that has the change; the one before if nothing changed */
+    size_t objects;    /* changed */
+    /* What brings the changed fields back, in any order, and leaves other fields to whoever changes them
+     * meanwhile. malloc'ed, to be freed in any case. */
+    struct fl_assignment *undo;
+    size_t undo_count;
+};
+/* Applies all assignments, in order, or none, in one transaction. Fields that others change meanwhile stay as they
+ * are: the daemon refuses an edit of an object that has changed since it was read, and it is made anew. A clip
+ * that plays has precedence over an edit of what it moves. *edited may be NULL. */
+FL_API bool fl_scene_edit(struct fl_scene *scene, const struct fl_assignment *assignments, size_t count,
+                          struct fl_edited *edited, struct fl_error *error);
+
 /* The contents of a model file, without a daemon. */
 struct fl_model_note {
     enum protocol_severity severity;

@@ -6,6 +6,14 @@
 #define ANSWER_NS 30000000000ull
 #define SILENCE_NS 30000000000ull
 
+bool fl_connection_ask(struct fl_connection *connection, const struct message *question,
+                       enum message_type expected, struct fl_received *received, struct fl_error *error)
+{
+    const uint32_t request = fl_connection_next_request(connection);
+    return fl_connection_send(connection, request, 0, question, error) &&
+           fl_connection_answer(connection, request, expected, received, monotonic_now_ns() + ANSWER_NS, error);
+}
+
 bool fl_ping(struct fl_connection *connection, uint64_t *round_trip_ns, struct fl_error *error)
 {
     struct message ping = {.type = MESSAGE_PING};
@@ -24,10 +32,7 @@ bool fl_stats(struct fl_connection *connection, const struct message_stats_reply
 {
     const struct message ask = {.type = MESSAGE_STATS};
     struct fl_received received;
-    const uint32_t request = fl_connection_next_request(connection);
-    if (!fl_connection_send(connection, request, 0, &ask, error) ||
-        !fl_connection_answer(connection, request, MESSAGE_STATS_REPLY, &received, monotonic_now_ns() + ANSWER_NS,
-                              error))
+    if (!fl_connection_ask(connection, &ask, MESSAGE_STATS_REPLY, &received, error))
         return false;
     connection->stats =
         received.message.stats_reply; /* its strings and arrays stay in the stream's scratch buffer */

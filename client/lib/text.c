@@ -9,6 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "protocol/common/srgb.h"
 #include "protocol/plain_text.h"
 
 #define EDGE_MAX 8192  /* the protocol's maximum of a picture */
@@ -130,6 +131,17 @@ bool fl_text_vector(const char *text, float vector[3], struct fl_error *error)
         at += length + 1;
     }
     memcpy(vector, read, sizeof(read));
+    return true;
+}
+
+bool fl_text_colour(const char *text, float linear[3], struct fl_error *error)
+{
+    unsigned codes[3];
+    if (strlen(text) != 7 || strspn(text + 1, "0123456789abcdefABCDEF") != 6 ||
+        sscanf(text, "#%2x%2x%2x", &codes[0], &codes[1], &codes[2]) != 3)
+        return fl_error_set(error, FL_ERROR_ARGUMENT, "", "'%s' is not a colour as #ffffff", text);
+    for (int c = 0; c < 3; c++)
+        linear[c] = linear_from_srgb_f((float)codes[c] / 255.0f);
     return true;
 }
 

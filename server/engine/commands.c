@@ -89,6 +89,12 @@ static void commit_here(struct engine *engine, const struct engine_reference *re
 static bool commit(struct engine *engine, const struct engine_reference *reference, struct engine_command *command)
 {
     struct engine_scene *scene = reference->scene;
+    struct error conflict = {0};
+    if (command->base_revision && !scene_edits_are_current(scene->scene, command->edits, command->edit_count,
+                                                           command->base_revision, &conflict)) {
+        fail(engine, command, &conflict);
+        return false;
+    }
     limit_tables(engine, scene);
     bool here = scene_commit_is_short(scene->scene, command->edits, command->edit_count);
     struct aside_commit *commit = here ? NULL : calloc(1, sizeof(*commit));
@@ -206,6 +212,8 @@ static const char *scene_field(enum engine_command_kind kind)
     return kind == ENGINE_JOB_START        ? "render.scene"
            : kind == ENGINE_SCENE_CLOSE    ? "scene_close.scene"
            : kind == ENGINE_SCENE_DESCRIBE ? "scene_describe.scene"
+           : kind == ENGINE_OBJECTS_LIST   ? "scene_objects.scene"
+           : kind == ENGINE_OBJECT_READ    ? "object_get.scene"
                                            : "edit_begin.scene";
 }
 
@@ -233,6 +241,10 @@ static void handle_of_scene(struct engine *engine, struct engine_command *comman
             return;
     } else if (command->kind == ENGINE_SCENE_DESCRIBE) {
         engine_scene_describe(engine, scene, command);
+    } else if (command->kind == ENGINE_OBJECTS_LIST) {
+        engine_objects_list(engine, scene, command);
+    } else if (command->kind == ENGINE_OBJECT_READ) {
+        engine_object_read(engine, scene, command);
     } else {
         start(engine, reference, command);
     }
@@ -335,6 +347,8 @@ void engine_handle(struct engine *engine, struct engine_command *command)
     switch (command->kind) {
     case ENGINE_SCENE_CLOSE:
     case ENGINE_SCENE_DESCRIBE:
+    case ENGINE_OBJECTS_LIST:
+    case ENGINE_OBJECT_READ:
     case ENGINE_COMMIT:
     case ENGINE_JOB_START:
         handle_of_scene(engine, command);

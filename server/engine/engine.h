@@ -121,6 +121,8 @@ enum engine_command_kind {
     ENGINE_SCENE_CLOSE,  /* the jobs that the client has on it fail with ERROR_CANCELLED just before the answer */
     ENGINE_SCENE_LIST,   /* answered by ENGINE_SCENES_LISTED */
     ENGINE_SCENE_DESCRIBE, /* answered by ENGINE_SCENE_DESCRIBED */
+    ENGINE_OBJECTS_LIST,   /* answered by ENGINE_OBJECTS_LISTED */
+    ENGINE_OBJECT_READ,    /* answered by ENGINE_OBJECT_IS */
     ENGINE_SCENES_TRIM,    /* ends scenes without a holder until blobs of trim_bytes are unused; no answer */
     ENGINE_COMMIT,         /* waits for the scene's frames in progress, and so do later commands for that scene */
     /* Answered by ENGINE_DONE after the last frame, or by ENGINE_FAILED, before which come the frames that were
@@ -141,7 +143,7 @@ struct engine_command {
     uint64_t client;
     uint32_t request;
     uint32_t scene;
-    char name[SCENE_NAME_MAX + 1]; /* scene_open, scene_attach */
+    char name[SCENE_NAME_MAX + 1]; /* scene_open, scene_attach, objects_list */
     enum sharing sharing;          /* scene_open */
     uint64_t kept_revision;        /* scene_open: the next transaction has this revision, and the keeper has it; 0:
                                       the scene is new */
@@ -151,6 +153,10 @@ struct engine_command {
     uint64_t trim_bytes; /* scenes_trim */
     struct scene_edit *edits; /* commit; malloc'ed array */
     size_t edit_count;
+    uint64_t base_revision;       /* commit: above 0: see scene_edits_are_current() */
+    enum object_kind object_kind; /* objects_list, object_read */
+    uint32_t object;              /* objects_list: 0: all; object_read */
+    uint32_t list_from;           /* objects_list: 0, or engine_object_list.next */
     struct engine_job job;
     uint32_t target_request; /* job_cancel, job_credit: the job's request */
     uint64_t credit;
@@ -210,6 +216,22 @@ struct engine_scene_description {
     struct engine_clip_entry clips[ENGINE_DESCRIPTION_MAX];
 };
 
+#define ENGINE_OBJECTS_MAX 256 /* of one answer */
+
+struct engine_object_entry {
+    uint32_t object;
+    uint32_t parent, shows; /* of a node */
+    enum node_kind shows_kind;
+    char name[SCENE_NAME_MAX + 1];
+};
+struct engine_object_list {
+    uint64_t revision;
+    uint32_t total; /* objects of the kind in the scene */
+    uint32_t next;  /* 0: there are no more */
+    uint32_t count;
+    struct engine_object_entry objects[ENGINE_OBJECTS_MAX];
+};
+
 enum engine_event_kind {
     ENGINE_DONE,
     ENGINE_FAILED,
@@ -217,6 +239,8 @@ enum engine_event_kind {
     ENGINE_STATS_READY,
     ENGINE_SCENES_LISTED,
     ENGINE_SCENE_DESCRIBED,
+    ENGINE_OBJECTS_LISTED,
+    ENGINE_OBJECT_IS,     /* at `revision` */
     ENGINE_SCENE_CHANGED, /* by another client; `scene` is the client's number for it */
     ENGINE_SCENE_ENDED,   /* a scene without a holder: blobs may be unused now. Client 0 */
     ENGINE_CLIENT_FORGOTTEN,
@@ -261,7 +285,7 @@ struct engine_event {
     enum engine_event_kind kind;
     uint64_t client;
     uint32_t request;
-    uint64_t revision;  /* done, for a commit or an attach; scene_changed */
+    uint64_t revision;  /* done, for a commit or an attach; scene_changed; object_is */
     uint32_t scene;     /* scene_changed */
     bool answers_stats; /* of `owner`, whatever the answer is */
     uint64_t owner;
@@ -270,6 +294,8 @@ struct engine_event {
     struct engine_stats *stats;
     struct engine_scene_list *list;
     struct engine_scene_description *description;
+    struct engine_object_list *objects;
+    struct scene_edit *object;
     struct job_output *output; /* private to job/ */
 };
 void engine_event_destroy(struct engine_event *event); /* accepts NULL */

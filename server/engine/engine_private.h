@@ -245,6 +245,13 @@ void engine_count_contents(struct engine_scene *scene);
 void engine_scene_list(struct engine *engine, const struct engine_command *command);
 void engine_scene_describe(struct engine *engine, struct engine_scene *scene,
                            const struct engine_command *command);
+
+/* objects.c: objects of a scene by name, and one as it is. */
+
+void engine_objects_list(struct engine *engine, const struct engine_scene *from,
+                         const struct engine_command *command);
+void engine_object_read(struct engine *engine, const struct engine_scene *from,
+                        const struct engine_command *command);
 /* Whether the owner may attach to it. */
 bool engine_scene_is_open_to(const struct engine_scene *scene, uint64_t principal);
 

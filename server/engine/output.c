@@ -227,6 +227,10 @@ void engine_event_destroy(struct engine_event *event)
     free(event->stats);
     free(event->list);
     free(event->description);
+    free(event->objects);
+    if (event->object)
+        scene_edit_finish(event->object);
+    free(event->object);
     job_output_unref(event->output);
     free(event);
 }

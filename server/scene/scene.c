@@ -6,6 +6,7 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 struct scene *scene_create(const char *name, const struct scene_limits *limits)
 {
@@ -91,4 +92,57 @@ const struct scene_skin *scene_skin(const struct scene *scene, uint32_t id)
 const struct scene_clip *scene_clip(const struct scene *scene, uint32_t id)
 {
     return hashmap_get(&scene->objects[OBJECT_CLIP], id);
+}
+
+/* ---- edits that change what is there ------------------------------------------------------------ */
+
+bool scene_read_object(const struct scene *scene, enum object_kind kind, uint32_t id, struct scene_edit *edit,
+                       struct error *error)
+{
+    const void *object = (unsigned)kind < OBJECT_COUNT ? hashmap_get(&scene->objects[kind], id) : NULL;
+    *edit = (struct scene_edit){.kind = EDIT_SET, .object = kind};
+    if (kind != OBJECT_NODE && kind != OBJECT_MATERIAL && kind != OBJECT_LIGHT && kind != OBJECT_CAMERA)
+        return error_set(error, ERROR_UNSUPPORTED, "object_get.kind",
+                         "%s objects cannot be read; nodes, materials, lights and cameras can",
+                         object_kind_name(kind));
+    if (!object)
+        return error_set(error, ERROR_UNKNOWN_ID, "object_get.object", "there is no %s %u", object_kind_name(kind),
+                         id);
+    memcpy(&edit->set, object, object_struct_bytes(kind));
+    struct scene_node *node = kind == OBJECT_NODE ? &edit->set.node : NULL;
+    if (!node || !node->weights)
+        return true;
+    const float *weights = node->weights;
+    node->weights = malloc(node->weight_count * sizeof(*weights));
+    if (!node->weights)
+        return error_set(error, ERROR_OUT_OF_MEMORY, "object_get", "no memory for an answer");
+    memcpy(node->weights, weights, node->weight_count * sizeof(*weights));
+    return true;
+}
+
+/* 0: it is not there. */
+static uint64_t revision_of(const struct scene *scene, const struct scene_edit *edit)
+{
+    if (edit->kind == EDIT_SET_ENVIRONMENT)
+        return scene->environment.revision;
+    const struct scene_object *object = hashmap_get(&scene->objects[edit->object], edit_object_id(edit));
+    return object ? object->revision : 0;
+}
+
+bool scene_edits_are_current(const struct scene *scene, const struct scene_edit *edits, size_t edit_count,
+                             uint64_t base_revision, struct error *error)
+{
+    for (size_t i = 0; i < edit_count; i++) {
+        const struct edit_place place = {.index = i, .edit = &edits[i], .error = error};
+        const uint64_t revision = revision_of(scene, &edits[i]);
+        if (!revision && edits[i].kind != EDIT_SET_ENVIRONMENT)
+            return edit_error(&place, ERROR_CONFLICT, "", "it is not there any more");
+        if (revision > base_revision) {
+            edit_error(&place, ERROR_CONFLICT, "", "it has been changed since revision %llu",
+                       (unsigned long long)base_revision);
+            error->retryable = true;
+            return error_remedy(error, "read it again, and change what is there now");
+        }
+    }
+    return true;
 }

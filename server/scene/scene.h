@@ -242,6 +242,10 @@ bool scene_commit(struct scene *scene, struct scene_edit *edits, size_t edit_cou
 /* The same; ends soon with ERROR_CANCELLED and an unchanged scene if another thread sets *abandoned in time. */
 bool scene_commit_unless(struct scene *scene, struct scene_edit *edits, size_t edit_count,
                          const atomic_bool *abandoned, struct error *error);
+/* Whether all that the edits set or remove is there and has not been changed after a revision; false: *error, of
+ * kind ERROR_CONFLICT, names the first that is not or has. */
+bool scene_edits_are_current(const struct scene *scene, const struct scene_edit *edits, size_t edit_count,
+                             uint64_t base_revision, struct error *error);
 /* Whether a transaction takes no longer than a slice of a frame, whatever is in it. */
 bool scene_commit_is_short(const struct scene *scene, const struct scene_edit *edits, size_t edit_count);
 /* What the tables of a scene may grow by. */
@@ -261,6 +265,11 @@ const struct scene_light *scene_light(const struct scene *scene, uint32_t id);
 const struct scene_camera *scene_camera(const struct scene *scene, uint32_t id);
 const struct scene_skin *scene_skin(const struct scene *scene, uint32_t id);
 const struct scene_clip *scene_clip(const struct scene *scene, uint32_t id);
+
+/* The edit that would make a node, material, light or camera as it is; it is the caller's to finish. False and
+ * *error: there is no such object, it is of another kind, or no memory. */
+bool scene_read_object(const struct scene *scene, enum object_kind kind, uint32_t id, struct scene_edit *edit,
+                       struct error *error);
 
 struct scene_pose; /* scene/pose.h */
 

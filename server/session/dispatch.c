@@ -96,6 +96,20 @@ static void on_scene_describe(struct session *session, struct request *request,
     scenes_describe(session, request, &message->scene_describe);
 }
 
+static void on_scene_objects(struct session *session, struct request *request, const struct framing_header *header,
+                             const struct message *message)
+{
+    (void)header;
+    scenes_list_objects(session, request, &message->scene_objects);
+}
+
+static void on_object_get(struct session *session, struct request *request, const struct framing_header *header,
+                          const struct message *message)
+{
+    (void)header;
+    scenes_get_object(session, request, &message->object_get);
+}
+
 /* ---- blobs and edits --------------------------------------------------------------------------------- */
 
 static void on_blob_offer(struct session *session, struct request *request, const struct framing_header *header,
@@ -169,6 +183,8 @@ static const struct dispatch_row rows[] = {
     {MESSAGE_SCENE_ATTACH, DISPATCH_STARTS, REQUEST_SCENE_ATTACH, on_scene_attach},
     {MESSAGE_SCENE_LIST, DISPATCH_STARTS, REQUEST_SCENE_LIST, on_scene_list},
     {MESSAGE_SCENE_DESCRIBE, DISPATCH_STARTS, REQUEST_SCENE_DESCRIBE, on_scene_describe},
+    {MESSAGE_SCENE_OBJECTS, DISPATCH_STARTS, REQUEST_SCENE_OBJECTS, on_scene_objects},
+    {MESSAGE_OBJECT_GET, DISPATCH_STARTS, REQUEST_OBJECT_GET, on_object_get},
     {MESSAGE_BLOB_OFFER, DISPATCH_STARTS, REQUEST_OFFER, on_blob_offer},
     {MESSAGE_BLOB_DATA, DISPATCH_ANY, REQUEST_UPLOAD, on_blob_data},
     {MESSAGE_EDIT_BEGIN, DISPATCH_STARTS, REQUEST_TRANSACTION, on_edit_begin},

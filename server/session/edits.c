@@ -26,7 +26,7 @@ void edits_begin(struct session *session, struct request *request, const struct 
     else if (!transaction)
         error_set(&error, ERROR_OUT_OF_MEMORY, "edit_begin", "no memory");
     else
-        transaction->scene = begin->scene;
+        *transaction = (struct transaction){.scene = begin->scene, .base_revision = begin->base_revision};
     request->object = transaction;
     if (error.kind != ERROR_NONE)
         edits_fail(session, request, &error);
@@ -142,6 +142,7 @@ void edits_commit(struct session *session, struct request *request)
     command = hub_command(ENGINE_COMMIT, session->number, request->id);
     if (command) {
         command->scene = transaction->scene;
+        command->base_revision = transaction->base_revision;
         command->edits = transaction->edits;
         command->edit_count = transaction->count;
         /* They are counted until the engine has answered: it may keep them for as long as a frame takes. */

@@ -9,6 +9,7 @@
 
 struct transaction {
     uint32_t scene;
+    uint64_t base_revision; /* as of edit_begin */
     struct scene_edit *edits;
     size_t count, capacity;
     uint64_t bytes; /* of the edits and their memory, without blobs */

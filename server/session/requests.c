@@ -150,6 +150,8 @@ void request_cancel(struct session *session, struct request *cancel, uint32_t ta
     case REQUEST_SCENE_ATTACH:
     case REQUEST_SCENE_LIST:
     case REQUEST_SCENE_DESCRIBE:
+    case REQUEST_SCENE_OBJECTS:
+    case REQUEST_OBJECT_GET:
     case REQUEST_OFFER:
     case REQUEST_COMMIT:
     case REQUEST_CANCEL:

@@ -18,6 +18,8 @@ enum request_kind {
     REQUEST_SCENE_ATTACH,
     REQUEST_SCENE_LIST,
     REQUEST_SCENE_DESCRIBE,
+    REQUEST_SCENE_OBJECTS,
+    REQUEST_OBJECT_GET,
     REQUEST_OFFER,
     REQUEST_UPLOAD,      /* object: struct offer */
     REQUEST_TRANSACTION, /* object: struct transaction; the client still adds to it */

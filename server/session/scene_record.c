@@ -14,6 +14,9 @@
 
 struct sink {
     struct store_record *record;
+    /* Instead of the record, for a single object; NULL: there is a record. */
+    void (*take)(void *context, const struct message *message);
+    void *context;
     size_t capacity_bytes, blob_capacity;
     const atomic_bool *abandoned;
     size_t objects;
@@ -47,6 +50,10 @@ static bool grow(struct sink *sink, void **array, size_t *capacity, size_t neede
 
 static void put(struct sink *sink, const struct message *message)
 {
+    if (sink->take && !sink->failed)
+        sink->take(sink->context, message);
+    if (sink->take)
+        return;
     struct store_record *record = sink->record;
     void *content = record->content;
     size_t message_bytes = message_write_bytes(message);
@@ -366,6 +373,16 @@ static void put_objects(struct sink *sink, enum object_kind kind, const struct h
             fail(sink);
         put_object(sink, kind, object);
     }
+}
+
+bool scene_record_object(const struct scene_edit *object,
+                         void (*take)(void *context, const struct message *message), void *context)
+{
+    struct sink sink = {.take = take, .context = context};
+    put_object(&sink, object->object, &object->set);
+    free(sink.ranges);
+    free(sink.weights);
+    return !sink.failed;
 }
 
 bool scene_record_write(struct store_record *record, const struct scene *scene, enum sharing sharing,

@@ -15,6 +15,11 @@
 bool scene_record_write(struct store_record *record, const struct scene *scene, enum sharing sharing,
                         const atomic_bool *abandoned);
 
+/* Hands the message that would make the object of an edit (of kind set, without blobs) to take(). False: out of
+ * memory. */
+bool scene_record_object(const struct scene_edit *object,
+                         void (*take)(void *context, const struct message *message), void *context);
+
 /* What scene_record_read() finds. */
 struct scene_record {
     uint64_t revision;

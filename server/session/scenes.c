@@ -2,6 +2,7 @@
 #include "session/scenes.h"
 
 #include "protocol/codec.h"
+#include "session/scene_record.h"
 #include "session/session.h"
 
 #include <stdio.h>
@@ -168,6 +169,35 @@ void scenes_describe(struct session *session, struct request *request,
         submit(session, request, ENGINE_SCENE_DESCRIBE, describe->scene, "", SHARING_PRIVATE);
 }
 
+void scenes_list_objects(struct session *session, struct request *request,
+                         const struct message_scene_objects *objects)
+{
+    if (!is_there(session, request, objects->scene, "scene_objects.scene"))
+        return;
+    struct engine_command *command = hub_command(ENGINE_OBJECTS_LIST, session->number, request->id);
+    if (command) {
+        command->scene = objects->scene;
+        command->object_kind = (enum object_kind)objects->kind;
+        command->object = objects->object;
+        command->list_from = objects->from;
+        snprintf(command->name, sizeof(command->name), "%s", objects->name);
+    }
+    session_submit(session, request, command);
+}
+
+void scenes_get_object(struct session *session, struct request *request, const struct message_object_get *get)
+{
+    if (!is_there(session, request, get->scene, "object_get.scene"))
+        return;
+    struct engine_command *command = hub_command(ENGINE_OBJECT_READ, session->number, request->id);
+    if (command) {
+        command->scene = get->scene;
+        command->object_kind = (enum object_kind)get->kind;
+        command->object = get->object;
+    }
+    session_submit(session, request, command);
+}
+
 static void answer(struct session *session, struct request *request, const struct message *message)
 {
     struct error error = {0};
@@ -236,6 +266,51 @@ void scenes_described(struct session *session, struct request *request,
             told->cameras_count--;
     }
     answer(session, request, &message);
+}
+
+void scenes_objects_listed(struct session *session, struct request *request, const struct engine_object_list *list)
+{
+    struct record_object_entry entries[ENGINE_OBJECTS_MAX];
+    struct message message;
+    message_init(&message, MESSAGE_SCENE_OBJECTS_REPLY);
+    message.scene_objects_reply.revision = list->revision;
+    message.scene_objects_reply.total = list->total;
+    message.scene_objects_reply.next = list->next;
+    message.scene_objects_reply.objects = entries;
+    message.scene_objects_reply.objects_count = list->count;
+    for (uint32_t i = 0; i < list->count; i++) {
+        const struct engine_object_entry *from = &list->objects[i];
+        entries[i] = (struct record_object_entry){.object = from->object,
+                                                  .parent = from->parent,
+                                                  .shows_kind = (enum protocol_node_kind)from->shows_kind,
+                                                  .shows = from->shows,
+                                                  .name = from->name};
+    }
+    answer(session, request, &message);
+}
+
+struct told_object {
+    struct session *session;
+    uint32_t request;
+    bool sent;
+};
+
+static void tell_object(void *context, const struct message *message)
+{
+    struct told_object *told = context;
+    told->sent = session_send(told->session, told->request, 0, message);
+}
+
+void scenes_object_is(struct session *session, struct request *request, const struct engine_event *event)
+{
+    struct told_object told = {.session = session, .request = request->id};
+    if (scene_record_object(event->object, tell_object, &told) && told.sent) {
+        request_answer_ok(session, request, event->revision);
+        return;
+    }
+    struct error error = {0};
+    error_set(&error, ERROR_INTERNAL, NULL, "the object cannot be sent");
+    request_answer_error(session, request, &error);
 }
 
 /* ---- changes ----------------------------------------------------------------------------------------- */

@@ -16,6 +16,10 @@ void scenes_list(struct session *session, struct request *request);
 void scenes_describe(struct session *session, struct request *request,
                      const struct message_scene_describe *describe);
 
+void scenes_list_objects(struct session *session, struct request *request,
+                         const struct message_scene_objects *objects);
+void scenes_get_object(struct session *session, struct request *request, const struct message_object_get *get);
+
 /* State of a scene, 0: it does not exist. */
 enum session_scene_state session_scene(const struct session *session, uint32_t scene);
 /* As it was opened or attached to; empty: there is none. */
@@ -27,6 +31,9 @@ void scenes_closed(struct session *session, struct request *request);
 void scenes_listed(struct session *session, struct request *request, const struct engine_scene_list *list);
 void scenes_described(struct session *session, struct request *request,
                       const struct engine_scene_description *description);
+void scenes_objects_listed(struct session *session, struct request *request,
+                           const struct engine_object_list *list);
+void scenes_object_is(struct session *session, struct request *request, const struct engine_event *event);
 /* A request of this kind failed: its scene is removed. `submitted`: the engine refused it; otherwise the engine
  * was not asked, and an open scene stays open. Sends no answer. */
 void scenes_failed(struct session *session, const struct request *request, bool submitted);

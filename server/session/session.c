@@ -125,6 +125,8 @@ static void on_done(struct session *session, struct request *request, const stru
     case REQUEST_STATS:
     case REQUEST_SCENE_LIST:
     case REQUEST_SCENE_DESCRIBE:
+    case REQUEST_SCENE_OBJECTS:
+    case REQUEST_OBJECT_GET:
         return; /* the engine has not seen these */
     }
 }
@@ -182,6 +184,14 @@ void session_engine_event(struct session *session, struct engine_event *event)
     case ENGINE_SCENE_DESCRIBED:
         if (request->kind == REQUEST_SCENE_DESCRIBE && event->description)
             scenes_described(session, request, event->description);
+        return;
+    case ENGINE_OBJECTS_LISTED:
+        if (request->kind == REQUEST_SCENE_OBJECTS && event->objects)
+            scenes_objects_listed(session, request, event->objects);
+        return;
+    case ENGINE_OBJECT_IS:
+        if (request->kind == REQUEST_OBJECT_GET && event->object)
+            scenes_object_is(session, request, event);
         return;
     case ENGINE_SCENE_CHANGED:
     case ENGINE_SCENE_ENDED:
@@ -368,8 +378,8 @@ static bool on_hello(void *context, const struct handshake_hello *hello, struct 
     if (session->can_abandon)
         reply->capabilities |= HANDSHAKE_CAN_ABANDON;
     session->can_send_parts = hello->capabilities & HANDSHAKE_CAN_SEND_PARTS;
-    reply->capabilities |= hello->capabilities &
-                           (HANDSHAKE_CAN_CHOOSE_PRIMARY | HANDSHAKE_CAN_SEND_PARTS | HANDSHAKE_CAN_MARK_STICKING);
+    reply->capabilities |= hello->capabilities & (HANDSHAKE_CAN_CHOOSE_PRIMARY | HANDSHAKE_CAN_SEND_PARTS |
+                                                  HANDSHAKE_CAN_MARK_STICKING | HANDSHAKE_CAN_READ_OBJECTS);
     fill_limits(&reply->limits, session);
     snprintf(session->name, sizeof(session->name), "%s", hello->name);
     return reply->text[0] == '\0';

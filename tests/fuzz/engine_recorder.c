@@ -206,6 +206,28 @@ static void describe(const struct engine_command *command, const struct scene *s
     say(ENGINE_SCENE_DESCRIBED, command->client, command->request)->description = made;
 }
 
+static void list_objects(const struct engine_command *command, const struct scene *scene)
+{
+    struct engine_object_list *made = calloc(1, sizeof(*made));
+    FUZZ_REQUIRE(made);
+    made->revision = scene->revision;
+    made->count = made->total = 2;
+    made->next = command->list_from < 2 ? command->list_from + 1 : 0;
+    for (uint32_t i = 0; i < 2; i++)
+        made->objects[i] = (struct engine_object_entry){.object = i + 1, .name = "an object"};
+    say(ENGINE_OBJECTS_LISTED, command->client, command->request)->objects = made;
+}
+
+static void read_object(const struct engine_command *command, const struct scene *scene)
+{
+    struct engine_event *event = say(ENGINE_OBJECT_IS, command->client, command->request);
+    event->revision = scene->revision;
+    event->object = calloc(1, sizeof(*event->object));
+    FUZZ_REQUIRE(event->object);
+    if (!scene_read_object(scene, command->object_kind, command->object, event->object, &event->error))
+        event->kind = ENGINE_FAILED;
+}
+
 /* ---- frames ----------------------------------------------------------------------------------------- */
 
 static void say_frame(struct recorded_job *job, uint32_t samples, const struct view_camera *camera)
@@ -378,6 +400,12 @@ static void carry_out_on(struct engine_command *command, struct recorded_referen
         return;
     case ENGINE_SCENE_DESCRIBE:
         describe(command, reference->scene->scene);
+        return;
+    case ENGINE_OBJECTS_LIST:
+        list_objects(command, reference->scene->scene);
+        return;
+    case ENGINE_OBJECT_READ:
+        read_object(command, reference->scene->scene);
         return;
     case ENGINE_COMMIT:
         commit(command, reference);

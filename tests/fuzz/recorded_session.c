@@ -224,6 +224,12 @@ void recorded_onlooker(recorded_say_fn *say, void *context)
     end(&talk, 2);
     begin(&talk, MESSAGE_SCENE_DESCRIBE)->scene_describe.scene = 1;
     end(&talk, 3);
+    begin(&talk, MESSAGE_SCENE_OBJECTS)->scene_objects.scene = 1;
+    end(&talk, 8);
+    message = begin(&talk, MESSAGE_OBJECT_GET);
+    message->object_get.scene = 1;
+    message->object_get.kind = PROTOCOL_OBJECT_MATERIAL;
+    end(&talk, 9);
     begin_render(&talk, PROTOCOL_JOB_VIEW)->adapt = 1;
     end(&talk, 4);
     look(&talk, 7, true);

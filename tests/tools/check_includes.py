@@ -50,6 +50,7 @@ MAY_INCLUDE = {
     "server": (BASE, GPU, "server/check", "server/store", "server/engine", "server/session"),
     "client/warp": ("shaders/quadtree",),  # no protocol, GL, window or socket
     "client/lib": ("protocol", "protocol/sealed", "protocol/common", "protocol/pixels", "client/warp"),
+    "client/edit": ("protocol", "protocol/common", "client/lib"),  # a part of the library
     "client/helper": ("protocol",),
     "client/import": ("protocol", "protocol/common", "client/helper"),
     "client/output": ("protocol", "client/helper"),

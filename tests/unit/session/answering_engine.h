@@ -83,6 +83,8 @@ static inline bool submit(void *context, struct engine_command *command, struct 
     case ENGINE_SCENE_CLOSE:
     case ENGINE_SCENE_LIST:
     case ENGINE_SCENE_DESCRIBE:
+    case ENGINE_OBJECTS_LIST:
+    case ENGINE_OBJECT_READ:
     case ENGINE_SCENES_TRIM:
         event(ENGINE_DONE, command, command->request);
         break;

@@ -176,6 +176,151 @@ TEST(many_changes_reach_a_slow_reader_as_one)
     cut(other, NULL);
 }
 
+/* ---- reading and changing what others made ------------------------------------------------------------ */
+
+static void get_object(struct client *client, uint32_t request, uint32_t scene, enum protocol_object_kind kind,
+                       uint32_t object)
+{
+    struct message message = made(MESSAGE_OBJECT_GET);
+    message.object_get.scene = scene;
+    message.object_get.kind = kind;
+    message.object_get.object = object;
+    send_message(client, request, 0, &message);
+}
+
+/* Sets a material's roughness if it is as it was at that revision. */
+static void submit_material(struct client *client, uint32_t request, uint64_t base_revision, float roughness)
+{
+    struct message message = made(MESSAGE_EDIT_BEGIN);
+    message.edit_begin.scene = 1;
+    message.edit_begin.base_revision = base_revision;
+    send_message(client, request, 0, &message);
+    message = made(MESSAGE_SET_MATERIAL);
+    message.set_material.material = 8;
+    message.set_material.roughness = roughness;
+    message.set_material.name = "steel";
+    send_message(client, request, 0, &message);
+    message = made(MESSAGE_EDIT_COMMIT);
+    send_message(client, request, 0, &message);
+}
+
+TEST(an_object_is_read_as_it_was_set)
+{
+    struct client *one = come(false), *other = come(true);
+    open_scene_as(one, 1, "model", PROTOCOL_SHARING_SHARED);
+    commit_sphere(one, 1);
+    submit_material(one, 20, 0, 0.25f);
+    assert_int_equal(expect_ok(one, 20), 2);
+    attach(other, 4, "model");
+    get_object(other, 5, 4, PROTOCOL_OBJECT_MATERIAL, 8);
+    expect(other, MESSAGE_SET_MATERIAL, 5);
+    assert_true(other->message.set_material.roughness == 0.25f);
+    assert_string_equal(other->message.set_material.name, "steel");
+    assert_int_equal(expect_ok(other, 5), 2);
+    get_object(other, 6, 4, PROTOCOL_OBJECT_NODE, 1);
+    expect(other, MESSAGE_SET_NODE, 6);
+    assert_int_equal(other->message.set_node.kind, PROTOCOL_NODE_SPHERES);
+    expect_ok(other, 6);
+    /* What is not there, or cannot be read, is an error of that request. */
+    get_object(other, 7, 4, PROTOCOL_OBJECT_MATERIAL, 9);
+    expect_error(other, 7, PROTOCOL_ERROR_UNKNOWN_ID);
+    get_object(other, 8, 4, PROTOCOL_OBJECT_SPHERES, 1);
+    expect_error(other, 8, PROTOCOL_ERROR_UNSUPPORTED);
+    get_object(other, 9, 5, PROTOCOL_OBJECT_NODE, 1);
+    expect_error(other, 9, PROTOCOL_ERROR_UNKNOWN_ID);
+    assert_string_equal(other->message.error.field, "object_get.scene");
+    cut(one, NULL);
+    cut(other, NULL);
+}
+
+TEST(objects_are_listed_by_name_and_page_by_page)
+{
+    struct client *one = come(false);
+    open_scene_as(one, 1, "model", PROTOCOL_SHARING_SHARED);
+    struct message message = made(MESSAGE_EDIT_BEGIN);
+    message.edit_begin.scene = 1;
+    send_message(one, 2, 0, &message);
+    for (uint32_t i = 1; i <= 300; i++) {
+        message = made(MESSAGE_SET_MATERIAL);
+        message.set_material.material = i;
+        message.set_material.name = i == 7 ? "steel" : "paint";
+        send_message(one, 2, 0, &message);
+    }
+    message = made(MESSAGE_EDIT_COMMIT);
+    send_message(one, 2, 0, &message);
+    expect_ok(one, 2);
+    struct message question = made(MESSAGE_SCENE_OBJECTS);
+    const struct message_scene_objects_reply *reply = &one->message.scene_objects_reply;
+    question.scene_objects.scene = 1;
+    question.scene_objects.kind = PROTOCOL_OBJECT_MATERIAL;
+    bool seen[301] = {false};
+    uint32_t count = 0, pages = 0;
+    do {
+        send_message(one, 3, 0, &question);
+        expect(one, MESSAGE_SCENE_OBJECTS_REPLY, 3);
+        assert_int_equal(reply->revision, 1);
+        assert_int_equal(reply->total, 300);
+        for (uint32_t i = 0; i < reply->objects_count; i++, count++) {
+            assert_false(seen[reply->objects[i].object]);
+            seen[reply->objects[i].object] = true;
+        }
+        question.scene_objects.from = reply->next;
+        pages++;
+    } while (reply->next);
+    assert_int_equal(count, 300);
+    assert_int_equal(pages, 2);
+    question.scene_objects.from = 0;
+    question.scene_objects.name = "steel";
+    send_message(one, 4, 0, &question);
+    expect(one, MESSAGE_SCENE_OBJECTS_REPLY, 4);
+    assert_int_equal(reply->objects_count, 1);
+    assert_int_equal(reply->objects[0].object, 7);
+    assert_int_equal(reply->next, 0);
+    question.scene_objects.name = "";
+    question.scene_objects.object = 7;
+    send_message(one, 5, 0, &question);
+    expect(one, MESSAGE_SCENE_OBJECTS_REPLY, 5);
+    assert_int_equal(reply->objects_count, 1);
+    assert_string_equal(reply->objects[0].name, "steel");
+    /* A place that no list has is its end. */
+    question.scene_objects.object = 0;
+    question.scene_objects.from = UINT32_MAX;
+    send_message(one, 6, 0, &question);
+    expect(one, MESSAGE_SCENE_OBJECTS_REPLY, 6);
+    assert_int_equal(reply->objects_count, 0);
+    assert_int_equal(reply->next, 0);
+    cut(one, NULL);
+}
+
+TEST(an_edit_of_what_has_changed_since_it_was_read_is_refused)
+{
+    struct client *one = come(false), *other = come(true);
+    open_scene_as(one, 1, "model", PROTOCOL_SHARING_SHARED);
+    commit_sphere(one, 1);
+    submit_material(one, 20, 1, 0.25f); /* it is not there */
+    expect_error(one, 20, PROTOCOL_ERROR_CONFLICT);
+    submit_material(one, 21, 0, 0.25f);
+    assert_int_equal(expect_ok(one, 21), 2);
+    attach(other, 1, "model");
+    submit_material(other, 22, 2, 0.5f);
+    assert_int_equal(expect_ok(other, 22), 3);
+    expect_changed(one, 1, 3);
+    submit_material(one, 23, 2, 0.75f);
+    expect_error(one, 23, PROTOCOL_ERROR_CONFLICT);
+    assert_int_equal(one->message.error.retryable, 1);
+    assert_string_equal(one->message.error.field, "edits[0] (material 8)");
+    /* A change of another object is no conflict. */
+    assert_int_equal(commit_node(other, 24, 1, 6), 4);
+    expect_changed(one, 1, 4);
+    submit_material(one, 25, 3, 0.75f);
+    assert_int_equal(expect_ok(one, 25), 5);
+    get_object(one, 26, 1, PROTOCOL_OBJECT_MATERIAL, 8);
+    expect(one, MESSAGE_SET_MATERIAL, 26);
+    assert_true(one->message.set_material.roughness == 0.75f);
+    cut(one, NULL);
+    cut(other, NULL);
+}
+
 TEST(contents_of_a_scene_are_reported)
 {
     struct client *one = come(false), *other = come(true);
