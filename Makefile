@@ -437,7 +437,7 @@ check:
 	@$(MAKE) -j$(JOBS) $(B)/tests/unit/unit_tests
 	@python3 tests/tools/run_tests.py $(B) $(PURE_TESTS)
 # Tests that need no GPU, no daemon and no file outside the checkout.
-PURE_TESTS := /base/ /net/ /protocol/ /scene/ /client/catalogue /client/frames /client/json /client/keys /client/text /client/y4m /warp/ \
+PURE_TESTS := /base/ /net/ /protocol/ /scene/ /client/catalogue /client/frames /client/json /client/keys /client/text /client/y4m /edit/assignment /edit/field /warp/ \
     /engine/camera_path /engine/scheduler /render/sequence /session/config /session/edits /session/limits /session/pacing
 # How each source is compiled, for editors and clang's tools; from our own rules.
 .PHONY: compile_commands.json
