@@ -258,7 +258,7 @@ static double draw_figures(struct hud_layout *layout, double left)
         names = fmax(names, hud_text_width(layout, HUD_PLAIN, rows[i].name));
         values = fmax(values, hud_text_width(layout, HUD_PLAIN, rows[i].value));
     }
-    const double width = names + values + 12 * s + 2 * inner, x = state->width - HUD_MARGIN * s - width,
+    const double width = names + values + 12 * s + 2 * inner, x = layout->right - HUD_MARGIN * s - width,
                  y = HUD_MARGIN * s;
     if (x < left + HUD_MARGIN * s)
         return 0;
@@ -334,13 +334,6 @@ static void draw_help(struct hud_layout *layout)
     layout->line = usual;
 }
 
-/* Cuts a text that is wider. */
-static void fit(const struct hud_layout *layout, char *what, double width)
-{
-    for (size_t length = strlen(what); length > 4 && hud_text_width(layout, HUD_PLAIN, what) > width; length--)
-        strcpy(what + length - 4, "..");
-}
-
 /* In the middle of the window: nothing else is as important. */
 static void draw_status(struct hud_layout *layout)
 {
@@ -353,7 +346,7 @@ static void draw_status(struct hud_layout *layout)
     char what[HUD_TEXT_MAX];
     snprintf(what, sizeof(what), "%s", state->status_text);
     const double maximum = state->width - 2 * inner - 2 * HUD_MARGIN * s;
-    fit(layout, what, maximum);
+    hud_fit(layout, HUD_PLAIN, what, maximum);
     const double bar = fmin(320 * s, maximum);
     const double width =
         fmax(fmax(bar, hud_text_width(layout, HUD_PLAIN, what)), hud_text_width(layout, HUD_BOLD, title));
@@ -413,7 +406,7 @@ static void draw_notice(struct hud_layout *layout, double bottom)
     const double s = layout->scale, inner = HUD_PADDING * s, line = HUD_LINE * s;
     char notice[HUD_TEXT_MAX];
     snprintf(notice, sizeof(notice), "%s", state->notice);
-    fit(layout, notice, state->width - 2 * inner - 2 * HUD_MARGIN * s);
+    hud_fit(layout, HUD_PLAIN, notice, state->width - 2 * inner - 2 * HUD_MARGIN * s);
     const double width = hud_text_width(layout, HUD_PLAIN, notice) + 2 * inner;
     const double x = (state->width - width) / 2, y = bottom - line - 2 * inner;
     hud_box(layout, x, y, width, line + 2 * inner, hud_panel);
@@ -427,6 +420,7 @@ void hud_layout(struct hud *hud, const struct hud_state *state, hud_measure *mea
                                 .measure = measure,
                                 .user = user,
                                 .scale = state->scale,
+                                .right = state->width - hud_edit_width(state->edit, state->width, state->scale),
                                 .line = HUD_LINE * state->scale};
     const enum overlay_mode overlay = state->settings->overlay;
     double bottom = state->height - HUD_MARGIN * state->scale, top = 0;
@@ -446,6 +440,7 @@ void hud_layout(struct hud *hud, const struct hud_state *state, hud_measure *mea
     }
     if (overlay != OVERLAY_NONE)
         bottom = draw_legend(&layout, bottom);
+    hud_draw_edit(&layout);
     if (state->settings->panel)
         draw_panel(&layout, top);
     if (state->notice[0] != '\0')

@@ -3,6 +3,7 @@
 
 #include <stdarg.h>
 #include <stdio.h>
+#include <string.h>
 
 const struct hud_colour hud_panel = {14, 17, 22, 205}, hud_ink = {232, 236, 241, 255},
                         hud_faint = {148, 158, 170, 255}, hud_accent = {255, 190, 92, 255},
@@ -46,6 +47,12 @@ __attribute__((format(printf, 6, 0))) static struct hud_mark *add_text(struct hu
     mark->font = font;
     mark->colour = colour;
     return mark;
+}
+
+void hud_fit(const struct hud_layout *layout, enum hud_font font, char *text, double width)
+{
+    for (size_t length = strlen(text); length > 4 && hud_text_width(layout, font, text) > width; length--)
+        strcpy(text + length - 4, "..");
 }
 
 void hud_text(struct hud_layout *layout, double x, double y, enum hud_font font, struct hud_colour colour,

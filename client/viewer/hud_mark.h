@@ -18,11 +18,14 @@ struct hud_layout {
     hud_measure *measure;
     void *user;
     double scale;
-    double line; /* height of the texts that follow */
+    double right; /* where the panel begins in which an object is edited, else the window's width */
+    double line;  /* height of the texts that follow */
 };
 
 void hud_box(struct hud_layout *layout, double x, double y, double width, double height, struct hud_colour colour);
 double hud_text_width(const struct hud_layout *layout, enum hud_font font, const char *text);
+/* Cuts a text that is wider. */
+void hud_fit(const struct hud_layout *layout, enum hud_font font, char *text, double width);
 void hud_text(struct hud_layout *layout, double x, double y, enum hud_font font, struct hud_colour colour,
               const char *format, ...) __attribute__((format(printf, 6, 7)));
 /* The same, ending at x. */
@@ -31,5 +34,7 @@ void hud_text_to(struct hud_layout *layout, double x, double y, enum hud_font fo
 
 /* At the bottom of the window; not drawn where it would come above `top_min`. */
 void hud_draw_timeline(struct hud_layout *layout, double top_min);
+/* At the right of the window, if it is shown. */
+void hud_draw_edit(struct hud_layout *layout);
 
 #endif

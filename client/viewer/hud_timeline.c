@@ -92,7 +92,7 @@ void hud_draw_timeline(struct hud_layout *layout, double top_min)
     const struct hud_state *state = layout->state;
     const double s = layout->scale, inner = HUD_PADDING * s, line = HUD_LINE * s;
     const double rows = ROW * s * LANE_COUNT, height = rows + line + 2 * inner;
-    const double x = HUD_MARGIN * s, width = state->width - 2 * HUD_MARGIN * s,
+    const double x = HUD_MARGIN * s, width = layout->right - 2 * HUD_MARGIN * s,
                  y = state->height - HUD_MARGIN * s - height;
     const int64_t offset_ns = metrics_clock_offset_ns(state->metrics);
     struct axis axis = {.x = x + inner + 62 * s};

@@ -125,6 +125,7 @@ static void serve(struct viewer *viewer, uint64_t now_ns)
     viewer_tell(viewer, now_ns);
     viewer_receive(viewer, wait_ms);
     viewer_step_tasks(viewer);
+    viewer_step_edit(viewer, now_ns);
 }
 
 static void draw(struct viewer *viewer)
@@ -231,6 +232,7 @@ static void close_viewer(struct viewer *viewer)
     pixmap_finish(&viewer->live);
     pixmap_finish(&viewer->compared);
     pixmap_finish(&viewer->heat);
+    viewer_edit_forget(viewer);
     replay_finish(&viewer->replay);
 }
 
@@ -244,6 +246,7 @@ bool viewer_run(const struct viewer_options *options, struct fl_error *error)
     viewer->width = (int)options->view.width;
     viewer->height = (int)options->view.height;
     viewer->scale = 1;
+    viewer->edit.tab = EDIT_MATERIAL;
     viewer->settings = (struct settings){.tracer = options->view.tracer,
                                          .integrator = options->view.integrator,
                                          .tone_map = options->view.tone_map,

@@ -110,6 +110,7 @@ void viewer_hud(struct viewer *viewer, struct hud_state *state)
     fill_names(viewer, state);
     fill_status(viewer, state);
     fill_local(viewer, state);
+    state->edit = viewer_edit_hud(viewer);
     if (viewer->notice_ns > state->now_ns)
         state->notice = viewer->notice;
 }
@@ -176,6 +177,21 @@ static json_t *local_json(const struct viewer *viewer, const struct hud_state *s
     return object;
 }
 
+/* What the panel shows. */
+static json_t *edit_json(const struct viewer_edit *edit)
+{
+    const struct fl_object_state *state = &edit->state;
+    json_t *fields = json_object();
+    for (size_t i = 0; i < state->count; i++) {
+        json_t *values = json_array();
+        for (unsigned k = 0; k < state->fields[i].field.count; k++)
+            json_array_append_new(values, json_real(state->fields[i].values[k]));
+        json_object_set_new(fields, state->fields[i].field.name, values);
+    }
+    return json_pack("{s:s, s:i, s:s, s:s, s:o}", "kind", edit->hud.tabs[edit->tab], "object", (int)state->id,
+                     "name", state->name, "row", edit->hud.rows[edit->chosen].name, "fields", fields);
+}
+
 void viewer_print_state(struct viewer *viewer, const char *name)
 {
     static const char *const statuses[] = {"loading", "live", "lost", "refused"};
@@ -206,6 +222,8 @@ void viewer_print_state(struct viewer *viewer, const char *name)
         json_object_set_new(line, "errors",
                             json_pack("{s:f, s:f, s:f}", "mean", viewer->heat_figures.mean, "max",
                                       viewer->heat_figures.max, "beyond", viewer->heat_figures.beyond));
+    if (line && viewer->edit.shown && viewer->edit.has_state)
+        json_object_set_new(line, "edit", edit_json(&viewer->edit));
     if (line && viewer->notice_ns > state.now_ns)
         json_object_set_new(line, "notice", json_string(viewer->notice));
     char *text = json_dumps(line, JSON_COMPACT | JSON_ENSURE_ASCII | JSON_REAL_PRECISION(9));

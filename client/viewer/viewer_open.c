@@ -62,6 +62,7 @@ static void forget_scene(struct viewer *viewer)
     viewer->view.keys_count = 0;
     viewer->view.auto_node = 0;
     viewer_forget_local(viewer);
+    viewer_edit_forget(viewer);
     viewer->has_camera = viewer->has_home = viewer->is_live = false;
     viewer->followed = 0;
     viewer->glide_begin_ns = 0;

@@ -8,6 +8,7 @@
 #include "viewer/replay.h"
 #include "viewer/session.h"
 #include "viewer/viewer.h"
+#include "viewer/viewer_edit.h"
 #include "viewer/views.h"
 #include "viewer/window.h"
 
@@ -16,7 +17,8 @@ enum viewer_task {
     TASK_NONE,
     TASK_HOME,     /* the initial camera, from the command line, the model or the scene's extent */
     TASK_CAMERA,   /* where a camera of the scene is */
-    TASK_FOCUS,    /* what is under the pointer */
+    TASK_FOCUS,    /* where what is under the pointer is */
+    TASK_PICK,     /* which object it is */
     TASK_REFERENCE /* the resting picture, by the reference */
 };
 
@@ -82,12 +84,14 @@ struct viewer {
     uint64_t local_views; /* so many */
 
     enum viewer_task task, wanted; /* the current one; the next one */
-    double focus_x, focus_y;       /* shares of the picture */
+    double focus_x, focus_y;       /* what is pointed at; shares of the picture */
     uint32_t camera_node;
     struct pixmap compared, heat; /* the picture as it was; its errors */
     struct heat_figures heat_figures;
     uint64_t heat_command, heat_change, heat_revision; /* of what was compared */
     bool has_heat, heat_refused;
+
+    struct viewer_edit edit;
 
     char notice[HUD_TEXT_MAX];
     uint64_t notice_ns; /* until then */
@@ -95,8 +99,8 @@ struct viewer {
 
     struct replay replay;
     size_t replay_next;
-    uint64_t replay_ns; /* since when the next event is looked at */
-    bool replay_waits;
+    uint64_t replay_ns;       /* since when the next event is looked at */
+    uint64_t replay_revision; /* of the scene, after the last event */
     uint64_t tick_ns;
     struct fl_error failure; /* why it ends */
 };

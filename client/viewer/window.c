@@ -157,7 +157,8 @@ static bool take_event(struct window *window, const SDL_Event *event, struct inp
     int width = 0, height = 0;
     double scale = 1;
     window_size(window, &width, &height, &scale);
-    *input = (struct input){.shift = (SDL_GetModState() & KMOD_SHIFT) != 0, .scale = scale};
+    const SDL_Keymod held = SDL_GetModState();
+    *input = (struct input){.shift = (held & KMOD_SHIFT) != 0, .ctrl = (held & KMOD_CTRL) != 0, .scale = scale};
     switch (event->type) {
     case SDL_QUIT:
         input->kind = INPUT_QUIT;
@@ -166,6 +167,10 @@ static bool take_event(struct window *window, const SDL_Event *event, struct inp
     case SDL_KEYUP:
         take_key(event, input);
         return event->key.repeat == 0;
+    case SDL_TEXTINPUT:
+        input->kind = INPUT_TEXT;
+        snprintf(input->text, sizeof(input->text), "%.15s", event->text.text);
+        return true;
     case SDL_MOUSEBUTTONDOWN:
     case SDL_MOUSEBUTTONUP:
         return take_button(event, scale, input);

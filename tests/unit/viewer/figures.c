@@ -5,6 +5,7 @@
 #include "tests/harness/test.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -352,6 +353,33 @@ TEST(it_begins_with_one_line_and_the_rest_is_a_key_away)
     settings_act(&settings, ACTION_OVERLAY_BACK);
     settings_act(&settings, ACTION_OVERLAY_BACK);
     assert_int_equal(settings.overlay, OVERLAY_NONE);
+}
+
+TEST(an_object_is_edited_beside_the_figures)
+{
+    static struct hud_edit edit;
+    add(0, 1, 1000 * MS);
+    edit = (struct hud_edit){.shown = true,
+                             .tabs = {"node", "material", "light"},
+                             .title = "a material with a name that is longer than its panel is wide",
+                             .hint = "what it means, in a line that is longer than its panel is wide, too",
+                             .typed = "0.25",
+                             .count = 40,
+                             .chosen = 20};
+    for (size_t i = 0; i < edit.count; i++) {
+        edit.rows[i] = (struct hud_edit_row){.share = i % 2 == 0 ? 0.5 : -1, .has_colour = i % 4 == 0};
+        snprintf(edit.rows[i].name, sizeof(edit.rows[i].name), "row %zu", i);
+        snprintf(edit.rows[i].value, sizeof(edit.rows[i].value), "value %zu", i);
+    }
+    for (int small = 0; small < 2; small++) {
+        struct hud_state shown = some_state(small ? 400 : 1280, small ? 200 : 720);
+        shown.edit = &edit;
+        hud_layout(&hud, &shown, measure, NULL);
+        check_within(&shown);
+        assert_true(tells("material") && tells("row 20") && tells("0.25_") && !tells("value 20") &&
+                    tells("value 19"));
+        assert_int_equal(tells("input to picture"), !small);
+    }
 }
 
 TEST(what_is_not_wanted_is_not_drawn_but_a_loss_is)

@@ -32,9 +32,10 @@ TEST(every_kind_of_event_is_read)
               " {\"wheel\": -2}, {\"key\": \"t\", \"shift\": true}, {\"key\": \"w\", \"hold\": 0.5},\n"
               " {\"resize\": [640, 360]}, {\"wait\": \"rest\", \"samples\": 8, \"timeout\": 3}, {\"wait\": "
               "\"lost\"}, {\"wait\": \"camera\"},\n"
-              " {\"screenshot\": \"a/b.png\"}, {\"state\": \"here\"}, {\"after\": 2}, {\"drop\": \"a.glb\"}]"))
+              " {\"screenshot\": \"a/b.png\"}, {\"state\": \"here\"}, {\"after\": 2}, {\"drop\": \"a.glb\"}, "
+              "{\"text\": \"0.5\", \"ctrl\": true}, {\"wait\": \"change\"}]"))
         fail_msg("%s", error.text);
-    assert_int_equal(replay.count, 16); /* a key is two: down and up */
+    assert_int_equal(replay.count, 18); /* a key is two: down and up */
     const struct replay_event *event = replay.events;
     assert_int_equal(event[0].input.kind, INPUT_BUTTON_DOWN);
     assert_int_equal(event[0].input.button, INPUT_RIGHT);
@@ -60,6 +61,9 @@ TEST(every_kind_of_event_is_read)
     assert_true(event[14].kind == REPLAY_INPUT && event[14].after_s == 2);
     assert_int_equal(event[15].input.kind, INPUT_DROP);
     assert_string_equal(event[15].input.path, "a.glb");
+    assert_true(event[16].input.kind == INPUT_TEXT && event[16].input.ctrl);
+    assert_string_equal(event[16].input.text, "0.5");
+    assert_true(event[17].kind == REPLAY_CHANGE);
     replay_finish(&replay);
 }
 

@@ -101,6 +101,10 @@ TEST(keys_have_the_names_of_the_list)
     push_key(SDL_KEYDOWN, SDLK_t, false);
     input = next(window);
     assert_int_equal(input_action(&input), ACTION_PREVIOUS_TRACER);
+    SDL_SetModState(KMOD_LCTRL);
+    push_key(SDL_KEYDOWN, SDLK_z, false);
+    input = next(window);
+    assert_true(input.ctrl && !input.shift && input_action(&input) == ACTION_UNDO);
     SDL_SetModState(KMOD_NONE);
     assert_false(window_poll(window, &input));
     window_destroy(window);
@@ -124,6 +128,10 @@ TEST(mouse_and_window_events_come_as_they_are)
     event.wheel.preciseY = -1.5f;
     SDL_PushEvent(&event);
     SDL_zero(event);
+    event.type = SDL_TEXTINPUT;
+    strcpy(event.text.text, "5");
+    SDL_PushEvent(&event);
+    SDL_zero(event);
     event.type = SDL_WINDOWEVENT;
     event.window.event = SDL_WINDOWEVENT_FOCUS_LOST;
     SDL_PushEvent(&event);
@@ -136,6 +144,9 @@ TEST(mouse_and_window_events_come_as_they_are)
     assert_true(input.x == 30 && input.y == 40);
     input = next(window);
     assert_true(input.kind == INPUT_WHEEL && input.wheel == -1.5);
+    input = next(window);
+    assert_int_equal(input.kind, INPUT_TEXT);
+    assert_string_equal(input.text, "5");
     assert_int_equal(next(window).kind, INPUT_FOCUS_LOST);
     assert_int_equal(next(window).kind, INPUT_QUIT);
     assert_true(window_wants_drawing(window)); /* for the events of the window */
