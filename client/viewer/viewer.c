@@ -107,9 +107,13 @@ static void take_input(struct viewer *viewer, uint64_t now_ns)
 
 static void serve(struct viewer *viewer, uint64_t now_ns)
 {
-    const enum session_state state = session_step(viewer->session, now_ns);
     const bool is_busy = viewer->moved_ns + BUSY_NS > now_ns || viewer->replay.count > 0;
     const unsigned wait_ms = viewer->must_draw ? 0 : is_busy ? BUSY_WAIT_MS : IDLE_WAIT_MS;
+    if (viewer_edit_works(viewer, false)) {
+        poll(NULL, 0, (int)wait_ms);
+        return;
+    }
+    const enum session_state state = session_step(viewer->session, now_ns);
     if (state == SESSION_FAILED) {
         viewer->failure = *session_error(viewer->session);
         return;
@@ -223,6 +227,7 @@ static void close_viewer(struct viewer *viewer)
         errno = 0; /* it is readable already */
     window_destroy(viewer->window);
     viewer_abandon_opening(viewer);
+    viewer_edit_works(viewer, true);
     session_destroy(viewer->session);
     free(viewer->model);
     decoder_destroy(viewer->decoder);

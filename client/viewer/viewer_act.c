@@ -236,8 +236,12 @@ static void do_event(struct viewer *viewer, const struct replay_event *event)
 
 void viewer_replay(struct viewer *viewer, uint64_t now_ns)
 {
+    const struct viewer_edit *edit = &viewer->edit;
     while (viewer->replay_next < viewer->replay.count && viewer->failure.code == FL_ERROR_NONE) {
         const struct replay_event *event = &viewer->replay.events[viewer->replay_next];
+        /* What follows an edit finds it made; but a drag goes on meanwhile. */
+        if ((edit->works || edit->has_pending) && !(edit->dragging && event->kind == REPLAY_INPUT))
+            return;
         const uint64_t due_ns = viewer->replay_ns + (uint64_t)(event->after_s * 1e9);
         if (now_ns < due_ns)
             return;
@@ -250,7 +254,7 @@ void viewer_replay(struct viewer *viewer, uint64_t now_ns)
         }
         do_event(viewer, event);
         viewer->replay_next++;
-        if (session_scene(viewer->session))
+        if (session_scene(viewer->session) && !edit->works)
             viewer->replay_revision = fl_scene_revision(session_scene(viewer->session));
         /* Time lost in a long operation, such as a screenshot, is not made up for. */
         viewer->replay_ns = event->kind == REPLAY_INPUT ? due_ns : monotonic_now_ns();

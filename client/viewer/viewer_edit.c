@@ -92,6 +92,8 @@ void viewer_edit_stop_typing(struct viewer_edit *edit)
 void viewer_edit_choose_tab(struct viewer *viewer, size_t tab)
 {
     struct viewer_edit *edit = &viewer->edit;
+    if (edit->works)
+        return;
     viewer_edit_stop_typing(edit);
     edit->tab = tab % EDIT_TABS;
     edit->chosen = 0;
@@ -116,6 +118,7 @@ void viewer_edit_object(struct viewer *viewer, uint32_t node, uint32_t material)
 
 void viewer_edit_forget(struct viewer *viewer)
 {
+    viewer_edit_works(viewer, true);
     forget_objects(&viewer->edit);
     edit_history_clear(&viewer->edit.history);
     viewer->edit = (struct viewer_edit){.tab = EDIT_MATERIAL};
@@ -165,6 +168,8 @@ void viewer_edit_choose_node_of_light(struct viewer *viewer)
     struct fl_error refusal = {0};
     struct fl_object *nodes = NULL;
     size_t count = 0;
+    if (edit->works)
+        return;
     if (!session_objects(viewer->session, PROTOCOL_OBJECT_NODE, &nodes, &count, &refusal))
         say(viewer, &refusal);
     for (size_t i = 0; i < count; i++)
@@ -178,22 +183,66 @@ void viewer_edit_choose_node_of_light(struct viewer *viewer)
 
 /* ---- changes ---- */
 
+static void *work(void *argument)
+{
+    struct edit_work *work = argument;
+    session_edit(work->session, work->change.list, work->change.count, &work->edited, &work->refusal);
+    atomic_store(&work->done, true);
+    return NULL;
+}
+
+/* Takes the list over. */
+static void begin_work(struct viewer *viewer, enum edit_way way, struct edit_change change)
+{
+    struct viewer_edit *edit = &viewer->edit;
+    edit->applied_ns = monotonic_now_ns();
+    edit->work = (struct edit_work){.session = viewer->session, .change = change, .way = way};
+    edit->works = pthread_create(&edit->work.thread, NULL, work, &edit->work) == 0;
+    if (!edit->works)
+        free(change.list);
+}
+
+static void end_work(struct viewer *viewer)
+{
+    struct viewer_edit *edit = &viewer->edit;
+    struct edit_work *done = &edit->work;
+    const struct fl_edited *edited = &done->edited;
+    const bool is_undo = done->way == EDIT_UNDO || done->way == EDIT_REDO;
+    pthread_join(done->thread, NULL);
+    edit->works = false;
+    if (edited->undo_count == 0 || done->refusal.code != FL_ERROR_NONE)
+        say(viewer, &done->refusal);
+    else if (is_undo)
+        viewer_say(viewer, "%s: %s", done->way == EDIT_REDO ? "redone" : "undone", done->change.list[0].field);
+    if (is_undo)
+        edit_history_took(&edit->history, done->way == EDIT_REDO, edited->undo, edited->undo_count);
+    else if (done->way == EDIT_DRAG_ON)
+        free(edited->undo);
+    else
+        edit_history_add(&edit->history, edited->undo, edited->undo_count);
+    edit->drag_is_noted |= !is_undo && edited->undo_count > 0;
+    free(done->change.list);
+}
+
+bool viewer_edit_works(struct viewer *viewer, bool wait)
+{
+    struct viewer_edit *edit = &viewer->edit;
+    if (!edit->works || (!wait && !atomic_load(&edit->work.done)))
+        return edit->works;
+    end_work(viewer);
+    if (!wait && edit->shown && session_scene(viewer->session))
+        read_object(viewer);
+    return false;
+}
+
 void viewer_edit_apply(struct viewer *viewer, size_t row, double value, bool more)
 {
     struct viewer_edit *edit = &viewer->edit;
-    struct fl_error refusal = {0};
-    struct fl_edited edited = {0};
-    struct fl_assignment assignment;
-    edit_row_assign(&edit->state, edit->rows[row], value, &assignment);
-    edit->applied_ns = monotonic_now_ns();
-    if (!session_edit(viewer->session, &assignment, 1, &edited, &refusal))
-        say(viewer, &refusal);
-    if (more)
-        free(edited.undo);
-    else
-        edit_history_add(&edit->history, edited.undo, edited.undo_count);
-    edit->drag_is_noted |= edit->dragging && edited.undo_count > 0;
-    read_object(viewer);
+    struct edit_change change = {.list = calloc(1, sizeof(*change.list)), .count = 1};
+    if (!change.list)
+        return;
+    edit_row_assign(&edit->state, edit->rows[row], value, change.list);
+    begin_work(viewer, more ? EDIT_DRAG_ON : EDIT_CHANGE, change);
 }
 
 bool viewer_edit_has_field(const struct viewer_edit *edit)
@@ -204,6 +253,8 @@ bool viewer_edit_has_field(const struct viewer_edit *edit)
 void viewer_edit_step(struct viewer *viewer, double steps)
 {
     struct viewer_edit *edit = &viewer->edit;
+    if (edit->works || edit->has_pending)
+        return;
     if (edit->chosen == 0)
         choose_object(viewer, steps > 0 ? 1 : -1);
     else if (viewer_edit_has_field(edit))
@@ -214,26 +265,21 @@ void viewer_edit_step(struct viewer *viewer, double steps)
 void viewer_edit_undo(struct viewer *viewer, bool redo)
 {
     struct viewer_edit *edit = &viewer->edit;
-    struct fl_error refusal = {0};
-    struct fl_edited edited = {0};
     struct edit_change change;
+    if (edit->works)
+        return;
     if (!edit_history_take(&edit->history, redo, &change)) {
         viewer_say(viewer, "there is nothing to %s", redo ? "redo" : "undo");
         return;
     }
-    if (!session_edit(viewer->session, change.list, change.count, &edited, &refusal))
-        say(viewer, &refusal);
-    else
-        viewer_say(viewer, "%s: %s", redo ? "redone" : "undone", change.list[0].field);
-    edit_history_took(&edit->history, redo, edited.undo, edited.undo_count);
-    free(change.list);
-    if (edit->shown)
-        read_object(viewer);
+    begin_work(viewer, redo ? EDIT_REDO : EDIT_UNDO, change);
 }
 
 void viewer_edit_toggle(struct viewer *viewer)
 {
     struct viewer_edit *edit = &viewer->edit;
+    if (edit->works)
+        return;
     edit->shown = !edit->shown;
     if (!edit->shown)
         return;
@@ -244,12 +290,12 @@ void viewer_edit_toggle(struct viewer *viewer)
 void viewer_step_edit(struct viewer *viewer, uint64_t now_ns)
 {
     struct viewer_edit *edit = &viewer->edit;
-    if (!edit->shown || !session_scene(viewer->session))
+    if (!edit->has_state || !session_scene(viewer->session))
         return;
-    if (edit->dragging && edit->has_pending && now_ns >= edit->applied_ns + APPLY_PAUSE_NS) {
+    if (edit->has_pending && (!edit->dragging || now_ns >= edit->applied_ns + APPLY_PAUSE_NS)) {
         edit->has_pending = false;
-        viewer_edit_apply(viewer, edit->chosen - 1, edit->pending, edit->drag_is_noted);
-    } else if (edit->has_state && !edit->dragging && now_ns >= edit->read_ns + READ_PAUSE_NS &&
+        viewer_edit_apply(viewer, edit->pending_row, edit->pending, edit->drag_is_noted);
+    } else if (edit->shown && !edit->dragging && now_ns >= edit->read_ns + READ_PAUSE_NS &&
                fl_scene_revision(session_scene(viewer->session)) > edit->state.revision) {
         read_object(viewer);
     }

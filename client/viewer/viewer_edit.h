@@ -7,6 +7,10 @@
 #include "viewer/edit_rows.h"
 #include "viewer/input.h"
 
+#include <pthread.h>
+#include <stdatomic.h>
+
+struct session;
 struct viewer;
 
 enum viewer_edit_tab { EDIT_NODE, EDIT_MATERIAL, EDIT_LIGHT, EDIT_TABS };
@@ -33,8 +37,21 @@ struct viewer_edit {
     bool dragging, slides, drag_is_noted; /* the history has what undoes the drag */
     double drag_x, drag_from;
     bool has_pending;
-    double pending; /* a value that the daemon is not told yet */
+    double pending;     /* a value that the daemon is not told yet .. */
+    size_t pending_row; /* .. and its row, counted from 0 */
 
+    /* What the daemon is told of in a thread, as an edit waits for the frame that is being made: until it is done
+     * the connection is the thread's. */
+    bool works;
+    struct edit_work {
+        pthread_t thread;
+        struct session *session;
+        struct edit_change change;
+        enum edit_way { EDIT_CHANGE, EDIT_DRAG_ON, EDIT_UNDO, EDIT_REDO } way;
+        struct fl_edited edited;
+        struct fl_error refusal;
+        atomic_bool done;
+    } work;
     struct edit_history history;
     struct hud_edit hud;
 };
@@ -46,10 +63,12 @@ void viewer_edit_undo(struct viewer *viewer, bool redo);
 /* True: the input was meant for the panel. */
 bool viewer_edit_input(struct viewer *viewer, const struct input *input);
 void viewer_step_edit(struct viewer *viewer, uint64_t now_ns);
+/* Whether the connection is in use by an edit; `wait`: until it is not. */
+bool viewer_edit_works(struct viewer *viewer, bool wait);
 void viewer_edit_forget(struct viewer *viewer); /* of a scene that is gone */
 const struct hud_edit *viewer_edit_hud(struct viewer *viewer);
 
-/* ---- from input to it ---- */
+/* ---- from input to it: nothing happens while an edit works ---- */
 
 void viewer_edit_choose_tab(struct viewer *viewer, size_t tab);
 void viewer_edit_choose_node_of_light(struct viewer *viewer);

@@ -17,6 +17,8 @@ static void end_typing(struct viewer *viewer)
     struct viewer_edit *edit = &viewer->edit;
     struct fl_error error = {0};
     double value;
+    if (edit->works)
+        return;
     if (edit->typed[0] != '\0' &&
         edit_row_read(&edit->state, edit->rows[edit->chosen - 1], edit->typed, &value, &error))
         viewer_edit_apply(viewer, edit->chosen - 1, value, false);
@@ -33,6 +35,7 @@ static void slide_to(struct viewer *viewer, double x)
         edit->slides
             ? edit_row_slide(&edit->state, row, hud_edit_share(viewer->width, viewer->scale, x))
             : edit_row_drag(&edit->state, row, edit->drag_from, (x - edit->drag_x) / viewer->scale, edit->metre);
+    edit->pending_row = edit->chosen - 1;
     edit->has_pending = true;
 }
 
@@ -41,7 +44,8 @@ static bool press(struct viewer *viewer, const struct input *input)
     struct viewer_edit *edit = &viewer->edit;
     struct hud_edit_hit hit;
     hud_edit_find(viewer_edit_hud(viewer), viewer->width, viewer->height, viewer->scale, input->x, input->y, &hit);
-    if (!hit.is_panel || input->button != INPUT_LEFT)
+    /* What begins must wait until the daemon has the last change. */
+    if (!hit.is_panel || input->button != INPUT_LEFT || edit->works || edit->has_pending)
         return hit.is_panel;
     viewer_edit_stop_typing(edit);
     if (hit.part == HUD_EDIT_TAB)
@@ -114,10 +118,16 @@ static bool press_key(struct viewer *viewer, const struct input *input)
     return true;
 }
 
+static bool is_on_panel(struct viewer *viewer, double x, double y)
+{
+    struct hud_edit_hit hit;
+    hud_edit_find(viewer_edit_hud(viewer), viewer->width, viewer->height, viewer->scale, x, y, &hit);
+    return hit.is_panel;
+}
+
 bool viewer_edit_input(struct viewer *viewer, const struct input *input)
 {
     struct viewer_edit *edit = &viewer->edit;
-    struct hud_edit_hit hit;
     if (!edit->shown || viewer->settings.help || !session_scene(viewer->session))
         return false;
     viewer->must_draw = true;
@@ -129,17 +139,15 @@ bool viewer_edit_input(struct viewer *viewer, const struct input *input)
             slide_to(viewer, input->x);
         return edit->dragging;
     case INPUT_BUTTON_UP:
-        if (edit->dragging && edit->has_pending)
-            viewer_edit_apply(viewer, edit->chosen - 1, edit->pending, edit->drag_is_noted);
-        edit->dragging = edit->has_pending = false;
+        edit->dragging = false; /* the last value of it may be pending */
         return false;
     case INPUT_WHEEL:
-        hud_edit_find(viewer_edit_hud(viewer), viewer->width, viewer->height, viewer->scale, viewer->pointer_x,
-                      viewer->pointer_y, &hit);
-        if (hit.is_panel)
+        if (!is_on_panel(viewer, viewer->pointer_x, viewer->pointer_y))
+            return false;
+        if (!edit->dragging && !edit->typing)
             edit->chosen = input->wheel > 0 ? edit->chosen - (edit->chosen > 0)
                                             : edit->chosen + (edit->chosen < edit->row_count);
-        return hit.is_panel;
+        return true;
     case INPUT_FOCUS_LOST:
         viewer_edit_stop_typing(edit);
         return false;

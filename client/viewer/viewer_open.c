@@ -91,7 +91,7 @@ void viewer_step_opening(struct viewer *viewer, uint64_t now_ns)
 {
     char line[HUD_TEXT_MAX];
     double share = 0;
-    if (!viewer->next)
+    if (!viewer->next || viewer_edit_works(viewer, false))
         return;
     const enum session_state state = session_step(viewer->next, now_ns);
     if (state == SESSION_LIVE) {
