@@ -1,99 +1,14 @@
 /* SPDX-License-Identifier: MIT */
 #include "viewer/hud.h"
+#include "viewer/hud_mark.h"
 
 #include <math.h>
-#include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
 
-#define LINE 17.0 /* height of a line of text, pixels of the desktop */
-#define MARGIN 12.0
-#define PADDING 10.0
-#define ROW 12.0 /* of the timeline */
-#define TIMELINE_FRAMES 8u
-#define TIMELINE_MIN_NS 20e6
 /* Of the window's width and height, for what a tracer says: longer lines are broken, those below are left out. */
 #define STRUCTURE_SHARE_MAX 0.6
 #define STRUCTURE_LINES_MAX 10u
-
-static const struct hud_colour panel = {14, 17, 22, 205}, ink = {232, 236, 241, 255}, faint = {148, 158, 170, 255},
-                               accent = {255, 190, 92, 255}, alarm = {255, 110, 92, 255},
-                               calm = {120, 214, 140, 255}, rule = {255, 255, 255, 26};
-
-static const struct hud_colour lane_colours[LANE_COUNT] = {
-    {173, 181, 191, 255}, {240, 137, 98, 255},  {247, 188, 86, 255},  {122, 200, 118, 255}, {80, 190, 178, 255},
-    {92, 160, 232, 255},  {141, 135, 235, 255}, {205, 130, 220, 255}, {236, 120, 164, 255}, {200, 200, 208, 255}};
-
-struct layout {
-    struct hud *hud;
-    const struct hud_state *state;
-    hud_measure *measure;
-    void *user;
-    double scale;
-    double line; /* height of the texts that follow */
-};
-
-/* ---- marks ---- */
-
-static struct hud_mark *add(struct layout *layout)
-{
-    struct hud *hud = layout->hud;
-    /* The last one is drawn over and over where there are too many. */
-    struct hud_mark *mark = &hud->marks[hud->count < HUD_MARKS_MAX ? hud->count++ : HUD_MARKS_MAX - 1];
-    *mark = (struct hud_mark){0};
-    return mark;
-}
-
-static void box(struct layout *layout, double x, double y, double width, double height, struct hud_colour colour)
-{
-    struct hud_mark *mark = add(layout);
-    mark->x = x;
-    mark->y = y;
-    mark->width = width;
-    mark->height = height;
-    mark->colour = colour;
-}
-
-static double text_width(const struct layout *layout, enum hud_font font, const char *text)
-{
-    return layout->measure(layout->user, font, layout->line, text);
-}
-
-__attribute__((format(printf, 6, 0))) static struct hud_mark *add_text(struct layout *layout, double x, double y,
-                                                                       enum hud_font font,
-                                                                       struct hud_colour colour,
-                                                                       const char *format, va_list arguments)
-{
-    struct hud_mark *mark = add(layout);
-    vsnprintf(mark->text, sizeof(mark->text), format, arguments);
-    mark->x = x;
-    mark->y = y;
-    mark->height = layout->line;
-    mark->font = font;
-    mark->colour = colour;
-    return mark;
-}
-
-__attribute__((format(printf, 6, 7))) static void text(struct layout *layout, double x, double y,
-                                                       enum hud_font font, struct hud_colour colour,
-                                                       const char *format, ...)
-{
-    va_list arguments;
-    va_start(arguments, format);
-    add_text(layout, x, y, font, colour, format, arguments);
-    va_end(arguments);
-}
-
-/* The same, ending at x. */
-__attribute__((format(printf, 6, 7))) static void text_to(struct layout *layout, double x, double y,
-                                                          enum hud_font font, struct hud_colour colour,
-                                                          const char *format, ...)
-{
-    va_list arguments;
-    va_start(arguments, format);
-    add_text(layout, x, y, font, colour, format, arguments)->is_right = true;
-    va_end(arguments);
-}
 
 /* ---- what is shown, at the top left ---- */
 
@@ -131,7 +46,7 @@ struct corner {
 };
 
 /* As much of a text as fits into a line, behind which commas follow or nothing; at least up to the first one. */
-static size_t line_length(const struct layout *layout, const char *said)
+static size_t line_length(const struct hud_layout *layout, const char *said)
 {
     size_t length = 0, next;
     char line[HUD_TEXT_MAX];
@@ -141,7 +56,7 @@ static size_t line_length(const struct layout *layout, const char *said)
         if (length > 0 && next >= HUD_TEXT_MAX)
             break;
         snprintf(line, sizeof(line), "%.*s", (int)next, said);
-        if (length > 0 && text_width(layout, HUD_PLAIN, line) >= STRUCTURE_SHARE_MAX * layout->state->width)
+        if (length > 0 && hud_text_width(layout, HUD_PLAIN, line) >= STRUCTURE_SHARE_MAX * layout->state->width)
             break;
         length = next;
     } while (said[length] != '\0');
@@ -149,14 +64,14 @@ static size_t line_length(const struct layout *layout, const char *said)
 }
 
 /* Adds rows that say it. */
-static size_t break_structure(const struct layout *layout, const char *said, struct row *rows, size_t room)
+static size_t break_structure(const struct hud_layout *layout, const char *said, struct row *rows, size_t room)
 {
     size_t count = 0;
     while (*said != '\0' && count < room) {
         const size_t length = line_length(layout, said);
         snprintf(rows[count].value, HUD_TEXT_MAX, "%.*s", (int)length, said);
         said += length + strspn(said + length, ", ");
-        if (text_width(layout, HUD_PLAIN, rows[count].value) >= STRUCTURE_SHARE_MAX * layout->state->width)
+        if (hud_text_width(layout, HUD_PLAIN, rows[count].value) >= STRUCTURE_SHARE_MAX * layout->state->width)
             continue;
         rows[count].name = count == 0 ? "structure" : "";
         count++;
@@ -164,11 +79,11 @@ static size_t break_structure(const struct layout *layout, const char *said, str
     return count;
 }
 
-static struct corner draw_scene(struct layout *layout)
+static struct corner draw_scene(struct hud_layout *layout)
 {
     const struct hud_state *state = layout->state;
     const struct settings *settings = state->settings;
-    const double s = layout->scale, line = LINE * s;
+    const double s = layout->scale, line = HUD_LINE * s;
     struct row rows[7 + STRUCTURE_LINES_MAX];
     size_t count = 0;
     snprintf(rows[count].value, HUD_TEXT_MAX, "%s, %s", protocol_tracer_text(settings->tracer),
@@ -196,28 +111,71 @@ static struct corner draw_scene(struct layout *layout)
     const size_t end = count + (size_t)fmin(lines, STRUCTURE_LINES_MAX);
     for (size_t i = 0; i < HUD_STRUCTURE_MAX && state->structure[i]; i++)
         count += break_structure(layout, state->structure[i], rows + count, end - count);
-    double names = 0, widest = text_width(layout, HUD_BOLD, state->scene);
+    double names = 0, widest = hud_text_width(layout, HUD_BOLD, state->scene);
     for (size_t i = 0; i < count; i++)
-        names = fmax(names, text_width(layout, HUD_PLAIN, rows[i].name));
+        names = fmax(names, hud_text_width(layout, HUD_PLAIN, rows[i].name));
     names += 12 * s;
     for (size_t i = 0; i < count; i++)
-        widest = fmax(widest, names + text_width(layout, HUD_PLAIN, rows[i].value));
-    const double x = MARGIN * s, y = MARGIN * s, inner = PADDING * s;
+        widest = fmax(widest, names + hud_text_width(layout, HUD_PLAIN, rows[i].value));
+    const double x = HUD_MARGIN * s, y = HUD_MARGIN * s, inner = HUD_PADDING * s;
     const double bar = state->samples_wanted > 1 ? 5 * s : 0;
-    box(layout, x, y, widest + 2 * inner, ((double)count + 1) * line + 2 * inner + 3 * s + bar, panel);
-    text(layout, x + inner, y + inner, HUD_BOLD, ink, "%s", state->scene);
+    hud_box(layout, x, y, widest + 2 * inner, ((double)count + 1) * line + 2 * inner + 3 * s + bar, hud_panel);
+    hud_text(layout, x + inner, y + inner, HUD_BOLD, hud_ink, "%s", state->scene);
     for (size_t i = 0; i < count; i++) {
         const double at = y + inner + 3 * s + line * ((double)i + 1);
-        text(layout, x + inner, at, HUD_PLAIN, faint, "%s", rows[i].name);
-        text(layout, x + inner + names, at, HUD_PLAIN, ink, "%s", rows[i].value);
+        hud_text(layout, x + inner, at, HUD_PLAIN, hud_faint, "%s", rows[i].name);
+        hud_text(layout, x + inner + names, at, HUD_PLAIN, hud_ink, "%s", rows[i].value);
     }
     if (bar > 0) { /* how far it is refined */
         const double at = y + inner + 3 * s + line * ((double)count + 1) + 2 * s;
         const double share = state->moving ? 0 : fmin(1, (double)state->samples / state->samples_wanted);
-        box(layout, x + inner, at, widest, 3 * s, rule);
-        box(layout, x + inner, at, widest * share, 3 * s, share < 1 ? accent : calm);
+        hud_box(layout, x + inner, at, widest, 3 * s, hud_rule);
+        hud_box(layout, x + inner, at, widest * share, 3 * s, share < 1 ? hud_accent : hud_calm);
     }
     return (struct corner){x + widest + 2 * inner, y + ((double)count + 1) * line + 2 * inner + 3 * s + bar};
+}
+
+/* ---- all of it in one line ---- */
+
+static void draw_line(struct hud_layout *layout)
+{
+    const struct hud_state *state = layout->state;
+    const double s = layout->scale, inner = HUD_PADDING * s, gap = 18 * s;
+    struct metrics_summary summary;
+    struct {
+        char value[HUD_TEXT_MAX];
+    } items[7];
+    size_t count = 0;
+    metrics_summarise(state->metrics, state->now_ns, &summary);
+    const double rate = state->local.shown ? summary.views_per_second : summary.frames_per_second;
+    snprintf(items[count++].value, HUD_TEXT_MAX, "%.*f fps", rate > 0 && rate < 9.95 ? 1 : 0, rate);
+    snprintf(items[count++].value, HUD_TEXT_MAX, "%s", state->scene);
+    if (state->camera[0] != '\0')
+        snprintf(items[count++].value, HUD_TEXT_MAX, "%s", state->camera);
+    if (state->clip[0] != '\0')
+        print_clip(state, items[count++].value, HUD_TEXT_MAX);
+    snprintf(items[count++].value, HUD_TEXT_MAX, "%s, %s", protocol_tracer_text(state->settings->tracer),
+             protocol_integrator_text(state->settings->integrator));
+    print_samples(state, items[count++].value, HUD_TEXT_MAX);
+    snprintf(items[count++].value, HUD_TEXT_MAX, "F1: keys");
+    double widths[7], width = 0;
+    size_t shown = 0;
+    for (; shown < count; shown++) {
+        widths[shown] = hud_text_width(layout, HUD_PLAIN, items[shown].value) + (shown > 0 ? gap : 0);
+        if (shown > 0 && width + widths[shown] + 2 * (inner + HUD_MARGIN * s) > state->width)
+            break;
+        width += widths[shown];
+    }
+    double x = HUD_MARGIN * s;
+    const double y = HUD_MARGIN * s;
+    hud_box(layout, x, y, width + 2 * inner, layout->line + inner, hud_panel);
+    x += inner;
+    for (size_t i = 0; i < shown; x += widths[i++])
+        hud_text(layout, i > 0 ? x + gap : x, y + inner / 2, HUD_PLAIN,
+                 i == 0   ? hud_accent
+                 : i == 1 ? hud_ink
+                          : hud_faint,
+                 "%s", items[i].value);
 }
 
 /* ---- how fast, at the top right ---- */
@@ -271,10 +229,10 @@ static size_t print_local(const struct hud_state *state, const struct metrics_su
 }
 
 /* Its bottom; not drawn where it does not fit beside `left`. */
-static double draw_figures(struct layout *layout, double left)
+static double draw_figures(struct hud_layout *layout, double left)
 {
     const struct hud_state *state = layout->state;
-    const double s = layout->scale, line = LINE * s, inner = PADDING * s;
+    const double s = layout->scale, line = HUD_LINE * s, inner = HUD_PADDING * s;
     struct metrics_summary summary;
     struct row rows[6 + LOCAL_ROWS];
     size_t count = 0;
@@ -295,136 +253,30 @@ static double draw_figures(struct layout *layout, double left)
     rows[count++].name = "size";
     snprintf(rows[count].value, HUD_TEXT_MAX, "%llu", (unsigned long long)state->revision);
     rows[count++].name = "revision";
-    double names = 0, values = text_width(layout, HUD_PLAIN, "000 kB, predicted");
+    double names = 0, values = hud_text_width(layout, HUD_PLAIN, "000 kB, predicted");
     for (size_t i = 0; i < count; i++) {
-        names = fmax(names, text_width(layout, HUD_PLAIN, rows[i].name));
-        values = fmax(values, text_width(layout, HUD_PLAIN, rows[i].value));
+        names = fmax(names, hud_text_width(layout, HUD_PLAIN, rows[i].name));
+        values = fmax(values, hud_text_width(layout, HUD_PLAIN, rows[i].value));
     }
-    const double width = names + values + 12 * s + 2 * inner, x = state->width - MARGIN * s - width,
-                 y = MARGIN * s;
-    if (x < left + MARGIN * s)
+    const double width = names + values + 12 * s + 2 * inner, x = layout->right - HUD_MARGIN * s - width,
+                 y = HUD_MARGIN * s;
+    if (x < left + HUD_MARGIN * s)
         return 0;
-    box(layout, x, y, width, (double)count * line + 2 * inner, panel);
+    hud_box(layout, x, y, width, (double)count * line + 2 * inner, hud_panel);
     for (size_t i = 0; i < count; i++) {
         const double at = y + inner + line * (double)i;
-        text(layout, x + inner, at, HUD_PLAIN, faint, "%s", rows[i].name);
-        text_to(layout, x + width - inner, at, HUD_PLAIN, i == 0 ? accent : ink, "%s", rows[i].value);
+        hud_text(layout, x + inner, at, HUD_PLAIN, hud_faint, "%s", rows[i].name);
+        hud_text_to(layout, x + width - inner, at, HUD_PLAIN, i == 0 ? hud_accent : hud_ink, "%s", rows[i].value);
     }
     return y + (double)count * line + 2 * inner;
 }
 
-/* ---- the timeline, at the bottom ---- */
-
-struct axis {
-    double x, width; /* pixels */
-    int64_t begin_ns;
-    double length_ns;
-};
-
-static double place_on(const struct axis *axis, int64_t at_ns)
-{
-    return axis->x + fmax(0, fmin(1, (double)(at_ns - axis->begin_ns) / axis->length_ns)) * axis->width;
-}
-
-/* 1, 2 or 5 times a power of ten: the smallest that fits into the length at most `maximum` times. */
-static double tick_ns(double length_ns, double maximum)
-{
-    const double minimum = length_ns / maximum, power = pow(10, floor(log10(minimum)));
-    return minimum <= power       ? power
-           : minimum <= 2 * power ? 2 * power
-           : minimum <= 5 * power ? 5 * power
-                                  : 10 * power;
-}
-
-static bool choose_axis(const struct metrics *metrics, int64_t offset_ns, struct axis *axis)
-{
-    int64_t begin_ns = INT64_MAX, end_ns = INT64_MIN;
-    for (size_t back = 0; back < TIMELINE_FRAMES; back++) {
-        const struct metrics_frame *frame = metrics_frame(metrics, back);
-        for (int lane = 0; frame && lane < LANE_COUNT; lane++) {
-            struct span span;
-            if (!metrics_span(frame, (enum lane)lane, offset_ns, &span))
-                continue;
-            begin_ns = span.begin_ns < begin_ns ? span.begin_ns : begin_ns;
-            end_ns = span.end_ns > end_ns ? span.end_ns : end_ns;
-        }
-        /* A pause between frames is not worth its room. */
-        const struct metrics_frame *before = metrics_frame(metrics, back + 1);
-        if (!frame || !before || (double)(begin_ns - (int64_t)before->shown_ns) > TIMELINE_MIN_NS * 4)
-            break;
-    }
-    if (end_ns <= begin_ns)
-        return false;
-    axis->length_ns = fmax((double)(end_ns - begin_ns), TIMELINE_MIN_NS);
-    axis->begin_ns = end_ns - (int64_t)axis->length_ns;
-    return true;
-}
-
-static void draw_span(struct layout *layout, const struct axis *axis, double top, enum lane lane,
-                      const struct span *span, bool is_even)
-{
-    const double s = layout->scale, from = place_on(axis, span->begin_ns), to = place_on(axis, span->end_ns);
-    struct hud_colour colour = lane_colours[lane];
-    if (span->end_ns < axis->begin_ns)
-        return;
-    colour.a = is_even ? 255 : 150; /* neighbours are told apart */
-    box(layout, from, top + (double)lane * ROW * s + 2 * s, fmax(to - from, s), ROW * s - 3 * s, colour);
-}
-
-static void draw_frames(struct layout *layout, const struct axis *axis, double top, int64_t offset_ns)
-{
-    const struct metrics *metrics = layout->state->metrics;
-    const double s = layout->scale;
-    for (size_t back = 0; back < METRICS_FRAMES; back++) {
-        const struct metrics_frame *frame = metrics_frame(metrics, back);
-        if (!frame || (int64_t)frame->shown_ns < axis->begin_ns)
-            break;
-        const bool is_even = frame->frame % 2 == 0;
-        for (int lane = 0; lane < LANE_COUNT; lane++) {
-            struct span span;
-            if (metrics_span(frame, (enum lane)lane, offset_ns, &span))
-                draw_span(layout, axis, top, (enum lane)lane, &span, is_even);
-        }
-        box(layout, place_on(axis, (int64_t)frame->shown_ns), top, s, ROW * s * LANE_COUNT,
-            (struct hud_colour){255, 255, 255, 60});
-    }
-}
-
-/* Not drawn where it would come above `top_min`. */
-static void draw_timeline(struct layout *layout, double top_min)
-{
-    const struct hud_state *state = layout->state;
-    const double s = layout->scale, inner = PADDING * s, line = LINE * s;
-    const double rows = ROW * s * LANE_COUNT, height = rows + line + 2 * inner;
-    const double x = MARGIN * s, width = state->width - 2 * MARGIN * s, y = state->height - MARGIN * s - height;
-    const int64_t offset_ns = metrics_clock_offset_ns(state->metrics);
-    struct axis axis = {.x = x + inner + 62 * s};
-    axis.width = x + width - inner - axis.x;
-    if (axis.width < 40 * s || y < top_min + MARGIN * s || !choose_axis(state->metrics, offset_ns, &axis))
-        return;
-    box(layout, x, y, width, height, panel);
-    const double top = y + inner;
-    layout->line = (ROW + 2) * s;
-    for (int lane = 0; lane < LANE_COUNT; lane++)
-        text(layout, x + inner, top + lane * ROW * s - 1 * s, HUD_PLAIN, lane_colours[lane], "%s",
-             lane_names[lane]);
-    layout->line = line;
-    const double label = text_width(layout, HUD_PLAIN, "0000 ms") + 10 * s;
-    const double tick = tick_ns(axis.length_ns, fmax(1, axis.width / label));
-    for (double at = tick; at <= axis.length_ns; at += tick) {
-        const double place = axis.x + at / axis.length_ns * axis.width;
-        box(layout, place, top, s, rows, rule);
-        text_to(layout, place, top + rows + 2 * s, HUD_PLAIN, faint, "%g ms", at * 1e-6);
-    }
-    draw_frames(layout, &axis, top, offset_ns);
-}
-
 /* ---- errors, help, state ---- */
 
-static double draw_legend(struct layout *layout, double bottom)
+static double draw_legend(struct hud_layout *layout, double bottom)
 {
     const struct hud_state *state = layout->state;
-    const double s = layout->scale, inner = PADDING * s, line = LINE * s, bar = 220 * s;
+    const double s = layout->scale, inner = HUD_PADDING * s, line = HUD_LINE * s, bar = 220 * s;
     char figures[HUD_TEXT_MAX];
     if (state->heat == HUD_HEAT_NONE)
         return bottom;
@@ -433,10 +285,10 @@ static double draw_legend(struct layout *layout, double bottom)
     else
         snprintf(figures, sizeof(figures), "mean %.2g, maximum %.2g; %.2g %% of the pixels beyond %g",
                  state->heat_figures.mean, state->heat_figures.max, state->heat_figures.beyond * 100, HEAT_BEYOND);
-    const double width = fmax(bar, text_width(layout, HUD_PLAIN, figures)) + 2 * inner;
-    const double height = 2 * line + 9 * s + 2 * inner, x = MARGIN * s, y = bottom - height;
-    box(layout, x, y, width, height, panel);
-    text(layout, x + inner, y + inner, HUD_PLAIN, ink, "errors against the reference");
+    const double width = fmax(bar, hud_text_width(layout, HUD_PLAIN, figures)) + 2 * inner;
+    const double height = 2 * line + 9 * s + 2 * inner, x = HUD_MARGIN * s, y = bottom - height;
+    hud_box(layout, x, y, width, height, hud_panel);
+    hud_text(layout, x + inner, y + inner, HUD_PLAIN, hud_ink, "errors against the reference");
     for (int i = 0; i < 64; i++) {
         struct hud_colour colour = {.a = 255};
         uint8_t rgb[3];
@@ -444,14 +296,14 @@ static double draw_legend(struct layout *layout, double bottom)
         colour.r = rgb[0];
         colour.g = rgb[1];
         colour.b = rgb[2];
-        box(layout, x + inner + bar * i / 64, y + inner + line + s, bar / 64 + 0.5, 6 * s, colour);
+        hud_box(layout, x + inner + bar * i / 64, y + inner + line + s, bar / 64 + 0.5, 6 * s, colour);
     }
-    text_to(layout, x + width - inner, y + inner, HUD_PLAIN, faint, "0 .. %g", state->heat_top);
-    text(layout, x + inner, y + inner + line + 9 * s, HUD_PLAIN, ink, "%s", figures);
-    return y - MARGIN * s;
+    hud_text_to(layout, x + width - inner, y + inner, HUD_PLAIN, hud_faint, "0 .. %g", state->heat_top);
+    hud_text(layout, x + inner, y + inner + line + 9 * s, HUD_PLAIN, hud_ink, "%s", figures);
+    return y - HUD_MARGIN * s;
 }
 
-static void draw_help(struct layout *layout)
+static void draw_help(struct hud_layout *layout)
 {
     const struct hud_state *state = layout->state;
     const double s = layout->scale, inner = 14 * s, gap = 24 * s, usual = layout->line;
@@ -465,55 +317,58 @@ static void draw_help(struct layout *layout)
     for (size_t i = 0; i < input_binding_count; i++) {
         if (!input_bindings[i].keys)
             continue;
-        keys = fmax(keys, text_width(layout, HUD_BOLD, input_bindings[i].keys));
-        docs = fmax(docs, text_width(layout, HUD_PLAIN, input_bindings[i].doc));
+        keys = fmax(keys, hud_text_width(layout, HUD_BOLD, input_bindings[i].keys));
+        docs = fmax(docs, hud_text_width(layout, HUD_PLAIN, input_bindings[i].doc));
     }
     const double width = keys + docs + gap + 2 * inner, height = line * (double)count + 2 * inner;
     const double x = (state->width - width) / 2, y = (state->height - height) / 2;
     double at = y + inner;
-    box(layout, x, y, width, height, (struct hud_colour){14, 17, 22, 235});
+    hud_box(layout, x, y, width, height, (struct hud_colour){14, 17, 22, 235});
     for (size_t i = 0; i < input_binding_count; i++) {
         if (!input_bindings[i].keys)
             continue;
-        text(layout, x + inner, at, HUD_BOLD, accent, "%s", input_bindings[i].keys);
-        text(layout, x + inner + keys + gap, at, HUD_PLAIN, ink, "%s", input_bindings[i].doc);
+        hud_text(layout, x + inner, at, HUD_BOLD, hud_accent, "%s", input_bindings[i].keys);
+        hud_text(layout, x + inner + keys + gap, at, HUD_PLAIN, hud_ink, "%s", input_bindings[i].doc);
         at += line;
     }
     layout->line = usual;
 }
 
 /* In the middle of the window: nothing else is as important. */
-static void draw_status(struct layout *layout)
+static void draw_status(struct hud_layout *layout)
 {
     const struct hud_state *state = layout->state;
-    const double s = layout->scale, inner = 16 * s, line = LINE * s;
-    const bool is_lost = state->status == HUD_LOST;
-    const char *title = is_lost ? "The connection is lost" : "Loading";
+    const double s = layout->scale, inner = 16 * s, line = HUD_LINE * s;
+    const bool is_lost = state->status != HUD_LOADING; /* or refused */
+    const char *title = state->status == HUD_REFUSED ? "This scene cannot be shown"
+                        : is_lost                    ? "The connection is lost"
+                                                     : "Loading";
     char what[HUD_TEXT_MAX];
     snprintf(what, sizeof(what), "%s", state->status_text);
-    const double maximum = state->width - 2 * inner - 2 * MARGIN * s;
-    for (size_t length = strlen(what); length > 4 && text_width(layout, HUD_PLAIN, what) > maximum; length--)
-        strcpy(what + length - 4, "..");
+    const double maximum = state->width - 2 * inner - 2 * HUD_MARGIN * s;
+    hud_fit(layout, HUD_PLAIN, what, maximum);
     const double bar = fmin(320 * s, maximum);
-    const double width = fmax(fmax(bar, text_width(layout, HUD_PLAIN, what)), text_width(layout, HUD_BOLD, title));
+    const double width =
+        fmax(fmax(bar, hud_text_width(layout, HUD_PLAIN, what)), hud_text_width(layout, HUD_BOLD, title));
     const double height = 2 * line + (is_lost ? 4 : 14) * s + 2 * inner;
     const double x = (state->width - width) / 2 - inner, y = (state->height - height) / 2;
-    box(layout, x, y, width + 2 * inner, height, panel);
-    box(layout, x, y, 3 * s, height, is_lost ? alarm : accent);
-    text(layout, x + inner, y + inner, HUD_BOLD, is_lost ? alarm : ink, "%s", title);
-    text(layout, x + inner, y + inner + line + 2 * s, HUD_PLAIN, is_lost ? ink : faint, "%s", what);
+    hud_box(layout, x, y, width + 2 * inner, height, hud_panel);
+    hud_box(layout, x, y, 3 * s, height, is_lost ? hud_alarm : hud_accent);
+    hud_text(layout, x + inner, y + inner, HUD_BOLD, is_lost ? hud_alarm : hud_ink, "%s", title);
+    hud_text(layout, x + inner, y + inner + line + 2 * s, HUD_PLAIN, is_lost ? hud_ink : hud_faint, "%s", what);
     if (!is_lost) {
-        box(layout, x + inner, y + height - inner - 4 * s, width, 4 * s, rule);
-        box(layout, x + inner, y + height - inner - 4 * s, width * fmin(1, state->progress), 4 * s, accent);
+        hud_box(layout, x + inner, y + height - inner - 4 * s, width, 4 * s, hud_rule);
+        hud_box(layout, x + inner, y + height - inner - 4 * s, width * fmin(1, state->progress), 4 * s,
+                hud_accent);
     }
 }
 
 /* The settings of the tracer, below `top`; the chosen one with what it means. */
-static void draw_panel(struct layout *layout, double top)
+static void draw_panel(struct hud_layout *layout, double top)
 {
     const struct hud_state *state = layout->state;
     const struct settings *settings = state->settings;
-    const double s = layout->scale, line = LINE * s, inner = PADDING * s;
+    const double s = layout->scale, line = HUD_LINE * s, inner = HUD_PADDING * s;
     const size_t count = panel_setting_count(settings->tracer);
     const struct field_desc *chosen = panel_setting(settings->tracer, settings->setting);
     char value[40], doc[HUD_TEXT_MAX];
@@ -522,62 +377,70 @@ static void draw_panel(struct layout *layout, double top)
     for (size_t i = 0; i < count; i++) {
         const struct field_desc *setting = panel_setting(settings->tracer, i);
         panel_value(setting, &settings->tracers, value, sizeof(value));
-        names = fmax(names, text_width(layout, HUD_PLAIN, setting->name));
-        values = fmax(values, text_width(layout, HUD_BOLD, value));
+        names = fmax(names, hud_text_width(layout, HUD_PLAIN, setting->name));
+        values = fmax(values, hud_text_width(layout, HUD_BOLD, value));
     }
     names += 12 * s;
-    const double width =
-        fmin(fmax(names + values, text_width(layout, HUD_PLAIN, doc)) + 2 * inner, state->width - 2 * MARGIN * s);
-    const double x = MARGIN * s, height = line * (double)(count + 1) + 2 * inner + 3 * s;
-    const double y = fmax(0, fmin(top + MARGIN * s, state->height - height));
-    box(layout, x, y, width, height, panel);
+    const double width = fmin(fmax(names + values, hud_text_width(layout, HUD_PLAIN, doc)) + 2 * inner,
+                              state->width - 2 * HUD_MARGIN * s);
+    const double x = HUD_MARGIN * s, height = line * (double)(count + 1) + 2 * inner + 3 * s;
+    const double y = fmax(0, fmin(top + HUD_MARGIN * s, state->height - height));
+    hud_box(layout, x, y, width, height, hud_panel);
     for (size_t i = 0; i < count; i++) {
         const struct field_desc *setting = panel_setting(settings->tracer, i);
         const bool is_chosen = i == settings->setting;
         panel_value(setting, &settings->tracers, value, sizeof(value));
-        text(layout, x + inner, y + inner + line * (double)i, HUD_PLAIN, is_chosen ? accent : faint, "%s",
-             setting->name);
-        text(layout, x + inner + names, y + inner + line * (double)i, is_chosen ? HUD_BOLD : HUD_PLAIN, ink, "%s",
-             value);
+        hud_text(layout, x + inner, y + inner + line * (double)i, HUD_PLAIN, is_chosen ? hud_accent : hud_faint,
+                 "%s", setting->name);
+        hud_text(layout, x + inner + names, y + inner + line * (double)i, is_chosen ? HUD_BOLD : HUD_PLAIN,
+                 hud_ink, "%s", value);
     }
-    while (doc[0] != '\0' && text_width(layout, HUD_PLAIN, doc) > width - 2 * inner)
+    while (doc[0] != '\0' && hud_text_width(layout, HUD_PLAIN, doc) > width - 2 * inner)
         doc[strlen(doc) - 1] = '\0';
-    text(layout, x + inner, y + inner + line * (double)count + 3 * s, HUD_PLAIN, faint, "%s", doc);
+    hud_text(layout, x + inner, y + inner + line * (double)count + 3 * s, HUD_PLAIN, hud_faint, "%s", doc);
 }
 
-static void draw_notice(struct layout *layout, double bottom)
+static void draw_notice(struct hud_layout *layout, double bottom)
 {
     const struct hud_state *state = layout->state;
-    const double s = layout->scale, inner = PADDING * s, line = LINE * s;
-    const double width = text_width(layout, HUD_PLAIN, state->notice) + 2 * inner;
+    const double s = layout->scale, inner = HUD_PADDING * s, line = HUD_LINE * s;
+    char notice[HUD_TEXT_MAX];
+    snprintf(notice, sizeof(notice), "%s", state->notice);
+    hud_fit(layout, HUD_PLAIN, notice, state->width - 2 * inner - 2 * HUD_MARGIN * s);
+    const double width = hud_text_width(layout, HUD_PLAIN, notice) + 2 * inner;
     const double x = (state->width - width) / 2, y = bottom - line - 2 * inner;
-    box(layout, x, y, width, line + 2 * inner, panel);
-    text(layout, x + inner, y + inner, HUD_PLAIN, accent, "%s", state->notice);
+    hud_box(layout, x, y, width, line + 2 * inner, hud_panel);
+    hud_text(layout, x + inner, y + inner, HUD_PLAIN, hud_accent, "%s", notice);
 }
 
 void hud_layout(struct hud *hud, const struct hud_state *state, hud_measure *measure, void *user)
 {
-    struct layout layout = {.hud = hud,
-                            .state = state,
-                            .measure = measure,
-                            .user = user,
-                            .scale = state->scale,
-                            .line = LINE * state->scale};
+    struct hud_layout layout = {.hud = hud,
+                                .state = state,
+                                .measure = measure,
+                                .user = user,
+                                .scale = state->scale,
+                                .right = state->width - hud_edit_width(state->edit, state->width, state->scale),
+                                .line = HUD_LINE * state->scale};
     const enum overlay_mode overlay = state->settings->overlay;
-    double bottom = state->height - MARGIN * state->scale, top = 0;
+    double bottom = state->height - HUD_MARGIN * state->scale, top = 0;
     hud->count = 0;
-    if (state->status != HUD_LOADING && overlay != OVERLAY_NONE) {
+    if (state->status != HUD_LOADING && overlay == OVERLAY_LINE) {
+        draw_line(&layout);
+        top = (HUD_MARGIN + HUD_PADDING + HUD_LINE) * state->scale;
+    } else if (state->status != HUD_LOADING && overlay != OVERLAY_NONE) {
         const struct corner corner = draw_scene(&layout);
         top = corner.bottom;
         const double figures = draw_figures(&layout, corner.right);
         const size_t before = hud->count;
         if (overlay == OVERLAY_ALL)
-            draw_timeline(&layout, fmax(corner.bottom, figures));
+            hud_draw_timeline(&layout, fmax(corner.bottom, figures));
         if (hud->count > before) /* its first mark is its panel */
-            bottom = hud->marks[before].y - MARGIN * state->scale;
+            bottom = hud->marks[before].y - HUD_MARGIN * state->scale;
     }
     if (overlay != OVERLAY_NONE)
         bottom = draw_legend(&layout, bottom);
+    hud_draw_edit(&layout);
     if (state->settings->panel)
         draw_panel(&layout, top);
     if (state->notice[0] != '\0')

@@ -5,6 +5,7 @@
 #define FARLIGHT_CLIENT_VIEWER_HUD_H
 
 #include "viewer/heat.h"
+#include "viewer/hud_edit.h"
 #include "viewer/metrics.h"
 #include "viewer/settings.h"
 #include "viewer/tour.h"
@@ -34,7 +35,7 @@ struct hud {
     size_t count;
 };
 
-enum hud_status { HUD_LOADING, HUD_LIVE, HUD_LOST };
+enum hud_status { HUD_LOADING, HUD_LIVE, HUD_LOST, HUD_REFUSED };
 
 /* Views that are made here. */
 struct hud_local {
@@ -69,6 +70,7 @@ struct hud_state {
     enum protocol_encoding encoding;
     unsigned quality;
     struct hud_local local;
+    const struct hud_edit *edit; /* NULL: none */
     enum { HUD_HEAT_NONE, HUD_HEAT_WAITING, HUD_HEAT_SHOWN } heat;
     struct heat_figures heat_figures;
     double heat_top;

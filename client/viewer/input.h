@@ -15,8 +15,10 @@ enum input_kind {
     INPUT_WHEEL,
     INPUT_KEY_DOWN,
     INPUT_KEY_UP,
+    INPUT_TEXT,
     INPUT_RESIZE,
     INPUT_FOCUS_LOST,
+    INPUT_DROP,
     INPUT_QUIT
 };
 
@@ -29,9 +31,11 @@ struct input {
     double x, y;       /* pointer, pixels of the window from its top left */
     double wheel;      /* notches away from the person */
     char key[16];      /* as the key is labelled, in small letters: "a", "f1", "space", "[" */
-    bool shift;        /* held */
+    bool shift, ctrl;  /* held */
+    char text[16];     /* INPUT_TEXT: what was typed, by whatever keys */
     int width, height; /* of a window of another size, pixels */
     double scale;      /* pixels of the window per pixel of the desktop, for text */
+    const char *path;  /* of a file that is dropped on the window; until the next event */
 };
 
 /* What a key does at once. */
@@ -40,6 +44,7 @@ enum action {
     ACTION_QUIT,
     ACTION_HELP,
     ACTION_OVERLAY,
+    ACTION_OVERLAY_BACK,
     ACTION_FULL_SCREEN,
     ACTION_SCREENSHOT,
     ACTION_HOME,
@@ -70,6 +75,12 @@ enum action {
     ACTION_PANEL,
     ACTION_UP,
     ACTION_DOWN,
+    ACTION_PICK,
+    ACTION_EDIT,
+    ACTION_EDIT_NEXT,
+    ACTION_EDIT_PREVIOUS,
+    ACTION_UNDO,
+    ACTION_REDO,
 };
 
 /* One line of the list of keys; those with action NONE are held down or of the mouse. */

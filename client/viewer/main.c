@@ -35,7 +35,8 @@ enum key {
     KEY_WEIGHT,
     KEY_EYES,
     KEY_VIEWS,
-    KEY_HOLES
+    KEY_HOLES,
+    KEY_STATE
 };
 
 static const struct argp_option options[] = {
@@ -75,6 +76,10 @@ static const struct argp_option options[] = {
      -2},
     {"holes", KEY_HOLES, "fill|pattern", 0,
      "Fill what no picture shows yet from what lies around it (default), or mark it", -2},
+    {"state", KEY_STATE, "FILE|none", 0,
+     "Remember the window's place and what keys choose in this file (default: farlight/viewer.json in "
+     "$XDG_STATE_HOME or ~/.local/state; with --replay none)",
+     -2},
     {"replay", KEY_REPLAY, "INPUT.json", 0, "Read timed input events from this file; exit after the last", -2},
     {"headless", KEY_HEADLESS, NULL, 0, "Open no window; needs --replay", -2},
     {0}};
@@ -194,7 +199,6 @@ static error_t parse(int key, char *value, struct argp_state *state)
     switch (key) {
     case ARGP_KEY_INIT:
         state->child_inputs[0] = &line->job;
-        viewer->local = LOCAL_AUTO;
         return 0;
     case ARGP_KEY_ARG:
         return cli_set_model(&line->job, value);
@@ -206,6 +210,9 @@ static error_t parse(int key, char *value, struct argp_state *state)
         return 0;
     case KEY_HEADLESS:
         viewer->headless = true;
+        return 0;
+    case KEY_STATE:
+        viewer->state = value;
         return 0;
     case KEY_REPLAY:
         viewer->replay = value;
@@ -325,6 +332,57 @@ static void fill(struct command_line *line)
     viewer->note = job->quiet ? NULL : on_note;
 }
 
+/* What is remembered stands for the defaults: variables and options count for more. */
+static bool read_line(struct command_line *line, const struct argp *argp, int argc, char **argv,
+                      const struct recall *recall)
+{
+    struct message_render defaults = fl_view_defaults();
+    struct settings settings = {.tracer = defaults.tracer,
+                                .integrator = defaults.integrator,
+                                .tone_map = defaults.tone_map,
+                                .local = LOCAL_AUTO};
+    recall_apply(recall, &settings);
+    defaults.tracer = settings.tracer;
+    defaults.integrator = settings.integrator;
+    defaults.tone_map = settings.tone_map;
+    if (recall->width > 0) {
+        defaults.width = (uint32_t)recall->width;
+        defaults.height = (uint32_t)recall->height;
+    }
+    *line = (struct command_line){.viewer = {.local = settings.local,
+                                             .holes = settings.holes,
+                                             .coarser = (unsigned)settings.coarser,
+                                             .overlay = settings.overlay,
+                                             .recall = *recall}};
+    return cli_job_begin(&line->job, defaults) && cli_parse(argp, argc, argv, ARGP_IN_ORDER, line) == 0 && complete(line);
+}
+
+/* A file of that name is named with its folder: ./none. */
+static const char *state_file(const struct viewer_options *viewer)
+{
+    static char path[4096];
+    if (viewer->state)
+        return strcmp(viewer->state, "none") == 0 ? NULL : viewer->state;
+    return !viewer->replay && recall_default_path(path, sizeof(path)) ? path : NULL;
+}
+
+/* The command line says which file is remembered in, so it is read a second time. */
+static bool read_all(struct command_line *line, const struct argp *argp, int argc, char **argv)
+{
+    struct recall recall = {0};
+    if (!read_line(line, argp, argc, argv, &recall))
+        return false;
+    const char *state = state_file(&line->viewer);
+    if (state)
+        recall_load(&recall, state);
+    /* What is remembered must not make a command line wrong. */
+    if (state && !read_line(line, argp, argc, argv, &recall) &&
+        !read_line(line, argp, argc, argv, &(struct recall){0}))
+        return false;
+    line->viewer.state = state;
+    return true;
+}
+
 int main(int argc, char **argv)
 {
     static struct argp_child children[2];
@@ -340,8 +398,7 @@ int main(int argc, char **argv)
                                      .help_filter = help_filter};
     static struct command_line line;
     argp_err_exit_status = CLI_USAGE;
-    if (!cli_job_begin(&line.job, fl_view_defaults()) || cli_parse(&argp, argc, argv, ARGP_IN_ORDER, &line) != 0 ||
-        !complete(&line))
+    if (!read_all(&line, &argp, argc, argv))
         return cli_report(&line.job.error);
     struct fl_error error = {0};
     if (!cli_interrupt_begin(&error) || !cli_read_input(&line.job, &error))

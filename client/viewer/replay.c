@@ -75,19 +75,19 @@ static bool read_mouse(struct reader *reader, const json_t *json, struct replay_
 
 static bool read_wait(struct reader *reader, const json_t *json, struct replay_event *event)
 {
-    static const char *const names[] = {"rest", "live", "lost", "camera"};
+    static const char *const names[] = {"rest", "live", "lost", "camera", "change"};
     const char *name = json_string_value(json_object_get(json, "wait"));
     double samples = 0;
     if (!read_number(reader, json, "samples", 1, 65536, &samples) ||
         !read_number(reader, json, "timeout", 0, SECONDS_MAX, &event->timeout_s))
         return false;
     event->samples = (unsigned)samples;
-    for (int i = 0; i < 4 && name; i++)
+    for (int i = 0; i < 5 && name; i++)
         if (strcmp(name, names[i]) == 0) {
             event->kind = (enum replay_kind)(REPLAY_REST + i);
             return true;
         }
-    return refuse(reader, "wait", "is not one of rest, live, lost, camera");
+    return refuse(reader, "wait", "is not one of rest, live, lost, camera, change");
 }
 
 static bool read_resize(struct reader *reader, const json_t *json, struct replay_event *event)
@@ -121,6 +121,7 @@ static bool read_event(struct reader *reader, const json_t *json, struct replay 
     struct replay_event *event = &replay->events[replay->count];
     *event = (struct replay_event){.number = reader->event.index, .timeout_s = TIMEOUT_S};
     event->input.shift = json_is_true(json_object_get(json, "shift"));
+    event->input.ctrl = json_is_true(json_object_get(json, "ctrl"));
     if (!read_number(reader, json, "after", 0, SECONDS_MAX, &event->after_s))
         return false;
     bool good = false;
@@ -131,10 +132,17 @@ static bool read_event(struct reader *reader, const json_t *json, struct replay 
         good = read_number(reader, json, "wheel", -1000, 1000, &event->input.wheel);
     } else if (json_object_get(json, "key")) {
         good = read_key(reader, json, replay, event);
+    } else if (json_object_get(json, "text")) {
+        event->input.kind = INPUT_TEXT;
+        good = read_text(reader, json, "text", event->input.text, sizeof(event->input.text));
     } else if (json_object_get(json, "resize")) {
         good = read_resize(reader, json, event);
     } else if (json_object_get(json, "wait")) {
         good = read_wait(reader, json, event);
+    } else if (json_object_get(json, "drop")) {
+        event->input.kind = INPUT_DROP;
+        event->input.path = event->path;
+        good = read_text(reader, json, "drop", event->path, sizeof(event->path));
     } else if (json_object_get(json, "screenshot")) {
         event->kind = REPLAY_SCREENSHOT;
         good = read_text(reader, json, "screenshot", event->path, sizeof(event->path));
@@ -146,7 +154,8 @@ static bool read_event(struct reader *reader, const json_t *json, struct replay 
         event->input.kind = INPUT_KEY_UP;
         good = true;
     } else {
-        return refuse(reader, NULL, "is not one of mouse, wheel, key, resize, wait, screenshot, state, after");
+        return refuse(reader, NULL,
+                      "is not one of mouse, wheel, key, text, resize, drop, wait, screenshot, state, after");
     }
     replay->count++;
     return good;

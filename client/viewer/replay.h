@@ -6,12 +6,13 @@
 #include "viewer/input.h"
 
 enum replay_kind {
-    REPLAY_INPUT,
+    REPLAY_INPUT,      /* a dropped file is `path` */
     REPLAY_REST,       /* wait until the picture is at rest, with all samples or `samples` of them, or the map has
                           arrived */
     REPLAY_LIVE,       /* wait until the scene is there */
     REPLAY_LOST,       /* wait until the connection is lost */
     REPLAY_CAMERA,     /* wait until the picture is of the newest camera, the daemon's own or made here */
+    REPLAY_CHANGE,     /* wait until somebody has changed the scene since the event before */
     REPLAY_SCREENSHOT, /* into `path` */
     REPLAY_STATE       /* one line of JSON on standard output */
 };
@@ -32,11 +33,11 @@ struct replay {
 };
 
 /* Reads
- *   [{"mouse": "down", "button": "left", "x": 100, "y": 80, "clicks": 1, "shift": false},
+ *   [{"mouse": "down", "button": "left", "x": 100, "y": 80, "clicks": 1, "shift": false, "ctrl": false},
  *    {"mouse": "move", "x": 120, "y": 80, "after": 0.02}, {"mouse": "up", "button": "left", "x": 120, "y": 80},
- *    {"wheel": 2}, {"key": "t", "shift": true}, {"key": "w", "hold": 0.5},
- *    {"resize": [640, 360]}, {"wait": "rest", "samples": 8, "timeout": 60}, {"wait": "live"}, {"wait": "lost"},
- * {"wait": "camera"},
+ *    {"wheel": 2}, {"key": "t", "shift": true}, {"key": "w", "hold": 0.5}, {"text": "0.5"},
+ *    {"resize": [640, 360]}, {"drop": "teapot.glb"}, {"wait": "rest", "samples": 8, "timeout": 60},
+ *    {"wait": "live"}, {"wait": "lost"}, {"wait": "camera"}, {"wait": "change"},
  *    {"screenshot": "a.png"}, {"state": "name"}]
  * "after" is in seconds since the previous event was finished, default 0. Errors name the file, the line and the
  * event.

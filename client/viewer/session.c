@@ -427,3 +427,33 @@ void session_give_up(struct session *session)
     fl_render_destroy(session->job);
     session->job = NULL;
 }
+
+/* ---- the scene's objects ---- */
+
+bool session_objects(struct session *session, enum protocol_object_kind kind, struct fl_object **objects,
+                     size_t *count, struct fl_error *refusal)
+{
+    struct fl_error error = {0};
+    return fl_scene_objects(session->scene, kind, objects, count, &error) || fail(session, &error, refusal);
+}
+
+bool session_object(struct session *session, enum protocol_object_kind kind, uint32_t id, struct fl_object *object,
+                    struct fl_error *refusal)
+{
+    struct fl_error error = {0};
+    return fl_scene_object(session->scene, kind, id, object, &error) || fail(session, &error, refusal);
+}
+
+bool session_read(struct session *session, enum protocol_object_kind kind, uint32_t id,
+                  struct fl_object_state *state, struct fl_error *refusal)
+{
+    struct fl_error error = {0};
+    return fl_scene_read(session->scene, kind, id, state, &error) || fail(session, &error, refusal);
+}
+
+bool session_edit(struct session *session, const struct fl_assignment *assignments, size_t count,
+                  struct fl_edited *edited, struct fl_error *refusal)
+{
+    struct fl_error error = {0};
+    return fl_scene_edit(session->scene, assignments, count, edited, &error) || fail(session, &error, refusal);
+}

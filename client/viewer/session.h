@@ -64,4 +64,14 @@ bool session_ask(struct session *session, const struct message_render *options, 
 struct fl_frame *session_answer(struct session *session, struct fl_error *refusal);
 void session_give_up(struct session *session); /* what was asked for */
 
+/* The scene's objects, as the functions of the library; they wait for the daemon. False: refused, or lost. */
+bool session_objects(struct session *session, enum protocol_object_kind kind, struct fl_object **objects,
+                     size_t *count, struct fl_error *refusal);
+bool session_object(struct session *session, enum protocol_object_kind kind, uint32_t id, struct fl_object *object,
+                    struct fl_error *refusal);
+bool session_read(struct session *session, enum protocol_object_kind kind, uint32_t id,
+                  struct fl_object_state *state, struct fl_error *refusal);
+bool session_edit(struct session *session, const struct fl_assignment *assignments, size_t count,
+                  struct fl_edited *edited, struct fl_error *refusal);
+
 #endif

@@ -110,7 +110,9 @@ enum settings_change settings_act(struct settings *settings, enum action action)
         settings->help = !settings->help;
         return SETTINGS_DRAWN;
     case ACTION_OVERLAY:
-        settings->overlay = (enum overlay_mode)around((int)settings->overlay, 1, OVERLAY_MODE_COUNT);
+    case ACTION_OVERLAY_BACK:
+        settings->overlay = (enum overlay_mode)around((int)settings->overlay, action == ACTION_OVERLAY ? 1 : -1,
+                                                      OVERLAY_MODE_COUNT);
         return SETTINGS_DRAWN;
     default:
         return change_view(settings, action) ? SETTINGS_VIEW : SETTINGS_SAME;

@@ -7,7 +7,7 @@
 #include "viewer/panel.h"
 #include "viewer/plan.h"
 
-enum overlay_mode { OVERLAY_ALL, OVERLAY_FIGURES, OVERLAY_NONE, OVERLAY_MODE_COUNT };
+enum overlay_mode { OVERLAY_LINE, OVERLAY_ALL, OVERLAY_FIGURES, OVERLAY_NONE, OVERLAY_MODE_COUNT };
 
 struct settings {
     enum protocol_tracer tracer;

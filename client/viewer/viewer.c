@@ -5,6 +5,7 @@
 #include "protocol/common/clock.h"
 
 #include <errno.h>
+#include <math.h>
 #include <poll.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -41,6 +42,8 @@ static bool settle(struct viewer *viewer, struct fl_error *error)
     uint32_t clip = 0;
     tour_begin(&viewer->tour, fl_scene_camera_count(scene), fl_scene_clip_count(scene));
     viewer->tour.speed = options->speed;
+    if (viewer->model) /* what the command line names is of its own */
+        return cli_find_camera(job, NULL, NULL, options->has_framing, scene, error);
     if (!cli_find_camera(job, options->camera, options->framed, options->has_framing, scene, error))
         return false;
     if (!options->clip)
@@ -65,14 +68,6 @@ static void fit_tour(struct viewer *viewer)
     tour_begin(tour, cameras, clips);
     tour->speed = speed;
     viewer->followed = 0;
-}
-
-static void say_stale(void *user, const struct fl_error *error)
-{
-    char line[1200];
-    fl_error_print(error, line, sizeof(line));
-    viewer_say(user, "%s", line);
-    cli_report(error);
 }
 
 static void begin_showing(struct viewer *viewer)
@@ -127,9 +122,13 @@ static void take_input(struct viewer *viewer, uint64_t now_ns)
 
 static void serve(struct viewer *viewer, uint64_t now_ns)
 {
-    const enum session_state state = session_step(viewer->session, now_ns);
     const bool is_busy = viewer->moved_ns + BUSY_NS > now_ns || viewer->replay.count > 0;
     const unsigned wait_ms = viewer->must_draw ? 0 : is_busy ? BUSY_WAIT_MS : IDLE_WAIT_MS;
+    if (viewer_edit_works(viewer, false)) {
+        poll(NULL, 0, (int)wait_ms);
+        return;
+    }
+    const enum session_state state = session_step(viewer->session, now_ns);
     if (state == SESSION_FAILED) {
         viewer->failure = *session_error(viewer->session);
         return;
@@ -145,6 +144,7 @@ static void serve(struct viewer *viewer, uint64_t now_ns)
     viewer_tell(viewer, now_ns);
     viewer_receive(viewer, wait_ms);
     viewer_step_tasks(viewer);
+    viewer_step_edit(viewer, now_ns);
 }
 
 static void draw(struct viewer *viewer)
@@ -169,6 +169,7 @@ static bool run(struct viewer *viewer)
         take_input(viewer, now_ns);
         tick(viewer, now_ns);
         viewer_step_local(viewer, now_ns);
+        viewer_step_opening(viewer, now_ns);
         serve(viewer, now_ns);
         draw(viewer);
         viewer->must_draw = false;
@@ -183,36 +184,54 @@ static bool run(struct viewer *viewer)
 static bool open_viewer(struct viewer *viewer, struct fl_error *error)
 {
     const struct viewer_options *options = viewer->options;
-    const struct session_options session = {.server = options->server,
-                                            .key_file = options->key_file,
-                                            .link = options->link,
-                                            .model = options->model,
-                                            .models = options->models,
-                                            .model_count = options->model_count,
-                                            .input_fd = options->input_fd,
-                                            .watch = options->watch,
-                                            .stale = say_stale,
-                                            .user = viewer,
-                                            .environment = options->environment,
-                                            .environment_degrees = options->environment_degrees,
-                                            .variant = options->variant,
-                                            .point_size = options->point_size,
-                                            .scene_name = options->scene_name,
-                                            .interrupt_fd = options->interrupt_fd,
-                                            .note = options->note};
+    const struct recall *recall = &options->recall;
+    const struct window_place place = {.width = viewer->width,
+                                       .height = viewer->height,
+                                       .has_place = recall->has_place,
+                                       .x = recall->x,
+                                       .y = recall->y,
+                                       .full_screen = recall->full_screen};
     if (options->replay && !replay_load(&viewer->replay, options->replay, error))
         return false;
     if (!options->headless) {
-        viewer->window = window_create(options->scene_name ? options->scene_name : options->model, viewer->width,
-                                       viewer->height, error);
+        viewer->window = window_create(viewer_scene_name(viewer), &place, error);
         if (!viewer->window)
             return false;
         window_size(viewer->window, &viewer->width, &viewer->height, &viewer->scale);
     }
     /* Only after the window is open: SDL starts programs of the desktop, whose pipes a daemon that is started
      * meanwhile must not inherit. */
-    viewer->session = session_create(&session, error);
+    viewer->session = viewer_open_session(viewer, NULL, error);
     return viewer->session != NULL;
+}
+
+/* That it cannot be remembered is no failure of what was shown. */
+static void remember(const struct viewer *viewer)
+{
+    const struct viewer_options *options = viewer->options;
+    struct recall recall = options->recall;
+    struct window_place place = {.full_screen = recall.full_screen,
+                                 .width = (int)lround(viewer->width / viewer->scale),
+                                 .height = (int)lround(viewer->height / viewer->scale)};
+    struct fl_error error = {0};
+    if (!options->state)
+        return;
+    recall_note(&recall, &viewer->first, &viewer->settings);
+    const bool is_placed = viewer->window && window_get_place(viewer->window, &place);
+    if (is_placed) {
+        recall.has_place = true;
+        recall.x = place.x;
+        recall.y = place.y;
+    }
+    recall.full_screen = place.full_screen;
+    /* A size from the command line is for once. */
+    if (!place.full_screen &&
+        (place.width != (int)options->view.width || place.height != (int)options->view.height)) {
+        recall.width = place.width;
+        recall.height = place.height;
+    }
+    if (!recall_save(&recall, options->state, &error) && !options->quiet)
+        cli_report(&error);
 }
 
 static void close_viewer(struct viewer *viewer)
@@ -222,7 +241,10 @@ static void close_viewer(struct viewer *viewer)
     if (write(viewer->options->interrupt_fd, &one, sizeof(one)) < 0)
         errno = 0; /* it is readable already */
     window_destroy(viewer->window);
+    viewer_abandon_opening(viewer);
+    viewer_edit_works(viewer, true);
     session_destroy(viewer->session);
+    free(viewer->model);
     decoder_destroy(viewer->decoder);
     views_destroy(viewer->views);
     pixmap_finish(&viewer->arrived);
@@ -230,6 +252,7 @@ static void close_viewer(struct viewer *viewer)
     pixmap_finish(&viewer->live);
     pixmap_finish(&viewer->compared);
     pixmap_finish(&viewer->heat);
+    viewer_edit_forget(viewer);
     replay_finish(&viewer->replay);
 }
 
@@ -243,17 +266,22 @@ bool viewer_run(const struct viewer_options *options, struct fl_error *error)
     viewer->width = (int)options->view.width;
     viewer->height = (int)options->view.height;
     viewer->scale = 1;
+    viewer->edit.tab = EDIT_MATERIAL;
     viewer->settings = (struct settings){.tracer = options->view.tracer,
                                          .integrator = options->view.integrator,
                                          .tone_map = options->view.tone_map,
                                          .tracers = options->view.settings,
                                          .coarser = (int)options->coarser,
+                                         .overlay = options->overlay,
                                          .stereo = options->stereo,
                                          .views = options->views,
                                          .local = options->local,
                                          .holes = options->holes};
+    viewer->first = viewer->settings;
     const bool opened = open_viewer(viewer, error);
     const bool done = opened && run(viewer);
+    if (opened)
+        remember(viewer);
     if (opened && !done)
         *error = viewer->failure;
     close_viewer(viewer);

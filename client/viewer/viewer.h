@@ -5,6 +5,7 @@
 #define FARLIGHT_CLIENT_VIEWER_VIEWER_H
 
 #include "viewer/plan.h"
+#include "viewer/recall.h"
 
 struct viewer_options {
     const char *server, *key_file, *link, *model, *environment, *scene_name; /* as of session_options */
@@ -28,7 +29,10 @@ struct viewer_options {
     double speed;              /* of the clip */
     unsigned coarser;          /* as of struct settings */
     enum local_views local;    /* likewise */
+    enum overlay_mode overlay;
     enum fl_warp_holes holes;
+    const char *state;    /* the file of what is remembered; NULL: none */
+    struct recall recall; /* what was in it */
     bool headless;
     const char *replay; /* path; NULL: a person */
     bool quiet;

@@ -45,7 +45,8 @@ static void next_camera(struct viewer *viewer, int step)
     viewer->wanted = TASK_CAMERA;
 }
 
-static void focus(struct viewer *viewer)
+/* Asks what is under the pointer. */
+static void point(struct viewer *viewer, enum viewer_task task)
 {
     if (viewer->live.width == 0 || !viewer->has_camera)
         return;
@@ -55,7 +56,7 @@ static void focus(struct viewer *viewer)
     double *along = viewer->options->stereo_over ? &viewer->focus_y : &viewer->focus_x;
     if (viewer->settings.stereo)
         *along = 2 * *along - (*along < 0.5 ? 0 : 1);
-    viewer->wanted = TASK_FOCUS;
+    viewer->wanted = task;
 }
 
 static void play(struct viewer *viewer)
@@ -88,7 +89,17 @@ static void act_on_scene(struct viewer *viewer, enum action action)
         viewer->tour.camera = TOUR_NONE;
         break;
     case ACTION_FOCUS:
-        focus(viewer);
+        point(viewer, TASK_FOCUS);
+        break;
+    case ACTION_PICK:
+        point(viewer, TASK_PICK);
+        break;
+    case ACTION_EDIT:
+        viewer_edit_toggle(viewer);
+        break;
+    case ACTION_UNDO:
+    case ACTION_REDO:
+        viewer_edit_undo(viewer, action == ACTION_REDO);
         break;
     case ACTION_NEXT_CAMERA:
     case ACTION_PREVIOUS_CAMERA:
@@ -126,6 +137,8 @@ static void act(struct viewer *viewer, enum action action)
         return;
     }
     viewer->must_show |= change == SETTINGS_VIEW;
+    if (change == SETTINGS_VIEW)
+        viewer->refused[0] = '\0'; /* it may be possible now */
     viewer->must_draw = true;
     viewer->has_heat = viewer->has_heat && viewer->settings.error_map;
     if (action == ACTION_QUIT && viewer->settings.help)
@@ -144,6 +157,12 @@ static void act(struct viewer *viewer, enum action action)
 
 void viewer_input(struct viewer *viewer, const struct input *input)
 {
+    if (input->kind == INPUT_MOTION || input->kind == INPUT_BUTTON_DOWN) {
+        viewer->pointer_x = input->x;
+        viewer->pointer_y = input->y;
+    }
+    if (viewer_edit_input(viewer, input))
+        return;
     switch (input->kind) {
     case INPUT_QUIT:
         viewer->quit = true;
@@ -155,14 +174,18 @@ void viewer_input(struct viewer *viewer, const struct input *input)
         viewer->scale = input->scale;
         viewer->must_draw = true;
         return;
+    case INPUT_DROP:
+        viewer_open(viewer, input->path);
+        return;
     case INPUT_KEY_DOWN:
         act(viewer, input_action(input));
         break;
-    case INPUT_MOTION:
     case INPUT_BUTTON_DOWN:
-        viewer->pointer_x = input->x;
-        viewer->pointer_y = input->y;
-        if (input->kind == INPUT_BUTTON_DOWN && input->button == INPUT_LEFT && input->clicks == 2)
+        if (input->button == INPUT_LEFT && input->ctrl) {
+            act(viewer, ACTION_PICK);
+            return;
+        }
+        if (input->button == INPUT_LEFT && input->clicks == 2)
             act(viewer, ACTION_FOCUS);
         break;
     default:
@@ -180,7 +203,8 @@ void viewer_input(struct viewer *viewer, const struct input *input)
 
 static bool has_come(const struct viewer *viewer, const struct replay_event *event)
 {
-    const bool is_live = viewer->times_live > 0 && viewer->times_live == session_times_live(viewer->session);
+    const bool is_live =
+        !viewer->next && viewer->times_live > 0 && viewer->times_live == session_times_live(viewer->session);
     switch (event->kind) {
     case REPLAY_REST:
         return is_live && viewer_is_at_rest(viewer, event->samples) && viewer->task == TASK_NONE &&
@@ -190,6 +214,9 @@ static bool has_come(const struct viewer *viewer, const struct replay_event *eve
         return is_live && viewer->has_camera && viewer->frames > 0;
     case REPLAY_LOST:
         return viewer->times_live > 0 && !session_scene(viewer->session);
+    case REPLAY_CHANGE:
+        return session_scene(viewer->session) &&
+               fl_scene_revision(session_scene(viewer->session)) > viewer->replay_revision;
     case REPLAY_CAMERA:
         return viewer_shows_camera(viewer);
     default:
@@ -209,8 +236,12 @@ static void do_event(struct viewer *viewer, const struct replay_event *event)
 
 void viewer_replay(struct viewer *viewer, uint64_t now_ns)
 {
+    const struct viewer_edit *edit = &viewer->edit;
     while (viewer->replay_next < viewer->replay.count && viewer->failure.code == FL_ERROR_NONE) {
         const struct replay_event *event = &viewer->replay.events[viewer->replay_next];
+        /* What follows an edit finds it made; but a drag goes on meanwhile. */
+        if ((edit->works || edit->has_pending) && !(edit->dragging && event->kind == REPLAY_INPUT))
+            return;
         const uint64_t due_ns = viewer->replay_ns + (uint64_t)(event->after_s * 1e9);
         if (now_ns < due_ns)
             return;
@@ -223,6 +254,8 @@ void viewer_replay(struct viewer *viewer, uint64_t now_ns)
         }
         do_event(viewer, event);
         viewer->replay_next++;
+        if (session_scene(viewer->session) && !edit->works)
+            viewer->replay_revision = fl_scene_revision(session_scene(viewer->session));
         /* Time lost in a long operation, such as a screenshot, is not made up for. */
         viewer->replay_ns = event->kind == REPLAY_INPUT ? due_ns : monotonic_now_ns();
     }

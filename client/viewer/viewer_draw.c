@@ -16,18 +16,12 @@ const struct pixmap *viewer_picture(const struct viewer *viewer)
     return viewer->has_heat ? &viewer->heat : viewer->shows_made ? &viewer->made : &viewer->live;
 }
 
-static const char *file_name(const char *path)
-{
-    const char *slash = strrchr(path, '/');
-    return slash ? slash + 1 : path;
-}
-
 static void fill_names(struct viewer *viewer, struct hud_state *state)
 {
     const struct viewer_options *options = viewer->options;
     struct fl_scene *scene = session_scene(viewer->session);
     const struct tour *tour = &viewer->tour;
-    state->scene = options->scene_name ? options->scene_name : file_name(options->model);
+    state->scene = viewer_scene_name(viewer);
     state->server = options->server ? options->server : "";
     state->camera = state->clip = "";
     if (scene && tour->camera != TOUR_NONE)
@@ -42,6 +36,11 @@ static void fill_status(struct viewer *viewer, struct hud_state *state)
     const bool was_live = viewer->times_live > 0;
     text[0] = '\0';
     state->status_text = text;
+    if (viewer->refused[0] != '\0') {
+        state->status = HUD_REFUSED;
+        state->status_text = viewer->refused;
+        return;
+    }
     if (session_scene(viewer->session)) {
         state->status = viewer->frames > 0 ? HUD_LIVE : HUD_LOADING;
         snprintf(text, sizeof(text), "rendering the first picture");
@@ -111,6 +110,7 @@ void viewer_hud(struct viewer *viewer, struct hud_state *state)
     fill_names(viewer, state);
     fill_status(viewer, state);
     fill_local(viewer, state);
+    state->edit = viewer_edit_hud(viewer);
     if (viewer->notice_ns > state->now_ns)
         state->notice = viewer->notice;
 }
@@ -177,18 +177,35 @@ static json_t *local_json(const struct viewer *viewer, const struct hud_state *s
     return object;
 }
 
+/* What the panel shows. */
+static json_t *edit_json(const struct viewer_edit *edit)
+{
+    const struct fl_object_state *state = &edit->state;
+    json_t *fields = json_object();
+    for (size_t i = 0; i < state->count; i++) {
+        json_t *values = json_array();
+        for (unsigned k = 0; k < state->fields[i].field.count; k++)
+            json_array_append_new(values, json_real(state->fields[i].values[k]));
+        json_object_set_new(fields, state->fields[i].field.name, values);
+    }
+    return json_pack("{s:s, s:i, s:s, s:s, s:o}", "kind", edit->hud.tabs[edit->tab], "object", (int)state->id,
+                     "name", state->name, "row", edit->hud.rows[edit->chosen].name, "fields", fields);
+}
+
 void viewer_print_state(struct viewer *viewer, const char *name)
 {
-    static const char *const statuses[] = {"loading", "live", "lost"};
+    static const char *const statuses[] = {"loading", "live", "lost", "refused"};
     struct hud_state state;
     struct metrics_summary summary;
     viewer_hud(viewer, &state);
     metrics_summarise(&viewer->metrics, state.now_ns, &summary);
     json_t *line = json_pack(
-        "{s:s, s:s, s:s, s:s, s:s, s:s, s:f, s:i, s:i, s:b, s:i, s:i, s:I, s:i, s:I, s:s, s:s, s:f, s:b, s:o, "
+        "{s:s, s:s, s:s, s:s, s:s, s:s, s:s, s:f, s:i, s:i, s:b, s:i, s:i, s:I, s:i, s:I, s:s, s:s, s:f, s:b, "
+        "s:o, "
         "s:o, s:o, s:o, s:f, s:f, s:f, s:b, s:s, s:o, s:i}",
-        "state", name, "status", statuses[state.status], "tracer", protocol_tracer_text(viewer->frame.tracer),
-        "integrator", protocol_integrator_text(viewer->frame.integrator), "tone_map",
+        "state", name, "scene", state.scene, "status", statuses[state.status], "tracer",
+        protocol_tracer_text(viewer->frame.tracer), "integrator",
+        protocol_integrator_text(viewer->frame.integrator), "tone_map",
         protocol_tone_map_text(viewer->settings.tone_map), "encoding",
         protocol_encoding_text(viewer->frame.encoding), "exposure_stops", (double)viewer->frame.exposure_stops,
         "samples", (int)state.samples, "samples_wanted", (int)state.samples_wanted, "moving", (int)state.moving,
@@ -205,6 +222,8 @@ void viewer_print_state(struct viewer *viewer, const char *name)
         json_object_set_new(line, "errors",
                             json_pack("{s:f, s:f, s:f}", "mean", viewer->heat_figures.mean, "max",
                                       viewer->heat_figures.max, "beyond", viewer->heat_figures.beyond));
+    if (line && viewer->edit.shown && viewer->edit.has_state)
+        json_object_set_new(line, "edit", edit_json(&viewer->edit));
     if (line && viewer->notice_ns > state.now_ns)
         json_object_set_new(line, "notice", json_string(viewer->notice));
     char *text = json_dumps(line, JSON_COMPACT | JSON_ENSURE_ASCII | JSON_REAL_PRECISION(9));

@@ -182,7 +182,7 @@ static void take(struct viewer *viewer, struct fl_frame *frame)
 static void refuse(struct viewer *viewer, const struct fl_error *refusal)
 {
     if (viewer->frames == 0) {
-        viewer->failure = *refusal;
+        viewer_refuse_scene(viewer, refusal);
         return;
     }
     viewer_say(viewer, "not possible: %s", refusal->text);
@@ -214,9 +214,10 @@ bool viewer_has_samples(const struct viewer *viewer, const struct fl_frame *fram
 bool viewer_is_at_rest(const struct viewer *viewer, unsigned samples)
 {
     const unsigned maximum = viewer->view.samples, enough = samples > 0 && samples < maximum ? samples : maximum;
+    const struct fl_scene *scene = session_scene(viewer->session);
     return viewer->has_camera && viewer->has_looked && !viewer->must_show && !viewer->must_look &&
-           !viewer->told_moving && viewer->glide_begin_ns == 0 && viewer->frames > 0 &&
-           viewer->frame.command == viewer->command && viewer->frame.change == viewer->change &&
-           !viewer->frame.moving && !viewer->frame.more_follows &&
+           (!scene || viewer->frame.revision >= fl_scene_revision(scene)) && !viewer->told_moving &&
+           viewer->glide_begin_ns == 0 && viewer->frames > 0 && viewer->frame.command == viewer->command &&
+           viewer->frame.change == viewer->change && !viewer->frame.moving && !viewer->frame.more_follows &&
            viewer_has_samples(viewer, &viewer->frame, enough);
 }

@@ -8,6 +8,7 @@
 #include "viewer/replay.h"
 #include "viewer/session.h"
 #include "viewer/viewer.h"
+#include "viewer/viewer_edit.h"
 #include "viewer/views.h"
 #include "viewer/window.h"
 
@@ -16,7 +17,8 @@ enum viewer_task {
     TASK_NONE,
     TASK_HOME,     /* the initial camera, from the command line, the model or the scene's extent */
     TASK_CAMERA,   /* where a camera of the scene is */
-    TASK_FOCUS,    /* what is under the pointer */
+    TASK_FOCUS,    /* where what is under the pointer is */
+    TASK_PICK,     /* which object it is */
     TASK_REFERENCE /* the resting picture, by the reference */
 };
 
@@ -24,13 +26,18 @@ struct viewer {
     const struct viewer_options *options;
     struct message_render view; /* of one eye: from the options, completed by the scene */
     struct session *session;
-    unsigned times_live;   /* of the session, as of when its view was started */
-    struct window *window; /* NULL: headless */
+    unsigned times_live;        /* of the session, as of when its view was started */
+    char *model;                /* that was dropped, and is shown; NULL: that of the options */
+    struct session *next;       /* that of a dropped model, until it is there; NULL: there is none */
+    char *next_model;           /* its path */
+    char refused[HUD_TEXT_MAX]; /* why a dropped model is not shown, though it is there; empty: it is */
+    struct window *window;      /* NULL: headless */
     int width, height;
     double scale;
     bool quit;
 
     struct settings settings, taken; /* `taken`: with which frames came */
+    struct settings first;           /* as they were at first */
     struct tour tour;
     struct controls controls;
     double pointer_x, pointer_y;
@@ -77,12 +84,14 @@ struct viewer {
     uint64_t local_views; /* so many */
 
     enum viewer_task task, wanted; /* the current one; the next one */
-    double focus_x, focus_y;       /* shares of the picture */
+    double focus_x, focus_y;       /* what is pointed at; shares of the picture */
     uint32_t camera_node;
     struct pixmap compared, heat; /* the picture as it was; its errors */
     struct heat_figures heat_figures;
     uint64_t heat_command, heat_change, heat_revision; /* of what was compared */
     bool has_heat, heat_refused;
+
+    struct viewer_edit edit;
 
     char notice[HUD_TEXT_MAX];
     uint64_t notice_ns; /* until then */
@@ -90,8 +99,8 @@ struct viewer {
 
     struct replay replay;
     size_t replay_next;
-    uint64_t replay_ns; /* since when the next event is looked at */
-    bool replay_waits;
+    uint64_t replay_ns;       /* since when the next event is looked at */
+    uint64_t replay_revision; /* of the scene, after the last event */
     uint64_t tick_ns;
     struct fl_error failure; /* why it ends */
 };
@@ -99,6 +108,18 @@ struct viewer {
 #define HEAT_TOP 0.25 /* a quarter of white is the brightest colour of the error map */
 
 __attribute__((format(printf, 2, 3))) void viewer_say(struct viewer *viewer, const char *format, ...);
+
+/* ---- viewer_open.c ---- */
+
+/* Of a dropped model, whose path must live as long, or NULL: of the command line's. */
+struct session *viewer_open_session(struct viewer *viewer, const char *dropped, struct fl_error *error);
+const char *viewer_scene_name(const struct viewer *viewer);
+/* Begins to open a model in place of the one that is shown. */
+void viewer_open(struct viewer *viewer, const char *path);
+/* It is there, and its first picture is not possible: a dropped one says so and waits for other settings. */
+void viewer_refuse_scene(struct viewer *viewer, const struct fl_error *refusal);
+void viewer_step_opening(struct viewer *viewer, uint64_t now_ns);
+void viewer_abandon_opening(struct viewer *viewer);
 
 /* ---- viewer_show.c ---- */
 

@@ -143,6 +143,12 @@ static bool ask(struct viewer *viewer, enum viewer_task task, struct fl_error *r
     case TASK_CAMERA:
         use_node(&job, viewer->camera_node);
         break;
+    case TASK_PICK:
+        job.layers = 1u << PROTOCOL_LAYER_ID;
+        job.tracer = PROTOCOL_TRACER_BVH; /* sampled tracers do not know nodes */
+        aim(viewer, &key);
+        use_key(&job, &key);
+        break;
     case TASK_FOCUS:
         aim(viewer, &key);
         use_key(&job, &key);
@@ -164,13 +170,13 @@ static bool ask(struct viewer *viewer, enum viewer_task task, struct fl_error *r
 
 /* ---- answers ---- */
 
-/* What the ray met; false: nothing. */
-static bool met(const struct fl_frame *frame, double place[3])
+/* Three numbers of what the ray met; false: nothing. */
+static bool met(const struct fl_frame *frame, double numbers[3])
 {
     float values[4];
     memcpy(values, frame->pixels, sizeof(values));
     for (int i = 0; i < 3; i++)
-        place[i] = (double)values[i];
+        numbers[i] = (double)values[i];
     return values[3] > 0;
 }
 
@@ -215,6 +221,15 @@ static void take_focus(struct viewer *viewer, const struct fl_frame *frame)
     viewer_say(viewer, "focus: %.4g m away", camera_distance(&camera));
 }
 
+static void take_pick(struct viewer *viewer, const struct fl_frame *frame)
+{
+    double numbers[3];
+    if (met(frame, numbers))
+        viewer_edit_object(viewer, (uint32_t)numbers[0], (uint32_t)numbers[1]);
+    else
+        viewer_say(viewer, "there is no surface");
+}
+
 static void take_reference(struct viewer *viewer, struct fl_frame *frame)
 {
     const struct pixmap *compared = &viewer->compared;
@@ -235,6 +250,8 @@ static void take(struct viewer *viewer, struct fl_frame *frame)
     viewer->task = TASK_NONE;
     if (task == TASK_FOCUS)
         take_focus(viewer, frame);
+    else if (task == TASK_PICK)
+        take_pick(viewer, frame);
     else if (task == TASK_REFERENCE)
         take_reference(viewer, frame);
     else
@@ -251,7 +268,7 @@ static void refuse(struct viewer *viewer, enum viewer_task task, const struct fl
     if (task == TASK_REFERENCE)
         viewer->heat_refused = true;
     if (task == TASK_HOME && !viewer->has_camera)
-        viewer->failure = *refusal;
+        viewer_refuse_scene(viewer, refusal);
 }
 
 /* ---- which one ---- */
@@ -270,7 +287,7 @@ static enum viewer_task next_task(struct viewer *viewer)
         return wanted;
     if (viewer->task != TASK_NONE)
         return TASK_NONE;
-    if (!viewer->has_home)
+    if (!viewer->has_home && viewer->refused[0] == '\0')
         return TASK_HOME;
     if (viewer->settings.error_map && !viewer->has_heat && !viewer->heat_refused &&
         viewer_is_at_rest(viewer, COMPARED_SAMPLES))

@@ -12,6 +12,7 @@ struct window {
     SDL_Renderer *renderer;
     struct painter *painter;
     bool wants_drawing, is_full_screen;
+    char *dropped; /* SDL's: the file that was told last */
 };
 
 /* Without a display SDL draws off-screen, even if that was not requested. */
@@ -22,7 +23,18 @@ static bool is_seen(const char *driver)
                                            strcmp(driver, "dummy") != 0 && strcmp(driver, "evdev") != 0);
 }
 
-struct window *window_create(const char *title, int width, int height, struct fl_error *error)
+/* A screen that is gone since then must not keep a window: the middle of its title bar is to be seen. */
+static bool is_on_a_display(const struct window_place *place)
+{
+    const SDL_Point middle = {place->x + place->width / 2, place->y};
+    SDL_Rect bounds;
+    for (int i = 0; i < SDL_GetNumVideoDisplays(); i++)
+        if (SDL_GetDisplayBounds(i, &bounds) == 0 && SDL_PointInRect(&middle, &bounds))
+            return true;
+    return false;
+}
+
+struct window *window_create(const char *title, const struct window_place *place, struct fl_error *error)
 {
     struct window *made = calloc(1, sizeof(*made));
     if (!made) {
@@ -38,8 +50,13 @@ struct window *window_create(const char *title, int width, int height, struct fl
         return NULL;
     }
     SDL_EnableScreenSaver();
-    made->window = SDL_CreateWindow(title, SDL_WINDOWPOS_CENTERED, SDL_WINDOWPOS_CENTERED, width, height,
-                                    SDL_WINDOW_RESIZABLE | SDL_WINDOW_ALLOW_HIGHDPI);
+    const bool is_placed = place->has_place && is_on_a_display(place);
+    made->is_full_screen = place->full_screen;
+    made->window =
+        SDL_CreateWindow(title, is_placed ? place->x : (int)SDL_WINDOWPOS_CENTERED,
+                         is_placed ? place->y : (int)SDL_WINDOWPOS_CENTERED, place->width, place->height,
+                         SDL_WINDOW_RESIZABLE | SDL_WINDOW_ALLOW_HIGHDPI |
+                             (place->full_screen ? SDL_WINDOW_FULLSCREEN_DESKTOP : 0u));
     if (made->window)
         made->renderer = SDL_CreateRenderer(made->window, -1, SDL_RENDERER_PRESENTVSYNC);
     if (!made->renderer)
@@ -52,6 +69,22 @@ struct window *window_create(const char *title, int width, int height, struct fl
     }
     made->wants_drawing = true;
     return made;
+}
+
+void window_set_title(struct window *window, const char *title)
+{
+    SDL_SetWindowTitle(window->window, title);
+}
+
+bool window_get_place(const struct window *window, struct window_place *place)
+{
+    place->full_screen = window->is_full_screen;
+    if (window->is_full_screen)
+        return false;
+    SDL_GetWindowSize(window->window, &place->width, &place->height);
+    SDL_GetWindowPosition(window->window, &place->x, &place->y);
+    place->has_place = true;
+    return true;
 }
 
 void window_size(const struct window *window, int *width, int *height, double *scale)
@@ -124,7 +157,8 @@ static bool take_event(struct window *window, const SDL_Event *event, struct inp
     int width = 0, height = 0;
     double scale = 1;
     window_size(window, &width, &height, &scale);
-    *input = (struct input){.shift = (SDL_GetModState() & KMOD_SHIFT) != 0, .scale = scale};
+    const SDL_Keymod held = SDL_GetModState();
+    *input = (struct input){.shift = (held & KMOD_SHIFT) != 0, .ctrl = (held & KMOD_CTRL) != 0, .scale = scale};
     switch (event->type) {
     case SDL_QUIT:
         input->kind = INPUT_QUIT;
@@ -133,6 +167,10 @@ static bool take_event(struct window *window, const SDL_Event *event, struct inp
     case SDL_KEYUP:
         take_key(event, input);
         return event->key.repeat == 0;
+    case SDL_TEXTINPUT:
+        input->kind = INPUT_TEXT;
+        snprintf(input->text, sizeof(input->text), "%.15s", event->text.text);
+        return true;
     case SDL_MOUSEBUTTONDOWN:
     case SDL_MOUSEBUTTONUP:
         return take_button(event, scale, input);
@@ -145,6 +183,15 @@ static bool take_event(struct window *window, const SDL_Event *event, struct inp
         input->kind = INPUT_WHEEL;
         input->wheel = (double)event->wheel.preciseY;
         return true;
+    case SDL_DROPFILE:
+        SDL_free(window->dropped);
+        window->dropped = event->drop.file;
+        input->kind = INPUT_DROP;
+        input->path = window->dropped;
+        return input->path != NULL;
+    case SDL_DROPTEXT:
+        SDL_free(event->drop.file);
+        return false;
     case SDL_WINDOWEVENT:
         return take_window_event(window, event, input);
     default:
@@ -191,6 +238,7 @@ void window_destroy(struct window *window)
         SDL_DestroyRenderer(window->renderer);
     if (window->window)
         SDL_DestroyWindow(window->window);
+    SDL_free(window->dropped);
     SDL_Quit();
     free(window);
 }

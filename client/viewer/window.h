@@ -8,8 +8,18 @@
 
 struct window;
 
-/* `width` and `height` as of the desktop: on a fine screen it has more pixels. */
-struct window *window_create(const char *title, int width, int height, struct fl_error *error);
+/* Of the desktop, whose pixels may be larger than the window's. */
+struct window_place {
+    int width, height;
+    bool has_place; /* x and y are known; in the middle otherwise, and where no display would show it */
+    int x, y;
+    bool full_screen; /* the rest is of the window without it */
+};
+
+struct window *window_create(const char *title, const struct window_place *place, struct fl_error *error);
+void window_set_title(struct window *window, const char *title);
+/* Where it is now; false: it is full screen, and only that is said. */
+bool window_get_place(const struct window *window, struct window_place *place);
 /* The next event; false: there is none. */
 bool window_poll(struct window *window, struct input *input);
 /* Whether the window must be redrawn though nothing of ours has changed, as after it was covered. */

@@ -71,7 +71,7 @@ def with_stops(events, every_s, stop):
 
 def replay(seconds, height):
     """Twice the walk, the second time back from the first camera."""
-    quiet = [{"key": "o"}, {"key": "o"}]  # no overlay in the pictures
+    quiet = [{"key": "o", "shift": True}]  # no overlay in the pictures
     first = with_stops(walk(seconds, height), STATES_EVERY_S, lambda n: [{"state": f"walk {n}"}])
     second = with_stops(walk(seconds, height), PICTURES_EVERY_S,
                         lambda n: [{"screenshot": f"{n:03}.png"}, {"state": f"picture {n}"}])

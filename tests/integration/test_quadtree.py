@@ -123,7 +123,7 @@ class Quadtree(OneDaemon):
         sample leaves 14 dB."""
         eyes = ["--stereo", "0.065", "--integrator", "distributed"]
         (self.folder / "replay.json").write_text(json.dumps(
-            [{"key": "o"}, {"key": "o"}, {"wait": "rest", "samples": 64}, {"screenshot": str(self.folder / "view.png")}]))
+            [{"key": "o", "shift": True}, {"wait": "rest", "samples": 64}, {"screenshot": str(self.folder / "view.png")}]))
         self.expect(farlight("view", bundled_scenes() / ROOM, "--headless", "--replay", self.folder / "replay.json", "--size",
                              "160x90", "--samples", "64", *eyes), 0)
         true, rendered = (self.render(f"{samples}.png", *eyes, "--size", "80x90", "--samples", samples, "--seed", seed, "--views",

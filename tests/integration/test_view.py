@@ -18,7 +18,7 @@ import unittest
 from farlight_test import BIN, TIMEOUT_S, Case, Daemon, bundled_scenes, farlight, read_png, tracers
 
 SIZE = (320, 180)
-HIDE = [{"key": "o"}, {"key": "o"}]  # the overlay
+HIDE = [{"key": "o", "shift": True}]  # the overlay
 
 
 def rest(samples=1):
@@ -320,6 +320,42 @@ class WithoutAWindow(Viewer):
                          [(200, 150), (100, 74), (200, 150)])
         for name in ("small.png", "coarse.png"):
             self.assertEqual(read_png(self.folder / name)[:2], (200, 150))
+
+    def test_a_dropped_file_replaces_the_model_or_says_why_not(self):
+        """As if it had been named on the command line; what is shown stays until it is there."""
+        other, broken = bundled_scenes() / "cornell.glb", self.folder / "broken.glb"
+        broken.write_bytes(b"glTF" + bytes(40))
+        states = self.replay([rest(8), {"drop": str(self.folder / "missing.glb")}, {"state": "missing"},
+                              {"drop": str(broken)}, rest(8), {"state": "broken"}, {"drop": str(other)}, rest(8),
+                              {"state": "other"}, *HIDE, {"screenshot": "dropped.png"}],
+                             "--camera", "camera", scene="carousel.glb")  # of the first model alone
+        self.assertEqual([states[name]["scene"] for name in ("missing", "broken", "other")],
+                         ["carousel.glb", "carousel.glb", "cornell.glb"])
+        self.assertIn("missing.glb: cannot be read", states["missing"]["notice"])
+        self.assertIn("broken.glb", states["broken"]["notice"])
+        self.assertEqual((states["other"]["clip"], states["other"]["times_live"]), ("", 1))
+        self.replay([rest(8), *HIDE, {"screenshot": "named.png"}], scene="cornell.glb")
+        self.assertEqual(difference(self.folder / "dropped.png", self.folder / "named.png"), 0)
+
+    def test_what_keys_have_chosen_is_remembered_and_options_count_for_more(self):
+        state = self.folder / "a" / "state.json"  # with the folder
+        self.replay([rest(1), {"key": "t"}, {"key": "t"}, {"resize": [200, 150]}, {"key": "m"}, rest(1)], "--state", state, "--scale", "2")
+        self.assertEqual(json.loads(state.read_text()), {"width": 200, "height": 150, "tracer": "ldc", "tone_map": "aces"})
+        events = [rest(1), {"state": "now"}]
+        model = [bundled_scenes() / "teapot.glb", "--headless", "--replay", self.folder / "replay.json"]
+        for options, variables, expected in (([], {}, ("ldc", "aces", 200)),
+                                             (["--tracer", "bvh", "--size", "320x180"], {}, ("bvh", "aces", 320)),
+                                             ([], {"FARLIGHT_TRACER": "abuffer"}, ("abuffer", "aces", 200)),
+                                             (["--state", "none"], {}, ("bvh", "neutral", 1280)),
+                                             (["--aperture", "0.01", "--integrator", "distributed"], {}, ("ldc", "aces", 200))):
+            (self.folder / "replay.json").write_text(json.dumps(events))
+            result = self.expect(farlight("view", *model, "--samples", "1", "--state", state, *options,
+                                          env={**os.environ, **variables}), 0)
+            now = json.loads(result.stdout)
+            self.assertEqual((now["tracer"], now["tone_map"], now["width"]), expected)
+        self.assertEqual(json.loads(state.read_text()), {"width": 200, "height": 150, "tracer": "ldc", "tone_map": "aces"})
+        state.write_text('{"tracer": "ldc", "width": -5, "tone_map": {}}')
+        self.assertEqual(self.replay(events, "--state", state)["now"]["tracer"], "ldc")
 
     def test_a_wait_in_vain_is_reported(self):
         self.replay([{"wait": "lost", "timeout": 0.2}], status=1)

@@ -5,6 +5,7 @@
 #include "tests/harness/test.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -201,7 +202,7 @@ static struct hud hud;
 
 static struct hud_state some_state(double width, double height)
 {
-    settings = (struct settings){0};
+    settings = (struct settings){.overlay = OVERLAY_ALL};
     tour = (struct tour){.camera = TOUR_NONE, .clip = TOUR_NONE, .speed = 1};
     return (struct hud_state){.width = width,
                               .height = height,
@@ -321,6 +322,63 @@ TEST(a_small_window_shows_less)
         settings.panel = true;
         hud_layout(&hud, &shown, measure, NULL);
         assert_true(tells("ldc_resolution"));
+    }
+}
+
+TEST(it_begins_with_one_line_and_the_rest_is_a_key_away)
+{
+    for (uint32_t i = 0; i < 20; i++)
+        add(i, i + 1, (1000 + i * 40) * MS);
+    struct hud_state shown = some_state(1280, 720);
+    settings = (struct settings){0};
+    hud_layout(&hud, &shown, measure, NULL);
+    check_within(&shown);
+    assert_true(tells("20 fps") && tells("teapot.glb") && tells("bvh, whitted") && tells("3 of 16 samples") &&
+                tells("F1"));
+    assert_false(tells("input to picture") || tells("trace"));
+    for (size_t i = 1; i < hud.count; i++) /* behind its panel */
+        assert_true(hud.marks[i].y >= hud.marks[0].y && hud.marks[i].y + hud.marks[i].height < 50);
+    shown.local.shown = true; /* what is seen then are views that are made here: none yet */
+    hud_layout(&hud, &shown, measure, NULL);
+    assert_true(tells("0 fps") && !tells("20 fps"));
+    shown = some_state(200, 100); /* what does not fit is left out */
+    settings = (struct settings){0};
+    shown.notice = "a notice that is longer than the window is wide";
+    hud_layout(&hud, &shown, measure, NULL);
+    check_within(&shown);
+    assert_true(tells("20 fps") && tells("teapot.glb") && !tells("F1") && tells("a notice"));
+    settings_act(&settings, ACTION_OVERLAY);
+    shown = (struct hud_state){0};
+    assert_int_equal(settings.overlay, OVERLAY_ALL);
+    settings_act(&settings, ACTION_OVERLAY_BACK);
+    settings_act(&settings, ACTION_OVERLAY_BACK);
+    assert_int_equal(settings.overlay, OVERLAY_NONE);
+}
+
+TEST(an_object_is_edited_beside_the_figures)
+{
+    static struct hud_edit edit;
+    add(0, 1, 1000 * MS);
+    edit = (struct hud_edit){.shown = true,
+                             .tabs = {"node", "material", "light"},
+                             .title = "a material with a name that is longer than its panel is wide",
+                             .hint = "what it means, in a line that is longer than its panel is wide, too",
+                             .typed = "0.25",
+                             .count = 40,
+                             .chosen = 20};
+    for (size_t i = 0; i < edit.count; i++) {
+        edit.rows[i] = (struct hud_edit_row){.share = i % 2 == 0 ? 0.5 : -1, .has_colour = i % 4 == 0};
+        snprintf(edit.rows[i].name, sizeof(edit.rows[i].name), "row %zu", i);
+        snprintf(edit.rows[i].value, sizeof(edit.rows[i].value), "value %zu", i);
+    }
+    for (int small = 0; small < 2; small++) {
+        struct hud_state shown = some_state(small ? 400 : 1280, small ? 200 : 720);
+        shown.edit = &edit;
+        hud_layout(&hud, &shown, measure, NULL);
+        check_within(&shown);
+        assert_true(tells("material") && tells("row 20") && tells("0.25_") && !tells("value 20") &&
+                    tells("value 19"));
+        assert_int_equal(tells("input to picture"), !small);
     }
 }
 

@@ -32,9 +32,10 @@ TEST(every_kind_of_event_is_read)
               " {\"wheel\": -2}, {\"key\": \"t\", \"shift\": true}, {\"key\": \"w\", \"hold\": 0.5},\n"
               " {\"resize\": [640, 360]}, {\"wait\": \"rest\", \"samples\": 8, \"timeout\": 3}, {\"wait\": "
               "\"lost\"}, {\"wait\": \"camera\"},\n"
-              " {\"screenshot\": \"a/b.png\"}, {\"state\": \"here\"}, {\"after\": 2}]"))
+              " {\"screenshot\": \"a/b.png\"}, {\"state\": \"here\"}, {\"after\": 2}, {\"drop\": \"a.glb\"}, "
+              "{\"text\": \"0.5\", \"ctrl\": true}, {\"wait\": \"change\"}]"))
         fail_msg("%s", error.text);
-    assert_int_equal(replay.count, 15); /* a key is two: down and up */
+    assert_int_equal(replay.count, 18); /* a key is two: down and up */
     const struct replay_event *event = replay.events;
     assert_int_equal(event[0].input.kind, INPUT_BUTTON_DOWN);
     assert_int_equal(event[0].input.button, INPUT_RIGHT);
@@ -58,6 +59,11 @@ TEST(every_kind_of_event_is_read)
     assert_string_equal(event[12].path, "a/b.png");
     assert_true(event[13].kind == REPLAY_STATE);
     assert_true(event[14].kind == REPLAY_INPUT && event[14].after_s == 2);
+    assert_int_equal(event[15].input.kind, INPUT_DROP);
+    assert_string_equal(event[15].input.path, "a.glb");
+    assert_true(event[16].input.kind == INPUT_TEXT && event[16].input.ctrl);
+    assert_string_equal(event[16].input.text, "0.5");
+    assert_true(event[17].kind == REPLAY_CHANGE);
     replay_finish(&replay);
 }
 
@@ -81,6 +87,7 @@ TEST(mistakes_are_reported_with_line_and_event)
         {"[{\"resize\": [640]}]", "resize: is not"},
         {"[{\"resize\": [640, 100000]}]", "resize: is not"},
         {"[{\"screenshot\": true}]", "screenshot: is not a text"},
+        {"[{\"drop\": 1}]", "drop: is not a text"},
         {"[5]", "[0]: is not one of"},
     };
     for (size_t i = 0; i < sizeof(wrong) / sizeof(wrong[0]); i++) {

@@ -46,7 +46,8 @@ static struct hud_state some_state(void)
 
 static struct window *open_window(void)
 {
-    struct window *window = window_create("test", WIDTH, HEIGHT, &error);
+    struct window *window =
+        window_create("test", &(struct window_place){.width = WIDTH, .height = HEIGHT}, &error);
     struct input input;
     if (!window)
         fail_msg("%s", error.text);
@@ -100,6 +101,10 @@ TEST(keys_have_the_names_of_the_list)
     push_key(SDL_KEYDOWN, SDLK_t, false);
     input = next(window);
     assert_int_equal(input_action(&input), ACTION_PREVIOUS_TRACER);
+    SDL_SetModState(KMOD_LCTRL);
+    push_key(SDL_KEYDOWN, SDLK_z, false);
+    input = next(window);
+    assert_true(input.ctrl && !input.shift && input_action(&input) == ACTION_UNDO);
     SDL_SetModState(KMOD_NONE);
     assert_false(window_poll(window, &input));
     window_destroy(window);
@@ -123,6 +128,10 @@ TEST(mouse_and_window_events_come_as_they_are)
     event.wheel.preciseY = -1.5f;
     SDL_PushEvent(&event);
     SDL_zero(event);
+    event.type = SDL_TEXTINPUT;
+    strcpy(event.text.text, "5");
+    SDL_PushEvent(&event);
+    SDL_zero(event);
     event.type = SDL_WINDOWEVENT;
     event.window.event = SDL_WINDOWEVENT_FOCUS_LOST;
     SDL_PushEvent(&event);
@@ -135,6 +144,9 @@ TEST(mouse_and_window_events_come_as_they_are)
     assert_true(input.x == 30 && input.y == 40);
     input = next(window);
     assert_true(input.kind == INPUT_WHEEL && input.wheel == -1.5);
+    input = next(window);
+    assert_int_equal(input.kind, INPUT_TEXT);
+    assert_string_equal(input.text, "5");
     assert_int_equal(next(window).kind, INPUT_FOCUS_LOST);
     assert_int_equal(next(window).kind, INPUT_QUIT);
     assert_true(window_wants_drawing(window)); /* for the events of the window */
@@ -153,6 +165,35 @@ TEST(a_window_tells_its_size_and_shows_something)
     const struct pixmap none = {0};
     window_show(window, &none, &shown);
     window_destroy(window);
+}
+
+TEST(a_file_that_is_dropped_comes_with_its_path)
+{
+    struct window *window = open_window();
+    SDL_Event event;
+    for (int i = 0; i < 2; i++) { /* the second is remembered in place of the first */
+        SDL_zero(event);
+        event.type = SDL_DROPFILE;
+        event.drop.file = SDL_strdup(i == 0 ? "/tmp/a b.glb" : "/tmp/c.glb");
+        SDL_PushEvent(&event);
+        const struct input input = next(window);
+        assert_int_equal(input.kind, INPUT_DROP);
+        assert_string_equal(input.path, i == 0 ? "/tmp/a b.glb" : "/tmp/c.glb");
+    }
+    window_destroy(window);
+}
+
+TEST(a_window_is_where_it_was_if_a_display_is_there)
+{
+    struct window_place place = {.width = WIDTH, .height = HEIGHT, .has_place = true, .x = 30, .y = 40}, now = {0};
+    for (int i = 0; i < 2; i++) {
+        struct window *window = window_create("test", &place, &error);
+        assert_non_null(window);
+        assert_true(window_get_place(window, &now) && now.width == WIDTH && now.height == HEIGHT);
+        assert_int_equal(now.x == 30 && now.y == 40, i == 0);
+        window_destroy(window);
+        place.x = place.y = 30000;
+    }
 }
 
 static uint8_t value_at(const struct pixmap *made, int x, int y, int channel)
