@@ -354,7 +354,8 @@ static bool read_line(struct command_line *line, const struct argp *argp, int ar
                                              .coarser = (unsigned)settings.coarser,
                                              .overlay = settings.overlay,
                                              .recall = *recall}};
-    return cli_job_begin(&line->job, defaults) && cli_parse(argp, argc, argv, ARGP_IN_ORDER, line) == 0 && complete(line);
+    return cli_job_begin(&line->job, defaults) && cli_parse(argp, argc, argv, ARGP_IN_ORDER, line) == 0 &&
+           complete(line);
 }
 
 /* A file of that name is named with its folder: ./none. */
