@@ -29,6 +29,7 @@ struct scene_features scene_features_of(const struct scene *scene)
         features.sheen |= material->sheen[0] > 0.0f || material->sheen[1] > 0.0f || material->sheen[2] > 0.0f;
         features.iridescence |= material->iridescence > 0.0f;
         features.dispersion |= material->transmission > 0.0f && material->dispersion > 0.0f;
+        features.thin_walls |= material->transmission > 0.0f && material->thin_walled;
         features.diffuse_transmission |= material->diffuse_transmission > 0.0f;
         features.anisotropy_map |=
             material->anisotropy > 0.0f && material->textures[MATERIAL_ANISOTROPY].texture != 0;

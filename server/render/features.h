@@ -19,6 +19,7 @@ struct scene_features {
     bool sheen;                /* some is cloth */
     bool iridescence;          /* some has a thin film */
     bool dispersion;           /* some glass splits colours */
+    bool thin_walls;           /* some glass has no body */
     bool diffuse_transmission; /* some material scatters light to its other side */
     bool anisotropy_map;       /* some grain differs from place to place */
     bool mirrors;              /* some material sends a ray on: a smooth one, glass, a blended one */

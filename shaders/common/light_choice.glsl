@@ -10,14 +10,15 @@ struct light_receiver {
     vec3 position, normal, view;
     float scattered, mirrored; // reflectances
     float alpha;               // of the facets
+    float passed;              // reflectance of what is scattered from the other side
 };
 
 light_receiver light_receiver_of(surface s, split parts, vec3 position, vec3 view, float NoV)
 {
     // A slanted mirror is dim at its own angle, but not at that of every facet: never 0.
-    return light_receiver(position, s.normal, view, max_component(parts.scattered + parts.again) * INVERSE_PI,
+    return light_receiver(position, s.normal, view, max_component(parts.scattered + parts.again + sheen_of(parts)) * INVERSE_PI,
                           (max_component(parts.mirror) + 1e-3) * 0.25 / max(NoV, 0.1),
-                          square(max(s.roughness, ROUGHNESS_MIN_LIGHT)));
+                          square(max(s.roughness, ROUGHNESS_MIN_LIGHT)), max_component(passed_of(parts)) * INVERSE_PI);
 }
 
 // An estimate of a light's unshadowed radiance at the eye: positive wherever the true one is.
@@ -49,7 +50,11 @@ float light_estimate(uint index, light_receiver r)
     float NoH = max(dot(r.normal, normalize(direction + r.view)), 0.0), alpha = r.alpha + 0.5 * reach;
     float wide = alpha * alpha, spread = 1.0 + NoH * NoH * (wide - 1.0) + 1e-6;
     float highlight = r.mirrored * wide / (PI * spread * spread);
-    return cosine + reach > 0.0 ? power * (r.scattered * min(cosine + reach, 1.0) + highlight) : 0.0;
+    float before = cosine + reach > 0.0 ? power * (r.scattered * min(cosine + reach, 1.0) + highlight) : 0.0;
+#ifdef HAS_DIFFUSE_TRANSMISSION
+    before += power * r.passed * clamp(reach - cosine, 0.0, 1.0);
+#endif
+    return before;
 }
 
 // Where there are emitters beside the lights (common/emitter.glsl): the probability of asking for a light. By the

@@ -9,7 +9,6 @@
 // facet, or, from inside, keeps it as the flat surface would. So glass loses no light at any roughness, and needs no
 // table of what single facets lose.
 
-#include "common/cone.glsl"
 #include "common/facets.glsl"
 #include "common/scattering.glsl"
 
@@ -35,12 +34,6 @@ vec3 again_direction(vec3 normal, float number)
     tangent_frame(normal, x, y);
     float sine = sqrt(number), phi = TWO_PI * fract(number * 4096.0);
     return sine * (cos(phi) * x + sin(phi) * y) + sqrt(1.0 - number) * normal;
-}
-
-// What of the light along a direction comes out mirrored more than once, as brdf() has it, by that of all directions.
-float again_share(split parts, float cosine, float alpha)
-{
-    return facets_lost(stretched_cosine(cosine, alpha), alpha) / max(parts.again_mean, 1e-9);
 }
 
 // The frame of facets, and the view in it.
@@ -72,31 +65,36 @@ struct facet_lobes {
     vec3 reflected, bent;       // directions
     vec3 mirror, again, window; // shares; again: mirrored more than once
     SHARE enters;               // neither is mirrored nor metal takes it
+    float window_size;          // of all colours, of which glass may disperse one
 };
 
-facet_lobes facet_lobes_of(surface s, split parts, float NoV, vec3 direction, vec3 facet, bool rough)
+facet_lobes facet_lobes_of(surface s, split parts, float NoV, vec3 direction, vec3 facet, bool rough, inout float number)
 {
-    bool leaves = s.inside && s.transmission > 0.0;
+    bool leaves = in_glass(s);
     float VoH = rough ? clamp(-dot(direction, facet), 1e-4, 1.0) : NoV;
-    float exact = fresnel_dielectric(VoH, leaves ? 1.0 / s.ior : s.ior), lit = 1.0;
-    SHARE dielectric = leaves ? SHARE(exact) : outside_mirror(s, exact, 1.0);
+    float lit = 1.0;
+    SHARE dielectric = leaves ? inside_mirror(s, VoH) : outside_mirror(s, fresnel_dielectric(VoH, s.ior), 1.0);
     facet_lobes f;
     f.reflected = reflect(direction, facet);
-    f.bent = refract(direction, facet, s.inside ? s.ior : 1.0 / s.ior);
     if (rough && leaves) {
         f.reflected = turned_to(f.reflected, s.normal);
-        f.bent = turned_to(f.bent, -s.normal);
     } else if (rough) {
         lit = lit_share(NoV, dot(f.reflected, s.normal), square(s.roughness));
     }
-    f.mirror = mix(vec3(dielectric), fresnel_schlick(s.base, VoH), s.metallic) * lit;
-    f.again = metal_again(s.base, parts.again_mean) * (s.metallic * (1.0 - lit));
+    f.mirror = mix(vec3(dielectric), fresnel_schlick(s.base, VoH), s.metallic) *
+               (lit * beneath_mirrored(s, parts, dot(f.reflected, s.normal)));
+    f.again = metal_again(s.base, parts.again_mean) * (s.metallic * (1.0 - lit) * beneath_view(parts));
     // Glass is tinted once, where light enters it.
-    f.enters = (1.0 - dielectric * lit) * (1.0 - s.metallic);
+    f.enters = (1.0 - dielectric * lit) * ((1.0 - s.metallic) * beneath_view(parts));
     f.window = (leaves ? vec3(1.0) : s.base) * (f.enters * s.transmission);
+    f.window_size = max_component(f.window);
+    f.bent = bent_direction(s, disperse(s, number, f.window), direction, facet, s.normal);
+    if (rough && leaves)
+        f.bent = turned_to(f.bent, -s.normal);
     if (dot(f.bent, s.geometric) >= 0.0) { // totally reflected, or a tilted normal would send it back
         f.mirror += f.window;
         f.window = vec3(0.0);
+        f.window_size = 0.0;
     }
     return f;
 }
@@ -106,16 +104,16 @@ facet_lobes facet_lobes_of(surface s, split parts, float NoV, vec3 direction, ve
 lobe lobe_choose(surface s, split parts, float NoV, vec3 direction, inout float choice, vec2 u)
 {
     float alpha = square(s.roughness);
-    bool rough = alpha > FACET_ALPHA_MIN, leaves = s.inside && s.transmission > 0.0;
+    bool rough = alpha > FACET_ALPHA_MIN, leaves = in_glass(s);
     vec3 facet = s.normal;
     float facet_angle = 0.0;
     if (rough)
         facet = facet_seen(s, NoV, direction, u, facet_angle);
-    facet_lobes f = facet_lobes_of(s, parts, NoV, direction, facet, rough);
+    facet_lobes f = facet_lobes_of(s, parts, NoV, direction, facet, rough, choice);
     vec3 scattered = leaves ? s.base * (f.enters * (1.0 - s.transmission)) : parts.scattered;
     lobe result = lobe(s.normal, vec3(0.0), 0.0, scattered, false);
     float mirror_size = max_component(f.mirror), again_size = max_component(f.again);
-    float all_ = mirror_size + again_size + max_component(f.window);
+    float all_ = mirror_size + again_size + f.window_size;
     if (!(all_ > 0.0))
         return result;
     float first = mirror_size / all_, second = again_size / all_;
@@ -128,12 +126,12 @@ lobe lobe_choose(surface s, split parts, float NoV, vec3 direction, inout float 
     result.weight = (mirrored ? f.mirror : is_again ? f.again : f.window) / chance;
     float cosine = dot(result.direction, s.normal);
     if (is_again)
-        result.weight *= again_share(parts, cosine, alpha);
+        result.weight *= again_share(s, parts, cosine, facets_lost(stretched_cosine(cosine, alpha), alpha));
     if (result.back && !(dot(result.direction, s.geometric) > 0.0)) {
         result.weight = rough ? vec3(0.0) : result.weight;
         result.direction = reflect(direction, s.geometric);
     }
-    float turned = facet_angle * square(facet_turn(s.inside ? 1.0 / s.ior : s.ior, mirrored));
+    float turned = facet_angle * square(turn_of(s, mirrored));
     result.solid_angle = is_again ? PI / max(cosine, 1e-3) : turned;
     return result;
 }
@@ -145,16 +143,18 @@ vec3 lobe_mirrored(surface s, split parts, float NoV, vec3 view, vec3 light, out
 {
     float NoL = dot(s.normal, light), alpha = square(s.roughness);
     density = 0.0;
-    if (alpha <= FACET_ALPHA_MIN || NoL <= 0.0 || dot(s.geometric, light) <= 0.0 || s.inside && s.transmission > 0.0)
+    if (alpha <= FACET_ALPHA_MIN || NoL <= 0.0 || dot(s.geometric, light) <= 0.0 || in_glass(s))
         return vec3(0.0);
     vec3 facet = normalize(view + light);
-    facet_lobes f = facet_lobes_of(s, parts, NoV, -view, facet, true);
+    float number = 0.5;
+    facet_lobes f = facet_lobes_of(s, parts, NoV, -view, facet, true, number);
     float VoH = clamp(dot(view, facet), 1e-4, 1.0), mirror_size = max_component(f.mirror);
-    float all_ = mirror_size + max_component(f.again) + max_component(f.window);
+    float all_ = mirror_size + max_component(f.again) + f.window_size;
     vec3 x, y;
     vec3 local_view = facet_frame(s, NoV, -view, x, y), local = vec3(dot(facet, x), dot(facet, y), dot(facet, s.normal));
     float mirrored = visible_facet_density(local, local_view, VoH, vec2(alpha)) / (4.0 * VoH);
     float again_size = max_component(parts.again), again_all = max_component(parts.mirror + parts.refracted) + again_size;
     density = mirror_size / max(all_, 1e-30) * mirrored + again_size / max(again_all, 1e-30) * NoL * INVERSE_PI;
-    return f.mirror * mirrored + parts.again * (again_share(parts, NoL, alpha) * NoL * INVERSE_PI);
+    float again = again_share(s, parts, NoL, facets_lost(stretched_cosine(NoL, alpha), alpha));
+    return f.mirror * mirrored + parts.again * (again * NoL * INVERSE_PI);
 }

@@ -10,10 +10,12 @@
 // Defines: HAS_TEXTURES some material has a texture; HAS_BUMP one of them is a bump map; HAS_SPECULAR the mirror of some
 // dielectric differs from what Fresnel's equations say; HAS_VOLUME some body of glass absorbs light; HAS_CLEARCOAT some
 // surface is varnished; HAS_IRIDESCENCE some has a thin film; HAS_SHEEN some is cloth; HAS_DIFFUSE_TRANSMISSION some scatters
-// light to its other side; HAS_DISPERSION some glass splits colours; HAS_ANISOTROPY_MAP some grain is a texture; HAS_SPHERES;
+// light to its other side; HAS_DISPERSION some glass splits colours; HAS_THIN_WALLS some has no body; HAS_ANISOTROPY_MAP some
+// grain is a texture; HAS_SPHERES;
 // HAS_SAMPLED the hits of the wave are stored samples, but for those of discs.
 
 #include "shared/hit.h"
+#include "common/cone.glsl"
 #include "common/sampled.glsl"
 #include "common/detail.glsl"
 
@@ -49,6 +51,10 @@ struct surface {
 #endif
 #ifdef HAS_DISPERSION
     float dispersion;     // 20 / Abbe number
+    vec3 carried;         // the weight of the path that sees it
+#endif
+#ifdef HAS_THIN_WALLS
+    bool thin;            // light goes straight on through it
 #endif
 #ifdef HAS_ANISOTROPY_MAP
     vec3 grain;           // direction from the material's, and share of its strength
@@ -58,6 +64,40 @@ struct surface {
     bool emission_seen_only;
     bool inside;    // seen from behind
 };
+
+bool is_thin(surface s)
+{
+#ifdef HAS_THIN_WALLS
+    return s.thin;
+#endif
+    return false;
+}
+
+// Whether it is glass, seen from inside of its body.
+bool in_glass(surface s)
+{
+    return s.inside && s.transmission > 0.0 && !is_thin(s);
+}
+
+// Index behind / index before, of what is refracted.
+float index_ratio(surface s)
+{
+    return is_thin(s) ? 1.0 : s.inside ? 1.0 / s.ior : s.ior;
+}
+
+// How far what is mirrored or refracted turns with the facet. The window of a thin wall spreads light as its mirror.
+float turn_of(surface s, bool mirrored)
+{
+    return facet_turn(index_ratio(s), mirrored || is_thin(s));
+}
+
+#ifdef HAS_DISPERSION
+// KHR_materials_dispersion: the indices of red, green and blue.
+vec3 channel_iors(surface s)
+{
+    return max(s.ior + (s.ior - 1.0) * 0.025 * s.dispersion * vec3(-1.0, 0.0, 1.0), 1.0);
+}
+#endif
 
 // What a ray's cone covers of a surface: on a slanted one it is longer in the plane of incidence. Akenine-Moeller et al.
 // 2021 (common/cone.glsl), section 5.
@@ -348,6 +388,10 @@ surface surface_at(hit h, vec3 origin, vec3 direction, float width)
 #endif
 #ifdef HAS_DISPERSION
     s.dispersion = m.dispersion;
+    s.carried = vec3(1.0);
+#endif
+#ifdef HAS_THIN_WALLS
+    s.thin = (m.flags & MATERIAL_THIN_WALLED) != 0u;
 #endif
 #ifdef HAS_ANISOTROPY_MAP
     s.grain = vec3(1.0, 0.0, 1.0);
@@ -373,6 +417,14 @@ surface surface_at(hit h, vec3 origin, vec3 direction, float width)
         s.normal = -s.normal;
 #ifdef HAS_CLEARCOAT
         s.coat_normal = -s.coat_normal;
+#endif
+    }
+    if (in_glass(s)) { // where there is neither
+#ifdef HAS_SHEEN
+        s.sheen = vec3(0.0);
+#endif
+#ifdef HAS_DIFFUSE_TRANSMISSION
+        s.diffuse_transmission = 0.0;
 #endif
     }
     return s;

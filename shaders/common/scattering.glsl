@@ -15,14 +15,19 @@
 #include "common/brdf.glsl"
 #include "common/facet_albedo.glsl"
 #include "common/material.glsl"
+#include "common/sheen.glsl"
 
 // Roughness at which the mirror ray begins to fade; at MIRROR_ROUGHNESS_GONE it is gone.
 const float MIRROR_ROUGHNESS_SHARP = 0.1;
 
 // What a dielectric does with light from outside: SHARE is a colour if some mirror has one.
-#ifdef HAS_SPECULAR
+#if defined HAS_SPECULAR || defined HAS_DISPERSION
 #define SHARE vec3
+#else
+#define SHARE float
+#endif
 
+#ifdef HAS_SPECULAR
 // KHR_materials_specular: Fresnel's curve from its value at normal incidence up to 1 begins at another one, of a colour,
 // and all of it is less. `exact`: what the equations say that facets mirror; `all_`: what they would if they mirrored
 // all light. As the change is the same line at every angle, it holds for means over facets and angles, too.
@@ -33,13 +38,59 @@ vec3 outside_mirror(surface s, float exact, float all_)
     return s.specular * (begins * all_ + (1.0 - begins) * max((exact - f0 * all_) / (1.0 - f0), 0.0));
 }
 #else
-#define SHARE float
-
-float outside_mirror(surface s, float exact, float all_)
+SHARE outside_mirror(surface s, float exact, float all_)
 {
-    return exact;
+    return SHARE(exact);
 }
 #endif
+
+// The direction of what a facet refracts; 0: it is totally reflected. In a thin wall facets of both sides bend it: it is
+// the mirrored direction on the other side (KHR_materials_transmission).
+vec3 bent_direction(surface s, float eta, vec3 direction, vec3 facet, vec3 normal)
+{
+#ifdef HAS_THIN_WALLS
+    if (is_thin(s)) {
+        vec3 mirrored = reflect(direction, facet);
+        float height = dot(mirrored, normal);
+        return mirrored - (height + abs(height)) * normal;
+    }
+#endif
+    return refract(direction, facet, 1.0 / eta);
+}
+
+// The share that a boundary mirrors of light from inside of glass.
+SHARE inside_mirror(surface s, float cosine)
+{
+#ifdef HAS_DISPERSION
+    vec3 ior = channel_iors(s);
+    return vec3(fresnel_dielectric(cosine, 1.0 / ior.r), fresnel_dielectric(cosine, 1.0 / ior.g),
+                fresnel_dielectric(cosine, 1.0 / ior.b));
+#else
+    return SHARE(fresnel_dielectric(cosine, 1.0 / s.ior));
+#endif
+}
+
+// Glass that disperses sends on one colour of what it lets through, bent as that one is, with a chance in proportion to
+// what the path would bring of it. `number` chooses it and comes back stretched; `window` becomes its share by its chance.
+// Returns the index behind / before.
+float disperse(surface s, inout float number, inout vec3 window)
+{
+    float eta = index_ratio(s);
+#ifdef HAS_DISPERSION
+    vec3 sizes = window * s.carried, iors = channel_iors(s);
+    float all_ = sizes.r + sizes.g + sizes.b;
+    if (s.dispersion <= 0.0 || is_thin(s) || !(all_ > 0.0))
+        return eta;
+    int chosen = number * all_ < sizes.r ? 0 : number * all_ < sizes.r + sizes.g ? 1 : 2;
+    float before = chosen == 0 ? 0.0 : chosen == 1 ? sizes.r : sizes.r + sizes.g;
+    float chance = sizes[chosen] / all_, kept = window[chosen] / chance;
+    number = clamp((number - before / all_) / chance, 0.0, 0.99999994);
+    window = vec3(0.0);
+    window[chosen] = kept;
+    eta = s.inside ? 1.0 / iors[chosen] : iors[chosen];
+#endif
+    return eta;
+}
 
 // How a surface splits the light along the view.
 struct split {
@@ -51,28 +102,168 @@ struct split {
     float mirror_ray;  // share of `mirror` that the mirror ray carries; the rest is blurred
     float again_mean;  // facets_lost_mean()
     SHARE enters_mean; // share of the light from all around that enters
+#ifdef HAS_SHEEN
+    vec3 sheen;          // what fibres send of the light from all around
+    float beneath;       // share of the light along the view that they leave to the rest
+    float beneath_mean;  // and of that from all around
+#endif
+#ifdef HAS_DIFFUSE_TRANSMISSION
+    vec3 passed; // what is scattered to the other side
+#endif
 };
+
+// Fibres over the surface. `beneath`: the share of light that they leave to it, along the view; to be mirrored from a
+// direction, which is the lesser one of both; to be scattered from a direction, as what is left of both, by the mean.
+#ifdef HAS_SHEEN
+float sheen_leaves(surface s, float cosine)
+{
+    return 1.0 - max_component(s.sheen) * sheen_albedo(max(cosine, 0.0), s.sheen_roughness);
+}
+
+void put_beneath_sheen(surface s, float NoV, inout split parts)
+{
+    parts.sheen = s.sheen * sheen_albedo(NoV, s.sheen_roughness);
+    parts.beneath = sheen_leaves(s, NoV);
+    parts.beneath_mean = 1.0 - max_component(s.sheen) * sheen_albedo_mean(s.sheen_roughness);
+    parts.mirror *= parts.beneath;
+    parts.again *= parts.beneath;
+    parts.scattered *= parts.beneath;
+    parts.refracted *= parts.beneath;
+}
+
+float beneath_view(split parts)
+{
+    return parts.beneath;
+}
+
+float beneath_mirrored(surface s, split parts, float NoL)
+{
+    return min(parts.beneath, sheen_leaves(s, NoL));
+}
+
+float beneath_scattered(surface s, split parts, float NoL)
+{
+    return sheen_leaves(s, NoL) / parts.beneath_mean;
+}
+
+// What fibres send from a direction, per steradian, and of the light from all around.
+vec3 sheen_sent(surface s, float NoH, float NoV, float NoL)
+{
+    return s.sheen * sheen_reflectance(s.sheen_roughness, NoH, NoV, NoL);
+}
+
+vec3 sheen_of(split parts)
+{
+    return parts.sheen;
+}
+#else
+void put_beneath_sheen(surface s, float NoV, inout split parts) {}
+
+float beneath_view(split parts)
+{
+    return 1.0;
+}
+
+float beneath_mirrored(surface s, split parts, float NoL)
+{
+    return 1.0;
+}
+
+float beneath_scattered(surface s, split parts, float NoL)
+{
+    return 1.0;
+}
+
+vec3 sheen_sent(surface s, float NoH, float NoV, float NoL)
+{
+    return vec3(0.0);
+}
+
+vec3 sheen_of(split parts)
+{
+    return vec3(0.0);
+}
+#endif
+
+// KHR_materials_diffuse_transmission: of what is scattered a share leaves at the other side, as if it had entered there.
+#ifdef HAS_DIFFUSE_TRANSMISSION
+void scatter_to_other_side(surface s, SHARE entered, inout split parts)
+{
+    parts.scattered *= 1.0 - s.diffuse_transmission;
+    parts.passed = s.diffuse_colour * (entered * (s.diffuse_transmission * beneath_view(parts)));
+}
+
+vec3 passed_of(split parts)
+{
+    return parts.passed;
+}
+
+// Of what is scattered, the share that goes to the other side: the chance of asking for light there.
+float passed_share(split parts)
+{
+    float size = max_component(parts.passed);
+    return size / max(size + max_component(parts.scattered + parts.again + sheen_of(parts)), 1e-30);
+}
+#else
+void scatter_to_other_side(surface s, SHARE entered, inout split parts) {}
+
+vec3 passed_of(split parts)
+{
+    return vec3(0.0);
+}
+
+float passed_share(split parts)
+{
+    return 0.0;
+}
+#endif
+
+// Which side of the surface to ask for light, by a number that comes back stretched to [0, 1) again, with the chance of it:
+// -1 behind it.
+float side_choose(split parts, inout float number, out float chance)
+{
+    chance = 1.0;
+#ifdef HAS_DIFFUSE_TRANSMISSION
+    float share = passed_share(parts);
+    bool behind = is_in(share, number);
+    chance = behind ? share : 1.0 - share;
+    return behind ? -1.0 : 1.0;
+#endif
+    return 1.0;
+}
+
+// Of a direction that another technique sampled.
+float side_chance(split parts, float cosine)
+{
+#ifdef HAS_DIFFUSE_TRANSMISSION
+    float share = passed_share(parts);
+    return cosine < 0.0 ? share : 1.0 - share;
+#endif
+    return 1.0;
+}
 
 // `loss`: facets_lost() of the view.
 split split_facets(surface s, float NoV, float alpha, float loss)
 {
-    bool leaves = s.inside && s.transmission > 0.0;
+    bool leaves = in_glass(s);
     float mean = facets_cosine(NoV, alpha);
     split result;
     // From inside of one direction: total reflection begins at an angle.
-    result.dielectric = leaves ? SHARE(fresnel_dielectric(NoV, 1.0 / s.ior))
+    result.dielectric = leaves ? inside_mirror(s, NoV)
                                : outside_mirror(s, facets_dielectric(mean, loss, alpha, s.ior), 1.0 - loss);
     result.again_mean = facets_lost_mean(alpha);
     SHARE mirrored_mean = outside_mirror(s, facets_dielectric_mean(alpha, s.ior), 1.0 - result.again_mean);
     result.enters_mean = max(1.0 - mirrored_mean, SHARE(1e-6));
     result.mirror = mix(vec3(result.dielectric), fresnel_schlick(s.base, mean) * (1.0 - loss), s.metallic);
     result.again = metal_again(s.base, result.again_mean) * (loss * s.metallic);
-    SHARE enters = (1.0 - result.dielectric) * (1.0 - s.metallic);
-    result.scattered = s.base * (enters * (1.0 - s.transmission));
+    SHARE enters = (1.0 - result.dielectric) * (1.0 - s.metallic), entered = enters * (1.0 - s.transmission);
+    result.scattered = s.base * entered;
     // Glass is tinted once, where light enters it.
     result.refracted = (leaves ? vec3(1.0) : s.base) * (enters * s.transmission);
     float blurred = smoothstep(MIRROR_ROUGHNESS_SHARP, MIRROR_ROUGHNESS_GONE, s.roughness);
     result.mirror_ray = leaves ? 1.0 : 1.0 - blurred;
+    put_beneath_sheen(s, NoV, result);
+    scatter_to_other_side(s, entered, result);
     return result;
 }
 
@@ -82,19 +273,31 @@ split split_light(surface s, float NoV)
     return split_facets(s, NoV, alpha, facets_lost(stretched_cosine(NoV, alpha), alpha));
 }
 
-// What goes to the eye of the light from a direction that enters, per steradian. `loss`: facets_lost() of that direction;
-// reciprocal, as `parts` have the same factors for the view. Shirley et al. A Practitioners' Assessment of Light
-// Reflection Models. 1997.
-vec3 spread_scattered(surface s, split parts, float NoL, float alpha, float loss)
+// How much of the light from a direction enters, by that of the light from all around, per steradian. `loss`: facets_lost()
+// of that direction; what is scattered is reciprocal, as `parts` have the same factors for the view. Shirley et al. A
+// Practitioners' Assessment of Light Reflection Models. 1997.
+SHARE spread_entered(surface s, split parts, float NoL, float alpha, float loss)
 {
     SHARE enters = 1.0 - outside_mirror(s, facets_dielectric(facets_cosine(NoL, alpha), loss, alpha, s.ior), 1.0 - loss);
-    return parts.scattered * (enters / parts.enters_mean * INVERSE_PI);
+    return enters / parts.enters_mean * beneath_scattered(s, parts, NoL) * INVERSE_PI;
 }
 
-// What enters or is mirrored again. Kulla, Conty 2017.
+vec3 spread_scattered(surface s, split parts, float NoL, float alpha, float loss)
+{
+    return parts.scattered * spread_entered(s, parts, NoL, alpha, loss);
+}
+
+// What of the light from a direction comes out mirrored more than once, by that of the light from all around. Kulla, Conty
+// 2017. `loss`: as above.
+float again_share(surface s, split parts, float NoL, float loss)
+{
+    return loss / max(parts.again_mean, 1e-9) * beneath_scattered(s, parts, NoL);
+}
+
+// What enters or is mirrored again.
 vec3 spread_out(surface s, split parts, float NoL, float alpha, float loss)
 {
-    return spread_scattered(s, parts, NoL, alpha, loss) + parts.again * (loss / max(parts.again_mean, 1e-9) * INVERSE_PI);
+    return spread_scattered(s, parts, NoL, alpha, loss) + parts.again * (again_share(s, parts, NoL, loss) * INVERSE_PI);
 }
 
 // The mirrored direction; about the geometric normal where the shading normal would send it into the surface.
@@ -104,15 +307,27 @@ vec3 mirror_direction(surface s, vec3 direction)
     return dot(mirrored, s.geometric) > 0.0 ? mirrored : reflect(direction, s.geometric);
 }
 
-// Of brdf() what is scattered, not mirrored, be it once or again; NoL > 0.
-vec3 brdf_scattered(surface s, split parts, float NoL)
+// Of brdf() what is scattered from the other side.
+vec3 brdf_passed(surface s, split parts, vec3 light)
 {
-    float alpha = square(s.roughness);
-    return spread_scattered(s, parts, NoL, alpha, facets_lost(stretched_cosine(NoL, alpha), alpha));
+    float NoL = -dot(s.normal, light), alpha = square(s.roughness);
+    if (NoL <= 0.0 || dot(s.geometric, light) >= 0.0)
+        return vec3(0.0);
+    return passed_of(parts) * spread_entered(s, parts, NoL, alpha, facets_lost(stretched_cosine(NoL, alpha), alpha));
+}
+
+// Of brdf() what is scattered, by fibres too, and not mirrored, be it once or again.
+vec3 brdf_scattered(surface s, split parts, vec3 view, float NoV, vec3 light)
+{
+    float alpha = square(s.roughness), NoL = dot(s.normal, light), NoH = dot(s.normal, normalize(view + light));
+    if (NoL <= 0.0 || dot(s.geometric, light) <= 0.0)
+        return brdf_passed(s, parts, light);
+    return spread_scattered(s, parts, NoL, alpha, facets_lost(stretched_cosine(NoL, alpha), alpha)) +
+           sheen_sent(s, NoH, NoV, NoL);
 }
 
 // Share of the irradiance from a direction (of a light, unit) that goes to the eye, per steradian; without the cosine.
-// 0 from below the horizon, and for glass seen from inside, where no light is sampled. Reciprocal. `parts`: of the same
+// From below the horizon only what is scattered to the other side, and 0 for glass seen from inside, where no light is sampled. Reciprocal. `parts`: of the same
 // surface and NoV.
 //
 // What is mirrored: Cook and Torrance 1982 with GGX. (1 - F) of the half-way vector alone, as often seen for scattered
@@ -121,12 +336,13 @@ vec3 brdf(surface s, split parts, vec3 view, float NoV, vec3 light)
 {
     float NoL = dot(s.normal, light);
     if (NoL <= 0.0 || dot(s.geometric, light) <= 0.0)
-        return vec3(0.0);
+        return brdf_passed(s, parts, light);
     vec3 half_way = normalize(view + light), across = cross(s.normal, half_way);
     float NoH = clamp(dot(s.normal, half_way), 0.0, 1.0), VoH = clamp(dot(view, half_way), 0.0, 1.0);
     vec3 mirror = mix(vec3(outside_mirror(s, fresnel_dielectric(VoH, s.ior), 1.0)), fresnel_schlick(s.base, VoH), s.metallic);
     float wide = square(max(s.roughness, ROUGHNESS_MIN_LIGHT)), alpha = square(s.roughness);
     vec3 specular = mirror * (D_GGX(NoH, dot(across, across), wide) * V_SmithGGXCorrelated(NoV, NoL, wide));
+    specular = specular * beneath_mirrored(s, parts, NoL) + sheen_sent(s, NoH, NoV, NoL);
     float loss = facets_lost(stretched_cosine(NoL, alpha), alpha);
     return spread_out(s, parts, NoL, alpha, loss) + specular;
 }

@@ -36,7 +36,7 @@ float sticking_of(surface s, vec3 direction)
         return 1.0 - s.alpha;
     float NoV = clamp(-dot(s.normal, direction), 1e-4, 1.0); // a shading normal may lean away
     split parts = split_light(s, NoV);
-    vec2 lit = s.inside && s.transmission > 0.0 ? vec2(0.0) : light_of_lights(s, parts, -direction, NoV);
+    vec2 lit = in_glass(s) ? vec2(0.0) : light_of_lights(s, parts, -direction, NoV);
     float around = lit.y + luminance(environment_irradiance(s.normal));
     around = around > 0.0 ? around : 1.0;
     float mirrored = around * luminance(parts.mirror) + lit.x, refracted = around * luminance(parts.refracted);

@@ -26,9 +26,11 @@ vec3 lit(path p, surface s, vec3 direction, float distance_)
     split parts = split_light(s, NoV);
     vec3 origin = off_surface(s, distance_, s.geometric);
     vec3 mirror = parts.mirror + parts.refracted; // as if the scene were as bright behind glass as before it
-    vec3 sum = s.emission + s.occlusion * ((parts.scattered + parts.again) * environment_irradiance(s.normal) +
+    vec3 scattered = parts.scattered + parts.again + sheen_of(parts);
+    vec3 sum = s.emission + s.occlusion * (scattered * environment_irradiance(s.normal) +
+                                           passed_of(parts) * environment_irradiance(-s.normal) +
                                            mirror * environment_irradiance(mirror_direction(s, direction)));
-    if (s.inside && s.transmission > 0.0)
+    if (in_glass(s))
         return sum; // glass samples no lights from inside
 #ifdef HAS_AREA_LIGHTS
     uvec2 seed = path_seed(p);
@@ -40,7 +42,7 @@ vec3 lit(path p, surface s, vec3 direction, float distance_)
         u = sequence_pair(seed, SEQUENCE_EVERY_LIGHT + (wave_number << 16 ^ i), sample_);
 #endif
         light_sample sampled = light_sample_at(i, origin, u);
-        float NoL = max(dot(s.normal, sampled.direction), 0.0);
+        float NoL = abs(dot(s.normal, sampled.direction));
         sum += brdf(s, parts, view, NoV, sampled.direction) * sampled.irradiance * NoL;
     }
     return sum;

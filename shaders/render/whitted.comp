@@ -11,8 +11,8 @@
 // Lights beyond the first batch come in further passes with first_ray > 0, which make shadow rays alone.
 
 #include "common/environment.glsl"
-#include "common/light.glsl"
 #include "common/scattering.glsl"
+#include "render/light_seen.glsl"
 #include "render/shade.glsl"
 #include "render/wave.glsl"
 
@@ -41,10 +41,11 @@ uint ask_for_lights(uint j, path parent, surface s, split parts, vec3 view, floa
 #ifdef HAS_AREA_LIGHTS
         u = sequence_pair(seed, SEQUENCE_EVERY_LIGHT + (wave_number << 16 ^ index), sample_);
 #endif
-        light_sample sampled = light_sample_at(index, origin, u);
+        vec3 from = origin;
+        light_sample sampled = light_seen(s, distance_, index, u, from);
         float NoL = dot(s.normal, sampled.direction);
-        vec3 arriving = weight * (brdf(s, parts, view, NoV, sampled.direction) * sampled.irradiance * NoL);
-        if (add_shadow_ray(i * wave.hits.count + j, parent, origin, sampled.direction, sampled.distance_, arriving))
+        vec3 arriving = weight * (brdf(s, parts, view, NoV, sampled.direction) * sampled.irradiance * abs(NoL));
+        if (add_shadow_ray(i * wave.hits.count + j, parent, from, sampled.direction, sampled.distance_, arriving))
             alive++;
     }
     return alive;
@@ -62,15 +63,16 @@ vec3 shade(uint j, path p, surface s, split parts, ray r, float distance_, vec3 
     if (s.unlit)
         return weight * s.base;
     vec3 mirrored = mirror_direction(s, direction);
-    vec3 bent = refract(direction, s.normal, s.inside ? s.ior : 1.0 / s.ior);
+    vec3 bent = bent_direction(s, index_ratio(s), direction, s.normal, s.normal);
     // If it is totally reflected, or a tilted normal would send it back, it is mirrored.
     bool through = dot(bent, s.geometric) < 0.0;
     vec3 mirror = parts.mirror + (through ? vec3(0.0) : parts.refracted);
     add_child_of_weight(j, p, s, distance_, mirrored, weight * mirror * parts.mirror_ray, false);
     if (through)
         add_child_of_weight(j, p, s, distance_, bent, weight * parts.refracted, false);
-    vec3 ambient = (parts.scattered + parts.again) * environment_irradiance(s.normal) +
+    vec3 ambient = (parts.scattered + parts.again + sheen_of(parts)) * environment_irradiance(s.normal) +
                    mirror * (1.0 - parts.mirror_ray) * environment_irradiance(mirrored);
+    ambient += passed_of(parts) * environment_irradiance(-s.normal);
     return weight * (s.emission + s.occlusion * ambient);
 }
 
@@ -95,7 +97,7 @@ void main()
         radiance[k] = vec4(shade(j, p, s, parts, r, h.distance, weight * s.alpha), seen);
     }
     uint shadows = 0u;
-    if (s.unlit || s.alpha <= 0.0 || (s.inside && s.transmission > 0.0))
+    if (s.unlit || s.alpha <= 0.0 || in_glass(s))
         no_lights(j);
     else
         shadows = ask_for_lights(j, p, s, parts, view, NoV, weight * s.alpha, h.distance);
