@@ -13,11 +13,17 @@
 
 #include "shared/material.h"
 #include "common/brdf.glsl"
+#include "common/coat.glsl"
 #include "common/facet_albedo.glsl"
 #include "common/material.glsl"
 
 // Roughness at which the mirror ray begins to fade; at MIRROR_ROUGHNESS_GONE it is gone.
 const float MIRROR_ROUGHNESS_SHARP = 0.1;
+
+float mirror_ray_share(float roughness)
+{
+    return 1.0 - smoothstep(MIRROR_ROUGHNESS_SHARP, MIRROR_ROUGHNESS_GONE, roughness);
+}
 
 // What a dielectric does with light from outside: SHARE is a colour if some mirror has one.
 #ifdef HAS_SPECULAR
@@ -41,7 +47,7 @@ float outside_mirror(surface s, float exact, float all_)
 }
 #endif
 
-// How a surface splits the light along the view.
+// How a surface splits the light along the view; below a coat: what gets through it.
 struct split {
     vec3 mirror;       // reflectance of the facets at the first go
     vec3 again;        // what they mirror more than once
@@ -51,10 +57,11 @@ struct split {
     float mirror_ray;  // share of `mirror` that the mirror ray carries; the rest is blurred
     float again_mean;  // facets_lost_mean()
     SHARE enters_mean; // share of the light from all around that enters
+    coating coat;
 };
 
-// `loss`: facets_lost() of the view.
-split split_facets(surface s, float NoV, float alpha, float loss)
+// `loss`: facets_lost() of the view, whose cosine is NoV.
+split split_facets(surface s, vec3 view, float NoV, float alpha, float loss)
 {
     bool leaves = s.inside && s.transmission > 0.0;
     float mean = facets_cosine(NoV, alpha);
@@ -71,15 +78,19 @@ split split_facets(surface s, float NoV, float alpha, float loss)
     result.scattered = s.base * (enters * (1.0 - s.transmission));
     // Glass is tinted once, where light enters it.
     result.refracted = (leaves ? vec3(1.0) : s.base) * (enters * s.transmission);
-    float blurred = smoothstep(MIRROR_ROUGHNESS_SHARP, MIRROR_ROUGHNESS_GONE, s.roughness);
-    result.mirror_ray = leaves ? 1.0 : 1.0 - blurred;
+    result.mirror_ray = leaves ? 1.0 : mirror_ray_share(s.roughness);
+    result.coat = coating_of(s, view);
+    result.mirror *= result.coat.passes;
+    result.again *= result.coat.passes;
+    result.scattered *= result.coat.passes;
+    result.refracted *= result.coat.passes;
     return result;
 }
 
-split split_light(surface s, float NoV)
+split split_light(surface s, vec3 view, float NoV)
 {
     float alpha = square(s.roughness);
-    return split_facets(s, NoV, alpha, facets_lost(stretched_cosine(NoV, alpha), alpha));
+    return split_facets(s, view, NoV, alpha, facets_lost(stretched_cosine(NoV, alpha), alpha));
 }
 
 // What goes to the eye of the light from a direction that enters, per steradian. `loss`: facets_lost() of that direction;
@@ -97,6 +108,16 @@ vec3 spread_out(surface s, split parts, float NoL, float alpha, float loss)
     return spread_scattered(s, parts, NoL, alpha, loss) + parts.again * (loss / max(parts.again_mean, 1e-9) * INVERSE_PI);
 }
 
+// The share of the light that a coat's mirror ray carries.
+float coat_ray_of(surface s, split parts)
+{
+#ifdef HAS_CLEARCOAT
+    return parts.coat.mirrors * mirror_ray_share(s.coat_roughness);
+#else
+    return 0.0;
+#endif
+}
+
 // The mirrored direction; about the geometric normal where the shading normal would send it into the surface.
 vec3 mirror_direction(surface s, vec3 direction)
 {
@@ -105,14 +126,15 @@ vec3 mirror_direction(surface s, vec3 direction)
 }
 
 // Of brdf() what is scattered, not mirrored, be it once or again; NoL > 0.
-vec3 brdf_scattered(surface s, split parts, float NoL)
+vec3 brdf_scattered(surface s, split parts, vec3 light)
 {
-    float alpha = square(s.roughness);
-    return spread_scattered(s, parts, NoL, alpha, facets_lost(stretched_cosine(NoL, alpha), alpha));
+    float alpha = square(s.roughness), NoL = dot(s.normal, light);
+    return spread_scattered(s, parts, NoL, alpha, facets_lost(stretched_cosine(NoL, alpha), alpha)) *
+           coat_over_scattered(parts.coat, s, light);
 }
 
-// Share of the irradiance from a direction (of a light, unit) that goes to the eye, per steradian; without the cosine.
-// 0 from below the horizon, and for glass seen from inside, where no light is sampled. Reciprocal. `parts`: of the same
+// Share of the irradiance from a direction (of a light, unit) that goes to the eye, per steradian; without the cosine, and
+// without what a coat mirrors. 0 from below the horizon, and for glass seen from inside, where no light is sampled. Reciprocal. `parts`: of the same
 // surface and NoV.
 //
 // What is mirrored: Cook and Torrance 1982 with GGX. (1 - F) of the half-way vector alone, as often seen for scattered
@@ -128,5 +150,16 @@ vec3 brdf(surface s, split parts, vec3 view, float NoV, vec3 light)
     float wide = square(max(s.roughness, ROUGHNESS_MIN_LIGHT)), alpha = square(s.roughness);
     vec3 specular = mirror * (D_GGX(NoH, dot(across, across), wide) * V_SmithGGXCorrelated(NoV, NoL, wide));
     float loss = facets_lost(stretched_cosine(NoL, alpha), alpha);
-    return spread_out(s, parts, NoL, alpha, loss) + specular;
+    return spread_out(s, parts, NoL, alpha, loss) * coat_over_scattered(parts.coat, s, light) +
+           specular * coat_over_mirrored(parts.coat, s, light);
+}
+
+// The same of all that is there, times the cosine.
+vec3 reflected(surface s, split parts, vec3 view, float NoV, vec3 light)
+{
+    vec3 sent = brdf(s, parts, view, NoV, light) * max(dot(s.normal, light), 0.0);
+#ifdef HAS_CLEARCOAT
+    sent += coat_highlight(s, parts.coat, view, light, max(s.coat_roughness, ROUGHNESS_MIN_LIGHT));
+#endif
+    return sent;
 }
