@@ -92,6 +92,19 @@ static uint32_t add_slot(const struct gpu_scene *gpu, const struct texture_use *
     return (*slot_count)++;
 }
 
+/* That of the first texture of those which need one counts. */
+static uint32_t tangent_flags(const struct scene_material *material)
+{
+    static const enum material_texture turned[] = {MATERIAL_NORMAL, MATERIAL_BUMP, MATERIAL_CLEARCOAT_NORMAL,
+                                                   MATERIAL_ANISOTROPY};
+    for (size_t i = 0; i < sizeof(turned) / sizeof(*turned); i++) {
+        const struct texture_use *use = &material->textures[turned[i]];
+        if (use->texture)
+            return MATERIAL_TANGENT | (use->texcoord_set == 1 ? MATERIAL_TANGENT_SECOND : 0);
+    }
+    return material->anisotropy != 0.0f ? MATERIAL_TANGENT : 0;
+}
+
 static void pack_material(const struct gpu_scene *gpu, const struct scene_material *in, struct material *out,
                           struct texture_slot *slots, uint32_t *slot_count)
 {
@@ -135,7 +148,7 @@ static void pack_material(const struct gpu_scene *gpu, const struct scene_materi
                  (in->alpha_mode == ALPHA_BLEND ? MATERIAL_ALPHA_BLEND : 0) |
                  (in->double_sided ? MATERIAL_DOUBLE_SIDED : 0) | (in->unlit ? MATERIAL_UNLIT : 0) |
                  (in->emission_seen_only ? MATERIAL_EMISSION_SEEN_ONLY : 0) |
-                 (in->thin_walled ? MATERIAL_THIN_WALLED : 0);
+                 (in->thin_walled ? MATERIAL_THIN_WALLED : 0) | tangent_flags(in);
     uint32_t *const places[MATERIAL_TEXTURE_COUNT] = {
         [MATERIAL_BASE_COLOUR] = &out->texture_base_colour,
         [MATERIAL_NORMAL] = &out->texture_normal,

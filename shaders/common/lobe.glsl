@@ -18,6 +18,7 @@ struct lobe {
     float solid_angle; // 1 / the density with which it was chosen, steradians; 0: the surface is smooth
     vec3 scattered;    // of split_light(), of the facet where glass is seen from inside
     bool back;         // mirrored, once or again
+    float roughness;   // of what sends it on
 };
 
 // The lit share of the visible facets, both correlated by height as in V_SmithGGXCorrelated(). 0 below the horizon.
@@ -35,6 +36,40 @@ vec3 again_direction(vec3 normal, float number)
     float sine = sqrt(number), phi = TWO_PI * fract(number * 4096.0);
     return sine * (cos(phi) * x + sin(phi) * y) + sqrt(1.0 - number) * normal;
 }
+
+// What of the light along a direction comes out mirrored more than once, as brdf() has it, by that of all directions.
+float again_share(surface s, split parts, vec3 light, float alpha)
+{
+    float cosine = dot(light, s.normal);
+    return facets_lost(stretched_cosine(cosine, alpha), alpha) / max(parts.again_mean, 1e-9) *
+           over_scattered(s, parts, light);
+}
+
+#ifdef HAS_CLEARCOAT
+// The lobe of the coat: a visible facet's, or the smooth coat's. `chance`: with which it was chosen.
+lobe coat_lobe(surface s, split parts, vec3 direction, float chance, vec2 u)
+{
+    float alpha = square(s.coat_roughness), NoV = coat_cosine(s, -direction), lit = 1.0;
+    bool rough = alpha > FACET_ALPHA_MIN;
+    vec3 x, y, facet = s.coat_normal;
+    tangent_frame(s.coat_normal, x, y);
+    vec3 view = normalize(vec3(-dot(direction, x), -dot(direction, y), NoV));
+    lobe result = lobe(facet, vec3(0.0), 0.0, parts.scattered, true, s.coat_roughness);
+    if (rough) {
+        vec3 local = visible_facet(view, vec2(alpha), u);
+        float VoH = clamp(dot(view, local), 1e-4, 1.0);
+        facet = local.x * x + local.y * y + local.z * s.coat_normal;
+        result.solid_angle = square(facet_turn(COAT_IOR, true)) / visible_facet_density(local, view, VoH, vec2(alpha));
+        NoV = VoH;
+    }
+    result.direction = rough ? reflect(direction, facet) : coat_mirror_direction(s, direction);
+    if (rough)
+        lit = lit_share(view.z, dot(result.direction, s.coat_normal), alpha);
+    bool out_ = dot(result.direction, s.geometric) > 0.0;
+    result.weight = vec3(out_ ? s.coat * fresnel_dielectric(NoV, COAT_IOR) * lit / chance : 0.0);
+    return result;
+}
+#endif
 
 // The frame of facets, and the view in it.
 vec3 facet_frame(surface s, float NoV, vec3 direction, out vec3 x, out vec3 y)
@@ -82,11 +117,11 @@ facet_lobes facet_lobes_of(surface s, split parts, float NoV, vec3 direction, ve
         lit = lit_share(NoV, dot(f.reflected, s.normal), square(s.roughness));
     }
     f.mirror = mix(vec3(dielectric), fresnel_schlick(s.base, VoH), s.metallic) *
-               (lit * beneath_mirrored(s, parts, dot(f.reflected, s.normal)));
-    f.again = metal_again(s.base, parts.again_mean) * (s.metallic * (1.0 - lit) * beneath_view(parts));
+               (lit * over_mirrored(s, parts, f.reflected));
+    f.again = metal_again(s.base, parts.again_mean) * (s.metallic * (1.0 - lit) * over_view(parts));
     // Glass is tinted once, where light enters it.
-    f.enters = (1.0 - dielectric * lit) * ((1.0 - s.metallic) * beneath_view(parts));
-    f.window = (leaves ? vec3(1.0) : s.base) * (f.enters * s.transmission);
+    f.enters = (1.0 - dielectric * lit) * (1.0 - s.metallic);
+    f.window = (leaves ? vec3(1.0) : s.base) * (f.enters * s.transmission * over_view(parts));
     f.window_size = max_component(f.window);
     f.bent = bent_direction(s, disperse(s, number, f.window), direction, facet, s.normal);
     if (rough && leaves)
@@ -98,6 +133,15 @@ facet_lobes facet_lobes_of(surface s, split parts, float NoV, vec3 direction, ve
     }
     return f;
 }
+
+#ifdef HAS_CLEARCOAT
+// The chance of its lobe among all that are sent on.
+float coat_chance_of(split parts)
+{
+    float below = max_component(parts.mirror + parts.again + parts.refracted);
+    return parts.coat.mirrors / max(parts.coat.mirrors + below, 1e-9);
+}
+#endif
 
 // `parts`: split_light() of the same surface and NoV. `choice` chooses between mirror, window and several mirrors in
 // turn, and comes back stretched; `u` chooses the facet.
@@ -111,9 +155,17 @@ lobe lobe_choose(surface s, split parts, float NoV, vec3 direction, inout float 
         facet = facet_seen(s, NoV, direction, u, facet_angle);
     facet_lobes f = facet_lobes_of(s, parts, NoV, direction, facet, rough, choice);
     vec3 scattered = leaves ? s.base * (f.enters * (1.0 - s.transmission)) : parts.scattered;
-    lobe result = lobe(s.normal, vec3(0.0), 0.0, scattered, false);
+    lobe result = lobe(s.normal, vec3(0.0), 0.0, scattered, false, s.roughness);
     float mirror_size = max_component(f.mirror), again_size = max_component(f.again);
     float all_ = mirror_size + again_size + f.window_size;
+#ifdef HAS_CLEARCOAT
+    // Before the facet below, by what is known of all of them.
+    float coat_chance = coat_chance_of(parts);
+    bool coated = choice < coat_chance;
+    choice = clamp(coated ? choice / coat_chance : (choice - coat_chance) / (1.0 - coat_chance), 0.0, 0.99999994);
+    if (coated)
+        return coat_lobe(s, parts, direction, coat_chance, u);
+#endif
     if (!(all_ > 0.0))
         return result;
     float first = mirror_size / all_, second = again_size / all_;
@@ -121,12 +173,15 @@ lobe lobe_choose(surface s, split parts, float NoV, vec3 direction, inout float 
     float before = mirrored ? 0.0 : is_again ? first : first + second;
     float chance = mirrored ? first : is_again ? second : 1.0 - first - second;
     choice = clamp((choice - before) / chance, 0.0, 0.99999994);
+#ifdef HAS_CLEARCOAT
+    chance *= 1.0 - coat_chance;
+#endif
     result.back = mirrored || is_again;
     result.direction = mirrored ? f.reflected : is_again ? again_direction(s.normal, choice) : f.bent;
     result.weight = (mirrored ? f.mirror : is_again ? f.again : f.window) / chance;
     float cosine = dot(result.direction, s.normal);
     if (is_again)
-        result.weight *= again_share(s, parts, cosine, facets_lost(stretched_cosine(cosine, alpha), alpha));
+        result.weight *= again_share(s, parts, result.direction, alpha);
     if (result.back && !(dot(result.direction, s.geometric) > 0.0)) {
         result.weight = rough ? vec3(0.0) : result.weight;
         result.direction = reflect(direction, s.geometric);
@@ -136,10 +191,10 @@ lobe lobe_choose(surface s, split parts, float NoV, vec3 direction, inout float 
     return result;
 }
 
-// The reflectance of the lobes that send light back, from a direction (of light, unit) to the eye, per steradian, times
+// Of the surface below a coat, see lobe_mirrored(). The reflectance of the lobes that send light back, from a direction (of light, unit) to the eye, per steradian, times
 // the cosine; and the density with which lobe_choose() sends a ray that way. Both are 0 where the surface is smooth, and
 // for glass seen from inside. Of light that is mirrored more than once, the density is a mean over the facets.
-vec3 lobe_mirrored(surface s, split parts, float NoV, vec3 view, vec3 light, out float density)
+vec3 lobe_mirrored_below(surface s, split parts, float NoV, vec3 view, vec3 light, out float density)
 {
     float NoL = dot(s.normal, light), alpha = square(s.roughness);
     density = 0.0;
@@ -155,6 +210,33 @@ vec3 lobe_mirrored(surface s, split parts, float NoV, vec3 view, vec3 light, out
     float mirrored = visible_facet_density(local, local_view, VoH, vec2(alpha)) / (4.0 * VoH);
     float again_size = max_component(parts.again), again_all = max_component(parts.mirror + parts.refracted) + again_size;
     density = mirror_size / max(all_, 1e-30) * mirrored + again_size / max(again_all, 1e-30) * NoL * INVERSE_PI;
-    float again = again_share(s, parts, NoL, facets_lost(stretched_cosine(NoL, alpha), alpha));
-    return f.mirror * mirrored + parts.again * (again * NoL * INVERSE_PI);
+    return f.mirror * mirrored + parts.again * (again_share(s, parts, light, alpha) * NoL * INVERSE_PI);
+}
+
+// Whether a lobe of it is no single direction.
+bool facets_are_rough(surface s)
+{
+#ifdef HAS_CLEARCOAT
+    if (square(s.coat_roughness) > FACET_ALPHA_MIN)
+        return true;
+#endif
+    return square(s.roughness) > FACET_ALPHA_MIN;
+}
+
+// The same with the coat.
+vec3 lobe_mirrored(surface s, split parts, float NoV, vec3 view, vec3 light, out float density)
+{
+    vec3 sent = lobe_mirrored_below(s, parts, NoV, view, light, density);
+#ifdef HAS_CLEARCOAT
+    float alpha = square(s.coat_roughness), chance = coat_chance_of(parts);
+    density *= 1.0 - chance;
+    if (alpha > FACET_ALPHA_MIN && chance > 0.0 && dot(s.coat_normal, light) > 0.0) {
+        float cosine = coat_cosine(s, view), VoH = clamp(dot(view, normalize(view + light)), 1e-4, 1.0);
+        float highlight = coat_highlight(s, parts.coat, view, light, s.coat_roughness);
+        float lit = s.coat * fresnel_dielectric(VoH, COAT_IOR) * lit_share(cosine, dot(s.coat_normal, light), alpha);
+        sent += highlight;
+        density += chance * highlight / max(lit, 1e-7); // what is sent, by its weight
+    }
+#endif
+    return sent;
 }

@@ -13,12 +13,18 @@
 
 #include "shared/material.h"
 #include "common/brdf.glsl"
+#include "common/coat.glsl"
 #include "common/facet_albedo.glsl"
 #include "common/material.glsl"
 #include "common/sheen.glsl"
 
 // Roughness at which the mirror ray begins to fade; at MIRROR_ROUGHNESS_GONE it is gone.
 const float MIRROR_ROUGHNESS_SHARP = 0.1;
+
+float mirror_ray_share(float roughness)
+{
+    return 1.0 - smoothstep(MIRROR_ROUGHNESS_SHARP, MIRROR_ROUGHNESS_GONE, roughness);
+}
 
 // What a dielectric does with light from outside: SHARE is a colour if some mirror has one.
 #if defined HAS_SPECULAR || defined HAS_DISPERSION
@@ -92,7 +98,7 @@ float disperse(surface s, inout float number, inout vec3 window)
     return eta;
 }
 
-// How a surface splits the light along the view.
+// How a surface splits the light along the view; below a coat: what gets through it.
 struct split {
     vec3 mirror;       // reflectance of the facets at the first go
     vec3 again;        // what they mirror more than once
@@ -110,46 +116,38 @@ struct split {
 #ifdef HAS_DIFFUSE_TRANSMISSION
     vec3 passed; // what is scattered to the other side
 #endif
+    coating coat;
 };
 
-// Fibres over the surface. `beneath`: the share of light that they leave to it, along the view; to be mirrored from a
-// direction, which is the lesser one of both; to be scattered from a direction, as what is left of both, by the mean.
+// What lies over the surface: fibres, and a coat over these. The share of light that they let through along the view; to be
+// mirrored from a direction; and to be scattered from one and back to the view, less that along the view.
 #ifdef HAS_SHEEN
-float sheen_leaves(surface s, float cosine)
+float sheen_leaves(surface s, vec3 direction)
 {
-    return 1.0 - max_component(s.sheen) * sheen_albedo(max(cosine, 0.0), s.sheen_roughness);
+    return 1.0 - max_component(s.sheen) * sheen_albedo(max(dot(s.normal, direction), 0.0), s.sheen_roughness);
 }
 
-void put_beneath_sheen(surface s, float NoV, inout split parts)
+float over_view(split parts)
 {
-    parts.sheen = s.sheen * sheen_albedo(NoV, s.sheen_roughness);
-    parts.beneath = sheen_leaves(s, NoV);
-    parts.beneath_mean = 1.0 - max_component(s.sheen) * sheen_albedo_mean(s.sheen_roughness);
-    parts.mirror *= parts.beneath;
-    parts.again *= parts.beneath;
-    parts.scattered *= parts.beneath;
-    parts.refracted *= parts.beneath;
+    return parts.beneath * parts.coat.passes;
 }
 
-float beneath_view(split parts)
+float over_mirrored(surface s, split parts, vec3 light)
 {
-    return parts.beneath;
+    return min(parts.beneath, sheen_leaves(s, light)) * coat_over_mirrored(parts.coat, s, light);
 }
 
-float beneath_mirrored(surface s, split parts, float NoL)
+float over_scattered(surface s, split parts, vec3 light)
 {
-    return min(parts.beneath, sheen_leaves(s, NoL));
-}
-
-float beneath_scattered(surface s, split parts, float NoL)
-{
-    return sheen_leaves(s, NoL) / parts.beneath_mean;
+    return sheen_leaves(s, light) / parts.beneath_mean * coat_over_scattered(parts.coat, s, light);
 }
 
 // What fibres send from a direction, per steradian, and of the light from all around.
-vec3 sheen_sent(surface s, float NoH, float NoV, float NoL)
+vec3 sheen_sent(surface s, split parts, vec3 view, float NoV, vec3 light)
 {
-    return s.sheen * sheen_reflectance(s.sheen_roughness, NoH, NoV, NoL);
+    float NoH = dot(s.normal, normalize(view + light)), NoL = dot(s.normal, light);
+    return s.sheen * (sheen_reflectance(s.sheen_roughness, NoH, NoV, NoL) * parts.coat.passes *
+                      coat_over_scattered(parts.coat, s, light));
 }
 
 vec3 sheen_of(split parts)
@@ -157,24 +155,22 @@ vec3 sheen_of(split parts)
     return parts.sheen;
 }
 #else
-void put_beneath_sheen(surface s, float NoV, inout split parts) {}
-
-float beneath_view(split parts)
+float over_view(split parts)
 {
-    return 1.0;
+    return parts.coat.passes;
 }
 
-float beneath_mirrored(surface s, split parts, float NoL)
+float over_mirrored(surface s, split parts, vec3 light)
 {
-    return 1.0;
+    return coat_over_mirrored(parts.coat, s, light);
 }
 
-float beneath_scattered(surface s, split parts, float NoL)
+float over_scattered(surface s, split parts, vec3 light)
 {
-    return 1.0;
+    return coat_over_scattered(parts.coat, s, light);
 }
 
-vec3 sheen_sent(surface s, float NoH, float NoV, float NoL)
+vec3 sheen_sent(surface s, split parts, vec3 view, float NoV, vec3 light)
 {
     return vec3(0.0);
 }
@@ -190,7 +186,7 @@ vec3 sheen_of(split parts)
 void scatter_to_other_side(surface s, SHARE entered, inout split parts)
 {
     parts.scattered *= 1.0 - s.diffuse_transmission;
-    parts.passed = s.diffuse_colour * (entered * (s.diffuse_transmission * beneath_view(parts)));
+    parts.passed = s.diffuse_colour * (entered * s.diffuse_transmission);
 }
 
 vec3 passed_of(split parts)
@@ -242,8 +238,25 @@ float side_chance(split parts, float cosine)
     return 1.0;
 }
 
-// `loss`: facets_lost() of the view.
-split split_facets(surface s, float NoV, float alpha, float loss)
+void put_below(surface s, vec3 view, float NoV, inout split parts)
+{
+    parts.coat = coating_of(s, view);
+#ifdef HAS_SHEEN
+    parts.sheen = s.sheen * (sheen_albedo(NoV, s.sheen_roughness) * parts.coat.passes);
+    parts.beneath = 1.0 - max_component(s.sheen) * sheen_albedo(NoV, s.sheen_roughness);
+    parts.beneath_mean = 1.0 - max_component(s.sheen) * sheen_albedo_mean(s.sheen_roughness);
+#endif
+    parts.mirror *= over_view(parts);
+    parts.again *= over_view(parts);
+    parts.scattered *= over_view(parts);
+    parts.refracted *= over_view(parts);
+#ifdef HAS_DIFFUSE_TRANSMISSION
+    parts.passed *= over_view(parts);
+#endif
+}
+
+// `loss`: facets_lost() of the view, whose cosine is NoV.
+split split_facets(surface s, vec3 view, float NoV, float alpha, float loss)
 {
     bool leaves = in_glass(s);
     float mean = facets_cosine(NoV, alpha);
@@ -260,17 +273,16 @@ split split_facets(surface s, float NoV, float alpha, float loss)
     result.scattered = s.base * entered;
     // Glass is tinted once, where light enters it.
     result.refracted = (leaves ? vec3(1.0) : s.base) * (enters * s.transmission);
-    float blurred = smoothstep(MIRROR_ROUGHNESS_SHARP, MIRROR_ROUGHNESS_GONE, s.roughness);
-    result.mirror_ray = leaves ? 1.0 : 1.0 - blurred;
-    put_beneath_sheen(s, NoV, result);
+    result.mirror_ray = leaves ? 1.0 : mirror_ray_share(s.roughness);
     scatter_to_other_side(s, entered, result);
+    put_below(s, view, NoV, result);
     return result;
 }
 
-split split_light(surface s, float NoV)
+split split_light(surface s, vec3 view, float NoV)
 {
     float alpha = square(s.roughness);
-    return split_facets(s, NoV, alpha, facets_lost(stretched_cosine(NoV, alpha), alpha));
+    return split_facets(s, view, NoV, alpha, facets_lost(stretched_cosine(NoV, alpha), alpha));
 }
 
 // How much of the light from a direction enters, by that of the light from all around, per steradian. `loss`: facets_lost()
@@ -279,7 +291,7 @@ split split_light(surface s, float NoV)
 SHARE spread_entered(surface s, split parts, float NoL, float alpha, float loss)
 {
     SHARE enters = 1.0 - outside_mirror(s, facets_dielectric(facets_cosine(NoL, alpha), loss, alpha, s.ior), 1.0 - loss);
-    return enters / parts.enters_mean * beneath_scattered(s, parts, NoL) * INVERSE_PI;
+    return enters / parts.enters_mean * INVERSE_PI;
 }
 
 vec3 spread_scattered(surface s, split parts, float NoL, float alpha, float loss)
@@ -287,17 +299,20 @@ vec3 spread_scattered(surface s, split parts, float NoL, float alpha, float loss
     return parts.scattered * spread_entered(s, parts, NoL, alpha, loss);
 }
 
-// What of the light from a direction comes out mirrored more than once, by that of the light from all around. Kulla, Conty
-// 2017. `loss`: as above.
-float again_share(surface s, split parts, float NoL, float loss)
-{
-    return loss / max(parts.again_mean, 1e-9) * beneath_scattered(s, parts, NoL);
-}
-
-// What enters or is mirrored again.
+// What enters or is mirrored again. Kulla, Conty 2017.
 vec3 spread_out(surface s, split parts, float NoL, float alpha, float loss)
 {
-    return spread_scattered(s, parts, NoL, alpha, loss) + parts.again * (again_share(s, parts, NoL, loss) * INVERSE_PI);
+    return spread_scattered(s, parts, NoL, alpha, loss) + parts.again * (loss / max(parts.again_mean, 1e-9) * INVERSE_PI);
+}
+
+// The share of the light that a coat's mirror ray carries.
+float coat_ray_of(surface s, split parts)
+{
+#ifdef HAS_CLEARCOAT
+    return parts.coat.mirrors * mirror_ray_share(s.coat_roughness);
+#else
+    return 0.0;
+#endif
 }
 
 // The mirrored direction; about the geometric normal where the shading normal would send it into the surface.
@@ -313,21 +328,24 @@ vec3 brdf_passed(surface s, split parts, vec3 light)
     float NoL = -dot(s.normal, light), alpha = square(s.roughness);
     if (NoL <= 0.0 || dot(s.geometric, light) >= 0.0)
         return vec3(0.0);
-    return passed_of(parts) * spread_entered(s, parts, NoL, alpha, facets_lost(stretched_cosine(NoL, alpha), alpha));
+    return passed_of(parts) * spread_entered(s, parts, NoL, alpha, facets_lost(stretched_cosine(NoL, alpha), alpha)) *
+           over_scattered(s, parts, -light);
 }
 
 // Of brdf() what is scattered, by fibres too, and not mirrored, be it once or again.
 vec3 brdf_scattered(surface s, split parts, vec3 view, float NoV, vec3 light)
 {
-    float alpha = square(s.roughness), NoL = dot(s.normal, light), NoH = dot(s.normal, normalize(view + light));
+    float alpha = square(s.roughness), NoL = dot(s.normal, light);
     if (NoL <= 0.0 || dot(s.geometric, light) <= 0.0)
         return brdf_passed(s, parts, light);
-    return spread_scattered(s, parts, NoL, alpha, facets_lost(stretched_cosine(NoL, alpha), alpha)) +
-           sheen_sent(s, NoH, NoV, NoL);
+    return spread_scattered(s, parts, NoL, alpha, facets_lost(stretched_cosine(NoL, alpha), alpha)) *
+               over_scattered(s, parts, light) +
+           sheen_sent(s, parts, view, NoV, light);
 }
 
-// Share of the irradiance from a direction (of a light, unit) that goes to the eye, per steradian; without the cosine.
-// From below the horizon only what is scattered to the other side, and 0 for glass seen from inside, where no light is sampled. Reciprocal. `parts`: of the same
+// Share of the irradiance from a direction (of a light, unit) that goes to the eye, per steradian; without the cosine, and
+// without what a coat mirrors. From below the horizon only what is scattered to the other side, and 0 for glass seen from
+// inside, where no light is sampled. Reciprocal. `parts`: of the same
 // surface and NoV.
 //
 // What is mirrored: Cook and Torrance 1982 with GGX. (1 - F) of the half-way vector alone, as often seen for scattered
@@ -342,7 +360,17 @@ vec3 brdf(surface s, split parts, vec3 view, float NoV, vec3 light)
     vec3 mirror = mix(vec3(outside_mirror(s, fresnel_dielectric(VoH, s.ior), 1.0)), fresnel_schlick(s.base, VoH), s.metallic);
     float wide = square(max(s.roughness, ROUGHNESS_MIN_LIGHT)), alpha = square(s.roughness);
     vec3 specular = mirror * (D_GGX(NoH, dot(across, across), wide) * V_SmithGGXCorrelated(NoV, NoL, wide));
-    specular = specular * beneath_mirrored(s, parts, NoL) + sheen_sent(s, NoH, NoV, NoL);
     float loss = facets_lost(stretched_cosine(NoL, alpha), alpha);
-    return spread_out(s, parts, NoL, alpha, loss) + specular;
+    return spread_out(s, parts, NoL, alpha, loss) * over_scattered(s, parts, light) +
+           specular * over_mirrored(s, parts, light) + sheen_sent(s, parts, view, NoV, light);
+}
+
+// The same of all that is there, times the cosine.
+vec3 reflected(surface s, split parts, vec3 view, float NoV, vec3 light)
+{
+    vec3 sent = brdf(s, parts, view, NoV, light) * abs(dot(s.normal, light));
+#ifdef HAS_CLEARCOAT
+    sent += coat_highlight(s, parts.coat, view, light, max(s.coat_roughness, ROUGHNESS_MIN_LIGHT));
+#endif
+    return sent;
 }

@@ -35,12 +35,13 @@ float sticking_of(surface s, vec3 direction)
     if (s.unlit)
         return 1.0 - s.alpha;
     float NoV = clamp(-dot(s.normal, direction), 1e-4, 1.0); // a shading normal may lean away
-    split parts = split_light(s, NoV);
+    split parts = split_light(s, -direction, NoV);
     vec2 lit = in_glass(s) ? vec2(0.0) : light_of_lights(s, parts, -direction, NoV);
     float around = lit.y + luminance(environment_irradiance(s.normal));
     around = around > 0.0 ? around : 1.0;
     float mirrored = around * luminance(parts.mirror) + lit.x, refracted = around * luminance(parts.refracted);
-    float all = mirrored + refracted + around * luminance(parts.scattered) + luminance(s.emission);
-    float sticks = parts.mirror_ray * mirrored + refracted;
+    float coat = around * coat_ray_of(s, parts);
+    float all = mirrored + refracted + around * luminance(parts.scattered) + luminance(s.emission) + coat;
+    float sticks = parts.mirror_ray * mirrored + refracted + coat;
     return 1.0 - s.alpha * (1.0 - (all > 0.0 ? min(sticks / all, 1.0) : 0.0)); // also if it is NaN
 }

@@ -80,12 +80,12 @@ void add_lobe(eye_hit e, lobe chosen, shadow_choice c, float choice)
     float survival = max_component(carried) / ROULETTE;
     if (!(choice < survival)) // also if it is NaN
         return;
-    uint roughness = uint(max(path_roughness(p), e.s.roughness) * 65535.0 + 0.5);
-    p.flags = path_sent_on(p.flags, e.s.roughness);
+    uint roughness = uint(max(path_roughness(p), chosen.roughness) * 65535.0 + 0.5);
+    p.flags = path_sent_on(p.flags, chosen.roughness);
     p.flags = p.flags & (1u << PATH_ROUGHNESS_SHIFT) - 1u | roughness << PATH_ROUGHNESS_SHIFT;
 #ifdef TWO_WAYS
     float found = 0.0;
-    if (chosen.back)
+    if (chosen.back && chosen.solid_angle > 0.0) // no shadow ray asks for what is smooth
         lobe_mirrored(e.s, e.parts, e.NoV, e.view, chosen.direction, found);
 #endif
 #ifdef HAS_EMITTERS
@@ -106,9 +106,12 @@ shadow_choice choose_shadow_ray(eye_hit e, vec2 u)
     float all_;
     c.light_number = light_choose(receiver, frame.light_count, c.u.x, c.light_chance, all_);
 #ifdef TWO_WAYS
-    bool mirrors = square(e.s.roughness) > FACET_ALPHA_MIN && last_wave == 0u &&
+    bool mirrors = facets_are_rough(e.s) && last_wave == 0u &&
                    (e.p.flags & PATH_BOUNCES_MASK) < frame.depth;
     float mirrored = mirrors ? max_component(e.parts.mirror + e.parts.again) : 0.0;
+#ifdef HAS_CLEARCOAT
+    mirrored += mirrors ? e.parts.coat.mirrors : 0.0;
+#endif
 #endif
 #ifdef HAS_EMITTERS
     c.ray_normal = pack_ray_normal(e.s.normal);
@@ -153,7 +156,8 @@ bool ask_for_emitter(eye_hit e, shadow_choice c)
     if (sampled.probability > 0.0)
         arriving = e.weight * sent * sampled.radiance * (emitter_share_asked(sampled, chance, found) /
                                                          (sampled.probability * chance));
-    return add_shadow_ray_from(e.j, e.p, from, sampled.direction, mirrored ? RAY_STOPS_T_MIN : 0.0, sampled.distance_, limited(e.p, 0u, arriving));
+    return add_shadow_ray_from(e.j, e.p, from, sampled.direction, mirrored ? RAY_STOPS_T_MIN : 0.0,
+                               sampled.distance_, limited(e.p, 0u, arriving));
 }
 #endif
 
@@ -189,9 +193,8 @@ bool ask_for_light(eye_hit e, shadow_choice c)
     }
     vec3 from = e.origin;
     light_sample sampled = light_seen(e.s, e.distance_, c.light_number, c.u, from);
-    float NoL = dot(e.s.normal, sampled.direction);
-    vec3 sent = brdf(e.blurred, e.blurred_parts, e.view, e.NoV, sampled.direction);
-    vec3 arriving = e.weight * (sent * sampled.irradiance * (abs(NoL) / probability));
+    vec3 sent = reflected(e.blurred, e.blurred_parts, e.view, e.NoV, sampled.direction);
+    vec3 arriving = e.weight * (sent * sampled.irradiance / probability);
     return add_shadow_ray(e.j, e.p, from, sampled.direction, sampled.distance_, limited(e.p, 0u, arriving));
 }
 
@@ -214,6 +217,9 @@ void main()
     uvec2 seed = path_seed(e.p);
     uint index = path_sample(e.p), dimension = SEQUENCE_WAVE + wave_number * SEQUENCE_WAVE_SIZE;
     e.s.roughness = regularised_roughness(e.p, e.s.roughness, index);
+#ifdef HAS_CLEARCOAT
+    e.s.coat_roughness = regularised_roughness(e.p, e.s.coat_roughness, index);
+#endif
     e.NoV = clamp(dot(e.s.normal, e.view), 1e-4, 1.0); // a shading normal may lean away
     float choice = sequence_number(seed, dimension + SEQUENCE_LOBE, index);
     vec3 sent = vec3(0.0);
@@ -233,11 +239,15 @@ void main()
         no_shadow_ray(j);
     } else {
         choice = min(choice / e.s.alpha, 0.99999994);
-        e.parts = split_light(e.s, e.NoV);
+        e.parts = split_light(e.s, e.view, e.NoV);
         e.origin = off_surface(e.s, h.distance, e.s.geometric);
         e.blurred = e.s;
-        e.blurred.roughness = max(e.s.roughness, shrunk_roughness(path_roughness(e.p), index));
-        e.blurred_parts = split_light(e.blurred, e.NoV);
+        float least = shrunk_roughness(path_roughness(e.p), index);
+        e.blurred.roughness = max(e.s.roughness, least);
+#ifdef HAS_CLEARCOAT
+        e.blurred.coat_roughness = max(e.s.coat_roughness, least);
+#endif
+        e.blurred_parts = split_light(e.blurred, e.view, e.NoV);
         bool asks = !in_glass(e.s);
         shadow_choice c = shadow_choice(0.0, 1.0, 0.0, 0u, 0.0, vec2(0.0), 0u);
         if (asks)

@@ -245,7 +245,11 @@ void go_on(eye_hit e, uvec2 seed, uint index, bool asked, float choice)
     float found = asked && !of_glass ? chosen.probability : 0.0;
     p.flags &= ~(PATH_ASKED | PATH_COVERED);
     p.flags |= (found > 0.0 ? PATH_ASKED : 0u) | (covered ? PATH_COVERED : 0u);
-    p.flags = path_sent_on(p.flags, chosen.lobe == BSDF_SCATTERED ? 1.0 : e.s.roughness);
+    float roughness = chosen.lobe == BSDF_SCATTERED ? 1.0 : e.s.roughness;
+#ifdef HAS_CLEARCOAT
+    roughness = chosen.lobe == BSDF_COAT ? e.s.coat_roughness : roughness;
+#endif
+    p.flags = path_sent_on(p.flags, roughness);
     p.light_number = 0u;
     p.light_share = 0.0;
     p.environment_share = covered ? 0.0 : 1.0;
@@ -266,7 +270,8 @@ void go_on(eye_hit e, uvec2 seed, uint index, bool asked, float choice)
     p.flags = p.flags & (1u << PATH_NORMAL_SHIFT) - 1u | ray_normal << PATH_NORMAL_SHIFT;
     p.light_number |= ratio_code(emitters_chance, found) << PATH_LIGHT_BITS;
 #endif
-    float angle = chosen.probability > 0.0 ? 1.0 / chosen.probability : rough_solid_angle(e.s, chosen.direction);
+    float angle = chosen.lobe == BSDF_COAT ? 0.0 : rough_solid_angle(e.s, chosen.direction);
+    angle = chosen.probability > 0.0 ? 1.0 / chosen.probability : angle;
     add_child(e.j, p, e.s, e.distance_, chosen.direction, carried / survival, false, sample_solid_angle(angle));
 }
 
@@ -298,6 +303,9 @@ void main()
     uvec2 seed = path_seed(e.p);
     uint index = path_sample(e.p);
     e.s.roughness = regularised_roughness(e.p, e.s.roughness, index);
+#ifdef HAS_CLEARCOAT
+    e.s.coat_roughness = regularised_roughness(e.p, e.s.coat_roughness, index);
+#endif
     e.origin = off_surface(e.s, h.distance, e.s.geometric);
     e.last = last_wave != 0u || (e.p.flags & PATH_BOUNCES_MASK) >= frame.depth;
     e.all_lights = 0.0;

@@ -43,8 +43,7 @@ uint ask_for_lights(uint j, path parent, surface s, split parts, vec3 view, floa
 #endif
         vec3 from = origin;
         light_sample sampled = light_seen(s, distance_, index, u, from);
-        float NoL = dot(s.normal, sampled.direction);
-        vec3 arriving = weight * (brdf(s, parts, view, NoV, sampled.direction) * sampled.irradiance * abs(NoL));
+        vec3 arriving = weight * (reflected(s, parts, view, NoV, sampled.direction) * sampled.irradiance);
         if (add_shadow_ray(i * wave.hits.count + j, parent, from, sampled.direction, sampled.distance_, arriving))
             alive++;
     }
@@ -67,12 +66,25 @@ vec3 shade(uint j, path p, surface s, split parts, ray r, float distance_, vec3 
     // If it is totally reflected, or a tilted normal would send it back, it is mirrored.
     bool through = dot(bent, s.geometric) < 0.0;
     vec3 mirror = parts.mirror + (through ? vec3(0.0) : parts.refracted);
-    add_child_of_weight(j, p, s, distance_, mirrored, weight * mirror * parts.mirror_ray, false);
+    vec3 in_mirror = mirror * parts.mirror_ray;
+#ifdef HAS_CLEARCOAT
+    float coat_ray = coat_ray_of(s, parts);
+    vec3 coat_mirrored = coat_mirror_direction(s, direction);
+    // One ray for both mirrors where they are one; over a refracted ray there is no room for two.
+    if (through && max_component(parts.refracted) > 0.0 || dot(mirrored, coat_mirrored) > 0.99999)
+        in_mirror += coat_ray;
+    else
+        add_child_of_weight(j, p, s, distance_, coat_mirrored, weight * coat_ray, false);
+#endif
+    add_child_of_weight(j, p, s, distance_, mirrored, weight * in_mirror, false);
     if (through)
         add_child_of_weight(j, p, s, distance_, bent, weight * parts.refracted, false);
     vec3 ambient = (parts.scattered + parts.again + sheen_of(parts)) * environment_irradiance(s.normal) +
                    mirror * (1.0 - parts.mirror_ray) * environment_irradiance(mirrored);
     ambient += passed_of(parts) * environment_irradiance(-s.normal);
+#ifdef HAS_CLEARCOAT
+    ambient += (parts.coat.mirrors - coat_ray) * environment_irradiance(coat_mirrored);
+#endif
     return weight * (s.emission + s.occlusion * ambient);
 }
 
@@ -89,7 +101,7 @@ void main()
     surface s = surface_of_path(p, h, r);
     vec3 view = -r.direction_t_max.xyz, weight = weight_at(p, s, h.distance);
     float NoV = clamp(dot(s.normal, view), 1e-4, 1.0); // a shading normal may lean away
-    split parts = split_light(s, NoV);
+    split parts = split_light(s, view, NoV);
     if (first) {
         float seen = (p.flags & PATH_STRAIGHT) != 0u ? p.weight_r * s.alpha : 0.0;
         if (s.alpha < 1.0)

@@ -35,6 +35,8 @@ SHARED_SIZE(material, 240)
 #define MATERIAL_UNLIT 8u
 #define MATERIAL_EMISSION_SEEN_ONLY 16u /* a light shines in its place */
 #define MATERIAL_THIN_WALLED 32u        /* without a body: light goes straight on through it */
+#define MATERIAL_TANGENT 64u            /* needs a tangent, where vertices have none that of texture coordinates */
+#define MATERIAL_TANGENT_SECOND 128u    /* of the second set of them */
 
 /* A texture as one input of a material. Entry 0 is unused. */
 struct texture_slot {
