@@ -91,4 +91,93 @@ TEST(fibres_send_out_what_their_fit_says)
     assert_true(mean_off < 0.003);
 }
 
+/* ---- light and view in each other's place ---- */
+
+enum { VIEWS = 24, PAIRS = VIEWS * VIEWS };
+
+/* Of each pair what goes from one direction to the other, and back. Those below the horizon see the other side. */
+static const char pairs_text[] =
+    "#define GROUP_SIZE 64\n"
+    "#include \"shared/bindings.h\"\n"
+    "#include \"common/dispatch.glsl\"\n"
+    "#include \"common/scattering.glsl\"\n"
+    "uniform vec4 roughness_metallic_ior_sheen;\n"
+    "layout(std430, binding = BIND_PASS_1) readonly buffer direction_block { vec4 directions[]; };\n"
+    "layout(std430, binding = BIND_PASS_2) writeonly buffer answer_block { float answers[]; };\n"
+    "void main()\n"
+    "{\n"
+    "    uint i = item_index();\n"
+    "    if (i >= 576u)\n"
+    "        return;\n"
+    "    vec3 view = directions[i / 24u].xyz, light = directions[i % 24u].xyz;\n"
+    "    surface s;\n"
+    "    s.position = s.emission = vec3(0.0);\n"
+    "    s.geometric = s.normal = vec3(0.0, 0.0, view.z > 0.0 ? 1.0 : -1.0);\n"
+    "    s.base = vec3(0.6);\n"
+    "    s.alpha = s.occlusion = 1.0;\n"
+    "    s.unlit = false;\n"
+    "    s.inside = view.z < 0.0;\n"
+    "    s.transmission = 0.0;\n"
+    "    s.roughness = roughness_metallic_ior_sheen.x;\n"
+    "    s.metallic = roughness_metallic_ior_sheen.y;\n"
+    "    s.ior = roughness_metallic_ior_sheen.z;\n"
+    "    s.sheen = vec3(0.7);\n"
+    "    s.sheen_roughness = roughness_metallic_ior_sheen.w;\n"
+    "    s.diffuse_colour = vec3(0.5);\n"
+    "    s.diffuse_transmission = 0.4;\n"
+    "    float NoV = abs(view.z);\n"
+    "    answers[i] = brdf(s, split_light(s, view, NoV), view, NoV, light).g;\n"
+    "}\n";
+
+static void ask_pairs(const float material[4], float there[VIEWS][VIEWS])
+{
+    static const struct gpu_define defines[] = {
+        {"HAS_SHEEN", "1"}, {"HAS_DIFFUSE_TRANSMISSION", "1"}, {NULL, NULL}};
+    static float directions[VIEWS][4];
+    struct gpu_program program = shader_probe_compile(pairs_text, defines);
+    struct gpu_buffer from = {0}, to = {0};
+    struct error error = {0};
+    for (int i = 0; i < VIEWS; i++) {
+        double z = (i % 2 ? -1.0 : 1.0) * (0.05 + 0.9 * i / (VIEWS - 1)), phi = 2.4 * i;
+        directions[i][0] = (float)(sqrt(1.0 - z * z) * cos(phi));
+        directions[i][1] = (float)(sqrt(1.0 - z * z) * sin(phi));
+        directions[i][2] = (float)z;
+    }
+    assert_true(gpu_buffer_upload(device, &from, directions, sizeof(directions), &error));
+    assert_true(gpu_buffer_reserve(device, &to, PAIRS * sizeof(float), &error));
+    gpu_uniform_vec(&program, "roughness_metallic_ior_sheen", 4, material);
+    gpu_buffer_bind_storage(&from, BIND_PASS_1);
+    gpu_buffer_bind_storage(&to, BIND_PASS_2);
+    gpu_dispatch(device, &program, PAIRS);
+    gpu_buffer_read(device, &to, 0, there, PAIRS * sizeof(float));
+    if (!gpu_check(device, "pairs probe", &error))
+        fail_msg("%s", error.text);
+    gpu_buffer_finish(device, &from);
+    gpu_buffer_finish(device, &to);
+    shader_probe_finish(&program);
+}
+
+TEST(cloth_that_light_shines_through_is_reciprocal)
+{
+    static const float materials[][4] = {
+        {0.8f, 0.0f, 1.5f, 0.3f}, {0.4f, 0.5f, 1.5f, 0.9f}, {1.0f, 0.0f, 1.0f, 0.1f}};
+    static float there[VIEWS][VIEWS];
+    double off = 0.0;
+    int through = 0;
+    if (!device)
+        skip();
+    for (size_t m = 0; m < sizeof(materials) / sizeof(materials[0]); m++) {
+        ask_pairs(materials[m], there);
+        for (int i = 0; i < VIEWS; i++)
+            for (int j = 0; j < i; j++) {
+                double one = (double)there[i][j], other = (double)there[j][i];
+                off = fmax(off, fabs(one - other) / fmax(fmax(one, other), 1e-3));
+                through += i % 2 != j % 2 && one > 0.01;
+            }
+    }
+    print_message("off by %.1e at most; %d pairs through the cloth\n", off, through);
+    assert_true(through > 100);
+    assert_true(off < 1e-4); /* roundings */
+}
+
 ALL_TESTS(open_device, close_device)
