@@ -251,7 +251,68 @@ TEST(white_thin_panes_vanish_in_a_furnace)
     }
 }
 
+static double fresnel(double cosine, double n)
+{
+    double sine = sqrt(1.0 - cosine * cosine), bent = sqrt(1.0 - sine * sine / (n * n));
+    double s = (cosine - n * bent) / (cosine + n * bent), p = (n * cosine - bent) / (n * cosine + bent);
+    return (s * s + p * p) / 2.0;
+}
+
+/* A ball that only shows itself, 0.2 degrees wide, at `distance` from the origin under an angle from -z. */
+static void a_mark(struct fixture *fixture, double angle, double distance)
+{
+    struct scene_material *mark = fixture_material(fixture);
+    mark->unlit = true;
+    fixture_sphere(fixture, (float)(-distance * sin(angle)), 0.0f, (float)(-distance * cos(angle)),
+                   (float)(distance * 0.0017), mark->base.id);
+    fixture_light(fixture, LIGHT_POINT, 0.0f, 0.0f, 900.0f, 1e-9f); /* else there is a sky */
+}
+
+/* From both of its sides, at a slant, what is straight ahead is seen, less what one boundary mirrors, in its
+ * colour. */
+TEST(a_thin_pane_displaces_nothing)
+{
+    struct fixture *fixture = *state;
+    const double angle = 1.1;
+    for (int side = -1; side <= 1; side += 2)
+        for (size_t w = 0; w < ALL_BUT_RAYCAST; w++) {
+            path_begin(fixture, TRACER_REFERENCE, 4);
+            struct scene_material *pane = white(fixture, 0.0f, 1.5f);
+            pane->base_colour[1] = 0.5f;
+            pane->transmission = 1.0f;
+            pane->thin_walled = true;
+            const float turned[12] = {(float)side, 0, 0, 0, 0, 1, 0, 0, 0, 0, (float)side, 0};
+            fixture_square(fixture, 50.0f, pane->base.id, turned);
+            a_mark(fixture, angle, 5.0);
+            fixture_look(fixture, (float)(3.0 * sin(angle)), 0.0f, (float)(3.0 * cos(angle)), 0.0005f);
+            struct colours colours = render_by(fixture, &ways[w], 64);
+            assert_mean(colours.channel[0], 1.0 - fresnel(cos(angle), 1.5), 1e-4);
+            assert_mean(colours.channel[1], 0.5 * (1.0 - fresnel(cos(angle), 1.5)), 1e-4);
+        }
+}
+
 /* ---- dispersion ---- */
+
+/* KHR_materials_dispersion: red, green and blue are bent by indices that are 0.025 (n - 1) dispersion apart. Where
+ * one of them goes, there is a mark, which is seen in this colour alone. */
+TEST(each_colour_is_bent_by_its_own_index)
+{
+    struct fixture *fixture = *state;
+    const double slant = 1.0, apart = 0.025 * 0.6 * 4.0;
+    for (size_t w = 0; w < RANDOM_ONES; w++)
+        for (int c = 0; c < 3; c++) {
+            path_begin(fixture, TRACER_REFERENCE, 2);
+            struct scene_material *glass = white(fixture, 0.0f, 1.6f);
+            glass->transmission = 1.0f;
+            glass->dispersion = 4.0f;
+            fixture_square(fixture, 50.0f, glass->base.id, NULL);
+            a_mark(fixture, asin(sin(slant) / (1.6 + apart * (c - 1))), 5.0);
+            fixture_look(fixture, (float)(3.0 * sin(slant)), 0.0f, (float)(3.0 * cos(slant)), 0.0005f);
+            struct colours colours = render_by(fixture, &ways[w], 64);
+            for (int other = 0; other < 3; other++)
+                assert_mean(colours.channel[other], other == c ? 1.0 - fresnel(cos(slant), 1.6) : 0.0, 1e-4);
+        }
+}
 
 TEST(white_glass_that_disperses_vanishes_in_a_furnace)
 {
