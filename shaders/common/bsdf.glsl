@@ -133,13 +133,13 @@ bsdf bsdf_of(surface s, vec3 view, float NoV, vec3 along, float anisotropy)
 void facet_parts(bsdf b, surface s, float VoH, float lit, float over, out vec3 mirror, out vec3 window)
 {
     SHARE dielectric = b.leaves ? SHARE(fresnel_dielectric(VoH, b.eta))
-                                : outside_mirror(s, fresnel_dielectric(VoH, b.eta), 1.0);
+                                : outside_mirror(s, VoH, fresnel_dielectric(VoH, b.eta), 1.0);
     SHARE mirrored = dielectric * lit;
 #ifdef WARD
     if (!b.leaves && b.rough) // whose mirror has other facets than the window
         mirrored = b.parts.dielectric;
 #endif
-    mirror = mix(vec3(dielectric), fresnel_schlick(s.base, VoH), s.metallic) * (lit * over);
+    mirror = mix(vec3(dielectric), metal_mirror(s, VoH), s.metallic) * (lit * over);
     // Glass is tinted once, where light enters it. From inside, also what is scattered is left to it.
     vec3 through = b.leaves ? mix(s.base, vec3(1.0), s.transmission) : s.base * s.transmission;
     window = through * ((1.0 - mirrored) * ((1.0 - s.metallic) * b.parts.coat.passes));

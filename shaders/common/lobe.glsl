@@ -108,7 +108,7 @@ facet_lobes facet_lobes_of(surface s, split parts, float NoV, vec3 direction, ve
     bool leaves = s.inside && s.transmission > 0.0;
     float VoH = rough ? clamp(-dot(direction, facet), 1e-4, 1.0) : NoV;
     float exact = fresnel_dielectric(VoH, leaves ? 1.0 / s.ior : s.ior), lit = 1.0;
-    SHARE dielectric = leaves ? SHARE(exact) : outside_mirror(s, exact, 1.0);
+    SHARE dielectric = leaves ? SHARE(exact) : outside_mirror(s, VoH, exact, 1.0);
     facet_lobes f;
     f.reflected = reflect(direction, facet);
     f.bent = refract(direction, facet, s.inside ? s.ior : 1.0 / s.ior);
@@ -118,8 +118,8 @@ facet_lobes facet_lobes_of(surface s, split parts, float NoV, vec3 direction, ve
     } else if (rough) {
         lit = lit_share(NoV, dot(f.reflected, s.normal), square(s.roughness));
     }
-    f.mirror = mix(vec3(dielectric), fresnel_schlick(s.base, VoH), s.metallic) * lit;
-    f.again = metal_again(s.base, parts.again_mean) * (s.metallic * (1.0 - lit) * parts.coat.passes);
+    f.mirror = mix(vec3(dielectric), metal_mirror(s, VoH), s.metallic) * lit;
+    f.again = parts.again_colour * (s.metallic * (1.0 - lit) * parts.coat.passes);
     // Glass is tinted once, where light enters it.
     f.enters = (1.0 - dielectric * lit) * (1.0 - s.metallic);
     f.window = (leaves ? vec3(1.0) : s.base) * (f.enters * s.transmission * parts.coat.passes);
