@@ -143,20 +143,23 @@ void use_converted(const building &b, const specular_gloss &factors, const gloss
             set.height = std::max(set.height, from[i].height);
             set.nearest = set.nearest || b.all.jobs[number].reason[0] != '\0';
         }
-    unsigned char *base = allocate_texels(b, set.width, set.height);
-    const uint64_t bytes = uint64_t(set.width) * set.height * 4;
-    const uint32_t base_blob = import_add_blob(b.r.scene, base, bytes);
-    unsigned char *rough = allocate_texels(b, set.width, set.height);
-    const uint32_t rough_blob = import_add_blob(b.r.scene, rough, bytes);
+    metal_images to = {set.width, set.height, nullptr, nullptr, nullptr};
+    uint32_t blobs[3];
+    unsigned char **const places[3] = {&to.base, &to.rough, &to.mirror};
+    for (size_t i = 0; i < 3; i++) {
+        *places[i] = allocate_texels(b, set.width, set.height);
+        blobs[i] = import_add_blob(b.r.scene, *places[i], uint64_t(set.width) * set.height * 4);
+    }
     if (b.r.scene->failed)
         throw failed();
-    metal_texels(factors, from[0], from[1], set.width, set.height, base, rough);
+    metal_texels(factors, from[0], from[1], to);
     const int texture = maps.sources[main].index;
     const std::string name = texture_name(b.r, texture, maps.images[main]);
-    b.uses[BASE_COLOUR] = b.uses[METALLIC_ROUGHNESS] = maps.uses[main];
-    b.uses[BASE_COLOUR].texture = add_texture(b.r, texture, name, true, set, base_blob);
+    b.uses[BASE_COLOUR] = b.uses[METALLIC_ROUGHNESS] = b.uses[SPECULAR_COLOUR] = maps.uses[main];
+    b.uses[BASE_COLOUR].texture = add_texture(b.r, texture, name, true, set, blobs[0]);
     b.uses[METALLIC_ROUGHNESS].texture =
-        add_texture(b.r, texture, name + " metallic roughness", false, set, rough_blob);
+        add_texture(b.r, texture, name + " metallic roughness", false, set, blobs[1]);
+    b.uses[SPECULAR_COLOUR].texture = add_texture(b.r, texture, name + " mirror", true, set, blobs[2]);
 }
 
 void specular_glossiness(const building &b)
@@ -179,9 +182,12 @@ void specular_glossiness(const building &b)
     const gloss_maps maps = maps_of(b, *old);
     const bool textured = maps.images[0] >= 0 || maps.images[1] >= 0;
     const metal_rough metal =
-        textured ? metal_rough{{1, 1, 1}, 1, 1, 1} : metal_of(factors); // the textures have all then
-    for (size_t c = 0; c < 3; c++)
+        textured ? metal_rough{{1, 1, 1}, 1, 1, 1, {1, 1, 1}} : metal_of(factors); // the textures have all then
+    float *const mirror[] = {&b.set.specular_red, &b.set.specular_green, &b.set.specular_blue};
+    for (size_t c = 0; c < 3; c++) {
         b.set.base_colour[c] = float(metal.base[c]);
+        *mirror[c] = float(metal.mirror[c] / plain_mirror);
+    }
     b.set.base_colour[3] = float(metal.alpha);
     b.set.metallic = float(metal.metallic);
     b.set.roughness = float(metal.roughness);

@@ -146,13 +146,13 @@ float bsdf_lit(bsdf b, vec3 light)
 void facet_parts(bsdf b, surface s, float VoH, vec3 light, out vec3 mirror, out vec3 window)
 {
     float lit = bsdf_lit(b, light);
-    SHARE dielectric = b.leaves ? inside_mirror(s, VoH) : outside_mirror(s, fresnel_dielectric(VoH, s.ior), 1.0);
+    SHARE dielectric = b.leaves ? inside_mirror(s, VoH) : outside_mirror(s, VoH, fresnel_dielectric(VoH, s.ior), 1.0);
     SHARE mirrored = dielectric * lit;
 #ifdef WARD
     if (!b.leaves && b.rough) // whose mirror has other facets than the window
         mirrored = b.parts.dielectric;
 #endif
-    mirror = mix(vec3(dielectric), fresnel_schlick(s.base, VoH), s.metallic) *
+    mirror = mix(vec3(dielectric), metal_mirror(s, VoH), s.metallic) *
              (lit * over_mirrored(s, b.parts, bsdf_world(b, light)));
     // Glass is tinted once, where light enters it. From inside, also what is scattered is left to it.
     vec3 through = b.leaves ? mix(s.base, vec3(1.0), s.transmission) : s.base * s.transmission;

@@ -108,7 +108,7 @@ facet_lobes facet_lobes_of(surface s, split parts, float NoV, vec3 direction, ve
     bool leaves = in_glass(s);
     float VoH = rough ? clamp(-dot(direction, facet), 1e-4, 1.0) : NoV;
     float lit = 1.0;
-    SHARE dielectric = leaves ? inside_mirror(s, VoH) : outside_mirror(s, fresnel_dielectric(VoH, s.ior), 1.0);
+    SHARE dielectric = leaves ? inside_mirror(s, VoH) : outside_mirror(s, VoH, fresnel_dielectric(VoH, s.ior), 1.0);
     facet_lobes f;
     f.reflected = reflect(direction, facet);
     if (rough && leaves) {
@@ -116,9 +116,9 @@ facet_lobes facet_lobes_of(surface s, split parts, float NoV, vec3 direction, ve
     } else if (rough) {
         lit = lit_share(NoV, dot(f.reflected, s.normal), square(s.roughness));
     }
-    f.mirror = mix(vec3(dielectric), fresnel_schlick(s.base, VoH), s.metallic) *
+    f.mirror = mix(vec3(dielectric), metal_mirror(s, VoH), s.metallic) *
                (lit * over_mirrored(s, parts, f.reflected));
-    f.again = metal_again(s.base, parts.again_mean) * (s.metallic * (1.0 - lit) * over_view(parts));
+    f.again = parts.again_colour * (s.metallic * (1.0 - lit) * over_view(parts));
     // Glass is tinted once, where light enters it.
     f.enters = (1.0 - dielectric * lit) * (1.0 - s.metallic);
     f.window = (leaves ? vec3(1.0) : s.base) * (f.enters * s.transmission * over_view(parts));

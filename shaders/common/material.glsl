@@ -331,7 +331,7 @@ void apply_textures(inout surface s, inout vec4 colour, hit h, material m, vec4 
 
 #ifdef HAS_SAMPLED
 // The sample's values of textures and vertex colours, in their place.
-void apply_sample(inout surface s, inout vec4 colour, uvec4 words)
+void apply_sample(inout surface s, inout vec4 colour, material m, uvec4 words)
 {
     surface_sample stored = unpack_sample(words);
     colour *= stored.base_colour;
@@ -340,6 +340,10 @@ void apply_sample(inout surface s, inout vec4 colour, uvec4 words)
     s.transmission *= stored.transmission;
     s.occlusion = stored.occlusion;
     s.emission *= stored.emission;
+#ifdef HAS_SPECULAR
+    if (m.texture_specular_colour != 0u) // which is not stored, and its factor says nothing without it
+        s.specular_colour = vec3(1.0);
+#endif
 }
 #endif
 
@@ -402,7 +406,7 @@ surface surface_at(hit h, vec3 origin, vec3 direction, float width)
 #ifdef HAS_SAMPLED
     is_stored = (h.material & HIT_SAMPLED) != 0u;
     if (is_stored)
-        apply_sample(s, colour, h.uv01_or_sample);
+        apply_sample(s, colour, m, h.uv01_or_sample);
 #endif
 #ifdef HAS_TEXTURES
     surface_detail detail = detail_at(h, footprint_edges(s.geometric, direction, width));

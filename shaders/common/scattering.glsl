@@ -15,6 +15,7 @@
 #include "common/brdf.glsl"
 #include "common/coat.glsl"
 #include "common/facet_albedo.glsl"
+#include "common/film.glsl"
 #include "common/material.glsl"
 #include "common/sheen.glsl"
 
@@ -27,28 +28,55 @@ float mirror_ray_share(float roughness)
 }
 
 // What a dielectric does with light from outside: SHARE is a colour if some mirror has one.
-#if defined HAS_SPECULAR || defined HAS_DISPERSION
+#if defined(HAS_SPECULAR) || defined(HAS_IRIDESCENCE) || defined(HAS_DISPERSION)
 #define SHARE vec3
 #else
 #define SHARE float
 #endif
 
-#ifdef HAS_SPECULAR
-// KHR_materials_specular: Fresnel's curve from its value at normal incidence up to 1 begins at another one, of a colour,
-// and all of it is less. `exact`: what the equations say that facets mirror; `all_`: what they would if they mirrored
-// all light. As the change is the same line at every angle, it holds for means over facets and angles, too.
-vec3 outside_mirror(surface s, float exact, float all_)
+// `exact`: what the equations say that facets mirror; `all_`: what they would if they mirrored all light.
+SHARE without_film(surface s, float exact, float all_)
 {
+#ifdef HAS_SPECULAR
+    // KHR_materials_specular: Fresnel's curve from its value at normal incidence up to 1 begins at another one, of a
+    // colour, and all of it is less. As the change is the same line at every angle, it holds for means over facets and
+    // angles, too.
     float f0 = square((s.ior - 1.0) / (s.ior + 1.0));
     vec3 begins = min(f0 * s.specular_colour, 1.0);
     return s.specular * (begins * all_ + (1.0 - begins) * max((exact - f0 * all_) / (1.0 - f0), 0.0));
-}
 #else
-SHARE outside_mirror(surface s, float exact, float all_)
-{
     return SHARE(exact);
-}
 #endif
+}
+
+// What a facet of a dielectric mirrors of light from outside, or facets of which it is the mean one.
+SHARE outside_mirror(surface s, float cosine, float exact, float all_)
+{
+    SHARE mirrored = without_film(s, exact, all_);
+#ifdef HAS_IRIDESCENCE
+    mirrored = mix(mirrored, film_of(s, cosine) * all_, s.film);
+#endif
+    return mirrored;
+}
+
+// What facets mirror at the first go. `mean`: facets_cosine().
+SHARE facets_outside_mirror(surface s, float mean, float loss, float alpha)
+{
+    float cosine = facets_dielectric_cosine(mean, alpha, s.ior), all_ = 1.0 - loss;
+    float exact = fresnel_dielectric(cosine, s.ior) * all_;
+    // A film's curve bends more, so facets at the horizon count for more; found by trial, so that no light is made.
+    return outside_mirror(s, cosine * (1.0 - 0.3 * alpha * (1.0 - mean)), exact, all_);
+}
+
+// What a facet of a metal mirrors.
+vec3 metal_mirror(surface s, float cosine)
+{
+    vec3 mirrored = fresnel_schlick(s.base, cosine);
+#ifdef HAS_IRIDESCENCE
+    mirrored = mix(mirrored, film_of(s, cosine), s.film);
+#endif
+    return mirrored;
+}
 
 // The direction of what a facet refracts; 0: it is totally reflected. In a thin wall facets of both sides bend it: it is
 // the mirrored direction on the other side (KHR_materials_transmission).
@@ -107,6 +135,7 @@ struct split {
     SHARE dielectric;  // share that does not enter
     float mirror_ray;  // share of `mirror` that the mirror ray carries; the rest is blurred
     float again_mean;  // facets_lost_mean()
+    vec3 again_colour; // metal_again()
     SHARE enters_mean; // share of the light from all around that enters
 #ifdef HAS_SHEEN
     vec3 sheen;          // what fibres send of the light from all around
@@ -262,13 +291,19 @@ split split_facets(surface s, vec3 view, float NoV, float alpha, float loss)
     float mean = facets_cosine(NoV, alpha);
     split result;
     // From inside of one direction: total reflection begins at an angle.
-    result.dielectric = leaves ? inside_mirror(s, NoV)
-                               : outside_mirror(s, facets_dielectric(mean, loss, alpha, s.ior), 1.0 - loss);
+    result.dielectric = leaves ? inside_mirror(s, NoV) : facets_outside_mirror(s, mean, loss, alpha);
     result.again_mean = facets_lost_mean(alpha);
-    SHARE mirrored_mean = outside_mirror(s, facets_dielectric_mean(alpha, s.ior), 1.0 - result.again_mean);
+    SHARE mirrored_mean = without_film(s, facets_dielectric_mean(alpha, s.ior), 1.0 - result.again_mean);
+    vec3 metal_mean = fresnel_schlick_mean(s.base);
+#ifdef HAS_IRIDESCENCE
+    vec3 film_mean = film_mean_of(s);
+    mirrored_mean = mix(mirrored_mean, film_mean * (1.0 - result.again_mean), s.film);
+    metal_mean = mix(metal_mean, film_mean, s.film);
+#endif
     result.enters_mean = max(1.0 - mirrored_mean, SHARE(1e-6));
-    result.mirror = mix(vec3(result.dielectric), fresnel_schlick(s.base, mean) * (1.0 - loss), s.metallic);
-    result.again = metal_again(s.base, result.again_mean) * (loss * s.metallic);
+    result.mirror = mix(vec3(result.dielectric), metal_mirror(s, mean) * (1.0 - loss), s.metallic);
+    result.again_colour = metal_again(metal_mean, result.again_mean);
+    result.again = result.again_colour * (loss * s.metallic);
     SHARE enters = (1.0 - result.dielectric) * (1.0 - s.metallic), entered = enters * (1.0 - s.transmission);
     result.scattered = s.base * entered;
     // Glass is tinted once, where light enters it.
@@ -290,7 +325,7 @@ split split_light(surface s, vec3 view, float NoV)
 // Practitioners' Assessment of Light Reflection Models. 1997.
 SHARE spread_entered(surface s, split parts, float NoL, float alpha, float loss)
 {
-    SHARE enters = 1.0 - outside_mirror(s, facets_dielectric(facets_cosine(NoL, alpha), loss, alpha, s.ior), 1.0 - loss);
+    SHARE enters = 1.0 - facets_outside_mirror(s, facets_cosine(NoL, alpha), loss, alpha);
     return enters / parts.enters_mean * INVERSE_PI;
 }
 
@@ -357,7 +392,7 @@ vec3 brdf(surface s, split parts, vec3 view, float NoV, vec3 light)
         return brdf_passed(s, parts, light);
     vec3 half_way = normalize(view + light), across = cross(s.normal, half_way);
     float NoH = clamp(dot(s.normal, half_way), 0.0, 1.0), VoH = clamp(dot(view, half_way), 0.0, 1.0);
-    vec3 mirror = mix(vec3(outside_mirror(s, fresnel_dielectric(VoH, s.ior), 1.0)), fresnel_schlick(s.base, VoH), s.metallic);
+    vec3 mirror = mix(vec3(outside_mirror(s, VoH, fresnel_dielectric(VoH, s.ior), 1.0)), metal_mirror(s, VoH), s.metallic);
     float wide = square(max(s.roughness, ROUGHNESS_MIN_LIGHT)), alpha = square(s.roughness);
     vec3 specular = mirror * (D_GGX(NoH, dot(across, across), wide) * V_SmithGGXCorrelated(NoV, NoL, wide));
     float loss = facets_lost(stretched_cosine(NoL, alpha), alpha);

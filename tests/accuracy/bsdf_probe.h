@@ -18,7 +18,7 @@
 #include <epoxy/gl.h>
 #include <string.h>
 
-/* As the shader has it: four vec4. */
+/* As the shader has it: five vec4. */
 struct bsdf_case {
     float roughness, metallic, transmission, ior;
     float view[3], base;             /* unit, towards the eye; base colour, grey */
@@ -26,9 +26,10 @@ struct bsdf_case {
     float specular, specular_colour; /* of a probe that has them; grey */
     float coat, coat_roughness;      /* likewise */
     float coat_turn;                 /* of its normal, radians from the surface's in the plane y = 0 */
-    float unused;
+    float film, film_ior, film_nm;   /* likewise */
+    float unused[2];
 };
-_Static_assert(sizeof(struct bsdf_case) == 64, "the shader reads four vec4 a case");
+_Static_assert(sizeof(struct bsdf_case) == 80, "the shader reads five vec4 a case");
 
 /* What is asked: a direction to evaluate, or three numbers to choose by. */
 struct bsdf_question {
@@ -53,7 +54,7 @@ static const char bsdf_probe_text[] =
     "#include \"common/dispatch.glsl\"\n"
     "#include \"common/bsdf.glsl\"\n"
     "uniform uint question_count, chooses;\n"
-    "uniform vec4 material_, view_base, more, coat;\n"
+    "uniform vec4 material_, view_base, more, coat, film;\n"
     "layout(std430, binding = BIND_PASS_1) readonly buffer question_block { vec4 questions[]; };\n"
     "layout(std430, binding = BIND_PASS_2) writeonly buffer answer_block { vec4 answers[]; };\n"
     "void main()\n"
@@ -80,6 +81,11 @@ static const char bsdf_probe_text[] =
     "    s.coat = coat.x;\n"
     "    s.coat_roughness = coat.y;\n"
     "    s.coat_normal = vec3(sin(coat.z), 0.0, cos(coat.z));\n"
+    "#endif\n"
+    "#ifdef HAS_IRIDESCENCE\n"
+    "    s.film = coat.w;\n"
+    "    s.film_ior = film.x;\n"
+    "    s.film_nm = film.y;\n"
     "#endif\n"
     "    vec3 view = view_base.xyz;\n"
     "    split parts = split_light(s, view, view.z);\n"
@@ -130,6 +136,7 @@ static inline void bsdf_probe_run(struct bsdf_probe *probe, const struct bsdf_ca
     gpu_uniform_vec(&probe->program, "view_base", 4, c->view);
     gpu_uniform_vec(&probe->program, "more", 4, &c->inside);
     gpu_uniform_vec(&probe->program, "coat", 4, &c->coat);
+    gpu_uniform_vec(&probe->program, "film", 4, &c->film_ior);
     gpu_buffer_bind_storage(&probe->questions, BIND_PASS_1);
     gpu_buffer_bind_storage(&probe->answers, BIND_PASS_2);
     gpu_dispatch(probe->device, &probe->program, count);

@@ -23,7 +23,8 @@ static const struct kind {
     bool pane;             /* else a ball */
     float specular_colour; /* 0: as Fresnel's equations have it; else half of their mirror, which begins so much
                               higher */
-    float coat;            /* over it, as rough as it is on the other half of the scale */
+    bool film;
+    float coat; /* over it, as rough as it is on the other half of the scale */
 } kinds[] = {
     {.name = "metal", .metallic = 1.0f},
     {.name = "varnish"},
@@ -31,6 +32,7 @@ static const struct kind {
     {.name = "pane of glass", .transmission = 1.0f, .pane = true},
 };
 
+static const struct kind with_film = {.name = "film", .film = true};
 static const struct kind other_varnish = {.name = "other varnish", .specular_colour = 6.0f};
 static const struct kind coated[] = {
     {.name = "coated metal", .metallic = 1.0f, .coat = 1.0f},
@@ -50,6 +52,9 @@ static struct scene_material *a_thing(struct fixture *fixture, const struct kind
         for (int i = 0; i < 3; i++)
             material->specular_colour[i] = kind->specular_colour;
     }
+    material->iridescence = kind->film ? 1.0f : 0.0f;
+    material->iridescence_ior = 1.8f;
+    material->iridescence_maximum_nm = 400.0f;
     material->clearcoat = kind->coat;
     material->clearcoat_roughness = fmodf(roughness + 0.5f, 1.0f);
     if (kind->pane) {
@@ -141,7 +146,7 @@ static struct mean mean_by(struct fixture *fixture, const struct way *way, uint3
 TEST(lamps_light_rough_things_alike_in_all_integrators)
 {
     struct fixture *fixture = *state;
-    const struct kind *const compared[] = {&kinds[0], &kinds[1], &other_varnish, &coated[1]};
+    const struct kind *const compared[] = {&kinds[0], &kinds[1], &other_varnish, &coated[1], &with_film};
     for (size_t k = 0; k < COUNT(compared); k++)
         for (int step = 0; step < 3; step++) {
             double means[COUNT(ways)] = {0};
