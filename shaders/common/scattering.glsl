@@ -171,9 +171,9 @@ vec3 brdf_scattered(surface s, split parts, vec3 light)
            coat_over_scattered(parts.coat, s, light);
 }
 
-// Share of the irradiance from a direction (of a light, unit) that goes to the eye, per steradian; without the cosine, and
-// without what a coat mirrors. 0 from below the horizon, and for glass seen from inside, where no light is sampled. Reciprocal. `parts`: of the same
-// surface and NoV.
+// Share of the irradiance from a direction (of a light, unit) that goes to the eye, per steradian; without the cosine,
+// and without what a coat mirrors. 0 from below the horizon, and for glass seen from inside, where no light is sampled.
+// Reciprocal. `parts`: of the same surface and NoV.
 //
 // What is mirrored: Cook and Torrance 1982 with GGX. (1 - F) of the half-way vector alone, as often seen for scattered
 // light, would give out up to 1.7 of what arrives at grazing angles.
