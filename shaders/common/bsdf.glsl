@@ -11,9 +11,10 @@
 //
 //   coat        GGX facets over all of them (common/coat.glsl)
 //
-// Mirrored and refracted may be stretched along a grain. Where they are smooth they are a mirror and a window, which nothing but
-// bsdf_choose() finds; nor does anything else find what goes on inside of glass, where both are GGX's. Radiance on the
-// other side is divided by the square of the index, so that a window neither dims nor brightens the view through it.
+// Mirrored and refracted may be stretched along a grain. Where they are smooth they are a mirror and a window, which
+// nothing but bsdf_choose() finds; nor does anything else find what goes on inside of glass, where both are GGX's.
+// Radiance on the other side is divided by the square of the index, so that a window neither dims nor brightens the
+// view through it.
 //
 // Defines: those of common/material.glsl; HAS_ANISOTROPY some material has a grain; WARD.
 

@@ -191,9 +191,10 @@ lobe lobe_choose(surface s, split parts, float NoV, vec3 direction, inout float 
     return result;
 }
 
-// Of the surface below a coat, see lobe_mirrored(). The reflectance of the lobes that send light back, from a direction (of light, unit) to the eye, per steradian, times
-// the cosine; and the density with which lobe_choose() sends a ray that way. Both are 0 where the surface is smooth, and
-// for glass seen from inside. Of light that is mirrored more than once, the density is a mean over the facets.
+// Of the surface below a coat, see lobe_mirrored(). The reflectance of the lobes that send light back, from a direction
+// (of light, unit) to the eye, per steradian, times the cosine; and the density with which lobe_choose() sends a ray
+// that way. Both are 0 where the surface is smooth, and for glass seen from inside. Of light that is mirrored more than
+// once, the density is a mean over the facets.
 vec3 lobe_mirrored_below(surface s, split parts, float NoV, vec3 view, vec3 light, out float density)
 {
     float NoL = dot(s.normal, light), alpha = square(s.roughness);

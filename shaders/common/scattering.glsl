@@ -378,10 +378,9 @@ vec3 brdf_scattered(surface s, split parts, vec3 view, float NoV, vec3 light)
            sheen_sent(s, parts, view, NoV, light);
 }
 
-// Share of the irradiance from a direction (of a light, unit) that goes to the eye, per steradian; without the cosine, and
-// without what a coat mirrors. From below the horizon only what is scattered to the other side, and 0 for glass seen from
-// inside, where no light is sampled. Reciprocal. `parts`: of the same
-// surface and NoV.
+// Share of the irradiance from a direction (of a light, unit) that goes to the eye, per steradian; without the cosine,
+// and without what a coat mirrors. From below the horizon only what is scattered to the other side, and 0 for glass seen
+// from inside, where no light is sampled. Reciprocal. `parts`: of the same surface and NoV.
 //
 // What is mirrored: Cook and Torrance 1982 with GGX. (1 - F) of the half-way vector alone, as often seen for scattered
 // light, would give out up to 1.7 of what arrives at grazing angles.
