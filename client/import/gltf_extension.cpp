@@ -14,12 +14,14 @@ const char *const understood[] = {
     "EXT_texture_webp",           "KHR_animation_pointer",
     "KHR_draco_mesh_compression", "KHR_lights_punctual",
     "KHR_materials_anisotropy",   "KHR_materials_emissive_strength",
+    "KHR_materials_clearcoat",    "KHR_materials_diffuse_transmission",
+    "KHR_materials_dispersion",   "KHR_materials_iridescence",
     "KHR_materials_ior",          "KHR_materials_pbrSpecularGlossiness",
-    "KHR_materials_specular",     "KHR_materials_transmission",
-    "KHR_materials_unlit",        "KHR_materials_variants",
-    "KHR_materials_volume",       "KHR_mesh_quantization",
-    "KHR_meshopt_compression",    "KHR_node_visibility",
-    "KHR_texture_transform",
+    "KHR_materials_sheen",        "KHR_materials_specular",
+    "KHR_materials_transmission", "KHR_materials_unlit",
+    "KHR_materials_variants",     "KHR_materials_volume",
+    "KHR_mesh_quantization",      "KHR_meshopt_compression",
+    "KHR_node_visibility",        "KHR_texture_transform",
 };
 // These hold nothing that could be seen.
 const char *const invisible[] = {"KHR_xmp", "KHR_xmp_json_ld", "EXT_mesh_manifold"};

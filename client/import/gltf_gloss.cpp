@@ -10,7 +10,7 @@ namespace gltf
 {
 namespace
 {
-constexpr double dielectric = 0.04; // reflection of a surface that is no metal, at normal incidence
+constexpr double dielectric = plain_mirror;
 
 double clamped(double value)
 {
@@ -56,7 +56,18 @@ metal_rough metal_of(const specular_gloss &from)
     const double strongest = std::max({from.specular[0], from.specular[1], from.specular[2]});
     const double rest = 1 - strongest, tiny = 1e-6;
     const double metallic = metallic_of(brightness(from.diffuse), brightness(from.specular), rest);
-    metal_rough to = {{0, 0, 0}, from.alpha, metallic, 1 - from.glossiness};
+    metal_rough to = {{0, 0, 0}, from.alpha, metallic, 1 - from.glossiness, {dielectric, dielectric, dielectric}};
+
+    if (metallic < 0.5) {
+        // Of the diffuse colour the file's model shows what the strongest channel of the mirror leaves, in all
+        // channels.
+        to.metallic = 0;
+        for (size_t c = 0; c < 3; c++) {
+            to.base[c] = clamped(from.diffuse[c] * rest / std::max(1 - from.specular[c], tiny));
+            to.mirror[c] = from.specular[c];
+        }
+        return to;
+    }
 
     for (size_t c = 0; c < 3; c++) {
         const double of_diffuse = from.diffuse[c] * rest / (1 - dielectric) / std::max(1 - metallic, tiny);
@@ -67,16 +78,17 @@ metal_rough metal_of(const specular_gloss &from)
 }
 
 void metal_texels(const specular_gloss &factors, const gloss_image &diffuse, const gloss_image &specular,
-                  uint32_t width, uint32_t height, unsigned char *base, unsigned char *rough)
+                  const metal_images &to)
 {
+    unsigned char *base = to.base, *rough = to.rough, *mirror = to.mirror;
     double linear[256];
 
     for (size_t i = 0; i < 256; i++)
         linear[i] = double(linear_from_srgb_f(float(i) / 255));
-    for (uint32_t y = 0; y < height; y++)
-        for (uint32_t x = 0; x < width; x++, base += 4, rough += 4) {
-            const unsigned char *d = texel_at(diffuse, x, y, width, height),
-                                *s = texel_at(specular, x, y, width, height);
+    for (uint32_t y = 0; y < to.height; y++)
+        for (uint32_t x = 0; x < to.width; x++, base += 4, rough += 4, mirror += 4) {
+            const unsigned char *d = texel_at(diffuse, x, y, to.width, to.height),
+                                *s = texel_at(specular, x, y, to.width, to.height);
             specular_gloss one = factors;
             for (size_t c = 0; c < 3; c++) {
                 one.diffuse[c] *= linear[d[c]];
@@ -85,9 +97,12 @@ void metal_texels(const specular_gloss &factors, const gloss_image &diffuse, con
             one.alpha *= d[3] / 255.0;
             one.glossiness *= s[3] / 255.0;
             const metal_rough metal = metal_of(one);
-            for (size_t c = 0; c < 3; c++)
+            for (size_t c = 0; c < 3; c++) {
                 base[c] = byte_of(double(srgb_from_linear_f(float(metal.base[c]))));
+                mirror[c] = byte_of(double(srgb_from_linear_f(float(metal.mirror[c]))));
+            }
             base[3] = byte_of(metal.alpha);
+            mirror[3] = 255;
             rough[0] = rough[3] = 255;
             rough[1] = byte_of(metal.roughness);
             rough[2] = byte_of(metal.metallic);

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Materials. Every one is gone through twice by the same code: first to learn which images are wanted and how, so
 // that they can be decoded side by side, then to be added.
-#include "gltf.hpp"
-#include "gltf_texture.hpp"
+#include "gltf_material.hpp"
 
 #include <algorithm>
 #include <cstdlib>
@@ -11,29 +10,7 @@ namespace gltf
 {
 namespace
 {
-// By position in the message set_material.
-enum slot {
-    BASE_COLOUR,
-    NORMAL,
-    METALLIC_ROUGHNESS,
-    OCCLUSION,
-    EMISSION,
-    TRANSMISSION,
-    SPECULAR = 7,
-    SPECULAR_COLOUR,
-    slot_count
-};
-
 // ---- the parts of a material
-
-struct building {
-    reader &r;
-    images &all;
-    const tinygltf::Material &source;
-    std::string where;
-    message_set_material &set;
-    record_texture_use *uses; // slot_count of them
-};
 
 void core(const building &b)
 {
@@ -107,48 +84,6 @@ void emission_seen_only(const building &b)
     b.set.emission_seen_only = is_true || number(extras, key, 0) != 0;
 }
 
-void specular(const building &b)
-{
-    const tinygltf::Value *mirror = extension(b.source.extensions, "KHR_materials_specular");
-    if (!mirror)
-        return;
-    const std::vector<double> colour = numbers(*mirror, "specularColorFactor");
-    float *const channels[] = {&b.set.specular_red, &b.set.specular_green, &b.set.specular_blue};
-    b.set.specular = limited(b.r, b.where, "specularFactor", number(*mirror, "specularFactor", 1), 0, 1);
-    for (size_t c = 0; c < 3 && c < colour.size(); c++)
-        *channels[c] = limited(b.r, b.where, "specularColorFactor", colour[c], 0, 1000);
-    use_texture(b.r, b.all, source_of(*mirror, "specularTexture"), false, b.uses[SPECULAR], b.where);
-    use_texture(b.r, b.all, source_of(*mirror, "specularColorTexture"), true, b.uses[SPECULAR_COLOUR], b.where);
-}
-
-void volume(const building &b)
-{
-    const tinygltf::Value *body = extension(b.source.extensions, "KHR_materials_volume");
-    if (!body)
-        return;
-    const std::vector<double> colour = numbers(*body, "attenuationColor");
-    float *const channels[] = {&b.set.attenuation_red, &b.set.attenuation_green, &b.set.attenuation_blue};
-    b.set.attenuation_distance =
-        limited(b.r, b.where, "attenuationDistance", number(*body, "attenuationDistance", 0), 0, 1e12);
-    for (size_t c = 0; c < 3 && c < colour.size(); c++)
-        *channels[c] = limited(b.r, b.where, "attenuationColor", colour[c], 0, 1);
-    b.set.thickness = limited(b.r, b.where, "thicknessFactor", number(*body, "thicknessFactor", 0), 0, 1e12);
-}
-
-void anisotropy(const building &b)
-{
-    const tinygltf::Value *brushed = extension(b.source.extensions, "KHR_materials_anisotropy");
-    if (!brushed)
-        return;
-    b.set.anisotropy =
-        limited(b.r, b.where, "anisotropyStrength", number(*brushed, "anisotropyStrength", 0), 0, 1);
-    b.set.anisotropy_rotation =
-        limited(b.r, b.where, "anisotropyRotation", number(*brushed, "anisotropyRotation", 0), -1000, 1000);
-    if (source_of(*brushed, "anisotropyTexture").index >= 0 && !b.all.collecting)
-        import_note(b.r.scene, PROTOCOL_SEVERITY_WARNING, b.where.c_str(),
-                    "a texture of anisotropy is not shown; its strength and rotation are the same everywhere");
-}
-
 // ---- the old model, converted
 
 struct gloss_maps {
@@ -208,20 +143,23 @@ void use_converted(const building &b, const specular_gloss &factors, const gloss
             set.height = std::max(set.height, from[i].height);
             set.nearest = set.nearest || b.all.jobs[number].reason[0] != '\0';
         }
-    unsigned char *base = allocate_texels(b, set.width, set.height);
-    const uint64_t bytes = uint64_t(set.width) * set.height * 4;
-    const uint32_t base_blob = import_add_blob(b.r.scene, base, bytes);
-    unsigned char *rough = allocate_texels(b, set.width, set.height);
-    const uint32_t rough_blob = import_add_blob(b.r.scene, rough, bytes);
+    metal_images to = {set.width, set.height, nullptr, nullptr, nullptr};
+    uint32_t blobs[3];
+    unsigned char **const places[3] = {&to.base, &to.rough, &to.mirror};
+    for (size_t i = 0; i < 3; i++) {
+        *places[i] = allocate_texels(b, set.width, set.height);
+        blobs[i] = import_add_blob(b.r.scene, *places[i], uint64_t(set.width) * set.height * 4);
+    }
     if (b.r.scene->failed)
         throw failed();
-    metal_texels(factors, from[0], from[1], set.width, set.height, base, rough);
+    metal_texels(factors, from[0], from[1], to);
     const int texture = maps.sources[main].index;
     const std::string name = texture_name(b.r, texture, maps.images[main]);
-    b.uses[BASE_COLOUR] = b.uses[METALLIC_ROUGHNESS] = maps.uses[main];
-    b.uses[BASE_COLOUR].texture = add_texture(b.r, texture, name, true, set, base_blob);
+    b.uses[BASE_COLOUR] = b.uses[METALLIC_ROUGHNESS] = b.uses[SPECULAR_COLOUR] = maps.uses[main];
+    b.uses[BASE_COLOUR].texture = add_texture(b.r, texture, name, true, set, blobs[0]);
     b.uses[METALLIC_ROUGHNESS].texture =
-        add_texture(b.r, texture, name + " metallic roughness", false, set, rough_blob);
+        add_texture(b.r, texture, name + " metallic roughness", false, set, blobs[1]);
+    b.uses[SPECULAR_COLOUR].texture = add_texture(b.r, texture, name + " mirror", true, set, blobs[2]);
 }
 
 void specular_glossiness(const building &b)
@@ -244,9 +182,12 @@ void specular_glossiness(const building &b)
     const gloss_maps maps = maps_of(b, *old);
     const bool textured = maps.images[0] >= 0 || maps.images[1] >= 0;
     const metal_rough metal =
-        textured ? metal_rough{{1, 1, 1}, 1, 1, 1} : metal_of(factors); // the textures have all then
-    for (size_t c = 0; c < 3; c++)
+        textured ? metal_rough{{1, 1, 1}, 1, 1, 1, {1, 1, 1}} : metal_of(factors); // the textures have all then
+    float *const mirror[] = {&b.set.specular_red, &b.set.specular_green, &b.set.specular_blue};
+    for (size_t c = 0; c < 3; c++) {
         b.set.base_colour[c] = float(metal.base[c]);
+        *mirror[c] = float(metal.mirror[c] / plain_mirror);
+    }
     b.set.base_colour[3] = float(metal.alpha);
     b.set.metallic = float(metal.metallic);
     b.set.roughness = float(metal.roughness);
@@ -267,9 +208,7 @@ uint32_t material(reader &r, images &all, int index)
     alpha(b);
     transmission(b);
     emission_seen_only(b);
-    specular(b);
-    volume(b);
-    anisotropy(b);
+    extensions(b);
     specular_glossiness(b);
     if (all.collecting)
         return 0;

@@ -8,6 +8,7 @@
 #include <string.h>
 #include <time.h>
 
+#include "protocol/describe.h"
 #include "protocol/plain_text.h"
 
 /* ---- text ---- */
@@ -256,6 +257,17 @@ static bool within(const float *values, size_t count, float minimum, float maxim
     return true;
 }
 
+/* What the table of messages says of the real numbers of a struct. */
+static bool within_fields(const struct struct_desc *desc, const void *body)
+{
+    bool ok = true;
+    for (const struct field_desc *field = desc->fields; field->name; field++)
+        if (field->kind == FIELD_REAL)
+            ok &= within((const float *)(const void *)((const char *)body + field->offset), field->count,
+                         field->real_min, field->real_max);
+    return ok;
+}
+
 /* ---- small objects ---- */
 
 uint32_t import_add_node(struct import_scene *scene, const struct message_set_node *node)
@@ -287,15 +299,7 @@ uint32_t import_add_material(struct import_scene *scene, const struct message_se
     struct record_texture_use *textures = NULL;
     uint32_t count = material->textures_count;
 
-    if (!within(material->base_colour, 4, 0, 1) || !within(material->emission, 3, 0, 1e6f) ||
-        !within(&material->metallic, 1, 0, 1) || !within(&material->roughness, 1, 0, 1) ||
-        !within(&material->transmission, 1, 0, 1) || !within(&material->ior, 1, 1, 10) ||
-        !within(&material->alpha_cutoff, 1, 0, 1) || !within(&material->anisotropy, 1, 0, 1) ||
-        !within(&material->anisotropy_rotation, 1, -1000, 1000) || !within(&material->specular, 1, 0, 1) ||
-        !within(&material->specular_red, 1, 0, 1000) || !within(&material->specular_green, 1, 0, 1000) ||
-        !within(&material->specular_blue, 1, 0, 1000) || !within(&material->attenuation_distance, 1, 0, 1e12f) ||
-        !within(&material->attenuation_red, 1, 0, 1) || !within(&material->attenuation_green, 1, 0, 1) ||
-        !within(&material->attenuation_blue, 1, 0, 1) || !within(&material->thickness, 1, 0, 1e12f)) {
+    if (!within_fields(message_describe(MESSAGE_SET_MATERIAL)->body(), material)) {
         import_fail(scene, material->name, "a material has a number that is not allowed");
         return 0;
     }
@@ -412,11 +416,12 @@ void import_identity(float parent_from_node[12])
 
 void import_material_default(struct message_set_material *material)
 {
-    *material = (struct message_set_material){.metallic = 0, .roughness = 1, .ior = 1.5f, .alpha_cutoff = 0.5f};
+    struct_defaults(message_describe(MESSAGE_SET_MATERIAL)->body(), material);
+    material->roughness = 1;
+    material->ior = 1.5f;
+    material->alpha_cutoff = 0.5f;
     for (int i = 0; i < 4; i++)
         material->base_colour[i] = 1;
-    material->attenuation_red = material->attenuation_green = material->attenuation_blue = 1;
-    material->specular = material->specular_red = material->specular_green = material->specular_blue = 1;
 }
 
 void import_texture_use_default(struct record_texture_use *use, uint32_t texture)

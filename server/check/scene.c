@@ -69,7 +69,9 @@ static struct scene_material *add_material(struct builder *builder, enum materia
                                         .alpha_cutoff = 0.5f,
                                         .specular = 1,
                                         .specular_colour = {1, 1, 1},
-                                        .attenuation = {1, 1, 1}};
+                                        .attenuation = {1, 1, 1},
+                                        .iridescence_ior = 1.3f,
+                                        .diffuse_transmission_colour = {1, 1, 1}};
     for (int i = 0; i < MATERIAL_TEXTURE_COUNT; i++)
         material->textures[i] = (struct texture_use){.uv_transform = {1, 0, 0, 0, 1, 0}, .strength = 1};
     return material;

@@ -435,7 +435,8 @@ static void classify_material(struct gpu_scene *gpu, const struct scene *scene, 
         gpu->has_translucent = true;
     gpu->has_transmission |= material->transmission > 0.0f;
     gpu->has_tangents |= material->textures[MATERIAL_NORMAL].texture ||
-                         material->textures[MATERIAL_BUMP].texture || material->anisotropy != 0.0f;
+                         material->textures[MATERIAL_BUMP].texture ||
+                         material->textures[MATERIAL_CLEARCOAT_NORMAL].texture || material->anisotropy != 0.0f;
     bool varies = material->textures[MATERIAL_BASE_COLOUR].texture ||
                   material->textures[MATERIAL_TRANSMISSION].texture || (*geometry_flags & GEOMETRY_HAS_COLOURS);
     gpu->has_varied_alpha |= varies && (material->alpha_mode != ALPHA_OPAQUE || material->transmission > 0.0f);

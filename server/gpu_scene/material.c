@@ -92,6 +92,19 @@ static uint32_t add_slot(const struct gpu_scene *gpu, const struct texture_use *
     return (*slot_count)++;
 }
 
+/* That of the first texture of those which need one counts. */
+static uint32_t tangent_flags(const struct scene_material *material)
+{
+    static const enum material_texture turned[] = {MATERIAL_NORMAL, MATERIAL_BUMP, MATERIAL_CLEARCOAT_NORMAL,
+                                                   MATERIAL_ANISOTROPY};
+    for (size_t i = 0; i < sizeof(turned) / sizeof(*turned); i++) {
+        const struct texture_use *use = &material->textures[turned[i]];
+        if (use->texture)
+            return MATERIAL_TANGENT | (use->texcoord_set == 1 ? MATERIAL_TANGENT_SECOND : 0);
+    }
+    return material->anisotropy != 0.0f ? MATERIAL_TANGENT : 0;
+}
+
 static void pack_material(const struct gpu_scene *gpu, const struct scene_material *in, struct material *out,
                           struct texture_slot *slots, uint32_t *slot_count)
 {
@@ -107,6 +120,21 @@ static void pack_material(const struct gpu_scene *gpu, const struct scene_materi
         .specular_red = in->specular_colour[0],
         .specular_green = in->specular_colour[1],
         .specular_blue = in->specular_colour[2],
+        .clearcoat = in->clearcoat,
+        .clearcoat_roughness = in->clearcoat_roughness,
+        .dispersion = in->dispersion,
+        .iridescence = in->iridescence,
+        .iridescence_ior = in->iridescence_ior,
+        .iridescence_minimum = in->iridescence_minimum_nm,
+        .iridescence_maximum = in->iridescence_maximum_nm,
+        .sheen_red = in->sheen[0],
+        .sheen_green = in->sheen[1],
+        .sheen_blue = in->sheen[2],
+        .sheen_roughness = in->sheen_roughness,
+        .diffuse_red = in->diffuse_transmission_colour[0],
+        .diffuse_green = in->diffuse_transmission_colour[1],
+        .diffuse_blue = in->diffuse_transmission_colour[2],
+        .diffuse_transmission = in->diffuse_transmission,
         .id = in->base.id,
     };
     memcpy(out->base_colour, in->base_colour, sizeof(out->base_colour));
@@ -119,7 +147,8 @@ static void pack_material(const struct gpu_scene *gpu, const struct scene_materi
     out->flags = (in->alpha_mode == ALPHA_MASK ? MATERIAL_ALPHA_MASK : 0) |
                  (in->alpha_mode == ALPHA_BLEND ? MATERIAL_ALPHA_BLEND : 0) |
                  (in->double_sided ? MATERIAL_DOUBLE_SIDED : 0) | (in->unlit ? MATERIAL_UNLIT : 0) |
-                 (in->emission_seen_only ? MATERIAL_EMISSION_SEEN_ONLY : 0);
+                 (in->emission_seen_only ? MATERIAL_EMISSION_SEEN_ONLY : 0) |
+                 (in->thin_walled ? MATERIAL_THIN_WALLED : 0) | tangent_flags(in);
     uint32_t *const places[MATERIAL_TEXTURE_COUNT] = {
         [MATERIAL_BASE_COLOUR] = &out->texture_base_colour,
         [MATERIAL_NORMAL] = &out->texture_normal,
@@ -130,6 +159,16 @@ static void pack_material(const struct gpu_scene *gpu, const struct scene_materi
         [MATERIAL_BUMP] = &out->texture_bump,
         [MATERIAL_SPECULAR] = &out->texture_specular,
         [MATERIAL_SPECULAR_COLOUR] = &out->texture_specular_colour,
+        [MATERIAL_CLEARCOAT] = &out->texture_clearcoat,
+        [MATERIAL_CLEARCOAT_ROUGHNESS] = &out->texture_clearcoat_roughness,
+        [MATERIAL_CLEARCOAT_NORMAL] = &out->texture_clearcoat_normal,
+        [MATERIAL_SHEEN] = &out->texture_sheen,
+        [MATERIAL_SHEEN_ROUGHNESS] = &out->texture_sheen_roughness,
+        [MATERIAL_IRIDESCENCE] = &out->texture_iridescence,
+        [MATERIAL_IRIDESCENCE_THICKNESS] = &out->texture_iridescence_thickness,
+        [MATERIAL_DIFFUSE_TRANSMISSION] = &out->texture_diffuse_transmission,
+        [MATERIAL_DIFFUSE_TRANSMISSION_COLOUR] = &out->texture_diffuse_transmission_colour,
+        [MATERIAL_ANISOTROPY] = &out->texture_anisotropy,
     };
     for (int i = 0; i < MATERIAL_TEXTURE_COUNT; i++)
         *places[i] = add_slot(gpu, &in->textures[i], slots, slot_count);
@@ -148,6 +187,9 @@ static void pack_default(struct material *out)
         .body_red = 1.0f,
         .body_green = 1.0f,
         .body_blue = 1.0f,
+        .diffuse_red = 1.0f,
+        .diffuse_green = 1.0f,
+        .diffuse_blue = 1.0f,
         .flags = MATERIAL_DOUBLE_SIDED,
     };
 }

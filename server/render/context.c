@@ -120,19 +120,29 @@ size_t context_surface_defines(const struct render_context *context, struct gpu_
 {
     /* Only discs have textures that are not applied already. */
     bool exact = !context->sampled_hits || context->scene->disc_count > 0;
+    const struct scene_features *features = &context->features;
+    const struct {
+        bool has;
+        const char *define;
+    } rows[CONTEXT_SURFACE_DEFINES] = {
+        {context->sampled_hits, "HAS_SAMPLED"},
+        {features->textures && exact, "HAS_TEXTURES"},
+        {features->bump && exact, "HAS_BUMP"},
+        {features->textures && exact && context->scene->has_spheres, "HAS_SPHERES"},
+        {features->volume, "HAS_VOLUME"},
+        {features->specular, "HAS_SPECULAR"},
+        {features->clearcoat, "HAS_CLEARCOAT"},
+        {features->iridescence, "HAS_IRIDESCENCE"},
+        {features->sheen, "HAS_SHEEN"},
+        {features->diffuse_transmission, "HAS_DIFFUSE_TRANSMISSION"},
+        {features->dispersion, "HAS_DISPERSION"},
+        {features->thin_walls, "HAS_THIN_WALLS"},
+        {features->anisotropy_map, "HAS_ANISOTROPY_MAP"},
+    };
     size_t n = 0;
-    if (context->sampled_hits)
-        defines[n++] = (struct gpu_define){"HAS_SAMPLED", "1"};
-    if (context->features.textures && exact)
-        defines[n++] = (struct gpu_define){"HAS_TEXTURES", "1"};
-    if (context->features.bump && exact)
-        defines[n++] = (struct gpu_define){"HAS_BUMP", "1"};
-    if (context->features.textures && exact && context->scene->has_spheres)
-        defines[n++] = (struct gpu_define){"HAS_SPHERES", "1"};
-    if (context->features.volume)
-        defines[n++] = (struct gpu_define){"HAS_VOLUME", "1"};
-    if (context->features.specular)
-        defines[n++] = (struct gpu_define){"HAS_SPECULAR", "1"};
+    for (size_t i = 0; i < CONTEXT_SURFACE_DEFINES; i++)
+        if (rows[i].has)
+            defines[n++] = (struct gpu_define){rows[i].define, "1"};
     return n;
 }
 

@@ -21,10 +21,19 @@ struct scene_features scene_features_of(const struct scene *scene)
         for (int i = 0; i < MATERIAL_TEXTURE_COUNT; i++)
             features.textures |= material->textures[i].texture != 0;
         features.mirrors |= material->roughness < MIRROR_ROUGHNESS_GONE || material->transmission > 0.0f ||
-                            material->alpha_mode == ALPHA_BLEND;
+                            material->alpha_mode == ALPHA_BLEND ||
+                            (material->clearcoat > 0.0f && material->clearcoat_roughness < MIRROR_ROUGHNESS_GONE);
         features.anisotropy |= material->anisotropy > 0.0f;
         features.specular |= has_specular(material);
         features.volume |= material->transmission > 0.0f && material->attenuation_distance > 0.0f;
+        features.clearcoat |= material->clearcoat > 0.0f;
+        features.sheen |= material->sheen[0] > 0.0f || material->sheen[1] > 0.0f || material->sheen[2] > 0.0f;
+        features.iridescence |= material->iridescence > 0.0f;
+        features.dispersion |= material->transmission > 0.0f && material->dispersion > 0.0f;
+        features.thin_walls |= material->transmission > 0.0f && material->thin_walled;
+        features.diffuse_transmission |= material->diffuse_transmission > 0.0f;
+        features.anisotropy_map |=
+            material->anisotropy > 0.0f && material->textures[MATERIAL_ANISOTROPY].texture != 0;
         features.bump |= material->textures[MATERIAL_BUMP].texture != 0;
     }
     for (size_t cursor = 0; hashmap_next(&scene->objects[OBJECT_LIGHT], &cursor, &id, &value);) {

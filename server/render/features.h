@@ -9,13 +9,20 @@
 #include <stdbool.h>
 
 struct scene_features {
-    bool textures;    /* some material has a texture */
-    bool bump;        /* one of them is a bump map */
-    bool area_lights; /* some light is a rectangle or a sphere */
-    bool anisotropy;  /* some material has a grain */
-    bool specular;    /* some material's mirror differs from what Fresnel's equations say */
-    bool volume;      /* some body of glass absorbs light */
-    bool mirrors;     /* some material sends a ray on: a smooth one, glass, a blended one */
+    bool textures;             /* some material has a texture */
+    bool bump;                 /* one of them is a bump map */
+    bool area_lights;          /* some light is a rectangle or a sphere */
+    bool anisotropy;           /* some material has a grain */
+    bool specular;             /* some material's mirror differs from what Fresnel's equations say */
+    bool volume;               /* some body of glass absorbs light */
+    bool clearcoat;            /* some material is varnished */
+    bool sheen;                /* some is cloth */
+    bool iridescence;          /* some has a thin film */
+    bool dispersion;           /* some glass splits colours */
+    bool thin_walls;           /* some glass has no body */
+    bool diffuse_transmission; /* some material scatters light to its other side */
+    bool anisotropy_map;       /* some grain differs from place to place */
+    bool mirrors;              /* some material sends a ray on: a smooth one, glass, a blended one */
 };
 
 struct scene_features scene_features_of(const struct scene *scene);

@@ -12,7 +12,7 @@
 
 #include <epoxy/gl.h>
 
-#define DEFINES_MAX 18
+#define DEFINES_MAX 24
 
 bool wave_passes_reserve(struct wave_passes *passes, struct render_context *context, struct error *error)
 {

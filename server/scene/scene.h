@@ -45,6 +45,16 @@ enum material_texture {
     MATERIAL_BUMP,
     MATERIAL_SPECULAR,
     MATERIAL_SPECULAR_COLOUR,
+    MATERIAL_CLEARCOAT,
+    MATERIAL_CLEARCOAT_ROUGHNESS,
+    MATERIAL_CLEARCOAT_NORMAL,
+    MATERIAL_SHEEN,
+    MATERIAL_SHEEN_ROUGHNESS,
+    MATERIAL_IRIDESCENCE,
+    MATERIAL_IRIDESCENCE_THICKNESS,
+    MATERIAL_DIFFUSE_TRANSMISSION,
+    MATERIAL_DIFFUSE_TRANSMISSION_COLOUR,
+    MATERIAL_ANISOTROPY,
     MATERIAL_TEXTURE_COUNT
 };
 
@@ -118,6 +128,13 @@ struct scene_material {
     /* What a body of glass lets through on the distance, metres; 0: it is clear. `thickness`: of the body, for
      * shadow rays, which cross two of its surfaces. */
     float attenuation[3], attenuation_distance, thickness;
+    float clearcoat, clearcoat_roughness;
+    float sheen[3], sheen_roughness;
+    float iridescence, iridescence_ior, iridescence_minimum_nm,
+        iridescence_maximum_nm; /* of the film: thickness */
+    float dispersion;           /* 20 / Abbe number */
+    float diffuse_transmission, diffuse_transmission_colour[3];
+    bool thin_walled;
     struct texture_use textures[MATERIAL_TEXTURE_COUNT];
 };
 

@@ -136,6 +136,20 @@ static void from_material(const struct message_set_material *message, struct sce
     memcpy(material->attenuation, attenuation, sizeof(attenuation));
     material->attenuation_distance = message->attenuation_distance;
     material->thickness = message->thickness;
+    material->clearcoat = message->clearcoat;
+    material->clearcoat_roughness = message->clearcoat_roughness;
+    memcpy(material->sheen, message->sheen, sizeof(material->sheen));
+    material->sheen_roughness = message->sheen_roughness;
+    material->iridescence = message->iridescence;
+    material->iridescence_ior = message->iridescence_ior;
+    material->iridescence_minimum_nm = message->iridescence_minimum_nm;
+    material->iridescence_maximum_nm = message->iridescence_maximum_nm;
+    material->dispersion = message->dispersion;
+    material->diffuse_transmission = message->diffuse_transmission;
+    const float through[3] = {message->diffuse_transmission_red, message->diffuse_transmission_green,
+                              message->diffuse_transmission_blue};
+    memcpy(material->diffuse_transmission_colour, through, sizeof(through));
+    material->thin_walled = message->thin_walled;
     for (uint32_t i = 0; i < message->textures_count && i < MATERIAL_TEXTURE_COUNT; i++) {
         const struct record_texture_use *from = &message->textures[i];
         struct texture_use *use = &material->textures[i];

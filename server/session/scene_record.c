@@ -207,6 +207,20 @@ static void put_material(struct sink *sink, const struct scene_material *materia
     set->attenuation_green = material->attenuation[1];
     set->attenuation_blue = material->attenuation[2];
     set->thickness = material->thickness;
+    set->clearcoat = material->clearcoat;
+    set->clearcoat_roughness = material->clearcoat_roughness;
+    memcpy(set->sheen, material->sheen, sizeof(set->sheen));
+    set->sheen_roughness = material->sheen_roughness;
+    set->iridescence = material->iridescence;
+    set->iridescence_ior = material->iridescence_ior;
+    set->iridescence_minimum_nm = material->iridescence_minimum_nm;
+    set->iridescence_maximum_nm = material->iridescence_maximum_nm;
+    set->dispersion = material->dispersion;
+    set->diffuse_transmission = material->diffuse_transmission;
+    set->diffuse_transmission_red = material->diffuse_transmission_colour[0];
+    set->diffuse_transmission_green = material->diffuse_transmission_colour[1];
+    set->diffuse_transmission_blue = material->diffuse_transmission_colour[2];
+    set->thin_walled = material->thin_walled;
     for (int i = 0; i < MATERIAL_TEXTURE_COUNT; i++) {
         const struct texture_use *use = &material->textures[i];
         textures[i] = (struct record_texture_use){

@@ -9,9 +9,12 @@
 //               reflectances
 //   refracted   GGX facets as windows: also for what they would mirror into another facet
 //
-// The last two may be stretched along a grain. Where they are smooth they are a mirror and a window, which nothing but
-// bsdf_choose() finds; nor does anything else find what goes on inside of glass, where both are GGX's. Radiance on the
-// other side is divided by the square of the index, so that a window neither dims nor brightens the view through it.
+//   coat        GGX facets over all of them (common/coat.glsl)
+//
+// Mirrored and refracted may be stretched along a grain. Where they are smooth they are a mirror and a window, which
+// nothing but bsdf_choose() finds; nor does anything else find what goes on inside of glass, where both are GGX's.
+// Radiance on the other side is divided by the square of the index, so that a window neither dims nor brightens the
+// view through it.
 //
 // Defines: those of common/material.glsl; HAS_ANISOTROPY some material has a grain; WARD.
 
@@ -27,10 +30,14 @@ struct bsdf {
     vec2 alpha;             // of the facets along x and y
     bool rough;             // else mirror and window are smooth
     bool leaves;            // the ray comes from inside of glass
-    float eta;              // index behind / index before
     split parts;            // none is scattered from inside of glass: bsdf_choose() does that by facets
     float scattered_chance; // of choosing that lobe
     float mirror_chance;    // WARD: of choosing the mirror otherwise
+#ifdef HAS_CLEARCOAT
+    vec3 coat_x, coat_y, coat_view; // the coat's frame with its normal, and the view in it
+    float coat_alpha, coat_chance;  // of choosing its lobe
+    bool coat_rough;
+#endif
 };
 
 // KHR_materials_anisotropy: facets are as rough as the material says across the grain, and up to fully rough along it.
@@ -55,7 +62,12 @@ vec3 grain_of(hit h, surface s, material m)
             y = cross(s.normal, x) * (s.inside ? -tangent.w : tangent.w);
         }
     }
-    return cos(m.anisotropy_rotation) * x + sin(m.anisotropy_rotation) * y;
+    vec2 turned = vec2(cos(m.anisotropy_rotation), sin(m.anisotropy_rotation));
+#ifdef HAS_ANISOTROPY_MAP // complex numbers
+    vec2 texel = dot(s.grain.xy, s.grain.xy) > 1e-6 ? normalize(s.grain.xy) : vec2(1.0, 0.0);
+    turned = vec2(turned.x * texel.x - turned.y * texel.y, turned.x * texel.y + turned.y * texel.x);
+#endif
+    return turned.x * x + turned.y * y;
 }
 #endif
 
@@ -97,35 +109,55 @@ bsdf bsdf_of(surface s, vec3 view, float NoV, vec3 along, float anisotropy)
     b.view = normalize(vec3(local.xy, NoV));
     b.alpha = facet_alpha(s.roughness, anisotropy);
     b.rough = b.alpha.x > FACET_ALPHA_MIN;
-    b.leaves = s.inside && s.transmission > 0.0;
-    b.eta = b.leaves ? 1.0 / s.ior : s.ior;
+    b.leaves = in_glass(s);
     float loss = b.rough ? bsdf_lost(b, b.view) : 0.0;
-    b.parts = split_facets(s, NoV, facet_alpha_mean(b.alpha).x, loss);
+    b.parts = split_facets(s, view, NoV, facet_alpha_mean(b.alpha).x, loss);
     b.alpha = max(b.alpha, vec2(FACET_ALPHA_MIN));
     if (b.leaves)
         b.parts.scattered = b.parts.again = vec3(0.0);
-    float scattered = max_component(b.parts.scattered + b.parts.again);
+    float scattered = max_component(b.parts.scattered + b.parts.again + sheen_of(b.parts)) +
+                      max_component(passed_of(b.parts));
     float mirror = max_component(b.parts.mirror), refracted = max_component(b.parts.refracted);
     float facets = mirror + refracted > 0.0 ? max(mirror + refracted, LOBE_CHANCE_MIN) : 0.0;
     b.scattered_chance = b.leaves ? 0.0 : scattered + facets > 0.0 ? scattered / (scattered + facets) : 1.0;
     b.mirror_chance = max(mirror, LOBE_CHANCE_MIN) / (max(mirror, LOBE_CHANCE_MIN) + refracted);
+#ifdef HAS_CLEARCOAT
+    tangent_frame(s.coat_normal, b.coat_x, b.coat_y);
+    b.coat_view = normalize(vec3(dot(view, b.coat_x), dot(view, b.coat_y), coat_cosine(s, view)));
+    b.coat_alpha = square(s.coat_roughness);
+    b.coat_rough = b.coat_alpha > FACET_ALPHA_MIN;
+    float coat = b.parts.coat.mirrors, below = scattered + facets;
+    coat = coat > 0.0 ? max(coat, LOBE_CHANCE_MIN) : 0.0;
+    b.coat_chance = coat > 0.0 ? coat / (coat + below) : 0.0;
+#endif
     return b;
 }
 
-// The reflectance and transmittance of a facet. `lit`: the share of its mirror's light that no other facet catches.
-void facet_parts(bsdf b, surface s, float VoH, float lit, out vec3 mirror, out vec3 window)
+// The share of the light mirrored by a facet that no other one catches; what comes from inside of glass stays there.
+float bsdf_lit(bsdf b, vec3 light)
 {
-    SHARE dielectric = b.leaves ? SHARE(fresnel_dielectric(VoH, b.eta))
-                                : outside_mirror(s, fresnel_dielectric(VoH, b.eta), 1.0);
+#ifndef WARD
+    if (b.rough && !b.leaves)
+        return light.z > 0.0 ? facet_both_share(b.view, light, b.alpha) : 0.0;
+#endif
+    return 1.0;
+}
+
+// The reflectance and transmittance of a facet. `light`: the direction that it mirrors.
+void facet_parts(bsdf b, surface s, float VoH, vec3 light, out vec3 mirror, out vec3 window)
+{
+    float lit = bsdf_lit(b, light);
+    SHARE dielectric = b.leaves ? inside_mirror(s, VoH) : outside_mirror(s, VoH, fresnel_dielectric(VoH, s.ior), 1.0);
     SHARE mirrored = dielectric * lit;
 #ifdef WARD
     if (!b.leaves && b.rough) // whose mirror has other facets than the window
         mirrored = b.parts.dielectric;
 #endif
-    mirror = mix(vec3(dielectric), fresnel_schlick(s.base, VoH), s.metallic) * lit;
+    mirror = mix(vec3(dielectric), metal_mirror(s, VoH), s.metallic) *
+             (lit * over_mirrored(s, b.parts, bsdf_world(b, light)));
     // Glass is tinted once, where light enters it. From inside, also what is scattered is left to it.
     vec3 through = b.leaves ? mix(s.base, vec3(1.0), s.transmission) : s.base * s.transmission;
-    window = through * ((1.0 - mirrored) * (1.0 - s.metallic));
+    window = through * ((1.0 - mirrored) * ((1.0 - s.metallic) * over_view(b.parts)));
 }
 
 // The probability of choosing the mirror over the window. Ward's lobe has other facets than the window, so it is chosen
@@ -140,31 +172,33 @@ float facet_mirror_chance(bsdf b, vec3 mirror, vec3 window)
     return both > 0.0 ? size / both : 1.0;
 }
 
-// The share of the light mirrored by a facet that no other one catches; what comes from inside of glass stays there.
-float bsdf_lit(bsdf b, vec3 light)
+// As evaluate_below(), of what is scattered from the other side.
+vec3 bsdf_passed(bsdf b, surface s, vec3 light, vec3 light_world, out float probability)
 {
-#ifndef WARD
-    if (b.rough && !b.leaves)
-        return light.z > 0.0 ? facet_both_share(b.view, light, b.alpha) : 0.0;
-#endif
-    return 1.0;
+    probability = 0.0;
+    if (light.z >= 0.0 || dot(s.geometric, light_world) >= 0.0 || b.leaves)
+        return vec3(0.0);
+    probability = b.scattered_chance * passed_share(b.parts) * -light.z * INVERSE_PI;
+    float alpha = facet_alpha_mean(b.alpha).x, loss = bsdf_lost(b, vec3(light.xy, -light.z));
+    return passed_of(b.parts) * (spread_entered(s, b.parts, -light.z, alpha, loss) * -light.z) *
+           over_scattered(s, b.parts, -light_world);
 }
 
-// The reflectance from a direction on the same side (unit) to the eye, per steradian, times the cosine; and the
-// probability per steradian with which bsdf_choose() samples it. A smooth mirror is left out of both.
-vec3 bsdf_evaluate(bsdf b, surface s, vec3 light_world, out float probability)
+// bsdf_evaluate() of the surface below a coat, as if there were only its lobes to choose from.
+vec3 evaluate_below(bsdf b, surface s, vec3 light_world, out float probability)
 {
     vec3 light = bsdf_local(b, light_world);
-    probability = 0.0;
     if (light.z <= 0.0 || dot(s.geometric, light_world) <= 0.0 || b.leaves)
-        return vec3(0.0);
-    vec3 sent = spread_out(s, b.parts, light.z, facet_alpha_mean(b.alpha).x, bsdf_lost(b, light)) * light.z;
-    probability = b.scattered_chance * light.z * INVERSE_PI;
+        return bsdf_passed(b, s, light, light_world, probability);
+    vec3 facet = normalize(b.view + light), mirror, window;
+    vec3 sent = spread_out(s, b.parts, light.z, facet_alpha_mean(b.alpha).x, bsdf_lost(b, light)) *
+                over_scattered(s, b.parts, light_world);
+    sent = (sent + sheen_sent(s, b.parts, bsdf_world(b, b.view), b.view.z, light_world)) * light.z;
+    probability = b.scattered_chance * (1.0 - passed_share(b.parts)) * light.z * INVERSE_PI;
     if (!b.rough)
         return sent;
-    vec3 facet = normalize(b.view + light), mirror, window;
     float VoH = clamp(dot(b.view, facet), 1e-6, 1.0);
-    facet_parts(b, s, VoH, bsdf_lit(b, light), mirror, window);
+    facet_parts(b, s, VoH, light, mirror, window);
     float chance = (1.0 - b.scattered_chance) * facet_mirror_chance(b, mirror, window);
 #ifdef WARD
     float lobe_density = ward_density(facet, VoH, b.alpha);
@@ -177,9 +211,31 @@ vec3 bsdf_evaluate(bsdf b, surface s, vec3 light_world, out float probability)
     return sent;
 }
 
+// The reflectance from a direction (unit) to the eye, per steradian, times the cosine; and the probability per steradian
+// with which bsdf_choose() samples it. A smooth mirror is left out of both, and what is refracted.
+vec3 bsdf_evaluate(bsdf b, surface s, vec3 light_world, out float probability)
+{
+    vec3 sent = evaluate_below(b, s, light_world, probability);
+#ifdef HAS_CLEARCOAT
+    vec3 light = vec3(dot(light_world, b.coat_x), dot(light_world, b.coat_y), dot(light_world, s.coat_normal));
+    probability *= 1.0 - b.coat_chance;
+    if (b.coat_rough && b.coat_chance > 0.0 && light.z > 0.0 && dot(s.geometric, light_world) > 0.0) {
+        vec2 alpha = vec2(b.coat_alpha);
+        vec3 facet = normalize(b.coat_view + light);
+        float VoH = clamp(dot(b.coat_view, facet), 1e-6, 1.0);
+        float density = visible_facet_density(facet, b.coat_view, VoH, alpha) / (4.0 * VoH);
+        float lit = facet_both_share(b.coat_view, light, alpha);
+        sent += s.coat * fresnel_dielectric(VoH, COAT_IOR) * lit * density;
+        probability += b.coat_chance * density;
+    }
+#endif
+    return sent;
+}
+
 #define BSDF_SCATTERED 0u
 #define BSDF_MIRRORED 1u
 #define BSDF_REFRACTED 2u
+#define BSDF_COAT 3u // mirrored by it
 
 struct bsdf_choice {
     vec3 direction;    // unit, world space
@@ -213,25 +269,36 @@ bool scattered_inside(surface s, inout float choice, inout vec3 window, inout ve
 bsdf_choice bsdf_choose(bsdf b, surface s, inout float choice, vec2 u)
 {
     bsdf_choice result = bsdf_choice(b.z, vec3(0.0), 0.0, BSDF_SCATTERED);
+    float below = 1.0; // the chance of it
+#ifdef HAS_CLEARCOAT
+    bool coated = choice < b.coat_chance;
+    below = 1.0 - b.coat_chance;
+    choice = clamp(coated ? choice / b.coat_chance : (choice - b.coat_chance) / below, 0.0, 0.99999994);
+    vec3 coat_facet = b.coat_rough ? visible_facet(b.coat_view, vec2(b.coat_alpha), u) : vec3(0.0, 0.0, 1.0);
+    vec3 coat_mirrored = reflect(-b.coat_view, coat_facet);
+#endif
     bool scattered = choice < b.scattered_chance;
     float first = scattered ? b.scattered_chance : 1.0 - b.scattered_chance;
     choice = min((scattered ? choice : choice - b.scattered_chance) / first, 0.99999994);
+    first *= below;
     vec3 facet = b.rough ? visible_facet(b.view, b.alpha, u) : vec3(0.0, 0.0, 1.0), mirror, window;
     float VoH = clamp(dot(b.view, facet), 1e-6, 1.0);
     vec3 mirrored_at = reflect(-b.view, facet);
-    facet_parts(b, s, VoH, bsdf_lit(b, mirrored_at), mirror, window);
-    vec3 bent = refract(-b.view, facet, 1.0 / b.eta);
+    facet_parts(b, s, VoH, mirrored_at, mirror, window);
+    float chance = facet_mirror_chance(b, mirror, window), eta = disperse(s, choice, window);
+    vec3 bent = bent_direction(s, eta, -b.view, facet, vec3(0.0, 0.0, 1.0));
     if (!b.rough && dot(bsdf_world(b, bent), s.geometric) >= 0.0) { // totally reflected, or a tilted normal sends it back
         mirror += window;
         window = vec3(0.0);
+        chance = facet_mirror_chance(b, mirror, window);
     }
-    float chance = facet_mirror_chance(b, mirror, window);
     bool mirrored = choice < chance;
     if (!scattered)
         choice = min((mirrored ? choice : choice - chance) / (mirrored ? chance : 1.0 - chance), 0.99999994);
     vec3 local;
     if (scattered) {
         local = direction_by_cosine(u);
+        local.z = is_in(passed_share(b.parts), choice) ? -local.z : local.z;
     } else if (mirrored) {
 #ifdef WARD
         if (b.rough && !b.leaves)
@@ -249,6 +316,19 @@ bsdf_choice bsdf_choose(bsdf b, surface s, inout float choice, vec2 u)
     if (diffuse)
         result.lobe = BSDF_SCATTERED;
     result.direction = normalize(bsdf_world(b, local));
+#ifdef HAS_CLEARCOAT
+    if (coated) {
+        result.lobe = BSDF_COAT;
+        result.direction = b.coat_rough ? normalize(coat_mirrored.x * b.coat_x + coat_mirrored.y * b.coat_y +
+                                                    coat_mirrored.z * s.coat_normal)
+                                        : coat_mirror_direction(s, -bsdf_world(b, b.view));
+        diffuse = false;
+    }
+    if (coated && !b.coat_rough) {
+        result.weight = vec3(b.parts.coat.mirrors / b.coat_chance);
+        return result;
+    }
+#endif
     if (diffuse || result.lobe == BSDF_REFRACTED) {
         bool out_ = dot(result.direction, s.geometric) * local.z > 0.0 && dot(local, local) > 0.5;
         result.weight = out_ ? window / (first * (1.0 - chance)) : vec3(0.0);

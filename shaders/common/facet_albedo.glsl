@@ -71,15 +71,20 @@ float facets_cosine(float cosine, float alpha)
     return cosine + r * (dot(COSINE, vec4(1.0, r, alpha, alpha * r)) + x * upright);
 }
 
-// The share that facets of a dielectric mirror at the first go. `mean`: facets_cosine().
-float facets_dielectric(float mean, float lost, float alpha, float ior)
+// The cosine at which a dielectric's curve has the mean of the facets that are seen and lit. `mean`: facets_cosine().
+float facets_dielectric_cosine(float mean, float alpha, float ior)
 {
     // Where Fresnel's curve is bent the most, facets at the horizon count for more than the mean one.
     float r = sqrt(alpha), s = (ior - 1.0) / (ior + 1.0);
     float bent = max(1.0 / (s + 0.04) - 1.0 / 0.24, 0.0) * (COSINE_THIN.x + COSINE_THIN.y * r) + max(s - 0.29, 0.0) *
                  square(1.0 - mean);
-    float cosine = mean * max(1.0 - bent * r * square(1.0 - mean), 0.1);
-    return (1.0 - lost) * fresnel_dielectric(clamp(cosine, 1e-4, 1.0), ior);
+    return clamp(mean * max(1.0 - bent * r * square(1.0 - mean), 0.1), 1e-4, 1.0);
+}
+
+// The share that facets of a dielectric mirror at the first go.
+float facets_dielectric(float mean, float lost, float alpha, float ior)
+{
+    return (1.0 - lost) * fresnel_dielectric(facets_dielectric_cosine(mean, alpha, ior), ior);
 }
 
 float facets_dielectric_mean(float alpha, float ior)
@@ -90,10 +95,9 @@ float facets_dielectric_mean(float alpha, float ior)
     return s * (dot(DIELECTRIC_MEAN_0, powers) + s * steeper);
 }
 
-// The colour of what a metal mirrors more than once, as a share of facets_lost(): the mean reflectance for each facet,
+// The colour of what a metal mirrors more than once, as a share of facets_lost(): its mean reflectance for each facet,
 // of which some send it out and the others on to further ones. Hill. A Multi-Faceted Exploration. 2018.
-vec3 metal_again(vec3 f0, float lost_mean)
+vec3 metal_again(vec3 mean, float lost_mean)
 {
-    vec3 mean = fresnel_schlick_mean(f0);
     return mean * mean * (1.0 - lost_mean) / (1.0 - mean * lost_mean);
 }

@@ -10,14 +10,31 @@ struct light_receiver {
     vec3 position, normal, view;
     float scattered, mirrored; // reflectances
     float alpha;               // of the facets
+    float passed;              // reflectance of what is scattered from the other side
+#ifdef HAS_CLEARCOAT
+    vec3 coat_normal;
+    float coat_mirrored, coat_alpha;
+#endif
 };
 
 light_receiver light_receiver_of(surface s, split parts, vec3 position, vec3 view, float NoV)
 {
     // A slanted mirror is dim at its own angle, but not at that of every facet: never 0.
-    return light_receiver(position, s.normal, view, max_component(parts.scattered + parts.again) * INVERSE_PI,
+    return light_receiver(position, s.normal, view, max_component(parts.scattered + parts.again + sheen_of(parts)) * INVERSE_PI,
                           (max_component(parts.mirror) + 1e-3) * 0.25 / max(NoV, 0.1),
-                          square(max(s.roughness, ROUGHNESS_MIN_LIGHT)));
+                          square(max(s.roughness, ROUGHNESS_MIN_LIGHT)), max_component(passed_of(parts)) * INVERSE_PI
+#ifdef HAS_CLEARCOAT
+                          , s.coat_normal, parts.coat.mirrors * 0.25 / max(coat_cosine(s, view), 0.1),
+                          square(max(s.coat_roughness, ROUGHNESS_MIN_LIGHT))
+#endif
+    );
+}
+
+// The highlight of GGX, widened by the light's extent (Karis. Real Shading in Unreal Engine 4. 2013).
+float highlight_estimate(vec3 normal, vec3 half_way, float alpha)
+{
+    float NoH = max(dot(normal, half_way), 0.0), wide = alpha * alpha, spread = 1.0 + NoH * NoH * (wide - 1.0) + 1e-6;
+    return wide / (PI * spread * spread);
 }
 
 // An estimate of a light's unshadowed radiance at the eye: positive wherever the true one is.
@@ -45,11 +62,17 @@ float light_estimate(uint index, light_receiver r)
         reach = l.colour.w * inverse;
     }
 #endif
-    // The highlight of GGX, widened by the light's extent (Karis. Real Shading in Unreal Engine 4. 2013).
-    float NoH = max(dot(r.normal, normalize(direction + r.view)), 0.0), alpha = r.alpha + 0.5 * reach;
-    float wide = alpha * alpha, spread = 1.0 + NoH * NoH * (wide - 1.0) + 1e-6;
-    float highlight = r.mirrored * wide / (PI * spread * spread);
-    return cosine + reach > 0.0 ? power * (r.scattered * min(cosine + reach, 1.0) + highlight) : 0.0;
+    vec3 half_way = normalize(direction + r.view);
+    float highlight = r.mirrored * highlight_estimate(r.normal, half_way, r.alpha + 0.5 * reach);
+#ifdef HAS_CLEARCOAT
+    highlight += r.coat_mirrored * highlight_estimate(r.coat_normal, half_way, r.coat_alpha + 0.5 * reach);
+    cosine = max(cosine, dot(r.coat_normal, direction));
+#endif
+    float estimate = cosine + reach > 0.0 ? power * (r.scattered * min(cosine + reach, 1.0) + highlight) : 0.0;
+#ifdef HAS_DIFFUSE_TRANSMISSION
+    estimate += power * r.passed * clamp(reach - dot(r.normal, direction), 0.0, 1.0);
+#endif
+    return estimate;
 }
 
 // Where there are emitters beside the lights (common/emitter.glsl): the probability of asking for a light. By the

@@ -9,7 +9,6 @@
 // facet, or, from inside, keeps it as the flat surface would. So glass loses no light at any roughness, and needs no
 // table of what single facets lose.
 
-#include "common/cone.glsl"
 #include "common/facets.glsl"
 #include "common/scattering.glsl"
 
@@ -19,6 +18,7 @@ struct lobe {
     float solid_angle; // 1 / the density with which it was chosen, steradians; 0: the surface is smooth
     vec3 scattered;    // of split_light(), of the facet where glass is seen from inside
     bool back;         // mirrored, once or again
+    float roughness;   // of what sends it on
 };
 
 // The lit share of the visible facets, both correlated by height as in V_SmithGGXCorrelated(). 0 below the horizon.
@@ -38,10 +38,38 @@ vec3 again_direction(vec3 normal, float number)
 }
 
 // What of the light along a direction comes out mirrored more than once, as brdf() has it, by that of all directions.
-float again_share(split parts, float cosine, float alpha)
+float again_share(surface s, split parts, vec3 light, float alpha)
 {
-    return facets_lost(stretched_cosine(cosine, alpha), alpha) / max(parts.again_mean, 1e-9);
+    float cosine = dot(light, s.normal);
+    return facets_lost(stretched_cosine(cosine, alpha), alpha) / max(parts.again_mean, 1e-9) *
+           over_scattered(s, parts, light);
 }
+
+#ifdef HAS_CLEARCOAT
+// The lobe of the coat: a visible facet's, or the smooth coat's. `chance`: with which it was chosen.
+lobe coat_lobe(surface s, split parts, vec3 direction, float chance, vec2 u)
+{
+    float alpha = square(s.coat_roughness), NoV = coat_cosine(s, -direction), lit = 1.0;
+    bool rough = alpha > FACET_ALPHA_MIN;
+    vec3 x, y, facet = s.coat_normal;
+    tangent_frame(s.coat_normal, x, y);
+    vec3 view = normalize(vec3(-dot(direction, x), -dot(direction, y), NoV));
+    lobe result = lobe(facet, vec3(0.0), 0.0, parts.scattered, true, s.coat_roughness);
+    if (rough) {
+        vec3 local = visible_facet(view, vec2(alpha), u);
+        float VoH = clamp(dot(view, local), 1e-4, 1.0);
+        facet = local.x * x + local.y * y + local.z * s.coat_normal;
+        result.solid_angle = square(facet_turn(COAT_IOR, true)) / visible_facet_density(local, view, VoH, vec2(alpha));
+        NoV = VoH;
+    }
+    result.direction = rough ? reflect(direction, facet) : coat_mirror_direction(s, direction);
+    if (rough)
+        lit = lit_share(view.z, dot(result.direction, s.coat_normal), alpha);
+    bool out_ = dot(result.direction, s.geometric) > 0.0;
+    result.weight = vec3(out_ ? s.coat * fresnel_dielectric(NoV, COAT_IOR) * lit / chance : 0.0);
+    return result;
+}
+#endif
 
 // The frame of facets, and the view in it.
 vec3 facet_frame(surface s, float NoV, vec3 direction, out vec3 x, out vec3 y)
@@ -72,50 +100,72 @@ struct facet_lobes {
     vec3 reflected, bent;       // directions
     vec3 mirror, again, window; // shares; again: mirrored more than once
     SHARE enters;               // neither is mirrored nor metal takes it
+    float window_size;          // of all colours, of which glass may disperse one
 };
 
-facet_lobes facet_lobes_of(surface s, split parts, float NoV, vec3 direction, vec3 facet, bool rough)
+facet_lobes facet_lobes_of(surface s, split parts, float NoV, vec3 direction, vec3 facet, bool rough, inout float number)
 {
-    bool leaves = s.inside && s.transmission > 0.0;
+    bool leaves = in_glass(s);
     float VoH = rough ? clamp(-dot(direction, facet), 1e-4, 1.0) : NoV;
-    float exact = fresnel_dielectric(VoH, leaves ? 1.0 / s.ior : s.ior), lit = 1.0;
-    SHARE dielectric = leaves ? SHARE(exact) : outside_mirror(s, exact, 1.0);
+    float lit = 1.0;
+    SHARE dielectric = leaves ? inside_mirror(s, VoH) : outside_mirror(s, VoH, fresnel_dielectric(VoH, s.ior), 1.0);
     facet_lobes f;
     f.reflected = reflect(direction, facet);
-    f.bent = refract(direction, facet, s.inside ? s.ior : 1.0 / s.ior);
     if (rough && leaves) {
         f.reflected = turned_to(f.reflected, s.normal);
-        f.bent = turned_to(f.bent, -s.normal);
     } else if (rough) {
         lit = lit_share(NoV, dot(f.reflected, s.normal), square(s.roughness));
     }
-    f.mirror = mix(vec3(dielectric), fresnel_schlick(s.base, VoH), s.metallic) * lit;
-    f.again = metal_again(s.base, parts.again_mean) * (s.metallic * (1.0 - lit));
+    f.mirror = mix(vec3(dielectric), metal_mirror(s, VoH), s.metallic) *
+               (lit * over_mirrored(s, parts, f.reflected));
+    f.again = parts.again_colour * (s.metallic * (1.0 - lit) * over_view(parts));
     // Glass is tinted once, where light enters it.
     f.enters = (1.0 - dielectric * lit) * (1.0 - s.metallic);
-    f.window = (leaves ? vec3(1.0) : s.base) * (f.enters * s.transmission);
+    f.window = (leaves ? vec3(1.0) : s.base) * (f.enters * s.transmission * over_view(parts));
+    f.window_size = max_component(f.window);
+    f.bent = bent_direction(s, disperse(s, number, f.window), direction, facet, s.normal);
+    if (rough && leaves)
+        f.bent = turned_to(f.bent, -s.normal);
     if (dot(f.bent, s.geometric) >= 0.0) { // totally reflected, or a tilted normal would send it back
         f.mirror += f.window;
         f.window = vec3(0.0);
+        f.window_size = 0.0;
     }
     return f;
 }
+
+#ifdef HAS_CLEARCOAT
+// The chance of its lobe among all that are sent on.
+float coat_chance_of(split parts)
+{
+    float below = max_component(parts.mirror + parts.again + parts.refracted);
+    return parts.coat.mirrors / max(parts.coat.mirrors + below, 1e-9);
+}
+#endif
 
 // `parts`: split_light() of the same surface and NoV. `choice` chooses between mirror, window and several mirrors in
 // turn, and comes back stretched; `u` chooses the facet.
 lobe lobe_choose(surface s, split parts, float NoV, vec3 direction, inout float choice, vec2 u)
 {
     float alpha = square(s.roughness);
-    bool rough = alpha > FACET_ALPHA_MIN, leaves = s.inside && s.transmission > 0.0;
+    bool rough = alpha > FACET_ALPHA_MIN, leaves = in_glass(s);
     vec3 facet = s.normal;
     float facet_angle = 0.0;
     if (rough)
         facet = facet_seen(s, NoV, direction, u, facet_angle);
-    facet_lobes f = facet_lobes_of(s, parts, NoV, direction, facet, rough);
+    facet_lobes f = facet_lobes_of(s, parts, NoV, direction, facet, rough, choice);
     vec3 scattered = leaves ? s.base * (f.enters * (1.0 - s.transmission)) : parts.scattered;
-    lobe result = lobe(s.normal, vec3(0.0), 0.0, scattered, false);
+    lobe result = lobe(s.normal, vec3(0.0), 0.0, scattered, false, s.roughness);
     float mirror_size = max_component(f.mirror), again_size = max_component(f.again);
-    float all_ = mirror_size + again_size + max_component(f.window);
+    float all_ = mirror_size + again_size + f.window_size;
+#ifdef HAS_CLEARCOAT
+    // Before the facet below, by what is known of all of them.
+    float coat_chance = coat_chance_of(parts);
+    bool coated = choice < coat_chance;
+    choice = clamp(coated ? choice / coat_chance : (choice - coat_chance) / (1.0 - coat_chance), 0.0, 0.99999994);
+    if (coated)
+        return coat_lobe(s, parts, direction, coat_chance, u);
+#endif
     if (!(all_ > 0.0))
         return result;
     float first = mirror_size / all_, second = again_size / all_;
@@ -123,38 +173,71 @@ lobe lobe_choose(surface s, split parts, float NoV, vec3 direction, inout float 
     float before = mirrored ? 0.0 : is_again ? first : first + second;
     float chance = mirrored ? first : is_again ? second : 1.0 - first - second;
     choice = clamp((choice - before) / chance, 0.0, 0.99999994);
+#ifdef HAS_CLEARCOAT
+    chance *= 1.0 - coat_chance;
+#endif
     result.back = mirrored || is_again;
     result.direction = mirrored ? f.reflected : is_again ? again_direction(s.normal, choice) : f.bent;
     result.weight = (mirrored ? f.mirror : is_again ? f.again : f.window) / chance;
     float cosine = dot(result.direction, s.normal);
     if (is_again)
-        result.weight *= again_share(parts, cosine, alpha);
+        result.weight *= again_share(s, parts, result.direction, alpha);
     if (result.back && !(dot(result.direction, s.geometric) > 0.0)) {
         result.weight = rough ? vec3(0.0) : result.weight;
         result.direction = reflect(direction, s.geometric);
     }
-    float turned = facet_angle * square(facet_turn(s.inside ? 1.0 / s.ior : s.ior, mirrored));
+    float turned = facet_angle * square(turn_of(s, mirrored));
     result.solid_angle = is_again ? PI / max(cosine, 1e-3) : turned;
     return result;
 }
 
-// The reflectance of the lobes that send light back, from a direction (of light, unit) to the eye, per steradian, times
-// the cosine; and the density with which lobe_choose() sends a ray that way. Both are 0 where the surface is smooth, and
-// for glass seen from inside. Of light that is mirrored more than once, the density is a mean over the facets.
-vec3 lobe_mirrored(surface s, split parts, float NoV, vec3 view, vec3 light, out float density)
+// Of the surface below a coat, see lobe_mirrored(). The reflectance of the lobes that send light back, from a direction
+// (of light, unit) to the eye, per steradian, times the cosine; and the density with which lobe_choose() sends a ray
+// that way. Both are 0 where the surface is smooth, and for glass seen from inside. Of light that is mirrored more than
+// once, the density is a mean over the facets.
+vec3 lobe_mirrored_below(surface s, split parts, float NoV, vec3 view, vec3 light, out float density)
 {
     float NoL = dot(s.normal, light), alpha = square(s.roughness);
     density = 0.0;
-    if (alpha <= FACET_ALPHA_MIN || NoL <= 0.0 || dot(s.geometric, light) <= 0.0 || s.inside && s.transmission > 0.0)
+    if (alpha <= FACET_ALPHA_MIN || NoL <= 0.0 || dot(s.geometric, light) <= 0.0 || in_glass(s))
         return vec3(0.0);
     vec3 facet = normalize(view + light);
-    facet_lobes f = facet_lobes_of(s, parts, NoV, -view, facet, true);
+    float number = 0.5;
+    facet_lobes f = facet_lobes_of(s, parts, NoV, -view, facet, true, number);
     float VoH = clamp(dot(view, facet), 1e-4, 1.0), mirror_size = max_component(f.mirror);
-    float all_ = mirror_size + max_component(f.again) + max_component(f.window);
+    float all_ = mirror_size + max_component(f.again) + f.window_size;
     vec3 x, y;
     vec3 local_view = facet_frame(s, NoV, -view, x, y), local = vec3(dot(facet, x), dot(facet, y), dot(facet, s.normal));
     float mirrored = visible_facet_density(local, local_view, VoH, vec2(alpha)) / (4.0 * VoH);
     float again_size = max_component(parts.again), again_all = max_component(parts.mirror + parts.refracted) + again_size;
     density = mirror_size / max(all_, 1e-30) * mirrored + again_size / max(again_all, 1e-30) * NoL * INVERSE_PI;
-    return f.mirror * mirrored + parts.again * (again_share(parts, NoL, alpha) * NoL * INVERSE_PI);
+    return f.mirror * mirrored + parts.again * (again_share(s, parts, light, alpha) * NoL * INVERSE_PI);
+}
+
+// Whether a lobe of it is no single direction.
+bool facets_are_rough(surface s)
+{
+#ifdef HAS_CLEARCOAT
+    if (square(s.coat_roughness) > FACET_ALPHA_MIN)
+        return true;
+#endif
+    return square(s.roughness) > FACET_ALPHA_MIN;
+}
+
+// The same with the coat.
+vec3 lobe_mirrored(surface s, split parts, float NoV, vec3 view, vec3 light, out float density)
+{
+    vec3 sent = lobe_mirrored_below(s, parts, NoV, view, light, density);
+#ifdef HAS_CLEARCOAT
+    float alpha = square(s.coat_roughness), chance = coat_chance_of(parts);
+    density *= 1.0 - chance;
+    if (alpha > FACET_ALPHA_MIN && chance > 0.0 && dot(s.coat_normal, light) > 0.0) {
+        float cosine = coat_cosine(s, view), VoH = clamp(dot(view, normalize(view + light)), 1e-4, 1.0);
+        float highlight = coat_highlight(s, parts.coat, view, light, s.coat_roughness);
+        float lit = s.coat * fresnel_dielectric(VoH, COAT_IOR) * lit_share(cosine, dot(s.coat_normal, light), alpha);
+        sent += highlight;
+        density += chance * highlight / max(lit, 1e-7); // what is sent, by its weight
+    }
+#endif
+    return sent;
 }

@@ -8,10 +8,14 @@
 // textures of a material are sampled in one place, in a loop.
 //
 // Defines: HAS_TEXTURES some material has a texture; HAS_BUMP one of them is a bump map; HAS_SPECULAR the mirror of some
-// dielectric differs from what Fresnel's equations say; HAS_VOLUME some body of glass absorbs light; HAS_SPHERES;
+// dielectric differs from what Fresnel's equations say; HAS_VOLUME some body of glass absorbs light; HAS_CLEARCOAT some
+// surface is varnished; HAS_IRIDESCENCE some has a thin film; HAS_SHEEN some is cloth; HAS_DIFFUSE_TRANSMISSION some scatters
+// light to its other side; HAS_DISPERSION some glass splits colours; HAS_THIN_WALLS some has no body; HAS_ANISOTROPY_MAP some
+// grain is a texture; HAS_SPHERES;
 // HAS_SAMPLED the hits of the wave are stored samples, but for those of discs.
 
 #include "shared/hit.h"
+#include "common/cone.glsl"
 #include "common/sampled.glsl"
 #include "common/detail.glsl"
 
@@ -30,11 +34,70 @@ struct surface {
     vec3 specular_colour; // of a dielectric's mirror, seen from above
     float specular;       // its share
 #endif
+#ifdef HAS_CLEARCOAT
+    vec3 coat_normal;     // shading, of the varnish
+    float coat, coat_roughness;
+#endif
+#ifdef HAS_IRIDESCENCE
+    float film, film_ior, film_nm; // share and thickness of a thin film
+#endif
+#ifdef HAS_SHEEN
+    vec3 sheen;
+    float sheen_roughness;
+#endif
+#ifdef HAS_DIFFUSE_TRANSMISSION
+    vec3 diffuse_colour;  // of the light that is scattered to the other side
+    float diffuse_transmission;
+#endif
+#ifdef HAS_DISPERSION
+    float dispersion;     // 20 / Abbe number
+    vec3 carried;         // the weight of the path that sees it
+#endif
+#ifdef HAS_THIN_WALLS
+    bool thin;            // light goes straight on through it
+#endif
+#ifdef HAS_ANISOTROPY_MAP
+    vec3 grain;           // direction from the material's, and share of its strength
+#endif
     float curvature; // 1 / metre, above 0: it bulges towards the viewer; 0 if there are no textures to be filtered
     bool unlit;
     bool emission_seen_only;
     bool inside;    // seen from behind
 };
+
+bool is_thin(surface s)
+{
+#ifdef HAS_THIN_WALLS
+    return s.thin;
+#endif
+    return false;
+}
+
+// Whether it is glass, seen from inside of its body.
+bool in_glass(surface s)
+{
+    return s.inside && s.transmission > 0.0 && !is_thin(s);
+}
+
+// Index behind / index before, of what is refracted.
+float index_ratio(surface s)
+{
+    return is_thin(s) ? 1.0 : s.inside ? 1.0 / s.ior : s.ior;
+}
+
+// How far what is mirrored or refracted turns with the facet. The window of a thin wall spreads light as its mirror.
+float turn_of(surface s, bool mirrored)
+{
+    return facet_turn(index_ratio(s), mirrored || is_thin(s));
+}
+
+#ifdef HAS_DISPERSION
+// KHR_materials_dispersion: the indices of red, green and blue.
+vec3 channel_iors(surface s)
+{
+    return max(s.ior + (s.ior - 1.0) * 0.025 * s.dispersion * vec3(-1.0, 0.0, 1.0), 1.0);
+}
+#endif
 
 // What a ray's cone covers of a surface: on a slanted one it is longer in the plane of incidence. Akenine-Moeller et al.
 // 2021 (common/cone.glsl), section 5.
@@ -138,10 +201,31 @@ vec3 mapped_normal(hit h, vec3 normal, vec3 texel, float strength)
     return squared > 1e-8 ? mapped * inversesqrt(squared) : normal;
 }
 
+// How many inputs the features bring.
 #ifdef HAS_SPECULAR
-#define INPUTS 8
+#define INPUTS_SPECULAR 2
 #else
-#define INPUTS 6
+#define INPUTS_SPECULAR 0
+#endif
+#ifdef HAS_CLEARCOAT
+#define INPUTS_CLEARCOAT 3
+#else
+#define INPUTS_CLEARCOAT 0
+#endif
+#ifdef HAS_IRIDESCENCE
+#define INPUTS_IRIDESCENCE 2
+#else
+#define INPUTS_IRIDESCENCE 0
+#endif
+#ifdef HAS_SHEEN
+#define INPUTS_SHEEN 2
+#else
+#define INPUTS_SHEEN 0
+#endif
+#ifdef HAS_DIFFUSE_TRANSMISSION
+#define INPUTS_DIFFUSE 2
+#else
+#define INPUTS_DIFFUSE 0
 #endif
 
 // Replaces the inputs that have textures, normal and bump maps included.
@@ -149,15 +233,36 @@ void apply_textures(inout surface s, inout vec4 colour, hit h, material m, vec4 
                     texture_footprint footprint)
 {
     const int BASE_COLOUR = 0, NORMAL = 1, METALLIC_ROUGHNESS = 2, OCCLUSION = 3, EMISSION = 4, TRANSMISSION = 5,
-              SPECULAR = 6, SPECULAR_COLOUR = 7;
-    uint uses[INPUTS] = uint[INPUTS](m.texture_base_colour, m.texture_normal, m.texture_metallic_roughness,
-                                     m.texture_occlusion, m.texture_emission, m.texture_transmission
+              SPECULAR = 6, SPECULAR_COLOUR = 7, COAT = SPECULAR + INPUTS_SPECULAR, COAT_ROUGHNESS = COAT + 1,
+              COAT_NORMAL = COAT + 2, FILM = COAT + INPUTS_CLEARCOAT, FILM_THICKNESS = FILM + 1,
+              SHEEN = FILM + INPUTS_IRIDESCENCE, SHEEN_ROUGHNESS = SHEEN + 1, DIFFUSE = SHEEN + INPUTS_SHEEN,
+              DIFFUSE_COLOUR = DIFFUSE + 1, GRAIN = DIFFUSE + INPUTS_DIFFUSE;
+    uint uses[] = uint[](m.texture_base_colour, m.texture_normal, m.texture_metallic_roughness, m.texture_occlusion,
+                         m.texture_emission, m.texture_transmission
 #ifdef HAS_SPECULAR
-                                     , m.texture_specular, m.texture_specular_colour
+                         , m.texture_specular, m.texture_specular_colour
+#endif
+#ifdef HAS_CLEARCOAT
+                         , m.texture_clearcoat, m.texture_clearcoat_roughness, m.texture_clearcoat_normal
+#endif
+#ifdef HAS_IRIDESCENCE
+                         , m.texture_iridescence, m.texture_iridescence_thickness
+#endif
+#ifdef HAS_SHEEN
+                         , m.texture_sheen, m.texture_sheen_roughness
+#endif
+#ifdef HAS_DIFFUSE_TRANSMISSION
+                         , m.texture_diffuse_transmission, m.texture_diffuse_transmission_colour
+#endif
+#ifdef HAS_ANISOTROPY_MAP
+                         , m.texture_anisotropy
 #endif
     );
     uint used = 0u;
-    for (int i = 0; i < INPUTS; i++)
+#ifdef HAS_CLEARCOAT
+    vec3 unmapped = s.normal;
+#endif
+    for (int i = 0; i < uses.length(); i++)
         used |= uses[i] != 0u ? 1u << i : 0u;
     while (used != 0u) { // not a loop over all: software GL would sample for the missing ones, too
         int i = findLSB(used);
@@ -182,6 +287,37 @@ void apply_textures(inout surface s, inout vec4 colour, hit h, material m, vec4 
         } else if (i == SPECULAR_COLOUR) {
             s.specular_colour *= texel.rgb;
 #endif
+#ifdef HAS_CLEARCOAT
+        } else if (i == COAT) {
+            s.coat *= texel.r;
+        } else if (i == COAT_ROUGHNESS) {
+            s.coat_roughness *= texel.g;
+        } else if (i == COAT_NORMAL) {
+            if ((h.material & HIT_HAS_TANGENT) != 0u)
+                s.coat_normal = mapped_normal(h, unmapped, texel.xyz, slot.strength);
+#endif
+#ifdef HAS_IRIDESCENCE
+        } else if (i == FILM) {
+            s.film *= texel.r;
+        } else if (i == FILM_THICKNESS) {
+            s.film_nm = mix(m.iridescence_minimum, m.iridescence_maximum, texel.g);
+#endif
+#ifdef HAS_SHEEN
+        } else if (i == SHEEN) {
+            s.sheen *= texel.rgb;
+        } else if (i == SHEEN_ROUGHNESS) {
+            s.sheen_roughness *= texel.a;
+#endif
+#ifdef HAS_DIFFUSE_TRANSMISSION
+        } else if (i == DIFFUSE) {
+            s.diffuse_transmission *= texel.a;
+        } else if (i == DIFFUSE_COLOUR) {
+            s.diffuse_colour *= texel.rgb;
+#endif
+#ifdef HAS_ANISOTROPY_MAP
+        } else if (i == GRAIN) {
+            s.grain = vec3(texel.rg * 2.0 - 1.0, texel.b);
+#endif
         } else {
             s.transmission *= texel.r;
         }
@@ -195,7 +331,7 @@ void apply_textures(inout surface s, inout vec4 colour, hit h, material m, vec4 
 
 #ifdef HAS_SAMPLED
 // The sample's values of textures and vertex colours, in their place.
-void apply_sample(inout surface s, inout vec4 colour, uvec4 words)
+void apply_sample(inout surface s, inout vec4 colour, material m, uvec4 words)
 {
     surface_sample stored = unpack_sample(words);
     colour *= stored.base_colour;
@@ -204,6 +340,10 @@ void apply_sample(inout surface s, inout vec4 colour, uvec4 words)
     s.transmission *= stored.transmission;
     s.occlusion = stored.occlusion;
     s.emission *= stored.emission;
+#ifdef HAS_SPECULAR
+    if (m.texture_specular_colour != 0u) // which is not stored, and its factor says nothing without it
+        s.specular_colour = vec3(1.0);
+#endif
 }
 #endif
 
@@ -232,13 +372,41 @@ surface surface_at(hit h, vec3 origin, vec3 direction, float width)
     s.specular_colour = vec3(m.specular_red, m.specular_green, m.specular_blue);
     s.specular = m.specular;
 #endif
+#ifdef HAS_CLEARCOAT
+    s.coat_normal = s.normal;
+    s.coat = m.clearcoat;
+    s.coat_roughness = m.clearcoat_roughness;
+#endif
+#ifdef HAS_IRIDESCENCE
+    s.film = m.iridescence;
+    s.film_ior = m.iridescence_ior;
+    s.film_nm = m.iridescence_maximum;
+#endif
+#ifdef HAS_SHEEN
+    s.sheen = vec3(m.sheen_red, m.sheen_green, m.sheen_blue);
+    s.sheen_roughness = m.sheen_roughness;
+#endif
+#ifdef HAS_DIFFUSE_TRANSMISSION
+    s.diffuse_colour = vec3(m.diffuse_red, m.diffuse_green, m.diffuse_blue);
+    s.diffuse_transmission = m.diffuse_transmission;
+#endif
+#ifdef HAS_DISPERSION
+    s.dispersion = m.dispersion;
+    s.carried = vec3(1.0);
+#endif
+#ifdef HAS_THIN_WALLS
+    s.thin = (m.flags & MATERIAL_THIN_WALLED) != 0u;
+#endif
+#ifdef HAS_ANISOTROPY_MAP
+    s.grain = vec3(1.0, 0.0, 1.0);
+#endif
     vec4 colour = m.base_colour * unpackUnorm4x8(h.colour);
     bool is_stored = false;
     s.curvature = 0.0;
 #ifdef HAS_SAMPLED
     is_stored = (h.material & HIT_SAMPLED) != 0u;
     if (is_stored)
-        apply_sample(s, colour, h.uv01_or_sample);
+        apply_sample(s, colour, m, h.uv01_or_sample);
 #endif
 #ifdef HAS_TEXTURES
     surface_detail detail = detail_at(h, footprint_edges(s.geometric, direction, width));
@@ -251,6 +419,17 @@ surface surface_at(hit h, vec3 origin, vec3 direction, float width)
     if (s.inside) {
         s.geometric = -s.geometric;
         s.normal = -s.normal;
+#ifdef HAS_CLEARCOAT
+        s.coat_normal = -s.coat_normal;
+#endif
+    }
+    if (in_glass(s)) { // where there is neither
+#ifdef HAS_SHEEN
+        s.sheen = vec3(0.0);
+#endif
+#ifdef HAS_DIFFUSE_TRANSMISSION
+        s.diffuse_transmission = 0.0;
+#endif
     }
     return s;
 }

@@ -144,3 +144,11 @@ vec3 offset_ray_origin(vec3 point, vec3 normal)
     vec3 moved = intBitsToFloat(floatBitsToInt(point) + mix(steps, -steps, lessThan(point, vec3(0.0))));
     return mix(moved, point + float_scale * normal, lessThan(abs(point), vec3(near_origin)));
 }
+
+// Whether a share of the cases is meant, by a number that comes back stretched to [0, 1) again.
+bool is_in(float share, inout float number)
+{
+    bool in_ = number < share;
+    number = min(in_ ? number / share : (number - share) / (1.0 - share), 0.99999994);
+    return in_;
+}

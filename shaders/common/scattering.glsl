@@ -13,35 +13,120 @@
 
 #include "shared/material.h"
 #include "common/brdf.glsl"
+#include "common/coat.glsl"
 #include "common/facet_albedo.glsl"
+#include "common/film.glsl"
 #include "common/material.glsl"
+#include "common/sheen.glsl"
 
 // Roughness at which the mirror ray begins to fade; at MIRROR_ROUGHNESS_GONE it is gone.
 const float MIRROR_ROUGHNESS_SHARP = 0.1;
 
-// What a dielectric does with light from outside: SHARE is a colour if some mirror has one.
-#ifdef HAS_SPECULAR
-#define SHARE vec3
-
-// KHR_materials_specular: Fresnel's curve from its value at normal incidence up to 1 begins at another one, of a colour,
-// and all of it is less. `exact`: what the equations say that facets mirror; `all_`: what they would if they mirrored
-// all light. As the change is the same line at every angle, it holds for means over facets and angles, too.
-vec3 outside_mirror(surface s, float exact, float all_)
+float mirror_ray_share(float roughness)
 {
+    return 1.0 - smoothstep(MIRROR_ROUGHNESS_SHARP, MIRROR_ROUGHNESS_GONE, roughness);
+}
+
+// What a dielectric does with light from outside: SHARE is a colour if some mirror has one.
+#if defined(HAS_SPECULAR) || defined(HAS_IRIDESCENCE) || defined(HAS_DISPERSION)
+#define SHARE vec3
+#else
+#define SHARE float
+#endif
+
+// `exact`: what the equations say that facets mirror; `all_`: what they would if they mirrored all light.
+SHARE without_film(surface s, float exact, float all_)
+{
+#ifdef HAS_SPECULAR
+    // KHR_materials_specular: Fresnel's curve from its value at normal incidence up to 1 begins at another one, of a
+    // colour, and all of it is less. As the change is the same line at every angle, it holds for means over facets and
+    // angles, too.
     float f0 = square((s.ior - 1.0) / (s.ior + 1.0));
     vec3 begins = min(f0 * s.specular_colour, 1.0);
     return s.specular * (begins * all_ + (1.0 - begins) * max((exact - f0 * all_) / (1.0 - f0), 0.0));
-}
 #else
-#define SHARE float
-
-float outside_mirror(surface s, float exact, float all_)
-{
-    return exact;
-}
+    return SHARE(exact);
 #endif
+}
 
-// How a surface splits the light along the view.
+// What a facet of a dielectric mirrors of light from outside, or facets of which it is the mean one.
+SHARE outside_mirror(surface s, float cosine, float exact, float all_)
+{
+    SHARE mirrored = without_film(s, exact, all_);
+#ifdef HAS_IRIDESCENCE
+    mirrored = mix(mirrored, film_of(s, cosine) * all_, s.film);
+#endif
+    return mirrored;
+}
+
+// What facets mirror at the first go. `mean`: facets_cosine().
+SHARE facets_outside_mirror(surface s, float mean, float loss, float alpha)
+{
+    float cosine = facets_dielectric_cosine(mean, alpha, s.ior), all_ = 1.0 - loss;
+    float exact = fresnel_dielectric(cosine, s.ior) * all_;
+    // A film's curve bends more, so facets at the horizon count for more; found by trial, so that no light is made.
+    return outside_mirror(s, cosine * (1.0 - 0.3 * alpha * (1.0 - mean)), exact, all_);
+}
+
+// What a facet of a metal mirrors.
+vec3 metal_mirror(surface s, float cosine)
+{
+    vec3 mirrored = fresnel_schlick(s.base, cosine);
+#ifdef HAS_IRIDESCENCE
+    mirrored = mix(mirrored, film_of(s, cosine), s.film);
+#endif
+    return mirrored;
+}
+
+// The direction of what a facet refracts; 0: it is totally reflected. In a thin wall facets of both sides bend it: it is
+// the mirrored direction on the other side (KHR_materials_transmission).
+vec3 bent_direction(surface s, float eta, vec3 direction, vec3 facet, vec3 normal)
+{
+#ifdef HAS_THIN_WALLS
+    if (is_thin(s)) {
+        vec3 mirrored = reflect(direction, facet);
+        float height = dot(mirrored, normal);
+        return mirrored - (height + abs(height)) * normal;
+    }
+#endif
+    return refract(direction, facet, 1.0 / eta);
+}
+
+// The share that a boundary mirrors of light from inside of glass.
+SHARE inside_mirror(surface s, float cosine)
+{
+#ifdef HAS_DISPERSION
+    vec3 ior = channel_iors(s);
+    return vec3(fresnel_dielectric(cosine, 1.0 / ior.r), fresnel_dielectric(cosine, 1.0 / ior.g),
+                fresnel_dielectric(cosine, 1.0 / ior.b));
+#else
+    return SHARE(fresnel_dielectric(cosine, 1.0 / s.ior));
+#endif
+}
+
+// Glass that disperses sends on one colour of what it lets through, bent as that one is, with a chance in proportion to
+// what the path would bring of it. `number` chooses it and comes back stretched; `window` becomes its share by its chance.
+// Returns the index behind / before.
+float disperse(surface s, inout float number, inout vec3 window)
+{
+    float eta = index_ratio(s);
+#ifdef HAS_DISPERSION
+    vec3 sizes = window * s.carried, iors = channel_iors(s);
+    float all_ = sizes.r + sizes.g + sizes.b;
+    if (s.dispersion <= 0.0 || is_thin(s) || !(all_ > 0.0))
+        return eta;
+    int chosen = number * all_ < sizes.r ? 0 : number * all_ < sizes.r + sizes.g ? 1 : 2;
+    float before = chosen == 0 ? 0.0 : chosen == 1 ? sizes.r : sizes.r + sizes.g;
+    float chance = sizes[chosen] / all_, kept = window[chosen] / chance;
+    number = clamp((number - before / all_) / chance, 0.0, 0.99999994);
+    window = vec3(0.0);
+    window[chosen] = kept;
+    eta = s.inside ? 1.0 / iors[chosen] : iors[chosen];
+#endif
+    return eta;
+}
+
+// How a surface splits the light along the view; below a coat: what gets through it.
 struct split {
     vec3 mirror;       // reflectance of the facets at the first go
     vec3 again;        // what they mirror more than once
@@ -50,51 +135,219 @@ struct split {
     SHARE dielectric;  // share that does not enter
     float mirror_ray;  // share of `mirror` that the mirror ray carries; the rest is blurred
     float again_mean;  // facets_lost_mean()
+    vec3 again_colour; // metal_again()
     SHARE enters_mean; // share of the light from all around that enters
+#ifdef HAS_SHEEN
+    vec3 sheen;          // what fibres send of the light from all around
+    float beneath;       // share of the light along the view that they leave to the rest
+    float beneath_mean;  // and of that from all around
+#endif
+#ifdef HAS_DIFFUSE_TRANSMISSION
+    vec3 passed; // what is scattered to the other side
+#endif
+    coating coat;
 };
 
-// `loss`: facets_lost() of the view.
-split split_facets(surface s, float NoV, float alpha, float loss)
+// What lies over the surface: fibres, and a coat over these. The share of light that they let through along the view; to be
+// mirrored from a direction; and to be scattered from one and back to the view, less that along the view.
+#ifdef HAS_SHEEN
+float sheen_leaves(surface s, vec3 direction)
 {
-    bool leaves = s.inside && s.transmission > 0.0;
+    return 1.0 - max_component(s.sheen) * sheen_albedo(max(dot(s.normal, direction), 0.0), s.sheen_roughness);
+}
+
+float over_view(split parts)
+{
+    return parts.beneath * parts.coat.passes;
+}
+
+float over_mirrored(surface s, split parts, vec3 light)
+{
+    return min(parts.beneath, sheen_leaves(s, light)) * coat_over_mirrored(parts.coat, s, light);
+}
+
+float over_scattered(surface s, split parts, vec3 light)
+{
+    return sheen_leaves(s, light) / parts.beneath_mean * coat_over_scattered(parts.coat, s, light);
+}
+
+// What fibres send from a direction, per steradian, and of the light from all around.
+vec3 sheen_sent(surface s, split parts, vec3 view, float NoV, vec3 light)
+{
+    float NoH = dot(s.normal, normalize(view + light)), NoL = dot(s.normal, light);
+    return s.sheen * (sheen_reflectance(s.sheen_roughness, NoH, NoV, NoL) * parts.coat.passes *
+                      coat_over_scattered(parts.coat, s, light));
+}
+
+vec3 sheen_of(split parts)
+{
+    return parts.sheen;
+}
+#else
+float over_view(split parts)
+{
+    return parts.coat.passes;
+}
+
+float over_mirrored(surface s, split parts, vec3 light)
+{
+    return coat_over_mirrored(parts.coat, s, light);
+}
+
+float over_scattered(surface s, split parts, vec3 light)
+{
+    return coat_over_scattered(parts.coat, s, light);
+}
+
+vec3 sheen_sent(surface s, split parts, vec3 view, float NoV, vec3 light)
+{
+    return vec3(0.0);
+}
+
+vec3 sheen_of(split parts)
+{
+    return vec3(0.0);
+}
+#endif
+
+// KHR_materials_diffuse_transmission: of what is scattered a share leaves at the other side, as if it had entered there.
+#ifdef HAS_DIFFUSE_TRANSMISSION
+void scatter_to_other_side(surface s, SHARE entered, inout split parts)
+{
+    parts.scattered *= 1.0 - s.diffuse_transmission;
+    parts.passed = s.diffuse_colour * (entered * s.diffuse_transmission);
+}
+
+vec3 passed_of(split parts)
+{
+    return parts.passed;
+}
+
+// Of what is scattered, the share that goes to the other side: the chance of asking for light there.
+float passed_share(split parts)
+{
+    float size = max_component(parts.passed);
+    return size / max(size + max_component(parts.scattered + parts.again + sheen_of(parts)), 1e-30);
+}
+#else
+void scatter_to_other_side(surface s, SHARE entered, inout split parts) {}
+
+vec3 passed_of(split parts)
+{
+    return vec3(0.0);
+}
+
+float passed_share(split parts)
+{
+    return 0.0;
+}
+#endif
+
+// Which side of the surface to ask for light, by a number that comes back stretched to [0, 1) again, with the chance of it:
+// -1 behind it.
+float side_choose(split parts, inout float number, out float chance)
+{
+    chance = 1.0;
+#ifdef HAS_DIFFUSE_TRANSMISSION
+    float share = passed_share(parts);
+    bool behind = is_in(share, number);
+    chance = behind ? share : 1.0 - share;
+    return behind ? -1.0 : 1.0;
+#endif
+    return 1.0;
+}
+
+// Of a direction that another technique sampled.
+float side_chance(split parts, float cosine)
+{
+#ifdef HAS_DIFFUSE_TRANSMISSION
+    float share = passed_share(parts);
+    return cosine < 0.0 ? share : 1.0 - share;
+#endif
+    return 1.0;
+}
+
+void put_below(surface s, vec3 view, float NoV, inout split parts)
+{
+    parts.coat = coating_of(s, view);
+#ifdef HAS_SHEEN
+    parts.sheen = s.sheen * (sheen_albedo(NoV, s.sheen_roughness) * parts.coat.passes);
+    parts.beneath = 1.0 - max_component(s.sheen) * sheen_albedo(NoV, s.sheen_roughness);
+    parts.beneath_mean = 1.0 - max_component(s.sheen) * sheen_albedo_mean(s.sheen_roughness);
+#endif
+    parts.mirror *= over_view(parts);
+    parts.again *= over_view(parts);
+    parts.scattered *= over_view(parts);
+    parts.refracted *= over_view(parts);
+#ifdef HAS_DIFFUSE_TRANSMISSION
+    parts.passed *= over_view(parts);
+#endif
+}
+
+// `loss`: facets_lost() of the view, whose cosine is NoV.
+split split_facets(surface s, vec3 view, float NoV, float alpha, float loss)
+{
+    bool leaves = in_glass(s);
     float mean = facets_cosine(NoV, alpha);
     split result;
     // From inside of one direction: total reflection begins at an angle.
-    result.dielectric = leaves ? SHARE(fresnel_dielectric(NoV, 1.0 / s.ior))
-                               : outside_mirror(s, facets_dielectric(mean, loss, alpha, s.ior), 1.0 - loss);
+    result.dielectric = leaves ? inside_mirror(s, NoV) : facets_outside_mirror(s, mean, loss, alpha);
     result.again_mean = facets_lost_mean(alpha);
-    SHARE mirrored_mean = outside_mirror(s, facets_dielectric_mean(alpha, s.ior), 1.0 - result.again_mean);
+    SHARE mirrored_mean = without_film(s, facets_dielectric_mean(alpha, s.ior), 1.0 - result.again_mean);
+    vec3 metal_mean = fresnel_schlick_mean(s.base);
+#ifdef HAS_IRIDESCENCE
+    vec3 film_mean = film_mean_of(s);
+    mirrored_mean = mix(mirrored_mean, film_mean * (1.0 - result.again_mean), s.film);
+    metal_mean = mix(metal_mean, film_mean, s.film);
+#endif
     result.enters_mean = max(1.0 - mirrored_mean, SHARE(1e-6));
-    result.mirror = mix(vec3(result.dielectric), fresnel_schlick(s.base, mean) * (1.0 - loss), s.metallic);
-    result.again = metal_again(s.base, result.again_mean) * (loss * s.metallic);
-    SHARE enters = (1.0 - result.dielectric) * (1.0 - s.metallic);
-    result.scattered = s.base * (enters * (1.0 - s.transmission));
+    result.mirror = mix(vec3(result.dielectric), metal_mirror(s, mean) * (1.0 - loss), s.metallic);
+    result.again_colour = metal_again(metal_mean, result.again_mean);
+    result.again = result.again_colour * (loss * s.metallic);
+    SHARE enters = (1.0 - result.dielectric) * (1.0 - s.metallic), entered = enters * (1.0 - s.transmission);
+    result.scattered = s.base * entered;
     // Glass is tinted once, where light enters it.
     result.refracted = (leaves ? vec3(1.0) : s.base) * (enters * s.transmission);
-    float blurred = smoothstep(MIRROR_ROUGHNESS_SHARP, MIRROR_ROUGHNESS_GONE, s.roughness);
-    result.mirror_ray = leaves ? 1.0 : 1.0 - blurred;
+    result.mirror_ray = leaves ? 1.0 : mirror_ray_share(s.roughness);
+    scatter_to_other_side(s, entered, result);
+    put_below(s, view, NoV, result);
     return result;
 }
 
-split split_light(surface s, float NoV)
+split split_light(surface s, vec3 view, float NoV)
 {
     float alpha = square(s.roughness);
-    return split_facets(s, NoV, alpha, facets_lost(stretched_cosine(NoV, alpha), alpha));
+    return split_facets(s, view, NoV, alpha, facets_lost(stretched_cosine(NoV, alpha), alpha));
 }
 
-// What goes to the eye of the light from a direction that enters, per steradian. `loss`: facets_lost() of that direction;
-// reciprocal, as `parts` have the same factors for the view. Shirley et al. A Practitioners' Assessment of Light
-// Reflection Models. 1997.
+// How much of the light from a direction enters, by that of the light from all around, per steradian. `loss`: facets_lost()
+// of that direction; what is scattered is reciprocal, as `parts` have the same factors for the view. Shirley et al. A
+// Practitioners' Assessment of Light Reflection Models. 1997.
+SHARE spread_entered(surface s, split parts, float NoL, float alpha, float loss)
+{
+    SHARE enters = 1.0 - facets_outside_mirror(s, facets_cosine(NoL, alpha), loss, alpha);
+    return enters / parts.enters_mean * INVERSE_PI;
+}
+
 vec3 spread_scattered(surface s, split parts, float NoL, float alpha, float loss)
 {
-    SHARE enters = 1.0 - outside_mirror(s, facets_dielectric(facets_cosine(NoL, alpha), loss, alpha, s.ior), 1.0 - loss);
-    return parts.scattered * (enters / parts.enters_mean * INVERSE_PI);
+    return parts.scattered * spread_entered(s, parts, NoL, alpha, loss);
 }
 
 // What enters or is mirrored again. Kulla, Conty 2017.
 vec3 spread_out(surface s, split parts, float NoL, float alpha, float loss)
 {
     return spread_scattered(s, parts, NoL, alpha, loss) + parts.again * (loss / max(parts.again_mean, 1e-9) * INVERSE_PI);
+}
+
+// The share of the light that a coat's mirror ray carries.
+float coat_ray_of(surface s, split parts)
+{
+#ifdef HAS_CLEARCOAT
+    return parts.coat.mirrors * mirror_ray_share(s.coat_roughness);
+#else
+    return 0.0;
+#endif
 }
 
 // The mirrored direction; about the geometric normal where the shading normal would send it into the surface.
@@ -104,16 +357,30 @@ vec3 mirror_direction(surface s, vec3 direction)
     return dot(mirrored, s.geometric) > 0.0 ? mirrored : reflect(direction, s.geometric);
 }
 
-// Of brdf() what is scattered, not mirrored, be it once or again; NoL > 0.
-vec3 brdf_scattered(surface s, split parts, float NoL)
+// Of brdf() what is scattered from the other side.
+vec3 brdf_passed(surface s, split parts, vec3 light)
 {
-    float alpha = square(s.roughness);
-    return spread_scattered(s, parts, NoL, alpha, facets_lost(stretched_cosine(NoL, alpha), alpha));
+    float NoL = -dot(s.normal, light), alpha = square(s.roughness);
+    if (NoL <= 0.0 || dot(s.geometric, light) >= 0.0)
+        return vec3(0.0);
+    return passed_of(parts) * spread_entered(s, parts, NoL, alpha, facets_lost(stretched_cosine(NoL, alpha), alpha)) *
+           over_scattered(s, parts, -light);
 }
 
-// Share of the irradiance from a direction (of a light, unit) that goes to the eye, per steradian; without the cosine.
-// 0 from below the horizon, and for glass seen from inside, where no light is sampled. Reciprocal. `parts`: of the same
-// surface and NoV.
+// Of brdf() what is scattered, by fibres too, and not mirrored, be it once or again.
+vec3 brdf_scattered(surface s, split parts, vec3 view, float NoV, vec3 light)
+{
+    float alpha = square(s.roughness), NoL = dot(s.normal, light);
+    if (NoL <= 0.0 || dot(s.geometric, light) <= 0.0)
+        return brdf_passed(s, parts, light);
+    return spread_scattered(s, parts, NoL, alpha, facets_lost(stretched_cosine(NoL, alpha), alpha)) *
+               over_scattered(s, parts, light) +
+           sheen_sent(s, parts, view, NoV, light);
+}
+
+// Share of the irradiance from a direction (of a light, unit) that goes to the eye, per steradian; without the cosine,
+// and without what a coat mirrors. From below the horizon only what is scattered to the other side, and 0 for glass seen
+// from inside, where no light is sampled. Reciprocal. `parts`: of the same surface and NoV.
 //
 // What is mirrored: Cook and Torrance 1982 with GGX. (1 - F) of the half-way vector alone, as often seen for scattered
 // light, would give out up to 1.7 of what arrives at grazing angles.
@@ -121,12 +388,23 @@ vec3 brdf(surface s, split parts, vec3 view, float NoV, vec3 light)
 {
     float NoL = dot(s.normal, light);
     if (NoL <= 0.0 || dot(s.geometric, light) <= 0.0)
-        return vec3(0.0);
+        return brdf_passed(s, parts, light);
     vec3 half_way = normalize(view + light), across = cross(s.normal, half_way);
     float NoH = clamp(dot(s.normal, half_way), 0.0, 1.0), VoH = clamp(dot(view, half_way), 0.0, 1.0);
-    vec3 mirror = mix(vec3(outside_mirror(s, fresnel_dielectric(VoH, s.ior), 1.0)), fresnel_schlick(s.base, VoH), s.metallic);
+    vec3 mirror = mix(vec3(outside_mirror(s, VoH, fresnel_dielectric(VoH, s.ior), 1.0)), metal_mirror(s, VoH), s.metallic);
     float wide = square(max(s.roughness, ROUGHNESS_MIN_LIGHT)), alpha = square(s.roughness);
     vec3 specular = mirror * (D_GGX(NoH, dot(across, across), wide) * V_SmithGGXCorrelated(NoV, NoL, wide));
     float loss = facets_lost(stretched_cosine(NoL, alpha), alpha);
-    return spread_out(s, parts, NoL, alpha, loss) + specular;
+    return spread_out(s, parts, NoL, alpha, loss) * over_scattered(s, parts, light) +
+           specular * over_mirrored(s, parts, light) + sheen_sent(s, parts, view, NoV, light);
+}
+
+// The same of all that is there, times the cosine.
+vec3 reflected(surface s, split parts, vec3 view, float NoV, vec3 light)
+{
+    vec3 sent = brdf(s, parts, view, NoV, light) * abs(dot(s.normal, light));
+#ifdef HAS_CLEARCOAT
+    sent += coat_highlight(s, parts.coat, view, light, max(s.coat_roughness, ROUGHNESS_MIN_LIGHT));
+#endif
+    return sent;
 }

@@ -21,6 +21,9 @@ vec2 light_of_lights(surface s, split parts, vec3 view, float NoV)
 {
     vec2 sum = vec2(0.0);
     parts.scattered = vec3(0.0);
+#ifdef HAS_SHEEN
+    s.sheen = vec3(0.0);
+#endif
     for (uint i = 0u; i < frame.light_count; i++) {
         light_sample sampled = light_sample_at(i, s.position, vec2(0.5));
         vec3 irradiance = sampled.irradiance * max(dot(s.normal, sampled.direction), 0.0);
@@ -35,12 +38,14 @@ float sticking_of(surface s, vec3 direction)
     if (s.unlit)
         return 1.0 - s.alpha;
     float NoV = clamp(-dot(s.normal, direction), 1e-4, 1.0); // a shading normal may lean away
-    split parts = split_light(s, NoV);
-    vec2 lit = s.inside && s.transmission > 0.0 ? vec2(0.0) : light_of_lights(s, parts, -direction, NoV);
+    split parts = split_light(s, -direction, NoV);
+    vec2 lit = in_glass(s) ? vec2(0.0) : light_of_lights(s, parts, -direction, NoV);
     float around = lit.y + luminance(environment_irradiance(s.normal));
     around = around > 0.0 ? around : 1.0;
     float mirrored = around * luminance(parts.mirror) + lit.x, refracted = around * luminance(parts.refracted);
-    float all = mirrored + refracted + around * luminance(parts.scattered) + luminance(s.emission);
-    float sticks = parts.mirror_ray * mirrored + refracted;
+    float coat = around * coat_ray_of(s, parts);
+    float scattered = around * luminance(parts.scattered + sheen_of(parts) + passed_of(parts));
+    float all = mirrored + refracted + scattered + luminance(s.emission) + coat;
+    float sticks = parts.mirror_ray * mirrored + refracted + coat;
     return 1.0 - s.alpha * (1.0 - (all > 0.0 ? min(sticks / all, 1.0) : 0.0)); // also if it is NaN
 }

@@ -71,12 +71,10 @@ bool triangle_tangent(uvec4 triangle, vec3 corners[3], geometry g, float time, v
         tangent_object = vec4(sum, handedness);
         return handedness != 0.0 && dot(sum, sum) > 0.0;
     }
-    material m = material_at(triangle.w & HIT_MATERIAL_MASK);
-    uint slot_index = m.texture_normal != 0u ? m.texture_normal : m.texture_bump;
-    if (slot_index == 0u && m.anisotropy == 0.0 || (g.flags & (GEOMETRY_HAS_TEXCOORDS_0 | GEOMETRY_HAS_TEXCOORDS_1)) == 0u)
+    uint flags = material_at(triangle.w & HIT_MATERIAL_MASK).flags;
+    if ((flags & MATERIAL_TANGENT) == 0u || (g.flags & (GEOMETRY_HAS_TEXCOORDS_0 | GEOMETRY_HAS_TEXCOORDS_1)) == 0u)
         return false;
-    bool second = slot_index != 0u && (texture_slot_at(slot_index).texture & 0x80000000u) != 0u;
-    return texture_tangent(triangle, corners, second, normal_object, tangent_object);
+    return texture_tangent(triangle, corners, (flags & MATERIAL_TANGENT_SECOND) != 0u, normal_object, tangent_object);
 #endif
 }
 

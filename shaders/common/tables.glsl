@@ -67,6 +67,51 @@ material material_at(uint index)
     m.absorbs_green = absorbs.y;
     m.absorbs_blue = absorbs.z;
 #endif
+#ifdef HAS_ANISOTROPY_MAP
+    m.texture_anisotropy = texelFetch(tables, texel + 8).w;
+#endif
+#ifdef HAS_CLEARCOAT
+    uvec4 coat = texelFetch(tables, texel + 9);
+    m.clearcoat = uintBitsToFloat(coat.x);
+    m.clearcoat_roughness = uintBitsToFloat(coat.y);
+    m.texture_clearcoat = coat.z;
+    m.texture_clearcoat_roughness = coat.w;
+#endif
+#if defined(HAS_CLEARCOAT) || defined(HAS_IRIDESCENCE) || defined(HAS_DISPERSION)
+    uvec4 several = texelFetch(tables, texel + 10);
+    m.texture_clearcoat_normal = several.x;
+    m.texture_iridescence = several.y;
+    m.texture_iridescence_thickness = several.z;
+    m.dispersion = uintBitsToFloat(several.w);
+#endif
+#ifdef HAS_IRIDESCENCE
+    vec4 film = uintBitsToFloat(texelFetch(tables, texel + 11));
+    m.iridescence = film.x;
+    m.iridescence_ior = film.y;
+    m.iridescence_minimum = film.z;
+    m.iridescence_maximum = film.w;
+#endif
+#ifdef HAS_SHEEN
+    vec4 sheen = uintBitsToFloat(texelFetch(tables, texel + 12));
+    m.sheen_red = sheen.x;
+    m.sheen_green = sheen.y;
+    m.sheen_blue = sheen.z;
+    m.sheen_roughness = sheen.w;
+#endif
+#if defined(HAS_SHEEN) || defined(HAS_DIFFUSE_TRANSMISSION)
+    uvec4 cloth = texelFetch(tables, texel + 13);
+    m.texture_sheen = cloth.x;
+    m.texture_sheen_roughness = cloth.y;
+    m.texture_diffuse_transmission = cloth.z;
+    m.texture_diffuse_transmission_colour = cloth.w;
+#endif
+#ifdef HAS_DIFFUSE_TRANSMISSION
+    vec4 diffuse = uintBitsToFloat(texelFetch(tables, texel + 14));
+    m.diffuse_red = diffuse.x;
+    m.diffuse_green = diffuse.y;
+    m.diffuse_blue = diffuse.z;
+    m.diffuse_transmission = diffuse.w;
+#endif
     return m;
 }
 

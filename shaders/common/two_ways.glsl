@@ -39,6 +39,16 @@ vec3 unpack_ray_normal(uint bits)
     return unit_from_octahedral(vec2(p) / PATH_NORMAL_MAX);
 }
 
+// Upper estimate of the light of the emitters. `behind`: chance of asking for those behind the surface.
+float emitters_around(vec3 position, vec3 normal, float behind)
+{
+    float estimate = emitter_estimate(position, unpack_ray_normal(pack_ray_normal(normal)));
+#ifdef HAS_DIFFUSE_TRANSMISSION
+    estimate = mix(estimate, emitter_estimate(position, unpack_ray_normal(pack_ray_normal(-normal))), behind);
+#endif
+    return estimate;
+}
+
 uint ratio_code(float chance, float found)
 {
     float steps = log2(max(chance, 1e-30) / found) * PATH_RATIO_STEPS + PATH_RATIO_ONE;

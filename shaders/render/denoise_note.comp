@@ -27,9 +27,10 @@ void main()
     if (h.distance >= 0.0) {
         ray r = ray_at(k);
         surface s = surface_of_path(path_at(k), h, r);
-        split parts = split_light(s, clamp(-dot(s.normal, r.direction_t_max.xyz), 1e-4, 1.0));
-        vec3 scattered = s.unlit ? s.base : parts.scattered;
-        vec3 clear_ = s.unlit ? vec3(0.0) : parts.mirror * parts.mirror_ray + parts.refracted;
+        vec3 view = -r.direction_t_max.xyz;
+        split parts = split_light(s, view, clamp(dot(s.normal, view), 1e-4, 1.0));
+        vec3 scattered = s.unlit ? s.base : parts.scattered + sheen_of(parts) + passed_of(parts);
+        vec3 clear_ = s.unlit ? vec3(0.0) : parts.mirror * parts.mirror_ray + parts.refracted + coat_ray_of(s, parts);
         float all = max_component(scattered + clear_);
         float share = all > 0.0 ? max_component(clear_) / all : 0.0;
         albedo = vec4(min(s.base + s.emission, vec3(1e6)), 1.0 - s.alpha * (1.0 - clamp(share, 0.0, 1.0)));

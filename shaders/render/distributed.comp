@@ -22,6 +22,7 @@
 #include "common/lobe.glsl"
 #include "common/two_ways.glsl"
 #include "render/fireflies.glsl"
+#include "render/light_seen.glsl"
 #include "render/shade.glsl"
 #include "render/wave.glsl"
 
@@ -79,12 +80,12 @@ void add_lobe(eye_hit e, lobe chosen, shadow_choice c, float choice)
     float survival = max_component(carried) / ROULETTE;
     if (!(choice < survival)) // also if it is NaN
         return;
-    uint roughness = uint(max(path_roughness(p), e.s.roughness) * 65535.0 + 0.5);
-    p.flags = path_sent_on(p.flags, e.s.roughness);
+    uint roughness = uint(max(path_roughness(p), chosen.roughness) * 65535.0 + 0.5);
+    p.flags = path_sent_on(p.flags, chosen.roughness);
     p.flags = p.flags & (1u << PATH_ROUGHNESS_SHIFT) - 1u | roughness << PATH_ROUGHNESS_SHIFT;
 #ifdef TWO_WAYS
     float found = 0.0;
-    if (chosen.back)
+    if (chosen.back && chosen.solid_angle > 0.0) // no shadow ray asks for what is smooth
         lobe_mirrored(e.s, e.parts, e.NoV, e.view, chosen.direction, found);
 #endif
 #ifdef HAS_EMITTERS
@@ -105,15 +106,18 @@ shadow_choice choose_shadow_ray(eye_hit e, vec2 u)
     float all_;
     c.light_number = light_choose(receiver, frame.light_count, c.u.x, c.light_chance, all_);
 #ifdef TWO_WAYS
-    bool mirrors = square(e.s.roughness) > FACET_ALPHA_MIN && last_wave == 0u &&
+    bool mirrors = facets_are_rough(e.s) && last_wave == 0u &&
                    (e.p.flags & PATH_BOUNCES_MASK) < frame.depth;
     float mirrored = mirrors ? max_component(e.parts.mirror + e.parts.again) : 0.0;
+#ifdef HAS_CLEARCOAT
+    mirrored += mirrors ? e.parts.coat.mirrors : 0.0;
+#endif
 #endif
 #ifdef HAS_EMITTERS
     c.ray_normal = pack_ray_normal(e.s.normal);
-    receiver.scattered = max_component(e.parts.scattered) * INVERSE_PI;
+    receiver.scattered = max_component(e.parts.scattered + sheen_of(e.parts) + passed_of(e.parts)) * INVERSE_PI;
     receiver.mirrored = mirrored * INVERSE_PI;
-    float estimate = emitter_estimate(e.origin, unpack_ray_normal(c.ray_normal));
+    float estimate = emitters_around(e.origin, e.s.normal, passed_share(e.parts));
     float both = receiver.scattered + receiver.mirrored;
     c.lights = both > 0.0 ? lights_share(receiver, all_, estimate) : 1.0;
     c.mirrored = both > 0.0 ? receiver.mirrored / both : 0.0;
@@ -127,31 +131,32 @@ shadow_choice choose_shadow_ray(eye_hit e, vec2 u)
     return c;
 }
 
-// Whether a share of the cases is meant, by a number that comes back stretched to [0, 1) again.
-bool is_in(float share, inout float number)
-{
-    bool in_ = number < share;
-    number = min(in_ ? number / share : (number - share) / (1.0 - share), 0.99999994);
-    return in_;
-}
-
 #ifdef HAS_EMITTERS
 bool ask_for_emitter(eye_hit e, shadow_choice c)
 {
     bool mirrored = is_in(c.mirrored, c.u.x);
     float chance = emitter_chance(c) * (mirrored ? c.mirrored : 1.0 - c.mirrored), found = 0.0;
-    emitter_sample sampled = emitter_sample_at(e.origin, unpack_ray_normal(c.ray_normal), c.u, e.p.time);
+    float side = 1.0, of_side = 1.0;
+    uint normal = c.ray_normal;
+#ifdef HAS_DIFFUSE_TRANSMISSION
+    if (!mirrored)
+        side = side_choose(e.parts, c.u.x, of_side);
+    chance *= of_side;
+    normal = pack_ray_normal(side * e.s.normal);
+#endif
+    vec3 from = origin_towards(e.s, e.origin, e.distance_, side * e.s.geometric);
+    emitter_sample sampled = emitter_sample_at(from, unpack_ray_normal(normal), c.u, e.p.time);
     float NoL = dot(e.s.normal, sampled.direction);
     vec3 sent = vec3(0.0);
     if (mirrored)
         sent = lobe_mirrored(e.s, e.parts, e.NoV, e.view, sampled.direction, found);
-    else if (NoL > 0.0 && dot(e.s.geometric, sampled.direction) > 0.0)
-        sent = brdf_scattered(e.s, e.parts, NoL) * NoL;
+    else if (side * NoL > 0.0) // the chance is of that side
+        sent = brdf_scattered(e.s, e.parts, e.view, e.NoV, sampled.direction) * abs(NoL);
     vec3 arriving = vec3(0.0);
     if (sampled.probability > 0.0)
         arriving = e.weight * sent * sampled.radiance * (emitter_share_asked(sampled, chance, found) /
                                                          (sampled.probability * chance));
-    return add_shadow_ray_from(e.j, e.p, e.origin, sampled.direction, mirrored ? RAY_STOPS_T_MIN : 0.0,
+    return add_shadow_ray_from(e.j, e.p, from, sampled.direction, mirrored ? RAY_STOPS_T_MIN : 0.0,
                                sampled.distance_, limited(e.p, 0u, arriving));
 }
 #endif
@@ -186,11 +191,11 @@ bool ask_for_light(eye_hit e, shadow_choice c)
         no_shadow_ray(e.j);
         return false;
     }
-    light_sample sampled = light_sample_at(c.light_number, e.origin, c.u);
-    float NoL = dot(e.s.normal, sampled.direction);
-    vec3 sent = brdf(e.blurred, e.blurred_parts, e.view, e.NoV, sampled.direction);
-    vec3 arriving = e.weight * (sent * sampled.irradiance * (NoL / probability));
-    return add_shadow_ray(e.j, e.p, e.origin, sampled.direction, sampled.distance_, limited(e.p, 0u, arriving));
+    vec3 from = e.origin;
+    light_sample sampled = light_seen(e.s, e.distance_, c.light_number, c.u, from);
+    vec3 sent = reflected(e.blurred, e.blurred_parts, e.view, e.NoV, sampled.direction);
+    vec3 arriving = e.weight * (sent * sampled.irradiance / probability);
+    return add_shadow_ray(e.j, e.p, from, sampled.direction, sampled.distance_, limited(e.p, 0u, arriving));
 }
 
 void main()
@@ -212,6 +217,9 @@ void main()
     uvec2 seed = path_seed(e.p);
     uint index = path_sample(e.p), dimension = SEQUENCE_WAVE + wave_number * SEQUENCE_WAVE_SIZE;
     e.s.roughness = regularised_roughness(e.p, e.s.roughness, index);
+#ifdef HAS_CLEARCOAT
+    e.s.coat_roughness = regularised_roughness(e.p, e.s.coat_roughness, index);
+#endif
     e.NoV = clamp(dot(e.s.normal, e.view), 1e-4, 1.0); // a shading normal may lean away
     float choice = sequence_number(seed, dimension + SEQUENCE_LOBE, index);
     vec3 sent = vec3(0.0);
@@ -231,18 +239,24 @@ void main()
         no_shadow_ray(j);
     } else {
         choice = min(choice / e.s.alpha, 0.99999994);
-        e.parts = split_light(e.s, e.NoV);
+        e.parts = split_light(e.s, e.view, e.NoV);
         e.origin = off_surface(e.s, h.distance, e.s.geometric);
         e.blurred = e.s;
-        e.blurred.roughness = max(e.s.roughness, shrunk_roughness(path_roughness(e.p), index));
-        e.blurred_parts = split_light(e.blurred, e.NoV);
-        bool asks = !(e.s.inside && e.s.transmission > 0.0);
+        float least = shrunk_roughness(path_roughness(e.p), index);
+        e.blurred.roughness = max(e.s.roughness, least);
+#ifdef HAS_CLEARCOAT
+        e.blurred.coat_roughness = max(e.s.coat_roughness, least);
+#endif
+        e.blurred_parts = split_light(e.blurred, e.view, e.NoV);
+        bool asks = !in_glass(e.s);
         shadow_choice c = shadow_choice(0.0, 1.0, 0.0, 0u, 0.0, vec2(0.0), 0u);
         if (asks)
             c = choose_shadow_ray(e, sequence_pair_sorted(seed, dimension + SEQUENCE_LIGHT, index, frame.group_shift));
         lobe chosen = lobe_choose(e.s, e.parts, e.NoV, direction, choice,
                                   sequence_pair(seed, dimension + SEQUENCE_LOBE_DIRECTION, index));
-        sent = e.s.emission + e.s.occlusion * chosen.scattered * environment_irradiance(e.s.normal);
+        vec3 ambient = (chosen.scattered + sheen_of(e.parts)) * environment_irradiance(e.s.normal);
+        ambient += passed_of(e.parts) * environment_irradiance(-e.s.normal);
+        sent = e.s.emission + e.s.occlusion * ambient;
         add_lobe(e, chosen, c, choice);
         if (asks)
             asked = ask_for_light(e, c);

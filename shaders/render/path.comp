@@ -30,6 +30,7 @@
 #include "common/light_choice.glsl"
 #include "common/two_ways.glsl"
 #include "render/fireflies.glsl"
+#include "render/light_seen.glsl"
 #include "render/shade.glsl"
 #include "render/wave.glsl"
 
@@ -55,8 +56,6 @@ struct eye_hit {
     float light_chance;
     vec2 light_u;
     float lights_chance; // of asking for a light, not for an emitter
-    vec3 emitter_normal; // with which emitters are chosen: `ray_normal` in the path of a child
-    uint ray_normal;
 };
 
 uint numbers_of(uint choice)
@@ -70,20 +69,23 @@ void choose_light(inout eye_hit e, uvec2 seed, uint index)
     e.light_number = light_choose(e.receiver, frame.light_count, e.light_u.x, e.light_chance, e.all_lights);
 #ifdef HAS_EMITTERS
     if (!e.last) // what emissive surfaces send is a bounce
-        e.lights_chance = lights_share(e.receiver, e.all_lights, emitter_estimate(e.origin, e.emitter_normal));
+        e.lights_chance = lights_share(e.receiver, e.all_lights,
+                                       emitters_around(e.origin, e.s.normal, passed_share(e.b.parts)));
 #endif
 }
 
 #ifdef HAS_EMITTERS
 bool ask_for_emitter(eye_hit e, uint place, vec2 u)
 {
-    float found, chance = 1.0 - e.lights_chance;
-    emitter_sample sampled = emitter_sample_at(e.origin, e.emitter_normal, u, e.p.time);
+    float found, of_side, side = side_choose(e.b.parts, u.x, of_side), chance = (1.0 - e.lights_chance) * of_side;
+    vec3 normal = unpack_ray_normal(pack_ray_normal(side * e.s.normal));
+    vec3 from = origin_towards(e.s, e.origin, e.distance_, side * e.s.geometric);
+    emitter_sample sampled = emitter_sample_at(from, normal, u, e.p.time);
     vec3 arriving = vec3(0.0), sent = bsdf_evaluate(e.b, e.s, sampled.direction, found);
-    if (sampled.probability > 0.0)
+    if (sampled.probability > 0.0 && side * dot(sampled.direction, e.s.normal) > 0.0) // the chance is of that side
         arriving = e.weight * sent * sampled.radiance / (sampled.probability * chance);
     arriving = limited(e.p, 0u, arriving * emitter_share_asked(sampled, chance, found));
-    return add_shadow_ray_from(place, e.p, e.origin, sampled.direction, RAY_STOPS_T_MIN, sampled.distance_, arriving);
+    return add_shadow_ray_from(place, e.p, from, sampled.direction, RAY_STOPS_T_MIN, sampled.distance_, arriving);
 }
 #endif
 
@@ -103,27 +105,44 @@ bool ask_for_light(eye_hit e, uint place)
         no_shadow_ray(place);
         return false;
     }
-    light_sample sampled = light_sample_at(e.light_number, e.origin, u);
+    vec3 from = e.origin;
+    light_sample sampled = light_seen(e.s, e.distance_, e.light_number, u, from);
     vec3 arriving = e.weight * bsdf_evaluate(e.b, e.s, sampled.direction, found) * (sampled.irradiance / chance);
 #ifdef HAS_AREA_LIGHTS
     float probability = chance * light_probability(light_at(e.light_number), sampled);
     if (!e.last && probability > 0.0)
         arriving *= heuristic(probability, found);
 #endif
-    return add_shadow_ray(place, e.p, e.origin, sampled.direction, sampled.distance_, limited(e.p, 0u, arriving));
+    return add_shadow_ray(place, e.p, from, sampled.direction, sampled.distance_, limited(e.p, 0u, arriving));
+}
+
+// The density with which shadow rays ask for the environment in a direction. A table knows no sides of the surface.
+float environment_density(eye_hit e, vec3 direction)
+{
+#ifdef HAS_ENVIRONMENT_TABLE
+    return environment_probability(e.s.normal, direction);
+#else
+    float cosine = dot(e.s.normal, direction);
+    return environment_probability(cosine < 0.0 ? -e.s.normal : e.s.normal, direction) * side_chance(e.b.parts, cosine);
+#endif
 }
 
 bool ask_for_environment(eye_hit e, uint place, uvec2 seed, uint index)
 {
-    float probability, found;
+    float probability, found, side = 1.0, of_side = 1.0;
     vec2 u = sequence_pair(seed, numbers_of(SEQUENCE_PATH_ENVIRONMENT), index);
-    vec3 direction = environment_choose(e.s.normal, u, probability);
+#ifndef HAS_ENVIRONMENT_TABLE
+    side = side_choose(e.b.parts, u.x, of_side);
+#endif
+    vec3 direction = environment_choose(side * e.s.normal, u, probability);
+    probability *= of_side;
     vec3 arriving = vec3(0.0), sent = bsdf_evaluate(e.b, e.s, direction, found);
     if (probability > 0.0 && max_component(sent) > 0.0)
         arriving = e.weight * sent * environment_radiance(direction) / probability;
     if (!e.last)
         arriving *= heuristic(probability, found);
-    return add_shadow_ray(place, e.p, e.origin, direction, FAR, limited(e.p, 0u, arriving));
+    vec3 from = origin_towards(e.s, e.origin, e.distance_, direction);
+    return add_shadow_ray(place, e.p, from, direction, FAR, limited(e.p, 0u, arriving));
 }
 
 #ifdef HAS_AREA_LIGHTS
@@ -226,14 +245,18 @@ void go_on(eye_hit e, uvec2 seed, uint index, bool asked, float choice)
     float found = asked && !of_glass ? chosen.probability : 0.0;
     p.flags &= ~(PATH_ASKED | PATH_COVERED);
     p.flags |= (found > 0.0 ? PATH_ASKED : 0u) | (covered ? PATH_COVERED : 0u);
-    p.flags = path_sent_on(p.flags, chosen.lobe == BSDF_SCATTERED ? 1.0 : e.s.roughness);
+    float roughness = chosen.lobe == BSDF_SCATTERED ? 1.0 : e.s.roughness;
+#ifdef HAS_CLEARCOAT
+    roughness = chosen.lobe == BSDF_COAT ? e.s.coat_roughness : roughness;
+#endif
+    p.flags = path_sent_on(p.flags, roughness);
     p.light_number = 0u;
     p.light_share = 0.0;
     p.environment_share = covered ? 0.0 : 1.0;
     if (frame.environment_kind == ENVIRONMENT_BACKDROP) // nothing that scatters sees it
         p.environment_share = chosen.lobe == BSDF_SCATTERED ? 0.0 : e.p.environment_share;
     if (found > 0.0 && asks_environment != 0u)
-        p.environment_share = heuristic(found, environment_probability(e.s.normal, chosen.direction));
+        p.environment_share = heuristic(found, environment_density(e, chosen.direction));
 #ifdef HAS_AREA_LIGHTS
     float side = dot(chosen.direction, e.s.geometric) > 0.0 ? 1.0 : -1.0;
     if (!covered)
@@ -241,10 +264,14 @@ void go_on(eye_hit e, uvec2 seed, uint index, bool asked, float choice)
                    sequence_number(seed, numbers_of(SEQUENCE_PATH_MET_LIGHT), index));
 #endif
 #ifdef HAS_EMITTERS
-    p.flags = p.flags & (1u << PATH_NORMAL_SHIFT) - 1u | e.ray_normal << PATH_NORMAL_SHIFT;
-    p.light_number |= ratio_code(1.0 - e.lights_chance, found) << PATH_LIGHT_BITS;
+    float cosine = dot(chosen.direction, e.s.normal), emitters_chance = (1.0 - e.lights_chance) *
+                                                                        side_chance(e.b.parts, cosine);
+    uint ray_normal = pack_ray_normal(cosine < 0.0 ? -e.s.normal : e.s.normal);
+    p.flags = p.flags & (1u << PATH_NORMAL_SHIFT) - 1u | ray_normal << PATH_NORMAL_SHIFT;
+    p.light_number |= ratio_code(emitters_chance, found) << PATH_LIGHT_BITS;
 #endif
-    float angle = chosen.probability > 0.0 ? 1.0 / chosen.probability : rough_solid_angle(e.s, chosen.direction);
+    float angle = chosen.lobe == BSDF_COAT ? 0.0 : rough_solid_angle(e.s, chosen.direction);
+    angle = chosen.probability > 0.0 ? 1.0 / chosen.probability : angle;
     add_child(e.j, p, e.s, e.distance_, chosen.direction, carried / survival, false, sample_solid_angle(angle));
 }
 
@@ -276,6 +303,9 @@ void main()
     uvec2 seed = path_seed(e.p);
     uint index = path_sample(e.p);
     e.s.roughness = regularised_roughness(e.p, e.s.roughness, index);
+#ifdef HAS_CLEARCOAT
+    e.s.coat_roughness = regularised_roughness(e.p, e.s.coat_roughness, index);
+#endif
     e.origin = off_surface(e.s, h.distance, e.s.geometric);
     e.last = last_wave != 0u || (e.p.flags & PATH_BOUNCES_MASK) >= frame.depth;
     e.all_lights = 0.0;
@@ -286,6 +316,9 @@ void main()
 #ifdef HAS_ANISOTROPY
     material m = material_at(h.material & HIT_MATERIAL_MASK);
     anisotropy = m.anisotropy;
+#ifdef HAS_ANISOTROPY_MAP
+    anisotropy *= e.s.grain.z;
+#endif
     along = grain_of(h, e.s, m);
 #else
     tangent_frame(e.s.normal, along, across);
@@ -303,10 +336,6 @@ void main()
 #endif
     if (!straight)
         sent += e.s.unlit ? e.s.base : e.s.emission;
-#ifdef HAS_EMITTERS
-    e.ray_normal = pack_ray_normal(e.s.normal);
-    e.emitter_normal = unpack_ray_normal(e.ray_normal);
-#endif
     if (asks)
         choose_light(e, seed, index);
     float passes = 0.0; // share of its shadow rays that are for light behind it

@@ -78,6 +78,9 @@ surface surface_of_path(path p, hit h, ray r)
     surface s = surface_at(h, r.origin_t_min.xyz, r.direction_t_max.xyz, cone_at(p, h.distance).x);
     if (s.emission_seen_only && (p.flags & PATH_STEP_MASK) != 0u) // a rough surface has sent the ray
         s.emission = vec3(0.0);
+#ifdef HAS_DISPERSION
+    s.carried = vec3(p.weight_r, p.weight_g, p.weight_b);
+#endif
     return s;
 }
 
@@ -87,15 +90,10 @@ vec3 weight_at(path p, surface s, float distance_)
 {
     vec3 weight = vec3(p.weight_r, p.weight_g, p.weight_b);
 #ifdef HAS_VOLUME
-    if (s.inside && s.transmission > 0.0)
+    if (in_glass(s))
         weight *= exp(-s.absorption * distance_);
 #endif
     return weight;
-}
-
-float index_ratio(surface s)
-{
-    return s.inside ? 1.0 / s.ior : s.ior; // behind / before
 }
 
 // The cone of a ray that a surface sends on. `solid_angle`: see add_child().
@@ -114,7 +112,7 @@ vec2 cone_sent_on(vec2 cone, surface s, vec3 direction, float solid_angle)
 // The directions that the surface's roughness spreads a mirrored or refracted ray over, steradians. A smooth one: 0.
 float rough_solid_angle(surface s, vec3 direction)
 {
-    return lobe_solid_angle(square(s.roughness), facet_turn(index_ratio(s), dot(direction, s.geometric) > 0.0));
+    return lobe_solid_angle(square(s.roughness), turn_of(s, dot(direction, s.geometric) > 0.0));
 }
 
 // Of the directions that one of the pixel's samples stands for, if it was chosen with a density of 1 / `solid_angle`.
@@ -128,6 +126,16 @@ float sample_solid_angle(float solid_angle)
 vec3 off_surface(surface s, float distance_, vec3 side)
 {
     return s.position + PATH_OFFSET * max(max_component(abs(s.position)), distance_) * side;
+}
+
+// Of a shadow ray in a direction. `origin`: of those on the viewer's side.
+vec3 origin_towards(surface s, vec3 origin, float distance_, vec3 direction)
+{
+#ifdef HAS_DIFFUSE_TRANSMISSION
+    if (dot(direction, s.geometric) < 0.0)
+        return off_surface(s, distance_, -s.geometric);
+#endif
+    return origin;
 }
 
 uint child_count = 0u, child_octant = 0u;

@@ -11,8 +11,8 @@
 // Lights beyond the first batch come in further passes with first_ray > 0, which make shadow rays alone.
 
 #include "common/environment.glsl"
-#include "common/light.glsl"
 #include "common/scattering.glsl"
+#include "render/light_seen.glsl"
 #include "render/shade.glsl"
 #include "render/wave.glsl"
 
@@ -41,10 +41,10 @@ uint ask_for_lights(uint j, path parent, surface s, split parts, vec3 view, floa
 #ifdef HAS_AREA_LIGHTS
         u = sequence_pair(seed, SEQUENCE_EVERY_LIGHT + (wave_number << 16 ^ index), sample_);
 #endif
-        light_sample sampled = light_sample_at(index, origin, u);
-        float NoL = dot(s.normal, sampled.direction);
-        vec3 arriving = weight * (brdf(s, parts, view, NoV, sampled.direction) * sampled.irradiance * NoL);
-        if (add_shadow_ray(i * wave.hits.count + j, parent, origin, sampled.direction, sampled.distance_, arriving))
+        vec3 from = origin;
+        light_sample sampled = light_seen(s, distance_, index, u, from);
+        vec3 arriving = weight * (reflected(s, parts, view, NoV, sampled.direction) * sampled.irradiance);
+        if (add_shadow_ray(i * wave.hits.count + j, parent, from, sampled.direction, sampled.distance_, arriving))
             alive++;
     }
     return alive;
@@ -62,15 +62,29 @@ vec3 shade(uint j, path p, surface s, split parts, ray r, float distance_, vec3 
     if (s.unlit)
         return weight * s.base;
     vec3 mirrored = mirror_direction(s, direction);
-    vec3 bent = refract(direction, s.normal, s.inside ? s.ior : 1.0 / s.ior);
+    vec3 bent = bent_direction(s, index_ratio(s), direction, s.normal, s.normal);
     // If it is totally reflected, or a tilted normal would send it back, it is mirrored.
     bool through = dot(bent, s.geometric) < 0.0;
     vec3 mirror = parts.mirror + (through ? vec3(0.0) : parts.refracted);
-    add_child_of_weight(j, p, s, distance_, mirrored, weight * mirror * parts.mirror_ray, false);
+    vec3 in_mirror = mirror * parts.mirror_ray;
+#ifdef HAS_CLEARCOAT
+    float coat_ray = coat_ray_of(s, parts);
+    vec3 coat_mirrored = coat_mirror_direction(s, direction);
+    // One ray for both mirrors where they are one; over a refracted ray there is no room for two.
+    if (through && max_component(parts.refracted) > 0.0 || dot(mirrored, coat_mirrored) > 0.99999)
+        in_mirror += coat_ray;
+    else
+        add_child_of_weight(j, p, s, distance_, coat_mirrored, weight * coat_ray, false);
+#endif
+    add_child_of_weight(j, p, s, distance_, mirrored, weight * in_mirror, false);
     if (through)
         add_child_of_weight(j, p, s, distance_, bent, weight * parts.refracted, false);
-    vec3 ambient = (parts.scattered + parts.again) * environment_irradiance(s.normal) +
+    vec3 ambient = (parts.scattered + parts.again + sheen_of(parts)) * environment_irradiance(s.normal) +
                    mirror * (1.0 - parts.mirror_ray) * environment_irradiance(mirrored);
+    ambient += passed_of(parts) * environment_irradiance(-s.normal);
+#ifdef HAS_CLEARCOAT
+    ambient += (parts.coat.mirrors - coat_ray) * environment_irradiance(coat_mirrored);
+#endif
     return weight * (s.emission + s.occlusion * ambient);
 }
 
@@ -87,7 +101,7 @@ void main()
     surface s = surface_of_path(p, h, r);
     vec3 view = -r.direction_t_max.xyz, weight = weight_at(p, s, h.distance);
     float NoV = clamp(dot(s.normal, view), 1e-4, 1.0); // a shading normal may lean away
-    split parts = split_light(s, NoV);
+    split parts = split_light(s, view, NoV);
     if (first) {
         float seen = (p.flags & PATH_STRAIGHT) != 0u ? p.weight_r * s.alpha : 0.0;
         if (s.alpha < 1.0)
@@ -95,7 +109,7 @@ void main()
         radiance[k] = vec4(shade(j, p, s, parts, r, h.distance, weight * s.alpha), seen);
     }
     uint shadows = 0u;
-    if (s.unlit || s.alpha <= 0.0 || (s.inside && s.transmission > 0.0))
+    if (s.unlit || s.alpha <= 0.0 || in_glass(s))
         no_lights(j);
     else
         shadows = ask_for_lights(j, p, s, parts, view, NoV, weight * s.alpha, h.distance);

@@ -18,14 +18,25 @@ struct material {
     uint texture_specular_colour;
     float body_red, body_green, body_blue; /* what one of the two surfaces of a body takes of shadow rays' light */
     float absorbs_red, absorbs_green, absorbs_blue; /* of a body's light, 1 / metre */
-    uint pad0;
+    uint texture_anisotropy;
+    float clearcoat, clearcoat_roughness; /* of the varnish */
+    uint texture_clearcoat, texture_clearcoat_roughness;
+    uint texture_clearcoat_normal, texture_iridescence, texture_iridescence_thickness;
+    float dispersion;                                                             /* 20 / Abbe number */
+    float iridescence, iridescence_ior, iridescence_minimum, iridescence_maximum; /* of the film: thickness, nm */
+    float sheen_red, sheen_green, sheen_blue, sheen_roughness;
+    uint texture_sheen, texture_sheen_roughness, texture_diffuse_transmission, texture_diffuse_transmission_colour;
+    float diffuse_red, diffuse_green, diffuse_blue, diffuse_transmission; /* what is scattered to the other side */
 };
-SHARED_SIZE(material, 144)
+SHARED_SIZE(material, 240)
 #define MATERIAL_ALPHA_MASK 1u
 #define MATERIAL_ALPHA_BLEND 2u
 #define MATERIAL_DOUBLE_SIDED 4u
 #define MATERIAL_UNLIT 8u
 #define MATERIAL_EMISSION_SEEN_ONLY 16u /* a light shines in its place */
+#define MATERIAL_THIN_WALLED 32u        /* without a body: light goes straight on through it */
+#define MATERIAL_TANGENT 64u            /* needs a tangent, where vertices have none that of texture coordinates */
+#define MATERIAL_TANGENT_SECOND 128u    /* of the second set of them */
 
 /* A texture as one input of a material. Entry 0 is unused. */
 struct texture_slot {

@@ -14,7 +14,7 @@ SHARED_SIZE(table_starts, 16)
 #define TABLES_HEAD_TEXELS 3u
 
 #define GEOMETRY_TEXELS 2u
-#define MATERIAL_TEXELS 9u
+#define MATERIAL_TEXELS 15u
 #define TEXTURE_SLOT_TEXELS 2u
 #define TEXTURE_TEXELS 1u
 #define DISC_TEXELS 3u

@@ -18,14 +18,18 @@
 #include <epoxy/gl.h>
 #include <string.h>
 
-/* As the shader has it: three vec4. */
+/* As the shader has it: five vec4. */
 struct bsdf_case {
     float roughness, metallic, transmission, ior;
     float view[3], base;             /* unit, towards the eye; base colour, grey */
     float inside, anisotropy;        /* inside 1: seen from behind, as glass is */
     float specular, specular_colour; /* of a probe that has them; grey */
+    float coat, coat_roughness;      /* likewise */
+    float coat_turn;                 /* of its normal, radians from the surface's in the plane y = 0 */
+    float film, film_ior, film_nm;   /* likewise */
+    float unused[2];
 };
-_Static_assert(sizeof(struct bsdf_case) == 48, "the shader reads three vec4 a case");
+_Static_assert(sizeof(struct bsdf_case) == 80, "the shader reads five vec4 a case");
 
 /* What is asked: a direction to evaluate, or three numbers to choose by. */
 struct bsdf_question {
@@ -33,10 +37,9 @@ struct bsdf_question {
 };
 
 struct bsdf_answer {
-    float direction[3], lobe; /* as given; or chosen, BSDF_* */
-    float weight, probability, sent,
-        of; /* weight of what was chosen; bsdf_evaluate() of the direction and its
-               probability; `of`: brdf() of common/scattering.glsl, times the cosine */
+    float direction[3], lobe;            /* as given; or chosen, BSDF_* */
+    float weight, probability, sent, of; /* weight of what was chosen; bsdf_evaluate() of the direction and its
+                                            probability; `of`: reflected() of common/scattering.glsl */
 };
 
 struct bsdf_probe {
@@ -51,7 +54,7 @@ static const char bsdf_probe_text[] =
     "#include \"common/dispatch.glsl\"\n"
     "#include \"common/bsdf.glsl\"\n"
     "uniform uint question_count, chooses;\n"
-    "uniform vec4 material_, view_base, more;\n"
+    "uniform vec4 material_, view_base, more, coat, film;\n"
     "layout(std430, binding = BIND_PASS_1) readonly buffer question_block { vec4 questions[]; };\n"
     "layout(std430, binding = BIND_PASS_2) writeonly buffer answer_block { vec4 answers[]; };\n"
     "void main()\n"
@@ -74,8 +77,18 @@ static const char bsdf_probe_text[] =
     "    s.specular = more.z;\n"
     "    s.specular_colour = vec3(more.w);\n"
     "#endif\n"
+    "#ifdef HAS_CLEARCOAT\n"
+    "    s.coat = coat.x;\n"
+    "    s.coat_roughness = coat.y;\n"
+    "    s.coat_normal = vec3(sin(coat.z), 0.0, cos(coat.z));\n"
+    "#endif\n"
+    "#ifdef HAS_IRIDESCENCE\n"
+    "    s.film = coat.w;\n"
+    "    s.film_ior = film.x;\n"
+    "    s.film_nm = film.y;\n"
+    "#endif\n"
     "    vec3 view = view_base.xyz;\n"
-    "    split parts = split_light(s, view.z);\n"
+    "    split parts = split_light(s, view, view.z);\n"
     "    bsdf b = bsdf_of(s, view, view.z, vec3(1.0, 0.0, 0.0), more.y);\n"
     "    vec4 asked = questions[i];\n"
     "    bsdf_choice chosen = bsdf_choice(asked.xyz, vec3(0.0), 0.0, BSDF_SCATTERED);\n"
@@ -83,7 +96,7 @@ static const char bsdf_probe_text[] =
     "    if (chooses != 0u)\n"
     "        chosen = bsdf_choose(b, s, choice, asked.xy);\n"
     "    vec3 sent = bsdf_evaluate(b, s, chosen.direction, probability);\n"
-    "    float other = brdf(s, parts, view, view.z, chosen.direction).g * chosen.direction.z;\n"
+    "    float other = reflected(s, parts, view, view.z, chosen.direction).g;\n"
     "    if (chooses != 0u)\n"
     "        probability = chosen.probability;\n"
     "    answers[2u * i] = vec4(chosen.direction, float(chosen.lobe));\n"
@@ -122,6 +135,8 @@ static inline void bsdf_probe_run(struct bsdf_probe *probe, const struct bsdf_ca
     gpu_uniform_vec(&probe->program, "material_", 4, &c->roughness);
     gpu_uniform_vec(&probe->program, "view_base", 4, c->view);
     gpu_uniform_vec(&probe->program, "more", 4, &c->inside);
+    gpu_uniform_vec(&probe->program, "coat", 4, &c->coat);
+    gpu_uniform_vec(&probe->program, "film", 4, &c->film_ior);
     gpu_buffer_bind_storage(&probe->questions, BIND_PASS_1);
     gpu_buffer_bind_storage(&probe->answers, BIND_PASS_2);
     gpu_dispatch(probe->device, &probe->program, count);

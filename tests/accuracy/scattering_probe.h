@@ -70,7 +70,7 @@ static const char probe_text[] =
     "    s.inside = more.x > 0.0;\n"
     "    vec3 view = view_base.xyz;\n"
     "    vec3 light = directions[k * direction_stride + j].xyz;\n"
-    "    split parts = split_light(s, view.z);\n"
+    "    split parts = split_light(s, view, view.z);\n"
     "    values[i] = brdf(s, parts, view, view.z, light).g;\n"
     "    if (j == 0u)\n"
     "        splits[k] = vec4(parts.mirror.g, parts.scattered.g + parts.again.g, parts.refracted.g, "

@@ -157,3 +157,39 @@ TEST(the_environment_turns_about_y_for_the_eye_and_for_surfaces_alike)
     assert_near(fixture_pixel(&result, 16, 16)[0], 1.0, 0.03);
     frame_result_finish(&result);
 }
+
+/* KHR_materials_anisotropy: red and green are a direction about the tangent, blue a share of the strength; the
+ * same as a rotation and a strength of the material, with the same random numbers. */
+TEST(a_texture_turns_the_grain_and_weakens_it)
+{
+    struct fixture *fixture = *state;
+    static const uint8_t texel[4] = {64, 224, 128, 255};
+    const double x = 2.0 * 64 / 255 - 1.0, y = 2.0 * 224 / 255 - 1.0;
+    float seen[3][32 * 32];
+    double brightest = 0.0, unlike = 0.0;
+    for (int way = 0; way < 3; way++) { /* by a texture; by numbers; without a texture's turn */
+        fixture_clear(state);
+        struct scene_material *brushed = fixture_material(fixture);
+        brushed->metallic = 1.0f;
+        brushed->roughness = 0.3f;
+        brushed->anisotropy = way == 0 ? 0.9f : 0.9f * 128 / 255;
+        brushed->anisotropy_rotation = way == 1 ? 0.4f + (float)atan2(y, x) : 0.4f;
+        if (way == 0)
+            brushed->textures[MATERIAL_ANISOTROPY] = one_texture(fixture, 1, 1, texel, 1.0f);
+        fixture_square(fixture, 10.0f, brushed->base.id, NULL);
+        light_from(fixture, 0.3f, 0.1f);
+        fixture->request.integrator = INTEGRATOR_PATH;
+        fixture->request.depth = 1;
+        struct frame_result result = fixture_render(fixture);
+        for (uint32_t i = 0; i < 32 * 32; i++)
+            seen[way][i] = fixture_pixel(&result, i % 32, i / 32)[1];
+        frame_result_finish(&result);
+    }
+    for (int i = 0; i < 32 * 32; i++) {
+        brightest = fmax(brightest, (double)seen[1][i]);
+        unlike = fmax(unlike, fabs((double)seen[2][i] - (double)seen[1][i]));
+    }
+    for (int i = 0; i < 32 * 32; i++)
+        assert_near(seen[0][i], seen[1][i], 1e-4 * brightest);
+    assert_true(unlike > 0.1 * brightest); /* else nothing is shown */
+}

@@ -86,6 +86,9 @@ static inline struct scene_material *test_material(struct test_edits *edits, uin
     material->specular = material->specular_colour[0] = material->specular_colour[1] =
         material->specular_colour[2] = 1.0f;
     material->attenuation[0] = material->attenuation[1] = material->attenuation[2] = 1.0f;
+    material->iridescence_ior = 1.3f;
+    material->diffuse_transmission_colour[0] = material->diffuse_transmission_colour[1] =
+        material->diffuse_transmission_colour[2] = 1.0f;
     for (int i = 0; i < MATERIAL_TEXTURE_COUNT; i++) {
         material->textures[i].uv_transform[0] = 1.0f;
         material->textures[i].uv_transform[4] = 1.0f;

@@ -76,8 +76,10 @@ def decode(kind, payload):
         base, emission = f.take("4f"), f.take("3f")
         metallic, roughness, transmission, ior, cutoff, *anisotropy = f.take("7f")
         seen_only, specular, body = f.take("I"), f.take("4f"), f.take("5f")
+        layers = dict(coat=f.take("2f"), sheen=f.take("4f"), film=f.take("4f"), dispersion=f.take("f"), through=f.take("4f"),
+                      thin_walled=f.take("I"))
         uses = [dict(texture=u[0], texcoord=u[1], transform=u[2:8], strength=u[8]) for u in f.array("2I6ff")]
-        return dict(id=material, alpha_mode=alpha_mode, double_sided=double_sided, unlit=unlit, base=base,
+        return dict(layers, id=material, alpha_mode=alpha_mode, double_sided=double_sided, unlit=unlit, base=base,
                     emission=emission, metallic=metallic, roughness=roughness, transmission=transmission, ior=ior,
                     cutoff=cutoff, anisotropy=anisotropy, seen_only=seen_only, specular=specular, body=body, textures=uses,
                     name=f.string())

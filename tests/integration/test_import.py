@@ -424,11 +424,48 @@ class Written(importer.Written):
         got, result = materials({"anisotropyStrength": 0.5, "anisotropyRotation": -1.5}, {}, {"anisotropyRotation": 2})
         self.assertEqual(got, [[0.5, -1.5], [0, 0], [0, 2]])
         self.assertEqual(result.notes, [])
-        got, result = materials({"anisotropyStrength": 3, "anisotropyRotation": "east", "anisotropyTexture": {"index": 0}})
+        got, result = materials({"anisotropyStrength": 3, "anisotropyRotation": "east"})
         self.assertEqual(got, [[1, 0]])
         self.assertIn("anisotropyStrength", result.text())
-        self.assertIn("texture of anisotropy is not shown", result.text())
-        self.assertNotIn("nowhere.png", result.text(), "what is not shown is not read either")
+
+    def test_gltf_layers(self):
+        """What the extensions say of varnish, cloth, films, dispersion, and light that is scattered to the other side."""
+        def numbered(**keys):
+            return {key + "Texture": {"index": index} for key, index in keys.items()}
+        given = {
+            "KHR_materials_clearcoat": {"clearcoatFactor": 0.5, "clearcoatRoughnessFactor": 0.25, "clearcoatNormalTexture":
+                                        {"index": 2, "scale": 0.5}, **numbered(clearcoat=0, clearcoatRoughness=1)},
+            "KHR_materials_sheen": {"sheenColorFactor": [1, 0.5, 0.25], "sheenRoughnessFactor": 0.75,
+                                    **numbered(sheenColor=3, sheenRoughness=4)},
+            "KHR_materials_iridescence": {"iridescenceFactor": 0.5, "iridescenceIor": 1.5, "iridescenceThicknessMinimum": 200,
+                                          "iridescenceThicknessMaximum": 800, **numbered(iridescence=5, iridescenceThickness=6)},
+            "KHR_materials_dispersion": {"dispersion": 2},
+            "KHR_materials_diffuse_transmission": {"diffuseTransmissionFactor": 0.25, "diffuseTransmissionColorFactor": [1, 0.5, 0],
+                                                   **numbered(diffuseTransmission=7, diffuseTransmissionColor=8)},
+            "KHR_materials_anisotropy": numbered(anisotropy=9)}
+        beyond = {"KHR_materials_clearcoat": {"clearcoatFactor": 2}, "KHR_materials_iridescence": {"iridescenceIor": 0},
+                  "KHR_materials_sheen": {"sheenColorFactor": [-1, 0, 0]}, "KHR_materials_dispersion": {"dispersion": -1}}
+        glass = {"KHR_materials_transmission": {"transmissionFactor": 1}, "KHR_materials_volume": {"thicknessFactor": 1}}
+        several = (given, {name: {} for name in given}, beyond, glass)
+        result = self.run_gltf({
+            "nodes": [{"mesh": 0}], "scenes": [{"nodes": [0]}], "extensionsRequired": list(given),
+            "images": [{"uri": "nowhere.png"}], "textures": [{"source": 0, "name": str(i)} for i in range(10)],
+            "materials": [{"extensions": each} for each in several],
+            "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "material": i} for i in range(len(several))]}]})
+        materials = result.of(SET_MATERIAL)
+        names = ("coat", "sheen", "film", "dispersion", "through", "thin_walled")
+        nothing = [(0, 0), (0, 0, 0, 0), (0, 1.2999999523162842, 100, 400), 0, (0, 1, 1, 1), 0]
+        got = [[material[name] for name in names] for material in materials]
+        self.assertEqual(got[0], [(0.5, 0.25), (1, 0.5, 0.25, 0.75), (0.5, 1.5, 200, 800), 2, (0.25, 1, 0.5, 0), 1])
+        self.assertEqual(got[1], nothing)
+        self.assertEqual(got[2], [(1, 0), (0, 0, 0, 0), (0, 1, 100, 400), *nothing[3:]])
+        self.assertEqual(got[3], nothing, "glass with a body has walls that are not thin")
+        uses = materials[0]["textures"]
+        textures = {one["id"]: one for one in result.of(SET_TEXTURE)}
+        self.assertEqual([textures[uses[at]["texture"]]["format"] for at in range(9, 19)], [1, 1, 1, 0, 1, 1, 1, 1, 0, 1],
+                         "colours of cloth and of what goes through are sRGB")
+        self.assertEqual((len(uses), uses[11]["strength"]), (19, 0.5))
+        self.assertEqual(len([note for note in result.notes if "was set to" in note[2]]), 4, result.text())
 
     def test_gltf_specular_and_volume(self):
         factors = {"KHR_materials_specular": {"specularFactor": 0.25, "specularColorFactor": [2, 1, 0.5]},

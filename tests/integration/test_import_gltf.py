@@ -8,7 +8,7 @@ Properties verified:
   - meshes that Draco or meshoptimizer has packed are those that were packed: every mode, filter and version;
   - packed bytes that are cut off, or whose counts lie, are refused with the place in the file, at once and within little memory;
   - instances share one mesh; variants choose materials by name; visibility and pointers reach nodes, lights and materials;
-  - specular and glossiness become metallic and roughness that reflect as much.
+  - specular and glossiness become a mirror of that strength over a body, or metallic and roughness that reflect as much.
 
 The encoders here write what the formats allow at its plainest. The cube that Draco's own encoder has packed is kept as it is.
 """
@@ -542,20 +542,32 @@ class Materials(Gltf):
                 self.assertAlmostEqual(material["metallic"], metallic, delta=1e-5)
                 self.assertAlmostEqual(material["roughness"], 0.25, delta=1e-5)
 
+    def test_a_dielectric_keeps_its_specular_colour(self):
+        """Its mirror is given beside 0.04, and its body is what the strongest channel of the mirror leaves."""
+        material, = self.gloss(diffuseFactor=[0.5, 0.5, 0.25, 1], specularFactor=[0.2, 0.1, 0.04]).of(SET_MATERIAL)
+        for value, wanted in zip(material["specular"], (1, 5, 2.5, 1)):
+            self.assertAlmostEqual(value, wanted, delta=1e-5)
+        for value, wanted in zip(material["base"], (0.5, 0.5 * 0.8 / 0.9, 0.25 * 0.8 / 0.96, 1)):
+            self.assertAlmostEqual(value, wanted, delta=1e-5)
+        self.assertEqual(material["metallic"], 0)
+
     def test_its_textures_are_converted_texel_by_texel(self):
         """The red, green, blue and white texels as diffuse colours of a plastic."""
         result = self.gloss([WEBP], diffuseTexture={"index": 0}, specularFactor=[0.04] * 3, glossinessFactor=0.6)
         material, = result.of(SET_MATERIAL)
-        base, rough = ({one["id"]: one for one in result.of(SET_TEXTURE)}[material["textures"][at]["texture"]] for at in (0, 2))
-        self.assertEqual((base["format"], rough["format"], len(result.of(SET_TEXTURE))), (0, 1, 2))
+        textures = {one["id"]: one for one in result.of(SET_TEXTURE)}
+        base, rough, mirror = (textures[material["textures"][at]["texture"]] for at in (0, 2, 8))
+        self.assertEqual((base["format"], rough["format"], mirror["format"], len(textures)), (0, 1, 0, 3))
         self.assertEqual(result.data(base["arrays"][0]), bytes([255, 0, 0, 255, 0, 255, 0, 255, 0, 0, 255, 255, 255, 255, 255, 255]))
         self.assertEqual(result.data(rough["arrays"][0]), bytes([255, 102, 0, 255]) * 4)
+        self.assertEqual(result.data(mirror["arrays"][0]), bytes([56, 56, 56, 255]) * 4, "0.04")
         self.assertEqual((material["base"], material["metallic"], material["roughness"]), ((1, 1, 1, 1), 1, 1))
+        self.assertEqual(material["specular"], (1, 25, 25, 25), "of 0.04, which the texture has whole")
 
     def test_a_specular_texture_makes_metal_of_what_shines(self):
         """Black below it: the coloured texels reflect as metals of their colours."""
         result = self.gloss([WEBP], diffuseFactor=[0, 0, 0, 1], specularGlossinessTexture={"index": 0})
-        base, rough = sorted(result.of(SET_TEXTURE), key=lambda one: one["format"])
+        base, rough, _ = result.of(SET_TEXTURE)
         self.assertEqual(result.data(base["arrays"][0])[:4], bytes([255, 0, 0, 255]))
         self.assertEqual(result.data(rough["arrays"][0]), bytes([255, 0, 255, 255]) * 4)
 

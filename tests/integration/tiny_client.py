@@ -297,6 +297,7 @@ def set_material(material, base_colour, roughness=1, unlit=0, metallic=0):
     fixed = struct.pack("<4I", material, 0, 0, unlit)
     fixed += struct.pack("<14f", *base_colour, 1, 0, 0, 0, metallic, roughness, 0, 1.5, 0, 0, 0)
     fixed += struct.pack("<I9f", 0, 1, 1, 1, 1, 0, 1, 1, 1, 0)  # emission, mirror and body as usual
+    fixed += struct.pack("<15fI", 0, 0, 0, 0, 0, 0, 0, 1.3, 100, 400, 0, 0, 1, 1, 1, 0)  # no layers
     return SET_MATERIAL, payload(fixed, array([]), string(""))
 
 

@@ -79,6 +79,19 @@ static void add_looks(struct draft_list *list)
     material->thickness = 1.5f;
     material->specular = 0.75f;
     material->specular_colour[1] = 2.5f;
+    material->clearcoat = 0.5f;
+    material->clearcoat_roughness = 0.375f;
+    material->sheen[2] = 0.25f;
+    material->sheen_roughness = 0.125f;
+    material->iridescence = 0.75f;
+    material->iridescence_ior = 1.5f;
+    material->iridescence_minimum_nm = 50;
+    material->iridescence_maximum_nm = 500;
+    material->dispersion = 2;
+    material->diffuse_transmission = 0.625f;
+    material->diffuse_transmission_colour[1] = 0.5f;
+    material->thin_walled = true;
+    material->textures[MATERIAL_ANISOTROPY] = (struct texture_use){40, 0, {1, 0, 0, 0, 1, 0}, 1};
     material->textures[MATERIAL_EMISSION] = (struct texture_use){40, 1, {1, 2, 3, 4, 5, 6}, 0.5f};
     struct scene_light *light = &add_set(list, OBJECT_LIGHT, 50)->set.light;
     name_it(&light->base, "light");
@@ -194,6 +207,10 @@ TEST(a_scene_of_all_kinds_is_the_same_afterwards)
                 one->attenuation_distance == other->attenuation_distance &&
                 memcmp(one->attenuation, other->attenuation, sizeof(one->attenuation)) == 0 &&
                 memcmp(one->specular_colour, other->specular_colour, sizeof(one->specular_colour)) == 0);
+    const size_t layers =
+        offsetof(struct scene_material, thin_walled) - offsetof(struct scene_material, clearcoat);
+    assert_memory_equal(&one->clearcoat, &other->clearcoat, layers);
+    assert_true(other->thin_walled);
     assert_true(other->unlit && other->double_sided && other->emission_seen_only &&
                 other->alpha_cutoff == 0.375f && other->emission[1] == 5);
     assert_string_equal(other->base.name, "material");

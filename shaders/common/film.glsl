@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: MIT
+// What a surface mirrors through a thin film, whose two sides' light interferes: Belcour, Barla. A Practical Extension to
+// Microfacet Theory for the Modeling of Varying Iridescence. 2017, as KHR_materials_iridescence has it (appendix B.3 of its
+// implementation notes): Schlick's curve at the lower side, no polarisation, and light that went to and fro up to twice.
+// The upper side obeys Fresnel's equations, as Schlick's curve is not 0 where there is no other index.
+//
+// Defines: HAS_IRIDESCENCE some material has a thin film.
+
+#include "common/brdf.glsl"
+#include "common/material.glsl"
+
+#ifdef HAS_IRIDESCENCE
+// Thinner films go over to none, nanometres.
+const float FILM_THIN_NM = 0.03;
+// Indices are those of what mirrors at most so much.
+const float FILM_F0_MAX = 0.9999;
+
+// Its spectrum by what eyes see of it, as Rec. 709: section 4.1, Gaussians fitted to CIE 1931 in the Fourier domain.
+// `difference_nm`: of the two optical paths; `shift`: of their phases.
+vec3 film_sensitivity(float difference_nm, vec3 shift)
+{
+    const vec3 HEIGHT = vec3(5.4856e-13, 4.4201e-13, 5.2481e-13), PLACE = vec3(1.6810e+06, 1.7953e+06, 2.2084e+06),
+               VARIANCE = vec3(4.3278e+09, 9.3046e+09, 6.6121e+09);
+    const float HEIGHT_2 = 9.7470e-14, PLACE_2 = 2.2399e+06, VARIANCE_2 = 4.5282e+09, WHITE = 1.0685e-7;
+    const mat3 REC709_FROM_XYZ = mat3(3.2404542, -0.9692660, 0.0556434, -1.5371385, 1.8760108, -0.2040259, -0.4985314,
+                                      0.0415560, 1.0572252);
+    float phase = TWO_PI * difference_nm * 1e-9;
+    vec3 xyz = HEIGHT * sqrt(TWO_PI * VARIANCE) * cos(PLACE * phase + shift) * exp(-square(phase) * VARIANCE);
+    xyz.x += HEIGHT_2 * sqrt(TWO_PI * VARIANCE_2) * cos(PLACE_2 * phase + shift.x) * exp(-VARIANCE_2 * square(phase));
+    return REC709_FROM_XYZ * (xyz / WHITE);
+}
+
+vec3 film_schlick(vec3 f0, float cosine)
+{
+    float m = clamp(1.0 - cosine, 0.0, 1.0), m2 = m * m;
+    return f0 + (1.0 - f0) * (m2 * m2 * m);
+}
+
+// The reflectance of a film over what mirrors `f0` in air.
+vec3 film_reflectance(float cosine, float ior, float thickness_nm, vec3 f0)
+{
+    ior = mix(1.0, ior, smoothstep(0.0, FILM_THIN_NM, thickness_nm));
+    float within = sqrt(max(1.0 - (1.0 - square(cosine)) / square(ior), 0.0)); // the cosine there
+    float first = fresnel_dielectric(cosine, ior), passes = 1.0 - first;
+    vec3 root = sqrt(clamp(f0, 0.0, FILM_F0_MAX)), base_ior = (1.0 + root) / (1.0 - root);
+    vec3 step_ = (base_ior - ior) / (base_ior + ior), second = film_schlick(step_ * step_, within);
+    vec3 shift = PI + mix(vec3(0.0), vec3(PI), lessThan(base_ior, vec3(ior)));
+    vec3 both = clamp(first * second, 1e-5, FILM_F0_MAX), rest = passes * passes * second / (1.0 - both);
+    vec3 sum = first + rest, order = rest - passes;
+    float difference_nm = 2.0 * ior * thickness_nm * within;
+    for (int m = 1; m <= 2; m++) {
+        order *= sqrt(both);
+        sum += order * 2.0 * film_sensitivity(float(m) * difference_nm, float(m) * shift);
+    }
+    return clamp(sum, 0.0, 1.0); // colours beyond Rec. 709 are cut off
+}
+
+// Of a surface, dielectric or metal.
+vec3 film_of(surface s, float cosine)
+{
+    vec3 dielectric = vec3(square((s.ior - 1.0) / (s.ior + 1.0)));
+#ifdef HAS_SPECULAR
+    dielectric = min(dielectric * s.specular_colour, 1.0) * s.specular;
+#endif
+    return film_reflectance(cosine, s.film_ior, s.film_nm, mix(dielectric, s.base, s.metallic));
+}
+
+// The mean of it over the hemisphere, cosine-weighted: Gauss' quadrature of three squares of the cosine.
+vec3 film_mean_of(surface s)
+{
+    return (5.0 * film_of(s, 0.335710) + 8.0 * film_of(s, 0.707107) + 5.0 * film_of(s, 0.941964)) / 18.0;
+}
+#endif

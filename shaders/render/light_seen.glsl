@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: MIT
+// A light as a surface sees it: what scatters light to its other side sees those behind it, from there.
+//
+// Defines: those of common/light.glsl and render/shade.glsl.
+
+#include "common/light.glsl"
+#include "render/shade.glsl"
+
+// `origin`: of shadow rays on the viewer's side; becomes that of this one.
+light_sample light_seen(surface s, float distance_, uint index, vec2 u, inout vec3 origin)
+{
+    light_sample sampled = light_sample_at(index, origin, u);
+#ifdef HAS_DIFFUSE_TRANSMISSION
+    if (dot(sampled.direction, s.geometric) < 0.0) {
+        origin = off_surface(s, distance_, -s.geometric);
+        sampled = light_sample_at(index, origin, u);
+    }
+#endif
+    return sampled;
+}
