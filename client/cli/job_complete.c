@@ -322,15 +322,38 @@ static bool complete_noise(struct cli_job *job)
     return fl_error_remedy(&job->error, "give --samples, or render them as they are: --views rays");
 }
 
+static bool complete_crop(struct cli_job *job)
+{
+    const struct message_render *wanted = &job->options;
+    if (wanted->crop_width == 0)
+        return true;
+    if (wanted->crop_x + wanted->crop_width > wanted->width ||
+        wanted->crop_y + wanted->crop_height > wanted->height) {
+        cli_usage(job, "--crop", "%ux%u pixels from (%u, %u) on are not in a picture of %ux%u", wanted->crop_width,
+                  wanted->crop_height, wanted->crop_x, wanted->crop_y, wanted->width, wanted->height);
+        return fl_error_remedy(&job->error, "--size is that of the whole picture");
+    }
+    const char *other = wanted->noise > 0.0f                                 ? "--noise"
+                        : wanted->denoise != PROTOCOL_DENOISE_OFF            ? "--denoise"
+                        : job->views.has_stereo                              ? "--stereo"
+                        : job->views.has_light_field                         ? "--light-field"
+                        : wanted->view_source == PROTOCOL_VIEW_SOURCE_LAYERS ? "--lens quadtree"
+                                                                             : NULL;
+    if (!other)
+        return true;
+    cli_usage(job, "--crop", "cannot go with %s, which looks at pixels around", other);
+    return fl_error_remedy(&job->error, "leave out one of them");
+}
+
 bool cli_job_complete(struct cli_job *job, bool is_series)
 {
     if (!complete_scene(job))
         return false;
     complete_samples(job, is_series);
     complete_integrator(job);
-    return cli_views_complete(job, is_series) && complete_noise(job) && complete_tracer(job) &&
-           complete_clips(job) && complete_outputs(job, is_series) && complete_encoding(job) &&
-           complete_camera(job);
+    return cli_views_complete(job, is_series) && complete_noise(job) && complete_crop(job) &&
+           complete_tracer(job) && complete_clips(job) && complete_outputs(job, is_series) &&
+           complete_encoding(job) && complete_camera(job);
 }
 
 bool cli_job_complete_view(struct cli_job *job)

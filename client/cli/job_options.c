@@ -26,6 +26,7 @@ enum key {
     KEY_KEY = 0x100,
     KEY_LINK,
     KEY_SIZE,
+    KEY_CROP,
     KEY_ENVIRONMENT,
     KEY_ENVIRONMENT_ROTATION,
     KEY_VARIANT,
@@ -81,6 +82,8 @@ static const struct argp_option special[] = {
      CLI_GROUP_OUTPUT},
     {NULL, 0, NULL, 0, "Picture:", CLI_GROUP_PICTURE},
     {"size", KEY_SIZE, "WxH", 0, "Pixels (default 1280x720)", CLI_GROUP_OUTPUT},
+    {"crop", KEY_CROP, "X,Y,W,H", 0,
+     "Render and write only these W x H pixels of the picture, from X to the right and Y down", CLI_GROUP_OUTPUT},
     {"environment", KEY_ENVIRONMENT, "FILE", 0, "Equirectangular image (HDR or EXR) that lights the scene",
      CLI_GROUP_OUTPUT},
     {"environment-rotation", KEY_ENVIRONMENT_ROTATION, "DEGREES", 0,
@@ -186,6 +189,18 @@ static error_t set_real(struct cli_job *job, const char *field, const char *valu
                         double *number)
 {
     return fl_text_real(value, minimum, maximum, number, &job->error) ? 0 : name_field(job, field);
+}
+
+static error_t set_crop(struct cli_job *job, const char *field, const char *value)
+{
+    struct message_render *options = &job->options;
+    int length = 0;
+    if (sscanf(value, "%4u,%4u,%4u,%4u%n", &options->crop_x, &options->crop_y, &options->crop_width,
+               &options->crop_height, &length) == 4 &&
+        value[length] == '\0' && strspn(value, "0123456789,") == strlen(value) && options->crop_width > 0 &&
+        options->crop_height > 0)
+        return 0;
+    return cli_usage(job, field, "'%s' is no part of a picture: use X,Y,W,H as in 640,0,320,180", value);
 }
 
 static error_t set_fov(struct cli_job *job, const char *field, const char *value)
@@ -357,6 +372,8 @@ static error_t set_option(struct cli_job *job, int key, const char *field, const
         return fl_text_size(value, &job->options.width, &job->options.height, &job->error)
                    ? 0
                    : name_field(job, field);
+    case KEY_CROP:
+        return set_crop(job, field, value);
     case KEY_FORMAT:
         return set_format(job, field, value);
     case KEY_FOV:
@@ -503,7 +520,7 @@ const struct argp *cli_views_argp(void)
 {
     static const char *const left_out[] = {"output",        "format", "half",      "float",   "timings",
                                            "trace-file",    "layers", "retry-for", "retries", "metadata",
-                                           "stereo-layout", "noise",  NULL};
+                                           "stereo-layout", "noise",  "crop",      NULL};
     static struct argp_option kept[OPTIONS_MAX];
     static const struct argp argp = {.options = kept, .parser = parse};
     keep(kept, left_out);
@@ -515,7 +532,7 @@ const struct argp *cli_view_argp(void)
     static const char *const left_out[] = {"output",      "format",   "half",       "float",   "samples",
                                            "integrator",  "timings",  "trace-file", "layers",  "clip-once",
                                            "clip-start",  "encoding", "retry-for",  "retries", "metadata",
-                                           "light-field", "baseline", "views",      NULL};
+                                           "light-field", "baseline", "views",      "crop",    NULL};
     static struct argp_option kept[OPTIONS_MAX];
     static const struct argp argp = {.options = kept, .parser = parse};
     keep(kept, left_out);

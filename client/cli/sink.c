@@ -168,9 +168,12 @@ static bool have(struct cli_sink *sink, uint32_t frame)
     const struct message_render *wanted = &sink->job->options;
     const uint32_t across = sink->part == CLI_PART_ALL ? wanted->views_across : 1;
     uint32_t width = 0, height = 0;
-    return sink->is_series && fl_pattern_path(&sink->pattern, frame, sink->path, sizeof(sink->path)) &&
-           fl_image_size(sink->path, &width, &height) && width == wanted->width * across &&
-           height == wanted->height * wanted->views_down;
+    if (!sink->is_series || !fl_pattern_path(&sink->pattern, frame, sink->path, sizeof(sink->path)) ||
+        !fl_image_size(sink->path, &width, &height))
+        return false;
+    return wanted->crop_width > 0
+               ? width == wanted->crop_width && height == wanted->crop_height
+               : width == wanted->width * across && height == wanted->height * wanted->views_down;
 }
 
 bool cli_sinks_have(struct cli_sinks *sinks, uint32_t frame)

@@ -25,8 +25,16 @@ struct frame_camera {
     float near; /* metres; 0: chosen from the scene */
 };
 
+/* A part of a picture, pixels; width 0: all of it. */
+struct frame_crop {
+    uint32_t x, y, width, height;
+};
+
 struct frame_request {
     uint32_t width, height; /* of the whole picture */
+    /* Only the tiles of 8 x 8 pixels that this part touches get samples, and the result is the part. Not with
+     * `noise` and `denoise`, which look at pixels around, attachments and VIEW_SOURCE_LAYERS. */
+    struct frame_crop crop;
     /* Views in it, of the same size, row by row; 0: 1. Each is that of an eye of its own, see frame_view_eye(). */
     uint32_t views_across, views_down;
     float baseline; /* metres between neighbouring eyes */

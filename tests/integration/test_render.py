@@ -94,6 +94,27 @@ class Pictures(OneDaemon):
                 self.assertEqual(read_png(unasked), read_png(paths["reference"]),
                                  "the reference traces first hits, too, unless it is told to rasterise them")
 
+    def test_a_crop_is_that_part_of_the_whole_picture(self):
+        """To the byte, of rasterised and of traced first hits, and of all layers."""
+        for primary, (x, y, width, height) in (("raster", (37, 21, 50, 33)), ("trace", (0, 112, 160, 8))):
+            with self.subTest(primary=primary):
+                whole, part = self.folder / "whole.png", self.folder / "part.png"
+                self.expect(render_picture("cornell", whole, "--primary", primary), 0)
+                self.expect(render_picture("cornell", part, "--primary", primary, "--crop", f"{x},{y},{width},{height}"), 0)
+                _, _, rows, channels = read_png(whole)
+                wanted = [row[x * channels:(x + width) * channels] for row in rows[y:y + height]]
+                self.assertTrue(read_png(part) == (width, height, wanted, channels))
+        whole, part = self.folder / "whole.exr", self.folder / "part.exr"
+        layers = ("--layers", "beauty,normal,depth", "--float")
+        self.expect(render_picture("cornell", whole, *layers), 0)
+        self.expect(render_picture("cornell", part, *layers, "--crop", "37,21,50,33"), 0)
+        wanted, got = farlight_test.read_exr(whole)[2], farlight_test.read_exr(part)[2]
+        for name in got:
+            self.assertEqual(list(got[name]), [value for y in range(21, 54)
+                                               for value in wanted[name][y * 160 + 37:y * 160 + 87]], name)
+        for options in (("--crop", "150,0,20,20"), ("--crop", "1,2,3"), ("--crop", "0,0,8,8", "--noise", "0.1")):
+            self.assertIn("--crop", self.expect(render_picture("cornell", part, *options), 2).stderr)
+
     def test_an_environment_lies_as_in_viewers_of_gltf(self):
         """Its middle column is +x and what is right of that is +z; a turn of 90 degrees about +y takes +x to -z."""
         red, green, dark = bytes((255, 16, 16, 129)), bytes((16, 255, 16, 129)), bytes((16, 16, 16, 129))
