@@ -75,6 +75,9 @@ enum cli_image {
     CLI_IMAGE_JPEG,
     CLI_IMAGE_EXR,
     CLI_IMAGE_HDR,
+    CLI_IMAGE_WEBP,
+    CLI_IMAGE_TIFF,
+    CLI_IMAGE_GIF,
     CLI_IMAGE_MP4, /* from here on videos, of animations only */
     CLI_IMAGE_MKV,
     CLI_IMAGE_Y4M,
@@ -235,7 +238,7 @@ struct cli_job {
         is_orbit;
     bool has_samples;
     char depth_field[24];  /* the option that set the depth, for messages; empty: none */
-    unsigned file_quality; /* of JPEG files; 0: default */
+    unsigned file_quality; /* of JPEG, WebP and video files; 0: default */
     enum cli_timings_form timings;
     struct record_camera_key key;
     struct message_render options;

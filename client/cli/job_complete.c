@@ -30,7 +30,8 @@ static bool complete_output(struct cli_job *job, struct cli_output *output, bool
         output->image = cli_image_by_path(output->path);
     if (output->image == CLI_IMAGE_UNKNOWN) {
         cli_usage(job, output->path, "its ending names no %sformat", is_series ? "" : "image ");
-        return fl_error_remedy(&job->error, "known: .png .jpg .jpeg .exr .hdr%s, or --format",
+        return fl_error_remedy(&job->error,
+                               "known: .png .jpg .jpeg .exr .hdr .webp .tiff .tif .gif%s, or --format",
                                is_series ? " .mp4 .mkv .y4m" : "");
     }
     if (!is_series && cli_image_is_video(output->image)) {
@@ -142,7 +143,7 @@ static bool complete_encoding(struct cli_job *job)
     for (size_t i = 0; i < job->output_count; i++) {
         const enum cli_image image = job->outputs[i].image;
         const unsigned quality = job->file_quality > 0 ? job->file_quality : job->options.quality;
-        if (image != CLI_IMAGE_JPEG && !cli_image_is_video(image))
+        if (image != CLI_IMAGE_JPEG && image != CLI_IMAGE_WEBP && !cli_image_is_video(image))
             continue;
         if (cli_image_is_video(image) && quality > 51)
             return cli_usage(job, "--quality", "a video has 1 (best) to 51") == 0;

@@ -55,7 +55,7 @@ static const struct row {
      "How pixels travel: raw, zstd, predicted, jpeg (default: raw on this machine, zstd over a network)",
      CLI_GROUP_METHOD, GIVEN(has_encoding), true},
     {"quality", "quality", "N",
-     "JPEG quality 1 to 100, zstd level 1 to 19, or rate factor of a video, 1 (best) to 51 (default 0: by the "
+     "Quality of JPEG and WebP, 1 to 100, zstd level 1 to 19, or rate factor of a video, 1 (best) to 51 (default 0: by the "
      "encoding)",
      CLI_GROUP_METHOD, GIVEN(has_quality), true},
     {"integrator", "integrator", "NAME",

@@ -62,7 +62,8 @@ enum key {
 static const struct argp_option special[] = {
     {"output", KEY_OUTPUT, "IMAGE", 0, "Image file; its ending is its format. '-' is standard output",
      CLI_GROUP_OUTPUT},
-    {"format", KEY_FORMAT, "FORMAT", 0, "png, jpeg, exr, hdr, where the ending does not say it", CLI_GROUP_OUTPUT},
+    {"format", KEY_FORMAT, "FORMAT", 0, "png, jpeg, exr, hdr, webp, tiff or gif, where the ending does not say it",
+     CLI_GROUP_OUTPUT},
     {"half", KEY_HALF, NULL, 0, "EXR of half floats (default)", CLI_GROUP_OUTPUT},
     {"float", KEY_FLOAT, NULL, 0, "EXR of 32-bit floats", CLI_GROUP_OUTPUT},
     {"metadata", KEY_METADATA, "stable|full", 0,
@@ -182,7 +183,9 @@ static error_t set_format(struct cli_job *job, const char *field, const char *va
     job->image = cli_image_by_name(value);
     return job->image != CLI_IMAGE_UNKNOWN
                ? 0
-               : cli_usage(job, field, "unknown format '%s' (known: png, jpeg, exr, hdr, mp4, mkv, y4m)", value);
+               : cli_usage(job, field,
+                           "unknown format '%s' (known: png, jpeg, exr, hdr, webp, tiff, gif, mp4, mkv, y4m)",
+                           value);
 }
 
 static error_t set_real(struct cli_job *job, const char *field, const char *value, double minimum, double maximum,

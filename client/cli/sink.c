@@ -190,11 +190,12 @@ static bool write_image(struct cli_sink *sink, const struct fl_frame *frame, str
     if (sink->is_series && !fl_pattern_path(&sink->pattern, frame->frame, sink->path, sizeof(sink->path)))
         return fl_error_set(error, FL_ERROR_FILE, sink->output.path, "the path of frame %u is too long",
                             frame->frame);
-    const struct fl_export_options options = {.path = sink->path,
-                                              .format = cli_image_name(sink->output.image),
-                                              .half = !job->float_pixels && sink->output.image == CLI_IMAGE_EXR,
-                                              .quality =
-                                                  sink->output.image == CLI_IMAGE_JPEG ? job->file_quality : 0};
+    const struct fl_export_options options = {
+        .path = sink->path,
+        .format = cli_image_name(sink->output.image),
+        .half = !job->float_pixels && sink->output.image == CLI_IMAGE_EXR,
+        .quality =
+            sink->output.image == CLI_IMAGE_JPEG || sink->output.image == CLI_IMAGE_WEBP ? job->file_quality : 0};
     return fl_exporter_write(sink->exporter, frame, &options, error);
 }
 

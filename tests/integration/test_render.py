@@ -18,6 +18,7 @@ import sys
 import tempfile
 import termios
 import time
+import zlib
 
 import farlight_test
 from farlight_test import BIN, Case, Daemon, OneDaemon, bundled_scenes, farlight, grid_means, read_png
@@ -154,12 +155,34 @@ class Pictures(OneDaemon):
 
 class Outputs(OneDaemon):
     def test_every_format_is_written_and_nothing_else(self):
-        magics = {"png": b"\x89PNG", "jpg": b"\xff\xd8\xff", "exr": b"\x76\x2f\x31\x01", "hdr": b"#?RADIANCE"}
+        magics = {"png": b"\x89PNG", "jpg": b"\xff\xd8\xff", "exr": b"\x76\x2f\x31\x01", "hdr": b"#?RADIANCE", "webp": b"RIFF",
+                  "tif": b"II*\0", "gif": b"GIF89a"}
         for ending, magic in magics.items():
             path = self.folder / f"picture.{ending}"
             self.expect(render_picture("cornell", path), 0)
             self.assertTrue(path.read_bytes().startswith(magic), ending)
         self.assertEqual(self.leftovers(), sorted(f"picture.{ending}" for ending in magics))
+
+    def test_tiff_has_the_pixels_of_png_and_webp_its_alpha(self):
+        def picture(ending):
+            path = self.folder / f"picture.{ending}"
+            self.expect(farlight("render", bundled_scenes() / "carousel.glb", "-o", path, "--size", "80x60", "--integrator",
+                                 "whitted", "--background", "transparent"), 0)
+            return path
+        data, (width, height, rows, _) = picture("tiff").read_bytes(), read_png(picture("png"))
+        at, tags = struct.unpack_from("<I", data, 4)[0], {}
+        for i in range(struct.unpack_from("<H", data, at)[0]):
+            tag, _, _, value = struct.unpack_from("<HHII", data, at + 2 + 12 * i)
+            tags[tag] = value
+        self.assertEqual([tags[tag] for tag in (256, 257, 277, 338)], [width, height, 4, 2], "size, channels, straight alpha")
+        plain = zlib.decompress(data[tags[273]:tags[273] + tags[279]])
+        for y, row in enumerate(rows):
+            got = bytearray(plain[y * width * 4:(y + 1) * width * 4])
+            for i in range(4, len(got)):
+                got[i] = (got[i] + got[i - 4]) & 255
+            self.assertTrue(bytes(got) == row, y)
+        data = picture("webp").read_bytes()
+        self.assertEqual((data[8:16], data[20] >> 4 & 1), (b"WEBPVP8X", 1))
 
     def test_exr_metadata_holds_camera_and_tracer_and_in_full_revision_times_and_path(self):
         path = self.folder / "picture.exr"
@@ -181,7 +204,7 @@ class Outputs(OneDaemon):
 
     def test_the_same_request_makes_the_same_bytes_in_every_format(self):
         folders = [self.folder / "a", self.folder / "b"]
-        formats = {"png": [], "jpg": [], "hdr": [], "exr": ["--layers", "beauty,depth"]}
+        formats = {"png": [], "jpg": [], "hdr": [], "webp": [], "tiff": [], "gif": [], "exr": ["--layers", "beauty,depth"]}
         for folder in folders:
             folder.mkdir()
             shutil.copy(bundled_scenes() / "teapot.glb", folder)
