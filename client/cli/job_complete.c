@@ -6,6 +6,8 @@
 
 #define RADIANS_PER_DEGREE 0.017453292519943295
 #define FRAME_BYTES_MAX (UINT64_C(4080) << 20) /* as the daemon has it */
+#define AUTO_SAMPLES 256u                      /* of --samples auto: the most that a pixel gets */
+#define AUTO_NOISE 0.03f                       /* likewise: hardly to be seen */
 #define PATH_SAMPLES 64u                       /* where nothing is said */
 #define CLAMP 10.0f                            /* likewise; times white, as Cycles has it for indirect light */
 #define NOISE_SAMPLES 4096u                    /* likewise with --noise: most pixels need far fewer */
@@ -249,6 +251,10 @@ static void complete_integrator(struct cli_job *job)
 static void complete_samples(struct cli_job *job, bool is_series)
 {
     struct message_render *wanted = &job->options;
+    if (job->auto_samples) {
+        wanted->samples = AUTO_SAMPLES;
+        wanted->noise = wanted->noise > 0.0f ? wanted->noise : AUTO_NOISE;
+    }
     const bool by_error = wanted->noise > 0.0f;
     job->endless = job->progressive && !job->has_samples && !by_error;
     job->by_error = by_error && !is_series;
@@ -260,6 +266,8 @@ static void complete_samples(struct cli_job *job, bool is_series)
         wanted->samples = PATH_SAMPLES;
     else if (!job->has_samples && wanted->integrator == PROTOCOL_INTEGRATOR_AO)
         wanted->samples = AO_SAMPLES;
+    else if (!job->has_samples && !job->progressive && job->usual_samples > 0)
+        wanted->samples = job->usual_samples;
 }
 
 static bool complete_tracer(struct cli_job *job)
