@@ -31,6 +31,8 @@ static const struct row {
     {"seed", "seed", "N", "Same seed, same picture (default 0)", CLI_GROUP_PICTURE, 0, true},
     {"exposure", "exposure_stops", "STOPS", "Multiply the picture by 2 to this power", CLI_GROUP_PICTURE, 0, true},
     {"tone-map", "tone_map", "NAME", "From linear light to colours of PNG and JPEG", CLI_GROUP_PICTURE, 0, true},
+    {"wireframe", "wireframe", "PIXELS", "Draw the edges of triangles, in lines of this width (default 0: none)",
+     CLI_GROUP_PICTURE, 0, false},
     {"azimuth", "auto_azimuth", "DEGREES",
      "Look from this side: 0 is the front (+z), 90 the right (+x), 180 the back (default 24)", CLI_GROUP_CAMERA,
      GIVEN(has_framing), true},

@@ -10,6 +10,7 @@
 #include "render/pixel_filter.h"
 #include "render/sequence.h"
 #include "render/wave_trace.h"
+#include "render/wireframe.h"
 #include "shared/path.h"
 
 void frame_abandon(struct frame_renderer *renderer)
@@ -328,6 +329,8 @@ static bool find_primary(struct frame_renderer *renderer, struct error *error)
         return false;
     if (done)
         renderer->phase = renderer->work->layers.wanted ? PHASE_LAYERS : PHASE_SHADE;
+    if (done && !wireframe_paint(context, error))
+        return false;
     if (done && denoise_notes_samples(context) && !denoise_note(&renderer->work->denoise.notes, context, error))
         return false;
     return gpu_check(renderer->device, "primary hits", error);

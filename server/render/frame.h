@@ -70,6 +70,7 @@ struct frame_request {
     float ao_distance;    /* metres; 0: a tenth of the scene's diagonal */
     float ao_falloff;     /* as a power of 1 - distance / ao_distance; 0: all counts the same */
     uint32_t ao_rays;     /* a sample; 0: 8 */
+    float wireframe;      /* pixels: width of lines along the edges of triangles; 0: none */
     float layer_opacity;  /* of opaque surfaces, integrator raycast; 0: 0.5 */
     uint32_t layers;      /* bits; 0: the picture alone. More than it need PIXEL_FORMAT_RGBA32F */
     uint32_t attachments; /* bits; beside the picture alone, in any format of it */

@@ -253,7 +253,7 @@ static bool same_light(const struct frame_request *a, const struct frame_request
     return a->integrator == b->integrator && a->brdf == b->brdf &&
            frame_request_radiance_limit(a) == frame_request_radiance_limit(b) &&
            a->ao_distance == b->ao_distance && a->ao_falloff == b->ao_falloff && a->ao_rays == b->ao_rays &&
-           a->layer_opacity == b->layer_opacity;
+           a->layer_opacity == b->layer_opacity && a->wireframe == b->wireframe;
 }
 
 bool frame_request_hides_environment(const struct frame_request *request)

@@ -466,6 +466,7 @@ static void fill_rest(struct engine_job *job, const struct session *session, con
                 .ao_falloff = render->ao_falloff,
                 .ao_rays = render->ao_rays,
                 .layer_opacity = render->layer_opacity,
+                .wireframe = render->wireframe,
                 .layers = render->layers,
                 .attachments = render->attachments,
                 .accumulate = render->accumulate != 0,

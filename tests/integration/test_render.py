@@ -116,6 +116,21 @@ class Pictures(OneDaemon):
         for options in (("--crop", "150,0,20,20"), ("--crop", "1,2,3"), ("--crop", "0,0,8,8", "--noise", "0.1")):
             self.assertIn("--crop", self.expect(render_picture("cornell", part, *options), 2).stderr)
 
+    def test_wireframe_draws_edges_as_wide_as_asked(self):
+        """One square, 40 pixels wide: of the row through its upper half lines 4 pixels wide cover 2 at each border, whose other
+        halves lie outside, and sqrt(2) times 4 where the diagonal is crossed, which goes on to both sides of the edge."""
+        model = self.folder / "square.obj"
+        model.write_text("v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nf 1 2 3\nf 1 3 4\n")
+        for integrator, primary in (("whitted", "raster"), ("raycast", "trace"), ("path", "trace")):
+            with self.subTest(integrator=integrator):
+                path = self.folder / "square.exr"
+                self.expect(farlight("render", model, "-o", path, "--size", "60x60", "--eye", "0,0,10", "--look-at", "0,0,0",
+                                     "--fov", "16.9924", "--wireframe", "4", "--integrator", integrator, "--primary", primary,
+                                     "--layers", "albedo", "--filter", "box", "--samples", "16", "--float"), 0)
+                _, _, values = farlight_test.read_exr(path)
+                row = values["albedo.R"][20 * 60:21 * 60]
+                self.assertAlmostEqual(sum(row) / 0.6, 40 - 4 - 4 * 2 ** 0.5, delta=0.5)
+
     def test_an_environment_lies_as_in_viewers_of_gltf(self):
         """Its middle column is +x and what is right of that is +z; a turn of 90 degrees about +y takes +x to -z."""
         red, green, dark = bytes((255, 16, 16, 129)), bytes((16, 255, 16, 129)), bytes((16, 16, 16, 129))
