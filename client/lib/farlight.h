@@ -483,7 +483,8 @@ struct fl_exporter_options {
 };
 struct fl_export_options {
     const char *path;
-    const char *format; /* "png", "jpeg", "exr", "hdr", "webp", "tiff", "gif" where the path's ending does not say; may be NULL */
+    const char *format; /* "png", "jpeg", "exr", "hdr", "webp", "tiff", "gif" where the path's ending does not say;
+                           may be NULL */
     bool half;          /* EXR: half floats; layers of distances, positions and object numbers stay 32-bit */
     unsigned quality;   /* JPEG and WebP; 0: 95 */
 };
