@@ -77,6 +77,9 @@ enum cli_image {
     CLI_IMAGE_JPEG,
     CLI_IMAGE_EXR,
     CLI_IMAGE_HDR,
+    CLI_IMAGE_WEBP,
+    CLI_IMAGE_TIFF,
+    CLI_IMAGE_GIF,
     CLI_IMAGE_MP4, /* from here on videos, of animations only */
     CLI_IMAGE_MKV,
     CLI_IMAGE_Y4M,
@@ -261,9 +264,10 @@ struct cli_job {
     const char *framed;                         /* node that it shows, name or number; NULL: all */
     bool float_pixels, half_pixels, has_encoding, has_primary, has_quality, has_integrator, has_clamp, quiet,
         is_orbit;
-    bool has_samples;
-    char depth_field[24];  /* the option that set the depth, for messages; empty: none */
-    unsigned file_quality; /* of JPEG files; 0: default */
+    bool has_samples, auto_samples; /* --samples auto */
+    uint32_t usual_samples;         /* where nothing is said and the integrator has no number of its own; 0: 1 */
+    char depth_field[24];           /* the option that set the depth, for messages; empty: none */
+    unsigned file_quality;          /* of JPEG, WebP and video files; 0: default */
     enum cli_timings_form timings;
     struct record_camera_key key;
     struct message_render options;

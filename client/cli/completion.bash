@@ -22,7 +22,7 @@ _farlight()
         --layers) words="beauty,albedo,normal beauty,depth beauty,albedo,normal,depth,position,ao,id beauty,unknown" ;;
         --scale) words="1 2 4 8" ;;
         --still-encoding) words="raw zstd predicted jpeg" ;;
-        --format) words="png jpeg exr hdr mp4 mkv y4m glb gltf obj ply stl fbx dae 3mf nff" ;;
+        --format) words="png jpeg exr hdr webp tiff gif mp4 mkv y4m glb gltf obj ply stl fbx dae 3mf nff" ;;
         --metadata) words="stable full" ;;
         --stereo-layout) words="side over files" ;;
         --views) [ "$subcommand" = view ] && words="off auto on" || words="rays quadtree" ;;
@@ -53,7 +53,7 @@ _farlight_program()
     farlightd:--log-level) words="error warning info debug" ;;
     farlight-view:--link) words="2mbit,100ms,1% 10mbit,50ms 50mbit" ;;
     farlight-view:--*) words=$("${program%-view}" complete "$before" 2>/dev/null) ;;
-    farlight-export:--format) words="png jpeg exr hdr" ;;
+    farlight-export:--format) words="png jpeg exr hdr webp tiff gif" ;;
     esac
     [[ -n $words || $word != -* ]] || words=$(_farlight_options "$program")
     COMPREPLY=()

@@ -16,9 +16,10 @@ enum cli_image cli_image_by_name(const char *name)
     static const struct {
         const char *name;
         enum cli_image image;
-    } known[] = {{"png", CLI_IMAGE_PNG}, {"jpg", CLI_IMAGE_JPEG}, {"jpeg", CLI_IMAGE_JPEG},
-                 {"exr", CLI_IMAGE_EXR}, {"hdr", CLI_IMAGE_HDR},  {"mp4", CLI_IMAGE_MP4},
-                 {"mkv", CLI_IMAGE_MKV}, {"y4m", CLI_IMAGE_Y4M}};
+    } known[] = {{"png", CLI_IMAGE_PNG},   {"jpg", CLI_IMAGE_JPEG}, {"jpeg", CLI_IMAGE_JPEG},
+                 {"exr", CLI_IMAGE_EXR},   {"hdr", CLI_IMAGE_HDR},  {"webp", CLI_IMAGE_WEBP},
+                 {"tiff", CLI_IMAGE_TIFF}, {"tif", CLI_IMAGE_TIFF}, {"gif", CLI_IMAGE_GIF},
+                 {"mp4", CLI_IMAGE_MP4},   {"mkv", CLI_IMAGE_MKV},  {"y4m", CLI_IMAGE_Y4M}};
     for (size_t i = 0; i < sizeof(known) / sizeof(known[0]); i++)
         if (strcasecmp(known[i].name, name) == 0)
             return known[i].image;
@@ -36,7 +37,8 @@ enum cli_image cli_image_by_path(const char *path)
 
 const char *cli_image_name(enum cli_image image)
 {
-    static const char *const names[] = {"", "png", "jpeg", "exr", "hdr", "mp4", "mkv", "y4m"};
+    static const char *const names[] = {"",     "png", "jpeg", "exr", "hdr", "webp",
+                                        "tiff", "gif", "mp4",  "mkv", "y4m"};
     return names[image];
 }
 

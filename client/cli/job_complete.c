@@ -6,6 +6,8 @@
 
 #define RADIANS_PER_DEGREE 0.017453292519943295
 #define FRAME_BYTES_MAX (UINT64_C(4080) << 20) /* as the daemon has it */
+#define AUTO_SAMPLES 256u                      /* of --samples auto: the most that a pixel gets */
+#define AUTO_NOISE 0.03f                       /* likewise: hardly to be seen */
 #define PATH_SAMPLES 64u                       /* where nothing is said */
 #define CLAMP 10.0f                            /* likewise; times white, as Cycles has it for indirect light */
 #define NOISE_SAMPLES 4096u                    /* likewise with --noise: most pixels need far fewer */
@@ -30,7 +32,8 @@ static bool complete_output(struct cli_job *job, struct cli_output *output, bool
         output->image = cli_image_by_path(output->path);
     if (output->image == CLI_IMAGE_UNKNOWN) {
         cli_usage(job, output->path, "its ending names no %sformat", is_series ? "" : "image ");
-        return fl_error_remedy(&job->error, "known: .png .jpg .jpeg .exr .hdr%s, or --format",
+        return fl_error_remedy(&job->error,
+                               "known: .png .jpg .jpeg .exr .hdr .webp .tiff .tif .gif%s, or --format",
                                is_series ? " .mp4 .mkv .y4m" : "");
     }
     if (!is_series && cli_image_is_video(output->image)) {
@@ -122,7 +125,8 @@ static bool complete_format(struct cli_job *job)
     if (!job->model_format ||
         (cli_has_input(job) && length > 0 && length < 8 && strspn(job->model_format, letters) == length))
         return true;
-    return cli_usage(job, "--format", "unknown format '%s' (known: png, jpeg, exr, hdr, mp4, mkv, y4m)",
+    return cli_usage(job, "--format",
+                     "unknown format '%s' (known: png, jpeg, exr, hdr, webp, tiff, gif, mp4, mkv, y4m)",
                      job->model_format) == 0;
 }
 
@@ -154,7 +158,7 @@ static bool complete_encoding(struct cli_job *job)
     for (size_t i = 0; i < job->output_count; i++) {
         const enum cli_image image = job->outputs[i].image;
         const unsigned quality = job->file_quality > 0 ? job->file_quality : job->options.quality;
-        if (image != CLI_IMAGE_JPEG && !cli_image_is_video(image))
+        if (image != CLI_IMAGE_JPEG && image != CLI_IMAGE_WEBP && !cli_image_is_video(image))
             continue;
         if (cli_image_is_video(image) && quality > 51)
             return cli_usage(job, "--quality", "a video has 1 (best) to 51") == 0;
@@ -260,6 +264,10 @@ static void complete_integrator(struct cli_job *job)
 static void complete_samples(struct cli_job *job, bool is_series)
 {
     struct message_render *wanted = &job->options;
+    if (job->auto_samples) {
+        wanted->samples = AUTO_SAMPLES;
+        wanted->noise = wanted->noise > 0.0f ? wanted->noise : AUTO_NOISE;
+    }
     const bool by_error = wanted->noise > 0.0f;
     job->endless = job->progressive && !job->has_samples && !by_error;
     job->by_error = by_error && !is_series;
@@ -271,6 +279,8 @@ static void complete_samples(struct cli_job *job, bool is_series)
         wanted->samples = PATH_SAMPLES;
     else if (!job->has_samples && wanted->integrator == PROTOCOL_INTEGRATOR_AO)
         wanted->samples = AO_SAMPLES;
+    else if (!job->has_samples && !job->progressive && job->usual_samples > 0)
+        wanted->samples = job->usual_samples;
 }
 
 static bool complete_tracer(struct cli_job *job)
@@ -338,15 +348,38 @@ static bool complete_noise(struct cli_job *job)
     return fl_error_remedy(&job->error, "give --samples, or render them as they are: --views rays");
 }
 
+static bool complete_crop(struct cli_job *job)
+{
+    const struct message_render *wanted = &job->options;
+    if (wanted->crop_width == 0)
+        return true;
+    if (wanted->crop_x + wanted->crop_width > wanted->width ||
+        wanted->crop_y + wanted->crop_height > wanted->height) {
+        cli_usage(job, "--crop", "%ux%u pixels from (%u, %u) on are not in a picture of %ux%u", wanted->crop_width,
+                  wanted->crop_height, wanted->crop_x, wanted->crop_y, wanted->width, wanted->height);
+        return fl_error_remedy(&job->error, "--size is that of the whole picture");
+    }
+    const char *other = wanted->noise > 0.0f                                 ? "--noise"
+                        : wanted->denoise != PROTOCOL_DENOISE_OFF            ? "--denoise"
+                        : job->views.has_stereo                              ? "--stereo"
+                        : job->views.has_light_field                         ? "--light-field"
+                        : wanted->view_source == PROTOCOL_VIEW_SOURCE_LAYERS ? "--lens quadtree"
+                                                                             : NULL;
+    if (!other)
+        return true;
+    cli_usage(job, "--crop", "cannot go with %s, which looks at pixels around", other);
+    return fl_error_remedy(&job->error, "leave out one of them");
+}
+
 bool cli_job_complete(struct cli_job *job, bool is_series)
 {
     if (!complete_scene(job) || !complete_format(job))
         return false;
     complete_samples(job, is_series);
     complete_integrator(job);
-    return cli_views_complete(job, is_series) && complete_noise(job) && complete_tracer(job) &&
-           complete_clips(job) && complete_outputs(job, is_series) && complete_encoding(job) &&
-           complete_camera(job);
+    return cli_views_complete(job, is_series) && complete_noise(job) && complete_crop(job) &&
+           complete_tracer(job) && complete_clips(job) && complete_outputs(job, is_series) &&
+           complete_encoding(job) && complete_camera(job);
 }
 
 bool cli_job_complete_view(struct cli_job *job)

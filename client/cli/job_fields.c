@@ -18,7 +18,10 @@ static const struct row {
     size_t given_offset;
     bool is_of_shot;
 } rows[] = {
-    {"samples", "samples", "N", "Samples per pixel (default 1; 16 for the integrator ao, 64 for path)",
+    {"samples", "samples", "N",
+     "Samples per pixel, or auto: until no noise is seen, up to 256 (default 16 for a picture, 1 for animations "
+     "and "
+     "comparisons; 16 for the integrator ao, 64 for path)",
      CLI_GROUP_PICTURE, GIVEN(has_samples), true},
     {"noise", "noise", "ERROR",
      "Sample each part of the picture until its error is below this, such as 0.02 for 2 %; --samples is the most "
@@ -28,6 +31,8 @@ static const struct row {
     {"seed", "seed", "N", "Same seed, same picture (default 0)", CLI_GROUP_PICTURE, 0, true},
     {"exposure", "exposure_stops", "STOPS", "Multiply the picture by 2 to this power", CLI_GROUP_PICTURE, 0, true},
     {"tone-map", "tone_map", "NAME", "From linear light to colours of PNG and JPEG", CLI_GROUP_PICTURE, 0, true},
+    {"wireframe", "wireframe", "PIXELS", "Draw the edges of triangles, in lines of this width (default 0: none)",
+     CLI_GROUP_PICTURE, 0, false},
     {"azimuth", "auto_azimuth", "DEGREES",
      "Look from this side: 0 is the front (+z), 90 the right (+x), 180 the back (default 24)", CLI_GROUP_CAMERA,
      GIVEN(has_framing), true},
@@ -55,7 +60,8 @@ static const struct row {
      "How pixels travel: raw, zstd, predicted, jpeg (default: raw on this machine, zstd over a network)",
      CLI_GROUP_METHOD, GIVEN(has_encoding), true},
     {"quality", "quality", "N",
-     "JPEG quality 1 to 100, zstd level 1 to 19, or rate factor of a video, 1 (best) to 51 (default 0: by the "
+     "Quality of JPEG and WebP, 1 to 100, zstd level 1 to 19, or rate factor of a video, 1 (best) to 51 (default "
+     "0: by the "
      "encoding)",
      CLI_GROUP_METHOD, GIVEN(has_quality), true},
     {"integrator", "integrator", "NAME",
@@ -292,8 +298,13 @@ error_t cli_field_set(struct cli_job *job, const struct cli_field *option, const
 {
     const struct field_desc *field = option->field;
     void *place = (char *)&job->options + field->offset;
+    const bool is_samples = strcmp(option->option, "samples") == 0;
+    if (is_samples)
+        job->auto_samples = strcmp(value, "auto") == 0;
     if (option->given_offset != 0)
         *(bool *)((char *)job + option->given_offset) = true;
+    if (is_samples && job->auto_samples)
+        return 0;
     return field->kind == FIELD_ENUM   ? set_enum(job, field, name, value, place)
            : field->kind == FIELD_REAL ? set_real(job, field, name, value, place)
                                        : set_int(job, field, name, value, place);

@@ -25,6 +25,7 @@ enum key {
     KEY_KEY = 0x100,
     KEY_LINK,
     KEY_SIZE,
+    KEY_CROP,
     KEY_ENVIRONMENT,
     KEY_ENVIRONMENT_ROTATION,
     KEY_VARIANT,
@@ -66,7 +67,7 @@ static const struct argp_option special[] = {
      "Place the MODEL named before: metres, degrees about x, then y, then z, and a factor; again: one more of it",
      CLI_GROUP_OUTPUT},
     {"format", KEY_FORMAT, "FORMAT", 0,
-     "png, jpeg, exr, hdr, where the ending does not say it; or of a model from standard input, such as glb",
+     "png, jpeg, exr, hdr, webp, tiff or gif, where the ending does not say it; or of a model from standard input",
      CLI_GROUP_OUTPUT},
     {"half", KEY_HALF, NULL, 0, "EXR of half floats (default)", CLI_GROUP_OUTPUT},
     {"float", KEY_FLOAT, NULL, 0, "EXR of 32-bit floats", CLI_GROUP_OUTPUT},
@@ -87,6 +88,8 @@ static const struct argp_option special[] = {
      CLI_GROUP_OUTPUT},
     {NULL, 0, NULL, 0, "Picture:", CLI_GROUP_PICTURE},
     {"size", KEY_SIZE, "WxH", 0, "Pixels (default 1280x720)", CLI_GROUP_OUTPUT},
+    {"crop", KEY_CROP, "X,Y,W,H", 0,
+     "Render and write only these W x H pixels of the picture, from X to the right and Y down", CLI_GROUP_OUTPUT},
     {"environment", KEY_ENVIRONMENT, "FILE", 0, "Equirectangular image (HDR or EXR) that lights the scene",
      CLI_GROUP_OUTPUT},
     {"environment-rotation", KEY_ENVIRONMENT_ROTATION, "DEGREES", 0,
@@ -200,6 +203,18 @@ static error_t add_edit(struct cli_job *job, const char *field, const char *valu
         return cli_usage(job, field, "more than %d assignments cannot be given", CLI_EDITS_MAX);
     job->edits[job->edit_count++] = value;
     return fl_assignment_parse(value, &assignment, &job->error) ? 0 : EINVAL;
+}
+
+static error_t set_crop(struct cli_job *job, const char *field, const char *value)
+{
+    struct message_render *options = &job->options;
+    int length = 0;
+    if (sscanf(value, "%4u,%4u,%4u,%4u%n", &options->crop_x, &options->crop_y, &options->crop_width,
+               &options->crop_height, &length) == 4 &&
+        value[length] == '\0' && strspn(value, "0123456789,") == strlen(value) && options->crop_width > 0 &&
+        options->crop_height > 0)
+        return 0;
+    return cli_usage(job, field, "'%s' is no part of a picture: use X,Y,W,H as in 640,0,320,180", value);
 }
 
 static error_t set_fov(struct cli_job *job, const char *field, const char *value)
@@ -362,6 +377,8 @@ static error_t set_option(struct cli_job *job, int key, const char *field, const
         return fl_text_size(value, &job->options.width, &job->options.height, &job->error)
                    ? 0
                    : name_field(job, field);
+    case KEY_CROP:
+        return set_crop(job, field, value);
     case KEY_FORMAT:
         return set_format(job, value);
     case KEY_FOV:
@@ -508,7 +525,7 @@ const struct argp *cli_views_argp(void)
 {
     static const char *const left_out[] = {"output",        "format", "half",      "float",   "timings",
                                            "trace-file",    "layers", "retry-for", "retries", "metadata",
-                                           "stereo-layout", "noise",  NULL};
+                                           "stereo-layout", "noise",  "crop",      NULL};
     static struct argp_option kept[OPTIONS_MAX];
     static const struct argp argp = {.options = kept, .parser = parse};
     keep(kept, left_out);
@@ -529,10 +546,10 @@ const struct argp *cli_thumbnail_argp(void)
 
 const struct argp *cli_view_argp(void)
 {
-    static const char *const left_out[] = {"output",      "format",   "half",       "float",   "samples",
-                                           "integrator",  "timings",  "trace-file", "layers",  "clip-once",
-                                           "clip-start",  "encoding", "retry-for",  "retries", "metadata",
-                                           "light-field", "baseline", "views",      "edit",    NULL};
+    static const char *const left_out[] = {
+        "output",     "format",      "half",      "float",      "samples",  "integrator", "timings",
+        "trace-file", "layers",      "clip-once", "clip-start", "encoding", "retry-for",  "retries",
+        "metadata",   "light-field", "baseline",  "views",      "edit",     "crop",       NULL};
     static struct argp_option kept[OPTIONS_MAX];
     static const struct argp argp = {.options = kept, .parser = parse};
     keep(kept, left_out);

@@ -155,8 +155,9 @@ static bool apply_output(const struct shot_reader *reader, const struct shot_val
         output->image = job->image;
     const bool to_stdout = strcmp(written, "-") == 0;
     if (output->image == CLI_IMAGE_UNKNOWN && !to_stdout)
-        return shot_wrong(reader, at, "known: .png .jpg .jpeg .exr .hdr .mp4 .mkv .y4m, or say \"format\"",
-                          "the ending is not that of a known format");
+        return shot_wrong(
+            reader, at, "known: .png .jpg .jpeg .exr .hdr .webp .tiff .tif .gif .mp4 .mkv .y4m, or say \"format\"",
+            "the ending is not that of a known format");
     if (!to_stdout && !cli_image_is_video(output->image)) {
         if (!fl_pattern_parse(written, &pattern, &why))
             return shot_wrong(reader, at, why.remedy[0] != '\0' ? why.remedy : "write it like 'frames/%04d.exr'",

@@ -164,9 +164,12 @@ static bool have(struct cli_sink *sink, uint32_t frame)
     const struct message_render *wanted = &sink->job->options;
     const uint32_t across = sink->part == CLI_PART_ALL ? wanted->views_across : 1;
     uint32_t width = 0, height = 0;
-    return sink->is_series && fl_pattern_path(&sink->pattern, frame, sink->path, sizeof(sink->path)) &&
-           fl_image_size(sink->path, &width, &height) && width == wanted->width * across &&
-           height == wanted->height * wanted->views_down;
+    if (!sink->is_series || !fl_pattern_path(&sink->pattern, frame, sink->path, sizeof(sink->path)) ||
+        !fl_image_size(sink->path, &width, &height))
+        return false;
+    return wanted->crop_width > 0
+               ? width == wanted->crop_width && height == wanted->crop_height
+               : width == wanted->width * across && height == wanted->height * wanted->views_down;
 }
 
 bool cli_sinks_have(struct cli_sinks *sinks, uint32_t frame)
@@ -183,11 +186,12 @@ static bool write_image(struct cli_sink *sink, const struct fl_frame *frame, str
     if (sink->is_series && !fl_pattern_path(&sink->pattern, frame->frame, sink->path, sizeof(sink->path)))
         return fl_error_set(error, FL_ERROR_FILE, sink->output.path, "the path of frame %u is too long",
                             frame->frame);
-    const struct fl_export_options options = {.path = sink->path,
-                                              .format = cli_image_name(sink->output.image),
-                                              .half = !job->float_pixels && sink->output.image == CLI_IMAGE_EXR,
-                                              .quality =
-                                                  sink->output.image == CLI_IMAGE_JPEG ? job->file_quality : 0};
+    const struct fl_export_options options = {
+        .path = sink->path,
+        .format = cli_image_name(sink->output.image),
+        .half = !job->float_pixels && sink->output.image == CLI_IMAGE_EXR,
+        .quality =
+            sink->output.image == CLI_IMAGE_JPEG || sink->output.image == CLI_IMAGE_WEBP ? job->file_quality : 0};
     return fl_exporter_write(sink->exporter, frame, &options, error);
 }
 

@@ -196,6 +196,16 @@ unsigned char *read_image(const reader &r, const std::string &name, size_t *size
         bytes = files_read(r.files, last.c_str(), size_bytes, reason_last);
     return bytes;
 }
+
+// Made up by the library for a file without materials: nameless or of the library's own name, and plainly white
+// or, of some of its readers, grey.
+bool is_made_up(const tinyobj::material_t &m)
+{
+    const tinyobj::real_t *d = m.diffuse, white = 1, grey = 0.6f;
+    return (m.name.empty() || m.name == "DefaultMaterial") && d[0] == d[1] && d[1] == d[2] &&
+           (d[0] == white || d[0] == grey) && m.metallic == 0 && m.dissolve == 1 && m.emission[0] == 0 &&
+           m.emission[1] == 0 && m.emission[2] == 0 && m.diffuse_texname.empty() && m.emissive_texname.empty();
+}
 } // namespace
 
 void add_materials(reader &r)
@@ -213,7 +223,7 @@ void add_materials(reader &r)
     for (unsigned i = 0; i < r.source->mNumMaterials; i++) {
         const aiMaterial *from = r.source->mMaterials[i];
         materials.push_back(from && used[i] ? material_of(r, *from) : tinyobj::material_t());
-        wanted.push_back(from && used[i] ? &materials.back() : nullptr);
+        wanted.push_back(from && used[i] && !is_made_up(materials.back()) ? &materials.back() : nullptr);
     }
     r.material_ids = obj::add_materials(
         r.scene,

@@ -2,6 +2,7 @@
 /* Meshes and sphere sets of the scene under construction, checked as the server will check them. */
 #include "closed.h"
 #include "model.h"
+#include "ranges.h"
 
 #include <float.h>
 #include <math.h>
@@ -44,38 +45,6 @@ static void mend(struct import_scene *scene, const char *where, float *values, s
         if (!isfinite(values[i]))
             values[i] = 0;
     import_note(scene, PROTOCOL_SEVERITY_WARNING, where, "%s that are NaN or infinite were set to 0", what);
-}
-
-static bool ranges_valid(const struct record_material_range *ranges, uint32_t count, uint32_t primitives)
-{
-    uint64_t end = 0;
-
-    for (uint32_t i = 0; i < count; i++) {
-        if (ranges[i].first < end)
-            return false;
-        end = (uint64_t)ranges[i].first + ranges[i].count;
-        if (end > primitives)
-            return false;
-    }
-    return count <= IMPORT_RANGES_MAX;
-}
-
-/* Merges neighbouring ranges of one material and removes empty ones. */
-static uint32_t ranges_merge(struct record_material_range *ranges, uint32_t count)
-{
-    uint32_t kept = 0;
-
-    for (uint32_t i = 0; i < count; i++) {
-        struct record_material_range *last = kept > 0 ? &ranges[kept - 1] : NULL;
-
-        if (ranges[i].count == 0)
-            continue;
-        if (last && last->material == ranges[i].material && last->first + last->count == ranges[i].first)
-            last->count += ranges[i].count;
-        else
-            ranges[kept++] = ranges[i];
-    }
-    return kept;
 }
 
 static bool triangle_whole(const struct import_mesh *mesh, uint32_t triangle)
@@ -197,14 +166,14 @@ static bool mesh_valid(struct import_scene *scene, struct import_mesh *mesh)
         maximum = mesh->indices[i] > maximum ? mesh->indices[i] : maximum;
     if (maximum >= mesh->vertex_count)
         return import_fail(scene, where, "index %u is beyond the %u vertices", maximum, mesh->vertex_count);
-    mesh->range_count = ranges_merge(mesh->ranges, mesh->range_count);
+    mesh->range_count = import_ranges_merge(mesh->ranges, mesh->range_count);
     if (mesh->range_count > IMPORT_RANGES_MAX)
         return import_fail(scene, where, "more than %d changes of material in one mesh", IMPORT_RANGES_MAX);
-    if (!ranges_valid(mesh->ranges, mesh->range_count, mesh->triangle_count))
+    if (!import_ranges_valid(mesh->ranges, mesh->range_count, mesh->triangle_count))
         return import_fail(scene, where, "material ranges overlap or exceed the triangles");
     if (!all_finite(mesh->positions, (size_t)mesh->vertex_count * 3)) {
         drop_broken(scene, where, mesh);
-        mesh->range_count = ranges_merge(mesh->ranges, mesh->range_count);
+        mesh->range_count = import_ranges_merge(mesh->ranges, mesh->range_count);
         if (mesh->triangle_count == 0)
             return import_fail(scene, where, "every triangle has corners that are NaN or infinite");
     }
@@ -251,7 +220,7 @@ uint32_t import_add_mesh(struct import_scene *scene, struct import_mesh *mesh)
 {
     const char *where = mesh->where ? mesh->where : mesh->name;
     uint64_t vertices = mesh->vertex_count;
-    struct import_edit *edit;
+    struct import_edit *edit = NULL;
     uint32_t count = 0;
 
     if (!mesh_valid(scene, mesh)) {
@@ -263,7 +232,9 @@ uint32_t import_add_mesh(struct import_scene *scene, struct import_mesh *mesh)
     mend(scene, where, mesh->texcoords[1], (size_t)vertices * 2, "texture coordinates");
     for (int i = 0; i < 3; i++)
         mend(scene, where, mesh->target_offsets[i], (size_t)(vertices * mesh->target_count) * 3, "morph targets");
-    edit = import_append(scene, MESSAGE_SET_MESH);
+    /* Colours of vertices multiply the material's: theirs are shown as they are. */
+    if (mesh->colours || import_ranges_fill(scene, &mesh->ranges, &mesh->range_count, mesh->triangle_count))
+        edit = import_append(scene, MESSAGE_SET_MESH);
     if (!edit) {
         import_mesh_finish(mesh);
         return 0;
@@ -310,7 +281,7 @@ static bool spheres_valid(struct import_scene *scene, const char *name, const fl
     for (size_t i = 0; i < count; i++)
         if (!all_finite(spheres + i * 4, 4) || !(spheres[i * 4 + 3] > 0))
             return import_fail(scene, name, "sphere %zu is not finite or has no radius", i);
-    if (!ranges_valid(ranges, range_count, count))
+    if (!import_ranges_valid(ranges, range_count, count))
         return import_fail(scene, name, "material ranges overlap, exceed the spheres or are more than %d",
                            IMPORT_RANGES_MAX);
     return true;
@@ -321,8 +292,9 @@ uint32_t import_add_spheres(struct import_scene *scene, const char *name, float 
 {
     struct import_edit *edit = NULL;
 
-    range_count = ranges_merge(ranges, range_count);
-    if (spheres_valid(scene, name, spheres, count, ranges, range_count))
+    range_count = import_ranges_merge(ranges, range_count);
+    if (spheres_valid(scene, name, spheres, count, ranges, range_count) &&
+        import_ranges_fill(scene, &ranges, &range_count, count))
         edit = import_append(scene, MESSAGE_SET_SPHERES);
     if (!edit) {
         free(spheres);

@@ -83,6 +83,7 @@ struct import_scene {
     size_t note_count;
     uint32_t notes_lost; /* distinct ones beyond IMPORT_NOTES_MAX, about */
     uint32_t last_id[PROTOCOL_OBJECT_COUNT];
+    uint32_t default_material; /* of what has none; 0: all have had one so far */
     uint64_t blob_bytes;
     char file[257];                     /* the current model's, as people named it; goes into `where` */
     char prefix[IMPORT_PREFIX_MAX + 1]; /* likewise, of all names; empty: none */

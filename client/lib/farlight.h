@@ -614,9 +614,10 @@ struct fl_export_text {
 };
 struct fl_export_options {
     const char *path;
-    const char *format; /* "png", "jpeg", "exr", "hdr" where the path's ending does not say; may be NULL */
+    const char *format; /* "png", "jpeg", "exr", "hdr", "webp", "tiff", "gif" where the path's ending does not say;
+                           may be NULL */
     bool half;          /* EXR: half floats; layers of distances, positions and object numbers stay 32-bit */
-    unsigned quality;   /* JPEG; 0: 95 */
+    unsigned quality;   /* JPEG and WebP; 0: 95 */
     const struct fl_export_text *texts; /* to be drawn into it, if it has the format rgba8 */
     size_t text_count;
 };

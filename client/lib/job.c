@@ -56,8 +56,8 @@ struct fl_job *fl_render_start(struct fl_scene *scene, const struct message_rend
     job->last_frame = render->last_frame;
     job->frame_step = render->frame_step;
     job->assembly.expected = (struct fl_frame_expected){
-        .width = render->width * render->views_across,
-        .height = render->height * render->views_down,
+        .width = render->crop_width > 0 ? render->crop_width : render->width * render->views_across,
+        .height = render->crop_width > 0 ? render->crop_height : render->height * render->views_down,
         .format = render->format,
         .encoding = render->encoding,
         .layers = render->layers != 0 ? render->layers : FL_LAYERS_PICTURE,

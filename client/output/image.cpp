@@ -5,6 +5,7 @@
 #include "library.h"
 #include "metadata.hpp"
 #include "png_encode.h"
+#include "tiff_encode.hpp"
 #include "protocol/version.h"
 
 #include <Imath/half.h>
@@ -28,10 +29,10 @@ struct known_format {
     const char *endings[2];
 };
 
-const known_format known[] = {{IMAGE_PNG, {"png", nullptr}},
-                              {IMAGE_JPEG, {"jpg", "jpeg"}},
-                              {IMAGE_EXR, {"exr", nullptr}},
-                              {IMAGE_HDR, {"hdr", nullptr}}};
+const known_format known[] = {{IMAGE_PNG, {"png", nullptr}},   {IMAGE_JPEG, {"jpg", "jpeg"}},
+                              {IMAGE_EXR, {"exr", nullptr}},   {IMAGE_HDR, {"hdr", nullptr}},
+                              {IMAGE_WEBP, {"webp", nullptr}}, {IMAGE_TIFF, {"tiff", "tif"}},
+                              {IMAGE_GIF, {"gif", nullptr}}};
 
 enum image_format format_by_ending(const char *ending)
 {
@@ -98,6 +99,18 @@ bool copy_out(const std::vector<uint8_t> &made, uint8_t **file, size_t *file_byt
     return true;
 }
 
+bool write_tiff(struct raster raster, const std::string &description, const std::string &date, uint8_t **file,
+                size_t *file_bytes, char *reason, size_t reason_bytes)
+{
+    std::vector<uint8_t> bytes;
+    if (raster.component_bytes != 1) {
+        bytes = bytes_of(raster);
+        raster.pixels = bytes.data();
+        raster.component_bytes = 1;
+    }
+    return copy_out(tiff_encode(raster, description, date), file, file_bytes, reason, reason_bytes);
+}
+
 bool write_with_library(const struct library_image &image, uint8_t **file, size_t *file_bytes, char *reason,
                         size_t reason_bytes)
 {
@@ -131,6 +144,8 @@ bool write_frame(const struct image &image, uint8_t **file, size_t *file_bytes, 
         return fail(reason, reason_bytes, "only an EXR file of 32-bit floats can store layers");
     if (image.format == IMAGE_EXR)
         return copy_out(exr_encode(image, date_words), file, file_bytes, reason, reason_bytes);
+    if (image.format == IMAGE_TIFF)
+        return write_tiff(raster, metadata_lines(image), date_words, file, file_bytes, reason, reason_bytes);
     if (image.format != IMAGE_PNG)
         return write_with_library(
             {image.format, raster, image.quality, metadata_lines(image).c_str(), date_words.c_str()}, file,
@@ -166,7 +181,7 @@ enum image_format image_format_of(const char *path, const char *fallback)
 
 bool image_needs_library(enum image_format format)
 {
-    return format != IMAGE_PNG && format != IMAGE_EXR;
+    return format != IMAGE_PNG && format != IMAGE_EXR && format != IMAGE_TIFF;
 }
 
 bool image_encode(const struct image *image, uint8_t **file, size_t *file_bytes, char *reason, size_t reason_bytes)

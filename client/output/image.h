@@ -10,7 +10,16 @@
 extern "C" {
 #endif
 
-enum image_format { IMAGE_UNKNOWN, IMAGE_PNG, IMAGE_JPEG, IMAGE_EXR, IMAGE_HDR };
+enum image_format {
+    IMAGE_UNKNOWN,
+    IMAGE_PNG,
+    IMAGE_JPEG,
+    IMAGE_EXR,
+    IMAGE_HDR,
+    IMAGE_WEBP,
+    IMAGE_TIFF,
+    IMAGE_GIF
+};
 
 /* By the path's ending, else by `fallback` ("png", ..). */
 enum image_format image_format_of(const char *path, const char *fallback);
@@ -20,7 +29,7 @@ bool image_needs_library(enum image_format format);
 struct image {
     enum image_format format;
     bool half;                               /* EXR: half floats */
-    unsigned quality;                        /* JPEG */
+    unsigned quality;                        /* JPEG, WebP */
     float frames_per_second;                 /* 0: unknown */
     bool full_metadata;                      /* also what differs from run to run: times, the scene's revision */
     const char *model;                       /* for the metadata; may be empty */

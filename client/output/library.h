@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The module that does what needs OpenImageIO and libjxl: it writes JPEG and HDR, and compares images. Their
- * libraries take a third of a second to load, so that only the runs that need it load it. */
+/* The module that does what needs OpenImageIO and libjxl: it writes JPEG, HDR, WebP and GIF, and compares images.
+ * Their libraries take a third of a second to load, so that only the runs that need it load it. */
 #ifndef FARLIGHT_CLIENT_OUTPUT_LIBRARY_H
 #define FARLIGHT_CLIENT_OUTPUT_LIBRARY_H
 
@@ -13,9 +13,9 @@ extern "C" {
 #endif
 
 struct library_image {
-    enum image_format format; /* JPEG or HDR */
+    enum image_format format; /* JPEG, HDR, WEBP or GIF */
     struct raster raster;
-    unsigned quality;        /* JPEG */
+    unsigned quality;        /* JPEG, WebP */
     const char *description; /* lines of text */
     const char *date;        /* "YYYY:MM:DD hh:mm:ss"; may be empty */
 };

@@ -127,7 +127,9 @@ int main(int argc, char **argv)
         {"fd", KEY_FD, "N", 0, "Connected stream socket to speak over (needed)", 0},
         {"folder", KEY_FOLDER, "DIR", 0, "The one folder that may be written to", 0},
         {"format", KEY_FORMAT, "NAME", 0,
-         "What is written: png, jpeg, exr or hdr, only (default: any, which takes longer to start)", 0},
+         "What is written: png, jpeg, exr, hdr, webp, tiff or gif, only (default: any, which takes longer to "
+         "start)",
+         0},
         {"read", KEY_READ, "FILE", 0, "An image that may be read and compared; twice", 0},
         {"text", KEY_TEXT, NULL, 0, "Text may be drawn into pictures", 0},
         {"fps", KEY_FPS, "N", 0, "Frames per second, for the metadata of EXR files", 0},

@@ -10,6 +10,7 @@
 #include "render/pixel_filter.h"
 #include "render/sequence.h"
 #include "render/wave_trace.h"
+#include "render/wireframe.h"
 #include "shared/path.h"
 
 void frame_abandon(struct frame_renderer *renderer)
@@ -61,9 +62,11 @@ static bool set_sample(struct frame_renderer *renderer, struct error *error)
     return context_upload_uniforms(context, error);
 }
 
-/* What is seen from that row on. */
+/* What is seen in the strip of that row: strips begin where they do if no row is left out, so that rounding puts
+ * edges where it does then. */
 static void begin_strip(struct frame_renderer *renderer, uint32_t row)
 {
+    row -= row % renderer->strip_rows;
     primary_rasterise_begin(&renderer->work->primary, row, 1u << renderer->work->context.uniforms.sample_shift);
     renderer->phase = PHASE_RASTER;
 }
@@ -75,7 +78,7 @@ static bool begin_sample(struct frame_renderer *renderer, struct error *error)
     if (!set_sample(renderer, error))
         return false;
     if (renderer->rasterise)
-        begin_strip(renderer, 0);
+        begin_strip(renderer, renderer->target->crop_top * 8);
     return true;
 }
 
@@ -326,6 +329,8 @@ static bool find_primary(struct frame_renderer *renderer, struct error *error)
         return false;
     if (done)
         renderer->phase = renderer->work->layers.wanted ? PHASE_LAYERS : PHASE_SHADE;
+    if (done && !wireframe_paint(context, error))
+        return false;
     if (done && denoise_notes_samples(context) &&
         !denoise_note(&renderer->work->denoise.notes, denoise_history_moved(&renderer->history), context, error))
         return false;
@@ -465,20 +470,24 @@ static bool hand_out(struct frame_renderer *renderer, struct frame_result *resul
     stage_times_add(&context->times, STAGE_FRAME, CLOCK_CPU, 0, context->times.origin_ns,
                     clock_now_ns() - context->times.origin_ns);
     *result = renderer->result;
+    const struct frame_crop all = {0, 0, request->width, request->height};
+    const struct frame_crop *part = request->crop.width > 0 ? &request->crop : &all;
+    if (request->crop.width > 0)
+        picture_cut(&renderer->picture, request);
     result->pixels = renderer->picture.pixels;
     result->layers = frame_request_layers(request);
     result->attachments = request->attachments;
     result->size_bytes = renderer->picture.size_bytes - attached_bytes(request);
     renderer->picture.pixels = NULL;
-    result->width = request->width;
-    result->height = request->height;
+    result->width = part->width;
+    result->height = part->height;
     result->format = request->format;
     result->ycbcr = request->ycbcr;
     result->samples = renderer->picture.samples;
     result->noise = renderer->picture.noise.error;
     result->primary_rays += request->noise > 0.0f
                                 ? picture_noise_rays(&renderer->picture, renderer->samples_before)
-                                : (uint64_t)request->width * request->height * request->samples;
+                                : (uint64_t)part->width * part->height * request->samples;
     result->times = context->times;
     renderer->kept_request = *request;
     renderer->kept_samples = result->samples;

@@ -33,8 +33,16 @@ enum frame_history {
     HISTORY_MOVING /* and has other noise than that, whatever the seed; no samples are added to its own */
 };
 
+/* A part of a picture, pixels; width 0: all of it. */
+struct frame_crop {
+    uint32_t x, y, width, height;
+};
+
 struct frame_request {
     uint32_t width, height; /* of the whole picture */
+    /* Only the tiles of 8 x 8 pixels that this part touches get samples, and the result is the part. Not with
+     * `noise` and `denoise`, which look at pixels around, attachments and VIEW_SOURCE_LAYERS. */
+    struct frame_crop crop;
     /* Views in it, of the same size, row by row; 0: 1. Each is that of an eye of its own, see frame_view_eye(). */
     uint32_t views_across, views_down;
     float baseline; /* metres between neighbouring eyes */
@@ -70,6 +78,7 @@ struct frame_request {
     float ao_distance;    /* metres; 0: a tenth of the scene's diagonal */
     float ao_falloff;     /* as a power of 1 - distance / ao_distance; 0: all counts the same */
     uint32_t ao_rays;     /* a sample; 0: 8 */
+    float wireframe;      /* pixels: width of lines along the edges of triangles; 0: none */
     float layer_opacity;  /* of opaque surfaces, integrator raycast; 0: 0.5 */
     uint32_t layers;      /* bits; 0: the picture alone. More than it need PIXEL_FORMAT_RGBA32F */
     uint32_t attachments; /* bits; beside the picture alone, in any format of it */

@@ -188,6 +188,22 @@ static bool check_noise(const struct frame_request *request, struct error *error
     return true;
 }
 
+static bool check_crop(const struct frame_request *request, struct error *error)
+{
+    const struct frame_crop *crop = &request->crop;
+    if (crop->width == 0 && crop->height == 0)
+        return true;
+    if (crop->width == 0 || crop->height == 0 || crop->x >= request->width || crop->y >= request->height ||
+        crop->width > request->width - crop->x || crop->height > request->height - crop->y)
+        return error_set(error, ERROR_INVALID, "crop", "%ux%u pixels from (%u, %u) on are not in %ux%u pixels",
+                         crop->width, crop->height, crop->x, crop->y, request->width, request->height);
+    if (request->noise > 0.0f || request->denoise != DENOISE_OFF || request->attachments ||
+        request->ycbcr != YCBCR_NONE || frame_has_views(request) || request->view_source == VIEW_SOURCE_LAYERS)
+        return error_set(error, ERROR_UNSUPPORTED, "crop",
+                         "a part of a picture has one view, a number of samples, and no filter for noise");
+    return true;
+}
+
 bool frame_request_check(const struct frame_request *request, struct error *error)
 {
     if (request->width == 0 || request->height == 0 || request->width > SIZE_MAX_PIXELS ||
@@ -202,8 +218,9 @@ bool frame_request_check(const struct frame_request *request, struct error *erro
     if (request->format > PIXEL_FORMAT_RGBA32F)
         return error_set(error, ERROR_UNSUPPORTED, "format", "there is no pixel format number %u",
                          (unsigned)request->format);
-    return check_noise(request, error) && check_views(request, error) && check_background(request, error) &&
-           check_integrator(request, error) && check_layers(request, error) && check_camera(request, error);
+    return check_noise(request, error) && check_crop(request, error) && check_views(request, error) &&
+           check_background(request, error) && check_integrator(request, error) && check_layers(request, error) &&
+           check_camera(request, error);
 }
 
 static bool same_camera(const struct frame_camera *a, const struct frame_camera *b)
@@ -236,7 +253,7 @@ static bool same_light(const struct frame_request *a, const struct frame_request
     return a->integrator == b->integrator && a->brdf == b->brdf &&
            frame_request_radiance_limit(a) == frame_request_radiance_limit(b) &&
            a->ao_distance == b->ao_distance && a->ao_falloff == b->ao_falloff && a->ao_rays == b->ao_rays &&
-           a->layer_opacity == b->layer_opacity;
+           a->layer_opacity == b->layer_opacity && a->wireframe == b->wireframe;
 }
 
 bool frame_request_hides_environment(const struct frame_request *request)
@@ -257,7 +274,8 @@ bool frame_request_goes_on(const struct frame_request *request)
 
 bool frame_request_adds_to(const struct frame_request *a, const struct frame_request *b)
 {
-    return a->accumulate && b->accumulate && a->width == b->width && a->height == b->height && same_views(a, b) &&
+    return a->accumulate && b->accumulate && a->width == b->width && a->height == b->height &&
+           memcmp(&a->crop, &b->crop, sizeof(a->crop)) == 0 && same_views(a, b) &&
            frame_request_same_radiance(a, b) && a->aperture == b->aperture && a->focus == b->focus &&
            a->filter == b->filter && same_camera(&a->camera, &b->camera) &&
            frame_request_planes(a) == frame_request_planes(b) && a->denoise == b->denoise && a->noise == b->noise;

@@ -75,6 +75,31 @@ uint32_t picture_slot_count(const struct picture *picture)
     return picture->tiles_across * ((picture->height + 7) / 8) * 64;
 }
 
+bool picture_has_tile(const struct picture *picture, uint32_t tile)
+{
+    const uint32_t x = tile % picture->tiles_across, y = tile / picture->tiles_across;
+    return x >= picture->crop_left && x < picture->crop_right && y >= picture->crop_top &&
+           y < picture->crop_bottom;
+}
+
+uint32_t picture_run_end(const struct picture *picture, uint32_t slot)
+{
+    const uint32_t across = picture->tiles_across;
+    if (picture->crop_right - picture->crop_left == across)
+        return picture->crop_bottom * across * TILE_SLOTS;
+    return (slot / TILE_SLOTS / across * across + picture->crop_right) * TILE_SLOTS;
+}
+
+static void set_crop(struct picture *picture, const struct frame_request *request)
+{
+    const struct frame_crop all = {0, 0, request->width, request->height};
+    const struct frame_crop *crop = request->crop.width > 0 ? &request->crop : &all;
+    picture->crop_left = crop->x / 8;
+    picture->crop_right = (crop->x + crop->width + 7) / 8;
+    picture->crop_top = crop->y / 8;
+    picture->crop_bottom = (crop->y + crop->height + 7) / 8;
+}
+
 uint32_t picture_band_end(const struct picture *picture, uint32_t slot)
 {
     uint64_t end = (uint64_t)(slot / band_slots(picture) + 1) * band_slots(picture);
@@ -142,6 +167,7 @@ bool picture_begin(struct picture *picture, struct render_context *context, uint
         if (!list_bands(picture, request, error))
             return false;
     }
+    set_crop(picture, request);
     picture->samples = samples_before + request->samples;
     return reserve_bands(picture, context->device, error) &&
            (samples_before > 0 || clear_bands(picture, context->device, error)) &&

@@ -11,6 +11,7 @@
 struct picture {
     uint32_t width, height;
     uint32_t tiles_across;
+    uint32_t crop_left, crop_right, crop_top, crop_bottom; /* tiles that get samples: from, and up to before */
     uint32_t samples;   /* samples per pixel in the sums, those of the current frame included; see noise */
     uint32_t band_rows; /* pixel rows of every band but the last; a multiple of 8 */
     uint32_t cleared;   /* bands that are so for this frame */
@@ -31,6 +32,9 @@ void picture_restart(struct picture *picture);
  * request adds, is kept. */
 bool picture_begin(struct picture *picture, struct render_context *context, uint32_t samples_before,
                    struct error *error);
+bool picture_has_tile(const struct picture *picture, uint32_t tile); /* it gets samples */
+/* The end of the slots without a gap, from `slot` on, whose tiles get samples. */
+uint32_t picture_run_end(const struct picture *picture, uint32_t slot);
 /* Row of the first slot of a band. */
 uint32_t picture_row_of(const struct picture *picture, uint32_t slot);
 /* Rows of as many whole bands as have that many pixels, at least one; all rows if there are no more. */
@@ -67,6 +71,8 @@ struct gpu_buffer *picture_slice_band(const struct picture *picture, const struc
 uint64_t picture_device_bytes(const struct picture *picture);
 uint32_t picture_band_first_row(const struct picture *picture, uint32_t band);
 uint32_t picture_band_row_count(const struct picture *picture, uint32_t band);
+/* readback.c. Leaves the request's crop of the pixels, of which there are all. */
+void picture_cut(struct picture *picture, const struct frame_request *request);
 void picture_drop_pixels(struct picture *picture);
 void picture_finish(struct picture *picture, struct gpu_device *device);
 

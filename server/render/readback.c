@@ -6,6 +6,7 @@
 #include "render/frame_request.h"
 
 #include <stdlib.h>
+#include <string.h>
 
 static size_t rows_bytes(const struct picture *picture, const struct render_context *context, uint32_t plane,
                          uint32_t rows)
@@ -38,6 +39,20 @@ static uint8_t *band_pixels(const struct picture *picture, const struct render_c
     for (uint32_t before = 0; before < plane; before++)
         pixels += rows_bytes(picture, context, before, picture->height);
     return pixels + rows_bytes(picture, context, plane, picture_band_first_row(picture, band));
+}
+
+void picture_cut(struct picture *picture, const struct frame_request *request)
+{
+    const struct frame_crop *crop = &request->crop;
+    const size_t pixel_bytes = frame_format_bytes(request->format), row_bytes = crop->width * pixel_bytes;
+    uint8_t *to = picture->pixels;
+    for (uint32_t plane = 0; plane < picture->plane_count; plane++) {
+        for (uint32_t y = 0; y < crop->height; y++, to += row_bytes) {
+            const size_t row = (size_t)plane * picture->height + crop->y + y;
+            memmove(to, picture->pixels + (row * picture->width + crop->x) * pixel_bytes, row_bytes);
+        }
+    }
+    picture->size_bytes = (size_t)(to - picture->pixels);
 }
 
 bool picture_read_band(struct picture *picture, struct render_context *context, uint32_t plane, uint32_t band,

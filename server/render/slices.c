@@ -36,7 +36,8 @@ void slices_restart(struct slices *slices)
 static uint32_t next_going_on(const struct picture *picture, uint32_t slot)
 {
     const uint32_t *stopped = picture->noise.samples;
-    while (stopped && slot < picture_slot_count(picture) && stopped[slot / TILE_SLOTS])
+    while (slot < picture_slot_count(picture) &&
+           ((stopped && stopped[slot / TILE_SLOTS]) || !picture_has_tile(picture, slot / TILE_SLOTS)))
         slot = (slot / TILE_SLOTS + 1) * TILE_SLOTS;
     return slot;
 }
@@ -68,10 +69,12 @@ bool slices_take(struct slices *slices, const struct picture *picture, uint32_t 
     slices->next_slot = next_going_on(picture, slices->next_slot);
     if (slices->next_slot >= picture_slot_count(picture))
         return false;
-    uint32_t band_left = picture_band_end(picture, slices->next_slot) - slices->next_slot;
+    const uint32_t band_end = picture_band_end(picture, slices->next_slot);
+    const uint32_t run_end = picture_run_end(picture, slices->next_slot);
+    const uint32_t left = (band_end < run_end ? band_end : run_end) - slices->next_slot;
     uint32_t slots = slices->slice_rays >> sample_shift;
     slice->first_slot = slices->next_slot;
-    slice->slot_count = band_left < slots ? band_left : slots;
+    slice->slot_count = left < slots ? left : slots;
     if (picture->noise.samples)
         slice->slot_count = worth_together(picture, slice);
     slices->next_slot += slice->slot_count;

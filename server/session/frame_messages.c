@@ -35,8 +35,9 @@ void frame_data_head(uint8_t head[FRAME_DATA_HEAD_BYTES], uint32_t request, uint
 void frame_fill_begin(struct message_frame_begin *begin, const struct engine_frame *frame)
 {
     begin->frame = frame->frame;
-    begin->width = frame->request.width;
-    begin->height = frame->request.height;
+    const struct frame_crop *crop = &frame->request.crop;
+    begin->width = crop->width > 0 ? crop->width : frame->request.width;
+    begin->height = crop->width > 0 ? crop->height : frame->request.height;
     begin->samples = frame->result.samples;
     begin->noise = frame->result.noise;
     begin->revision = frame->result.revision;

@@ -153,6 +153,27 @@ static bool check_noise(const struct message_render *render, struct error *error
     return error_remedy(error, "set view_source to rays, or noise to 0");
 }
 
+/* Neighbours of its pixels are not there. */
+static bool check_crop(const struct message_render *render, struct error *error)
+{
+    if (render->crop_width == 0 && render->crop_height == 0)
+        return true;
+    if (render->crop_width == 0 || render->crop_height == 0 ||
+        render->crop_x + render->crop_width > render->width ||
+        render->crop_y + render->crop_height > render->height) {
+        error_set(error, ERROR_INVALID, "render.crop_width", "%u x %u pixels from (%u, %u) on are not in %u x %u",
+                  render->crop_width, render->crop_height, render->crop_x, render->crop_y, render->width,
+                  render->height);
+        return error_remedy(error, "ask for a part of the picture, or set all four to 0");
+    }
+    if (render->kind == PROTOCOL_JOB_BATCH && !(render->noise > 0.0f) && render->denoise == PROTOCOL_DENOISE_OFF &&
+        !has_views(render) && render->view_source != PROTOCOL_VIEW_SOURCE_LAYERS)
+        return true;
+    error_set(error, ERROR_UNSUPPORTED, "render.crop_width",
+              "a part of a picture has one view, a number of samples, and no filter for noise");
+    return error_remedy(error, "set crop_width and crop_height to 0, or leave out what needs all pixels");
+}
+
 static bool check_views(const struct message_render *render, struct error *error)
 {
     if (!check_eyes(render, error) || !check_upsample(render, error) || !check_hidden(render, error))
@@ -331,8 +352,8 @@ bool job_check(const struct session *session, const struct message_render *rende
         return error_set(error, ERROR_UNKNOWN_ID, "render.scene", "there is no scene %u", render->scene);
     if (jobs_find(session, render->channel) && !job_replaced_by(session, render))
         return error_set(error, ERROR_INVALID, "render.channel", "a running job has channel %u", render->channel);
-    if (!check_kind(session, render, error) || !check_noise(render, error) || !check_views(render, error) ||
-        !check_layers(render, error))
+    if (!check_kind(session, render, error) || !check_noise(render, error) || !check_crop(render, error) ||
+        !check_views(render, error) || !check_layers(render, error))
         return false;
     if (!check_encoding(session, render, render->encoding, "render.encoding", error))
         return false;
@@ -416,6 +437,7 @@ static void fill_rest(struct engine_job *job, const struct session *session, con
             {
                 .width = render->width * render->views_across,
                 .height = render->height * render->views_down,
+                .crop = {render->crop_x, render->crop_y, render->crop_width, render->crop_height},
                 .views_across = render->views_across,
                 .views_down = render->views_down,
                 .baseline = render->baseline,
@@ -444,6 +466,7 @@ static void fill_rest(struct engine_job *job, const struct session *session, con
                 .ao_falloff = render->ao_falloff,
                 .ao_rays = render->ao_rays,
                 .layer_opacity = render->layer_opacity,
+                .wireframe = render->wireframe,
                 .layers = render->layers,
                 .attachments = render->attachments,
                 .accumulate = render->accumulate != 0,

@@ -128,7 +128,8 @@ def measure_flake(bench):
         say(f"  frames of {n} spheres")
         with Daemon(bench) as daemon:
             got = [records(bench.program("farlight"), "render", model, "-o", f"{daemon.folder}/x.png", "--size",
-                           "64x64" if bench.tiny else "640x480", "--depth", "4", "--server", daemon.address, "--timings=json")[0][0]
+                           "64x64" if bench.tiny else "640x480", "--samples", "1", "--depth", "4", "--server", daemon.address,
+                           "--timings=json")[0][0]
                    for _ in range(1 + bench.times(3))][1:]
         frames.append({"spheres": n, "frame_ms": figure([sum(stage_ms(f, s) for s in FRAME_STAGES) for f in got])})
     return {**traversals, "frames": frames}

@@ -80,7 +80,7 @@ def first_picture(bench):
             for seconds in (cold, warm):
                 begin = time.monotonic()
                 subprocess.run([bench.program("farlight"), "render", bundled(bench, "teapot.glb"), "-o", f"{folder}/x.png",
-                                "--size", "640x360"], env=environment, check=True, capture_output=True)
+                                "--size", "640x360", "--samples", "1"], env=environment, check=True, capture_output=True)
                 seconds.append(time.monotonic() - begin)
     return [{"command": "first picture, cold caches", "seconds": figure(cold)},
             {"command": "first picture, warm caches", "seconds": figure(warm)}]
@@ -131,7 +131,7 @@ def measure_oneshot(bench):
         for _ in range(1 + bench.times(3)):
             begin = time.monotonic()
             frames, client = records(bench.program("farlight"), "render", model, "-o", f"{folder}/x.png", "--size",
-                                     "1280x720", "--timings=json")
+                                     "1280x720", "--samples", "1", "--timings=json")
             runs.append((1000 * (time.monotonic() - begin), frames[0], client))
     runs = sorted(runs[1:], key=lambda run: run[0])
     wall_ms, frame, client = runs[len(runs) // 2]
@@ -184,8 +184,8 @@ def measure_frames(bench):
         with Daemon(bench) as daemon:
             for run in range(1 + bench.times(3)):
                 got, client = records(bench.program("farlight"), "render", model, "-o", f"{daemon.folder}/x.png", "--size",
-                                      "64x64" if bench.tiny else "640x480", "--depth", "4", "--server", daemon.address,
-                                      "--timings=json", *options)
+                                      "64x64" if bench.tiny else "640x480", "--samples", "1", "--depth", "4",
+                                      "--server", daemon.address, "--timings=json", *options)
                 if run == 0:
                     first = client
                 else:

@@ -468,7 +468,7 @@ class Scripts(OneDaemon, Animations):
 
     def still(self, *arguments, name="still.exr"):
         path = self.folder / name
-        self.expect(farlight("render", self.model, "-o", path, *SIZE, *arguments), 0)
+        self.expect(farlight("render", self.model, "-o", path, *SIZE, "--samples", "1", *arguments), 0)
         return digest(path)
 
     def test_an_orbit_is_that_of_the_command_line(self):
@@ -559,7 +559,7 @@ class Clips(OneDaemon, Animations):
 
     def still(self, *arguments):
         path = self.folder / "still.exr"
-        self.expect(farlight("render", self.model, "-o", path, *SIZE, *self.VIEW, *arguments), 0)
+        self.expect(farlight("render", self.model, "-o", path, *SIZE, *self.VIEW, "--samples", "1", *arguments), 0)
         return digest(path)
 
     def test_a_clip_runs_once_through_and_every_moment_can_be_rendered_alone(self):

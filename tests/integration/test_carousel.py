@@ -65,7 +65,7 @@ class Pictures(Case):
     def render(self, time, *more, server=None):
         with tempfile.TemporaryDirectory() as folder:
             path = pathlib.Path(folder) / "frame.png"
-            self.expect(farlight("render", carousel(), "--server", server, "--clip", "ride", "--time", time, "--size",
+            self.expect(farlight("render", carousel(), "--server", server, "--clip", "ride", "--time", time, "--samples", "1", "--size",
                                  f"{SIZE[0]}x{SIZE[1]}", "-o", path, *more), 0)
             width, _, rows, channels = read_png(path)
             return width, rows, channels

@@ -20,7 +20,7 @@ class CompareViews(OneDaemon):
     def render(self, name, *options):
         """Where the picture is, and the share of it that no layer shows."""
         path = self.folder / name
-        result = self.expect(farlight("render", bundled_scenes() / ROOM, "-o", path, *SMALL, "--timings=json", *options), 0)
+        result = self.expect(farlight("render", bundled_scenes() / ROOM, "--samples", "1", "-o", path, *SMALL, "--timings=json", *options), 0)
         return path, frames_of(result)[0]["structure"].get("views/unknown_per_ray")
 
     def test_the_figures_are_those_of_two_pictures_that_render_makes(self):

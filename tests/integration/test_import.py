@@ -570,6 +570,19 @@ class Written(importer.Written):
         self.assertEqual(glass["base"][:3], (1, 1, 1))
         self.assertEqual(result.floats(mesh["arrays"][4])[1], 0.75, "v runs downwards here")
 
+    def test_what_has_no_material_is_light_grey_unless_its_vertices_have_colours(self):
+        corners = "v 0 0 0 %s\nv 1 0 0 %s\nv 1 1 0 %s\nv 0 1 0 %s\n"
+        bare, coloured = corners % (("",) * 4), corners % (("1 0 0",) * 4)
+        self.write("m.mtl", "newmtl red\nKd 1 0 0\n")
+        result = self.import_text("model.obj", "mtllib m.mtl\n" + bare + "f 1 2 3\nusemtl red\nf 1 3 4\n")
+        mesh, = result.of(SET_MESH)
+        materials = {m["id"]: (m["name"], m["base"], m["double_sided"]) for m in result.of(SET_MATERIAL)}
+        grey = tuple(struct.unpack("4f", struct.pack("4f", 0.6, 0.6, 0.6, 1)))
+        self.assertEqual({materials[m] for _, _, m in mesh["ranges"]}, {("default", grey, 1), ("red", (1, 0, 0, 1), 1)})
+        result = self.run_gltf({"nodes": [{"mesh": 0}], "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}]})
+        self.assertEqual([m["name"] for m in result.of(SET_MATERIAL)], ["default"])
+        self.assertEqual(self.import_text("coloured.obj", coloured + "f 1 2 3\n").of(SET_MATERIAL), [])
+
     def test_obj_concave_polygon(self):
         result = self.import_text("model.obj", "v 0 0 0\nv 4 0 0\nv 4 4 0\nv 2 1 0\nv 0 4 0\nf 1 2 3 4 5\n")
         mesh, = result.of(SET_MESH)

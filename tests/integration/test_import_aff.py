@@ -276,7 +276,7 @@ class Written(importer.Written):
         result = self.run_text(self.moving_triangle(0) + self.moving_triangle(1, (0, 2)) + "f 1 0 0\n" +
                                self.moving_triangle(2))
         self.assertEqual([mesh["targets"] for mesh in result.of(importer.SET_MESH)], [2, 1, 2])
-        self.assertEqual([mesh["ranges"][0][2] for mesh in result.of(importer.SET_MESH)], [0, 0, 1])
+        self.assertEqual([mesh["ranges"][0][2] for mesh in result.of(importer.SET_MESH)], [2, 2, 1])  # 2: `default`
 
     def test_moving_triangles_are_placed_and_at_rest_as_the_animation_begins(self):
         result = self.run_text("a 2 3 2\nxs 1 1 1 0 1 0 0 0 0 100 {\n" + self.moving_triangle(0) + "}\n")

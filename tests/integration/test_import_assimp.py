@@ -219,6 +219,13 @@ class Formats(importer.Written):
         mesh, = result.of(SET_MESH)
         self.assertEqual(list(result.data(mesh["arrays"][6])), [255, 0, 0, 255, 0, 255, 0, 255, 0, 0, 255, 255, 55, 55, 55, 255],
                          "128 of 255 is 0.2158 of the light")
+        self.assertEqual(result.of(SET_MATERIAL), [], "they are shown as they are")
+
+    def test_what_has_no_material_is_light_grey(self):
+        for name, model in (("model.ply", ply()), ("model.stl", stl_text(CORNERS)), ("model.off", off())):
+            with self.subTest(name):
+                material, = self.import_text(name, model).of(SET_MATERIAL)
+                self.assertEqual((material["name"], round(material["base"][0], 6)), ("default", 0.6))
 
     # ---- points
 

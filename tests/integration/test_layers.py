@@ -54,7 +54,7 @@ class Layers(OneDaemon):
 
     def test_places_depths_and_normals_fit_each_other_and_the_camera(self):
         """One sample, which lies in the middle of its pixel."""
-        got = self.read("--layers", "beauty,normal,depth,position,id", "--float", "--primary", "trace")
+        got = self.read("--layers", "beauty,normal,depth,position,id", "--float", "--primary", "trace", "--samples", "1")
         way = [b - a for a, b in zip(EYE, LOOK_AT)]
         length = math.hypot(*way)
         forward = [w / length for w in way]
@@ -84,7 +84,7 @@ class Layers(OneDaemon):
         self.assertGreater(seen, 48 * 40 / 2)
 
     def test_numbers_tell_objects_apart(self):
-        got = self.read("--layers", "albedo,id", "--float")
+        got = self.read("--layers", "albedo,id", "--float", "--samples", "1")
         colours = {}
         for i, number in enumerate(got["id.material"]):
             colours.setdefault(number, set()).add(tuple(round(got[f"albedo.{c}"][i], 4) for c in "RGB"))

@@ -56,12 +56,15 @@ class Light(Case):
                     for got, value in zip(middle, wanted, strict=True):
                         self.assertLessEqual(abs(got - 255 * value), steps + 0.5, (width, list(middle), wanted))
 
-    def test_noisy_integrators_take_more_samples_by_default(self):
+    def test_a_picture_has_16_samples_and_more_of_what_is_noisy_by_default(self):
         small = ["--size", "8x6"]
-        for integrator, samples in (("whitted", 1), ("raycast", 1), ("ao", 16), ("path", 64)):
+        self.assertEqual(self.render(*small)[1]["integrator"], "distributed", "as several samples are, where nothing is said")
+        for integrator, samples in (("whitted", 16), ("raycast", 16), ("ao", 16), ("path", 64)):
             _, frame = self.render("--integrator", integrator, *small)
             self.assertEqual((frame["integrator"], frame["samples"]), (integrator, samples))
             self.assertEqual(self.render("--integrator", integrator, "--samples", "2", *small)[1]["samples"], 2)
+        held = self.render("--samples", "auto", "--integrator", "whitted", *small)[1]["samples"]
+        self.assertTrue(16 <= held <= 256, held)
         # As in the paper, 128 rays of ambient occlusion a pixel.
         frame = self.render("--integrator", "ao", *small)[1]
         self.assertEqual(frame["shadow_rays"], 128 * 8 * 6)

@@ -82,7 +82,7 @@ class Pictures(PoseCase):
 
     DIFFERENT = 1e-3  # share of the pixels; by more than 2 of 255 in a channel
     FRAMES = 3        # the later ones show that no tree and no vertices of an earlier one are left
-    OPTIONS = ("--size", "160x120", "--depth", "2", "--quiet")
+    OPTIONS = ("--size", "160x120", "--samples", "1", "--depth", "2", "--quiet")
 
     def camera(self, corners):
         low, high = ([end(p[i] for p, _ in corners) for i in range(3)] for end in (min, max))

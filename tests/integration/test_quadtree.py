@@ -5,7 +5,7 @@ import json
 from farlight_test import OneDaemon, bundled_scenes, farlight, frames_of, read_exr, read_png
 
 ROOM = "cornell.glb"
-SMALL = ["--size", "48x36", "--integrator", "whitted"]
+SMALL = ["--size", "48x36", "--integrator", "whitted", "--samples", "1"]
 SHARES = ("behind_layer_1_per_ray", "behind_layer_2_per_ray", "unknown_behind_per_ray", "unknown_outside_per_ray")
 
 

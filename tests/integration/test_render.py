@@ -18,6 +18,7 @@ import sys
 import tempfile
 import termios
 import time
+import zlib
 
 import farlight_test
 from farlight_test import BIN, Case, Daemon, OneDaemon, bundled_scenes, farlight, grid_means, read_png
@@ -94,6 +95,42 @@ class Pictures(OneDaemon):
                 self.assertEqual(read_png(unasked), read_png(paths["reference"]),
                                  "the reference traces first hits, too, unless it is told to rasterise them")
 
+    def test_a_crop_is_that_part_of_the_whole_picture(self):
+        """To the byte, of rasterised and of traced first hits, and of all layers."""
+        for primary, (x, y, width, height) in (("raster", (37, 21, 50, 33)), ("trace", (0, 112, 160, 8))):
+            with self.subTest(primary=primary):
+                whole, part = self.folder / "whole.png", self.folder / "part.png"
+                self.expect(render_picture("cornell", whole, "--primary", primary), 0)
+                self.expect(render_picture("cornell", part, "--primary", primary, "--crop", f"{x},{y},{width},{height}"), 0)
+                _, _, rows, channels = read_png(whole)
+                wanted = [row[x * channels:(x + width) * channels] for row in rows[y:y + height]]
+                self.assertTrue(read_png(part) == (width, height, wanted, channels))
+        whole, part = self.folder / "whole.exr", self.folder / "part.exr"
+        layers = ("--layers", "beauty,normal,depth", "--float")
+        self.expect(render_picture("cornell", whole, *layers), 0)
+        self.expect(render_picture("cornell", part, *layers, "--crop", "37,21,50,33"), 0)
+        wanted, got = farlight_test.read_exr(whole)[2], farlight_test.read_exr(part)[2]
+        for name in got:
+            self.assertEqual(list(got[name]), [value for y in range(21, 54)
+                                               for value in wanted[name][y * 160 + 37:y * 160 + 87]], name)
+        for options in (("--crop", "150,0,20,20"), ("--crop", "1,2,3"), ("--crop", "0,0,8,8", "--noise", "0.1")):
+            self.assertIn("--crop", self.expect(render_picture("cornell", part, *options), 2).stderr)
+
+    def test_wireframe_draws_edges_as_wide_as_asked(self):
+        """One square, 40 pixels wide: of the row through its upper half lines 4 pixels wide cover 2 at each border, whose other
+        halves lie outside, and sqrt(2) times 4 where the diagonal is crossed, which goes on to both sides of the edge."""
+        model = self.folder / "square.obj"
+        model.write_text("v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nf 1 2 3\nf 1 3 4\n")
+        for integrator, primary in (("whitted", "raster"), ("raycast", "trace"), ("path", "trace")):
+            with self.subTest(integrator=integrator):
+                path = self.folder / "square.exr"
+                self.expect(farlight("render", model, "-o", path, "--size", "60x60", "--eye", "0,0,10", "--look-at", "0,0,0",
+                                     "--fov", "16.9924", "--wireframe", "4", "--integrator", integrator, "--primary", primary,
+                                     "--layers", "albedo", "--filter", "box", "--samples", "16", "--float"), 0)
+                _, _, values = farlight_test.read_exr(path)
+                row = values["albedo.R"][20 * 60:21 * 60]
+                self.assertAlmostEqual(sum(row) / 0.6, 40 - 4 - 4 * 2 ** 0.5, delta=0.5)
+
     def test_an_environment_lies_as_in_viewers_of_gltf(self):
         """Its middle column is +x and what is right of that is +z; a turn of 90 degrees about +y takes +x to -z."""
         red, green, dark = bytes((255, 16, 16, 129)), bytes((16, 255, 16, 129)), bytes((16, 16, 16, 129))
@@ -133,12 +170,34 @@ class Pictures(OneDaemon):
 
 class Outputs(OneDaemon):
     def test_every_format_is_written_and_nothing_else(self):
-        magics = {"png": b"\x89PNG", "jpg": b"\xff\xd8\xff", "exr": b"\x76\x2f\x31\x01", "hdr": b"#?RADIANCE"}
+        magics = {"png": b"\x89PNG", "jpg": b"\xff\xd8\xff", "exr": b"\x76\x2f\x31\x01", "hdr": b"#?RADIANCE", "webp": b"RIFF",
+                  "tif": b"II*\0", "gif": b"GIF89a"}
         for ending, magic in magics.items():
             path = self.folder / f"picture.{ending}"
             self.expect(render_picture("cornell", path), 0)
             self.assertTrue(path.read_bytes().startswith(magic), ending)
         self.assertEqual(self.leftovers(), sorted(f"picture.{ending}" for ending in magics))
+
+    def test_tiff_has_the_pixels_of_png_and_webp_its_alpha(self):
+        def picture(ending):
+            path = self.folder / f"picture.{ending}"
+            self.expect(farlight("render", bundled_scenes() / "carousel.glb", "-o", path, "--size", "80x60", "--integrator",
+                                 "whitted", "--background", "transparent"), 0)
+            return path
+        data, (width, height, rows, _) = picture("tiff").read_bytes(), read_png(picture("png"))
+        at, tags = struct.unpack_from("<I", data, 4)[0], {}
+        for i in range(struct.unpack_from("<H", data, at)[0]):
+            tag, _, _, value = struct.unpack_from("<HHII", data, at + 2 + 12 * i)
+            tags[tag] = value
+        self.assertEqual([tags[tag] for tag in (256, 257, 277, 338)], [width, height, 4, 2], "size, channels, straight alpha")
+        plain = zlib.decompress(data[tags[273]:tags[273] + tags[279]])
+        for y, row in enumerate(rows):
+            got = bytearray(plain[y * width * 4:(y + 1) * width * 4])
+            for i in range(4, len(got)):
+                got[i] = (got[i] + got[i - 4]) & 255
+            self.assertTrue(bytes(got) == row, y)
+        data = picture("webp").read_bytes()
+        self.assertEqual((data[8:16], data[20] >> 4 & 1), (b"WEBPVP8X", 1))
 
     def test_exr_metadata_holds_camera_and_tracer_and_in_full_revision_times_and_path(self):
         path = self.folder / "picture.exr"
@@ -160,7 +219,7 @@ class Outputs(OneDaemon):
 
     def test_the_same_request_makes_the_same_bytes_in_every_format(self):
         folders = [self.folder / "a", self.folder / "b"]
-        formats = {"png": [], "jpg": [], "hdr": [], "exr": ["--layers", "beauty,depth"]}
+        formats = {"png": [], "jpg": [], "hdr": [], "webp": [], "tiff": [], "gif": [], "exr": ["--layers", "beauty,depth"]}
         for folder in folders:
             folder.mkdir()
             shutil.copy(bundled_scenes() / "teapot.glb", folder)

@@ -256,7 +256,7 @@ class Session(Case):
         client.wait(client.render(1, 2, (160, 120), ABOVE))
         digest = client.next_frame().digest
         result = self.expect(farlight("render", "--scene", "sheet", "--server", self.daemon.address, "--size", "160x120",
-                                      "--eye", "0,1,5", "--look-at", "0,0,0", "--fov", math.degrees(0.8),
+                                      "--samples", "1", "--eye", "0,1,5", "--look-at", "0,0,0", "--fov", math.degrees(0.8),
                                       "-o", self.folder / "a.png", "--timings=json"), 0)
         self.assertEqual(int(frames_of(result)[0]["digest"], 16), digest)
 
@@ -267,7 +267,7 @@ class Session(Case):
         client = self.connect((blobs, edits))
         client.wait(client.render(1, 2, (40, 30), ABOVE))
         digest = client.next_frame().digest
-        result = self.expect(farlight("render", self.folder / "triangle.gltf", "--size", "40x30", "--eye", "0,1,5",
+        result = self.expect(farlight("render", self.folder / "triangle.gltf", "--size", "40x30", "--samples", "1", "--eye", "0,1,5",
                                       "--look-at", "0,0,0", "--fov", math.degrees(0.8), "-o", self.folder / "a.png",
                                       "--server", self.daemon.address, "--timings=json"), 0)
         self.assertEqual(int(frames_of(result)[0]["digest"], 16), digest)

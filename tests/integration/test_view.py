@@ -109,7 +109,7 @@ class WithoutAWindow(Viewer):
     def test_what_rests_is_the_picture_that_render_makes(self):
         """Same camera, same samples, same random numbers: the view and a batch are one picture."""
         self.replay([rest(8), *HIDE, {"screenshot": "view.png"}])
-        result = farlight("render", bundled_scenes() / "teapot.glb", "-q", "-o", self.folder / "render.png", "--size",
+        result = farlight("render", bundled_scenes() / "teapot.glb", "--samples", "1", "-q", "-o", self.folder / "render.png", "--size",
                           f"{SIZE[0]}x{SIZE[1]}", "--samples", "8", "--integrator", "whitted", "--progressive")
         self.expect(result, 0)
         # Rounding in the order of the passes: a step of 8 bits here and there.
@@ -136,7 +136,7 @@ class WithoutAWindow(Viewer):
                                   for state in states.values()], [True, False, False])
                 for state in states.values():
                     self.assertEqual((state["width"], state["height"]), SIZE)
-                self.expect(farlight("render", bundled_scenes() / "teapot.glb", "-q", "-o", self.folder / "render.png",
+                self.expect(farlight("render", bundled_scenes() / "teapot.glb", "--samples", "1", "-q", "-o", self.folder / "render.png",
                                      "--size", f"{SIZE[0] // parts[0]}x{SIZE[1] // parts[1]}", "--progressive",
                                      "--stereo-layout", layout, "--views", "rays", *eyes), 0)
                 self.assertLess(difference(self.folder / "view.png", self.folder / "render.png"), 0.05)
@@ -296,7 +296,7 @@ class WithoutAWindow(Viewer):
         self.assertGreater(states["left alone"]["time_s"], states["led"]["time_s"])
         self.assertGreater(distance(states["back"]["eye"], states["stepped"]["eye"]), 0.01)
         self.assertLess(states["true"]["errors"]["mean"], 1e-4)  # the reference looks from there, too
-        result = farlight("render", scene, "-q", "-o", self.folder / "render.png", "--size", f"{size[0]}x{size[1]}",
+        result = farlight("render", scene, "--samples", "1", "-q", "-o", self.folder / "render.png", "--size", f"{size[0]}x{size[1]}",
                           "--samples", "8", "--integrator", "whitted", "--progressive", "--camera", "camera", "--clip",
                           "ride", "--time", f"{states['ridden']['time_s']:.9g}")
         self.expect(result, 0)
@@ -416,7 +416,7 @@ class MadeHere(Viewer):
     def rendered(self, state, size, *options):
         """The rows of the true picture, without the middle."""
         camera = [f"--{name}={','.join(f'{x:.9g}' for x in state[key])}" for name, key in (("eye", "eye"), ("look-at", "look_at"))]
-        result = farlight("render", bundled_scenes() / "cornell.glb", "-q", "-o", self.folder / "true.png", "--size",
+        result = farlight("render", bundled_scenes() / "cornell.glb", "--samples", "1", "-q", "-o", self.folder / "true.png", "--size",
                           f"{size[0]}x{size[1]}", "--samples", "8", "--integrator", "whitted", "--progressive", *camera, "--fov",
                           f"{math.degrees(state['fov_y']):.9g}", *options)
         self.expect(result, 0)

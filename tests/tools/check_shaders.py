@@ -68,7 +68,7 @@ WITHOUT |= {what: ("HAS_UNKNOWN", "HAS_LENS") for what in ("MARK", "KEPT")}
 WITHOUT["EYES"] = ("HAS_LENS",)  # these need rays
 # And in programs of a folder: what moves is met by tracers, and shaded where it was met. Emitters alone are looked for.
 WITHOUT_IN = {"render": ("HAS_MOTION",)}
-MAY_MOVE = ("render/path.comp", "render/distributed.comp")
+MAY_MOVE = ("render/path.comp", "render/distributed.comp", "render/wireframe.comp")
 STAGES = {"raster/view.vert": ["raster/view.vert", "raster/view.frag"],
           "rayspace/reduce.vert": ["rayspace/reduce.vert", "rayspace/reduce.geom"],
           "ldc/build.frag": ["raster/draw.vert", "raster/draw.geom", "ldc/build.frag"],

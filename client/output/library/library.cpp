@@ -27,7 +27,16 @@ bool fail(char *reason, size_t reason_bytes, const std::string &text)
 // Named, never guessed.
 const char *plugin_of(enum image_format format)
 {
-    return format == IMAGE_JPEG ? "jpeg" : "hdr";
+    switch (format) {
+    case IMAGE_HDR:
+        return "hdr";
+    case IMAGE_WEBP:
+        return "webp";
+    case IMAGE_GIF:
+        return "gif";
+    default:
+        return "jpeg";
+    }
 }
 
 OIIO::TypeDesc type_of(const struct raster &raster)
@@ -37,21 +46,23 @@ OIIO::TypeDesc type_of(const struct raster &raster)
                                          : OIIO::TypeDesc::FLOAT;
 }
 
-// What the file's pixels are: neither format has alpha.
+// What the file's pixels are. JPEG and HDR have no alpha, and the library writes GIF without.
 OIIO::ImageSpec make_spec(const struct library_image &image)
 {
-    const bool is_jpeg = image.format == IMAGE_JPEG;
-    OIIO::ImageSpec spec(static_cast<int>(image.raster.width), static_cast<int>(image.raster.height), 3,
-                         is_jpeg ? OIIO::TypeDesc::UINT8 : OIIO::TypeDesc::FLOAT);
-    spec.attribute("oiio:ColorSpace", is_jpeg ? "sRGB" : "Linear");
+    const bool is_linear = image.format == IMAGE_HDR;
+    const bool has_alpha = image.format == IMAGE_WEBP && image.raster.channels == 4;
+    OIIO::ImageSpec spec(static_cast<int>(image.raster.width), static_cast<int>(image.raster.height),
+                         has_alpha ? 4 : 3, is_linear ? OIIO::TypeDesc::FLOAT : OIIO::TypeDesc::UINT8);
+    spec.attribute("oiio:ColorSpace", is_linear ? "Linear" : "sRGB");
+    spec.attribute("oiio:UnassociatedAlpha", 1);
     spec.attribute("Software", "farlight " FARLIGHT_VERSION);
     if (image.date[0] != '\0')
         spec.attribute("DateTime", image.date);
-    if (is_jpeg) {
-        spec.attribute("Compression", "jpeg:" + std::to_string(image.quality));
-        if (image.description[0] != '\0') // the library stops at an empty one
-            spec.attribute("ImageDescription", image.description);
-    }
+    if (is_linear)
+        return spec;
+    spec.attribute("Compression", std::string(plugin_of(image.format)) + ":" + std::to_string(image.quality));
+    if (image.description[0] != '\0') // the library stops at an empty one
+        spec.attribute("ImageDescription", image.description);
     return spec;
 }
 
@@ -119,7 +130,7 @@ bool prepare(bool draws, char *reason, size_t reason_bytes)
     // One thread: the renderer has use for the others, and the sandbox need not allow more.
     OIIO::attribute("threads", 1);
     OIIO::attribute("exr_threads", -1);
-    for (const enum image_format format : {IMAGE_JPEG, IMAGE_HDR}) {
+    for (const enum image_format format : {IMAGE_JPEG, IMAGE_HDR, IMAGE_WEBP, IMAGE_GIF}) {
         const struct library_image image = {format, {4, 4, 4, 1, pixels.data()}, 90, "", "2026:01:01 00:00:00"};
         uint8_t *file = nullptr;
         size_t file_bytes = 0;
