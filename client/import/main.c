@@ -8,6 +8,7 @@
 #include "helper/sandbox.h"
 #include "send.h"
 #include "texture.h"
+#include "texture_plain.h"
 #include "protocol/common/clock.h"
 #include "protocol/version.h"
 
@@ -213,12 +214,22 @@ static bool contains(const unsigned char *bytes, size_t size_bytes, const char *
     return memmem(bytes, size_bytes, text, strlen(text)) != NULL;
 }
 
-/* By the bytes alone, for nothing may be parsed yet. JSON can write the letters of "images" as \u0069 and so on.
- */
+/* Of a binary one the first chunk, after two headers. */
+static size_t gltf_text_bytes(const unsigned char *bytes, size_t size_bytes)
+{
+    uint32_t chunk_bytes;
+    if (size_bytes < 20 || memcmp(bytes, "glTF", 4) != 0)
+        return size_bytes;
+    memcpy(&chunk_bytes, bytes + 12, sizeof(chunk_bytes)); /* little-endian, as this host is */
+    return chunk_bytes < size_bytes - 20 ? 20 + (size_t)chunk_bytes : size_bytes;
+}
+
+/* Whether there may be some that need OpenImageIO: of glTF others than PNG and JPEG. By the bytes alone, for
+ * nothing may be parsed yet. */
 static bool may_name_images(const char *name, const unsigned char *bytes, size_t size_bytes)
 {
     if (is_gltf(name, bytes, size_bytes))
-        return contains(bytes, size_bytes, "images") || contains(bytes, size_bytes, "\\u00");
+        return texture_gltf_names_others(bytes, gltf_text_bytes(bytes, size_bytes));
     if (is_aff(name)) /* what it includes may name some, too */
         return contains(bytes, size_bytes, "texturecoords") || contains(bytes, size_bytes, "tt") ||
                contains(bytes, size_bytes, ".aff") || contains(bytes, size_bytes, ".nff");
