@@ -52,7 +52,7 @@ SERVER_PKGS += $(if $(filter sanitize fuzz,$(config)),,jemalloc)
 # The daemon loads this one when it needs it, so that only its headers are needed here.
 SERVER_LOADED_PKGS := libavcodec libavutil
 CLIENT_PKGS := libzstd libsodium libxxhash libturbojpeg jansson
-IMPORT_PKGS := tinygltf tinyobjloader draco jansson libsodium libseccomp
+IMPORT_PKGS := tinygltf tinyobjloader draco jansson libsodium libseccomp libpng libturbojpeg
 TEXTURE_PKGS := OpenImageIO
 ASSIMP_PKGS := assimp
 EXPORT_PKGS := libpng zlib OpenEXR libseccomp

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "cli/cli.h"
+#include "cli/info_camera.h"
 
 #include <inttypes.h>
 #include <jansson.h>
@@ -8,17 +9,21 @@
 
 #define KEY_JSON 0x400
 #define KEY_VARIANT 0x401
+#define KEY_CAMERA 0x402
 #define LISTED_MAX 200u
 
 struct info_options {
     const char *model, *environment, *variant;
-    bool json;
+    bool json, has_camera;
+    struct cli_info_camera camera;
     struct cli_job job; /* holds the error of what was typed */
 };
 
 static const struct argp_option options[] = {
     {"json", KEY_JSON, NULL, 0, "Print one JSON object on one line", 0},
     {"environment", 'e', "FILE", 0, "Check this environment image as well", 0},
+    {"camera", KEY_CAMERA, NULL, 0,
+     "Show the camera that 'farlight render' takes, as options to copy (starts a daemon)", 0},
     {"variant", KEY_VARIANT, "NAME", 0, "Show the materials of this variant of a glTF model", 0},
     {0}};
 
@@ -31,6 +36,9 @@ static error_t parse(int key, char *value, struct argp_state *state)
         return 0;
     case 'e':
         wanted->environment = value;
+        return 0;
+    case KEY_CAMERA:
+        wanted->has_camera = true;
         return 0;
     case KEY_VARIANT:
         wanted->variant = value;
@@ -120,6 +128,8 @@ static void print_json(const struct info_options *wanted, const struct fl_model_
     json_object_set_new(object, "light_list", objects(info->light_list, info->light_list_count));
     if (info->has_bounds)
         json_object_set_new(object, "bounds", bounds(info->lower_world, info->upper_world));
+    if (wanted->has_camera)
+        json_object_set_new(object, "camera", cli_info_camera_json(&wanted->camera));
     json_object_set_new(object, "model", string(wanted->model ? wanted->model : ""));
     for (size_t i = 0; i < sizeof(numbers) / sizeof(numbers[0]); i++)
         json_object_set_new(object, numbers[i].name, json_integer((json_int_t)numbers[i].value));
@@ -177,6 +187,8 @@ static void print_table(const struct info_options *wanted, const struct fl_model
     else
         printf("  %-10s a camera at azimuth %g and elevation %g degrees that sees all, or --view, --eye\n",
                "seen by", (double)usual.auto_azimuth, (double)usual.auto_elevation);
+    if (wanted->has_camera)
+        cli_info_print_camera(&wanted->camera);
     print_objects("node", info->node_list, info->node_list_count);
     print_objects("material", info->material_list, info->material_list_count);
     print_objects("light", info->light_list, info->light_list_count);
@@ -227,13 +239,13 @@ int cli_info(int argc, char **argv)
     int input_fd = 0;
     if (wanted.model && strcmp(wanted.model, "-") == 0 && !cli_open_input(&input_fd, &error))
         return cli_report(&error);
-    struct fl_model_info *info = fl_model_info(&(struct fl_load_options){.model = wanted.model,
-                                                                         .input_fd = input_fd,
-                                                                         .environment = wanted.environment,
-                                                                         .variant = wanted.variant},
-                                               cli_interrupt_fd(), &error);
-    if (!info)
+    const struct fl_load_options load = {
+        .model = wanted.model, .input_fd = input_fd, .environment = wanted.environment, .variant = wanted.variant};
+    struct fl_model_info *info = fl_model_info(&load, cli_interrupt_fd(), &error);
+    if (!info || (wanted.has_camera && !cli_info_find_camera(&load, info, &wanted.camera, &error))) {
+        fl_model_info_destroy(info);
         return cli_report(&error);
+    }
     if (wanted.json)
         print_json(&wanted, info);
     else

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 #include "closed.h"
 
+#include <pthread.h>
+#include <stdatomic.h>
 #include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
@@ -90,7 +92,8 @@ static bool put(uint64_t *table, uint64_t mask, uint64_t triangle)
 }
 
 /* There are triangles, and none with both orientations. */
-static bool no_sheets(const float *positions, const uint32_t *indices, uint32_t triangle_count)
+static bool no_sheets(const float *positions, const uint32_t *indices, uint32_t triangle_count,
+                      const atomic_bool *stop)
 {
     uint64_t slots = 16;
     uint64_t *table;
@@ -101,7 +104,7 @@ static bool no_sheets(const float *positions, const uint32_t *indices, uint32_t 
     table = calloc(slots, sizeof(*table));
     if (!table)
         return false;
-    for (size_t t = 0; single && t < triangle_count; t++) {
+    for (size_t t = 0; single && t < triangle_count && !atomic_load_explicit(stop, memory_order_relaxed); t++) {
         uint64_t places[3];
 
         places_of(positions, indices + t * 3, places);
@@ -114,7 +117,37 @@ static bool no_sheets(const float *positions, const uint32_t *indices, uint32_t 
     return any && single;
 }
 
+/* Fewer are looked at before a thread has started. */
+#define TRIANGLES_SHARED 20000u
+
+struct sheets {
+    const float *positions;
+    const uint32_t *indices;
+    uint32_t triangle_count;
+    atomic_bool stop; /* nobody will ask for the result */
+    bool none;
+};
+
+static void *look_for_sheets(void *context)
+{
+    struct sheets *sheets = context;
+
+    sheets->none = no_sheets(sheets->positions, sheets->indices, sheets->triangle_count, &sheets->stop);
+    return NULL;
+}
+
 bool import_triangles_closed(const float *positions, const uint32_t *indices, uint32_t triangle_count)
 {
-    return edges_paired(positions, indices, triangle_count) && no_sheets(positions, indices, triangle_count);
+    struct sheets sheets = {.positions = positions, .indices = indices, .triangle_count = triangle_count};
+    pthread_t helper;
+    bool helped =
+        triangle_count >= TRIANGLES_SHARED && pthread_create(&helper, NULL, look_for_sheets, &sheets) == 0;
+    bool paired = edges_paired(positions, indices, triangle_count);
+
+    atomic_store(&sheets.stop, !paired);
+    if (helped)
+        pthread_join(helper, NULL);
+    else if (paired)
+        look_for_sheets(&sheets);
+    return paired && sheets.none;
 }

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 #include "format.h"
 
+#include "texture_plain.h"
+
 #include <ctype.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -135,12 +137,20 @@ struct format format_of(const char *name, const unsigned char *bytes, size_t siz
     return format_of_name(model);
 }
 
-/* JSON can write the letters of "images" as \u0069 and so on. */
+/* Of a binary one the first chunk, after two headers. */
+static size_t gltf_text_bytes(const unsigned char *bytes, size_t size_bytes)
+{
+    if (size_bytes < 20 || !begins(bytes, size_bytes, "glTF"))
+        return size_bytes;
+    const uint32_t chunk_bytes = number_at(bytes + 12);
+    return chunk_bytes < size_bytes - 20 ? 20 + (size_t)chunk_bytes : size_bytes;
+}
+
 bool format_may_name_images(const struct format *format, const unsigned char *bytes, size_t size_bytes)
 {
     switch (format->reader) {
     case FORMAT_GLTF:
-        return contains(bytes, size_bytes, "images") || contains(bytes, size_bytes, "\\u00");
+        return texture_gltf_names_others(bytes, gltf_text_bytes(bytes, size_bytes));
     case FORMAT_AFF: /* what it includes may name some, too */
         return contains(bytes, size_bytes, "texturecoords") || contains(bytes, size_bytes, "tt") ||
                contains(bytes, size_bytes, ".aff") || contains(bytes, size_bytes, ".nff");

@@ -9,6 +9,7 @@
 #include "send.h"
 #include "source.h"
 #include "texture.h"
+#include "texture_plain.h"
 #include "protocol/common/clock.h"
 #include "protocol/version.h"
 

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "texture.h"
 #include "helper/module.h"
+#include "texture_plain.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -9,7 +10,8 @@
 #pragma weak texture_reader
 /* NULL, unless the module is linked to the program itself. */
 static const struct texture_reader *reader = &texture_reader;
-static char why_none[200] = "cannot be decoded: the module that reads images is not loaded";
+static char why_none[200] =
+    "is neither PNG nor JPEG, and nothing in the model says so, by an ending or a MIME type";
 
 void texture_load(void)
 {
@@ -24,11 +26,12 @@ void texture_load(void)
 
 void texture_decode(struct texture_job *jobs, size_t count)
 {
+    texture_plain_decode(jobs, count);
     if (reader)
         reader->decode(jobs, count);
     else
         for (size_t i = 0; i < count; i++)
-            if (jobs[i].bytes)
+            if (jobs[i].bytes && !texture_is_plain(&jobs[i]))
                 snprintf(jobs[i].reason, sizeof(jobs[i].reason), "%s", why_none);
 }
 

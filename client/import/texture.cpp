@@ -239,7 +239,7 @@ void run(texture_job &job, bool (*decoder)(texture_job &, std::string &)) noexce
 void decode_next(texture_job *jobs, size_t count, std::atomic<size_t> &next) noexcept
 {
     for (size_t i; (i = next.fetch_add(1)) < count;)
-        if (jobs[i].bytes)
+        if (jobs[i].bytes && !jobs[i].texels && !jobs[i].reason[0])
             run(jobs[i], decode);
 }
 

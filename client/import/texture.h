@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Images to texels. What decodes them is a module (texture.cpp), because loading OpenImageIO with its libraries
- * takes longer than importing most models; it is loaded before the sandbox is entered, by the imports that may
- * need it. */
+/* Images to texels. PNG and JPEG are decoded by texture_plain.h; the rest by a module (texture.cpp), because
+ * loading OpenImageIO with its libraries takes longer than importing most models; it is loaded before the sandbox
+ * is entered, by the imports that may need it. */
 #ifndef FARLIGHT_IMPORT_TEXTURE_H
 #define FARLIGHT_IMPORT_TEXTURE_H
 
@@ -27,7 +27,8 @@ struct texture_job {
 
 /* What the module exports, under the name `texture_reader`. */
 struct texture_reader {
-    /* Decodes all, with two threads if there are several. Never fails as a whole. */
+    /* Decodes all that have neither texels nor a reason, with two threads if there are several. Never fails as a
+     * whole. */
     void (*decode)(struct texture_job *jobs, size_t count);
     /* Texels of 4 half floats, linear light; alpha is 0. */
     void (*decode_environment)(struct texture_job *job);

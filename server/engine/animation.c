@@ -137,6 +137,26 @@ float animation_distance(const struct frame_camera *camera, const float point_wo
     return distance > 0.0 ? (float)fmin(distance, (double)PLACE_MAX) : 0.0f;
 }
 
+/* By the vertices: round models leave the corners of their bounds empty. False: nothing is visible. Only after
+ * find_bounds(). */
+static bool find_reach(const struct engine_job *job, const struct scene *scene,
+                       const struct frame_framing *framing, float aspect, struct animation_bounds *bounds)
+{
+    double directions[FRAME_CAMERA_DIRECTIONS][3];
+    struct scene_pose pose;
+    _Static_assert(FRAME_CAMERA_DIRECTIONS <= SCENE_SUPPORTS_MAX, "all at once");
+    frame_camera_directions(directions, framing, aspect);
+    if (bounds->reach_known && memcmp(bounds->directions, directions, sizeof(directions)) == 0)
+        return true;
+    if (!scene_pose_evaluate(&pose, scene, job->clips, job->clip_count, 0.0, NULL))
+        return false;
+    memcpy(bounds->directions, directions, sizeof(directions));
+    bounds->reach_known = scene_supports_below(scene, &pose, job->framed_node, directions, bounds->supports,
+                                               FRAME_CAMERA_DIRECTIONS);
+    scene_pose_finish(&pose);
+    return bounds->reach_known;
+}
+
 static bool auto_camera(const struct engine_job *job, const struct scene *scene, struct animation_bounds *bounds,
                         struct frame_camera *camera, struct error *error)
 {
@@ -146,7 +166,15 @@ static bool auto_camera(const struct engine_job *job, const struct scene *scene,
     frame_view_size(&job->frame, &width, &height);
     struct frame_framing framing = job->framing;
     framing.turns = job->path == CAMERA_ORBIT;
-    frame_camera_auto(camera, &framing, bounds->lower, bounds->upper, (float)width / (float)height);
+    const float aspect = (float)width / (float)height;
+    double size = 0.0;
+    if (framing.turns || !find_reach(job, scene, &framing, aspect, bounds)) {
+        frame_camera_auto(camera, &framing, bounds->lower, bounds->upper, aspect);
+        return true;
+    }
+    for (int axis = 0; axis < 3; axis++)
+        size += fabs((double)bounds->upper[axis] - (double)bounds->lower[axis]);
+    frame_camera_around(camera, &framing, aspect, bounds->supports, size);
     return true;
 }
 

@@ -20,8 +20,8 @@ struct gpu_measured {
 bool gpu_measured_load(const struct gpu_device_info *info, struct gpu_measured *measured);
 /* False: there is no cache that can be written. */
 bool gpu_measured_store(const struct gpu_device_info *info, const struct gpu_measured *measured);
-/* Whether first hits are traced, where that is left to the device. Of software GL nothing is ever known: it
- * rasterises, so that its pictures do not depend on what a machine was measured to be. */
+/* Whether first hits are traced, where that is left to the device. Of software GL nothing is ever measured, so
+ * that its pictures do not depend on what a machine was found to be. */
 bool gpu_measured_traces(const struct gpu_measured *measured, bool several_samples, uint64_t primitives,
                          uint64_t pixels);
 

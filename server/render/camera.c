@@ -79,53 +79,80 @@ static unsigned points_of(double points[POINTS_OF_TURN][3], const float lower[3]
     return count;
 }
 
-/* What must fit between two edges of the picture, as seen along one axis of it. */
-struct reach {
-    double most, least; /* where lines through the points, along the edges, meet the plane of the origin */
+/* The picture's axes, not by an upward direction: seen from above there is none. */
+struct axes {
+    double right[3], above[3], back[3];
+    double slope_x, slope_y; /* of what touches the margin */
 };
 
-static void reach_of(struct reach *reach, double across, double behind, double slope)
+static void axes_of(struct axes *axes, const struct frame_framing *framing, float aspect)
 {
-    reach->most = fmax(reach->most, across + behind * slope);
-    reach->least = fmin(reach->least, across - behind * slope);
+    const double azimuth = (double)framing->azimuth, elevation = (double)framing->elevation;
+    *axes = (struct axes){
+        .right = {cos(azimuth), 0.0, -sin(azimuth)},
+        .back = {sin(azimuth) * cos(elevation), sin(elevation), cos(azimuth) * cos(elevation)},
+        .slope_y = tan((double)framing->fov_y / 2.0) * (1.0 - 2.0 * (double)framing->margin),
+    };
+    cross3(axes->above, axes->back, axes->right);
+    axes->slope_x = axes->slope_y * (double)aspect;
+}
+
+enum { TO_RIGHT, TO_LEFT, TO_TOP, TO_BOTTOM, TO_EYE };
+
+/* Of each edge the normal of the plane through the eye: all lies on one side of it. */
+void frame_camera_directions(double directions[FRAME_CAMERA_DIRECTIONS][3], const struct frame_framing *framing,
+                             float aspect)
+{
+    struct axes axes;
+    axes_of(&axes, framing, aspect);
+    for (int i = 0; i < 3; i++) {
+        directions[TO_RIGHT][i] = axes.slope_x * axes.back[i] + axes.right[i];
+        directions[TO_LEFT][i] = axes.slope_x * axes.back[i] - axes.right[i];
+        directions[TO_TOP][i] = axes.slope_y * axes.back[i] + axes.above[i];
+        directions[TO_BOTTOM][i] = axes.slope_y * axes.back[i] - axes.above[i];
+        directions[TO_EYE][i] = axes.back[i];
+    }
+}
+
+void frame_camera_around(struct frame_camera *camera, const struct frame_framing *framing, float aspect,
+                         const double supports[FRAME_CAMERA_DIRECTIONS], double size)
+{
+    struct axes axes;
+    axes_of(&axes, framing, aspect);
+    double eye[3] = {(supports[TO_RIGHT] - supports[TO_LEFT]) / 2.0,
+                     (supports[TO_TOP] - supports[TO_BOTTOM]) / 2.0};
+    eye[2] = fmax((supports[TO_RIGHT] + supports[TO_LEFT]) / (2.0 * axes.slope_x),
+                  (supports[TO_TOP] + supports[TO_BOTTOM]) / (2.0 * axes.slope_y));
+    /* Something without an extent across the view, or without any. */
+    eye[2] = fmax(eye[2], supports[TO_EYE] + (size > 0.0 ? NEAREST_SHARE * size : 1.0));
+    *camera = (struct frame_camera){
+        .fov_y = (float)(2.0 * atan(tan((double)framing->fov_y / 2.0) / (double)framing->zoom))};
+    float *m = camera->world_from_view;
+    for (int row = 0; row < 3; row++) {
+        m[4 * row] = (float)axes.right[row];
+        m[4 * row + 1] = (float)axes.above[row];
+        m[4 * row + 2] = (float)axes.back[row];
+        m[4 * row + 3] = (float)(eye[0] * axes.right[row] + eye[1] * axes.above[row] + eye[2] * axes.back[row]);
+        if (!isfinite(m[4 * row + 3])) /* bounds at the end of the floats */
+            m[4 * row + 3] = 0.0f;
+    }
 }
 
 void frame_camera_auto(struct frame_camera *camera, const struct frame_framing *framing, const float lower[3],
                        const float upper[3], float aspect)
 {
-    const double azimuth = (double)framing->azimuth, elevation = (double)framing->elevation;
-    /* Not by an upward direction: seen from above there is none. */
-    const double right[3] = {cos(azimuth), 0.0, -sin(azimuth)};
-    const double back[3] = {sin(azimuth) * cos(elevation), sin(elevation), cos(azimuth) * cos(elevation)};
-    double above[3], points[POINTS_OF_TURN][3], diagonal = 0.0, nearest = -INFINITY;
-    cross3(above, back, right);
-    const double slope_y = tan((double)framing->fov_y / 2.0) * (1.0 - 2.0 * (double)framing->margin);
-    const double slope_x = slope_y * (double)aspect;
-    struct reach x = {-INFINITY, INFINITY}, y = x;
+    double directions[FRAME_CAMERA_DIRECTIONS][3], supports[FRAME_CAMERA_DIRECTIONS], points[POINTS_OF_TURN][3];
+    double size = 0.0;
+    frame_camera_directions(directions, framing, aspect);
     for (int i = 0; i < 3; i++)
-        diagonal += fabs((double)upper[i] - (double)lower[i]);
+        size += fabs((double)upper[i] - (double)lower[i]);
     const unsigned count = points_of(points, lower, upper, framing->turns);
-    for (unsigned i = 0; i < count; i++) {
-        const double behind = dot3(points[i], back);
-        reach_of(&x, dot3(points[i], right), behind, slope_x);
-        reach_of(&y, dot3(points[i], above), behind, slope_y);
-        nearest = fmax(nearest, behind);
+    for (unsigned k = 0; k < FRAME_CAMERA_DIRECTIONS; k++) {
+        supports[k] = -INFINITY;
+        for (unsigned i = 0; i < count; i++)
+            supports[k] = fmax(supports[k], dot3(points[i], directions[k]));
     }
-    double eye[3] = {(x.most + x.least) / 2.0, (y.most + y.least) / 2.0};
-    eye[2] = fmax((x.most - x.least) / (2.0 * slope_x), (y.most - y.least) / (2.0 * slope_y));
-    /* Something without an extent across the view, or without any. */
-    eye[2] = fmax(eye[2], nearest + (diagonal > 0.0 ? NEAREST_SHARE * diagonal : 1.0));
-    *camera = (struct frame_camera){
-        .fov_y = (float)(2.0 * atan(tan((double)framing->fov_y / 2.0) / (double)framing->zoom))};
-    float *m = camera->world_from_view;
-    for (int row = 0; row < 3; row++) {
-        m[4 * row] = (float)right[row];
-        m[4 * row + 1] = (float)above[row];
-        m[4 * row + 2] = (float)back[row];
-        m[4 * row + 3] = (float)(eye[0] * right[row] + eye[1] * above[row] + eye[2] * back[row]);
-        if (!isfinite(m[4 * row + 3])) /* bounds at the end of the floats */
-            m[4 * row + 3] = 0.0f;
-    }
+    frame_camera_around(camera, framing, aspect, supports, size);
 }
 
 static float distance_along_view(const struct frame_camera *camera, const float point[3])

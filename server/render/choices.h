@@ -6,7 +6,7 @@
 
 #include "render/context.h"
 
-/* How many times as many rays as a slice its waves have room for: mirrors and glass rarely fill it. */
+/* How many times as many rays as a slice its waves have room for at most: mirrors and glass rarely fill it. */
 #define CHOICES_WAVE_PER_SLICE 2
 
 /* Rays of a slice at most. */

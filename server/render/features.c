@@ -21,6 +21,7 @@ struct scene_features scene_features_of(const struct scene *scene)
         for (int i = 0; i < MATERIAL_TEXTURE_COUNT; i++)
             features.textures |= material->textures[i].texture != 0;
         features.mirrors |= material->roughness < MIRROR_ROUGHNESS_GONE || material->transmission > 0.0f ||
+                            material->textures[MATERIAL_METALLIC_ROUGHNESS].texture != 0 ||
                             material->alpha_mode == ALPHA_BLEND ||
                             (material->clearcoat > 0.0f && material->clearcoat_roughness < MIRROR_ROUGHNESS_GONE);
         features.anisotropy |= material->anisotropy > 0.0f;

@@ -215,8 +215,15 @@ struct frame_framing {
     float zoom;   /* scales the picture about its middle */
     bool turns;   /* all stays in view where the eye turns about the vertical in the middle of the bounds */
 };
-/* A camera that sees all of the bounds, as near as that allows: they touch two opposite edges of the picture, or
- * of the margin. */
+/* A camera that sees all, as near as that allows: two opposite edges of the picture, or of the margin, are
+ * touched. What it depends on is how far all reaches in these directions: the greatest dot product with a point
+ * for each. `size`: of all, in metres; the eye is at least a part of that before it. */
+#define FRAME_CAMERA_DIRECTIONS 5
+void frame_camera_directions(double directions[FRAME_CAMERA_DIRECTIONS][3], const struct frame_framing *framing,
+                             float aspect);
+void frame_camera_around(struct frame_camera *camera, const struct frame_framing *framing, float aspect,
+                         const double supports[FRAME_CAMERA_DIRECTIONS], double size);
+/* Likewise, of all within bounds. */
 void frame_camera_auto(struct frame_camera *camera, const struct frame_framing *framing, const float lower[3],
                        const float upper[3], float aspect);
 /* Pixels of one view. */

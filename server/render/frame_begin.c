@@ -244,6 +244,17 @@ static uint32_t sample_shift_max(const struct frame_renderer *renderer)
     return shift;
 }
 
+/* Room for more than the first hits is needed by what they send on, and to ask several lights at once. Memory that
+ * is touched for the first time takes longer than most passes of a picture. */
+static uint32_t rays_a_path(const struct frame_renderer *renderer)
+{
+    const struct render_context *context = &renderer->work->context;
+    const struct wave_passes *passes = &renderer->work->passes;
+    const bool once = !context->request.compare && !wave_passes_expect_bounces(passes, context) &&
+                      passes->integrator->shadow_rays_a_hit(context) <= 1;
+    return once ? 1 : CHOICES_WAVE_PER_SLICE;
+}
+
 static bool reserve_frame(struct frame_renderer *renderer, struct error *error)
 {
     struct render_context *context = &renderer->work->context;
@@ -262,7 +273,7 @@ static bool reserve_frame(struct frame_renderer *renderer, struct error *error)
     uint64_t all = (uint64_t)picture_slot_count(renderer->target) << renderer->sample_shift_max;
     rays = rays < all ? rays : (uint32_t)all;
     renderer->slice_rays_max = renderer->slices.slice_rays = rays;
-    uint32_t wave_rays = rays * CHOICES_WAVE_PER_SLICE;
+    uint32_t wave_rays = rays * rays_a_path(renderer);
     if (renderer->wanted_wave_rays)
         wave_rays = renderer->wanted_wave_rays;
     context->wave_capacity = at_least(wave_rays, rays);

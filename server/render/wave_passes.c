@@ -308,6 +308,13 @@ static void announce_bounces(struct wave_passes *passes, struct render_context *
     (void)shade_program(passes, context, NULL);
 }
 
+bool wave_passes_expect_bounces(const struct wave_passes *passes, const struct render_context *context)
+{
+    const struct integrator *integrator = passes->integrator;
+    return context->scene->instance_count > 0 && context->request.depth > 0 &&
+           (integrator->always_bounces || (integrator->mirrors && context->features.mirrors));
+}
+
 void wave_passes_announce(struct wave_passes *passes, struct render_context *context)
 {
     const struct integrator *integrator = passes->integrator;
@@ -318,7 +325,6 @@ void wave_passes_announce(struct wave_passes *passes, struct render_context *con
     (void)left_scene_program(passes, context, NULL);
     (void)gather_program(passes, context, NULL);
     compact_announce_children(context, integrator->scatters);
-    if (shows_something && context->request.depth > 0 &&
-        (integrator->always_bounces || (integrator->mirrors && context->features.mirrors)))
+    if (wave_passes_expect_bounces(passes, context))
         announce_bounces(passes, context);
 }

@@ -31,6 +31,8 @@ uint64_t wave_passes_device_bytes(const struct wave_passes *passes);
 enum wave_progress wave_passes_shade(struct wave_passes *passes, struct render_context *context,
                                      struct error *error);
 
+/* Whether hits are likely to send rays on. If they do all the same, slices whose waves do not fit are split. */
+bool wave_passes_expect_bounces(const struct wave_passes *passes, const struct render_context *context);
 /* Announces the programs that every frame of the integrator needs (gpu_program_announce): those of its first wave,
  * and of its bounces where there will be some. */
 void wave_passes_announce(struct wave_passes *passes, struct render_context *context);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Bounds of all that a scene shows. */
+/* Bounds of all that a scene shows, and how far it reaches in given directions. */
 #include "scene/affine.h"
 #include "scene/pose.h"
 
@@ -135,4 +135,197 @@ bool scene_bounds_below(const struct scene *scene, const struct scene_pose *pose
 bool scene_bounds(const struct scene *scene, const struct scene_pose *pose, float lower[3], float upper[3])
 {
     return scene_bounds_below(scene, pose, 0, lower, upper);
+}
+
+/* ---- supports ----------------------------------------------------------------------------------- */
+
+struct direction {
+    double object[3]; /* its dot product with a point in object space, plus the offset, is that in world space */
+    double offset;
+};
+
+/* What is looked for: the greatest dot products so far. */
+struct reach {
+    const struct scene *scene;
+    const struct scene_pose *pose;
+    const double (*directions)[3];
+    double *supports;
+    size_t count;
+    uint64_t left; /* of the budget for deformed meshes */
+    bool found;
+};
+
+static double dot(const double a[3], const float b[3])
+{
+    return a[0] * (double)b[0] + a[1] * (double)b[1] + a[2] * (double)b[2];
+}
+
+static void to_object(struct direction own[SCENE_SUPPORTS_MAX], const struct reach *reach, const float m[12])
+{
+    for (size_t i = 0; i < reach->count; i++) {
+        const double *world = reach->directions[i];
+        for (int axis = 0; axis < 3; axis++)
+            own[i].object[axis] =
+                world[0] * (double)m[axis] + world[1] * (double)m[4 + axis] + world[2] * (double)m[8 + axis];
+        own[i].offset = world[0] * (double)m[3] + world[1] * (double)m[7] + world[2] * (double)m[11];
+    }
+}
+
+static void note(struct reach *reach, size_t i, double support)
+{
+    if (isfinite(support))
+        reach->supports[i] = fmax(reach->supports[i], support);
+}
+
+/* One direction after the other: the loops are short enough for vectors of the processor. */
+static void reach_points(struct reach *reach, const struct direction *own, const float *positions,
+                         const uint32_t *indices, size_t count)
+{
+    for (size_t i = 0; i < reach->count; i++) {
+        const double *d = own[i].object;
+        double most = -INFINITY;
+        for (size_t k = 0; k < count; k++) {
+            const double at = dot(d, positions + 3 * (indices ? (size_t)indices[k] : k));
+            most = at > most ? at : most; /* not of a place that is not finite */
+        }
+        note(reach, i, most + own[i].offset);
+    }
+}
+
+/* The vertices between the bounds, of which those beyond belong to other meshes. */
+static void reach_vertices(struct reach *reach, const struct direction *own, const struct scene_mesh *mesh)
+{
+    const float *p = (const float *)(const void *)mesh->arrays[MESH_POSITIONS]->data;
+    const float *lower = mesh->lower, *upper = mesh->upper;
+    double most[SCENE_SUPPORTS_MAX];
+    for (size_t i = 0; i < reach->count; i++)
+        most[i] = -INFINITY;
+    for (uint32_t k = 0; k < mesh->vertex_count; k++, p += 3) {
+        if (p[0] < lower[0] || p[0] > upper[0] || p[1] < lower[1] || p[1] > upper[1] || p[2] < lower[2] ||
+            p[2] > upper[2])
+            continue;
+        for (size_t i = 0; i < reach->count; i++) {
+            const double at = dot(own[i].object, p);
+            most[i] = at > most[i] ? at : most[i];
+        }
+    }
+    for (size_t i = 0; i < reach->count; i++)
+        note(reach, i, most[i] + own[i].offset);
+}
+
+/* False: out of memory. */
+static bool reach_deformed(struct reach *reach, const struct direction *own, const struct scene_instance *instance)
+{
+    const struct scene_mesh *mesh = scene_mesh(reach->scene, instance->node->object);
+    float *positions = malloc((size_t)mesh->vertex_count * 3 * sizeof(*positions));
+    const bool deformed =
+        positions && scene_deform(reach->scene, reach->pose, instance->node, positions, NULL, NULL);
+    if (deformed)
+        reach_points(reach, own, positions, (const uint32_t *)(const void *)mesh->arrays[MESH_INDICES]->data,
+                     (size_t)mesh->triangle_count * 3);
+    free(positions);
+    return deformed;
+}
+
+static void reach_mesh(struct reach *reach, const struct direction *own, const struct scene_instance *instance)
+{
+    const struct scene_mesh *mesh = scene_mesh(reach->scene, instance->node->object);
+    const size_t corners = (size_t)mesh->triangle_count * 3;
+    if (scene_node_deforms(instance->node, mesh) && afford(mesh, &reach->left) &&
+        reach_deformed(reach, own, instance))
+        return;
+    if (mesh->vertex_count < corners)
+        reach_vertices(reach, own, mesh);
+    else
+        reach_points(reach, own, (const float *)(const void *)mesh->arrays[MESH_POSITIONS]->data,
+                     (const uint32_t *)(const void *)mesh->arrays[MESH_INDICES]->data, corners);
+}
+
+static void reach_spheres(struct reach *reach, const struct direction *own, const struct scene_spheres *spheres)
+{
+    const float *sphere = (const float *)(const void *)spheres->centres_radii->data;
+    for (size_t i = 0; i < reach->count; i++) {
+        const double *d = own[i].object, length = sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+        double most = -INFINITY;
+        for (uint32_t k = 0; k < spheres->sphere_count; k++)
+            most = fmax(most, dot(d, sphere + 4 * k) + length * (double)sphere[4 * k + 3]);
+        note(reach, i, most + own[i].offset);
+    }
+}
+
+/* Whether the box of an instance goes beyond what was found; that of a deforming mesh may. */
+static bool goes_beyond(const struct reach *reach, const struct direction *own, const float lower[3],
+                        const float upper[3])
+{
+    for (size_t i = 0; i < reach->count; i++) {
+        double support = own[i].offset;
+        for (int axis = 0; axis < 3; axis++) {
+            const double d = own[i].object[axis];
+            support += d * (double)(d > 0.0 ? upper[axis] : lower[axis]);
+        }
+        if (!(support <= reach->supports[i]))
+            return true;
+    }
+    return false;
+}
+
+static void reach_kind(struct reach *reach, enum node_kind kind, uint32_t root)
+{
+    struct scene_instance *instances;
+    size_t count;
+    if (!scene_flatten(reach->scene, reach->pose, kind, &instances, &count))
+        return;
+    for (size_t i = 0; i < count; i++) {
+        const struct scene_node *node = instances[i].node;
+        struct direction own[SCENE_SUPPORTS_MAX];
+        if (instances[i].singular || !is_below(reach->scene, node, root))
+            continue;
+        const struct scene_mesh *mesh = kind == NODE_MESH ? scene_mesh(reach->scene, node->object) : NULL;
+        const struct scene_spheres *spheres = mesh ? NULL : scene_spheres(reach->scene, node->object);
+        to_object(own, reach, instances[i].world_from_object);
+        if (!(mesh && scene_node_deforms(node, mesh)) &&
+            !goes_beyond(reach, own, mesh ? mesh->lower : spheres->lower, mesh ? mesh->upper : spheres->upper))
+            continue;
+        if (mesh)
+            reach_mesh(reach, own, &instances[i]);
+        else
+            reach_spheres(reach, own, spheres);
+        reach->found = true;
+    }
+    free(instances);
+}
+
+static void reach_discs(struct reach *reach)
+{
+    size_t cursor = 0;
+    void *value;
+    while (hashmap_next(&reach->scene->objects[OBJECT_DISC], &cursor, NULL, &value)) {
+        const struct scene_disc *disc = value;
+        for (size_t i = 0; i < reach->count; i++) {
+            const double *d = reach->directions[i], along = dot(d, disc->normal_world);
+            const double across = fmax(0.0, d[0] * d[0] + d[1] * d[1] + d[2] * d[2] - along * along);
+            note(reach, i, dot(d, disc->centre_world) + (double)disc->radius * sqrt(across));
+        }
+        reach->found = true;
+    }
+}
+
+bool scene_supports_below(const struct scene *scene, const struct scene_pose *pose, uint32_t root,
+                          const double (*directions)[3], double *supports, size_t count)
+{
+    struct reach reach = {.scene = scene,
+                          .pose = pose,
+                          .directions = directions,
+                          .supports = supports,
+                          .count = count,
+                          .left = DEFORM_NUMBERS_MAX};
+    for (size_t i = 0; i < count; i++)
+        supports[i] = -INFINITY;
+    reach_kind(&reach, NODE_MESH, root);
+    reach_kind(&reach, NODE_SPHERES, root);
+    if (!reach.found && root == 0)
+        reach_discs(&reach);
+    for (size_t i = 0; i < count; i++)
+        reach.found &= isfinite(supports[i]) != 0;
+    return reach.found;
 }

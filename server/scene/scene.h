@@ -311,5 +311,11 @@ bool scene_bounds(const struct scene *scene, const struct scene_pose *pose, floa
 /* Likewise of a node and the nodes below it; 0: of all. */
 bool scene_bounds_below(const struct scene *scene, const struct scene_pose *pose, uint32_t root, float lower[3],
                         float upper[3]);
+/* For each direction in world space the greatest dot product with a point of what scene_bounds_below() counts: of
+ * the vertices that triangles use, of spheres, of discs. Of a mesh with fewer vertices than corners any of its
+ * vertices may count that is within its bounds. False: nothing is visible. */
+#define SCENE_SUPPORTS_MAX 5
+bool scene_supports_below(const struct scene *scene, const struct scene_pose *pose, uint32_t root,
+                          const double (*directions)[3], double *supports, size_t count);
 
 #endif

@@ -66,6 +66,18 @@ TEST(the_number_of_primitives_a_pixel_decides)
     assert_chosen(fixture, TRACER_BVH, PRIMARY_RASTER);
 }
 
+/* Many primitives a pixel are not enough. */
+TEST(software_gl_rasterises_scenes_of_few_primitives)
+{
+    struct fixture *fixture = *state;
+    fixture_mixture(fixture);
+    fixture->request.samples = 16;
+    fixture->request.width = 4;
+    fixture->request.height = 3;
+    device->measured = (struct gpu_measured){0};
+    assert_chosen(fixture, TRACER_BVH, PRIMARY_RASTER);
+}
+
 TEST(tracers_that_sample_and_brute_force_keep_rasterised_first_hits)
 {
     struct fixture *fixture = *state;

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: MIT
 """`make bench`: where the time goes, in tables and as JSON. Usage: bench.py BUILD_FOLDER [PART ..] [--out FOLDER]
 
-Parts: start, oneshot, frames, animation, tracers, forms, family, pixels, rays, parallel, instances, refit, flake, distributed,
+Parts: start, first_picture, oneshot, frames, animation, tracers, forms, family, pixels, rays, parallel, instances, refit, flake, distributed,
 steps, link, view, deadline, walk, warp, ldc, abuffer, rayspace, quadtree, reduce, reach; all of them where none is named. Each figure is the median of several runs after a
 warm-up, with the median absolute deviation beside it; what is compared takes turns, run by run. Scenes of FARLIGHT_SCENES
 (default: ../shared/scenes beside the checkout) are left out, and named, where missing.
@@ -14,7 +14,7 @@ embree, and on a GPU copy_bytes_per_s}, "parts": {NAME: {..}}}. Figures are obje
 and runs; keys end with their unit. tracers, reach, family, pixels and rays have `results`, one for each call of
 bench_tracers: title, triangles, spheres, instances, width, height, rays_per_pixel, `structures` (tracer, form, build,
 memory_bytes) and `waves` (kind, order, any, rays, `measures`: tracer, form, way, time, rays_per_s, agreement).
-`distributed` is described in bench_frames.py, `steps` in bench_steps.py, `link` in bench_link.py, `view` in bench_view.py, `deadline` in bench_deadline.py, `walk` in bench_walk.py, `warp` in bench_warp.py, `ldc` in bench_ldc.py,
+`first_picture` is described in bench_first_picture.py, `distributed` in bench_frames.py, `steps` in bench_steps.py, `link` in bench_link.py, `view` in bench_view.py, `deadline` in bench_deadline.py, `walk` in bench_walk.py, `warp` in bench_warp.py, `ldc` in bench_ldc.py,
 `abuffer` in bench_abuffer.py, `rayspace` in bench_rayspace.py, `quadtree` in bench_quadtree.py, `reduce` in bench_reduce.py. `wanted` has the lines that are to be reached: line, wanted, measured, met, within_spread
 (missed by no more than twice its deviation), where.
 
@@ -34,6 +34,7 @@ import bench_abuffer_show
 import bench_animated
 import bench_client
 import bench_deadline
+import bench_first_picture
 import bench_frames
 import bench_ldc
 import bench_ldc_show
@@ -54,6 +55,7 @@ from bench_common import Bench, Failure, command, environment, say
 # name: (title, measure, show)
 PARTS = {
     "start": ("Starting", bench_client.measure_start, bench_client.show_start),
+    "first_picture": ("Time to the first picture", bench_first_picture.measure, bench_first_picture.show),
     "oneshot": ("One command with a daemon of its own", bench_client.measure_oneshot, bench_client.show_oneshot),
     "frames": ("Frames", bench_client.measure_frames, bench_client.show_frames),
     "animation": ("An animation", bench_client.measure_animation, bench_client.show_animation),

@@ -28,7 +28,7 @@ import bench_walk  # noqa: E402  pylint: disable=wrong-import-position
 import bench_warp  # noqa: E402  pylint: disable=wrong-import-position
 
 TRACED = ("tracers", "family", "pixels", "rays", "flake", "reach")  # results of `bench tracers`
-PARTS = ("frames", "distributed", "steps", "link", "view", "deadline", "walk", "warp", "tracers", "family", "pixels", "rays", "parallel",
+PARTS = ("first_picture", "frames", "distributed", "steps", "link", "view", "deadline", "walk", "warp", "tracers", "family", "pixels", "rays", "parallel",
          "instances", "refit", "flake", "ldc", "abuffer", "rayspace", "quadtree", "reach")
 
 

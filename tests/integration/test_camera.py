@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Cameras without coordinates: the side that a model is seen from, and how near."""
+import json
+import math
+
 from farlight_test import OneDaemon, bundled_scenes, farlight, read_png
 
 COLOURS = {"front": (1, 0, 0), "back": (0, 1, 0), "left": (0, 0, 1), "right": (1, 1, 0), "top": (0, 1, 1), "bottom": (1, 0, 1)}
@@ -18,9 +21,9 @@ class Sides(OneDaemon):
         self.box.write_text("mtllib box.mtl\no box\n" + "".join(f"v {x} {y} {z}\n" for x, y, z in CORNERS) + "".join(
             f"usemtl {name}\nf {' '.join(str(i) for i in corners)}\n" for name, corners in SIDES.items()))
 
-    def render(self, *options, size="96x54"):
+    def render(self, *options, size="96x54", model=None):
         path = self.folder / "x.png"
-        self.expect(farlight("render", self.box, "-o", path, "--size", size, "--background", "transparent", *options), 0)
+        self.expect(farlight("render", model or self.box, "-o", path, "--size", size, "--background", "transparent", *options), 0)
         _, _, rows, channels = read_png(path)
         self.assertEqual(channels, 4)
         return [[row[x:x + 4] for x in range(0, len(row), 4)] for row in rows]
@@ -50,6 +53,36 @@ class Sides(OneDaemon):
             _, _, top, bottom = self.covered(self.render(*options, size="320x40"))
             self.assertAlmostEqual(top, 40 * margin, delta=1)
             self.assertAlmostEqual(39 - bottom, 40 * margin, delta=1)
+
+    def ball(self):
+        """A round model off the middle of its space: its bounds' corners are empty."""
+        points = [(3 + math.sin(a) * math.cos(b), 2 + math.cos(a), math.sin(a) * math.sin(b))
+                  for a in (math.pi * i / 24 for i in range(25)) for b in (math.tau * k / 48 for k in range(48))]
+        faces = [(48 * i + k, 48 * i + 48 + k, 48 * i + 48 + (k + 1) % 48, 48 * i + (k + 1) % 48) for i in range(24) for k in range(48)]
+        path = self.folder / "ball.obj"
+        path.write_text("".join(f"v {x} {y} {z}\n" for x, y, z in points) +
+                        "".join(f"f {' '.join(str(i + 1) for i in face)}\n" for face in faces))
+        return path
+
+    def test_a_round_model_is_framed_by_its_vertices(self):
+        """Its bounds would leave a third of the height free. A share of 0.01 is 2 pixels, of which rounding takes a half."""
+        for model, options in ((self.ball(), []), (self.ball(), ["--azimuth", "70", "--elevation", "40", "--margin", "0.1"])):
+            margin = 0.1 if options else 0.03
+            left, right, top, bottom = self.covered(self.render(*options, size="300x200", model=model))
+            self.assertAlmostEqual(top / 200, margin, delta=0.01)
+            self.assertAlmostEqual((199 - bottom) / 200, margin, delta=0.01)
+            self.assertAlmostEqual(left, 299 - right, delta=2, msg="it is in the middle")
+
+    def test_info_says_its_camera_as_options(self):
+        box = self.folder / "box.obj"
+        done = self.expect(farlight("info", box, "--camera", "--json"), 0)
+        camera = json.loads(done.stdout)["camera"]
+        options = [f"--{name}=" + ",".join(map(str, camera[key])) for name, key in (("eye", "eye"), ("look-at", "target"), ("up", "up"))]
+        line = next(line for line in self.expect(farlight("info", box, "--camera"), 0).stdout.splitlines() if "camera  " in line)
+        same, usual = self.render(*line.split()[1:], size="160x90"), self.render(size="160x90")
+        self.assertEqual(same, self.render(*options, "--fov", str(camera["fov_degrees"]), size="160x90"))
+        apart = sum(a != b for row, other in zip(same, usual) for a, b in zip(row, other))
+        self.assertLess(apart, 160, "as coordinates are rounded, less than a pixel of a row at silhouettes")
 
     def test_another_field_of_view_and_a_zoom_keep_the_middle(self):
         for fov in ("10", "90"):

@@ -17,6 +17,7 @@ import json
 import os
 import struct
 import unittest
+import zlib
 
 import importer
 from farlight_test import SHARED_SCENES, farlight, needs_shared_scenes
@@ -563,6 +564,36 @@ class Materials(Gltf):
         self.assertEqual(result.data(mirror["arrays"][0]), bytes([56, 56, 56, 255]) * 4, "0.04")
         self.assertEqual((material["base"], material["metallic"], material["roughness"]), ((1, 1, 1, 1), 1, 1))
         self.assertEqual(material["specular"], (1, 25, 25, 25), "of 0.04, which the texture has whole")
+
+    def texels(self, image, mime):
+        """Of the base colour of a material."""
+        model = Model().cube()
+        model.primitive["material"] = 0
+        model.json.update(materials=[{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}], textures=[{"source": 0}],
+                          images=[{"bufferView": model.view(image), "mimeType": mime}])
+        result = self.run_model(model)
+        texture, = result.of(SET_TEXTURE)
+        return result.data(texture["arrays"][0]), result.text()
+
+    def test_every_kind_of_png_becomes_four_bytes_a_texel(self):
+        """Two texels. 16 bits are rounded: 0x0180 is 1.494 of 255, 0x0182 is 1.502."""
+        for name, kind, depth, row, more, wanted in (
+                ("grey of one bit", 0, 1, b"\x40", {}, [0, 0, 0, 255, 255, 255, 255, 255]),
+                ("grey of 16 bits with alpha", 4, 16, bytes.fromhex("0180ffff01820000"), {}, [1, 1, 1, 255, 2, 2, 2, 0]),
+                ("a palette with alpha", 3, 2, b"\x40", {b"PLTE": b"\1\2\3\4\5\6", b"tRNS": b"\x80"}, [4, 5, 6, 255, 1, 2, 3, 128]),
+                ("colours of which one is clear", 2, 8, b"\1\2\3\4\5\6", {b"tRNS": b"\0\4\0\5\0\6"}, [1, 2, 3, 255, 4, 5, 6, 0])):
+            with self.subTest(name):
+                chunks = [(b"IHDR", struct.pack(">IIBBBBB", 2, 1, depth, kind, 0, 0, 0)), *more.items(),
+                          (b"IDAT", zlib.compress(b"\0" + row)), (b"IEND", b"")]
+                image = b"\x89PNG\r\n\x1a\n" + b"".join(struct.pack(">I", len(data)) + tag + data +
+                                                       struct.pack(">I", zlib.crc32(tag + data)) for tag, data in chunks)
+                self.assertEqual(list(self.texels(image, "image/png")[0]), wanted)
+
+    def test_an_image_that_is_not_what_the_model_says_is_named(self):
+        texels, text = self.texels(WEBP, "image/png")
+        self.assertEqual(texels[:4], bytes([255, 0, 255, 255]), "magenta stands in")
+        self.assertIn("is neither PNG nor JPEG", text)
+        self.assertEqual(self.texels(WEBP, "image/webp")[0][:4], bytes([255, 0, 0, 255]))
 
     def test_a_specular_texture_makes_metal_of_what_shines(self):
         """Black below it: the coloured texels reflect as metals of their colours."""

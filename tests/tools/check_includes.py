@@ -82,10 +82,12 @@ RESTRICTED = {
     r"lib(av|sw)": ("client/video", "client/viewer", "server/encode"),
     r"SDL2?/": ("client/viewer",),
     r"OpenImageIO/": ("client/import", "client/output/library"),
-    r"(png\.h|(OpenEXR|Imath)/)": ("client/output",),
+    r"png\.h": ("client/import", "client/output"),
+    r"(OpenEXR|Imath)/": ("client/output",),
     r"tiny_(gltf|obj_loader)": ("client/import",),
     r"assimp/": ("client/import",),
-    r"(turbojpeg|zstd)\.h": ("server/encode", "client/lib", "protocol/pixels"),
+    r"turbojpeg\.h": ("client/import", "client/lib", "server/encode"),
+    r"zstd\.h": ("server/encode", "client/lib", "protocol/pixels"),
     r"sodium\.h": ("server/session", "server/store", "protocol/common", "protocol/sealed"),
 }
 # Where the matrix of the server's rooms stands.

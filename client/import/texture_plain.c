@@ -1,0 +1,260 @@
+/* SPDX-License-Identifier: MIT */
+#include "texture_plain.h"
+
+#include <png.h>
+#include <pthread.h>
+#include <setjmp.h>
+#include <stdatomic.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+#include <turbojpeg.h>
+
+/* As in texture.cpp. */
+#define EDGE_MAX 16384
+#define IMAGE_TEXELS_MAX (UINT64_C(1) << 26)
+#define ALL_TEXELS_MAX (UINT64_C(1) << 30)
+#define TEXEL_BYTES 4
+
+static atomic_uint_fast64_t all_texels;
+
+static bool is_png(const struct texture_job *job)
+{
+    return job->size_bytes >= 8 && memcmp(job->bytes, "\x89PNG\r\n\x1a\n", 8) == 0;
+}
+
+static bool is_jpeg(const struct texture_job *job)
+{
+    return job->size_bytes >= 3 && memcmp(job->bytes, "\xff\xd8\xff", 3) == 0;
+}
+
+bool texture_is_plain(const struct texture_job *job)
+{
+    return job->bytes && (is_png(job) || is_jpeg(job));
+}
+
+/* Checks what the header claims before memory is taken for it. */
+static bool take_texels(struct texture_job *job, uint64_t width, uint64_t height)
+{
+    char *reason = job->reason;
+    if (width < 1 || height < 1)
+        return snprintf(reason, sizeof(job->reason), "is not a flat image"), false;
+    if (width > EDGE_MAX || height > EDGE_MAX)
+        return snprintf(reason, sizeof(job->reason), "is %llu x %llu texels, more than %d in one direction",
+                        (unsigned long long)width, (unsigned long long)height, EDGE_MAX),
+               false;
+    const uint64_t texels = width * height;
+    if (texels > IMAGE_TEXELS_MAX)
+        return snprintf(reason, sizeof(job->reason), "would need more than 1 GiB"), false;
+    if (atomic_fetch_add(&all_texels, texels) > ALL_TEXELS_MAX - texels)
+        return snprintf(reason, sizeof(job->reason), "would need, with the images before it, more than 4 GiB"),
+               false;
+    job->texels = calloc(texels, TEXEL_BYTES);
+    if (!job->texels)
+        return snprintf(reason, sizeof(job->reason), "out of memory"), false;
+    job->width = (uint32_t)width;
+    job->height = (uint32_t)height;
+    return true;
+}
+
+/* ---- PNG ---- */
+
+struct png_bytes {
+    struct texture_job *job;
+    size_t at;
+    png_bytep *rows;
+};
+
+static void read_png(png_structp png, png_bytep to, size_t count)
+{
+    struct png_bytes *bytes = png_get_io_ptr(png);
+    if (count > bytes->job->size_bytes - bytes->at)
+        png_error(png, "the file ends too early");
+    memcpy(to, bytes->job->bytes + bytes->at, count);
+    bytes->at += count;
+}
+
+static void fail_png(png_structp png, png_const_charp text)
+{
+    struct png_bytes *bytes = png_get_error_ptr(png);
+    snprintf(bytes->job->reason, sizeof(bytes->job->reason), "%s", text);
+    png_longjmp(png, 1);
+}
+
+static void ignore_warning(png_structp png, png_const_charp text)
+{
+    (void)png, (void)text;
+}
+
+/* Whatever it holds becomes four bytes a texel. */
+static void ask_for_bytes(png_structp png, png_infop info, struct texture_job *job)
+{
+    const png_byte type = png_get_color_type(png, info);
+    const bool keyed = png_get_valid(png, info, PNG_INFO_tRNS);
+    job->has_alpha = keyed || (type & PNG_COLOR_MASK_ALPHA);
+    png_set_expand(png);
+    png_set_scale_16(png);
+    if (!(type & PNG_COLOR_MASK_COLOR))
+        png_set_gray_to_rgb(png);
+    if (!job->has_alpha)
+        png_set_add_alpha(png, 255, PNG_FILLER_AFTER);
+    png_set_interlace_handling(png);
+    png_read_update_info(png, info);
+}
+
+/* An error of libpng ends it by a jump: it keeps nothing in variables that the caller must free. */
+static bool read_png_texels(png_structp png, png_infop info, struct png_bytes *bytes)
+{
+    struct texture_job *job = bytes->job;
+    if (setjmp(png_jmpbuf(png)))
+        return false;
+    png_set_read_fn(png, bytes, read_png);
+    png_set_user_limits(png, 0x7fffffff, 0x7fffffff); /* ours have their own words */
+    png_read_info(png, info);
+    if (!take_texels(job, png_get_image_width(png, info), png_get_image_height(png, info)))
+        return false;
+    ask_for_bytes(png, info, job);
+    bytes->rows = malloc(job->height * sizeof(*bytes->rows));
+    if (!bytes->rows)
+        png_error(png, "out of memory");
+    for (uint32_t y = 0; y < job->height; y++)
+        bytes->rows[y] = job->texels + (size_t)y * job->width * TEXEL_BYTES;
+    png_read_image(png, bytes->rows);
+    return true;
+}
+
+static bool decode_png(struct texture_job *job)
+{
+    struct png_bytes bytes = {.job = job};
+    png_structp png = png_create_read_struct(PNG_LIBPNG_VER_STRING, &bytes, fail_png, ignore_warning);
+    png_infop info = png ? png_create_info_struct(png) : NULL;
+    bool decoded = false;
+    if (info)
+        decoded = read_png_texels(png, info, &bytes);
+    else
+        snprintf(job->reason, sizeof(job->reason), "out of memory");
+    png_destroy_read_struct(&png, &info, NULL);
+    free(bytes.rows);
+    return decoded;
+}
+
+/* ---- JPEG ---- */
+
+/* JPEGs hold 255 minus the ink of each colour. In place. */
+static void rgb_from_cmyk(unsigned char *texels, size_t count)
+{
+    for (unsigned char *at = texels; at < texels + count * TEXEL_BYTES; at += TEXEL_BYTES) {
+        for (int i = 0; i < 3; i++)
+            at[i] = (unsigned char)((at[i] * at[3] + 127) / 255);
+        at[3] = 255;
+    }
+}
+
+static bool decode_jpeg_with(tjhandle handle, struct texture_job *job)
+{
+    int width = 0, height = 0, chroma = 0, space = 0;
+    const unsigned long size = (unsigned long)job->size_bytes;
+    if (tjDecompressHeader3(handle, job->bytes, size, &width, &height, &chroma, &space) < 0 &&
+        tjGetErrorCode(handle) != TJERR_WARNING)
+        return false;
+    if (!take_texels(job, (uint64_t)width, (uint64_t)height))
+        return false;
+    const bool inks = space == TJCS_CMYK || space == TJCS_YCCK;
+    /* What is cut off stays grey, as with a warning. */
+    if (tjDecompress2(handle, job->bytes, size, job->texels, width, 0, height, inks ? TJPF_CMYK : TJPF_RGBA,
+                      TJFLAG_LIMITSCANS) < 0 &&
+        tjGetErrorCode(handle) != TJERR_WARNING)
+        return false;
+    if (inks)
+        rgb_from_cmyk(job->texels, (size_t)width * (size_t)height);
+    return true;
+}
+
+static bool decode_jpeg(struct texture_job *job)
+{
+    tjhandle handle = tjInitDecompress();
+    const bool decoded = handle && decode_jpeg_with(handle, job);
+    if (!decoded && job->reason[0] == '\0')
+        snprintf(job->reason, sizeof(job->reason), "%s", tjGetErrorStr2(handle));
+    if (handle)
+        tjDestroy(handle);
+    return decoded;
+}
+
+/* ---- all ---- */
+
+struct work {
+    struct texture_job *jobs;
+    size_t count;
+    atomic_size_t next;
+};
+
+static void *decode_next(void *context)
+{
+    struct work *work = context;
+    for (size_t i; (i = atomic_fetch_add(&work->next, 1)) < work->count;) {
+        struct texture_job *job = &work->jobs[i];
+        if (!texture_is_plain(job) || (is_png(job) ? decode_png(job) : decode_jpeg(job)))
+            continue;
+        free(job->texels);
+        job->texels = NULL;
+        job->width = job->height = 0;
+    }
+    return NULL;
+}
+
+void texture_plain_decode(struct texture_job *jobs, size_t count)
+{
+    struct work work = {.jobs = jobs, .count = count};
+    size_t plain = 0;
+    pthread_t helper;
+    for (size_t i = 0; i < count; i++)
+        plain += texture_is_plain(&jobs[i]);
+    const bool helped = plain > 1 && pthread_create(&helper, NULL, decode_next, &work) == 0;
+    if (plain > 0)
+        decode_next(&work);
+    if (helped)
+        pthread_join(helper, NULL);
+}
+
+/* ---- names ---- */
+
+static bool begins_with(const char *text, size_t length, const char *start)
+{
+    return length >= strlen(start) && strncmp(text, start, strlen(start)) == 0;
+}
+
+static bool ends_with(const char *text, size_t length, const char *ending)
+{
+    const size_t bytes = strlen(ending);
+    return length >= bytes && strncasecmp(text + length - bytes, ending, bytes) == 0;
+}
+
+static bool names_other(const char *text, size_t length)
+{
+    static const char *const endings[] = {".webp", ".exr", ".hdr", ".pic",  ".tif", ".tiff",
+                                          ".bmp",  ".gif", ".tga", ".tpic", ".ppm", ".pnm"};
+    const size_t skipped = begins_with(text, length, "data:") ? strlen("data:") : 0;
+    if (begins_with(text + skipped, length - skipped, "image/"))
+        return !begins_with(text + skipped, length - skipped, "image/png") &&
+               !begins_with(text + skipped, length - skipped, "image/jp");
+    for (size_t i = 0; !skipped && i < sizeof(endings) / sizeof(endings[0]); i++)
+        if (ends_with(text, length, endings[i]))
+            return true;
+    return !skipped && memchr(text, '\\', length);
+}
+
+bool texture_gltf_names_others(const unsigned char *json, size_t size_bytes)
+{
+    const char *at = (const char *)json, *const end = at + size_bytes;
+    while ((at = memchr(at, '"', (size_t)(end - at)))) {
+        const char *text = at + 1, *quote = memchr(text, '"', (size_t)(end - text));
+        if (!quote)
+            return false;
+        if (names_other(text, (size_t)(quote - text)))
+            return true;
+        at = quote + 1;
+    }
+    return false;
+}

@@ -1,0 +1,17 @@
+/* SPDX-License-Identifier: MIT */
+/* PNG and JPEG to texels, by libpng and libjpeg-turbo: what nearly all models have, without OpenImageIO, whose
+ * loading takes longer than decoding most of them. The texels are those that OpenImageIO gives. */
+#ifndef FARLIGHT_IMPORT_TEXTURE_PLAIN_H
+#define FARLIGHT_IMPORT_TEXTURE_PLAIN_H
+
+#include "texture.h"
+
+/* By the image's first bytes. */
+bool texture_is_plain(const struct texture_job *job);
+/* Decodes all that are, with two threads if there are several; leaves the others as they are. */
+void texture_plain_decode(struct texture_job *jobs, size_t count);
+/* Whether a glTF file names an image that is neither PNG nor JPEG, by an ending or a MIME type. `json` is its
+ * text, not parsed; strings with escapes count as such a name. */
+bool texture_gltf_names_others(const unsigned char *json, size_t size_bytes);
+
+#endif
