@@ -55,8 +55,8 @@ CLIENT_PKGS := libzstd libsodium libxxhash libturbojpeg jansson
 IMPORT_PKGS := tinygltf tinyobjloader draco jansson libsodium libseccomp libpng libturbojpeg
 TEXTURE_PKGS := OpenImageIO
 ASSIMP_PKGS := assimp
-EXPORT_PKGS := libpng zlib OpenEXR libseccomp
-IMAGES_PKGS := OpenImageIO libjxl
+EXPORT_PKGS := libpng OpenEXR libseccomp
+IMAGES_PKGS := OpenImageIO libtiff-4 libjxl
 VIDEO_PKGS := libavformat libavcodec libavutil libseccomp
 VIEWER_PKGS := sdl2 SDL2_ttf libavcodec libswscale libavutil
 TEST_PKGS := cmocka
@@ -325,7 +325,7 @@ $(LOSING_DAEMON): $(B)/tests/tools/lost_gpu.o $(B)/server/main.o $(SERVER_OBJ) $
 
 # ---- what people call ------------------------------------------------------------------------------
 BUILD_PACKAGES := gcc g++ make pkg-config libepoxy-dev libegl-dev libgl-dev libcglm-dev libturbojpeg0-dev libzstd-dev \
-    libsodium-dev libxxhash-dev libinih-dev libjansson-dev libjemalloc-dev libseccomp-dev libopenimageio-dev libpng-dev zlib1g-dev libopenexr-dev libjxl-dev libtinygltf-dev \
+    libsodium-dev libxxhash-dev libinih-dev libjansson-dev libjemalloc-dev libseccomp-dev libopenimageio-dev libpng-dev libtiff-dev libopenexr-dev libjxl-dev libtinygltf-dev \
     libtinyobjloader-dev libdraco-dev libmeshoptimizer-dev libassimp-dev libembree-dev libavcodec-dev libavformat-dev libavutil-dev libswscale-dev libsdl2-dev libsdl2-ttf-dev fonts-dejavu-core libegl1 libgl1-mesa-dri
 TEST_PACKAGES := libcmocka-dev python3 python3-jsonschema ffmpeg xvfb gnuplot-nox
 LINT_PACKAGES := clang clang-format glslang-tools python3

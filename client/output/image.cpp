@@ -5,7 +5,6 @@
 #include "library.h"
 #include "metadata.hpp"
 #include "png_encode.h"
-#include "tiff_encode.hpp"
 #include "protocol/version.h"
 
 #include <Imath/half.h>
@@ -99,18 +98,6 @@ bool copy_out(const std::vector<uint8_t> &made, uint8_t **file, size_t *file_byt
     return true;
 }
 
-bool write_tiff(struct raster raster, const std::string &description, const std::string &date, uint8_t **file,
-                size_t *file_bytes, char *reason, size_t reason_bytes)
-{
-    std::vector<uint8_t> bytes;
-    if (raster.component_bytes != 1) {
-        bytes = bytes_of(raster);
-        raster.pixels = bytes.data();
-        raster.component_bytes = 1;
-    }
-    return copy_out(tiff_encode(raster, description, date), file, file_bytes, reason, reason_bytes);
-}
-
 bool write_with_library(const struct library_image &image, uint8_t **file, size_t *file_bytes, char *reason,
                         size_t reason_bytes)
 {
@@ -136,16 +123,19 @@ std::string date_text(const std::tm &date)
 bool write_frame(const struct image &image, uint8_t **file, size_t *file_bytes, char *reason, size_t reason_bytes)
 {
     const struct message_frame_begin &begin = *image.begin;
-    const struct raster raster = {begin.width, begin.height, 4, protocol_pixel_format_bytes(begin.format) / 4,
-                                  image.pixels};
+    std::vector<uint8_t> bytes;
+    struct raster raster = {begin.width, begin.height, 4, protocol_pixel_format_bytes(begin.format) / 4,
+                            image.pixels};
     const std::tm date = now();
     const std::string date_words = image.full_metadata ? date_text(date) : "";
     if (has_layers(begin) && (image.format != IMAGE_EXR || begin.format != PROTOCOL_PIXEL_FORMAT_RGBA32F))
         return fail(reason, reason_bytes, "only an EXR file of 32-bit floats can store layers");
     if (image.format == IMAGE_EXR)
         return copy_out(exr_encode(image, date_words), file, file_bytes, reason, reason_bytes);
-    if (image.format == IMAGE_TIFF)
-        return write_tiff(raster, metadata_lines(image), date_words, file, file_bytes, reason, reason_bytes);
+    if (image.format == IMAGE_TIFF && raster.component_bytes != 1) {
+        bytes = bytes_of(raster);
+        raster = {raster.width, raster.height, raster.channels, 1, bytes.data()};
+    }
     if (image.format != IMAGE_PNG)
         return write_with_library(
             {image.format, raster, image.quality, metadata_lines(image).c_str(), date_words.c_str()}, file,
@@ -181,7 +171,7 @@ enum image_format image_format_of(const char *path, const char *fallback)
 
 bool image_needs_library(enum image_format format)
 {
-    return format != IMAGE_PNG && format != IMAGE_EXR && format != IMAGE_TIFF;
+    return format != IMAGE_PNG && format != IMAGE_EXR;
 }
 
 bool image_encode(const struct image *image, uint8_t **file, size_t *file_bytes, char *reason, size_t reason_bytes)

@@ -2,6 +2,7 @@
 #include "output/library.h"
 #include "caption.hpp"
 #include "compare.hpp"
+#include "tiff.hpp"
 #include "protocol/version.h"
 
 #include <OpenImageIO/filesystem.h>
@@ -109,7 +110,7 @@ bool encode(const struct library_image *image, uint8_t **file, size_t *file_byte
     try {
         std::vector<unsigned char> made;
         std::string why;
-        if (!write(*image, made, why))
+        if (!(image->format == IMAGE_TIFF ? tiff_encode(*image, made, why) : write(*image, made, why)))
             return fail(reason, reason_bytes, why);
         if (image->format == IMAGE_HDR)
             insert_comments(made, image->description);
