@@ -52,7 +52,7 @@ class CheckDevice(Case):
         self.assertGreaterEqual(len(lines), 2)
         for device, way in zip(lines[::2], lines[1::2]):
             self.assertRegex(device, r"^[0-9]+  ")
-            self.assertRegex(way, r"^   first hits are (rasterised|traced from)")
+            self.assertRegex(way, r"^   first hits are (rasterised|traced of|traced from)")
 
     def test_json_alone_is_wrong_usage(self):
         self.expect(farlight_test.run("farlightd", "--json"), 2)

@@ -256,7 +256,7 @@ class Session(Case):
         client.wait(client.render(1, 2, (160, 120), ABOVE))
         digest = client.next_frame().digest
         result = self.expect(farlight("render", "--scene", "sheet", "--server", self.daemon.address, "--size", "160x120",
-                                      "--samples", "1", "--eye", "0,1,5", "--look-at", "0,0,0", "--fov", math.degrees(0.8),
+                                      "--samples", "1", "--primary", "raster", "--eye", "0,1,5", "--look-at", "0,0,0", "--fov", math.degrees(0.8),
                                       "-o", self.folder / "a.png", "--timings=json"), 0)
         self.assertEqual(int(frames_of(result)[0]["digest"], 16), digest)
 

@@ -369,7 +369,7 @@ class WithoutAWindow(Viewer):
                                 (["--scene", "a"], "--server"), ([scene, "--scale", "3"], "--scale"),
                                 ([scene, "--integrator", "x"], "--integrator"), ([scene, "--encoding", "x"], "--encoding"),
                                 ([scene, "--still-encoding", "h264"], "--still-encoding"), ([scene, "--samples", "0"], "--samples"), ([scene, "--views", "x"], "--views"), ([scene, "--holes", "x"], "--holes"),
-                                ([scene, scene], "one model")):
+                                (["-", "--watch"], "standard input")):
             result = self.expect(farlight("view", *arguments, env={**os.environ, "DISPLAY": ""}), 2)
             self.assertIn(part, result.stderr)
         self.assertEqual(farlight("view", "/nonexistent.glb", "--headless", "--replay", scene).returncode, 1)

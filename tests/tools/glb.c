@@ -20,6 +20,7 @@ void glb_print_material(FILE *json, const struct glb_material *m)
     if (m->transmission > 0) {
         fprintf(json, ",\"KHR_materials_transmission\":{\"transmissionFactor\":%g}", m->transmission);
         fprintf(json, ",\"KHR_materials_ior\":{\"ior\":%g}", m->ior);
+        fprintf(json, ",\"KHR_materials_volume\":{\"thicknessFactor\":1}"); /* a body, no pane */
     }
     fprintf(json, "}}");
 }
@@ -81,7 +82,7 @@ static void print_json(FILE *json, const struct glb_part *parts, size_t part_cou
                        size_t light_count, const struct glb_camera *camera)
 {
     fprintf(json, "{\"asset\":{\"version\":\"2.0\",\"generator\":\"farlight make_scenes\"},\"extensionsUsed\":["
-                  "\"KHR_lights_punctual\",\"KHR_materials_transmission\",\"KHR_materials_ior\","
+                  "\"KHR_lights_punctual\",\"KHR_materials_transmission\",\"KHR_materials_ior\",\"KHR_materials_volume\","
                   "\"KHR_materials_emissive_strength\"],");
     print_nodes(json, parts, part_count, lights, light_count, camera);
     if (light_count) {

@@ -336,7 +336,7 @@ TEST(layers_that_a_file_cannot_have_are_refused_and_the_next_picture_is_written)
 
 TEST(a_file_that_cannot_be_written_is_named_and_nothing_is_left)
 {
-    static const char *const wrong[] = {"%s/missing/a.png", "%s/a.gif", "%s/no-ending", "/a.png"};
+    static const char *const wrong[] = {"%s/missing/a.png", "%s/a.bmp", "%s/no-ending", "/a.png"};
     if (!find_exporter()) {
         print_message("skipped: farlight-export is not built\n");
         skip();
