@@ -64,7 +64,7 @@ ON_A_STACK = re.compile(r"accuracy/|contract/|unit/(gpu|gpu_scene|render|trace)/
 # which is GLSL's arithmetic again; the lengths of steps; forms of a tracer that differ in constants of a shader, or in
 # what the host does; what fills memory up to limits; commands that differ from those of test_stacks in files and options.
 LONG_ON_A_STACK = re.compile(
-    r"accuracy/(bsdf|sampling|sampled_against_reference|shading_.*|path_light|distributed_light|emitters|energy|fireflies"
+    r"accuracy/(bsdf|sampling|sampled_against_reference|shading_.*|path_light|distributed_light|emitters|energy.*|fireflies|sheen|film"
     r"|depth_of_field|frame_steps)"
     r"|contract/(bvh, (one ray alone|packets of)|reference, |ldc by|abuffer, |rayspace, flat, by|quadtree, (of one layer|of boxes|texel by texel))"
     r"|unit/trace/(abuffer|ldc)/(limits|traversal)|unit/trace/bvh/history"
