@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* The module that does what needs OpenImageIO, libtiff and libjxl: it writes JPEG, HDR, WebP, TIFF and GIF, and compares images.
- * Their libraries take a third of a second to load, so that only the runs that need it load it. */
+/* The module that does what needs OpenImageIO, libtiff and libjxl: it writes JPEG, HDR, WebP, TIFF and GIF, and
+ * compares images. Their libraries take a third of a second to load, so that only the runs that need it load it.
+ */
 #ifndef FARLIGHT_CLIENT_OUTPUT_LIBRARY_H
 #define FARLIGHT_CLIENT_OUTPUT_LIBRARY_H
 

@@ -81,9 +81,11 @@ static void print_nodes(FILE *json, const struct glb_part *parts, size_t part_co
 static void print_json(FILE *json, const struct glb_part *parts, size_t part_count, const struct glb_light *lights,
                        size_t light_count, const struct glb_camera *camera)
 {
-    fprintf(json, "{\"asset\":{\"version\":\"2.0\",\"generator\":\"farlight make_scenes\"},\"extensionsUsed\":["
-                  "\"KHR_lights_punctual\",\"KHR_materials_transmission\",\"KHR_materials_ior\",\"KHR_materials_volume\","
-                  "\"KHR_materials_emissive_strength\"],");
+    fprintf(
+        json,
+        "{\"asset\":{\"version\":\"2.0\",\"generator\":\"farlight make_scenes\"},\"extensionsUsed\":["
+        "\"KHR_lights_punctual\",\"KHR_materials_transmission\",\"KHR_materials_ior\",\"KHR_materials_volume\","
+        "\"KHR_materials_emissive_strength\"],");
     print_nodes(json, parts, part_count, lights, light_count, camera);
     if (light_count) {
         fprintf(json, "\"extensions\":{\"KHR_lights_punctual\":{\"lights\":[");
