@@ -270,6 +270,8 @@ def main():
     # Mesa's driver keeps memory until the process ends; that is not ours to free. In full: tests run in folders of their own.
     suppressions = pathlib.Path(__file__).resolve().with_name("lsan.supp")
     os.environ.setdefault("LSAN_OPTIONS", f"suppressions={suppressions}:print_suppressions=0")
+    # Or LeakSanitizer may follow what lies before a library's thread-local memory as if it were a pointer, and crash.
+    os.environ.setdefault("ASAN_OPTIONS", "intercept_tls_get_addr=0")
     os.environ.setdefault("UBSAN_OPTIONS", "print_stacktrace=1")
     os.environ["FARLIGHT_BIN"] = str(build)
     scenes = pathlib.Path("../shared/scenes").resolve()
