@@ -12,10 +12,6 @@
 #define STEP_BYTES ((size_t)2 << 20)
 /* Drivers allocate a little more than they are asked for. */
 #define SLACK_BYTES ((size_t)1 << 16)
-/* For what is not asked for yet: about what a first picture of 640x480 needs. Each block is below an allocator's
- * limits for splitting it, and holds the sums of a picture's band. */
-#define AHEAD_BYTES ((size_t)6 << 20)
-#define AHEAD_BLOCKS 5
 /* A finished block that the caller has not asked for again is freed after this time. */
 #define UNCLAIMED_NS UINT64_C(1000000000)
 
@@ -30,7 +26,6 @@ struct prefault {
     pthread_mutex_t lock; /* of all that follows but the thread */
     pthread_cond_t changed;
     struct block blocks[BLOCKS_MAX];
-    size_t ahead; /* blocks that are still to be prefaulted ahead */
     bool ends;
     pthread_t thread; /* since the first block */
     bool has_thread;
@@ -82,27 +77,10 @@ static uint64_t drop_unclaimed(struct prefault *prefault)
     return first_ns;
 }
 
-/* Locked. All are held until the last is there, or each would be the same memory. */
-static void fill_ahead(struct prefault *prefault)
-{
-    uint8_t *blocks[AHEAD_BLOCKS] = {NULL};
-    const size_t count = prefault->ahead;
-    for (size_t i = 0; i < count && !prefault->ends && !next_block(prefault); i++) {
-        pthread_mutex_unlock(&prefault->lock);
-        if ((blocks[i] = malloc(AHEAD_BYTES)))
-            memset(blocks[i], 0, AHEAD_BYTES);
-        pthread_mutex_lock(&prefault->lock);
-    }
-    for (size_t i = 0; i < count; i++)
-        free(blocks[i]);
-    prefault->ahead = 0;
-}
-
 static void *run(void *context)
 {
     struct prefault *prefault = context;
     pthread_mutex_lock(&prefault->lock);
-    fill_ahead(prefault);
     while (!prefault->ends) {
         uint64_t until_ns = drop_unclaimed(prefault);
         struct block *block = next_block(prefault);
@@ -166,14 +144,6 @@ static bool start_thread(struct prefault *prefault)
     if (prefault->has_thread)
         pthread_setname_np(prefault->thread, "prefault");
     return prefault->has_thread;
-}
-
-void prefault_ahead(struct prefault *prefault)
-{
-    if (!prefault || prefault->has_thread)
-        return;
-    prefault->ahead = AHEAD_BLOCKS;
-    start_thread(prefault);
 }
 
 /* NULL: there is no thread, or no place or memory for the block. */

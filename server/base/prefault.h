@@ -18,9 +18,6 @@ struct prefault;
 
 struct prefault *prefault_create(void);           /* NULL: no memory */
 void prefault_destroy(struct prefault *prefault); /* accepts NULL */
-/* Prefaults memory that is not asked for yet, in blocks of which many allocations can be made, and frees it at
- * once: the allocator keeps the pages. Once. */
-void prefault_ahead(struct prefault *prefault);
 /* Waits until the block is prefaulted, at most until `until_ns` of the clock. True: the caller may allocate that
  * many bytes now, and should do so at once. False: the thread goes on with the block; call again. Small blocks
  * come before large ones. */

@@ -119,19 +119,10 @@ size_t gpu_device_list(struct gpu_device_info *list, size_t max)
     return count;
 }
 
-/* Memory for the first picture is prefaulted while the driver is loaded. */
-static void prefault_start(struct gpu_device *device)
-{
-    if (allocator_keeps_pages())
-        device->prefault = prefault_create();
-    prefault_ahead(device->prefault);
-}
-
 /* Opens the first place that fits the options: the one that was named; else hardware before software. */
-static bool open_place(struct gpu_device *device, struct gpu_egl_place *chosen, const struct gpu_options *options,
+static bool open_place(struct gpu_egl *egl, struct gpu_egl_place *chosen, const struct gpu_options *options,
                        bool debug, struct error *error)
 {
-    struct gpu_egl *egl = device->egl;
     struct gpu_egl_place places[GPU_EGL_PLACES_MAX];
     size_t count = gpu_egl_places(places, GPU_EGL_PLACES_MAX);
     struct error last = {0};
@@ -145,8 +136,6 @@ static bool open_place(struct gpu_device *device, struct gpu_egl_place *chosen, 
             if (!fits)
                 continue;
             last = (struct error){0};
-            if (places[i].software && !device->prefault)
-                prefault_start(device);
             if (!gpu_egl_open(egl, &places[i], debug, &last)) {
                 log_write(LOG_DEBUG, "gpu", "%s", last.text);
                 continue;
@@ -202,7 +191,7 @@ struct gpu_device *gpu_device_create(const struct gpu_options *options, struct e
         error_set(error, ERROR_OUT_OF_MEMORY, "device", "no memory for a device");
         goto fail;
     }
-    if (!open_place(device, &place, options, debug, error))
+    if (!open_place(device->egl, &place, options, debug, error))
         goto fail;
     current_device = device;
     device->registry = gpu_registry_create();
@@ -229,8 +218,8 @@ struct gpu_device *gpu_device_create(const struct gpu_options *options, struct e
     device->measured = options->measured;
     if (!device->measured.known)
         gpu_measured_load(&device->info, &device->measured);
-    if (device->facts.software && !device->prefault)
-        prefault_start(device);
+    if (device->facts.software && allocator_keeps_pages())
+        device->prefault = prefault_create();
     if (debug)
         gpu_debug_start();
     if (!gpu_limits_check(device->facts.limits, error) || !create_defaults(device, error))

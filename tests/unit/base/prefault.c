@@ -42,31 +42,6 @@ TEST(a_block_that_was_prefaulted_is_filled_without_faults)
     prefault_destroy(prefault);
 }
 
-TEST(what_was_prefaulted_ahead_serves_allocations_of_many_sizes)
-{
-    if (!allocator_keeps_pages()) {
-        print_message("SKIP: sanitizers have an allocator of their own\n");
-        skip();
-    }
-    static const size_t sizes[] = {(size_t)5 << 20, (size_t)4 << 20, (size_t)3 << 20, (size_t)2 << 20};
-    void *blocks[4];
-    struct prefault *prefault = prefault_create();
-    assert_non_null(prefault);
-    prefault_ahead(prefault);
-    /* The thread has come to this when all ahead is done. */
-    assert_true(prefault_is_ready(prefault, PREFAULT_BYTES_MIN, clock_now_ns() + LONG_NS));
-    long before = faults_of_this_thread();
-    for (size_t i = 0; i < 4; i++) {
-        assert_non_null(blocks[i] = malloc(sizes[i]));
-        memset(blocks[i], 1, sizes[i]);
-    }
-    /* They have 3,584 pages, or 7 huge ones. */
-    assert_in_range(faults_of_this_thread() - before, 0, 4);
-    for (size_t i = 0; i < 4; i++)
-        free(blocks[i]);
-    prefault_destroy(prefault);
-}
-
 TEST(what_is_not_ready_is_put_off_and_ready_later)
 {
     struct prefault *prefault = prefault_create();
