@@ -124,7 +124,7 @@ struct sheets {
     const float *positions;
     const uint32_t *indices;
     uint32_t triangle_count;
-    atomic_bool stop; /* nobody will ask for the result */
+    atomic_bool stop; /* the result is not needed any more */
     bool none;
 };
 

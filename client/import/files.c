@@ -284,7 +284,7 @@ static bool may_be_key(int descriptor)
     return fstat(descriptor, &status) == 0 && status.st_size == 32 && (status.st_mode & (S_IRWXG | S_IRWXO)) == 0;
 }
 
-/* Whoever waits for changes must know of it, also if it is not there yet. Best effort: there may be no memory. */
+/* A file that is missing is remembered, too, as --watch waits for it. Without memory it is left out. */
 static void remember(struct files *files, const char *folder, const char *name)
 {
     char **grown = files->named_count < FILES_NAMED_MAX

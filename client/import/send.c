@@ -218,7 +218,7 @@ bool sender_file(struct sender *sender, uint32_t model, const char *name)
     struct message message;
     char text[1025];
 
-    /* A name that is none in the protocol is a file that nobody waits for. */
+    /* A file whose name the protocol cannot carry is left out. */
     import_copy_text(text, sizeof(text), name);
     if (strcmp(text, name) != 0)
         return true;

@@ -279,7 +279,7 @@ struct fl_channel {
 FL_API bool fl_scene_add_clip(struct fl_scene *scene, const char *name, const struct fl_channel *channels,
                               size_t channel_count, uint32_t *clip, struct fl_error *error);
 
-/* ---- objects and their fields: what a scene has, whoever made it ---- */
+/* ---- objects of a scene and their fields, also of other clients ---- */
 
 struct fl_object {
     uint32_t id;
@@ -370,8 +370,8 @@ FL_API const char *fl_assignment_print(const struct fl_assignment *assignment, c
 struct fl_edited {
     uint64_t revision; /* that has the change; the one before if nothing changed */
     size_t objects;    /* changed */
-    /* What brings the changed fields back, in any order, and leaves other fields to whoever changes them
-     * meanwhile. malloc'ed, to be freed in any case. */
+    /* What sets the changed fields back, in any order; fields that others change meanwhile stay. malloc'ed, to be
+     * freed in any case. */
     struct fl_assignment *undo;
     size_t undo_count;
 };

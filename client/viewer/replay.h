@@ -12,7 +12,7 @@ enum replay_kind {
     REPLAY_LIVE,       /* wait until the scene is there */
     REPLAY_LOST,       /* wait until the connection is lost */
     REPLAY_CAMERA,     /* wait until the picture is of the newest camera, the daemon's own or made here */
-    REPLAY_CHANGE,     /* wait until somebody has changed the scene since the event before */
+    REPLAY_CHANGE,     /* wait until the scene has changed since the event before */
     REPLAY_SCREENSHOT, /* into `path` */
     REPLAY_STATE       /* one line of JSON on standard output */
 };

@@ -79,7 +79,7 @@ static void read_object(struct viewer *viewer)
         edit->chosen = 0;
     if (id == 0 || edit->has_state || refusal.code == FL_ERROR_NONE)
         return;
-    say(viewer, &refusal); /* somebody has removed it */
+    say(viewer, &refusal); /* another client has removed it */
     edit->ids[edit->tab] = 0;
 }
 
