@@ -174,8 +174,10 @@ bool prefault_is_ready(struct prefault *prefault, size_t bytes, uint64_t until_n
     if (!block)
         block = begin(prefault, bytes);
     bool in_time = true;
+    /* A time that has passed is not waited for at all: a wait lets the lock go, and the thread might finish then.
+     */
     while (block && !block->finished_ns && in_time)
-        in_time = clock_wait(&prefault->changed, &prefault->lock, until_ns);
+        in_time = clock_now_ns() < until_ns && clock_wait(&prefault->changed, &prefault->lock, until_ns);
     bool ready = !block || block->finished_ns;
     if (block && ready)
         drop(block);
