@@ -98,6 +98,8 @@ const char *cli_base_name(const char *path);
 bool cli_check_output(const char *path, char *folder, size_t folder_bytes, struct fl_error *error);
 /* Makes the folder, and those around it, where they are missing. */
 bool cli_make_folder(const char *folder, struct fl_error *error);
+/* Replaces a file as a whole. */
+bool cli_write_text(const char *path, const char *text, mode_t rights, struct fl_error *error);
 /* Whether writing to `path`, named by `option`, overwrites none of the inputs; NULL among them is skipped. */
 bool cli_check_not_input(const char *path, const char *option, const char *const *inputs, size_t count,
                          struct fl_error *error);
