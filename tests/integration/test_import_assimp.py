@@ -411,7 +411,10 @@ class Formats(importer.Written):
                 ("corners.off", off([(math.cos(i), math.sin(i), 0) for i in range(70000)]), "up to 4000 are allowed"),
                 ("deep.dae", dae('<node>' * 300 + QUAD + '</node>' * 300), "nodes are nested more than 254 deep"),
                 ("deeper.dae", dae("<node>" * 100000 + QUAD + "</node>" * 100000), "elements are nested more than 2000 deep"),
-                ("old.fbx", fbx(CORNERS).replace("7300", "6100"), "write it again with a newer version, or as glTF"),
+                ("old.fbx", fbx(CORNERS).replace("7300", "6100"), "version 6.1, but only 7.1 (FBX 2011) and newer are read: write it"),
+                ("corner.ply", ply(faces=((0, 1, 200000000),)), "a face has the vertex 200000000, but there are 4"),
+                ("cube.x", "xof 0303txt 0032\nMesh {\n", "it is a DirectX file (version 3.3, txt), which is not read: write it"),
+                ("cube.blend", "BLENDER-v300", "it is a scene of Blender, which is not read: write it as glTF in Blender"),
                 ("broken.3mf", three_mf(CORNERS)[:-30], "the 3MF file cannot be read: ")):
             with self.subTest(name):
                 result = self.import_text(name, model, 1)
@@ -424,7 +427,7 @@ class Formats(importer.Written):
         self.assertIn("more memory than a model may have", self.import_text("model.ply", model, 1, memory=64 << 20).text())
 
 
-REFUSED = {"blender_279_ball_6100_ascii.fbx": "old format version", "skin_and_morph.dae": "Unable to resolve library reference"}
+REFUSED = {"blender_279_ball_6100_ascii.fbx": "FBX file of version 6.1", "skin_and_morph.dae": "Unable to resolve library reference"}
 
 
 @needs_shared_scenes
