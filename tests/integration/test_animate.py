@@ -184,6 +184,14 @@ class Parts(OneDaemon, Animations):
             after = (folder / f"{frame:04d}.exr").stat()
             self.assertEqual((after.st_ino, after.st_mtime_ns), (before.st_ino, before.st_mtime_ns))
 
+    def test_files_of_all_formats_are_known(self):
+        """That of a frame alone lets no daemon be asked for it."""
+        for ending in ("png", "jpg", "hdr", "webp", "tiff", "gif"):
+            with self.subTest(ending):
+                arguments = "animate", self.model, "--frames", "1-1", *SIZE, "-o", self.folder / f"%d.{ending}"
+                self.expect(farlight(*arguments), 0)
+                self.expect(farlight(*arguments, "--resume", "--server", "unix:/nonexistent"), 0)
+
     def test_with_all_frames_present_no_daemon_is_asked(self):
         whole, _ = self.animate("whole", self.model, *self.RANGE)
         again, _ = self.animate("whole", self.model, *self.RANGE, "--resume", "--server", "unix:/nonexistent")
