@@ -496,6 +496,15 @@ class Scripts(OneDaemon, Animations):
         self.assertEqual(digest(self.folder / "still-1.exr"), self.still("--eye", "2,1.5,2.5", "--look-at", "0,0,0",
                                                                          "--fov", "40"))
 
+    def test_models_have_their_places(self):
+        """As the command line's --at has them; a model of the command line replaces them all."""
+        models = [str(self.model), {"model": str(self.model), "at": [1, 0, 0], "rotation_degrees": [0, 90, 0], "scale": 0.5}]
+        script = self.write({"models": models, "camera": self.camera(), "size": [96, 64], "frames": "1-1", "samples": 1})
+        for more, typed in (((), (self.model, "--at", "1,0,0:0,90,0:0.5")), ((self.model,), ())):
+            self.expect(farlight("animate", "--script", script, *more, "-o", self.folder / "script-%d.exr"), 0)
+            self.assertEqual(digest(self.folder / "script-1.exr"),
+                             self.still(*typed, "--eye", "2,1.5,2.5", "--look-at", "0,0,0", "--fov", "40"))
+
     def test_keys_begin_and_end_where_they_say(self):
         """The first and the last frame are pictures of a camera that stands there."""
         eye = {"times": [0, 0.25], "values": [self.EYE, [3, 1, 1]]}
