@@ -131,11 +131,17 @@ static bool read_all(struct animation *animation, int argc, char **argv)
     }
     /* The command line again, over the script. */
     good = cli_job_begin(&animation->job, fl_render_defaults()) && apply_script(animation, &typed);
-    const char *model = !typed.job.scene ? animation->job.model : NULL; /* which --scene replaces */
-    animation->job.model = NULL;
+    struct cli_job *job = &animation->job;
+    const bool is_kept = !typed.job.scene && !typed.job.model; /* the script's models, which these replace */
+    const char *model = is_kept ? job->model : NULL;
+    const size_t model_count = is_kept ? job->model_count : 0;
+    job->model = NULL;
+    job->model_count = 0;
     good = good && cli_parse(&argp, argc, argv, ARGP_IN_ORDER, animation) == 0;
-    if (!animation->job.model)
-        animation->job.model = model;
+    if (is_kept) {
+        job->model = model;
+        job->model_count = model_count;
+    }
     return good;
 }
 

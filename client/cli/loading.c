@@ -38,11 +38,9 @@ static bool connect_to(struct cli_loading *loading, struct fl_error *error)
     return loading->connection != NULL;
 }
 
-static bool start_import(struct cli_loading *loading, struct fl_error *error)
+static void fill_options(struct cli_loading *loading)
 {
     const struct cli_job *job = loading->job;
-    if (!cli_check_models(job, error))
-        return false;
     loading->load = (struct fl_load_options){.model = job->model,
                                              .models = job->models,
                                              .model_count = job->model_count,
@@ -56,7 +54,16 @@ static bool start_import(struct cli_loading *loading, struct fl_error *error)
                                              .progress = on_progress,
                                              .user = loading,
                                              .sharing = loading->sharing,
-                                             .scene_name = loading->scene_name};
+                                             .scene_name = loading->scene_name,
+                                             /* Edits that change values by factors would do so once more. */
+                                             .will_reload = job->watch && job->edit_count == 0};
+}
+
+static bool start_import(struct cli_loading *loading, struct fl_error *error)
+{
+    if (!cli_check_models(loading->job, error))
+        return false;
+    fill_options(loading);
     loading->import_begin_ns = monotonic_now_ns();
     loading->load.started = fl_import_start(&loading->load, error);
     return loading->load.started != NULL;
@@ -77,6 +84,14 @@ static bool apply_edits(const struct cli_job *job, struct fl_scene *scene, struc
     return job->edit_count == 0 || fl_scene_edit(scene, assignments, job->edit_count, NULL, error);
 }
 
+static void tell_warnings(struct cli_loading *loading)
+{
+    if (loading->warnings <= NOTES_SHOWN)
+        return;
+    cli_progress_clear(loading->progress);
+    fprintf(stderr, "farlight: %u more warnings ('farlight info' lists them)\n", loading->warnings - NOTES_SHOWN);
+}
+
 bool cli_loading_end(struct cli_loading *loading, struct fl_error *error)
 {
     if (loading->job->scene) {
@@ -85,26 +100,22 @@ bool cli_loading_end(struct cli_loading *loading, struct fl_error *error)
     }
     loading->scene = fl_scene_load(loading->connection, &loading->load, error);
     loading->load.started = NULL; /* the load took it over */
-    if (loading->warnings > NOTES_SHOWN) {
-        cli_progress_clear(loading->progress);
-        fprintf(stderr, "farlight: %u more warnings ('farlight info' lists them)\n",
-                loading->warnings - NOTES_SHOWN);
-    }
+    tell_warnings(loading);
     return loading->scene && apply_edits(loading->job, loading->scene, error);
 }
 
 bool cli_loading_again(struct cli_loading *loading, struct fl_error *error)
 {
-    struct fl_scene *old = loading->scene;
     loading->warnings = 0;
-    if (!start_import(loading, error))
+    if (!cli_check_models(loading->job, error))
         return false;
-    if (!cli_loading_end(loading, error)) {
-        loading->scene = old;
+    fill_options(loading);
+    struct fl_scene *scene = fl_scene_reload(loading->scene, &loading->load, error);
+    tell_warnings(loading);
+    if (!scene)
         return false;
-    }
-    fl_scene_destroy(old);
-    return true;
+    loading->scene = scene;
+    return apply_edits(loading->job, scene, error);
 }
 
 void cli_loading_close(struct cli_loading *loading)

@@ -206,7 +206,8 @@ static bool apply_members(const struct shot_reader *reader, const struct shot_va
 {
     const struct cli_shot_given *given = reader->given;
     struct cli_job *job = reader->job;
-    const struct shot_value model = shot_member(root, "model"), environment = shot_member(root, "environment"),
+    const struct shot_value model = shot_member(root, "model"), models = shot_member(root, "models"),
+                            environment = shot_member(root, "environment"),
                             background = shot_member(root, "background"),
                             rotation = shot_member(root, "environment_rotation"),
                             variant = shot_member(root, "variant"), points = shot_member(root, "point_size"),
@@ -217,7 +218,10 @@ static bool apply_members(const struct shot_reader *reader, const struct shot_va
     for (size_t i = 0; i < 2; i++)
         if (texts[i]->value && !json_is_string(texts[i]->value))
             return shot_wrong(reader, texts[i], "leave it out", "must be a string");
+    if (model.value && models.value)
+        return shot_wrong(reader, &model, "leave one of them out", "\"model\" and \"models\" cannot be combined");
     if ((model.value && !shot_path(reader, &model, &job->model)) ||
+        (models.value && !shot_models(reader, &models)) ||
         (environment.value && !shot_path(reader, &environment, &job->environment)) ||
         (background.value && !apply_background(reader, &background)) ||
         (rotation.value && !shot_number(reader, &rotation, -360, 360, &job->environment_degrees)) ||
@@ -248,10 +252,9 @@ bool cli_shot_apply(struct cli_shot *shot, struct cli_job *job, const struct cli
                     cli_shot_set *set, void *user)
 {
     static const char *const others[] = {
-        "$schema",   "description", "model",  "environment", "environment_rotation",
-        "variant",   "background",  "camera", "clips",       "lights",
-        "materials", "nodes",       "output", "outputs",     "point_size",
-        NULL};
+        "$schema", "description", "model",   "models",     "environment", "environment_rotation",
+        "variant", "background",  "camera",  "clips",      "lights",      "materials",
+        "nodes",   "output",      "outputs", "point_size", NULL};
     const struct shot_reader reader = {.shot = shot, .job = job, .given = given, .set = set, .user = user};
     const struct shot_value root = {.value = shot->json.root};
     const char *known[SHOT_SETTINGS_MAX + sizeof(others) / sizeof(others[0])];

@@ -74,6 +74,10 @@ size_t shot_setting_names(const char **names);
 /* Those that the file's object has. */
 bool shot_settings(const struct shot_reader *reader, const struct shot_value *root);
 
+/* ---- shot_models.c ---- */
+
+bool shot_models(const struct shot_reader *reader, const struct shot_value *at);
+
 /* ---- shot_camera.c ---- */
 
 bool shot_camera(const struct shot_reader *reader, const struct shot_value *at);

@@ -35,6 +35,7 @@ struct reader {
     const aiScene *source = nullptr;
     double metres = 1; // of a unit, when the scene is there
     std::vector<uint32_t> material_ids = {};
+    bool uses_second_texcoords = false;                                    // some material does
     std::map<std::vector<unsigned>, shown_mesh> meshes = {};               // by places in the scene's list
     std::map<std::string, std::pair<uint32_t, const aiNode *>> nodes = {}; // by name: the first one
     std::map<std::string, std::pair<uint32_t, uint32_t>> morphs = {}; // by node's or mesh's name: node, targets

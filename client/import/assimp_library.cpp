@@ -9,6 +9,7 @@
 #include <assimp/config.h>
 #include <assimp/mesh.h>
 #include <assimp/postprocess.h>
+#include <assimp/scene.h>
 
 #include <algorithm>
 #include <cstdio>
@@ -102,6 +103,22 @@ class model_system : public Assimp::IOSystem
     size_t size_bytes;
 };
 
+// Some readers of the library take a face's corners as they are, and its next steps read and write there.
+bool has_all_corners(const aiScene &scene, char reason[ASSIMP_REASON_BYTES])
+{
+    for (unsigned i = 0; i < scene.mNumMeshes; i++) {
+        const aiMesh &mesh = *scene.mMeshes[i];
+        for (unsigned f = 0; f < mesh.mNumFaces; f++)
+            for (unsigned k = 0; k < mesh.mFaces[f].mNumIndices; k++)
+                if (mesh.mFaces[f].mIndices[k] >= mesh.mNumVertices) {
+                    snprintf(reason, ASSIMP_REASON_BYTES, "a face has the vertex %u, but there are %u",
+                             mesh.mFaces[f].mIndices[k], mesh.mNumVertices);
+                    return false;
+                }
+    }
+    return true;
+}
+
 const aiScene *read(const char *name, const assimp_format *format, const unsigned char *bytes, size_t size_bytes,
                     void **keep, char reason[ASSIMP_REASON_BYTES])
 {
@@ -116,7 +133,11 @@ const aiScene *read(const char *name, const assimp_format *format, const unsigne
         importer->SetPropertyInteger(AI_CONFIG_PP_RVC_FLAGS, aiComponent_NORMALS);
         steps |= aiProcess_RemoveComponent;
     }
-    const aiScene *scene = importer->ReadFile(plain.c_str(), steps);
+    const aiScene *scene = importer->ReadFile(plain.c_str(), 0);
+    if (scene && !has_all_corners(*scene, reason))
+        return nullptr;
+    if (scene)
+        scene = importer->ApplyPostProcessing(steps);
     snprintf(reason, ASSIMP_REASON_BYTES, "%s", scene ? "" : importer->GetErrorString());
     if (scene)
         *keep = importer.release();

@@ -61,9 +61,30 @@ void colour(reader &r, const aiMaterial &material, const char *key, tinyobj::rea
         out[c] = r.format->colours_are_srgb ? linear(value[c]) : value[c];
 }
 
-// The first of the kinds that the material has a texture of.
-void texture(const aiMaterial &material, std::initializer_list<aiTextureType> kinds, std::string &name,
-             tinyobj::texture_option_t &option)
+int32_t whole_number(const aiMaterial &material, const char *key, unsigned semantic, int32_t otherwise)
+{
+    const aiMaterialProperty *p = property(material, key, semantic, aiPTI_Integer, sizeof(int32_t));
+    if (p)
+        memcpy(&otherwise, p->mData, sizeof(otherwise));
+    return otherwise;
+}
+
+// Notes that a mesh needs the second set.
+uint32_t texcoord_set(reader &r, const aiMaterial &material, aiTextureType kind)
+{
+    const int32_t set = whole_number(material, "$tex.uvwsrc", kind, 0);
+    if (set == 0 || set == 1) {
+        r.uses_second_texcoords = r.uses_second_texcoords || set == 1;
+        return uint32_t(set);
+    }
+    import_note(r.scene, PROTOCOL_SEVERITY_WARNING, words(material, "?mat.name", 0).c_str(),
+                "texture coordinate set %d is not read; set 0 is used", set);
+    return 0;
+}
+
+// The first of the kinds that the material has a texture of. Returns its set of texture coordinates.
+uint32_t texture(reader &r, const aiMaterial &material, std::initializer_list<aiTextureType> kinds,
+                 std::string &name, tinyobj::texture_option_t &option)
 {
     option.scale[0] = option.scale[1] = option.scale[2] = option.bump_multiplier = 1;
     for (aiTextureType kind : kinds) {
@@ -71,36 +92,43 @@ void texture(const aiMaterial &material, std::initializer_list<aiTextureType> ki
         name = words(material, "$tex.file", kind);
         if (name.empty())
             continue;
-        const aiMaterialProperty *wrap = property(material, "$tex.mapmodeu", kind, aiPTI_Integer, sizeof(int32_t));
-        int32_t mode = aiTextureMapMode_Wrap;
-        if (wrap)
-            memcpy(&mode, wrap->mData, sizeof(mode));
-        option.clamp = mode == aiTextureMapMode_Clamp;
+        option.clamp =
+            whole_number(material, "$tex.mapmodeu", kind, aiTextureMapMode_Wrap) == aiTextureMapMode_Clamp;
         if (numbers(material, "$tex.uvtrafo", kind, transform, 5))
             for (size_t c = 0; c < 2; c++) {
                 option.origin_offset[c] = transform[c];
                 option.scale[c] = transform[2 + c];
             }
-        return;
+        return texcoord_set(r, material, kind);
     }
+    return 0;
 }
 
-void textures(const aiMaterial &material, tinyobj::material_t &m)
+obj::texcoord_sets textures(reader &r, const aiMaterial &from, tinyobj::material_t &m)
 {
-    texture(material, {aiTextureType_BASE_COLOR, aiTextureType_DIFFUSE}, m.diffuse_texname, m.diffuse_texopt);
-    texture(material, {aiTextureType_OPACITY}, m.alpha_texname, m.alpha_texopt);
-    texture(material, {aiTextureType_NORMAL_CAMERA, aiTextureType_NORMALS}, m.normal_texname, m.normal_texopt);
-    texture(material, {aiTextureType_HEIGHT}, m.bump_texname, m.bump_texopt);
-    texture(material, {aiTextureType_EMISSION_COLOR, aiTextureType_EMISSIVE}, m.emissive_texname,
-            m.emissive_texopt);
-    texture(material, {aiTextureType_METALNESS}, m.metallic_texname, m.metallic_texopt);
-    texture(material, {aiTextureType_DIFFUSE_ROUGHNESS}, m.roughness_texname, m.roughness_texopt);
+    obj::texcoord_sets sets = {};
+
+    const uint32_t alpha = texture(r, from, {aiTextureType_OPACITY}, m.alpha_texname, m.alpha_texopt);
+    sets[obj::BASE_COLOUR] =
+        texture(r, from, {aiTextureType_BASE_COLOR, aiTextureType_DIFFUSE}, m.diffuse_texname, m.diffuse_texopt);
+    sets[obj::NORMAL] =
+        texture(r, from, {aiTextureType_NORMAL_CAMERA, aiTextureType_NORMALS}, m.normal_texname, m.normal_texopt);
+    sets[obj::BUMP] = texture(r, from, {aiTextureType_HEIGHT}, m.bump_texname, m.bump_texopt);
+    sets[obj::EMISSION] = texture(r, from, {aiTextureType_EMISSION_COLOR, aiTextureType_EMISSIVE},
+                                  m.emissive_texname, m.emissive_texopt);
+    const uint32_t metal = texture(r, from, {aiTextureType_METALNESS}, m.metallic_texname, m.metallic_texopt);
+    const uint32_t rough =
+        texture(r, from, {aiTextureType_DIFFUSE_ROUGHNESS}, m.roughness_texname, m.roughness_texopt);
+    sets[obj::METALLIC_ROUGHNESS] = m.roughness_texname.empty() ? metal : rough;
     // One image for both colour and cutouts is said twice.
     if (m.alpha_texname == m.diffuse_texname)
         m.alpha_texname.clear();
+    if (!m.alpha_texname.empty())
+        sets[obj::BASE_COLOUR] = alpha;
+    return sets;
 }
 
-tinyobj::material_t material_of(reader &r, const aiMaterial &from)
+tinyobj::material_t material_of(reader &r, const aiMaterial &from, obj::texcoord_sets &sets)
 {
     tinyobj::material_t m = {};
 
@@ -125,7 +153,7 @@ tinyobj::material_t material_of(reader &r, const aiMaterial &from)
         import_note(r.scene, PROTOCOL_SEVERITY_INFO, m.name.c_str(),
                     "a material of opacity 0 is taken for opaque, as exporters mean it");
     }
-    textures(from, m);
+    sets = textures(r, from, m);
     return m;
 }
 
@@ -213,6 +241,7 @@ void add_materials(reader &r)
     std::vector<bool> used(r.source->mNumMaterials, false);
     std::vector<tinyobj::material_t> materials;
     std::vector<const tinyobj::material_t *> wanted;
+    std::vector<obj::texcoord_sets> sets(used.size());
 
     for (unsigned i = 0; i < r.source->mNumMeshes; i++) {
         const aiMesh *mesh = r.source->mMeshes[i];
@@ -222,7 +251,7 @@ void add_materials(reader &r)
     materials.reserve(used.size());
     for (unsigned i = 0; i < r.source->mNumMaterials; i++) {
         const aiMaterial *from = r.source->mMaterials[i];
-        materials.push_back(from && used[i] ? material_of(r, *from) : tinyobj::material_t());
+        materials.push_back(from && used[i] ? material_of(r, *from, sets[i]) : tinyobj::material_t());
         wanted.push_back(from && used[i] && !is_made_up(materials.back()) ? &materials.back() : nullptr);
     }
     r.material_ids = obj::add_materials(
@@ -230,7 +259,7 @@ void add_materials(reader &r)
         [&](const std::string &name, size_t *size_bytes, char *reason) {
             return read_image(r, name, size_bytes, reason);
         },
-        wanted);
+        wanted, sets);
     check(r);
 }
 } // namespace assimp

@@ -95,7 +95,7 @@ void add_faces(builder &b, const aiMesh &from, uint32_t first)
 
 // ---- vertices
 
-bool any(const builder &b, bool (*has)(const aiMesh &))
+template <typename predicate> bool any(const builder &b, predicate has)
 {
     return std::any_of(b.sources.begin(), b.sources.end(), [&](const aiMesh *from) { return has(*from); });
 }
@@ -136,16 +136,18 @@ void read_vertices(builder &b, uint64_t count)
     mesh.positions = allocate<float>(b, count * 3);
     if (any(b, [](const aiMesh &from) { return from.mNormals != nullptr; }))
         mesh.normals = allocate<float>(b, count * 3); // zeros are made good when the mesh is added
-    if (any(b, [](const aiMesh &from) { return from.mTextureCoords[0] != nullptr; }))
-        mesh.texcoords[0] = allocate<float>(b, count * 2);
+    for (size_t set = 0; set < (b.r.uses_second_texcoords ? 2 : 1); set++)
+        if (any(b, [&](const aiMesh &from) { return from.mTextureCoords[set] != nullptr; }))
+            mesh.texcoords[set] = allocate<float>(b, count * 2);
     if (any(b, [](const aiMesh &from) { return from.mColors[0] != nullptr; }))
         mesh.colours = allocate<uint8_t>(b, count * 4);
     for (const aiMesh *from : b.sources) {
         read_vectors(from->mVertices, from->mNumVertices, mesh.positions + first * 3);
         if (mesh.normals)
             read_vectors(from->mNormals, from->mNumVertices, mesh.normals + first * 3);
-        if (mesh.texcoords[0])
-            read_texcoords(from->mTextureCoords[0], from->mNumVertices, mesh.texcoords[0] + first * 2);
+        for (size_t set = 0; set < 2; set++)
+            if (mesh.texcoords[set])
+                read_texcoords(from->mTextureCoords[set], from->mNumVertices, mesh.texcoords[set] + first * 2);
         if (mesh.colours)
             read_colours(from->mColors[0], from->mNumVertices, mesh.colours + first * 4);
         first += from->mNumVertices;

@@ -79,12 +79,31 @@ bool begins(const char *words, const char *with)
     return strncmp(words, with, strlen(with)) == 0;
 }
 
-[[noreturn]] void explain(reader &r, const char *said)
+// Of an FBX file, such as 6100 of 6.1: behind 23 bytes of a binary one, else stated in its head. 0: not said.
+unsigned fbx_version(const unsigned char *bytes, size_t size_bytes)
+{
+    constexpr size_t version_at = 23;
+    const std::string head(reinterpret_cast<const char *>(bytes), std::min<size_t>(size_bytes, 4096));
+    const size_t stated = head.find("FBXVersion:");
+
+    if (size_bytes >= version_at + 4 && begins(head.c_str(), "Kaydara FBX Binary"))
+        return unsigned(bytes[version_at]) | unsigned(bytes[version_at + 1]) << 8 |
+               unsigned(bytes[version_at + 2]) << 16 | unsigned(bytes[version_at + 3]) << 24;
+    return stated == std::string::npos ? 0 : unsigned(strtoul(head.c_str() + stated + 11, nullptr, 10));
+}
+
+[[noreturn]] void explain(reader &r, const char *said, const unsigned char *bytes, size_t size_bytes)
 {
     if (begins(said, "std::bad_alloc") || begins(said, "vector::") || begins(said, "basic_string::"))
         fail(r, "", "%s", too_large);
-    if (strstr(said, "old format version"))
-        fail(r, "", "%s; write it again with a newer version, or as glTF", said);
+    if (strstr(said, "old format version")) {
+        const unsigned version = fbx_version(bytes, size_bytes);
+        fail(r, "",
+             "it is an FBX file of version %u.%u, but only 7.1 (FBX 2011) and newer are read: write it again with "
+             "a "
+             "newer version, as Autodesk's FBX Converter does, or as glTF",
+             version / 1000, version / 100 % 10);
+    }
     fail(r, "", "the %s file cannot be read: %s; if other programs can, write it with one of them as glTF",
          r.format->name, said[0] != '\0' ? said : "the library does not say why");
 }
@@ -120,7 +139,7 @@ void import(reader &r, const unsigned char *bytes, size_t size_bytes)
     }
     r.source = owner.library->read(r.format->ending, r.format, bytes, size_bytes, &owner.keep, reason);
     if (!r.source || !r.source->mRootNode)
-        explain(r, reason);
+        explain(r, reason, bytes, size_bytes);
     add_materials(r);
     add_scene(r);
     add_skins(r);

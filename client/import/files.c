@@ -337,6 +337,20 @@ unsigned char *files_read(struct files *files, const char *name, size_t *size_by
     return read_beneath(files, files->folder, name, size_bytes, reason);
 }
 
+size_t files_read_head(const struct files *files, const char *name, unsigned char head[FILES_HEAD_BYTES])
+{
+    char reason[FILES_REASON_BYTES];
+    const int descriptor = files->folder >= 0 ? open_beneath(files->folder, name, reason) : -1;
+    ssize_t got = 0;
+
+    if (descriptor < 0)
+        return 0;
+    if (!may_be_key(descriptor) && is_regular(descriptor, reason))
+        got = pread(descriptor, head, FILES_HEAD_BYTES, 0);
+    close(descriptor);
+    return got > 0 ? (size_t)got : 0;
+}
+
 unsigned char *files_read_image(struct files *files, const char *name, size_t *size_bytes,
                                 char reason[FILES_REASON_BYTES])
 {

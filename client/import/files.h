@@ -53,7 +53,11 @@ unsigned char *files_read_descriptor(struct files *files, int descriptor, size_t
 unsigned char *files_read(struct files *files, const char *name, size_t *size_bytes,
                           char reason[FILES_REASON_BYTES]);
 
-/* Likewise; what is not in the model's folder may be in that of further images. */
+#define FILES_HEAD_BYTES 16
+/* The first bytes of such a file; returns their number, 0: there is none that may be read. */
+size_t files_read_head(const struct files *files, const char *name, unsigned char head[FILES_HEAD_BYTES]);
+
+/* As files_read(); what is not in the model's folder may be in that of further images. */
 unsigned char *files_read_image(struct files *files, const char *name, size_t *size_bytes,
                                 char reason[FILES_REASON_BYTES]);
 

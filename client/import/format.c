@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "format.h"
 
-#include "texture_plain.h"
+#include "gltf_image.h"
 
 #include <ctype.h>
 #include <stdint.h>
@@ -137,20 +137,12 @@ struct format format_of(const char *name, const unsigned char *bytes, size_t siz
     return format_of_name(model);
 }
 
-/* Of a binary one the first chunk, after two headers. */
-static size_t gltf_text_bytes(const unsigned char *bytes, size_t size_bytes)
-{
-    if (size_bytes < 20 || !begins(bytes, size_bytes, "glTF"))
-        return size_bytes;
-    const uint32_t chunk_bytes = number_at(bytes + 12);
-    return chunk_bytes < size_bytes - 20 ? 20 + (size_t)chunk_bytes : size_bytes;
-}
-
-bool format_may_name_images(const struct format *format, const unsigned char *bytes, size_t size_bytes)
+bool format_may_need_images(const struct format *format, const struct files *files, const unsigned char *bytes,
+                            size_t size_bytes)
 {
     switch (format->reader) {
     case FORMAT_GLTF:
-        return texture_gltf_names_others(bytes, gltf_text_bytes(bytes, size_bytes));
+        return gltf_may_have_other_images(files, bytes, size_bytes);
     case FORMAT_AFF: /* what it includes may name some, too */
         return contains(bytes, size_bytes, "texturecoords") || contains(bytes, size_bytes, "tt") ||
                contains(bytes, size_bytes, ".aff") || contains(bytes, size_bytes, ".nff");
@@ -163,7 +155,27 @@ bool format_may_name_images(const struct format *format, const unsigned char *by
     }
 }
 
-const char *format_endings(char out[256])
+/* ---- what is not read ---- */
+
+static const struct {
+    const char *ending, *magic; /* "": by the ending alone */
+    const char *what, *remedy;
+} unread[] = {
+    {".x", "xof ", "DirectX file", "by 'assimp export IN.x OUT.glb' (package assimp-utils)"},
+    {".blend", "BLENDER", "scene of Blender", "in Blender by File, Export"},
+    {".usdz", "", "USD file", "with Blender"},
+    {".usda", "#usda", "USD file", "with Blender"},
+    {".usdc", "PXR-USDC", "USD file", "with Blender"},
+    {".wrl", "#VRML ", "VRML file", "with Blender, or as X3D"},
+    {".step", "ISO-10303-21", "STEP file, which has no triangles",
+     "or STL with a program of CAD, such as FreeCAD"},
+    {".max", "", "scene of 3ds Max", "or FBX in 3ds Max"},
+    {".c4d", "", "scene of Cinema 4D", "or FBX in Cinema 4D"},
+    {".mb", "", "scene of Maya", "or FBX in Maya"},
+    {".skp", "", "scene of SketchUp", "or COLLADA in SketchUp"},
+};
+
+static const char *endings_of_all(char out[256])
 {
     size_t used = (size_t)snprintf(out, 256, ".gltf, .glb, .obj, .nff, .aff");
 
@@ -171,4 +183,40 @@ const char *format_endings(char out[256])
         used += (size_t)snprintf(out + used, 256 - used, "%s%s", assimp_format_at(i + 1) ? ", " : " and ",
                                  assimp_format_at(i)->ending);
     return out;
+}
+
+/* "version 3.3, txt": behind "xof " are four digits and the kind. */
+static void describe_directx(const unsigned char *bytes, size_t size_bytes, char out[40])
+{
+    int major, minor;
+    char head[13] = "", kind[5];
+
+    out[0] = '\0';
+    memcpy(head, bytes, size_bytes < 12 ? size_bytes : 12);
+    if (sscanf(head, "xof %2d%2d%4[a-z]", &major, &minor, kind) == 3)
+        snprintf(out, 40, " (version %d.%d, %s)", major, minor, kind);
+}
+
+void format_explain_unknown(const char *name, const char *format, const unsigned char *bytes, size_t size_bytes,
+                            char out[FORMAT_REASON_BYTES])
+{
+    const char *dot = strrchr(name, '.');
+    char endings[256], version[40] = "";
+
+    for (size_t i = 0; !format && i < sizeof(unread) / sizeof(unread[0]); i++) {
+        const bool is_it = unread[i].magic[0] != '\0' && begins(bytes, size_bytes, unread[i].magic);
+
+        if (!is_it && !has_ending(name, unread[i].ending))
+            continue;
+        if (is_it && strcmp(unread[i].ending, ".x") == 0)
+            describe_directx(bytes, size_bytes, version);
+        snprintf(out, FORMAT_REASON_BYTES, "it is a %s%s, which is not read: write it as glTF %s", unread[i].what,
+                 version, unread[i].remedy);
+        return;
+    }
+    snprintf(out, FORMAT_REASON_BYTES, "unknown format %s%.40s; known are %s", format ? "." : "",
+             format ? format
+             : dot  ? dot
+                    : "(no ending, and its first bytes are of none)",
+             endings_of_all(endings));
 }

@@ -4,9 +4,12 @@
 #define FARLIGHT_IMPORT_FORMAT_H
 
 #include "assimp.h"
+#include "files.h"
 
 #include <stdbool.h>
 #include <stddef.h>
+
+#define FORMAT_REASON_BYTES 400
 
 enum format_reader {
     FORMAT_UNKNOWN,
@@ -26,9 +29,12 @@ struct format {
 struct format format_of_name(const char *name);
 /* A GLB file is one under any name. */
 struct format format_of(const char *name, const unsigned char *bytes, size_t size_bytes);
-/* By the bytes alone, for nothing may be parsed yet. */
-bool format_may_name_images(const struct format *format, const unsigned char *bytes, size_t size_bytes);
-/* The endings of all formats, for people. */
-const char *format_endings(char out[256]);
+/* Whether images may be decoded that need the module (texture.h); nothing may be parsed yet. */
+bool format_may_need_images(const struct format *format, const struct files *files, const unsigned char *bytes,
+                            size_t size_bytes);
+/* Why a file of no known format is not read, and what to do about it. `format`: what the user takes it for, or
+ * NULL. */
+void format_explain_unknown(const char *name, const char *format, const unsigned char *bytes, size_t size_bytes,
+                            char out[FORMAT_REASON_BYTES]);
 
 #endif

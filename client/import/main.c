@@ -9,7 +9,6 @@
 #include "send.h"
 #include "source.h"
 #include "texture.h"
-#include "texture_plain.h"
 #include "protocol/common/clock.h"
 #include "protocol/version.h"
 
@@ -228,10 +227,9 @@ static bool enter_sandbox(struct import_scene *scene, const struct options *opti
 
 static bool parse_model(struct import_scene *scene, struct source *source, double point_size)
 {
-    const char *name = source_name(source), *dot = strrchr(name, '.');
     const unsigned char *bytes = source->bytes;
     const size_t size_bytes = source->size_bytes;
-    char endings[256];
+    char reason[FORMAT_REASON_BYTES];
 
     if (size_bytes == 0)
         return import_fail(scene, NULL, "the file is empty");
@@ -249,11 +247,8 @@ static bool parse_model(struct import_scene *scene, struct source *source, doubl
     case FORMAT_ASSIMP:
         return assimp_import(scene, &source->files, source->of.assimp, point_size, bytes, size_bytes);
     default:
-        return import_fail(scene, NULL, "unknown format %s%.40s; known are %s", source->format ? "." : "",
-                           source->format ? source->format
-                           : dot          ? dot
-                                          : "(no ending, and its first bytes are of none)",
-                           format_endings(endings));
+        format_explain_unknown(source_name(source), source->format, bytes, size_bytes, reason);
+        return import_fail(scene, NULL, "%s", reason);
     }
 }
 
@@ -329,7 +324,8 @@ static bool read_and_import(struct import_scene *scene, struct files *surroundin
     for (size_t i = 0; i < options->source_count; i++) {
         const struct source *source = &options->sources[i];
 
-        needs_images = needs_images || format_may_name_images(&source->of, source->bytes, source->size_bytes);
+        needs_images =
+            needs_images || format_may_need_images(&source->of, &source->files, source->bytes, source->size_bytes);
         needs_assimp = needs_assimp || source->of.reader == FORMAT_ASSIMP;
     }
     if (needs_images)

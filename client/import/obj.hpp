@@ -8,6 +8,7 @@
 
 #include <tiny_obj_loader.h>
 
+#include <array>
 #include <functional>
 #include <istream>
 #include <map>
@@ -71,9 +72,25 @@ class material_reader : public tinyobj::MaterialReader
 };
 // Reads an image by the name that a material has for it, as files_read() does.
 using image_source = std::function<unsigned char *(const std::string &name, size_t *size_bytes, char *reason)>;
-// Also for readers that fill such materials from other formats. Identifiers by position; 0 where there is none.
+// A material's maps, by position in the message set_material.
+enum slot {
+    BASE_COLOUR,
+    NORMAL,
+    METALLIC_ROUGHNESS,
+    OCCLUSION,
+    EMISSION,
+    TRANSMISSION,
+    BUMP,
+    SHEEN = 12,
+    slot_count
+};
+// Which texture coordinates each map of a material uses.
+using texcoord_sets = std::array<uint32_t, slot_count>;
+// Also for readers that fill such materials from other formats. `sets`, by position, may be empty: MTL has one
+// set. Identifiers by position; 0 where there is none.
 std::vector<uint32_t> add_materials(import_scene *scene, const image_source &read_image,
-                                    const std::vector<const tinyobj::material_t *> &materials);
+                                    const std::vector<const tinyobj::material_t *> &materials,
+                                    const std::vector<texcoord_sets> &sets = {});
 } // namespace obj
 
 #endif

@@ -1,224 +1,19 @@
 // SPDX-License-Identifier: MIT
 // MTL: Phong's terms of 1995, and the later ones for physically based shading, to metallic-roughness.
-#include "obj.hpp"
-#include "texture.h"
+#include "obj_texture.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
-#include <cstring>
-#include <memory>
-#include <set>
 
 namespace obj
 {
 namespace
 {
-enum slot { BASE_COLOUR, NORMAL, METALLIC_ROUGHNESS, OCCLUSION, EMISSION, TRANSMISSION, BUMP, slot_count };
-
 // MTL's bump maps have no unit; a height of 1 cm for white suits models in metres.
 constexpr double bump_height_m = 0.01;
-
-struct free_bytes {
-    void operator()(unsigned char *bytes) const
-    {
-        free(bytes);
-    }
-};
-
-struct image {
-    std::unique_ptr<unsigned char, free_bytes> texels; // the marker if it could not be had
-    uint32_t width = 2, height = 2;
-    bool has_alpha = false, marked = false;
-};
-
-struct building {
-    import_scene *scene;
-    const image_source &read_image;
-    std::map<std::string, image> images;      // by file name
-    std::map<std::string, uint32_t> textures; // by file name and use
-};
-
-// ---- images
-
-std::set<std::string> image_names(const std::vector<const tinyobj::material_t *> &materials)
-{
-    std::set<std::string> names;
-    for (const tinyobj::material_t *m : materials) {
-        if (!m)
-            continue;
-        for (const std::string *name :
-             {&m->diffuse_texname, &m->alpha_texname, &m->bump_texname, &m->normal_texname, &m->emissive_texname,
-              &m->roughness_texname, &m->metallic_texname})
-            if (!name->empty())
-                names.insert(*name);
-    }
-    return names;
-}
-
-void read_images(building &b, const std::set<std::string> &names)
-{
-    std::vector<texture_job> jobs;
-    std::vector<std::unique_ptr<unsigned char, free_bytes>> files;
-
-    for (const std::string &name : names) {
-        texture_job job = {};
-        char reason[FILES_REASON_BYTES] = "";
-        unsigned char *bytes = b.read_image(name, &job.size_bytes, reason);
-        if (!bytes)
-            snprintf(job.reason, sizeof(job.reason), "%.199s", reason);
-        job.bytes = bytes;
-        job.srgb = true;
-        files.emplace_back(bytes);
-        jobs.push_back(job);
-    }
-    texture_decode(jobs.data(), jobs.size());
-    size_t number = 0;
-    for (const std::string &name : names) {
-        const texture_job &job = jobs[number++];
-        image &i = b.images[name];
-        i.texels.reset(job.texels ? job.texels : texture_marker());
-        if (!i.texels)
-            throw std::bad_alloc();
-        if (job.texels) {
-            i.width = job.width;
-            i.height = job.height;
-            i.has_alpha = job.has_alpha;
-            continue;
-        }
-        i.marked = true;
-        import_note(b.scene, PROTOCOL_SEVERITY_WARNING, name.c_str(),
-                    "the image '%.100s' cannot be used: %.150s; it is shown in magenta and black", name.c_str(),
-                    job.reason);
-    }
-}
-
-// What a texel of one image is at the place of a texel of another size.
-const unsigned char *texel_at(const image &i, uint32_t x, uint32_t y, uint32_t width, uint32_t height)
-{
-    const size_t column = size_t(uint64_t(x) * i.width / width), row = size_t(uint64_t(y) * i.height / height);
-    return i.texels.get() + (row * i.width + column) * 4;
-}
-
-unsigned char *new_texels(uint32_t width, uint32_t height)
-{
-    unsigned char *texels = static_cast<unsigned char *>(calloc(size_t(width) * height, 4));
-    if (!texels)
-        throw std::bad_alloc();
-    return texels;
-}
-
-uint32_t add_texture(building &b, const std::string &key, const std::string &name, unsigned char *texels,
-                     const image &size, bool colour, bool clamp)
-{
-    message_set_texture set = {};
-    set.width = size.width;
-    set.height = size.height;
-    set.format = colour ? PROTOCOL_TEXTURE_RGBA8_SRGB : PROTOCOL_TEXTURE_RGBA8_LINEAR;
-    set.wrap_u = set.wrap_v = clamp ? PROTOCOL_WRAP_CLAMP : PROTOCOL_WRAP_REPEAT;
-    set.nearest = size.marked;
-    set.name = name.c_str();
-    const uint32_t blob = import_add_blob(b.scene, texels, uint64_t(size.width) * size.height * 4);
-    return b.textures[key] = import_add_texture(b.scene, &set, blob);
-}
-
-uint32_t plain_texture(building &b, const std::string &name, bool colour, bool clamp)
-{
-    const std::string key = name + (colour ? "|colour" : "|data") + (clamp ? "|clamp" : "");
-    const auto found = b.textures.find(key);
-    if (found != b.textures.end())
-        return found->second;
-    const image &i = b.images.at(name);
-    unsigned char *texels = new_texels(i.width, i.height);
-    memcpy(texels, i.texels.get(), size_t(i.width) * i.height * 4);
-    return add_texture(b, key, name, texels, i, colour, clamp);
-}
-
-// Base colour with map_d as its alpha; without map_Kd it is white. *cutout: alpha is nearly only 0 or 1.
-uint32_t alpha_texture(building &b, const tinyobj::material_t &m, bool &cutout)
-{
-    const image &alpha = b.images.at(m.alpha_texname);
-    const image *colour = m.diffuse_texname.empty() ? nullptr : &b.images.at(m.diffuse_texname);
-    const image &size = colour ? *colour : alpha;
-    const std::string key = m.diffuse_texname + "|alpha|" + m.alpha_texname;
-    unsigned char *texels = new_texels(size.width, size.height);
-    size_t between = 0;
-
-    for (uint32_t y = 0; y < size.height; y++) {
-        for (uint32_t x = 0; x < size.width; x++) {
-            unsigned char *to = texels + (size_t(y) * size.width + x) * 4;
-            const unsigned char *a = texel_at(alpha, x, y, size.width, size.height);
-            if (colour)
-                memcpy(to, texel_at(*colour, x, y, size.width, size.height), 3);
-            else
-                memset(to, 255, 3);
-            to[3] = alpha.marked ? 255 : alpha.has_alpha ? a[3] : a[0];
-            between += to[3] > 16 && to[3] < 239;
-        }
-    }
-    cutout = between * 20 < size_t(size.width) * size.height;
-    const auto found = b.textures.find(key);
-    if (found != b.textures.end()) {
-        free(texels);
-        return found->second;
-    }
-    return add_texture(b, key, m.alpha_texname, texels, size, true, m.alpha_texopt.clamp);
-}
-
-// map_Pr in green and map_Pm in blue, as glTF has them.
-uint32_t roughness_texture(building &b, const tinyobj::material_t &m)
-{
-    const image *rough = m.roughness_texname.empty() ? nullptr : &b.images.at(m.roughness_texname);
-    const image *metal = m.metallic_texname.empty() ? nullptr : &b.images.at(m.metallic_texname);
-    const image &size = rough ? *rough : *metal;
-    const std::string key = m.roughness_texname + "|pr|" + m.metallic_texname;
-    const auto found = b.textures.find(key);
-
-    if (found != b.textures.end())
-        return found->second;
-    unsigned char *texels = new_texels(size.width, size.height);
-    for (uint32_t y = 0; y < size.height; y++) {
-        for (uint32_t x = 0; x < size.width; x++) {
-            unsigned char *to = texels + (size_t(y) * size.width + x) * 4;
-            to[0] = to[3] = 255;
-            to[1] = rough ? texel_at(*rough, x, y, size.width, size.height)[0] : 255;
-            to[2] = metal ? texel_at(*metal, x, y, size.width, size.height)[0] : 255;
-        }
-    }
-    return add_texture(b, key, rough ? m.roughness_texname : m.metallic_texname, texels, size, false, false);
-}
-
-// Many files call a normal map a bump map: it is bluish throughout, heights are grey.
-bool looks_like_normals(const image &i)
-{
-    uint64_t sum[3] = {0};
-    const size_t count = size_t(i.width) * i.height, step = std::max<size_t>(count / 4096, 1);
-    size_t seen = 0;
-
-    for (size_t at = 0; at < count; at += step, seen++)
-        for (size_t c = 0; c < 3; c++)
-            sum[c] += i.texels.get()[at * 4 + c];
-    return !i.marked && sum[2] > 190 * seen && sum[0] > 90 * seen && sum[0] < 165 * seen && sum[1] > 90 * seen &&
-           sum[1] < 165 * seen;
-}
-
-// -o and -s; ours have v running downwards, hence the odd last term.
-record_texture_use use_of(uint32_t texture, const tinyobj::texture_option_t &option)
-{
-    record_texture_use use;
-    import_texture_use_default(&use, texture);
-    const float values[4] = {option.scale[0], option.scale[1], option.origin_offset[0], option.origin_offset[1]};
-    for (float value : values)
-        if (!(std::fabs(value) < 1e6f))
-            return use;
-    use.uv_transform[0] = values[0];
-    use.uv_transform[2] = values[2];
-    use.uv_transform[4] = values[1];
-    use.uv_transform[5] = 1 - values[1] - values[3];
-    return use;
-}
-
-// ---- the material
+// Of the fibres of sheen, of which MTL does not speak: the default of Blender's shader, whose exporter writes Ps.
+constexpr float sheen_roughness = 0.5f;
 
 float unit(float value)
 {
@@ -285,26 +80,46 @@ void transparency(const tinyobj::material_t &m, message_set_material &set)
     }
 }
 
-void maps(building &b, const tinyobj::material_t &m, message_set_material &set, record_texture_use *uses)
+// Pc, Pcr and Ps.
+void layers(const tinyobj::material_t &m, message_set_material &set)
+{
+    set.clearcoat = unit(m.clearcoat_thickness);
+    set.clearcoat_roughness = unit(m.clearcoat_roughness);
+    const float sheen = m.sheen <= 0 && !m.sheen_texname.empty() ? 1 : unit(m.sheen);
+    for (float &channel : set.sheen)
+        channel = sheen;
+    set.sheen_roughness = sheen > 0 ? sheen_roughness : 0;
+}
+
+void surface_maps(building &b, const tinyobj::material_t &m, const texcoord_sets &sets, message_set_material &set,
+                  record_texture_use *uses)
 {
     if (!m.alpha_texname.empty()) {
         bool cutout = false;
-        uses[BASE_COLOUR] = use_of(alpha_texture(b, m, cutout), m.alpha_texopt);
+        uses[BASE_COLOUR] = use_of(alpha_texture(b, m, cutout), m.alpha_texopt, sets[BASE_COLOUR]);
         set.alpha_mode = cutout ? PROTOCOL_ALPHA_MASK : PROTOCOL_ALPHA_BLEND;
     } else if (!m.diffuse_texname.empty()) {
-        uses[BASE_COLOUR] =
-            use_of(plain_texture(b, m.diffuse_texname, true, m.diffuse_texopt.clamp), m.diffuse_texopt);
+        uses[BASE_COLOUR] = use_of(plain_texture(b, m.diffuse_texname, true, m.diffuse_texopt.clamp),
+                                   m.diffuse_texopt, sets[BASE_COLOUR]);
     }
     if (!m.emissive_texname.empty()) {
-        uses[EMISSION] =
-            use_of(plain_texture(b, m.emissive_texname, true, m.emissive_texopt.clamp), m.emissive_texopt);
+        uses[EMISSION] = use_of(plain_texture(b, m.emissive_texname, true, m.emissive_texopt.clamp),
+                                m.emissive_texopt, sets[EMISSION]);
         if (max_component(m.emission) <= 0)
             set.emission[0] = set.emission[1] = set.emission[2] = 1;
     }
     if (!m.roughness_texname.empty() || !m.metallic_texname.empty())
-        uses[METALLIC_ROUGHNESS] = use_of(roughness_texture(b, m), m.roughness_texopt);
+        uses[METALLIC_ROUGHNESS] = use_of(roughness_texture(b, m), m.roughness_texopt, sets[METALLIC_ROUGHNESS]);
+    if (!m.sheen_texname.empty())
+        uses[SHEEN] =
+            use_of(plain_texture(b, m.sheen_texname, false, m.sheen_texopt.clamp), m.sheen_texopt, sets[SHEEN]);
+}
+
+void relief_maps(building &b, const tinyobj::material_t &m, const texcoord_sets &sets, record_texture_use *uses)
+{
     if (!m.normal_texname.empty())
-        uses[NORMAL] = use_of(plain_texture(b, m.normal_texname, false, m.normal_texopt.clamp), m.normal_texopt);
+        uses[NORMAL] = use_of(plain_texture(b, m.normal_texname, false, m.normal_texopt.clamp), m.normal_texopt,
+                              sets[NORMAL]);
     if (m.bump_texname.empty())
         return;
     const slot at = looks_like_normals(b.images.at(m.bump_texname)) ? NORMAL : BUMP;
@@ -312,7 +127,7 @@ void maps(building &b, const tinyobj::material_t &m, message_set_material &set, 
         std::isfinite(m.bump_texopt.bump_multiplier) ? double(m.bump_texopt.bump_multiplier) : 1;
     if (at == NORMAL && uses[NORMAL].texture != 0)
         return;
-    uses[at] = use_of(plain_texture(b, m.bump_texname, false, m.bump_texopt.clamp), m.bump_texopt);
+    uses[at] = use_of(plain_texture(b, m.bump_texname, false, m.bump_texopt.clamp), m.bump_texopt, sets[BUMP]);
     uses[at].strength = float(std::min(std::max(strength, -1e3), 1e3) * (at == BUMP ? bump_height_m : 1));
     if (at == NORMAL)
         import_note(b.scene, PROTOCOL_SEVERITY_INFO, m.bump_texname.c_str(), "a bump map that holds normals");
@@ -324,15 +139,14 @@ void note_unused(building &b, const tinyobj::material_t &m)
                                                                    {"map_Ks", &m.specular_texname},
                                                                    {"map_Ns", &m.specular_highlight_texname},
                                                                    {"disp", &m.displacement_texname},
-                                                                   {"refl", &m.reflection_texname},
-                                                                   {"map_Ps", &m.sheen_texname}};
+                                                                   {"refl", &m.reflection_texname}};
     for (const auto &entry : unused)
         if (!entry.second->empty())
             import_note(b.scene, PROTOCOL_SEVERITY_WARNING, m.name.c_str(), "maps of kind %s are not shown",
                         entry.first);
 }
 
-uint32_t add_material(building &b, const tinyobj::material_t &m)
+uint32_t add_material(building &b, const tinyobj::material_t &m, const texcoord_sets &sets)
 {
     record_texture_use uses[slot_count] = {};
     message_set_material set;
@@ -342,10 +156,12 @@ uint32_t add_material(building &b, const tinyobj::material_t &m)
     set.name = m.name.c_str();
     reflection(m, set);
     anisotropy(m, set);
+    layers(m, set);
     transparency(m, set);
     for (size_t c = 0; c < 3; c++)
         set.emission[c] = m.emission[c] > 0 ? std::min(m.emission[c], 1e6f) : 0;
-    maps(b, m, set, uses);
+    surface_maps(b, m, sets, set, uses);
+    relief_maps(b, m, sets, uses);
     note_unused(b, m);
     set.textures = uses;
     set.textures_count = slot_count;
@@ -387,14 +203,16 @@ bool material_reader::operator()(const std::string &name, std::vector<tinyobj::m
 }
 
 std::vector<uint32_t> add_materials(import_scene *scene, const image_source &read_image,
-                                    const std::vector<const tinyobj::material_t *> &materials)
+                                    const std::vector<const tinyobj::material_t *> &materials,
+                                    const std::vector<texcoord_sets> &sets)
 {
     building b = {scene, read_image, {}, {}};
     std::vector<uint32_t> ids;
 
-    read_images(b, image_names(materials));
-    for (const tinyobj::material_t *material : materials)
-        ids.push_back(material ? add_material(b, *material) : 0);
+    read_images(b, materials);
+    for (size_t i = 0; i < materials.size(); i++)
+        ids.push_back(materials[i] ? add_material(b, *materials[i], i < sets.size() ? sets[i] : texcoord_sets{})
+                                   : 0);
     return ids;
 }
 } // namespace obj

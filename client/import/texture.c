@@ -11,7 +11,7 @@
 /* NULL, unless the module is linked to the program itself. */
 static const struct texture_reader *reader = &texture_reader;
 static char why_none[200] =
-    "is neither PNG nor JPEG, and nothing in the model says so, by an ending or a MIME type";
+    "is neither PNG nor JPEG, and nothing in the model says so, by an ending, a MIME type or its first bytes";
 
 void texture_load(void)
 {

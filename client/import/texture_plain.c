@@ -8,7 +8,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <strings.h>
 #include <turbojpeg.h>
 
 /* As in texture.cpp. */
@@ -216,45 +215,4 @@ void texture_plain_decode(struct texture_job *jobs, size_t count)
         decode_next(&work);
     if (helped)
         pthread_join(helper, NULL);
-}
-
-/* ---- names ---- */
-
-static bool begins_with(const char *text, size_t length, const char *start)
-{
-    return length >= strlen(start) && strncmp(text, start, strlen(start)) == 0;
-}
-
-static bool ends_with(const char *text, size_t length, const char *ending)
-{
-    const size_t bytes = strlen(ending);
-    return length >= bytes && strncasecmp(text + length - bytes, ending, bytes) == 0;
-}
-
-static bool names_other(const char *text, size_t length)
-{
-    static const char *const endings[] = {".webp", ".exr", ".hdr", ".pic",  ".tif", ".tiff",
-                                          ".bmp",  ".gif", ".tga", ".tpic", ".ppm", ".pnm"};
-    const size_t skipped = begins_with(text, length, "data:") ? strlen("data:") : 0;
-    if (begins_with(text + skipped, length - skipped, "image/"))
-        return !begins_with(text + skipped, length - skipped, "image/png") &&
-               !begins_with(text + skipped, length - skipped, "image/jp");
-    for (size_t i = 0; !skipped && i < sizeof(endings) / sizeof(endings[0]); i++)
-        if (ends_with(text, length, endings[i]))
-            return true;
-    return !skipped && memchr(text, '\\', length);
-}
-
-bool texture_gltf_names_others(const unsigned char *json, size_t size_bytes)
-{
-    const char *at = (const char *)json, *const end = at + size_bytes;
-    while ((at = memchr(at, '"', (size_t)(end - at)))) {
-        const char *text = at + 1, *quote = memchr(text, '"', (size_t)(end - text));
-        if (!quote)
-            return false;
-        if (names_other(text, (size_t)(quote - text)))
-            return true;
-        at = quote + 1;
-    }
-    return false;
 }

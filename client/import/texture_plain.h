@@ -10,8 +10,5 @@
 bool texture_is_plain(const struct texture_job *job);
 /* Decodes all that are, with two threads if there are several; leaves the others as they are. */
 void texture_plain_decode(struct texture_job *jobs, size_t count);
-/* Whether a glTF file names an image that is neither PNG nor JPEG, by an ending or a MIME type. `json` is its
- * text, not parsed; strings with escapes count as such a name. */
-bool texture_gltf_names_others(const unsigned char *json, size_t size_bytes);
 
 #endif

@@ -195,6 +195,7 @@ struct fl_load_options {
     struct fl_import *started;     /* by fl_import_start; the load takes it over, also when it fails. `model`,
                                       its environment and `timeout_ms` are those given at its start */
     const char *variant;           /* of the model's materials, by name; NULL: the file's choice */
+    bool will_reload;              /* for fl_scene_reload: what is loaded is remembered, some bytes an object */
 };
 
 /* The options' strings must live until the load. Destroy an importer that is not loaded. */
@@ -204,6 +205,11 @@ FL_API void fl_import_destroy(struct fl_import *started);
 /* Runs the importer and passes its edits to the daemon. */
 FL_API struct fl_scene *fl_scene_load(struct fl_connection *connection, const struct fl_load_options *options,
                                       struct fl_error *error);
+/* Loads the models again and passes on what has changed since, in one transaction, so that structures of what
+ * stays are kept. Returns the same scene, or another one in its place, where objects are gone or it was not loaded
+ * with will_reload. NULL: it is as it was before. Edits of others that the models do not contradict stay. */
+FL_API struct fl_scene *fl_scene_reload(struct fl_scene *scene, const struct fl_load_options *options,
+                                        struct fl_error *error);
 FL_API void fl_scene_destroy(struct fl_scene *scene); /* lets go of it on the daemon, too */
 
 /* Attaches to an existing scene; its cameras and clips are requested at once and known as those of a loaded one.

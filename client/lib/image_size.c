@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Formats: PNG (W3C, 3rd edition, 11.2.2), JPEG (ITU-T T.81, B.2.2), OpenEXR ("File Layout"), Radiance HDR (Ward,
- * "Radiance File Formats"). The input is not trusted: every position is checked against the number of bytes. */
+ * "Radiance File Formats"), WebP (RFC 9649, 2.3 to 2.7), TIFF (6.0, section 2), GIF (89a, 17 to 27). The input is
+ * not trusted: every position is checked against the number of bytes. */
 #include "lib/image_size.h"
 
 #include <errno.h>
@@ -179,6 +180,85 @@ static bool hdr_size(const struct head *head, uint32_t *width, uint32_t *height)
     return sscanf(line, "-Y %9u +X %9u", height, width) == 2;
 }
 
+/* A container that says how long it is; its first chunk is one of three. */
+static bool webp_size(const struct head *head, uint32_t *width, uint32_t *height)
+{
+    const uint8_t *bytes = head->bytes, *chunk = bytes + 12;
+    if (head->count < 30 || memcmp(bytes, "RIFF", 4) != 0 || memcmp(bytes + 8, "WEBP", 4) != 0 ||
+        little_endian(bytes + 4, 4) + 8 > head->file_bytes)
+        return false;
+    if (memcmp(chunk, "VP8X", 4) == 0) {
+        *width = (uint32_t)little_endian(bytes + 24, 3) + 1;
+        *height = (uint32_t)little_endian(bytes + 27, 3) + 1;
+    } else if (memcmp(chunk, "VP8L", 4) == 0 && bytes[20] == 0x2f) {
+        const uint32_t sizes = (uint32_t)little_endian(bytes + 21, 4);
+        *width = (sizes & 0x3fff) + 1;
+        *height = (sizes >> 14 & 0x3fff) + 1;
+    } else if (memcmp(chunk, "VP8 ", 4) == 0 && memcmp(bytes + 23, "\x9d\x01\x2a", 3) == 0) {
+        *width = (uint32_t)little_endian(bytes + 26, 2) & 0x3fff;
+        *height = (uint32_t)little_endian(bytes + 28, 2) & 0x3fff;
+    } else {
+        return false;
+    }
+    return true;
+}
+
+static bool gif_size(const struct head *head, uint32_t *width, uint32_t *height)
+{
+    if (head->count < 13 || (memcmp(head->bytes, "GIF87a", 6) != 0 && memcmp(head->bytes, "GIF89a", 6) != 0))
+        return false;
+    *width = (uint32_t)little_endian(head->bytes + 6, 2);
+    *height = (uint32_t)little_endian(head->bytes + 8, 2);
+    return ends_with(head, ";", 1);
+}
+
+static uint32_t tiff_number(const struct head *head, const uint8_t *at, unsigned count)
+{
+    return head->bytes[0] == 'M' ? big_endian(at, count) : (uint32_t)little_endian(at, count);
+}
+
+/* The last number of an entry: one of 4 bytes, or of 2, stands in the entry itself. */
+static bool tiff_last(const struct head *head, const uint8_t entry[12], uint32_t *value)
+{
+    const uint32_t type = tiff_number(head, entry + 2, 2), count = tiff_number(head, entry + 4, 4);
+    const unsigned bytes = type == 3 ? 2 : 4;
+    uint8_t number[4];
+    if ((type != 3 && type != 4) || count == 0)
+        return false;
+    const uint64_t skipped = (uint64_t)(count - 1) * bytes;
+    if ((uint64_t)count * bytes <= 4)
+        memcpy(number, entry + 8 + skipped, bytes);
+    else if (read_at(head->fd, number, bytes, tiff_number(head, entry + 8, 4) + skipped) != bytes)
+        return false;
+    *value = tiff_number(head, number, bytes);
+    return true;
+}
+
+/* The first directory, which may be anywhere. Pixels are in strips, and the last one must end within the file. */
+static bool tiff_size(const struct head *head, uint32_t *width, uint32_t *height)
+{
+    uint32_t strip = 0, strip_bytes = 0;
+    uint8_t entry[12];
+    if (head->count < 8 || (memcmp(head->bytes, "II*", 4) != 0 && memcmp(head->bytes, "MM\0*", 4) != 0))
+        return false;
+    const uint64_t directory = tiff_number(head, head->bytes + 4, 4);
+    if (read_at(head->fd, entry, 2, directory) != 2)
+        return false;
+    const uint32_t count = tiff_number(head, entry, 2);
+    bool known = true;
+    *width = *height = 0;
+    for (uint32_t i = 0; i < count && known; i++) {
+        if (read_at(head->fd, entry, sizeof(entry), directory + 2 + i * sizeof(entry)) != sizeof(entry))
+            return false;
+        const uint32_t tag = tiff_number(head, entry, 2);
+        if (tag == 256 || tag == 257)
+            known = tiff_last(head, entry, tag == 256 ? width : height);
+        else if (tag == 273 || tag == 279)
+            known = tiff_last(head, entry, tag == 273 ? &strip : &strip_bytes);
+    }
+    return known && *width > 0 && *height > 0 && strip > 0 && (uint64_t)strip + strip_bytes <= head->file_bytes;
+}
+
 bool fl_image_size(const char *path, uint32_t *width, uint32_t *height)
 {
     struct head head;
@@ -191,7 +271,9 @@ bool fl_image_size(const char *path, uint32_t *width, uint32_t *height)
         head.file_bytes = (uint64_t)status.st_size;
         head.count = read_at(head.fd, head.bytes, sizeof(head.bytes), 0);
         known = png_size(&head, width, height) || jpeg_size(&head, width, height) ||
-                exr_size(&head, width, height) || hdr_size(&head, width, height);
+                exr_size(&head, width, height) || hdr_size(&head, width, height) ||
+                webp_size(&head, width, height) || gif_size(&head, width, height) ||
+                tiff_size(&head, width, height);
     }
     close(head.fd);
     return known;

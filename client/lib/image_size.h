@@ -6,9 +6,9 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-/* PNG, JPEG, EXR (one part, scan lines) and HDR, by their content. False: there is no such file, it cannot be
- * read, is none of these, or is cut short as far as can be seen without decoding it (an HDR file does not show
- * it). */
+/* PNG, JPEG, EXR (one part, scan lines), HDR, WebP, TIFF (strips) and GIF, by their content. False: there is no
+ * such file, it cannot be read, is none of these, or is cut short as far as can be seen without decoding it (an
+ * HDR file does not show it). */
 bool fl_image_size(const char *path, uint32_t *width, uint32_t *height);
 
 #endif

@@ -278,8 +278,10 @@ bool fl_importer_explain(struct fl_importer *importer, struct fl_error *error)
     }
     char words[520];
     fl_process_last_words(&importer->process, 1000, words, sizeof(words));
-    return fl_error_set(error, FL_ERROR_MODEL, fl_importer_name(importer),
-                        "the importer failed without a message%s%s", words[0] != '\0' ? ": " : "", words);
+    fl_error_set(error, FL_ERROR_MODEL, fl_importer_name(importer), "the importer failed without a message%s%s",
+                 words[0] != '\0' ? ": " : "", words);
+    return fl_error_remedy(error, "the file may be broken in a way that its reader does not survive; if other "
+                                  "programs can read it, write it with one of them as glTF");
 }
 
 /* Nodes without a name have their camera's. */

@@ -4,6 +4,7 @@
 
 #include "lib/catalogue.h"
 #include "lib/connection.h"
+#include "lib/imported.h"
 
 struct fl_scene {
     struct fl_scene *next; /* of the connection's */
@@ -19,9 +20,12 @@ struct fl_scene {
     struct fl_catalogue catalogue;
     char **files;
     size_t file_count;
+    struct fl_imported imported; /* empty unless it is to be loaded again */
 };
 
 /* A new scene of the connection, with its own number; nothing is sent. NULL: out of memory. */
 struct fl_scene *fl_scene_create(struct fl_connection *connection, struct fl_error *error);
+/* Frees what an import has told of it. */
+void fl_scene_forget_import(struct fl_scene *scene);
 
 #endif

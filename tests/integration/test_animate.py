@@ -184,6 +184,14 @@ class Parts(OneDaemon, Animations):
             after = (folder / f"{frame:04d}.exr").stat()
             self.assertEqual((after.st_ino, after.st_mtime_ns), (before.st_ino, before.st_mtime_ns))
 
+    def test_files_of_all_formats_are_known(self):
+        """That of a frame alone lets no daemon be asked for it."""
+        for ending in ("png", "jpg", "hdr", "webp", "tiff", "gif"):
+            with self.subTest(ending):
+                arguments = "animate", self.model, "--frames", "1-1", *SIZE, "-o", self.folder / f"%d.{ending}"
+                self.expect(farlight(*arguments), 0)
+                self.expect(farlight(*arguments, "--resume", "--server", "unix:/nonexistent"), 0)
+
     def test_with_all_frames_present_no_daemon_is_asked(self):
         whole, _ = self.animate("whole", self.model, *self.RANGE)
         again, _ = self.animate("whole", self.model, *self.RANGE, "--resume", "--server", "unix:/nonexistent")
@@ -487,6 +495,15 @@ class Scripts(OneDaemon, Animations):
                              "--look-at", "0,0,0", "--fov", "40", "-o", self.folder / "still-%d.exr"), 0)
         self.assertEqual(digest(self.folder / "still-1.exr"), self.still("--eye", "2,1.5,2.5", "--look-at", "0,0,0",
                                                                          "--fov", "40"))
+
+    def test_models_have_their_places(self):
+        """As the command line's --at has them; a model of the command line replaces them all."""
+        models = [str(self.model), {"model": str(self.model), "at": [1, 0, 0], "rotation_degrees": [0, 90, 0], "scale": 0.5}]
+        script = self.write({"models": models, "camera": self.camera(), "size": [96, 64], "frames": "1-1", "samples": 1})
+        for more, typed in (((), (self.model, "--at", "1,0,0:0,90,0:0.5")), ((self.model,), ())):
+            self.expect(farlight("animate", "--script", script, *more, "-o", self.folder / "script-%d.exr"), 0)
+            self.assertEqual(digest(self.folder / "script-1.exr"),
+                             self.still(*typed, "--eye", "2,1.5,2.5", "--look-at", "0,0,0", "--fov", "40"))
 
     def test_keys_begin_and_end_where_they_say(self):
         """The first and the last frame are pictures of a camera that stands there."""

@@ -570,6 +570,21 @@ class Written(importer.Written):
         self.assertEqual(glass["base"][:3], (1, 1, 1))
         self.assertEqual(result.floats(mesh["arrays"][4])[1], 0.75, "v runs downwards here")
 
+    def test_obj_materials_have_varnish_and_sheen(self):
+        """Sheen is grey, with the roughness that Blender's shader has by default; a map without a number is whole."""
+        self.write("fibres.ppm", b"P6\n1 1\n255\n\x80\x80\x80")
+        self.write("m.mtl", "newmtl car\nKd 1 0 0\nPr 0.4\nPm 0.25\nPc 0.75\nPcr 0.125\nnewmtl cloth\nPs 0.5\n"
+                            "newmtl woven\nmap_Ps fibres.ppm\n")
+        result = self.import_text("model.obj", "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nvt 0 0\n"
+                                               "usemtl car\nf 1 2 3\nusemtl cloth\nf 1 2 3\nusemtl woven\nf 1/1 2/1 3/1\n")
+        car, cloth, woven = result.of(SET_MATERIAL)
+        self.assertEqual((car["coat"], car["sheen"], car["metallic"]), ((0.75, 0.125), (0, 0, 0, 0), 0.25))
+        self.assertEqual((cloth["coat"], cloth["sheen"]), ((0, 0), (0.5,) * 4))
+        self.assertEqual(woven["sheen"], (1, 1, 1, 0.5))
+        texture, = result.of(SET_TEXTURE)
+        self.assertEqual((woven["textures"][12]["texture"], texture["format"]), (texture["id"], 1), "linear")
+        self.assertEqual(result.text(), "")
+
     def test_what_has_no_material_is_light_grey_unless_its_vertices_have_colours(self):
         corners = "v 0 0 0 %s\nv 1 0 0 %s\nv 1 1 0 %s\nv 0 1 0 %s\n"
         bare, coloured = corners % (("",) * 4), corners % (("1 0 0",) * 4)

@@ -95,7 +95,7 @@ def three_ds(corners):
 
 def source(name, values, stride, kind="float"):
     word = "Name_array" if kind == "name" else "float_array"
-    parameters = "XYZ" if stride == 3 else ("TRANSFORM",) if stride == 16 else "X"
+    parameters = "XYZ" if stride == 3 else "ST" if stride == 2 else ("TRANSFORM",) if stride == 16 else "X"
     return (f'<source id="{name}"><{word} id="{name}a" count="{len(values)}">{" ".join(map(str, values))}</{word}><technique_common>'
             f'<accessor source="#{name}a" count="{len(values) // stride}" stride="{stride}">' +
             "".join(f'<param name="{parameter}" type="{"float4x4" if stride == 16 else kind}"/>' for parameter in parameters) +
@@ -290,6 +290,33 @@ class Formats(importer.Written):
                 self.assertEqual(texels[:3] == bytes(RED), found, result.text())
                 self.assertEqual("cannot be used" in result.text(), not found)
 
+    def test_a_texture_uses_the_coordinates_that_the_material_says(self):
+        """The colour those of set 1, the emission those of set 0; without the first no mesh has set 1."""
+        images = "".join(f'<image id="{name}" name="{name}"><init_from>red.ppm</init_from></image>' for name in "ij")
+        parameters = "".join(f'<newparam sid="f{i}"><surface type="2D"><init_from>{i}</init_from></surface></newparam><newparam sid='
+                             f'"t{i}"><sampler2D><source>f{i}</source></sampler2D></newparam>' for i in "ij")
+        coordinates = "".join(source(f"uv{n}", values, 2) for n, values in ((0, [0, 0, 1, 0, 1, 1, 0, 1]), (1, [0.25] * 8)))
+        inputs = "".join(f'<input semantic="TEXCOORD" source="#uv{n}" offset="0" set="{n}"/>' for n in (0, 1))
+        bound = BOUND.replace('target="#m"/>', 'target="#m">' + "".join(
+            f'<bind_vertex_input semantic="U{n}" input_semantic="TEXCOORD" input_set="{n}"/>' for n in (0, 1)) + "</instance_material>")
+        self.write("red.ppm", PPM)
+        for effect, sets in (
+                ('<phong><emission><texture texture="tj" texcoord="U0"/></emission><diffuse><texture texture="ti" texcoord="U1"/>'
+                 "</diffuse></phong>", (1, 0)),
+                ('<phong><diffuse><texture texture="ti" texcoord="U0"/></diffuse></phong>', (0, None))):
+            with self.subTest(sets):
+                text = dae(QUAD.replace(BOUND, bound), f"<library_images>{images}</library_images>", effect=effect)
+                for before, more in (('<technique sid="c">', parameters), ('<vertices id="v">', coordinates), ("<vcount>", inputs)):
+                    text = text.replace(before, more + before)
+                result = self.import_text("model.dae", text)
+                (material,), (mesh,) = result.of(SET_MATERIAL), result.of(SET_MESH)
+                uses = {at: use["texcoord"] for at, use in enumerate(material["textures"]) if use["texture"]}
+                self.assertEqual((uses[0], uses.get(4)), sets, result.text())
+                self.assertEqual(result.floats(mesh["arrays"][4])[2:4], [1, 1], "v runs downwards here")
+                self.assertEqual(len(mesh["arrays"]) > 5 and mesh["arrays"][5][0] > 0, sets[0] == 1)
+                if sets[0] == 1:
+                    self.assertEqual(result.floats(mesh["arrays"][5]), [0.25, 0.75] * 4)
+
     # ---- cameras and lights
 
     def test_camera_and_lights(self):
@@ -384,7 +411,10 @@ class Formats(importer.Written):
                 ("corners.off", off([(math.cos(i), math.sin(i), 0) for i in range(70000)]), "up to 4000 are allowed"),
                 ("deep.dae", dae('<node>' * 300 + QUAD + '</node>' * 300), "nodes are nested more than 254 deep"),
                 ("deeper.dae", dae("<node>" * 100000 + QUAD + "</node>" * 100000), "elements are nested more than 2000 deep"),
-                ("old.fbx", fbx(CORNERS).replace("7300", "6100"), "write it again with a newer version, or as glTF"),
+                ("old.fbx", fbx(CORNERS).replace("7300", "6100"), "version 6.1, but only 7.1 (FBX 2011) and newer are read: write it"),
+                ("corner.ply", ply(faces=((0, 1, 200000000),)), "a face has the vertex 200000000, but there are 4"),
+                ("cube.x", "xof 0303txt 0032\nMesh {\n", "it is a DirectX file (version 3.3, txt), which is not read: write it"),
+                ("cube.blend", "BLENDER-v300", "it is a scene of Blender, which is not read: write it as glTF in Blender"),
                 ("broken.3mf", three_mf(CORNERS)[:-30], "the 3MF file cannot be read: ")):
             with self.subTest(name):
                 result = self.import_text(name, model, 1)
@@ -397,7 +427,7 @@ class Formats(importer.Written):
         self.assertIn("more memory than a model may have", self.import_text("model.ply", model, 1, memory=64 << 20).text())
 
 
-REFUSED = {"blender_279_ball_6100_ascii.fbx": "old format version", "skin_and_morph.dae": "Unable to resolve library reference"}
+REFUSED = {"blender_279_ball_6100_ascii.fbx": "FBX file of version 6.1", "skin_and_morph.dae": "Unable to resolve library reference"}
 
 
 @needs_shared_scenes

@@ -183,6 +183,13 @@ class Model:
                 self.json[key].append(name)
         return self
 
+    def binary(self):
+        data = self.data + bytes(-len(self.data) % 4)
+        text = json.dumps({**self.json, "buffers": [{"byteLength": len(data)}]}).encode("ascii")
+        text += b" " * (-len(text) % 4)
+        chunks = struct.pack("<II", len(text), 0x4e4f534a) + text + struct.pack("<II", len(data), 0x004e4942) + data
+        return b"glTF" + struct.pack("<II", 2, 12 + len(chunks)) + chunks
+
     def text(self):
         uri = "data:application/octet-stream;base64," + base64.b64encode(self.data).decode("ascii")
         buffers = [{"uri": uri, "byteLength": len(self.data)}]
@@ -266,13 +273,8 @@ class Draco(Gltf):
                 self.assertEqual(self.shape(result), whole)
 
     def test_a_binary_file_may_have_it_too(self):
-        model = Model().draco(DRACO_CUBE)
-        data = model.data + bytes(-len(model.data) % 4)
-        text = json.dumps({**model.json, "buffers": [{"byteLength": len(data)}]}).encode("ascii")
-        text += b" " * (-len(text) % 4)
-        chunks = struct.pack("<II", len(text), 0x4e4f534a) + text + struct.pack("<II", len(data), 0x004e4942) + data
-        glb = b"glTF" + struct.pack("<II", 2, 12 + len(chunks)) + chunks
-        self.assertEqual(self.shape(self.import_text("cube.glb", glb)), self.cube_shape())
+        result = self.import_text("cube.glb", Model().draco(DRACO_CUBE).binary())
+        self.assertEqual(self.shape(result), self.cube_shape())
 
     def test_bytes_that_are_cut_off_are_refused(self):
         for data in (draco(CUBE, CORNERS), DRACO_CUBE):
@@ -565,13 +567,15 @@ class Materials(Gltf):
         self.assertEqual((material["base"], material["metallic"], material["roughness"]), ((1, 1, 1, 1), 1, 1))
         self.assertEqual(material["specular"], (1, 25, 25, 25), "of 0.04, which the texture has whole")
 
-    def texels(self, image, mime):
-        """Of the base colour of a material."""
+    def texels(self, mime, **image):
+        """Of the base colour of a material, in a binary file."""
         model = Model().cube()
         model.primitive["material"] = 0
+        if "data" in image:
+            image = {"bufferView": model.view(image["data"]), "mimeType": mime}
         model.json.update(materials=[{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}], textures=[{"source": 0}],
-                          images=[{"bufferView": model.view(image), "mimeType": mime}])
-        result = self.run_model(model)
+                          images=[image])
+        result = self.import_text("model.glb", model.binary())
         texture, = result.of(SET_TEXTURE)
         return result.data(texture["arrays"][0]), result.text()
 
@@ -587,13 +591,21 @@ class Materials(Gltf):
                           (b"IDAT", zlib.compress(b"\0" + row)), (b"IEND", b"")]
                 image = b"\x89PNG\r\n\x1a\n" + b"".join(struct.pack(">I", len(data)) + tag + data +
                                                        struct.pack(">I", zlib.crc32(tag + data)) for tag, data in chunks)
-                self.assertEqual(list(self.texels(image, "image/png")[0]), wanted)
+                self.assertEqual(list(self.texels("image/png", data=image)[0]), wanted)
 
-    def test_an_image_that_is_not_what_the_model_says_is_named(self):
-        texels, text = self.texels(WEBP, "image/png")
+    def test_an_image_is_what_its_first_bytes_say(self):
+        """Whatever its MIME type or name is: in the binary part, in a data URI and beside the model."""
+        self.write("my wood.png", WEBP)
+        for mime, image in (("image/webp", {"data": WEBP}), ("image/png", {"data": WEBP}), ("", {"uri": "my%20wood.png"}),
+                            ("", {"uri": "data:image/jpeg;base64," + base64.b64encode(WEBP).decode()})):
+            with self.subTest(mime or image["uri"][:20]):
+                texels, text = self.texels(mime, **image)
+                self.assertEqual((texels[:4], text), (bytes([255, 0, 0, 255]), ""))
+
+    def test_an_image_of_no_known_format_is_named(self):
+        texels, text = self.texels("image/png", data=b"no image at all")
         self.assertEqual(texels[:4], bytes([255, 0, 255, 255]), "magenta stands in")
         self.assertIn("is neither PNG nor JPEG", text)
-        self.assertEqual(self.texels(WEBP, "image/webp")[0][:4], bytes([255, 0, 0, 255]))
 
     def test_a_specular_texture_makes_metal_of_what_shines(self):
         """Black below it: the coloured texels reflect as metals of their colours."""

@@ -173,6 +173,13 @@ class Inputs(OneDaemon):
         new.write_text(text)
         new.rename(path)
 
+    def scene_and_builds(self):
+        """The revision of the one scene that there is, and how many steps building structures has taken."""
+        result = self.expect(farlight("stats", "--json"), 0)
+        stats = farlight_test.json.loads(result.stdout)
+        scene, = stats["scenes"]
+        return scene["revision"], sum(stage["count"] for stage in stats["stages"] if stage["stage"] == "build")
+
     def test_a_picture_follows_the_files_of_its_model(self):
         paint = self.folder / "square.mtl"
         process = subprocess.Popen([BIN / "farlight", "render", self.square, "--watch", "-o", self.picture, *FRONT],
@@ -182,10 +189,14 @@ class Inputs(OneDaemon):
         self.addCleanup(process.kill)
         self.wait_for(process, "watching 2 files")
         self.assertEqual(colour(self.picture, 0, 0), "red")
+        before = self.scene_and_builds()
         self.replace(paint, PAINT.format(0, 0, 1))
         line = self.wait_for(process, "is new")
         self.assertEqual(colour(self.picture, 0, 0), "blue")
         self.assertIn("sent 0.000 of", line, "the square is the same: no blob is sent")
+        revision, steps = self.scene_and_builds()
+        self.assertEqual(revision, before[0] + 1, "the same scene")
+        self.assertLess(steps - before[1], before[1] / 2, "its structure is kept: a step finds that it is up to date")
         self.square.write_text("v 1 2 3\nf 1 2 99\n")
         self.wait_for(process, "vertex 2 does not exist")
         self.assertEqual(colour(self.picture, 0, 0), "blue", "the last good one stays")
@@ -193,6 +204,10 @@ class Inputs(OneDaemon):
         self.wait_for(process, "is new")
         self.assertIsNone(colour(self.picture, 0.4, 0.4))
         self.assertIsNotNone(colour(self.picture, 0.2, 0.2))
+        for text, revision in ((SQUARE.replace("f 1 3", "usemtl nothing\nf 1 3"), before[0] + 3), (SQUARE, before[0])):
+            self.square.write_text(text)
+            self.wait_for(process, "is new")
+            self.assertEqual(self.scene_and_builds()[0], revision, "what is gone, the default material, needs another scene")
         process.send_signal(signal.SIGINT)
         self.assertEqual(process.wait(), 0)
         self.assertEqual(self.leftovers(), ["picture.png", "square.mtl", "square.obj"])

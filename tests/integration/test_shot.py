@@ -60,6 +60,8 @@ EXAMPLES = {
     "dolly to": {"model": "teapot.glb", "camera": {"eye": [0, 1, 5], "look_at": [0, 0, 0],
                                                    "dolly": {"to": [1, 1, 1]}}, "output": "-"},
     "lens": {"model": "teapot.glb", "camera": {"name": "a camera", "aperture": 0.1, "focus": 2}, "output": "%d.png"},
+    "furnished": {"models": ["teapot.glb", {"model": "teapot.glb", "at": [1, 0, 2]},
+                             {"model": "teapot.glb", "rotation_degrees": [0, 90, 0], "scale": 0.5}], "output": "%d.png"},
     "turning": {"model": "teapot.glb", "camera": {"orbit": True}, "output": "%d.png"},
     "turning half": {"model": "teapot.glb", "camera": {"orbit": 180}, "output": "%d.png"},
 }
@@ -80,6 +82,7 @@ BEYOND_THE_SCHEMA = [
     ("stills", ("output",), "frames.exr", "output: 'frames.exr' has no place for the frame's number"),
     ("stills", ("output",), "%d/0001.exr", "output: '%d/0001.exr': the frame's number may only be in the file's"),
     ("dolly", ("depth",), 2, "contradicts"),
+    ("furnished", ("models",), ["-", {"model": "-"}], "models[1].model: standard input can be read only once"),
     ("movie", ("outputs", 0), "movie.webm", "outputs[0]: the ending is not that of a known format"),
 ]
 

@@ -125,6 +125,25 @@ static const uint8_t exr[] = "\x76\x2f\x31\x01\x02\0\0\0"
                              "\0"
                              "\x5b\0\0\0\0\0\0\0\x63\0\0\0\0\0\0\0"    /* where the two lines are */
                              "\0\0\0\0\0\0\0\0\x01\0\0\0\x02\0\0\0zz"; /* line, bytes, bytes of pixels */
+static const uint8_t webp[3][30] = {"RIFF\x16\0\0\0WEBPVP8X\x0a\0\0\0\0\0\0\0\x02\0\0\x01\0\0",
+                                    "RIFF\x16\0\0\0WEBPVP8L\x0a\0\0\0\x2f\x02\x40\0\0",
+                                    "RIFF\x16\0\0\0WEBPVP8 \x0a\0\0\0xxx\x9d\x01\x2a\x03\0\x02\0"};
+static const uint8_t gif[] = "GIF89a\x03\0\x02\0\0\0\0;";
+/* Strips of 3 bytes each, which end at 14, then the directory: one of numbers of 2 bytes, and a list elsewhere. */
+static const uint8_t tiff[] = "II*\0\x0e\0\0\0pixels"
+                              "\x04\0"
+                              "\0\x01\x03\0\x01\0\0\0\x03\0\0\0"
+                              "\x01\x01\x04\0\x01\0\0\0\x02\0\0\0"
+                              "\x11\x01\x04\0\x02\0\0\0\x44\0\0\0"
+                              "\x17\x01\x03\0\x02\0\0\0\x03\0\x03\0"
+                              "\0\0\0\0"
+                              "\x08\0\0\0\x0b\0\0\0";
+static const uint8_t motorola[] = "MM\0*\0\0\0\x0epixels"
+                                  "\0\x04"
+                                  "\x01\0\0\x03\0\0\0\x01\0\x03\0\0"
+                                  "\x01\x01\0\x04\0\0\0\x01\0\0\0\x02"
+                                  "\x01\x11\0\x04\0\0\0\x01\0\0\0\x08"
+                                  "\x01\x17\0\x03\0\0\0\x01\0\x06\0\0";
 static const char hdr[] = "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 3\nxxxx";
 
 TEST(image_files_tell_their_size)
@@ -133,6 +152,11 @@ TEST(image_files_tell_their_size)
     assert_string_equal(size_of(jpeg, sizeof(jpeg) - 1), "3x2");
     assert_string_equal(size_of(exr, sizeof(exr) - 1), "3x2");
     assert_string_equal(size_of(hdr, sizeof(hdr) - 1), "3x2");
+    for (size_t i = 0; i < 3; i++)
+        assert_string_equal(size_of(webp[i], sizeof(webp[i])), "3x2");
+    assert_string_equal(size_of(gif, sizeof(gif) - 1), "3x2");
+    assert_string_equal(size_of(tiff, sizeof(tiff) - 1), "3x2");
+    assert_string_equal(size_of(motorola, sizeof(motorola) - 1), "3x2");
     uint32_t width = 0, height = 0;
     assert_false(fl_image_size("/nonexistent/0001.png", &width, &height));
     assert_false(fl_image_size("/", &width, &height));
@@ -146,6 +170,12 @@ TEST(files_cut_short_are_not_complete)
         assert_string_equal(size_of(jpeg, count), "");
     for (size_t count = 0; count < sizeof(exr) - 1; count++)
         assert_string_equal(size_of(exr, count), "");
+    for (size_t count = 0; count < sizeof(webp[0]); count++)
+        assert_string_equal(size_of(webp[0], count), "");
+    for (size_t count = 0; count < sizeof(gif) - 1; count++)
+        assert_string_equal(size_of(gif, count), "");
+    for (size_t count = 0; count < sizeof(tiff) - 1; count++)
+        assert_string_equal(size_of(tiff, count), "");
 }
 
 /* Each byte of each file changed in a few ways: nothing is read beyond what there is (sanitizers watch). */
@@ -154,7 +184,10 @@ TEST(files_of_nonsense_do_no_harm)
     const struct {
         const void *bytes;
         size_t count;
-    } files[] = {{png, sizeof(png) - 1}, {jpeg, sizeof(jpeg) - 1}, {exr, sizeof(exr) - 1}, {hdr, sizeof(hdr) - 1}};
+    } files[] = {{png, sizeof(png) - 1},          {jpeg, sizeof(jpeg) - 1},   {exr, sizeof(exr) - 1},
+                 {hdr, sizeof(hdr) - 1},          {webp[0], sizeof(webp[0])}, {webp[1], sizeof(webp[1])},
+                 {webp[2], sizeof(webp[2])},      {gif, sizeof(gif) - 1},     {tiff, sizeof(tiff) - 1},
+                 {motorola, sizeof(motorola) - 1}};
     static const uint8_t values[] = {0, 1, 0x7f, 0x80, 0xff};
     for (size_t f = 0; f < sizeof(files) / sizeof(files[0]); f++)
         for (size_t i = 0; i < files[f].count; i++)

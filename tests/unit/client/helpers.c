@@ -74,6 +74,7 @@ TEST(an_importer_that_crashes_is_reported_with_its_signal)
 {
     assert_null(import_with("#!/bin/sh\nkill -SEGV $$\n", 60000));
     check_error(FL_ERROR_MODEL, "farlight-import was ended by signal 11");
+    assert_non_null(strstr(error.remedy, "the file may be broken"));
 }
 
 TEST(an_importer_that_hangs_is_killed_at_its_deadline)
