@@ -137,6 +137,7 @@ size_t context_surface_defines(const struct render_context *context, struct gpu_
         {features->diffuse_transmission, "HAS_DIFFUSE_TRANSMISSION"},
         {features->dispersion, "HAS_DISPERSION"},
         {features->thin_walls, "HAS_THIN_WALLS"},
+        {features->anisotropy, "HAS_ANISOTROPY"},
         {features->anisotropy_map, "HAS_ANISOTROPY_MAP"},
     };
     size_t n = 0;

@@ -12,7 +12,7 @@
 
 #include <epoxy/gl.h>
 
-#define DEFINES_MAX 24
+#define DEFINES_MAX (INTEGRATOR_DEFINES_MAX + CONTEXT_SURFACE_DEFINES + 3) /* and what ends them */
 
 bool wave_passes_reserve(struct wave_passes *passes, struct render_context *context, struct error *error)
 {

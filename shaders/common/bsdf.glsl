@@ -16,9 +16,9 @@
 // Radiance on the other side is divided by the square of the index, so that a window neither dims nor brightens the
 // view through it.
 //
-// Defines: those of common/material.glsl; HAS_ANISOTROPY some material has a grain; WARD.
+// Defines: those of common/material.glsl; WARD.
 
-#include "common/facets.glsl"
+#include "common/grain.glsl"
 #include "common/scattering.glsl"
 
 // The minimum probability of a lobe, as its mean may exceed its value at this angle.
@@ -40,37 +40,6 @@ struct bsdf {
 #endif
 };
 
-// KHR_materials_anisotropy: facets are as rough as the material says across the grain, and up to fully rough along it.
-vec2 facet_alpha(float roughness, float anisotropy)
-{
-    float across = square(roughness);
-    return vec2(mix(across, 1.0, square(anisotropy)), across);
-}
-
-#ifdef HAS_ANISOTROPY
-// Along the material's grain; a point without a tangent gets an arbitrary one.
-vec3 grain_of(hit h, surface s, material m)
-{
-    vec3 x, y;
-    tangent_frame(s.normal, x, y);
-    if ((h.material & HIT_HAS_TANGENT) != 0u) {
-        vec4 tangent = unpack_tangent(h.tangent);
-        vec3 along = tangent.xyz - dot(tangent.xyz, s.normal) * s.normal;
-        float squared = dot(along, along);
-        if (squared > 1e-8) {
-            x = along * inversesqrt(squared);
-            y = cross(s.normal, x) * (s.inside ? -tangent.w : tangent.w);
-        }
-    }
-    vec2 turned = vec2(cos(m.anisotropy_rotation), sin(m.anisotropy_rotation));
-#ifdef HAS_ANISOTROPY_MAP // complex numbers
-    vec2 texel = dot(s.grain.xy, s.grain.xy) > 1e-6 ? normalize(s.grain.xy) : vec2(1.0, 0.0);
-    turned = vec2(turned.x * texel.x - turned.y * texel.y, turned.x * texel.y + turned.y * texel.x);
-#endif
-    return turned.x * x + turned.y * y;
-}
-#endif
-
 vec3 bsdf_local(bsdf b, vec3 direction)
 {
     return vec3(dot(direction, b.x), dot(direction, b.y), dot(direction, b.z));
@@ -81,17 +50,6 @@ vec3 bsdf_world(bsdf b, vec3 local)
     return local.x * b.x + local.y * b.y + local.z * b.z;
 }
 
-// The facets' alpha for polynomials that know only one, and how much of what these say is surely lost.
-vec2 facet_alpha_mean(vec2 alpha)
-{
-#ifdef HAS_ANISOTROPY
-    float mean = 0.5 * (alpha.x + alpha.y), squares = sqrt(0.5 * dot(alpha, alpha));
-    return vec2(0.5 * (mean + squares), 0.9 + 0.1 * alpha.y / max(alpha.x, FACET_ALPHA_MIN));
-#else
-    return vec2(alpha.x, 1.0);
-#endif
-}
-
 float bsdf_lost(bsdf b, vec3 direction)
 {
     vec2 mean = facet_alpha_mean(b.alpha);
@@ -99,15 +57,16 @@ float bsdf_lost(bsdf b, vec3 direction)
 }
 
 // `view`: towards the eye, as NoV, which is not 0.
-bsdf bsdf_of(surface s, vec3 view, float NoV, vec3 along, float anisotropy)
+bsdf bsdf_of(surface s, vec3 view, float NoV)
 {
     bsdf b;
-    b.x = along;
-    b.y = cross(s.normal, along);
+    vec3 unused;
+    facet_axes(s, b.x, unused);
+    b.y = cross(s.normal, b.x);
     b.z = s.normal;
     vec3 local = bsdf_local(b, view);
     b.view = normalize(vec3(local.xy, NoV));
-    b.alpha = facet_alpha(s.roughness, anisotropy);
+    b.alpha = facet_alpha(s, s.roughness);
     b.rough = b.alpha.x > FACET_ALPHA_MIN;
     b.leaves = in_glass(s);
     float loss = b.rough ? bsdf_lost(b, b.view) : 0.0;

@@ -22,7 +22,7 @@ light_receiver light_receiver_of(surface s, split parts, vec3 position, vec3 vie
     // A slanted mirror is dim at its own angle, but not at that of every facet: never 0.
     return light_receiver(position, s.normal, view, max_component(parts.scattered + parts.again + sheen_of(parts)) * INVERSE_PI,
                           (max_component(parts.mirror) + 1e-3) * 0.25 / max(NoV, 0.1),
-                          square(max(s.roughness, ROUGHNESS_MIN_LIGHT)), max_component(passed_of(parts)) * INVERSE_PI
+                          square(max(blurring_roughness(s), ROUGHNESS_MIN_LIGHT)), max_component(passed_of(parts)) * INVERSE_PI
 #ifdef HAS_CLEARCOAT
                           , s.coat_normal, parts.coat.mirrors * 0.25 / max(coat_cosine(s, view), 0.1),
                           square(max(s.coat_roughness, ROUGHNESS_MIN_LIGHT))

@@ -9,7 +9,7 @@
 // facet, or, from inside, keeps it as the flat surface would. So glass loses no light at any roughness, and needs no
 // table of what single facets lose.
 
-#include "common/facets.glsl"
+#include "common/grain.glsl"
 #include "common/scattering.glsl"
 
 struct lobe {
@@ -38,10 +38,9 @@ vec3 again_direction(vec3 normal, float number)
 }
 
 // What of the light along a direction comes out mirrored more than once, as brdf() has it, by that of all directions.
-float again_share(surface s, split parts, vec3 light, float alpha)
+float again_share(surface s, split parts, vec3 light)
 {
-    float cosine = dot(light, s.normal);
-    return facets_lost(stretched_cosine(cosine, alpha), alpha) / max(parts.again_mean, 1e-9) *
+    return facets_lost_from(s, light, dot(light, s.normal)) / max(parts.again_mean, 1e-9) *
            over_scattered(s, parts, light);
 }
 
@@ -74,14 +73,26 @@ lobe coat_lobe(surface s, split parts, vec3 direction, float chance, vec2 u)
 // The frame of facets, and the view in it.
 vec3 facet_frame(surface s, float NoV, vec3 direction, out vec3 x, out vec3 y)
 {
-    tangent_frame(s.normal, x, y);
+    facet_axes(s, x, y);
     return normalize(vec3(-dot(direction, x), -dot(direction, y), NoV));
+}
+
+// Of a rough surface.
+float facets_lit_share(surface s, float NoV, vec3 direction, vec3 light)
+{
+    float NoL = dot(light, s.normal);
+#ifdef HAS_ANISOTROPY
+    vec3 x, y, view = facet_frame(s, NoV, direction, x, y);
+    return NoL > 0.0 ? facet_both_share(view, vec3(dot(light, x), dot(light, y), NoL), sampled_alpha(s)) : 0.0;
+#else
+    return lit_share(NoV, NoL, square(s.roughness));
+#endif
 }
 
 // A facet of a rough surface that is seen along the direction. `angle`: 1 / the density with which it was chosen.
 vec3 facet_seen(surface s, float NoV, vec3 direction, vec2 u, out float angle)
 {
-    vec2 alpha = vec2(square(s.roughness));
+    vec2 alpha = sampled_alpha(s);
     vec3 x, y;
     vec3 view = facet_frame(s, NoV, direction, x, y);
     vec3 facet = visible_facet(view, alpha, u);
@@ -114,7 +125,7 @@ facet_lobes facet_lobes_of(surface s, split parts, float NoV, vec3 direction, ve
     if (rough && leaves) {
         f.reflected = turned_to(f.reflected, s.normal);
     } else if (rough) {
-        lit = lit_share(NoV, dot(f.reflected, s.normal), square(s.roughness));
+        lit = facets_lit_share(s, NoV, direction, f.reflected);
     }
     f.mirror = mix(vec3(dielectric), metal_mirror(s, VoH), s.metallic) *
                (lit * over_mirrored(s, parts, f.reflected));
@@ -147,8 +158,7 @@ float coat_chance_of(split parts)
 // turn, and comes back stretched; `u` chooses the facet.
 lobe lobe_choose(surface s, split parts, float NoV, vec3 direction, inout float choice, vec2 u)
 {
-    float alpha = square(s.roughness);
-    bool rough = alpha > FACET_ALPHA_MIN, leaves = in_glass(s);
+    bool rough = facets_are_rough(s), leaves = in_glass(s);
     vec3 facet = s.normal;
     float facet_angle = 0.0;
     if (rough)
@@ -181,7 +191,7 @@ lobe lobe_choose(surface s, split parts, float NoV, vec3 direction, inout float 
     result.weight = (mirrored ? f.mirror : is_again ? f.again : f.window) / chance;
     float cosine = dot(result.direction, s.normal);
     if (is_again)
-        result.weight *= again_share(s, parts, result.direction, alpha);
+        result.weight *= again_share(s, parts, result.direction);
     if (result.back && !(dot(result.direction, s.geometric) > 0.0)) {
         result.weight = rough ? vec3(0.0) : result.weight;
         result.direction = reflect(direction, s.geometric);
@@ -197,9 +207,9 @@ lobe lobe_choose(surface s, split parts, float NoV, vec3 direction, inout float 
 // once, the density is a mean over the facets.
 vec3 lobe_mirrored_below(surface s, split parts, float NoV, vec3 view, vec3 light, out float density)
 {
-    float NoL = dot(s.normal, light), alpha = square(s.roughness);
+    float NoL = dot(s.normal, light);
     density = 0.0;
-    if (alpha <= FACET_ALPHA_MIN || NoL <= 0.0 || dot(s.geometric, light) <= 0.0 || in_glass(s))
+    if (!facets_are_rough(s) || NoL <= 0.0 || dot(s.geometric, light) <= 0.0 || in_glass(s))
         return vec3(0.0);
     vec3 facet = normalize(view + light);
     float number = 0.5;
@@ -208,20 +218,20 @@ vec3 lobe_mirrored_below(surface s, split parts, float NoV, vec3 view, vec3 ligh
     float all_ = mirror_size + max_component(f.again) + f.window_size;
     vec3 x, y;
     vec3 local_view = facet_frame(s, NoV, -view, x, y), local = vec3(dot(facet, x), dot(facet, y), dot(facet, s.normal));
-    float mirrored = visible_facet_density(local, local_view, VoH, vec2(alpha)) / (4.0 * VoH);
+    float mirrored = visible_facet_density(local, local_view, VoH, sampled_alpha(s)) / (4.0 * VoH);
     float again_size = max_component(parts.again), again_all = max_component(parts.mirror + parts.refracted) + again_size;
     density = mirror_size / max(all_, 1e-30) * mirrored + again_size / max(again_all, 1e-30) * NoL * INVERSE_PI;
-    return f.mirror * mirrored + parts.again * (again_share(s, parts, light, alpha) * NoL * INVERSE_PI);
+    return f.mirror * mirrored + parts.again * (again_share(s, parts, light) * NoL * INVERSE_PI);
 }
 
 // Whether a lobe of it is no single direction.
-bool facets_are_rough(surface s)
+bool lobes_are_rough(surface s)
 {
 #ifdef HAS_CLEARCOAT
     if (square(s.coat_roughness) > FACET_ALPHA_MIN)
         return true;
 #endif
-    return square(s.roughness) > FACET_ALPHA_MIN;
+    return facets_are_rough(s);
 }
 
 // The same with the coat.

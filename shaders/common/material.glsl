@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// From a hit to its surface's material: textures, normal and bump maps applied.
+// From a hit to its surface's material: textures applied.
 //
 // A back face of an opaque material is shaded as if it were two-sided, double_sided or not: a model with a hole in it
 // would surprise more than one whose inside is visible. Only glass distinguishes its sides.
@@ -10,14 +10,15 @@
 // Defines: HAS_TEXTURES some material has a texture; HAS_BUMP one of them is a bump map; HAS_SPECULAR the mirror of some
 // dielectric differs from what Fresnel's equations say; HAS_VOLUME some body of glass absorbs light; HAS_CLEARCOAT some
 // surface is varnished; HAS_IRIDESCENCE some has a thin film; HAS_SHEEN some is cloth; HAS_DIFFUSE_TRANSMISSION some scatters
-// light to its other side; HAS_DISPERSION some glass splits colours; HAS_THIN_WALLS some has no body; HAS_ANISOTROPY_MAP some
-// grain is a texture; HAS_SPHERES;
+// light to its other side; HAS_DISPERSION some glass splits colours; HAS_THIN_WALLS some has no body; HAS_ANISOTROPY some material
+// has a grain, HAS_ANISOTROPY_MAP and some grain is a texture; HAS_SPHERES;
 // HAS_SAMPLED the hits of the wave are stored samples, but for those of discs.
 
 #include "shared/hit.h"
 #include "common/cone.glsl"
 #include "common/sampled.glsl"
 #include "common/detail.glsl"
+#include "common/relief.glsl"
 
 struct surface {
     vec3 position;
@@ -56,8 +57,9 @@ struct surface {
 #ifdef HAS_THIN_WALLS
     bool thin;            // light goes straight on through it
 #endif
-#ifdef HAS_ANISOTROPY_MAP
-    vec3 grain;           // direction from the material's, and share of its strength
+#ifdef HAS_ANISOTROPY
+    vec3 grain;           // direction from the tangent, and strength
+    vec3 along;           // unit, world space, across `normal`: that direction
 #endif
     float curvature; // 1 / metre, above 0: it bulges towards the viewer; 0 if there are no textures to be filtered
     bool unlit;
@@ -113,94 +115,7 @@ mat2x3 footprint_edges(vec3 geometric, vec3 direction, float width)
     return mat2x3(cross(across, geometric) * (width / slant), across * width);
 }
 
-#ifdef HAS_BUMP
-// The derivatives of the position by the texture coordinates of a slot, world space, at a hit.
-bool surface_derivatives(hit h, texture_slot slot, out vec3 along_u, out vec3 along_v)
-{
-    along_u = along_v = vec3(0.0);
-    if (h.primitive == HIT_NO_PRIMITIVE)
-        return false;
-    if (h.instance == HIT_NO_PRIMITIVE) {
-        disc d = disc_at(h.primitive);
-        vec3 tangent, bitangent;
-        tangent_frame(d.normal.xyz, tangent, bitangent);
-        along_u = 2.0 * d.centre_radius.w * tangent; // texture coordinates run 0..1 across the disc
-        along_v = -2.0 * d.centre_radius.w * bitangent;
-        return true;
-    }
-    instance i = instance_at(h.instance);
-    if (geometry_at(i.geometry).kind == GEOMETRY_SPHERES) {
-        float radius = texelFetch(spheres, int(h.primitive)).w;
-        vec2 uv = uintBitsToFloat(h.uv01_or_sample.xy);
-        float phi = (uv.x - 0.5) * TWO_PI, theta = uv.y * PI;
-        vec3 east = vec3(cos(phi), 0.0, -sin(phi));
-        vec3 south = vec3(cos(theta) * sin(phi), -sin(theta), cos(theta) * cos(phi));
-        along_u = affine_vector(i.world_from_object, east * (TWO_PI * radius * sin(theta)));
-        along_v = affine_vector(i.world_from_object, south * (PI * radius));
-        return true;
-    }
-    uvec4 triangle = texelFetch(triangles, int(h.primitive));
-    vec3 p0 = texelFetch(positions, int(triangle.x)).xyz;
-    vec3 e1 = affine_vector(i.world_from_object, texelFetch(positions, int(triangle.y)).xyz - p0);
-    vec3 e2 = affine_vector(i.world_from_object, texelFetch(positions, int(triangle.z)).xyz - p0);
-    vec2 t0 = slot_texcoords(slot, texelFetch(texcoords, int(triangle.x)));
-    vec2 d1 = slot_texcoords(slot, texelFetch(texcoords, int(triangle.y))) - t0;
-    vec2 d2 = slot_texcoords(slot, texelFetch(texcoords, int(triangle.z))) - t0;
-    float area = d1.x * d2.y - d1.y * d2.x;
-    if (area == 0.0)
-        return false;
-    along_u = (e1 * d2.y - e2 * d1.y) / area;
-    along_v = (e2 * d1.x - e1 * d2.x) / area;
-    return true;
-}
-
-// Blinn. Simulation of Wrinkled Surfaces. 1978, in the form of Mikkelsen. Bump Mapping Unparametrized Surfaces on
-// the GPU. 2010: the slope of the height along the surface tilts the normal. The height's derivatives are
-// differences over one texel of the level that the footprint sees.
-vec3 bump_normal(hit h, uint slot_index, vec3 normal, vec4 uv01, texture_footprint footprint)
-{
-    texture_slot slot = texture_slot_at(slot_index);
-    vec3 along_u, along_v;
-    if (!surface_derivatives(h, slot, along_u, along_v))
-        return normal;
-    texture_info info = texture_at(slot.texture & 0x7fffffffu);
-    texture_level level = find_level(info, slot_level(slot, footprint));
-    vec2 uv = slot_texcoords(slot, uv01), texel = 1.0 / vec2(level.size);
-    float height_u = 0.0, height_v = 0.0;
-    for (int i = 0; i < 4; i++) { // -u, +u, -v, +v
-        float side = (i & 1) != 0 ? 0.5 : -0.5;
-        vec2 step = i < 2 ? vec2(side * texel.x, 0.0) : vec2(0.0, side * texel.y);
-        float height = sample_level(info, level, uv + step).r * 2.0 * side;
-        height_u += i < 2 ? height : 0.0;
-        height_v += i < 2 ? 0.0 : height;
-    }
-    vec3 across_u = cross(along_v, normal), across_v = cross(normal, along_u);
-    float determinant_ = dot(along_u, across_u);
-    vec3 slope = sign(determinant_) * slot.strength *
-                 (height_u / texel.x * across_u + height_v / texel.y * across_v);
-    vec3 tilted = abs(determinant_) * normal - slope;
-    float squared = dot(tilted, tilted);
-    return squared > 0.0 ? tilted * inversesqrt(squared) : normal;
-}
-
-#endif
-
 #ifdef HAS_TEXTURES
-vec3 mapped_normal(hit h, vec3 normal, vec3 texel, float strength)
-{
-    texel = texel * 2.0 - 1.0;
-    texel.xy *= strength;
-    vec4 tangent = unpack_tangent(h.tangent);
-    vec3 along = tangent.xyz - dot(tangent.xyz, normal) * normal;
-    float squared = dot(along, along);
-    if (squared < 1e-8)
-        return normal;
-    along *= inversesqrt(squared);
-    vec3 mapped = along * texel.x + cross(normal, along) * (tangent.w * texel.y) + normal * texel.z;
-    squared = dot(mapped, mapped);
-    return squared > 1e-8 ? mapped * inversesqrt(squared) : normal;
-}
-
 // How many inputs the features bring.
 #ifdef HAS_SPECULAR
 #define INPUTS_SPECULAR 2
@@ -226,6 +141,16 @@ vec3 mapped_normal(hit h, vec3 normal, vec3 texel, float strength)
 #define INPUTS_DIFFUSE 2
 #else
 #define INPUTS_DIFFUSE 0
+#endif
+
+#ifdef HAS_ANISOTROPY_MAP
+// KHR_materials_anisotropy: by the texture's direction, and weakened by its strength. Directions are complex numbers.
+vec3 turned_grain(vec3 grain, vec3 texel)
+{
+    vec2 turn = texel.rg * 2.0 - 1.0;
+    turn = dot(turn, turn) > 1e-6 ? normalize(turn) : vec2(1.0, 0.0);
+    return vec3(grain.x * turn.x - grain.y * turn.y, grain.x * turn.y + grain.y * turn.x, grain.z * texel.b);
+}
 #endif
 
 // Replaces the inputs that have textures, normal and bump maps included.
@@ -316,7 +241,7 @@ void apply_textures(inout surface s, inout vec4 colour, hit h, material m, vec4 
 #endif
 #ifdef HAS_ANISOTROPY_MAP
         } else if (i == GRAIN) {
-            s.grain = vec3(texel.rg * 2.0 - 1.0, texel.b);
+            s.grain = turned_grain(s.grain, texel.rgb);
 #endif
         } else {
             s.transmission *= texel.r;
@@ -344,6 +269,25 @@ void apply_sample(inout surface s, inout vec4 colour, material m, uvec4 words)
     if (m.texture_specular_colour != 0u) // which is not stored, and its factor says nothing without it
         s.specular_colour = vec3(1.0);
 #endif
+}
+#endif
+
+#ifdef HAS_ANISOTROPY
+// A point without a tangent gets an arbitrary one.
+vec3 along_grain(hit h, surface s)
+{
+    vec3 x, y;
+    tangent_frame(s.normal, x, y);
+    if ((h.material & HIT_HAS_TANGENT) != 0u) {
+        vec4 tangent = unpack_tangent(h.tangent);
+        vec3 along = tangent.xyz - dot(tangent.xyz, s.normal) * s.normal;
+        float squared = dot(along, along);
+        if (squared > 1e-8) {
+            x = along * inversesqrt(squared);
+            y = cross(s.normal, x) * (s.inside ? -tangent.w : tangent.w);
+        }
+    }
+    return s.grain.x * x + s.grain.y * y;
 }
 #endif
 
@@ -397,8 +341,8 @@ surface surface_at(hit h, vec3 origin, vec3 direction, float width)
 #ifdef HAS_THIN_WALLS
     s.thin = (m.flags & MATERIAL_THIN_WALLED) != 0u;
 #endif
-#ifdef HAS_ANISOTROPY_MAP
-    s.grain = vec3(1.0, 0.0, 1.0);
+#ifdef HAS_ANISOTROPY
+    s.grain = vec3(cos(m.anisotropy_rotation), sin(m.anisotropy_rotation), m.anisotropy);
 #endif
     vec4 colour = m.base_colour * unpackUnorm4x8(h.colour);
     bool is_stored = false;
@@ -423,6 +367,9 @@ surface surface_at(hit h, vec3 origin, vec3 direction, float width)
         s.coat_normal = -s.coat_normal;
 #endif
     }
+#ifdef HAS_ANISOTROPY
+    s.along = along_grain(h, s);
+#endif
     if (in_glass(s)) { // where there is neither
 #ifdef HAS_SHEEN
         s.sheen = vec3(0.0);

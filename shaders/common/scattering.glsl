@@ -12,11 +12,10 @@
 // Defines: those of common/material.glsl.
 
 #include "shared/material.h"
+#include "common/boundary.glsl"
 #include "common/brdf.glsl"
 #include "common/coat.glsl"
-#include "common/facet_albedo.glsl"
-#include "common/film.glsl"
-#include "common/material.glsl"
+#include "common/grain.glsl"
 #include "common/sheen.glsl"
 
 // Roughness at which the mirror ray begins to fade; at MIRROR_ROUGHNESS_GONE it is gone.
@@ -25,105 +24,6 @@ const float MIRROR_ROUGHNESS_SHARP = 0.1;
 float mirror_ray_share(float roughness)
 {
     return 1.0 - smoothstep(MIRROR_ROUGHNESS_SHARP, MIRROR_ROUGHNESS_GONE, roughness);
-}
-
-// What a dielectric does with light from outside: SHARE is a colour if some mirror has one.
-#if defined(HAS_SPECULAR) || defined(HAS_IRIDESCENCE) || defined(HAS_DISPERSION)
-#define SHARE vec3
-#else
-#define SHARE float
-#endif
-
-// `exact`: what the equations say that facets mirror; `all_`: what they would if they mirrored all light.
-SHARE without_film(surface s, float exact, float all_)
-{
-#ifdef HAS_SPECULAR
-    // KHR_materials_specular: Fresnel's curve from its value at normal incidence up to 1 begins at another one, of a
-    // colour, and all of it is less. As the change is the same line at every angle, it holds for means over facets and
-    // angles, too.
-    float f0 = square((s.ior - 1.0) / (s.ior + 1.0));
-    vec3 begins = min(f0 * s.specular_colour, 1.0);
-    return s.specular * (begins * all_ + (1.0 - begins) * max((exact - f0 * all_) / (1.0 - f0), 0.0));
-#else
-    return SHARE(exact);
-#endif
-}
-
-// What a facet of a dielectric mirrors of light from outside, or facets of which it is the mean one.
-SHARE outside_mirror(surface s, float cosine, float exact, float all_)
-{
-    SHARE mirrored = without_film(s, exact, all_);
-#ifdef HAS_IRIDESCENCE
-    mirrored = mix(mirrored, film_of(s, cosine) * all_, s.film);
-#endif
-    return mirrored;
-}
-
-// What facets mirror at the first go. `mean`: facets_cosine().
-SHARE facets_outside_mirror(surface s, float mean, float loss, float alpha)
-{
-    float cosine = facets_dielectric_cosine(mean, alpha, s.ior), all_ = 1.0 - loss;
-    float exact = fresnel_dielectric(cosine, s.ior) * all_;
-    // A film's curve bends more, so facets at the horizon count for more; found by trial, so that no light is made.
-    return outside_mirror(s, cosine * (1.0 - 0.3 * alpha * (1.0 - mean)), exact, all_);
-}
-
-// What a facet of a metal mirrors.
-vec3 metal_mirror(surface s, float cosine)
-{
-    vec3 mirrored = fresnel_schlick(s.base, cosine);
-#ifdef HAS_IRIDESCENCE
-    mirrored = mix(mirrored, film_of(s, cosine), s.film);
-#endif
-    return mirrored;
-}
-
-// The direction of what a facet refracts; 0: it is totally reflected. In a thin wall facets of both sides bend it: it is
-// the mirrored direction on the other side (KHR_materials_transmission).
-vec3 bent_direction(surface s, float eta, vec3 direction, vec3 facet, vec3 normal)
-{
-#ifdef HAS_THIN_WALLS
-    if (is_thin(s)) {
-        vec3 mirrored = reflect(direction, facet);
-        float height = dot(mirrored, normal);
-        return mirrored - (height + abs(height)) * normal;
-    }
-#endif
-    return refract(direction, facet, 1.0 / eta);
-}
-
-// The share that a boundary mirrors of light from inside of glass.
-SHARE inside_mirror(surface s, float cosine)
-{
-#ifdef HAS_DISPERSION
-    vec3 ior = channel_iors(s);
-    return vec3(fresnel_dielectric(cosine, 1.0 / ior.r), fresnel_dielectric(cosine, 1.0 / ior.g),
-                fresnel_dielectric(cosine, 1.0 / ior.b));
-#else
-    return SHARE(fresnel_dielectric(cosine, 1.0 / s.ior));
-#endif
-}
-
-// Glass that disperses sends on one colour of what it lets through, bent as that one is, with a chance in proportion to
-// what the path would bring of it. `number` chooses it and comes back stretched; `window` becomes its share by its chance.
-// Returns the index behind / before.
-float disperse(surface s, inout float number, inout vec3 window)
-{
-    float eta = index_ratio(s);
-#ifdef HAS_DISPERSION
-    vec3 sizes = window * s.carried, iors = channel_iors(s);
-    float all_ = sizes.r + sizes.g + sizes.b;
-    if (s.dispersion <= 0.0 || is_thin(s) || !(all_ > 0.0))
-        return eta;
-    int chosen = number * all_ < sizes.r ? 0 : number * all_ < sizes.r + sizes.g ? 1 : 2;
-    float before = chosen == 0 ? 0.0 : chosen == 1 ? sizes.r : sizes.r + sizes.g;
-    float chance = sizes[chosen] / all_, kept = window[chosen] / chance;
-    number = clamp((number - before / all_) / chance, 0.0, 0.99999994);
-    window = vec3(0.0);
-    window[chosen] = kept;
-    eta = s.inside ? 1.0 / iors[chosen] : iors[chosen];
-#endif
-    return eta;
 }
 
 // How a surface splits the light along the view; below a coat: what gets through it.
@@ -308,7 +208,7 @@ split split_facets(surface s, vec3 view, float NoV, float alpha, float loss)
     result.scattered = s.base * entered;
     // Glass is tinted once, where light enters it.
     result.refracted = (leaves ? vec3(1.0) : s.base) * (enters * s.transmission);
-    result.mirror_ray = leaves ? 1.0 : mirror_ray_share(s.roughness);
+    result.mirror_ray = leaves ? 1.0 : mirror_ray_share(blurring_roughness(s));
     scatter_to_other_side(s, entered, result);
     put_below(s, view, NoV, result);
     return result;
@@ -316,8 +216,7 @@ split split_facets(surface s, vec3 view, float NoV, float alpha, float loss)
 
 split split_light(surface s, vec3 view, float NoV)
 {
-    float alpha = square(s.roughness);
-    return split_facets(s, view, NoV, alpha, facets_lost(stretched_cosine(NoV, alpha), alpha));
+    return split_facets(s, view, NoV, facets_alpha(s), facets_lost_from(s, view, NoV));
 }
 
 // How much of the light from a direction enters, by that of the light from all around, per steradian. `loss`: facets_lost()
@@ -360,20 +259,20 @@ vec3 mirror_direction(surface s, vec3 direction)
 // Of brdf() what is scattered from the other side.
 vec3 brdf_passed(surface s, split parts, vec3 light)
 {
-    float NoL = -dot(s.normal, light), alpha = square(s.roughness);
+    float NoL = -dot(s.normal, light);
     if (NoL <= 0.0 || dot(s.geometric, light) >= 0.0)
         return vec3(0.0);
-    return passed_of(parts) * spread_entered(s, parts, NoL, alpha, facets_lost(stretched_cosine(NoL, alpha), alpha)) *
+    return passed_of(parts) * spread_entered(s, parts, NoL, facets_alpha(s), facets_lost_from(s, light, NoL)) *
            over_scattered(s, parts, -light);
 }
 
 // Of brdf() what is scattered, by fibres too, and not mirrored, be it once or again.
 vec3 brdf_scattered(surface s, split parts, vec3 view, float NoV, vec3 light)
 {
-    float alpha = square(s.roughness), NoL = dot(s.normal, light);
+    float NoL = dot(s.normal, light);
     if (NoL <= 0.0 || dot(s.geometric, light) <= 0.0)
         return brdf_passed(s, parts, light);
-    return spread_scattered(s, parts, NoL, alpha, facets_lost(stretched_cosine(NoL, alpha), alpha)) *
+    return spread_scattered(s, parts, NoL, facets_alpha(s), facets_lost_from(s, light, NoL)) *
                over_scattered(s, parts, light) +
            sheen_sent(s, parts, view, NoV, light);
 }
@@ -382,20 +281,18 @@ vec3 brdf_scattered(surface s, split parts, vec3 view, float NoV, vec3 light)
 // and without what a coat mirrors. From below the horizon only what is scattered to the other side, and 0 for glass seen
 // from inside, where no light is sampled. Reciprocal. `parts`: of the same surface and NoV.
 //
-// What is mirrored: Cook and Torrance 1982 with GGX. (1 - F) of the half-way vector alone, as often seen for scattered
+// What is mirrored: facets_mirror(). (1 - F) of the half-way vector alone, as often seen for scattered
 // light, would give out up to 1.7 of what arrives at grazing angles.
 vec3 brdf(surface s, split parts, vec3 view, float NoV, vec3 light)
 {
     float NoL = dot(s.normal, light);
     if (NoL <= 0.0 || dot(s.geometric, light) <= 0.0)
         return brdf_passed(s, parts, light);
-    vec3 half_way = normalize(view + light), across = cross(s.normal, half_way);
-    float NoH = clamp(dot(s.normal, half_way), 0.0, 1.0), VoH = clamp(dot(view, half_way), 0.0, 1.0);
+    float VoH = clamp(dot(view, normalize(view + light)), 0.0, 1.0);
     vec3 mirror = mix(vec3(outside_mirror(s, VoH, fresnel_dielectric(VoH, s.ior), 1.0)), metal_mirror(s, VoH), s.metallic);
-    float wide = square(max(s.roughness, ROUGHNESS_MIN_LIGHT)), alpha = square(s.roughness);
-    vec3 specular = mirror * (D_GGX(NoH, dot(across, across), wide) * V_SmithGGXCorrelated(NoV, NoL, wide));
-    float loss = facets_lost(stretched_cosine(NoL, alpha), alpha);
-    return spread_out(s, parts, NoL, alpha, loss) * over_scattered(s, parts, light) +
+    vec3 specular = mirror * facets_mirror(s, max(s.roughness, ROUGHNESS_MIN_LIGHT), view, NoV, light, NoL);
+    float loss = facets_lost_from(s, light, NoL);
+    return spread_out(s, parts, NoL, facets_alpha(s), loss) * over_scattered(s, parts, light) +
            specular * over_mirrored(s, parts, light) + sheen_sent(s, parts, view, NoV, light);
 }
 

@@ -106,7 +106,7 @@ shadow_choice choose_shadow_ray(eye_hit e, vec2 u)
     float all_;
     c.light_number = light_choose(receiver, frame.light_count, c.u.x, c.light_chance, all_);
 #ifdef TWO_WAYS
-    bool mirrors = facets_are_rough(e.s) && last_wave == 0u &&
+    bool mirrors = lobes_are_rough(e.s) && last_wave == 0u &&
                    (e.p.flags & PATH_BOUNCES_MASK) < frame.depth;
     float mirrored = mirrors ? max_component(e.parts.mirror + e.parts.again) : 0.0;
 #ifdef HAS_CLEARCOAT

@@ -311,19 +311,7 @@ void main()
     e.all_lights = 0.0;
     e.lights_chance = 1.0;
     float NoV = clamp(dot(e.s.normal, view), 1e-4, 1.0); // a shading normal may lean away
-    vec3 along, across;
-    float anisotropy = 0.0;
-#ifdef HAS_ANISOTROPY
-    material m = material_at(h.material & HIT_MATERIAL_MASK);
-    anisotropy = m.anisotropy;
-#ifdef HAS_ANISOTROPY_MAP
-    anisotropy *= e.s.grain.z;
-#endif
-    along = grain_of(h, e.s, m);
-#else
-    tangent_frame(e.s.normal, along, across);
-#endif
-    e.b = bsdf_of(e.s, view, NoV, along, anisotropy);
+    e.b = bsdf_of(e.s, view, NoV);
     e.receiver = light_receiver_of(e.s, e.b.parts, e.origin, view, NoV);
     float choice = sequence_number(seed, numbers_of(SEQUENCE_PATH_LOBE), index);
     bool straight = choice >= e.s.alpha;

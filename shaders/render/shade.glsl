@@ -9,6 +9,7 @@
 #include "common/camera.glsl"
 #include "common/cone.glsl"
 #include "common/dispatch.glsl"
+#include "common/grain.glsl"
 #include "common/material.glsl"
 #include "common/sequence.glsl"
 
@@ -112,7 +113,7 @@ vec2 cone_sent_on(vec2 cone, surface s, vec3 direction, float solid_angle)
 // The directions that the surface's roughness spreads a mirrored or refracted ray over, steradians. A smooth one: 0.
 float rough_solid_angle(surface s, vec3 direction)
 {
-    return lobe_solid_angle(square(s.roughness), turn_of(s, dot(direction, s.geometric) > 0.0));
+    return lobe_solid_angle(facets_alpha(s), turn_of(s, dot(direction, s.geometric) > 0.0));
 }
 
 // Of the directions that one of the pixel's samples stands for, if it was chosen with a density of 1 / `solid_angle`.

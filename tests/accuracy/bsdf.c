@@ -391,7 +391,7 @@ TEST(reflectance_is_the_same_both_ways)
     assert_true(off < 1e-3); /* slopes of facets are differences of directions: their roundings by alpha of 0.04 */
 }
 
-TEST(without_a_grain_ggx_is_that_of_the_other_integrators)
+TEST(ggx_is_that_of_the_other_integrators)
 {
     struct bsdf_probe *probes = *state;
     double off = 0.0;
@@ -400,17 +400,18 @@ TEST(without_a_grain_ggx_is_that_of_the_other_integrators)
     ask_directions(&probes[GGX]);
     ask_directions(&probes[COATED]);
     for (size_t r = 0; r < COUNT(roughnesses); r++)
-        for (int metal = 0; metal < 3; metal++) /* the last: coated */
+        for (int kind = 0; kind < 5; kind++) /* plastic and metal, both along a grain; coated plastic */
             for (size_t v = 0; v < COUNT(cosines); v++) {
                 struct bsdf_case c = {.roughness = roughnesses[r],
-                                      .metallic = (float)(metal % 2),
+                                      .metallic = (float)(kind % 2),
                                       .ior = 1.5f,
                                       .base = 0.7f,
+                                      .anisotropy = kind / 2 == 1 ? 0.6f : 0.0f,
                                       .coat = 0.5f,
                                       .coat_roughness = 0.4f,
                                       .coat_turn = 0.3f};
                 look_from(&c, cosines[v]);
-                struct bsdf_probe *probe = &probes[metal == 2 ? COATED : GGX];
+                struct bsdf_probe *probe = &probes[kind == 4 ? COATED : GGX];
                 bsdf_probe_run(probe, &c, false, DIRECTIONS, answers);
                 for (int i = 0; i < DIRECTIONS; i++)
                     off = fmax(off, fabs((double)(answers[i].sent - answers[i].of)) /

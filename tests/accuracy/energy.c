@@ -11,10 +11,9 @@ static const struct way {
     const char *name;
     unsigned integrator, brdf;
 } ways[] = {
-    {"path, ggx", INTEGRATOR_PATH, BRDF_GGX},
-    {"path, ward", INTEGRATOR_PATH, BRDF_WARD},
-    {"distributed", INTEGRATOR_DISTRIBUTED, BRDF_GGX},
-    {"whitted", INTEGRATOR_WHITTED, BRDF_GGX},
+    {"path, ggx", INTEGRATOR_PATH, BRDF_GGX},          {"path, ward", INTEGRATOR_PATH, BRDF_WARD},
+    {"distributed", INTEGRATOR_DISTRIBUTED, BRDF_GGX}, {"whitted", INTEGRATOR_WHITTED, BRDF_GGX},
+    {"raycast", INTEGRATOR_RAYCAST, BRDF_GGX},
 };
 
 static const struct kind {
@@ -25,6 +24,7 @@ static const struct kind {
                               higher */
     bool film;
     float coat; /* over it, as rough as it is on the other half of the scale */
+    float grain;
 } kinds[] = {
     {.name = "metal", .metallic = 1.0f},
     {.name = "varnish"},
@@ -38,6 +38,15 @@ static const struct kind coated[] = {
     {.name = "coated metal", .metallic = 1.0f, .coat = 1.0f},
     {.name = "coated body", .coat = 1.0f},
 };
+static const struct kind brushed[] = {
+    {.name = "brushed metal", .metallic = 1.0f, .grain = 0.6f},
+    {.name = "brushed body", .grain = 0.6f},
+};
+
+static bool is_random(const struct way *way)
+{
+    return way->integrator != INTEGRATOR_WHITTED && way->integrator != INTEGRATOR_RAYCAST;
+}
 
 /* Seen from where a ball fills the picture but for its corners; a pane slants. */
 static struct scene_material *a_thing(struct fixture *fixture, const struct kind *kind, float roughness)
@@ -55,6 +64,8 @@ static struct scene_material *a_thing(struct fixture *fixture, const struct kind
     material->iridescence = kind->film ? 1.0f : 0.0f;
     material->iridescence_ior = 1.8f;
     material->iridescence_maximum_nm = 400.0f;
+    material->anisotropy = kind->grain;
+    material->anisotropy_rotation = 0.5f;
     material->clearcoat = kind->coat;
     material->clearcoat_roughness = fmodf(roughness + 0.5f, 1.0f);
     if (kind->pane) {
@@ -73,7 +84,7 @@ static struct scene_material *a_thing(struct fixture *fixture, const struct kind
  * wall keeps some paths for more than 32 bounces. So much for 0.98. What is above 1 is noise: blocks have 128
  * samples of which few are above 1.5, and fits are too high by 1e-3 at most. */
 static void expect_furnace(struct fixture *fixture, const struct way *way, const struct kind *kind,
-                           float roughness)
+                           float roughness, double least)
 {
     enum { BLOCKS = PIXELS / 16 };
     path_begin(fixture, TRACER_REFERENCE, 32);
@@ -81,7 +92,8 @@ static void expect_furnace(struct fixture *fixture, const struct way *way, const
     fixture_environment(fixture, 1.0f, 1.0f, 1.0f);
     fixture->request.integrator = way->integrator;
     fixture->request.brdf = way->brdf;
-    fixture->request.samples = way->integrator == INTEGRATOR_WHITTED ? 1 : 8;
+    fixture->request.layer_opacity = 1.0f; /* raycast shows what it meets first, as the others */
+    fixture->request.samples = is_random(way) ? 8 : 1;
     struct frame_result result = fixture_render(fixture);
     double blocks[BLOCKS] = {0}, minimum = INFINITY;
     for (uint32_t i = 0; i < PIXELS; i++)
@@ -95,7 +107,7 @@ static void expect_furnace(struct fixture *fixture, const struct way *way, const
     print_message("%-11s %-13s roughness %.1f: mean %.4f (standard error %.4f), minimum %.3f\n", way->name,
                   kind->name, (double)roughness, mean.value, mean.error, minimum);
     assert_true(mean.value < 1.0 + 1e-3 + 5.0 * mean.error);
-    assert_true(mean.value > 0.98 - 5.0 * mean.error);
+    assert_true(mean.value > least - 5.0 * mean.error);
     assert_true(mean.error < 4e-3); /* else nothing is shown */
     frame_result_finish(&result);
 }
@@ -106,14 +118,14 @@ TEST(white_things_vanish_in_a_furnace_at_any_roughness)
     for (size_t w = 0; w < COUNT(ways); w++)
         for (size_t k = 0; k < COUNT(kinds); k++)
             for (int tenths = 0; tenths <= 10; tenths++)
-                expect_furnace(fixture, &ways[w], &kinds[k], 0.1f * (float)tenths);
+                expect_furnace(fixture, &ways[w], &kinds[k], 0.1f * (float)tenths, 0.98);
 }
 
 TEST(other_mirrors_of_varnish_keep_all_light_too)
 {
     for (size_t w = 0; w < COUNT(ways); w++)
         for (int fifths = 0; fifths <= 5; fifths += 2)
-            expect_furnace(*state, &ways[w], &other_varnish, 0.2f * (float)fifths);
+            expect_furnace(*state, &ways[w], &other_varnish, 0.2f * (float)fifths, 0.98);
 }
 
 /* Coats over rough metal lose up to 0.045 at an angle, see common/coat.glsl, and less on average. */
@@ -122,7 +134,24 @@ TEST(coats_keep_the_light)
     for (size_t w = 0; w < COUNT(ways); w++)
         for (size_t k = 0; k < COUNT(coated); k++)
             for (int fifths = 0; fifths <= 5; fifths += 2)
-                expect_furnace(*state, &ways[w], &coated[k], 0.2f * (float)fifths);
+                expect_furnace(*state, &ways[w], &coated[k], 0.2f * (float)fifths, 0.98);
+}
+
+/* Of facets along a grain fits for facets without one are off by up to 0.05 (shaders/common/grain.glsl). */
+TEST(brushed_things_make_no_light_and_lose_little)
+{
+    for (size_t w = 0; w < COUNT(ways); w++)
+        for (size_t k = 0; k < COUNT(brushed); k++)
+            for (int fifths = 0; fifths <= 5; fifths += 2)
+                expect_furnace(*state, &ways[w], &brushed[k], 0.2f * (float)fifths, 0.95);
+}
+
+/* A film over a white body keeps all light, as what it does not mirror enters. */
+TEST(films_keep_the_light)
+{
+    for (size_t w = 0; w < COUNT(ways); w++)
+        for (int fifths = 0; fifths <= 5; fifths += 2)
+            expect_furnace(*state, &ways[w], &with_film, 0.2f * (float)fifths, 0.98);
 }
 
 /* ---- the same in all integrators ---- */
@@ -131,7 +160,8 @@ static struct mean mean_by(struct fixture *fixture, const struct way *way, uint3
 {
     fixture->request.integrator = way->integrator;
     fixture->request.brdf = way->brdf;
-    fixture->request.samples = way->integrator == INTEGRATOR_WHITTED ? 4 : samples;
+    fixture->request.layer_opacity = 1.0f;
+    fixture->request.samples = is_random(way) ? samples : 4;
     fixture->request.seed = way->integrator;
     struct frame_result result = fixture_render(fixture);
     double blocks[16] = {0};
@@ -146,7 +176,8 @@ static struct mean mean_by(struct fixture *fixture, const struct way *way, uint3
 TEST(lamps_light_rough_things_alike_in_all_integrators)
 {
     struct fixture *fixture = *state;
-    const struct kind *const compared[] = {&kinds[0], &kinds[1], &other_varnish, &coated[1], &with_film};
+    const struct kind *const compared[] = {&kinds[0],  &kinds[1],   &other_varnish, &coated[1],
+                                           &with_film, &brushed[0], &brushed[1]};
     for (size_t k = 0; k < COUNT(compared); k++)
         for (int step = 0; step < 3; step++) {
             double means[COUNT(ways)] = {0};
@@ -158,10 +189,11 @@ TEST(lamps_light_rough_things_alike_in_all_integrators)
             for (size_t w = 0; w < COUNT(ways); w++)
                 if (ways[w].brdf == BRDF_GGX)
                     means[w] = mean_by(fixture, &ways[w], 64).value;
-            print_message("%s, roughness %.1f: path %.4f, distributed %.4f, whitted %.4f\n", compared[k]->name,
-                          0.4 + 0.3 * step, means[0], means[2], means[3]);
-            assert_near(means[0], means[3], 0.005 * means[3]);
-            assert_near(means[2], means[3], 0.005 * means[3]);
+            print_message("%s, roughness %.1f: path %.4f, distributed %.4f, whitted %.4f, raycast %.4f\n",
+                          compared[k]->name, 0.4 + 0.3 * step, means[0], means[2], means[3], means[4]);
+            for (int w = 0; w < (int)COUNT(ways); w++)
+                if (ways[w].brdf == BRDF_GGX)
+                    assert_near(means[w], means[3], 0.005 * means[3]);
         }
 }
 
@@ -186,12 +218,16 @@ static void a_bright_sky(struct fixture *fixture)
 TEST(a_sky_lights_rough_things_alike_in_all_integrators)
 {
     struct fixture *fixture = *state;
-    static const double off[COUNT(kinds)][2] = {{0.01, 0.1}, {0.01, 0.1}, {0.02, 0.0}};
-    for (size_t k = 0; k < 3; k++)
+    static const struct {
+        const struct kind *kind;
+        double off[2];
+    } compared[] = {
+        {&kinds[0], {0.01, 0.1}}, {&kinds[1], {0.01, 0.1}}, {&kinds[2], {0.02, 0.0}}, {&brushed[0], {0.03, 0.1}}};
+    for (size_t k = 0; k < COUNT(compared); k++)
         for (int step = 0; step < 3; step++) {
             struct mean means[COUNT(ways)] = {0};
             path_begin(fixture, TRACER_REFERENCE, 16);
-            struct scene_material *material = a_thing(fixture, &kinds[k], 0.2f + 0.4f * (float)step);
+            struct scene_material *material = a_thing(fixture, compared[k].kind, 0.2f + 0.4f * (float)step);
             material->base_colour[1] = 0.8f;
             fixture_look(fixture, 0.0f, 1.0f, 3.0f, 0.6f);
             a_bright_sky(fixture);
@@ -199,10 +235,10 @@ TEST(a_sky_lights_rough_things_alike_in_all_integrators)
                 if (ways[w].brdf == BRDF_GGX)
                     means[w] = mean_by(fixture, &ways[w], 256);
             double path = means[0].value;
-            print_message("%s, roughness %.1f: path %.4f, distributed %.4f, whitted %.4f\n", kinds[k].name,
-                          0.2 + 0.4 * step, path, means[2].value, means[3].value);
-            assert_near(means[2].value, path, off[k][0] * path);
-            if (off[k][1] > 0.0)
-                assert_near(means[3].value, path, off[k][1] * path);
+            print_message("%s, roughness %.1f: path %.4f, distributed %.4f, whitted %.4f\n",
+                          compared[k].kind->name, 0.2 + 0.4 * step, path, means[2].value, means[3].value);
+            assert_near(means[2].value, path, compared[k].off[0] * path);
+            if (compared[k].off[1] > 0.0)
+                assert_near(means[3].value, path, compared[k].off[1] * path);
         }
 }

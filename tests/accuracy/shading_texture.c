@@ -160,15 +160,14 @@ TEST(the_environment_turns_about_y_for_the_eye_and_for_surfaces_alike)
 
 /* KHR_materials_anisotropy: red and green are a direction about the tangent, blue a share of the strength; the
  * same as a rotation and a strength of the material, with the same random numbers. */
-TEST(a_texture_turns_the_grain_and_weakens_it)
+static void expect_turned_grain(struct fixture *fixture, unsigned integrator)
 {
-    struct fixture *fixture = *state;
     static const uint8_t texel[4] = {64, 224, 128, 255};
     const double x = 2.0 * 64 / 255 - 1.0, y = 2.0 * 224 / 255 - 1.0;
     float seen[3][32 * 32];
     double brightest = 0.0, unlike = 0.0;
     for (int way = 0; way < 3; way++) { /* by a texture; by numbers; without a texture's turn */
-        fixture_clear(state);
+        fixture_clear((void **)&fixture);
         struct scene_material *brushed = fixture_material(fixture);
         brushed->metallic = 1.0f;
         brushed->roughness = 0.3f;
@@ -178,7 +177,7 @@ TEST(a_texture_turns_the_grain_and_weakens_it)
             brushed->textures[MATERIAL_ANISOTROPY] = one_texture(fixture, 1, 1, texel, 1.0f);
         fixture_square(fixture, 10.0f, brushed->base.id, NULL);
         light_from(fixture, 0.3f, 0.1f);
-        fixture->request.integrator = INTEGRATOR_PATH;
+        fixture->request.integrator = integrator;
         fixture->request.depth = 1;
         struct frame_result result = fixture_render(fixture);
         for (uint32_t i = 0; i < 32 * 32; i++)
@@ -192,4 +191,12 @@ TEST(a_texture_turns_the_grain_and_weakens_it)
     for (int i = 0; i < 32 * 32; i++)
         assert_near(seen[0][i], seen[1][i], 1e-4 * brightest);
     assert_true(unlike > 0.1 * brightest); /* else nothing is shown */
+}
+
+TEST(a_texture_turns_the_grain_and_weakens_it)
+{
+    static const unsigned integrators[] = {INTEGRATOR_PATH, INTEGRATOR_DISTRIBUTED, INTEGRATOR_WHITTED,
+                                           INTEGRATOR_RAYCAST};
+    for (size_t i = 0; i < sizeof(integrators) / sizeof(integrators[0]); i++)
+        expect_turned_grain(*state, integrators[i]);
 }

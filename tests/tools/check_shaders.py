@@ -60,7 +60,8 @@ CHOICES = {
     "svo/voxelise.frag": [[{"PRIMITIVE_KIND": "0"}, {"PRIMITIVE_KIND": "1", "HAS_SPHERES": "1"}]],
 }
 # Defines that come only with others.
-WITH = {"BVH_DEFORMS_IN_SHUTTER": ("BVH_DEFORMS", "HAS_MOTION"), "BVH_RESUMES": ("BVH_BUDGET",)}
+WITH = {"BVH_DEFORMS_IN_SHUTTER": ("BVH_DEFORMS", "HAS_MOTION"), "BVH_RESUMES": ("BVH_BUDGET",),
+        "HAS_ANISOTROPY_MAP": ("HAS_ANISOTROPY",)}
 # Defines that never come with others: tracers that know the scene as the shutter opens refuse rays with times.
 WITHOUT = {tracer: ("HAS_MOTION",) for tracer in ("TRACER_LDC", "TRACER_ABUFFER", "TRACER_QUADTREE", "TRACER_SVO")}
 # Of a sample a pixel, without a lens and other layers of the picture.

@@ -124,8 +124,6 @@ static size_t path_defines(const struct render_context *context, struct gpu_defi
         defines[n++] = (struct gpu_define){"HAS_ENVIRONMENT_IMAGE", "1"};
     if (context->environment_choice->rows > 0)
         defines[n++] = (struct gpu_define){"HAS_ENVIRONMENT_TABLE", "1"};
-    if (context->features.anisotropy)
-        defines[n++] = (struct gpu_define){"HAS_ANISOTROPY", "1"};
     if (context->request.brdf == BRDF_WARD)
         defines[n++] = (struct gpu_define){"WARD", "1"};
     return n;

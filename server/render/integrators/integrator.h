@@ -5,7 +5,7 @@
 
 #include "render/context.h"
 
-#define INTEGRATOR_DEFINES_MAX 9
+#define INTEGRATOR_DEFINES_MAX 7
 
 struct integrator {
     const char *name;

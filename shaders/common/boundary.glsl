@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: MIT
+// What one facet, or a boundary that is smooth, mirrors, and how it bends what it lets through: dielectrics by Fresnel's
+// equations, metals by Schlick's approximation, each as KHR_materials_specular, _iridescence and _dispersion change it.
+//
+// Defines: those of common/material.glsl.
+
+#include "common/brdf.glsl"
+#include "common/facet_albedo.glsl"
+#include "common/film.glsl"
+#include "common/material.glsl"
+
+// What a dielectric does with light from outside: SHARE is a colour if some mirror has one.
+#if defined(HAS_SPECULAR) || defined(HAS_IRIDESCENCE) || defined(HAS_DISPERSION)
+#define SHARE vec3
+#else
+#define SHARE float
+#endif
+
+// `exact`: what the equations say that facets mirror; `all_`: what they would if they mirrored all light.
+SHARE without_film(surface s, float exact, float all_)
+{
+#ifdef HAS_SPECULAR
+    // KHR_materials_specular: Fresnel's curve from its value at normal incidence up to 1 begins at another one, of a
+    // colour, and all of it is less. As the change is the same line at every angle, it holds for means over facets and
+    // angles, too.
+    float f0 = square((s.ior - 1.0) / (s.ior + 1.0));
+    vec3 begins = min(f0 * s.specular_colour, 1.0);
+    return s.specular * (begins * all_ + (1.0 - begins) * max((exact - f0 * all_) / (1.0 - f0), 0.0));
+#else
+    return SHARE(exact);
+#endif
+}
+
+// What a facet of a dielectric mirrors of light from outside, or facets of which it is the mean one.
+SHARE outside_mirror(surface s, float cosine, float exact, float all_)
+{
+    SHARE mirrored = without_film(s, exact, all_);
+#ifdef HAS_IRIDESCENCE
+    mirrored = mix(mirrored, film_of(s, cosine) * all_, s.film);
+#endif
+    return mirrored;
+}
+
+// What facets mirror at the first go. `mean`: facets_cosine().
+SHARE facets_outside_mirror(surface s, float mean, float loss, float alpha)
+{
+    float cosine = facets_dielectric_cosine(mean, alpha, s.ior), all_ = 1.0 - loss;
+    float exact = fresnel_dielectric(cosine, s.ior) * all_;
+    // A film's curve bends more, so facets at the horizon count for more; found by trial, so that no light is made.
+    return outside_mirror(s, cosine * (1.0 - 0.3 * alpha * (1.0 - mean)), exact, all_);
+}
+
+// What a facet of a metal mirrors.
+vec3 metal_mirror(surface s, float cosine)
+{
+    vec3 mirrored = fresnel_schlick(s.base, cosine);
+#ifdef HAS_IRIDESCENCE
+    mirrored = mix(mirrored, film_of(s, cosine), s.film);
+#endif
+    return mirrored;
+}
+
+// The direction of what a facet refracts; 0: it is totally reflected. In a thin wall facets of both sides bend it: it is
+// the mirrored direction on the other side (KHR_materials_transmission).
+vec3 bent_direction(surface s, float eta, vec3 direction, vec3 facet, vec3 normal)
+{
+#ifdef HAS_THIN_WALLS
+    if (is_thin(s)) {
+        vec3 mirrored = reflect(direction, facet);
+        float height = dot(mirrored, normal);
+        return mirrored - (height + abs(height)) * normal;
+    }
+#endif
+    return refract(direction, facet, 1.0 / eta);
+}
+
+// The share that a boundary mirrors of light from inside of glass.
+SHARE inside_mirror(surface s, float cosine)
+{
+#ifdef HAS_DISPERSION
+    vec3 ior = channel_iors(s);
+    return vec3(fresnel_dielectric(cosine, 1.0 / ior.r), fresnel_dielectric(cosine, 1.0 / ior.g),
+                fresnel_dielectric(cosine, 1.0 / ior.b));
+#else
+    return SHARE(fresnel_dielectric(cosine, 1.0 / s.ior));
+#endif
+}
+
+// Glass that disperses sends on one colour of what it lets through, bent as that one is, with a chance in proportion to
+// what the path would bring of it. `number` chooses it and comes back stretched; `window` becomes its share by its chance.
+// Returns the index behind / before.
+float disperse(surface s, inout float number, inout vec3 window)
+{
+    float eta = index_ratio(s);
+#ifdef HAS_DISPERSION
+    vec3 sizes = window * s.carried, iors = channel_iors(s);
+    float all_ = sizes.r + sizes.g + sizes.b;
+    if (s.dispersion <= 0.0 || is_thin(s) || !(all_ > 0.0))
+        return eta;
+    int chosen = number * all_ < sizes.r ? 0 : number * all_ < sizes.r + sizes.g ? 1 : 2;
+    float before = chosen == 0 ? 0.0 : chosen == 1 ? sizes.r : sizes.r + sizes.g;
+    float chance = sizes[chosen] / all_, kept = window[chosen] / chance;
+    number = clamp((number - before / all_) / chance, 0.0, 0.99999994);
+    window = vec3(0.0);
+    window[chosen] = kept;
+    eta = s.inside ? 1.0 / iors[chosen] : iors[chosen];
+#endif
+    return eta;
+}
