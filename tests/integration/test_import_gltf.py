@@ -148,7 +148,7 @@ class Model:
         return len(self.json["accessors"]) - 1
 
     def floats(self, kind, values):
-        width = {"SCALAR": 1, "VEC3": 3, "VEC4": 4}[kind]
+        width = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}[kind]
         flat = [number for value in values for number in (value if width > 1 else (value,))]
         return self.accessor(self.view(struct.pack("<%df" % len(flat), *flat)), kind, FLOAT, len(values))
 
@@ -578,6 +578,22 @@ class Materials(Gltf):
         result = self.import_text("model.glb", model.binary())
         texture, = result.of(SET_TEXTURE)
         return result.data(texture["arrays"][0]), result.text()
+
+    def test_a_texture_uses_the_coordinates_that_the_material_says(self):
+        """One of two sets, that of the transform before that of the texture; a third one is told and is the first."""
+        model = Model().cube()
+        model.primitive["material"] = 0
+        for number in (0, 1):
+            model.primitive["attributes"][f"TEXCOORD_{number}"] = model.floats("VEC2", [(number, 0.25)] * 8)
+        model.json.update(textures=[{"source": 0}], images=[{"bufferView": model.view(WEBP), "mimeType": "image/webp"}],
+                          materials=[{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0, "texCoord": 1}},
+                                      "occlusionTexture": {"index": 0, "texCoord": 2},
+                                      "emissiveTexture": {"index": 0, "extensions": {"KHR_texture_transform": {"texCoord": 1}}}}])
+        result = self.import_text("model.glb", model.binary())
+        (material,), (mesh,) = result.of(SET_MATERIAL), result.of(SET_MESH)
+        self.assertEqual([material["textures"][at]["texcoord"] for at in (0, 3, 4)], [1, 0, 1])
+        self.assertEqual([result.floats(mesh["arrays"][at]) for at in (4, 5)], [[0, 0.25] * 8, [1, 0.25] * 8])
+        self.assertIn("texture coordinate set 2 is not read", result.text())
 
     def test_every_kind_of_png_becomes_four_bytes_a_texel(self):
         """Two texels. 16 bits are rounded: 0x0180 is 1.494 of 255, 0x0182 is 1.502."""
