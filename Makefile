@@ -344,7 +344,7 @@ EQUAL_TIME_PACKAGES := $(FIDELITY_PACKAGES) blender
 DEB_PACKAGES := debhelper dpkg-dev fakeroot lintian xz-utils git
 FARM_PACKAGES := slurm-wlm nodejs python3-yaml
 
-.PHONY: tests build-packages test-packages stack-packages sync-packages lint-packages analyze-packages coverage-packages fuzz-packages fidelity-packages equal-time-packages farm-packages deb-packages test test-long test-zink check-sync demo bench fidelity equal-time soak farm-drill farm-test siege bench-plot check-headers check-rules lint check analyze coverage format install uninstall dist deb clean distclean help
+.PHONY: tests build-packages test-packages stack-packages sync-packages lint-packages analyze-packages coverage-packages fuzz-packages fidelity-packages equal-time-packages farm-packages deb-packages test test-long test-zink check-sync demo bench fidelity equal-time soak farm-drill farm-test siege bench-plot check-headers check-rules lint check analyze coverage format install uninstall dist deb deb-test clean distclean help
 tests: $(TEST_PROGRAMS) $(CONTRACT) $(BENCH_PROGRAM) $(SHAPED_LINK) $(B)/tests/tools/make_scenes $(B)/tests/tools/pose_dump $(LOSING_DAEMON)
 
 build-packages:
@@ -502,8 +502,8 @@ install: all
 	install -m 644 README.md CHANGELOG.md SECURITY.md LICENSE $(B)/protocol.md $(DESTDIR)$(PREFIX)/share/doc/farlight
 	install -m 644 conf/examples/* $(DESTDIR)$(PREFIX)/share/doc/farlight/examples
 	install -d $(DESTDIR)$(PREFIX)/share/farlight/farm
-	install -m 644 $(addprefix conf/farm/,README.md slurm.sbatch openjd.yaml flamenco.js) $(DESTDIR)$(PREFIX)/share/farlight/farm
-	install -m 755 conf/farm/xargs.sh $(DESTDIR)$(PREFIX)/share/farlight/farm
+	install -m 644 $(addprefix conf/farm/,README.md openjd.yaml flamenco.js) $(DESTDIR)$(PREFIX)/share/farlight/farm
+	install -m 755 conf/farm/xargs.sh conf/farm/slurm.sbatch $(DESTDIR)$(PREFIX)/share/farlight/farm
 	install -m 755 conf/farm/farlight-node $(DESTDIR)$(PREFIX)/bin
 	install -m 644 conf/farlightd.conf $(DESTDIR)/etc/farlight
 	sed 's#/usr/local/bin#$(PREFIX)/bin#' conf/farlightd.service >$(DESTDIR)$(UNITDIR)/farlightd.service
@@ -541,6 +541,12 @@ deb: deb-packages
 	cd $(DEB) && SOURCE_DATE_EPOCH=$(SOURCE_DATE_EPOCH) dpkg-buildpackage -b -us -uc
 	mv build/deb/*.deb build/deb/*.buildinfo build/deb/*.changes out/deb
 	lintian --fail-on error,warning out/deb/*.changes
+# On a clean Debian 12: install, render as the service does, remove without a trace. Needs root and Debian's archive.
+deb-test: deb
+	@tests/tools/install_packages.sh debootstrap
+	$(MAKE) $(B)/tests/tools/make_scenes
+	mkdir -p build/deb-scenes && $(B)/tests/tools/make_scenes build/deb-scenes
+	tests/packages/clean_install.sh build/deb-scenes
 # What was rendered and measured stays.
 clean:
 	rm -rf build compile_commands.json
@@ -559,6 +565,7 @@ help:
 	@echo 'make soak       use one daemon for some minutes, and see that its memory stays flat   [ROUNDS=1000]'
 	@echo 'make farm-drill kill the daemon or the client of animations at random, and see that no frame is lost   [ROUNDS=1000 SEED=]'
 	@echo 'make deb        build Debian packages into out/deb; make dist: an archive of the sources'
+	@echo 'make deb-test   build them, install them on a clean Debian, render there, and remove them'
 	@echo 'make farm-test  try the templates of conf/farm on Slurm and what stands in for other queues'
 	@echo 'make siege      attack a daemon as one user, and see that another one does not notice   [ATTACKS="stats pings"]'
 	@echo 'make bench-plot draw the scaling curves into out/, as SVG and PNG'

@@ -13,5 +13,5 @@ sed -i "s/@BUILD_PACKAGES@/$(echo "$*" | sed 's/ /, /g')/" "$debian/control"
 sed -n '5,$p' "$tree/LICENSE" | sed 's/^$/./; s/^/ /' >"$debian/licence"
 sed -i -e "/@LICENSE@/{r $debian/licence" -e 'd;}' "$debian/copyright"
 rm "$debian/licence"
-printf 'farlight (%s) unstable; urgency=medium\n\n  * See CHANGELOG.md in the package farlight-doc.\n\n -- farlight <farlight@localhost>  %s\n' \
+printf 'farlight (%s) unstable; urgency=medium\n\n  * See changes.md in the package farlight-doc.\n\n -- The farlight authors <maintainers@farlight.example>  %s\n' \
     "$version" "$date" >"$debian/changelog"
