@@ -7,6 +7,9 @@ config ?= release
 B := build/$(config)
 VERSION := $(shell sed -n 's/^.define FARLIGHT_VERSION "\(.*\)"/\1/p' protocol/version.h)
 PREFIX ?= /usr/local
+# Where packages want the library and systemd's units.
+LIBDIR ?= $(PREFIX)/lib
+UNITDIR ?= $(PREFIX)/lib/systemd/system
 DESTDIR ?=
 PKG_CONFIG ?= pkg-config
 # Make's own defaults are cc and g++; what the user says wins.
@@ -338,9 +341,10 @@ FUZZ_PACKAGES := clang libclang-rt-14-dev
 # These come for Debian's own python3.
 FIDELITY_PACKAGES := python3-openimageio python3-numpy
 EQUAL_TIME_PACKAGES := $(FIDELITY_PACKAGES) blender
+DEB_PACKAGES := debhelper dpkg-dev fakeroot lintian xz-utils git
 FARM_PACKAGES := slurm-wlm nodejs python3-yaml
 
-.PHONY: tests build-packages test-packages stack-packages sync-packages lint-packages analyze-packages coverage-packages fuzz-packages fidelity-packages equal-time-packages farm-packages test test-long test-zink check-sync demo bench fidelity equal-time soak farm-drill farm-test siege bench-plot check-headers check-rules lint check analyze coverage format install uninstall clean distclean help
+.PHONY: tests build-packages test-packages stack-packages sync-packages lint-packages analyze-packages coverage-packages fuzz-packages fidelity-packages equal-time-packages farm-packages deb-packages test test-long test-zink check-sync demo bench fidelity equal-time soak farm-drill farm-test siege bench-plot check-headers check-rules lint check analyze coverage format install uninstall dist deb deb-test clean distclean help
 tests: $(TEST_PROGRAMS) $(CONTRACT) $(BENCH_PROGRAM) $(SHAPED_LINK) $(B)/tests/tools/make_scenes $(B)/tests/tools/pose_dump $(LOSING_DAEMON)
 
 build-packages:
@@ -361,6 +365,8 @@ fuzz-packages:
 	@tests/tools/install_packages.sh $(BUILD_PACKAGES) $(FUZZ_PACKAGES)
 fidelity-packages:
 	@tests/tools/install_packages.sh $(BUILD_PACKAGES) $(FIDELITY_PACKAGES)
+deb-packages:
+	@tests/tools/install_packages.sh $(BUILD_PACKAGES) $(DEB_PACKAGES)
 farm-packages: test-packages
 	@tests/tools/install_packages.sh $(FARM_PACKAGES)
 equal-time-packages:
@@ -473,20 +479,20 @@ install: all
 	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/share/farlight \
 	    $(addprefix $(DESTDIR)$(PREFIX)/share/man/man,1 5 7 8) \
 	    $(DESTDIR)$(PREFIX)/share/doc/farlight/examples $(DESTDIR)/etc/farlight \
-	    $(DESTDIR)$(PREFIX)/lib/systemd/system $(DESTDIR)$(PREFIX)/lib/sysusers.d
-	install -d $(DESTDIR)$(PREFIX)/lib/pkgconfig $(DESTDIR)$(PREFIX)/include/farlight/lib \
+	    $(DESTDIR)$(UNITDIR) $(DESTDIR)$(PREFIX)/lib/sysusers.d
+	install -d $(DESTDIR)$(LIBDIR)/pkgconfig $(DESTDIR)$(PREFIX)/include/farlight/lib \
 	    $(DESTDIR)$(PREFIX)/include/farlight/protocol $(DESTDIR)$(PREFIX)/include/farlight/warp \
 	    $(DESTDIR)$(PREFIX)/share/bash-completion/completions
 	install -m 755 $(PROGRAMS) $(DESTDIR)$(PREFIX)/bin
 	install -d $(DESTDIR)$(PREFIX)/lib/farlight
 	install -m 644 $(MODULES) $(DESTDIR)$(PREFIX)/lib/farlight
-	install -m 755 $(B)/$(SONAME) $(DESTDIR)$(PREFIX)/lib
-	ln -sf $(SONAME) $(DESTDIR)$(PREFIX)/lib/libfarlight.so
+	install -m 755 $(B)/$(SONAME) $(DESTDIR)$(LIBDIR)
+	ln -sf $(SONAME) $(DESTDIR)$(LIBDIR)/libfarlight.so
 	install -m 644 client/lib/farlight.h $(DESTDIR)$(PREFIX)/include/farlight/lib
 	install -m 644 client/warp/warp.h $(DESTDIR)$(PREFIX)/include/farlight/warp
 	install -m 644 $(addprefix protocol/,messages.h messages.def tracers.h tracers.def words.h words.def) $(DESTDIR)$(PREFIX)/include/farlight/protocol
-	sed 's#@PREFIX@#$(PREFIX)#; s#@VERSION@#$(VERSION)#' conf/farlight.pc.in \
-	    >$(DESTDIR)$(PREFIX)/lib/pkgconfig/farlight.pc
+	sed 's#@PREFIX@#$(PREFIX)#; s#@LIBDIR@#$(LIBDIR)#; s#@VERSION@#$(VERSION)#' conf/farlight.pc.in \
+	    >$(DESTDIR)$(LIBDIR)/pkgconfig/farlight.pc
 	install -m 644 client/cli/completion.bash $(DESTDIR)$(PREFIX)/share/bash-completion/completions/farlight
 	for name in $(filter-out farlight,$(notdir $(PROGRAMS))); do \
 	    ln -sf farlight $(DESTDIR)$(PREFIX)/share/bash-completion/completions/$$name; done
@@ -496,12 +502,12 @@ install: all
 	install -m 644 README.md CHANGELOG.md SECURITY.md LICENSE $(B)/protocol.md $(DESTDIR)$(PREFIX)/share/doc/farlight
 	install -m 644 conf/examples/* $(DESTDIR)$(PREFIX)/share/doc/farlight/examples
 	install -d $(DESTDIR)$(PREFIX)/share/farlight/farm
-	install -m 644 $(addprefix conf/farm/,README.md slurm.sbatch openjd.yaml flamenco.js) $(DESTDIR)$(PREFIX)/share/farlight/farm
-	install -m 755 conf/farm/xargs.sh $(DESTDIR)$(PREFIX)/share/farlight/farm
+	install -m 644 $(addprefix conf/farm/,README.md openjd.yaml flamenco.js) $(DESTDIR)$(PREFIX)/share/farlight/farm
+	install -m 755 conf/farm/xargs.sh conf/farm/slurm.sbatch $(DESTDIR)$(PREFIX)/share/farlight/farm
 	install -m 755 conf/farm/farlight-node $(DESTDIR)$(PREFIX)/bin
 	install -m 644 conf/farlightd.conf $(DESTDIR)/etc/farlight
-	sed 's#/usr/local/bin#$(PREFIX)/bin#' conf/farlightd.service >$(DESTDIR)$(PREFIX)/lib/systemd/system/farlightd.service
-	install -m 644 conf/farlightd.socket $(DESTDIR)$(PREFIX)/lib/systemd/system
+	sed 's#/usr/local/bin#$(PREFIX)/bin#' conf/farlightd.service >$(DESTDIR)$(UNITDIR)/farlightd.service
+	install -m 644 conf/farlightd.socket $(DESTDIR)$(UNITDIR)
 	install -m 644 conf/sysusers.conf $(DESTDIR)$(PREFIX)/lib/sysusers.d/farlight.conf
 
 uninstall:
@@ -510,13 +516,37 @@ uninstall:
 	rm -f $(addprefix $(DESTDIR)$(PREFIX)/share/man/man5/,$(notdir $(wildcard conf/man/*.5)))
 	rm -f $(addprefix $(DESTDIR)$(PREFIX)/share/man/man7/,$(notdir $(wildcard conf/man/*.7)))
 	rm -f $(addprefix $(DESTDIR)$(PREFIX)/share/man/man8/,$(notdir $(wildcard conf/man/*.8)))
-	rm -f $(DESTDIR)$(PREFIX)/lib/$(SONAME) $(DESTDIR)$(PREFIX)/lib/libfarlight.so \
-	    $(DESTDIR)$(PREFIX)/lib/pkgconfig/farlight.pc \
+	rm -f $(DESTDIR)$(LIBDIR)/$(SONAME) $(DESTDIR)$(LIBDIR)/libfarlight.so \
+	    $(DESTDIR)$(LIBDIR)/pkgconfig/farlight.pc \
 	    $(addprefix $(DESTDIR)$(PREFIX)/share/bash-completion/completions/,$(notdir $(PROGRAMS)))
-	rm -f $(addprefix $(DESTDIR)$(PREFIX)/lib/systemd/system/farlightd.,service socket) \
+	rm -f $(addprefix $(DESTDIR)$(UNITDIR)/farlightd.,service socket) \
 	    $(DESTDIR)$(PREFIX)/lib/sysusers.d/farlight.conf
 	rm -rf $(DESTDIR)$(PREFIX)/lib/farlight $(DESTDIR)$(PREFIX)/share/doc/farlight $(DESTDIR)$(PREFIX)/share/farlight $(DESTDIR)$(PREFIX)/include/farlight
 
+# ---- packages ----
+# From what is committed; the same commit gives the same bytes.
+SOURCE_DATE_EPOCH = $(shell git log -1 --format=%ct)
+DIST := out/farlight-$(VERSION).tar.xz
+dist:
+	@mkdir -p out
+	git archive --prefix=farlight-$(VERSION)/ HEAD | xz -T1 >$(DIST)
+	@echo '$(DIST)'
+# Debian packages into out/deb, checked by lintian.
+DEB := build/deb/farlight-$(VERSION)
+deb: deb-packages
+	rm -rf build/deb out/deb && mkdir -p $(DEB) out/deb
+	git archive HEAD | tar -x -C $(DEB)
+	conf/debian/prepare.sh $(DEB) $(VERSION) "$$(date -uRd @$(SOURCE_DATE_EPOCH))" \
+	    $(filter-out gcc g++ make fonts-% libegl1 libgl1-mesa-dri,$(BUILD_PACKAGES))
+	cd $(DEB) && SOURCE_DATE_EPOCH=$(SOURCE_DATE_EPOCH) dpkg-buildpackage -b -us -uc
+	mv build/deb/*.deb build/deb/*.buildinfo build/deb/*.changes out/deb
+	lintian --fail-on error,warning out/deb/*.changes
+# On a clean Debian 12: install, render as the service does, remove without a trace. Needs root and Debian's archive.
+deb-test: deb
+	@tests/tools/install_packages.sh debootstrap
+	$(MAKE) $(B)/tests/tools/make_scenes
+	mkdir -p build/deb-scenes && $(B)/tests/tools/make_scenes build/deb-scenes
+	tests/packages/clean_install.sh build/deb-scenes
 # What was rendered and measured stays.
 clean:
 	rm -rf build compile_commands.json
@@ -534,6 +564,8 @@ help:
 	@echo 'make equal-time measure noise over time beside Cycles, into out/equal-time   [ONLY=scene,scene OPTIONS="--denoise"]'
 	@echo 'make soak       use one daemon for some minutes, and see that its memory stays flat   [ROUNDS=1000]'
 	@echo 'make farm-drill kill the daemon or the client of animations at random, and see that no frame is lost   [ROUNDS=1000 SEED=]'
+	@echo 'make deb        build Debian packages into out/deb; make dist: an archive of the sources'
+	@echo 'make deb-test   build them, install them on a clean Debian, render there, and remove them'
 	@echo 'make farm-test  try the templates of conf/farm on Slurm and what stands in for other queues'
 	@echo 'make siege      attack a daemon as one user, and see that another one does not notice   [ATTACKS="stats pings"]'
 	@echo 'make bench-plot draw the scaling curves into out/, as SVG and PNG'
