@@ -12,6 +12,7 @@ import subprocess
 import sys
 import threading
 import time
+import unittest.mock
 
 import farlight_test
 from farlight_test import Case, Daemon, OneDaemon, bundled_scenes, frames_of, read_png
@@ -25,7 +26,7 @@ if not importlib.util.find_spec("numpy"):  # another python3 comes before Debian
     sys.path.append(DEBIANS)
 import numpy as np  # pylint: disable=wrong-import-position
 import farlight  # pylint: disable=wrong-import-position
-from farlight import errors, fields, framing, importer, messages  # pylint: disable=wrong-import-position
+from farlight import blobs, errors, fields, framing, importer, messages  # pylint: disable=wrong-import-position
 from farlight.core import Core  # pylint: disable=wrong-import-position
 
 GOLDEN = farlight_test.ROOT / "tests/unit/protocol/golden/messages.hex"
@@ -266,10 +267,38 @@ class Lies(Case):
                 self.assertLess(time.monotonic() - began, 10)
                 thread.join()
                 held[0].close()
+                thread = threading.Thread(target=lambda: (held.append(listener.accept()[0]), held[1].sendall(said)))
+                thread.start()
+                with self.assertRaises(farlight.TimedOut):
+                    asyncio.run(self.ask_async(f"unix:{path}"))
+                thread.join()
+                held[1].close()
+
+    @staticmethod
+    async def ask_async(address):
+        async with await farlight.aio.connect(address, timeout=0.3) as client:
+            await client.stats()
+
+    def test_a_program_that_cannot_start_says_why(self):
+        fake = self.folder / "farlightd"
+        fake.write_text("#!/bin/sh\necho 'no device gives OpenGL 4.5' >&2\nexit 1\n")
+        fake.chmod(0o755)
+        environment = {**os.environ, "FARLIGHT_LIBEXEC": str(self.folder)}
+        environment.pop("FARLIGHT_SERVER", None)
+        with unittest.mock.patch.dict(os.environ, environment, clear=True):
+            for connect in (farlight.connect, lambda: asyncio.run(farlight.aio.connect())):
+                with self.assertRaises(farlight.ConnectionLost) as raised:
+                    connect()
+                self.assertIn("farlightd ended with status 1: no device gives OpenGL 4.5", str(raised.exception))
+                self.assertFalse(raised.exception.retryable)
+        with unittest.mock.patch.dict(os.environ, {"FARLIGHT_LIBEXEC": "", "PATH": str(self.folder / "none")}):
+            with self.assertRaises(farlight.FileFailed) as raised:
+                farlight.load(__file__)
+            self.assertIn("FARLIGHT_LIBEXEC", raised.exception.remedy)
 
     def test_an_importer_is_believed_no_more_than_a_daemon(self):
         blob = bytes(12)
-        name = farlight.core.blob_hash(blob)
+        name = blobs.blob_hash(blob)
         reference = messages.BlobRef(12, name)
         offer = say(messages.BlobOffer([reference]), 1)
         for lie in (say(messages.Render(1, channel=2), 1), say(messages.Ok(), 1), say(messages.SceneOpen(2), 1), say(messages.SetNode(1), 3),
@@ -359,6 +388,7 @@ class WithDaemon(OneDaemon):
             guest.send(other, base_revision=revision)
         self.assertEqual(raised.exception.code, messages.ErrorCode.CONFLICT)
         self.assertEqual(guest.send(other), 3)
+        self.assertEqual((guest.changed(other), owner.read(scene, steel)[1], owner.changed(scene)), (2, 3, 3))
         self.assertEqual(owner.read(scene, steel)[0].base_colour, (1, 0, 0, 1))
 
     def test_a_refusal_names_the_field_and_ends_nothing_else(self):
@@ -511,6 +541,22 @@ class Faults(Case):
             self.assertEqual(numbers, [0, 1, 2, 3, 4, 5])
             process = client._link.process  # pylint: disable=protected-access
         self.assertEqual(process.poll(), 0)
+
+    def test_a_kept_scene_outlives_the_connection_and_is_not_sent_again(self):
+        with Daemon() as daemon, farlight.connect(daemon.address) as client:
+            scene, material = triangle()
+            kept = farlight.Scene("python-kept", "kept")
+            for edit in scene.edits_since(0):
+                for blob in getattr(edit, "arrays", ()):
+                    kept.blob(scene.blob_bytes(blob))
+                kept.set(edit)
+            before = client.render(kept, STRAIGHT, width=8, height=8)
+            client._link.socket.shutdown(socket.SHUT_RDWR)  # pylint: disable=protected-access
+            after = client.render(kept, STRAIGHT, width=8, height=8)
+            self.assertEqual((after.data, after.begin.revision), (before.data, before.begin.revision))
+            self.assertEqual(client._core._uploaded, 0)  # pylint: disable=protected-access
+            kept.change(material, roughness=0.7)
+            self.assertEqual(client.send(kept), 2)
 
     def test_a_client_that_was_idle_too_long_connects_again_by_itself(self):
         (self.folder / "conf").write_text("[network]\nidle = 1000\n")

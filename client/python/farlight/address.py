@@ -7,12 +7,14 @@ import re
 import shutil
 import socket
 import subprocess
+import tempfile
 from dataclasses import dataclass
-from typing import Optional
+from typing import IO, Optional
 
-from .errors import ConnectionLost, FileFailed, InvalidValue
+from .errors import ConnectionLost, Error, FileFailed, InvalidValue
 
 REMOTE_SOCKET = "/run/farlight/farlight.sock"
+TRY_AGAIN_STATUS, FIRST_SIGNAL_STATUS = 75, 128  # of our programs; ssh has 255
 
 
 @dataclass
@@ -20,10 +22,30 @@ class Link:
     """A connected socket, and the program that holds its other end, if we started one."""
     socket: socket.socket
     process: Optional["subprocess.Popen[bytes]"] = None
+    talk: Optional[IO[bytes]] = None  # what the program says
+
+    def last_words(self) -> tuple[str, bool]:
+        """How a program that has closed its end ended, with its last line; and whether it would do so again."""
+        if self.process is None:
+            return "", False
+        try:
+            status = self.process.wait(1)
+        except subprocess.TimeoutExpired:
+            return "", False
+        name = os.path.basename(str(self.process.args[0])) if isinstance(self.process.args, list) else "it"
+        words = f"{name} ended with status {status}" if status >= 0 else f"{name} was ended by signal {-status}"
+        line = b""
+        if self.talk is not None:
+            self.talk.seek(max(0, self.talk.seek(0, os.SEEK_END) - 2048))
+            line = (self.talk.read().strip().splitlines() or [b""])[-1][:400]
+        text = "".join(one if one.isprintable() else "?" for one in line.decode("utf-8", "replace"))
+        return f"{words}: {text}" if text else words, 0 < status < FIRST_SIGNAL_STATUS and status != TRY_AGAIN_STATUS
 
     def close(self) -> None:
         """Closes the socket, and sees that the program ends."""
         self.socket.close()
+        if self.talk is not None:
+            self.talk.close()
         if self.process is not None:
             for end in (lambda: None, self.process.terminate, self.process.kill):
                 end()
@@ -48,19 +70,21 @@ def start_program(name: str, arguments: list[str], is_remote: bool = False) -> L
     """Starts a program with a socket as its descriptor, or, as ssh wants it, as its standard input and output."""
     path = find_program(name)
     ours, theirs = socket.socketpair()
+    talk = None
     try:
         if is_remote:
             process = subprocess.Popen([path, *arguments], stdin=theirs.fileno(), stdout=theirs.fileno())
         else:
+            talk = tempfile.TemporaryFile()
+            # In a process group of its own: a Ctrl-C is for us, and we end it properly.
             process = subprocess.Popen([path, "--fd", str(theirs.fileno()), *arguments], pass_fds=[theirs.fileno()],
-                                       stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-                                       process_group=0)
+                                       stdin=subprocess.DEVNULL, stdout=talk, stderr=talk, process_group=0)
     except OSError as why:
         ours.close()
         raise FileFailed(f"cannot be started: {why.strerror}", field=path) from None
     finally:
         theirs.close()
-    return Link(ours, process)
+    return Link(ours, process, talk)
 
 
 def _connect(server: str, family: int, where: object, timeout: float) -> socket.socket:
@@ -112,6 +136,15 @@ def usual_server() -> str | None:
 def usual_key(server: str | None) -> str | None:
     """FARLIGHT_KEY, over TCP."""
     return os.environ.get("FARLIGHT_KEY") or None if server and server.startswith("tcp:") else None
+
+
+def explain(why: Error, server: str | None, link: Link | None) -> None:
+    """Adds to an error of the beginning where it happened, and what the program there said."""
+    why.field = why.field or server or "farlightd"
+    if link is not None and isinstance(why, ConnectionLost):
+        words, is_final = link.last_words()
+        why.text += f": {words}" if words else ""
+        why.retryable = why.retryable and not is_final
 
 
 def open_link(server: str | None, timeout: float) -> Link:

@@ -10,10 +10,11 @@ from typing import Any, TypeVar
 
 from . import address, messages
 from .client import RECEIVE_BYTES, SILENCE_S, Options, Retry
-from .core import Core, Job, Operation
+from .core import Core, Operation
 from .errors import ConnectionLost, Error, TimedOut
 from .fields import Message
 from .frame import Frame
+from .jobs import Job
 from .scene import Camera, CameraOf, Object, Scene, request
 
 T = TypeVar("T")
@@ -72,7 +73,7 @@ class AsyncClient:
         try:
             await self._operate(core, core.greet())
         except Error as why:
-            why.field = why.field or self._options.server or "farlightd"
+            await asyncio.to_thread(address.explain, why, self._options.server, self._link)
             raise
 
     async def _drop(self) -> None:
@@ -178,6 +179,10 @@ class AsyncClient:
         scene.is_attached = True
         await self._again(lambda core: core.open(scene))
         return scene
+
+    def changed(self, scene: Scene) -> int:
+        """As Client.changed()."""
+        return self._core.changed(scene)
 
     async def objects(self, scene: Scene, kind: messages.ObjectKind | str, name: str = "") -> list[messages.ObjectEntry]:
         """As Client.objects()."""

@@ -10,10 +10,11 @@ from collections.abc import Callable, Iterator
 from typing import Any, TypeVar
 
 from . import address, messages
-from .core import Core, Job, Operation
+from .core import Core, Operation
 from .errors import ConnectionLost, Error, Refused, TimedOut
 from .fields import Message
 from .frame import Frame
+from .jobs import Job
 from .scene import Camera, CameraOf, Object, Scene, request
 from .sealed import read_key
 
@@ -115,7 +116,7 @@ class Client:
         try:
             self._operate(self._core.greet(), self._options.timeout)
         except Error as why:
-            why.field = why.field or self._options.server or "farlightd"
+            address.explain(why, self._options.server, self._link)
             raise
 
     def _drop(self) -> None:
@@ -229,6 +230,11 @@ class Client:
         scene.is_attached = True
         self._call(lambda: self._core.open(scene))
         return scene
+
+    def changed(self, scene: Scene) -> int:
+        """The revision that others have made of a kept or shared scene since it was opened here; 0: none."""
+        self._ensure()
+        return self._core.changed(scene)
 
     def objects(self, scene: Scene, kind: messages.ObjectKind | str, name: str = "") -> list[messages.ObjectEntry]:
         """Those that the daemon has, also others' ones."""

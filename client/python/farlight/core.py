@@ -8,16 +8,15 @@ sent, and returns its result. Several may wait at once. The core believes nothin
 from __future__ import annotations
 
 import collections
-import hashlib
-import os
 from collections.abc import Callable, Generator, Sequence
-from dataclasses import dataclass, field
-from typing import Any, Optional, TypeVar
+from dataclasses import dataclass
+from typing import Any, TypeVar
 
-from . import fields, framing, messages
+from . import fields, framing, handshake, messages
 from .errors import Cancelled, ConnectionLost, Error, InvalidValue, ProtocolError, Refused
 from .fields import Bytes, Message
-from .frame import Frame, bytes_per_pixel, layer_count
+from .frame import Frame
+from .jobs import Job, Pending
 from .messages import ErrorCode
 from .scene import Scene, Sharing
 from .sealed import Seal
@@ -25,23 +24,12 @@ from .sealed import Seal
 T = TypeVar("T")
 Operation = Generator[None, None, T]
 
-VERSION = 1
-CAN_READ_ONLY, NEEDS_KEY, TRY_AGAIN, CAN_CHOOSE_PRIMARY, CAN_READ_OBJECTS = 1 << 1, 1 << 2, 1 << 4, 1 << 5, 1 << 8
-LIMITS_MAX_BYTES = 256
-UPLOAD_CHANNEL, CHUNK_BYTES, PIECE_BYTES = 1, 1 << 20, 262144
+UPLOAD_CHANNEL, PIECE_BYTES = 1, 262144
 QUEUED_BYTES = 4 << 20  # that may wait to be sent before an operation waits
 OFFER_BLOBS = 1024
 BLOBS_IN_FLIGHT = 16
 FRAMES_AHEAD = 2
 STATES_CHANGE = (ErrorCode.SHUTTING_DOWN, ErrorCode.DEVICE_LOST, ErrorCode.BUSY)
-
-
-def blob_hash(data: Bytes) -> bytes:
-    """BLAKE2b-256 over the BLAKE2b-256 hashes of the chunks."""
-    view = memoryview(data).cast("B")
-    names = b"".join(hashlib.blake2b(view[at:at + CHUNK_BYTES], digest_size=32).digest()
-                     for at in range(0, len(view), CHUNK_BYTES))
-    return hashlib.blake2b(names, digest_size=32).digest()
 
 
 def refused(error: messages.Error) -> Refused:
@@ -50,81 +38,6 @@ def refused(error: messages.Error) -> Refused:
     code = ErrorCode(int(error.code))
     return kind(error.text or code.word, code=code, field=error.field, remedy=error.remedy,
                 retryable=bool(error.retryable) or code in STATES_CHANGE, retry_after_s=error.retry_after_ms / 1000)
-
-
-@dataclass
-class Pending:
-    """A request on its way."""
-    finals: tuple[type[Message], ...]
-    extra: Optional[type[Message]] = None  # what may come once before the answer
-    came: Optional[Message] = None
-    answer: Optional[Message] = None
-
-
-@dataclass
-class Job:
-    """A request whose frames come on a channel of its own."""
-    request: int
-    channel: int
-    render: messages.Render
-    pending: Pending
-    credit: int
-    begun: Optional[messages.FrameBegin] = None
-    data: bytearray = field(default_factory=bytearray)
-    frames: collections.deque[Frame] = field(default_factory=collections.deque)
-    came: int = 0
-    command: int = 0
-    is_abandoned: bool = False
-
-    @property
-    def is_view(self) -> bool:
-        return self.render.kind == messages.JobKind.VIEW
-
-    def check_begin(self, begin: messages.FrameBegin) -> None:
-        """That it is a frame of what was asked for: nobody makes us keep more."""
-        render, pixels = self.render, begin.width * begin.height
-        width = render.crop_width or render.width * render.views_across
-        height = render.crop_height or render.height * render.views_down
-        if self.begun is not None:
-            raise ProtocolError("a frame begins within another one", field="frame_begin")
-        if self.came >= self.credit:
-            raise ProtocolError(f"frame {self.came + 1} of a job with a credit of {self.credit}", field="frame_begin")
-        if pixels > width * height or (not self.is_view and (begin.width, begin.height) != (width, height)):
-            raise ProtocolError(f"a picture of {begin.width}x{begin.height} where {width}x{height} was asked for",
-                                field="frame_begin.width")
-        if (begin.encoding, begin.format, begin.layers) != (render.encoding, render.format, render.layers or 1):
-            raise ProtocolError(f"{begin.encoding!r}, {begin.format!r}, layers {begin.layers}: not what was asked for",
-                                field="frame_begin.encoding")
-        wanted = pixels * bytes_per_pixel(begin) * layer_count(begin)
-        attached = begin.depth_bytes + begin.normal_bytes + begin.sticking_bytes
-        if begin.size_bytes != wanted or attached:
-            raise ProtocolError(f"{begin.size_bytes} bytes, and {attached} attached, where the picture has {wanted}",
-                                field="frame_begin.size_bytes")
-
-    def take(self, message: Message) -> Optional[Frame]:
-        """A frame's message; the frame that is complete with it."""
-        if isinstance(message, messages.FrameBegin):
-            if not self.is_abandoned:
-                self.check_begin(message)
-            self.begun, self.data = message, bytearray()
-            return None
-        if self.is_abandoned:
-            return None
-        if self.begun is None:
-            raise ProtocolError("comes without a frame_begin", field=message.NAME)
-        if isinstance(message, messages.FrameData):
-            if message.offset_bytes != len(self.data) or len(self.data) + len(message.data) > self.begun.size_bytes:
-                raise ProtocolError(f"{len(message.data)} bytes at {message.offset_bytes}, where {len(self.data)} of "
-                                    f"{self.begun.size_bytes} have come", field="frame_data.offset_bytes")
-            self.data += message.data
-            return None
-        assert isinstance(message, messages.FrameEnd)
-        if message.frame != self.begun.frame or message.abandoned or len(self.data) != self.begun.size_bytes:
-            raise ProtocolError(f"frame {message.frame} ends with {len(self.data)} of {self.begun.size_bytes} bytes, "
-                                f"and frame {self.begun.frame} was begun", field="frame_end.frame")
-        frame = Frame(self.begun, message, bytes(self.data))
-        self.begun, self.data, self.came = None, bytearray(), self.came + 1
-        return frame
 
 
 @dataclass
@@ -140,9 +53,6 @@ class Core:
     """One connection. `lost`: the previous one's core, whose scenes may still linger at the daemon."""
 
     def __init__(self, name: str = "python", key: bytes | None = None, lost: Core | None = None) -> None:
-        encoded = name.encode()
-        if len(encoded) > 64:
-            raise InvalidValue(f"{name!r} has more than 64 bytes", field="name")
         self._in, self._out = bytearray(), bytearray()
         self._seal = Seal(key) if key else None
         self._is_greeted = False
@@ -150,7 +60,7 @@ class Core:
         self.limits: dict[str, int] = {}
         self.capabilities = 0
         self.daemon = ""
-        self.changes: dict[int, int] = {}  # scene -> revision of another client's last change
+        self._changes: dict[int, int] = {}  # scene -> revision of another client's last change
         self._pending: dict[int, Pending] = {}
         self._jobs: dict[int, Job] = {}
         self._request, self._channel, self._scene_number = 0, UPLOAD_CHANNEL, 0
@@ -159,10 +69,7 @@ class Core:
         self._is_uploading = False
         self._scenes: dict[Scene, SceneState] = {}
         self._before: dict[Scene, SceneState] = {**lost._before, **lost._scenes} if lost else {}
-        hello = b"FARL" + VERSION.to_bytes(2, "little") * 2
-        hello += (CAN_CHOOSE_PRIMARY | CAN_READ_OBJECTS).to_bytes(8, "little") + os.urandom(16)
-        hello += bytes((len(encoded),)) + encoded
-        self._out += hello + bytes(-len(hello) % 8)
+        self._out += handshake.hello(name)
 
     # ---- bytes
 
@@ -217,41 +124,12 @@ class Core:
     # ---- handshake
 
     def _take_reply(self) -> bool:
-        if not b"FARL".startswith(bytes(self._in[:4])):
-            raise ProtocolError("the server there is no farlight daemon", field="handshake")
-        if len(self._in) < 48:
-            return False
-        limits_bytes = int.from_bytes(self._in[6:8], "little")
-        if limits_bytes > LIMITS_MAX_BYTES:
-            raise ProtocolError(f"{limits_bytes} bytes of limits, at most {LIMITS_MAX_BYTES}", field="handshake")
-        at, texts = 48 + limits_bytes, []
-        for _ in range(2):
-            if len(self._in) <= at or len(self._in) < at + 1 + self._in[at]:
-                return False
-            texts.append(bytes(self._in[at + 1:at + 1 + self._in[at]]).decode("utf-8", "replace"))
-            at += 1 + self._in[at]
-        at += -at % 8
-        if len(self._in) < at:
-            return False
-        self.capabilities = int.from_bytes(self._in[8:16], "little")
-        self._read_limits(bytes(self._in[48:48 + limits_bytes]))
-        version, self.daemon = int.from_bytes(self._in[4:6], "little"), texts[0]
-        if version == 0 and self.capabilities & NEEDS_KEY:
-            raise Refused("the daemon accepts only clients with its key", code=ErrorCode.DENIED,
-                          remedy="give key_file, the file with a copy of the key")
-        if version != VERSION:
-            raise Refused(texts[1] or f"the daemon chose version {version}", code=ErrorCode.VERSION,
-                          retryable=bool(self.capabilities & TRY_AGAIN))
-        del self._in[:at]
-        self._is_greeted = True
-        return True
-
-    def _read_limits(self, data: bytes) -> None:
-        at = 0
-        for name, letter, _ in messages.LIMITS:
-            size = 8 if letter == "Q" else 4
-            self.limits[name] = int.from_bytes(data[at:at + size], "little") if at + size <= len(data) else 0
-            at += size
+        reply = handshake.parse(self._in)
+        if reply is not None:
+            self.limits, self.capabilities, self.daemon = reply.limits, reply.capabilities, reply.daemon
+            del self._in[:reply.size]
+            self._is_greeted = True
+        return reply is not None
 
     def greet(self) -> Operation[None]:
         """Until the handshake is done."""
@@ -269,7 +147,7 @@ class Core:
             pass
         elif isinstance(message, messages.SceneChanged):
             if message.scene <= self._scene_number:
-                self.changes[message.scene] = message.revision
+                self._changes[message.scene] = message.revision
         elif isinstance(message, messages.Goodbye):
             raise ConnectionLost(f"the daemon ended the connection: {message.text or messages.ErrorCode(int(message.code)).word}",
                                  retryable=message.code == ErrorCode.SHUTTING_DOWN or message.code == ErrorCode.TIMEOUT)
@@ -447,14 +325,15 @@ class Core:
                 state.is_busy = False
         return state
 
-    def _transact(self, scene: int, base_revision: int, edits: Sequence[Message]) -> Operation[messages.Ok]:
+    def _transact(self, begin: messages.EditBegin, edits: Sequence[tuple[int, bytes]]) -> Operation[messages.Ok]:
         yield from self._until(self._has_room)
         request, pending = self._begin((messages.Ok,))
-        self._send(messages.EditBegin(scene, base_revision), request)
+        self._send(begin, request)
         try:
-            for edit in edits:
-                yield from self._until(lambda: self._has_space() or pending.answer is not None)
-                self._send(edit, request)
+            for kind, payload in edits:
+                if not self._has_space():
+                    yield from self._until(lambda: self._has_space() or pending.answer is not None)
+                self._out += framing.wrap(kind, payload, request)
         except GeneratorExit:
             self.fail(ConnectionLost("a transaction was left in its middle"))
             raise
@@ -472,10 +351,9 @@ class Core:
         state.is_busy = True
         try:
             version, edits = scene.version, scene.edits_since(state.version)
-            for edit in edits:  # all are checked before the first is sent
-                fields.encode(edit)
+            payloads = [(edit.TYPE, fields.encode(edit)) for edit in edits]  # all are valid before the first is sent
             yield from self._upload(scene.blobs_of(edits))
-            answer = yield from self._transact(state.scene, base_revision, edits)
+            answer = yield from self._transact(messages.EditBegin(state.scene, base_revision), payloads)
             state.revision, state.version = answer.revision, version
         finally:
             state.is_busy = False
@@ -487,9 +365,19 @@ class Core:
         if state is not None and state.scene:
             yield from self.ask(messages.SceneClose(state.scene))
 
+    def changed(self, scene: Scene) -> int:
+        """The revision of others' last change."""
+        state = self._scenes.get(scene)
+        return self._changes.get(state.scene, 0) if state else 0
+
+    def _check_reads_objects(self) -> None:
+        if not self.capabilities & handshake.CAN_READ_OBJECTS:
+            raise Refused("the daemon is too old to tell of its objects", code=ErrorCode.UNSUPPORTED)
+
     def read(self, scene: Scene, kind: messages.ObjectKind, number: int) -> Operation[tuple[Message, int]]:
         """An object as the daemon has it, and the scene's revision."""
         state = yield from self.open(scene)
+        self._check_reads_objects()
         extra = {messages.ObjectKind.NODE: messages.SetNode, messages.ObjectKind.MATERIAL: messages.SetMaterial,
                  messages.ObjectKind.LIGHT: messages.SetLight, messages.ObjectKind.CAMERA: messages.SetCamera}.get(kind)
         if extra is None:
@@ -504,6 +392,7 @@ class Core:
                 name: str) -> Operation[list[messages.ObjectEntry]]:
         """Those of a kind, or those of a name."""
         state = yield from self.open(scene)
+        self._check_reads_objects()
         found: list[messages.ObjectEntry] = []
         at = 0
         while True:
@@ -529,7 +418,7 @@ class Core:
             len(self._jobs) < most or all(job.is_view for job in self._jobs.values())))
         self._channel += 1
         render.channel = self._channel
-        if not self.capabilities & CAN_CHOOSE_PRIMARY and render.primary in ("auto", messages.Primary.AUTO):
+        if not self.capabilities & handshake.CAN_CHOOSE_PRIMARY and render.primary in ("auto", messages.Primary.AUTO):
             is_reference = render.tracer in ("reference", messages.Tracer.REFERENCE)
             render.primary = messages.Primary.TRACE if is_reference else messages.Primary.RASTER
         fields.encode(render)

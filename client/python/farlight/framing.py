@@ -24,8 +24,12 @@ class Received(NamedTuple):
 
 def pack(message: Message, request: int = 0, channel: int = 0) -> bytes:
     """As it is sent; InvalidValue names the field."""
-    payload = fields.encode(message)
-    return b"".join((_HEADER.pack(len(payload), message.TYPE, 0, request, channel), payload, bytes(-len(payload) % 8)))
+    return wrap(message.TYPE, fields.encode(message), request, channel)
+
+
+def wrap(kind: int, payload: bytes, request: int = 0, channel: int = 0) -> bytes:
+    """A payload of that type of message, as it is sent."""
+    return b"".join((_HEADER.pack(len(payload), kind, 0, request, channel), payload, bytes(-len(payload) % 8)))
 
 
 def cut(data: bytearray, senders: tuple[str, ...]) -> Received | None:

@@ -8,7 +8,8 @@ import time
 from collections.abc import Sequence
 
 from . import address, framing, messages
-from .core import UPLOAD_CHANNEL, blob_hash
+from .blobs import blob_hash
+from .core import UPLOAD_CHANNEL
 from .errors import FileFailed, ImportFailed, InvalidValue, ProtocolError
 from .fields import Message
 from .messages import ObjectKind
@@ -114,8 +115,7 @@ def _run(link: address.Link, work: _Import, timeout: float, names: str) -> None:
         except OSError:
             data = b""
         if not data:
-            status = link.process.wait() if link.process else 0
-            raise work.complaint or ImportFailed(f"the importer ended with status {status}, without a message", field=names)
+            raise work.complaint or ImportFailed(f"the importer failed without a message: {link.last_words()[0]}", field=names)
         try:
             work.receive(data)
         except (ProtocolError, InvalidValue) as why:

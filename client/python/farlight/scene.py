@@ -14,8 +14,10 @@ import numpy as np
 import numpy.typing as npt
 
 from . import fields, messages
+from .blobs import blob_hash
 from .errors import InvalidValue
 from .fields import Bytes, Message
+from .frame import layer_set
 from .messages import LightKind, NodeKind, ObjectKind, Sharing
 
 __all__ = ["Camera", "Object", "Scene", "Sharing", "look_at"]
@@ -187,7 +189,6 @@ class Scene:
 
     def blob(self, data: Bytes) -> messages.BlobRef:
         """Keeps the bytes, and names them."""
-        from .core import blob_hash  # which knows scenes
         view = memoryview(data).cast("B")
         name = blob_hash(view)
         self._blobs[name] = view
@@ -365,7 +366,6 @@ CameraOf = Union[Camera, Object, Sequence[Camera], None]
 def request(camera: CameraOf, layers: Any, values: dict[str, Any]) -> messages.Render:
     """The message of a job. camera: one, a node of the scene that shows one, several as keys over time, or None: all of
     the scene is in view."""
-    from .frame import layer_set
     render: messages.Render = _make(messages.Render, values)
     if isinstance(camera, Object):
         render.camera_path, render.camera_node = messages.CameraPath.NODE, camera.number
