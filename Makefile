@@ -327,7 +327,7 @@ $(LOSING_DAEMON): $(B)/tests/tools/lost_gpu.o $(B)/server/main.o $(SERVER_OBJ) $
 BUILD_PACKAGES := gcc g++ make pkg-config libepoxy-dev libegl-dev libgl-dev libcglm-dev libturbojpeg0-dev libzstd-dev \
     libsodium-dev libxxhash-dev libinih-dev libjansson-dev libjemalloc-dev libseccomp-dev libopenimageio-dev libpng-dev libtiff-dev libopenexr-dev libjxl-dev libtinygltf-dev \
     libtinyobjloader-dev libdraco-dev libmeshoptimizer-dev libassimp-dev libembree-dev libavcodec-dev libavformat-dev libavutil-dev libswscale-dev libsdl2-dev libsdl2-ttf-dev fonts-dejavu-core libegl1 libgl1-mesa-dri
-TEST_PACKAGES := libcmocka-dev python3 python3-jsonschema python3-numpy ffmpeg xvfb gnuplot-nox
+TEST_PACKAGES := libcmocka-dev python3 python3-jsonschema python3-numpy python3-prometheus-client ffmpeg xvfb gnuplot-nox
 LINT_PACKAGES := clang clang-format glslang-tools python3 python3-numpy mypy
 # A second driver stack: OpenGL over Vulkan, on the CPU. The validation sees what it does.
 STACK_PACKAGES := mesa-vulkan-drivers
@@ -338,8 +338,9 @@ FUZZ_PACKAGES := clang libclang-rt-14-dev
 # These come for Debian's own python3.
 FIDELITY_PACKAGES := python3-openimageio python3-numpy
 EQUAL_TIME_PACKAGES := $(FIDELITY_PACKAGES) blender
+FARM_PACKAGES := slurm-wlm nodejs python3-yaml
 
-.PHONY: tests build-packages test-packages stack-packages sync-packages lint-packages analyze-packages coverage-packages fuzz-packages fidelity-packages equal-time-packages test test-long test-zink check-sync demo bench fidelity equal-time soak farm-drill siege bench-plot check-headers check-rules lint check analyze coverage format install uninstall clean distclean help
+.PHONY: tests build-packages test-packages stack-packages sync-packages lint-packages analyze-packages coverage-packages fuzz-packages fidelity-packages equal-time-packages farm-packages test test-long test-zink check-sync demo bench fidelity equal-time soak farm-drill farm-test siege bench-plot check-headers check-rules lint check analyze coverage format install uninstall clean distclean help
 tests: $(TEST_PROGRAMS) $(CONTRACT) $(BENCH_PROGRAM) $(SHAPED_LINK) $(B)/tests/tools/make_scenes $(B)/tests/tools/pose_dump $(LOSING_DAEMON)
 
 build-packages:
@@ -360,6 +361,8 @@ fuzz-packages:
 	@tests/tools/install_packages.sh $(BUILD_PACKAGES) $(FUZZ_PACKAGES)
 fidelity-packages:
 	@tests/tools/install_packages.sh $(BUILD_PACKAGES) $(FIDELITY_PACKAGES)
+farm-packages: test-packages
+	@tests/tools/install_packages.sh $(FARM_PACKAGES)
 equal-time-packages:
 	@tests/tools/install_packages.sh $(BUILD_PACKAGES) $(EQUAL_TIME_PACKAGES)
 
@@ -408,6 +411,11 @@ soak: test-packages
 farm-drill: test-packages
 	$(MAKE) -j$(JOBS) all
 	python3 tests/soak/drill.py $(B) $(ROUNDS) $(if $(SEED),--seed $(SEED))
+# The templates of conf/farm: Slurm with killed workers, and what stands in for other managers. Debian's own Python has yaml.
+farm-test: farm-packages
+	$(MAKE) -j$(JOBS) all tests
+	/usr/bin/python3 tests/farm/farm.py $(B)
+
 # One user attacks a daemon in every way that tests/siege knows, another one looks at a triangle beside it.
 siege: test-packages
 	$(MAKE) -j$(JOBS) all
@@ -477,7 +485,7 @@ install: all
 	install -m 755 client/python/examples/*.py $(DESTDIR)$(PREFIX)/share/doc/farlight/examples/python
 	install -m 644 client/python/README.md $(DESTDIR)$(PREFIX)/share/doc/farlight/python.md
 	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/share/farlight \
-	    $(addprefix $(DESTDIR)$(PREFIX)/share/man/man,1 5 8) \
+	    $(addprefix $(DESTDIR)$(PREFIX)/share/man/man,1 5 7 8) \
 	    $(DESTDIR)$(PREFIX)/share/doc/farlight/examples $(DESTDIR)/etc/farlight \
 	    $(DESTDIR)$(PREFIX)/lib/systemd/system $(DESTDIR)$(PREFIX)/lib/sysusers.d
 	install -d $(DESTDIR)$(PREFIX)/lib/pkgconfig $(DESTDIR)$(PREFIX)/include/farlight/lib \
@@ -501,15 +509,20 @@ install: all
 	install -m 644 $(B)/shot.schema.json $(DESTDIR)$(PREFIX)/share/farlight
 	install -m 644 README.md CHANGELOG.md SECURITY.md LICENSE $(B)/protocol.md $(DESTDIR)$(PREFIX)/share/doc/farlight
 	install -m 644 conf/examples/* $(DESTDIR)$(PREFIX)/share/doc/farlight/examples
+	install -d $(DESTDIR)$(PREFIX)/share/farlight/farm
+	install -m 644 $(addprefix conf/farm/,README.md slurm.sbatch openjd.yaml flamenco.js) $(DESTDIR)$(PREFIX)/share/farlight/farm
+	install -m 755 conf/farm/xargs.sh $(DESTDIR)$(PREFIX)/share/farlight/farm
+	install -m 755 conf/farm/farlight-node $(DESTDIR)$(PREFIX)/bin
 	install -m 644 conf/farlightd.conf $(DESTDIR)/etc/farlight
 	sed 's#/usr/local/bin#$(PREFIX)/bin#' conf/farlightd.service >$(DESTDIR)$(PREFIX)/lib/systemd/system/farlightd.service
 	install -m 644 conf/farlightd.socket $(DESTDIR)$(PREFIX)/lib/systemd/system
 	install -m 644 conf/sysusers.conf $(DESTDIR)$(PREFIX)/lib/sysusers.d/farlight.conf
 
 uninstall:
-	rm -f $(addprefix $(DESTDIR)$(PREFIX)/bin/,$(notdir $(PROGRAMS)))
+	rm -f $(addprefix $(DESTDIR)$(PREFIX)/bin/,$(notdir $(PROGRAMS)) farlight-node)
 	rm -f $(addprefix $(DESTDIR)$(PREFIX)/share/man/man1/,$(notdir $(wildcard conf/man/*.1)))
 	rm -f $(addprefix $(DESTDIR)$(PREFIX)/share/man/man5/,$(notdir $(wildcard conf/man/*.5)))
+	rm -f $(addprefix $(DESTDIR)$(PREFIX)/share/man/man7/,$(notdir $(wildcard conf/man/*.7)))
 	rm -f $(addprefix $(DESTDIR)$(PREFIX)/share/man/man8/,$(notdir $(wildcard conf/man/*.8)))
 	rm -f $(DESTDIR)$(PREFIX)/lib/$(SONAME) $(DESTDIR)$(PREFIX)/lib/libfarlight.so \
 	    $(DESTDIR)$(PREFIX)/lib/pkgconfig/farlight.pc \
@@ -536,6 +549,7 @@ help:
 	@echo 'make equal-time measure noise over time beside Cycles, into out/equal-time   [ONLY=scene,scene OPTIONS="--denoise"]'
 	@echo 'make soak       use one daemon for some minutes, and see that its memory stays flat   [ROUNDS=1000]'
 	@echo 'make farm-drill kill the daemon or the client of animations at random, and see that no frame is lost   [ROUNDS=1000 SEED=]'
+	@echo 'make farm-test  try the templates of conf/farm on Slurm and what stands in for other queues'
 	@echo 'make siege      attack a daemon as one user, and see that another one does not notice   [ATTACKS="stats pings"]'
 	@echo 'make bench-plot draw the scaling curves into out/, as SVG and PNG'
 	@echo 'make all        build the programs into build/$$config/   [config=debug|release|sanitize|fuzz EMBREE=0]'

@@ -58,6 +58,9 @@ static const struct option options[] = {
     {"server", "log_level", ANYTIME, OPTION_LEVEL, AT(log_level), "info", 0, 0, "", "error, warning, info or debug"},
     {"server", "trace_file", START, OPTION_TEXT, AT(trace_file), "", 0, 0, "",
      "File that gets the stages of all frames as trace events, for ui.perfetto.dev or chrome://tracing"},
+    {"server", "unused", START, OPTION_U32, AT(unused_s), "0", 0, 31536000, "s",
+     "Time without any client after which the daemon ends; 0: it stays. Where systemd holds its socket, the next "
+     "client starts it again"},
 
     {"engine", "device", START, OPTION_TEXT, AT(device), "auto", 0, 0, "",
      "GPU: a number of --list-devices, software, or auto for the first hardware, else software"},

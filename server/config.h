@@ -24,6 +24,7 @@ struct config {
     uint32_t log_level;
     char trace_file[CONFIG_TEXT_BYTES]; /* empty: none */
     uint64_t trace_file_bytes;
+    uint32_t unused_s;              /* without a client, after which the daemon ends; 0: it does not */
     char device[CONFIG_TEXT_BYTES]; /* "auto", "software" or a number */
     uint32_t encode_threads, frames_in_flight, engine_queue;
     uint64_t scene_bytes, device_bytes, program_bytes;

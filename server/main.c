@@ -243,6 +243,7 @@ static bool serve_with_engine(struct serving *serving, struct hub_options *optio
     options->device_bytes = engine_device_limit_bytes(engine);
     options->timeline = serving->timeline;
     options->owner_may_be_idle = true;
+    daemon->unused_ns = serving->config->unused_s * UINT64_C(1000000000);
     bool ok = daemon_start(daemon, options, error);
     auth_keys_unref(options->keys); /* the hub has its own reference */
     if (ok && serving->store)

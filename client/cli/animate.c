@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum key { KEY_SHARD = 0x400, KEY_RESUME, KEY_SCRIPT, KEY_LOSSLESS, KEY_DRY_RUN, KEY_SCENE };
+enum key { KEY_SHARD = 0x400, KEY_RESUME, KEY_DIGESTS, KEY_SCRIPT, KEY_LOSSLESS, KEY_DRY_RUN, KEY_SCENE };
 
 struct animation {
     struct cli_job job;
@@ -27,6 +27,10 @@ static const struct argp_option options[] = {
     {NULL, 0, NULL, 0, "Parts:", -1},
     {"shard", KEY_SHARD, "K/N", 0, "Render only every N-th frame of the range, beginning with the K-th", 0},
     {"resume", KEY_RESUME, NULL, 0, "Skip frames whose files exist, are complete and have the requested size", 0},
+    {"digests", KEY_DIGESTS, NULL, 0,
+     "Write FILE.sha256 beside each picture, for 'farlight verify'; --resume then renders again what differs from "
+     "it",
+     0},
     {0}};
 
 static error_t set_shard(struct cli_job *job, const char *value)
@@ -49,6 +53,9 @@ static error_t parse(int key, char *value, struct argp_state *state)
         return set_shard(job, value);
     case KEY_RESUME:
         job->series.resume = true;
+        return 0;
+    case KEY_DIGESTS:
+        job->series.digests = true;
         return 0;
     case KEY_LOSSLESS:
         job->lossless = true;

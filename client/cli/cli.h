@@ -32,6 +32,7 @@ int cli_serve(int argc, char **argv);
 int cli_scenes(int argc, char **argv);
 int cli_edit(int argc, char **argv);
 int cli_stats(int argc, char **argv);
+int cli_verify(int argc, char **argv);
 int cli_ping(int argc, char **argv);
 int cli_bridge(int argc, char **argv);
 int cli_view(int argc, char **argv);
@@ -98,6 +99,8 @@ const char *cli_base_name(const char *path);
 bool cli_check_output(const char *path, char *folder, size_t folder_bytes, struct fl_error *error);
 /* Makes the folder, and those around it, where they are missing. */
 bool cli_make_folder(const char *folder, struct fl_error *error);
+/* Replaces a file as a whole. */
+bool cli_write_text(const char *path, const char *text, mode_t rights, struct fl_error *error);
 /* Whether writing to `path`, named by `option`, overwrites none of the inputs; NULL among them is skipped. */
 bool cli_check_not_input(const char *path, const char *option, const char *const *inputs, size_t count,
                          struct fl_error *error);
@@ -129,8 +132,15 @@ bool cli_open_input(int *input_fd, struct fl_error *error); /* the same without 
 
 /* ---- progress.c: progress on standard error ---- */
 
+enum cli_progress_form {
+    CLI_PROGRESS_LINES,
+    CLI_PROGRESS_BAR,   /* drawn over and over on one line */
+    CLI_PROGRESS_OPENJD /* what Open Job Description reads on standard output */
+};
+
 struct cli_progress {
-    bool silent, bar; /* a bar is drawn over and over on one line */
+    enum cli_progress_form form;
+    bool silent;
     bool drawn;
     uint64_t begin_ns, shown_ns, first_ns;
     uint32_t total;
@@ -138,7 +148,8 @@ struct cli_progress {
     double error_s, slope; /* it falls as that power of the time */
 };
 
-void cli_progress_begin(struct cli_progress *progress, bool silent);
+struct cli_job;
+void cli_progress_begin(struct cli_progress *progress, const struct cli_job *job);
 void cli_progress_import(struct cli_progress *progress, uint64_t done_bytes, uint64_t total_bytes,
                          const char *what);
 /* From the first call on frames are counted. */
@@ -183,6 +194,7 @@ struct cli_series {
     struct fl_frame_run range;
     uint32_t shard_part, shard_parts; /* 0 parts: all frames */
     bool resume;                      /* frames whose files exist are not rendered again */
+    bool digests;                     /* a file with its digest beside each picture */
     struct record_camera_key *keys;   /* of the job's keys_file, once all options are read */
     double orbit_degrees;
     double orbit_seconds; /* for these degrees; 0: the range */
@@ -236,6 +248,8 @@ struct cli_job {
         outputs[CLI_OUTPUTS_MAX]; /* destinations of the pictures: `output`, or several of a script */
     size_t output_count;
     struct cli_series series;
+    bool has_progress; /* else by whether there is a terminal */
+    enum cli_progress_form progress;
     struct cli_retries retries;
     const char *script; /* path; NULL: none */
     const struct fl_json *script_json;

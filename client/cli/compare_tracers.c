@@ -219,7 +219,7 @@ int cli_compare_tracers(int argc, char **argv)
         return cli_trouble(&comparison.pair.job.error);
     if (!cli_interrupt_begin(&error))
         return cli_trouble(&error);
-    cli_progress_begin(&comparison.pair.progress, comparison.pair.job.quiet);
+    cli_progress_begin(&comparison.pair.progress, &comparison.pair.job);
     const bool done = run(&comparison, &error);
     cli_progress_end(&comparison.pair.progress, done);
     if (done && comparison.pair.json)

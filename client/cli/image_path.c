@@ -133,6 +133,28 @@ bool cli_make_folder(const char *folder, struct fl_error *error)
     return true;
 }
 
+/* A name for the unfinished file beside it, then the rename: a reader sees the old text or the whole new one. */
+bool cli_write_text(const char *path, const char *text, mode_t rights, struct fl_error *error)
+{
+    char unfinished[4200];
+    if ((size_t)snprintf(unfinished, sizeof(unfinished), "%s.XXXXXX", path) >= sizeof(unfinished))
+        return fl_error_set(error, FL_ERROR_FILE, "", "the path of the file is too long");
+    const int fd = mkostemp(unfinished, O_CLOEXEC);
+    if (fd < 0)
+        return fl_error_set(error, FL_ERROR_FILE, path, "cannot be written: %s", strerror(errno));
+    FILE *file = fdopen(fd, "w");
+    bool done = file && fputs(text, file) >= 0 && fchmod(fd, rights) == 0;
+    if (file)
+        done = fclose(file) == 0 && done;
+    else
+        close(fd);
+    if (done && rename(unfinished, path) == 0)
+        return true;
+    fl_error_set(error, FL_ERROR_FILE, path, "cannot be written: %s", strerror(errno));
+    unlink(unfinished);
+    return false;
+}
+
 static bool is_same_file(const char *a, const char *b)
 {
     struct stat first, second;

@@ -48,8 +48,12 @@ static bool complete_output(struct cli_job *job, struct cli_output *output, bool
     }
     if (!cli_image_is_video(output->image))
         return true;
-    if (job->series.resume || job->series.shard_parts > 1) {
-        cli_usage(job, job->series.resume ? "--resume" : "--shard", "a video is made of all frames at once");
+    if (job->series.resume || job->series.shard_parts > 1 || job->series.digests) {
+        cli_usage(job,
+                  job->series.resume    ? "--resume"
+                  : job->series.digests ? "--digests"
+                                        : "--shard",
+                  "a video is made of all frames at once");
         return fl_error_remedy(&job->error,
                                "write images, such as 'frames/%%04d.png', and a video of all of them");
     }
@@ -145,6 +149,8 @@ static bool complete_outputs(struct cli_job *job, bool is_series)
     for (size_t i = 0; i < job->output_count; i++)
         if (!complete_output(job, &job->outputs[i], is_series))
             return false;
+    if (job->has_progress && job->progress == CLI_PROGRESS_OPENJD && cli_writes_to_stdout(job))
+        return cli_usage(job, "--progress", "openjd is written to standard output, as the picture is") == 0;
     return complete_pixels(job);
 }
 

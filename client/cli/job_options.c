@@ -45,6 +45,7 @@ enum key {
     KEY_FLOAT,
     KEY_TIMINGS,
     KEY_TRACE_FILE,
+    KEY_PROGRESS,
     KEY_CLIP,
     KEY_CLIP_ONCE,
     KEY_CLIP_START,
@@ -151,6 +152,9 @@ static const struct argp_option special[] = {
      "Print the time of every stage, as a table or as JSON, one object a line", CLI_GROUP_OUTPUT},
     {"trace-file", KEY_TRACE_FILE, "FILE", 0,
      "Write every stage to FILE as trace events, for ui.perfetto.dev or chrome://tracing", CLI_GROUP_OUTPUT},
+    {"progress", KEY_PROGRESS, "bar|lines|openjd", 0,
+     "How it is shown: as a bar (default on a terminal), as lines, or as Open Job Description reads it",
+     CLI_GROUP_OUTPUT},
     {"quiet", KEY_QUIET, NULL, 0, "No progress, no notes about the model", CLI_GROUP_OUTPUT},
     {0}};
 
@@ -169,6 +173,20 @@ error_t cli_usage(struct cli_job *job, const char *field, const char *format, ..
 static error_t name_field(struct cli_job *job, const char *field)
 {
     snprintf(job->error.field, sizeof(job->error.field), "%s", field);
+    return EINVAL;
+}
+
+static error_t set_progress(struct cli_job *job, const char *value)
+{
+    static const char *const forms[] = {
+        [CLI_PROGRESS_LINES] = "lines", [CLI_PROGRESS_BAR] = "bar", [CLI_PROGRESS_OPENJD] = "openjd"};
+    for (size_t i = 0; i < sizeof(forms) / sizeof(forms[0]); i++)
+        if (strcmp(value, forms[i]) == 0) {
+            job->has_progress = true;
+            job->progress = (enum cli_progress_form)i;
+            return 0;
+        }
+    cli_usage(job, "--progress", "'%s' is none of bar, lines and openjd", value);
     return EINVAL;
 }
 
@@ -362,6 +380,8 @@ static error_t set_option(struct cli_job *job, int key, const char *field, const
     case KEY_CLIP_ONCE:
         job->clip_once = true;
         return 0;
+    case KEY_PROGRESS:
+        return set_progress(job, value);
     case KEY_QUIET:
         job->quiet = true;
         return 0;

@@ -21,6 +21,7 @@ static const struct subcommand {
     {"compare", "farlight compare", cli_compare, "measure the difference of two images or two tracers"},
     {"tracers", "farlight tracers", cli_tracers, "list the tracers and their settings"},
     {"serve", "farlight serve", cli_serve, "share a model for other clients"},
+    {"verify", "farlight verify", cli_verify, "check the pictures of an animation against their digests"},
     {"scenes", "farlight scenes", cli_scenes, "list the scenes of a daemon to which clients may attach"},
     {"edit", "farlight edit", cli_edit, "change materials, nodes and lights of a shared scene"},
     {"stats", "farlight stats", cli_stats, "show a daemon's clients, scenes, memory and times"},

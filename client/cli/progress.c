@@ -20,10 +20,13 @@ static unsigned columns(void)
     return ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0 ? size.ws_col : COLUMNS_UNKNOWN;
 }
 
-void cli_progress_begin(struct cli_progress *progress, bool silent)
+void cli_progress_begin(struct cli_progress *progress, const struct cli_job *job)
 {
-    *progress = (struct cli_progress){
-        .silent = silent, .bar = cli_is_terminal(STDERR_FILENO), .begin_ns = monotonic_now_ns(), .slope = 0.5};
+    const enum cli_progress_form usual = cli_is_terminal(STDERR_FILENO) ? CLI_PROGRESS_BAR : CLI_PROGRESS_LINES;
+    *progress = (struct cli_progress){.form = job->has_progress ? job->progress : usual,
+                                      .silent = job->quiet,
+                                      .begin_ns = monotonic_now_ns(),
+                                      .slope = 0.5};
 }
 
 void cli_progress_clear(struct cli_progress *progress)
@@ -46,7 +49,7 @@ void cli_progress_end(struct cli_progress *progress, bool done)
 static bool is_due(struct cli_progress *progress, bool always)
 {
     const uint64_t now = monotonic_now_ns();
-    if (!always && now - progress->shown_ns < (progress->bar ? BAR_EVERY_NS : LINE_EVERY_NS))
+    if (!always && now - progress->shown_ns < (progress->form == CLI_PROGRESS_BAR ? BAR_EVERY_NS : LINE_EVERY_NS))
         return false;
     progress->shown_ns = now;
     return true;
@@ -70,11 +73,30 @@ static void draw(struct cli_progress *progress, uint32_t done, uint32_t total, c
     progress->drawn = true;
 }
 
+/* `total` 0: no share of the work is known. */
+static void show(struct cli_progress *progress, uint32_t done, uint32_t total, const char *text)
+{
+    switch (progress->form) {
+    case CLI_PROGRESS_BAR:
+        draw(progress, done, total, text);
+        return;
+    case CLI_PROGRESS_LINES:
+        fprintf(stderr, "%s\n", text);
+        return;
+    case CLI_PROGRESS_OPENJD: /* at once: who reads it waits for it */
+        if (total > 0)
+            printf("openjd_progress: %.1f\n", 100.0 * done / total);
+        printf("openjd_status: %s\n", text);
+        fflush(stdout);
+        return;
+    }
+}
+
 /* `what` comes from our importer, which is not trusted: only plain characters are shown. */
 void cli_progress_import(struct cli_progress *progress, uint64_t done_bytes, uint64_t total_bytes,
                          const char *what)
 {
-    if (progress->silent || !progress->bar || !is_due(progress, false))
+    if (progress->silent || progress->form != CLI_PROGRESS_BAR || !is_due(progress, false))
         return;
     char plain[41];
     size_t length = 0;
@@ -103,15 +125,11 @@ static void print_duration(char *text, size_t text_bytes, double seconds)
 void cli_progress_step(struct cli_progress *progress, uint32_t done, uint32_t total, const char *what)
 {
     const uint64_t now = monotonic_now_ns();
-    if (progress->silent || (!progress->bar && now - progress->begin_ns < LINE_EVERY_NS))
+    if (progress->silent || (progress->form != CLI_PROGRESS_BAR && now - progress->begin_ns < LINE_EVERY_NS))
         return;
     char text[120];
     snprintf(text, sizeof(text), "%u of %u: %s", done, total, what);
-    if (!progress->bar) {
-        fprintf(stderr, "%s\n", text);
-        return;
-    }
-    draw(progress, done, total, text);
+    show(progress, done, total, text);
 }
 
 void cli_progress_samples(struct cli_progress *progress, uint32_t held, uint32_t total)
@@ -123,11 +141,7 @@ void cli_progress_samples(struct cli_progress *progress, uint32_t held, uint32_t
         snprintf(text, sizeof(text), "%u of %u samples a pixel", held, total);
     else
         snprintf(text, sizeof(text), "%u sample%s a pixel; Ctrl-C ends it", held, held == 1 ? "" : "s");
-    if (!progress->bar) {
-        fprintf(stderr, "%s\n", text);
-        return;
-    }
-    draw(progress, held, total, text);
+    show(progress, held, total, text);
 }
 
 /* Seconds until the error is small enough: it falls as a power of the time, by what was seen of that, n^-1/2 at
@@ -166,11 +180,7 @@ void cli_progress_noise(struct cli_progress *progress, const struct cli_noise *n
         print_duration(text + length, sizeof(text) - (size_t)length, left_s);
         strncat(text, " left", sizeof(text) - strlen(text) - 1);
     }
-    if (!progress->bar) {
-        fprintf(stderr, "%s\n", text);
-        return;
-    }
-    draw(progress, (uint32_t)(1000 * seconds / (seconds + left_s)), is_known ? 1000 : 0, text);
+    show(progress, (uint32_t)(1000 * seconds / (seconds + left_s)), is_known ? 1000 : 0, text);
 }
 
 void cli_progress_frames(struct cli_progress *progress, uint32_t done, uint32_t total)
@@ -189,8 +199,8 @@ void cli_progress_frames(struct cli_progress *progress, uint32_t done, uint32_t 
     int length = snprintf(numbers, sizeof(numbers), "%u of %u frames", done, total);
     if (left[0] != '\0')
         snprintf(numbers + length, sizeof(numbers) - (size_t)length, ", %.2f frames/s, %s left", rate, left);
-    if (!progress->bar) {
-        fprintf(stderr, "%s\n", numbers);
+    if (progress->form != CLI_PROGRESS_BAR) {
+        show(progress, done, total, numbers);
         return;
     }
     /* What is left of it is more worth than the rate. */

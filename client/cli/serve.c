@@ -338,7 +338,7 @@ static int serve(struct serving *serving)
                                   .sharing = PROTOCOL_SHARING_SHARED,
                                   .scene_name = serving->name ? serving->name : cli_base_name(serving->job.model),
                                   .daemon_arguments = serving->words};
-    cli_progress_begin(&progress, serving->job.quiet);
+    cli_progress_begin(&progress, &serving->job);
     const bool is_up = cli_read_input(&serving->job, &error) && put_up(serving, &loading, &error);
     cli_progress_end(&progress, is_up);
     const bool done = is_up && stay_and_recover(serving, &loading, &error);

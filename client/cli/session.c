@@ -488,7 +488,7 @@ int cli_run_job(struct cli_job *job, bool is_series)
     struct fl_error error = {0};
     if (!cli_interrupt_begin(&error))
         return cli_report(&error);
-    cli_progress_begin(&session.progress, job->quiet);
+    cli_progress_begin(&session.progress, job);
     if (job->timings != CLI_TIMINGS_NONE)
         session.timings = cli_timings_create(job->timings, cli_writes_to_stdout(job));
     bool done = cli_read_input(job, &error) && begin_trace(&session, &error) && run(&session, &error);

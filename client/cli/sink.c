@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "cli/sink.h"
+#include "cli/digest.h"
 #include "lib/frame_part.h"
 #include "lib/image_size.h"
 
@@ -167,9 +168,11 @@ static bool have(struct cli_sink *sink, uint32_t frame)
     if (!sink->is_series || !fl_pattern_path(&sink->pattern, frame, sink->path, sizeof(sink->path)) ||
         !fl_image_size(sink->path, &width, &height))
         return false;
-    return wanted->crop_width > 0
-               ? width == wanted->crop_width && height == wanted->crop_height
-               : width == wanted->width * across && height == wanted->height * wanted->views_down;
+    const bool has_size = wanted->crop_width > 0
+                              ? width == wanted->crop_width && height == wanted->crop_height
+                              : width == wanted->width * across && height == wanted->height * wanted->views_down;
+    const enum digest_state digest = has_size ? digest_check(sink->path) : DIGEST_DIFFERS;
+    return digest == DIGEST_AGREES || (digest == DIGEST_MISSING && !sink->job->series.digests);
 }
 
 bool cli_sinks_have(struct cli_sinks *sinks, uint32_t frame)
@@ -178,6 +181,14 @@ bool cli_sinks_have(struct cli_sinks *sinks, uint32_t frame)
         if (!have(&sinks->items[i], frame))
             return false;
     return true;
+}
+
+/* Of the image before, which is complete now. */
+static bool write_digest(struct cli_sink *sink, struct fl_error *error)
+{
+    const bool done = sink->undigested[0] == '\0' || digest_write(sink->undigested, error);
+    sink->undigested[0] = '\0';
+    return done;
 }
 
 static bool write_image(struct cli_sink *sink, const struct fl_frame *frame, struct fl_error *error)
@@ -192,7 +203,11 @@ static bool write_image(struct cli_sink *sink, const struct fl_frame *frame, str
         .half = !job->float_pixels && sink->output.image == CLI_IMAGE_EXR,
         .quality =
             sink->output.image == CLI_IMAGE_JPEG || sink->output.image == CLI_IMAGE_WEBP ? job->file_quality : 0};
-    return fl_exporter_write(sink->exporter, frame, &options, error);
+    if (!fl_exporter_write(sink->exporter, frame, &options, error) || !write_digest(sink, error))
+        return false;
+    if (job->series.digests)
+        memcpy(sink->undigested, sink->path, sizeof(sink->undigested));
+    return true;
 }
 
 static bool write_all(struct cli_sink *sink, const struct fl_frame *frame, struct fl_error *error)
@@ -249,7 +264,8 @@ static bool finish(struct cli_sink *sink, struct fl_error *error)
         return fl_video_finish(sink->video, error) && (!sink->to_stdout || cli_copy_to_stdout(sink->path, error));
     if (sink->y4m)
         return sink->to_stdout || finish_y4m(sink, error);
-    return fl_exporter_wait(sink->exporter, error) && (!sink->to_stdout || cli_copy_to_stdout(sink->path, error));
+    return fl_exporter_wait(sink->exporter, error) && write_digest(sink, error) &&
+           (!sink->to_stdout || cli_copy_to_stdout(sink->path, error));
 }
 
 bool cli_sinks_finish(struct cli_sinks *sinks, struct fl_error *error)

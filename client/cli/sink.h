@@ -17,6 +17,7 @@ struct cli_sink {
     char part_path[4096];          /* of a part, the output's path */
     struct fl_pattern pattern;     /* of a series */
     char folder[4096], path[4352]; /* the image's path; of a series, that of the current frame */
+    char undigested[4352];         /* the path of an image that is being written, and gets a digest; or empty */
     bool has_temporary;            /* `folder` is to be removed */
     struct fl_exporter *exporter;  /* of images */
     struct fl_video *video;

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "cli/cli.h"
+#include "cli/metrics.h"
 #include "lib/text.h"
 
 #include <errno.h>
@@ -15,13 +16,14 @@
 #define WATCH_MIN_S 0.1
 #define WATCH_MAX_S 86400.0
 
-enum { KEY_JSON = 0x400, KEY_LIMITS, KEY_WATCH };
+enum { KEY_JSON = 0x400, KEY_LIMITS, KEY_WATCH, KEY_PROMETHEUS };
 
 struct stats_options {
     struct cli_daemon daemon;
-    bool json, limits;
-    double watch_s;     /* 0: once */
-    struct cli_job job; /* holds the error of what was typed */
+    bool json, limits, prometheus;
+    const char *prometheus_path; /* NULL: standard output */
+    double watch_s;              /* 0: once */
+    struct cli_job job;          /* holds the error of what was typed */
 };
 
 static const struct argp_option options[] = {
@@ -29,6 +31,8 @@ static const struct argp_option options[] = {
     {"limits", KEY_LIMITS, NULL, 0, "Show the daemon's limits too (JSON always contains them)", 0},
     {"watch", KEY_WATCH, "SECONDS", OPTION_ARG_OPTIONAL,
      "Show them again after so many seconds (default 2), until Ctrl-C; write --watch=10", 0},
+    {"prometheus", KEY_PROMETHEUS, "FILE", OPTION_ARG_OPTIONAL,
+     "Print what Prometheus reads, or replace FILE by it, as node_exporter reads it; write --prometheus=FILE", 0},
     {0},
 };
 
@@ -46,6 +50,10 @@ static error_t parse(int key, char *value, struct argp_state *state)
         return 0;
     case KEY_LIMITS:
         wanted->limits = true;
+        return 0;
+    case KEY_PROMETHEUS:
+        wanted->prometheus = true;
+        wanted->prometheus_path = value;
         return 0;
     case KEY_WATCH:
         wanted->watch_s = WATCH_DEFAULT_S;
@@ -256,18 +264,48 @@ static void print_limits(const struct fl_connection *connection)
         printf("limit  %-27s %14" PRIu64 "  %s\n", limit.name, limit.value, limit.what);
 }
 
+/* ---- metrics ---- */
+
+static bool write_metrics(const char *path, const struct message_stats_reply *reply, struct fl_error *error)
+{
+    char *text = NULL;
+    size_t length = 0;
+    FILE *stream = open_memstream(&text, &length);
+    if (stream)
+        metrics_print(stream, reply);
+    const bool done = stream && fclose(stream) == 0 ? cli_write_text(path, text, 0644, error)
+                                                    : fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
+    free(text);
+    return done;
+}
+
+/* A monitor is to see that the daemon is away: the error is reported as well. */
+static void tell_that_it_is_away(const struct stats_options *wanted, const struct fl_error *error)
+{
+    if (!wanted->prometheus || error->code == FL_ERROR_FILE || error->code == FL_ERROR_ARGUMENT)
+        return;
+    if (wanted->prometheus_path)
+        write_metrics(wanted->prometheus_path, NULL, NULL);
+    else
+        metrics_print(stdout, NULL);
+}
+
 static bool show(struct fl_connection *connection, const struct stats_options *wanted, struct fl_error *error)
 {
     const struct message_stats_reply *reply = NULL;
     if (!fl_stats(connection, &reply, error))
         return false;
+    if (wanted->prometheus_path)
+        return write_metrics(wanted->prometheus_path, reply, error);
     if (wanted->watch_s > 0 && !wanted->json && cli_is_terminal(STDOUT_FILENO))
         fputs("\033[H\033[J", stdout); /* on an empty screen */
-    if (wanted->json)
+    if (wanted->prometheus)
+        metrics_print(stdout, reply);
+    else if (wanted->json)
         print_json(connection, reply);
     else
         print_table(reply);
-    if (wanted->limits && !wanted->json)
+    if (wanted->limits && !wanted->json && !wanted->prometheus)
         print_limits(connection);
     return true;
 }
@@ -300,9 +338,16 @@ int cli_stats(int argc, char **argv)
     if (cli_parse(&argp, argc, argv, 0, &wanted) != 0)
         return cli_report(&wanted.job.error);
     struct fl_error error = {0};
+    if (wanted.json && wanted.prometheus) {
+        fl_error_set(&error, FL_ERROR_ARGUMENT, "--prometheus", "cannot be had together with --json");
+        return cli_report(&error);
+    }
     struct fl_connection *connection = cli_daemon_connect(&wanted.daemon, "farlight stats", true, &error);
     const bool done = connection && (wanted.watch_s > 0 ? watch(connection, &wanted, &error)
                                                         : show(connection, &wanted, &error));
     fl_connection_destroy(connection);
-    return done ? CLI_DONE : cli_report(&error);
+    if (done)
+        return CLI_DONE;
+    tell_that_it_is_away(&wanted, &error);
+    return cli_report(&error);
 }

@@ -300,7 +300,7 @@ static int thumbnails(struct thumbnails *wanted)
     struct fl_error error = {0};
     if (!cli_interrupt_begin(&error))
         return cli_report(&error);
-    cli_progress_begin(&wanted->progress, wanted->job.quiet);
+    cli_progress_begin(&wanted->progress, &wanted->job);
     const bool done = run(wanted, &error);
     cli_progress_end(&wanted->progress, done);
     close_all(wanted);

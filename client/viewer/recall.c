@@ -3,12 +3,10 @@
 #include "cli/cli.h"
 #include "lib/json_text.h"
 
-#include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
 #define FILE_BYTES_MAX 65536u
 #define PATH_BYTES 4096
@@ -167,25 +165,6 @@ static char *print(const struct recall *recall)
     return text;
 }
 
-static bool write_text(const char *path, const char *text, struct fl_error *error)
-{
-    char unfinished[PATH_BYTES + 8];
-    snprintf(unfinished, sizeof(unfinished), "%s-XXXXXX", path);
-    const int fd = mkstemp(unfinished);
-    if (fd < 0)
-        return fl_error_set(error, FL_ERROR_FILE, path, "cannot be written: %s", strerror(errno));
-    FILE *file = fdopen(fd, "w");
-    bool done = file && fprintf(file, "%s\n", text) > 0;
-    if (file)
-        done = fclose(file) == 0 && done;
-    else
-        close(fd);
-    if (done && rename(unfinished, path) == 0)
-        return true;
-    unlink(unfinished);
-    return fl_error_set(error, FL_ERROR_FILE, path, "cannot be written: %s", strerror(errno));
-}
-
 bool recall_save(const struct recall *recall, const char *path, struct fl_error *error)
 {
     char folder[PATH_BYTES];
@@ -197,7 +176,7 @@ bool recall_save(const struct recall *recall, const char *path, struct fl_error 
         return false;
     char *text = print(recall);
     const bool done =
-        text ? write_text(path, text, error) : fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
+        text ? cli_write_text(path, text, 0600, error) : fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
     free(text);
     return done;
 }

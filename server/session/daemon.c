@@ -193,6 +193,19 @@ static void on_emptied(void *context)
     struct daemon *daemon = context;
     if (daemon->hub.stopping)
         loop_stop(daemon->loop);
+    else if (daemon->unused_ns)
+        loop_timer_start(daemon->loop, &daemon->unused_timer, daemon->unused_ns);
+}
+
+/* A client that has come since then starts the timer again when it goes. */
+static void on_unused_timer(void *context)
+{
+    struct daemon *daemon = context;
+    if (daemon->hub.stopping || daemon->hub.sessions.count)
+        return;
+    log_write(LOG_INFO, "session", "stopping: there was no client for %" PRIu64 " s",
+              daemon->unused_ns / UINT64_C(1000000000));
+    stop(daemon);
 }
 
 static void on_stop_timer(void *context)
@@ -259,12 +272,14 @@ bool daemon_start(struct daemon *daemon, const struct hub_options *options, stru
     daemon->hub.call_context = daemon;
     daemon->accept_timer = (struct loop_timer){.call = on_accept_timer, .context = daemon};
     daemon->stop_timer = (struct loop_timer){.call = on_stop_timer, .context = daemon};
+    daemon->unused_timer = (struct loop_timer){.call = on_unused_timer, .context = daemon};
     daemon->watchdog_timer = (struct loop_timer){.call = on_watchdog_timer, .context = daemon};
     daemon->watchdog_ns = notify_watchdog_ns();
     if (daemon->watchdog_ns)
         on_watchdog_timer(daemon);
     if (!watch_signals(daemon, error))
         return false;
+    on_emptied(daemon); /* as yet there is no client */
     for (size_t i = 0; i < daemon->listener_count; i++) {
         daemon->listener_watches[i] =
             loop_watch_add(loop, daemon->listeners[i].fd, EPOLLIN, on_listeners, daemon, error);
@@ -329,6 +344,7 @@ void daemon_finish(struct daemon *daemon)
         loop_watch_remove(daemon->signal_watch);
         loop_timer_stop(daemon->loop, &daemon->accept_timer);
         loop_timer_stop(daemon->loop, &daemon->stop_timer);
+        loop_timer_stop(daemon->loop, &daemon->unused_timer);
         loop_timer_stop(daemon->loop, &daemon->watchdog_timer);
         hub_finish(&daemon->hub);
         loop_destroy(daemon->loop);

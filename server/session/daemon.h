@@ -24,6 +24,8 @@ struct daemon {
     struct loop_timer watchdog_timer;           /* after which the service manager is told that all goes on */
     uint64_t watchdog_ns;                       /* it wants to hear that so often; 0: it does not */
     uint64_t engine_turns;                      /* for engine_is_alive() */
+    struct loop_timer unused_timer;             /* runs from the last client's end */
+    uint64_t unused_ns;                         /* without a client, after which it ends; 0: it does not */
     bool device_gone;                           /* the engine's is lost for good: that is why it ends */
     /* Reads the configuration again and hands it to hub_reload(), at SIGHUP; NULL: that changes nothing. */
     loop_call_fn *reload;

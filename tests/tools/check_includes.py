@@ -88,7 +88,7 @@ RESTRICTED = {
     r"assimp/": ("client/import",),
     r"turbojpeg\.h": ("client/import", "client/lib", "server/encode"),
     r"zstd\.h": ("server/encode", "client/lib", "protocol/pixels"),
-    r"sodium\.h": ("server/session", "server/store", "protocol/common", "protocol/sealed"),
+    r"sodium\.h": ("client/cli", "server/session", "server/store", "protocol/common", "protocol/sealed"),
 }
 # Where the matrix of the server's rooms stands.
 README = pathlib.Path("server/README.md")

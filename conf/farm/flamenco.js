@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: MIT
+// An animation as a job type of Flamenco 3; it belongs into the folder `scripts` beside flamenco-manager.
+// Each task renders one chunk of the frames with the daemon of its worker's GPU; the last one checks all of them.
+const JOB_TYPE = {
+    label: "farlight animation",
+    description: "Render a model's animation with farlight",
+    settings: [
+        { key: "model", type: "string", subtype: "file_path", required: true, description: "The model's file" },
+        { key: "frames", type: "string", required: true, default: "1-120", description: "Frames, such as 1-120" },
+        { key: "chunk_size", type: "int32", default: 8, description: "Frames of one task" },
+        { key: "output", type: "string", subtype: "file_path", required: true,
+          description: "Pictures, such as /shared/frames/%04d.exr" },
+        { key: "options", type: "string", default: "--samples 16", description: "Further options of farlight animate" },
+    ],
+};
+
+// "1-8" of "1-8", and "3" of "3": farlight takes both as they are.
+function animate(settings, frames) {
+    return author.Command("exec", {
+        exe: "farlight-node",
+        args: ["farlight", "animate", settings.model, "--frames", frames, "-o", settings.output, "--resume", "--digests",
+               "--progress", "lines", "--retry-for", "5"].concat(settings.options.split(" ").filter((word) => word !== "")),
+    });
+}
+
+function compileJob(job) {
+    const settings = job.settings;
+    const verify = author.Task("verify", "misc");
+    verify.addCommand(author.Command("exec", {
+        exe: "farlight", args: ["verify", settings.output, "--frames", settings.frames],
+    }));
+    for (const frames of frameChunker(settings.frames, settings.chunk_size)) {
+        const task = author.Task(`render ${frames}`, "misc");
+        task.addCommand(animate(settings, frames));
+        job.addTask(task);
+        verify.addDependency(task);
+    }
+    job.addTask(verify);
+}

@@ -1,0 +1,113 @@
+# SPDX-License-Identifier: MIT
+"""What farms rely on: digests and `farlight verify`, progress in other programs' words, a daemon that ends when it is unused,
+one that stays for many tasks. tests/farm tries the templates on the queues themselves."""
+import hashlib
+import json
+import os
+import pathlib
+import re
+import subprocess
+import time
+import unittest
+
+import farlight_test
+from farlight_test import Case, Daemon, bundled_scenes, farlight
+
+NODE = pathlib.Path(__file__).parents[2] / "conf/farm/farlight-node"
+SMALL = ["--size", "24x16", "--samples", "1", "--orbit"]
+
+
+def animate(*arguments, **options):
+    return farlight("animate", bundled_scenes() / "cornell.glb", *SMALL, *arguments, **options)
+
+
+class Digests(Case):
+    def test_what_is_missing_or_differs_is_found_and_rendered_again(self):
+        pattern = self.folder / "%02d.png"
+        frames = ["--frames", "1-5"]
+        with Daemon() as daemon:
+            daemon_options = ["--server", daemon.address, "-q"]
+            self.expect(animate(*frames, "-o", pattern, "--digests", *daemon_options), 0)
+            for path in self.folder.glob("*.png"):
+                self.assertEqual(pathlib.Path(f"{path}.sha256").read_text(),
+                                 f"{hashlib.sha256(path.read_bytes()).hexdigest()}  {path.name}\n")
+            good = {path.name: path.read_bytes() for path in self.folder.iterdir()}
+            self.assertEqual(len(good), 10)
+            self.assertEqual(self.expect(farlight("verify", self.folder), 0).stdout, "5 pictures, 5 good\n")
+            damaged = self.folder / "02.png"
+            damaged.write_bytes(good["02.png"][:-1] + b"x")  # of the same size, and still a PNG by its head
+            (self.folder / "03.png").unlink()
+            (self.folder / "04.png.sha256").unlink()
+            result = self.expect(farlight("verify", pattern, *frames), 1)
+            self.assertEqual(result.stdout, f"{damaged}: differs from its digest\n{self.folder}/03.png: missing\n"
+                                            f"{self.folder}/04.png: has no digest\n5 pictures, 2 good\n")
+            record = json.loads(self.expect(farlight("verify", pattern, *frames, "--json"), 1).stdout)
+            self.assertEqual((record["pictures"], record["good"], [bad["state"] for bad in record["bad"]]),
+                             (5, 2, ["differs from its digest", "missing", "has no digest"]))
+            self.assertEqual(self.expect(farlight("verify", self.folder, "-q"), 1).stdout, "")
+            # Without the option a picture that has no digest is as good as its size.
+            for options, there in ((["--digests"], 2), ([], 5)):
+                result = self.expect(animate(*frames, "-o", pattern, "--resume", *options, "--server", daemon.address), 0)
+                self.assertIn(f"{there} of 5 frames exist already", result.stderr)
+            self.assertEqual({path.name: path.read_bytes() for path in self.folder.iterdir()}, good)
+
+    def test_what_cannot_be_checked_is_said(self):
+        for arguments, status, words in ((["verify"], 2, "FOLDER"), (["verify", self.folder], 1, "no picture in it has a digest"),
+                                         (["verify", self.folder / "none"], 1, "cannot be read"),
+                                         (["verify", self.folder, "--frames", "1-2"], 2, "%"),
+                                         (["verify", self.folder / "%d.png", "--frames", "2-1"], 2, "--frames"),
+                                         (["animate", "x.glb", "--frames", "1-2", "--digests", "-o", "x.mp4"], 2, "--digests")):
+            result = self.expect(farlight(*arguments), status)
+            self.assertIn(words, result.stderr)
+
+
+class Progress(Case):
+    def test_open_job_description_reads_it_on_standard_output(self):
+        output = ["--frames", "1-4", "-o", self.folder / "%d.png"]
+        lines = self.expect(animate(*output, "--progress", "openjd"), 0).stdout.splitlines()
+        shares = [float(line.split(": ")[1]) for line in lines if line.startswith("openjd_progress: ")]
+        self.assertEqual((shares, shares[-1]), (sorted(shares), 100))
+        self.assertTrue(all(re.match(r"openjd_(progress: \d+\.\d|status: .+)$", line) for line in lines), lines)
+        result = self.expect(farlight("render", "x.glb", "-o", "-", "--progress", "openjd"), 2)
+        self.assertIn("--progress", result.stderr)
+        self.assertIn("bar, lines and openjd", self.expect(animate(*output, "--progress", "loud"), 2).stderr)
+
+
+class OneDaemonForManyTasks(Case):
+    def test_a_daemon_without_clients_ends(self):
+        with Daemon(environment={**os.environ, "FARLIGHT_SERVER_UNUSED": "1"}) as daemon:
+            holder = subprocess.Popen([farlight_test.BIN / "farlight", "stats", "--json", "--watch=0.1", "--server", daemon.address],
+                                      stdout=subprocess.PIPE)
+            self.addCleanup(holder.stdout.close)
+            begin = time.monotonic()
+            while time.monotonic() < begin + 2:
+                holder.stdout.readline()
+            self.assertIsNone(daemon.process.poll())
+            holder.terminate()
+            holder.wait(farlight_test.TIMEOUT_S)
+            self.assertEqual(daemon.process.wait(farlight_test.TIMEOUT_S), 0)
+
+    def test_the_second_task_sends_nothing_and_finds_the_same_daemon(self):
+        environment = {**os.environ, "XDG_RUNTIME_DIR": str(self.folder), "FARLIGHT_GPU": "software", "FARLIGHT_UNUSED": "1",
+                       "PATH": f"{farlight_test.BIN}:{os.environ['PATH']}"}
+        environment.pop("FARLIGHT_SERVER", None)
+        sent = []
+        for task in range(2):
+            result = subprocess.run([NODE, "farlight", "animate", bundled_scenes() / "teapot.glb", *SMALL, "--frames", "1", "-o",
+                                     self.folder / f"{task}-%d.png", "--timings=json", "-q"], env=environment, stdout=subprocess.PIPE,
+                                    stderr=subprocess.PIPE, text=True, check=False, timeout=farlight_test.TIMEOUT_S)
+            self.expect(result, 0)
+            sent += [json.loads(line)["uploaded_bytes"] for line in result.stdout.splitlines() if '"kind":"client"' in line]
+        self.assertGreater(sent[0], 0)
+        self.assertEqual(sent[1], 0)
+        result = subprocess.run([NODE], env=environment, stderr=subprocess.PIPE, text=True, check=False)
+        self.assertEqual(result.returncode, 2)
+        environment["FARLIGHT_GPU"] = "77"  # there is none
+        result = subprocess.run([NODE, "true"], env=environment, stderr=subprocess.PIPE, text=True, check=False,
+                                timeout=farlight_test.TIMEOUT_S)
+        self.assertEqual(result.returncode, 75, result.stderr)
+        self.assertIn("77", result.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()
