@@ -103,6 +103,9 @@ class Codec(Case):
         passing = scene.add_node()
         scene.remove(passing)  # which nobody has seen
         self.assertEqual([edit.NAME for edit in scene.edits_since(version)], ["set_material"])
+        lamp = scene.objects("node")[-1]
+        scene.change(scene.shown(lamp), colour=(9, 9, 9))
+        self.assertEqual([edit.NAME for edit in scene.edits_since(version)], ["set_material", "set_light"])
         group = scene.add_node()
         scene.add_node(parent=group)
         version = scene.version

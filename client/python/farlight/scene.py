@@ -164,6 +164,12 @@ class Scene:
         _make(type(edit), values)
         self.set(replace(edit, **values))
 
+    def shown(self, node: Object) -> Object | None:
+        """What a node shows: change(shown(lamp), colour=(9, 9, 9))."""
+        edit = self.get(node)
+        kind = next((kind for kind, shows in _SHOWN.items() if shows == edit.kind), None)
+        return None if kind is None else Object(kind, edit.object)
+
     def remove(self, thing: Object) -> None:
         """With a node all below it, as the daemon does it; refused at the commit if a remaining node uses it."""
         below, at = [thing], 0
