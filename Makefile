@@ -330,8 +330,8 @@ $(LOSING_DAEMON): $(B)/tests/tools/lost_gpu.o $(B)/server/main.o $(SERVER_OBJ) $
 BUILD_PACKAGES := gcc g++ make pkg-config libepoxy-dev libegl-dev libgl-dev libcglm-dev libturbojpeg0-dev libzstd-dev \
     libsodium-dev libxxhash-dev libinih-dev libjansson-dev libjemalloc-dev libseccomp-dev libopenimageio-dev libpng-dev libtiff-dev libopenexr-dev libjxl-dev libtinygltf-dev \
     libtinyobjloader-dev libdraco-dev libmeshoptimizer-dev libassimp-dev libembree-dev libavcodec-dev libavformat-dev libavutil-dev libswscale-dev libsdl2-dev libsdl2-ttf-dev fonts-dejavu-core libegl1 libgl1-mesa-dri
-TEST_PACKAGES := libcmocka-dev python3 python3-jsonschema python3-prometheus-client ffmpeg xvfb gnuplot-nox
-LINT_PACKAGES := clang clang-format glslang-tools python3
+TEST_PACKAGES := libcmocka-dev python3 python3-jsonschema python3-numpy python3-prometheus-client ffmpeg xvfb gnuplot-nox
+LINT_PACKAGES := clang clang-format glslang-tools python3 python3-numpy mypy
 # A second driver stack: OpenGL over Vulkan, on the CPU. The validation sees what it does.
 STACK_PACKAGES := mesa-vulkan-drivers
 SYNC_PACKAGES := $(STACK_PACKAGES) libvulkan1 libvulkan-dev vulkan-validationlayers
@@ -431,6 +431,11 @@ bench-plot: test-packages
 	$(MAKE) -j$(JOBS) $(BENCHED)
 	python3 tests/bench/bench_plot.py $(B)
 
+# The Python package's messages, from the tables of protocol/; the package is installed without make, too.
+.PHONY: python-messages
+python-messages:
+	python3 client/python/generate.py
+
 # ---- what is checked without running it
 check-headers:
 	@tests/tools/check_headers.sh $(CC) -I. -Iserver -Ishaders -Iclient $(SERVER_CFLAGS) $(CLIENT_CFLAGS)
@@ -440,10 +445,12 @@ format:
 # Include rules, headers alone, layout: without installing, and without clang's compiler.
 check-rules: check-headers
 	@python3 tests/tools/check_includes.py
+	@python3 client/python/generate.py --check
 	@printf '%s\n' $(FORMATTED) | xargs -P $(JOBS) -n 40 clang-format --dry-run -Werror
 lint: lint-packages
 	@$(MAKE) -s check-rules compile_commands.json
 	python3 tests/tools/check_shaders.py
+	cd client/python && mypy --strict --cache-dir $(CURDIR)/build/mypy -p farlight
 	python3 tests/tools/compile_commands.py --syntax
 # About a minute after a build; installs nothing, and names what is missing.
 check:
@@ -475,7 +482,14 @@ coverage: coverage-packages
 	gcovr -j $(JOBS) --root . --filter 'server/' --filter 'client/' --filter 'protocol/' --gcov-ignore-parse-errors \
 	    --html-details out/coverage/index.html --print-summary build/coverage
 
+# Where Debian's python3 looks: it has one folder for all versions below /usr, and one for each below /usr/local.
+PYTHON_VERSION := $(if $(filter-out /usr,$(PREFIX)),$(shell /usr/bin/python3 -c 'import sys; print("%d.%d" % sys.version_info[:2])' 2>/dev/null),3)
+PYTHON_FOLDER ?= $(PREFIX)/lib/python$(PYTHON_VERSION)/dist-packages
 install: all
+	install -d $(DESTDIR)$(PYTHON_FOLDER)/farlight $(DESTDIR)$(PREFIX)/share/doc/farlight/examples/python
+	install -m 644 client/python/farlight/*.py client/python/farlight/py.typed $(DESTDIR)$(PYTHON_FOLDER)/farlight
+	install -m 755 client/python/examples/*.py $(DESTDIR)$(PREFIX)/share/doc/farlight/examples/python
+	install -m 644 client/python/README.md $(DESTDIR)$(PREFIX)/share/doc/farlight/python.md
 	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/share/farlight \
 	    $(addprefix $(DESTDIR)$(PREFIX)/share/man/man,1 5 7 8) \
 	    $(DESTDIR)$(PREFIX)/share/doc/farlight/examples $(DESTDIR)/etc/farlight \
@@ -521,6 +535,7 @@ uninstall:
 	    $(addprefix $(DESTDIR)$(PREFIX)/share/bash-completion/completions/,$(notdir $(PROGRAMS)))
 	rm -f $(addprefix $(DESTDIR)$(UNITDIR)/farlightd.,service socket) \
 	    $(DESTDIR)$(PREFIX)/lib/sysusers.d/farlight.conf
+	rm -rf $(DESTDIR)$(PYTHON_FOLDER)/farlight
 	rm -rf $(DESTDIR)$(PREFIX)/lib/farlight $(DESTDIR)$(PREFIX)/share/doc/farlight $(DESTDIR)$(PREFIX)/share/farlight $(DESTDIR)$(PREFIX)/include/farlight
 
 # ---- packages ----
@@ -577,6 +592,7 @@ help:
 	@echo 'make coverage   which lines tests reach, into out/coverage   [TESTS=part-of-a-name]'
 	@echo 'make compile_commands.json   how each source is compiled, for editors'
 	@echo 'make format     clang-format over our sources'
+	@echo 'make python-messages   write the messages of the Python package from the tables of protocol/'
 	@echo 'make install    [PREFIX=/usr/local DESTDIR=]'
 	@echo 'make clean      remove build/; distclean removes out/ as well'
 

@@ -1,0 +1,332 @@
+# SPDX-License-Identifier: MIT
+"""The plain client: each call returns when it is done."""
+from __future__ import annotations
+
+import contextlib
+import os
+import selectors
+import time
+from collections.abc import Callable, Iterator
+from typing import Any, TypeVar
+
+from . import address, messages
+from .core import Core, Operation
+from .errors import ConnectionLost, Error, Refused, TimedOut
+from .fields import Message
+from .frame import Frame
+from .jobs import Job
+from .scene import Camera, CameraOf, Object, Scene, request
+from .sealed import read_key
+
+T = TypeVar("T")
+
+RECEIVE_BYTES = 1 << 20
+SILENCE_S = 60.0  # a daemon answers pings at once, however long a frame takes
+PAUSE_S, PAUSE_MAX_S = 0.25, 10.0  # between attempts
+
+
+class Retry:
+    """How long, and at which pace, a daemon is waited for that is lost or has no place."""
+
+    def __init__(self, for_s: float) -> None:
+        self.for_s, self.pause_s = for_s, PAUSE_S
+        self.since: float | None = None
+
+    def succeeded(self) -> None:
+        """The next failure is a new one."""
+        self.since, self.pause_s = None, PAUSE_S
+
+    def pause(self, why: Error) -> float:
+        """Seconds to wait before the next attempt; raises `why` if there is none."""
+        now = time.monotonic()
+        self.since = now if self.since is None else self.since
+        if not why.retryable or now - self.since >= self.for_s:
+            raise why
+        pause = max(self.pause_s, why.retry_after_s if isinstance(why, Refused) else 0)
+        self.pause_s = min(2 * self.pause_s, PAUSE_MAX_S)
+        return min(pause, self.since + self.for_s - now)
+
+
+class Options:
+    """What both clients are connected by."""
+
+    def __init__(self, server: str | None, key_file: str | os.PathLike[str] | None, name: str, timeout: float,
+                 retry_for: float) -> None:
+        self.server = server or address.usual_server()
+        key_file = key_file or address.usual_key(self.server)
+        self.key = read_key(key_file) if key_file and self.server else None
+        self.name, self.timeout, self.retry_for = name, timeout, retry_for
+
+    def core(self, lost: Core | None) -> Core:
+        """For a new connection."""
+        return Core(self.name, self.key, lost)
+
+
+class View:
+    """A picture that follows a camera; a context manager."""
+
+    def __init__(self, client: Client, job: Job) -> None:
+        self._client, self._job, self._core = client, job, client._core
+
+    def look(self, camera: Camera, moving: bool = False, time_s: float = 0.0) -> int:
+        """Moves the camera; the number that frames have as begin.command. moving: more will follow soon."""
+        number = self._core.look(self._job, camera.command(moving, time_s))
+        self._client._flush()
+        return number
+
+    def next_frame(self) -> Frame:
+        """The newest; waits for it. While nothing changes and all samples are there, none comes."""
+        return self._client._operate(self._core.next_frame(self._job))
+
+    def close(self) -> None:
+        """Ends it."""
+        if self._core.failure is None:
+            self._client._operate(self._core.cancel(self._job))
+
+    def __enter__(self) -> View:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+class Client:
+    """A connection to a daemon; a context manager. Made by connect(). Not for several threads at once."""
+
+    def __init__(self, options: Options) -> None:
+        self._options = options
+        self._link: address.Link | None = None
+        self._core: Core = options.core(None)
+        self._selector = selectors.DefaultSelector()
+        self._closed = False
+        try:
+            self._again(self._ensure)
+        except BaseException:
+            self.close()
+            raise
+
+    # ---- driving the core
+
+    def _connect(self) -> None:
+        self._drop()
+        self._core = self._options.core(self._core)
+        self._link = address.open_link(self._options.server, self._options.timeout)
+        self._link.socket.setblocking(False)
+        self._selector.register(self._link.socket, selectors.EVENT_READ)
+        try:
+            self._operate(self._core.greet(), self._options.timeout)
+        except Error as why:
+            address.explain(why, self._options.server, self._link)
+            raise
+
+    def _drop(self) -> None:
+        if self._link is not None:
+            self._selector.unregister(self._link.socket)
+            self._link.close()
+            self._link = None
+
+    def _ensure(self) -> None:
+        """Connects, and again if the connection was lost, or is found to be."""
+        if self._closed:
+            raise ConnectionLost("the client is closed", retryable=False)
+        if self._link is not None and self._core.failure is None:
+            while self._receive() and self._core.failure is None:
+                pass
+        if self._link is None or self._core.failure is not None:
+            self._connect()
+
+    def _receive(self) -> bool:
+        """Takes what has come; False: nothing has."""
+        assert self._link is not None
+        try:
+            self._core.receive(self._link.socket.recv(RECEIVE_BYTES))
+            return True
+        except BlockingIOError:
+            return False
+        except OSError as why:
+            self._core.fail(ConnectionLost(f"the connection broke: {why.strerror}"))
+            return True
+
+    def _flush(self) -> None:
+        """Sends what can be sent without waiting."""
+        assert self._link is not None
+        try:
+            while unsent := self._core.unsent():
+                self._core.sent(self._link.socket.send(memoryview(unsent)[:RECEIVE_BYTES].tobytes()))
+        except BlockingIOError:
+            pass
+        except OSError as why:
+            # The daemon may have said why before it closed.
+            while self._core.failure is None and self._receive():
+                pass
+            self._core.fail(ConnectionLost(f"the connection broke: {why.strerror}"))
+
+    def _exchange(self, silence_s: float) -> None:
+        """Sends, and waits until something has come or could be sent."""
+        self._flush()
+        if self._core.failure is not None:
+            return
+        assert self._link is not None
+        quiet = 0
+        while True:
+            events = selectors.EVENT_READ | (selectors.EVENT_WRITE if self._core.unsent() else 0)
+            self._selector.modify(self._link.socket, events)
+            ready = self._selector.select(silence_s / 3)
+            if ready and ready[0][1] & selectors.EVENT_READ:
+                self._receive()
+            if ready:
+                return
+            quiet += 1
+            if quiet == 3:
+                self._core.fail(TimedOut(f"the daemon has been silent for {silence_s:g} s"))
+                return
+            self._core.ping()
+            self._flush()
+
+    def _operate(self, operation: Operation[T], silence_s: float | None = None) -> T:
+        while True:
+            try:
+                next(operation)
+            except StopIteration as done:
+                self._flush()
+                result: T = done.value
+                return result
+            self._exchange(silence_s or self._options.timeout)
+
+    def _again(self, attempt: Callable[[], T]) -> T:
+        """Attempts it until it succeeds or the time of retry_for is over."""
+        retry = Retry(self._options.retry_for)
+        while True:
+            try:
+                return attempt()
+            except Error as why:
+                time.sleep(retry.pause(why))
+
+    def _call(self, make: Callable[[], Operation[T]]) -> T:
+        def attempt() -> T:
+            self._ensure()
+            return self._operate(make())
+        return self._again(attempt)
+
+    # ---- what it is for
+
+    @property
+    def limits(self) -> dict[str, int]:
+        """Those of the daemon; 0: not told."""
+        return dict(self._core.limits)
+
+    def send(self, scene: Scene, base_revision: int = 0) -> int:
+        """Sends what has changed in the scene; its revision. Rendering does that by itself. base_revision: refused with
+        `conflict` if others have changed the same objects since."""
+        return self._call(lambda: self._core.commit(scene, base_revision))
+
+    def close_scene(self, scene: Scene) -> None:
+        """Releases it at the daemon; the next use sends it again."""
+        self._call(lambda: self._core.close_scene(scene))
+
+    def attach(self, name: str) -> Scene:
+        """A kept or shared scene that is there, to be rendered and edited; objects() says what it has."""
+        scene = Scene(name)
+        scene.is_attached = True
+        self._call(lambda: self._core.open(scene))
+        return scene
+
+    def changed(self, scene: Scene) -> int:
+        """The revision that others have made of a kept or shared scene since it was opened here; 0: none."""
+        self._ensure()
+        return self._core.changed(scene)
+
+    def objects(self, scene: Scene, kind: messages.ObjectKind | str, name: str = "") -> list[messages.ObjectEntry]:
+        """Those that the daemon has, also others' ones."""
+        return self._call(lambda: self._core.objects(scene, kind, name))
+
+    def read(self, scene: Scene, thing: Object) -> tuple[Message, int]:
+        """A node, material, light or camera as the daemon has it, and the revision for send(base_revision=...)."""
+        return self._call(lambda: self._core.read(scene, thing.kind, thing.number))
+
+    def describe(self, scene: Scene) -> messages.SceneDescription:
+        """Bounds, cameras and clips."""
+        self.send(scene)
+        return self._call(lambda: self._core.describe(scene))
+
+    def scenes(self) -> list[messages.SceneEntry]:
+        """Those that the client may attach to."""
+        reply, _ = self._call(lambda: self._core.ask(messages.SceneList(), messages.SceneListReply))
+        entries: list[messages.SceneEntry] = list(reply.scenes)
+        return entries
+
+    def stats(self) -> messages.StatsReply:
+        """The daemon's state."""
+        reply, _ = self._call(lambda: self._core.ask(messages.Stats(), messages.StatsReply))
+        assert isinstance(reply, messages.StatsReply)
+        return reply
+
+    def render(self, scene: Scene, camera: CameraOf = None, *, layers: Any = (), **values: Any) -> Frame:
+        """One picture. camera: a Camera, a node with one, or None: the whole scene in view. layers: "depth" or
+        ("beauty", "normal"), as floats. `values`: fields of messages.Render, such as width, samples, integrator="path"."""
+        frame, = self.frames(scene, camera, layers=layers, **values)
+        return frame
+
+    def frames(self, scene: Scene, camera: CameraOf = None, *, layers: Any = (), **values: Any) -> Iterator[Frame]:
+        """The frames first_frame .. last_frame, one after the other. After a lost connection it goes on with the next
+        one, if there is a retry_for. Several cameras are keys over time."""
+        render = request(camera, layers, {**values, "kind": messages.JobKind.BATCH})
+        retry = Retry(self._options.retry_for)
+        is_complete = False
+        while not is_complete:
+            try:
+                self._ensure()
+                with contextlib.closing(self._core.batch(scene, render)) as batch:
+                    for frame in batch:
+                        if frame is None:
+                            self._exchange(self._options.timeout)
+                            continue
+                        self._flush()
+                        retry.succeeded()
+                        render.first_frame = frame.number + render.frame_step
+                        is_complete = render.first_frame > render.last_frame
+                        yield frame
+                return
+            except Error as why:
+                if not is_complete:
+                    time.sleep(retry.pause(why))
+            finally:
+                if self._link is not None:
+                    self._flush()
+
+    def view(self, scene: Scene, camera: CameraOf = None, **values: Any) -> View:
+        """A picture that follows a camera."""
+        render = request(camera, (), {**values, "kind": messages.JobKind.VIEW})
+        return View(self, self._call(lambda: self._core.view(scene, render)))
+
+    def ask(self, message: Message, answer: type[Message] = messages.Ok) -> Message:
+        """Any request of the protocol, and its answer."""
+        made: Message = self._call(lambda: self._core.ask(message, answer))[0]
+        return made
+
+    def close(self) -> None:
+        """Says goodbye; a daemon of one's own ends."""
+        if not self._closed and self._link is not None:
+            self._core.leave()
+            self._flush()
+        self._closed = True
+        self._drop()
+        self._selector.close()
+
+    def __enter__(self) -> Client:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+def connect(server: str | None = None, *, key_file: str | os.PathLike[str] | None = None, name: str = "python",
+            timeout: float = SILENCE_S, retry_for: float = 0.0) -> Client:
+    """Connects to a daemon.
+
+    server: unix:PATH, tcp:HOST:PORT or ssh:HOST[:SOCKET]; None: FARLIGHT_SERVER, else a daemon of one's own, which ends
+    with the client. key_file: the daemon's key: the connection is sealed (default over TCP: FARLIGHT_KEY). timeout:
+    seconds that the daemon may be silent. retry_for: seconds for which a daemon that is lost or has no place is waited
+    for; scenes are sent to it again, and animations go on where they were.
+    """
+    return Client(Options(server, key_file, name, timeout, retry_for))

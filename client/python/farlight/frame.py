@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: MIT
+"""Frames as arrays."""
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Union
+
+import numpy as np
+import numpy.typing as npt
+
+from .errors import InvalidValue
+from .messages import FrameBegin, FrameEnd, Layer, PixelFormat, StructureRow
+
+Array = npt.NDArray[Any]
+
+_TYPES = {PixelFormat.RGBA8: "u1", PixelFormat.RGBA16F: "<f2", PixelFormat.RGBA32F: "<f4"}
+
+
+def bytes_per_pixel(begin: FrameBegin) -> int:
+    """Of its format."""
+    return 4 * np.dtype(_TYPES[PixelFormat(int(begin.format))]).itemsize
+
+
+def layer_count(begin: FrameBegin) -> int:
+    """Images in the frame."""
+    return bin(begin.layers).count("1")
+
+
+def layer_set(layers: Union[int, str, Layer, "tuple[str | Layer, ...]", "list[str | Layer]"]) -> int:
+    """The set of bits of "depth", or of ("beauty", "depth")."""
+    names = (layers,) if isinstance(layers, (str, Layer)) else layers
+    if isinstance(names, int):
+        return names
+    try:
+        return sum({1 << int(Layer.of(name)) for name in names})
+    except ValueError as why:
+        raise InvalidValue(str(why), field="render.layers") from None
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A picture as it came. `begin` and `end` are all that the daemon says of it: camera, revision, samples, digest,
+    rays, times of the stages. Arrays are views of its bytes, rows from the top, and cannot be written to."""
+    begin: FrameBegin
+    end: FrameEnd
+    data: bytes
+
+    @property
+    def number(self) -> int:
+        """In the job's range."""
+        return self.begin.frame
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height, pixels."""
+        return self.begin.width, self.begin.height
+
+    @property
+    def layers(self) -> list[Layer]:
+        """Those that are there, in the order of their images."""
+        return [layer for layer in Layer if self.begin.layers >> layer & 1]
+
+    def layer(self, layer: str | Layer) -> Array:
+        """Height x width x 4 numbers of one layer: what the protocol says of it."""
+        try:
+            place = self.layers.index(Layer(Layer.of(layer)))
+        except ValueError:
+            raise InvalidValue(f"the frame has {', '.join(one.word for one in self.layers)} and not {layer}",
+                               field="layer", remedy="name it in `layers` of the request") from None
+        shape = (layer_count(self.begin), self.begin.height, self.begin.width, 4)
+        images = np.frombuffer(self.data, _TYPES[PixelFormat(int(self.begin.format))]).reshape(shape)
+        one: Array = images[place]
+        return one
+
+    @property
+    def colour(self) -> Array:
+        """Height x width x 4: the picture itself. uint8: tone-mapped sRGB and straight alpha; else linear floats and
+        premultiplied alpha."""
+        return self.layer(Layer.BEAUTY)
+
+    @property
+    def depth(self) -> Array:
+        """Height x width: metres along the view to the first surface; infinite where there is none."""
+        layer = self.layer(Layer.DEPTH)
+        return np.where(layer[..., 3] > 0, layer[..., 0], np.inf).astype(layer.dtype)
+
+    @property
+    def normal(self) -> Array:
+        """Height x width x 3: the shading normal in world space; 0 where there is no surface."""
+        layer: Array = self.layer(Layer.NORMAL)[..., :3]
+        return layer
+
+    @property
+    def albedo(self) -> Array:
+        """Height x width x 3: base colour."""
+        layer: Array = self.layer(Layer.ALBEDO)[..., :3]
+        return layer
+
+    @property
+    def position(self) -> Array:
+        """Height x width x 3: world position of the first surface, metres."""
+        layer: Array = self.layer(Layer.POSITION)[..., :3]
+        return layer
+
+    @property
+    def world_from_view(self) -> Array:
+        """4 x 4: the camera, which looks along -z."""
+        return np.array([*self.begin.world_from_view, 0, 0, 0, 1], dtype=np.float64).reshape(4, 4)
+
+    @property
+    def warnings(self) -> list[str]:
+        """What the picture lacks, and the remedy, in the tracer's words."""
+        rows: list[StructureRow] = list(self.end.structure)
+        return [row.warning for row in rows if row.warning]

@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: MIT
+"""The first bytes of a connection; their layout never changes. No I/O."""
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+
+from . import messages
+from .errors import InvalidValue, ProtocolError, Refused
+from .messages import ErrorCode
+
+VERSION = 1
+MAGIC = b"FARL"
+NEEDS_KEY, TRY_AGAIN, CAN_CHOOSE_PRIMARY, CAN_READ_OBJECTS = 1 << 2, 1 << 4, 1 << 5, 1 << 8  # bits of capabilities
+NAME_MAX_BYTES, LIMITS_MAX_BYTES, FIXED_BYTES = 64, 256, 48
+
+
+def hello(name: str) -> bytes:
+    """A client's; `name` is what the daemon shows of it."""
+    encoded = name.encode("utf-8", "replace")
+    if len(encoded) > NAME_MAX_BYTES or b"\0" in encoded:
+        raise InvalidValue(f"{name!r} is not at most {NAME_MAX_BYTES} bytes without NUL", field="name")
+    made = MAGIC + VERSION.to_bytes(2, "little") * 2 + (CAN_CHOOSE_PRIMARY | CAN_READ_OBJECTS).to_bytes(8, "little")
+    made += os.urandom(16) + bytes((len(encoded),)) + encoded
+    return made + bytes(-len(made) % 8)
+
+
+@dataclass(frozen=True)
+class Reply:
+    """A daemon's, which lets us in; `size` bytes were it."""
+    capabilities: int
+    limits: dict[str, int]
+    daemon: str
+    size: int
+
+
+def _limits(data: bytes) -> dict[str, int]:
+    """What an older daemon lacks is 0, what a newer one has is skipped."""
+    limits, at = {}, 0
+    for name, letter, _ in messages.LIMITS:
+        size = 8 if letter == "Q" else 4
+        limits[name] = int.from_bytes(data[at:at + size], "little") if at + size <= len(data) else 0
+        at += size
+    return limits
+
+
+def parse(data: bytearray) -> Reply | None:
+    """None: it has not come as a whole. ProtocolError for a wrong byte as soon as it is there, Refused with the daemon's
+    reason."""
+    if not MAGIC.startswith(bytes(data[:4])):
+        raise ProtocolError("the server there is no farlight daemon", field="handshake")
+    if len(data) < FIXED_BYTES:
+        return None
+    limits_bytes = int.from_bytes(data[6:8], "little")
+    if limits_bytes > LIMITS_MAX_BYTES:
+        raise ProtocolError(f"{limits_bytes} bytes of limits, at most {LIMITS_MAX_BYTES}", field="handshake")
+    at, texts = FIXED_BYTES + limits_bytes, []
+    for _ in range(2):
+        if len(data) <= at or len(data) < at + 1 + data[at]:
+            return None
+        texts.append(bytes(data[at + 1:at + 1 + data[at]]).decode("utf-8", "replace"))
+        at += 1 + data[at]
+    at += -at % 8
+    if len(data) < at:
+        return None
+    version, capabilities = int.from_bytes(data[4:6], "little"), int.from_bytes(data[8:16], "little")
+    if version == 0 and capabilities & NEEDS_KEY:
+        raise Refused("the daemon accepts only clients with its key", code=ErrorCode.DENIED,
+                      remedy="give key_file, the file with a copy of the key")
+    if version != VERSION:
+        raise Refused(texts[1] or f"the daemon chose version {version}", code=ErrorCode.VERSION,
+                      retryable=bool(capabilities & TRY_AGAIN))
+    return Reply(capabilities, _limits(bytes(data[FIXED_BYTES:FIXED_BYTES + limits_bytes])), texts[0], at)

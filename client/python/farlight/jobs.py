@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: MIT
+"""Requests on their way, and the frames of those that are jobs. No I/O; what comes is checked against what was asked for."""
+from __future__ import annotations
+
+import collections
+from dataclasses import dataclass, field
+from typing import Optional
+
+from . import messages
+from .errors import ProtocolError
+from .fields import Message
+from .frame import Frame, bytes_per_pixel, layer_count
+
+
+@dataclass
+class Pending:
+    """A request on its way."""
+    finals: tuple[type[Message], ...]
+    extra: Optional[type[Message]] = None  # what may come once before the answer
+    came: Optional[Message] = None
+    answer: Optional[Message] = None
+
+
+@dataclass
+class Job:
+    """A request whose frames come on a channel of its own."""
+    request: int
+    channel: int
+    render: messages.Render
+    pending: Pending
+    credit: int
+    begun: Optional[messages.FrameBegin] = None
+    data: bytearray = field(default_factory=bytearray)
+    frames: collections.deque[Frame] = field(default_factory=collections.deque)
+    came: int = 0
+    command: int = 0
+    is_abandoned: bool = False
+
+    @property
+    def is_view(self) -> bool:
+        return self.render.kind == messages.JobKind.VIEW
+
+    def check_begin(self, begin: messages.FrameBegin) -> None:
+        """That it is a frame of what was asked for: nobody makes us keep more."""
+        render, pixels = self.render, begin.width * begin.height
+        width = render.crop_width or render.width * render.views_across
+        height = render.crop_height or render.height * render.views_down
+        if self.begun is not None:
+            raise ProtocolError("a frame begins within another one", field="frame_begin")
+        if self.came >= self.credit:
+            raise ProtocolError(f"frame {self.came + 1} of a job with a credit of {self.credit}", field="frame_begin")
+        if pixels > width * height or (not self.is_view and (begin.width, begin.height) != (width, height)):
+            raise ProtocolError(f"a picture of {begin.width}x{begin.height} where {width}x{height} was asked for",
+                                field="frame_begin.width")
+        if (begin.encoding, begin.format, begin.layers) != (render.encoding, render.format, render.layers or 1):
+            raise ProtocolError(f"{begin.encoding!r}, {begin.format!r}, layers {begin.layers}: not what was asked for",
+                                field="frame_begin.encoding")
+        wanted = pixels * bytes_per_pixel(begin) * layer_count(begin)
+        attached = begin.depth_bytes + begin.normal_bytes + begin.sticking_bytes
+        if begin.size_bytes != wanted or attached:
+            raise ProtocolError(f"{begin.size_bytes} bytes, and {attached} attached, where the picture has {wanted}",
+                                field="frame_begin.size_bytes")
+
+    def take(self, message: Message) -> Optional[Frame]:
+        """A frame's message; the frame that is complete with it."""
+        if isinstance(message, messages.FrameBegin):
+            if not self.is_abandoned:
+                self.check_begin(message)
+            self.begun, self.data = message, bytearray()
+            return None
+        if self.is_abandoned:
+            return None
+        if self.begun is None:
+            raise ProtocolError("comes without a frame_begin", field=message.NAME)
+        if isinstance(message, messages.FrameData):
+            if message.offset_bytes != len(self.data) or len(self.data) + len(message.data) > self.begun.size_bytes:
+                raise ProtocolError(f"{len(message.data)} bytes at {message.offset_bytes}, where {len(self.data)} of "
+                                    f"{self.begun.size_bytes} have come", field="frame_data.offset_bytes")
+            self.data += message.data
+            return None
+        assert isinstance(message, messages.FrameEnd)
+        if message.frame != self.begun.frame or message.abandoned or len(self.data) != self.begun.size_bytes:
+            raise ProtocolError(f"frame {message.frame} ends with {len(self.data)} of {self.begun.size_bytes} bytes, "
+                                f"and frame {self.begun.frame} was begun", field="frame_end.frame")
+        frame = Frame(self.begun, message, bytes(self.data))
+        self.begun, self.data, self.came = None, bytearray(), self.came + 1
+        return frame

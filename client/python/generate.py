@@ -1,0 +1,206 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""Writes farlight/messages.py from the tables of protocol/, or says whether it is current.
+
+Usage: generate.py [--check]. The C preprocessor reads the tables, as it does for the C side. A record or a message
+becomes a dataclass with the defaults of the table, an enumeration an IntEnum. EXTRA_TRACER has no part in it.
+"""
+import ast
+import keyword
+import pathlib
+import re
+import subprocess
+import sys
+import textwrap
+
+HERE = pathlib.Path(__file__).resolve().parent
+ROOT = HERE.parents[1]
+TARGET = HERE / "farlight" / "messages.py"
+VERSION = HERE / "farlight" / "version.py"
+LETTERS = {"u8": "B", "u16": "H", "u32": "I", "u64": "Q"}
+WIDTH = 120
+
+# Each row of a table becomes a tuple of Python. Arguments that are no strings in the table become strings.
+ROWS = {
+    "RECORD": "name, doc", "MESSAGE": "NAME, name, number, from, doc",
+    "INT": "type, field, min, max, doc", "ENUM": "enum_name, field, doc", "REAL": "field, min, max, doc",
+    "OPTION_INT": "type, field, min, max, default_value, unit, doc",
+    "OPTION_REAL": "field, min, max, default_value, unit, doc", "REALS": "field, count, min, max, doc",
+    "BYTES": "field, count, doc", "STRING": "field, max, doc", "ARRAY": "record, field, max, doc",
+    "BULK": "field, max, doc",
+    "SETTING_WHOLE": "tracer, field, min, max, default_value, unit, mark, doc",
+    "SETTING_ONE_OF": "tracer, field, numbers, max, default_value, unit, mark, doc",
+    "SETTING_REAL": "tracer, field, min, max, default_value, unit, mark, doc",
+    "SETTING_CHOICE": "tracer, field, choices, mark, doc",
+    "ENUMERATION": "PREFIX, name, doc", "VALUE": "PREFIX, NAME, number, text, doc", "LIMIT": "type, name, doc",
+}
+STRINGS = {"doc", "unit", "text", "numbers"}
+
+
+def read(table, names):
+    """The rows of a table, each a tuple that begins with its macro."""
+    source = ""
+    for name in names:
+        arguments = ROWS[name].split(", ")
+        values = [argument if argument in STRINGS else f"#{argument}" for argument in arguments]
+        source += f"#define {name}({', '.join(arguments)}) (\"{name}\", {', '.join(values)}),\n"
+    source += f'#include "protocol/{table}"\n'
+    done = subprocess.run(["cc", "-E", "-P", "-I", str(ROOT), "-xc", "-"], input=source, capture_output=True, text=True,
+                          check=True)
+    return ast.literal_eval(f"[{done.stdout}]")
+
+
+def camel(name):
+    return "".join(word.capitalize() for word in name.split("_"))
+
+
+def number(text):
+    return int(float(text)) if "e" in text else int(text, 0)
+
+
+def real(text):
+    """A float of Python."""
+    return text if set(text) & set(".e") else f"{text}.0"
+
+
+def prose(text, indent):
+    return textwrap.fill(text, WIDTH, initial_indent=indent, subsequent_indent=indent + "    ", break_on_hyphens=False,
+                         break_long_words=False)
+
+
+def docstring(text, fields=()):
+    """`fields`: (name, its doc)."""
+    told = [(name, doc) for name, doc in fields if doc]
+    text = text.replace("\\", "\\\\") or "See the table."
+    first = prose(f'"""{text}' + ("" if told else '"""'), "    ").replace("        ", "    ")
+    if not told:
+        return first
+    return "\n".join([first, ""] + [prose(f"{name}: {doc}", "    ") for name, doc in told] + ['    """'])
+
+
+class Field:
+    """One field: its descriptor, its type and default in Python, and its doc."""
+
+    def __init__(self, row):
+        kind = row[0]
+        self.doc = row[-1]
+        getattr(self, kind.lower())(*row[1:-1])
+
+    def make(self, name, descriptor, annotation, default):
+        self.name = name + "_" * keyword.iskeyword(name)
+        self.annotation, self.default = annotation, default
+        self.descriptor = "_f." + descriptor.format(name=f'"{self.name}"')
+
+    def int(self, type_, field, low, high, default=None, _unit=None):
+        low, high = number(low), number(high)
+        self.make(field, f'whole({{name}}, "{LETTERS[type_]}", {low}, {high})', "int", low if default is None else default)
+
+    def option_int(self, *arguments):
+        self.int(*arguments)
+
+    def enum(self, enum_name, field):
+        self.make(field, f"choice({{name}}, {camel(enum_name)})", f"{camel(enum_name)} | str", f"{camel(enum_name)}(0)")
+
+    def real(self, field, low, high, default=None, _unit=None):
+        start = default if default is not None else low if float(low) > 0 else "0"
+        self.make(field, f"real({{name}}, {real(low)}, {real(high)})", "float", real(start))
+
+    def option_real(self, *arguments):
+        self.real(*arguments)
+
+    def reals(self, field, count, low, high):
+        start = ", ".join([real(low) if float(low) > 0 else "0.0"] * int(count))
+        self.make(field, f"real({{name}}, {real(low)}, {real(high)}, {count})", "Sequence[float]", f"({start})")
+
+    def bytes(self, field, count):
+        self.make(field, f"exactly({{name}}, {count})", "bytes", f"bytes({count})")
+
+    def string(self, field, high):
+        self.make(field, f"text({{name}}, {high})", "str", '""')
+
+    def array(self, record, field, high):
+        self.make(field, f"array({{name}}, {camel(record)}, {high})", f"Sequence[{camel(record)}]", "()")
+
+    def bulk(self, field, high):
+        self.make(field, f"bulk({{name}}, {high})", "Bytes", 'b""')
+
+    def setting_whole(self, tracer, field, low, high, _default, _unit, _mark):
+        self.make(f"{tracer}_{field}", f'whole({{name}}, "I", {low}, {high}, zero=True)', "int", 0)
+
+    def setting_one_of(self, tracer, field, numbers, high, _default, _unit, _mark):
+        self.make(f"{tracer}_{field}", f'whole({{name}}, "I", 0, {high}, listed=(0, {numbers}))', "int", 0)
+
+    def setting_real(self, tracer, field, low, high, default, _unit, _mark):
+        zero = float(low) > 0
+        self.make(f"{tracer}_{field}", f"real({{name}}, {real(low)}, {real(high)}, zero={zero})", "float",
+                  "0.0" if zero else real(default))
+
+    def setting_choice(self, tracer, field, choices, _mark):
+        self.enum(choices, f"{tracer}_{field}")
+
+
+def enumerations():
+    lines = []
+    for row in read("words.def", ("ENUMERATION", "VALUE")):
+        if row[0] == "ENUMERATION":
+            lines += ["", "", f"class {camel(row[2])}(Word):", docstring(row[3] or row[2].replace("_", " ")), ""]
+        else:
+            lines.append(f"    {row[2]} = {row[3]}" + (f"  # {row[5]}" if row[5] and len(row[5]) < 90 else ""))
+    return lines
+
+
+def structs():
+    groups = []
+    for row in read("messages.def", [name for name in ROWS if name not in ("ENUMERATION", "VALUE", "LIMIT")]):
+        if row[0] in ("RECORD", "MESSAGE"):
+            groups.append((row, []))
+        else:
+            groups[-1][1].append(Field(row))
+    lines = []
+    for row, fields in groups:
+        lines += ["", "", "@dataclass"]
+        name, doc = (row[1], row[2]) if row[0] == "RECORD" else (row[2], row[5])
+        base = "Record" if row[0] == "RECORD" else "Message"
+        lines += [f"class {camel(name)}({base}):", docstring(doc, [(field.name, field.doc) for field in fields])]
+        if row[0] == "MESSAGE":
+            lines += [f"    TYPE: ClassVar[int] = {row[3]}", f'    SENDER: ClassVar[str] = "{row[4].lower()}"']
+        lines += [f'    NAME: ClassVar[str] = "{name}"', "    FIELDS: ClassVar[tuple[Field, ...]] = ("]
+        lines += [f"        {field.descriptor}," for field in fields] + ["    )"]
+        lines += [f"    {field.name}: {field.annotation} = {field.default}" for field in fields]
+    names = [camel(row[2]) for row, _ in groups if row[0] == "MESSAGE"]
+    lines += ["", "", "_ALL: tuple[type[Message], ...] = ("]
+    lines += [textwrap.fill(", ".join(names) + ",", WIDTH, initial_indent="    ", subsequent_indent="    "), ")"]
+    lines += ["MESSAGES = {each.TYPE: each for each in _ALL}"]
+    return lines
+
+
+def limits():
+    lines = ["", "", "LIMITS = (  # that a daemon sends in the handshake, in their order: name, letter of struct, meaning"]
+    lines += [f'    ("{name}", "{LETTERS[kind]}", {doc!r}),' for _, kind, name, doc in read("limits.def", ("LIMIT",))]
+    return lines + [")"]
+
+
+def generate():
+    head = ["# SPDX-License-Identifier: MIT",
+            '"""Every message of the protocol. Written by generate.py from the tables of protocol/: change those instead.',
+            "", "Enumerations accept their words, too: Render(tracer=\"ldc\").", '"""',
+            "from __future__ import annotations", "",
+            "from collections.abc import Sequence", "from dataclasses import dataclass", "from typing import ClassVar", "",
+            "from . import fields as _f", "from .fields import Bytes, Field, Message, Record, Word"]
+    return "\n".join(head + enumerations() + structs() + limits()) + "\n"
+
+
+def main():
+    made = generate()
+    if sys.argv[1:] == ["--check"]:
+        if not TARGET.exists() or TARGET.read_text(encoding="utf-8") != made:
+            sys.exit(f"{TARGET.relative_to(ROOT)} is out of date: run client/python/generate.py")
+        told = re.search(r'FARLIGHT_VERSION "(.*)"', (ROOT / "protocol/version.h").read_text(encoding="utf-8"))[1]
+        if f'VERSION = "{told}"' not in VERSION.read_text(encoding="utf-8"):
+            sys.exit(f"{VERSION.relative_to(ROOT)} is not {told}, the version of protocol/version.h")
+    else:
+        TARGET.write_text(made, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

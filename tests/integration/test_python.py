@@ -1,0 +1,645 @@
+# SPDX-License-Identifier: MIT
+"""The Python package: its codec against the stored bytes of the C side, pictures against the command line's, servers that
+lie, and connections that are cut."""
+import asyncio
+import importlib.util
+import os
+import pathlib
+import random
+import socket
+import struct
+import subprocess
+import sys
+import threading
+import time
+import unittest.mock
+
+import farlight_test
+from farlight_test import Case, Daemon, OneDaemon, bundled_scenes, frames_of, read_png
+from test_animate import Cut
+from test_sealed import SealedDaemon
+
+PACKAGE = farlight_test.ROOT / "client/python"
+DEBIANS = "/usr/lib/python3/dist-packages"
+sys.path.insert(0, str(PACKAGE))
+if not importlib.util.find_spec("numpy"):  # another python3 comes before Debian's
+    sys.path.append(DEBIANS)
+import numpy as np  # pylint: disable=wrong-import-position
+import farlight  # pylint: disable=wrong-import-position
+from farlight import blobs, errors, fields, framing, importer, messages  # pylint: disable=wrong-import-position
+from farlight.core import Core  # pylint: disable=wrong-import-position
+
+GOLDEN = farlight_test.ROOT / "tests/unit/protocol/golden/messages.hex"
+STRAIGHT = farlight.Camera((0, 0, 6), fov_degrees=40)
+os.environ["FARLIGHT_LIBEXEC"] = str(farlight_test.BIN.absolute())
+
+
+def triangle(colour=(0.8, 0.4, 0.2)):
+    scene = farlight.Scene()
+    material = scene.add_material(colour, roughness=1)
+    scene.add_node(scene.add_mesh([(-1, -1, 0), (3, -1, 0), (-1, 3, 0)], material=material))
+    scene.add_light("directional", (3, 3, 3))
+    return scene, material
+
+
+def python(*arguments, **options):
+    path = os.pathsep.join([str(PACKAGE)] + [DEBIANS] * (DEBIANS in sys.path))
+    return subprocess.run([sys.executable, *map(str, arguments)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+                          check=False, timeout=farlight_test.TIMEOUT_S, env={**os.environ, "PYTHONPATH": path}, **options)
+
+
+# ---- bytes
+
+class Codec(Case):
+    def test_the_stored_messages_of_the_c_side_are_read_and_written_byte_by_byte(self):
+        rows = {row.NAME: row for row in messages.MESSAGES.values()}
+        for line in GOLDEN.read_text().splitlines():
+            name, case, stored = (line.split(" ") + [""])[:3]
+            payload = bytes.fromhex(stored)
+            with self.subTest(message=name, case=case):
+                self.assertEqual(fields.encode(fields.decode(rows[name], payload)), payload)
+
+    def test_every_prefix_of_a_message_is_refused_with_the_name_of_a_field(self):
+        for line in GOLDEN.read_text().splitlines():
+            name, _, stored = (line.split(" ") + [""])[:3]
+            row = next(row for row in messages.MESSAGES.values() if row.NAME == name)
+            payload = bytes.fromhex(stored)
+            for size in {*range(min(len(payload), 40)), len(payload) // 2, len(payload) - 1} - {-1}:
+                with self.subTest(message=name, size=size), self.assertRaises(errors.ProtocolError) as raised:
+                    fields.decode(row, payload[:size])
+                self.assertTrue(raised.exception.field.startswith(name))
+
+    def test_a_value_that_may_not_be_sent_names_its_field_and_what_is_allowed(self):
+        for values, field, text in (({"width": 0}, "render.width", "1 .. 8192"), ({"width": 1.5}, "render.width", "whole"),
+                                    ({"tracer": "bwh"}, "render.tracer", "bvh, naive"), ({"noise": float("nan")}, "render.noise", "0"),
+                                    ({"quadtree_layers": 9}, "render.quadtree_layers", "3"), ({"bvh_rays": 5}, "render.bvh_rays", "1, 2, 3"),
+                                    ({"keys": [3]}, "render.keys[0]", "CameraKey"), ({"exposure_stops": "x"}, "render.exposure_stops", "number")):
+            with self.subTest(**values), self.assertRaises(farlight.InvalidValue) as raised:
+                fields.encode(messages.Render(scene=1, channel=2, **values))
+            self.assertEqual(raised.exception.field, field)
+            self.assertIn(text, str(raised.exception))
+
+    def test_arrays_that_fit_no_scene_are_refused_before_anything_is_sent(self):
+        scene, square = farlight.Scene(), [(0, 0, 0), (1, 0, 0), (0, 1, 0)]
+        for attempt, field in ((lambda: scene.add_mesh([(0, 0)] * 3), "positions"), (lambda: scene.add_mesh(square, [(0, 1, 3)]), "triangles"),
+                               (lambda: scene.add_mesh(square, [(0, 1, -1)]), "triangles"), (lambda: scene.add_mesh([]), "positions"),
+                               (lambda: scene.add_mesh([(0, 0, np.nan)] * 3), "positions"),
+                               (lambda: scene.add_mesh(square, normals=square[:2]), "normals"),
+                               (lambda: scene.add_spheres(square, -1), "radii"), (lambda: scene.add_texture(np.zeros((2, 2, 5))), "image"),
+                               (lambda: scene.add_node(None, np.ones((2, 2))), "transform"),
+                               (lambda: scene.add_material((1, 1, 2)), "set_material.base_colour[2]"),
+                               (lambda: scene.add_light("lamp", (1, 1, 1)), "set_light.kind"),
+                               (lambda: farlight.look_at((0, 0, 0), (0, 1, 0)), "look_at")):
+            with self.subTest(field=field), self.assertRaises(farlight.InvalidValue) as raised:
+                attempt()
+            self.assertEqual(raised.exception.field, field)
+        self.assertEqual(scene.edits_since(0), [])
+
+    def test_edits_are_what_has_changed_since(self):
+        scene, material = triangle()
+        version, objects = scene.version, len(scene.edits_since(0))
+        self.assertEqual(objects, 5)
+        scene.change(material, roughness=0.5)
+        passing = scene.add_node()
+        scene.remove(passing)  # which nobody has seen
+        self.assertEqual([edit.NAME for edit in scene.edits_since(version)], ["set_material"])
+        lamp = scene.objects("node")[-1]
+        scene.change(scene.shown(lamp), colour=(9, 9, 9))
+        self.assertEqual([edit.NAME for edit in scene.edits_since(version)], ["set_material", "set_light"])
+        group = scene.add_node()
+        scene.add_node(parent=group)
+        version = scene.version
+        scene.remove(group)
+        self.assertEqual([(edit.NAME, edit.object) for edit in scene.edits_since(version)],
+                         [("remove", group.number + 1), ("remove", group.number)])
+        self.assertEqual(len(scene.edits_since(0)), objects)
+
+
+# ---- servers that lie
+
+def say(message, request=0, channel=0):
+    return framing.pack(message, request, channel)
+
+
+REPLY = b"FARL" + struct.pack("<HHQ", 1, 0, 0) + bytes(32) + b"\0\0" + bytes(6)
+
+
+class Asked:
+    """A core that has asked for the frames of a batch of 16x8 pixels, and what it did then. No socket, no clock."""
+
+    def __init__(self):
+        self.core = Core()
+        self.frames = []
+        self.scene, _ = triangle()
+        self.steps = self.work()
+
+    def work(self):
+        yield from self.core.greet()
+        render = farlight.scene.request(STRAIGHT, (), {"width": 16, "height": 8, "last_frame": 1})
+        for frame in self.core.batch(self.scene, render):
+            if frame is not None:
+                self.frames.append(frame)
+            yield frame is not None
+
+    def hear(self, data):
+        """What it raises, or None."""
+        self.core.receive(data)
+        return self.go_on()
+
+    def go_on(self):
+        try:
+            while True:
+                sent = len(self.core.unsent())
+                if not next(self.steps) and len(self.core.unsent()) == sent:
+                    return None
+        except StopIteration:
+            return None
+        except farlight.Error as why:
+            return why
+
+
+def started(data=b""):
+    """After the daemon has taken the scene; the batch is request 4 on channel 2."""
+    asked = Asked()
+    for one in (REPLY, say(messages.Ok(), 1), say(messages.BlobNeed([]), 2), say(messages.Ok(1), 3)):
+        assert asked.hear(one) is None
+    return asked, asked.hear(data)
+
+
+def begin(**values):
+    return messages.FrameBegin(**{"width": 16, "height": 8, "samples": 1, "size_bytes": 512, "layers": 1, **values})
+
+
+def frame(number, **values):
+    return (say(begin(frame=number, **values), 4, 2) + say(messages.FrameData(0, bytes(range(256)) * 2), 4, 2) +
+            say(messages.FrameEnd(number), 4, 2))
+
+
+class Lies(Case):
+    def test_what_is_no_handshake_ends_the_connection(self):
+        for reply, kind in ((b"HTTP/1.1 400 Bad Request", farlight.ProtocolError), (b"F" + bytes(47), farlight.ProtocolError),
+                            (b"FARL" + struct.pack("<HH", 1, 60000) + bytes(40), farlight.ProtocolError),
+                            (b"FARL" + struct.pack("<HHQ", 7, 0, 0) + bytes(34) + bytes(6), farlight.Refused),
+                            (b"FARL" + struct.pack("<HHQ", 0, 0, 4) + bytes(34) + bytes(6), farlight.Refused)):
+            with self.subTest(reply=reply[:8]):
+                asked = Asked()
+                self.assertIsInstance(asked.hear(reply), kind)
+
+    def test_messages_that_nobody_may_send_now_end_the_connection(self):
+        header = struct.pack
+        for lie in (header("<I2H2I", 1 << 31, 0x0001, 0, 4, 0),  # two gigabytes
+                    header("<I2H2I", 65544, 0x000a, 0, 4, 0), header("<I2H2I", 8, 0x7fff, 0, 0, 0) + bytes(8),
+                    header("<I2H2I", 8, 0x0003, 1, 0, 0) + bytes(8), header("<I2H2I", 2, 0x0003, 0, 0, 0) + bytes(2) + b"padded",
+                    say(messages.Render(1, channel=2)), say(messages.ImportDone()), say(messages.Ok(), 77), say(messages.Ok(), 1),
+                    say(messages.BlobNeed([]), 4), say(begin(), 4, 9), say(begin(), 9, 2), say(messages.FrameData(0, b"x"), 4, 2),
+                    say(messages.FrameEnd(), 4, 2), say(begin(width=8192, height=8192, size_bytes=1 << 28), 4, 2),
+                    say(begin(size_bytes=511), 4, 2), say(begin(encoding=2), 4, 2), say(begin(format=2), 4, 2), say(begin(layers=255), 4, 2),
+                    say(begin(depth_bytes=9, attachments=1), 4, 2), say(begin(), 4, 2) * 2,
+                    say(begin(), 4, 2) + say(messages.FrameData(8, b"x"), 4, 2), say(begin(), 4, 2) + say(messages.FrameEnd(), 4, 2),
+                    say(begin(), 4, 2) + say(messages.FrameData(0, bytes(513)), 4, 2), frame(0) + frame(1) + frame(2) + frame(3),
+                    say(messages.SetNode(1), 4), say(messages.FrameParts(0, []), 4, 2)):
+            with self.subTest(lie=lie[:24]):
+                asked, why = started(lie)
+                self.assertIsInstance(why, farlight.ProtocolError)
+                self.assertTrue(why.field)
+                self.assertIsInstance(asked.hear(b"more"), (farlight.ProtocolError, type(None)))
+
+    def test_nothing_is_kept_of_a_frame_but_what_has_come(self):
+        asked, why = started(say(begin(), 4, 2) + say(messages.FrameData(0, bytes(100)), 4, 2))
+        self.assertIsNone(why)
+        self.assertIsNone(asked.hear(struct.pack("<I2H2I", 262144, 0x0211, 0, 4, 2)))
+        self.assertLess(len(asked.core._in), 100)  # pylint: disable=protected-access
+
+    def test_an_honest_daemon_is_believed(self):
+        asked, why = started(frame(0) + say(messages.Ping(5)) + struct.pack("<I2H2I", 3, 0x9999, 0, 0, 0) + bytes(8) + frame(1) +
+                             say(messages.Ok(), 4))
+        self.assertIsNone(why)
+        self.assertEqual([one.number for one in asked.frames], [0, 1])
+        self.assertEqual(asked.frames[0].data, bytes(range(256)) * 2)
+
+    def test_an_error_says_what_helps_and_the_connection_goes_on(self):
+        error = messages.Error(messages.ErrorCode.BUSY, 0, 1500, "render.scene", "no place", "wait")
+        asked, why = started(say(error, 4))
+        self.assertIsInstance(why, farlight.Refused)
+        self.assertEqual((why.field, why.remedy, why.retryable, why.retry_after_s), ("render.scene", "wait", True, 1.5))
+        self.assertIsNone(asked.core.failure)
+        asked, why = started(say(error))
+        self.assertIsInstance(asked.core.failure, farlight.Refused)
+        asked, why = started(say(messages.Goodbye(messages.ErrorCode.SHUTTING_DOWN, "until later")))
+        self.assertIsInstance(why, farlight.ConnectionLost)
+        self.assertIn("until later", str(why))
+
+    def test_changed_bytes_raise_nothing_but_errors_of_the_package(self):
+        random.seed(farlight_test.ROOT.name)
+        honest = frame(0) + say(messages.Blocked(2, 1, "why")) + frame(1) + say(messages.Ok(), 4)
+        for _ in range(600):
+            changed = bytearray(honest)
+            for _ in range(random.randrange(1, 4)):
+                changed[random.choice((random.randrange(16), random.randrange(len(changed))))] = random.randrange(256)
+            asked, why = started(bytes(changed))
+            ended = asked.hear(b"")
+            self.assertTrue(why is None or isinstance(why, farlight.Error), why)
+            self.assertTrue(ended is None or isinstance(ended, farlight.Error), ended)
+            self.assertIsNotNone(asked.core.failure)
+
+    def test_a_connection_that_ends_after_any_byte_is_lost_and_may_be_sought_again(self):
+        honest = [REPLY, say(messages.Ok(), 1), say(messages.BlobNeed([]), 2), say(messages.Ok(1), 3), frame(0)]
+        for cut in range(0, sum(map(len, honest)), 3):
+            asked, left, why = Asked(), cut, None
+            for one in honest:
+                why = asked.hear(one[:left]) if left else None
+                left -= min(left, len(one))
+                self.assertIsNone(why)
+            why = asked.hear(b"")
+            self.assertIsInstance(why, farlight.ConnectionLost, cut)
+            self.assertTrue(why.retryable)
+
+    def test_a_server_that_says_nothing_or_too_little_is_not_waited_for(self):
+        for said in (b"", REPLY[:20], REPLY):
+            with self.subTest(said=said[:4]), socket.socket(socket.AF_UNIX) as listener:
+                path = self.folder / f"silent-{len(said)}"
+                listener.bind(str(path))
+                listener.listen()
+                held = []
+                thread = threading.Thread(target=lambda: (held.append(listener.accept()[0]), held[0].sendall(said)))
+                thread.start()
+                began = time.monotonic()
+                with self.assertRaises(farlight.TimedOut):
+                    with farlight.connect(f"unix:{path}", timeout=0.3) as client:
+                        client.stats()
+                self.assertLess(time.monotonic() - began, 10)
+                thread.join()
+                held[0].close()
+                thread = threading.Thread(target=lambda: (held.append(listener.accept()[0]), held[1].sendall(said)))
+                thread.start()
+                with self.assertRaises(farlight.TimedOut):
+                    asyncio.run(self.ask_async(f"unix:{path}"))
+                thread.join()
+                held[1].close()
+
+    @staticmethod
+    async def ask_async(address):
+        async with await farlight.aio.connect(address, timeout=0.3) as client:
+            await client.stats()
+
+    def test_a_program_that_cannot_start_says_why(self):
+        fake = self.folder / "farlightd"
+        fake.write_text("#!/bin/sh\necho 'no device gives OpenGL 4.5' >&2\nexit 1\n")
+        fake.chmod(0o755)
+        environment = {**os.environ, "FARLIGHT_LIBEXEC": str(self.folder)}
+        environment.pop("FARLIGHT_SERVER", None)
+        with unittest.mock.patch.dict(os.environ, environment, clear=True):
+            for connect in (farlight.connect, lambda: asyncio.run(farlight.aio.connect())):
+                with self.assertRaises(farlight.ConnectionLost) as raised:
+                    connect()
+                self.assertIn("farlightd ended with status 1: no device gives OpenGL 4.5", str(raised.exception))
+                self.assertFalse(raised.exception.retryable)
+        with unittest.mock.patch.dict(os.environ, {"FARLIGHT_LIBEXEC": "", "PATH": str(self.folder / "none")}):
+            with self.assertRaises(farlight.FileFailed) as raised:
+                farlight.load(__file__)
+            self.assertIn("FARLIGHT_LIBEXEC", raised.exception.remedy)
+
+    def test_an_importer_is_believed_no_more_than_a_daemon(self):
+        blob = bytes(12)
+        name = blobs.blob_hash(blob)
+        reference = messages.BlobRef(12, name)
+        offer = say(messages.BlobOffer([reference]), 1)
+        for lie in (say(messages.Render(1, channel=2), 1), say(messages.Ok(), 1), say(messages.SceneOpen(2), 1), say(messages.SetNode(1), 3),
+                    say(messages.BlobData(0, name, blob), 2, 1), offer + say(messages.BlobData(0, name, bytes(13)), 2, 1),
+                    offer + say(messages.BlobData(4, name, blob), 2, 1), offer + say(messages.BlobData(0, name, b"wrong bytes "), 2, 1),
+                    say(messages.EditBegin(1), 3) + say(messages.SetSpheres(1, 1, [reference]), 3)):
+            with self.subTest(lie=lie[:24]), self.assertRaises(farlight.Error):
+                importer._Import(farlight.Scene(), 1 << 20).receive(lie)  # pylint: disable=protected-access
+
+
+# ---- daemons
+
+class WithDaemon(OneDaemon):
+    def connect(self, **options):
+        client = farlight.connect(self.daemon.address, **options)
+        self.addCleanup(client.close)
+        return client
+
+    def test_pictures_are_the_command_lines_to_the_byte(self):
+        client = self.connect()
+        for model, size in (("teapot.glb", (64, 48)), ("sphereflake-2.nff", (48, 32))):
+            path = bundled_scenes() / model
+            shape = f"{size[0]}x{size[1]}"
+            self.expect(farlight_test.farlight("render", path, "--size", shape, "-o", self.folder / "c.png"), 0)
+            self.expect(python("-m", "farlight", "render", path, "--size", shape, "-o", self.folder / "python.png"), 0)
+            self.assertEqual(read_png(self.folder / "python.png")[2:], read_png(self.folder / "c.png")[2:])
+        scene = farlight.load(bundled_scenes() / "teapot.glb")
+        named = ("--eye", "1,2,6", "--look-at", "0,0.5,0", "--fov", "40", "--size", "40x30", "--samples", "2", "--integrator", "whitted")
+        result = self.expect(farlight_test.farlight("render", bundled_scenes() / "teapot.glb", *named, "--layers", "beauty,depth,normal,albedo",
+                                                    "-o", self.folder / "c.exr", "--float", "--timings=json"), 0)
+        camera = farlight.Camera((1, 2, 6), (0, 0.5, 0), fov_degrees=40)
+        picture = client.render(scene, camera, width=40, height=30, samples=2, primary="auto", clamp=10,
+                                layers=("beauty", "depth", "normal", "albedo"))
+        width, height, channels = farlight_test.read_exr(self.folder / "c.exr")
+        self.assertEqual((width, height), picture.size)
+        self.assertEqual(picture.begin.digest, int(frames_of(result)[0]["digest"], 16))
+        self.assertEqual(picture.colour[..., 0].ravel().tolist(), list(channels["R"]))
+        self.assertEqual(picture.albedo[..., 1].ravel().tolist(), list(channels["albedo.G"]))
+        self.assertEqual(picture.normal[..., 2].ravel().tolist(), list(channels["normal.Z"]))
+
+    def test_arrays_are_seen_as_they_were_given(self):
+        """An unlit quad that fills the right half of the picture, with a texture of two colours; its depth is 2 m."""
+        scene = farlight.Scene()
+        texture = scene.add_texture(np.array([[[255, 0, 0]], [[0, 0, 255]]], np.uint8), nearest=1)
+        material = scene.add_material((1, 1, 1), unlit=1, textures={0: texture})
+        scene.add_node(scene.add_mesh([(0, -1, 0), (1, -1, 0), (1, 1, 0), (0, 1, 0)], [(0, 1, 2), (0, 2, 3)], material=material,
+                                      texcoords=[(0, 1), (1, 1), (1, 0), (0, 0)]))
+        scene.add_light("point", (1, 1, 1), farlight.look_at((0, 0, 5), (0, 0, 0)))
+        seen = farlight.Camera((0, 0, 2), fov_degrees=np.degrees(2 * np.arctan(0.5)))
+        picture = self.connect().render(scene, seen, width=16, height=16, layers=("beauty", "depth", "normal"), samples=1)
+        np.testing.assert_allclose(picture.colour[:8, 8:, :3], np.broadcast_to((1, 0, 0), (8, 8, 3)), atol=1e-6)
+        np.testing.assert_allclose(picture.colour[8:, 8:, :3], np.broadcast_to((0, 0, 1), (8, 8, 3)), atol=1e-6)
+        np.testing.assert_allclose(picture.depth[:, 8:], 2, atol=1e-5)
+        self.assertTrue(np.isinf(picture.depth[:, :8]).all())
+        np.testing.assert_allclose(picture.normal[:, 8:], np.broadcast_to((0, 0, 1), (16, 8, 3)), atol=1e-5)
+        self.assertFalse(picture.colour.flags.writeable)
+
+    def test_only_what_has_changed_is_sent(self):
+        client, (scene, material) = self.connect(), triangle()
+        first = client.render(scene, STRAIGHT, width=16, height=16)
+        sent = client._core._uploaded  # pylint: disable=protected-access
+        scene.change(material, base_colour=(0, 0, 1, 1))
+        node = scene.find("node", "")[0]
+        second = client.render(scene, STRAIGHT, width=16, height=16)
+        self.assertEqual((first.begin.revision, second.begin.revision), (1, 2))
+        self.assertGreater(second.colour[8, 8, 2], second.colour[8, 8, 0])
+        self.assertEqual(client._core._uploaded, sent)  # pylint: disable=protected-access
+        scene.remove(node)
+        self.assertEqual(client.describe(scene).empty, 1)
+        self.assertEqual(client.send(scene), 3)
+
+    def test_others_attach_edit_and_notice_conflicts(self):
+        owner, guest = self.connect(), self.connect()
+        scene = farlight.Scene("python-shared", "shared")
+        steel = scene.add_material((0.5, 0.5, 0.5), name="steel")
+        scene.add_node(scene.add_spheres([(0, 0, 0)], 1, material=steel))
+        owner.send(scene)
+        self.assertIn("python-shared", [entry.name for entry in guest.scenes()])
+        other = guest.attach("python-shared")
+        found, = guest.objects(other, "material", "steel")
+        message, revision = guest.read(other, farlight.Object(messages.ObjectKind.MATERIAL, found.object))
+        message.base_colour = (1, 0, 0, 1)
+        other.set(message)
+        scene.change(steel, roughness=0.1)
+        owner.send(scene)
+        with self.assertRaises(farlight.Refused) as raised:
+            guest.send(other, base_revision=revision)
+        self.assertEqual(raised.exception.code, messages.ErrorCode.CONFLICT)
+        self.assertEqual(guest.send(other), 3)
+        self.assertEqual((guest.changed(other), owner.read(scene, steel)[1], owner.changed(scene)), (2, 3, 3))
+        self.assertEqual(owner.read(scene, steel)[0].base_colour, (1, 0, 0, 1))
+
+    def test_a_refusal_names_the_field_and_ends_nothing_else(self):
+        client, (scene, _) = self.connect(), triangle()
+        with self.assertRaises(farlight.Refused) as raised:
+            client.render(scene, farlight.Camera((0, 0, 0)), width=8, height=8)
+        self.assertTrue(raised.exception.field.startswith("render.keys"), raised.exception.field)
+        for values, field in (({"encoding": "jpeg"}, "render.encoding"), ({"wdth": 3}, "render.wdth")):
+            with self.assertRaises(farlight.InvalidValue) as raised:
+                client.render(scene, **values)
+            self.assertEqual(raised.exception.field, field)
+        self.assertIn("width", str(raised.exception))
+        self.assertEqual(client.render(scene, STRAIGHT, width=8, height=8).size, (8, 8))
+
+    def test_frames_that_nobody_wants_any_more_are_cancelled(self):
+        client, (scene, _) = self.connect(), triangle()
+        for picture in client.frames(scene, STRAIGHT, width=8, height=8, last_frame=1000000):
+            if picture.number == 2:
+                break
+        self.assertEqual(client.render(scene, STRAIGHT, width=8, height=8).number, 0)
+        deadline = time.monotonic() + 60
+        while client.stats().jobs and time.monotonic() < deadline:
+            time.sleep(0.05)
+        self.assertEqual(client.stats().jobs, 0)
+
+    def test_a_view_shows_the_newest_camera_and_ends(self):
+        client, (scene, _) = self.connect(), triangle()
+        with client.view(scene, STRAIGHT, width=16, height=12, samples=2) as view:
+            self.assertEqual(view.next_frame().begin.command, 0)
+            number = view.look(farlight.Camera((1, 1, 6)))
+            while (picture := view.next_frame()).begin.command != number or picture.begin.samples != 2:
+                pass
+        np.testing.assert_allclose(picture.world_from_view[:3, 3], (1, 1, 6), atol=1e-6)
+        self.assertEqual(client.render(scene, STRAIGHT, width=8, height=8).size, (8, 8))
+
+    def test_tasks_share_an_asyncio_client(self):
+        async def all_of_it():
+            async with await farlight.aio.connect(self.daemon.address) as client:
+                (scene, _), (other, _) = triangle(), triangle((0.1, 0.2, 0.8))
+                plan = [(one, step) for one in (scene, other) for step in (1, 2, 3)]
+                made = await asyncio.gather(*(client.render(one, farlight.Camera((0, 0, 5 + step)), width=16, height=12)
+                                              for one, step in plan))
+                numbers = [frame.number async for frame in client.frames(scene, STRAIGHT, width=8, height=8, last_frame=4)]
+                async with await client.view(scene, STRAIGHT, width=16, height=12) as view:
+                    shown = await view.next_frame()
+                task = asyncio.create_task(client.render(scene, width=640, height=480, samples=4096))
+                await asyncio.sleep(0.05)
+                task.cancel()
+                with self.assertRaises(asyncio.CancelledError):
+                    await task
+                with self.assertRaises(farlight.InvalidValue):
+                    await client.render(scene, width=-1)
+                jobs = (await client.stats()).version
+                return plan, made, numbers, shown, jobs
+
+        plan, made, numbers, shown, version = asyncio.run(all_of_it())
+        self.assertEqual((numbers, shown.size, version), ([0, 1, 2, 3, 4], (16, 12), farlight.__version__))
+        client = self.connect()
+        for (scene, step), picture in zip(plan, made):
+            same = client.render(scene, farlight.Camera((0, 0, 5 + step)), width=16, height=12)
+            self.assertEqual(same.data, picture.data)
+
+    def test_blobs_larger_than_the_credit_arrive(self):
+        """36 MB of positions: more than the window of the upload."""
+        client, scene = self.connect(), farlight.Scene()
+        points = np.zeros((3000000, 3), np.float32)
+        points[:3] = (-1, -1, 0), (3, -1, 0), (-1, 3, 0)
+        self.assertGreater(points.nbytes, client.limits["upload_window_bytes"])
+        scene.add_node(scene.add_mesh(points, [(0, 1, 2)]))
+        self.assertEqual(client.describe(scene).triangles, 1)
+
+    def test_models_say_what_they_lack_and_what_is_wrong_with_them(self):
+        (self.folder / "broken.glb").write_bytes(b"glTF" + bytes(40))
+        with self.assertRaises(farlight.ImportFailed) as raised:
+            farlight.load(self.folder / "broken.glb")
+        self.assertIn("broken.glb", raised.exception.field)
+        with self.assertRaises(farlight.FileFailed):
+            farlight.load(self.folder / "nothing.glb")
+        with self.assertRaises(farlight.ImportFailed) as raised:
+            farlight.load(bundled_scenes() / "teapot.glb", max_bytes=1000)
+        self.assertEqual(raised.exception.field, "max_bytes")
+
+    def test_the_command_line_says_how_it_ended(self):
+        model, output = bundled_scenes() / "teapot.glb", ("-o", self.folder / "a.png")
+        helped = self.expect(python("-m", "farlight", "render", "--help"), 0)
+        self.assertIn("--layers", helped.stdout)
+        for arguments, status in (((self.folder / "none.glb", *output), 1), ((model, *output, "--size", "0x9"), 2), ((model,), 2),
+                                  ((model, *output, "--set", "tracer=none"), 2),
+                                  ((model, *output, "--server", f"unix:{self.folder}/nowhere"), 75)):
+            result = self.expect(python("-m", "farlight", "render", *arguments), status)
+            self.assertTrue(result.stderr.strip())
+            self.assertNotIn("Traceback", result.stderr)
+        self.assertEqual(self.leftovers(), [])
+        self.expect(python("-m", "farlight", "render", model, "-o", self.folder / "a.npz", "--size", "24x16", "--samples", "1",
+                           "--layers", "depth,normal"), 0)
+        with np.load(self.folder / "a.npz") as layers:
+            self.assertEqual({name: layers[name].shape for name in layers}, {"depth": (16, 24, 4), "normal": (16, 24, 4)})
+
+    def test_the_examples_run(self):
+        result = self.expect(python(PACKAGE / "examples/training_set.py", bundled_scenes() / "teapot.glb", self.folder / "set", "--count", 2,
+                                    "--size", 24, "--samples", 1), 0)
+        self.assertEqual(len(result.stdout.splitlines()), 2)
+        with np.load(self.folder / "set/00001.npz") as made:
+            self.assertEqual({name: made[name].shape for name in ("colour", "depth", "normal", "world_from_view")},
+                             {"colour": (24, 24, 4), "depth": (24, 24), "normal": (24, 24, 3), "world_from_view": (4, 4)})
+            self.assertTrue(np.isfinite(made["depth"]).any())
+        self.expect(python(PACKAGE / "examples/turntable.py", bundled_scenes() / "sphereflake-2.nff", self.folder / "turn", 2), 0)
+        self.assertEqual(sorted(path.name for path in (self.folder / "turn").iterdir()), ["000.png", "001.png"])
+
+
+# ---- daemons that go away
+
+class Faults(Case):
+    def frames(self, client, count=4):
+        scene, _ = triangle()
+        return [picture.data for picture in client.frames(scene, [STRAIGHT, farlight.Camera((0, 3, 5), time_s=1)], width=16, height=12,
+                                                          frames_per_second=3, last_frame=count - 1)]
+
+    def test_cut_connections_lose_no_frame_and_change_no_byte(self):
+        with Daemon() as daemon:
+            with farlight.connect(daemon.address) as client:
+                undisturbed = self.frames(client)
+            for cut in (0, 1, 47, 250, 400, 1500, 3000, 5000, 7000):
+                with self.subTest(cut=cut), Cut(daemon.path, cut) as proxy:
+                    with farlight.connect(proxy.address, retry_for=60) as client:
+                        self.assertEqual(self.frames(client), undisturbed)
+                with self.subTest(cut=cut, client="asyncio"), Cut(daemon.path, cut) as proxy:
+                    self.assertEqual(asyncio.run(self.frames_async(proxy.address)), undisturbed)
+            with Cut(daemon.path, 400) as proxy, self.assertRaises(farlight.ConnectionLost) as raised:
+                with farlight.connect(proxy.address) as client:
+                    self.frames(client)
+            self.assertTrue(raised.exception.retryable)
+
+    @staticmethod
+    async def frames_async(address):
+        scene, _ = triangle()
+        async with await farlight.aio.connect(address, retry_for=60) as client:
+            return [picture.data async for picture in client.frames(
+                scene, [STRAIGHT, farlight.Camera((0, 3, 5), time_s=1)], width=16, height=12, frames_per_second=3, last_frame=3)]
+
+    def test_a_killed_daemon_of_ones_own_is_started_again(self):
+        os.environ.pop("FARLIGHT_SERVER", None)
+        with farlight.connect(retry_for=60) as client:
+            scene, _ = triangle()
+            numbers = []
+            for picture in client.frames(scene, STRAIGHT, width=8, height=8, last_frame=5):
+                numbers.append(picture.number)
+                if picture.number == 2:
+                    client._link.process.kill()  # pylint: disable=protected-access
+            self.assertEqual(numbers, [0, 1, 2, 3, 4, 5])
+            process = client._link.process  # pylint: disable=protected-access
+        self.assertEqual(process.poll(), 0)
+
+    def test_a_kept_scene_outlives_the_connection_and_is_not_sent_again(self):
+        with Daemon() as daemon, farlight.connect(daemon.address) as client:
+            scene, material = triangle()
+            kept = farlight.Scene("python-kept", "kept")
+            for edit in scene.edits_since(0):
+                for blob in getattr(edit, "arrays", ()):
+                    kept.blob(scene.blob_bytes(blob))
+                kept.set(edit)
+            before = client.render(kept, STRAIGHT, width=8, height=8)
+            client._link.socket.shutdown(socket.SHUT_RDWR)  # pylint: disable=protected-access
+            after = client.render(kept, STRAIGHT, width=8, height=8)
+            self.assertEqual((after.data, after.begin.revision), (before.data, before.begin.revision))
+            self.assertEqual(client._core._uploaded, 0)  # pylint: disable=protected-access
+            kept.change(material, roughness=0.7)
+            self.assertEqual(client.send(kept), 2)
+
+    def test_a_client_that_was_idle_too_long_connects_again_by_itself(self):
+        (self.folder / "conf").write_text("[network]\nidle = 1000\n")
+        with Daemon("--config", self.folder / "conf") as daemon, farlight.connect(daemon.address) as client:
+            scene, _ = triangle()
+            before = client.render(scene, STRAIGHT, width=8, height=8)
+            time.sleep(2.2)
+            self.assertEqual(client.render(scene, STRAIGHT, width=8, height=8).data, before.data)
+
+    def test_a_sealed_connection_makes_the_same_picture_and_wrong_keys_say_so(self):
+        for name in ("key", "reader", "other"):
+            self.expect(farlight_test.farlight("key", self.folder / name), 0)
+        scene, _ = triangle()
+        with SealedDaemon(self.folder, "--listen", f"unix:{self.folder}/s") as daemon:
+            with farlight.connect(daemon.reached, key_file=self.folder / "key") as client:
+                sealed = client.render(scene, STRAIGHT, width=200, height=150)
+            with farlight.connect(f"unix:{self.folder}/s") as client:
+                self.assertEqual(client.render(scene, STRAIGHT, width=200, height=150).data, sealed.data)
+            with self.assertRaises(farlight.Refused) as raised:
+                farlight.connect(daemon.reached, key_file=self.folder / "other")
+            self.assertIn("another key", str(raised.exception))
+            with self.assertRaises(farlight.Refused) as raised:
+                farlight.connect(daemon.reached)
+            self.assertIn("key_file", raised.exception.remedy)
+            self.expect(python("-m", "farlight", "render", bundled_scenes() / "sphereflake-2.nff", "-o", self.folder / "a.png", "--size", "8x8",
+                               "--server", daemon.reached, "--key", self.folder / "key"), 0)
+            with Changed(daemon.port) as proxy, self.assertRaises(farlight.ProtocolError) as raised:
+                with farlight.connect(proxy.address, key_file=self.folder / "key") as client:
+                    client.render(scene, STRAIGHT, width=200, height=150)
+            self.assertIn("changed", str(raised.exception))
+        (self.folder / "key").chmod(0o644)
+        with self.assertRaises(farlight.FileFailed) as raised:
+            farlight.connect("tcp:127.0.0.1:9", key_file=self.folder / "key")
+        self.assertIn("chmod 600", raised.exception.remedy)
+
+
+class Changed:
+    """Somebody on the way, who changes a byte of the daemon's."""
+
+    def __init__(self, port):
+        self.port = port
+
+    def __enter__(self):
+        self.listener = socket.create_server(("127.0.0.1", 0))
+        self.address = f"tcp:127.0.0.1:{self.listener.getsockname()[1]}"
+        self.thread = threading.Thread(target=self.serve)
+        self.thread.start()
+        return self
+
+    def serve(self):
+        client = self.listener.accept()[0]
+        daemon = socket.create_connection(("127.0.0.1", self.port))
+
+        def forward():
+            try:
+                while data := client.recv(65536):
+                    daemon.sendall(data)
+            except OSError:
+                pass
+            daemon.shutdown(socket.SHUT_RDWR)
+
+        there = threading.Thread(target=forward)
+        there.start()
+        came = 0
+        try:
+            while data := bytearray(daemon.recv(65536)):
+                if came <= 3000 < came + len(data):
+                    data[3000 - came] ^= 1
+                came += len(data)
+                client.sendall(data)
+        except OSError:
+            pass
+        client.close()
+        there.join()
+        daemon.close()
+
+    def __exit__(self, *_):
+        self.listener.close()
+        self.thread.join()
+
+
+if __name__ == "__main__":
+    farlight_test.unittest.main()
