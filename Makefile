@@ -596,7 +596,7 @@ help:
 	@echo 'make install    [PREFIX=/usr/local DESTDIR=]'
 	@echo 'make clean      remove build/; distclean removes out/ as well'
 
--include $(shell find build -name '*.d' 2>/dev/null)
+-include $(shell find $(B) -name '*.d' 2>/dev/null)
 .SECONDARY:
 
 # ---- fuzz ----
