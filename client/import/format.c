@@ -110,7 +110,7 @@ static const char *ending_of(const unsigned char *bytes, size_t size_bytes)
     if (begins(bytes, size_bytes, "Kaydara FBX Binary"))
         return ".fbx";
     if (begins(bytes, size_bytes, "PK\3\4"))
-        return ".3mf";
+        return contains(bytes, size_bytes, "_rels/.rels") ? ".3mf" : NULL;
     if (begins(bytes, size_bytes, "AC3D"))
         return ".ac";
     if (size_bytes > 6 && begins(bytes, size_bytes, "MM") && number_at(bytes + 2) == size_bytes)
@@ -157,22 +157,25 @@ bool format_may_need_images(const struct format *format, const struct files *fil
 
 /* ---- what is not read ---- */
 
+#define AS_GLTF "write it as glTF "
+
 static const struct {
     const char *ending, *magic; /* "": by the ending alone */
     const char *what, *remedy;
 } unread[] = {
-    {".x", "xof ", "DirectX file", "by 'assimp export IN.x OUT.glb' (package assimp-utils)"},
-    {".blend", "BLENDER", "scene of Blender", "in Blender by File, Export"},
-    {".usdz", "", "USD file", "with Blender"},
-    {".usda", "#usda", "USD file", "with Blender"},
-    {".usdc", "PXR-USDC", "USD file", "with Blender"},
-    {".wrl", "#VRML ", "VRML file", "with Blender, or as X3D"},
+    {".x", "xof ", "DirectX file", AS_GLTF "by 'assimp export IN.x OUT.glb' (package assimp-utils)"},
+    {".blend", "BLENDER", "scene of Blender", AS_GLTF "in Blender by File, Export"},
+    {".usdz", "", "USD file", AS_GLTF "with Blender"},
+    {".usda", "#usda", "USD file", AS_GLTF "with Blender"},
+    {".usdc", "PXR-USDC", "USD file", AS_GLTF "with Blender"},
+    {".wrl", "#VRML ", "VRML file", AS_GLTF "with Blender, or as X3D"},
     {".step", "ISO-10303-21", "STEP file, which has no triangles",
-     "or STL with a program of CAD, such as FreeCAD"},
-    {".max", "", "scene of 3ds Max", "or FBX in 3ds Max"},
-    {".c4d", "", "scene of Cinema 4D", "or FBX in Cinema 4D"},
-    {".mb", "", "scene of Maya", "or FBX in Maya"},
-    {".skp", "", "scene of SketchUp", "or COLLADA in SketchUp"},
+     AS_GLTF "or STL with a program of CAD, such as FreeCAD"},
+    {".max", "", "scene of 3ds Max", AS_GLTF "or FBX in 3ds Max"},
+    {".c4d", "", "scene of Cinema 4D", AS_GLTF "or FBX in Cinema 4D"},
+    {".mb", "", "scene of Maya", AS_GLTF "or FBX in Maya"},
+    {".skp", "", "scene of SketchUp", AS_GLTF "or COLLADA in SketchUp"},
+    {".zip", "PK\3\4", "zip archive without a 3MF model", "unpack it and name the model in it"},
 };
 
 static const char *endings_of_all(char out[256])
@@ -210,8 +213,8 @@ void format_explain_unknown(const char *name, const char *format, const unsigned
             continue;
         if (is_it && strcmp(unread[i].ending, ".x") == 0)
             describe_directx(bytes, size_bytes, version);
-        snprintf(out, FORMAT_REASON_BYTES, "it is a %s%s, which is not read: write it as glTF %s", unread[i].what,
-                 version, unread[i].remedy);
+        snprintf(out, FORMAT_REASON_BYTES, "it is a %s%s, which is not read: %s", unread[i].what, version,
+                 unread[i].remedy);
         return;
     }
     snprintf(out, FORMAT_REASON_BYTES, "unknown format %s%.40s; known are %s", format ? "." : "",

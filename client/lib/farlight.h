@@ -207,7 +207,8 @@ FL_API struct fl_scene *fl_scene_load(struct fl_connection *connection, const st
                                       struct fl_error *error);
 /* Loads the models again and passes on what has changed since, in one transaction, so that structures of what
  * stays are kept. Returns the same scene, or another one in its place, where objects are gone or it was not loaded
- * with will_reload. NULL: it is as it was before. Edits of others that the models do not contradict stay. */
+ * with will_reload. NULL: it is as it was before. Edits of others that the models do not contradict stay. What the
+ * scene has told of its files, cameras and clips is not valid any more. options->started must be NULL. */
 FL_API struct fl_scene *fl_scene_reload(struct fl_scene *scene, const struct fl_load_options *options,
                                         struct fl_error *error);
 FL_API void fl_scene_destroy(struct fl_scene *scene); /* lets go of it on the daemon, too */

@@ -415,6 +415,8 @@ class Formats(importer.Written):
                 ("corner.ply", ply(faces=((0, 1, 200000000),)), "a face has the vertex 200000000, but there are 4"),
                 ("cube.x", "xof 0303txt 0032\nMesh {\n", "it is a DirectX file (version 3.3, txt), which is not read: write it"),
                 ("cube.blend", "BLENDER-v300", "it is a scene of Blender, which is not read: write it as glTF in Blender"),
+                ("other.3mf", three_mf(CORNERS).replace(b"_rels/.rels", b"_rels/.relx"), "no '_rels/.rels' in it"),
+                ("models.zip", three_mf(CORNERS).replace(b"_rels/.rels", b"model.gltfs"), "without a 3MF model, which is not read: unpack"),
                 ("broken.3mf", three_mf(CORNERS)[:-30], "the 3MF file cannot be read: ")):
             with self.subTest(name):
                 result = self.import_text(name, model, 1)
