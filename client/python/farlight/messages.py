@@ -1587,8 +1587,7 @@ class SetMaterial(Message):
     transmission: share of the light that is not reflected and enters
     ior: index of refraction; 1.5 is glTF's default
     alpha_cutoff: for alpha mode mask
-    anisotropy: of rough reflections: their elongation along the grain, as in KHR_materials_anisotropy; for the
-        integrator path
+    anisotropy: of rough reflections: their elongation along the grain, as in KHR_materials_anisotropy
     anisotropy_rotation: of the grain from the tangent, counter-clockwise
     emission_seen_only: 1: the emission is seen by the eye, also in smooth mirrors and through glass, and lights
         nothing: a light shines in its place, and would be counted twice
