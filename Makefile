@@ -341,7 +341,7 @@ FUZZ_PACKAGES := clang libclang-rt-14-dev
 # These come for Debian's own python3.
 FIDELITY_PACKAGES := python3-openimageio python3-numpy
 EQUAL_TIME_PACKAGES := $(FIDELITY_PACKAGES) blender
-DEB_PACKAGES := debhelper dpkg-dev fakeroot lintian xz-utils git
+DEB_PACKAGES := debhelper dh-python python3 dpkg-dev fakeroot lintian xz-utils git
 FARM_PACKAGES := slurm-wlm nodejs python3-yaml
 
 .PHONY: tests build-packages test-packages stack-packages sync-packages lint-packages analyze-packages coverage-packages fuzz-packages fidelity-packages equal-time-packages farm-packages deb-packages test test-long test-zink check-sync demo bench fidelity equal-time soak farm-drill farm-test siege bench-plot check-headers check-rules lint check analyze coverage format install uninstall dist deb deb-test clean distclean help
