@@ -162,17 +162,17 @@ class Pictures(OneDaemon):
         self.assertIn("#ffffff", result.stderr)
 
     def test_a_ground_shows_the_shadow_of_a_model_and_nothing_else(self):
-        """A square 2 m above a small one, which lies on the ground, under light from straight above: seen from the side, the
-        middle of its shadow is a point of the ground in front of the small one."""
+        """A square 2 m above a small one, which lies on the ground, under light from straight above: of its shadow what lies
+        in front of the small one is seen."""
         model = self.folder / "roof.nff"
-        model.write_text("v\nfrom 0 1 8\nat 0 0 0\nup 0 1 0\nangle 40\nhither 0.1\nresolution 64 64\nl 0 500 0\nf 1 1 1 1 0 0 0 1\n"
+        model.write_text("v\nfrom 0 6 8\nat 0 0 0\nup 0 1 0\nangle 40\nhither 0.1\nresolution 64 64\nl 0 500 0\nf 1 1 1 1 0 0 0 1\n"
                          "p 4\n-1 2 -1\n-1 2 1\n1 2 1\n1 2 -1\np 4\n-0.1 0 -0.1\n-0.1 0 0.1\n0.1 0 0.1\n0.1 0 -0.1\n")
         def pixels(*options):
             path = self.folder / "ground.png"
             self.expect(farlight("render", model, "-o", path, "--size", "64x64", "--integrator", "whitted", *options), 0)
             _, _, rows, channels = read_png(path)
             place = lambda x, y: tuple(rows[y][x * channels:(x + 1) * channels])
-            return place(32, 37), place(60, 60)  # 0.7 m in front of the middle; and 2.4 m aside
+            return place(32, 35), place(60, 60)  # 0.6 m in front of the middle, and far off
         self.assertEqual(pixels("--background", "transparent", "--ground"), ((0, 0, 0, 255), (0, 0, 0, 0)))
         self.assertEqual(pixels("--background", "transparent"), ((0, 0, 0, 0), (0, 0, 0, 0)))
         self.assertEqual([pixel[:3] for pixel in pixels("--background", "#2040a0", "--ground")], [(0, 0, 0), (0x20, 0x40, 0xa0)])
