@@ -26,9 +26,15 @@ uint32_t ground_shadow_rays(const struct render_context *context, const struct i
     return chosen && own < SHADOW_RAYS ? SHADOW_RAYS : own;
 }
 
+/* Directions of an image about the scene are looked up in its table; of a smooth sky those by the cosine do. */
+static bool uses_table(const struct render_context *context, const struct integrator *integrator)
+{
+    return integrator->random && context->environment->kind == ENVIRONMENT_IMAGE;
+}
+
 bool ground_prepare(struct render_context *context, const struct integrator *integrator, struct error *error)
 {
-    return !ground_is_shown(context, integrator) || !integrator->random ||
+    return !ground_is_shown(context, integrator) || !uses_table(context, integrator) ||
            environment_choice_update(context->environment_choice, context->device, context->environment,
                                      &context->scene->scene->environment, error);
 }
@@ -66,7 +72,7 @@ static const struct gpu_program *shade_program(struct render_context *context, c
         defines[n++] = (struct gpu_define){"HAS_TIMES", "1"};
     if (context->environment->kind == ENVIRONMENT_IMAGE)
         defines[n++] = (struct gpu_define){"HAS_ENVIRONMENT_IMAGE", "1"};
-    if (integrator->random && context->environment_choice->rows > 0)
+    if (uses_table(context, integrator) && context->environment_choice->rows > 0)
         defines[n++] = (struct gpu_define){"HAS_ENVIRONMENT_TABLE", "1"};
     return context_use_with(context, "render/ground.comp", defines, error);
 }

@@ -114,6 +114,13 @@ light_choice choose_light(path p, vec3 origin, vec3 normal, vec2 u, vec2 v, floa
         for (uint i = 0u; i < CANDIDATES; i++) {
             float probability;
             vec3 direction = environment_choose(normal, numbers_of_candidate(v, i), probability);
+#ifdef HAS_ENVIRONMENT_TABLE
+            // Every other one by the cosine: of a bright sea all that the table gives may come from below.
+            if ((i & 1u) != 0u)
+                direction = occlusion_direction(normal, normal, numbers_of_candidate(v, i));
+            float by_cosine = max(dot(normal, direction), 0.0) * INVERSE_PI;
+            probability = 0.5 * (environment_probability(normal, direction) + by_cosine);
+#endif
             float inverse = probability > 0.0 ? 1.0 / probability : 0.0;
             if (take(lambert(normal, direction, environment_radiance(direction) * inverse), of_environment, number))
                 c.direction = direction;

@@ -179,6 +179,26 @@ class Pictures(OneDaemon):
         result = self.expect(farlight("render", model, "-o", self.folder / "none.png", "--ground", "--stereo", "0.1"), 2)
         self.assertIn("--views rays", result.stderr)
 
+    def test_light_from_below_a_ground_does_not_count_for_its_shadows(self):
+        """Alpha beneath a roof, under images that are alike above the horizon, and as bright or 8 times as bright below it; what
+        its 64 rows mix at the horizon is 1 % of the light. A ray is off by
+        1/2 at most, the mean of 1024 pixels of 64 rays each by 0.002."""
+        model = self.folder / "roof.obj"
+        model.write_text("v -1 1 -1\nv -1 1 1\nv 1 1 1\nv 1 1 -1\nv 0 0 0\nv 0.01 0 0\nv 0 0 0.01\nf 1 2 3 4\nf 5 6 7\n")
+        means = []
+        for below in (129, 132):
+            sky = self.folder / "below.hdr"
+            sky.write_bytes(b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 64 +X 8\n" + bytes((128, 128, 128, 129)) * 256
+                            + bytes((128, 128, 128, below)) * 256)
+            path = self.folder / "below.png"
+            self.expect(farlight("render", model, "-o", path, "--size", "32x32", "--eye", "0,0.9,4", "--look-at", "0,0,0",
+                                 "--fov", "20", "--samples", "16", "--ground", "--background", "transparent",
+                                 "--environment", sky), 0)
+            _, _, rows, _ = read_png(path)
+            means.append(sum(sum(row[3::4]) for row in rows) / (255 * 32 * 32))
+        self.assertGreater(means[0], 0.1)
+        self.assertAlmostEqual(means[0], means[1], delta=0.006)
+
     def test_the_same_seed_gives_the_same_bytes(self):
         paths = [self.folder / "a.png", self.folder / "b.png"]
         for path in paths:
