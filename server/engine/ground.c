@@ -3,7 +3,8 @@
 
 #include <math.h>
 
-/* Of a clip; what dips below the ground between two of them is cut off by nothing, it only hides the ground. */
+/* At which the lowest point is looked for. What dips below it in between is shown all the same, and hides the
+ * ground. */
 #define TIMES 17
 /* In diagonals of the scene: a sun 1 degree above the horizon throws shadows 57 times as long as things are high.
  */
