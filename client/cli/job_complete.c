@@ -229,6 +229,9 @@ static bool complete_camera(struct cli_job *job)
         return cli_usage(job, "--look-at", "is where --eye is") == 0;
     if (is_zero(job->key.up_world) || is_degenerate(&job->key))
         return cli_usage(job, "--up", "must not be parallel to the view direction") == 0;
+    job->options.ground_up_x = job->key.up_world[0];
+    job->options.ground_up_y = job->key.up_world[1];
+    job->options.ground_up_z = job->key.up_world[2];
     job->options.camera_path = PROTOCOL_CAMERA_KEYS;
     job->options.keys = &job->key;
     job->options.keys_count = 1;
@@ -354,6 +357,15 @@ static bool complete_noise(struct cli_job *job)
     return fl_error_remedy(&job->error, "give --samples, or render them as they are: --views rays");
 }
 
+/* They are made from what an eye sees, and nothing is there to be seen of a ground. */
+static bool complete_ground(struct cli_job *job)
+{
+    if (job->options.ground == 0 || job->options.view_source != PROTOCOL_VIEW_SOURCE_LAYERS)
+        return true;
+    cli_usage(job, "--ground", "pictures that are made of depth layers show none");
+    return fl_error_remedy(&job->error, "render them as they are: --views rays, --lens rays");
+}
+
 static bool complete_crop(struct cli_job *job)
 {
     const struct message_render *wanted = &job->options;
@@ -384,8 +396,8 @@ bool cli_job_complete(struct cli_job *job, bool is_series)
     complete_samples(job, is_series);
     complete_integrator(job);
     return cli_views_complete(job, is_series) && complete_noise(job) && complete_crop(job) &&
-           complete_tracer(job) && complete_clips(job) && complete_outputs(job, is_series) &&
-           complete_encoding(job) && complete_camera(job);
+           complete_ground(job) && complete_tracer(job) && complete_clips(job) &&
+           complete_outputs(job, is_series) && complete_encoding(job) && complete_camera(job);
 }
 
 bool cli_job_complete_view(struct cli_job *job)

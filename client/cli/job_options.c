@@ -32,6 +32,7 @@ enum key {
     KEY_EDIT,
     KEY_POINT_SIZE,
     KEY_BACKGROUND,
+    KEY_GROUND,
     KEY_DENOISE,
     KEY_CAMERA,
     KEY_EYE,
@@ -104,6 +105,9 @@ static const struct argp_option special[] = {
      "Show points without faces as spheres of this diameter (default: by their distances)", CLI_GROUP_OUTPUT},
     {"background", KEY_BACKGROUND, "NAME|#RRGGBB", 0,
      "Behind all surfaces: the environment (default), transparent, or a colour such as '#ffffff'",
+     CLI_GROUP_OUTPUT},
+    {"ground", KEY_GROUND, NULL, 0,
+     "Show the shadows of the model on a ground beneath it, which is not seen itself; also over no background",
      CLI_GROUP_OUTPUT},
     {"denoise", KEY_DENOISE, "on|off|auto", OPTION_ARG_OPTIONAL,
      "Filter the noise of few samples out of the picture (default: off; of views: auto, up to 64 samples)",
@@ -353,6 +357,9 @@ static error_t set_option(struct cli_job *job, int key, const char *field, const
         return set_real(job, field, value, 1e-6, 1e6, &job->point_size);
     case KEY_BACKGROUND:
         return cli_set_background(job, field, value);
+    case KEY_GROUND:
+        job->options.ground = 1;
+        return 0;
     case KEY_DENOISE:
         return protocol_denoise_parse(value ? value : "on", &job->options.denoise)
                    ? 0

@@ -41,6 +41,8 @@ void viewer_use_eyes(const struct viewer *viewer, struct message_render *view)
     view->height /= view->views_down;
     view->baseline = options->stereo_m;
     view->view_source = viewer->settings.views;
+    if (view->view_source == PROTOCOL_VIEW_SOURCE_LAYERS)
+        view->ground = 0; /* pictures that are made of layers have none */
 }
 
 /* On this machine pixels travel as they are; over a network as video while they move, and without loss at rest. */

@@ -30,6 +30,9 @@ struct animation_bounds {
     float lower[3], upper[3];
     bool reach_known; /* of the vertices, in these directions */
     double directions[FRAME_CAMERA_DIRECTIONS][3], supports[FRAME_CAMERA_DIRECTIONS];
+    bool ground_known; /* engine/ground.h */
+    uint64_t ground_revision;
+    struct frame_ground ground;
 };
 /* That of one key; false if its vectors do not span a view. */
 bool animation_key_camera(const struct camera_key *key, const char *field, struct frame_camera *camera,

@@ -90,6 +90,8 @@ struct engine_job {
     uint32_t camera_node;
     struct frame_framing framing; /* of the path auto */
     uint32_t framed_node;         /* 0: all of the scene */
+    bool has_ground;              /* frames have one, see engine/ground.h */
+    float ground_up_world[3];     /* not 0 */
     float orbit_turn, orbit_seconds;
     struct camera_key *keys; /* owned */
     uint32_t key_count;

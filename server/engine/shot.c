@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 #include "engine/shot.h"
 
+#include "engine/ground.h"
+
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -89,7 +91,8 @@ static bool make_alone(struct shot *shot, const struct engine_job *job, const st
         return false;
     const struct scene_pose *pose = shot->motion.pose_count ? &shot->motion.poses[0] : NULL;
     struct animation_view view;
-    if (!animation_view(job, scene, pose, time_s, bounds, &view, error)) {
+    if (!animation_view(job, scene, pose, time_s, bounds, &view, error) ||
+        !ground_place(job, scene, bounds, &shot->request.ground, error)) {
         shot_finish(shot);
         return false;
     }
@@ -166,7 +169,8 @@ bool shot_look(struct shot *shot, const struct engine_job *job, const struct sce
     const struct scene_pose *pose = shot->motion.pose_count ? &shot->motion.poses[0] : NULL;
     struct animation_view view = {0};
     if (!(from->node ? look_through_node(job, scene, pose, from, bounds, &view, error)
-                     : look_from_key(&from->key, &view, error))) {
+                     : look_from_key(&from->key, &view, error)) ||
+        !ground_place(job, scene, bounds, &shot->request.ground, error)) {
         shot_finish(shot);
         return false;
     }

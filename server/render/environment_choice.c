@@ -1,8 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 #include "render/environment_choice.h"
 
+#include "shared/bindings.h"
 #include "shared/sky.h"
 
+#include <epoxy/gl.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -151,6 +153,14 @@ bool environment_choice_update(struct environment_choice *choice, struct gpu_dev
         return false;
     choice->known = true;
     return true;
+}
+
+void environment_choice_bind(struct environment_choice *choice, struct gpu_device *device,
+                             const struct gpu_program *program)
+{
+    gpu_uniform_uint(program, "environment_rows", choice->rows);
+    gpu_uniform_uint(program, "environment_columns", choice->columns);
+    gpu_buffer_bind_texels(device, &choice->table, UNIT_SHADE_ENVIRONMENT, GL_R32F);
 }
 
 void environment_choice_finish(struct environment_choice *choice, struct gpu_device *device)

@@ -4,6 +4,7 @@
 #define FARLIGHT_RENDER_ENVIRONMENT_CHOICE_H
 
 #include "gpu/buffer.h"
+#include "gpu/program.h"
 #include "render/environment.h"
 #include "scene/scene.h"
 
@@ -20,6 +21,9 @@ struct environment_choice {
 bool environment_choice_update(struct environment_choice *choice, struct gpu_device *device,
                                const struct environment *environment, const struct scene_environment *given,
                                struct error *error);
+/* To a program in use, with HAS_ENVIRONMENT_TABLE if there is one. */
+void environment_choice_bind(struct environment_choice *choice, struct gpu_device *device,
+                             const struct gpu_program *program);
 void environment_choice_finish(struct environment_choice *choice, struct gpu_device *device);
 
 #endif

@@ -7,6 +7,7 @@
 #include "render/compact.h"
 #include "render/frame_request.h"
 #include "render/frame_state.h"
+#include "render/ground.h"
 #include "render/pixel_filter.h"
 #include "render/sequence.h"
 #include "render/wave_trace.h"
@@ -275,7 +276,7 @@ static bool trace_wave(struct frame_renderer *renderer, struct error *error)
     renderer->phase = PHASE_SHADE;
     context->sampled_hits = context->tracer->impl->sampled;
     context_span_begin(context, STAGE_SHADE);
-    bool listed = compact_hits(context, error);
+    bool listed = ground_hit(context, renderer->work->passes.integrator, error) && compact_hits(context, error);
     context_span_end(context);
     return listed && layers_mark_unknown(&renderer->work->layers, context, error);
 }
@@ -319,6 +320,19 @@ static bool find_eyes(struct frame_renderer *renderer, struct error *error)
     return true;
 }
 
+/* First hits are listed already: where they were rasterised, that list is of what was filled in. */
+static bool list_ground(struct frame_renderer *renderer, struct error *error)
+{
+    struct render_context *context = &renderer->work->context;
+    const struct integrator *integrator = renderer->work->passes.integrator;
+    if (!ground_is_shown(context, integrator))
+        return true;
+    context_span_begin(context, STAGE_SHADE);
+    const bool listed = ground_hit(context, integrator, error) && compact_hits(context, error);
+    context_span_end(context);
+    return listed;
+}
+
 static bool find_primary(struct frame_renderer *renderer, struct error *error)
 {
     bool done = false;
@@ -329,7 +343,7 @@ static bool find_primary(struct frame_renderer *renderer, struct error *error)
         return false;
     if (done)
         renderer->phase = renderer->work->layers.wanted ? PHASE_LAYERS : PHASE_SHADE;
-    if (done && !wireframe_paint(context, error))
+    if (done && (!list_ground(renderer, error) || !wireframe_paint(context, error)))
         return false;
     if (done && denoise_notes_samples(context) &&
         !denoise_note(&renderer->work->denoise.notes, denoise_history_moved(&renderer->history), context, error))

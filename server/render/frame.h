@@ -38,6 +38,15 @@ struct frame_crop {
     uint32_t x, y, width, height;
 };
 
+/* A shadow catcher: a disc that shows what lies behind it, times the share of light that reaches it, where a ray
+ * of the eye from above it meets nothing else. Nothing else sees it, and it throws no shadow;
+ * shaders/render/ground.comp has the share. Not with VIEW_SOURCE_LAYERS; the integrator raycast, which has no
+ * shadows, shows none, and neither does a hidden_layer. */
+struct frame_ground {
+    float centre_world[3], normal_world[3]; /* unit */
+    float radius;                           /* 0: there is none */
+};
+
 struct frame_request {
     uint32_t width, height; /* of the whole picture */
     /* Only the tiles of 8 x 8 pixels that this part touches get samples, and the result is the part. Not with
@@ -73,12 +82,13 @@ struct frame_request {
     float aperture;             /* diameter of the lens, metres; 0: everything is sharp, or the camera has none */
     float focus; /* distance along the view of the plane that is sharp, metres; 0: middle of the scene */
     enum pixel_filter filter;
-    enum brdf brdf;       /* of rough surfaces; integrator path */
-    float clamp;          /* times 2^-exposure_stops: see shaders/render/fireflies.glsl; 0: nothing is limited */
-    float ao_distance;    /* metres; 0: a tenth of the scene's diagonal */
-    float ao_falloff;     /* as a power of 1 - distance / ao_distance; 0: all counts the same */
-    uint32_t ao_rays;     /* a sample; 0: 8 */
-    float wireframe;      /* pixels: width of lines along the edges of triangles; 0: none */
+    enum brdf brdf;    /* of rough surfaces; integrator path */
+    float clamp;       /* times 2^-exposure_stops: see shaders/render/fireflies.glsl; 0: nothing is limited */
+    float ao_distance; /* metres; 0: a tenth of the scene's diagonal */
+    float ao_falloff;  /* as a power of 1 - distance / ao_distance; 0: all counts the same */
+    uint32_t ao_rays;  /* a sample; 0: 8 */
+    float wireframe;   /* pixels: width of lines along the edges of triangles; 0: none */
+    struct frame_ground ground;
     float layer_opacity;  /* of opaque surfaces, integrator raycast; 0: 0.5 */
     uint32_t layers;      /* bits; 0: the picture alone. More than it need PIXEL_FORMAT_RGBA32F */
     uint32_t attachments; /* bits; beside the picture alone, in any format of it */

@@ -8,6 +8,7 @@
 #include "render/choices.h"
 #include "render/compact.h"
 #include "render/frame_request.h"
+#include "render/ground.h"
 #include "render/pixel_filter.h"
 
 #include <math.h>
@@ -251,7 +252,7 @@ static uint32_t rays_a_path(const struct frame_renderer *renderer)
     const struct render_context *context = &renderer->work->context;
     const struct wave_passes *passes = &renderer->work->passes;
     const bool once = !context->request.compare && !wave_passes_expect_bounces(passes, context) &&
-                      passes->integrator->shadow_rays_a_hit(context) <= 1;
+                      ground_shadow_rays(context, passes->integrator) <= 1;
     return once ? 1 : CHOICES_WAVE_PER_SLICE;
 }
 

@@ -188,6 +188,20 @@ static bool check_noise(const struct frame_request *request, struct error *error
     return true;
 }
 
+static bool check_ground(const struct frame_request *request, struct error *error)
+{
+    const struct frame_ground *ground = &request->ground;
+    for (int i = 0; i < 3; i++)
+        if (!isfinite(ground->centre_world[i]) || !isfinite(ground->normal_world[i]))
+            return error_set(error, ERROR_INVALID, "ground", "its centre or its normal is not finite");
+    if (!(ground->radius >= 0.0f && isfinite(ground->radius)))
+        return error_set(error, ERROR_INVALID, "ground", "a radius of %g metres", (double)ground->radius);
+    if (ground->radius > 0.0f && request->view_source == VIEW_SOURCE_LAYERS)
+        return error_set(error, ERROR_UNSUPPORTED, "ground",
+                         "pictures made from layers have none; render them as they are");
+    return true;
+}
+
 static bool check_crop(const struct frame_request *request, struct error *error)
 {
     const struct frame_crop *crop = &request->crop;
@@ -218,9 +232,9 @@ bool frame_request_check(const struct frame_request *request, struct error *erro
     if (request->format > PIXEL_FORMAT_RGBA32F)
         return error_set(error, ERROR_UNSUPPORTED, "format", "there is no pixel format number %u",
                          (unsigned)request->format);
-    return check_noise(request, error) && check_crop(request, error) && check_views(request, error) &&
-           check_background(request, error) && check_integrator(request, error) && check_layers(request, error) &&
-           check_camera(request, error);
+    return check_noise(request, error) && check_crop(request, error) && check_ground(request, error) &&
+           check_views(request, error) && check_background(request, error) && check_integrator(request, error) &&
+           check_layers(request, error) && check_camera(request, error);
 }
 
 static bool same_camera(const struct frame_camera *a, const struct frame_camera *b)
@@ -253,7 +267,8 @@ static bool same_light(const struct frame_request *a, const struct frame_request
     return a->integrator == b->integrator && a->brdf == b->brdf &&
            frame_request_radiance_limit(a) == frame_request_radiance_limit(b) &&
            a->ao_distance == b->ao_distance && a->ao_falloff == b->ao_falloff && a->ao_rays == b->ao_rays &&
-           a->layer_opacity == b->layer_opacity && a->wireframe == b->wireframe;
+           a->layer_opacity == b->layer_opacity && a->wireframe == b->wireframe &&
+           memcmp(&a->ground, &b->ground, sizeof(a->ground)) == 0;
 }
 
 bool frame_request_hides_environment(const struct frame_request *request)

@@ -3,6 +3,7 @@
 
 #include "render/compact.h"
 #include "render/frame_request.h"
+#include "render/ground.h"
 #include "render/wave_trace.h"
 
 #include "shared/bindings.h"
@@ -19,9 +20,10 @@ bool wave_passes_reserve(struct wave_passes *passes, struct render_context *cont
     const struct integrator *integrator = passes->integrator;
     struct gpu_device *device = context->device;
     size_t waves = context->wave_capacity, children = waves * integrator->children_a_hit;
-    size_t shadows = integrator->shadow_rays_a_hit(context) > 0 ? waves * integrator->shadow_waves : 0;
+    size_t shadows = ground_shadow_rays(context, passes->integrator) > 0 ? waves * integrator->shadow_waves : 0;
     size_t shadow_times = context->scene->has_motion ? shadows : 0;
-    if (integrator->prepare && !integrator->prepare(context, error))
+    if ((integrator->prepare && !integrator->prepare(context, error)) ||
+        !ground_prepare(context, integrator, error))
         return false;
     return gpu_buffer_reserve(device, &passes->radiance, waves * sizeof(vec4), error) &&
            gpu_buffer_reserve(device, &passes->children, children * sizeof(struct child), error) &&
@@ -97,17 +99,20 @@ static const struct gpu_program *shade_program(struct wave_passes *passes, struc
 static bool shade_hits(struct wave_passes *passes, struct render_context *context, uint32_t first, uint32_t count,
                        struct error *error)
 {
+    const uint32_t own = passes->integrator->shadow_rays_a_hit(context);
+    const bool is_own = first == 0 || first < own; /* the rest are the ground's */
     context_span_begin(context, STAGE_SHADE);
     const struct gpu_program *program = shade_program(passes, context, error);
-    if (program) {
+    if (program && is_own) {
         gpu_uniform_uint(program, "first_ray", first);
-        gpu_uniform_uint(program, "batch_rays", count);
+        gpu_uniform_uint(program, "batch_rays", count < own - first ? count : own - first);
         if (passes->integrator->set)
             passes->integrator->set(context, program);
         compact_dispatch(context, program, WAVE_HITS);
     }
+    const bool shaded = program && ground_shade(context, passes->integrator, first, count, error);
     context_span_end(context);
-    return program != NULL;
+    return shaded;
 }
 
 static const struct gpu_program *left_scene_program(const struct wave_passes *passes,
@@ -166,7 +171,12 @@ static bool trace_shadows(struct wave_passes *passes, struct render_context *con
 static const struct gpu_program *gather_program(const struct wave_passes *passes, struct render_context *context,
                                                 struct error *error)
 {
-    const struct gpu_define defines[2] = {{passes->integrator->gather, "1"}, {NULL, NULL}};
+    struct gpu_define defines[3] = {0};
+    size_t n = 0;
+    if (passes->integrator->gather)
+        defines[n++] = (struct gpu_define){passes->integrator->gather, "1"};
+    if (ground_is_shown(context, passes->integrator))
+        defines[n++] = (struct gpu_define){"GROUND", "1"};
     return context_use_with(context, "render/gather.comp", defines, error);
 }
 
@@ -248,7 +258,7 @@ static uint32_t batch_of(const struct wave_passes *passes, const struct render_c
 {
     if (context->hit_count == 0)
         return 0;
-    uint32_t left = passes->integrator->shadow_rays_a_hit(context) - context->asked;
+    uint32_t left = ground_shadow_rays(context, passes->integrator) - context->asked;
     uint32_t together = context->wave_capacity * passes->integrator->shadow_waves / context->hit_count;
     return left < together ? left : together;
 }
@@ -268,7 +278,7 @@ static enum wave_progress finish_batch(struct wave_passes *passes, struct render
     const uint32_t count = context->asking;
     context->asking = 0;
     context->asked += count;
-    bool last = context->hit_count == 0 || context->asked == passes->integrator->shadow_rays_a_hit(context);
+    bool last = context->hit_count == 0 || context->asked == ground_shadow_rays(context, passes->integrator);
     if (!gather(passes, context, last, count, error))
         return WAVE_FAILED;
     return last ? next_wave(passes, context, error) : WAVE_AGAIN;
@@ -295,7 +305,7 @@ void wave_passes_announce_shadows(struct wave_passes *passes, struct render_cont
                           !context_samples_emitters(context);
     const struct wave shadows = {.kind = WAVE_ANY,
                                  .times = context->scene->has_motion ? &passes->shadow_times : NULL};
-    if (passes->integrator->shadow_rays_a_hit(context) > 0)
+    if (ground_shadow_rays(context, passes->integrator) > 0)
         wave_announce(context, &shadows, coherent);
 }
 

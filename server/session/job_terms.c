@@ -7,6 +7,7 @@
 #include "protocol/common/margin.h"
 
 #include <inttypes.h>
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -154,6 +155,22 @@ static bool check_noise(const struct message_render *render, struct error *error
 }
 
 /* Neighbours of its pixels are not there. */
+static bool check_ground(const struct message_render *render, struct error *error)
+{
+    const double up =
+        fabs((double)render->ground_up_x) + fabs((double)render->ground_up_y) + fabs((double)render->ground_up_z);
+    if (!render->ground)
+        return true;
+    if (!(up > 1e-6)) {
+        error_set(error, ERROR_INVALID, "render.ground_up_y", "the ground's normal is zero");
+        return error_remedy(error, "give a direction, such as 0, 1, 0");
+    }
+    if (render->view_source != PROTOCOL_VIEW_SOURCE_LAYERS)
+        return true;
+    error_set(error, ERROR_UNSUPPORTED, "render.ground", "pictures that are made of layers show no ground");
+    return error_remedy(error, "set view_source to rays, or ground to 0");
+}
+
 static bool check_crop(const struct message_render *render, struct error *error)
 {
     if (render->crop_width == 0 && render->crop_height == 0)
@@ -353,7 +370,7 @@ bool job_check(const struct session *session, const struct message_render *rende
     if (jobs_find(session, render->channel) && !job_replaced_by(session, render))
         return error_set(error, ERROR_INVALID, "render.channel", "a running job has channel %u", render->channel);
     if (!check_kind(session, render, error) || !check_noise(render, error) || !check_crop(render, error) ||
-        !check_views(render, error) || !check_layers(render, error))
+        !check_ground(render, error) || !check_views(render, error) || !check_layers(render, error))
         return false;
     if (!check_encoding(session, render, render->encoding, "render.encoding", error))
         return false;
@@ -485,6 +502,8 @@ static void fill_rest(struct engine_job *job, const struct session *session, con
                     .margin = render->auto_margin,
                     .zoom = render->auto_zoom},
         .framed_node = render->auto_node,
+        .has_ground = render->ground != 0,
+        .ground_up_world = {render->ground_up_x, render->ground_up_y, render->ground_up_z},
         .orbit_turn = render->orbit_turn,
         .orbit_seconds = render->orbit_seconds,
         .upsample = render->upsample,

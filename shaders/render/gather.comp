@@ -3,7 +3,8 @@
 // sample lie side by side; the first of them adds for all, in their order, so no two invocations share a sample and the
 // sum is the same to the bit every time. Shadow rays come in batches: each batch is added to its path's radiance, and
 // the last to the samples, so their number does not matter.
-// Defines: GREY of what a shadow ray lets through, the mean of the channels counts.
+// Defines: GREY of what a shadow ray lets through, the mean of the channels counts; GROUND shadow rays change the pixel's
+// coverage, too (ground.comp).
 
 #include "shared/path.h"
 #include "common/dispatch.glsl"
@@ -47,6 +48,9 @@ vec4 radiance_of(uint k)
             share = vec3(dot(share, vec3(1.0 / 3.0)));
 #endif
             sum.rgb += light_samples[place].rgb * share;
+#ifdef GROUND
+            sum.a += light_samples[place].a * dot(share, vec3(1.0 / 3.0));
+#endif
         }
     }
     return sum;

@@ -94,6 +94,46 @@ TEST(every_integrator_and_tracer_gives_the_same_picture_and_waits_once)
         }
 }
 
+/* Its hits are listed behind those of what is rasterised, and its shadow rays may come in batches of their own. */
+TEST(a_ground_is_the_same_however_its_rays_are_cut)
+{
+    struct fixture *fixture = *state;
+    static const unsigned integrators[] = {INTEGRATOR_WHITTED, INTEGRATOR_DISTRIBUTED, INTEGRATOR_PATH,
+                                           INTEGRATOR_AO};
+    fixture_mixture(fixture);
+    struct scene_material *glow = fixture_material(fixture);
+    const float up[12] = {1, 0, 0, 0.3f, 0, 1, 0, 0.9f, 0, 0, 1, 0.2f};
+    glow->double_sided = true;
+    glow->emission[0] = glow->emission[1] = glow->emission[2] = 4.0f;
+    fixture_square(fixture, 0.3f, glow->base.id, up);
+    fixture->request.width = 24;
+    fixture->request.height = 18;
+    fixture->request.samples = 2;
+    fixture->request.tracer = TRACER_BVH;
+    fixture->request.background = BACKGROUND_TRANSPARENT;
+    fixture_look(fixture, 0.5f, 5.0f, 6.0f, 1.2f);
+    fixture->request.ground = (struct frame_ground){
+        .centre_world = {0.0f, -2.0f, 0.0f}, .normal_world = {0.0f, 1.0f, 0.0f}, .radius = 100.0f};
+    for (size_t i = 0; i < sizeof(integrators) / sizeof(integrators[0]); i++) {
+        fixture->request.integrator = integrators[i];
+        fixture->request.primary = i % 2 ? PRIMARY_TRACE : PRIMARY_RASTER;
+        assert_ahead_is_as_waiting(fixture, "a ground");
+        struct frame_result whole = render(fixture, false);
+        frame_renderer_set_capacity(fixture->renderer, 100, 130);
+        struct frame_result cut = render(fixture, false);
+        frame_renderer_set_capacity(fixture->renderer, 0, 0);
+        assert_same_picture(&whole, &cut);
+        assert_int_equal(whole.shadow_rays, cut.shadow_rays);
+        uint32_t shadowed = 0;
+        for (uint32_t k = 0; k < 24 * 18; k++)
+            shadowed +=
+                fixture_pixel(&whole, k % 24, k / 24)[3] > 0.2f && fixture_pixel(&whole, k % 24, k / 24)[3] < 0.8f;
+        assert_true(shadowed > 4);
+        frame_result_finish(&whole);
+        frame_result_finish(&cut);
+    }
+}
+
 /* Only the device knows how many rays there are. Slices have other sizes where they are queued: a hierarchy of its
  * own each, so tests differ a little. */
 TEST(what_a_tracer_counts_of_the_waves_comes_with_the_picture)

@@ -161,6 +161,44 @@ class Pictures(OneDaemon):
         result = self.expect(render_picture("teapot", self.folder / "none.png", "--background", "#2040a"), 2)
         self.assertIn("#ffffff", result.stderr)
 
+    def test_a_ground_shows_the_shadow_of_a_model_and_nothing_else(self):
+        """A square 2 m above a small one, which lies on the ground, under light from straight above: of its shadow what lies
+        in front of the small one is seen."""
+        model = self.folder / "roof.nff"
+        model.write_text("v\nfrom 0 6 8\nat 0 0 0\nup 0 1 0\nangle 40\nhither 0.1\nresolution 64 64\nl 0 500 0\nf 1 1 1 1 0 0 0 1\n"
+                         "p 4\n-1 2 -1\n-1 2 1\n1 2 1\n1 2 -1\np 4\n-0.1 0 -0.1\n-0.1 0 0.1\n0.1 0 0.1\n0.1 0 -0.1\n")
+        def pixels(*options):
+            path = self.folder / "ground.png"
+            self.expect(farlight("render", model, "-o", path, "--size", "64x64", "--integrator", "whitted", *options), 0)
+            _, _, rows, channels = read_png(path)
+            place = lambda x, y: tuple(rows[y][x * channels:(x + 1) * channels])
+            return place(32, 35), place(60, 60)  # 0.6 m in front of the middle, and far off
+        self.assertEqual(pixels("--background", "transparent", "--ground"), ((0, 0, 0, 255), (0, 0, 0, 0)))
+        self.assertEqual(pixels("--background", "transparent"), ((0, 0, 0, 0), (0, 0, 0, 0)))
+        self.assertEqual([pixel[:3] for pixel in pixels("--background", "#2040a0", "--ground")], [(0, 0, 0), (0x20, 0x40, 0xa0)])
+        result = self.expect(farlight("render", model, "-o", self.folder / "none.png", "--ground", "--stereo", "0.1"), 2)
+        self.assertIn("--views rays", result.stderr)
+
+    def test_light_from_below_a_ground_does_not_count_for_its_shadows(self):
+        """Alpha beneath a roof, under images that are alike above the horizon, and as bright or 8 times as bright below it; what
+        its 64 rows mix at the horizon is 1 % of the light. A ray is off by
+        1/2 at most, the mean of 1024 pixels of 64 rays each by 0.002."""
+        model = self.folder / "roof.obj"
+        model.write_text("v -1 1 -1\nv -1 1 1\nv 1 1 1\nv 1 1 -1\nv 0 0 0\nv 0.01 0 0\nv 0 0 0.01\nf 1 2 3 4\nf 5 6 7\n")
+        means = []
+        for below in (129, 132):
+            sky = self.folder / "below.hdr"
+            sky.write_bytes(b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 64 +X 8\n" + bytes((128, 128, 128, 129)) * 256
+                            + bytes((128, 128, 128, below)) * 256)
+            path = self.folder / "below.png"
+            self.expect(farlight("render", model, "-o", path, "--size", "32x32", "--eye", "0,0.9,4", "--look-at", "0,0,0",
+                                 "--fov", "20", "--samples", "16", "--ground", "--background", "transparent",
+                                 "--environment", sky), 0)
+            _, _, rows, _ = read_png(path)
+            means.append(sum(sum(row[3::4]) for row in rows) / (255 * 32 * 32))
+        self.assertGreater(means[0], 0.1)
+        self.assertAlmostEqual(means[0], means[1], delta=0.006)
+
     def test_the_same_seed_gives_the_same_bytes(self):
         paths = [self.folder / "a.png", self.folder / "b.png"]
         for path in paths:

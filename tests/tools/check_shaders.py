@@ -50,6 +50,7 @@ CHOICES = {
                         "LIST BLOCKS PLACE MARK COUNT FILL FURTHER SORT REACH_X REACH_Y REACH_Z".split()]],
     "render/gather_views.comp": [[{}, {"MARK": "1"}, {"KEPT": "1"}], [{}, {"EYES": "1"}],
                                  [{"KEY_LAYERS": number} for number in "123"]],
+    "render/ground.comp": [[{way: "1"} for way in "EVERY_LIGHT ONE_LIGHT OPEN".split()]],
     "quadtree/eyes.comp": [[{"QUADTREE_LAYERS": number} for number in "123"]],
     "raster/view.vert": [[{"PRIMITIVE_KIND": kind, "HAS_SPHERES": "1"} for kind in "012"],
                          [{}, {"HAS_LAYERS": "1"}, {"K_BUFFER": "2"}, {"K_BUFFER": "3"}]],
@@ -69,7 +70,7 @@ WITHOUT |= {what: ("HAS_UNKNOWN", "HAS_LENS") for what in ("MARK", "KEPT")}
 WITHOUT["EYES"] = ("HAS_LENS",)  # these need rays
 # And in programs of a folder: what moves is met by tracers, and shaded where it was met. Emitters alone are looked for.
 WITHOUT_IN = {"render": ("HAS_MOTION",)}
-MAY_MOVE = ("render/path.comp", "render/distributed.comp", "render/wireframe.comp")
+MAY_MOVE = ("render/path.comp", "render/distributed.comp", "render/ground.comp", "render/wireframe.comp")
 STAGES = {"raster/view.vert": ["raster/view.vert", "raster/view.frag"],
           "rayspace/reduce.vert": ["rayspace/reduce.vert", "rayspace/reduce.geom"],
           "ldc/build.frag": ["raster/draw.vert", "raster/draw.geom", "ldc/build.frag"],

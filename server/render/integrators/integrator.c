@@ -63,8 +63,7 @@ static void set_raycast(struct render_context *context, const struct gpu_program
     gpu_uniform_float(program, "layer_opacity", opacity > 0.0f ? opacity : OPACITY_DEFAULT);
 }
 
-/* At most 4. */
-static size_t emitter_defines(const struct render_context *context, struct gpu_define *defines)
+size_t integrator_emitter_defines(const struct render_context *context, struct gpu_define *defines)
 {
     size_t n = 0;
     if (!context_samples_emitters(context))
@@ -83,10 +82,8 @@ static size_t emitter_defines(const struct render_context *context, struct gpu_d
 static void set_environment_choice(struct render_context *context, const struct gpu_program *program)
 {
     struct environment_choice *choice = context->environment_choice;
-    gpu_uniform_uint(program, "environment_rows", choice->rows);
-    gpu_uniform_uint(program, "environment_columns", choice->columns);
     gpu_uniform_float(program, "environment_extent", choice->extent);
-    gpu_buffer_bind_texels(context->device, &choice->table, UNIT_SHADE_ENVIRONMENT, GL_R32F);
+    environment_choice_bind(choice, context->device, program);
 }
 
 static bool prepare_environment_choice(struct render_context *context, struct error *error)
@@ -98,7 +95,7 @@ static bool prepare_environment_choice(struct render_context *context, struct er
 /* Of an image; what a mirror sees of other environments its own rays find as well. */
 static size_t distributed_defines(const struct render_context *context, struct gpu_define *defines)
 {
-    size_t n = emitter_defines(context, defines);
+    size_t n = integrator_emitter_defines(context, defines);
     if (context->environment->kind != ENVIRONMENT_IMAGE || context->environment_choice->rows == 0)
         return n;
     defines[n++] = (struct gpu_define){"HAS_ENVIRONMENT_IMAGE", "1"};
@@ -119,7 +116,7 @@ static bool prepare_distributed(struct render_context *context, struct error *er
 
 static size_t path_defines(const struct render_context *context, struct gpu_define *defines)
 {
-    size_t n = emitter_defines(context, defines);
+    size_t n = integrator_emitter_defines(context, defines);
     if (context->environment->kind == ENVIRONMENT_IMAGE)
         defines[n++] = (struct gpu_define){"HAS_ENVIRONMENT_IMAGE", "1"};
     if (context->environment_choice->rows > 0)
@@ -145,6 +142,7 @@ static const struct integrator integrators[] = {
         {
             .name = "whitted",
             .shader = "render/whitted.comp",
+            .ground = "EVERY_LIGHT",
             .children_a_hit = CHILDREN_MAX,
             .follows_eye = true,
             .mirrors = true,
@@ -159,6 +157,7 @@ static const struct integrator integrators[] = {
         {
             .name = "distributed",
             .shader = "render/distributed.comp",
+            .ground = "ONE_LIGHT",
             .children_a_hit = 1,
             .lit_by_surfaces = true,
             .follows_eye = true,
@@ -191,6 +190,7 @@ static const struct integrator integrators[] = {
         {
             .name = "ao",
             .shader = "render/ao.comp",
+            .ground = "OPEN",
             .children_a_hit = 1,
             .random = true,
             .shadow_waves = 1,
@@ -206,6 +206,7 @@ static const struct integrator integrators[] = {
         {
             .name = "path",
             .shader = "render/path.comp",
+            .ground = "ONE_LIGHT",
             .children_a_hit = 1,
             .lit_by_surfaces = true,
             .follows_eye = true,

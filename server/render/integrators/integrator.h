@@ -24,6 +24,7 @@ struct integrator {
     uint32_t straight_waves; /* waves beyond the depth that are left to rays which go straight on */
     uint32_t (*shadow_rays_a_hit)(const struct render_context *context); /* of the current frame */
     /* The rest may be NULL: none. */
+    const char *ground;     /* a define of render/ground.comp */
     const char *left_scene; /* a define of render/left_scene.comp */
     const char *gather;     /* a define of render/gather.comp */
     size_t (*defines)(const struct render_context *context, struct gpu_define *defines); /* of the shader */
@@ -31,6 +32,9 @@ struct integrator {
     /* At the start of a frame and when the capacity of its waves grows. */
     bool (*prepare)(struct render_context *context, struct error *error);
 };
+
+/* For programs that choose among emissive triangles: at most 4. Returns how many. */
+size_t integrator_emitter_defines(const struct render_context *context, struct gpu_define *defines);
 
 /* By frame_request's number; NULL: there is none. */
 const struct integrator *integrator_by_number(unsigned number);

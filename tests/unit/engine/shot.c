@@ -342,6 +342,42 @@ TEST(an_automatic_camera_shows_the_pose_at_time_0_in_all_frames)
     scene_destroy(scene);
 }
 
+/* A clip that takes the mesh, 1 m high, down to y = -3 at its middle and up again: in every frame, of a part of
+ * the job too, the ground lies there, a hair below. */
+TEST(a_ground_lies_beneath_all_that_clips_do)
+{
+    struct scene *scene = new_scene();
+    struct draft_list list = {0};
+    add_mesh(&list, 1);
+    add_shown(&list, 1, NODE_MESH, 1);
+    add_clip(&list, 1, (float[]){0, 1, 2, 0, 0, 0, 0, -3, 0, 0, 0, 0}, 12);
+    add_channel(&list, 1, 1, CHANNEL_NODE_TRANSLATION, 1, 3, 3);
+    expect_commit(scene, &list);
+    struct clip_use use = {.clip = 1, .speed = 1};
+    struct engine_job job = job_of(CAMERA_AUTO, &use, 1);
+    job.has_ground = true;
+    job.ground_up_world[1] = 2.0f;
+    struct animation_bounds bounds = {0};
+    for (uint32_t frame = 0; frame < 25; frame += 12) {
+        struct shot fresh = shot_at(&job, scene, frame), kept;
+        assert_true(shot_make(&kept, &job, scene, frame, &bounds, NULL));
+        const struct frame_ground *ground = &fresh.request.ground;
+        assert_memory_equal(ground, &kept.request.ground, sizeof(*ground));
+        assert_true(ground->centre_world[1] < -3.0f && ground->centre_world[1] > -3.001f);
+        assert_true(ground->normal_world[1] == 1.0f && ground->radius > 10.0f);
+        shot_finish(&fresh);
+        shot_finish(&kept);
+    }
+    /* Of the rest pose, without the clip; seen from x, what lies at 0. */
+    job.clip_count = 0;
+    job.ground_up_world[0] = 1.0f;
+    job.ground_up_world[1] = 0.0f;
+    struct shot still = shot_at(&job, scene, 0);
+    assert_true(fabsf(still.request.ground.centre_world[0]) < 1e-3f);
+    shot_finish(&still);
+    scene_destroy(scene);
+}
+
 TEST(noise_is_another_in_every_frame_but_in_none_that_accumulates)
 {
     struct scene *scene = turning_scene(90);

@@ -1,0 +1,89 @@
+/* SPDX-License-Identifier: MIT */
+#include "engine/ground.h"
+
+#include <math.h>
+
+/* At which the lowest point is looked for. What dips below it in between is shown all the same, and hides the
+ * ground. */
+#define TIMES 17
+/* In diagonals of the scene: a sun 1 degree above the horizon throws shadows 57 times as long as things are high.
+ */
+#define RADIUS 64.0
+/* The same: so far below the lowest point that a floor of the model's own lies on it, and no ray can tell. */
+#define DEPTH (1.0 / 8192.0)
+
+static double job_end_s(const struct engine_job *job, const struct scene *scene)
+{
+    double end_s = 0.0;
+    for (uint32_t i = 0; i < job->clip_count; i++)
+        end_s = fmax(end_s, (double)job->clips[i].start_s +
+                                scene_clip_duration_s(scene, job->clips[i].clip) / (double)job->clips[i].speed);
+    return end_s;
+}
+
+/* How far the scene reaches along `down` at a time of the job, if that is farther than `reach`. */
+static bool look_at(const struct engine_job *job, const struct scene *scene, double time_s,
+                    const double down[1][3], double *reach, struct error *error)
+{
+    struct scene_pose pose;
+    double support;
+    if (!scene_pose_evaluate(&pose, scene, job->clips, job->clip_count, time_s, error))
+        return false;
+    if (scene_supports_below(scene, &pose, 0, down, &support, 1))
+        *reach = fmax(*reach, support);
+    scene_pose_finish(&pose);
+    return true;
+}
+
+static bool find(const struct engine_job *job, const struct scene *scene, struct frame_ground *ground,
+                 struct error *error)
+{
+    const float *up = job->ground_up_world;
+    const double length =
+        sqrt((double)up[0] * (double)up[0] + (double)up[1] * (double)up[1] + (double)up[2] * (double)up[2]);
+    double down[1][3], reach = -INFINITY, diagonal = 0.0, along = 0.0;
+    const uint32_t times = job->clip_count > 0 ? TIMES : 1;
+    float lower[3], upper[3];
+    *ground = (struct frame_ground){0};
+    for (int axis = 0; axis < 3; axis++)
+        down[0][axis] = -(double)up[axis] / length;
+    for (uint32_t i = 0; i < times; i++)
+        if (!look_at(job, scene, job_end_s(job, scene) * i / (times > 1 ? times - 1 : 1), down, &reach, error))
+            return false;
+    if (!isfinite(reach) || !scene_bounds(scene, NULL, lower, upper))
+        return true;
+    for (int axis = 0; axis < 3; axis++) {
+        const double size = (double)upper[axis] - (double)lower[axis];
+        diagonal += size * size;
+        along += down[0][axis] * ((double)upper[axis] + (double)lower[axis]) / 2.0;
+    }
+    diagonal = sqrt(diagonal);
+    const double off = reach + DEPTH * diagonal - along;
+    for (int axis = 0; axis < 3; axis++) {
+        ground->centre_world[axis] =
+            (float)(((double)upper[axis] + (double)lower[axis]) / 2.0 + off * down[0][axis]);
+        ground->normal_world[axis] = (float)-down[0][axis];
+    }
+    ground->radius = (float)fmin(RADIUS * diagonal, 1e18);
+    return true;
+}
+
+bool ground_place(const struct engine_job *job, const struct scene *scene, struct animation_bounds *bounds,
+                  struct frame_ground *ground, struct error *error)
+{
+    *ground = (struct frame_ground){0};
+    if (!job->has_ground)
+        return true;
+    if (bounds && bounds->ground_known && bounds->ground_revision == scene->revision) {
+        *ground = bounds->ground;
+        return true;
+    }
+    if (!find(job, scene, ground, error))
+        return false;
+    if (bounds) {
+        bounds->ground_known = true;
+        bounds->ground_revision = scene->revision;
+        bounds->ground = *ground;
+    }
+    return true;
+}

@@ -1,0 +1,13 @@
+/* SPDX-License-Identifier: MIT */
+/* Where a job's ground lies: beneath all that the scene shows, and all that the job's clips make of it. */
+#ifndef FARLIGHT_ENGINE_GROUND_H
+#define FARLIGHT_ENGINE_GROUND_H
+
+#include "engine/animation.h"
+
+/* The same in all frames of a scene's revision, whatever part of them the job renders. Nothing visible: a radius
+ * of 0. False: a clip does not exist, or out of memory. */
+bool ground_place(const struct engine_job *job, const struct scene *scene, struct animation_bounds *bounds,
+                  struct frame_ground *ground, struct error *error);
+
+#endif
