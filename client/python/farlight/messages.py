@@ -2069,6 +2069,11 @@ class Render(Message):
     crop_height: pixels
     wireframe: pixels: width of the lines that show, in black, the edges of the triangles that rays of the eye hit
         first; what a tracer stores as samples has none. 0: no lines
+    ground: 1: beneath all that is visible, also while clips play, lies a ground that is not seen itself: it shows what
+        lies behind it, and where things take light from it, so much less of that. With a transparent background it is
+        black, as opaque as that is. Nothing but the eye sees it, from above. Not with view_source layers; the
+        integrator raycast, which has no shadows, shows none
+    ground_up_x: ground: its normal
     keys: ascending in time
     clips: played simultaneously; of two that change the same property, the later one counts. The paths view-eye,
         view-look-at and view-up need camera path keys
@@ -2183,6 +2188,10 @@ class Render(Message):
         _f.whole("crop_width", "I", 0, 8192),
         _f.whole("crop_height", "I", 0, 8192),
         _f.real("wireframe", 0.0, 64.0),
+        _f.whole("ground", "I", 0, 1),
+        _f.real("ground_up_x", -1e6, 1e6),
+        _f.real("ground_up_y", -1e6, 1e6),
+        _f.real("ground_up_z", -1e6, 1e6),
         _f.array("keys", CameraKey, 1024),
         _f.array("clips", ClipUse, 16),
     )
@@ -2292,6 +2301,10 @@ class Render(Message):
     crop_width: int = 0
     crop_height: int = 0
     wireframe: float = 0.0
+    ground: int = 0
+    ground_up_x: float = 0.0
+    ground_up_y: float = 1.0
+    ground_up_z: float = 0.0
     keys: Sequence[CameraKey] = ()
     clips: Sequence[ClipUse] = ()
 
