@@ -41,13 +41,17 @@ SHARE outside_mirror(surface s, float cosine, float exact, float all_)
     return mirrored;
 }
 
-// What facets mirror at the first go. `mean`: facets_cosine().
-SHARE facets_outside_mirror(surface s, float mean, float loss, float alpha)
+// What facets mirror of light from outside at the first go, along a view of that cosine. `mean`: facets_cosine() of it;
+// `loss`: what they send into each other.
+SHARE facets_outside_mirror(surface s, float cosine, float mean, float alpha, float loss)
 {
-    float cosine = facets_dielectric_cosine(mean, alpha, s.ior), all_ = 1.0 - loss;
-    float exact = fresnel_dielectric(cosine, s.ior) * all_;
-    // A film's curve bends more, so facets at the horizon count for more; found by trial, so that no light is made.
-    return outside_mirror(s, cosine * (1.0 - 0.3 * alpha * (1.0 - mean)), exact, all_);
+    float all_ = 1.0 - loss;
+    float exact = fresnel_dielectric(facets_dielectric_cosine(mean, alpha, s.ior), s.ior) * all_;
+    SHARE mirrored = without_film(s, exact, all_);
+#ifdef HAS_IRIDESCENCE
+    mirrored = mix(mirrored, facets_film(s, cosine, alpha) * all_, s.film);
+#endif
+    return mirrored;
 }
 
 // What a facet of a metal mirrors.
@@ -58,6 +62,15 @@ vec3 metal_mirror(surface s, float cosine)
     mirrored = mix(mirrored, film_of(s, cosine), s.film);
 #endif
     return mirrored;
+}
+
+vec3 facets_metal_mirror(surface s, float cosine, float mean, float alpha, float loss)
+{
+    vec3 mirrored = fresnel_schlick(s.base, mean);
+#ifdef HAS_IRIDESCENCE
+    mirrored = mix(mirrored, facets_film(s, cosine, alpha), s.film);
+#endif
+    return mirrored * (1.0 - loss);
 }
 
 // The direction of what a facet refracts; 0: it is totally reflected. In a thin wall facets of both sides bend it: it is

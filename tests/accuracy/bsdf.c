@@ -306,19 +306,20 @@ TEST(a_coat_follows_its_density_and_keeps_the_light)
 }
 
 /* Films over white plastic and glass keep all light, as what they do not mirror enters; over metal what they do
- * not mirror is gone. Over rough facets the mean cosine stands in for all of them, which at the horizon meets a
- * film's curve where it bends. */
+ * not mirror is gone. Of rough facets three stand in for all of them, which is off by up to 0.01
+ * (shaders/common/film.glsl). The film of 400 nm bends most there: by one facet for all of them 1.044 came out. */
 TEST(a_film_follows_its_density_and_makes_no_light)
 {
     static const struct bsdf_case kinds[] = {
         {.ior = 1.5f, .film_ior = 1.3f, .film_nm = 400.0f},
         {.ior = 1.5f, .film_ior = 2.0f, .film_nm = 150.0f},
+        {.ior = 1.5f, .film_ior = 1.8f, .film_nm = 400.0f},
         {.ior = 1.5f, .film_ior = 1.8f, .film_nm = 1200.0f},
         {.ior = 1.5f, .transmission = 1.0f, .film_ior = 1.8f, .film_nm = 300.0f},
         {.ior = 1.5f, .metallic = 1.0f, .film_ior = 1.3f, .film_nm = 400.0f},
         {.ior = 1.5f, .metallic = 1.0f, .film_ior = 2.0f, .film_nm = 250.0f},
     };
-    static const float roughnesses[] = {0.0f, 0.4f, 0.9f};
+    static const float roughnesses[] = {0.0f, 0.4f, 0.7f, 0.9f};
     static const double cosines[] = {1.0, 0.6, 0.2};
     struct bsdf_probe *probe = &((struct bsdf_probe *)*state)[WITH_FILM];
     struct densities densities = {0};
@@ -339,8 +340,8 @@ TEST(a_film_follows_its_density_and_makes_no_light)
                   albedos.where, metals.max);
     assert_true(densities.max_z < 5.5); /* as above */
     assert_true(densities.max_weight_off < 1e-4);
-    assert_true(albedos.max <= 1.0 + 0.02);
-    assert_true(albedos.min_even[0] > 0.97);
+    assert_true(albedos.max <= 1.0 + 0.01);
+    assert_true(albedos.min_even[0] > 0.98);
     assert_true(metals.max <= 1.0 + 1e-3);
 }
 
