@@ -27,7 +27,7 @@ void main()
     uint slot = slot_of_pixel(uvec2(pixel.x, uint(pixel.y) + strip_row - band_row));
     float count = samples_of_slot(slot);
     vec4 sum = accumulation[slot];
-    vec3 albedo = max(albedos[slot].rgb / count, vec3(DENOISE_ALBEDO_MIN));
+    vec3 albedo = max(albedos[slot].rgb / notes_of_slot(slot, count), vec3(DENOISE_ALBEDO_MIN));
     vec3 moved = mean_of(halves_of_words(texelFetch(light, place))) -
                  mean_of(halves_of_words(texelFetch(first_light, place)));
 #ifdef HAS_REPROJECTED

@@ -89,7 +89,7 @@ TEST(a_view_at_rest_ends_in_the_same_picture_however_it_moved)
 {
     struct fixture *fixture = *state;
     a_corner(fixture);
-    struct frame_result direct = rendered(fixture, HISTORY_NONE, 4);
+    struct frame_result direct = rendered(fixture, HISTORY_KEPT, 4);
     fixture->request.accumulate = true;
     for (int frame = 1; frame < 4; frame++) {
         look(fixture, frame - 3);
