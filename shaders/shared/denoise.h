@@ -41,6 +41,8 @@
 #define DENOISE_MIRROR_DOUBT 0.5f
 /* What is brighter than so many times what is around it, or than so much of white, is left out of the filter. */
 #define DENOISE_CAP 4.0f
+/* What is that much brighter is a speck where pixels beside it have less than this share of what is left of it. */
+#define DENOISE_ALONE 0.5f
 /* Light counts as like another that differs by this many standard deviations; in mirrors and glass by as much less
  * as DENOISE_MIRROR_EDGES says. */
 #define DENOISE_LIGHT_SCALE 2.0f
