@@ -232,7 +232,7 @@ TEST(what_moves_by_itself_leaves_nothing_behind)
 }
 
 /* A wall that fills the picture and moves in its plane. Three samples of frames before and one are half of the
- * noise; three quarters of the error would be more than the denoiser leaves where nothing is found again. */
+ * noise, 0.41 is left with the denoiser; where the wall begins anew and the ball alone is followed, 0.69. */
 TEST(what_moves_is_followed)
 {
     struct fixture *fixture = *state;
@@ -244,5 +244,5 @@ TEST(what_moves_is_followed)
     look(fixture, 0);
     const double left = error_beside_alone(fixture, 4.0f, white, 0.0f);
     print_message("error %.2f\n", left);
-    assert_true(left < 0.75);
+    assert_true(left < 0.55);
 }
