@@ -396,6 +396,10 @@ class AbufferSearch(Word):
     DDA = 1  # texel by texel: the most exact
     LINEAR3 = 2  # in three steps, then by bisection
     LINEAR1 = 3  # in one step, then by bisection: the fastest, for soft light
+    VOXELS3 = 4  # as linear3, in steps of whole voxels, as in the paper: thin bodies are missed
+    VOXELS1 = 5  # as linear1, likewise
+    PARITY3 = 6
+    PARITY1 = 7  # as voxels1, likewise
 
 
 class RayspaceMode(Word):
