@@ -136,13 +136,15 @@ VIEWER_OBJ := $(call obj,$(VIEWER_C) $(addprefix client/cli/,image_path.c interr
 
 # The library for others' programs: position-independent, only what farlight.h declares is visible.
 SONAME := libfarlight.so.$(firstword $(subst ., ,$(VERSION)))
+# farlight.h is installed as <farlight/client.h>, the others below farlight/.
+PUBLIC_HEADERS := client/lib/farlight.h client/warp/warp.h $(addprefix protocol/,messages.h messages.def tracers.h tracers.def words.h words.def)
 LIB_PIC := $(patsubst %.c,$(B)/pic/%.o,$(LIB_SRC) $(EDIT_SRC) $(WARP_SRC) $(PROTOCOL_SRC) $(SEALED_SRC) $(PIXELS_SRC) $(COMMON_SRC))
 
 MODULES := $(B)/farlight-textures.so $(B)/farlight-assimp.so $(B)/farlight-images.so
 PROGRAMS := $(B)/farlightd $(B)/farlight $(B)/farlight-import $(B)/farlight-export $(B)/farlight-video $(B)/farlight-view
 
 .PHONY: all
-all: $(PROGRAMS) $(MODULES) $(B)/$(SONAME) $(B)/protocol.md $(B)/shot.schema.json $(B)/man/farlight.1
+all: $(PROGRAMS) $(MODULES) $(B)/$(SONAME) $(B)/libfarlight.a $(B)/protocol.md $(B)/shot.schema.json $(B)/man/farlight.1
 ifneq ($(EMBREE),1)
 	@echo 'built without Embree: the tracer reference is left out (its header is in the package libembree-dev)'
 endif
@@ -191,6 +193,12 @@ $(B)/pic/%.o: %.c
 $(B)/$(SONAME): $(LIB_PIC) client/lib/libfarlight.map
 	$(call say,LINK)$(CC) -shared -Wl,-soname,$(SONAME) -Wl,--version-script=client/lib/libfarlight.map $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) \
 	    $(LIB_PIC) $(CLIENT_LIBS) -o $@
+# One object whose symbols are those of the shared library, so that no name of ours meets one of the program's.
+$(B)/libfarlight.a: $(LIB_PIC)
+	@rm -f $@
+	$(call say,AR)ld -r $(LIB_PIC) -o $(B)/libfarlight.o && \
+	    objcopy --localize-hidden -w --keep-global-symbol='fl_*' --keep-global-symbol='protocol_*_text' --keep-global-symbol='protocol_*_parse' \
+	    $(B)/libfarlight.o && ar rcs $@ $(B)/libfarlight.o
 
 $(B)/shader_sources.c: shaders/embed.sh $(addprefix shaders/,$(SHADERS)) Makefile
 	@mkdir -p $(@D)
@@ -491,10 +499,10 @@ install: all
 	install -m 755 client/python/examples/*.py $(DESTDIR)$(PREFIX)/share/doc/farlight/examples/python
 	install -m 644 client/python/README.md $(DESTDIR)$(PREFIX)/share/doc/farlight/python.md
 	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/share/farlight \
-	    $(addprefix $(DESTDIR)$(PREFIX)/share/man/man,1 5 7 8) \
+	    $(addprefix $(DESTDIR)$(PREFIX)/share/man/man,1 3 5 7 8) \
 	    $(DESTDIR)$(PREFIX)/share/doc/farlight/examples $(DESTDIR)/etc/farlight \
 	    $(DESTDIR)$(UNITDIR) $(DESTDIR)$(PREFIX)/lib/sysusers.d
-	install -d $(DESTDIR)$(LIBDIR)/pkgconfig $(DESTDIR)$(PREFIX)/include/farlight/lib \
+	install -d $(DESTDIR)$(LIBDIR)/pkgconfig $(DESTDIR)$(PREFIX)/include/farlight \
 	    $(DESTDIR)$(PREFIX)/include/farlight/protocol $(DESTDIR)$(PREFIX)/include/farlight/warp \
 	    $(DESTDIR)$(PREFIX)/share/bash-completion/completions
 	install -m 755 $(PROGRAMS) $(DESTDIR)$(PREFIX)/bin
@@ -502,10 +510,10 @@ install: all
 	install -m 644 $(MODULES) $(DESTDIR)$(PREFIX)/lib/farlight
 	install -m 755 $(B)/$(SONAME) $(DESTDIR)$(LIBDIR)
 	ln -sf $(SONAME) $(DESTDIR)$(LIBDIR)/libfarlight.so
-	install -m 644 client/lib/farlight.h $(DESTDIR)$(PREFIX)/include/farlight/lib
-	install -m 644 client/warp/warp.h $(DESTDIR)$(PREFIX)/include/farlight/warp
-	install -m 644 $(addprefix protocol/,messages.h messages.def tracers.h tracers.def words.h words.def) $(DESTDIR)$(PREFIX)/include/farlight/protocol
-	sed 's#@PREFIX@#$(PREFIX)#; s#@LIBDIR@#$(LIBDIR)#; s#@VERSION@#$(VERSION)#' conf/farlight.pc.in \
+	install -m 644 $(B)/libfarlight.a $(DESTDIR)$(LIBDIR)
+	for header in $(PUBLIC_HEADERS); do case $$header in client/lib/*) name=client.h ;; *) name=$${header#client/} ;; esac; \
+	    sed 's,^#include "\(protocol\|warp\)/,#include "farlight/\1/,' $$header >$(DESTDIR)$(PREFIX)/include/farlight/$$name; done
+	sed 's#@PREFIX@#$(PREFIX)#; s#@LIBDIR@#$(patsubst $(PREFIX)/%,$${prefix}/%,$(LIBDIR))#; s#@VERSION@#$(VERSION)#' conf/farlight.pc.in \
 	    >$(DESTDIR)$(LIBDIR)/pkgconfig/farlight.pc
 	install -m 644 client/cli/completion.bash $(DESTDIR)$(PREFIX)/share/bash-completion/completions/farlight
 	for name in $(filter-out farlight,$(notdir $(PROGRAMS))); do \
@@ -527,10 +535,11 @@ install: all
 uninstall:
 	rm -f $(addprefix $(DESTDIR)$(PREFIX)/bin/,$(notdir $(PROGRAMS)) farlight-node)
 	rm -f $(addprefix $(DESTDIR)$(PREFIX)/share/man/man1/,$(notdir $(wildcard conf/man/*.1)))
+	rm -f $(addprefix $(DESTDIR)$(PREFIX)/share/man/man3/,$(notdir $(wildcard conf/man/*.3)))
 	rm -f $(addprefix $(DESTDIR)$(PREFIX)/share/man/man5/,$(notdir $(wildcard conf/man/*.5)))
 	rm -f $(addprefix $(DESTDIR)$(PREFIX)/share/man/man7/,$(notdir $(wildcard conf/man/*.7)))
 	rm -f $(addprefix $(DESTDIR)$(PREFIX)/share/man/man8/,$(notdir $(wildcard conf/man/*.8)))
-	rm -f $(DESTDIR)$(LIBDIR)/$(SONAME) $(DESTDIR)$(LIBDIR)/libfarlight.so \
+	rm -f $(DESTDIR)$(LIBDIR)/$(SONAME) $(addprefix $(DESTDIR)$(LIBDIR)/libfarlight.,so a) \
 	    $(DESTDIR)$(LIBDIR)/pkgconfig/farlight.pc \
 	    $(addprefix $(DESTDIR)$(PREFIX)/share/bash-completion/completions/,$(notdir $(PROGRAMS)))
 	rm -f $(addprefix $(DESTDIR)$(UNITDIR)/farlightd.,service socket) \

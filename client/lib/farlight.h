@@ -11,9 +11,9 @@
  *   while ((frame = fl_render_next(job, &error))) { ... fl_frame_destroy(frame); }
  *   fl_render_destroy(job); fl_scene_destroy(scene); fl_connection_destroy(connection);
  *
- * Zero is the default of every option. Errors are values: a function that can fail takes a struct fl_error,
- * says so by false or NULL, and fills it; what the call made until then is undone. A lost connection is
- * FL_ERROR_CONNECTION from then on. `destroy` takes NULL.
+ * Installed as <farlight/client.h>; libfarlight(3) is its overview. Zero is the default of every option. Errors
+ * are values: a function that can fail takes a struct fl_error, says so by false or NULL, and fills it; what the
+ * call made until then is undone. A lost connection is FL_ERROR_CONNECTION from then on. `destroy` takes NULL.
  * Destroy jobs before their scene and scenes before their connection; frames stand alone.
  *
  * Calls block and serve one connection at a time: a connection and all that hangs on it belong to one thread
