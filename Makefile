@@ -61,6 +61,7 @@ ASSIMP_PKGS := assimp
 EXPORT_PKGS := libpng OpenEXR libseccomp
 IMAGES_PKGS := OpenImageIO libtiff-4 libjxl
 VIDEO_PKGS := libavformat libavcodec libavutil libseccomp
+PALETTE_PKGS := libavfilter libavutil
 VIEWER_PKGS := sdl2 SDL2_ttf libavcodec libswscale libavutil
 TEST_PKGS := cmocka
 # pkg-config is only asked when something is built.
@@ -95,7 +96,8 @@ IMPORT_CXX := $(filter-out $(TEXTURE_CXX) $(ASSIMP_CXX),$(call sources,client/im
 EXPORT_C := $(call sources,client/output,c)
 IMAGES_CXX := $(call sources,client/output/library,cpp)
 EXPORT_CXX := $(filter-out $(IMAGES_CXX),$(call sources,client/output,cpp))
-VIDEO_C := $(call sources,client/video,c)
+PALETTE_C := client/video/palette_library.c
+VIDEO_C := $(filter-out $(PALETTE_C),$(call sources,client/video,c))
 VIEWER_C := $(call sources,client/viewer,c)
 SHADERS := $(patsubst shaders/%,%,$(call sources,shaders,h glsl comp vert geom frag))
 # make EXTRA_TRACER=FOLDER B=build/OTHER builds the product with one more tracer: its rows are FOLDER/tracers.def, its C
@@ -140,7 +142,7 @@ SONAME := libfarlight.so.$(firstword $(subst ., ,$(VERSION)))
 PUBLIC_HEADERS := client/lib/farlight.h client/warp/warp.h $(addprefix protocol/,messages.h messages.def tracers.h tracers.def words.h words.def)
 LIB_PIC := $(patsubst %.c,$(B)/pic/%.o,$(LIB_SRC) $(EDIT_SRC) $(WARP_SRC) $(PROTOCOL_SRC) $(SEALED_SRC) $(PIXELS_SRC) $(COMMON_SRC))
 
-MODULES := $(B)/farlight-textures.so $(B)/farlight-assimp.so $(B)/farlight-images.so
+MODULES := $(B)/farlight-textures.so $(B)/farlight-assimp.so $(B)/farlight-images.so $(B)/farlight-palette.so
 PROGRAMS := $(B)/farlightd $(B)/farlight $(B)/farlight-import $(B)/farlight-export $(B)/farlight-video $(B)/farlight-view
 
 .PHONY: all
@@ -163,7 +165,7 @@ $(B)/client/warp/%.o $(B)/pic/client/warp/%.o: CPPFLAGS_ALL += -Ishaders
 $(B)/client/warp/%.o $(B)/pic/client/warp/%.o: CFLAGS_ALL += -fopenmp-simd -ffp-contract=off -Wno-pass-failed $(if $(filter release,$(config)),-O3 -DLANES_CLONES)
 $(B)/client/import/%.opp $(B)/client/import/%.o $(B)/pic/client/import/%.opp: INCLUDES = -Iclient $(IMPORT_CFLAGS)
 $(B)/client/output/%.opp $(B)/client/output/%.o $(B)/pic/client/output/%.opp: INCLUDES = -Iclient $(EXPORT_CFLAGS)
-$(B)/client/video/%.o: INCLUDES = -Iclient $(VIDEO_CFLAGS)
+$(B)/client/video/%.o $(B)/pic/client/video/%.o: INCLUDES = -Iclient $(VIDEO_CFLAGS)
 $(B)/client/viewer/%.o: INCLUDES = -Iclient $(CLIENT_CFLAGS) $(VIEWER_CFLAGS)
 $(B)/tests/%.o: INCLUDES = -Iserver -Ishaders -Iclient $(SERVER_CFLAGS) $(CLIENT_CFLAGS) $(TEST_CFLAGS)
 SERVER_CFLAGS = $(eval SERVER_CFLAGS := $(call pkg_cflags,$(SERVER_PKGS) $(SERVER_LOADED_PKGS)))$(SERVER_CFLAGS)
@@ -240,7 +242,9 @@ $(B)/farlight-export: $(EXPORT_OBJ) $(PROTOCOL_OBJ) | $(B)/farlight-images.so
 	$(call say,LINK)$(CXX) $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(EXPORT_LIBS) -o $@
 $(B)/farlight-images.so: $(patsubst %.cpp,$(B)/pic/%.opp,$(IMAGES_CXX))
 	$(call say,LINK)$(CXX) -shared $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(call pkg_libs,$(IMAGES_PKGS)) -o $@
-$(B)/farlight-video: $(VIDEO_OBJ) $(PROTOCOL_OBJ)
+$(B)/farlight-palette.so: $(patsubst %.c,$(B)/pic/%.o,$(PALETTE_C))
+	$(call say,LINK)$(CC) -shared $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(call pkg_libs,$(PALETTE_PKGS)) -o $@
+$(B)/farlight-video: $(VIDEO_OBJ) $(PROTOCOL_OBJ) | $(B)/farlight-palette.so
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(VIDEO_LIBS) -o $@
 $(B)/farlight-view: $(VIEWER_OBJ) $(LIB_OBJ) $(PROTOCOL_OBJ)
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(VIEWER_LIBS) -o $@
@@ -337,7 +341,7 @@ $(LOSING_DAEMON): $(B)/tests/tools/lost_gpu.o $(B)/server/main.o $(SERVER_OBJ) $
 # ---- what people call ------------------------------------------------------------------------------
 BUILD_PACKAGES := gcc g++ make pkg-config libepoxy-dev libegl-dev libgl-dev libcglm-dev libturbojpeg0-dev libzstd-dev \
     libsodium-dev libxxhash-dev libinih-dev libjansson-dev libjemalloc-dev libseccomp-dev libopenimageio-dev libpng-dev libtiff-dev libopenexr-dev libjxl-dev libtinygltf-dev \
-    libtinyobjloader-dev libdraco-dev libmeshoptimizer-dev libassimp-dev libembree-dev libavcodec-dev libavformat-dev libavutil-dev libswscale-dev libsdl2-dev libsdl2-ttf-dev fonts-dejavu-core libegl1 libgl1-mesa-dri
+    libtinyobjloader-dev libdraco-dev libmeshoptimizer-dev libassimp-dev libembree-dev libavcodec-dev libavformat-dev libavfilter-dev libavutil-dev libswscale-dev libsdl2-dev libsdl2-ttf-dev fonts-dejavu-core libegl1 libgl1-mesa-dri
 TEST_PACKAGES := libcmocka-dev python3 python3-jsonschema python3-numpy python3-prometheus-client ffmpeg xvfb gnuplot-nox
 LINT_PACKAGES := clang clang-format glslang-tools python3 python3-numpy mypy
 # A second driver stack: OpenGL over Vulkan, on the CPU. The validation sees what it does.
