@@ -259,7 +259,7 @@ struct cli_job {
     const struct fl_json *script_json;
     struct cli_clip clips[CLI_CLIPS_MAX];
     size_t clip_count;
-    const char *edits[CLI_EDITS_MAX]; /* assignments, of a model's scene */
+    struct fl_assignment edits[CLI_EDITS_MAX]; /* of a model's scene */
     size_t edit_count;
     struct cli_channel *channels; /* the script's */
     size_t channel_count;

@@ -166,7 +166,8 @@ static bool edit(const struct editing *editing, struct fl_scene *scene, struct f
 /* ---- the list ---- */
 
 static const enum protocol_object_kind listed_kinds[] = {PROTOCOL_OBJECT_MATERIAL, PROTOCOL_OBJECT_LIGHT,
-                                                         PROTOCOL_OBJECT_CAMERA, PROTOCOL_OBJECT_NODE};
+                                                         PROTOCOL_OBJECT_CAMERA, PROTOCOL_OBJECT_NODE,
+                                                         PROTOCOL_OBJECT_ENVIRONMENT};
 
 static json_t *object_json(enum protocol_object_kind kind, uint32_t id, const char *name)
 {
@@ -195,7 +196,7 @@ static bool list_names(struct fl_scene *scene, bool json, struct fl_error *error
                 print_json(object_json(kind, objects[i].id, objects[i].name));
                 continue;
             }
-            printf("%-8s %6zu  #%-8" PRIu32 "  ", protocol_object_kind_text(kind), i, objects[i].id);
+            printf("%-11s %6zu  #%-8" PRIu32 "  ", protocol_object_kind_text(kind), i, objects[i].id);
             cli_print_name(objects[i].name);
             putchar('\n');
         }
@@ -278,7 +279,7 @@ static void print_state(struct fl_scene *scene, const struct fl_object_state *st
     }
 }
 
-/* "material.Steel", "node.*" */
+/* "material.Steel", "node.*", "environment" */
 static bool list_fields(const struct editing *editing, struct fl_scene *scene, const char *word,
                         struct fl_error *error)
 {
@@ -287,13 +288,14 @@ static bool list_fields(const struct editing *editing, struct fl_scene *scene, c
     enum protocol_object_kind kind = PROTOCOL_OBJECT_COUNT;
     uint32_t *ids = NULL;
     size_t count = 0;
-    snprintf(kind_name, sizeof(kind_name), "%.*s", (int)(dot && dot - word < 31 ? dot - word : 0), word);
+    snprintf(kind_name, sizeof(kind_name), "%.*s", (int)strcspn(word, "."), word);
     struct fl_field fields[FL_FIELDS_MAX];
-    if (!protocol_object_kind_parse(kind_name, &kind) || fl_fields(kind, fields) == 0) {
+    if (!protocol_object_kind_parse(kind_name, &kind) || fl_fields(kind, fields) == 0 ||
+        (kind == PROTOCOL_OBJECT_ENVIRONMENT) == (dot != NULL)) {
         fl_error_set(error, FL_ERROR_ARGUMENT, word, "is no object that can be edited");
-        return fl_error_remedy(error, "write it like material.Steel, node.*, light.#2 or camera.0");
+        return fl_error_remedy(error, "write it like material.Steel, node.*, light.#2, camera.0 or environment");
     }
-    if (!fl_scene_find_objects(scene, kind, dot + 1, &ids, &count, error)) {
+    if (!fl_scene_find_objects(scene, kind, dot ? dot + 1 : "", &ids, &count, error)) {
         snprintf(error->field, sizeof(error->field), "%s", word);
         return false;
     }
@@ -354,10 +356,11 @@ int cli_edit(int argc, char **argv)
         .parser = parse,
         .children = children,
         .args_doc = "--scene NAME ASSIGNMENT...\n--scene NAME --from FILE\n--scene NAME --list [OBJECT...]",
-        .doc = "Change materials, nodes, lights and cameras of a shared scene, for all its clients, in one "
-               "transaction.\v"
+        .doc = "Change materials, nodes, lights, cameras and the environment of a shared scene, for all its "
+               "clients, in one transaction.\v"
                "An ASSIGNMENT is material.Steel.roughness=0.2, node.Door.rotate=0,30,0, 'light.Sun.intensity*=2', "
-               "hide=Roof or show=Roof. Names may have '*'; numbers and #identifiers name objects, too."};
+               "environment.rotation=90, hide=Roof or show=Roof. Names may have '*'; numbers and #identifiers "
+               "name objects, too."};
     struct editing editing = {0};
     struct fl_error error = {0};
     editing.words = calloc((size_t)argc + 1, sizeof(*editing.words));

@@ -220,11 +220,9 @@ static error_t set_real(struct cli_job *job, const char *field, const char *valu
 /* Read here, so that what is wrong is known early; meant by the scene, which is not there yet. */
 static error_t add_edit(struct cli_job *job, const char *field, const char *value)
 {
-    struct fl_assignment assignment;
     if (job->edit_count == CLI_EDITS_MAX)
         return cli_usage(job, field, "more than %d assignments cannot be given", CLI_EDITS_MAX);
-    job->edits[job->edit_count++] = value;
-    return fl_assignment_parse(value, &assignment, &job->error) ? 0 : EINVAL;
+    return fl_assignment_parse(value, &job->edits[job->edit_count++], &job->error) ? 0 : EINVAL;
 }
 
 static error_t set_crop(struct cli_job *job, const char *field, const char *value)
@@ -573,10 +571,10 @@ const struct argp *cli_thumbnail_argp(void)
 
 const struct argp *cli_view_argp(void)
 {
-    static const char *const left_out[] = {
-        "output",     "format",      "half",      "float",      "samples",  "integrator", "timings",
-        "trace-file", "layers",      "clip-once", "clip-start", "encoding", "retry-for",  "retries",
-        "metadata",   "light-field", "baseline",  "views",      "edit",     "crop",       NULL};
+    static const char *const left_out[] = {"output",      "format",   "half",       "float",   "samples",
+                                           "integrator",  "timings",  "trace-file", "layers",  "clip-once",
+                                           "clip-start",  "encoding", "retry-for",  "retries", "metadata",
+                                           "light-field", "baseline", "views",      "crop",    NULL};
     static struct argp_option kept[OPTIONS_MAX];
     static const struct argp argp = {.options = kept, .parser = parse};
     keep(kept, left_out);

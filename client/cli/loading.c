@@ -77,11 +77,7 @@ bool cli_loading_begin(struct cli_loading *loading, struct fl_error *error)
 /* Makes the job's edits in a scene that has just been loaded. */
 static bool apply_edits(const struct cli_job *job, struct fl_scene *scene, struct fl_error *error)
 {
-    struct fl_assignment assignments[CLI_EDITS_MAX];
-    for (size_t i = 0; i < job->edit_count; i++)
-        if (!fl_assignment_parse(job->edits[i], &assignments[i], error))
-            return false;
-    return job->edit_count == 0 || fl_scene_edit(scene, assignments, job->edit_count, NULL, error);
+    return job->edit_count == 0 || fl_scene_edit(scene, job->edits, job->edit_count, NULL, error);
 }
 
 static void tell_warnings(struct cli_loading *loading)

@@ -11,7 +11,8 @@
 #define TEXT_MAX 1024u
 
 static const enum protocol_object_kind kinds[] = {PROTOCOL_OBJECT_MATERIAL, PROTOCOL_OBJECT_NODE,
-                                                  PROTOCOL_OBJECT_LIGHT, PROTOCOL_OBJECT_CAMERA};
+                                                  PROTOCOL_OBJECT_LIGHT, PROTOCOL_OBJECT_CAMERA,
+                                                  PROTOCOL_OBJECT_ENVIRONMENT};
 
 /* ---- reading ---- */
 
@@ -37,7 +38,7 @@ static bool wrong_form(struct fl_error *error)
 {
     fl_error_set(error, FL_ERROR_ARGUMENT, "", "is no assignment");
     return fl_error_remedy(error, "write it like material.Steel.roughness=0.2, node.Door.rotate=0,30,0, "
-                                  "light.Sun.intensity=5, hide=Roof or show=Roof");
+                                  "light.Sun.intensity=5, environment.rotation=90, hide=Roof or show=Roof");
 }
 
 /* The way of an assignment whose equals sign is there, and the end of what is in front of it. */
@@ -56,6 +57,17 @@ static char *dot_before(char *text, char *end)
     while (end > text && end[-1] != '.')
         end--;
     return end > text ? end - 1 : NULL;
+}
+
+/* "intensity=2" of the environment, which has no name. */
+static void split_nameless(struct parts *parts, char *text)
+{
+    char *equals = strchr(text, '='), *end;
+    parts->way = way_of(text, equals, &end);
+    parts->value = trimmed(equals + 1);
+    *end = '\0';
+    parts->name = "";
+    parts->field = trimmed(text);
 }
 
 /* Where the value's equals sign is: the first one with a known field in front of it, else the first one. */
@@ -89,7 +101,7 @@ static bool find_kind(const char *text, enum protocol_object_kind *kind, struct 
     fl_error_set(error, FL_ERROR_ARGUMENT, "", "'%s' is no kind of object that can be edited", text);
     if (nearest.name)
         return fl_error_remedy(error, "did you mean '%s'?", nearest.name);
-    return fl_error_remedy(error, "material, node, light and camera can");
+    return fl_error_remedy(error, "material, node, light, camera and environment can");
 }
 
 /* "hide=Roof", "show=Roof". */
@@ -120,6 +132,10 @@ static bool split(struct parts *parts, enum protocol_object_kind *kind, struct f
     parts->kind = trimmed(text);
     if (!find_kind(parts->kind, kind, error))
         return false;
+    if (*kind == PROTOCOL_OBJECT_ENVIRONMENT) {
+        split_nameless(parts, first + 1);
+        return true;
+    }
     char *rest = first + 1, *equals = find_equals(*kind, rest), *end;
     parts->way = way_of(rest, equals, &end);
     char *last = dot_before(rest, end);
@@ -214,7 +230,7 @@ static bool read_values(const struct fl_field *field, const char *text, struct f
 static bool read_parts(const struct parts *parts, struct fl_assignment *assignment, struct fl_error *error)
 {
     struct fl_field field;
-    if (parts->name[0] == '\0')
+    if (parts->name[0] == '\0' && assignment->kind != PROTOCOL_OBJECT_ENVIRONMENT)
         return wrong_form(error);
     if (strlen(parts->name) >= sizeof(assignment->which))
         return fl_error_set(error, FL_ERROR_ARGUMENT, "", "the name has more than %zu bytes",
@@ -305,8 +321,10 @@ const char *fl_assignment_print(const struct fl_assignment *assignment, char *te
     snprintf(id, sizeof(id), "#%u", assignment->id);
     append(&line, protocol_object_kind_text(assignment->kind));
     append(&line, ".");
-    append(&line, assignment->id > 0 ? id : assignment->which);
-    append(&line, ".");
+    if (assignment->kind != PROTOCOL_OBJECT_ENVIRONMENT) {
+        append(&line, assignment->id > 0 ? id : assignment->which);
+        append(&line, ".");
+    }
     append(&line, assignment->field);
     append(&line, (unsigned)assignment->way <= FL_ASSIGN_PRODUCT ? signs[assignment->way] : "=");
     append_values(&line, assignment);

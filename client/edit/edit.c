@@ -295,7 +295,8 @@ bool fl_scene_read(struct fl_scene *scene, enum protocol_object_kind kind, uint3
              kind == PROTOCOL_OBJECT_NODE       ? message->set_node.name
              : kind == PROTOCOL_OBJECT_MATERIAL ? message->set_material.name
              : kind == PROTOCOL_OBJECT_LIGHT    ? message->set_light.name
-                                                : message->set_camera.name);
+             : kind == PROTOCOL_OBJECT_CAMERA   ? message->set_camera.name
+                                                : "");
     for (size_t i = 0; i < count; i++) {
         if (!edit_field_applies(&fields[i], message))
             continue;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Fields of materials, lights and cameras are those of their messages, so that a new one needs no word here; those
- * of nodes, and the intensity of lights, are made of what the messages have. */
+ * of nodes and of the environment, and the intensity of lights, are made of what the messages have. */
 #include "edit/field.h"
 
 #include "edit/turn.h"
@@ -15,7 +15,9 @@
 #define COORDINATE_MAX 1e12 /* of the protocol */
 #define SCALE_MAX 1e6
 #define ANGLE_MAX 3.6e6
-#define ANGLE_STEP 1e-4 /* degrees: an angle out of a matrix of floats is no better than a tenth of it */
+#define TURN_MAX 3600.0    /* degrees, of the environment; the protocol has 100 radians */
+#define TURN_OF_IMAGE 90.0 /* as --environment-rotation: the middle column is +x, in the protocol -z */
+#define ANGLE_STEP 1e-4    /* degrees: an angle out of a matrix of floats is no better than a tenth of it */
 
 /* ---- units ---- */
 
@@ -56,11 +58,12 @@ static void set_unit(struct fl_field *field)
 
 enum message_type edit_message_type(enum protocol_object_kind kind)
 {
-    return kind == PROTOCOL_OBJECT_NODE       ? MESSAGE_SET_NODE
-           : kind == PROTOCOL_OBJECT_MATERIAL ? MESSAGE_SET_MATERIAL
-           : kind == PROTOCOL_OBJECT_LIGHT    ? MESSAGE_SET_LIGHT
-           : kind == PROTOCOL_OBJECT_CAMERA   ? MESSAGE_SET_CAMERA
-                                              : MESSAGE_OK;
+    return kind == PROTOCOL_OBJECT_NODE          ? MESSAGE_SET_NODE
+           : kind == PROTOCOL_OBJECT_MATERIAL    ? MESSAGE_SET_MATERIAL
+           : kind == PROTOCOL_OBJECT_LIGHT       ? MESSAGE_SET_LIGHT
+           : kind == PROTOCOL_OBJECT_CAMERA      ? MESSAGE_SET_CAMERA
+           : kind == PROTOCOL_OBJECT_ENVIRONMENT ? MESSAGE_SET_ENVIRONMENT
+                                                 : MESSAGE_OK;
 }
 
 /* The place of a colour in three fields, X_red and so on; 0: it is none. */
@@ -129,6 +132,27 @@ static size_t node_fields(struct fl_field fields[FL_FIELDS_MAX])
     return 5;
 }
 
+static struct fl_field intensity(double max, const char *doc)
+{
+    struct fl_field field = made("intensity", EDIT_INTENSITY, 1, max);
+    field.min = 0;
+    field.doc = doc;
+    return field;
+}
+
+/* Without its image. */
+static size_t environment_fields(struct fl_field fields[FL_FIELDS_MAX])
+{
+    const struct struct_desc *body = message_describe(MESSAGE_SET_ENVIRONMENT)->body();
+    fields[1] = of_wire(struct_field(body, "colour"));
+    fields[0] = intensity(fields[1].max, "the largest of the colour's numbers");
+    fields[2] = made("rotation", EDIT_TURN, 1, TURN_MAX);
+    fields[2].unit = "degrees";
+    fields[2].doc = "turn of the image about +y; 0: its middle column is +x";
+    fields[3] = of_wire(struct_field(body, "backdrop"));
+    return 4;
+}
+
 /* What tells objects apart or points elsewhere is no field. */
 static bool is_value(const struct field_desc *wire, const struct struct_desc *body)
 {
@@ -144,12 +168,12 @@ size_t fl_fields(enum protocol_object_kind kind, struct fl_field fields[FL_FIELD
         return 0;
     if (type == MESSAGE_SET_NODE)
         return node_fields(fields);
+    if (type == MESSAGE_SET_ENVIRONMENT)
+        return environment_fields(fields);
     const struct struct_desc *body = message_describe(type)->body();
-    if (type == MESSAGE_SET_LIGHT) {
-        fields[count] = made("intensity", EDIT_INTENSITY, 1, COORDINATE_MAX);
-        fields[count].min = 0;
-        fields[count++].doc = "the largest of the colour's numbers, in the unit of the light's kind";
-    }
+    if (type == MESSAGE_SET_LIGHT)
+        fields[count++] =
+            intensity(COORDINATE_MAX, "the largest of the colour's numbers, in the unit of the light's kind");
     for (const struct field_desc *wire = body->fields; wire->name && count < FL_FIELDS_MAX; wire++) {
         if (!is_value(wire, body))
             continue;
@@ -186,7 +210,8 @@ bool edit_field_find(enum protocol_object_kind kind, const char *name, struct fl
         }
         fl_nearest_try(&nearest, name, fields[i].name);
     }
-    fl_error_set(error, FL_ERROR_ARGUMENT, "", "a %s has no field '%s'", protocol_object_kind_text(kind), name);
+    fl_error_set(error, FL_ERROR_ARGUMENT, "", "%s %s has no field '%s'",
+                 kind == PROTOCOL_OBJECT_ENVIRONMENT ? "an" : "a", protocol_object_kind_text(kind), name);
     if (nearest.name)
         return fl_error_remedy(error, "did you mean '%s'?", nearest.name);
     if (error)
@@ -246,9 +271,9 @@ static void store_wire(const struct fl_field *field, struct message *object, con
     }
 }
 
-static double intensity_of(const struct message_set_light *light)
+static double intensity_of(const float colour[3])
 {
-    return (double)fmaxf(light->colour[0], fmaxf(light->colour[1], light->colour[2]));
+    return (double)fmaxf(colour[0], fmaxf(colour[1], colour[2]));
 }
 
 void edit_field_load(const struct fl_field *field, const struct message *object,
@@ -278,16 +303,21 @@ void edit_field_load(const struct fl_field *field, const struct message *object,
             values[i] = (double)matrix[i];
         return;
     case EDIT_INTENSITY:
-        values[0] = intensity_of(&object->set_light);
+        values[0] = intensity_of(object->type == MESSAGE_SET_LIGHT ? object->set_light.colour
+                                                                   : object->set_environment.colour);
+        return;
+    case EDIT_TURN:
+        values[0] = (double)object->set_environment.rotation / RADIANS_PER_DEGREE + TURN_OF_IMAGE;
+        values[0] = rint(values[0] / ANGLE_STEP) * ANGLE_STEP + 0.0;
         return;
     }
 }
 
-static void store_intensity(struct message_set_light *light, double intensity)
+static void store_intensity(float colour[3], double intensity)
 {
-    const double before = intensity_of(light);
+    const double before = intensity_of(colour);
     for (int i = 0; i < 3; i++)
-        light->colour[i] = (float)(before > 0 ? (double)light->colour[i] / before * intensity : intensity);
+        colour[i] = (float)(before > 0 ? (double)colour[i] / before * intensity : intensity);
 }
 
 void edit_field_store(const struct fl_field *field, struct message *object, const double *values)
@@ -316,7 +346,12 @@ void edit_field_store(const struct fl_field *field, struct message *object, cons
             matrix[i] = (float)values[i];
         return;
     case EDIT_INTENSITY:
-        store_intensity(&object->set_light, values[0]);
+        store_intensity(object->type == MESSAGE_SET_LIGHT ? object->set_light.colour
+                                                          : object->set_environment.colour,
+                        values[0]);
+        return;
+    case EDIT_TURN:
+        object->set_environment.rotation = (float)((values[0] - TURN_OF_IMAGE) * RADIANS_PER_DEGREE);
         return;
     }
 }

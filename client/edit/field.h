@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Fields of objects: the values of a set_node, set_material, set_light or set_camera as people name them. Pure. */
+/* Fields of objects: the values of a set_node, set_material, set_light, set_camera or set_environment as
+ * people name them. Pure. */
 #ifndef FARLIGHT_CLIENT_EDIT_FIELD_H
 #define FARLIGHT_CLIENT_EDIT_FIELD_H
 
@@ -13,7 +14,8 @@ enum edit_source {
     EDIT_ROTATE,
     EDIT_SCALE,
     EDIT_MATRIX,
-    EDIT_INTENSITY, /* a light's largest colour channel */
+    EDIT_INTENSITY, /* the largest colour channel of a light or the environment */
+    EDIT_TURN,      /* of the environment's image */
 };
 
 /* False and *error, with field empty: there is none of that name. */

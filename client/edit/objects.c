@@ -12,6 +12,7 @@
 #include <string.h>
 
 #define ANSWER_NS 30000000000ull
+#define ENVIRONMENT 1u /* the identifier of the only one */
 
 static bool check_daemon(const struct fl_connection *connection, struct fl_error *error)
 {
@@ -63,12 +64,23 @@ static bool take_page(struct list *list, const struct message_scene_objects_repl
     return true;
 }
 
+/* Each scene has one, which the daemon does not list. */
+static bool list_environment(struct list *list, struct fl_error *error)
+{
+    if (!fl_grow((void **)&list->objects, &list->capacity, list->count, sizeof(*list->objects), error))
+        return false;
+    list->objects[list->count++] = (struct fl_object){.id = ENVIRONMENT};
+    return true;
+}
+
 /* `name` empty: all. Places ascend from page to page, so that the questions come to an end. */
 static bool list_objects(struct fl_scene *scene, enum protocol_object_kind kind, const char *name,
                          struct list *list, struct fl_error *error)
 {
     struct message question;
     struct fl_received received;
+    if (kind == PROTOCOL_OBJECT_ENVIRONMENT)
+        return list_environment(list, error);
     message_init(&question, MESSAGE_SCENE_OBJECTS);
     question.scene_objects.scene = scene->scene;
     question.scene_objects.kind = kind;
@@ -259,6 +271,8 @@ bool fl_scene_find_objects(struct fl_scene *scene, enum protocol_object_kind kin
     bool good = check_daemon(scene->connection, error);
     if (good && which[0] == '#' && fl_text_integer(which + 1, 1, UINT32_MAX, &id, NULL))
         good = add_id(&found, (uint32_t)id, error);
+    else if (good && kind == PROTOCOL_OBJECT_ENVIRONMENT)
+        good = add_id(&found, ENVIRONMENT, error);
     else if (good)
         good = find_in_lists(scene, &wanted, &objects, &nodes, &found, error);
     free(objects.objects);
@@ -274,11 +288,12 @@ bool fl_scene_find_objects(struct fl_scene *scene, enum protocol_object_kind kin
 
 static uint32_t id_in(const struct message *message)
 {
-    return message->type == MESSAGE_SET_NODE       ? message->set_node.node
-           : message->type == MESSAGE_SET_MATERIAL ? message->set_material.material
-           : message->type == MESSAGE_SET_LIGHT    ? message->set_light.light
-           : message->type == MESSAGE_SET_CAMERA   ? message->set_camera.camera
-                                                   : 0;
+    return message->type == MESSAGE_SET_NODE          ? message->set_node.node
+           : message->type == MESSAGE_SET_MATERIAL    ? message->set_material.material
+           : message->type == MESSAGE_SET_LIGHT       ? message->set_light.light
+           : message->type == MESSAGE_SET_CAMERA      ? message->set_camera.camera
+           : message->type == MESSAGE_SET_ENVIRONMENT ? ENVIRONMENT
+                                                      : 0;
 }
 
 /* A copy that needs no buffer of the connection: its bytes, decoded again. */

@@ -5,7 +5,7 @@
 
 #include "lib/farlight.h"
 
-/* An object as the daemon has it: a set_node, set_material, set_light or set_camera. */
+/* An object as the daemon has it: a set_node, set_material, set_light, set_camera or set_environment. */
 struct edit_object {
     enum protocol_object_kind kind;
     uint32_t id;

@@ -297,13 +297,14 @@ struct fl_object {
 /* The objects of a kind as the daemon has them now, ascending by id; *objects is malloc'ed. */
 FL_API bool fl_scene_objects(struct fl_scene *scene, enum protocol_object_kind kind, struct fl_object **objects,
                              size_t *count, struct fl_error *error);
-/* One of them by its identifier, such as a picture's layer `id` has of nodes and materials. */
+/* One of them by its identifier, such as a picture's layer `id` has of nodes and materials; of any kind but
+ * `environment`. */
 FL_API bool fl_scene_object(struct fl_scene *scene, enum protocol_object_kind kind, uint32_t id,
                             struct fl_object *object, struct fl_error *error);
 
 /* The identifiers of the objects that are meant, at least one; *ids is malloc'ed. `which` is a name, a number or
  * "#" and an identifier, as of fl_assignment. FL_ERROR_ARGUMENT, field empty: there is none; the remedy has a name
- * that is near, or all as far as they fit. */
+ * that is near, or all as far as they fit. Of the kind `environment` there is one, 1, whatever `which` says. */
 FL_API bool fl_scene_find_objects(struct fl_scene *scene, enum protocol_object_kind kind, const char *which,
                                   uint32_t **ids, size_t *count, struct fl_error *error);
 
@@ -317,7 +318,7 @@ enum fl_field_form {
     FL_FIELD_WORD,   /* the number of a word: fl_field_word */
 };
 
-/* A field that can be edited, of nodes, materials, lights or cameras. Angles are degrees. */
+/* A field that can be edited, of nodes, materials, lights, cameras or the environment. Angles are degrees. */
 struct fl_field {
     char name[48]; /* "roughness" */
     enum fl_field_form form;
@@ -356,8 +357,8 @@ enum fl_assignment_way { FL_ASSIGN, FL_ASSIGN_SUM, FL_ASSIGN_PRODUCT };
 
 /* A field of an object gets a value. */
 struct fl_assignment {
-    enum protocol_object_kind kind; /* node, material, light or camera */
-    uint32_t id;                    /* 0: `which` says which objects */
+    enum protocol_object_kind kind; /* node, material, light, camera or environment */
+    uint32_t id;                    /* 0: `which` says which objects; of the environment neither counts */
     /* A name, or a number counted from 0 by ascending identifiers; a name has precedence over a number, and the
      * first of several with one name counts. A light or a camera is known by the nodes that show it, too. "*"
      * stands for any characters, and then all that match are meant. "#7" is the object with identifier 7. */
@@ -368,8 +369,8 @@ struct fl_assignment {
     double values[FL_FIELD_VALUES_MAX];
 };
 /* Reads "material.Steel.roughness=0.2", "light.Sun.intensity*=2", "node.Door.rotate+=0,30,0",
- * "material.#7.base_colour=#ff8000", "hide=Roof" or "show=Roof". FL_ERROR_ARGUMENT names the
- * assignment. */
+ * "material.#7.base_colour=#ff8000", "environment.rotation=90", "hide=Roof" or "show=Roof". FL_ERROR_ARGUMENT
+ * names the assignment. */
 FL_API bool fl_assignment_parse(const char *text, struct fl_assignment *assignment, struct fl_error *error);
 /* As fl_assignment_parse() reads it; values keep their floats. Cut off where it does not fit. Returns text. */
 FL_API const char *fl_assignment_print(const struct fl_assignment *assignment, char *text, size_t text_bytes);

@@ -306,6 +306,8 @@ static void fill(struct command_line *line)
     viewer->environment = job->environment;
     viewer->environment_degrees = job->environment_degrees;
     viewer->variant = job->variant;
+    viewer->edits = job->edits;
+    viewer->edit_count = job->edit_count;
     viewer->point_size = job->point_size;
     viewer->scene_name = job->scene;
     viewer->view = job->options;

@@ -83,7 +83,12 @@ static struct fl_scene *load(struct session *session, struct fl_error *error)
                                            .sharing =
                                                options->server ? PROTOCOL_SHARING_KEPT : PROTOCOL_SHARING_PRIVATE,
                                            .scene_name = options->server ? session->kept_name : NULL};
-    return fl_scene_load(session->connection, &wanted, error);
+    struct fl_scene *scene = fl_scene_load(session->connection, &wanted, error);
+    if (!scene || options->edit_count == 0 ||
+        fl_scene_edit(scene, options->edits, options->edit_count, NULL, error))
+        return scene;
+    fl_scene_destroy(scene);
+    return NULL;
 }
 
 /* A daemon that kept running still has the scene; a new one gets it again. */

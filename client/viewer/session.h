@@ -16,6 +16,8 @@ struct session_options {
     int input_fd; /* likewise */
     double environment_degrees, point_size;
     const char *variant;
+    const struct fl_assignment *edits; /* of what is loaded, each time */
+    size_t edit_count;
     const char *scene_name; /* .. or, not NULL, the scene to attach to */
     bool watch;             /* the files are loaded again when they change: it becomes live anew */
     int interrupt_fd;
@@ -32,7 +34,7 @@ enum session_state {
     SESSION_FAILED /* it never was there, and will not be */
 };
 
-/* The strings must live until it is destroyed. */
+/* The strings and lists must live until it is destroyed. */
 struct session *session_create(const struct session_options *options, struct fl_error *error);
 /* Advances the current state; never waits for long. */
 enum session_state session_step(struct session *session, uint64_t now_ns);

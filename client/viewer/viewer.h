@@ -13,7 +13,9 @@ struct viewer_options {
     size_t model_count;
     int input_fd;
     bool watch;
-    const char *variant;                    /* likewise */
+    const char *variant;               /* likewise */
+    const struct fl_assignment *edits; /* likewise */
+    size_t edit_count;
     double environment_degrees, point_size; /* likewise */
     /* From the command line; width and height are the window's, in pixels of the desktop. */
     struct message_render view;      /* of one eye */

@@ -40,6 +40,7 @@ static bool shape_check(const struct scene_edit *edit, const struct edit_place *
     case OBJECT_CHANNEL:
         return channel_check(&edit->set.channel, place);
     case OBJECT_MATERIAL:
+    case OBJECT_ENVIRONMENT:
     case OBJECT_COUNT:
         break;
     }
@@ -72,8 +73,9 @@ static bool mesh_content_check(struct draft *draft, struct scene_mesh *mesh, con
 
 static bool content_check(struct draft *draft, struct scene_edit *edit, const struct edit_place *place)
 {
-    if (edit->kind == EDIT_SET_ENVIRONMENT)
-        return environment_check_content(&edit->set.environment, place);
+    if (edit->kind == EDIT_SET_ENVIRONMENT) /* the image of the scene has been looked through */
+        return edit->set.environment.texels == draft->scene->environment.texels ||
+               environment_check_content(&edit->set.environment, place);
     switch (edit->object) {
     case OBJECT_MESH:
         return mesh_content_check(draft, &edit->set.mesh, place);
@@ -90,10 +92,23 @@ static bool content_check(struct draft *draft, struct scene_edit *edit, const st
     case OBJECT_CAMERA:
     case OBJECT_DISC:
     case OBJECT_CHANNEL:
+    case OBJECT_ENVIRONMENT:
     case OBJECT_COUNT:
         break;
     }
     return true;
+}
+
+/* The image that is there is that of the edit before, if there is one. */
+static void keep_image(const struct draft *draft, struct scene_environment *environment)
+{
+    const struct scene_environment *before =
+        draft->last_environment ? &draft->last_environment->set.environment : &draft->scene->environment;
+    struct blob *texels = blob_ref(before->texels);
+    blob_unref(environment->texels);
+    environment->texels = texels;
+    environment->width = before->width;
+    environment->height = before->height;
 }
 
 /* Makes an edit the last of its object. */
@@ -101,6 +116,8 @@ static bool take_edit(struct draft *draft, struct scene_edit *edit)
 {
     struct edit_place place = draft_place(draft, edit);
     if (edit->kind == EDIT_SET_ENVIRONMENT) {
+        if (edit->set.environment.keeps_image)
+            keep_image(draft, &edit->set.environment);
         draft->last_environment = edit;
         return true;
     }
@@ -356,6 +373,7 @@ static void apply(struct draft *draft, const struct size *size)
         } else {
             blob_unref(scene->environment.texels);
             scene->environment = edit->set.environment;
+            scene->environment.keeps_image = false;
             scene->environment.revision = scene->lights_revision = scene->revision;
             memset(&edit->set, 0, sizeof(edit->set));
         }

@@ -15,7 +15,7 @@ const char *object_kind_name(enum object_kind kind)
         [OBJECT_NODE] = "node",         [OBJECT_MESH] = "mesh",       [OBJECT_SPHERES] = "spheres",
         [OBJECT_MATERIAL] = "material", [OBJECT_TEXTURE] = "texture", [OBJECT_LIGHT] = "light",
         [OBJECT_CAMERA] = "camera",     [OBJECT_DISC] = "disc",       [OBJECT_SKIN] = "skin",
-        [OBJECT_CLIP] = "clip",         [OBJECT_CHANNEL] = "channel",
+        [OBJECT_CLIP] = "clip",         [OBJECT_CHANNEL] = "channel", [OBJECT_ENVIRONMENT] = "environment",
     };
     return (unsigned)kind < OBJECT_COUNT ? names[kind] : "object";
 }

@@ -125,6 +125,7 @@ static bool next_reference(enum object_kind kind, const void *object, uint32_t *
     case OBJECT_LIGHT:
     case OBJECT_CAMERA:
     case OBJECT_CLIP:
+    case OBJECT_ENVIRONMENT:
     case OBJECT_COUNT:
         break;
     }

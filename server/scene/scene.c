@@ -96,14 +96,28 @@ const struct scene_clip *scene_clip(const struct scene *scene, uint32_t id)
 
 /* ---- edits that change what is there ------------------------------------------------------------ */
 
+/* Without its image, which another client may not know: an edit leaves that as it is. */
+static void read_environment(const struct scene *scene, struct scene_edit *edit)
+{
+    edit->kind = EDIT_SET_ENVIRONMENT;
+    edit->set.environment = scene->environment;
+    edit->set.environment.texels = NULL;
+    edit->set.environment.keeps_image = true;
+}
+
 bool scene_read_object(const struct scene *scene, enum object_kind kind, uint32_t id, struct scene_edit *edit,
                        struct error *error)
 {
     const void *object = (unsigned)kind < OBJECT_COUNT ? hashmap_get(&scene->objects[kind], id) : NULL;
     *edit = (struct scene_edit){.kind = EDIT_SET, .object = kind};
-    if (kind != OBJECT_NODE && kind != OBJECT_MATERIAL && kind != OBJECT_LIGHT && kind != OBJECT_CAMERA)
+    if (kind == OBJECT_ENVIRONMENT && id == 1) {
+        read_environment(scene, edit);
+        return true;
+    }
+    if (kind != OBJECT_NODE && kind != OBJECT_MATERIAL && kind != OBJECT_LIGHT && kind != OBJECT_CAMERA &&
+        kind != OBJECT_ENVIRONMENT)
         return error_set(error, ERROR_UNSUPPORTED, "object_get.kind",
-                         "%s objects cannot be read; nodes, materials, lights and cameras can",
+                         "%s objects cannot be read; nodes, materials, lights, cameras and the environment can",
                          object_kind_name(kind));
     if (!object)
         return error_set(error, ERROR_UNKNOWN_ID, "object_get.object", "there is no %s %u", object_kind_name(kind),

@@ -199,6 +199,7 @@ struct scene_environment {
     uint32_t width, height;
     struct blob *texels; /* 4 half floats a texel; NULL: constant colour */
     bool backdrop;       /* the constant colour is seen and lights nothing */
+    bool keeps_image;    /* of an edit: it gets the image that is there */
 };
 
 /* One edit of a transaction. Its pointers (blobs, ranges) pass to the scene with a successful commit and stay with
@@ -207,7 +208,7 @@ enum scene_edit_kind { EDIT_SET, EDIT_REMOVE, EDIT_SET_ENVIRONMENT };
 
 struct scene_edit {
     enum scene_edit_kind kind;
-    enum object_kind object; /* for set and remove */
+    enum object_kind object; /* for set and remove; of an object that was read */
     uint32_t id;             /* for remove */
     union {
         struct scene_node node;

@@ -209,17 +209,20 @@ static bool from_environment(const struct edit_source *source, const struct mess
 {
     struct scene_environment *environment = &edit->set.environment;
     edit->kind = EDIT_SET_ENVIRONMENT;
+    memcpy(environment->colour, message->colour, sizeof(environment->colour));
+    environment->rotation = message->rotation;
+    environment->backdrop = message->backdrop != 0;
+    environment->keeps_image = message->keeps_image != 0;
+    if (environment->keeps_image)
+        return true;
     uint32_t limit_texels = source->texture_edge_texels;
     if (message->width > limit_texels || message->height > limit_texels) {
         error_set(error, ERROR_LIMIT, "set_environment", "%u x %u texels, the limit is %u a side", message->width,
                   message->height, limit_texels);
         return error_remedy(error, texture_remedy);
     }
-    memcpy(environment->colour, message->colour, sizeof(environment->colour));
-    environment->rotation = message->rotation;
     environment->width = message->width;
     environment->height = message->height;
-    environment->backdrop = message->backdrop != 0;
     return take_blob(source, message->arrays, message->arrays_count, 0, "set_environment", 0, &environment->texels,
                      error);
 }

@@ -74,9 +74,11 @@ static uint16_t put_blobs(struct sink *sink, struct blob *const *blobs, uint16_t
     struct store_record *record = sink->record;
     uint16_t used = 0;
     for (uint16_t i = 0; i < count; i++) {
-        void *array = record->blobs;
         sink->arrays[i] = (struct record_blob_ref){0};
-        if (!blobs[i] || !grow(sink, &array, &sink->blob_capacity, record->blob_count + 1, sizeof(struct blob *)))
+        if (!blobs[i])
+            continue;
+        void *array = record->blobs;
+        if (!grow(sink, &array, &sink->blob_capacity, record->blob_count + 1, sizeof(struct blob *)))
             continue;
         record->blobs = array;
         record->blobs[record->blob_count++] = blob_ref(blobs[i]);
@@ -333,6 +335,7 @@ static void put_environment(struct sink *sink, const struct scene_environment *e
     set->width = environment->width;
     set->height = environment->height;
     set->backdrop = environment->backdrop ? 1 : 0;
+    set->keeps_image = environment->keeps_image ? 1 : 0;
     set->arrays = sink->arrays;
     set->arrays_count = put_blobs(sink, &environment->texels, 1);
     put(sink, &message);
@@ -373,6 +376,9 @@ static void put_object(struct sink *sink, enum object_kind kind, const void *obj
         return;
     case OBJECT_CHANNEL:
         put_channel(sink, object);
+        return;
+    case OBJECT_ENVIRONMENT:
+        put_environment(sink, object);
         return;
     case OBJECT_COUNT:
         return;

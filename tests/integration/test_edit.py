@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: MIT
-"""`farlight edit`: materials, nodes, lights and cameras of a scene that several clients share, and `--edit`."""
+"""`farlight edit`: materials, nodes, lights, cameras and environment of a scene that several clients share, and `--edit`."""
 import base64
 import json
 import os
+import pathlib
 import struct
 import subprocess
+import tempfile
 import threading
 
 from farlight_test import BIN, TIMEOUT_S, Case, Daemon, bundled_scenes, farlight, long_test, read_png
@@ -18,6 +20,7 @@ class Shared(Case):
     """A daemon with the Cornell box, and clients of it."""
 
     model, scene = "cornell.glb", "room"
+    options = []
 
     @classmethod
     def setUpClass(cls):
@@ -25,7 +28,7 @@ class Shared(Case):
         daemon = cls.enterClassContext(Daemon())
         os.environ["FARLIGHT_SERVER"] = cls.address = daemon.address
         cls.addClassCleanup(os.environ.pop, "FARLIGHT_SERVER")
-        cls.enterClassContext(Serving(bundled_scenes() / cls.model, "--server", daemon.address, "--name", cls.scene,
+        cls.enterClassContext(Serving(bundled_scenes() / cls.model, *cls.options, "--server", daemon.address, "--name", cls.scene,
                                       addresses=0))
 
     def edit(self, *arguments, status=0, **options):
@@ -117,7 +120,7 @@ class Edits(Shared):
         self.assertFalse(self.fields("node.block")["hidden"])
 
     def test_what_is_listed_can_be_read_back(self):
-        things = ["material.*", "light.*", "camera.*", "node.*"]
+        things = ["material.*", "light.*", "camera.*", "node.*", "environment"]
         listed = self.edit("--list", *things).stdout
         self.assertIn("material.mirror.roughness=0 ", listed)
         revision = self.revision()
@@ -127,7 +130,7 @@ class Edits(Shared):
         self.assertEqual(self.edit("--list", *things).stdout, listed)
         names = [json.loads(line) for line in self.edit("--list", "--json").stdout.splitlines()]
         self.assertIn({"kind": "material", "id": 2, "name": "red"}, names)
-        self.assertEqual({entry["kind"] for entry in names}, {"material", "light", "camera", "node"})
+        self.assertEqual({entry["kind"] for entry in names}, {"material", "light", "camera", "node", "environment"})
 
     def test_two_clients_that_change_one_object_lose_nothing(self):
         """Each adds to another field, or to the same one: no edit may be made of values that are out of date."""
@@ -190,6 +193,51 @@ class Edits(Shared):
         self.assertEqual(read_png(path), self.picture())
         result = farlight("render", model, "-o", path, *PICTURE, "--edit", "material.rod.roughness=1")
         self.assertIn("did you mean 'red'?", self.expect(result, 2).stderr)
+
+
+class Environment(Shared):
+    """The box with an image around it: rows from +y down, red at the left, green at the right."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.image = pathlib.Path(cls.enterClassContext(tempfile.TemporaryDirectory())) / "sky.hdr"
+        cls.image.write_bytes(b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 4 +X 8\n" +
+                              (bytes((128, 16, 0, 129)) * 4 + bytes((0, 128, 32, 129)) * 4) * 4)
+        cls.options = ["--environment", cls.image, "--environment-rotation", "30"]
+        super().setUpClass()
+
+    def test_the_environment_is_changed_and_keeps_its_image(self):
+        """As the importer would have turned it; undone it is the very picture."""
+        before = self.picture()
+        fields = self.fields("environment")
+        self.assertEqual((fields["intensity"], fields["colour"], fields["backdrop"]), (1, [1, 1, 1], False))
+        self.assertAlmostEqual(fields["rotation"], 30, 3)
+        undo = self.edit("--print-undo", "environment.rotation+=90", "environment.intensity*=0.5").stdout
+        changed = self.picture()
+        path = self.folder / "own.png"
+        self.expect(farlight("render", bundled_scenes() / self.model, "-o", path, *PICTURE, "--environment", self.image,
+                             "--environment-rotation", "120", "--edit", "environment.intensity=0.5"), 0)
+        self.assertEqual(changed, read_png(path))
+        self.assertNotEqual(changed, before)
+        self.edit("--from", "-", input=undo)
+        self.assertEqual((self.picture(), self.fields("environment")), (before, fields))
+        self.assertIn("a backdrop is a colour alone", self.edit("environment.backdrop=true", status=1).stderr)
+
+    def test_two_clients_that_change_the_environment_lose_nothing(self):
+        self.edit_for_now("environment.rotation=0", "environment.intensity=1")
+
+        def add(assignment):
+            for _ in range(8):
+                self.edit(assignment)
+
+        threads = [threading.Thread(target=add, args=(one,)) for one in ("environment.rotation+=10", "environment.intensity+=1")]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        fields = self.fields("environment")
+        self.assertAlmostEqual(fields["rotation"], 80, 3)
+        self.assertEqual(fields["colour"], [9, 9, 9])
 
 
 class Readers(Case):

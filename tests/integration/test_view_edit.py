@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Editing in the viewer: what is picked is changed and changed back, and two viewers at one scene see each other's changes."""
+import shutil
 import signal
 import subprocess
 
@@ -73,6 +74,21 @@ class Editing(Viewer):
         self.assertEqual([states[name]["edit"]["kind"] for name in ("light", "its node", "moved")], ["light", "node", "node"])
         self.assertNotEqual(states["its node"]["edit"]["fields"], states["moved"]["edit"]["fields"])
         self.assertEqual(states["dragged"]["eye"], states["moved"]["eye"])  # the camera is left alone
+
+    def test_the_command_line_changes_the_model_before_it_is_shown(self):
+        """Each time that it is loaded, but not one that is dropped in its place."""
+        model = self.folder / "pot.glb"
+        shutil.copy(bundled_scenes() / "teapot.glb", model)
+        rough = float(self.picked()["fields"]["roughness"][0] <= 0.5)
+        edit = ["--edit", f"material.*.roughness={rough}"]
+        pick_it = [*pick(*POT), rest(1)]
+        states = self.replay([rest(1), *pick_it, {"state": "edited"}, {"key": "z"}, {"state": "no undo"},
+                              {"drop": str(model)}, rest(1), *pick_it, {"state": "dropped"}], *edit)
+        self.assertEqual(states["edited"]["edit"]["fields"]["roughness"], [rough])
+        self.assertIn("nothing to undo", states["no undo"]["notice"])
+        self.assertEqual(states["dropped"]["edit"]["fields"], self.picked()["fields"])
+        self.replay([rest(1)], "--edit", "material.nothing.roughness=1", status=2)
+        self.assertIn("no material 'nothing'", self.errors)
 
     def test_two_viewers_see_what_the_other_one_changes(self):
         keys = choose(self.picked(), "base_colour")

@@ -251,6 +251,7 @@ class ObjectKind(Word):
     SKIN = 8
     CLIP = 9
     CHANNEL = 10
+    ENVIRONMENT = 11  # each scene has one, 1, which is not listed or removed; only for object_get
 
 
 class ChannelPath(Word):
@@ -1359,9 +1360,11 @@ class SceneObjectsReply(Message):
 @dataclass
 class ObjectGet(Message):
     """asks for an object as it is, whatever clips do to it. The daemon sends the edit that would make it (set_node,
-    set_material, set_light or set_camera) with the same request, then answers by ok with the scene's revision
+    set_material, set_light, set_camera or set_environment, that one with `keeps_image`) with the same request, then
+    answers by ok with the scene's revision
 
-    kind: node, material, light or camera
+    kind: node, material, light, camera or environment
+    object: of the environment 1
     """
     TYPE: ClassVar[int] = 0x010b
     SENDER: ClassVar[str] = "client"
@@ -1807,11 +1810,13 @@ class SetEnvironment(Message):
     height: texels
     backdrop: 1: the colour is what a ray sees that leaves the scene, from the eye, a mirror or through glass, and
         lights nothing; without an image
+    keeps_image: 1: the image stays as it is, or none; width, height and arrays do not count. For daemons that have
+        object_get
     arrays: 0: equirectangular image, width x height x 4 half floats (red, green, blue, unused); rows from +y down, the
         middle column is -z
     """
     TYPE: ClassVar[int] = 0x0138
-    SENDER: ClassVar[str] = "client"
+    SENDER: ClassVar[str] = "both"
     NAME: ClassVar[str] = "set_environment"
     FIELDS: ClassVar[tuple[Field, ...]] = (
         _f.real("colour", 0.0, 1e9, 3),
@@ -1819,6 +1824,7 @@ class SetEnvironment(Message):
         _f.whole("width", "I", 0, 16384),
         _f.whole("height", "I", 0, 16384),
         _f.whole("backdrop", "I", 0, 1),
+        _f.whole("keeps_image", "I", 0, 1),
         _f.array("arrays", BlobRef, 1),
     )
     colour: Sequence[float] = (0.0, 0.0, 0.0)
@@ -1826,6 +1832,7 @@ class SetEnvironment(Message):
     width: int = 0
     height: int = 0
     backdrop: int = 0
+    keeps_image: int = 0
     arrays: Sequence[BlobRef] = ()
 
 

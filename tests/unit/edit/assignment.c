@@ -77,7 +77,10 @@ TEST(what_is_wrong_is_named_with_a_remedy)
         {"=", "is no assignment", "hide=Roof"},
         {".=", "'' is no kind", "material"},
         {"materiel.Steel.roughness=1", "'materiel' is no kind", "did you mean 'material'?"},
-        {"mesh.Steel.roughness=1", "'mesh' is no kind", "material, node, light and camera"},
+        {"mesh.Steel.roughness=1", "'mesh' is no kind", "material, node, light, camera and environment"},
+        {"environment=1", "is no assignment", "environment.rotation=90"},
+        {"environment.rotaton=1", "an environment has no field 'rotaton'", "did you mean 'rotation'?"},
+        {"environment.sky.intensity=1", "no field 'sky.intensity'", "intensity, colour, rotation, backdrop"},
         {"material.Steel.roughnes=1", "no field 'roughnes'", "did you mean 'roughness'?"},
         {"node.Door.angle=1", "no field 'angle'", "translate, rotate, scale, hidden"},
         {"material.Steel.roughness=", "not what roughness takes", "a number"},
@@ -125,7 +128,9 @@ TEST(what_is_printed_is_read_as_the_same)
                                         "material.a=b.alpha_mode=mask",
                                         "node.Door.hidden=1",
                                         "node.0.matrix=1,0,0,0,0,1,0,0,0,0,1,0.33333334",
-                                        "material.*.emission=1e+06,0,3.1415927"};
+                                        "material.*.emission=1e+06,0,3.1415927",
+                                        "environment.intensity*=2",
+                                        "environment.colour=1,0.5,0.25"};
     for (size_t i = 0; i < sizeof(texts) / sizeof(texts[0]); i++) {
         const struct fl_assignment first = parsed(texts[i]);
         char text[400];

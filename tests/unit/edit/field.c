@@ -49,7 +49,7 @@ TEST(every_value_of_a_material_is_a_field)
 TEST(a_field_that_is_stored_is_loaded_and_leaves_the_others)
 {
     static const enum protocol_object_kind kinds[] = {PROTOCOL_OBJECT_MATERIAL, PROTOCOL_OBJECT_LIGHT,
-                                                      PROTOCOL_OBJECT_CAMERA};
+                                                      PROTOCOL_OBJECT_CAMERA, PROTOCOL_OBJECT_ENVIRONMENT};
     for (size_t k = 0; k < sizeof(kinds) / sizeof(kinds[0]); k++) {
         struct fl_field fields[FL_FIELDS_MAX];
         const size_t count = fl_fields(kinds[k], fields);
@@ -84,6 +84,23 @@ TEST(the_intensity_of_a_light_keeps_its_hue)
     set(&light, PROTOCOL_OBJECT_LIGHT, "intensity", (double[]){0});
     set(&light, PROTOCOL_OBJECT_LIGHT, "intensity", (double[]){3});
     assert_true(light.set_light.colour[0] == 3 && light.set_light.colour[2] == 3); /* of black: white */
+}
+
+TEST(the_environment_turns_as_the_command_line_turns_it)
+{
+    struct message environment = made(PROTOCOL_OBJECT_ENVIRONMENT);
+    struct fl_field field;
+    double degrees[FL_FIELD_VALUES_MAX];
+    /* The import's: radians, from -z on. */
+    static const float turns[] = {-1.57079633f, 0.0f, 1.57079633f}, degrees_of[] = {0.0f, 90.0f, 180.0f};
+    assert_true(edit_field_find(PROTOCOL_OBJECT_ENVIRONMENT, "rotation", &field, &error));
+    for (size_t i = 0; i < 3; i++) {
+        environment.set_environment.rotation = turns[i];
+        edit_field_load(&field, &environment, degrees);
+        assert_true(degrees[0] == (double)degrees_of[i]);
+        edit_field_store(&field, &environment, degrees);
+        assert_true(environment.set_environment.rotation == turns[i]);
+    }
 }
 
 TEST(lights_have_the_fields_of_their_kind)

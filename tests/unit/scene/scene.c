@@ -454,6 +454,47 @@ TEST(revisions_tell_what_a_transaction_touched)
     scene_destroy(scene);
 }
 
+static struct scene_environment *set_environment(struct draft_list *list, size_t index)
+{
+    list->edits[index] = (struct scene_edit){.kind = EDIT_SET_ENVIRONMENT};
+    list->count = index + 1;
+    return &list->edits[index].set.environment;
+}
+
+TEST(an_environment_keeps_its_image_if_the_edit_says_so)
+{
+    static const uint16_t dark[4] = {0}, infinite[4] = {0x7c00};
+    struct scene *scene = new_scene();
+    struct draft_list list = {0};
+    struct scene_edit read;
+    struct error error = {0};
+    struct scene_environment *environment = set_environment(&list, 0);
+    environment->width = environment->height = 1;
+    environment->texels = make_blob(dark, sizeof(dark));
+    expect_commit(scene, &list);
+    const struct blob *image = scene->environment.texels;
+    const uint64_t bytes = scene->host_bytes;
+    assert_true(scene_read_object(scene, OBJECT_ENVIRONMENT, 1, &read, &error));
+    assert_true(read.set.environment.keeps_image && !read.set.environment.texels);
+    set_environment(&list, 0)->colour[0] = 3;
+    list.edits[0].set.environment.keeps_image = true;
+    expect_commit(scene, &list);
+    assert_true(scene->environment.texels == image && scene->environment.colour[0] == 3);
+    assert_int_equal(scene->environment.width, 1);
+    assert_int_equal(scene->host_bytes, bytes);
+    /* Of two edits the second keeps the image of the first, which is looked through all the same. */
+    environment = set_environment(&list, 0);
+    environment->width = environment->height = 1;
+    environment->texels = make_blob(infinite, sizeof(infinite));
+    set_environment(&list, 1)->keeps_image = true;
+    expect_refusal(scene, &list, ERROR_INVALID, "edits[1] (environment).arrays[0] (texels)");
+    set_environment(&list, 0)->keeps_image = true;
+    list.edits[0].set.environment.backdrop = true;
+    expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (environment).backdrop");
+    assert_true(scene->environment.texels == image);
+    scene_destroy(scene);
+}
+
 /* ---- what is not looked at ---------------------------------------------------------------------- */
 
 static const float square_with_nan[12] = {0, 0, 0, 1, 0, 0, NAN, 1, 0, 0, 1, 0};

@@ -221,11 +221,17 @@ TEST(an_object_is_read_as_it_was_set)
     expect(other, MESSAGE_SET_NODE, 6);
     assert_int_equal(other->message.set_node.kind, PROTOCOL_NODE_SPHERES);
     expect_ok(other, 6);
+    get_object(other, 6, 4, PROTOCOL_OBJECT_ENVIRONMENT, 1); /* black as long as nobody has set it */
+    expect(other, MESSAGE_SET_ENVIRONMENT, 6);
+    assert_true(other->message.set_environment.colour[0] == 0 && other->message.set_environment.keeps_image == 1);
+    expect_ok(other, 6);
     /* What is not there, or cannot be read, is an error of that request. */
     get_object(other, 7, 4, PROTOCOL_OBJECT_MATERIAL, 9);
     expect_error(other, 7, PROTOCOL_ERROR_UNKNOWN_ID);
     get_object(other, 8, 4, PROTOCOL_OBJECT_SPHERES, 1);
     expect_error(other, 8, PROTOCOL_ERROR_UNSUPPORTED);
+    get_object(other, 8, 4, PROTOCOL_OBJECT_ENVIRONMENT, 2);
+    expect_error(other, 8, PROTOCOL_ERROR_UNKNOWN_ID);
     get_object(other, 9, 5, PROTOCOL_OBJECT_NODE, 1);
     expect_error(other, 9, PROTOCOL_ERROR_UNKNOWN_ID);
     assert_string_equal(other->message.error.field, "object_get.scene");
