@@ -131,7 +131,7 @@ IMPORT_OBJ := $(call obj,$(IMPORT_C) $(IMPORT_CXX)) $(COMMON_OBJ) $(B)/helper.a
 EXPORT_OBJ := $(call obj,$(EXPORT_C) $(EXPORT_CXX)) $(B)/helper.a
 VIDEO_OBJ := $(call obj,$(VIDEO_C) client/lib/rate.c protocol/pixels/ycbcr.c) $(B)/helper.a
 
-# The viewer takes the command line as render does; the gateway has what of it says which daemon is meant.
+# The viewer takes the command line as render does; the gateway takes of it which daemon is meant.
 COMMAND_LINE_OBJ := $(call obj,$(addprefix client/cli/,daemon.c image_path.c interrupt.c job_complete.c job_fields.c job_options.c \
     job_views.c key.c models.c parse.c retry.c talk.c \
     watch.c))

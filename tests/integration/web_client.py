@@ -36,11 +36,11 @@ class Gateway:
         """(exit status, what it has said on standard error)"""
         if self.process.poll() is None:
             self.process.send_signal(number)
-        return self.process.wait(TIMEOUT_S), self.process.stderr.read()
+        status = self.process.wait(TIMEOUT_S)
+        return status, self.process.stderr.read()
 
     def __exit__(self, *_):
-        self.process.kill()
-        self.process.wait()
+        self.stop(signal.SIGKILL)
         self.process.stdout.close()
         self.process.stderr.close()
 

@@ -50,6 +50,7 @@ class Page:
         for domain in ("Runtime", "Page", "Log"):
             self.call(f"{domain}.enable")
         self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=False)
+        self.call("Page.bringToFront")  # what is behind is not animated
         self.call("Page.navigate", url=address)
 
     def call(self, method, **parameters):
@@ -104,4 +105,5 @@ class Page:
         self.mouse("mouseReleased", x + right, y + down, button=button, clickCount=1)
 
     def close(self):
+        self.call("Page.close")
         self.socket.close()

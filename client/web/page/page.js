@@ -15,7 +15,7 @@ let socket = null, scene = null, failures = 0, wantsH264 = false;
 let camera = null; // null: the view is the scene's own, or `node`'s
 let node = 0;
 let lastFrame = null;
-let isDirty = false, movedAt = 0, isMoving = false, id = 0;
+let isDirty = false, movedAt = 0, resting = 0, id = 0;
 let isPlaying = false, time = 0, tickAt = 0;
 const inputs = new Map(); // when the input of a camera came, by its number
 const link = new URLSearchParams(location.hash.slice(1));
@@ -35,8 +35,9 @@ function tellShow() {
     canvas.width = width;
     canvas.height = height;
   }
-  tell({ show: { width, height, h264: wantsH264, tracer: $("tracer").value || link.get("tracer") || "bvh",
-    integrator: $("integrator").value || link.get("integrator") || "distributed", clip: Number($("clip").value || link.get("clip") || 0) } });
+  const chosen = (name, usual) => $(name).value || link.get(name) || usual; // a menu is empty before the scene is told
+  tell({ show: { width, height, h264: wantsH264, tracer: chosen("tracer", "bvh"),
+    integrator: chosen("integrator", "distributed"), clip: Number(chosen("clip", 0)) } });
 }
 
 function tellLook(moving) {
@@ -63,9 +64,10 @@ function takeScene(told) {
   scene = told;
   document.title = `${told.name} - farlight`;
   if (!isFirst) return;
-  fill($("camera"), [...told.cameras.map((one) => [one.node, one.name || `camera ${one.node}`]), ...(told.cameras.length ? [] : [[0, "whole scene"]]), ["", "free"]], "");
-  $("camera").value = camera ? "" : String(told.cameras.length ? told.cameras[0].node : 0);
-  node = told.cameras.length ? told.cameras[0].node : 0;
+  const cameras = told.cameras.map((one) => [one.node, one.name || `camera ${one.node}`]);
+  if (cameras.length === 0) cameras.push([0, "whole scene"]);
+  node = cameras[0][0];
+  fill($("camera"), [...cameras, ["", "free"]], camera ? "" : node);
   fill($("clip"), [[0, "none"], ...told.clips.map((one) => [one.clip, one.name || `clip ${one.clip}`])], link.get("clip") || 0);
   $("clips").hidden = $("play").hidden = told.clips.length === 0;
   fill($("tracer"), told.tracers.map((name) => [name, name]), told.tracer);
@@ -81,6 +83,7 @@ function drawStages(stages) {
     rows.set(key, [...(rows.get(key) || []), [name, start, duration]]);
   }
   const end = Math.max(1e-3, ...stages.map((stage) => stage[2] + stage[3])), row = 16, left = 110;
+  const scale = (timeline.width - left - 60) / end; // pixels per millisecond
   timeline.height = Math.max(1, rows.size) * row;
   const context = timeline.getContext("2d");
   context.font = "11px system-ui";
@@ -89,7 +92,7 @@ function drawStages(stages) {
     context.fillText(key, 4, index * row + 12);
     for (const [name, start, duration] of spans) {
       context.fillStyle = COLOURS[name] || "#8a8f98";
-      context.fillRect(left + (start / end) * (timeline.width - left - 60), index * row + 3, Math.max(1, (duration / end) * (timeline.width - left - 60)), row - 6);
+      context.fillRect(left + start * scale, index * row + 3, Math.max(1, duration * scale), row - 6);
     }
     context.fillStyle = "#e8e8e8";
     context.fillText(`${spans.reduce((sum, span) => sum + span[2], 0).toFixed(1)} ms`, timeline.width - 56, index * row + 12);
@@ -101,12 +104,17 @@ const picture = new Picture(canvas, (header) => {
   lastFrame = header;
   if (!$("stages").checked) $("timeline").hidden = true;
   drawStages(header.stages);
-  const input = inputs.get(header.id);
-  for (const old of [...inputs.keys()].filter((key) => key <= header.id)) inputs.delete(old);
+  let input = 0; // the newest one that it shows
+  for (const seen of [...inputs.keys()].filter((key) => key <= header.id)) {
+    input = inputs.get(seen);
+    inputs.delete(seen);
+  }
   if (input) canvas.dataset.latency = (performance.now() - input).toFixed(1);
-  Object.assign(canvas.dataset, { frame: header.frame, samples: header.samples, encoding: header.encoding, moving: header.moving, look: header.id });
+  const { frame, samples, encoding, moving, id: look } = header;
+  Object.assign(canvas.dataset, { frame, samples, encoding, moving, look });
   const latency = canvas.dataset.latency ? `, input to picture ${Number(canvas.dataset.latency).toFixed(0)} ms` : "";
-  say(`${header.width} x ${header.height}, ${header.tracer}, ${header.integrator}, ${header.samples} samples, ${header.encoding}${latency}`);
+  say(`${header.width} x ${header.height}, ${header.tracer}, ${header.integrator}, ${header.samples} samples, `
+    + `${header.encoding}${latency}`);
 }, (isGone) => {
   if (isGone) {
     wantsH264 = false;
@@ -120,7 +128,10 @@ function take(event) {
   if (typeof event.data === "string") {
     const message = JSON.parse(event.data);
     if (message.scene) takeScene(message.scene);
-    if (message.error) say(message.error.text, true);
+    if (message.error) {
+      say(message.error.text, true);
+      link.delete("clip"); // it may be what the daemon does not have
+    }
     return;
   }
   failures = 0;
@@ -183,7 +194,8 @@ canvas.addEventListener("pointermove", (event) => {
   Object.assign(pointer, { x: event.clientX, y: event.clientY });
   if (before) {
     const after = spread();
-    move((one) => zoom(pan(one, (before.x - after.x) / canvas.clientHeight, (after.y - before.y) / canvas.clientHeight), before.distance / Math.max(1, after.distance)));
+    const height = canvas.clientHeight, factor = before.distance / Math.max(1, after.distance);
+    move((one) => zoom(pan(one, (before.x - after.x) / height, (after.y - before.y) / height), factor));
   } else if (pointer.pans) {
     move((one) => pan(one, -right, down));
   } else {
@@ -231,7 +243,8 @@ $("stages").addEventListener("change", () => {
 $("share").addEventListener("click", async () => {
   const from = camera || (lastFrame && cameraOfFrame(lastFrame, scene));
   if (!from) return;
-  const parts = new URLSearchParams({ view: printCamera(from), tracer: $("tracer").value, integrator: $("integrator").value, clip: $("clip").value, time: time.toFixed(3) });
+  const parts = new URLSearchParams({ view: printCamera(from), time: time.toFixed(3) });
+  for (const name of ["tracer", "integrator", "clip"]) parts.set(name, $(name).value);
   history.replaceState(null, "", `#${parts}`);
   try {
     await navigator.clipboard.writeText(location.href);
@@ -252,14 +265,16 @@ function tick(now) {
   tickAt = now;
   if (isDirty) {
     isDirty = false;
-    isMoving = true;
     tellLook(true);
-  } else if (isMoving && now - movedAt > REST_MS && pointers.size === 0) {
-    isMoving = false;
-    movedAt = 0;
-    tellLook(false);
+    clearTimeout(resting);
+    resting = setTimeout(settle, REST_MS); // also where nothing is animated, as the page is hidden
   }
   requestAnimationFrame(tick);
+}
+
+function settle() {
+  movedAt = 0;
+  tellLook(false);
 }
 
 camera = readCamera(link.get("view"));
