@@ -61,6 +61,7 @@ ASSIMP_PKGS := assimp
 EXPORT_PKGS := libpng OpenEXR libseccomp
 IMAGES_PKGS := OpenImageIO libtiff-4 libjxl
 VIDEO_PKGS := libavformat libavcodec libavutil libseccomp
+PALETTE_PKGS := libavfilter libavutil
 WEB_PKGS := libwebsockets
 VIEWER_PKGS := sdl2 SDL2_ttf libavcodec libswscale libavutil
 TEST_PKGS := cmocka
@@ -96,7 +97,8 @@ IMPORT_CXX := $(filter-out $(TEXTURE_CXX) $(ASSIMP_CXX),$(call sources,client/im
 EXPORT_C := $(call sources,client/output,c)
 IMAGES_CXX := $(call sources,client/output/library,cpp)
 EXPORT_CXX := $(filter-out $(IMAGES_CXX),$(call sources,client/output,cpp))
-VIDEO_C := $(call sources,client/video,c)
+PALETTE_C := client/video/palette_library.c
+VIDEO_C := $(filter-out $(PALETTE_C),$(call sources,client/video,c))
 VIEWER_C := $(call sources,client/viewer,c)
 WEB_C := $(call sources,client/web,c)
 SHADERS := $(patsubst shaders/%,%,$(call sources,shaders,h glsl comp vert geom frag))
@@ -140,13 +142,15 @@ WEB_OBJ := $(call obj,$(WEB_C)) $(COMMAND_LINE_OBJ)
 
 # The library for others' programs: position-independent, only what farlight.h declares is visible.
 SONAME := libfarlight.so.$(firstword $(subst ., ,$(VERSION)))
+# farlight.h is installed as <farlight/client.h>, the others below farlight/.
+PUBLIC_HEADERS := client/lib/farlight.h client/warp/warp.h $(addprefix protocol/,messages.h messages.def tracers.h tracers.def words.h words.def)
 LIB_PIC := $(patsubst %.c,$(B)/pic/%.o,$(LIB_SRC) $(EDIT_SRC) $(WARP_SRC) $(PROTOCOL_SRC) $(SEALED_SRC) $(PIXELS_SRC) $(COMMON_SRC))
 
-MODULES := $(B)/farlight-textures.so $(B)/farlight-assimp.so $(B)/farlight-images.so
+MODULES := $(B)/farlight-textures.so $(B)/farlight-assimp.so $(B)/farlight-images.so $(B)/farlight-palette.so
 PROGRAMS := $(B)/farlightd $(B)/farlight $(B)/farlight-import $(B)/farlight-export $(B)/farlight-video $(B)/farlight-view $(B)/farlight-web
 
 .PHONY: all
-all: $(PROGRAMS) $(MODULES) $(B)/$(SONAME) $(B)/protocol.md $(B)/shot.schema.json $(B)/man/farlight.1
+all: $(PROGRAMS) $(MODULES) $(B)/$(SONAME) $(B)/libfarlight.a $(B)/protocol.md $(B)/shot.schema.json $(B)/man/farlight.1
 ifneq ($(EMBREE),1)
 	@echo 'built without Embree: the tracer reference is left out (its header is in the package libembree-dev)'
 endif
@@ -165,7 +169,7 @@ $(B)/client/warp/%.o $(B)/pic/client/warp/%.o: CPPFLAGS_ALL += -Ishaders
 $(B)/client/warp/%.o $(B)/pic/client/warp/%.o: CFLAGS_ALL += -fopenmp-simd -ffp-contract=off -Wno-pass-failed $(if $(filter release,$(config)),-O3 -DLANES_CLONES)
 $(B)/client/import/%.opp $(B)/client/import/%.o $(B)/pic/client/import/%.opp: INCLUDES = -Iclient $(IMPORT_CFLAGS)
 $(B)/client/output/%.opp $(B)/client/output/%.o $(B)/pic/client/output/%.opp: INCLUDES = -Iclient $(EXPORT_CFLAGS)
-$(B)/client/video/%.o: INCLUDES = -Iclient $(VIDEO_CFLAGS)
+$(B)/client/video/%.o $(B)/pic/client/video/%.o: INCLUDES = -Iclient $(VIDEO_CFLAGS)
 $(B)/client/viewer/%.o: INCLUDES = -Iclient $(CLIENT_CFLAGS) $(VIEWER_CFLAGS)
 $(B)/tests/%.o: INCLUDES = -Iserver -Ishaders -Iclient $(SERVER_CFLAGS) $(CLIENT_CFLAGS) $(TEST_CFLAGS)
 SERVER_CFLAGS = $(eval SERVER_CFLAGS := $(call pkg_cflags,$(SERVER_PKGS) $(SERVER_LOADED_PKGS)))$(SERVER_CFLAGS)
@@ -195,6 +199,12 @@ $(B)/pic/%.o: %.c
 $(B)/$(SONAME): $(LIB_PIC) client/lib/libfarlight.map
 	$(call say,LINK)$(CC) -shared -Wl,-soname,$(SONAME) -Wl,--version-script=client/lib/libfarlight.map $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) \
 	    $(LIB_PIC) $(CLIENT_LIBS) -o $@
+# One object whose symbols are those of the shared library, so that no name of ours meets one of the program's.
+$(B)/libfarlight.a: $(LIB_PIC)
+	@rm -f $@
+	$(call say,AR)ld -r $(LIB_PIC) -o $(B)/libfarlight.o && \
+	    objcopy --localize-hidden -w --keep-global-symbol='fl_*' --keep-global-symbol='protocol_*_text' --keep-global-symbol='protocol_*_parse' \
+	    $(B)/libfarlight.o && ar rcs $@ $(B)/libfarlight.o
 
 $(B)/shader_sources.c: shaders/embed.sh $(addprefix shaders/,$(SHADERS)) Makefile
 	@mkdir -p $(@D)
@@ -237,7 +247,9 @@ $(B)/farlight-export: $(EXPORT_OBJ) $(PROTOCOL_OBJ) | $(B)/farlight-images.so
 	$(call say,LINK)$(CXX) $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(EXPORT_LIBS) -o $@
 $(B)/farlight-images.so: $(patsubst %.cpp,$(B)/pic/%.opp,$(IMAGES_CXX))
 	$(call say,LINK)$(CXX) -shared $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(call pkg_libs,$(IMAGES_PKGS)) -o $@
-$(B)/farlight-video: $(VIDEO_OBJ) $(PROTOCOL_OBJ)
+$(B)/farlight-palette.so: $(patsubst %.c,$(B)/pic/%.o,$(PALETTE_C))
+	$(call say,LINK)$(CC) -shared $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(call pkg_libs,$(PALETTE_PKGS)) -o $@
+$(B)/farlight-video: $(VIDEO_OBJ) $(PROTOCOL_OBJ) | $(B)/farlight-palette.so
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(VIDEO_LIBS) -o $@
 $(B)/farlight-view: $(VIEWER_OBJ) $(LIB_OBJ) $(PROTOCOL_OBJ)
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(VIEWER_LIBS) -o $@
@@ -338,7 +350,7 @@ $(LOSING_DAEMON): $(B)/tests/tools/lost_gpu.o $(B)/server/main.o $(SERVER_OBJ) $
 # ---- what people call ------------------------------------------------------------------------------
 BUILD_PACKAGES := gcc g++ make pkg-config libepoxy-dev libegl-dev libgl-dev libcglm-dev libturbojpeg0-dev libzstd-dev \
     libsodium-dev libxxhash-dev libinih-dev libjansson-dev libjemalloc-dev libseccomp-dev libopenimageio-dev libpng-dev libtiff-dev libopenexr-dev libjxl-dev libtinygltf-dev \
-    libtinyobjloader-dev libdraco-dev libmeshoptimizer-dev libassimp-dev libembree-dev libavcodec-dev libavformat-dev libavutil-dev libswscale-dev libsdl2-dev libsdl2-ttf-dev libwebsockets-dev fonts-dejavu-core libegl1 libgl1-mesa-dri
+    libtinyobjloader-dev libdraco-dev libmeshoptimizer-dev libassimp-dev libembree-dev libavcodec-dev libavformat-dev libavfilter-dev libavutil-dev libswscale-dev libsdl2-dev libsdl2-ttf-dev libwebsockets-dev fonts-dejavu-core libegl1 libgl1-mesa-dri
 TEST_PACKAGES := libcmocka-dev python3 python3-jsonschema python3-numpy python3-prometheus-client ffmpeg xvfb gnuplot-nox
 LINT_PACKAGES := clang clang-format glslang-tools python3 python3-numpy mypy
 # A second driver stack: OpenGL over Vulkan, on the CPU. The validation sees what it does.
@@ -507,10 +519,10 @@ install: all
 	install -m 755 client/python/examples/*.py $(DESTDIR)$(PREFIX)/share/doc/farlight/examples/python
 	install -m 644 client/python/README.md $(DESTDIR)$(PREFIX)/share/doc/farlight/python.md
 	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/share/farlight \
-	    $(addprefix $(DESTDIR)$(PREFIX)/share/man/man,1 5 7 8) \
+	    $(addprefix $(DESTDIR)$(PREFIX)/share/man/man,1 3 5 7 8) \
 	    $(DESTDIR)$(PREFIX)/share/doc/farlight/examples $(DESTDIR)/etc/farlight \
 	    $(DESTDIR)$(UNITDIR) $(DESTDIR)$(PREFIX)/lib/sysusers.d
-	install -d $(DESTDIR)$(LIBDIR)/pkgconfig $(DESTDIR)$(PREFIX)/include/farlight/lib \
+	install -d $(DESTDIR)$(LIBDIR)/pkgconfig $(DESTDIR)$(PREFIX)/include/farlight \
 	    $(DESTDIR)$(PREFIX)/include/farlight/protocol $(DESTDIR)$(PREFIX)/include/farlight/warp \
 	    $(DESTDIR)$(PREFIX)/share/bash-completion/completions
 	install -m 755 $(PROGRAMS) $(DESTDIR)$(PREFIX)/bin
@@ -518,10 +530,10 @@ install: all
 	install -m 644 $(MODULES) $(DESTDIR)$(PREFIX)/lib/farlight
 	install -m 755 $(B)/$(SONAME) $(DESTDIR)$(LIBDIR)
 	ln -sf $(SONAME) $(DESTDIR)$(LIBDIR)/libfarlight.so
-	install -m 644 client/lib/farlight.h $(DESTDIR)$(PREFIX)/include/farlight/lib
-	install -m 644 client/warp/warp.h $(DESTDIR)$(PREFIX)/include/farlight/warp
-	install -m 644 $(addprefix protocol/,messages.h messages.def tracers.h tracers.def words.h words.def) $(DESTDIR)$(PREFIX)/include/farlight/protocol
-	sed 's#@PREFIX@#$(PREFIX)#; s#@LIBDIR@#$(LIBDIR)#; s#@VERSION@#$(VERSION)#' conf/farlight.pc.in \
+	install -m 644 $(B)/libfarlight.a $(DESTDIR)$(LIBDIR)
+	for header in $(PUBLIC_HEADERS); do case $$header in client/lib/*) name=client.h ;; *) name=$${header#client/} ;; esac; \
+	    sed 's,^#include "\(protocol\|warp\)/,#include "farlight/\1/,' $$header >$(DESTDIR)$(PREFIX)/include/farlight/$$name; done
+	sed 's#@PREFIX@#$(PREFIX)#; s#@LIBDIR@#$(patsubst $(PREFIX)/%,$${prefix}/%,$(LIBDIR))#; s#@VERSION@#$(VERSION)#' conf/farlight.pc.in \
 	    >$(DESTDIR)$(LIBDIR)/pkgconfig/farlight.pc
 	install -m 644 client/cli/completion.bash $(DESTDIR)$(PREFIX)/share/bash-completion/completions/farlight
 	for name in $(filter-out farlight,$(notdir $(PROGRAMS))); do \
@@ -543,10 +555,11 @@ install: all
 uninstall:
 	rm -f $(addprefix $(DESTDIR)$(PREFIX)/bin/,$(notdir $(PROGRAMS)) farlight-node)
 	rm -f $(addprefix $(DESTDIR)$(PREFIX)/share/man/man1/,$(notdir $(wildcard conf/man/*.1)))
+	rm -f $(addprefix $(DESTDIR)$(PREFIX)/share/man/man3/,$(notdir $(wildcard conf/man/*.3)))
 	rm -f $(addprefix $(DESTDIR)$(PREFIX)/share/man/man5/,$(notdir $(wildcard conf/man/*.5)))
 	rm -f $(addprefix $(DESTDIR)$(PREFIX)/share/man/man7/,$(notdir $(wildcard conf/man/*.7)))
 	rm -f $(addprefix $(DESTDIR)$(PREFIX)/share/man/man8/,$(notdir $(wildcard conf/man/*.8)))
-	rm -f $(DESTDIR)$(LIBDIR)/$(SONAME) $(DESTDIR)$(LIBDIR)/libfarlight.so \
+	rm -f $(DESTDIR)$(LIBDIR)/$(SONAME) $(addprefix $(DESTDIR)$(LIBDIR)/libfarlight.,so a) \
 	    $(DESTDIR)$(LIBDIR)/pkgconfig/farlight.pc \
 	    $(addprefix $(DESTDIR)$(PREFIX)/share/bash-completion/completions/,$(notdir $(PROGRAMS)))
 	rm -f $(addprefix $(DESTDIR)$(UNITDIR)/farlightd.,service socket) \

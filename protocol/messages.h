@@ -40,7 +40,8 @@
 #define BULK(field, max, doc)                                                                                    \
     const uint8_t *field;                                                                                        \
     uint32_t field##_bytes;
-#define MESSAGE(NAME, name, number, from, doc) struct message_##name {
+/* Some have no fields, which strict C does not know. */
+#define MESSAGE(NAME, name, number, from, doc) __extension__ struct message_##name {
 #define MESSAGE_END(NAME, name) };
 #include "protocol/messages.def"
 

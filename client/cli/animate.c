@@ -23,7 +23,7 @@ static const struct argp_option options[] = {
     {"scene", KEY_SCENE, "NAME", 0,
      "Use a shared scene at --server in place of MODEL ('farlight scenes' lists them)", 0},
     {"dry-run", KEY_DRY_RUN, NULL, 0, "Check options and script without rendering", 0},
-    {"lossless", KEY_LOSSLESS, NULL, 0, "Write a lossless video, for .mkv", 0},
+    {"lossless", KEY_LOSSLESS, NULL, 0, "Write a lossless video, for .mkv and .webp", 0},
     {NULL, 0, NULL, 0, "Parts:", -1},
     {"shard", KEY_SHARD, "K/N", 0, "Render only every N-th frame of the range, beginning with the K-th", 0},
     {"resume", KEY_RESUME, NULL, 0, "Skip frames whose files exist, are complete and have the requested size", 0},
@@ -119,8 +119,8 @@ static bool read_all(struct animation *animation, int argc, char **argv)
             "same with --orbit: once around the model, which takes 4 seconds unless something else says how "
             "long.\v"
             "In the name of the images write %d or %04d for the frame's number and %% for a percent sign. Videos "
-            "end "
-            "in .mp4, .mkv or .y4m; '-' is standard output, as y4m.",
+            "end in .mp4, .mkv or .y4m, moving pictures, whose name has no %d, in .gif or .webp; '-' is standard "
+            "output, as y4m or as --format says.",
         .children = children};
     struct animation typed = {0};
     bool good = cli_job_begin(&typed.job, fl_render_defaults()) &&

@@ -84,6 +84,8 @@ enum cli_image {
     CLI_IMAGE_MP4, /* from here on videos, of animations only */
     CLI_IMAGE_MKV,
     CLI_IMAGE_Y4M,
+    CLI_IMAGE_MOVING_WEBP,
+    CLI_IMAGE_MOVING_GIF,
     CLI_IMAGE_COUNT
 };
 
@@ -92,6 +94,8 @@ enum cli_image cli_image_by_name(const char *name);
 enum cli_image cli_image_by_path(const char *path);
 const char *cli_image_name(enum cli_image image);
 bool cli_image_is_video(enum cli_image image);
+/* Of a series: WebP and GIF are moving pictures where the name has no place for the frame's number. */
+enum cli_image cli_image_of_series(enum cli_image image, const char *path);
 /* The name of a file without its folders. */
 const char *cli_base_name(const char *path);
 /* Whether a file can be created at `path`, without creating it. `folder` gets its folder, which may be missing:

@@ -37,14 +37,21 @@ enum cli_image cli_image_by_path(const char *path)
 
 const char *cli_image_name(enum cli_image image)
 {
-    static const char *const names[] = {"",     "png", "jpeg", "exr", "hdr", "webp",
-                                        "tiff", "gif", "mp4",  "mkv", "y4m"};
+    static const char *const names[] = {"",    "png", "jpeg", "exr", "hdr",  "webp", "tiff",
+                                        "gif", "mp4", "mkv",  "y4m", "webp", "gif"};
     return names[image];
 }
 
 bool cli_image_is_video(enum cli_image image)
 {
     return image >= CLI_IMAGE_MP4 && image < CLI_IMAGE_COUNT;
+}
+
+enum cli_image cli_image_of_series(enum cli_image image, const char *path)
+{
+    if (strchr(path, '%'))
+        return image;
+    return image == CLI_IMAGE_WEBP ? CLI_IMAGE_MOVING_WEBP : image == CLI_IMAGE_GIF ? CLI_IMAGE_MOVING_GIF : image;
 }
 
 const char *cli_base_name(const char *path)

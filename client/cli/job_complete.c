@@ -36,6 +36,8 @@ static bool complete_output(struct cli_job *job, struct cli_output *output, bool
                                "known: .png .jpg .jpeg .exr .hdr .webp .tiff .tif .gif%s, or --format",
                                is_series ? " .mp4 .mkv .y4m" : "");
     }
+    if (is_series)
+        output->image = cli_image_of_series(output->image, output->path);
     if (!is_series && cli_image_is_video(output->image)) {
         cli_usage(job, output->path, "one picture is no video");
         return fl_error_remedy(&job->error, "use 'farlight animate'");
@@ -57,9 +59,9 @@ static bool complete_output(struct cli_job *job, struct cli_output *output, bool
         return fl_error_remedy(&job->error,
                                "write images, such as 'frames/%%04d.png', and a video of all of them");
     }
-    if (job->lossless && output->image != CLI_IMAGE_MKV) {
+    if (job->lossless && output->image != CLI_IMAGE_MKV && output->image != CLI_IMAGE_MOVING_WEBP) {
         cli_usage(job, "--lossless", "%s files are not lossless", cli_image_name(output->image));
-        return fl_error_remedy(&job->error, "write an .mkv file");
+        return fl_error_remedy(&job->error, "write an .mkv or .webp file");
     }
     return true;
 }
@@ -164,9 +166,11 @@ static bool complete_encoding(struct cli_job *job)
     for (size_t i = 0; i < job->output_count; i++) {
         const enum cli_image image = job->outputs[i].image;
         const unsigned quality = job->file_quality > 0 ? job->file_quality : job->options.quality;
-        if (image != CLI_IMAGE_JPEG && image != CLI_IMAGE_WEBP && !cli_image_is_video(image))
+        const bool is_picture =
+            image == CLI_IMAGE_JPEG || image == CLI_IMAGE_WEBP || image == CLI_IMAGE_MOVING_WEBP;
+        if (image == CLI_IMAGE_MOVING_GIF || (!is_picture && !cli_image_is_video(image)))
             continue;
-        if (cli_image_is_video(image) && quality > 51)
+        if (!is_picture && quality > 51)
             return cli_usage(job, "--quality", "a video has 1 (best) to 51") == 0;
         job->file_quality = quality;
         if (job->options.encoding != PROTOCOL_ENCODING_JPEG)

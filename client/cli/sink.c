@@ -3,9 +3,11 @@
 #include "cli/digest.h"
 #include "lib/frame_part.h"
 #include "lib/image_size.h"
+#include "lib/rate.h"
 
 #include <errno.h>
 #include <fcntl.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -109,6 +111,20 @@ static const char *model_name(const struct cli_job *job)
     return strcmp(model, "-") == 0 ? "standard input" : job->full_metadata ? model : cli_base_name(model);
 }
 
+/* A GIF file is shown at the nearest rate that it can have. */
+static void note_rate(const struct cli_sink *sink)
+{
+    char text[160];
+    const double wanted = (double)sink->job->options.frames_per_second;
+    const double shown = 100.0 / fl_rate_gif_delay(sink->job->options.frames_per_second);
+    if (sink->output.image != CLI_IMAGE_MOVING_GIF || sink->job->quiet || fabs(shown - wanted) < 1e-3 * wanted)
+        return;
+    snprintf(text, sizeof(text), "GIF files count hundredths of a second: %g frames per second become %.4g",
+             wanted, shown);
+    cli_note(&(struct fl_note){.severity = PROTOCOL_SEVERITY_INFO, .where = sink->output.path, .text = text},
+             true);
+}
+
 static bool start_video(struct cli_sink *sink, struct fl_error *error)
 {
     const struct cli_job *job = sink->job;
@@ -122,6 +138,7 @@ static bool start_video(struct cli_sink *sink, struct fl_error *error)
         sink->y4m = fl_y4m_begin(&options, error);
         return sink->y4m != NULL;
     }
+    note_rate(sink);
     const struct fl_video_options options = {.path = sink->path,
                                              .format = cli_image_name(sink->output.image),
                                              .model = model_name(job),

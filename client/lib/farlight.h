@@ -11,9 +11,9 @@
  *   while ((frame = fl_render_next(job, &error))) { ... fl_frame_destroy(frame); }
  *   fl_render_destroy(job); fl_scene_destroy(scene); fl_connection_destroy(connection);
  *
- * Zero is the default of every option. Errors are values: a function that can fail takes a struct fl_error,
- * says so by false or NULL, and fills it; what the call made until then is undone. A lost connection is
- * FL_ERROR_CONNECTION from then on. `destroy` takes NULL.
+ * Installed as <farlight/client.h>; libfarlight(3) is its overview. Zero is the default of every option. Errors
+ * are values: a function that can fail takes a struct fl_error, says so by false or NULL, and fills it; what the
+ * call made until then is undone. A lost connection is FL_ERROR_CONNECTION from then on. `destroy` takes NULL.
  * Destroy jobs before their scene and scenes before their connection; frames stand alone.
  *
  * Calls block and serve one connection at a time: a connection and all that hangs on it belong to one thread
@@ -648,27 +648,28 @@ struct fl_video;
 
 struct fl_video_options {
     const char *path;        /* its folder is the only one that the program can write to */
-    const char *format;      /* "mp4" or "mkv" where the path's ending does not say; may be NULL */
+    const char *format;      /* "mp4", "mkv", "webp", "gif" where the path's ending does not say; may be NULL */
     const char *codec;       /* "h264", "mpeg4", "ffv1"; NULL: H.264 where libavcodec has an encoder for it, else
                                 MPEG-4; lossless: FFV1 */
     const char *model;       /* named in the file; may be NULL */
     float frames_per_second; /* 0: 24; 23.976, 29.97 and so on mean 24000/1001, 30000/1001 and so on */
-    unsigned quality;        /* constant rate factor as x264 has it, 1 (best) to 51; 0: 18 */
-    bool lossless;           /* every pixel as it is, .mkv only */
+    unsigned quality;        /* x264's rate factor, 1 (best) to 51; 0: 18. WebP: 1 to 100 (best); 0: 90 */
+    bool lossless;           /* every pixel as it is, .mkv and .webp only */
     int interrupt_fd;        /* as of fl_connect_options */
 };
 
 struct fl_video_info {
     char encoder[33];       /* libavcodec's name: "libx264"; known from the start on */
     uint32_t frames;        /* this and what follows: once fl_video_finish has returned true */
-    uint32_t width, height; /* even, unless lossless: an odd picture repeats its last column or row */
+    uint32_t width, height; /* those of the frames, but 4:2:0 has even ones: it repeats the last column or row */
     uint64_t size_bytes;
 };
 
 /* Fails early: when this returns, the folder can be written to and there is an encoder. The video is 8-bit 4:2:0,
  * tagged as what it is: primaries and matrix of BT.709, the transfer curve of sRGB, limited range; lossless: RGB.
- * Transparent pixels are composited over black. The same frames and options make the same file on the same machine
- * (x264 encodes a little differently with another number of processors). */
+ * Transparent pixels are composited over black. WebP keeps red, green, blue and alpha, GIF 255 colours over black;
+ * both are shown over and over, and GIF counts hundredths of a second. The same frames and options make the same
+ * file on the same machine (x264 encodes a little differently with another number of processors). */
 FL_API struct fl_video *fl_video_start(const struct fl_video_options *options, struct fl_error *error);
 /* Hands the frame over and returns; the frame may be destroyed at once. Frames are shown in the order in which
  * they come, whatever their numbers. A frame that fails in the program is reported by a later call of this or by

@@ -36,3 +36,9 @@ void fl_rate_exact(float frames_per_second, uint32_t *numerator, uint32_t *denom
     *numerator = (uint32_t)lround(rate * *denominator);
     *numerator += *numerator == 0;
 }
+
+uint32_t fl_rate_gif_delay(float frames_per_second)
+{
+    const double delay = round(100.0 / (double)frames_per_second);
+    return delay < 2 ? 2 : delay > UINT16_MAX ? UINT16_MAX : (uint32_t)delay;
+}

@@ -6,6 +6,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 #include <unistd.h>
 
 struct fl_video {
@@ -111,6 +112,13 @@ static bool send_begin(struct fl_video *video, const struct fl_video_options *op
     return fl_helper_flush(&video->helper, error) && await_begun(video, error);
 }
 
+/* The writer loads what that needs before it enters its sandbox. */
+static bool is_gif(const struct fl_video_options *options)
+{
+    const char *dot = strrchr(options->path, '.');
+    return (dot && strcasecmp(dot, ".gif") == 0) || (options->format && strcmp(options->format, "gif") == 0);
+}
+
 struct fl_video *fl_video_start(const struct fl_video_options *options, struct fl_error *error)
 {
     struct fl_video *video = calloc(1, sizeof(*video));
@@ -125,7 +133,7 @@ struct fl_video *fl_video_start(const struct fl_video_options *options, struct f
                                        .interrupt_fd = options->interrupt_fd,
                                        .request = 1};
     fl_shorten_path(options->path, video->path, sizeof(video->path));
-    const char *const arguments[] = {"--folder", video->folder, NULL};
+    const char *const arguments[] = {"--folder", video->folder, is_gif(options) ? "--gif" : NULL, NULL};
     if (!set_folder(video, options->path, error) || !fl_helper_start(&video->helper, arguments, error) ||
         !send_begin(video, options, error)) {
         fl_video_destroy(video);

@@ -2,6 +2,7 @@
 #include "encode.h"
 #include "protocol/pixels/ycbcr.h"
 #include "log.h"
+#include "palette.h"
 #include "sink.h"
 #include "protocol/version.h"
 
@@ -19,6 +20,7 @@
 /* Slices gain nothing in smaller pictures, and libavcodec 59 stores those of one or two rows or columns wrongly in
  * version 3 of FFV1. */
 #define FFV1_SLICED_EDGE_MIN 64
+#define WAITING_BYTES_MAX (INT64_C(4) << 30)
 #define KEY_FRAME_SECONDS 2 /* distance of key frames: the maximum that a player must go back to seek */
 
 struct video_encoder {
@@ -31,6 +33,7 @@ struct video_encoder {
     AVFrame *picture;
     AVPacket *packet;
     int64_t next_picture;
+    struct palette *palette; /* of a GIF: pictures wait in it for the last one */
 };
 
 /* ---- beginning ---- */
@@ -39,18 +42,23 @@ struct video_encoder {
 static void describe_pictures(AVCodecContext *codec, const struct video_plan *plan,
                               const struct video_source *source)
 {
-    const uint32_t odd = plan->rgb ? 0 : 1; /* 4:2:0 needs even sizes */
+    static const enum AVPixelFormat formats[] = {[VIDEO_YCBCR] = AV_PIX_FMT_YUV420P,
+                                                 [VIDEO_RGB] = AV_PIX_FMT_BGR0,
+                                                 [VIDEO_RGBA] = AV_PIX_FMT_BGRA,
+                                                 [VIDEO_PALETTE] = AV_PIX_FMT_PAL8};
+    const bool rgb = plan->pixels != VIDEO_YCBCR;
+    const uint32_t odd = rgb ? 0 : 1; /* 4:2:0 needs even sizes */
     codec->width = (int)((source->width + odd) & ~odd);
     codec->height = (int)((source->height + odd) & ~odd);
-    codec->pix_fmt = plan->rgb ? AV_PIX_FMT_BGR0 : AV_PIX_FMT_YUV420P;
+    codec->pix_fmt = formats[plan->pixels];
     codec->sample_aspect_ratio = (AVRational){1, 1};
     codec->time_base = (AVRational){(int)plan->rate_denominator, (int)plan->rate_numerator};
     codec->framerate = (AVRational){(int)plan->rate_numerator, (int)plan->rate_denominator};
     codec->color_primaries = AVCOL_PRI_BT709;
     codec->color_trc = AVCOL_TRC_IEC61966_2_1;
-    codec->colorspace = plan->rgb ? AVCOL_SPC_RGB : AVCOL_SPC_BT709;
-    codec->color_range = plan->rgb ? AVCOL_RANGE_JPEG : AVCOL_RANGE_MPEG;
-    codec->chroma_sample_location = plan->rgb ? AVCHROMA_LOC_UNSPECIFIED : AVCHROMA_LOC_LEFT;
+    codec->colorspace = rgb ? AVCOL_SPC_RGB : AVCOL_SPC_BT709;
+    codec->color_range = rgb ? AVCOL_RANGE_JPEG : AVCOL_RANGE_MPEG;
+    codec->chroma_sample_location = rgb ? AVCHROMA_LOC_UNSPECIFIED : AVCHROMA_LOC_LEFT;
 }
 
 static void set_quality(AVCodecContext *codec, const struct video_plan *plan, AVDictionary **options)
@@ -63,6 +71,11 @@ static void set_quality(AVCodecContext *codec, const struct video_plan *plan, AV
         const double scale = exp2(((double)plan->quality - 4) / 6) / 2;
         codec->flags |= AV_CODEC_FLAG_QSCALE;
         codec->global_quality = (int)lround(FF_QP2LAMBDA * (scale < 1 ? 1 : scale > 31 ? 31 : scale));
+    } else if (plan->pixels == VIDEO_RGBA) {
+        av_dict_set_int(options, "quality", (int64_t)plan->quality, 0);
+        av_dict_set_int(options, "lossless", plan->lossless, 0);
+    } else if (plan->pixels == VIDEO_PALETTE) {
+        return;
     } else if (codec->width < FFV1_SLICED_EDGE_MIN || codec->height < FFV1_SLICED_EDGE_MIN) {
         codec->level = 1;
     } else {
@@ -113,7 +126,7 @@ static bool open_picture(struct video_encoder *encoder, struct video_failure *fa
     encoder->packet = av_packet_alloc();
     if (!picture || !encoder->packet)
         return video_fail_library(failure, "", "a picture", AVERROR(ENOMEM));
-    picture->format = encoder->codec->pix_fmt;
+    picture->format = encoder->palette ? AV_PIX_FMT_BGRA : encoder->codec->pix_fmt;
     picture->width = encoder->codec->width;
     picture->height = encoder->codec->height;
     picture->color_primaries = encoder->codec->color_primaries;
@@ -151,9 +164,20 @@ static bool begin_file(struct video_encoder *encoder, const struct video_source 
     encoder->format->flags |= AVFMT_FLAG_BITEXACT;
     if (strcmp(encoder->plan->container, "mp4") == 0) /* the index in front: plays while it is fetched */
         av_dict_set(&options, "movflags", "faststart+write_colr", 0);
+    if (encoder->plan->pixels == VIDEO_RGBA || encoder->plan->pixels == VIDEO_PALETTE)
+        av_dict_set(&options, "loop", "0", 0); /* for ever */
     const int result = avformat_write_header(encoder->format, &options);
     av_dict_free(&options);
     return (result >= 0 && encoder->sink.failure == 0) || fail_file(encoder, result, failure);
+}
+
+static bool open_palette(struct video_encoder *encoder, const struct video_source *source,
+                         struct video_failure *failure)
+{
+    if (encoder->plan->pixels != VIDEO_PALETTE)
+        return true;
+    const int result = encoder->plan->palette->create(&encoder->palette, (int)source->width, (int)source->height);
+    return result >= 0 || video_fail_library(failure, "", "the palette", result);
 }
 
 struct video_encoder *video_encoder_create(const struct video_plan *plan, const struct video_source *source,
@@ -170,14 +194,28 @@ struct video_encoder *video_encoder_create(const struct video_plan *plan, const 
     }
     if (!good)
         video_fail_library(failure, "", "a video", AVERROR(ENOMEM));
-    if (good && open_codec(encoder, source, failure) && open_picture(encoder, failure) &&
-        begin_file(encoder, source, failure))
+    if (good && open_codec(encoder, source, failure) && open_palette(encoder, source, failure) &&
+        open_picture(encoder, failure) && begin_file(encoder, source, failure))
         return encoder;
     video_encoder_destroy(encoder);
     return NULL;
 }
 
 /* ---- pictures ---- */
+
+static void fill_rgba(struct video_encoder *encoder, const uint8_t *pixels)
+{
+    const AVFrame *picture = encoder->picture;
+    for (int y = 0; y < picture->height; y++) {
+        uint8_t *to = picture->data[0] + (ptrdiff_t)y * picture->linesize[0];
+        for (int x = 0; x < picture->width; x++, to += 4, pixels += 4) {
+            to[0] = pixels[2];
+            to[1] = pixels[1];
+            to[2] = pixels[0];
+            to[3] = pixels[3];
+        }
+    }
+}
 
 static void fill_rgb(struct video_encoder *encoder, const uint8_t *pixels)
 {
@@ -229,23 +267,54 @@ static bool encode(struct video_encoder *encoder, const AVFrame *picture, struct
     return fail_codec(encoder, result, failure);
 }
 
+/* All pictures have the same colours, or what stands still would flicker: they are kept until the last one. */
+static bool wait_for_palette(struct video_encoder *encoder, struct video_failure *failure)
+{
+    const AVFrame *picture = encoder->picture;
+    const int64_t bytes = encoder->next_picture * picture->height * picture->linesize[0];
+    if (bytes > WAITING_BYTES_MAX)
+        return video_fail(
+            failure, "frames", "make it shorter or smaller, or write a .webp file",
+            "the pictures of a GIF file have their colours in common, and these need more than 4 GiB");
+    const int result = encoder->plan->palette->put(encoder->palette, encoder->picture);
+    return result >= 0 || video_fail_library(failure, "", "the palette", result);
+}
+
 bool video_encoder_write(struct video_encoder *encoder, const uint8_t *pixels, struct video_failure *failure)
 {
     /* An encoder may still hold the one before. */
     const int result = av_frame_make_writable(encoder->picture);
     if (result < 0)
         return video_fail_library(failure, "", "a picture", result);
-    if (encoder->plan->rgb)
-        fill_rgb(encoder, pixels);
-    else
+    if (encoder->plan->pixels == VIDEO_YCBCR)
         fill_ycbcr(encoder, pixels);
+    else if (encoder->plan->pixels == VIDEO_RGBA)
+        fill_rgba(encoder, pixels);
+    else
+        fill_rgb(encoder, pixels);
     encoder->picture->pts = encoder->next_picture++;
-    return encode(encoder, encoder->picture, failure);
+    return encoder->palette ? wait_for_palette(encoder, failure) : encode(encoder, encoder->picture, failure);
+}
+
+static bool encode_waiting(struct video_encoder *encoder, struct video_failure *failure)
+{
+    int result = encoder->plan->palette->put(encoder->palette, NULL);
+    bool good = result >= 0;
+    while (good) {
+        av_frame_unref(encoder->picture);
+        result = encoder->plan->palette->take(encoder->palette, encoder->picture);
+        if (result == AVERROR_EOF)
+            return true;
+        good = result >= 0;
+        if (good && !encode(encoder, encoder->picture, failure))
+            return false;
+    }
+    return video_fail_library(failure, "", "the palette", result);
 }
 
 bool video_encoder_finish(struct video_encoder *encoder, struct video_failure *failure)
 {
-    if (!encode(encoder, NULL, failure))
+    if ((encoder->palette && !encode_waiting(encoder, failure)) || !encode(encoder, NULL, failure))
         return false;
     const int result = av_write_trailer(encoder->format);
     avio_flush(encoder->format->pb);
@@ -262,6 +331,8 @@ void video_encoder_destroy(struct video_encoder *encoder)
 {
     if (!encoder)
         return;
+    if (encoder->palette)
+        encoder->plan->palette->destroy(encoder->palette);
     av_packet_free(&encoder->packet);
     av_frame_free(&encoder->picture);
     avcodec_free_context(&encoder->codec);

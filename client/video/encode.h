@@ -15,12 +15,21 @@ struct video_failure {
 bool video_fail(struct video_failure *failure, const char *field, const char *remedy, const char *format, ...)
     __attribute__((format(printf, 4, 5)));
 
+enum video_pixels {
+    VIDEO_YCBCR,   /* BT.709, 4:2:0 */
+    VIDEO_RGB,     /* as they are */
+    VIDEO_RGBA,    /* likewise, with alpha */
+    VIDEO_PALETTE, /* 255 colours for all pictures, and one that lets the picture before shine through */
+};
+
 /* What a video will be; made of a request. */
 struct video_plan {
-    const char *container; /* the library's name: "mp4" or "matroska" */
+    const char *container; /* the library's name: "mp4", "matroska", "webp", "gif" */
     const char *encoder;   /* the library's name */
-    bool rgb;              /* the encoder keeps red, green and blue as they are */
-    unsigned quality;      /* 1..51; lossless: without meaning */
+    enum video_pixels pixels;
+    const struct palette_maker *palette; /* of a GIF */
+    bool lossless;
+    unsigned quality; /* on the encoder's scale; lossless, or of a GIF: without meaning */
     uint32_t rate_numerator, rate_denominator;
 };
 /* Chooses container and encoder. False: the request cannot be met. */

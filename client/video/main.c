@@ -5,6 +5,7 @@
 #include "encode.h"
 #include "helper/sandbox.h"
 #include "helper/file.h"
+#include "palette.h"
 #include "serve.h"
 #include "protocol/version.h"
 
@@ -19,11 +20,12 @@
 /* The C library looks for it by name, past our hidden visibility. */
 __attribute__((visibility("default"))) const char *argp_program_version = "farlight-video " FARLIGHT_VERSION;
 
-enum { KEY_FD = 0x100, KEY_FOLDER };
+enum { KEY_FD = 0x100, KEY_FOLDER, KEY_GIF };
 
 struct options {
     const char *folder;
     int fd;
+    bool gif;
 };
 
 static error_t parse(int key, char *value, struct argp_state *state)
@@ -40,6 +42,9 @@ static error_t parse(int key, char *value, struct argp_state *state)
     }
     case KEY_FOLDER:
         options->folder = value;
+        return 0;
+    case KEY_GIF:
+        options->gif = true;
         return 0;
     case ARGP_KEY_END:
         if (options->fd < 0 || !options->folder)
@@ -70,6 +75,7 @@ int main(int argc, char **argv)
     static const struct argp_option rows[] = {
         {"fd", KEY_FD, "N", 0, "Connected stream socket to speak over (needed)", 0},
         {"folder", KEY_FOLDER, "DIR", 0, "The one folder that may be written to (needed)", 0},
+        {"gif", KEY_GIF, NULL, 0, "Load what GIF files need", 0},
         {0}};
     static const struct argp argp = {
         .options = rows, .parser = parse, .doc = "Write videos for farlight, which starts this program."};
@@ -81,5 +87,7 @@ int main(int argc, char **argv)
     signal(SIGXFSZ, SIG_IGN);
     file_clean_up_on_end();
     video_keep_log();
+    if (options.gif)
+        palette_load();
     return enter_sandbox(&options) && video_serve(options.fd) ? EXIT_SUCCESS : EXIT_FAILURE;
 }

@@ -2,12 +2,15 @@
 /* Which container and which encoder. */
 #include "encode.h"
 #include "lib/rate.h"
+#include "palette.h"
 
 #include <libavcodec/avcodec.h>
 #include <string.h>
 #include <strings.h>
 
-#define DEFAULT_QUALITY 18 /* of x264's constant rate factor: hardly to be told from the original */
+#define DEFAULT_FACTOR 18 /* of x264's constant rate factor: hardly to be told from the original */
+#define FACTOR_MAX 51
+#define DEFAULT_WEBP_QUALITY 90 /* likewise; 95, as pictures have it, makes files half as large again */
 
 /* H.264 (ITU-T H.264, table A-1): level 6.2 allows 139,264 macroblocks of 16x16. */
 #define H264_MACROBLOCKS_MAX 139264u
@@ -19,16 +22,28 @@ static const struct choice {
     bool lossless;
 } choices[] = {{"h264", "libx264", false}, {"mpeg4", "mpeg4", false}, {"ffv1", "ffv1", true}};
 
-static const char *container_by_ending(const char *ending)
+static const struct container {
+    const char *ending, *name;
+    const char *encoder;      /* of moving pictures the only one; NULL: one of the choices */
+    enum video_pixels pixels; /* of that encoder */
+} containers[] = {{"mp4", "mp4", NULL, VIDEO_YCBCR},
+                  {"mkv", "matroska", NULL, VIDEO_YCBCR},
+                  {"webp", "webp", "libwebp_anim", VIDEO_RGBA},
+                  {"gif", "gif", "gif", VIDEO_PALETTE}};
+
+static const struct container *container_by_ending(const char *ending)
 {
-    return strcasecmp(ending, "mp4") == 0 ? "mp4" : strcasecmp(ending, "mkv") == 0 ? "matroska" : NULL;
+    for (size_t i = 0; i < sizeof(containers) / sizeof(containers[0]); i++)
+        if (strcasecmp(containers[i].ending, ending) == 0)
+            return &containers[i];
+    return NULL;
 }
 
-static const char *container_of(const char *path, const char *fallback)
+static const struct container *container_of(const char *path, const char *fallback)
 {
     const char *slash = strrchr(path, '/'), *dot = strrchr(path, '.');
     const bool has_ending = dot && (!slash || dot > slash);
-    const char *container = has_ending ? container_by_ending(dot + 1) : NULL;
+    const struct container *container = has_ending ? container_by_ending(dot + 1) : NULL;
     return container ? container : container_by_ending(fallback);
 }
 
@@ -58,22 +73,59 @@ static const struct choice *choose(const struct message_video_begin *wanted, str
     return NULL;
 }
 
-bool video_plan(struct video_plan *plan, const struct message_video_begin *wanted, struct video_failure *failure)
+static bool plan_film(struct video_plan *plan, const struct message_video_begin *wanted,
+                      struct video_failure *failure)
 {
-    *plan = (struct video_plan){.container = container_of(wanted->path, wanted->format)};
-    if (!plan->container)
-        return video_fail(failure, "path", "use the ending .mp4 or .mkv",
-                          "the ending is not that of a video format that can be written");
     const struct choice *chosen = choose(wanted, failure);
     if (!chosen)
         return false;
     if (chosen->lossless && strcmp(plan->container, "mp4") == 0)
         return video_fail(failure, "lossless", "use the ending .mkv", "an MP4 file does not hold FFV1");
+    if (wanted->quality > FACTOR_MAX)
+        return video_fail(failure, "quality", NULL, "a video has 1 (best) to %d", FACTOR_MAX);
     plan->encoder = chosen->encoder;
-    plan->rgb = chosen->lossless;
-    plan->quality = wanted->quality > 0 ? wanted->quality : DEFAULT_QUALITY;
+    plan->pixels = chosen->lossless ? VIDEO_RGB : VIDEO_YCBCR;
+    plan->quality = wanted->quality > 0 ? wanted->quality : DEFAULT_FACTOR;
     fl_rate_exact(wanted->frames_per_second, &plan->rate_numerator, &plan->rate_denominator);
     return true;
+}
+
+static bool plan_moving_picture(struct video_plan *plan, const struct container *container,
+                                const struct message_video_begin *wanted, struct video_failure *failure)
+{
+    const bool is_gif = container->pixels == VIDEO_PALETTE;
+    char reason[256];
+    if (wanted->codec[0] != '\0')
+        return video_fail(failure, "codec", "leave the codec out", "a .%s file is written in one way only",
+                          container->ending);
+    if (is_gif && wanted->lossless)
+        return video_fail(failure, "lossless", "use the ending .webp or .mkv", "a GIF file has 256 colours");
+    if (!avcodec_find_encoder_by_name(container->encoder))
+        return video_fail(failure, "codec", "install a libavcodec with it", "this libavcodec has no encoder %s",
+                          container->encoder);
+    plan->palette = is_gif ? palette_loaded(reason, sizeof(reason)) : NULL;
+    if (is_gif && !plan->palette)
+        return video_fail(failure, "path", NULL, "%s", reason);
+    plan->encoder = container->encoder;
+    plan->pixels = container->pixels;
+    plan->quality = wanted->quality > 0 ? wanted->quality : DEFAULT_WEBP_QUALITY;
+    fl_rate_exact(wanted->frames_per_second, &plan->rate_numerator, &plan->rate_denominator);
+    if (is_gif) {
+        plan->rate_numerator = 100;
+        plan->rate_denominator = fl_rate_gif_delay(wanted->frames_per_second);
+    }
+    return true;
+}
+
+bool video_plan(struct video_plan *plan, const struct message_video_begin *wanted, struct video_failure *failure)
+{
+    const struct container *container = container_of(wanted->path, wanted->format);
+    if (!container)
+        return video_fail(failure, "path", "use the ending .mp4, .mkv, .webp or .gif",
+                          "the ending is not that of a video format that can be written");
+    *plan = (struct video_plan){.container = container->name, .lossless = wanted->lossless != 0};
+    return container->encoder ? plan_moving_picture(plan, container, wanted, failure)
+                              : plan_film(plan, wanted, failure);
 }
 
 bool video_plan_allows(const struct video_plan *plan, uint32_t width, uint32_t height,

@@ -2,6 +2,7 @@
 #include "render/features.h"
 
 #include "shared/material.h"
+#include "shared/path.h"
 
 static bool has_specular(const struct scene_material *material)
 {
@@ -9,6 +10,15 @@ static bool has_specular(const struct scene_material *material)
     return material->specular != 1.0f || colour[0] != 1.0f || colour[1] != 1.0f || colour[2] != 1.0f ||
            material->textures[MATERIAL_SPECULAR].texture != 0 ||
            material->textures[MATERIAL_SPECULAR_COLOUR].texture != 0;
+}
+
+/* Mirrors of varnish and of what is no metal are strong at grazing angles alone. */
+static bool is_clear(const struct scene_material *material)
+{
+    const bool textured = material->textures[MATERIAL_METALLIC_ROUGHNESS].texture != 0;
+    const bool is_smooth = textured || material->roughness < PATH_STEPS_ROUGHNESS / PATH_STEPS;
+    return material->alpha_mode == ALPHA_BLEND ||
+           (is_smooth && (material->metallic > 0.5f || material->transmission > 0.5f));
 }
 
 struct scene_features scene_features_of(const struct scene *scene)
@@ -24,6 +34,7 @@ struct scene_features scene_features_of(const struct scene *scene)
                             material->textures[MATERIAL_METALLIC_ROUGHNESS].texture != 0 ||
                             material->alpha_mode == ALPHA_BLEND ||
                             (material->clearcoat > 0.0f && material->clearcoat_roughness < MIRROR_ROUGHNESS_GONE);
+        features.clear |= is_clear(material);
         features.anisotropy |= material->anisotropy > 0.0f;
         features.specular |= has_specular(material);
         features.volume |= material->transmission > 0.0f && material->attenuation_distance > 0.0f;

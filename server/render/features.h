@@ -22,6 +22,7 @@ struct scene_features {
     bool thin_walls;           /* some glass has no body */
     bool diffuse_transmission; /* some material scatters light to its other side */
     bool anisotropy_map;       /* some grain differs from place to place */
+    bool clear;                /* of some material most may be seen in a smooth mirror, or through it */
     bool mirrors;              /* some material sends a ray on: a smooth one, glass, a blended one */
 };
 

@@ -258,6 +258,22 @@ static bool begin_slice(struct frame_renderer *renderer, struct error *error)
     return begun && gpu_check_reset(renderer->device, "primary rays", error);
 }
 
+static bool note_guides(struct frame_renderer *renderer, struct error *error)
+{
+    struct render_context *context = &renderer->work->context;
+    return !denoise_notes_samples(context) ||
+           denoise_note(&renderer->denoise, &renderer->work->denoise.notes,
+                        denoise_history_moved(&renderer->history), context, error);
+}
+
+static bool follow_guides(struct frame_renderer *renderer, struct error *error)
+{
+    struct render_context *context = &renderer->work->context;
+    return !denoise_notes_samples(context) ||
+           denoise_follow(&renderer->denoise, &renderer->work->denoise.notes,
+                          denoise_history_moved(&renderer->history), context, error);
+}
+
 static bool trace_wave(struct frame_renderer *renderer, struct error *error)
 {
     struct render_context *context = &renderer->work->context;
@@ -278,7 +294,8 @@ static bool trace_wave(struct frame_renderer *renderer, struct error *error)
     context_span_begin(context, STAGE_SHADE);
     bool listed = ground_hit(context, renderer->work->passes.integrator, error) && compact_hits(context, error);
     context_span_end(context);
-    return listed && layers_mark_unknown(&renderer->work->layers, context, error);
+    return listed && follow_guides(renderer, error) &&
+           layers_mark_unknown(&renderer->work->layers, context, error);
 }
 
 static bool accumulate(struct frame_renderer *renderer, struct error *error)
@@ -345,8 +362,7 @@ static bool find_primary(struct frame_renderer *renderer, struct error *error)
         renderer->phase = renderer->work->layers.wanted ? PHASE_LAYERS : PHASE_SHADE;
     if (done && (!list_ground(renderer, error) || !wireframe_paint(context, error)))
         return false;
-    if (done && denoise_notes_samples(context) &&
-        !denoise_note(&renderer->work->denoise.notes, denoise_history_moved(&renderer->history), context, error))
+    if (done && !note_guides(renderer, error))
         return false;
     return gpu_check(renderer->device, "primary hits", error);
 }

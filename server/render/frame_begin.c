@@ -260,7 +260,8 @@ static bool reserve_frame(struct frame_renderer *renderer, struct error *error)
 {
     struct render_context *context = &renderer->work->context;
     if (!picture_begin(renderer->target, context, renderer->samples_before, error) ||
-        !denoise_sums_begin(&renderer->denoise, context, renderer->target, renderer->samples_before, error))
+        !denoise_sums_begin(&renderer->denoise, context, renderer->target, renderer->samples_before,
+                            &renderer->history, error))
         return false;
     renderer->picture.denoised = NULL;
     context->tile_samples = renderer->target->noise.errors ? &renderer->target->noise.tile_samples : NULL;

@@ -117,6 +117,15 @@ static double render_ns_of(const struct pacing *pacing, const struct pacing_advi
     return pacing->render_fixed_ns + of_work_ns * work_of(pacing, advice);
 }
 
+static void forget_render(struct pacing *pacing)
+{
+    pacing->surprises = 0;
+    pacing->guessed = false;
+    pacing->render_frames = pacing->render_areas = pacing->render_ns = 0.0;
+    pacing->render_areas_areas = pacing->render_areas_ns = pacing->render_fixed_ns = 0.0;
+    memset(pacing->bounce_ns, 0, sizeof(pacing->bounce_ns));
+}
+
 /* Forgets what no longer holds. */
 static bool is_disturbed(struct pacing *pacing, const struct pacing_advice *made, double render_ns)
 {
@@ -126,10 +135,7 @@ static bool is_disturbed(struct pacing *pacing, const struct pacing_advice *made
     pacing->surprises = surprises ? pacing->surprises + 1 : 0;
     if (pacing->surprises < 2)
         return surprises;
-    pacing->surprises = 0;
-    pacing->render_frames = pacing->render_areas = pacing->render_ns = 0.0;
-    pacing->render_areas_areas = pacing->render_areas_ns = 0.0;
-    memset(pacing->bounce_ns, 0, sizeof(pacing->bounce_ns));
+    forget_render(pacing);
     return false;
 }
 
@@ -138,6 +144,8 @@ void pacing_learn_waves(struct pacing *pacing, const struct pacing_advice *made,
 {
     const double work = work_of(pacing, made);
     double rest_ns = (double)render_ns;
+    if (pacing->guessed)
+        forget_render(pacing);
     if (made->quality && bytes > 0)
         learn(&pacing->bytes_full, (double)bytes / area_of(pacing, made) / bytes_of_quality(made->quality));
     if (pacing->terms.deadline_ns && is_disturbed(pacing, made, (double)render_ns))
@@ -147,6 +155,15 @@ void pacing_learn_waves(struct pacing *pacing, const struct pacing_advice *made,
         rest_ns -= (double)wave_ns[wave];
     }
     learn_render(pacing, work, fmax(rest_ns, 0.0));
+}
+
+void pacing_guess_waves(struct pacing *pacing, const struct pacing_advice *made, uint64_t render_ns,
+                        const uint64_t wave_ns[PACING_WAVES])
+{
+    if (render_ns == 0 || pacing->render_frames > 0.0)
+        return;
+    pacing_learn_waves(pacing, made, render_ns, wave_ns, 0);
+    pacing->guessed = true;
 }
 
 void pacing_learn_picture(struct pacing *pacing, const struct pacing_advice *made, uint64_t render_ns,

@@ -64,6 +64,7 @@ struct pacing {
     /* Of a full picture with all samples, what each bounce takes; not known: 0. With a deadline the sums above are
      * of the rest. */
     double bounce_ns[PACING_WAVES];
+    bool guessed;        /* what is known of rendering is a guess, until a frame tells */
     unsigned surprises;  /* frames in a row that took far more or less than expected */
     double hidden_bytes; /* of a layer of what a picture hides; 0: not known */
     struct pacing_terms terms;
@@ -119,6 +120,9 @@ void pacing_learn_picture(struct pacing *pacing, const struct pacing_advice *mad
  * is learned of them. */
 void pacing_learn_waves(struct pacing *pacing, const struct pacing_advice *made, uint64_t render_ns,
                         const uint64_t wave_ns[PACING_WAVES], uint64_t bytes);
+/* The same, where that is a guess: it counts until something is learned. */
+void pacing_guess_waves(struct pacing *pacing, const struct pacing_advice *made, uint64_t render_ns,
+                        const uint64_t wave_ns[PACING_WAVES]);
 void pacing_learn_hidden(struct pacing *pacing, uint64_t bytes);
 /* Size and quality of the next frame while things move, so that frame_ns is met by the renderer and by the link;
  * at most `quality_wanted`. Worse at once, better step by step, so that it does not flicker between two.

@@ -3,6 +3,7 @@
 
 #include "base/clock.h"
 #include "session/frames.h"
+#include "session/guess.h"
 #include "session/session.h"
 
 #include <inttypes.h>
@@ -270,20 +271,32 @@ static void waves_of(const struct stage_times *times, uint64_t wave_ns[PACING_WA
 }
 
 /* As it was advised, which may be some frames ago. */
-static void learn(struct session_view *view, const struct engine_frame *frame)
+static struct pacing_advice advice_of(const struct engine_frame *frame)
 {
-    uint64_t wave_ns[PACING_WAVES] = {0};
-    const struct pacing_advice made = {
+    return (struct pacing_advice){
         .scale_32nds = frame->scale_32nds ? frame->scale_32nds : PACING_SCALE_FULL,
         .quality = frame->quality,
         .margin_halves_less = frame->margin_halves_less,
         .samples = frame->request.samples,
         .depth_less = frame->depth_less,
     };
+}
+
+static void learn(struct session_view *view, const struct engine_frame *frame)
+{
+    uint64_t wave_ns[PACING_WAVES] = {0};
+    const struct pacing_advice made = advice_of(frame);
     if (view->terms.moving.deadline_ns)
         waves_of(&frame->result.times, wave_ns);
     pacing_learn_waves(&view->pacing, &made, frame->rendered_ns - frame->applied_ns, wave_ns,
                        frame->moving ? frame->size_bytes : 0);
+}
+
+static void guess(struct session_view *view, const struct engine_frame *frame)
+{
+    uint64_t wave_ns[PACING_WAVES] = {0};
+    const struct pacing_advice made = advice_of(frame);
+    pacing_guess_waves(&view->pacing, &made, guess_render_ns(&frame->result.times, wave_ns), wave_ns);
 }
 
 /* Of a picture at rest the first frames may have built and compiled; those that refine it say what one takes. */
@@ -304,6 +317,10 @@ void view_frame_made(struct job *job, const struct engine_frame *frame)
         learn(view, frame);
         if (view->terms.adapt || view->terms.moving.deadline_ns)
             choose_effort(view); /* also at rest: for the first frame that moves */
+    } else if (view->terms.moving.deadline_ns) {
+        guess(view, frame); /* it may be the only one */
+        if (view->pacing.guessed)
+            choose_effort(view);
     }
     if (view->terms.adapt && !frame->moving && frame->encoding == view->terms.still_encoding)
         choose_sparing(view, frame);

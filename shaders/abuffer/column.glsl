@@ -4,7 +4,8 @@
 //
 // A sample stands for the plane through it, within its texel: a depth alone would turn every slope into steps.
 //
-// Define: ABUFFER_COUNT_STEPS for the benchmark, intersections hold counts and not samples: visited blocks of voxels in
+// Defines: ABUFFER_PARITY bodies are told from what is around them by parity, as in the paper, where the winding tells
+// bodies in bodies apart, too; ABUFFER_COUNT_STEPS for the benchmark, intersections hold counts and not samples: visited blocks of voxels in
 // place of the distance, visited samples in place of the primitive, visited texels in place of the instance.
 #include "abuffer/layout.h"
 #include "raster/layout.h"
@@ -119,6 +120,17 @@ bool scan(inout column_scan c, float depth_min, out int index, out uvec2 words)
     return !is_far && index < c.end && depth_of(words) >= depth_min;
 }
 
+// What says where a point is: the winding, or, by parity, whether it is odd. Each surface of a body changes the winding
+// by one, so it is odd where an odd number of them is before the point.
+int inside_of(int winding)
+{
+#ifdef ABUFFER_PARITY
+    return winding & 1;
+#else
+    return winding;
+#endif
+}
+
 // The winding at a point of the image: the number of bodies around it.
 int winding_at(int axis, vec3 p)
 {
@@ -138,5 +150,5 @@ int winding_at(int axis, vec3 p)
             winding += !is_behind && plane_depth(s, from_middle) < p.z ? s.step_ : 0;
         }
     } while (c.next < c.end && !is_behind);
-    return winding;
+    return inside_of(winding);
 }

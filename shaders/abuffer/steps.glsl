@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Linear search by a few steps, ABUFFER_STEPS of them, and between two steps binary search: paper, section 3.2. There
-// the steps are those of a voxel; here of each subvoxel that holds something. Steps as long as voxels pass many thin
-// bodies twice in one step, and miss parts of an open room's walls between two columns.
+// the steps are those of a voxel; here of each subvoxel that holds something, unless voxels know none. Steps as long as
+// voxels pass many thin bodies twice in one step, and miss parts of an open room's walls between two columns.
 //
 // A column's samples decide what is inside: the winding at a point is the sum over the samples before it. If it differs
 // between a step's begin and end, a surface was passed. A surface that is passed twice in a step is missed.
@@ -90,7 +90,7 @@ int winding_at_origin(voxel_traversal w, uint what)
         images &= images - 1u;
     } while (images != 0u);
     int there = winding_at(own_axis, place_in_image(w, own_axis, w.s_min + OWN_WAY));
-    return is_own && !goes_along ? own_winding : there;
+    return is_own && !goes_along ? inside_of(own_winding) : there;
 }
 
 // Intersects the ray with a surface near s: with the plane of a sample there, then with that of a sample at this
@@ -219,6 +219,7 @@ bool look(inout voxel_traversal w, inout step_traversal t)
             nearest = !is_behind && intersects && is_here ? s : nearest;
         }
     } while (c.next < c.end && !is_behind);
+    winding = inside_of(winding);
     bool is_past_own = t.hi > w.s_min + OWN_WAY;
     bool differs = t.next > 0 && is_past_own && winding != t.winding;
     t.by_winding = is_body;

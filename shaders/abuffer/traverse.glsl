@@ -5,7 +5,7 @@
 // The host (trace/abuffer/trace.c) sets, besides the defines of trace/wave.comp, those that the files included here
 // name.
 //
-// Defines: ABUFFER_STEPS the search is by this number of steps per subvoxel (abuffer/steps.glsl), else by 2D DDA
+// Defines: ABUFFER_STEPS the search is by this number of steps per subvoxel (abuffer/steps.glsl), with ABUFFER_PARITY (abuffer/column.glsl), else by 2D DDA
 // (abuffer/planes.glsl), verified with triangles (abuffer/exact.glsl); ABUFFER_EMPTY the scene has no samples.
 #include "abuffer/exact.glsl"
 #include "abuffer/steps.glsl"

@@ -41,12 +41,13 @@ SHARE outside_mirror(surface s, float cosine, float exact, float all_)
     return mirrored;
 }
 
-// What facets mirror of light from outside at the first go, along a view of that cosine. `loss`: what they send into each
-// other.
-SHARE facets_outside_mirror(surface s, float cosine, float alpha, float loss)
+// What facets mirror of light from outside at the first go, along a view of that cosine. `mean`: facets_cosine() of it;
+// `loss`: what they send into each other.
+SHARE facets_outside_mirror(surface s, float cosine, float mean, float alpha, float loss)
 {
-    float mean = facets_dielectric_cosine(facets_cosine(cosine, alpha), alpha, s.ior), all_ = 1.0 - loss;
-    SHARE mirrored = without_film(s, fresnel_dielectric(mean, s.ior) * all_, all_);
+    float all_ = 1.0 - loss;
+    float exact = fresnel_dielectric(facets_dielectric_cosine(mean, alpha, s.ior), s.ior) * all_;
+    SHARE mirrored = without_film(s, exact, all_);
 #ifdef HAS_IRIDESCENCE
     mirrored = mix(mirrored, facets_film(s, cosine, alpha) * all_, s.film);
 #endif
@@ -63,9 +64,9 @@ vec3 metal_mirror(surface s, float cosine)
     return mirrored;
 }
 
-vec3 facets_metal_mirror(surface s, float cosine, float alpha, float loss)
+vec3 facets_metal_mirror(surface s, float cosine, float mean, float alpha, float loss)
 {
-    vec3 mirrored = fresnel_schlick(s.base, facets_cosine(cosine, alpha));
+    vec3 mirrored = fresnel_schlick(s.base, mean);
 #ifdef HAS_IRIDESCENCE
     mirrored = mix(mirrored, facets_film(s, cosine, alpha), s.film);
 #endif

@@ -188,9 +188,10 @@ void put_below(surface s, vec3 view, float NoV, inout split parts)
 split split_facets(surface s, vec3 view, float NoV, float alpha, float loss)
 {
     bool leaves = in_glass(s);
+    float mean = facets_cosine(NoV, alpha);
     split result;
     // From inside of one direction: total reflection begins at an angle.
-    result.dielectric = leaves ? inside_mirror(s, NoV) : facets_outside_mirror(s, NoV, alpha, loss);
+    result.dielectric = leaves ? inside_mirror(s, NoV) : facets_outside_mirror(s, NoV, mean, alpha, loss);
     result.again_mean = facets_lost_mean(alpha);
     SHARE mirrored_mean = without_film(s, facets_dielectric_mean(alpha, s.ior), 1.0 - result.again_mean);
     vec3 metal_mean = fresnel_schlick_mean(s.base);
@@ -200,7 +201,7 @@ split split_facets(surface s, vec3 view, float NoV, float alpha, float loss)
     metal_mean = mix(metal_mean, film_mean, s.film);
 #endif
     result.enters_mean = max(1.0 - mirrored_mean, SHARE(1e-6));
-    result.mirror = mix(vec3(result.dielectric), facets_metal_mirror(s, NoV, alpha, loss), s.metallic);
+    result.mirror = mix(vec3(result.dielectric), facets_metal_mirror(s, NoV, mean, alpha, loss), s.metallic);
     result.again_colour = metal_again(metal_mean, result.again_mean);
     result.again = result.again_colour * (loss * s.metallic);
     SHARE enters = (1.0 - result.dielectric) * (1.0 - s.metallic), entered = enters * (1.0 - s.transmission);
@@ -223,7 +224,7 @@ split split_light(surface s, vec3 view, float NoV)
 // Practitioners' Assessment of Light Reflection Models. 1997.
 SHARE spread_entered(surface s, split parts, float NoL, float alpha, float loss)
 {
-    SHARE enters = 1.0 - facets_outside_mirror(s, NoL, alpha, loss);
+    SHARE enters = 1.0 - facets_outside_mirror(s, NoL, facets_cosine(NoL, alpha), alpha, loss);
     return enters / parts.enters_mean * INVERSE_PI;
 }
 

@@ -15,8 +15,7 @@ uniform uint strip_row, strip_rows; // the strip's first row in the picture, and
 
 struct halves {
     vec3 a, b;
-    float deviation; // of each, by luminance; until it is known, the luminance of their mean, before that negative where
-                     // something has moved since the picture before
+    float deviation; // of each, by luminance; until it is known, the luminance of their mean
 };
 
 struct guide {
@@ -63,6 +62,22 @@ guide guide_of_words(uvec2 words)
     int bytes = int(words.x);
     vec4 parts = vec4(bytes << 24 >> 24, bytes << 16 >> 24, bytes << 8 >> 24, bytes >> 24) / 127.0;
     return guide(parts.xyz, parts.w, uintBitsToFloat(words.y));
+}
+
+// Of a pixel, as a share of its depth.
+uvec2 words_of_motion(vec3 motion)
+{
+    bool known = max_component(abs(motion)) < HALF_FLOAT_MAX;
+    motion = known ? motion : vec3(0.0);
+    return uvec2(packHalf2x16(motion.xy), packHalf2x16(vec2(motion.z, known ? 0.0 : 1.0)));
+}
+
+// False: it is not known.
+bool motion_of_words(uvec2 words, out vec3 motion)
+{
+    vec2 last = unpackHalf2x16(words.y);
+    motion = vec3(unpackHalf2x16(words.x), last.x);
+    return last.y == 0.0;
 }
 
 // The pixel of this invocation in the strip; false: it has none.

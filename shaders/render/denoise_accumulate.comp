@@ -3,6 +3,7 @@
 // samples of the first half, and what all of them saw. Each doubling of the samples is halved in turn, so that both halves
 // are as evenly spread as all of them; the first four so that both have one of either half of what is chosen.
 // Defines: HAS_TILE_SAMPLES tiles may have stopped, and get no more (server/render/picture_noise.h).
+//          HAS_NOTED_MOTION notes say whether they are to count, and where things were.
 
 #include "shared/denoise.h"
 #include "common/dispatch.glsl"
@@ -22,6 +23,9 @@ layout(std430, binding = BIND_DENOISE_NOTES) readonly buffer note_block { vec4 n
 layout(std430, binding = BIND_DENOISE_HALF) buffer half_block { vec4 first_half[]; };
 layout(std430, binding = BIND_DENOISE_ALBEDO) buffer albedo_block { vec4 albedos[]; };
 layout(std430, binding = BIND_DENOISE_NORMAL) buffer normal_block { vec4 normals[]; };
+#ifdef HAS_NOTED_MOTION
+layout(std430, binding = BIND_DENOISE_MOTION) buffer motion_block { vec4 motions[]; };
+#endif
 
 bool is_of_first_half(uint index)
 {
@@ -40,9 +44,16 @@ void main()
     uint begin = k << sample_shift, count = 1u << sample_shift, slot = first_slot + k;
     vec4 sum = first_half[slot], albedo = albedos[slot], normal = normals[slot];
     for (uint i = 0u; i < count; i++) {
+        uint first = DENOISE_NOTE_TEXELS * (begin + i);
+        float counts = 1.0;
+#ifdef HAS_NOTED_MOTION
+        vec4 motion = notes[first + 2u];
+        counts = motion.w > 0.0 ? 1.0 : DENOISE_WHISPER; // if it is all that there is
+        motions[slot] += vec4(motion.xyz, 1.0) * counts;
+#endif
         sum += is_of_first_half(sample_index + i) ? slice_sums[begin + i] : vec4(0.0);
-        albedo += notes[DENOISE_NOTE_TEXELS * (begin + i)];
-        normal += notes[DENOISE_NOTE_TEXELS * (begin + i) + 1u];
+        albedo += counts * notes[first];
+        normal += counts * notes[first + 1u];
     }
     first_half[slot] = sum;
     albedos[slot] = albedo;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // How many samples the pixels of a band have, and which of them are of the first half.
 // Defines: HAS_TILE_SAMPLES tiles may have stopped, and have fewer samples (server/render/picture_noise.h).
+//          HAS_NOTED_MOTION some samples may not say what they saw.
 
 uniform uint sample_count;
 
@@ -16,6 +17,20 @@ float samples_of_slot(uint slot)
     return float(stopped_at != 0u ? stopped_at : sample_count);
 #else
     return float(sample_count);
+#endif
+}
+
+#ifdef HAS_NOTED_MOTION
+layout(std430, binding = BIND_DENOISE_MOTION) readonly buffer motion_block { vec4 motions[]; };
+#endif
+
+// Those of them that say what they saw.
+float notes_of_slot(uint slot, float count)
+{
+#ifdef HAS_NOTED_MOTION
+    return motions[slot].w;
+#else
+    return count;
 #endif
 }
 

@@ -1,5 +1,11 @@
 // SPDX-License-Identifier: MIT
 // From the strip to the sums of a band: the picture's, moved by as much as filtering has moved the light.
+//
+// What the filter has left out because it was much brighter than its surroundings stays as far as both halves of the
+// samples have it, or a pixel beside it is as bright: a highlight. What one half has alone is a speck, which is worth
+// next to nothing where it was found (DeCoro, Weyrich, Rusinkiewicz. Density-based Outlier Rejection in Monte Carlo
+// Rendering. 2010, by neighbours and halves in place of all samples).
+//
 // Defines: HAS_REPROJECTED what pictures before have brought has moved it, too.
 
 #include "render/denoise.glsl"
@@ -15,8 +21,34 @@ layout(binding = UNIT_DENOISE_GUIDE) uniform usamplerBuffer guides;
 layout(binding = UNIT_DENOISE_WIDER) uniform usamplerBuffer kept; // denoise_reproject.comp
 #endif
 layout(std430, binding = BIND_ACCUMULATION) readonly buffer accumulation_block { vec4 accumulation[]; };
+layout(std430, binding = BIND_DENOISE_HALF) readonly buffer half_block { vec4 first_half[]; };
 layout(std430, binding = BIND_DENOISE_ALBEDO) readonly buffer albedo_block { vec4 albedos[]; };
 layout(std430, binding = BIND_DENOISE_OUT) writeonly buffer band_block { vec4 denoised[]; };
+
+// Of what was left out, `left`, the part that is a speck. Of one sample nothing is known.
+vec3 speck_of(vec3 left, vec3 mean, uint slot, float count)
+{
+    float first_count = first_half_of(count), second_count = count - first_count;
+    vec3 first = first_half[slot].rgb, second = accumulation[slot].rgb - first;
+    vec3 lesser = luminance(first) * second_count < luminance(second) * first_count ? first / first_count : second / second_count;
+    float shown = luminance(lesser) - luminance(mean - left), all = luminance(left);
+    return second_count > 0.0 && all > 0.0 ? left * (1.0 - clamp(shown / all, 0.0, 1.0)) : vec3(0.0);
+}
+
+// 1: no pixel beside it is about as bright.
+float is_alone(ivec2 pixel, vec3 filtered)
+{
+    ivec2 lower, upper;
+    bounds_of(pixel, lower, upper);
+    float most = 0.0;
+    for (int i = 0; i < 9; i++) {
+        ivec2 next = clamp(pixel + ivec2(i % 3 - 1, i / 3 - 1), lower, upper - 1);
+        float shown = luminance(mean_of(halves_of_words(texelFetch(first_light, place_of(next)))));
+        most = max(most, next == pixel ? 0.0 : shown);
+    }
+    float share = most / max(luminance(filtered), 1e-30);
+    return 1.0 - clamp((share - DENOISE_ALONE) / DENOISE_ALONE, 0.0, 1.0);
+}
 
 void main()
 {
@@ -27,12 +59,15 @@ void main()
     uint slot = slot_of_pixel(uvec2(pixel.x, uint(pixel.y) + strip_row - band_row));
     float count = samples_of_slot(slot);
     vec4 sum = accumulation[slot];
-    vec3 albedo = max(albedos[slot].rgb / count, vec3(DENOISE_ALBEDO_MIN));
-    vec3 moved = mean_of(halves_of_words(texelFetch(light, place))) -
-                 mean_of(halves_of_words(texelFetch(first_light, place)));
+    vec3 albedo = max(albedos[slot].rgb / notes_of_slot(slot, count), vec3(DENOISE_ALBEDO_MIN));
+    vec3 filtered = mean_of(halves_of_words(texelFetch(first_light, place)));
+    vec3 moved = mean_of(halves_of_words(texelFetch(light, place))) - filtered;
 #ifdef HAS_REPROJECTED
     uvec2 words = texelFetch(kept, place).xy;
     moved += vec3(unpackHalf2x16(words.x), unpackHalf2x16(words.y).x) - sum.rgb / (count * albedo);
+#else
+    vec3 mean = sum.rgb / count;
+    moved -= speck_of(mean - filtered * albedo, mean, slot, count) * is_alone(pixel, filtered) / albedo;
 #endif
     bool there = uintBitsToFloat(texelFetch(guides, place).y) > 0.0;
     denoised[slot] = vec4(there ? max(sum.rgb + strength * moved * albedo * count, vec3(0.0)) : sum.rgb, sum.a);

@@ -2,6 +2,10 @@
 // The light of the pixel's own samples, with that of the picture before where it shows the same place (Schied et al.
 // Spatiotemporal Variance-Guided Filtering. HPG 2017, 4.1). Both take the place of the halves, as their noise is not the same.
 //
+// Places on instances that have moved since are looked for where these were.
+//
+// Defines: HAS_NOTED_MOTION of each pixel is known how it has moved.
+//
 // Of each pixel is kept: rg; b and how many samples it is worth, as half floats; the guide.
 
 #include "render/denoise.glsl"
@@ -19,6 +23,9 @@ uniform int before_height;
 layout(binding = UNIT_DENOISE_LIGHT) uniform usamplerBuffer light;
 layout(binding = UNIT_DENOISE_GUIDE) uniform usamplerBuffer guides;
 layout(binding = UNIT_DENOISE_FIRST) uniform usamplerBuffer before;
+#ifdef HAS_NOTED_MOTION
+layout(binding = UNIT_DENOISE_MOTION) uniform usamplerBuffer motions;
+#endif
 layout(std430, binding = BIND_DENOISE_OUT) writeonly buffer light_block { uvec4 blended[]; };
 layout(std430, binding = BIND_DENOISE_OUT_TOO) writeonly buffer kept_block { uvec4 kept[]; };
 
@@ -99,13 +106,16 @@ void main()
     halves h = halves_of_words(texelFetch(light, place));
     vec3 mean = mean_of(h);
     float count = samples;
-    bool moved = h.deviation < 0.0;
-    h.deviation = abs(h.deviation);
-    if (samples_before_max > 0.0 && own.nearness > 0.0 && !moved) {
+    vec3 motion = vec3(0.0);
+    bool known = true;
+#ifdef HAS_NOTED_MOTION
+    known = motion_of_words(texelFetch(motions, place).xy, motion);
+#endif
+    if (samples_before_max > 0.0 && own.nearness > 0.0 && known) {
         bool orthographic = frame.extent_near.w != 0.0;
         vec3 p = view_place((vec2(pixel) + 0.5) / vec2(frame.view_width, frame.view_height), frame.extent_near.xy,
                             orthographic, own.nearness);
-        vec3 place_world = eye_world() + world_from_view_vector(p);
+        vec3 place_world = eye_world() + world_from_view_vector(p) - motion * p.z;
         vec4 was = light_before(place_world, own, orthographic ? frame.extent_near.y : -p.z);
         float worth = min(was.w, samples_before_max * samples) * (1.0 - DENOISE_HISTORY_DOUBT * own.share);
         if (worth > 0.0) {

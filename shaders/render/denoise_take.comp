@@ -5,7 +5,6 @@
 #include "render/denoise_count.glsl"
 
 uniform uint band_row; // the first row of the band in the picture
-uniform uint notes_moved; // 1: samples have DENOISE_MOVED
 
 layout(std430, binding = BIND_ACCUMULATION) readonly buffer accumulation_block { vec4 accumulation[]; };
 layout(std430, binding = BIND_DENOISE_HALF) readonly buffer half_block { vec4 first_half[]; };
@@ -13,6 +12,9 @@ layout(std430, binding = BIND_DENOISE_ALBEDO) readonly buffer albedo_block { vec
 layout(std430, binding = BIND_DENOISE_NORMAL) readonly buffer normal_block { vec4 normals[]; };
 layout(std430, binding = BIND_DENOISE_GUIDE) writeonly buffer guide_block { uvec2 guides[]; };
 layout(std430, binding = BIND_DENOISE_OUT) writeonly buffer light_block { uvec4 light[]; };
+#ifdef HAS_NOTED_MOTION
+layout(std430, binding = BIND_DENOISE_OUT_TOO) writeonly buffer strip_block { uvec2 strip_motions[]; };
+#endif
 
 void main()
 {
@@ -21,20 +23,22 @@ void main()
         return;
     uint slot = slot_of_pixel(uvec2(pixel.x, uint(pixel.y) + strip_row - band_row));
     float count = samples_of_slot(slot), first_count = first_half_of(count), second_count = count - first_count;
-    vec4 albedo = albedos[slot] / count, normal = normals[slot] / count;
+    float noted = notes_of_slot(slot, count);
+    vec4 albedo = albedos[slot] / noted, normal = normals[slot] / noted;
     vec3 sum = accumulation[slot].rgb, first = first_half[slot].rgb, mean = sum / count, noise = vec3(0.0);
     if (second_count > 0.0)
         noise = (first / first_count - (sum - first) / second_count) * (sqrt(first_count * second_count) / count);
     vec3 divisor = max(albedo.rgb, vec3(DENOISE_ALBEDO_MIN));
     float depth = normal.w;
-    float moved = notes_moved != 0u ? floor(albedo.a * count / DENOISE_MOVED + 0.01) : 0.0; // samples
-    albedo.a -= moved * DENOISE_MOVED / count;
-    bool there = depth > 0.0 && moved <= count && albedo.a <= 1.0; // all of it: what is behind would be spread over the edge, too
-    guide g = guide(there ? normal.xyz : vec3(0.0), min(albedo.a, 1.0), 0.0);
+    bool there = depth > 0.0 && albedo.a <= 1.0; // all of it: what is behind would be spread over the edge, too
+    guide g = guide(there ? normal.xyz : vec3(0.0), min(albedo.a + (count - noted) / count, 1.0), 0.0);
     if (there)
         g.nearness = frame.extent_near.w != 0.0 ? depth : 1.0 / depth;
     int place = place_of(pixel);
     guides[place] = words_of_guide(g);
-    float shown = luminance(mean / divisor);
-    light[place] = words_of_halves(halves((mean + noise) / divisor, (mean - noise) / divisor, moved == 0.0 ? shown : -shown));
+    light[place] = words_of_halves(halves((mean + noise) / divisor, (mean - noise) / divisor, luminance(mean / divisor)));
+#ifdef HAS_NOTED_MOTION
+    vec3 motion = motions[slot].xyz / (noted * max(depth, 1e-30));
+    strip_motions[place] = words_of_motion(motion);
+#endif
 }

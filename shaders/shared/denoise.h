@@ -4,14 +4,29 @@
 #define FARLIGHT_SHARED_DENOISE_H
 #include "shared/path.h"
 
-/* Of each sample of a slice, beside its radiance: albedo and the share of mirrors and glass; normal and depth. */
+/* Of each sample of a slice, beside its radiance: albedo and the share of mirrors and glass; normal and depth;
+ * with HAS_NOTED_MOTION where that place was in the picture before, less where it is, and DENOISE_SAYS .. as a
+ * number. */
+#define DENOISE_NOTE_TEXELS_MAX 3u
+#ifdef HAS_NOTED_MOTION
+#define DENOISE_NOTE_TEXELS 3u
+#else
 #define DENOISE_NOTE_TEXELS 2u
+#endif
+#define DENOISE_SAYS 1u      /* what guides; 0: the sample went another way than most of its pixel do */
+#define DENOISE_MIRRORS 2u   /* most of what is seen there lies in a smooth mirror; */
+#define DENOISE_PASSES 4u    /* behind glass */
+#define DENOISE_WAVES_MAX 3u /* of bounces that are followed: into glass, out of it, and to what is behind */
+/* So much of what is seen goes one way where that is followed. */
+#define DENOISE_MOST 0.75f
+/* The weight of what samples say that do not. */
+#define DENOISE_WHISPER (1.0f / 4096.0f)
+/* In place of a motion: nobody knows. */
+#define DENOISE_ANEW 1e30f
+#define DENOISE_MOVED_TEXELS 3u /* an instance: rows of a matrix, from where it is to where it was */
 
 /* In place of the share of mirrors and glass: the sample left the scene. */
 #define DENOISE_LEFT 1e6f
-/* Added to it: the instance has moved since the picture before. */
-#define DENOISE_MOVED 1e3f
-#define DENOISE_MOVED_SAMPLES_MAX 256u /* so that sums tell how many have */
 /* Of the depth: a surface is not flatter than this, per pixel. */
 #define DENOISE_DEPTH_SHARE 0.004f
 /* A turn of the normal by 14 degrees is as far as one surface is expected to go. */
@@ -26,6 +41,8 @@
 #define DENOISE_MIRROR_DOUBT 0.5f
 /* What is brighter than so many times what is around it, or than so much of white, is left out of the filter. */
 #define DENOISE_CAP 4.0f
+/* What is that much brighter is a speck where pixels beside it have less than this share of what is left of it. */
+#define DENOISE_ALONE 0.5f
 /* Light counts as like another that differs by this many standard deviations; in mirrors and glass by as much less
  * as DENOISE_MIRROR_EDGES says. */
 #define DENOISE_LIGHT_SCALE 2.0f
@@ -53,18 +70,20 @@
 #define BIND_DENOISE_HALF BIND_PASS_1   /* vec4 a slot of a band: sums of the first half of the samples */
 #define BIND_DENOISE_ALBEDO BIND_PASS_3 /* vec4 a slot: sums of notes */
 #define BIND_DENOISE_NORMAL BIND_PASS_4 /* the same */
+#define BIND_DENOISE_MOTION BIND_WAVE   /* the same, with HAS_NOTED_MOTION */
 #define BIND_DENOISE_OUT BIND_PASS_2    /* what a pass over the strip writes */
 #define BIND_DENOISE_GUIDE 0            /* the guide, where it writes that */
 #define BIND_DENOISE_SLOPE 0            /* the slopes, where it writes those */
 #define BIND_DENOISE_OUT_TOO 3          /* and what it writes beside these */
 
 /* texture units */
-#define UNIT_DENOISE_MOVED UNIT_PASS_0   /* uint an instance, 1: it has moved since the picture before */
+#define UNIT_DENOISE_MOVED UNIT_PASS_0   /* vec4, DENOISE_MOVED_TEXELS an instance */
 #define UNIT_DENOISE_LIGHT UNIT_TRACER_0 /* halves of the light at this level */
 #define UNIT_DENOISE_GUIDE UNIT_TRACER_1
 #define UNIT_DENOISE_FIRST UNIT_TRACER_2 /* halves of the light before any level */
 #define UNIT_DENOISE_RISK UNIT_TRACER_3
 #define UNIT_DENOISE_SLOPE UNIT_TRACER_5
 #define UNIT_DENOISE_WIDER UNIT_TRACER_4 /* halves of the light at the next level */
+#define UNIT_DENOISE_MOTION UNIT_PASS_0  /* of the strip */
 
 #endif

@@ -9,9 +9,13 @@ EACH_TEST(fixture_clear, NULL)
 
 enum { TEXELS = EDGE };
 
+/* The wall in front of the eye, and behind it, turned round. */
+static const float FRONT[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0},
+                   BACK[12] = {-1, 0, 0, 0, 0, 1, 0, 0, 0, 0, -1, 9};
+
 /* A wall that fills the picture, with a checker of a texel a pixel, 1 and 1/4; under a sky, next to a ball that
  * hides some of that. Scattered light is noise. */
-static void a_checker(struct fixture *fixture)
+static void a_checker(struct fixture *fixture, const float place[12])
 {
     static uint8_t texels[TEXELS * TEXELS * 4];
     for (uint32_t i = 0; i < TEXELS * TEXELS; i++)
@@ -27,8 +31,8 @@ static void a_checker(struct fixture *fixture)
     material->textures[MATERIAL_BASE_COLOUR] =
         (struct texture_use){.texture = texture->base.id, .uv_transform = {1, 0, 0, 0, 1, 0}, .strength = 1.0f};
     dark->base_colour[0] = dark->base_colour[1] = dark->base_colour[2] = 0.0f;
-    fixture_square(fixture, 1.0f, material->base.id, NULL);
-    fixture_sphere(fixture, 1.5f, 0.0f, 0.5f, 0.5f, dark->base.id);
+    fixture_square(fixture, 1.0f, material->base.id, place);
+    fixture_sphere(fixture, 1.5f, 0.0f, 0.5f * place[10] + place[11], 0.5f, dark->base.id);
     fixture_environment(fixture, 1.0f, 1.0f, 1.0f);
     fixture->request.camera.fov_y = 0.0f;
     fixture->request.camera.ortho_height = 2.0f;
@@ -72,10 +76,8 @@ static double contrast(const struct frame_result *picture, const struct frame_re
  * the number of pixels, which is 32: 3 % are many times that. A filter of three pixels that did not divide by the
  * albedo would take nearly all contrast of a checker. Light is smooth here, so most of the noise can go, and half
  * must. */
-TEST(a_texture_keeps_its_detail_while_its_noise_goes)
+static void expect_detail_without_noise(struct fixture *fixture)
 {
-    struct fixture *fixture = *state;
-    a_checker(fixture);
     struct frame_result truth = rendered(fixture, DENOISE_OFF, 1024, 7);
     for (uint32_t samples = 1; samples <= 16; samples *= 4) {
         struct frame_result noisy = rendered(fixture, DENOISE_OFF, samples, 1);
@@ -86,6 +88,24 @@ TEST(a_texture_keeps_its_detail_while_its_noise_goes)
         frame_result_finish(&denoised);
     }
     frame_result_finish(&truth);
+}
+
+TEST(a_texture_keeps_its_detail_while_its_noise_goes)
+{
+    a_checker(*state, FRONT);
+    expect_detail_without_noise(*state);
+}
+
+/* The same as the wall itself: of a mirror's own normal and albedo one sample would be left as it is. */
+TEST(so_it_does_in_a_mirror)
+{
+    struct fixture *fixture = *state;
+    a_checker(fixture, BACK);
+    struct scene_material *mirror = fixture_material(fixture);
+    mirror->metallic = 1.0f;
+    mirror->roughness = 0.0f;
+    fixture_square(fixture, 1.0f, mirror->base.id, FRONT);
+    expect_detail_without_noise(fixture);
 }
 
 TEST(pictures_without_noise_stay_as_they_are)
@@ -128,7 +148,7 @@ TEST(a_hard_shadow_stays_hard)
 TEST(with_many_samples_the_denoised_picture_is_the_noisy_one)
 {
     struct fixture *fixture = *state;
-    a_checker(fixture);
+    a_checker(fixture, FRONT);
     double before = 1e9;
     for (uint32_t samples = 4; samples <= 1024; samples *= 16) {
         struct frame_result plain = rendered(fixture, DENOISE_OFF, samples, 0);
@@ -179,7 +199,7 @@ TEST(a_denoised_picture_is_the_same_however_it_was_cut_queued_and_added_up)
 TEST(auto_denoises_few_samples_alone)
 {
     struct fixture *fixture = *state;
-    a_checker(fixture);
+    a_checker(fixture, FRONT);
     for (uint32_t samples = 32; samples <= 64; samples *= 2) {
         struct frame_result plain = rendered(fixture, DENOISE_OFF, samples, 1);
         struct frame_result always = rendered(fixture, DENOISE_ON, samples, 1);

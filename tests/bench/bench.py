@@ -3,7 +3,7 @@
 """`make bench`: where the time goes, in tables and as JSON. Usage: bench.py BUILD_FOLDER [PART ..] [--out FOLDER]
 
 Parts: start, first_picture, oneshot, frames, animation, tracers, forms, family, pixels, rays, parallel, instances, refit, flake, distributed,
-steps, link, view, deadline, walk, warp, ldc, abuffer, rayspace, quadtree, reduce, reach; all of them where none is named. Each figure is the median of several runs after a
+steps, link, view, deadline, walk, warp, ldc, abuffer, sampled, rayspace, quadtree, reduce, reach; all of them where none is named. Each figure is the median of several runs after a
 warm-up, with the median absolute deviation beside it; what is compared takes turns, run by run. Scenes of FARLIGHT_SCENES
 (default: ../shared/scenes beside the checkout) are left out, and named, where missing.
 
@@ -15,7 +15,7 @@ and runs; keys end with their unit. tracers, reach, family, pixels and rays have
 bench_tracers: title, triangles, spheres, instances, width, height, rays_per_pixel, `structures` (tracer, form, build,
 memory_bytes) and `waves` (kind, order, any, rays, `measures`: tracer, form, way, time, rays_per_s, agreement).
 `first_picture` is described in bench_first_picture.py, `distributed` in bench_frames.py, `steps` in bench_steps.py, `link` in bench_link.py, `view` in bench_view.py, `deadline` in bench_deadline.py, `walk` in bench_walk.py, `warp` in bench_warp.py, `ldc` in bench_ldc.py,
-`abuffer` in bench_abuffer.py, `rayspace` in bench_rayspace.py, `quadtree` in bench_quadtree.py, `reduce` in bench_reduce.py. `wanted` has the lines that are to be reached: line, wanted, measured, met, within_spread
+`abuffer` in bench_abuffer.py, `rayspace` in bench_rayspace.py, `quadtree` in bench_quadtree.py, `reduce` in bench_reduce.py, `sampled` in bench_sampled.py. `wanted` has the lines that are to be reached: line, wanted, measured, met, within_spread
 (missed by no more than twice its deviation), where.
 
 Exit status 1 if something failed, or a tracer gave wrong answers; a line that was missed is no failure.
@@ -46,6 +46,7 @@ import bench_rayspace
 import bench_reach
 import bench_readme
 import bench_reduce
+import bench_sampled
 import bench_steps
 import bench_view
 import bench_walk
@@ -78,6 +79,7 @@ PARTS = {
     "warp": ("A walk over slow links", bench_warp.measure, bench_warp.show),
     "ldc": ("Layered depth cubes", bench_ldc.measure, bench_ldc_show.show),
     "abuffer": ("Voxels and A-buffers", bench_abuffer.measure, bench_abuffer_show.show),
+    "sampled": ("Layered depth cubes and A-buffers beside bvh", bench_sampled.measure, bench_sampled.show),
     "rayspace": ("A hierarchy over the rays", bench_rayspace.measure, bench_rayspace.show),
     "quadtree": ("Quadtrees over what a view sees", bench_quadtree.measure, bench_quadtree_show.show),
     "reduce": ("Stream reduction", bench_reduce.measure, bench_reduce.show),

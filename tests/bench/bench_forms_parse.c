@@ -39,7 +39,8 @@ static bool set_ldc_key(struct tracer_options *options, const char *key, const c
 
 static bool set_key(struct bench_form *form, const char *key, const char *value)
 {
-    static const char *const searches[] = {"auto", "dda", "linear3", "linear1"};
+    static const char *const searches[] = {"auto",    "dda",     "linear3", "linear1",
+                                           "voxels3", "voxels1", "parity3", "parity1"};
     struct tracer_options *options = &form->options;
     const bool is_ldc = form->tracer == TRACER_LDC, is_abuffer = form->tracer == TRACER_ABUFFER;
     const struct {
@@ -59,7 +60,7 @@ static bool set_key(struct bench_form *form, const char *key, const char *value)
             return bench_parse_number(value, 1, 4096, numbers[i].number);
     if (is_abuffer && strcmp(key, "search") == 0) {
         uint32_t word = 0;
-        const bool known = bench_parse_word(value, searches, 4, &word);
+        const bool known = bench_parse_word(value, searches, 8, &word);
         options->abuffer.search = word;
         return known;
     }

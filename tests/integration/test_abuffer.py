@@ -18,7 +18,7 @@ class Options(Case):
                 ("--abuffer-resolution", "15", "16 to 4096"), ("--abuffer-resolution", "4097", "4096"),
                 ("--abuffer-resolution", "fine", "fine"), ("--abuffer-voxels", "100", "auto, 16, 32, 64, 128, 256"),
                 ("--abuffer-voxels", "512", "auto, 16"), ("--abuffer-voxels", "8", "auto, 16"), ("--abuffer-voxels", "many", "auto, 16"),
-                ("--abuffer-search", "linear2", "auto, dda, linear3, linear1"),
+                ("--abuffer-search", "linear2", "auto, dda, linear3, linear1, voxels3, voxels1, parity3, parity1"),
                 ("--integrator", "photons", "whitted, distributed, raycast, ao, path"), ("--brdf", "phong", "ggx, ward"),
                 ("--ao-distance", "-1", "-1"), ("--ao-falloff", "65", "64"), ("--ao-rays", "0", "256"),
                 ("--ao-rays", "257", "256"), ("--layer-opacity", "0", "from 1e-06 to 1"), ("--layer-opacity", "1.5", "1.5"),
@@ -81,12 +81,13 @@ class Pictures(OneDaemon):
     def test_options_arrive(self):
         digests = {}
         for options in ((), ("--abuffer-search", "auto"), ("--abuffer-search", "dda"), ("--abuffer-search", "linear3"), ("--abuffer-search", "linear1"),
-                        ("--abuffer-voxels", "32"), ("--abuffer-resolution", "200")):
+                        ("--abuffer-search", "voxels3"), ("--abuffer-search", "voxels1"), ("--abuffer-voxels", "32"), ("--abuffer-resolution", "200")):
             digests[options] = self.picture("x", *SMALL, *options)[1]["digest"]
         same = {digests[()], digests["--abuffer-search", "auto"], digests["--abuffer-search", "dda"]}
         self.assertEqual(len(same), 1, "auto is dda, and one picture comes of one request")
         self.assertNotIn(digests["--abuffer-search", "linear3"], same)
-        self.assertNotEqual(digests["--abuffer-search", "linear1"], digests["--abuffer-search", "linear3"])
+        searches = ("linear3", "linear1", "voxels3", "voxels1")
+        self.assertEqual(len({digests["--abuffer-search", search] for search in searches}), len(searches))
         self.assertNotIn(digests["--abuffer-resolution", "200"], same)
 
     def test_voxels_are_chosen_by_the_resolution(self):

@@ -441,7 +441,9 @@ class Videos(OneDaemon, Animations):
     def test_what_makes_no_video_is_refused_before_anything_is_rendered(self):
         for arguments, said in ((["-o", "m.mp4", "--resume"], "--resume"), (["-o", "m.mp4", "--shard", "1/2"], "--shard"),
                                 (["-o", "-", "--format", "png"], "standard output"), (["-o", "m.webm"], "m.webm"),
-                                (["-o", "m.mp4", "--lossless"], ".mkv"), (["-o", "m.mp4", "--quality", "60"], "51")):
+                                (["-o", "m.mp4", "--lossless"], ".mkv"), (["-o", "m.mp4", "--quality", "60"], "51"),
+                                (["-o", "m.gif", "--resume"], "--resume"), (["-o", "m.webp", "--shard", "1/2"], "--shard"),
+                                (["-o", "m.gif", "--lossless"], ".webp"), (["-o", "m.webp", "--quality", "101"], "100")):
             with self.subTest(arguments=arguments):
                 result = self.expect(farlight("animate", self.model, "--frames", "1-2", *arguments,
                                               cwd=self.folder), 2)
@@ -451,15 +453,98 @@ class Videos(OneDaemon, Animations):
         self.assertEqual(self.leftovers(), [])
 
     def test_an_interrupted_video_leaves_nothing(self):
-        child = subprocess.Popen([BIN / "farlight", "animate", self.model, "--frames", "1-500", *SIZE, "-o",
-                                  self.folder / "movie.mp4"], stderr=subprocess.PIPE, text=True)
-        for line in child.stderr:
-            if line.startswith("1 of 500"):
-                break
-        child.send_signal(signal.SIGINT)
-        _, errors = child.communicate(timeout=farlight_test.TIMEOUT_S)
-        self.assertEqual(child.returncode, 130, errors)
-        self.assertEqual(self.leftovers(), [])
+        for name in ("movie.mp4", "movie.gif"):
+            with self.subTest(name=name):
+                child = subprocess.Popen([BIN / "farlight", "animate", self.model, "--frames", "1-500", *SIZE, "--fps", "25",
+                                          "-o", self.folder / name], stderr=subprocess.PIPE, text=True)
+                for line in child.stderr:
+                    if line.startswith("1 of 500"):
+                        break
+                child.send_signal(signal.SIGINT)
+                _, errors = child.communicate(timeout=farlight_test.TIMEOUT_S)
+                self.assertEqual(child.returncode, 130, errors)
+                self.assertEqual(self.leftovers(), [])
+
+
+class MovingPictures(OneDaemon, Animations):
+    """GIF and WebP whose names have no place for a number, beside the PNG files of the same frames."""
+    COUNT = 6
+
+    def pictures(self, **more):
+        """Renders into PNG files and what else is wanted; returns what it said, and their pixels, RGBA."""
+        script = self.write({"model": str(self.model), "frames": f"1-{self.COUNT}", "size": [96, 64], "samples": 1,
+                             "camera": {"orbit": True}, "outputs": ["%d.png", "around.gif"], **more})
+        result = self.expect(farlight("animate", "--script", script), 0)
+        return result, [self.decode(self.folder / f"{n}.png") for n in range(1, self.COUNT + 1)]
+
+    def decode(self, source, data=None):
+        """All pictures of a file that ffmpeg reads, RGBA, one after the other."""
+        return subprocess.run(["ffmpeg", "-v", "error", "-i", source, "-vsync", "passthrough", "-f", "rawvideo", "-pix_fmt", "rgba", "-"],
+                              input=data, check=True, stdout=subprocess.PIPE).stdout
+
+    def test_a_gif_has_every_frame_near_to_its_colours_and_is_shown_for_ever(self):
+        result, pictures = self.pictures(background="#ffffff")
+        self.assertIn("24 frames per second become 25", result.stderr)
+        path = self.folder / "around.gif"
+        self.assertIn(b"NETSCAPE2.0\x03\x01\0\0\0", path.read_bytes())  # 0 times: without end
+        said = subprocess.run(["ffprobe", "-v", "error", "-show_entries", "packet=duration_time", "-of", "csv=p=0", path],
+                              check=True, stdout=subprocess.PIPE, text=True).stdout.split()
+        self.assertEqual([float(duration.strip(",")) for duration in said], [0.04] * self.COUNT)
+        # The dither adds 2 at most, and 255 colours are most of those that this model has.
+        shown = self.decode(path)
+        self.assertEqual(len(shown), sum(map(len, pictures)))
+        for frame, wanted in enumerate(pictures):
+            got = shown[frame * len(wanted):(frame + 1) * len(wanted)]
+            self.assertLess(sum(abs(a - b) for a, b in zip(got, wanted)) / len(wanted), 1, f"frame {frame}")
+
+    def chunks(self, data):
+        """The parts of a RIFF file: names and contents."""
+        while data:
+            size = int.from_bytes(data[4:8], "little")
+            yield data[:4], data[8:8 + size]
+            data = data[8 + size + size % 2:]
+
+    def show(self, canvas, data):
+        """Draws a frame of a WebP file (RFC 9649, section 2.7.1.1); returns its milliseconds."""
+        x, y, width, height, milliseconds = (int.from_bytes(data[at:at + 3], "little") for at in range(0, 15, 3))
+        kind = b"VP8X" + struct.pack("<I4B", 10, 0x10, 0, 0, 0) + data[6:12]  # a file of its own, with alpha
+        pixels = self.decode("-", b"RIFF" + struct.pack("<I", 4 + len(kind) + len(data) - 16) + b"WEBP" + kind + data[16:])
+        is_blended = data[15] & 2 == 0
+        for row in range(height + 1):
+            for column in range(width + 1):
+                pixel = pixels[4 * (row * (width + 1) + column):][:4]
+                if pixel[3] > 0 or not is_blended:
+                    canvas[2 * y + row, 2 * x + column] = pixel
+        return milliseconds, data[15] & 1 and [(2 * y + row, 2 * x + column) for row in range(height + 1) for column in range(width + 1)]
+
+    def test_a_lossless_webp_has_every_pixel_and_its_alpha(self):
+        _, pictures = self.pictures(model=str(bundled_scenes() / "teapot.glb"), outputs=["%d.png", "around.webp"], lossless=True)
+        self.assertLess(min(pictures[0][3::4]), 255)
+        chunks = list(self.chunks((self.folder / "around.webp").read_bytes()[12:]))
+        self.assertEqual([data[4:6] for name, data in chunks if name == b"ANIM"], [b"\0\0"])  # without end
+        frames = [data for name, data in chunks if name == b"ANMF"]
+        self.assertEqual(len(frames), self.COUNT)
+        canvas, times, clear = {}, [], b"\0\0\0\0"
+        for number, (frame, wanted) in enumerate(zip(frames, pictures)):
+            milliseconds, disposed = self.show(canvas, frame)
+            times.append(milliseconds)
+            for at in range(96 * 64):
+                got, right = canvas.get((at // 96, at % 96), clear), wanted[4 * at:4 * at + 4]
+                if got != right and (got[3] or right[3]):
+                    self.fail(f"frame {number}, pixel {at}: {got} in place of {right}")
+            for place in disposed or ():
+                canvas[place] = clear
+        self.assertIn(sum(times), range(1000 * self.COUNT // 24 - 1, 1000 * self.COUNT // 24 + 2), times)
+
+    def test_standard_output_gets_the_same_file(self):
+        for ending in ("gif", "webp"):
+            command = ("animate", self.model, "--frames", "1-3", "--fps", "25", *SIZE, "--samples", "1")
+            result = farlight(*command, "-o", "-", "--format", ending, text=False)
+            self.assertEqual(result.returncode, 0, result.stderr)
+            self.assertNotIn(b"note", result.stderr)  # 25 per second are 4 hundredths
+            path = self.folder / f"around.{ending}"
+            self.expect(farlight(*command, "-o", path), 0)
+            self.assertEqual(result.stdout, path.read_bytes())
 
 
 class Scripts(OneDaemon, Animations):

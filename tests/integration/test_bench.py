@@ -29,7 +29,7 @@ import bench_warp  # noqa: E402  pylint: disable=wrong-import-position
 
 TRACED = ("tracers", "family", "pixels", "rays", "flake", "reach")  # results of `bench tracers`
 PARTS = ("first_picture", "frames", "distributed", "steps", "link", "view", "deadline", "walk", "warp", "tracers", "family", "pixels", "rays", "parallel",
-         "instances", "refit", "flake", "ldc", "abuffer", "rayspace", "quadtree", "reach")
+         "instances", "refit", "flake", "ldc", "abuffer", "sampled", "rayspace", "quadtree", "reach")
 
 
 class Figures(unittest.TestCase):

@@ -36,7 +36,7 @@ TRACERS = [{"TRAVERSE": '"naive/traverse.glsl"', "TRACER_NAIVE": "1", "PACKET_RA
     {"TRAVERSE": '"rayspace/traverse.glsl"', "TRACER_RAYSPACE": "1", "PACKET_RAYS": "1"},
     {"TRAVERSE": '"quadtree/traverse.glsl"', "TRACER_QUADTREE": "1", "PACKET_RAYS": "1"}] + [
     {"TRAVERSE": '"abuffer/traverse.glsl"', "TRACER_ABUFFER": "1", "PACKET_RAYS": "1", **search}
-    for search in ({}, {"ABUFFER_STEPS": "3"}, {"ABUFFER_STEPS": "1"})] + [
+    for search in ({}, {"ABUFFER_STEPS": "3"}, {"ABUFFER_STEPS": "1"}, {"ABUFFER_STEPS": "1", "ABUFFER_PARITY": "1"})] + [
     {"TRAVERSE": f'"svo/{traversal}.glsl"', "TRACER_SVO": "1", "PACKET_RAYS": "1", **tree}
     for traversal, tree in (("traverse", {"SVO_TOP_SHIFT": "8"}), ("tile_traverse", {"SVO_LEVELS": "10"}))]
 CHOICES = {

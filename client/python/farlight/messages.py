@@ -396,6 +396,10 @@ class AbufferSearch(Word):
     DDA = 1  # texel by texel: the most exact
     LINEAR3 = 2  # in three steps, then by bisection
     LINEAR1 = 3  # in one step, then by bisection: the fastest, for soft light
+    VOXELS3 = 4  # as linear3, in steps of whole voxels, as in the paper: thin bodies are missed
+    VOXELS1 = 5  # as linear1, likewise
+    PARITY3 = 6
+    PARITY1 = 7  # as voxels1, likewise
 
 
 class RayspaceMode(Word):
@@ -2925,19 +2929,21 @@ class VideoBegin(Message):
     frame_end; all of this request, in order, all of one size) become a video; answered by video_begun, or by error
     here or later, after which nothing more of the request is answered and no file is left
 
-    quality: as the constant rate factor of x264: a lower number is better; 0: 18
-    lossless: 1: every pixel as it is; not in MP4
-    frames_per_second: 23.976 means 24000/1001, likewise 29.97 and so on
-    path: MP4 or MKV by its ending; written under a temporary name and renamed
+    quality: as the constant rate factor of x264, 1 to 51: a lower number is better; of WebP 1 to 100: a higher number
+        is better; 0: 18 or 90
+    lossless: 1: every pixel as it is; not in MP4 and GIF
+    frames_per_second: 23.976 means 24000/1001, likewise 29.97 and so on; in GIF to the nearest hundredth of a second
+    path: MP4, MKV, WebP or GIF by its ending; written under a temporary name and renamed
     format: the ending to assume if the path has none; may be empty
-    codec: h264, mpeg4 or ffv1; empty: ffv1 if lossless, else h264 if there is an encoder for it, else mpeg4
+    codec: of MP4 and MKV, h264, mpeg4 or ffv1; empty: ffv1 if lossless, else h264 if there is an encoder for it, else
+        mpeg4
     model: for the metadata
     """
     TYPE: ClassVar[int] = 0x8320
     SENDER: ClassVar[str] = "local"
     NAME: ClassVar[str] = "video_begin"
     FIELDS: ClassVar[tuple[Field, ...]] = (
-        _f.whole("quality", "I", 0, 51),
+        _f.whole("quality", "I", 0, 100),
         _f.whole("lossless", "I", 0, 1),
         _f.real("frames_per_second", 0.001, 1000.0),
         _f.text("path", 4096),
@@ -2992,7 +2998,7 @@ class VideoEnd(Message):
 class VideoWritten(Message):
     """video writer to client: the file is complete
 
-    width: pixels of the video: even, unless it is lossless
+    width: pixels of the video: even, unless it is lossless, WebP or GIF
     height: pixels
     size_bytes: of the file
     """

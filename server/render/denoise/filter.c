@@ -41,7 +41,7 @@ static uint64_t rows_max(const struct render_context *context, const struct pict
 }
 
 static bool reserve_strip(struct denoise_filter *filter, struct render_context *context, uint32_t width,
-                          struct error *error)
+                          bool has_motion, struct error *error)
 {
     struct gpu_device *device = context->device;
     const size_t pixels = (size_t)width * filter->strip_rows;
@@ -49,14 +49,17 @@ static bool reserve_strip(struct denoise_filter *filter, struct render_context *
     for (size_t i = 0; i < sizeof(lights) / sizeof(*lights); i++)
         if (!gpu_buffer_reserve(device, lights[i], pixels * sizeof(uvec4), error))
             return false;
-    return gpu_buffer_reserve(device, &filter->guides, pixels * 2 * sizeof(uint32_t), error) &&
+    const size_t motions = has_motion ? pixels * 2 * sizeof(uint32_t) : 0;
+    return gpu_buffer_reserve(device, &filter->motions, motions, error) &&
+           gpu_buffer_reserve(device, &filter->guides, pixels * 2 * sizeof(uint32_t), error) &&
            gpu_buffer_reserve(device, &filter->slopes, pixels * sizeof(uint32_t), error) &&
            gpu_buffer_reserve(device, &filter->risks, pixels * 2 * sizeof(float), error);
 }
 
 /* All of the picture where it fits. */
-static bool begin_strip(struct denoise_filter *filter, struct denoise_history *history,
-                        struct render_context *context, const struct picture *picture, struct error *error)
+static bool begin_strip(struct denoise_filter *filter, const struct denoise_sums *sums,
+                        struct denoise_history *history, struct render_context *context,
+                        const struct picture *picture, struct error *error)
 {
     const uint64_t most = rows_max(context, picture);
     filter->own_row = filter->own_end;
@@ -70,8 +73,8 @@ static bool begin_strip(struct denoise_filter *filter, struct denoise_history *h
     filter->strip_row = filter->own_row > EDGE_ROWS ? filter->own_row - EDGE_ROWS : 0;
     const uint64_t end = (uint64_t)filter->own_end + EDGE_ROWS;
     filter->strip_rows = (end < picture->height ? (uint32_t)end : picture->height) - filter->strip_row;
-    return reserve_strip(filter, context, picture->width, error) &&
-           denoise_history_reserve(history, context, fits, error);
+    return reserve_strip(filter, context, picture->width, sums->has_motion, error) &&
+           denoise_history_reserve(history, context, fits && !sums->follows, sums->has_motion, error);
 }
 
 static void bind_light(struct render_context *context, struct gpu_buffer *buffer, unsigned unit)
@@ -96,6 +99,8 @@ static void bind_sums(struct denoise_sums *sums, const struct render_context *co
     gpu_buffer_bind_storage(denoise_sums_band(sums, DENOISE_SUM_HALF, band), BIND_DENOISE_HALF);
     gpu_buffer_bind_storage(denoise_sums_band(sums, DENOISE_SUM_ALBEDO, band), BIND_DENOISE_ALBEDO);
     gpu_buffer_bind_storage(denoise_sums_band(sums, DENOISE_SUM_NORMAL, band), BIND_DENOISE_NORMAL);
+    if (sums->has_motion)
+        gpu_buffer_bind_storage(denoise_sums_band(sums, DENOISE_SUM_MOTION, band), BIND_DENOISE_MOTION);
     gpu_uniform_uint(program, "band_row", picture_band_first_row(picture, band));
     gpu_uniform_uint(program, "sample_count", picture->samples);
     if (context->tile_samples) {
@@ -106,18 +111,20 @@ static void bind_sums(struct denoise_sums *sums, const struct render_context *co
     gpu_uniform_float(program, "strength", denoise_strength(&context->request, picture->samples));
 }
 
-static void bind_take(struct denoise_filter *filter, const struct denoise_history *history,
-                      const struct gpu_program *program)
+static void bind_take(struct denoise_filter *filter, const struct denoise_sums *sums)
 {
-    gpu_uniform_uint(program, "notes_moved", history->things_moved);
     gpu_buffer_bind_storage(&filter->guides, BIND_DENOISE_GUIDE);
     gpu_buffer_bind_storage(&filter->first, BIND_DENOISE_OUT);
+    if (sums->has_motion)
+        gpu_buffer_bind_storage(&filter->motions, BIND_DENOISE_OUT_TOO);
 }
 
-static void bind_reproject(struct denoise_filter *filter, struct denoise_history *history,
-                           struct render_context *context, const struct picture *picture,
-                           const struct gpu_program *program)
+static void bind_reproject(struct denoise_filter *filter, const struct denoise_sums *sums,
+                           struct denoise_history *history, struct render_context *context,
+                           const struct picture *picture, const struct gpu_program *program)
 {
+    if (sums->has_motion)
+        gpu_buffer_bind_texels(context->device, &filter->motions, UNIT_DENOISE_MOTION, GL_RG32UI);
     bind_light(context, &filter->first, UNIT_DENOISE_LIGHT);
     bind_guides(filter, context);
     gpu_buffer_bind_storage(&filter->levels[0], BIND_DENOISE_OUT);
@@ -201,10 +208,10 @@ static void bind_pass(struct denoise_filter *filter, struct denoise_sums *sums, 
     switch (filter->pass) {
     case PASS_TAKE:
         bind_sums(sums, context, picture, program, band);
-        bind_take(filter, history, program);
+        bind_take(filter, sums);
         break;
     case PASS_REPROJECT:
-        bind_reproject(filter, history, context, picture, program);
+        bind_reproject(filter, sums, history, context, picture, program);
         break;
     case PASS_NOISE:
         bind_noise(filter, history, context, picture, program);
@@ -253,8 +260,9 @@ static bool dispatch(struct denoise_filter *filter, struct denoise_sums *sums, s
 {
     const char *shader = shader_of(filter->pass);
     const bool gives_reprojected = filter->pass == PASS_GIVE && history->is_written;
-    const struct gpu_program *program = has_band(filter) ? denoise_use(context, shader, gives_reprojected, error)
-                                                         : context_use(context, shader, error);
+    const bool asks_sums = has_band(filter) || filter->pass == PASS_REPROJECT;
+    const struct gpu_program *program = asks_sums ? denoise_use(context, sums, shader, gives_reprojected, error)
+                                                  : context_use(context, shader, error);
     if (!program)
         return false;
     context_span_begin(context, STAGE_RESOLVE);
@@ -280,7 +288,7 @@ bool denoise_step(struct denoise_filter *filter, struct denoise_sums *sums, stru
                   struct render_context *context, const struct picture *picture, bool *done, struct error *error)
 {
     *done = false;
-    if (filter->pass == 0 && filter->row == 0 && !begin_strip(filter, history, context, picture, error))
+    if (filter->pass == 0 && filter->row == 0 && !begin_strip(filter, sums, history, context, picture, error))
         return false;
     uint32_t begin, end;
     rows_of_pass(filter, &begin, &end);
@@ -306,13 +314,14 @@ uint64_t denoise_filter_device_bytes(const struct denoise_filter *filter)
 {
     return filter->notes.capacity_bytes + filter->guides.capacity_bytes + filter->slopes.capacity_bytes +
            filter->first.capacity_bytes + filter->wider.capacity_bytes + filter->levels[0].capacity_bytes +
-           filter->levels[1].capacity_bytes + filter->risks.capacity_bytes;
+           filter->levels[1].capacity_bytes + filter->risks.capacity_bytes + filter->motions.capacity_bytes;
 }
 
 void denoise_filter_finish(struct denoise_filter *filter, struct gpu_device *device)
 {
-    struct gpu_buffer *const all[] = {&filter->notes, &filter->guides,    &filter->slopes,    &filter->first,
-                                      &filter->wider, &filter->levels[0], &filter->levels[1], &filter->risks};
+    struct gpu_buffer *const all[] = {&filter->notes,     &filter->guides,    &filter->slopes,
+                                      &filter->motions,   &filter->first,     &filter->wider,
+                                      &filter->levels[0], &filter->levels[1], &filter->risks};
     for (size_t i = 0; i < sizeof(all) / sizeof(*all); i++)
         gpu_buffer_finish(device, all[i]);
 }

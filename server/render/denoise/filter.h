@@ -9,7 +9,8 @@
 
 struct denoise_filter {
     struct gpu_buffer notes;                   /* of the slice in hand */
-    struct gpu_buffer guides, slopes;          /* of the first hits */
+    struct gpu_buffer guides, slopes;          /* of what is seen */
+    struct gpu_buffer motions;                 /* where the sums have them */
     struct gpu_buffer first, wider, levels[2]; /* halves of the light: at first; filtered; as it was chosen */
     struct gpu_buffer risks;
     /* progress */

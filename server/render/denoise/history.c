@@ -22,7 +22,6 @@ static bool is_followed(const struct denoise_kept *before, const struct denoise_
     struct frame_request same = before->request;
     same.seed = now->request.seed;
     const bool posed = before->revision == now->revision && now->request.history == HISTORY_MOVING &&
-                       now->request.samples <= DENOISE_MOVED_SAMPLES_MAX &&
                        denoise_places_match(&before->places, &now->places);
     return before->whole && (before->showing == now->showing || posed) &&
            frame_request_same_radiance(&same, &now->request);
@@ -31,8 +30,8 @@ static bool is_followed(const struct denoise_kept *before, const struct denoise_
 static bool upload_moved(struct denoise_history *history, struct render_context *context,
                          const struct denoise_kept *before, const struct denoise_kept *now, struct error *error)
 {
-    const size_t bytes = now->places.count * sizeof(uint32_t);
-    uint32_t *moved = malloc(bytes);
+    const size_t bytes = now->places.count * sizeof(float[12]);
+    float(*moved)[12] = malloc(bytes);
     if (!moved)
         return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for what has moved");
     denoise_places_compare(&before->places, &now->places, moved);
@@ -75,13 +74,13 @@ struct gpu_buffer *denoise_history_moved(struct denoise_history *history)
 }
 
 bool denoise_history_reserve(struct denoise_history *history, struct render_context *context, bool fits,
-                             struct error *error)
+                             bool has_motion, struct error *error)
 {
     const struct frame_request *request = &context->request;
     struct denoise_kept *now = &history->kept[history->now];
     now->uniforms = context->uniforms;
     history->is_written = history->is_written && fits;
-    history->is_used = history->is_used && fits;
+    history->is_used = history->is_used && fits && (has_motion || !history->things_moved);
     const size_t bytes = (size_t)request->width * request->height * sizeof(uvec4);
     return !history->is_written || gpu_buffer_reserve(context->device, &now->pixels, bytes, error);
 }

@@ -26,7 +26,7 @@ struct denoise_history {
     bool is_used;    /* the same */
     uint32_t moving; /* frames so far: each has noise of its own */
     bool is_moving;  /* the frame in hand, or the last one, is one of them */
-    /* uint an instance, 1: it has moved since the picture before; nothing: none has. */
+    /* DENOISE_MOVED_TEXELS an instance, where some have moved since the picture before. */
     struct gpu_buffer moved;
     bool things_moved; /* it has something */
 };
@@ -35,11 +35,12 @@ struct denoise_history {
  * follows the one before that. */
 bool denoise_history_begin(struct denoise_history *history, struct render_context *context, uint64_t showing,
                            bool goes_on, struct error *error);
-/* NULL: nothing has moved. */
+/* How things have moved since the picture before; NULL: not at all. */
 struct gpu_buffer *denoise_history_moved(struct denoise_history *history);
-/* `fits`: the picture is filtered in one strip; others have no history. False: there is no memory. */
+/* `fits`: the picture is filtered in one strip, and the guides are those of first hits; others have no history.
+ * `has_motion`: of each pixel it is known how it has moved. False: there is no memory. */
 bool denoise_history_reserve(struct denoise_history *history, struct render_context *context, bool fits,
-                             struct error *error);
+                             bool has_motion, struct error *error);
 /* For the pass that reprojects, of a picture of so many samples. */
 void denoise_history_bind(struct denoise_history *history, struct render_context *context,
                           const struct gpu_program *program, uint32_t samples);

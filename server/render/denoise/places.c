@@ -1,6 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 #include "render/denoise/places.h"
 
+#include "scene/affine.h"
+#include "shared/denoise.h"
+
 #include <stdlib.h>
 #include <string.h>
 
@@ -32,13 +35,23 @@ bool denoise_places_match(const struct denoise_places *a, const struct denoise_p
     return a->count > 0 && a->count == b->count;
 }
 
-void denoise_places_compare(const struct denoise_places *before, const struct denoise_places *now, uint32_t *moved)
+static void lead_back(const struct denoise_place *before, const struct denoise_place *now,
+                      float before_from_now[12])
 {
-    for (uint32_t i = 0; i < now->count; i++) {
-        const struct denoise_place *a = &before->instances[i], *b = &now->instances[i];
-        moved[i] = a->deformed_revision != b->deformed_revision ||
-                   memcmp(a->world_from_object, b->world_from_object, sizeof(a->world_from_object)) != 0;
-    }
+    float object_from_now[12];
+    affine_identity(before_from_now);
+    if (before->deformed_revision != now->deformed_revision ||
+        !affine_invert(object_from_now, now->world_from_object))
+        before_from_now[3] = DENOISE_ANEW;
+    else if (memcmp(before->world_from_object, now->world_from_object, sizeof(now->world_from_object)) != 0)
+        affine_multiply(before_from_now, before->world_from_object, object_from_now);
+}
+
+void denoise_places_compare(const struct denoise_places *before, const struct denoise_places *now,
+                            float (*before_from_now)[12])
+{
+    for (uint32_t i = 0; i < now->count; i++)
+        lead_back(&before->instances[i], &now->instances[i], before_from_now[i]);
 }
 
 void denoise_places_finish(struct denoise_places *places)

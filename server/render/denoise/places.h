@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Where instances were in a picture, so that the next one knows which of them have moved since, or have another
+/* Where instances were in a picture, so that the next one knows how they have moved since, and which have another
  * shape: while clips play. */
 #ifndef FARLIGHT_RENDER_DENOISE_PLACES_H
 #define FARLIGHT_RENDER_DENOISE_PLACES_H
@@ -20,9 +20,10 @@ struct denoise_places {
 void denoise_places_note(struct denoise_places *places, const struct gpu_scene *scene);
 /* Whether both are of the same instances. */
 bool denoise_places_match(const struct denoise_places *a, const struct denoise_places *b);
-/* Of those that match, for each instance 1 where it has moved, else 0: to `moved`. */
+/* Of those that match: of each instance the matrix that leads from where a point of it is to where it was. Of one
+ * that has another shape it leads as far as DENOISE_ANEW. */
 void denoise_places_compare(const struct denoise_places *before, const struct denoise_places *now,
-                            uint32_t *moved);
+                            float (*before_from_now)[12]);
 void denoise_places_finish(struct denoise_places *places);
 
 #endif

@@ -5,12 +5,14 @@
 #define FARLIGHT_RENDER_DENOISE_SUMS_H
 
 #include "render/context.h"
+#include "render/denoise/history.h"
 #include "render/picture.h"
 
 enum denoise_sum {
     DENOISE_SUM_HALF,
     DENOISE_SUM_ALBEDO,
     DENOISE_SUM_NORMAL,
+    DENOISE_SUM_MOTION, /* where has_motion; else nothing */
     DENOISE_SUM_RESULT, /* of the denoised picture, as many samples; no sum of slices */
     DENOISE_SUM_COUNT
 };
@@ -18,6 +20,10 @@ enum denoise_sum {
 struct denoise_sums {
     struct gpu_buffer *bands; /* owned; sum after sum, as the picture's bands; vec4 a slot */
     uint32_t band_count;
+    /* Notes say what is seen in smooth mirrors and behind glass. Not where pictures follow one another: what each
+     * sample meets there differs from one to the next. */
+    bool follows;
+    bool has_motion; /* that, or something has moved since the picture before */
 };
 
 /* Whether the frame has noise, and is to lose it: of those that trace no rays at random, and of pictures made from
@@ -29,15 +35,18 @@ bool denoise_notes_samples(const struct render_context *context);
 float denoise_strength(const struct frame_request *request, uint32_t samples);
 /* One of the programs that ask how many samples a pixel has: its tile may have stopped. `reprojected`: the light
  * of the picture has that of pictures before in it. */
-const struct gpu_program *denoise_use(struct render_context *context, const char *shader, bool reprojected,
-                                      struct error *error);
+const struct gpu_program *denoise_use(struct render_context *context, const struct denoise_sums *sums,
+                                      const char *shader, bool reprojected, struct error *error);
 /* Behind picture_begin(): reserves the sums, and clears them unless the frame goes on. */
 bool denoise_sums_begin(struct denoise_sums *sums, struct render_context *context, const struct picture *picture,
-                        uint32_t samples_before, struct error *error);
-/* The context has hits of a new slice: notes what they are. `moved`: of each instance, whether it has moved since
- * the picture before; NULL: none has. Inside no span. */
-bool denoise_note(struct gpu_buffer *notes, struct gpu_buffer *moved, struct render_context *context,
-                  struct error *error);
+                        uint32_t samples_before, const struct denoise_history *history, struct error *error);
+/* The context has hits of a new slice: notes what they are. `moved`: see denoise_history_moved(). Inside no span.
+ */
+bool denoise_note(const struct denoise_sums *sums, struct gpu_buffer *notes, struct gpu_buffer *moved,
+                  struct render_context *context, struct error *error);
+/* It has those of the rays that these have sent on: of what is seen in mirrors and through glass they say more. */
+bool denoise_follow(const struct denoise_sums *sums, struct gpu_buffer *notes, struct gpu_buffer *moved,
+                    struct render_context *context, struct error *error);
 /* Adds the current slice. Call it once the slice cannot be repeated, but on the device. */
 bool denoise_accumulate(struct denoise_sums *sums, struct gpu_buffer *notes, struct render_context *context,
                         const struct picture *picture, struct error *error);

@@ -222,6 +222,7 @@ bool abuffer_build_begin(struct abuffer_builder *builder, struct abuffer_store *
         .texel_count = 3 * tiles_along * tiles_along * ABUFFER_TILE_TEXELS,
     };
     store->without_steep = !abuffer_is_linear(options);
+    store->whole_voxels = abuffer_steps_of_voxels(options);
     store->sample_count = 0;
     store->depth_max = 0;
     builder->passes = 0;

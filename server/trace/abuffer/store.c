@@ -29,7 +29,8 @@ void abuffer_store_finish(struct abuffer_store *store)
 
 bool abuffer_has_subvoxels(const struct abuffer_store *store)
 {
-    return store->voxels_along <= ABUFFER_SUBVOXELS_VOXELS_MAX && 4 * store->voxels_along <= store->resolution;
+    return !store->whole_voxels && store->voxels_along <= ABUFFER_SUBVOXELS_VOXELS_MAX &&
+           4 * store->voxels_along <= store->resolution;
 }
 
 uint64_t abuffer_store_bytes(const struct abuffer_store *store)

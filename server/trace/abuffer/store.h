@@ -17,6 +17,7 @@ struct abuffer_store {
     uint32_t resolution_wanted; /* it is lower where there would be too many samples */
     uint32_t voxels_along;      /* V */
     bool without_steep;         /* no image has samples that are steep in it: for searches by planes */
+    bool whole_voxels;          /* voxels do not know their occupied parts: for steps of voxels */
     uint64_t sample_count;
     uint32_t depth_max; /* samples of the texel that has most */
     uint32_t drawn_count;

@@ -34,9 +34,36 @@ bool abuffer_surfaces(struct abuffer_store *store, const struct gpu_scene *scene
     return true;
 }
 
+/* What a linear search has for ABUFFER_STEPS; NULL: it is by DDA. */
+static const char *steps_of(const struct tracer_options *options)
+{
+    switch (options->abuffer.search) {
+    case ABUFFER_SEARCH_LINEAR3:
+    case ABUFFER_SEARCH_VOXELS3:
+    case ABUFFER_SEARCH_PARITY3:
+        return "3";
+    case ABUFFER_SEARCH_LINEAR1:
+    case ABUFFER_SEARCH_VOXELS1:
+    case ABUFFER_SEARCH_PARITY1:
+        return "1";
+    default:
+        return NULL;
+    }
+}
+
+static bool is_by_parity(const struct tracer_options *options)
+{
+    return options->abuffer.search == ABUFFER_SEARCH_PARITY3 || options->abuffer.search == ABUFFER_SEARCH_PARITY1;
+}
+
 bool abuffer_is_linear(const struct tracer_options *options)
 {
-    return options->abuffer.search == ABUFFER_SEARCH_LINEAR3 || options->abuffer.search == ABUFFER_SEARCH_LINEAR1;
+    return steps_of(options) != NULL;
+}
+
+bool abuffer_steps_of_voxels(const struct tracer_options *options)
+{
+    return options->abuffer.search >= ABUFFER_SEARCH_VOXELS3 && options->abuffer.search <= ABUFFER_SEARCH_PARITY1;
 }
 
 /* With N texels and V voxels along a side, and D samples in the longest list: a ray passes 12 V parts of voxels,
@@ -54,13 +81,14 @@ uint64_t abuffer_rounds_of_a_ray(const struct abuffer_store *store, const struct
 bool abuffer_intersect(struct abuffer_store *store, struct gpu_scene *scene, const struct ray_range *rays,
                        const struct tracer_options *options, struct error *error)
 {
-    struct gpu_define defines[5] = {{"TRACER_ABUFFER", "1"}};
+    struct gpu_define defines[6] = {{"TRACER_ABUFFER", "1"}};
     size_t n = 1;
     if (store->resolution == 0)
         defines[n++] = (struct gpu_define){"ABUFFER_EMPTY", "1"};
     if (abuffer_is_linear(options))
-        defines[n++] =
-            (struct gpu_define){"ABUFFER_STEPS", options->abuffer.search == ABUFFER_SEARCH_LINEAR3 ? "3" : "1"};
+        defines[n++] = (struct gpu_define){"ABUFFER_STEPS", steps_of(options)};
+    if (is_by_parity(options))
+        defines[n++] = (struct gpu_define){"ABUFFER_PARITY", "1"};
     if (options->bench.abuffer_count_steps && rays->wave->kind == WAVE_CLOSEST)
         defines[n++] = (struct gpu_define){"ABUFFER_COUNT_STEPS", "1"};
     const struct trace_program_source source = {

@@ -22,5 +22,7 @@ bool abuffer_surfaces(struct abuffer_store *store, const struct gpu_scene *scene
 
 /* Whether intersections are searched in steps, by the winding behind samples in all images. */
 bool abuffer_is_linear(const struct tracer_options *options);
+/* Whether these steps are of whole voxels, as in the paper, and not of voxels' occupied parts. */
+bool abuffer_steps_of_voxels(const struct tracer_options *options);
 
 #endif

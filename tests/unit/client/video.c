@@ -256,7 +256,9 @@ TEST(the_same_frames_make_the_same_file)
     static const struct fl_video_options kinds[] = {{.format = "mp4"},
                                                     {.format = "mkv"},
                                                     {.format = "mkv", .lossless = true},
-                                                    {.format = "mp4", .codec = "mpeg4"}};
+                                                    {.format = "mp4", .codec = "mpeg4"},
+                                                    {.format = "webp"},
+                                                    {.format = "gif"}};
     need(false);
     for (size_t i = 0; i < sizeof(kinds) / sizeof(kinds[0]); i++) {
         uint8_t *bytes[2];
@@ -403,13 +405,16 @@ TEST(an_unwritable_output_is_reported_before_the_first_frame)
     } rows[] = {
         {"missing/a.mp4", {0}, "No such file", "", NULL},
         {"", {.format = "mp4"}, "Is a directory", "", NULL},
-        {"a.avi", {0}, "the ending is not that of a video format", ".mp4 or .mkv", NULL},
+        {"a.avi", {0}, "the ending is not that of a video format", ".mp4, .mkv, .webp or .gif", NULL},
         {"a.mp4", {.lossless = true}, "an MP4 file does not hold FFV1", ".mkv", NULL},
         {"a.mkv", {.lossless = true, .codec = "h264"}, "h264 is not lossless, which is asked", "leave", NULL},
         {"a.mkv", {.codec = "ffv1"}, "ffv1 is lossless, which is not asked for", "ask for lossless", NULL},
         {"a.mp4", {.codec = "h264_v4l2m2m"}, "is not a codec that can be written", "h264, mpeg4", NULL},
         {"a.mp4", {.frames_per_second = 2000}, "not within 0.001 .. 1000", "", "frames_per_second"},
-        {"a.mp4", {.quality = 52}, "not within 0 .. 51", "", "quality"},
+        {"a.mp4", {.quality = 52}, "1 (best) to 51", "", NULL},
+        {"a.webp", {.quality = 101}, "not within 0 .. 100", "", "quality"},
+        {"a.webp", {.codec = "h264"}, "written in one way only", "leave", NULL},
+        {"a.gif", {.lossless = true}, "a GIF file has 256 colours", ".webp", NULL},
         {"\xff.mp4", {0}, "no UTF-8", "", "path"}};
     need(false);
     for (size_t i = 0; i < sizeof(rows) / sizeof(rows[0]); i++) {

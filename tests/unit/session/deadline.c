@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* What a view goes without so that it is rendered at the rate that it asks for, with a renderer that is simulated:
  * a part that every frame takes, one that grows with the area, and bounces that do. */
-#include "session/pacing.h"
+#include "base/clock.h"
+#include "session/guess.h"
 #include "tests/harness/test.h"
 
 #define MS UINT64_C(1000000)
@@ -153,6 +154,52 @@ TEST(the_first_that_moves_is_right_where_pictures_at_rest_were_seen)
     pacing_learn_waves(&pacing, &full, took_ns, wave_ns, 0);
     follow(&pacing, &heavy, 30, &longest_ns, &changes);
     assert_true(longest_ns <= DEADLINE_NS);
+}
+
+static void add_spans(struct stage_times *times, enum stage stage, uint32_t wave, uint64_t first_ns, uint64_t ns)
+{
+    for (uint32_t slice = 0; slice < 8; slice++)
+        stage_times_add(times, stage, CLOCK_CPU, wave, clock_now_ns(), slice == 0 ? first_ns : ns);
+}
+
+/* It compiled for seconds, and built, before it rendered for half of one. */
+TEST(the_first_that_moves_is_right_where_one_picture_at_rest_was_seen)
+{
+    struct pacing pacing = begin(1);
+    struct renderer heavy = {.fixed_ns = 10 * MS, .area_ns = 300 * MS, .bounce_ns = 200 * MS};
+    const struct pacing_advice full = {.scale_32nds = PACING_SCALE_FULL, .samples = 1};
+    uint64_t wave_ns[PACING_WAVES] = {0}, guessed_ns[PACING_WAVES] = {0}, longest_ns, bounces_ns = 0;
+    unsigned changes;
+    struct stage_times times;
+    const uint64_t took_ns = render(&heavy, &full, wave_ns);
+    stage_times_begin(&times);
+    stage_times_add(&times, STAGE_BUILD, CLOCK_CPU, 0, clock_now_ns(), 3000 * MS);
+    for (uint32_t wave = 1; wave <= 8; wave++) {
+        bounces_ns += wave_ns[wave];
+        add_spans(&times, STAGE_TRACE, wave, 1000 * MS, wave_ns[wave] / 8);
+    }
+    add_spans(&times, STAGE_SHADE, 0, 1000 * MS, (took_ns - bounces_ns) / 8);
+    const uint64_t guess_ns = guess_render_ns(&times, guessed_ns);
+    assert_in_range(guess_ns, took_ns - 100, took_ns); /* nanoseconds that divisions have lost */
+    pacing_guess_waves(&pacing, &full, guess_ns, guessed_ns);
+    follow(&pacing, &heavy, 30, &longest_ns, &changes);
+    assert_true(longest_ns <= DEADLINE_NS);
+}
+
+/* One that is a hundred times too high costs the frames until a better step has fitted eight times, no more. */
+TEST(a_guess_counts_until_something_is_known)
+{
+    struct pacing pacing = begin(1);
+    struct renderer light = {.fixed_ns = MS, .area_ns = 20 * MS, .bounce_ns = 10 * MS};
+    const struct pacing_advice full = {.scale_32nds = PACING_SCALE_FULL, .samples = 1};
+    const uint64_t unknown[PACING_WAVES] = {0};
+    uint64_t longest_ns;
+    unsigned changes;
+    pacing_guess_waves(&pacing, &full, 3000 * MS, unknown);
+    struct pacing_advice advice = follow(&pacing, &light, 1, &longest_ns, &changes);
+    assert_int_equal(advice.scale_32nds, 8);
+    advice = follow(&pacing, &light, 8, &longest_ns, &changes);
+    assert_int_equal(advice.scale_32nds, PACING_SCALE_FULL);
 }
 
 TEST(without_a_deadline_bounces_stay)

@@ -24,8 +24,13 @@ static const struct form {
     {"dda", {.abuffer = {.search = ABUFFER_SEARCH_DDA}}},
     {"linear3", {.abuffer = {.search = ABUFFER_SEARCH_LINEAR3}}},
     {"linear1", {.abuffer = {.search = ABUFFER_SEARCH_LINEAR1}}},
+    {"voxels3", {.abuffer = {.search = ABUFFER_SEARCH_VOXELS3}}},
+    {"voxels1", {.abuffer = {.search = ABUFFER_SEARCH_VOXELS1}}},
+    {"parity3", {.abuffer = {.search = ABUFFER_SEARCH_PARITY3}}},
+    {"parity1", {.abuffer = {.search = ABUFFER_SEARCH_PARITY1}}},
 };
-enum { DDA, LINEAR3, LINEAR1, FORM_COUNT };
+/* Those before FORM_COUNT read one structure; the others one of whole voxels. */
+enum { DDA, LINEAR3, LINEAR1, FORM_COUNT, VOXELS3 = FORM_COUNT, VOXELS1, PARITY3, PARITY1, FORMS_END };
 
 struct fixture {
     struct scene *scene;

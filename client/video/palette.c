@@ -1,0 +1,20 @@
+/* SPDX-License-Identifier: MIT */
+#include "palette.h"
+#include "helper/module.h"
+
+#include <stdio.h>
+
+static const struct palette_maker *maker;
+static char why_none[256] = "cannot be done: this program was started without --gif";
+
+void palette_load(void)
+{
+    maker = module_load("farlight-palette.so", "palette_maker", why_none, sizeof(why_none));
+}
+
+const struct palette_maker *palette_loaded(char *reason, size_t reason_bytes)
+{
+    if (!maker)
+        snprintf(reason, reason_bytes, "%s", why_none);
+    return maker;
+}
