@@ -62,6 +62,7 @@ EXPORT_PKGS := libpng OpenEXR libseccomp
 IMAGES_PKGS := OpenImageIO libtiff-4 libjxl
 VIDEO_PKGS := libavformat libavcodec libavutil libseccomp
 PALETTE_PKGS := libavfilter libavutil
+WEB_PKGS := libwebsockets
 VIEWER_PKGS := sdl2 SDL2_ttf libavcodec libswscale libavutil
 TEST_PKGS := cmocka
 # pkg-config is only asked when something is built.
@@ -99,6 +100,7 @@ EXPORT_CXX := $(filter-out $(IMAGES_CXX),$(call sources,client/output,cpp))
 PALETTE_C := client/video/palette_library.c
 VIDEO_C := $(filter-out $(PALETTE_C),$(call sources,client/video,c))
 VIEWER_C := $(call sources,client/viewer,c)
+WEB_C := $(call sources,client/web,c)
 SHADERS := $(patsubst shaders/%,%,$(call sources,shaders,h glsl comp vert geom frag))
 # make EXTRA_TRACER=FOLDER B=build/OTHER builds the product with one more tracer: its rows are FOLDER/tracers.def, its C
 # FOLDER/*.c, its shaders FOLDER/shaders/, and its row of the contract suite FOLDER/row.c.
@@ -131,10 +133,12 @@ IMPORT_OBJ := $(call obj,$(IMPORT_C) $(IMPORT_CXX)) $(COMMON_OBJ) $(B)/helper.a
 EXPORT_OBJ := $(call obj,$(EXPORT_C) $(EXPORT_CXX)) $(B)/helper.a
 VIDEO_OBJ := $(call obj,$(VIDEO_C) client/lib/rate.c protocol/pixels/ycbcr.c) $(B)/helper.a
 
-# The viewer takes the command line as render does.
-VIEWER_OBJ := $(call obj,$(VIEWER_C) $(addprefix client/cli/,image_path.c interrupt.c job_complete.c job_fields.c job_options.c \
+# The viewer takes the command line as render does; the gateway takes of it which daemon is meant.
+COMMAND_LINE_OBJ := $(call obj,$(addprefix client/cli/,daemon.c image_path.c interrupt.c job_complete.c job_fields.c job_options.c \
     job_views.c key.c models.c parse.c retry.c talk.c \
     watch.c))
+VIEWER_OBJ := $(call obj,$(VIEWER_C)) $(COMMAND_LINE_OBJ)
+WEB_OBJ := $(call obj,$(WEB_C)) $(COMMAND_LINE_OBJ)
 
 # The library for others' programs: position-independent, only what farlight.h declares is visible.
 SONAME := libfarlight.so.$(firstword $(subst ., ,$(VERSION)))
@@ -143,7 +147,7 @@ PUBLIC_HEADERS := client/lib/farlight.h client/warp/warp.h $(addprefix protocol/
 LIB_PIC := $(patsubst %.c,$(B)/pic/%.o,$(LIB_SRC) $(EDIT_SRC) $(WARP_SRC) $(PROTOCOL_SRC) $(SEALED_SRC) $(PIXELS_SRC) $(COMMON_SRC))
 
 MODULES := $(B)/farlight-textures.so $(B)/farlight-assimp.so $(B)/farlight-images.so $(B)/farlight-palette.so
-PROGRAMS := $(B)/farlightd $(B)/farlight $(B)/farlight-import $(B)/farlight-export $(B)/farlight-video $(B)/farlight-view
+PROGRAMS := $(B)/farlightd $(B)/farlight $(B)/farlight-import $(B)/farlight-export $(B)/farlight-video $(B)/farlight-view $(B)/farlight-web
 
 .PHONY: all
 all: $(PROGRAMS) $(MODULES) $(B)/$(SONAME) $(B)/libfarlight.a $(B)/protocol.md $(B)/shot.schema.json $(B)/man/farlight.1
@@ -225,6 +229,7 @@ IMPORT_LIBS = $(call pkg_libs,$(IMPORT_PKGS)) -lmeshoptimizer -lm
 EXPORT_LIBS = $(call pkg_libs,$(EXPORT_PKGS)) -lm
 VIDEO_LIBS = $(call pkg_libs,$(VIDEO_PKGS)) -lm
 VIEWER_LIBS = $(call pkg_libs,$(VIEWER_PKGS) $(CLIENT_PKGS)) -lm
+WEB_LIBS = $(call pkg_libs,$(WEB_PKGS) $(CLIENT_PKGS)) -lm
 
 $(B)/farlightd: $(B)/server/main.o $(SERVER_OBJ) $(PROTOCOL_OBJ)
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(SERVER_LIBS) -o $@
@@ -248,6 +253,10 @@ $(B)/farlight-video: $(VIDEO_OBJ) $(PROTOCOL_OBJ) | $(B)/farlight-palette.so
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(VIDEO_LIBS) -o $@
 $(B)/farlight-view: $(VIEWER_OBJ) $(LIB_OBJ) $(PROTOCOL_OBJ)
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(VIEWER_LIBS) -o $@
+$(B)/farlight-web: $(WEB_OBJ) $(LIB_OBJ) $(PROTOCOL_OBJ)
+	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(WEB_LIBS) -o $@
+# It takes in the files of the page.
+$(B)/client/web/page.o: $(wildcard client/web/page/*)
 $(B)/protocol-docgen: $(call obj,$(DOCS_SRC)) $(PROTOCOL_OBJ) $(SEALED_OBJ) $(COMMON_OBJ)
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(call pkg_libs,libsodium libxxhash) -o $@
 $(B)/protocol.md: $(B)/protocol-docgen protocol/docs/guide.md
@@ -341,7 +350,7 @@ $(LOSING_DAEMON): $(B)/tests/tools/lost_gpu.o $(B)/server/main.o $(SERVER_OBJ) $
 # ---- what people call ------------------------------------------------------------------------------
 BUILD_PACKAGES := gcc g++ make pkg-config libepoxy-dev libegl-dev libgl-dev libcglm-dev libturbojpeg0-dev libzstd-dev \
     libsodium-dev libxxhash-dev libinih-dev libjansson-dev libjemalloc-dev libseccomp-dev libopenimageio-dev libpng-dev libtiff-dev libopenexr-dev libjxl-dev libtinygltf-dev \
-    libtinyobjloader-dev libdraco-dev libmeshoptimizer-dev libassimp-dev libembree-dev libavcodec-dev libavformat-dev libavfilter-dev libavutil-dev libswscale-dev libsdl2-dev libsdl2-ttf-dev fonts-dejavu-core libegl1 libgl1-mesa-dri
+    libtinyobjloader-dev libdraco-dev libmeshoptimizer-dev libassimp-dev libembree-dev libavcodec-dev libavformat-dev libavfilter-dev libavutil-dev libswscale-dev libsdl2-dev libsdl2-ttf-dev libwebsockets-dev fonts-dejavu-core libegl1 libgl1-mesa-dri
 TEST_PACKAGES := libcmocka-dev python3 python3-jsonschema python3-numpy python3-prometheus-client ffmpeg xvfb gnuplot-nox
 LINT_PACKAGES := clang clang-format glslang-tools python3 python3-numpy mypy
 # A second driver stack: OpenGL over Vulkan, on the CPU. The validation sees what it does.
@@ -354,9 +363,10 @@ FUZZ_PACKAGES := clang libclang-rt-14-dev
 FIDELITY_PACKAGES := python3-openimageio python3-numpy
 EQUAL_TIME_PACKAGES := $(FIDELITY_PACKAGES) blender
 DEB_PACKAGES := debhelper dh-python python3 dpkg-dev fakeroot lintian xz-utils git
+WEB_PACKAGES := chromium python3-websocket
 FARM_PACKAGES := slurm-wlm nodejs python3-yaml
 
-.PHONY: tests build-packages test-packages stack-packages sync-packages lint-packages analyze-packages coverage-packages fuzz-packages fidelity-packages equal-time-packages farm-packages deb-packages test test-long test-zink check-sync demo bench fidelity equal-time soak farm-drill farm-test siege bench-plot check-headers check-rules lint check analyze coverage format install uninstall dist deb deb-test clean distclean help
+.PHONY: tests build-packages test-packages stack-packages sync-packages lint-packages analyze-packages coverage-packages fuzz-packages fidelity-packages equal-time-packages farm-packages web-packages deb-packages test test-long test-zink check-sync demo bench fidelity equal-time soak farm-drill farm-test web-test siege bench-plot check-headers check-rules lint check analyze coverage format install uninstall dist deb deb-test clean distclean help
 tests: $(TEST_PROGRAMS) $(CONTRACT) $(BENCH_PROGRAM) $(SHAPED_LINK) $(B)/tests/tools/make_scenes $(B)/tests/tools/pose_dump $(LOSING_DAEMON)
 
 build-packages:
@@ -381,6 +391,8 @@ deb-packages:
 	@tests/tools/install_packages.sh $(BUILD_PACKAGES) $(DEB_PACKAGES)
 farm-packages: test-packages
 	@tests/tools/install_packages.sh $(FARM_PACKAGES)
+web-packages: test-packages
+	@tests/tools/install_packages.sh $(WEB_PACKAGES)
 equal-time-packages:
 	@tests/tools/install_packages.sh $(BUILD_PACKAGES) $(EQUAL_TIME_PACKAGES)
 
@@ -433,6 +445,10 @@ farm-drill: test-packages
 farm-test: farm-packages
 	$(MAKE) -j$(JOBS) all tests
 	/usr/bin/python3 tests/farm/farm.py $(B)
+# The page of farlight-web in headless Chromium. Debian's own Python has websocket.
+web-test: web-packages
+	$(MAKE) -j$(JOBS) all tests
+	FARLIGHT_BIN=$(CURDIR)/$(B) /usr/bin/python3 tests/web/test_browser.py
 
 # One user attacks a daemon in every way that tests/siege knows, another one looks at a triangle beside it.
 siege: test-packages
@@ -484,7 +500,7 @@ analyze: analyze-packages
 	$(MAKE) -j$(JOBS) CC=gcc CXX=g++ B=build/analyze CFLAGS='$(ANALYZE_FLAGS)' $(patsubst $(B)/%,build/analyze/%,$(ANALYZED))
 ANALYZE_FLAGS := -fanalyzer
 ANALYZED = $(filter-out $(B)/shader_sources.o %.opp %.a,$(sort $(SERVER_OBJ) $(PROTOCOL_OBJ) $(LIB_OBJ) $(CLI_OBJ) $(VIEWER_OBJ) \
-    $(HELPER_OBJ) $(IMPORT_OBJ) $(EXPORT_OBJ) $(VIDEO_OBJ)))
+    $(WEB_OBJ) $(HELPER_OBJ) $(IMPORT_OBJ) $(EXPORT_OBJ) $(VIDEO_OBJ)))
 # Lines that tests reach, as HTML; TESTS chooses among them.
 coverage: coverage-packages
 	$(MAKE) -j$(JOBS) config=coverage all tests
@@ -595,6 +611,7 @@ help:
 	@echo 'make deb        build Debian packages into out/deb; make dist: an archive of the sources'
 	@echo 'make deb-test   build them, install them on a clean Debian, render there, and remove them'
 	@echo 'make farm-test  try the templates of conf/farm on Slurm and what stands in for other queues'
+	@echo 'make web-test   the page of farlight-web in headless Chromium'
 	@echo 'make siege      attack a daemon as one user, and see that another one does not notice   [ATTACKS="stats pings"]'
 	@echo 'make bench-plot draw the scaling curves into out/, as SVG and PNG'
 	@echo 'make all        build the programs into build/$$config/   [config=debug|release|sanitize|fuzz EMBREE=0]'

@@ -60,4 +60,4 @@ _farlight_program()
     [ -z "$words" ] || mapfile -t COMPREPLY < <(compgen -W "$words" -- "$word")
 }
 complete -o default -F _farlight farlight
-complete -o default -F _farlight_program farlightd farlight-view farlight-import farlight-export farlight-video
+complete -o default -F _farlight_program farlightd farlight-view farlight-web farlight-import farlight-export farlight-video

@@ -482,7 +482,7 @@ struct fl_frame {
     uint64_t change; /* how many fl_view_change came before what it shows */
     bool moving, key_frame;
     unsigned frame_quality; /* as encoded; 0: lossless */
-    uint8_t *encoded;       /* H.264 access unit; NULL: pixels are decoded */
+    uint8_t *encoded;       /* H.264 access unit, or see fl_view_keep_jpeg; NULL: pixels are decoded */
     size_t encoded_bytes;
     float *depth;         /* width * height, metres along the view; 0 where nothing is; NULL: none */
     float depth_step;     /* 1 / depth was rounded to multiples of it, 1 / metres; 0: it was not */
@@ -573,6 +573,9 @@ FL_API struct fl_frame *fl_view_next(struct fl_view *view, unsigned timeout_ms, 
  * more_follows, and again with all that has come, under the same number. Those in H.264 come once. It costs a
  * second decoding. */
 FL_API void fl_view_deliver_parts(struct fl_view *view, bool deliver);
+/* From now on: a frame in JPEG comes undecoded and unchecked, as one in H.264 does, for a caller that passes it
+ * on. */
+FL_API void fl_view_keep_jpeg(struct fl_view *view, bool keep);
 /* Reports that the caller could not decode a frame: the next one will be a key frame. */
 FL_API bool fl_view_want_key_frame(struct fl_view *view, struct fl_error *error);
 FL_API void fl_view_destroy(struct fl_view *view);

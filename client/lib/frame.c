@@ -149,7 +149,15 @@ static bool check_begin(const struct fl_assembly *assembly, const struct message
     return check_attachments(assembly, begin, error);
 }
 
-static struct fl_frame *new_frame(const struct message_frame_begin *begin)
+/* The caller decodes it. */
+static bool stays_encoded(const struct fl_frame_expected *expected, const struct message_frame_begin *begin)
+{
+    return begin->encoding == PROTOCOL_ENCODING_H264 ||
+           (begin->encoding == PROTOCOL_ENCODING_JPEG && expected->stays_jpeg);
+}
+
+static struct fl_frame *new_frame(const struct fl_frame_expected *expected,
+                                  const struct message_frame_begin *begin)
 {
     struct fl_frame *frame = calloc(1, sizeof(*frame));
     if (!frame)
@@ -190,7 +198,7 @@ static struct fl_frame *new_frame(const struct message_frame_begin *begin)
     frame->of_frame = begin->of_frame;
     frame->wire_bytes = begin->size_bytes + begin->depth_bytes + begin->normal_bytes + begin->sticking_bytes;
     frame->parts = 1;
-    if (begin->encoding == PROTOCOL_ENCODING_H264)
+    if (stays_encoded(expected, begin))
         return frame;
     frame->pixels_bytes = pixels_bytes_of(begin);
     frame->pixels = malloc(frame->pixels_bytes);
@@ -207,7 +215,7 @@ bool fl_assembly_begin(struct fl_assembly *assembly, const struct message_frame_
     if (!check_begin(assembly, begin, number, error))
         return false;
     const bool in_place = begin->encoding == PROTOCOL_ENCODING_RAW && begin->attachments == 0;
-    assembly->frame = new_frame(begin);
+    assembly->frame = new_frame(&assembly->expected, begin);
     if (assembly->frame)
         assembly->encoded = in_place ? assembly->frame->pixels : malloc((size_t)assembly->frame->wire_bytes);
     if (!assembly->frame || !assembly->encoded)
@@ -377,7 +385,7 @@ struct fl_frame *fl_assembly_end(struct fl_assembly *assembly, const struct mess
     if (!take_costs(frame, end, error) || !decode(assembly, frame, error))
         return NULL;
     frame->receive_ns = now_ns - frame->begun_ns;
-    if (frame->encoding == PROTOCOL_ENCODING_H264) {
+    if (!frame->pixels) {
         frame->encoded = assembly->encoded;
         frame->encoded_bytes = (size_t)assembly->parts.bytes.of[PROTOCOL_FRAME_PART_COLOURS];
     } else if (assembly->encoded != frame->pixels) {

@@ -17,6 +17,7 @@ struct fl_frame_expected {
     enum protocol_encoding still_encoding;
     uint32_t margin_x_max, margin_y_max, hidden_layers;
     bool parts;
+    bool stays_jpeg;      /* a JPEG is handed over as it came */
     bool is_bare_at_rest; /* without attachments then, as it shows several views */
 };
 

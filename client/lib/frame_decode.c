@@ -95,7 +95,7 @@ static bool decode_jpeg(struct fl_frame *frame, const struct fl_encoded *encoded
 
 static bool decode_pixels(struct fl_frame *frame, const struct fl_encoded *encoded, struct fl_error *error)
 {
-    if (frame->encoding == PROTOCOL_ENCODING_H264) /* the caller decodes it */
+    if (!frame->pixels) /* the caller decodes it */
         return true;
     if (frame->encoding == PROTOCOL_ENCODING_JPEG)
         return decode_jpeg(frame, encoded, error);

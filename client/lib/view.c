@@ -41,8 +41,9 @@ struct fl_view {
     struct fl_error failure; /* why a render was refused; reported once while an older one continues */
     struct fl_assembly assembly;
     uint32_t assembled_request;
-    bool delivers_parts;        /* as soon as they show something .. */
-    bool delivered;             /* .. as the frame's that is assembled */
+    bool delivers_parts; /* as soon as they show something .. */
+    bool delivered;      /* .. as the frame's that is assembled */
+    bool keeps_jpeg;
     struct fl_frame_queue done; /* that nobody has asked for yet */
 };
 
@@ -231,6 +232,11 @@ void fl_view_deliver_parts(struct fl_view *view, bool deliver)
     view->delivers_parts = deliver;
 }
 
+void fl_view_keep_jpeg(struct fl_view *view, bool keep)
+{
+    view->keeps_jpeg = keep;
+}
+
 /* It shows nothing. */
 static bool abandon(struct fl_view *view, uint32_t number, struct fl_error *error)
 {
@@ -306,6 +312,7 @@ static bool take(struct fl_view *view, size_t index, const struct message *messa
     case MESSAGE_FRAME_BEGIN:
         if (!view->assembly.frame) {
             view->assembly.expected = view->asked[index].expected;
+            view->assembly.expected.stays_jpeg = view->keeps_jpeg;
             view->assembled_request = request;
             view->delivered = false;
         }

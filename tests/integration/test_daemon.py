@@ -406,7 +406,7 @@ class Listening(Case):
         self.assertIn("no_such_key", result.stderr)
 
     def test_help_version_and_devices_go_to_standard_output(self):
-        for program in ("farlight", "farlightd", "farlight-import", "farlight-export", "farlight-video"):
+        for program in ("farlight", "farlightd", "farlight-import", "farlight-export", "farlight-video", "farlight-web"):
             for option in ("--help", "--version"):
                 result = self.expect(farlight_test.run(program, option), 0)
                 self.assertIn(program, result.stdout)

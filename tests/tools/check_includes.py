@@ -57,6 +57,7 @@ MAY_INCLUDE = {
     "client/output/library": ("protocol/common", "client/output"),
     "client/video": ("protocol", "protocol/pixels", "client/helper", "client/lib"),  # of lib: rate
     "client/cli": ("protocol", "protocol/common", "protocol/sealed", "client/lib"),
+    "client/web": ("protocol/common", "client/lib", "client/cli"),  # no scene file, no pixels: encoded frames pass through
     "client/viewer": ("protocol", "protocol/common", "client/warp", "client/lib", "client/cli"),  # the command line is parsed as that of render
 }
 # Files that every room may include.
@@ -88,7 +89,8 @@ RESTRICTED = {
     r"assimp/": ("client/import",),
     r"turbojpeg\.h": ("client/import", "client/lib", "server/encode"),
     r"zstd\.h": ("server/encode", "client/lib", "protocol/pixels"),
-    r"sodium\.h": ("client/cli", "server/session", "server/store", "protocol/common", "protocol/sealed"),
+    r"libwebsockets\.h": ("client/web",),
+    r"sodium\.h": ("client/cli", "client/web", "server/session", "server/store", "protocol/common", "protocol/sealed"),
 }
 # Where the matrix of the server's rooms stands.
 README = pathlib.Path("server/README.md")

@@ -1,0 +1,16 @@
+/* SPDX-License-Identifier: MIT */
+/* What a page is told, as JSON text for free(); NULL: out of memory. */
+#ifndef FARLIGHT_CLIENT_WEB_DESCRIBE_H
+#define FARLIGHT_CLIENT_WEB_DESCRIBE_H
+
+#include "lib/farlight.h"
+
+/* {"scene": ..}: cameras, clips, bounds, tracers, integrators; what the view is asked for first. */
+char *web_describe_scene(struct fl_scene *scene, const char *name, const struct message_render *render,
+                         const struct fl_scene_bounds *bounds, bool can_h264);
+/* What precedes a frame's bytes; `id`: of the camera that it shows, 0: none. */
+char *web_describe_frame(const struct fl_frame *frame, uint32_t id);
+/* {"error": {"text", "again"}}; again: it may be gone later. */
+char *web_describe_error(const struct fl_error *error, bool again);
+
+#endif

@@ -1,0 +1,361 @@
+/* SPDX-License-Identifier: MIT */
+#include "web/gateway.h"
+#include "web/page.h"
+#include "protocol/common/clock.h"
+
+#include <libwebsockets.h>
+#include <sodium.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define TOKEN_BYTES 32
+#define TOKEN_LENGTH 43 /* of base 64 without padding */
+#define HEADERS_BYTES 2048
+#define NAME_BYTES 256
+#define CHECK_US 250000 /* for a signal that came just before the wait */
+#define REQUEST_TIMEOUT_S 20
+#define PING_S 20
+#define SILENCE_S 60
+#define MESSAGES_PER_S                                                                                            \
+    250.0 /* a mouse that reports 125 to 250 times a second, each with a shown frame at most .. */
+#define MESSAGES_AT_ONCE 500.0 /* .. after a pause of the browser's */
+
+_Static_assert(LWS_PRE <= PARCEL_ROOM, "libwebsockets writes its frame's header in front of a message");
+
+struct gateway {
+    const struct gateway_options *options;
+    struct seat_options seat;
+    struct lws_context *context;
+    char token[TOKEN_LENGTH + 1];
+    unsigned viewers;
+    lws_sorted_usec_list_t check;
+};
+
+/* What belongs to one HTTP request or WebSocket; cleared by libwebsockets. */
+struct visitor {
+    const struct page_file *file; /* to be sent */
+    struct seat *seat;
+    char message[WEB_REQUEST_BYTES_MAX];
+    size_t message_bytes;
+    double messages; /* that may still come at once */
+    uint64_t last_ns;
+};
+
+static struct gateway *gateway_of(struct lws *wsi)
+{
+    return lws_context_user(lws_get_context(wsi));
+}
+
+/* ---- the right to come in ---- */
+
+/* What follows the token in a path; NULL: it is not there. Takes the same time for all tokens. */
+static const char *behind_token(const struct gateway *gateway, const char *path)
+{
+    if (strlen(path) < TOKEN_LENGTH + 2 || path[0] != '/' || path[TOKEN_LENGTH + 1] != '/' ||
+        sodium_memcmp(path + 1, gateway->token, TOKEN_LENGTH) != 0)
+        return NULL;
+    return path + TOKEN_LENGTH + 2;
+}
+
+/* The page itself has asked, not one of another site in the same browser. */
+static bool is_own_origin(struct lws *wsi)
+{
+    char origin[NAME_BYTES], host[NAME_BYTES];
+    if (lws_hdr_copy(wsi, origin, sizeof(origin), WSI_TOKEN_ORIGIN) <= 0 ||
+        lws_hdr_copy(wsi, host, sizeof(host), WSI_TOKEN_HOST) <= 0)
+        return false;
+    const char *behind_scheme = strstr(origin, "://");
+    return behind_scheme && strcmp(behind_scheme + 3, host) == 0 &&
+           (strncmp(origin, "http://", 7) == 0 || strncmp(origin, "https://", 8) == 0);
+}
+
+/* The HTTP status with which a WebSocket is turned away; 0: it may come in. */
+static unsigned refuse_socket(struct gateway *gateway, struct lws *wsi)
+{
+    char path[NAME_BYTES];
+    const int length = lws_hdr_copy(wsi, path, sizeof(path), WSI_TOKEN_GET_URI);
+    const char *name = length > 0 ? behind_token(gateway, path) : NULL;
+    if (!name || strcmp(name, "view") != 0)
+        return HTTP_STATUS_UNAUTHORIZED;
+    if (!is_own_origin(wsi))
+        return HTTP_STATUS_FORBIDDEN;
+    return gateway->viewers < gateway->options->viewers ? 0 : HTTP_STATUS_SERVICE_UNAVAILABLE;
+}
+
+/* ---- pages ---- */
+
+static const char *const headers[][2] = {
+    {"content-security-policy:",
+     "default-src 'none'; script-src 'self'; style-src 'self'; img-src data:; "
+     "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"},
+    {"x-content-type-options:", "nosniff"},
+    {"x-frame-options:", "DENY"},
+    {"referrer-policy:", "no-referrer"},
+    {"cross-origin-opener-policy:", "same-origin"},
+    {"cross-origin-resource-policy:", "same-origin"},
+    {"cache-control:", "no-store"},
+};
+
+static int begin_page(struct lws *wsi, struct visitor *visitor, const struct page_file *file, unsigned status)
+{
+    unsigned char buffer[LWS_PRE + HEADERS_BYTES], *at = buffer + LWS_PRE, *start = at,
+                                                   *end = buffer + sizeof(buffer) - 1;
+    if (lws_add_http_common_headers(wsi, status, file->type, (lws_filepos_t)(file->end - file->bytes), &at, end))
+        return 1;
+    for (size_t i = 0; i < sizeof(headers) / sizeof(headers[0]); i++)
+        if (lws_add_http_header_by_name(wsi, (const unsigned char *)headers[i][0],
+                                        (const unsigned char *)headers[i][1], (int)strlen(headers[i][1]), &at,
+                                        end))
+            return 1;
+    if (lws_finalize_write_http_header(wsi, start, &at, end))
+        return 1;
+    visitor->file = file;
+    lws_callback_on_writable(wsi);
+    return 0;
+}
+
+static int on_page(struct gateway *gateway, struct lws *wsi, struct visitor *visitor, const char *path)
+{
+    const bool is_get = lws_hdr_total_length(wsi, WSI_TOKEN_GET_URI) > 0;
+    const char *name = behind_token(gateway, path);
+    if (!name)
+        return begin_page(wsi, visitor, &page_denied, HTTP_STATUS_UNAUTHORIZED);
+    const struct page_file *file = page_find(name);
+    if (is_get && file)
+        return begin_page(wsi, visitor, file, HTTP_STATUS_OK);
+    lws_return_http_status(wsi, is_get ? HTTP_STATUS_NOT_FOUND : HTTP_STATUS_METHOD_NOT_ALLOWED, NULL);
+    return lws_http_transaction_completed(wsi) ? -1 : 0;
+}
+
+static int send_page(struct lws *wsi, struct visitor *visitor)
+{
+    const struct page_file *file = visitor->file;
+    if (!file)
+        return 0;
+    const size_t bytes = (size_t)(file->end - file->bytes);
+    unsigned char *copy = malloc(LWS_PRE + bytes);
+    if (!copy)
+        return -1;
+    memcpy(copy + LWS_PRE, file->bytes, bytes);
+    const int sent = lws_write(wsi, copy + LWS_PRE, bytes, LWS_WRITE_HTTP_FINAL);
+    free(copy);
+    visitor->file = NULL;
+    return sent < (int)bytes || lws_http_transaction_completed(wsi) ? -1 : 0;
+}
+
+/* ---- WebSockets ---- */
+
+static int refuse(struct lws *wsi, enum lws_close_status status, const char *why)
+{
+    unsigned char reason[100]; /* a close frame holds 123 bytes; libwebsockets wants to be able to write to them */
+    const size_t bytes = strnlen(why, sizeof(reason));
+    memcpy(reason, why, bytes);
+    lws_close_reason(wsi, status, reason, bytes);
+    return -1;
+}
+
+static int on_upgrade(struct gateway *gateway, struct lws *wsi, const char *to)
+{
+    const unsigned status = refuse_socket(gateway, wsi);
+    if (strcmp(to, "websocket") != 0)
+        return -1;
+    if (status != 0)
+        lws_return_http_status(wsi, status, NULL);
+    return status != 0;
+}
+
+static int open_seat(struct gateway *gateway, struct lws *wsi, struct visitor *visitor)
+{
+    struct fl_error error = {0};
+    visitor->messages = MESSAGES_AT_ONCE;
+    visitor->last_ns = monotonic_now_ns();
+    visitor->seat = seat_create(&gateway->seat, &error);
+    if (!visitor->seat)
+        return refuse(wsi, LWS_CLOSE_STATUS_UNEXPECTED_CONDITION, "out of memory or threads");
+    gateway->viewers++;
+    return 0;
+}
+
+static void close_seat(struct gateway *gateway, struct visitor *visitor)
+{
+    if (!visitor || !visitor->seat)
+        return;
+    seat_destroy(visitor->seat);
+    visitor->seat = NULL;
+    gateway->viewers--;
+}
+
+static bool comes_too_often(struct visitor *visitor)
+{
+    const uint64_t now_ns = monotonic_now_ns();
+    visitor->messages += (double)(now_ns - visitor->last_ns) * 1e-9 * MESSAGES_PER_S;
+    visitor->messages = visitor->messages < MESSAGES_AT_ONCE ? visitor->messages : MESSAGES_AT_ONCE;
+    visitor->last_ns = now_ns;
+    visitor->messages -= 1;
+    return visitor->messages < 0;
+}
+
+static int on_message(struct lws *wsi, struct visitor *visitor, const char *bytes, size_t count)
+{
+    struct web_request request;
+    struct fl_error error = {0};
+    if (lws_frame_is_binary(wsi))
+        return refuse(wsi, LWS_CLOSE_STATUS_UNACCEPTABLE_OPCODE, "messages are text");
+    if (count > sizeof(visitor->message) - visitor->message_bytes)
+        return refuse(wsi, LWS_CLOSE_STATUS_MESSAGE_TOO_LARGE, "the message is too long");
+    memcpy(visitor->message + visitor->message_bytes, bytes, count);
+    visitor->message_bytes += count;
+    if (comes_too_often(visitor)) /* also parts of one */
+        return refuse(wsi, LWS_CLOSE_STATUS_POLICY_VIOLATION, "too many messages");
+    if (!lws_is_final_fragment(wsi) || lws_remaining_packet_payload(wsi) > 0)
+        return 0;
+    const size_t whole = visitor->message_bytes;
+    visitor->message_bytes = 0;
+    if (!web_request_read(visitor->message, whole, &request, &error))
+        return refuse(wsi, LWS_CLOSE_STATUS_POLICY_VIOLATION, error.field);
+    seat_tell(visitor->seat, &request);
+    return 0;
+}
+
+static int on_writable(struct lws *wsi, struct visitor *visitor)
+{
+    bool has_ended = false;
+    struct parcel *parcel = visitor->seat ? seat_take(visitor->seat, &has_ended) : NULL;
+    if (parcel) {
+        const int sent = lws_write(wsi, parcel->data + PARCEL_ROOM, parcel->bytes,
+                                   parcel->is_text ? LWS_WRITE_TEXT : LWS_WRITE_BINARY);
+        const bool is_lost = sent < (int)parcel->bytes;
+        free(parcel);
+        if (is_lost)
+            return -1;
+        lws_callback_on_writable(wsi);
+        return 0;
+    }
+    return has_ended ? refuse(wsi, LWS_CLOSE_STATUS_GOINGAWAY, "the view has ended") : 0;
+}
+
+static int on_event(struct lws *wsi, enum lws_callback_reasons reason, void *user, void *in, size_t bytes)
+{
+    struct visitor *visitor = user;
+    switch (reason) {
+    case LWS_CALLBACK_HTTP:
+        return on_page(gateway_of(wsi), wsi, visitor, in);
+    case LWS_CALLBACK_HTTP_WRITEABLE:
+        return send_page(wsi, visitor);
+    case LWS_CALLBACK_HTTP_CONFIRM_UPGRADE:
+        return on_upgrade(gateway_of(wsi), wsi, in);
+    case LWS_CALLBACK_ESTABLISHED:
+        return open_seat(gateway_of(wsi), wsi, visitor);
+    case LWS_CALLBACK_RECEIVE:
+        return on_message(wsi, visitor, in, bytes);
+    case LWS_CALLBACK_SERVER_WRITEABLE:
+        return on_writable(wsi, visitor);
+    case LWS_CALLBACK_CLOSED:
+        close_seat(gateway_of(wsi), visitor);
+        return 0;
+    case LWS_CALLBACK_EVENT_WAIT_CANCELLED: /* a seat has something */
+        lws_callback_on_writable_all_protocol(lws_get_context(wsi), lws_get_protocol(wsi));
+        return 0;
+    default:
+        return 0; /* nothing of libwebsockets' own pages and uploads */
+    }
+}
+
+/* ---- beginning and end ---- */
+
+static void seat_changed(void *user)
+{
+    struct gateway *gateway = user;
+    lws_cancel_service(gateway->context);
+}
+
+static void check_again(lws_sorted_usec_list_t *check)
+{
+    struct gateway *gateway = lws_container_of(check, struct gateway, check);
+    lws_sul_schedule(gateway->context, 0, check, check_again, CHECK_US);
+}
+
+bool gateway_read_listen(const char *text, struct gateway_options *options, bool *is_loopback,
+                         struct fl_error *error)
+{
+    const char *colon = strrchr(text, ':');
+    unsigned numbers[4];
+    char *end = NULL, more;
+    const long port = colon && colon[1] != '\0' ? strtol(colon + 1, &end, 10) : -1;
+    const size_t length = colon ? (size_t)(colon - text) : 0;
+    if (port < 0 || port > 65535 || *end != '\0' || length == 0 || length >= sizeof(options->host))
+        return fl_error_set(error, FL_ERROR_ARGUMENT, "--listen", "'%s' is not HOST:PORT", text);
+    snprintf(options->host, sizeof(options->host), "%.*s", (int)length, text);
+    if (strcmp(options->host, "localhost") == 0)
+        snprintf(options->host, sizeof(options->host), "127.0.0.1");
+    if (sscanf(options->host, "%3u.%3u.%3u.%3u%c", &numbers[0], &numbers[1], &numbers[2], &numbers[3], &more) != 4)
+        return fl_error_set(error, FL_ERROR_ARGUMENT, "--listen", "'%s' is no IPv4 address of this machine",
+                            options->host);
+    options->port = (int)port;
+    *is_loopback = numbers[0] == 127;
+    return true;
+}
+
+static bool make_token(struct gateway *gateway, struct fl_error *error)
+{
+    unsigned char bytes[TOKEN_BYTES];
+    if (sodium_init() < 0)
+        return fl_error_set(error, FL_ERROR_SYSTEM, "", "libsodium does not start");
+    randombytes_buf(bytes, sizeof(bytes));
+    sodium_bin2base64(gateway->token, sizeof(gateway->token), bytes, sizeof(bytes),
+                      sodium_base64_VARIANT_URLSAFE_NO_PADDING);
+    return true;
+}
+
+static bool open_context(struct gateway *gateway, struct fl_error *error)
+{
+    static const struct lws_protocols protocols[] = {
+        {"farlight", on_event, sizeof(struct visitor), WEB_REQUEST_BYTES_MAX, 0, NULL, 0}, {0}};
+    static const lws_retry_bo_t alive = {.secs_since_valid_ping = PING_S, .secs_since_valid_hangup = SILENCE_S};
+    const struct gateway_options *options = gateway->options;
+    const struct lws_context_creation_info info = {.port = options->port,
+                                                   .iface = options->host,
+                                                   .protocols = protocols,
+                                                   .user = gateway,
+                                                   .gid = -1,
+                                                   .uid = -1,
+                                                   .retry_and_idle_policy = &alive,
+                                                   .timeout_secs = REQUEST_TIMEOUT_S,
+                                                   .keepalive_timeout = REQUEST_TIMEOUT_S,
+                                                   .server_string = "farlight-web",
+                                                   .options = LWS_SERVER_OPTION_DISABLE_IPV6 |
+                                                              LWS_SERVER_OPTION_FAIL_UPON_UNABLE_TO_BIND};
+    lws_set_log_level(0, NULL); /* it would log paths, and with them the token */
+    gateway->context = lws_create_context(&info);
+    return gateway->context ||
+           fl_error_set(error, FL_ERROR_SYSTEM, "--listen", "cannot listen at %s:%d: is something else there?",
+                        options->host, options->port);
+}
+
+static void announce(const struct gateway *gateway)
+{
+    const struct gateway_options *options = gateway->options;
+    const char *host =
+        strcmp(options->host, "0.0.0.0") == 0 ? lws_canonical_hostname(gateway->context) : options->host;
+    printf("http://%s:%d/%s/\n", host,
+           lws_get_vhost_listen_port(lws_get_vhost_by_name(gateway->context, "default")), gateway->token);
+    fflush(stdout);
+}
+
+bool gateway_run(const struct gateway_options *options, struct fl_error *error)
+{
+    struct gateway gateway = {.options = options, .seat = options->seat};
+    gateway.seat.changed = seat_changed;
+    gateway.seat.user = &gateway;
+    if (!make_token(&gateway, error) || !open_context(&gateway, error))
+        return false;
+    announce(&gateway);
+    check_again(&gateway.check);
+    while (options->interrupt_signal() == 0 && lws_service(gateway.context, 0) >= 0)
+        continue;
+    lws_sul_schedule(gateway.context, 0, &gateway.check, NULL, LWS_SET_TIMER_USEC_CANCEL);
+    lws_context_destroy(gateway.context);
+    return fl_error_set(error, options->interrupt_signal() != 0 ? FL_ERROR_INTERRUPTED : FL_ERROR_SYSTEM, "", "%s",
+                        options->interrupt_signal() != 0 ? "interrupted" : "libwebsockets failed");
+}

@@ -1,0 +1,284 @@
+// SPDX-License-Identifier: MIT
+import { cameraOfFrame, orbit, pan, printCamera, readCamera, zoom } from "./camera.js";
+import { Picture, canH264 } from "./picture.js";
+
+const WIDTH_MAX = 3840, HEIGHT_MAX = 2160, SIDE_MIN = 16; // as the gateway allows
+const REST_MS = 150; // after the last input the picture is refined
+const PAUSE_MS = 250, PAUSE_MAX_MS = 8000; // between tries to connect
+const TURN = Math.PI; // radians for a drag over the picture's height
+const NARROW = 0.0015; // of a wheel's notch of 100: 14 %
+const COLOURS = { primary: "#4f8fd0", trace: "#d08a3c", shade: "#62a85b", resolve: "#9a72c4", encode: "#c4556b", build: "#b8a13c" };
+
+const $ = (id) => document.getElementById(id);
+const canvas = $("picture");
+let socket = null, scene = null, failures = 0, wantsH264 = false;
+let camera = null; // null: the view is the scene's own, or `node`'s
+let node = 0;
+let lastFrame = null;
+let isDirty = false, movedAt = 0, resting = 0, id = 0;
+let isPlaying = false, time = 0, tickAt = 0;
+const inputs = new Map(); // when the input of a camera came, by its number
+const link = new URLSearchParams(location.hash.slice(1));
+
+// ---- what the gateway is told ----
+
+function tell(message) {
+  if (socket && socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify(message));
+}
+
+function tellShow() {
+  const scale = window.devicePixelRatio || 1;
+  const fit = Math.min(1, WIDTH_MAX / (canvas.clientWidth * scale), HEIGHT_MAX / (canvas.clientHeight * scale));
+  const side = (css) => Math.max(SIDE_MIN, Math.floor(css * scale * fit));
+  const width = side(canvas.clientWidth), height = side(canvas.clientHeight);
+  if (canvas.width !== width || canvas.height !== height) {
+    canvas.width = width;
+    canvas.height = height;
+  }
+  const chosen = (name, usual) => $(name).value || link.get(name) || usual; // a menu is empty before the scene is told
+  tell({ show: { width, height, h264: wantsH264, tracer: chosen("tracer", "bvh"),
+    integrator: chosen("integrator", "distributed"), clip: Number(chosen("clip", 0)) } });
+}
+
+function tellLook(moving) {
+  const from = camera || (lastFrame && cameraOfFrame(lastFrame, scene));
+  if (!from) return;
+  id = (id + 1) % 0xffffffff;
+  if (movedAt) inputs.set(id, movedAt);
+  tell({ look: { id, eye: from.eye, at: from.at, up: from.up, fov: from.fov, time, moving, node: camera ? 0 : node } });
+}
+
+// ---- what it tells ----
+
+function say(text, isLost = false) {
+  $("status").textContent = text;
+  $("status").classList.toggle("lost", isLost);
+}
+
+function fill(select, entries, chosen) {
+  select.replaceChildren(...entries.map(([value, text]) => new Option(text, value, false, String(value) === String(chosen))));
+}
+
+function takeScene(told) {
+  const isFirst = !scene;
+  scene = told;
+  document.title = `${told.name} - farlight`;
+  if (!isFirst) return;
+  const cameras = told.cameras.map((one) => [one.node, one.name || `camera ${one.node}`]);
+  if (cameras.length === 0) cameras.push([0, "whole scene"]);
+  node = cameras[0][0];
+  fill($("camera"), [...cameras, ["", "free"]], camera ? "" : node);
+  fill($("clip"), [[0, "none"], ...told.clips.map((one) => [one.clip, one.name || `clip ${one.clip}`])], link.get("clip") || 0);
+  $("clips").hidden = $("play").hidden = told.clips.length === 0;
+  fill($("tracer"), told.tracers.map((name) => [name, name]), told.tracer);
+  fill($("integrator"), told.integrators.map((name) => [name, name]), told.integrator);
+}
+
+function drawStages(stages) {
+  const timeline = $("timeline");
+  if (timeline.hidden) return;
+  const rows = new Map();
+  for (const [name, clock, start, duration] of stages) {
+    const key = `${name} (${clock})`;
+    rows.set(key, [...(rows.get(key) || []), [name, start, duration]]);
+  }
+  const end = Math.max(1e-3, ...stages.map((stage) => stage[2] + stage[3])), row = 16, left = 110;
+  const scale = (timeline.width - left - 60) / end; // pixels per millisecond
+  timeline.height = Math.max(1, rows.size) * row;
+  const context = timeline.getContext("2d");
+  context.font = "11px system-ui";
+  [...rows].forEach(([key, spans], index) => {
+    context.fillStyle = "#e8e8e8";
+    context.fillText(key, 4, index * row + 12);
+    for (const [name, start, duration] of spans) {
+      context.fillStyle = COLOURS[name] || "#8a8f98";
+      context.fillRect(left + start * scale, index * row + 3, Math.max(1, duration * scale), row - 6);
+    }
+    context.fillStyle = "#e8e8e8";
+    context.fillText(`${spans.reduce((sum, span) => sum + span[2], 0).toFixed(1)} ms`, timeline.width - 56, index * row + 12);
+  });
+}
+
+const picture = new Picture(canvas, (header) => {
+  tell({ shown: 1 });
+  lastFrame = header;
+  if (!$("stages").checked) $("timeline").hidden = true;
+  drawStages(header.stages);
+  let input = 0; // the newest one that it shows
+  for (const seen of [...inputs.keys()].filter((key) => key <= header.id)) {
+    input = inputs.get(seen);
+    inputs.delete(seen);
+  }
+  if (input) canvas.dataset.latency = (performance.now() - input).toFixed(1);
+  const { frame, samples, encoding, moving, id: look } = header;
+  Object.assign(canvas.dataset, { frame, samples, encoding, moving, look });
+  const latency = canvas.dataset.latency ? `, input to picture ${Number(canvas.dataset.latency).toFixed(0)} ms` : "";
+  say(`${header.width} x ${header.height}, ${header.tracer}, ${header.integrator}, ${header.samples} samples, `
+    + `${header.encoding}${latency}`);
+}, (isGone) => {
+  if (isGone) {
+    wantsH264 = false;
+    tellShow();
+  } else {
+    tell({ key: true });
+  }
+});
+
+function take(event) {
+  if (typeof event.data === "string") {
+    const message = JSON.parse(event.data);
+    if (message.scene) takeScene(message.scene);
+    if (message.error) {
+      say(message.error.text, true);
+      link.delete("clip"); // it may be what the daemon does not have
+    }
+    return;
+  }
+  failures = 0;
+  const headBytes = new DataView(event.data).getUint32(0, true);
+  const header = JSON.parse(new TextDecoder().decode(new Uint8Array(event.data, 4, headBytes)));
+  picture.take(header, new Uint8Array(event.data, 4 + headBytes));
+}
+
+// ---- connecting, and connecting again ----
+
+function connect() {
+  socket = new WebSocket(new URL("view", location.href.split("#")[0].replace(/^http/, "ws")), "farlight");
+  socket.binaryType = "arraybuffer";
+  socket.onopen = () => {
+    tellShow();
+    if (camera) tellLook(false);
+  };
+  socket.onmessage = take;
+  socket.onclose = (event) => {
+    const pause = Math.min(PAUSE_MAX_MS, PAUSE_MS * 2 ** failures) * (0.75 + Math.random() / 2);
+    failures += 1;
+    picture.reset();
+    inputs.clear();
+    say(`the connection is lost${event.reason ? ` (${event.reason})` : ""}; trying again`, true);
+    setTimeout(connect, pause);
+  };
+}
+
+// ---- input ----
+
+function free() {
+  if (!camera && lastFrame && scene) camera = cameraOfFrame(lastFrame, scene);
+  $("camera").value = "";
+  return camera !== null;
+}
+
+function move(change) {
+  if (!free()) return;
+  camera = change(camera);
+  movedAt = performance.now();
+  isDirty = true;
+}
+
+const pointers = new Map();
+
+function spread() {
+  const [a, b] = [...pointers.values()];
+  return { distance: Math.hypot(a.x - b.x, a.y - b.y), x: (a.x + b.x) / 2, y: (a.y + b.y) / 2 };
+}
+
+canvas.addEventListener("pointerdown", (event) => {
+  canvas.setPointerCapture(event.pointerId);
+  pointers.set(event.pointerId, { x: event.clientX, y: event.clientY, pans: event.button !== 0 || event.shiftKey });
+});
+canvas.addEventListener("pointermove", (event) => {
+  const pointer = pointers.get(event.pointerId);
+  if (!pointer || pointers.size > 2) return;
+  const before = pointers.size === 2 ? spread() : null;
+  const right = (event.clientX - pointer.x) / canvas.clientHeight, down = (event.clientY - pointer.y) / canvas.clientHeight;
+  Object.assign(pointer, { x: event.clientX, y: event.clientY });
+  if (before) {
+    const after = spread();
+    const height = canvas.clientHeight, factor = before.distance / Math.max(1, after.distance);
+    move((one) => zoom(pan(one, (before.x - after.x) / height, (after.y - before.y) / height), factor));
+  } else if (pointer.pans) {
+    move((one) => pan(one, -right, down));
+  } else {
+    move((one) => orbit(one, -right * TURN, down * TURN));
+  }
+});
+for (const name of ["pointerup", "pointercancel"]) canvas.addEventListener(name, (event) => pointers.delete(event.pointerId));
+canvas.addEventListener("contextmenu", (event) => event.preventDefault());
+canvas.addEventListener("wheel", (event) => {
+  event.preventDefault();
+  move((one) => zoom(one, Math.exp(event.deltaY * NARROW)));
+}, { passive: false });
+canvas.addEventListener("keydown", (event) => {
+  const steps = { ArrowLeft: [-0.05, 0], ArrowRight: [0.05, 0], ArrowUp: [0, 0.05], ArrowDown: [0, -0.05] };
+  if (steps[event.key]) move((one) => orbit(one, ...steps[event.key]));
+  else if (event.key === "+" || event.key === "-") move((one) => zoom(one, event.key === "+" ? 0.9 : 1 / 0.9));
+  else return;
+  event.preventDefault();
+});
+
+$("menu").addEventListener("submit", (event) => event.preventDefault());
+$("camera").addEventListener("change", () => {
+  if ($("camera").value === "") return;
+  camera = null;
+  node = Number($("camera").value);
+  // Without a camera of its own the whole scene is what a new view shows.
+  if (node === 0) socket.close();
+  else tellLook(false);
+});
+for (const name of ["tracer", "integrator", "clip"]) $(name).addEventListener("change", tellShow);
+$("play").addEventListener("click", () => {
+  isPlaying = !isPlaying;
+  if (isPlaying && $("clip").value === "0") {
+    $("clip").selectedIndex = 1;
+    tellShow();
+  }
+  $("play").textContent = isPlaying ? "Pause" : "Play";
+  movedAt = 0;
+  isDirty = true;
+});
+$("stages").addEventListener("change", () => {
+  $("timeline").hidden = !$("stages").checked;
+  if (lastFrame) drawStages(lastFrame.stages);
+});
+$("share").addEventListener("click", async () => {
+  const from = camera || (lastFrame && cameraOfFrame(lastFrame, scene));
+  if (!from) return;
+  const parts = new URLSearchParams({ view: printCamera(from), time: time.toFixed(3) });
+  for (const name of ["tracer", "integrator", "clip"]) parts.set(name, $(name).value);
+  history.replaceState(null, "", `#${parts}`);
+  try {
+    await navigator.clipboard.writeText(location.href);
+    say("the link is copied; who has it can look");
+  } catch {
+    say("the link is in the address line; who has it can look");
+  }
+});
+new ResizeObserver(tellShow).observe(canvas);
+
+// ---- what goes on by itself ----
+
+function tick(now) {
+  if (isPlaying) {
+    time += Math.min(0.25, (now - tickAt) / 1000);
+    isDirty = true;
+  }
+  tickAt = now;
+  if (isDirty) {
+    isDirty = false;
+    tellLook(true);
+    clearTimeout(resting);
+    resting = setTimeout(settle, REST_MS); // also where nothing is animated, as the page is hidden
+  }
+  requestAnimationFrame(tick);
+}
+
+function settle() {
+  movedAt = 0;
+  tellLook(false);
+}
+
+camera = readCamera(link.get("view"));
+time = Number(link.get("time")) || 0;
+wantsH264 = await canH264();
+connect();
+requestAnimationFrame(tick);

@@ -1,0 +1,40 @@
+/* SPDX-License-Identifier: MIT */
+/* What a page sends, read once and checked here: JSON with one of "show", "look", "shown", "compare", "key". No
+ * I/O. */
+#ifndef FARLIGHT_CLIENT_WEB_REQUEST_H
+#define FARLIGHT_CLIENT_WEB_REQUEST_H
+
+#include "lib/farlight.h"
+
+#define WEB_REQUEST_BYTES_MAX 2048u
+#define WEB_WIDTH_MAX 3840u
+#define WEB_HEIGHT_MAX 2160u
+
+enum web_request_kind {
+    WEB_SHOW,  /* {"show": {"width", "height", "h264", "tracer", "integrator", "clip"}} */
+    WEB_LOOK,  /* {"look": {"id", "eye", "at", "up", "fov", "time", "moving", "node"}} */
+    WEB_SHOWN, /* {"shown": N}: another N frames are on the screen */
+    WEB_KEY    /* {"key": true}: a frame in H.264 could not be decoded */
+};
+
+/* Which picture. */
+struct web_show {
+    uint32_t width, height; /* pixels */
+    bool h264;
+    enum protocol_tracer tracer;
+    enum protocol_integrator integrator;
+    uint32_t clip; /* 0: none */
+};
+
+struct web_request {
+    enum web_request_kind kind;
+    struct web_show show;
+    struct fl_view_camera camera;
+    uint32_t id; /* the page's number for the camera, which frames name */
+    uint32_t shown;
+};
+
+/* False: the error says which field is wrong. */
+bool web_request_read(const char *text, size_t bytes, struct web_request *request, struct fl_error *error);
+
+#endif

@@ -1,0 +1,328 @@
+/* SPDX-License-Identifier: MIT */
+#include "web/seat.h"
+#include "web/describe.h"
+
+#include <errno.h>
+#include <poll.h>
+#include <pthread.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+#define FRAMES_ON_THE_WAY 2u /* to the browser and not shown yet: further ones would only be late */
+#define FRAMES_PER_SECOND 60.0f
+#define MOVING_RATE 15.0f
+#define LOOKS_REMEMBERED 256u
+#define IDLE_MS 1000
+#define PING_ROUNDS 8u /* seconds without news after which the daemon hears from us: it disconnects the silent */
+
+struct seat {
+    struct seat_options options;
+    pthread_t thread;
+    int wake_fd, end_fd; /* events: there is something to do; it is over */
+
+    pthread_mutex_t lock; /* guards what follows */
+    bool wants_show, wants_look, wants_key;
+    struct web_request show, look;
+    unsigned on_the_way;
+    bool has_ended;
+    struct parcel *first, **end;
+
+    /* Of the thread. */
+    struct fl_connection *connection;
+    struct fl_scene *scene;
+    struct fl_view *view;
+    struct record_clip_use clip;
+    bool is_described;
+    unsigned idle_rounds;
+    uint32_t ids[LOOKS_REMEMBERED]; /* the page's numbers of cameras, by ours, modulo */
+};
+
+/* ---- to the browser ---- */
+
+static void signal_event(int fd)
+{
+    const uint64_t one = 1;
+    if (write(fd, &one, sizeof(one)) < 0)
+        errno = 0; /* it is readable already */
+}
+
+static bool post(struct seat *seat, char *head, const uint8_t *tail, size_t tail_bytes, struct fl_error *error)
+{
+    const size_t head_bytes = head ? strlen(head) : 0, size_bytes = tail ? sizeof(uint32_t) : 0;
+    const size_t bytes = size_bytes + head_bytes + tail_bytes;
+    struct parcel *parcel = head ? malloc(sizeof(*parcel) + PARCEL_ROOM + bytes) : NULL;
+    if (!parcel) {
+        free(head);
+        return fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
+    }
+    unsigned char *to = parcel->data + PARCEL_ROOM;
+    *parcel = (struct parcel){.is_text = !tail, .bytes = bytes};
+    for (size_t i = 0; i < size_bytes; i++)
+        *to++ = (unsigned char)(head_bytes >> (8 * i));
+    memcpy(to, head, head_bytes);
+    if (tail)
+        memcpy(to + head_bytes, tail, tail_bytes);
+    free(head);
+    pthread_mutex_lock(&seat->lock);
+    *seat->end = parcel;
+    seat->end = &parcel->next;
+    seat->on_the_way += tail != NULL;
+    pthread_mutex_unlock(&seat->lock);
+    seat->options.changed(seat->options.user);
+    return true;
+}
+
+/* ---- the view ---- */
+
+static void fill_render(struct seat *seat, const struct web_show *show, struct message_render *render)
+{
+    const struct fl_camera_info *first = fl_scene_camera(seat->scene, 0);
+    *render = fl_view_defaults();
+    render->width = show->width;
+    render->height = show->height;
+    render->tracer = show->tracer;
+    render->integrator = show->integrator;
+    render->frames_per_second = FRAMES_PER_SECOND;
+    render->moving_rate = MOVING_RATE;
+    render->adapt = 1;
+    render->encoding =
+        show->h264 && fl_connection_can_h264(seat->connection) ? PROTOCOL_ENCODING_H264 : PROTOCOL_ENCODING_JPEG;
+    render->still_encoding = PROTOCOL_ENCODING_JPEG;
+    if (first) {
+        render->camera_path = PROTOCOL_CAMERA_NODE;
+        render->camera_node = first->node;
+    }
+    if (show->clip != 0) {
+        seat->clip = (struct record_clip_use){.clip = show->clip, .speed = 1, .loop = 1};
+        render->clips = &seat->clip;
+        render->clips_count = 1;
+    }
+}
+
+static bool describe(struct seat *seat, const struct message_render *render, struct fl_error *error)
+{
+    struct fl_scene_bounds bounds;
+    seat->is_described = true;
+    return fl_scene_get_bounds(seat->scene, &bounds, error) &&
+           post(seat,
+                web_describe_scene(seat->scene, seat->options.scene, render, &bounds,
+                                   fl_connection_can_h264(seat->connection)),
+                NULL, 0, error);
+}
+
+static bool show(struct seat *seat, const struct web_show *wanted, struct fl_error *error)
+{
+    struct message_render render;
+    fill_render(seat, wanted, &render);
+    if (!seat->is_described && !describe(seat, &render, error))
+        return false;
+    if (seat->view)
+        return fl_view_change(seat->view, &render, error);
+    seat->view = fl_view_start(seat->scene, &render, error);
+    if (seat->view)
+        fl_view_keep_jpeg(seat->view, true);
+    return seat->view != NULL;
+}
+
+static bool look(struct seat *seat, const struct web_request *wanted, struct fl_error *error)
+{
+    uint64_t command = 0;
+    if (!fl_view_look(seat->view, &wanted->camera, &command, error))
+        return false;
+    seat->ids[command % LOOKS_REMEMBERED] = wanted->id;
+    return true;
+}
+
+static bool may_send(struct seat *seat)
+{
+    pthread_mutex_lock(&seat->lock);
+    const bool may = seat->on_the_way < FRAMES_ON_THE_WAY;
+    pthread_mutex_unlock(&seat->lock);
+    return may;
+}
+
+static bool pass_frames(struct seat *seat, struct fl_error *error)
+{
+    while (may_send(seat)) {
+        struct fl_frame *frame = fl_view_next(seat->view, 0, error);
+        if (!frame)
+            return error->code == FL_ERROR_NONE;
+        const uint32_t id = frame->command == 0 ? 0 : seat->ids[frame->command % LOOKS_REMEMBERED];
+        const bool sent = post(seat, web_describe_frame(frame, id), frame->encoded, frame->encoded_bytes, error);
+        fl_frame_destroy(frame);
+        if (!sent)
+            return false;
+    }
+    return true;
+}
+
+/* ---- the thread ---- */
+
+static bool do_what_came(struct seat *seat, struct fl_error *error)
+{
+    pthread_mutex_lock(&seat->lock);
+    const bool wants_show = seat->wants_show, wants_look = seat->wants_look, wants_key = seat->wants_key;
+    const struct web_request shown = seat->show, looked = seat->look;
+    seat->wants_show = seat->wants_key = false;
+    seat->wants_look = wants_look && !seat->view && !wants_show;
+    pthread_mutex_unlock(&seat->lock);
+    if (wants_show && !show(seat, &shown.show, error))
+        return false;
+    if (wants_look && seat->view && !look(seat, &looked, error))
+        return false;
+    return !wants_key || !seat->view || fl_view_want_key_frame(seat->view, error);
+}
+
+/* Until there is something to do; false: it is over. */
+static bool wait_for_work(struct seat *seat)
+{
+    uint64_t count;
+    struct pollfd fds[] = {{.fd = seat->end_fd, .events = POLLIN},
+                           {.fd = seat->wake_fd, .events = POLLIN},
+                           {.fd = -1, .events = POLLIN}};
+    if (seat->view && may_send(seat)) /* else what arrives waits, and the daemon sees that */
+        fds[2].fd = fl_connection_fd(seat->connection);
+    const int ready = poll(fds, sizeof(fds) / sizeof(fds[0]), seat->connection ? IDLE_MS : -1);
+    if (ready < 0 && errno != EINTR)
+        return false;
+    seat->idle_rounds = ready == 0 ? seat->idle_rounds + 1 : 0;
+    if (fds[1].revents != 0 && read(seat->wake_fd, &count, sizeof(count)) < 0)
+        errno = 0;
+    return fds[0].revents == 0;
+}
+
+static bool has_show(struct seat *seat)
+{
+    pthread_mutex_lock(&seat->lock);
+    const bool has = seat->wants_show;
+    pthread_mutex_unlock(&seat->lock);
+    return has;
+}
+
+static bool come_to_scene(struct seat *seat, struct fl_error *error)
+{
+    const struct fl_connect_options connect = {.server = seat->options.server,
+                                               .key_file = seat->options.key_file,
+                                               .link = seat->options.link,
+                                               .name = "farlight-web",
+                                               .can_h264 = true,
+                                               .interrupt_fd = seat->end_fd};
+    seat->connection = fl_connect(&connect, error);
+    if (seat->connection)
+        seat->scene = fl_scene_attach(seat->connection, seat->options.scene, error);
+    return seat->scene != NULL;
+}
+
+static void serve(struct seat *seat, struct fl_error *error)
+{
+    while (!has_show(seat))
+        if (!wait_for_work(seat))
+            return;
+    if (!come_to_scene(seat, error))
+        return;
+    do {
+        uint64_t round_trip_ns;
+        if (seat->idle_rounds % PING_ROUNDS == PING_ROUNDS - 1 &&
+            !fl_ping(seat->connection, &round_trip_ns, error))
+            return;
+        /* Answers pings, and notices that the daemon is gone, also while no frame is wanted. */
+        if (!do_what_came(seat, error) || !fl_connection_wait(seat->connection, 0, error) ||
+            !pass_frames(seat, error))
+            return;
+    } while (wait_for_work(seat));
+}
+
+static void *work(void *argument)
+{
+    struct seat *seat = argument;
+    struct fl_error error = {0}, ignored;
+    serve(seat, &error);
+    if (error.code != FL_ERROR_NONE && error.code != FL_ERROR_INTERRUPTED)
+        post(seat, web_describe_error(&error, error.code != FL_ERROR_ARGUMENT), NULL, 0, &ignored);
+    fl_view_destroy(seat->view);
+    fl_scene_destroy(seat->scene);
+    fl_connection_destroy(seat->connection);
+    pthread_mutex_lock(&seat->lock);
+    seat->has_ended = true;
+    pthread_mutex_unlock(&seat->lock);
+    seat->options.changed(seat->options.user);
+    return NULL;
+}
+
+/* ---- from outside ---- */
+
+static void forget(struct seat *seat)
+{
+    while (seat->first) {
+        struct parcel *parcel = seat->first;
+        seat->first = parcel->next;
+        free(parcel);
+    }
+    if (seat->wake_fd > 0)
+        close(seat->wake_fd);
+    if (seat->end_fd > 0)
+        close(seat->end_fd);
+    pthread_mutex_destroy(&seat->lock);
+    free(seat);
+}
+
+struct seat *seat_create(const struct seat_options *options, struct fl_error *error)
+{
+    struct seat *seat = calloc(1, sizeof(*seat));
+    if (!seat) {
+        fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
+        return NULL;
+    }
+    seat->options = *options;
+    seat->end = &seat->first;
+    pthread_mutex_init(&seat->lock, NULL);
+    seat->wake_fd = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
+    seat->end_fd = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
+    if (seat->wake_fd > 0 && seat->end_fd > 0 && pthread_create(&seat->thread, NULL, work, seat) == 0)
+        return seat;
+    fl_error_set(error, FL_ERROR_SYSTEM, "", "no thread or no descriptor: %s", strerror(errno));
+    forget(seat);
+    return NULL;
+}
+
+void seat_tell(struct seat *seat, const struct web_request *request)
+{
+    pthread_mutex_lock(&seat->lock);
+    if (request->kind == WEB_SHOW) {
+        seat->show = *request;
+        seat->wants_show = true;
+    } else if (request->kind == WEB_LOOK) {
+        seat->look = *request;
+        seat->wants_look = true;
+    } else if (request->kind == WEB_KEY) {
+        seat->wants_key = true;
+    } else {
+        seat->on_the_way -= request->shown < seat->on_the_way ? request->shown : seat->on_the_way;
+    }
+    pthread_mutex_unlock(&seat->lock);
+    signal_event(seat->wake_fd);
+}
+
+struct parcel *seat_take(struct seat *seat, bool *has_ended)
+{
+    pthread_mutex_lock(&seat->lock);
+    struct parcel *parcel = seat->first;
+    if (parcel) {
+        seat->first = parcel->next;
+        seat->end = seat->first ? seat->end : &seat->first;
+    }
+    *has_ended = !seat->first && seat->has_ended;
+    pthread_mutex_unlock(&seat->lock);
+    return parcel;
+}
+
+void seat_destroy(struct seat *seat)
+{
+    if (!seat)
+        return;
+    signal_event(seat->end_fd);
+    pthread_join(seat->thread, NULL);
+    forget(seat);
+}

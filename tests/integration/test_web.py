@@ -1,0 +1,191 @@
+# SPDX-License-Identifier: MIT
+"""farlight-web, as browsers and others see it: the link, the page, pictures of a view, and what is turned away."""
+import json
+import pathlib
+import tempfile
+import time
+
+from farlight_test import TIMEOUT_S, Case, bundled_scenes, farlight, run
+from test_serve import Serving
+from web_client import BINARY, TEXT, Gateway, Socket
+
+NAME = "pot"
+SHOW = {"width": 96, "height": 64, "h264": False, "tracer": "bvh", "integrator": "whitted", "clip": 0}
+LOOK = {"id": 7, "eye": [6, 4, 8], "at": [0, 1, 0], "up": [0, 1, 0], "fov": 0.7, "time": 0, "moving": True, "node": 0}
+SAMPLES = 64  # of a view at rest
+# JPEG of quality 90 loses about 38 dB of small pictures with many edges; another view of the scene has below 20.
+PSNR_DB = 30
+TOO_LARGE, NOT_TEXT, POLICY, PROTOCOL, BAD_TEXT, GOING = 1009, 1003, 1008, 1002, 1007, 1001
+
+
+class Web(Case):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.folder = cls.enterClassContext(tempfile.TemporaryDirectory(prefix="farlight-web-"))
+        cls.address = f"unix:{cls.folder}/s"
+        cls.serving = cls.enterClassContext(cls.serve())
+        cls.gateway = cls.enterClassContext(Gateway(cls.address, NAME, "--viewers", 3))
+
+    @classmethod
+    def serve(cls, address=None):
+        return Serving(bundled_scenes() / "teapot.glb", "--listen", address or cls.address, "--name", NAME, "--quiet")
+
+    def view(self, gateway=None, **show):
+        """An open view that has shown its first frame."""
+        view = self.enterContext(Socket(gateway or self.gateway))
+        self.assertEqual(view.status, 101)
+        view.send({"show": {**SHOW, **show}})
+        view.frame()
+        return view
+
+    def test_page_comes_with_its_rules(self):
+        for name, kind in (("", "text/html"), ("page.js", "text/javascript"), ("page.css", "text/css")):
+            status, headers, body = self.gateway.get(self.gateway.path + name)
+            self.assertEqual(status, 200)
+            self.assertTrue(headers["content-type"].startswith(kind), headers)
+            self.assertEqual(int(headers["content-length"]), len(body))
+            policy = headers["content-security-policy"]
+            for rule in ("default-src 'none'", "script-src 'self';", "style-src 'self';", "frame-ancestors 'none'"):
+                self.assertIn(rule, policy)
+            self.assertEqual(headers["x-content-type-options"], "nosniff")
+            self.assertEqual(headers["referrer-policy"], "no-referrer")
+        self.assertNotIn(b"<script>", self.gateway.get(self.gateway.path)[2])
+
+    def test_nothing_comes_without_the_token(self):
+        path = self.gateway.path
+        other = path[:5] + ("A" if path[5] != "A" else "B") + path[6:]
+        for wrong in ("/", "/page.js", other, path[:-2] + "/", path[:-1], "/../etc/passwd", "/" + "A" * 3000):
+            status, headers, body = self.gateway.get(wrong)
+            self.assertIn(status, (401, 403, 404, 413, 431), wrong)
+            self.assertNotIn(path[1:-1].encode(), body)
+        self.assertIn(b"right link", self.gateway.get(other)[2])
+        self.assertEqual(self.gateway.get(path + "../main.c")[0], 401)
+        self.assertEqual(self.gateway.get(path + "main.c")[0], 404)
+        self.assertEqual(self.gateway.get(path, "POST")[0], 405)
+
+    def test_sockets_need_token_and_origin(self):
+        path = self.gateway.path
+        for arguments, status in (({"path": "/view"}, 401), ({"path": "/" + "A" * 43 + "/view"}, 401), ({"path": path}, 401),
+                                  ({"origin": ""}, 403), ({"origin": "http://elsewhere.example"}, 403),
+                                  ({"origin": "null"}, 403), ({"origin": f"http://{self.gateway.host}.example"}, 403)):
+            with Socket(self.gateway, **arguments) as socket:
+                self.assertEqual(socket.status, status, arguments)
+
+    def test_picture_is_what_render_makes(self):
+        view = self.view()
+        frame = {"samples": 0}
+        while frame["samples"] < SAMPLES:
+            frame, jpeg = view.frame()
+        self.assertEqual((frame["width"], frame["height"], frame["encoding"]), (96, 64, "jpeg"))
+        shown, rendered = (pathlib.Path(self.folder) / name for name in ("shown.jpg", "rendered.png"))
+        shown.write_bytes(jpeg)
+        result = farlight("render", "--server", self.address, "--scene", NAME, "--size", "96x64", "--samples", SAMPLES,
+                          "--integrator", "whitted", "-o", rendered, "-q")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        result = farlight("compare", rendered, shown, "--json", "--ignore-alpha")
+        self.assertGreater(json.loads(result.stdout)["psnr"], PSNR_DB)
+        names = {stage[0] for stage in frame["stages"]}
+        self.assertLessEqual({"trace", "shade", "encode"}, names)
+
+    def test_each_viewer_has_a_camera_of_its_own(self):
+        first, second = self.view(), self.view()
+        eyes = {}
+        for view, eye in ((first, [6, 4, 8]), (second, [-6, 5, 7])):
+            view.send({"look": {**LOOK, "eye": eye}})
+        for view in (first, second):
+            frame = {"id": 0}
+            while frame["id"] != LOOK["id"]:
+                frame, _ = view.frame()
+            eyes[view] = [frame["camera"][i] for i in (3, 7, 11)]
+        self.assertEqual((eyes[first], eyes[second]), ([6, 4, 8], [-6, 5, 7]))
+
+    def test_more_viewers_than_allowed_wait(self):
+        views = [self.view() for _ in range(3)]
+        with Socket(self.gateway) as more:
+            self.assertEqual(more.status, 503)
+        views[0].peer.close()
+        deadline, status = time.monotonic() + TIMEOUT_S, 0
+        while status != 101 and time.monotonic() < deadline:
+            with Socket(self.gateway) as again:
+                status = again.status
+        self.assertEqual(status, 101)
+
+    def test_wrong_messages_end_the_connection(self):
+        def look(**changes):
+            return {"look": {**LOOK, **changes}}
+        wrong = (
+            (b"{", TEXT, POLICY), (b"[1]", TEXT, POLICY), (b"{}", TEXT, POLICY),
+            (b'{"shown": 1, "key": true}', TEXT, POLICY), (b'{"shown": 0}', TEXT, POLICY), (b'{"shown": 1e9}', TEXT, POLICY),
+            (b"[" * 1500, TEXT, POLICY), (b'{"other": 1}', TEXT, POLICY),
+            ({"show": {**SHOW, "width": 100000}}, TEXT, POLICY), ({"show": {**SHOW, "width": -1}}, TEXT, POLICY),
+            ({"show": {**SHOW, "tracer": "x"}}, TEXT, POLICY), ({"show": {**SHOW, "more": 1}}, TEXT, POLICY),
+            (look(eye=LOOK["at"]), TEXT, POLICY), (look(eye=[1, 2]), TEXT, POLICY), (look(up=[0, 0, 0]), TEXT, POLICY),
+            (look(eye=[1e300, 0, 0]), TEXT, POLICY), (look(fov=0), TEXT, POLICY), (look(time=1e9), TEXT, POLICY),
+            (look(id=-1), TEXT, POLICY), (b'{"look": {"fov": NaN}}', TEXT, POLICY),
+            (b" " * 5000, TEXT, TOO_LARGE), (b"\x00\x01", BINARY, NOT_TEXT), (b'{"key": "\xff"}', TEXT, None),
+            (b"x", 5, None),  # an opcode that does not exist
+        )
+        for message, kind, status in wrong:
+            with Socket(self.gateway) as socket:
+                socket.send(message, kind)
+                closed = socket.closed_with()
+                self.assertIn(closed, (status,) if status else (0, PROTOCOL, BAD_TEXT, POLICY), message)
+        with Socket(self.gateway) as socket:  # a message without an end
+            try:
+                for part in range(100):
+                    socket.send(b" " * 100, TEXT if part == 0 else 0, final=False)
+            except OSError:
+                pass
+            self.assertIn(socket.closed_with(), (0, TOO_LARGE))
+        self.view()
+
+    def test_message_may_come_in_pieces(self):
+        view = self.view()
+        text = json.dumps({"look": LOOK}).encode()
+        view.send(text[:20], TEXT, final=False)
+        view.send(text[20:], 0)
+        frame = {"id": 0}
+        while frame["id"] != LOOK["id"]:
+            frame, _ = view.frame()
+
+    def test_flood_ends_the_connection(self):
+        with Socket(self.gateway) as socket:
+            try:
+                for _ in range(3000):
+                    socket.send({"shown": 1})
+            except OSError:
+                pass
+            self.assertIn(socket.closed_with(), (0, POLICY))
+        self.view()
+
+    def test_lost_daemon_is_told_and_comes_back(self):
+        address = f"unix:{self.folder}/again"
+        with self.serve(address) as serving, Gateway(address, NAME) as gateway:
+            view = self.view(gateway)
+            serving.stop()
+            kind, data = BINARY, b""
+            while kind == BINARY:
+                kind, data = view.receive()
+            self.assertTrue(json.loads(data)["error"]["again"], data)
+            self.assertEqual(view.closed_with(), GOING)
+            with self.serve(address):
+                self.view(gateway)
+            status, said = gateway.stop()
+            self.assertEqual(status, 130)
+            self.assertNotIn(gateway.path[1:-1], said)
+
+    def test_command_line_says_what_is_wrong(self):
+        def say(*arguments, server=self.address, scene=NAME):
+            result = run("farlight-web", "--server", server, "--scene", scene, *arguments)
+            self.assertEqual(result.stdout, "")
+            return result.returncode, result.stderr
+        status, said = say("--listen", "0.0.0.0:0")
+        self.assertEqual(status, 2)
+        self.assertIn("ssh -L", said)
+        for arguments in (("--listen", "8080"), ("--listen", "127.0.0.1:x"), ("--listen", "nowhere:1"), ("--viewers", "0")):
+            self.assertEqual(say(*arguments)[0], 2, arguments)
+        self.assertIn("none", say(scene="none")[1])
+        self.assertEqual(say(server=f"unix:{self.folder}/nobody")[0], 75)
+        self.assertEqual(say("--listen", f"127.0.0.1:{self.gateway.port}")[0], 1)
+        self.assertIn("--scene", run("farlight-web", "--server", self.address).stderr)

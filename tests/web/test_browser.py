@@ -1,0 +1,152 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: MIT
+"""farlight-web's page in headless Chromium: make web-test.
+
+Usage: FARLIGHT_BIN=BUILD_FOLDER test_browser.py. Prints what it has measured.
+"""
+import pathlib
+import sys
+import tempfile
+import time
+import unittest
+
+sys.path[:0] = [str(pathlib.Path(__file__).resolve().parent), str(pathlib.Path(__file__).resolve().parents[1] / "integration")]
+
+import json  # noqa: E402
+
+from browser import Browser  # noqa: E402
+from farlight_test import bundled_scenes, farlight  # noqa: E402
+from test_serve import Serving  # noqa: E402
+from web_client import Gateway  # noqa: E402
+
+NAME, WIDTH, HEIGHT, SAMPLES = "scene", 360, 270, 64
+PSNR_DB = 32  # JPEG of quality 90 has about 38 dB; a neighbouring camera has below 25
+DATASET = "document.getElementById('picture')?.dataset"
+
+
+class Page(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = pathlib.Path(cls.enterClassContext(tempfile.TemporaryDirectory(prefix="farlight-web-")))
+        cls.address = f"unix:{cls.folder}/s"
+        cls.serving = cls.serve()
+        cls.serving.__enter__()
+        cls.addClassCleanup(lambda: cls.serving.__exit__())
+        cls.gateway = cls.enterClassContext(Gateway(cls.address, NAME))
+        cls.browser = cls.enterClassContext(Browser())
+
+    @classmethod
+    def serve(cls):
+        return Serving(bundled_scenes() / "carousel.glb", "--listen", cls.address, "--name", NAME, "--quiet")
+
+    def open(self, fragment=""):
+        page = self.browser.open(self.gateway.link + fragment, WIDTH, HEIGHT)
+        self.addCleanup(page.close)
+        page.wait(f"{DATASET}.frame")
+        return page
+
+    def choose(self, page, name, value):
+        page.value(f"(() => {{ const one = document.getElementById('{name}'); one.value = '{value}'; "
+                   "one.dispatchEvent(new Event('change')); })()")
+
+    def rest(self, page, samples=SAMPLES):
+        self.choose(page, "integrator", "whitted")
+        page.wait(f"Number({DATASET}.samples) >= {samples} && {DATASET}.moving === 'false' && "
+                  "document.getElementById('status').textContent.includes('whitted')")
+
+    def psnr(self, page, *options):
+        shown, rendered = self.folder / "shown.png", self.folder / "rendered.png"
+        shown.write_bytes(page.picture())
+        result = farlight("render", "--server", self.address, "--scene", NAME, "--size", f"{WIDTH}x{HEIGHT}", "--samples", SAMPLES,
+                          "--integrator", "whitted", "-o", rendered, "-q", *options)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        return json.loads(farlight("compare", rendered, shown, "--json", "--ignore-alpha").stdout)["psnr"]
+
+    def drag(self, page):
+        before = page.value(f"delete {DATASET}.latency, {DATASET}.look")
+        page.drag(WIDTH // 2, HEIGHT // 2, 60, -20)
+        page.wait(f"{DATASET}.look !== '{before}' && {DATASET}.latency")
+
+    def test_picture_is_what_render_makes(self):
+        page = self.open()
+        self.rest(page)
+        psnr = self.psnr(page)
+        print(f"picture of the page and of farlight render: {psnr:.1f} dB")
+        self.assertGreater(psnr, PSNR_DB)
+        self.assertEqual(page.faults, [])
+
+    def test_drag_wheel_and_touch_move_the_camera(self):
+        page = self.open()
+        latencies, encodings = [], set()
+        for _ in range(8):
+            self.drag(page)
+            latencies.append(float(page.shown()["latency"]))
+            encodings.add(page.shown()["encoding"])
+        latencies.sort()
+        print(f"input to picture: median {latencies[4]:.0f} ms, worst {latencies[-1]:.0f} ms of 8 drags; {encodings}")
+        before = page.shown()["look"]
+        page.mouse("mouseWheel", WIDTH // 2, HEIGHT // 2, deltaX=0, deltaY=200)
+        page.wait(f"{DATASET}.look !== '{before}'")
+        before = page.wait(f"{DATASET}.look")
+        for i in range(6):
+            page.call("Input.dispatchTouchEvent", type="touchMove" if i > 0 else "touchStart",
+                      touchPoints=[{"x": 150 - 8 * i, "y": 150, "id": 1}, {"x": 210 + 8 * i, "y": 150, "id": 2}])
+        page.call("Input.dispatchTouchEvent", type="touchEnd", touchPoints=[])
+        page.wait(f"Number({DATASET}.look) > {before}")
+        page.wait(f"{DATASET}.moving === 'false' && {DATASET}.encoding === 'jpeg'")  # refined at rest
+        self.assertEqual(page.faults, [])
+
+    def test_h264_is_decoded_while_it_moves(self):
+        page = self.open()
+        if not page.value("'VideoDecoder' in window && "
+                          "VideoDecoder.isConfigSupported({codec: 'avc1.640033'}).then((it) => it.supported)"):
+            self.skipTest("this Chromium decodes no H.264")
+        page.value(f"window.seen = new Set(); new MutationObserver(() => seen.add({DATASET}.encoding))"
+                   ".observe(document.getElementById('picture'), {attributes: true})")
+        self.drag(page)
+        self.drag(page)
+        page.wait("seen.has('h264')")
+        self.assertEqual(page.faults, [])
+
+    def test_shared_link_shows_the_same_and_others_their_own(self):
+        page = self.open()
+        self.drag(page)
+        page.value("document.getElementById('share').click()")
+        other, own = self.open(page.wait("location.hash")), self.open()
+        files = []
+        for name, one in (("page", page), ("other", other), ("own", own)):
+            self.rest(one, samples=4)
+            files.append(self.folder / f"{name}.png")
+            files[-1].write_bytes(one.picture())
+        alike, unlike = (json.loads(farlight("compare", files[1], file, "--json").stdout)["psnr"] for file in (files[0], files[2]))
+        print(f"views of one link: {alike} dB, and of another camera: {unlike:.1f} dB")
+        # They are alike but for the number of samples, at edges.
+        self.assertTrue(alike is None or alike > unlike + 6, (alike, unlike))
+
+    def test_clip_plays_and_pauses(self):
+        page = self.open()
+        page.value("document.getElementById('play').click()")
+        first = int(page.wait(f"{DATASET}.look"))
+        page.wait(f"Number({DATASET}.look) > {first + 3}")
+        page.value("document.getElementById('play').click()")
+        page.wait(f"{DATASET}.moving === 'false'")
+        page.value("document.getElementById('stages').click()")
+        self.assertGreater(page.value("document.getElementById('timeline').height"), 50)
+        self.assertEqual(page.faults, [])
+
+    def test_page_comes_back_with_the_daemon(self):
+        page = self.open()
+        self.drag(page)
+        cls = type(self)
+        self.serving.stop()
+        page.wait("document.getElementById('status').classList.contains('lost')")
+        self.serving.__exit__()
+        cls.serving = self.serve()
+        cls.serving.__enter__()
+        begin = time.monotonic()
+        page.wait("!document.getElementById('status').classList.contains('lost')")
+        print(f"back {time.monotonic() - begin:.1f} s after the daemon")
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)
