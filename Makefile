@@ -339,7 +339,7 @@ FUZZ_PACKAGES := clang libclang-rt-14-dev
 FIDELITY_PACKAGES := python3-openimageio python3-numpy
 EQUAL_TIME_PACKAGES := $(FIDELITY_PACKAGES) blender
 FARM_PACKAGES := slurm-wlm nodejs python3-yaml
-BLENDER_PACKAGES := blender python3-numpy
+BLENDER_PACKAGES := blender python3-numpy xvfb xauth
 
 .PHONY: tests build-packages test-packages stack-packages sync-packages lint-packages analyze-packages coverage-packages fuzz-packages fidelity-packages equal-time-packages farm-packages blender-packages test test-long test-zink check-sync demo bench fidelity equal-time soak farm-drill farm-test blender-test blender-addon siege bench-plot check-headers check-rules lint check analyze coverage format install uninstall clean distclean help
 tests: $(TEST_PROGRAMS) $(CONTRACT) $(BENCH_PROGRAM) $(SHAPED_LINK) $(B)/tests/tools/make_scenes $(B)/tests/tools/pose_dump $(LOSING_DAEMON)
@@ -419,10 +419,11 @@ farm-test: farm-packages
 	$(MAKE) -j$(JOBS) all tests
 	/usr/bin/python3 tests/farm/farm.py $(B)
 
-# The add-on in Blender, without a window; pictures beside Cycles'.
+# The add-on in Blender, without a window; pictures beside Cycles'. Then its viewport, on a virtual screen.
 blender-test: blender-packages
 	$(MAKE) -j$(JOBS) all
 	blender --background --factory-startup --python-exit-code 1 --python tests/blender/test_addon.py -- $(B) $(TESTS)
+	xvfb-run -a -s "-screen 0 640x480x24" blender --factory-startup --window-geometry 0 0 640 480 --python tests/blender/viewport.py -- $(B)
 # One file for Blender's preferences, with the Python package in it.
 blender-addon:
 	rm -rf build/blender && mkdir -p build/blender/farlight_blender/bundled out

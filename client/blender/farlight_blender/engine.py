@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The render engine: F12 and animations."""
+"""The render engine: F12, animations, and the viewport."""
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, Optional
 
 import bpy
@@ -12,6 +13,7 @@ from farlight.messages import Background
 
 from . import cameras, session, settings
 from .mirror import Mirror, forget_all, mirror
+from .viewport import Viewport
 
 NOTHING_THERE = 1e10  # what Blender's depth has where there is no surface
 ALBEDO = "Denoising Albedo"
@@ -63,6 +65,7 @@ class FarlightEngine(bpy.types.RenderEngine):  # type: ignore[misc]
     bl_idname, bl_label = settings.ENGINE, "farlight"
     bl_use_shading_nodes_custom = False
     bl_use_eevee_viewport = True  # for the preview of materials
+    _viewport: Optional[Viewport] = None
 
     # ---- what Blender calls
 
@@ -84,6 +87,25 @@ class FarlightEngine(bpy.types.RenderEngine):  # type: ignore[misc]
             pass
         except (farlight.Error, cameras.TooLarge) as why:
             self._fail(str(why))
+
+    def view_update(self, _: bpy.types.Context, depsgraph: bpy.types.Depsgraph) -> None:
+        """The viewport's scene has changed."""
+        self._seen(lambda: self._viewport_of(depsgraph).update(depsgraph))
+
+    def view_draw(self, context: bpy.types.Context, depsgraph: bpy.types.Depsgraph) -> None:
+        """The viewport is drawn."""
+        self._seen(lambda: self._viewport_of(depsgraph).draw(context, depsgraph.scene_eval))
+
+    def _viewport_of(self, depsgraph: bpy.types.Depsgraph) -> Viewport:
+        if self._viewport is None:
+            self._viewport = Viewport(self, depsgraph.scene_eval)
+        return self._viewport
+
+    def _seen(self, action: Callable[[], None]) -> None:
+        try:
+            action()
+        except farlight.Error as why:
+            self.update_stats("", f"farlight: {why}")
 
     # ---- a picture
 

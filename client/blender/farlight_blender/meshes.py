@@ -2,7 +2,8 @@
 """Evaluated meshes as arrays: triangles, split normals, coordinates of the active UV map, colours where a material asks."""
 from __future__ import annotations
 
-from collections.abc import Hashable
+import functools
+from collections.abc import Callable, Hashable
 from typing import TYPE_CHECKING, Any, Optional
 
 import bpy
@@ -15,6 +16,7 @@ from .materials import Material, Reader
 if TYPE_CHECKING:
     from .mirror import Mirror
 
+Steady = Callable[[str, Any], Any]  # Mirror.steady() of one mesh
 
 def _read(items: Any, field: str, width: int, kind: Any = np.float32) -> Any:
     values = np.empty(len(items) * width, kind)
@@ -40,24 +42,25 @@ def _colours(mesh: bpy.types.Mesh, name: str) -> Any:
     return np.rint(np.clip(values, 0, 1) * 255).astype(np.uint8)
 
 
-def _corners(mesh: bpy.types.Mesh, uses: list[Material]) -> dict[str, Any]:
+def _corners(mesh: bpy.types.Mesh, uses: list[Material], steady: Steady) -> dict[str, Any]:
     """What Scene.add_mesh() takes of each corner."""
     points = _read(mesh.vertices, "co", 3)[_read(mesh.loops, "vertex_index", 1, np.int32)]
-    arrays = {"positions": points, "normals": _normals(mesh)}
+    arrays = {"positions": points, "normals": steady("normals", _normals(mesh))}
     layer = next((one for one in mesh.uv_layers if one.active_render), None)
     if layer is not None:
         # Rows of textures are counted from the top, Blender's v from below.
         arrays["texcoords"] = _read(layer.data, "uv", 2) * (1, -1) + (0, 1)
         if any(use.has_normal_map for use in uses):
             mesh.calc_tangents(uvmap=layer.name)
-            arrays["tangents"] = np.column_stack((_read(mesh.loops, "tangent", 3), _read(mesh.loops, "bitangent_sign", 1)))
+            tangents = np.column_stack((_read(mesh.loops, "tangent", 3), _read(mesh.loops, "bitangent_sign", 1)))
+            arrays["tangents"] = steady("tangents", tangents)
     name = next((use.colour_attribute for use in uses if use.colour_attribute is not None), None)
     if name is not None:
         arrays["colours"] = _colours(mesh, name)
     return arrays
 
 
-def _arrays(mesh: bpy.types.Mesh, uses: list[Material]) -> Optional[dict[str, Any]]:
+def _arrays(mesh: bpy.types.Mesh, uses: list[Material], steady: Steady) -> Optional[dict[str, Any]]:
     mesh.calc_loop_triangles()
     triangles = _read(mesh.loop_triangles, "loops", 3, np.int32)
     if not len(triangles):
@@ -65,7 +68,7 @@ def _arrays(mesh: bpy.types.Mesh, uses: list[Material]) -> Optional[dict[str, An
     slots = np.clip(_read(mesh.loop_triangles, "material_index", 1, np.int32), 0, len(uses) - 1)
     order = np.argsort(slots, kind="stable")  # few runs of materials
     numbers = np.array([use.number for use in uses], np.uint32)
-    corners = _corners(mesh, uses)
+    corners = _corners(mesh, uses, steady)
     # Corners that are the same in everything are one vertex.
     rows = np.column_stack([np.ascontiguousarray(one, np.uint8 if name == "colours" else np.float32).view(np.uint8)
                             for name, one in corners.items() if one is not None])
@@ -92,15 +95,15 @@ class Shared:
 
     def _make(self, thing: bpy.types.Object) -> Optional[Object]:
         uses = [self._reader.material(slot.material) for slot in thing.material_slots] or [self._reader.material(None)]
+        # The same name may stand for several meshes, of an object and of what geometry nodes make from it.
+        count = self._named[thing.name_full] = self._named.get(thing.name_full, 0) + 1
+        number = self._mirror.number(ObjectKind.MESH, (thing.name_full, count))
         mesh = thing.data if thing.type == "MESH" else thing.to_mesh()
         try:
-            arrays = _arrays(mesh, uses) if mesh else None
+            arrays = _arrays(mesh, uses, functools.partial(self._mirror.steady, number)) if mesh else None
         finally:
             if thing.type != "MESH":
                 thing.to_mesh_clear()
         if arrays is None:
             return None
-        # The same name may stand for several meshes, of an object and of what geometry nodes make from it.
-        count = self._named[thing.name_full] = self._named.get(thing.name_full, 0) + 1
-        number = self._mirror.number(ObjectKind.MESH, (thing.name_full, count))
         return self._mirror.scene.add_mesh(arrays.pop("positions"), mesh=number, name=thing.name[:100], **arrays)

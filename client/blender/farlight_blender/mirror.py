@@ -19,6 +19,8 @@ from . import cameras, lights, materials, meshes, world
 
 WORLD_FROM_BLENDER = np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]], dtype=np.float64)
 WITH_SURFACE = {"MESH", "META"}  # the surfaces of curves and texts come as objects of the type mesh beside them
+# Blender adds the normals of faces up in several threads, in any order: by rounding they differ from time to time.
+SAME_DIRECTION = 1e-5
 NOT_DRAWN = {"VOLUME": "volumes", "CURVES": "hair", "POINTCLOUD": "point clouds", "GPENCIL": "grease pencil"}
 
 
@@ -28,6 +30,7 @@ class Mirror:
     def __init__(self) -> None:
         self.scene = farlight.Scene()
         self.notes: list[str] = []
+        self._steady: dict[tuple[int, str], Any] = {}
         self._numbers: dict[tuple[ObjectKind, Hashable], int] = {}
         self._last: dict[ObjectKind, int] = {}
         self._seen: set[tuple[ObjectKind, Hashable]] = set()
@@ -45,6 +48,14 @@ class Mirror:
     def is_seen(self, kind: ObjectKind, key: Hashable) -> bool:
         """Whether this update has set it already."""
         return (kind, key) in self._seen
+
+    def steady(self, mesh: int, name: str, values: Any) -> Any:
+        """The directions that a mesh had the last time, if these differ from them by rounding alone."""
+        before = self._steady.get((mesh, name))
+        if before is not None and before.shape == values.shape and np.abs(values - before).max(initial=0) < SAME_DIRECTION:
+            return before
+        self._steady[mesh, name] = values
+        return values
 
     def note(self, text: str) -> None:
         """Says once what the picture lacks."""
@@ -94,7 +105,10 @@ class Mirror:
     def _sweep(self) -> None:
         gone = [one for one in self._numbers if one not in self._seen]
         for kind, key in sorted(gone, key=lambda one: one[0] != ObjectKind.NODE):  # they use the others
-            self.scene.remove(Object(kind, self._numbers.pop((kind, key))))
+            number = self._numbers.pop((kind, key))
+            self.scene.remove(Object(kind, number))
+            if kind == ObjectKind.MESH:
+                self._steady = {key: values for key, values in self._steady.items() if key[0] != number}
 
 
 _mirrors: dict[Hashable, Mirror] = {}
