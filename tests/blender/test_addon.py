@@ -8,6 +8,7 @@ import contextlib
 import math
 import os
 import pathlib
+import subprocess
 import sys
 import time
 import unittest
@@ -22,7 +23,8 @@ import numpy as np  # pylint: disable=wrong-import-position
 import farlight_blender  # pylint: disable=wrong-import-position
 from farlight_blender import engine, mirror, session  # pylint: disable=wrong-import-position
 import scenes  # pylint: disable=wrong-import-position
-from scenes import ball, blocks, diffuse, empty, grid, image, lamp, load, material, put, render, textured  # pylint: disable=wrong-import-position
+from scenes import (ball, blocks, diffuse, empty, grid, image, lamp, load, material, put,  # pylint: disable=wrong-import-position
+                    render, textured)
 
 GROUND = (0.8, 0.5, 0.3, 1)
 DARK = 0.05  # parts that are darker are compared as if they were of this light
@@ -193,7 +195,8 @@ class Things(Case):
         node = textured(tiled, "Base Color", image("tiles.png", tiles))
         textured(tiled, "Roughness", image("ramp.png", ramp, "Non-Color"))
         tree = tiled.node_tree
-        mapping, coordinates, normals, bumpy = (tree.nodes.new(f"ShaderNode{kind}") for kind in ("Mapping", "UVMap", "NormalMap", "TexImage"))
+        mapping, coordinates, normals, bumpy = (tree.nodes.new(f"ShaderNode{kind}")
+                                                for kind in ("Mapping", "UVMap", "NormalMap", "TexImage"))
         for name, value in (("Scale", (2, 1.5, 1)), ("Rotation", (0, 0, 0.4)), ("Location", (0.1, 0.2, 0))):
             mapping.inputs[name].default_value = value
         tree.links.new(coordinates.outputs["UV"], mapping.inputs["Vector"])
@@ -352,6 +355,20 @@ class Trouble(Case):
         scene.farlight.server = "unix:/nowhere/socket"
         with self.assertRaisesRegex(RuntimeError, "farlight: unix:/nowhere/socket: no daemon can be reached: No such file"):
             render()
+
+    def test_a_daemon_behind_a_socket_makes_the_same_picture(self):
+        scene = empty((0.5, 0.5, 0.5))
+        grid("ground", 20, diffuse(GROUND))
+        own = render()
+        path = pathlib.Path(scenes.FOLDER.name) / "socket"
+        with subprocess.Popen([pathlib.Path(os.environ["FARLIGHT_LIBEXEC"]) / "farlightd", "--listen", f"unix:{path}"]) as daemon:
+            self.addCleanup(daemon.kill)
+            until = time.monotonic() + 20
+            while not path.exists() and time.monotonic() < until:
+                time.sleep(0.05)
+            scene.farlight.server = f"unix:{path}"
+            np.testing.assert_array_equal(render(), own)
+            daemon.terminate()
 
     def test_a_scene_without_a_camera(self):
         scene = empty()
