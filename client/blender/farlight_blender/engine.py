@@ -134,25 +134,27 @@ class FarlightEngine(bpy.types.RenderEngine):  # type: ignore[misc]
         self.update_stats("", "farlight: sending the scene")
         daemon = session.session(*settings.server_of(scene))
         daemon.wait(daemon.send(image.scene), self.test_break)
+        layer = depsgraph.view_layer_eval.name
         if scene.farlight.use_pass_albedo:
-            self.add_pass(ALBEDO, 3, "RGB", layer=depsgraph.view_layer_eval.name)
-        self._show(daemon, image, node, view, _job(scene, view))
-
-    def _show(self, daemon: session.Session, image: Mirror, node: Any, view: cameras.Lens, job: dict[str, Any]) -> None:
-        result = self.begin_result(0, 0, view.part_width, view.part_height)
+            self.add_pass(ALBEDO, 3, "RGB", layer=layer)
+        result = self.begin_result(0, 0, view.part_width, view.part_height, layer=layer)
         try:
-            layer = result.layers[0]
-            count = job["last_frame"] + 1
-            self.update_stats("", f"farlight: {job['samples'] * count} samples")
-            daemon.wait(daemon.render(image.scene, node, **_NOTHING, integrator=job["integrator"], tracer=job["tracer"]), self.test_break)
-            for frame in daemon.frames(image.scene, node, self.test_break, layers=_wanted_layers(layer), **job):
-                _write(layer, _passes(frame, view, job["background"] == Background.TRANSPARENT))
-                self.update_result(result)
-                self.update_progress((frame.number + 1) / count)
-            for warning in frame.warnings:
-                self._warn(warning)
+            self._show(result, daemon, image, node, view, _job(scene, view))
         finally:
             self.end_result(result)  # with what has come
+
+    def _show(self, result: bpy.types.RenderResult, daemon: session.Session, image: Mirror, node: Any, view: cameras.Lens,
+              job: dict[str, Any]) -> None:
+        layer = result.layers[0]
+        count = job["last_frame"] + 1
+        self.update_stats("", f"farlight: {job['samples'] * count} samples")
+        daemon.wait(daemon.render(image.scene, node, **_NOTHING, integrator=job["integrator"], tracer=job["tracer"]), self.test_break)
+        for frame in daemon.frames(image.scene, node, self.test_break, layers=_wanted_layers(layer), **job):
+            _write(layer, _passes(frame, view, job["background"] == Background.TRANSPARENT))
+            self.update_result(result)
+            self.update_progress((frame.number + 1) / count)
+        for warning in frame.warnings:
+            self._warn(warning)
 
 
 def _write(layer: bpy.types.RenderLayer, images: dict[str, Any]) -> None:
