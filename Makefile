@@ -365,8 +365,9 @@ EQUAL_TIME_PACKAGES := $(FIDELITY_PACKAGES) blender
 DEB_PACKAGES := debhelper dh-python python3 dpkg-dev fakeroot lintian xz-utils git
 WEB_PACKAGES := chromium python3-websocket
 FARM_PACKAGES := slurm-wlm nodejs python3-yaml
+BLENDER_PACKAGES := blender python3-numpy xvfb xauth
 
-.PHONY: tests build-packages test-packages stack-packages sync-packages lint-packages analyze-packages coverage-packages fuzz-packages fidelity-packages equal-time-packages farm-packages web-packages deb-packages test test-long test-zink check-sync demo bench fidelity equal-time soak farm-drill farm-test web-test siege bench-plot check-headers check-rules lint check analyze coverage format install uninstall dist deb deb-test clean distclean help
+.PHONY: tests build-packages test-packages stack-packages sync-packages lint-packages analyze-packages coverage-packages fuzz-packages fidelity-packages equal-time-packages farm-packages web-packages deb-packages blender-packages test test-long test-zink check-sync demo bench fidelity equal-time soak farm-drill farm-test web-test blender-test blender-addon siege bench-plot check-headers check-rules lint check analyze coverage format install uninstall dist deb deb-test clean distclean help
 tests: $(TEST_PROGRAMS) $(CONTRACT) $(BENCH_PROGRAM) $(SHAPED_LINK) $(B)/tests/tools/make_scenes $(B)/tests/tools/pose_dump $(LOSING_DAEMON)
 
 build-packages:
@@ -393,6 +394,8 @@ farm-packages: test-packages
 	@tests/tools/install_packages.sh $(FARM_PACKAGES)
 web-packages: test-packages
 	@tests/tools/install_packages.sh $(WEB_PACKAGES)
+blender-packages: build-packages
+	@tests/tools/install_packages.sh $(BLENDER_PACKAGES)
 equal-time-packages:
 	@tests/tools/install_packages.sh $(BUILD_PACKAGES) $(EQUAL_TIME_PACKAGES)
 
@@ -450,6 +453,19 @@ web-test: web-packages
 	$(MAKE) -j$(JOBS) all tests
 	FARLIGHT_BIN=$(CURDIR)/$(B) /usr/bin/python3 tests/web/test_browser.py
 
+# The add-on in Blender, without a window; pictures beside Cycles'. Then its viewport, on a virtual screen.
+blender-test: blender-packages
+	$(MAKE) -j$(JOBS) all
+	blender --background --factory-startup --python-exit-code 1 --python tests/blender/test_addon.py -- $(B) $(TESTS)
+	xvfb-run -a -s "-screen 0 640x480x24" blender --factory-startup --window-geometry 0 0 640 480 --python tests/blender/viewport.py -- $(B)
+# One file for Blender's preferences, with the Python package in it.
+blender-addon:
+	rm -rf build/blender && mkdir -p build/blender/farlight_blender/bundled out
+	cp client/blender/farlight_blender/*.py build/blender/farlight_blender
+	mkdir build/blender/farlight_blender/bundled/farlight
+	cp client/python/farlight/*.py build/blender/farlight_blender/bundled/farlight
+	cd build/blender && python3 -m zipfile -c $(CURDIR)/out/farlight_blender.zip farlight_blender
+
 # One user attacks a daemon in every way that tests/siege knows, another one looks at a triangle beside it.
 siege: test-packages
 	$(MAKE) -j$(JOBS) all
@@ -479,6 +495,7 @@ lint: lint-packages
 	@$(MAKE) -s check-rules compile_commands.json
 	python3 tests/tools/check_shaders.py
 	cd client/python && mypy --strict --cache-dir $(CURDIR)/build/mypy -p farlight
+	cd client/blender && MYPYPATH=../python mypy --strict --ignore-missing-imports --cache-dir $(CURDIR)/build/mypy farlight_blender
 	python3 tests/tools/compile_commands.py --syntax
 # About a minute after a build; installs nothing, and names what is missing.
 check:
@@ -518,6 +535,9 @@ install: all
 	install -m 644 client/python/farlight/*.py client/python/farlight/py.typed $(DESTDIR)$(PYTHON_FOLDER)/farlight
 	install -m 755 client/python/examples/*.py $(DESTDIR)$(PREFIX)/share/doc/farlight/examples/python
 	install -m 644 client/python/README.md $(DESTDIR)$(PREFIX)/share/doc/farlight/python.md
+	install -d $(DESTDIR)$(PREFIX)/share/farlight/blender/farlight_blender
+	install -m 644 client/blender/farlight_blender/*.py $(DESTDIR)$(PREFIX)/share/farlight/blender/farlight_blender
+	install -m 644 client/blender/README.md $(DESTDIR)$(PREFIX)/share/doc/farlight/blender.md
 	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/share/farlight \
 	    $(addprefix $(DESTDIR)$(PREFIX)/share/man/man,1 3 5 7 8) \
 	    $(DESTDIR)$(PREFIX)/share/doc/farlight/examples $(DESTDIR)/etc/farlight \
@@ -612,6 +632,8 @@ help:
 	@echo 'make deb-test   build them, install them on a clean Debian, render there, and remove them'
 	@echo 'make farm-test  try the templates of conf/farm on Slurm and what stands in for other queues'
 	@echo 'make web-test   the page of farlight-web in headless Chromium'
+	@echo 'make blender-test   try the add-on in Blender, and compare its pictures with those of Cycles   [TESTS="words"]'
+	@echo 'make blender-addon  the add-on as one file for Blender, out/farlight_blender.zip'
 	@echo 'make siege      attack a daemon as one user, and see that another one does not notice   [ATTACKS="stats pings"]'
 	@echo 'make bench-plot draw the scaling curves into out/, as SVG and PNG'
 	@echo 'make all        build the programs into build/$$config/   [config=debug|release|sanitize|fuzz EMBREE=0]'

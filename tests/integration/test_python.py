@@ -99,6 +99,8 @@ class Codec(Case):
         scene, material = triangle()
         version, objects = scene.version, len(scene.edits_since(0))
         self.assertEqual(objects, 5)
+        scene.change(material, roughness=scene.get(material).roughness)  # as it is: no change
+        self.assertEqual(scene.version, version)
         scene.change(material, roughness=0.5)
         passing = scene.add_node()
         scene.remove(passing)  # which nobody has seen

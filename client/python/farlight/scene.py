@@ -138,13 +138,16 @@ class Scene:
     # ---- any object
 
     def set(self, edit: Message) -> Object | None:
-        """Creates or replaces an object by its message; what it names in blobs is given by blob()."""
+        """Creates or replaces an object by its message; what it names in blobs is given by blob(). The message that it
+        already has changes nothing."""
         kind = _KINDS.get(type(edit))
         if kind is None and not isinstance(edit, messages.SetEnvironment):
             raise InvalidValue("is no edit of an object", field=edit.NAME)
-        fields.encode(edit)
-        self.version += 1
+        encoded = fields.encode(edit)
         key = None if kind is None else Object(kind, getattr(edit, edit.FIELDS[0].name))
+        if key in self._objects and fields.encode(self._objects[key][1]) == encoded:
+            return key  # as it is: nothing to be sent
+        self.version += 1
         self._objects[key] = (self.version, edit)
         self._made.setdefault(key, self._removed[key][0] if key in self._removed else self.version)
         if key is not None:

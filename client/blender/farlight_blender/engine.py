@@ -1,0 +1,197 @@
+# SPDX-License-Identifier: MIT
+"""The render engine: F12, animations, and the viewport."""
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Optional
+
+import bpy
+import farlight
+import numpy as np
+from farlight.frame import Frame
+from farlight.messages import Background
+
+from . import cameras, session, settings
+from .mirror import Mirror, forget_all, mirror
+from .viewport import Viewport
+
+NOTHING_THERE = 1e10  # what Blender's depth has where there is no surface
+ALBEDO = "Denoising Albedo"
+# The daemon adds the samples of an accumulating job to those of the one before, if the scene is the same. With this between
+# them each picture starts anew, and F12 twice makes the same picture.
+_NOTHING = {"width": 1, "height": 1}
+
+
+def _wanted_layers(layer: bpy.types.RenderLayer) -> tuple[str, ...]:
+    names = {"albedo": ALBEDO, "normal": "Normal", "depth": "Depth"}
+    return ("beauty", *(one for one, name in names.items() if name in layer.passes))
+
+
+def _steps(samples: int, most: int) -> tuple[int, int]:
+    """How often, and how many samples."""
+    count = -(-samples // most)
+    return count, -(-samples // count)
+
+
+def _job(scene: bpy.types.Scene, view: cameras.Lens) -> dict[str, Any]:
+    """Fields of render that F12 asks for."""
+    chosen = scene.farlight
+    steps, samples = _steps(chosen.samples, chosen.step_samples)
+    background = Background.TRANSPARENT if scene.render.film_transparent else Background.ENVIRONMENT
+    return {**view.fields(may_crop=chosen.denoise == "off"), "integrator": chosen.integrator, "tracer": chosen.tracer,
+            "samples": samples, "last_frame": steps - 1, "accumulate": 1, "depth": chosen.depth, "clamp": chosen.clamp,
+            "denoise": chosen.denoise, "background": background, "seed": scene.frame_current}
+
+
+def _passes(frame: Frame, view: cameras.Lens, is_transparent: bool) -> dict[str, Any]:
+    """Arrays by the names of Blender's passes, rows from the top."""
+    made = {"Combined": frame.colour}
+    if not is_transparent:  # what is seen of the world is no hole in the picture, however dark it is
+        made["Combined"] = np.array(frame.colour)
+        made["Combined"][..., 3] = 1
+    words = [one.word for one in frame.layers]
+    if "depth" in words:
+        made["Depth"] = np.where(np.isinf(frame.depth), NOTHING_THERE, frame.depth)[..., None]
+    if "normal" in words:
+        normal = frame.normal
+        made["Normal"] = np.stack((normal[..., 0], -normal[..., 2], normal[..., 1]), axis=-1)  # z up again
+    if "albedo" in words:
+        made[ALBEDO] = frame.albedo
+    return {name: view.cut(image) for name, image in made.items()}
+
+
+class FarlightEngine(bpy.types.RenderEngine):  # type: ignore[misc]
+    """Blender makes one for each picture."""
+    bl_idname, bl_label = settings.ENGINE, "farlight"
+    bl_use_shading_nodes_custom = False
+    bl_use_eevee_viewport = True  # for the preview of materials
+    _viewport: Optional[Viewport] = None
+
+    # ---- what Blender calls
+
+    def update_render_passes(self, scene: bpy.types.Scene, layer: bpy.types.ViewLayer) -> None:
+        """Tells which passes there will be."""
+        self.register_pass(scene, layer, "Combined", 4, "RGBA", "COLOR")
+        if layer.use_pass_z:
+            self.register_pass(scene, layer, "Depth", 1, "Z", "VALUE")
+        if layer.use_pass_normal:
+            self.register_pass(scene, layer, "Normal", 3, "XYZ", "VECTOR")
+        if scene.farlight.use_pass_albedo:
+            self.register_pass(scene, layer, ALBEDO, 3, "RGB", "COLOR")
+
+    def render(self, depsgraph: bpy.types.Depsgraph) -> None:
+        """One picture of one view layer."""
+        try:
+            self._render(depsgraph)
+        except session.Stopped:
+            pass
+        except (farlight.Error, cameras.TooLarge) as why:
+            self._fail(str(why))
+
+    def view_update(self, _: bpy.types.Context, depsgraph: bpy.types.Depsgraph) -> None:
+        """The viewport's scene has changed."""
+        self._seen(lambda: self._viewport_of(depsgraph).update(depsgraph))
+
+    def view_draw(self, context: bpy.types.Context, depsgraph: bpy.types.Depsgraph) -> None:
+        """The viewport is drawn."""
+        self._seen(lambda: self._viewport_of(depsgraph).draw(context, depsgraph.scene_eval))
+
+    def _viewport_of(self, depsgraph: bpy.types.Depsgraph) -> Viewport:
+        if self._viewport is None:
+            self._viewport = Viewport(self, depsgraph.scene_eval)
+        return self._viewport
+
+    def _seen(self, action: Callable[[], None]) -> None:
+        try:
+            action()
+        except farlight.Error as why:
+            self.update_stats("", f"farlight: {why}")
+
+    # ---- a picture
+
+    def _warn(self, text: str) -> None:
+        self.report({"WARNING"}, f"farlight: {text}")
+
+    def _fail(self, text: str) -> None:
+        self.report({"ERROR"}, f"farlight: {text}")
+        self.error_set(f"farlight: {text}")
+
+    def _render(self, depsgraph: bpy.types.Depsgraph) -> None:
+        scene = depsgraph.scene_eval
+        camera = scene.camera
+        if camera is None or camera.type != "CAMERA":
+            self._fail("the scene has no camera")
+            return
+        if camera.data.type == "PANO":
+            self._fail(f"{camera.name} is panoramic; perspective and orthographic cameras can be rendered")
+            return
+        self.update_stats("", "farlight: reading the scene")
+        view = cameras.lens(camera.evaluated_get(depsgraph), depsgraph, *_size(scene), _border(scene))
+        image = mirror((scene.name_full, depsgraph.view_layer_eval.name))
+        node = image.update(depsgraph, (camera.evaluated_get(depsgraph), view))
+        for note in image.notes:
+            self._warn(note)
+        self.update_stats("", "farlight: sending the scene")
+        daemon = session.session(*settings.server_of(scene))
+        daemon.wait(daemon.send(image.scene), self.test_break)
+        layer = depsgraph.view_layer_eval.name
+        if scene.farlight.use_pass_albedo:
+            self.add_pass(ALBEDO, 3, "RGB", layer=layer)
+        result = self.begin_result(0, 0, view.part_width, view.part_height, layer=layer)
+        try:
+            self._show(result, daemon, image, node, view, _job(scene, view))
+        finally:
+            self.end_result(result)  # with what has come
+
+    def _show(self, result: bpy.types.RenderResult, daemon: session.Session, image: Mirror, node: Any, view: cameras.Lens,
+              job: dict[str, Any]) -> None:
+        layer = result.layers[0]
+        count = job["last_frame"] + 1
+        self.update_stats("", f"farlight: {job['samples'] * count} samples")
+        daemon.wait(daemon.render(image.scene, node, **_NOTHING, integrator=job["integrator"], tracer=job["tracer"]), self.test_break)
+        for frame in daemon.frames(image.scene, node, self.test_break, layers=_wanted_layers(layer), **job):
+            _write(layer, _passes(frame, view, job["background"] == Background.TRANSPARENT))
+            self.update_result(result)
+            self.update_progress((frame.number + 1) / count)
+        for warning in frame.warnings:
+            self._warn(warning)
+
+
+def _write(layer: bpy.types.RenderLayer, images: dict[str, Any]) -> None:
+    """All passes at once, rows from below: one by one Blender takes them as Python lists, fifty times slower."""
+    nothing = np.zeros(images["Combined"].shape[:2])
+    rows = [images[one.name] if one.name in images else np.repeat(nothing[..., None], one.channels, axis=2) for one in layer.passes]
+    layer.passes.foreach_set("rect", np.concatenate([one[::-1].astype(np.float32).ravel() for one in rows]))
+
+
+def _size(scene: bpy.types.Scene) -> tuple[int, int]:
+    share = scene.render.resolution_percentage / 100
+    return max(1, int(scene.render.resolution_x * share)), max(1, int(scene.render.resolution_y * share))
+
+
+def _border(scene: bpy.types.Scene) -> Optional[tuple[float, float, float, float]]:
+    """Left, right, lower and upper edge of the part to be rendered."""
+    render = scene.render
+    return (render.border_min_x, render.border_max_x, render.border_min_y, render.border_max_y) if render.use_border else None
+
+
+@bpy.app.handlers.persistent  # type: ignore[misc]
+def _forget(_: Any) -> None:
+    for one in forget_all():
+        session.release(one.scene)
+
+
+def register() -> None:
+    """With the add-on."""
+    bpy.utils.register_class(FarlightEngine)
+    bpy.app.handlers.load_pre.append(_forget)
+    bpy.app.timers.register(session.idle, persistent=True)
+
+
+def unregister() -> None:
+    """With the add-on."""
+    bpy.app.timers.unregister(session.idle)
+    bpy.app.handlers.load_pre.remove(_forget)
+    bpy.utils.unregister_class(FarlightEngine)
+    forget_all()
+    session.close_all()

@@ -1,0 +1,144 @@
+# SPDX-License-Identifier: MIT
+"""Connections to daemons. Blender forbids Python threads of one's own: a connection lives while somebody waits for it, in
+slices, between which Blender is asked whether the user has cancelled."""
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import threading
+from collections.abc import AsyncIterator, Callable, Coroutine, Iterator
+from typing import Any, Optional, TypeVar
+
+import farlight
+import farlight.aio
+from farlight.aio import AsyncClient
+from farlight.frame import Frame
+
+T = TypeVar("T")
+IDLE_S = 5.0  # a daemon waits longer for a sign of life
+SLICE_S = 0.05  # how late Blender's Esc is noticed
+
+
+class Stopped(Exception):
+    """The user has cancelled."""
+
+
+def _never() -> bool:
+    return False
+
+
+class Session:
+    """One daemon. Several of Blender's threads may wait at once, for a render and for the viewport: they take turns."""
+
+    def __init__(self, server: Optional[str], key_file: Optional[str]) -> None:
+        self._server, self._key_file = server, key_file
+        self._client: Optional[AsyncClient] = None
+        self._loop = asyncio.new_event_loop()
+        self._turn = threading.Lock()
+
+    def start(self, operation: Coroutine[Any, Any, T]) -> asyncio.Task[T]:
+        """Begins it; it goes on while anybody waits, or in idle()."""
+        return self._loop.create_task(operation)
+
+    def slice(self, task: asyncio.Task[Any], seconds: float) -> None:
+        """Lets all operations go on until this one is done, but not for longer."""
+        with self._turn:
+            self._loop.run_until_complete(asyncio.wait({task}, timeout=seconds))
+
+    def wait(self, operation: Coroutine[Any, Any, T], is_stopped: Callable[[], bool] = _never) -> T:
+        """Its result. Raises Stopped, and ends it, once is_stopped() says so."""
+        task = self.start(operation)
+        while True:
+            self.slice(task, SLICE_S)
+            if task.done():
+                return task.result()
+            if is_stopped():
+                task.cancel()
+                self.slice(task, 1)
+                raise Stopped
+
+    def idle(self) -> None:
+        """Answers the daemon while nobody waits: it would take us for dead."""
+        self.wait(asyncio.sleep(0.001))
+
+    async def client(self) -> AsyncClient:
+        """The connection, made at its first use; it is made again by itself when it was lost."""
+        if self._client is None:
+            self._client = await farlight.aio.connect(self._server, key_file=self._key_file, name="blender")
+        return self._client
+
+    async def send(self, scene: farlight.Scene) -> None:
+        """Sends what has changed in the scene."""
+        await (await self.client()).send(scene)
+
+    async def render(self, scene: farlight.Scene, camera: Any, **values: Any) -> Frame:
+        """As Client.render()."""
+        return await (await self.client()).render(scene, camera, **values)
+
+    async def forget(self, scene: farlight.Scene) -> None:
+        """Releases a scene that will not be rendered again."""
+        with contextlib.suppress(farlight.Error):  # a daemon that is away has none
+            if self._client is not None:
+                await self._client.close_scene(scene)
+
+    async def _frames(self, scene: farlight.Scene, camera: Any, values: dict[str, Any]) -> AsyncIterator[Frame]:
+        client = await self.client()
+        frames = client.frames(scene, camera, **values)
+        try:
+            async for frame in frames:
+                yield frame
+        finally:
+            await frames.aclose()  # type: ignore[attr-defined]  # cancels the job, if it is not over
+
+    def frames(self, scene: farlight.Scene, camera: Any, is_stopped: Callable[[], bool], **values: Any) -> Iterator[Frame]:
+        """As Client.frames(). Raises Stopped; then the job has been cancelled."""
+        frames = self._frames(scene, camera, values)
+
+        async def following() -> Optional[Frame]:
+            return await anext(frames, None)
+
+        async def end() -> None:
+            await frames.aclose()  # type: ignore[attr-defined]
+
+        try:
+            while (frame := self.wait(following(), is_stopped)) is not None:
+                yield frame
+        finally:
+            self.wait(end())
+
+    def close(self) -> None:
+        """Says goodbye; a daemon of one's own ends."""
+        if self._client is not None:
+            self.wait(self._client.close())
+        self.wait(self._loop.shutdown_default_executor())
+        self._loop.close()
+
+
+_sessions: dict[tuple[Optional[str], Optional[str]], Session] = {}
+
+
+def session(server: Optional[str], key_file: Optional[str]) -> Session:
+    """That of a daemon: one for all renders."""
+    key = server, key_file
+    if key not in _sessions:
+        _sessions[key] = Session(server, key_file)
+    return _sessions[key]
+
+
+def release(scene: farlight.Scene) -> None:
+    """Lets the daemons forget a scene, without waiting for it."""
+    for one in _sessions.values():
+        one.start(one.forget(scene))
+
+
+def idle() -> float:
+    """Of all; in how many seconds again."""
+    for one in list(_sessions.values()):
+        one.idle()
+    return IDLE_S
+
+
+def close_all() -> None:
+    """When the add-on is disabled."""
+    while _sessions:
+        _sessions.popitem()[1].close()

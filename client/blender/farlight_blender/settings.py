@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: MIT
+"""What the user chooses: the daemon in the preferences, the job in the scene; and the panels for it."""
+from __future__ import annotations
+
+from typing import Any, Optional
+
+import bpy
+from farlight.messages import Denoise, Integrator, Tracer
+
+ENGINE = "FARLIGHT"
+
+
+def _choices(words: Any) -> list[tuple[str, str, str]]:
+    return [(one.word, one.word, "") for one in words]
+
+
+class FarlightPreferences(bpy.types.AddonPreferences):  # type: ignore[misc]
+    """Of the add-on."""
+    bl_idname = __package__
+
+    server: bpy.props.StringProperty(  # type: ignore[valid-type]
+        name="Daemon", description="unix:PATH, tcp:HOST:PORT or ssh:HOST[:SOCKET]; empty: FARLIGHT_SERVER, else one of Blender's own")
+    key_file: bpy.props.StringProperty(  # type: ignore[valid-type]
+        name="Key file", subtype="FILE_PATH", description="The daemon's key: the connection is sealed; empty: FARLIGHT_KEY over TCP")
+
+    def draw(self, _: bpy.types.Context) -> None:
+        """The form."""
+        self.layout.prop(self, "server")
+        self.layout.prop(self, "key_file")
+
+
+class FarlightSettings(bpy.types.PropertyGroup):  # type: ignore[misc]
+    """Of a scene."""
+    server: bpy.props.StringProperty(  # type: ignore[valid-type]
+        name="Daemon", description="unix:PATH, tcp:HOST:PORT or ssh:HOST[:SOCKET] for this scene; empty: the preferences' one")
+    integrator: bpy.props.EnumProperty(  # type: ignore[valid-type]
+        name="Integrator", items=_choices(Integrator), default="path", description="How light is followed")
+    tracer: bpy.props.EnumProperty(  # type: ignore[valid-type]
+        name="Tracer", items=_choices(Tracer), default="bvh", description="The acceleration structure")
+    samples: bpy.props.IntProperty(  # type: ignore[valid-type]
+        name="Samples", default=64, min=1, max=65536, description="Rays for each pixel; a multiple of the number of steps")
+    step_samples: bpy.props.IntProperty(  # type: ignore[valid-type]
+        name="Samples a step", default=16, min=1, max=4096, description="The picture is shown after so many")
+    view_samples: bpy.props.IntProperty(  # type: ignore[valid-type]
+        name="Viewport samples", default=32, min=1, max=4096, description="In the viewport, once it rests")
+    depth: bpy.props.IntProperty(name="Bounces", default=8, min=0, max=32)  # type: ignore[valid-type]
+    clamp: bpy.props.FloatProperty(  # type: ignore[valid-type]
+        name="Clamp indirect", default=10, min=0, max=1e6, description="Brightest light of a path over several bounces; 0: none")
+    denoise: bpy.props.EnumProperty(  # type: ignore[valid-type]
+        name="Denoise", items=_choices(Denoise), default="auto", description="auto: up to 64 samples")
+    use_pass_albedo: bpy.props.BoolProperty(  # type: ignore[valid-type]
+        name="Denoising albedo", description="Base colours, as the pass Denoising Albedo")
+
+
+def server_of(scene: bpy.types.Scene) -> tuple[Optional[str], Optional[str]]:
+    """Address and key file."""
+    addon = bpy.context.preferences.addons.get(__package__)
+    preferences = addon.preferences if addon else None
+    server = scene.farlight.server or (preferences.server if preferences else "")
+    key_file = bpy.path.abspath(preferences.key_file) if preferences and preferences.key_file else ""
+    return server or None, key_file or None
+
+
+class _Panel(bpy.types.Panel):  # type: ignore[misc]
+    bl_space_type, bl_region_type = "PROPERTIES", "WINDOW"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Whether it is shown."""
+        return bool(context.engine == ENGINE)
+
+    def _rows(self, owner: Any, *names: str) -> None:
+        self.layout.use_property_split = True
+        for name in names:
+            self.layout.prop(owner, name)
+
+
+class FARLIGHT_PT_sampling(_Panel):  # pylint: disable=invalid-name
+    """In the render properties."""
+    bl_label, bl_context = "Farlight", "render"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """The form."""
+        self._rows(context.scene.farlight, "server", "integrator", "tracer", "samples", "step_samples", "view_samples", "depth",
+                   "clamp", "denoise")
+        self._rows(context.scene.render, "film_transparent")
+
+
+class FARLIGHT_PT_passes(_Panel):  # pylint: disable=invalid-name
+    """In the view layer's properties."""
+    bl_label, bl_context = "Passes", "view_layer"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """The form."""
+        self._rows(context.view_layer, "use_pass_z", "use_pass_normal")
+        self._rows(context.scene.farlight, "use_pass_albedo")
+
+
+_CLASSES = (FarlightPreferences, FarlightSettings, FARLIGHT_PT_sampling, FARLIGHT_PT_passes)
+
+
+def _others() -> Any:
+    """Blender's own panels for lamps, materials, cameras and worlds that any engine may have."""
+    left_out = {"VIEWLAYER_PT_filter", "VIEWLAYER_PT_layer_passes"}
+    for panel in bpy.types.Panel.__subclasses__():
+        if "BLENDER_RENDER" in getattr(panel, "COMPAT_ENGINES", ()) and panel.__name__ not in left_out:
+            yield panel
+
+
+def register() -> None:
+    """With the add-on."""
+    for one in _CLASSES:
+        bpy.utils.register_class(one)
+    bpy.types.Scene.farlight = bpy.props.PointerProperty(type=FarlightSettings)
+    for panel in _others():
+        panel.COMPAT_ENGINES.add(ENGINE)
+
+
+def unregister() -> None:
+    """With the add-on."""
+    for panel in _others():
+        panel.COMPAT_ENGINES.discard(ENGINE)
+    del bpy.types.Scene.farlight
+    for one in reversed(_CLASSES):
+        bpy.utils.unregister_class(one)

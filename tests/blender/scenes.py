@@ -1,0 +1,147 @@
+# SPDX-License-Identifier: MIT
+"""Scenes for the add-on's tests, built in Blender, and their pictures as arrays."""
+import math
+import pathlib
+import tempfile
+
+import bpy
+import numpy as np
+
+WIDTH, HEIGHT = 96, 72
+FOLDER = tempfile.TemporaryDirectory(prefix="farlight-blender-")
+
+
+def empty(world=(0, 0, 0)):
+    """A scene with a camera that looks along +y, slightly down, at the origin."""
+    for group in (bpy.data.objects, bpy.data.meshes, bpy.data.materials, bpy.data.lights, bpy.data.cameras, bpy.data.images,
+                  bpy.data.node_groups, bpy.data.curves, bpy.data.worlds):
+        for one in list(group):
+            if one.users == 0 or group in (bpy.data.objects, bpy.data.worlds):
+                group.remove(one)
+    scene = bpy.context.scene
+    scene.render.resolution_x, scene.render.resolution_y, scene.render.resolution_percentage = WIDTH, HEIGHT, 100
+    scene.render.film_transparent = scene.render.use_border = scene.use_nodes = False
+    scene.view_settings.view_transform = "Raw"
+    scene.frame_set(1)
+    scene.world = bpy.data.worlds.new("World")
+    scene.world.use_nodes = True
+    scene.world.node_tree.nodes["Background"].inputs["Color"].default_value = (*world, 1)
+    scene.camera = put("camera", bpy.data.cameras.new("camera"), (0, -8, 3), (math.radians(70), 0, 0))
+    scene.farlight.samples, scene.farlight.step_samples, scene.farlight.denoise = 64, 32, "auto"
+    scene.farlight.server = ""
+    return scene
+
+
+def put(name, data, place=(0, 0, 0), turn=(0, 0, 0), scale=(1, 1, 1)):
+    thing = bpy.data.objects.new(name, data)
+    thing.location, thing.rotation_euler, thing.scale = place, turn, scale
+    bpy.context.scene.collection.objects.link(thing)
+    return thing
+
+
+def material(name="material", **inputs):
+    """Principled, with values by the names of its inputs."""
+    made = bpy.data.materials.new(name)
+    made.use_nodes = True
+    for key, value in inputs.items():
+        made.node_tree.nodes["Principled BSDF"].inputs[key.replace("_", " ")].default_value = value
+    return made
+
+
+def grid(name, size, of=None, place=(0, 0, 0), turn=(0, 0, 0)):
+    """A square with UV."""
+    mesh = bpy.data.meshes.new(name)
+    half = size / 2
+    mesh.from_pydata([(-half, -half, 0), (half, -half, 0), (half, half, 0), (-half, half, 0)], [], [(0, 1, 2, 3)])
+    mesh.uv_layers.new().data.foreach_set("uv", (0, 0, 1, 0, 1, 1, 0, 1))
+    if of:
+        mesh.materials.append(of)
+    return put(name, mesh, place, turn)
+
+
+def ball(name, of=None, place=(0, 0, 1), radius=1.0):
+    """Smooth."""
+    bpy.ops.mesh.primitive_uv_sphere_add(segments=48, ring_count=24, radius=radius, location=place)
+    made = bpy.context.object
+    made.name = name
+    bpy.ops.object.shade_smooth()
+    if of:
+        made.data.materials.append(of)
+    return made
+
+
+def lamp(kind, energy, place=(0, 0, 4), turn=(0, 0, 0), **values):
+    data = bpy.data.lights.new(kind.lower(), kind)
+    data.energy = energy
+    for name, value in values.items():
+        setattr(data, name, value)
+    return put(data.name, data, place, turn)
+
+
+def image(name, pixels, space="sRGB", is_float=False):
+    """Height x width x 4, rows from the top; in a file, from which Cycles takes them."""
+    pixels = np.asarray(pixels, np.float32)
+    made = bpy.data.images.new(name, pixels.shape[1], pixels.shape[0], alpha=True, float_buffer=is_float)
+    made.pixels.foreach_set(np.ascontiguousarray(pixels[::-1]).ravel())
+    made.file_format = "OPEN_EXR" if is_float else "PNG"
+    made.filepath_raw = str(pathlib.Path(FOLDER.name) / name)
+    made.save()
+    path = made.filepath_raw
+    bpy.data.images.remove(made)
+    made = bpy.data.images.load(path)
+    made.colorspace_settings.name = space
+    return made
+
+
+def textured(of, name, picture, output="Color"):
+    """Feeds an input of a Principled BSDF from an image."""
+    tree = of.node_tree
+    node = tree.nodes.new("ShaderNodeTexImage")
+    node.image = picture
+    tree.links.new(node.outputs[output], tree.nodes["Principled BSDF"].inputs[name])
+    return node
+
+
+def load(path):
+    """Height x width x 4 floats, rows from the top."""
+    picture = bpy.data.images.load(str(path))
+    picture.colorspace_settings.name = "Non-Color"
+    width, height = picture.size
+    values = np.empty(width * height * 4, np.float32)
+    picture.pixels.foreach_get(values)
+    bpy.data.images.remove(picture)
+    return values.reshape(height, width, 4)[::-1]
+
+
+def render(engine="FARLIGHT", samples=128):
+    """F12, linear."""
+    scene = bpy.context.scene
+    scene.render.engine = engine
+    if engine == "CYCLES":
+        scene.cycles.samples, scene.cycles.use_denoising, scene.cycles.use_adaptive_sampling = samples, False, False
+        scene.cycles.max_bounces, scene.cycles.caustics_refractive, scene.cycles.caustics_reflective = 8, True, True
+    scene.render.image_settings.file_format, scene.render.image_settings.color_depth = "OPEN_EXR", "32"
+    scene.render.image_settings.color_mode = "RGBA"
+    path = pathlib.Path(FOLDER.name) / f"{engine}.exr"
+    path.unlink(missing_ok=True)
+    scene.render.filepath = str(path)
+    bpy.ops.render.render(write_still=True)
+    return load(path)
+
+
+def blocks(picture, across=8, down=6):
+    """Means of the picture's parts: noise is averaged away, light is not."""
+    height, width = picture.shape[0] // down, picture.shape[1] // across
+    cut = picture[:height * down, :width * across].astype(np.float64)
+    return cut.reshape(down, height, across, width, -1).mean(axis=(1, 3))
+
+
+def diffuse(colour):
+    """Lambert's, which both engines have alike."""
+    made = bpy.data.materials.new("diffuse")
+    made.use_nodes = True
+    tree = made.node_tree
+    node = tree.nodes.new("ShaderNodeBsdfDiffuse")
+    node.inputs["Color"].default_value = colour
+    tree.links.new(node.outputs[0], tree.nodes["Material Output"].inputs["Surface"])
+    return made

@@ -1,0 +1,392 @@
+# SPDX-License-Identifier: MIT
+"""The add-on in Blender: pictures beside Cycles' of the same scene, what is sent, and what goes wrong.
+
+Run by `make blender-test`. Pictures are compared by the means of 8 x 6 parts. With Lambert's surfaces both engines compute the same light:
+what differs is noise, 0.5 % of a part's mean at these samples, and the filter at the edges of what is small. The Principled
+BSDF differs by its model, which each test that has one says."""
+import contextlib
+import math
+import os
+import pathlib
+import subprocess
+import sys
+import time
+import unittest
+import unittest.mock
+
+HERE = pathlib.Path(__file__).resolve().parent
+ROOT = HERE.parents[1]
+sys.path[:0] = [str(HERE), str(ROOT / "client/python"), str(ROOT / "client/blender")]
+
+import bpy  # pylint: disable=wrong-import-position
+import numpy as np  # pylint: disable=wrong-import-position
+import farlight_blender  # pylint: disable=wrong-import-position
+from farlight_blender import engine, mirror, session  # pylint: disable=wrong-import-position
+import scenes  # pylint: disable=wrong-import-position
+from scenes import (ball, blocks, diffuse, empty, grid, image, lamp, load, material, put,  # pylint: disable=wrong-import-position
+                    render, textured)
+
+GROUND = (0.8, 0.5, 0.3, 1)
+DARK = 0.05  # parts that are darker are compared as if they were of this light
+
+
+class Case(unittest.TestCase):
+    def assert_like_cycles(self, mean, worst, samples=128):
+        """mean: of the relative differences of all parts and colours; worst: of one."""
+        ours, theirs = (blocks(render(*which)) for which in (("FARLIGHT",), ("CYCLES", samples)))
+        apart = np.abs(ours - theirs) / np.maximum(theirs, DARK)
+        self.assertLess(apart.mean(), mean, f"mean difference {apart.mean():.4f}, worst {apart.max():.3f}")
+        self.assertLess(apart.max(), worst, f"part {np.unravel_index(apart.argmax(), apart.shape)}")
+
+    @contextlib.contextmanager
+    def asked(self, is_stopped):
+        """In place of Blender's own answer to the question whether the user has cancelled."""
+        frames = session.Session.frames
+        with unittest.mock.patch.object(session.Session, "frames", lambda this, scene, camera, _, **values:
+                                        frames(this, scene, camera, is_stopped, **values)):
+            yield
+
+
+class Lights(Case):
+    def ground(self, world=(0, 0, 0)):
+        empty(world)
+        grid("ground", 20, diffuse(GROUND))
+        ball("ball", diffuse((0.8, 0.8, 0.8, 1)))
+
+    def test_a_ball_of_light_has_the_power_that_it_has_in_cycles(self):
+        self.ground()
+        lamp("POINT", 500, (2, -2, 4), shadow_soft_size=0.2)
+        self.assert_like_cycles(0.01, 0.05)
+
+    def test_a_sun_has_the_irradiance_that_it_has_in_cycles(self):
+        self.ground()
+        lamp("SUN", 3, turn=(0.5, 0.3, 0), angle=0)
+        self.assert_like_cycles(0.01, 0.05)
+
+    def test_a_spot_has_the_cone_that_it_has_in_cycles(self):
+        self.ground()
+        lamp("SPOT", 800, (0, 0, 6), shadow_soft_size=0, spot_size=1.0, spot_blend=0.5)
+        # Cycles 3.x also weakens a spot by the cosine from its axis, 0.88 at the edge of this one, and its edge is another curve.
+        self.assert_like_cycles(0.06, 0.16)
+
+    def test_a_panel_has_the_power_that_it_has_in_cycles(self):
+        self.ground()
+        lamp("AREA", 500, (2, -1, 4), (0, 0.5, 0), shape="RECTANGLE", size=2, size_y=1)
+        self.assert_like_cycles(0.01, 0.05)
+
+    def test_the_world_lights_and_is_seen(self):
+        self.ground((0.5, 0.6, 0.8))
+        self.assert_like_cycles(0.01, 0.05)
+
+    def test_an_image_of_the_world_is_where_cycles_has_it(self):
+        scene = empty()
+        ball("mirror", material(Metallic=1, Roughness=0, Base_Color=(1, 1, 1, 1)), radius=1.6)
+        sky = np.ones((32, 64, 4))
+        sky[..., 0], sky[..., 1] = np.linspace(0, 2, 64)[None], np.linspace(1, 0, 32)[:, None]
+        sky[:, 10:14, :3] = (0, 0, 3)
+        tree = scene.world.node_tree
+        node, mapping, place = (tree.nodes.new(f"ShaderNode{kind}") for kind in ("TexEnvironment", "Mapping", "TexCoord"))
+        node.image = image("sky.exr", sky, "Linear", is_float=True)
+        mapping.inputs["Rotation"].default_value = (0, 0, 0.7)
+        tree.links.new(place.outputs["Generated"], mapping.inputs["Vector"])
+        tree.links.new(mapping.outputs["Vector"], node.inputs["Vector"])
+        tree.links.new(node.outputs["Color"], tree.nodes["Background"].inputs["Color"])
+        self.assert_like_cycles(0.01, 0.05)
+
+
+class Cameras(Case):
+    def thing(self):
+        scene = empty((0.5, 0.5, 0.5))
+        grid("ground", 20, diffuse(GROUND))
+        ball("ball", diffuse((0.9, 0.1, 0.1, 1)))
+        return scene
+
+    def test_a_shifted_camera(self):
+        camera = self.thing().camera.data
+        camera.shift_x, camera.shift_y = 0.25, -0.125  # whole pixels
+        self.assert_like_cycles(0.01, 0.05)
+
+    def test_a_shifted_orthographic_camera(self):
+        camera = self.thing().camera.data
+        camera.type, camera.ortho_scale, camera.shift_x = "ORTHO", 7, 0.125
+        self.assert_like_cycles(0.01, 0.05)
+
+    def test_depth_of_field(self):
+        camera = self.thing().camera.data
+        camera.dof.use_dof, camera.dof.focus_distance, camera.dof.aperture_fstop = True, 5, 0.1
+        self.assert_like_cycles(0.01, 0.05)
+
+    def test_a_part_of_the_picture_is_that_part(self):
+        scene = self.thing()
+        scene.farlight.denoise = "off"
+        whole = render()
+        scene.render.use_border, scene.render.use_crop_to_border = True, True
+        scene.render.border_min_x, scene.render.border_max_x, scene.render.border_min_y, scene.render.border_max_y = 0.25, 0.75, 0.5, 1
+        part = render()
+        self.assertEqual(part.shape, (36, 48, 4))
+        np.testing.assert_array_equal(part, whole[:36, 24:72])
+
+    def test_a_transparent_film(self):
+        scene = self.thing()
+        bpy.data.objects.remove(bpy.data.objects["ground"])
+        scene.render.film_transparent = True
+        self.assert_like_cycles(0.01, 0.05)
+
+
+class Things(Case):
+    def test_instances_modifiers_and_text(self):
+        empty((0.5, 0.5, 0.5))
+        part, ground = ball("ball", diffuse((0.9, 0.1, 0.1, 1)), (0, 0, 0), 0.3), grid("ground", 8, diffuse(GROUND))
+        finer = ground.modifiers.new("finer", "SUBSURF")
+        finer.levels = finer.render_levels = 2
+        finer.subdivision_type = "SIMPLE"
+        part.parent, ground.instance_type = ground, "VERTS"
+        text = bpy.data.curves.new("text", "FONT")
+        text.body, text.extrude = "Ab", 0.2
+        text.materials.append(diffuse((0.1, 0.1, 0.9, 1)))
+        put("text", text, (0, -2, 1), (1.2, 0, 0))
+        self.assert_like_cycles(0.01, 0.05)
+        made = next(iter(mirror._mirrors.values())).scene
+        self.assertEqual(len(made.objects("mesh")), 3, "the balls are one mesh")
+        self.assertEqual(len(made.objects("node")), 25 + 2 + 2)  # and the root, and the camera
+
+    def test_materials_of_faces_and_colours_of_corners(self):
+        empty((0.5, 0.5, 0.5))
+        thing = ball("ball", diffuse((0.9, 0.1, 0.1, 1)), radius=1.5)
+        thing.data.materials.append(diffuse((0.1, 0.1, 0.9, 1)))
+        count = len(thing.data.polygons)
+        thing.data.polygons.foreach_set("material_index", np.arange(count) // 7 % 2)
+        painted = material("painted", Specular=0.0)
+        tree = painted.node_tree
+        node = tree.nodes.new("ShaderNodeVertexColor")
+        node.layer_name = "paint"
+        tree.links.new(node.outputs["Color"], tree.nodes["Principled BSDF"].inputs["Base Color"])
+        ground = grid("ground", 20, painted)
+        ground.data.color_attributes.new("paint", "FLOAT_COLOR", "CORNER").data.foreach_set(
+            "color", (1, 0, 0, 1, 0, 1, 0, 1, 0, 0, 1, 1, 1, 1, 1, 1))
+        # A Principled surface without specular: its diffuse part is Burley's in Cycles 3.x, and Lambert's here.
+        self.assert_like_cycles(0.04, 0.15)
+
+    def test_principled_materials(self):
+        scene = empty((0.6, 0.6, 0.6))
+        grid("ground", 20, diffuse(GROUND))
+        lamp("AREA", 300, (2, -2, 5), (0.3, 0.3, 0), shape="SQUARE", size=2)
+        for x, y, values in ((-3, 0, {"Base_Color": (0.2, 0.3, 0.8, 1), "Roughness": 0.2, "Specular": 0.9}),
+                             (-1, 0, {"Metallic": 1, "Roughness": 0.3, "Base_Color": (0.9, 0.7, 0.3, 1)}),
+                             (1, 0, {"Transmission": 1, "Roughness": 0, "IOR": 1.45, "Base_Color": (1, 1, 1, 1)}),
+                             (3, 0, {"Base_Color": (0.6, 0.05, 0.05, 1), "Clearcoat": 1, "Roughness": 0.6}),
+                             (-2, 3, {"Base_Color": (0.1, 0.6, 0.1, 1), "Alpha": 0.5}),
+                             (2, 3, {"Emission": (1, 0.5, 0.1, 1), "Emission_Strength": 2})):
+            ball(f"ball {x}", material(f"material {x}", **values), (x, y, 0.8), 0.8)
+        # Below a mirroring coat Cycles 3.x scatters all light, and not what the coat lets through. Caustics are noisy in both.
+        scene.farlight.clamp = 0
+        self.assert_like_cycles(0.04, 0.3)
+
+    def test_textures(self):
+        scene = empty()
+        scene.camera.location, scene.camera.rotation_euler = (0, 0, 8), (0, 0, 0)
+        # As seen from above: Cycles bends normals that mirror into the surface, which are many at grazing angles.
+        row, column = np.mgrid[:64, :64] / 64
+        tiles, ramp, bumps = np.ones((3, 64, 64, 4))
+        tiles[..., 0], tiles[..., 1], tiles[..., 2] = column, row, ((column * 4).astype(int) + (row * 4).astype(int)) % 2
+        ramp[..., :3] = column[..., None]
+        bumps[..., 0], bumps[..., 1] = 0.5 + 0.15 * np.sin(column * 12), 0.5 + 0.2 * np.cos(row * 9)
+        tiled = material("tiled")
+        node = textured(tiled, "Base Color", image("tiles.png", tiles))
+        textured(tiled, "Roughness", image("ramp.png", ramp, "Non-Color"))
+        tree = tiled.node_tree
+        mapping, coordinates, normals, bumpy = (tree.nodes.new(f"ShaderNode{kind}")
+                                                for kind in ("Mapping", "UVMap", "NormalMap", "TexImage"))
+        for name, value in (("Scale", (2, 1.5, 1)), ("Rotation", (0, 0, 0.4)), ("Location", (0.1, 0.2, 0))):
+            mapping.inputs[name].default_value = value
+        tree.links.new(coordinates.outputs["UV"], mapping.inputs["Vector"])
+        tree.links.new(mapping.outputs["Vector"], node.inputs["Vector"])
+        bumpy.image = image("bumps.png", bumps, "Non-Color")
+        tree.links.new(bumpy.outputs["Color"], normals.inputs["Color"])
+        tree.links.new(normals.outputs["Normal"], tree.nodes["Principled BSDF"].inputs["Normal"])
+        grid("ground", 8, tiled)
+        lamp("SUN", 3, turn=(0.8, 0.5, 0), angle=0)
+        # As above: diffuse light below the mirroring surface. The worst part is of a colour that is nearly black.
+        self.assert_like_cycles(0.06, 0.3)
+
+    def test_what_is_not_known_is_told(self):
+        empty((0.5, 0.5, 0.5))
+        odd = material("odd")
+        tree = odd.node_tree
+        tree.links.new(tree.nodes.new("ShaderNodeTexVoronoi").outputs["Color"], tree.nodes["Principled BSDF"].inputs["Base Color"])
+        grid("ground", 8, odd)
+        with unittest.mock.patch.object(engine.FarlightEngine, "_warn") as told:
+            render()
+        told.assert_called_once_with("odd: Base Color comes from Voronoi Texture, which is not known: its own value is used")
+
+
+class Passes(Case):
+    def test_depth_normal_and_albedo_arrive_in_the_compositor(self):
+        scene = empty((0.5, 0.5, 0.5))
+        scene.camera.location, scene.camera.rotation_euler = (0, 0, 8), (0, 0, 0)
+        grid("ground", 4, diffuse((0.6, 0.3, 0.1, 1)), turn=(0.3, 0, 0))
+        scene.render.engine = "FARLIGHT"
+        layer = bpy.context.view_layer
+        layer.use_pass_z = layer.use_pass_normal = scene.farlight.use_pass_albedo = True
+        scene.use_nodes = True
+        tree = scene.node_tree
+        source = tree.nodes["Render Layers"]
+        layer.update_render_passes()
+        files = tree.nodes.new("CompositorNodeOutputFile")
+        files.base_path = scenes.FOLDER.name
+        files.format.file_format, files.format.color_depth = "OPEN_EXR", "32"
+        files.file_slots.clear()
+        for name in ("Depth", "Normal", "Denoising Albedo"):
+            files.file_slots.new(name)
+            tree.links.new(source.outputs[name], files.inputs[name])
+        render()
+        scene.use_nodes = False
+        depth, normal, albedo = (load(pathlib.Path(scenes.FOLDER.name) / f"{name}0001.exr")
+                                 for name in ("Depth", "Normal", "Denoising Albedo"))
+        self.assertAlmostEqual(float(depth[36, 48, 0]), 8, delta=0.05)  # half a pixel of a slope
+        self.assertEqual(float(depth[0, 0, 0]), 1e10)
+        np.testing.assert_allclose(normal[36, 48, :3], (0, -math.sin(0.3), math.cos(0.3)), atol=1e-3)
+        np.testing.assert_allclose(albedo[36, 48, :3], (0.6, 0.3, 0.1), atol=1e-3)
+
+
+class Sending(Case):
+    """What the daemon receives, by its own count."""
+
+    def received(self):
+        only = session._sessions[None, None]
+        stats = only.wait(only._client.stats())
+        return stats.clients[0].received_bytes, stats.clients[0].bulk_bytes, only
+
+    def moving(self):
+        scene = empty((0.5, 0.5, 0.5))
+        scene.farlight.samples = 1
+        grid("ground", 20, diffuse(GROUND))
+        thing = ball("ball", diffuse((0.9, 0.1, 0.1, 1)))
+        for frame, x in ((1, -1), (3, 1)):
+            thing.location.x = x
+            thing.keyframe_insert("location", frame=frame)
+        soft = grid("cloth", 3, diffuse((0.1, 0.1, 0.9, 1)), (0, 0, 2))
+        soft.shape_key_add(name="rest")
+        soft.shape_key_add(name="bent").data[0].co.z = 1
+        return scene, thing, soft
+
+    def test_the_same_scene_is_not_sent_again(self):
+        self.moving()
+        first = render()
+        version = next(iter(mirror._mirrors.values())).scene.version
+        before, bulk, _ = self.received()
+        again = render()
+        after, bulk_after, _ = self.received()
+        np.testing.assert_array_equal(first, again)
+        self.assertEqual(bulk_after, bulk)
+        self.assertEqual(next(iter(mirror._mirrors.values())).scene.version, version)
+        self.assertLess(after - before, 2000)  # a job, its cancel and credit
+
+    def test_an_animation_sends_what_moves_alone(self):
+        scene, _, soft = self.moving()
+        render()
+        before, bulk, _ = self.received()
+        scene.frame_set(2)
+        first = render()
+        after, bulk_after, _ = self.received()
+        self.assertEqual(bulk_after, bulk, "a ball that moves is a transform")
+        self.assertLess(after - before, 3000)
+        soft.data.shape_keys.key_blocks["bent"].value = 1
+        second = render()
+        self.assertEqual(self.received()[1] - bulk_after, 4 * (12 + 12), "positions and normals of four corners")
+        self.assertGreater(np.abs(blocks(first) - blocks(second)).max(), 0.02)
+
+    def test_an_animation_is_one_connection_and_its_frames_differ(self):
+        scene, _, _ = self.moving()
+        render()
+        core = session._sessions[None, None]._client._core
+        scene.frame_start, scene.frame_end = 1, 3
+        scene.render.filepath = str(pathlib.Path(scenes.FOLDER.name) / "frame")
+        bpy.ops.render.render(animation=True)
+        pictures = [blocks(load(pathlib.Path(scenes.FOLDER.name) / f"frame{number:04}.exr")) for number in (1, 2, 3)]
+        self.assertIs(session._sessions[None, None]._client._core, core)
+        for one, next_one in zip(pictures, pictures[1:]):
+            self.assertGreater(np.abs(one - next_one).max(), 0.05)
+
+    def test_what_is_removed_is_gone(self):
+        _, thing, _ = self.moving()
+        render()
+        bpy.data.objects.remove(thing)
+        with_nothing = render()
+        made = next(iter(mirror._mirrors.values())).scene
+        self.assertEqual(made.find("node", "ball"), [])
+        self.assertLess((with_nothing[..., 0] - with_nothing[..., 1]).max(), 0.3)  # of the ground; the ball is redder
+
+
+class Trouble(Case):
+    def test_a_job_that_is_cancelled_ends_at_the_daemon_too(self):
+        scene = empty((0.5, 0.5, 0.5))
+        grid("ground", 20, diffuse(GROUND))
+        render()
+        scene.farlight.samples = scene.farlight.step_samples = 4096
+        start = time.monotonic()
+        with self.asked(lambda: time.monotonic() > start + 1):
+            render()
+        self.assertLess(time.monotonic() - start, 8)
+        only = session._sessions[None, None]
+        self.assertEqual(only.wait(only._client.stats()).jobs, 0)
+        scene.farlight.samples, scene.farlight.step_samples = 16, 16
+        self.assertGreater(render()[..., :3].mean(), 0.1)
+
+    def test_a_daemon_that_goes_away_is_told_and_the_next_render_finds_a_new_one(self):
+        scene = empty((0.5, 0.5, 0.5))
+        grid("ground", 20, diffuse(GROUND))
+        first = render()
+        link = session._sessions[None, None]._client._link
+        scene.farlight.samples = scene.farlight.step_samples = 4096
+        start = time.monotonic()
+
+        def kill():
+            if time.monotonic() > start + 1 and link.process.poll() is None:
+                link.process.kill()
+            return False
+        with self.asked(kill), self.assertRaisesRegex(RuntimeError, "farlight: the daemon closed the connection"):
+            render()
+        scene.farlight.samples, scene.farlight.step_samples = 64, 32
+        np.testing.assert_array_equal(render(), first)
+
+    def test_an_address_without_a_daemon(self):
+        scene = empty()
+        scene.farlight.server = "unix:/nowhere/socket"
+        with self.assertRaisesRegex(RuntimeError, "farlight: unix:/nowhere/socket: no daemon can be reached: No such file"):
+            render()
+
+    def test_a_daemon_behind_a_socket_makes_the_same_picture(self):
+        scene = empty((0.5, 0.5, 0.5))
+        grid("ground", 20, diffuse(GROUND))
+        own = render()
+        path = pathlib.Path(scenes.FOLDER.name) / "socket"
+        with subprocess.Popen([pathlib.Path(os.environ["FARLIGHT_LIBEXEC"]) / "farlightd", "--listen", f"unix:{path}"]) as daemon:
+            self.addCleanup(daemon.kill)
+            until = time.monotonic() + 20
+            while not path.exists() and time.monotonic() < until:
+                time.sleep(0.05)
+            scene.farlight.server = f"unix:{path}"
+            np.testing.assert_array_equal(render(), own)
+            daemon.terminate()
+
+    def test_a_scene_without_a_camera(self):
+        scene = empty()
+        bpy.data.objects.remove(scene.camera)
+        with self.assertRaises(RuntimeError):
+            render()
+
+
+def main():
+    os.environ["FARLIGHT_LIBEXEC"] = os.path.abspath(sys.argv[sys.argv.index("--") + 1])
+    names = sys.argv[sys.argv.index("--") + 2:]
+    farlight_blender.register()
+    loader = unittest.TestLoader()
+    loader.testNamePatterns = [f"*{name}*" for name in names] or None
+    result = unittest.TextTestRunner(stream=sys.stderr, verbosity=2).run(loader.loadTestsFromModule(sys.modules[__name__]))
+    farlight_blender.unregister()
+    sys.exit(not result.wasSuccessful())
+
+
+if __name__ == "__main__":
+    main()

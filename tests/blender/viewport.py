@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: MIT
+"""The viewport, in a Blender with a window: what is drawn follows the world, a thing and the camera.
+
+Run by `make blender-test` on a virtual screen. Blender's timers drive it: each step waits until what it expects is on the screen."""
+import os
+import pathlib
+import sys
+import tempfile
+import time
+import traceback
+
+HERE = pathlib.Path(__file__).resolve().parent
+ROOT = HERE.parents[1]
+sys.path[:0] = [str(ROOT / "client/python"), str(ROOT / "client/blender"), str(HERE)]
+
+import bpy  # pylint: disable=wrong-import-position
+import farlight_blender  # pylint: disable=wrong-import-position
+from farlight_blender import session  # pylint: disable=wrong-import-position
+import scenes  # pylint: disable=wrong-import-position
+
+WAIT_S = 60
+FOLDER = tempfile.TemporaryDirectory(prefix="farlight-viewport-")
+
+
+def area():
+    return next(one for one in bpy.context.window_manager.windows[0].screen.areas if one.type == "VIEW_3D")
+
+
+def middle():
+    """The screen's colour in the middle of the viewport: red, green, blue."""
+    path = pathlib.Path(FOLDER.name) / "screen.png"
+    with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
+        bpy.ops.screen.screenshot(filepath=str(path))
+    picture, place = scenes.load(path)[::-1], area()
+    row, column = place.y + place.height // 2, place.x + place.width // 2
+    return picture[row - 2:row + 3, column - 2:column + 3, :3].mean(axis=(0, 1))
+
+
+def world(colour):
+    bpy.context.scene.world.node_tree.nodes["Background"].inputs["Color"].default_value = (*colour, 1)
+
+
+def begin():
+    scene = scenes.empty((0.8, 0.1, 0.1))
+    scene.render.engine, scene.farlight.view_samples = "FARLIGHT", 4
+    area().spaces.active.overlay.show_overlays = area().spaces.active.show_gizmo = False
+    area().spaces.active.shading.type = "RENDERED"
+
+
+def is_red():
+    red, green, _ = middle()
+    return red > 0.5 and red > 2 * green
+
+
+def is_green():
+    red, green, _ = middle()
+    return green > 0.4 and green > 1.5 * red
+
+
+def is_blue():
+    red, _, blue = middle()
+    return blue > 1.5 * red
+
+
+def put_a_ball():
+    shining = scenes.material("shining", Base_Color=(0, 0, 0, 1), Emission=(0, 0, 1, 1), Emission_Strength=1)
+    scenes.ball("ball", shining, (0, 0, 0), 2)
+
+
+def look_away():
+    area().spaces.active.region_3d.view_location.x = 40
+
+
+def no_view_is_left():
+    only = session._sessions[None, None]
+    return only.wait(only._client.stats()).jobs == 0
+
+
+STEPS = [(begin, is_red), (lambda: world((0.1, 0.6, 0.1)), is_green), (put_a_ball, is_blue), (look_away, is_green),
+         (lambda: setattr(area().spaces.active.shading, "type", "SOLID"), no_view_is_left)]
+
+
+def step(state={"at": 0, "since": None}):  # pylint: disable=dangerous-default-value
+    try:
+        action, is_there = STEPS[state["at"]]
+        if state["since"] is None:
+            action()
+            state["since"] = time.monotonic()
+            return 1
+        if not is_there():
+            if time.monotonic() > state["since"] + WAIT_S:
+                raise AssertionError(f"step {state['at']}: the middle is {middle()}")
+            return 1
+        print(f"viewport: step {state['at']} ok", flush=True)
+        state.update(at=state["at"] + 1, since=None)
+        if state["at"] < len(STEPS):
+            return 0.1
+        farlight_blender.unregister()
+        os._exit(0)
+    except Exception:  # pylint: disable=broad-except  # Blender would go on
+        traceback.print_exc()
+        os._exit(1)
+
+
+os.environ["FARLIGHT_LIBEXEC"] = os.path.abspath(sys.argv[sys.argv.index("--") + 1])
+bpy.context.preferences.view.show_splash = False
+farlight_blender.register()
+bpy.app.timers.register(step, first_interval=2)
