@@ -94,7 +94,8 @@ def decode(kind, payload):
     if kind == SET_CAMERA:
         return dict(id=f.take("I"), fov_y=f.take("f"), height=f.take("f"), near=f.take("f"), name=f.string())
     if kind == SET_ENVIRONMENT:
-        return dict(id=0, colour=f.take("3f"), rotation=f.take("f"), size=f.take("2I"), backdrop=f.take("I"), arrays=blob_refs(f))
+        return dict(id=0, colour=f.take("3f"), rotation=f.take("f"), size=f.take("2I"), backdrop=f.take("I"), keeps_image=f.take("I"),
+                    arrays=blob_refs(f))
     if kind == SET_SKIN:
         return dict(id=f.take("I"), joints=f.take("I"), arrays=blob_refs(f), name=f.string())
     if kind == SET_CLIP:

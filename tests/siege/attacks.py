@@ -169,7 +169,7 @@ def environments(address):
     half = struct.pack("<4e", 1, 1, 1, 0)
     images = [(half * 8192 * 4096)[:-8] + struct.pack("<4e", 1 + i, 1, 1, 0) for i in range(2)]
     client.upload(images)
-    fixed = struct.pack("<4f2I", 1, 1, 1, 0, 8192, 4096)
+    fixed = struct.pack("<4f4I", 1, 1, 1, 0, 8192, 4096, 0, 0)
     edits = [(SET_ENVIRONMENT, tiny_client.payload(fixed, tiny_client.array([tiny_client.blob_reference(image)])))
              for image in images]
     begun()
