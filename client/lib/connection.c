@@ -76,7 +76,7 @@ static bool fail_ended(struct fl_connection *connection, struct fl_error *error)
     if (fl_stream_has_remains(&connection->stream))
         how = " in the middle of a message";
     else if (!fl_stream_is_whole(&connection->stream))
-        how = ", or somebody on the way cut it: its sealed end is missing";
+        how = ", or it was cut on the way: its sealed end is missing";
     fl_error_set(error, FL_ERROR_CONNECTION, "", "the daemon closed the connection%s", how);
     error->retryable = true; /* a daemon was there */
     return fl_connection_break(connection, error);

@@ -13,7 +13,7 @@ struct gateway_options {
     int (*interrupt_signal)(void);
 };
 
-/* Reads "HOST:PORT". *is_loopback: nobody beyond this machine can come there. */
+/* Reads "HOST:PORT". *is_loopback: only this machine can come there. */
 bool gateway_read_listen(const char *text, struct gateway_options *options, bool *is_loopback,
                          struct fl_error *error);
 /* Prints the link and serves until there is a signal, which is FL_ERROR_INTERRUPTED. */

@@ -22,8 +22,7 @@ static const struct argp_option options[] = {
      "Serve the page here, at an IPv4 address of this machine (default " LISTEN_DEFAULT "; port 0: any free one)",
      0},
     {"insecure", KEY_INSECURE, NULL, 0,
-     "Let --listen be beyond this machine: whoever can read the network's traffic gets the link and the pictures",
-     0},
+     "Let --listen be beyond this machine: who can read the network's traffic gets the link and the pictures", 0},
     {"viewers", KEY_VIEWERS, "N", 0, "Let N browsers look at once, 1 to 64 (default 8)", 0},
     {0}};
 

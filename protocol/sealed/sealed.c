@@ -288,7 +288,7 @@ static enum sealed_result take_server_proof(struct sealed *sealed, const uint8_t
     uint8_t proof[PROOF_BYTES];
     sealed_server_proof(sealed, bytes, proof);
     if (sodium_memcmp(proof, bytes + UNPROVED_BYTES, PROOF_BYTES) != 0) {
-        return sealed_fatal(sealed, error, "proof", "whoever answers does not have the key");
+        return sealed_fatal(sealed, error, "proof", "the other side does not have the key");
     }
     sealed_begin_receiving(sealed, bytes + HEAD_BYTES);
     sealed->stage = STAGE_OPEN;

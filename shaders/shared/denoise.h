@@ -21,7 +21,7 @@
 #define DENOISE_MOST 0.75f
 /* The weight of what samples say that do not. */
 #define DENOISE_WHISPER (1.0f / 4096.0f)
-/* In place of a motion: nobody knows. */
+/* In place of a motion: it is not known. */
 #define DENOISE_ANEW 1e30f
 #define DENOISE_MOVED_TEXELS 3u /* an instance: rows of a matrix, from where it is to where it was */
 

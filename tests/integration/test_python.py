@@ -103,7 +103,7 @@ class Codec(Case):
         self.assertEqual(scene.version, version)
         scene.change(material, roughness=0.5)
         passing = scene.add_node()
-        scene.remove(passing)  # which nobody has seen
+        scene.remove(passing)  # which was never sent
         self.assertEqual([edit.NAME for edit in scene.edits_since(version)], ["set_material"])
         lamp = scene.objects("node")[-1]
         scene.change(scene.shown(lamp), colour=(9, 9, 9))
@@ -599,7 +599,7 @@ class Faults(Case):
 
 
 class Changed:
-    """Somebody on the way, who changes a byte of the daemon's."""
+    """Changes a byte of the daemon's on the way."""
 
     def __init__(self, port):
         self.port = port

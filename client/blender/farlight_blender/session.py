@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Connections to daemons. Blender forbids Python threads of one's own: a connection lives while somebody waits for it, in
+"""Connections to daemons. Blender forbids Python threads of one's own: a connection lives while it is waited for, in
 slices, between which Blender is asked whether the user has cancelled."""
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class Session:
                 raise Stopped
 
     def idle(self) -> None:
-        """Answers the daemon while nobody waits: it would take us for dead."""
+        """Answers the daemon between waits: it would take us for dead."""
         self.wait(asyncio.sleep(0.001))
 
     async def client(self) -> AsyncClient:

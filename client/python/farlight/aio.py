@@ -118,7 +118,7 @@ class AsyncClient:
             self._flush(core)
             self._wake()
         if writer is not None:
-            writer.transport.abort()  # nobody waits for what cannot be sent
+            writer.transport.abort()  # what cannot be sent is not waited for
 
     def _flush(self, core: Core) -> None:
         if core is self._core and self._writer is not None and (unsent := core.unsent()):

@@ -301,7 +301,7 @@ class Core:
             try:
                 answer, _ = yield from self.ask(messages.SceneAttach(number, scene.name))
                 state.revision = answer.revision
-                # Nobody has changed it since: it has all that was sent.
+                # It has not changed since: it has all that was sent.
                 state.version = before.version if before and before.revision == answer.revision else 0
                 state.scene = number
                 return

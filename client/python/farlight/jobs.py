@@ -41,7 +41,7 @@ class Job:
         return self.render.kind == messages.JobKind.VIEW
 
     def check_begin(self, begin: messages.FrameBegin) -> None:
-        """That it is a frame of what was asked for: nobody makes us keep more."""
+        """That it is a frame of what was asked for: no more than that is kept."""
         render, pixels = self.render, begin.width * begin.height
         width = render.crop_width or render.width * render.views_across
         height = render.crop_height or render.height * render.views_down

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Sealed connections, as the document of the protocol defines them: both ends prove that they have the same key, then
-everything goes in records that nobody on the way can read, change, repeat or leave out. No I/O; the cryptography is the
+everything goes in records that cannot be read, changed, repeated or left out on the way. No I/O; the cryptography is the
 system's libsodium.
 """
 from __future__ import annotations
@@ -53,7 +53,7 @@ def _sodium() -> ctypes.CDLL:
 
 
 def read_key(path: str | os.PathLike[str]) -> bytes:
-    """The 32 bytes of a key file, which nobody but its owner may read or write."""
+    """The 32 bytes of a key file, which its owner alone may read or write."""
     name = os.fspath(path)
     try:
         with open(os.open(name, os.O_RDONLY | os.O_CLOEXEC | os.O_NOCTTY | os.O_NONBLOCK), "rb") as file:
@@ -142,7 +142,7 @@ class Seal:
 
     def _finish(self, message: bytes) -> None:
         if not hmac.compare_digest(_blake2b(self._derive(b"server proof"), self._proving, message[:32]), message[32:]):
-            raise ProtocolError("whoever answers does not have the key", field="sealed")
+            raise ProtocolError("the other side does not have the key", field="sealed")
         state = ctypes.create_string_buffer(STATE_BYTES)
         sodium = _sodium()
         sodium.crypto_secretstream_xchacha20poly1305_init_pull(state, message[8:32], self._derive(b"server stream"))
@@ -206,4 +206,4 @@ class Seal:
     def check_end(self) -> None:
         """The other side has closed: ConnectionLost where something was left off."""
         if not self.is_whole:
-            raise ConnectionLost("the daemon closed the connection, or somebody on the way cut it: its sealed end is missing")
+            raise ConnectionLost("the daemon closed the connection, or it was cut on the way: its sealed end is missing")

@@ -221,7 +221,7 @@ TEST(an_object_is_read_as_it_was_set)
     expect(other, MESSAGE_SET_NODE, 6);
     assert_int_equal(other->message.set_node.kind, PROTOCOL_NODE_SPHERES);
     expect_ok(other, 6);
-    get_object(other, 6, 4, PROTOCOL_OBJECT_ENVIRONMENT, 1); /* black as long as nobody has set it */
+    get_object(other, 6, 4, PROTOCOL_OBJECT_ENVIRONMENT, 1); /* black until it is set */
     expect(other, MESSAGE_SET_ENVIRONMENT, 6);
     assert_true(other->message.set_environment.colour[0] == 0 && other->message.set_environment.keeps_image == 1);
     expect_ok(other, 6);
