@@ -37,14 +37,16 @@ EXPECTED_SKIPS = (
     r"ptrace: ",  # forbidden in many containers
     r"this kernel does not name children",
     r"left to make test-long",  # which .ci/run calls
+    r"programs on such a library need its compiler flags",  # of the sanitizers and of coverage
 )
 # Under the sanitizers each large allocation of Mesa's is mapped and cleared anew, so that what rasterises large
 # structures takes ten times as long, and they see nothing of shaders, which Mesa compiles at run time. Left out are
 # pictures and samples against closed forms, forms of a tracer that differ in shaders, rows of the tracers that rasterise
-# (their rooms' unit tests stay), and programs from end to end where pictures are compared.
+# (their rooms' unit tests stay, but for those of answers), and programs from end to end where pictures are compared.
 NOT_SANITIZED = re.compile(
     r"accuracy/(?!render_frame|tracer_owners|wave_comparison)"
     r"|contract/(.*(ray alone|packets of|rays? a call)|bvh in the plain|ldc|abuffer|rayspace, |quadtree)"
+    r"|unit/trace/(abuffer/traversal|ldc/traversal|quadtree/layers)"
     r"|test_(abuffer|animate|check_device|compare.*|guide|import_animation|layers|ldc|light|models|poses|quadtree|rayspace|shot|siege|view)$")
 # Where no times of an earlier run are known: what takes longest begins first.
 LONGEST_FIRST = ("test_view", "test_import", "accuracy/sampled_against_reference", "accuracy/frame_ahead", "accuracy/emitters",
