@@ -61,6 +61,7 @@ command=$(sed -n 's/^ExecStart=//p' "$root/lib/systemd/system/farlightd.service"
 in_root install -d -o farlight -g farlight /run/farlight /var/lib/farlight /var/cache/farlight
 in_root sh -c "XDG_CACHE_HOME=/var/cache/farlight setsid setpriv --reuid=farlight --regid=farlight --init-groups $command >/run/farlightd.log 2>&1 & echo \$! >/run/farlightd.pid"
 for _ in $(seq 600); do
+    kill -0 "$(cat "$root/run/farlightd.pid")" 2>/dev/null || fail "the daemon does not start: $(cat "$root/run/farlightd.log")"
     ! in_root farlight ping --count 1 --server unix:/run/farlight/farlight.sock >/dev/null 2>&1 || break
     sleep 0.1
 done
