@@ -15,6 +15,10 @@ in_root()
 {
     chroot "$root" /usr/bin/env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root DEBIAN_FRONTEND=noninteractive "$@"
 }
+remove_all()
+{
+    in_root sh -c "dpkg-query -W -f '\${Package}\n' 'farlight*' 'libfarlight*' 'python3-farlight*' 2>/dev/null | xargs -r apt-get purge -y -q" >/dev/null
+}
 end_daemon()
 {
     [ ! -e "$root/run/farlightd.pid" ] || kill "$(cat "$root/run/farlightd.pid")" 2>/dev/null || true
@@ -34,7 +38,7 @@ mountpoint -q "$root/proc" || mount -t proc proc "$root/proc"
 cp -f /etc/resolv.conf "$root/etc/resolv.conf"
 cp -rf /etc/apt/apt.conf.d/. "$root/etc/apt/apt.conf.d/"
 in_root apt-get update -q
-in_root apt-get purge -y -q 'farlight*' 'libfarlight*' >/dev/null 2>&1 || true
+remove_all
 
 # What they need first, so that all that is new afterwards is theirs.
 rm -rf "$root/packages" && mkdir "$root/packages"
@@ -70,7 +74,7 @@ in_root farlight render /tmp/teapot.glb --server unix:/run/farlight/farlight.soc
 [ "$(head -c 4 "$root/tmp/picture.png" | tail -c 3)" = PNG ] || fail "the picture is none"
 end_daemon
 
-in_root sh -c "dpkg-query -W -f '\${Package}\n' 'farlight*' 'libfarlight*' 'python3-farlight*' 2>/dev/null | xargs apt-get purge -y -q" >/dev/null
+remove_all
 listed >build/deb-after.txt
 diff build/deb-before.txt build/deb-after.txt || fail "the packages leave files behind"
 echo "installed, rendered and removed: $(find out/deb -name '*.deb' ! -name '*dbgsym*' | wc -l) packages"
