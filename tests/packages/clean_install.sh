@@ -44,9 +44,9 @@ remove_all
 rm -rf "$root/packages" && mkdir "$root/packages"
 cp out/deb/*.deb "$root/packages"
 rm -f "$root"/packages/*dbgsym*
-needed=$(in_root sh -c 'apt-get install -s --no-install-recommends /packages/*.deb' | sed -n 's/^Inst \([^ ]*\).*/\1/p' | grep -v farlight)
+needed=$(in_root sh -c 'apt-get install -s --no-install-recommends /packages/*.deb' | sed -n '/^Inst [^ ]*farlight/d; s/^Inst \([^ ]*\).*/\1/p')
 # shellcheck disable=SC2086
-in_root apt-get install -y -q --no-install-recommends $needed >/dev/null
+[ -z "$needed" ] || in_root apt-get install -y -q --no-install-recommends $needed >/dev/null
 listed()
 {
     (cd "$root" && find . -xdev \( -path ./proc -o -path ./packages -o -path ./var/cache -o -path ./var/lib/apt -o -path ./var/log \
