@@ -100,7 +100,7 @@ _CLASSES = (FarlightPreferences, FarlightSettings, FARLIGHT_PT_sampling, FARLIGH
 
 
 def _others() -> Any:
-    """Blender's own panels for lamps, materials, cameras and worlds that any engine may have."""
+    """Blender's own panels for lights, materials, cameras and worlds that any engine may have."""
     left_out = {"VIEWLAYER_PT_filter", "VIEWLAYER_PT_layer_passes"}
     for panel in bpy.types.Panel.__subclasses__():
         if "BLENDER_RENDER" in getattr(panel, "COMPAT_ENGINES", ()) and panel.__name__ not in left_out:
