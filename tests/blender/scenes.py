@@ -70,7 +70,7 @@ def ball(name, of=None, place=(0, 0, 1), radius=1.0):
     return made
 
 
-def lamp(kind, energy, place=(0, 0, 4), turn=(0, 0, 0), **values):
+def add_light(kind, energy, place=(0, 0, 4), turn=(0, 0, 0), **values):
     data = bpy.data.lights.new(kind.lower(), kind)
     data.energy = energy
     for name, value in values.items():

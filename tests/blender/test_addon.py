@@ -23,7 +23,7 @@ import numpy as np  # pylint: disable=wrong-import-position
 import farlight_blender  # pylint: disable=wrong-import-position
 from farlight_blender import engine, mirror, session  # pylint: disable=wrong-import-position
 import scenes  # pylint: disable=wrong-import-position
-from scenes import (ball, blocks, diffuse, empty, grid, image, lamp, load, material, put,  # pylint: disable=wrong-import-position
+from scenes import (add_light, ball, blocks, diffuse, empty, grid, image, load, material, put,  # pylint: disable=wrong-import-position
                     render, textured)
 
 GROUND = (0.8, 0.5, 0.3, 1)
@@ -55,23 +55,23 @@ class Lights(Case):
 
     def test_a_ball_of_light_has_the_power_that_it_has_in_cycles(self):
         self.ground()
-        lamp("POINT", 500, (2, -2, 4), shadow_soft_size=0.2)
+        add_light("POINT", 500, (2, -2, 4), shadow_soft_size=0.2)
         self.assert_like_cycles(0.01, 0.05)
 
     def test_a_sun_has_the_irradiance_that_it_has_in_cycles(self):
         self.ground()
-        lamp("SUN", 3, turn=(0.5, 0.3, 0), angle=0)
+        add_light("SUN", 3, turn=(0.5, 0.3, 0), angle=0)
         self.assert_like_cycles(0.01, 0.05)
 
     def test_a_spot_has_the_cone_that_it_has_in_cycles(self):
         self.ground()
-        lamp("SPOT", 800, (0, 0, 6), shadow_soft_size=0, spot_size=1.0, spot_blend=0.5)
+        add_light("SPOT", 800, (0, 0, 6), shadow_soft_size=0, spot_size=1.0, spot_blend=0.5)
         # Cycles 3.x also weakens a spot by the cosine from its axis, 0.88 at the edge of this one, and its edge is another curve.
         self.assert_like_cycles(0.06, 0.16)
 
     def test_a_panel_has_the_power_that_it_has_in_cycles(self):
         self.ground()
-        lamp("AREA", 500, (2, -1, 4), (0, 0.5, 0), shape="RECTANGLE", size=2, size_y=1)
+        add_light("AREA", 500, (2, -1, 4), (0, 0.5, 0), shape="RECTANGLE", size=2, size_y=1)
         self.assert_like_cycles(0.01, 0.05)
 
     def test_the_world_lights_and_is_seen(self):
@@ -170,7 +170,7 @@ class Things(Case):
     def test_principled_materials(self):
         scene = empty((0.6, 0.6, 0.6))
         grid("ground", 20, diffuse(GROUND))
-        lamp("AREA", 300, (2, -2, 5), (0.3, 0.3, 0), shape="SQUARE", size=2)
+        add_light("AREA", 300, (2, -2, 5), (0.3, 0.3, 0), shape="SQUARE", size=2)
         for x, y, values in ((-3, 0, {"Base_Color": (0.2, 0.3, 0.8, 1), "Roughness": 0.2, "Specular": 0.9}),
                              (-1, 0, {"Metallic": 1, "Roughness": 0.3, "Base_Color": (0.9, 0.7, 0.3, 1)}),
                              (1, 0, {"Transmission": 1, "Roughness": 0, "IOR": 1.45, "Base_Color": (1, 1, 1, 1)}),
@@ -205,7 +205,7 @@ class Things(Case):
         tree.links.new(bumpy.outputs["Color"], normals.inputs["Color"])
         tree.links.new(normals.outputs["Normal"], tree.nodes["Principled BSDF"].inputs["Normal"])
         grid("ground", 8, tiled)
-        lamp("SUN", 3, turn=(0.8, 0.5, 0), angle=0)
+        add_light("SUN", 3, turn=(0.8, 0.5, 0), angle=0)
         # As above: diffuse light below the mirroring surface. The worst part is of a colour that is nearly black.
         self.assert_like_cycles(0.06, 0.3)
 

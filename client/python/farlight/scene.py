@@ -168,7 +168,7 @@ class Scene:
         self.set(replace(edit, **values))
 
     def shown(self, node: Object) -> Object | None:
-        """What a node shows: change(shown(lamp), colour=(9, 9, 9))."""
+        """What a node shows: change(shown(light), colour=(9, 9, 9))."""
         edit = self.get(node)
         kind = next((kind for kind, shows in _SHOWN.items() if shows == edit.kind), None)
         return None if kind is None else Object(kind, edit.object)
