@@ -35,8 +35,8 @@
 /* Steps of about a half of the area: each costs a stream of pictures a key frame. */
 static const unsigned scales_32nds[] = {32, 24, 16, 12, 8, 0};
 /* Steps of at most a fifth of it: what a deadline leaves is used. */
-static const unsigned scales_of_deadline_32nds[] = {32, 30, 28, 26, 24, 22, 20, 18, 16,
-                                                    15, 14, 13, 12, 11, 10, 9,  8,  0};
+static const unsigned scales_of_deadline_32nds[] = {32, 30, 28, 26, 24, 22, 20, 18, 16, 15, 14,
+                                                    13, 12, 11, 10, 9,  8,  7,  6,  5,  0};
 
 /* ---- what pictures cost ------------------------------------------------------------------------------ */
 

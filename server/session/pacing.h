@@ -36,7 +36,7 @@ struct pacing_terms {
 
 /* What the next frame is to be. */
 struct pacing_advice {
-    unsigned scale_32nds; /* of width and height: 32, 24, 16, 12, 8; for a deadline finer */
+    unsigned scale_32nds; /* of width and height: 32, 24, 16, 12, 8; for a deadline finer, down to 5 */
     unsigned quality;     /* as JPEG has it, PACING_QUALITY_MIN .. the wanted one */
     uint64_t bytes;       /* that a frame may have, for an encoder that can be told */
     unsigned margin_halves_less, samples, depth_less;

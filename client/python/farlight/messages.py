@@ -2061,7 +2061,7 @@ class Render(Message):
         this, in the picture's linear values; what one rough surface scatters to the eye stays whole. Behind a rough
         surface no sharper one is seen, by less with every sample. 0: neither
     moving_rate: view: frames a second that are to be rendered while it moves. They go without what the eye misses least
-        until they are: samples beyond one, then size, down to a quarter of the width, then bounces beyond two. Frames
+        until they are: samples beyond one, then size, down to a sixth of the width, then bounces beyond two. Frames
         state what they have. At rest it has no effect. 0: nothing is given up for it
     noise: above 0: a tile of the picture gets no more samples once its estimated error is below this, relative to its
         light, and `samples` is the most that one gets. Not with compare, nor with views that are made from layers. 0:
