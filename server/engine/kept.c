@@ -7,8 +7,8 @@
 /* Between two times that a scene is kept: at least this, and this many times as long as its changes waited. */
 #define PAUSE_NS UINT64_C(1000000000)
 #define PAUSE_OF_READ 20
-/* At the end. */
-#define STOP_NS UINT64_C(200000000)
+/* At the end, for changes that clients were told are made: a daemon that is told to stop ends within a second. */
+#define STOP_NS UINT64_C(800000000)
 
 static bool has_news(const struct engine_scene *scene)
 {
