@@ -138,7 +138,7 @@ COMMAND_LINE_OBJ := $(call obj,$(addprefix client/cli/,daemon.c image_path.c int
     job_views.c key.c models.c parse.c retry.c talk.c \
     watch.c))
 VIEWER_OBJ := $(call obj,$(VIEWER_C)) $(COMMAND_LINE_OBJ)
-WEB_OBJ := $(call obj,$(WEB_C)) $(COMMAND_LINE_OBJ)
+WEB_OBJ := $(call obj,$(WEB_C) client/cli/wave_table.c) $(COMMAND_LINE_OBJ)
 
 # The library for others' programs: position-independent, only what farlight.h declares is visible.
 SONAME := libfarlight.so.$(firstword $(subst ., ,$(VERSION)))

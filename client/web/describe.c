@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "web/describe.h"
+#include "cli/cli.h"
 
 #include <jansson.h>
 #include <stdlib.h>
@@ -90,12 +91,30 @@ static json_t *stages(const struct fl_frame *frame)
 char *web_describe_frame(const struct fl_frame *frame, uint32_t id)
 {
     return print(
-        json_pack("{s:I,s:I,s:I,s:I,s:I,s:s,s:b,s:b,s:s,s:s,s:f,s:f,s:o,s:o}", "frame", (json_int_t)frame->frame,
-                  "id", (json_int_t)id, "width", (json_int_t)frame->width, "height", (json_int_t)frame->height,
-                  "samples", (json_int_t)frame->samples, "encoding", protocol_encoding_text(frame->encoding),
-                  "key", frame->key_frame, "moving", frame->moving, "tracer", protocol_tracer_text(frame->tracer),
+        json_pack("{s:I,s:I,s:I,s:I,s:I,s:I,s:s,s:b,s:b,s:s,s:s,s:f,s:f,s:o,s:o}", "frame",
+                  (json_int_t)frame->frame, "revision", (json_int_t)frame->revision, "id", (json_int_t)id, "width",
+                  (json_int_t)frame->width, "height", (json_int_t)frame->height, "samples",
+                  (json_int_t)frame->samples, "encoding", protocol_encoding_text(frame->encoding), "key",
+                  frame->key_frame, "moving", frame->moving, "tracer", protocol_tracer_text(frame->tracer),
                   "integrator", protocol_integrator_text(frame->integrator), "fov", (double)frame->fov_y, "time",
                   (double)frame->time_s, "camera", numbers(frame->world_from_view, 12), "stages", stages(frame)));
+}
+
+char *web_describe_errors(const struct fl_frame *frame, double far_share, uint32_t id)
+{
+    return print(json_pack("{s:{s:I,s:I,s:I,s:I,s:I,s:s,s:s,s:f,s:o,s:o}}", "errors", "compare", (json_int_t)id,
+                           "width", (json_int_t)frame->width, "height", (json_int_t)frame->height, "samples",
+                           (json_int_t)frame->samples, "revision", (json_int_t)frame->revision, "tracer",
+                           protocol_tracer_text(frame->tracer), "reference",
+                           protocol_tracer_text(PROTOCOL_TRACER_REFERENCE), "far_share", far_share, "waves",
+                           cli_waves_json(frame), "all", cli_wave_total_json(frame)));
+}
+
+char *web_describe_refusal(const struct fl_error *error, uint32_t id)
+{
+    char line[1200];
+    fl_error_print(error, line, sizeof(line));
+    return print(json_pack("{s:{s:I,s:s}}", "refused", "compare", (json_int_t)id, "text", line));
 }
 
 char *web_describe_error(const struct fl_error *error, bool again)

@@ -15,6 +15,8 @@ EMBED(page_style, "page.css");
 EMBED(page_main, "page.js");
 EMBED(page_camera, "camera.js");
 EMBED(page_picture, "picture.js");
+EMBED(page_errors, "errors.js");
+EMBED(page_stages, "stages.js");
 EMBED(page_refusal, "denied.html");
 
 #define HTML "text/html; charset=utf-8"
@@ -26,6 +28,8 @@ static const struct page_file files[] = {
     {"page.js", SCRIPT, page_main, page_main_end},
     {"camera.js", SCRIPT, page_camera, page_camera_end},
     {"picture.js", SCRIPT, page_picture, page_picture_end},
+    {"errors.js", SCRIPT, page_errors, page_errors_end},
+    {"stages.js", SCRIPT, page_stages, page_stages_end},
 };
 
 const struct page_file page_denied = {"", HTML, page_refusal, page_refusal_end};

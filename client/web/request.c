@@ -91,6 +91,16 @@ static bool read_look(json_t *json, struct web_request *request, struct fl_error
     return true;
 }
 
+static bool read_compare(json_t *json, struct web_request *request, struct fl_error *error)
+{
+    const json_int_t id = json_is_integer(json) ? json_integer_value(json) : -1;
+    if (id < 0 || id > UINT32_MAX)
+        return refuse(error, "compare", "is no number of 32 bits");
+    request->kind = WEB_COMPARE;
+    request->id = (uint32_t)id;
+    return true;
+}
+
 static bool read_one(const char *name, json_t *value, struct web_request *request, struct fl_error *error)
 {
     if (strcmp(name, "show") == 0) {
@@ -105,6 +115,8 @@ static bool read_one(const char *name, json_t *value, struct web_request *reques
         request->kind = WEB_KEY;
         return true;
     }
+    if (strcmp(name, "compare") == 0)
+        return read_compare(value, request, error);
     const json_int_t shown = json_integer_value(value);
     if (strcmp(name, "shown") != 0 || shown < 1 || shown > SHOWN_MAX)
         return refuse(error, "message", "nothing that a page sends");

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What a page sends, read once and checked here: JSON with one of "show", "look", "shown", "compare", "key". No
+/* What a page sends, read once and checked here: JSON with one of "show", "look", "shown", "key", "compare". No
  * I/O. */
 #ifndef FARLIGHT_CLIENT_WEB_REQUEST_H
 #define FARLIGHT_CLIENT_WEB_REQUEST_H
@@ -11,10 +11,11 @@
 #define WEB_HEIGHT_MAX 2160u
 
 enum web_request_kind {
-    WEB_SHOW,  /* {"show": {"width", "height", "h264", "tracer", "integrator", "clip"}} */
-    WEB_LOOK,  /* {"look": {"id", "eye", "at", "up", "fov", "time", "moving", "node"}} */
-    WEB_SHOWN, /* {"shown": N}: another N frames are on the screen */
-    WEB_KEY    /* {"key": true}: a frame in H.264 could not be decoded */
+    WEB_SHOW,   /* {"show": {"width", "height", "h264", "tracer", "integrator", "clip"}} */
+    WEB_LOOK,   /* {"look": {"id", "eye", "at", "up", "fov", "time", "moving", "node"}} */
+    WEB_SHOWN,  /* {"shown": N}: another N frames are on the screen */
+    WEB_KEY,    /* {"key": true}: a frame in H.264 could not be decoded */
+    WEB_COMPARE /* {"compare": N}: the picture's tracer is to be held against the reference; the answer names N */
 };
 
 /* Which picture. */
@@ -30,7 +31,7 @@ struct web_request {
     enum web_request_kind kind;
     struct web_show show;
     struct fl_view_camera camera;
-    uint32_t id; /* the page's number for the camera, which frames name */
+    uint32_t id; /* the page's number for the camera, which frames name, or for the comparison */
     uint32_t shown;
 };
 

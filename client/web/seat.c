@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "web/seat.h"
 #include "web/describe.h"
+#include "web/error_map.h"
 
 #include <errno.h>
 #include <poll.h>
@@ -10,7 +11,7 @@
 #include <sys/eventfd.h>
 #include <unistd.h>
 
-#define FRAMES_ON_THE_WAY 2u /* to the browser and not shown yet: further ones would only be late */
+#define ON_THE_WAY_MAX 2u /* to the browser and not shown yet: further ones would only be late */
 #define FRAMES_PER_SECOND 60.0f
 #define MOVING_RATE 15.0f
 #define LOOKS_REMEMBERED 256u
@@ -23,9 +24,10 @@ struct seat {
     int wake_fd, end_fd; /* events: there is something to do; it is over */
 
     pthread_mutex_t lock; /* guards what follows */
-    bool wants_show, wants_look, wants_key;
-    struct web_request show, look;
-    unsigned on_the_way;
+    bool wants_show, wants_look, wants_key, wants_compare;
+    struct web_request show, look, compare;
+    unsigned queued;     /* parcels from `first` on */
+    unsigned on_the_way; /* frames that were taken and are not shown */
     bool has_ended;
     struct parcel *first, **end;
 
@@ -34,7 +36,10 @@ struct seat {
     struct fl_scene *scene;
     struct fl_view *view;
     struct record_clip_use clip;
-    bool is_described;
+    struct message_render render; /* as the view was last asked for */
+    struct fl_view_camera camera; /* likewise, if has_camera */
+    bool has_camera, is_described;
+    struct error_map errors;
     unsigned idle_rounds;
     uint32_t ids[LOOKS_REMEMBERED]; /* the page's numbers of cameras, by ours, modulo */
 };
@@ -68,7 +73,7 @@ static bool post(struct seat *seat, char *head, const uint8_t *tail, size_t tail
     pthread_mutex_lock(&seat->lock);
     *seat->end = parcel;
     seat->end = &parcel->next;
-    seat->on_the_way += tail != NULL;
+    seat->queued++;
     pthread_mutex_unlock(&seat->lock);
     seat->options.changed(seat->options.user);
     return true;
@@ -76,9 +81,10 @@ static bool post(struct seat *seat, char *head, const uint8_t *tail, size_t tail
 
 /* ---- the view ---- */
 
-static void fill_render(struct seat *seat, const struct web_show *show, struct message_render *render)
+static void fill_render(struct seat *seat, const struct web_show *show)
 {
     const struct fl_camera_info *first = fl_scene_camera(seat->scene, 0);
+    struct message_render *render = &seat->render;
     *render = fl_view_defaults();
     render->width = show->width;
     render->height = show->height;
@@ -114,13 +120,13 @@ static bool describe(struct seat *seat, const struct message_render *render, str
 
 static bool show(struct seat *seat, const struct web_show *wanted, struct fl_error *error)
 {
-    struct message_render render;
-    fill_render(seat, wanted, &render);
-    if (!seat->is_described && !describe(seat, &render, error))
+    error_map_end(&seat->errors);
+    fill_render(seat, wanted);
+    if (!seat->is_described && !describe(seat, &seat->render, error))
         return false;
     if (seat->view)
-        return fl_view_change(seat->view, &render, error);
-    seat->view = fl_view_start(seat->scene, &render, error);
+        return fl_view_change(seat->view, &seat->render, error);
+    seat->view = fl_view_start(seat->scene, &seat->render, error);
     if (seat->view)
         fl_view_keep_jpeg(seat->view, true);
     return seat->view != NULL;
@@ -129,16 +135,20 @@ static bool show(struct seat *seat, const struct web_show *wanted, struct fl_err
 static bool look(struct seat *seat, const struct web_request *wanted, struct fl_error *error)
 {
     uint64_t command = 0;
+    error_map_end(&seat->errors);
     if (!fl_view_look(seat->view, &wanted->camera, &command, error))
         return false;
     seat->ids[command % LOOKS_REMEMBERED] = wanted->id;
+    seat->camera = wanted->camera;
+    seat->has_camera = true;
     return true;
 }
 
 static bool may_send(struct seat *seat)
 {
     pthread_mutex_lock(&seat->lock);
-    const bool may = seat->on_the_way < FRAMES_ON_THE_WAY;
+    /* A browser may say that it has shown what it has not read; what waits for it counts all the same. */
+    const bool may = seat->queued + seat->on_the_way < ON_THE_WAY_MAX;
     pthread_mutex_unlock(&seat->lock);
     return may;
 }
@@ -158,19 +168,60 @@ static bool pass_frames(struct seat *seat, struct fl_error *error)
     return true;
 }
 
+/* ---- the errors of its tracer ---- */
+
+/* Of a comparison that cannot be made the page is told, and its view goes on. */
+static bool refuse_compare(struct seat *seat, struct fl_error *error)
+{
+    struct fl_error refusal = *error;
+    const uint32_t id = seat->errors.id;
+    error_map_end(&seat->errors);
+    if (refusal.code != FL_ERROR_REFUSED && refusal.code != FL_ERROR_ARGUMENT)
+        return false;
+    *error = (struct fl_error){0};
+    return post(seat, web_describe_refusal(&refusal, id), NULL, 0, error);
+}
+
+static bool compare(struct seat *seat, uint32_t id, struct fl_error *error)
+{
+    const bool is_begun =
+        error_map_begin(&seat->errors, seat->scene, &seat->render, seat->has_camera ? &seat->camera : NULL, error);
+    seat->errors.id = id;
+    return is_begun || refuse_compare(seat, error);
+}
+
+static bool pass_errors(struct seat *seat, struct fl_error *error)
+{
+    struct error_map *map = &seat->errors;
+    if (!map->job || !may_send(seat))
+        return true;
+    if (!error_map_step(map, seat->scene, error))
+        return error->code == FL_ERROR_NONE || refuse_compare(seat, error);
+    const bool sent = post(seat, web_describe_errors(map->frame, (double)map->render.compare_far, map->id),
+                           map->frame->pixels, (size_t)map->frame->width * map->frame->height, error);
+    error_map_end(map);
+    return sent;
+}
+
 /* ---- the thread ---- */
 
 static bool do_what_came(struct seat *seat, struct fl_error *error)
 {
     pthread_mutex_lock(&seat->lock);
     const bool wants_show = seat->wants_show, wants_look = seat->wants_look, wants_key = seat->wants_key;
-    const struct web_request shown = seat->show, looked = seat->look;
+    /* Each answer is a parcel, and those that wait are counted. */
+    const bool wants_compare =
+        seat->wants_compare && seat->view && seat->queued + seat->on_the_way < ON_THE_WAY_MAX;
+    const struct web_request shown = seat->show, looked = seat->look, compared = seat->compare;
+    seat->wants_compare = seat->wants_compare && !wants_compare;
     seat->wants_show = seat->wants_key = false;
     seat->wants_look = wants_look && !seat->view && !wants_show;
     pthread_mutex_unlock(&seat->lock);
     if (wants_show && !show(seat, &shown.show, error))
         return false;
     if (wants_look && seat->view && !look(seat, &looked, error))
+        return false;
+    if (wants_compare && !compare(seat, compared.id, error))
         return false;
     return !wants_key || !seat->view || fl_view_want_key_frame(seat->view, error);
 }
@@ -229,7 +280,7 @@ static void serve(struct seat *seat, struct fl_error *error)
             return;
         /* Answers pings, and notices that the daemon is gone, also while no frame is wanted. */
         if (!do_what_came(seat, error) || !fl_connection_wait(seat->connection, 0, error) ||
-            !pass_frames(seat, error))
+            !pass_frames(seat, error) || !pass_errors(seat, error))
             return;
     } while (wait_for_work(seat));
 }
@@ -241,6 +292,7 @@ static void *work(void *argument)
     serve(seat, &error);
     if (error.code != FL_ERROR_NONE && error.code != FL_ERROR_INTERRUPTED)
         post(seat, web_describe_error(&error, error.code != FL_ERROR_ARGUMENT), NULL, 0, &ignored);
+    error_map_end(&seat->errors);
     fl_view_destroy(seat->view);
     fl_scene_destroy(seat->scene);
     fl_connection_destroy(seat->connection);
@@ -298,6 +350,9 @@ void seat_tell(struct seat *seat, const struct web_request *request)
         seat->wants_look = true;
     } else if (request->kind == WEB_KEY) {
         seat->wants_key = true;
+    } else if (request->kind == WEB_COMPARE) {
+        seat->compare = *request;
+        seat->wants_compare = true;
     } else {
         seat->on_the_way -= request->shown < seat->on_the_way ? request->shown : seat->on_the_way;
     }
@@ -312,9 +367,13 @@ struct parcel *seat_take(struct seat *seat, bool *has_ended)
     if (parcel) {
         seat->first = parcel->next;
         seat->end = seat->first ? seat->end : &seat->first;
+        seat->queued--;
+        seat->on_the_way += !parcel->is_text;
     }
     *has_ended = !seat->first && seat->has_ended;
     pthread_mutex_unlock(&seat->lock);
+    if (parcel && parcel->is_text)
+        signal_event(seat->wake_fd); /* there is room for another one */
     return parcel;
 }
 

@@ -88,6 +88,47 @@ class Web(Case):
         names = {stage[0] for stage in frame["stages"]}
         self.assertLessEqual({"trace", "shade", "encode"}, names)
 
+    def errors(self, view, number):
+        """(what is said of them, a byte a pixel) of the comparison of that number."""
+        view.send({"compare": number})
+        while True:
+            kind, data = view.receive()
+            size = int.from_bytes(data[:4], "little")
+            if kind == BINARY:
+                view.send({"shown": 1})
+            else:
+                self.assertNotIn(b"refused", data)
+            if kind == BINARY and "errors" in (header := json.loads(data[4:4 + size])):
+                return header["errors"], data[4 + size:]
+
+    def test_errors_of_a_tracer_are_those_of_compare(self):
+        view = self.view(tracer="abuffer")
+        told, errors = self.errors(view, 5)
+        self.assertEqual((told["compare"], told["width"], told["height"]), (5, 96, 64))
+        self.assertEqual(len(errors), 96 * 64)
+        result = farlight("compare", bundled_scenes() / "teapot.glb", "--tracers", "abuffer,reference", "--size", "96x64",
+                          "--samples", 4, "--integrator", "whitted", "--json", "-q")
+        figures = json.loads(result.stdout)
+        for name in ("rays", "both_hit", "only_tracer", "only_reference", "far", "edges", "other_surface", "agree"):
+            self.assertEqual(told["all"][name], figures["all"][name], name)
+        self.assertEqual([(wave["wave"], wave["kind"], wave.get("normal_p99")) for wave in told["waves"]],
+                         [(wave["wave"], wave["kind"], wave.get("normal_p99")) for wave in figures["waves"]])
+        self.assertGreater(max(errors), 10)
+        # Another camera, and another tracer, which has hardly any.
+        view.send({"show": {**SHOW, "tracer": "bvh"}})
+        view.send({"look": {**LOOK, "moving": False}})
+        told, errors = self.errors(view, 6)
+        self.assertEqual((told["compare"], told["tracer"]), (6, "bvh"))
+        self.assertGreater(told["all"]["agree"], 0.9999)
+        self.assertLess(sum(errors), len(errors))
+
+    def test_moving_on_ends_a_comparison(self):
+        view = self.view(tracer="abuffer")
+        view.send({"compare": 1})
+        view.send({"look": {**LOOK, "moving": False}})
+        told, _ = self.errors(view, 2)
+        self.assertEqual(told["compare"], 2)
+
     def test_each_viewer_has_a_camera_of_its_own(self):
         first, second = self.view(), self.view()
         eyes = {}
@@ -117,7 +158,8 @@ class Web(Case):
         wrong = (
             (b"{", TEXT, POLICY), (b"[1]", TEXT, POLICY), (b"{}", TEXT, POLICY),
             (b'{"shown": 1, "key": true}', TEXT, POLICY), (b'{"shown": 0}', TEXT, POLICY), (b'{"shown": 1e9}', TEXT, POLICY),
-            (b"[" * 1500, TEXT, POLICY), (b'{"other": 1}', TEXT, POLICY),
+            (b"[" * 1500, TEXT, POLICY), (b'{"other": 1}', TEXT, POLICY), (b'{"compare": -1}', TEXT, POLICY),
+            (b'{"compare": true}', TEXT, POLICY), (b'{"compare": 4294967296}', TEXT, POLICY),
             ({"show": {**SHOW, "width": 100000}}, TEXT, POLICY), ({"show": {**SHOW, "width": -1}}, TEXT, POLICY),
             ({"show": {**SHOW, "tracer": "x"}}, TEXT, POLICY), ({"show": {**SHOW, "more": 1}}, TEXT, POLICY),
             (look(eye=LOOK["at"]), TEXT, POLICY), (look(eye=[1, 2]), TEXT, POLICY), (look(up=[0, 0, 0]), TEXT, POLICY),

@@ -57,7 +57,7 @@ MAY_INCLUDE = {
     "client/output/library": ("protocol/common", "client/output"),
     "client/video": ("protocol", "protocol/pixels", "client/helper", "client/lib"),  # of lib: rate
     "client/cli": ("protocol", "protocol/common", "protocol/sealed", "client/lib"),
-    "client/web": ("protocol/common", "client/lib", "client/cli"),  # no scene file, no pixels: encoded frames pass through
+    "client/web": ("protocol/common", "client/lib", "client/cli"),  # no scene file; pixels are compared, but never encoded
     "client/viewer": ("protocol", "protocol/common", "client/warp", "client/lib", "client/cli"),  # the command line is parsed as that of render
 }
 # Files that every room may include.

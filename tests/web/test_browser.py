@@ -51,8 +51,7 @@ class Page(unittest.TestCase):
 
     def rest(self, page, samples=SAMPLES):
         self.choose(page, "integrator", "whitted")
-        page.wait(f"Number({DATASET}.samples) >= {samples} && {DATASET}.moving === 'false' && "
-                  "document.getElementById('status').textContent.includes('whitted')")
+        page.wait(f"Number({DATASET}.samples) >= {samples} && {DATASET}.moving === 'false' && {DATASET}.integrator === 'whitted'")
 
     def psnr(self, page, *options):
         shown, rendered = self.folder / "shown.png", self.folder / "rendered.png"
@@ -131,7 +130,34 @@ class Page(unittest.TestCase):
         page.value("document.getElementById('play').click()")
         page.wait(f"{DATASET}.moving === 'false'")
         page.value("document.getElementById('stages').click()")
-        self.assertGreater(page.value("document.getElementById('timeline').height"), 50)
+        self.assertGreater(page.value("document.querySelectorAll('#timeline rect').length"), 3)
+        self.assertEqual(page.faults, [])
+
+    def test_errors_of_the_tracer_are_shown_with_their_figures(self):
+        page = self.open()
+        self.choose(page, "tracer", "abuffer")
+        self.choose(page, "integrator", "whitted")
+        page.wait(f"{DATASET}.tracer === 'abuffer'")
+        page.value("document.getElementById('compare').click()")
+        page.wait(f"{DATASET}.compared === 'abuffer'")
+        coloured = page.value("(() => { const map = document.getElementById('errors'); const {data} = "
+                              "map.getContext('2d').getImageData(0, 0, map.width, map.height); let count = 0; "
+                              "for (let i = 0; i < data.length; i += 4) count += data[i] > 40; return count / (map.width * map.height); })()")
+        said = page.value("document.getElementById('errors-figures').innerText")
+        print(f"errors of abuffer: {coloured:.2%} of the pixels; {' '.join(said.split())}")
+        # A tracer of samples errs somewhere, and is right nearly everywhere.
+        self.assertGreater(coloured, 0)
+        self.assertLess(coloured, 0.5)
+        self.drag(page)  # another picture has other errors
+        page.wait(f"{DATASET}.compared === undefined || {DATASET}.moving === 'true'")
+        page.wait(f"{DATASET}.compared === 'abuffer'")
+        # The exact tracer has the reference's picture.
+        self.choose(page, "tracer", "bvh")
+        page.wait(f"{DATASET}.compared === 'bvh'")
+        said = page.value("document.getElementById('errors-state').textContent")
+        self.assertLess(float(said.split()[0]), 0.1, said)
+        self.choose(page, "tracer", "reference")
+        page.wait("document.getElementById('errors-state').textContent.includes('itself')")
         self.assertEqual(page.faults, [])
 
     def test_page_comes_back_with_the_daemon(self):
