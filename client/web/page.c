@@ -18,6 +18,7 @@ EMBED(page_picture, "picture.js");
 EMBED(page_errors, "errors.js");
 EMBED(page_stages, "stages.js");
 EMBED(page_refusal, "denied.html");
+EMBED(page_elsewhere, "misdirected.html");
 
 #define HTML "text/html; charset=utf-8"
 #define SCRIPT "text/javascript; charset=utf-8"
@@ -33,6 +34,7 @@ static const struct page_file files[] = {
 };
 
 const struct page_file page_denied = {"", HTML, page_refusal, page_refusal_end};
+const struct page_file page_misdirected = {"", HTML, page_elsewhere, page_elsewhere_end};
 
 const struct page_file *page_find(const char *name)
 {

@@ -24,7 +24,7 @@ static bool read_show(json_t *json, struct web_show *show, struct fl_error *erro
     json_int_t width = 0, height = 0, clip = 0;
     const char *tracer = NULL, *integrator = NULL;
     int h264 = 0;
-    if (json_unpack_ex(json, &why, JSON_STRICT, "{s:I,s:I,s:b,s:s,s:s,s:I}", "width", &width, "height", &height,
+    if (json_unpack_ex(json, &why, JSON_STRICT, "{s:I,s:I,s:b,s?s,s?s,s:I}", "width", &width, "height", &height,
                        "h264", &h264, "tracer", &tracer, "integrator", &integrator, "clip", &clip) != 0)
         return refuse(error, "show", why.text);
     if (width < SIDE_MIN || width > (json_int_t)WEB_WIDTH_MAX || height < SIDE_MIN ||
@@ -32,9 +32,11 @@ static bool read_show(json_t *json, struct web_show *show, struct fl_error *erro
         return refuse(error, "show.width", "no window has this size");
     if (clip < 0 || clip > UINT32_MAX)
         return refuse(error, "show.clip", "is no clip");
-    if (!protocol_tracer_parse(tracer, &show->tracer))
+    show->has_tracer = tracer != NULL;
+    show->has_integrator = integrator != NULL;
+    if (tracer && !protocol_tracer_parse(tracer, &show->tracer))
         return refuse(error, "show.tracer", "there is no such tracer");
-    if (!protocol_integrator_parse(integrator, &show->integrator))
+    if (integrator && !protocol_integrator_parse(integrator, &show->integrator))
         return refuse(error, "show.integrator", "there is no such integrator");
     show->width = (uint32_t)width;
     show->height = (uint32_t)height;

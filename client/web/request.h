@@ -20,8 +20,8 @@ enum web_request_kind {
 
 /* Which picture. */
 struct web_show {
-    uint32_t width, height; /* pixels */
-    bool h264;
+    uint32_t width, height;                /* pixels */
+    bool h264, has_tracer, has_integrator; /* else those that the gateway was started with */
     enum protocol_tracer tracer;
     enum protocol_integrator integrator;
     uint32_t clip; /* 0: none */

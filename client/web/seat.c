@@ -11,8 +11,6 @@
 #include <sys/eventfd.h>
 #include <unistd.h>
 
-#define ON_THE_WAY_MAX 2u /* to the browser and not shown yet: further ones would only be late */
-#define FRAMES_PER_SECOND 60.0f
 #define MOVING_RATE 15.0f
 #define LOOKS_REMEMBERED 256u
 #define IDLE_MS 1000
@@ -26,10 +24,8 @@ struct seat {
     pthread_mutex_t lock; /* guards what follows */
     bool wants_show, wants_look, wants_key, wants_compare;
     struct web_request show, look, compare;
-    unsigned queued;     /* parcels from `first` on */
-    unsigned on_the_way; /* frames that were taken and are not shown */
     bool has_ended;
-    struct parcel *first, **end;
+    struct web_queue queue;
 
     /* Of the thread. */
     struct fl_connection *connection;
@@ -71,9 +67,7 @@ static bool post(struct seat *seat, char *head, const uint8_t *tail, size_t tail
         memcpy(to + head_bytes, tail, tail_bytes);
     free(head);
     pthread_mutex_lock(&seat->lock);
-    *seat->end = parcel;
-    seat->end = &parcel->next;
-    seat->queued++;
+    web_queue_add(&seat->queue, parcel);
     pthread_mutex_unlock(&seat->lock);
     seat->options.changed(seat->options.user);
     return true;
@@ -81,30 +75,29 @@ static bool post(struct seat *seat, char *head, const uint8_t *tail, size_t tail
 
 /* ---- the view ---- */
 
-static void fill_render(struct seat *seat, const struct web_show *show)
+static bool fill_render(struct seat *seat, const struct web_show *show, struct fl_error *error)
 {
-    const struct fl_camera_info *first = fl_scene_camera(seat->scene, 0);
+    const struct cli_job *job = seat->options.job;
     struct message_render *render = &seat->render;
-    *render = fl_view_defaults();
+    *render = job->options;
     render->width = show->width;
     render->height = show->height;
-    render->tracer = show->tracer;
-    render->integrator = show->integrator;
-    render->frames_per_second = FRAMES_PER_SECOND;
-    render->moving_rate = MOVING_RATE;
+    if (show->has_tracer)
+        render->tracer = show->tracer;
+    if (show->has_integrator)
+        render->integrator = show->integrator;
+    if (render->moving_rate == 0)
+        render->moving_rate = MOVING_RATE;
     render->adapt = 1;
     render->encoding =
         show->h264 && fl_connection_can_h264(seat->connection) ? PROTOCOL_ENCODING_H264 : PROTOCOL_ENCODING_JPEG;
     render->still_encoding = PROTOCOL_ENCODING_JPEG;
-    if (first) {
-        render->camera_path = PROTOCOL_CAMERA_NODE;
-        render->camera_node = first->node;
-    }
     if (show->clip != 0) {
         seat->clip = (struct record_clip_use){.clip = show->clip, .speed = 1, .loop = 1};
         render->clips = &seat->clip;
         render->clips_count = 1;
     }
+    return cli_find_camera(render, job->camera, job->framed, job->has_framing, seat->scene, error);
 }
 
 static bool describe(struct seat *seat, const struct message_render *render, struct fl_error *error)
@@ -121,7 +114,8 @@ static bool describe(struct seat *seat, const struct message_render *render, str
 static bool show(struct seat *seat, const struct web_show *wanted, struct fl_error *error)
 {
     error_map_end(&seat->errors);
-    fill_render(seat, wanted);
+    if (!fill_render(seat, wanted, error))
+        return false;
     if (!seat->is_described && !describe(seat, &seat->render, error))
         return false;
     if (seat->view)
@@ -147,8 +141,7 @@ static bool look(struct seat *seat, const struct web_request *wanted, struct fl_
 static bool may_send(struct seat *seat)
 {
     pthread_mutex_lock(&seat->lock);
-    /* A browser may say that it has shown what it has not read; what waits for it counts all the same. */
-    const bool may = seat->queued + seat->on_the_way < ON_THE_WAY_MAX;
+    const bool may = web_queue_has_room(&seat->queue);
     pthread_mutex_unlock(&seat->lock);
     return may;
 }
@@ -210,8 +203,7 @@ static bool do_what_came(struct seat *seat, struct fl_error *error)
     pthread_mutex_lock(&seat->lock);
     const bool wants_show = seat->wants_show, wants_look = seat->wants_look, wants_key = seat->wants_key;
     /* Each answer is a parcel, and those that wait are counted. */
-    const bool wants_compare =
-        seat->wants_compare && seat->view && seat->queued + seat->on_the_way < ON_THE_WAY_MAX;
+    const bool wants_compare = seat->wants_compare && seat->view && web_queue_has_room(&seat->queue);
     const struct web_request shown = seat->show, looked = seat->look, compared = seat->compare;
     seat->wants_compare = seat->wants_compare && !wants_compare;
     seat->wants_show = seat->wants_key = false;
@@ -307,11 +299,7 @@ static void *work(void *argument)
 
 static void forget(struct seat *seat)
 {
-    while (seat->first) {
-        struct parcel *parcel = seat->first;
-        seat->first = parcel->next;
-        free(parcel);
-    }
+    web_queue_clear(&seat->queue);
     if (seat->wake_fd > 0)
         close(seat->wake_fd);
     if (seat->end_fd > 0)
@@ -328,7 +316,6 @@ struct seat *seat_create(const struct seat_options *options, struct fl_error *er
         return NULL;
     }
     seat->options = *options;
-    seat->end = &seat->first;
     pthread_mutex_init(&seat->lock, NULL);
     seat->wake_fd = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
     seat->end_fd = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
@@ -354,7 +341,7 @@ void seat_tell(struct seat *seat, const struct web_request *request)
         seat->compare = *request;
         seat->wants_compare = true;
     } else {
-        seat->on_the_way -= request->shown < seat->on_the_way ? request->shown : seat->on_the_way;
+        web_queue_shown(&seat->queue, request->shown);
     }
     pthread_mutex_unlock(&seat->lock);
     signal_event(seat->wake_fd);
@@ -363,14 +350,8 @@ void seat_tell(struct seat *seat, const struct web_request *request)
 struct parcel *seat_take(struct seat *seat, bool *has_ended)
 {
     pthread_mutex_lock(&seat->lock);
-    struct parcel *parcel = seat->first;
-    if (parcel) {
-        seat->first = parcel->next;
-        seat->end = seat->first ? seat->end : &seat->first;
-        seat->queued--;
-        seat->on_the_way += !parcel->is_text;
-    }
-    *has_ended = !seat->first && seat->has_ended;
+    struct parcel *parcel = web_queue_take(&seat->queue);
+    *has_ended = !seat->queue.first && seat->has_ended;
     pthread_mutex_unlock(&seat->lock);
     if (parcel && parcel->is_text)
         signal_event(seat->wake_fd); /* there is room for another one */

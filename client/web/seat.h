@@ -3,21 +3,15 @@
 #ifndef FARLIGHT_CLIENT_WEB_SEAT_H
 #define FARLIGHT_CLIENT_WEB_SEAT_H
 
+#include "cli/cli.h"
+#include "web/queue.h"
 #include "web/request.h"
 
 struct seat_options {
     const char *server, *key_file, *link, *scene; /* as of fl_connect and fl_scene_attach */
+    const struct cli_job *job;                    /* its camera, and its options, which views begin with */
     void (*changed)(void *user);                  /* there is a parcel, or it has ended; from the thread */
     void *user;
-};
-
-/* A message for the browser. */
-#define PARCEL_ROOM 32u
-struct parcel {
-    struct parcel *next;
-    bool is_text;
-    size_t bytes;
-    unsigned char data[]; /* PARCEL_ROOM bytes for who sends it, then the message */
 };
 
 struct seat;

@@ -79,7 +79,8 @@ UNIT_ALSO = {
 RESTRICTED = {
     r"(epoxy|GL|EGL)/": (GPU, GPU_SCENE, TRACE, "server/render"),
     r"embree": ("server/trace/reference",),
-    r"(sys/socket|sys/un|netinet/.*|netdb|arpa/inet)\.h": (BASE, "server/net", "client/lib", "client/helper", "client/import"),
+    r"(sys/socket|sys/un|netinet/.*|netdb|arpa/inet)\.h": (
+        BASE, "server/net", "client/lib", "client/helper", "client/import", "client/web"),
     r"lib(av|sw)": ("client/video", "client/viewer", "server/encode"),
     r"SDL2?/": ("client/viewer",),
     r"OpenImageIO/": ("client/import", "client/output/library"),

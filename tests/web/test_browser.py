@@ -32,7 +32,7 @@ class Page(unittest.TestCase):
         cls.serving = cls.serve()
         cls.serving.__enter__()
         cls.addClassCleanup(lambda: cls.serving.__exit__())
-        cls.gateway = cls.enterClassContext(Gateway(cls.address, NAME))
+        cls.gateway = cls.enterClassContext(Gateway("--server", cls.address, "--scene", NAME))
         cls.browser = cls.enterClassContext(Browser())
 
     @classmethod

@@ -40,9 +40,10 @@ function tellShow() {
     canvas.height = height;
   }
   forgetErrors();
-  const chosen = (name, usual) => $(name).value || link.get(name) || usual; // a menu is empty before the scene is told
-  tell({ show: { width, height, h264: wantsH264, tracer: chosen("tracer", "bvh"),
-    integrator: chosen("integrator", "distributed"), clip: Number(chosen("clip", 0)) } });
+  // A menu is empty before the scene is told; without a word the gateway has its own.
+  const chosen = (name) => $(name).value || link.get(name) || undefined;
+  tell({ show: { width, height, h264: wantsH264, tracer: chosen("tracer"), integrator: chosen("integrator"),
+    clip: Number(chosen("clip") || 0) } });
 }
 
 function tellLook(moving) {
@@ -80,8 +81,8 @@ function takeScene(told) {
   say("");
   if (!isFirst) return;
   const cameras = told.cameras.map((one) => [one.node, one.name || `camera ${one.node}`]);
-  if (cameras.length === 0) cameras.push([0, "whole scene"]);
-  node = cameras[0][0];
+  if (told.node === 0) cameras.unshift([0, "start"]); // no camera of the scene
+  node = told.node;
   fill($("camera"), [...cameras, ["", "free"]], camera ? "" : node);
   fill($("clip"), [[0, "none"], ...told.clips.map((one) => [one.clip, one.name || `clip ${one.clip}`])], link.get("clip") || 0);
   $("clips").hidden = $("play").hidden = told.clips.length === 0;
@@ -243,7 +244,7 @@ canvas.addEventListener("keydown", (event) => {
   const steps = { ArrowLeft: [-0.05, 0], ArrowRight: [0.05, 0], ArrowUp: [0, 0.05], ArrowDown: [0, -0.05] };
   if (event.ctrlKey || event.altKey || event.metaKey) return;
   if (steps[event.key]) move((one) => (event.shiftKey ? pan : orbit)(one, ...steps[event.key]));
-  else if (event.key === "Home") goTo($("camera").options[0].value);
+  else if (event.key === "Home") goTo(String(scene ? scene.node : 0));
   else if (event.key === "+" || event.key === "-") move((one) => zoom(one, event.key === "+" ? 0.9 : 1 / 0.9));
   else return;
   event.preventDefault();
