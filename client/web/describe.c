@@ -66,15 +66,15 @@ static char *print(json_t *json)
 }
 
 char *web_describe_scene(struct fl_scene *scene, const char *name, const struct message_render *render,
-                         const struct fl_scene_bounds *bounds, bool can_h264)
+                         const struct fl_scene_bounds *bounds, bool can_h264, bool may_edit)
 {
-    return print(json_pack("{s:{s:s,s:I,s:I,s:b,s:o,s:o,s:o,s:o,s:s,s:s,s:o,s:o}}", "scene", "name", name, "node",
-                           (json_int_t)(render->camera_path == PROTOCOL_CAMERA_NODE ? render->camera_node : 0),
-                           "triangles", (json_int_t)bounds->triangles, "h264", can_h264, "cameras", cameras(scene),
-                           "clips", clips(scene), "tracers", tracers(), "integrators", integrators(), "tracer",
-                           protocol_tracer_text(render->tracer), "integrator",
-                           protocol_integrator_text(render->integrator), "lower", numbers(bounds->lower_world, 3),
-                           "upper", numbers(bounds->upper_world, 3)));
+    return print(json_pack(
+        "{s:{s:s,s:b,s:I,s:I,s:b,s:o,s:o,s:o,s:o,s:s,s:s,s:o,s:o}}", "scene", "name", name, "edit", may_edit,
+        "node", (json_int_t)(render->camera_path == PROTOCOL_CAMERA_NODE ? render->camera_node : 0), "triangles",
+        (json_int_t)bounds->triangles, "h264", can_h264, "cameras", cameras(scene), "clips", clips(scene),
+        "tracers", tracers(), "integrators", integrators(), "tracer", protocol_tracer_text(render->tracer),
+        "integrator", protocol_integrator_text(render->integrator), "lower", numbers(bounds->lower_world, 3),
+        "upper", numbers(bounds->upper_world, 3)));
 }
 
 static json_t *stages(const struct fl_frame *frame)
@@ -116,6 +116,13 @@ char *web_describe_refusal(const struct fl_error *error, uint32_t id)
     char line[1200];
     fl_error_print(error, line, sizeof(line));
     return print(json_pack("{s:{s:I,s:s}}", "refused", "compare", (json_int_t)id, "text", line));
+}
+
+char *web_describe_edit_refusal(const struct fl_error *error)
+{
+    char line[1200];
+    fl_error_print(error, line, sizeof(line));
+    return print(json_pack("{s:{s:b,s:s}}", "refused", "edit", 1, "text", line));
 }
 
 char *web_describe_error(const struct fl_error *error, bool again)

@@ -1,16 +1,14 @@
 /* SPDX-License-Identifier: MIT */
 #include "web/gateway.h"
+#include "web/callers.h"
 #include "web/page.h"
 #include "protocol/common/clock.h"
 
 #include <libwebsockets.h>
-#include <sodium.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#define TOKEN_BYTES 32
-#define TOKEN_LENGTH 43 /* of base 64 without padding */
 #define HEADERS_BYTES 2048
 #define NAME_BYTES 256
 #define MISDIRECTED 421 /* the HTTP status: this server does not answer for that name */
@@ -24,23 +22,14 @@
 
 _Static_assert(LWS_PRE <= PARCEL_ROOM, "libwebsockets writes its frame's header in front of a message");
 
-#define CONNECTIONS_MAX 512u
-#define PEER_BYTES 64
-
-/* A connection, in a table, for the limit of those of one address. */
-struct caller {
-    bool is_there;
-    char peer[PEER_BYTES];
-};
-
 struct gateway {
     const struct gateway_options *options;
     struct seat_options seat;
     struct lws_context *context;
     const char *machine; /* its own name counts where it listens beyond itself; NULL: it does not */
     int port;            /* of the first address */
-    struct caller callers[CONNECTIONS_MAX];
-    char token[TOKEN_LENGTH + 1];
+    struct web_callers callers;
+    struct web_links links;
     unsigned viewers;
     lws_sorted_usec_list_t check;
 };
@@ -61,15 +50,6 @@ static struct gateway *gateway_of(struct lws *wsi)
 }
 
 /* ---- the right to come in ---- */
-
-/* What follows the token in a path; NULL: it is not there. Takes the same time for all tokens. */
-static const char *behind_token(const struct gateway *gateway, const char *path)
-{
-    if (strlen(path) < TOKEN_LENGTH + 2 || path[0] != '/' || path[TOKEN_LENGTH + 1] != '/' ||
-        sodium_memcmp(path + 1, gateway->token, TOKEN_LENGTH) != 0)
-        return NULL;
-    return path + TOKEN_LENGTH + 2;
-}
 
 /* A browser is led here by another site's name, whose pages could then read ours: it says that name. */
 static bool is_own_host(const struct gateway *gateway, struct lws *wsi)
@@ -93,13 +73,13 @@ static bool is_own_origin(struct lws *wsi)
 }
 
 /* The HTTP status with which a WebSocket is turned away; 0: it may come in. */
-static unsigned refuse_socket(struct gateway *gateway, struct lws *wsi)
+static unsigned refuse_socket(struct gateway *gateway, struct lws *wsi, enum web_right *right)
 {
     char path[NAME_BYTES];
     if (!is_own_host(gateway, wsi))
         return MISDIRECTED;
     const int length = lws_hdr_copy(wsi, path, sizeof(path), WSI_TOKEN_GET_URI);
-    const char *name = length > 0 ? behind_token(gateway, path) : NULL;
+    const char *name = length > 0 ? web_links_find(&gateway->links, path, right) : NULL;
     if (!name || strcmp(name, "view") != 0)
         return HTTP_STATUS_UNAUTHORIZED;
     if (!is_own_origin(wsi))
@@ -144,7 +124,8 @@ static int on_page(struct gateway *gateway, struct lws *wsi, struct visitor *vis
     if (!is_own_host(gateway, wsi))
         return begin_page(wsi, visitor, &page_misdirected, MISDIRECTED);
     const bool is_get = lws_hdr_total_length(wsi, WSI_TOKEN_GET_URI) > 0;
-    const char *name = behind_token(gateway, path);
+    enum web_right right;
+    const char *name = web_links_find(&gateway->links, path, &right);
     if (!name)
         return begin_page(wsi, visitor, &page_denied, HTTP_STATUS_UNAUTHORIZED);
     const struct page_file *file = page_find(name);
@@ -183,11 +164,15 @@ static int refuse(struct lws *wsi, enum lws_close_status status, const char *why
 
 static int on_upgrade(struct gateway *gateway, struct lws *wsi, const char *to)
 {
-    const unsigned status = refuse_socket(gateway, wsi);
+    enum web_right right = WEB_LOOKS;
+    const unsigned status = refuse_socket(gateway, wsi, &right);
     if (strcmp(to, "websocket") != 0)
         return -1;
     if (status != 0)
         lws_return_http_status(wsi, status, NULL);
+    struct web_caller *caller = lws_get_opaque_user_data(wsi);
+    if (caller)
+        caller->right = right;
     return status != 0;
 }
 
@@ -196,7 +181,10 @@ static int open_seat(struct gateway *gateway, struct lws *wsi, struct visitor *v
     struct fl_error error = {0};
     visitor->messages = MESSAGES_AT_ONCE;
     visitor->last_ns = monotonic_now_ns();
-    visitor->seat = seat_create(&gateway->seat, &error);
+    const struct web_caller *caller = lws_get_opaque_user_data(wsi);
+    struct seat_options options = gateway->seat;
+    options.may_edit = caller && caller->right == WEB_EDITS;
+    visitor->seat = seat_create(&options, &error);
     if (!visitor->seat)
         return refuse(wsi, LWS_CLOSE_STATUS_UNEXPECTED_CONDITION, "out of memory or threads");
     gateway->viewers++;
@@ -240,7 +228,8 @@ static int on_message(struct lws *wsi, struct visitor *visitor, const char *byte
     visitor->message_bytes = 0;
     if (!web_request_read(visitor->message, whole, &request, &error))
         return refuse(wsi, LWS_CLOSE_STATUS_POLICY_VIOLATION, error.field);
-    seat_tell(visitor->seat, &request);
+    if (!seat_tell(visitor->seat, &request))
+        return refuse(wsi, LWS_CLOSE_STATUS_POLICY_VIOLATION, "this link may not edit, or not yet");
     return 0;
 }
 
@@ -272,34 +261,21 @@ static unsigned callers_max(const struct gateway *gateway)
 
 static int filter_caller(const struct gateway *gateway, lws_sockfd_type fd)
 {
-    char peer[PEER_BYTES] = "";
-    unsigned count = 0;
-    bool has_room = false;
+    char peer[CALLER_PEER_BYTES] = "";
     lws_get_peer_simple_fd(fd, peer, sizeof(peer));
-    for (size_t i = 0; i < CONNECTIONS_MAX; i++) {
-        has_room = has_room || !gateway->callers[i].is_there;
-        count += gateway->callers[i].is_there && strcmp(gateway->callers[i].peer, peer) == 0;
-    }
-    return !has_room || count >= callers_max(gateway);
+    return !web_callers_has_room(&gateway->callers, peer, callers_max(gateway));
 }
 
 static void add_caller(struct gateway *gateway, struct lws *wsi)
 {
-    for (size_t i = 0; i < CONNECTIONS_MAX; i++) {
-        struct caller *caller = &gateway->callers[i];
-        if (caller->is_there)
-            continue;
-        caller->is_there = true;
-        caller->peer[0] = '\0';
-        lws_get_peer_simple(wsi, caller->peer, sizeof(caller->peer));
-        lws_set_opaque_user_data(wsi, caller);
-        return;
-    }
+    char peer[CALLER_PEER_BYTES] = "";
+    lws_get_peer_simple(wsi, peer, sizeof(peer));
+    lws_set_opaque_user_data(wsi, web_callers_add(&gateway->callers, peer));
 }
 
 static void remove_caller(struct lws *wsi)
 {
-    struct caller *caller = lws_get_opaque_user_data(wsi);
+    struct web_caller *caller = lws_get_opaque_user_data(wsi);
     if (caller)
         caller->is_there = false;
     lws_set_opaque_user_data(wsi, NULL);
@@ -354,17 +330,6 @@ static void check_again(lws_sorted_usec_list_t *check)
     lws_sul_schedule(gateway->context, 0, check, check_again, CHECK_US);
 }
 
-static bool make_token(struct gateway *gateway, struct fl_error *error)
-{
-    unsigned char bytes[TOKEN_BYTES];
-    if (sodium_init() < 0)
-        return fl_error_set(error, FL_ERROR_SYSTEM, "", "libsodium does not start");
-    randombytes_buf(bytes, sizeof(bytes));
-    sodium_bin2base64(gateway->token, sizeof(gateway->token), bytes, sizeof(bytes),
-                      sodium_base64_VARIANT_URLSAFE_NO_PADDING);
-    return true;
-}
-
 static const struct lws_protocols protocols[] = {
     {"farlight", on_event, sizeof(struct visitor), WEB_REQUEST_BYTES_MAX, 0, NULL, 0}, {0}};
 
@@ -417,7 +382,9 @@ static void announce(const struct gateway *gateway)
     const struct web_address *address = gateway->options->listens;
     char host[NAME_BYTES];
     web_address_print(address, host, sizeof(host));
-    printf("http://%s:%d/%s/\n", address->is_any ? gateway->machine : host, gateway->port, gateway->token);
+    for (int right = 0; right <= (gateway->options->allow_edit ? WEB_EDITS : WEB_LOOKS); right++)
+        printf("http://%s:%d/%s/\n", address->is_any ? gateway->machine : host, gateway->port,
+               gateway->links.tokens[right]);
     fflush(stdout);
 }
 
@@ -432,7 +399,9 @@ struct gateway *gateway_create(const struct gateway_options *options, struct fl_
     gateway->seat = options->seat;
     gateway->seat.changed = seat_changed;
     gateway->seat.user = gateway;
-    bool is_open = make_token(gateway, error) && open_context(gateway, error);
+    bool is_open = (web_links_make(&gateway->links, options->allow_edit) ||
+                    fl_error_set(error, FL_ERROR_SYSTEM, "", "libsodium does not start")) &&
+                   open_context(gateway, error);
     for (size_t i = 0; is_open && i < options->listen_count; i++)
         is_open = listen_at(gateway, &options->listens[i], error);
     if (is_open)
@@ -462,6 +431,6 @@ void gateway_destroy(struct gateway *gateway)
         return;
     if (gateway->context)
         lws_context_destroy(gateway->context);
-    sodium_memzero(gateway->token, sizeof(gateway->token));
+    web_links_forget(&gateway->links);
     free(gateway);
 }

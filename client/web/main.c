@@ -19,7 +19,16 @@ __attribute__((visibility("default"))) const char *argp_program_version = "farli
 #define VIEWERS_MAX 64u
 #define DAEMON_WORDS_MAX 28 /* of fl_connect */
 
-enum key { KEY_SCENE = 0x500, KEY_LISTEN, KEY_HOST, KEY_INSECURE, KEY_VIEWERS, KEY_SAMPLES, KEY_INTEGRATOR };
+enum key {
+    KEY_SCENE = 0x500,
+    KEY_LISTEN,
+    KEY_HOST,
+    KEY_INSECURE,
+    KEY_VIEWERS,
+    KEY_ALLOW_EDIT,
+    KEY_SAMPLES,
+    KEY_INTEGRATOR
+};
 
 static const struct argp_option options[] = {
     {NULL, 0, NULL, 0, "Page:", -2},
@@ -37,6 +46,8 @@ static const struct argp_option options[] = {
     {"insecure", KEY_INSECURE, NULL, 0,
      "Let --listen be beyond this machine: who can read the network's traffic gets the link and the pictures", -2},
     {"viewers", KEY_VIEWERS, "N", 0, "Let N browsers look at once, 1 to 64 (default 8)", -2},
+    {"allow-edit", KEY_ALLOW_EDIT, NULL, 0,
+     "Print a second link: who has it may edit the scene, for all who look at it", -2},
     {"samples", KEY_SAMPLES, "N", 0, "Render N samples per pixel while nothing moves (default 64)", -2},
     {"integrator", KEY_INTEGRATOR, "NAME", 0,
      "Begin with whitted (default), distributed (default with a lens or a shutter), raycast, ao or path", -2},
@@ -107,6 +118,9 @@ static error_t parse(int key, char *value, struct argp_state *state)
         return add_host(line, value);
     case KEY_INSECURE:
         line->insecure = true;
+        return 0;
+    case KEY_ALLOW_EDIT:
+        line->gateway.allow_edit = true;
         return 0;
     case KEY_VIEWERS:
         return set_number(line, "--viewers", value, VIEWERS_MAX, &line->gateway.viewers);
@@ -293,7 +307,8 @@ int main(int argc, char **argv)
         .doc =
             "Show a model, or a shared scene of a daemon, in browsers: prints a link, and serves who has it until "
             "Ctrl-C.\v"
-            "The link has a random token; who has it can look, and change nothing. Each browser has a view of its "
+            "The link has a random token; who has it can look, and change nothing; --allow-edit prints another "
+            "one. Each browser has a view of its "
             "own. Without --server a daemon is started, which ends with the command; arguments after -- are its "
             "options.",
         .children = children};

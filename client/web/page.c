@@ -16,6 +16,7 @@ EMBED(page_main, "page.js");
 EMBED(page_camera, "camera.js");
 EMBED(page_picture, "picture.js");
 EMBED(page_errors, "errors.js");
+EMBED(page_edit, "edit.js");
 EMBED(page_stages, "stages.js");
 EMBED(page_refusal, "denied.html");
 EMBED(page_elsewhere, "misdirected.html");
@@ -30,6 +31,7 @@ static const struct page_file files[] = {
     {"camera.js", SCRIPT, page_camera, page_camera_end},
     {"picture.js", SCRIPT, page_picture, page_picture_end},
     {"errors.js", SCRIPT, page_errors, page_errors_end},
+    {"edit.js", SCRIPT, page_edit, page_edit_end},
     {"stages.js", SCRIPT, page_stages, page_stages_end},
 };
 

@@ -8,6 +8,11 @@ bool web_queue_has_room(const struct web_queue *queue)
     return queue->queued + queue->unshown < QUEUE_ROOM;
 }
 
+bool web_queue_has_room_for_text(const struct web_queue *queue)
+{
+    return queue->queued < QUEUE_ROOM;
+}
+
 void web_queue_add(struct web_queue *queue, struct parcel *parcel)
 {
     parcel->next = NULL;

@@ -23,8 +23,11 @@ struct web_queue {
     unsigned queued, unshown; /* parcels in it; pictures that were taken from it */
 };
 
-/* A parcel may be added. One that ends the connection is, in any case. */
+/* A picture may be added. */
 bool web_queue_has_room(const struct web_queue *queue);
+/* A text may be, which does not wait until pictures are shown. One that ends the connection is added in any case.
+ */
+bool web_queue_has_room_for_text(const struct web_queue *queue);
 /* It is the queue's from now on. */
 void web_queue_add(struct web_queue *queue, struct parcel *parcel);
 /* The first one, for the caller to free; NULL: none. */

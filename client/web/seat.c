@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "web/seat.h"
 #include "web/describe.h"
+#include "web/editing.h"
 #include "web/error_map.h"
 
 #include <errno.h>
@@ -22,8 +23,8 @@ struct seat {
     int wake_fd, end_fd; /* events: there is something to do; it is over */
 
     pthread_mutex_t lock; /* guards what follows */
-    bool wants_show, wants_look, wants_key, wants_compare;
-    struct web_request show, look, compare;
+    bool wants_show, wants_look, wants_key, wants_compare, wants_edit;
+    struct web_request show, look, compare, edit;
     bool has_ended;
     struct web_queue queue;
 
@@ -36,6 +37,7 @@ struct seat {
     struct fl_view_camera camera; /* likewise, if has_camera */
     bool has_camera, is_described;
     struct error_map errors;
+    struct web_editing editing;
     unsigned idle_rounds;
     uint32_t ids[LOOKS_REMEMBERED]; /* the page's numbers of cameras, by ours, modulo */
 };
@@ -107,7 +109,7 @@ static bool describe(struct seat *seat, const struct message_render *render, str
     return fl_scene_get_bounds(seat->scene, &bounds, error) &&
            post(seat,
                 web_describe_scene(seat->scene, seat->options.scene, render, &bounds,
-                                   fl_connection_can_h264(seat->connection)),
+                                   fl_connection_can_h264(seat->connection), seat->options.may_edit),
                 NULL, 0, error);
 }
 
@@ -196,6 +198,19 @@ static bool pass_errors(struct seat *seat, struct fl_error *error)
     return sent;
 }
 
+/* ---- edits ---- */
+
+static bool answer_edit(struct seat *seat, const struct web_request *request, struct fl_error *error)
+{
+    struct fl_error refusal = {0};
+    char *answer = web_editing_answer(&seat->editing, seat->scene, request, &refusal);
+    if (!answer && refusal.code != FL_ERROR_REFUSED && refusal.code != FL_ERROR_ARGUMENT) {
+        *error = refusal;
+        return false;
+    }
+    return post(seat, answer ? answer : web_describe_edit_refusal(&refusal), NULL, 0, error);
+}
+
 /* ---- the thread ---- */
 
 static bool do_what_came(struct seat *seat, struct fl_error *error)
@@ -203,8 +218,11 @@ static bool do_what_came(struct seat *seat, struct fl_error *error)
     pthread_mutex_lock(&seat->lock);
     const bool wants_show = seat->wants_show, wants_look = seat->wants_look, wants_key = seat->wants_key;
     /* Each answer is a parcel, and those that wait are counted. */
-    const bool wants_compare = seat->wants_compare && seat->view && web_queue_has_room(&seat->queue);
-    const struct web_request shown = seat->show, looked = seat->look, compared = seat->compare;
+    const bool wants_compare = seat->wants_compare && seat->view && web_queue_has_room_for_text(&seat->queue);
+    const bool wants_edit = seat->wants_edit && seat->view && web_queue_has_room_for_text(&seat->queue);
+    const struct web_request shown = seat->show, looked = seat->look, compared = seat->compare,
+                             edited = seat->edit;
+    seat->wants_edit = seat->wants_edit && !wants_edit;
     seat->wants_compare = seat->wants_compare && !wants_compare;
     seat->wants_show = seat->wants_key = false;
     seat->wants_look = wants_look && !seat->view && !wants_show;
@@ -214,6 +232,8 @@ static bool do_what_came(struct seat *seat, struct fl_error *error)
     if (wants_look && seat->view && !look(seat, &looked, error))
         return false;
     if (wants_compare && !compare(seat, compared.id, error))
+        return false;
+    if (wants_edit && !answer_edit(seat, &edited, error))
         return false;
     return !wants_key || !seat->view || fl_view_want_key_frame(seat->view, error);
 }
@@ -270,9 +290,10 @@ static void serve(struct seat *seat, struct fl_error *error)
         if (seat->idle_rounds % PING_ROUNDS == PING_ROUNDS - 1 &&
             !fl_ping(seat->connection, &round_trip_ns, error))
             return;
-        /* Answers pings, and notices that the daemon is gone, also while no frame is wanted. */
+        /* Answers pings, and notices that the daemon is gone, also while no frame is wanted. The frames of a view
+         * that is being refined would leave no room for errors behind them. */
         if (!do_what_came(seat, error) || !fl_connection_wait(seat->connection, 0, error) ||
-            !pass_frames(seat, error) || !pass_errors(seat, error))
+            !pass_errors(seat, error) || !pass_frames(seat, error))
             return;
     } while (wait_for_work(seat));
 }
@@ -284,6 +305,7 @@ static void *work(void *argument)
     serve(seat, &error);
     if (error.code != FL_ERROR_NONE && error.code != FL_ERROR_INTERRUPTED)
         post(seat, web_describe_error(&error, error.code != FL_ERROR_ARGUMENT), NULL, 0, &ignored);
+    web_editing_finish(&seat->editing);
     error_map_end(&seat->errors);
     fl_view_destroy(seat->view);
     fl_scene_destroy(seat->scene);
@@ -326,8 +348,9 @@ struct seat *seat_create(const struct seat_options *options, struct fl_error *er
     return NULL;
 }
 
-void seat_tell(struct seat *seat, const struct web_request *request)
+bool seat_tell(struct seat *seat, const struct web_request *request)
 {
+    bool is_taken = true;
     pthread_mutex_lock(&seat->lock);
     if (request->kind == WEB_SHOW) {
         seat->show = *request;
@@ -340,11 +363,16 @@ void seat_tell(struct seat *seat, const struct web_request *request)
     } else if (request->kind == WEB_COMPARE) {
         seat->compare = *request;
         seat->wants_compare = true;
+    } else if (web_request_edits(request->kind)) {
+        is_taken = seat->options.may_edit && !seat->wants_edit;
+        seat->edit = is_taken ? *request : seat->edit;
+        seat->wants_edit = true;
     } else {
         web_queue_shown(&seat->queue, request->shown);
     }
     pthread_mutex_unlock(&seat->lock);
     signal_event(seat->wake_fd);
+    return is_taken;
 }
 
 struct parcel *seat_take(struct seat *seat, bool *has_ended)

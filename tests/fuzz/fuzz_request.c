@@ -37,6 +37,19 @@ static void check_camera(const struct fl_view_camera *camera)
     FUZZ_REQUIRE(camera->fov_y >= 0.001f && camera->fov_y <= 3.1f && fabsf(camera->time_s) <= 1e6f);
 }
 
+static void check_assignment(const struct web_request *request)
+{
+    const struct fl_assignment *wanted = &request->assignment;
+    FUZZ_REQUIRE(wanted->kind == PROTOCOL_OBJECT_NODE || wanted->kind == PROTOCOL_OBJECT_MATERIAL ||
+                 wanted->kind == PROTOCOL_OBJECT_LIGHT || wanted->kind == PROTOCOL_OBJECT_ENVIRONMENT);
+    FUZZ_REQUIRE(memchr(wanted->which, '\0', sizeof(wanted->which)));
+    FUZZ_REQUIRE(memchr(wanted->field, '\0', sizeof(wanted->field)));
+    FUZZ_REQUIRE(request->kind == WEB_LIST || wanted->id > 0);
+    FUZZ_REQUIRE(wanted->count <= FL_FIELD_VALUES_MAX && (request->kind != WEB_EDIT || wanted->count > 0));
+    for (unsigned i = 0; i < wanted->count; i++)
+        FUZZ_REQUIRE(isfinite(wanted->values[i]));
+}
+
 static void check_request(const uint8_t *data, size_t size)
 {
     struct web_request request;
@@ -52,6 +65,8 @@ static void check_request(const uint8_t *data, size_t size)
         check_camera(&request.camera);
     else if (request.kind == WEB_SHOWN)
         FUZZ_REQUIRE(request.shown > 0);
+    else if (web_request_edits(request.kind) && request.kind != WEB_UNDO)
+        check_assignment(&request);
 }
 
 /* Nothing that could be looked up as a name is answered, but for the names that are ours. */

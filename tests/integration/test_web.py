@@ -208,6 +208,13 @@ class Web(Case):
             (look(eye=LOOK["at"]), TEXT, POLICY), (look(eye=[1, 2]), TEXT, POLICY), (look(up=[0, 0, 0]), TEXT, POLICY),
             (look(eye=[1e300, 0, 0]), TEXT, POLICY), (look(fov=0), TEXT, POLICY), (look(time=1e9), TEXT, POLICY),
             (look(id=-1), TEXT, POLICY), (b'{"look": {"fov": NaN}}', TEXT, POLICY),
+            ({"list": {"kind": "mesh", "match": ""}}, TEXT, POLICY), ({"list": {"kind": "node", "match": "x" * 200}}, TEXT, POLICY),
+            ({"read": {"kind": "node", "id": 0}}, TEXT, POLICY), ({"undo": False}, TEXT, POLICY),
+            ({"edit": {"kind": "material", "id": 1, "field": "roughness", "values": []}}, TEXT, POLICY),
+            ({"edit": {"kind": "material", "id": 1, "field": "roughness", "values": ["1"]}}, TEXT, POLICY),
+            # Well-formed, of a link that may look alone.
+            ({"list": {"kind": "node", "match": ""}}, TEXT, POLICY), ({"undo": True}, TEXT, POLICY),
+            ({"edit": {"kind": "material", "id": 1, "field": "roughness", "values": [0.5]}}, TEXT, POLICY),
             (b" " * 5000, TEXT, TOO_LARGE), (b"\x00\x01", BINARY, NOT_TEXT), (b'{"key": "\xff"}', TEXT, None),
             (b"x", 5, None),  # an opcode that does not exist
         )
@@ -278,6 +285,98 @@ class Web(Case):
         self.assertIn("--scene", run("farlight-web", "--server", self.address).stderr)
         self.assertIn("MODEL", run("farlight-web").stderr)
         self.assertEqual(say("--camera", "none")[0], 2)
+
+
+class Edit(Case):
+    """--allow-edit: a second link."""
+
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.folder = cls.enterClassContext(tempfile.TemporaryDirectory(prefix="farlight-web-"))
+        cls.gateway = cls.enterClassContext(Gateway(bundled_scenes() / "teapot.glb", "--allow-edit",
+                                                    environment={**os.environ, "XDG_RUNTIME_DIR": cls.folder}))
+
+    def view(self, path):
+        view = self.enterContext(Socket(self.gateway, path=path + "view"))
+        self.assertEqual(view.status, 101)
+        view.send({"show": SHOW})
+        view.frame()
+        return view
+
+    @staticmethod
+    def ask(view, message):
+        """The answer, which is text; frames are passed over."""
+        view.send(message)
+        while True:
+            kind, data = view.receive()
+            if kind == BINARY:
+                view.send({"shown": 1})
+            elif kind == TEXT:
+                return json.loads(data)
+            else:
+                raise ConnectionError(data)
+
+    def first(self, view, kind):
+        return self.ask(view, {"list": {"kind": kind, "match": ""}})["objects"]["list"][0][0]
+
+    def values(self, view, kind, number, field):
+        found = self.ask(view, {"read": {"kind": kind, "id": number}})["object"]["fields"]
+        return next(one["values"] for one in found if one["name"] == field)
+
+    def test_change_is_seen_by_others_and_undone(self):
+        editor, other, looker = self.view(self.gateway.edit_path), self.view(self.gateway.edit_path), self.view(self.gateway.path)
+        material = self.first(editor, "material")
+        before = self.values(editor, "material", material, "roughness")
+        told = self.ask(editor, {"edit": {"kind": "material", "id": material, "field": "roughness", "values": [0.8125]}})["edited"]
+        self.assertEqual((told["objects"], told["undos"]), (1, 1))
+        self.assertEqual(self.values(other, "material", material, "roughness"), [0.8125])
+        frame = {"revision": 0}
+        while frame["revision"] < told["revision"]:
+            frame, _ = looker.frame()
+        # It is not the other's to undo.
+        self.assertIn("no change", self.ask(other, {"undo": True})["refused"]["text"])
+        self.assertEqual(self.ask(editor, {"undo": True})["edited"]["undos"], 0)
+        self.assertEqual(self.values(other, "material", material, "roughness"), before)
+
+    def test_lights_nodes_and_environment_are_edited(self):
+        view = self.view(self.gateway.edit_path)
+        for kind, field, values in (("light", "intensity", [3.5]), ("node", "translate", [0.25, 0.5, 0.75]),
+                                    ("environment", "rotation", [90])):
+            number = self.first(view, kind)
+            told = self.ask(view, {"edit": {"kind": kind, "id": number, "field": field, "values": values}})
+            self.assertIn("edited", told, kind)
+            for now, wanted in zip(self.values(view, kind, number, field), values):
+                self.assertAlmostEqual(now, wanted, places=4)
+
+    def test_impossible_changes_are_refused_and_the_view_goes_on(self):
+        view = self.view(self.gateway.edit_path)
+        material = self.first(view, "material")
+        for number, field, values in ((material, "nothing", [1]), (material, "roughness", [7]), (material, "base_colour", [1, 2]),
+                                      (4000000000, "roughness", [1])):
+            told = self.ask(view, {"edit": {"kind": "material", "id": number, "field": field, "values": values}})
+            self.assertTrue(told["refused"]["edit"], field)
+        self.assertIn("refused", self.ask(view, {"read": {"kind": "light", "id": 4000000000}}))
+        self.assertEqual(self.ask(view, {"list": {"kind": "material", "match": "no such name"}})["objects"]["list"], [])
+        view.send({"look": LOOK})
+        view.frame()
+
+    def test_other_link_may_not_edit(self):
+        self.assertNotEqual(self.gateway.path, self.gateway.edit_path)
+        view = self.view(self.gateway.path)
+        view.send({"undo": True})
+        self.assertEqual(view.closed_with(), POLICY)
+        with Socket(self.gateway, path=self.gateway.edit_path + "view", origin="http://elsewhere.example") as view:
+            self.assertEqual(view.status, 403)
+
+    def test_changes_are_asked_one_at_a_time(self):
+        view = self.view(self.gateway.edit_path)
+        try:
+            for _ in range(200):
+                view.send({"list": {"kind": "node", "match": ""}})
+        except OSError:
+            pass
+        self.assertIn(view.closed_with(), (0, POLICY))
 
 
 class Model(Case):

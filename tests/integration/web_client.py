@@ -27,11 +27,12 @@ class Gateway:
         self.process = subprocess.Popen(self.command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
                                         env=self.environment)
         self.link = self.process.stdout.readline().strip()
+        self.edit_link = self.process.stdout.readline().strip() if "--allow-edit" in self.command else ""
         if not self.link:
             raise AssertionError(f"farlight-web printed no link, but: {self.process.communicate()[1]}")
         self.host = urllib.parse.urlsplit(self.link).netloc
         self.machine, self.port = urllib.parse.urlsplit(self.link).hostname, urllib.parse.urlsplit(self.link).port
-        self.path = urllib.parse.urlsplit(self.link).path
+        self.path, self.edit_path = urllib.parse.urlsplit(self.link).path, urllib.parse.urlsplit(self.edit_link).path
         return self
 
     def stop(self, number=signal.SIGINT):

@@ -32,15 +32,15 @@ class Page(unittest.TestCase):
         cls.serving = cls.serve()
         cls.serving.__enter__()
         cls.addClassCleanup(lambda: cls.serving.__exit__())
-        cls.gateway = cls.enterClassContext(Gateway("--server", cls.address, "--scene", NAME))
+        cls.gateway = cls.enterClassContext(Gateway("--server", cls.address, "--scene", NAME, "--allow-edit"))
         cls.browser = cls.enterClassContext(Browser())
 
     @classmethod
     def serve(cls):
         return Serving(bundled_scenes() / "carousel.glb", "--listen", cls.address, "--name", NAME, "--quiet")
 
-    def open(self, fragment=""):
-        page = self.browser.open(self.gateway.link + fragment, WIDTH, HEIGHT)
+    def open(self, fragment="", link=None):
+        page = self.browser.open((link or self.gateway.link) + fragment, WIDTH, HEIGHT)
         self.addCleanup(page.close)
         page.wait(f"{DATASET}.frame")
         return page
@@ -158,6 +158,46 @@ class Page(unittest.TestCase):
         self.assertLess(float(said.split()[0]), 0.1, said)
         self.choose(page, "tracer", "reference")
         page.wait("document.getElementById('errors-state').textContent.includes('itself')")
+        self.assertEqual(page.faults, [])
+
+    def test_change_is_seen_by_another_viewer_and_undone(self):
+        looker, editor = self.open(), self.open(link=self.gateway.edit_link)
+        self.assertTrue(looker.value("document.getElementById('editing').hidden"))
+        editor.wait("!document.getElementById('editing').hidden && document.getElementById('edit-fields').children.length > 0")
+        self.choose(editor, "edit-kind", "environment")
+        editor.wait("document.getElementById('field-rotation-0')")
+        revision = looker.shown()["revision"]
+        before = editor.value("document.getElementById('field-rotation-0').value")
+        self.choose(editor, "field-rotation-0", "77")
+        editor.wait("!document.getElementById('edit-undo').disabled")
+        looker.call("Page.bringToFront")
+        looker.wait(f"{DATASET}.revision !== '{revision}'")
+        revision = looker.shown()["revision"]
+        editor.value("document.getElementById('edit-undo').click()")
+        looker.wait(f"{DATASET}.revision !== '{revision}'")
+        editor.call("Page.bringToFront")
+        editor.wait(f"document.getElementById('field-rotation-0').value === '{before}'")
+        # What cannot be is said, and the field shows what is.
+        self.choose(editor, "field-rotation-0", "1e9")
+        editor.wait("document.getElementById('edit-state').textContent.includes('rotation')")
+        self.assertEqual((looker.faults, editor.faults), ([], []))
+
+    def test_everything_has_a_name_and_keys_reach_it(self):
+        page = self.open(link=self.gateway.edit_link)
+        page.value("document.getElementById('panel').hidden && document.getElementById('open').click()")
+        page.wait("document.getElementById('edit-fields').children.length > 0")
+        nameless = page.value("[...document.querySelectorAll('button, input, select, canvas, section, aside')].filter((one) => "
+                              "!(one.getAttribute('aria-label') || one.textContent.trim() && one.matches('button') || "
+                              "one.labels && one.labels.length)).map((one) => one.id)")
+        self.assertEqual(nameless, [])
+        page.value("document.getElementById('picture').focus()")
+        before = page.value(f"{DATASET}.look")
+        for key in ("ArrowLeft", "Home"):
+            page.call("Input.dispatchKeyEvent", type="keyDown", key=key)
+            page.call("Input.dispatchKeyEvent", type="keyUp", key=key)
+        page.wait(f"{DATASET}.look !== '{before}'")
+        page.call("Input.dispatchKeyEvent", type="keyDown", key="Escape")
+        self.assertTrue(page.value("document.getElementById('panel').hidden && document.activeElement.id === 'open'"))
         self.assertEqual(page.faults, [])
 
     def test_page_comes_back_with_the_daemon(self):

@@ -24,7 +24,7 @@ export function drawErrors(canvas, header, bytes) {
 
 const percent = (share) => (share === 0 ? "0 %" : `${share < 1e-4 ? (share * 100).toExponential(0) : (share * 100).toPrecision(2)} %`);
 const count = (number) => (number >= 1e6 ? `${(number / 1e6).toPrecision(3)} M` : number >= 1e4 ? `${Math.round(number / 1e3)} k` : String(number));
-const small = (number) => (number === 0 ? "0" : number < 1e-3 ? number.toExponential(0) : Number(number.toPrecision(2)).toString());
+const small = (number) => (number === 0 ? "0" : number < 0.01 ? number.toExponential(0) : Number(number.toPrecision(2)).toString());
 
 function row(name, wave, isAll) {
   const line = document.createElement("tr");
@@ -45,7 +45,7 @@ function row(name, wave, isAll) {
 export function showFigures(table, line, errors, bytes) {
   table.caption.textContent = `${errors.tracer} against ${errors.reference}, ${errors.samples} samples a pixel; far: beyond `
     + `${Number(errors.far_share.toPrecision(2))} of the scene's diagonal; normals: 99 % differ by less`;
-  table.tBodies[0].replaceChildren(row("all", errors.all, true), ...errors.waves.map((wave) => row(`${wave.wave} ${wave.kind}`, wave, false)));
+  table.tBodies[0].replaceChildren(row("all", errors.all, true), ...errors.waves.map((wave) => row(`${wave.wave} ${wave.kind === "secondary" ? "further" : wave.kind}`, wave, false)));
   let sum = 0, largest = 0, beyond = 0;
   for (const error of bytes) {
     sum += error;

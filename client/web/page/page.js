@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 import { cameraOfFrame, orbit, pan, printCamera, readCamera, zoom } from "./camera.js";
+import { Editing } from "./edit.js";
 import { drawErrors, showFigures } from "./errors.js";
 import { Picture, canH264 } from "./picture.js";
 import { showStages } from "./stages.js";
@@ -77,6 +78,7 @@ function takeScene(told) {
   scene = told;
   document.title = `${told.name} - farlight`;
   $("name").textContent = told.name;
+  editing.begin(told.edit);
   canvas.setAttribute("aria-label", `Picture of ${told.name}`);
   say("");
   if (!isFirst) return;
@@ -89,6 +91,8 @@ function takeScene(told) {
   fill($("tracer"), told.tracers.map((name) => [name, name]), told.tracer);
   fill($("integrator"), told.integrators.map((name) => [name, name]), told.integrator);
 }
+
+const editing = new Editing(tell);
 
 // ---- errors of the tracer ----
 
@@ -129,6 +133,7 @@ const picture = new Picture(canvas, (header) => {
   tell({ shown: 1 });
   if (lastFrame && lastFrame.revision !== header.revision) forgetErrors();
   lastFrame = header;
+  editing.seen(header.revision);
   drawStages();
   let input = 0; // the newest one that it shows
   for (const seen of [...inputs.keys()].filter((key) => key <= header.id)) {
@@ -156,6 +161,7 @@ function take(event) {
   if (typeof event.data === "string") {
     const message = JSON.parse(event.data);
     if (message.scene) takeScene(message.scene);
+    if (message.objects || message.object || message.edited || (message.refused && message.refused.edit)) editing.take(message);
     if (message.refused && message.refused.compare === comparison) sayOfErrors(message.refused.text);
     if (message.error) {
       say(message.error.text, true);

@@ -56,6 +56,17 @@ TEST(a_text_needs_not_be_shown)
     web_queue_clear(&queue);
 }
 
+TEST(a_text_needs_not_wait_for_pictures_to_be_shown_but_to_be_taken)
+{
+    struct web_queue queue = {0};
+    fill(&queue);
+    assert_false(web_queue_has_room_for_text(&queue));
+    free(web_queue_take(&queue));
+    assert_false(web_queue_has_room(&queue));
+    assert_true(web_queue_has_room_for_text(&queue));
+    web_queue_clear(&queue);
+}
+
 TEST(parcels_come_in_their_order)
 {
     struct web_queue queue = {0};
