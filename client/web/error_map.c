@@ -5,6 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#define WEIGHT 8u /* a view has 4: it is refined further while its errors are waited for */
+
 static void shrink(struct message_render *render)
 {
     const double pixels = (double)render->width * render->height;
@@ -52,6 +54,7 @@ bool error_map_begin(struct error_map *map, struct fl_scene *scene, const struct
         PROTOCOL_ENCODING_PREDICTED;        /* what a lossy one adds would look like errors */
     render->denoise = PROTOCOL_DENOISE_OFF; /* likewise what a filter takes away */
     render->adapt = 0;
+    render->weight = WEIGHT;
     render->moving_rate = render->noise = 0;
     if (camera)
         place(map, camera);

@@ -136,7 +136,7 @@ class Page(unittest.TestCase):
     def test_errors_of_the_tracer_are_shown_with_their_figures(self):
         page = self.open()
         self.choose(page, "tracer", "abuffer")
-        self.choose(page, "integrator", "whitted")
+        self.choose(page, "integrator", "raycast")  # what takes least
         page.wait(f"{DATASET}.tracer === 'abuffer'")
         page.value("document.getElementById('compare').click()")
         page.wait(f"{DATASET}.compared === 'abuffer'")
@@ -151,11 +151,13 @@ class Page(unittest.TestCase):
         self.drag(page)  # another picture has other errors
         page.wait(f"{DATASET}.compared === undefined || {DATASET}.moving === 'true'")
         page.wait(f"{DATASET}.compared === 'abuffer'")
-        # The exact tracer has the reference's picture.
+        # The first hits of the exact tracer are the reference's, but for rays at edges.
         self.choose(page, "tracer", "bvh")
         page.wait(f"{DATASET}.compared === 'bvh'")
-        said = page.value("document.getElementById('errors-state').textContent")
-        self.assertLess(float(said.split()[0]), 0.1, said)
+        said = page.value("document.querySelectorAll('#errors-table tbody tr')[1].textContent")
+        differ = page.value("document.querySelectorAll('#errors-table tbody tr')[1].cells[2].textContent")
+        self.assertIn("primary", said)
+        self.assertLess(float(differ.split()[0]), 0.01, said)
         self.choose(page, "tracer", "reference")
         page.wait("document.getElementById('errors-state').textContent.includes('itself')")
         self.assertEqual(page.faults, [])
@@ -165,7 +167,7 @@ class Page(unittest.TestCase):
         self.assertTrue(looker.value("document.getElementById('editing').hidden"))
         editor.wait("!document.getElementById('editing').hidden && document.getElementById('edit-fields').children.length > 0")
         self.choose(editor, "edit-kind", "environment")
-        editor.wait("document.getElementById('field-rotation-0')")
+        editor.wait("document.getElementById('field-rotation-0') !== null")
         revision = looker.shown()["revision"]
         before = editor.value("document.getElementById('field-rotation-0').value")
         self.choose(editor, "field-rotation-0", "77")
