@@ -45,7 +45,7 @@ function row(name, wave, isAll) {
 export function showFigures(table, line, errors, bytes) {
   table.caption.textContent = `${errors.tracer} against ${errors.reference}, ${errors.samples} samples a pixel; far: beyond `
     + `${Number(errors.far_share.toPrecision(2))} of the scene's diagonal; normals: 99 % differ by less`;
-  table.tBodies[0].replaceChildren(row("all", errors.all, true), ...errors.waves.map((wave) => row(`${wave.wave} ${wave.kind === "secondary" ? "further" : wave.kind}`, wave, false)));
+  table.tBodies[0].replaceChildren(row("all", errors.all, true), ...errors.waves.map((wave) => row(`${wave.wave} ${wave.kind}`, wave, false)));
   let sum = 0, largest = 0, beyond = 0;
   for (const error of bytes) {
     sum += error;
