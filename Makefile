@@ -138,7 +138,7 @@ COMMAND_LINE_OBJ := $(call obj,$(addprefix client/cli/,daemon.c image_path.c int
     job_views.c key.c models.c parse.c retry.c talk.c \
     watch.c))
 VIEWER_OBJ := $(call obj,$(VIEWER_C)) $(COMMAND_LINE_OBJ)
-WEB_OBJ := $(call obj,$(WEB_C)) $(COMMAND_LINE_OBJ)
+WEB_OBJ := $(call obj,$(WEB_C) $(addprefix client/cli/,loading.c progress.c sharing.c wave_table.c)) $(COMMAND_LINE_OBJ)
 
 # The library for others' programs: position-independent, only what farlight.h declares is visible.
 SONAME := libfarlight.so.$(firstword $(subst ., ,$(VERSION)))
@@ -310,18 +310,20 @@ $(B)/tests/fuzz/kept_%.o: tests/fuzz/fuzz_%.c
 # The importer without its main() and its sandbox.
 READERS_OBJ := $(filter-out $(addprefix $(B)/client/import/,main.o send.o),$(IMPORT_OBJ)) $(call obj,$(TEXTURE_CXX) $(ASSIMP_CXX))
 READERS_LIBS = $(IMPORT_LIBS) $(call pkg_libs,$(TEXTURE_PKGS) $(ASSIMP_PKGS))
+# What reads messages of the page of farlight-web.
+REQUEST_OBJ := $(call obj,client/web/address.c client/web/request.c)
 # Sessions that begin, break and end, with memory that runs out.
 $(B)/tests/unit/fault_tests: $(SERVING_OBJ) $(B)/tests/fuzz/recorded_session.o
 $(B)/tests/unit/fault_tests: TEST_LIBS += $(SERVING_WRAP) -Wl,--wrap=malloc,--wrap=calloc,--wrap=realloc
 # What the fuzzers have found.
-$(B)/tests/unit/corpus_tests: $(KEPT_OBJ) $(SERVING_OBJ) $(READERS_OBJ)
+$(B)/tests/unit/corpus_tests: $(KEPT_OBJ) $(SERVING_OBJ) $(READERS_OBJ) $(REQUEST_OBJ)
 $(B)/tests/unit/corpus_tests: TEST_LIBS += $(SERVING_WRAP) $(READERS_LIBS) -lstdc++
 # What the daemon encodes is decoded by the library itself.
 $(B)/tests/unit/media_tests: $(patsubst %,$(B)/client/viewer/%.o,camera decode edit_history edit_rows heat hud hud_edit hud_mark hud_timeline input layer metrics paint panel pixmap plan recall replay settings tour views \
   warped_key window) $(B)/client/cli/image_path.o
 $(B)/tests/unit/media_tests: TEST_LIBS += $(VIEWER_LIBS) -Wl,--wrap=libav_load
 $(B)/tests/unit/unit_tests: TEST_LIBS += $(call pkg_libs,libseccomp)
-$(B)/tests/unit/unit_tests: $(B)/client/helper/sandbox.o $(addprefix $(B)/client/import/,closed.o spline.o) $(MODEL_OBJ) $(RIVAL_OBJ) $(if $(filter 1,$(EMBREE)),$(CONTEST_OBJ))
+$(B)/tests/unit/unit_tests: $(B)/client/helper/sandbox.o $(addprefix $(B)/client/import/,closed.o spline.o) $(addprefix $(B)/client/web/,address.o callers.o links.o queue.o) $(MODEL_OBJ) $(RIVAL_OBJ) $(if $(filter 1,$(EMBREE)),$(CONTEST_OBJ))
 # Measurements of the benchmark register themselves (tests/bench/bench.h). Those that hold us against Embree need it.
 EMBREE_BENCH_SRC := $(addprefix tests/bench/,embree_build.c $(addprefix bench_,contest.c embree.c forms.c forms_frames.c forms_parse.c forms_rays.c forms_samples.c parallel.c rayspace.c tracers.c))
 BENCH_SRC := $(filter-out tests/bench/shaped_link.c $(if $(filter 0,$(EMBREE)),$(EMBREE_BENCH_SRC)),$(wildcard tests/bench/*.c))
@@ -677,6 +679,8 @@ $(B)/tests/fuzz/fuzz_coarse_depth: $(PIXELS_OBJ)
 $(B)/tests/fuzz/fuzz_coarse_depth: FUZZ_LIBS = $(call pkg_libs,libzstd) -lm
 $(B)/tests/fuzz/fuzz_frame: $(LIB_OBJ)
 $(B)/tests/fuzz/fuzz_frame: FUZZ_LIBS = $(call pkg_libs,$(CLIENT_PKGS)) -lm
+$(B)/tests/fuzz/fuzz_request: $(REQUEST_OBJ) $(LIB_OBJ)
+$(B)/tests/fuzz/fuzz_request: FUZZ_LIBS = $(call pkg_libs,$(CLIENT_PKGS)) -lm
 $(B)/tests/fuzz/fuzz_warp: $(WARP_OBJ)
 $(B)/tests/fuzz/fuzz_warp: FUZZ_LIBS = -lm
 $(addprefix $(B)/tests/fuzz/fuzz_,aff assimp gltf nff obj): $(READERS_OBJ)

@@ -324,6 +324,8 @@ const struct argp *cli_thumbnail_argp(void);
 /* Likewise for a window, without the options of files; samples, integrator and encoding have other defaults
  * there. */
 const struct argp *cli_view_argp(void);
+/* Likewise for a page in a browser, whose window has its size, and which chooses clips itself. */
+const struct argp *cli_web_argp(void);
 /* The defaults, then FARLIGHT_*; before the command line is read. */
 bool cli_job_begin(struct cli_job *job, struct message_render defaults);
 /* As if "--OPTION VALUE" had been typed; NULL for an option without a value. ARGP_ERR_UNKNOWN: there is none. */

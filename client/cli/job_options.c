@@ -581,6 +581,20 @@ const struct argp *cli_view_argp(void)
     return &argp;
 }
 
+const struct argp *cli_web_argp(void)
+{
+    static const char *const left_out[] = {"output",     "format",      "half",       "float",         "samples",
+                                           "integrator", "timings",     "trace-file", "layers",        "clip-once",
+                                           "retry-for",  "clip-start",  "clip-speed", "clip",          "encoding",
+                                           "retries",    "light-field", "metadata",   "stereo-layout", "baseline",
+                                           "views",      "crop",        "stereo",     "lens",          "size",
+                                           NULL};
+    static struct argp_option kept[OPTIONS_MAX];
+    static const struct argp argp = {.options = kept, .parser = parse};
+    keep(kept, left_out);
+    return &argp;
+}
+
 /* FARLIGHT_SIZE for --size, and so on. */
 static bool read_variable(struct cli_job *job, const struct argp_option *option)
 {

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Shares a scene: on a daemon of its own, which listens on the given addresses and ends with the command, or on a
  * running one. */
-#include "cli/cli.h"
+#include "cli/sharing.h"
 
 #include <errno.h>
 #include <stdio.h>
@@ -21,7 +21,6 @@
 
 #define LISTENS_MAX 8
 #define DAEMON_WORDS_MAX 28 /* of fl_connect */
-#define WAIT_MS 3600000u
 
 struct serving {
     struct cli_job job; /* model, environment, server, key file; and the error of what was typed */
@@ -30,8 +29,7 @@ struct serving {
     size_t listen_count;
     const char *words[DAEMON_WORDS_MAX + 1]; /* the daemon's arguments, and a NULL */
     size_t word_count;
-    char usual_address[300];
-    char folder[64]; /* created for the socket in it; empty: there is none */
+    struct cli_socket socket; /* where no address is given */
 };
 
 static const struct argp_option options[] = {
@@ -111,33 +109,13 @@ static error_t parse(int key, char *value, struct argp_state *state)
 
 /* ---- the daemon's command line ---- */
 
-/* A folder for the socket that only its owner can enter: anyone may write to the folder of temporary files, so the
- * socket goes into a subfolder of mode 0700. NULL: it failed; the error is set. */
 static const char *usual_address(struct serving *serving)
 {
-    const char *folder = getenv("XDG_RUNTIME_DIR");
-    if (!folder || folder[0] != '/') {
-        snprintf(serving->folder, sizeof(serving->folder), "%s/farlight-XXXXXX", P_tmpdir);
-        folder = mkdtemp(serving->folder);
-    }
-    if (!folder) {
-        cli_usage(&serving->job, "--listen", "cannot create a folder for a socket in %s: %s; set XDG_RUNTIME_DIR",
-                  P_tmpdir, strerror(errno));
-        serving->folder[0] = '\0';
-        return NULL;
-    }
-    snprintf(serving->usual_address, sizeof(serving->usual_address), "unix:%s/farlight-%ld.sock", folder,
-             (long)getpid());
-    return serving->usual_address;
-}
-
-/* The daemon removes its socket, if it can. */
-static void remove_folder(const struct serving *serving)
-{
-    if (serving->folder[0] == '\0')
-        return;
-    unlink(serving->usual_address + strlen("unix:"));
-    rmdir(serving->folder);
+    struct fl_error *error = &serving->job.error;
+    if (cli_socket_choose(&serving->socket, error))
+        return serving->socket.address;
+    snprintf(error->field, sizeof(error->field), "--listen");
+    return NULL;
 }
 
 /* The user's arguments for it come last: the later of two options counts. */
@@ -249,82 +227,6 @@ static bool announce(const struct serving *serving, const struct cli_loading *lo
     return true;
 }
 
-/* ---- serving ---- */
-
-/* Serves until it is interrupted, which is success, or the daemon is lost. */
-static bool stay(struct fl_connection *connection, struct fl_error *error)
-{
-    while (fl_connection_wait(connection, WAIT_MS, error))
-        continue;
-    if (error->code != FL_ERROR_INTERRUPTED)
-        return false;
-    *error = (struct fl_error){0};
-    return true;
-}
-
-static bool put_up(const struct serving *serving, struct cli_loading *loading, struct fl_error *error)
-{
-    if (!cli_loading_begin(loading, error) || !cli_loading_end(loading, error))
-        return false;
-    cli_progress_end(loading->progress, true);
-    return announce(serving, loading, error);
-}
-
-static bool load_again(struct cli_loading *loading, const struct cli_job *job, struct fl_error *error)
-{
-    *error = (struct fl_error){0};
-    loading->job = job;
-    return cli_loading_begin(loading, error) && cli_loading_end(loading, error);
-}
-
-/* A daemon that kept running still has the scene; a new one gets it under the same name. */
-static bool come_back(const struct serving *serving, struct cli_loading *loading, struct fl_error *error)
-{
-    struct cli_job attaching = serving->job;
-    attaching.scene = loading->scene_name;
-    const bool attached = load_again(loading, &attaching, error);
-    loading->job = &serving->job;
-    if (attached || error->server_code != PROTOCOL_ERROR_UNKNOWN_ID)
-        return attached;
-    cli_loading_close(loading);
-    return load_again(loading, &serving->job, error);
-}
-
-/* A private daemon is not lost: it has failed. */
-static bool recover(const struct serving *serving, struct cli_loading *loading, struct fl_error *error)
-{
-    unsigned failures = 0;
-    loading->again = true;
-    while (serving->job.server && cli_is_temporary(error)) {
-        const uint32_t pause_ms = cli_retry_pause_ms(++failures, error->retry_after_ms);
-        cli_progress_clear(loading->progress);
-        cli_report(error);
-        cli_loading_close(loading);
-        if (!serving->job.quiet)
-            fprintf(stderr, "farlight: trying again in %.1f s\n", pause_ms * 1e-3);
-        if (!cli_retry_wait(pause_ms, error))
-            return false;
-        if (!come_back(serving, loading, error))
-            continue;
-        cli_progress_clear(loading->progress);
-        if (!serving->job.quiet)
-            fputs("farlight: the scene is shared again\n", stderr);
-        return true;
-    }
-    return false;
-}
-
-/* Serves until it is interrupted, which is success, or the daemon is gone for good. */
-static bool stay_and_recover(const struct serving *serving, struct cli_loading *loading, struct fl_error *error)
-{
-    while (!stay(loading->connection, error))
-        if (!recover(serving, loading, error))
-            break;
-    if (error->code == FL_ERROR_INTERRUPTED)
-        *error = (struct fl_error){0};
-    return error->code == FL_ERROR_NONE;
-}
-
 static int serve(struct serving *serving)
 {
     struct fl_error error = {0};
@@ -332,19 +234,13 @@ static int serve(struct serving *serving)
         return cli_report(&serving->job.error);
     if (!cli_interrupt_begin(&error))
         return cli_report(&error);
-    struct cli_progress progress;
-    struct cli_loading loading = {.job = &serving->job,
-                                  .progress = &progress,
-                                  .sharing = PROTOCOL_SHARING_SHARED,
-                                  .scene_name = serving->name ? serving->name : cli_base_name(serving->job.model),
-                                  .daemon_arguments = serving->words};
-    cli_progress_begin(&progress, &serving->job);
-    const bool is_up = cli_read_input(&serving->job, &error) && put_up(serving, &loading, &error);
-    cli_progress_end(&progress, is_up);
-    const bool done = is_up && stay_and_recover(serving, &loading, &error);
-    if (loading.connection)
-        fl_connection_set_interrupt(loading.connection, 0); /* it is still told in order */
-    cli_loading_close(&loading);
+    struct cli_sharing sharing = {
+        .job = &serving->job,
+        .loading = {.scene_name = serving->name ? serving->name : cli_base_name(serving->job.model),
+                    .daemon_arguments = serving->words}};
+    const bool done = cli_read_input(&serving->job, &error) && cli_sharing_begin(&sharing, &error) &&
+                      announce(serving, &sharing.loading, &error) && cli_sharing_stay(&sharing, &error);
+    cli_sharing_end(&sharing);
     return done ? CLI_DONE : cli_report(&error);
 }
 
@@ -361,6 +257,6 @@ int cli_serve(int argc, char **argv)
     if (cli_parse(&argp, argc, argv, ARGP_IN_ORDER, &serving) != 0)
         return cli_report(&serving.job.error);
     const int status = serve(&serving);
-    remove_folder(&serving);
+    cli_socket_remove(&serving.socket);
     return status;
 }

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "web/describe.h"
+#include "cli/cli.h"
 
 #include <jansson.h>
 #include <stdlib.h>
@@ -65,14 +66,15 @@ static char *print(json_t *json)
 }
 
 char *web_describe_scene(struct fl_scene *scene, const char *name, const struct message_render *render,
-                         const struct fl_scene_bounds *bounds, bool can_h264)
+                         const struct fl_scene_bounds *bounds, bool can_h264, bool may_edit)
 {
-    return print(json_pack("{s:{s:s,s:I,s:b,s:o,s:o,s:o,s:o,s:s,s:s,s:o,s:o}}", "scene", "name", name, "triangles",
-                           (json_int_t)bounds->triangles, "h264", can_h264, "cameras", cameras(scene), "clips",
-                           clips(scene), "tracers", tracers(), "integrators", integrators(), "tracer",
-                           protocol_tracer_text(render->tracer), "integrator",
-                           protocol_integrator_text(render->integrator), "lower", numbers(bounds->lower_world, 3),
-                           "upper", numbers(bounds->upper_world, 3)));
+    return print(json_pack(
+        "{s:{s:s,s:b,s:I,s:I,s:b,s:o,s:o,s:o,s:o,s:s,s:s,s:o,s:o}}", "scene", "name", name, "edit", may_edit,
+        "node", (json_int_t)(render->camera_path == PROTOCOL_CAMERA_NODE ? render->camera_node : 0), "triangles",
+        (json_int_t)bounds->triangles, "h264", can_h264, "cameras", cameras(scene), "clips", clips(scene),
+        "tracers", tracers(), "integrators", integrators(), "tracer", protocol_tracer_text(render->tracer),
+        "integrator", protocol_integrator_text(render->integrator), "lower", numbers(bounds->lower_world, 3),
+        "upper", numbers(bounds->upper_world, 3)));
 }
 
 static json_t *stages(const struct fl_frame *frame)
@@ -90,12 +92,37 @@ static json_t *stages(const struct fl_frame *frame)
 char *web_describe_frame(const struct fl_frame *frame, uint32_t id)
 {
     return print(
-        json_pack("{s:I,s:I,s:I,s:I,s:I,s:s,s:b,s:b,s:s,s:s,s:f,s:f,s:o,s:o}", "frame", (json_int_t)frame->frame,
-                  "id", (json_int_t)id, "width", (json_int_t)frame->width, "height", (json_int_t)frame->height,
-                  "samples", (json_int_t)frame->samples, "encoding", protocol_encoding_text(frame->encoding),
-                  "key", frame->key_frame, "moving", frame->moving, "tracer", protocol_tracer_text(frame->tracer),
+        json_pack("{s:I,s:I,s:I,s:I,s:I,s:I,s:s,s:b,s:b,s:s,s:s,s:f,s:f,s:o,s:o}", "frame",
+                  (json_int_t)frame->frame, "revision", (json_int_t)frame->revision, "id", (json_int_t)id, "width",
+                  (json_int_t)frame->width, "height", (json_int_t)frame->height, "samples",
+                  (json_int_t)frame->samples, "encoding", protocol_encoding_text(frame->encoding), "key",
+                  frame->key_frame, "moving", frame->moving, "tracer", protocol_tracer_text(frame->tracer),
                   "integrator", protocol_integrator_text(frame->integrator), "fov", (double)frame->fov_y, "time",
                   (double)frame->time_s, "camera", numbers(frame->world_from_view, 12), "stages", stages(frame)));
+}
+
+char *web_describe_errors(const struct fl_frame *frame, double far_share, uint32_t id)
+{
+    return print(json_pack("{s:{s:I,s:I,s:I,s:I,s:I,s:s,s:s,s:f,s:o,s:o}}", "errors", "compare", (json_int_t)id,
+                           "width", (json_int_t)frame->width, "height", (json_int_t)frame->height, "samples",
+                           (json_int_t)frame->samples, "revision", (json_int_t)frame->revision, "tracer",
+                           protocol_tracer_text(frame->tracer), "reference",
+                           protocol_tracer_text(PROTOCOL_TRACER_REFERENCE), "far_share", far_share, "waves",
+                           cli_waves_json(frame), "all", cli_wave_total_json(frame)));
+}
+
+char *web_describe_refusal(const struct fl_error *error, uint32_t id)
+{
+    char line[1200];
+    fl_error_print(error, line, sizeof(line));
+    return print(json_pack("{s:{s:I,s:s}}", "refused", "compare", (json_int_t)id, "text", line));
+}
+
+char *web_describe_edit_refusal(const struct fl_error *error)
+{
+    char line[1200];
+    fl_error_print(error, line, sizeof(line));
+    return print(json_pack("{s:{s:b,s:s}}", "refused", "edit", 1, "text", line));
 }
 
 char *web_describe_error(const struct fl_error *error, bool again)

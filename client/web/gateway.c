@@ -1,18 +1,17 @@
 /* SPDX-License-Identifier: MIT */
 #include "web/gateway.h"
+#include "web/callers.h"
 #include "web/page.h"
 #include "protocol/common/clock.h"
 
 #include <libwebsockets.h>
-#include <sodium.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#define TOKEN_BYTES 32
-#define TOKEN_LENGTH 43 /* of base 64 without padding */
 #define HEADERS_BYTES 2048
 #define NAME_BYTES 256
+#define MISDIRECTED 421 /* the HTTP status: this server does not answer for that name */
 #define CHECK_US 250000 /* for a signal that came just before the wait */
 #define REQUEST_TIMEOUT_S 20
 #define PING_S 20
@@ -27,7 +26,10 @@ struct gateway {
     const struct gateway_options *options;
     struct seat_options seat;
     struct lws_context *context;
-    char token[TOKEN_LENGTH + 1];
+    const char *machine; /* its own name counts where it listens beyond itself; NULL: it does not */
+    int port;            /* of the first address */
+    struct web_callers callers;
+    struct web_links links;
     unsigned viewers;
     lws_sorted_usec_list_t check;
 };
@@ -49,13 +51,13 @@ static struct gateway *gateway_of(struct lws *wsi)
 
 /* ---- the right to come in ---- */
 
-/* What follows the token in a path; NULL: it is not there. Takes the same time for all tokens. */
-static const char *behind_token(const struct gateway *gateway, const char *path)
+/* A browser is led here by another site's name, whose pages could then read ours: it says that name. */
+static bool is_own_host(const struct gateway *gateway, struct lws *wsi)
 {
-    if (strlen(path) < TOKEN_LENGTH + 2 || path[0] != '/' || path[TOKEN_LENGTH + 1] != '/' ||
-        sodium_memcmp(path + 1, gateway->token, TOKEN_LENGTH) != 0)
-        return NULL;
-    return path + TOKEN_LENGTH + 2;
+    char host[NAME_BYTES];
+    return lws_hdr_copy(wsi, host, sizeof(host), WSI_TOKEN_HOST) > 0 &&
+           (web_host_is_ours(host, gateway->options->hosts, gateway->options->host_count) ||
+            (gateway->machine && web_host_is_ours(host, &gateway->machine, 1)));
 }
 
 /* The page itself has asked, not one of another site in the same browser. */
@@ -71,11 +73,13 @@ static bool is_own_origin(struct lws *wsi)
 }
 
 /* The HTTP status with which a WebSocket is turned away; 0: it may come in. */
-static unsigned refuse_socket(struct gateway *gateway, struct lws *wsi)
+static unsigned refuse_socket(struct gateway *gateway, struct lws *wsi, enum web_right *right)
 {
     char path[NAME_BYTES];
+    if (!is_own_host(gateway, wsi))
+        return MISDIRECTED;
     const int length = lws_hdr_copy(wsi, path, sizeof(path), WSI_TOKEN_GET_URI);
-    const char *name = length > 0 ? behind_token(gateway, path) : NULL;
+    const char *name = length > 0 ? web_links_find(&gateway->links, path, right) : NULL;
     if (!name || strcmp(name, "view") != 0)
         return HTTP_STATUS_UNAUTHORIZED;
     if (!is_own_origin(wsi))
@@ -117,8 +121,11 @@ static int begin_page(struct lws *wsi, struct visitor *visitor, const struct pag
 
 static int on_page(struct gateway *gateway, struct lws *wsi, struct visitor *visitor, const char *path)
 {
+    if (!is_own_host(gateway, wsi))
+        return begin_page(wsi, visitor, &page_misdirected, MISDIRECTED);
     const bool is_get = lws_hdr_total_length(wsi, WSI_TOKEN_GET_URI) > 0;
-    const char *name = behind_token(gateway, path);
+    enum web_right right;
+    const char *name = web_links_find(&gateway->links, path, &right);
     if (!name)
         return begin_page(wsi, visitor, &page_denied, HTTP_STATUS_UNAUTHORIZED);
     const struct page_file *file = page_find(name);
@@ -157,11 +164,15 @@ static int refuse(struct lws *wsi, enum lws_close_status status, const char *why
 
 static int on_upgrade(struct gateway *gateway, struct lws *wsi, const char *to)
 {
-    const unsigned status = refuse_socket(gateway, wsi);
+    enum web_right right = WEB_LOOKS;
+    const unsigned status = refuse_socket(gateway, wsi, &right);
     if (strcmp(to, "websocket") != 0)
         return -1;
     if (status != 0)
         lws_return_http_status(wsi, status, NULL);
+    struct web_caller *caller = lws_get_opaque_user_data(wsi);
+    if (caller)
+        caller->right = right;
     return status != 0;
 }
 
@@ -170,7 +181,10 @@ static int open_seat(struct gateway *gateway, struct lws *wsi, struct visitor *v
     struct fl_error error = {0};
     visitor->messages = MESSAGES_AT_ONCE;
     visitor->last_ns = monotonic_now_ns();
-    visitor->seat = seat_create(&gateway->seat, &error);
+    const struct web_caller *caller = lws_get_opaque_user_data(wsi);
+    struct seat_options options = gateway->seat;
+    options.may_edit = caller && caller->right == WEB_EDITS;
+    visitor->seat = seat_create(&options, &error);
     if (!visitor->seat)
         return refuse(wsi, LWS_CLOSE_STATUS_UNEXPECTED_CONDITION, "out of memory or threads");
     gateway->viewers++;
@@ -214,7 +228,8 @@ static int on_message(struct lws *wsi, struct visitor *visitor, const char *byte
     visitor->message_bytes = 0;
     if (!web_request_read(visitor->message, whole, &request, &error))
         return refuse(wsi, LWS_CLOSE_STATUS_POLICY_VIOLATION, error.field);
-    seat_tell(visitor->seat, &request);
+    if (!seat_tell(visitor->seat, &request))
+        return refuse(wsi, LWS_CLOSE_STATUS_POLICY_VIOLATION, "this link may not edit, or not yet");
     return 0;
 }
 
@@ -235,10 +250,49 @@ static int on_writable(struct lws *wsi, struct visitor *visitor)
     return has_ended ? refuse(wsi, LWS_CLOSE_STATUS_GOINGAWAY, "the view has ended") : 0;
 }
 
+/* ---- connections ---- */
+
+/* Each browser has a WebSocket, and up to six connections for the files of a page; ssh and proxies make one
+ * address of many. */
+static unsigned callers_max(const struct gateway *gateway)
+{
+    return 6 * gateway->options->viewers + 16;
+}
+
+static int filter_caller(const struct gateway *gateway, lws_sockfd_type fd)
+{
+    char peer[CALLER_PEER_BYTES] = "";
+    lws_get_peer_simple_fd(fd, peer, sizeof(peer));
+    return !web_callers_has_room(&gateway->callers, peer, callers_max(gateway));
+}
+
+static void add_caller(struct gateway *gateway, struct lws *wsi)
+{
+    char peer[CALLER_PEER_BYTES] = "";
+    lws_get_peer_simple(wsi, peer, sizeof(peer));
+    lws_set_opaque_user_data(wsi, web_callers_add(&gateway->callers, peer));
+}
+
+static void remove_caller(struct lws *wsi)
+{
+    struct web_caller *caller = lws_get_opaque_user_data(wsi);
+    if (caller)
+        caller->is_there = false;
+    lws_set_opaque_user_data(wsi, NULL);
+}
+
 static int on_event(struct lws *wsi, enum lws_callback_reasons reason, void *user, void *in, size_t bytes)
 {
     struct visitor *visitor = user;
     switch (reason) {
+    case LWS_CALLBACK_FILTER_NETWORK_CONNECTION: /* `in` is a descriptor */
+        return filter_caller(gateway_of(wsi), (lws_sockfd_type)(intptr_t)in);
+    case LWS_CALLBACK_SERVER_NEW_CLIENT_INSTANTIATED:
+        add_caller(gateway_of(wsi), wsi);
+        return 0;
+    case LWS_CALLBACK_WSI_DESTROY:
+        remove_caller(wsi);
+        return 0;
     case LWS_CALLBACK_HTTP:
         return on_page(gateway_of(wsi), wsi, visitor, in);
     case LWS_CALLBACK_HTTP_WRITEABLE:
@@ -276,86 +330,107 @@ static void check_again(lws_sorted_usec_list_t *check)
     lws_sul_schedule(gateway->context, 0, check, check_again, CHECK_US);
 }
 
-bool gateway_read_listen(const char *text, struct gateway_options *options, bool *is_loopback,
-                         struct fl_error *error)
-{
-    const char *colon = strrchr(text, ':');
-    unsigned numbers[4];
-    char *end = NULL, more;
-    const long port = colon && colon[1] != '\0' ? strtol(colon + 1, &end, 10) : -1;
-    const size_t length = colon ? (size_t)(colon - text) : 0;
-    if (port < 0 || port > 65535 || *end != '\0' || length == 0 || length >= sizeof(options->host))
-        return fl_error_set(error, FL_ERROR_ARGUMENT, "--listen", "'%s' is not HOST:PORT", text);
-    snprintf(options->host, sizeof(options->host), "%.*s", (int)length, text);
-    if (strcmp(options->host, "localhost") == 0)
-        snprintf(options->host, sizeof(options->host), "127.0.0.1");
-    if (sscanf(options->host, "%3u.%3u.%3u.%3u%c", &numbers[0], &numbers[1], &numbers[2], &numbers[3], &more) != 4)
-        return fl_error_set(error, FL_ERROR_ARGUMENT, "--listen", "'%s' is no IPv4 address of this machine",
-                            options->host);
-    options->port = (int)port;
-    *is_loopback = numbers[0] == 127;
-    return true;
-}
-
-static bool make_token(struct gateway *gateway, struct fl_error *error)
-{
-    unsigned char bytes[TOKEN_BYTES];
-    if (sodium_init() < 0)
-        return fl_error_set(error, FL_ERROR_SYSTEM, "", "libsodium does not start");
-    randombytes_buf(bytes, sizeof(bytes));
-    sodium_bin2base64(gateway->token, sizeof(gateway->token), bytes, sizeof(bytes),
-                      sodium_base64_VARIANT_URLSAFE_NO_PADDING);
-    return true;
-}
+static const struct lws_protocols protocols[] = {
+    {"farlight", on_event, sizeof(struct visitor), WEB_REQUEST_BYTES_MAX, 0, NULL, 0}, {0}};
 
 static bool open_context(struct gateway *gateway, struct fl_error *error)
 {
-    static const struct lws_protocols protocols[] = {
-        {"farlight", on_event, sizeof(struct visitor), WEB_REQUEST_BYTES_MAX, 0, NULL, 0}, {0}};
     static const lws_retry_bo_t alive = {.secs_since_valid_ping = PING_S, .secs_since_valid_hangup = SILENCE_S};
-    const struct gateway_options *options = gateway->options;
-    const struct lws_context_creation_info info = {.port = options->port,
-                                                   .iface = options->host,
-                                                   .protocols = protocols,
+    const struct lws_context_creation_info info = {.port = CONTEXT_PORT_NO_LISTEN,
                                                    .user = gateway,
                                                    .gid = -1,
                                                    .uid = -1,
                                                    .retry_and_idle_policy = &alive,
-                                                   .timeout_secs = REQUEST_TIMEOUT_S,
-                                                   .keepalive_timeout = REQUEST_TIMEOUT_S,
                                                    .server_string = "farlight-web",
-                                                   .options = LWS_SERVER_OPTION_DISABLE_IPV6 |
-                                                              LWS_SERVER_OPTION_FAIL_UPON_UNABLE_TO_BIND};
+                                                   .options = LWS_SERVER_OPTION_EXPLICIT_VHOSTS};
     lws_set_log_level(0, NULL); /* it would log paths, and with them the token */
     gateway->context = lws_create_context(&info);
-    return gateway->context ||
-           fl_error_set(error, FL_ERROR_SYSTEM, "--listen", "cannot listen at %s:%d: is something else there?",
-                        options->host, options->port);
+    return gateway->context || fl_error_set(error, FL_ERROR_SYSTEM, "", "libwebsockets does not start");
+}
+
+/* Where the kernel has chosen a port for the first address, the others take it too. */
+static bool listen_at(struct gateway *gateway, const struct web_address *address, struct fl_error *error)
+{
+    const uint64_t of_four = LWS_SERVER_OPTION_DISABLE_IPV6;
+    const uint64_t of_six =
+        LWS_SERVER_OPTION_IPV6_V6ONLY_MODIFY | (address->is_any ? 0 : LWS_SERVER_OPTION_IPV6_V6ONLY_VALUE);
+    const bool is_first = address == gateway->options->listens;
+    char host[sizeof(address->host) + 2];
+    web_address_print(address, host, sizeof(host));
+    const struct lws_context_creation_info info = {
+        .port = address->port == 0 && !is_first ? gateway->port : address->port,
+        .iface = address->host,
+        .vhost_name = host,
+        .protocols = protocols,
+        .timeout_secs = REQUEST_TIMEOUT_S,
+        .keepalive_timeout = REQUEST_TIMEOUT_S,
+        .options = LWS_SERVER_OPTION_FAIL_UPON_UNABLE_TO_BIND | (address->is_v6 ? of_six : of_four)};
+    struct lws_vhost *vhost = lws_create_vhost(gateway->context, &info);
+    if (!vhost)
+        return fl_error_set(error, FL_ERROR_SYSTEM, "--listen",
+                            "cannot listen at %s:%d: is something else there, or is it not this machine's?", host,
+                            info.port);
+    if (is_first)
+        gateway->port = lws_get_vhost_listen_port(vhost);
+    if (address->is_any)
+        gateway->machine = lws_canonical_hostname(gateway->context);
+    return true;
 }
 
 static void announce(const struct gateway *gateway)
 {
-    const struct gateway_options *options = gateway->options;
-    const char *host =
-        strcmp(options->host, "0.0.0.0") == 0 ? lws_canonical_hostname(gateway->context) : options->host;
-    printf("http://%s:%d/%s/\n", host,
-           lws_get_vhost_listen_port(lws_get_vhost_by_name(gateway->context, "default")), gateway->token);
+    const struct web_address *address = gateway->options->listens;
+    char host[NAME_BYTES];
+    web_address_print(address, host, sizeof(host));
+    for (int right = 0; right <= (gateway->options->allow_edit ? WEB_EDITS : WEB_LOOKS); right++)
+        printf("http://%s:%d/%s/\n", address->is_any ? gateway->machine : host, gateway->port,
+               gateway->links.tokens[right]);
     fflush(stdout);
 }
 
-bool gateway_run(const struct gateway_options *options, struct fl_error *error)
+struct gateway *gateway_create(const struct gateway_options *options, struct fl_error *error)
 {
-    struct gateway gateway = {.options = options, .seat = options->seat};
-    gateway.seat.changed = seat_changed;
-    gateway.seat.user = &gateway;
-    if (!make_token(&gateway, error) || !open_context(&gateway, error))
-        return false;
-    announce(&gateway);
-    check_again(&gateway.check);
-    while (options->interrupt_signal() == 0 && lws_service(gateway.context, 0) >= 0)
-        continue;
-    lws_sul_schedule(gateway.context, 0, &gateway.check, NULL, LWS_SET_TIMER_USEC_CANCEL);
-    lws_context_destroy(gateway.context);
-    return fl_error_set(error, options->interrupt_signal() != 0 ? FL_ERROR_INTERRUPTED : FL_ERROR_SYSTEM, "", "%s",
-                        options->interrupt_signal() != 0 ? "interrupted" : "libwebsockets failed");
+    struct gateway *gateway = calloc(1, sizeof(*gateway));
+    if (!gateway) {
+        fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
+        return NULL;
+    }
+    gateway->options = options;
+    gateway->seat = options->seat;
+    gateway->seat.changed = seat_changed;
+    gateway->seat.user = gateway;
+    bool is_open = (web_links_make(&gateway->links, options->allow_edit) ||
+                    fl_error_set(error, FL_ERROR_SYSTEM, "", "libsodium does not start")) &&
+                   open_context(gateway, error);
+    for (size_t i = 0; is_open && i < options->listen_count; i++)
+        is_open = listen_at(gateway, &options->listens[i], error);
+    if (is_open)
+        return gateway;
+    gateway_destroy(gateway);
+    return NULL;
+}
+
+void gateway_run(struct gateway *gateway, struct fl_error *error)
+{
+    const struct gateway_options *options = gateway->options;
+    bool has_failed = false;
+    announce(gateway);
+    check_again(&gateway->check);
+    while (options->interrupt_signal() == 0 && !has_failed && lws_service(gateway->context, 0) >= 0)
+        has_failed = options->has_failed && options->has_failed(options->user);
+    lws_sul_schedule(gateway->context, 0, &gateway->check, NULL, LWS_SET_TIMER_USEC_CANCEL);
+    if (options->interrupt_signal() != 0)
+        fl_error_set(error, FL_ERROR_INTERRUPTED, "", "interrupted");
+    else if (!has_failed)
+        fl_error_set(error, FL_ERROR_SYSTEM, "", "libwebsockets failed");
+}
+
+void gateway_destroy(struct gateway *gateway)
+{
+    if (!gateway)
+        return;
+    if (gateway->context)
+        lws_context_destroy(gateway->context);
+    web_links_forget(&gateway->links);
+    free(gateway);
 }

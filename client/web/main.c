@@ -1,11 +1,15 @@
 /* SPDX-License-Identifier: MIT */
-/* farlight-web: a page in a browser that shows a shared scene of a daemon. */
-#include "cli/cli.h"
+/* farlight-web: a page in a browser that shows a model, or a shared scene of a daemon. */
+#include "cli/sharing.h"
 #include "lib/text.h"
 #include "web/gateway.h"
 #include "protocol/version.h"
 
+#include <errno.h>
+#include <pthread.h>
+#include <stdatomic.h>
 #include <stdlib.h>
+#include <string.h>
 
 /* The C library looks for it by name, past our hidden visibility. */
 __attribute__((visibility("default"))) const char *argp_program_version = "farlight-web " FARLIGHT_VERSION;
@@ -13,96 +17,200 @@ __attribute__((visibility("default"))) const char *argp_program_version = "farli
 #define LISTEN_DEFAULT "127.0.0.1:8080"
 #define VIEWERS_DEFAULT 8u
 #define VIEWERS_MAX 64u
+#define DAEMON_WORDS_MAX 28 /* of fl_connect */
 
-enum key { KEY_SCENE = 0x500, KEY_LISTEN, KEY_INSECURE, KEY_VIEWERS };
+enum key {
+    KEY_SCENE = 0x500,
+    KEY_LISTEN,
+    KEY_HOST,
+    KEY_INSECURE,
+    KEY_VIEWERS,
+    KEY_ALLOW_EDIT,
+    KEY_SAMPLES,
+    KEY_INTEGRATOR
+};
 
 static const struct argp_option options[] = {
-    {"scene", KEY_SCENE, "NAME", 0, "Show this shared scene of the daemon ('farlight scenes' lists them)", 0},
+    {NULL, 0, NULL, 0, "Page:", -2},
+    {"scene", KEY_SCENE, "NAME", 0,
+     "Show a shared scene at --server in place of MODEL ('farlight scenes' lists them)", -2},
     {"listen", KEY_LISTEN, "HOST:PORT", 0,
-     "Serve the page here, at an IPv4 address of this machine (default " LISTEN_DEFAULT "; port 0: any free one)",
-     0},
+     "Serve the page here, as 127.0.0.1:8080 (default), [::1]:8080, or [::]:8080 for all of this machine; port 0: "
+     "any free one; may be repeated",
+     -2},
+    {"host", KEY_HOST, "NAME", 0,
+     "Answer browsers that ask for this name, such as a proxy's; may be repeated (addresses and localhost are "
+     "always "
+     "answered)",
+     -2},
     {"insecure", KEY_INSECURE, NULL, 0,
-     "Let --listen be beyond this machine: who can read the network's traffic gets the link and the pictures", 0},
-    {"viewers", KEY_VIEWERS, "N", 0, "Let N browsers look at once, 1 to 64 (default 8)", 0},
+     "Let --listen be beyond this machine: who can read the network's traffic gets the link and the pictures", -2},
+    {"viewers", KEY_VIEWERS, "N", 0, "Let N browsers look at once, 1 to 64 (default 8)", -2},
+    {"allow-edit", KEY_ALLOW_EDIT, NULL, 0,
+     "Print a second link: who has it may edit the scene, for all who look at it", -2},
+    {"samples", KEY_SAMPLES, "N", 0, "Render N samples per pixel while nothing moves (default 64)", -2},
+    {"integrator", KEY_INTEGRATOR, "NAME", 0,
+     "Begin with whitted (default), distributed (default with a lens or a shutter), raycast, ao or path", -2},
     {0}};
 
 struct command_line {
-    struct cli_daemon daemon;
-    struct cli_job job; /* has the error of what was typed */
-    const char *scene, *listen;
+    struct cli_job job; /* model, server, options of the picture; and the error of what was typed */
+    struct gateway_options gateway;
     bool insecure;
-    uint64_t viewers;
+    struct cli_socket socket;
+    const char *words[DAEMON_WORDS_MAX + 1]; /* arguments of a daemon of its own, and a NULL */
+    size_t word_count;
 };
+
+/* ---- command line ---- */
+
+static error_t add_word(struct command_line *line, const char *word)
+{
+    if (line->word_count == DAEMON_WORDS_MAX)
+        return cli_usage(&line->job, word, "too many options for the daemon");
+    line->words[line->word_count++] = word;
+    return 0;
+}
+
+static error_t add_listen(struct command_line *line, const char *value)
+{
+    struct gateway_options *gateway = &line->gateway;
+    if (gateway->listen_count == GATEWAY_LISTENS_MAX)
+        return cli_usage(&line->job, "--listen", "at most %d addresses can be given", GATEWAY_LISTENS_MAX);
+    return web_address_read(value, &gateway->listens[gateway->listen_count++], &line->job.error) ? 0 : EINVAL;
+}
+
+static error_t add_host(struct command_line *line, const char *value)
+{
+    struct gateway_options *gateway = &line->gateway;
+    if (gateway->host_count == GATEWAY_HOSTS_MAX)
+        return cli_usage(&line->job, "--host", "at most %d names can be given", GATEWAY_HOSTS_MAX);
+    if (value[0] == '\0' || strpbrk(value, ":/ "))
+        return cli_usage(&line->job, "--host", "'%s' is no name: leave scheme and port out", value);
+    gateway->hosts[gateway->host_count++] = value;
+    return 0;
+}
+
+static error_t set_number(struct command_line *line, const char *field, const char *value, uint64_t max,
+                          unsigned *out)
+{
+    uint64_t number = 0;
+    if (!fl_text_integer(value, 1, max, &number, &line->job.error))
+        return cli_usage(&line->job, field, "'%s' is no number from 1 to %llu", value, (unsigned long long)max);
+    *out = (unsigned)number;
+    return 0;
+}
 
 static error_t parse(int key, char *value, struct argp_state *state)
 {
     struct command_line *line = state->input;
+    struct cli_job *job = &line->job;
     switch (key) {
     case ARGP_KEY_INIT:
-        state->child_inputs[0] = &line->daemon;
+        state->child_inputs[0] = job;
         return 0;
     case KEY_SCENE:
-        line->scene = value;
+        job->scene = value;
         return 0;
     case KEY_LISTEN:
-        line->listen = value;
-        return 0;
+        return add_listen(line, value);
+    case KEY_HOST:
+        return add_host(line, value);
     case KEY_INSECURE:
         line->insecure = true;
         return 0;
+    case KEY_ALLOW_EDIT:
+        line->gateway.allow_edit = true;
+        return 0;
     case KEY_VIEWERS:
-        return fl_text_integer(value, 1, VIEWERS_MAX, &line->viewers, &line->job.error)
+        return set_number(line, "--viewers", value, VIEWERS_MAX, &line->gateway.viewers);
+    case KEY_SAMPLES:
+        return set_number(line, "--samples", value, 65536, &job->options.samples);
+    case KEY_INTEGRATOR:
+        job->has_integrator = true;
+        return protocol_integrator_parse(value, &job->options.integrator)
                    ? 0
-                   : cli_usage(&line->job, "--viewers", "'%s' is no number from 1 to %u", value, VIEWERS_MAX);
-    case ARGP_KEY_ARG:
-        return cli_usage(&line->job, value,
-                         "is not expected; share a model with 'farlight serve', and name its scene with --scene");
+                   : cli_usage(job, "--integrator", "unknown integrator '%s'", value);
+    case ARGP_KEY_ARG: /* those behind -- are the daemon's */
+        return state->quoted > 0 && state->next > state->quoted ? add_word(line, value)
+                                                                : cli_set_model(job, value);
     default:
         return ARGP_ERR_UNKNOWN;
     }
 }
 
-/* An empty one is none. */
-static const char *usual(const char *typed, const char *variable)
+static bool check_listens(const struct command_line *line, struct fl_error *error)
 {
-    const char *value = typed ? typed : getenv(variable);
-    return value && value[0] != '\0' ? value : NULL;
-}
-
-static bool complete(struct command_line *line, struct gateway_options *gateway, struct fl_error *error)
-{
-    bool is_loopback = false;
-    const char *server = usual(line->daemon.server, "FARLIGHT_SERVER");
-    if (!server) {
-        fl_error_set(error, FL_ERROR_ARGUMENT, "--server", "no address of a daemon is given");
-        return fl_error_remedy(error, "'farlight serve MODEL' shares a model and prints its address");
-    }
-    if (!line->scene) {
-        fl_error_set(error, FL_ERROR_ARGUMENT, "--scene", "no scene is given");
-        return fl_error_remedy(error, "'farlight scenes --server %s' lists them", server);
-    }
-    if (!gateway_read_listen(line->listen, gateway, &is_loopback, error))
-        return false;
-    if (!is_loopback && !line->insecure) {
+    for (size_t i = 0; i < line->gateway.listen_count; i++) {
+        const struct web_address *address = &line->gateway.listens[i];
+        if (address->is_loopback || line->insecure)
+            continue;
         fl_error_set(
             error, FL_ERROR_ARGUMENT, "--listen",
             "%s is beyond this machine, where all traffic, the link with its token included, is unencrypted",
-            gateway->host);
+            address->host);
         return fl_error_remedy(error,
                                "keep 127.0.0.1 and come by 'ssh -L %d:127.0.0.1:%d HOST' or through a TLS "
                                "proxy on this machine; --insecure listens there nevertheless",
-                               gateway->port, gateway->port);
+                               address->port, address->port);
     }
-    gateway->seat = (struct seat_options){.server = server,
-                                          .key_file = cli_key_file(server, line->daemon.key_file),
-                                          .link = usual(line->daemon.link, "FARLIGHT_LINK"),
-                                          .scene = line->scene};
-    gateway->viewers = (unsigned)line->viewers;
-    gateway->interrupt_signal = cli_interrupt_signal;
     return true;
 }
 
-/* A wrong name or address is better told here than in a browser. */
+/* The seats come to the daemon by an address, as every client does. The user's arguments for it come last: the
+ * later of two options counts. */
+static bool name_daemon(struct command_line *line, struct fl_error *error)
+{
+    const char *const ours[] = {"--listen", line->socket.address, "--log-level", "error"};
+    const size_t our_count = sizeof(ours) / sizeof(ours[0]);
+    if (!cli_socket_choose(&line->socket, error))
+        return false;
+    if (line->word_count + our_count > DAEMON_WORDS_MAX)
+        return fl_error_set(error, FL_ERROR_ARGUMENT, line->words[0], "too many options for the daemon");
+    memmove(line->words + our_count, line->words, line->word_count * sizeof(*line->words));
+    memcpy(line->words, ours, sizeof(ours));
+    return true;
+}
+
+/* What is empty, such as FARLIGHT_SERVER=, names nothing. */
+static const char *named(const char *text)
+{
+    return text && text[0] != '\0' ? text : NULL;
+}
+
+static bool complete(struct command_line *line, struct fl_error *error)
+{
+    struct cli_job *job = &line->job;
+    job->server = named(job->server);
+    if (line->gateway.listen_count == 0)
+        add_listen(line, LISTEN_DEFAULT);
+    if (!job->scene && !job->model) {
+        fl_error_set(error, FL_ERROR_ARGUMENT, "MODEL", "no model and no --scene is given");
+        return fl_error_remedy(error, job->server ? "'farlight scenes' lists the daemon's scenes"
+                                                  : "farlight-web model.glb");
+    }
+    if (!cli_job_complete_view(job) || !cli_check_models(job, &job->error)) {
+        *error = job->error;
+        return false;
+    }
+    if (line->word_count > 0 && (job->scene || job->server))
+        return fl_error_set(error, FL_ERROR_ARGUMENT, line->words[0],
+                            "the daemon at --server already has its options; leave this out");
+    if (!check_listens(line, error) || (!job->server && !name_daemon(line, error)))
+        return false;
+    const char *server = job->server ? job->server : line->socket.address;
+    line->gateway.seat = (struct seat_options){.job = job,
+                                               .server = server,
+                                               .key_file = cli_key_file(server, job->key_file),
+                                               .link = named(job->link),
+                                               .scene = job->scene ? job->scene : cli_base_name(job->model)};
+    line->gateway.interrupt_signal = cli_interrupt_signal;
+    return true;
+}
+
+/* ---- a scene of the daemon's ---- */
+
+/* A wrong name, address or camera is better told here than in a browser. */
 static bool check_scene(const struct seat_options *seat, struct fl_error *error)
 {
     const struct fl_connect_options connect = {.server = seat->server,
@@ -110,35 +218,108 @@ static bool check_scene(const struct seat_options *seat, struct fl_error *error)
                                                .link = seat->link,
                                                .name = "farlight-web",
                                                .interrupt_fd = cli_interrupt_fd()};
+    const struct cli_job *job = seat->job;
+    struct message_render render = job->options;
     struct fl_connection *connection = fl_connect(&connect, error);
     struct fl_scene *scene = connection ? fl_scene_attach(connection, seat->scene, error) : NULL;
-    const bool is_there = scene != NULL;
+    const bool is_there =
+        scene && cli_find_camera(&render, job->camera, job->framed, job->has_framing, scene, error);
     fl_scene_destroy(scene);
     fl_connection_destroy(connection);
     return is_there;
 }
 
+/* ---- a model ---- */
+
+/* It is shared as long as the gateway runs, by a thread of its own. */
+struct share {
+    struct cli_sharing sharing;
+    struct fl_error error; /* of the thread, once it has ended */
+    atomic_bool has_ended;
+    pthread_t thread;
+};
+
+static void *keep_sharing(void *argument)
+{
+    struct share *share = argument;
+    cli_sharing_stay(&share->sharing, &share->error);
+    atomic_store(&share->has_ended, true);
+    return NULL;
+}
+
+static bool has_ended(void *user)
+{
+    struct share *share = user;
+    return atomic_load(&share->has_ended);
+}
+
+/* Ctrl-C ends both; the gateway alone ends with the process. */
+static void run_with(struct gateway *gateway, struct share *share, struct fl_error *error)
+{
+    if (pthread_create(&share->thread, NULL, keep_sharing, share) != 0) {
+        fl_error_set(error, FL_ERROR_SYSTEM, "", "cannot start a thread");
+        return;
+    }
+    gateway_run(gateway, error);
+    if (cli_interrupt_signal() == 0 && !atomic_load(&share->has_ended))
+        exit(cli_report(error));
+    pthread_join(share->thread, NULL);
+    if (error->code == FL_ERROR_NONE)
+        *error = share->error;
+}
+
+static bool show_model(struct command_line *line, struct gateway *gateway, struct fl_error *error)
+{
+    static struct share share;
+    struct cli_sharing *sharing = &share.sharing;
+    sharing->job = &line->job;
+    sharing->restarts = true;
+    sharing->loading.scene_name = line->gateway.seat.scene;
+    sharing->loading.daemon_arguments = line->words;
+    line->gateway.has_failed = has_ended;
+    line->gateway.user = &share;
+    if (cli_read_input(&line->job, error) && cli_sharing_begin(sharing, error) &&
+        check_scene(&line->gateway.seat, error))
+        run_with(gateway, &share, error);
+    cli_sharing_end(sharing);
+    return error->code == FL_ERROR_NONE;
+}
+
+static void serve(struct command_line *line, struct fl_error *error)
+{
+    struct gateway *gateway = gateway_create(&line->gateway, error);
+    if (gateway && line->job.model)
+        show_model(line, gateway, error);
+    else if (gateway && check_scene(&line->gateway.seat, error))
+        gateway_run(gateway, error);
+    gateway_destroy(gateway);
+}
+
 int main(int argc, char **argv)
 {
     static struct argp_child children[2];
-    children[0].argp = &cli_daemon_argp;
+    children[0].argp = cli_web_argp();
     static const struct argp argp = {
         .options = options,
         .parser = parse,
-        .args_doc = "--server ADDRESS --scene NAME",
+        .args_doc = "MODEL [--at PLACE] [MODEL [--at PLACE]]... [-- OPTION OF FARLIGHTD...]\n"
+                    "--server ADDRESS --scene NAME",
         .doc =
-            "Show a shared scene of a daemon in browsers: prints a link, and serves who has it until Ctrl-C.\v"
-            "The link has a random token; who has it can look, and change nothing. Each browser has a view of its "
-            "own.",
+            "Show a model, or a shared scene of a daemon, in browsers: prints a link, and serves who has it until "
+            "Ctrl-C.\v"
+            "The link has a random token; who has it can look, and change nothing; --allow-edit prints another "
+            "one. Each browser has a view of its "
+            "own. Without --server a daemon is started, which ends with the command; arguments after -- are its "
+            "options.",
         .children = children};
-    struct command_line line = {.listen = LISTEN_DEFAULT, .viewers = VIEWERS_DEFAULT};
-    struct gateway_options gateway = {0};
+    static struct command_line line;
     struct fl_error error = {0};
     argp_err_exit_status = CLI_USAGE;
-    if (cli_parse(&argp, argc, argv, 0, &line) != 0)
+    line.gateway.viewers = VIEWERS_DEFAULT;
+    if (!cli_job_begin(&line.job, fl_view_defaults()) || cli_parse(&argp, argc, argv, ARGP_IN_ORDER, &line) != 0)
         return cli_report(&line.job.error);
-    if (!complete(&line, &gateway, &error) || !cli_interrupt_begin(&error) || !check_scene(&gateway.seat, &error))
-        return cli_report(&error);
-    gateway_run(&gateway, &error);
+    if (complete(&line, &error) && cli_interrupt_begin(&error))
+        serve(&line, &error);
+    cli_socket_remove(&line.socket);
     return cli_report(&error);
 }

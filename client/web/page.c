@@ -15,7 +15,11 @@ EMBED(page_style, "page.css");
 EMBED(page_main, "page.js");
 EMBED(page_camera, "camera.js");
 EMBED(page_picture, "picture.js");
+EMBED(page_errors, "errors.js");
+EMBED(page_edit, "edit.js");
+EMBED(page_stages, "stages.js");
 EMBED(page_refusal, "denied.html");
+EMBED(page_elsewhere, "misdirected.html");
 
 #define HTML "text/html; charset=utf-8"
 #define SCRIPT "text/javascript; charset=utf-8"
@@ -26,9 +30,13 @@ static const struct page_file files[] = {
     {"page.js", SCRIPT, page_main, page_main_end},
     {"camera.js", SCRIPT, page_camera, page_camera_end},
     {"picture.js", SCRIPT, page_picture, page_picture_end},
+    {"errors.js", SCRIPT, page_errors, page_errors_end},
+    {"edit.js", SCRIPT, page_edit, page_edit_end},
+    {"stages.js", SCRIPT, page_stages, page_stages_end},
 };
 
 const struct page_file page_denied = {"", HTML, page_refusal, page_refusal_end};
+const struct page_file page_misdirected = {"", HTML, page_elsewhere, page_elsewhere_end};
 
 const struct page_file *page_find(const char *name)
 {

@@ -13,7 +13,7 @@ struct page_file {
 
 /* NULL: there is none. */
 const struct page_file *page_find(const char *name);
-/* What is seen without the right link. */
-extern const struct page_file page_denied;
+/* What is seen without the right link, and by another name than this machine's. */
+extern const struct page_file page_denied, page_misdirected;
 
 #endif

@@ -12,6 +12,7 @@
 #define FOV_MIN 0.001
 #define FOV_MAX 3.1
 #define TIME_MAX 1e6
+#define VALUE_MAX 1e30 /* of any field; what it allows itself, the library checks */
 
 static bool refuse(struct fl_error *error, const char *field, const char *what)
 {
@@ -24,7 +25,7 @@ static bool read_show(json_t *json, struct web_show *show, struct fl_error *erro
     json_int_t width = 0, height = 0, clip = 0;
     const char *tracer = NULL, *integrator = NULL;
     int h264 = 0;
-    if (json_unpack_ex(json, &why, JSON_STRICT, "{s:I,s:I,s:b,s:s,s:s,s:I}", "width", &width, "height", &height,
+    if (json_unpack_ex(json, &why, JSON_STRICT, "{s:I,s:I,s:b,s?s,s?s,s:I}", "width", &width, "height", &height,
                        "h264", &h264, "tracer", &tracer, "integrator", &integrator, "clip", &clip) != 0)
         return refuse(error, "show", why.text);
     if (width < SIDE_MIN || width > (json_int_t)WEB_WIDTH_MAX || height < SIDE_MIN ||
@@ -32,9 +33,11 @@ static bool read_show(json_t *json, struct web_show *show, struct fl_error *erro
         return refuse(error, "show.width", "no window has this size");
     if (clip < 0 || clip > UINT32_MAX)
         return refuse(error, "show.clip", "is no clip");
-    if (!protocol_tracer_parse(tracer, &show->tracer))
+    show->has_tracer = tracer != NULL;
+    show->has_integrator = integrator != NULL;
+    if (tracer && !protocol_tracer_parse(tracer, &show->tracer))
         return refuse(error, "show.tracer", "there is no such tracer");
-    if (!protocol_integrator_parse(integrator, &show->integrator))
+    if (integrator && !protocol_integrator_parse(integrator, &show->integrator))
         return refuse(error, "show.integrator", "there is no such integrator");
     show->width = (uint32_t)width;
     show->height = (uint32_t)height;
@@ -91,6 +94,88 @@ static bool read_look(json_t *json, struct web_request *request, struct fl_error
     return true;
 }
 
+static bool read_compare(json_t *json, struct web_request *request, struct fl_error *error)
+{
+    const json_int_t id = json_is_integer(json) ? json_integer_value(json) : -1;
+    if (id < 0 || id > UINT32_MAX)
+        return refuse(error, "compare", "is no number of 32 bits");
+    request->kind = WEB_COMPARE;
+    request->id = (uint32_t)id;
+    return true;
+}
+
+static bool read_kind(const char *name, enum protocol_object_kind *kind, struct fl_error *error)
+{
+    if (protocol_object_kind_parse(name, kind) &&
+        (*kind == PROTOCOL_OBJECT_NODE || *kind == PROTOCOL_OBJECT_MATERIAL || *kind == PROTOCOL_OBJECT_LIGHT ||
+         *kind == PROTOCOL_OBJECT_ENVIRONMENT))
+        return true;
+    return refuse(error, "kind", "is nothing that can be edited");
+}
+
+static bool read_list(json_t *json, struct fl_assignment *wanted, struct fl_error *error)
+{
+    json_error_t why;
+    const char *kind = NULL, *match = NULL;
+    if (json_unpack_ex(json, &why, JSON_STRICT, "{s:s,s:s}", "kind", &kind, "match", &match) != 0)
+        return refuse(error, "list", why.text);
+    if (strlen(match) >= sizeof(wanted->which))
+        return refuse(error, "list.match", "is longer than a name");
+    memcpy(wanted->which, match, strlen(match) + 1);
+    return read_kind(kind, &wanted->kind, error);
+}
+
+/* "field" and "values", which an edit has. */
+static bool read_change(const char *field, json_t *values, struct fl_assignment *wanted, struct fl_error *error)
+{
+    if (strlen(field) >= sizeof(wanted->field))
+        return refuse(error, "edit.field", "there is no such field");
+    memcpy(wanted->field, field, strlen(field) + 1);
+    const size_t count = json_array_size(values); /* 0 of what is no array */
+    if (count < 1 || count > FL_FIELD_VALUES_MAX)
+        return refuse(error, "edit.values", "no field has this many values");
+    wanted->way = FL_ASSIGN;
+    wanted->count = (unsigned)count;
+    for (size_t i = 0; i < count; i++) {
+        const json_t *value = json_array_get(values, i);
+        wanted->values[i] = json_number_value(value);
+        if (!json_is_number(value) || !(fabs(wanted->values[i]) <= VALUE_MAX))
+            return refuse(error, "edit.values", "is no number, or a huge one");
+    }
+    return true;
+}
+
+static bool read_object(json_t *json, bool is_edit, struct fl_assignment *wanted, struct fl_error *error)
+{
+    json_error_t why;
+    const char *kind = NULL, *field = NULL;
+    json_int_t id = 0;
+    json_t *values = NULL;
+    if (json_unpack_ex(json, &why, JSON_STRICT, is_edit ? "{s:s,s:I,s:s,s:o}" : "{s:s,s:I}", "kind", &kind, "id",
+                       &id, "field", &field, "values", &values) != 0)
+        return refuse(error, is_edit ? "edit" : "read", why.text);
+    if (id < 1 || id > UINT32_MAX)
+        return refuse(error, "id", "is no identifier");
+    wanted->id = (uint32_t)id;
+    return read_kind(kind, &wanted->kind, error) && (!is_edit || read_change(field, values, wanted, error));
+}
+
+/* What only browsers that may edit send. */
+static bool read_editing(const char *name, json_t *value, struct web_request *request, struct fl_error *error)
+{
+    if (strcmp(name, "list") == 0) {
+        request->kind = WEB_LIST;
+        return read_list(value, &request->assignment, error);
+    }
+    if (strcmp(name, "read") == 0 || strcmp(name, "edit") == 0) {
+        request->kind = name[0] == 'e' ? WEB_EDIT : WEB_READ;
+        return read_object(value, request->kind == WEB_EDIT, &request->assignment, error);
+    }
+    request->kind = WEB_UNDO;
+    return (strcmp(name, "undo") == 0 && json_is_true(value)) ||
+           refuse(error, "message", "nothing that a page sends");
+}
+
 static bool read_one(const char *name, json_t *value, struct web_request *request, struct fl_error *error)
 {
     if (strcmp(name, "show") == 0) {
@@ -105,9 +190,13 @@ static bool read_one(const char *name, json_t *value, struct web_request *reques
         request->kind = WEB_KEY;
         return true;
     }
+    if (strcmp(name, "compare") == 0)
+        return read_compare(value, request, error);
     const json_int_t shown = json_integer_value(value);
-    if (strcmp(name, "shown") != 0 || shown < 1 || shown > SHOWN_MAX)
-        return refuse(error, "message", "nothing that a page sends");
+    if (strcmp(name, "shown") != 0)
+        return read_editing(name, value, request, error);
+    if (shown < 1 || shown > SHOWN_MAX)
+        return refuse(error, "shown", "is no number of frames");
     request->kind = WEB_SHOWN;
     request->shown = (uint32_t)shown;
     return true;

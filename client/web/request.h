@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What a page sends, read once and checked here: JSON with one of "show", "look", "shown", "compare", "key". No
- * I/O. */
+/* What a page sends, read once and checked here: JSON with one of "show", "look", "shown", "key", "compare",
+ * "list", "read", "edit", "undo". No I/O. */
 #ifndef FARLIGHT_CLIENT_WEB_REQUEST_H
 #define FARLIGHT_CLIENT_WEB_REQUEST_H
 
@@ -11,16 +11,27 @@
 #define WEB_HEIGHT_MAX 2160u
 
 enum web_request_kind {
-    WEB_SHOW,  /* {"show": {"width", "height", "h264", "tracer", "integrator", "clip"}} */
-    WEB_LOOK,  /* {"look": {"id", "eye", "at", "up", "fov", "time", "moving", "node"}} */
-    WEB_SHOWN, /* {"shown": N}: another N frames are on the screen */
-    WEB_KEY    /* {"key": true}: a frame in H.264 could not be decoded */
+    WEB_SHOW,    /* {"show": {"width", "height", "h264", "tracer", "integrator", "clip"}} */
+    WEB_LOOK,    /* {"look": {"id", "eye", "at", "up", "fov", "time", "moving", "node"}} */
+    WEB_SHOWN,   /* {"shown": N}: another N frames are on the screen */
+    WEB_KEY,     /* {"key": true}: a frame in H.264 could not be decoded */
+    WEB_COMPARE, /* {"compare": N}: the picture's tracer is to be held against the reference; the answer names N */
+    /* Of browsers that may edit alone; each is answered before the next one may come. */
+    WEB_LIST, /* {"list": {"kind", "match"}}: the objects of this kind whose names have the text in them */
+    WEB_READ, /* {"read": {"kind", "id"}} */
+    WEB_EDIT, /* {"edit": {"kind", "id", "field", "values"}} */
+    WEB_UNDO  /* {"undo": true}: the newest change of this browser */
 };
+
+static inline bool web_request_edits(enum web_request_kind kind)
+{
+    return kind >= WEB_LIST;
+}
 
 /* Which picture. */
 struct web_show {
-    uint32_t width, height; /* pixels */
-    bool h264;
+    uint32_t width, height;                /* pixels */
+    bool h264, has_tracer, has_integrator; /* else those that the gateway was started with */
     enum protocol_tracer tracer;
     enum protocol_integrator integrator;
     uint32_t clip; /* 0: none */
@@ -30,8 +41,10 @@ struct web_request {
     enum web_request_kind kind;
     struct web_show show;
     struct fl_view_camera camera;
-    uint32_t id; /* the page's number for the camera, which frames name */
+    uint32_t id; /* the page's number for the camera, which frames name, or for the comparison */
     uint32_t shown;
+    struct fl_assignment
+        assignment; /* of WEB_LIST `kind` and `which`, of WEB_READ `kind` and `id`, of WEB_EDIT all */
 };
 
 /* False: the error says which field is wrong. */

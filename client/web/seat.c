@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 #include "web/seat.h"
 #include "web/describe.h"
+#include "web/editing.h"
+#include "web/error_map.h"
 
 #include <errno.h>
 #include <poll.h>
@@ -10,8 +12,6 @@
 #include <sys/eventfd.h>
 #include <unistd.h>
 
-#define FRAMES_ON_THE_WAY 2u /* to the browser and not shown yet: further ones would only be late */
-#define FRAMES_PER_SECOND 60.0f
 #define MOVING_RATE 15.0f
 #define LOOKS_REMEMBERED 256u
 #define IDLE_MS 1000
@@ -23,18 +23,21 @@ struct seat {
     int wake_fd, end_fd; /* events: there is something to do; it is over */
 
     pthread_mutex_t lock; /* guards what follows */
-    bool wants_show, wants_look, wants_key;
-    struct web_request show, look;
-    unsigned on_the_way;
+    bool wants_show, wants_look, wants_key, wants_compare, wants_edit;
+    struct web_request show, look, compare, edit;
     bool has_ended;
-    struct parcel *first, **end;
+    struct web_queue queue;
 
     /* Of the thread. */
     struct fl_connection *connection;
     struct fl_scene *scene;
     struct fl_view *view;
     struct record_clip_use clip;
-    bool is_described;
+    struct message_render render; /* as the view was last asked for */
+    struct fl_view_camera camera; /* likewise, if has_camera */
+    bool has_camera, is_described;
+    struct error_map errors;
+    struct web_editing editing;
     unsigned idle_rounds;
     uint32_t ids[LOOKS_REMEMBERED]; /* the page's numbers of cameras, by ours, modulo */
 };
@@ -66,9 +69,7 @@ static bool post(struct seat *seat, char *head, const uint8_t *tail, size_t tail
         memcpy(to + head_bytes, tail, tail_bytes);
     free(head);
     pthread_mutex_lock(&seat->lock);
-    *seat->end = parcel;
-    seat->end = &parcel->next;
-    seat->on_the_way += tail != NULL;
+    web_queue_add(&seat->queue, parcel);
     pthread_mutex_unlock(&seat->lock);
     seat->options.changed(seat->options.user);
     return true;
@@ -76,29 +77,29 @@ static bool post(struct seat *seat, char *head, const uint8_t *tail, size_t tail
 
 /* ---- the view ---- */
 
-static void fill_render(struct seat *seat, const struct web_show *show, struct message_render *render)
+static bool fill_render(struct seat *seat, const struct web_show *show, struct fl_error *error)
 {
-    const struct fl_camera_info *first = fl_scene_camera(seat->scene, 0);
-    *render = fl_view_defaults();
+    const struct cli_job *job = seat->options.job;
+    struct message_render *render = &seat->render;
+    *render = job->options;
     render->width = show->width;
     render->height = show->height;
-    render->tracer = show->tracer;
-    render->integrator = show->integrator;
-    render->frames_per_second = FRAMES_PER_SECOND;
-    render->moving_rate = MOVING_RATE;
+    if (show->has_tracer)
+        render->tracer = show->tracer;
+    if (show->has_integrator)
+        render->integrator = show->integrator;
+    if (render->moving_rate == 0)
+        render->moving_rate = MOVING_RATE;
     render->adapt = 1;
     render->encoding =
         show->h264 && fl_connection_can_h264(seat->connection) ? PROTOCOL_ENCODING_H264 : PROTOCOL_ENCODING_JPEG;
     render->still_encoding = PROTOCOL_ENCODING_JPEG;
-    if (first) {
-        render->camera_path = PROTOCOL_CAMERA_NODE;
-        render->camera_node = first->node;
-    }
     if (show->clip != 0) {
         seat->clip = (struct record_clip_use){.clip = show->clip, .speed = 1, .loop = 1};
         render->clips = &seat->clip;
         render->clips_count = 1;
     }
+    return cli_find_camera(render, job->camera, job->framed, job->has_framing, seat->scene, error);
 }
 
 static bool describe(struct seat *seat, const struct message_render *render, struct fl_error *error)
@@ -108,19 +109,20 @@ static bool describe(struct seat *seat, const struct message_render *render, str
     return fl_scene_get_bounds(seat->scene, &bounds, error) &&
            post(seat,
                 web_describe_scene(seat->scene, seat->options.scene, render, &bounds,
-                                   fl_connection_can_h264(seat->connection)),
+                                   fl_connection_can_h264(seat->connection), seat->options.may_edit),
                 NULL, 0, error);
 }
 
 static bool show(struct seat *seat, const struct web_show *wanted, struct fl_error *error)
 {
-    struct message_render render;
-    fill_render(seat, wanted, &render);
-    if (!seat->is_described && !describe(seat, &render, error))
+    error_map_end(&seat->errors);
+    if (!fill_render(seat, wanted, error))
+        return false;
+    if (!seat->is_described && !describe(seat, &seat->render, error))
         return false;
     if (seat->view)
-        return fl_view_change(seat->view, &render, error);
-    seat->view = fl_view_start(seat->scene, &render, error);
+        return fl_view_change(seat->view, &seat->render, error);
+    seat->view = fl_view_start(seat->scene, &seat->render, error);
     if (seat->view)
         fl_view_keep_jpeg(seat->view, true);
     return seat->view != NULL;
@@ -129,16 +131,19 @@ static bool show(struct seat *seat, const struct web_show *wanted, struct fl_err
 static bool look(struct seat *seat, const struct web_request *wanted, struct fl_error *error)
 {
     uint64_t command = 0;
+    error_map_end(&seat->errors);
     if (!fl_view_look(seat->view, &wanted->camera, &command, error))
         return false;
     seat->ids[command % LOOKS_REMEMBERED] = wanted->id;
+    seat->camera = wanted->camera;
+    seat->has_camera = true;
     return true;
 }
 
 static bool may_send(struct seat *seat)
 {
     pthread_mutex_lock(&seat->lock);
-    const bool may = seat->on_the_way < FRAMES_ON_THE_WAY;
+    const bool may = web_queue_has_room(&seat->queue);
     pthread_mutex_unlock(&seat->lock);
     return may;
 }
@@ -158,19 +163,77 @@ static bool pass_frames(struct seat *seat, struct fl_error *error)
     return true;
 }
 
+/* ---- the errors of its tracer ---- */
+
+/* Of a comparison that cannot be made the page is told, and its view goes on. */
+static bool refuse_compare(struct seat *seat, struct fl_error *error)
+{
+    struct fl_error refusal = *error;
+    const uint32_t id = seat->errors.id;
+    error_map_end(&seat->errors);
+    if (refusal.code != FL_ERROR_REFUSED && refusal.code != FL_ERROR_ARGUMENT)
+        return false;
+    *error = (struct fl_error){0};
+    return post(seat, web_describe_refusal(&refusal, id), NULL, 0, error);
+}
+
+static bool compare(struct seat *seat, uint32_t id, struct fl_error *error)
+{
+    const bool is_begun =
+        error_map_begin(&seat->errors, seat->scene, &seat->render, seat->has_camera ? &seat->camera : NULL, error);
+    seat->errors.id = id;
+    return is_begun || refuse_compare(seat, error);
+}
+
+static bool pass_errors(struct seat *seat, struct fl_error *error)
+{
+    struct error_map *map = &seat->errors;
+    if (!map->job || !may_send(seat))
+        return true;
+    if (!error_map_step(map, seat->scene, error))
+        return error->code == FL_ERROR_NONE || refuse_compare(seat, error);
+    const bool sent = post(seat, web_describe_errors(map->frame, (double)map->render.compare_far, map->id),
+                           map->frame->pixels, (size_t)map->frame->width * map->frame->height, error);
+    error_map_end(map);
+    return sent;
+}
+
+/* ---- edits ---- */
+
+static bool answer_edit(struct seat *seat, const struct web_request *request, struct fl_error *error)
+{
+    struct fl_error refusal = {0};
+    char *answer = web_editing_answer(&seat->editing, seat->scene, request, &refusal);
+    if (!answer && refusal.code != FL_ERROR_REFUSED && refusal.code != FL_ERROR_ARGUMENT) {
+        *error = refusal;
+        return false;
+    }
+    return post(seat, answer ? answer : web_describe_edit_refusal(&refusal), NULL, 0, error);
+}
+
 /* ---- the thread ---- */
 
 static bool do_what_came(struct seat *seat, struct fl_error *error)
 {
     pthread_mutex_lock(&seat->lock);
     const bool wants_show = seat->wants_show, wants_look = seat->wants_look, wants_key = seat->wants_key;
-    const struct web_request shown = seat->show, looked = seat->look;
+    /* Each answer is a parcel, and those that wait are counted. */
+    const bool wants_compare = seat->wants_compare && seat->view && web_queue_has_room_for_text(&seat->queue);
+    const bool wants_edit = seat->wants_edit && seat->view && web_queue_has_room_for_text(&seat->queue);
+    const struct web_request shown = seat->show, looked = seat->look, compared = seat->compare,
+                             edited = seat->edit;
+    seat->wants_edit = seat->wants_edit && !wants_edit;
+    seat->wants_compare = seat->wants_compare && !wants_compare;
     seat->wants_show = seat->wants_key = false;
     seat->wants_look = wants_look && !seat->view && !wants_show;
     pthread_mutex_unlock(&seat->lock);
     if (wants_show && !show(seat, &shown.show, error))
         return false;
     if (wants_look && seat->view && !look(seat, &looked, error))
+        return false;
+    if (wants_compare && !compare(seat, compared.id, error))
+        return false;
+    if (wants_edit && !answer_edit(seat, &edited, error))
         return false;
     return !wants_key || !seat->view || fl_view_want_key_frame(seat->view, error);
 }
@@ -227,9 +290,10 @@ static void serve(struct seat *seat, struct fl_error *error)
         if (seat->idle_rounds % PING_ROUNDS == PING_ROUNDS - 1 &&
             !fl_ping(seat->connection, &round_trip_ns, error))
             return;
-        /* Answers pings, and notices that the daemon is gone, also while no frame is wanted. */
+        /* Answers pings, and notices that the daemon is gone, also while no frame is wanted. The frames of a view
+         * that is being refined would leave no room for errors behind them. */
         if (!do_what_came(seat, error) || !fl_connection_wait(seat->connection, 0, error) ||
-            !pass_frames(seat, error))
+            !pass_errors(seat, error) || !pass_frames(seat, error))
             return;
     } while (wait_for_work(seat));
 }
@@ -241,6 +305,8 @@ static void *work(void *argument)
     serve(seat, &error);
     if (error.code != FL_ERROR_NONE && error.code != FL_ERROR_INTERRUPTED)
         post(seat, web_describe_error(&error, error.code != FL_ERROR_ARGUMENT), NULL, 0, &ignored);
+    web_editing_finish(&seat->editing);
+    error_map_end(&seat->errors);
     fl_view_destroy(seat->view);
     fl_scene_destroy(seat->scene);
     fl_connection_destroy(seat->connection);
@@ -255,11 +321,7 @@ static void *work(void *argument)
 
 static void forget(struct seat *seat)
 {
-    while (seat->first) {
-        struct parcel *parcel = seat->first;
-        seat->first = parcel->next;
-        free(parcel);
-    }
+    web_queue_clear(&seat->queue);
     if (seat->wake_fd > 0)
         close(seat->wake_fd);
     if (seat->end_fd > 0)
@@ -276,7 +338,6 @@ struct seat *seat_create(const struct seat_options *options, struct fl_error *er
         return NULL;
     }
     seat->options = *options;
-    seat->end = &seat->first;
     pthread_mutex_init(&seat->lock, NULL);
     seat->wake_fd = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
     seat->end_fd = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
@@ -287,8 +348,9 @@ struct seat *seat_create(const struct seat_options *options, struct fl_error *er
     return NULL;
 }
 
-void seat_tell(struct seat *seat, const struct web_request *request)
+bool seat_tell(struct seat *seat, const struct web_request *request)
 {
+    bool is_taken = true;
     pthread_mutex_lock(&seat->lock);
     if (request->kind == WEB_SHOW) {
         seat->show = *request;
@@ -298,23 +360,29 @@ void seat_tell(struct seat *seat, const struct web_request *request)
         seat->wants_look = true;
     } else if (request->kind == WEB_KEY) {
         seat->wants_key = true;
+    } else if (request->kind == WEB_COMPARE) {
+        seat->compare = *request;
+        seat->wants_compare = true;
+    } else if (web_request_edits(request->kind)) {
+        is_taken = seat->options.may_edit && !seat->wants_edit;
+        seat->edit = is_taken ? *request : seat->edit;
+        seat->wants_edit = true;
     } else {
-        seat->on_the_way -= request->shown < seat->on_the_way ? request->shown : seat->on_the_way;
+        web_queue_shown(&seat->queue, request->shown);
     }
     pthread_mutex_unlock(&seat->lock);
     signal_event(seat->wake_fd);
+    return is_taken;
 }
 
 struct parcel *seat_take(struct seat *seat, bool *has_ended)
 {
     pthread_mutex_lock(&seat->lock);
-    struct parcel *parcel = seat->first;
-    if (parcel) {
-        seat->first = parcel->next;
-        seat->end = seat->first ? seat->end : &seat->first;
-    }
-    *has_ended = !seat->first && seat->has_ended;
+    struct parcel *parcel = web_queue_take(&seat->queue);
+    *has_ended = !seat->queue.first && seat->has_ended;
     pthread_mutex_unlock(&seat->lock);
+    if (parcel && parcel->is_text)
+        signal_event(seat->wake_fd); /* there is room for another one */
     return parcel;
 }
 

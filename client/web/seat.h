@@ -3,28 +3,24 @@
 #ifndef FARLIGHT_CLIENT_WEB_SEAT_H
 #define FARLIGHT_CLIENT_WEB_SEAT_H
 
+#include "cli/cli.h"
+#include "web/queue.h"
 #include "web/request.h"
 
 struct seat_options {
     const char *server, *key_file, *link, *scene; /* as of fl_connect and fl_scene_attach */
-    void (*changed)(void *user);                  /* there is a parcel, or it has ended; from the thread */
+    const struct cli_job *job;                    /* its camera, and its options, which views begin with */
+    bool may_edit;
+    void (*changed)(void *user); /* there is a parcel, or it has ended; from the thread */
     void *user;
-};
-
-/* A message for the browser. */
-#define PARCEL_ROOM 32u
-struct parcel {
-    struct parcel *next;
-    bool is_text;
-    size_t bytes;
-    unsigned char data[]; /* PARCEL_ROOM bytes for who sends it, then the message */
 };
 
 struct seat;
 
 /* The options and what they point to must outlive it. It connects once the first WEB_SHOW has come. */
 struct seat *seat_create(const struct seat_options *options, struct fl_error *error);
-void seat_tell(struct seat *seat, const struct web_request *request);
+/* False: the browser may not ask that, or not yet. */
+bool seat_tell(struct seat *seat, const struct web_request *request);
 /* The next one, to be freed; NULL: none. *has_ended: and none will come. */
 struct parcel *seat_take(struct seat *seat, bool *has_ended);
 /* Leaves the daemon and waits for the thread. */

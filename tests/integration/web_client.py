@@ -3,6 +3,7 @@
 import base64
 import json
 import os
+import pathlib
 import re
 import signal
 import socket
@@ -16,20 +17,22 @@ TEXT, BINARY, CLOSE, PING, PONG = 1, 2, 8, 9, 10
 
 
 class Gateway:
-    """A running farlight-web on a free port; a context manager."""
+    """A running farlight-web on a free port; a context manager. Arguments: a model, or --server and --scene."""
 
-    def __init__(self, server, scene, *arguments):
-        self.command = [BIN / "farlight-web", "--server", server, "--scene", scene, "--listen", "127.0.0.1:0",
-                        *map(str, arguments)]
+    def __init__(self, *arguments, listen="127.0.0.1:0", environment=None):
+        self.command = [BIN / "farlight-web", "--listen", listen, *map(str, arguments)]
+        self.environment = environment
 
     def __enter__(self):
-        self.process = subprocess.Popen(self.command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        self.process = subprocess.Popen(self.command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+                                        env=self.environment)
         self.link = self.process.stdout.readline().strip()
+        self.edit_link = self.process.stdout.readline().strip() if "--allow-edit" in self.command else ""
         if not self.link:
             raise AssertionError(f"farlight-web printed no link, but: {self.process.communicate()[1]}")
         self.host = urllib.parse.urlsplit(self.link).netloc
-        self.port = int(self.host.split(":")[1])
-        self.path = urllib.parse.urlsplit(self.link).path
+        self.machine, self.port = urllib.parse.urlsplit(self.link).hostname, urllib.parse.urlsplit(self.link).port
+        self.path, self.edit_path = urllib.parse.urlsplit(self.link).path, urllib.parse.urlsplit(self.edit_link).path
         return self
 
     def stop(self, number=signal.SIGINT):
@@ -44,10 +47,18 @@ class Gateway:
         self.process.stdout.close()
         self.process.stderr.close()
 
-    def get(self, path, method="GET", headers=()):
+    @property
+    def daemon(self):
+        """The process of its daemon; None: it has none of its own."""
+        children = pathlib.Path(f"/proc/{self.process.pid}/task").glob("*/children")
+        found = [child for part in children for child in part.read_text().split()
+                 if pathlib.Path(f"/proc/{child}/comm").read_text().strip() == "farlightd"]
+        return int(found[0]) if found else None
+
+    def get(self, path, method="GET", host=None):
         """(status, headers by their name in small letters, body)"""
-        with socket.create_connection(("127.0.0.1", self.port), TIMEOUT_S) as peer:
-            lines = [f"{method} {path} HTTP/1.1", f"Host: {self.host}", "Connection: close", *headers]
+        with socket.create_connection((self.machine, self.port), TIMEOUT_S) as peer:
+            lines = [f"{method} {path} HTTP/1.1", f"Host: {self.host if host is None else host}", "Connection: close"]
             peer.sendall("\r\n".join([*lines, "", ""]).encode())
             answer = b""
             while piece := peer.recv(65536):
@@ -60,10 +71,10 @@ class Gateway:
 class Socket:
     """A WebSocket to a gateway; `status` is that of the handshake, 101 if it is open."""
 
-    def __init__(self, gateway, path=None, origin=None, protocol="farlight"):
-        self.peer = socket.create_connection(("127.0.0.1", gateway.port), TIMEOUT_S)
+    def __init__(self, gateway, path=None, origin=None, protocol="farlight", host=None):
+        self.peer = socket.create_connection((gateway.machine, gateway.port), TIMEOUT_S)
         key = base64.b64encode(os.urandom(16)).decode()
-        lines = [f"GET {gateway.path + 'view' if path is None else path} HTTP/1.1", f"Host: {gateway.host}",
+        lines = [f"GET {gateway.path + 'view' if path is None else path} HTTP/1.1", f"Host: {host or gateway.host}",
                  "Upgrade: websocket", "Connection: Upgrade", f"Sec-WebSocket-Key: {key}", "Sec-WebSocket-Version: 13"]
         lines += [f"Sec-WebSocket-Protocol: {protocol}"] if protocol else []
         origin = f"http://{gateway.host}" if origin is None else origin

@@ -57,7 +57,7 @@ MAY_INCLUDE = {
     "client/output/library": ("protocol/common", "client/output"),
     "client/video": ("protocol", "protocol/pixels", "client/helper", "client/lib"),  # of lib: rate
     "client/cli": ("protocol", "protocol/common", "protocol/sealed", "client/lib"),
-    "client/web": ("protocol/common", "client/lib", "client/cli"),  # no scene file, no pixels: encoded frames pass through
+    "client/web": ("protocol/common", "client/lib", "client/cli"),  # no scene file; pixels are compared, but never encoded
     "client/viewer": ("protocol", "protocol/common", "client/warp", "client/lib", "client/cli"),  # the command line is parsed as that of render
 }
 # Files that every room may include.
@@ -79,7 +79,8 @@ UNIT_ALSO = {
 RESTRICTED = {
     r"(epoxy|GL|EGL)/": (GPU, GPU_SCENE, TRACE, "server/render"),
     r"embree": ("server/trace/reference",),
-    r"(sys/socket|sys/un|netinet/.*|netdb|arpa/inet)\.h": (BASE, "server/net", "client/lib", "client/helper", "client/import"),
+    r"(sys/socket|sys/un|netinet/.*|netdb|arpa/inet)\.h": (
+        BASE, "server/net", "client/lib", "client/helper", "client/import", "client/web"),
     r"lib(av|sw)": ("client/video", "client/viewer", "server/encode"),
     r"SDL2?/": ("client/viewer",),
     r"OpenImageIO/": ("client/import", "client/output/library"),

@@ -32,15 +32,15 @@ class Page(unittest.TestCase):
         cls.serving = cls.serve()
         cls.serving.__enter__()
         cls.addClassCleanup(lambda: cls.serving.__exit__())
-        cls.gateway = cls.enterClassContext(Gateway(cls.address, NAME))
+        cls.gateway = cls.enterClassContext(Gateway("--server", cls.address, "--scene", NAME, "--allow-edit"))
         cls.browser = cls.enterClassContext(Browser())
 
     @classmethod
     def serve(cls):
         return Serving(bundled_scenes() / "carousel.glb", "--listen", cls.address, "--name", NAME, "--quiet")
 
-    def open(self, fragment=""):
-        page = self.browser.open(self.gateway.link + fragment, WIDTH, HEIGHT)
+    def open(self, fragment="", link=None):
+        page = self.browser.open((link or self.gateway.link) + fragment, WIDTH, HEIGHT)
         self.addCleanup(page.close)
         page.wait(f"{DATASET}.frame")
         return page
@@ -51,8 +51,7 @@ class Page(unittest.TestCase):
 
     def rest(self, page, samples=SAMPLES):
         self.choose(page, "integrator", "whitted")
-        page.wait(f"Number({DATASET}.samples) >= {samples} && {DATASET}.moving === 'false' && "
-                  "document.getElementById('status').textContent.includes('whitted')")
+        page.wait(f"Number({DATASET}.samples) >= {samples} && {DATASET}.moving === 'false' && {DATASET}.integrator === 'whitted'")
 
     def psnr(self, page, *options):
         shown, rendered = self.folder / "shown.png", self.folder / "rendered.png"
@@ -131,7 +130,76 @@ class Page(unittest.TestCase):
         page.value("document.getElementById('play').click()")
         page.wait(f"{DATASET}.moving === 'false'")
         page.value("document.getElementById('stages').click()")
-        self.assertGreater(page.value("document.getElementById('timeline').height"), 50)
+        self.assertGreater(page.value("document.querySelectorAll('#timeline rect').length"), 3)
+        self.assertEqual(page.faults, [])
+
+    def test_errors_of_the_tracer_are_shown_with_their_figures(self):
+        page = self.open()
+        self.choose(page, "tracer", "abuffer")
+        self.choose(page, "integrator", "raycast")  # what takes least
+        page.wait(f"{DATASET}.tracer === 'abuffer'")
+        page.value("document.getElementById('compare').click()")
+        page.wait(f"{DATASET}.compared === 'abuffer'")
+        coloured = page.value("(() => { const map = document.getElementById('errors'); const {data} = "
+                              "map.getContext('2d').getImageData(0, 0, map.width, map.height); let count = 0; "
+                              "for (let i = 0; i < data.length; i += 4) count += data[i] > 40; return count / (map.width * map.height); })()")
+        said = page.value("document.getElementById('errors-figures').innerText")
+        print(f"errors of abuffer: {coloured:.2%} of the pixels; {' '.join(said.split())}")
+        # A tracer of samples errs somewhere, and is right nearly everywhere.
+        self.assertGreater(coloured, 0)
+        self.assertLess(coloured, 0.5)
+        self.drag(page)  # another picture has other errors
+        page.wait(f"{DATASET}.compared === undefined || {DATASET}.moving === 'true'")
+        page.wait(f"{DATASET}.compared === 'abuffer'")
+        # The first hits of the exact tracer are the reference's, but for rays at edges.
+        self.choose(page, "tracer", "bvh")
+        page.wait(f"{DATASET}.compared === 'bvh'")
+        said = page.value("document.querySelectorAll('#errors-table tbody tr')[1].textContent")
+        differ = page.value("document.querySelectorAll('#errors-table tbody tr')[1].cells[2].textContent")
+        self.assertIn("primary", said)
+        self.assertLess(float(differ.split()[0]), 0.01, said)
+        self.choose(page, "tracer", "reference")
+        page.wait("document.getElementById('errors-state').textContent.includes('itself')")
+        self.assertEqual(page.faults, [])
+
+    def test_change_is_seen_by_another_viewer_and_undone(self):
+        looker, editor = self.open(), self.open(link=self.gateway.edit_link)
+        self.assertTrue(looker.value("document.getElementById('editing').hidden"))
+        editor.wait("!document.getElementById('editing').hidden && document.getElementById('edit-fields').children.length > 0")
+        self.choose(editor, "edit-kind", "environment")
+        editor.wait("document.getElementById('field-rotation-0') !== null")
+        revision = looker.shown()["revision"]
+        before = editor.value("document.getElementById('field-rotation-0').value")
+        self.choose(editor, "field-rotation-0", "77")
+        editor.wait("!document.getElementById('edit-undo').disabled")
+        looker.call("Page.bringToFront")
+        looker.wait(f"{DATASET}.revision !== '{revision}'")
+        revision = looker.shown()["revision"]
+        editor.value("document.getElementById('edit-undo').click()")
+        looker.wait(f"{DATASET}.revision !== '{revision}'")
+        editor.call("Page.bringToFront")
+        editor.wait(f"document.getElementById('field-rotation-0').value === '{before}'")
+        # What cannot be is said, and the field shows what is.
+        self.choose(editor, "field-rotation-0", "1e9")
+        editor.wait("document.getElementById('edit-state').textContent.includes('rotation')")
+        self.assertEqual((looker.faults, editor.faults), ([], []))
+
+    def test_everything_has_a_name_and_keys_reach_it(self):
+        page = self.open(link=self.gateway.edit_link)
+        page.value("document.getElementById('panel').hidden && document.getElementById('open').click()")
+        page.wait("document.getElementById('edit-fields').children.length > 0")
+        nameless = page.value("[...document.querySelectorAll('button, input, select, canvas, section, aside')].filter((one) => "
+                              "!(one.getAttribute('aria-label') || one.textContent.trim() && one.matches('button') || "
+                              "one.labels && one.labels.length)).map((one) => one.id)")
+        self.assertEqual(nameless, [])
+        page.value("document.getElementById('picture').focus()")
+        before = page.value(f"{DATASET}.look")
+        for key in ("ArrowLeft", "Home"):
+            page.call("Input.dispatchKeyEvent", type="keyDown", key=key)
+            page.call("Input.dispatchKeyEvent", type="keyUp", key=key)
+        page.wait(f"{DATASET}.look !== '{before}'")
+        page.call("Input.dispatchKeyEvent", type="keyDown", key="Escape")
+        self.assertTrue(page.value("document.getElementById('panel').hidden && document.activeElement.id === 'open'"))
         self.assertEqual(page.faults, [])
 
     def test_page_comes_back_with_the_daemon(self):

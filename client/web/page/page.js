@@ -1,13 +1,17 @@
 // SPDX-License-Identifier: MIT
 import { cameraOfFrame, orbit, pan, printCamera, readCamera, zoom } from "./camera.js";
+import { Editing } from "./edit.js";
+import { drawErrors, showFigures } from "./errors.js";
 import { Picture, canH264 } from "./picture.js";
+import { showStages } from "./stages.js";
 
 const WIDTH_MAX = 3840, HEIGHT_MAX = 2160, SIDE_MIN = 16; // as the gateway allows
 const REST_MS = 150; // after the last input the picture is refined
 const PAUSE_MS = 250, PAUSE_MAX_MS = 8000; // between tries to connect
 const TURN = Math.PI; // radians for a drag over the picture's height
 const NARROW = 0.0015; // of a wheel's notch of 100: 14 %
-const COLOURS = { primary: "#4f8fd0", trace: "#d08a3c", shade: "#62a85b", resolve: "#9a72c4", encode: "#c4556b", build: "#b8a13c" };
+const COMPARED_SAMPLES = 4; // the view has so many before its tracer is compared, which takes the daemon a while
+const WIDE = 1000; // pixels of a window that has room for the controls beside the scene
 
 const $ = (id) => document.getElementById(id);
 const canvas = $("picture");
@@ -17,6 +21,7 @@ let node = 0;
 let lastFrame = null;
 let isDirty = false, movedAt = 0, resting = 0, id = 0;
 let isPlaying = false, time = 0, tickAt = 0;
+let comparison = 0, isCompared = false; // the newest one, and whether the gateway has been asked for it
 const inputs = new Map(); // when the input of a camera came, by its number
 const link = new URLSearchParams(location.hash.slice(1));
 
@@ -35,14 +40,17 @@ function tellShow() {
     canvas.width = width;
     canvas.height = height;
   }
-  const chosen = (name, usual) => $(name).value || link.get(name) || usual; // a menu is empty before the scene is told
-  tell({ show: { width, height, h264: wantsH264, tracer: chosen("tracer", "bvh"),
-    integrator: chosen("integrator", "distributed"), clip: Number(chosen("clip", 0)) } });
+  forgetErrors();
+  // A menu is empty before the scene is told; without a word the gateway has its own.
+  const chosen = (name) => $(name).value || link.get(name) || undefined;
+  tell({ show: { width, height, h264: wantsH264, tracer: chosen("tracer"), integrator: chosen("integrator"),
+    clip: Number(chosen("clip") || 0) } });
 }
 
 function tellLook(moving) {
   const from = camera || (lastFrame && cameraOfFrame(lastFrame, scene));
   if (!from) return;
+  forgetErrors();
   id = (id + 1) % 0xffffffff;
   if (movedAt) inputs.set(id, movedAt);
   tell({ look: { id, eye: from.eye, at: from.at, up: from.up, fov: from.fov, time, moving, node: camera ? 0 : node } });
@@ -50,8 +58,14 @@ function tellLook(moving) {
 
 // ---- what it tells ----
 
+function drawStages() {
+  $("timeline").hidden = !$("stages").checked;
+  if ($("stages").checked && lastFrame) showStages(document.querySelector("#timeline tbody"), lastFrame.stages);
+}
+
+// Screen readers read it out, so that it is not for what changes with each frame.
 function say(text, isLost = false) {
-  $("status").textContent = text;
+  if ($("status").textContent !== text) $("status").textContent = text;
   $("status").classList.toggle("lost", isLost);
 }
 
@@ -63,10 +77,14 @@ function takeScene(told) {
   const isFirst = !scene;
   scene = told;
   document.title = `${told.name} - farlight`;
+  $("name").textContent = told.name;
+  editing.begin(told.edit);
+  canvas.setAttribute("aria-label", `Picture of ${told.name}`);
+  say("");
   if (!isFirst) return;
   const cameras = told.cameras.map((one) => [one.node, one.name || `camera ${one.node}`]);
-  if (cameras.length === 0) cameras.push([0, "whole scene"]);
-  node = cameras[0][0];
+  if (told.node === 0) cameras.unshift([0, "start"]); // no camera of the scene
+  node = told.node;
   fill($("camera"), [...cameras, ["", "free"]], camera ? "" : node);
   fill($("clip"), [[0, "none"], ...told.clips.map((one) => [one.clip, one.name || `clip ${one.clip}`])], link.get("clip") || 0);
   $("clips").hidden = $("play").hidden = told.clips.length === 0;
@@ -74,47 +92,62 @@ function takeScene(told) {
   fill($("integrator"), told.integrators.map((name) => [name, name]), told.integrator);
 }
 
-function drawStages(stages) {
-  const timeline = $("timeline");
-  if (timeline.hidden) return;
-  const rows = new Map();
-  for (const [name, clock, start, duration] of stages) {
-    const key = `${name} (${clock})`;
-    rows.set(key, [...(rows.get(key) || []), [name, start, duration]]);
-  }
-  const end = Math.max(1e-3, ...stages.map((stage) => stage[2] + stage[3])), row = 16, left = 110;
-  const scale = (timeline.width - left - 60) / end; // pixels per millisecond
-  timeline.height = Math.max(1, rows.size) * row;
-  const context = timeline.getContext("2d");
-  context.font = "11px system-ui";
-  [...rows].forEach(([key, spans], index) => {
-    context.fillStyle = "#e8e8e8";
-    context.fillText(key, 4, index * row + 12);
-    for (const [name, start, duration] of spans) {
-      context.fillStyle = COLOURS[name] || "#8a8f98";
-      context.fillRect(left + start * scale, index * row + 3, Math.max(1, duration * scale), row - 6);
-    }
-    context.fillStyle = "#e8e8e8";
-    context.fillText(`${spans.reduce((sum, span) => sum + span[2], 0).toFixed(1)} ms`, timeline.width - 56, index * row + 12);
-  });
+const editing = new Editing(tell);
+
+// ---- errors of the tracer ----
+
+function forgetErrors() {
+  comparison += 1;
+  isCompared = false;
+  $("errors").hidden = $("errors-table").hidden = true;
+  $("errors-picture").textContent = "";
+  delete canvas.dataset.compared;
+  const isReference = $("tracer").value === "reference";
+  sayOfErrors(isReference ? "This is the reference itself: choose another tracer" : "Waits until the view is at rest");
+}
+
+function sayOfErrors(text) {
+  if ($("errors-state").textContent !== text) $("errors-state").textContent = text;
+}
+
+function askForErrors() {
+  $("errors-figures").hidden = !$("compare").checked;
+  if (!$("compare").checked || isCompared || isPlaying || isDirty || $("tracer").value === "reference") return;
+  if (!lastFrame || lastFrame.moving || lastFrame.samples < COMPARED_SAMPLES) return;
+  isCompared = true;
+  sayOfErrors("Tracing the reference ..");
+  tell({ compare: comparison });
+}
+
+function takeErrors(errors, bytes) {
+  tell({ shown: 1 });
+  if (errors.compare !== comparison || !$("compare").checked) return;
+  drawErrors($("errors"), errors, bytes);
+  showFigures($("errors-table"), $("errors-picture"), errors, bytes);
+  $("errors").hidden = $("errors-table").hidden = false;
+  canvas.dataset.compared = errors.tracer;
+  sayOfErrors(`${((1 - errors.all.agree) * 100).toPrecision(2)} % of the rays differ`);
 }
 
 const picture = new Picture(canvas, (header) => {
   tell({ shown: 1 });
+  if (lastFrame && lastFrame.revision !== header.revision) forgetErrors();
   lastFrame = header;
-  if (!$("stages").checked) $("timeline").hidden = true;
-  drawStages(header.stages);
+  editing.seen(header.revision);
+  drawStages();
   let input = 0; // the newest one that it shows
   for (const seen of [...inputs.keys()].filter((key) => key <= header.id)) {
     input = inputs.get(seen);
     inputs.delete(seen);
   }
   if (input) canvas.dataset.latency = (performance.now() - input).toFixed(1);
-  const { frame, samples, encoding, moving, id: look } = header;
-  Object.assign(canvas.dataset, { frame, samples, encoding, moving, look });
+  const { frame, samples, encoding, moving, tracer, integrator, revision, id: look } = header;
+  Object.assign(canvas.dataset, { frame, samples, encoding, moving, tracer, integrator, revision, look });
   const latency = canvas.dataset.latency ? `, input to picture ${Number(canvas.dataset.latency).toFixed(0)} ms` : "";
-  say(`${header.width} x ${header.height}, ${header.tracer}, ${header.integrator}, ${header.samples} samples, `
-    + `${header.encoding}${latency}`);
+  $("figures").textContent = `${header.width} x ${header.height}, ${tracer}, ${integrator}, ${samples} sample${samples === 1 ? "" : "s"}, `
+    + `${encoding}${latency}`;
+  if ($("status").classList.contains("lost")) say("");
+  askForErrors();
 }, (isGone) => {
   if (isGone) {
     wantsH264 = false;
@@ -128,6 +161,8 @@ function take(event) {
   if (typeof event.data === "string") {
     const message = JSON.parse(event.data);
     if (message.scene) takeScene(message.scene);
+    if (message.objects || message.object || message.edited || (message.refused && message.refused.edit)) editing.take(message);
+    if (message.refused && message.refused.compare === comparison) sayOfErrors(message.refused.text);
     if (message.error) {
       say(message.error.text, true);
       link.delete("clip"); // it may be what the daemon does not have
@@ -137,7 +172,9 @@ function take(event) {
   failures = 0;
   const headBytes = new DataView(event.data).getUint32(0, true);
   const header = JSON.parse(new TextDecoder().decode(new Uint8Array(event.data, 4, headBytes)));
-  picture.take(header, new Uint8Array(event.data, 4 + headBytes));
+  const bytes = new Uint8Array(event.data, 4 + headBytes);
+  if (header.errors) takeErrors(header.errors, bytes);
+  else picture.take(header, bytes);
 }
 
 // ---- connecting, and connecting again ----
@@ -155,6 +192,7 @@ function connect() {
     failures += 1;
     picture.reset();
     inputs.clear();
+    forgetErrors();
     say(`the connection is lost${event.reason ? ` (${event.reason})` : ""}; trying again`, true);
     setTimeout(connect, pause);
   };
@@ -210,21 +248,25 @@ canvas.addEventListener("wheel", (event) => {
 }, { passive: false });
 canvas.addEventListener("keydown", (event) => {
   const steps = { ArrowLeft: [-0.05, 0], ArrowRight: [0.05, 0], ArrowUp: [0, 0.05], ArrowDown: [0, -0.05] };
-  if (steps[event.key]) move((one) => orbit(one, ...steps[event.key]));
+  if (event.ctrlKey || event.altKey || event.metaKey) return;
+  if (steps[event.key]) move((one) => (event.shiftKey ? pan : orbit)(one, ...steps[event.key]));
+  else if (event.key === "Home") goTo(String(scene ? scene.node : 0));
   else if (event.key === "+" || event.key === "-") move((one) => zoom(one, event.key === "+" ? 0.9 : 1 / 0.9));
   else return;
   event.preventDefault();
 });
 
 $("menu").addEventListener("submit", (event) => event.preventDefault());
-$("camera").addEventListener("change", () => {
-  if ($("camera").value === "") return;
+function goTo(value) {
+  $("camera").value = value;
+  if (value === "") return;
   camera = null;
-  node = Number($("camera").value);
+  node = Number(value);
   // Without a camera of its own the whole scene is what a new view shows.
   if (node === 0) socket.close();
   else tellLook(false);
-});
+}
+$("camera").addEventListener("change", () => goTo($("camera").value));
 for (const name of ["tracer", "integrator", "clip"]) $(name).addEventListener("change", tellShow);
 $("play").addEventListener("click", () => {
   isPlaying = !isPlaying;
@@ -233,13 +275,26 @@ $("play").addEventListener("click", () => {
     tellShow();
   }
   $("play").textContent = isPlaying ? "Pause" : "Play";
+  $("play").setAttribute("aria-pressed", String(isPlaying));
   movedAt = 0;
   isDirty = true;
 });
-$("stages").addEventListener("change", () => {
-  $("timeline").hidden = !$("stages").checked;
-  if (lastFrame) drawStages(lastFrame.stages);
+$("stages").addEventListener("change", drawStages);
+$("compare").addEventListener("change", () => {
+  forgetErrors();
+  askForErrors();
 });
+function openPanel(isOpen) {
+  $("panel").hidden = !isOpen;
+  $("open").setAttribute("aria-expanded", String(isOpen));
+}
+$("open").addEventListener("click", () => openPanel($("panel").hidden));
+document.addEventListener("keydown", (event) => {
+  if (event.key !== "Escape" || $("panel").hidden) return;
+  openPanel(false);
+  $("open").focus();
+});
+openPanel(window.innerWidth >= WIDE);
 $("share").addEventListener("click", async () => {
   const from = camera || (lastFrame && cameraOfFrame(lastFrame, scene));
   if (!from) return;

@@ -1,0 +1,155 @@
+/* SPDX-License-Identifier: MIT */
+#include "web/editing.h"
+
+#include <jansson.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define LIST_MAX 200u /* objects of one answer */
+#define WORDS_MAX 64u
+
+static char *print(json_t *json, struct fl_error *error)
+{
+    char *text = json ? json_dumps(json, JSON_COMPACT | JSON_REAL_PRECISION(9)) : NULL;
+    json_decref(json);
+    if (!text)
+        fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
+    return text;
+}
+
+/* ---- reading ---- */
+
+static char *list(struct fl_scene *scene, const struct web_request *request, struct fl_error *error)
+{
+    struct fl_object *objects = NULL;
+    size_t count = 0, more = 0;
+    if (!fl_scene_objects(scene, request->assignment.kind, &objects, &count, error))
+        return NULL;
+    json_t *found = json_array();
+    for (size_t i = 0; i < count; i++) {
+        if (!strcasestr(objects[i].name, request->assignment.which))
+            continue;
+        if (json_array_size(found) < LIST_MAX)
+            json_array_append_new(found, json_pack("[I,s]", (json_int_t)objects[i].id, objects[i].name));
+        else
+            more++;
+    }
+    free(objects);
+    return print(json_pack("{s:{s:s,s:I,s:o}}", "objects", "kind",
+                           protocol_object_kind_text(request->assignment.kind), "more", (json_int_t)more, "list",
+                           found),
+                 error);
+}
+
+static json_t *words_of(const struct fl_field *field)
+{
+    json_t *words = json_array();
+    for (unsigned i = 0; i < WORDS_MAX && field->form == FL_FIELD_WORD && fl_field_word(field, i); i++)
+        json_array_append_new(words, json_string(fl_field_word(field, i)));
+    return words;
+}
+
+static json_t *field_object(const struct fl_field_value *value)
+{
+    static const char *const forms[] = {[FL_FIELD_NUMBERS] = "numbers",
+                                        [FL_FIELD_COLOUR] = "colour",
+                                        [FL_FIELD_FLAG] = "flag",
+                                        [FL_FIELD_WORD] = "word"};
+    const struct fl_field *field = &value->field;
+    json_t *values = json_array();
+    for (unsigned i = 0; i < field->count; i++)
+        json_array_append_new(values, json_real(value->values[i]));
+    return json_pack("{s:s,s:s,s:s,s:s,s:f,s:f,s:o,s:o}", "name", field->name, "form", forms[field->form], "unit",
+                     field->unit ? field->unit : "", "doc", field->doc ? field->doc : "", "min", field->min, "max",
+                     field->max, "words", words_of(field), "values", values);
+}
+
+static char *read_one(struct fl_scene *scene, const struct web_request *request, struct fl_error *error)
+{
+    struct fl_object_state *state = malloc(sizeof(*state));
+    char *text = NULL;
+    if (!state)
+        fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
+    else if (fl_scene_read(scene, request->assignment.kind, request->assignment.id, state, error)) {
+        json_t *fields = json_array();
+        for (size_t i = 0; i < state->count; i++)
+            json_array_append_new(fields, field_object(&state->fields[i]));
+        text = print(json_pack("{s:{s:s,s:I,s:s,s:I,s:o}}", "object", "kind",
+                               protocol_object_kind_text(state->kind), "id", (json_int_t)state->id, "name",
+                               state->name, "revision", (json_int_t)state->revision, "fields", fields),
+                     error);
+    }
+    free(state);
+    return text;
+}
+
+/* ---- changing ---- */
+
+static void remember(struct web_editing *editing, const struct fl_edited *edited)
+{
+    if (editing->undo_count == UNDOS_MAX) {
+        free(editing->undos[0].assignments);
+        memmove(editing->undos, editing->undos + 1, (UNDOS_MAX - 1) * sizeof(editing->undos[0]));
+        editing->undo_count--;
+    }
+    editing->undos[editing->undo_count++] =
+        (struct web_undo){.assignments = edited->undo, .count = edited->undo_count};
+}
+
+static char *tell_edited(const struct web_editing *editing, const struct fl_edited *edited, struct fl_error *error)
+{
+    return print(json_pack("{s:{s:I,s:I,s:I}}", "edited", "revision", (json_int_t)edited->revision, "objects",
+                           (json_int_t)edited->objects, "undos", (json_int_t)editing->undo_count),
+                 error);
+}
+
+static char *edit(struct web_editing *editing, struct fl_scene *scene, const struct web_request *request,
+                  struct fl_error *error)
+{
+    struct fl_edited edited = {0};
+    if (!fl_scene_edit(scene, &request->assignment, 1, &edited, error)) {
+        free(edited.undo);
+        return NULL;
+    }
+    if (edited.undo_count > 0)
+        remember(editing, &edited);
+    else
+        free(edited.undo);
+    return tell_edited(editing, &edited, error);
+}
+
+/* One that cannot be undone any more, as its object is gone, is forgotten. */
+static char *undo(struct web_editing *editing, struct fl_scene *scene, struct fl_error *error)
+{
+    struct fl_edited edited = {0};
+    if (editing->undo_count == 0) {
+        fl_error_set(error, FL_ERROR_ARGUMENT, "undo", "there is no change to undo");
+        return NULL;
+    }
+    const struct web_undo last = editing->undos[--editing->undo_count];
+    const bool done = fl_scene_edit(scene, last.assignments, last.count, &edited, error);
+    free(last.assignments);
+    free(edited.undo);
+    return done ? tell_edited(editing, &edited, error) : NULL;
+}
+
+char *web_editing_answer(struct web_editing *editing, struct fl_scene *scene, const struct web_request *request,
+                         struct fl_error *error)
+{
+    switch (request->kind) {
+    case WEB_LIST:
+        return list(scene, request, error);
+    case WEB_READ:
+        return read_one(scene, request, error);
+    case WEB_EDIT:
+        return edit(editing, scene, request, error);
+    default:
+        return undo(editing, scene, error);
+    }
+}
+
+void web_editing_finish(struct web_editing *editing)
+{
+    while (editing->undo_count > 0)
+        free(editing->undos[--editing->undo_count].assignments);
+}

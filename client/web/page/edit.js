@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: MIT
+// The panel that edits objects of the scene, for those whose link allows it. No socket: ask() sends, and the answer comes to take().
+
+const SEARCH_PAUSE_MS = 250;
+const BRIGHTEST = 1; // of a colour that a menu of colours can show
+
+const $ = (id) => document.getElementById(id);
+const encode = (linear) => (linear <= 0.0031308 ? linear * 12.92 : 1.055 * linear ** (1 / 2.4) - 0.055);
+const decode = (shown) => (shown <= 0.04045 ? shown / 12.92 : ((shown + 0.055) / 1.055) ** 2.4);
+const hex = (values) => `#${values.slice(0, 3).map((value) => Math.round(encode(Math.min(1, value)) * 255).toString(16).padStart(2, "0")).join("")}`;
+const linear = (text) => [1, 3, 5].map((at) => decode(parseInt(text.slice(at, at + 2), 16) / 255));
+const round = (value) => Number(value.toPrecision(5));
+
+export class Editing {
+  constructor(ask) {
+    this.ask = ask;
+    this.waiting = []; // requests; the first one is asked, as the gateway takes one at a time
+    this.revision = -1;
+    $("edit-kind").addEventListener("change", () => this.list());
+    $("edit-match").addEventListener("input", () => {
+      clearTimeout(this.searching);
+      this.searching = setTimeout(() => this.list(), SEARCH_PAUSE_MS);
+    });
+    $("edit-object").addEventListener("change", () => this.read());
+    $("edit-undo").addEventListener("click", () => this.request({ undo: true }));
+  }
+
+  // The connection is a new one: what was asked of the old one is not answered, and its changes cannot be undone.
+  begin(mayEdit) {
+    $("editing").hidden = !mayEdit;
+    this.waiting = [];
+    $("edit-undo").disabled = true;
+    if (mayEdit) this.list();
+  }
+
+  // Of a question that waits the newest counts; each change does.
+  request(message) {
+    const name = Object.keys(message)[0];
+    if (name === "list" || name === "read") this.waiting = this.waiting.filter((one, i) => i === 0 || !(name in one));
+    this.waiting.push(message);
+    if (this.waiting.length === 1) this.ask(message);
+  }
+
+  say(text) {
+    $("edit-state").textContent = text;
+  }
+
+  list() {
+    this.request({ list: { kind: $("edit-kind").value, match: $("edit-match").value.slice(0, 32) } });
+  }
+
+  read() {
+    if ($("edit-object").value) this.request({ read: { kind: $("edit-kind").value, id: Number($("edit-object").value) } });
+    else $("edit-fields").replaceChildren();
+  }
+
+  // Another one may have changed the object.
+  seen(revision) {
+    if ($("editing").hidden || revision === this.revision) return;
+    this.revision = revision;
+    this.read();
+  }
+
+  take(message) {
+    this.waiting.shift();
+    if (this.waiting.length > 0) this.ask(this.waiting[0]);
+    if (message.refused) {
+      this.say(message.refused.text);
+      this.read(); // as it is
+    } else if (message.objects) {
+      this.takeObjects(message.objects);
+    } else if (message.object) {
+      this.takeObject(message.object);
+    } else {
+      $("edit-undo").disabled = message.edited.undos === 0;
+      this.say("");
+      this.read();
+    }
+  }
+
+  takeObjects({ kind, list, more }) {
+    if (kind !== $("edit-kind").value) return;
+    const chosen = $("edit-object").value;
+    $("edit-object").replaceChildren(...list.map(([id, name]) => new Option(name || `${kind} ${id}`, id, false, String(id) === chosen)));
+    this.say(more > 0 ? `${more} more: name what you look for` : list.length === 0 ? "There is none" : "");
+    this.read();
+  }
+
+  takeObject(object) {
+    if (object.kind !== $("edit-kind").value || String(object.id) !== $("edit-object").value) return;
+    this.revision = Math.max(this.revision, object.revision);
+    const focused = document.activeElement && document.activeElement.id;
+    $("edit-fields").replaceChildren(...object.fields.filter((field) => field.values.length <= 4).flatMap((field) => this.row(object, field)));
+    if (focused && focused.startsWith("field-") && $(focused)) $(focused).focus();
+  }
+
+  row(object, field) {
+    const label = document.createElement("label");
+    label.textContent = field.name.replaceAll("_", " ") + (field.unit ? `, ${field.unit}` : "");
+    label.title = field.doc;
+    const inputs = this.inputs(field);
+    const change = () => {
+      const values = this.values(field, inputs);
+      if (values.every((value) => Number.isFinite(value))) this.request({ edit: { kind: object.kind, id: object.id, field: field.name, values } });
+    };
+    inputs.forEach((input, i) => {
+      input.id = `field-${field.name}-${i}`;
+      if (i > 0) input.setAttribute("aria-label", `${field.name} ${"xyzw"[i]}`);
+      input.addEventListener("change", change);
+    });
+    label.htmlFor = inputs[0].id;
+    const values = document.createElement("div");
+    values.className = "values";
+    values.replaceChildren(...inputs);
+    return [label, values];
+  }
+
+  inputs(field) {
+    if (field.form === "word") {
+      const select = document.createElement("select");
+      select.replaceChildren(...field.words.map((word, i) => new Option(word, i, false, i === field.values[0])));
+      return [select];
+    }
+    const input = (type, value) => Object.assign(document.createElement("input"), { type, value });
+    if (field.form === "flag") return [Object.assign(input("checkbox", ""), { checked: field.values[0] > 0 })];
+    if (this.isMenu(field)) return [input("color", hex(field.values))];
+    return field.values.map((value) => Object.assign(input("number", round(value)), { step: "any", min: field.min, max: field.max }));
+  }
+
+  isMenu(field) {
+    return field.form === "colour" && field.values.slice(0, 3).every((value) => value <= BRIGHTEST);
+  }
+
+  values(field, inputs) {
+    if (field.form === "flag") return [inputs[0].checked ? 1 : 0];
+    if (field.form === "colour" && inputs.length === 1) return linear(inputs[0].value); // alpha stays
+    return inputs.map((input) => (input.value === "" ? NaN : Number(input.value)));
+  }
+}
