@@ -200,11 +200,12 @@ $(B)/$(SONAME): $(LIB_PIC) client/lib/libfarlight.map
 	$(call say,LINK)$(CC) -shared -Wl,-soname,$(SONAME) -Wl,--version-script=client/lib/libfarlight.map $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) \
 	    $(LIB_PIC) $(CLIENT_LIBS) -o $@
 # One object whose symbols are those of the shared library, so that no name of ours meets one of the program's.
-$(B)/libfarlight.a: $(LIB_PIC)
+$(B)/libfarlight.a: $(LIB_PIC) client/lib/libfarlight.map
 	@rm -f $@
-	$(call say,AR)ld -r $(LIB_PIC) -o $(B)/libfarlight.o && \
-	    objcopy --localize-hidden -w --keep-global-symbol='fl_*' --keep-global-symbol='protocol_*_text' --keep-global-symbol='protocol_*_parse' \
-	    $(B)/libfarlight.o && ar rcs $@ $(B)/libfarlight.o
+	$(call say,AR)sed -n '/^global:/,/^local:/s/^ *\(.*\);$$/\1/p' client/lib/libfarlight.map >$(B)/libfarlight.symbols && \
+	    ld -r $(LIB_PIC) -o $(B)/libfarlight.o && \
+	    objcopy --localize-hidden -w --keep-global-symbols=$(B)/libfarlight.symbols $(B)/libfarlight.o && \
+	    ar rcs $@ $(B)/libfarlight.o
 
 $(B)/shader_sources.c: shaders/embed.sh $(addprefix shaders/,$(SHADERS)) Makefile
 	@mkdir -p $(@D)
