@@ -200,11 +200,12 @@ $(B)/$(SONAME): $(LIB_PIC) client/lib/libfarlight.map
 	$(call say,LINK)$(CC) -shared -Wl,-soname,$(SONAME) -Wl,--version-script=client/lib/libfarlight.map $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) \
 	    $(LIB_PIC) $(CLIENT_LIBS) -o $@
 # One object whose symbols are those of the shared library, so that no name of ours meets one of the program's.
-$(B)/libfarlight.a: $(LIB_PIC)
+$(B)/libfarlight.a: $(LIB_PIC) client/lib/libfarlight.map
 	@rm -f $@
-	$(call say,AR)ld -r $(LIB_PIC) -o $(B)/libfarlight.o && \
-	    objcopy --localize-hidden -w --keep-global-symbol='fl_*' --keep-global-symbol='protocol_*_text' --keep-global-symbol='protocol_*_parse' \
-	    $(B)/libfarlight.o && ar rcs $@ $(B)/libfarlight.o
+	$(call say,AR)sed -n '/^global:/,/^local:/s/^ *\(.*\);$$/\1/p' client/lib/libfarlight.map >$(B)/libfarlight.symbols && \
+	    ld -r $(LIB_PIC) -o $(B)/libfarlight.o && \
+	    objcopy --localize-hidden -w --keep-global-symbols=$(B)/libfarlight.symbols $(B)/libfarlight.o && \
+	    ar rcs $@ $(B)/libfarlight.o
 
 $(B)/shader_sources.c: shaders/embed.sh $(addprefix shaders/,$(SHADERS)) Makefile
 	@mkdir -p $(@D)
@@ -225,7 +226,7 @@ EMBREE_LIBS := $(if $(filter 1,$(EMBREE)),-lembree3)
 SERVER_LIBS = $(call pkg_libs,$(SERVER_PKGS)) $(EMBREE_LIBS) -lm
 CLIENT_LIBS = $(call pkg_libs,$(CLIENT_PKGS)) -lm
 # meshoptimizer comes without a file for pkg-config.
-IMPORT_LIBS = $(call pkg_libs,$(IMPORT_PKGS)) -lmeshoptimizer -lm
+IMPORT_LIBS = $(call pkg_libs,$(IMPORT_PKGS)) -lmeshoptimizer -lexpat -lminizip -lm
 EXPORT_LIBS = $(call pkg_libs,$(EXPORT_PKGS)) -lm
 VIDEO_LIBS = $(call pkg_libs,$(VIDEO_PKGS)) -lm
 VIEWER_LIBS = $(call pkg_libs,$(VIEWER_PKGS) $(CLIENT_PKGS)) -lm
@@ -352,7 +353,7 @@ $(LOSING_DAEMON): $(B)/tests/tools/lost_gpu.o $(B)/server/main.o $(SERVER_OBJ) $
 # ---- what people call ------------------------------------------------------------------------------
 BUILD_PACKAGES := gcc g++ make pkg-config libepoxy-dev libegl-dev libgl-dev libcglm-dev libturbojpeg0-dev libzstd-dev \
     libsodium-dev libxxhash-dev libinih-dev libjansson-dev libjemalloc-dev libseccomp-dev libopenimageio-dev libpng-dev libtiff-dev libopenexr-dev libjxl-dev libtinygltf-dev \
-    libtinyobjloader-dev libdraco-dev libmeshoptimizer-dev libassimp-dev libembree-dev libavcodec-dev libavformat-dev libavfilter-dev libavutil-dev libswscale-dev libsdl2-dev libsdl2-ttf-dev libwebsockets-dev fonts-dejavu-core libegl1 libgl1-mesa-dri
+    libtinyobjloader-dev libdraco-dev libmeshoptimizer-dev libassimp-dev libexpat1-dev libminizip-dev libembree-dev libavcodec-dev libavformat-dev libavfilter-dev libavutil-dev libswscale-dev libsdl2-dev libsdl2-ttf-dev libwebsockets-dev fonts-dejavu-core libegl1 libgl1-mesa-dri
 TEST_PACKAGES := libcmocka-dev python3 python3-jsonschema python3-numpy python3-prometheus-client ffmpeg xvfb gnuplot-nox
 LINT_PACKAGES := clang clang-format glslang-tools python3 python3-numpy mypy
 # A second driver stack: OpenGL over Vulkan, on the CPU. The validation sees what it does.
@@ -683,8 +684,8 @@ $(B)/tests/fuzz/fuzz_request: $(REQUEST_OBJ) $(LIB_OBJ)
 $(B)/tests/fuzz/fuzz_request: FUZZ_LIBS = $(call pkg_libs,$(CLIENT_PKGS)) -lm
 $(B)/tests/fuzz/fuzz_warp: $(WARP_OBJ)
 $(B)/tests/fuzz/fuzz_warp: FUZZ_LIBS = -lm
-$(addprefix $(B)/tests/fuzz/fuzz_,aff assimp gltf nff obj): $(READERS_OBJ)
-$(addprefix $(B)/tests/fuzz/fuzz_,aff assimp gltf nff obj): FUZZ_LIBS = $(READERS_LIBS)
+$(addprefix $(B)/tests/fuzz/fuzz_,aff assimp gltf nff obj threemf): $(READERS_OBJ)
+$(addprefix $(B)/tests/fuzz/fuzz_,aff assimp gltf nff obj threemf): FUZZ_LIBS = $(READERS_LIBS)
 # OpenImageIO loses memory with broken images; the importer lives for one model only.
 run-fuzz-gltf run-fuzz-obj: FUZZ_FLAGS = -detect_leaks=0
 .PHONY: fuzz fuzz-keep $(addprefix run-fuzz-,$(FUZZERS)) $(addprefix keep-fuzz-,$(FUZZERS))

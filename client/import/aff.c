@@ -64,8 +64,8 @@ static uint32_t find_text(struct aff *aff, const char *name)
     aff->text_count++;
     grown->bytes = files_read(aff->files, name, &grown->size_bytes, reason);
     if (!grown->bytes) {
-        import_fail(scene, word_reader_where(&aff->nff.reader), "the file '%.100s', which it includes, %s", name,
-                    reason);
+        import_fail(scene, word_reader_where(&aff->nff.reader),
+                    "the file '%.100s', which it includes, cannot be used: %s", name, reason);
         return UINT32_MAX;
     }
     return (uint32_t)aff->text_count - 1;

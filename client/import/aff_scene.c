@@ -66,7 +66,10 @@ bool aff_add_all(struct aff *aff)
     bool added;
 
     if (!has_shapes(aff))
-        return import_fail(aff->nff.scene, NULL, "it contains nothing that can be shown");
+        return import_fail(
+            aff->nff.scene, NULL,
+            "it contains nothing that can be shown: no polygon, mesh, sphere, cone or cylinder; a file "
+            "that others include is shown with them");
     textures = calloc(aff->texture_count + 1, sizeof(*textures));
     if (!textures)
         return import_fail(aff->nff.scene, NULL, "out of memory");

@@ -6,16 +6,10 @@
 #include <string.h>
 #include <strings.h>
 
-/* Of what the library can read, the formats that its version in Debian 12 reads well. Files of printers and
- * scanners have their layers along z, and their unit is the millimetre or not said. */
+/* Of what the library can read, the formats that its version in Debian 12 reads well. STL files of
+ * printers and scanners have their layers along z, and do not say their unit. */
 static const struct assimp_format formats[] = {
-    {.ending = ".3ds", .name = "3DS", .metres = 1, .may_name_images = true},
-    {.ending = ".3mf",
-     .name = "3MF",
-     .z_up = true,
-     .metres = 0.001,
-     .may_name_images = true,
-     .colours_are_srgb = true},
+    {.ending = ".3ds", .name = "3DS", .metres = 1, .may_name_images = true, .colours_are_srgb = true},
     {.ending = ".ac", .name = "AC3D", .metres = 1, .may_name_images = true},
     {.ending = ".dae", .name = "COLLADA", .metres = 1, .may_name_images = true},
     {.ending = ".fbx", .name = "FBX", .metres = 0.01, .may_name_images = true},

@@ -56,6 +56,10 @@ float linear(float value);
 // ---- assimp_check.cpp: what the library would not survive, before it sees the file
 void check_bytes(reader &r, const unsigned char *bytes, size_t size_bytes);
 
+// ---- assimp_collada.cpp
+// The text that the library is to read instead.
+std::string mend_collada(reader &r, const unsigned char *bytes, size_t size_bytes);
+
 // ---- assimp_scene.cpp
 void add_scene(reader &r);
 

@@ -109,19 +109,10 @@ void check_xml(reader &r, const unsigned char *bytes, size_t size_bytes)
             fail(r, "", "elements are nested more than %zu deep", depth_max);
     }
 }
-
-// A package without the file that says where the model is ends the library by an assertion. Names are not packed.
-void check_3mf(reader &r, const unsigned char *bytes, size_t size_bytes)
-{
-    if (!memmem(bytes, size_bytes, "_rels/.rels", 11))
-        fail(r, "", "it is no 3MF file: there is no '_rels/.rels' in it");
-}
 } // namespace
 
 void check_bytes(reader &r, const unsigned char *bytes, size_t size_bytes)
 {
-    if (strcmp(r.format->ending, ".3mf") == 0)
-        check_3mf(r, bytes, size_bytes);
     if (strcmp(r.format->ending, ".ply") == 0)
         check_ply(r, bytes, size_bytes);
     if (strcmp(r.format->ending, ".off") == 0)

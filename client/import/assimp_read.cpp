@@ -49,26 +49,6 @@ float linear(float value)
 
 namespace
 {
-// ---- before the library sees the file
-
-// This version passes over cameras without a name, which COLLADA does not ask for. Empty: there is nothing to
-// mend.
-std::string named_cameras(const unsigned char *bytes, size_t size_bytes)
-{
-    const std::string tag = "<camera ", all(reinterpret_cast<const char *>(bytes), size_bytes);
-    std::string mended;
-    size_t copied = 0;
-
-    for (size_t at = all.find(tag); at != std::string::npos; at = all.find(tag, at + tag.size())) {
-        const size_t name = all.find("name=", at);
-        if (name != std::string::npos && name < all.find('>', at))
-            continue;
-        mended.append(all, copied, at + tag.size() - copied).append("name=\"\" ");
-        copied = at + tag.size();
-    }
-    return copied > 0 ? mended.append(all, copied, std::string::npos) : mended;
-}
-
 // ---- what the library says
 
 const char *const too_large =
@@ -128,12 +108,7 @@ void import(reader &r, const unsigned char *bytes, size_t size_bytes)
     check_bytes(r, bytes, size_bytes);
     std::string mended;
     if (strcmp(r.format->ending, ".dae") == 0) {
-        mended = named_cameras(bytes, size_bytes);
-        if (memmem(bytes, size_bytes, "<morph ", 7))
-            import_note(r.scene, PROTOCOL_SEVERITY_WARNING, "",
-                        "meshes with morph targets of COLLADA files are not shown; write it as glTF");
-    }
-    if (!mended.empty()) {
+        mended = mend_collada(r, bytes, size_bytes);
         bytes = reinterpret_cast<const unsigned char *>(mended.data());
         size_bytes = mended.size();
     }

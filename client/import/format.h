@@ -17,6 +17,7 @@ enum format_reader {
     FORMAT_OBJ,
     FORMAT_NFF,
     FORMAT_AFF,
+    FORMAT_3MF,
     FORMAT_ASSIMP,
 };
 

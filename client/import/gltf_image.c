@@ -5,6 +5,7 @@
 
 #include <stdint.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <strings.h>
 
@@ -32,17 +33,16 @@ static bool is_plain(const unsigned char *head, size_t head_bytes)
 
 /* ---- of a string ---- */
 
-/* Behind the comma of a data URI. Other characters than those of base64 end it. */
-static bool is_plain_base64(const char *text, size_t length)
+/* Behind the comma of a data URI. Other characters than those of base64 end it. Returns how many bytes
+ * it has written. */
+static size_t read_base64(const char *text, size_t length, unsigned char *bytes, size_t bytes_max)
 {
     static const char digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     const char *comma = memchr(text, ',', length < 100 ? length : 100);
-    unsigned char head[FILES_HEAD_BYTES];
     size_t count = 0;
     uint32_t bits = 0;
 
-    for (size_t i = comma ? (size_t)(comma - text) + 1 : length, used = 0; i < length && count < sizeof(head);
-         i++) {
+    for (size_t i = comma ? (size_t)(comma - text) + 1 : length, used = 0; i < length && count < bytes_max; i++) {
         const char *digit = text[i] != '\0' ? strchr(digits, text[i]) : NULL;
         if (!digit)
             break;
@@ -50,10 +50,16 @@ static bool is_plain_base64(const char *text, size_t length)
         used += 6;
         if (used >= 8) {
             used -= 8;
-            head[count++] = (unsigned char)(bits >> used);
+            bytes[count++] = (unsigned char)(bits >> used);
         }
     }
-    return is_plain(head, count);
+    return count;
+}
+
+static bool is_plain_base64(const char *text, size_t length)
+{
+    unsigned char head[FILES_HEAD_BYTES];
+    return is_plain(head, read_base64(text, length, head, sizeof(head)));
 }
 
 /* "my%20wood.png" becomes "my wood.png". False: it is too long for a name. */
@@ -113,6 +119,33 @@ static bool may_be_other(const struct files *files, const char *text, size_t len
            (has_ending(text, length, plain) && is_other_file(files, text, length));
 }
 
+/* ---- of a buffer ---- */
+
+/* Where images begin among the vertices only the JSON says: these signatures are long enough to be found. */
+static bool holds_other(const unsigned char *binary, size_t size_bytes)
+{
+    return memmem(binary, size_bytes, "WEBPVP8", 7) || memmem(binary, size_bytes, "GIF89a", 6);
+}
+
+static bool base64_holds_other(const char *text, size_t length)
+{
+    unsigned char *bytes = malloc(length);
+    const bool found = bytes && holds_other(bytes, read_base64(text, length, bytes, length));
+
+    free(bytes);
+    return found;
+}
+
+/* Of what "uri" names, in the file or beside it. */
+static bool buffer_may_hold_other(const struct files *files, const char *text, size_t length)
+{
+    char name[NAME_BYTES_MAX];
+
+    if (begins_with(text, length, "data:"))
+        return !begins_with(text, length, "data:image/") && base64_holds_other(text, length);
+    return resolve_percents(text, length, name) && files_hold(files, name, holds_other);
+}
+
 /* ---- of the file ---- */
 
 static uint32_t number_at(const unsigned char *bytes)
@@ -129,24 +162,25 @@ static size_t text_bytes(const unsigned char *bytes, size_t size_bytes)
     return chunk_bytes < size_bytes - 20 ? 20 + (size_t)chunk_bytes : size_bytes;
 }
 
-/* Where images begin among the vertices only the JSON says: these signatures are long enough to be found. */
-static bool holds_other(const unsigned char *binary, size_t size_bytes)
-{
-    return memmem(binary, size_bytes, "WEBPVP8", 7) || memmem(binary, size_bytes, "GIF89a", 6);
-}
-
 bool gltf_may_have_other_images(const struct files *files, const unsigned char *bytes, size_t size_bytes)
 {
     const size_t json_bytes = text_bytes(bytes, size_bytes);
     const char *at = (const char *)bytes, *const end = at + json_bytes;
+    /* An image in a buffer has a MIME type, which may be another's. */
+    const bool has_images = memmem(bytes, json_bytes, "\"images\"", 8),
+               in_buffers = has_images && memmem(bytes, json_bytes, "\"mimeType\"", 10);
+    bool is_uri = false;
 
     while ((at = memchr(at, '"', (size_t)(end - at)))) {
         const char *text = at + 1, *quote = memchr(text, '"', (size_t)(end - text));
         if (!quote)
             break;
-        if (may_be_other(files, text, (size_t)(quote - text)))
+        const size_t length = (size_t)(quote - text);
+        if (may_be_other(files, text, length) ||
+            (is_uri && in_buffers && buffer_may_hold_other(files, text, length)))
             return true;
+        is_uri = length == 3 && memcmp(text, "uri", 3) == 0;
         at = quote + 1;
     }
-    return memmem(bytes, json_bytes, "\"images\"", 8) && holds_other(bytes + json_bytes, size_bytes - json_bytes);
+    return has_images && holds_other(bytes + json_bytes, size_bytes - json_bytes);
 }

@@ -9,6 +9,7 @@
 #include "send.h"
 #include "source.h"
 #include "texture.h"
+#include "threemf.h"
 #include "protocol/common/clock.h"
 #include "protocol/version.h"
 
@@ -244,6 +245,8 @@ static bool parse_model(struct import_scene *scene, struct source *source, doubl
         return nff_import(scene, bytes, size_bytes);
     case FORMAT_AFF:
         return aff_import(scene, &source->files, bytes, size_bytes);
+    case FORMAT_3MF:
+        return threemf_import(scene, bytes, size_bytes);
     case FORMAT_ASSIMP:
         return assimp_import(scene, &source->files, source->of.assimp, point_size, bytes, size_bytes);
     default:

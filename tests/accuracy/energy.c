@@ -137,13 +137,14 @@ TEST(coats_keep_the_light)
                 expect_furnace(*state, &ways[w], &coated[k], 0.2f * (float)fifths, 0.98);
 }
 
-/* Of facets along a grain fits for facets without one are off by up to 0.05 (shaders/common/grain.glsl). */
+/* Of facets along a grain fits for facets without one lose up to 0.026 in the mean (shaders/common/grain.glsl),
+ * and the others of this file 0.007. */
 TEST(brushed_things_make_no_light_and_lose_little)
 {
     for (size_t w = 0; w < COUNT(ways); w++)
         for (size_t k = 0; k < COUNT(brushed); k++)
             for (int fifths = 0; fifths <= 5; fifths += 2)
-                expect_furnace(*state, &ways[w], &brushed[k], 0.2f * (float)fifths, 0.95);
+                expect_furnace(*state, &ways[w], &brushed[k], 0.2f * (float)fifths, 0.97);
 }
 
 /* A film over a white body keeps all light, as what it does not mirror enters. */

@@ -356,23 +356,23 @@ static const char obj_model[] =
     "vn 0 0 1\nusemtl red\ns 1\nf 1/1/1 2/2/1 \\\n3//1 -1\ng other\nl 1 2\np 3\nf 1 2 3\n";
 /* The first letter chooses the format, by its place in the table (import/assimp.c). */
 static const char *const assimp_models[] = {
-    "rply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\nproperty uch"
+    "mply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\nproperty uch"
     "ar red\nproperty uchar green\nproperty uchar blue\nelement face 1\nproperty list uchar int vertex_indices\ne"
     "nd_header\n0 0 0 255 0 0\n1 0 0 0 255 0\n1 1 0 0 0 255\n0 1 0 255 255 255\n4 0 1 2 3\n",
-    "rply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\nproperty uch"
+    "mply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\nproperty uch"
     "ar red\nproperty uchar green\nproperty uchar blue\nend_header\n0 0 0 255 0 0\n1 0 0 0 255 0\n1 1 0 0 0 255\n"
     "0 1 0 255 255 255\n",
-    "ssolid thing\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\ne"
+    "nsolid thing\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\ne"
     "ndsolid thing\n",
-    "qOFF\n4 1 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3\n",
-    "nAC3Db\nMATERIAL \"red\" rgb 1 0 0  amb 0.2 0.2 0.2  emis 0 0 0  spec 0.5 0.5 0.5  shi 10  trans 0\nOBJECT w"
+    "lOFF\n4 1 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3\n",
+    "iAC3Db\nMATERIAL \"red\" rgb 1 0 0  amb 0.2 0.2 0.2  emis 0 0 0  spec 0.5 0.5 0.5  shi 10  trans 0\nOBJECT w"
     "orld\nkids 1\nOBJECT poly\nname \"quad\"\nloc 0 2 0\nnumvert 4\n0 0 0\n1 0 0\n1 1 0\n0 1 0\nnumsurf 1\nSURF "
     "0x20\nmat 0\nrefs 4\n0 0 0\n1 1 0\n2 1 1\n3 0 1\nkids 0\n",
-    "t<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<X3D profile=\"Interchange\" version=\"3.3\"><Scene><Transform "
+    "o<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<X3D profile=\"Interchange\" version=\"3.3\"><Scene><Transform "
     "translation=\"0 2 0\"><Shape><Appearance><Material diffuseColor=\"1 0 0\"/></Appearance>\n<IndexedFaceSet co"
     "ordIndex=\"0 1 2 3 -1\" solid=\"false\"><Coordinate point=\"0 0 0 1 0 0 1 1 0 0 1 0\"/></IndexedFaceSet></Sh"
     "ape></Transform></Scene></X3D>\n",
-    "o<?xml version=\"1.0\"?>\n<COLLADA xmlns=\"http://www.collada.org/2005/11/COLLADASchema\" version=\"1.4.1\">"
+    "j<?xml version=\"1.0\"?>\n<COLLADA xmlns=\"http://www.collada.org/2005/11/COLLADASchema\" version=\"1.4.1\">"
     "<asset><unit meter=\"0.01\" name=\"centimeter\"/><up_axis>Z_UP</up_axis></asset>\n<library_cameras><camera i"
     "d=\"cam\"><optics><technique_common><perspective><xfov>60</xfov><aspect_ratio>1.5</aspect_ratio><znear>1</zn"
     "ear><zfar>1000</zfar></perspective></technique_common></optics></camera></library_cameras>\n<library_lights>"
@@ -391,7 +391,7 @@ static const char *const assimp_models[] = {
     "/technique_common></bind_material></instance_geometry></node><node id=\"eye\" name=\"eye\"><instance_camera "
     "url=\"#cam\"/></node><node id=\"lamp\" name=\"lamp\"><instance_light url=\"#sun\"/></node></visual_scene></l"
     "ibrary_visual_scenes>\n<scene><instance_visual_scene url=\"#s\"/></scene></COLLADA>\n",
-    "p; FBX 7.3.0 project file\nFBXHeaderExtension:  {\nFBXHeaderVersion: 1003\nFBXVersion: 7300\n}\nGlobalSettin"
+    "k; FBX 7.3.0 project file\nFBXHeaderExtension:  {\nFBXHeaderVersion: 1003\nFBXVersion: 7300\n}\nGlobalSettin"
     "gs:  {\nVersion: 1000\nProperties70:  {\nP: \"UpAxis\", \"int\", \"Integer\", \"\",2\nP: \"UpAxisSign\", \"i"
     "nt\", \"Integer\", \"\",1\nP: \"FrontAxis\", \"int\", \"Integer\", \"\",1\nP: \"FrontAxisSign\", \"int\", \""
     "Integer\", \"\",-1\nP: \"CoordAxis\", \"int\", \"Integer\", \"\",0\nP: \"CoordAxisSign\", \"int\", \"Integer"

@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: MIT
+// The parts of the reader of 3MF: an archive with models in XML (3MF Core Specification 1.3; of its extensions the
+// colour groups of materials, and parts in other files of the archive).
+#ifndef FARLIGHT_IMPORT_THREEMF_HPP
+#define FARLIGHT_IMPORT_THREEMF_HPP
+
+#include "files.h"
+#include "import.h"
+#include "threemf.h"
+
+#include <array>
+#include <functional>
+#include <map>
+#include <string>
+#include <vector>
+
+namespace threemf
+{
+// Thrown after import_fail(); caught in threemf_import() and at the edge of the XML parser.
+struct failed {
+};
+
+// A property of a corner that is none.
+constexpr uint32_t none = UINT32_MAX;
+
+// Base materials, or colours.
+struct group {
+    bool has_materials = false;
+    std::vector<std::array<uint8_t, 4>> colours; // sRGB
+    std::vector<std::string> names;
+    std::vector<uint32_t> materials; // once they are added
+};
+
+struct triangle {
+    std::array<uint32_t, 3> corners;
+    uint32_t group_id;
+    std::array<uint32_t, 3> properties;
+};
+
+using object_key = std::pair<std::string, uint32_t>; // a file of the archive, and the identifier there
+
+// sRGB to linear light.
+double linear(uint8_t value);
+
+// An object where it stands.
+struct instance {
+    object_key key;
+    float parent_from_object[12];
+};
+
+struct object {
+    std::string name;
+    uint32_t mesh = 0; // 0: it has no triangles
+    std::vector<instance> components;
+};
+
+struct reader {
+    import_scene *scene;
+    double metres = 0.001; // of a unit
+    std::map<object_key, object> objects = {};
+    std::vector<instance> items = {};
+    uint32_t colours_material = 0; // white, beneath colours
+};
+
+[[noreturn]] void fail(reader &r, const std::string &where, const char *format, ...)
+    __attribute__((format(printf, 3, 4)));
+void check(reader &r);
+
+// ---- threemf_archive.cpp
+using taker = std::function<void(const char *bytes, size_t size_bytes, bool is_last)>;
+// Calls `begin` with the name of each model in the archive, the main one last, and what that returns with its
+// bytes, a part at a time.
+void each_model(reader &r, const unsigned char *bytes, size_t size_bytes,
+                const std::function<taker(const std::string &name, bool is_main)> &begin);
+
+// ---- threemf_scene.cpp
+struct geometry {
+    std::vector<float> positions;
+    std::vector<triangle> triangles;
+};
+// Returns the mesh's identifier.
+uint32_t add_mesh(reader &r, const std::string &name, const geometry &from, std::map<uint32_t, group> &groups);
+// The nodes of all items, with the objects that they are made of.
+void add_items(reader &r);
+} // namespace threemf
+
+#endif
