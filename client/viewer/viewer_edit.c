@@ -92,7 +92,7 @@ void viewer_edit_stop_typing(struct viewer_edit *edit)
 void viewer_edit_choose_tab(struct viewer *viewer, size_t tab)
 {
     struct viewer_edit *edit = &viewer->edit;
-    if (edit->works)
+    if (viewer_edit_must_wait(viewer))
         return;
     viewer_edit_stop_typing(edit);
     edit->tab = tab % EDIT_TABS;
@@ -114,6 +114,23 @@ void viewer_edit_object(struct viewer *viewer, uint32_t node, uint32_t material)
     viewer_edit_choose_tab(viewer, edit->tab != EDIT_LIGHT && edit->ids[edit->tab] != 0 ? edit->tab
                                    : material != 0                                      ? EDIT_MATERIAL
                                                                                         : EDIT_NODE);
+}
+
+void viewer_edit_read_again(struct viewer *viewer, bool is_same)
+{
+    struct viewer_edit *edit = &viewer->edit;
+    forget_objects(edit);
+    if (!is_same) {
+        edit_history_clear(&edit->history);
+        memset(edit->ids, 0, sizeof(edit->ids));
+        edit->picked = 0;
+        edit->has_state = false;
+        viewer_edit_stop_typing(edit);
+    }
+    if (edit->shown && is_same)
+        read_object(viewer);
+    else if (edit->shown)
+        viewer_edit_choose_tab(viewer, edit->tab);
 }
 
 void viewer_edit_forget(struct viewer *viewer)
@@ -168,7 +185,7 @@ void viewer_edit_choose_node_of_light(struct viewer *viewer)
     struct fl_error refusal = {0};
     struct fl_object *nodes = NULL;
     size_t count = 0;
-    if (edit->works)
+    if (viewer_edit_must_wait(viewer))
         return;
     if (!session_objects(viewer->session, PROTOCOL_OBJECT_NODE, &nodes, &count, &refusal))
         say(viewer, &refusal);
@@ -224,6 +241,11 @@ static void end_work(struct viewer *viewer)
     free(done->change.list);
 }
 
+bool viewer_edit_must_wait(const struct viewer *viewer)
+{
+    return viewer->edit.works || session_reads(viewer->session);
+}
+
 bool viewer_edit_works(struct viewer *viewer, bool wait)
 {
     struct viewer_edit *edit = &viewer->edit;
@@ -253,7 +275,7 @@ bool viewer_edit_has_field(const struct viewer_edit *edit)
 void viewer_edit_step(struct viewer *viewer, double steps)
 {
     struct viewer_edit *edit = &viewer->edit;
-    if (edit->works || edit->has_pending)
+    if (viewer_edit_must_wait(viewer) || edit->has_pending)
         return;
     if (edit->chosen == 0)
         choose_object(viewer, steps > 0 ? 1 : -1);
@@ -266,7 +288,7 @@ void viewer_edit_undo(struct viewer *viewer, bool redo)
 {
     struct viewer_edit *edit = &viewer->edit;
     struct edit_change change;
-    if (edit->works)
+    if (viewer_edit_must_wait(viewer))
         return;
     if (!edit_history_take(&edit->history, redo, &change)) {
         viewer_say(viewer, "there is nothing to %s", redo ? "redo" : "undo");
@@ -278,7 +300,7 @@ void viewer_edit_undo(struct viewer *viewer, bool redo)
 void viewer_edit_toggle(struct viewer *viewer)
 {
     struct viewer_edit *edit = &viewer->edit;
-    if (edit->works)
+    if (viewer_edit_must_wait(viewer))
         return;
     edit->shown = !edit->shown;
     if (!edit->shown)

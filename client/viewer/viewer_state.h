@@ -27,6 +27,7 @@ struct viewer {
     struct message_render view; /* of one eye: from the options, completed by the scene */
     struct session *session;
     unsigned times_live;        /* of the session, as of when its view was started */
+    unsigned times_read;        /* likewise; what is known of cameras and clips is as of then */
     char *model;                /* that was dropped, and is shown; NULL: that of the options */
     struct session *next;       /* that of a dropped model, until it is there; NULL: there is none */
     char *next_model;           /* its path */
@@ -39,6 +40,7 @@ struct viewer {
     struct settings settings, taken; /* `taken`: with which frames came */
     struct settings first;           /* as they were at first */
     struct tour tour;
+    char camera_name[129], clip_name[129]; /* of those that the tour is at */
     struct controls controls;
     double pointer_x, pointer_y;
 

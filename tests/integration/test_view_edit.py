@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: MIT
 """Editing in the viewer: what is picked is changed and changed back, and two viewers at one scene see each other's changes."""
+import json
 import shutil
 import signal
 import subprocess
 
-from farlight_test import BIN, bundled_scenes, read_png
-from test_view import HIDE, Viewer, difference, error_of, rest
+from farlight_test import BIN, Daemon, bundled_scenes, read_png
+from test_view import HIDE, Relay, Viewer, change_model, difference, drag, error_of, rest
 
 POT = (160, 80)  # in the middle of the teapot
 ABOVE_NOTICES = 120  # rows
@@ -89,6 +90,39 @@ class Editing(Viewer):
         self.assertEqual(states["dropped"]["edit"]["fields"], self.picked()["fields"])
         self.replay([rest(1)], "--edit", "material.nothing.roughness=1", status=2)
         self.assertIn("no material 'nothing'", self.errors)
+
+    def test_what_changes_in_the_file_is_sent_alone_and_the_view_goes_on(self):
+        """Camera, clip, selection and undo are kept, and so are edits of what the file does not change."""
+        model = self.folder / "carousel.glb"
+        shutil.copy(bundled_scenes() / "carousel.glb", model)
+
+        def repaint(scene):
+            scene["materials"][0]["pbrMetallicRoughness"]["baseColorFactor"] = [0.9, 0.1, 0.1, 1]  # the floor's
+
+        # One step of the clip: the pot is still where it is picked.
+        events = [rest(1), *drag(160, 90, 40, 10), {"key": "v"}, {"key": "space"}, {"key": "right"}, rest(1), *pick(200, 108), rest(1),
+                  {"state": "picked"}, *[{"key": "down"}] * 4, *typed("0.9"), rest(2), *HIDE, {"screenshot": "before.png"},
+                  {"state": "before"}, {"wait": "change"}, {"state": "changed"}, rest(2), {"screenshot": "after.png"}, {"state": "after"},
+                  {"key": "z"}, rest(2), {"state": "undone"}]
+        with Daemon() as daemon, Relay(daemon.path, self.folder / "relay") as relay:
+            process = self.start(events, model, "--watch", "--headless", "--server", f"unix:{self.folder}/relay", *QUICK, scene=None)
+            states = [json.loads(process.stdout.readline()) for _ in range(2)]
+            first = relay.sent
+            change_model(model, model, repaint)
+            states += self.end(process).values()
+            again = relay.sent - first
+        picked, before, changed, after, undone = states
+        self.assertGreater(first, 1_000_000)
+        self.assertLess(again, 20_000)  # cameras and questions, each a few hundred bytes
+        self.assertEqual([state["times_live"] for state in states], [1] * 5)
+        self.assertIn("nodes rebuilt 0, nodes refitted 0", after["structure"][0])
+        for kept in ("eye", "look_at", "clip", "time_s", "edit"):
+            self.assertEqual(before[kept], after[kept])
+        self.assertGreater(before["time_s"], 0)
+        self.assertGreater(difference(self.folder / "before.png", self.folder / "after.png"), 5)
+        self.assertIn("carousel.glb is read again; sent 0.000 of", changed["notice"])
+        self.assertNotEqual(after["edit"]["fields"]["base_colour"], picked["edit"]["fields"]["base_colour"])
+        self.assertEqual(undone["edit"]["fields"], picked["edit"]["fields"])
 
     def test_two_viewers_see_what_the_other_one_changes(self):
         keys = choose(self.picked(), "base_colour")
