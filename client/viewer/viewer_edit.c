@@ -14,8 +14,8 @@
 #define METRES_OF_EXTENT 0.01      /* a step of a length */
 
 static const enum protocol_object_kind kinds[EDIT_TABS] = {PROTOCOL_OBJECT_NODE, PROTOCOL_OBJECT_MATERIAL,
-                                                           PROTOCOL_OBJECT_LIGHT};
-static const char *const tab_names[EDIT_TABS] = {"node", "material", "light"};
+                                                           PROTOCOL_OBJECT_LIGHT, PROTOCOL_OBJECT_ENVIRONMENT};
+static const char *const tab_names[EDIT_TABS] = {"node", "material", "light", "environment"};
 
 static void say(struct viewer *viewer, const struct fl_error *refusal)
 {
@@ -98,9 +98,9 @@ void viewer_edit_choose_tab(struct viewer *viewer, size_t tab)
     edit->tab = tab % EDIT_TABS;
     edit->chosen = 0;
     forget_objects(edit);
-    /* Lights are not seen: the first one is there to begin with. */
-    if (edit->tab == EDIT_LIGHT && edit->ids[EDIT_LIGHT] == 0 && list_objects(viewer) && edit->object_count > 0)
-        edit->ids[EDIT_LIGHT] = edit->objects[0].id;
+    /* What cannot be picked: the first one is there to begin with. */
+    if (edit->tab >= EDIT_LIGHT && edit->ids[edit->tab] == 0 && list_objects(viewer) && edit->object_count > 0)
+        edit->ids[edit->tab] = edit->objects[0].id;
     read_object(viewer);
 }
 
@@ -111,9 +111,9 @@ void viewer_edit_object(struct viewer *viewer, uint32_t node, uint32_t material)
     edit->ids[EDIT_MATERIAL] = material;
     edit->shown = true;
     measure(viewer);
-    viewer_edit_choose_tab(viewer, edit->tab != EDIT_LIGHT && edit->ids[edit->tab] != 0 ? edit->tab
-                                   : material != 0                                      ? EDIT_MATERIAL
-                                                                                        : EDIT_NODE);
+    viewer_edit_choose_tab(viewer, edit->tab < EDIT_LIGHT && edit->ids[edit->tab] != 0 ? edit->tab
+                                   : material != 0                                     ? EDIT_MATERIAL
+                                                                                       : EDIT_NODE);
 }
 
 void viewer_edit_read_again(struct viewer *viewer, bool is_same)
@@ -332,6 +332,8 @@ static void show_which(const struct viewer_edit *edit, struct hud_edit_row *row)
     if (edit->tab == EDIT_NODE)
         snprintf(row->value, sizeof(row->value),
                  edit->ids[EDIT_NODE] == edit->picked ? "picked" : "group around it");
+    else if (edit->tab == EDIT_ENVIRONMENT)
+        snprintf(row->value, sizeof(row->value), "the only one");
     else if (edit->objects)
         snprintf(row->value, sizeof(row->value), "%zu of %zu", index_of(edit) + 1, edit->object_count);
     else
@@ -350,14 +352,17 @@ const struct hud_edit *viewer_edit_hud(struct viewer *viewer)
         return hud;
     }
     const char *name = edit->state.name;
-    snprintf(hud->title, sizeof(hud->title), "%.60s%s#%u", name, name[0] != '\0' ? "  " : "", edit->state.id);
+    if (edit->tab == EDIT_ENVIRONMENT)
+        snprintf(hud->title, sizeof(hud->title), "environment");
+    else
+        snprintf(hud->title, sizeof(hud->title), "%.60s%s#%u", name, name[0] != '\0' ? "  " : "", edit->state.id);
     hud->count = edit->row_count + 1;
     show_which(edit, &hud->rows[0]);
     for (size_t i = 0; i < edit->row_count; i++)
         edit_row_show(&edit->state, edit->rows[i], &hud->rows[i + 1]);
-    static const char *const others[EDIT_TABS] = {"Left: the group around it, Right: back",
-                                                  "Left, Right: another one",
-                                                  "Left, Right: another one; Return: its node"};
+    static const char *const others[EDIT_TABS] = {
+        "Left: the group around it, Right: back", "Left, Right: another one",
+        "Left, Right: another one; Return: its node", "light from far away, all around the scene"};
     hud->hint = edit->chosen > 0 ? edit_row_hint(&edit->state, edit->rows[edit->chosen - 1]) : others[edit->tab];
     hud->typed = edit->typing ? edit->typed : NULL;
     return hud;

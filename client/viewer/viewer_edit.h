@@ -13,7 +13,7 @@
 struct session;
 struct viewer;
 
-enum viewer_edit_tab { EDIT_NODE, EDIT_MATERIAL, EDIT_LIGHT, EDIT_TABS };
+enum viewer_edit_tab { EDIT_NODE, EDIT_MATERIAL, EDIT_LIGHT, EDIT_ENVIRONMENT, EDIT_TABS };
 #define EDIT_ROWS_MAX (HUD_EDIT_ROWS_MAX - 1) /* the first says which object it is */
 
 /* The object that is edited. */

@@ -31,6 +31,22 @@ def typed(number):
 class Editing(Viewer):
     edit = None
 
+    def two_viewers(self, first, second):
+        """Their states at one scene; the second one begins when the first one has told a state."""
+        address = f"unix:{self.folder}/up"
+        command = [BIN / "farlight", "serve", bundled_scenes() / "teapot.glb", "--name", "pot", "--listen", address]
+        with subprocess.Popen(list(map(str, command)), stdout=subprocess.PIPE, text=True) as server:
+            try:
+                while "farlight view" not in (line := server.stdout.readline()):
+                    self.assertNotEqual(line, "")
+                options = ["--headless", "--scene", "pot", "--server", address, *QUICK]
+                waiting = self.start(first, *options, scene=None)
+                self.assertIn("state", waiting.stdout.readline())
+                other = self.replay(second, *options, scene=None)
+                return self.end(waiting), other
+            finally:
+                server.send_signal(signal.SIGTERM)
+
     def picked(self):
         """The material at the pot, as the panel shows it."""
         if not Editing.edit:
@@ -132,21 +148,32 @@ class Editing(Viewer):
                  *end, {"screenshot": "first.png"}]
         second = [*begin, *keys, *typed("0.9"), {"state": "mine"}, change, {"after": 0.5}, {"state": "changed"}, *end,
                   {"screenshot": "second.png"}]
-        address = f"unix:{self.folder}/up"
-        command = [BIN / "farlight", "serve", bundled_scenes() / "teapot.glb", "--name", "pot", "--listen", address]
-        with subprocess.Popen(list(map(str, command)), stdout=subprocess.PIPE, text=True) as server:
-            try:
-                while "farlight view" not in (line := server.stdout.readline()):
-                    self.assertNotEqual(line, "")
-                options = ["--headless", "--scene", "pot", "--server", address, *QUICK]
-                waiting = self.start(first, *options, scene=None)
-                self.assertIn("picked", waiting.stdout.readline())
-                other = self.replay(second, *options, scene=None)
-                states = self.end(waiting)
-            finally:
-                server.send_signal(signal.SIGTERM)
+        states, other = self.two_viewers(first, second)
         for state in (states["changed"], other["mine"]):
             self.assertAlmostEqual(state["edit"]["fields"]["base_colour"][0], 0.9, 6)
         for state in (states["mine"], other["changed"]):  # each keeps what the other one has changed
             self.assertEqual([round(value, 5) for value in state["edit"]["fields"]["base_colour"][:2]], [0.9, 0.8])
         self.assertEqual(difference(self.folder / "first.png", self.folder / "second.png"), 0)
+
+    def test_the_environment_is_edited_before_the_eyes_of_all(self):
+        begin, end = [rest(2), *HIDE, {"key": "n"}, {"key": "tab"}], [{"key": "n"}, rest(2)]
+        first = [*begin, {"state": "open"}, {"wait": "change"}, {"after": 0.5}, {"state": "changed"}, *end, {"screenshot": "first.png"}]
+        second = [*begin, {"key": "down"}, *typed("0.5"), {"state": "mine"}, *end, {"screenshot": "second.png"}]
+        states, other = self.two_viewers(first, second)
+        for state in (other["mine"], states["changed"]):
+            self.assertEqual(state["edit"]["kind"], "environment")
+            self.assertEqual(state["edit"]["fields"]["colour"], [0.5] * 3)
+        self.assertEqual(difference(self.folder / "first.png", self.folder / "second.png"), 0)
+
+    def test_undoing_returns_the_environment_as_it_was(self):
+        """The scene has a black one, which an intensity makes white."""
+        states = self.replay([rest(2), *HIDE, {"screenshot": "before.png"}, {"key": "n"}, {"key": "tab"}, {"state": "before"}, {"key": "down"},
+                              *typed("0.5"), {"key": "n"}, rest(2), {"screenshot": "lit.png"}, {"key": "n"}, *[{"key": "down"}] * 5,
+                              *typed("40"), {"state": "turned"}, {"key": "z"}, {"key": "z"}, {"state": "undone"}, {"key": "n"}, rest(2),
+                              {"screenshot": "undone.png"}], *QUICK)
+        self.assertEqual(states["turned"]["edit"]["row"], "rotation")
+        self.assertEqual(states["turned"]["edit"]["fields"]["rotation"], [40])
+        self.assertEqual(states["undone"]["edit"]["fields"], states["before"]["edit"]["fields"])
+        before, lit, undone = (read_png(self.folder / f"{name}.png")[2][:ABOVE_NOTICES] for name in ("before", "lit", "undone"))
+        self.assertGreater(sum(map(sum, lit)), 1.2 * sum(map(sum, before)))  # values with alpha, which stays
+        self.assertEqual(before, undone)
