@@ -182,6 +182,7 @@ static void serve(struct viewer *viewer, uint64_t now_ns)
     viewer_tell(viewer, now_ns);
     viewer_receive(viewer, wait_ms);
     viewer_step_tasks(viewer);
+    viewer_step_outline(viewer);
     viewer_step_edit(viewer, now_ns);
 }
 
@@ -291,6 +292,7 @@ static void close_viewer(struct viewer *viewer)
     pixmap_finish(&viewer->compared);
     pixmap_finish(&viewer->heat);
     viewer_edit_forget(viewer);
+    viewer_outline_forget(viewer);
     replay_finish(&viewer->replay);
 }
 

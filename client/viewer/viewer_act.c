@@ -211,7 +211,7 @@ static bool has_come(const struct viewer *viewer, const struct replay_event *eve
     switch (event->kind) {
     case REPLAY_REST:
         return is_live && viewer_is_at_rest(viewer, event->samples) && viewer->task == TASK_NONE &&
-               viewer->wanted == TASK_NONE &&
+               viewer->wanted == TASK_NONE && !viewer_outline_is_due(viewer) &&
                (!viewer->settings.error_map || viewer->has_heat || viewer->heat_refused);
     case REPLAY_LIVE:
         return is_live && viewer->has_camera && viewer->frames > 0;

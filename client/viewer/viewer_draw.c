@@ -13,6 +13,8 @@
 
 const struct pixmap *viewer_picture(const struct viewer *viewer)
 {
+    if (viewer_outline_is_shown(viewer))
+        return &viewer->outline.picture;
     return viewer->has_heat ? &viewer->heat : viewer->shows_made ? &viewer->made : &viewer->live;
 }
 
