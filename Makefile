@@ -320,7 +320,7 @@ $(B)/tests/unit/fault_tests: TEST_LIBS += $(SERVING_WRAP) -Wl,--wrap=malloc,--wr
 $(B)/tests/unit/corpus_tests: $(KEPT_OBJ) $(SERVING_OBJ) $(READERS_OBJ) $(REQUEST_OBJ)
 $(B)/tests/unit/corpus_tests: TEST_LIBS += $(SERVING_WRAP) $(READERS_LIBS) -lstdc++
 # What the daemon encodes is decoded by the library itself.
-$(B)/tests/unit/media_tests: $(patsubst %,$(B)/client/viewer/%.o,camera decode edit_history edit_rows heat hud hud_edit hud_mark hud_timeline input layer metrics paint panel pixmap plan recall replay settings tour views \
+$(B)/tests/unit/media_tests: $(patsubst %,$(B)/client/viewer/%.o,camera decode edit_history edit_rows heat hud hud_edit hud_mark hud_timeline input layer metrics outline paint panel pixmap plan recall replay settings tour views \
   warped_key window) $(B)/client/cli/image_path.o
 $(B)/tests/unit/media_tests: TEST_LIBS += $(VIEWER_LIBS) -Wl,--wrap=libav_load
 $(B)/tests/unit/unit_tests: TEST_LIBS += $(call pkg_libs,libseccomp)

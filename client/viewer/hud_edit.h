@@ -7,7 +7,7 @@
 #include <stddef.h>
 
 #define HUD_EDIT_ROWS_MAX 96u
-#define HUD_EDIT_TABS 3u
+#define HUD_EDIT_TABS 4u
 
 /* A number, or one of a vector. */
 struct hud_edit_row {
@@ -19,7 +19,7 @@ struct hud_edit_row {
 
 struct hud_edit {
     bool shown;
-    const char *tabs[HUD_EDIT_TABS]; /* "node", "material", "light" */
+    const char *tabs[HUD_EDIT_TABS]; /* "node", "material" and so on */
     size_t tab;
     char title[80];    /* the object's name and number */
     const char *hint;  /* what the chosen row means, or what to do */

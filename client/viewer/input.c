@@ -33,7 +33,7 @@ const struct binding input_bindings[] = {
     {NULL, "down", ACTION_DOWN, ACTION_DOWN, NULL},
     {"Ctrl + click, K", "k", ACTION_PICK, ACTION_PICK, "edit what is under the pointer"},
     {"N", "n", ACTION_EDIT, ACTION_EDIT, "its fields; arrows, drags and numbers change them"},
-    {"Tab, Shift+Tab", "tab", ACTION_EDIT_NEXT, ACTION_EDIT_PREVIOUS, "node, material, lights"},
+    {"Tab, Shift+Tab", "tab", ACTION_EDIT_NEXT, ACTION_EDIT_PREVIOUS, "node, material, lights, environment"},
     {"Z, Shift+Z", "z", ACTION_UNDO, ACTION_REDO, "undo, redo what was changed here"},
     {NULL, "y", ACTION_REDO, ACTION_REDO, NULL},
     {"I, Shift+I", "i", ACTION_NEXT_INTEGRATOR, ACTION_PREVIOUS_INTEGRATOR, "next, previous integrator"},

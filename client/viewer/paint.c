@@ -30,7 +30,8 @@ struct painter {
     SDL_Renderer *renderer;
     SDL_Texture *texture; /* of the picture */
     int texture_width, texture_height;
-    uint64_t version; /* of the picture that is in it */
+    const struct pixmap *picture; /* that is in it, .. */
+    uint64_t version;             /* .. as it was then */
     struct kept_font fonts[FONTS_KEPT];
     size_t font_count;
     struct drawn_text texts[TEXTS_KEPT];
@@ -132,11 +133,13 @@ static bool load_picture(struct painter *painter, const struct pixmap *picture)
         SDL_SetTextureScaleMode(painter->texture, SDL_ScaleModeLinear);
         painter->texture_width = picture->width;
         painter->texture_height = picture->height;
-        painter->version = 0;
+        painter->picture = NULL;
     }
-    if (painter->version != picture->version &&
-        SDL_UpdateTexture(painter->texture, NULL, picture->pixels, picture->width * 4) == 0)
+    if ((painter->picture != picture || painter->version != picture->version) &&
+        SDL_UpdateTexture(painter->texture, NULL, picture->pixels, picture->width * 4) == 0) {
+        painter->picture = picture;
         painter->version = picture->version;
+    }
     return true;
 }
 

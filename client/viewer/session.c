@@ -17,20 +17,21 @@
 struct session {
     struct session_options options;
     uint64_t number;    /* of this session, by chance */
-    char kept_name[40]; /* by which a scene that we loaded is found again */
+    char name[40];      /* of the next scene that we load */
+    char kept_name[40]; /* by which the one that we loaded is found again */
     struct cli_watch watch;
     enum session_state state;
-    unsigned times_live;
+    unsigned times_live, times_read;
     struct fl_error error;
     uint64_t retry_ns, pause_ns;
 
     /* Of the thread while it runs, ours else. */
     pthread_t thread;
-    bool has_thread;
-    atomic_bool opened; /* the thread is at its end */
+    bool has_thread, reads; /* `reads`: changed files, into the scene that is there */
+    atomic_bool opened;     /* the thread is at its end */
     struct fl_connection *connection;
     struct fl_scene *scene;
-    struct fl_scene *fresh; /* of changed files, to take the place of `scene` */
+    bool is_other; /* changed files are another scene, in the place of one that is gone */
     struct fl_error open_error;
 
     pthread_mutex_t lock; /* guards what follows */
@@ -65,24 +66,31 @@ static void on_note(void *user, const struct fl_note *note)
         session->options.note(session->options.user, note);
 }
 
-static struct fl_scene *load(struct session *session, struct fl_error *error)
+static struct fl_load_options load_options(struct session *session)
 {
     const struct session_options *options = &session->options;
     /* A private daemon ends with its connection, and its scenes with it. */
-    const struct fl_load_options wanted = {.model = options->model,
-                                           .models = options->models,
-                                           .model_count = options->model_count,
-                                           .input_fd = options->input_fd,
-                                           .environment = options->environment,
-                                           .environment_degrees = options->environment_degrees,
-                                           .variant = options->variant,
-                                           .point_size = options->point_size,
-                                           .note = on_note,
-                                           .progress = on_progress,
-                                           .user = session,
-                                           .sharing =
-                                               options->server ? PROTOCOL_SHARING_KEPT : PROTOCOL_SHARING_PRIVATE,
-                                           .scene_name = options->server ? session->kept_name : NULL};
+    return (struct fl_load_options){.model = options->model,
+                                    .models = options->models,
+                                    .model_count = options->model_count,
+                                    .input_fd = options->input_fd,
+                                    .environment = options->environment,
+                                    .environment_degrees = options->environment_degrees,
+                                    .variant = options->variant,
+                                    .point_size = options->point_size,
+                                    .note = on_note,
+                                    .progress = on_progress,
+                                    .user = session,
+                                    .sharing = options->server ? PROTOCOL_SHARING_KEPT : PROTOCOL_SHARING_PRIVATE,
+                                    .scene_name = options->server ? session->name : NULL,
+                                    /* Edits that change values by factors would do so once more. */
+                                    .will_reload = options->watch && options->edit_count == 0};
+}
+
+static struct fl_scene *load(struct session *session, struct fl_error *error)
+{
+    const struct session_options *options = &session->options;
+    const struct fl_load_options wanted = load_options(session);
     struct fl_scene *scene = fl_scene_load(session->connection, &wanted, error);
     if (!scene || options->edit_count == 0 ||
         fl_scene_edit(scene, options->edits, options->edit_count, NULL, error))
@@ -103,6 +111,7 @@ static struct fl_scene *come_to_scene(struct session *session, struct fl_error *
     if (scene || error->code == FL_ERROR_CONNECTION || error->code == FL_ERROR_INTERRUPTED)
         return scene;
     *error = (struct fl_error){0};
+    strcpy(session->kept_name, session->name);
     return load(session, error);
 }
 
@@ -125,18 +134,30 @@ static void *open_all(void *argument)
     return NULL;
 }
 
-/* The next scene is another one, of another name: until it is there the old one stays. */
-static void *load_fresh(void *argument)
+/* Only what changed, into the scene that is there, unless it must be another one; until that is there the old one
+ * stays. */
+static void *read_again(void *argument)
 {
     struct session *session = argument;
-    session->fresh = load(session, &session->open_error);
+    struct fl_scene *before = session->scene;
+    const struct fl_load_options wanted = load_options(session);
+    const bool has_edits = session->options.edit_count > 0;
+    struct fl_scene *scene =
+        has_edits ? load(session, &session->open_error) : fl_scene_reload(before, &wanted, &session->open_error);
+    if (scene && has_edits)
+        fl_scene_destroy(before);
+    session->is_other = scene && scene != before;
+    if (session->is_other)
+        strcpy(session->kept_name, session->name);
+    session->scene = scene ? scene : before;
     atomic_store(&session->opened, true);
     return NULL;
 }
 
+/* The next scene that is loaded is another one than those that were. */
 static void name_scene(struct session *session)
 {
-    snprintf(session->kept_name, sizeof(session->kept_name), "view-%016" PRIx64, session->number++);
+    snprintf(session->name, sizeof(session->name), "view-%016" PRIx64, session->number++);
 }
 
 static bool begin_opening(struct session *session, void *(*open)(void *))
@@ -154,12 +175,11 @@ static void close_all(struct session *session)
 {
     fl_render_destroy(session->job);
     fl_view_destroy(session->view);
-    fl_scene_destroy(session->fresh);
     fl_scene_destroy(session->scene);
     fl_connection_destroy(session->connection);
     session->job = NULL;
     session->view = NULL;
-    session->scene = session->fresh = NULL;
+    session->scene = NULL;
     session->connection = NULL;
 }
 
@@ -177,26 +197,28 @@ static void lose(struct session *session, const struct fl_error *error, uint64_t
 }
 
 /* The view of the old scene ends with it. */
-static void take_fresh(struct session *session)
+static void take_other(struct session *session)
 {
     fl_render_destroy(session->job);
     fl_view_destroy(session->view);
-    fl_scene_destroy(session->scene);
     session->job = NULL;
     session->view = NULL;
-    session->scene = session->fresh;
-    session->fresh = NULL;
+    session->times_live++;
 }
 
 /* A file that cannot be read leaves everything as it was. */
-static bool keeps_scene(struct session *session)
+static bool end_reading(struct session *session)
 {
     const struct fl_error *error = &session->open_error;
-    if (!session->scene || session->fresh || error->code == FL_ERROR_CONNECTION ||
-        error->code == FL_ERROR_INTERRUPTED || error->code == FL_ERROR_NONE)
+    session->reads = false;
+    if (error->code == FL_ERROR_CONNECTION || error->code == FL_ERROR_INTERRUPTED)
         return false;
-    if (session->options.stale)
+    if (error->code == FL_ERROR_NONE)
+        session->times_read++;
+    else if (session->options.stale)
         session->options.stale(session->options.user, error);
+    if (session->is_other)
+        take_other(session);
     session->state = SESSION_LIVE;
     return true;
 }
@@ -206,12 +228,10 @@ static void end_opening(struct session *session, uint64_t now_ns)
     struct fl_error ignored; /* files beyond the memory are not watched */
     pthread_join(session->thread, NULL);
     session->has_thread = false;
-    if (keeps_scene(session))
-        return;
-    if (session->fresh)
-        take_fresh(session);
     if (session->options.watch && session->scene)
         cli_watch_scene(&session->watch, session->scene, &ignored);
+    if (session->reads && end_reading(session))
+        return;
     if (!session->scene || session->open_error.code != FL_ERROR_NONE) {
         const struct fl_error error = session->open_error;
         lose(session, &error, now_ns);
@@ -232,7 +252,8 @@ enum session_state session_step(struct session *session, uint64_t now_ns)
     } else if (session->state == SESSION_LIVE && session->options.watch &&
                cli_watch_has_changed(&session->watch, now_ns)) {
         name_scene(session);
-        if (!begin_opening(session, load_fresh))
+        session->reads = begin_opening(session, read_again);
+        if (!session->reads)
             session->state = SESSION_LIVE;
     } else if (session->state == SESSION_LOST && now_ns >= session->retry_ns) {
         if (!begin_opening(session, open_all))
@@ -297,6 +318,21 @@ unsigned session_times_live(const struct session *session)
     return session->times_live;
 }
 
+unsigned session_times_read(const struct session *session)
+{
+    return session->times_read;
+}
+
+bool session_reads(const struct session *session)
+{
+    return session->reads;
+}
+
+bool session_has_scene(const struct session *session)
+{
+    return session->reads || session->state == SESSION_LIVE;
+}
+
 const char *session_progress(struct session *session, double *share)
 {
     pthread_mutex_lock(&session->lock);
@@ -320,7 +356,7 @@ uint64_t session_retry_ns(const struct session *session)
 
 struct fl_scene *session_scene(struct session *session)
 {
-    return session->scene;
+    return session->has_thread ? NULL : session->scene;
 }
 
 bool session_is_local(const struct session *session)

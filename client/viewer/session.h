@@ -19,7 +19,7 @@ struct session_options {
     const struct fl_assignment *edits; /* of what is loaded, each time */
     size_t edit_count;
     const char *scene_name; /* .. or, not NULL, the scene to attach to */
-    bool watch;             /* the files are loaded again when they change: it becomes live anew */
+    bool watch;             /* the files are read again when they change */
     int interrupt_fd;
     void (*note)(void *user, const struct fl_note *note); /* of the first load; called from another thread */
     /* Why changed files could not be loaded: the scene stays as it was. */
@@ -41,6 +41,11 @@ enum session_state session_step(struct session *session, uint64_t now_ns);
 /* The number of times that it has become live: a new number means a new connection, or a new scene, of which
  * nothing is shown yet. */
 unsigned session_times_live(const struct session *session);
+/* The number of times that changed files were read. It became live with that, too, if they are another scene; else
+ * the scene is the same, and what it told of cameras and clips is not valid any more. */
+unsigned session_times_read(const struct session *session);
+bool session_reads(const struct session *session);     /* that happens now, in a thread, which has the scene */
+bool session_has_scene(const struct session *session); /* also while it is read again */
 /* The current activity (valid until the next call) and its progress: 0 to 1, 0 also if it is not known. */
 const char *session_progress(struct session *session, double *share);
 const struct fl_error *session_error(const struct session *session); /* why it was lost, or failed */
@@ -48,7 +53,7 @@ uint64_t session_retry_ns(const struct session *session);            /* SESSION_
 void session_destroy(struct session *session);
 
 /* The functions below need SESSION_LIVE; the next step notices a connection that is lost meanwhile. */
-struct fl_scene *session_scene(struct session *session);
+struct fl_scene *session_scene(struct session *session); /* NULL: in no other state there is one */
 bool session_is_local(const struct session *session);
 bool session_can_h264(const struct session *session);
 /* Shows it from now on. *change is the number that its frames have in fl_frame.change. */

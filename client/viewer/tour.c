@@ -34,6 +34,13 @@ int tour_clip(struct tour *tour, int step)
     return tour->clip;
 }
 
+void tour_stop(struct tour *tour)
+{
+    tour->clip = TOUR_NONE;
+    tour->time_s = tour->duration_s = 0;
+    tour->playing = false;
+}
+
 void tour_set_duration(struct tour *tour, double duration_s)
 {
     tour->duration_s = duration_s;

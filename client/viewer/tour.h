@@ -24,6 +24,7 @@ int tour_camera(struct tour *tour, int step);
 /* `step` clips forwards or back; between the last and the first no clip is chosen. Starts playing. */
 int tour_clip(struct tour *tour, int step);
 /* Of the clip that was chosen. */
+void tour_stop(struct tour *tour); /* no clip is chosen then */
 void tour_set_duration(struct tour *tour, double duration_s);
 void tour_play(struct tour *tour); /* or pauses */
 void tour_change_speed(struct tour *tour, int doublings);

@@ -56,18 +56,51 @@ static bool settle(struct viewer *viewer, struct fl_error *error)
     return true;
 }
 
-/* A model that was loaded again may have lost cameras and clips. */
+static int camera_of_name(const struct fl_scene *scene, const char *name)
+{
+    for (size_t i = 0; i < fl_scene_camera_count(scene); i++)
+        if (strcmp(fl_scene_camera(scene, i)->name, name) == 0)
+            return (int)i;
+    return TOUR_NONE;
+}
+
+static int clip_of_name(const struct fl_scene *scene, const char *name)
+{
+    for (size_t i = 0; i < fl_scene_clip_count(scene); i++)
+        if (strcmp(fl_scene_clip(scene, i)->name, name) == 0)
+            return (int)i;
+    return TOUR_NONE;
+}
+
+/* A model that was loaded again may have other cameras and clips; where there are as many, names may be new. */
 static void fit_tour(struct viewer *viewer)
 {
     const struct fl_scene *scene = session_scene(viewer->session);
     const size_t cameras = fl_scene_camera_count(scene), clips = fl_scene_clip_count(scene);
     struct tour *tour = &viewer->tour;
-    if (tour->camera_count == cameras && tour->clip_count == clips)
-        return;
-    const double speed = tour->speed;
-    tour_begin(tour, cameras, clips);
-    tour->speed = speed;
-    viewer->followed = 0;
+    if (tour->camera_count != cameras || tour->clip_count != clips) {
+        tour->camera = tour->camera != TOUR_NONE ? camera_of_name(scene, viewer->camera_name) : TOUR_NONE;
+        tour->clip = tour->clip != TOUR_NONE ? clip_of_name(scene, viewer->clip_name) : TOUR_NONE;
+        tour->camera_count = cameras;
+        tour->clip_count = clips;
+        viewer->followed = 0;
+        viewer->must_show = true;
+    }
+    if (tour->clip == TOUR_NONE)
+        tour_stop(tour);
+    else
+        tour_set_duration(tour, (double)fl_scene_clip(scene, (size_t)tour->clip)->duration_s);
+}
+
+/* Of the scene that is shown: the view goes on. */
+static void take_changes(struct viewer *viewer)
+{
+    const struct fl_import_stats *stats = fl_scene_import_stats(session_scene(viewer->session));
+    fit_tour(viewer);
+    viewer->times_read = session_times_read(viewer->session);
+    viewer_edit_read_again(viewer, true);
+    viewer_say(viewer, "%.60s is read again; sent %.3f of %.3f MB", viewer_scene_name(viewer),
+               (double)stats->uploaded_bytes * 1e-6, (double)stats->offered_bytes * 1e-6);
 }
 
 static void begin_showing(struct viewer *viewer)
@@ -75,7 +108,10 @@ static void begin_showing(struct viewer *viewer)
     if (viewer->times_live == 0 && !settle(viewer, &viewer->failure))
         return;
     fit_tour(viewer);
+    if (viewer->times_live > 0)
+        viewer_edit_read_again(viewer, viewer->times_read == session_times_read(viewer->session));
     viewer->times_live = session_times_live(viewer->session);
+    viewer->times_read = session_times_read(viewer->session);
     viewer_drop_tasks(viewer);
     viewer->metrics = (struct metrics){0}; /* another daemon has another clock */
     viewer->has_looked = viewer->told_moving = false;
@@ -139,11 +175,14 @@ static void serve(struct viewer *viewer, uint64_t now_ns)
     }
     if (viewer->times_live != session_times_live(viewer->session))
         begin_showing(viewer);
+    else if (viewer->times_read != session_times_read(viewer->session))
+        take_changes(viewer);
     if (viewer->failure.code != FL_ERROR_NONE)
         return;
     viewer_tell(viewer, now_ns);
     viewer_receive(viewer, wait_ms);
     viewer_step_tasks(viewer);
+    viewer_step_outline(viewer);
     viewer_step_edit(viewer, now_ns);
 }
 
@@ -253,6 +292,7 @@ static void close_viewer(struct viewer *viewer)
     pixmap_finish(&viewer->compared);
     pixmap_finish(&viewer->heat);
     viewer_edit_forget(viewer);
+    viewer_outline_forget(viewer);
     replay_finish(&viewer->replay);
 }
 

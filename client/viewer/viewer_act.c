@@ -15,6 +15,7 @@ void viewer_choose_clip(struct viewer *viewer, int clip)
     const struct fl_clip_info *info =
         clip != TOUR_NONE ? fl_scene_clip(session_scene(viewer->session), (size_t)clip) : NULL;
     tour_set_duration(&viewer->tour, info ? (double)info->duration_s : 0);
+    snprintf(viewer->clip_name, sizeof(viewer->clip_name), "%s", info ? info->name : "");
     viewer->must_show = true;
     viewer->moved_ns = monotonic_now_ns();
 }
@@ -41,7 +42,9 @@ static void next_camera(struct viewer *viewer, int step)
         viewer_say(viewer, "the scene has no cameras");
         return;
     }
-    viewer->camera_node = fl_scene_camera(session_scene(viewer->session), (size_t)camera)->node;
+    const struct fl_camera_info *info = fl_scene_camera(session_scene(viewer->session), (size_t)camera);
+    viewer->camera_node = info->node;
+    snprintf(viewer->camera_name, sizeof(viewer->camera_name), "%s", info->name);
     viewer->wanted = TASK_CAMERA;
 }
 
@@ -208,12 +211,12 @@ static bool has_come(const struct viewer *viewer, const struct replay_event *eve
     switch (event->kind) {
     case REPLAY_REST:
         return is_live && viewer_is_at_rest(viewer, event->samples) && viewer->task == TASK_NONE &&
-               viewer->wanted == TASK_NONE &&
+               viewer->wanted == TASK_NONE && !viewer_outline_is_due(viewer) &&
                (!viewer->settings.error_map || viewer->has_heat || viewer->heat_refused);
     case REPLAY_LIVE:
         return is_live && viewer->has_camera && viewer->frames > 0;
     case REPLAY_LOST:
-        return viewer->times_live > 0 && !session_scene(viewer->session);
+        return viewer->times_live > 0 && !session_has_scene(viewer->session);
     case REPLAY_CHANGE:
         return session_scene(viewer->session) &&
                fl_scene_revision(session_scene(viewer->session)) > viewer->replay_revision;
@@ -239,7 +242,9 @@ void viewer_replay(struct viewer *viewer, uint64_t now_ns)
     const struct viewer_edit *edit = &viewer->edit;
     while (viewer->replay_next < viewer->replay.count && viewer->failure.code == FL_ERROR_NONE) {
         const struct replay_event *event = &viewer->replay.events[viewer->replay_next];
-        /* What follows an edit finds it made; but a drag goes on meanwhile. */
+        /* What follows an edit or a change of files finds it made; but a drag goes on meanwhile. */
+        if (session_reads(viewer->session))
+            return;
         if ((edit->works || edit->has_pending) && !(edit->dragging && event->kind == REPLAY_INPUT))
             return;
         const uint64_t due_ns = viewer->replay_ns + (uint64_t)(event->after_s * 1e9);

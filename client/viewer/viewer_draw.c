@@ -13,21 +13,18 @@
 
 const struct pixmap *viewer_picture(const struct viewer *viewer)
 {
+    if (viewer_outline_is_shown(viewer))
+        return &viewer->outline.picture;
     return viewer->has_heat ? &viewer->heat : viewer->shows_made ? &viewer->made : &viewer->live;
 }
 
 static void fill_names(struct viewer *viewer, struct hud_state *state)
 {
     const struct viewer_options *options = viewer->options;
-    struct fl_scene *scene = session_scene(viewer->session);
-    const struct tour *tour = &viewer->tour;
     state->scene = viewer_scene_name(viewer);
     state->server = options->server ? options->server : "";
-    state->camera = state->clip = "";
-    if (scene && tour->camera != TOUR_NONE)
-        state->camera = fl_scene_camera(scene, (size_t)tour->camera)->name;
-    if (scene && tour->clip != TOUR_NONE)
-        state->clip = fl_scene_clip(scene, (size_t)tour->clip)->name;
+    state->camera = viewer->tour.camera != TOUR_NONE ? viewer->camera_name : "";
+    state->clip = viewer->tour.clip != TOUR_NONE ? viewer->clip_name : "";
 }
 
 static void fill_status(struct viewer *viewer, struct hud_state *state)
@@ -41,7 +38,7 @@ static void fill_status(struct viewer *viewer, struct hud_state *state)
         state->status_text = viewer->refused;
         return;
     }
-    if (session_scene(viewer->session)) {
+    if (session_has_scene(viewer->session)) {
         state->status = viewer->frames > 0 ? HUD_LIVE : HUD_LOADING;
         snprintf(text, sizeof(text), "rendering the first picture");
         return;

@@ -14,8 +14,8 @@
 #define METRES_OF_EXTENT 0.01      /* a step of a length */
 
 static const enum protocol_object_kind kinds[EDIT_TABS] = {PROTOCOL_OBJECT_NODE, PROTOCOL_OBJECT_MATERIAL,
-                                                           PROTOCOL_OBJECT_LIGHT};
-static const char *const tab_names[EDIT_TABS] = {"node", "material", "light"};
+                                                           PROTOCOL_OBJECT_LIGHT, PROTOCOL_OBJECT_ENVIRONMENT};
+static const char *const tab_names[EDIT_TABS] = {"node", "material", "light", "environment"};
 
 static void say(struct viewer *viewer, const struct fl_error *refusal)
 {
@@ -92,15 +92,15 @@ void viewer_edit_stop_typing(struct viewer_edit *edit)
 void viewer_edit_choose_tab(struct viewer *viewer, size_t tab)
 {
     struct viewer_edit *edit = &viewer->edit;
-    if (edit->works)
+    if (viewer_edit_must_wait(viewer))
         return;
     viewer_edit_stop_typing(edit);
     edit->tab = tab % EDIT_TABS;
     edit->chosen = 0;
     forget_objects(edit);
-    /* Lights are not seen: the first one is there to begin with. */
-    if (edit->tab == EDIT_LIGHT && edit->ids[EDIT_LIGHT] == 0 && list_objects(viewer) && edit->object_count > 0)
-        edit->ids[EDIT_LIGHT] = edit->objects[0].id;
+    /* What cannot be picked: the first one is there to begin with. */
+    if (edit->tab >= EDIT_LIGHT && edit->ids[edit->tab] == 0 && list_objects(viewer) && edit->object_count > 0)
+        edit->ids[edit->tab] = edit->objects[0].id;
     read_object(viewer);
 }
 
@@ -111,9 +111,26 @@ void viewer_edit_object(struct viewer *viewer, uint32_t node, uint32_t material)
     edit->ids[EDIT_MATERIAL] = material;
     edit->shown = true;
     measure(viewer);
-    viewer_edit_choose_tab(viewer, edit->tab != EDIT_LIGHT && edit->ids[edit->tab] != 0 ? edit->tab
-                                   : material != 0                                      ? EDIT_MATERIAL
-                                                                                        : EDIT_NODE);
+    viewer_edit_choose_tab(viewer, edit->tab < EDIT_LIGHT && edit->ids[edit->tab] != 0 ? edit->tab
+                                   : material != 0                                     ? EDIT_MATERIAL
+                                                                                       : EDIT_NODE);
+}
+
+void viewer_edit_read_again(struct viewer *viewer, bool is_same)
+{
+    struct viewer_edit *edit = &viewer->edit;
+    forget_objects(edit);
+    if (!is_same) {
+        edit_history_clear(&edit->history);
+        memset(edit->ids, 0, sizeof(edit->ids));
+        edit->picked = 0;
+        edit->has_state = false;
+        viewer_edit_stop_typing(edit);
+    }
+    if (edit->shown && is_same)
+        read_object(viewer);
+    else if (edit->shown)
+        viewer_edit_choose_tab(viewer, edit->tab);
 }
 
 void viewer_edit_forget(struct viewer *viewer)
@@ -168,7 +185,7 @@ void viewer_edit_choose_node_of_light(struct viewer *viewer)
     struct fl_error refusal = {0};
     struct fl_object *nodes = NULL;
     size_t count = 0;
-    if (edit->works)
+    if (viewer_edit_must_wait(viewer))
         return;
     if (!session_objects(viewer->session, PROTOCOL_OBJECT_NODE, &nodes, &count, &refusal))
         say(viewer, &refusal);
@@ -224,6 +241,11 @@ static void end_work(struct viewer *viewer)
     free(done->change.list);
 }
 
+bool viewer_edit_must_wait(const struct viewer *viewer)
+{
+    return viewer->edit.works || session_reads(viewer->session);
+}
+
 bool viewer_edit_works(struct viewer *viewer, bool wait)
 {
     struct viewer_edit *edit = &viewer->edit;
@@ -253,7 +275,7 @@ bool viewer_edit_has_field(const struct viewer_edit *edit)
 void viewer_edit_step(struct viewer *viewer, double steps)
 {
     struct viewer_edit *edit = &viewer->edit;
-    if (edit->works || edit->has_pending)
+    if (viewer_edit_must_wait(viewer) || edit->has_pending)
         return;
     if (edit->chosen == 0)
         choose_object(viewer, steps > 0 ? 1 : -1);
@@ -266,7 +288,7 @@ void viewer_edit_undo(struct viewer *viewer, bool redo)
 {
     struct viewer_edit *edit = &viewer->edit;
     struct edit_change change;
-    if (edit->works)
+    if (viewer_edit_must_wait(viewer))
         return;
     if (!edit_history_take(&edit->history, redo, &change)) {
         viewer_say(viewer, "there is nothing to %s", redo ? "redo" : "undo");
@@ -278,7 +300,7 @@ void viewer_edit_undo(struct viewer *viewer, bool redo)
 void viewer_edit_toggle(struct viewer *viewer)
 {
     struct viewer_edit *edit = &viewer->edit;
-    if (edit->works)
+    if (viewer_edit_must_wait(viewer))
         return;
     edit->shown = !edit->shown;
     if (!edit->shown)
@@ -310,6 +332,8 @@ static void show_which(const struct viewer_edit *edit, struct hud_edit_row *row)
     if (edit->tab == EDIT_NODE)
         snprintf(row->value, sizeof(row->value),
                  edit->ids[EDIT_NODE] == edit->picked ? "picked" : "group around it");
+    else if (edit->tab == EDIT_ENVIRONMENT)
+        snprintf(row->value, sizeof(row->value), "the only one");
     else if (edit->objects)
         snprintf(row->value, sizeof(row->value), "%zu of %zu", index_of(edit) + 1, edit->object_count);
     else
@@ -328,14 +352,17 @@ const struct hud_edit *viewer_edit_hud(struct viewer *viewer)
         return hud;
     }
     const char *name = edit->state.name;
-    snprintf(hud->title, sizeof(hud->title), "%.60s%s#%u", name, name[0] != '\0' ? "  " : "", edit->state.id);
+    if (edit->tab == EDIT_ENVIRONMENT)
+        snprintf(hud->title, sizeof(hud->title), "environment");
+    else
+        snprintf(hud->title, sizeof(hud->title), "%.60s%s#%u", name, name[0] != '\0' ? "  " : "", edit->state.id);
     hud->count = edit->row_count + 1;
     show_which(edit, &hud->rows[0]);
     for (size_t i = 0; i < edit->row_count; i++)
         edit_row_show(&edit->state, edit->rows[i], &hud->rows[i + 1]);
-    static const char *const others[EDIT_TABS] = {"Left: the group around it, Right: back",
-                                                  "Left, Right: another one",
-                                                  "Left, Right: another one; Return: its node"};
+    static const char *const others[EDIT_TABS] = {
+        "Left: the group around it, Right: back", "Left, Right: another one",
+        "Left, Right: another one; Return: its node", "light from far away, all around the scene"};
     hud->hint = edit->chosen > 0 ? edit_row_hint(&edit->state, edit->rows[edit->chosen - 1]) : others[edit->tab];
     hud->typed = edit->typing ? edit->typed : NULL;
     return hud;

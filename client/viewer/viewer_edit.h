@@ -13,7 +13,7 @@
 struct session;
 struct viewer;
 
-enum viewer_edit_tab { EDIT_NODE, EDIT_MATERIAL, EDIT_LIGHT, EDIT_TABS };
+enum viewer_edit_tab { EDIT_NODE, EDIT_MATERIAL, EDIT_LIGHT, EDIT_ENVIRONMENT, EDIT_TABS };
 #define EDIT_ROWS_MAX (HUD_EDIT_ROWS_MAX - 1) /* the first says which object it is */
 
 /* The object that is edited. */
@@ -65,10 +65,14 @@ bool viewer_edit_input(struct viewer *viewer, const struct input *input);
 void viewer_step_edit(struct viewer *viewer, uint64_t now_ns);
 /* Whether the connection is in use by an edit; `wait`: until it is not. */
 bool viewer_edit_works(struct viewer *viewer, bool wait);
+bool viewer_edit_must_wait(
+    const struct viewer *viewer);               /* it is in use by that, or by a file that is read again */
 void viewer_edit_forget(struct viewer *viewer); /* of a scene that is gone */
+/* Its files have changed: they are the same scene, or another one, of which nothing is chosen yet. */
+void viewer_edit_read_again(struct viewer *viewer, bool is_same);
 const struct hud_edit *viewer_edit_hud(struct viewer *viewer);
 
-/* ---- from input to it: nothing happens while an edit works ---- */
+/* ---- from input to it: nothing happens while it must wait ---- */
 
 void viewer_edit_choose_tab(struct viewer *viewer, size_t tab);
 void viewer_edit_choose_node_of_light(struct viewer *viewer);

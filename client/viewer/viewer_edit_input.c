@@ -17,7 +17,7 @@ static void end_typing(struct viewer *viewer)
     struct viewer_edit *edit = &viewer->edit;
     struct fl_error error = {0};
     double value;
-    if (edit->works)
+    if (viewer_edit_must_wait(viewer))
         return;
     if (edit->typed[0] != '\0' &&
         edit_row_read(&edit->state, edit->rows[edit->chosen - 1], edit->typed, &value, &error))
@@ -45,7 +45,7 @@ static bool press(struct viewer *viewer, const struct input *input)
     struct hud_edit_hit hit;
     hud_edit_find(viewer_edit_hud(viewer), viewer->width, viewer->height, viewer->scale, input->x, input->y, &hit);
     /* What begins must wait until the daemon has the last change. */
-    if (!hit.is_panel || input->button != INPUT_LEFT || edit->works || edit->has_pending)
+    if (!hit.is_panel || input->button != INPUT_LEFT || viewer_edit_must_wait(viewer) || edit->has_pending)
         return hit.is_panel;
     viewer_edit_stop_typing(edit);
     if (hit.part == HUD_EDIT_TAB)
@@ -128,7 +128,7 @@ static bool is_on_panel(struct viewer *viewer, double x, double y)
 bool viewer_edit_input(struct viewer *viewer, const struct input *input)
 {
     struct viewer_edit *edit = &viewer->edit;
-    if (!edit->shown || viewer->settings.help || !session_scene(viewer->session))
+    if (!edit->shown || viewer->settings.help || !session_has_scene(viewer->session))
         return false;
     viewer->must_draw = true;
     switch (input->kind) {

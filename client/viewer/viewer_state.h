@@ -15,11 +15,12 @@
 /* What a job beside the view is for. */
 enum viewer_task {
     TASK_NONE,
-    TASK_HOME,     /* the initial camera, from the command line, the model or the scene's extent */
-    TASK_CAMERA,   /* where a camera of the scene is */
-    TASK_FOCUS,    /* where what is under the pointer is */
-    TASK_PICK,     /* which object it is */
-    TASK_REFERENCE /* the resting picture, by the reference */
+    TASK_HOME,      /* the initial camera, from the command line, the model or the scene's extent */
+    TASK_CAMERA,    /* where a camera of the scene is */
+    TASK_FOCUS,     /* where what is under the pointer is */
+    TASK_PICK,      /* which object it is */
+    TASK_REFERENCE, /* the resting picture, by the reference */
+    TASK_OUTLINE    /* where in it is what the panel changes */
 };
 
 struct viewer {
@@ -27,6 +28,7 @@ struct viewer {
     struct message_render view; /* of one eye: from the options, completed by the scene */
     struct session *session;
     unsigned times_live;        /* of the session, as of when its view was started */
+    unsigned times_read;        /* likewise; what is known of cameras and clips is as of then */
     char *model;                /* that was dropped, and is shown; NULL: that of the options */
     struct session *next;       /* that of a dropped model, until it is there; NULL: there is none */
     char *next_model;           /* its path */
@@ -39,6 +41,7 @@ struct viewer {
     struct settings settings, taken; /* `taken`: with which frames came */
     struct settings first;           /* as they were at first */
     struct tour tour;
+    char camera_name[129], clip_name[129]; /* of those that the tour is at */
     struct controls controls;
     double pointer_x, pointer_y;
 
@@ -92,6 +95,17 @@ struct viewer {
     bool has_heat, heat_refused;
 
     struct viewer_edit edit;
+    struct viewer_outline {
+        uint64_t command, change, revision; /* of the picture .. */
+        size_t tab;
+        uint32_t id; /* .. and the object that it was asked for last */
+        bool is_answered;
+        uint8_t *marks; /* its pixels; NULL: there is none */
+        int width, height;
+        struct pixmap picture; /* the live one with it, .. */
+        uint64_t of_version;   /* .. of which it is this version, .. */
+        bool is_drawn;         /* .. once it is there */
+    } outline;
 
     char notice[HUD_TEXT_MAX];
     uint64_t notice_ns; /* until then */
@@ -171,6 +185,18 @@ bool viewer_follows(const struct viewer *viewer);
 uint32_t viewer_primary(const struct viewer *viewer);
 uint32_t viewer_home_node(const struct viewer *viewer); /* of the initial camera; 0: it is none of the scene's */
 
+/* ---- viewer_outline.c ---- */
+
+bool viewer_outline_is_due(const struct viewer *viewer);   /* it can be asked for, and was not yet */
+bool viewer_outline_is_asked(const struct viewer *viewer); /* what was asked for is what is wanted */
+/* Completes a request for identifiers. */
+void viewer_outline_ask(struct viewer *viewer, struct message_render *job);
+void viewer_outline_take(struct viewer *viewer, const struct fl_frame *frame);
+void viewer_outline_refuse(struct viewer *viewer); /* this picture has none */
+bool viewer_outline_is_shown(const struct viewer *viewer);
+void viewer_step_outline(struct viewer *viewer);
+void viewer_outline_forget(struct viewer *viewer);
+
 /* ---- viewer_act.c ---- */
 
 void viewer_input(struct viewer *viewer, const struct input *input);
@@ -180,7 +206,7 @@ void viewer_choose_clip(struct viewer *viewer, int clip);
 
 /* ---- viewer_draw.c ---- */
 
-const struct pixmap *viewer_picture(const struct viewer *viewer); /* the live one, or the error map */
+const struct pixmap *viewer_picture(const struct viewer *viewer); /* that is shown */
 void viewer_hud(struct viewer *viewer, struct hud_state *state);
 bool viewer_screenshot(struct viewer *viewer, const char *path, struct fl_error *error);
 void viewer_print_state(struct viewer *viewer, const char *name);

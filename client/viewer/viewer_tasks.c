@@ -110,6 +110,16 @@ static void aim(const struct viewer *viewer, struct record_camera_key *key)
     fill_key(&camera, key);
 }
 
+/* That of the view. */
+static void use_camera(const struct viewer *viewer, struct message_render *job, struct record_camera_key *key)
+{
+    fill_key(&viewer->camera, key);
+    if (viewer_follows(viewer))
+        use_node(job, viewer->followed);
+    else
+        use_key(job, key);
+}
+
 /* All but the tracer as in the view. */
 static void fill_reference(const struct viewer *viewer, struct message_render *job, struct record_camera_key *key)
 {
@@ -126,11 +136,13 @@ static void fill_reference(const struct viewer *viewer, struct message_render *j
     viewer_use_eyes(viewer, job);
     job->view_source = PROTOCOL_VIEW_SOURCE_RAYS; /* what layers lack is an error, too */
     job->encoding = session_is_local(viewer->session) ? PROTOCOL_ENCODING_RAW : PROTOCOL_ENCODING_PREDICTED;
-    fill_key(&viewer->camera, key);
-    if (viewer_follows(viewer))
-        use_node(job, viewer->followed);
-    else
-        use_key(job, key);
+    use_camera(viewer, job, key);
+}
+
+static void ask_for_ids(struct message_render *job)
+{
+    job->layers = 1u << PROTOCOL_LAYER_ID;
+    job->tracer = PROTOCOL_TRACER_BVH; /* sampled tracers do not know nodes */
 }
 
 static bool ask(struct viewer *viewer, enum viewer_task task, struct fl_error *refusal)
@@ -144,14 +156,18 @@ static bool ask(struct viewer *viewer, enum viewer_task task, struct fl_error *r
         use_node(&job, viewer->camera_node);
         break;
     case TASK_PICK:
-        job.layers = 1u << PROTOCOL_LAYER_ID;
-        job.tracer = PROTOCOL_TRACER_BVH; /* sampled tracers do not know nodes */
+        ask_for_ids(&job);
         aim(viewer, &key);
         use_key(&job, &key);
         break;
     case TASK_FOCUS:
         aim(viewer, &key);
         use_key(&job, &key);
+        break;
+    case TASK_OUTLINE:
+        ask_for_ids(&job);
+        viewer_outline_ask(viewer, &job);
+        use_camera(viewer, &job, &key);
         break;
     case TASK_REFERENCE:
         if (!pixmap_copy(&viewer->compared, &viewer->live, refusal))
@@ -254,6 +270,8 @@ static void take(struct viewer *viewer, struct fl_frame *frame)
         take_pick(viewer, frame);
     else if (task == TASK_REFERENCE)
         take_reference(viewer, frame);
+    else if (task == TASK_OUTLINE)
+        viewer_outline_take(viewer, frame);
     else
         take_camera(viewer, task, frame);
     fl_frame_destroy(frame);
@@ -264,6 +282,10 @@ static void refuse(struct viewer *viewer, enum viewer_task task, const struct fl
     viewer->task = TASK_NONE;
     if (refusal->code == FL_ERROR_NONE) /* the connection is lost */
         return;
+    if (task == TASK_OUTLINE) {
+        viewer_outline_refuse(viewer);
+        return;
+    }
     viewer_say(viewer, "not possible: %s", refusal->text);
     if (task == TASK_REFERENCE)
         viewer->heat_refused = true;
@@ -292,13 +314,17 @@ static enum viewer_task next_task(struct viewer *viewer)
     if (viewer->settings.error_map && !viewer->has_heat && !viewer->heat_refused &&
         viewer_is_at_rest(viewer, COMPARED_SAMPLES))
         return TASK_REFERENCE;
-    return TASK_NONE;
+    return viewer_outline_is_due(viewer) ? TASK_OUTLINE : TASK_NONE;
 }
 
 void viewer_step_tasks(struct viewer *viewer)
 {
     struct fl_error refusal = {0};
     /* An answer for another picture is discarded. */
+    if (viewer->task == TASK_OUTLINE && !viewer_outline_is_asked(viewer)) {
+        session_give_up(viewer->session);
+        viewer->task = TASK_NONE;
+    }
     if (!viewer->settings.error_map || !is_compared(viewer)) {
         viewer->must_draw = viewer->must_draw || viewer->has_heat;
         viewer->has_heat = viewer->heat_refused = false;

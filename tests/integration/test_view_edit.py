@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: MIT
 """Editing in the viewer: what is picked is changed and changed back, and two viewers at one scene see each other's changes."""
+import json
+import math
 import shutil
 import signal
 import subprocess
 
-from farlight_test import BIN, bundled_scenes, read_png
-from test_view import HIDE, Viewer, difference, error_of, rest
+from farlight_test import BIN, Daemon, bundled_scenes, read_png
+from test_view import HIDE, Relay, Viewer, change_model, difference, drag, error_of, rest
 
 POT = (160, 80)  # in the middle of the teapot
 ABOVE_NOTICES = 120  # rows
@@ -29,6 +31,22 @@ def typed(number):
 
 class Editing(Viewer):
     edit = None
+
+    def two_viewers(self, first, second):
+        """Their states at one scene; the second one begins when the first one has told a state."""
+        address = f"unix:{self.folder}/up"
+        command = [BIN / "farlight", "serve", bundled_scenes() / "teapot.glb", "--name", "pot", "--listen", address]
+        with subprocess.Popen(list(map(str, command)), stdout=subprocess.PIPE, text=True) as server:
+            try:
+                while "farlight view" not in (line := server.stdout.readline()):
+                    self.assertNotEqual(line, "")
+                options = ["--headless", "--scene", "pot", "--server", address, *QUICK]
+                waiting = self.start(first, *options, scene=None)
+                self.assertIn("state", waiting.stdout.readline())
+                other = self.replay(second, *options, scene=None)
+                return self.end(waiting), other
+            finally:
+                server.send_signal(signal.SIGTERM)
 
     def picked(self):
         """The material at the pot, as the panel shows it."""
@@ -55,6 +73,36 @@ class Editing(Viewer):
         self.assertGreater(error_of(before, red), 2 * sum(map(len, before)))
         self.assertEqual(before, undone)
         self.assertEqual(red, redone)
+
+    def test_what_is_changed_has_an_outline_at_rest_while_the_panel_is_open(self):
+        size, left = (640, 360), 640 - 12 - 376  # of the panel
+        states = self.replay([rest(2), *HIDE, {"screenshot": "without.png"}, *pick(128, 180), rest(2), {"screenshot": "picked.png"},
+                              {"key": "tab"}, {"screenshot": "light.png"}, {"key": "tab", "shift": True},
+                              *drag(60, 340, 12, 0), {"state": "moving"}, {"screenshot": "moving.png"}, rest(2), {"screenshot": "moved.png"},
+                              {"state": "moved"}, {"key": "n"}, {"screenshot": "closed.png"}], *QUICK, size=size)
+        self.assertEqual((states["moving"]["eye"], states["moved"]["edit"]["name"]), (states["moved"]["eye"], "red"))
+
+        def pixels(name):
+            _, _, rows, channels = read_png(self.folder / f"{name}.png")
+            return {(x, y): tuple(row[channels * x:channels * x + 3]) for y, row in enumerate(rows) for x in range(left)}
+
+        def line(name, other):
+            a, b = pixels(name), pixels(other)
+            return {place: a[place] for place in a if a[place] != b[place]}
+
+        self.assertEqual(line("light", "without"), {})
+        self.assertNotIn((255, 190, 92), pixels("moving").values())
+        for name, other in (("picked", "without"), ("moved", "closed")):
+            found = line(name, other)
+            self.assertEqual(set(found.values()), {(255, 190, 92)})
+            # Of the red ball alone, not of its mirror image below it: beyond its ellipse by two pixels across and down. One pixel more, as
+            # rays go through no pixel's centre.
+            (x0, x1), (y0, y1) = ((min(along), max(along)) for along in zip(*found))
+            across, down = (x1 - x0) / 2, (y1 - y0) / 2
+            self.assertTrue(all(abs(half - 48) < 6 for half in (across, down)), (across, down))
+            beyond = [math.hypot((x - x0 - across) / across, (y - y0 - down) / down) * down - down for x, y in found]
+            self.assertGreater(min(beyond), -2 - 1)
+            self.assertLess(max(beyond), 2 * math.sqrt(2) - 2 + 1)
 
     def test_a_drag_is_one_change_and_nodes_and_lights_are_edited_too(self):
         edit = self.picked()
@@ -90,6 +138,39 @@ class Editing(Viewer):
         self.replay([rest(1)], "--edit", "material.nothing.roughness=1", status=2)
         self.assertIn("no material 'nothing'", self.errors)
 
+    def test_what_changes_in_the_file_is_sent_alone_and_the_view_goes_on(self):
+        """Camera, clip, selection and undo are kept, and so are edits of what the file does not change."""
+        model = self.folder / "carousel.glb"
+        shutil.copy(bundled_scenes() / "carousel.glb", model)
+
+        def repaint(scene):
+            scene["materials"][0]["pbrMetallicRoughness"]["baseColorFactor"] = [0.9, 0.1, 0.1, 1]  # the floor's
+
+        # One step of the clip: the pot is still where it is picked.
+        events = [rest(1), *drag(160, 90, 40, 10), {"key": "v"}, {"key": "space"}, {"key": "right"}, rest(1), *pick(200, 108), rest(1),
+                  {"state": "picked"}, *[{"key": "down"}] * 4, *typed("0.9"), rest(2), *HIDE, {"screenshot": "before.png"},
+                  {"state": "before"}, {"wait": "change"}, {"state": "changed"}, rest(2), {"screenshot": "after.png"}, {"state": "after"},
+                  {"key": "z"}, rest(2), {"state": "undone"}]
+        with Daemon() as daemon, Relay(daemon.path, self.folder / "relay") as relay:
+            process = self.start(events, model, "--watch", "--headless", "--server", f"unix:{self.folder}/relay", *QUICK, scene=None)
+            states = [json.loads(process.stdout.readline()) for _ in range(2)]
+            first = relay.sent
+            change_model(model, model, repaint)
+            states += self.end(process).values()
+            again = relay.sent - first
+        picked, before, changed, after, undone = states
+        self.assertGreater(first, 1_000_000)
+        self.assertLess(again, 20_000)  # cameras and questions, each a few hundred bytes
+        self.assertEqual([state["times_live"] for state in states], [1] * 5)
+        self.assertIn("nodes rebuilt 0, nodes refitted 0", after["structure"][0])
+        for kept in ("eye", "look_at", "clip", "time_s", "edit"):
+            self.assertEqual(before[kept], after[kept])
+        self.assertGreater(before["time_s"], 0)
+        self.assertGreater(difference(self.folder / "before.png", self.folder / "after.png"), 5)
+        self.assertIn("carousel.glb is read again; sent 0.000 of", changed["notice"])
+        self.assertNotEqual(after["edit"]["fields"]["base_colour"], picked["edit"]["fields"]["base_colour"])
+        self.assertEqual(undone["edit"]["fields"], picked["edit"]["fields"])
+
     def test_two_viewers_see_what_the_other_one_changes(self):
         keys = choose(self.picked(), "base_colour")
         begin = [rest(2), *HIDE, *pick(*POT), rest(2), {"state": "picked"}]
@@ -98,21 +179,32 @@ class Editing(Viewer):
                  *end, {"screenshot": "first.png"}]
         second = [*begin, *keys, *typed("0.9"), {"state": "mine"}, change, {"after": 0.5}, {"state": "changed"}, *end,
                   {"screenshot": "second.png"}]
-        address = f"unix:{self.folder}/up"
-        command = [BIN / "farlight", "serve", bundled_scenes() / "teapot.glb", "--name", "pot", "--listen", address]
-        with subprocess.Popen(list(map(str, command)), stdout=subprocess.PIPE, text=True) as server:
-            try:
-                while "farlight view" not in (line := server.stdout.readline()):
-                    self.assertNotEqual(line, "")
-                options = ["--headless", "--scene", "pot", "--server", address, *QUICK]
-                waiting = self.start(first, *options, scene=None)
-                self.assertIn("picked", waiting.stdout.readline())
-                other = self.replay(second, *options, scene=None)
-                states = self.end(waiting)
-            finally:
-                server.send_signal(signal.SIGTERM)
+        states, other = self.two_viewers(first, second)
         for state in (states["changed"], other["mine"]):
             self.assertAlmostEqual(state["edit"]["fields"]["base_colour"][0], 0.9, 6)
         for state in (states["mine"], other["changed"]):  # each keeps what the other one has changed
             self.assertEqual([round(value, 5) for value in state["edit"]["fields"]["base_colour"][:2]], [0.9, 0.8])
         self.assertEqual(difference(self.folder / "first.png", self.folder / "second.png"), 0)
+
+    def test_the_environment_is_edited_before_the_eyes_of_all(self):
+        begin, end = [rest(2), *HIDE, {"key": "n"}, {"key": "tab"}], [{"key": "n"}, rest(2)]
+        first = [*begin, {"state": "open"}, {"wait": "change"}, {"after": 0.5}, {"state": "changed"}, *end, {"screenshot": "first.png"}]
+        second = [*begin, {"key": "down"}, *typed("0.5"), {"state": "mine"}, *end, {"screenshot": "second.png"}]
+        states, other = self.two_viewers(first, second)
+        for state in (other["mine"], states["changed"]):
+            self.assertEqual(state["edit"]["kind"], "environment")
+            self.assertEqual(state["edit"]["fields"]["colour"], [0.5] * 3)
+        self.assertEqual(difference(self.folder / "first.png", self.folder / "second.png"), 0)
+
+    def test_undoing_returns_the_environment_as_it_was(self):
+        """The scene has a black one, which an intensity makes white."""
+        states = self.replay([rest(2), *HIDE, {"screenshot": "before.png"}, {"key": "n"}, {"key": "tab"}, {"state": "before"}, {"key": "down"},
+                              *typed("0.5"), {"key": "n"}, rest(2), {"screenshot": "lit.png"}, {"key": "n"}, *[{"key": "down"}] * 5,
+                              *typed("40"), {"state": "turned"}, {"key": "z"}, {"key": "z"}, {"state": "undone"}, {"key": "n"}, rest(2),
+                              {"screenshot": "undone.png"}], *QUICK)
+        self.assertEqual(states["turned"]["edit"]["row"], "rotation")
+        self.assertEqual(states["turned"]["edit"]["fields"]["rotation"], [40])
+        self.assertEqual(states["undone"]["edit"]["fields"], states["before"]["edit"]["fields"])
+        before, lit, undone = (read_png(self.folder / f"{name}.png")[2][:ABOVE_NOTICES] for name in ("before", "lit", "undone"))
+        self.assertGreater(sum(map(sum, lit)), 1.2 * sum(map(sum, before)))  # values with alpha, which stays
+        self.assertEqual(before, undone)

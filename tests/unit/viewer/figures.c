@@ -360,7 +360,7 @@ TEST(an_object_is_edited_beside_the_figures)
     static struct hud_edit edit;
     add(0, 1, 1000 * MS);
     edit = (struct hud_edit){.shown = true,
-                             .tabs = {"node", "material", "light"},
+                             .tabs = {"node", "material", "light", "environment"},
                              .title = "a material with a name that is longer than its panel is wide",
                              .hint = "what it means, in a line that is longer than its panel is wide, too",
                              .typed = "0.25",

@@ -262,3 +262,31 @@ TEST(the_overlay_is_painted_over_the_picture)
     pixmap_finish(&picture);
     pixmap_finish(&made);
 }
+
+TEST(another_picture_of_the_same_version_is_painted)
+{
+    uint8_t out[4 * 4 * 4] = {0};
+    struct pixmap pictures[2] = {{0}};
+    struct hud_state shown = some_state();
+    shown.width = shown.height = 4;
+    settings.overlay = OVERLAY_NONE;
+    SDL_Surface *surface = SDL_CreateRGBSurfaceWithFormatFrom(out, 4, 4, 32, 16, SDL_PIXELFORMAT_RGBA32);
+    SDL_Renderer *renderer = SDL_CreateSoftwareRenderer(surface);
+    struct painter *painter = painter_create(renderer, &error);
+    assert_non_null(painter);
+    for (int i = 0; i < 2; i++) {
+        assert_true(pixmap_resize(&pictures[i], 4, 4, &error));
+        memset(pictures[i].pixels, 100 + 100 * i, sizeof(out));
+    }
+    assert_int_equal(pictures[0].version, pictures[1].version);
+    for (int i = 0; i < 2; i++) {
+        painter_draw(painter, 4, 4, &pictures[i], &shown);
+        SDL_RenderFlush(renderer);
+        assert_int_equal(out[0], 100 + 100 * i);
+    }
+    painter_destroy(painter);
+    SDL_DestroyRenderer(renderer);
+    SDL_FreeSurface(surface);
+    for (int i = 0; i < 2; i++)
+        pixmap_finish(&pictures[i]);
+}
