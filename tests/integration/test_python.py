@@ -123,6 +123,7 @@ def say(message, request=0, channel=0):
     return framing.pack(message, request, channel)
 
 
+DIGEST = 0x1059105ad19bfa09  # XXH3-64 of bytes(range(256)) * 2
 REPLY = b"FARL" + struct.pack("<HHQ", 1, 0, 0) + bytes(32) + b"\0\0" + bytes(6)
 
 
@@ -137,7 +138,7 @@ class Asked:
 
     def work(self):
         yield from self.core.greet()
-        render = farlight.scene.request(STRAIGHT, (), {"width": 16, "height": 8, "last_frame": 1})
+        render = farlight.camera.request(STRAIGHT, (), {"width": 16, "height": 8, "last_frame": 1})
         for frame in self.core.batch(self.scene, render):
             if frame is not None:
                 self.frames.append(frame)
@@ -169,7 +170,7 @@ def started(data=b""):
 
 
 def begin(**values):
-    return messages.FrameBegin(**{"width": 16, "height": 8, "samples": 1, "size_bytes": 512, "layers": 1, **values})
+    return messages.FrameBegin(**{"width": 16, "height": 8, "samples": 1, "size_bytes": 512, "layers": 1, "digest": DIGEST, **values})
 
 
 def frame(number, **values):
@@ -401,7 +402,7 @@ class WithDaemon(OneDaemon):
         with self.assertRaises(farlight.Refused) as raised:
             client.render(scene, farlight.Camera((0, 0, 0)), width=8, height=8)
         self.assertTrue(raised.exception.field.startswith("render.keys"), raised.exception.field)
-        for values, field in (({"encoding": "jpeg"}, "render.encoding"), ({"wdth": 3}, "render.wdth")):
+        for values, field in (({"encoding": "h264"}, "render.encoding"), ({"wdth": 3}, "render.wdth")):
             with self.assertRaises(farlight.InvalidValue) as raised:
                 client.render(scene, **values)
             self.assertEqual(raised.exception.field, field)

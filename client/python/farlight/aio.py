@@ -9,13 +9,16 @@ from collections.abc import AsyncIterator, Callable
 from typing import Any, TypeVar
 
 from . import address, messages
+from .camera import Camera, CameraOf, one_frame, request
 from .client import RECEIVE_BYTES, SILENCE_S, Options, Retry
-from .core import Core, Operation
+from .connection import Operation
+from .core import Core, Progress
 from .errors import ConnectionLost, Error, TimedOut
 from .fields import Message
 from .frame import Frame
 from .jobs import Job
-from .scene import Camera, CameraOf, Object, Scene, request
+from .objects import Object
+from .scene import Scene
 
 T = TypeVar("T")
 
@@ -115,6 +118,8 @@ class AsyncClient:
                 core.ping()
             except OSError as why:
                 core.fail(ConnectionLost(f"the connection broke: {why.strerror}"))
+            if core.failure is not None and self._link is not None:
+                await asyncio.to_thread(address.tell_end, core.failure, self._link)
             self._flush(core)
             self._wake()
         if writer is not None:
@@ -127,15 +132,16 @@ class AsyncClient:
             self._writer.write(data)
 
     async def _operate(self, core: Core, operation: Operation[T]) -> T:
-        while True:
-            changed = self._changed
-            try:
-                next(operation)
-            except StopIteration as done:
-                self._flush(core)
-                result: T = done.value
-                return result
-            await self._wait(core, changed)
+        with contextlib.closing(operation):  # at once where the task is cancelled
+            while True:
+                changed = self._changed
+                try:
+                    next(operation)
+                except StopIteration as done:
+                    self._flush(core)
+                    result: T = done.value
+                    return result
+                await self._wait(core, changed)
 
     async def _wait(self, core: Core, changed: asyncio.Event) -> None:
         """Until something has come, or what was to be sent is on its way."""
@@ -190,7 +196,7 @@ class AsyncClient:
 
     async def read(self, scene: Scene, thing: Object) -> tuple[Message, int]:
         """As Client.read()."""
-        return await self._again(lambda core: core.read(scene, thing.kind, thing.number))
+        return await self._again(lambda core: core.read(scene, thing))
 
     async def describe(self, scene: Scene) -> messages.SceneDescription:
         """As Client.describe()."""
@@ -211,7 +217,7 @@ class AsyncClient:
 
     async def render(self, scene: Scene, camera: CameraOf = None, *, layers: Any = (), **values: Any) -> Frame:
         """As Client.render()."""
-        frame, = [frame async for frame in self.frames(scene, camera, layers=layers, **values)]
+        frame, = [frame async for frame in self.frames(scene, camera, layers=layers, **one_frame(values))]
         return frame
 
     async def frames(self, scene: Scene, camera: CameraOf = None, *, layers: Any = (),
@@ -273,9 +279,9 @@ class AsyncClient:
 
 
 async def connect(server: str | None = None, *, key_file: str | os.PathLike[str] | None = None, name: str = "python",
-                  timeout: float = SILENCE_S, retry_for: float = 0.0) -> AsyncClient:
+                  timeout: float = SILENCE_S, retry_for: float = 0.0, progress: Progress | None = None) -> AsyncClient:
     """As farlight.connect()."""
-    client = AsyncClient(Options(server, key_file, name, timeout, retry_for))
+    client = AsyncClient(Options(server, key_file, name, timeout, retry_for, progress, has_tasks=True))
     retry = Retry(retry_for)
     while True:
         try:
