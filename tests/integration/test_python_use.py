@@ -123,9 +123,8 @@ class Encoded(Case):
     """Frames that are not raw, and daemons that lie about them."""
 
     def hear(self, data, size, digest=0, **values):
-        asked, _ = started()
-        asked.hear(say(begin(size_bytes=size, digest=digest, **values), 4, 2))
-        why = asked.hear(say(messages.FrameData(0, data), 4, 2) + say(messages.FrameEnd(), 4, 2))
+        asked, why = started(say(begin(size_bytes=size, digest=digest, **values), 4, 2))
+        why = why or asked.hear(say(messages.FrameData(0, data), 4, 2) + say(messages.FrameEnd(), 4, 2))
         return asked, why or asked.core.failure
 
     def test_pixels_that_are_not_those_that_were_rendered_are_refused(self):
@@ -230,7 +229,7 @@ class WithDaemon(OneDaemon):
 
     def test_an_older_daemon_is_not_asked_to_keep_an_image(self):
         """It would not know the field, and drop the image."""
-        asked, why = started()
+        asked, why = started(say(messages.Ping(1)))
         self.assertIsNone(why)
         scene = asked.scene
         scene.set(messages.SetEnvironment(colour=(1, 1, 1), keeps_image=1))
@@ -283,10 +282,10 @@ class WithDaemon(OneDaemon):
         self.assertEqual(client.render(scene, STRAIGHT, width=8, height=8).size, (8, 8))
 
     @staticmethod
-    def large():
-        """36 MB, which take a while."""
+    def large(number):
+        """36 MB, which take a while; others for each number, as a daemon keeps what it has."""
         scene, points = farlight.Scene(), np.zeros((3000000, 3), np.float32)
-        points[:3] = (-1, -1, 0), (3, -1, 0), (-1, 3, 0)
+        points[:3], points[3:] = [(-1, -1, 0), (3, -1, 0), (-1, 3, 0)], number
         scene.add_node(scene.add_mesh(points, [(0, 1, 2)]))
         return scene, points.nbytes
 
@@ -298,7 +297,7 @@ class WithDaemon(OneDaemon):
             if len(told) == 3:
                 raise KeyboardInterrupt
 
-        client, (scene, size) = self.connect(progress=tell), self.large()
+        client, (scene, size) = self.connect(progress=tell), self.large(1)
         with self.assertRaises(KeyboardInterrupt):
             client.send(scene)
         self.assertEqual(client.describe(scene).triangles, 1)
@@ -315,7 +314,7 @@ class WithDaemon(OneDaemon):
                     task.cancel()
 
             async with await farlight.aio.connect(self.daemon.address, progress=tell) as client:
-                scene, _ = self.large()
+                scene, _ = self.large(2)
                 task = asyncio.create_task(client.send(scene))
                 ended, = await asyncio.gather(task, return_exceptions=True)
                 self.assertIsInstance(ended, asyncio.CancelledError)

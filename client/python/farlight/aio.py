@@ -85,7 +85,10 @@ class AsyncClient:
             await asyncio.gather(self._pump_task, return_exceptions=True)
             self._pump_task = None
         if self._writer is not None:
-            self._writer.close()
+            # Its socket may be closed only when the loop has let go of it: a new one may have the same number.
+            self._writer.transport.abort()
+            with contextlib.suppress(OSError):
+                await self._writer.wait_closed()
             self._writer = None
         if self._link is not None:
             await asyncio.to_thread(self._link.close)
@@ -264,10 +267,9 @@ class AsyncClient:
         if not self._closed and self._writer is not None:
             self._core.leave()
             self._flush(self._core)
-            try:
-                await asyncio.wait_for(self._writer.drain(), 1)
-            except (OSError, asyncio.TimeoutError):
-                pass
+            self._writer.close()
+            with contextlib.suppress(OSError, asyncio.TimeoutError):
+                await asyncio.wait_for(self._writer.wait_closed(), 1)
         self._closed = True
         await self._drop()
 
