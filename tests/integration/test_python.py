@@ -2,6 +2,7 @@
 """The Python package: its codec against the stored bytes of the C side, pictures against the command line's, servers that
 lie, and connections that are cut."""
 import asyncio
+import contextlib
 import importlib.util
 import os
 import pathlib
@@ -528,6 +529,22 @@ class Faults(Case):
                     self.frames(client)
             self.assertTrue(raised.exception.retryable)
 
+    def test_connections_that_are_cut_in_an_upload_or_sealed_lose_no_frame_either(self):
+        self.expect(farlight_test.farlight("key", self.folder / "key"), 0)
+        self.expect(farlight_test.farlight("key", self.folder / "reader"), 0)
+        with SealedDaemon(self.folder, "--listen", f"unix:{self.folder}/s") as daemon:
+            with farlight.connect(f"unix:{self.folder}/s") as client:
+                undisturbed = self.frames(client)
+            plain, sealed = f"{self.folder}/s", ("127.0.0.1", daemon.port)
+            # Of a client: its greeting, the offer, the blob of 36 bytes, edits, the job. Sealed: hello, proof, first record.
+            for place, of_client, cuts, options in ((plain, True, (0, 20, 100, 200, 260, 330, 500, 900), {}),
+                                                    (sealed, True, (0, 71, 72, 130, 136, 200, 700, 1300), {"key_file": self.folder / "key"}),
+                                                    (sealed, False, (0, 71, 72, 135, 136, 150, 900, 3500), {"key_file": self.folder / "key"})):
+                for cut in cuts:
+                    with self.subTest(place=place, of_client=of_client, cut=cut), CutOf(place, cut, of_client) as relay:
+                        with farlight.connect(relay.address, retry_for=60, **options) as client:
+                            self.assertEqual(self.frames(client), undisturbed)
+
     @staticmethod
     async def frames_async(address):
         scene, _ = triangle()
@@ -597,6 +614,28 @@ class Faults(Case):
         with self.assertRaises(farlight.FileFailed) as raised:
             farlight.connect("tcp:127.0.0.1:9", key_file=self.folder / "key")
         self.assertIn("chmod 600", raised.exception.remedy)
+
+
+class CutOf(Cut):
+    """Ends the first connection to a Unix or TCP socket after so many bytes of the client's or the daemon's."""
+
+    def __init__(self, place, count, of_client):
+        super().__init__(place, count)
+        self.of_client = of_client
+
+    def serve(self):
+        left = self.count
+        while True:
+            try:
+                client = self.listener.accept()[0]
+            except OSError:
+                return
+            family = socket.AF_INET if isinstance(self.path, tuple) else socket.AF_UNIX
+            with contextlib.suppress(OSError), client, socket.socket(family) as daemon:
+                daemon.connect(self.path)
+                # relay() counts what its second argument sends.
+                self.relay(*((daemon, client) if self.of_client else (client, daemon)), left)
+            left = None
 
 
 class Changed:
