@@ -98,6 +98,16 @@ class Arguments(Case):
         self.refused(lambda: farlight.Camera((0, 0, 3), fov_degrees=200), "camera.fov_degrees", "177.6")
         self.assertEqual(farlight.Camera(np.array([1, 2, 3])), farlight.Camera((1.0, 2.0, 3.0)))
 
+    def test_what_is_no_value_of_its_type_is_refused_by_the_name_of_its_field(self):
+        scene, material = triangle()
+        for attempt, field, text in ((lambda: scene.change(material, textures=3), "set_material.textures", "no list of TextureUse"),
+                                     (lambda: scene.change(material, base_colour="red"), "set_material.base_colour", "'red'"),
+                                     (lambda: farlight.Scene(3), "scene_open.name", "3"), (lambda: farlight.Scene("a", "all"), "scene_open.sharing", "kept"),
+                                     (lambda: scene.blob("text"), "blob", "'text'"), (lambda: scene.set(3), "edit", "no edit"),
+                                     (lambda: farlight.connect(5), "server", "tcp:HOST:PORT"), (lambda: farlight.load(5), "models", "5 is no path"),
+                                     (lambda: farlight.camera.request(None, (), {"clips": ["ride"]}), "render.clips[0]", "no ClipUse")):
+            self.refused(attempt, field, text)
+
     def test_a_message_that_its_caller_changes_later_counts_when_it_is_set(self):
         scene, material = triangle()
         message = scene.get(material)
@@ -241,6 +251,17 @@ class WithDaemon(OneDaemon):
         self.assertEqual(bytes(asked.core.unsent()), sent)
         self.assertFalse(asked.core.capabilities & handshake.CAN_READ_OBJECTS)
 
+    def test_clips_of_a_file_are_played_by_their_objects(self):
+        client, scene = self.connect(), farlight.load(bundled_scenes() / "carousel.glb")
+        clip, = scene.objects("clip")
+        self.assertEqual(scene.find("clip", scene.get(clip).name), [clip])
+        values = {"width": 64, "height": 48, "first_frame": 24}
+        camera = next(node for node in scene.objects("node") if scene.shown(node) and scene.shown(node).kind == messages.ObjectKind.CAMERA)
+        still, moved, same = (client.render(scene, camera, clips=clips, **values).data for clips in (
+            [], [clip], [messages.ClipUse(clip.number, 0, 1)]))
+        self.assertNotEqual(moved, still)
+        self.assertEqual(moved, same)
+
     def test_objects_of_others_are_removed_by_their_numbers(self):
         owner, guest = self.connect(), self.connect()
         scene = farlight.Scene("python-removed", "shared")
@@ -255,7 +276,7 @@ class WithDaemon(OneDaemon):
         client, (scene, _) = self.connect(), triangle()
         for values, field in (({"width": 0}, "render.width"), ({"layers": "dept"}, "render.layers"), ({"last_frame": 3}, "render.last_frame"),
                               ({"attachments": 1}, "render.attachments"), ({"camera": (0, 0, 5)}, "camera"), ({"camera": []}, "camera"),
-                              ({"integrator": "pth"}, "render.integrator"), ({"wdth": 4}, "render.wdth")):
+                              ({"clips": 3}, "render.clips"), ({"integrator": "pth"}, "render.integrator"), ({"wdth": 4}, "render.wdth")):
             with self.subTest(**values), self.assertRaises(farlight.InvalidValue) as raised:
                 client.render(scene, **values)
             self.assertEqual(raised.exception.field, field)
@@ -265,6 +286,11 @@ class WithDaemon(OneDaemon):
             self.assertEqual(raised.exception.field, "scene")
         self.assertEqual(client.scenes(), [])
         self.assertEqual(client.render(scene, STRAIGHT, width=8, height=8, first_frame=7).number, 7)
+        for attempt, field in ((lambda: client.frames(scene, width=0), "render.width"), (lambda: client.ask(3), "message"),
+                               (lambda: client.view(scene, STRAIGHT, width=8, height=8).look((0, 0, 3)), "camera")):
+            with self.assertRaises(farlight.InvalidValue) as raised:
+                attempt()
+            self.assertEqual(raised.exception.field, field)
         for options, field in (({"timeout": 0}, "timeout"), ({"retry_for": "long"}, "retry_for")):
             with self.assertRaises(farlight.InvalidValue) as raised:
                 farlight.connect(self.daemon.address, **options)

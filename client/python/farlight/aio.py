@@ -5,11 +5,11 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import os
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncGenerator, Callable
 from typing import Any, TypeVar
 
 from . import address, messages
-from .camera import Camera, CameraOf, one_frame, request
+from .camera import Camera, CameraOf, command, one_frame, request
 from .client import RECEIVE_BYTES, SILENCE_S, Options, Retry
 from .connection import Operation
 from .core import Core, Progress
@@ -31,7 +31,7 @@ class AsyncView:
 
     def look(self, camera: Camera, moving: bool = False, time_s: float = 0.0) -> int:
         """As View.look()."""
-        number = self._core.look(self._job, camera.command(moving, time_s))
+        number = self._core.look(self._job, command(camera, moving, time_s))
         self._client._flush(self._core)
         return number
 
@@ -223,10 +223,12 @@ class AsyncClient:
         frame, = [frame async for frame in self.frames(scene, camera, layers=layers, **one_frame(values))]
         return frame
 
-    async def frames(self, scene: Scene, camera: CameraOf = None, *, layers: Any = (),
-                     **values: Any) -> AsyncIterator[Frame]:
+    def frames(self, scene: Scene, camera: CameraOf = None, *, layers: Any = (),
+               **values: Any) -> AsyncGenerator[Frame, None]:
         """As Client.frames()."""
-        render = request(camera, layers, {**values, "kind": messages.JobKind.BATCH})
+        return self._frames(scene, request(camera, layers, {**values, "kind": messages.JobKind.BATCH}))
+
+    async def _frames(self, scene: Scene, render: messages.Render) -> AsyncGenerator[Frame, None]:
         retry = Retry(self._options.retry_for)
         is_complete = False
         while not is_complete:

@@ -41,6 +41,14 @@ def translate(x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Array:
     return made
 
 
+def command(camera: Any, moving: bool, time_s: float) -> messages.ViewCamera:
+    """A camera for a view."""
+    if not isinstance(camera, Camera):
+        raise InvalidValue(f"{camera!r:.80} is no farlight.Camera", field="camera")
+    return messages.ViewCamera(moving=int(moving), time_s=time_s, eye_world=camera.eye, look_at_world=camera.look_at,
+                               up_world=camera.up, fov_y=math.radians(camera.fov_degrees))
+
+
 @dataclass(frozen=True)
 class Camera:
     """A camera of a job: where it is, what is at the centre of its picture, its vertical field of view."""
@@ -61,11 +69,6 @@ class Camera:
     def key(self) -> messages.CameraKey:
         """As a job's camera."""
         return messages.CameraKey(self.time_s, self.eye, self.look_at, self.up, math.radians(self.fov_degrees))
-
-    def command(self, moving: bool, time_s: float) -> messages.ViewCamera:
-        """As a view's camera."""
-        return messages.ViewCamera(moving=int(moving), time_s=time_s, eye_world=self.eye, look_at_world=self.look_at,
-                                   up_world=self.up, fov_y=math.radians(self.fov_degrees))
 
 
 CameraOf = Union[Camera, Object, Sequence[Camera], None]
@@ -88,7 +91,10 @@ def _look(render: messages.Render, camera: CameraOf) -> None:
 
 def request(camera: CameraOf, layers: Any, values: dict[str, Any]) -> messages.Render:
     """The message of a job, valid but for the scene. camera: one, a node of the scene that shows one, several as keys over
-    time, or None: all of the scene is in view."""
+    time, or None: all of the scene is in view. `clips` may be those of the scene: clips=scene.objects("clip")."""
+    if isinstance(values.get("clips"), (list, tuple)):
+        values = {**values, "clips": [messages.ClipUse(one.number, 0.0, 1.0) if isinstance(one, Object) and one.kind == ObjectKind.CLIP
+                                      else one for one in values["clips"]]}
     render: messages.Render = make(messages.Render, values)
     if camera is not None:
         _look(render, camera)

@@ -7,11 +7,11 @@ import os
 import selectors
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator
 from typing import Any, TypeVar
 
 from . import address, messages
-from .camera import Camera, CameraOf, one_frame, request
+from .camera import Camera, CameraOf, command, one_frame, request
 from .connection import Operation
 from .core import Core, Progress
 from .errors import ConnectionLost, Error, InvalidValue, Refused, TimedOut
@@ -80,7 +80,7 @@ class View:
 
     def look(self, camera: Camera, moving: bool = False, time_s: float = 0.0) -> int:
         """Moves the camera; the number that frames have as begin.command. moving: more will follow soon."""
-        number = self._core.look(self._job, camera.command(moving, time_s))
+        number = self._core.look(self._job, command(camera, moving, time_s))
         self._client._flush()
         return number
 
@@ -285,10 +285,13 @@ class Client:
         frame, = self.frames(scene, camera, layers=layers, **one_frame(values))
         return frame
 
-    def frames(self, scene: Scene, camera: CameraOf = None, *, layers: Any = (), **values: Any) -> Iterator[Frame]:
+    def frames(self, scene: Scene, camera: CameraOf = None, *, layers: Any = (), **values: Any) -> Generator[Frame, None, None]:
         """The frames first_frame .. last_frame, one after the other. After a lost connection it goes on with the next
-        one, if there is a retry_for. Several cameras are keys over time."""
-        render = request(camera, layers, {**values, "kind": messages.JobKind.BATCH})
+        one, if there is a retry_for. Several cameras are keys over time. Arguments are checked at once; the job begins with
+        the first frame that is asked for, and ends with the generator."""
+        return self._frames(scene, request(camera, layers, {**values, "kind": messages.JobKind.BATCH}))
+
+    def _frames(self, scene: Scene, render: messages.Render) -> Generator[Frame, None, None]:
         retry = Retry(self._options.retry_for)
         is_complete = False
         while not is_complete:

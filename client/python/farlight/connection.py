@@ -200,13 +200,12 @@ class Connection:
     def ask(self, message: Message, answer: type[Message] = messages.Ok,
             extra: type[Message] | None = None) -> Operation[tuple[Any, Any]]:
         """Sends a request; its answer, and what came before it."""
+        if not isinstance(message, Message) or message.SENDER not in ("client", "both"):
+            raise InvalidValue(f"{message!r:.80} is no message of a client", field="message")
+        framing.pack(message)  # whether it is valid, before anything is begun
         yield from self._until(self._has_room)
         request, pending = self._begin((answer,), extra)
-        try:
-            self._send(message, request)
-        except InvalidValue:
-            del self._pending[request]
-            raise
+        self._send(message, request)
         return (yield from self._answer(pending)), pending.came
 
     def ping(self) -> None:

@@ -77,6 +77,8 @@ class Objects:
             self.sharing = Sharing(Sharing.of(sharing))
         except ValueError as why:
             raise InvalidValue(str(why), field="scene_open.sharing") from None
+        if not isinstance(name, str):
+            raise InvalidValue(f"{name!r:.80} is no text", field="scene_open.name")
         self.name, self.is_attached = name, False
         self.version = 0  # counts changes
         self.notes: list[str] = []  # of an import
@@ -176,7 +178,10 @@ class Objects:
 
     def blob(self, data: Bytes) -> messages.BlobRef:
         """Keeps the bytes, and names them."""
-        view = memoryview(data).cast("B")
+        try:
+            view = memoryview(data).cast("B")
+        except TypeError:
+            raise InvalidValue(f"{data!r:.80} are no contiguous bytes", field="blob") from None
         name = blob_hash(view)
         self._blobs[name] = view
         return messages.BlobRef(len(view), name)
