@@ -5,6 +5,7 @@ import asyncio
 import ctypes
 import os
 import pty
+import random
 import signal
 import subprocess
 import sys
@@ -13,16 +14,20 @@ import unittest.mock
 
 import farlight_test
 from farlight_test import Case, OneDaemon, bundled_scenes
+from test_sealed import SealedDaemon
 from test_python import DEBIANS, PACKAGE, STRAIGHT, begin, python, say, started, triangle
 
 import numpy as np
 import farlight
 from farlight import decode, handshake, libraries, messages
+from farlight.core import Core
 
 SQUARE = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (1, 1, 0)], np.float64)
 
-# 513 and 511 bytes of 0, where a picture of 16x8 has 512.
-ZSTD_513, ZSTD_511 = (bytes.fromhex(one) for one in ("28b52ffd6001014d00001000000100fc2ac002", "28b52ffd60ff004d00001000000100fa2ac002"))
+# 513, 511 and 512 bytes of 0, of which a picture of 16x8 has the last.
+ZSTD_513, ZSTD_511, ZSTD_512 = (bytes.fromhex(one) for one in (
+    "28b52ffd6001014d00001000000100fc2ac002", "28b52ffd60ff004d00001000000100fa2ac002", "28b52ffd6000014d00001000000100fb2ac002"))
+DIGEST_OF_ZEROS = 0xb2987a9d949e807c  # XXH3-64 of those 512
 
 
 def jpeg(width, height):
@@ -157,9 +162,25 @@ class Encoded(Case):
                     with self.assertRaises(farlight.ProtocolError) as raised:
                         decode.decode(begun, bytearray(lie), 512)
                     self.assertEqual(raised.exception.field, "frame_data")
+        self.assertEqual(bytes(decode.decode(begin(encoding=messages.Encoding.ZSTD, digest=DIGEST_OF_ZEROS), bytearray(ZSTD_512), 512)[0]), bytes(512))
         good = jpeg(16, 8)
         pixels, is_checked = decode.decode(begin(encoding=messages.Encoding.JPEG, size_bytes=len(good)), bytearray(good), 512)
         self.assertEqual((bytes(pixels), is_checked), (b"\0\0\0\xff" * 128, False))
+
+    def test_changed_bytes_of_encoded_pictures_make_other_pixels_or_a_refusal_and_nothing_else(self):
+        random.seed(1)
+        for encoding, honest in ((messages.Encoding.JPEG, jpeg(16, 8)), (messages.Encoding.ZSTD, ZSTD_512)):
+            refused = 0
+            for _ in range(400):
+                changed = bytearray(honest)
+                for _ in range(random.randrange(1, 4)):
+                    changed[random.randrange(len(changed))] = random.randrange(256)
+                try:
+                    pixels, _ = decode.decode(begin(encoding=encoding, size_bytes=len(changed), digest=DIGEST_OF_ZEROS), changed, 512)
+                    self.assertEqual(len(pixels), 512)
+                except farlight.ProtocolError:
+                    refused += 1
+            self.assertGreater(refused, 0, encoding)
 
     def test_a_library_that_is_missing_is_named_with_its_package(self):
         for encoding, cached, package in (("jpeg", decode._turbojpeg, "libturbojpeg0"), ("zstd", decode._zstd, "libzstd1")):  # pylint: disable=protected-access
@@ -347,6 +368,19 @@ class WithDaemon(OneDaemon):
                 return (await client.describe(scene)).triangles
 
         self.assertEqual(asyncio.run(all_of_it()), 1)
+
+
+class Sealed(Case):
+    def test_a_large_upload_over_tcp_waits_for_nothing_but_the_daemon(self):
+        """The system may take all that is queued at once; then no answer is due, and the rest must follow all the same. Pings
+        would hide it: each makes an answer."""
+        for name in ("key", "reader"):
+            self.expect(farlight_test.farlight("key", self.folder / name), 0)
+        scene, size = WithDaemon.large(3)
+        with SealedDaemon(self.folder) as daemon, unittest.mock.patch.object(Core, "ping"):
+            with farlight.connect(daemon.reached, key_file=self.folder / "key") as client:
+                self.assertGreater(size, 2 * client.limits["upload_window_bytes"])
+                self.assertEqual(client.describe(scene).triangles, 1)
 
 
 class Ends(Case):

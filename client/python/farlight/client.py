@@ -161,14 +161,16 @@ class Client:
             self._core.fail(ConnectionLost(f"the connection broke: {why.strerror}"))
             return True
 
-    def _flush(self) -> None:
-        """Sends what can be sent without waiting."""
+    def _flush(self) -> bool:
+        """Sends what can be sent without waiting; whether that was anything."""
         assert self._link is not None
+        has_sent = False
         try:
             while unsent := self._core.unsent():
                 with memoryview(unsent) as view, view[:RECEIVE_BYTES] as part:
                     count = self._link.socket.send(part)
                 self._core.sent(count)
+                has_sent = True
         except BlockingIOError:
             pass
         except OSError as why:
@@ -176,11 +178,12 @@ class Client:
             while self._core.failure is None and self._receive():
                 pass
             self._core.fail(ConnectionLost(f"the connection broke: {why.strerror}"))
+        return has_sent
 
     def _exchange(self, silence_s: float) -> None:
         """Sends, and waits until something has come or could be sent."""
-        self._flush()
-        if self._core.failure is not None:
+        # What has been sent has left room, for which an upload may have waited: nothing need come first.
+        if self._flush() or self._core.failure is not None:
             return
         assert self._link is not None
         quiet = 0
