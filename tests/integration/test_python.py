@@ -2,6 +2,7 @@
 """The Python package: its codec against the stored bytes of the C side, pictures against the command line's, servers that
 lie, and connections that are cut."""
 import asyncio
+import contextlib
 import importlib.util
 import os
 import pathlib
@@ -123,6 +124,7 @@ def say(message, request=0, channel=0):
     return framing.pack(message, request, channel)
 
 
+DIGEST = 0x1059105ad19bfa09  # XXH3-64 of bytes(range(256)) * 2
 REPLY = b"FARL" + struct.pack("<HHQ", 1, 0, 0) + bytes(32) + b"\0\0" + bytes(6)
 
 
@@ -137,7 +139,7 @@ class Asked:
 
     def work(self):
         yield from self.core.greet()
-        render = farlight.scene.request(STRAIGHT, (), {"width": 16, "height": 8, "last_frame": 1})
+        render = farlight.camera.request(STRAIGHT, (), {"width": 16, "height": 8, "last_frame": 1})
         for frame in self.core.batch(self.scene, render):
             if frame is not None:
                 self.frames.append(frame)
@@ -169,7 +171,7 @@ def started(data=b""):
 
 
 def begin(**values):
-    return messages.FrameBegin(**{"width": 16, "height": 8, "samples": 1, "size_bytes": 512, "layers": 1, **values})
+    return messages.FrameBegin(**{"width": 16, "height": 8, "samples": 1, "size_bytes": 512, "layers": 1, "digest": DIGEST, **values})
 
 
 def frame(number, **values):
@@ -401,7 +403,7 @@ class WithDaemon(OneDaemon):
         with self.assertRaises(farlight.Refused) as raised:
             client.render(scene, farlight.Camera((0, 0, 0)), width=8, height=8)
         self.assertTrue(raised.exception.field.startswith("render.keys"), raised.exception.field)
-        for values, field in (({"encoding": "jpeg"}, "render.encoding"), ({"wdth": 3}, "render.wdth")):
+        for values, field in (({"encoding": "h264"}, "render.encoding"), ({"wdth": 3}, "render.wdth")):
             with self.assertRaises(farlight.InvalidValue) as raised:
                 client.render(scene, **values)
             self.assertEqual(raised.exception.field, field)
@@ -527,6 +529,22 @@ class Faults(Case):
                     self.frames(client)
             self.assertTrue(raised.exception.retryable)
 
+    def test_connections_that_are_cut_in_an_upload_or_sealed_lose_no_frame_either(self):
+        self.expect(farlight_test.farlight("key", self.folder / "key"), 0)
+        self.expect(farlight_test.farlight("key", self.folder / "reader"), 0)
+        with SealedDaemon(self.folder, "--listen", f"unix:{self.folder}/s") as daemon:
+            with farlight.connect(f"unix:{self.folder}/s") as client:
+                undisturbed = self.frames(client)
+            plain, sealed = f"{self.folder}/s", ("127.0.0.1", daemon.port)
+            # Of a client: its greeting, the offer, the blob of 36 bytes, edits, the job. Sealed: hello, proof, first record.
+            for place, of_client, cuts, options in ((plain, True, (0, 20, 100, 200, 260, 330, 500, 900), {}),
+                                                    (sealed, True, (0, 71, 72, 130, 136, 200, 700, 1300), {"key_file": self.folder / "key"}),
+                                                    (sealed, False, (0, 71, 72, 135, 136, 150, 900, 3500), {"key_file": self.folder / "key"})):
+                for cut in cuts:
+                    with self.subTest(place=place, of_client=of_client, cut=cut), CutOf(place, cut, of_client) as relay:
+                        with farlight.connect(relay.address, retry_for=60, **options) as client:
+                            self.assertEqual(self.frames(client), undisturbed)
+
     @staticmethod
     async def frames_async(address):
         scene, _ = triangle()
@@ -596,6 +614,28 @@ class Faults(Case):
         with self.assertRaises(farlight.FileFailed) as raised:
             farlight.connect("tcp:127.0.0.1:9", key_file=self.folder / "key")
         self.assertIn("chmod 600", raised.exception.remedy)
+
+
+class CutOf(Cut):
+    """Ends the first connection to a Unix or TCP socket after so many bytes of the client's or the daemon's."""
+
+    def __init__(self, place, count, of_client):
+        super().__init__(place, count)
+        self.of_client = of_client
+
+    def serve(self):
+        left = self.count
+        while True:
+            try:
+                client = self.listener.accept()[0]
+            except OSError:
+                return
+            family = socket.AF_INET if isinstance(self.path, tuple) else socket.AF_UNIX
+            with contextlib.suppress(OSError), client, socket.socket(family) as daemon:
+                daemon.connect(self.path)
+                # relay() counts what its second argument sends.
+                self.relay(*((daemon, client) if self.of_client else (client, daemon)), left)
+            left = None
 
 
 class Changed:

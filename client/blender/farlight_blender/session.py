@@ -88,7 +88,7 @@ class Session:
             async for frame in frames:
                 yield frame
         finally:
-            await frames.aclose()  # type: ignore[attr-defined]  # cancels the job, if it is not over
+            await frames.aclose()  # cancels the job, if it is not over
 
     def frames(self, scene: farlight.Scene, camera: Any, is_stopped: Callable[[], bool], **values: Any) -> Iterator[Frame]:
         """As Client.frames(). Raises Stopped; then the job has been cancelled."""

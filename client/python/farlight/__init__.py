@@ -17,9 +17,11 @@ from .errors import (Cancelled, ConnectionLost, Error, FileFailed, ImportFailed,
 from .frame import Frame
 from .importer import load
 from .png import write as write_png
-from .scene import Camera, Object, Scene, look_at
+from .camera import Camera, look_at, translate
+from .objects import ENVIRONMENT, Object
+from .scene import Scene
 from .version import VERSION as __version__
 
-__all__ = ["Camera", "Cancelled", "Client", "ConnectionLost", "Error", "FileFailed", "Frame", "ImportFailed",
+__all__ = ["Camera", "Cancelled", "Client", "ConnectionLost", "ENVIRONMENT", "Error", "FileFailed", "Frame", "ImportFailed",
            "InvalidValue", "Object", "ProtocolError", "Refused", "Scene", "TimedOut", "View", "__version__", "aio", "connect", "load",
-           "look_at", "messages", "write_png"]
+           "look_at", "messages", "translate", "write_png"]

@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 import argparse
+import difflib
+import os
 import re
 import sys
+import time
 from typing import Any
 
 import numpy as np
 
-from . import client, importer, messages, png
-from .errors import Error, InvalidValue
+from . import client, files, importer, messages, png
+from .camera import Camera, CameraOf, one_frame, request
+from .errors import Error, FileFailed, InvalidValue
 from .fields import Word
 from .frame import Frame
-from .scene import Camera, CameraOf, Scene
+from .scene import Scene
+from .version import VERSION
 
 FAILED, USAGE, TRY_AGAIN, INTERRUPTED = 1, 2, 75, 130
 # Where nothing is said, as the command `farlight render` has it: samples of a pixel, and the clamp of indirect light.
@@ -21,33 +26,66 @@ SAMPLES = {"path": 64}
 OTHER_SAMPLES, CLAMP = 16, 10.0
 
 
+class _Progress:
+    """One line on a terminal, drawn again at most ten times a second."""
+
+    def __init__(self) -> None:
+        self.is_shown, self.is_drawn, self.next_s = sys.stderr.isatty(), False, 0.0
+
+    def tell(self, what: str, done: int = 0, total: int = 0) -> None:
+        """`total` 0: it is not known how much there is."""
+        now = time.monotonic()
+        if self.is_shown and (now >= self.next_s or not total):
+            share = f" {100 * min(done, total) // total} % of {total / 1e6:.1f} MB" if total else ""
+            print(f"\r\033[K{what}{share}", end="", file=sys.stderr, flush=True)
+            self.is_drawn, self.next_s = True, now + 0.1
+
+    def clear(self) -> None:
+        """Before anything else is printed."""
+        if self.is_drawn:
+            print("\r\033[K", end="", file=sys.stderr, flush=True)
+        self.is_drawn = False
+
+
 def _vector(text: str) -> list[float]:
-    numbers = [float(one) for one in text.split(",")]
+    try:
+        numbers = [float(one) for one in text.split(",")]
+    except ValueError:
+        numbers = []
     if len(numbers) != 3:
-        raise ValueError
+        raise argparse.ArgumentTypeError(f"{text!r} is not X,Y,Z, such as 0,1.5,4")
     return numbers
 
 
 def _size(text: str) -> tuple[int, int]:
-    found = re.fullmatch(r"(\d+)x(\d+)", text)
+    found = re.fullmatch(r"(\d{1,9})x(\d{1,9})", text, re.ASCII)
     if not found:
-        raise ValueError
+        raise argparse.ArgumentTypeError(f"{text!r} is not WxH, such as 1280x720")
     return int(found[1]), int(found[2])
 
 
 def _setting(text: str) -> tuple[str, Any]:
     """A field of the message render, as its type has it."""
-    name, equals, value = text.partition("=")
-    default = getattr(messages.Render(), name.replace("-", "_"), None)
-    if not equals or isinstance(default, tuple) or default is None:
-        raise argparse.ArgumentTypeError(f"{text!r} is not FIELD=VALUE with a field of the message render")
+    word, equals, value = text.partition("=")
+    name, render = word.replace("-", "_"), messages.Render()
+    known = [field.name for field in render.FIELDS if not isinstance(getattr(render, field.name), tuple)]
+    if not equals or name not in known:
+        like = " or ".join(difflib.get_close_matches(name, known)) if equals else ""
+        raise argparse.ArgumentTypeError(f"{text!r} is not FIELD=VALUE with a field of the message render" +
+                                         (f"; did you mean {like}?" if like else ""))
+    default = getattr(render, name)
     if isinstance(default, Word):
-        return name.replace("-", "_"), value
-    return name.replace("-", "_"), type(default)(value)
+        return name, value
+    try:
+        return name, type(default)(value)
+    except ValueError:
+        kind = "number" if isinstance(default, float) else "whole number"
+        raise argparse.ArgumentTypeError(f"{name}: {value!r} is no {kind}") from None
 
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python3 -m farlight", description="A client of farlightd.")
+    parser.add_argument("--version", action="version", version=f"farlight {VERSION}")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     render = commands.add_parser(
         "render", help="render a picture of a model", description="Render a picture of a model. Exit status: 0, 1 failed, "
@@ -85,30 +123,47 @@ def _camera(options: argparse.Namespace, scene: Scene) -> CameraOf:
 
 
 def _write(options: argparse.Namespace, frame: Frame) -> None:
-    if not options.output.endswith(".npz"):
+    if options.output.endswith(".png"):
         png.write(options.output, frame.colour)
-        return
-    try:
-        np.savez_compressed(options.output, **{layer.word: frame.layer(layer) for layer in frame.layers})
-    except OSError as why:
-        raise Error(f"cannot be written: {why.strerror}", field=options.output) from None
+    else:
+        layers = {layer.word: frame.layer(layer) for layer in frame.layers}
+        files.write(options.output, lambda file: np.savez_compressed(file, **layers))
 
 
-def _render(options: argparse.Namespace) -> None:
+def _values(options: argparse.Namespace) -> dict[str, Any]:
     samples = options.samples if options.samples is not None else SAMPLES.get(options.integrator, OTHER_SAMPLES)
     integrator = options.integrator or ("distributed" if samples > 1 else "whitted")
-    values: dict[str, Any] = {"width": options.size[0], "height": options.size[1], "samples": samples,
-                              "integrator": integrator, "tracer": options.tracer, "clamp": CLAMP,
-                              "primary": messages.Primary.AUTO, **dict(options.set)}
-    is_npz = options.output.endswith(".npz")
-    if not is_npz and (options.layers or not options.output.endswith(".png")):
-        raise InvalidValue("is no .png file; layers are for .npz files", field=options.output)
-    layers = (options.layers or "beauty").split(",") if is_npz else ()
-    scene = importer.load(*options.models, environment=options.environment)
+    return {"width": options.size[0], "height": options.size[1], "samples": samples, "integrator": integrator,
+            "tracer": options.tracer, "clamp": CLAMP, "primary": messages.Primary.AUTO, **dict(options.set)}
+
+
+def _layers(options: argparse.Namespace) -> tuple[str, ...]:
+    if options.output.endswith(".npz"):
+        return tuple((options.layers or "beauty").split(","))
+    if not options.output.endswith(".png"):
+        raise InvalidValue("is neither .png nor .npz", field=options.output,
+                           remedy="name such a file, or run 'farlight render', which writes other formats")
+    if options.layers:
+        raise InvalidValue("a .png has no layers", field=options.output, remedy="name an .npz file")
+    return ()
+
+
+def _render(options: argparse.Namespace, progress: _Progress) -> None:
+    # What is wrong with options is said before a large model is read.
+    values, layers = _values(options), _layers(options)
+    request(Camera(options.eye or (0, 0, 1), options.look_at or (0, 0, 0), fov_degrees=options.fov), layers, one_frame(values))
+    if not os.path.isdir(os.path.dirname(options.output) or "."):
+        raise FileFailed("its folder is not there", field=options.output)
+    progress.tell("importing")
+    scene = importer.load(*options.models, environment=options.environment, progress=progress.tell)
+    progress.clear()
     for note in scene.notes:
         print(f"farlight: {note}", file=sys.stderr)
-    with client.connect(options.server, key_file=options.key, retry_for=options.retry_for) as daemon:
+    with client.connect(options.server, key_file=options.key, retry_for=options.retry_for, progress=progress.tell) as daemon:
+        daemon.send(scene)
+        progress.tell("rendering")
         frame = daemon.render(scene, _camera(options, scene), layers=layers, **values)
+    progress.clear()
     for warning in frame.warnings:
         print(f"farlight: {warning}", file=sys.stderr)
     _write(options, frame)
@@ -117,12 +172,20 @@ def _render(options: argparse.Namespace) -> None:
 def main(arguments: list[str] | None = None) -> int:
     """The exit status."""
     options = _parser().parse_args(arguments)
+    progress = _Progress()
     try:
-        _render(options)
+        _render(options, progress)
     except Error as why:
+        progress.clear()
         print(f"farlight: {why}", file=sys.stderr)
         return USAGE if isinstance(why, InvalidValue) else TRY_AGAIN if why.retryable else FAILED
+    except MemoryError:
+        progress.clear()
+        print("farlight: out of memory", file=sys.stderr)
+        return FAILED
     except KeyboardInterrupt:
+        progress.clear()
+        print("farlight: interrupted", file=sys.stderr)
         return INTERRUPTED
     return 0
 

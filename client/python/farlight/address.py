@@ -23,6 +23,8 @@ class Link:
     socket: socket.socket
     process: Optional["subprocess.Popen[bytes]"] = None
     talk: Optional[IO[bytes]] = None  # what the program says
+    is_told: bool = False  # how it ended
+    is_final: bool = False
 
     def last_words(self) -> tuple[str, bool]:
         """How a program that has closed its end ended, with its last line; and whether it would do so again."""
@@ -37,9 +39,15 @@ class Link:
         line = b""
         if self.talk is not None:
             self.talk.seek(max(0, self.talk.seek(0, os.SEEK_END) - 2048))
-            line = (self.talk.read().strip().splitlines() or [b""])[-1][:400]
+            lines = [one for one in self.talk.read().strip().splitlines() if not one.startswith(b"READY")]
+            line = lines[-1][:400] if lines else b""
         text = "".join(one if one.isprintable() else "?" for one in line.decode("utf-8", "replace"))
         return f"{words}: {text}" if text else words, 0 < status < FIRST_SIGNAL_STATUS and status != TRY_AGAIN_STATUS
+
+    def end(self) -> None:
+        """Ends the program, which has nothing to finish."""
+        if self.process is not None:
+            self.process.terminate()
 
     def close(self) -> None:
         """Closes the socket, and sees that the program ends."""
@@ -138,13 +146,21 @@ def usual_key(server: str | None) -> str | None:
     return os.environ.get("FARLIGHT_KEY") or None if server and server.startswith("tcp:") else None
 
 
+def tell_end(why: Error | None, link: Link | None) -> bool:
+    """Adds to a lost connection how the program at its other end ended, if we started it; whether it would do so again."""
+    if link is None or link.process is None or type(why) is not ConnectionLost or link.is_told:
+        return link is not None and link.is_final
+    words, link.is_final = link.last_words()
+    link.is_told = bool(words)
+    why.text += f": {words}" if words else ""
+    return link.is_final
+
+
 def explain(why: Error, server: str | None, link: Link | None) -> None:
     """Adds to an error of the beginning where it happened, and what the program there said."""
     why.field = why.field or server or "farlightd"
-    if link is not None and isinstance(why, ConnectionLost):
-        words, is_final = link.last_words()
-        why.text += f": {words}" if words else ""
-        why.retryable = why.retryable and not is_final
+    if tell_end(why, link):
+        why.retryable = False
 
 
 def open_link(server: str | None, timeout: float) -> Link:

@@ -5,17 +5,20 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import os
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncGenerator, Callable
 from typing import Any, TypeVar
 
 from . import address, messages
+from .camera import Camera, CameraOf, command, one_frame, request
 from .client import RECEIVE_BYTES, SILENCE_S, Options, Retry
-from .core import Core, Operation
+from .connection import Operation
+from .core import Core, Progress
 from .errors import ConnectionLost, Error, TimedOut
 from .fields import Message
 from .frame import Frame
 from .jobs import Job
-from .scene import Camera, CameraOf, Object, Scene, request
+from .objects import Object
+from .scene import Scene
 
 T = TypeVar("T")
 
@@ -28,7 +31,7 @@ class AsyncView:
 
     def look(self, camera: Camera, moving: bool = False, time_s: float = 0.0) -> int:
         """As View.look()."""
-        number = self._core.look(self._job, camera.command(moving, time_s))
+        number = self._core.look(self._job, command(camera, moving, time_s))
         self._client._flush(self._core)
         return number
 
@@ -82,7 +85,10 @@ class AsyncClient:
             await asyncio.gather(self._pump_task, return_exceptions=True)
             self._pump_task = None
         if self._writer is not None:
-            self._writer.close()
+            # Its socket may be closed only when the loop has let go of it: a new one may have the same number.
+            self._writer.transport.abort()
+            with contextlib.suppress(OSError):
+                await self._writer.wait_closed()
             self._writer = None
         if self._link is not None:
             await asyncio.to_thread(self._link.close)
@@ -115,6 +121,8 @@ class AsyncClient:
                 core.ping()
             except OSError as why:
                 core.fail(ConnectionLost(f"the connection broke: {why.strerror}"))
+            if core.failure is not None and self._link is not None:
+                await asyncio.to_thread(address.tell_end, core.failure, self._link)
             self._flush(core)
             self._wake()
         if writer is not None:
@@ -127,15 +135,16 @@ class AsyncClient:
             self._writer.write(data)
 
     async def _operate(self, core: Core, operation: Operation[T]) -> T:
-        while True:
-            changed = self._changed
-            try:
-                next(operation)
-            except StopIteration as done:
-                self._flush(core)
-                result: T = done.value
-                return result
-            await self._wait(core, changed)
+        with contextlib.closing(operation):  # at once where the task is cancelled
+            while True:
+                changed = self._changed
+                try:
+                    next(operation)
+                except StopIteration as done:
+                    self._flush(core)
+                    result: T = done.value
+                    return result
+                await self._wait(core, changed)
 
     async def _wait(self, core: Core, changed: asyncio.Event) -> None:
         """Until something has come, or what was to be sent is on its way."""
@@ -190,7 +199,7 @@ class AsyncClient:
 
     async def read(self, scene: Scene, thing: Object) -> tuple[Message, int]:
         """As Client.read()."""
-        return await self._again(lambda core: core.read(scene, thing.kind, thing.number))
+        return await self._again(lambda core: core.read(scene, thing))
 
     async def describe(self, scene: Scene) -> messages.SceneDescription:
         """As Client.describe()."""
@@ -211,13 +220,15 @@ class AsyncClient:
 
     async def render(self, scene: Scene, camera: CameraOf = None, *, layers: Any = (), **values: Any) -> Frame:
         """As Client.render()."""
-        frame, = [frame async for frame in self.frames(scene, camera, layers=layers, **values)]
+        frame, = [frame async for frame in self.frames(scene, camera, layers=layers, **one_frame(values))]
         return frame
 
-    async def frames(self, scene: Scene, camera: CameraOf = None, *, layers: Any = (),
-                     **values: Any) -> AsyncIterator[Frame]:
+    def frames(self, scene: Scene, camera: CameraOf = None, *, layers: Any = (),
+               **values: Any) -> AsyncGenerator[Frame, None]:
         """As Client.frames()."""
-        render = request(camera, layers, {**values, "kind": messages.JobKind.BATCH})
+        return self._frames(scene, request(camera, layers, {**values, "kind": messages.JobKind.BATCH}))
+
+    async def _frames(self, scene: Scene, render: messages.Render) -> AsyncGenerator[Frame, None]:
         retry = Retry(self._options.retry_for)
         is_complete = False
         while not is_complete:
@@ -258,10 +269,9 @@ class AsyncClient:
         if not self._closed and self._writer is not None:
             self._core.leave()
             self._flush(self._core)
-            try:
-                await asyncio.wait_for(self._writer.drain(), 1)
-            except (OSError, asyncio.TimeoutError):
-                pass
+            self._writer.close()
+            with contextlib.suppress(OSError, asyncio.TimeoutError):
+                await asyncio.wait_for(self._writer.wait_closed(), 1)
         self._closed = True
         await self._drop()
 
@@ -273,9 +283,9 @@ class AsyncClient:
 
 
 async def connect(server: str | None = None, *, key_file: str | os.PathLike[str] | None = None, name: str = "python",
-                  timeout: float = SILENCE_S, retry_for: float = 0.0) -> AsyncClient:
+                  timeout: float = SILENCE_S, retry_for: float = 0.0, progress: Progress | None = None) -> AsyncClient:
     """As farlight.connect()."""
-    client = AsyncClient(Options(server, key_file, name, timeout, retry_for))
+    client = AsyncClient(Options(server, key_file, name, timeout, retry_for, progress, has_tasks=True))
     retry = Retry(retry_for)
     while True:
         try:

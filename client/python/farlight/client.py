@@ -5,17 +5,21 @@ from __future__ import annotations
 import contextlib
 import os
 import selectors
+import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator
 from typing import Any, TypeVar
 
 from . import address, messages
-from .core import Core, Operation
-from .errors import ConnectionLost, Error, Refused, TimedOut
+from .camera import Camera, CameraOf, command, one_frame, request
+from .connection import Operation
+from .core import Core, Progress
+from .errors import ConnectionLost, Error, InvalidValue, Refused, TimedOut
 from .fields import Message
 from .frame import Frame
 from .jobs import Job
-from .scene import Camera, CameraOf, Object, Scene, request
+from .objects import Object
+from .scene import Scene
 from .sealed import read_key
 
 T = TypeVar("T")
@@ -51,15 +55,21 @@ class Options:
     """What both clients are connected by."""
 
     def __init__(self, server: str | None, key_file: str | os.PathLike[str] | None, name: str, timeout: float,
-                 retry_for: float) -> None:
+                 retry_for: float, progress: Progress | None, has_tasks: bool = False) -> None:
+        if server is not None and not isinstance(server, str):
+            raise InvalidValue(f"{server!r:.80}; allowed: unix:PATH, tcp:HOST:PORT or ssh:HOST[:SOCKET]", field="server")
+        for what, value, least in (("timeout", timeout, 1e-3), ("retry_for", retry_for, 0)):
+            if not isinstance(value, (int, float)) or not least <= value < threading.TIMEOUT_MAX:
+                raise InvalidValue(f"{value!r:.80}; allowed: seconds, at least {least:g}", field=what)
         self.server = server or address.usual_server()
         key_file = key_file or address.usual_key(self.server)
         self.key = read_key(key_file) if key_file and self.server else None
-        self.name, self.timeout, self.retry_for = name, timeout, retry_for
+        self.name, self.timeout, self.retry_for, self.progress = name, timeout, retry_for, progress
+        self.has_tasks = has_tasks
 
     def core(self, lost: Core | None) -> Core:
         """For a new connection."""
-        return Core(self.name, self.key, lost)
+        return Core(self.name, self.key, lost, self.progress, self.has_tasks)
 
 
 class View:
@@ -70,7 +80,7 @@ class View:
 
     def look(self, camera: Camera, moving: bool = False, time_s: float = 0.0) -> int:
         """Moves the camera; the number that frames have as begin.command. moving: more will follow soon."""
-        number = self._core.look(self._job, camera.command(moving, time_s))
+        number = self._core.look(self._job, command(camera, moving, time_s))
         self._client._flush()
         return number
 
@@ -104,6 +114,10 @@ class Client:
         except BaseException:
             self.close()
             raise
+
+    def __repr__(self) -> str:
+        state = "closed" if self._closed else f"lost: {self._core.failure}" if self._core.failure else self._core.daemon
+        return f"<farlight.Client of {self._options.server or 'a daemon of its own'}: {state}>"
 
     # ---- driving the core
 
@@ -147,12 +161,16 @@ class Client:
             self._core.fail(ConnectionLost(f"the connection broke: {why.strerror}"))
             return True
 
-    def _flush(self) -> None:
-        """Sends what can be sent without waiting."""
+    def _flush(self) -> bool:
+        """Sends what can be sent without waiting; whether that was anything."""
         assert self._link is not None
+        has_sent = False
         try:
             while unsent := self._core.unsent():
-                self._core.sent(self._link.socket.send(memoryview(unsent)[:RECEIVE_BYTES].tobytes()))
+                with memoryview(unsent) as view, view[:RECEIVE_BYTES] as part:
+                    count = self._link.socket.send(part)
+                self._core.sent(count)
+                has_sent = True
         except BlockingIOError:
             pass
         except OSError as why:
@@ -160,11 +178,12 @@ class Client:
             while self._core.failure is None and self._receive():
                 pass
             self._core.fail(ConnectionLost(f"the connection broke: {why.strerror}"))
+        return has_sent
 
     def _exchange(self, silence_s: float) -> None:
         """Sends, and waits until something has come or could be sent."""
-        self._flush()
-        if self._core.failure is not None:
+        # What has been sent has left room, for which an upload may have waited: nothing need come first.
+        if self._flush() or self._core.failure is not None:
             return
         assert self._link is not None
         quiet = 0
@@ -174,6 +193,7 @@ class Client:
             ready = self._selector.select(silence_s / 3)
             if ready and ready[0][1] & selectors.EVENT_READ:
                 self._receive()
+                address.tell_end(self._core.failure, self._link)
             if ready:
                 return
             quiet += 1
@@ -184,14 +204,15 @@ class Client:
             self._flush()
 
     def _operate(self, operation: Operation[T], silence_s: float | None = None) -> T:
-        while True:
-            try:
-                next(operation)
-            except StopIteration as done:
-                self._flush()
-                result: T = done.value
-                return result
-            self._exchange(silence_s or self._options.timeout)
+        with contextlib.closing(operation):  # a Ctrl-C must not leave it where it waits
+            while True:
+                try:
+                    next(operation)
+                except StopIteration as done:
+                    self._flush()
+                    result: T = done.value
+                    return result
+                self._exchange(silence_s or self._options.timeout)
 
     def _again(self, attempt: Callable[[], T]) -> T:
         """Attempts it until it succeeds or the time of retry_for is over."""
@@ -242,7 +263,7 @@ class Client:
 
     def read(self, scene: Scene, thing: Object) -> tuple[Message, int]:
         """A node, material, light or camera as the daemon has it, and the revision for send(base_revision=...)."""
-        return self._call(lambda: self._core.read(scene, thing.kind, thing.number))
+        return self._call(lambda: self._core.read(scene, thing))
 
     def describe(self, scene: Scene) -> messages.SceneDescription:
         """Bounds, cameras and clips."""
@@ -264,13 +285,16 @@ class Client:
     def render(self, scene: Scene, camera: CameraOf = None, *, layers: Any = (), **values: Any) -> Frame:
         """One picture. camera: a Camera, a node with one, or None: the whole scene in view. layers: "depth" or
         ("beauty", "normal"), as floats. `values`: fields of messages.Render, such as width, samples, integrator="path"."""
-        frame, = self.frames(scene, camera, layers=layers, **values)
+        frame, = self.frames(scene, camera, layers=layers, **one_frame(values))
         return frame
 
-    def frames(self, scene: Scene, camera: CameraOf = None, *, layers: Any = (), **values: Any) -> Iterator[Frame]:
+    def frames(self, scene: Scene, camera: CameraOf = None, *, layers: Any = (), **values: Any) -> Generator[Frame, None, None]:
         """The frames first_frame .. last_frame, one after the other. After a lost connection it goes on with the next
-        one, if there is a retry_for. Several cameras are keys over time."""
-        render = request(camera, layers, {**values, "kind": messages.JobKind.BATCH})
+        one, if there is a retry_for. Several cameras are keys over time. Arguments are checked at once; the job begins with
+        the first frame that is asked for, and ends with the generator."""
+        return self._frames(scene, request(camera, layers, {**values, "kind": messages.JobKind.BATCH}))
+
+    def _frames(self, scene: Scene, render: messages.Render) -> Generator[Frame, None, None]:
         retry = Retry(self._options.retry_for)
         is_complete = False
         while not is_complete:
@@ -321,12 +345,13 @@ class Client:
 
 
 def connect(server: str | None = None, *, key_file: str | os.PathLike[str] | None = None, name: str = "python",
-            timeout: float = SILENCE_S, retry_for: float = 0.0) -> Client:
+            timeout: float = SILENCE_S, retry_for: float = 0.0, progress: Progress | None = None) -> Client:
     """Connects to a daemon.
 
     server: unix:PATH, tcp:HOST:PORT or ssh:HOST[:SOCKET]; None: FARLIGHT_SERVER, else a daemon of one's own, which ends
     with the client. key_file: the daemon's key: the connection is sealed (default over TCP: FARLIGHT_KEY). timeout:
     seconds that the daemon may be silent. retry_for: seconds for which a daemon that is lost or has no place is waited
-    for; scenes are sent to it again, and animations go on where they were.
+    for; scenes are sent to it again, and animations go on where they were. progress: is called with "sending", bytes that
+    were and bytes in all, while the arrays of a scene are.
     """
-    return Client(Options(server, key_file, name, timeout, retry_for))
+    return Client(Options(server, key_file, name, timeout, retry_for, progress))

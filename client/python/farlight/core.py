@@ -1,43 +1,31 @@
 # SPDX-License-Identifier: MIT
-"""A connection without I/O: bytes in, bytes out, no socket and no clock. The plain and the asyncio clients drive it.
-
-What takes more than one step is an operation, a generator: it yields where it waits for something to arrive or to be
-sent, and returns its result. Several may wait at once. The core believes nothing that comes: every failure ends up in
-`failure`, which all operations raise.
-"""
+"""What a client does with a connection, as operations: scenes, their blobs and edits, jobs and their frames. The plain and
+the asyncio clients drive it."""
 from __future__ import annotations
 
 import collections
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
-from typing import Any, TypeVar
 
 from . import fields, framing, handshake, messages
-from .errors import Cancelled, ConnectionLost, Error, InvalidValue, ProtocolError, Refused
+from .connection import UPLOAD_CHANNEL, Connection, Operation, refused
+from .errors import ConnectionLost, InvalidValue, ProtocolError, Refused
 from .fields import Bytes, Message
 from .frame import Frame
 from .jobs import Job, Pending
-from .messages import ErrorCode
-from .scene import Scene, Sharing
-from .sealed import Seal
+from .messages import ErrorCode, ObjectKind, Sharing
+from .objects import Object
+from .scene import Scene
 
-T = TypeVar("T")
-Operation = Generator[None, None, T]
-
-UPLOAD_CHANNEL, PIECE_BYTES = 1, 262144
-QUEUED_BYTES = 4 << 20  # that may wait to be sent before an operation waits
+PIECE_BYTES = 262144
 OFFER_BLOBS = 1024
 BLOBS_IN_FLIGHT = 16
 FRAMES_AHEAD = 2
-STATES_CHANGE = (ErrorCode.SHUTTING_DOWN, ErrorCode.DEVICE_LOST, ErrorCode.BUSY)
-
-
-def refused(error: messages.Error) -> Refused:
-    """The exception of a message."""
-    kind = Cancelled if error.code == ErrorCode.CANCELLED else Refused
-    code = ErrorCode(int(error.code))
-    return kind(error.text or code.word, code=code, field=error.field, remedy=error.remedy,
-                retryable=bool(error.retryable) or code in STATES_CHANGE, retry_after_s=error.retry_after_ms / 1000)
+READABLE: dict[ObjectKind, type[Message]] = {
+    ObjectKind.NODE: messages.SetNode, ObjectKind.MATERIAL: messages.SetMaterial, ObjectKind.LIGHT: messages.SetLight,
+    ObjectKind.CAMERA: messages.SetCamera, ObjectKind.ENVIRONMENT: messages.SetEnvironment,
+}
+Progress = Callable[[str, int, int], None]  # what is done, bytes of it, bytes in all
 
 
 @dataclass
@@ -49,200 +37,20 @@ class SceneState:
     is_busy: bool = False
 
 
-class Core:
-    """One connection. `lost`: the previous one's core, whose scenes may still linger at the daemon."""
+class Core(Connection):
+    """`lost`: the previous connection's core, whose scenes may still linger at the daemon."""
 
-    def __init__(self, name: str = "python", key: bytes | None = None, lost: Core | None = None) -> None:
-        self._in, self._out = bytearray(), bytearray()
-        self._seal = Seal(key) if key else None
-        self._is_greeted = False
-        self.failure: Error | None = None
-        self.limits: dict[str, int] = {}
-        self.capabilities = 0
-        self.daemon = ""
-        self._changes: dict[int, int] = {}  # scene -> revision of another client's last change
-        self._pending: dict[int, Pending] = {}
-        self._jobs: dict[int, Job] = {}
-        self._request, self._channel, self._scene_number = 0, UPLOAD_CHANNEL, 0
-        self._credit = self._uploaded = 0
+    def __init__(self, name: str = "python", key: bytes | None = None, lost: Core | None = None,
+                 progress: Progress | None = None, has_tasks: bool = False) -> None:
+        super().__init__(name, key)
+        self.has_tasks = has_tasks  # that use it at once
+        self._channel = UPLOAD_CHANNEL
+        self._uploaded = 0
         self._held: set[bytes] = set()
         self._is_uploading = False
         self._scenes: dict[Scene, SceneState] = {}
         self._before: dict[Scene, SceneState] = {**lost._before, **lost._scenes} if lost else {}
-        self._out += handshake.hello(name)
-
-    # ---- bytes
-
-    def unsent(self) -> Bytes:
-        """What is to be sent now."""
-        if self._seal is None:
-            return self._out
-        if self._out and self._seal.may_seal:
-            self._seal.seal(self._out)
-            self._out.clear()
-        return self._seal.out
-
-    def sent(self, count: int) -> None:
-        """So many bytes of unsent() were."""
-        del (self._out if self._seal is None else self._seal.out)[:count]
-
-    def receive(self, data: Bytes) -> None:
-        """Takes what came; empty: the other side has closed."""
-        if self.failure is not None:
-            return
-        try:
-            if not data:
-                self._ended()
-            self._in += self._seal.receive(data) if self._seal else data
-            while self._take_one():
-                pass
-        except Error as why:
-            self.fail(why)
-
-    def fail(self, why: Error) -> None:
-        """Gives the connection up."""
-        if self.failure is None:
-            self.failure = why
-
-    def _ended(self) -> None:
-        if self._seal is not None:
-            self._seal.check_end()
-        raise ConnectionLost("the daemon closed the connection" + " in the middle of a message" * bool(self._in))
-
-    def _send(self, message: Message, request: int = 0, channel: int = 0) -> None:
-        self._out += framing.pack(message, request, channel)
-
-    def _take_one(self) -> bool:
-        """False: there is no whole message."""
-        if not self._is_greeted:
-            return self._take_reply()
-        received = framing.cut(self._in, ("server", "both"))
-        if received is not None:
-            self._dispatch(*received)
-        return received is not None
-
-    # ---- handshake
-
-    def _take_reply(self) -> bool:
-        reply = handshake.parse(self._in)
-        if reply is not None:
-            self.limits, self.capabilities, self.daemon = reply.limits, reply.capabilities, reply.daemon
-            del self._in[:reply.size]
-            self._is_greeted = True
-        return reply is not None
-
-    def greet(self) -> Operation[None]:
-        """Until the handshake is done."""
-        return self._until(lambda: self._is_greeted)
-
-    # ---- messages that come
-
-    def _dispatch(self, message: Message, request: int, channel: int) -> None:
-        if isinstance(message, messages.Ping):
-            self._send(messages.Pong(message.sent_ns), request)
-        elif isinstance(message, messages.Credit):
-            if message.channel == UPLOAD_CHANNEL:
-                self._credit = max(self._credit, message.total)
-        elif isinstance(message, messages.Blocked):
-            pass
-        elif isinstance(message, messages.SceneChanged):
-            if message.scene <= self._scene_number:
-                self._changes[message.scene] = message.revision
-        elif isinstance(message, messages.Goodbye):
-            raise ConnectionLost(f"the daemon ended the connection: {message.text or messages.ErrorCode(int(message.code)).word}",
-                                 retryable=message.code == ErrorCode.SHUTTING_DOWN or message.code == ErrorCode.TIMEOUT)
-        elif isinstance(message, messages.Error) and request == 0:
-            raise refused(message)
-        elif isinstance(message, (messages.FrameBegin, messages.FrameData, messages.FrameEnd)):
-            self._take_frame(message, request, channel)
-        else:
-            self._take_answer(message, request)
-
-    def _take_frame(self, message: Message, request: int, channel: int) -> None:
-        job = self._jobs.get(channel)
-        if job is None or job.request != request:
-            raise ProtocolError(f"channel {channel} and request {request} are no job's", field=message.NAME)
-        frame = job.take(message)
-        if job.is_abandoned:
-            return
-        if job.is_view and isinstance(message, messages.FrameBegin):
-            self._send(messages.FrameAck(channel, message.frame, 0, 0))
-        if frame is not None:
-            if job.is_view:
-                self._send(messages.FrameAck(channel, frame.number, 1, 0))
-            job.frames.append(frame)
-
-    def _take_answer(self, message: Message, request: int) -> None:
-        pending = self._pending.get(request)
-        if pending is None:
-            raise ProtocolError(f"request {request} was not made, or has been answered", field=message.NAME)
-        if isinstance(message, (messages.Error, *pending.finals)):
-            pending.answer = message
-            del self._pending[request]
-            for channel in [channel for channel, job in self._jobs.items() if job.request == request]:
-                del self._jobs[channel]
-        elif pending.extra is not None and isinstance(message, pending.extra) and pending.came is None:
-            pending.came = message
-        else:
-            raise ProtocolError(f"is no answer to request {request}", field=message.NAME)
-
-    # ---- requests
-
-    def _until(self, ready: Callable[[], bool]) -> Operation[None]:
-        while not ready():
-            if self.failure is not None:
-                raise self.failure
-            yield
-        if self.failure is not None:
-            raise self.failure
-
-    def _begin(self, finals: tuple[type[Message], ...], extra: type[Message] | None = None) -> tuple[int, Pending]:
-        if self.failure is not None:
-            raise self.failure
-        self._request = self._request % 0xffffffff + 1
-        pending = self._pending[self._request] = Pending(finals, extra)
-        return self._request, pending
-
-    def _has_room(self) -> bool:
-        """Of the requests that may be in flight one is left for a cancel."""
-        return len(self._pending) < max(self.limits.get("requests_in_flight") or 64, 2) - 1 and self._has_space()
-
-    def _has_space(self) -> bool:
-        return len(self._out) < QUEUED_BYTES
-
-    def _answer(self, pending: Pending) -> Operation[Message]:
-        yield from self._until(lambda: pending.answer is not None)
-        assert pending.answer is not None
-        if isinstance(pending.answer, messages.Error):
-            raise refused(pending.answer)
-        return pending.answer
-
-    def ask(self, message: Message, answer: type[Message] = messages.Ok,
-            extra: type[Message] | None = None) -> Operation[tuple[Any, Any]]:
-        """Sends a request; its answer, and what came before it."""
-        yield from self._until(self._has_room)
-        request, pending = self._begin((answer,), extra)
-        try:
-            self._send(message, request)
-        except InvalidValue:
-            del self._pending[request]
-            raise
-        return (yield from self._answer(pending)), pending.came
-
-    def ping(self) -> None:
-        """Asks for a sign of life."""
-        if self._is_greeted and self.failure is None and self._has_room():
-            request, _ = self._begin((messages.Pong,))
-            self._send(messages.Ping(0), request)
-
-    def leave(self) -> None:
-        """Says goodbye; the connection takes nothing more."""
-        if self._is_greeted and self.failure is None:
-            self._send(messages.Goodbye(ErrorCode.NONE, ""))
-            self.unsent()
-            if self._seal is not None and self._seal.may_seal:
-                self._seal.seal(b"")
-        self.fail(ConnectionLost("the connection was closed here", retryable=False))
+        self._progress = progress
 
     # ---- scenes
 
@@ -263,10 +71,12 @@ class Core:
             wanted = [one.index for one in need.needed]
             if any(index >= len(part) for index in wanted) or len(set(wanted)) != len(wanted):
                 self.fail(ProtocolError("names blobs that were not offered", field="blob_need.needed"))
-            yield from self._send_blobs([(part[index], blobs[part[index]]) for index in wanted if index < len(part)])
+            chosen = [(part[index], blobs[part[index]]) for index in wanted if index < len(part)]
+            yield from self._send_blobs(chosen)
             self._held.update(part)
 
     def _send_blobs(self, wanted: Sequence[tuple[bytes, Bytes]]) -> Operation[None]:
+        before, total = self._uploaded, sum(len(data) for _, data in wanted)
         on_way: collections.deque[Pending] = collections.deque()
         for name, data in wanted:
             if len(on_way) >= BLOBS_IN_FLIGHT:
@@ -275,8 +85,11 @@ class Core:
             request, pending = self._begin((messages.Ok,))
             on_way.append(pending)
             try:
-                yield from self._send_pieces(name, data, request, pending)
-            except GeneratorExit:
+                for _ in self._send_pieces(name, data, request, pending):
+                    if self._progress is not None:
+                        self._progress("sending", self._uploaded - before, total)
+                    yield
+            except BaseException:  # a Ctrl-C may come at any place
                 self.fail(ConnectionLost("an upload was left in its middle"))
                 raise
         for pending in on_way:
@@ -315,6 +128,8 @@ class Core:
 
     def open(self, scene: Scene) -> Operation[SceneState]:
         """The scene as the daemon has it, opened or attached to."""
+        if not isinstance(scene, Scene):
+            raise InvalidValue(f"{scene!r:.80} is no farlight.Scene", field="scene", remedy="farlight.load(FILE) makes one of a file")
         state = self._scenes.setdefault(scene, SceneState())
         yield from self._until(lambda: not state.is_busy)
         if not state.scene:
@@ -334,10 +149,10 @@ class Core:
                 if not self._has_space():
                     yield from self._until(lambda: self._has_space() or pending.answer is not None)
                 self._out += framing.wrap(kind, payload, request)
-        except GeneratorExit:
+            self._send(messages.EditCommit(), request)
+        except BaseException:
             self.fail(ConnectionLost("a transaction was left in its middle"))
             raise
-        self._send(messages.EditCommit(), request)
         answer = yield from self._answer(pending)
         assert isinstance(answer, messages.Ok)
         return answer
@@ -351,6 +166,8 @@ class Core:
         state.is_busy = True
         try:
             version, edits = scene.version, scene.edits_since(state.version)
+            if any(getattr(edit, "keeps_image", 0) for edit in edits):
+                self._check_reads_objects()  # an older one would drop the image
             payloads = [(edit.TYPE, fields.encode(edit)) for edit in edits]  # all are valid before the first is sent
             yield from self._upload(scene.blobs_of(edits))
             answer = yield from self._transact(messages.EditBegin(state.scene, base_revision), payloads)
@@ -374,15 +191,15 @@ class Core:
         if not self.capabilities & handshake.CAN_READ_OBJECTS:
             raise Refused("the daemon is too old to tell of its objects", code=ErrorCode.UNSUPPORTED)
 
-    def read(self, scene: Scene, kind: messages.ObjectKind, number: int) -> Operation[tuple[Message, int]]:
+    def read(self, scene: Scene, thing: Object) -> Operation[tuple[Message, int]]:
         """An object as the daemon has it, and the scene's revision."""
+        if not isinstance(thing, Object) or thing.kind not in READABLE:
+            raise InvalidValue(f"{thing!r:.80} cannot be read; allowed: {', '.join(kind.word for kind in READABLE)}",
+                               field="object")
         state = yield from self.open(scene)
         self._check_reads_objects()
-        extra = {messages.ObjectKind.NODE: messages.SetNode, messages.ObjectKind.MATERIAL: messages.SetMaterial,
-                 messages.ObjectKind.LIGHT: messages.SetLight, messages.ObjectKind.CAMERA: messages.SetCamera}.get(kind)
-        if extra is None:
-            raise InvalidValue("only nodes, materials, lights and cameras can be read", field="object_get.kind")
-        answer, came = yield from self.ask(messages.ObjectGet(state.scene, kind, number), extra=extra)
+        answer, came = yield from self.ask(messages.ObjectGet(state.scene, thing.kind, thing.number),
+                                           extra=READABLE[thing.kind])
         if came is None:
             self.fail(ProtocolError("the object did not come", field="object_get"))
             raise ProtocolError("the object did not come", field="object_get")
@@ -414,8 +231,9 @@ class Core:
 
     def _start(self, render: messages.Render) -> Operation[Job]:
         most = self.limits.get("views_per_client") or 4
+        # Where there are no tasks, nothing would end another job meanwhile: the daemon says that they are too many.
         yield from self._until(lambda: self._has_room() and (
-            len(self._jobs) < most or all(job.is_view for job in self._jobs.values())))
+            not self.has_tasks or len(self._jobs) < most or all(job.is_view for job in self._jobs.values())))
         self._channel += 1
         render.channel = self._channel
         if not self.capabilities & handshake.CAN_CHOOSE_PRIMARY and render.primary in ("auto", messages.Primary.AUTO):

@@ -199,6 +199,8 @@ class _Exactly(Field):
         self.fixed_bytes = count
 
     def encode(self, value: Any, out: bytearray, path: str) -> None:
+        if not isinstance(value, (bytes, bytearray, memoryview)):
+            raise InvalidValue(f"{value!r:.80} are no bytes", field=path)
         if len(value) != self.fixed_bytes:
             raise InvalidValue(f"{len(value)} bytes where {self.fixed_bytes} belong", field=path)
         out += value
@@ -242,6 +244,8 @@ class _Array(Field):
         self.record_bytes = sum(field.fixed_bytes or field.least_bytes for field in record.FIELDS)
 
     def encode(self, value: Any, out: bytearray, path: str) -> None:
+        if not isinstance(value, (list, tuple)):
+            raise InvalidValue(f"{value!r:.80} is no list of {self.record.__name__}", field=path)
         if len(value) > self.maximum:
             raise InvalidValue(f"{len(value)} of them where {self.maximum} are allowed", field=path)
         out += len(value).to_bytes(4, "little")

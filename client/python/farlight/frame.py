@@ -16,34 +16,36 @@ Array = npt.NDArray[Any]
 _TYPES = {PixelFormat.RGBA8: "u1", PixelFormat.RGBA16F: "<f2", PixelFormat.RGBA32F: "<f4"}
 
 
-def bytes_per_pixel(begin: FrameBegin) -> int:
-    """Of its format."""
-    return 4 * np.dtype(_TYPES[PixelFormat(int(begin.format))]).itemsize
+def pixels_bytes(begin: FrameBegin) -> int:
+    """Of all its images, decoded."""
+    bytes_per_pixel = 4 * np.dtype(_TYPES[PixelFormat(int(begin.format))]).itemsize
+    return begin.width * begin.height * bytes_per_pixel * begin.layers.bit_count()
 
 
-def layer_count(begin: FrameBegin) -> int:
-    """Images in the frame."""
-    return bin(begin.layers).count("1")
-
-
-def layer_set(layers: Union[int, str, Layer, "tuple[str | Layer, ...]", "list[str | Layer]"]) -> int:
+def layer_set(layers: Union[str, Layer, "tuple[str | Layer, ...]", "list[str | Layer]"]) -> int:
     """The set of bits of "depth", or of ("beauty", "depth")."""
-    names = (layers,) if isinstance(layers, (str, Layer)) else layers
-    if isinstance(names, int):
-        return names
     try:
+        names = (layers,) if isinstance(layers, (str, Layer)) else tuple(layers)
         return sum({1 << int(Layer.of(name)) for name in names})
-    except ValueError as why:
+    except (TypeError, ValueError) as why:
         raise InvalidValue(str(why), field="render.layers") from None
 
 
 @dataclass(frozen=True)
 class Frame:
     """A picture as it came. `begin` and `end` are all that the daemon says of it: camera, revision, samples, digest,
-    rays, times of the stages. Arrays are views of its bytes, rows from the top, and cannot be written to."""
+    rays, times of the stages. Arrays are views of `data`, its pixels, rows from the top, and cannot be written to.
+    `is_checked`: they have the digest that the daemon computed; not known of JPEG, and without libxxhash."""
     begin: FrameBegin
     end: FrameEnd
-    data: bytes
+    data: memoryview
+    is_checked: bool = False
+
+    def __repr__(self) -> str:
+        width, height = self.size
+        names = ", ".join(layer.word for layer in self.layers)
+        return (f"<farlight.Frame {self.number}: {width}x{height} {PixelFormat(int(self.begin.format)).word}, {names}, "
+                f"{self.begin.samples} samples>")
 
     @property
     def number(self) -> int:
@@ -63,11 +65,14 @@ class Frame:
     def layer(self, layer: str | Layer) -> Array:
         """Height x width x 4 numbers of one layer: what the protocol says of it."""
         try:
-            place = self.layers.index(Layer(Layer.of(layer)))
-        except ValueError:
-            raise InvalidValue(f"the frame has {', '.join(one.word for one in self.layers)} and not {layer}",
-                               field="layer", remedy="name it in `layers` of the request") from None
-        shape = (layer_count(self.begin), self.begin.height, self.begin.width, 4)
+            wanted = Layer(Layer.of(layer))
+        except ValueError as why:
+            raise InvalidValue(str(why), field="layer") from None
+        if wanted not in self.layers:
+            raise InvalidValue(f"the frame has {', '.join(one.word for one in self.layers)} and not {wanted.word}",
+                               field="layer", remedy=f'ask for it: layers=("{wanted.word}", ...)')
+        place = self.layers.index(wanted)
+        shape = (self.begin.layers.bit_count(), self.begin.height, self.begin.width, 4)
         images = np.frombuffer(self.data, _TYPES[PixelFormat(int(self.begin.format))]).reshape(shape)
         one: Array = images[place]
         return one

@@ -52,8 +52,9 @@ def cut(data: bytearray, senders: tuple[str, ...]) -> Received | None:
         whole = end + -size % 8
         if len(data) < whole:
             return None
-        payload, padding = bytes(data[_HEADER.size:end]), bytes(data[end:whole])
-        if any(padding):
+        with memoryview(data) as view:
+            payload = bytes(view[_HEADER.size:end])  # one copy, where a slice of `data` would be two
+        if any(data[end:whole]):
             raise ProtocolError("padding is not zero", field=name)
         del data[:whole]
         if row is not None:

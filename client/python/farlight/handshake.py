@@ -17,7 +17,7 @@ NAME_MAX_BYTES, LIMITS_MAX_BYTES, FIXED_BYTES = 64, 256, 48
 
 def hello(name: str) -> bytes:
     """A client's; `name` is what the daemon shows of it."""
-    encoded = name.encode("utf-8", "replace")
+    encoded = name.encode("utf-8", "replace") if isinstance(name, str) else b"\0"
     if len(encoded) > NAME_MAX_BYTES or b"\0" in encoded:
         raise InvalidValue(f"{name!r} is not at most {NAME_MAX_BYTES} bytes without NUL", field="name")
     made = MAGIC + VERSION.to_bytes(2, "little") * 2 + (CAN_CHOOSE_PRIMARY | CAN_READ_OBJECTS).to_bytes(8, "little")

@@ -9,11 +9,13 @@ from collections.abc import Sequence
 
 from . import address, framing, messages
 from .blobs import blob_hash
-from .core import UPLOAD_CHANNEL
+from .connection import UPLOAD_CHANNEL
+from .core import Progress
 from .errors import FileFailed, ImportFailed, InvalidValue, ProtocolError
 from .fields import Message
 from .messages import ObjectKind
-from .scene import Object, Scene
+from .objects import Object
+from .scene import Scene
 
 WINDOW_BYTES = 16 << 20  # that the importer may send ahead
 RECEIVE_BYTES = 1 << 20
@@ -24,8 +26,8 @@ MODELS_MAX = 64
 class _Import:
     """What has come of it so far."""
 
-    def __init__(self, scene: Scene, max_bytes: int) -> None:
-        self.scene, self.left = scene, max_bytes
+    def __init__(self, scene: Scene, max_bytes: int, progress: Progress | None = None) -> None:
+        self.scene, self.left, self.progress = scene, max_bytes, progress
         self.incoming, self.out = bytearray(), bytearray()
         self.offered: dict[bytes, int] = {}
         self.partial: dict[tuple[int, bytes], bytearray] = {}
@@ -66,6 +68,9 @@ class _Import:
             self.out += framing.pack(messages.Ok(1), request)
         elif isinstance(message, messages.ImportDone):
             self.is_done = True
+        elif isinstance(message, messages.ImportProgress):
+            if self.progress is not None:
+                self.progress("importing", message.done_bytes, message.total_bytes)
         elif message.SENDER == "local":
             pass
         elif message.NAME.startswith("set_") and request == self.transaction:
@@ -126,7 +131,10 @@ def _run(link: address.Link, work: _Import, timeout: float, names: str) -> None:
 
 def _word(path: str | os.PathLike[str]) -> str:
     """A name may begin with '-'."""
-    name = os.fspath(path)
+    try:
+        name = os.fsdecode(path)
+    except TypeError:
+        raise InvalidValue(f"{path!r:.80} is no path", field="models") from None
     try:
         with open(os.open(name, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK), "rb"):
             pass
@@ -140,10 +148,11 @@ def _word(path: str | os.PathLike[str]) -> str:
 def load(*models: str | os.PathLike[str], environment: str | os.PathLike[str] | None = None,
          environment_degrees: float = 0.0, variant: str | None = None, point_size: float | None = None,
          name: str = "", sharing: messages.Sharing | str = "private", arguments: Sequence[str] = (),
-         timeout: float = 600.0, max_bytes: int = BYTES_MAX) -> Scene:
+         timeout: float = 600.0, max_bytes: int = BYTES_MAX, progress: Progress | None = None) -> Scene:
     """A scene from model files (glTF, OBJ, NFF, PLY and more), to be changed and rendered like any other; several in
     one space. `scene.notes` says what a file has that is not shown. environment: an image that lights the scene.
     arguments: further ones of farlight-import, such as --at. It holds the models' bytes in memory: at most max_bytes.
+    progress: is called with "importing", bytes that were read and bytes in all; 0: not known.
 
     FileFailed, or ImportFailed with the importer's words.
     """
@@ -162,7 +171,10 @@ def load(*models: str | os.PathLike[str], environment: str | os.PathLike[str] | 
     scene = Scene(name, sharing)
     link = address.start_program("farlight-import", words)
     try:
-        _run(link, _Import(scene, max_bytes), timeout, ", ".join(os.fspath(model) for model in models) or "environment")
+        _run(link, _Import(scene, max_bytes, progress), timeout, ", ".join(map(os.fsdecode, models)) or "environment")
+    except BaseException:  # a Ctrl-C, too: it need not go on
+        link.end()
+        raise
     finally:
         link.close()
     return scene

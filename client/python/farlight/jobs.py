@@ -6,10 +6,11 @@ import collections
 from dataclasses import dataclass, field
 from typing import Optional
 
-from . import messages
+from . import decode, messages
 from .errors import ProtocolError
 from .fields import Message
-from .frame import Frame, bytes_per_pixel, layer_count
+from .frame import Frame, pixels_bytes
+from .messages import Encoding
 
 
 @dataclass
@@ -52,13 +53,14 @@ class Job:
         if pixels > width * height or (not self.is_view and (begin.width, begin.height) != (width, height)):
             raise ProtocolError(f"a picture of {begin.width}x{begin.height} where {width}x{height} was asked for",
                                 field="frame_begin.width")
-        if (begin.encoding, begin.format, begin.layers) != (render.encoding, render.format, render.layers or 1):
+        encodings = {render.encoding, render.still_encoding} if self.is_view else {render.encoding}
+        if begin.encoding not in encodings or (begin.format, begin.layers) != (render.format, render.layers or 1):
             raise ProtocolError(f"{begin.encoding!r}, {begin.format!r}, layers {begin.layers}: not what was asked for",
                                 field="frame_begin.encoding")
-        wanted = pixels * bytes_per_pixel(begin) * layer_count(begin)
+        most = decode.encoded_bytes_max(begin, pixels_bytes(begin))
         attached = begin.depth_bytes + begin.normal_bytes + begin.sticking_bytes
-        if begin.size_bytes != wanted or attached:
-            raise ProtocolError(f"{begin.size_bytes} bytes, and {attached} attached, where the picture has {wanted}",
+        if not 0 < begin.size_bytes <= most or (begin.encoding == Encoding.RAW and begin.size_bytes != most) or attached:
+            raise ProtocolError(f"{begin.size_bytes} bytes, and {attached} attached, where the picture has {most}",
                                 field="frame_begin.size_bytes")
 
     def take(self, message: Message) -> Optional[Frame]:
@@ -82,6 +84,7 @@ class Job:
         if message.frame != self.begun.frame or message.abandoned or len(self.data) != self.begun.size_bytes:
             raise ProtocolError(f"frame {message.frame} ends with {len(self.data)} of {self.begun.size_bytes} bytes, "
                                 f"and frame {self.begun.frame} was begun", field="frame_end.frame")
-        frame = Frame(self.begun, message, bytes(self.data))
+        pixels, is_checked = decode.decode(self.begun, self.data, pixels_bytes(self.begun))
+        frame = Frame(self.begun, message, pixels, is_checked)
         self.begun, self.data, self.came = None, bytearray(), self.came + 1
         return frame

@@ -4,23 +4,25 @@ from __future__ import annotations
 
 import os
 import struct
-import tempfile
 import zlib
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from .errors import FileFailed, InvalidValue
+from . import files
+from .errors import InvalidValue
 
 _UP = 2  # the filter: each byte minus the one above it
 
 
 def encode(pixels: npt.NDArray[Any]) -> bytes:
     """Height x width (grey), x 3 or x 4 of uint8."""
-    if pixels.dtype != np.uint8 or pixels.ndim not in (2, 3) or (pixels.ndim == 3 and pixels.shape[2] not in (3, 4)):
-        raise InvalidValue(f"has {pixels.dtype} and the shape {pixels.shape} where uint8 and (height, width[, 3 or 4]) belong",
-                           field="pixels")
+    pixels = np.asarray(pixels)
+    if pixels.dtype != np.uint8 or pixels.ndim not in (2, 3) or pixels.shape[2:] not in ((), (3,), (4,)) or not pixels.size:
+        raise InvalidValue(f"an array of {pixels.dtype} with the shape {pixels.shape}; allowed: uint8 with the shape (height, "
+                           "width), (height, width, 3) or (height, width, 4)", field="pixels",
+                           remedy="render without `layers` and `format`, whose floats have no tone map")
     height, width = pixels.shape[:2]
     channels = 1 if pixels.ndim == 2 else pixels.shape[2]
     rows = np.ascontiguousarray(pixels).reshape(height, width * channels)
@@ -37,18 +39,6 @@ def encode(pixels: npt.NDArray[Any]) -> bytes:
 
 
 def write(path: str | os.PathLike[str], pixels: npt.NDArray[Any]) -> None:
-    """Complete or not at all: under a temporary name, then renamed."""
-    data, name = encode(pixels), os.fspath(path)
-    temporary = ""
-    try:
-        descriptor, temporary = tempfile.mkstemp(dir=os.path.dirname(name) or ".", prefix=".farlight-")
-        with open(descriptor, "wb") as file:
-            umask = os.umask(0)
-            os.umask(umask)
-            os.fchmod(file.fileno(), 0o666 & ~umask)
-            file.write(data)
-        os.replace(temporary, name)
-    except OSError as why:
-        if temporary and os.path.exists(temporary):
-            os.unlink(temporary)
-        raise FileFailed(f"cannot be written: {why.strerror}", field=name) from None
+    """Complete or not at all."""
+    data = encode(pixels)
+    files.write(path, lambda file: file.write(data))

@@ -6,12 +6,13 @@ system's libsodium.
 from __future__ import annotations
 
 import ctypes
-import ctypes.util
+import functools
 import hashlib
 import hmac
 import os
 import stat
 
+from . import libraries
 from .errors import ConnectionLost, FileFailed, ProtocolError, Refused
 from .fields import Bytes
 from .messages import ErrorCode
@@ -29,27 +30,15 @@ REFUSALS = {
     OTHER_VERSION: ("the daemon speaks another version of sealed connections", ""),
 }
 
-_library: ctypes.CDLL | None = None
 
-
+@functools.cache
 def _sodium() -> ctypes.CDLL:
-    global _library
-    if _library is None:
-        for name in ("libsodium.so.23", ctypes.util.find_library("sodium") or "libsodium.so"):
-            try:
-                library = ctypes.CDLL(name)
-                break
-            except OSError:
-                continue
-        else:
-            raise FileFailed("sealed connections need this library", field="libsodium",
-                             remedy="install the package libsodium23")
-        size = library.crypto_secretstream_xchacha20poly1305_statebytes
-        size.restype = ctypes.c_size_t
-        if library.sodium_init() < 0 or size() > STATE_BYTES:
-            raise FileFailed("this library cannot be used", field="libsodium")
-        _library = library
-    return _library
+    library = libraries.need("sodium", 23, "sealed connections")
+    size = library.crypto_secretstream_xchacha20poly1305_statebytes
+    size.restype = ctypes.c_size_t
+    if library.sodium_init() < 0 or size() > STATE_BYTES:
+        raise FileFailed("this library cannot be used", field="libsodium")
+    return library
 
 
 def read_key(path: str | os.PathLike[str]) -> bytes:
@@ -158,7 +147,8 @@ class Seal:
             raise ProtocolError("nothing can be sealed yet", field="sealed")
         sodium = _sodium()
         for at in range(0, max(len(plain), 1), PLAIN_MAX_BYTES):
-            piece = bytes(plain[at:at + PLAIN_MAX_BYTES])
+            with memoryview(plain) as view:
+                piece = bytes(view[at:at + PLAIN_MAX_BYTES])
             length = (len(piece) + TAG_BYTES).to_bytes(4, "little")
             record = ctypes.create_string_buffer(len(piece) + TAG_BYTES)
             sodium.crypto_secretstream_xchacha20poly1305_push(

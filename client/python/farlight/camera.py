@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: MIT
+"""Cameras, and the messages of jobs that look through them."""
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Union
+
+import numpy as np
+
+from . import arrays, decode, fields, messages
+from .arrays import Array, Numbers
+from .errors import InvalidValue
+from .frame import layer_set
+from .messages import Encoding, ObjectKind
+from .objects import Object, make
+
+FOV_MIN, FOV_MAX = 0.06, 177.6  # degrees: what messages may have, in radians
+
+
+def look_at(eye: Numbers, target: Numbers, up: Numbers = (0, 1, 0)) -> Array:
+    """The 4 x 4 transform of a node at `eye` whose -z points at `target`: for cameras, spots and rectangles."""
+    place, at, above = (np.array(arrays.vector(one, f"look_at.{name}"))
+                        for one, name in ((eye, "eye"), (target, "target"), (up, "up")))
+    back = place - at
+    right = np.cross(above, back)
+    if not np.linalg.norm(back) > 0 or not np.linalg.norm(right) > 1e-12 * np.linalg.norm(back):
+        raise InvalidValue("the eye is at its target, or looks along `up`", field="look_at",
+                           remedy="move one of them, or give another `up`")
+    back, right = back / np.linalg.norm(back), right / np.linalg.norm(right)
+    made = np.eye(4)
+    made[:3] = np.column_stack((right, np.cross(back, right), back, place))
+    return made
+
+
+def translate(x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Array:
+    """The 4 x 4 transform of a node at that place."""
+    made = np.eye(4)
+    made[:3, 3] = arrays.vector((x, y, z), "translate")
+    return made
+
+
+def command(camera: Any, moving: bool, time_s: float) -> messages.ViewCamera:
+    """A camera for a view."""
+    if not isinstance(camera, Camera):
+        raise InvalidValue(f"{camera!r:.80} is no farlight.Camera", field="camera")
+    return messages.ViewCamera(moving=int(moving), time_s=time_s, eye_world=camera.eye, look_at_world=camera.look_at,
+                               up_world=camera.up, fov_y=math.radians(camera.fov_degrees))
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A camera of a job: where it is, what is at the centre of its picture, its vertical field of view."""
+    eye: Sequence[float]
+    look_at: Sequence[float] = (0.0, 0.0, 0.0)
+    up: Sequence[float] = (0.0, 1.0, 0.0)
+    fov_degrees: float = 40.0
+    time_s: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("eye", "look_at", "up"):
+            object.__setattr__(self, name, tuple(arrays.vector(getattr(self, name), f"camera.{name}")))
+        for name in ("fov_degrees", "time_s"):
+            object.__setattr__(self, name, arrays.number(getattr(self, name), f"camera.{name}"))
+        if not FOV_MIN <= self.fov_degrees <= FOV_MAX:
+            raise InvalidValue(f"{self.fov_degrees:g} is not within {FOV_MIN} .. {FOV_MAX}", field="camera.fov_degrees")
+
+    def key(self) -> messages.CameraKey:
+        """As a job's camera."""
+        return messages.CameraKey(self.time_s, self.eye, self.look_at, self.up, math.radians(self.fov_degrees))
+
+
+CameraOf = Union[Camera, Object, Sequence[Camera], None]
+
+
+def _look(render: messages.Render, camera: CameraOf) -> None:
+    if isinstance(camera, Object):
+        if camera.kind != ObjectKind.NODE:
+            raise InvalidValue(f"is a {camera.kind.word}", field="camera", remedy="give the node that shows a camera")
+        render.camera_path, render.camera_node = messages.CameraPath.NODE, camera.number
+        return
+    keys = [camera] if isinstance(camera, Camera) else list(camera) if isinstance(camera, (list, tuple)) else []
+    if not keys or not all(isinstance(one, Camera) for one in keys):
+        raise InvalidValue(f"{camera!r:.80} is no camera", field="camera", remedy="give a farlight.Camera(eye, look_at), several "
+                           "of them, a node of the scene that shows a camera, or nothing, for all of the scene in view")
+    render.keys = [one.key() for one in keys]
+    if render.camera_path in ("auto", messages.CameraPath.AUTO):
+        render.camera_path = messages.CameraPath.KEYS
+
+
+def request(camera: CameraOf, layers: Any, values: dict[str, Any]) -> messages.Render:
+    """The message of a job, valid but for the scene. camera: one, a node of the scene that shows one, several as keys over
+    time, or None: all of the scene is in view. `clips` may be those of the scene: clips=scene.objects("clip")."""
+    if isinstance(values.get("clips"), (list, tuple)):
+        values = {**values, "clips": [messages.ClipUse(one.number, 0.0, 1.0) if isinstance(one, Object) and one.kind == ObjectKind.CLIP
+                                      else one for one in values["clips"]]}
+    render: messages.Render = make(messages.Render, values)
+    if camera is not None:
+        _look(render, camera)
+    if layers:
+        render.layers, render.format = layer_set(layers), messages.PixelFormat.RGBA32F
+    fields.encode(replace(render, scene=1, channel=2))
+    for name in ("encoding", "still_encoding"):
+        setattr(render, name, Encoding.of(getattr(render, name)))
+    decode.check_wanted(render)
+    for name in ("attachments", "parts", "margin", "hidden_layers"):
+        if getattr(render, name):
+            raise InvalidValue("this package takes whole pictures alone", field=f"render.{name}",
+                               remedy=f"leave {name} out" + "; frames() has layers" * (name == "attachments"))
+    return render
+
+
+def one_frame(values: dict[str, Any]) -> dict[str, Any]:
+    """The values of a job of one picture."""
+    first = values.get("first_frame", 0)
+    if values.get("last_frame", first) != first:
+        raise InvalidValue("render() makes one picture", field="render.last_frame", remedy="frames() makes several")
+    return {**values, "last_frame": first}

@@ -1,0 +1,210 @@
+# SPDX-License-Identifier: MIT
+"""A scene as its client keeps it: objects by kind and number, each the message that makes it. No connection: clients send
+what has changed since the last time; to a new connection they send all of it."""
+from __future__ import annotations
+
+import collections
+import copy
+import difflib
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+from . import fields, messages
+from .blobs import blob_hash
+from .errors import InvalidValue
+from .fields import Bytes, Message
+from .messages import NodeKind, ObjectKind, Sharing
+
+
+class Object(NamedTuple):
+    """An object of a scene: its kind and its number among those of that kind."""
+    kind: ObjectKind
+    number: int
+
+    def __repr__(self) -> str:
+        return f"<{self.kind.word} {self.number}>"
+
+
+ENVIRONMENT = Object(ObjectKind.ENVIRONMENT, 1)  # of every scene
+ATTACHED_FROM = 1 << 20  # identifiers of new objects in a scene that others have made
+KINDS: dict[type[Message], ObjectKind] = {
+    messages.SetNode: ObjectKind.NODE, messages.SetMesh: ObjectKind.MESH, messages.SetSpheres: ObjectKind.SPHERES,
+    messages.SetMaterial: ObjectKind.MATERIAL, messages.SetTexture: ObjectKind.TEXTURE,
+    messages.SetLight: ObjectKind.LIGHT, messages.SetCamera: ObjectKind.CAMERA, messages.SetDisc: ObjectKind.DISC,
+    messages.SetSkin: ObjectKind.SKIN, messages.SetClip: ObjectKind.CLIP, messages.SetChannel: ObjectKind.CHANNEL,
+    messages.SetEnvironment: ObjectKind.ENVIRONMENT,
+}
+SHOWN = {ObjectKind.MESH: NodeKind.MESH, ObjectKind.SPHERES: NodeKind.SPHERES, ObjectKind.LIGHT: NodeKind.LIGHT,
+         ObjectKind.CAMERA: NodeKind.CAMERA}
+
+
+def kind_of(kind: ObjectKind | str) -> ObjectKind:
+    """By its word, too."""
+    try:
+        return ObjectKind(ObjectKind.of(kind))
+    except ValueError as why:
+        raise InvalidValue(str(why), field="kind") from None
+
+
+def make(kind: type[Message], values: dict[str, Any]) -> Any:
+    """A message of those values; one that has no such field is InvalidValue, with names that are like it."""
+    known = {field.name for field in kind.FIELDS}
+    for name in values:
+        if name not in known:
+            like = difflib.get_close_matches(name, known)
+            raise InvalidValue("there is no such field", field=f"{kind.NAME}.{name}",
+                               remedy=f"did you mean {' or '.join(like)}?" if like else
+                               f"help(farlight.messages.{kind.__name__}) lists them")
+    return kind(**values)
+
+
+def _with_intensity(edit: Message, values: dict[str, Any]) -> dict[str, Any]:
+    """`intensity` of lights and of the environment is the largest of their colour's numbers, as `farlight view` has it."""
+    if "intensity" not in values or not isinstance(edit, (messages.SetLight, messages.SetEnvironment)):
+        return values
+    colour = [float(one) for one in values.get("colour", edit.colour)]
+    largest, intensity = max(colour, default=0), float(values["intensity"])
+    made = [one / largest * intensity for one in colour] if largest > 0 else [intensity] * 3
+    return {**{name: value for name, value in values.items() if name != "intensity"}, "colour": made}
+
+
+class Objects:
+    """Objects by number, with the version of the scene that set each."""
+
+    def __init__(self, name: str, sharing: Sharing | str) -> None:
+        try:
+            self.sharing = Sharing(Sharing.of(sharing))
+        except ValueError as why:
+            raise InvalidValue(str(why), field="scene_open.sharing") from None
+        if not isinstance(name, str):
+            raise InvalidValue(f"{name!r:.80} is no text", field="scene_open.name")
+        self.name, self.is_attached = name, False
+        self.version = 0  # counts changes
+        self.notes: list[str] = []  # of an import
+        self._objects: dict[Object, tuple[int, Message, bytes]] = {}  # version, message, and that encoded
+        self._made: dict[Object, int] = {}  # the version that made it
+        self._removed: dict[Object, tuple[int, int]] = {}  # the versions that made and removed it
+        self._numbers: dict[ObjectKind, int] = {}
+        self._blobs: dict[bytes, Bytes] = {}
+
+    def __repr__(self) -> str:
+        counts = collections.Counter(key.kind.word for key in self._objects)
+        listed = ", ".join(f"{word}: {count}" for word, count in counts.items()) or "empty"
+        return f"<farlight.Scene {self.name + ' ' if self.name else ''}{listed}>"
+
+    def set(self, edit: Message) -> Object:
+        """Creates or replaces an object by its message; what it names in blobs is given by blob(). The message that it
+        already has changes nothing."""
+        kind = KINDS.get(type(edit))
+        if kind is None:
+            raise InvalidValue("is no edit of an object", field=getattr(edit, "NAME", "edit"))
+        encoded = fields.encode(edit)
+        key = ENVIRONMENT if kind == ObjectKind.ENVIRONMENT else Object(kind, getattr(edit, edit.FIELDS[0].name))
+        if key in self._objects and self._objects[key][2] == encoded:
+            return key  # as it is: nothing to be sent
+        self.version += 1
+        self._objects[key] = (self.version, copy.copy(edit), encoded)
+        self._made.setdefault(key, self._removed[key][0] if key in self._removed else self.version)
+        self._removed.pop(key, None)
+        self._numbers[key.kind] = max(self._numbers.get(key.kind, 0), key.number)
+        return key
+
+    def check(self, thing: Object, kinds: Iterable[ObjectKind], field: str) -> int:
+        """The number of an argument; InvalidValue where it is no object of those kinds, or is not here."""
+        if not isinstance(thing, Object) or thing.kind not in kinds:
+            wanted = "object" if kinds is ObjectKind else " or ".join(kind.word for kind in kinds)
+            raise InvalidValue(f"{thing!r:.80} is no {wanted} of the scene", field=field,
+                               remedy="give what an add_ function, find() or objects() returned")
+        if thing not in self._objects and not self.is_attached and thing != ENVIRONMENT:
+            raise InvalidValue(f"{thing.kind.word} {thing.number} is not in this scene", field=field)
+        return thing.number
+
+    def get(self, thing: Object) -> Any:
+        """A copy of the message that makes it; change() changes it."""
+        self.check(thing, ObjectKind, "object")
+        if thing in self._objects:
+            return copy.copy(self._objects[thing][1])
+        if self.is_attached:
+            raise InvalidValue(f"what others made of {thing.kind.word} {thing.number} is not known here", field="object",
+                               remedy="read() it with the client, and set() what comes")
+        return messages.SetEnvironment()
+
+    def change(self, thing: Object, **values: Any) -> None:
+        """Other values for some of its fields: change(steel, roughness=0.2), change(farlight.ENVIRONMENT, rotation=1).
+        Lights and the environment have `intensity` as well: the largest of the colour's numbers."""
+        edit = self.get(thing)
+        try:
+            values = _with_intensity(edit, values)
+        except (TypeError, ValueError):
+            raise InvalidValue("intensity and colour must be numbers", field=f"{edit.NAME}.intensity") from None
+        make(type(edit), values)
+        self.set(replace(edit, **values))
+
+    def shown(self, node: Object) -> Object | None:
+        """What a node shows: change(shown(light), colour=(9, 9, 9))."""
+        self.check(node, (ObjectKind.NODE,), "node")
+        edit = self.get(node)
+        kind = next((kind for kind, shows in SHOWN.items() if shows == edit.kind), None)
+        return None if kind is None else Object(kind, edit.object)
+
+    def remove(self, thing: Object) -> None:
+        """With a node all below it, as the daemon does it; refused at the commit if a remaining node uses it."""
+        self.check(thing, [kind for kind in ObjectKind if kind != ObjectKind.ENVIRONMENT], "object")
+        children: dict[int, list[Object]] = {}
+        if thing.kind == ObjectKind.NODE:
+            for key, (_, edit, _) in self._objects.items():
+                if isinstance(edit, messages.SetNode):
+                    children.setdefault(edit.parent, []).append(key)
+        below = [thing]
+        for one in below:
+            below += children.pop(one.number, ())
+        for one in reversed(below):  # each before what is above it
+            self.version += 1
+            # One that was not set here is another client's: it has been there since before the first version.
+            self._removed[one] = (self._made.pop(one, 0), self.version)
+            self._objects.pop(one, None)
+
+    def find(self, kind: ObjectKind | str, name: str) -> list[Object]:
+        """Those of a name: those of a file have the file's."""
+        wanted = kind_of(kind)
+        return [key for key, (_, edit, _) in self._objects.items()
+                if key.kind == wanted and getattr(edit, "name", None) == name]
+
+    def objects(self, kind: ObjectKind | str) -> list[Object]:
+        """All of a kind."""
+        wanted = kind_of(kind)
+        return [key for key in self._objects if key.kind == wanted]
+
+    def blob(self, data: Bytes) -> messages.BlobRef:
+        """Keeps the bytes, and names them."""
+        try:
+            view = memoryview(data).cast("B")
+        except TypeError:
+            raise InvalidValue(f"{data!r:.80} are no contiguous bytes", field="blob") from None
+        name = blob_hash(view)
+        self._blobs[name] = view
+        return messages.BlobRef(len(view), name)
+
+    def blob_bytes(self, reference: messages.BlobRef) -> Bytes:
+        """Those that it names."""
+        return self._blobs[reference.hash]
+
+    def _next(self, kind: ObjectKind) -> int:
+        self._numbers[kind] = self._numbers.get(kind, ATTACHED_FROM if self.is_attached else 0) + 1
+        return self._numbers[kind]
+
+    # ---- for clients
+
+    def edits_since(self, version: int) -> list[Message]:
+        """What makes of the scene at that version this one."""
+        gone = sorted((at, thing) for thing, (made, at) in self._removed.items() if made <= version < at)
+        edits: list[Message] = [messages.Remove(thing.kind, thing.number) for _, thing in gone]
+        named = {one.hash for _, edit, _ in self._objects.values() for one in getattr(edit, "arrays", ())}
+        self._blobs = {name: data for name, data in self._blobs.items() if name in named}
+        return edits + [edit for at, edit, _ in sorted(self._objects.values(), key=lambda one: one[0]) if at > version]
+
+    def blobs_of(self, edits: Iterable[Message]) -> dict[bytes, Bytes]:
+        """By their hashes: those that edits name."""
+        named = (one for edit in edits for one in getattr(edit, "arrays", ()) if one.size_bytes)
+        return {one.hash: self._blobs[one.hash] for one in named}
