@@ -370,7 +370,7 @@ WEB_PACKAGES := chromium python3-websocket
 FARM_PACKAGES := slurm-wlm nodejs python3-yaml
 BLENDER_PACKAGES := blender python3-numpy xvfb xauth
 
-.PHONY: tests build-packages test-packages stack-packages sync-packages lint-packages analyze-packages coverage-packages fuzz-packages fidelity-packages equal-time-packages farm-packages web-packages deb-packages blender-packages test test-long test-zink check-sync demo bench fidelity equal-time soak farm-drill farm-test web-test blender-test blender-addon siege bench-plot check-headers check-rules lint check analyze coverage format install uninstall dist deb deb-test clean distclean help
+.PHONY: tests build-packages test-packages stack-packages sync-packages lint-packages analyze-packages coverage-packages fuzz-packages fidelity-packages equal-time-packages farm-packages web-packages deb-packages blender-packages test test-long test-zink check-sync demo bench fidelity equal-time soak farm-drill farm-test web-test blender-test blender-addon siege bench-plot check-headers check-rules lint check analyze coverage format install uninstall dist deb deb-same deb-test clean distclean help
 tests: $(TEST_PROGRAMS) $(CONTRACT) $(BENCH_PROGRAM) $(SHAPED_LINK) $(B)/tests/tools/make_scenes $(B)/tests/tools/pose_dump $(LOSING_DAEMON)
 
 build-packages:
@@ -484,8 +484,12 @@ python-messages:
 	python3 client/python/generate.py
 
 # ---- what is checked without running it
-check-headers:
+# Once for all configurations, until a header changes.
+HEADERS_STAMP := build/headers-alone
+check-headers: $(HEADERS_STAMP)
+$(HEADERS_STAMP): tests/tools/check_headers.sh Makefile $(call sources,protocol server shaders client,h)
 	@tests/tools/check_headers.sh $(CC) -I. -Iserver -Ishaders -Iclient $(SERVER_CFLAGS) $(CLIENT_CFLAGS)
+	@mkdir -p $(@D) && touch $@
 FORMATTED = $(call sources,server protocol client tests shaders,c h hpp cpp)
 format:
 	clang-format -i $(FORMATTED)
@@ -599,15 +603,18 @@ dist:
 	git archive --prefix=farlight-$(VERSION)/ HEAD | xz -T1 >$(DIST)
 	@echo '$(DIST)'
 # Debian packages into out/deb, checked by lintian.
-DEB := build/deb/farlight-$(VERSION)
+build_deb = conf/debian/build.sh $(1) $(VERSION) $(SOURCE_DATE_EPOCH) $(filter-out gcc g++ make fonts-% libegl1 libgl1-mesa-dri,$(BUILD_PACKAGES))
 deb: deb-packages
-	rm -rf build/deb out/deb && mkdir -p $(DEB) out/deb
-	git archive HEAD | tar -x -C $(DEB)
-	conf/debian/prepare.sh $(DEB) $(VERSION) "$$(date -uRd @$(SOURCE_DATE_EPOCH))" \
-	    $(filter-out gcc g++ make fonts-% libegl1 libgl1-mesa-dri,$(BUILD_PACKAGES))
-	cd $(DEB) && SOURCE_DATE_EPOCH=$(SOURCE_DATE_EPOCH) dpkg-buildpackage -b -us -uc
+	$(call build_deb,build/deb)
+	rm -rf out/deb && mkdir -p out/deb
 	mv build/deb/*.deb build/deb/*.buildinfo build/deb/*.changes out/deb
 	lintian --fail-on error,warning out/deb/*.changes
+# Once more, in another folder, time zone, language and mask of files: the same bytes.
+deb-same: deb
+	umask 077 && TZ=Pacific/Auckland LC_ALL=C.UTF-8 $(call build_deb,build/deb-same/in/a/longer/path)
+	for package in out/deb/*.deb; do cmp $$package build/deb-same/in/a/longer/path/$${package##*/} || exit 1; done
+	rm -rf build/deb-same
+	@echo "built twice, the same bytes: $$(ls out/deb/*.deb | wc -l) packages"
 # On a clean Debian 12: install, render as the service does, remove without a trace. Needs root and Debian's archive.
 deb-test: deb
 	@tests/tools/install_packages.sh debootstrap
@@ -632,6 +639,7 @@ help:
 	@echo 'make soak       use one daemon for some minutes, and see that its memory stays flat   [ROUNDS=1000]'
 	@echo 'make farm-drill kill the daemon or the client of animations at random, and see that no frame is lost   [ROUNDS=1000 SEED=]'
 	@echo 'make deb        build Debian packages into out/deb; make dist: an archive of the sources'
+	@echo 'make deb-same   build them once more in another folder, and see that they have the same bytes'
 	@echo 'make deb-test   build them, install them on a clean Debian, render there, and remove them'
 	@echo 'make farm-test  try the templates of conf/farm on Slurm and what stands in for other queues'
 	@echo 'make web-test   the page of farlight-web in headless Chromium'

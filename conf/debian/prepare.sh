@@ -6,7 +6,7 @@ tree=$1 version=$2 date=$3
 shift 3
 debian=$tree/debian
 cp -r "$tree/conf/debian" "$debian"
-rm "$debian/prepare.sh"
+rm "$debian/prepare.sh" "$debian/build.sh"
 cp "$tree/conf/sysusers.conf" "$debian/farlightd.sysusers"
 sed -i "s/@BUILD_PACKAGES@/$(echo "$*" | sed 's/ /, /g')/" "$debian/control"
 # The licence's text without its title and names, as Debian's format wants it.

@@ -4,6 +4,7 @@ import collections
 import json
 import pathlib
 import re
+import shutil
 import stat
 import subprocess
 import unittest
@@ -63,6 +64,22 @@ class Metrics(Case):
         asked = set(re.findall(r"farlight_\w+", DASHBOARD.read_text()))
         self.assertGreater(len(asked), 8)
         self.assertLessEqual(asked, set(found))
+
+    @unittest.skipUnless(shutil.which("promtool"), "no promtool, which Debian's package prometheus has")
+    def test_prometheus_own_tool_finds_no_fault(self):
+        """Neither in the text nor in what the dashboard asks."""
+        with Daemon() as daemon:
+            printed = self.expect(farlight("stats", "--prometheus", "--server", daemon.address), 0).stdout
+        questions = re.findall(r'"expr": ("(?:[^"\\]|\\.)*")', DASHBOARD.read_text())
+        self.assertGreater(len(questions), 8)
+        rules = self.folder / "rules.yml"
+        rules.write_text("groups:\n- name: dashboard\n  rules:\n" + "".join(
+            f"  - {{record: asked{number}, expr: {question.replace('$__rate_interval', '1m')}}}\n"
+            for number, question in enumerate(questions)))
+        for arguments, text in ((["metrics"], printed), (["rules", rules], "")):
+            done = subprocess.run(["promtool", "check", *arguments], input=text, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+                                  text=True, check=False)
+            self.assertEqual(done.returncode, 0, done.stdout)
 
     def test_a_daemon_that_is_away_is_a_figure_too(self):
         path = self.folder / "farlight.prom"

@@ -22,6 +22,7 @@ import re
 import resource
 import subprocess
 import sys
+import threading
 import time
 import unittest
 
@@ -36,6 +37,7 @@ EXPECTED_SKIPS = (
     r"sanitizers (do not run within|have an allocator)",
     r"ptrace: ",  # forbidden in many containers
     r"this kernel does not name children",
+    r"no promtool",  # its package starts a server
     r"left to make test-long",  # which .ci/run calls
     r"programs on such a library need its compiler flags",  # of the sanitizers and of coverage
 )
@@ -74,22 +76,35 @@ LONG_ON_A_STACK = re.compile(
 # Compares two stacks.
 ONLY_ON_A_STACK = re.compile(r"test_stacks$")
 
-Result = collections.namedtuple("Result", "text passed failed skips")  # skips: (test, reason)
+# skips: (test, reason); used: processor time of it and of the programs that it has waited for, in seconds
+Result = collections.namedtuple("Result", "text passed failed skips used")
+
+
+def processor_time(usage):
+    return usage.ru_utime + usage.ru_stime
+
+
+def run_command(command, timeout=None):
+    """(output, exit status, processor time)"""
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace") as program:
+        timer = threading.Timer(timeout or threading.TIMEOUT_MAX, program.kill)
+        timer.start()
+        output = program.stdout.read()
+        _, status, usage = os.wait4(program.pid, 0)
+        program.returncode = os.waitstatus_to_exitcode(status)
+        output += "" if timer.is_alive() else "\ntimed out\n"
+        timer.cancel()
+    return output, program.returncode, processor_time(usage)
 
 
 def run_check(name, command):
-    result = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
-    return Result(f"== {name}\n{result.stdout}", int(result.returncode == 0), int(result.returncode != 0), [])
+    output, status, used = run_command(command)
+    return Result(f"== {name}\n{output}", int(status == 0), int(status != 0), [], used)
 
 
 def run_program(command):
-    """(output, exit status, test -> verdict, (test, reason) of those that were skipped)"""
-    try:
-        result = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False,
-                                errors="replace", timeout=FILE_TIMEOUT_S)
-        output, status = result.stdout, result.returncode
-    except subprocess.TimeoutExpired as timeout:
-        output, status = (timeout.stdout or b"").decode(errors="replace") + "\ntimed out\n", -1
+    """(output, exit status, test -> verdict, (test, reason) of those that were skipped, processor time)"""
+    output, status, used = run_command(command, FILE_TIMEOUT_S)
     verdicts, reason, skips = {}, "", []  # by name: cmocka lists those that failed once more at the end
     for line in output.splitlines():
         if line.startswith(("skipped: ", "SKIP: ")):
@@ -101,20 +116,20 @@ def run_program(command):
                 skips.append((found[2], reason or "without a reason"))
     if not verdicts and status == 0 and reason:  # a program that skips all of its tests
         skips.append(("all of them", reason))
-    return output, status, verdicts, skips
+    return output, status, verdicts, skips, used
 
 
 def run_cmocka(name, command, tests):
     """`tests`: their names in order, where they are known. What follows a test that failed, or after which the program
     died, may have failed because of it, and is run again alone."""
-    output, status, verdicts, skips = run_program(command)
+    output, status, verdicts, skips, used = run_program(command)
     first = next((i for i, test in enumerate(tests) if verdicts.get(test) in (None, "FAILED")), len(tests))
     if first < len(tests):
         verdicts[tests[first]] = "FAILED"
     for test in tests[first + 1:]:
         if verdicts.get(test) in (None, "FAILED"):
-            again, _, alone, _ = run_program([command[0], f"{command[1]}:{test}"])
-            verdicts[test] = alone.get(test, "FAILED")
+            again, _, alone, _, more = run_program([command[0], f"{command[1]}:{test}"])
+            verdicts[test], used = alone.get(test, "FAILED"), used + more
             output += f"\nalone:\n{again}"
     passed, failed = (sum(verdict == word for verdict in verdicts.values()) for word in ("OK", "FAILED"))
     if status != 0 and failed == 0:  # it died after the last test
@@ -124,7 +139,7 @@ def run_cmocka(name, command, tests):
         lines.append(output)
     lines += [f"   failed: {test}" for test, verdict in verdicts.items() if verdict == "FAILED"]
     lines.append(f"   {passed} passed, {failed} failed, {len(skips)} skipped" + (f" (exit status {status})" if status else ""))
-    return Result("\n".join(lines), passed, failed, skips)
+    return Result("\n".join(lines), passed, failed, skips, used)
 
 
 class Timed(unittest.TextTestResult):
@@ -157,13 +172,12 @@ def module_main(name):
 
 
 def run_module(name):
-    result = subprocess.run([sys.executable, __file__, MODULE, name], stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-                            text=True, errors="replace", check=False)
-    text, _, last = result.stdout.rstrip("\n").rpartition("\n")
-    if result.returncode != 0 or not last.startswith('{"failed"'):  # it died
-        return Result(f"== {name}\n{result.stdout}", 0, 1, [])
+    output, status, used = run_command([sys.executable, __file__, MODULE, name])
+    text, _, last = output.rstrip("\n").rpartition("\n")
+    if status != 0 or not last.startswith('{"failed"'):  # it died
+        return Result(f"== {name}\n{output}", 0, 1, [], used)
     counts = json.loads(last)
-    return Result(f"== {name}\n{text}", counts["passed"], counts["failed"], counts["skips"])
+    return Result(f"== {name}\n{text}", counts["passed"], counts["failed"], counts["skips"], used)
 
 
 def tasks(build, names):
@@ -214,7 +228,7 @@ class Sums:
         self.skips_are_failures = os.environ.get("CI") == "true"
 
     def add(self, result, seconds=None):
-        print(result.text + ("" if seconds is None else f" in {seconds:.1f} s"), flush=True)
+        print(result.text + ("" if seconds is None else f" in {seconds:.1f} s, of processors {result.used:.1f} s"), flush=True)
         self.passed += result.passed
         self.failed += result.failed
         for test, reason in result.skips:
@@ -249,18 +263,19 @@ def run_all(build, names):
         sums.add(run_check("headers alone", ["make", "-s", "check-headers"]))
     jobs = int(os.environ.get("FARLIGHT_TEST_JOBS") or min(JOBS_MAX, len(os.sched_getaffinity(0)) + 2))
     times_path = build / f"test_times{os.environ.get('FARLIGHT_TEST_STACK', '')}.json"
-    times, todo, took = known_times(times_path), tasks(build, names), {}
+    times, todo, took, used = known_times(times_path), tasks(build, names), {}, {}
     with concurrent.futures.ThreadPoolExecutor(jobs) as pool:
         running = {pool.submit(timed, todo[name]): name
                    for name in sorted(todo, key=lambda name: -times.get(name, 0))}
         for done in concurrent.futures.as_completed(running):
             result, took[running[done]] = done.result()
+            used[running[done]] = result.used
             sums.add(result, took[running[done]])
     times_path.write_text(json.dumps({**times, **took}, indent=1))
-    slowest = sorted(took.items(), key=lambda item: -item[1])[:SLOWEST]
-    used = resource.getrusage(resource.RUSAGE_CHILDREN)
-    print("\nslowest: " + ", ".join(f"{name} {seconds:.0f} s" for name, seconds in slowest))
-    print(f"processor time: {used.ru_utime + used.ru_stime:.0f} s")
+    for title, seconds in (("slowest", took), ("most processor time", used)):
+        longest = sorted(seconds.items(), key=lambda item: -item[1])[:SLOWEST]
+        print(f"\n{title}: " + ", ".join(f"{name} {value:.0f} s" for name, value in longest), end="")
+    print(f"\nprocessor time: {processor_time(resource.getrusage(resource.RUSAGE_CHILDREN)):.0f} s")
     return sums
 
 
