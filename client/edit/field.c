@@ -150,7 +150,8 @@ static size_t environment_fields(struct fl_field fields[FL_FIELDS_MAX])
     fields[2].unit = "degrees";
     fields[2].doc = "turn of the image about +y; 0: its middle column is +x";
     fields[3] = of_wire(struct_field(body, "backdrop"));
-    return 4;
+    fields[4] = of_wire(struct_field(body, "display_values"));
+    return 5;
 }
 
 /* What tells objects apart or points elsewhere is no field. */

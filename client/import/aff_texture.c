@@ -36,9 +36,11 @@ bool aff_read_texture(struct aff *aff, uint32_t *texture, const char *of)
 }
 
 /* Takes the texels. An image that cannot be used is shown in a conspicuous colour. */
-static uint32_t add_texture(struct import_scene *scene, const char *name, struct texture_job *job)
+static uint32_t add_texture(const struct nff *nff, const char *name, struct texture_job *job)
 {
-    struct message_set_texture set = {.format = PROTOCOL_TEXTURE_RGBA8_SRGB,
+    struct import_scene *scene = nff->scene;
+    struct message_set_texture set = {.format = nff_keeps_values(nff) ? PROTOCOL_TEXTURE_RGBA8_LINEAR
+                                                                      : PROTOCOL_TEXTURE_RGBA8_SRGB,
                                       .wrap_u = PROTOCOL_WRAP_REPEAT,
                                       .wrap_v = PROTOCOL_WRAP_REPEAT,
                                       .name = name};
@@ -75,7 +77,7 @@ bool aff_add_textures(struct aff *aff, uint32_t *ids)
     texture_decode(jobs, count);
     for (size_t i = 0; i < count; i++) {
         free((void *)(uintptr_t)jobs[i].bytes);
-        ids[i + 1] = add_texture(aff->nff.scene, aff->textures[i], &jobs[i]);
+        ids[i + 1] = add_texture(&aff->nff, aff->textures[i], &jobs[i]);
     }
     free(jobs);
     return !aff->nff.scene->failed;

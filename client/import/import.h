@@ -89,6 +89,8 @@ struct import_scene {
     char prefix[IMPORT_PREFIX_MAX + 1]; /* likewise, of all names; empty: none */
     uint32_t root;                      /* likewise, the node above all others; 0: none */
     bool is_added;                      /* it is not the first: its cameras and background are left out */
+    bool display_values; /* it is alone, so that its colours may stay a display's values where its format has such
+                          */
     const char *variant; /* of the materials, that the user wants; NULL: the file's choice. Readers of formats
                             without variants need not look */
     bool failed;

@@ -417,6 +417,8 @@ int main(int argc, char **argv)
     argp_parse(&argp, argc, argv, ARGP_IN_ORDER, NULL, &options);
     import_scene_init(&scene,
                       options.source_count > 0 ? source_name(&sources[0]) : file_part(options.environment));
+    /* Light of images and of other formats is linear. */
+    scene.display_values = options.source_count == 1 && !options.environment;
     done = sender_init(&sender, options.socket, &scene) && run(&scene, &sender, &options, start_ns);
     if (!done)
         sender_failure(&sender);

@@ -58,8 +58,10 @@ bool nff_use_fill(struct nff *nff);
 /* Adds the materials that were in use. textures[i] is the identifier of texture i. */
 bool nff_add_materials(struct nff *nff, const uint32_t *textures);
 
-/* NFF's colours are a display's, 0 to 1; ours are linear. */
-float nff_linear(float shown);
+/* NFF's colours are a display's, 0 to 1, as were those that renderers of its time computed with and showed. They
+ * stay so in a scene of their own that has lights, and are made linear in any other. */
+bool nff_keeps_values(const struct nff *nff);
+float nff_colour(const struct nff *nff, float shown);
 
 bool nff_add_camera(struct nff *nff);
 bool nff_add_lights(struct nff *nff);

@@ -14,9 +14,14 @@ static float unit(float value)
     return value < 0 ? 0 : value > 1 ? 1 : value;
 }
 
-float nff_linear(float shown)
+bool nff_keeps_values(const struct nff *nff)
 {
-    return linear_from_srgb_f(unit(shown));
+    return nff->scene->display_values && nff->light_count > 0;
+}
+
+float nff_colour(const struct nff *nff, float shown)
+{
+    return nff_keeps_values(nff) ? unit(shown) : linear_from_srgb_f(unit(shown));
 }
 
 static float max_component(const float colour[3])
@@ -48,18 +53,19 @@ static void transmit(struct message_set_material *material, float through, float
 
 /* NFF's numbers are a display's: where one of the parts is all that is seen, a display shows it times the colour,
  * and the mirror times what it mirrors, which has a hue of its own. */
-static void from_plain(const float n[8], struct message_set_material *material)
+static void from_plain(const struct nff *nff, const float n[8], struct message_set_material *material)
 {
-    const float scattered = nff_linear(n[3]), specular = nff_linear(n[4]), through = nff_linear(n[6]);
+    const float scattered = nff_colour(nff, n[3]), specular = nff_colour(nff, n[4]),
+                through = nff_colour(nff, n[6]);
 
     if (through > 0) {
         transmit(material, through / (through + scattered), n[7]);
         for (int c = 0; c < 3; c++)
-            material->base_colour[c] = unit(nff_linear(n[c]) * (through + scattered));
+            material->base_colour[c] = unit(nff_colour(nff, n[c]) * (through + scattered));
     } else if (specular > MIRROR_MAX) { /* metal; it has the surface's hue */
         reflect(material, scattered, specular);
         for (int c = 0; c < 3; c++)
-            material->base_colour[c] = unit(nff_linear(n[c]) * (scattered + specular));
+            material->base_colour[c] = unit(nff_colour(nff, n[c]) * (scattered + specular));
     } else {
         const float root = sqrtf(specular); /* Fresnel's equations, straight on */
 
@@ -67,7 +73,7 @@ static void from_plain(const float n[8], struct message_set_material *material)
         material->roughness = specular > 0 ? 0.0f : 1.0f;
         material->ior = (1 + root) / (1 - root);
         for (int c = 0; c < 3; c++)
-            material->base_colour[c] = unit(nff_linear(unit(n[c]) * unit(n[3])) / (1 - specular));
+            material->base_colour[c] = unit(nff_colour(nff, unit(n[c]) * unit(n[3])) / (1 - specular));
     }
 }
 
@@ -153,7 +159,7 @@ static uint32_t add_material(struct nff *nff, const struct nff_material *from, c
     if (from->fill.extended)
         from_extended(from->fill.numbers, nff->ambient, &material);
     else
-        from_plain(from->fill.numbers, &material);
+        from_plain(nff, from->fill.numbers, &material);
     if (from->fill.texture != 0) {
         import_texture_use_default(&uses[0], textures[from->fill.texture]);
         import_texture_use_default(&uses[4], textures[from->fill.texture]);

@@ -75,11 +75,12 @@ void nff_add_background(struct nff *nff)
 {
     struct message_set_environment environment = {0};
 
-    if (!nff->has_background)
+    if (!nff->has_background && !nff_keeps_values(nff))
         return;
     /* What a ray sees that leaves; without a light it is the only one. */
     environment.backdrop = nff->light_count > 0;
+    environment.display_values = nff_keeps_values(nff);
     for (int c = 0; c < 3; c++)
-        environment.colour[c] = nff_linear(nff->background[c]);
+        environment.colour[c] = nff_colour(nff, nff->background[c]);
     import_set_environment(nff->scene, &environment, 0);
 }

@@ -43,8 +43,9 @@ struct render_context {
     struct scene_features features;
     struct frame_uniforms uniforms;
     struct gpu_buffer uniform_buffer;
-    bool spread;     /* each pixel has its samples in places of its own; else sample_places' */
-    bool has_filter; /* the uniforms have the places of `filter` */
+    bool display_values; /* light is a display's values, see scene_environment */
+    bool spread;         /* each pixel has its samples in places of its own; else sample_places' */
+    bool has_filter;     /* the uniforms have the places of `filter` */
     enum pixel_filter filter;
     /* The host waits for the counts of each wave and dispatches what there is; else it queues a slice's waves on
      * what there may be at most, and the device leaves out what there is not (compact.h). */

@@ -124,6 +124,8 @@ struct frame_request {
  *   linear formats  mean radiance of the samples times 2^exposure_stops, premultiplied by alpha
  *   RGBA8           the same divided by alpha, tone-mapped, sRGB
  *   planes          that, without alpha
+ *                   If the scene's light is display values, RGBA8 is clamped and nothing else, and the linear
+ *                   formats, the albedo too, have what a display emits for it
  *   layers          those beside the beauty are what protocol/words.def says of them (LAYER), and know of no
  *                   exposure
  *   attachments     those layers in 4 bytes a pixel, see frame_result_attachment()

@@ -341,6 +341,7 @@ static bool get_ready(struct frame_renderer *renderer, struct error *error)
     camera_fill_uniforms(&context->uniforms, request, &renderer->shared->copy);
     frame_key_limit_rows(renderer, &context->request); /* the camera is that of all of them */
     environment_fill_uniforms(context->environment, &context->uniforms, &renderer->shared->copy);
+    context->display_values = renderer->shared->copy.scene->environment.display_values;
     context->uniforms.depth = request->depth;
     context->uniforms.far_width[2] = frame_request_hides_environment(request) ? 1.0f : 0.0f;
     /* Those of a texel of a layer all pass through its middle. */

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* From the sum of samples to pixels: mean, exposure and, for 8 bits, tone map and sRGB, or Y'CbCr of that. */
+/* From the sum of samples to pixels: mean, exposure and, for 8 bits, tone map and sRGB, or Y'CbCr of that; of
+ * light that is a display's values these, clamped, and for floats what a display emits for them. */
 #include "render/frame_request.h"
 #include "render/layers.h"
 #include "render/picture.h"
@@ -59,6 +60,14 @@ static void set_background(const struct gpu_program *program, const struct frame
     gpu_uniform_vec(program, "background", 4, has_colour ? background : none);
 }
 
+/* Layers that are no colours stay as they are. */
+static void set_display(const struct gpu_program *program, const struct render_context *context, enum layer layer)
+{
+    const bool is_colour = layer == LAYER_BEAUTY || layer == LAYER_ALBEDO;
+    gpu_uniform_uint(program, "tone_map_kind", context->request.tone_map);
+    gpu_uniform_uint(program, "display_values", context->display_values && is_colour);
+}
+
 static void set_tiles(const struct gpu_program *program, const struct picture *picture,
                       struct render_context *context, enum layer layer, uint32_t band)
 {
@@ -108,7 +117,7 @@ bool picture_resolve_band(struct picture *picture, struct render_context *contex
         gpu_buffer_bind_storage(denoised ? &picture->denoised[band] : picture_band(picture, plane, band),
                                 BIND_ACCUMULATION);
         gpu_buffer_bind_storage(&picture->resolved, BIND_RESOLVED);
-        gpu_uniform_uint(program, "tone_map_kind", request->tone_map);
+        set_display(program, context, layer);
         gpu_uniform_float(program, "scale", scale_of(picture, request, layer));
         gpu_uniform_float(program, "coverage_scale", coverage_scale);
         set_background(program, request, layer);

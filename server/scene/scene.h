@@ -199,6 +199,7 @@ struct scene_environment {
     uint32_t width, height;
     struct blob *texels; /* 4 half floats a texel; NULL: constant colour */
     bool backdrop;       /* the constant colour is seen and lights nothing */
+    bool display_values; /* of the whole scene: colours and light are a display's values, not linear */
     bool keeps_image;    /* of an edit: it gets the image that is there */
 };
 

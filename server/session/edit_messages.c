@@ -212,6 +212,7 @@ static bool from_environment(const struct edit_source *source, const struct mess
     memcpy(environment->colour, message->colour, sizeof(environment->colour));
     environment->rotation = message->rotation;
     environment->backdrop = message->backdrop != 0;
+    environment->display_values = message->display_values != 0;
     environment->keeps_image = message->keeps_image != 0;
     if (environment->keeps_image)
         return true;

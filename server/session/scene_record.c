@@ -336,6 +336,7 @@ static void put_environment(struct sink *sink, const struct scene_environment *e
     set->height = environment->height;
     set->backdrop = environment->backdrop ? 1 : 0;
     set->keeps_image = environment->keeps_image ? 1 : 0;
+    set->display_values = environment->display_values ? 1 : 0;
     set->arrays = sink->arrays;
     set->arrays_count = put_blobs(sink, &environment->texels, 1);
     put(sink, &message);

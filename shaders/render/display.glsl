@@ -6,6 +6,7 @@
 #include "common/tonemap.glsl"
 
 uniform uint tone_map_kind;
+uniform uint display_values;  // 1: what is summed is display values of no curve
 uniform float scale;          // exposure / samples
 uniform float coverage_scale; // 1 / samples
 uniform vec4 background;      // what lies behind the surfaces: linear; a: 1: a colour, 0: nothing
@@ -25,7 +26,7 @@ vec4 sum_of_pixel(uvec2 pixel)
 }
 
 // Of one of the band. Premultiplied by alpha.
-vec4 linear_of_sum(vec4 sum, uvec2 pixel)
+vec4 mean_of_sum(vec4 sum, uvec2 pixel)
 {
     vec2 by = vec2(scale, coverage_scale);
 #ifdef HAS_TILE_SAMPLES
@@ -36,17 +37,29 @@ vec4 linear_of_sum(vec4 sum, uvec2 pixel)
     return vec4(sum.rgb * by.x, clamp(sum.a * by.y, 0.0, 1.0));
 }
 
-// Before the background. Premultiplied by alpha.
+vec3 straight_of(vec4 colour)
+{
+    return colour.a > 0.0 ? colour.rgb / colour.a : colour.rgb;
+}
+
+// Before the background, linear. Premultiplied by alpha.
 vec4 over_background(vec4 colour)
 {
+    if (display_values != 0u)
+        colour.rgb = linear_from_srgb(max(straight_of(colour), 0.0)) * (colour.a > 0.0 ? colour.a : 1.0);
     return colour + background * (1.0 - colour.a);
 }
 
 // Straight, tone-mapped and sRGB.
-vec4 display_of_linear(vec4 colour)
+vec4 display_of_sum(vec4 colour)
 {
-    vec3 straight = tone_map(colour.a > 0.0 ? colour.rgb / colour.a : colour.rgb, tone_map_kind);
-    if (background.a > 0.0)
-        return vec4(srgb_from_linear(mix(background.rgb, straight, colour.a)), 1.0);
-    return vec4(srgb_from_linear(straight), colour.a);
+    vec3 straight = straight_of(colour), behind = background.rgb;
+    if (display_values != 0u) {
+        straight = clamp(straight, 0.0, 1.0);
+        behind = srgb_from_linear(behind);
+    } else {
+        straight = tone_map(straight, tone_map_kind);
+    }
+    vec4 shown = background.a > 0.0 ? vec4(mix(behind, straight, colour.a), 1.0) : vec4(straight, colour.a);
+    return display_values != 0u ? shown : vec4(srgb_from_linear(shown.rgb), shown.a);
 }

@@ -27,9 +27,9 @@ void main()
     if (k >= pixel_count)
         return;
     uvec2 pixel = uvec2(k % frame.width, k / frame.width);
-    vec4 sum = sum_of_pixel(pixel), colour = linear_of_sum(sum, pixel);
+    vec4 sum = sum_of_pixel(pixel), colour = mean_of_sum(sum, pixel);
 #if FORMAT == FORMAT_RGBA8
-    resolved[k] = packUnorm4x8(display_of_linear(colour));
+    resolved[k] = packUnorm4x8(display_of_sum(colour));
 #elif FORMAT == FORMAT_RGBA16F
     colour = min(over_background(colour), vec4(HALF_MAX));
     resolved[2u * k] = packHalf2x16(colour.rg);

@@ -18,7 +18,7 @@ layout(std430, binding = BIND_RESOLVED) writeonly buffer resolved_block { uint r
 vec3 codes_of_pixel(uint x, uint y)
 {
     uvec2 pixel = min(uvec2(x, y), uvec2(frame.width, row_count) - 1u);
-    return round(display_of_linear(linear_of_sum(sum_of_pixel(pixel), pixel)).rgb * 255.0);
+    return round(display_of_sum(mean_of_sum(sum_of_pixel(pixel), pixel)).rgb * 255.0);
 }
 
 // Packs four codes, the first in the lowest byte.

@@ -95,7 +95,7 @@ def decode(kind, payload):
         return dict(id=f.take("I"), fov_y=f.take("f"), height=f.take("f"), near=f.take("f"), name=f.string())
     if kind == SET_ENVIRONMENT:
         return dict(id=0, colour=f.take("3f"), rotation=f.take("f"), size=f.take("2I"), backdrop=f.take("I"), keeps_image=f.take("I"),
-                    arrays=blob_refs(f))
+                    display_values=f.take("I"), arrays=blob_refs(f))
     if kind == SET_SKIN:
         return dict(id=f.take("I"), joints=f.take("I"), arrays=blob_refs(f), name=f.string())
     if kind == SET_CLIP:

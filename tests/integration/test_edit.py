@@ -210,7 +210,7 @@ class Environment(Shared):
         """As the importer would have turned it; undone it is the very picture."""
         before = self.picture()
         fields = self.fields("environment")
-        self.assertEqual((fields["intensity"], fields["colour"], fields["backdrop"]), (1, [1, 1, 1], False))
+        self.assertEqual((fields["intensity"], fields["colour"], fields["backdrop"], fields["display_values"]), (1, [1, 1, 1], False, False))
         self.assertAlmostEqual(fields["rotation"], 30, 3)
         undo = self.edit("--print-undo", "environment.rotation+=90", "environment.intensity*=0.5").stdout
         changed = self.picture()

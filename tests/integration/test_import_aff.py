@@ -103,7 +103,10 @@ class Written(importer.Written):
         texture, = result.of(importer.SET_TEXTURE)
         material, = result.of(importer.SET_MATERIAL)
         self.assertEqual(result.data(texture["arrays"][0])[:8], b"\xff\0\0\xff\0\xff\0\xff", "rows from the top")
-        self.assertEqual(texture["wrap"], (0, 0))
+        self.assertEqual((texture["wrap"], texture["format"]), ((0, 0), 0))
+        lit = self.run_text("l 0 0 5\n" + self.MESH)
+        self.assertEqual(lit.of(importer.SET_TEXTURE)[0]["format"], 1, "where light is display values, texels are as they are")
+        self.assertEqual([e["display_values"] for e in lit.of(importer.SET_ENVIRONMENT)], [1], "also without a background")
         self.assertEqual([use["texture"] for use in material["textures"]], [texture["id"], 0, 0, 0, texture["id"]])
 
     def test_a_corner_with_another_normal_is_another_vertex(self):

@@ -4,6 +4,12 @@ import farlight_test
 from farlight_test import Case, Daemon, bundled_scenes, farlight, frames_of, grid_means, read_exr, read_png
 
 SIZE = ["--size", "96x72"]
+
+
+def srgb(linear):
+    return 12.92 * linear if linear <= 0.0031308 else 1.055 * linear ** (1 / 2.4) - 0.055
+
+
 INTEGRATORS = ("whitted", "distributed", "raycast", "ao", "path")
 
 
@@ -34,7 +40,7 @@ class Light(Case):
         return sum(sum(channels[c]) for c in "RGB") / (3 * len(channels["R"]))
 
     def test_nff_is_shown_as_its_author_does(self):
-        """Its numbers are a display's: a surface that scatters shows colour times Kd times the cosine, a mirror Ks of what it
+        """Its numbers are a display's, and so is light, whatever the tone map: a surface that scatters shows colour times Kd times the cosine, a mirror Ks of what it
         shows, a ray that leaves the background. Nothing else lights a surface, and no distance makes it darker."""
         view = "b 0.078 0.361 0.753\nv\nfrom 0 0 4\nat 0 0 0\nup 0 1 0\nangle 30\nhither 0.01\nresolution 8 8\n"
         square, lamp = "p 4\n-9 -9 {0}\n9 -9 {0}\n9 9 {0}\n-9 9 {0}\n", "l 0 0 {}\n"
@@ -44,17 +50,48 @@ class Light(Case):
                 ("far", view + lamp.format(700) + scatters + square.format(0), (0.8, 0.6, 0.264), 1),
                 ("unlit", view + lamp.format(-7) + scatters + square.format(0), (0, 0, 0), 0),
                 ("nothing", view + lamp.format(7) + scatters + square.format(9), background, 1),
-                # A half is 0.214 of the light: of (0.0070, 0.1070, 0.5274) there is (0.0015, 0.0229, 0.1129).
-                ("mirror", view + lamp.format(-7) + "f 1 1 1 0 0.5 9 0 1\n" + square.format(0), (0.0193, 0.1635, 0.3709), 1)):
+                ("bright", view + 3 * lamp.format(7) + scatters + square.format(0), (1, 1, 0.4573), 1),  # sqrt(3) of "lit"
+                ("mirror", view + lamp.format(-7) + "f 1 1 1 0 0.5 9 0 1\n" + square.format(0), (0.039, 0.1805, 0.3765), 1)):
             (self.folder / f"{name}.nff").write_text(text)
             for integrator in ("whitted", "distributed", "path"):
                 with self.subTest(name=name, integrator=integrator):
-                    path = self.render("--integrator", integrator, "--samples", "16", "--tone-map", "none", "--size", "9x9",
+                    path = self.render("--integrator", integrator, "--samples", "16", "--tone-map", "aces", "--size", "9x9",
                                        scene=self.folder / f"{name}.nff")[0]
                     width, _, rows, channels = read_png(path)
                     middle = rows[4][4 * channels:4 * channels + 3]
                     for got, value in zip(middle, wanted, strict=True):
                         self.assertLessEqual(abs(got - 255 * value), steps + 0.5, (width, list(middle), wanted))
+
+    def test_exr_of_nff_has_the_light_of_its_picture(self):
+        """So that what shows linear files shows it as it is. Half open to what lies behind: alpha stays that of the picture."""
+        scene = self.folder / "open.nff"
+        scene.write_text("v\nfrom 0 0 4\nat 0 0 0\nup 0 1 0\nangle 30\nhither 0.01\nresolution 8 8\nl 0 0 7\nf 1 0.75 0.33 0.8 0 0 0 1\n"
+                         "p 4\n-9 -9 0\n0 -9 0\n0 9 0\n-9 9 0\n")
+        options = ["--samples", "16", "--size", "9x9"]
+        rows = read_png(self.render(*options, scene=scene)[0])[2]
+        _, _, linear = read_exr(self.render("--float", *options, "--layers", "beauty,albedo", scene=scene, name="x.exr")[0])
+        for place, coverage in ((4 * 9 + 1, 1), (4 * 9 + 4, 0.5)):
+            self.assertAlmostEqual(linear["A"][place], coverage, delta=0.13)
+            alpha = linear["A"][place]
+            for c, albedo in zip("RGB", (0.8, 0.6, 0.264)):
+                self.assertAlmostEqual(255 * srgb(linear[c][place] / alpha), rows[4][4 * (place - 36) + "RGB".index(c)], delta=1)
+                self.assertAlmostEqual(srgb(linear["albedo." + c][place] / alpha), albedo, delta=0.01)
+
+    def test_nff_beside_other_light_is_linear(self):
+        """With an environment, or another model: the light that a display emits for its numbers, with the tone map's curve."""
+        scene, sky = self.folder / "lit.nff", self.folder / "black.hdr"
+        scene.write_text("v\nfrom 0 0 4\nat 0 0 0\nup 0 1 0\nangle 30\nhither 0.01\nresolution 8 8\nl 0 0 7\nf 1 1 1 0.5 0 0 0 1\n"
+                         "p 4\n-9 -9 0\n9 -9 0\n9 9 0\n-9 9 0\n")
+        sky.write_bytes(b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 2\n" + bytes(8))
+        for more in (["--environment", sky], [bundled_scenes() / "teapot.glb", "--at", "50,0,0"]):
+            with self.subTest(more=more):
+                shown = {}
+                for tone_map in ("none", "aces"):
+                    _, _, rows, _ = read_png(self.render(*more, "--tone-map", tone_map, "--size", "9x9", "--eye", "0,0,4", "--look-at", "0,0,0",
+                                                         scene=scene)[0])
+                    shown[tone_map] = rows[4][4 * 4]
+                self.assertAlmostEqual(shown["none"], 127.5, delta=1.5)
+                self.assertGreater(abs(shown["aces"] - shown["none"]), 10)
 
     def test_a_picture_has_16_samples_and_more_of_what_is_noisy_by_default(self):
         small = ["--size", "8x6"]

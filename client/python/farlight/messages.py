@@ -1812,6 +1812,9 @@ class SetEnvironment(Message):
         lights nothing; without an image
     keeps_image: 1: the image stays as it is, or none; width, height and arrays do not count. For daemons that have
         object_get
+    display_values: 1: the colours of the scene are a display's values, and light is computed with them as they are:
+        pictures of 8 bits show it without a tone map and a transfer function, floats are the light that a display emits
+        for it
     arrays: 0: equirectangular image, width x height x 4 half floats (red, green, blue, unused); rows from +y down, the
         middle column is -z
     """
@@ -1825,6 +1828,7 @@ class SetEnvironment(Message):
         _f.whole("height", "I", 0, 16384),
         _f.whole("backdrop", "I", 0, 1),
         _f.whole("keeps_image", "I", 0, 1),
+        _f.whole("display_values", "I", 0, 1),
         _f.array("arrays", BlobRef, 1),
     )
     colour: Sequence[float] = (0.0, 0.0, 0.0)
@@ -1833,6 +1837,7 @@ class SetEnvironment(Message):
     height: int = 0
     backdrop: int = 0
     keeps_image: int = 0
+    display_values: int = 0
     arrays: Sequence[BlobRef] = ()
 
 

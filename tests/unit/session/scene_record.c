@@ -108,6 +108,7 @@ static void add_looks(struct draft_list *list)
     *edit = (struct scene_edit){.kind = EDIT_SET_ENVIRONMENT};
     edit->set.environment.colour[0] = 2;
     edit->set.environment.rotation = 1.5f;
+    edit->set.environment.display_values = true;
     edit->set.environment.width = 2;
     edit->set.environment.height = 1;
     edit->set.environment.texels = make_blob(half_floats, sizeof(half_floats));
@@ -224,6 +225,7 @@ TEST(a_scene_of_all_kinds_is_the_same_afterwards)
         assert_true(mesh->arrays[i] == scene_mesh(scene, 10)->arrays[i]);
     assert_true(scene_light(again, 50)->outer_cone == 0.5f && scene_light(again, 50)->kind == LIGHT_SPOT);
     assert_true(scene_camera(again, 60)->near == 0.125f && scene_texture(again, 40)->nearest);
+    assert_true(again->environment.display_values);
     assert_true(again->environment.rotation == 1.5f && again->environment.texels == scene->environment.texels);
     struct store_record second = record_of(again);
     assert_int_equal(second.content_bytes, first.content_bytes);
