@@ -220,6 +220,96 @@ class Things(Case):
         told.assert_called_once_with("odd: Base Color comes from Voronoi Texture, which is not known: its own value is used")
 
 
+class Motion(Case):
+    """Keys 2 frames apart, seen halfway with the shutter open for one frame: half of what the keys say."""
+
+    def thing(self):
+        scene = empty((0.5, 0.5, 0.5))
+        scene.render.use_motion_blur, scene.render.motion_blur_shutter = True, 1
+        scene.frame_set(2)
+        grid("ground", 20, diffuse(GROUND))
+        return scene, ball("ball", diffuse((0.9, 0.1, 0.1, 1)))
+
+    def keys(self, owner, path, first, last):
+        for frame, value in ((1, first), (3, last)):
+            setattr(owner, path, value)
+            owner.keyframe_insert(path, frame=frame)
+        action = (owner.id_data.animation_data or owner.animation_data).action
+        for curve in action.fcurves:
+            for point in curve.keyframe_points:
+                point.interpolation = "LINEAR"
+
+    def test_things_that_move_and_rotate(self):
+        _, thing = self.thing()
+        self.keys(thing, "location", (-2, 0, 1), (2, 1, 1))
+        bar = grid("bar", 3, diffuse((0.1, 0.1, 0.9, 1)), (0, 2, 2))
+        self.keys(bar, "rotation_euler", (1, 0, 0), (1, 2, 0))
+        self.assert_like_cycles(0.01, 0.05)
+
+    def soft(self):
+        scene, thing = self.thing()
+        thing.location.z = 1.5
+        thing.shape_key_add(name="rest")
+        wide = thing.shape_key_add(name="wide")
+        for point in wide.data:
+            point.co.x *= 2.5
+        self.keys(wide, "value", 0, 1)
+        return scene, thing
+
+    def test_instances_of_what_deforms(self):
+        _, thing = self.soft()
+        put("other", thing.data, (0, 3, 2))
+        self.assert_like_cycles(0.01, 0.05)
+
+    def test_a_camera_that_moves(self):
+        scene, _ = self.thing()
+        self.keys(scene.camera, "location", (-1, -8, 3), (1, -8, 3))
+        self.keys(scene.camera, "rotation_euler", (1.2, 0, 0.2), (1.2, 0.1, -0.2))
+        self.assert_like_cycles(0.01, 0.05)
+
+    def test_a_light_that_moves_is_in_the_middle_of_each_step(self):
+        scene, _ = self.thing()  # Cycles blurs no lights: it renders the steps one by one
+        scene.farlight.samples, scene.farlight.motion_steps = 64, 4
+        self.keys(add_light("POINT", 500, shadow_soft_size=0.2), "location", (-3, -1, 4), (3, -1, 4))
+        ours = blocks(render())
+        scene.render.use_motion_blur = False
+        theirs = np.zeros_like(ours)
+        for part in (0.625, 0.875, 1.125, 1.375):
+            scene.frame_set(1 + int(part), subframe=part % 1)
+            theirs += blocks(render("CYCLES", 32)) / 4
+        apart = np.abs(ours - theirs) / np.maximum(theirs, DARK)
+        self.assertLess(apart.mean(), 0.01)
+        self.assertLess(apart.max(), 0.05)
+
+    def test_the_shutter_opens_when_blender_says(self):
+        scene, thing = self.thing()
+        scene.render.motion_blur_shutter = 0.02
+        self.keys(thing, "location", (-2, 0, 1), (2, 0, 1))
+
+        def middle():
+            red = render()
+            return np.average(np.arange(scenes.WIDTH), weights=np.clip(red[..., 0] - 2 * red[..., 1], 0, None).sum(axis=0))
+        shifts = {}
+        for place in ("START", "CENTER", "END"):
+            scene.cycles.motion_blur_position = place
+            scene.render.motion_blur_shutter = 0.5
+            shifts[place] = middle()
+        # A quarter of the 4 metres between the keys lies between neighbours, as half a frame is open.
+        self.assertGreater(shifts["START"], shifts["CENTER"] + 2)
+        self.assertGreater(shifts["CENTER"], shifts["END"] + 2)
+
+    def test_the_same_motion_is_the_same_picture_and_is_not_sent_again(self):
+        scene, _ = self.soft()
+        first = render()
+        made = next(iter(mirror._mirrors.values())).scene
+        version = made.version
+        np.testing.assert_array_equal(render(), first)
+        self.assertEqual(made.version, version)
+        scene.render.use_motion_blur = False
+        self.assertGreater(np.abs(blocks(render()) - blocks(first)).max(), 0.01)  # five times the noise
+        self.assertEqual(made.objects("clip") + made.objects("channel"), [])
+
+
 class Passes(Case):
     def test_depth_normal_and_albedo_arrive_in_the_compositor(self):
         scene = empty((0.5, 0.5, 0.5))

@@ -15,13 +15,43 @@ import numpy as np
 from farlight.scene import Object
 from farlight.messages import NodeKind, ObjectKind, SetNode
 
-from . import cameras, lights, materials, meshes, world
+from . import cameras, lights, materials, meshes, motion, world
 
 WORLD_FROM_BLENDER = np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]], dtype=np.float64)
 WITH_SURFACE = {"MESH", "META"}  # the surfaces of curves and texts come as objects of the type mesh beside them
 # Blender adds the normals of faces up in several threads, in any order: by rounding they differ from time to time.
 SAME_DIRECTION = 1e-5
+# What is removed first, as it uses the others, or goes with them.
+SWEPT = {ObjectKind.CHANNEL: 0, ObjectKind.CLIP: 1, ObjectKind.NODE: 2}
 NOT_DRAWN = {"VOLUME": "volumes", "CURVES": "hair", "POINTCLOUD": "point clouds", "GPENCIL": "grease pencil"}
+
+
+ROOT, CAMERA = ("root",), ("camera",)  # keys of nodes that stand for no object of a name
+
+
+def _key(instance: bpy.types.DepsgraphObjectInstance) -> Hashable:
+    """Of the node that stands for it."""
+    thing = instance.object
+    return (instance.parent.name_full, thing.name_full, tuple(instance.persistent_id)) if instance.is_instance else thing.name_full
+
+
+def moment(depsgraph: bpy.types.Depsgraph, camera: bpy.types.Object) -> motion.Moment:
+    """Where things are, and the shapes of those that deform, at the time that Blender's scene has."""
+    made, names = motion.Moment(), meshes.Names()
+    scene = depsgraph.scene_eval
+    for instance in depsgraph.object_instances:
+        thing = instance.object
+        if not instance.show_self or thing.type not in WITH_SURFACE | {"LIGHT"}:
+            continue
+        if motion.is_blurred(thing):
+            made.places[_key(instance)] = instance.matrix_world.copy()
+        if thing.type in WITH_SURFACE:
+            mesh, is_new = names.of(thing)
+            if is_new and motion.deforms(thing, scene):
+                made.shapes[mesh] = meshes.shape(thing.data)
+    if motion.is_blurred(camera):
+        made.places[CAMERA] = camera.matrix_world.copy()
+    return made
 
 
 class Mirror:
@@ -34,6 +64,8 @@ class Mirror:
         self._numbers: dict[tuple[ObjectKind, Hashable], int] = {}
         self._last: dict[ObjectKind, int] = {}
         self._seen: set[tuple[ObjectKind, Hashable]] = set()
+        self.pictures = 0  # that were rendered
+        self._motion: Optional[motion.Motion] = None
 
     # ---- for the modules that read Blender's data
 
@@ -65,25 +97,31 @@ class Mirror:
     def place(self, key: Hashable, shows: Object, matrix: Any, name: str) -> Object:
         """Shows a thing at a place in Blender's world."""
         node = self.number(ObjectKind.NODE, key)
+        if self._motion is not None and not self._motion.follow(key, node, shows.kind in {ObjectKind.LIGHT, ObjectKind.CAMERA}):
+            self.note(f"{name}: it is sheared, and while it moves it is not")
         return self.scene.add_node(shows, np.array(matrix), parent=self._root(), node=node, name=name[:100])
 
     def _root(self) -> Object:
-        return Object(ObjectKind.NODE, self.number(ObjectKind.NODE, "root"))
+        return Object(ObjectKind.NODE, self.number(ObjectKind.NODE, ROOT))
 
     # ---- an update
 
     def update(self, depsgraph: bpy.types.Depsgraph,
-               seen_by: Optional[tuple[bpy.types.Object, cameras.Lens]] = None) -> Optional[Object]:
-        """Makes the scene what Blender's is. seen_by: a camera; its node is returned."""
+               seen_by: Optional[tuple[bpy.types.Object, cameras.Lens]] = None,
+               moves: Optional[motion.Motion] = None) -> Optional[Object]:
+        """Makes the scene what Blender's is. seen_by: a camera; its node is returned. moves: what does while the shutter is open."""
+        self._motion = moves
         self._seen.clear()
         self.notes.clear()
         self.scene.set(SetNode(node=self._root().number, kind=NodeKind.GROUP, name="Blender",
                                parent_from_node=[float(one) for one in WORLD_FROM_BLENDER[:3].ravel()]))
         world.update(self, depsgraph.scene_eval)
-        shared = meshes.Shared(self, materials.Reader(self))
+        shared = meshes.Shared(self, materials.Reader(self), moves)
         for instance in depsgraph.object_instances:
             self._instance(instance, shared)
-        node = cameras.update(self, *seen_by) if seen_by else None
+        node = cameras.update(self, CAMERA, *seen_by) if seen_by else None
+        if moves is not None:
+            moves.send(self)
         self._sweep()
         return node
 
@@ -91,12 +129,13 @@ class Mirror:
         if not instance.show_self:
             return
         thing = instance.object
-        key: Hashable = (instance.parent.name_full, thing.name_full, tuple(instance.persistent_id)) \
-            if instance.is_instance else thing.name_full
+        key = _key(instance)
         if thing.type in WITH_SURFACE:
-            mesh = shared.mesh(thing)
+            mesh, bends = shared.mesh(thing)
             if mesh is not None:
-                self.place(key, mesh, instance.matrix_world, thing.name)
+                node = self.place(key, mesh, instance.matrix_world, thing.name)
+                if bends and self._motion is not None:
+                    self._motion.bend(key, node.number)
         elif thing.type == "LIGHT":
             lights.update(self, key, thing, instance.matrix_world)
         elif thing.type in NOT_DRAWN:
@@ -104,7 +143,7 @@ class Mirror:
 
     def _sweep(self) -> None:
         gone = [one for one in self._numbers if one not in self._seen]
-        for kind, key in sorted(gone, key=lambda one: one[0] != ObjectKind.NODE):  # they use the others
+        for kind, key in sorted(gone, key=lambda one: SWEPT.get(one[0], len(SWEPT))):
             number = self._numbers.pop((kind, key))
             self.scene.remove(Object(kind, number))
             if kind == ObjectKind.MESH:
