@@ -6,7 +6,8 @@ same as before is no change of the farlight.Scene and is not sent. All nodes are
 into the protocol's (y up), so that all transforms are Blender's own."""
 from __future__ import annotations
 
-from collections.abc import Hashable
+import math
+from collections.abc import Callable, Hashable
 from typing import Any, Optional
 
 import bpy
@@ -14,6 +15,7 @@ import farlight
 import numpy as np
 from farlight.scene import Object
 from farlight.messages import NodeKind, ObjectKind, SetNode
+from mathutils import Vector
 
 from . import cameras, lights, materials, meshes, motion, world
 
@@ -31,8 +33,8 @@ ROOT, CAMERA = ("root",), ("camera",)  # keys of nodes that stand for no object 
 
 def _key(instance: bpy.types.DepsgraphObjectInstance) -> Hashable:
     """Of the node that stands for it."""
-    thing = instance.object
-    return (instance.parent.name_full, thing.name_full, tuple(instance.persistent_id)) if instance.is_instance else thing.name_full
+    name: str = instance.object.name_full
+    return (instance.parent.name_full, name, tuple(instance.persistent_id)) if instance.is_instance else name
 
 
 def moment(depsgraph: bpy.types.Depsgraph, camera: bpy.types.Object) -> motion.Moment:
@@ -52,6 +54,24 @@ def moment(depsgraph: bpy.types.Depsgraph, camera: bpy.types.Object) -> motion.M
     if motion.is_blurred(camera):
         made.places[CAMERA] = camera.matrix_world.copy()
     return made
+
+
+class _Extent:
+    """How far from its origin the scene reaches."""
+
+    def __init__(self) -> None:
+        self._radii: dict[int, float] = {}
+        self._farthest = 1e-3
+
+    def add(self, mesh: int, thing: bpy.types.Object, matrix: Any) -> None:
+        """An object with a mesh, at a place."""
+        if mesh not in self._radii:
+            self._radii[mesh] = max(Vector(corner).length for corner in thing.bound_box)
+        self._farthest = max(self._farthest, matrix.translation.length + self._radii[mesh] * max(abs(one) for one in matrix.to_scale()))
+
+    def radius(self) -> float:
+        """A power of two, so that it rarely changes."""
+        return float(2 ** math.ceil(math.log2(self._farthest)))
 
 
 class Mirror:
@@ -94,12 +114,12 @@ class Mirror:
         if text not in self.notes:
             self.notes.append(text)
 
-    def place(self, key: Hashable, shows: Object, matrix: Any, name: str) -> Object:
-        """Shows a thing at a place in Blender's world."""
+    def place(self, key: Hashable, shows: Object, matrix: Any, name: str, rigid: Optional[Callable[[Any], Any]] = None) -> Object:
+        """Shows a thing at a place in Blender's world. rigid: what is left of a place, for a light or the camera."""
         node = self.number(ObjectKind.NODE, key)
-        if self._motion is not None and not self._motion.follow(key, node, shows.kind in {ObjectKind.LIGHT, ObjectKind.CAMERA}):
+        if self._motion is not None and not self._motion.follow(key, node, rigid):
             self.note(f"{name}: it is sheared, and while it moves it is not")
-        return self.scene.add_node(shows, np.array(matrix), parent=self._root(), node=node, name=name[:100])
+        return self.scene.add_node(shows, np.array(rigid(matrix) if rigid else matrix), parent=self._root(), node=node, name=name[:100])
 
     def _root(self) -> Object:
         return Object(ObjectKind.NODE, self.number(ObjectKind.NODE, ROOT))
@@ -117,15 +137,20 @@ class Mirror:
                                parent_from_node=[float(one) for one in WORLD_FROM_BLENDER[:3].ravel()]))
         world.update(self, depsgraph.scene_eval)
         shared = meshes.Shared(self, materials.Reader(self), moves)
+        found: list[tuple[Hashable, bpy.types.Object, Any]] = []  # lights
+        extent = _Extent()
         for instance in depsgraph.object_instances:
-            self._instance(instance, shared)
+            self._instance(instance, shared, found, extent)
+        for light in found:
+            lights.update(self, *light, extent.radius())
         node = cameras.update(self, CAMERA, *seen_by) if seen_by else None
         if moves is not None:
             moves.send(self)
         self._sweep()
         return node
 
-    def _instance(self, instance: bpy.types.DepsgraphObjectInstance, shared: "meshes.Shared") -> None:
+    def _instance(self, instance: bpy.types.DepsgraphObjectInstance, shared: meshes.Shared,
+                  found: list[tuple[Hashable, bpy.types.Object, Any]], extent: _Extent) -> None:
         if not instance.show_self:
             return
         thing = instance.object
@@ -133,11 +158,12 @@ class Mirror:
         if thing.type in WITH_SURFACE:
             mesh, bends = shared.mesh(thing)
             if mesh is not None:
+                extent.add(mesh.number, thing, instance.matrix_world)
                 node = self.place(key, mesh, instance.matrix_world, thing.name)
                 if bends and self._motion is not None:
                     self._motion.bend(key, node.number)
         elif thing.type == "LIGHT":
-            lights.update(self, key, thing, instance.matrix_world)
+            found.append((key, thing, instance.matrix_world.copy()))
         elif thing.type in NOT_DRAWN:
             self.note(f"{thing.name}: {NOT_DRAWN[thing.type]} are not drawn")
 

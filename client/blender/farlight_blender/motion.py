@@ -6,7 +6,7 @@ move and meshes that deform are blurred by the shutter of the job. A camera and 
 that a job is several frames, each of a part of the shutter's time, of which the picture is the mean."""
 from __future__ import annotations
 
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Optional
 
@@ -78,25 +78,27 @@ class Motion:
         stacked = np.stack([np.column_stack(one) for one in found if one])
         return (stacked if np.abs(stacked[..., :3] - stacked[0, :, :3]).max(initial=0) > 0 else None), False
 
-    def follow(self, key: Hashable, node: int, is_rigid: bool) -> bool:
-        """Lets a node move as Blender's object of that key. is_rigid: a light or the camera. False: the object is sheared, which
-        is lost."""
-        matrices = [one.places.get(key) for one in self._moments]
-        if any(one is None for one in matrices):
+    def follow(self, key: Hashable, node: int, rigid: Optional[Callable[[Any], Any]]) -> bool:
+        """Lets a node move as Blender's object of that key. rigid: what is left of a place of a light or the camera. False: the
+        object is sheared, which is lost."""
+        places = [one.places.get(key) for one in self._moments]
+        if any(one is None for one in places):
             return True  # it comes or goes
+        matrices = [rigid(one) if rigid else one for one in places]
         first = np.array(matrices[0])
         if all(np.allclose(np.array(one), first, rtol=SAME, atol=SAME) for one in matrices[1:]):
             return True
         parts = [one.decompose() for one in matrices]
-        whose = "watchers" if is_rigid else "things"
-        paths = [(ChannelPath.NODE_TRANSLATION, [tuple(place) for place, _, _ in parts]),
-                 (ChannelPath.NODE_ROTATION, [(turn.x, turn.y, turn.z, turn.w) for _, turn, _ in parts])]
-        if not is_rigid:
+        whose = "watchers" if rigid else "things"
+        paths: list[tuple[ChannelPath, Any]] = [
+            (ChannelPath.NODE_TRANSLATION, [tuple(place) for place, _, _ in parts]),
+            (ChannelPath.NODE_ROTATION, [(turn.x, turn.y, turn.z, turn.w) for _, turn, _ in parts])]
+        if rigid is None:
             paths.append((ChannelPath.NODE_SCALE, [tuple(scale) for _, _, scale in parts]))
         for path, values in paths:
             self._channels[whose].append((key, node, path, len(values[0]), values))
         rebuilt = np.array(parts[0][1].to_matrix()) * tuple(parts[0][2])
-        return is_rigid or bool(np.allclose(rebuilt, first[:3, :3], atol=1e-4 * np.abs(first[:3, :3]).max()))
+        return rigid is not None or bool(np.allclose(rebuilt, first[:3, :3], atol=1e-4 * np.abs(first[:3, :3]).max()))
 
     def bend(self, key: Hashable, node: int) -> None:
         """Lets a node's mesh, whose targets are all keys but the first, deform."""
