@@ -74,6 +74,9 @@ def _passes(frame: Frame, view: cameras.Lens, is_transparent: bool) -> dict[str,
     return {name: view.cut(image) for name, image in made.items()}
 
 
+_told: set[str] = set()  # to those who look at a viewport
+
+
 class _Mean:
     """The picture of frames that each show a part of the shutter's time."""
 
@@ -118,12 +121,14 @@ class FarlightEngine(bpy.types.RenderEngine):  # type: ignore[misc]
             self._render(depsgraph)
         except session.Stopped:
             pass
+        except farlight.ConnectionLost as why:
+            self._fail(str(why) if why.remedy else f"{why}; render again, which connects again and sends everything")
         except (farlight.Error, cameras.TooLarge) as why:
             self._fail(str(why))
 
     def view_update(self, _: bpy.types.Context, depsgraph: bpy.types.Depsgraph) -> None:
         """The viewport's scene has changed."""
-        self._seen(lambda: self._viewport_of(depsgraph).update(depsgraph))
+        self._seen(lambda: self._note(self._viewport_of(depsgraph).update(depsgraph)))
 
     def view_draw(self, context: bpy.types.Context, depsgraph: bpy.types.Depsgraph) -> None:
         """The viewport is drawn."""
@@ -134,13 +139,24 @@ class FarlightEngine(bpy.types.RenderEngine):  # type: ignore[misc]
             self._viewport = Viewport(self, depsgraph.scene_eval)
         return self._viewport
 
+    def _note(self, notes: list[str]) -> None:
+        """Tells what the viewport lacks: each once a session, as every change of the scene would tell it again."""
+        for note in notes:
+            if note not in _told:
+                _told.add(note)
+                self._warn(note)
+
     def _seen(self, action: Callable[[], None]) -> None:
         try:
             action()
         except farlight.Error as why:
-            self.update_stats("", f"farlight: {why}")
+            self.say(str(why))
 
     # ---- a picture
+
+    def say(self, text: str) -> None:
+        """In the picture's or the viewport's corner."""
+        self.update_stats("", f"farlight: {text}")
 
     def _warn(self, text: str) -> None:
         self.report({"WARNING"}, f"farlight: {text}")
@@ -158,14 +174,14 @@ class FarlightEngine(bpy.types.RenderEngine):  # type: ignore[misc]
         if camera.data.type == "PANO":
             self._fail(f"{camera.name} is panoramic; perspective and orthographic cameras can be rendered")
             return
-        self.update_stats("", "farlight: reading the scene")
+        self.say("reading the scene")
         moves = self._moves(depsgraph, camera)
         view = cameras.lens(camera.evaluated_get(depsgraph), depsgraph, *_size(scene), _border(scene))
         image = mirror((scene.name_full, depsgraph.view_layer_eval.name))
         node = image.update(depsgraph, (camera.evaluated_get(depsgraph), view), moves)
         for note in image.notes:
             self._warn(note)
-        self.update_stats("", "farlight: sending the scene")
+        self.say("sending the scene")
         daemon = session.session(*settings.server_of(scene))
         daemon.wait(daemon.send(image.scene), self.test_break)
         layer = depsgraph.view_layer_eval.name
@@ -194,7 +210,7 @@ class FarlightEngine(bpy.types.RenderEngine):  # type: ignore[misc]
               job: dict[str, Any]) -> None:
         layer = result.layers[0]
         count = job["last_frame"] + 1
-        self.update_stats("", f"farlight: {job['samples'] * count} samples")
+        self.say(f"{job['samples'] * count} samples")
         mean = _Mean(count) if "clips" in job else None
         for frame in daemon.frames(image.scene, node, self.test_break, layers=_wanted_layers(layer), **job):
             images = _passes(frame, view, job["background"] == Background.TRANSPARENT)
