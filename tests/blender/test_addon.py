@@ -271,6 +271,22 @@ class Things(Case):
             render()
         told.assert_called_once_with("odd: Base Color comes from Voronoi Texture, which is not known: its own value is used")
 
+    def test_what_is_not_drawn_is_told_once(self):
+        empty((0.5, 0.5, 0.5))
+        foggy = material("foggy", Subsurface=0.5)
+        tree = foggy.node_tree
+        tree.links.new(tree.nodes.new("ShaderNodeVolumeScatter").outputs[0], tree.nodes["Material Output"].inputs["Volume"])
+        ground = grid("ground", 8, foggy)
+        ground.modifiers.new("hairy", "PARTICLE_SYSTEM")
+        ground.particle_systems[0].settings.type = "HAIR"
+        put("cloud", bpy.data.volumes.new("cloud"))
+        put("fur", bpy.data.hair_curves.new("fur"))
+        with unittest.mock.patch.object(engine.FarlightEngine, "_warn") as told:
+            render()
+        self.assertEqual(sorted(one.args[0] for one in told.call_args_list), [
+            "cloud: volumes are not drawn", "foggy: Subsurface is left out", "foggy: its volume is not drawn",
+            "fur: hairs are not drawn", "ground: the hairs of hairy are not drawn"])
+
 
 class Motion(Case):
     """Keys 2 frames apart, seen halfway with the shutter open for one frame: half of what the keys say."""

@@ -25,7 +25,7 @@ WITH_SURFACE = {"MESH", "META"}  # the surfaces of curves and texts come as obje
 SAME_DIRECTION = 1e-5
 # What is removed first, as it uses the others, or goes with them.
 SWEPT = {ObjectKind.CHANNEL: 0, ObjectKind.CLIP: 1, ObjectKind.NODE: 2}
-NOT_DRAWN = {"VOLUME": "volumes", "CURVES": "hair", "POINTCLOUD": "point clouds", "GPENCIL": "grease pencil"}
+NOT_DRAWN = {"VOLUME": "volumes", "CURVES": "hairs", "POINTCLOUD": "point clouds", "GPENCIL": "grease pencil"}
 
 
 ROOT, CAMERA = ("root",), ("camera",)  # keys of nodes that stand for no object of a name
@@ -54,6 +54,8 @@ def moment(depsgraph: bpy.types.Depsgraph, camera: bpy.types.Object) -> motion.M
     if motion.is_blurred(camera):
         made.places[CAMERA] = camera.matrix_world.copy()
     return made
+
+PARTICLES = {"PATH": "the hairs", "HALO": "the halos", "LINE": "the lines"}
 
 
 class _Extent:
@@ -156,6 +158,9 @@ class Mirror:
         thing = instance.object
         key = _key(instance)
         if thing.type in WITH_SURFACE:
+            for system in thing.particle_systems if not instance.is_instance else ():
+                if system.settings.render_type in PARTICLES:  # others are instances
+                    self.note(f"{thing.name}: {PARTICLES[system.settings.render_type]} of {system.name} are not drawn")
             mesh, bends = shared.mesh(thing)
             if mesh is not None:
                 extent.add(mesh.number, thing, instance.matrix_world)
