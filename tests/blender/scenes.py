@@ -28,7 +28,7 @@ def empty(world=(0, 0, 0)):
     scene.world.node_tree.nodes["Background"].inputs["Color"].default_value = (*world, 1)
     scene.camera = put("camera", bpy.data.cameras.new("camera"), (0, -8, 3), (math.radians(70), 0, 0))
     scene.farlight.samples, scene.farlight.step_samples, scene.farlight.denoise = 64, 32, "auto"
-    scene.farlight.server = ""
+    scene.farlight.server, scene.farlight.clamp = "", 10
     return scene
 
 
@@ -93,12 +93,17 @@ def image(name, pixels, space="sRGB", is_float=False):
     return made
 
 
-def textured(of, name, picture, output="Color"):
-    """Feeds an input of a Principled BSDF from an image."""
+def shader(of):
+    """The node that makes the surface."""
+    return of.node_tree.nodes["Material Output"].inputs["Surface"].links[0].from_node
+
+
+def textured(of, name, picture, interpolation="Linear"):
+    """Feeds an input of the shader from an image."""
     tree = of.node_tree
     node = tree.nodes.new("ShaderNodeTexImage")
-    node.image = picture
-    tree.links.new(node.outputs[output], tree.nodes["Principled BSDF"].inputs[name])
+    node.image, node.interpolation = picture, interpolation
+    tree.links.new(node.outputs["Color"], shader(of).inputs[name])
     return node
 
 
@@ -119,7 +124,12 @@ def render(engine="FARLIGHT", samples=128):
     scene.render.engine = engine
     if engine == "CYCLES":
         scene.cycles.samples, scene.cycles.use_denoising, scene.cycles.use_adaptive_sampling = samples, False, False
-        scene.cycles.max_bounces, scene.cycles.caustics_refractive, scene.cycles.caustics_reflective = 8, True, True
+        # The same paths: as many bounces of each kind, no light left out, and no surface rougher after a rough one, which takes
+        # 12 % of the light of metals and a third of that below glass.
+        for bounces in ("max", "diffuse", "glossy", "transmission", "transparent_max"):
+            setattr(scene.cycles, f"{bounces}_bounces", scene.farlight.depth)
+        scene.cycles.sample_clamp_indirect, scene.cycles.blur_glossy = scene.farlight.clamp, 0
+        scene.cycles.caustics_refractive = scene.cycles.caustics_reflective = True
     scene.render.image_settings.file_format, scene.render.image_settings.color_depth = "OPEN_EXR", "32"
     scene.render.image_settings.color_mode = "RGBA"
     path = pathlib.Path(FOLDER.name) / f"{engine}.exr"

@@ -14,8 +14,9 @@ ROOT = HERE.parents[1]
 sys.path[:0] = [str(ROOT / "client/python"), str(ROOT / "client/blender"), str(HERE)]
 
 import bpy  # pylint: disable=wrong-import-position
+from mathutils import Euler  # pylint: disable=wrong-import-position
 import farlight_blender  # pylint: disable=wrong-import-position
-from farlight_blender import session  # pylint: disable=wrong-import-position
+from farlight_blender import engine, session  # pylint: disable=wrong-import-position
 import scenes  # pylint: disable=wrong-import-position
 
 WAIT_S = 60
@@ -62,13 +63,33 @@ def is_blue():
     return blue > 1.5 * red
 
 
+def shine(colour):
+    bpy.data.materials["shining"].node_tree.nodes["Principled BSDF"].inputs["Emission"].default_value = (*colour, 1)
+
+
 def put_a_ball():
     shining = scenes.material("shining", Base_Color=(0, 0, 0, 1), Emission=(0, 0, 1, 1), Emission_Strength=1)
     scenes.ball("ball", shining, (0, 0, 0), 2)
 
 
+def orbit():
+    """Half about the ball: it is in the middle from everywhere."""
+    area().spaces.active.region_3d.view_rotation.rotate(Euler((0, 0, 3)))
+
+
 def look_away():
     area().spaces.active.region_3d.view_location.x = 40
+
+
+def kill_the_daemon():
+    session._sessions[None, None]._client._link.process.kill()
+    told.clear()
+    world((0.8, 0.1, 0.1))
+
+
+def is_told_and_red():
+    """The message says what has happened, and the next daemon has the scene."""
+    return any("connection" in one and "tried again every 1 s" in one for one in told) and is_red()
 
 
 def no_view_is_left():
@@ -76,7 +97,8 @@ def no_view_is_left():
     return only.wait(only._client.stats()).jobs == 0
 
 
-STEPS = [(begin, is_red), (lambda: world((0.1, 0.6, 0.1)), is_green), (put_a_ball, is_blue), (look_away, is_green),
+STEPS = [(begin, is_red), (lambda: world((0.1, 0.6, 0.1)), is_green), (put_a_ball, is_blue), (orbit, is_blue),
+         (lambda: shine((1, 0, 0)), is_red), (look_away, is_green), (kill_the_daemon, is_told_and_red),
          (lambda: setattr(area().spaces.active.shading, "type", "SOLID"), no_view_is_left)]
 
 
@@ -104,5 +126,8 @@ def step(state={"at": 0, "since": None}):  # pylint: disable=dangerous-default-v
 
 os.environ["FARLIGHT_LIBEXEC"] = os.path.abspath(sys.argv[sys.argv.index("--") + 1])
 bpy.context.preferences.view.show_splash = False
+told = []  # what the viewport's engine has said
 farlight_blender.register()
+say = engine.FarlightEngine.say
+engine.FarlightEngine.say = lambda self, text: (told.append(text), say(self, text))
 bpy.app.timers.register(step, first_interval=2)

@@ -6,6 +6,7 @@ a part of a larger picture."""
 from __future__ import annotations
 
 import math
+from collections.abc import Hashable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -94,10 +95,10 @@ def lens(camera: bpy.types.Object, depsgraph: bpy.types.Depsgraph, width: int, h
                 0.0 if is_flat else 2 * math.atan(tangent), 2 * tangent if is_flat else 0.0, aperture, focus)
 
 
-def update(mirror: Mirror, camera: bpy.types.Object, view: Lens) -> Object:
-    """Sets it, and the node that shows it."""
-    number = mirror.number(ObjectKind.CAMERA, "camera")
+def update(mirror: Mirror, key: Hashable, camera: bpy.types.Object, view: Lens) -> Object:
+    """Sets it, and the node of that key that shows it."""
+    number = mirror.number(ObjectKind.CAMERA, key)
     made = mirror.scene.set(SetCamera(camera=number, fov_y=view.fov_y, height=view.ortho_height,
                                       near=camera.data.clip_start, name=camera.name[:100]))
     assert made is not None
-    return mirror.place("the camera", made, camera.matrix_world.normalized(), camera.name)
+    return mirror.place(key, made, camera.matrix_world, camera.name, lambda matrix: matrix.normalized())

@@ -2,6 +2,7 @@
 """The render engine: F12, animations, and the viewport."""
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any, Optional
 
@@ -11,15 +12,13 @@ import numpy as np
 from farlight.frame import Frame
 from farlight.messages import Background
 
-from . import cameras, session, settings
-from .mirror import Mirror, forget_all, mirror
+from . import cameras, motion, session, settings
+from .mirror import Mirror, forget_all, mirror, moment
 from .viewport import Viewport
 
 NOTHING_THERE = 1e10  # what Blender's depth has where there is no surface
 ALBEDO = "Denoising Albedo"
-# The daemon adds the samples of an accumulating job to those of the one before, if the scene is the same. With this between
-# them each picture starts anew, and F12 twice makes the same picture.
-_NOTHING = {"width": 1, "height": 1}
+FULLY_DENOISED = 64  # from so many samples on a daemon's `auto` leaves noise as it is
 
 
 def _wanted_layers(layer: bpy.types.RenderLayer) -> tuple[str, ...]:
@@ -33,14 +32,29 @@ def _steps(samples: int, most: int) -> tuple[int, int]:
     return count, -(-samples // count)
 
 
-def _job(scene: bpy.types.Scene, view: cameras.Lens) -> dict[str, Any]:
+def _anew(integrator: str, picture: int) -> dict[str, Any]:
+    """The daemon adds the samples of an accumulating job to those of the one before, if both show the same. Jobs that differ by a
+    field that their integrator does not look at start anew, so that F12 twice makes the same picture."""
+    count = 1 + picture % (1 << 20)
+    return {"layer_opacity": 1 / count} if integrator == "ao" else {"ao_distance": count}
+
+
+def _job(scene: bpy.types.Scene, view: cameras.Lens, moves: Optional[motion.Motion], picture: int) -> dict[str, Any]:
     """Fields of render that F12 asks for."""
     chosen = scene.farlight
-    steps, samples = _steps(chosen.samples, chosen.step_samples)
+    most = chosen.step_samples
+    if moves is not None and moves.has_watchers():
+        most = max(1, min(most, chosen.samples // chosen.motion_steps))
+    steps, samples = _steps(chosen.samples, most)
     background = Background.TRANSPARENT if scene.render.film_transparent else Background.ENVIRONMENT
-    return {**view.fields(may_crop=chosen.denoise == "off"), "integrator": chosen.integrator, "tracer": chosen.tracer,
+    job = {**view.fields(may_crop=chosen.denoise == "off"), "integrator": chosen.integrator, "tracer": chosen.tracer,
             "samples": samples, "last_frame": steps - 1, "accumulate": 1, "depth": chosen.depth, "clamp": chosen.clamp,
-            "denoise": chosen.denoise, "background": background, "seed": scene.frame_current}
+            "denoise": chosen.denoise, "background": background, "seed": scene.frame_current, **_anew(chosen.integrator, picture)}
+    if moves is None or not moves.has_any():
+        return job
+    if chosen.denoise == "auto" and steps * samples > FULLY_DENOISED:  # which the daemon does not know: it sees frames of few
+        job["denoise"] = "off"
+    return {**job, **moves.job(steps)}
 
 
 def _passes(frame: Frame, view: cameras.Lens, is_transparent: bool) -> dict[str, Any]:
@@ -58,6 +72,28 @@ def _passes(frame: Frame, view: cameras.Lens, is_transparent: bool) -> dict[str,
     if "albedo" in words:
         made[ALBEDO] = frame.albedo
     return {name: view.cut(image) for name, image in made.items()}
+
+
+_told: set[str] = set()  # to those who look at a viewport
+
+
+class _Mean:
+    """The picture of frames that each show a part of the shutter's time."""
+
+    def __init__(self, frames: int) -> None:
+        self._middle, self._added = frames // 2, 0
+        self._images: dict[str, Any] = {}
+
+    def add(self, images: dict[str, Any]) -> dict[str, Any]:
+        """What there is with this frame. A depth has no mean: it is that of the middle."""
+        for name, image in images.items():
+            before = self._images.get(name)
+            if name == "Depth":
+                self._images[name] = image if self._added <= self._middle else before
+            else:
+                self._images[name] = image if before is None else before + (image - before) / (self._added + 1)
+        self._added += 1
+        return self._images
 
 
 class FarlightEngine(bpy.types.RenderEngine):  # type: ignore[misc]
@@ -85,12 +121,14 @@ class FarlightEngine(bpy.types.RenderEngine):  # type: ignore[misc]
             self._render(depsgraph)
         except session.Stopped:
             pass
+        except farlight.ConnectionLost as why:
+            self._fail(str(why) if why.remedy else f"{why}; render again, which connects again and sends everything")
         except (farlight.Error, cameras.TooLarge) as why:
             self._fail(str(why))
 
     def view_update(self, _: bpy.types.Context, depsgraph: bpy.types.Depsgraph) -> None:
         """The viewport's scene has changed."""
-        self._seen(lambda: self._viewport_of(depsgraph).update(depsgraph))
+        self._seen(lambda: self._note(self._viewport_of(depsgraph).update(depsgraph)))
 
     def view_draw(self, context: bpy.types.Context, depsgraph: bpy.types.Depsgraph) -> None:
         """The viewport is drawn."""
@@ -101,13 +139,24 @@ class FarlightEngine(bpy.types.RenderEngine):  # type: ignore[misc]
             self._viewport = Viewport(self, depsgraph.scene_eval)
         return self._viewport
 
+    def _note(self, notes: list[str]) -> None:
+        """Tells what the viewport lacks: each once a session, as every change of the scene would tell it again."""
+        for note in notes:
+            if note not in _told:
+                _told.add(note)
+                self._warn(note)
+
     def _seen(self, action: Callable[[], None]) -> None:
         try:
             action()
         except farlight.Error as why:
-            self.update_stats("", f"farlight: {why}")
+            self.say(str(why))
 
     # ---- a picture
+
+    def say(self, text: str) -> None:
+        """In the picture's or the viewport's corner."""
+        self.update_stats("", f"farlight: {text}")
 
     def _warn(self, text: str) -> None:
         self.report({"WARNING"}, f"farlight: {text}")
@@ -125,13 +174,14 @@ class FarlightEngine(bpy.types.RenderEngine):  # type: ignore[misc]
         if camera.data.type == "PANO":
             self._fail(f"{camera.name} is panoramic; perspective and orthographic cameras can be rendered")
             return
-        self.update_stats("", "farlight: reading the scene")
+        self.say("reading the scene")
+        moves = self._moves(depsgraph, camera)
         view = cameras.lens(camera.evaluated_get(depsgraph), depsgraph, *_size(scene), _border(scene))
         image = mirror((scene.name_full, depsgraph.view_layer_eval.name))
-        node = image.update(depsgraph, (camera.evaluated_get(depsgraph), view))
+        node = image.update(depsgraph, (camera.evaluated_get(depsgraph), view), moves)
         for note in image.notes:
             self._warn(note)
-        self.update_stats("", "farlight: sending the scene")
+        self.say("sending the scene")
         daemon = session.session(*settings.server_of(scene))
         daemon.wait(daemon.send(image.scene), self.test_break)
         layer = depsgraph.view_layer_eval.name
@@ -139,18 +189,32 @@ class FarlightEngine(bpy.types.RenderEngine):  # type: ignore[misc]
             self.add_pass(ALBEDO, 3, "RGB", layer=layer)
         result = self.begin_result(0, 0, view.part_width, view.part_height, layer=layer)
         try:
-            self._show(result, daemon, image, node, view, _job(scene, view))
+            self._show(result, daemon, image, node, view, _job(scene, view, moves, image.pictures))
         finally:
+            image.pictures += 1
             self.end_result(result)  # with what has come
+
+    def _moves(self, depsgraph: bpy.types.Depsgraph, camera: bpy.types.Object) -> Optional[motion.Motion]:
+        """Evaluates Blender's scene at the keys of the shutter, then at the frame's time again."""
+        scene = depsgraph.scene_eval
+        if not motion.is_wanted(scene):
+            return None
+        now, moments = (scene.frame_current, scene.frame_subframe), []
+        for time in motion.times(scene):
+            self.frame_set(math.floor(time), time - math.floor(time))
+            moments.append(moment(depsgraph, camera.evaluated_get(depsgraph)))
+        self.frame_set(*now)
+        return motion.Motion(moments)
 
     def _show(self, result: bpy.types.RenderResult, daemon: session.Session, image: Mirror, node: Any, view: cameras.Lens,
               job: dict[str, Any]) -> None:
         layer = result.layers[0]
         count = job["last_frame"] + 1
-        self.update_stats("", f"farlight: {job['samples'] * count} samples")
-        daemon.wait(daemon.render(image.scene, node, **_NOTHING, integrator=job["integrator"], tracer=job["tracer"]), self.test_break)
+        self.say(f"{job['samples'] * count} samples")
+        mean = _Mean(count) if "clips" in job else None
         for frame in daemon.frames(image.scene, node, self.test_break, layers=_wanted_layers(layer), **job):
-            _write(layer, _passes(frame, view, job["background"] == Background.TRANSPARENT))
+            images = _passes(frame, view, job["background"] == Background.TRANSPARENT)
+            _write(layer, mean.add(images) if mean else images)
             self.update_result(result)
             self.update_progress((frame.number + 1) / count)
         for warning in frame.warnings:

@@ -20,6 +20,7 @@ BASE_COLOUR, NORMAL, METALLIC_ROUGHNESS, EMISSION, BUMP = 0, 1, 2, 4, 6  # place
 # Blender's varnish of 1 mirrors a quarter of what Fresnel's equations say, until 4.0.
 CLEARCOAT_SHARE = 0.25 if bpy.app.version < (4, 0) else 1.0
 SHEEN_ROUGHNESS = 0.5  # of the fibres, where Blender's sheen has none
+LEFT_OUT = ("Subsurface", "Subsurface Weight", "Anisotropic", "Specular Tint")  # inputs of the Principled BSDF
 WRAPS = {"REPEAT": Wrap.REPEAT, "EXTEND": Wrap.CLAMP, "CLIP": Wrap.CLAMP, "MIRROR": Wrap.MIRROR}
 
 
@@ -90,6 +91,8 @@ class Reader:
                                   roughness=material.roughness)
         else:
             reading.values.update(roughness=1.0, specular=0.0)
+        if material is not None and material.use_nodes and material.node_tree and nodes.has_volume(material.node_tree):
+            self._mirror.note(f"{name}: its volume is not drawn")
         number = self._mirror.number(ObjectKind.MATERIAL, name)
         places = range(max(reading.textures, default=-1) + 1)
         uses = [reading.textures.get(place, TextureUse(0, 0, (1, 0, 0, 0, 1, 0), 1)) for place in places]
@@ -118,6 +121,10 @@ class Reader:
         if emission is not None:
             self._shine(reading, emission, nodes.number(node.inputs["Emission Strength"]))
         self._normal(reading, node.inputs["Normal"])
+        for name in LEFT_OUT:
+            socket = node.inputs.get(name)
+            if socket is not None and socket.type == "VALUE" and (socket.is_linked or socket.default_value > 0):
+                self._mirror.note(f"{reading.name}: {name} is left out")
 
     def _emission(self, reading: _Reading, node: bpy.types.Node) -> None:
         reading.values.update(base_colour=(0, 0, 0, 1), specular=0.0)

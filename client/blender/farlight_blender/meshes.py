@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Any, Optional
 
 import bpy
 import numpy as np
-from farlight.scene import Object
-from farlight.messages import ObjectKind
+from farlight.scene import Object, Scene
+from farlight.messages import BlobRef, ObjectKind
 
 from .materials import Material, Reader
+from .motion import Motion
 
 if TYPE_CHECKING:
     from .mirror import Mirror
@@ -42,10 +43,15 @@ def _colours(mesh: bpy.types.Mesh, name: str) -> Any:
     return np.rint(np.clip(values, 0, 1) * 255).astype(np.uint8)
 
 
+def shape(mesh: bpy.types.Mesh) -> tuple[Any, Any]:
+    """Positions and normals of its corners."""
+    return _read(mesh.vertices, "co", 3)[_read(mesh.loops, "vertex_index", 1, np.int32)], _normals(mesh)
+
+
 def _corners(mesh: bpy.types.Mesh, uses: list[Material], steady: Steady) -> dict[str, Any]:
     """What Scene.add_mesh() takes of each corner."""
-    points = _read(mesh.vertices, "co", 3)[_read(mesh.loops, "vertex_index", 1, np.int32)]
-    arrays = {"positions": points, "normals": steady("normals", _normals(mesh))}
+    points, normals = shape(mesh)
+    arrays = {"positions": points, "normals": steady("normals", normals)}
     layer = next((one for one in mesh.uv_layers if one.active_render), None)
     if layer is not None:
         # Rows of textures are counted from the top, Blender's v from below.
@@ -60,7 +66,8 @@ def _corners(mesh: bpy.types.Mesh, uses: list[Material], steady: Steady) -> dict
     return arrays
 
 
-def _arrays(mesh: bpy.types.Mesh, uses: list[Material], steady: Steady) -> Optional[dict[str, Any]]:
+def _arrays(mesh: bpy.types.Mesh, uses: list[Material], steady: Steady, bent: Optional[Any]) -> Optional[dict[str, Any]]:
+    """What Scene.add_mesh() takes, and "moves". bent: keys of the shutter x corners x 6, positions and normals."""
     mesh.calc_loop_triangles()
     triangles = _read(mesh.loop_triangles, "loops", 3, np.int32)
     if not len(triangles):
@@ -69,6 +76,9 @@ def _arrays(mesh: bpy.types.Mesh, uses: list[Material], steady: Steady) -> Optio
     order = np.argsort(slots, kind="stable")  # few runs of materials
     numbers = np.array([use.number for use in uses], np.uint32)
     corners = _corners(mesh, uses, steady)
+    if bent is not None:
+        bent[..., 3:] = steady("bent", bent[..., 3:])
+        corners.update(positions=bent[0, :, :3], normals=bent[0, :, 3:], moves=np.column_stack(list(bent[1:] - bent[0])))
     # Corners that are the same in everything are one vertex.
     rows = np.column_stack([np.ascontiguousarray(one, np.uint8 if name == "colours" else np.float32).view(np.uint8)
                             for name, one in corners.items() if one is not None])
@@ -77,33 +87,71 @@ def _arrays(mesh: bpy.types.Mesh, uses: list[Material], steady: Steady) -> Optio
             "triangles": vertex[triangles[order]], "materials": numbers[slots[order]]}
 
 
+def _with_targets(scene: Scene, arrays: dict[str, Any]) -> dict[str, Any]:
+    """Fields of set_mesh for a mesh that deforms: morph targets, the offsets to each key of the shutter but the first."""
+    moves = arrays.pop("moves", None)
+    if moves is None:
+        return {}
+    targets = moves.reshape(len(moves), -1, 2, 3).transpose(2, 1, 0, 3)  # positions and normals x targets x vertices x 3
+    by_place = {0: (arrays["positions"], "<f4"), 1: (arrays["triangles"], "<u4"), 2: (arrays["normals"], "<f4"),
+                3: (arrays.get("tangents"), "<f4"), 4: (arrays.get("texcoords"), "<f4"), 6: (arrays.get("colours"), "|u1"),
+                9: (targets[0], "<f4"), 10: (targets[1], "<f4")}
+    given = [by_place.get(place, (None, "")) for place in range(11)]
+    return {"target_count": targets.shape[1],
+            "arrays": [BlobRef() if one is None else scene.blob(np.array(one, kind, order="C").data) for one, kind in given]}
+
+
+class Names:
+    """Keys of meshes: what several objects share has one."""
+
+    def __init__(self) -> None:
+        self._keys: dict[Hashable, tuple[str, int]] = {}
+        self._named: dict[str, int] = {}
+
+    def of(self, thing: bpy.types.Object) -> tuple[tuple[str, int], bool]:
+        """The key of an evaluated object's mesh, and whether it has not been asked for before."""
+        names = tuple(slot.material.name_full if slot.material else "" for slot in thing.material_slots)
+        what = thing.data.as_pointer() if thing.type == "MESH" else thing.name_full, names
+        if what in self._keys:
+            return self._keys[what], False
+        # The same name may stand for several meshes, of an object and of what geometry nodes make from it.
+        count = self._named[thing.name_full] = self._named.get(thing.name_full, 0) + 1
+        self._keys[what] = thing.name_full, count
+        return self._keys[what], True
+
+
 class Shared:
     """The meshes of one update: what several objects share is read and stored once."""
 
-    def __init__(self, mirror: Mirror, reader: Reader) -> None:
-        self._mirror, self._reader = mirror, reader
-        self._made: dict[Hashable, Optional[Object]] = {}
-        self._named: dict[str, int] = {}
+    def __init__(self, mirror: Mirror, reader: Reader, motion: Optional[Motion]) -> None:
+        self._mirror, self._reader, self._motion = mirror, reader, motion
+        self._names = Names()
+        self._made: dict[Hashable, tuple[Optional[Object], bool]] = {}
 
-    def mesh(self, thing: bpy.types.Object) -> Optional[Object]:
-        """That of an evaluated object; None: it has no surface."""
-        names = tuple(slot.material.name_full if slot.material else "" for slot in thing.material_slots)
-        what = thing.data.as_pointer() if thing.type == "MESH" else thing.name_full, names
-        if what not in self._made:
-            self._made[what] = self._make(thing)
-        return self._made[what]
+    def mesh(self, thing: bpy.types.Object) -> tuple[Optional[Object], bool]:
+        """That of an evaluated object, and whether it deforms while the shutter is open; None: it has no surface."""
+        key, is_new = self._names.of(thing)
+        if is_new:
+            self._made[key] = self._make(thing, key)
+        return self._made[key]
 
-    def _make(self, thing: bpy.types.Object) -> Optional[Object]:
+    def _bent(self, thing: bpy.types.Object, key: Hashable, mesh: bpy.types.Mesh) -> Optional[Any]:
+        bent, has_changed = self._motion.shape(key, len(mesh.loops)) if self._motion else (None, False)
+        if has_changed:
+            self._mirror.note(f"{thing.name}: its points differ in number while the shutter is open: it does not deform meanwhile")
+        return bent
+
+    def _make(self, thing: bpy.types.Object, key: Hashable) -> tuple[Optional[Object], bool]:
         uses = [self._reader.material(slot.material) for slot in thing.material_slots] or [self._reader.material(None)]
-        # The same name may stand for several meshes, of an object and of what geometry nodes make from it.
-        count = self._named[thing.name_full] = self._named.get(thing.name_full, 0) + 1
-        number = self._mirror.number(ObjectKind.MESH, (thing.name_full, count))
+        number = self._mirror.number(ObjectKind.MESH, key)
         mesh = thing.data if thing.type == "MESH" else thing.to_mesh()
         try:
-            arrays = _arrays(mesh, uses, functools.partial(self._mirror.steady, number)) if mesh else None
+            bent = self._bent(thing, key, mesh) if mesh else None
+            arrays = _arrays(mesh, uses, functools.partial(self._mirror.steady, number), bent) if mesh else None
         finally:
             if thing.type != "MESH":
                 thing.to_mesh_clear()
         if arrays is None:
-            return None
-        return self._mirror.scene.add_mesh(arrays.pop("positions"), mesh=number, name=thing.name[:100], **arrays)
+            return None, False
+        more = _with_targets(self._mirror.scene, arrays)
+        return self._mirror.scene.add_mesh(arrays.pop("positions"), mesh=number, name=thing.name[:100], **arrays, **more), bool(more)

@@ -6,7 +6,8 @@ same as before is no change of the farlight.Scene and is not sent. All nodes are
 into the protocol's (y up), so that all transforms are Blender's own."""
 from __future__ import annotations
 
-from collections.abc import Hashable
+import math
+from collections.abc import Callable, Hashable
 from typing import Any, Optional
 
 import bpy
@@ -14,14 +15,65 @@ import farlight
 import numpy as np
 from farlight.scene import Object
 from farlight.messages import NodeKind, ObjectKind, SetNode
+from mathutils import Vector
 
-from . import cameras, lights, materials, meshes, world
+from . import cameras, lights, materials, meshes, motion, world
 
 WORLD_FROM_BLENDER = np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]], dtype=np.float64)
 WITH_SURFACE = {"MESH", "META"}  # the surfaces of curves and texts come as objects of the type mesh beside them
 # Blender adds the normals of faces up in several threads, in any order: by rounding they differ from time to time.
 SAME_DIRECTION = 1e-5
-NOT_DRAWN = {"VOLUME": "volumes", "CURVES": "hair", "POINTCLOUD": "point clouds", "GPENCIL": "grease pencil"}
+# What is removed first, as it uses the others, or goes with them.
+SWEPT = {ObjectKind.CHANNEL: 0, ObjectKind.CLIP: 1, ObjectKind.NODE: 2}
+NOT_DRAWN = {"VOLUME": "volumes", "CURVES": "hairs", "POINTCLOUD": "point clouds", "GPENCIL": "grease pencil"}
+
+
+ROOT, CAMERA = ("root",), ("camera",)  # keys of nodes that stand for no object of a name
+
+
+def _key(instance: bpy.types.DepsgraphObjectInstance) -> Hashable:
+    """Of the node that stands for it."""
+    name: str = instance.object.name_full
+    return (instance.parent.name_full, name, tuple(instance.persistent_id)) if instance.is_instance else name
+
+
+def moment(depsgraph: bpy.types.Depsgraph, camera: bpy.types.Object) -> motion.Moment:
+    """Where things are, and the shapes of those that deform, at the time that Blender's scene has."""
+    made, names = motion.Moment(), meshes.Names()
+    scene = depsgraph.scene_eval
+    for instance in depsgraph.object_instances:
+        thing = instance.object
+        if not instance.show_self or thing.type not in WITH_SURFACE | {"LIGHT"}:
+            continue
+        if motion.is_blurred(thing):
+            made.places[_key(instance)] = instance.matrix_world.copy()
+        if thing.type in WITH_SURFACE:
+            mesh, is_new = names.of(thing)
+            if is_new and motion.deforms(thing, scene):
+                made.shapes[mesh] = meshes.shape(thing.data)
+    if motion.is_blurred(camera):
+        made.places[CAMERA] = camera.matrix_world.copy()
+    return made
+
+PARTICLES = {"PATH": "the hairs", "HALO": "the halos", "LINE": "the lines"}
+
+
+class _Extent:
+    """How far from its origin the scene reaches."""
+
+    def __init__(self) -> None:
+        self._radii: dict[int, float] = {}
+        self._farthest = 1e-3
+
+    def add(self, mesh: int, thing: bpy.types.Object, matrix: Any) -> None:
+        """An object with a mesh, at a place."""
+        if mesh not in self._radii:
+            self._radii[mesh] = max(Vector(corner).length for corner in thing.bound_box)
+        self._farthest = max(self._farthest, matrix.translation.length + self._radii[mesh] * max(abs(one) for one in matrix.to_scale()))
+
+    def radius(self) -> float:
+        """A power of two, so that it rarely changes."""
+        return float(2 ** math.ceil(math.log2(self._farthest)))
 
 
 class Mirror:
@@ -34,6 +86,8 @@ class Mirror:
         self._numbers: dict[tuple[ObjectKind, Hashable], int] = {}
         self._last: dict[ObjectKind, int] = {}
         self._seen: set[tuple[ObjectKind, Hashable]] = set()
+        self.pictures = 0  # that were rendered
+        self._motion: Optional[motion.Motion] = None
 
     # ---- for the modules that read Blender's data
 
@@ -62,49 +116,65 @@ class Mirror:
         if text not in self.notes:
             self.notes.append(text)
 
-    def place(self, key: Hashable, shows: Object, matrix: Any, name: str) -> Object:
-        """Shows a thing at a place in Blender's world."""
+    def place(self, key: Hashable, shows: Object, matrix: Any, name: str, rigid: Optional[Callable[[Any], Any]] = None) -> Object:
+        """Shows a thing at a place in Blender's world. rigid: what is left of a place, for a light or the camera."""
         node = self.number(ObjectKind.NODE, key)
-        return self.scene.add_node(shows, np.array(matrix), parent=self._root(), node=node, name=name[:100])
+        if self._motion is not None and not self._motion.follow(key, node, rigid):
+            self.note(f"{name}: it is sheared, and while it moves it is not")
+        return self.scene.add_node(shows, np.array(rigid(matrix) if rigid else matrix), parent=self._root(), node=node, name=name[:100])
 
     def _root(self) -> Object:
-        return Object(ObjectKind.NODE, self.number(ObjectKind.NODE, "root"))
+        return Object(ObjectKind.NODE, self.number(ObjectKind.NODE, ROOT))
 
     # ---- an update
 
     def update(self, depsgraph: bpy.types.Depsgraph,
-               seen_by: Optional[tuple[bpy.types.Object, cameras.Lens]] = None) -> Optional[Object]:
-        """Makes the scene what Blender's is. seen_by: a camera; its node is returned."""
+               seen_by: Optional[tuple[bpy.types.Object, cameras.Lens]] = None,
+               moves: Optional[motion.Motion] = None) -> Optional[Object]:
+        """Makes the scene what Blender's is. seen_by: a camera; its node is returned. moves: what does while the shutter is open."""
+        self._motion = moves
         self._seen.clear()
         self.notes.clear()
         self.scene.set(SetNode(node=self._root().number, kind=NodeKind.GROUP, name="Blender",
                                parent_from_node=[float(one) for one in WORLD_FROM_BLENDER[:3].ravel()]))
         world.update(self, depsgraph.scene_eval)
-        shared = meshes.Shared(self, materials.Reader(self))
+        shared = meshes.Shared(self, materials.Reader(self), moves)
+        found: list[tuple[Hashable, bpy.types.Object, Any]] = []  # lights
+        extent = _Extent()
         for instance in depsgraph.object_instances:
-            self._instance(instance, shared)
-        node = cameras.update(self, *seen_by) if seen_by else None
+            self._instance(instance, shared, found, extent)
+        for light in found:
+            lights.update(self, *light, extent.radius())
+        node = cameras.update(self, CAMERA, *seen_by) if seen_by else None
+        if moves is not None:
+            moves.send(self)
         self._sweep()
         return node
 
-    def _instance(self, instance: bpy.types.DepsgraphObjectInstance, shared: "meshes.Shared") -> None:
+    def _instance(self, instance: bpy.types.DepsgraphObjectInstance, shared: meshes.Shared,
+                  found: list[tuple[Hashable, bpy.types.Object, Any]], extent: _Extent) -> None:
         if not instance.show_self:
             return
         thing = instance.object
-        key: Hashable = (instance.parent.name_full, thing.name_full, tuple(instance.persistent_id)) \
-            if instance.is_instance else thing.name_full
+        key = _key(instance)
         if thing.type in WITH_SURFACE:
-            mesh = shared.mesh(thing)
+            for system in thing.particle_systems if not instance.is_instance else ():
+                if system.settings.render_type in PARTICLES:  # others are instances
+                    self.note(f"{thing.name}: {PARTICLES[system.settings.render_type]} of {system.name} are not drawn")
+            mesh, bends = shared.mesh(thing)
             if mesh is not None:
-                self.place(key, mesh, instance.matrix_world, thing.name)
+                extent.add(mesh.number, thing, instance.matrix_world)
+                node = self.place(key, mesh, instance.matrix_world, thing.name)
+                if bends and self._motion is not None:
+                    self._motion.bend(key, node.number)
         elif thing.type == "LIGHT":
-            lights.update(self, key, thing, instance.matrix_world)
+            found.append((key, thing, instance.matrix_world.copy()))
         elif thing.type in NOT_DRAWN:
             self.note(f"{thing.name}: {NOT_DRAWN[thing.type]} are not drawn")
 
     def _sweep(self) -> None:
         gone = [one for one in self._numbers if one not in self._seen]
-        for kind, key in sorted(gone, key=lambda one: one[0] != ObjectKind.NODE):  # they use the others
+        for kind, key in sorted(gone, key=lambda one: SWEPT.get(one[0], len(SWEPT))):
             number = self._numbers.pop((kind, key))
             self.scene.remove(Object(kind, number))
             if kind == ObjectKind.MESH:

@@ -27,6 +27,12 @@ def surface(tree: bpy.types.NodeTree) -> Optional[bpy.types.Node]:
     return None
 
 
+def has_volume(tree: bpy.types.NodeTree) -> bool:
+    """Whether the active output has a volume."""
+    output = tree.get_output_node("CYCLES") or tree.get_output_node("ALL")
+    return output is not None and source(output.inputs["Volume"]) is not None
+
+
 def number(socket: Optional[bpy.types.NodeSocket], missing: float = 0.0) -> float:
     """Its value, or that of a Value node."""
     if socket is None:

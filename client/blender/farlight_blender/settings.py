@@ -7,6 +7,8 @@ from typing import Any, Optional
 import bpy
 from farlight.messages import Denoise, Integrator, Tracer
 
+from . import motion
+
 ENGINE = "FARLIGHT"
 
 
@@ -48,6 +50,9 @@ class FarlightSettings(bpy.types.PropertyGroup):  # type: ignore[misc]
         name="Clamp indirect", default=10, min=0, max=1e6, description="Brightest light of a path over several bounces; 0: none")
     denoise: bpy.props.EnumProperty(  # type: ignore[valid-type]
         name="Denoise", items=_choices(Denoise), default="auto", description="auto: up to 64 samples")
+    motion_steps: bpy.props.IntProperty(  # type: ignore[valid-type]
+        name="Motion steps", default=16, min=1, max=256, description="A picture with motion blur in which the camera or a light moves "
+        "is the mean of so many frames, at most one a sample; other things blur without steps")
     use_pass_albedo: bpy.props.BoolProperty(  # type: ignore[valid-type]
         name="Denoising albedo", description="Base colours, as the pass Denoising Albedo")
 
@@ -86,6 +91,25 @@ class FARLIGHT_PT_sampling(_Panel):  # pylint: disable=invalid-name
         self._rows(context.scene.render, "film_transparent")
 
 
+class FARLIGHT_PT_motion(_Panel):  # pylint: disable=invalid-name
+    """In the render properties."""
+    bl_label, bl_context = "Motion Blur", "render"
+
+    def draw_header(self, context: bpy.types.Context) -> None:
+        """Its switch."""
+        self.layout.prop(context.scene.render, "use_motion_blur", text="")
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """The form."""
+        scene = context.scene
+        self.layout.active = scene.render.use_motion_blur
+        owner = motion.position_owner(scene)
+        if owner is not None:
+            self._rows(owner, "motion_blur_position")
+        self._rows(scene.render, "motion_blur_shutter")
+        self._rows(scene.farlight, "motion_steps")
+
+
 class FARLIGHT_PT_passes(_Panel):  # pylint: disable=invalid-name
     """In the view layer's properties."""
     bl_label, bl_context = "Passes", "view_layer"
@@ -96,7 +120,7 @@ class FARLIGHT_PT_passes(_Panel):  # pylint: disable=invalid-name
         self._rows(context.scene.farlight, "use_pass_albedo")
 
 
-_CLASSES = (FarlightPreferences, FarlightSettings, FARLIGHT_PT_sampling, FARLIGHT_PT_passes)
+_CLASSES = (FarlightPreferences, FarlightSettings, FARLIGHT_PT_sampling, FARLIGHT_PT_motion, FARLIGHT_PT_passes)
 
 
 def _others() -> Any:

@@ -2,8 +2,9 @@
 """The viewport: a view of the daemon's, whose newest frame is drawn."""
 from __future__ import annotations
 
+import asyncio
 import math
-from typing import Any, Optional
+from typing import TYPE_CHECKING, Any, Optional
 
 import bpy
 import farlight
@@ -16,6 +17,9 @@ from gpu_extras.presets import draw_texture_2d
 
 from . import session, settings
 from .mirror import WORLD_FROM_BLENDER, Mirror
+
+if TYPE_CHECKING:
+    from .engine import FarlightEngine
 
 LOOK_S = 0.03  # how often it is looked whether a frame has come
 RETRY_S = 1.0  # before a view is begun again that has failed
@@ -35,26 +39,31 @@ def _camera(region: bpy.types.Region, view: bpy.types.RegionView3D) -> farlight.
 
 
 class Viewport:
-    """Of one engine: a mirror of its own, and a job that follows its camera."""
+    """Of one engine: a mirror of its own, and a job that follows its camera. Nothing here waits: the connection goes on in slices
+    of a timer, so that a daemon that is slow or away holds up nothing of Blender's."""
 
-    def __init__(self, engine: bpy.types.RenderEngine, scene: bpy.types.Scene) -> None:
+    def __init__(self, engine: FarlightEngine, scene: bpy.types.Scene) -> None:
         self._engine = engine
         self._mirror = Mirror()
         self._session = session.session(*settings.server_of(scene))
         self._view: Optional[AsyncView] = None
-        self._asked: Any = None
+        self._wanted: Optional[tuple[Any, farlight.Camera]] = None  # job and camera
+        self._asked: Any = None  # the job of the view
         self._camera: Optional[farlight.Camera] = None
-        self._waiting: Any = None
+        self._is_sent = True
+        self._working: Optional[asyncio.Task[Any]] = None  # opens a view, or sends the scene
+        self._waiting: Optional[asyncio.Task[Frame]] = None
         self._pixels: Any = None  # that have come and are no texture yet
         self._texture: Optional[gpu.types.GPUTexture] = None
         bpy.app.timers.register(self._look)
 
     # ---- what Blender calls
 
-    def update(self, depsgraph: bpy.types.Depsgraph) -> None:
-        """Something has changed."""
+    def update(self, depsgraph: bpy.types.Depsgraph) -> list[str]:
+        """Something has changed. What the picture lacks."""
         self._mirror.update(depsgraph)
-        self._session.wait(self._session.send(self._mirror.scene))
+        self._is_sent = False
+        return self._mirror.notes
 
     def draw(self, context: bpy.types.Context, scene: bpy.types.Scene) -> None:
         """Draws what there is, and asks for what is seen now."""
@@ -63,12 +72,8 @@ class Viewport:
         job = {"width": context.region.width, "height": context.region.height, "integrator": chosen.integrator,
                "tracer": chosen.tracer, "samples": chosen.view_samples, "depth": chosen.depth, "clamp": chosen.clamp,
                "denoise": chosen.denoise, "format": PixelFormat.RGBA16F, "moving_rate": 10}
-        if job != self._asked:
-            self._end()
-            client = self._session.wait(self._session.client())
-            self._view = self._session.wait(client.view(self._mirror.scene, camera, **job))
-            self._asked, self._camera = job, camera
-        elif camera != self._camera and self._view is not None:
+        self._wanted = job, camera
+        if self._view is not None and job == self._asked and camera != self._camera:
             self._view.look(camera)
             self._camera = camera
         if self._pixels is not None:
@@ -82,42 +87,70 @@ class Viewport:
 
     # ---- frames
 
-    def _end(self) -> None:
-        if self._waiting is not None:
-            self._waiting.cancel()
-            self._waiting = None
+    async def _open(self, job: Any, camera: farlight.Camera) -> None:
+        """Another view in place of the one that there is."""
         if self._view is not None:
             view, self._view = self._view, None
-            self._session.wait(view.close())
+            await view.close()
+        client = await self._session.client()
+        self._view = await client.view(self._mirror.scene, camera, **job)
+        self._asked, self._camera = job, camera
+
+    def _stop(self) -> Optional[AsyncView]:
+        """The view that there was, if any."""
+        for task in (self._working, self._waiting):
+            if task is not None:
+                task.cancel()
+        view, self._view, self._asked, self._working, self._waiting = self._view, None, None, None, None
+        return view
 
     def _look(self) -> Optional[float]:
         """A timer of Blender's: lets the connection go on, until the viewport shows something else."""
         try:
             self._engine.is_preview  # pylint: disable=pointless-statement  # raises once Blender has freed the engine
-            self._take()
+            self._go_on()
         except ReferenceError:
-            self._end()
+            view = self._stop()
+            if view is not None:
+                self._session.start(view.close())
             self._session.start(self._session.forget(self._mirror.scene))
             return None
         except farlight.Error as why:
-            self._asked = self._view = self._waiting = None  # the next draw begins a new view
-            self._engine.update_stats("", f"farlight: {why}")
+            self._stop()
+            self._engine.say(f"{why} (tried again every {RETRY_S:g} s)")
             self._engine.tag_redraw()
             return RETRY_S
         return LOOK_S
 
-    def _take(self) -> None:
-        if self._view is None:
-            return
-        if self._waiting is None:
+    def _begin(self) -> None:
+        """What is to be done next, if nothing is."""
+        if self._wanted is not None and self._wanted[0] != self._asked:
+            if self._waiting is not None:
+                self._waiting.cancel()
+                self._waiting = None
+            self._is_sent = True  # with the view
+            self._working = self._session.start(self._open(*self._wanted))
+        elif not self._is_sent and self._view is not None:
+            self._is_sent = True
+            self._working = self._session.start(self._session.send(self._mirror.scene))
+
+    def _go_on(self) -> None:
+        if self._working is None:
+            self._begin()
+        if self._waiting is None and self._working is None and self._view is not None:
             self._waiting = self._session.start(self._view.next_frame())
-        self._session.slice(self._waiting, 0.001)
-        if self._waiting.done():
-            frame, self._waiting = self._waiting.result(), None
-            self._show(frame)
+        for task in (self._working, self._waiting):
+            if task is not None:
+                self._session.slice(task, 0.001)
+        if self._working is not None and self._working.done():
+            done, self._working = self._working, None
+            done.result()
+        if self._waiting is not None and self._waiting.done():
+            come, self._waiting = self._waiting, None
+            self._show(come.result())
 
     def _show(self, frame: Frame) -> None:
         self._pixels = np.array(frame.colour[::-1], np.float32, order="C")
         self._pixels[..., 3] = 1
-        self._engine.update_stats("", f"farlight: {frame.begin.samples} samples")
+        self._engine.say(f"{frame.begin.samples} samples")
         self._engine.tag_redraw()
