@@ -57,7 +57,8 @@ static bool allocate(struct gpu_device *device, struct gpu_buffer *buffer, size_
     }
     /* Clears older errors, which are not this allocation's and must not hide its own. */
     GLenum before = glGetError();
-    glNamedBufferStorage(buffer->name, (GLsizeiptr)capacity, NULL, STORAGE_FLAGS);
+    glNamedBufferStorage(buffer->name, (GLsizeiptr)capacity, NULL,
+                         device->facts.software ? STORAGE_FLAGS | GL_MAP_READ_BIT : STORAGE_FLAGS);
     if (glGetError() != GL_NO_ERROR) {
         release(device, buffer);
         gpu_note_loss(device, error);
@@ -119,6 +120,20 @@ void *gpu_buffer_map(struct gpu_device *device, struct gpu_buffer *buffer, size_
         return data;
     gpu_note_loss(device, error);
     error_set(error, ERROR_OUT_OF_MEMORY, NULL, "the driver does not map a buffer of %zu bytes", size_bytes);
+    return NULL;
+}
+
+void *gpu_buffer_open(struct gpu_device *device, struct gpu_buffer *buffer, struct error *error)
+{
+    device->waits++;
+    gpu_await(device, GL_BUFFER_UPDATE_BARRIER_BIT);
+    void *data =
+        glMapNamedBufferRange(buffer->name, 0, (GLsizeiptr)buffer->size_bytes, GL_MAP_READ_BIT | GL_MAP_WRITE_BIT);
+    if (data)
+        return data;
+    gpu_note_loss(device, error);
+    error_set(error, ERROR_OUT_OF_MEMORY, NULL, "the driver does not map a buffer of %zu bytes",
+              buffer->size_bytes);
     return NULL;
 }
 

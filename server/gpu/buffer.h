@@ -32,6 +32,9 @@ void gpu_buffer_write(struct gpu_device *device, struct gpu_buffer *buffer, size
 /* Reserves the buffer and maps all of it for writing: each byte once, in order where that is easy (the memory may
  * be write-combined). NULL and *error on failure. Unmap it before the GPU uses it. */
 void *gpu_buffer_map(struct gpu_device *device, struct gpu_buffer *buffer, size_t size_bytes, struct error *error);
+/* Maps what the buffer has, to read and write it: of software GL, whose memory is the host's. NULL and *error on
+ * failure. Unmap it before the GPU uses it. */
+void *gpu_buffer_open(struct gpu_device *device, struct gpu_buffer *buffer, struct error *error);
 void gpu_buffer_unmap(struct gpu_device *device, struct gpu_buffer *buffer);
 void gpu_buffer_read(struct gpu_device *device, const struct gpu_buffer *buffer, size_t offset_bytes, void *data,
                      size_t size_bytes); /* waits for the GPU */

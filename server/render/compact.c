@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 #include "render/compact.h"
 
+#include "render/compact_host.h"
+
 #include "shared/bindings.h"
 #include "shared/path.h"
 
@@ -72,13 +74,8 @@ void compact_dispatch(struct render_context *context, const struct gpu_program *
 /* In use. `hits`: of rays, else of hits. */
 static const struct gpu_program *use_scan(struct render_context *context, bool hits, struct error *error)
 {
-    struct gpu_define defines[3] = {0};
-    size_t n = 0;
-    if (hits)
-        defines[n++] = (struct gpu_define){"HITS", "1"};
-    if (!context->device->facts.software)
-        defines[n++] = (struct gpu_define){"PARALLEL", "1"};
-    return context_use_with(context, "render/compact_scan.comp", defines, error);
+    static const struct gpu_define of_hits[] = {{"HITS", "1"}, {NULL, NULL}};
+    return context_use_with(context, "render/compact_scan.comp", hits ? of_hits : NULL, error);
 }
 
 /* The blocks' counts become places, and their sum the wave's. `program` is in use. */
@@ -93,8 +90,28 @@ static bool scan(struct render_context *context, const struct gpu_program *progr
     return gpu_check(context->device, "compacting", error);
 }
 
+/* As the scans do. */
+static void write_state(struct render_context *context)
+{
+    gpu_buffer_write(context->device, &context->wave_state, 0, &context->known_state,
+                     sizeof(context->known_state));
+}
+
+static bool list_hits(struct render_context *context, struct error *error)
+{
+    struct wave_state *state = &context->known_state;
+    if (!compact_host_hits(context, error))
+        return false;
+    state->hits = counts_of(context->hit_count);
+    state->hit_blocks = counts_of(blocks_of(context->hit_count));
+    write_state(context);
+    return true;
+}
+
 bool compact_hits(struct render_context *context, struct error *error)
 {
+    if (compact_host_is_used(context))
+        return list_hits(context, error);
     const struct gpu_program *program = context_use(context, "render/hit_count.comp", error);
     if (!program)
         return false;
@@ -124,10 +141,40 @@ static bool decide_order(struct render_context *context, struct error *error)
     return true;
 }
 
-bool compact_children(struct render_context *context, uint32_t children_a_hit, bool last_queued, bool sorts,
-                      struct error *error)
+static bool place_children(struct render_context *context, struct gpu_buffer *child_counts, bool sorts,
+                           struct error *error)
 {
-    if (sorts && !decide_order(context, error))
+    struct wave_state *state = &context->known_state;
+    uint32_t children, shadow_rays;
+    if (!compact_host_count(context, child_counts, &children, &shadow_rays, error))
+        return false;
+    if (sorts && children > 0) {
+        if (!decide_order(context, error))
+            return false;
+        gpu_buffer_read(context->device, &context->wave_state, 0, state, sizeof(*state));
+    }
+    if (children > context->wave_capacity) {
+        state->stopped = WAVE_STOPPED_FULL;
+        children = 0;
+    }
+    if (children > 0 && !compact_host_places(context, child_counts, state->sorted != 0, error))
+        return false;
+    state->rays = counts_of(children);
+    state->ray_blocks = counts_of(blocks_of(children));
+    state->all_secondary_rays += children;
+    state->all_shadow_rays += shadow_rays;
+    write_state(context);
+    context->ray_count = children;
+    return gpu_check(context->device, "compacting", error);
+}
+
+bool compact_children(struct render_context *context, const struct compact_order *order,
+                      struct gpu_buffer *child_counts, struct error *error)
+{
+    gpu_buffer_bind_storage(child_counts, BIND_CHILD_COUNTS);
+    if (compact_host_is_used(context))
+        return place_children(context, child_counts, order->sorts, error);
+    if (order->sorts && !decide_order(context, error))
         return false;
     const struct gpu_program *program = context_use(context, "render/compact_count.comp", error);
     if (!program)
@@ -138,10 +185,10 @@ bool compact_children(struct render_context *context, uint32_t children_a_hit, b
     if (!program)
         return false;
     gpu_uniform_uint(program, "capacity", context->wave_capacity);
-    gpu_uniform_uint(program, "last_queued", last_queued);
+    gpu_uniform_uint(program, "last_queued", order->last_queued);
     if (!scan(context, program, error))
         return false;
-    const uint64_t maximum = (uint64_t)context->hit_count * children_a_hit;
+    const uint64_t maximum = (uint64_t)context->hit_count * order->children_a_hit;
     context->ray_count = context->counts_on_host            ? context->known_state.rays.count
                          : maximum < context->wave_capacity ? (uint32_t)maximum
                                                             : context->wave_capacity;
@@ -179,6 +226,8 @@ void compact_rays(struct render_context *context, struct wave *wave)
 
 void compact_announce_hits(struct render_context *context)
 {
+    if (compact_host_is_used(context))
+        return;
     (void)context_use(context, "render/hit_count.comp", NULL);
     (void)use_scan(context, true, NULL);
     (void)context_use(context, "render/hit_list.comp", NULL);
@@ -190,6 +239,8 @@ void compact_announce_children(struct render_context *context, bool sorts)
         (void)context_use(context, "render/shadow_count.comp", NULL);
     if (sorts)
         (void)context_use(context, "render/compact_sample.comp", NULL);
+    if (compact_host_is_used(context))
+        return;
     (void)context_use(context, "render/compact_count.comp", NULL);
     (void)use_scan(context, false, NULL);
 }

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Lists made on the device by prefix sums: their order is that of what they are made from, every time, and they
- * have no holes. How long they are the device notes in context->wave_state, from which the passes over them are
- * dispatched. */
+ * have no holes; on software GL by the host (compact_host.h). How long they are the device notes in
+ * context->wave_state, from which the passes over them are dispatched. */
 #ifndef FARLIGHT_RENDER_COMPACT_H
 #define FARLIGHT_RENDER_COMPACT_H
 
@@ -18,11 +18,15 @@ void compact_go_on(struct render_context *context);
 void compact_dispatch(struct render_context *context, const struct gpu_program *program, enum wave_list list);
 /* Lists the hits of the current wave: context->hit_list, hit_places and hit_count. */
 bool compact_hits(struct render_context *context, struct error *error);
-/* The places of the hits' children (context->block_offsets) and their number, context->ray_count, from
- * BIND_CHILD_COUNTS. `last_queued`: no wave is queued behind this one, so that none may be left. `sorts`: the
- * places are in the order of the children's directions where that pays (compact_sample.comp). */
-bool compact_children(struct render_context *context, uint32_t children_a_hit, bool last_queued, bool sorts,
-                      struct error *error);
+struct compact_order {
+    uint32_t children_a_hit;
+    bool last_queued; /* no wave is queued behind this one, so that no child may be left */
+    bool sorts;       /* by the children's directions, where that pays (compact_sample.comp) */
+};
+
+/* The places of the hits' children (context->block_offsets) and their number, context->ray_count. */
+bool compact_children(struct render_context *context, const struct compact_order *order,
+                      struct gpu_buffer *child_counts, struct error *error);
 /* Makes the wave one of `count` shadow rays of each hit. `all_count`: they count as rays of the slice as they are;
  * else the children's scan counts those that are alive. */
 bool compact_shadow_rays(struct render_context *context, uint32_t count, bool all_count, struct wave *wave,

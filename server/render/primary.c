@@ -182,7 +182,7 @@ static bool fill_hits(struct render_context *context, struct error *error)
     if (!program)
         return false;
     context_bind(context);
-    gpu_buffer_bind_storage(&context->rays, BIND_RAYS);
+    gpu_buffer_bind_texels(context->device, &context->rays, UNIT_RAYS, GL_RGBA32F);
     gpu_buffer_bind_storage(&context->hits, BIND_HITS);
     gpu_buffer_bind_storage(&context->hit_list, BIND_HIT_LIST);
     compact_dispatch(context, program, WAVE_HITS);

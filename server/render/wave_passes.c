@@ -144,8 +144,8 @@ static bool left_scene(struct wave_passes *passes, struct render_context *contex
     gpu_uniform_float(program, "radiance_limit", frame_request_radiance_limit(&context->request));
     gpu_buffer_bind_texels(context->device, environment_lights(context->environment, context->scene),
                            UNIT_SHADE_LIGHTS, GL_RGBA32F);
-    gpu_buffer_bind_storage(&context->rays, BIND_RAYS);
-    gpu_buffer_bind_storage(&context->paths, BIND_PATHS);
+    gpu_buffer_bind_texels(context->device, &context->rays, UNIT_RAYS, GL_RGBA32F);
+    gpu_buffer_bind_texels(context->device, &context->paths, UNIT_SHADE_PATHS, GL_RGBA32UI);
     gpu_buffer_bind_storage(&context->hit_places, BIND_HIT_PLACES);
     gpu_buffer_bind_storage(&passes->radiance, BIND_RADIANCE);
     context_span_begin(context, STAGE_SHADE);
@@ -189,11 +189,11 @@ static bool gather(struct wave_passes *passes, struct render_context *context, b
         return false;
     gpu_uniform_uint(program, "batch_rays", rays_a_hit);
     gpu_uniform_uint(program, "last_batch", last);
-    gpu_buffer_bind_storage(&context->paths, BIND_PATHS);
+    gpu_buffer_bind_texels(context->device, &context->paths, UNIT_SHADE_PATHS, GL_RGBA32UI);
+    gpu_buffer_bind_texels(context->device, &passes->light_samples, UNIT_PASS_0, GL_RGBA32F);
     gpu_buffer_bind_storage(&passes->radiance, BIND_RADIANCE);
     gpu_buffer_bind_storage(&context->hit_places, BIND_HIT_PLACES);
     gpu_buffer_bind_storage(&passes->visibility, BIND_VISIBILITY);
-    gpu_buffer_bind_storage(&passes->light_samples, BIND_LIGHT_SAMPLES);
     gpu_buffer_bind_storage(&context->slice_sums, BIND_SLICE_SUMS);
     context_span_begin(context, STAGE_SHADE);
     compact_dispatch(context, program, WAVE_RAYS);
@@ -230,9 +230,10 @@ static enum wave_progress make_wave(struct wave_passes *passes, struct render_co
     const bool last_queued = !context->counts_on_host && context->wave_number + 1 == context->waves_queued;
     if (context->hit_count == 0)
         return WAVE_DONE;
-    gpu_buffer_bind_storage(&passes->child_counts, BIND_CHILD_COUNTS);
-    const struct integrator *integrator = passes->integrator;
-    if (!compact_children(context, integrator->children_a_hit, last_queued, integrator->scatters, error))
+    const struct compact_order order = {.children_a_hit = passes->integrator->children_a_hit,
+                                        .last_queued = last_queued,
+                                        .sorts = passes->integrator->scatters};
+    if (!compact_children(context, &order, &passes->child_counts, error))
         return WAVE_FAILED;
     if (context->counts_on_host && context->known_state.stopped)
         return WAVE_OVERFLOW;

@@ -2,18 +2,11 @@
 // Second: each block's count becomes the place of its first item. One group scans them all, each invocation a run of
 // blocks. The sums are the wave's new counts.
 // Defines:
-//   HITS      the blocks are of rays, of which the hits are counted; else of hits, whose children are the next wave
-//   PARALLEL  many invocations add up their sums side by side; else one of a few does, which is faster on software GL
+//   HITS  the blocks are of rays, of which the hits are counted; else of hits, whose children are the next wave
 
 #include "render/wave_counts.glsl"
 
-#ifdef PARALLEL
-#define SCAN_SIZE COMPACT_SCAN_SIZE_PARALLEL
-#else
-#define SCAN_SIZE COMPACT_SCAN_SIZE
-#endif
-
-layout(local_size_x = SCAN_SIZE) in;
+layout(local_size_x = COMPACT_SCAN_SIZE) in;
 
 #ifndef HITS
 uniform uint capacity;    // rays that the buffers hold
@@ -22,7 +15,7 @@ uniform uint last_queued; // 1: no wave is queued behind this one
 
 layout(std430, binding = BIND_BLOCK_OFFSETS) buffer offset_block { uvec2 block_offsets[]; };
 
-shared uvec2 sums[SCAN_SIZE + 1];
+shared uvec2 sums[COMPACT_SCAN_SIZE];
 
 #ifdef HITS
 
@@ -55,29 +48,14 @@ void add_up(uint self, uvec2 own, out uvec2 before, out uvec2 total)
 {
     sums[self] = own;
     barrier();
-#ifdef PARALLEL
-    for (uint reach = 1u; reach < SCAN_SIZE; reach <<= 1) {
+    for (uint reach = 1u; reach < COMPACT_SCAN_SIZE; reach <<= 1) {
         uvec2 more = self >= reach ? sums[self - reach] : uvec2(0u);
         barrier();
         sums[self] += more;
         barrier();
     }
     before = sums[self] - own;
-    total = sums[SCAN_SIZE - 1];
-#else
-    if (self == 0u) {
-        uvec2 sum = uvec2(0u);
-        for (int i = 0; i < SCAN_SIZE; i++) {
-            uvec2 next = sums[i];
-            sums[i] = sum;
-            sum += next;
-        }
-        sums[SCAN_SIZE] = sum;
-    }
-    barrier();
-    before = sums[self];
-    total = sums[SCAN_SIZE];
-#endif
+    total = sums[COMPACT_SCAN_SIZE - 1];
 }
 
 void main()
@@ -88,7 +66,7 @@ void main()
 #else
     uint block_count = state.hit_blocks.count * (state.sorted != 0u ? OCTANTS : 1u); // octant by octant
 #endif
-    uint run = (block_count + SCAN_SIZE - 1u) / SCAN_SIZE;
+    uint run = (block_count + COMPACT_SCAN_SIZE - 1u) / COMPACT_SCAN_SIZE;
     uint first = min(self * run, block_count), end = min(first + run, block_count);
     uvec2 sum = uvec2(0u);
     for (uint block = first; block < end; block++)

@@ -16,16 +16,21 @@ layout(local_size_x = 64) in;
 uniform uint batch_rays;
 uniform uint last_batch;
 
-layout(std430, binding = BIND_PATHS) readonly buffer path_block { path paths[]; };
+layout(binding = UNIT_SHADE_PATHS) uniform usamplerBuffer paths; // in texels: software GL fetches those faster
+layout(binding = UNIT_PASS_0) uniform samplerBuffer light_samples;
 layout(std430, binding = BIND_HIT_PLACES) readonly buffer place_block { uint hit_places[]; };
 layout(std430, binding = BIND_RADIANCE) buffer radiance_block { vec4 radiance[]; };
 layout(std430, binding = BIND_VISIBILITY) readonly buffer visibility_block { uint visibility[]; };
-layout(std430, binding = BIND_LIGHT_SAMPLES) readonly buffer sample_block { vec4 light_samples[]; };
 layout(std430, binding = BIND_SLICE_SUMS) buffer sum_block { vec4 slice_sums[]; };
 
 // The maximum radiance of a pixel: half floats hold 65504, and brighter values are white at any exposure of a scene lit
 // for the eye. NaN must not spread either.
 const float RADIANCE_MAX = 1e9;
+
+uint slot_of(uint k)
+{
+    return texelFetch(paths, int(k) * PATH_TEXELS).w;
+}
 
 vec4 finite(vec4 v)
 {
@@ -47,9 +52,10 @@ vec4 radiance_of(uint k)
 #ifdef GREY
             share = vec3(dot(share, vec3(1.0 / 3.0)));
 #endif
-            sum.rgb += light_samples[place].rgb * share;
+            vec4 light = texelFetch(light_samples, int(place));
+            sum.rgb += light.rgb * share;
 #ifdef GROUND
-            sum.a += light_samples[place].a * dot(share, vec3(1.0 / 3.0));
+            sum.a += light.a * dot(share, vec3(1.0 / 3.0));
 #endif
         }
     }
@@ -61,15 +67,21 @@ void main()
     uint k = item_index();
     if (k >= wave.rays.count)
         return;
-    if (last_batch == 0u) {
-        radiance[k] = radiance_of(k);
-        return;
-    }
-    uint slot = paths[k].sample_slot;
-    if (k > 0u && paths[k - 1u].sample_slot == slot)
+    bool last = last_batch != 0u;
+    uint slot = slot_of(k);
+    if (last && k > 0u && slot_of(k - 1u) == slot)
         return;
     vec4 sum = slice_sums[slot];
-    for (; k < wave.rays.count && paths[k].sample_slot == slot; k++)
-        sum += finite(radiance_of(k));
-    slice_sums[slot] = sum;
+    bool more = true;
+    while (more) { // of which a batch that is not the last has one
+        vec4 arrived = radiance_of(k);
+        if (last)
+            sum += finite(arrived);
+        else
+            radiance[k] = arrived;
+        k++;
+        more = last && k < wave.rays.count && slot_of(k) == slot;
+    }
+    if (last)
+        slice_sums[slot] = sum;
 }

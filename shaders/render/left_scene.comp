@@ -10,21 +10,28 @@
 #include "common/environment.glsl"
 #include "common/light.glsl"
 #include "render/fireflies.glsl"
+#include "render/path_texels.glsl"
 #include "render/wave.glsl"
 
 layout(local_size_x = 64) in;
 
-layout(std430, binding = BIND_RAYS) readonly buffer ray_block { ray rays[]; };
-layout(std430, binding = BIND_PATHS) readonly buffer path_block { path paths[]; };
+layout(binding = UNIT_RAYS) uniform samplerBuffer rays; // in texels: software GL fetches those faster
+layout(binding = UNIT_SHADE_PATHS) uniform usamplerBuffer paths;
 layout(std430, binding = BIND_HIT_PLACES) readonly buffer place_block { uint hit_places[]; };
 layout(std430, binding = BIND_RADIANCE) writeonly buffer radiance_block { vec4 radiance[]; };
+
+path path_at(uint k)
+{
+    int texel = int(k) * PATH_TEXELS;
+    return path_of_texels(texelFetch(paths, texel), texelFetch(paths, texel + 1), texelFetch(paths, texel + 2));
+}
 
 void main()
 {
     uint k = item_index();
     if (k >= wave.rays.count || hit_places[k] != HIT_PLACE_NONE)
         return;
-    path p = paths[k];
+    path p = path_at(k);
     bool straight = (p.flags & PATH_STRAIGHT) != 0u, seen = straight && frame.environment_kind != ENVIRONMENT_NONE;
     if (straight && environment_is_hidden()) {
         radiance[k] = vec4(0.0);
@@ -32,7 +39,7 @@ void main()
     }
     vec3 arriving = vec3(1.0);
 #ifndef OPEN
-    arriving = environment_radiance(rays[k].direction_t_max.xyz);
+    arriving = environment_radiance(texelFetch(rays, int(2u * k + 1u)).xyz);
 #endif
 #ifdef SHARES
     arriving *= p.environment_share;

@@ -12,7 +12,7 @@
 
 layout(local_size_x = 64) in;
 
-layout(std430, binding = BIND_RAYS) readonly buffer ray_block { ray rays[]; };
+layout(binding = UNIT_RAYS) uniform samplerBuffer rays; // in texels: software GL fetches those faster
 layout(std430, binding = BIND_HITS) buffer hit_block { hit hits[]; };
 layout(std430, binding = BIND_HIT_LIST) readonly buffer list_block { uint hit_list[]; };
 
@@ -22,17 +22,18 @@ void main()
     if (j >= wave.hits.count)
         return;
     uint k = hit_list[j], instance_index = hits[k].instance, primitive = hits[k].primitive;
-    vec3 origin = rays[k].origin_t_min.xyz, direction = rays[k].direction_t_max.xyz;
+    vec4 origin_t_min = texelFetch(rays, int(2u * k));
+    vec3 origin = origin_t_min.xyz, direction = texelFetch(rays, int(2u * k + 1u)).xyz;
     candidate found;
     if (instance_index == HIT_NO_PRIMITIVE)
         found = candidate_disc(primitive, origin, direction);
 #ifdef HAS_SPHERES
     else if (geometry_at(instance_at(instance_index).geometry).kind == GEOMETRY_SPHERES)
-        found = candidate_sphere(instance_index, primitive, origin, direction, rays[k].origin_t_min.w);
+        found = candidate_sphere(instance_index, primitive, origin, direction, origin_t_min.w);
 #endif
     else
         found = candidate_triangle(instance_index, primitive, origin, direction, 0.0);
     // Two compilations of one test may round differently at a rim: a hit stays a hit.
-    found.distance = max(found.distance, rays[k].origin_t_min.w);
+    found.distance = max(found.distance, origin_t_min.w);
     hits[k] = surface_of(found, origin, direction, 0.0);
 }

@@ -12,6 +12,7 @@
 #include "common/grain.glsl"
 #include "common/material.glsl"
 #include "common/sequence.glsl"
+#include "render/path_texels.glsl"
 
 layout(local_size_x = 64) in;
 
@@ -50,10 +51,7 @@ hit hit_at(uint k)
 path path_at(uint k)
 {
     int texel = int(k) * PATH_TEXELS;
-    uvec4 a = texelFetch(paths, texel), b = texelFetch(paths, texel + 1), c = texelFetch(paths, texel + 2);
-    vec3 weight = uintBitsToFloat(a.xyz);
-    return path(weight.r, weight.g, weight.b, a.w, uintBitsToFloat(b.x), uintBitsToFloat(b.y), b.z, uintBitsToFloat(b.w),
-                c.x, uintBitsToFloat(c.y), uintBitsToFloat(c.z), uintBitsToFloat(c.w));
+    return path_of_texels(texelFetch(paths, texel), texelFetch(paths, texel + 1), texelFetch(paths, texel + 2));
 }
 
 // The pixel and sample of a path, for common/sequence.glsl. Of a picture of tiles (render/tiles.glsl) it is another pixel,
@@ -193,17 +191,17 @@ void no_shadow_ray(uint place)
 // `arriving`: the radiance at the eye if the ray reaches the light. False if it is zero. `t_min`: 0 or RAY_STOPS_T_MIN.
 bool add_shadow_ray_from(uint place, path p, vec3 origin, vec3 direction, float t_min, float distance_, vec3 arriving)
 {
-    if (!(max_component(arriving) > 0.0)) { // also if it is NaN
-        no_shadow_ray(place);
+    bool alive = max_component(arriving) > 0.0; // not if it is NaN
+    if (!alive && shadow_rays_a_hit == 0u)
         return false;
-    }
-    // Short of the light, as a model may have a surface at its position.
-    shadow_rays[place] = ray(vec4(origin, t_min), vec4(direction, distance_ * (1.0 - 4.0 * PATH_OFFSET)));
-    light_samples[place] = vec4(arriving, 0.0);
+    // Short of the light, as a model may have a surface at its position. One of both, as each store is code.
+    vec4 start = vec4(origin, t_min), way = vec4(direction, distance_ * (1.0 - 4.0 * PATH_OFFSET));
+    shadow_rays[place] = ray(alive ? start : vec4(0.0), alive ? way : vec4(0.0, 0.0, 1.0, -1.0));
+    light_samples[place] = alive ? vec4(arriving, 0.0) : vec4(0.0);
 #ifdef HAS_TIMES
-    shadow_times[place] = p.time;
+    shadow_times[place] = alive ? p.time : 0.0;
 #endif
-    return true;
+    return alive;
 }
 
 bool add_shadow_ray(uint place, path p, vec3 origin, vec3 direction, float distance_, vec3 arriving)

@@ -18,11 +18,44 @@
 
 uniform uint first_ray, batch_rays; // a light each
 
-void add_child_of_weight(uint j, path parent, surface s, float distance_, vec3 direction, vec3 weight, bool straight)
+// What a hit sends on, in this order. Each has a bit, so that one loop makes the children: code is compiled once, and software
+// GL skips it for a group of hits that sends nothing on.
+const uint SENDS_STRAIGHT = 1u, SENDS_COAT = 2u, SENDS_MIRRORED = 4u, SENDS_BENT = 8u;
+
+struct sent {
+    uint which;
+    vec3 straight, mirrored, bent; // directions
+    vec3 straight_weight, mirrored_weight, bent_weight;
+#ifdef HAS_CLEARCOAT
+    vec3 coat, coat_weight;
+#endif
+};
+
+uint sends(uint which, vec3 weight)
 {
-    // not `<`: NaN ends here as well
-    if (max_component(weight) >= PATH_WEIGHT_MIN)
-        add_child(j, parent, s, distance_, direction, weight, straight, rough_solid_angle(s, direction));
+    return max_component(weight) >= PATH_WEIGHT_MIN ? which : 0u; // not `<`: NaN sends nothing
+}
+
+void add_children(uint j, path parent, surface s, float distance_, sent on)
+{
+    for (; on.which != 0u; on.which &= on.which - 1u) {
+        uint which = on.which & -on.which;
+        vec3 direction = on.bent, weight = on.bent_weight;
+        if (which == SENDS_STRAIGHT) {
+            direction = on.straight;
+            weight = on.straight_weight;
+        } else if (which == SENDS_MIRRORED) {
+            direction = on.mirrored;
+            weight = on.mirrored_weight;
+        }
+#ifdef HAS_CLEARCOAT
+        if (which == SENDS_COAT) {
+            direction = on.coat;
+            weight = on.coat_weight;
+        }
+#endif
+        add_child(j, parent, s, distance_, direction, weight, which == SENDS_STRAIGHT, rough_solid_angle(s, direction));
+    }
 }
 
 // Returns the number of the batch's live shadow rays.
@@ -56,34 +89,36 @@ void no_lights(uint j)
         no_shadow_ray(i * wave.hits.count + j);
 }
 
-vec3 shade(uint j, path p, surface s, split parts, ray r, float distance_, vec3 weight)
+vec3 shade(surface s, split parts, vec3 direction, vec3 weight, inout sent on)
 {
-    vec3 direction = r.direction_t_max.xyz;
     if (s.unlit)
         return weight * s.base;
-    vec3 mirrored = mirror_direction(s, direction);
-    vec3 bent = bent_direction(s, index_ratio(s), direction, s.normal, s.normal);
+    on.mirrored = mirror_direction(s, direction);
+    on.bent = bent_direction(s, index_ratio(s), direction, s.normal, s.normal);
     // If it is totally reflected, or a tilted normal would send it back, it is mirrored.
-    bool through = dot(bent, s.geometric) < 0.0;
+    bool through = dot(on.bent, s.geometric) < 0.0;
     vec3 mirror = parts.mirror + (through ? vec3(0.0) : parts.refracted);
     vec3 in_mirror = mirror * parts.mirror_ray;
 #ifdef HAS_CLEARCOAT
     float coat_ray = coat_ray_of(s, parts);
-    vec3 coat_mirrored = coat_mirror_direction(s, direction);
+    on.coat = coat_mirror_direction(s, direction);
+    on.coat_weight = weight * coat_ray;
     // One ray for both mirrors where they are one; over a refracted ray there is no room for two.
-    if (through && max_component(parts.refracted) > 0.0 || dot(mirrored, coat_mirrored) > 0.99999)
+    if (through && max_component(parts.refracted) > 0.0 || dot(on.mirrored, on.coat) > 0.99999)
         in_mirror += coat_ray;
     else
-        add_child_of_weight(j, p, s, distance_, coat_mirrored, weight * coat_ray, false);
+        on.which |= sends(SENDS_COAT, on.coat_weight);
 #endif
-    add_child_of_weight(j, p, s, distance_, mirrored, weight * in_mirror, false);
+    on.mirrored_weight = weight * in_mirror;
+    on.which |= sends(SENDS_MIRRORED, on.mirrored_weight);
+    on.bent_weight = weight * parts.refracted;
     if (through)
-        add_child_of_weight(j, p, s, distance_, bent, weight * parts.refracted, false);
+        on.which |= sends(SENDS_BENT, on.bent_weight);
     vec3 ambient = (parts.scattered + parts.again + sheen_of(parts)) * environment_irradiance(s.normal) +
-                   mirror * (1.0 - parts.mirror_ray) * environment_irradiance(mirrored);
+                   mirror * (1.0 - parts.mirror_ray) * environment_irradiance(on.mirrored);
     ambient += passed_of(parts) * environment_irradiance(-s.normal);
 #ifdef HAS_CLEARCOAT
-    ambient += (parts.coat.mirrors - coat_ray) * environment_irradiance(coat_mirrored);
+    ambient += (parts.coat.mirrors - coat_ray) * environment_irradiance(on.coat);
 #endif
     return weight * (s.emission + s.occlusion * ambient);
 }
@@ -104,9 +139,12 @@ void main()
     split parts = split_light(s, view, NoV);
     if (first) {
         float seen = (p.flags & PATH_STRAIGHT) != 0u ? p.weight_r * s.alpha : 0.0;
-        if (s.alpha < 1.0)
-            add_child_of_weight(j, p, s, h.distance, r.direction_t_max.xyz, weight * (1.0 - s.alpha), true);
-        radiance[k] = vec4(shade(j, p, s, parts, r, h.distance, weight * s.alpha), seen);
+        sent on;
+        on.straight = r.direction_t_max.xyz;
+        on.straight_weight = weight * (1.0 - s.alpha);
+        on.which = s.alpha < 1.0 ? sends(SENDS_STRAIGHT, on.straight_weight) : 0u;
+        radiance[k] = vec4(shade(s, parts, r.direction_t_max.xyz, weight * s.alpha, on), seen);
+        add_children(j, p, s, h.distance, on);
     }
     uint shadows = 0u;
     if (s.unlit || s.alpha <= 0.0 || in_glass(s))

@@ -80,9 +80,9 @@ SHARED_SIZE(child, 80)
 #define CHILD_OCTANT_SHIFT 2u
 #define SHADOW_RAYS_SHIFT 5u
 #define OCTANTS 8u
-#define COMPACT_BLOCK 16u               /* paths whose hits, and then children, are counted together */
-#define COMPACT_SCAN_SIZE 64            /* invocations of the one group that scans the counts */
-#define COMPACT_SCAN_SIZE_PARALLEL 1024 /* of a GPU: as many as every device has in a group */
+#define COMPACT_BLOCK 16u /* paths whose hits, and then children, are counted together */
+#define COMPACT_SCAN_SIZE                                                                                         \
+    1024 /* invocations of the one group that scans the counts: as many as every device has */
 
 /* The visibility buffer's first word is an instance + 1, or one of these. */
 #define VISIBLE_NOTHING 0u
