@@ -46,7 +46,7 @@ vec3 straight_of(vec4 colour)
 vec4 over_background(vec4 colour)
 {
     if (display_values != 0u)
-        colour.rgb = linear_from_srgb(max(straight_of(colour), 0.0)) * (colour.a > 0.0 ? colour.a : 1.0);
+        colour.rgb = linear_from_srgb(clamp(straight_of(colour), 0.0, 1.0)) * (colour.a > 0.0 ? colour.a : 1.0);
     return colour + background * (1.0 - colour.a);
 }
 

@@ -415,15 +415,20 @@ class Ends(Case):
         environment = {**os.environ, "PYTHONPATH": path}
         environment.pop("FARLIGHT_SERVER", None)
         arguments = ("render", bundled_scenes() / "teapot.glb", "-o", self.folder / "never.png", "--samples", "65536", "--integrator", "path")
+        # A shell's background commands ignore SIGINT, and so do those that they start.
         with subprocess.Popen([sys.executable, "-m", "farlight", *map(str, arguments)], stderr=child, stdout=subprocess.DEVNULL,
-                              env=environment, start_new_session=True) as process:
+                              env=environment, start_new_session=True,
+                              preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL)) as process:
             os.close(child)
             said, deadline = b"", time.monotonic() + farlight_test.TIMEOUT_S
             while b"rendering" not in said and time.monotonic() < deadline:
                 said += os.read(parent, 4096)
             self.assertIn(b"importing", said)
             process.send_signal(signal.SIGINT)
-            status = process.wait(farlight_test.TIMEOUT_S)
+            try:
+                status = process.wait(farlight_test.TIMEOUT_S)
+            finally:
+                process.kill()
             try:
                 while more := os.read(parent, 4096):
                     said += more

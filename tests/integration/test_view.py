@@ -215,7 +215,7 @@ class WithoutAWindow(Viewer):
                                         {"state": "rested"}, {"screenshot": f"rested-{rate}.png"}],
                                        "--views", "off", "--moving-rate", rate, "--integrator", "path")
         self.assertEqual([(states[rate]["moving"]["width"], states[rate]["moving"]["depth_less"]) for rate in (1000, 0)],
-                         [(SIZE[0] // 4, 6), (SIZE[0], 0)])
+                         [(SIZE[0] * 5 // 32, 6), (SIZE[0], 0)])
         self.assertEqual([(states[rate]["rested"]["width"], states[rate]["rested"]["depth_less"]) for rate in (1000, 0)],
                          [(SIZE[0], 0)] * 2)
         self.assertEqual(states[1000]["rested"]["eye"], states[0]["rested"]["eye"])

@@ -32,6 +32,9 @@ def typed(number):
 class Editing(Viewer):
     edit = None
 
+    def start(self, events, *options, **more):
+        return super().start(events, *options, **{"size": (320, 180), **more})  # the panel needs room beside the pot
+
     def two_viewers(self, first, second):
         """Their states at one scene; the second one begins when the first one has told a state."""
         address = f"unix:{self.folder}/up"
