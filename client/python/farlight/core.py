@@ -229,11 +229,14 @@ class Core(Connection):
 
     # ---- jobs
 
+    def _will_end(self, job: Job) -> bool:
+        return job.is_abandoned or (self.has_tasks and not job.is_view)
+
     def _start(self, render: messages.Render) -> Operation[Job]:
         most = self.limits.get("views_per_client") or 4
-        # Where there are no tasks, nothing would end another job meanwhile: the daemon says that they are too many.
+        # Where nothing would end another job meanwhile, the daemon says that they are too many.
         yield from self._until(lambda: self._has_room() and (
-            not self.has_tasks or len(self._jobs) < most or all(job.is_view for job in self._jobs.values())))
+            len(self._jobs) < most or not any(self._will_end(job) for job in self._jobs.values())))
         self._channel += 1
         render.channel = self._channel
         if not self.capabilities & handshake.CAN_CHOOSE_PRIMARY and render.primary in ("auto", messages.Primary.AUTO):
