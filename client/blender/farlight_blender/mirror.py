@@ -176,7 +176,8 @@ class Mirror:
         gone = [one for one in self._numbers if one not in self._seen]
         for kind, key in sorted(gone, key=lambda one: SWEPT.get(one[0], len(SWEPT))):
             number = self._numbers.pop((kind, key))
-            self.scene.remove(Object(kind, number))
+            if Object(kind, number) in self.scene:  # a node has gone with the one above it
+                self.scene.remove(Object(kind, number))
             if kind == ObjectKind.MESH:
                 self._steady = {key: values for key, values in self._steady.items() if key[0] != number}
 

@@ -93,6 +93,9 @@ class Objects:
         listed = ", ".join(f"{word}: {count}" for word, count in counts.items()) or "empty"
         return f"<farlight.Scene {self.name + ' ' if self.name else ''}{listed}>"
 
+    def __contains__(self, thing: object) -> bool:
+        return thing in self._objects
+
     def set(self, edit: Message) -> Object:
         """Creates or replaces an object by its message; what it names in blobs is given by blob(). The message that it
         already has changes nothing."""
