@@ -31,7 +31,8 @@ FRAMES = (
     ("unit/trace/bvh/refit:", "refits of a hierarchy"),
     ("unit/gpu_scene/motion:", "scenes that move and deform"),
 )
-WITHOUT_BARRIERS = "accuracy/render_frame:rasterised_and_traced"
+# Its waves are queued: where the host makes their lists it waits for each.
+WITHOUT_BARRIERS = "accuracy/frame_ahead:rays_behind_the_last_queued"
 # Messages about zink itself, each with its reason.
 NOT_OURS = (
     ("INDIRECT_COMMAND_READ, prior_usage: SYNC_COPY_TRANSFER_WRITE",
