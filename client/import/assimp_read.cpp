@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "assimp.hpp"
 
+#include "protocol/common/srgb.h"
+
 #include <algorithm>
 #include <cmath>
 #include <cstdarg>
@@ -43,8 +45,7 @@ std::string text(const aiString &from)
 
 float linear(float value)
 {
-    const float cut = std::min(std::max(value, 0.0f), 1.0f); // NaN becomes 0
-    return cut <= 0.04045f ? cut / 12.92f : std::pow((cut + 0.055f) / 1.055f, 2.4f);
+    return linear_from_srgb_f(std::min(std::max(value, 0.0f), 1.0f)); // NaN becomes 0
 }
 
 namespace

@@ -39,9 +39,6 @@ struct triangle {
 
 using object_key = std::pair<std::string, uint32_t>; // a file of the archive, and the identifier there
 
-// sRGB to linear light.
-double linear(uint8_t value);
-
 // An object where it stands.
 struct instance {
     object_key key;

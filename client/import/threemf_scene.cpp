@@ -2,6 +2,8 @@
 // The objects of a 3MF model as meshes, and its build as nodes.
 #include "threemf.hpp"
 
+#include "protocol/common/srgb.h"
+
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
@@ -10,12 +12,6 @@
 
 namespace threemf
 {
-double linear(uint8_t value)
-{
-    const double s = value / 255.0;
-    return s <= 0.04045 ? s / 12.92 : std::pow((s + 0.055) / 1.055, 2.4);
-}
-
 namespace
 {
 constexpr uint32_t instances_max = 1 << 20;
@@ -23,6 +19,11 @@ constexpr unsigned depth_max = 64;
 
 using colour = std::array<uint8_t, 4>;
 constexpr colour white = {255, 255, 255, 255};
+
+float linear(uint8_t value)
+{
+    return linear_from_srgb_f(float(value) / 255);
+}
 
 colour linear_of(const colour &of)
 {
@@ -50,7 +51,7 @@ uint32_t add_material(reader &r, const std::string &name, const colour &of)
     set.double_sided = 1;
     set.roughness = 1; // as of what other formats call plain colours
     for (size_t c = 0; c < 3; c++)
-        set.base_colour[c] = float(linear(of[c]));
+        set.base_colour[c] = linear(of[c]);
     if (of[3] > 0 && of[3] < 255) { // 0 is what exporters write that know no alpha
         set.base_colour[3] = float(of[3]) / 255;
         set.alpha_mode = PROTOCOL_ALPHA_BLEND;
@@ -181,7 +182,7 @@ void place(placing &p, uint32_t parent, const instance &from, unsigned depth)
         return;
     }
     if (depth > depth_max)
-        fail(r, from.key.first, "the object %u has itself as a component, or components nested more than %u deep",
+        fail(r, from.key.first, "the object %u has itself as a component, or more than %u levels of components",
              from.key.second, depth_max);
     if (p.left-- == 0)
         fail(r, from.key.first, "the objects are there more than %u times", instances_max);
