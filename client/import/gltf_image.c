@@ -96,14 +96,13 @@ static bool is_other_file(const struct files *files, const char *text, size_t le
     return head_bytes > 0 && !is_plain(head, head_bytes);
 }
 
+static const char *const plain_endings[] = {".png", ".jpg", ".jpeg", NULL};
+
 /* Strings with escapes may be anything. */
 static bool may_be_other(const struct files *files, const char *text, size_t length)
 {
-    static const char *const plain[] = {".png", ".jpg", ".jpeg", NULL}, *const others[] = {
-                                                                            ".webp", ".exr",  ".hdr", ".pic",
-                                                                            ".tif",  ".tiff", ".bmp", ".gif",
-                                                                            ".tga",  ".tpic", ".ppm", ".pnm",
-                                                                            NULL};
+    static const char *const others[] = {".webp", ".exr", ".hdr",  ".pic", ".tif", ".tiff", ".bmp",
+                                         ".gif",  ".tga", ".tpic", ".ppm", ".pnm", NULL};
     const bool is_data = begins_with(text, length, "data:");
     const size_t skipped = is_data ? strlen("data:") : 0;
 
@@ -116,7 +115,7 @@ static bool may_be_other(const struct files *files, const char *text, size_t len
     if (is_data)
         return false;
     return has_ending(text, length, others) || memchr(text, '\\', length) ||
-           (has_ending(text, length, plain) && is_other_file(files, text, length));
+           (has_ending(text, length, plain_endings) && is_other_file(files, text, length));
 }
 
 /* ---- of a buffer ---- */
@@ -136,14 +135,15 @@ static bool base64_holds_other(const char *text, size_t length)
     return found;
 }
 
-/* Of what "uri" names, in the file or beside it. */
+/* Of what "uri" names, in the file or beside it. What ends as an image is one, whose head has been looked at. */
 static bool buffer_may_hold_other(const struct files *files, const char *text, size_t length)
 {
     char name[NAME_BYTES_MAX];
 
     if (begins_with(text, length, "data:"))
         return !begins_with(text, length, "data:image/") && base64_holds_other(text, length);
-    return resolve_percents(text, length, name) && files_hold(files, name, holds_other);
+    return !has_ending(text, length, plain_endings) && resolve_percents(text, length, name) &&
+           files_hold(files, name, holds_other);
 }
 
 /* ---- of the file ---- */
