@@ -70,7 +70,8 @@ class Guide(Case):
                 key = " --key my.key" if "--key-file" in here else ""
                 lines.append(f"until farlight ping --count 1 --server {address}{key} >/dev/null 2>&1; do sleep 0.1; done")
             if here.startswith("farlight serve"):
-                lines.append(f"until farlight scenes {here.split('model.glb ')[1][:-1]} | grep -q model; do sleep 0.1; done")
+                lines[-1] = here[:-1] + ">serving.txt &"
+                lines.append("until grep -q 'view it with' serving.txt; do sleep 0.1; done")
         environment = {**self.environment, **({"DISPLAY": display} if display else {})}
         result = subprocess.run(["bash", "-c", "\n".join(lines)], cwd=self.work, env=environment, stdout=subprocess.PIPE,
                                 stderr=subprocess.STDOUT, text=True, check=False, timeout=farlight_test.TIMEOUT_S)
