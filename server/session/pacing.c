@@ -53,7 +53,7 @@ double pacing_room_bytes(const struct pacing *pacing)
 
 uint64_t pacing_wait_ns(const struct pacing *pacing, unsigned coming)
 {
-    if (!pacing->in_flight_count && !coming)
+    if (!coming && (pacing->silent || !pacing->in_flight_count))
         return 0;
     if (!(pacing->carried_ns > 0.0) || pacing->in_flight_count + coming >= PACING_IN_FLIGHT_MAX)
         return UINT64_MAX;
@@ -71,10 +71,21 @@ bool pacing_may_send(const struct pacing *pacing)
     return pacing_wait_ns(pacing, 0) == 0;
 }
 
+static void remove_oldest(struct pacing *pacing, size_t count)
+{
+    for (size_t i = 0; i < count; i++)
+        pacing->in_flight_bytes -= pacing->in_flight[i].bytes;
+    pacing->in_flight_count -= count;
+    memmove(pacing->in_flight, pacing->in_flight + count, pacing->in_flight_count * sizeof(pacing->in_flight[0]));
+}
+
 void pacing_sent(struct pacing *pacing, uint32_t frame, uint64_t bytes, uint64_t now_ns)
 {
-    if (pacing->in_flight_count == PACING_IN_FLIGHT_MAX)
-        return;
+    if (pacing->in_flight_count == PACING_IN_FLIGHT_MAX) {
+        if (!pacing->silent)
+            return;
+        remove_oldest(pacing, 1);
+    }
     pacing->in_flight[pacing->in_flight_count++] =
         (struct pacing_frame){.frame = frame, .bytes = bytes, .sent_ns = now_ns};
     pacing->in_flight_bytes += bytes;
@@ -107,14 +118,6 @@ static void learn_rate(struct pacing *pacing, const struct pacing_frame *frame, 
     pacing->carried_ns = pacing->carried_ns * CARRIED_FADES + fmax(taken_ns, CARRIED_MIN_NS);
 }
 
-static void remove_oldest(struct pacing *pacing, size_t count)
-{
-    for (size_t i = 0; i < count; i++)
-        pacing->in_flight_bytes -= pacing->in_flight[i].bytes;
-    pacing->in_flight_count -= count;
-    memmove(pacing->in_flight, pacing->in_flight + count, pacing->in_flight_count * sizeof(pacing->in_flight[0]));
-}
-
 void pacing_acknowledged(struct pacing *pacing, uint32_t frame, bool whole, uint64_t now_ns)
 {
     size_t place = 0;
@@ -124,6 +127,7 @@ void pacing_acknowledged(struct pacing *pacing, uint32_t frame, bool whole, uint
         return;
     struct pacing_frame *acknowledged = &pacing->in_flight[place];
     pacing->acknowledges = true;
+    pacing->silent = false;
     if (!whole) {
         if (!acknowledged->begun_ns)
             learn_round_trip(pacing, now_ns - acknowledged->sent_ns, now_ns);
@@ -173,8 +177,7 @@ void pacing_cut(struct pacing *pacing, uint32_t frame, uint64_t bytes)
     }
 }
 
-void pacing_forget(struct pacing *pacing)
+void pacing_note_silence(struct pacing *pacing)
 {
-    if (!pacing->acknowledges)
-        remove_oldest(pacing, pacing->in_flight_count);
+    pacing->silent = !pacing->acknowledges;
 }

@@ -49,6 +49,7 @@ struct pacing {
     size_t in_flight_count;
     uint64_t in_flight_bytes;
     bool acknowledges; /* the client has acknowledged a frame */
+    bool silent;       /* it has not, and frames do not wait for it */
     uint64_t last_whole_ns;
     /* Minimum round trip of this time window and of the one before it; 0: none. */
     uint64_t round_trip_ns, round_trip_before_ns, window_begun_ns;
@@ -82,7 +83,7 @@ void pacing_set_terms(struct pacing *pacing, uint64_t frame_ns, const struct pac
 bool pacing_makes_views(const struct pacing_terms *terms);
 
 /* Whether the next frame may begin. False: an acknowledgement will change that. A client that has never
- * acknowledged a frame gets one at a time, and its credit releases the next; call pacing_forget() then. */
+ * acknowledged a frame gets one, and those behind it once it is called silent. */
 bool pacing_may_send(const struct pacing *pacing);
 /* How long until the next frame may go if `coming` others of its size go before it, as far as can be told: 0: it
  * may now; UINT64_MAX: only an acknowledgement will tell. */
@@ -100,8 +101,10 @@ void pacing_cut(struct pacing *pacing, uint32_t frame, uint64_t bytes);
 /* The rest of the frame is abandoned. Its sent bytes are ahead of the next frame at any time, so the next need not
  * wait. */
 void pacing_abandoned(struct pacing *pacing, uint32_t frame);
-/* Nothing is in flight any more, as far as is known: credit has come from a client that does not acknowledge. */
-void pacing_forget(struct pacing *pacing);
+/* The client has had its time to acknowledge its first frame. If it has not, its credit alone releases frames,
+ * until an acknowledgement comes after all, which tells of the link as any other does: a slow one may take longer
+ * for that frame. */
+void pacing_note_silence(struct pacing *pacing);
 
 /* 0: not known yet. */
 uint64_t pacing_bytes_per_second(const struct pacing *pacing);

@@ -19,7 +19,7 @@
 /* Expected times may be too long: a frame that is this much early is hardly older.
  */
 #define EARLY_NS UINT64_C(500000)
-/* A client that has not acknowledged its first frame by then acknowledges none. */
+/* A client that has not acknowledged its first frame by then may acknowledge none. */
 #define SILENCE_NS UINT64_C(250000000)
 /* A frame that a link takes longer for than that is not sent again and again while a picture is refined. */
 #define SPARING_NS 250000000.0
@@ -213,11 +213,7 @@ static void on_pace_timer(void *context)
 static void on_silence_timer(void *context)
 {
     struct job *job = context;
-    struct session_view *view = job->view;
-    if (view->pacing.acknowledges)
-        return;
-    view->silent = true;
-    pacing_forget(&view->pacing);
+    pacing_note_silence(&job->view->pacing);
     job_pace(job);
 }
 
@@ -388,9 +384,7 @@ void view_frame_sent(struct job *job)
 {
     struct session_view *view = job->view;
     view->given_up = 0;
-    if (view->silent)
-        pacing_forget(&view->pacing);
-    else if (!view->pacing.acknowledges && !view->silence_timer.running)
+    if (!view->pacing.acknowledges && !view->pacing.silent && !view->silence_timer.running)
         start_timer(job, &view->silence_timer, on_silence_timer, SILENCE_NS);
 }
 
@@ -452,7 +446,6 @@ void views_acknowledge(struct session *session, const struct message_frame_ack *
     if (!job)
         return;
     struct session_view *view = job->view;
-    view->silent = false;
     pacing_acknowledged(&view->pacing, message->frame, message->whole != 0, session->connection->last_received_ns);
     if (message->want_key_frame && view_wishes_want_key_frame(view->wishes))
         tell_engine(job);

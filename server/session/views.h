@@ -43,7 +43,6 @@ struct session_view {
     struct loop_timer pace_timer; /* until the next frame is begun, if nothing happens before .. */
     bool due;                     /* .. which it is now */
     struct loop_timer silence_timer;
-    bool silent;               /* the client acknowledges nothing */
     struct view_effort effort; /* as the engine has it */
     uint64_t made_ns;          /* time of the last frame from its start until it was encoded */
     /* The client's last command, and the last one that it was shown. */

@@ -183,14 +183,43 @@ TEST(sends_one_at_a_time_to_a_client_that_is_silent)
     assert_true(pacing_may_send(&pacing));
     pacing_sent(&pacing, 0, 1000, 0);
     assert_false(pacing_may_send(&pacing));
-    pacing_forget(&pacing);
+    pacing_note_silence(&pacing);
     assert_true(pacing_may_send(&pacing));
     /* Once it has acknowledged, credit does not stand for that any more. */
     pacing_sent(&pacing, 1, 1000000, MS);
     pacing_acknowledged(&pacing, 1, true, 101 * MS);
     pacing_sent(&pacing, 2, 1000000, 102 * MS);
-    pacing_forget(&pacing);
+    pacing_note_silence(&pacing);
     assert_false(pacing_may_send(&pacing));
+}
+
+/* 1 MB takes a second, longer than a client has to acknowledge. */
+TEST(learns_a_slow_link_from_an_acknowledgement_that_comes_late)
+{
+    struct pacing pacing;
+    pacing_init(&pacing, FRAME_NS);
+    pacing_sent(&pacing, 0, 1000000, 0);
+    pacing_note_silence(&pacing);
+    for (uint32_t frame = 1; frame <= PACING_IN_FLIGHT_MAX / 2; frame++) {
+        assert_true(pacing_may_send(&pacing));
+        pacing_sent(&pacing, frame, 1000000, 250 * MS);
+    }
+    pacing_acknowledged(&pacing, 0, true, S);
+    assert_int_equal(pacing_bytes_per_second(&pacing), 1000000);
+    assert_false(pacing_may_send(&pacing));
+}
+
+TEST(goes_on_for_ever_with_a_client_that_acknowledges_nothing)
+{
+    struct pacing pacing;
+    pacing_init(&pacing, FRAME_NS);
+    pacing_sent(&pacing, 0, 1000, 0);
+    pacing_note_silence(&pacing);
+    for (uint32_t frame = 1; frame <= 3 * PACING_IN_FLIGHT_MAX; frame++) {
+        assert_true(pacing_may_send(&pacing));
+        pacing_sent(&pacing, frame, 1000, frame * MS);
+    }
+    assert_int_equal(pacing.in_flight_bytes, 1000 * PACING_IN_FLIGHT_MAX);
 }
 
 TEST(ignores_acknowledgements_of_what_is_not_in_flight)
