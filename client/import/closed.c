@@ -79,12 +79,16 @@ static bool edges_paired(const struct places *places)
     return sum == 0;
 }
 
-/* A hash independent of the first corner; the lowest bit is the orientation. Never 0, which is an empty slot. */
+/* An empty slot. Not 0: memory that is 0 from the kernel and is read before it is written is mapped twice, and the
+ * other thread's processor is told each time, which took longer than all else. */
+#define EMPTY UINT64_MAX
+
+/* A hash independent of the first corner; the lowest bit is the orientation. Never EMPTY. */
 static uint64_t triangle_of(const uint64_t corners[3])
 {
     bool turned = (corners[0] < corners[1]) ^ (corners[1] < corners[2]) ^ (corners[2] < corners[0]);
 
-    return ((mix(corners[0]) + mix(corners[1]) + mix(corners[2])) & ~(uint64_t)1) | 2 | turned;
+    return ((mix(corners[0]) + mix(corners[1]) + mix(corners[2])) & ~(uint64_t)3) | turned;
 }
 
 /* False: it is in the table with the other orientation. The table's size is a power of two and greater than the
@@ -94,7 +98,7 @@ static bool put(uint64_t *table, uint64_t mask, uint64_t triangle)
 {
     uint64_t at = triangle >> 2 & mask;
 
-    for (; table[at] != 0; at = (at + 1) & mask)
+    for (; table[at] != EMPTY; at = (at + 1) & mask)
         if ((table[at] ^ triangle) <= 1)
             return table[at] == triangle;
     table[at] = triangle;
@@ -117,9 +121,7 @@ static bool no_sheets(const struct places *places, const atomic_bool *stop)
     table = malloc(slots * sizeof(*table));
     if (!table)
         return false;
-    /* Not by calloc: pages that are read before they are written are mapped twice, and the other thread's
-     * processor is told each time. */
-    memset(table, 0, slots * sizeof(*table));
+    memset(table, 0xff, slots * sizeof(*table));
     for (size_t t = 0; single && t < triangle_count && !atomic_load_explicit(stop, memory_order_relaxed);) {
         size_t count = 0;
 
