@@ -35,46 +35,60 @@ static uint64_t place_of(const float *position)
     return mix_two(bits[0] | (uint64_t)bits[1] << 32, bits[2]);
 }
 
-/* A hash of the edge, and its negative for the reversed edge; 0 for one without length. */
+/* A hash of the edge, and its negative for the reversed edge; 0 for one without length. Which end is the lesser is
+ * unpredictable, so nothing branches on it. Places are hashes already: their sum, one end times an odd number, is
+ * as good as one. */
 static uint64_t edge_of(uint64_t from, uint64_t to)
 {
-    if (from == to)
-        return 0;
-    return from < to ? mix_two(from, to) : 0 - mix_two(to, from);
+    const uint64_t lesser = from < to ? from : to, greater = from < to ? to : from;
+    const uint64_t hash = mix(lesser * 0x9e3779b97f4a7c15u + greater);
+    const uint64_t reversed = 0 - (uint64_t)(from > to), has_length = 0 - (uint64_t)(from != to);
+    return ((hash ^ reversed) - reversed) & has_length;
 }
 
-static void places_of(const float *positions, const uint32_t *corners, uint64_t places[3])
+/* Triangles, and the place of each vertex: a vertex is hashed once, not at each of its triangles. */
+struct places {
+    const uint64_t *of_vertex;
+    const uint32_t *indices;
+    uint32_t triangle_count;
+};
+
+static void corners_of(const struct places *places, size_t triangle, uint64_t corners[3])
 {
-    for (int c = 0; c < 3; c++)
-        places[c] = place_of(positions + (size_t)corners[c] * 3);
+    for (size_t c = 0; c < 3; c++)
+        corners[c] = places->of_vertex[places->indices[triangle * 3 + c]];
 }
 
-static bool degenerate(const uint64_t places[3])
+static bool degenerate(const uint64_t corners[3])
 {
-    return places[0] == places[1] || places[1] == places[2] || places[2] == places[0];
+    return corners[0] == corners[1] || corners[1] == corners[2] || corners[2] == corners[0];
 }
 
 /* The edges' hashes add up to 0 if each edge occurs equally often in both directions, and otherwise, but for one
  * chance in 2^64, they do not. So no edge need be stored. (The edges of a degenerate triangle add up to 0.) */
-static bool edges_paired(const float *positions, const uint32_t *indices, uint32_t triangle_count)
+static bool edges_paired(const struct places *places)
 {
     uint64_t sum = 0;
 
-    for (size_t t = 0; t < triangle_count; t++) {
-        uint64_t places[3];
+    for (size_t t = 0; t < places->triangle_count; t++) {
+        uint64_t corners[3];
 
-        places_of(positions, indices + t * 3, places);
-        sum += edge_of(places[0], places[1]) + edge_of(places[1], places[2]) + edge_of(places[2], places[0]);
+        corners_of(places, t, corners);
+        sum += edge_of(corners[0], corners[1]) + edge_of(corners[1], corners[2]) + edge_of(corners[2], corners[0]);
     }
     return sum == 0;
 }
 
-/* A hash independent of the first corner; the lowest bit is the orientation. Never 0, which is an empty slot. */
-static uint64_t triangle_of(const uint64_t places[3])
-{
-    bool turned = (places[0] < places[1]) ^ (places[1] < places[2]) ^ (places[2] < places[0]);
+/* An empty slot. Not 0: memory that is 0 from the kernel and is read before it is written is mapped twice, and the
+ * other thread's processor is told each time, which took longer than all else. */
+#define EMPTY UINT64_MAX
 
-    return ((mix(places[0]) + mix(places[1]) + mix(places[2])) & ~(uint64_t)1) | 2 | turned;
+/* A hash independent of the first corner; the lowest bit is the orientation. Never EMPTY. */
+static uint64_t triangle_of(const uint64_t corners[3])
+{
+    bool turned = (corners[0] < corners[1]) ^ (corners[1] < corners[2]) ^ (corners[2] < corners[0]);
+
+    return ((mix(corners[0]) + mix(corners[1]) + mix(corners[2])) & ~(uint64_t)3) | turned;
 }
 
 /* False: it is in the table with the other orientation. The table's size is a power of two and greater than the
@@ -84,34 +98,45 @@ static bool put(uint64_t *table, uint64_t mask, uint64_t triangle)
 {
     uint64_t at = triangle >> 2 & mask;
 
-    for (; table[at] != 0; at = (at + 1) & mask)
+    for (; table[at] != EMPTY; at = (at + 1) & mask)
         if ((table[at] ^ triangle) <= 1)
             return table[at] == triangle;
     table[at] = triangle;
     return true;
 }
 
+/* So many triangles are hashed before the first is looked up, as each lies elsewhere in memory. */
+#define LOOKED_UP_TOGETHER 32u
+
 /* There are triangles, and none with both orientations. */
-static bool no_sheets(const float *positions, const uint32_t *indices, uint32_t triangle_count,
-                      const atomic_bool *stop)
+static bool no_sheets(const struct places *places, const atomic_bool *stop)
 {
-    uint64_t slots = 16;
+    const size_t triangle_count = places->triangle_count;
+    uint64_t slots = 16, together[LOOKED_UP_TOGETHER];
     uint64_t *table;
     bool any = false, single = true;
 
     while (slots * 4 < (uint64_t)triangle_count * 5)
         slots *= 2;
-    table = calloc(slots, sizeof(*table));
+    table = malloc(slots * sizeof(*table));
     if (!table)
         return false;
-    for (size_t t = 0; single && t < triangle_count && !atomic_load_explicit(stop, memory_order_relaxed); t++) {
-        uint64_t places[3];
+    memset(table, 0xff, slots * sizeof(*table));
+    for (size_t t = 0; single && t < triangle_count && !atomic_load_explicit(stop, memory_order_relaxed);) {
+        size_t count = 0;
 
-        places_of(positions, indices + t * 3, places);
-        if (degenerate(places))
-            continue;
-        any = true;
-        single = put(table, slots - 1, triangle_of(places));
+        for (; count < LOOKED_UP_TOGETHER && t < triangle_count; t++) {
+            uint64_t corners[3];
+
+            corners_of(places, t, corners);
+            if (degenerate(corners))
+                continue;
+            together[count] = triangle_of(corners);
+            __builtin_prefetch(&table[together[count++] >> 2 & (slots - 1)], 1);
+        }
+        any = any || count > 0;
+        for (size_t i = 0; single && i < count; i++)
+            single = put(table, slots - 1, together[i]);
     }
     free(table);
     return any && single;
@@ -121,9 +146,7 @@ static bool no_sheets(const float *positions, const uint32_t *indices, uint32_t 
 #define TRIANGLES_SHARED 20000u
 
 struct sheets {
-    const float *positions;
-    const uint32_t *indices;
-    uint32_t triangle_count;
+    const struct places *places;
     atomic_bool stop; /* the result is not needed any more */
     bool none;
 };
@@ -132,22 +155,31 @@ static void *look_for_sheets(void *context)
 {
     struct sheets *sheets = context;
 
-    sheets->none = no_sheets(sheets->positions, sheets->indices, sheets->triangle_count, &sheets->stop);
+    sheets->none = no_sheets(sheets->places, &sheets->stop);
     return NULL;
 }
 
-bool import_triangles_closed(const float *positions, const uint32_t *indices, uint32_t triangle_count)
+bool import_triangles_closed(const float *positions, uint32_t vertex_count, const uint32_t *indices,
+                             uint32_t triangle_count)
 {
-    struct sheets sheets = {.positions = positions, .indices = indices, .triangle_count = triangle_count};
+    uint64_t *of_vertex = malloc((size_t)vertex_count * sizeof(*of_vertex) + 1);
+    const struct places places = {of_vertex, indices, triangle_count};
+    struct sheets sheets = {.places = &places};
     pthread_t helper;
+
+    if (!of_vertex)
+        return false;
+    for (size_t v = 0; v < vertex_count; v++)
+        of_vertex[v] = place_of(positions + v * 3);
     bool helped =
         triangle_count >= TRIANGLES_SHARED && pthread_create(&helper, NULL, look_for_sheets, &sheets) == 0;
-    bool paired = edges_paired(positions, indices, triangle_count);
+    bool paired = edges_paired(&places);
 
     atomic_store(&sheets.stop, !paired);
     if (helped)
         pthread_join(helper, NULL);
     else if (paired)
         look_for_sheets(&sheets);
+    free(of_vertex);
     return paired && sheets.none;
 }

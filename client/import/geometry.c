@@ -242,7 +242,8 @@ uint32_t import_add_mesh(struct import_scene *scene, struct import_mesh *mesh)
     edit->message.set_mesh.vertex_count = mesh->vertex_count;
     edit->message.set_mesh.triangle_count = mesh->triangle_count;
     edit->message.set_mesh.name = import_copy_name(scene, mesh->name);
-    edit->message.set_mesh.closed = import_triangles_closed(mesh->positions, mesh->indices, mesh->triangle_count);
+    edit->message.set_mesh.closed =
+        import_triangles_closed(mesh->positions, mesh->vertex_count, mesh->indices, mesh->triangle_count);
     edit->message.set_mesh.ranges = mesh->ranges;
     edit->message.set_mesh.ranges_count = mesh->range_count;
     edit->message.set_mesh.influence_count = mesh->influence_count;

@@ -184,7 +184,7 @@ static bool decode_jpeg(struct texture_job *job)
 /* ---- all ---- */
 
 struct work {
-    struct texture_job *jobs;
+    struct texture_job **jobs;
     size_t count;
     atomic_size_t next;
 };
@@ -193,8 +193,8 @@ static void *decode_next(void *context)
 {
     struct work *work = context;
     for (size_t i; (i = atomic_fetch_add(&work->next, 1)) < work->count;) {
-        struct texture_job *job = &work->jobs[i];
-        if (!texture_is_plain(job) || (is_png(job) ? decode_png(job) : decode_jpeg(job)))
+        struct texture_job *job = work->jobs[i];
+        if (is_png(job) ? decode_png(job) : decode_jpeg(job))
             continue;
         free(job->texels);
         job->texels = NULL;
@@ -203,16 +203,29 @@ static void *decode_next(void *context)
     return NULL;
 }
 
+/* Larger ones first: else one thread may decode the largest while the other has no more to do. */
+static int compare_jobs(const void *a, const void *b)
+{
+    const size_t left = (*(struct texture_job *const *)a)->size_bytes;
+    const size_t right = (*(struct texture_job *const *)b)->size_bytes;
+    return (left < right) - (left > right);
+}
+
 void texture_plain_decode(struct texture_job *jobs, size_t count)
 {
-    struct work work = {.jobs = jobs, .count = count};
-    size_t plain = 0;
+    struct work work = {.jobs = malloc((count + 1) * sizeof(struct texture_job *))};
     pthread_t helper;
-    for (size_t i = 0; i < count; i++)
-        plain += texture_is_plain(&jobs[i]);
-    const bool helped = plain > 1 && pthread_create(&helper, NULL, decode_next, &work) == 0;
-    if (plain > 0)
-        decode_next(&work);
+    for (size_t i = 0; i < count; i++) {
+        if (texture_is_plain(&jobs[i]) && work.jobs)
+            work.jobs[work.count++] = &jobs[i];
+        else if (texture_is_plain(&jobs[i]))
+            snprintf(jobs[i].reason, sizeof(jobs[i].reason), "out of memory");
+    }
+    if (work.jobs)
+        qsort(work.jobs, work.count, sizeof(struct texture_job *), compare_jobs);
+    const bool helped = work.count > 1 && pthread_create(&helper, NULL, decode_next, &work) == 0;
+    decode_next(&work);
     if (helped)
         pthread_join(helper, NULL);
+    free(work.jobs);
 }

@@ -2,12 +2,16 @@
 #include "base/prefault.h"
 
 #include "base/clock.h"
+#include "base/host.h"
+#include "base/parallel.h"
 
 #include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
 
 #define BLOCKS_MAX 16
+/* The kernel clears pages one after the other: two processors have twice as many. */
+#define THREADS_MAX 2u
 /* Between two looks at what else is wanted. */
 #define STEP_BYTES ((size_t)2 << 20)
 /* Drivers allocate a little more than they are asked for. */
@@ -17,18 +21,19 @@
 
 struct block {
     size_t bytes;   /* that the caller will allocate; 0: the place is free */
-    size_t faulted; /* of the bytes and the slack */
+    size_t begun;   /* of the bytes and the slack: faulted, or a thread is at it */
+    size_t faulted; /* likewise */
     uint8_t *memory;
     uint64_t finished_ns; /* 0: not yet */
 };
 
 struct prefault {
-    pthread_mutex_t lock; /* of all that follows but the thread */
+    pthread_mutex_t lock; /* of all that follows but the threads */
     pthread_cond_t changed;
     struct block blocks[BLOCKS_MAX];
     bool ends;
-    pthread_t thread; /* since the first block */
-    bool has_thread;
+    pthread_t threads[THREADS_MAX]; /* since the first block */
+    unsigned thread_count;
 };
 
 static struct block *find(struct prefault *prefault, size_t bytes)
@@ -47,16 +52,16 @@ static void drop(struct block *block)
 
 static size_t left(const struct block *block)
 {
-    return block->bytes + SLACK_BYTES - block->faulted;
+    return block->bytes + SLACK_BYTES - block->begun;
 }
 
-/* The one with least left to do; NULL: all are finished. */
+/* The one with least left to begin; NULL: all are begun. */
 static struct block *next_block(struct prefault *prefault)
 {
     struct block *next = NULL;
     for (size_t i = 0; i < BLOCKS_MAX; i++) {
         struct block *block = &prefault->blocks[i];
-        if (block->bytes && !block->finished_ns && (!next || left(block) < left(next)))
+        if (block->bytes && left(block) > 0 && (!next || left(block) < left(next)))
             next = block;
     }
     return next;
@@ -89,11 +94,13 @@ static void *run(void *context)
             continue;
         }
         size_t step = left(block) < STEP_BYTES ? left(block) : STEP_BYTES;
+        uint8_t *begin = block->memory + block->begun;
+        block->begun += step;
         pthread_mutex_unlock(&prefault->lock); /* the caller leaves unfinished blocks alone */
-        memset(block->memory + block->faulted, 0, step);
+        memset(begin, 0, step);
         pthread_mutex_lock(&prefault->lock);
         block->faulted += step;
-        if (left(block) == 0)
+        if (block->faulted == block->bytes + SLACK_BYTES)
             block->finished_ns = clock_now_ns();
         pthread_cond_broadcast(&prefault->changed);
     }
@@ -119,8 +126,8 @@ void prefault_destroy(struct prefault *prefault)
     prefault->ends = true;
     pthread_cond_broadcast(&prefault->changed);
     pthread_mutex_unlock(&prefault->lock);
-    if (prefault->has_thread)
-        pthread_join(prefault->thread, NULL);
+    for (unsigned i = 0; i < prefault->thread_count; i++)
+        pthread_join(prefault->threads[i], NULL);
     for (size_t i = 0; i < BLOCKS_MAX; i++)
         free(prefault->blocks[i].memory);
     pthread_cond_destroy(&prefault->changed);
@@ -136,14 +143,26 @@ static size_t total_bytes(const struct prefault *prefault)
     return total;
 }
 
-static bool start_thread(struct prefault *prefault)
+/* The second gives way: others may have work for its processor. */
+static void *run_beside(void *context)
 {
-    if (prefault->has_thread)
+    host_thread_gives_way();
+    return run(context);
+}
+
+static bool start_threads(struct prefault *prefault)
+{
+    const unsigned max = parallel_processors() < THREADS_MAX ? parallel_processors() : THREADS_MAX;
+    if (prefault->thread_count > 0)
         return true;
-    prefault->has_thread = pthread_create(&prefault->thread, NULL, run, prefault) == 0;
-    if (prefault->has_thread)
-        pthread_setname_np(prefault->thread, "prefault");
-    return prefault->has_thread;
+    for (unsigned i = 0; i < max; i++) {
+        pthread_t *thread = &prefault->threads[prefault->thread_count];
+        if (pthread_create(thread, NULL, i == 0 ? run : run_beside, prefault) != 0)
+            break;
+        pthread_setname_np(*thread, "prefault");
+        prefault->thread_count++;
+    }
+    return prefault->thread_count > 0;
 }
 
 /* NULL: there is no thread, or no place or memory for the block. */
@@ -152,7 +171,7 @@ static struct block *begin(struct prefault *prefault, size_t bytes)
     struct block *block = find(prefault, 0);
     if (!block || bytes > PREFAULT_BYTES_MAX - total_bytes(prefault))
         return NULL;
-    uint8_t *memory = start_thread(prefault) ? malloc(bytes + SLACK_BYTES) : NULL;
+    uint8_t *memory = start_threads(prefault) ? malloc(bytes + SLACK_BYTES) : NULL;
     if (!memory)
         return NULL;
     *block = (struct block){.bytes = bytes, .memory = memory};

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Memory prefaulted by a background thread. Each page that the kernel gives for the first time costs a fault, and
+/* Memory prefaulted by up to two background threads. Each page that the kernel gives for the first time costs a fault, and
  * a gigabyte of them may take seconds. The thread allocates and fills a block; the caller's own allocation of that
  * size then takes the same pages, since the allocator keeps them (allocator.h). Correctness does not depend on it:
  * without the thread the caller has the faults itself. Call it from one thread. */

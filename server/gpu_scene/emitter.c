@@ -271,10 +271,10 @@ static bool update_tree(struct emitters *emitters, struct emitters *listed, cons
     return ok;
 }
 
-bool gpu_scene_update_emitters(struct gpu_scene *gpu, const struct scene *scene, const struct scene_motion *motion,
-                               struct error *error)
+bool gpu_scene_make_emitters(struct gpu_scene *gpu, struct error *error)
 {
-    const struct scene_pose *pose = motion ? &motion->poses[0] : NULL;
+    const struct scene *scene = gpu->scene;
+    const struct scene_pose *pose = gpu->motion ? &gpu->motion->poses[0] : NULL;
     struct emitters *emitters = &gpu->state->emitters, listed;
     const bool had = emitters->leaf_count > 0;
     bool changed;

@@ -130,9 +130,8 @@ static bool update_parts(struct gpu_scene *gpu, const struct scene *scene, const
         return false;
     if ((geometry || nodes) && !gpu_scene_upload_instances(gpu, scene, motion, changes, error))
         return false;
-    if ((geometry || nodes || shading || (changes->bits & (CHANGED_GEOMETRY | CHANGED_DEFORMED))) &&
-        !gpu_scene_update_emitters(gpu, scene, motion, error))
-        return false;
+    gpu->state->stale_emitters |=
+        geometry || nodes || shading || (changes->bits & (CHANGED_GEOMETRY | CHANGED_DEFORMED));
     if (!gpu_scene_upload_tables(gpu, changes, error))
         return false;
     /* The bounds are of geometry, instances and lights together; lights see to them last. */
@@ -266,6 +265,26 @@ bool gpu_scene_update(struct gpu_scene *gpu, const struct scene *scene, const st
     gpu->instances_revision = scene->instances_revision;
     gpu->shading_revision = scene->shading_revision;
     gpu->lights_revision = scene->lights_revision;
+    stage_times_add(times, STAGE_UPLOAD, CLOCK_CPU, 0, start_ns, clock_now_ns() - start_ns);
+    return true;
+}
+
+bool gpu_scene_emitters_are_current(const struct gpu_scene *gpu)
+{
+    return gpu->state && !gpu->state->stale_emitters;
+}
+
+bool gpu_scene_update_emitters(struct gpu_scene *gpu, struct scene_changes *changes, struct stage_times *times,
+                               struct error *error)
+{
+    uint64_t start_ns = clock_now_ns();
+    if (gpu_scene_emitters_are_current(gpu))
+        return true;
+    if (!gpu_scene_make_emitters(gpu, error) || !gpu_scene_upload_tables(gpu, changes, error)) {
+        gpu_scene_finish(gpu);
+        return false;
+    }
+    gpu->state->stale_emitters = false;
     stage_times_add(times, STAGE_UPLOAD, CLOCK_CPU, 0, start_ns, clock_now_ns() - start_ns);
     return true;
 }

@@ -108,6 +108,13 @@ void gpu_scene_finish(struct gpu_scene *gpu);
  * next update makes it again. */
 bool gpu_scene_update(struct gpu_scene *gpu, const struct scene *scene, const struct scene_motion *motion,
                       struct scene_changes *changes, struct stage_times *times, struct error *error);
+/* After an update, for integrators that ask emissive triangles for light: `has_emitters`, `has_lamps` and their
+ * tables become what the update has brought. Of many such triangles the tree takes a while, which others do
+ * without. Fails like gpu_scene_update(). */
+bool gpu_scene_update_emitters(struct gpu_scene *gpu, struct scene_changes *changes, struct stage_times *times,
+                               struct error *error);
+/* Whether it would change nothing. */
+bool gpu_scene_emitters_are_current(const struct gpu_scene *gpu);
 /* Brings what is large of the scene to the device, until about `end_ns` of the clock: triangles, vertices,
  * textures. *done: all is there, and the update will not take long for it. An update without it does all at once.
  * Between two steps the scene must not change, and nobody may use the copy. Fails like gpu_scene_update();

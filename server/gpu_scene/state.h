@@ -45,6 +45,7 @@ struct gpu_scene_state {
     uint32_t close_vertex;              /* where the deforming geometries' vertices as the shutter closes begin */
     struct gpu_scene_deform deform;
     struct emitters emitters;
+    bool stale_emitters;  /* something changed that they follow from */
     unsigned posed_parts; /* POSED_*, by the last update: without poses they are elsewhere again */
     bool any_update;      /* false: nothing is there yet */
     /* What gpu_scene_bring() is at, and what it has changed since the last update. */
@@ -92,8 +93,7 @@ bool gpu_scene_pack_discs(struct gpu_scene *gpu, const struct scene *scene, stru
 /* Of the instances; empty (lower above upper) if there are none. */
 void gpu_scene_all_instance_bounds(const struct gpu_scene *gpu, float lower[3], float upper[3]);
 /* emitter.c. As the shutter opens; after the instances. */
-bool gpu_scene_update_emitters(struct gpu_scene *gpu, const struct scene *scene, const struct scene_motion *motion,
-                               struct error *error);
+bool gpu_scene_make_emitters(struct gpu_scene *gpu, struct error *error);
 /* tables.c. What differs from the mirror, where they are stale. */
 bool gpu_scene_upload_tables(struct gpu_scene *gpu, struct scene_changes *changes, struct error *error);
 /* light.c. As the shutter opens; the bounds too. */

@@ -71,7 +71,10 @@ bool frame_may_begin(const struct frame_renderer *renderer, const struct scene *
     for (size_t i = 0; i < 2; i++)
         if (wanted[i] && !(wanted[i]->depends_on & CHANGED_VIEW))
             impls[count++] = wanted[i];
-    return gpu_scene_is_current(&renderer->shared->copy, scene, motion) &&
+    const struct gpu_scene *copy = &renderer->shared->copy;
+    const struct integrator *integrator = integrator_by_number(request->integrator);
+    const bool lit = integrator && integrator->lit_by_surfaces;
+    return gpu_scene_is_current(copy, scene, motion) && (!lit || gpu_scene_emitters_are_current(copy)) &&
            tracer_set_are_free(&renderer->shared->tracers, impls, count, &request->tracer_options);
 }
 
@@ -89,7 +92,9 @@ static bool update_scene(struct frame_renderer *renderer, const struct scene *sc
     struct frame_scene *shared = renderer->shared;
     struct scene_changes changes = {0};
     uint64_t revision_before = shared->copy.revision;
-    bool updated = gpu_scene_update(&shared->copy, scene, motion, &changes, &context->times, error);
+    bool updated = gpu_scene_update(&shared->copy, scene, motion, &changes, &context->times, error) &&
+                   (!renderer->work->passes.integrator->lit_by_surfaces ||
+                    gpu_scene_update_emitters(&shared->copy, &changes, &context->times, error));
     change_history_note(&shared->changes, updated ? changes.bits : CHANGED_SCENE);
     note_showing(shared, revision_before, &changes);
     if (!updated)

@@ -340,8 +340,10 @@ bool hub_init(struct hub *hub, struct loop *loop, const struct hub_options *opti
     }
     hub->engine_watch =
         loop_watch_add(loop, options->engine.event_fd(options->engine.context), EPOLLIN, on_engine, hub, error);
-    if (hub->engine_watch)
+    if (hub->engine_watch) {
+        hub->hasher = hasher_create();
         return true;
+    }
 fail:
     auth_keys_unref(hub->options.keys);
     blob_store_destroy(hub->blobs);
@@ -369,6 +371,7 @@ void hub_finish(struct hub *hub)
         free(value);
     hashmap_finish(&hub->departed);
     owners_finish(&hub->owners);
+    hasher_destroy(hub->hasher);
     blob_store_destroy(hub->blobs);
     hashmap_finish(&hub->sessions);
     auth_keys_unref(hub->options.keys);

@@ -11,6 +11,7 @@
 #include "net/readers.h"
 #include "session/blob_store.h"
 #include "session/engine_port.h"
+#include "session/hasher.h"
 #include "session/limits.h"
 #include "session/owners.h"
 
@@ -38,6 +39,7 @@ struct hub {
     struct loop *loop;
     struct hub_options options;
     struct blob_store *blobs;
+    struct hasher *hasher;   /* NULL: the network thread hashes itself */
     struct hashmap sessions; /* struct session *, by number */
     struct owners owners;
     struct owner *itself; /* of commands that no client has asked for */

@@ -129,11 +129,13 @@ void upload_abandon(struct session *session, struct offer *offer)
 {
     if (!offer->arriving)
         return;
+    hasher_await(session->hub->hasher, &offer->hashes_left);
     blob_store_release(session->hub->blobs, offer->arrived_bytes);
     blob_unref(offer->arriving);
     free(offer->chunk_hashes);
     offer->arriving = NULL;
     offer->chunk_hashes = NULL;
+    offer->chunk_hashes_max = 0;
     offer->arrived_bytes = 0;
 }
 
@@ -170,26 +172,50 @@ static bool begin_blob(struct session *session, struct offer *offer, struct erro
                                         offer->size_bytes);
 }
 
-static bool hash_arrived(struct offer *offer, uint64_t before_bytes, struct error *error)
+static bool reserve_hashes(const struct session *session, struct offer *offer, uint64_t count)
 {
+    if (count <= offer->chunk_hashes_max)
+        return true;
+    const uint64_t max = count > 2 * offer->chunk_hashes_max ? count : 2 * offer->chunk_hashes_max;
+    hasher_await(session->hub->hasher, &offer->hashes_left);
+    uint8_t *hashes = realloc(offer->chunk_hashes, (size_t)max * BLOB_HASH_BYTES);
+    if (!hashes)
+        return false;
+    offer->chunk_hashes = hashes;
+    offer->chunk_hashes_max = (size_t)max;
+    return true;
+}
+
+static bool hash_arrived(const struct session *session, struct offer *offer, uint64_t before_bytes,
+                         struct error *error)
+{
+    struct hasher *hasher = session->hub->hasher;
     uint64_t first = before_bytes / BLOB_CHUNK_BYTES, end = offer->arrived_bytes / BLOB_CHUNK_BYTES;
     bool complete = offer->arrived_bytes == offer->size_bytes;
     if (complete && offer->arrived_bytes % BLOB_CHUNK_BYTES)
         end++;
     if (first == end)
         return true;
-    uint8_t *hashes = realloc(offer->chunk_hashes, (size_t)end * BLOB_HASH_BYTES);
-    if (!hashes)
+    if (!reserve_hashes(session, offer, end))
         return error_set(error, ERROR_OUT_OF_MEMORY, "blob_data", "no memory");
-    offer->chunk_hashes = hashes;
     for (uint64_t chunk = first; chunk < end; chunk++) {
         uint64_t start_bytes = chunk * BLOB_CHUNK_BYTES;
-        blob_hash_chunk(hashes + chunk * BLOB_HASH_BYTES, offer->arriving->data + start_bytes,
-                        blob_chunk_bytes(offer->arrived_bytes, start_bytes));
+        hasher_add(hasher, offer->chunk_hashes + chunk * BLOB_HASH_BYTES, offer->arriving->data + start_bytes,
+                   blob_chunk_bytes(offer->arrived_bytes, start_bytes), &offer->hashes_left);
     }
-    if (complete)
-        blob_hash_chunks(offer->arriving->hash, hashes, (size_t)end);
+    if (!complete)
+        return true;
+    hasher_await(hasher, &offer->hashes_left);
+    blob_hash_chunks(offer->arriving->hash, offer->chunk_hashes, (size_t)end);
     return true;
+}
+
+/* Room for so many bytes. Where what has arrived must move, its hashes are awaited. */
+static bool reserve_bytes(const struct session *session, struct offer *offer, size_t needed_bytes)
+{
+    if (needed_bytes > offer->arriving->capacity_bytes)
+        hasher_await(session->hub->hasher, &offer->hashes_left);
+    return blob_reserve(offer->arriving, needed_bytes);
 }
 
 static bool add_piece(struct session *session, struct offer *offer, const struct message_blob_data *data,
@@ -206,14 +232,14 @@ static bool add_piece(struct session *session, struct offer *offer, const struct
     if (!blob_store_reserve(session->hub->blobs, data->data_bytes, error))
         return false;
     uint64_t before_bytes = offer->arrived_bytes;
-    if (!blob_reserve(offer->arriving, (size_t)(before_bytes + data->data_bytes))) {
+    if (!reserve_bytes(session, offer, (size_t)(before_bytes + data->data_bytes))) {
         blob_store_release(session->hub->blobs, data->data_bytes);
         return error_set(error, ERROR_OUT_OF_MEMORY, "blob_data", "no memory for %" PRIu64 " bytes",
                          before_bytes + data->data_bytes);
     }
     memcpy(offer->arriving->data + before_bytes, data->data, data->data_bytes);
     offer->arrived_bytes += data->data_bytes;
-    return hash_arrived(offer, before_bytes, error);
+    return hash_arrived(session, offer, before_bytes, error);
 }
 
 /* All chunks have arrived: verifies the hash. */

@@ -22,7 +22,9 @@ struct offer {
     struct blob *held;     /* complete and checked */
     struct blob *arriving; /* while its chunks arrive */
     uint64_t arrived_bytes;
-    uint8_t *chunk_hashes; /* of the complete chunks that have arrived */
+    uint8_t *chunk_hashes;   /* of the complete chunks that have arrived */
+    size_t chunk_hashes_max; /* for which there is room */
+    uint32_t hashes_left;    /* of these, not known yet: the hasher's */
 };
 
 void upload_begin(struct session *session); /* tells the first credit */

@@ -4,10 +4,9 @@
  * wave, before its first step. */
 #include "trace/bvh/tracer.h"
 
-#include "gpu/program.h"
-#include "shared/bindings.h"
+#include "shared/ray.h"
 
-#include <epoxy/gl.h>
+#include <math.h>
 
 /* The packet size on software GL where packets pay. On hardware a SIMD group traverses together already, and
  * several rays per invocation cost registers; not measured there. */
@@ -34,33 +33,88 @@ float bvh_packet_reach(const struct gpu_scene *scene, const struct wave *wave)
     return wave->origin_spread > reach && !scene->has_motion ? wave->origin_spread : reach;
 }
 
-static const struct gpu_program_source coherence_source = {.compute = "bvh/coherence.comp"};
+/* ---- the coherence of a wave: what form_packet() of bvh/packet.glsl says, but of rays that stay close ---- */
 
-/* Of a sample of the wave: live rays, and the traversals that they would need. */
+#define PACKET_SQUARED_COSINE 0.998f /* as there */
+
+struct closeness {
+    float reach_squared; /* of the origins' distance */
+    float centre[3];     /* of the scene */
+    float width;         /* maximum distance at the scene's centre; 0: any */
+};
+
+static float dot3(const float a[3], const float b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+static float distance3(const float a[3], const float b[3])
+{
+    const float apart[3] = {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+    return sqrtf(dot3(apart, apart));
+}
+
+static bool same_octant(const float a[3], const float b[3])
+{
+    return (a[0] < 0.0f) == (b[0] < 0.0f) && (a[1] < 0.0f) == (b[1] < 0.0f) && (a[2] < 0.0f) == (b[2] < 0.0f);
+}
+
+static bool would_share(const struct closeness *closeness, const struct ray *a, const struct ray *b)
+{
+    const float *direction_a = a->direction_t_max, *direction_b = b->direction_t_max;
+    const float *origin_a = a->origin_t_min, *origin_b = b->origin_t_min;
+    const float cosine = dot3(direction_a, direction_b), squares_a = dot3(direction_a, direction_a);
+    const float squares_b = dot3(direction_b, direction_b), apart = distance3(origin_a, origin_b);
+    if (!same_octant(direction_a, direction_b) ||
+        !(cosine * cosine >= PACKET_SQUARED_COSINE * squares_a * squares_b) ||
+        !(apart * apart <= closeness->reach_squared))
+        return false;
+    const float far = distance3(closeness->centre, origin_a), length_a = sqrtf(squares_a),
+                length_b = sqrtf(squares_b);
+    float unit_a[3], unit_b[3];
+    for (int k = 0; k < 3; k++) {
+        unit_a[k] = direction_a[k] / length_a;
+        unit_b[k] = direction_b[k] / length_b;
+    }
+    return closeness->width == 0.0f || apart + far * distance3(unit_a, unit_b) <= closeness->width;
+}
+
+/* Adds the live rays of a group, and the packets that would be best for them. */
+static void count_group(const struct closeness *closeness, const struct ray *rays, uint32_t counts[2])
+{
+    bool waits[PACKET_RAYS_SOFTWARE];
+    for (uint32_t k = 0; k < PACKET_RAYS_SOFTWARE; k++) {
+        waits[k] = rays[k].direction_t_max[3] > rays[k].origin_t_min[3];
+        counts[0] += waits[k];
+    }
+    for (uint32_t leading = 0; leading < PACKET_RAYS_SOFTWARE; leading++) {
+        if (!waits[leading])
+            continue;
+        counts[1]++;
+        for (uint32_t k = leading + 1; k < PACKET_RAYS_SOFTWARE; k++)
+            waits[k] = waits[k] && !would_share(closeness, &rays[leading], &rays[k]);
+    }
+}
+
+/* Of a sample of the wave: live rays, and the traversals that they would need. On the host, whose memory software
+ * GL's buffers are: a program of its own took 45 ms to compile. */
 static bool measure_coherence(struct bvh *bvh, const struct gpu_scene *scene, const struct wave *wave,
                               uint32_t counts[2], struct error *error)
 {
-    struct gpu_device *device = scene->device;
-    const struct gpu_program *program = gpu_program_get(device, &coherence_source, error);
-    if (!program)
-        return false;
-    uint32_t groups = wave->ray_count / PACKET_RAYS_SOFTWARE;
-    uint32_t step = groups > COHERENCE_GROUPS ? groups / COHERENCE_GROUPS : 1;
-    gpu_buffer_clear(device, &bvh->coherence, 0);
-    gpu_buffer_bind_storage(&bvh->coherence, BIND_TRACER_0);
-    gpu_buffer_bind_texels(device, wave->rays, UNIT_RAYS, GL_RGBA32F);
-    gpu_uniform_uint(program, "group_count", groups / step);
-    gpu_uniform_uint(program, "group_stride", step * PACKET_RAYS_SOFTWARE);
-    gpu_uniform_uint(program, "group_rays", PACKET_RAYS_SOFTWARE);
-    gpu_uniform_float(program, "bvh_packet_reach", bvh_packet_reach(scene, wave));
-    float centre[3];
+    const float leaves = wave->kind == WAVE_ANY ? PACKET_WIDTH_ANY : PACKET_WIDTH_CLOSEST;
+    const float reach = bvh_packet_reach(scene, wave);
+    struct closeness closeness = {.reach_squared = reach * reach, .width = leaves * bvh->tree.leaf_extent_world};
     for (int k = 0; k < 3; k++)
-        centre[k] = 0.5f * scene->lower_world[k] + 0.5f * scene->upper_world[k];
-    gpu_uniform_vec(program, "scene_centre", 3, centre);
-    float leaves = wave->kind == WAVE_ANY ? PACKET_WIDTH_ANY : PACKET_WIDTH_CLOSEST;
-    gpu_uniform_float(program, "packet_width", leaves * bvh->tree.leaf_extent_world);
-    gpu_dispatch(device, program, groups / step);
-    gpu_buffer_read(device, &bvh->coherence, 0, counts, BVH_COHERENCE_BYTES);
+        closeness.centre[k] = 0.5f * scene->lower_world[k] + 0.5f * scene->upper_world[k];
+    const uint32_t groups = wave->ray_count / PACKET_RAYS_SOFTWARE;
+    const uint32_t step = groups > COHERENCE_GROUPS ? groups / COHERENCE_GROUPS : 1;
+    const struct ray *rays = gpu_buffer_open(scene->device, wave->rays, error);
+    if (!rays)
+        return false;
+    counts[0] = counts[1] = 0;
+    for (uint32_t group = 0; group < groups / step; group++)
+        count_group(&closeness, rays + (size_t)group * step * PACKET_RAYS_SOFTWARE, counts);
+    gpu_buffer_unmap(scene->device, wave->rays);
     return true;
 }
 
@@ -69,8 +123,6 @@ uint32_t bvh_packet_rays_expected(struct bvh *bvh, const struct wave *wave, bool
     const struct tracer_options *options = &bvh->base.options;
     const bool measured = bvh->base.device->facts.software && wave->ray_count >= COHERENCE_RAYS_MIN &&
                           options->bench.bvh_layout != BVH_LAYOUT_PLAIN && options->bvh.rays == 0;
-    if (measured)
-        (void)gpu_program_get(bvh->base.device, &coherence_source, NULL);
     if (measured)
         return coherent ? 0 : 1;
     return options->bvh.rays ? options->bvh.rays : 1;

@@ -44,14 +44,12 @@ static struct tracer *bvh_create(struct gpu_device *device, const struct tracer_
 
 static void fill_bytes(struct bvh *bvh)
 {
-    bvh->base.stats.device_bytes = scene_tree_bytes(&bvh->tree) + bvh->coherence.capacity_bytes;
+    bvh->base.stats.device_bytes = scene_tree_bytes(&bvh->tree);
 }
 
 static void bvh_reset(struct bvh *bvh)
 {
-    struct gpu_device *device = bvh->tree.store.device;
     scene_tree_finish(&bvh->tree);
-    gpu_buffer_finish(device, &bvh->coherence);
     fill_bytes(bvh);
 }
 
@@ -67,9 +65,6 @@ static enum tracer_progress bvh_update(struct tracer *tracer, struct gpu_scene *
 {
     struct bvh *bvh = (struct bvh *)tracer;
     enum tracer_progress progress = scene_tree_update(&bvh->tree, scene, update, tracer->step_end_ns, error);
-    if (progress == TRACER_DONE &&
-        !gpu_buffer_reserve(tracer->device, &bvh->coherence, BVH_COHERENCE_BYTES, error))
-        progress = TRACER_FAILED;
     if (progress == TRACER_FAILED)
         bvh_reset(bvh);
     fill_bytes(bvh);

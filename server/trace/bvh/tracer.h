@@ -7,12 +7,9 @@
 #include "trace/tracer.h"
 #include "trace/tree/tree.h"
 
-#define BVH_COHERENCE_BYTES (2 * sizeof(uint32_t))
-
 struct bvh {
     struct tracer base;
     struct scene_tree tree;
-    struct gpu_buffer coherence; /* what bvh/coherence.comp counts; there from the build on */
 };
 
 /* Of one wave. */
@@ -30,8 +27,7 @@ struct bvh_state {
  * rays meet again in the plane of focus. */
 float bvh_packet_reach(const struct gpu_scene *scene, const struct wave *wave);
 
-/* What bvh_packet_rays() will find of such a wave; 0: that is not known, as it can be coherent. Announces the
- * program that measures it. */
+/* What bvh_packet_rays() will find of such a wave; 0: that is not known, as it can be coherent. */
 uint32_t bvh_packet_rays_expected(struct bvh *bvh, const struct wave *wave, bool coherent);
 /* The packet size for the wave: that of the options, else the faster one for the wave's coherence, which is
  * measured on a sample. 0: failed. */

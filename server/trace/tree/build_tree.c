@@ -26,6 +26,7 @@ struct work {
     struct bvh_box *boxes; /* gone when the primitives are there */
     struct bvh_binary binary;
     struct bvh_baked baked;
+    bool is_baked;
     float (*spheres)[4]; /* per place of the binary tree: centre, radius; NULL with boxes */
 };
 
@@ -308,6 +309,18 @@ static bool alloc_primitives(struct work *work)
     return work->boxes != NULL;
 }
 
+/* To bake is mostly one thread's work, beside which another writes the primitives. */
+static void bake_or_write(void *context, uint32_t part)
+{
+    struct work *work = context;
+    const uint32_t chunks = chunk_count(work->shape->primitive_count);
+    if (part == 0)
+        work->is_baked =
+            bvh_bake(&work->baked, &work->binary, work->binary.areas, bvh_octants(work->settings), work->threads);
+    for (uint32_t chunk = 0; part == 1 && chunk < chunks; chunk++)
+        chunk_primitives(work, chunk);
+}
+
 static bool build(struct work *work)
 {
     struct bvh_tree *tree = work->tree;
@@ -321,10 +334,10 @@ static bool build(struct work *work)
         return false;
     if (work->settings->bounds == BVH_BOUNDS_SPHERE && !make_spheres(work))
         return false;
-    if (is_stopped(work) ||
-        !bvh_bake(&work->baked, &work->binary, work->binary.areas, bvh_octants(work->settings), threads))
-        return false;
     if (is_stopped(work))
+        return false;
+    parallel_run(threads, 2, bake_or_write, work);
+    if (!work->is_baked || is_stopped(work))
         return false;
     memcpy(tree->lower, work->binary.nodes[0].lower, sizeof(tree->lower));
     memcpy(tree->upper, work->binary.nodes[0].upper, sizeof(tree->upper));
@@ -336,7 +349,6 @@ static bool build(struct work *work)
     if (!tree->elements)
         return false;
     parallel_run(threads, chunk_count(tree->element_count), chunk_elements, work);
-    parallel_run(threads, chunk_count(count), chunk_primitives, work);
     if (is_stopped(work))
         return false;
     if (work->shape->deforms && !work->settings->plain)

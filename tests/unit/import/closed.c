@@ -44,7 +44,7 @@ static void add_cube(struct mesh *mesh, float x, float size)
 
 static bool closed(const struct mesh *mesh)
 {
-    return import_triangles_closed(mesh->positions[0], mesh->indices[0], mesh->triangle_count);
+    return import_triangles_closed(mesh->positions[0], mesh->vertex_count, mesh->indices[0], mesh->triangle_count);
 }
 
 static void flip(struct mesh *mesh, uint32_t triangle)
@@ -226,10 +226,10 @@ TEST(a_million_triangles_are_looked_at)
         memcpy(*out++, (uint32_t[3]){a, a + 1, b}, sizeof(*out));
         memcpy(*out++, (uint32_t[3]){a + 1, b + 1, b}, sizeof(*out));
     }
-    assert_true(import_triangles_closed(positions[0], indices[0], triangle_count));
-    assert_false(import_triangles_closed(positions[0], indices[0], triangle_count - 1));
+    assert_true(import_triangles_closed(positions[0], EACH * EACH, indices[0], triangle_count));
+    assert_false(import_triangles_closed(positions[0], EACH * EACH, indices[0], triangle_count - 1));
     memcpy(indices[1234], indices[77777], sizeof(*indices));
-    assert_false(import_triangles_closed(positions[0], indices[0], triangle_count));
+    assert_false(import_triangles_closed(positions[0], EACH * EACH, indices[0], triangle_count));
     free(positions);
     free(indices);
 }
