@@ -250,7 +250,7 @@ static bool render_passes(struct session *session, struct fl_error *error)
     const uint32_t total = job->endless ? UINT32_MAX : options.samples;
     const struct fl_frame_run still = {.step = 1};
     uint64_t pass_ns = 0;
-    options.accumulate = true;
+    options.accumulate = PROTOCOL_ACCUMULATION_ON;
     for (uint32_t held = 0; held < total; held += options.samples) {
         const uint64_t begin_ns = monotonic_now_ns();
         options.samples = pass_samples(job, held, total, options.samples, pass_ns);

@@ -132,7 +132,7 @@ static void fill_reference(const struct viewer *viewer, struct message_render *j
     job->integrator = viewer->settings.integrator;
     job->tone_map = viewer->settings.tone_map;
     job->exposure_stops += (float)viewer->settings.exposure_thirds / 3;
-    job->accumulate = true; /* with the random numbers of a view */
+    job->accumulate = PROTOCOL_ACCUMULATION_ON; /* with the random numbers of a view */
     viewer_use_eyes(viewer, job);
     job->view_source = PROTOCOL_VIEW_SOURCE_RAYS; /* what layers lack is an error, too */
     job->encoding = session_is_local(viewer->session) ? PROTOCOL_ENCODING_RAW : PROTOCOL_ENCODING_PREDICTED;

@@ -99,6 +99,7 @@ static bool make_alone(struct shot *shot, const struct engine_job *job, const st
     shot->request.camera = view.camera;
     set_lens(&shot->request, &view, pose ? &pose->view : &nothing);
     set_source(&shot->request);
+    shot->request.starts_anew &= frame == job->first_frame;
     if (!shot->request.accumulate)
         shot->request.seed = shot_seed(job->frame.seed, frame);
     return true;

@@ -99,6 +99,7 @@ struct frame_request {
      * motion and request alike but for `samples` and what is done with the sum (format, tone map, exposure); it
      * adds its samples to those. n frames of k samples hold what one of n x k does, to the bit. */
     bool accumulate;
+    bool starts_anew; /* with `accumulate`: this frame does not go on; those after it may go on from this one */
     /* With `accumulate`: the limit of accumulated samples; of `samples` only those up to it are added. 0: no
      * limit. */
     uint32_t samples_max;

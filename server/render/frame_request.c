@@ -289,7 +289,7 @@ bool frame_request_goes_on(const struct frame_request *request)
 
 bool frame_request_adds_to(const struct frame_request *a, const struct frame_request *b)
 {
-    return a->accumulate && b->accumulate && a->width == b->width && a->height == b->height &&
+    return a->accumulate && b->accumulate && !b->starts_anew && a->width == b->width && a->height == b->height &&
            memcmp(&a->crop, &b->crop, sizeof(a->crop)) == 0 && same_views(a, b) &&
            frame_request_same_radiance(a, b) && a->aperture == b->aperture && a->focus == b->focus &&
            a->filter == b->filter && same_camera(&a->camera, &b->camera) &&

@@ -29,7 +29,8 @@ float frame_request_radiance_limit(const struct frame_request *request);
 bool frame_request_same_radiance(const struct frame_request *a, const struct frame_request *b);
 /* How many samples a pixel will have is not known beforehand. */
 bool frame_request_goes_on(const struct frame_request *request);
-/* Whether their samples may be added up: they are equal but for their number and the use of the sum. */
+/* Whether the samples of `b` may be added to those of `a`: they are equal but for their number and the use of the
+ * sum, and `b` does not start anew. */
 bool frame_request_adds_to(const struct frame_request *a, const struct frame_request *b);
 
 #endif

@@ -107,7 +107,7 @@ static bool check_upsample(const struct message_render *render, struct error *er
     if (!render->accumulate)
         return true;
     error_set(error, ERROR_UNSUPPORTED, "render.upsample", "such frames do not add to one another");
-    return error_remedy(error, "set accumulate to 0, or upsample to 1");
+    return error_remedy(error, "set accumulate to off, or upsample to 1");
 }
 
 static bool check_hidden(const struct message_render *render, struct error *error)
@@ -486,7 +486,8 @@ static void fill_rest(struct engine_job *job, const struct session *session, con
                 .wireframe = render->wireframe,
                 .layers = render->layers,
                 .attachments = render->attachments,
-                .accumulate = render->accumulate != 0,
+                .accumulate = render->accumulate != PROTOCOL_ACCUMULATION_OFF,
+                .starts_anew = !is_view && render->accumulate == PROTOCOL_ACCUMULATION_ANEW,
                 .compare = render->compare != 0,
                 .compare_with = render->compare_with,
                 .compare_far_share = render->compare_far,

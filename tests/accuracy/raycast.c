@@ -182,6 +182,18 @@ TEST(frames_of_few_samples_add_up_to_one_of_many)
     }
     assert_int_equal(parts.samples, 6);
     assert_memory_equal(whole.pixels, parts.pixels, whole.size_bytes);
+    fixture->request.samples = 6;
+    fixture->request.starts_anew = true;
+    for (int i = 0; i < 2; i++) {
+        frame_result_finish(&parts);
+        parts = fixture_render(fixture);
+        assert_int_equal(parts.samples, 6);
+        assert_memory_equal(whole.pixels, parts.pixels, whole.size_bytes);
+    }
+    fixture->request.starts_anew = false;
+    frame_result_finish(&parts);
+    parts = fixture_render(fixture);
+    assert_int_equal(parts.samples, 12);
     frame_result_finish(&whole);
     frame_result_finish(&parts);
 }

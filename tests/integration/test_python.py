@@ -346,6 +346,18 @@ class WithDaemon(OneDaemon):
         self.assertEqual(picture.albedo[..., 1].ravel().tolist(), list(channels["albedo.G"]))
         self.assertEqual(picture.normal[..., 2].ravel().tolist(), list(channels["normal.Z"]))
 
+    def test_a_job_that_starts_anew_makes_the_first_picture_again(self):
+        client = self.connect()
+        scene, _ = triangle()
+        scene.add_light("sphere", (9, 9, 9), farlight.look_at((0, 0, 2), (0, 0, 0)), size=(0.5, 0))  # with a soft shadow
+        wanted = {"width": 32, "height": 32, "samples": 4, "integrator": "path"}
+        first = client.render(scene, STRAIGHT, **wanted, accumulate="on")
+        again, more = client.frames(scene, STRAIGHT, **wanted, accumulate="anew", last_frame=1)
+        on = client.render(scene, STRAIGHT, **wanted, accumulate=1)
+        self.assertEqual([frame.begin.samples for frame in (first, again, more, on)], [4, 4, 8, 12])
+        self.assertEqual(bytes(again.data), bytes(first.data))
+        self.assertNotEqual(bytes(more.data), bytes(first.data))
+
     def test_arrays_are_seen_as_they_were_given(self):
         """An unlit quad that fills the right half of the picture, with a texture of two colours; its depth is 2 m."""
         scene = farlight.Scene()

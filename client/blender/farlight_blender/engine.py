@@ -10,7 +10,7 @@ import bpy
 import farlight
 import numpy as np
 from farlight.frame import Frame
-from farlight.messages import Background
+from farlight.messages import Accumulation, Background
 
 from . import cameras, motion, session, settings
 from .mirror import Mirror, forget_all, mirror, moment
@@ -32,14 +32,7 @@ def _steps(samples: int, most: int) -> tuple[int, int]:
     return count, -(-samples // count)
 
 
-def _anew(integrator: str, picture: int) -> dict[str, Any]:
-    """The daemon adds the samples of an accumulating job to those of the one before, if both show the same. Jobs that differ by a
-    field that their integrator does not look at start anew, so that F12 twice makes the same picture."""
-    count = 1 + picture % (1 << 20)
-    return {"layer_opacity": 1 / count} if integrator == "ao" else {"ao_distance": count}
-
-
-def _job(scene: bpy.types.Scene, view: cameras.Lens, moves: Optional[motion.Motion], picture: int) -> dict[str, Any]:
+def _job(scene: bpy.types.Scene, view: cameras.Lens, moves: Optional[motion.Motion]) -> dict[str, Any]:
     """Fields of render that F12 asks for."""
     chosen = scene.farlight
     most = chosen.step_samples
@@ -48,8 +41,8 @@ def _job(scene: bpy.types.Scene, view: cameras.Lens, moves: Optional[motion.Moti
     steps, samples = _steps(chosen.samples, most)
     background = Background.TRANSPARENT if scene.render.film_transparent else Background.ENVIRONMENT
     job = {**view.fields(may_crop=chosen.denoise == "off"), "integrator": chosen.integrator, "tracer": chosen.tracer,
-            "samples": samples, "last_frame": steps - 1, "accumulate": 1, "depth": chosen.depth, "clamp": chosen.clamp,
-            "denoise": chosen.denoise, "background": background, "seed": scene.frame_current, **_anew(chosen.integrator, picture)}
+            "samples": samples, "last_frame": steps - 1, "accumulate": Accumulation.ANEW, "depth": chosen.depth, "clamp": chosen.clamp,
+            "denoise": chosen.denoise, "background": background, "seed": scene.frame_current}
     if moves is None or not moves.has_any():
         return job
     if chosen.denoise == "auto" and steps * samples > FULLY_DENOISED:  # which the daemon does not know: it sees frames of few
@@ -189,9 +182,8 @@ class FarlightEngine(bpy.types.RenderEngine):  # type: ignore[misc]
             self.add_pass(ALBEDO, 3, "RGB", layer=layer)
         result = self.begin_result(0, 0, view.part_width, view.part_height, layer=layer)
         try:
-            self._show(result, daemon, image, node, view, _job(scene, view, moves, image.pictures))
+            self._show(result, daemon, image, node, view, _job(scene, view, moves))
         finally:
-            image.pictures += 1
             self.end_result(result)  # with what has come
 
     def _moves(self, depsgraph: bpy.types.Depsgraph, camera: bpy.types.Object) -> Optional[motion.Motion]:

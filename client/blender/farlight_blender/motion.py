@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Optional
 
 import bpy
 import numpy as np
-from farlight.messages import ChannelPath, ClipUse, Interpolation, ObjectKind, SetChannel, SetClip
+from farlight.messages import Accumulation, ChannelPath, ClipUse, Interpolation, ObjectKind, SetChannel, SetClip
 
 if TYPE_CHECKING:
     from .mirror import Mirror
@@ -133,4 +133,4 @@ class Motion:
         through each."""
         starts = {"things": 0.0, "watchers": -0.5 * CLIP_S / frames}
         clips = [ClipUse(clip, starts[whose], 1.0, 0) for whose, clip in self._clips.items()]
-        return {"clips": clips, "frames_per_second": frames / CLIP_S, "shutter": 1.0, "last_frame": frames - 1, "accumulate": 0}
+        return {"clips": clips, "frames_per_second": frames / CLIP_S, "shutter": 1.0, "last_frame": frames - 1, "accumulate": Accumulation.OFF}

@@ -59,6 +59,15 @@ class Background(Word):
     COLOUR = 2  # one colour, which no exposure and no tone map changes
 
 
+class Accumulation(Word):
+    """whether a frame of a batch adds its samples to those of the frame before it, which may be the last one of the
+    client's previous job with the scene"""
+
+    OFF = 0  # each frame begins with no samples
+    ON = 1  # one that shows the same (scene, clips, camera) adds its samples; a change starts over
+    ANEW = 2  # likewise, but the job's first frame begins with none: the same job, the same picture
+
+
 class Denoise(Word):
     """whether the noise of random choices is filtered out of the beauty: of the integrators distributed, path and ao,
     where it is rendered and not made from layers. Frames of a view that moves, and those at rest that do not have
@@ -1986,8 +1995,7 @@ class Render(Message):
         centre
     shutter: open time of the shutter, from the frame's time on, in frames: 0.5 is the film camera's 180 degrees; 0: no
         motion blur. Nodes and shapes move; camera, lights, materials and visibility are those of the frame's time
-    accumulate: 1: a frame that shows the same as the previous one (scene, clips, camera) adds its samples to it; a
-        change starts over. Views always do that, if one frame does not have all samples
+    accumulate: Views always add up, if one frame does not have all samples. Daemons of version 0.1.0 refuse `anew`
     ao_distance: ambient occlusion: maximum distance of an occluder, metres; 0: a tenth of the scene's diagonal
     ao_falloff: decrease of an occluder's weight with its distance, as a power of 1 - distance / ao_distance; 0: none
     ao_rays: ambient occlusion: for each sample
@@ -2136,7 +2144,7 @@ class Render(Message):
         _f.real("focus", 0.0, 1e12),
         _f.real("shutter", 0.0, 64.0),
         _f.choice("pixel_filter", PixelFilter),
-        _f.whole("accumulate", "I", 0, 1),
+        _f.choice("accumulate", Accumulation),
         _f.choice("brdf", Brdf),
         _f.real("ao_distance", 0.0, 1e12),
         _f.real("ao_falloff", 0.0, 64.0),
@@ -2249,7 +2257,7 @@ class Render(Message):
     focus: float = 0.0
     shutter: float = 0.0
     pixel_filter: PixelFilter | str = PixelFilter(0)
-    accumulate: int = 0
+    accumulate: Accumulation | str = Accumulation(0)
     brdf: Brdf | str = Brdf(0)
     ao_distance: float = 0.0
     ao_falloff: float = 0.0

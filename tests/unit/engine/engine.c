@@ -41,6 +41,31 @@ TEST(frames_come_in_order_with_what_they_cost)
     stop(engine);
 }
 
+static void expect_samples(struct engine *engine, uint32_t request, bool starts_anew, const uint32_t samples[3])
+{
+    struct engine_command *made = render(1, request, 5, 7);
+    made->job.frame.samples = 4;
+    made->job.frame.accumulate = true;
+    made->job.frame.starts_anew = starts_anew;
+    submit(engine, made);
+    for (uint32_t i = 0; i < 3; i++) {
+        struct engine_event *event = expect_frame(engine, 1, request, 5 + i);
+        assert_int_equal(event->frame->result.samples, samples[i]);
+        engine_event_destroy(event);
+    }
+    expect_done(engine, 1, request);
+}
+
+TEST(a_job_adds_to_the_samples_of_the_one_before_it_unless_it_starts_anew)
+{
+    struct engine *engine = start((struct engine_options){.encode_threads = 1});
+    open_scene(engine, 1, 1);
+    expect_samples(engine, 2, false, (const uint32_t[]){4, 8, 12});
+    expect_samples(engine, 3, false, (const uint32_t[]){16, 20, 24});
+    expect_samples(engine, 4, true, (const uint32_t[]){4, 8, 12});
+    stop(engine);
+}
+
 TEST(layers_are_encoded_as_one_picture)
 {
     struct engine *engine = start((struct engine_options){.encode_threads = 1});

@@ -172,7 +172,7 @@ SESSION_TEST(a_job_takes_its_clips_and_its_lens_along)
     message.render.shutter = 0.5f;
     message.render.pixel_filter = PROTOCOL_FILTER_TENT;
     message.render.settings.bvh.rays = 3;
-    message.render.accumulate = 1;
+    message.render.accumulate = PROTOCOL_ACCUMULATION_ON;
     send_message(2, 0, &message);
     expect(MESSAGE_FRAME_BEGIN, 2);
     const struct message_frame_begin *begin = &client.message.frame_begin;
@@ -194,6 +194,32 @@ SESSION_TEST(a_job_takes_its_clips_and_its_lens_along)
         send_unchecked(3 + i, &message);
         expect_error(3 + i, PROTOCOL_ERROR_INVALID);
         assert_string_equal(client.message.error.field, "render.bvh_rays");
+    }
+}
+
+SESSION_TEST(a_job_starts_anew_where_it_asks_for_it_and_a_view_never)
+{
+    static const struct {
+        enum protocol_accumulation wanted;
+        enum protocol_job_kind kind;
+        bool accumulates, starts_anew;
+    } cases[] = {
+        {PROTOCOL_ACCUMULATION_OFF, PROTOCOL_JOB_BATCH, false, false},
+        {PROTOCOL_ACCUMULATION_ON, PROTOCOL_JOB_BATCH, true, false},
+        {PROTOCOL_ACCUMULATION_ANEW, PROTOCOL_JOB_BATCH, true, true},
+        {PROTOCOL_ACCUMULATION_ANEW, PROTOCOL_JOB_VIEW, true, false},
+    };
+    open_scene(1, 1);
+    for (uint32_t i = 0; i < sizeof(cases) / sizeof(cases[0]); i++) {
+        struct message message = render_message(0, 1);
+        message.render.accumulate = cases[i].wanted;
+        message.render.kind = cases[i].kind;
+        send_message(2 + 2 * i, 2 + i, &message);
+        expect(MESSAGE_FRAME_BEGIN, 2 + 2 * i);
+        assert_int_equal(engine.job.frame.accumulate, cases[i].accumulates);
+        assert_int_equal(engine.job.frame.starts_anew, cases[i].starts_anew);
+        while (cases[i].kind == PROTOCOL_JOB_BATCH && receive()->type != MESSAGE_OK)
+            continue;
     }
 }
 
@@ -339,7 +365,7 @@ SESSION_TEST(views_that_cannot_be_are_refused_by_their_field)
          .source = PROTOCOL_VIEW_SOURCE_LAYERS,
          .accumulate = 1,
          .field = "render.upsample",
-         .remedy = "accumulate to 0",
+         .remedy = "accumulate to off",
          .code = PROTOCOL_ERROR_UNSUPPORTED},
         {.source = PROTOCOL_VIEW_SOURCE_LAYERS,
          .compare = 1,
