@@ -134,7 +134,7 @@ EXPORT_OBJ := $(call obj,$(EXPORT_C) $(EXPORT_CXX)) $(B)/helper.a
 VIDEO_OBJ := $(call obj,$(VIDEO_C) client/lib/rate.c protocol/pixels/ycbcr.c) $(B)/helper.a
 
 # The viewer takes the command line as render does; the gateway takes of it which daemon is meant.
-COMMAND_LINE_OBJ := $(call obj,$(addprefix client/cli/,daemon.c image_path.c interrupt.c job_complete.c job_fields.c job_options.c \
+COMMAND_LINE_OBJ := $(call obj,$(addprefix client/cli/,daemon.c edit_history.c image_path.c interrupt.c job_complete.c job_fields.c job_options.c \
     job_views.c key.c models.c parse.c retry.c talk.c \
     watch.c))
 VIEWER_OBJ := $(call obj,$(VIEWER_C)) $(COMMAND_LINE_OBJ)
@@ -320,8 +320,8 @@ $(B)/tests/unit/fault_tests: TEST_LIBS += $(SERVING_WRAP) -Wl,--wrap=malloc,--wr
 $(B)/tests/unit/corpus_tests: $(KEPT_OBJ) $(SERVING_OBJ) $(READERS_OBJ) $(REQUEST_OBJ)
 $(B)/tests/unit/corpus_tests: TEST_LIBS += $(SERVING_WRAP) $(READERS_LIBS) -lstdc++
 # What the daemon encodes is decoded by the library itself.
-$(B)/tests/unit/media_tests: $(patsubst %,$(B)/client/viewer/%.o,camera decode edit_history edit_rows heat hud hud_edit hud_mark hud_timeline input layer metrics outline paint panel pixmap plan recall replay settings tour views \
-  warped_key window) $(B)/client/cli/image_path.o
+$(B)/tests/unit/media_tests: $(patsubst %,$(B)/client/viewer/%.o,camera decode edit_rows heat hud hud_edit hud_mark hud_timeline input layer metrics outline paint panel pixmap plan recall replay settings tour views \
+  warped_key window) $(addprefix $(B)/client/cli/,edit_history.o image_path.o)
 $(B)/tests/unit/media_tests: TEST_LIBS += $(VIEWER_LIBS) -Wl,--wrap=libav_load
 $(B)/tests/unit/unit_tests: TEST_LIBS += $(call pkg_libs,libseccomp)
 $(B)/tests/unit/unit_tests: $(B)/client/helper/sandbox.o $(addprefix $(B)/client/import/,closed.o spline.o) $(addprefix $(B)/client/web/,address.o callers.o links.o queue.o) $(MODEL_OBJ) $(RIVAL_OBJ) $(if $(filter 1,$(EMBREE)),$(CONTEST_OBJ))

@@ -130,6 +130,8 @@ error_t cli_set_place(struct cli_job *job, const char *field, const char *value)
 bool cli_has_input(const struct cli_job *job); /* a model is standard input */
 /* Whether the files of models and environment can be read. */
 bool cli_check_models(const struct cli_job *job, struct fl_error *error);
+/* Whether --watch, if it is given, has files to watch. */
+bool cli_check_watch(struct cli_job *job);
 /* Reads standard input, if a model is that, into a file in memory. Interruptible; refused on a terminal. */
 bool cli_read_input(struct cli_job *job, struct fl_error *error);
 bool cli_open_input(int *input_fd, struct fl_error *error); /* the same without a job */
@@ -243,7 +245,7 @@ struct cli_job {
     size_t model_count;
     int input_fd;             /* of a model "-": its bytes, once cli_read_input() has them */
     const char *model_format; /* of it; NULL: by its first bytes */
-    bool watch;               /* of `render`: again and again, as its files change */
+    bool watch;               /* again and again, as its files change */
     const char *model, *server, *key_file, *link, *environment, *output, *camera, *keys_file, *trace_file;
     double environment_degrees, point_size; /* as of fl_load_options */
     const char *variant;                    /* likewise */
@@ -367,9 +369,14 @@ struct cli_loading {
 bool cli_loading_begin(struct cli_loading *loading, struct fl_error *error);
 /* Waits for the scene. */
 bool cli_loading_end(struct cli_loading *loading, struct fl_error *error);
+/* Whether the job's edits give values, and do not add to them or multiply them: they can be made again in a scene
+ * that has them. */
+bool cli_can_edit_again(const struct cli_job *job);
 /* Loads the files again over the same connection: the new scene takes the place of the old one, which stays where
  * that fails. What the daemon has already is not sent. */
 bool cli_loading_again(struct cli_loading *loading, struct fl_error *error);
+/* That `what` is new, and how much of it was sent; on standard error, unless the job is quiet. */
+void cli_loading_print_sent(const struct cli_loading *loading, const char *what);
 void cli_loading_close(struct cli_loading *loading);
 /* Sets the job's camera if the command line leaves it to the model. */
 /* A camera by name or number; without one the model's first, unless keys or something else place it. `framed`: the

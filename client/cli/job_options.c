@@ -102,7 +102,7 @@ static const struct argp_option special[] = {
      "Change the model, as in material.Steel.roughness=0.2 or hide=Roof; may be repeated ('farlight help edit')",
      CLI_GROUP_OUTPUT},
     {"point-size", KEY_POINT_SIZE, "METRES", 0,
-     "Show points without faces as spheres of this diameter (default: by their distances)", CLI_GROUP_OUTPUT},
+     "Show points as spheres, and lines as tubes, of this diameter (default: by their distances)", CLI_GROUP_OUTPUT},
     {"background", KEY_BACKGROUND, "NAME|#RRGGBB", 0,
      "Behind all surfaces: the environment (default), transparent, or a colour such as '#ffffff'",
      CLI_GROUP_OUTPUT},

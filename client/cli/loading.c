@@ -2,6 +2,7 @@
 /* Loads the command line's scene into a daemon. */
 #include "cli/cli.h"
 #include "protocol/common/clock.h"
+#include "protocol/plain_text.h"
 
 #include <stdio.h>
 #include <time.h>
@@ -38,6 +39,14 @@ static bool connect_to(struct cli_loading *loading, struct fl_error *error)
     return loading->connection != NULL;
 }
 
+bool cli_can_edit_again(const struct cli_job *job)
+{
+    for (size_t i = 0; i < job->edit_count; i++)
+        if (job->edits[i].way != FL_ASSIGN)
+            return false;
+    return true;
+}
+
 static void fill_options(struct cli_loading *loading)
 {
     const struct cli_job *job = loading->job;
@@ -55,8 +64,7 @@ static void fill_options(struct cli_loading *loading)
                                              .user = loading,
                                              .sharing = loading->sharing,
                                              .scene_name = loading->scene_name,
-                                             /* Edits that change values by factors would do so once more. */
-                                             .will_reload = job->watch && job->edit_count == 0};
+                                             .will_reload = job->watch && cli_can_edit_again(job)};
 }
 
 static bool start_import(struct cli_loading *loading, struct fl_error *error)
@@ -112,6 +120,17 @@ bool cli_loading_again(struct cli_loading *loading, struct fl_error *error)
         return false;
     loading->scene = scene;
     return apply_edits(loading->job, scene, error);
+}
+
+void cli_loading_print_sent(const struct cli_loading *loading, const char *what)
+{
+    const struct fl_import_stats *stats = fl_scene_import_stats(loading->scene);
+    if (loading->job->quiet)
+        return;
+    fputs("farlight: ", stderr);
+    plain_text_print(stderr, what);
+    fprintf(stderr, " is new; sent %.3f of %.3f MB\n", (double)stats->uploaded_bytes * 1e-6,
+            (double)stats->offered_bytes * 1e-6);
 }
 
 void cli_loading_close(struct cli_loading *loading)

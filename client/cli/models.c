@@ -95,6 +95,13 @@ bool cli_check_models(const struct cli_job *job, struct fl_error *error)
     return !job->environment || cli_check_input(job->environment, error);
 }
 
+bool cli_check_watch(struct cli_job *job)
+{
+    return !job->watch || (!job->scene && !cli_has_input(job)) ||
+           cli_usage(job, "--watch", "%s does not change as a file does",
+                     job->scene ? "a shared scene" : "standard input") == 0;
+}
+
 /* ---- standard input ---- */
 
 static bool write_all(int fd, const char *bytes, size_t count)

@@ -62,11 +62,8 @@ static error_t parse(int key, char *value, struct argp_state *state)
 /* Only files change, and only a file can be written again. */
 static bool complete_watch(struct cli_job *job)
 {
-    if (!job->watch)
-        return true;
-    if (job->scene || cli_has_input(job))
-        return cli_usage(job, "--watch", "%s does not change as a file does",
-                         job->scene ? "a shared scene" : "standard input") == 0;
+    if (!job->watch || !cli_check_watch(job))
+        return !job->watch;
     if (job->endless) {
         cli_usage(job, "--watch", "a picture that is refined without an end waits for nothing");
         return fl_error_remedy(&job->error, "say how far by --samples");

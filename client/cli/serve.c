@@ -18,6 +18,7 @@
 #define KEY_KEY 0x403
 #define KEY_VARIANT 0x405
 #define KEY_AT 0x406
+#define KEY_WATCH 0x407
 
 #define LISTENS_MAX 8
 #define DAEMON_WORDS_MAX 28 /* of fl_connect */
@@ -49,6 +50,7 @@ static const struct argp_option options[] = {
      "Place the MODEL named before: metres, degrees about x, then y, then z, and a factor; again: one more of it",
      0},
     {"variant", KEY_VARIANT, "NAME", 0, "Show the materials of this variant of a glTF model", 0},
+    {"watch", KEY_WATCH, NULL, 0, "Load the model again when it, or a file that it names, has changed", 0},
     {"quiet", 'q', NULL, 0, "Print no progress and no notes about the model", 0},
     {0}};
 
@@ -96,6 +98,9 @@ static error_t parse(int key, char *value, struct argp_state *state)
         return cli_set_place(job, "--at", value);
     case KEY_VARIANT:
         job->variant = value;
+        return 0;
+    case KEY_WATCH:
+        job->watch = true;
         return 0;
     case 'q':
         job->quiet = true;
@@ -145,6 +150,8 @@ static bool complete(struct serving *serving)
     struct cli_job *job = &serving->job;
     if (!job->model)
         return cli_usage(job, "MODEL", "a model file is needed") == 0;
+    if (!cli_check_watch(job))
+        return false;
     if (serving->name && serving->name[0] == '\0')
         return cli_usage(job, "--name", "the name is empty, but other clients need it to attach") == 0;
     if (!job->server)

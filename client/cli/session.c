@@ -385,18 +385,11 @@ static bool load_and_render(struct session *session, struct fl_error *error)
 
 /* ---- changed files ---- */
 
-/* Before they are read: what changes while that happens has changed. */
 static bool begin_watch(struct session *session, struct fl_error *error)
 {
     const struct cli_job *job = session->job;
-    if (!job->watch)
-        return true;
-    if (!cli_watch_begin(&session->watch, error))
-        return false;
-    for (size_t i = 0; i < job->model_count; i++)
-        if (!cli_watch_add(&session->watch, job->models[i].path, error))
-            return false;
-    return !job->environment || cli_watch_add(&session->watch, job->environment, error);
+    return !job->watch ||
+           cli_watch_begin_models(&session->watch, job->models, job->model_count, job->environment, error);
 }
 
 static bool render_again(struct session *session, struct fl_error *error)
@@ -408,17 +401,6 @@ static bool render_again(struct session *session, struct fl_error *error)
            finish_sinks(session, error);
 }
 
-static void print_sent(const struct session *session)
-{
-    const struct fl_import_stats *stats = fl_scene_import_stats(session->loading.scene);
-    if (session->job->quiet)
-        return;
-    fputs("farlight: ", stderr);
-    plain_text_print(stderr, session->job->outputs[0].path);
-    fprintf(stderr, " is new; sent %.3f of %.3f MB\n", (double)stats->uploaded_bytes * 1e-6,
-            (double)stats->offered_bytes * 1e-6);
-}
-
 /* Until it is interrupted, which is its end. A model that cannot be read is reported, and its last picture stays.
  */
 static bool follow(struct session *session, struct fl_error *error)
@@ -428,7 +410,7 @@ static bool follow(struct session *session, struct fl_error *error)
     while (cli_watch_wait(&session->watch, session->loading.connection, error)) {
         if (render_again(session, error)) {
             cli_progress_clear(&session->progress);
-            print_sent(session);
+            cli_loading_print_sent(&session->loading, session->job->outputs[0].path);
             continue;
         }
         if (error->code == FL_ERROR_INTERRUPTED || session->sink_failed ||

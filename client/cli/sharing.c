@@ -41,10 +41,35 @@ void cli_socket_remove(const struct cli_socket *chosen)
 
 /* ---- serving ---- */
 
-/* Serves until it is interrupted, which is success, or the daemon is lost. */
-static bool stay(struct fl_connection *connection, struct fl_error *error)
+static bool watch_scene(struct cli_sharing *sharing, struct fl_error *error)
 {
-    while (fl_connection_wait(connection, WAIT_MS, error))
+    return !sharing->job->watch || cli_watch_scene(&sharing->watch, sharing->loading.scene, error);
+}
+
+/* Waits until files have changed, and reads them. Those that cannot be read are reported: the scene stays. */
+static bool follow(struct cli_sharing *sharing, struct fl_error *error)
+{
+    struct cli_loading *loading = &sharing->loading;
+    if (!cli_watch_wait(&sharing->watch, loading->connection, error))
+        return false;
+    const bool is_read = cli_loading_again(loading, error);
+    cli_progress_clear(&sharing->progress);
+    if (is_read) {
+        cli_loading_print_sent(loading, sharing->job->model);
+        return watch_scene(sharing, error);
+    }
+    if (error->code == FL_ERROR_INTERRUPTED || cli_is_temporary(error))
+        return false;
+    cli_report(error);
+    *error = (struct fl_error){0};
+    return true;
+}
+
+/* Serves until it is interrupted, which is success, or the daemon is lost. */
+static bool stay(struct cli_sharing *sharing, struct fl_error *error)
+{
+    while (sharing->job->watch ? follow(sharing, error)
+                               : fl_connection_wait(sharing->loading.connection, WAIT_MS, error))
         continue;
     if (error->code != FL_ERROR_INTERRUPTED)
         return false;
@@ -90,7 +115,7 @@ static bool recover(struct cli_sharing *sharing, struct fl_error *error)
             fprintf(stderr, "farlight: trying again in %.1f s\n", pause_ms * 1e-3);
         if (!cli_retry_wait(pause_ms, error))
             return false;
-        if (!come_back(sharing, error))
+        if (!come_back(sharing, error) || !watch_scene(sharing, error))
             continue;
         cli_progress_clear(&sharing->progress);
         if (!job->quiet)
@@ -107,14 +132,18 @@ bool cli_sharing_begin(struct cli_sharing *sharing, struct fl_error *error)
     loading->progress = &sharing->progress;
     loading->sharing = PROTOCOL_SHARING_SHARED;
     cli_progress_begin(&sharing->progress, sharing->job);
-    const bool is_up = cli_loading_begin(loading, error) && cli_loading_end(loading, error);
+    const struct cli_job *job = sharing->job;
+    const bool is_up =
+        (!job->watch ||
+         cli_watch_begin_models(&sharing->watch, job->models, job->model_count, job->environment, error)) &&
+        cli_loading_begin(loading, error) && cli_loading_end(loading, error) && watch_scene(sharing, error);
     cli_progress_end(&sharing->progress, is_up);
     return is_up;
 }
 
 bool cli_sharing_stay(struct cli_sharing *sharing, struct fl_error *error)
 {
-    while (!stay(sharing->loading.connection, error))
+    while (!stay(sharing, error))
         if (!recover(sharing, error))
             break;
     if (error->code == FL_ERROR_INTERRUPTED)
@@ -127,4 +156,5 @@ void cli_sharing_end(struct cli_sharing *sharing)
     if (sharing->loading.connection)
         fl_connection_set_interrupt(sharing->loading.connection, 0); /* it is still told in order */
     cli_loading_close(&sharing->loading);
+    cli_watch_end(&sharing->watch);
 }

@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 /* A scene that is up for other clients: on a daemon of its own, which ends with the command, or on a running one.
- * A lost daemon is waited for, and gets the scene again. */
+ * A lost daemon is waited for, and gets the scene again. With the job's `watch` the scene follows its files. */
 #ifndef FARLIGHT_CLIENT_CLI_SHARING_H
 #define FARLIGHT_CLIENT_CLI_SHARING_H
 
 #include "cli/cli.h"
+#include "cli/watch.h"
 
 /* A Unix socket for a daemon of one's own, in $XDG_RUNTIME_DIR or a new folder that only its owner can enter. */
 struct cli_socket {
@@ -23,6 +24,7 @@ struct cli_sharing {
     bool restarts;
     struct cli_progress progress;
     struct cli_loading loading;
+    struct cli_watch watch;
 };
 /* Loads the scene. */
 bool cli_sharing_begin(struct cli_sharing *sharing, struct fl_error *error);

@@ -69,6 +69,15 @@ bool cli_watch_add(struct cli_watch *watch, const char *path, struct fl_error *e
     return true;
 }
 
+bool cli_watch_begin_models(struct cli_watch *watch, const struct fl_model *models, size_t count,
+                            const char *environment, struct fl_error *error)
+{
+    bool is_good = cli_watch_begin(watch, error) && (!environment || cli_watch_add(watch, environment, error));
+    for (size_t i = 0; is_good && i < count; i++)
+        is_good = cli_watch_add(watch, models[i].path, error);
+    return is_good;
+}
+
 bool cli_watch_scene(struct cli_watch *watch, const struct fl_scene *scene, struct fl_error *error)
 {
     const char *path = NULL;

@@ -25,6 +25,10 @@ struct cli_watch {
 };
 
 bool cli_watch_begin(struct cli_watch *watch, struct fl_error *error);
+/* Begins with models, and an environment (NULL: none), before they are read: what changes while that happens has
+ * changed. */
+bool cli_watch_begin_models(struct cli_watch *watch, const struct fl_model *models, size_t count,
+                            const char *environment, struct fl_error *error);
 /* A file from now on, which need not exist; one that is known is left as it is. */
 bool cli_watch_add(struct cli_watch *watch, const char *path, struct fl_error *error);
 /* All files of the scene. */

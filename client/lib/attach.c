@@ -57,6 +57,8 @@ static bool describe(struct fl_scene *scene, struct fl_received *received, struc
 
 static bool learn_cameras(struct fl_scene *scene, const struct message_scene_description *description)
 {
+    free(scene->cameras);
+    scene->camera_count = 0;
     scene->cameras = calloc(description->cameras_count + 1u, sizeof(*scene->cameras));
     if (!scene->cameras)
         return false;
@@ -70,6 +72,8 @@ static bool learn_cameras(struct fl_scene *scene, const struct message_scene_des
 
 static bool learn_clips(struct fl_catalogue *catalogue, const struct message_scene_description *description)
 {
+    free(catalogue->clips);
+    catalogue->clip_count = catalogue->clip_capacity = 0;
     catalogue->clips = calloc(description->clips_count + 1u, sizeof(*catalogue->clips));
     if (!catalogue->clips)
         return false;
@@ -83,6 +87,13 @@ static bool learn_clips(struct fl_catalogue *catalogue, const struct message_sce
         snprintf(clip->name, sizeof(clip->name), "%s", from->name);
     }
     return true;
+}
+
+static bool learn(struct fl_scene *scene, const struct message_scene_description *description,
+                  struct fl_error *error)
+{
+    return (learn_cameras(scene, description) && learn_clips(&scene->catalogue, description)) ||
+           fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
 }
 
 /* Objects that other clients create later are unknown here: own identifiers begin far from theirs, at a different
@@ -109,11 +120,8 @@ static bool come_to(struct fl_scene *scene, const char *name, struct fl_error *e
         return false;
     note_revision(scene, received.message.ok.revision);
     scene->attached = true;
-    if (!describe(scene, &received, error))
+    if (!describe(scene, &received, error) || !learn(scene, &received.message.scene_description, error))
         return false;
-    if (!learn_cameras(scene, &received.message.scene_description) ||
-        !learn_clips(&scene->catalogue, &received.message.scene_description))
-        return fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
     return choose_new_ids(&scene->catalogue) || fl_error_set(error, FL_ERROR_SYSTEM, "", "no random numbers");
 }
 
@@ -128,12 +136,8 @@ struct fl_scene *fl_scene_attach(struct fl_connection *connection, const char *n
     return NULL;
 }
 
-bool fl_scene_get_bounds(struct fl_scene *scene, struct fl_scene_bounds *bounds, struct fl_error *error)
+static void fill_bounds(struct fl_scene_bounds *bounds, const struct message_scene_description *description)
 {
-    struct fl_received received;
-    if (!describe(scene, &received, error))
-        return false;
-    const struct message_scene_description *description = &received.message.scene_description;
     *bounds = (struct fl_scene_bounds){.empty = description->empty != 0,
                                        .revision = description->revision,
                                        .triangles = description->triangles,
@@ -142,6 +146,23 @@ bool fl_scene_get_bounds(struct fl_scene *scene, struct fl_scene_bounds *bounds,
         bounds->lower_world[axis] = description->lower_world[axis];
         bounds->upper_world[axis] = description->upper_world[axis];
     }
+}
+
+bool fl_scene_get_bounds(struct fl_scene *scene, struct fl_scene_bounds *bounds, struct fl_error *error)
+{
+    struct fl_received received;
+    if (!describe(scene, &received, error))
+        return false;
+    fill_bounds(bounds, &received.message.scene_description);
+    return true;
+}
+
+bool fl_scene_refresh(struct fl_scene *scene, struct fl_scene_bounds *bounds, struct fl_error *error)
+{
+    struct fl_received received;
+    if (!describe(scene, &received, error) || !learn(scene, &received.message.scene_description, error))
+        return false;
+    fill_bounds(bounds, &received.message.scene_description);
     return true;
 }
 

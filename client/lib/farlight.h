@@ -206,9 +206,10 @@ FL_API void fl_import_destroy(struct fl_import *started);
 FL_API struct fl_scene *fl_scene_load(struct fl_connection *connection, const struct fl_load_options *options,
                                       struct fl_error *error);
 /* Loads the models again and passes on what has changed since, in one transaction, so that structures of what
- * stays are kept. Returns the same scene, or another one in its place, where objects are gone or it was not loaded
- * with will_reload. NULL: it is as it was before. Edits of others that the models do not contradict stay. What the
- * scene has told of its files, cameras and clips is not valid any more. options->started must be NULL. */
+ * stays are kept; a scene that was attached to gets all of it. Returns the same scene, or another one in its
+ * place, where it was loaded without will_reload, or something is gone that cannot be removed, as others use it.
+ * NULL: it is as it was before. Edits of others that the models do not contradict stay. What the scene has told of
+ * its files, cameras and clips is not valid any more. options->started must be NULL. */
 FL_API struct fl_scene *fl_scene_reload(struct fl_scene *scene, const struct fl_load_options *options,
                                         struct fl_error *error);
 FL_API void fl_scene_destroy(struct fl_scene *scene); /* lets go of it on the daemon, too */
@@ -232,6 +233,9 @@ struct fl_scene_bounds {
     uint64_t revision, triangles, spheres;
 };
 FL_API bool fl_scene_get_bounds(struct fl_scene *scene, struct fl_scene_bounds *bounds, struct fl_error *error);
+/* The same of a scene that was attached to, whose cameras and clips are learned again: what it has told of them is
+ * not valid any more. */
+FL_API bool fl_scene_refresh(struct fl_scene *scene, struct fl_scene_bounds *bounds, struct fl_error *error);
 /* The highest revision that the daemon has reported, of an own edit or another client's. */
 FL_API uint64_t fl_scene_revision(const struct fl_scene *scene);
 /* The path of a file that a loaded scene is made of: its models, its environment, and what the models name, which

@@ -4,45 +4,57 @@
 #include <stdlib.h>
 #include <xxhash.h>
 
-/* False: no edit that sets an object. An environment has no identifier, as there is one. */
-static bool object_of(const struct message *message, uint32_t *id)
+/* False: no edit that sets an object. */
+static bool object_of(const struct message *message, struct fl_imported_object *object)
 {
-    *id = 0;
+    *object = (struct fl_imported_object){.is_there = true};
     switch (message->type) {
     case MESSAGE_SET_NODE:
-        *id = message->set_node.node;
+        object->kind = PROTOCOL_OBJECT_NODE;
+        object->id = message->set_node.node;
         return true;
     case MESSAGE_SET_MESH:
-        *id = message->set_mesh.mesh;
+        object->kind = PROTOCOL_OBJECT_MESH;
+        object->id = message->set_mesh.mesh;
         return true;
     case MESSAGE_SET_SPHERES:
-        *id = message->set_spheres.spheres;
+        object->kind = PROTOCOL_OBJECT_SPHERES;
+        object->id = message->set_spheres.spheres;
         return true;
     case MESSAGE_SET_DISC:
-        *id = message->set_disc.disc;
+        object->kind = PROTOCOL_OBJECT_DISC;
+        object->id = message->set_disc.disc;
         return true;
     case MESSAGE_SET_MATERIAL:
-        *id = message->set_material.material;
+        object->kind = PROTOCOL_OBJECT_MATERIAL;
+        object->id = message->set_material.material;
         return true;
     case MESSAGE_SET_TEXTURE:
-        *id = message->set_texture.texture;
+        object->kind = PROTOCOL_OBJECT_TEXTURE;
+        object->id = message->set_texture.texture;
         return true;
     case MESSAGE_SET_LIGHT:
-        *id = message->set_light.light;
+        object->kind = PROTOCOL_OBJECT_LIGHT;
+        object->id = message->set_light.light;
         return true;
     case MESSAGE_SET_CAMERA:
-        *id = message->set_camera.camera;
+        object->kind = PROTOCOL_OBJECT_CAMERA;
+        object->id = message->set_camera.camera;
         return true;
     case MESSAGE_SET_SKIN:
-        *id = message->set_skin.skin;
+        object->kind = PROTOCOL_OBJECT_SKIN;
+        object->id = message->set_skin.skin;
         return true;
     case MESSAGE_SET_CLIP:
-        *id = message->set_clip.clip;
+        object->kind = PROTOCOL_OBJECT_CLIP;
+        object->id = message->set_clip.clip;
         return true;
     case MESSAGE_SET_CHANNEL:
-        *id = message->set_channel.channel;
+        object->kind = PROTOCOL_OBJECT_CHANNEL;
+        object->id = message->set_channel.channel;
         return true;
-    case MESSAGE_SET_ENVIRONMENT:
+    case MESSAGE_SET_ENVIRONMENT: /* it has no identifier, as there is one */
+        object->kind = PROTOCOL_OBJECT_ENVIRONMENT;
         return true;
     default:
         return false;
@@ -50,13 +62,15 @@ static bool object_of(const struct message *message, uint32_t *id)
 }
 
 /* The object's place, or the empty one where it belongs; one of four places is always empty. */
-static struct fl_imported_object *place_of(const struct fl_imported *imported, uint32_t type, uint32_t id)
+static struct fl_imported_object *place_of(const struct fl_imported *imported,
+                                           const struct fl_imported_object *object)
 {
-    const uint64_t key = (uint64_t)type << 32 | id;
-    size_t at = (size_t)XXH3_64bits(&key, sizeof(key)) & (imported->capacity - 1);
-    while (imported->places[at].type != 0 && (imported->places[at].type != type || imported->places[at].id != id))
-        at = (at + 1) & (imported->capacity - 1);
-    return &imported->places[at];
+    const uint64_t key = (uint64_t)object->kind << 32 | object->id;
+    for (size_t at = (size_t)XXH3_64bits(&key, sizeof(key));; at++) {
+        struct fl_imported_object *place = &imported->places[at & (imported->capacity - 1)];
+        if (!place->is_there || (place->kind == object->kind && place->id == object->id))
+            return place;
+    }
 }
 
 static bool make_room(struct fl_imported *imported, struct fl_error *error)
@@ -69,8 +83,8 @@ static bool make_room(struct fl_imported *imported, struct fl_error *error)
     if (!grown.places)
         return fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
     for (size_t i = 0; i < imported->capacity; i++)
-        if (imported->places[i].type != 0)
-            *place_of(&grown, imported->places[i].type, imported->places[i].id) = imported->places[i];
+        if (imported->places[i].is_there)
+            *place_of(&grown, &imported->places[i]) = imported->places[i];
     free(imported->places);
     *imported = grown;
     return true;
@@ -79,34 +93,36 @@ static bool make_room(struct fl_imported *imported, struct fl_error *error)
 bool fl_imported_add(struct fl_imported *imported, const struct frame *frame, const struct message *message,
                      struct fl_error *error)
 {
-    uint32_t id;
-    if (!object_of(message, &id))
+    struct fl_imported_object object;
+    if (!object_of(message, &object))
         return true;
     if (!make_room(imported, error))
         return false;
-    struct fl_imported_object *place = place_of(imported, message->type, id);
-    imported->count += place->type == 0;
-    *place = (struct fl_imported_object){
-        .type = message->type, .id = id, .digest = XXH3_64bits(frame->payload, frame->header.payload_bytes)};
+    struct fl_imported_object *place = place_of(imported, &object);
+    imported->count += !place->is_there;
+    object.digest = XXH3_64bits(frame->payload, frame->header.payload_bytes);
+    *place = object;
     return true;
 }
 
 bool fl_imported_has(const struct fl_imported *imported, const struct frame *frame, const struct message *message)
 {
-    uint32_t id;
-    if (imported->count == 0 || !object_of(message, &id))
+    struct fl_imported_object object;
+    if (imported->count == 0 || !object_of(message, &object))
         return false;
-    const struct fl_imported_object *place = place_of(imported, message->type, id);
-    return place->type != 0 && place->digest == XXH3_64bits(frame->payload, frame->header.payload_bytes);
+    const struct fl_imported_object *place = place_of(imported, &object);
+    return place->is_there && place->digest == XXH3_64bits(frame->payload, frame->header.payload_bytes);
 }
 
-bool fl_imported_covers(const struct fl_imported *now, const struct fl_imported *before)
+const struct fl_imported_object *fl_imported_gone(const struct fl_imported *now, const struct fl_imported *before,
+                                                  size_t *cursor)
 {
-    for (size_t i = 0; i < before->capacity; i++)
-        if (before->places[i].type != 0 &&
-            (now->count == 0 || place_of(now, before->places[i].type, before->places[i].id)->type == 0))
-            return false;
-    return true;
+    while (*cursor < before->capacity) {
+        const struct fl_imported_object *object = &before->places[(*cursor)++];
+        if (object->is_there && (now->count == 0 || !place_of(now, object)->is_there))
+            return object;
+    }
+    return NULL;
 }
 
 void fl_imported_finish(struct fl_imported *imported)

@@ -7,7 +7,9 @@
 #include "protocol/framing.h"
 
 struct fl_imported_object {
-    uint32_t type, id; /* of the edit; type 0: an empty place */
+    bool is_there; /* else the place is empty */
+    enum protocol_object_kind kind;
+    uint32_t id; /* 0 of an environment */
     uint64_t digest;
 };
 
@@ -21,8 +23,10 @@ bool fl_imported_add(struct fl_imported *imported, const struct frame *frame, co
                      struct fl_error *error);
 /* Whether the edit would change nothing. */
 bool fl_imported_has(const struct fl_imported *imported, const struct frame *frame, const struct message *message);
-/* Whether all objects of `before` are in `now`, whatever they are. */
-bool fl_imported_covers(const struct fl_imported *now, const struct fl_imported *before);
+/* The next object of `before`, from *cursor on, 0 at first, that is not in `now`, whatever it was; NULL: no more.
+ */
+const struct fl_imported_object *fl_imported_gone(const struct fl_imported *now, const struct fl_imported *before,
+                                                  size_t *cursor);
 void fl_imported_finish(struct fl_imported *imported);
 
 #endif

@@ -23,7 +23,9 @@ struct load {
     struct fl_error refusal;          /* the daemon's first error for an importer's request */
     struct fl_imported *imported;     /* of this import; NULL: it is not remembered */
     const struct fl_imported *before; /* of the one before it; NULL: all is new */
-    bool abandoned;                   /* something of that is gone */
+    struct message commit;            /* that waits until what is gone is removed; type 0: none does */
+    size_t gone_cursor;
+    bool removes, abandoned; /* something of `before` is gone; nothing was changed */
 };
 
 /* ---- from the importer to the daemon ---- */
@@ -46,13 +48,35 @@ static void count(struct load *load, const struct message *message, uint32_t req
 }
 
 /* Ends the transaction in place of its commit: the daemon answers the commit's request as cancelled. */
-static bool abandon(struct load *load, uint32_t request, struct fl_error *error)
+static bool abandon(struct load *load, struct fl_error *error)
 {
     struct message cancel = {.type = MESSAGE_CANCEL};
-    cancel.cancel.target_request = request;
+    cancel.cancel.target_request = load->commit_request;
+    load->commit = (struct message){0};
     load->abandoned = true;
     return fl_stream_push(&load->connection->stream, load->relay.request_base + ++load->relay.max_request, 0,
                           &cancel, error);
+}
+
+/* Removes what is gone, in the transaction of the rest, then commits it. */
+static bool remove_gone(struct load *load, struct fl_error *error)
+{
+    struct fl_stream *daemon = &load->connection->stream;
+    const struct fl_imported_object *gone;
+    while (fl_stream_has_room(daemon) &&
+           (gone = fl_imported_gone(load->imported, load->before, &load->gone_cursor))) {
+        struct message removal = {.type = MESSAGE_REMOVE, .remove = {.kind = gone->kind, .object = gone->id}};
+        if (gone->kind == PROTOCOL_OBJECT_ENVIRONMENT) /* which stays, as each scene has one */
+            return abandon(load, error);
+        if (!fl_stream_push(daemon, load->commit_request, 0, &removal, error))
+            return false;
+        load->removes = true;
+    }
+    if (!fl_stream_has_room(daemon))
+        return true;
+    const struct message commit = load->commit;
+    load->commit = (struct message){0};
+    return fl_stream_push(daemon, load->commit_request, 0, &commit, error);
 }
 
 /* Whether the daemon has what the edit says. */
@@ -75,9 +99,11 @@ static bool pass_on(struct load *load, const struct frame *frame, struct message
         return false;
     if (is_known(load, frame, message))
         return true;
-    if (message->type == MESSAGE_EDIT_COMMIT && load->before && !fl_imported_covers(load->imported, load->before))
-        return abandon(load, request, error);
     count(load, message, request);
+    if (message->type == MESSAGE_EDIT_COMMIT && load->before) {
+        load->commit = *message;
+        return remove_gone(load, error);
+    }
     if (message->type == MESSAGE_EDIT_BEGIN)
         return fl_stream_push(&load->connection->stream, request, 0, message, error);
     struct framing_header header = frame->header;
@@ -89,9 +115,9 @@ static bool pass_on(struct load *load, const struct frame *frame, struct message
 /* As many as the daemon's side can queue. */
 static bool drain_importer(struct load *load, struct fl_error *error)
 {
-    if (!fl_connection_push_late(load->connection, error))
+    if (!fl_connection_push_late(load->connection, error) || (load->commit.type != 0 && !remove_gone(load, error)))
         return false;
-    while (fl_stream_has_room(&load->connection->stream)) {
+    while (load->commit.type == 0 && fl_stream_has_room(&load->connection->stream)) {
         struct frame frame;
         struct message message;
         const enum fl_stream_result result = fl_stream_next(&load->importer->stream, &frame, &message, error);
@@ -350,7 +376,7 @@ struct fl_scene *fl_scene_load(struct fl_connection *connection, const struct fl
     return scene;
 }
 
-/* *abandoned: objects are gone, and nothing has changed. */
+/* *abandoned: something is gone that cannot be removed; nothing has changed. */
 static bool load_changes(struct fl_scene *scene, struct fl_importer *importer, bool *abandoned,
                          struct fl_error *error)
 {
@@ -360,14 +386,14 @@ static bool load_changes(struct fl_scene *scene, struct fl_importer *importer, b
     if (loaded)
         adopt_import(scene, importer, &imported);
     fl_imported_finish(&imported);
-    *abandoned = load.abandoned && load.refusal.code != FL_ERROR_NONE;
+    *abandoned = (load.abandoned || load.removes) && load.refusal.code != FL_ERROR_NONE;
     return loaded;
 }
 
 struct fl_scene *fl_scene_reload(struct fl_scene *scene, const struct fl_load_options *options,
                                  struct fl_error *error)
 {
-    bool abandoned = scene->imported.count == 0;
+    bool abandoned = scene->imported.count == 0 && !scene->attached;
     if (!abandoned) {
         struct fl_import *started =
             fl_connection_check(scene->connection, error) ? fl_import_start(options, error) : NULL;

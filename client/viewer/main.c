@@ -206,7 +206,7 @@ static error_t parse(int key, char *value, struct argp_state *state)
         line->job.scene = value;
         return 0;
     case KEY_WATCH:
-        viewer->watch = true;
+        line->job.watch = true;
         return 0;
     case KEY_HEADLESS:
         viewer->headless = true;
@@ -278,9 +278,8 @@ static bool complete(struct command_line *line)
         cli_usage(job, "--stereo-layout", "a window is no pair of files");
         return fl_error_remedy(&job->error, "use side or over");
     }
-    if (viewer->watch && (job->scene || cli_has_input(job)))
-        return cli_usage(job, "--watch", "%s does not change as a file does",
-                         job->scene ? "a shared scene" : "standard input") == 0;
+    if (!cli_check_watch(job))
+        return false;
     if (job->clip_count > 1)
         return cli_usage(job, "--clip", "only one clip can be played") == 0;
     return cli_check_models(job, &job->error) && cli_job_complete_view(job);
@@ -300,6 +299,7 @@ static void fill(struct command_line *line)
     viewer->key_file = cli_key_file(viewer->server, job->key_file);
     viewer->link = job->link;
     viewer->model = job->model;
+    viewer->watch = job->watch;
     viewer->models = job->models;
     viewer->model_count = job->model_count;
     viewer->input_fd = job->input_fd;

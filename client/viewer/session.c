@@ -269,14 +269,9 @@ static bool begin_watch(struct session *session)
     const struct session_options *options = &session->options;
     if (!options->watch)
         return true;
-    if (!cli_watch_begin(&session->watch, &session->error))
-        return false;
-    if (options->model && !cli_watch_add(&session->watch, options->model, &session->error))
-        return false;
-    for (size_t i = 0; i < options->model_count; i++)
-        if (!cli_watch_add(&session->watch, options->models[i].path, &session->error))
-            return false;
-    return !options->environment || cli_watch_add(&session->watch, options->environment, &session->error);
+    return cli_watch_begin_models(&session->watch, options->models, options->model_count, options->environment,
+                                  &session->error) &&
+           (!options->model || cli_watch_add(&session->watch, options->model, &session->error));
 }
 
 struct session *session_create(const struct session_options *options, struct fl_error *error)

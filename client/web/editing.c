@@ -85,25 +85,16 @@ static char *read_one(struct fl_scene *scene, const struct web_request *request,
 
 /* ---- changing ---- */
 
-static void remember(struct web_editing *editing, const struct fl_edited *edited)
+static char *tell_edited(const struct edit_history *history, const struct fl_edited *edited,
+                         struct fl_error *error)
 {
-    if (editing->undo_count == UNDOS_MAX) {
-        free(editing->undos[0].assignments);
-        memmove(editing->undos, editing->undos + 1, (UNDOS_MAX - 1) * sizeof(editing->undos[0]));
-        editing->undo_count--;
-    }
-    editing->undos[editing->undo_count++] =
-        (struct web_undo){.assignments = edited->undo, .count = edited->undo_count};
-}
-
-static char *tell_edited(const struct web_editing *editing, const struct fl_edited *edited, struct fl_error *error)
-{
-    return print(json_pack("{s:{s:I,s:I,s:I}}", "edited", "revision", (json_int_t)edited->revision, "objects",
-                           (json_int_t)edited->objects, "undos", (json_int_t)editing->undo_count),
+    return print(json_pack("{s:{s:I,s:I,s:I,s:I}}", "edited", "revision", (json_int_t)edited->revision, "objects",
+                           (json_int_t)edited->objects, "undos", (json_int_t)history->undo_count, "redos",
+                           (json_int_t)history->redo_count),
                  error);
 }
 
-static char *edit(struct web_editing *editing, struct fl_scene *scene, const struct web_request *request,
+static char *edit(struct edit_history *history, struct fl_scene *scene, const struct web_request *request,
                   struct fl_error *error)
 {
     struct fl_edited edited = {0};
@@ -111,29 +102,27 @@ static char *edit(struct web_editing *editing, struct fl_scene *scene, const str
         free(edited.undo);
         return NULL;
     }
-    if (edited.undo_count > 0)
-        remember(editing, &edited);
-    else
-        free(edited.undo);
-    return tell_edited(editing, &edited, error);
+    edit_history_add(history, edited.undo, edited.undo_count);
+    return tell_edited(history, &edited, error);
 }
 
 /* One that cannot be undone any more, as its object is gone, is forgotten. */
-static char *undo(struct web_editing *editing, struct fl_scene *scene, struct fl_error *error)
+static char *undo(struct edit_history *history, struct fl_scene *scene, bool redo, struct fl_error *error)
 {
     struct fl_edited edited = {0};
-    if (editing->undo_count == 0) {
-        fl_error_set(error, FL_ERROR_ARGUMENT, "undo", "there is no change to undo");
+    struct edit_change change;
+    if (!edit_history_take(history, redo, &change)) {
+        fl_error_set(error, FL_ERROR_ARGUMENT, redo ? "redo" : "undo", "there is no change to %s",
+                     redo ? "redo" : "undo");
         return NULL;
     }
-    const struct web_undo last = editing->undos[--editing->undo_count];
-    const bool done = fl_scene_edit(scene, last.assignments, last.count, &edited, error);
-    free(last.assignments);
-    free(edited.undo);
-    return done ? tell_edited(editing, &edited, error) : NULL;
+    const bool is_done = fl_scene_edit(scene, change.list, change.count, &edited, error);
+    free(change.list);
+    edit_history_took(history, redo, edited.undo, edited.undo_count);
+    return is_done ? tell_edited(history, &edited, error) : NULL;
 }
 
-char *web_editing_answer(struct web_editing *editing, struct fl_scene *scene, const struct web_request *request,
+char *web_editing_answer(struct edit_history *history, struct fl_scene *scene, const struct web_request *request,
                          struct fl_error *error)
 {
     switch (request->kind) {
@@ -142,14 +131,8 @@ char *web_editing_answer(struct web_editing *editing, struct fl_scene *scene, co
     case WEB_READ:
         return read_one(scene, request, error);
     case WEB_EDIT:
-        return edit(editing, scene, request, error);
+        return edit(history, scene, request, error);
     default:
-        return undo(editing, scene, error);
+        return undo(history, scene, request->kind == WEB_REDO, error);
     }
-}
-
-void web_editing_finish(struct web_editing *editing)
-{
-    while (editing->undo_count > 0)
-        free(editing->undos[--editing->undo_count].assignments);
 }

@@ -25,6 +25,7 @@ enum key {
     KEY_HOST,
     KEY_INSECURE,
     KEY_VIEWERS,
+    KEY_WATCH,
     KEY_ALLOW_EDIT,
     KEY_SAMPLES,
     KEY_INTEGRATOR
@@ -48,6 +49,7 @@ static const struct argp_option options[] = {
     {"viewers", KEY_VIEWERS, "N", 0, "Let N browsers look at once, 1 to 64 (default 8)", -2},
     {"allow-edit", KEY_ALLOW_EDIT, NULL, 0,
      "Print a second link: who has it may edit the scene, for all who look at it", -2},
+    {"watch", KEY_WATCH, NULL, 0, "Load the model again when it, or a file that it names, has changed", -2},
     {"samples", KEY_SAMPLES, "N", 0, "Render N samples per pixel while nothing moves (default 64)", -2},
     {"integrator", KEY_INTEGRATOR, "NAME", 0,
      "Begin with whitted (default), distributed (default with a lens or a shutter), raycast, ao or path", -2},
@@ -119,6 +121,9 @@ static error_t parse(int key, char *value, struct argp_state *state)
     case KEY_INSECURE:
         line->insecure = true;
         return 0;
+    case KEY_WATCH:
+        job->watch = true;
+        return 0;
     case KEY_ALLOW_EDIT:
         line->gateway.allow_edit = true;
         return 0;
@@ -189,7 +194,10 @@ static bool complete(struct command_line *line, struct fl_error *error)
         return fl_error_remedy(error, job->server ? "'farlight scenes' lists the daemon's scenes"
                                                   : "farlight-web model.glb");
     }
-    if (!cli_job_complete_view(job) || !cli_check_models(job, &job->error)) {
+    if (job->watch && !cli_can_edit_again(job)) /* its scene keeps its name, and stays */
+        cli_usage(job, "--watch", "an --edit that adds or multiplies would do so each time: assign a value");
+    if (job->error.code != FL_ERROR_NONE || !cli_check_watch(job) || !cli_job_complete_view(job) ||
+        !cli_check_models(job, &job->error)) {
         *error = job->error;
         return false;
     }

@@ -171,8 +171,9 @@ static bool read_editing(const char *name, json_t *value, struct web_request *re
         request->kind = name[0] == 'e' ? WEB_EDIT : WEB_READ;
         return read_object(value, request->kind == WEB_EDIT, &request->assignment, error);
     }
-    request->kind = WEB_UNDO;
-    return (strcmp(name, "undo") == 0 && json_is_true(value)) ||
+    const bool is_redo = strcmp(name, "redo") == 0;
+    request->kind = is_redo ? WEB_REDO : WEB_UNDO;
+    return ((is_redo || strcmp(name, "undo") == 0) && json_is_true(value)) ||
            refuse(error, "message", "nothing that a page sends");
 }
 

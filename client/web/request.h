@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* What a page sends, read once and checked here: JSON with one of "show", "look", "shown", "key", "compare",
- * "list", "read", "edit", "undo". No I/O. */
+ * "list", "read", "edit", "undo", "redo". No I/O. */
 #ifndef FARLIGHT_CLIENT_WEB_REQUEST_H
 #define FARLIGHT_CLIENT_WEB_REQUEST_H
 
@@ -20,7 +20,8 @@ enum web_request_kind {
     WEB_LIST, /* {"list": {"kind", "match"}}: the objects of this kind whose names have the text in them */
     WEB_READ, /* {"read": {"kind", "id"}} */
     WEB_EDIT, /* {"edit": {"kind", "id", "field", "values"}} */
-    WEB_UNDO  /* {"undo": true}: the newest change of this browser */
+    WEB_UNDO, /* {"undo": true}: the newest change of this browser */
+    WEB_REDO  /* {"redo": true}: the newest one that it has undone */
 };
 
 static inline bool web_request_edits(enum web_request_kind kind)

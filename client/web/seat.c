@@ -35,9 +35,11 @@ struct seat {
     struct record_clip_use clip;
     struct message_render render; /* as the view was last asked for */
     struct fl_view_camera camera; /* likewise, if has_camera */
-    bool has_camera, is_described;
+    bool has_camera;
     struct error_map errors;
-    struct web_editing editing;
+    struct edit_history history;
+    char *described;                             /* what the page was told of the scene last */
+    uint64_t described_revision, shown_revision; /* then, and of the newest frame */
     unsigned idle_rounds;
     uint32_t ids[LOOKS_REMEMBERED]; /* the page's numbers of cameras, by ours, modulo */
 };
@@ -102,15 +104,22 @@ static bool fill_render(struct seat *seat, const struct web_show *show, struct f
     return cli_find_camera(render, job->camera, job->framed, job->has_framing, seat->scene, error);
 }
 
-static bool describe(struct seat *seat, const struct message_render *render, struct fl_error *error)
+/* What is as it was told is not told again. */
+static bool describe(struct seat *seat, struct fl_error *error)
 {
     struct fl_scene_bounds bounds;
-    seat->is_described = true;
-    return fl_scene_get_bounds(seat->scene, &bounds, error) &&
-           post(seat,
-                web_describe_scene(seat->scene, seat->options.scene, render, &bounds,
-                                   fl_connection_can_h264(seat->connection), seat->options.may_edit),
-                NULL, 0, error);
+    if (!fl_scene_refresh(seat->scene, &bounds, error))
+        return false;
+    seat->described_revision = bounds.revision;
+    char *text = web_describe_scene(seat->scene, seat->options.scene, &seat->render, &bounds,
+                                    fl_connection_can_h264(seat->connection), seat->options.may_edit);
+    if (text && seat->described && strcmp(text, seat->described) == 0) {
+        free(text);
+        return true;
+    }
+    free(seat->described);
+    seat->described = text ? strdup(text) : NULL;
+    return post(seat, text, NULL, 0, error);
 }
 
 static bool show(struct seat *seat, const struct web_show *wanted, struct fl_error *error)
@@ -118,7 +127,7 @@ static bool show(struct seat *seat, const struct web_show *wanted, struct fl_err
     error_map_end(&seat->errors);
     if (!fill_render(seat, wanted, error))
         return false;
-    if (!seat->is_described && !describe(seat, &seat->render, error))
+    if (!seat->described && !describe(seat, error))
         return false;
     if (seat->view)
         return fl_view_change(seat->view, &seat->render, error);
@@ -156,6 +165,7 @@ static bool pass_frames(struct seat *seat, struct fl_error *error)
             return error->code == FL_ERROR_NONE;
         const uint32_t id = frame->command == 0 ? 0 : seat->ids[frame->command % LOOKS_REMEMBERED];
         const bool sent = post(seat, web_describe_frame(frame, id), frame->encoded, frame->encoded_bytes, error);
+        seat->shown_revision = frame->revision;
         fl_frame_destroy(frame);
         if (!sent)
             return false;
@@ -203,7 +213,7 @@ static bool pass_errors(struct seat *seat, struct fl_error *error)
 static bool answer_edit(struct seat *seat, const struct web_request *request, struct fl_error *error)
 {
     struct fl_error refusal = {0};
-    char *answer = web_editing_answer(&seat->editing, seat->scene, request, &refusal);
+    char *answer = web_editing_answer(&seat->history, seat->scene, request, &refusal);
     if (!answer && refusal.code != FL_ERROR_REFUSED && refusal.code != FL_ERROR_ARGUMENT) {
         *error = refusal;
         return false;
@@ -220,6 +230,8 @@ static bool do_what_came(struct seat *seat, struct fl_error *error)
     /* Each answer is a parcel, and those that wait are counted. */
     const bool wants_compare = seat->wants_compare && seat->view && web_queue_has_room_for_text(&seat->queue);
     const bool wants_edit = seat->wants_edit && seat->view && web_queue_has_room_for_text(&seat->queue);
+    const bool wants_scene =
+        seat->shown_revision > seat->described_revision && web_queue_has_room_for_text(&seat->queue);
     const struct web_request shown = seat->show, looked = seat->look, compared = seat->compare,
                              edited = seat->edit;
     seat->wants_edit = seat->wants_edit && !wants_edit;
@@ -234,6 +246,8 @@ static bool do_what_came(struct seat *seat, struct fl_error *error)
     if (wants_compare && !compare(seat, compared.id, error))
         return false;
     if (wants_edit && !answer_edit(seat, &edited, error))
+        return false;
+    if (wants_scene && !describe(seat, error))
         return false;
     return !wants_key || !seat->view || fl_view_want_key_frame(seat->view, error);
 }
@@ -305,7 +319,8 @@ static void *work(void *argument)
     serve(seat, &error);
     if (error.code != FL_ERROR_NONE && error.code != FL_ERROR_INTERRUPTED)
         post(seat, web_describe_error(&error, error.code != FL_ERROR_ARGUMENT), NULL, 0, &ignored);
-    web_editing_finish(&seat->editing);
+    edit_history_clear(&seat->history);
+    free(seat->described);
     error_map_end(&seat->errors);
     fl_view_destroy(seat->view);
     fl_scene_destroy(seat->scene);

@@ -204,10 +204,10 @@ class Inputs(OneDaemon):
         self.wait_for(process, "is new")
         self.assertIsNone(colour(self.picture, 0.4, 0.4))
         self.assertIsNotNone(colour(self.picture, 0.2, 0.2))
-        for text, revision in ((SQUARE.replace("f 1 3", "usemtl nothing\nf 1 3"), before[0] + 3), (SQUARE, before[0])):
+        for text, revision in ((SQUARE.replace("f 1 3", "usemtl nothing\nf 1 3"), before[0] + 3), (SQUARE, before[0] + 4)):
             self.square.write_text(text)
             self.wait_for(process, "is new")
-            self.assertEqual(self.scene_and_builds()[0], revision, "what is gone, the default material, needs another scene")
+            self.assertEqual(self.scene_and_builds()[0], revision, "what is gone, the default material, is removed")
         process.send_signal(signal.SIGINT)
         self.assertEqual(process.wait(), 0)
         self.assertEqual(self.leftovers(), ["picture.png", "square.mtl", "square.obj"])

@@ -306,14 +306,16 @@ class Edit(Case):
 
     @staticmethod
     def ask(view, message):
-        """The answer, which is text; frames are passed over."""
+        """The answer, which is text; frames, and what the scene is now, are passed over."""
         view.send(message)
         while True:
             kind, data = view.receive()
             if kind == BINARY:
                 view.send({"shown": 1})
-            elif kind == TEXT:
+            elif kind == TEXT and not data.startswith(b'{"scene"'):
                 return json.loads(data)
+            elif kind == TEXT:
+                continue
             else:
                 raise ConnectionError(data)
 
@@ -336,8 +338,16 @@ class Edit(Case):
             frame, _ = looker.frame()
         # It is not the other's to undo.
         self.assertIn("no change", self.ask(other, {"undo": True})["refused"]["text"])
-        self.assertEqual(self.ask(editor, {"undo": True})["edited"]["undos"], 0)
+        told = self.ask(editor, {"undo": True})["edited"]
+        self.assertEqual((told["undos"], told["redos"]), (0, 1))
         self.assertEqual(self.values(other, "material", material, "roughness"), before)
+        told = self.ask(editor, {"redo": True})["edited"]
+        self.assertEqual((told["undos"], told["redos"]), (1, 0))
+        self.assertEqual(self.values(other, "material", material, "roughness"), [0.8125])
+        self.assertIn("no change", self.ask(editor, {"redo": True})["refused"]["text"])
+        self.ask(editor, {"undo": True})
+        told = self.ask(editor, {"edit": {"kind": "material", "id": material, "field": "roughness", "values": [0.25]}})["edited"]
+        self.assertEqual((told["undos"], told["redos"]), (1, 0), "a new change ends redoing")
 
     def test_lights_nodes_and_environment_are_edited(self):
         view = self.view(self.gateway.edit_path)
@@ -435,6 +445,40 @@ class Model(Case):
                 self.assertIsNone(gateway.daemon)
                 self.assertIn("carousel.glb", farlight("scenes", "--server", address).stdout)
 
+    def test_files_that_change_are_shown_again_and_others_are_not(self):
+        model = pathlib.Path(self.folder) / "tile.obj"
+        tile = "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nf 1 2 3\n"
+        model.write_text(tile)
+        with Gateway(model, "--watch", "--edit", "node.0.translate=0,0,1", environment=self.environment) as gateway:
+            view, frame = self.view(gateway)
+            view.send({"look": {**LOOK, "moving": False}})
+            while frame["id"] != LOOK["id"]:
+                frame, _ = view.frame()
+            camera, revision = frame["camera"], frame["revision"]
+            for text, triangles in ((tile + "f 1 3 2\n", 2), (tile + "usemtl other\nf 1 3 2\nf 2 3 1\n", 3), (tile, 1)):
+                model.write_text(text)
+                told = self.described(view)
+                self.assertEqual((told["triangles"], told["lower"][2]), (triangles, 1), "edits are made again")
+                while frame["revision"] == revision or frame["samples"] < 2:
+                    frame, _ = view.frame()
+                revision = frame["revision"]
+                self.assertEqual((frame["camera"], frame["id"]), (camera, LOOK["id"]))
+            model.write_text("f 1 2 9\n")
+            for line in gateway.process.stderr:
+                if "tile.obj" in line and "new" not in line:
+                    break
+            view.send({"look": LOOK})
+            self.assertEqual(view.frame()[0]["revision"], revision, "what cannot be read leaves the view as it is")
+
+    def described(self, view):
+        """What the page is told of the scene the next time."""
+        while True:
+            kind, data = view.receive()
+            if kind == BINARY:
+                view.send({"shown": 1})
+            elif b'"scene"' in data:
+                return json.loads(data)["scene"]
+
     def test_page_is_served_at_ipv6_addresses(self):
         with Gateway(bundled_scenes() / "teapot.glb", "--listen", "127.0.0.1:0", listen="[::1]:0",
                      environment=self.environment) as gateway:
@@ -452,7 +496,9 @@ class Model(Case):
 
     def test_wrong_models_are_told(self):
         for arguments, status in ((("none.glb",), 1), ((bundled_scenes() / "teapot.glb", "--camera", "none"), 2),
-                                  ((bundled_scenes() / "teapot.glb", "--scene", "x"), 2), (("--at", "1,1,1"), 2)):
+                                  ((bundled_scenes() / "teapot.glb", "--scene", "x"), 2), (("--at", "1,1,1"), 2),
+                                  (("--server", "unix:/none", "--scene", "x", "--watch"), 2),
+                                  ((bundled_scenes() / "teapot.glb", "--watch", "--edit", "camera.fov*=2"), 2)):
             result = run("farlight-web", "--listen", "127.0.0.1:0", *arguments, env=self.environment)
             self.assertEqual((result.returncode, result.stdout), (status, ""), (arguments, result.stderr))
         self.assertEqual(os.listdir(self.folder), [])

@@ -178,7 +178,13 @@ class Page(unittest.TestCase):
         editor.value("document.getElementById('edit-undo').click()")
         looker.wait(f"{DATASET}.revision !== '{revision}'")
         editor.call("Page.bringToFront")
-        editor.wait(f"document.getElementById('field-rotation-0').value === '{before}'")
+        value = "document.getElementById('field-rotation-0').value"
+        editor.wait(f"{value} === '{before}' && !document.getElementById('edit-redo').disabled")
+        for key, shown in (("y", "77"), ("z", before)):
+            editor.value("document.getElementById('picture').focus()")
+            editor.call("Input.dispatchKeyEvent", type="keyDown", key=key, modifiers=2)  # Control
+            editor.call("Input.dispatchKeyEvent", type="keyUp", key=key, modifiers=2)
+            editor.wait(f"Number({value}) === {shown}")
         # What cannot be is said, and the field shows what is.
         self.choose(editor, "field-rotation-0", "1e9")
         editor.wait("document.getElementById('edit-state').textContent.includes('rotation')")
@@ -201,6 +207,32 @@ class Page(unittest.TestCase):
         page.call("Input.dispatchKeyEvent", type="keyDown", key="Escape")
         self.assertTrue(page.value("document.getElementById('panel').hidden && document.activeElement.id === 'open'"))
         self.assertEqual(page.faults, [])
+
+    def test_files_that_change_are_shown_and_what_is_chosen_stays(self):
+        model = self.folder / "model.glb"
+        model.write_bytes((bundled_scenes() / "carousel.glb").read_bytes())
+        with Gateway(model, "--watch", "--allow-edit") as gateway:
+            page = self.open(link=gateway.edit_link)
+            self.choose(page, "tracer", "abuffer")
+            self.choose(page, "edit-kind", "material")
+            page.wait("document.getElementById('edit-fields').children.length > 0")
+            self.drag(page)
+            page.wait(f"{DATASET}.tracer === 'abuffer' && {DATASET}.moving === 'false'")
+            shown = page.shown()
+            model.write_bytes((bundled_scenes() / "teapot.glb").read_bytes())
+            page.wait(f"{DATASET}.revision !== '{shown['revision']}' && document.getElementById('clips').hidden")
+            self.assertEqual({name: page.shown()[name] for name in ("look", "tracer")},
+                             {name: shown[name] for name in ("look", "tracer")}, "camera and tracer stay")
+            materials = "[...document.getElementById('edit-object').options].map((one) => one.textContent).join()"
+            page.wait(f"{materials} === '{self.names(bundled_scenes() / 'teapot.glb')}'")
+            self.assertEqual(page.status(), "")
+            self.assertEqual(page.faults, [])
+
+    @staticmethod
+    def names(model):
+        """Of the materials of a GLB file, with commas between them."""
+        data = model.read_bytes()
+        return ",".join(one["name"] for one in json.loads(data[20:20 + int.from_bytes(data[12:16], "little")])["materials"])
 
     def test_page_comes_back_with_the_daemon(self):
         page = self.open()

@@ -2,6 +2,7 @@
 // The panel that edits objects of the scene, for those whose link allows it. No socket: ask() sends, and the answer comes to take().
 
 const SEARCH_PAUSE_MS = 250;
+const KEYS = { z: "undo", "Shift+z": "redo", y: "redo" }; // with Control, or the Command of a Mac
 const BRIGHTEST = 1; // of a colour that a menu of colours can show
 
 const $ = (id) => document.getElementById(id);
@@ -22,15 +23,31 @@ export class Editing {
       this.searching = setTimeout(() => this.list(), SEARCH_PAUSE_MS);
     });
     $("edit-object").addEventListener("change", () => this.read());
-    $("edit-undo").addEventListener("click", () => this.request({ undo: true }));
+    for (const name of ["undo", "redo"]) $(`edit-${name}`).addEventListener("click", () => this.turn(name));
+    document.addEventListener("keydown", (event) => {
+      const name = KEYS[(event.shiftKey ? "Shift+" : "") + event.key.toLowerCase()];
+      if (!name || !(event.ctrlKey || event.metaKey) || event.altKey || $("editing").hidden) return;
+      if (event.target.matches("input[type=text], input[type=number]")) return; // it undoes what is typed
+      event.preventDefault();
+      this.turn(name);
+    });
   }
 
   // The connection is a new one: what was asked of the old one is not answered, and its changes cannot be undone.
   begin(mayEdit) {
-    $("editing").hidden = !mayEdit;
+    $("editing").hidden = $("edit-keys").hidden = !mayEdit;
     this.waiting = [];
-    $("edit-undo").disabled = true;
-    if (mayEdit) this.list();
+    this.showTurns({ undos: 0, redos: 0 });
+  }
+
+  // One that has nothing to turn is disabled, but not what a key asks for.
+  turn(name) {
+    if (!$(`edit-${name}`).disabled) this.request({ [name]: true });
+  }
+
+  showTurns({ undos, redos }) {
+    $("edit-undo").disabled = undos === 0;
+    $("edit-redo").disabled = redos === 0;
   }
 
   // Of a question that waits the newest counts; each change does.
@@ -46,6 +63,7 @@ export class Editing {
   }
 
   list() {
+    if ($("editing").hidden) return;
     this.request({ list: { kind: $("edit-kind").value, match: $("edit-match").value.slice(0, 32) } });
   }
 
@@ -62,17 +80,18 @@ export class Editing {
   }
 
   take(message) {
-    this.waiting.shift();
+    const asked = this.waiting.shift();
     if (this.waiting.length > 0) this.ask(this.waiting[0]);
     if (message.refused) {
       this.say(message.refused.text);
-      this.read(); // as it is
+      if (asked.read) this.list(); // the object is gone
+      else if (!asked.list) this.read(); // as it is
     } else if (message.objects) {
       this.takeObjects(message.objects);
     } else if (message.object) {
       this.takeObject(message.object);
     } else {
-      $("edit-undo").disabled = message.edited.undos === 0;
+      this.showTurns(message.edited);
       this.say("");
       this.read();
     }

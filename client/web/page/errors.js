@@ -14,9 +14,9 @@ function colour(error) {
 }
 
 export function drawErrors(canvas, header, bytes) {
-  const colours = Array.from({ length: 256 }, (_, error) => colour(error));
+  const colours = Array.from({ length: 256 }, (_, error) => [...colour(error), 255]);
   const image = new ImageData(header.width, header.height);
-  for (let i = 0; i < bytes.length; i += 1) image.data.set([...colours[bytes[i]], 255], i * 4);
+  for (let i = 0; i < bytes.length; i += 1) image.data.set(colours[bytes[i]], i * 4);
   canvas.width = header.width;
   canvas.height = header.height;
   canvas.getContext("2d").putImageData(image, 0, 0);

@@ -8,6 +8,7 @@ import { showStages } from "./stages.js";
 const WIDTH_MAX = 3840, HEIGHT_MAX = 2160, SIDE_MIN = 16; // as the gateway allows
 const REST_MS = 150; // after the last input the picture is refined
 const PAUSE_MS = 250, PAUSE_MAX_MS = 8000; // between tries to connect
+const REFUSED = 1008; // the status with which the gateway closes a connection that has asked for what there is not
 const TURN = Math.PI; // radians for a drag over the picture's height
 const NARROW = 0.0015; // of a wheel's notch of 100: 14 %
 const COMPARED_SAMPLES = 4; // the view has so many before its tracer is compared, which takes the daemon a while
@@ -15,9 +16,10 @@ const WIDE = 1000; // pixels of a window that has room for the controls beside t
 
 const $ = (id) => document.getElementById(id);
 const canvas = $("picture");
-let socket = null, scene = null, failures = 0, wantsH264 = false;
+let socket = null, retry = 0, failures = 0, wantsH264 = false;
+let scene = null, isNew = true; // what was told last, on another connection
 let camera = null; // null: the view is the scene's own, or `node`'s
-let node = 0;
+let node = null; // null: not told yet
 let lastFrame = null;
 let isDirty = false, movedAt = 0, resting = 0, id = 0;
 let isPlaying = false, time = 0, tickAt = 0;
@@ -28,7 +30,9 @@ const link = new URLSearchParams(location.hash.slice(1));
 // ---- what the gateway is told ----
 
 function tell(message) {
-  if (socket && socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify(message));
+  const isOpen = socket !== null && socket.readyState === WebSocket.OPEN;
+  if (isOpen) socket.send(JSON.stringify(message));
+  return isOpen;
 }
 
 function tellShow() {
@@ -51,9 +55,10 @@ function tellLook(moving) {
   const from = camera || (lastFrame && cameraOfFrame(lastFrame, scene));
   if (!from) return;
   forgetErrors();
-  id = (id + 1) % 0xffffffff;
-  if (movedAt) inputs.set(id, movedAt);
-  tell({ look: { id, eye: from.eye, at: from.at, up: from.up, fov: from.fov, time, moving, node: camera ? 0 : node } });
+  id += 1;
+  const { eye, at, up, fov } = from;
+  const isTold = tell({ look: { id, eye, at, up, fov, time, moving, node: camera ? 0 : node || 0 } });
+  if (isTold && movedAt) inputs.set(id, movedAt);
 }
 
 // ---- what it tells ----
@@ -73,23 +78,28 @@ function fill(select, entries, chosen) {
   select.replaceChildren(...entries.map(([value, text]) => new Option(text, value, false, String(value) === String(chosen))));
 }
 
+// At the beginning of a connection, and when the scene has changed: what is chosen stays, if it is still there.
 function takeScene(told) {
-  const isFirst = !scene;
+  const clip = $("clip").value || link.get("clip") || "0";
   scene = told;
   document.title = `${told.name} - farlight`;
   $("name").textContent = told.name;
-  editing.begin(told.edit);
   canvas.setAttribute("aria-label", `Picture of ${told.name}`);
-  say("");
-  if (!isFirst) return;
+  if (isNew) {
+    editing.begin(told.edit);
+    say("");
+  }
+  isNew = false;
+  editing.list();
   const cameras = told.cameras.map((one) => [one.node, one.name || `camera ${one.node}`]);
   if (told.node === 0) cameras.unshift([0, "start"]); // no camera of the scene
-  node = told.node;
+  if (!cameras.some(([value]) => value === node)) node = told.node;
   fill($("camera"), [...cameras, ["", "free"]], camera ? "" : node);
-  fill($("clip"), [[0, "none"], ...told.clips.map((one) => [one.clip, one.name || `clip ${one.clip}`])], link.get("clip") || 0);
-  $("clips").hidden = $("play").hidden = told.clips.length === 0;
-  fill($("tracer"), told.tracers.map((name) => [name, name]), told.tracer);
-  fill($("integrator"), told.integrators.map((name) => [name, name]), told.integrator);
+  fill($("clip"), [[0, "none"], ...told.clips.map((one) => [one.clip, one.name || `clip ${one.clip}`])], clip);
+  $("clips").hidden = told.clips.length === 0;
+  if ($("clip").value !== clip) tellShow(); // it is gone
+  fill($("tracer"), told.tracers.map((name) => [name, name]), $("tracer").value || told.tracer);
+  fill($("integrator"), told.integrators.map((name) => [name, name]), $("integrator").value || told.integrator);
 }
 
 const editing = new Editing(tell);
@@ -165,7 +175,7 @@ function take(event) {
     if (message.refused && message.refused.compare === comparison) sayOfErrors(message.refused.text);
     if (message.error) {
       say(message.error.text, true);
-      link.delete("clip"); // it may be what the daemon does not have
+      forgetLink();
     }
     return;
   }
@@ -179,7 +189,20 @@ function take(event) {
 
 // ---- connecting, and connecting again ----
 
+// It may name what there is not, and is for the first view alone.
+function forgetLink() {
+  for (const name of ["tracer", "integrator", "clip"]) link.delete(name);
+}
+
+function forgetConnection() {
+  isNew = true;
+  picture.reset();
+  inputs.clear();
+  forgetErrors();
+}
+
 function connect() {
+  clearTimeout(retry);
   socket = new WebSocket(new URL("view", location.href.split("#")[0].replace(/^http/, "ws")), "farlight");
   socket.binaryType = "arraybuffer";
   socket.onopen = () => {
@@ -190,11 +213,10 @@ function connect() {
   socket.onclose = (event) => {
     const pause = Math.min(PAUSE_MAX_MS, PAUSE_MS * 2 ** failures) * (0.75 + Math.random() / 2);
     failures += 1;
-    picture.reset();
-    inputs.clear();
-    forgetErrors();
+    if (event.code === REFUSED) forgetLink();
+    forgetConnection();
     say(`the connection is lost${event.reason ? ` (${event.reason})` : ""}; trying again`, true);
-    setTimeout(connect, pause);
+    retry = setTimeout(connect, pause);
   };
 }
 
@@ -262,9 +284,15 @@ function goTo(value) {
   if (value === "") return;
   camera = null;
   node = Number(value);
+  if (node !== 0) {
+    tellLook(false);
+    return;
+  }
   // Without a camera of its own the whole scene is what a new view shows.
-  if (node === 0) socket.close();
-  else tellLook(false);
+  socket.onclose = null;
+  socket.close();
+  forgetConnection();
+  connect();
 }
 $("camera").addEventListener("change", () => goTo($("camera").value));
 for (const name of ["tracer", "integrator", "clip"]) $(name).addEventListener("change", tellShow);
@@ -275,7 +303,6 @@ $("play").addEventListener("click", () => {
     tellShow();
   }
   $("play").textContent = isPlaying ? "Pause" : "Play";
-  $("play").setAttribute("aria-pressed", String(isPlaying));
   movedAt = 0;
   isDirty = true;
 });

@@ -42,16 +42,23 @@ TEST(an_edit_is_known_while_its_object_is_as_it_was)
     fl_imported_finish(&imported);
 }
 
-TEST(an_object_that_is_gone_is_noticed)
+TEST(objects_that_are_gone_are_named)
 {
     struct fl_imported before = {0}, now = {0};
-    assert_true(fl_imported_covers(&now, &before));
+    size_t cursor = 0;
+    assert_null(fl_imported_gone(&now, &before, &cursor));
     assert_true(add(&before, 1, 7) && add(&before, 2, 7));
-    assert_false(fl_imported_covers(&now, &before));
     assert_true(add(&now, 2, 8) && add(&now, 3, 8));
-    assert_false(fl_imported_covers(&now, &before));
-    assert_true(add(&now, 1, 8));
-    assert_true(fl_imported_covers(&now, &before));
-    fl_imported_finish(&before);
+    const struct fl_imported_object *gone = fl_imported_gone(&now, &before, &cursor);
+    assert_non_null(gone);
+    assert_int_equal(gone->kind, PROTOCOL_OBJECT_NODE);
+    assert_int_equal(gone->id, 1);
+    assert_null(fl_imported_gone(&now, &before, &cursor));
     fl_imported_finish(&now);
+    now = (struct fl_imported){0};
+    cursor = 0;
+    for (int i = 0; i < 2; i++)
+        assert_non_null(fl_imported_gone(&now, &before, &cursor));
+    assert_null(fl_imported_gone(&now, &before, &cursor));
+    fl_imported_finish(&before);
 }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-#include "viewer/edit_history.h"
+#include "cli/edit_history.h"
 
 #include <stdlib.h>
 #include <string.h>

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* What was changed here, to undo and redo it: lists of assignments that bring fields back. Independent of window
  * and daemon. */
-#ifndef FARLIGHT_CLIENT_VIEWER_EDIT_HISTORY_H
-#define FARLIGHT_CLIENT_VIEWER_EDIT_HISTORY_H
+#ifndef FARLIGHT_CLIENT_CLI_EDIT_HISTORY_H
+#define FARLIGHT_CLIENT_CLI_EDIT_HISTORY_H
 
 #include "lib/farlight.h"
 
