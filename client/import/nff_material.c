@@ -24,75 +24,81 @@ float nff_colour(const struct nff *nff, float shown)
     return nff_keeps_values(nff) ? unit(shown) : linear_from_srgb_f(unit(shown));
 }
 
+/* The protocol's limit of a mirror's colour. */
+#define SPECULAR_MAX 1000.0f
+
 static float max_component(const float colour[3])
 {
     return fmaxf(fmaxf(colour[0], colour[1]), colour[2]);
 }
 
-/* `diffuse` is what scatters and `specular` what mirrors, which it does like a metal's share of the surface. */
-static void reflect(struct message_set_material *material, float diffuse, float specular)
+/* A mirror of NFF shows the same share at every angle, and the surface below it scatters what the mirror leaves.
+ * Fresnel's curve begins at `share` of the light from straight on and would rise to all of it: as it is scaled to
+ * begin at all of it, it stays there, and then it is as much weaker. Reflections are sharp, as Shine only shapes
+ * highlights. */
+static void mirror(struct message_set_material *material, const float share[3])
 {
-    float sum = diffuse + specular;
+    const float most = max_component(share), root = (material->ior - 1) / (material->ior + 1);
+    float *const colour[3] = {&material->specular_red, &material->specular_green, &material->specular_blue};
 
-    material->metallic = sum > 0 ? specular / sum : 0;
-    /* Reflections are sharp; Shine only shapes highlights. */
-    material->roughness = specular > 0 ? 0.0f : 1.0f;
+    if (most == 0 && material->transmission == 0) {
+        material->ior = 1; /* nothing is mirrored */
+        return;
+    }
+    material->roughness = 0;
+    material->specular = most;
+    for (int c = 0; c < 3; c++)
+        *colour[c] = most > 0 ? fminf(share[c] / most / (root * root), SPECULAR_MAX) : 1;
 }
 
-/* Glass mirrors by its index of refraction. */
+/* Where the index of refraction says nothing, light goes straight on, and what is met is a pane. */
 static void transmit(struct message_set_material *material, float through, float ior)
 {
     material->transmission = through;
-    material->metallic = 0;
     material->roughness = 0;
-    material->ior = ior >= 1 && ior <= 10 ? ior : 1;
+    material->thin_walled = ior > 1 ? 0u : 1u;
+    if (ior > 1)
+        material->ior = fminf(ior, 10);
 }
 
-/* What a surface of the index of refraction 10 mirrors, at most one may have. */
-#define MIRROR_MAX 0.669f
+/* The colour below a mirror of that share with which as much is sent back as without it. */
+static float below(float sent, float share)
+{
+    return share < 1 ? unit(sent / (1 - share)) : 0;
+}
 
 /* NFF's numbers are a display's: where one of the parts is all that is seen, a display shows it times the colour,
- * and the mirror times what it mirrors, which has a hue of its own. */
+ * and the mirror times what it mirrors, which has a hue of its own. What passes is not scattered, as in pictures
+ * of the Standard Procedural Databases that POV-Ray makes of their author's output. */
 static void from_plain(const struct nff *nff, const float n[8], struct message_set_material *material)
 {
-    const float scattered = nff_colour(nff, n[3]), specular = nff_colour(nff, n[4]),
-                through = nff_colour(nff, n[6]);
+    const float share = nff_colour(nff, n[4]), shares[3] = {share, share, share};
+    const float through = nff_colour(nff, n[6]), sent = through + nff_colour(nff, n[3]) * (1 - through);
 
-    if (through > 0) {
-        transmit(material, through / (through + scattered), n[7]);
-        for (int c = 0; c < 3; c++)
-            material->base_colour[c] = unit(nff_colour(nff, n[c]) * (through + scattered));
-    } else if (specular > MIRROR_MAX) { /* metal; it has the surface's hue */
-        reflect(material, scattered, specular);
-        for (int c = 0; c < 3; c++)
-            material->base_colour[c] = unit(nff_colour(nff, n[c]) * (scattered + specular));
-    } else {
-        const float root = sqrtf(specular); /* Fresnel's equations, straight on */
-
-        reflect(material, 1, 0);
-        material->roughness = specular > 0 ? 0.0f : 1.0f;
-        material->ior = (1 + root) / (1 - root);
-        for (int c = 0; c < 3; c++)
-            material->base_colour[c] = unit(nff_colour(nff, unit(n[c]) * unit(n[3])) / (1 - specular));
-    }
+    if (through > 0)
+        transmit(material, through / sent, n[7]);
+    mirror(material, shares);
+    for (int c = 0; c < 3; c++)
+        material->base_colour[c] =
+            below(through > 0 ? nff_colour(nff, n[c]) * sent : nff_colour(nff, unit(n[c]) * unit(n[3])), share);
 }
 
 /* What the ambient light shows is there whatever else lights the surface: it becomes emission. Glass has the hue
  * of what it scatters, but lets all of T through. */
 static void from_extended(const float n[12], const float ambient[3], struct message_set_material *material)
 {
-    const float *diffuse = n + 3, *specular = n + 6;
-    float brightest = fmaxf(max_component(diffuse), 0), through = unit(n[10]);
+    const float *diffuse = n + 3;
+    const float brightest = fmaxf(max_component(diffuse), 0), through = unit(n[10]);
+    const float shares[3] = {unit(n[6]), unit(n[7]), unit(n[8])};
 
-    reflect(material, brightest, fmaxf(max_component(specular), 0));
-    for (int c = 0; c < 3; c++) {
-        material->base_colour[c] = unit(fmaxf(diffuse[c], 0) + fmaxf(specular[c], 0));
-        material->emission[c] = fminf(fmaxf(n[c] * ambient[c], 0), 1e6f);
-    }
-    if (through > 0) {
+    if (through > 0)
         transmit(material, through, n[11]);
-        for (int c = 0; c < 3; c++)
+    mirror(material, shares);
+    for (int c = 0; c < 3; c++) {
+        material->base_colour[c] = below(fmaxf(diffuse[c], 0), shares[c]);
+        if (through > 0)
             material->base_colour[c] = brightest > 0 ? unit(diffuse[c] / brightest) : 1;
+        material->emission[c] = fminf(fmaxf(n[c] * ambient[c], 0), 1e6f);
     }
 }
 

@@ -279,29 +279,40 @@ vec3 brdf_scattered(surface s, split parts, vec3 view, float NoV, vec3 light)
 
 // Share of the irradiance from a direction (of a light, unit) that goes to the eye, per steradian; without the cosine,
 // and without what a coat mirrors. From below the horizon only what is scattered to the other side, and 0 for glass seen
-// from inside, where no light is sampled. Reciprocal. `parts`: of the same surface and NoV.
+// from inside, where no light is sampled. Reciprocal. `parts`: of the same surface and NoV. `shine`: 0 leaves out the
+// highlight.
 //
 // What is mirrored: facets_mirror(). (1 - F) of the half-way vector alone, as often seen for scattered
 // light, would give out up to 1.7 of what arrives at grazing angles.
-vec3 brdf(surface s, split parts, vec3 view, float NoV, vec3 light)
+vec3 brdf(surface s, split parts, vec3 view, float NoV, vec3 light, float shine)
 {
     float NoL = dot(s.normal, light);
     if (NoL <= 0.0 || dot(s.geometric, light) <= 0.0)
         return brdf_passed(s, parts, light);
     float VoH = clamp(dot(view, normalize(view + light)), 0.0, 1.0);
     vec3 mirror = mix(vec3(outside_mirror(s, VoH, fresnel_dielectric(VoH, s.ior), 1.0)), metal_mirror(s, VoH), s.metallic);
-    vec3 specular = mirror * facets_mirror(s, max(s.roughness, ROUGHNESS_MIN_LIGHT), view, NoV, light, NoL);
+    vec3 specular = mirror * (shine * facets_mirror(s, max(s.roughness, ROUGHNESS_MIN_LIGHT), view, NoV, light, NoL));
     float loss = facets_lost_from(s, light, NoL);
     return spread_out(s, parts, NoL, facets_alpha(s), loss) * over_scattered(s, parts, light) +
            specular * over_mirrored(s, parts, light) + sheen_sent(s, parts, view, NoV, light);
 }
 
-// The same of all that is there, times the cosine.
-vec3 reflected(surface s, split parts, vec3 view, float NoV, vec3 light)
+vec3 brdf(surface s, split parts, vec3 view, float NoV, vec3 light)
 {
-    vec3 sent = brdf(s, parts, view, NoV, light) * abs(dot(s.normal, light));
+    return brdf(s, parts, view, NoV, light, 1.0);
+}
+
+// The same of all that is there, times the cosine.
+vec3 reflected(surface s, split parts, vec3 view, float NoV, vec3 light, float shine)
+{
+    vec3 sent = brdf(s, parts, view, NoV, light, shine) * abs(dot(s.normal, light));
 #ifdef HAS_CLEARCOAT
     sent += coat_highlight(s, parts.coat, view, light, max(s.coat_roughness, ROUGHNESS_MIN_LIGHT));
 #endif
     return sent;
+}
+
+vec3 reflected(surface s, split parts, vec3 view, float NoV, vec3 light)
+{
+    return reflected(s, parts, view, NoV, light, 1.0);
 }

@@ -193,7 +193,8 @@ bool ask_for_light(eye_hit e, shadow_choice c)
     }
     vec3 from = e.origin;
     light_sample sampled = light_seen(e.s, e.distance_, c.light_number, c.u, from);
-    vec3 sent = reflected(e.blurred, e.blurred_parts, e.view, e.NoV, sampled.direction);
+    float shine = light_shine(c.light_number, e.s.roughness);
+    vec3 sent = reflected(e.blurred, e.blurred_parts, e.view, e.NoV, sampled.direction, shine);
     vec3 arriving = e.weight * (sent * sampled.irradiance / probability);
     return add_shadow_ray(e.j, e.p, from, sampled.direction, sampled.distance_, limited(e.p, 0u, arriving));
 }

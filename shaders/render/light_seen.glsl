@@ -18,3 +18,11 @@ light_sample light_seen(surface s, float distance_, uint index, vec2 u, inout ve
 #endif
     return sampled;
 }
+
+// Of a light's highlight: 0 for a steady one in a smooth mirror. Renderers that had such lights showed in mirrors what rays
+// meet, and no ray meets a point.
+float light_shine(uint index, float roughness)
+{
+    int kind = int(texelFetch(lights, int(index) * LIGHT_TEXELS).w);
+    return kind == LIGHT_KIND_STEADY && roughness < ROUGHNESS_MIN_LIGHT ? 0.0 : 1.0;
+}

@@ -12,8 +12,8 @@
 // Defines: those of common/material.glsl, common/light.glsl and common/environment.glsl.
 
 #include "common/environment.glsl"
-#include "common/light.glsl"
 #include "common/scattering.glsl"
+#include "render/light_seen.glsl"
 #include "render/shade.glsl"
 #include "render/wave.glsl"
 
@@ -45,7 +45,7 @@ vec3 lit(path p, surface s, vec3 direction, float distance_)
         u = sequence_pair(seed, SEQUENCE_EVERY_LIGHT + (wave_number << 16 ^ i), sample_);
 #endif
         light_sample sampled = light_sample_at(i, origin, u);
-        sum += reflected(s, parts, view, NoV, sampled.direction) * sampled.irradiance;
+        sum += reflected(s, parts, view, NoV, sampled.direction, light_shine(i, s.roughness)) * sampled.irradiance;
     }
     return sum;
 }

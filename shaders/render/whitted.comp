@@ -76,7 +76,8 @@ uint ask_for_lights(uint j, path parent, surface s, split parts, vec3 view, floa
 #endif
         vec3 from = origin;
         light_sample sampled = light_seen(s, distance_, index, u, from);
-        vec3 arriving = weight * (reflected(s, parts, view, NoV, sampled.direction) * sampled.irradiance);
+        vec3 sent = reflected(s, parts, view, NoV, sampled.direction, light_shine(index, s.roughness));
+        vec3 arriving = weight * (sent * sampled.irradiance);
         if (add_shadow_ray(i * wave.hits.count + j, parent, from, sampled.direction, sampled.distance_, arriving))
             alive++;
     }

@@ -638,12 +638,14 @@ class Written(importer.Written):
         spheres, = result.of(SET_SPHERES)
         red, glass = result.of(SET_MATERIAL)
         self.assertEqual([r[:2] for r in spheres["ranges"]], [(0, 2), (2, 1)], "sorted by material")
-        # A display's numbers, with which light is computed. What scatters is below the mirror, which takes its part.
-        self.assertEqual((red["metallic"], red["roughness"]), (0, 0))
+        # A display's numbers, with which light is computed. What scatters is below the mirror, which takes its part and is the same
+        # at every angle: by its colour, Fresnel's curve begins at 1.
+        self.assertEqual((red["metallic"], red["roughness"], red["specular"][0]), (0, 0, 0.5))
+        for got in red["specular"][1:]:
+            self.assertAlmostEqual(got * ((red["ior"] - 1) / (red["ior"] + 1)) ** 2, 1, 5)
         for got, wanted in zip(red["base"], (0.5 / (1 - 0.5), 0, 0)):
             self.assertAlmostEqual(got, wanted, 5)
-        self.assertAlmostEqual(((red["ior"] - 1) / (red["ior"] + 1)) ** 2, 0.5, 5)
-        self.assertEqual(glass["transmission"], 1)
+        self.assertEqual((glass["transmission"], glass["specular"][0], glass["thin_walled"]), (1, 0, 0))
         self.assertAlmostEqual(glass["base"][0], 0.9, 5)
         self.assertEqual(glass["ior"], 1.5)
         self.assertEqual(result.of(SET_MESH)[0]["triangles"], 64 + 2 + 1)

@@ -70,16 +70,18 @@ class Written(importer.Written):
         self.assertEqual((len(result.of(importer.SET_LIGHT)), len(result.of(importer.SET_SPHERES))), (2, 1))
         self.assertEqual(self.positions(result, result.of(importer.SET_MESH)[0])[0], (5, 0, 0))
 
-    def test_three_colours_become_base_colour_metal_and_emission(self):
-        result = self.run_text("fm 0.1 0.2 0.3 0.3 0.2 0.1 0.1 0.1 0.1 20 0 0 % a comment\n" + TRIANGLE +
+    def test_three_colours_become_base_colour_mirror_and_emission(self):
+        result = self.run_text("fm 0.1 0.2 0.3 0.3 0.2 0.1 0.1 0.2 0 20 0 0 % a comment\n" + TRIANGLE +
                                "fm 0.1 0.1 0.1 0.2 0.1 0 0 0 0 20 0.75 1.25 # another\n" + TRIANGLE + "am 2 1 0.5\n")
         mirror, glass = result.of(importer.SET_MATERIAL)
-        self.assert_near(mirror["base"], (0.4, 0.3, 0.2, 1))
-        self.assertAlmostEqual(mirror["metallic"], 0.25)
-        self.assertEqual((mirror["roughness"], mirror["double_sided"]), (0, 1))
+        self.assert_near(mirror["base"], (0.3 / 0.9, 0.2 / 0.8, 0.1, 1))
+        self.assert_near([0.04 * factor for factor in mirror["specular"][1:]], (0.5, 1, 0))
+        self.assertAlmostEqual(mirror["specular"][0], 0.2)
+        self.assertEqual((mirror["metallic"], mirror["roughness"], mirror["double_sided"]), (0, 0, 1))
         self.assert_near(mirror["emission"], (0.2, 0.2, 0.15))
         self.assertEqual((glass["transmission"], glass["ior"], glass["metallic"]), (0.75, 1.25, 0))
         self.assert_near(glass["base"], (1, 0.5, 0, 1))
+        self.assertEqual((glass["specular"][0], glass["thin_walled"]), (0, 0))
 
     def test_ambient_light_is_white_if_nothing_is_said(self):
         material, = self.run_text("fm 0.1 0.2 0.3 1 1 1 0 0 0 1 0 1\n" + TRIANGLE).of(importer.SET_MATERIAL)

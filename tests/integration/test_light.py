@@ -41,9 +41,11 @@ class Light(Case):
 
     def test_nff_is_shown_as_its_author_does(self):
         """Its numbers are a display's, and so is light, whatever the tone map: a surface that scatters shows colour times Kd times the cosine, a mirror Ks of what it
-        shows, a ray that leaves the background. Nothing else lights a surface, and no distance makes it darker."""
+        shows at every angle, and no light, which no ray meets, a pane colour times T, a ray that leaves the background. Nothing else lights a surface, and no distance
+        makes it darker."""
         view = "b 0.078 0.361 0.753\nv\nfrom 0 0 4\nat 0 0 0\nup 0 1 0\nangle 30\nhither 0.01\nresolution 8 8\n"
         square, lamp = "p 4\n-9 -9 {0}\n9 -9 {0}\n9 9 {0}\n-9 9 {0}\n", "l 0 0 {}\n"
+        steep = "p 4\n-9 -1 6\n9 -1 6\n9 1 -6\n-9 1 -6\n"  # 80 degrees; Fresnel's equations would have it mirror 0.7
         background, scatters = (0.078, 0.361, 0.753), "f 1 0.75 0.33 0.8 0 0 0 1\n"
         for name, text, wanted, steps in (
                 ("lit", view + lamp.format(7) + scatters + square.format(0), (0.8, 0.6, 0.264), 1),
@@ -51,7 +53,10 @@ class Light(Case):
                 ("unlit", view + lamp.format(-7) + scatters + square.format(0), (0, 0, 0), 0),
                 ("nothing", view + lamp.format(7) + scatters + square.format(9), background, 1),
                 ("bright", view + 3 * lamp.format(7) + scatters + square.format(0), (1, 1, 0.4573), 1),  # sqrt(3) of "lit"
-                ("mirror", view + lamp.format(-7) + "f 1 1 1 0 0.5 9 0 1\n" + square.format(0), (0.039, 0.1805, 0.3765), 1)):
+                ("mirror", view + lamp.format(7) + "f 1 1 1 0 0.5 9 0 1\n" + square.format(0), (0.039, 0.1805, 0.3765), 1),
+                ("sum", view + lamp.format(7) + "f 1 0.5 0 0.4 0.5 9 0 1\n" + square.format(0), (0.439, 0.3805, 0.3765), 1),
+                ("grazing", view + lamp.format(-7) + "f 1 1 1 0 0.5 9 0 1\n" + steep, (0.039, 0.1805, 0.3765), 1),
+                ("pane", view + lamp.format(-7) + "f 1 0.5 0 0.4 0 9 0.5 0\n" + square.format(0), (0.039, 0.09025, 0), 1)):
             (self.folder / f"{name}.nff").write_text(text)
             for integrator in ("whitted", "distributed", "path"):
                 with self.subTest(name=name, integrator=integrator):

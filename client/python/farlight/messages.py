@@ -329,7 +329,7 @@ class LightKind(Word):
     DIRECTIONAL = 2  # irradiance in W/m2, along -z of its node
     RECTANGLE = 3  # radiance in W/(m2 sr), in the node's xy plane, shining along -z
     SPHERE = 4  # radiance in W/(m2 sr)
-    STEADY = 5  # irradiance in W/m2, from a point, the same at every distance, as the lights of NFF
+    STEADY = 5
 
 
 class CameraPath(Word):
