@@ -93,7 +93,7 @@ static bool check_rule(const struct tracer_settings *settings, const struct rule
         snprintf(fault->text, sizeof(fault->text), "%" PRIu64 " is more than the %" PRIu64 " %s of %s", value,
                  limit, other->unit, other_name);
         snprintf(fault->remedy, sizeof(fault->remedy), "choose a lower number, or a higher %s", other_name);
-        return value <= limit;
+        return limit == 0 || value <= limit; /* 0: the tracer chooses */
     }
     const char *text = enum_desc_text(field->enumeration, (uint32_t)value);
     bool holds = true;

@@ -429,6 +429,16 @@ static bool fill_keys(struct engine_job *job, const struct message_render *rende
     return true;
 }
 
+static struct tracer_options options_of(const struct session *session, const struct message_render *render)
+{
+    const uint64_t pixels = (uint64_t)render->width * render->height * render->views_across * render->views_down;
+    struct tracer_options options = tracer_options_of(&render->settings, &session->hub->options.limits.tracers);
+    tracer_options_note_picture(&options, render->tracer, pixels);
+    if (render->compare)
+        tracer_options_note_picture(&options, render->compare_with, pixels);
+    return options;
+}
+
 /* All but keys and clips, which are there already. */
 static void fill_rest(struct engine_job *job, const struct session *session, const struct message_render *render)
 {
@@ -465,7 +475,7 @@ static void fill_rest(struct engine_job *job, const struct session *session, con
                 .depth = render->depth,
                 .seed = render->seed,
                 .tracer = render->tracer,
-                .tracer_options = tracer_options_of(&render->settings, &session->hub->options.limits.tracers),
+                .tracer_options = options_of(session, render),
                 .integrator = (enum integrator_kind)render->integrator,
                 .primary = (enum primary_kind)render->primary,
                 .tone_map = (enum tone_map)render->tone_map,

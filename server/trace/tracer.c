@@ -22,6 +22,17 @@ struct tracer_options tracer_options_of(const struct tracer_settings *settings, 
     return options;
 }
 
+void tracer_options_note_picture(struct tracer_options *options, unsigned tracer, uint64_t pixels)
+{
+    uint32_t noted = 1;
+    if (!(tracer == TRACER_LDC && options->ldc.resolution == 0) &&
+        !(tracer == TRACER_ABUFFER && options->abuffer.resolution == 0))
+        return;
+    while ((double)noted * 1.4142135 < (double)pixels && noted < 1u << 31)
+        noted *= 2;
+    options->picture_pixels = noted;
+}
+
 bool tracer_options_same(const struct tracer_options *a, const struct tracer_options *b)
 {
     return memcmp(a, b, sizeof(*a)) == 0;
@@ -79,8 +90,10 @@ struct tracer *tracer_create(const struct tracer_impl *impl, struct gpu_device *
         return NULL;
     }
     resolved = tracer_options_of(&settings, &resolved.limits);
-    if (options)
+    if (options) {
         resolved.bench = options->bench;
+        resolved.picture_pixels = options->picture_pixels;
+    }
     struct tracer *tracer = impl->create(device, &resolved, error);
     if (!tracer)
         return NULL;

@@ -51,12 +51,19 @@ struct tracer_options {
 #include "protocol/tracers.def"
     struct tracer_limits limits;
     uint32_t quadtree_leaves; /* 1: its layers will be asked for, and no ray traced */
+    /* Of the pictures that are asked for, the nearest power of two, so that a window may change its size a little:
+     * by it a structure of samples chooses its resolution. 0: not known, or a resolution was asked for. */
+    uint32_t picture_pixels;
     struct tracer_bench bench;
 };
 /* clang-format on */
 
 struct tracer_options tracer_options_of(const struct tracer_settings *settings,
                                         const struct tracer_limits *limits);
+
+/* Notes the pixels of the pictures that are asked for of a tracer, by number, where it needs them. Structures that
+ * do not depend on them are the same for all pictures. */
+void tracer_options_note_picture(struct tracer_options *options, unsigned tracer, uint64_t pixels);
 
 /* Whether one tracer serves both, and a picture by either goes on from one by the other. */
 bool tracer_options_same(const struct tracer_options *a, const struct tracer_options *b);

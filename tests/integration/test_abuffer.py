@@ -170,7 +170,8 @@ class Comparison(OneDaemon):
         if "libembree-dev" in result.stderr:
             self.skipTest("this farlightd was built without Embree")
         report = json.loads(self.expect(result, 0).stdout)
-        self.assertEqual((report["tracer"], report["integrator"], report["structure"]["resolution"]), ("abuffer", "whitted", 1280))
+        self.assertEqual((report["tracer"], report["integrator"]), ("abuffer", "whitted"))
+        self.assertIn(report["structure"]["resolution"], range(128, 1280))  # of a small picture
         for kind in ("primary", "secondary"):
             waves = [wave for wave in report["waves"] if wave["kind"] == kind]
             agreed, rays = (sum(wave[key] for wave in waves for key in keys) for keys in
@@ -178,7 +179,7 @@ class Comparison(OneDaemon):
             self.assertGreater(rays, 1000)
             self.assertGreaterEqual(agreed / rays, 0.99, kind)
         text = self.expect(farlight("compare", bundled_scenes() / "teapot.glb", "--tracers", "abuffer,bvh", "--abuffer-search",
-                                    "linear1", *SIZE), 0).stdout
+                                    "linear1", "--abuffer-resolution", "1280", *SIZE), 0).stdout
         self.assertIn("abuffer against bvh", text)
         self.assertIn("structure: resolution 1280, cell ", text)
 

@@ -181,7 +181,7 @@ class Comparison(OneDaemon):
         if "libembree-dev" in result.stderr:
             self.skipTest("this farlightd was built without Embree")
         report = json.loads(self.expect(result, 0).stdout)
-        self.assertEqual(report["structure"]["static/resolution"], 1024)
+        self.assertIn(report["structure"]["static/resolution"], range(128, 1024))  # of a small picture
         self.assertIn("secondary", {wave["kind"] for wave in report["waves"]})
         for kind in ("primary", "secondary"):
             waves = [wave for wave in report["waves"] if wave["kind"] == kind]
@@ -189,7 +189,8 @@ class Comparison(OneDaemon):
                             (("both_hit", "both_missed"), ("rays",)))
             self.assertGreater(rays, 1000)
             self.assertGreaterEqual(agreed / rays, 0.99, kind)
-        text = self.expect(farlight("compare", bundled_scenes() / "teapot.glb", "--tracers", "ldc,bvh", *SIZE), 0).stdout
+        text = self.expect(farlight("compare", bundled_scenes() / "teapot.glb", "--tracers", "ldc,bvh", "--ldc-resolution", "1024",
+                                    *SIZE), 0).stdout
         self.assertIn("structure static: resolution 1024, cell ", text)
 
 

@@ -2004,14 +2004,16 @@ class Render(Message):
         rgba32f and encoding raw, zstd or predicted
     bvh_bounds: bounding volume of a node
     bvh_rays: rays that traverse the hierarchy as one packet
-    ldc_resolution: cells along the longest side of the sampled box
+    ldc_resolution: cells along the longest side of the sampled box; auto: 1024, or as many as are worth their time for
+        the layers of the scene and the pixels of the picture
     ldc_tolerance: a ray hits a sample that it comes this near to; 0: one whose plane it intersects
     ldc_build: how the samples are created
     ldc_levels: what lets a ray skip empty space
     ldc_block: side of a block, for the levels blocks
     ldc_images: which of the three images hold a surface
     ldc_rays: rays that traverse a cube as one packet
-    abuffer_resolution: texels along a side of the images of the lists
+    abuffer_resolution: texels along a side of the images of the lists; auto: 1280, or as many as are worth their time
+        for the layers of the scene and the pixels of the picture
     abuffer_voxels: voxels along a side of the grid, not more than texels; auto: near the root of three times the
         resolution
     abuffer_search: how the intersection is found in a voxel that holds a surface

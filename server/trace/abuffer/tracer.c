@@ -16,6 +16,11 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* Where no resolution was asked for: the maximum, and the samples that a pixel of the picture is worth: one takes
+ * a third of the time that one of ldc takes. */
+#define RESOLUTION_USUAL 1280u
+#define SAMPLES_PER_PIXEL 12.0
+
 #define VOXELS_MIN 16
 #define VOXELS_MAX 256
 
@@ -24,10 +29,11 @@ struct abuffer {
     struct abuffer_store store;
     struct abuffer_builder *builder;
     struct gpu_timer *timer;
-    uint32_t resolution, voxels_along; /* as wanted; no voxels: as many as go with the resolution */
-    uint32_t fitted;                   /* what the resolution was lowered to; 0: not counted yet */
-    uint32_t fitted_instances;         /* that were counted */
-    bool had_cutout;                   /* when it was built last */
+    struct axes_wish wish;     /* of the resolution */
+    uint32_t voxels_along;     /* as wanted; 0: as many as go with the resolution */
+    uint32_t fitted;           /* what the resolution was lowered to; 0: not counted yet */
+    uint32_t fitted_instances; /* that were counted */
+    bool had_cutout;           /* when it was built last */
 };
 
 /* ---- options ---- */
@@ -64,7 +70,7 @@ static struct tracer *abuffer_create(struct gpu_device *device, const struct tra
         return NULL;
     }
     abuffer_store_init(&abuffer->store, device);
-    abuffer->resolution = options->abuffer.resolution;
+    abuffer->wish = (struct axes_wish){options->abuffer.resolution, RESOLUTION_USUAL, SAMPLES_PER_PIXEL};
     abuffer->voxels_along = options->abuffer.voxels;
     abuffer->timer = gpu_timer_create(device);
     if (!abuffer->timer)
@@ -78,14 +84,14 @@ static struct tracer *abuffer_create(struct gpu_device *device, const struct tra
 
 /* ---- updates ---- */
 
-/* Counts the layers before anything is built. `box`: as it is at the wanted resolution. */
+/* Counts the layers before anything is built. `box`: as it is at the greatest resolution. */
 static bool fit(struct abuffer *abuffer, const struct gpu_scene *scene, const uint32_t *instances, uint32_t count,
                 const struct axes_box *box, struct error *error)
 {
-    const struct axes_box whole = axes_box_whole(box, abuffer->resolution);
+    const struct axes_box whole = axes_box_whole(box, axes_greatest_resolution(&abuffer->wish));
     const float steep = abuffer_is_linear(&abuffer->base.options) ? 0 : ABUFFER_STEEP;
     const struct axes_layers layers = axes_count_layers(scene, instances, count, 0, steep, &whole);
-    uint32_t fitted = abuffer->resolution;
+    uint32_t fitted = axes_choose_resolution(&abuffer->base, layers.mean, &abuffer->wish);
     if (!axes_fit_resolution(&abuffer->base, layers.mean, &fitted, error))
         return false;
     abuffer->fitted = fitted;
@@ -93,11 +99,13 @@ static bool fit(struct abuffer *abuffer, const struct gpu_scene *scene, const ui
     return true;
 }
 
+/* As many as go with a resolution that was not lowered: a lower one makes images cheaper, but with fewer voxels a
+ * ray passes more samples (gears of 28 layers, 543 texels: 64 voxels take 0.7 of the time of 32). */
 static uint32_t voxels_of(const struct abuffer *abuffer)
 {
     uint32_t voxels = abuffer->voxels_along;
     if (voxels == 0)
-        return voxels_for(abuffer->fitted);
+        voxels = voxels_for(axes_greatest_resolution(&abuffer->wish));
     while (voxels > abuffer->fitted && voxels > VOXELS_MIN)
         voxels /= 2;
     return voxels;
@@ -110,7 +118,7 @@ static bool place(struct abuffer *abuffer, const struct gpu_scene *scene, const 
     struct abuffer_store *store = &abuffer->store;
     struct axes_box box;
     if ((abuffer->fitted == 0 || abuffer->fitted_instances != count) &&
-        (!axes_box_place(&box, scene, instances, count, abuffer->resolution, error) ||
+        (!axes_box_place(&box, scene, instances, count, axes_greatest_resolution(&abuffer->wish), error) ||
          !fit(abuffer, scene, instances, count, &box, error)))
         return false;
     if (!axes_box_place(&box, scene, instances, count, abuffer->fitted, error))
@@ -118,7 +126,7 @@ static bool place(struct abuffer *abuffer, const struct gpu_scene *scene, const 
     memcpy(store->lower_world, box.lower_world, sizeof(store->lower_world));
     store->cell_world = box.cell_world;
     store->resolution = abuffer->fitted;
-    store->resolution_wanted = abuffer->resolution;
+    store->resolution_wanted = axes_wanted_resolution(&abuffer->base, &abuffer->wish);
     store->voxels_along = voxels_of(abuffer);
     return true;
 }

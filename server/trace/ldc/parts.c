@@ -2,7 +2,6 @@
 #include "trace/ldc/parts.h"
 
 #include "trace/ldc/build.h"
-#include "trace/raster/fit.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -177,12 +176,13 @@ static bool place_part(struct ldc_part *fresh, const struct ldc_part *before, co
 {
     const uint32_t *instances = fresh->instances, count = fresh->count;
     const bool is_counted = before->resolution > 0 && same_bodies(before, fresh);
-    uint32_t resolution = is_counted ? before->resolution : settings->resolution;
+    uint32_t resolution = is_counted ? before->resolution : axes_greatest_resolution(&settings->wish);
     if (!axes_box_place(&fresh->box, scene, instances, count, resolution, error))
         return false;
     if (count > 0 && !is_counted) {
         const struct axes_box whole = axes_box_whole(&fresh->box, resolution);
         const struct axes_layers layers = axes_count_layers(scene, instances, count, settings->overlap, 0, &whole);
+        resolution = axes_choose_resolution(settings->tracer, layers.mean, &settings->wish);
         if (!axes_fit_depth(settings->tracer, layers.greatest, LDC_LISTED_LAYERS_MAX, error) ||
             !axes_fit_resolution(settings->tracer, layers.mean, &resolution, error) ||
             !axes_box_place(&fresh->box, scene, instances, count, resolution, error))

@@ -11,6 +11,7 @@
 #include "base/error.h"
 #include "base/hashmap.h"
 #include "trace/raster/box.h"
+#include "trace/raster/fit.h"
 #include "gpu_scene/scene.h"
 #include "trace/ldc/store.h"
 #include "trace/tracer.h"
@@ -45,8 +46,8 @@ struct ldc_parts {
 
 struct ldc_parts_settings {
     const struct tracer *tracer;
-    uint32_t resolution; /* of a cube, as wanted: it is lower where there would be too many samples */
-    float overlap;       /* as axes_pass */
+    struct axes_wish wish; /* of a cube's resolution: it is lower where there would be too many samples */
+    float overlap;         /* as axes_pass */
 };
 
 void ldc_parts_finish(struct ldc_parts *parts); /* leaves it empty */

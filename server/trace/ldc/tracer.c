@@ -5,6 +5,7 @@
 #include "gpu/timer.h"
 #include "ldc/layout.h"
 #include "trace/raster/draw.h"
+#include "trace/raster/fit.h"
 #include "trace/ldc/build.h"
 #include "trace/ldc/levels.h"
 #include "trace/ldc/parts.h"
@@ -16,6 +17,11 @@
 #include <epoxy/gl.h>
 #include <stdlib.h>
 #include <string.h>
+
+/* Where no resolution was asked for: the maximum, and the samples that a pixel of the picture is worth. To build
+ * one takes some five times as long as bvh takes for a ray, and a pixel has 16 rays and more. */
+#define RESOLUTION_USUAL 1024u
+#define SAMPLES_PER_PIXEL 4.0
 
 /* What the next unit of an update does. */
 enum ldc_phase {
@@ -35,7 +41,7 @@ struct ldc {
     struct ldc_builder *builder;
     struct ldc_parts parts;
     struct gpu_timer *timer;
-    uint32_t resolution;
+    struct axes_wish wish;
 };
 
 /* ---- options ---- */
@@ -78,7 +84,7 @@ static struct tracer *ldc_create(struct gpu_device *device, const struct tracer_
         return NULL;
     }
     ldc_store_init(&ldc->store, device);
-    ldc->resolution = options->ldc.resolution;
+    ldc->wish = (struct axes_wish){options->ldc.resolution, RESOLUTION_USUAL, SAMPLES_PER_PIXEL};
     ldc->timer = gpu_timer_create(device);
     if (!ldc->timer)
         error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a tracer's timer");
@@ -116,7 +122,7 @@ static enum tracer_progress find_cube(struct ldc *ldc)
         if (part->count == 0)
             continue;
         cube->resolution = part->resolution;
-        cube->resolution_wanted = ldc->resolution;
+        cube->resolution_wanted = axes_wanted_resolution(&ldc->base, &ldc->wish);
         ldc->phase = LDC_CUBE;
         return TRACER_MORE;
     }
@@ -203,7 +209,7 @@ static enum tracer_progress begin_update(struct ldc *ldc, const struct gpu_scene
 {
     const struct ldc_parts_settings settings = {
         .tracer = &ldc->base,
-        .resolution = ldc->resolution,
+        .wish = ldc->wish,
         .overlap = ldc->base.options.ldc.images == LDC_IMAGES_ONE ? 1.0f : AXES_OVERLAP,
     };
     bool any = changed & CHANGED_SURFACES;

@@ -191,11 +191,38 @@ struct axes_layers axes_count_layers(const struct gpu_scene *scene, const uint32
     return layers;
 }
 
+static double hardware_times(const struct tracer *tracer)
+{
+    return tracer->device->facts.software ? 1 : AXES_HARDWARE_TIMES;
+}
+
 static double samples_max(const struct tracer *tracer)
 {
     if (tracer->options.bench.axes_samples > 0)
         return tracer->options.bench.axes_samples;
-    return AXES_SAMPLES_MAX * (tracer->device->facts.software ? 1 : AXES_HARDWARE_TIMES);
+    return AXES_SAMPLES_MAX * hardware_times(tracer);
+}
+
+uint32_t axes_greatest_resolution(const struct axes_wish *wish)
+{
+    return wish->resolution > 0 ? wish->resolution : wish->usual;
+}
+
+uint32_t axes_choose_resolution(const struct tracer *tracer, double layers, const struct axes_wish *wish)
+{
+    const uint32_t pixels = tracer->options.picture_pixels;
+    if (wish->resolution > 0 || pixels == 0)
+        return axes_greatest_resolution(wish);
+    const double counted = pixels > AXES_PICTURE_PIXELS_MIN ? pixels : AXES_PICTURE_PIXELS_MIN;
+    const double samples = wish->samples_per_pixel * counted * hardware_times(tracer);
+    const double fitting = fmax(sqrt(samples / (3 * (layers + AXES_TEXEL_COST))), AXES_FITTED_MIN);
+    return (uint32_t)fmin(fitting, wish->usual);
+}
+
+uint32_t axes_wanted_resolution(const struct tracer *tracer, const struct axes_wish *wish)
+{
+    const uint32_t pixels = tracer->options.picture_pixels, greatest = axes_greatest_resolution(wish);
+    return wish->resolution > 0 || pixels == 0 ? greatest : (uint32_t)fmin(sqrt(pixels) / 2, greatest);
 }
 
 bool axes_fit_resolution(const struct tracer *tracer, double layers, uint32_t *resolution, struct error *error)

@@ -19,6 +19,11 @@
 /* Coarser than this, a picture would show nothing of what is so deep. */
 #define AXES_FITTED_MIN 128u
 
+/* Where no resolution was asked for, a structure costs no more than what is worth its time for the picture; one of
+ * fewer pixels than this counts as one of this many. A texel without samples costs a share of a sample. */
+#define AXES_PICTURE_PIXELS_MIN 65536u
+#define AXES_TEXEL_COST 0.2
+
 struct axes_layers {
     double mean;     /* over all texels of the three images, at any resolution: within a tenth for surfaces of many
                       * primitives */
@@ -31,12 +36,29 @@ struct axes_layers {
 struct axes_layers axes_count_layers(const struct gpu_scene *scene, const uint32_t *instances, uint32_t count,
                                      float overlap, float steep, const struct axes_box *whole);
 
+struct axes_wish {
+    uint32_t resolution;      /* asked for; 0: chosen */
+    uint32_t usual;           /* the maximum of those that are chosen */
+    double samples_per_pixel; /* of the picture, that are worth their time */
+};
+
+/* The resolution that a scene has where it needs no lower one. */
+uint32_t axes_greatest_resolution(const struct axes_wish *wish);
+
+/* That which was asked for; where it is chosen, what goes with the layers and the picture, and not less than
+ * AXES_FITTED_MIN. */
+uint32_t axes_choose_resolution(const struct tracer *tracer, double layers, const struct axes_wish *wish);
+
 /* Lowers *resolution to what `layers`, on average, allow the tracer. Fails, with a remedy, where that were less
  * than AXES_FITTED_MIN and less than what was asked for. */
 bool axes_fit_resolution(const struct tracer *tracer, double layers, uint32_t *resolution, struct error *error);
 
 /* Fails, with a remedy, where the greatest number of `layers` is above the maximum. */
 bool axes_fit_depth(const struct tracer *tracer, double layers, uint32_t maximum, struct error *error);
+
+/* The resolution below which the picture lacks something: that which was asked for, or one texel for two pixels
+ * along the middle of the picture's sides, of which shadows are then a pixel off at most. */
+uint32_t axes_wanted_resolution(const struct tracer *tracer, const struct axes_wish *wish);
 
 /* Says in the row of a structure's resolution, as a warning, that more was wanted, where it was. */
 void axes_fit_tell(struct structure_row *resolution, uint32_t wanted);

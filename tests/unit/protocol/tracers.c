@@ -51,8 +51,8 @@ TEST(zero_is_the_default_of_every_setting)
     assert_true(tracer_settings_check(&settings, "", &fault));
     message_init(&message, MESSAGE_RENDER);
     assert_memory_equal(&settings, &message.render.settings, sizeof(settings));
-    assert_int_equal(settings.ldc.resolution, 1024);
-    assert_int_equal(settings.abuffer.voxels, 0); /* the tracer chooses */
+    assert_int_equal(settings.ldc.block, 8);
+    assert_int_equal(settings.ldc.resolution, 0); /* the tracer chooses */
 }
 
 static void expect_fault(const struct tracer_settings *settings, const char *prefix, const char *field,
@@ -68,7 +68,7 @@ static void expect_fault(const struct tracer_settings *settings, const char *pre
 TEST(a_wrong_setting_is_reported_with_its_name_and_what_is_allowed)
 {
     expect_fault(&(struct tracer_settings){.ldc = {.resolution = 15}}, "render.", "render.ldc_resolution",
-                 "15 is not one of 16 to 4096 (0: 1024)", "");
+                 "15 is not one of auto, 16 to 4096", "");
     expect_fault(&(struct tracer_settings){.ldc = {.block = 12}}, "--", "--ldc-block",
                  "12 is not one of 2, 4, 8, 16, 32 (0: 8)", "");
     expect_fault(&(struct tracer_settings){.bvh = {.rays = 5}}, "", "bvh_rays", "auto, 1, 2, 3, 4, 8", "");
@@ -83,7 +83,7 @@ TEST(settings_that_contradict_each_other_are_reported_with_both_names)
     settings.ldc.levels = PROTOCOL_LDC_LEVELS_PYRAMID;
     assert_true(tracer_settings_check(&settings, "--", &fault));
     settings.abuffer.voxels = 64;
-    assert_true(tracer_settings_check(&settings, "--", &fault)); /* of 1280 texels, the default */
+    assert_true(tracer_settings_check(&settings, "--", &fault)); /* of as many texels as the tracer chooses */
     settings.abuffer.resolution = 32;
     expect_fault(&settings, "render.", "render.abuffer_voxels",
                  "64 is more than the 32 texels of abuffer_resolution", "higher abuffer_resolution");

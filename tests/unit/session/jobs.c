@@ -420,6 +420,34 @@ SESSION_TEST(settings_that_no_cube_has_are_refused_by_their_field)
     assert_string_equal(client.message.error.field, "render.ldc_levels");
 }
 
+/* What the engine gets of a picture of 300 x 200 pixels. */
+static uint32_t pixels_noted_for(const struct message *message)
+{
+    static uint32_t request = 2;
+    send_message(request, 0, message);
+    expect(MESSAGE_FRAME_BEGIN, request++);
+    const uint32_t noted = engine.job.frame.tracer_options.picture_pixels;
+    while (receive()->type != MESSAGE_OK)
+        ;
+    return noted;
+}
+
+SESSION_TEST(the_pictures_size_goes_to_the_engine_where_a_resolution_is_chosen_by_it)
+{
+    open_scene(1, 1);
+    struct message message = render_message(0, 1);
+    message.render.width = 300;
+    message.render.height = 200;
+    message.render.tracer = PROTOCOL_TRACER_LDC;
+    assert_int_equal(pixels_noted_for(&message), 65536);
+    message.render.settings.ldc.resolution = 1024;
+    assert_int_equal(pixels_noted_for(&message), 0);
+    message.render.tracer = PROTOCOL_TRACER_ABUFFER;
+    assert_int_equal(pixels_noted_for(&message), 65536);
+    message.render.tracer = PROTOCOL_TRACER_BVH;
+    assert_int_equal(pixels_noted_for(&message), 0);
+}
+
 SESSION_TEST(settings_of_a_buffers_and_light_go_to_the_engine)
 {
     open_scene(1, 1);

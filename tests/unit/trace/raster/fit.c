@@ -182,6 +182,77 @@ TEST(deep_scenes_have_a_lower_one_and_a_warning)
         }
 }
 
+static uint32_t chosen(const struct tracer_options *options, unsigned tracer, double layers, uint32_t asked)
+{
+    const struct tracer stand_in = {.impl = tracer_impl_by_number(tracer), .device = device, .options = *options};
+    return axes_choose_resolution(&stand_in, layers, &(struct axes_wish){asked, 1024, 4});
+}
+
+TEST(a_resolution_that_was_asked_for_is_taken_whatever_the_picture)
+{
+    const struct tracer_options options = {.picture_pixels = 1};
+    assert_int_equal(chosen(&options, TRACER_LDC, 100, 2048), 2048);
+    assert_int_equal(chosen(&(struct tracer_options){0}, TRACER_LDC, 100, 0), 1024);
+}
+
+TEST(a_resolution_that_is_chosen_costs_what_goes_with_the_picture)
+{
+    const double times = device->facts.software ? 1 : AXES_HARDWARE_TIMES;
+    for (uint32_t pixels = AXES_PICTURE_PIXELS_MIN; pixels <= 1u << 21; pixels *= 2) {
+        const struct tracer_options options = {.picture_pixels = pixels};
+        for (double layers = 1; layers < 20; layers *= 2) {
+            const uint32_t resolution = chosen(&options, TRACER_LDC, layers, 0);
+            const double samples = layers * 3 * resolution * resolution;
+            assert_in_range(resolution, AXES_FITTED_MIN, 1024);
+            if (resolution > AXES_FITTED_MIN)
+                assert_true(samples <= 4 * times * pixels);
+            if (resolution < 1024) /* a fifth of a sample for each texel, and a texel for rounding */
+                assert_true(samples > 4 * times * pixels * layers / (layers + AXES_TEXEL_COST) * 0.97);
+        }
+    }
+}
+
+/* As frames of one window, which the user makes a little smaller or larger, must not need another structure. */
+TEST(pictures_of_almost_the_same_size_have_the_same_structure)
+{
+    struct tracer_options options[3] = {0};
+    static const uint64_t pixels[] = {1280 * 720, 1400 * 750, 640 * 360};
+    for (int i = 0; i < 3; i++)
+        tracer_options_note_picture(&options[i], TRACER_LDC, pixels[i]);
+    assert_true(tracer_options_same(&options[0], &options[1]));
+    assert_false(tracer_options_same(&options[0], &options[2]));
+}
+
+TEST(a_chosen_resolution_is_that_of_the_picture_and_warns_only_where_it_is_coarser_than_its_pixels)
+{
+    for (size_t i = 0; i < 2; i++) {
+        struct fixture fixture;
+        struct tracer_options options = {0};
+        tracer_options_note_picture(&options, sampled[i], 320 * 180);
+        fixture_init_by(&fixture, sampled[i], test_scene_spheres(), &options);
+        const struct structure_row row = told_row(fixture.tracer, row_of(sampled[i], "static/resolution"));
+        if (device->facts.software)
+            assert_in_range(row.number, AXES_FITTED_MIN, 1023);
+        assert_string_equal(row.warning, "");
+        expect_predicted(&fixture, sampled[i], TOLERANCE);
+        fixture_finish(&fixture);
+    }
+}
+
+TEST(a_chosen_resolution_coarser_than_the_pictures_pixels_comes_with_a_warning)
+{
+    for (size_t i = 0; i < 2 && device->facts.software; i++) {
+        struct fixture fixture;
+        struct tracer_options options = {0};
+        tracer_options_note_picture(&options, sampled[i], 640 * 360);
+        fixture_init_by(&fixture, sampled[i], nested_shells(60), &options);
+        const struct structure_row row = told_row(fixture.tracer, row_of(sampled[i], "static/resolution"));
+        assert_in_range(row.number, AXES_FITTED_MIN, 255);
+        assert_non_null(strstr(row.warning, "instead of 256 texels"));
+        fixture_finish(&fixture);
+    }
+}
+
 /* Before there is anything of it. */
 TEST(what_is_too_deep_at_any_resolution_is_refused_with_a_remedy)
 {
