@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/* Memory prefaulted by up to two background threads. Each page that the kernel gives for the first time costs a fault, and
- * a gigabyte of them may take seconds. The thread allocates and fills a block; the caller's own allocation of that
- * size then takes the same pages, since the allocator keeps them (allocator.h). Correctness does not depend on it:
- * without the thread the caller has the faults itself. Call it from one thread. */
+/* Memory prefaulted by up to two background threads. Each page that the kernel gives for the first time costs a
+ * fault, and a gigabyte of them may take seconds. They allocate and fill a block; the caller's own allocation of
+ * that size then takes the same pages, since the allocator keeps them (allocator.h). Correctness does not depend
+ * on it: without them the caller has the faults itself. Call it from one thread. */
 #ifndef FARLIGHT_BASE_PREFAULT_H
 #define FARLIGHT_BASE_PREFAULT_H
 
