@@ -367,7 +367,7 @@ FIDELITY_PACKAGES := python3-openimageio python3-numpy
 EQUAL_TIME_PACKAGES := $(FIDELITY_PACKAGES) blender
 DEB_PACKAGES := debhelper dh-python python3 dpkg-dev fakeroot lintian xz-utils git
 WEB_PACKAGES := chromium python3-websocket
-FARM_PACKAGES := slurm-wlm nodejs python3-yaml
+FARM_PACKAGES := slurm-wlm slurmdbd mariadb-server-core mariadb-client-core nodejs python3-yaml
 BLENDER_PACKAGES := blender python3-numpy xvfb xauth
 
 .PHONY: tests build-packages test-packages stack-packages sync-packages lint-packages analyze-packages coverage-packages fuzz-packages fidelity-packages equal-time-packages farm-packages web-packages deb-packages blender-packages test test-long test-zink check-sync demo bench fidelity equal-time soak farm-drill farm-test web-test blender-test blender-addon siege bench-plot check-headers check-rules lint check analyze coverage format install uninstall dist deb deb-same deb-test clean distclean help

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // An animation as a job type of Flamenco 3; it belongs into the folder `scripts` beside flamenco-manager.
-// Each task renders one chunk of the frames with the daemon of its worker's GPU; the last one checks all of them.
+// Each task renders one part of the frames with the daemon of its worker's GPU; the last one checks all of them.
 const JOB_TYPE = {
     label: "farlight animation",
     description: "Render a model's animation with farlight",
@@ -14,12 +14,12 @@ const JOB_TYPE = {
     ],
 };
 
-// "1-8" of "1-8", and "3" of "3": farlight takes both as they are.
-function animate(settings, frames) {
+// Of all frames: an orbit or a dolly lasts as long as the range that is given, so that a range of its own would be another path.
+function animate(settings, part) {
     return author.Command("exec", {
         exe: "farlight-node",
-        args: ["farlight", "animate", settings.model, "--frames", frames, "-o", settings.output, "--resume", "--digests",
-               "--progress", "lines", "--retry-for", "5"].concat(settings.options.split(" ").filter((word) => word !== "")),
+        args: ["farlight", "animate", settings.model, "--frames", settings.frames, "--shard", part, "-o", settings.output, "--resume",
+               "--digests", "--progress", "lines", "--retry-for", "5"].concat(settings.options.split(" ").filter((word) => word !== "")),
     });
 }
 
@@ -29,9 +29,10 @@ function compileJob(job) {
     verify.addCommand(author.Command("exec", {
         exe: "farlight", args: ["verify", settings.output, "--frames", settings.frames],
     }));
-    for (const frames of frameChunker(settings.frames, settings.chunk_size)) {
-        const task = author.Task(`render ${frames}`, "misc");
-        task.addCommand(animate(settings, frames));
+    const parts = frameChunker(settings.frames, settings.chunk_size).length;
+    for (let part = 1; part <= parts; part++) {
+        const task = author.Task(`render ${part}/${parts}`, "misc");
+        task.addCommand(animate(settings, `${part}/${parts}`));
         job.addTask(task);
         verify.addDependency(task);
     }

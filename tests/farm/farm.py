@@ -31,6 +31,8 @@ from slurm import Slurm  # pylint: disable=wrong-import-position
 PICTURE = ["--size", "96x72", "--samples", "4", "--integrator", "path", "--orbit"]
 KILL_EVERY_S = 2.0
 FOR_GOOD_S = 900
+# The controller tells the database without haste.
+ACCOUNTED_S = 60
 
 
 def digests(folder):
@@ -100,42 +102,61 @@ class Farm:
     # ---- one each ----
 
     def slurm(self):
-        out, rng, killed = self.folder / "slurm", random.Random(1), 0
+        out, rng, killed, comments = self.folder / "slurm", random.Random(1), 0, set()
         variables = {"MODEL": str(self.model), "FRAMES": f"1-{self.tasks}", "OUTPUT": str(out / "%04d.png"), "RETRIES": "20"}
         (self.folder / "cluster").mkdir()
         with Slurm(self.folder / "cluster") as cluster:
-            begin = time.monotonic()
+            begin = killed_s = time.monotonic()
             job = cluster.submit(FARM / "slurm.sbatch", f"1-{self.tasks}", *PICTURE, **variables)
-            killed_s = begin
-            while cluster.is_busy():
+            while queue := cluster.queue():
+                comments.update(queue)
                 self.expect(time.monotonic() - begin < FOR_GOOD_S, f"the job does not end: {cluster.ask('squeue')}")
                 if time.monotonic() - killed_s > KILL_EVERY_S:
                     killed_s = time.monotonic()
                     killed += self.kill_one(rng)
                 time.sleep(0.1)
             took_s = time.monotonic() - begin
-            comments = cluster.comments(job)
             self.is_as_one_run(out)
             logs = list((self.folder / "cluster").glob("farlight-*.log"))
             requeued = sum(log.read_text().count("queued again") for log in logs)
             self.expect(killed > 0, "nothing was killed")
-            self.expect(any(re.search(r"1 of 1 frames|0 of 1 frames", comment) for comment in comments), f"comments: {comments}")
-            print(f"slurm: {self.tasks} tasks in {took_s:.0f} s, {killed} processes killed, {requeued} tasks queued again")
+            self.expect(any("of 1 frames" in comment for comment in comments), f"squeue shows {comments}")
+            attempts = self.accounted(cluster, job)
+            ended = [state for _, state, _ in attempts]
+            self.expect(ended.count("REQUEUED") == requeued and len(attempts) == self.tasks + requeued, f"sacct shows {attempts}")
+            print(f"slurm: {self.tasks} tasks in {took_s:.0f} s, {killed} processes killed, {requeued} tasks queued again, as sacct shows")
             self.poisoned(cluster, out, variables)
 
+    def accounted(self, cluster, job):
+        """What sacct shows of each attempt; the comment of each task's last one must say that all is done."""
+        deadline = time.monotonic() + ACCOUNTED_S
+        while True:
+            attempts = cluster.accounts(job)
+            last = {task: (state, comment) for task, state, comment in attempts}
+            if len(last) == self.tasks and all(state == "COMPLETED" for state, _ in last.values()):
+                break
+            self.expect(time.monotonic() < deadline, f"sacct shows {attempts}")
+            time.sleep(0.5)
+        self.expect(all("1 of 1 frames" in comment for _, comment in last.values()), f"sacct shows {last}")
+        return attempts
+
     def poisoned(self, cluster, out, variables):
-        damaged = out / f"{self.tasks // 4 + 1:04d}.png"
+        poisoned = self.tasks // 4 + 1
+        damaged = out / f"{poisoned:04d}.png"
         before = {path.name: path.stat().st_mtime_ns for path in out.glob("*.png")}
         damaged.write_bytes(damaged.read_bytes()[:-20] + bytes(20))
         text = self.run("farlight", "verify", out / "%04d.png", *self.range(self.tasks), status=1)
         self.expect(damaged.name in text and text.count("differs") == 1, text)
-        cluster.submit(FARM / "slurm.sbatch", f"1-{self.tasks}", *PICTURE, **variables)
-        while cluster.is_busy():
+        job = cluster.submit(FARM / "slurm.sbatch", f"1-{self.tasks}", *PICTURE, **variables)
+        while cluster.queue():
             time.sleep(0.2)
         self.is_as_one_run(out)
         changed = {path.name for path in out.glob("*.png") if path.stat().st_mtime_ns != before[path.name]}
         self.expect(changed == {damaged.name}, f"rendered again: {changed}")
-        print(f"slurm: of {self.tasks} pictures the damaged one alone was rendered again")
+        attempts = self.accounted(cluster, job)
+        rendered = [task for task, _, comment in attempts if "exist already" not in comment]
+        self.expect(rendered == [poisoned], f"sacct shows {attempts}")
+        print(f"slurm: of {self.tasks} pictures the damaged one alone was rendered again, as sacct shows")
 
     def openjd(self):
         import yaml  # pylint: disable=import-outside-toplevel
