@@ -81,7 +81,9 @@ def of_particles(thing: bpy.types.Object, modifier: bpy.types.Modifier, is_final
     place = system.co_hair
     found = itertools.chain.from_iterable(place(thing, particle_no=number, step=step) for number in numbers for step in range(steps))
     world = np.fromiter(found, np.float64, 3 * len(numbers) * steps).reshape(-1, 3)
-    world = world[np.maximum.accumulate(np.where(world.any(axis=1), np.arange(len(world)), 0))]  # 0, 0, 0: a hair has fewer steps
+    is_there = world.any(axis=1)  # 0, 0, 0 behind the root: the hair has fewer steps
+    is_there[::steps] = True
+    world = world[np.maximum.accumulate(np.where(is_there, np.arange(len(world)), 0))]
     back = np.linalg.pinv(np.array(thing.matrix_world, np.float64))
     points = steady("hairs", (world @ back[:3, :3].T + back[:3, 3]).astype(np.float32))
     strand = np.repeat(np.arange(len(numbers)), steps)
