@@ -70,6 +70,42 @@ def ball(name, of=None, place=(0, 0, 1), radius=1.0):
     return made
 
 
+def hairs(thing, count, material=1, **values):
+    """A particle system with straight hairs, and its settings."""
+    thing.modifiers.new("hairs", "PARTICLE_SYSTEM")
+    settings = thing.particle_systems[0].settings
+    settings.type, settings.count, settings.material = "HAIR", count, material
+    for name, value in values.items():
+        setattr(settings, name, value)
+    return settings
+
+
+def bow_and_points(name, place=(0, 0, 0)):
+    """An object of curves (hair) whose geometry nodes make a bent one of five points, and a row of points."""
+    tree = bpy.data.node_groups.new(name, "GeometryNodeTree")
+    tree.outputs.new("NodeSocketGeometry", "Geometry")
+    joined, end = tree.nodes.new("GeometryNodeJoinGeometry"), tree.nodes.new("NodeGroupOutput")
+    tree.links.new(joined.outputs[0], end.inputs[0])
+    curve = {"Start": (0, 0, 0), "Start Handle": (0, 0, 1), "End Handle": (0.5, 0, 2), "End": (1, 0, 1)}
+    for chain in ((("CurvePrimitiveBezierSegment", curve), ("ResampleCurve", {"Count": 5}), ("SetCurveRadius", {"Radius": 0.2})),
+                  (("MeshLine", {"Offset": (0.6, 0, 0), "Count": 5}), ("MeshToPoints", {"Radius": 0.25}),
+                   ("SetMaterial", {"Material": diffuse((0.2, 0.7, 0.2, 1))}))):
+        before = None
+        for kind, inputs in chain:
+            node = tree.nodes.new(f"GeometryNode{kind}")
+            for key, value in inputs.items():
+                node.inputs[key].default_value = value
+            if before:
+                tree.links.new(before.outputs[0], node.inputs[0])
+            before = node
+        tree.links.new(before.outputs[0], joined.inputs[0])
+    data = bpy.data.hair_curves.new(name)
+    data.materials.append(diffuse((0.1, 0.3, 0.8, 1)))
+    made = put(name, data, place)
+    made.modifiers.new(name, "NODES").node_group = tree
+    return made
+
+
 def add_light(kind, energy, place=(0, 0, 4), turn=(0, 0, 0), **values):
     data = bpy.data.lights.new(kind.lower(), kind)
     data.energy = energy

@@ -7,6 +7,7 @@ import importlib.util
 import os
 import pathlib
 import random
+import re
 import socket
 import struct
 import subprocess
@@ -489,6 +490,14 @@ class WithDaemon(OneDaemon):
         with self.assertRaises(farlight.ImportFailed) as raised:
             farlight.load(bundled_scenes() / "teapot.glb", max_bytes=1000)
         self.assertEqual(raised.exception.field, "max_bytes")
+
+    def test_the_man_page_has_every_option_of_the_command_line(self):
+        page = (farlight_test.ROOT / "conf/man/farlight-python.1").read_text()
+        done = python("-m", "farlight", "render", "--help")
+        options = set(re.findall(r"--([a-z-]+)", done.stdout)) - {"output", "help"}
+        self.assertGreater(len(options), 10)
+        for option in options:
+            self.assertIn(f".It Fl -{option}", page)
 
     def test_the_command_line_says_how_it_ended(self):
         model, output = bundled_scenes() / "teapot.glb", ("-o", self.folder / "a.png")

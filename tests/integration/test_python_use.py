@@ -193,6 +193,7 @@ class Encoded(Case):
         with self.assertRaises(farlight.InvalidValue) as raised:
             farlight.camera.request(STRAIGHT, (), {"encoding": "h264"})
         self.assertIn("raw, zstd, jpeg", str(raised.exception))
+        self.assertEqual(raised.exception.remedy, "use jpeg")
 
 
 class WithDaemon(OneDaemon):

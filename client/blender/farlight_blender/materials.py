@@ -92,7 +92,7 @@ class Reader:
         else:
             reading.values.update(roughness=1.0, specular=0.0)
         if material is not None and material.use_nodes and material.node_tree and nodes.has_volume(material.node_tree):
-            self._mirror.note(f"{name}: its volume is not drawn")
+            self._mirror.note(f"{name}: its volume is not drawn: render it with Cycles")
         number = self._mirror.number(ObjectKind.MATERIAL, name)
         places = range(max(reading.textures, default=-1) + 1)
         uses = [reading.textures.get(place, TextureUse(0, 0, (1, 0, 0, 0, 1, 0), 1)) for place in places]

@@ -19,7 +19,9 @@ if TYPE_CHECKING:
 
 Steady = Callable[[str, Any], Any]  # Mirror.steady() of one mesh
 
-def _read(items: Any, field: str, width: int, kind: Any = np.float32) -> Any:
+
+def read(items: Any, field: str, width: int, kind: Any = np.float32) -> Any:
+    """One field of each item: n numbers, or n x width."""
     values = np.empty(len(items) * width, kind)
     items.foreach_get(field, values)
     return values.reshape(-1, width) if width > 1 else values
@@ -27,9 +29,9 @@ def _read(items: Any, field: str, width: int, kind: Any = np.float32) -> Any:
 
 def _normals(mesh: bpy.types.Mesh) -> Any:
     if hasattr(mesh, "corner_normals"):  # Blender 4.1 and later
-        return _read(mesh.corner_normals, "vector", 3)
+        return read(mesh.corner_normals, "vector", 3)
     mesh.calc_normals_split()
-    return _read(mesh.loops, "normal", 3)
+    return read(mesh.loops, "normal", 3)
 
 
 def _colours(mesh: bpy.types.Mesh, name: str) -> Any:
@@ -37,15 +39,15 @@ def _colours(mesh: bpy.types.Mesh, name: str) -> Any:
     attribute = mesh.color_attributes.get(name) or mesh.color_attributes.active_color
     if attribute is None:
         return None
-    values = _read(attribute.data, "color", 4)
+    values = read(attribute.data, "color", 4)
     if attribute.domain == "POINT":
-        values = values[_read(mesh.loops, "vertex_index", 1, np.int32)]
+        values = values[read(mesh.loops, "vertex_index", 1, np.int32)]
     return np.rint(np.clip(values, 0, 1) * 255).astype(np.uint8)
 
 
 def shape(mesh: bpy.types.Mesh) -> tuple[Any, Any]:
     """Positions and normals of its corners."""
-    return _read(mesh.vertices, "co", 3)[_read(mesh.loops, "vertex_index", 1, np.int32)], _normals(mesh)
+    return read(mesh.vertices, "co", 3)[read(mesh.loops, "vertex_index", 1, np.int32)], _normals(mesh)
 
 
 def _corners(mesh: bpy.types.Mesh, uses: list[Material], steady: Steady) -> dict[str, Any]:
@@ -55,10 +57,10 @@ def _corners(mesh: bpy.types.Mesh, uses: list[Material], steady: Steady) -> dict
     layer = next((one for one in mesh.uv_layers if one.active_render), None)
     if layer is not None:
         # Rows of textures are counted from the top, Blender's v from below.
-        arrays["texcoords"] = _read(layer.data, "uv", 2) * (1, -1) + (0, 1)
+        arrays["texcoords"] = read(layer.data, "uv", 2) * (1, -1) + (0, 1)
         if any(use.has_normal_map for use in uses):
             mesh.calc_tangents(uvmap=layer.name)
-            tangents = np.column_stack((_read(mesh.loops, "tangent", 3), _read(mesh.loops, "bitangent_sign", 1)))
+            tangents = np.column_stack((read(mesh.loops, "tangent", 3), read(mesh.loops, "bitangent_sign", 1)))
             arrays["tangents"] = steady("tangents", tangents)
     name = next((use.colour_attribute for use in uses if use.colour_attribute is not None), None)
     if name is not None:
@@ -69,10 +71,10 @@ def _corners(mesh: bpy.types.Mesh, uses: list[Material], steady: Steady) -> dict
 def _arrays(mesh: bpy.types.Mesh, uses: list[Material], steady: Steady, bent: Optional[Any]) -> Optional[dict[str, Any]]:
     """What Scene.add_mesh() takes, and "moves". bent: keys of the shutter x corners x 6, positions and normals."""
     mesh.calc_loop_triangles()
-    triangles = _read(mesh.loop_triangles, "loops", 3, np.int32)
+    triangles = read(mesh.loop_triangles, "loops", 3, np.int32)
     if not len(triangles):
         return None
-    slots = np.clip(_read(mesh.loop_triangles, "material_index", 1, np.int32), 0, len(uses) - 1)
+    slots = np.clip(read(mesh.loop_triangles, "material_index", 1, np.int32), 0, len(uses) - 1)
     order = np.argsort(slots, kind="stable")  # few runs of materials
     numbers = np.array([use.number for use in uses], np.uint32)
     corners = _corners(mesh, uses, steady)
@@ -109,9 +111,9 @@ class Names:
         self._named: dict[str, int] = {}
 
     def of(self, thing: bpy.types.Object) -> tuple[tuple[str, int], bool]:
-        """The key of an evaluated object's mesh, and whether it has not been asked for before."""
+        """The key of an evaluated object's data, and whether it has not been asked for before."""
         names = tuple(slot.material.name_full if slot.material else "" for slot in thing.material_slots)
-        what = thing.data.as_pointer() if thing.type == "MESH" else thing.name_full, names
+        what = thing.name_full if thing.type == "META" else thing.data.as_pointer(), names
         if what in self._keys:
             return self._keys[what], False
         # The same name may stand for several meshes, of an object and of what geometry nodes make from it.

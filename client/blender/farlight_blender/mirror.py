@@ -17,7 +17,7 @@ from farlight.scene import Object
 from farlight.messages import NodeKind, ObjectKind, SetNode
 from mathutils import Vector
 
-from . import cameras, lights, materials, meshes, motion, world
+from . import cameras, lights, materials, meshes, motion, strands, world
 
 WORLD_FROM_BLENDER = np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]], dtype=np.float64)
 WITH_SURFACE = {"MESH", "META"}  # the surfaces of curves and texts come as objects of the type mesh beside them
@@ -25,16 +25,31 @@ WITH_SURFACE = {"MESH", "META"}  # the surfaces of curves and texts come as obje
 SAME_DIRECTION = 1e-5
 # What is removed first, as it uses the others, or goes with them.
 SWEPT = {ObjectKind.CHANNEL: 0, ObjectKind.CLIP: 1, ObjectKind.NODE: 2}
-NOT_DRAWN = {"VOLUME": "volumes", "CURVES": "hairs", "POINTCLOUD": "point clouds", "GPENCIL": "grease pencil"}
-
+WITHOUT_FACES = {"CURVES", "POINTCLOUD"}
+NOT_DRAWN = {"VOLUME": "volumes are not drawn: make a surface of it (modifier Volume to Mesh) or render it with Cycles",
+             "GPENCIL": "grease pencil is not drawn: convert it to a curve or a mesh"}
+PARTICLES = {"HALO": "halos", "LINE": "lines"}
 
 ROOT, CAMERA = ("root",), ("camera",)  # keys of nodes that stand for no object of a name
 
 
 def _key(instance: bpy.types.DepsgraphObjectInstance) -> Hashable:
     """Of the node that stands for it."""
-    name: str = instance.object.name_full
+    thing = instance.object
+    name: Hashable = (thing.type, thing.name_full) if thing.type in WITHOUT_FACES else thing.name_full  # beside a mesh of that name
     return (instance.parent.name_full, name, tuple(instance.persistent_id)) if instance.is_instance else name
+
+
+def _has_hairs(instance: bpy.types.DepsgraphObjectInstance) -> bool:
+    """Geometry nodes make meshes under the name of an object, whose hairs are not theirs."""
+    thing = instance.object
+    if not instance.show_particles or thing.type != "MESH":
+        return False
+    return not instance.is_instance or bool(instance.instance_object.data == thing.data)
+
+
+def _hairs_key(key: Hashable, system: str) -> Hashable:
+    return "hairs", key, system
 
 
 def moment(depsgraph: bpy.types.Depsgraph, camera: bpy.types.Object) -> motion.Moment:
@@ -43,11 +58,12 @@ def moment(depsgraph: bpy.types.Depsgraph, camera: bpy.types.Object) -> motion.M
     scene = depsgraph.scene_eval
     for instance in depsgraph.object_instances:
         thing = instance.object
-        if not instance.show_self or thing.type not in WITH_SURFACE | {"LIGHT"}:
-            continue
-        if motion.is_blurred(thing):
-            made.places[_key(instance)] = instance.matrix_world.copy()
-        if thing.type in WITH_SURFACE:
+        key = _key(instance)
+        if motion.is_blurred(thing) and thing.type in WITH_SURFACE | WITHOUT_FACES | {"LIGHT"}:
+            made.places[key] = instance.matrix_world.copy()
+            for hairs in strands.hairy(thing, True) if _has_hairs(instance) else ():
+                made.places[_hairs_key(key, hairs.particle_system.name)] = made.places[key]
+        if instance.show_self and thing.type in WITH_SURFACE:
             mesh, is_new = names.of(thing)
             if is_new and motion.deforms(thing, scene):
                 made.shapes[mesh] = meshes.shape(thing.data)
@@ -55,21 +71,19 @@ def moment(depsgraph: bpy.types.Depsgraph, camera: bpy.types.Object) -> motion.M
         made.places[CAMERA] = camera.matrix_world.copy()
     return made
 
-PARTICLES = {"PATH": "the hairs", "HALO": "the halos", "LINE": "the lines"}
-
 
 class _Extent:
     """How far from its origin the scene reaches."""
 
     def __init__(self) -> None:
-        self._radii: dict[int, float] = {}
+        self._radii: dict[Object, float] = {}
         self._farthest = 1e-3
 
-    def add(self, mesh: int, thing: bpy.types.Object, matrix: Any) -> None:
-        """An object with a mesh, at a place."""
-        if mesh not in self._radii:
-            self._radii[mesh] = max(Vector(corner).length for corner in thing.bound_box)
-        self._farthest = max(self._farthest, matrix.translation.length + self._radii[mesh] * max(abs(one) for one in matrix.to_scale()))
+    def add(self, shown: Object, thing: bpy.types.Object, matrix: Any) -> None:
+        """An object with a surface, at a place."""
+        if shown not in self._radii:
+            self._radii[shown] = max(Vector(corner).length for corner in thing.bound_box)
+        self._farthest = max(self._farthest, matrix.translation.length + self._radii[shown] * max(abs(one) for one in matrix.to_scale()))
 
     def radius(self) -> float:
         """A power of two, so that it rarely changes."""
@@ -86,7 +100,6 @@ class Mirror:
         self._numbers: dict[tuple[ObjectKind, Hashable], int] = {}
         self._last: dict[ObjectKind, int] = {}
         self._seen: set[tuple[ObjectKind, Hashable]] = set()
-        self.pictures = 0  # that were rendered
         self._motion: Optional[motion.Motion] = None
 
     # ---- for the modules that read Blender's data
@@ -138,7 +151,8 @@ class Mirror:
         self.scene.set(SetNode(node=self._root().number, kind=NodeKind.GROUP, name="Blender",
                                parent_from_node=[float(one) for one in WORLD_FROM_BLENDER[:3].ravel()]))
         world.update(self, depsgraph.scene_eval)
-        shared = meshes.Shared(self, materials.Reader(self), moves)
+        reader = materials.Reader(self)
+        shared = meshes.Shared(self, reader, moves), strands.Shared(self, reader, depsgraph.mode == "RENDER")
         found: list[tuple[Hashable, bpy.types.Object, Any]] = []  # lights
         extent = _Extent()
         for instance in depsgraph.object_instances:
@@ -151,26 +165,32 @@ class Mirror:
         self._sweep()
         return node
 
-    def _instance(self, instance: bpy.types.DepsgraphObjectInstance, shared: meshes.Shared,
+    def _instance(self, instance: bpy.types.DepsgraphObjectInstance, shared: tuple[meshes.Shared, strands.Shared],
                   found: list[tuple[Hashable, bpy.types.Object, Any]], extent: _Extent) -> None:
-        if not instance.show_self:
-            return
-        thing = instance.object
-        key = _key(instance)
-        if thing.type in WITH_SURFACE:
+        thing, key, place = instance.object, _key(instance), instance.matrix_world
+        if instance.show_self and thing.type in WITH_SURFACE:
             for system in thing.particle_systems if not instance.is_instance else ():
-                if system.settings.render_type in PARTICLES:  # others are instances
-                    self.note(f"{thing.name}: {PARTICLES[system.settings.render_type]} of {system.name} are not drawn")
-            mesh, bends = shared.mesh(thing)
+                if system.settings.render_type in PARTICLES:  # others are hairs or instances
+                    self.note(f"{thing.name}: the {PARTICLES[system.settings.render_type]} of {system.name} are not drawn: "
+                              "render them as objects")
+            mesh, bends = shared[0].mesh(thing)
             if mesh is not None:
-                extent.add(mesh.number, thing, instance.matrix_world)
-                node = self.place(key, mesh, instance.matrix_world, thing.name)
+                extent.add(mesh, thing, place)
+                node = self.place(key, mesh, place, thing.name)
                 if bends and self._motion is not None:
                     self._motion.bend(key, node.number)
-        elif thing.type == "LIGHT":
-            found.append((key, thing, instance.matrix_world.copy()))
-        elif thing.type in NOT_DRAWN:
-            self.note(f"{thing.name}: {NOT_DRAWN[thing.type]} are not drawn")
+        elif instance.show_self and thing.type in WITHOUT_FACES:
+            shown = shared[1].own(thing)
+            if shown is not None:
+                extent.add(shown, thing, place)
+                self.place(key, shown, place, thing.name)
+        elif instance.show_self and thing.type == "LIGHT":
+            found.append((key, thing, place.copy()))
+        elif instance.show_self and thing.type in NOT_DRAWN:
+            self.note(f"{thing.name}: {NOT_DRAWN[thing.type]}")
+        for name, hairs in shared[1].hairs(thing) if _has_hairs(instance) else ():
+            if hairs is not None:
+                self.place(_hairs_key(key, name), hairs, place, thing.name)
 
     def _sweep(self) -> None:
         gone = [one for one in self._numbers if one not in self._seen]

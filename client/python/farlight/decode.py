@@ -47,7 +47,8 @@ def check_wanted(render: messages.Render) -> None:
         encoding = Encoding(int(getattr(render, name)))
         if encoding not in DECODED:
             raise InvalidValue(f"{encoding.word} cannot be decoded here; allowed: {', '.join(one.word for one in DECODED)}",
-                               field=f"render.{name}")
+                               field=f"render.{name}",
+                               remedy="use jpeg" if encoding == Encoding.H264 else "use zstd")
         if encoding == Encoding.ZSTD:
             _zstd()
         if encoding == Encoding.JPEG:
