@@ -7,6 +7,7 @@
 #include "assimp.h"
 #include "formats.h"
 #include "grouping.h"
+#include "reading.hpp"
 
 #include <assimp/scene.h>
 
@@ -16,10 +17,6 @@
 
 namespace assimp
 {
-// Thrown after import_fail(); caught in assimp_import().
-struct failed {
-};
-
 // What became of meshes of the library that one node shows.
 struct shown_mesh {
     protocol_node_kind kind = PROTOCOL_NODE_MESH;
@@ -27,11 +24,9 @@ struct shown_mesh {
     uint32_t skin = 0, target_count = 0;
 };
 
-struct reader {
-    import_scene *scene;
+struct reader : reading::base {
     struct files *files;
     const assimp_format *format;
-    double point_size; // diameter; 0: by the distances of the points
     const aiScene *source = nullptr;
     double metres = 1; // of a unit, when the scene is there
     std::vector<uint32_t> material_ids = {};
@@ -43,12 +38,6 @@ struct reader {
     uint64_t budget = POLYGON_BUDGET;
 };
 
-[[noreturn]] void fail(reader &r, const std::string &where, const char *format, ...)
-    __attribute__((format(printf, 3, 4)));
-// Ends the work where the scene has failed.
-void check(reader &r);
-// Fails if the scene would not have room for so many bytes more, before anybody allocates them.
-void check_room(reader &r, const std::string &where, uint64_t count, uint64_t element_bytes);
 std::string text(const aiString &from);
 // sRGB to linear light, cut to 0..1.
 float linear(float value);
@@ -66,10 +55,7 @@ void add_scene(reader &r);
 // ---- assimp_mesh.cpp
 // What the meshes become, all of which stand in the same node; adds them when they are asked for the first time.
 const shown_mesh &meshes_of(reader &r, const std::vector<unsigned> &places);
-
-// ---- assimp_points.cpp
 bool is_point_cloud(const aiMesh &mesh);
-shown_mesh add_points(reader &r, const aiMesh &from, const std::string &where);
 
 // ---- assimp_skin.cpp
 // Whether bones of the mesh move it.

@@ -2,6 +2,7 @@
 // The library has a mesh for each material. Those of one node that nothing deforms become one again, with a range
 // of triangles for each, so that a body with several materials stays closed.
 #include "assimp.hpp"
+#include "points.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -227,7 +228,37 @@ shown_mesh build(builder &b, const std::vector<unsigned> &places)
     check(b.r);
     return shown;
 }
+
+// ---- points
+
+shown_mesh add_points(reader &r, const aiMesh &from, const std::string &where)
+{
+    points::cloud cloud;
+    shown_mesh shown;
+
+    if (from.mNumVertices > points::points_max)
+        fail(r, where, "%u points; up to %u are allowed", from.mNumVertices, points::points_max);
+    check_room(r, where, from.mNumVertices, 10 * sizeof(float)); // with its sphere
+    for (unsigned i = 0; i < from.mNumVertices; i++) {
+        const aiVector3D &place = from.mVertices[i];
+        cloud.places.insert(cloud.places.end(), {place.x, place.y, place.z});
+        if (from.mColors[0]) {
+            const aiColor4D &colour = from.mColors[0][i];
+            cloud.colours.insert(cloud.colours.end(), {colour.r, colour.g, colour.b});
+        }
+    }
+    cloud.material = from.mMaterialIndex < r.material_ids.size() ? r.material_ids[from.mMaterialIndex] : 0;
+    cloud.metres = r.metres;
+    shown.kind = PROTOCOL_NODE_SPHERES;
+    shown.id = points::add(r, cloud, text(from.mName), where);
+    return shown;
+}
 } // namespace
+
+bool is_point_cloud(const aiMesh &mesh)
+{
+    return mesh.mNumFaces == 0 || mesh.mPrimitiveTypes == aiPrimitiveType_POINT;
+}
 
 const shown_mesh &meshes_of(reader &r, const std::vector<unsigned> &places)
 {

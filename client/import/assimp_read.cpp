@@ -5,39 +5,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdarg>
-#include <cstdio>
 #include <cstring>
 #include <memory>
 #include <new>
 
 namespace assimp
 {
-void check(reader &r)
-{
-    if (r.scene->failed)
-        throw failed();
-}
-
-void fail(reader &r, const std::string &where, const char *format, ...)
-{
-    char words[400];
-    va_list arguments;
-
-    va_start(arguments, format);
-    vsnprintf(words, sizeof(words), format, arguments);
-    va_end(arguments);
-    import_fail(r.scene, where.c_str(), "%s", words);
-    throw failed();
-}
-
-void check_room(reader &r, const std::string &where, uint64_t count, uint64_t element_bytes)
-{
-    if (count > (IMPORT_BYTES_MAX - r.scene->blob_bytes) / element_bytes)
-        fail(r, where, "the scene would need more than %llu GiB",
-             static_cast<unsigned long long>(IMPORT_BYTES_MAX >> 30));
-}
-
 std::string text(const aiString &from)
 {
     return {from.data, std::min<size_t>(from.length, sizeof(from.data) - 1)};
@@ -125,12 +98,12 @@ void import(reader &r, const unsigned char *bytes, size_t size_bytes)
 } // namespace assimp
 
 extern "C" bool assimp_import(struct import_scene *scene, struct files *files, const struct assimp_format *format,
-                              double point_size, const unsigned char *bytes, size_t size_bytes)
+                              const unsigned char *bytes, size_t size_bytes)
 {
     try {
-        assimp::reader r = {scene, files, format, point_size};
+        assimp::reader r = {{scene}, files, format};
         assimp::import(r, bytes, size_bytes);
-    } catch (const assimp::failed &) {
+    } catch (const reading::failed &) {
         // said already
     } catch (const std::bad_alloc &) {
         import_fail(scene, nullptr, "%s", assimp::too_large);

@@ -21,9 +21,9 @@ bool obj_import(struct import_scene *scene, struct files *files, const unsigned 
 bool aff_import(struct import_scene *scene, struct files *files, const unsigned char *bytes, size_t size_bytes);
 /* Neutral File Format of the Standard Procedural Databases. */
 bool nff_import(struct import_scene *scene, const unsigned char *bytes, size_t size_bytes);
-/* Any of assimp.h's formats. `point_size`: diameter of points without faces, 0: chosen by their distances. */
+/* Any of assimp.h's formats. */
 bool assimp_import(struct import_scene *scene, struct files *files, const struct assimp_format *format,
-                   double point_size, const unsigned char *bytes, size_t size_bytes);
+                   const unsigned char *bytes, size_t size_bytes);
 
 #ifdef __cplusplus
 }

@@ -39,7 +39,7 @@ extern "C" bool gltf_import(struct import_scene *scene, struct files *files, con
         r.scene = scene;
         r.files = files;
         gltf::import(r, bytes, size_bytes);
-    } catch (const gltf::failed &) {
+    } catch (const reading::failed &) {
         // said already
     } catch (const std::bad_alloc &) {
         import_fail(scene, nullptr, "out of memory");

@@ -5,6 +5,7 @@
 #define FARLIGHT_IMPORT_GLTF_HPP
 
 #include "formats.h"
+#include "reading.hpp"
 
 // What the library was built with in every distribution; the declarations do not depend on it.
 #define TINYGLTF_NO_STB_IMAGE
@@ -21,21 +22,23 @@
 
 namespace gltf
 {
-// Thrown after import_fail(); caught in gltf_import().
-struct failed {
+// Points or lines of a glTF mesh.
+struct shown_part {
+    protocol_node_kind kind;
+    uint32_t id;
 };
 
 // What became of a glTF mesh.
 struct shown_mesh {
-    uint32_t id = 0;           // 0: there is nothing to show
-    bool has_joints = false;   // a skin can move it
-    uint32_t max_joint = 0;    // that moves one of its vertices: place in the skin
-    size_t file_targets = 0;   // morph targets in the file, and
-    uint32_t target_count = 0; // those that are kept, the first ones
+    uint32_t id = 0;                    // 0: there is nothing to show
+    bool has_joints = false;            // a skin can move it
+    uint32_t max_joint = 0;             // that moves one of its vertices: place in the skin
+    size_t file_targets = 0;            // morph targets in the file, and
+    uint32_t target_count = 0;          // those that are kept, the first ones
+    std::vector<shown_part> parts = {}; // that are shown beside its triangles
 };
 
-struct reader {
-    import_scene *scene;
+struct reader : reading::base {
     struct files *files;
     tinygltf::Model model;
     // By index of the glTF material: identifier in the scene, 0 until it is added.
@@ -57,8 +60,6 @@ struct reader {
     size_t draco_buffers = 0; // where buffers begin that Draco has filled for the mesh at hand
 };
 
-[[noreturn]] void fail(reader &r, const std::string &where, const char *format, ...)
-    __attribute__((format(printf, 3, 4)));
 // "meshes[3]"
 std::string place(const char *array, size_t index);
 
@@ -104,8 +105,22 @@ void add_materials(reader &r, const std::set<int> &used);
 // ---- gltf_mesh.cpp
 // The mesh as its vertices are given; adds it when it is asked for the first time.
 const shown_mesh &mesh_of(reader &r, int mesh);
-// Fails if the scene would not have room for so many bytes more, before anybody allocates them.
-void check_room(reader &r, const std::string &where, uint64_t count, uint64_t element_bytes);
+int attribute(const std::map<std::string, int> &attributes, const char *name); // its accessor; -1: none
+// Vertices of a primitive that has positions, once all its accessors are known to have as many elements.
+size_t vertex_count(reader &r, const tinygltf::Primitive &primitive, const std::string &where);
+// The vertices, of so many, that it joins, in order.
+std::vector<uint32_t> corners_of(reader &r, const tinygltf::Primitive &primitive, size_t vertices,
+                                 const std::string &where);
+// Its material in the scene; 0: the default one.
+uint32_t material_id(reader &r, const tinygltf::Primitive &primitive, const std::string &where);
+// Four bytes each, linear.
+void read_colours(reader &r, int accessor, size_t count, uint8_t *out, const std::string &where);
+
+// ---- gltf_line.cpp
+// Adds the points and lines of a mesh, as spheres and as tubes; `skinned`: it has a skin, which does not move
+// them.
+std::vector<shown_part> add_points_and_lines(reader &r, const tinygltf::Mesh &source, bool skinned,
+                                             const std::string &where);
 
 // ---- gltf_skin.cpp
 // Joints of a primitive's vertices and their weights, the used ones first; `stride` places a vertex, of which no

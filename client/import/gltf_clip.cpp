@@ -176,7 +176,7 @@ void send_channel(builder &b, protocol_channel_path path, uint32_t object, uint3
     set.first_time = first_time;
     set.first_value = first_value;
     if (import_add_channel(b.r.scene, &set) == 0)
-        throw failed();
+        throw reading::failed();
 }
 
 void play(builder &b, const tinygltf::AnimationSampler &sampler, const channel_target &to,
@@ -281,7 +281,7 @@ void add_clip(reader &r, size_t index)
             fail(r, b.where, "out of memory");
         memcpy(floats, b.floats.data(), b.floats.size() * sizeof(float));
         if (!import_add_clip(r.scene, b.clip, source.name.c_str(), floats, uint32_t(b.floats.size())))
-            throw failed();
+            throw reading::failed();
     } else {
         import_note(r.scene, PROTOCOL_SEVERITY_WARNING, b.where.c_str(),
                     "an animation has nothing that can be played");

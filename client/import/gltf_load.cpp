@@ -3,7 +3,6 @@
 #include "gltf.hpp"
 
 #include <algorithm>
-#include <cstdarg>
 #include <cstring>
 
 namespace gltf
@@ -232,18 +231,6 @@ void check_version(reader &r)
         fail(r, "asset", "the file needs glTF version '%.32s'; only 2.0 is supported", minimum.c_str());
 }
 } // namespace
-
-void fail(reader &r, const std::string &where, const char *format, ...)
-{
-    char text[480];
-    va_list arguments;
-
-    va_start(arguments, format);
-    vsnprintf(text, sizeof(text), format, arguments);
-    va_end(arguments);
-    import_fail(r.scene, where.c_str(), "%s", text);
-    throw failed();
-}
 
 std::string place(const char *array, size_t index)
 {

@@ -151,8 +151,7 @@ void use_converted(const building &b, const specular_gloss &factors, const gloss
         *places[i] = allocate_texels(b, set.width, set.height);
         blobs[i] = import_add_blob(b.r.scene, *places[i], uint64_t(set.width) * set.height * 4);
     }
-    if (b.r.scene->failed)
-        throw failed();
+    check(b.r);
     metal_texels(factors, from[0], from[1], to);
     const int texture = maps.sources[main].index;
     const std::string name = texture_name(b.r, texture, maps.images[main]);
@@ -232,7 +231,6 @@ void add_materials(reader &r, const std::set<int> &used)
     for (int index : used)
         if (size_t(index) < r.model.materials.size())
             r.material_ids[size_t(index)] = material(r, all, index);
-    if (r.scene->failed)
-        throw failed();
+    check(r);
 }
 } // namespace gltf

@@ -53,12 +53,6 @@ template <typename type> type *allocate(builder &b, uint64_t count)
     return static_cast<type *>(memory);
 }
 
-int attribute(const std::map<std::string, int> &attributes, const char *name)
-{
-    const auto found = attributes.find(name);
-    return found == attributes.end() ? -1 : found->second;
-}
-
 vertex_attributes attributes_of(const tinygltf::Primitive &primitive)
 {
     vertex_attributes a;
@@ -71,23 +65,6 @@ vertex_attributes attributes_of(const tinygltf::Primitive &primitive)
     return a;
 }
 
-void check_counts(builder &b, const tinygltf::Primitive &primitive, size_t vertices, const std::string &where)
-{
-    static const char *const vectors3[] = {"POSITION", "NORMAL"};
-    for (const char *name : vectors3)
-        if (attribute(primitive.attributes, name) >= 0)
-            accessor_count(b.r, attribute(primitive.attributes, name), TINYGLTF_TYPE_VEC3, where + "." + name);
-    for (const auto &entry : primitive.attributes) {
-        const size_t count = accessor_count(b.r, entry.second, 0, where + "." + entry.first);
-        if (count != vertices)
-            fail(b.r, where, "%.40s has %zu elements, POSITION has %zu", entry.first.c_str(), count, vertices);
-    }
-    for (const auto &target : primitive.targets)
-        for (const auto &entry : target)
-            if (accessor_count(b.r, entry.second, 0, where + ".targets") != vertices)
-                fail(b.r, where, "a morph target has another count than the %zu vertices", vertices);
-}
-
 uint32_t lot_of(builder &b, const tinygltf::Primitive &primitive, const std::string &where)
 {
     for (size_t i = 0; i < b.lots.size(); i++)
@@ -95,8 +72,7 @@ uint32_t lot_of(builder &b, const tinygltf::Primitive &primitive, const std::str
             b.lots[i].primitive->targets == primitive.targets)
             return uint32_t(i);
     const vertex_attributes a = attributes_of(primitive);
-    const size_t count = accessor_count(b.r, a.position, TINYGLTF_TYPE_VEC3, where + ".POSITION");
-    check_counts(b, primitive, count, where);
+    const size_t count = vertex_count(b.r, primitive, where);
     const uint64_t first = b.lots.empty() ? 0 : uint64_t(b.lots.back().first) + b.lots.back().count;
     if (first + count > vertices_max)
         fail(b.r, b.where, "more than %llu vertices", static_cast<unsigned long long>(vertices_max));
@@ -125,28 +101,10 @@ void add_corners(builder &b, uint32_t first, std::vector<uint32_t> corners)
         b.indices.insert(b.indices.end(), corners.begin(), corners.end());
 }
 
-std::vector<uint32_t> corners_of(builder &b, const tinygltf::Primitive &primitive, const vertex_lot &lot,
-                                 const std::string &where)
-{
-    std::vector<uint32_t> corners;
-
-    if (primitive.indices < 0) {
-        corners.resize(lot.count);
-        for (uint32_t i = 0; i < lot.count; i++)
-            corners[i] = i;
-        return corners;
-    }
-    corners = read_integers(b.r, primitive.indices, 1, where + ".indices");
-    for (size_t i = 0; i < corners.size(); i++)
-        if (corners[i] >= lot.count)
-            fail(b.r, where, "index %u (number %zu) is beyond the %u vertices", corners[i], i, lot.count);
-    return corners;
-}
-
 void add_triangles(builder &b, const tinygltf::Primitive &primitive, const vertex_lot &lot,
                    const std::string &where)
 {
-    std::vector<uint32_t> corners = corners_of(b, primitive, lot, where);
+    std::vector<uint32_t> corners = corners_of(b.r, primitive, lot.count, where);
     const size_t count = corners.size();
 
     if (primitive.mode == TINYGLTF_MODE_TRIANGLES) {
@@ -174,43 +132,25 @@ void add_primitive(builder &b, const tinygltf::Primitive &primitive, size_t numb
 
     if (primitive.mode < TINYGLTF_MODE_POINTS || primitive.mode > TINYGLTF_MODE_TRIANGLE_FAN)
         fail(b.r, where, "mode %d is unknown", primitive.mode);
-    if (primitive.mode < TINYGLTF_MODE_TRIANGLES) {
-        import_note(b.r.scene, PROTOCOL_SEVERITY_WARNING, where.c_str(), "points and lines cannot be shown");
-        return;
-    }
+    if (primitive.mode < TINYGLTF_MODE_TRIANGLES)
+        return; // add_points_and_lines() has them
     if (attribute(primitive.attributes, "POSITION") < 0) {
         import_note(b.r.scene, PROTOCOL_SEVERITY_WARNING, where.c_str(),
                     "a primitive without positions is left out");
         return;
     }
-    const int material = material_of(b.r, primitive);
-    if (material >= 0 && size_t(material) >= b.r.material_ids.size())
-        fail(b.r, where, "material %d does not exist", material);
+    range.material = material_id(b.r, primitive, where);
     const uint32_t lot = lot_of(b, primitive, where);
     range.first = uint32_t(b.indices.size() / 3);
     add_triangles(b, primitive, b.lots[lot], where);
     if (b.indices.size() / 3 > triangles_max)
         fail(b.r, b.where, "more than %llu triangles", static_cast<unsigned long long>(triangles_max));
     range.count = uint32_t(b.indices.size() / 3) - range.first;
-    range.material = material >= 0 ? b.r.material_ids[size_t(material)] : 0;
     if (range.count > 0)
         b.ranges.push_back(range);
 }
 
 // ---- vertices
-
-void read_colours(builder &b, const vertex_lot &lot, const std::string &where)
-{
-    const bool has_alpha = accessor_components(b.r, lot.attributes.colour, where) == 4;
-    std::vector<float> colours(size_t(lot.count) * 4);
-    uint8_t *out = b.mesh.colours + size_t(lot.first) * 4;
-
-    read_floats(b.r, lot.attributes.colour, 4, 1, colours.data(), where);
-    for (size_t i = 0; i < colours.size(); i++) {
-        const float value = i % 4 == 3 && !has_alpha ? 1 : colours[i];
-        out[i] = uint8_t(std::lround(std::min(std::max(value, 0.0f), 1.0f) * 255));
-    }
-}
 
 void read_lot(builder &b, const vertex_lot &lot)
 {
@@ -226,7 +166,7 @@ void read_lot(builder &b, const vertex_lot &lot)
         if (a.texcoord[set] >= 0)
             read_floats(b.r, a.texcoord[set], 2, 0, b.mesh.texcoords[set] + first * 2, b.where + ".TEXCOORD");
     if (a.colour >= 0)
-        read_colours(b, lot, b.where + ".COLOR_0");
+        read_colours(b.r, a.colour, lot.count, b.mesh.colours + first * 4, b.where + ".COLOR_0");
     else if (b.mesh.colours)
         memset(b.mesh.colours + first * 4, 255, size_t(lot.count) * 4);
 }
@@ -336,17 +276,73 @@ void build(builder &b)
     b.mesh.range_count = uint32_t(b.ranges.size());
     b.mesh.ranges = copy_of(b, b.ranges);
     b.shown.id = import_add_mesh(b.r.scene, &b.mesh);
-    if (b.r.scene->failed)
-        throw failed();
+    check(b.r);
 }
 } // namespace
 
-void check_room(reader &r, const std::string &where, uint64_t count, uint64_t element_bytes)
+int attribute(const std::map<std::string, int> &attributes, const char *name)
 {
-    const uint64_t room = IMPORT_BYTES_MAX - r.scene->blob_bytes;
-    if (count > room / element_bytes)
-        fail(r, where, "the scene would need more than %llu GiB",
-             static_cast<unsigned long long>(IMPORT_BYTES_MAX >> 30));
+    const auto found = attributes.find(name);
+    return found == attributes.end() ? -1 : found->second;
+}
+
+size_t vertex_count(reader &r, const tinygltf::Primitive &primitive, const std::string &where)
+{
+    const size_t vertices =
+        accessor_count(r, attribute(primitive.attributes, "POSITION"), TINYGLTF_TYPE_VEC3, where + ".POSITION");
+
+    if (attribute(primitive.attributes, "NORMAL") >= 0)
+        accessor_count(r, attribute(primitive.attributes, "NORMAL"), TINYGLTF_TYPE_VEC3, where + ".NORMAL");
+    for (const auto &entry : primitive.attributes) {
+        const size_t count = accessor_count(r, entry.second, 0, where + "." + entry.first);
+        if (count != vertices)
+            fail(r, where, "%.40s has %zu elements, POSITION has %zu", entry.first.c_str(), count, vertices);
+    }
+    for (const auto &target : primitive.targets)
+        for (const auto &entry : target)
+            if (accessor_count(r, entry.second, 0, where + ".targets") != vertices)
+                fail(r, where, "a morph target has another count than the %zu vertices", vertices);
+    return vertices;
+}
+
+std::vector<uint32_t> corners_of(reader &r, const tinygltf::Primitive &primitive, size_t vertices,
+                                 const std::string &where)
+{
+    std::vector<uint32_t> corners;
+
+    if (primitive.indices < 0) {
+        check_room(r, where, vertices, sizeof(uint32_t));
+        corners.resize(vertices);
+        for (size_t i = 0; i < vertices; i++)
+            corners[i] = uint32_t(i);
+        return corners;
+    }
+    corners = read_integers(r, primitive.indices, 1, where + ".indices");
+    for (size_t i = 0; i < corners.size(); i++)
+        if (corners[i] >= vertices)
+            fail(r, where, "index %u (number %zu) is beyond the %zu vertices", corners[i], i, vertices);
+    return corners;
+}
+
+uint32_t material_id(reader &r, const tinygltf::Primitive &primitive, const std::string &where)
+{
+    const int material = material_of(r, primitive);
+
+    if (material >= 0 && size_t(material) >= r.material_ids.size())
+        fail(r, where, "material %d does not exist", material);
+    return material >= 0 ? r.material_ids[size_t(material)] : 0;
+}
+
+void read_colours(reader &r, int accessor, size_t count, uint8_t *out, const std::string &where)
+{
+    const bool has_alpha = accessor_components(r, accessor, where) == 4;
+    std::vector<float> colours(count * 4);
+
+    read_floats(r, accessor, 4, 1, colours.data(), where);
+    for (size_t i = 0; i < colours.size(); i++) {
+        const float value = i % 4 == 3 && !has_alpha ? 1 : colours[i];
+        out[i] = uint8_t(std::lround(std::min(std::max(value, 0.0f), 1.0f) * 255));
+    }
 }
 
 const shown_mesh &mesh_of(reader &r, int mesh)
@@ -360,6 +356,7 @@ const shown_mesh &mesh_of(reader &r, int mesh)
     const tinygltf::Mesh &source = r.model.meshes[size_t(mesh)];
     builder b = {r, place("meshes", size_t(mesh)), source, r.skinned_meshes.count(mesh) > 0};
     build(b);
+    b.shown.parts = add_points_and_lines(r, source, b.skinned, b.where);
     forget_draco(r);
     return r.meshes[mesh] = b.shown;
 }

@@ -98,6 +98,7 @@ struct attachment {
     protocol_node_kind kind;
     uint32_t object;
     const char *suffix;
+    bool is_of_mesh; // it is shown for each instance of the node's mesh
     uint32_t skin;
     std::vector<record_morph_weight> weights;
 };
@@ -105,9 +106,12 @@ struct attachment {
 void attach_mesh(reader &r, const tinygltf::Node &node, const std::string &where, std::vector<attachment> &found)
 {
     const shown_mesh &mesh = mesh_of(r, node.mesh);
+    for (const shown_part &part : mesh.parts)
+        found.push_back(
+            {part.kind, part.id, part.kind == PROTOCOL_NODE_SPHERES ? " points" : " lines", true, 0, {}});
     if (mesh.id == 0)
         return;
-    attachment one = {PROTOCOL_NODE_MESH, mesh.id, " mesh", 0, {}};
+    attachment one = {PROTOCOL_NODE_MESH, mesh.id, " mesh", true, 0, {}};
     if (node.skin >= 0 && mesh.has_joints)
         one.skin = skin_id(r, node.skin, mesh, where);
     if (!node.weights.empty())
@@ -124,11 +128,11 @@ std::vector<attachment> attachments_of(reader &r, size_t index)
     if (node.mesh >= 0)
         attach_mesh(r, node, where, found);
     if (node.camera >= 0)
-        found.push_back({PROTOCOL_NODE_CAMERA, camera_id(r, node.camera, where), " camera", 0, {}});
+        found.push_back({PROTOCOL_NODE_CAMERA, camera_id(r, node.camera, where), " camera", false, 0, {}});
     if (const tinygltf::Value *lights = extension(node.extensions, "KHR_lights_punctual")) {
         const uint32_t light = light_id(r, index_of(*lights, "light"), where);
         if (light != 0)
-            found.push_back({PROTOCOL_NODE_LIGHT, light, " light", 0, {}});
+            found.push_back({PROTOCOL_NODE_LIGHT, light, " light", false, 0, {}});
     }
     return found;
 }
@@ -151,8 +155,7 @@ uint32_t add_node(reader &r, uint32_t parent, const matrix &m, const attachment 
         set.weights_count = uint32_t(what->weights.size());
     }
     const uint32_t id = import_add_node(r.scene, &set);
-    if (r.scene->failed)
-        throw failed();
+    check(r);
     return id;
 }
 
@@ -172,21 +175,21 @@ uint32_t add_one(reader &r, size_t index, uint32_t parent)
     const std::string name = name_of(r, node);
     const std::vector<attachment> found = attachments_of(r, index);
     const std::vector<matrix> instances = node.mesh >= 0 ? instances_of(r, index) : std::vector<matrix>();
+    const uint32_t mesh = node.mesh >= 0 ? mesh_of(r, node.mesh).id : 0;
     const bool single = found.size() == 1 && instances.empty();
     const uint32_t id =
         add_node(r, parent, node_matrix(r, index), single ? &found[0] : nullptr, name, is_hidden(node));
 
     r.node_ids[index] = id;
     for (const attachment &one : found) {
-        const bool is_mesh = one.kind == PROTOCOL_NODE_MESH;
-        if (is_mesh)
+        std::vector<uint32_t> holders;
+        if (one.is_of_mesh)
             for (const matrix &instance : instances)
-                r.mesh_nodes[index].push_back(add_node(r, id, instance, &one, "", false));
-        if (is_mesh && !instances.empty())
-            continue;
-        const uint32_t holder = single ? id : add_node(r, id, identity(), &one, name + one.suffix, false);
-        if (is_mesh)
-            r.mesh_nodes[index].push_back(holder);
+                holders.push_back(add_node(r, id, instance, &one, "", false));
+        if (holders.empty())
+            holders.push_back(single ? id : add_node(r, id, identity(), &one, name + one.suffix, false));
+        if (one.kind == PROTOCOL_NODE_MESH && one.object == mesh) // points and lines have no morph targets
+            r.mesh_nodes[index] = holders;
     }
     return id;
 }

@@ -125,7 +125,7 @@ void add_skin(reader &r, int index, uint32_t id)
     arrays.joints = nullptr;
     arrays.joint_from_mesh = nullptr;
     if (!import_add_skin(r.scene, id, skin.name.c_str(), uint32_t(skin.joints.size()), joints, joint_from_mesh))
-        throw failed();
+        throw reading::failed();
 }
 } // namespace
 

@@ -26,8 +26,7 @@ uint32_t blob_of(reader &r, images &all, size_t number)
     if (all.blobs[number] == 0) {
         all.blobs[number] = import_add_blob(r.scene, job.texels, uint64_t(job.width) * job.height * 4);
         job.texels = nullptr;
-        if (r.scene->failed)
-            throw failed();
+        check(r);
     }
     return all.blobs[number];
 }

@@ -38,8 +38,7 @@ void choose_variant(reader &r)
         if (wanted && r.variant < 0 && one == wanted)
             r.variant = int(i);
     }
-    if (r.scene->failed)
-        throw failed();
+    check(r);
     if (wanted && r.variant < 0)
         fail(r, "", "the model has no variant '%.100s'; it has %s", wanted, listed(variants).c_str());
 }

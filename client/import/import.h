@@ -91,6 +91,7 @@ struct import_scene {
     bool is_added;                      /* it is not the first: its cameras and background are left out */
     bool display_values; /* it is alone, so that its colours may stay a display's values where its format has such
                           */
+    double point_size;   /* diameter of points and lines without faces, metres; 0: chosen by their distances */
     const char *variant; /* of the materials, that the user wants; NULL: the file's choice. Readers of formats
                             without variants need not look */
     bool failed;

@@ -226,7 +226,7 @@ static bool enter_sandbox(struct import_scene *scene, const struct options *opti
     return true;
 }
 
-static bool parse_model(struct import_scene *scene, struct source *source, double point_size)
+static bool parse_model(struct import_scene *scene, struct source *source)
 {
     const unsigned char *bytes = source->bytes;
     const size_t size_bytes = source->size_bytes;
@@ -248,7 +248,7 @@ static bool parse_model(struct import_scene *scene, struct source *source, doubl
     case FORMAT_3MF:
         return threemf_import(scene, bytes, size_bytes);
     case FORMAT_ASSIMP:
-        return assimp_import(scene, &source->files, source->of.assimp, point_size, bytes, size_bytes);
+        return assimp_import(scene, &source->files, source->of.assimp, bytes, size_bytes);
     default:
         format_explain_unknown(source_name(source), source->format, bytes, size_bytes, reason);
         return import_fail(scene, NULL, "%s", reason);
@@ -295,10 +295,10 @@ static bool import_model(struct import_scene *scene, struct sender *sender, cons
     if (!sender_progress(sender, source->size_bytes, 0, "parsing"))
         return false;
     scene->variant = index == 0 ? options->variant : NULL;
+    scene->point_size = options->point_size;
     if (source_repeat(scene, options->sources, index, options->source_count))
         return !scene->failed;
-    imported = source_begin(scene, options->sources, index, options->source_count) &&
-               parse_model(scene, source, options->point_size);
+    imported = source_begin(scene, options->sources, index, options->source_count) && parse_model(scene, source);
     if (imported && scene->edit_count == edits + (source->root != 0))
         import_note(scene, PROTOCOL_SEVERITY_WARNING, NULL, "it contains nothing that can be shown");
     source_end(scene, source);

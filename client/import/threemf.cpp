@@ -6,8 +6,6 @@
 #include "threemf.hpp"
 
 #include <cmath>
-#include <cstdarg>
-#include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <exception>
@@ -17,24 +15,6 @@
 
 namespace threemf
 {
-void fail(reader &r, const std::string &where, const char *format, ...)
-{
-    char words[400];
-    va_list arguments;
-
-    va_start(arguments, format);
-    vsnprintf(words, sizeof(words), format, arguments);
-    va_end(arguments);
-    import_fail(r.scene, where.c_str(), "%s", words);
-    throw failed();
-}
-
-void check(reader &r)
-{
-    if (r.scene->failed)
-        throw failed();
-}
-
 namespace
 {
 // Behind the prefix of its namespace.
@@ -271,9 +251,9 @@ void import(reader &r, const unsigned char *bytes, size_t size_bytes)
 extern "C" bool threemf_import(struct import_scene *scene, const unsigned char *bytes, size_t size_bytes)
 {
     try {
-        threemf::reader r = {scene};
+        threemf::reader r = {{scene}};
         threemf::import(r, bytes, size_bytes);
-    } catch (const threemf::failed &) {
+    } catch (const reading::failed &) {
         // said already
     } catch (const std::bad_alloc &) {
         import_fail(scene, nullptr,

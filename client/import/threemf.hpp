@@ -6,6 +6,7 @@
 
 #include "files.h"
 #include "import.h"
+#include "reading.hpp"
 #include "threemf.h"
 
 #include <array>
@@ -16,10 +17,6 @@
 
 namespace threemf
 {
-// Thrown after import_fail(); caught in threemf_import() and at the edge of the XML parser.
-struct failed {
-};
-
 // A property of a corner that is none.
 constexpr uint32_t none = UINT32_MAX;
 
@@ -51,17 +48,12 @@ struct object {
     std::vector<instance> components;
 };
 
-struct reader {
-    import_scene *scene;
+struct reader : reading::base {
     double metres = 0.001; // of a unit
     std::map<object_key, object> objects = {};
     std::vector<instance> items = {};
     uint32_t colours_material = 0; // white, beneath colours
 };
-
-[[noreturn]] void fail(reader &r, const std::string &where, const char *format, ...)
-    __attribute__((format(printf, 3, 4)));
-void check(reader &r);
 
 // ---- threemf_archive.cpp
 using taker = std::function<void(const char *bytes, size_t size_bytes, bool is_last)>;

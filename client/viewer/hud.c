@@ -162,7 +162,8 @@ static void draw_line(struct hud_layout *layout)
     size_t shown = 0;
     for (; shown < count; shown++) {
         widths[shown] = hud_text_width(layout, HUD_PLAIN, items[shown].value) + (shown > 0 ? gap : 0);
-        if (shown > 0 && width + widths[shown] + 2 * (inner + HUD_MARGIN * s) > state->width)
+        /* Beside the panel, if that is open. */
+        if (shown > 0 && width + widths[shown] + 2 * (inner + HUD_MARGIN * s) > layout->right)
             break;
         width += widths[shown];
     }

@@ -72,13 +72,15 @@ void hud_edit_find(const struct hud_edit *edit, double width, double height, dou
 
 /* ---- drawing ---- */
 
-static struct hud_colour swatch(const float linear[3])
+static struct hud_colour swatch(const struct hud_edit_row *row)
 {
-    const float top = fmaxf(1, fmaxf(linear[0], fmaxf(linear[1], linear[2])));
-    const float r = srgb_from_linear_f(linear[0] / top), g = srgb_from_linear_f(linear[1] / top),
-                b = srgb_from_linear_f(linear[2] / top);
-    return (struct hud_colour){(uint8_t)lroundf(255 * r), (uint8_t)lroundf(255 * g), (uint8_t)lroundf(255 * b),
-                               255};
+    const float top = fmaxf(1, fmaxf(row->colour[0], fmaxf(row->colour[1], row->colour[2])));
+    uint8_t shown[3];
+    for (int i = 0; i < 3; i++) {
+        const float value = row->colour[i] / top;
+        shown[i] = (uint8_t)lroundf(255 * (row->is_shown_as_it_is ? value : srgb_from_linear_f(value)));
+    }
+    return (struct hud_colour){shown[0], shown[1], shown[2], 255};
 }
 
 static void draw_header(struct hud_layout *layout, const struct hud_edit *edit, const struct edit_place *frame)
@@ -112,7 +114,7 @@ static void draw_row(struct hud_layout *layout, const struct hud_edit *edit, con
         hud_box(layout, frame->x + 3 * s, y, frame->width - 6 * s, frame->line, hud_rule);
     hud_text(layout, frame->x + inner, y, HUD_PLAIN, is_chosen ? hud_accent : hud_faint, "%s", name);
     if (row->has_colour)
-        hud_box(layout, track - 15 * s, middle - 5 * s, 10 * s, 10 * s, swatch(row->colour));
+        hud_box(layout, track - 15 * s, middle - 5 * s, 10 * s, 10 * s, swatch(row));
     if (row->share >= 0) {
         const double share = fmin(row->share, 1);
         hud_box(layout, track, middle - 1 * s, width, 2 * s, (struct hud_colour){255, 255, 255, 60});

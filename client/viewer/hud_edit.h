@@ -14,7 +14,8 @@ struct hud_edit_row {
     char name[40], value[40];
     double share; /* of its range, on the slider; below 0: it has no ends, and no slider */
     bool has_colour;
-    float colour[3]; /* linear, of which this is the first number; drawn as a swatch, brightest at 1 */
+    bool is_shown_as_it_is; /* the colour is a display's, else linear */
+    float colour[3];        /* of which this is the first number; drawn as a swatch, brightest at 1 */
 };
 
 struct hud_edit {

@@ -52,6 +52,19 @@ static size_t index_of(const struct viewer_edit *edit)
     return 0;
 }
 
+/* Whether colours are a display's values, which the environment says. */
+static void ask_for_colours(struct viewer *viewer)
+{
+    struct viewer_edit *edit = &viewer->edit;
+    struct fl_error refusal = {0};
+    edit->has_display_values = false;
+    if (!session_read(viewer->session, PROTOCOL_OBJECT_ENVIRONMENT, 1, &edit->state, &refusal))
+        return;
+    for (size_t i = 0; i < edit->state.count; i++)
+        if (strcmp(edit->state.fields[i].field.name, "display_values") == 0)
+            edit->has_display_values = edit->state.fields[i].values[0] > 0;
+}
+
 /* A length that is a step in the scene. */
 static void measure(struct viewer *viewer)
 {
@@ -98,6 +111,7 @@ void viewer_edit_choose_tab(struct viewer *viewer, size_t tab)
     edit->tab = tab % EDIT_TABS;
     edit->chosen = 0;
     forget_objects(edit);
+    ask_for_colours(viewer);
     /* What cannot be picked: the first one is there to begin with. */
     if (edit->tab >= EDIT_LIGHT && edit->ids[edit->tab] == 0 && list_objects(viewer) && edit->object_count > 0)
         edit->ids[edit->tab] = edit->objects[0].id;
@@ -358,8 +372,10 @@ const struct hud_edit *viewer_edit_hud(struct viewer *viewer)
         snprintf(hud->title, sizeof(hud->title), "%.60s%s#%u", name, name[0] != '\0' ? "  " : "", edit->state.id);
     hud->count = edit->row_count + 1;
     show_which(edit, &hud->rows[0]);
-    for (size_t i = 0; i < edit->row_count; i++)
+    for (size_t i = 0; i < edit->row_count; i++) {
         edit_row_show(&edit->state, edit->rows[i], &hud->rows[i + 1]);
+        hud->rows[i + 1].is_shown_as_it_is = edit->has_display_values;
+    }
     static const char *const others[EDIT_TABS] = {
         "Left: the group around it, Right: back", "Left, Right: another one",
         "Left, Right: another one; Return: its node", "light from far away, all around the scene"};

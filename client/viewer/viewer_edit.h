@@ -25,6 +25,7 @@ struct viewer_edit {
     struct fl_object *objects; /* of the tab's kind; NULL: not asked for yet */
     size_t object_count;
     bool has_state;
+    bool has_display_values; /* colours are a display's */
     struct fl_object_state state;
     struct edit_row rows[EDIT_ROWS_MAX];
     size_t row_count, chosen; /* 0: which object; else a row counted from 1 */

@@ -7,7 +7,7 @@ static const struct assimp_format *format;
 static bool import_with_library(struct import_scene *scene, struct files *files, const unsigned char *bytes,
                                 size_t size_bytes)
 {
-    return assimp_import(scene, files, format, 0, bytes, size_bytes);
+    return assimp_import(scene, files, format, bytes, size_bytes);
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)

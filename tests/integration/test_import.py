@@ -15,6 +15,7 @@ Environment: FARLIGHT_BIN (default build/release), FARLIGHT_SCENES (default ../s
 """
 import base64
 import json
+import math
 import os
 import shutil
 import struct
@@ -353,6 +354,86 @@ class Written(importer.Written):
                 {"nodes": [{"mesh": 0}], "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "mode": mode}]}]},
                 data=data, accessors=[{"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3"}])
             self.assertEqual(result.integers(result.of(SET_MESH)[0]["arrays"][1]), wanted)
+
+    PLACES = ((0, 0, 0), (2, 0, 0), (2, 2, 0), (0, 2, 0))
+    COLOURS = (1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 1)
+
+    def run_modes(self, *primitives, places=PLACES, last=3, status=0, arguments=(), **extra):
+        """Of the modes, each with positions 0, colours 1 and indices 2 as it likes."""
+        data = b"".join(struct.pack("<3f", *place) for place in (*places, *self.COLOURS)) + struct.pack("<4H", 0, 2, 1, last)
+        views = [{"buffer": 0, "byteOffset": at, "byteLength": size} for at, size in ((0, 48), (48, 48), (96, 8))]
+        accessors = [{"bufferView": i, "componentType": kind, "count": 4, "type": name}
+                     for i, (kind, name) in enumerate(((5126, "VEC3"), (5126, "VEC3"), (5123, "SCALAR")))]
+        model = {"nodes": [{"mesh": 0, "name": "n"}], "meshes": [{"primitives": list(primitives)}], **extra}
+        self.write("model.gltf", json.dumps(gltf(model, data=data, views=views, accessors=accessors)))
+        result = import_file(str(self.folder / "model.gltf"), *arguments)
+        self.assertEqual((result.status, result.faults), (status, []), result.text())
+        self.assertEqual(inconsistencies(result) if status == 0 else [], [])
+        return result
+
+    def test_gltf_points_are_spheres_in_the_colours_of_their_vertices(self):
+        points = {"mode": 0, "attributes": {"POSITION": 0, "COLOR_0": 1}, "material": 0}
+        result = self.run_modes(points, {"attributes": {"POSITION": 0}, "indices": 2, "mode": 5},
+                                materials=[{"pbrMetallicRoughness": {"baseColorFactor": [0.5, 1, 1, 1]}}])
+        spheres, = result.of(SET_SPHERES)
+        values = result.floats(spheres["arrays"][0])
+        materials = {material["id"]: material["base"][:3] for material in result.of(SET_MATERIAL)}
+        shown = {tuple(values[at * 4:at * 4 + 3]): materials[material]
+                 for first, count, material in spheres["ranges"] for at in range(first, first + count)}
+        self.assertEqual(set(shown), set(self.PLACES))
+        for place, colour in zip(self.PLACES, self.COLOURS):
+            for got, wanted in zip(shown[place], (colour[0] * 0.5, *colour[1:])):
+                self.assertAlmostEqual(got, wanted, 5)
+        self.assertEqual(set(values[3::4]), {2}, "the distance to the nearest other point")
+        # Beside the triangles of the same mesh, below its node.
+        group, *below = result.of(SET_NODE)
+        self.assertEqual(sorted((node["parent"], node["kind"]) for node in below), [(group["id"], 1), (group["id"], 2)])
+        given = self.run_modes(points, arguments=("--point-size", "0.5"), materials=[{}])
+        self.assertEqual(set(given.floats(given.of(SET_SPHERES)[0]["arrays"][0])[3::4]), {0.25})
+
+    def test_gltf_lines_are_closed_tubes(self):
+        for mode, indices, ends in ((1, None, ((0, 1), (2, 3))), (1, 2, ((0, 2), (1, 3))), (2, None, ((0, 1), (1, 2), (2, 3), (3, 0))),
+                                    (3, 2, ((0, 2), (2, 1), (1, 3)))):
+            with self.subTest((mode, indices)):
+                line = {"mode": mode, "attributes": {"POSITION": 0, "COLOR_0": 1}, **({"indices": indices} if indices else {})}
+                result = self.run_modes(line, arguments=("--point-size", "0.1"))
+                mesh, = result.of(SET_MESH)
+                self.assertEqual((mesh["vertices"], mesh["triangles"]), (8 * len(ends), 12 * len(ends)))
+                places, colours = result.floats(mesh["arrays"][0]), result.data(mesh["arrays"][6])
+                self.check_closed(result.integers(mesh["arrays"][1]), places)
+                for tube, pair in enumerate(ends):
+                    for vertex in range(8):
+                        at, end = tube * 8 + vertex, pair[vertex % 2]
+                        self.assertAlmostEqual(math.dist(places[at * 3:at * 3 + 3], self.PLACES[end]), 0.05, 5)
+                        self.assertEqual(tuple(colours[at * 4:at * 4 + 4]), tuple(255 * c for c in (*self.COLOURS[end], 1)))
+        chosen = self.run_modes({"mode": 1, "attributes": {"POSITION": 0}})
+        places = chosen.floats(chosen.of(SET_MESH)[0]["arrays"][0])
+        self.assertAlmostEqual(math.dist(places[:3], self.PLACES[0]), math.sqrt(8) / 200 / 2, 5)
+
+    def check_closed(self, corners, places):
+        """Each edge is in two triangles, in both directions, and the volume is not negative."""
+        edges, volume = set(), 0
+        for at in range(0, len(corners), 3):
+            a, b, c = corners[at:at + 3]
+            edges |= {(a, b), (b, c), (c, a)}
+            p, q, r = (places[one * 3:one * 3 + 3] for one in (a, b, c))
+            volume += (p[0] * (q[1] * r[2] - q[2] * r[1]) + p[1] * (q[2] * r[0] - q[0] * r[2]) + p[2] * (q[0] * r[1] - q[1] * r[0])) / 6
+        self.assertEqual(len(edges), len(corners))
+        self.assertEqual(edges, {(b, a) for a, b in edges})
+        self.assertGreater(volume, 0)
+
+    def test_gltf_points_and_lines_that_cannot_be_shown_are_said(self):
+        far, here = float("inf"), (0, 0, 0)
+        for mode, wanted in ((0, "NaN or infinite"), (2, "without length")):
+            result = self.run_modes({"mode": mode, "attributes": {"POSITION": 0}}, places=(here, here, (far, 0, 0), (1, 0, 0)))
+            self.assertIn(wanted, result.text())
+        self.assertEqual(result.of(SET_MESH)[0]["triangles"], 12)
+        moved = {"mode": 1, "attributes": {"POSITION": 0}, "targets": [{"POSITION": 0}]}
+        self.assertIn("at rest", self.run_modes(moved).text())
+        self.assertIn("without positions", self.run_modes({"mode": 3, "attributes": {}}).text())
+        for mode in (0, 1):
+            wrong = self.run_modes({"mode": mode, "attributes": {"POSITION": 0}, "indices": 2}, last=4, status=1)
+            self.assertIn("index 4 (number 3) is beyond the 4 vertices", wrong.text())
 
     def test_gltf_quantised_and_sparse_positions(self):
         data = struct.pack("<9bxxx", 0, 0, 0, 127, 0, 0, 0, 127, 0) + struct.pack("<Bxxx3f", 2, 0, 3, 0) + TRIANGLE

@@ -382,6 +382,39 @@ TEST(an_object_is_edited_beside_the_figures)
     }
 }
 
+static bool has_box_of(uint8_t grey)
+{
+    for (size_t i = 0; i < hud.count; i++)
+        if (hud.marks[i].colour.r == grey && hud.marks[i].colour.g == grey && hud.marks[i].colour.b == grey)
+            return true;
+    return false;
+}
+
+TEST(the_line_of_figures_ends_before_the_panel_whose_swatches_are_as_the_picture_is)
+{
+    static struct hud_edit edit;
+    add(0, 1, 1000 * MS);
+    edit = (struct hud_edit){.shown = true, .count = 1};
+    edit.rows[0] = (struct hud_edit_row){.share = -1, .has_colour = true, .colour = {0.5f, 0.5f, 0.5f}};
+    for (int width = 600; width <= 1280; width += 10) {
+        struct hud_state shown = some_state(width, 480);
+        settings = (struct settings){0};
+        shown.edit = &edit;
+        hud_layout(&hud, &shown, measure, NULL);
+        assert_true(tells("teapot.glb") || width < 700);
+        const double right = width - hud_edit_width(&edit, width, shown.scale);
+        for (size_t i = 0; i < hud.count; i++) /* what begins beside the panel ends there */
+            assert_true(hud.marks[i].y >= 50 || hud.marks[i].x >= right || hud.marks[i].is_right ||
+                        hud.marks[i].x + hud.marks[i].width <= right);
+        assert_true(has_box_of(188) && !has_box_of(128)); /* sRGB of 0.5 */
+    }
+    edit.rows[0].is_shown_as_it_is = true;
+    struct hud_state shown = some_state(1280, 480);
+    shown.edit = &edit;
+    hud_layout(&hud, &shown, measure, NULL);
+    assert_true(has_box_of(128) && !has_box_of(188));
+}
+
 TEST(what_is_not_wanted_is_not_drawn_but_a_loss_is)
 {
     add(0, 1, 1000 * MS);

@@ -1,41 +1,44 @@
 // SPDX-License-Identifier: MIT
 // Points without faces: a sphere each.
-#include "assimp.hpp"
+#include "points.hpp"
+#include "protocol/common/srgb.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdlib>
 #include <limits>
+#include <new>
 
-namespace assimp
+namespace points
 {
 namespace
 {
-constexpr uint32_t points_max = 1u << 27;
 // Colours of spheres are those of materials: with 16 steps of each component there are never more of them than
 // ranges in one set.
 constexpr int steps = 16;
 static_assert(steps * steps * steps <= IMPORT_RANGES_MAX, "one set has room for the ranges of all colours");
 
-bool usable(const aiVector3D &p)
+bool usable(const float *p)
 {
-    return std::fabs(p.x) <= 1e12f && std::fabs(p.y) <= 1e12f && std::fabs(p.z) <= 1e12f;
+    return std::fabs(p[0]) <= 1e12f && std::fabs(p[1]) <= 1e12f && std::fabs(p[2]) <= 1e12f;
 }
 
 // Median distance of some points to the nearest other one that is not at the same place; 0: there is none.
-double spacing(const std::vector<aiVector3D> &points)
+double spacing(const std::vector<float> &places)
 {
     constexpr uint64_t budget = 200000000; // distances: a fraction of a second
-    const size_t samples = std::min<size_t>(
-        points.size(), size_t(std::min<uint64_t>(std::max<uint64_t>(budget / points.size(), 8), 256)));
+    const size_t count = places.size() / 3;
+    const size_t samples =
+        std::min<size_t>(count, size_t(std::min<uint64_t>(std::max<uint64_t>(budget / count, 8), 256)));
     std::vector<float> nearest;
 
     for (size_t s = 0; s < samples; s++) {
-        const aiVector3D at = points[s * points.size() / samples];
+        const float *at = &places[s * count / samples * 3];
         float least = std::numeric_limits<float>::infinity();
-        for (const aiVector3D &other : points) {
-            const float distance = (other - at).SquareLength();
+        for (size_t i = 0; i < count * 3; i += 3) {
+            const float x = places[i] - at[0], y = places[i + 1] - at[1], z = places[i + 2] - at[2];
+            const float distance = x * x + y * y + z * z;
             if (distance > 0)
                 least = std::min(least, distance);
         }
@@ -53,7 +56,7 @@ struct cell {
     uint32_t count = 0;
 };
 
-unsigned cell_of(const aiColor4D &colour)
+unsigned cell_of(const float *colour)
 {
     unsigned at = 0;
     for (unsigned c = 0; c < 3; c++) {
@@ -64,15 +67,15 @@ unsigned cell_of(const aiColor4D &colour)
 }
 
 // A material for each colour that there is, the mean of those that are nearly the same.
-std::vector<uint32_t> add_palette(reader &r, const std::vector<aiColor4D> &colours, uint32_t otherwise)
+std::vector<uint32_t> add_palette(reading::base &r, const std::vector<float> &colours, uint32_t otherwise)
 {
     std::vector<cell> cells(steps * steps * steps);
     std::vector<uint32_t> ids(cells.size(), otherwise);
 
-    for (const aiColor4D &colour : colours) {
-        cell &of = cells[cell_of(colour)];
-        for (unsigned c = 0; c < 3; c++)
-            of.sum[c] += double(linear(colour[c]));
+    for (size_t i = 0; i < colours.size(); i += 3) {
+        cell &of = cells[cell_of(&colours[i])];
+        for (unsigned c = 0; c < 3; c++) // NaN becomes 0
+            of.sum[c] += double(linear_from_srgb_f(std::min(std::max(colours[i + c], 0.0f), 1.0f)));
         of.count++;
     }
     for (size_t i = 0; i < cells.size(); i++) {
@@ -90,11 +93,11 @@ std::vector<uint32_t> add_palette(reader &r, const std::vector<aiColor4D> &colou
 }
 
 // Counting sort by material, so that each has one range.
-uint32_t add_set(reader &r, const std::vector<aiVector3D> &points, const std::vector<unsigned> &cells,
+uint32_t add_set(reading::base &r, const std::vector<float> &places, const std::vector<unsigned> &cells,
                  const std::vector<uint32_t> &materials, double radius, const char *name)
 {
     std::vector<uint32_t> first(materials.size() + 1, 0);
-    const uint32_t count = uint32_t(points.size());
+    const uint32_t count = uint32_t(places.size() / 3);
 
     for (unsigned one : cells)
         first[one + 1]++;
@@ -114,59 +117,42 @@ uint32_t add_set(reader &r, const std::vector<aiVector3D> &points, const std::ve
             ranges[range_count++] = {first[i], first[i + 1] - first[i], materials[i]};
     for (uint32_t i = 0; i < count; i++) {
         float *to = spheres + size_t(first[cells[i]]++) * 4;
-        to[0] = points[i].x;
-        to[1] = points[i].y;
-        to[2] = points[i].z;
+        std::copy_n(&places[size_t(i) * 3], 3, to);
         to[3] = float(radius);
     }
     return import_add_spheres(r.scene, name, spheres, count, ranges, range_count);
 }
 } // namespace
 
-bool is_point_cloud(const aiMesh &mesh)
+uint32_t add(reading::base &r, const cloud &from, const std::string &name, const std::string &where)
 {
-    return mesh.mNumFaces == 0 || mesh.mPrimitiveTypes == aiPrimitiveType_POINT;
-}
-
-shown_mesh add_points(reader &r, const aiMesh &from, const std::string &where)
-{
-    std::vector<aiVector3D> points;
-    std::vector<aiColor4D> colours;
+    const bool has_colours = !from.colours.empty();
+    const double diameter = r.scene->point_size;
+    std::vector<float> places;
     std::vector<unsigned> cells;
-    shown_mesh shown;
 
-    if (from.mNumVertices > points_max)
-        fail(r, where, "%u points; up to %u are allowed", from.mNumVertices, points_max);
-    check_room(r, where, from.mNumVertices, 4 * sizeof(float));
-    for (unsigned i = 0; i < from.mNumVertices; i++) {
-        if (!usable(from.mVertices[i])) {
+    check_room(r, where, from.places.size() / 3, 4 * sizeof(float));
+    for (size_t i = 0; i < from.places.size(); i += 3) {
+        if (!usable(&from.places[i])) {
             import_note(r.scene, PROTOCOL_SEVERITY_WARNING, where.c_str(),
                         "points that are NaN or infinite are left out");
             continue;
         }
-        points.push_back(from.mVertices[i]);
-        if (from.mColors[0])
-            colours.push_back(from.mColors[0][i]);
+        places.insert(places.end(), &from.places[i], &from.places[i] + 3);
+        cells.push_back(has_colours ? cell_of(&from.colours[i]) : 0);
     }
-    if (points.empty())
-        return shown;
-    const double apart = r.point_size > 0 ? 0 : spacing(points);
-    const double radius = r.point_size > 0 ? r.point_size / 2 / r.metres : apart > 0 ? apart : 0.5;
-    const uint32_t plain = from.mMaterialIndex < r.material_ids.size() ? r.material_ids[from.mMaterialIndex] : 0;
-    std::vector<uint32_t> materials = {plain};
-    if (colours.empty()) {
-        cells.assign(points.size(), 0);
-    } else {
-        materials = add_palette(r, colours, plain);
-        for (const aiColor4D &colour : colours)
-            cells.push_back(cell_of(colour));
-    }
-    shown.kind = PROTOCOL_NODE_SPHERES;
-    shown.id = add_set(r, points, cells, materials, radius, text(from.mName).c_str());
+    if (places.empty())
+        return 0;
+    const double apart = diameter > 0 ? 0 : spacing(places);
+    const double radius = diameter > 0 ? diameter / 2 / from.metres : apart > 0 ? apart : 0.5;
+    std::vector<uint32_t> materials = {from.material};
+    if (has_colours)
+        materials = add_palette(r, from.colours, from.material);
+    const uint32_t id = add_set(r, places, cells, materials, radius, name.c_str());
     check(r);
     import_note(r.scene, PROTOCOL_SEVERITY_INFO, where.c_str(),
                 "%zu points without faces are shown as spheres of diameter %.3g; --point-size sets it",
-                points.size(), 2 * radius * r.metres);
-    return shown;
+                places.size() / 3, 2 * radius * from.metres);
+    return id;
 }
-} // namespace assimp
+} // namespace points

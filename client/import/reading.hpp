@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: MIT
+// What readers in C++ share: how they end where a file is wrong.
+#ifndef FARLIGHT_IMPORT_READING_HPP
+#define FARLIGHT_IMPORT_READING_HPP
+
+#include "import.h"
+
+#include <cstdarg>
+#include <cstdio>
+#include <string>
+
+namespace reading
+{
+// Thrown after import_fail(); caught where the format's C function begins, and at the edges of libraries in C.
+struct failed {
+};
+
+// What every reader begins with. The functions below are found by it, so that a reader calls them by their names.
+struct base {
+    import_scene *scene;
+};
+
+// The scene keeps 480 bytes of it.
+[[noreturn]] inline void fail(base &r, const std::string &where, const char *format, ...)
+    __attribute__((format(printf, 3, 4)));
+inline void fail(base &r, const std::string &where, const char *format, ...)
+{
+    char words[480];
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(words, sizeof(words), format, arguments);
+    va_end(arguments);
+    import_fail(r.scene, where.c_str(), "%s", words);
+    throw failed();
+}
+
+// Ends the work where the scene has failed.
+inline void check(base &r)
+{
+    if (r.scene->failed)
+        throw failed();
+}
+
+// Fails if the scene would not have room for so many bytes more, before they are allocated.
+inline void check_room(base &r, const std::string &where, uint64_t count, uint64_t element_bytes)
+{
+    if (count > (IMPORT_BYTES_MAX - r.scene->blob_bytes) / element_bytes)
+        fail(r, where, "the scene would need more than %llu GiB",
+             static_cast<unsigned long long>(IMPORT_BYTES_MAX >> 30));
+}
+} // namespace reading
+
+#endif
