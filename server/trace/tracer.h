@@ -34,6 +34,7 @@ struct tracer_bench {
     uint32_t ldc_layers_together;       /* of a texel, tested at once; 0: chosen; 1, 4 */
     uint32_t ldc_count_steps;           /* 1: hits hold counts of the traversal (shaders/ldc/cube.glsl) */
     uint32_t abuffer_count_steps;       /* likewise */
+    uint32_t abuffer_on_device;         /* 1: its runs are sorted by shaders on software GL, too */
     uint32_t axes_samples;              /* of ldc and abuffer: coarser beyond these; 0: chosen */
     uint32_t rayspace_pairs;            /* of a stack of it; 0: chosen */
     uint32_t quadtree_stack; /* 1: the traversal keeps the ancestors of a node (shaders/quadtree/traverse.glsl) */

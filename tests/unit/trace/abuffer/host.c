@@ -1,0 +1,68 @@
+/* SPDX-License-Identifier: MIT */
+/* Where the host sorts the runs (software GL), they are those of the passes that a GPU does it with. */
+#include "tests/unit/trace/abuffer/fixture.h"
+#include "tests/unit/trace/abuffer/scenes.h"
+#include "tests/unit/trace/stack_scene.h"
+
+#include "tests/harness/test.h"
+
+#define RESOLUTION 72u
+#define VOXELS 16u
+
+static void build_by(struct fixture *fixture, struct contents *contents, uint32_t on_device, bool in_steps)
+{
+    struct error error = {0};
+    enum tracer_progress progress;
+    fixture->options.bench.abuffer_on_device = on_device;
+    place(fixture, RESOLUTION, VOXELS);
+    expect_ok(abuffer_build_begin(fixture->builder, &fixture->store, &fixture->gpu, fixture->instances,
+                                  fixture->instance_count, &fixture->options, &error),
+              &error);
+    do {
+        progress = abuffer_build_step(fixture->builder, in_steps ? 0 : STEP_WITHOUT_END, &error);
+    } while (progress == TRACER_MORE);
+    expect_ok(progress == TRACER_DONE, &error);
+    contents_read(contents, &fixture->store);
+    expect_consistent(contents);
+}
+
+static struct scene *few_layers(void)
+{
+    return stack_scene(9, SHUFFLED, true);
+}
+
+static struct scene *many_layers(void)
+{
+    return stack_scene(33, SHUFFLED, false);
+}
+
+static struct scene *too_many_for_a_device(void)
+{
+    return stack_scene(ABUFFER_LIST_MAX + 1, SHUFFLED, false);
+}
+
+ALL_TESTS(open_device, close_device)
+
+TEST(host_and_device_make_the_same_runs)
+{
+    struct scene *(*const scenes[])(void) = {
+        scene_of_bodies_and_others, test_scene_spheres, test_scene_translucent, few_layers, many_layers,
+        too_many_for_a_device};
+    for (size_t i = 0; i < sizeof(scenes) / sizeof(scenes[0]); i++)
+        for (int search = 0; search < 2; search++) {
+            struct fixture fixture;
+            struct contents by_host, by_device, in_steps;
+            fixture_init(&fixture, scenes[i]());
+            fixture.options.abuffer.search = search == 0 ? ABUFFER_SEARCH_LINEAR3 : ABUFFER_SEARCH_DDA;
+            build_by(&fixture, &by_host, 0, false);
+            assert_in_range(by_host.store.sample_count, 1000, UINT32_MAX);
+            build_by(&fixture, &by_device, 1, false);
+            expect_same(&by_host, &by_device);
+            build_by(&fixture, &in_steps, 1, true);
+            expect_same(&by_host, &in_steps);
+            contents_free(&by_host);
+            contents_free(&by_device);
+            contents_free(&in_steps);
+            fixture_finish(&fixture);
+        }
+}
