@@ -60,7 +60,7 @@ unsigned cell_of(const float *colour)
 {
     unsigned at = 0;
     for (unsigned c = 0; c < 3; c++) {
-        const float value = std::min(std::max(colour[c], 0.0f), 1.0f); // NaN becomes 0
+        const float value = std::min(std::max(0.0f, colour[c]), 1.0f); // NaN becomes 0
         at = at * steps + unsigned(std::lround(value * (steps - 1)));
     }
     return at;
@@ -75,7 +75,7 @@ std::vector<uint32_t> add_palette(reading::base &r, const std::vector<float> &co
     for (size_t i = 0; i < colours.size(); i += 3) {
         cell &of = cells[cell_of(&colours[i])];
         for (unsigned c = 0; c < 3; c++) // NaN becomes 0
-            of.sum[c] += double(linear_from_srgb_f(std::min(std::max(colours[i + c], 0.0f), 1.0f)));
+            of.sum[c] += double(linear_from_srgb_f(std::min(std::max(0.0f, colours[i + c]), 1.0f)));
         of.count++;
     }
     for (size_t i = 0; i < cells.size(); i++) {
