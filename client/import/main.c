@@ -62,7 +62,7 @@ static const struct argp_option option_rows[] = {
      "turn it about +y by -360 to 360 (default 0: its middle column is +x)", 0},
     {"variant", OPTION_VARIANT, "NAME", 0, "show the materials of this variant of a glTF model", 0},
     {"point-size", OPTION_POINT_SIZE, "METRES", 0,
-     "show points without faces as spheres of this diameter (default: by their distances)", 0},
+     "show points as spheres, and lines as tubes, of this diameter (default: by their distances)", 0},
     {"at", OPTION_AT, "X,Y,Z[:RX,RY,RZ[:SCALE]]", 0,
      "place the MODEL named before: metres, degrees about x, then y, then z, and a factor", 0},
     {"format", OPTION_FORMAT, "NAME", 0,

@@ -241,6 +241,18 @@ class Serve(Case):
         self.assertEqual((kind, error_code(payload)), (ERROR, DENIED))
         self.assertEqual(self.scenes()[0]["revision"], 1)
 
+    def test_a_model_that_changes_is_loaded_into_the_scene_that_is_up(self):
+        tile = "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nf 1 2 3\n"
+        model = self.folder / "tile.obj"
+        model.write_text(tile)
+        with Daemon() as daemon, Serving(model, "--watch", "--server", daemon.address):
+            viewer = Viewer(daemon.path, "tile.obj")
+            self.addCleanup(viewer.close)
+            model.write_text(tile + "f 1 3 2\n")
+            self.assertEqual(viewer.changed(), viewer.revision + 1)
+            scene, = self.scenes(daemon.address)
+            self.assertEqual((scene["triangles"], scene["clients"]), (2, 2))
+
     # ---- lost connections ---------------------------------------------------------------------------
 
     def test_a_scene_outlives_a_cut_connection_and_can_be_attached_again(self):
