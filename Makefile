@@ -211,7 +211,7 @@ $(B)/shader_sources.c: shaders/embed.sh $(addprefix shaders/,$(SHADERS)) Makefil
 	@mkdir -p $(@D)
 	shaders/embed.sh $(CURDIR)/shaders $(SHADERS) $(EXTRA_EMBEDDED) >$@.new && mv $@.new $@
 $(B)/shader_sources.o: $(B)/shader_sources.c
-	$(call say,CC)$(CC) $(CPPFLAGS_ALL) $(INCLUDES) $(OPT) $(CFLAGS_ALL) $(WARN_C) -c $< -o $@
+	$(call say,CC)$(CC) $(CPPFLAGS_ALL) $(INCLUDES) $(OPT) $(CFLAGS_ALL) $(WARN_C) $(CPPFLAGS) $(CFLAGS) -c $< -o $@
 
 # Programs that measure or test rivals have their shaders too.
 RIVAL_SHADERS := $(patsubst tests/bench/%,%,$(call sources,tests/bench/svo tests/bench/reduce,h glsl comp frag))
@@ -219,7 +219,7 @@ $(B)/tests/bench/shader_sources.c: shaders/embed.sh $(addprefix shaders/,$(SHADE
 	@mkdir -p $(@D)
 	shaders/embed.sh $(CURDIR)/shaders $(SHADERS) -- $(CURDIR)/tests/bench $(RIVAL_SHADERS) >$@.new && mv $@.new $@
 $(B)/tests/bench/shader_sources.o: $(B)/tests/bench/shader_sources.c
-	$(call say,CC)$(CC) $(CPPFLAGS_ALL) -Iserver $(OPT) $(CFLAGS_ALL) $(WARN_C) -c $< -o $@
+	$(call say,CC)$(CC) $(CPPFLAGS_ALL) -Iserver $(OPT) $(CFLAGS_ALL) $(WARN_C) $(CPPFLAGS) $(CFLAGS) -c $< -o $@
 
 # ---- programs --------------------------------------------------------------------------------------
 EMBREE_LIBS := $(if $(filter 1,$(EMBREE)),-lembree3)
