@@ -204,16 +204,6 @@ void add_lines(tubes &t, const tinygltf::Primitive &primitive, const std::string
         t.ranges.push_back({first, triangles, material_id(t.r, primitive, where)});
 }
 
-template <typename type> type *copy_of(const std::vector<type> &from)
-{
-    type *copy = from.empty() ? nullptr : static_cast<type *>(malloc(from.size() * sizeof(type)));
-    if (!copy && !from.empty())
-        throw std::bad_alloc();
-    if (copy)
-        memcpy(copy, from.data(), from.size() * sizeof(type));
-    return copy;
-}
-
 uint32_t add_mesh(tubes &t, const std::string &name)
 {
     import_mesh mesh = {};
@@ -226,11 +216,11 @@ uint32_t add_mesh(tubes &t, const std::string &name)
     mesh.triangle_count = uint32_t(t.indices.size() / 3);
     mesh.range_count = uint32_t(t.ranges.size());
     try {
-        mesh.positions = copy_of(t.positions);
-        mesh.normals = copy_of(t.normals);
-        mesh.colours = copy_of(t.colours);
-        mesh.indices = copy_of(t.indices);
-        mesh.ranges = copy_of(t.ranges);
+        mesh.positions = reading::copy_of(t.positions);
+        mesh.normals = reading::copy_of(t.normals);
+        mesh.colours = reading::copy_of(t.colours);
+        mesh.indices = reading::copy_of(t.indices);
+        mesh.ranges = reading::copy_of(t.ranges);
     } catch (...) {
         import_mesh_finish(&mesh);
         throw;

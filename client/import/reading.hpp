@@ -7,7 +7,11 @@
 
 #include <cstdarg>
 #include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <new>
 #include <string>
+#include <vector>
 
 namespace reading
 {
@@ -47,6 +51,17 @@ inline void check_room(base &r, const std::string &where, uint64_t count, uint64
     if (count > (IMPORT_BYTES_MAX - r.scene->blob_bytes) / element_bytes)
         fail(r, where, "the scene would need more than %llu GiB",
              static_cast<unsigned long long>(IMPORT_BYTES_MAX >> 30));
+}
+
+// For the C interface, which takes it over; NULL of nothing.
+template <typename type> type *copy_of(const std::vector<type> &from)
+{
+    type *copy = from.empty() ? nullptr : static_cast<type *>(malloc(from.size() * sizeof(type)));
+    if (!copy && !from.empty())
+        throw std::bad_alloc();
+    if (copy)
+        memcpy(copy, from.data(), from.size() * sizeof(type));
+    return copy;
 }
 } // namespace reading
 

@@ -33,15 +33,6 @@ colour linear_of(const colour &of)
     return made;
 }
 
-template <typename Value> Value *copy_of(const std::vector<Value> &from)
-{
-    Value *copy = static_cast<Value *>(malloc(from.size() * sizeof(Value) + 1));
-    if (!copy)
-        throw std::bad_alloc();
-    memcpy(copy, from.data(), from.size() * sizeof(Value));
-    return copy;
-}
-
 uint32_t add_material(reader &r, const std::string &name, const colour &of)
 {
     message_set_material set;
@@ -210,10 +201,10 @@ uint32_t add_mesh(reader &r, const std::string &name, const geometry &from, std:
     mesh.triangle_count = uint32_t(made.indices.size() / 3);
     mesh.range_count = uint32_t(made.ranges.size());
     try {
-        mesh.positions = copy_of(made.positions);
-        mesh.indices = copy_of(made.indices);
-        mesh.colours = made.colours.empty() ? nullptr : copy_of(made.colours);
-        mesh.ranges = copy_of(made.ranges);
+        mesh.positions = reading::copy_of(made.positions);
+        mesh.indices = reading::copy_of(made.indices);
+        mesh.colours = reading::copy_of(made.colours);
+        mesh.ranges = reading::copy_of(made.ranges);
     } catch (...) {
         import_mesh_finish(&mesh);
         throw;
