@@ -370,7 +370,7 @@ WEB_PACKAGES := chromium python3-websocket
 FARM_PACKAGES := slurm-wlm slurmdbd mariadb-server-core mariadb-client-core nodejs python3-yaml
 BLENDER_PACKAGES := blender python3-numpy xvfb xauth
 
-.PHONY: tests build-packages test-packages stack-packages sync-packages lint-packages analyze-packages coverage-packages fuzz-packages fidelity-packages equal-time-packages farm-packages web-packages deb-packages blender-packages test test-long test-zink check-sync demo bench fidelity equal-time soak farm-drill farm-test web-test blender-test blender-addon siege bench-plot check-headers check-rules lint check analyze coverage format install uninstall dist deb deb-same deb-test clean distclean help
+.PHONY: tests build-packages test-packages stack-packages sync-packages lint-packages analyze-packages coverage-packages fuzz-packages fidelity-packages equal-time-packages farm-packages web-packages deb-packages blender-packages test test-long test-zink check-sync demo bench fidelity equal-time soak farm-drill farm-test web-test blender-test blender-addon siege bench-plot check-headers check-rules lint check analyze coverage format install uninstall dist deb deb-same deb-test container-test clean distclean help
 tests: $(TEST_PROGRAMS) $(CONTRACT) $(BENCH_PROGRAM) $(SHAPED_LINK) $(B)/tests/tools/make_scenes $(B)/tests/tools/pose_dump $(LOSING_DAEMON)
 
 build-packages:
@@ -618,9 +618,16 @@ deb-same: deb
 # On a clean Debian 12: install, render as the service does, remove without a trace. Needs root and Debian's archive.
 deb-test: deb
 	@tests/tools/install_packages.sh debootstrap
-	$(MAKE) $(B)/tests/tools/make_scenes
-	mkdir -p build/deb-scenes && $(B)/tests/tools/make_scenes build/deb-scenes
-	tests/packages/clean_install.sh build/deb-scenes
+	$(MAKE) $(DEB_SCENES)
+	tests/packages/clean_install.sh $(DEB_SCENES)
+# The image of conf/Containerfile: build it of the packages, render with its daemon. Needs root and Debian's archive.
+container-test: deb
+	@tests/tools/install_packages.sh debootstrap buildah iproute2
+	$(MAKE) $(DEB_SCENES) $(B)/farlight
+	tests/packages/container.sh $(B) $(DEB_SCENES)
+DEB_SCENES := build/deb-scenes
+$(DEB_SCENES): $(B)/tests/tools/make_scenes
+	mkdir -p $@ && $< $@
 # What was rendered and measured stays.
 clean:
 	rm -rf build compile_commands.json
@@ -641,6 +648,7 @@ help:
 	@echo 'make deb        build Debian packages into out/deb; make dist: an archive of the sources'
 	@echo 'make deb-same   build them once more in another folder, and see that they have the same bytes'
 	@echo 'make deb-test   build them, install them on a clean Debian, render there, and remove them'
+	@echo 'make container-test   build the image of conf/Containerfile of them, and render with its daemon'
 	@echo 'make farm-test  try the templates of conf/farm on Slurm and what stands in for other queues'
 	@echo 'make web-test   the page of farlight-web in headless Chromium'
 	@echo 'make blender-test   try the add-on in Blender, and compare its pictures with those of Cycles   [TESTS="words"]'

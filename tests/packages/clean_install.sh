@@ -4,32 +4,14 @@
 # packages that they need have left. Needs root, Debian's archive, and 2 GB below build/.
 # Usage: clean_install.sh SCENES | --check     --check prints why it cannot be done here, and ends with 1 then
 set -eu
-root=$(pwd)/build/deb-root
-suite=bookworm
-# The archive that this host uses.
-mirror=$(sed -n 's/^deb \(\[[^]]*\] \)\?\([^ ]*\) .*/\2/p; s/^URIs: \([^ ]*\).*/\1/p' /etc/apt/sources.list /etc/apt/sources.list.d/* 2>/dev/null | head -1)
-mirror=${mirror:-http://deb.debian.org/debian}
+# shellcheck source=tests/packages/clean_root.sh
+. "$(dirname "$0")/clean_root.sh"
 if [ "$1" = --check ]; then
-    if [ "$(id -u)" -ne 0 ]; then
-        echo "it needs root"
-    elif ! chroot / true 2>/dev/null; then
-        echo "chroot is not allowed here"
-    else
-        probe=$(mktemp -d)
-        reached=1
-        timeout 60 /usr/lib/apt/apt-helper download-file "$mirror/dists/$suite/Release" "$probe/Release" >/dev/null 2>&1 || reached=
-        rm -r "$probe"
-        [ -z "$reached" ] || exit 0
-        echo "$mirror cannot be reached"
-    fi
-    exit 1
+    can_make_root
+    exit
 fi
+root=$(pwd)/build/deb-root
 scenes=$1
-fail()
-{
-    echo "clean_install: $*" >&2
-    exit 1
-}
 in_root()
 {
     chroot "$root" /usr/bin/env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root DEBIAN_FRONTEND=noninteractive "$@"
@@ -50,12 +32,9 @@ ended()
 }
 trap ended EXIT
 
-[ -x "$root/usr/bin/apt-get" ] || debootstrap --variant=minbase "$suite" "$root" "$mirror"
-# Nothing of it has to survive a power cut.
-echo force-unsafe-io >"$root/etc/dpkg/dpkg.cfg.d/unsafe-io"
+make_root "$root"
 mountpoint -q "$root/proc" || mount -t proc proc "$root/proc"
 cp -f /etc/resolv.conf "$root/etc/resolv.conf"
-cp -rf /etc/apt/apt.conf.d/. "$root/etc/apt/apt.conf.d/"
 in_root apt-get update -q
 remove_all
 
