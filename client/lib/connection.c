@@ -278,9 +278,10 @@ static bool read_key(struct sealed_key *key, const char *key_file, struct fl_err
     if (sealed_key_read(key, key_file, &why))
         return true;
     fl_error_set(error, FL_ERROR_FILE, key_file, "%s", why.text);
-    return fl_error_remedy(error, why.code == PROTOCOL_ERROR_DENIED
-                                      ? "only its owner may read or write a key: run 'chmod 600'"
-                                      : "a key file has 32 bytes; 'farlight key FILE' creates one");
+    return fl_error_remedy(
+        error, why.code == PROTOCOL_ERROR_DENIED
+                   ? "a key has to be its reader's own, and closed to others: run 'chown' or 'chmod 600'"
+                   : "a key file has 32 bytes; 'farlight key FILE' creates one");
 }
 
 static bool shake_hands(struct fl_connection *connection, const char *name, uint64_t deadline_ns,

@@ -50,7 +50,7 @@ def read_key(path: str | os.PathLike[str]) -> bytes:
             if not stat.S_ISREG(status.st_mode):
                 raise FileFailed("is no file that could hold a key", field=name)
             if status.st_uid != os.geteuid():
-                raise FileFailed("belongs to another user", field=name)
+                raise FileFailed("belongs to another user", field=name, remedy="run 'chown'")
             if status.st_mode & 0o077:
                 raise FileFailed(f"is open to others (mode {stat.S_IMODE(status.st_mode):04o})", field=name,
                                  remedy="run 'chmod 600'")
