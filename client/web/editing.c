@@ -64,19 +64,32 @@ static json_t *field_object(const struct fl_field_value *value)
                      field->max, "words", words_of(field), "values", values);
 }
 
+/* Whether the scene's colours are a display's values, and not linear. Without an environment they are linear. */
+static bool has_display_values(struct fl_scene *scene, struct fl_object_state *state)
+{
+    struct fl_error ignored = {0};
+    if (fl_scene_read(scene, PROTOCOL_OBJECT_ENVIRONMENT, 1, state, &ignored))
+        for (size_t i = 0; i < state->count; i++)
+            if (strcmp(state->fields[i].field.name, "display_values") == 0)
+                return state->fields[i].values[0] > 0;
+    return false;
+}
+
 static char *read_one(struct fl_scene *scene, const struct web_request *request, struct fl_error *error)
 {
     struct fl_object_state *state = malloc(sizeof(*state));
     char *text = NULL;
+    const bool display_values = state && has_display_values(scene, state);
     if (!state)
         fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
     else if (fl_scene_read(scene, request->assignment.kind, request->assignment.id, state, error)) {
         json_t *fields = json_array();
         for (size_t i = 0; i < state->count; i++)
             json_array_append_new(fields, field_object(&state->fields[i]));
-        text = print(json_pack("{s:{s:s,s:I,s:s,s:I,s:o}}", "object", "kind",
+        text = print(json_pack("{s:{s:s,s:I,s:s,s:I,s:b,s:o}}", "object", "kind",
                                protocol_object_kind_text(state->kind), "id", (json_int_t)state->id, "name",
-                               state->name, "revision", (json_int_t)state->revision, "fields", fields),
+                               state->name, "revision", (json_int_t)state->revision, "display_values",
+                               display_values, "fields", fields),
                      error);
     }
     free(state);

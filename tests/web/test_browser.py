@@ -190,6 +190,22 @@ class Page(unittest.TestCase):
         editor.wait("document.getElementById('edit-state').textContent.includes('rotation')")
         self.assertEqual((looker.faults, editor.faults), ([], []))
 
+    def test_colours_are_shown_as_the_scene_keeps_them(self):
+        model = self.folder / "kept.nff"  # its colours are a display's values
+        model.write_text("b 0 0 0\nv\nfrom 0 0 4\nat 0 0 0\nup 0 1 0\nangle 45\nhither 0.01\nresolution 64 64\nl 4 3 2\n"
+                         "f 1 0.8 0.2 1 0 1 0 1\ns 0 0 0 1\n")
+        with Gateway(model, "--allow-edit") as gateway:
+            page = self.open(link=gateway.edit_link)
+            colour = "document.getElementById('field-base_colour-0')"
+            page.wait(f"{colour} !== null")
+            self.assertEqual(page.value(f"{colour}.value"), "#ffcc33")
+            self.choose(page, "field-base_colour-0", "#336699")
+            page.wait("!document.getElementById('edit-undo').disabled")
+            self.choose(page, "edit-kind", "environment")
+            self.choose(page, "edit-kind", "material")
+            page.wait(f"{colour}?.value === '#336699'")
+            self.assertEqual(page.faults, [])
+
     def test_everything_has_a_name_and_keys_reach_it(self):
         page = self.open(link=self.gateway.edit_link)
         page.value("document.getElementById('panel').hidden && document.getElementById('open').click()")

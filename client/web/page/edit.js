@@ -8,8 +8,9 @@ const BRIGHTEST = 1; // of a colour that a menu of colours can show
 const $ = (id) => document.getElementById(id);
 const encode = (linear) => (linear <= 0.0031308 ? linear * 12.92 : 1.055 * linear ** (1 / 2.4) - 0.055);
 const decode = (shown) => (shown <= 0.04045 ? shown / 12.92 : ((shown + 0.055) / 1.055) ** 2.4);
-const hex = (values) => `#${values.slice(0, 3).map((value) => Math.round(encode(Math.min(1, value)) * 255).toString(16).padStart(2, "0")).join("")}`;
-const linear = (text) => [1, 3, 5].map((at) => decode(parseInt(text.slice(at, at + 2), 16) / 255));
+const same = (value) => value; // where the scene's colours are a display's values
+const hex = (values, shown) => `#${values.slice(0, 3).map((value) => Math.round(shown(Math.min(1, value)) * 255).toString(16).padStart(2, "0")).join("")}`;
+const colour = (text, kept) => [1, 3, 5].map((at) => kept(parseInt(text.slice(at, at + 2), 16) / 255));
 const round = (value) => Number(value.toPrecision(5));
 
 export class Editing {
@@ -17,6 +18,7 @@ export class Editing {
     this.ask = ask;
     this.waiting = []; // requests; the first one is asked, as the gateway takes one at a time
     this.revision = -1;
+    this.display = false; // colours are a display's values, else linear
     $("edit-kind").addEventListener("change", () => this.list());
     $("edit-match").addEventListener("input", () => {
       clearTimeout(this.searching);
@@ -108,6 +110,7 @@ export class Editing {
   takeObject(object) {
     if (object.kind !== $("edit-kind").value || String(object.id) !== $("edit-object").value) return;
     this.revision = Math.max(this.revision, object.revision);
+    this.display = object.display_values;
     const focused = document.activeElement && document.activeElement.id;
     $("edit-fields").replaceChildren(...object.fields.filter((field) => field.values.length <= 4).flatMap((field) => this.row(object, field)));
     if (focused && focused.startsWith("field-") && $(focused)) $(focused).focus();
@@ -142,7 +145,7 @@ export class Editing {
     }
     const input = (type, value) => Object.assign(document.createElement("input"), { type, value });
     if (field.form === "flag") return [Object.assign(input("checkbox", ""), { checked: field.values[0] > 0 })];
-    if (this.isMenu(field)) return [input("color", hex(field.values))];
+    if (this.isMenu(field)) return [input("color", hex(field.values, this.display ? same : encode))];
     return field.values.map((value) => Object.assign(input("number", round(value)), { step: "any", min: field.min, max: field.max }));
   }
 
@@ -152,7 +155,7 @@ export class Editing {
 
   values(field, inputs) {
     if (field.form === "flag") return [inputs[0].checked ? 1 : 0];
-    if (field.form === "colour" && inputs.length === 1) return linear(inputs[0].value); // alpha stays
+    if (field.form === "colour" && inputs.length === 1) return colour(inputs[0].value, this.display ? same : decode); // alpha stays
     return inputs.map((input) => (input.value === "" ? NaN : Number(input.value)));
   }
 }
