@@ -52,7 +52,8 @@ bool gpu_build_prepare(struct gpu_build *build, const struct gpu_device *device,
              gpu_uniforms_take(build->program.uniforms, &build->stages[i].text, source->defines, error);
     for (unsigned i = 0; ok && i < build->stage_count; i++) {
         gpu_accesses_add(&build->program, build->stages[i].text.text);
-        ok = gpu_uniforms_put(build->program.uniforms, &build->stages[i].text, error);
+        ok = gpu_uniforms_put(build->program.uniforms, &build->stages[i].text,
+                              device->facts.software && build->stages[i].type == GL_COMPUTE_SHADER, error);
     }
     ok = ok && make_key(build, &device->info);
     if (!ok) {

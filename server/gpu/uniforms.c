@@ -5,6 +5,7 @@
 #include "gpu/registry.h"
 
 #include <epoxy/gl.h>
+#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -13,6 +14,8 @@
 #define BLOCK_BYTES_MAX 1024
 #define NAME_BYTES 32
 #define VEC4_BYTES 16u
+#define ASKS_AT_START "UNIFORMS_AT_START"
+#define IN_BLOCK "_in_block"
 /* A thousand passes where a range begins at a multiple of 256 bytes, more than a frame has. */
 #define RING_BYTES (256u << 10)
 
@@ -139,25 +142,59 @@ bool gpu_uniforms_take(struct gpu_uniforms *uniforms, struct gpu_source_text *te
     return true;
 }
 
-bool gpu_uniforms_put(const struct gpu_uniforms *uniforms, struct gpu_source_text *text, struct error *error)
+/* Mesa puts a uniform in the place of its copy, but not in that of an expression. */
+static const char at_start[] = "bool at_start(bool v) { return v; }\n"
+                               "uint at_start(uint v) { return v | 0u; }\n"
+                               "int at_start(int v) { return v | 0; }\n"
+                               "float at_start(float v) { return uintBitsToFloat(floatBitsToUint(v)); }\n"
+                               "vec2 at_start(vec2 v) { return uintBitsToFloat(floatBitsToUint(v)); }\n"
+                               "vec3 at_start(vec3 v) { return uintBitsToFloat(floatBitsToUint(v)); }\n"
+                               "vec4 at_start(vec4 v) { return uintBitsToFloat(floatBitsToUint(v)); }\n";
+
+struct block {
+    size_t length;
+    char text[sizeof(ASKS_AT_START) + sizeof(at_start) + MEMBERS_MAX * (3 * NAME_BYTES + 64)];
+};
+
+static void write_format(struct block *block, const char *format, ...) __attribute__((format(printf, 2, 3)));
+static void write_format(struct block *block, const char *format, ...)
 {
-    char block[MEMBERS_MAX * (NAME_BYTES + 32)];
-    size_t length = 0;
+    va_list arguments;
+    va_start(arguments, format);
+    const int length =
+        vsnprintf(block->text + block->length, sizeof(block->text) - block->length, format, arguments);
+    va_end(arguments);
+    block->length += length > 0 ? (size_t)length : 0;
+}
+
+bool gpu_uniforms_put(const struct gpu_uniforms *uniforms, struct gpu_source_text *text, bool software,
+                      struct error *error)
+{
+    struct block block = {0};
     const char *files = text->text ? strstr(text->text, "#line ") : NULL; /* behind what must come first */
-    if (uniforms->count == 0 || !files)
+    const bool copies = files && software && strstr(files, "#ifdef " ASKS_AT_START);
+    if (!files)
         return true;
-    length += (size_t)snprintf(block, sizeof(block), "layout(std140, binding = %d) uniform pass_block {\n",
-                               GPU_UNIFORMS_BINDING);
+    if (copies)
+        write_format(&block, "#define " ASKS_AT_START " 1\n%s", at_start);
+    if (uniforms->count > 0)
+        write_format(&block, "layout(std140, binding = %d) uniform pass_block {\n", GPU_UNIFORMS_BINDING);
     for (uint32_t i = 0; i < uniforms->count; i++) {
         const struct member *member = &uniforms->members[i];
-        length +=
-            (size_t)snprintf(block + length, sizeof(block) - length, "%s %s", member->type->name, member->name);
+        write_format(&block, "%s %s", member->type->name, member->name);
         if (member->length > 0)
-            length += (size_t)snprintf(block + length, sizeof(block) - length, "[%u]", member->length);
-        length += (size_t)snprintf(block + length, sizeof(block) - length, ";\n");
+            write_format(&block, "[%u]", member->length);
+        write_format(&block, copies && member->length == 0 ? IN_BLOCK ";\n" : ";\n");
     }
-    length += (size_t)snprintf(block + length, sizeof(block) - length, "};\n");
-    return gpu_source_insert(text, (size_t)(files - text->text), block, length, error);
+    if (uniforms->count > 0)
+        write_format(&block, "};\n");
+    for (uint32_t i = 0; copies && i < uniforms->count; i++) {
+        const struct member *member = &uniforms->members[i];
+        if (member->length == 0) /* a copied array has code for each of its elements */
+            write_format(&block, "%s %s = at_start(%s" IN_BLOCK ");\n", member->type->name, member->name,
+                         member->name);
+    }
+    return gpu_source_insert(text, (size_t)(files - text->text), block.text, block.length, error);
 }
 
 /* ---- values ---- */

@@ -26,8 +26,12 @@ void gpu_uniforms_destroy(struct gpu_uniforms *uniforms); /* accepts NULL */
 /* Takes the declarations out of the text. The size of an array is a number or one of the defines. */
 bool gpu_uniforms_take(struct gpu_uniforms *uniforms, struct gpu_source_text *text,
                        const struct gpu_define *defines, struct error *error);
-/* Puts the block of all that was taken in front of the text's first file. */
-bool gpu_uniforms_put(const struct gpu_uniforms *uniforms, struct gpu_source_text *text, struct error *error);
+/* Puts the block of all that was taken in front of the text's first file. `software`: of a compute shader for
+ * software GL; if it asks for UNIFORMS_AT_START, that is defined, and main() begins with copies of all uniforms
+ * but arrays. llvmpipe reads a uniform once for all invocations of a group only outside of branches: in one, and
+ * behind an early return, once for each. */
+bool gpu_uniforms_put(const struct gpu_uniforms *uniforms, struct gpu_source_text *text, bool software,
+                      struct error *error);
 /* Where a value lies in the block, false: there is none of that name ("lights[1]" of an array). */
 bool gpu_uniforms_find(const struct gpu_uniforms *uniforms, const char *name, uint32_t *offset_bytes);
 

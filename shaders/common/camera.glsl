@@ -4,10 +4,24 @@
 #include "shared/frame.h"
 #include "common/math.glsl"
 
-layout(std140, binding = UNIFORM_FRAME) uniform frame_block
+layout(std140, binding = UNIFORM_FRAME) uniform frame_block { frame_uniforms frame_in_block; };
+#ifdef UNIFORMS_AT_START // server/gpu/uniforms.h
+#define COPY(member) f.member = at_start(frame_in_block.member)
+frame_uniforms frame_at_start()
 {
-    frame_uniforms frame;
-};
+    frame_uniforms f;
+    COPY(world_from_view[0]), COPY(world_from_view[1]), COPY(world_from_view[2]);
+    COPY(extent_near), COPY(far_width), COPY(eye_steps), COPY(eyes_middle), COPY(lens), COPY(environment_colour);
+    COPY(irradiance[0]), COPY(irradiance[1]), COPY(irradiance[2]), COPY(irradiance[3]), COPY(irradiance[4]);
+    COPY(irradiance[5]), COPY(irradiance[6]), COPY(irradiance[7]), COPY(irradiance[8]);
+    COPY(width), COPY(height), COPY(tiles_across), COPY(sample_index), COPY(sample_shift), COPY(environment_kind);
+    COPY(light_count), COPY(depth), COPY(seed), COPY(group_shift), COPY(view_width), COPY(view_height);
+    return f;
+}
+frame_uniforms frame = frame_at_start(); // but for what is found by an index
+#else
+#define frame frame_in_block
+#endif
 
 // Pixel of a slot: x to the right, y down. May lie outside the picture at its right and lower edges.
 uvec2 pixel_of_slot(uint slot)
@@ -87,7 +101,7 @@ void camera_ray_through(vec2 view_place, out vec3 origin, out vec3 direction, ou
 // Where in a pixel that one of the current samples is, if it is the same in all.
 vec2 sample_place(uint i)
 {
-    vec4 two = frame.sample_places[i >> 1];
+    vec4 two = frame_in_block.sample_places[i >> 1];
     return (i & 1u) != 0u ? two.zw : two.xy;
 }
 
@@ -122,7 +136,7 @@ void camera_ray_lens(vec2 view_place, vec2 on_lens, out vec3 origin, out vec3 di
 
 float filter_place(int i)
 {
-    return frame.filter_places[i >> 2][i & 3];
+    return frame_in_block.filter_places[i >> 2][i & 3];
 }
 
 // The offset of a sample from its pixel's centre, in pixels: server/render/pixel_filter.h.

@@ -157,12 +157,19 @@ def text_of(path, defines):
 
 
 def with_block(texts):
-    """The uniforms of a program's stages in one block, as server/gpu/uniforms.c has them."""
-    members = {f"{kind} {name.strip()};": None for text in texts for kind, names in UNIFORM.findall(text)
+    """The uniforms of a program's stages in one block, and copies of them, as server/gpu/uniforms.c has them."""
+    members = {(kind, name.strip()): None for text in texts for kind, names in UNIFORM.findall(text)
                for name in names.split(",")}
-    block = "layout(std140, binding = 2) uniform pass_block {" + " ".join(members) + "};\n" if members else ""
+    copies = "#define UNIFORMS_AT_START " in texts[0]
+    copied = [member for member in members if copies and "[" not in member[1]]
+    block = "".join(f"{kind} at_start({kind} v) {{ return v; }} "
+                    for kind in "bool uint int float vec2 vec3 vec4".split() if copies)
+    if members:
+        block += "layout(std140, binding = 2) uniform pass_block {" + " ".join(
+            f"{kind} {name}{'_in_block' if (kind, name) in copied else ''};" for kind, name in members) + "}; "
+    block += " ".join(f"{kind} {name} = at_start({name}_in_block);" for kind, name in copied)
     texts = [UNIFORM.sub("", text) for text in texts]
-    return [text.replace("#line 1 0\n", block + "#line 1 0\n", 1) for text in texts]
+    return [text.replace("#line 1 0\n", block + "\n#line 1 0\n", 1) for text in texts]
 
 
 def optional_defines(paths, chosen, all_chosen):

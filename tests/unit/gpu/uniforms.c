@@ -63,7 +63,8 @@ TEST(the_stages_of_a_program_share_one_block_and_its_lines_keep_their_numbers)
                                text_of("#version 450 core\n#line 1 0\n  uniform uint b, c;\nuniform int a;\n");
     assert_true(gpu_uniforms_take(uniforms, &first, NULL, NULL) &&
                 gpu_uniforms_take(uniforms, &second, NULL, NULL));
-    assert_true(gpu_uniforms_put(uniforms, &first, NULL) && gpu_uniforms_put(uniforms, &second, NULL));
+    assert_true(gpu_uniforms_put(uniforms, &first, false, NULL) &&
+                gpu_uniforms_put(uniforms, &second, false, NULL));
     assert_string_equal(first.text,
                         "#version 450 core\n#extension GL_EXT_some : require\n"
                         "layout(std140, binding = 2) uniform pass_block {\nint a;\nuint b;\nuint c;\n};\n"
@@ -75,6 +76,24 @@ TEST(the_stages_of_a_program_share_one_block_and_its_lines_keep_their_numbers)
     gpu_source_finish(&first);
     gpu_source_finish(&second);
     gpu_uniforms_destroy(uniforms);
+}
+
+TEST(software_gl_reads_what_asks_for_it_when_main_begins)
+{
+    static const char asks[] =
+        "#version 450 core\n#line 1 0\n#ifdef UNIFORMS_AT_START\n#endif\nuniform uint a, b[2];\n";
+    for (unsigned software = 0; software < 2; software++) {
+        struct gpu_uniforms *uniforms = gpu_uniforms_create();
+        struct gpu_source_text text = text_of(asks);
+        assert_true(gpu_uniforms_take(uniforms, &text, NULL, NULL));
+        assert_true(gpu_uniforms_put(uniforms, &text, software != 0, NULL));
+        assert_true(
+            (strstr(text.text, "{\nuint a_in_block;\nuint b[2];\n};\nuint a = at_start(a_in_block);\n#line 1 0") !=
+             NULL) == (software != 0));
+        assert_true((strstr(text.text, "{\nuint a;\nuint b[2];\n};\n#line 1 0") != NULL) == (software == 0));
+        gpu_source_finish(&text);
+        gpu_uniforms_destroy(uniforms);
+    }
 }
 
 TEST(a_declaration_that_is_not_understood_is_an_error)
