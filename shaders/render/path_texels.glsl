@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A path from the texels of its buffer: PATH_TEXELS, RGBA32UI.
+// A path from and to the texels of its buffer: PATH_TEXELS, RGBA32UI.
 
 #include "shared/path.h"
 
@@ -8,4 +8,16 @@ path path_of_texels(uvec4 a, uvec4 b, uvec4 c)
     vec3 weight = uintBitsToFloat(a.xyz);
     return path(weight.r, weight.g, weight.b, a.w, uintBitsToFloat(b.x), uintBitsToFloat(b.y), b.z, uintBitsToFloat(b.w),
                 c.x, uintBitsToFloat(c.y), uintBitsToFloat(c.z), uintBitsToFloat(c.w));
+}
+
+// In three stores: each is code of its own, whose size hardly depends on how many words it stores.
+struct path_texels {
+    uvec4 a, b, c;
+};
+
+path_texels texels_of_path(path p)
+{
+    return path_texels(uvec4(floatBitsToUint(vec3(p.weight_r, p.weight_g, p.weight_b)), p.sample_slot),
+                       uvec4(floatBitsToUint(vec2(p.cone_width, p.cone_spread)), p.flags, floatBitsToUint(p.time)),
+                       uvec4(p.light_number, floatBitsToUint(vec3(p.light_distance, p.light_share, p.environment_share))));
 }

@@ -13,6 +13,7 @@
 #include "shared/hit.h"
 #include "common/dispatch.glsl"
 #include "common/sample_place.glsl"
+#include "render/path_texels.glsl"
 #include "render/tiles.glsl"
 layout(local_size_x = 64) in;
 
@@ -27,13 +28,13 @@ layout(binding = UNIT_TILE_SAMPLES) uniform usamplerBuffer tile_samples;
 #endif
 
 layout(std430, binding = BIND_RAYS) writeonly buffer ray_block { ray rays[]; };
-layout(std430, binding = BIND_PATHS) writeonly buffer path_block { path paths[]; };
+layout(std430, binding = BIND_PATHS) writeonly buffer path_block { uvec4 paths[]; }; // PATH_TEXELS each
 layout(std430, binding = BIND_SLICE_SUMS) writeonly buffer sum_block { vec4 slice_sums[]; };
 #ifdef HAS_TIMES
 layout(std430, binding = BIND_RAY_TIMES) writeonly buffer time_block { float times[]; };
 #endif
 #ifdef VISIBILITY
-layout(std430, binding = BIND_HITS) writeonly buffer hit_block { hit hits[]; };
+layout(std430, binding = BIND_HITS) writeonly buffer hit_block { uvec4 hits[]; }; // HIT_TEXELS each
 layout(binding = UNIT_PASS_0) uniform usampler2DArray visible_primitives; // a layer for each of the current samples
 uniform uint first_row; // of the picture in them
 #endif
@@ -76,16 +77,18 @@ void main()
     float weight = in_picture ? 1.0 : 0.0;
     // Dead beyond the picture's edge, and where a tile has stopped.
     rays[k] = ray(vec4(origin, t_min), vec4(direction, in_picture ? 1e30 : -1.0));
-    paths[k] = path(weight, weight, weight, k, cone.x, cone.y, PATH_STRAIGHT, time, 0u, 0.0, 0.0, 1.0);
+    path_texels texels =
+        texels_of_path(path(weight, weight, weight, k, cone.x, cone.y, PATH_STRAIGHT, time, 0u, 0.0, 0.0, 1.0));
+    paths[uint(PATH_TEXELS) * k] = texels.a;
+    paths[uint(PATH_TEXELS) * k + 1u] = texels.b;
+    paths[uint(PATH_TEXELS) * k + 2u] = texels.c;
     slice_sums[k] = vec4(0.0);
 #ifdef VISIBILITY
     uvec2 visible = uvec2(VISIBLE_NOTHING, 0u);
     if (in_picture)
         visible = texelFetch(visible_primitives, ivec3(pixel - uvec2(0u, first_row), sample_), 0).xy;
-    hits[k].distance = visible.x != VISIBLE_NOTHING ? 0.0 : -1.0;
-    hits[k].instance = visible.x == VISIBLE_DISC ? HIT_NO_PRIMITIVE : visible.x - 1u;
-    hits[k].primitive = visible.y;
-    if (visible.x == VISIBLE_NOTHING)
-        hits[k].material = 0u; // layers.comp looks at the bits of misses too
+    // Of misses layers.comp looks at the flags of the material, too.
+    hits[HIT_TEXELS * k] = uvec4(floatBitsToUint(visible.x != VISIBLE_NOTHING ? 0.0 : -1.0), 0u, visible.y,
+                                 visible.x == VISIBLE_DISC ? HIT_NO_PRIMITIVE : visible.x - 1u);
 #endif
 }

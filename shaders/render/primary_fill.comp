@@ -13,7 +13,7 @@
 layout(local_size_x = 64) in;
 
 layout(binding = UNIT_RAYS) uniform samplerBuffer rays; // in texels: software GL fetches those faster
-layout(std430, binding = BIND_HITS) buffer hit_block { hit hits[]; };
+layout(std430, binding = BIND_HITS) buffer hit_block { uvec4 hits[]; }; // HIT_TEXELS each
 layout(std430, binding = BIND_HIT_LIST) readonly buffer list_block { uint hit_list[]; };
 
 void main()
@@ -21,7 +21,9 @@ void main()
     uint j = item_index();
     if (j >= wave.hits.count)
         return;
-    uint k = hit_list[j], instance_index = hits[k].instance, primitive = hits[k].primitive;
+    uint k = hit_list[j];
+    uvec4 seen = hits[HIT_TEXELS * k];
+    uint instance_index = seen.w, primitive = seen.z;
     vec4 origin_t_min = texelFetch(rays, int(2u * k));
     vec3 origin = origin_t_min.xyz, direction = texelFetch(rays, int(2u * k + 1u)).xyz;
     candidate found;
@@ -35,5 +37,8 @@ void main()
         found = candidate_triangle(instance_index, primitive, origin, direction, 0.0);
     // Two compilations of one test may round differently at a rim: a hit stays a hit.
     found.distance = max(found.distance, origin_t_min.w);
-    hits[k] = surface_of(found, origin, direction, 0.0);
+    hit h = surface_of(found, origin, direction, 0.0);
+    hits[HIT_TEXELS * k] = uvec4(floatBitsToUint(h.distance), h.material, h.primitive, h.instance);
+    hits[HIT_TEXELS * k + 1u] = h.uv01_or_sample;
+    hits[HIT_TEXELS * k + 2u] = uvec4(h.normal_geometric, h.normal_shading, h.tangent, h.colour);
 }

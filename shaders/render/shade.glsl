@@ -27,7 +27,7 @@ layout(binding = UNIT_SHADE_HITS) uniform usamplerBuffer hits;
 layout(binding = UNIT_SHADE_PATHS) uniform usamplerBuffer paths;
 layout(std430, binding = BIND_HIT_LIST) readonly buffer list_block { uint hit_list[]; };
 layout(std430, binding = BIND_RADIANCE) writeonly buffer radiance_block { vec4 radiance[]; };
-layout(std430, binding = BIND_CHILDREN) writeonly buffer child_block { child children[]; };
+layout(std430, binding = BIND_CHILDREN) writeonly buffer child_block { uvec4 children[]; }; // CHILD_TEXELS each
 layout(std430, binding = BIND_CHILD_COUNTS) buffer count_block { uint child_counts[]; };
 layout(std430, binding = BIND_SHADOW_RAYS) writeonly buffer shadow_block { ray shadow_rays[]; };
 layout(std430, binding = BIND_LIGHT_SAMPLES) writeonly buffer sample_block { vec4 light_samples[]; };
@@ -150,30 +150,28 @@ void add_child(uint j, path parent, surface s, float distance_, vec3 direction, 
     if (!(max_component(weight) > 0.0)) // also if it is NaN
         return;
     vec3 side = dot(direction, s.geometric) > 0.0 ? s.geometric : -s.geometric;
-    child c;
-    c.origin_t_min = vec4(off_surface(s, distance_, side), 0.0);
-    c.direction_t_max = vec4(direction, FAR);
-    c.weight_r = weight.r;
-    c.weight_g = weight.g;
-    c.weight_b = weight.b;
-    c.sample_slot = parent.sample_slot;
+    path p = parent;
+    p.weight_r = weight.r;
+    p.weight_g = weight.g;
+    p.weight_b = weight.b;
     vec2 cone = cone_at(parent, distance_);
 #ifdef HAS_TEXTURES // only they are filtered by it
     if (!straight)
         cone = cone_sent_on(cone, s, direction, solid_angle);
 #endif
-    c.cone_width = cone.x;
-    c.cone_spread = cone.y;
+    p.cone_width = cone.x;
+    p.cone_spread = cone.y;
     uint kept = straight ? ~PATH_BOUNCES_MASK : ~(PATH_BOUNCES_MASK | PATH_STRAIGHT);
-    c.flags = bounces | parent.flags & kept;
-    c.time = parent.time;
-    c.light_number = parent.light_number;
-    c.light_distance = parent.light_distance;
-    c.light_share = parent.light_share;
-    c.environment_share = parent.environment_share;
+    p.flags = bounces | parent.flags & kept;
+    uint texel = uint(CHILD_TEXELS) * (j * children_a_hit + child_count);
+    children[texel] = floatBitsToUint(vec4(off_surface(s, distance_, side), 0.0));
+    children[texel + 1u] = floatBitsToUint(vec4(direction, FAR));
+    path_texels texels = texels_of_path(p);
+    children[texel + 2u] = texels.a;
+    children[texel + 3u] = texels.b;
+    children[texel + 4u] = texels.c;
     uvec3 negative = uvec3(lessThan(direction, vec3(0.0)));
     child_octant = negative.x | negative.y << 1 | negative.z << 2;
-    children[j * children_a_hit + child_count] = c;
     child_count++;
 }
 

@@ -17,6 +17,7 @@ struct hit {
     uint colour;           /* vertex colour times what a sampled tracer stored, unorm 4x8, linear */
 };
 SHARED_SIZE(hit, 48)
+#define HIT_TEXELS 3u /* RGBA32UI */
 /* An intersection is a hit of which only the first four words are known yet: distance (< 0: a miss), HIT_UNKNOWN
  * and HIT_LAYER bits or 0, primitive (of a disc its number; HIT_NO_PRIMITIVE: a miss), instance. */
 
