@@ -25,6 +25,23 @@ static const char *counts_tiles(const struct render_context *context, enum layer
     return context->tile_samples && !layers_of_first_sample(layer) ? "HAS_TILE_SAMPLES" : NULL;
 }
 
+/* Layers that are no colours stay as they are. */
+static const char *shows_display_values(const struct render_context *context, enum layer layer)
+{
+    const bool is_colour = layer == LAYER_BEAUTY || layer == LAYER_ALBEDO;
+    return context->display_values && is_colour ? "DISPLAY_VALUES" : NULL;
+}
+
+/* The defines that all programs of display.glsl have. */
+static void display_defines(const struct render_context *context, enum layer layer, struct gpu_define defines[2])
+{
+    const char *names[] = {shows_display_values(context, layer), counts_tiles(context, layer)};
+    size_t n = 0;
+    for (size_t i = 0; i < sizeof(names) / sizeof(names[0]); i++)
+        if (names[i])
+            defines[n++] = (struct gpu_define){names[i], "1"};
+}
+
 static const struct gpu_program *use_pixels(struct render_context *context, enum layer layer, uint32_t pixel_count,
                                             struct error *error)
 {
@@ -32,7 +49,8 @@ static const struct gpu_program *use_pixels(struct render_context *context, enum
         [PIXEL_FORMAT_RGBA8] = "0",    [PIXEL_FORMAT_RGBA16F] = "1", [PIXEL_FORMAT_RGBA32F] = "2",
         [PIXEL_FORMAT_DEPTH32F] = "3", [PIXEL_FORMAT_NORMAL8] = "4", [PIXEL_FORMAT_SHARE8] = "5"};
     unsigned format = frame_request_plane_format(&context->request, layer);
-    const struct gpu_define defines[] = {{"FORMAT", numbers[format]}, {counts_tiles(context, layer), "1"}, {0}};
+    struct gpu_define defines[4] = {{"FORMAT", numbers[format]}};
+    display_defines(context, layer, defines + 1);
     const struct gpu_program *program = context_use_with(context, "render/resolve.comp", defines, error);
     if (program)
         gpu_uniform_uint(program, "pixel_count", pixel_count);
@@ -41,7 +59,8 @@ static const struct gpu_program *use_pixels(struct render_context *context, enum
 
 static const struct gpu_program *use_ycbcr(struct render_context *context, uint32_t row_count, struct error *error)
 {
-    const struct gpu_define defines[] = {{counts_tiles(context, LAYER_BEAUTY), "1"}, {0}};
+    struct gpu_define defines[3] = {0};
+    display_defines(context, LAYER_BEAUTY, defines);
     const struct gpu_program *program = context_use_with(context, "render/resolve_ycbcr.comp", defines, error);
     if (program) {
         gpu_uniform_uint(program, "row_count", row_count);
@@ -58,14 +77,6 @@ static void set_background(const struct gpu_program *program, const struct frame
     const float *colour = request->background_colour;
     const float background[4] = {colour[0], colour[1], colour[2], 1.0f}, none[4] = {0};
     gpu_uniform_vec(program, "background", 4, has_colour ? background : none);
-}
-
-/* Layers that are no colours stay as they are. */
-static void set_display(const struct gpu_program *program, const struct render_context *context, enum layer layer)
-{
-    const bool is_colour = layer == LAYER_BEAUTY || layer == LAYER_ALBEDO;
-    gpu_uniform_uint(program, "tone_map_kind", context->request.tone_map);
-    gpu_uniform_uint(program, "display_values", context->display_values && is_colour);
 }
 
 static void set_tiles(const struct gpu_program *program, const struct picture *picture,
@@ -117,7 +128,7 @@ bool picture_resolve_band(struct picture *picture, struct render_context *contex
         gpu_buffer_bind_storage(denoised ? &picture->denoised[band] : picture_band(picture, plane, band),
                                 BIND_ACCUMULATION);
         gpu_buffer_bind_storage(&picture->resolved, BIND_RESOLVED);
-        set_display(program, context, layer);
+        gpu_uniform_uint(program, "tone_map_kind", request->tone_map);
         gpu_uniform_float(program, "scale", scale_of(picture, request, layer));
         gpu_uniform_float(program, "coverage_scale", coverage_scale);
         set_background(program, request, layer);

@@ -1,16 +1,22 @@
 // SPDX-License-Identifier: MIT
 // The mean of a pixel's samples, and its display value.
-// Defines: HAS_TILE_SAMPLES tiles may have stopped, and have fewer samples (server/render/picture_noise.h).
+// Defines:
+//   HAS_TILE_SAMPLES tiles may have stopped, and have fewer samples (server/render/picture_noise.h)
+//   DISPLAY_VALUES   what is summed is display values of no curve
 #include "shared/path.h"
 #include "common/camera.glsl"
 #include "common/tonemap.glsl"
 
 uniform uint tone_map_kind;
-uniform uint display_values;  // 1: what is summed is display values of no curve
 uniform float scale;          // exposure / samples
 uniform float coverage_scale; // 1 / samples
 uniform vec4 background;      // what lies behind the surfaces: linear; a: 1: a colour, 0: nothing
 
+#ifdef DISPLAY_VALUES
+const bool display_values = true;
+#else
+const bool display_values = false;
+#endif
 #ifdef HAS_TILE_SAMPLES
 layout(binding = UNIT_TILE_SAMPLES) uniform usamplerBuffer tile_samples;
 uniform uint first_tile; // of the band
@@ -45,7 +51,7 @@ vec3 straight_of(vec4 colour)
 // Before the background, linear. Premultiplied by alpha.
 vec4 over_background(vec4 colour)
 {
-    if (display_values != 0u)
+    if (display_values)
         colour.rgb = linear_from_srgb(clamp(straight_of(colour), 0.0, 1.0)) * (colour.a > 0.0 ? colour.a : 1.0);
     return colour + background * (1.0 - colour.a);
 }
@@ -54,12 +60,12 @@ vec4 over_background(vec4 colour)
 vec4 display_of_sum(vec4 colour)
 {
     vec3 straight = straight_of(colour), behind = background.rgb;
-    if (display_values != 0u) {
+    if (display_values) {
         straight = clamp(straight, 0.0, 1.0);
         behind = srgb_from_linear(behind);
     } else {
         straight = tone_map(straight, tone_map_kind);
     }
     vec4 shown = background.a > 0.0 ? vec4(mix(behind, straight, colour.a), 1.0) : vec4(straight, colour.a);
-    return display_values != 0u ? shown : vec4(srgb_from_linear(shown.rgb), shown.a);
+    return display_values ? shown : vec4(srgb_from_linear(shown.rgb), shown.a);
 }
