@@ -285,11 +285,18 @@ static bool import_environment(struct import_scene *scene, struct files *files, 
     return !scene->failed;
 }
 
+/* Surfaces and lights so far. Cameras and nodes alone show nothing. */
+static uint32_t count_shown(const struct import_scene *scene)
+{
+    return scene->last_id[PROTOCOL_OBJECT_MESH] + scene->last_id[PROTOCOL_OBJECT_SPHERES] +
+           scene->last_id[PROTOCOL_OBJECT_LIGHT];
+}
+
 static bool import_model(struct import_scene *scene, struct sender *sender, const struct options *options,
                          size_t index)
 {
     struct source *source = &options->sources[index];
-    const size_t edits = scene->edit_count;
+    const uint32_t shown = count_shown(scene);
     bool imported;
 
     if (!sender_progress(sender, source->size_bytes, 0, "parsing"))
@@ -299,7 +306,7 @@ static bool import_model(struct import_scene *scene, struct sender *sender, cons
     if (source_repeat(scene, options->sources, index, options->source_count))
         return !scene->failed;
     imported = source_begin(scene, options->sources, index, options->source_count) && parse_model(scene, source);
-    if (imported && scene->edit_count == edits + (source->root != 0))
+    if (imported && count_shown(scene) == shown)
         import_note(scene, PROTOCOL_SEVERITY_WARNING, NULL, "it contains nothing that can be shown");
     source_end(scene, source);
     return imported;

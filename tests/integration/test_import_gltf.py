@@ -245,6 +245,12 @@ class Extensions(Gltf):
         self.assertEqual(len(notes), 1)
         self.assertRegex(notes[0], "not shown: ACME_a, ACME_b$")
 
+    def test_a_model_with_cameras_alone_is_said_to_show_nothing(self):
+        model = {"asset": {"version": "2.0"}, "cameras": [{"type": "perspective", "perspective": {"yfov": 1, "znear": 0.1}}],
+                 "nodes": [{"camera": 0}], "scenes": [{"nodes": [0]}], "scene": 0}
+        said = "it contains nothing that can be shown"
+        self.assertIn(said, [text for _, _, text in self.run_model(model).notes])
+        self.assertNotIn(said, [text for _, _, text in self.run_model(Model().cube()).notes])
 
     @needs_shared_scenes
     def test_files_of_other_programs_are_imported_but_for_basisu(self):
