@@ -3,9 +3,10 @@
 
 #include <math.h>
 
-uint32_t unit_vector_pack(const float v[3])
+/* Two snorms of so many bits each. */
+static uint32_t pack(const float v[3], unsigned bits)
 {
-    float sum = fabsf(v[0]) + fabsf(v[1]) + fabsf(v[2]);
+    const float sum = fabsf(v[0]) + fabsf(v[1]) + fabsf(v[2]), maximum = (float)((1u << (bits - 1)) - 1);
     if (!(sum > 0.0f) || !isfinite(sum))
         return 0;
     float p[2] = {v[0] / sum, v[1] / sum};
@@ -16,6 +17,16 @@ uint32_t unit_vector_pack(const float v[3])
     }
     uint32_t packed[2];
     for (int i = 0; i < 2; i++)
-        packed[i] = (uint32_t)(int32_t)lrintf(fminf(fmaxf(p[i], -1.0f), 1.0f) * 32767.0f) & 0xffffu;
-    return packed[0] | packed[1] << 16;
+        packed[i] = (uint32_t)(int32_t)lrintf(fminf(fmaxf(p[i], -1.0f), 1.0f) * maximum) & ((1u << bits) - 1);
+    return packed[0] | packed[1] << bits;
+}
+
+uint32_t unit_vector_pack(const float v[3])
+{
+    return pack(v, 16);
+}
+
+uint32_t unit_vector_pack_24(const float v[3])
+{
+    return pack(v, 12);
 }

@@ -94,8 +94,10 @@ static uint32_t count_tile(struct host_runs *runs, uint32_t number)
     const uint32_t first = number * ABUFFER_TILE_TEXELS, *heads = &runs->heads[first];
     uint32_t sum = 0, longest = 0, filled = 0;
     memset(runs->texels[first], 0, ABUFFER_TILE_TEXELS * sizeof(*runs->texels));
-    for (uint32_t i = 0; i < ABUFFER_TILE_TEXELS; i++)
+    for (uint32_t i = 0; i < ABUFFER_TILE_TEXELS; i++) {
         filled |= heads[i];
+        __builtin_prefetch(&runs->nodes[heads[i] > 0 ? heads[i] - 1 : 0]);
+    }
     if (filled == 0)
         return 0;
     for (uint32_t i = 0; i < ABUFFER_TILE_TEXELS; i++) {

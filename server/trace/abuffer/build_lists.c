@@ -201,6 +201,7 @@ bool abuffer_draw_run(struct abuffer_task *task, uint32_t first, uint32_t end, s
         .defines = defines,
         .cell_world = store->cell_world,
         .resolution = store->resolution,
+        .triangles_left_out = abuffer_host_is_used(task),
         .set = set_lists,
         .context = task,
     };
@@ -209,6 +210,8 @@ bool abuffer_draw_run(struct abuffer_task *task, uint32_t first, uint32_t end, s
         pass.end_row = (uint32_t)((uint64_t)store->resolution * (task->band + 1) / task->band_count);
     }
     memcpy(pass.lower_world, store->lower_world, sizeof(pass.lower_world));
+    if (pass.triangles_left_out && !abuffer_host_draws(task, &pass, first, end, error))
+        return false;
     gpu_buffer_bind_image(device, &builder->heads, IMAGE_ABUFFER_HEADS, GL_R32UI);
     if (nodes_in_storage)
         gpu_buffer_bind_storage(&builder->nodes, BIND_ABUFFER_NODES);

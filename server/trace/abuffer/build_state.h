@@ -85,6 +85,10 @@ abuffer_stage_end abuffer_resolve_end;
 /* build_host.c. The same by the host, but for what is left to build_deep.c; items are tiles. */
 bool abuffer_host_is_used(const struct abuffer_task *task);
 bool abuffer_host_runs(struct abuffer_task *task, uint32_t first, uint32_t end, struct error *error);
+/* build_triangles.c. Draws the triangles among the primitives first .. end - 1 that are not cut out, by the host.
+ */
+bool abuffer_host_draws(struct abuffer_task *task, const struct axes_pass *pass, uint32_t first, uint32_t end,
+                        struct error *error);
 struct abuffer_node { /* abuffer/layout.h */
     uint32_t next, depth, bits, id;
 };

@@ -33,7 +33,7 @@ void axes_draw_finish(struct axes_draw *draw)
     axes_draw_init(draw, draw->device);
 }
 
-static enum axes_sort sort_of(const struct geometry *geometry)
+enum axes_sort axes_sort_of(const struct geometry *geometry)
 {
     if (geometry->kind == GEOMETRY_SPHERES)
         return AXES_SPHERES;
@@ -64,7 +64,7 @@ static bool list_drawn(struct axes_draw *draw, const struct gpu_scene *scene, co
     for (uint32_t i = 0; i < count; i++) {
         const struct instance *instance = &scene->instances[instances[i]];
         const struct geometry *geometry = &scene->geometries[instance->geometry].device;
-        enum axes_sort sort = sort_of(geometry);
+        enum axes_sort sort = axes_sort_of(geometry);
         if (id + geometry->primitive_count > UINT32_MAX ||
             (uint64_t)geometry->first_primitive + geometry->primitive_count > INT32_MAX)
             return error_set(error, ERROR_LIMIT, NULL, "more primitives than can be numbered");
@@ -283,7 +283,7 @@ static bool draw_runs(struct axes_draw *draw, const struct gpu_scene *scene, con
     gpu_together_begin(draw->device);
     for (uint32_t i = 0; i < draw->run_count; i++) {
         const struct axes_run *run = &draw->runs[i];
-        if (!run_has_any(draw, run, first, end))
+        if (!run_has_any(draw, run, first, end) || (pass->triangles_left_out && run->sort == AXES_TRIANGLES))
             continue;
         const struct gpu_program *program = get_program(draw, scene, pass, run->sort, error);
         good = program != NULL;

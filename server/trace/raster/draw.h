@@ -56,6 +56,7 @@ bool axes_list_instances(const struct gpu_scene *scene, uint32_t **instances, ui
 /* Lists instances[0 .. count - 1] (gpu_scene's), which need not ascend, for the passes that follow. */
 bool axes_draw_prepare(struct axes_draw *draw, const struct gpu_scene *scene, const uint32_t *instances,
                        uint32_t instance_count, struct error *error);
+enum axes_sort axes_sort_of(const struct geometry *geometry);
 /* A framebuffer of three layers without attachments, so many texels along a side. */
 bool axes_draw_bind_plain(struct axes_draw *draw, uint32_t along, struct error *error);
 
@@ -66,6 +67,7 @@ struct axes_pass {
      * {0} */
     const struct gpu_define *defines;
     bool cutouts_ignored;             /* nothing is cut out: every primitive is drawn whole */
+    bool triangles_left_out;          /* those of AXES_TRIANGLES: the caller draws them itself */
     float lower_world[3], cell_world; /* of the cube */
     uint32_t resolution;              /* texels along a side of the images */
     uint32_t first_row, end_row;      /* of each image, what is drawn; 0, 0: all */

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Where the host sorts the runs (software GL), they are those of the passes that a GPU does it with. */
+/* Where the host draws triangles and sorts runs (software GL), they are those of the passes that a GPU does it with. */
 #include "tests/unit/trace/abuffer/fixture.h"
 #include "tests/unit/trace/abuffer/scenes.h"
 #include "tests/unit/trace/stack_scene.h"
