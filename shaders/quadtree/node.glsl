@@ -4,11 +4,13 @@
 
 layout(std140, binding = UNIFORM_QUADTREE) uniform quadtree_block { quadtree_uniforms quadtree; };
 
-// A define where it is known that there is one face.
+// Of a view, which is one face, nothing beside it is known; beside the faces of a cube there is nothing.
 #ifdef QUADTREE_VIEW
+#define IS_VIEW true
 #define FACES 1u
 #define FACE(face) 0u
 #else
+#define IS_VIEW false
 #define FACES quadtree.faces
 #define FACE(face) (face)
 #endif

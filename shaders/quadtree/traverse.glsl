@@ -29,6 +29,8 @@ uniform uint ray_kind;
 const float SAME_DISTANCE = 1e-5; // the share by which intersections with one surface differ at most
 const float FLOAT_MAX = 3.4e38;
 const float NEVER = 2.0; // beyond the end of a segment
+const float BRUSHES = 6.0; // texels: a surface is not met farther than this from where it is seen
+const int LEVEL_AT_SURFACES = 2; // of the node that rays begin in beside a surface
 const int STEPS_TOGETHER = 32; // of rays side by side, before what some of them have met is looked at
 
 // A ray on its way through a layer of a face.
@@ -41,6 +43,7 @@ struct layer_walk {
     ivec2 cell;     // of the node that it is in
     int level;
     bool is_before, is_behind; // neither: it has just begun
+    bool was_close;            // to the plane that it left last
     float u_before;            // where it was last before the layer
     float u_since;             // since when it is behind it; NEVER: it is not
     float u_behind;            // where it came behind it for more than a texel
@@ -56,6 +59,7 @@ struct node_passage {
     bool is_plane;
     float u_out, w_out;
     float gap_in, gap_out; // how far the surface is before the ray there, in w: above 0 the ray is behind it
+    float reach; // of a plane: a ray that is farther from it than this meets nothing of the surface within a texel
 };
 
 uint walk_flags = 0u;
@@ -131,15 +135,22 @@ bool offer_primitives(trace_ray r, vec2 place, float near, bool all_four, inout 
                       out bool has_met)
 {
     ivec2 texel = ivec2(floor(place)), towards = ivec2(greaterThan(fract(place), vec2(0.5))) * 2 - 1;
-    uvec2 tried = uvec2(VISIBLE_NOTHING);
+    uvec2 tried = uvec2(VISIBLE_NOTHING), tried_before = tried;
     has_met = false;
     bool ends = false;
-    for (int i = 0; i < 4 && (all_four || !has_met); i++) {
+    int i = 0;
+    while (!has_met || all_four) {
+        // To the next one that is another, as rays side by side wait for the one that tries most.
         uvec2 visible;
-        candidate met;
-        if (!visible_at(texel + ivec2(i & 1, i >> 1) * towards, slice_of(walk), visible) || visible == tried)
-            continue;
+        bool is_other = false;
+        for (; i < 4 && !is_other; i++)
+            is_other = visible_at(texel + ivec2(i & 1, i >> 1) * towards, slice_of(walk), visible) && visible != tried &&
+                       visible != tried_before;
+        if (!is_other)
+            break;
+        tried_before = tried;
         tried = visible;
+        candidate met;
         if (intersect_visible(r, visible, near, met) && met.distance > r.t_min) {
             has_met = true;
             ends = offer(r, met, walk, found) || ends;
@@ -156,70 +167,59 @@ bool is_own_surface(layer_walk walk, vec3 place, vec2 slopes)
            away.z <= QUADTREE_OWN_WAY * (abs(slopes.x) + abs(slopes.y)) + QUADTREE_EDGE_SHARE * place.z;
 }
 
-// The ray meets the plane of a node at u. True: it ends.
-bool meet(trace_ray r, float u, uvec2 node, inout layer_walk walk, inout found_type found)
-{
-    vec3 place = walk.s.from + u * walk.s.along;
-    float near = distance_at(walk.s, u);
-#ifndef QUADTREE_PLANES
-    bool has_met;
-    if (offer_primitives(r, place.xy, near, plane_is_at_edge(node), walk, found, has_met))
-        return true;
-    if (has_met)
-        return false;
-#endif
-    uvec2 visible;
-    if (is_own_surface(walk, place, plane_slopes(node)) || !visible_at(ivec2(floor(place.xy)), slice_of(walk), visible))
-        return false;
-    candidate met = candidate(near, visible.y, visible.x - 1u, vec2(0.0));
-#ifndef QUADTREE_PLANES
-    // Beside the edge of the surface, or through primitives that are finer than texels.
-    if (plane_is_at_edge(node)) {
-        walk.u_beside = u;
-        return false;
-    }
-#endif
-    return offer(r, met, walk, found);
-}
-
 // Where the ray's w passes from before the node to behind it, or back: true.
 bool is_met(node_passage p)
 {
     return p.is_plane && (p.gap_in > 0.0) != (p.gap_out > 0.0);
 }
 
-// What the ray meets in a node whose plane it passes, or beside whose edge it is. True: it ends.
+// What the ray meets in a node: its plane, or primitives beside the edge that it passes. True: it ends. One call of
+// offer_primitives(), as rays side by side take all of them.
 bool meet_in(trace_ray r, node_passage p, inout layer_walk walk, inout found_type found)
 {
-    bool goes_on = walk.is_before && p.gap_in <= QUADTREE_EDGE_SHARE * plane_w(p.node) + quadtree.bounds.x;
-    if (is_met(p))
-        return meet(r, mix(walk.u, p.u_out, clamp(p.gap_in / (p.gap_in - p.gap_out), 0.0, 1.0)), p.node, walk, found);
-    if (goes_on) // between two planes that do not quite meet
-        return meet(r, walk.u, p.node, walk, found);
+    bool passes = is_met(p);
+    // Or goes on between two planes that do not quite meet.
+    bool meets = passes || walk.is_before && p.gap_in <= QUADTREE_EDGE_SHARE * plane_w(p.node) + quadtree.bounds.x;
+    float u = passes ? mix(walk.u, p.u_out, clamp(p.gap_in / (p.gap_in - p.gap_out), 0.0, 1.0)) : walk.u;
+    vec3 place = walk.s.from + u * walk.s.along;
+    float near = distance_at(walk.s, u);
 #ifndef QUADTREE_PLANES
-    // Within a texel of an edge, of which its middle sees the other side.
-    bool has_met;
-    vec3 place = walk.s.from + walk.u * walk.s.along;
-    return offer_primitives(r, place.xy, distance_at(walk.s, walk.u), true, walk, found, has_met);
-#else
-    return false;
+    // Within a texel of an edge its middle sees the other side.
+    bool is_at_edge = plane_is_at_edge(p.node), has_met;
+    if (offer_primitives(r, place.xy, near, is_at_edge || !meets, walk, found, has_met))
+        return true;
+    if (has_met)
+        return false;
 #endif
+    uvec2 visible;
+    if (!meets || is_own_surface(walk, place, plane_slopes(p.node)) ||
+        !visible_at(ivec2(floor(place.xy)), slice_of(walk), visible))
+        return false;
+#ifndef QUADTREE_PLANES
+    // Beside the edge of the surface, or through primitives that are finer than texels.
+    if (is_at_edge) {
+        walk.u_beside = u;
+        return false;
+    }
+#endif
+    return offer(r, candidate(near, visible.y, visible.x - 1u, vec2(0.0)), walk, found);
 }
 
 // ---- the walk through a layer ----
 
-void begin_layer(uint layer, float u, inout layer_walk walk)
+// From `level` down: rays that begin at a surface have to come down to it.
+void begin_layer(uint layer, float u, int level, inout layer_walk walk)
 {
     ivec2 last = ivec2(quadtree.padded_width, quadtree.padded_height) - 1;
 #ifdef QUADTREE_DDA
     walk.level = 0;
 #else
-    walk.level = QUADTREE_TOP;
+    walk.level = level;
 #endif
     walk.layer = layer;
     walk.u = u;
     walk.cell = clamp(ivec2(floor(walk.s.from.xy + walk.s.along.xy * u)), ivec2(0), last) >> walk.level;
-    walk.is_before = walk.is_behind = false;
+    walk.is_before = walk.is_behind = walk.was_close = false;
     walk.u_before = walk.u_since = walk.u_behind = walk.u_beside = NEVER;
 }
 
@@ -244,6 +244,12 @@ node_passage look(layer_walk walk)
     float gap = of_ray.x > range.x ? -1.0 : of_ray.y < range.y ? range.y - of_ray.y : 0.0; // of a box; 0: in it
     p.gap_in = p.is_plane ? w + growth * walk.u - w_in : gap;
     p.gap_out = p.is_plane ? w + growth * p.u_out - p.w_out : gap;
+    float steepness = abs(slopes.x) + abs(slopes.y);
+    p.reach = BRUSHES * steepness + QUADTREE_EDGE_SHARE * plane_w(p.node) + quadtree.bounds.x;
+    if (steepness == 0.0 && plane_w(p.node) > 0.0) // seen on edge, its slopes are not known
+        p.reach = FLOAT_MAX;
+    if (!p.is_plane)
+        p.reach = 0.0;
     return p;
 }
 
@@ -272,6 +278,7 @@ void note_side(node_passage p, inout layer_walk walk)
 {
     walk.is_before = p.gap_out <= 0.0;
     walk.is_behind = !walk.is_before;
+    walk.was_close = abs(p.gap_out) <= p.reach;
     if (walk.is_before) {
         walk.u_before = mix(walk.u, p.u_out, 0.99);
         walk.u_since = NEVER;
@@ -328,7 +335,9 @@ bool walk_on(inout layer_walk walk, out node_passage p)
             continue;
         }
         bool is_other_side = p.gap_in > 0.0 ? !walk.is_behind : !walk.is_before;
-        if (p.is_plane && (is_met(p) || is_other_side))
+        // Most rays that pass an edge are far behind or before both of its sides: not one in ten of them meets either.
+        bool is_close = walk.was_close || abs(p.gap_in) <= p.reach;
+        if (p.is_plane && (is_met(p) || is_other_side && is_close))
             return true;
         note_side(p, walk);
         leave(p, walk);
@@ -366,7 +375,7 @@ bool is_free_before(trace_ray r, float t)
 // A view, which is one face, does not see what is beside it.
 void note_outside(trace_ray r, float t_end, inout view_walk seen)
 {
-    if (FACES > 1u)
+    if (!IS_VIEW)
         return;
     vec2 t = seen.t_face;
     float t_outside = !(t.x < t.y) || (t.x > r.t_min && !is_free_before(r, t.x)) ? r.t_min
@@ -390,13 +399,17 @@ float last_distance(trace_ray r)
     return (length(r.origin - quadtree.eye_world.xyz) + far) / length(r.direction);
 }
 
+// Of the faces that there are that which sees most of a direction: the first that a ray is looked for in.
 uint face_towards(vec3 p)
 {
-    if (FACES == 1u)
-        return 0u;
-    vec3 size = abs(p);
-    uint axis = size.x >= max(size.y, size.z) ? 0u : size.y >= size.z ? 1u : 2u;
-    return 2u * axis + uint(p[axis] < 0.0);
+    uint face = 0u;
+    float most = -FLOAT_MAX;
+    for (uint i = 0u; i < FACES; i++) {
+        float along = dot(quadtree.face_from_world[3u * i + 2u].xyz, p);
+        face = along > most ? i : face;
+        most = max(most, along);
+    }
+    return face;
 }
 
 #ifdef ANY_HIT
@@ -443,10 +456,15 @@ bool meet_beside(trace_ray r, inout layer_walk walk, inout found_type found)
     return offer(r, candidate(distance_at(walk.s, walk.u_beside), visible.y, visible.x - 1u, vec2(0.0)), walk, found);
 }
 
-// To where surfaces of the face may be: before the nearest one there is nothing.
-void clip_to_surfaces(uint face, vec3 origin, vec3 direction, inout vec2 t)
+// The greatest w of a face; 0: it sees nothing.
+float nearest_w(uint face)
 {
-    float w = uintBitsToFloat(texelFetch(quadtree_nodes, int(face_index(FACE(face)))).x);
+    return uintBitsToFloat(texelFetch(quadtree_nodes, int(face_index(FACE(face)))).x);
+}
+
+// To where surfaces of the face may be: before the nearest one there is nothing.
+void clip_to_surfaces(float w, vec3 origin, vec3 direction, inout vec2 t)
+{
     float far = quadtree.depths.y, z = is_orthographic() ? far - w * (far - quadtree.depths.x) : quadtree.depths.x / w;
     clip_range(origin.z - z, direction.z, t);
 }
@@ -458,10 +476,13 @@ bool begin_face(trace_ray r, found_type found, inout layer_walk walk, inout view
     uint first = face_towards(from_eye + r.t_min * r.direction);
     for (; walk.turn < FACES; walk.turn++) {
         walk.face = walk.turn == 0u ? first : walk.turn <= first ? walk.turn - 1u : walk.turn;
+        float w = nearest_w(walk.face);
+        if (!IS_VIEW && w == 0.0)
+            continue;
         vec3 origin = face_vector(walk.face, from_eye), direction = face_vector(walk.face, r.direction);
         vec2 t = clip_to_face(origin, direction, vec2(r.t_min, min(seen.t_last, NEAREST(found, r))));
         seen.t_face = t;
-        clip_to_surfaces(walk.face, origin, direction, t);
+        clip_to_surfaces(w, origin, direction, t);
         if (!(t.x < t.y))
             continue;
         walk.turn++;
@@ -472,7 +493,7 @@ bool begin_face(trace_ray r, found_type found, inout layer_walk walk, inout view
         walk.u_end = 1.0;
         walk.u_fill = NEVER;
         walk.fill_layer = 0u;
-        begin_layer(0u, 0.0, walk);
+        begin_layer(0u, 0.0, walk.s.t_from <= r.t_min ? LEVEL_AT_SURFACES : QUADTREE_TOP, walk);
         return true;
     }
     return false;
@@ -495,7 +516,7 @@ void end_face(trace_ray r, layer_walk walk, inout found_type found, inout view_w
 
 void note_end(layer_walk walk, inout view_walk seen)
 {
-    if (FACES > 1u && walk.s.t_to <= seen.t_end)
+    if (!IS_VIEW && walk.s.t_to <= seen.t_end)
         return;
     seen.t_end = walk.s.t_to;
     seen.ends_behind = walk.is_behind;
@@ -505,7 +526,7 @@ void note_end(layer_walk walk, inout view_walk seen)
 bool begin_next(trace_ray r, inout layer_walk walk, inout found_type found, inout view_walk seen)
 {
     // A ray that comes into the view behind what is seen has passed that beside the view.
-    if (FACES == 1u && walk.layer == 0u && walk.u_behind == 0.0 && walk.s.t_from > r.t_min &&
+    if (IS_VIEW && walk.layer == 0u && walk.u_behind == 0.0 && walk.s.t_from > r.t_min &&
         walk.s.t_from < seen.t_unknown) {
         seen.t_unknown = walk.s.t_from;
         seen.has_left = true;
@@ -513,7 +534,7 @@ bool begin_next(trace_ray r, inout layer_walk walk, inout found_type found, inou
     if (walk.layer == 0u)
         note_end(walk, seen);
     if (walk.u_behind < walk.u_end && walk.layer + 1u < quadtree.layers) {
-        begin_layer(walk.layer + 1u, walk.u_behind, walk);
+        begin_layer(walk.layer + 1u, walk.u_behind, LEVEL_AT_SURFACES, walk);
         seen.layers = max(seen.layers, walk.layer + 1u);
         return true;
     }

@@ -156,7 +156,8 @@ static void look_by_daemon(struct sides *sides, const struct fl_warp_camera *cam
     struct frame_uniforms frame = {0};
     struct gpu_buffer uniforms = {0}, hits = {0};
     struct error error = {0};
-    const struct tracer_options options = {.quadtree.hits = QUADTREE_HITS_PLANE};
+    const struct tracer_options options = {.quadtree.hits = QUADTREE_HITS_PLANE,
+                                           .quadtree.faces = QUADTREE_FACES_VIEW};
     memcpy(raster.world_from_view, camera->world_from_view, sizeof(raster.world_from_view));
     raster_camera_fill(&frame, &raster);
     frame.tiles_across = WIDTH / 8;

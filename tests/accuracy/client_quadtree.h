@@ -7,6 +7,7 @@
 #include "tests/unit/trace/quadtree/layers.h"
 
 #include "render/frame.h"
+#include "trace/quadtree/faces.h"
 #include "trace/quadtree/layers.h"
 #include "warp/warp.h"
 #include "tests/fixtures/framing.h"
@@ -99,7 +100,6 @@ static inline void build_by_client(struct sides *sides)
     struct quadtree_uniforms *u = &sides->daemon.store.uniforms;
     struct fl_warp_error error = {0};
     struct fl_warp_key *key = &sides->key;
-    float extent[2];
     *key = (struct fl_warp_key){.width = WIDTH,
                                 .height = HEIGHT,
                                 .camera.fov_y = FOV,
@@ -107,7 +107,8 @@ static inline void build_by_client(struct sides *sides)
                                 .radius = sides->radius,
                                 .pixels = PIXELS,
                                 .layer_count = LAYERS};
-    quadtree_face_view(&sides->daemon.store, 0, key->camera.world_from_view, extent);
+    const struct raster_camera face = quadtree_face_camera(u, 0);
+    memcpy(key->camera.world_from_view, face.world_from_view, sizeof(face.world_from_view));
     for (uint32_t l = 0; l < LAYERS; l++) {
         for (uint32_t i = 0; i < COUNT; i++)
             sides->colours[l][i] = place_colour(l, i, sides->w[l][i]);

@@ -86,8 +86,8 @@ bool quadtree_finds_eyes(const struct quadtree_store *store, const struct gpu_sc
     const bool is_plain = options->quadtree.hits == QUADTREE_HITS_PLANE && !options->bench.quadtree_stack &&
                           !options->bench.quadtree_count_steps;
     const bool is_perspective = u->depths[2] == 0.0f && frame->extent_near[3] == 0.0f;
-    return is_plain && is_perspective && u->faces == 1 && scene->disc_count == 0 && frame->lens[0] == 0.0f &&
-           is_near(u, frame) && goes_ahead(u, frame);
+    return is_plain && is_perspective && options->quadtree.faces == QUADTREE_FACES_VIEW &&
+           scene->disc_count == 0 && frame->lens[0] == 0.0f && is_near(u, frame) && goes_ahead(u, frame);
 }
 
 /* ---- uniforms ---- */

@@ -3,6 +3,7 @@
 
 #include "base/clock.h"
 #include "shared/path.h"
+#include "trace/quadtree/faces.h"
 
 #include <epoxy/gl.h>
 #include <stdlib.h>
@@ -26,48 +27,6 @@ bool quadtree_layers_begin(struct quadtree_layers *layers, struct quadtree_store
     return true;
 }
 
-static struct raster_camera camera_of(const struct quadtree_store *store, uint32_t face)
-{
-    struct raster_camera camera = {
-        .near = store->uniforms.depths[3],
-        .far = store->uniforms.depths[1],
-        .orthographic = store->uniforms.depths[2] != 0.0f,
-        .width = store->uniforms.width,
-        .height = store->uniforms.height,
-    };
-    quadtree_face_view(store, face, camera.world_from_view, camera.extent);
-    return camera;
-}
-
-/* Sides of the frustum, as bits, that a point lies beyond. */
-static unsigned beyond(const struct raster_camera *camera, const float world[3])
-{
-    const float *m = camera->world_from_view;
-    float v[3];
-    for (int k = 0; k < 3; k++)
-        v[k] = (world[0] - m[3]) * m[k] + (world[1] - m[7]) * m[4 + k] + (world[2] - m[11]) * m[8 + k];
-    /* A little wider, for rounding. */
-    float reach = (camera->orthographic ? 1.0f : -v[2]) * 1.0001f;
-    float x = camera->extent[0] * reach, y = camera->extent[1] * reach;
-    const bool is_beyond[] = {v[0]<-x, v[0]> x, v[1]<-y, v[1]> y, -v[2] < camera->near};
-    unsigned sides = 0;
-    for (unsigned i = 0; i < sizeof(is_beyond) / sizeof(is_beyond[0]); i++)
-        sides |= is_beyond[i] ? 1u << i : 0;
-    return sides;
-}
-
-static bool is_beside(const struct gpu_scene *scene, uint32_t instance, const struct raster_camera *camera)
-{
-    float bounds[2][3];
-    unsigned all = ~0u;
-    gpu_scene_instance_bounds(scene, instance, bounds[0], bounds[1]);
-    for (int corner = 0; corner < 8; corner++) {
-        const float point[3] = {bounds[corner & 1][0], bounds[corner >> 1 & 1][1], bounds[corner >> 2][2]};
-        all &= beyond(camera, point);
-    }
-    return all != 0;
-}
-
 static bool reserve_left_out(struct quadtree_layers *layers, uint32_t count, struct error *error)
 {
     if (count <= layers->left_out_capacity)
@@ -82,13 +41,13 @@ static bool reserve_left_out(struct quadtree_layers *layers, uint32_t count, str
 
 static bool begin_face(struct quadtree_layers *layers, const struct gpu_scene *scene, struct error *error)
 {
-    const struct raster_camera camera = camera_of(layers->store, layers->face);
+    const struct raster_camera camera = quadtree_face_camera(&layers->store->uniforms, layers->face);
     struct frame_uniforms uniforms = {.sample_places = {{0.5f, 0.5f}}};
     raster_camera_fill(&uniforms, &camera);
     if (!reserve_left_out(layers, scene->instance_count, error))
         return false;
     for (uint32_t i = 0; i < scene->instance_count; i++)
-        layers->left_out[i] = is_beside(scene, i, &camera);
+        layers->left_out[i] = quadtree_is_beside(&camera, scene, i);
     return gpu_buffer_upload(layers->store->device, &layers->frame, &uniforms, sizeof(uniforms), error);
 }
 

@@ -2,7 +2,7 @@
 #include "trace/quadtree/store.h"
 
 #include "protocol/words.h"
-#include "trace/raster/view.h"
+#include "trace/quadtree/faces.h"
 
 #include <epoxy/gl.h>
 #include <math.h>
@@ -77,44 +77,19 @@ static float far_distance(const struct gpu_scene *scene, const float eye[3], boo
     return far * 1.001f + 1e-6f;
 }
 
-static void place_view(struct quadtree_uniforms *u, const struct trace_view *texels)
-{
-    const float *m = texels->world_from_view;
-    const bool orthographic = texels->fov_y == 0.0f;
-    const float half_height = orthographic ? texels->ortho_height / 2.0f : tanf(texels->fov_y / 2.0f);
-    for (int i = 0; i < 3; i++) {
-        u->face_from_world[0][i] = m[4 * i];
-        u->face_from_world[1][i] = -m[4 * i + 1];
-        u->face_from_world[2][i] = -m[4 * i + 2];
-    }
-    u->faces = 1;
-    u->width = texels->width;
-    u->height = texels->height;
-    u->scale_centre[0] = u->scale_centre[1] = (float)texels->height / 2.0f / half_height;
-}
+/* A texel for two of the picture's pixels along its middle: what is hit is the primitive itself, so that only what
+ * is thinner than a texel, or hidden within one, is missed. Of the scenes of the SPD set as fine as the pixels it
+ * took 1.5 to 2 times as long, for 0.2 to 0.8 dB. */
+#define CUBE_PIXELS_A_TEXEL 2.0f
 
-/* Face 2 a looks along axis a, face 2 a + 1 against it; right, down and forward are right-handed. */
-static void place_cube(struct quadtree_uniforms *u, uint32_t texels)
-{
-    for (int face = 0; face < 6; face++) {
-        const int axis = face / 2, side = face % 2;
-        u->face_from_world[3 * face][(axis + 1 + side) % 3] = 1.0f;
-        u->face_from_world[3 * face + 1][(axis + 2 - side) % 3] = 1.0f;
-        u->face_from_world[3 * face + 2][axis] = side ? -1.0f : 1.0f;
-    }
-    u->faces = 6;
-    u->width = u->height = texels;
-    u->scale_centre[0] = u->scale_centre[1] = (float)texels / 2.0f;
-}
-
-/* Texels that are as fine as the picture's pixels in its middle. */
+/* The texels along a side of a cube's face. */
 static uint32_t cube_texels(const struct trace_view *view, const struct quadtree_settings *settings)
 {
     if (settings->resolution)
         return settings->resolution;
     const float tangent = view->fov_y > 0.0f ? tanf(view->fov_y / 2.0f) : 1.0f;
-    const float texels = fminf((float)view->height / tangent, (float)CUBE_TEXELS_MAX);
-    const uint32_t whole = ((uint32_t)texels + CUBE_TEXELS_MIN - 1) / CUBE_TEXELS_MIN * CUBE_TEXELS_MIN;
+    const float texels = fminf((float)view->height / tangent / CUBE_PIXELS_A_TEXEL, (float)CUBE_TEXELS_MAX);
+    const uint32_t whole = ((uint32_t)texels + CUBE_TEXELS_MIN / 2) / CUBE_TEXELS_MIN * CUBE_TEXELS_MIN;
     return whole > CUBE_TEXELS_MIN ? whole : CUBE_TEXELS_MIN;
 }
 
@@ -166,9 +141,9 @@ static void fill_uniforms(struct quadtree_uniforms *u, const struct gpu_scene *s
     if (settings->faces == QUADTREE_FACES_VIEW) {
         struct trace_view texels;
         quadtree_texel_view(&texels, view, settings);
-        place_view(u, &texels);
+        quadtree_place_view(u, &texels);
     } else {
-        place_cube(u, cube_texels(view, settings));
+        quadtree_place_cube(u, view, cube_texels(view, settings));
     }
     u->scale_centre[2] = (float)u->width / 2.0f;
     u->scale_centre[3] = (float)u->height / 2.0f;
@@ -179,6 +154,7 @@ static void fill_uniforms(struct quadtree_uniforms *u, const struct gpu_scene *s
     u->bounds[2] =
         settings->adaptive == QUADTREE_ADAPTIVE_ON ? u->depths[0] / (DOUBLED_AT * diagonal_of(scene)) : 0.0f;
     u->bounds[3] = settings->radius / u->depths[0];
+    quadtree_drop_empty_faces(u, scene);
     u->padded_width = padded(u->width);
     u->padded_height = padded(u->height);
     for (uint32_t level = 0; level <= (only_leaves ? 0 : QUADTREE_TOP); level++)
@@ -202,21 +178,6 @@ bool quadtree_store_place(struct quadtree_store *store, const struct gpu_scene *
     return gpu_buffer_upload(store->device, &store->uniform_buffer, u, sizeof(*u), error) &&
            gpu_texture_reserve_array(store->device, &store->visible, GL_RG32UI, u->padded_width, u->padded_height,
                                      u->faces * u->layers, error);
-}
-
-void quadtree_face_view(const struct quadtree_store *store, uint32_t face, float world_from_view[12],
-                        float extent[2])
-{
-    const struct quadtree_uniforms *u = &store->uniforms;
-    const vec4 *rows = &u->face_from_world[(size_t)face * 3];
-    for (int i = 0; i < 3; i++) {
-        world_from_view[4 * i] = rows[0][i];
-        world_from_view[4 * i + 1] = -rows[1][i];
-        world_from_view[4 * i + 2] = -rows[2][i];
-        world_from_view[4 * i + 3] = u->eye_world[i];
-    }
-    extent[0] = (float)u->width / 2.0f / u->scale_centre[0];
-    extent[1] = (float)u->height / 2.0f / u->scale_centre[1];
 }
 
 void quadtree_store_bind(struct quadtree_store *store)

@@ -38,10 +38,6 @@ void quadtree_texel_view(struct trace_view *texels, const struct trace_view *vie
 bool quadtree_store_place(struct quadtree_store *store, const struct gpu_scene *scene,
                           const struct trace_view *view, const struct quadtree_settings *settings,
                           struct error *error);
-/* The view of a face as a rigid transform (looks along -z, y up), to draw it: three rows of four; and half its
- * width and height at distance 1, or of an orthographic one itself. */
-void quadtree_face_view(const struct quadtree_store *store, uint32_t face, float world_from_view[12],
-                        float extent[2]);
 /* Binds uniforms, `visible` and `nodes` at their places. */
 void quadtree_store_bind(struct quadtree_store *store);
 

@@ -195,7 +195,7 @@ static bool texel_view(const struct tracer *tracer, struct trace_view *texels, u
     const struct quadtree *quadtree = (const struct quadtree *)tracer;
     *texels = quadtree->texels;
     *layers = quadtree->store.uniforms.layers;
-    return quadtree->store.uniforms.faces == 1;
+    return tracer->options.quadtree.faces == QUADTREE_FACES_VIEW && quadtree->store.uniforms.faces == 1;
 }
 
 static bool layer_hits(struct tracer *tracer, struct gpu_scene *scene, const struct ray_range *rays,

@@ -262,6 +262,39 @@ TEST(far_sides_of_spheres_are_layers_of_their_own)
     expect_drawn(test_scene_spheres(), &u, u.width * u.height / 10 * 9);
 }
 
+/* Faces lie as the view does: one of them sees all that is before the eye. */
+TEST(faces_of_a_cube_that_see_nothing_are_left_out)
+{
+    struct error error = {0};
+    struct scene_changes changes;
+    struct gpu_scene gpu;
+    struct test_edits edits = {.scene = test_scene_create()};
+    static const float positions[3][3] = {{-1, -1, -5}, {1, -1, -5}, {0, 1, -5}};
+    static const uint32_t indices[3] = {0, 1, 2};
+    const struct quadtree_settings settings = {
+        .faces = QUADTREE_FACES_CUBE, .layers = 1, .resolution = 128, .pixels = 0.5f, .radius = 0.1f};
+    /* Looks at the triangle; likewise between two axes of the world; away from it. */
+    const float s = 0.70710678f;
+    const struct trace_view views[] = {
+        {.world_from_view = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}, .fov_y = 1, .width = 64, .height = 64},
+        {.world_from_view = {s, 0, s, 5, 0, 1, 0, 0, -s, 0, s, 0}, .fov_y = 1, .width = 64, .height = 64},
+        {.world_from_view = {-1, 0, 0, 0, 0, 1, 0, 0, 0, 0, -1, 0}, .fov_y = 1, .width = 64, .height = 64}};
+    test_mesh(&edits, 10, positions, 3, indices, 1);
+    test_node(&edits, 1, 0, NODE_MESH, 10, NULL);
+    test_commit(&edits);
+    gpu_scene_init(&gpu, device);
+    expect_ok(gpu_scene_update(&gpu, edits.scene, NULL, &changes, NULL, &error), &error);
+    for (size_t i = 0; i < sizeof(views) / sizeof(views[0]); i++) {
+        struct quadtree_store store = {.device = device};
+        expect_ok(quadtree_store_place(&store, &gpu, &views[i], &settings, &error), &error);
+        assert_int_equal(store.uniforms.faces, 1);
+        assert_float_equal(store.uniforms.face_from_world[2][2], i == 1 ? -s : -1, 1e-6);
+        quadtree_store_finish(&store);
+    }
+    gpu_scene_finish(&gpu);
+    scene_destroy(edits.scene);
+}
+
 /* Placed as the tracer does it. */
 TEST(layers_of_all_faces_of_a_cube_show_the_first_surfaces_in_order)
 {
@@ -280,8 +313,8 @@ TEST(layers_of_all_faces_of_a_cube_show_the_first_surfaces_in_order)
     const struct quadtree_uniforms u = store.uniforms;
     gpu_scene_finish(&gpu);
     quadtree_store_finish(&store);
-    assert_int_equal(u.faces, 6);
-    expect_drawn(scene, &u, u.width * u.height * 6 / 10 * 9);
+    assert_int_equal(u.faces, 5); /* nothing is behind the eye */
+    expect_drawn(scene, &u, u.width * u.height * u.faces / 10 * 9);
 }
 
 /* ---- sheets ---- */

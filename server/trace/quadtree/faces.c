@@ -1,0 +1,178 @@
+/* SPDX-License-Identifier: MIT */
+#include "trace/quadtree/faces.h"
+
+#include <math.h>
+#include <string.h>
+
+/* ---- where they lie ---- */
+
+/* Right, down and forward of a view. */
+static void axes_of(const struct trace_view *view, vec4 axes[3])
+{
+    const float *m = view->world_from_view;
+    for (int i = 0; i < 3; i++) {
+        axes[0][i] = m[4 * i];
+        axes[1][i] = -m[4 * i + 1];
+        axes[2][i] = -m[4 * i + 2];
+    }
+}
+
+void quadtree_place_view(struct quadtree_uniforms *uniforms, const struct trace_view *texels)
+{
+    const bool orthographic = texels->fov_y == 0.0f;
+    const float half_height = orthographic ? texels->ortho_height / 2.0f : tanf(texels->fov_y / 2.0f);
+    axes_of(texels, uniforms->face_from_world);
+    uniforms->faces = 1;
+    uniforms->width = texels->width;
+    uniforms->height = texels->height;
+    uniforms->scale_centre[0] = uniforms->scale_centre[1] = (float)texels->height / 2.0f / half_height;
+}
+
+/* Face 2 a looks along axis a of the view, face 2 a + 1 against it; right, down and forward are right-handed. What
+ * the picture shows lies in one face where its angle allows it: a ray that stays there looks at no other. */
+void quadtree_place_cube(struct quadtree_uniforms *uniforms, const struct trace_view *view, uint32_t texels)
+{
+    vec4 axes[3] = {{0}};
+    axes_of(view, axes);
+    for (int face = 0; face < 6; face++) {
+        const int axis = face / 2, side = face % 2;
+        vec4 *rows = &uniforms->face_from_world[3 * face];
+        for (int i = 0; i < 3; i++) {
+            rows[0][i] = axes[(axis + 1 + side) % 3][i];
+            rows[1][i] = axes[(axis + 2 - side) % 3][i];
+            rows[2][i] = side ? -axes[axis][i] : axes[axis][i];
+        }
+    }
+    uniforms->faces = 6;
+    uniforms->width = uniforms->height = texels;
+    uniforms->scale_centre[0] = uniforms->scale_centre[1] = (float)texels / 2.0f;
+}
+
+/* ---- what they see ---- */
+
+struct raster_camera quadtree_face_camera(const struct quadtree_uniforms *uniforms, uint32_t face)
+{
+    const vec4 *rows = &uniforms->face_from_world[(size_t)face * 3];
+    struct raster_camera camera = {
+        .near = uniforms->depths[3],
+        .far = uniforms->depths[1],
+        .orthographic = uniforms->depths[2] != 0.0f,
+        .width = uniforms->width,
+        .height = uniforms->height,
+    };
+    for (int i = 0; i < 3; i++) {
+        camera.world_from_view[4 * i] = rows[0][i];
+        camera.world_from_view[4 * i + 1] = -rows[1][i];
+        camera.world_from_view[4 * i + 2] = -rows[2][i];
+        camera.world_from_view[4 * i + 3] = uniforms->eye_world[i];
+    }
+    camera.extent[0] = (float)uniforms->width / 2.0f / uniforms->scale_centre[0];
+    camera.extent[1] = (float)uniforms->height / 2.0f / uniforms->scale_centre[1];
+    return camera;
+}
+
+/* Sides of the frustum, as bits, that a ball lies beyond. */
+static unsigned beyond(const struct raster_camera *camera, const float world[3], float radius)
+{
+    const float *m = camera->world_from_view;
+    float v[3];
+    for (int k = 0; k < 3; k++)
+        v[k] = (world[0] - m[3]) * m[k] + (world[1] - m[7]) * m[4 + k] + (world[2] - m[11]) * m[8 + k];
+    /* A little wider, for rounding. */
+    const float reach = (camera->orthographic ? 1.0f : -v[2]) * 1.0001f;
+    unsigned sides = 0;
+    for (int k = 0; k < 2; k++) {
+        const float extent = camera->extent[k], side = extent * reach;
+        const float slack = radius * (camera->orthographic ? 1.0f : sqrtf(1.0f + extent * extent));
+        sides |= v[k] < -side - slack ? 1u << 2 * k : 0;
+        sides |= v[k] > side + slack ? 2u << 2 * k : 0;
+    }
+    return sides | (-v[2] + radius < camera->near ? 16u : 0);
+}
+
+bool quadtree_is_beside(const struct raster_camera *camera, const struct gpu_scene *scene, uint32_t instance)
+{
+    float bounds[2][3];
+    unsigned all = ~0u;
+    gpu_scene_instance_bounds(scene, instance, bounds[0], bounds[1]);
+    for (int corner = 0; corner < 8; corner++) {
+        const float point[3] = {bounds[corner & 1][0], bounds[corner >> 1 & 1][1], bounds[corner >> 2][2]};
+        all &= beyond(camera, point, 0.0f);
+    }
+    return all != 0;
+}
+
+static void world_of(float world[3], const struct instance *instance, const float object[3])
+{
+    for (int r = 0; r < 3; r++) {
+        const float *m = instance->world_from_object[r];
+        world[r] = m[0] * object[0] + m[1] * object[1] + m[2] * object[2] + m[3];
+    }
+}
+
+static bool is_triangle_beside(const struct raster_camera *camera, const struct instance *instance,
+                               const struct scene_mesh *mesh, uint32_t triangle)
+{
+    const uint32_t *corner =
+        (const uint32_t *)(const void *)mesh->arrays[MESH_INDICES]->data + 3 * (size_t)triangle;
+    const float *positions = (const float *)(const void *)mesh->arrays[MESH_POSITIONS]->data;
+    unsigned all = ~0u;
+    for (int i = 0; i < 3; i++) {
+        float world[3];
+        world_of(world, instance, &positions[3 * (size_t)corner[i]]);
+        all &= beyond(camera, world, 0.0f);
+    }
+    return all != 0;
+}
+
+static bool is_sphere_beside(const struct raster_camera *camera, const struct instance *instance,
+                             const struct scene_spheres *spheres, uint32_t sphere)
+{
+    const float *at = (const float *)(const void *)spheres->centres_radii->data + 4 * (size_t)sphere;
+    float world[3], squares = 0.0f;
+    world_of(world, instance, at);
+    for (int r = 0; r < 3; r++)
+        for (int c = 0; c < 3; c++)
+            squares += instance->world_from_object[r][c] * instance->world_from_object[r][c];
+    return beyond(camera, world, at[3] * sqrtf(squares)) != 0; /* no axis grows by more than all of them */
+}
+
+/* Primitives that are looked at for a face: about a millisecond's worth. With more it counts as not empty. */
+#define PRIMITIVES_LOOKED_AT (1u << 16)
+
+/* What deforms is not where its mesh is. *left: of PRIMITIVES_LOOKED_AT. */
+static bool are_all_beside(const struct raster_camera *camera, const struct gpu_scene *scene, uint32_t instance,
+                           uint32_t *left)
+{
+    const struct gpu_scene_geometry *geometry = &scene->geometries[scene->instances[instance].geometry];
+    const uint32_t count = geometry->device.primitive_count;
+    bool beside = geometry->node == 0 && count <= *left;
+    *left -= beside ? count : 0;
+    for (uint32_t i = 0; beside && i < count; i++)
+        beside = geometry->mesh ? is_triangle_beside(camera, &scene->instances[instance], geometry->mesh, i)
+                                : is_sphere_beside(camera, &scene->instances[instance], geometry->spheres, i);
+    return beside;
+}
+
+static bool is_empty(const struct quadtree_uniforms *uniforms, const struct gpu_scene *scene, uint32_t face)
+{
+    const struct raster_camera camera = quadtree_face_camera(uniforms, face);
+    uint32_t left = PRIMITIVES_LOOKED_AT;
+    for (uint32_t i = 0; i < scene->instance_count; i++)
+        if (!quadtree_is_beside(&camera, scene, i) && !are_all_beside(&camera, scene, i, &left))
+            return false;
+    return true;
+}
+
+void quadtree_drop_empty_faces(struct quadtree_uniforms *uniforms, const struct gpu_scene *scene)
+{
+    uint32_t kept = 0;
+    if (uniforms->faces == 1)
+        return;
+    for (uint32_t face = 0; face < uniforms->faces; face++) {
+        vec4 *rows = uniforms->face_from_world;
+        if (!is_empty(uniforms, scene, face))
+            memmove(&rows[3 * (size_t)kept++], &rows[3 * (size_t)face], 3 * sizeof(rows[0]));
+    }
+    uniforms->faces = kept > 0 ? kept : 1;
+}

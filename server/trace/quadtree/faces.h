@@ -1,0 +1,26 @@
+/* SPDX-License-Identifier: MIT */
+/* Where the faces of a view lie (shaders/quadtree/layout.h), and which of them see nothing. */
+#ifndef FARLIGHT_TRACE_QUADTREE_FACES_H
+#define FARLIGHT_TRACE_QUADTREE_FACES_H
+
+#include "gpu_scene/scene.h"
+#include "quadtree/layout.h"
+#include "trace/raster/view.h"
+#include "trace/view.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+
+/* One face, whose texels are the pixels of `texels`. */
+void quadtree_place_view(struct quadtree_uniforms *uniforms, const struct trace_view *texels);
+/* Six faces round the eye, so many texels along a side; the last but one looks along the view. */
+void quadtree_place_cube(struct quadtree_uniforms *uniforms, const struct trace_view *view, uint32_t texels);
+/* Leaves out the faces of a placed cube that no instance of the scene reaches, but for one. */
+void quadtree_drop_empty_faces(struct quadtree_uniforms *uniforms, const struct gpu_scene *scene);
+
+/* To draw a face. */
+struct raster_camera quadtree_face_camera(const struct quadtree_uniforms *uniforms, uint32_t face);
+/* Whether an instance lies beside what the camera sees. */
+bool quadtree_is_beside(const struct raster_camera *camera, const struct gpu_scene *scene, uint32_t instance);
+
+#endif
