@@ -304,9 +304,9 @@ static bool accumulate(struct frame_renderer *renderer, struct error *error)
     struct picture *picture = renderer->target;
     bool has_beauty = picture->layers & 1u << LAYER_BEAUTY; /* then it is the first plane */
     return (!context->comparison || comparison_keep_slice(context->comparison, error)) &&
-           (!has_beauty || picture_accumulate(picture, context, 0, &context->slice_sums, 0, error)) &&
            (!denoise_notes_samples(context) ||
             denoise_accumulate(&renderer->denoise, &renderer->work->denoise.notes, context, picture, error)) &&
+           (!has_beauty || picture_accumulate(picture, context, 0, &context->slice_sums, 0, error)) &&
            layers_accumulate(&renderer->work->layers, picture, context, error);
 }
 

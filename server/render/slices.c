@@ -19,7 +19,7 @@ uint32_t slices_group_shift(uint32_t samples, uint32_t done)
     uint32_t shift = 0, group = 0;
     for (uint32_t end = 0; end <= done; end += group) {
         shift = 0;
-        while (2u << shift <= SAMPLES_TOGETHER_MAX && 2u << shift <= samples - end)
+        while (2u << shift <= SAMPLES_TOGETHER_MAX && 2u << shift <= samples - end && 8u << shift <= samples)
             shift++;
         group = 1u << shift;
     }

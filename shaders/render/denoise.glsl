@@ -15,7 +15,7 @@ uniform uint strip_row, strip_rows; // the strip's first row in the picture, and
 
 struct halves {
     vec3 a, b;
-    float deviation; // of each, by luminance; until it is known, the luminance of their mean
+    float deviation; // of each, by luminance
 };
 
 struct guide {
@@ -39,6 +39,20 @@ halves halves_of_words(uvec4 words)
     vec2 middle = unpackHalf2x16(words.y);
     return halves(vec3(unpackHalf2x16(words.x), middle.x), vec3(middle.y, unpackHalf2x16(words.z)),
                   uintBitsToFloat(words.w));
+}
+
+// Until the deviation is known: the luminance of the mean, and the noise of the first half by how its own halves differ (0: not
+// known).
+uvec4 words_of_taken(vec3 a, vec3 b, float half_noise)
+{
+    uvec4 words = words_of_halves(halves(a, b, 0.0));
+    words.w = packHalf2x16(clamp(vec2(luminance(0.5 * (a + b)), half_noise), -HALF_FLOAT_MAX, HALF_FLOAT_MAX));
+    return words;
+}
+
+vec2 taken_of_words(uvec4 words)
+{
+    return unpackHalf2x16(words.w);
 }
 
 vec3 mean_of(halves h)

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-// Adds a slice to the sums that the denoiser has beside the picture, unless it must be done again: the radiance of the
-// samples of the first half, and what all of them saw. Each doubling of the samples is halved in turn, so that both halves
-// are as evenly spread as all of them; the first four so that both have one of either half of what is chosen.
+// Adds a slice to the sums that the denoiser has beside the picture, unless it must be done again: the light of the
+// samples of the first half, and what all of them saw. The picture does not have the slice yet.
 // Defines: HAS_TILE_SAMPLES tiles may have stopped, and get no more (server/render/picture_noise.h).
 //          HAS_NOTED_MOTION notes say whether they are to count, and where things were.
 
 #include "shared/denoise.h"
 #include "common/dispatch.glsl"
+#include "render/denoise_half.glsl"
 #include "render/wave.glsl"
 
 uniform uint slot_count;
@@ -20,17 +20,14 @@ layout(binding = UNIT_TILE_SAMPLES) uniform usamplerBuffer tile_samples;
 
 layout(std430, binding = BIND_SLICE_SUMS) readonly buffer sum_block { vec4 slice_sums[]; };
 layout(std430, binding = BIND_DENOISE_NOTES) readonly buffer note_block { vec4 notes[]; };
-layout(std430, binding = BIND_DENOISE_HALF) buffer half_block { vec4 first_half[]; };
+layout(std430, binding = BIND_DENOISE_SUM) readonly buffer accumulation_block { vec4 accumulation[]; };
+layout(std430, binding = BIND_DENOISE_DOUBLED) buffer doubled_block { vec4 doubled_lights[]; };
+layout(std430, binding = BIND_DENOISE_HALF) buffer half_block { uvec4 first_half[]; };
 layout(std430, binding = BIND_DENOISE_ALBEDO) buffer albedo_block { vec4 albedos[]; };
 layout(std430, binding = BIND_DENOISE_NORMAL) buffer normal_block { vec4 normals[]; };
 #ifdef HAS_NOTED_MOTION
 layout(std430, binding = BIND_DENOISE_MOTION) buffer motion_block { vec4 motions[]; };
 #endif
-
-bool is_of_first_half(uint index)
-{
-    return index < 4u ? index % 3u == 0u : (index >> findMSB(index) - 1 & 1u) == 0u;
-}
 
 void main()
 {
@@ -42,20 +39,36 @@ void main()
         return;
 #endif
     uint begin = k << sample_shift, count = 1u << sample_shift, slot = first_slot + k;
-    vec4 sum = first_half[slot], albedo = albedos[slot], normal = normals[slot];
+    vec4 sum = accumulation[slot], doubled = doubled_lights[slot], albedo = albedos[slot], normal = normals[slot];
+    uvec4 half_ = first_half[slot];
+    float noted = float(sample_index);
+#ifdef HAS_NOTED_MOTION
+    vec4 motion = motions[slot];
+    noted = motion.w;
+#endif
     for (uint i = 0u; i < count; i++) {
         uint first = DENOISE_NOTE_TEXELS * (begin + i);
         float counts = 1.0;
 #ifdef HAS_NOTED_MOTION
-        vec4 motion = notes[first + 2u];
-        counts = motion.w > 0.0 ? 1.0 : DENOISE_WHISPER; // if it is all that there is
-        motions[slot] += vec4(motion.xyz, 1.0) * counts;
+        vec4 moved = notes[first + 2u];
+        counts = moved.w > 0.0 ? 1.0 : DENOISE_WHISPER; // if it is all that there is
+        motion += vec4(moved.xyz, 1.0) * counts;
 #endif
-        sum += is_of_first_half(sample_index + i) ? slice_sums[begin + i] : vec4(0.0);
         albedo += counts * notes[first];
         normal += counts * notes[first + 1u];
+        noted += counts;
+        sum += slice_sums[begin + i];
+        uint counted = sample_index + i + 1u;
+        if (counted == 2u || counted > 2u && first_half_of(counted) != first_half_of(counted - 1u))
+            half_ = words_of_half(doubled.rgb, doubled.rgb - light_of_half(half_));
+        if ((counted & counted - 1u) == 0u)
+            doubled.rgb = sum.rgb / (float(counted) * divisor_of(albedo.rgb / noted));
     }
-    first_half[slot] = sum;
+    first_half[slot] = half_;
+    doubled_lights[slot] = doubled;
     albedos[slot] = albedo;
     normals[slot] = normal;
+#ifdef HAS_NOTED_MOTION
+    motions[slot] = motion;
+#endif
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// How many samples the pixels of a band have, and which of them are of the first half.
+// How many samples the pixels of a band have.
 // Defines: HAS_TILE_SAMPLES tiles may have stopped, and have fewer samples (server/render/picture_noise.h).
 //          HAS_NOTED_MOTION some samples may not say what they saw.
 
@@ -32,11 +32,4 @@ float notes_of_slot(uint slot, float count)
 #else
     return count;
 #endif
-}
-
-// Of so many samples: denoise_accumulate.comp says which.
-float first_half_of(float samples)
-{
-    uint count = uint(samples), doubled = 1u << findMSB(count);
-    return count < 4u ? 1.0 : float((doubled >> 1) + min(count - doubled, doubled >> 1));
 }

@@ -10,6 +10,7 @@
 
 #include "render/denoise.glsl"
 #include "render/denoise_count.glsl"
+#include "render/denoise_half.glsl"
 
 uniform uint band_row; // the first row of the band in the picture
 uniform float strength;
@@ -21,16 +22,16 @@ layout(binding = UNIT_DENOISE_GUIDE) uniform usamplerBuffer guides;
 layout(binding = UNIT_DENOISE_WIDER) uniform usamplerBuffer kept; // denoise_reproject.comp
 #endif
 layout(std430, binding = BIND_ACCUMULATION) readonly buffer accumulation_block { vec4 accumulation[]; };
-layout(std430, binding = BIND_DENOISE_HALF) readonly buffer half_block { vec4 first_half[]; };
+layout(std430, binding = BIND_DENOISE_HALF) readonly buffer half_block { uvec4 first_half[]; };
 layout(std430, binding = BIND_DENOISE_ALBEDO) readonly buffer albedo_block { vec4 albedos[]; };
 layout(std430, binding = BIND_DENOISE_OUT) writeonly buffer band_block { vec4 denoised[]; };
 
 // Of what was left out, `left`, the part that is a speck. Of one sample nothing is known.
-vec3 speck_of(vec3 left, vec3 mean, uint slot, float count)
+vec3 speck_of(vec3 left, vec3 mean, vec3 albedo, uint slot, float count)
 {
-    float first_count = first_half_of(count), second_count = count - first_count;
-    vec3 first = first_half[slot].rgb, second = accumulation[slot].rgb - first;
-    vec3 lesser = luminance(first) * second_count < luminance(second) * first_count ? first / first_count : second / second_count;
+    float first_count = float(first_half_of(uint(count))), second_count = count - first_count;
+    vec3 first = light_of_half(first_half[slot]) * albedo, second = (count * mean - first_count * first) / max(second_count, 1.0);
+    vec3 lesser = luminance(first) < luminance(second) ? first : second;
     float shown = luminance(lesser) - luminance(mean - left), all = luminance(left);
     return second_count > 0.0 && all > 0.0 ? left * (1.0 - clamp(shown / all, 0.0, 1.0)) : vec3(0.0);
 }
@@ -59,7 +60,7 @@ void main()
     uint slot = slot_of_pixel(uvec2(pixel.x, uint(pixel.y) + strip_row - band_row));
     float count = samples_of_slot(slot);
     vec4 sum = accumulation[slot];
-    vec3 albedo = max(albedos[slot].rgb / notes_of_slot(slot, count), vec3(DENOISE_ALBEDO_MIN));
+    vec3 albedo = divisor_of(albedos[slot].rgb / notes_of_slot(slot, count));
     vec3 filtered = mean_of(halves_of_words(texelFetch(first_light, place)));
     vec3 moved = mean_of(halves_of_words(texelFetch(light, place))) - filtered;
 #ifdef HAS_REPROJECTED
@@ -67,7 +68,7 @@ void main()
     moved += vec3(unpackHalf2x16(words.x), unpackHalf2x16(words.y).x) - sum.rgb / (count * albedo);
 #else
     vec3 mean = sum.rgb / count;
-    moved -= speck_of(mean - filtered * albedo, mean, slot, count) * is_alone(pixel, filtered) / albedo;
+    moved -= DENOISE_SPECK_DOUBT * speck_of(mean - filtered * albedo, mean, albedo, slot, count) * is_alone(pixel, filtered) / albedo;
 #endif
     bool there = uintBitsToFloat(texelFetch(guides, place).y) > 0.0;
     denoised[slot] = vec4(there ? max(sum.rgb + strength * moved * albedo * count, vec3(0.0)) : sum.rgb, sum.a);

@@ -36,7 +36,7 @@ float cap_around(ivec2 pixel, ivec2 lower, ivec2 upper, guide own)
         int place = place_of(counts ? next : pixel);
         guide other = guide_of_words(texelFetch(guides, place).xy);
         float weight = counts && is_alike(own, other) ? 1.0 : 0.0;
-        sum += weight * min(uintBitsToFloat(texelFetch(light, place).w), DENOISE_CAP * white);
+        sum += weight * min(taken_of_words(texelFetch(light, place)).x, DENOISE_CAP * white);
         count += weight;
     }
     return min(DENOISE_CAP * sum / max(count, 1.0), DENOISE_CAP * white);
@@ -55,7 +55,8 @@ void main()
     bounds_of(pixel, lower, upper);
     int place = place_of(pixel);
     guide own = guide_of_words(texelFetch(guides, place).xy);
-    halves h = halves_of_words(texelFetch(light, place));
+    uvec4 words = texelFetch(light, place);
+    halves h = halves_of_words(words);
     float cap = cap_around(pixel, lower, upper, own);
     h.a = capped(h.a, cap);
     h.b = capped(h.b, cap);
@@ -85,8 +86,9 @@ void main()
     vec3 noise = noise_of(h);
     if (one_sample != 0u && h.a == h.b)
         noise = apart;
-    noise *= 1.0 - (one_sample != 0u && h.a == h.b ? 1.0 : DENOISE_MIRROR_DOUBT) * own.share;
-    h = halves(mean + noise, mean - noise, 0.0);
+    float believed = 1.0 - (one_sample != 0u && h.a == h.b ? 1.0 : DENOISE_MIRROR_DOUBT) * own.share;
+    noise *= believed;
+    h = halves(mean + noise, mean - noise, min(abs(taken_of_words(words).y), cap) * believed);
     vec2 slope = vec2(smaller(rises.x, rises.y), smaller(rises.z, rises.w));
     slope = mix(slope, vec2(0.0), greaterThan(abs(slope), vec2(1e29))); // a view one pixel wide
     slope = own.nearness > 0.0 ? clamp(slope / own.nearness, vec2(-1.0), vec2(1.0)) : vec2(0.0);

@@ -123,10 +123,10 @@ void main()
             count += worth;
             vec3 noise = (was.rgb - mean) * (sqrt(worth * samples) / count);
             mean += (was.rgb - mean) * (worth / count);
-            h = halves(mean + noise, mean - noise, luminance(mean));
+            h = halves(mean + noise, mean - noise, 0.0);
         }
     }
-    blended[place] = words_of_halves(h);
+    blended[place] = words_of_taken(h.a, h.b, 0.0);
     mean = min(mean, vec3(HALF_FLOAT_MAX));
     kept[place] = uvec4(packHalf2x16(mean.rg), packHalf2x16(vec2(mean.b, min(count, HALF_FLOAT_MAX))), guide_words);
 }

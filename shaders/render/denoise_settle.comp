@@ -1,8 +1,14 @@
 // SPDX-License-Identifier: MIT
 // Brings the difference of the halves down to the noise that neighbours show, and notes how large it is around a pixel, on
 // whatever surface: how noisy light is differs little from one to the next, and more witnesses say more.
+//
+// And to what halves of the halves let expect: where the square of the error of n samples is n^-p, the mean square of half the
+// difference is D(n) = E(n) (2^p - 1), and D(n / 2) is 2^p D(n). So E(n) = D(n)^2 / (D(n / 2) - D(n)); without stratification
+// D(n).
 
 #include "render/denoise.glsl"
+
+uniform float believed; // of the noise that halves show
 
 layout(binding = UNIT_DENOISE_LIGHT) uniform usamplerBuffer light;
 layout(binding = UNIT_DENOISE_RISK) uniform samplerBuffer risks;
@@ -16,17 +22,20 @@ void main()
     bounds_of(pixel, lower, upper);
     int place = place_of(pixel);
     vec2 sum = vec2(0.0);
-    float weights = 0.0;
+    float weights = 0.0, half_sum = 0.0;
     for (int y = -2; y <= 2; y++) {
         for (int x = -2; x <= 2; x++) {
             ivec2 next = clamp(pixel + ivec2(x, y), lower, upper - 1);
             vec2 risk = texelFetch(risks, place_of(next)).xy;
             sum += max(risk, vec2(0.0));
-            weights += risk.x < 0.0 ? 0.0 : 1.0;
+            float there = risk.x < 0.0 ? 0.0 : 1.0;
+            half_sum += there * square(uintBitsToFloat(texelFetch(light, place_of(next)).w));
+            weights += there;
         }
     }
     halves h = halves_of_words(texelFetch(light, place));
-    float share = sum.x > 0.0 ? min(sqrt(DENOISE_NEIGHBOURS_TRUST * sum.y / sum.x), 1.0) : 0.0;
+    float share = sum.x > 0.0 ? min(DENOISE_NEIGHBOURS_TRUST * sum.y / sum.x, 1.0) : 0.0;
+    share = sqrt(min(share, believed * sum.x / max(half_sum - sum.x, sum.x)));
     vec3 mean = mean_of(h), noise = noise_of(h) * share;
     h.a = mean + noise;
     h.b = mean - noise;

@@ -3,11 +3,12 @@
 
 #include "render/denoise.glsl"
 #include "render/denoise_count.glsl"
+#include "render/denoise_half.glsl"
 
 uniform uint band_row; // the first row of the band in the picture
 
 layout(std430, binding = BIND_ACCUMULATION) readonly buffer accumulation_block { vec4 accumulation[]; };
-layout(std430, binding = BIND_DENOISE_HALF) readonly buffer half_block { vec4 first_half[]; };
+layout(std430, binding = BIND_DENOISE_HALF) readonly buffer half_block { uvec4 first_half[]; };
 layout(std430, binding = BIND_DENOISE_ALBEDO) readonly buffer albedo_block { vec4 albedos[]; };
 layout(std430, binding = BIND_DENOISE_NORMAL) readonly buffer normal_block { vec4 normals[]; };
 layout(std430, binding = BIND_DENOISE_GUIDE) writeonly buffer guide_block { uvec2 guides[]; };
@@ -22,13 +23,12 @@ void main()
     if (!pixel_of_item(pixel))
         return;
     uint slot = slot_of_pixel(uvec2(pixel.x, uint(pixel.y) + strip_row - band_row));
-    float count = samples_of_slot(slot), first_count = first_half_of(count), second_count = count - first_count;
+    float count = samples_of_slot(slot), first_count = float(first_half_of(uint(count))), second_count = count - first_count;
     float noted = notes_of_slot(slot, count);
     vec4 albedo = albedos[slot] / noted, normal = normals[slot] / noted;
-    vec3 sum = accumulation[slot].rgb, first = first_half[slot].rgb, mean = sum / count, noise = vec3(0.0);
+    vec3 mean = accumulation[slot].rgb / (count * divisor_of(albedo.rgb)), noise = vec3(0.0);
     if (second_count > 0.0)
-        noise = (first / first_count - (sum - first) / second_count) * (sqrt(first_count * second_count) / count);
-    vec3 divisor = max(albedo.rgb, vec3(DENOISE_ALBEDO_MIN));
+        noise = (light_of_half(first_half[slot]) - mean) * sqrt(first_count / second_count);
     float depth = normal.w;
     bool there = depth > 0.0 && albedo.a <= 1.0; // all of it: what is behind would be spread over the edge, too
     guide g = guide(there ? normal.xyz : vec3(0.0), min(albedo.a + (count - noted) / count, 1.0), 0.0);
@@ -36,7 +36,8 @@ void main()
         g.nearness = frame.extent_near.w != 0.0 ? depth : 1.0 / depth;
     int place = place_of(pixel);
     guides[place] = words_of_guide(g);
-    light[place] = words_of_halves(halves((mean + noise) / divisor, (mean - noise) / divisor, luminance(mean / divisor)));
+    float half_noise = count == 2.0 * first_count && count > 4.0 ? luminance(difference_of_half(first_half[slot])) : 0.0;
+    light[place] = words_of_taken(mean + noise, mean - noise, half_noise);
 #ifdef HAS_NOTED_MOTION
     vec3 motion = motions[slot].xyz / (noted * max(depth, 1e-30));
     strip_motions[place] = words_of_motion(motion);

@@ -43,6 +43,9 @@
 #define DENOISE_CAP 4.0f
 /* What is that much brighter is a speck where pixels beside it have less than this share of what is left of it. */
 #define DENOISE_ALONE 0.5f
+/* So much of a speck is left out: it may be a light that few samples find, and partway is wrong least either way.
+ */
+#define DENOISE_SPECK_DOUBT 0.75f
 /* Light counts as like another that differs by this many standard deviations; in mirrors and glass by as much less
  * as DENOISE_MIRROR_EDGES says. */
 #define DENOISE_LIGHT_SCALE 2.0f
@@ -67,10 +70,12 @@
 
 /* storage buffers */
 #define BIND_DENOISE_NOTES BIND_PASS_0  /* vec4, DENOISE_NOTE_TEXELS a sample of the slice */
-#define BIND_DENOISE_HALF BIND_PASS_1   /* vec4 a slot of a band: sums of the first half of the samples */
+#define BIND_DENOISE_HALF BIND_PASS_1   /* uvec4 a slot of a band: render/denoise_half.glsl */
 #define BIND_DENOISE_ALBEDO BIND_PASS_3 /* vec4 a slot: sums of notes */
 #define BIND_DENOISE_NORMAL BIND_PASS_4 /* the same */
 #define BIND_DENOISE_MOTION BIND_WAVE   /* the same, with HAS_NOTED_MOTION */
+#define BIND_DENOISE_DOUBLED 0          /* vec4 a slot: the light of the last power of two of the samples */
+#define BIND_DENOISE_SUM 3              /* the picture's, where BIND_ACCUMULATION is taken */
 #define BIND_DENOISE_OUT BIND_PASS_2    /* what a pass over the strip writes */
 #define BIND_DENOISE_GUIDE 0            /* the guide, where it writes that */
 #define BIND_DENOISE_SLOPE 0            /* the slopes, where it writes those */

@@ -155,8 +155,16 @@ static void bind_noise(struct denoise_filter *filter, const struct denoise_histo
     gpu_uniform_float(program, "white", exp2f(-context->request.exposure_stops));
 }
 
-static void bind_settle(struct denoise_filter *filter, struct render_context *context)
+/* The more samples, the less of what the halves of a picture differ by is noise: edges within pixels stay. */
+static float believed(uint32_t samples)
 {
+    return fminf(4.0f / (1.0f + log2f((float)samples)), 1.0f);
+}
+
+static void bind_settle(struct denoise_filter *filter, struct render_context *context,
+                        const struct picture *picture, const struct gpu_program *program)
+{
+    gpu_uniform_float(program, "believed", believed(picture->samples));
     bind_light(context, &filter->wider, UNIT_DENOISE_LIGHT);
     bind_guides(filter, context);
     bind_risks(filter, context);
@@ -217,7 +225,7 @@ static void bind_pass(struct denoise_filter *filter, struct denoise_sums *sums, 
         bind_noise(filter, history, context, picture, program);
         break;
     case PASS_SETTLE:
-        bind_settle(filter, context);
+        bind_settle(filter, context, picture, program);
         break;
     case PASS_GIVE:
         bind_sums(sums, context, picture, program, band);

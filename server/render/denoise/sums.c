@@ -158,6 +158,8 @@ bool denoise_accumulate(struct denoise_sums *sums, struct gpu_buffer *notes, str
         gpu_uniform_uint(program, "first_picture_slot", context->slice.first_slot);
     gpu_buffer_bind_storage(&context->slice_sums, BIND_SLICE_SUMS);
     gpu_buffer_bind_storage(notes, BIND_DENOISE_NOTES);
+    gpu_buffer_bind_storage(picture_band(picture, 0, band), BIND_DENOISE_SUM);
+    gpu_buffer_bind_storage(denoise_sums_band(sums, DENOISE_SUM_DOUBLED, band), BIND_DENOISE_DOUBLED);
     gpu_buffer_bind_storage(denoise_sums_band(sums, DENOISE_SUM_HALF, band), BIND_DENOISE_HALF);
     gpu_buffer_bind_storage(denoise_sums_band(sums, DENOISE_SUM_ALBEDO, band), BIND_DENOISE_ALBEDO);
     gpu_buffer_bind_storage(denoise_sums_band(sums, DENOISE_SUM_NORMAL, band), BIND_DENOISE_NORMAL);

@@ -9,7 +9,8 @@
 #include "render/picture.h"
 
 enum denoise_sum {
-    DENOISE_SUM_HALF,
+    DENOISE_SUM_HALF,    /* the light of the first half: shaders/render/denoise_half.glsl */
+    DENOISE_SUM_DOUBLED, /* that of as many samples as the last power of two, which will be half of them */
     DENOISE_SUM_ALBEDO,
     DENOISE_SUM_NORMAL,
     DENOISE_SUM_MOTION, /* where has_motion; else nothing */
@@ -47,7 +48,8 @@ bool denoise_note(const struct denoise_sums *sums, struct gpu_buffer *notes, str
 /* It has those of the rays that these have sent on: of what is seen in mirrors and through glass they say more. */
 bool denoise_follow(const struct denoise_sums *sums, struct gpu_buffer *notes, struct gpu_buffer *moved,
                     struct render_context *context, struct error *error);
-/* Adds the current slice. Call it once the slice cannot be repeated, but on the device. */
+/* Adds the current slice, before the picture has it. Call it once the slice cannot be repeated, but on the device.
+ */
 bool denoise_accumulate(struct denoise_sums *sums, struct gpu_buffer *notes, struct render_context *context,
                         const struct picture *picture, struct error *error);
 struct gpu_buffer *denoise_sums_band(const struct denoise_sums *sums, enum denoise_sum sum, uint32_t band);
