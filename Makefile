@@ -407,7 +407,7 @@ JOBS ?= $(shell nproc)
 test: test-packages
 	$(MAKE) -j$(JOBS) all tests
 	python3 tests/tools/run_tests.py $(B) $(TESTS)
-# With what takes minutes: the benchmark itself, tiny, and every hostile file the whole way.
+# With what takes minutes: all forms of the tracers, the benchmark itself, tiny, and every hostile file the whole way.
 test-long: test-packages
 	$(MAKE) -j$(JOBS) all tests
 	FARLIGHT_TEST_LONG=1 python3 tests/tools/run_tests.py $(B) $(TESTS)
@@ -637,7 +637,7 @@ distclean: clean
 help:
 	@echo 'make demo       install what is missing, build, render the bundled scenes into out/   [FAST=1: one picture]'
 	@echo 'make test       install what tests need, build, run all tests   [TESTS=part-of-a-name]'
-	@echo 'make test-long  all tests and what takes minutes: the benchmark itself, every hostile file the whole way'
+	@echo 'make test-long  all tests and what takes minutes: all forms of the tracers, the benchmark itself, every hostile file the whole way'
 	@echo "make test-zink  tracers, frames and layers on another OpenGL stack, and its pictures beside llvmpipe's   [TESTS=part-of-a-name]"
 	@echo 'make check-sync frames under Vulkan synchronisation validation, to find missing memory barriers'
 	@echo 'make bench      measure, into out/bench.txt and out/bench.json   [BENCH="family reach"; see tests/bench/bench.py]'

@@ -11,6 +11,7 @@ the last time. With CI=true in the environment, a skipped test fails unless EXPE
 FARLIGHT_TEST_SANITIZED=1 leaves out where the sanitizers see little for their time (NOT_SANITIZED).
 FARLIGHT_TEST_STACK=zink runs what depends on the driver on another driver stack than Mesa's default (STACKS): without a
 part of a name what is worth most for its time, with FARLIGHT_TEST_LONG=1 all of it.
+FARLIGHT_TEST_LONG=1 also runs what adds breadth, not another kind of check: LONG, which a part of a name chooses too.
 """
 import collections
 import concurrent.futures
@@ -57,6 +58,13 @@ LONGEST_FIRST = ("test_view", "test_import", "accuracy/sampled_against_reference
                  "contract/rayspace, flat, by spheres, in batches of 256", "test_check_device", "test_poses", "test_quadtree",
                  "test_staying_up", "test_sealed", "test_units")
 
+# Left to FARLIGHT_TEST_LONG=1: forms of a tracer whose settings other rows have in other combinations, or whose answers
+# others hold against brute force: unit/trace/ldc/traversal (all levels, packets and layers one by one), unit/trace/bvh/tracer
+# (packets, the plain form), accuracy/sampled_against_reference (searches), unit/trace/rayspace/reduce and tracer (ways to
+# reduce, too little room), accuracy/quadtree_against_reference (numbers of layers).
+LONG = re.compile(r"contract/(bvh, packets|bvh in the plain|ldc, peeled|ldc by a pyramid|ldc by blocks of (8|32)|abuffer, |rayspace, flat$"
+                  r"|rayspace with|quadtree, of one layer)")
+
 # Driver stacks beside the default one: what chooses it, and what the daemon must then say that it renders with.
 # zink is OpenGL 4.6 over Vulkan, here on lavapipe (mesa-vulkan-drivers).
 Stack = collections.namedtuple("Stack", "environment renderer")
@@ -70,7 +78,7 @@ ON_A_STACK = re.compile(r"accuracy/|contract/|unit/(gpu|gpu_scene|render|trace)/
 LONG_ON_A_STACK = re.compile(
     r"accuracy/(bsdf|sampling|sampled_against_reference|shading_.*|path_light|distributed_light|emitters|energy.*|fireflies|sheen|film"
     r"|depth_of_field|frame_steps)"
-    r"|contract/(bvh, (one ray alone|packets of)|reference, |ldc by|abuffer, |rayspace, flat, by|quadtree, (of one layer|of boxes|texel by texel))"
+    r"|contract/(bvh, one ray alone|reference, |ldc by|rayspace, flat, by|quadtree, of boxes)"
     r"|unit/trace/(abuffer|ldc)/(limits|traversal)|unit/trace/bvh/history"
     r"|test_(render|ldc|abuffer|animate|carousel|light|poses)$")
 # Compares two stacks.
@@ -199,6 +207,8 @@ def tasks(build, names):
                       for row in rows})
     if os.environ.get("FARLIGHT_TEST_SANITIZED"):
         found = {name: task for name, task in found.items() if not NOT_SANITIZED.match(name)}
+    if not names and not os.environ.get("FARLIGHT_TEST_LONG"):
+        found = {name: task for name, task in found.items() if not LONG.match(name)}
     stack = STACKS.get(os.environ.get("FARLIGHT_TEST_STACK"))
     found = {name: task for name, task in found.items()
              if (ON_A_STACK.match(name) if stack else not ONLY_ON_A_STACK.match(name))}
@@ -280,6 +290,9 @@ def run_all(build, names):
 
 
 def main():
+    if len(sys.argv) < 2 or sys.argv[1] in ("-h", "--help"):
+        print(__doc__.strip())
+        return 0
     if sys.argv[1] == MODULE:
         module_main(sys.argv[2])
         return 0
