@@ -9,6 +9,7 @@ import struct
 import subprocess
 import tempfile
 import unittest
+import unittest.mock
 import zlib
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
@@ -19,6 +20,9 @@ TIMEOUT_S = 900  # on a busy machine; sanitizers and software GL together are sl
 # `make test-long` runs what takes minutes and adds breadth, not another kind of check.
 LONG = bool(os.environ.get("FARLIGHT_TEST_LONG"))
 long_test = unittest.skipUnless(LONG, "left to make test-long")
+
+# A picture has one sample where a test says nothing, in place of 16 and more of what is noisy (Case.default_samples).
+os.environ.setdefault("FARLIGHT_SAMPLES", "1")
 
 _bundled = None
 
@@ -240,6 +244,11 @@ class Case(unittest.TestCase):
     def setUp(self):
         self.folder = pathlib.Path(tempfile.mkdtemp(prefix="farlight-test-"))
         self.addCleanup(shutil.rmtree, self.folder, ignore_errors=True)
+
+    def default_samples(self):
+        """For the rest of the test: as many as where no one has said a number."""
+        self.enterContext(unittest.mock.patch.dict(os.environ))
+        del os.environ["FARLIGHT_SAMPLES"]
 
     def expect(self, result, status):
         self.assertEqual(result.returncode, status, f"\nstdout: {result.stdout}\nstderr: {result.stderr}")

@@ -811,6 +811,7 @@ class Progressive(OneDaemon, Animations):
         digest(path)
 
     def test_without_a_number_an_interrupt_is_the_end_and_the_picture_says_how_many_samples_it_has(self):
+        self.default_samples()
         path = self.folder / "p.exr"
         child = subprocess.Popen([BIN / "farlight", "render", bundled_scenes() / "teapot.glb", "-o", path,
                                   *self.ARGUMENTS, "--progressive=2"], stderr=subprocess.PIPE)

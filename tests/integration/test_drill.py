@@ -8,7 +8,7 @@ from farlight_test import BIN, ROOT, Case
 sys.path.insert(0, str(ROOT / "tests/soak"))
 import drill  # pylint: disable=wrong-import-position
 
-ROUNDS = 50
+ROUNDS = 20
 ROUNDS_SANITIZED = 10
 
 

@@ -100,6 +100,7 @@ class Light(Case):
 
     def test_a_picture_has_16_samples_and_more_of_what_is_noisy_by_default(self):
         small = ["--size", "8x6"]
+        self.default_samples()
         self.assertEqual(self.render(*small)[1]["integrator"], "distributed", "as several samples are, where nothing is said")
         for integrator, samples in (("whitted", 16), ("raycast", 16), ("ao", 16), ("path", 64)):
             _, frame = self.render("--integrator", integrator, *small)

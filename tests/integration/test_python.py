@@ -326,6 +326,7 @@ class WithDaemon(OneDaemon):
         return client
 
     def test_pictures_are_the_command_lines_to_the_byte(self):
+        self.default_samples()
         client = self.connect()
         for model, size in (("teapot.glb", (64, 48)), ("sphereflake-2.nff", (48, 32))):
             path = bundled_scenes() / model

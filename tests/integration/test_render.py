@@ -389,6 +389,7 @@ class BadInput(Case):
 
     def test_noise_ends_a_picture_by_its_error_and_tells_how_far_it_is(self):
         wanted = ["--size", "64x48", "--integrator", "path", "--noise", "0.3"]
+        self.default_samples()
         self.expect(farlight("render", bundled_scenes() / "cornell.glb", "-o", self.folder / "whole.exr", *wanted), 0)
         shown = self.shown_by(100, "render", bundled_scenes() / "cornell.glb", "-o", self.folder / "again.exr", *wanted)
         self.assertRegex(shown, rb"error [0-9.]+ %, wanted 30 %")
@@ -396,6 +397,7 @@ class BadInput(Case):
 
     def test_noise_counts_only_what_tiles_need(self):
         """A picture of nothing has 16 samples, however many it might have."""
+        self.default_samples()
         result = self.expect(farlight("render", bundled_scenes() / "teapot.glb", "-o", self.folder / "x.png", "--size", "64x48",
                                       "--eye", "0,90,0", "--look-at", "0,180,1", "--noise", "0.02", "--quiet", "--timings=json"), 0)
         self.assertEqual(json.loads(result.stdout.splitlines()[0])["samples"], 16)
