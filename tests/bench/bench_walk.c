@@ -396,20 +396,4 @@ static void finish(struct bench *bench)
     gpu_device_destroy(bench->device);
 }
 
-BENCH(walk)
-{
-    struct bench bench;
-    struct error error = {0};
-    if (!parse(&bench, argc, argv)) {
-        fputs(usage, stderr);
-        return 2;
-    }
-    bench.device = gpu_device_create(&(struct gpu_options){.index = -1}, &error);
-    bool ok = bench.device && prepare(&bench, &error) && run(&bench, &error);
-    if (!ok)
-        fprintf(stderr, "bench walk: %s%s%s\n", error.field, error.field[0] ? ": " : "", error.text);
-    ok = ok && print(&bench);
-    if (bench.device)
-        finish(&bench);
-    return ok ? 0 : 1;
-}
+BENCH_ON_DEVICE(walk, prepare(&bench, &error) && run(&bench, &error))
