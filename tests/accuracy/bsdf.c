@@ -58,9 +58,10 @@ TEST(sampled_directions_follow_the_stated_density)
  * one stands in: it is off by up to 0.05, and chosen so that no more comes out than went in. */
 TEST(white_materials_send_on_what_arrives_and_no_more)
 {
-    static const float roughnesses[] = {0.0f, 0.05f, 0.15f, 0.3f, 0.5f, 0.7f, 0.85f, 1.0f};
+    static const float roughnesses[] = {0.0f, 0.15f, 0.5f, 1.0f, 0.05f, 0.3f, 0.7f, 0.85f};
     struct albedos albedos = {.min_even = {1, 1}, .min_grain = {1, 1}};
-    visit_materials(*state, roughnesses, COUNT(roughnesses), sum_up, &albedos);
+    visit_materials(*state, roughnesses, COUNT(roughnesses) / (getenv("FARLIGHT_TEST_LONG") ? 1 : 2), sum_up,
+                    &albedos);
     print_message("maximum albedo, less five standard errors: %.5f (%s), of an index of 4 %.5f\n", albedos.max,
                   albedos.where, albedos.max_dense);
     for (int ward = 0; ward < 2; ward++) {

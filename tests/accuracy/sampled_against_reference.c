@@ -101,7 +101,8 @@ static void expect_like_the_reference(struct fixture *fixture, const char *name,
     struct frame_result expected = render(fixture, exact_tracer(), &rows[0], name);
     for (const struct row *row = rows; row < rows + ROWS; row++) {
         const double asked = row->psnr_min[kind];
-        if (asked == 0)
+        if (asked == 0 ||
+            (row->search == ABUFFER_SEARCH_LINEAR1 && !getenv("FARLIGHT_TEST_LONG"))) /* as linear3's */
             continue;
         struct frame_result got = render(fixture, row->tracer, row, name);
         double reached = psnr(&got, &expected);
@@ -243,7 +244,7 @@ TEST(occlusion_of_models_is_like_the_references)
         printf("FARLIGHT_SCENES names no folder of models\n");
         skip();
     }
-    for (size_t i = 0; i < sizeof(models) / sizeof(models[0]); i++) {
+    for (size_t i = 0; i < (getenv("FARLIGHT_TEST_LONG") ? sizeof(models) / sizeof(models[0]) : 1); i++) {
         char path[512];
         struct loaded_model model;
         struct error error = {0};

@@ -334,11 +334,14 @@ static void expect_answers(struct fixture *fixture, const struct scene_row *scen
                             row->seen.layers ? row->seen.wrong_max : row->sampled.wrong_max, RAY_COUNT},
                  any = closest;
     for (uint32_t i = 0; i < RAY_COUNT; i++) {
-        const struct seen_answer seen = fixture_seen(fixture, &fixture->host_rays[i]);
-        hit_count += truth->answers[i].closest.distance >= 0;
+        const struct twin_answer *answer = &truth->answers[i];
+        hit_count += answer->closest.distance >= 0;
         unknown += (hits[i].material & HIT_UNKNOWN) != 0;
-        judge_closest(&closest, fixture, i, &hits[i], &truth->answers[i], &seen);
-        judge_any(&any, fixture, i, visibilities[i], &truth->answers[i], &seen);
+        if (answer->close_call && answer->close_any)
+            continue; /* neither is judged */
+        const struct seen_answer seen = fixture_seen(fixture, &fixture->host_rays[i]);
+        judge_closest(&closest, fixture, i, &hits[i], answer, &seen);
+        judge_any(&any, fixture, i, visibilities[i], answer, &seen);
     }
     free(hits);
     free(visibilities);
