@@ -27,17 +27,19 @@ enum {
     CELLS_ABOUT = 16
 };
 
-static struct bsdf_question questions[DIRECTIONS];
+static struct bsdf_question numbers[NUMBERS], rays[DIRECTIONS]; /* made once */
 static struct bsdf_answer answers[DIRECTIONS];
 
 /* Numbers to choose by, stratified: what their means are off is at most as with independent ones. */
 static inline void ask_numbers(struct bsdf_probe *probe)
 {
-    for (uint32_t i = 0; i < NUMBERS; i++) {
-        sequence_pair(questions[i].v, sequence_seed(1, 0, 7), 1, i);
-        questions[i].v[2] = sequence_number(sequence_seed(1, 0, 7), 2, i);
+    static bool is_made;
+    for (uint32_t i = 0; i < NUMBERS && !is_made; i++) {
+        sequence_pair(numbers[i].v, sequence_seed(1, 0, 7), 1, i);
+        numbers[i].v[2] = sequence_number(sequence_seed(1, 0, 7), 2, i);
     }
-    bsdf_probe_ask(probe, questions, NUMBERS);
+    is_made = true;
+    bsdf_probe_ask(probe, numbers, NUMBERS);
 }
 
 /* Equal steps of the cosine and of the angle about the normal: cells of one solid angle. */
@@ -48,15 +50,17 @@ static inline double cosine_at(double across)
 
 static inline void ask_directions(struct bsdf_probe *probe)
 {
-    for (int a = 0; a < ACROSS; a++)
+    static bool is_made;
+    for (int a = 0; a < ACROSS && !is_made; a++)
         for (int b = 0; b < ABOUT; b++) {
             double z = cosine_at(a + 0.5), sine = sqrt(1.0 - z * z), phi = (b + 0.5) * 2.0 * PI / ABOUT;
-            float *v = questions[a * ABOUT + b].v;
+            float *v = rays[a * ABOUT + b].v;
             v[0] = (float)(sine * cos(phi));
             v[1] = (float)(sine * sin(phi));
             v[2] = (float)z;
         }
-    bsdf_probe_ask(probe, questions, DIRECTIONS);
+    is_made = true;
+    bsdf_probe_ask(probe, rays, DIRECTIONS);
 }
 
 static inline const char *case_name(const struct bsdf_case *c, bool ward)
