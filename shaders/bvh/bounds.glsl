@@ -1,27 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Rays against the bound of an element: spheres (BVH_SPHERES), boxes in floats, or boxes on the tree's grid
 // (BVH_PACKED), whose cells are then the unit of the ray too. All tests only ever err towards a hit.
+#include "tree/minmax.glsl"
 #include "tree/slack.glsl"
-
-// The minimum and the maximum of two; if the first is NaN, the second. Software GL has one instruction for these
-// comparisons, and takes three for min() and max(), which `precise` keeps them from becoming: they are in the critical
-// chain of a traversal step.
-#ifdef SOFTWARE_GL
-float lesser(float a, float b)
-{
-    precise float c = a < b ? a : b;
-    return c;
-}
-
-float greater(float a, float b)
-{
-    precise float c = a > b ? a : b;
-    return c;
-}
-#else
-#define lesser min
-#define greater max
-#endif
 
 // The grid of the traversed tree; without one: 0 and 1.
 struct tree_grid {

@@ -26,9 +26,9 @@ uniform uint level_first[16]; // RAYSPACE_LEVELS: node of each level
 uniform uint level_count[16];
 uniform uint to, later; // the stacks that are written to
 
-// The node is divided while it is wider than a fraction of the element, by that factor (measured best for every wave):
-// what is coarse on both sides costs tests and culls little.
-const float SPLIT_FACTOR = 4.0;
+// The node is divided while it is wider than a fraction of the element, by that factor: what is coarse on both sides
+// costs tests and culls little.
+uniform float split_factor;
 
 bundle bundle_at(uint node)
 {
@@ -51,7 +51,13 @@ bool divides_node(uint level, bundle node, uint link, bounds b)
     if (is_leaf(link))
         return holds_primitives(link);
     float width = node.radius + distance(b.centre, node.centre) * node.tangent;
-    return node.secant == 0.0 || width * SPLIT_FACTOR > b.radius;
+    return node.secant == 0.0 || width * split_factor > b.radius;
+}
+
+// Whether a ray that meets the element goes on alone, as a pair of a ray and a leaf does (rayspace/subtree.glsl).
+bool is_for_one_ray(tree_place tree, uint element, uint link)
+{
+    return is_leaf(link) ? holds_primitives(link) : !tree.is_top && link - element <= RAYSPACE_SUBTREE_MAX;
 }
 
 uint after(uint element, uint link)
@@ -70,7 +76,7 @@ uint kept_count = 0u;
 uint leaf_mask = 0u, far_mask = 0u; // a bit for each
 uint tests = 0u;
 
-void test(uvec4 pair, uint leaf_link, bool is_ray_leaf, bundle b, bounds what)
+void test(uvec4 pair, bool is_ray_leaf, bundle b, bounds what)
 {
     tests++;
     if (!may_meet(b, what))
@@ -80,7 +86,6 @@ void test(uvec4 pair, uint leaf_link, bool is_ray_leaf, bundle b, bounds what)
         pair.w |= RAYSPACE_AGAIN;
         far_mask |= 1u << kept_count;
     } else if (is_ray_leaf) {
-        pair.y = leaf_link;
         leaf_mask |= 1u << kept_count;
     }
     kept[kept_count++] = pair;
@@ -105,7 +110,8 @@ void take(uvec4 pair)
     tree_element element = element_at(tree, pair.y);
     bounds bounds_ = bounds_of(tree, element);
     uint link = element.link, next = pair.y + 1u, end = link;
-    bool itself = again || (level == 0u && holds_primitives(link)), by_node = itself || divides_node(level, b, link, bounds_);
+    bool itself = again || (level == 0u && is_for_one_ray(tree, pair.y, link));
+    bool by_node = itself || divides_node(level, b, link, bounds_);
     if (!by_node && is_leaf(link)) { // an instance: its tree's root is the one child
         made.z = link & BVH_LEAF_FIRST_MASK;
         tree = tree_of(made.z);
@@ -136,11 +142,11 @@ void take(uvec4 pair)
             link = element.link;
             next = after(next, link);
         }
-        bool is_ray_leaf = one.x >> RAYSPACE_LEVEL_SHIFT == 0u && holds_primitives(link);
+        bool is_ray_leaf = one.x >> RAYSPACE_LEVEL_SHIFT == 0u && is_for_one_ray(tree, one.y, link);
 #else
         bool is_ray_leaf = one.x >> RAYSPACE_LEVEL_SHIFT == 0u;
 #endif
-        test(one, link, is_ray_leaf, b, bounds_);
+        test(one, is_ray_leaf, b, bounds_);
     }
     if (!by_node && next < end) // the rest of many children
         kept[kept_count++] = uvec4(pair.xyz, made.w + RAYSPACE_CHILDREN);

@@ -27,8 +27,8 @@ SHARED_SIZE(rayspace_node, 96)
  *   z  instance, RAYSPACE_TOP: the top tree
  *   w  joint descent: how many children of the element have been tested; the rest is to be. RAYSPACE_AGAIN: the
  *      pair was put off, and is itself to be tested again
- * A pair of a ray and a leaf:
- *   x  ray;  y  joint descent: link of the leaf; flat: item;  z  instance;
+ * A pair of a ray and a leaf, or of a ray and a small part of a tree:
+ *   x  ray;  y  joint descent: element; flat: item;  z  instance;
  *   then, once it was tested, z: rank of the nearest primitive, w: its distance, as ordered_bits() */
 #define RAYSPACE_LEVEL_SHIFT 27u
 #define RAYSPACE_INDEX_MASK 0x07ffffffu
@@ -37,6 +37,10 @@ SHARED_SIZE(rayspace_node, 96)
 #define RAYSPACE_PAIR_BYTES 16u
 #define RAYSPACE_CHUNK 4u    /* pairs of an invocation */
 #define RAYSPACE_CHILDREN 4u /* of a pair in a pass: nodes, or elements; more elements wait for the next pass */
+
+/* Elements of a part of a tree that a ray goes through alone, at most: what a dispatch takes has a bound, and
+ * software GL leaves a loop after 65535 rounds. */
+#define RAYSPACE_SUBTREE_MAX 8192u
 
 /* A primitive of an instance has a rank: by the number of the instance, then by its own. Of surfaces at one
  * distance the first by rank is hit. */
@@ -69,7 +73,7 @@ struct rayspace_control {
     uint sort_groups_x, sort_groups_y, sort_groups_z;
     uint turned, sorted;             /* what a sample of the rays has decided */
     float band;                      /* metres; what is farther away from its node than this is put off */
-    uint cone_tests, triangle_tests; /* so far */
+    uint cone_tests, triangle_tests; /* so far; boxes that rays alone were tested against count as cones */
     uint pairs_max, passes, halvings;
     uint left_over;      /* not 0: some batch was not traced to its end */
     uint failed_in_turn; /* passes, up to the last one */
@@ -105,6 +109,7 @@ SHARED_SIZE(rayspace_counts, 48)
 #define BIND_RAYSPACE_COUNTS BIND_PASS_4  /* of count.comp */
 #define BIND_RAYSPACE_ORDER BIND_PASS_4   /* of the sort */
 #define BIND_RAYSPACE_BINS BIND_PASS_2
+#define BIND_RAYSPACE_TIMES BIND_PASS_4 /* of tests of discs and leaves, whose texture units are few */
 #define BIND_RAYSPACE_ITEMS BIND_PASS_4 /* of the pass that makes them */
 /* of the tree: UNIT_TRACER_0 .. 2 */
 #define UNIT_RAYSPACE_NODES UNIT_TRACER_3

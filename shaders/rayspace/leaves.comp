@@ -22,17 +22,15 @@ void main()
     uvec4 pair = leaves[which];
     uint ray = ray_of_place(pair.x);
 #ifdef LEAVES_TEST
-    leaf_range leaf = leaf_of(pair);
-    atomicAdd(control.triangle_tests, leaf.end - leaf.first);
 #ifdef ANY_HIT
-    test_leaf_any(ray, leaf);
+    test_leaf_any(pair, ray);
 #else
-    uvec2 nearest = test_leaf_closest(ray, leaf);
+    uvec2 nearest = test_leaf_closest(pair, ray);
     leaves[which].zw = uvec2(nearest.y, nearest.x);
     answers[ray].y = RAYSPACE_NO_RANK;
-    if (nearest.y != RAYSPACE_NO_RANK)
-        atomicMin(answers[ray].x, nearest.x);
 #endif
+    atomicAdd(control.triangle_tests, triangle_tests);
+    atomicAdd(control.cone_tests, box_tests);
 #elif defined LEAVES_RANK
     if (pair.z != RAYSPACE_NO_RANK && pair.w == answers[ray].x)
         atomicMin(answers[ray].y, pair.z);

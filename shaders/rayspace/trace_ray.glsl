@@ -3,10 +3,11 @@
 //
 // Defines: HAS_MOTION.
 #include "common/candidate.glsl"
+#include "rayspace/layout.h"
 #include "rayspace/ray.glsl"
 
 #ifdef HAS_MOTION
-layout(binding = UNIT_RAY_TIMES) uniform samplerBuffer ray_times;
+layout(std430, binding = BIND_RAYSPACE_TIMES) readonly buffer time_block { float ray_times[]; };
 #endif
 
 trace_ray trace_ray_of(uint ray)
@@ -18,7 +19,7 @@ trace_ray trace_ray_of(uint ray)
     r.t_min = origin_t_min.w;
     r.t_max = direction_t_max.w;
 #ifdef HAS_MOTION
-    r.time = texelFetch(ray_times, int(ray)).x;
+    r.time = ray_times[ray];
 #endif
     return r;
 }
