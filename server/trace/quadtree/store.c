@@ -11,7 +11,8 @@
 #define UNIT_OF_DIAGONAL 0.05f /* where w is 1: slopes of w then have all bits of half floats */
 #define DOUBLED_AT 0.25f       /* diagonals: where bounds that grow with distance are twice as large */
 #define CUBE_TEXELS_MAX 1024u
-#define CUBE_TEXELS_MIN 128u
+#define CUBE_TEXELS_MIN 256u
+#define CUBE_TEXELS_STEP 128u
 
 uint32_t quadtree_layer_count(const struct quadtree_settings *settings)
 {
@@ -89,7 +90,7 @@ static uint32_t cube_texels(const struct trace_view *view, const struct quadtree
         return settings->resolution;
     const float tangent = view->fov_y > 0.0f ? tanf(view->fov_y / 2.0f) : 1.0f;
     const float texels = fminf((float)view->height / tangent / CUBE_PIXELS_A_TEXEL, (float)CUBE_TEXELS_MAX);
-    const uint32_t whole = ((uint32_t)texels + CUBE_TEXELS_MIN / 2) / CUBE_TEXELS_MIN * CUBE_TEXELS_MIN;
+    const uint32_t whole = ((uint32_t)texels + CUBE_TEXELS_STEP / 2) / CUBE_TEXELS_STEP * CUBE_TEXELS_STEP;
     return whole > CUBE_TEXELS_MIN ? whole : CUBE_TEXELS_MIN;
 }
 
