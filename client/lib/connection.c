@@ -12,6 +12,8 @@
 #include <unistd.h>
 
 #define DEFAULT_TIMEOUT_MS 30000u
+/* A killed daemon's connections close before it has ended, which takes a busy machine a while. */
+#define LAST_WORDS_MS 2000
 #define DEFAULT_REMOTE_SOCKET "/run/farlight/farlight.sock"
 
 /* ---- failing ---- */
@@ -27,7 +29,7 @@ bool fl_connection_break(struct fl_connection *connection, struct fl_error *erro
     }
     if (connection->process.pid > 0 && error->code == FL_ERROR_CONNECTION) {
         char words[520];
-        fl_process_last_words(&connection->process, 500, words, sizeof(words));
+        fl_process_last_words(&connection->process, LAST_WORDS_MS, words, sizeof(words));
         const bool is_final = fl_process_has_refused(&connection->process);
         if (words[0] != '\0')
             fl_error_set(error, is_final ? FL_ERROR_SYSTEM : FL_ERROR_CONNECTION, "", "the connection is lost: %s",
