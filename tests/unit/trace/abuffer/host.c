@@ -43,8 +43,14 @@ static struct scene *too_many_for_a_device(void)
 
 ALL_TESTS(open_device, close_device)
 
+/* The host's arithmetic is llvmpipe's. Other drivers add the three parts of a depth in another order, or round a
+ * product and a sum once. Each part may be some times the resolution, and each of three roundings is half a unit
+ * of its 24 bits: 2^-24 * 3 * 72 is 1.3e-5 cells. */
+#define DEPTHS_WITHIN_ELSEWHERE 1e-4f
+
 TEST(host_and_device_make_the_same_runs)
 {
+    const float within = strncmp(device->info.name, "llvmpipe", 8) == 0 ? 0.0f : DEPTHS_WITHIN_ELSEWHERE;
     struct scene *(*const scenes[])(void) = {
         scene_of_bodies_and_others, test_scene_spheres, test_scene_translucent, few_layers, many_layers,
         too_many_for_a_device};
@@ -57,12 +63,12 @@ TEST(host_and_device_make_the_same_runs)
             build_by(&fixture, &by_host, 0, false);
             assert_in_range(by_host.store.sample_count, 1000, UINT32_MAX);
             build_by(&fixture, &by_device, 1, false);
-            expect_same(&by_host, &by_device);
+            expect_same_within(&by_host, &by_device, within);
             contents_free(&by_device);
             for (uint32_t on_device = 0; on_device < 2; on_device++) {
                 struct contents in_steps;
                 build_by(&fixture, &in_steps, on_device, true);
-                expect_same(&by_host, &in_steps);
+                expect_same_within(&by_host, &in_steps, on_device ? within : 0.0f);
                 contents_free(&in_steps);
             }
             contents_free(&by_host);
