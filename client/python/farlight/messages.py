@@ -2028,7 +2028,7 @@ class Render(Message):
     quadtree_layers: surfaces behind one another that are kept at each texel; auto: 3, but 1 where each is a picture of
         its own that is rendered as a whole, for a lens or for frames between others
     quadtree_resolution: texels along a face of the cube, or along the longer side of the picture; auto: as fine as the
-        picture, of a cube half as fine, 256 to 1024
+        picture, of a cube two thirds as fine, 256 to 1024
     quadtree_faces: which surfaces are known
     quadtree_pixels: how far a surface may be from where it is, seen by an eye within `quadtree_radius`
     quadtree_radius: of the sphere round the eye within which `quadtree_pixels` holds
