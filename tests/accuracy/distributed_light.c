@@ -72,8 +72,8 @@ TEST(rough_metal_mirrors_a_lamp_as_its_rays_alone_find_it)
     struct fixture *fixture = *state;
     static const float roughnesses[] = {0.15f, 0.3f, 0.6f, 1.0f};
     for (size_t i = 0; i < COUNT(roughnesses); i++) {
-        const struct mean met = metal_with_a_lamp(fixture, roughnesses[i], false, 32),
-                          both = metal_with_a_lamp(fixture, roughnesses[i], true, 8);
+        const struct mean met = metal_with_a_lamp(fixture, roughnesses[i], false, 64),
+                          both = metal_with_a_lamp(fixture, roughnesses[i], true, 16);
         print_message("roughness %g: met alone %.5f (%.0e), both ways %.5f (%.0e) of a quarter of the samples\n",
                       (double)roughnesses[i], met.value, met.error, both.value, both.error);
         assert_mean(both, met.value, 5.0 * met.error);
@@ -86,7 +86,7 @@ static void what_path_finds(struct fixture *fixture, const char *name, void (*ad
 {
     struct mean means[2];
     for (int path = 0; path < 2; path++) {
-        begin(fixture, path ? INTEGRATOR_PATH : INTEGRATOR_DISTRIBUTED, 8);
+        begin(fixture, path ? INTEGRATOR_PATH : INTEGRATOR_DISTRIBUTED, 16);
         a_floor(fixture, roughness, metallic);
         add(fixture);
         means[path] = mean_of_seeds(fixture, whole);
@@ -194,7 +194,7 @@ TEST(rough_metal_shows_no_specks_of_lamps)
     begin(fixture, INTEGRATOR_PATH, 1);
     a_floor(fixture, 0.3f, 1.0f);
     a_lamp(fixture, 0.05f, 1.0f, true);
-    float *truth = path_render_pixels(fixture, 256, 9); /* its own error adds a sixteenth */
+    float *truth = path_render_pixels(fixture, 1024, 9);
     const double met = noise_of_a_lamp(fixture, 0.05f, false, truth),
                  both = noise_of_a_lamp(fixture, 0.05f, true, truth);
     free(truth);
@@ -210,7 +210,7 @@ TEST(rough_metal_shows_no_specks_of_the_sun)
         begin(fixture, truth ? INTEGRATOR_PATH : INTEGRATOR_DISTRIBUTED, 1);
         a_floor(fixture, 0.3f, 1.0f);
         a_sun(fixture);
-        pictures[truth] = path_render_pixels(fixture, truth ? 256 : 16, truth ? 9 : 1);
+        pictures[truth] = path_render_pixels(fixture, truth ? 1024 : 16, truth ? 9 : 1);
     }
     const double error = error_of(pictures[0], pictures[1]);
     print_message("error of 16 samples, by the mean: %.3f\n", error);

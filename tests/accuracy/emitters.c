@@ -139,7 +139,7 @@ TEST(the_picture_is_that_of_the_rays_that_hit_the_lamps_alone)
             for (int sampled = 0; sampled < 2; sampled++) {
                 path_begin(fixture, tracers[t], 3);
                 a_scene(fixture, kind, sampled);
-                fixture->request.samples = sampled ? 2 : 6;
+                fixture->request.samples = sampled ? 4 : 12;
                 means[sampled] = mean_of_seeds(fixture, whole);
             }
             print_message("%s: met alone %.5f (%.0e), sampled %.5f (%.0e) of a third of the samples\n",
@@ -161,7 +161,7 @@ TEST(stored_samples_show_as_much_light)
         for (int sampled = 0; sampled < 2; sampled++) {
             path_begin(fixture, TRACER_LDC, 3);
             a_scene(fixture, kinds[i], sampled);
-            fixture->request.samples = sampled ? 2 : 6;
+            fixture->request.samples = sampled ? 4 : 12;
             means[sampled] = mean_of_seeds(fixture, whole);
         }
         print_message("ldc, %s: met alone %.5f (%.0e), sampled %.5f (%.0e)\n", kind_names[kinds[i]],
@@ -172,13 +172,13 @@ TEST(stored_samples_show_as_much_light)
 
 /* ---- noise ---- */
 
-/* The mean squared error of 32 samples against the converged picture, in all pixels but those of the lamp, of
+/* The mean squared error of 64 samples against the converged picture, in all pixels but those of the lamp, of
  * which those of its rim and of its texture's edges are dimmer than it is, and noisy however it is sampled. */
 static double noise_of(struct fixture *fixture, enum kind kind, enum place where, bool sampled, const float *truth)
 {
     path_begin(fixture, TRACER_REFERENCE, 3);
     a_scene_with(fixture, kind, where, sampled);
-    float *noisy = path_render_pixels(fixture, 32, 1);
+    float *noisy = path_render_pixels(fixture, 64, 1);
     double sum = 0.0;
     for (uint32_t i = 0; i < PIXELS; i++)
         sum +=
@@ -199,7 +199,7 @@ TEST(lamps_that_are_sampled_have_less_noise)
         path_begin(fixture, TRACER_REFERENCE, 3);
         a_scene_with(fixture, rows[i].kind, rows[i].where, true);
         /* Its own error adds a quarter to that of sampled emissive surfaces, and so makes the test stricter. */
-        float *truth = path_render_pixels(fixture, 128, 77);
+        float *truth = path_render_pixels(fixture, 256, 77);
         const double before = noise_of(fixture, rows[i].kind, rows[i].where, false, truth);
         const double after = noise_of(fixture, rows[i].kind, rows[i].where, true, truth);
         free(truth);

@@ -173,7 +173,7 @@ static struct mean mean_by(struct fixture *fixture, const struct way *way, uint3
 }
 
 /* Of a lamp all integrators ask for the same share. Pixels are not alike, so what is compared are means over the
- * same columns; two lamps leave a choice by chance, which 32 samples even out to 0.15 %. */
+ * same columns; two lamps leave a choice by chance, which 64 samples even out to 0.1 %. */
 TEST(lamps_light_rough_things_alike_in_all_integrators)
 {
     struct fixture *fixture = *state;
@@ -189,7 +189,7 @@ TEST(lamps_light_rough_things_alike_in_all_integrators)
             fixture_light(fixture, LIGHT_POINT, -2.0f, 2.0f, 1.0f, 20.0f);
             for (size_t w = 0; w < COUNT(ways); w++)
                 if (ways[w].brdf == BRDF_GGX)
-                    means[w] = mean_by(fixture, &ways[w], 32).value;
+                    means[w] = mean_by(fixture, &ways[w], 64).value;
             print_message("%s, roughness %.1f: path %.4f, distributed %.4f, whitted %.4f, raycast %.4f\n",
                           compared[k]->name, 0.4 + 0.3 * step, means[0], means[2], means[3], means[4]);
             for (int w = 0; w < (int)COUNT(ways); w++)

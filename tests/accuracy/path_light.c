@@ -122,7 +122,7 @@ TEST(lights_illuminate_a_floor_as_their_closed_forms_say)
                 path_begin(fixture, tracers[t], depth);
                 a_floor(fixture, 1.0f);
                 a_light(fixture, lights[l].kind);
-                fixture->request.samples = 8;
+                fixture->request.samples = 16;
                 closed_form = lights[l].form;
                 struct mean mean = mean_of_seeds(fixture, off_the_form);
                 print_message("%s, tracer %u, %s: off by %+.1e, standard error %.1e\n", lights[l].name, tracers[t],
@@ -176,7 +176,7 @@ TEST(shadow_rays_and_rays_that_go_on_find_the_same_light)
                 else
                     a_glowing_square(fixture, way == 3);
                 fixture->request.brdf = ward ? BRDF_WARD : BRDF_GGX;
-                fixture->request.samples = way == 2 ? 32 : 4; /* what is met alone is noisier */
+                fixture->request.samples = way == 2 ? 32 : 8; /* what is met alone is noisier */
                 ways[way] = mean_of_seeds(fixture, whole);
             }
             print_message(

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """A short run of what `make farm-drill` does: kills at random moments, loading included, lose and change no frame."""
+import os
 import random
 import sys
 
@@ -8,7 +9,7 @@ from farlight_test import BIN, ROOT, Case
 sys.path.insert(0, str(ROOT / "tests/soak"))
 import drill  # pylint: disable=wrong-import-position
 
-ROUNDS = 20
+ROUNDS = 50 if os.environ.get("FARLIGHT_TEST_LONG") else 20
 ROUNDS_SANITIZED = 10
 
 
