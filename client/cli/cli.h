@@ -369,9 +369,6 @@ struct cli_loading {
 bool cli_loading_begin(struct cli_loading *loading, struct fl_error *error);
 /* Waits for the scene. */
 bool cli_loading_end(struct cli_loading *loading, struct fl_error *error);
-/* Whether the job's edits give values, and do not add to them or multiply them: they can be made again in a scene
- * that has them. */
-bool cli_can_edit_again(const struct cli_job *job);
 /* Loads the files again over the same connection: the new scene takes the place of the old one, which stays where
  * that fails. What the daemon has already is not sent. */
 bool cli_loading_again(struct cli_loading *loading, struct fl_error *error);

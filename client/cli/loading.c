@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Loads the command line's scene into a daemon. */
 #include "cli/cli.h"
+#include "cli/watch.h"
 #include "protocol/common/clock.h"
 #include "protocol/plain_text.h"
 
@@ -39,14 +40,6 @@ static bool connect_to(struct cli_loading *loading, struct fl_error *error)
     return loading->connection != NULL;
 }
 
-bool cli_can_edit_again(const struct cli_job *job)
-{
-    for (size_t i = 0; i < job->edit_count; i++)
-        if (job->edits[i].way != FL_ASSIGN)
-            return false;
-    return true;
-}
-
 static void fill_options(struct cli_loading *loading)
 {
     const struct cli_job *job = loading->job;
@@ -64,7 +57,8 @@ static void fill_options(struct cli_loading *loading)
                                              .user = loading,
                                              .sharing = loading->sharing,
                                              .scene_name = loading->scene_name,
-                                             .will_reload = job->watch && cli_can_edit_again(job)};
+                                             .will_reload = job->watch &&
+                                                            cli_watch_can_edit_again(job->edits, job->edit_count)};
 }
 
 static bool start_import(struct cli_loading *loading, struct fl_error *error)

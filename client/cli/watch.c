@@ -148,3 +148,11 @@ void cli_watch_end(struct cli_watch *watch)
         close(watch->fd);
     *watch = (struct cli_watch){0};
 }
+
+bool cli_watch_can_edit_again(const struct fl_assignment *edits, size_t count)
+{
+    for (size_t i = 0; i < count; i++)
+        if (edits[i].way != FL_ASSIGN)
+            return false;
+    return true;
+}

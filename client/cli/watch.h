@@ -39,4 +39,8 @@ bool cli_watch_has_changed(struct cli_watch *watch, uint64_t now_ns);
 bool cli_watch_wait(struct cli_watch *watch, struct fl_connection *connection, struct fl_error *error);
 void cli_watch_end(struct cli_watch *watch);
 
+/* Whether the edits give values, and do not add to them or multiply them: they can be made again in a scene that
+ * has them and whose files are read again. */
+bool cli_watch_can_edit_again(const struct fl_assignment *edits, size_t count);
+
 #endif

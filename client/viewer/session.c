@@ -31,7 +31,8 @@ struct session {
     atomic_bool opened;     /* the thread is at its end */
     struct fl_connection *connection;
     struct fl_scene *scene;
-    bool is_other; /* changed files are another scene, in the place of one that is gone */
+    bool is_read,
+        is_other; /* changed files are in the scene; it is another one, in the place of one that is gone */
     struct fl_error open_error;
 
     pthread_mutex_t lock; /* guards what follows */
@@ -83,17 +84,20 @@ static struct fl_load_options load_options(struct session *session)
                                     .user = session,
                                     .sharing = options->server ? PROTOCOL_SHARING_KEPT : PROTOCOL_SHARING_PRIVATE,
                                     .scene_name = options->server ? session->name : NULL,
-                                    /* Edits that change values by factors would do so once more. */
-                                    .will_reload = options->watch && options->edit_count == 0};
+                                    .will_reload = options->watch &&
+                                                   cli_watch_can_edit_again(options->edits, options->edit_count)};
+}
+
+static bool apply_edits(const struct session_options *options, struct fl_scene *scene, struct fl_error *error)
+{
+    return options->edit_count == 0 || fl_scene_edit(scene, options->edits, options->edit_count, NULL, error);
 }
 
 static struct fl_scene *load(struct session *session, struct fl_error *error)
 {
-    const struct session_options *options = &session->options;
     const struct fl_load_options wanted = load_options(session);
     struct fl_scene *scene = fl_scene_load(session->connection, &wanted, error);
-    if (!scene || options->edit_count == 0 ||
-        fl_scene_edit(scene, options->edits, options->edit_count, NULL, error))
+    if (!scene || apply_edits(&session->options, scene, error))
         return scene;
     fl_scene_destroy(scene);
     return NULL;
@@ -141,11 +145,10 @@ static void *read_again(void *argument)
     struct session *session = argument;
     struct fl_scene *before = session->scene;
     const struct fl_load_options wanted = load_options(session);
-    const bool has_edits = session->options.edit_count > 0;
-    struct fl_scene *scene =
-        has_edits ? load(session, &session->open_error) : fl_scene_reload(before, &wanted, &session->open_error);
-    if (scene && has_edits)
-        fl_scene_destroy(before);
+    struct fl_scene *scene = fl_scene_reload(before, &wanted, &session->open_error);
+    session->is_read = scene != NULL;
+    if (scene)
+        apply_edits(&session->options, scene, &session->open_error);
     session->is_other = scene && scene != before;
     if (session->is_other)
         strcpy(session->kept_name, session->name);
@@ -206,16 +209,16 @@ static void take_other(struct session *session)
     session->times_live++;
 }
 
-/* A file that cannot be read leaves everything as it was. */
+/* A file that cannot be read leaves everything as it was; edits that are refused leave what was read. */
 static bool end_reading(struct session *session)
 {
     const struct fl_error *error = &session->open_error;
     session->reads = false;
     if (error->code == FL_ERROR_CONNECTION || error->code == FL_ERROR_INTERRUPTED)
         return false;
-    if (error->code == FL_ERROR_NONE)
+    if (session->is_read)
         session->times_read++;
-    else if (session->options.stale)
+    if (error->code != FL_ERROR_NONE && session->options.stale)
         session->options.stale(session->options.user, error);
     if (session->is_other)
         take_other(session);

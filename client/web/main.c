@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* farlight-web: a page in a browser that shows a model, or a shared scene of a daemon. */
 #include "cli/sharing.h"
+#include "cli/watch.h"
 #include "lib/text.h"
 #include "web/gateway.h"
 #include "protocol/version.h"
@@ -194,7 +195,8 @@ static bool complete(struct command_line *line, struct fl_error *error)
         return fl_error_remedy(error, job->server ? "'farlight scenes' lists the daemon's scenes"
                                                   : "farlight-web model.glb");
     }
-    if (job->watch && !cli_can_edit_again(job)) /* its scene keeps its name, and stays */
+    if (job->watch &&
+        !cli_watch_can_edit_again(job->edits, job->edit_count)) /* its scene keeps its name, and stays */
         cli_usage(job, "--watch", "an --edit that adds or multiplies would do so each time: assign a value");
     if (job->error.code != FL_ERROR_NONE || !cli_check_watch(job) || !cli_job_complete_view(job) ||
         !cli_check_models(job, &job->error)) {

@@ -142,7 +142,8 @@ class Editing(Viewer):
         self.assertIn("no material 'nothing'", self.errors)
 
     def test_what_changes_in_the_file_is_sent_alone_and_the_view_goes_on(self):
-        """Camera, clip, selection and undo are kept, and so are edits of what the file does not change."""
+        """Camera, clip, selection and undo are kept, and so are edits of what the file does not change; the command line's
+        are made again."""
         model = self.folder / "carousel.glb"
         shutil.copy(bundled_scenes() / "carousel.glb", model)
 
@@ -155,7 +156,8 @@ class Editing(Viewer):
                   {"state": "before"}, {"wait": "change"}, {"state": "changed"}, rest(2), {"screenshot": "after.png"}, {"state": "after"},
                   {"key": "z"}, rest(2), {"state": "undone"}]
         with Daemon() as daemon, Relay(daemon.path, self.folder / "relay") as relay:
-            process = self.start(events, model, "--watch", "--headless", "--server", f"unix:{self.folder}/relay", *QUICK, scene=None)
+            process = self.start(events, model, "--watch", "--edit", "material.*.roughness=0.25", "--headless",
+                                 "--server", f"unix:{self.folder}/relay", *QUICK, scene=None)
             states = [json.loads(process.stdout.readline()) for _ in range(2)]
             first = relay.sent
             change_model(model, model, repaint)
@@ -172,6 +174,7 @@ class Editing(Viewer):
         self.assertGreater(difference(self.folder / "before.png", self.folder / "after.png"), 5)
         self.assertIn("carousel.glb is read again; sent 0.000 of", changed["notice"])
         self.assertNotEqual(after["edit"]["fields"]["base_colour"], picked["edit"]["fields"]["base_colour"])
+        self.assertEqual(after["edit"]["fields"]["roughness"], [0.25])
         self.assertEqual(undone["edit"]["fields"], picked["edit"]["fields"])
 
     def test_two_viewers_see_what_the_other_one_changes(self):
