@@ -4,6 +4,7 @@
 #include "base/progress.h"
 
 #include <pthread.h>
+#include <sched.h>
 #include <stdatomic.h>
 #include <unistd.h>
 
@@ -45,6 +46,8 @@ void parallel_run(unsigned threads, uint32_t count, void (*work)(void *context, 
 
 unsigned parallel_processors(void)
 {
-    long processors = sysconf(_SC_NPROCESSORS_ONLN);
-    return processors < 1 ? 1 : (unsigned)processors;
+    cpu_set_t set;
+    if (sched_getaffinity(0, sizeof(set), &set) != 0) /* there are more than a set has room for */
+        return (unsigned)sysconf(_SC_NPROCESSORS_ONLN);
+    return (unsigned)CPU_COUNT(&set);
 }

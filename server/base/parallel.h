@@ -8,7 +8,7 @@
 /* Calls work(context, i) for i in 0 .. count - 1 from up to `threads` threads (at most 64), of which the caller is
  * one, and returns when all is done. With one thread, or where none can be started, the caller does it all. */
 void parallel_run(unsigned threads, uint32_t count, void (*work)(void *context, uint32_t i), void *context);
-/* The number of processors, at least 1. */
+/* The number of processors that this process may use, at least 1. */
 unsigned parallel_processors(void);
 
 #endif
