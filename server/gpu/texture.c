@@ -141,6 +141,11 @@ void gpu_texture_bind(const struct gpu_texture *texture, unsigned unit)
     glBindTextureUnit(unit, texture->name);
 }
 
+void gpu_texture_bind_image(const struct gpu_texture *texture, unsigned unit)
+{
+    glBindImageTexture(unit, texture->name, 0, GL_TRUE, 0, GL_READ_ONLY, texture->internal_format);
+}
+
 static bool create_framebuffer(struct gpu_device *device, struct gpu_framebuffer *framebuffer, struct error *error)
 {
     framebuffer->name = gpu_object_create(device->registry, GPU_FRAMEBUFFER);

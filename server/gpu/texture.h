@@ -29,6 +29,8 @@ void gpu_texture_write_rows(struct gpu_texture *texture, unsigned format, unsign
                             uint32_t rows, const void *texels);
 void gpu_texture_finish(struct gpu_device *device, struct gpu_texture *texture);
 void gpu_texture_bind(const struct gpu_texture *texture, unsigned unit);
+/* An array, to read. */
+void gpu_texture_bind_image(const struct gpu_texture *texture, unsigned unit);
 
 struct gpu_framebuffer {
     unsigned name;

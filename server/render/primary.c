@@ -143,7 +143,7 @@ static bool make_rays(const struct primary *primary, struct render_context *cont
         return false;
     context_bind(context);
     if (primary) {
-        gpu_texture_bind(&primary->visible, UNIT_PASS_0);
+        gpu_texture_bind_image(&primary->visible, IMAGE_VISIBLE);
         gpu_uniform_uint(program, "first_row", primary->first_row);
     }
     gpu_buffer_bind_storage(&context->rays, BIND_RAYS);
@@ -304,6 +304,6 @@ void primary_announce(struct render_context *context, bool rasterised)
         (void)fill_program(context, NULL);
     } else {
         const struct wave wave = camera_wave(context);
-        wave_announce(context, &wave, true);
+        wave_announce(context, &wave);
     }
 }

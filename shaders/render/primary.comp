@@ -35,7 +35,8 @@ layout(std430, binding = BIND_RAY_TIMES) writeonly buffer time_block { float tim
 #endif
 #ifdef VISIBILITY
 layout(std430, binding = BIND_HITS) writeonly buffer hit_block { uvec4 hits[]; }; // HIT_TEXELS each
-layout(binding = UNIT_PASS_0) uniform usampler2DArray visible_primitives; // a layer for each of the current samples
+// A layer for each of the current samples. An image, as llvmpipe compiles later programs for the state of a sampler, too.
+layout(binding = IMAGE_VISIBLE, rg32ui) readonly uniform uimage2DArray visible_primitives;
 uniform uint first_row; // of the picture in them
 #endif
 
@@ -86,7 +87,7 @@ void main()
 #ifdef VISIBILITY
     uvec2 visible = uvec2(VISIBLE_NOTHING, 0u);
     if (in_picture)
-        visible = texelFetch(visible_primitives, ivec3(pixel - uvec2(0u, first_row), sample_), 0).xy;
+        visible = imageLoad(visible_primitives, ivec3(pixel - uvec2(0u, first_row), sample_)).xy;
     // Of misses layers.comp looks at the flags of the material, too.
     hits[HIT_TEXELS * k] = uvec4(floatBitsToUint(visible.x != VISIBLE_NOTHING ? 0.0 : -1.0), 0u, visible.y,
                                  visible.x == VISIBLE_DISC ? HIT_NO_PRIMITIVE : visible.x - 1u);

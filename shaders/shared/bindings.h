@@ -21,6 +21,7 @@
 
 /* image units */
 #define IMAGE_HITS 0
+#define IMAGE_VISIBLE 0   /* primary.comp */
 #define IMAGE_POSITIONS 0 /* deform.comp */
 #define IMAGE_NORMALS 1
 #define IMAGE_TANGENTS 2
