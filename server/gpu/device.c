@@ -84,12 +84,14 @@ static void ask_facts(struct gpu_facts *facts, bool software, bool robust, bool 
     GLint groups = 0, time_stamp_bits = 0;
     glGetQueryiv(GL_TIMESTAMP, GL_QUERY_COUNTER_BITS, &time_stamp_bits);
     glGetIntegeri_v(GL_MAX_COMPUTE_WORK_GROUP_COUNT, 0, &groups);
+    const bool compiles_at_dispatch = strncmp((const char *)glGetString(GL_RENDERER), "llvmpipe", 8) == 0;
     *facts = (struct gpu_facts){
         .software = software,
         .robust = robust,
         .debug_output = debug,
         .has_program_binary = get_integer(GL_NUM_PROGRAM_BINARY_FORMATS) > 0,
-        .compiles_together = epoxy_has_gl_extension("GL_KHR_parallel_shader_compile"),
+        .compiles_together = !compiles_at_dispatch && epoxy_has_gl_extension("GL_KHR_parallel_shader_compile"),
+        .compiles_at_dispatch = compiles_at_dispatch,
         .fetches_framebuffer = epoxy_has_gl_extension("GL_EXT_shader_framebuffer_fetch"),
         .time_stamp_bits = (uint32_t)time_stamp_bits,
         .storage_block_bytes_max = get_integer(GL_MAX_SHADER_STORAGE_BLOCK_SIZE),

@@ -22,15 +22,24 @@ struct gpu_device_info {
     char drm_path[64]; /* "" if the driver tells none */
 };
 
+#define GPU_TEXEL_UNITS 32
+
+/* Of the buffer textures that frames bind to units, by unit: GL_RGBA8 .., or 0: four floats or words a texel. A
+ * sampler of the other kind of numbers at the unit has these four, too. */
+struct gpu_texel_formats {
+    unsigned of_unit[GPU_TEXEL_UNITS];
+};
+
 /* Facts asked once. */
 struct gpu_facts {
     bool software; /* llvmpipe and the like: SSBO loads are gathers, dispatches are synchronous */
     bool robust;   /* context tells of its loss */
     bool debug_output;
     bool has_program_binary;
-    bool compiles_together;   /* the driver compiles several programs at a time, in threads of its own */
-    bool fetches_framebuffer; /* fragments read what is in their place: GL_EXT_shader_framebuffer_fetch */
-    uint32_t time_stamp_bits; /* 0: the device does not measure its time */
+    bool compiles_together;    /* the driver compiles several programs at a time, in threads of its own */
+    bool compiles_at_dispatch; /* llvmpipe: a compute program, and for the formats of what is bound */
+    bool fetches_framebuffer;  /* fragments read what is in their place: GL_EXT_shader_framebuffer_fetch */
+    uint32_t time_stamp_bits;  /* 0: the device does not measure its time */
     uint64_t texture_buffer_texels_max;
     uint64_t storage_block_bytes_max;
     uint32_t work_groups_max;  /* on x; more is a GL error */
@@ -59,13 +68,14 @@ struct gpu_unseen {
 struct gpu_device {
     struct gpu_device_info info;
     struct gpu_facts facts;
-    struct gpu_egl *egl;                /* private to device.c */
-    struct gpu_registry *registry;      /* every GL object that lives, see registry.h */
-    struct gpu_program_cache *programs; /* private to program.c */
-    struct gpu_binary_cache *binaries;  /* on the disk; NULL: none are kept */
-    struct gpu_ahead *ahead;            /* compiles programs before their first use */
-    bool announces;                     /* see gpu_program_announce */
-    unsigned empty_buffer;              /* zeros, bound in place of an empty buffer */
+    struct gpu_egl *egl;                           /* private to device.c */
+    struct gpu_registry *registry;                 /* every GL object that lives, see registry.h */
+    struct gpu_program_cache *programs;            /* private to program.c */
+    struct gpu_binary_cache *binaries;             /* on the disk; NULL: none are kept */
+    struct gpu_ahead *ahead;                       /* compiles programs before their first use */
+    bool announces;                                /* see gpu_program_announce */
+    const struct gpu_texel_formats *texel_formats; /* NULL: nothing was announced */
+    unsigned empty_buffer;                         /* zeros, bound in place of an empty buffer */
     struct gpu_uniform_ring uniform_ring;
     struct gpu_unseen unseen;
     const char *misused_uniform;  /* one that was given a value of another type; NULL: none */

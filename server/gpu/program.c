@@ -199,20 +199,30 @@ static const struct gpu_program *create_program(struct gpu_device *device, const
     return &program->program;
 }
 
-/* A program that is on the disk is not compiled, as it is loaded in no time. Software GL compiles at a program's
- * first dispatch, and hardly anything before: contexts for it cost more than they gain. */
+/* What llvmpipe compiles at a dispatch it hands over on the disk. Other software GL compiles hardly anything
+ * before a program is used: contexts for it cost more than they gain. */
+static bool compiles_ahead(const struct gpu_device *device)
+{
+    const struct gpu_facts *facts = &device->facts;
+    const bool gains = facts->compiles_at_dispatch ? device->binaries != NULL : !facts->software;
+    return gains && facts->has_program_binary && !device->compiles;
+}
+
+/* A program that is on the disk is not compiled, as it is loaded in no time. */
 static void announce(struct gpu_device *device, const struct gpu_program_source *source, const struct key *key)
 {
     struct gpu_build build;
-    if (device->facts.software || !device->facts.has_program_binary || device->compiles ||
-        gpu_ahead_knows(device->ahead, key->text) || !gpu_build_prepare(&build, device, source, NULL))
+    if (!compiles_ahead(device) || gpu_ahead_knows(device->ahead, key->text) ||
+        !gpu_build_prepare(&build, device, source, NULL))
         return;
     gpu_ahead_add(device->ahead, key->text, &build, !gpu_binary_is_there(device->binaries, &build.key));
 }
 
-void gpu_program_announce(struct gpu_device *device, bool begin)
+void gpu_program_announce(struct gpu_device *device, const struct gpu_texel_formats *formats)
 {
-    device->announces = begin;
+    device->announces = formats != NULL;
+    if (formats)
+        device->texel_formats = formats;
 }
 
 const struct gpu_program *gpu_program_get(struct gpu_device *device, const struct gpu_program_source *source,

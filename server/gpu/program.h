@@ -37,10 +37,11 @@ struct gpu_program {
 const struct gpu_program *gpu_program_get(struct gpu_device *device, const struct gpu_program_source *source,
                                           struct error *error);
 
-/* Between true and false, gpu_program_get() only announces a program: it returns NULL without an error, and
+/* Between formats and NULL, gpu_program_get() only announces a program: it returns NULL without an error, and
  * threads compile the program if the device does not have it (gpu/program_ahead.h). A later gpu_program_get()
- * returns it. Announce programs in the order of their need, and none that may not be needed. */
-void gpu_program_announce(struct gpu_device *device, bool begin);
+ * returns it. Announce programs in the order of their need, and none that may not be needed. The formats must live
+ * as long as the device. */
+void gpu_program_announce(struct gpu_device *device, const struct gpu_texel_formats *formats);
 
 /* A program that the device has, for the device check. */
 struct gpu_program_stat {

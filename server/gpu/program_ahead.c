@@ -1,17 +1,24 @@
 /* SPDX-License-Identifier: MIT */
 #include "gpu/program_ahead.h"
 
+#include "base/clock.h"
+#include "base/parallel.h"
 #include "gpu/egl.h"
+#include "gpu/program_rehearse.h"
 
 #include <epoxy/gl.h>
 #include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 
 /* Compilers are single threads. More would need more memory and gain little: a frame has a few large programs. */
 #define THREADS_MAX 2
 /* Of a driver that compiles several together. */
 #define TOGETHER_MAX 32
+/* Mesa writes what it has compiled in a thread of its own, which takes some milliseconds. */
+#define WRITTEN_NS UINT64_C(8000000)
+#define NS_PER_S UINT64_C(1000000000)
 
 enum state { WAITING, BEGUN, DONE };
 
@@ -20,7 +27,8 @@ struct item {
     struct gpu_build build;
     struct gpu_binary binary;
     enum state state;
-    char key[]; /* files and defines */
+    uint64_t rehearsed_ns; /* 0: it was not */
+    char key[];            /* files and defines */
 };
 
 struct worker {
@@ -56,11 +64,16 @@ static void end_item(struct gpu_ahead *ahead, struct item *item, GLuint program)
 {
     struct gpu_binary binary = {0};
     const bool good = gpu_build_end(&item->build, program, NULL) && gpu_build_binary(&binary, program);
+    const bool rehearses =
+        good && ahead->device->facts.compiles_at_dispatch && item->build.stages[0].type == GL_COMPUTE_SHADER;
+    if (rehearses)
+        gpu_program_rehearse(ahead->device->texel_formats, program);
     glDeleteProgram(program);
     if (good)
         gpu_binary_write(ahead->device->binaries, &item->build.key, &binary);
     pthread_mutex_lock(&ahead->lock);
     item->binary = binary;
+    item->rehearsed_ns = rehearses ? clock_now_ns() : 0;
     item->state = DONE;
     pthread_cond_broadcast(&ahead->changed);
     pthread_mutex_unlock(&ahead->lock);
@@ -167,6 +180,15 @@ static void start(struct worker *worker)
         pthread_setname_np(worker->thread, "compile");
 }
 
+static size_t thread_count(const struct gpu_facts *facts)
+{
+    if (facts->compiles_together)
+        return 1;
+    /* Beside the device's thread, which compiles, too, where that happens at a dispatch. */
+    const size_t count = facts->compiles_at_dispatch ? parallel_processors() - 1 : THREADS_MAX;
+    return count < THREADS_MAX ? count : THREADS_MAX;
+}
+
 void gpu_ahead_add(struct gpu_ahead *ahead, const char *key, struct gpu_build *build, bool compiles)
 {
     const size_t key_bytes = strlen(key) + 1;
@@ -181,7 +203,7 @@ void gpu_ahead_add(struct gpu_ahead *ahead, const char *key, struct gpu_build *b
     pthread_mutex_lock(&ahead->lock);
     *ahead->end = item;
     ahead->end = &item->next;
-    const size_t threads = !compiles ? 0 : ahead->device->facts.compiles_together ? 1 : THREADS_MAX;
+    const size_t threads = compiles ? thread_count(&ahead->device->facts) : 0;
     for (size_t i = 0; i < threads; i++)
         start(&ahead->workers[i]);
     pthread_mutex_unlock(&ahead->lock);
@@ -195,6 +217,15 @@ size_t gpu_ahead_left(struct gpu_ahead *ahead)
         count++;
     pthread_mutex_unlock(&ahead->lock);
     return count;
+}
+
+/* What was waited for is on the disk a little later; all else has been there for long. */
+static void let_write(const struct item *item)
+{
+    const uint64_t end_ns = item->rehearsed_ns + WRITTEN_NS;
+    const struct timespec end = {(time_t)(end_ns / NS_PER_S), (long)(end_ns % NS_PER_S)};
+    if (item->rehearsed_ns)
+        (void)clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &end, NULL);
 }
 
 bool gpu_ahead_take(struct gpu_ahead *ahead, const char *key, struct gpu_build *build, struct gpu_binary *binary)
@@ -211,6 +242,7 @@ bool gpu_ahead_take(struct gpu_ahead *ahead, const char *key, struct gpu_build *
     pthread_mutex_unlock(&ahead->lock);
     if (!item)
         return false;
+    let_write(item);
     *build = item->build;
     *binary = item->binary;
     free(item);

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* Compiles programs before their first use, by threads with GL contexts of their own on the device's display.
  * These contexts share no objects with the device's: a thread hands over the binary, and the device's thread loads
- * it like one from the disk. So a thread's context that fails leaves the device's as it is.
+ * it like one from the disk. So a thread's context that fails leaves the device's as it is. The code that llvmpipe
+ * makes of a program at its first dispatch is handed over by Mesa's own cache: see program_rehearse.h.
  *
  * The threads and their contexts exist only while there are programs to compile. Where the driver gives no further
  * contexts or no binaries, nothing is compiled ahead. */

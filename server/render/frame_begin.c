@@ -10,7 +10,9 @@
 #include "render/frame_request.h"
 #include "render/ground.h"
 #include "render/pixel_filter.h"
+#include "shared/bindings.h"
 
+#include <epoxy/gl.h>
 #include <math.h>
 #include <string.h>
 
@@ -317,22 +319,31 @@ static void limit_samples(const struct frame_renderer *renderer, struct frame_re
     request->samples = request->samples < lacking ? request->samples : lacking;
 }
 
+static const struct gpu_texel_formats texel_formats = {.of_unit = {[UNIT_TANGENTS] = GL_R32UI,
+                                                                   [UNIT_COLOURS] = GL_RGBA8,
+                                                                   [UNIT_SPHERE_MATERIALS] = GL_R32UI,
+                                                                   [UNIT_TEXELS] = GL_RGBA8,
+                                                                   [UNIT_SHADE_ENVIRONMENT] = GL_R32F,
+                                                                   [UNIT_RAY_TIMES] = GL_R32F}};
+
 /* Threads compile while this one goes on. */
 static void announce_programs(struct frame_renderer *renderer)
 {
     struct render_context *context = &renderer->work->context;
     struct wave_passes *passes = &renderer->work->passes;
-    gpu_program_announce(renderer->device, true);
-    /* What takes longest begins first; the rest is in the order of its use. */
+    gpu_program_announce(renderer->device, &texel_formats);
+    /* What takes longest begins first; the rest is in the order of its use. Software GL compiles in this thread,
+     * too, where it uses a program: what it needs first is left to it. */
     if (frame_is_eyes_pass(renderer)) {
         frame_key_announce(renderer);
     } else {
         wave_passes_announce_shadows(passes, context);
-        primary_announce(context, renderer->rasterise);
+        if (!renderer->device->facts.software || !renderer->rasterise)
+            primary_announce(context, renderer->rasterise);
         wave_passes_announce(passes, context);
     }
     picture_announce(renderer->target, context);
-    gpu_program_announce(renderer->device, false);
+    gpu_program_announce(renderer->device, NULL);
 }
 
 /* Once its tracers are what the scene is. */

@@ -301,13 +301,10 @@ enum wave_progress wave_passes_shade(struct wave_passes *passes, struct render_c
 
 void wave_passes_announce_shadows(struct wave_passes *passes, struct render_context *context)
 {
-    /* Towards points on a light that each hit chooses for itself they go all ways. */
-    const bool coherent = passes->integrator->shadows_together && !context->features.area_lights &&
-                          !context_samples_emitters(context);
     const struct wave shadows = {.kind = WAVE_ANY,
                                  .times = context->scene->has_motion ? &passes->shadow_times : NULL};
     if (ground_shadow_rays(context, passes->integrator) > 0)
-        wave_announce(context, &shadows, coherent);
+        wave_announce(context, &shadows);
 }
 
 static void announce_bounces(struct wave_passes *passes, struct render_context *context)
@@ -315,7 +312,7 @@ static void announce_bounces(struct wave_passes *passes, struct render_context *
     const struct wave bounces = {.kind = WAVE_CLOSEST, .times = context_ray_times(context)};
     context->sampled_hits = context->tracer->impl->sampled;
     (void)move_program(context, NULL);
-    wave_announce(context, &bounces, false);
+    wave_announce(context, &bounces);
     (void)shade_program(passes, context, NULL);
 }
 

@@ -58,12 +58,12 @@ bool wave_trace(struct render_context *context, enum ray_kind kind, const struct
     return progress != TRACER_FAILED;
 }
 
-void wave_announce(struct render_context *context, const struct wave *wave, bool coherent)
+void wave_announce(struct render_context *context, const struct wave *wave)
 {
     struct wave own = *wave;
     own.ray_count = context->wave_capacity;
     if (!context->counts_on_host)
         own.counts = &context->wave_state;
     if (!context->comparison)
-        tracer_announce(context->tracer, context->scene, &own, coherent);
+        tracer_announce(context->tracer, context->scene, &own);
 }

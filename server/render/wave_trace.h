@@ -16,7 +16,7 @@
 bool wave_trace(struct render_context *context, enum ray_kind kind, const struct wave *wave, bool *done,
                 struct error *error);
 
-/* Announces the programs that such a wave needs. `coherent`: its rays go side by side. */
-void wave_announce(struct render_context *context, const struct wave *wave, bool coherent);
+/* Announces the programs that such a wave needs. */
+void wave_announce(struct render_context *context, const struct wave *wave);
 
 #endif

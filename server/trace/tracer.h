@@ -187,8 +187,8 @@ struct tracer_impl {
     enum tracer_progress (*trace_step)(struct tracer *tracer, struct gpu_scene *scene, struct trace_state *state,
                                        uint64_t step_end_ns, struct error *error);
     /* Gets the programs that such a wave needs, to announce them (gpu_program_announce), but no others.
-     * `coherent`: its rays go side by side. NULL: nothing is announced. */
-    void (*announce)(struct tracer *tracer, struct gpu_scene *scene, const struct wave *wave, bool coherent);
+     * NULL: nothing is announced. */
+    void (*announce)(struct tracer *tracer, struct gpu_scene *scene, const struct wave *wave);
     /* Turns the intersections of these rays of a WAVE_CLOSEST into hits, in place: what the shading reads of a
      * surface. NULL: an intersection names a primitive of the scene, and trace_surfaces() (trace/program.h) does
      * it. Sampled tracers run a program of their own, shaders/<tracer>/surface.comp. */
@@ -296,7 +296,7 @@ bool tracer_eye_hits(struct tracer *tracer, struct gpu_scene *scene, struct trac
                      const struct eye_rays *rays, struct error *error);
 
 /* Announces the programs of such a wave (gpu_program_announce), of which the buffers may be missing. */
-void tracer_announce(struct tracer *tracer, struct gpu_scene *scene, const struct wave *wave, bool coherent);
+void tracer_announce(struct tracer *tracer, struct gpu_scene *scene, const struct wave *wave);
 
 /* ---- tracing at once, with a state of the tracer's own: tests, benchmarks, comparisons ---- */
 

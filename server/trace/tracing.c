@@ -228,12 +228,12 @@ enum tracer_progress tracer_trace_step(struct tracer *tracer, struct gpu_scene *
     return TRACER_FAILED;
 }
 
-void tracer_announce(struct tracer *tracer, struct gpu_scene *scene, const struct wave *wave, bool coherent)
+void tracer_announce(struct tracer *tracer, struct gpu_scene *scene, const struct wave *wave)
 {
     const struct ray_range rays = {.wave = wave, .end = wave->ray_count};
     if (!tracer->impl->announce)
         return;
-    tracer->impl->announce(tracer, scene, wave, coherent);
+    tracer->impl->announce(tracer, scene, wave);
     (void)make_surfaces(tracer, scene, &rays, NULL);
 }
 

@@ -299,6 +299,22 @@ class Outputs(OneDaemon):
         self.assertEqual(len(pictures), 4, "frames of an orbit must differ")
 
 
+class FirstPicture(Case):
+    def test_what_other_processors_compile_is_not_compiled_again(self):
+        """Software GL hands code over in the files of its cache: as many as where one processor compiles all."""
+        files, pictures = [], []
+        for name, processors in (("one", {min(os.sched_getaffinity(0))}), ("all", os.sched_getaffinity(0))):
+            cache, picture = self.folder / name, self.folder / f"{name}.png"
+            result = farlight("render", bundled_scenes() / "teapot.glb", "-o", picture, "--size", "80x60", "--integrator", "path",
+                              env={**os.environ, "XDG_CACHE_HOME": str(cache)},
+                              preexec_fn=lambda own=processors: os.sched_setaffinity(0, own))
+            self.expect(result, 0)
+            files.append(sum(path.is_file() for path in cache.glob("mesa_shader_cache/**/*")))
+            pictures.append(picture.read_bytes())
+        self.assertEqual(*files)
+        self.assertEqual(*pictures)
+
+
 class BadInput(Case):
     def refused(self, status, *arguments, says=()):
         result = self.expect(farlight(*arguments), status)

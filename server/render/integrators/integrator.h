@@ -18,7 +18,6 @@ struct integrator {
     /* These three say only what is compiled ahead: */
     bool always_bounces;     /* hits of any material may have children, unless the depth is 0 */
     bool mirrors;            /* hits of scene_features.mirrors have children */
-    bool shadows_together;   /* shadow rays of neighbouring hits usually go side by side */
     bool meets_lights;       /* rays hit area lights, by their weights */
     uint32_t shadow_waves;   /* how many waves of shadow rays the buffers hold; no more are traced at once */
     uint32_t straight_waves; /* waves beyond the depth that are left to rays which go straight on */

@@ -218,11 +218,9 @@ static bool abuffer_trace_range(struct tracer *tracer, struct gpu_scene *scene, 
     return abuffer_intersect(&((struct abuffer *)tracer)->store, scene, rays, &tracer->options, error);
 }
 
-static void abuffer_announce(struct tracer *tracer, struct gpu_scene *scene, const struct wave *wave,
-                             bool coherent)
+static void abuffer_announce(struct tracer *tracer, struct gpu_scene *scene, const struct wave *wave)
 {
     const struct ray_range rays = {.wave = wave, .end = wave->ray_count};
-    (void)coherent;
     (void)abuffer_intersect(&((struct abuffer *)tracer)->store, scene, &rays, &tracer->options, NULL);
 }
 

@@ -118,13 +118,13 @@ static bool measure_coherence(struct bvh *bvh, const struct gpu_scene *scene, co
     return true;
 }
 
-uint32_t bvh_packet_rays_expected(struct bvh *bvh, const struct wave *wave, bool coherent)
+uint32_t bvh_packet_rays_expected(struct bvh *bvh, const struct wave *wave)
 {
     const struct tracer_options *options = &bvh->base.options;
     const bool measured = bvh->base.device->facts.software && wave->ray_count >= COHERENCE_RAYS_MIN &&
                           options->bench.bvh_layout != BVH_LAYOUT_PLAIN && options->bvh.rays == 0;
     if (measured)
-        return coherent ? 0 : 1;
+        return wave->shared_origin ? PACKET_RAYS_SOFTWARE : 1;
     return options->bvh.rays ? options->bvh.rays : 1;
 }
 

@@ -274,13 +274,10 @@ static bool bvh_trace_range(struct tracer *tracer, struct gpu_scene *scene, stru
     return true;
 }
 
-static void bvh_announce(struct tracer *tracer, struct gpu_scene *scene, const struct wave *wave, bool coherent)
+static void bvh_announce(struct tracer *tracer, struct gpu_scene *scene, const struct wave *wave)
 {
     struct bvh *bvh = (struct bvh *)tracer;
-    const uint32_t packet_rays = bvh_packet_rays_expected(bvh, wave, coherent);
-    if (packet_rays == 0)
-        return;
-    struct bvh_state state = {.base.wave = *wave, .packet_rays = packet_rays};
+    struct bvh_state state = {.base.wave = *wave, .packet_rays = bvh_packet_rays_expected(bvh, wave)};
     const struct ray_range rays = {.wave = &state.base.wave, .end = wave->ray_count};
     state.ray_pairs = bvh_ray_pairs(bvh, scene, wave, state.packet_rays);
     (void)bvh_trace_range(tracer, scene, &state.base, &rays, NULL);

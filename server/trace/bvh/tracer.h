@@ -27,8 +27,8 @@ struct bvh_state {
  * rays meet again in the plane of focus. */
 float bvh_packet_reach(const struct gpu_scene *scene, const struct wave *wave);
 
-/* What bvh_packet_rays() will find of such a wave; 0: that is not known, as it can be coherent. */
-uint32_t bvh_packet_rays_expected(struct bvh *bvh, const struct wave *wave, bool coherent);
+/* What bvh_packet_rays() finds of most such waves. */
+uint32_t bvh_packet_rays_expected(struct bvh *bvh, const struct wave *wave);
 /* The packet size for the wave: that of the options, else the faster one for the wave's coherence, which is
  * measured on a sample. 0: failed. */
 uint32_t bvh_packet_rays(struct bvh *bvh, const struct gpu_scene *scene, const struct wave *wave,

@@ -260,10 +260,9 @@ static bool ldc_trace_range(struct tracer *tracer, struct gpu_scene *scene, stru
     return ldc_intersect(&((struct ldc *)tracer)->store, scene, rays, &tracer->options, error);
 }
 
-static void ldc_announce(struct tracer *tracer, struct gpu_scene *scene, const struct wave *wave, bool coherent)
+static void ldc_announce(struct tracer *tracer, struct gpu_scene *scene, const struct wave *wave)
 {
     const struct ray_range rays = {.wave = wave, .end = wave->ray_count};
-    (void)coherent;
     (void)ldc_intersect(&((struct ldc *)tracer)->store, scene, &rays, &tracer->options, NULL);
 }
 

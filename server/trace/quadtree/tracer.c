@@ -184,9 +184,8 @@ static bool trace_range(struct tracer *tracer, struct gpu_scene *scene, struct t
                               &tracer->options, error);
 }
 
-static void announce(struct tracer *tracer, struct gpu_scene *scene, const struct wave *wave, bool coherent)
+static void announce(struct tracer *tracer, struct gpu_scene *scene, const struct wave *wave)
 {
-    (void)coherent;
     quadtree_announce(scene, wave, &tracer->options);
 }
 

@@ -21,7 +21,7 @@ static int open_cold(void **state)
     assert_non_null(mkdtemp(home));
     setenv("XDG_CACHE_HOME", home, 1);
     open_device(state);
-    device->facts.software = false; /* for which nothing is done ahead */
+    device->facts.software = device->facts.compiles_at_dispatch = false; /* what hardware does */
     return 0;
 }
 
@@ -35,6 +35,7 @@ static int close_cold(void **state)
 
 EACH_TEST(open_cold, close_cold)
 
+static const struct gpu_texel_formats formats;
 static const struct gpu_define naive[] = {{"TRAVERSE", "\"naive/traverse.glsl\""}, {0}};
 static const struct gpu_define wrong[] = {
     {"TRAVERSE", "\"naive/traverse.glsl\""}, {"trace_ray", "no such (type"}, {0}};
@@ -48,10 +49,10 @@ static const struct gpu_program_source sources[] = {
 
 static void announce_all(void)
 {
-    gpu_program_announce(device, true);
+    gpu_program_announce(device, &formats);
     for (size_t i = 0; i < COUNT; i++)
         assert_null(gpu_program_get(device, &sources[i], NULL));
-    gpu_program_announce(device, false);
+    gpu_program_announce(device, NULL);
 }
 
 static size_t known_programs(size_t *compiled)
@@ -91,7 +92,7 @@ TEST(a_second_start_compiles_nothing)
         return;
     close_device(NULL);
     open_device(NULL);
-    device->facts.software = false;
+    device->facts.software = device->facts.compiles_at_dispatch = false;
     announce_all();
     for (size_t i = 0; i < COUNT; i++)
         assert_non_null(gpu_program_get(device, &sources[i], NULL));
@@ -125,10 +126,10 @@ TEST(a_shader_that_does_not_compile_ahead_says_where_when_it_is_got)
 {
     struct error error = {0};
     const struct gpu_program_source source = {.compute = "trace/wave.comp", .defines = wrong};
-    gpu_program_announce(device, true);
+    gpu_program_announce(device, &formats);
     assert_null(gpu_program_get(device, &source, &error));
     assert_int_equal(error.kind, ERROR_NONE);
-    gpu_program_announce(device, false);
+    gpu_program_announce(device, NULL);
     assert_null(gpu_program_get(device, &source, &error));
     assert_int_equal(error.kind, ERROR_INTERNAL);
     assert_string_equal(error.field, "trace/wave.comp");
