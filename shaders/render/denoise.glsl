@@ -22,6 +22,7 @@ struct guide {
     vec3 normal;    // the mean of the samples' unit normals: shorter where they see several surfaces
     float share;    // that mirrors and glass have in what is seen
     float nearness; // 1 / depth, which is linear in the picture where the surface is flat; orthographic: depth; 0: nothing
+    float tone;     // root of the albedo's luminance, up to 1
 };
 
 const float HALF_FLOAT_MAX = 6e4;
@@ -68,14 +69,15 @@ vec3 noise_of(halves h)
 uvec2 words_of_guide(guide g)
 {
     ivec4 bytes = ivec4(round(vec4(g.normal * 127.0, g.share * 127.0))) & 0xff;
-    return uvec2(bytes.x | bytes.y << 8 | bytes.z << 16 | bytes.w << 24, floatBitsToUint(g.nearness));
+    uint tone = uint(round(clamp(g.tone, 0.0, 1.0) * 255.0));
+    return uvec2(bytes.x | bytes.y << 8 | bytes.z << 16 | bytes.w << 24, floatBitsToUint(g.nearness) & ~0xffu | tone);
 }
 
 guide guide_of_words(uvec2 words)
 {
     int bytes = int(words.x);
     vec4 parts = vec4(bytes << 24 >> 24, bytes << 16 >> 24, bytes << 8 >> 24, bytes >> 24) / 127.0;
-    return guide(parts.xyz, parts.w, uintBitsToFloat(words.y));
+    return guide(parts.xyz, parts.w, uintBitsToFloat(words.y & ~0xffu), float(words.y & 0xffu) / 255.0);
 }
 
 // Of a pixel, as a share of its depth.

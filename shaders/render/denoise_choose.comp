@@ -8,6 +8,9 @@
 //   s = (c - t)(c - F) / (c - F)^2,  where  E (c - t)(c - F) = E (c - y)(c - F) + E n (n_c - n_F)
 //
 // with n the noise of y and n_c, n_F what the filters leave of it. Without noise s is 0.
+//
+// Both are means of few pixels, and where there is next to nothing to gain chance decides. So of the gain DENOISE_MARGIN
+// standard errors are left out, and where light moves by less than DENOISE_UNSEEN of itself, nothing is gained that shows.
 
 #include "render/denoise.glsl"
 
@@ -25,16 +28,19 @@ void main()
         return;
     bounds_of(pixel, lower, upper);
     vec2 sum = vec2(0.0);
-    float squares = 0.0;
-    for (int y = -2; y <= 2; y++) {
-        for (int x = -2; x <= 2; x++) {
+    float squares = 0.0, gains = 0.0;
+    for (int y = -DENOISE_CHOICE_RADIUS; y <= DENOISE_CHOICE_RADIUS; y++) {
+        for (int x = -DENOISE_CHOICE_RADIUS; x <= DENOISE_CHOICE_RADIUS; x++) {
             ivec2 next = clamp(pixel + ivec2(x, y) * spacing, lower, upper - 1);
             vec2 risk = texelFetch(risks, place_of(next)).xy;
             sum += risk;
             squares += square(risk.y);
+            gains += square(risk.x);
         }
     }
-    float share = sum.y > 0.0 ? clamp(sum.x / sum.y, 0.0, 1.0) : 0.0;
+    const float count = square(2.0 * float(DENOISE_CHOICE_RADIUS) + 1.0);
+    float gain = sum.x - DENOISE_MARGIN * sqrt(max(gains - sum.x * sum.x / count, 0.0));
+    float share = clamp(gain / (sum.y + count * square(DENOISE_UNSEEN)), 0.0, 1.0);
     float witnesses = squares > 0.0 ? square(sum.y) / squares : 0.0;
     share *= clamp((witnesses - 1.0) / DENOISE_WITNESSES, 0.0, 1.0);
     int place = place_of(pixel);

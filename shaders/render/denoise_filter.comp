@@ -2,7 +2,8 @@
 // A level of an edge-avoiding a-trous wavelet (Dammertz et al. Edge-Avoiding A-Trous Wavelet Transform for fast Global
 // Illumination Filtering. HPG 2010), whose light differs by what variance lets expect (Schied et al. Spatiotemporal
 // Variance-Guided Filtering. HPG 2017, 4.4). Each half is weighed by the light of the other, so that no noise chooses
-// itself (Rousselle et al. Adaptive Rendering with Non-Local Means Filtering. 2012).
+// itself (Rousselle et al. Adaptive Rendering with Non-Local Means Filtering. 2012). And by albedo, though light is divided by
+// it: what surfaces scatter is one light, what they mirror another, and albedo says how much of each there is.
 //
 // Also the parts of the risk of each pixel, see denoise_choose.comp.
 
@@ -50,7 +51,7 @@ void main()
         int next_place = place_of(counts ? next : pixel);
         guide other = guide_of_words(texelFetch(guides, next_place).xy);
         halves e = halves_of_words(texelFetch(light, next_place));
-        float off = off_surface(own, slope, other, vec2(offset));
+        float off = off_surface(own, slope, other, vec2(offset)) + DENOISE_TONE_SCALE * abs(own.tone - other.tone);
         vec2 apart = abs(vec2(luminance(e.b), luminance(e.a)) - own_luminance.yx) * sharpness;
         float kernel = counts ? (step_.x == 0 || step_.y == 0 ? 0.125 : 0.0625) : 0.0;
         vec2 weight = kernel * exp2(-(off + apart));

@@ -70,6 +70,6 @@ void main()
     vec3 mean = sum.rgb / count;
     moved -= DENOISE_SPECK_DOUBT * speck_of(mean - filtered * albedo, mean, albedo, slot, count) * is_alone(pixel, filtered) / albedo;
 #endif
-    bool there = uintBitsToFloat(texelFetch(guides, place).y) > 0.0;
+    bool there = guide_of_words(texelFetch(guides, place).xy).nearness > 0.0;
     denoised[slot] = vec4(there ? max(sum.rgb + strength * moved * albedo * count, vec3(0.0)) : sum.rgb, sum.a);
 }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 // What guides the denoiser, of the first surface that each ray of a slice met: its albedo, with what it shines itself, by
-// which light is divided so that textures are not blurred; its normal and depth.
+// which light is divided so that textures are not blurred; its normal and depth. The albedo is the share of light from all
+// around that is sent to the eye, with what is mirrored: by its base colour alone, light that a dark colour mirrors would
+// get the complement of that colour.
 //
 // Of smooth mirrors and glass that is what is seen in or behind them, where most is (FOLLOWS, over the rays of a bounce): the
 // albedo is the product, the normal that of what is seen, the depth that of the way, as production has them (Intel. Open
@@ -49,6 +51,7 @@ note note_of(path p, hit h, ray r)
     vec3 scattered = s.unlit ? s.base : parts.scattered + sheen_of(parts) + passed_of(parts);
     vec3 mirrored = s.unlit ? vec3(0.0) : parts.mirror * parts.mirror_ray + coat_ray_of(s, parts);
     vec3 refracted = s.unlit ? vec3(0.0) : parts.refracted;
+    vec3 sent = scattered + refracted + (s.unlit ? vec3(0.0) : parts.mirror + parts.again + coat_ray_of(s, parts));
     float all = max(max_component(scattered + mirrored + refracted), 1e-30);
     float share = clamp(max_component(mirrored + refracted) / all, 0.0, 1.0);
     vec3 place = r.origin_t_min.xyz + h.distance * r.direction_t_max.xyz;
@@ -59,7 +62,7 @@ note note_of(path p, hit h, ray r)
     bool passes = s.alpha * (1.0 - (smooth_ ? max_component(refracted) / all : 0.0)) < 1.0 - DENOISE_MOST;
     says |= (mirrors ? DENOISE_MIRRORS : 0u) | (passes ? DENOISE_PASSES : 0u);
 #endif
-    return note(vec4(min(s.base + s.emission, vec3(1e6)), 1.0 - s.alpha * (1.0 - share)),
+    return note(vec4(min(sent + s.emission, vec3(1e6)), 1.0 - s.alpha * (1.0 - share)),
                 vec4(s.normal, -view_from_world_point(place).z), vec4(motion_of(h, place), float(says)));
 }
 

@@ -31,7 +31,8 @@ void main()
         noise = (light_of_half(first_half[slot]) - mean) * sqrt(first_count / second_count);
     float depth = normal.w;
     bool there = depth > 0.0 && albedo.a <= 1.0; // all of it: what is behind would be spread over the edge, too
-    guide g = guide(there ? normal.xyz : vec3(0.0), min(albedo.a + (count - noted) / count, 1.0), 0.0);
+    guide g = guide(there ? normal.xyz : vec3(0.0), min(albedo.a + (count - noted) / count, 1.0), 0.0,
+                    sqrt(luminance(albedo.rgb)));
     if (there)
         g.nearness = frame.extent_near.w != 0.0 ? depth : 1.0 / depth;
     int place = place_of(pixel);

@@ -31,6 +31,9 @@
 #define DENOISE_DEPTH_SHARE 0.004f
 /* A turn of the normal by 14 degrees is as far as one surface is expected to go. */
 #define DENOISE_NORMAL_SCALE 32.0f
+/* Black and white weigh by this power of two less: of their tones, roots of albedos, by as much less as they are
+ * nearer. */
+#define DENOISE_TONE_SCALE 8.0f
 /* Light is divided by albedos no darker than this. */
 #define DENOISE_ALBEDO_MIN 0.02f
 
@@ -52,6 +55,13 @@
 #define DENOISE_MIRROR_EDGES 0.75f
 /* Errors count by their share of the light, and of darker light as if it were this. */
 #define DENOISE_DARK 0.01f
+/* The pixels around whose estimates are summed, so many to each side. */
+#define DENOISE_CHOICE_RADIUS 3
+/* Of an estimated gain so many standard errors are left out. */
+#define DENOISE_MARGIN 0.7f
+/* A step by this share of the light (root of the sum over colours) is about one of 8 bits in the middle of their
+ * range: noise below it is more often an error of the estimate than one of the picture. */
+#define DENOISE_UNSEEN 0.02f
 /* An estimate that comes from one pixel says nothing, one from so many more all. */
 #define DENOISE_WITNESSES 3.0f
 

@@ -8,9 +8,9 @@
 #include <math.h>
 
 #define LEVELS 4u /* of the wavelet: the widest sees 15 pixels far */
-/* Rows that a strip's own depend on: each level sees 2^level pixels far and its risk twice that, and noise is
- * looked for 4 pixels around. */
-#define EDGE_ROWS 49u
+/* Rows that a strip's own depend on: each level sees 2^level pixels far and its risk DENOISE_CHOICE_RADIUS times
+ * that, and noise is looked for 4 pixels around. */
+#define EDGE_ROWS (((1u << LEVELS) - 1) * (1 + DENOISE_CHOICE_RADIUS) + 4)
 /* Pixels of a dispatch: software GL does them within some ten milliseconds; a GPU has no use for more than this.
  */
 #define STEP_PIXELS_SOFTWARE (1u << 15)
@@ -158,7 +158,7 @@ static void bind_noise(struct denoise_filter *filter, const struct denoise_histo
 /* The more samples, the less of what the halves of a picture differ by is noise: edges within pixels stay. */
 static float believed(uint32_t samples)
 {
-    return fminf(4.0f / (1.0f + log2f((float)samples)), 1.0f);
+    return fminf(5.0f / (1.0f + log2f((float)samples)), 1.0f);
 }
 
 static void bind_settle(struct denoise_filter *filter, struct render_context *context,
