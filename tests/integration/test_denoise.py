@@ -1,14 +1,20 @@
 # SPDX-License-Identifier: MIT
-"""Denoised pictures of all bundled scenes are no farther from converged ones than noisy ones are."""
+"""Denoised pictures of bundled and shared scenes are no farther from converged ones than noisy ones are."""
 import math
 
-from farlight_test import OneDaemon, bundled_scenes, farlight, frames_of, read_exr, read_png
+from farlight_test import SHARED_SCENES, OneDaemon, bundled_scenes, farlight, frames_of, long_test, needs_shared_scenes, read_exr, read_png
 
 SIZE = ["--size", "80x45"]
 SCENES = ("cornell.glb", "teapot.glb", "carousel.glb", "sphereflake-3.nff")
 # Highlights that few samples miss and many show weigh alike in both pictures, so that what is left of them decides: a
 # thousandth either way. More is never lost where anything is gained.
 AS_GOOD = 1.005
+# Black tiles that mirror among white ones that scatter, which grow smaller than a pixel: light differs from one to the next, and
+# nothing there is rare.
+TILES = "ldc/reflection_scene.gltf"
+SHARED = ("bvh/spider.obj", "bvh/spd-teapot.nff", "bvh/spd-balls-3.nff", "bvh/spd-gears-2.nff", "bvh/spd-tree.nff", "gltf/spot.obj",
+          "gltf/DamagedHelmet.glb", "gltf/Fox.glb", "gltf/sampleroom.gltf", "ldc/legocar.obj", TILES)
+SEEDS = ("1", "2", "3")
 
 
 def distance(a, b):
@@ -40,6 +46,32 @@ class Denoise(OneDaemon):
                         few = [*options, "--samples", samples]
                         noisy, denoised = distance(self.picture(*few), truth), distance(self.picture(*few, "--denoise"), truth)
                         self.assertLessEqual(denoised, AS_GOOD * noisy)
+
+    def ratio(self, options, samples, truth, seeds):
+        """The error of denoised pictures to that of noisy ones, root of the means over seeds."""
+        sums = [0.0, 0.0]
+        for seed in seeds:
+            few = [*options, "--samples", samples, "--seed", seed]
+            for i, more in enumerate(((), ("--denoise",))):
+                sums[i] += distance(self.picture(*few, *more), truth) ** 2
+        return math.sqrt(sums[1] / sums[0])
+
+    @needs_shared_scenes
+    def test_tiles_that_mirror_and_scatter_are_no_worse_for_it_at_all(self):
+        options = [SHARED_SCENES / TILES, "--integrator", "distributed"]
+        truth = self.picture(*options, "--samples", "64", "--seed", "7")
+        self.assertLessEqual(self.ratio(options, "16", truth, ("0",)), 1.0)
+
+    @long_test
+    @needs_shared_scenes
+    def test_nor_are_scenes_of_many_kinds_with_more_samples(self):
+        """Over three seeds, as of one a single highlight may decide."""
+        for scene in [*(bundled_scenes() / name for name in SCENES), *(SHARED_SCENES / name for name in SHARED)]:
+            options = [scene, "--integrator", "distributed"]
+            truth = self.picture(*options, "--samples", "512", "--seed", "7")
+            for samples in ("16", "64"):
+                with self.subTest(scene=scene.name, samples=samples):
+                    self.assertLessEqual(self.ratio(options, samples, truth, SEEDS), AS_GOOD)
 
     def test_more_than_a_third_of_the_noise_of_a_room_is_gone(self):
         """Of four samples. Mirror and glass keep half of theirs, and the truth, a thirty-second of the noise, counts in both."""
