@@ -2,6 +2,7 @@
 /* Settings that depend on several options: derived defaults, and invalid combinations. */
 #include "cli/cli.h"
 
+#include <math.h>
 #include <string.h>
 
 #define RADIANS_PER_DEGREE 0.017453292519943295
@@ -10,8 +11,10 @@
 #define AUTO_NOISE 0.03f                       /* likewise: hardly to be seen */
 #define PATH_SAMPLES 64u                       /* where nothing is said */
 #define CLAMP 10.0f                            /* likewise; times white, as Cycles has it for indirect light */
-#define NOISE_SAMPLES 4096u                    /* likewise with --noise: most pixels need far fewer */
-#define AO_SAMPLES 16u                         /* of 8 rays: 128 a pixel, as in the paper */
+#define CLAMP_SAMPLES 64.0f /* with so many samples or more; with fewer by as much less, as each shows more, */
+#define CLAMP_MIN 1.25f     /* down to this */
+#define NOISE_SAMPLES 4096u /* likewise with --noise: most pixels need far fewer */
+#define AO_SAMPLES 16u      /* of 8 rays: 128 a pixel, as in the paper */
 
 /* ---- where pictures go ---- */
 
@@ -272,6 +275,12 @@ static void complete_integrator(struct cli_job *job)
         job->options.integrator = spreads ? PROTOCOL_INTEGRATOR_DISTRIBUTED : PROTOCOL_INTEGRATOR_WHITTED;
 }
 
+static float usual_clamp(uint32_t samples)
+{
+    const float clamp = CLAMP * fminf((float)samples / CLAMP_SAMPLES, 1.0f);
+    return fmaxf(clamp, CLAMP_MIN);
+}
+
 /* Random choices show as noise in one sample. Pictures that are refined without an end have no number of
  * samples. */
 static void complete_samples(struct cli_job *job, bool is_series)
@@ -284,8 +293,6 @@ static void complete_samples(struct cli_job *job, bool is_series)
     const bool by_error = wanted->noise > 0.0f;
     job->endless = job->progressive && !job->has_samples && !by_error;
     job->by_error = by_error && !is_series;
-    if (!job->has_clamp && !job->endless)
-        wanted->clamp = CLAMP;
     if (!job->has_samples && by_error)
         wanted->samples = NOISE_SAMPLES;
     else if (!job->has_samples && wanted->integrator == PROTOCOL_INTEGRATOR_PATH)
@@ -294,6 +301,8 @@ static void complete_samples(struct cli_job *job, bool is_series)
         wanted->samples = AO_SAMPLES;
     else if (!job->has_samples && !job->progressive && job->usual_samples > 0)
         wanted->samples = job->usual_samples;
+    if (!job->has_clamp && !job->endless)
+        wanted->clamp = usual_clamp(wanted->samples);
 }
 
 static bool complete_tracer(struct cli_job *job)

@@ -72,8 +72,8 @@ static const struct row {
     {"brdf", "brdf", "NAME", "How rough surfaces reflect, for path", CLI_GROUP_LIGHT, 0, true},
     {"clamp", "clamp", "X",
      "Bound fireflies, for distributed and path: limit light over a rough surface and another one to X times "
-     "white, and see no sharp mirror behind a rough one (default 10; 0, which is off, for pictures that are "
-     "refined without an end)",
+     "white, and see no sharp mirror behind a rough one (default 10, with fewer than 64 samples by as much less, "
+     "down to 1.25; 0, which is off, for pictures that are refined without an end)",
      CLI_GROUP_LIGHT, GIVEN(has_clamp), true},
     {"ao-distance", "ao_distance", "METRES",
      "What is farther away does not occlude, for ao (default 0: a tenth of the scene's diagonal)", CLI_GROUP_LIGHT,

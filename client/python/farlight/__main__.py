@@ -23,7 +23,7 @@ from .version import VERSION
 FAILED, USAGE, TRY_AGAIN, INTERRUPTED = 1, 2, 75, 130
 # Where nothing is said, as the command `farlight render` has it: samples of a pixel, and the clamp of indirect light.
 SAMPLES = {"path": 64}
-OTHER_SAMPLES, CLAMP = 16, 10.0
+OTHER_SAMPLES, CLAMP, CLAMP_SAMPLES, CLAMP_MIN = 16, 10.0, 64, 1.25
 
 
 class _Progress:
@@ -133,8 +133,9 @@ def _write(options: argparse.Namespace, frame: Frame) -> None:
 def _values(options: argparse.Namespace) -> dict[str, Any]:
     samples = options.samples if options.samples is not None else SAMPLES.get(options.integrator, OTHER_SAMPLES)
     integrator = options.integrator or ("distributed" if samples > 1 else "whitted")
+    clamp = max(CLAMP * min(samples / CLAMP_SAMPLES, 1.0), CLAMP_MIN)
     return {"width": options.size[0], "height": options.size[1], "samples": samples, "integrator": integrator,
-            "tracer": options.tracer, "clamp": CLAMP, "primary": messages.Primary.AUTO, **dict(options.set)}
+            "tracer": options.tracer, "clamp": clamp, "primary": messages.Primary.AUTO, **dict(options.set)}
 
 
 def _layers(options: argparse.Namespace) -> tuple[str, ...]:
