@@ -151,7 +151,8 @@ TEST(the_picture_is_that_of_the_rays_that_hit_the_lamps_alone)
         }
 }
 
-/* Stored samples lie up to a cell or so off the surfaces, and off lamps as well. */
+/* Stored samples lie up to a cell or so off the surfaces, and off lamps as well; cells are four times as wide as by
+ * default. */
 TEST(stored_samples_show_as_much_light)
 {
     struct fixture *fixture = *state;
@@ -160,6 +161,7 @@ TEST(stored_samples_show_as_much_light)
         struct mean means[2];
         for (int sampled = 0; sampled < 2; sampled++) {
             path_begin(fixture, TRACER_LDC, 3);
+            fixture->request.tracer_options.ldc.resolution = 256;
             a_scene(fixture, kinds[i], sampled);
             fixture->request.samples = sampled ? 4 : 12;
             means[sampled] = mean_of_seeds(fixture, whole);

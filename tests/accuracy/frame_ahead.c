@@ -73,6 +73,7 @@ TEST(every_integrator_and_tracer_gives_the_same_picture_and_waits_once)
     fixture_mixture(fixture);
     fixture->request.width = 24;
     fixture->request.height = 18;
+    fixture->request.tracer_options.ldc.resolution = fixture->request.tracer_options.abuffer.resolution = 64;
     static const struct form {
         unsigned integrator, depth, samples;
     } forms[] = {{INTEGRATOR_WHITTED, 4, 1},
