@@ -117,7 +117,7 @@ TEST(white_things_vanish_in_a_furnace_at_any_roughness)
     struct fixture *fixture = *state;
     for (size_t w = 0; w < COUNT(ways); w++)
         for (size_t k = 0; k < COUNT(kinds); k++)
-            for (int tenths = 0; tenths <= 10; tenths += getenv("FARLIGHT_TEST_LONG") ? 1 : 2)
+            for (int tenths = 0; tenths <= 10; tenths += getenv("FARLIGHT_TEST_LONG") ? 1 : 5)
                 expect_furnace(fixture, &ways[w], &kinds[k], 0.1f * (float)tenths, 0.98);
 }
 
@@ -180,7 +180,7 @@ TEST(lamps_light_rough_things_alike_in_all_integrators)
     const struct kind *const compared[] = {&kinds[0],  &kinds[1],   &other_varnish, &coated[1],
                                            &with_film, &brushed[0], &brushed[1]};
     for (size_t k = 0; k < COUNT(compared); k++)
-        for (int step = 0; step < 3; step++) {
+        for (int step = 0; step < 3; step += getenv("FARLIGHT_TEST_LONG") ? 1 : 2) { /* or the ends */
             double means[COUNT(ways)] = {0};
             path_begin(fixture, TRACER_REFERENCE, 4);
             struct scene_material *material = a_thing(fixture, compared[k], 0.4f + 0.3f * (float)step);
@@ -225,7 +225,7 @@ TEST(a_sky_lights_rough_things_alike_in_all_integrators)
     } compared[] = {
         {&kinds[0], {0.01, 0.1}}, {&kinds[1], {0.01, 0.1}}, {&kinds[2], {0.02, 0.0}}, {&brushed[0], {0.03, 0.1}}};
     for (size_t k = 0; k < COUNT(compared); k++)
-        for (int step = 0; step < 3; step++) {
+        for (int step = 0; step < 3; step += getenv("FARLIGHT_TEST_LONG") ? 1 : 2) { /* or the ends */
             struct mean means[COUNT(ways)] = {0};
             path_begin(fixture, TRACER_REFERENCE, 16);
             struct scene_material *material = a_thing(fixture, compared[k].kind, 0.2f + 0.4f * (float)step);

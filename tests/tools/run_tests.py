@@ -59,11 +59,12 @@ LONGEST_FIRST = ("test_view", "test_import", "accuracy/sampled_against_reference
                  "test_staying_up", "test_sealed", "test_units")
 
 # Left to FARLIGHT_TEST_LONG=1: forms of a tracer whose settings other rows have in other combinations, or whose answers
-# others hold against brute force: unit/trace/ldc/traversal (all levels, packets and layers one by one), unit/trace/bvh/tracer
-# (packets, the plain form), accuracy/sampled_against_reference (searches), unit/trace/rayspace/reduce and tracer (ways to
-# reduce, too little room), accuracy/quadtree_against_reference (numbers of layers).
-LONG = re.compile(r"contract/(bvh, packets|bvh in the plain|ldc, peeled|ldc by a pyramid|ldc by blocks of (8|32)|abuffer, |rayspace, flat$"
-                  r"|rayspace with|quadtree, of one layer)")
+# others hold against brute force: unit/trace/ldc/traversal (all levels, packets and layers one by one) and build (lists as
+# peeled), unit/trace/bvh/tracer (one ray alone, packets, spheres, the plain form), accuracy/sampled_against_reference (searches),
+# unit/trace/rayspace/reduce and tracer (ways to reduce, too little room) and nodes (sorted, turned round),
+# accuracy/quadtree_against_reference (numbers of layers, the view, planes).
+LONG = re.compile(r"contract/(bvh, one|bvh, packets|bvh in the plain|bvh with|ldc, |ldc by|abuffer, |rayspace, flat$|rayspace, sorted"
+                  r"|rayspace with|quadtree, of one layer|quadtree, of the view|quadtree, planes)")
 
 # Driver stacks beside the default one: what chooses it, and what the daemon must then say that it renders with.
 # zink is OpenGL 4.6 over Vulkan, here on lavapipe (mesa-vulkan-drivers).
