@@ -26,21 +26,21 @@ struct bvh_box {
 
 /* ---- binary tree ---- */
 
-/* Nodes in depth-first order with gaps: the left child of node i is i + 1, the right one `link`; a leaf of n
- * primitives takes 2 n - 1 places, of which the first is used. So every node's place follows from the number of
- * primitives before it, and threads need not agree on one. */
+/* The children of a node lie side by side; beyond that nodes have no order that could be relied on, as each thread
+ * puts its own where there is a place. bvh_binary_list() is the same for the same input. */
 struct bvh_binary_node {
     float lower[3];
-    uint32_t link; /* inner: right child; leaf: first primitive in `order` */
+    uint32_t link; /* inner: left child, behind which is the right one; leaf: first primitive in `order` */
     float upper[3];
     uint32_t count_axis; /* bits 2..: primitives of a leaf, 0: inner; bits 0..1: axis of the split */
 };
 
 struct bvh_binary {
-    struct bvh_binary_node *nodes; /* 2 primitive_count - 1 places */
-    float *areas;                  /* of each place: half the surface of the node's box */
+    struct bvh_binary_node *nodes; /* the first is the root */
+    float *areas;                  /* of each node: half the surface of its box */
     uint32_t *order;               /* primitive numbers as the leaves hold them */
-    uint32_t primitive_count;
+    uint32_t primitive_count, node_count;
+    uint32_t place_count; /* at most that many are in memory, as not every place between two nodes has one */
 };
 
 /* The costs of an element test and of a primitive test, in arbitrary units; their ratio was measured. */
@@ -49,13 +49,13 @@ struct bvh_costs {
     uint32_t leaf_max; /* 1 .. BVH_LEAF_MAX */
 };
 
-/* Builds over boxes[0..count-1], which it reorders. 1 <= count <= 2^27. False: out of memory, or stopped: `stop`
+/* Builds over boxes[0..count-1], which it writes over. 1 <= count <= 2^27. False: out of memory, or stopped: `stop`
  * (NULL: never) was set meanwhile. */
 bool bvh_binary_build(struct bvh_binary *tree, struct bvh_box *boxes, uint32_t count,
                       const struct bvh_costs *costs, unsigned threads, const atomic_bool *stop);
 void bvh_binary_finish(struct bvh_binary *tree);
-/* The node after i in depth-first order, gaps left out. */
-uint32_t bvh_binary_next(const struct bvh_binary_node *nodes, uint32_t i);
+/* All nodes in depth-first order: left children follow their parent. The caller frees it. NULL: out of memory. */
+uint32_t *bvh_binary_list(const struct bvh_binary *tree);
 
 /* ---- baked tree ---- */
 

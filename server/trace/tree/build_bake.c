@@ -16,59 +16,85 @@
 #define LANES 4
 typedef uint32_t lanes __attribute__((vector_size(LANES * sizeof(uint32_t))));
 
+/* A binary node, in depth-first order: a left child is the next one. */
+struct step {
+    uint32_t element; /* BVH_NONE: an inner node that is thrown back */
+    uint32_t below;   /* elements of its subtree */
+    uint32_t right;   /* step of the right child; 0: a leaf */
+    uint32_t axis;
+};
+
 struct bake {
     struct bvh_baked *baked;
-    const struct bvh_binary_node *nodes;
-    uint32_t place_count; /* of the binary tree */
-    uint32_t *element;    /* of each binary node; of inner nodes that are thrown back BVH_NONE */
-    uint32_t *below;      /* elements of each binary node's subtree */
+    struct step *steps;
+    uint32_t step_count;
     uint32_t waiting_max; /* maximum of right children that wait during a traversal */
     bool failed[BVH_OCTANTS / LANES];
 };
 
-static bool node_is_leaf(const struct bvh_binary_node *node)
+/* Going backwards, both children are done before their parent. */
+static void link_steps(struct bake *bake, const struct bvh_binary *tree, const uint32_t *list)
 {
-    return node->count_axis >> 2 > 0;
+    struct step *steps = bake->steps;
+    for (uint32_t i = bake->step_count; i-- > 0;) {
+        const struct bvh_binary_node *node = &tree->nodes[list[i]];
+        const bool is_leaf = node->count_axis >> 2 > 0;
+        const uint32_t right = is_leaf ? 0 : i + 1 + steps[i + 1].below;
+        /* `below` is nodes until the elements are chosen. */
+        steps[i] = (struct step){.below = is_leaf ? 1 : 1 + steps[i + 1].below + steps[right].below,
+                                 .right = right,
+                                 .axis = node->count_axis & 3};
+    }
 }
 
 /* In depth-first order: which nodes are kept, and their new parents. */
-static void choose_elements(struct bake *bake, const float *areas)
+static void choose_elements(struct bake *bake, const float *areas, const uint32_t *list)
 {
     struct bvh_baked *baked = bake->baked;
+    struct step *steps = bake->steps;
     uint32_t elements = 0, waiting = 0;
-    uint32_t *above = bake->element; /* the nearest kept ancestor, until the node itself is reached */
-    above[0] = BVH_NONE;
-    for (uint32_t i = 0; i < bake->place_count; i = bvh_binary_next(bake->nodes, i)) {
-        const struct bvh_binary_node *node = &bake->nodes[i];
-        uint32_t parent = above[i];
+    steps[0].element = BVH_NONE; /* of each step: its nearest kept ancestor, until the step itself is reached */
+    for (uint32_t i = 0; i < bake->step_count; i++) {
+        const bool is_leaf = steps[i].right == 0;
+        const float area = areas[list[i]];
+        uint32_t parent = steps[i].element;
         /* written so that areas which are not numbers keep their node */
-        bool pays = i == 0 || node_is_leaf(node) || !(areas[i] >= THROW_BACK * areas[baked->node[parent]]);
+        bool pays = i == 0 || is_leaf || !(area >= THROW_BACK * areas[baked->node[parent]]);
         if (pays) {
-            baked->node[elements] = i;
+            baked->node[elements] = list[i];
             baked->parent[elements] = parent;
-            baked->size[elements] = 1;
             parent = elements++;
         }
-        if (node_is_leaf(node)) {
+        if (is_leaf) {
             waiting -= waiting > 0;
         } else {
-            above[i + 1] = above[node->link] = parent;
+            steps[i + 1].element = steps[steps[i].right].element = parent;
             waiting++;
             if (waiting > bake->waiting_max)
                 bake->waiting_max = waiting;
         }
-        bake->element[i] = pays ? parent : BVH_NONE;
+        steps[i].element = pays ? parent : BVH_NONE;
     }
     baked->element_count = elements;
-    for (uint32_t e = elements - 1; e > 0; e--)
-        baked->size[baked->parent[e]] += baked->size[e];
+}
+
+static void count_below(struct bake *bake)
+{
+    struct step *steps = bake->steps;
+    for (uint32_t i = bake->step_count; i-- > 0;) {
+        steps[i].below = steps[i].element != BVH_NONE;
+        if (steps[i].right != 0)
+            steps[i].below += steps[i + 1].below + steps[steps[i].right].below;
+        if (steps[i].element != BVH_NONE)
+            bake->baked->size[steps[i].element] = steps[i].below;
+    }
 }
 
 /* All ones in the lanes of octants that meet the left child of a node first: its axis is positive there. */
-static lanes left_is_near(const struct bvh_binary_node *node, uint32_t first_octant)
+static lanes left_is_near(const struct step *step, uint32_t first_octant)
 {
     const lanes octants = {first_octant, first_octant + 1, first_octant + 2, first_octant + 3};
-    return (lanes)((octants >> (node->count_axis & 3) & 1) == 0);
+    return (lanes)((octants >> step->axis & 1) == 0);
 }
 
 static lanes choose(lanes which, lanes yes, lanes no)
@@ -76,32 +102,12 @@ static lanes choose(lanes which, lanes yes, lanes no)
     return (yes & which) | (no & ~which);
 }
 
-/* Elements below each binary node. A right child's place comes after its left sibling's and all below that: going
- * backwards, both children are done before their parent. The binary nodes' places have gaps, whence the list. */
-static bool count_below(struct bake *bake)
-{
-    uint32_t count = 0;
-    uint32_t *order = malloc(bake->place_count * sizeof(*order));
-    if (!order)
-        return false;
-    for (uint32_t i = 0; i < bake->place_count; i = bvh_binary_next(bake->nodes, i))
-        order[count++] = i;
-    while (count-- > 0) {
-        uint32_t i = order[count];
-        const struct bvh_binary_node *node = &bake->nodes[i];
-        bake->below[i] = bake->element[i] != BVH_NONE;
-        if (!node_is_leaf(node))
-            bake->below[i] += bake->below[i + 1] + bake->below[node->link];
-    }
-    free(order);
-    return true;
-}
-
 /* The places of all elements in four octants' orders, in one traversal that carries where the subtree it is in
  * begins: its own element first, then all of the nearer child, then all of the farther one. */
 static void place_octants(void *context, uint32_t group)
 {
     struct bake *bake = context;
+    const struct step *steps = bake->steps;
     uint32_t first_octant = group * LANES, waiting = 0;
     size_t count = bake->baked->element_count;
     uint32_t *places = bake->baked->place + first_octant * count;
@@ -110,36 +116,24 @@ static void place_octants(void *context, uint32_t group)
     bake->failed[group] = !begin_right;
     if (!begin_right)
         return;
-    for (uint32_t i = 0; i < bake->place_count; i = bvh_binary_next(bake->nodes, i)) {
-        const struct bvh_binary_node *node = &bake->nodes[i];
-        uint32_t element = bake->element[i];
+    for (uint32_t i = 0; i < bake->step_count; i++) {
+        uint32_t element = steps[i].element;
         if (element != BVH_NONE) {
             for (uint32_t lane = 0; lane < LANES; lane++)
                 places[lane * count + element] = begin[lane];
             begin += 1;
         }
-        if (node_is_leaf(node)) {
+        if (steps[i].right == 0) {
             if (waiting > 0)
                 begin = begin_right[--waiting];
             continue;
         }
-        const lanes none = {0}, left = none + bake->below[i + 1], right = none + bake->below[node->link];
-        lanes left_first = left_is_near(node, first_octant);
+        const lanes none = {0}, left = none + steps[i + 1].below, right = none + steps[steps[i].right].below;
+        lanes left_first = left_is_near(&steps[i], first_octant);
         begin_right[waiting++] = begin + choose(left_first, left, none);
         begin += choose(left_first, none, right);
     }
     free(begin_right);
-}
-
-static bool bake_alloc(struct bake *bake, struct bvh_baked *baked)
-{
-    size_t places = bake->place_count;
-    bake->element = malloc(places * sizeof(*bake->element));
-    bake->below = malloc(places * sizeof(*bake->below));
-    baked->node = malloc(places * sizeof(*baked->node));
-    baked->size = malloc(places * sizeof(*baked->size));
-    baked->parent = malloc(places * sizeof(*baked->parent));
-    return bake->element && bake->below && baked->node && baked->size && baked->parent;
 }
 
 static bool place_all(struct bake *bake, uint32_t octants, unsigned threads)
@@ -148,7 +142,7 @@ static bool place_all(struct bake *bake, uint32_t octants, unsigned threads)
     if (octants == 1)
         return true;
     baked->place = malloc((size_t)octants * baked->element_count * sizeof(*baked->place));
-    if (!baked->place || !count_below(bake))
+    if (!baked->place)
         return false;
     parallel_run(threads, octants / LANES, place_octants, bake);
     for (uint32_t group = 0; group < octants / LANES; group++)
@@ -160,15 +154,24 @@ static bool place_all(struct bake *bake, uint32_t octants, unsigned threads)
 bool bvh_bake(struct bvh_baked *baked, const struct bvh_binary *tree, const float *areas, uint32_t octants,
               unsigned threads)
 {
+    const size_t count = tree->node_count;
     *baked = (struct bvh_baked){0};
-    struct bake bake = {.baked = baked, .nodes = tree->nodes, .place_count = 2 * tree->primitive_count - 1};
-    bool ok = bake_alloc(&bake, baked);
-    if (ok)
-        choose_elements(&bake, areas);
+    struct bake bake = {.baked = baked, .step_count = tree->node_count};
+    uint32_t *list = bvh_binary_list(tree);
+    bake.steps = malloc(count * sizeof(*bake.steps));
+    baked->node = malloc(count * sizeof(*baked->node));
+    baked->size = malloc(count * sizeof(*baked->size));
+    baked->parent = malloc(count * sizeof(*baked->parent));
+    bool ok = list && bake.steps && baked->node && baked->size && baked->parent;
+    if (ok) {
+        link_steps(&bake, tree, list);
+        choose_elements(&bake, areas, list);
+        count_below(&bake);
+    }
     progress_tell();
     ok = ok && place_all(&bake, octants, threads);
-    free(bake.element);
-    free(bake.below);
+    free(list);
+    free(bake.steps);
     if (!ok)
         bvh_baked_finish(baked);
     return ok;

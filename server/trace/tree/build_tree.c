@@ -27,7 +27,7 @@ struct work {
     struct bvh_binary binary;
     struct bvh_baked baked;
     bool is_baked;
-    float (*spheres)[4]; /* per place of the binary tree: centre, radius; NULL with boxes */
+    float (*spheres)[4]; /* per node of the binary tree: centre, radius; NULL with boxes */
 };
 
 static bool is_stopped(const struct work *work)
@@ -159,15 +159,13 @@ static float leaf_radius(const struct work *work, const struct bvh_binary_node *
 static bool make_spheres(struct work *work)
 {
     const struct bvh_binary_node *nodes = work->binary.nodes;
-    uint32_t places = 2 * work->binary.primitive_count - 1, count = 0;
-    uint32_t *order = malloc(places * sizeof(*order));
-    work->spheres = malloc(places * sizeof(*work->spheres));
+    uint32_t count = work->binary.node_count;
+    uint32_t *order = bvh_binary_list(&work->binary);
+    work->spheres = malloc((size_t)work->binary.place_count * sizeof(*work->spheres));
     if (!order || !work->spheres) {
         free(order);
         return false;
     }
-    for (uint32_t i = 0; i < places; i = bvh_binary_next(nodes, i))
-        order[count++] = i;
     while (count-- > 0) {
         const struct bvh_binary_node *node = &nodes[order[count]];
         float *sphere = work->spheres[order[count]];
@@ -178,7 +176,7 @@ static bool make_spheres(struct work *work)
         if (node->count_axis >> 2 > 0) {
             other = leaf_radius(work, node, sphere);
         } else {
-            const float *left = work->spheres[order[count] + 1], *right = work->spheres[node->link];
+            const float *left = work->spheres[node->link], *right = work->spheres[node->link + 1];
             other = fmaxf(distance(sphere, left) + left[3], distance(sphere, right) + right[3]);
         }
         /* Each sum above rounds a few times. */
@@ -191,11 +189,11 @@ static bool make_spheres(struct work *work)
 
 /* ---- elements ---- */
 
-static struct bvh_bound bound_of(const struct work *work, uint32_t place)
+static struct bvh_bound bound_of(const struct work *work, uint32_t n)
 {
-    const struct bvh_binary_node *node = &work->binary.nodes[place];
+    const struct bvh_binary_node *node = &work->binary.nodes[n];
     if (work->spheres)
-        return bvh_bound_of_sphere(work->spheres[place], work->spheres[place][3]);
+        return bvh_bound_of_sphere(work->spheres[n], work->spheres[n][3]);
     return bvh_bound_of_box(node->lower, node->upper);
 }
 
