@@ -2,6 +2,12 @@
 #include "trace/tree/build_split.h"
 
 #include <string.h>
+#if defined(__x86_64__)
+#include <immintrin.h>
+#endif
+
+/* Into the two forms of bvh_split_find(): by the instructions that every processor has, and by AVX2's. */
+#define INLINED static inline __attribute__((always_inline))
 
 #define BINS_MAX 16
 #define SMALL_RANGE 24 /* ranges below are split with fewer bins: the sweep would cost more than the filling */
@@ -9,8 +15,11 @@
 
 typedef int32_t int4 __attribute__((vector_size(16)));
 
+/* A box as its lower corner and its upper one times -1, so that boxes are united by minima alone. */
+typedef float corners __attribute__((vector_size(32)));
+
 struct bins {
-    struct bvh_box boxes[BINS_MAX][3]; /* of each axis */
+    corners boxes[BINS_MAX][3]; /* of each axis */
     _Alignas(16) int32_t counts[BINS_MAX][4];
     int count;
 };
@@ -33,17 +42,28 @@ static inline int4 counts_of(const struct bins *bins, int bin)
     return counts;
 }
 
-static inline void add_to_bin(struct bins *bins, int bin, int axis, const struct bvh_box *box)
+typedef void minimum(corners *a, const corners *b); /* into the first */
+
+static inline void minimum_of_halves(corners *a, const corners *b)
 {
-    bvh_box_add(&bins->boxes[bin][axis], box);
-    bins->counts[bin][axis]++;
+    bvh_vec4 *halves = (bvh_vec4 *)a;
+    const bvh_vec4 *others = (const bvh_vec4 *)b;
+    halves[0] = bvh_vec_min(halves[0], others[0]);
+    halves[1] = bvh_vec_min(halves[1], others[1]);
 }
 
-static void fill_bins(struct bins *bins, const struct bvh_box *boxes, uint32_t count, bvh_vec4 origin,
-                      bvh_vec4 scale)
+static const corners nothing = {FLT_MAX, FLT_MAX, FLT_MAX, 0, FLT_MAX, FLT_MAX, FLT_MAX, 0};
+
+INLINED void corners_of(corners *out, const struct bvh_box *box)
+{
+    *out = __builtin_shufflevector(box->lower, -box->upper, 0, 1, 2, 3, 4, 5, 6, 7);
+}
+
+INLINED void fill_bins(struct bins *bins, const struct bvh_box *boxes, uint32_t count, bvh_vec4 origin,
+                       bvh_vec4 scale, minimum *take_minimum)
 {
     for (int i = 0; i < bins->count; i++) {
-        bins->boxes[i][0] = bins->boxes[i][1] = bins->boxes[i][2] = bvh_box_empty();
+        bins->boxes[i][0] = bins->boxes[i][1] = bins->boxes[i][2] = nothing;
         memset(bins->counts[i], 0, sizeof(bins->counts[i]));
     }
     const float last = (float)(bins->count - 1);
@@ -52,44 +72,54 @@ static void fill_bins(struct bins *bins, const struct bvh_box *boxes, uint32_t c
         bvh_vec4 place = (bvh_box_centre(&boxes[i]) - origin) * scale;
         /* in this order: what is not a number becomes 0 */
         int4 bin = __builtin_convertvector(bvh_vec_min(bvh_vec_max(place, zero), last_bin), int4);
-        add_to_bin(bins, bin[0], 0, &boxes[i]);
-        add_to_bin(bins, bin[1], 1, &boxes[i]);
-        add_to_bin(bins, bin[2], 2, &boxes[i]);
+        corners box;
+        corners_of(&box, &boxes[i]);
+        const int x = bin[0], y = bin[1], z = bin[2];
+        take_minimum(&bins->boxes[x][0], &box);
+        take_minimum(&bins->boxes[y][1], &box);
+        take_minimum(&bins->boxes[z][2], &box);
+        bins->counts[x][0]++;
+        bins->counts[y][1]++;
+        bins->counts[z][2]++;
     }
 }
 
 /* Half the surfaces of three boxes: a constant factor changes no choice. */
-static inline bvh_vec4 box_areas(const struct bvh_box boxes[3])
+INLINED bvh_vec4 diagonal(const corners *of)
 {
-    bvh_vec4 a = boxes[0].upper - boxes[0].lower, b = boxes[1].upper - boxes[1].lower;
-    bvh_vec4 c = boxes[2].upper - boxes[2].lower;
+    return -__builtin_shufflevector(*of, *of, 4, 5, 6, 7) - __builtin_shufflevector(*of, *of, 0, 1, 2, 3);
+}
+
+INLINED bvh_vec4 box_areas(const corners of[3])
+{
+    const bvh_vec4 a = diagonal(&of[0]), b = diagonal(&of[1]), c = diagonal(&of[2]);
     bvh_vec4 xy = __builtin_shufflevector(a, b, 0, 4, 1, 5), zw = __builtin_shufflevector(a, b, 2, 6, 3, 7);
     bvh_vec4 x = __builtin_shufflevector(xy, c, 0, 1, 4, 4), y = __builtin_shufflevector(xy, c, 2, 3, 5, 5);
     bvh_vec4 z = __builtin_shufflevector(zw, c, 0, 1, 6, 6);
     return x * y + y * z + z * x;
 }
 
-static inline void add_boxes(struct bvh_box sum[3], const struct bvh_box boxes[3])
+INLINED void add_three(corners sum[3], const corners boxes[3], minimum *take_minimum)
 {
-    bvh_box_add(&sum[0], &boxes[0]);
-    bvh_box_add(&sum[1], &boxes[1]);
-    bvh_box_add(&sum[2], &boxes[2]);
+    take_minimum(&sum[0], &boxes[0]);
+    take_minimum(&sum[1], &boxes[1]);
+    take_minimum(&sum[2], &boxes[2]);
 }
 
-static struct best sweep(const struct bins *bins)
+INLINED struct best sweep(const struct bins *bins, minimum *take_minimum)
 {
     bvh_vec4 area_right[BINS_MAX];
-    struct bvh_box sum[3] = {bvh_box_empty(), bvh_box_empty(), bvh_box_empty()};
+    corners sum[3] = {nothing, nothing, nothing};
     int4 total = counts_of(bins, 0), left = {0, 0, 0, 0};
     for (int i = bins->count - 1; i > 0; i--) {
-        add_boxes(sum, bins->boxes[i]);
+        add_three(sum, bins->boxes[i], take_minimum);
         total += counts_of(bins, i);
         area_right[i] = box_areas(sum);
     }
-    sum[0] = sum[1] = sum[2] = bvh_box_empty();
+    sum[0] = sum[1] = sum[2] = nothing;
     struct best best = {{FLT_MAX, FLT_MAX, FLT_MAX, FLT_MAX}, {0, 0, 0, 0}};
     for (int i = 1; i < bins->count; i++) {
-        add_boxes(sum, bins->boxes[i - 1]);
+        add_three(sum, bins->boxes[i - 1], take_minimum);
         left += counts_of(bins, i - 1);
         bvh_vec4 cost = box_areas(sum) * __builtin_convertvector(left, bvh_vec4) +
                         area_right[i] * __builtin_convertvector(total - left, bvh_vec4);
@@ -101,19 +131,42 @@ static struct best sweep(const struct bins *bins)
     return best;
 }
 
-struct bvh_split bvh_split_find(const struct bvh_box *boxes, uint32_t count, const struct bvh_box *centres)
+INLINED struct bvh_split find(const struct bvh_box *boxes, uint32_t count, const struct bvh_box *centres,
+                              minimum *take_minimum)
 {
     struct bins bins; /* filled as far as it is used */
     bins.count = count < SMALL_RANGE ? BINS_SMALL : BINS_MAX;
     bvh_vec4 extent = centres->upper - centres->lower, scale = {0, 0, 0, 0};
     for (int axis = 0; axis < 3; axis++)
         scale[axis] = extent[axis] > 0 ? (float)bins.count / extent[axis] : 0;
-    fill_bins(&bins, boxes, count, centres->lower, scale);
-    const struct best best = sweep(&bins);
+    fill_bins(&bins, boxes, count, centres->lower, scale, take_minimum);
+    const struct best best = sweep(&bins, take_minimum);
     struct bvh_split split = {.axis = -1, .cost = FLT_MAX};
     for (int axis = 0; axis < 3; axis++)
         if (extent[axis] > 0 && best.bin[axis] > 0 && best.cost[axis] < split.cost)
             split = (struct bvh_split){axis, best.cost[axis], centres->lower[axis], scale[axis],
                                        (float)best.bin[axis]};
     return split;
+}
+
+#if defined(__x86_64__)
+__attribute__((target("avx2"))) static inline void minimum_at_once(corners *a, const corners *b)
+{
+    *a = (corners)_mm256_min_ps((__m256)*a, (__m256)*b);
+}
+
+__attribute__((target("avx2"))) static struct bvh_split find_wide(const struct bvh_box *boxes, uint32_t count,
+                                                                  const struct bvh_box *centres)
+{
+    return find(boxes, count, centres, minimum_at_once);
+}
+#endif
+
+struct bvh_split bvh_split_find(const struct bvh_box *boxes, uint32_t count, const struct bvh_box *centres)
+{
+#if defined(__x86_64__)
+    if (__builtin_cpu_supports("avx2"))
+        return find_wide(boxes, count, centres);
+#endif
+    return find(boxes, count, centres, minimum_of_halves);
 }
