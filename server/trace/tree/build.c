@@ -60,10 +60,9 @@ static uint32_t partition(const struct builder *builder, const struct range *ran
     uint32_t *order_out = builder->order[!range->array];
     uint32_t left = range->begin, right = range->end - 1;
     for (uint32_t i = range->begin; i < range->end; i++) {
-        const struct bvh_box box = boxes[i];
-        const uint32_t goes_left = bvh_split_goes_left(split, &box);
+        const uint32_t goes_left = bvh_split_goes_left(split, &boxes[i]);
         const uint32_t to = right ^ ((right ^ left) & (0 - goes_left));
-        boxes_out[to] = box;
+        boxes_out[to] = boxes[i];
         order_out[to] = order[i];
         left += goes_left;
         right -= 1 - goes_left;
@@ -269,7 +268,8 @@ void bvh_binary_finish(struct bvh_binary *tree)
 uint32_t *bvh_binary_list(const struct bvh_binary *tree)
 {
     const struct bvh_binary_node *nodes = tree->nodes;
-    uint32_t *list = malloc((size_t)tree->node_count * sizeof(*list)), count = 0, waiting = tree->node_count, i = 0;
+    uint32_t *list = malloc((size_t)tree->node_count * sizeof(*list)), count = 0, waiting = tree->node_count,
+             i = 0;
     if (!list)
         return NULL;
     /* Right children wait at the list's end: each is a node that the list does not have yet. */

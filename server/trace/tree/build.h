@@ -49,8 +49,8 @@ struct bvh_costs {
     uint32_t leaf_max; /* 1 .. BVH_LEAF_MAX */
 };
 
-/* Builds over boxes[0..count-1], which it writes over. 1 <= count <= 2^27. False: out of memory, or stopped: `stop`
- * (NULL: never) was set meanwhile. */
+/* Builds over boxes[0..count-1], which it writes over. 1 <= count <= 2^27. False: out of memory, or stopped:
+ * `stop` (NULL: never) was set meanwhile. */
 bool bvh_binary_build(struct bvh_binary *tree, struct bvh_box *boxes, uint32_t count,
                       const struct bvh_costs *costs, unsigned threads, const atomic_bool *stop);
 void bvh_binary_finish(struct bvh_binary *tree);
@@ -109,19 +109,19 @@ struct bvh_grid {
 };
 
 struct bvh_tree {
-    uint32_t *elements; /* as the device has them: octants x element_count x words */
+    uint32_t *elements; /* as the device has them: octants x element_count x words; NULL: they lie elsewhere */
     uint32_t element_count;
     struct bvh_grid grid;
     float grid_cost;   /* how much larger the grid makes a box's surface, in the mean: 1 .. 4, also where it is
                           not used since `whole` is set; 1: never used */
     float leaf_extent; /* diagonal of a leaf's box, in the mean */
-    float *primitives; /* 4 x primitive_texels floats, see tree/layout.h */
+    float *primitives; /* 4 x primitive_texels floats, see tree/layout.h; likewise */
     size_t primitive_texels;
     float lower[3], upper[3]; /* of everything, padded */
     float wear; /* surfaces of all elements' boxes over those of each primitive's own box; of shapes that deform.
                    That of a refitted tree grows as its boxes come to overlap, and not where all grows alike */
     struct bvh_refit_plan plan; /* empty: the shape does not deform, or the tree is not one that can be refitted */
-    uint64_t build_ns;
+    struct bvh_draft *draft;    /* until it is written */
 };
 
 /* What the settings mean for elements. */
@@ -134,6 +134,14 @@ size_t bvh_element_bytes(const struct bvh_form *settings);   /* of one element i
  * arithmetic cannot lose a hit (shaders/tree/slack.glsl has the sum). ERROR_OUT_OF_MEMORY, ERROR_LIMIT. */
 bool bvh_tree_build(struct bvh_tree *tree, const struct bvh_shape *shape, const struct bvh_form *settings,
                     struct error *error);
+/* The same in two steps, between which it is known how large the arrays are: all but these; then both, to where
+ * the caller says, which may be the device's memory: nothing is read there. Stopped, the second one writes a part.
+ */
+bool bvh_tree_plan(struct bvh_tree *tree, const struct bvh_shape *shape, const struct bvh_form *settings,
+                   struct error *error);
+void bvh_tree_write(struct bvh_tree *tree, const struct bvh_shape *shape, const struct bvh_form *settings,
+                    uint32_t *elements, float *primitives);
+bool bvh_tree_alloc(struct bvh_tree *tree, const struct bvh_form *settings); /* arrays of its own, for that */
 void bvh_tree_finish(struct bvh_tree *tree);
 #define BVH_PAD_RELATIVE 0x1p-21f
 
@@ -142,13 +150,19 @@ struct bvh_job {
     struct bvh_shape shape;
     struct bvh_tree tree; /* out */
     struct error error;   /* out; kind ERROR_NONE: built */
+    uint32_t *elements;   /* where they are to be written */
+    float *primitives;
 };
 
-/* Begins to build all. Where there is much to do it is done in threads of its own, which read the shapes and what
- * they point to until the run is finished or stopped, and are only stopped between two of a build's loops over the
- * primitives of a range. The caller finishes the trees, in any case. NULL: out of memory. */
+enum bvh_step { BVH_PLAN, BVH_WRITE };
+
+/* Begins to plan all, or to write all that are planned. Where there is much to do it is done in threads of its
+ * own, which read the shapes and what they point to until the run is finished or stopped, and are only stopped
+ * between two of a build's loops over the primitives of a range. The caller finishes the trees, in any case. NULL:
+ * out of memory. */
 struct bvh_run;
-struct bvh_run *bvh_jobs_start(struct bvh_job *jobs, uint32_t count, const struct bvh_form *settings);
+struct bvh_run *bvh_jobs_start(struct bvh_job *jobs, uint32_t count, const struct bvh_form *settings,
+                               enum bvh_step step);
 /* Waits until then, by clock_now_ns(), at most. False: it is not done. */
 bool bvh_jobs_wait(struct bvh_run *run, uint64_t until_ns);
 /* Waits for the end; *end_ns is when it came. False: one failed; its error is in *error. */

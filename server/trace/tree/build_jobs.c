@@ -12,6 +12,7 @@ struct bvh_run {
     struct bvh_job *jobs;
     uint32_t count;
     struct bvh_form settings;
+    enum bvh_step step;
     atomic_bool stop;
     pthread_t thread;
     bool has_thread;
@@ -28,7 +29,10 @@ static bool is_large(const struct bvh_job *job)
 
 static void build(struct bvh_run *run, struct bvh_job *job)
 {
-    bvh_tree_build(&job->tree, &job->shape, &run->settings, &job->error);
+    if (run->step == BVH_PLAN)
+        bvh_tree_plan(&job->tree, &job->shape, &run->settings, &job->error);
+    else
+        bvh_tree_write(&job->tree, &job->shape, &run->settings, job->elements, job->primitives);
 }
 
 static void run_small(void *context, uint32_t i)
@@ -68,7 +72,8 @@ static void *run_thread(void *argument)
     return NULL;
 }
 
-struct bvh_run *bvh_jobs_start(struct bvh_job *jobs, uint32_t count, const struct bvh_form *settings)
+struct bvh_run *bvh_jobs_start(struct bvh_job *jobs, uint32_t count, const struct bvh_form *settings,
+                               enum bvh_step step)
 {
     uint64_t primitives = 0;
     struct bvh_run *run = calloc(1, sizeof(*run));
@@ -77,10 +82,13 @@ struct bvh_run *bvh_jobs_start(struct bvh_job *jobs, uint32_t count, const struc
     run->jobs = jobs;
     run->count = count;
     run->settings = *settings;
+    run->step = step;
     run->settings.stop = &run->stop;
     for (uint32_t i = 0; i < count; i++) {
-        jobs[i].tree = (struct bvh_tree){0};
-        jobs[i].error = (struct error){0};
+        if (step == BVH_PLAN) {
+            jobs[i].tree = (struct bvh_tree){0};
+            jobs[i].error = (struct error){0};
+        }
         primitives += jobs[i].shape.primitive_count;
     }
     pthread_cond_init(&run->ended, NULL);

@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include "trace/tree/build.h"
 
-#include "base/clock.h"
 #include "base/parallel.h"
 #include "trace/tree/build_split.h"
 
-#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -18,16 +16,22 @@
  * choice is the fastest by a little and has the fewest elements. */
 static const struct bvh_costs costs = {.element = 1, .primitive = 0.5f, .leaf_max = BVH_LEAF_MAX};
 
+/* From which a tree's elements and primitives are written. */
+struct bvh_draft {
+    struct bvh_binary binary;
+    struct bvh_baked baked;
+    float (*spheres)[4]; /* per node of the binary tree: centre, radius; NULL with boxes */
+};
+
 struct work {
     struct bvh_tree *tree;
+    struct bvh_draft *draft;
     const struct bvh_shape *shape;
     const struct bvh_form *settings;
     unsigned threads;
-    struct bvh_box *boxes; /* gone when the primitives are there */
-    struct bvh_binary binary;
-    struct bvh_baked baked;
-    bool is_baked;
-    float (*spheres)[4]; /* per node of the binary tree: centre, radius; NULL with boxes */
+    struct bvh_box *boxes;
+    uint32_t *elements;
+    float *primitives;
 };
 
 static bool is_stopped(const struct work *work)
@@ -109,15 +113,15 @@ static void chunk_primitives(void *context, uint32_t chunk)
     if (end > shape->primitive_count)
         end = shape->primitive_count;
     for (uint32_t i = begin; i < end; i++) {
-        uint32_t number = work->binary.order[i];
+        uint32_t number = work->draft->binary.order[i];
         if (shape->centres_radii) {
-            float *out = work->tree->primitives + (size_t)i * 4 * BVH_SPHERE_TEXELS;
+            float *out = work->primitives + (size_t)i * 4 * BVH_SPHERE_TEXELS;
             memcpy(out, shape->centres_radii + 4 * (size_t)number, 4 * sizeof(*out));
             memset(out + 4, 0, 4 * sizeof(*out));
             memcpy(out + 4, &number, sizeof(number));
             continue;
         }
-        float *out = work->tree->primitives + (size_t)i * 4 * BVH_TRIANGLE_TEXELS;
+        float *out = work->primitives + (size_t)i * 4 * BVH_TRIANGLE_TEXELS;
         write_triangle(shape, shape->positions, number, out);
         if (shape->deforms)
             write_triangle(shape, shape->positions_close ? shape->positions_close : shape->positions, number,
@@ -138,7 +142,7 @@ static float leaf_radius(const struct work *work, const struct bvh_binary_node *
     const struct bvh_shape *shape = work->shape;
     float radius = 0;
     for (uint32_t i = 0; i < node->count_axis >> 2; i++) {
-        uint32_t number = work->binary.order[node->link + i];
+        uint32_t number = work->draft->binary.order[node->link + i];
         if (shape->centres_radii) {
             const float *s = shape->centres_radii + 4 * (size_t)number;
             radius = fmaxf(radius, distance(centre, s) + s[3]);
@@ -158,17 +162,17 @@ static float leaf_radius(const struct work *work, const struct bvh_binary_node *
  * children's spheres need. Children come after their parent, so backwards. */
 static bool make_spheres(struct work *work)
 {
-    const struct bvh_binary_node *nodes = work->binary.nodes;
-    uint32_t count = work->binary.node_count;
-    uint32_t *order = bvh_binary_list(&work->binary);
-    work->spheres = malloc((size_t)work->binary.place_count * sizeof(*work->spheres));
-    if (!order || !work->spheres) {
+    const struct bvh_binary_node *nodes = work->draft->binary.nodes;
+    uint32_t count = work->draft->binary.node_count;
+    uint32_t *order = bvh_binary_list(&work->draft->binary);
+    work->draft->spheres = malloc((size_t)work->draft->binary.place_count * sizeof(*work->draft->spheres));
+    if (!order || !work->draft->spheres) {
         free(order);
         return false;
     }
     while (count-- > 0) {
         const struct bvh_binary_node *node = &nodes[order[count]];
-        float *sphere = work->spheres[order[count]];
+        float *sphere = work->draft->spheres[order[count]];
         for (int axis = 0; axis < 3; axis++)
             sphere[axis] = 0.5f * node->lower[axis] + 0.5f * node->upper[axis];
         sphere[3] = distance(sphere, node->upper);
@@ -176,12 +180,12 @@ static bool make_spheres(struct work *work)
         if (node->count_axis >> 2 > 0) {
             other = leaf_radius(work, node, sphere);
         } else {
-            const float *left = work->spheres[node->link], *right = work->spheres[node->link + 1];
+            const float *left = work->draft->spheres[node->link], *right = work->draft->spheres[node->link + 1];
             other = fmaxf(distance(sphere, left) + left[3], distance(sphere, right) + right[3]);
         }
         /* Each sum above rounds a few times. */
         sphere[3] = fminf(sphere[3], other) * (1 + 0x1p-21f);
-        work->binary.areas[order[count]] = sphere[3] * sphere[3]; /* the surface, up to a factor */
+        work->draft->binary.areas[order[count]] = sphere[3] * sphere[3]; /* the surface, up to a factor */
     }
     free(order);
     return true;
@@ -191,16 +195,16 @@ static bool make_spheres(struct work *work)
 
 static struct bvh_bound bound_of(const struct work *work, uint32_t n)
 {
-    const struct bvh_binary_node *node = &work->binary.nodes[n];
-    if (work->spheres)
-        return bvh_bound_of_sphere(work->spheres[n], work->spheres[n][3]);
+    const struct bvh_binary_node *node = &work->draft->binary.nodes[n];
+    if (work->draft->spheres)
+        return bvh_bound_of_sphere(work->draft->spheres[n], work->draft->spheres[n][3]);
     return bvh_bound_of_box(node->lower, node->upper);
 }
 
 static void chunk_elements(void *context, uint32_t chunk)
 {
     struct work *work = context;
-    const struct bvh_baked *baked = &work->baked;
+    const struct bvh_baked *baked = &work->draft->baked;
     uint32_t kind = work->shape->centres_radii ? BVH_LEAF_SPHERES : BVH_LEAF_TRIANGLES;
     uint32_t begin = chunk * CHUNK, end = begin + CHUNK;
     if (is_stopped(work))
@@ -208,10 +212,10 @@ static void chunk_elements(void *context, uint32_t chunk)
     if (end > baked->element_count)
         end = baked->element_count;
     for (uint32_t e = begin; e < end; e++) {
-        const struct bvh_binary_node *node = &work->binary.nodes[baked->node[e]];
+        const struct bvh_binary_node *node = &work->draft->binary.nodes[baked->node[e]];
         struct bvh_bound bound = bound_of(work, baked->node[e]);
         uint32_t count = node->count_axis >> 2;
-        bvh_write_element(work->tree->elements, work->settings, baked, &work->tree->grid, e, &bound,
+        bvh_write_element(work->elements, work->settings, baked, &work->tree->grid, e, &bound,
                           count > 0 ? bvh_leaf(kind, node->link, count) : 0);
     }
 }
@@ -220,13 +224,13 @@ static void chunk_elements(void *context, uint32_t chunk)
  * small it is: the camera looks where there is detail. */
 static void survey(struct work *work)
 {
-    const struct bvh_baked *baked = &work->baked;
+    const struct bvh_baked *baked = &work->draft->baked;
     struct bvh_tree *tree = work->tree;
     bool has_grid = work->settings->bounds == BVH_BOUNDS_BOX && !work->settings->plain;
     uint32_t step = baked->element_count / SURVEYED_ELEMENTS + 1, count = 0, leaf_count = 0;
     float cost_sum = 0, extent_sum = 0;
     for (uint32_t e = 0; e < baked->element_count; e += step, count++) {
-        const struct bvh_binary_node *node = &work->binary.nodes[baked->node[e]];
+        const struct bvh_binary_node *node = &work->draft->binary.nodes[baked->node[e]];
         if (node->count_axis >> 2 > 0) {
             extent_sum += distance(node->lower, node->upper);
             leaf_count++;
@@ -247,8 +251,8 @@ static void survey(struct work *work)
 static float tree_wear(const struct work *work)
 {
     double boxes = 0, primitives = 0;
-    for (uint32_t e = 0; e < work->baked.element_count; e++) {
-        const struct bvh_binary_node *node = &work->binary.nodes[work->baked.node[e]];
+    for (uint32_t e = 0; e < work->draft->baked.element_count; e++) {
+        const struct bvh_binary_node *node = &work->draft->binary.nodes[work->draft->baked.node[e]];
         boxes += (double)bvh_box_area(node->lower, node->upper);
     }
     for (uint32_t i = 0; i < work->shape->primitive_count; i++) {
@@ -265,7 +269,7 @@ static bool list_corners(struct work *work)
     plan->triangle_count = shape->primitive_count;
     plan->corners = malloc(shape->primitive_count * 4 * sizeof(*plan->corners));
     for (uint32_t i = 0; plan->corners && i < shape->primitive_count; i++) {
-        uint32_t number = work->binary.order[i];
+        uint32_t number = work->draft->binary.order[i];
         memcpy(plan->corners + 4 * (size_t)i, shape->indices + 3 * (size_t)number, 3 * sizeof(*plan->corners));
         plan->corners[4 * (size_t)i + 3] = number;
     }
@@ -274,12 +278,12 @@ static bool list_corners(struct work *work)
 
 static bool make_plan(struct work *work)
 {
-    const struct bvh_baked *baked = &work->baked;
+    const struct bvh_baked *baked = &work->draft->baked;
     uint32_t kind = work->shape->centres_radii ? BVH_LEAF_SPHERES : BVH_LEAF_TRIANGLES;
     uint32_t *leaves = calloc(baked->element_count, sizeof(*leaves));
     bool ok = leaves != NULL;
     for (uint32_t e = 0; ok && e < baked->element_count; e++) {
-        const struct bvh_binary_node *node = &work->binary.nodes[baked->node[e]];
+        const struct bvh_binary_node *node = &work->draft->binary.nodes[baked->node[e]];
         uint32_t count = node->count_axis >> 2;
         leaves[e] = count > 0 ? bvh_leaf(kind, node->link, count) : 0;
     }
@@ -294,92 +298,130 @@ static uint32_t chunk_count(uint32_t count)
     return count / CHUNK + (count % CHUNK > 0);
 }
 
-/* The boxes lie where the primitives will be, which are not fewer bytes and are written when the boxes have
- * served: memory that is touched for the first time costs more than what is done here with most of it. */
-static bool alloc_primitives(struct work *work)
+static bool build_binary(struct work *work)
 {
-    size_t count = work->shape->primitive_count;
-    size_t texels = work->shape->centres_radii ? BVH_SPHERE_TEXELS : BVH_TRIANGLE_TEXELS;
-    static_assert(BVH_SPHERE_TEXELS * 4 * sizeof(float) >= sizeof(struct bvh_box), "a box fits in any primitive");
-    work->tree->primitive_texels = count * texels * (work->shape->deforms ? 2 : 1);
-    work->tree->primitives = aligned_alloc(16, work->tree->primitive_texels * 4 * sizeof(float));
-    work->boxes = (struct bvh_box *)(void *)work->tree->primitives;
-    return work->boxes != NULL;
+    const uint32_t count = work->shape->primitive_count;
+    work->boxes = aligned_alloc(32, count * sizeof(*work->boxes));
+    if (!work->boxes)
+        return false;
+    parallel_run(work->threads, chunk_count(count), chunk_boxes, work);
+    const bool ok = !is_stopped(work) && bvh_binary_build(&work->draft->binary, work->boxes, count, &costs,
+                                                          work->threads, work->settings->stop);
+    free(work->boxes);
+    return ok;
 }
 
-/* To bake is mostly one thread's work, beside which another writes the primitives. */
-static void bake_or_write(void *context, uint32_t part)
-{
-    struct work *work = context;
-    const uint32_t chunks = chunk_count(work->shape->primitive_count);
-    if (part == 0)
-        work->is_baked =
-            bvh_bake(&work->baked, &work->binary, work->binary.areas, bvh_octants(work->settings), work->threads);
-    for (uint32_t chunk = 0; part == 1 && chunk < chunks; chunk++)
-        chunk_primitives(work, chunk);
-}
-
-static bool build(struct work *work)
+static bool plan(struct work *work)
 {
     struct bvh_tree *tree = work->tree;
-    uint32_t count = work->shape->primitive_count;
-    unsigned threads = work->threads;
-    if (!alloc_primitives(work))
-        return false;
-    parallel_run(threads, chunk_count(count), chunk_boxes, work);
-    if (is_stopped(work) ||
-        !bvh_binary_build(&work->binary, work->boxes, count, &costs, threads, work->settings->stop))
+    struct bvh_draft *draft = work->draft;
+    const size_t count = work->shape->primitive_count;
+    if (!draft || !build_binary(work))
         return false;
     if (work->settings->bounds == BVH_BOUNDS_SPHERE && !make_spheres(work))
         return false;
-    if (is_stopped(work))
+    if (is_stopped(work) ||
+        !bvh_bake(&draft->baked, &draft->binary, draft->binary.areas, bvh_octants(work->settings), work->threads))
         return false;
-    parallel_run(threads, 2, bake_or_write, work);
-    if (!work->is_baked || is_stopped(work))
-        return false;
-    memcpy(tree->lower, work->binary.nodes[0].lower, sizeof(tree->lower));
-    memcpy(tree->upper, work->binary.nodes[0].upper, sizeof(tree->upper));
+    memcpy(tree->lower, draft->binary.nodes[0].lower, sizeof(tree->lower));
+    memcpy(tree->upper, draft->binary.nodes[0].upper, sizeof(tree->upper));
     bvh_pad_box(tree->lower, tree->upper);
     tree->grid = bvh_grid_over(tree->lower, tree->upper, 0);
     survey(work);
-    tree->element_count = work->baked.element_count;
-    tree->elements = malloc(tree->element_count * bvh_element_bytes(work->settings));
-    if (!tree->elements)
-        return false;
-    parallel_run(threads, chunk_count(tree->element_count), chunk_elements, work);
+    tree->element_count = draft->baked.element_count;
+    tree->primitive_texels = count * (work->shape->centres_radii ? BVH_SPHERE_TEXELS : BVH_TRIANGLE_TEXELS) *
+                             (work->shape->deforms ? 2 : 1);
     if (is_stopped(work))
         return false;
-    if (work->shape->deforms && !work->settings->plain)
-        return make_plan(work);
-    return true;
+    return !work->shape->deforms || work->settings->plain || make_plan(work);
+}
+
+static void free_draft(struct bvh_tree *tree)
+{
+    if (!tree->draft)
+        return;
+    free(tree->draft->spheres);
+    bvh_binary_finish(&tree->draft->binary);
+    bvh_baked_finish(&tree->draft->baked);
+    free(tree->draft);
+    tree->draft = NULL;
+}
+
+static unsigned threads_of(const struct bvh_shape *shape, const struct bvh_form *settings)
+{
+    return shape->primitive_count >= BVH_THREADED_PRIMITIVES && settings->threads > 1 ? settings->threads : 1;
+}
+
+bool bvh_tree_plan(struct bvh_tree *tree, const struct bvh_shape *shape, const struct bvh_form *settings,
+                   struct error *error)
+{
+    *tree = (struct bvh_tree){0};
+    if (shape->primitive_count == 0 || shape->primitive_count > BVH_LEAF_FIRST_MASK)
+        return error_set(error, ERROR_LIMIT, NULL, "a tree holds 1 to %u primitives, not %u", BVH_LEAF_FIRST_MASK,
+                         shape->primitive_count);
+    tree->draft = calloc(1, sizeof(*tree->draft));
+    struct work work = {.tree = tree,
+                        .draft = tree->draft,
+                        .shape = shape,
+                        .settings = settings,
+                        .threads = threads_of(shape, settings)};
+    if (plan(&work))
+        return true;
+    bvh_tree_finish(tree);
+    return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the tree over %u primitives",
+                     shape->primitive_count);
+}
+
+/* Chunks of both arrays, as one list. */
+static void chunk_of_either(void *context, uint32_t chunk)
+{
+    const struct work *work = context;
+    const uint32_t primitive_chunks = chunk_count(work->shape->primitive_count);
+    if (chunk < primitive_chunks)
+        chunk_primitives(context, chunk);
+    else
+        chunk_elements(context, chunk - primitive_chunks);
+}
+
+void bvh_tree_write(struct bvh_tree *tree, const struct bvh_shape *shape, const struct bvh_form *settings,
+                    uint32_t *elements, float *primitives)
+{
+    struct work work = {.tree = tree,
+                        .draft = tree->draft,
+                        .shape = shape,
+                        .settings = settings,
+                        .threads = threads_of(shape, settings),
+                        .elements = elements,
+                        .primitives = primitives};
+    parallel_run(work.threads, chunk_count(shape->primitive_count) + chunk_count(tree->element_count),
+                 chunk_of_either, &work);
+    free_draft(tree);
+}
+
+bool bvh_tree_alloc(struct bvh_tree *tree, const struct bvh_form *settings)
+{
+    tree->elements = malloc(tree->element_count * bvh_element_bytes(settings));
+    tree->primitives = malloc(tree->primitive_texels * 4 * sizeof(float));
+    return tree->elements && tree->primitives;
 }
 
 bool bvh_tree_build(struct bvh_tree *tree, const struct bvh_shape *shape, const struct bvh_form *settings,
                     struct error *error)
 {
-    uint64_t start_ns = clock_now_ns();
-    *tree = (struct bvh_tree){0};
-    if (shape->primitive_count == 0 || shape->primitive_count > BVH_LEAF_FIRST_MASK)
-        return error_set(error, ERROR_LIMIT, NULL, "a tree holds 1 to %u primitives, not %u", BVH_LEAF_FIRST_MASK,
-                         shape->primitive_count);
-    struct work work = {.tree = tree, .shape = shape, .settings = settings, .threads = 1};
-    if (shape->primitive_count >= BVH_THREADED_PRIMITIVES && settings->threads > 1)
-        work.threads = settings->threads;
-    bool ok = build(&work);
-    free(work.spheres);
-    bvh_binary_finish(&work.binary);
-    bvh_baked_finish(&work.baked);
-    if (!ok) {
-        bvh_tree_finish(tree);
-        return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the tree over %u primitives",
-                         shape->primitive_count);
+    if (!bvh_tree_plan(tree, shape, settings, error))
+        return false;
+    if (bvh_tree_alloc(tree, settings)) {
+        bvh_tree_write(tree, shape, settings, tree->elements, tree->primitives);
+        return true;
     }
-    tree->build_ns = clock_now_ns() - start_ns;
-    return true;
+    bvh_tree_finish(tree);
+    return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the tree over %u primitives",
+                     shape->primitive_count);
 }
 
 void bvh_tree_finish(struct bvh_tree *tree)
 {
+    free_draft(tree);
     free(tree->elements);
     free(tree->primitives);
     bvh_refit_plan_finish(&tree->plan);

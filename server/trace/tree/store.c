@@ -21,10 +21,21 @@ void bvh_store_init(struct bvh_store *store, struct gpu_device *device, const st
     *store = (struct bvh_store){.device = device, .settings = *settings, .top_lost = true};
 }
 
-/* Also one that is still at work. */
-static void end_build(struct bvh_store_build *build)
+static void unmap(struct bvh_store *store)
 {
+    if (!store->build.is_mapped)
+        return;
+    gpu_buffer_unmap(store->device, &store->elements);
+    gpu_buffer_unmap(store->device, &store->primitives);
+    store->build.is_mapped = false;
+}
+
+/* Also one that is still at work. */
+static void end_build(struct bvh_store *store)
+{
+    struct bvh_store_build *build = &store->build;
     bvh_jobs_stop(build->run);
+    unmap(store);
     for (uint32_t i = 0; build->jobs && i < build->count; i++)
         bvh_tree_finish(&build->jobs[i].tree);
     free(build->jobs);
@@ -34,7 +45,7 @@ static void end_build(struct bvh_store_build *build)
 
 void bvh_store_finish(struct bvh_store *store)
 {
-    end_build(&store->build);
+    end_build(store);
     gpu_buffer_finish(store->device, &store->elements);
     gpu_buffer_finish(store->device, &store->primitives);
     gpu_buffer_finish(store->device, &store->boxes);
@@ -276,24 +287,34 @@ static bool upload_array(struct bvh_store *store, struct gpu_buffer *buffer, uin
     return *done == bytes;
 }
 
-/* Goes on with the last entry's. */
-static enum tracer_progress upload_tree(struct bvh_store *store, struct bvh_tree *tree, uint64_t step_end_ns,
-                                        struct bvh_store_report *report, struct error *error)
+static bool upload_arrays(struct bvh_store *store, const struct bvh_entry *entry, const struct bvh_tree *tree,
+                          uint64_t step_end_ns)
 {
-    struct bvh_entry *entry = &store->entries[store->entry_count - 1];
     uint64_t *done = &store->build.uploaded_bytes;
-    size_t each_bytes = bvh_element_bytes(&store->settings), element_bytes = tree->element_count * each_bytes;
-    size_t texel_bytes = tree->primitive_texels * TEXEL_BYTES;
+    const size_t each_bytes = bvh_element_bytes(&store->settings),
+                 element_bytes = tree->element_count * each_bytes;
+    const size_t texel_bytes = tree->primitive_texels * TEXEL_BYTES;
     if (*done < element_bytes && !upload_array(store, &store->elements, entry->first_element * each_bytes,
                                                tree->elements, element_bytes, done, step_end_ns))
-        return TRACER_MORE;
+        return false;
     uint64_t texels_done = *done - element_bytes;
     bool all = upload_array(store, &store->primitives, entry->first_texel * TEXEL_BYTES, tree->primitives,
                             texel_bytes, &texels_done, step_end_ns);
-    *done = element_bytes + texels_done;
-    if (!all)
+    *done = all ? 0 : element_bytes + texels_done;
+    return all;
+}
+
+/* Goes on with the next one. */
+static enum tracer_progress upload_tree(struct bvh_store *store, uint64_t step_end_ns,
+                                        struct bvh_store_report *report, struct error *error)
+{
+    const struct bvh_store_build *build = &store->build;
+    struct bvh_entry *entry = &store->entries[store->entry_count - build->count + build->uploaded];
+    struct bvh_tree *tree = &build->jobs[build->uploaded].tree;
+    const size_t element_bytes = tree->element_count * bvh_element_bytes(&store->settings);
+    const size_t texel_bytes = tree->primitive_texels * TEXEL_BYTES;
+    if (tree->elements && !upload_arrays(store, entry, tree, step_end_ns))
         return TRACER_MORE;
-    *done = 0;
     report->uploaded_bytes += element_bytes + texel_bytes;
     report->built_elements += tree->element_count;
     const struct bvh_refit_plan *plan = &tree->plan;
@@ -316,41 +337,95 @@ static bool begin_build(struct bvh_store *store, struct bvh_job *jobs, uint32_t 
         realloc(store->entries, ((size_t)store->entry_count + count + 1) * sizeof(*entries));
     if (entries) {
         store->entries = entries;
-        store->build.run = bvh_jobs_start(jobs, count, &store->settings);
+        store->build.run = bvh_jobs_start(jobs, count, &store->settings, BVH_PLAN);
     }
     return store->build.run ||
            error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the trees of %u geometries", count);
 }
 
-/* After the builds: reserves memory for the trees. */
 static bool finish_run(struct bvh_store *store, struct stage_times *times, struct error *error)
 {
     struct bvh_store_build *build = &store->build;
-    uint64_t elements = 0, texels = 0, built_ns;
+    uint64_t built_ns;
     bool ok = bvh_jobs_finish(build->run, &built_ns, error);
     build->run = NULL;
     stage_times_add(times, STAGE_BUILD, CLOCK_CPU, 0, build->start_ns, built_ns - build->start_ns);
+    return ok;
+}
+
+/* Reserves memory for the planned trees. */
+static bool make_entries(struct bvh_store *store, const struct gpu_scene *scene, struct error *error)
+{
+    const struct bvh_store_build *build = &store->build;
+    uint64_t elements = 0, texels = 0;
     for (uint32_t i = 0; i < build->count; i++) {
         elements += build->jobs[i].tree.element_count;
         texels += build->jobs[i].tree.primitive_texels;
     }
     uint32_t top_capacity = store->top_capacity < TOP_CAPACITY_MIN ? TOP_CAPACITY_MIN : store->top_capacity;
-    return ok && pack(store, top_capacity, elements, texels, error);
+    if (!pack(store, top_capacity, elements, texels, error))
+        return false;
+    for (uint32_t i = 0; i < build->count; i++)
+        add_entry(store, &scene->geometries[build->which[i]], &build->jobs[i].tree);
+    return true;
 }
 
-static enum tracer_progress upload_trees(struct bvh_store *store, const struct gpu_scene *scene,
-                                         uint64_t step_end_ns, struct bvh_store_report *report,
-                                         struct error *error)
+/* Says where the trees go. Software GL's buffers are memory like any other: an array of its own for each would be
+ * twice as much of it. */
+static bool open_arrays(struct bvh_store *store, struct error *error)
 {
     struct bvh_store_build *build = &store->build;
+    const struct bvh_entry *entries = &store->entries[store->entry_count - build->count];
+    uint8_t *elements = NULL, *primitives = NULL;
+    if (store->device->facts.software && build->count > 0) {
+        elements = gpu_buffer_open(store->device, &store->elements, error);
+        if (!elements)
+            return false;
+        primitives = gpu_buffer_open(store->device, &store->primitives, error);
+        if (!primitives) {
+            gpu_buffer_unmap(store->device, &store->elements);
+            return false;
+        }
+        build->is_mapped = true;
+    }
+    for (uint32_t i = 0; i < build->count; i++) {
+        struct bvh_job *job = &build->jobs[i];
+        if (!elements && !bvh_tree_alloc(&job->tree, &store->settings))
+            return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the trees of %u geometries",
+                             build->count);
+        job->elements = job->tree.elements;
+        job->primitives = job->tree.primitives;
+        if (!elements)
+            continue;
+        job->elements =
+            (uint32_t *)(void *)(elements + entries[i].first_element * bvh_element_bytes(&store->settings));
+        job->primitives = (float *)(void *)(primitives + entries[i].first_texel * TEXEL_BYTES);
+    }
+    return true;
+}
+
+static bool begin_writing(struct bvh_store *store, const struct gpu_scene *scene, struct error *error)
+{
+    struct bvh_store_build *build = &store->build;
+    build->step = BVH_WRITE;
+    if (!make_entries(store, scene, error) || !open_arrays(store, error))
+        return false;
+    build->start_ns = clock_now_ns();
+    build->run = bvh_jobs_start(build->jobs, build->count, &store->settings, BVH_WRITE);
+    return build->run ||
+           error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the trees of %u geometries", build->count);
+}
+
+static enum tracer_progress upload_trees(struct bvh_store *store, uint64_t step_end_ns,
+                                         struct bvh_store_report *report, struct error *error)
+{
+    struct bvh_store_build *build = &store->build;
+    unmap(store);
     while (build->uploaded < build->count) {
-        struct bvh_tree *tree = &build->jobs[build->uploaded].tree;
-        if (build->uploaded_bytes == 0)
-            add_entry(store, &scene->geometries[build->which[build->uploaded]], tree);
-        enum tracer_progress progress = upload_tree(store, tree, step_end_ns, report, error);
+        enum tracer_progress progress = upload_tree(store, step_end_ns, report, error);
         if (progress != TRACER_DONE)
             return progress;
-        bvh_tree_finish(tree);
+        bvh_tree_finish(&build->jobs[build->uploaded].tree);
         build->uploaded++;
         if (step_is_over(step_end_ns))
             return TRACER_MORE;
@@ -363,12 +438,15 @@ static enum tracer_progress go_on_building(struct bvh_store *store, const struct
                                            struct stage_times *times, struct error *error)
 {
     struct bvh_store_build *build = &store->build;
-    if (build->run && !bvh_jobs_wait(build->run, step_end_ns))
-        return TRACER_MORE;
+    while (build->run) {
+        if (!bvh_jobs_wait(build->run, step_end_ns))
+            return TRACER_MORE;
+        const bool is_planned = build->step == BVH_PLAN;
+        if (!finish_run(store, times, error) || (is_planned && !begin_writing(store, scene, error)))
+            return TRACER_FAILED;
+    }
     uint64_t start_ns = clock_now_ns();
-    if (build->run && !finish_run(store, times, error))
-        return TRACER_FAILED;
-    enum tracer_progress progress = upload_trees(store, scene, step_end_ns, report, error);
+    enum tracer_progress progress = upload_trees(store, step_end_ns, report, error);
     stage_times_add(times, STAGE_UPLOAD, CLOCK_CPU, 0, start_ns, clock_now_ns() - start_ns);
     return progress;
 }
@@ -426,7 +504,7 @@ bool bvh_store_rebuild(struct bvh_store *store, const struct gpu_scene *scene, s
         entry->grid_cost = old[i].grid_cost;
         entry->deformed_revision = scene->geometries[which[i]].deformed_revision;
     }
-    end_build(&store->build);
+    end_build(store);
     free(old);
     if (ok && !index_entries(store, scene))
         ok = error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a scene of %u geometries",
@@ -463,7 +541,7 @@ enum tracer_progress bvh_store_step(struct bvh_store *store, struct gpu_scene *s
     enum tracer_progress progress = go_on_building(store, scene, step_end_ns, report, times, error);
     if (progress == TRACER_MORE)
         return TRACER_MORE;
-    end_build(&store->build);
+    end_build(store);
     bool ok = progress == TRACER_DONE;
     if (ok && !index_entries(store, scene))
         ok = error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a scene of %u geometries",

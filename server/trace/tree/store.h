@@ -34,13 +34,17 @@ struct bvh_entry {
     float grid_cost, leaf_extent; /* as struct bvh_tree has them */
 };
 
-/* Trees that are being built, then uploaded. */
+/* Trees that are planned, then written: by software GL to the buffers themselves, else to arrays that are
+ * uploaded.
+ */
 struct bvh_store_build {
     struct bvh_job *jobs; /* owned; NULL: there are none */
     uint32_t *which;      /* owned; geometry of each */
     uint32_t count;
-    struct bvh_run *run; /* NULL: it has ended */
-    uint64_t start_ns;
+    struct bvh_run *run;     /* NULL: it has ended */
+    enum bvh_step step;      /* of the run */
+    bool is_mapped;          /* both buffers are, to be written */
+    uint64_t start_ns;       /* of the run */
     uint32_t uploaded;       /* trees */
     uint64_t uploaded_bytes; /* of the next one's elements and primitives */
 };

@@ -596,7 +596,16 @@ TEST(a_shape_without_primitives_is_refused)
 static bool run_jobs(struct bvh_job *jobs, uint32_t count, struct error *error)
 {
     uint64_t end_ns;
-    struct bvh_run *run = bvh_jobs_start(jobs, count, &packed);
+    struct bvh_run *run = bvh_jobs_start(jobs, count, &packed, BVH_PLAN);
+    assert_non_null(run);
+    if (!bvh_jobs_finish(run, &end_ns, error))
+        return false;
+    for (uint32_t i = 0; i < count; i++) {
+        assert_true(bvh_tree_alloc(&jobs[i].tree, &packed));
+        jobs[i].elements = jobs[i].tree.elements;
+        jobs[i].primitives = jobs[i].tree.primitives;
+    }
+    run = bvh_jobs_start(jobs, count, &packed, BVH_WRITE);
     assert_non_null(run);
     return bvh_jobs_finish(run, &end_ns, error);
 }
