@@ -212,7 +212,6 @@ static void build_thread(void *context, uint32_t thread)
 
 static void free_work(struct builder *builder)
 {
-    free(builder->boxes[1]);
     free(builder->order[1]);
     free(builder->waiting);
 }
@@ -226,17 +225,20 @@ static bool alloc_work(struct builder *builder, uint32_t count, unsigned threads
     tree->areas = malloc(places * sizeof(*tree->areas));
     tree->order = builder->order[0] = malloc(count * sizeof(*tree->order));
     builder->order[1] = malloc(count * sizeof(*tree->order));
-    builder->boxes[1] = aligned_alloc(32, count * sizeof(*builder->boxes[1]));
     builder->waiting = malloc((count / TASK_PRIMITIVES + 1) * sizeof(*builder->waiting));
-    return tree->nodes && tree->areas && tree->order && builder->order[1] && builder->boxes[1] && builder->waiting;
+    return tree->nodes && tree->areas && tree->order && builder->order[1] && builder->waiting;
 }
 
 bool bvh_binary_build(struct bvh_binary *tree, struct bvh_box *boxes, uint32_t count,
                       const struct bvh_costs *costs, unsigned threads, const atomic_bool *stop)
 {
     *tree = (struct bvh_binary){.primitive_count = count};
-    struct builder builder = {
-        .tree = tree, .boxes = {boxes}, .costs = costs, .node_count = 1, .shared = threads > 1, .stop = stop};
+    struct builder builder = {.tree = tree,
+                              .boxes = {boxes, boxes + count},
+                              .costs = costs,
+                              .node_count = 1,
+                              .shared = threads > 1,
+                              .stop = stop};
     const bool has_memory = alloc_work(&builder, count, threads);
     for (uint32_t i = 0; has_memory && i < count; i++)
         tree->order[i] = i;

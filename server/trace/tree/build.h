@@ -49,8 +49,8 @@ struct bvh_costs {
     uint32_t leaf_max; /* 1 .. BVH_LEAF_MAX */
 };
 
-/* Builds over boxes[0..count-1], which it writes over. 1 <= count <= 2^27. False: out of memory, or stopped:
- * `stop` (NULL: never) was set meanwhile. */
+/* Builds over boxes[0..count-1], which it writes over, and as many behind them, which need not be set. 1 <= count
+ * <= 2^27. False: out of memory, or stopped: `stop` (NULL: never) was set meanwhile. */
 bool bvh_binary_build(struct bvh_binary *tree, struct bvh_box *boxes, uint32_t count,
                       const struct bvh_costs *costs, unsigned threads, const atomic_bool *stop);
 void bvh_binary_finish(struct bvh_binary *tree);
@@ -141,6 +141,7 @@ bool bvh_tree_plan(struct bvh_tree *tree, const struct bvh_shape *shape, const s
                    struct error *error);
 void bvh_tree_write(struct bvh_tree *tree, const struct bvh_shape *shape, const struct bvh_form *settings,
                     uint32_t *elements, float *primitives);
+size_t bvh_primitive_texels(const struct bvh_shape *shape);
 bool bvh_tree_alloc(struct bvh_tree *tree, const struct bvh_form *settings); /* arrays of its own, for that */
 void bvh_tree_finish(struct bvh_tree *tree);
 #define BVH_PAD_RELATIVE 0x1p-21f

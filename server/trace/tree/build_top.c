@@ -114,7 +114,7 @@ bool bvh_top_build(struct bvh_top *top, const struct bvh_world_box *boxes, uint3
     if (count == 0)
         return true;
     struct bvh_binary binary = {0};
-    struct bvh_box *filled = aligned_alloc(16, count * sizeof(*filled));
+    struct bvh_box *filled = aligned_alloc(32, 2 * (size_t)count * sizeof(*filled));
     uint32_t *instances = malloc(count * sizeof(*instances));
     top->element_of = malloc(count * sizeof(*top->element_of));
     bool ok = filled && instances && top->element_of;

@@ -301,7 +301,7 @@ static uint32_t chunk_count(uint32_t count)
 static bool build_binary(struct work *work)
 {
     const uint32_t count = work->shape->primitive_count;
-    work->boxes = aligned_alloc(32, count * sizeof(*work->boxes));
+    work->boxes = aligned_alloc(32, 2 * (size_t)count * sizeof(*work->boxes));
     if (!work->boxes)
         return false;
     parallel_run(work->threads, chunk_count(count), chunk_boxes, work);
@@ -311,11 +311,16 @@ static bool build_binary(struct work *work)
     return ok;
 }
 
+size_t bvh_primitive_texels(const struct bvh_shape *shape)
+{
+    const size_t each = shape->centres_radii ? BVH_SPHERE_TEXELS : BVH_TRIANGLE_TEXELS;
+    return shape->primitive_count * each * (shape->deforms ? 2 : 1);
+}
+
 static bool plan(struct work *work)
 {
     struct bvh_tree *tree = work->tree;
     struct bvh_draft *draft = work->draft;
-    const size_t count = work->shape->primitive_count;
     if (!draft || !build_binary(work))
         return false;
     if (work->settings->bounds == BVH_BOUNDS_SPHERE && !make_spheres(work))
@@ -329,8 +334,7 @@ static bool plan(struct work *work)
     tree->grid = bvh_grid_over(tree->lower, tree->upper, 0);
     survey(work);
     tree->element_count = draft->baked.element_count;
-    tree->primitive_texels = count * (work->shape->centres_radii ? BVH_SPHERE_TEXELS : BVH_TRIANGLE_TEXELS) *
-                             (work->shape->deforms ? 2 : 1);
+    tree->primitive_texels = bvh_primitive_texels(work->shape);
     if (is_stopped(work))
         return false;
     return !work->shape->deforms || work->settings->plain || make_plan(work);
