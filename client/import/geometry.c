@@ -242,8 +242,6 @@ uint32_t import_add_mesh(struct import_scene *scene, struct import_mesh *mesh)
     edit->message.set_mesh.vertex_count = mesh->vertex_count;
     edit->message.set_mesh.triangle_count = mesh->triangle_count;
     edit->message.set_mesh.name = import_copy_name(scene, mesh->name);
-    edit->message.set_mesh.closed =
-        import_triangles_closed(mesh->positions, mesh->vertex_count, mesh->indices, mesh->triangle_count);
     edit->message.set_mesh.ranges = mesh->ranges;
     edit->message.set_mesh.ranges_count = mesh->range_count;
     edit->message.set_mesh.influence_count = mesh->influence_count;
@@ -270,6 +268,19 @@ uint32_t import_add_mesh(struct import_scene *scene, struct import_mesh *mesh)
     edit->message.set_mesh.arrays_count = count;
     memset(mesh, 0, sizeof(*mesh));
     return edit->message.set_mesh.mesh;
+}
+
+void import_mark_closed(struct import_scene *scene)
+{
+    for (size_t i = 0; i < scene->edit_count; i++) {
+        const struct import_edit *edit = &scene->edits[i];
+        struct message_set_mesh *mesh = &scene->edits[i].message.set_mesh;
+
+        if (edit->message.type == MESSAGE_SET_MESH && edit->blobs[0] != 0 && edit->blobs[1] != 0)
+            mesh->closed = import_triangles_closed(
+                (const float *)(const void *)scene->blobs[edit->blobs[0] - 1].bytes, mesh->vertex_count,
+                (const uint32_t *)(const void *)scene->blobs[edit->blobs[1] - 1].bytes, mesh->triangle_count);
+    }
 }
 
 static bool spheres_valid(struct import_scene *scene, const char *name, const float *spheres, uint32_t count,

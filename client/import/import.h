@@ -165,6 +165,9 @@ struct import_mesh {
     uint32_t range_count;
 };
 uint32_t import_add_mesh(struct import_scene *scene, struct import_mesh *mesh);
+/* Once all is added: says in the edit of each mesh whether it is closed (closed.h). Blobs may be hashed and sent
+ * meanwhile. */
+void import_mark_closed(struct import_scene *scene);
 void import_mesh_finish(struct import_mesh *mesh); /* for one that was not added */
 
 /* `spheres` (4 floats each) and `ranges` are taken. */

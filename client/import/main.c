@@ -16,6 +16,7 @@
 #include <argp.h>
 #include <errno.h>
 #include <math.h>
+#include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -369,13 +370,20 @@ static bool send_names(struct sender *sender, const struct options *options)
     return true;
 }
 
+static void *mark_closed(void *scene)
+{
+    import_mark_closed(scene);
+    return NULL;
+}
+
 static bool run(struct import_scene *scene, struct sender *sender, const struct options *options,
                 uint64_t start_ns)
 {
     struct message_import_done done = {0};
     struct files surroundings = {.folder = -1, .model = -1, .environment = -1, .images = -1};
     uint64_t parsed_ns, begin_ns = monotonic_now_ns();
-    bool imported;
+    bool imported, marks, sent;
+    pthread_t marker;
 
     silence_libraries();
     imported = read_files(scene, &surroundings, options) && read_and_import(scene, &surroundings, sender, options);
@@ -389,14 +397,20 @@ static bool run(struct import_scene *scene, struct sender *sender, const struct 
         done.read_ns += options->sources[i].files.read_ns;
         source_finish(&options->sources[i]);
     }
-    if (!imported || !sender_notes(sender) || !sender_progress(sender, 0, scene->blob_bytes, "hashing"))
+    if (!imported)
         return false;
     begin_ns += done.read_ns;
     done.parse_ns = parsed_ns > begin_ns ? parsed_ns - begin_ns : 0;
-    if (!import_hash(scene))
-        return false;
+    /* The edits come after the blobs and alone say which meshes are closed. */
+    marks = pthread_create(&marker, NULL, mark_closed, scene) == 0;
+    sent = sender_notes(sender) && sender_progress(sender, 0, scene->blob_bytes, "hashing") && import_hash(scene);
     done.hash_ns = monotonic_now_ns() - parsed_ns;
-    if (!sender_blobs(sender) || !sender_edits(sender, options->scene))
+    sent = sent && sender_blobs(sender);
+    if (marks)
+        pthread_join(marker, NULL);
+    else
+        mark_closed(scene);
+    if (!sent || !sender_edits(sender, options->scene))
         return false;
     done.total_ns = monotonic_now_ns() - start_ns;
     return sender_done(sender, &done);
