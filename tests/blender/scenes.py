@@ -87,7 +87,8 @@ def bow_and_points(name, place=(0, 0, 0)):
     joined, end = tree.nodes.new("GeometryNodeJoinGeometry"), tree.nodes.new("NodeGroupOutput")
     tree.links.new(joined.outputs[0], end.inputs[0])
     curve = {"Start": (0, 0, 0), "Start Handle": (0, 0, 1), "End Handle": (0.5, 0, 2), "End": (1, 0, 1)}
-    for chain in ((("CurvePrimitiveBezierSegment", curve), ("ResampleCurve", {"Count": 5}), ("SetCurveRadius", {"Radius": 0.2})),
+    for chain in ((("CurvePrimitiveBezierSegment", curve), ("ResampleCurve", {"Count": 5}), ("SetCurveRadius", {"Radius": 0.2}),
+                   ("SetMaterial", {"Material": diffuse((0.1, 0.3, 0.8, 1))})),
                   (("MeshLine", {"Offset": (0.6, 0, 0), "Count": 5}), ("MeshToPoints", {"Radius": 0.25}),
                    ("SetMaterial", {"Material": diffuse((0.2, 0.7, 0.2, 1))}))):
         before = None
@@ -100,7 +101,6 @@ def bow_and_points(name, place=(0, 0, 0)):
             before = node
         tree.links.new(before.outputs[0], joined.inputs[0])
     data = bpy.data.hair_curves.new(name)
-    data.materials.append(diffuse((0.1, 0.3, 0.8, 1)))
     made = put(name, data, place)
     made.modifiers.new(name, "NODES").node_group = tree
     return made

@@ -339,6 +339,55 @@ class Strands(Case):
         self.assert_like_cycles(0.02, 0.1)
         self.assertEqual(len(next(iter(mirror._mirrors.values())).scene.objects("spheres")), 1)
 
+    def test_hairs_that_bend_while_the_shutter_is_open(self):
+        scene = empty((0.6, 0.6, 0.6))
+        grid("ground", 20, diffuse(GROUND))
+        thing = grid("field", 3, diffuse((0.1, 0.6, 0.1, 1)), (0, 0, 1))
+        hairs(thing, 60, hair_length=1, radius_scale=0.2, render_step=3, shape=0)
+        thing.shape_key_add(name="rest")
+        bowl = thing.shape_key_add(name="bowl")  # turns the hairs with their roots, these by 4 degrees each frame
+        for point in bowl.data:
+            point.co.z = 1.4 * point.co.x
+        scene.render.use_motion_blur, scene.render.motion_blur_shutter = True, 1
+        for frame, value in ((1, -1), (3, 1)):
+            bowl.slider_min = -1
+            bowl.value = value
+            bowl.keyframe_insert("value", frame=frame)
+        scene.frame_set(2)
+        self.assert_like_cycles(0.02, 0.1)
+        blurred = render()
+        scene.render.use_motion_blur = False
+        self.assertGreater(np.abs(blocks(render()) - blocks(blurred)).max(), 0.05)
+
+    def test_curves_that_bend_while_the_shutter_is_open(self):
+        scene = empty((0.6, 0.6, 0.6))
+        grid("ground", 20, diffuse(GROUND))
+        made = scenes.bow_and_points("bow", (-1.5, 0, 0))
+        curve = next(node for node in made.modifiers[0].node_group.nodes if node.bl_idname == "GeometryNodeCurvePrimitiveBezierSegment")
+        for frame, x in ((1, -1), (3, 3)):
+            for name, place in (("End", (x, 0, 2.2)), ("End Handle", (x / 2, 0, 1.5))):
+                curve.inputs[name].default_value = place
+                curve.inputs[name].keyframe_insert("default_value", frame=frame)
+        scene.render.use_motion_blur, scene.render.motion_blur_shutter = True, 1
+        scene.frame_set(2)
+        self.assert_like_cycles(0.01, 0.05)
+
+    def test_what_does_not_bend_with_the_shutter_is_told(self):
+        scene = empty()
+        nodes = scenes.bow_and_points("bow").modifiers[0].node_group.nodes
+        scene.farlight.samples, scene.render.use_motion_blur = 1, True
+        for kind, key, values, told in (
+                ("MeshLine", "Offset", ((0.2, 0, 0), (1, 0, 0)), "its points move in it while the shutter is open, and are drawn where they are at "
+                 "the frame's time"),
+                ("ResampleCurve", "Count", (5, 50), "its points differ in number while the shutter is open: it does not deform meanwhile")):
+            value = next(node for node in nodes if node.bl_idname == f"GeometryNode{kind}").inputs[key]
+            for frame, value.default_value in zip((1, 3), values):
+                value.keyframe_insert("default_value", frame=frame)
+            scene.frame_set(2)
+            with self.subTest(kind), unittest.mock.patch.object(engine.FarlightEngine, "_warn") as warned:
+                render()
+                self.assertIn(f"bow: {told}", [one.args[0] for one in warned.call_args_list])
+
     def test_hairs_of_an_object_that_moves_are_not_sent_again(self):
         scene, thing = self.fur()
         scene.farlight.samples = 1

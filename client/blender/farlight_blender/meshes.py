@@ -17,6 +17,7 @@ from .motion import Motion
 if TYPE_CHECKING:
     from .mirror import Mirror
 
+DIFFER = "its points differ in number while the shutter is open: it does not deform meanwhile"
 Steady = Callable[[str, Any], Any]  # Mirror.steady() of one mesh
 
 
@@ -45,15 +46,15 @@ def _colours(mesh: bpy.types.Mesh, name: str) -> Any:
     return np.rint(np.clip(values, 0, 1) * 255).astype(np.uint8)
 
 
-def shape(mesh: bpy.types.Mesh) -> tuple[Any, Any]:
-    """Positions and normals of its corners."""
-    return read(mesh.vertices, "co", 3)[read(mesh.loops, "vertex_index", 1, np.int32)], _normals(mesh)
+def shape(mesh: bpy.types.Mesh) -> Any:
+    """Corners x 6: their positions and normals."""
+    return np.column_stack((read(mesh.vertices, "co", 3)[read(mesh.loops, "vertex_index", 1, np.int32)], _normals(mesh)))
 
 
 def _corners(mesh: bpy.types.Mesh, uses: list[Material], steady: Steady) -> dict[str, Any]:
     """What Scene.add_mesh() takes of each corner."""
-    points, normals = shape(mesh)
-    arrays = {"positions": points, "normals": steady("normals", normals)}
+    corners = shape(mesh)
+    arrays = {"positions": corners[:, :3], "normals": steady("normals", corners[:, 3:])}
     layer = next((one for one in mesh.uv_layers if one.active_render), None)
     if layer is not None:
         # Rows of textures are counted from the top, Blender's v from below.
@@ -80,7 +81,7 @@ def _arrays(mesh: bpy.types.Mesh, uses: list[Material], steady: Steady, bent: Op
     corners = _corners(mesh, uses, steady)
     if bent is not None:
         bent[..., 3:] = steady("bent", bent[..., 3:])
-        corners.update(positions=bent[0, :, :3], normals=bent[0, :, 3:], moves=np.column_stack(list(bent[1:] - bent[0])))
+        corners.update(with_moves(bent))
     # Corners that are the same in everything are one vertex.
     rows = np.column_stack([np.ascontiguousarray(one, np.uint8 if name == "colours" else np.float32).view(np.uint8)
                             for name, one in corners.items() if one is not None])
@@ -89,7 +90,13 @@ def _arrays(mesh: bpy.types.Mesh, uses: list[Material], steady: Steady, bent: Op
             "triangles": vertex[triangles[order]], "materials": numbers[slots[order]]}
 
 
-def _with_targets(scene: Scene, arrays: dict[str, Any]) -> dict[str, Any]:
+def with_moves(bent: Any) -> dict[str, Any]:
+    """What Scene.add_mesh() takes of the first key, and "moves" to others. bent: keys x vertices x 6, positions and normals."""
+    made = {"positions": bent[0, :, :3], "normals": bent[0, :, 3:]}
+    return {**made, "moves": np.column_stack(list(bent[1:] - bent[0]))} if len(bent) > 1 else made
+
+
+def with_targets(scene: Scene, arrays: dict[str, Any]) -> dict[str, Any]:
     """Fields of set_mesh for a mesh that deforms: morph targets, the offsets to each key of the shutter but the first."""
     moves = arrays.pop("moves", None)
     if moves is None:
@@ -140,7 +147,7 @@ class Shared:
     def _bent(self, thing: bpy.types.Object, key: Hashable, mesh: bpy.types.Mesh) -> Optional[Any]:
         bent, has_changed = self._motion.shape(key, len(mesh.loops)) if self._motion else (None, False)
         if has_changed:
-            self._mirror.note(f"{thing.name}: its points differ in number while the shutter is open: it does not deform meanwhile")
+            self._mirror.note(f"{thing.name}: {DIFFER}")
         return bent
 
     def _make(self, thing: bpy.types.Object, key: Hashable) -> tuple[Optional[Object], bool]:
@@ -155,5 +162,5 @@ class Shared:
                 thing.to_mesh_clear()
         if arrays is None:
             return None, False
-        more = _with_targets(self._mirror.scene, arrays)
+        more = with_targets(self._mirror.scene, arrays)
         return self._mirror.scene.add_mesh(arrays.pop("positions"), mesh=number, name=thing.name[:100], **arrays, **more), bool(more)

@@ -54,7 +54,7 @@ def _hairs_key(key: Hashable, system: str) -> Hashable:
 
 def moment(depsgraph: bpy.types.Depsgraph, camera: bpy.types.Object) -> motion.Moment:
     """Where things are, and the shapes of those that deform, at the time that Blender's scene has."""
-    made, names = motion.Moment(), meshes.Names()
+    made, names, others = motion.Moment(), meshes.Names(), meshes.Names()
     scene = depsgraph.scene_eval
     for instance in depsgraph.object_instances:
         thing = instance.object
@@ -63,10 +63,17 @@ def moment(depsgraph: bpy.types.Depsgraph, camera: bpy.types.Object) -> motion.M
             made.places[key] = instance.matrix_world.copy()
             for hairs in strands.hairy(thing, True) if _has_hairs(instance) else ():
                 made.places[_hairs_key(key, hairs.particle_system.name)] = made.places[key]
+                mesh = strands.hairs_key(thing, hairs.particle_system)
+                if mesh not in made.shapes and motion.may_deform(thing):
+                    made.shapes[mesh] = strands.places(thing, hairs.particle_system, True)
         if instance.show_self and thing.type in WITH_SURFACE:
             mesh, is_new = names.of(thing)
             if is_new and motion.deforms(thing, scene):
                 made.shapes[mesh] = meshes.shape(thing.data)
+        if instance.show_self and thing.type in WITHOUT_FACES:
+            name, is_new = others.of(thing)
+            if is_new and motion.may_deform(thing):
+                made.shapes[thing.type, *name] = strands.rows(thing.data)
     if motion.is_blurred(camera):
         made.places[CAMERA] = camera.matrix_world.copy()
     return made
@@ -129,11 +136,15 @@ class Mirror:
         if text not in self.notes:
             self.notes.append(text)
 
-    def place(self, key: Hashable, shows: Object, matrix: Any, name: str, rigid: Optional[Callable[[Any], Any]] = None) -> Object:
-        """Shows a thing at a place in Blender's world. rigid: what is left of a place, for a light or the camera."""
+    def place(self, key: Hashable, shows: Object, matrix: Any, name: str, rigid: Optional[Callable[[Any], Any]] = None,
+              *, bends: bool = False) -> Object:
+        """Shows a thing at a place in Blender's world. rigid: what is left of a place, for a light or the camera. bends: its mesh has
+        targets."""
         node = self.number(ObjectKind.NODE, key)
         if self._motion is not None and not self._motion.follow(key, node, rigid):
             self.note(f"{name}: it is sheared, and while it moves it is not")
+        if self._motion is not None and bends:
+            self._motion.bend(key, node)
         return self.scene.add_node(shows, np.array(rigid(matrix) if rigid else matrix), parent=self._root(), node=node, name=name[:100])
 
     def _root(self) -> Object:
@@ -152,7 +163,7 @@ class Mirror:
                                parent_from_node=[float(one) for one in WORLD_FROM_BLENDER[:3].ravel()]))
         world.update(self, depsgraph.scene_eval)
         reader = materials.Reader(self)
-        shared = meshes.Shared(self, reader, moves), strands.Shared(self, reader, depsgraph.mode == "RENDER")
+        shared = meshes.Shared(self, reader, moves), strands.Shared(self, reader, moves, depsgraph.mode == "RENDER")
         found: list[tuple[Hashable, bpy.types.Object, Any]] = []  # lights
         extent = _Extent()
         for instance in depsgraph.object_instances:
@@ -176,21 +187,19 @@ class Mirror:
             mesh, bends = shared[0].mesh(thing)
             if mesh is not None:
                 extent.add(mesh, thing, place)
-                node = self.place(key, mesh, place, thing.name)
-                if bends and self._motion is not None:
-                    self._motion.bend(key, node.number)
+                self.place(key, mesh, place, thing.name, bends=bends)
         elif instance.show_self and thing.type in WITHOUT_FACES:
-            shown = shared[1].own(thing)
+            shown, bends = shared[1].own(thing)
             if shown is not None:
                 extent.add(shown, thing, place)
-                self.place(key, shown, place, thing.name)
+                self.place(key, shown, place, thing.name, bends=bends)
         elif instance.show_self and thing.type == "LIGHT":
             found.append((key, thing, place.copy()))
         elif instance.show_self and thing.type in NOT_DRAWN:
             self.note(f"{thing.name}: {NOT_DRAWN[thing.type]}")
-        for name, hairs in shared[1].hairs(thing) if _has_hairs(instance) else ():
+        for name, hairs, bends in shared[1].hairs(thing) if _has_hairs(instance) else ():
             if hairs is not None:
-                self.place(_hairs_key(key, name), hairs, place, thing.name)
+                self.place(_hairs_key(key, name), hairs, place, thing.name, bends=bends)
 
     def _sweep(self) -> None:
         gone = [one for one in self._numbers if one not in self._seen]

@@ -27,7 +27,7 @@ FIRST = {"START": 0.0, "CENTER": -0.5, "END": -1.0}  # when the shutter opens, i
 class Moment:
     """What of the scene may move, as it is at one key."""
     places: dict[Hashable, Any] = field(default_factory=dict)  # matrices, by the keys of nodes
-    shapes: dict[Hashable, tuple[Any, Any]] = field(default_factory=dict)  # positions and normals of corners, by the keys of meshes
+    shapes: dict[Hashable, Any] = field(default_factory=dict)  # rows of corners or of points of strands, by the keys of meshes
 
 
 def position_owner(scene: bpy.types.Scene) -> Any:
@@ -53,10 +53,14 @@ def is_blurred(thing: bpy.types.Object) -> bool:
     return bool(getattr(getattr(thing, "cycles", None), "use_motion_blur", True))
 
 
+def may_deform(thing: bpy.types.Object) -> bool:
+    """Cycles has a switch for this, too."""
+    return is_blurred(thing) and bool(getattr(getattr(thing, "cycles", None), "use_deform_motion", True))
+
+
 def deforms(thing: bpy.types.Object, scene: bpy.types.Scene) -> bool:
     """Whether its mesh may change its shape while its points stay the same."""
-    may = getattr(getattr(thing, "cycles", None), "use_deform_motion", True)
-    return bool(thing.type == "MESH" and is_blurred(thing) and may and thing.original.is_deform_modified(scene, "RENDER"))
+    return bool(thing.type == "MESH" and may_deform(thing) and thing.original.is_deform_modified(scene, "RENDER"))
 
 
 class Motion:
@@ -68,15 +72,16 @@ class Motion:
         self._clips: dict[str, int] = {}
         self._channels: dict[str, list[tuple[Hashable, int, ChannelPath, int, Any]]] = {"things": [], "watchers": []}
 
-    def shape(self, mesh: Hashable, corners: int) -> tuple[Optional[Any], bool]:
-        """Keys x corners x 6, positions and normals, of a mesh that deforms; and whether it would if its points stayed the same."""
-        found = [one.shapes.get(mesh) for one in self._moments]
-        if any(one is None for one in found):
+    def shape(self, mesh: Hashable, rows: int, rounding: float = 0) -> tuple[Optional[Any], bool]:
+        """Keys x rows x columns of what deforms, positions in the first three; and whether it would if its points stayed the same.
+        rounding: by how much positions differ that are the same."""
+        found = [one.shapes[mesh] for one in self._moments if mesh in one.shapes]
+        if len(found) < len(self._moments):
             return None, False
-        if any(len(one[0]) != corners for one in found if one):
+        if any(len(one) != rows for one in found):
             return None, True
-        stacked = np.stack([np.column_stack(one) for one in found if one])
-        return (stacked if np.abs(stacked[..., :3] - stacked[0, :, :3]).max(initial=0) > 0 else None), False
+        stacked = np.stack(found)
+        return (stacked if np.abs(stacked[..., :3] - stacked[0, :, :3]).max(initial=0) > rounding else None), False
 
     def follow(self, key: Hashable, node: int, rigid: Optional[Callable[[Any], Any]]) -> bool:
         """Lets a node move as Blender's object of that key. rigid: what is left of a place of a light or the camera. False: the

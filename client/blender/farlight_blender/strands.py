@@ -4,7 +4,6 @@
 Hairs and curves become tubes of triangles, points exact spheres. Which hairs there are and how thick they are is as in Cycles."""
 from __future__ import annotations
 
-import functools
 import itertools
 import math
 from collections.abc import Hashable, Iterator
@@ -17,7 +16,8 @@ from farlight.scene import Object
 from farlight.messages import ObjectKind
 
 from .materials import Material, Reader
-from .meshes import Names, Steady, read
+from .meshes import DIFFER, Names, read, with_moves, with_targets
+from .motion import Motion
 
 if TYPE_CHECKING:
     from .mirror import Mirror
@@ -28,6 +28,7 @@ WIDER = math.pi / (SIDES * math.sin(math.pi / SIDES))
 SMOOTH = 12  # points that curves of few are brought to: Cycles draws them as splines
 CURVE_RADIUS = 0.005  # metres, of curves without radii: Cycles'
 TINY = 1e-12
+ROUNDING = 1e-5  # metres: Blender tells places of hairs in the world, in which rounding differs as their object moves
 
 
 @dataclass
@@ -37,9 +38,15 @@ class Strands:
     radii: Any  # n
     strand: Any  # n, of each point its strand's number, ascending
     texcoords: Optional[Any] = None  # of each strand, v from below
+    bent: Optional[Any] = None  # keys of the shutter x n x 3: the points of strands that bend
 
 
 # ---- particle systems
+
+def hairs_key(thing: bpy.types.Object, system: bpy.types.ParticleSystem) -> Hashable:
+    """Of the mesh of a particle system's hairs."""
+    return "hairs", thing.name_full, system.name
+
 
 def hairy(thing: bpy.types.Object, is_final: bool) -> Iterator[bpy.types.Modifier]:
     """Of an evaluated object: its particle systems whose hairs are seen."""
@@ -68,16 +75,19 @@ def _thickness(settings: bpy.types.ParticleSettings, share: Any, is_last: Any) -
     return np.where(is_last & settings.use_close_tip, 0, radii)
 
 
-def of_particles(thing: bpy.types.Object, modifier: bpy.types.Modifier, is_final: bool,
-                 steady: Steady) -> Optional[Strands]:
-    """The hairs of one system; None: it has none."""
-    system = modifier.particle_system
-    settings, numbers = system.settings, _numbers(system, is_final)
-    steps = (1 << (settings.render_step if is_final else settings.display_step)) + 1
+def _steps(settings: bpy.types.ParticleSettings, is_final: bool) -> int:
+    """Points of each hair."""
+    steps: int = (1 << (settings.render_step if is_final else settings.display_step)) + 1
     if settings.kink == "SPIRAL":
         steps += settings.kink_extra_steps
-    if not numbers or not len(system.particles):
-        return None
+    return steps
+
+
+def places(thing: bpy.types.Object, system: bpy.types.ParticleSystem, is_final: bool) -> Any:
+    """The points of all hairs of one system, the same number for each, in the space of the object."""
+    numbers, steps = _numbers(system, is_final) if len(system.particles) else range(0), _steps(system.settings, is_final)
+    if not numbers:
+        return np.empty((0, 3), np.float32)
     place = system.co_hair
     found = itertools.chain.from_iterable(place(thing, particle_no=number, step=step) for number in numbers for step in range(steps))
     world = np.fromiter(found, np.float64, 3 * len(numbers) * steps).reshape(-1, 3)
@@ -85,11 +95,21 @@ def of_particles(thing: bpy.types.Object, modifier: bpy.types.Modifier, is_final
     is_there[::steps] = True
     world = world[np.maximum.accumulate(np.where(is_there, np.arange(len(world)), 0))]
     back = np.linalg.pinv(np.array(thing.matrix_world, np.float64))
-    points = steady("hairs", (world @ back[:3, :3].T + back[:3, 3]).astype(np.float32))
+    return (world @ back[:3, :3].T + back[:3, 3]).astype(np.float32)
+
+
+def of_particles(thing: bpy.types.Object, modifier: bpy.types.Modifier, is_final: bool, points: Any,
+                 bent: Optional[Any]) -> Optional[Strands]:
+    """The hairs of one system, of whose places() the points are; None: it has none. bent: these at the keys of the shutter."""
+    if not len(points):
+        return None
+    system = modifier.particle_system
+    settings, numbers, steps = system.settings, _numbers(system, is_final), _steps(system.settings, is_final)
     strand = np.repeat(np.arange(len(numbers)), steps)
-    lengths = np.r_[0, np.linalg.norm(np.diff(points, axis=0), axis=1)]
+    every = points[None] if bent is None else bent
+    lengths = np.pad(np.linalg.norm(np.diff(every, axis=1), axis=2).max(axis=0), (1, 0))
     lengths[::steps] = 0
-    keep = lengths > 0  # of places that are repeated
+    keep = lengths > 0  # of places that are repeated, at all keys
     keep[::steps] = True
     along = lengths.reshape(-1, steps).cumsum(axis=1)
     share = (along / np.maximum(along[:, -1:], TINY)).ravel()[keep]
@@ -102,7 +122,7 @@ def of_particles(thing: bpy.types.Object, modifier: bpy.types.Modifier, is_final
         last = len(system.particles) - 1
         texcoords = np.array([system.uv_on_emitter(modifier, particle=system.particles[min(number, last)], particle_no=number,
                                                    uv_no=at)[:] for number in numbers], np.float32)
-    return Strands(points, radii, strand, texcoords)
+    return Strands(points, radii, strand, texcoords, None if bent is None else bent[:, keep])
 
 
 # ---- curves
@@ -145,13 +165,16 @@ def _across(directions: Any) -> Any:
     return _normalised(np.cross(directions, np.eye(3)[np.abs(directions).argmin(axis=1)]), (1.0, 0.0, 0.0))
 
 
-def _frames(points: Any, strand: Any) -> tuple[Any, Any]:
-    """Two directions across each point's strand, which turn no more than it does."""
+def _frames(points: Any, strand: Any, like: Optional[Any] = None) -> tuple[Any, Any]:
+    """Two directions across each point's strand, which turn no more than it does. like: the first of each before it bent."""
     first = np.flatnonzero(np.r_[True, strand[1:] != strand[:-1]])
     counts = np.diff(np.r_[first, len(strand)])
     low, high = np.maximum(np.arange(len(strand)) - 1, np.repeat(first, counts)), np.arange(1, len(strand) + 1)
     high = np.minimum(high, np.repeat(first + counts - 1, counts))
     along = _normalised(points[high] - points[low], (0.0, 0.0, 1.0))
+    if like is not None:
+        across = _normalised(like - along * (like * along).sum(axis=1, keepdims=True), _across(along))
+        return across, np.cross(along, across)
     across = _across(along)
     for step in range(1, counts.max()):
         at = first[counts > step] + step
@@ -166,17 +189,19 @@ def tubes(strands: Strands) -> Optional[dict[str, Any]]:
     start = np.flatnonzero((strand[1:] == strand[:-1]) & ((strands.radii[1:] > 0) | (strands.radii[:-1] > 0)))
     if not len(start):
         return None
-    points = strands.points.astype(np.float64)
-    across, beside = _frames(points, strand)
-    angles = np.arange(SIDES) * (2 * math.pi / SIDES)
-    normals = np.cos(angles)[:, None] * across[:, None] + np.sin(angles)[:, None] * beside[:, None]
-    corners = points[:, None] + WIDER * strands.radii[:, None, None] * normals
+    across, corners = None, []
+    for points in (strands.points[None] if strands.bent is None else strands.bent).astype(np.float64):
+        made, beside = _frames(points, strand, across)
+        across = made if across is None else across
+        angles = np.arange(SIDES) * (2 * math.pi / SIDES)
+        normals = np.cos(angles)[:, None] * made[:, None] + np.sin(angles)[:, None] * beside[:, None]
+        corners.append(np.concatenate((points[:, None] + WIDER * strands.radii[:, None, None] * normals, normals), axis=2).reshape(-1, 6))
     side = np.arange(SIDES)
     here, there = start[:, None] * SIDES + side, start[:, None] * SIDES + (side + 1) % SIDES
     wide = [np.broadcast_to(strands.radii[one, None] > 0, here.shape) for one in (start, start + 1)]  # else a tip: one triangle
     triangles = np.concatenate((np.stack((here, there, there + SIDES), axis=-1)[wide[0]],
                                 np.stack((here, there + SIDES, here + SIDES), axis=-1)[wide[1]]))
-    arrays = {"positions": corners.reshape(-1, 3), "normals": normals.reshape(-1, 3), "triangles": triangles}
+    arrays = {**with_moves(np.stack(corners)), "triangles": triangles}
     if strands.texcoords is not None:
         # Rows of textures are counted from the top, Blender's v from below.
         arrays["texcoords"] = np.repeat(strands.texcoords[strand] * (1, -1) + (0, 1), SIDES, axis=0)
@@ -184,6 +209,14 @@ def tubes(strands: Strands) -> Optional[dict[str, Any]]:
 
 
 # ---- points
+
+def rows(data: Any) -> Any:
+    """What of curves or a point cloud may move: of each point its place, and for curves its strand's number."""
+    if isinstance(data, bpy.types.PointCloud):
+        return read(data.points, "co", 3)
+    made = of_curves(data)
+    return np.column_stack((made.points, made.strand)) if made else np.empty((0, 4))
+
 
 def of_points(data: bpy.types.PointCloud) -> Optional[tuple[Any, Any]]:
     """Centres and radii; None: nothing is seen."""
@@ -198,10 +231,10 @@ def of_points(data: bpy.types.PointCloud) -> Optional[tuple[Any, Any]]:
 class Shared:
     """What is read in one update: once, however often it is seen."""
 
-    def __init__(self, mirror: Mirror, reader: Reader, is_final: bool) -> None:
-        self._mirror, self._reader, self._is_final = mirror, reader, is_final
+    def __init__(self, mirror: Mirror, reader: Reader, moves: Optional[Motion], is_final: bool) -> None:
+        self._mirror, self._reader, self._motion, self._is_final = mirror, reader, moves, is_final
         self._names = Names()
-        self._made: dict[Hashable, Optional[Object]] = {}
+        self._made: dict[Hashable, tuple[Optional[Object], bool]] = {}
 
     def _material(self, thing: bpy.types.Object, slot: int) -> Material:
         slots = thing.material_slots
@@ -210,39 +243,64 @@ class Shared:
             self._mirror.note(f"{thing.name}: its strands have no colour attributes and are drawn as if these were white")
         return made
 
-    def _tubes(self, thing: bpy.types.Object, number: int, made: Optional[Strands], slot: int) -> Optional[Object]:
+    def _bent(self, thing: bpy.types.Object, key: Hashable, count: int) -> Optional[Any]:
+        """Rows at the keys of the shutter; None: they stay as they are."""
+        bent, has_changed = self._motion.shape(key, count, ROUNDING) if self._motion else (None, False)
+        if has_changed or bent is not None and (bent[..., 3:] != bent[0, :, 3:]).any():
+            self._mirror.note(f"{thing.name}: {DIFFER}")
+            return None
+        return bent
+
+    def _tubes(self, thing: bpy.types.Object, number: int, made: Optional[Strands], slot: int) -> tuple[Optional[Object], bool]:
         arrays = tubes(made) if made else None
         if arrays is None:
-            return None
+            return None, False
+        more = with_targets(self._mirror.scene, arrays)
         material = Object(ObjectKind.MATERIAL, self._material(thing, slot).number)
-        return self._mirror.scene.add_mesh(arrays.pop("positions"), mesh=number, name=thing.name[:100], material=material, **arrays)
+        return self._mirror.scene.add_mesh(arrays.pop("positions"), mesh=number, name=thing.name[:100], material=material, **arrays,
+                                           **more), bool(more)
 
-    def hairs(self, thing: bpy.types.Object) -> list[tuple[str, Optional[Object]]]:
-        """Of an evaluated object: names and meshes of its particle systems' hairs."""
+    def _fur(self, thing: bpy.types.Object, modifier: bpy.types.Modifier, key: Hashable) -> tuple[Optional[Object], bool]:
+        number = self._mirror.number(ObjectKind.MESH, key)
+        points = self._mirror.steady(number, "hairs", places(thing, modifier.particle_system, self._is_final))
+        bent = self._bent(thing, key, len(points))
+        if bent is not None:
+            bent = self._mirror.steady(number, "bent", bent)
+        made = of_particles(thing, modifier, self._is_final, points, bent)
+        return self._tubes(thing, number, made, modifier.particle_system.settings.material - 1)
+
+    def hairs(self, thing: bpy.types.Object) -> list[tuple[str, Optional[Object], bool]]:
+        """Of an evaluated object: names and meshes of its particle systems' hairs, and whether they bend while the shutter is open."""
         found = []
         for modifier in hairy(thing, self._is_final):
             name = modifier.particle_system.name
-            key = ("hairs", thing.name_full, name)
+            key = hairs_key(thing, modifier.particle_system)
             if key not in self._made:
-                number = self._mirror.number(ObjectKind.MESH, key)
-                made = of_particles(thing, modifier, self._is_final, functools.partial(self._mirror.steady, number))
-                self._made[key] = self._tubes(thing, number, made, modifier.particle_system.settings.material - 1)
-            found.append((name, self._made[key]))
+                self._made[key] = self._fur(thing, modifier, key)
+            found.append((name, *self._made[key]))
         return found
 
-    def own(self, thing: bpy.types.Object) -> Optional[Object]:
-        """The tubes or spheres of an object of the type curves or point cloud; None: there are none."""
+    def own(self, thing: bpy.types.Object) -> tuple[Optional[Object], bool]:
+        """The tubes or spheres of an object of the type curves or point cloud, and whether they bend; None: there are none."""
         name, is_new = self._names.of(thing)
         key = (thing.type, *name)
         if is_new:
-            self._made[key] = self._points(thing, key) if thing.type == "POINTCLOUD" else self._tubes(
-                thing, self._mirror.number(ObjectKind.MESH, key), of_curves(thing.data), 0)
+            self._made[key] = (self._points(thing, key), False) if thing.type == "POINTCLOUD" else self._curves(thing, key)
         return self._made[key]
+
+    def _curves(self, thing: bpy.types.Object, key: Hashable) -> tuple[Optional[Object], bool]:
+        made = of_curves(thing.data)
+        bent = self._bent(thing, key, len(made.points)) if made else None
+        if made and bent is not None:
+            made.bent = bent[..., :3]
+        return self._tubes(thing, self._mirror.number(ObjectKind.MESH, key), made, 0)
 
     def _points(self, thing: bpy.types.Object, key: Hashable) -> Optional[Object]:
         found = of_points(thing.data)
         if found is None:
             return None
+        if self._bent(thing, key, len(thing.data.points)) is not None:
+            self._mirror.note(f"{thing.name}: its points move in it while the shutter is open, and are drawn where they are at the frame's time")
         material = Object(ObjectKind.MATERIAL, self._material(thing, 0).number)
         return self._mirror.scene.add_spheres(*found, material=material, name=thing.name[:100],
                                               spheres=self._mirror.number(ObjectKind.SPHERES, key))
