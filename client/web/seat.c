@@ -317,6 +317,8 @@ static void *work(void *argument)
     struct seat *seat = argument;
     struct fl_error error = {0}, ignored;
     serve(seat, &error);
+    if (!seat->connection) /* these name the daemon's address or its key's file */
+        error.field[0] = error.remedy[0] = '\0';
     if (error.code != FL_ERROR_NONE && error.code != FL_ERROR_INTERRUPTED)
         post(seat, web_describe_error(&error, error.code != FL_ERROR_ARGUMENT), NULL, 0, &ignored);
     edit_history_clear(&seat->history);

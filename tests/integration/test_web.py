@@ -260,7 +260,13 @@ class Web(Case):
             while kind == BINARY:
                 kind, data = view.receive()
             self.assertTrue(json.loads(data)["error"]["again"], data)
+            self.assertNotIn(str(self.folder), data.decode(), "where the daemon is")
             self.assertEqual(view.closed_with(), GOING)
+            with Socket(gateway) as late:
+                late.send({"show": SHOW})
+                _, data = late.receive()
+                self.assertTrue(json.loads(data)["error"]["again"], data)
+                self.assertNotIn(str(self.folder), data.decode(), "where the daemon is")
             with self.serve(address):
                 self.view(gateway)
             status, said = gateway.stop()
@@ -427,7 +433,13 @@ class Model(Case):
             while kind == BINARY:
                 kind, data = view.receive()
             self.assertTrue(json.loads(data)["error"]["again"], data)
+            self.assertNotIn(str(self.folder), data.decode(), "where the daemon is")
             self.assertEqual(view.closed_with(), GOING)
+            with Socket(gateway) as late:
+                late.send({"show": SHOW})
+                _, data = late.receive()
+                self.assertTrue(json.loads(data)["error"]["again"], data)
+                self.assertNotIn(str(self.folder), data.decode(), "where the daemon is")
             deadline, frame = time.monotonic() + TIMEOUT_S, None
             while not frame and time.monotonic() < deadline:
                 try:
