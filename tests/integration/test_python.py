@@ -348,6 +348,23 @@ class WithDaemon(OneDaemon):
         self.assertEqual(picture.albedo[..., 1].ravel().tolist(), list(channels["albedo.G"]))
         self.assertEqual(picture.normal[..., 2].ravel().tolist(), list(channels["normal.Z"]))
 
+    def test_ssh_makes_the_same_picture_and_says_why_it_cannot(self):
+        scene, _ = triangle()
+        place = self.daemon.address.removeprefix("unix:")
+        fake = self.folder / "ssh"
+        fake.write_text('#!/bin/sh\ntest "$1 $2 $3" = "-T -- gpu-host" || { echo "unknown host $3" >&2; exit 255; }\nshift 3\nexec "$@"\n')
+        fake.chmod(0o755)
+        with unittest.mock.patch.dict(os.environ, {"PATH": f"{self.folder}:{farlight_test.BIN}:{os.environ['PATH']}"}):
+            with farlight.connect(f"ssh:gpu-host:{place}") as client:
+                self.assertEqual(client.render(scene, STRAIGHT, width=8, height=8).data,
+                                 self.connect().render(scene, STRAIGHT, width=8, height=8).data)
+            with self.assertRaises(farlight.ConnectionLost) as raised:
+                farlight.connect(f"ssh:elsewhere:{place}")
+            self.assertIn("ssh", str(raised.exception))
+            for wrong in ("ssh:", "ssh:-oProxyCommand=x", "ssh:gpu-host:a;b"):
+                with self.assertRaises(farlight.InvalidValue):
+                    farlight.connect(wrong)
+
     def test_a_job_that_starts_anew_makes_the_first_picture_again(self):
         client = self.connect()
         scene, _ = triangle()
