@@ -32,6 +32,7 @@ const float NEVER = 2.0; // beyond the end of a segment
 const float BRUSHES = 6.0; // texels: a surface is not met farther than this from where it is seen
 const int LEVEL_AT_SURFACES = 2; // of the node that rays begin in beside a surface
 const int STEPS_TOGETHER = 32; // of rays side by side, before what some of them have met is looked at
+const int MEETINGS_MAX = 1 << 20, LAYERS_MAX = 64;
 
 // A ray on its way through a layer of a face.
 struct layer_walk {
@@ -324,25 +325,31 @@ void leave(node_passage p, inout layer_walk walk)
 #endif
 }
 
-// Nodes that the ray passes, until it meets something in one of them: true.
+// Nodes that the ray passes, until it may meet something in one of them: true. The end of the loop has two ways out:
+// with one, software GL gave rays that were through sooner the values of their neighbours.
 bool walk_on(inout layer_walk walk, out node_passage p)
 {
-    for (int i = 0; i < STEPS_TOGETHER && walk.u < walk.u_end; i++) {
+    bool meets = false;
+    for (int i = 0; i < STEPS_TOGETHER; i++) {
         walk_steps++;
         p = look(walk);
-        if (!p.is_plane && p.gap_in == 0.0) {
-            go_down(walk);
-            continue;
-        }
+        bool goes_down = !p.is_plane && p.gap_in == 0.0;
         bool is_other_side = p.gap_in > 0.0 ? !walk.is_behind : !walk.is_before;
         // Most rays that pass an edge are far behind or before both of its sides: not one in ten of them meets either.
         bool is_close = walk.was_close || abs(p.gap_in) <= p.reach;
-        if (p.is_plane && (is_met(p) || is_other_side && is_close))
-            return true;
-        note_side(p, walk);
-        leave(p, walk);
+        meets = p.is_plane && (is_met(p) || is_other_side && is_close);
+        if (meets)
+            break;
+        if (goes_down) {
+            go_down(walk);
+        } else {
+            note_side(p, walk);
+            leave(p, walk);
+        }
+        if (!(walk.u < walk.u_end))
+            break;
     }
-    return false;
+    return meets;
 }
 
 // ---- faces ----
@@ -549,19 +556,15 @@ bool is_ray(trace_ray r)
            r.direction != vec3(0.0);
 }
 
-// True: the ray ends before its end.
-bool walk_view(trace_ray r, inout view_walk seen, inout found_type found)
+// Through a layer. True: the ray ends in it.
+bool walk_layer(trace_ray r, inout layer_walk walk, inout found_type found)
 {
-    layer_walk walk;
     node_passage p;
-    walk.turn = 0u;
-    walk.offered = vec2(-1.0);
-    bool has_layer = begin_face(r, found, walk, seen);
-    while (has_layer) {
+    bool ends = false;
+    for (int i = 0; i < MEETINGS_MAX; i++) {
         if (walk_on(walk, p)) {
             walk_meetings++;
-            if (meet_in(r, p, walk, found))
-                return true;
+            ends = meet_in(r, p, walk, found);
             SHORTEN(walk, found);
             if (walk.u_end < p.u_out) {
                 walk.u = walk.u_end;
@@ -570,13 +573,27 @@ bool walk_view(trace_ray r, inout view_walk seen, inout found_type found)
                 leave(p, walk);
             }
         }
-        if (walk.u < walk.u_end)
-            continue;
-        if (meet_beside(r, walk, found))
-            return true;
+        if (ends || !(walk.u < walk.u_end))
+            break;
+    }
+    return ends;
+}
+
+// True: the ray ends before its end. Three loops in one another: software GL runs the code of both sides of a branch for
+// all rays side by side, so that what is done once for a layer would be paid for at each step.
+bool walk_view(trace_ray r, inout view_walk seen, inout found_type found)
+{
+    layer_walk walk;
+    walk.turn = 0u;
+    walk.offered = vec2(-1.0);
+    bool ends = false, has_layer = begin_face(r, found, walk, seen);
+    for (int i = 0; i < LAYERS_MAX && has_layer; i++) {
+        ends = walk_layer(r, walk, found) || meet_beside(r, walk, found);
+        if (ends)
+            break;
         has_layer = begin_next(r, walk, found, seen);
     }
-    return false;
+    return ends;
 }
 
 view_walk begin_view_walk(trace_ray r)
