@@ -31,7 +31,7 @@ const float FLOAT_MAX = 3.4e38;
 const float NEVER = 2.0; // beyond the end of a segment
 const float BRUSHES = 6.0; // texels: a surface is not met farther than this from where it is seen
 const int LEVEL_AT_SURFACES = 2; // of the node that rays begin in beside a surface
-const int STEPS_TOGETHER = 32; // of rays side by side, before what some of them have met is looked at
+const int STEPS_TOGETHER = 256; // of rays side by side, before what some of them have met is looked at
 const int MEETINGS_MAX = 1 << 20, LAYERS_MAX = 64;
 
 // A ray on its way through a layer of a face.
@@ -39,7 +39,7 @@ struct layer_walk {
     face_segment s;
     vec3 origin;  // x, y, w of the ray's origin; w below 0: it is not in this face
     vec2 inverse; // of s.along.xy
-    uint turn, face, layer;
+    uint face, layer;
     float u, u_end; // where the ray is, and where it ends, as far as is known
     ivec2 cell;     // of the node that it is in
     int level;
@@ -136,26 +136,26 @@ bool offer_primitives(trace_ray r, vec2 place, float near, bool all_four, inout 
                       out bool has_met)
 {
     ivec2 texel = ivec2(floor(place)), towards = ivec2(greaterThan(fract(place), vec2(0.5))) * 2 - 1;
-    uvec2 tried = uvec2(VISIBLE_NOTHING), tried_before = tried;
+    uint slice = slice_of(walk), left = 0u;
+    uvec2 a, b, c, d;
+    left |= visible_at(texel, slice, a) ? 1u : 0u;
+    left |= visible_at(texel + ivec2(towards.x, 0), slice, b) && b != a ? 2u : 0u;
+    left |= visible_at(texel + ivec2(0, towards.y), slice, c) && c != a && c != b ? 4u : 0u;
+    left |= visible_at(texel + towards, slice, d) && d != a && d != b && d != c ? 8u : 0u;
     has_met = false;
     bool ends = false;
-    int i = 0;
-    while (!has_met || all_four) {
-        // To the next one that is another, as rays side by side wait for the one that tries most.
-        uvec2 visible;
-        bool is_other = false;
-        for (; i < 4 && !is_other; i++)
-            is_other = visible_at(texel + ivec2(i & 1, i >> 1) * towards, slice_of(walk), visible) && visible != tried &&
-                       visible != tried_before;
-        if (!is_other)
-            break;
-        tried_before = tried;
-        tried = visible;
+    // As many turns as the ray among those side by side takes that tries most.
+    for (int i = 0; i < 4; i++) {
+        uint first = left & -left;
+        uvec2 visible = first == 1u ? a : first == 2u ? b : first == 4u ? c : d;
         candidate met;
-        if (intersect_visible(r, visible, near, met) && met.distance > r.t_min) {
+        if (left != 0u && intersect_visible(r, visible, near, met) && met.distance > r.t_min) {
             has_met = true;
             ends = offer(r, met, walk, found) || ends;
         }
+        left ^= first;
+        if (left == 0u || has_met && !all_four)
+            break;
     }
     return ends;
 }
@@ -357,15 +357,17 @@ bool walk_on(inout layer_walk walk, out node_passage p)
 // What is known of a ray in all faces.
 struct view_walk {
     float t_last;    // how far along the ray something may be that the view sees
+    vec4 begins;     // where it comes into the faces 0 to 3 that it has not been in yet; FLOAT_MAX: never
+    vec2 begins_4_5; // and into the others
     vec2 t_face;     // where it is in the face, of which there is one
     float t_unknown; // from where on nothing is; 1e30: all is known
     uint layers;     // that it had to look at
     bool has_left;   // it is unknown as the ray is outside what the view sees
-    float t_end;     // of its part in a face, the last one
-    bool ends_behind; // there, what the view sees first
+    bool ends_behind; // what the view sees first, at its end
+    bool is_filled;
     float t_fill;    // where it is taken to meet what a texel shows, and which
     uint fill_slice;
-    ivec2 fill_texel;
+    ivec2 fill_texel; // x -1: the one where it leaves the face, or ends
 };
 
 // Whether a ray that comes into the view at t has passed nothing that the view does not see. Of one from an eye within
@@ -476,34 +478,74 @@ void clip_to_surfaces(float w, vec3 origin, vec3 direction, inout vec2 t)
     clip_range(origin.z - z, direction.z, t);
 }
 
-// The first layer of the next face that the ray passes; the face in which it begins is the first one.
-bool begin_face(trace_ray r, found_type found, inout layer_walk walk, inout view_walk seen)
+// Where on a ray, from t.x to t.y, something may be: beyond the scene's box faces are empty. A view does not see what is
+// beside it, be it empty or not.
+vec2 clip_to_box(trace_ray r, vec2 t)
+{
+    if (IS_VIEW)
+        return t;
+    vec3 inverse = 1.0 / mix(r.direction, vec3(1e-20), lessThan(abs(r.direction), vec3(1e-20)));
+    vec3 a = (quadtree.lower_world.xyz - r.origin) * inverse, b = (quadtree.upper_world.xyz - r.origin) * inverse;
+    vec3 low = min(a, b), high = max(a, b);
+    float t_in = max(t.x, max(low.x, max(low.y, low.z))), t_out = min(t.y, min(high.x, min(high.y, high.z)));
+    if (t_in > t_out)
+        return vec2(1.0, 0.0);
+    // A surface is met up to so many texels beside where it is, and a ray is behind it if it is by a share of the way.
+    float slack = (BRUSHES / quadtree.scale_centre.x + 2.0 * QUADTREE_DEEP) / length(r.direction);
+    vec3 from_eye = r.origin - quadtree.eye_world.xyz;
+    return vec2(max(t.x, t_in - slack * length(from_eye + t_in * r.direction)),
+                min(t.y, t_out + slack * length(from_eye + t_out * r.direction)));
+}
+
+// Where the ray comes into each of the faces.
+void begin_faces(trace_ray r, float t_end, inout view_walk seen)
 {
     vec3 from_eye = r.origin - quadtree.eye_world.xyz;
-    uint first = face_towards(from_eye + r.t_min * r.direction);
-    for (; walk.turn < FACES; walk.turn++) {
-        walk.face = walk.turn == 0u ? first : walk.turn <= first ? walk.turn - 1u : walk.turn;
-        float w = nearest_w(walk.face);
-        if (!IS_VIEW && w == 0.0)
-            continue;
-        vec3 origin = face_vector(walk.face, from_eye), direction = face_vector(walk.face, r.direction);
-        vec2 t = clip_to_face(origin, direction, vec2(r.t_min, min(seen.t_last, NEAREST(found, r))));
+    vec2 t_box = clip_to_box(r, vec2(r.t_min, min(seen.t_last, t_end)));
+    for (uint face = 0u; face < FACES; face++) {
+        float w = nearest_w(face);
+        vec3 origin = face_vector(face, from_eye), direction = face_vector(face, r.direction);
+        vec2 t = clip_to_face(origin, direction, t_box);
         seen.t_face = t;
         clip_to_surfaces(w, origin, direction, t);
-        if (!(t.x < t.y))
-            continue;
-        walk.turn++;
-        walk.s = segment_of(origin, direction, t);
-        walk.origin = origin.z >= quadtree.depths.w ? face_place(origin, face_q(origin)) : vec3(-1.0);
-        vec2 along = walk.s.along.xy;
-        walk.inverse = 1.0 / mix(along, vec2(1e-9), lessThan(abs(along), vec2(1e-9)));
-        walk.u_end = 1.0;
-        walk.u_fill = NEVER;
-        walk.fill_layer = 0u;
-        begin_layer(0u, 0.0, walk.s.t_from <= r.t_min ? LEVEL_AT_SURFACES : QUADTREE_TOP, walk);
-        return true;
+        float begin = t.x < t.y && w > 0.0 ? t.x : FLOAT_MAX;
+        seen.begins = mix(seen.begins, vec4(begin), equal(uvec4(0u, 1u, 2u, 3u), uvec4(face)));
+        seen.begins_4_5 = mix(seen.begins_4_5, vec2(begin), equal(uvec2(4u, 5u), uvec2(face)));
     }
-    return false;
+}
+
+// The face that the ray comes into next, and where; FLOAT_MAX: none.
+float next_face(inout view_walk seen, out uint face)
+{
+    float begin = seen.begins.x;
+    face = 0u;
+    for (uint i = 1u; i < FACES; i++) {
+        float other = i < 4u ? seen.begins[i] : seen.begins_4_5[i - 4u];
+        face = other < begin ? i : face;
+        begin = min(begin, other);
+    }
+    seen.begins = mix(seen.begins, vec4(FLOAT_MAX), equal(uvec4(0u, 1u, 2u, 3u), uvec4(face)));
+    seen.begins_4_5 = mix(seen.begins_4_5, vec2(FLOAT_MAX), equal(uvec2(4u, 5u), uvec2(face)));
+    return begin;
+}
+
+// The first layer of the next face that the ray passes. False: there is none before its end.
+bool begin_face(trace_ray r, found_type found, inout layer_walk walk, inout view_walk seen)
+{
+    float t_end = min(seen.t_last, NEAREST(found, r)), begin = next_face(seen, walk.face);
+    vec3 from_eye = r.origin - quadtree.eye_world.xyz;
+    vec3 origin = face_vector(walk.face, from_eye), direction = face_vector(walk.face, r.direction);
+    vec2 t = clip_to_face(origin, direction, clip_to_box(r, vec2(r.t_min, t_end)));
+    clip_to_surfaces(nearest_w(walk.face), origin, direction, t);
+    walk.s = segment_of(origin, direction, t);
+    walk.origin = origin.z >= quadtree.depths.w ? face_place(origin, face_q(origin)) : vec3(-1.0);
+    vec2 along = walk.s.along.xy;
+    walk.inverse = 1.0 / mix(along, vec2(1e-9), lessThan(abs(along), vec2(1e-9)));
+    walk.u_end = 1.0;
+    walk.u_fill = NEVER;
+    walk.fill_layer = 0u;
+    begin_layer(0u, 0.0, walk.s.t_from <= r.t_min ? LEVEL_AT_SURFACES : QUADTREE_TOP, walk);
+    return begin < t_end && t.x < t.y;
 }
 
 // What is unknown is filled with what the ray was last before: the background of what hides it (section 4.1). One that
@@ -514,19 +556,26 @@ void end_face(trace_ray r, layer_walk walk, inout found_type found, inout view_w
     if (walk.u_behind >= walk.u_end || t >= seen.t_unknown)
         return;
     bool was_before = walk.u_fill != NEVER;
-    vec2 place = walk.s.from.xy + walk.s.along.xy * (was_before ? walk.u_fill : QUADTREE_ALMOST_END);
     seen.t_unknown = t;
     seen.t_fill = was_before ? distance_at(walk.s, walk.u_fill) : t;
     seen.fill_slice = FACE(walk.face) * quadtree.layers + walk.fill_layer;
-    seen.fill_texel = ivec2(floor(place));
+    seen.is_filled = true;
+    seen.fill_texel = was_before ? ivec2(floor(walk.s.from.xy + walk.s.along.xy * walk.u_fill)) : ivec2(-1);
 }
 
-void note_end(layer_walk walk, inout view_walk seen)
+// Whether a ray is behind what the view sees first where it ends: beyond the scene's box it was not traced, and beyond the
+// faces that hold something it is what it was in the last of them.
+bool ends_behind(trace_ray r, view_walk seen)
 {
-    if (!IS_VIEW && walk.s.t_to <= seen.t_end)
-        return;
-    seen.t_end = walk.s.t_to;
-    seen.ends_behind = walk.is_behind;
+    vec3 end = r.origin - quadtree.eye_world.xyz + min(last_distance(r), r.t_max) * r.direction;
+    uint face = face_towards(end);
+    vec3 p = face_vector(face, end), place = face_place(p, face_q(p));
+    ivec2 texel = ivec2(floor(place.xy)), size = ivec2(quadtree.width, quadtree.height);
+    if (IS_VIEW || p.z < quadtree.depths.w || any(lessThan(texel, ivec2(0))) || any(greaterThanEqual(texel, size)) ||
+        nearest_w(face) == 0.0)
+        return seen.ends_behind;
+    uvec2 leaf = texelFetch(quadtree_nodes, int(node_index(face * quadtree.layers, 0u, uvec2(texel)))).xy;
+    return plane_w(leaf) + dot(plane_slopes(leaf), place.xy - node_centre(0u, uvec2(texel))) > place.z;
 }
 
 // The next layer where the ray is behind this one, or the next face. False: it has been through all.
@@ -539,7 +588,7 @@ bool begin_next(trace_ray r, inout layer_walk walk, inout found_type found, inou
         seen.has_left = true;
     }
     if (walk.layer == 0u)
-        note_end(walk, seen);
+        seen.ends_behind = walk.is_behind;
     if (walk.u_behind < walk.u_end && walk.layer + 1u < quadtree.layers) {
         begin_layer(walk.layer + 1u, walk.u_behind, LEVEL_AT_SURFACES, walk);
         seen.layers = max(seen.layers, walk.layer + 1u);
@@ -584,8 +633,8 @@ bool walk_layer(trace_ray r, inout layer_walk walk, inout found_type found)
 bool walk_view(trace_ray r, inout view_walk seen, inout found_type found)
 {
     layer_walk walk;
-    walk.turn = 0u;
     walk.offered = vec2(-1.0);
+    begin_faces(r, NEAREST(found, r), seen);
     bool ends = false, has_layer = begin_face(r, found, walk, seen);
     for (int i = 0; i < LAYERS_MAX && has_layer; i++) {
         ends = walk_layer(r, walk, found) || meet_beside(r, walk, found);
@@ -598,7 +647,8 @@ bool walk_view(trace_ray r, inout view_walk seen, inout found_type found)
 
 view_walk begin_view_walk(trace_ray r)
 {
-    return view_walk(last_distance(r), vec2(1.0, 0.0), 1e30, 1u, false, 0.0, false, 0.0, 0u, ivec2(-1));
+    return view_walk(last_distance(r), vec4(FLOAT_MAX), vec2(FLOAT_MAX), vec2(1.0, 0.0), 1e30, 1u, false, false, false, 0.0, 0u,
+                     ivec2(-1));
 }
 
 void count(view_walk seen, bool is_unknown)
@@ -629,16 +679,21 @@ bool trace_any(trace_ray r, inout vec3 optical_depth)
     note_outside(r, r.t_max, seen);
     bool is_unknown = !is_stopped && seen.t_unknown < r.t_max;
     count(seen, is_unknown);
-    return is_stopped || (is_unknown && seen.ends_behind);
+    return is_stopped || (is_unknown && ends_behind(r, seen));
 }
 
 #else
 
 // A ray that met nothing. If it came out again from behind what the view sees, it has left the scene, as far as is known.
-void fill(view_walk seen, inout candidate best)
+void fill(trace_ray r, view_walk seen, inout candidate best)
 {
+    uint face = seen.fill_slice / quadtree.layers;
+    vec3 origin = face_vector(face, r.origin - quadtree.eye_world.xyz), direction = face_vector(face, r.direction);
+    face_segment s = segment_of(origin, direction, clip_to_face(origin, direction, vec2(r.t_min, min(seen.t_last, r.t_max))));
+    ivec2 last = ivec2(floor(s.from.xy + s.along.xy * QUADTREE_ALMOST_END));
     uvec2 visible;
-    if (!seen.ends_behind || seen.fill_texel.x < 0 || !visible_at(seen.fill_texel, seen.fill_slice, visible))
+    if (!seen.is_filled || !ends_behind(r, seen) ||
+        !visible_at(seen.fill_texel.x < 0 ? last : seen.fill_texel, seen.fill_slice, visible))
         return;
     best = candidate(seen.t_fill, visible.y, visible.x - 1u, vec2(0.0));
     walk_flags |= (seen.fill_slice % quadtree.layers + 1u) << HIT_LAYER_SHIFT;
@@ -657,7 +712,7 @@ void trace_closest(trace_ray r, inout candidate best)
     if (is_unknown) {
         walk_flags |= HIT_UNKNOWN;
         if (best.primitive == HIT_NO_PRIMITIVE)
-            fill(seen, best);
+            fill(r, seen, best);
     }
 #ifdef QUADTREE_COUNT_STEPS
     best = candidate(float(walk_steps), seen.layers, walk_meetings, vec2(0.0));

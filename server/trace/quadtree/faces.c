@@ -71,13 +71,18 @@ struct raster_camera quadtree_face_camera(const struct quadtree_uniforms *unifor
     return camera;
 }
 
+static void view_of(float view[3], const struct raster_camera *camera, const float world[3])
+{
+    const float *m = camera->world_from_view;
+    for (int k = 0; k < 3; k++)
+        view[k] = (world[0] - m[3]) * m[k] + (world[1] - m[7]) * m[4 + k] + (world[2] - m[11]) * m[8 + k];
+}
+
 /* Sides of the frustum, as bits, that a ball lies beyond. */
 static unsigned beyond(const struct raster_camera *camera, const float world[3], float radius)
 {
-    const float *m = camera->world_from_view;
     float v[3];
-    for (int k = 0; k < 3; k++)
-        v[k] = (world[0] - m[3]) * m[k] + (world[1] - m[7]) * m[4 + k] + (world[2] - m[11]) * m[8 + k];
+    view_of(v, camera, world);
     /* A little wider, for rounding. */
     const float reach = (camera->orthographic ? 1.0f : -v[2]) * 1.0001f;
     unsigned sides = 0;
@@ -110,19 +115,60 @@ static void world_of(float world[3], const struct instance *instance, const floa
     }
 }
 
+/* Sides of a face's frustum; what is left of a triangle has one corner more for each at most. */
+#define SIDES 5
+#define CORNERS_MAX (3 + SIDES)
+
+/* How far within a side a point of the view lies, right, up and backward: a little more, for rounding. */
+static float within(const struct raster_camera *camera, const float v[3], int side)
+{
+    const float reach = (camera->orthographic ? 1.0f : -v[2]) + 1e-4f * fabsf(v[2]);
+    if (side == 4)
+        return -v[2] - camera->near;
+    const int k = side / 2;
+    return camera->extent[k] * reach + (side % 2 ? -v[k] : v[k]);
+}
+
+/* Leaves of a polygon what is within a side; the number of its corners. */
+static int cut(const struct raster_camera *camera, float corners[CORNERS_MAX][3], int count, int side)
+{
+    float kept[CORNERS_MAX][3];
+    int n = 0;
+    for (int i = 0; i < count; i++) {
+        const float *a = corners[i], *b = corners[(i + 1) % count];
+        const float d_a = within(camera, a, side), d_b = within(camera, b, side);
+        if (d_a >= 0.0f)
+            memcpy(kept[n++], a, sizeof(kept[0]));
+        if (n < CORNERS_MAX && (d_a >= 0.0f) != (d_b >= 0.0f)) {
+            const float share = d_a / (d_a - d_b);
+            for (int k = 0; k < 3; k++)
+                kept[n][k] = a[k] + (b[k] - a[k]) * share;
+            n++;
+        }
+    }
+    memcpy(corners, kept, (size_t)n * sizeof(kept[0]));
+    return n;
+}
+
+/* A large triangle, of a floor, may pass by though no side alone has all of it beyond. */
 static bool is_triangle_beside(const struct raster_camera *camera, const struct instance *instance,
                                const struct scene_mesh *mesh, uint32_t triangle)
 {
     const uint32_t *corner =
         (const uint32_t *)(const void *)mesh->arrays[MESH_INDICES]->data + 3 * (size_t)triangle;
     const float *positions = (const float *)(const void *)mesh->arrays[MESH_POSITIONS]->data;
+    float corners[CORNERS_MAX][3];
     unsigned all = ~0u;
     for (int i = 0; i < 3; i++) {
         float world[3];
         world_of(world, instance, &positions[3 * (size_t)corner[i]]);
         all &= beyond(camera, world, 0.0f);
+        view_of(corners[i], camera, world);
     }
-    return all != 0;
+    int count = all != 0 ? 0 : 3;
+    for (int side = 0; side < SIDES && count > 0; side++)
+        count = cut(camera, corners, count, side);
+    return count == 0;
 }
 
 static bool is_sphere_beside(const struct raster_camera *camera, const struct instance *instance,
