@@ -32,7 +32,8 @@ const float NEVER = 2.0; // beyond the end of a segment
 const float BRUSHES = 6.0; // texels: a surface is not met farther than this from where it is seen
 const int LEVEL_AT_SURFACES = 2; // of the node that rays begin in beside a surface
 const int STEPS_TOGETHER = 256; // of rays side by side, before what some of them have met is looked at
-const int MEETINGS_MAX = 1 << 20, LAYERS_MAX = 64;
+const int MEETINGS_MAX = 1 << 20;
+const int LAYERS_MAX = 32; // more than all faces have
 
 // A ray on its way through a layer of a face.
 struct layer_walk {
@@ -364,7 +365,7 @@ struct view_walk {
     uint layers;     // that it had to look at
     bool has_left;   // it is unknown as the ray is outside what the view sees
     bool ends_behind; // what the view sees first, at its end
-    bool is_filled;
+    bool is_filled;   // by what follows
     float t_fill;    // where it is taken to meet what a texel shows, and which
     uint fill_slice;
     ivec2 fill_texel; // x -1: the one where it leaves the face, or ends
@@ -563,8 +564,8 @@ void end_face(trace_ray r, layer_walk walk, inout found_type found, inout view_w
     seen.fill_texel = was_before ? ivec2(floor(walk.s.from.xy + walk.s.along.xy * walk.u_fill)) : ivec2(-1);
 }
 
-// Whether a ray is behind what the view sees first where it ends: beyond the scene's box it was not traced, and beyond the
-// faces that hold something it is what it was in the last of them.
+// Whether a ray is behind what the view sees first where it ends: beyond the scene's box it was not traced, and beyond
+// the faces that hold something it is what it was in the last of them.
 bool ends_behind(trace_ray r, view_walk seen)
 {
     vec3 end = r.origin - quadtree.eye_world.xyz + min(last_distance(r), r.t_max) * r.direction;
@@ -647,8 +648,8 @@ bool walk_view(trace_ray r, inout view_walk seen, inout found_type found)
 
 view_walk begin_view_walk(trace_ray r)
 {
-    return view_walk(last_distance(r), vec4(FLOAT_MAX), vec2(FLOAT_MAX), vec2(1.0, 0.0), 1e30, 1u, false, false, false, 0.0, 0u,
-                     ivec2(-1));
+    return view_walk(last_distance(r), vec4(FLOAT_MAX), vec2(FLOAT_MAX), vec2(1.0, 0.0), 1e30, 1u, false, false, false,
+                     0.0, 0u, ivec2(-1));
 }
 
 void count(view_walk seen, bool is_unknown)
@@ -689,7 +690,8 @@ void fill(trace_ray r, view_walk seen, inout candidate best)
 {
     uint face = seen.fill_slice / quadtree.layers;
     vec3 origin = face_vector(face, r.origin - quadtree.eye_world.xyz), direction = face_vector(face, r.direction);
-    face_segment s = segment_of(origin, direction, clip_to_face(origin, direction, vec2(r.t_min, min(seen.t_last, r.t_max))));
+    vec2 t = clip_to_face(origin, direction, vec2(r.t_min, min(seen.t_last, r.t_max)));
+    face_segment s = segment_of(origin, direction, t);
     ivec2 last = ivec2(floor(s.from.xy + s.along.xy * QUADTREE_ALMOST_END));
     uvec2 visible;
     if (!seen.is_filled || !ends_behind(r, seen) ||

@@ -295,6 +295,36 @@ TEST(faces_of_a_cube_that_see_nothing_are_left_out)
     scene_destroy(edits.scene);
 }
 
+/* A floor beneath an eye that looks down by 30 degrees: the face above it sees none, though no side of what it
+ * sees has all corners of the floor beyond. */
+TEST(a_face_that_a_large_floor_passes_by_is_left_out)
+{
+    struct error error = {0};
+    struct scene_changes changes;
+    struct gpu_scene gpu;
+    struct test_edits edits = {.scene = test_scene_create()};
+    static const float positions[4][3] = {{-12, -1, -12}, {12, -1, -12}, {12, -1, 12}, {-12, -1, 12}};
+    static const uint32_t indices[6] = {0, 1, 2, 0, 2, 3};
+    const struct quadtree_settings settings = {
+        .faces = QUADTREE_FACES_CUBE, .layers = 1, .resolution = 128, .pixels = 0.5f, .radius = 0.1f};
+    const float c = 0.8660254f;
+    const struct trace_view view = {
+        .world_from_view = {1, 0, 0, 0, 0, c, 0.5f, 0, 0, -0.5f, c, 0}, .fov_y = 1, .width = 64, .height = 64};
+    struct quadtree_store store = {.device = device};
+    test_mesh(&edits, 10, positions, 4, indices, 2);
+    test_node(&edits, 1, 0, NODE_MESH, 10, NULL);
+    test_commit(&edits);
+    gpu_scene_init(&gpu, device);
+    expect_ok(gpu_scene_update(&gpu, edits.scene, NULL, &changes, NULL, &error), &error);
+    expect_ok(quadtree_store_place(&store, &gpu, &view, &settings, &error), &error);
+    assert_int_equal(store.uniforms.faces, 5);
+    for (uint32_t face = 0; face < store.uniforms.faces; face++)
+        assert_true(store.uniforms.face_from_world[3 * face + 2][1] < 0.6f); /* forward: none is the one above */
+    quadtree_store_finish(&store);
+    gpu_scene_finish(&gpu);
+    scene_destroy(edits.scene);
+}
+
 /* Placed as the tracer does it. */
 TEST(layers_of_all_faces_of_a_cube_show_the_first_surfaces_in_order)
 {
