@@ -46,14 +46,13 @@ struct quadtree_uniforms {
                            far from it: unit pixels / (f radius); y: cosine of the greatest angle between it and
                            those of its children, 0: any; z: w at the distance where both are twice as much, 0:
                            they do not grow; w: radius / unit, of the sphere of eyes for which x holds */
-    vec4 lower_world, upper_world; /* of a box round all that faces may show */
-    uint width, height;            /* of a face, texels */
+    uint width, height; /* of a face, texels */
     uint padded_width, padded_height;
     uint faces, layers;
     uint slice_nodes; /* nodes of a slice */
     uint pad0;
 };
-SHARED_SIZE(quadtree_uniforms, 416)
+SHARED_SIZE(quadtree_uniforms, 384)
 
 /* What a frame's rays of one kind came to. */
 struct quadtree_counts {

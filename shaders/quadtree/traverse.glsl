@@ -479,34 +479,15 @@ void clip_to_surfaces(float w, vec3 origin, vec3 direction, inout vec2 t)
     clip_range(origin.z - z, direction.z, t);
 }
 
-// Where on a ray, from t.x to t.y, something may be: beyond the scene's box faces are empty. A view does not see what is
-// beside it, be it empty or not.
-vec2 clip_to_box(trace_ray r, vec2 t)
-{
-    if (IS_VIEW)
-        return t;
-    vec3 inverse = 1.0 / mix(r.direction, vec3(1e-20), lessThan(abs(r.direction), vec3(1e-20)));
-    vec3 a = (quadtree.lower_world.xyz - r.origin) * inverse, b = (quadtree.upper_world.xyz - r.origin) * inverse;
-    vec3 low = min(a, b), high = max(a, b);
-    float t_in = max(t.x, max(low.x, max(low.y, low.z))), t_out = min(t.y, min(high.x, min(high.y, high.z)));
-    if (t_in > t_out)
-        return vec2(1.0, 0.0);
-    // A surface is met up to so many texels beside where it is, and a ray is behind it if it is by a share of the way.
-    float slack = (BRUSHES / quadtree.scale_centre.x + 2.0 * QUADTREE_DEEP) / length(r.direction);
-    vec3 from_eye = r.origin - quadtree.eye_world.xyz;
-    return vec2(max(t.x, t_in - slack * length(from_eye + t_in * r.direction)),
-                min(t.y, t_out + slack * length(from_eye + t_out * r.direction)));
-}
-
 // Where the ray comes into each of the faces.
 void begin_faces(trace_ray r, float t_end, inout view_walk seen)
 {
     vec3 from_eye = r.origin - quadtree.eye_world.xyz;
-    vec2 t_box = clip_to_box(r, vec2(r.t_min, min(seen.t_last, t_end)));
+    vec2 t_ray = vec2(r.t_min, min(seen.t_last, t_end));
     for (uint face = 0u; face < FACES; face++) {
         float w = nearest_w(face);
         vec3 origin = face_vector(face, from_eye), direction = face_vector(face, r.direction);
-        vec2 t = clip_to_face(origin, direction, t_box);
+        vec2 t = clip_to_face(origin, direction, t_ray);
         seen.t_face = t;
         clip_to_surfaces(w, origin, direction, t);
         float begin = t.x < t.y && w > 0.0 ? t.x : FLOAT_MAX;
@@ -536,7 +517,7 @@ bool begin_face(trace_ray r, found_type found, inout layer_walk walk, inout view
     float t_end = min(seen.t_last, NEAREST(found, r)), begin = next_face(seen, walk.face);
     vec3 from_eye = r.origin - quadtree.eye_world.xyz;
     vec3 origin = face_vector(walk.face, from_eye), direction = face_vector(walk.face, r.direction);
-    vec2 t = clip_to_face(origin, direction, clip_to_box(r, vec2(r.t_min, t_end)));
+    vec2 t = clip_to_face(origin, direction, vec2(r.t_min, t_end));
     clip_to_surfaces(nearest_w(walk.face), origin, direction, t);
     walk.s = segment_of(origin, direction, t);
     walk.origin = origin.z >= quadtree.depths.w ? face_place(origin, face_q(origin)) : vec3(-1.0);
@@ -562,21 +543,6 @@ void end_face(trace_ray r, layer_walk walk, inout found_type found, inout view_w
     seen.fill_slice = FACE(walk.face) * quadtree.layers + walk.fill_layer;
     seen.is_filled = true;
     seen.fill_texel = was_before ? ivec2(floor(walk.s.from.xy + walk.s.along.xy * walk.u_fill)) : ivec2(-1);
-}
-
-// Whether a ray is behind what the view sees first where it ends: beyond the scene's box it was not traced, and beyond
-// the faces that hold something it is what it was in the last of them.
-bool ends_behind(trace_ray r, view_walk seen)
-{
-    vec3 end = r.origin - quadtree.eye_world.xyz + min(last_distance(r), r.t_max) * r.direction;
-    uint face = face_towards(end);
-    vec3 p = face_vector(face, end), place = face_place(p, face_q(p));
-    ivec2 texel = ivec2(floor(place.xy)), size = ivec2(quadtree.width, quadtree.height);
-    if (IS_VIEW || p.z < quadtree.depths.w || any(lessThan(texel, ivec2(0))) || any(greaterThanEqual(texel, size)) ||
-        nearest_w(face) == 0.0)
-        return seen.ends_behind;
-    uvec2 leaf = texelFetch(quadtree_nodes, int(node_index(face * quadtree.layers, 0u, uvec2(texel)))).xy;
-    return plane_w(leaf) + dot(plane_slopes(leaf), place.xy - node_centre(0u, uvec2(texel))) > place.z;
 }
 
 // The next layer where the ray is behind this one, or the next face. False: it has been through all.
@@ -680,7 +646,7 @@ bool trace_any(trace_ray r, inout vec3 optical_depth)
     note_outside(r, r.t_max, seen);
     bool is_unknown = !is_stopped && seen.t_unknown < r.t_max;
     count(seen, is_unknown);
-    return is_stopped || (is_unknown && ends_behind(r, seen));
+    return is_stopped || (is_unknown && seen.ends_behind);
 }
 
 #else
@@ -694,7 +660,7 @@ void fill(trace_ray r, view_walk seen, inout candidate best)
     face_segment s = segment_of(origin, direction, t);
     ivec2 last = ivec2(floor(s.from.xy + s.along.xy * QUADTREE_ALMOST_END));
     uvec2 visible;
-    if (!seen.is_filled || !ends_behind(r, seen) ||
+    if (!seen.is_filled || !seen.ends_behind ||
         !visible_at(seen.fill_texel.x < 0 ? last : seen.fill_texel, seen.fill_slice, visible))
         return;
     best = candidate(seen.t_fill, visible.y, visible.x - 1u, vec2(0.0));

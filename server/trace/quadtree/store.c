@@ -10,7 +10,6 @@
 
 #define UNIT_OF_DIAGONAL 0.05f /* where w is 1: slopes of w then have all bits of half floats */
 #define DOUBLED_AT 0.25f       /* diagonals: where bounds that grow with distance are twice as large */
-#define BOX_SLACK 1e-3f        /* of the farthest distance, for rounding */
 #define CUBE_TEXELS_MAX 1024u
 #define CUBE_TEXELS_MIN 256u
 #define CUBE_TEXELS_STEP 128u
@@ -127,17 +126,6 @@ static void place_depths(struct quadtree_uniforms *u, const struct gpu_scene *sc
     u->depths[3] = near;
 }
 
-/* A plane lies farther away than what it stands for by no more than the bound: at the farthest most. */
-static void place_bounds(struct quadtree_uniforms *u, const struct gpu_scene *scene)
-{
-    const float far = u->depths[1], share = u->bounds[0] * QUADTREE_PLANES_APART / u->depths[0] * far;
-    const float slack = fminf(share, 1.0f) * far + BOX_SLACK * far;
-    for (int i = 0; i < 3; i++) {
-        u->lower_world[i] = scene->lower_world[i] - slack;
-        u->upper_world[i] = scene->upper_world[i] + slack;
-    }
-}
-
 static uint32_t padded(uint32_t texels)
 {
     return (texels + QUADTREE_SIDE - 1) / QUADTREE_SIDE * QUADTREE_SIDE;
@@ -167,7 +155,6 @@ static void fill_uniforms(struct quadtree_uniforms *u, const struct gpu_scene *s
     u->bounds[2] =
         settings->adaptive == QUADTREE_ADAPTIVE_ON ? u->depths[0] / (DOUBLED_AT * diagonal_of(scene)) : 0.0f;
     u->bounds[3] = settings->radius / u->depths[0];
-    place_bounds(u, scene);
     quadtree_drop_empty_faces(u, scene);
     u->padded_width = padded(u->width);
     u->padded_height = padded(u->height);
