@@ -207,6 +207,11 @@ static bool is_empty(const struct quadtree_uniforms *uniforms, const struct gpu_
     for (uint32_t i = 0; i < scene->instance_count; i++)
         if (!quadtree_is_beside(&camera, scene, i) && !are_all_beside(&camera, scene, i, &left))
             return false;
+    for (uint32_t i = 0; i < scene->disc_count; i++) {
+        const float *ball = scene->discs[i].centre_radius; /* which its disc lies in */
+        if (beyond(&camera, ball, ball[3]) == 0)
+            return false;
+    }
     return true;
 }
 
