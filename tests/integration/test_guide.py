@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Every command of farlight-guide(7) is run, in its order, as it stands there."""
+"""Every command of farlight-guide(7) is run, in its order, as it stands there; ELSEWHERE names who runs the others."""
 import os
 import pathlib
+import re
 import shlex
 import shutil
 import socket
@@ -12,6 +13,8 @@ import farlight_test
 from farlight_test import BIN, Case, Daemon, bundled_scenes
 
 ROOT = pathlib.Path(__file__).parents[2]
+# Commands within a sentence, which need a system of their own, or minutes: the test that runs them.
+ELSEWHERE = {"systemctl enable --now farlightd": "test_units.py", "farlightd --check-device": "test_check_device.py"}
 # The other host is this one, with a daemon of this test in place of its service's: -T -- HOST farlight bridge unix:..
 SSH = """#!/bin/sh
 exec farlight bridge "$THERE"
@@ -107,6 +110,10 @@ class Guide(Case):
         self.assertIn("OpenGL", self.run_part("WHEN SOMETHING IS WRONG"))
 
     def test_no_command_is_left_out(self):
+        page = (ROOT / "conf/man/farlight-guide.7").read_text()
+        self.assertEqual(set(re.findall(r"Ql ((?:farlight|systemctl)\S* .*?)(?: :)?$", page, re.MULTILINE)), set(ELSEWHERE))
+        for command, module in ELSEWHERE.items():
+            self.assertIn(f'"{command.split()[1]}"', (ROOT / "tests/integration" / module).read_text())
         self.assertEqual(set(commands()), {"LOOKING AT MODELS", "A RENDER FARM", "SCRIPTS", "WHEN SOMETHING IS WRONG"})
 
 

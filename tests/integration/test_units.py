@@ -118,6 +118,14 @@ class Units(unittest.TestCase):
         self.assertEqual((self.shown("Result"), self.shown("ExecMainStatus")), ("success", "0"))
         self.assert_served()
 
+    def test_it_is_enabled_and_started_by_one_command(self):
+        """That of farlight-guide(7)."""
+        self.systemctl("stop", SOCKET)
+        self.systemctl("enable", "--now", "farlightd")
+        self.assertEqual(self.shown("ActiveState"), "active")
+        self.assert_served()
+        self.systemctl("disable", "--now", "farlightd")
+
     def test_without_systemd_it_listens_at_the_same_address_for_the_same_users(self):
         self.systemctl("stop", SOCKET)
         self.systemctl("start", SERVICE)
