@@ -409,19 +409,6 @@ float last_distance(trace_ray r)
     return (length(r.origin - quadtree.eye_world.xyz) + far) / length(r.direction);
 }
 
-// Of the faces that there are that which sees most of a direction: the first that a ray is looked for in.
-uint face_towards(vec3 p)
-{
-    uint face = 0u;
-    float most = -FLOAT_MAX;
-    for (uint i = 0u; i < FACES; i++) {
-        float along = dot(quadtree.face_from_world[3u * i + 2u].xyz, p);
-        face = along > most ? i : face;
-        most = max(most, along);
-    }
-    return face;
-}
-
 #ifdef ANY_HIT
 #define NEAREST(found, r) r.t_max
 #define SHORTEN(walk, found)

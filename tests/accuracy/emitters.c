@@ -151,7 +151,7 @@ TEST(the_picture_is_that_of_the_rays_that_hit_the_lamps_alone)
         }
 }
 
-/* Stored samples lie up to a cell or so off the surfaces, and off lamps as well; cells are four times as wide as
+/* Stored samples lie up to a cell or so off the surfaces, and off lights as well; cells are four times as wide as
  * by default. */
 TEST(stored_samples_show_as_much_light)
 {
