@@ -84,7 +84,8 @@ static void ask_facts(struct gpu_facts *facts, bool software, bool robust, bool 
     GLint groups = 0, time_stamp_bits = 0;
     glGetQueryiv(GL_TIMESTAMP, GL_QUERY_COUNTER_BITS, &time_stamp_bits);
     glGetIntegeri_v(GL_MAX_COMPUTE_WORK_GROUP_COUNT, 0, &groups);
-    const bool compiles_at_dispatch = strncmp((const char *)glGetString(GL_RENDERER), "llvmpipe", 8) == 0;
+    const char *renderer = (const char *)glGetString(GL_RENDERER);
+    const bool compiles_at_dispatch = renderer && strncmp(renderer, "llvmpipe", 8) == 0;
     *facts = (struct gpu_facts){
         .software = software,
         .robust = robust,
