@@ -415,8 +415,10 @@ TEST(waves_of_each_kind_are_told_apart_until_the_reset)
             trace_state_reset(fixture.tracer->state);
             assert_int_equal(rows_of(&fixture).count, 0);
             trace_rays(trace_shadows, &fixture, WAVE_ANY, rays, 256, NULL, visibility);
+            /* Not the counts of before: which rays are found stopped in time to spare others' tests varies. */
+            const struct rayspace_control third = control_of(&fixture);
             const struct structure_rows after = rows_of(&fixture);
-            expect_mean(&after, "shadow/cone_tests", second.cone_tests, 256);
+            expect_mean(&after, "shadow/cone_tests", third.cone_tests, 256);
             assert_int_equal(after.count, 8);
             fixture_finish(&fixture);
         }
