@@ -197,7 +197,6 @@ def main():
                 failed += 1
                 lines.append(f"{name:10} failed: {fault}")
             print(lines[-1], flush=True)
-    farlight_test.tearDownModule()
     (OPTIONS.out / "equal-time.txt").write_text("\n".join(lines) + "\n")
     measured = {"size": OPTIONS.size, "samples": samples(), "scenes": rows}
     (OPTIONS.out / "equal-time.json").write_text(json.dumps(measured, indent=1))

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """What the integration tests share: the programs, a daemon, the bundled scenes, and readers of PNG and EXR."""
+import atexit
 import json
 import os
 import pathlib
@@ -28,17 +29,13 @@ _bundled = None
 
 
 def bundled_scenes():
-    """Folder with the scenes of the project's own generator; made once per run."""
+    """Folder with the scenes of the project's own generator; made once per run and gone at its end."""
     global _bundled
     if _bundled is None:
         _bundled = tempfile.mkdtemp(prefix="farlight-scenes-")
+        atexit.register(shutil.rmtree, _bundled, ignore_errors=True)
         subprocess.run([BIN / "tests/tools/make_scenes", _bundled], check=True)
     return pathlib.Path(_bundled)
-
-
-def tearDownModule():  # pylint: disable=invalid-name
-    if _bundled:
-        shutil.rmtree(_bundled, ignore_errors=True)
 
 
 def run(program, *arguments, timeout=TIMEOUT_S, **options):

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: MIT
 """What a picture is made of: several models in a scene, a model from standard input, files that change; and contact
 sheets of whole folders."""
+import json
 import signal
 import subprocess
+import unittest
 
-import farlight_test
 from farlight_test import BIN, OneDaemon, bundled_scenes, farlight, read_png
 
 # A square of one metre about the origin that faces the camera, and shines by itself.
@@ -62,7 +63,7 @@ class Inputs(OneDaemon):
     def test_names_stay_distinct_and_one_file_is_sent_once(self):
         def sent(*more):
             result = self.expect(farlight("render", self.square, *more, "-o", self.picture, "--timings=json", *FRONT), 0)
-            return farlight_test.json.loads(result.stdout.splitlines()[-1])["offered_bytes"]
+            return json.loads(result.stdout.splitlines()[-1])["offered_bytes"]
 
         self.assertEqual(sent(), sent("--at", "1,0,0", "--at", "-1,0,0"))
         result = self.expect(farlight("render", self.square, "--at", "1,0,0", "--at", "-1,0,0", "--frame", "x", "-o",
@@ -176,7 +177,7 @@ class Inputs(OneDaemon):
     def scene_and_builds(self):
         """The revision of the one scene that there is, and how many steps building structures has taken."""
         result = self.expect(farlight("stats", "--json"), 0)
-        stats = farlight_test.json.loads(result.stdout)
+        stats = json.loads(result.stdout)
         scene, = stats["scenes"]
         return scene["revision"], sum(stage["count"] for stage in stats["stages"] if stage["stage"] == "build")
 
@@ -213,9 +214,5 @@ class Inputs(OneDaemon):
         self.assertEqual(self.leftovers(), ["picture.png", "square.mtl", "square.obj"])
 
 
-def tearDownModule():  # pylint: disable=invalid-name
-    farlight_test.tearDownModule()
-
-
 if __name__ == "__main__":
-    farlight_test.unittest.main()
+    unittest.main()

@@ -8,7 +8,7 @@ import subprocess
 import tempfile
 import unittest
 
-from farlight_test import BIN, ROOT, Daemon, bundled_scenes, read_png, tearDownModule  # noqa: F401
+from farlight_test import BIN, ROOT, Daemon, bundled_scenes, read_png
 
 PREFIX = "/usr/local"
 

@@ -15,7 +15,6 @@ TOY = RELEASE.parent / f"{RELEASE.name}-toy"
 os.environ["FARLIGHT_BIN"] = str(TOY)  # what farlight_test runs; each module of tests is a process of its own
 
 from farlight_test import Case, bundled_scenes, farlight, long_test, read_png, LONG  # pylint: disable=wrong-import-position
-from farlight_test import tearDownModule  # pylint: disable=wrong-import-position,unused-import
 
 FOLDER = "tests/tracers/toy"
 TARGETS = ("farlightd", "farlight", "farlight-import", "farlight-export", "farlight-video", "farlight-view",
