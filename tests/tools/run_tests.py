@@ -50,7 +50,7 @@ NOT_SANITIZED = re.compile(
     r"accuracy/(?!render_frame|tracer_owners|wave_comparison)"
     r"|contract/(.*(ray alone|packets of|rays? a call)|bvh in the plain|ldc|abuffer|rayspace, |quadtree)"
     r"|unit/trace/(abuffer/traversal|ldc/traversal|quadtree/layers)"
-    r"|test_(abuffer|animate|check_device|compare.*|guide|import_animation|layers|ldc|light|models|poses|quadtree|rayspace|shot|siege|view)$")
+    r"|test_(abuffer|animate|check_device|compare.*|denoise|guide|import_animation|layers|ldc|light|models|poses|quadtree|rayspace|shot|siege|view)$")
 # Where no times of an earlier run are known: what takes longest begins first.
 LONGEST_FIRST = ("test_view", "test_import", "accuracy/sampled_against_reference", "accuracy/frame_ahead", "accuracy/emitters",
                  "test_light", "test_models", "test_siege", "accuracy/distributed", "test_animate", "test_compare", "test_drill",
