@@ -28,7 +28,7 @@ def empty(world=(0, 0, 0)):
     scene.world.node_tree.nodes["Background"].inputs["Color"].default_value = (*world, 1)
     scene.camera = put("camera", bpy.data.cameras.new("camera"), (0, -8, 3), (math.radians(70), 0, 0))
     scene.farlight.samples, scene.farlight.step_samples, scene.farlight.denoise = 64, 32, "auto"
-    scene.farlight.server, scene.farlight.clamp = "", 10
+    scene.farlight.server, scene.farlight.use_auto_clamp, scene.farlight.clamp = "", False, 10
     return scene
 
 

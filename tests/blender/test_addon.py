@@ -489,6 +489,23 @@ class Motion(Case):
         self.assertEqual(made.objects("clip") + made.objects("channel"), [])
 
 
+class Settings(Case):
+    def test_indirect_light_is_clamped_by_the_samples_unless_a_value_is_chosen(self):
+        scene = empty()
+        grid("ground", 20, diffuse(GROUND))
+        ball("shining", material(Base_Color=(0, 0, 0, 1), Emission=(1, 1, 1, 1), Emission_Strength=2000), (0, 0, 1), 0.05)
+        scene.farlight.denoise, chosen = "off", scene.farlight
+
+        def picture(samples, clamp=None):
+            chosen.samples, chosen.use_auto_clamp = samples, clamp is None
+            chosen.clamp = 3 if clamp is None else clamp
+            return render()
+        for samples, clamp in ((8, 1.25), (32, 5), (96, 10)):
+            with self.subTest(samples):
+                self.assertGreater(np.abs(picture(samples) - picture(samples, 3)).max(), 0.01, "the chosen value has no effect")
+                np.testing.assert_array_equal(picture(samples), picture(samples, clamp))
+
+
 class Passes(Case):
     def test_depth_normal_and_albedo_arrive_in_the_compositor(self):
         scene = empty((0.5, 0.5, 0.5))

@@ -41,8 +41,8 @@ def _job(scene: bpy.types.Scene, view: cameras.Lens, moves: Optional[motion.Moti
     steps, samples = _steps(chosen.samples, most)
     background = Background.TRANSPARENT if scene.render.film_transparent else Background.ENVIRONMENT
     job = {**view.fields(may_crop=chosen.denoise == "off"), "integrator": chosen.integrator, "tracer": chosen.tracer,
-            "samples": samples, "last_frame": steps - 1, "accumulate": Accumulation.ANEW, "depth": chosen.depth, "clamp": chosen.clamp,
-            "denoise": chosen.denoise, "background": background, "seed": scene.frame_current}
+            "samples": samples, "last_frame": steps - 1, "accumulate": Accumulation.ANEW, "depth": chosen.depth,
+            "clamp": settings.clamp_of(chosen), "denoise": chosen.denoise, "background": background, "seed": scene.frame_current}
     if moves is None or not moves.has_any():
         return job
     if chosen.denoise == "auto" and steps * samples > FULLY_DENOISED:  # which the daemon does not know: it sees frames of few

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any, Optional
 
 import bpy
+from farlight.camera import usual_clamp
 from farlight.messages import Denoise, Integrator, Tracer
 
 from . import motion
@@ -46,8 +47,10 @@ class FarlightSettings(bpy.types.PropertyGroup):  # type: ignore[misc]
     view_samples: bpy.props.IntProperty(  # type: ignore[valid-type]
         name="Viewport samples", default=32, min=1, max=4096, description="In the viewport, once it rests")
     depth: bpy.props.IntProperty(name="Bounces", default=8, min=0, max=32)  # type: ignore[valid-type]
+    use_auto_clamp: bpy.props.BoolProperty(  # type: ignore[valid-type]
+        name="Clamp by samples", default=True, description="Clamp indirect light at 10, below 64 samples at less, down to 1.25")
     clamp: bpy.props.FloatProperty(  # type: ignore[valid-type]
-        name="Clamp indirect", default=10, min=0, max=1e6, description="Brightest light of a path over several bounces; 0: none")
+        name="Clamp indirect", default=10, min=0, max=1e6, description="Brightest light of a path over several bounces; 0: no limit")
     denoise: bpy.props.EnumProperty(  # type: ignore[valid-type]
         name="Denoise", items=_choices(Denoise), default="auto", description="auto: up to 64 samples")
     motion_steps: bpy.props.IntProperty(  # type: ignore[valid-type]
@@ -66,6 +69,11 @@ def server_of(scene: bpy.types.Scene) -> tuple[Optional[str], Optional[str]]:
     return server or None, key_file or None
 
 
+def clamp_of(chosen: FarlightSettings) -> float:
+    """Of F12, and of the viewport, which shows how bright that will be."""
+    return usual_clamp(chosen.samples) if chosen.use_auto_clamp else float(chosen.clamp)
+
+
 class _Panel(bpy.types.Panel):  # type: ignore[misc]
     bl_space_type, bl_region_type = "PROPERTIES", "WINDOW"
 
@@ -74,10 +82,11 @@ class _Panel(bpy.types.Panel):  # type: ignore[misc]
         """Whether it is shown."""
         return bool(context.engine == ENGINE)
 
-    def _rows(self, owner: Any, *names: str) -> None:
-        self.layout.use_property_split = True
+    def _rows(self, owner: Any, *names: str, is_active: bool = True) -> None:
+        rows = self.layout.column()
+        rows.use_property_split, rows.active = True, is_active
         for name in names:
-            self.layout.prop(owner, name)
+            rows.prop(owner, name)
 
 
 class FARLIGHT_PT_sampling(_Panel):  # pylint: disable=invalid-name
@@ -86,8 +95,10 @@ class FARLIGHT_PT_sampling(_Panel):  # pylint: disable=invalid-name
 
     def draw(self, context: bpy.types.Context) -> None:
         """The form."""
-        self._rows(context.scene.farlight, "server", "integrator", "tracer", "samples", "step_samples", "view_samples", "depth",
-                   "clamp", "denoise")
+        chosen = context.scene.farlight
+        self._rows(chosen, "server", "integrator", "tracer", "samples", "step_samples", "view_samples", "depth", "use_auto_clamp")
+        self._rows(chosen, "clamp", is_active=not chosen.use_auto_clamp)
+        self._rows(chosen, "denoise")
         self._rows(context.scene.render, "film_transparent")
 
 

@@ -70,8 +70,8 @@ class Viewport:
         camera = _camera(context.region, context.region_data)
         chosen = scene.farlight
         job = {"width": context.region.width, "height": context.region.height, "integrator": chosen.integrator,
-               "tracer": chosen.tracer, "samples": chosen.view_samples, "depth": chosen.depth, "clamp": chosen.clamp,
-               "denoise": chosen.denoise, "format": PixelFormat.RGBA16F, "moving_rate": 10}
+               "tracer": chosen.tracer, "samples": chosen.view_samples, "depth": chosen.depth,
+               "clamp": settings.clamp_of(chosen), "denoise": chosen.denoise, "format": PixelFormat.RGBA16F, "moving_rate": 10}
         self._wanted = job, camera
         if self._view is not None and job == self._asked and camera != self._camera:
             self._view.look(camera)

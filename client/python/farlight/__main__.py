@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from . import client, files, importer, messages, png
-from .camera import Camera, CameraOf, one_frame, request
+from .camera import Camera, CameraOf, one_frame, request, usual_clamp
 from .errors import Error, FileFailed, InvalidValue
 from .fields import Word
 from .frame import Frame
@@ -21,9 +21,9 @@ from .scene import Scene
 from .version import VERSION
 
 FAILED, USAGE, TRY_AGAIN, INTERRUPTED = 1, 2, 75, 130
-# Where nothing is said, as the command `farlight render` has it: samples of a pixel, and the clamp of indirect light.
+# Samples of a pixel where nothing is said, as the command `farlight render` has it.
 SAMPLES = {"path": 64}
-OTHER_SAMPLES, CLAMP, CLAMP_SAMPLES, CLAMP_MIN = 16, 10.0, 64, 1.25
+OTHER_SAMPLES = 16
 
 
 class _Progress:
@@ -133,9 +133,8 @@ def _write(options: argparse.Namespace, frame: Frame) -> None:
 def _values(options: argparse.Namespace) -> dict[str, Any]:
     samples = options.samples if options.samples is not None else SAMPLES.get(options.integrator, OTHER_SAMPLES)
     integrator = options.integrator or ("distributed" if samples > 1 else "whitted")
-    clamp = max(CLAMP * min(samples / CLAMP_SAMPLES, 1.0), CLAMP_MIN)
     return {"width": options.size[0], "height": options.size[1], "samples": samples, "integrator": integrator,
-            "tracer": options.tracer, "clamp": clamp, "primary": messages.Primary.AUTO, **dict(options.set)}
+            "tracer": options.tracer, "clamp": usual_clamp(samples), "primary": messages.Primary.AUTO, **dict(options.set)}
 
 
 def _layers(options: argparse.Namespace) -> tuple[str, ...]:

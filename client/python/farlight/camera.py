@@ -16,6 +16,7 @@ from .frame import layer_set
 from .messages import Encoding, ObjectKind
 from .objects import Object, make
 
+CLAMP, CLAMP_SAMPLES, CLAMP_MIN = 10.0, 64, 1.25  # as the command `farlight render` has it
 FOV_MIN, FOV_MAX = 0.06, 177.6  # degrees: what messages may have, in radians
 
 
@@ -109,6 +110,11 @@ def request(camera: CameraOf, layers: Any, values: dict[str, Any]) -> messages.R
             raise InvalidValue("this package takes whole pictures alone", field=f"render.{name}",
                                remedy=f"leave {name} out" + "; frames() has layers" * (name == "attachments"))
     return render
+
+
+def usual_clamp(samples: int) -> float:
+    """The clamp of indirect light that suits a picture of so many samples: the fewer they are, the more a rare bright one shows."""
+    return max(CLAMP * min(samples / CLAMP_SAMPLES, 1.0), CLAMP_MIN)
 
 
 def one_frame(values: dict[str, Any]) -> dict[str, Any]:
