@@ -10,6 +10,7 @@ import os
 import pathlib
 import subprocess
 import sys
+import tempfile
 import time
 import unittest
 import unittest.mock
@@ -20,6 +21,7 @@ sys.path[:0] = [str(HERE), str(ROOT / "client/python"), str(ROOT / "client/blend
 
 import bpy  # pylint: disable=wrong-import-position
 import numpy as np  # pylint: disable=wrong-import-position
+import farlight  # pylint: disable=wrong-import-position
 import farlight_blender  # pylint: disable=wrong-import-position
 from farlight_blender import engine, mirror, session  # pylint: disable=wrong-import-position
 import scenes  # pylint: disable=wrong-import-position
@@ -631,7 +633,7 @@ class Trouble(Case):
             if time.monotonic() > start + 1 and link.process.poll() is None:
                 link.process.kill()
             return False
-        with self.asked(kill), self.assertRaisesRegex(RuntimeError, "farlight: the daemon closed the connection"):
+        with self.asked(kill), self.assertRaisesRegex(RuntimeError, "farlight: farlightd: the daemon closed the connection: farlightd was ended by signal 9"):
             render()
         scene.farlight.samples, scene.farlight.step_samples = 64, 32
         np.testing.assert_array_equal(render(), first)
@@ -642,25 +644,98 @@ class Trouble(Case):
         with self.assertRaisesRegex(RuntimeError, "farlight: unix:/nowhere/socket: no daemon can be reached: No such file"):
             render()
 
-    def test_a_daemon_behind_a_socket_makes_the_same_picture(self):
-        scene = empty((0.5, 0.5, 0.5))
-        grid("ground", 20, diffuse(GROUND))
-        own = render()
-        path = pathlib.Path(scenes.FOLDER.name) / "socket"
-        with subprocess.Popen([pathlib.Path(os.environ["FARLIGHT_LIBEXEC"]) / "farlightd", "--listen", f"unix:{path}"]) as daemon:
-            self.addCleanup(daemon.kill)
-            until = time.monotonic() + 20
-            while not path.exists() and time.monotonic() < until:
-                time.sleep(0.05)
-            scene.farlight.server = f"unix:{path}"
-            np.testing.assert_array_equal(render(), own)
-            daemon.terminate()
-
     def test_a_scene_without_a_camera(self):
         scene = empty()
         bpy.data.objects.remove(scene.camera)
         with self.assertRaises(RuntimeError):
             render()
+
+
+# The other host is this one. It has no words but those that ssh and a shell have.
+SSH = """#!/bin/sh
+test "$1 $2" = "-T --" || exit 2
+case $3 in
+there) shift 3; exec "$@" ;;
+bare) echo "bash: line 1: $4: command not found" >&2; exit 127 ;;
+refusing) echo "ssh: connect to host $3 port 22: Connection refused" >&2; exit 255 ;;
+*) echo "ssh: Could not resolve hostname $3: Name or service not known" >&2; exit 255 ;;
+esac
+"""
+
+
+class Elsewhere(Case):
+    """A daemon with a socket, here or behind ssh."""
+
+    def setUp(self):
+        programs, folder = os.environ["FARLIGHT_LIBEXEC"], pathlib.Path(self.enterContext(tempfile.TemporaryDirectory()))
+        (folder / "ssh").write_text(SSH)
+        (folder / "ssh").chmod(0o755)
+        self.enterContext(unittest.mock.patch.dict(os.environ, {"PATH": f"{folder}:{programs}:{os.environ['PATH']}"}))
+        self.path = folder / "socket"
+        daemon = subprocess.Popen([f"{programs}/farlightd", "--listen", f"unix:{self.path}"], stdout=subprocess.DEVNULL)
+        self.addCleanup(daemon.wait)
+        self.addCleanup(daemon.kill)
+        self.addCleanup(session.close_all)
+        until = time.monotonic() + 20
+        while not self.path.exists() and time.monotonic() < until:
+            time.sleep(0.05)
+        self.scene = empty((0.5, 0.5, 0.5))
+        grid("ground", 20, diffuse(GROUND))
+
+    def render_by(self, server):
+        self.scene.farlight.server = server
+        return render()
+
+    def test_a_daemon_makes_the_same_picture_of_ones_own_behind_a_socket_and_behind_ssh(self):
+        own = render()
+        for server in (f"unix:{self.path}", f"ssh:there:{self.path}"):
+            np.testing.assert_array_equal(self.render_by(server), own)
+        link = session._sessions[f"ssh:there:{self.path}", None]._client._link
+        self.assertEqual(pathlib.Path(link.process.args[0]).name, "ssh")
+        session.close_all()
+        self.assertIsNotNone(link.process.poll(), "ssh has not ended")
+
+    def test_an_ssh_that_fails_is_named_with_its_reason_and_what_to_try(self):
+        usual = "unix:/run/farlight/farlight.sock"
+        for server, at, words in (("ssh:nowhere", usual, "ssh ended with status 255: ssh: Could not resolve hostname nowhere: Name or service "),
+                                  ("ssh:refusing", usual, "ssh ended with status 255: ssh: connect to host refusing port 22: Connection ref"),
+                                  ("ssh:bare", usual, "ssh ended with status 127: bash: line 1: farlight: command not found; "),
+                                  ("ssh:there:/no/socket", "unix:/no/socket", "ssh ended with status 75: farlight: unix:/no/socket: cannot reach "
+                                   "a daemon: No such file or directory")):
+            with self.subTest(server), self.assertRaises(RuntimeError) as raised:
+                self.render_by(server)
+            told, host = str(raised.exception), server.split(":")[1]
+            self.assertIn(f"farlight: {server}: no daemon can be reached: {words}", told)
+            self.assertIn(f"; try 'ssh {host} farlight ping --count 1 --server {at}' in a terminal", told)
+        for server in ("ssh:", "ssh:-oProxyCommand=x", "ssh:there:/a;b"):
+            with self.subTest(server), self.assertRaisesRegex(RuntimeError, r"is not ssh:HOST\[:SOCKET\]"):
+                self.render_by(server)
+
+    def test_an_ssh_that_ends_within_a_frame_leaves_what_has_come_and_the_next_render_connects_again(self):
+        server = f"ssh:there:{self.path}"
+        first = self.render_by(server)
+        process = session._sessions[server, None]._client._link.process
+        self.scene.farlight.samples = 65536
+
+        def kill():
+            if written.call_count >= 2 and process.poll() is None:
+                process.kill()
+            return False
+        with unittest.mock.patch.object(engine, "_write", wraps=engine._write) as written, self.asked(kill), \
+                self.assertRaises(RuntimeError) as raised:
+            render()
+        self.assertIn(f"farlight: {server}: the daemon closed the connection", str(raised.exception))
+        self.assertIn(": ssh was ended by signal 9; render again, which connects again and sends everything", str(raised.exception))
+        left = pathlib.Path(scenes.FOLDER.name) / "left.exr"
+        bpy.data.images["Render Result"].save_render(str(left))
+        np.testing.assert_allclose(blocks(load(left)), blocks(first), atol=0.02)  # noise of 64 samples is less than 0.01
+        with farlight.connect(f"unix:{self.path}") as beside:
+            until = time.monotonic() + 20
+            while beside.stats().jobs and time.monotonic() < until:
+                time.sleep(0.05)
+            self.assertEqual(beside.stats().jobs, 0, "the job goes on without a client")
+        self.scene.farlight.samples = 64
+        np.testing.assert_array_equal(render(), first)
 
 
 def main():

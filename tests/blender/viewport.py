@@ -15,6 +15,7 @@ sys.path[:0] = [str(ROOT / "client/python"), str(ROOT / "client/blender"), str(H
 
 import bpy  # pylint: disable=wrong-import-position
 from mathutils import Euler  # pylint: disable=wrong-import-position
+from farlight.aio import AsyncClient  # pylint: disable=wrong-import-position
 import farlight_blender  # pylint: disable=wrong-import-position
 from farlight_blender import engine, session  # pylint: disable=wrong-import-position
 import scenes  # pylint: disable=wrong-import-position
@@ -94,7 +95,7 @@ def kill_the_daemon():
 
 def is_told_and_red():
     """The message says what has happened, and the next daemon has the scene."""
-    return any("connection" in one and "tried again every 1 s" in one for one in told) and is_red()
+    return any("connection" in one and "tried again in 1 s" in one for one in told) and is_red()
 
 
 def no_view_is_left():

@@ -352,15 +352,28 @@ class WithDaemon(OneDaemon):
         scene, _ = triangle()
         place = self.daemon.address.removeprefix("unix:")
         fake = self.folder / "ssh"
-        fake.write_text('#!/bin/sh\ntest "$1 $2 $3" = "-T -- gpu-host" || { echo "unknown host $3" >&2; exit 255; }\nshift 3\nexec "$@"\n')
+        fake.write_text("""#!/bin/sh
+case "$1 $2 $3" in
+"-T -- gpu-host") shift 3; exec "$@" ;;
+"-T -- waiting") echo "Confirm user presence for key" >&2; exec sleep 60 ;;
+"-T -- chatty") exec yes >&2 ;;
+*) echo "unknown host $3" >&2; exit 255 ;;
+esac
+""")
         fake.chmod(0o755)
         with unittest.mock.patch.dict(os.environ, {"PATH": f"{self.folder}:{farlight_test.BIN}:{os.environ['PATH']}"}):
             with farlight.connect(f"ssh:gpu-host:{place}") as client:
                 self.assertEqual(client.render(scene, STRAIGHT, width=8, height=8).data,
                                  self.connect().render(scene, STRAIGHT, width=8, height=8).data)
-            with self.assertRaises(farlight.ConnectionLost) as raised:
-                farlight.connect(f"ssh:elsewhere:{place}")
-            self.assertIn("ssh", str(raised.exception))
+            # A signal 25 is for files that grow too long: another host may say as much as it likes.
+            for host, words in (("elsewhere", "ssh ended with status 255: unknown host elsewhere"),
+                                ("chatty", "ssh was ended by signal 25: y"),
+                                ("waiting", "the daemon has been silent for 0.5 s: Confirm user presence for key")):
+                for connect in (farlight.connect, lambda *where, **how: asyncio.run(farlight.aio.connect(*where, **how))):
+                    with self.subTest(host), self.assertRaises(farlight.ConnectionLost) as raised:
+                        connect(f"ssh:{host}:{place}", timeout=0.5 if host == "waiting" else 60)
+                    self.assertEqual(str(raised.exception), f"ssh:{host}:{place}: no daemon can be reached: {words}; try 'ssh {host} "
+                                     f"farlight ping --count 1 --server {self.daemon.address}' in a terminal")
             for wrong in ("ssh:", "ssh:-oProxyCommand=x", "ssh:gpu-host:a;b"):
                 with self.assertRaises(farlight.InvalidValue):
                     farlight.connect(wrong)

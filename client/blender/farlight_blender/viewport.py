@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from .engine import FarlightEngine
 
 LOOK_S = 0.03  # how often it is looked whether a frame has come
-RETRY_S = 1.0  # before a view is begun again that has failed
+RETRY_S, RETRY_MAX_S = 1.0, 8.0  # before a view is begun again that has failed, and failed again: each try may be an ssh
 
 
 def _camera(region: bpy.types.Region, view: bpy.types.RegionView3D) -> farlight.Camera:
@@ -51,6 +51,7 @@ class Viewport:
         self._asked: Any = None  # the job of the view
         self._camera: Optional[farlight.Camera] = None
         self._is_sent = True
+        self._pause = RETRY_S
         self._working: Optional[asyncio.Task[Any]] = None  # opens a view, or sends the scene
         self._waiting: Optional[asyncio.Task[Frame]] = None
         self._pixels: Any = None  # that have come and are no texture yet
@@ -117,9 +118,10 @@ class Viewport:
             return None
         except farlight.Error as why:
             self._stop()
-            self._engine.say(f"{why} (tried again every {RETRY_S:g} s)")
+            pause, self._pause = self._pause, min(2 * self._pause, RETRY_MAX_S)
+            self._engine.say(f"{why} (tried again in {pause:g} s)")
             self._engine.tag_redraw()
-            return RETRY_S
+            return pause
         return LOOK_S
 
     def _begin(self) -> None:
@@ -150,6 +152,7 @@ class Viewport:
             self._show(come.result())
 
     def _show(self, frame: Frame) -> None:
+        self._pause = RETRY_S
         self._pixels = np.array(frame.colour[::-1], np.float32, order="C")
         self._pixels[..., 3] = 1
         self._engine.say(f"{frame.begin.samples} samples")

@@ -2,8 +2,11 @@
 """Where a daemon is: an address, or a daemon of one's own."""
 from __future__ import annotations
 
+import contextlib
 import os
 import re
+import resource
+import shlex
 import shutil
 import socket
 import subprocess
@@ -11,10 +14,11 @@ import tempfile
 from dataclasses import dataclass
 from typing import IO, Optional
 
-from .errors import ConnectionLost, Error, FileFailed, InvalidValue
+from .errors import ConnectionLost, Error, FileFailed, InvalidValue, TimedOut
 
 REMOTE_SOCKET = "/run/farlight/farlight.sock"
 TRY_AGAIN_STATUS, FIRST_SIGNAL_STATUS = 75, 128  # of our programs; ssh has 255
+TALK_BYTES = 16 << 20  # that ssh may say before it is ended: another host chooses part of it
 
 
 @dataclass
@@ -23,8 +27,20 @@ class Link:
     socket: socket.socket
     process: Optional["subprocess.Popen[bytes]"] = None
     talk: Optional[IO[bytes]] = None  # what the program says
-    is_told: bool = False  # how it ended
+    remote: tuple[str, str] = ("", "")  # of ssh: the host, and the daemon's address there
+    server: str = "farlightd"  # the address, where there is one
     is_final: bool = False
+    words: str = ""  # how it ended, once that was asked
+
+    def last_line(self) -> str:
+        """Of what the program has said."""
+        if self.talk is None:
+            return ""
+        number = self.talk.fileno()  # whose place the program shares
+        end = os.pread(number, 2048, max(0, os.fstat(number).st_size - 2048))
+        lines = [one for one in end.strip().splitlines() if not one.startswith(b"READY")]
+        line = lines[-1][:400] if lines else b""
+        return "".join(one if one.isprintable() else "?" for one in line.decode("utf-8", "replace"))
 
     def last_words(self) -> tuple[str, bool]:
         """How a program that has closed its end ended, with its last line; and whether it would do so again."""
@@ -36,13 +52,8 @@ class Link:
             return "", False
         name = os.path.basename(str(self.process.args[0])) if isinstance(self.process.args, list) else "it"
         words = f"{name} ended with status {status}" if status >= 0 else f"{name} was ended by signal {-status}"
-        line = b""
-        if self.talk is not None:
-            self.talk.seek(max(0, self.talk.seek(0, os.SEEK_END) - 2048))
-            lines = [one for one in self.talk.read().strip().splitlines() if not one.startswith(b"READY")]
-            line = lines[-1][:400] if lines else b""
-        text = "".join(one if one.isprintable() else "?" for one in line.decode("utf-8", "replace"))
-        return f"{words}: {text}" if text else words, 0 < status < FIRST_SIGNAL_STATUS and status != TRY_AGAIN_STATUS
+        line = self.last_line()
+        return f"{words}: {line}" if line else words, 0 < status < FIRST_SIGNAL_STATUS and status != TRY_AGAIN_STATUS
 
     def end(self) -> None:
         """Ends the program, which has nothing to finish."""
@@ -74,25 +85,27 @@ def find_program(name: str) -> str:
     return found
 
 
-def start_program(name: str, arguments: list[str], is_remote: bool = False) -> Link:
+def start_program(name: str, arguments: list[str], remote: tuple[str, str] = ("", "")) -> Link:
     """Starts a program with a socket as its descriptor, or, as ssh wants it, as its standard input and output."""
     path = find_program(name)
     ours, theirs = socket.socketpair()
-    talk = None
+    talk = tempfile.TemporaryFile()
     try:
-        if is_remote:
-            process = subprocess.Popen([path, *arguments], stdin=theirs.fileno(), stdout=theirs.fileno())
+        if any(remote):
+            process = subprocess.Popen([path, *arguments], stdin=theirs.fileno(), stdout=theirs.fileno(), stderr=talk)
+            with contextlib.suppress(OSError):
+                resource.prlimit(process.pid, resource.RLIMIT_FSIZE, (TALK_BYTES, TALK_BYTES))
         else:
-            talk = tempfile.TemporaryFile()
             # In a process group of its own: a Ctrl-C is for us, and we end it properly.
             process = subprocess.Popen([path, "--fd", str(theirs.fileno()), *arguments], pass_fds=[theirs.fileno()],
                                        stdin=subprocess.DEVNULL, stdout=talk, stderr=talk, process_group=0)
     except OSError as why:
         ours.close()
+        talk.close()
         raise FileFailed(f"cannot be started: {why.strerror}", field=path) from None
     finally:
         theirs.close()
-    return Link(ours, process, talk)
+    return Link(ours, process, talk, remote)
 
 
 def _connect(server: str, family: int, where: object, timeout: float) -> socket.socket:
@@ -133,7 +146,7 @@ def _start_ssh(server: str) -> Link:
     path = path or REMOTE_SOCKET
     if not host or host.startswith("-") or not re.fullmatch(r"[\w/.+@%,=-]+", path, re.ASCII):
         raise InvalidValue("is not ssh:HOST[:SOCKET] with a path of letters, digits and /._-+@%,=", field=server)
-    return start_program("ssh", ["-T", "--", host, "farlight", "bridge", f"unix:{path}"], is_remote=True)
+    return start_program("ssh", ["-T", "--", host, "farlight", "bridge", f"unix:{path}"], (host, f"unix:{path}"))
 
 
 def usual_server() -> str | None:
@@ -146,25 +159,37 @@ def usual_key(server: str | None) -> str | None:
     return os.environ.get("FARLIGHT_KEY") or None if server and server.startswith("tcp:") else None
 
 
+def broken(why: OSError, link: Link | None) -> ConnectionLost:
+    """Of a system call. A program of ours that ends resets its socket or not, as it happens: either way it has closed it."""
+    has_closed = link is not None and link.process is not None and isinstance(why, (BrokenPipeError, ConnectionResetError))
+    return ConnectionLost("the daemon closed the connection" if has_closed else f"the connection broke: {why.strerror}")
+
+
 def tell_end(why: Error | None, link: Link | None) -> bool:
     """Adds to a lost connection how the program at its other end ended, if we started it; whether it would do so again."""
-    if link is None or link.process is None or type(why) is not ConnectionLost or link.is_told:
+    if link is None or not isinstance(why, ConnectionLost):
         return link is not None and link.is_final
-    words, link.is_final = link.last_words()
-    link.is_told = bool(words)
-    why.text += f": {words}" if words else ""
+    why.field = why.field or link.server
+    if not link.words and not isinstance(why, TimedOut):
+        link.words, link.is_final = link.last_words()
+        why.text += f": {link.words}" if link.words else ""
     return link.is_final
 
 
-def explain(why: Error, server: str | None, link: Link | None) -> None:
+def explain(why: Error, link: Link) -> None:
     """Adds to an error of the beginning where it happened, and what the program there said."""
-    why.field = why.field or server or "farlightd"
+    why.field = why.field or link.server
     if tell_end(why, link):
         why.retryable = False
+    if not any(link.remote) or not isinstance(why, ConnectionLost):
+        return
+    host, address = link.remote
+    line = "" if link.words else link.last_line()
+    why.text = f"no daemon can be reached: {link.words or why.text}" + (f": {line}" if line else "")
+    why.remedy = f"try 'ssh {shlex.quote(host)} farlight ping --count 1 --server {address}' in a terminal"
 
 
-def open_link(server: str | None, timeout: float) -> Link:
-    """unix:PATH, tcp:HOST:PORT, ssh:HOST[:SOCKET]; None starts a daemon, which ends with the connection."""
+def _open(server: str | None, timeout: float) -> Link:
     if server is None:
         return start_program("farlightd", [])
     if server.startswith("ssh:"):
@@ -175,3 +200,10 @@ def open_link(server: str | None, timeout: float) -> Link:
         return Link(_connect(server, socket.AF_UNIX, server[5:], timeout))
     raise InvalidValue("is not an address of a daemon", field=server,
                        remedy="give unix:PATH, tcp:HOST:PORT or ssh:HOST[:SOCKET]")
+
+
+def open_link(server: str | None, timeout: float) -> Link:
+    """unix:PATH, tcp:HOST:PORT, ssh:HOST[:SOCKET]; None starts a daemon, which ends with the connection."""
+    link = _open(server, timeout)
+    link.server = server or link.server
+    return link

@@ -76,7 +76,7 @@ class AsyncClient:
         try:
             await self._operate(core, core.greet())
         except Error as why:
-            await asyncio.to_thread(address.explain, why, self._options.server, self._link)
+            await asyncio.to_thread(address.explain, why, self._link)
             raise
 
     async def _drop(self) -> None:
@@ -120,7 +120,7 @@ class AsyncClient:
                     core.fail(TimedOut(f"the daemon has been silent for {self._options.timeout:g} s"))
                 core.ping()
             except OSError as why:
-                core.fail(ConnectionLost(f"the connection broke: {why.strerror}"))
+                core.fail(address.broken(why, self._link))
             if core.failure is not None and self._link is not None:
                 await asyncio.to_thread(address.tell_end, core.failure, self._link)
             self._flush(core)

@@ -130,7 +130,7 @@ class Client:
         try:
             self._operate(self._core.greet(), self._options.timeout)
         except Error as why:
-            address.explain(why, self._options.server, self._link)
+            address.explain(why, self._link)
             raise
 
     def _drop(self) -> None:
@@ -158,7 +158,7 @@ class Client:
         except BlockingIOError:
             return False
         except OSError as why:
-            self._core.fail(ConnectionLost(f"the connection broke: {why.strerror}"))
+            self._core.fail(address.broken(why, self._link))
             return True
 
     def _flush(self) -> bool:
@@ -177,13 +177,14 @@ class Client:
             # The daemon may have said why before it closed.
             while self._core.failure is None and self._receive():
                 pass
-            self._core.fail(ConnectionLost(f"the connection broke: {why.strerror}"))
+            self._core.fail(address.broken(why, self._link))
         return has_sent
 
     def _exchange(self, silence_s: float) -> None:
         """Sends, and waits until something has come or could be sent."""
         # What has been sent has left room, for which an upload may have waited: nothing need come first.
         if self._flush() or self._core.failure is not None:
+            address.tell_end(self._core.failure, self._link)
             return
         assert self._link is not None
         quiet = 0
@@ -199,6 +200,7 @@ class Client:
             quiet += 1
             if quiet == 3:
                 self._core.fail(TimedOut(f"the daemon has been silent for {silence_s:g} s"))
+                address.tell_end(self._core.failure, self._link)
                 return
             self._core.ping()
             self._flush()
