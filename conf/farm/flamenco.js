@@ -18,8 +18,8 @@ const JOB_TYPE = {
 function animate(settings, part) {
     return author.Command("exec", {
         exe: "farlight-node",
-        args: ["farlight", "animate", settings.model, "--frames", settings.frames, "--shard", part, "-o", settings.output, "--resume",
-               "--digests", "--progress", "lines", "--retry-for", "5"].concat(settings.options.split(" ").filter((word) => word !== "")),
+        args: ["farlight", "animate", "--frames", settings.frames, "--shard", part, "-o", settings.output, "--resume", "--digests",
+               "--progress", "lines", "--retry-for", "5", ...settings.options.split(" ").filter((word) => word !== ""), "--", settings.model],
     });
 }
 
@@ -27,7 +27,7 @@ function compileJob(job) {
     const settings = job.settings;
     const verify = author.Task("verify", "misc");
     verify.addCommand(author.Command("exec", {
-        exe: "farlight", args: ["verify", settings.output, "--frames", settings.frames],
+        exe: "farlight", args: ["verify", "--frames", settings.frames, "--", settings.output],
     }));
     const parts = frameChunker(settings.frames, settings.chunk_size).length;
     for (let part = 1; part <= parts; part++) {

@@ -5,7 +5,8 @@
 Slurm, one node: an animation as an array of tasks while workers and daemons are killed at random. Then a picture is
 damaged, and the same job is submitted again. Every picture must be there once, with the bytes of a single run, and the
 second job must render the damaged one alone. Open Job Description: the template's own scripts, run as its specification
-says. Flamenco: the job type is compiled by Node.js with Flamenco's names, and the commands are run. xargs: as it is.
+says. Flamenco: the job type is compiled by Node.js with Flamenco's names, and the commands are run. xargs: as it is. All of
+them once more with names that a shell, xargs or a parser of options could take for its own.
 
 Usage: farm.py BIN [--tasks 64] [--only slurm,openjd,flamenco,xargs,node]   Exit status: 0 all good, 1 not.
 """
@@ -31,6 +32,7 @@ from slurm import Slurm  # pylint: disable=wrong-import-position
 PICTURE = ["--size", "96x72", "--samples", "4", "--integrator", "path", "--orbit"]
 KILL_EVERY_S = 2.0
 FOR_GOOD_S = 900
+HOSTILE = """-a "b' $(touch x) `touch y`; touch z {} \\ *"""
 # The controller tells the database without haste.
 ACCOUNTED_S = 60
 
@@ -67,8 +69,8 @@ class Farm:
         if not holds:
             raise AssertionError(what)
 
-    def is_as_one_run(self, folder, count=None):
-        wanted = {name: digest for name, digest in self.reference.items() if count is None or int(name[:4]) <= count}
+    def is_as_one_run(self, folder, reference=None):
+        wanted = reference or self.reference
         self.expect(digests(folder) == wanted, f"{folder}: other pictures than one run gives")
         self.run("farlight", "verify", folder / "%04d.png", *self.range(len(wanted)))
         left = {path.name for path in folder.iterdir()} - set(wanted) - {f"{name}.sha256" for name in wanted}
@@ -126,6 +128,24 @@ class Farm:
             self.expect(ended.count("REQUEUED") == requeued and len(attempts) == self.tasks + requeued, f"sacct shows {attempts}")
             print(f"slurm: {self.tasks} tasks in {took_s:.0f} s, {killed} processes killed, {requeued} tasks queued again, as sacct shows")
             self.poisoned(cluster, out, variables)
+            for_all = self.hostile(self.folder / "cluster")
+            cluster.submit(FARM / "slurm.sbatch", "1-2", *PICTURE, MODEL=f"{HOSTILE}.glb", FRAMES="1-2", OUTPUT=f"{HOSTILE}/%04d.png")
+            while cluster.queue():
+                time.sleep(0.2)
+            for_all()
+
+    def hostile(self, folder):
+        """A model with such a name in a folder, whose pictures shall be in a folder with that name. What is to be called then."""
+        folder.mkdir(exist_ok=True)
+        shutil.copy(self.model, folder / f"{HOSTILE}.glb")
+        reference = self.folder / "of 2"
+        self.run("farlight", "animate", folder / f"{HOSTILE}.glb", *self.range(2), "-o", reference / "%04d.png", *PICTURE, "-q")
+
+        def check():
+            self.is_as_one_run(folder / HOSTILE, digests(reference))
+            made = [path for path in self.folder.rglob("*") if path.name in ("x", "y", "z") or path.name.startswith(("x)", "y`"))]
+            self.expect(not made, f"a name was run: {made}")
+        return check
 
     def accounted(self, cluster, job):
         """What sacct shows of each attempt; the comment of each task's last one must say that all is done."""
@@ -159,50 +179,68 @@ class Farm:
         print(f"slurm: of {self.tasks} pictures the damaged one alone was rendered again, as sacct shows")
 
     def openjd(self):
+        self.openjd_job(self.folder / "session", {"Model": self.model, "Frames": f"1-{self.tasks}", "OutputFolder": self.folder / "openjd",
+                                                  "OutputName": "%04d.png", "Parts": 4, "Options": " ".join(PICTURE)})
+        self.is_as_one_run(self.folder / "openjd")
+        folder = self.folder / "hostile-openjd"  # a daemon's address has no spaces
+        check = self.hostile(folder)
+        self.openjd_job(folder / "$(id>x)", {"Model": f"{HOSTILE}.glb", "Frames": "1-2", "OutputFolder": HOSTILE, "OutputName": "%04d.png",
+                                                "Parts": 2, "Options": " ".join([*PICTURE, ""])}, cwd=folder)
+        check()
+        print("openjd: 4 tasks; 2 with a name that no shell may read")
+
+    def openjd_job(self, session, given, **options):
         import yaml  # pylint: disable=import-outside-toplevel
-        out, parts = self.folder / "openjd", 4
         template = yaml.safe_load((FARM / "openjd.yaml").read_text())
-        given = {"Model": self.model, "Frames": f"1-{self.tasks}", "OutputFolder": out, "OutputName": "%04d.png", "Parts": parts,
-                 "Options": " ".join(PICTURE)}
         self.expect({parameter["name"] for parameter in template["parameterDefinitions"]} == set(given), "other parameters")
-        session = self.folder / "session"
         session.mkdir()
         values = {**{f"Param.{name}": value for name, value in given.items()}, "Session.WorkingDirectory": session}
         render, verify = template["steps"]
         environment = render["stepEnvironments"][0]["script"]
-        answered = openjd_run(self, environment, "onEnter", "Env", values)
+        answered = openjd_run(self, environment, "onEnter", "Env", values, **options)
         os.environ.update(dict(re.findall(r"^openjd_env: (\w+)=(.*)$", answered, re.M)))
         try:
             self.expect(render["parameterSpace"]["taskParameterDefinitions"][0]["range"] == "1-{{Param.Parts}}", "another range")
-            for part in range(1, parts + 1):
-                told = openjd_run(self, render["script"], "onRun", "Task", {**values, "Task.Param.Part": part})
+            for part in range(1, given["Parts"] + 1):
+                told = openjd_run(self, render["script"], "onRun", "Task", {**values, "Task.Param.Part": part}, **options)
                 shares = [float(share) for share in re.findall(r"^openjd_progress: (.*)$", told, re.M)]
                 self.expect(shares == sorted(shares) and shares[-1] == 100, f"progress {shares}")
         finally:
-            openjd_run(self, environment, "onExit", "Env", values)
+            openjd_run(self, environment, "onExit", "Env", values, **options)
             del os.environ["FARLIGHT_SERVER"]
-        openjd_run(self, verify["script"], "onRun", "Task", values)
-        self.is_as_one_run(out)
-        print(f"openjd: {parts} tasks")
+        openjd_run(self, verify["script"], "onRun", "Task", values, **options)
 
     def flamenco(self):
         out = self.folder / "flamenco"
-        settings = {"model": str(self.model), "frames": f"1-{self.tasks}", "chunk_size": 16, "output": str(out / "%04d.png"),
-                    "options": " ".join(PICTURE)}
+        count = self.flamenco_job({"model": str(self.model), "frames": f"1-{self.tasks}", "chunk_size": 16, "output": str(out / "%04d.png"),
+                                   "options": " ".join(PICTURE)})
+        self.is_as_one_run(out)
+        folder = self.folder / "hostile flamenco"
+        check = self.hostile(folder)
+        self.flamenco_job({"model": f"{HOSTILE}.glb", "frames": "1-2", "chunk_size": 1, "output": f"{HOSTILE}/%04d.png",
+                           "options": " ".join(PICTURE)}, cwd=folder)
+        check()
+        print(f"flamenco: {count} tasks; 3 with a name that no shell may read")
+
+    def flamenco_job(self, settings, **options):
         tasks = json.loads(self.run("node", HERE / "flamenco_compile.js", FARM / "flamenco.js", json.dumps(settings)))
         for task in tasks:
             for command in task["commands"]:
                 self.expect(command["name"] == "exec", f"command {command['name']}")
-                self.run(command["parameters"]["exe"], *command["parameters"]["args"])
+                self.run(command["parameters"]["exe"], *command["parameters"]["args"], **options)
         self.expect(tasks[-1]["dependencies"] == [task["name"] for task in tasks[:-1]], "verify does not wait for all")
-        self.is_as_one_run(out)
-        print(f"flamenco: {len(tasks)} tasks")
+        return len(tasks)
 
     def xargs(self):
         out = self.folder / "xargs"
         self.run(FARM / "xargs.sh", 8, 2, self.model, *self.range(self.tasks), "-o", out / "%04d.png", *PICTURE)
         self.is_as_one_run(out)
-        print("xargs: 8 parts, 2 at once")
+        folder = self.folder / "hostile xargs"
+        check = self.hostile(folder)
+        self.run(FARM / "xargs.sh", 2, 1, *self.range(2), "-o", f"{HOSTILE}/%04d.png", *PICTURE, "--", f"{HOSTILE}.glb", cwd=folder)
+        check()
+        self.run(FARM / "xargs.sh", "2/$(touch x)", 1, self.model, *self.range(2), status=2, cwd=folder)
+        print("xargs: 8 parts, 2 at once; 2 with a name that no shell may read")
 
     def node(self):
         """What the first task of a node costs, and a later one."""
@@ -228,7 +266,7 @@ class Farm:
             time.sleep(0.05)
 
 
-def openjd_run(farm, script, action, scope, values):
+def openjd_run(farm, script, action, scope, values, **options):
     """One action: its embedded files are written, references replaced."""
     def replace(text, known):
         return re.sub(r"\{\{\s*([\w.]+)\s*\}\}", lambda match: str(known[match.group(1)]), text)
@@ -240,7 +278,7 @@ def openjd_run(farm, script, action, scope, values):
         if file["name"] in script["actions"][action]["args"][0]:
             path.write_text(replace(file["data"], known))
     wanted = script["actions"][action]
-    return farm.run(*(replace(word, known) for word in [wanted["command"], *wanted["args"]]))
+    return farm.run(*(replace(word, known) for word in [wanted["command"], *wanted["args"]]), **options)
 
 
 def main():

@@ -100,13 +100,35 @@ class OneDaemonForManyTasks(Case):
             sent += [json.loads(line)["uploaded_bytes"] for line in result.stdout.splitlines() if '"kind":"client"' in line]
         self.assertGreater(sent[0], 0)
         self.assertEqual(sent[1], 0)
-        result = subprocess.run([NODE], env=environment, stderr=subprocess.PIPE, text=True, check=False)
-        self.assertEqual(result.returncode, 2)
-        environment["FARLIGHT_GPU"] = "77"  # there is none
-        result = subprocess.run([NODE, "true"], env=environment, stderr=subprocess.PIPE, text=True, check=False,
-                                timeout=farlight_test.TIMEOUT_S)
-        self.assertEqual(result.returncode, 75, result.stderr)
-        self.assertIn("77", result.stderr)
+
+    def node(self, *command, **environment):
+        environment = {**os.environ, "XDG_RUNTIME_DIR": str(self.folder), "PATH": f"{self.folder}:{farlight_test.BIN}:{os.environ['PATH']}",
+                       "FARLIGHT_GPU": "software", **environment}
+        environment.pop("FARLIGHT_SERVER", None)
+        return subprocess.run([NODE, *command], env=environment, stderr=subprocess.PIPE, text=True, check=False,
+                              timeout=farlight_test.TIMEOUT_S)
+
+    def test_a_daemon_that_does_not_start_is_named_with_how_it_ended_and_its_log(self):
+        folder = self.folder / f"farlight-{os.getuid()}"
+        result = self.expect(self.node("true", FARLIGHT_GPU="77"), 75)  # there is none
+        self.assertIn(f"farlightd --listen unix:{folder}/gpu-77.sock --device 77 ended with status ", result.stderr)
+        self.assertRegex(result.stderr, rf"its log, {folder}/gpu-77.log:\n.*device.*77")
+        fake, log = self.folder / "farlightd", folder / "gpu-software.log"
+        for does, words in (("exit 3", "ended with status 3\n"), ("kill -9 $$", "ended with status 137, by signal 9\n"),
+                            ("exec sleep 60", "has not answered for 1 s\n")):
+            fake.write_text(f"#!/bin/sh\n{does}\n")
+            fake.chmod(0o755)
+            result = self.expect(self.node("true", FARLIGHT_START="1"), 75)
+            self.assertEqual(result.stderr, "farlight-node: the daemon does not start: farlightd --listen "
+                             f"unix:{folder}/gpu-software.sock --device software {words}farlight-node: it said nothing; its log, {log}, is empty\n")
+
+    def test_what_cannot_be_a_value_is_named(self):
+        for command, environment, status, words in (
+                ([], {}, 2, "no command is given"), (["true"], {"FARLIGHT_GPU": "../x"}, 2, "FARLIGHT_GPU is '../x'"),
+                (["true"], {"FARLIGHT_START": "a[$(touch x)]"}, 2, "FARLIGHT_START is 'a[$(touch x)]'"),
+                (["true"], {"XDG_RUNTIME_DIR": "/nowhere"}, 75, "/nowhere/farlight-")):
+            with self.subTest(words):
+                self.assertIn(words, self.expect(self.node(*command, **environment), status).stderr)
 
 
 if __name__ == "__main__":
