@@ -61,6 +61,7 @@ struct command_line {
     struct gateway_options gateway;
     bool insecure;
     struct cli_socket socket;
+    struct web_outage outage;
     const char *words[DAEMON_WORDS_MAX + 1]; /* arguments of a daemon of its own, and a NULL */
     size_t word_count;
 };
@@ -213,7 +214,9 @@ static bool complete(struct command_line *line, struct fl_error *error)
                                                .server = server,
                                                .key_file = cli_key_file(server, job->key_file),
                                                .link = named(job->link),
-                                               .scene = job->scene ? job->scene : cli_base_name(job->model)};
+                                               .scene = job->scene ? job->scene : cli_base_name(job->model),
+                                               /* Of a model's daemon the thread tells that shares it. */
+                                               .outage = job->model ? NULL : &line->outage};
     line->gateway.interrupt_signal = cli_interrupt_signal;
     return true;
 }
@@ -326,6 +329,7 @@ int main(int argc, char **argv)
     struct fl_error error = {0};
     argp_err_exit_status = CLI_USAGE;
     line.gateway.viewers = VIEWERS_DEFAULT;
+    web_outage_init(&line.outage);
     if (!cli_job_begin(&line.job, fl_view_defaults()) || cli_parse(&argp, argc, argv, ARGP_IN_ORDER, &line) != 0)
         return cli_report(&line.job.error);
     if (complete(&line, &error) && cli_interrupt_begin(&error))

@@ -3,10 +3,12 @@
 #include "web/describe.h"
 #include "web/editing.h"
 #include "web/error_map.h"
+#include "protocol/common/clock.h"
 
 #include <errno.h>
 #include <poll.h>
 #include <pthread.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/eventfd.h>
@@ -278,6 +280,30 @@ static bool has_show(struct seat *seat)
     return has;
 }
 
+/* ---- to the operator ---- */
+
+/* What a page alone has asked for, and is refused, is no outage. */
+static void tell_outage(const struct seat *seat, const struct fl_error *error)
+{
+    const bool is_of_page = seat->scene && !cli_is_temporary(error) &&
+                            (error->code == FL_ERROR_REFUSED || error->code == FL_ERROR_ARGUMENT);
+    if (!seat->options.outage || is_of_page || error->code == FL_ERROR_NONE ||
+        error->code == FL_ERROR_INTERRUPTED || !web_outage_begins(seat->options.outage, monotonic_now_ns()))
+        return;
+    struct fl_error told = *error;
+    if (told.field[0] == '\0')
+        snprintf(told.field, sizeof(told.field), "%.*s", (int)sizeof(told.field) - 1, seat->options.server);
+    cli_report(&told);
+}
+
+static void tell_return(const struct seat *seat)
+{
+    if (seat->options.outage && web_outage_ends(seat->options.outage) && !seat->options.job->quiet)
+        fprintf(stderr, "farlight: %s: the daemon is back\n", seat->options.server);
+}
+
+/* ---- the thread ---- */
+
 static bool come_to_scene(struct seat *seat, struct fl_error *error)
 {
     const struct fl_connect_options connect = {.server = seat->options.server,
@@ -289,6 +315,8 @@ static bool come_to_scene(struct seat *seat, struct fl_error *error)
     seat->connection = fl_connect(&connect, error);
     if (seat->connection)
         seat->scene = fl_scene_attach(seat->connection, seat->options.scene, error);
+    if (seat->scene)
+        tell_return(seat);
     return seat->scene != NULL;
 }
 
@@ -317,6 +345,7 @@ static void *work(void *argument)
     struct seat *seat = argument;
     struct fl_error error = {0}, ignored;
     serve(seat, &error);
+    tell_outage(seat, &error);
     if (!seat->connection) /* these name the daemon's address or its key's file */
         error.field[0] = error.remedy[0] = '\0';
     if (error.code != FL_ERROR_NONE && error.code != FL_ERROR_INTERRUPTED)

@@ -267,11 +267,30 @@ class Web(Case):
                 _, data = late.receive()
                 self.assertTrue(json.loads(data)["error"]["again"], data)
                 self.assertNotIn(str(self.folder), data.decode(), "where the daemon is")
+            for _ in range(5):  # pages that try again
+                with Socket(gateway) as late:
+                    late.send({"show": SHOW})
+                    late.receive()
             with self.serve(address):
-                self.view(gateway)
-            status, said = gateway.stop()
+                for _ in range(2):
+                    self.view(gateway)
+                status, said = gateway.stop()
             self.assertEqual(status, 130)
             self.assertNotIn(gateway.path[1:-1], said)
+            lost, back, interrupted = said.splitlines()
+            self.assertRegex(lost, f"^farlight: {address}: the (daemon stops|connection is lost)")
+            self.assertEqual(back, f"farlight: {address}: the daemon is back")
+            self.assertIn("interrupted", interrupted)
+
+    def test_what_a_page_is_refused_is_no_outage(self):
+        with Gateway("--server", self.address, "--scene", NAME) as gateway:
+            view = self.enterContext(Socket(gateway))
+            view.send({"show": {**SHOW, "clip": 77}})  # there is none
+            kind, data = BINARY, b""
+            while kind == BINARY or b'"scene"' in data:
+                kind, data = view.receive()
+            self.assertIn(b"77", data)
+            self.assertEqual(len(gateway.stop()[1].splitlines()), 1)  # that it was interrupted
 
     def test_command_line_says_what_is_wrong(self):
         def say(*arguments, server=self.address, scene=NAME):
