@@ -235,7 +235,9 @@ static void last_line(int fd, char *line, size_t line_bytes)
     size_t start = end;
     while (start > 0 && tail[start - 1] != '\n')
         start--;
-    snprintf(line, line_bytes, "%.*s", (int)(end - start), tail + start);
+    const bool is_greeting =
+        end - start >= 5 && memcmp(tail + start, "READY", 5) == 0; /* of a daemon that starts */
+    snprintf(line, line_bytes, "%.*s", is_greeting ? 0 : (int)(end - start), tail + start);
 }
 
 bool fl_process_has_refused(const struct fl_process *process)

@@ -22,6 +22,7 @@ sys.path[:0] = [str(HERE), str(ROOT / "client/python"), str(ROOT / "client/blend
 import bpy  # pylint: disable=wrong-import-position
 import numpy as np  # pylint: disable=wrong-import-position
 import farlight  # pylint: disable=wrong-import-position
+from farlight import fields  # pylint: disable=wrong-import-position
 import farlight_blender  # pylint: disable=wrong-import-position
 from farlight_blender import engine, mirror, session  # pylint: disable=wrong-import-position
 import scenes  # pylint: disable=wrong-import-position
@@ -595,6 +596,25 @@ class Sending(Case):
         self.assertIs(session._sessions[None, None]._client._core, core)
         for one, next_one in zip(pictures, pictures[1:]):
             self.assertGreater(np.abs(one - next_one).max(), 0.05)
+
+    def test_names_of_files_and_what_is_not_rendered_are_not_sent(self):
+        empty()
+        picture = image("secret.png", np.ones((4, 4, 4)))
+        seen = diffuse((1, 1, 1, 1))
+        seen.name = "seen material"
+        textured(seen, "Color", picture)
+        self.assertEqual(picture.name, "secret.png", "Blender's name of an image is its file's")
+        thing = grid("seen object", 4, seen)
+        thing["secret"] = "secret"
+        grid("secret object", 1, material("secret material")).hide_render = True
+        bpy.data.texts.new("secret text").write("secret")
+        render()
+        made = next(iter(mirror._mirrors.values())).scene
+        sent = b"".join(bytes(fields.encode(edit)) for edit in made.edits_since(0))
+        for word in ("seen object", "seen material"):
+            self.assertIn(word.encode(), sent)
+        for word in ("secret", scenes.FOLDER.name):
+            self.assertNotIn(word.encode(), sent)
 
     def test_what_is_removed_is_gone(self):
         _, thing, _ = self.moving()

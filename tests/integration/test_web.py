@@ -467,6 +467,9 @@ class Model(Case):
                     time.sleep(0.2)
             self.assertTrue(frame)
             self.assertNotIn(gateway.daemon, (None, first))
+            said = gateway.stop()[1]
+            self.assertIn("farlightd was ended by signal 9\n", said)
+            self.assertIn("the scene is shared again\n", said)
 
     def test_model_goes_to_a_daemon_that_runs(self):
         address = f"unix:{self.folder}/d"

@@ -256,7 +256,7 @@ class Reader:
         if is_new:
             wrap = WRAPS.get(node.extension, Wrap.REPEAT)
             self._mirror.scene.add_texture(texels, srgb=is_srgb, texture=number, wrap_u=wrap, wrap_v=wrap,
-                                           nearest=int(node.interpolation == "Closest"), name=node.image.name[:100])
+                                           nearest=int(node.interpolation == "Closest"))  # without its name, which is a file's
         reading.textures[place] = TextureUse(number, 0, _uv_transform(self._mirror, reading.name, node), strength)
 
     def _unknown(self, reading: _Reading, socket: bpy.types.NodeSocket, start: bpy.types.NodeSocket) -> None:
