@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import os
 import re
-import resource
 import shlex
 import shutil
 import socket
@@ -85,6 +84,12 @@ def find_program(name: str) -> str:
     return found
 
 
+def _bound_talk(process: int) -> None:
+    with contextlib.suppress(ImportError, AttributeError, OSError):  # of systems other than Linux
+        import resource  # pylint: disable=import-outside-toplevel
+        resource.prlimit(process, resource.RLIMIT_FSIZE, (TALK_BYTES, TALK_BYTES))
+
+
 def start_program(name: str, arguments: list[str], remote: tuple[str, str] = ("", "")) -> Link:
     """Starts a program with a socket as its descriptor, or, as ssh wants it, as its standard input and output."""
     path = find_program(name)
@@ -93,8 +98,7 @@ def start_program(name: str, arguments: list[str], remote: tuple[str, str] = (""
     try:
         if any(remote):
             process = subprocess.Popen([path, *arguments], stdin=theirs.fileno(), stdout=theirs.fileno(), stderr=talk)
-            with contextlib.suppress(OSError):
-                resource.prlimit(process.pid, resource.RLIMIT_FSIZE, (TALK_BYTES, TALK_BYTES))
+            _bound_talk(process.pid)
         else:
             # In a process group of its own: a Ctrl-C is for us, and we end it properly.
             process = subprocess.Popen([path, "--fd", str(theirs.fileno()), *arguments], pass_fds=[theirs.fileno()],
