@@ -380,6 +380,9 @@ static bool load_and_render(struct session *session, struct fl_error *error)
     while (!load_scene(session, error) || !choose_frames(session, error) || !render(session, error))
         if (!recover(session, error))
             return false;
+    /* What a private daemon takes to end it takes while the last file is written. */
+    if (!session->job->server && !session->job->watch)
+        fl_connection_end(session->loading.connection);
     return finish_sinks(session, error);
 }
 

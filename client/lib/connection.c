@@ -450,23 +450,29 @@ struct fl_connection *fl_connect(const struct fl_connect_options *options, struc
     return connection;
 }
 
-void fl_connection_destroy(struct fl_connection *connection)
+void fl_connection_end(struct fl_connection *connection)
 {
-    if (!connection)
-        return;
     if (connection->broken.code == FL_ERROR_NONE && connection->stream.fd >= 0) {
         struct message goodbye = {.type = MESSAGE_GOODBYE};
         goodbye.goodbye.text = "";
         struct fl_error ignored;
         connection->stream.is_last = true;
-        fl_connection_send(connection, 0, 0, &goodbye, &ignored);
+        connection->said_goodbye = fl_connection_send(connection, 0, 0, &goodbye, &ignored);
+        fl_error_set(&connection->broken, FL_ERROR_CONNECTION, "", "the connection has been ended");
     }
+    fl_stream_finish(&connection->stream);
+}
+
+void fl_connection_destroy(struct fl_connection *connection)
+{
+    if (!connection)
+        return;
+    fl_connection_end(connection);
     for (struct fl_late *late = connection->late, *next; late; late = next) {
         next = late->next;
         free(late);
     }
-    fl_stream_finish(&connection->stream);
-    fl_process_end(&connection->process, connection->broken.code == FL_ERROR_NONE ? 3000 : 500);
+    fl_process_end(&connection->process, connection->said_goodbye ? 3000 : 500);
     fl_shaper_destroy(connection->shaper);
     free(connection);
 }

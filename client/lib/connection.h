@@ -40,6 +40,7 @@ struct fl_connection {
     struct message_stats_reply stats; /* the last answer */
     uint64_t start_ns;
     bool local;
+    bool said_goodbye;
     char address[300];
 };
 

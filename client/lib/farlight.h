@@ -96,7 +96,9 @@ struct fl_connect_options {
 };
 
 FL_API struct fl_connection *fl_connect(const struct fl_connect_options *options, struct fl_error *error);
-/* Says goodbye, ends a private daemon and waits for it (it is killed after a few seconds). */
+/* Says goodbye, which ends a private daemon, and waits for nothing: scenes and jobs can only be destroyed now. */
+FL_API void fl_connection_end(struct fl_connection *connection);
+/* Ends it, waits for a private daemon (it is killed after a few seconds), and frees it. */
 FL_API void fl_connection_destroy(struct fl_connection *connection);
 /* From now on; 0: nothing interrupts. For cleaning up after an interruption. */
 FL_API void fl_connection_set_interrupt(struct fl_connection *connection, int interrupt_fd);
