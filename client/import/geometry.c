@@ -26,14 +26,37 @@ void import_mesh_finish(struct import_mesh *mesh)
     memset(mesh, 0, sizeof(*mesh));
 }
 
+#define SIDE_BY_SIDE 8u /* that the processor may add at a time */
+
 static bool all_finite(const float *values, size_t count)
 {
     /* x * 0 is 0 for finite x and NaN for the others; a sum of zeros stays 0. */
-    float sum = 0;
+    float sums[SIDE_BY_SIDE] = {0}, sum = 0;
+    size_t i = 0;
 
-    for (size_t i = 0; i < count; i++)
+    for (; count - i >= SIDE_BY_SIDE; i += SIDE_BY_SIDE)
+        for (size_t k = 0; k < SIDE_BY_SIDE; k++)
+            sums[k] += values[i + k] * 0.0f;
+    for (; i < count; i++)
         sum += values[i] * 0.0f;
+    for (size_t k = 0; k < SIDE_BY_SIDE; k++)
+        sum += sums[k];
     return sum == 0;
+}
+
+static uint32_t greatest(const uint32_t *values, size_t count)
+{
+    uint32_t greatest_of[SIDE_BY_SIDE] = {0}, greatest = 0;
+    size_t i = 0;
+
+    for (; count - i >= SIDE_BY_SIDE; i += SIDE_BY_SIDE)
+        for (size_t k = 0; k < SIDE_BY_SIDE; k++)
+            greatest_of[k] = values[i + k] > greatest_of[k] ? values[i + k] : greatest_of[k];
+    for (; i < count; i++)
+        greatest = values[i] > greatest ? values[i] : greatest;
+    for (size_t k = 0; k < SIDE_BY_SIDE; k++)
+        greatest = greatest_of[k] > greatest ? greatest_of[k] : greatest;
+    return greatest;
 }
 
 /* Shading data that is not finite becomes 0. */
@@ -156,14 +179,13 @@ static bool mesh_valid(struct import_scene *scene, struct import_mesh *mesh)
 {
     const char *where = mesh->where ? mesh->where : mesh->name;
     size_t index_count = (size_t)mesh->triangle_count * 3;
-    uint32_t maximum = 0;
+    uint32_t maximum;
 
     if (scene->failed)
         return false;
     if (!mesh->positions || !mesh->indices || mesh->vertex_count == 0 || mesh->triangle_count == 0)
         return import_fail(scene, where, "a mesh without vertices or triangles");
-    for (size_t i = 0; i < index_count; i++)
-        maximum = mesh->indices[i] > maximum ? mesh->indices[i] : maximum;
+    maximum = greatest(mesh->indices, index_count);
     if (maximum >= mesh->vertex_count)
         return import_fail(scene, where, "index %u is beyond the %u vertices", maximum, mesh->vertex_count);
     mesh->range_count = import_ranges_merge(mesh->ranges, mesh->range_count);
@@ -204,8 +226,10 @@ static void add_bounds(struct import_scene *scene, const struct import_bounds *o
     for (size_t i = 0; i < count; i++) {
         const float *point = points + i * stride, radius = stride > 3 ? point[3] : 0;
         for (unsigned axis = 0; axis < 3; axis++) {
-            box.lower[axis] = fminf(box.lower[axis], point[axis] - radius);
-            box.upper[axis] = fmaxf(box.upper[axis], point[axis] + radius);
+            const float lower = point[axis] - radius, upper = point[axis] + radius;
+            /* They are numbers: fminf() and fmaxf() would be calls. */
+            box.lower[axis] = lower < box.lower[axis] ? lower : box.lower[axis];
+            box.upper[axis] = upper > box.upper[axis] ? upper : box.upper[axis];
         }
     }
     for (unsigned axis = 0; axis < 3; axis++) { /* in the message's range */

@@ -158,6 +158,7 @@ static bool start(struct fl_importer *importer, struct fl_error *error)
     int fd = -1;
     /* The program reads the bytes from their begin, each time. */
     importer->process.input_fd = importer->options.input_fd;
+    importer->process.has_large_arrays = true;
     if (importer->process.input_fd > 0)
         lseek(importer->process.input_fd, 0, SEEK_SET);
     const bool started =

@@ -91,23 +91,44 @@ static bool set_attributes(posix_spawnattr_t *attributes, enum fl_wiring wiring)
            posix_spawnattr_setflags(attributes, (short)flags) == 0;
 }
 
+/* Ours and, of a program with large arrays, what glibc reads when it starts: a page of 4 KB costs a fault, and faults
+ * were a fifth of an import's time. NULL: no memory. */
+static char **make_environment(const struct fl_process *process)
+{
+    size_t count = 0;
+    while (environ[count])
+        count++;
+    char **made = malloc((count + 2) * sizeof(*made));
+    if (!made)
+        return NULL;
+    memcpy(made, environ, count * sizeof(*made));
+    if (process->has_large_arrays && !getenv("GLIBC_TUNABLES"))
+        made[count++] = (char *)(uintptr_t) "GLIBC_TUNABLES=glibc.malloc.hugetlb=1";
+    made[count] = NULL;
+    return made;
+}
+
 static int spawn(struct fl_process *process, const char *path, char *const *argv, enum fl_wiring wiring,
                  int socket_fd)
 {
     posix_spawn_file_actions_t actions;
     posix_spawnattr_t attributes;
-    int failure = posix_spawn_file_actions_init(&actions);
-    if (failure != 0)
+    char **environment = make_environment(process);
+    int failure = environment ? posix_spawn_file_actions_init(&actions) : ENOMEM;
+    if (failure != 0) {
+        free(environment);
         return failure;
+    }
     failure = posix_spawnattr_init(&attributes);
     if (failure == 0) {
         if (!wire(&actions, wiring, process, socket_fd) || !set_attributes(&attributes, wiring))
             failure = ENOMEM;
         else
-            failure = posix_spawn(&process->pid, path, &actions, &attributes, argv, environ);
+            failure = posix_spawn(&process->pid, path, &actions, &attributes, argv, environment);
         posix_spawnattr_destroy(&attributes);
     }
     posix_spawn_file_actions_destroy(&actions);
+    free(environment);
     return failure;
 }
 
@@ -140,7 +161,8 @@ static size_t fill_arguments(char *argv[ARGUMENTS_MAX], const char *path, enum f
 bool fl_process_start(struct fl_process *process, const char *name, enum fl_wiring wiring,
                       const char *const *arguments, int *socket_fd, struct fl_error *error)
 {
-    *process = (struct fl_process){.talk_fd = -1, .input_fd = process->input_fd};
+    *process = (struct fl_process){
+        .talk_fd = -1, .input_fd = process->input_fd, .has_large_arrays = process->has_large_arrays};
     snprintf(process->name, sizeof(process->name), "%s", name);
     char path[4096];
     if (!fl_find_program(name, path, sizeof(path), error))
