@@ -10,10 +10,16 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* Into what one thread does, where most ranges are small, and into what all do. */
+#define INLINED static inline __attribute__((always_inline))
+
 #define TASK_PRIMITIVES 4096u /* smaller ranges stay with the thread that has them */
 #define STACK_DEPTH 40        /* the smaller half comes first: at most one level for each doubling of the range */
 #define BLOCK_NODES 512u      /* that a thread takes at a time; an even number, as children come in pairs */
 #define FIRST_CHILD 2u        /* so that a pair lies in one line of the cache */
+
+/* So many ranges at most are cut by all threads together. */
+#define CUTS_MAX(threads) (2 * (threads))
 
 /* Primitives begin .. end - 1, which lie in the first or the second array of boxes and numbers. */
 struct range {
@@ -31,10 +37,10 @@ struct builder {
     /* ranges that wait for a thread */
     pthread_mutex_t mutex;
     pthread_cond_t changed;
-    struct range *waiting; /* capacity for all ranges of at least TASK_PRIMITIVES */
+    struct range *waiting; /* capacity for all ranges of at least TASK_PRIMITIVES, and those of the first cuts */
     uint32_t waiting_count;
     unsigned busy;
-    bool shared; /* several threads */
+    unsigned threads;
     const atomic_bool *stop;
 };
 
@@ -50,16 +56,16 @@ static inline float half_area(const struct bvh_box *box)
     return d[0] * d[1] + d[1] * d[2] + d[2] * d[0];
 }
 
-/* Returns the first primitive of the right half. The side of a primitive is unpredictable, so nothing branches on
- * it. The right half is filled from its end. */
-static uint32_t partition(const struct builder *builder, const struct range *range, const struct bvh_split *split)
+/* Moves a part of a range to its halves, which go on at `left` and, from its end, at `right`. Returns where the left
+ * one ends. The side of a primitive is unpredictable, so nothing branches on it. */
+INLINED uint32_t move(const struct builder *builder, unsigned array, uint32_t begin, uint32_t end, uint32_t left,
+                     uint32_t right, const struct bvh_split *split)
 {
-    const struct bvh_box *boxes = builder->boxes[range->array];
-    const uint32_t *order = builder->order[range->array];
-    struct bvh_box *boxes_out = builder->boxes[!range->array];
-    uint32_t *order_out = builder->order[!range->array];
-    uint32_t left = range->begin, right = range->end - 1;
-    for (uint32_t i = range->begin; i < range->end; i++) {
+    const struct bvh_box *boxes = builder->boxes[array];
+    const uint32_t *order = builder->order[array];
+    struct bvh_box *boxes_out = builder->boxes[!array];
+    uint32_t *order_out = builder->order[!array];
+    for (uint32_t i = begin; i < end; i++) {
         const uint32_t goes_left = bvh_split_goes_left(split, &boxes[i]);
         const uint32_t to = right ^ ((right ^ left) & (0 - goes_left));
         boxes_out[to] = boxes[i];
@@ -70,8 +76,12 @@ static uint32_t partition(const struct builder *builder, const struct range *ran
     return left;
 }
 
-static void find_bounds(const struct bvh_box *boxes, uint32_t count, struct bvh_box *bounds,
-                        struct bvh_box *centres)
+/* Boxes, and their centres. */
+struct extents {
+    struct bvh_box all, centres;
+};
+
+INLINED struct extents find_extents(const struct bvh_box *boxes, uint32_t count)
 {
     struct bvh_box all = bvh_box_empty(), middle = bvh_box_empty();
     for (uint32_t i = 0; i < count; i++) {
@@ -81,9 +91,90 @@ static void find_bounds(const struct bvh_box *boxes, uint32_t count, struct bvh_
         middle.lower = bvh_vec_min(middle.lower, centre);
         middle.upper = bvh_vec_max(middle.upper, centre);
     }
-    *bounds = all;
-    *centres = middle;
+    return (struct extents){all, middle};
 }
+
+/* ---- a range that several threads cut, piece by piece ---- */
+
+/* Of each piece; also, of the one range that is being cut, where the pieces' halves go. */
+struct cut {
+    const struct builder *builder;
+    const struct range *range;
+    struct bvh_split split;
+    struct extents *extents;
+    struct bvh_bins *bins;
+    uint32_t *lefts; /* how many go left; then where they begin */
+};
+
+static void free_cut(struct cut *cut)
+{
+    free(cut->extents);
+    free(cut->bins);
+    free(cut->lefts);
+    *cut = (struct cut){0};
+}
+
+static bool alloc_cut(struct cut *cut, uint32_t count)
+{
+    const uint32_t pieces = bvh_piece_count(count);
+    cut->extents = aligned_alloc(_Alignof(struct extents), pieces * sizeof(*cut->extents));
+    cut->bins = bvh_bins_alloc(pieces);
+    cut->lefts = malloc(pieces * sizeof(*cut->lefts));
+    if (cut->extents && cut->bins && cut->lefts)
+        return true;
+    free_cut(cut);
+    return false;
+}
+
+static uint32_t size_of(const struct range *range)
+{
+    return range->end - range->begin;
+}
+
+static void piece_extents(void *context, uint32_t piece)
+{
+    const struct cut *cut = context;
+    const uint32_t begin = piece * BVH_PIECE, end = bvh_piece_end(piece, size_of(cut->range));
+    cut->extents[piece] =
+        find_extents(cut->builder->boxes[cut->range->array] + cut->range->begin + begin, end - begin);
+}
+
+static struct extents extents_together(const struct cut *cut)
+{
+    const uint32_t pieces = bvh_piece_count(size_of(cut->range));
+    parallel_run(cut->builder->threads, pieces, piece_extents, (void *)(uintptr_t)cut);
+    struct extents sum = cut->extents[0];
+    for (uint32_t piece = 1; piece < pieces; piece++) {
+        bvh_box_add(&sum.all, &cut->extents[piece].all);
+        bvh_box_add(&sum.centres, &cut->extents[piece].centres);
+    }
+    return sum;
+}
+
+static void move_piece(void *context, uint32_t piece)
+{
+    const struct cut *cut = context;
+    const uint32_t begin = piece * BVH_PIECE, left = cut->lefts[piece];
+    move(cut->builder, cut->range->array, cut->range->begin + begin,
+         cut->range->begin + bvh_piece_end(piece, size_of(cut->range)), cut->range->begin + left,
+         cut->range->end - 1 - (begin - left), &cut->split);
+}
+
+/* As move() does it with the whole range. */
+static uint32_t move_together(struct cut *cut)
+{
+    const uint32_t pieces = bvh_piece_count(size_of(cut->range));
+    uint32_t left = 0;
+    for (uint32_t piece = 0; piece < pieces; piece++) {
+        const uint32_t count = cut->lefts[piece];
+        cut->lefts[piece] = left;
+        left += count;
+    }
+    parallel_run(cut->builder->threads, pieces, move_piece, cut);
+    return cut->range->begin + left;
+}
+
+/* ---- ranges ---- */
 
 static void node_set(struct bvh_binary_node *node, const struct bvh_box *box, uint32_t link, uint32_t count,
                      uint32_t axis)
@@ -98,7 +189,7 @@ static void node_set(struct bvh_binary_node *node, const struct bvh_box *box, ui
 
 static void make_leaf(const struct builder *builder, const struct range *range, const struct bvh_box *bounds)
 {
-    const uint32_t count = range->end - range->begin;
+    const uint32_t count = size_of(range);
     if (range->array != 0)
         memcpy(builder->order[0] + range->begin, builder->order[1] + range->begin,
                count * sizeof(*builder->order[0]));
@@ -117,36 +208,44 @@ static uint32_t take_nodes(struct builder *builder, struct place *place)
     return place->next - 2;
 }
 
-/* Makes the node of a range. False: it is a leaf; else the ranges of its children. */
-static bool split_range(struct builder *builder, struct place *place, const struct range *range,
+/* Makes the node of a range. False: it is a leaf; else the ranges of its children. cut: with all threads; NULL: by
+ * this one. */
+INLINED bool split_range(struct builder *builder, struct place *place, struct cut *cut, const struct range *range,
                         struct range *left, struct range *right)
 {
     const struct bvh_box *boxes = builder->boxes[range->array] + range->begin;
-    struct bvh_box bounds, centres;
-    find_bounds(boxes, range->end - range->begin, &bounds, &centres);
-    float area = builder->tree->areas[range->node] = half_area(&bounds);
     const struct bvh_costs *costs = builder->costs;
-    uint32_t count = range->end - range->begin, middle = range->begin + count / 2, axis = 0;
+    uint32_t count = size_of(range), middle = range->begin + count / 2, axis = 0;
+    const struct extents extents = cut ? extents_together(cut) : find_extents(boxes, count);
+    float area = builder->tree->areas[range->node] = half_area(&extents.all);
     struct bvh_split split = {.axis = -1};
-    if (count > 1)
-        split = bvh_split_find(boxes, count, &centres);
+    if (cut)
+        split = bvh_split_find_together(boxes, count, &extents.centres, builder->threads, cut->bins, cut->lefts);
+    else if (count > 1)
+        split = bvh_split_find(boxes, count, &extents.centres);
     bool pays = split.axis >= 0 &&
                 2 * costs->element * area + costs->primitive * split.cost < costs->primitive * (float)count * area;
     if (count <= costs->leaf_max && !pays) {
-        make_leaf(builder, range, &bounds);
+        make_leaf(builder, range, &extents.all);
         return false;
     }
     /* Where no border separates them (equal centres, or extents that overflow), half of them goes each way. */
     unsigned array = range->array;
     if (split.axis >= 0) {
-        uint32_t border = partition(builder, range, &split);
+        uint32_t border;
+        if (cut) {
+            cut->split = split;
+            border = move_together(cut);
+        } else {
+            border = move(builder, range->array, range->begin, range->end, range->begin, range->end - 1, &split);
+        }
         if (border > range->begin && border < range->end)
             middle = border;
         axis = (uint32_t)split.axis;
         array = !array;
     }
     const uint32_t children = take_nodes(builder, place);
-    node_set(&builder->tree->nodes[range->node], &bounds, children, 0, axis);
+    node_set(&builder->tree->nodes[range->node], &extents.all, children, 0, axis);
     *left = (struct range){children, range->begin, middle, array};
     *right = (struct range){children + 1, middle, range->end, array};
     return true;
@@ -166,13 +265,13 @@ static void build_range(struct builder *builder, struct place *place, struct ran
     unsigned depth = 0;
     while (!bvh_is_stopped(builder->stop)) {
         struct range left, right;
-        if (range.end - range.begin >= TASK_PRIMITIVES)
+        if (size_of(&range) >= TASK_PRIMITIVES)
             progress_tell();
-        if (split_range(builder, place, &range, &left, &right)) {
-            bool left_is_larger = left.end - left.begin > right.end - right.begin;
+        if (split_range(builder, place, NULL, &range, &left, &right)) {
+            bool left_is_larger = size_of(&left) > size_of(&right);
             struct range *larger = left_is_larger ? &left : &right;
             range = left_is_larger ? right : left;
-            if (builder->shared && larger->end - larger->begin >= TASK_PRIMITIVES)
+            if (builder->threads > 1 && size_of(larger) >= TASK_PRIMITIVES)
                 give_away(builder, larger);
             else
                 stack[depth++] = *larger;
@@ -210,6 +309,35 @@ static void build_thread(void *context, uint32_t thread)
     atomic_fetch_add(&builder->node_count, place.made);
 }
 
+/* Cuts the first ranges with all threads, until each thread has one. */
+static void cut_together(struct builder *builder)
+{
+    const uint32_t large = builder->tree->primitive_count / builder->threads;
+    struct cut cut = {.builder = builder};
+    struct place place = {0};
+    if (builder->threads == 1 || !alloc_cut(&cut, builder->tree->primitive_count))
+        return;
+    uint32_t cuts_left = CUTS_MAX(builder->threads);
+    for (uint32_t i = 0; i < builder->waiting_count && cuts_left > 0 && !bvh_is_stopped(builder->stop);) {
+        const struct range range = builder->waiting[i];
+        struct range left, right;
+        if (size_of(&range) <= large || size_of(&range) < TASK_PRIMITIVES) {
+            i++;
+            continue;
+        }
+        cut.range = &range;
+        cuts_left--;
+        if (split_range(builder, &place, &cut, &range, &left, &right)) {
+            builder->waiting[i] = left;
+            builder->waiting[builder->waiting_count++] = right;
+        } else {
+            builder->waiting[i] = builder->waiting[--builder->waiting_count];
+        }
+    }
+    free_cut(&cut);
+    atomic_fetch_add(&builder->node_count, place.made);
+}
+
 static void free_work(struct builder *builder)
 {
     free(builder->order[1]);
@@ -220,12 +348,12 @@ static void free_work(struct builder *builder)
 static bool alloc_work(struct builder *builder, uint32_t count, unsigned threads)
 {
     struct bvh_binary *tree = builder->tree;
-    const size_t places = FIRST_CHILD + 2 * (size_t)count + (size_t)threads * BLOCK_NODES;
+    const size_t places = FIRST_CHILD + 2 * (size_t)count + ((size_t)threads + 1) * BLOCK_NODES;
     tree->nodes = aligned_alloc(32, places * sizeof(*tree->nodes));
     tree->areas = malloc(places * sizeof(*tree->areas));
     tree->order = builder->order[0] = malloc(count * sizeof(*tree->order));
     builder->order[1] = malloc(count * sizeof(*tree->order));
-    builder->waiting = malloc((count / TASK_PRIMITIVES + 1) * sizeof(*builder->waiting));
+    builder->waiting = malloc((count / TASK_PRIMITIVES + 1 + CUTS_MAX(threads)) * sizeof(*builder->waiting));
     return tree->nodes && tree->areas && tree->order && builder->order[1] && builder->waiting;
 }
 
@@ -237,7 +365,7 @@ bool bvh_binary_build(struct bvh_binary *tree, struct bvh_box *boxes, uint32_t c
                               .boxes = {boxes, boxes + count},
                               .costs = costs,
                               .node_count = 1,
-                              .shared = threads > 1,
+                              .threads = threads,
                               .stop = stop};
     const bool has_memory = alloc_work(&builder, count, threads);
     for (uint32_t i = 0; has_memory && i < count; i++)
@@ -246,6 +374,7 @@ bool bvh_binary_build(struct bvh_binary *tree, struct bvh_box *boxes, uint32_t c
     pthread_cond_init(&builder.changed, NULL);
     if (has_memory) {
         builder.waiting[builder.waiting_count++] = (struct range){.end = count};
+        cut_together(&builder);
         parallel_run(threads, threads, build_thread, &builder);
     }
     pthread_cond_destroy(&builder.changed);

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include "trace/tree/build_split.h"
 
+#include "base/parallel.h"
+
+#include <stdlib.h>
 #include <string.h>
 #if defined(__x86_64__)
 #include <immintrin.h>
@@ -12,13 +15,14 @@
 #define BINS_MAX 16
 #define SMALL_RANGE 24 /* ranges below are split with fewer bins: the sweep would cost more than the filling */
 #define BINS_SMALL 8
+#define LARGE_RANGE 256
 
 typedef int32_t int4 __attribute__((vector_size(16)));
 
 /* A box as its lower corner and its upper one times -1, so that boxes are united by minima alone. */
 typedef float corners __attribute__((vector_size(32)));
 
-struct bins {
+struct bvh_bins {
     corners boxes[BINS_MAX][3]; /* of each axis */
     _Alignas(16) int32_t counts[BINS_MAX][4];
     int count;
@@ -35,7 +39,7 @@ static bvh_vec4 choose(int4 which, bvh_vec4 yes, bvh_vec4 no)
     return (bvh_vec4)(((int4)yes & which) | ((int4)no & ~which));
 }
 
-static inline int4 counts_of(const struct bins *bins, int bin)
+static inline int4 counts_of(const struct bvh_bins *bins, int bin)
 {
     int4 counts;
     memcpy(&counts, bins->counts[bin], sizeof(counts));
@@ -59,29 +63,63 @@ INLINED void corners_of(corners *out, const struct bvh_box *box)
     *out = __builtin_shufflevector(box->lower, -box->upper, 0, 1, 2, 3, 4, 5, 6, 7);
 }
 
-INLINED void fill_bins(struct bins *bins, const struct bvh_box *boxes, uint32_t count, bvh_vec4 origin,
-                       bvh_vec4 scale, minimum *take_minimum)
+INLINED void clear_bins(struct bvh_bins *bins)
 {
     for (int i = 0; i < bins->count; i++) {
         bins->boxes[i][0] = bins->boxes[i][1] = bins->boxes[i][2] = nothing;
         memset(bins->counts[i], 0, sizeof(bins->counts[i]));
     }
-    const float last = (float)(bins->count - 1);
-    const bvh_vec4 zero = {0, 0, 0, 0}, last_bin = {last, last, last, last};
-    for (uint32_t i = 0; i < count; i++) {
-        bvh_vec4 place = (bvh_box_centre(&boxes[i]) - origin) * scale;
-        /* in this order: what is not a number becomes 0 */
-        int4 bin = __builtin_convertvector(bvh_vec_min(bvh_vec_max(place, zero), last_bin), int4);
-        corners box;
-        corners_of(&box, &boxes[i]);
-        const int x = bin[0], y = bin[1], z = bin[2];
-        take_minimum(&bins->boxes[x][0], &box);
-        take_minimum(&bins->boxes[y][1], &box);
-        take_minimum(&bins->boxes[z][2], &box);
-        bins->counts[x][0]++;
-        bins->counts[y][1]++;
-        bins->counts[z][2]++;
+}
+
+INLINED void add_box(struct bvh_bins *bins, const struct bvh_box *of, bvh_vec4 origin, bvh_vec4 scale,
+                     bvh_vec4 last_bin, minimum *take_minimum)
+{
+    const bvh_vec4 zero = {0, 0, 0, 0}, place = (bvh_box_centre(of) - origin) * scale;
+    /* in this order: what is not a number becomes 0 */
+    int4 bin = __builtin_convertvector(bvh_vec_min(bvh_vec_max(place, zero), last_bin), int4);
+    corners box;
+    corners_of(&box, of);
+    const int x = bin[0], y = bin[1], z = bin[2];
+    take_minimum(&bins->boxes[x][0], &box);
+    take_minimum(&bins->boxes[y][1], &box);
+    take_minimum(&bins->boxes[z][2], &box);
+    bins->counts[x][0]++;
+    bins->counts[y][1]++;
+    bins->counts[z][2]++;
+}
+
+INLINED void add_bins(struct bvh_bins *sum, const struct bvh_bins *bins, minimum *take_minimum)
+{
+    for (int i = 0; i < sum->count; i++) {
+        for (int axis = 0; axis < 3; axis++) {
+            take_minimum(&sum->boxes[i][axis], &bins->boxes[i][axis]);
+            sum->counts[i][axis] += bins->counts[i][axis];
+        }
     }
+}
+
+/* Neighbours are mostly in the same bins, and one would wait for the other: of many, each half has bins of its own. */
+INLINED void fill_bins(struct bvh_bins *bins, const struct bvh_box *boxes, uint32_t count, bvh_vec4 origin,
+                       bvh_vec4 scale, minimum *take_minimum)
+{
+    const float last = (float)(bins->count - 1);
+    const bvh_vec4 last_bin = {last, last, last, last};
+    uint32_t i = 0;
+    clear_bins(bins);
+    if (count >= LARGE_RANGE) {
+        struct bvh_bins others;
+        const uint32_t half = count / 2;
+        others.count = bins->count;
+        clear_bins(&others);
+        for (; i < half; i++) {
+            add_box(bins, &boxes[i], origin, scale, last_bin, take_minimum);
+            add_box(&others, &boxes[half + i], origin, scale, last_bin, take_minimum);
+        }
+        add_bins(bins, &others, take_minimum);
+        i = 2 * half;
+    }
+    for (; i < count; i++)
+        add_box(bins, &boxes[i], origin, scale, last_bin, take_minimum);
 }
 
 /* Half the surfaces of three boxes: a constant factor changes no choice. */
@@ -106,7 +144,7 @@ INLINED void add_three(corners sum[3], const corners boxes[3], minimum *take_min
     take_minimum(&sum[2], &boxes[2]);
 }
 
-INLINED struct best sweep(const struct bins *bins, minimum *take_minimum)
+INLINED struct best sweep(const struct bvh_bins *bins, minimum *take_minimum)
 {
     bvh_vec4 area_right[BINS_MAX];
     corners sum[3] = {nothing, nothing, nothing};
@@ -131,22 +169,40 @@ INLINED struct best sweep(const struct bins *bins, minimum *take_minimum)
     return best;
 }
 
-INLINED struct bvh_split find(const struct bvh_box *boxes, uint32_t count, const struct bvh_box *centres,
-                              minimum *take_minimum)
+INLINED int bin_count_of(uint32_t count)
 {
-    struct bins bins; /* filled as far as it is used */
-    bins.count = count < SMALL_RANGE ? BINS_SMALL : BINS_MAX;
-    bvh_vec4 extent = centres->upper - centres->lower, scale = {0, 0, 0, 0};
+    return count < SMALL_RANGE ? BINS_SMALL : BINS_MAX;
+}
+
+/* Bins to a unit. */
+INLINED bvh_vec4 scale_of(bvh_vec4 extent, int bin_count)
+{
+    bvh_vec4 scale = {0, 0, 0, 0};
     for (int axis = 0; axis < 3; axis++)
-        scale[axis] = extent[axis] > 0 ? (float)bins.count / extent[axis] : 0;
-    fill_bins(&bins, boxes, count, centres->lower, scale, take_minimum);
-    const struct best best = sweep(&bins, take_minimum);
+        scale[axis] = extent[axis] > 0 ? (float)bin_count / extent[axis] : 0;
+    return scale;
+}
+
+INLINED struct bvh_split choose_split(const struct bvh_bins *bins, const struct bvh_box *centres, bvh_vec4 extent,
+                                      bvh_vec4 scale, minimum *take_minimum)
+{
+    const struct best best = sweep(bins, take_minimum);
     struct bvh_split split = {.axis = -1, .cost = FLT_MAX};
     for (int axis = 0; axis < 3; axis++)
         if (extent[axis] > 0 && best.bin[axis] > 0 && best.cost[axis] < split.cost)
             split = (struct bvh_split){axis, best.cost[axis], centres->lower[axis], scale[axis],
                                        (float)best.bin[axis]};
     return split;
+}
+
+INLINED struct bvh_split find(const struct bvh_box *boxes, uint32_t count, const struct bvh_box *centres,
+                              minimum *take_minimum)
+{
+    struct bvh_bins bins; /* filled as far as it is used */
+    bins.count = bin_count_of(count);
+    const bvh_vec4 extent = centres->upper - centres->lower, scale = scale_of(extent, bins.count);
+    fill_bins(&bins, boxes, count, centres->lower, scale, take_minimum);
+    return choose_split(&bins, centres, extent, scale, take_minimum);
 }
 
 #if defined(__x86_64__)
@@ -160,6 +216,12 @@ __attribute__((target("avx2"))) static struct bvh_split find_wide(const struct b
 {
     return find(boxes, count, centres, minimum_at_once);
 }
+
+__attribute__((target("avx2"))) static void fill_wide(struct bvh_bins *bins, const struct bvh_box *boxes,
+                                                      uint32_t count, bvh_vec4 origin, bvh_vec4 scale)
+{
+    fill_bins(bins, boxes, count, origin, scale, minimum_at_once);
+}
 #endif
 
 struct bvh_split bvh_split_find(const struct bvh_box *boxes, uint32_t count, const struct bvh_box *centres)
@@ -169,4 +231,65 @@ struct bvh_split bvh_split_find(const struct bvh_box *boxes, uint32_t count, con
         return find_wide(boxes, count, centres);
 #endif
     return find(boxes, count, centres, minimum_of_halves);
+}
+
+/* ---- by several threads ---- */
+
+struct pieces {
+    const struct bvh_box *boxes;
+    uint32_t count;
+    bvh_vec4 origin, scale;
+    int bin_count;
+    struct bvh_bins *bins; /* of each */
+};
+
+static void fill_piece(void *context, uint32_t piece)
+{
+    const struct pieces *pieces = context;
+    const uint32_t begin = piece * BVH_PIECE, count = bvh_piece_end(piece, pieces->count) - begin;
+    struct bvh_bins *bins = &pieces->bins[piece];
+    bins->count = pieces->bin_count;
+#if defined(__x86_64__)
+    if (__builtin_cpu_supports("avx2")) {
+        fill_wide(bins, pieces->boxes + begin, count, pieces->origin, pieces->scale);
+        return;
+    }
+#endif
+    fill_bins(bins, pieces->boxes + begin, count, pieces->origin, pieces->scale, minimum_of_halves);
+}
+
+/* A primitive goes left if its bin is before the border, by the same arithmetic. */
+static uint32_t count_left(const struct bvh_bins *bins, const struct bvh_split *split)
+{
+    uint32_t left = 0;
+    for (int i = 0; i < (int)split->border; i++)
+        left += (uint32_t)bins->counts[i][split->axis];
+    return left;
+}
+
+struct bvh_bins *bvh_bins_alloc(uint32_t piece_count)
+{
+    return aligned_alloc(_Alignof(struct bvh_bins), piece_count * sizeof(struct bvh_bins));
+}
+
+struct bvh_split bvh_split_find_together(const struct bvh_box *boxes, uint32_t count,
+                                         const struct bvh_box *centres, unsigned threads, struct bvh_bins *bins,
+                                         uint32_t *lefts)
+{
+    const uint32_t piece_count = bvh_piece_count(count);
+    const bvh_vec4 extent = centres->upper - centres->lower;
+    struct pieces pieces = {.boxes = boxes,
+                            .count = count,
+                            .origin = centres->lower,
+                            .scale = scale_of(extent, bin_count_of(count)),
+                            .bin_count = bin_count_of(count),
+                            .bins = bins};
+    parallel_run(threads, piece_count, fill_piece, &pieces);
+    struct bvh_bins sum = bins[0];
+    for (uint32_t piece = 1; piece < piece_count; piece++)
+        add_bins(&sum, &bins[piece], minimum_of_halves);
+    const struct bvh_split split = choose_split(&sum, centres, extent, pieces.scale, minimum_of_halves);
+    for (uint32_t piece = 0; split.axis >= 0 && piece < piece_count; piece++)
+        lefts[piece] = count_left(&bins[piece], &split);
+    return split;
 }

@@ -21,6 +21,26 @@ struct bvh_split {
 /* The cheapest cut of boxes[0 .. count - 1], whose centres lie in `centres`. */
 struct bvh_split bvh_split_find(const struct bvh_box *boxes, uint32_t count, const struct bvh_box *centres);
 
+/* ---- by several threads, piece by piece ---- */
+
+#define BVH_PIECE 16384u /* primitives that a thread takes at a time */
+
+struct bvh_bins; /* of a piece */
+struct bvh_bins *bvh_bins_alloc(uint32_t piece_count); /* for free(); NULL: no memory */
+/* The same cut. Of each piece: its bins, for working, and how many of its primitives go left. */
+struct bvh_split bvh_split_find_together(const struct bvh_box *boxes, uint32_t count,
+                                         const struct bvh_box *centres, unsigned threads, struct bvh_bins *bins,
+                                         uint32_t *lefts);
+
+static inline uint32_t bvh_piece_count(uint32_t count)
+{
+    return count / BVH_PIECE + (count % BVH_PIECE > 0);
+}
+static inline uint32_t bvh_piece_end(uint32_t piece, uint32_t count)
+{
+    return count - piece * BVH_PIECE < BVH_PIECE ? count : (piece + 1) * BVH_PIECE;
+}
+
 #if defined(__SSE__)
 static inline bvh_vec4 bvh_vec_min(bvh_vec4 a, bvh_vec4 b)
 {
