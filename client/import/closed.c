@@ -83,12 +83,12 @@ static bool edges_paired(const struct places *places)
  * other thread's processor is told each time, which took longer than all else. */
 #define EMPTY UINT64_MAX
 
-/* A hash independent of the first corner; the lowest bit is the orientation. Never EMPTY. */
+/* A hash independent of the first corner, as a sum of hashes; the lowest bit is the orientation. Never EMPTY. */
 static uint64_t triangle_of(const uint64_t corners[3])
 {
     bool turned = (corners[0] < corners[1]) ^ (corners[1] < corners[2]) ^ (corners[2] < corners[0]);
 
-    return ((mix(corners[0]) + mix(corners[1]) + mix(corners[2])) & ~(uint64_t)3) | turned;
+    return ((corners[0] + corners[1] + corners[2]) & ~(uint64_t)3) | turned;
 }
 
 /* False: it is in the table with the other orientation. The table's size is a power of two and greater than the
