@@ -21,7 +21,9 @@ static bool can_encode(const struct engine_job *spec, enum encoding encoding)
            (spec->kind == JOB_VIEW && encoder_stream_supports(encoding, pixel_bytes));
 }
 
-static bool spec_check(const struct engine_job *spec, const struct scene *scene, struct error *error)
+/* What is found of the scene's bounds is kept. */
+static bool spec_check(const struct engine_job *spec, const struct scene *scene, struct animation_bounds *bounds,
+                       struct error *error)
 {
     if (spec->last_frame < spec->first_frame)
         return error_set(error, ERROR_INVALID, "render.last_frame", "%u lies before the first frame, %u",
@@ -44,7 +46,7 @@ static bool spec_check(const struct engine_job *spec, const struct scene *scene,
                          frame_format_bytes(spec->frame.format));
     return tracer_find(spec->frame.tracer, "render.tracer", error) &&
            (!spec->frame.compare || tracer_find(spec->frame.compare_with, "render.compare_with", error)) &&
-           shot_check(spec, scene, error);
+           shot_check(spec, scene, bounds, error);
 }
 
 static bool jobs_reserve(struct engine *engine)
@@ -87,7 +89,8 @@ static struct job *replaced_by(struct engine *engine, const struct engine_comman
 bool job_start(struct engine *engine, struct engine_reference *reference, struct engine_command *command,
                struct error *error)
 {
-    if (!spec_check(&command->job, reference->scene->scene, error))
+    struct animation_bounds bounds = {0};
+    if (!spec_check(&command->job, reference->scene->scene, &bounds, error))
         return false;
     struct job *job = calloc(1, sizeof(*job));
     struct job_output *output = job_output_create(&(struct job_output_options){
@@ -119,6 +122,7 @@ bool job_start(struct engine *engine, struct engine_reference *reference, struct
     job->scene = reference->scene;
     job->output = output;
     job->next_frame = job->spec.first_frame;
+    job->bounds = bounds;
     job->view.credit = job->spec.credit;
     job->view.lane = lane;
     engine->jobs[engine->job_count++] = job;

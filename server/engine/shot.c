@@ -181,10 +181,11 @@ bool shot_look(struct shot *shot, const struct engine_job *job, const struct sce
     return true;
 }
 
-bool shot_check(const struct engine_job *job, const struct scene *scene, struct error *error)
+bool shot_check(const struct engine_job *job, const struct scene *scene, struct animation_bounds *bounds,
+                struct error *error)
 {
     struct shot shot;
-    if (!animation_check(job, error) || !shot_make(&shot, job, scene, job->first_frame, NULL, error))
+    if (!animation_check(job, error) || !shot_make(&shot, job, scene, job->first_frame, bounds, error))
         return false;
     shot_finish(&shot);
     return true;

@@ -2,8 +2,11 @@
 /* Checks of triangle meshes. They run over every element: a loop per array and nothing else in it. */
 #include "scene/edit.h"
 
+#include "base/parallel.h"
+
 #include <float.h>
 #include <stdio.h>
+#include <stdlib.h>
 
 /* The kinds of counts that arrays depend on. */
 enum array_of { PER_VERTEX, PER_TRIANGLE, PER_INFLUENCE, PER_TARGET };
@@ -192,28 +195,76 @@ static void extend(struct bounds *bounds, const float *positions, const uint32_t
     *bounds = b;
 }
 
+/* Of large meshes, several threads look at a part each. */
+#define PART (128u * INDEX_BLOCK)
+
+struct part {
+    struct bounds bounds;
+    size_t bad; /* the first index out of range; SIZE_MAX: none is */
+};
+
+struct parts {
+    const uint32_t *indices;
+    const float *positions;
+    size_t count; /* indices */
+    uint32_t vertex_count;
+    struct part *parts;
+};
+
+static void check_part(void *context, uint32_t number)
+{
+    const struct parts *of = context;
+    struct part *part = &of->parts[number];
+    const size_t first = (size_t)number * PART, end = of->count - first < PART ? of->count : first + PART;
+    *part = (struct part){{FLT_MAX, FLT_MAX, FLT_MAX, -FLT_MAX, -FLT_MAX, -FLT_MAX}, SIZE_MAX};
+    for (size_t begin = first; begin < end; begin += INDEX_BLOCK) {
+        const size_t length = end - begin < INDEX_BLOCK ? end - begin : INDEX_BLOCK;
+        if (max_index(of->indices + begin, length) >= of->vertex_count) {
+            part->bad = begin;
+            while (of->indices[part->bad] < of->vertex_count)
+                part->bad++;
+            return;
+        }
+        extend(&part->bounds, of->positions, of->indices + begin, length);
+    }
+}
+
+static void unite(struct scene_mesh *mesh, const struct bounds *bounds)
+{
+    const float lower[3] = {bounds->x_lower, bounds->y_lower, bounds->z_lower};
+    const float upper[3] = {bounds->x_upper, bounds->y_upper, bounds->z_upper};
+    for (int axis = 0; axis < 3; axis++) {
+        mesh->lower[axis] = lower[axis] < mesh->lower[axis] ? lower[axis] : mesh->lower[axis];
+        mesh->upper[axis] = upper[axis] > mesh->upper[axis] ? upper[axis] : mesh->upper[axis];
+    }
+}
+
 /* The indices' range check and the bounds of the vertices that triangles use: arrays may be shared between
  * meshes, so that most vertices belong to others. */
 static bool indices_check(struct scene_mesh *mesh, const struct edit_place *place)
 {
-    const uint32_t *indices = (const uint32_t *)(const void *)mesh->arrays[MESH_INDICES]->data;
-    const float *positions = (const float *)(const void *)mesh->arrays[MESH_POSITIONS]->data;
-    size_t count = (size_t)mesh->triangle_count * 3;
-    struct bounds bounds = {FLT_MAX, FLT_MAX, FLT_MAX, -FLT_MAX, -FLT_MAX, -FLT_MAX};
-    for (size_t begin = 0; begin < count; begin += INDEX_BLOCK) {
-        size_t length = count - begin < INDEX_BLOCK ? count - begin : INDEX_BLOCK;
-        if (max_index(indices + begin, length) >= mesh->vertex_count) {
-            size_t bad = begin;
-            while (indices[bad] < mesh->vertex_count)
-                bad++;
-            return edit_error(place, ERROR_INVALID, array_rows[MESH_INDICES].path,
-                              "triangle %zu refers to vertex %u of %u", bad / 3, indices[bad], mesh->vertex_count);
-        }
-        extend(&bounds, positions, indices + begin, length);
+    struct parts parts = {.indices = (const uint32_t *)(const void *)mesh->arrays[MESH_INDICES]->data,
+                          .positions = (const float *)(const void *)mesh->arrays[MESH_POSITIONS]->data,
+                          .count = (size_t)mesh->triangle_count * 3,
+                          .vertex_count = mesh->vertex_count};
+    const uint32_t part_count = (uint32_t)((parts.count + PART - 1) / PART);
+    parts.parts = malloc(part_count * sizeof(*parts.parts));
+    if (!parts.parts)
+        return edit_error(place, ERROR_OUT_OF_MEMORY, "", "no memory to check a mesh");
+    parallel_run(part_count > 1 ? parallel_processors() : 1, part_count, check_part, &parts);
+    for (int axis = 0; axis < 3; axis++) {
+        mesh->lower[axis] = FLT_MAX;
+        mesh->upper[axis] = -FLT_MAX;
     }
-    mesh->lower[0] = bounds.x_lower, mesh->lower[1] = bounds.y_lower, mesh->lower[2] = bounds.z_lower;
-    mesh->upper[0] = bounds.x_upper, mesh->upper[1] = bounds.y_upper, mesh->upper[2] = bounds.z_upper;
-    return true;
+    size_t bad = SIZE_MAX;
+    for (uint32_t i = 0; i < part_count && bad == SIZE_MAX; i++) {
+        bad = parts.parts[i].bad;
+        unite(mesh, &parts.parts[i].bounds);
+    }
+    free(parts.parts);
+    return bad == SIZE_MAX || edit_error(place, ERROR_INVALID, array_rows[MESH_INDICES].path,
+                                         "triangle %zu refers to vertex %u of %u", bad / 3, parts.indices[bad],
+                                         mesh->vertex_count);
 }
 
 bool mesh_check_shape(const struct scene_mesh *mesh, const struct edit_place *place)

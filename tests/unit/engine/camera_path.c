@@ -199,18 +199,18 @@ TEST(keys_that_span_no_view_are_errors)
     struct camera_key keys[] = {key_at(1, 0, 0, 0), key_at(1, 5, 1, 0)};
     struct engine_job job = job_of(CAMERA_KEYS, keys, 2);
     struct error error = {0};
-    assert_false(shot_check(&job, scene, &error));
+    assert_false(shot_check(&job, scene, NULL, &error));
     assert_string_equal(error.field, "render.keys[1].time_s");
     memcpy(keys[0].look_at_world, keys[0].eye_world, sizeof(keys[0].eye_world));
     job.key_count = 1;
     error = (struct error){0};
-    assert_false(shot_check(&job, scene, &error));
+    assert_false(shot_check(&job, scene, NULL, &error));
     assert_string_equal(error.field, "render.keys");
     keys[0] = key_at(0, 0, 0, 0);
     keys[0].up_world[1] = 0;
     keys[0].up_world[2] = 1;
     error = (struct error){0};
-    assert_false(shot_check(&job, scene, &error));
+    assert_false(shot_check(&job, scene, NULL, &error));
     assert_string_equal(error.field, "render.keys");
     scene_destroy(scene);
 }
@@ -263,7 +263,7 @@ TEST(an_orbit_turns_about_its_own_up_axis)
     expect_near("eye", eye, (double[]){0, 3, 1}, 3, 1e-5);
     job.orbit_seconds = 0;
     struct error error = {0};
-    assert_false(shot_check(&job, scene, &error));
+    assert_false(shot_check(&job, scene, NULL, &error));
     assert_string_equal(error.field, "render.orbit_seconds");
     scene_destroy(scene);
 }
@@ -336,7 +336,7 @@ TEST(a_camera_node_gives_its_place_without_its_scale_or_mirror)
     expect_near("up", (float[]){m[1], m[5], m[9]}, (double[]){0, 1, 0}, 3, 1e-6);
     assert_true(camera.fov_y == 0.9f && camera.near == 0.25f);
     job.camera_node = 1;
-    assert_false(shot_check(&job, scene, &error));
+    assert_false(shot_check(&job, scene, NULL, &error));
     assert_int_equal(error.kind, ERROR_INVALID);
     assert_string_equal(error.field, "render.camera_node");
     scene_destroy(scene);

@@ -142,7 +142,7 @@ static void expect_refused(const struct engine_job *job, const struct scene *sce
                            const char *field)
 {
     struct error error = {0};
-    assert_false(shot_check(job, scene, &error));
+    assert_false(shot_check(job, scene, NULL, &error));
     assert_string_equal(error.field, field);
     assert_int_equal(error.kind, kind);
 }
