@@ -91,8 +91,8 @@ static bool set_attributes(posix_spawnattr_t *attributes, enum fl_wiring wiring)
            posix_spawnattr_setflags(attributes, (short)flags) == 0;
 }
 
-/* Ours and, of a program with large arrays, what glibc reads when it starts: a page of 4 KB costs a fault, and faults
- * were a fifth of an import's time. NULL: no memory. */
+/* Ours and, of a program with large arrays, what glibc reads when it starts: a page of 4 KB costs a fault, and
+ * faults were a fifth of an import's time. NULL: no memory. */
 static char **make_environment(const struct fl_process *process)
 {
     size_t count = 0;

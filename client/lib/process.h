@@ -14,9 +14,9 @@ enum fl_wiring {
 };
 
 struct fl_process {
-    pid_t pid;    /* 0: none */
-    int input_fd; /* > 0: its standard input, set by the caller; it stays the caller's. 0: none */
-    int talk_fd;  /* a memory file with its standard output and error; -1: none */
+    pid_t pid;             /* 0: none */
+    int input_fd;          /* > 0: its standard input, set by the caller; it stays the caller's. 0: none */
+    int talk_fd;           /* a memory file with its standard output and error; -1: none */
     bool has_large_arrays; /* set by the caller: its memory comes in huge pages, where the C library can do that */
     char name[32];
 };

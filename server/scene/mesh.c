@@ -262,9 +262,9 @@ static bool indices_check(struct scene_mesh *mesh, const struct edit_place *plac
         unite(mesh, &parts.parts[i].bounds);
     }
     free(parts.parts);
-    return bad == SIZE_MAX || edit_error(place, ERROR_INVALID, array_rows[MESH_INDICES].path,
-                                         "triangle %zu refers to vertex %u of %u", bad / 3, parts.indices[bad],
-                                         mesh->vertex_count);
+    return bad == SIZE_MAX ||
+           edit_error(place, ERROR_INVALID, array_rows[MESH_INDICES].path,
+                      "triangle %zu refers to vertex %u of %u", bad / 3, parts.indices[bad], mesh->vertex_count);
 }
 
 bool mesh_check_shape(const struct scene_mesh *mesh, const struct edit_place *place)

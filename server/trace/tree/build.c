@@ -56,10 +56,10 @@ static inline float half_area(const struct bvh_box *box)
     return d[0] * d[1] + d[1] * d[2] + d[2] * d[0];
 }
 
-/* Moves a part of a range to its halves, which go on at `left` and, from its end, at `right`. Returns where the left
- * one ends. The side of a primitive is unpredictable, so nothing branches on it. */
+/* Moves a part of a range to its halves, which go on at `left` and, from its end, at `right`. Returns where the
+ * left one ends. The side of a primitive is unpredictable, so nothing branches on it. */
 INLINED uint32_t move(const struct builder *builder, unsigned array, uint32_t begin, uint32_t end, uint32_t left,
-                     uint32_t right, const struct bvh_split *split)
+                      uint32_t right, const struct bvh_split *split)
 {
     const struct bvh_box *boxes = builder->boxes[array];
     const uint32_t *order = builder->order[array];
@@ -211,7 +211,7 @@ static uint32_t take_nodes(struct builder *builder, struct place *place)
 /* Makes the node of a range. False: it is a leaf; else the ranges of its children. cut: with all threads; NULL: by
  * this one. */
 INLINED bool split_range(struct builder *builder, struct place *place, struct cut *cut, const struct range *range,
-                        struct range *left, struct range *right)
+                         struct range *left, struct range *right)
 {
     const struct bvh_box *boxes = builder->boxes[range->array] + range->begin;
     const struct bvh_costs *costs = builder->costs;

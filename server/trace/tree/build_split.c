@@ -98,7 +98,8 @@ INLINED void add_bins(struct bvh_bins *sum, const struct bvh_bins *bins, minimum
     }
 }
 
-/* Neighbours are mostly in the same bins, and one would wait for the other: of many, each half has bins of its own. */
+/* Neighbours are mostly in the same bins, and one would wait for the other: of many, each half has bins of its
+ * own. */
 INLINED void fill_bins(struct bvh_bins *bins, const struct bvh_box *boxes, uint32_t count, bvh_vec4 origin,
                        bvh_vec4 scale, minimum *take_minimum)
 {

@@ -25,7 +25,7 @@ struct bvh_split bvh_split_find(const struct bvh_box *boxes, uint32_t count, con
 
 #define BVH_PIECE 16384u /* primitives that a thread takes at a time */
 
-struct bvh_bins; /* of a piece */
+struct bvh_bins;                                       /* of a piece */
 struct bvh_bins *bvh_bins_alloc(uint32_t piece_count); /* for free(); NULL: no memory */
 /* The same cut. Of each piece: its bins, for working, and how many of its primitives go left. */
 struct bvh_split bvh_split_find_together(const struct bvh_box *boxes, uint32_t count,
