@@ -41,6 +41,9 @@ TEST(a_ping_comes_back_and_a_ping_is_answered)
     assert_true(fl_ping(connection, &ns, &error));
     assert_true(fl_ping(connection, &ns, &error));
     assert_int_equal(connection->upload_credit, 12345);
+    fl_connection_end(connection);
+    assert_false(fl_ping(connection, &ns, &error));
+    check_error(FL_ERROR_CONNECTION, "has been ended");
     fl_connection_destroy(connection);
     stop(daemon);
 }
