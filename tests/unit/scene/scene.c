@@ -207,6 +207,36 @@ TEST(indices_beyond_the_vertices_are_refused_wherever_they_stand)
     scene_destroy(scene);
 }
 
+/* Several threads look at a part each. */
+TEST(a_large_mesh_is_checked_to_its_end_and_its_bounds_hold_each_used_vertex)
+{
+    enum { TRIANGLES = 200000, BAD = 150000 };
+    struct scene *scene = new_scene();
+    struct draft_list list = {0};
+    for (int has_bad = 1; has_bad >= 0; has_bad--) {
+        struct scene_mesh *mesh = add_mesh(&list, 1);
+        blob_unref(mesh->arrays[MESH_INDICES]);
+        mesh->arrays[MESH_INDICES] = blob_create((size_t)TRIANGLES * 12);
+        assert_non_null(mesh->arrays[MESH_INDICES]);
+        uint32_t *indices = (uint32_t *)(void *)mesh->arrays[MESH_INDICES]->data;
+        memset(indices, 0, (size_t)TRIANGLES * 12);
+        mesh->triangle_count = TRIANGLES;
+        indices[3 * BAD + 1] = has_bad ? 4 : 1;
+        indices[3 * TRIANGLES - 1] = has_bad ? 5 : 2;
+        struct error error = {0};
+        const bool accepted = scene_commit(scene, list.edits, list.count, &error);
+        assert_int_equal(accepted, !has_bad);
+        if (has_bad)
+            assert_string_equal(error.text, "triangle 150000 refers to vertex 4 of 4");
+        finish(&list);
+    }
+    const struct scene_mesh *mesh = scene_mesh(scene, 1);
+    assert_float_equal(mesh->lower[0], 0, 0);
+    assert_float_equal(mesh->upper[0], 1, 0);
+    assert_float_equal(mesh->upper[1], 1, 0);
+    scene_destroy(scene);
+}
+
 TEST(ranges_ascend_without_overlap_and_within_bounds)
 {
     struct scene *scene = new_scene();
