@@ -115,6 +115,22 @@ static void world_of(float world[3], const struct instance *instance, const floa
     }
 }
 
+bool quadtree_is_run_beside(const struct raster_camera *camera, const struct quadtree_runs *runs,
+                            const struct gpu_scene *scene, uint32_t instance, uint32_t run)
+{
+    const struct quadtree_run_box *box = quadtree_run_box(runs, scene, instance, run);
+    unsigned all = box ? ~0u : 0u;
+    for (int corner = 0; corner < 8 && all != 0; corner++) {
+        const float object[3] = {(corner & 1 ? box->upper : box->lower)[0],
+                                 (corner & 2 ? box->upper : box->lower)[1],
+                                 (corner & 4 ? box->upper : box->lower)[2]};
+        float world[3];
+        world_of(world, &scene->instances[instance], object);
+        all &= beyond(camera, world, 0.0f);
+    }
+    return all != 0;
+}
+
 /* Sides of a face's frustum; what is left of a triangle has one corner more for each at most. */
 #define SIDES 5
 #define CORNERS_MAX (3 + SIDES)
@@ -187,25 +203,38 @@ static bool is_sphere_beside(const struct raster_camera *camera, const struct in
 #define PRIMITIVES_LOOKED_AT (1u << 16)
 
 /* What deforms is not where its mesh is. *left: of PRIMITIVES_LOOKED_AT. */
-static bool are_all_beside(const struct raster_camera *camera, const struct gpu_scene *scene, uint32_t instance,
-                           uint32_t *left)
+static bool are_all_beside(const struct raster_camera *camera, const struct gpu_scene *scene,
+                           struct raster_span span, uint32_t *left)
 {
+    const uint32_t instance = span.instance, count = span.end - span.first;
     const struct gpu_scene_geometry *geometry = &scene->geometries[scene->instances[instance].geometry];
-    const uint32_t count = geometry->device.primitive_count;
     bool beside = geometry->node == 0 && count <= *left;
     *left -= beside ? count : 0;
-    for (uint32_t i = 0; beside && i < count; i++)
+    for (uint32_t i = span.first; beside && i < span.end; i++)
         beside = geometry->mesh ? is_triangle_beside(camera, &scene->instances[instance], geometry->mesh, i)
                                 : is_sphere_beside(camera, &scene->instances[instance], geometry->spheres, i);
     return beside;
 }
 
-static bool is_empty(const struct quadtree_uniforms *uniforms, const struct gpu_scene *scene, uint32_t face)
+static bool is_instance_beside(const struct raster_camera *camera, const struct quadtree_runs *runs,
+                               const struct gpu_scene *scene, uint32_t instance, uint32_t *left)
+{
+    const uint32_t count =
+        quadtree_is_beside(camera, scene, instance) ? 0 : quadtree_runs_of(runs, scene, instance);
+    bool beside = true;
+    for (uint32_t run = 0; beside && run < count; run++)
+        beside = quadtree_is_run_beside(camera, runs, scene, instance, run) ||
+                 are_all_beside(camera, scene, quadtree_run_span(runs, scene, instance, run), left);
+    return beside;
+}
+
+static bool is_empty(const struct quadtree_uniforms *uniforms, const struct gpu_scene *scene,
+                     const struct quadtree_runs *runs, uint32_t face)
 {
     const struct raster_camera camera = quadtree_face_camera(uniforms, face);
     uint32_t left = PRIMITIVES_LOOKED_AT;
     for (uint32_t i = 0; i < scene->instance_count; i++)
-        if (!quadtree_is_beside(&camera, scene, i) && !are_all_beside(&camera, scene, i, &left))
+        if (!is_instance_beside(&camera, runs, scene, i, &left))
             return false;
     for (uint32_t i = 0; i < scene->disc_count; i++) {
         const float *ball = scene->discs[i].centre_radius; /* which its disc lies in */
@@ -215,14 +244,15 @@ static bool is_empty(const struct quadtree_uniforms *uniforms, const struct gpu_
     return true;
 }
 
-void quadtree_drop_empty_faces(struct quadtree_uniforms *uniforms, const struct gpu_scene *scene)
+void quadtree_drop_empty_faces(struct quadtree_uniforms *uniforms, const struct gpu_scene *scene,
+                               const struct quadtree_runs *runs)
 {
     uint32_t kept = 0;
     if (uniforms->faces == 1)
         return;
     for (uint32_t face = 0; face < uniforms->faces; face++) {
         vec4 *rows = uniforms->face_from_world;
-        if (!is_empty(uniforms, scene, face))
+        if (!is_empty(uniforms, scene, runs, face))
             memmove(&rows[3 * (size_t)kept++], &rows[3 * (size_t)face], 3 * sizeof(rows[0]));
     }
     uniforms->faces = kept > 0 ? kept : 1;

@@ -5,6 +5,7 @@
 
 #include "gpu_scene/scene.h"
 #include "quadtree/layout.h"
+#include "trace/quadtree/runs.h"
 #include "trace/raster/view.h"
 #include "trace/view.h"
 
@@ -16,11 +17,15 @@ void quadtree_place_view(struct quadtree_uniforms *uniforms, const struct trace_
 /* Six faces round the eye, so many texels along a side; the last but one looks along the view. */
 void quadtree_place_cube(struct quadtree_uniforms *uniforms, const struct trace_view *view, uint32_t texels);
 /* Leaves out the faces of a placed cube that no instance of the scene reaches, but for one. */
-void quadtree_drop_empty_faces(struct quadtree_uniforms *uniforms, const struct gpu_scene *scene);
+void quadtree_drop_empty_faces(struct quadtree_uniforms *uniforms, const struct gpu_scene *scene,
+                               const struct quadtree_runs *runs);
 
 /* To draw a face. */
 struct raster_camera quadtree_face_camera(const struct quadtree_uniforms *uniforms, uint32_t face);
 /* Whether an instance lies beside what the camera sees. */
 bool quadtree_is_beside(const struct raster_camera *camera, const struct gpu_scene *scene, uint32_t instance);
+/* Whether one of its runs does. */
+bool quadtree_is_run_beside(const struct raster_camera *camera, const struct quadtree_runs *runs,
+                            const struct gpu_scene *scene, uint32_t instance, uint32_t run);
 
 #endif

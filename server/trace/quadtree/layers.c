@@ -27,16 +27,35 @@ bool quadtree_layers_begin(struct quadtree_layers *layers, struct quadtree_store
     return true;
 }
 
-static bool reserve_left_out(struct quadtree_layers *layers, uint32_t count, struct error *error)
+static bool add_span(struct quadtree_layers *layers, struct raster_span span, struct error *error)
 {
-    if (count <= layers->left_out_capacity)
+    struct raster_span *last = layers->span_count > 0 ? &layers->spans[layers->span_count - 1] : NULL;
+    if (last && last->instance == span.instance && last->end == span.first) {
+        last->end = span.end;
         return true;
-    bool *larger = realloc(layers->left_out, count * sizeof(bool));
-    if (!larger)
-        return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the instances of a face");
-    layers->left_out = larger;
-    layers->left_out_capacity = count;
+    }
+    if (layers->span_count == layers->span_capacity) {
+        const uint32_t capacity = layers->span_capacity > 0 ? 2 * layers->span_capacity : 64;
+        struct raster_span *larger = realloc(layers->spans, capacity * sizeof(*larger));
+        if (!larger)
+            return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for what a face may see");
+        layers->spans = larger;
+        layers->span_capacity = capacity;
+    }
+    layers->spans[layers->span_count++] = span;
     return true;
+}
+
+/* What of an instance is not beside the face. */
+static bool add_spans(struct quadtree_layers *layers, const struct gpu_scene *scene,
+                      const struct raster_camera *camera, uint32_t instance, struct error *error)
+{
+    const uint32_t count = quadtree_runs_of(&layers->store->runs, scene, instance);
+    bool good = true;
+    for (uint32_t run = 0; good && run < count; run++)
+        if (!quadtree_is_run_beside(camera, &layers->store->runs, scene, instance, run))
+            good = add_span(layers, quadtree_run_span(&layers->store->runs, scene, instance, run), error);
+    return good;
 }
 
 static bool begin_face(struct quadtree_layers *layers, const struct gpu_scene *scene, struct error *error)
@@ -44,10 +63,10 @@ static bool begin_face(struct quadtree_layers *layers, const struct gpu_scene *s
     const struct raster_camera camera = quadtree_face_camera(&layers->store->uniforms, layers->face);
     struct frame_uniforms uniforms = {.sample_places = {{0.5f, 0.5f}}};
     raster_camera_fill(&uniforms, &camera);
-    if (!reserve_left_out(layers, scene->instance_count, error))
-        return false;
+    layers->span_count = 0;
     for (uint32_t i = 0; i < scene->instance_count; i++)
-        layers->left_out[i] = quadtree_is_beside(&camera, scene, i);
+        if (!quadtree_is_beside(&camera, scene, i) && !add_spans(layers, scene, &camera, i, error))
+            return false;
     return gpu_buffer_upload(layers->store->device, &layers->frame, &uniforms, sizeof(uniforms), error);
 }
 
@@ -95,7 +114,8 @@ static bool draw_part(struct quadtree_layers *layers, struct gpu_scene *scene, b
         .scene = scene,
         .layers = layers->pass_layers,
         .has_before = layers->layer > 0,
-        .left_out = layers->left_out,
+        .spans = layers->spans,
+        .span_count = layers->span_count,
     };
     gpu_scene_bind(scene);
     gpu_buffer_bind_uniform(&layers->frame, UNIFORM_FRAME);
@@ -155,7 +175,7 @@ void quadtree_layers_finish(struct quadtree_layers *layers)
             gpu_texture_finish(device, &layers->depths[i]);
         gpu_buffer_finish(device, &layers->frame);
     }
-    free(layers->left_out);
+    free(layers->spans);
     *layers = (struct quadtree_layers){0};
 }
 

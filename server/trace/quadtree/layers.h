@@ -17,8 +17,8 @@ struct quadtree_layers {
     struct gpu_buffer frame;      /* struct frame_uniforms of the face */
     struct gpu_texture depths[2]; /* of the layer that is drawn, and of the one before; or of all in the first */
     struct gpu_framebuffer framebuffer;
-    bool *left_out; /* instances beside the face */
-    uint32_t left_out_capacity;
+    struct raster_span *spans; /* of primitives that the face may see */
+    uint32_t span_count, span_capacity;
     /* where drawing goes on */
     struct raster_view drawing;
     uint32_t face, layer;

@@ -25,6 +25,7 @@ void quadtree_store_finish(struct quadtree_store *store)
     gpu_buffer_finish(device, &store->uniform_buffer);
     gpu_buffer_finish(device, &store->nodes);
     gpu_texture_finish(device, &store->visible);
+    quadtree_runs_finish(&store->runs);
     *store = (struct quadtree_store){.device = device};
 }
 
@@ -133,7 +134,7 @@ static uint32_t padded(uint32_t texels)
 
 static void fill_uniforms(struct quadtree_uniforms *u, const struct gpu_scene *scene,
                           const struct trace_view *view, const struct quadtree_settings *settings,
-                          bool only_leaves)
+                          const struct quadtree_store *store)
 {
     *u = (struct quadtree_uniforms){.layers = quadtree_layer_count(settings)};
     for (int i = 0; i < 3; i++)
@@ -155,10 +156,10 @@ static void fill_uniforms(struct quadtree_uniforms *u, const struct gpu_scene *s
     u->bounds[2] =
         settings->adaptive == QUADTREE_ADAPTIVE_ON ? u->depths[0] / (DOUBLED_AT * diagonal_of(scene)) : 0.0f;
     u->bounds[3] = settings->radius / u->depths[0];
-    quadtree_drop_empty_faces(u, scene);
+    quadtree_drop_empty_faces(u, scene, &store->runs);
     u->padded_width = padded(u->width);
     u->padded_height = padded(u->height);
-    for (uint32_t level = 0; level <= (only_leaves ? 0 : QUADTREE_TOP); level++)
+    for (uint32_t level = 0; level <= (store->only_leaves ? 0 : QUADTREE_TOP); level++)
         u->slice_nodes += (u->padded_width >> level) * (u->padded_height >> level);
 }
 
@@ -169,7 +170,9 @@ bool quadtree_store_place(struct quadtree_store *store, const struct gpu_scene *
                           struct error *error)
 {
     struct quadtree_uniforms *u = &store->uniforms;
-    fill_uniforms(u, scene, view, settings, store->only_leaves);
+    if (!quadtree_runs_update(&store->runs, scene, error))
+        return false;
+    fill_uniforms(u, scene, view, settings, store);
     const uint32_t longer = u->padded_width > u->padded_height ? u->padded_width : u->padded_height;
     if (longer > store->device->facts.texture_size_max) {
         error_set(error, ERROR_LIMIT, "quadtree_resolution", "%u texels along a side; the device holds %u", longer,

@@ -10,6 +10,7 @@
 #include "gpu_scene/scene.h"
 #include "protocol/tracers.h"
 #include "quadtree/layout.h"
+#include "trace/quadtree/runs.h"
 #include "trace/view.h"
 
 #include <stdbool.h>
@@ -23,6 +24,7 @@ struct quadtree_store {
     struct gpu_buffer uniform_buffer;
     struct gpu_texture visible; /* GL_RG32UI array: a layer a slice, padded size */
     struct gpu_buffer nodes;
+    struct quadtree_runs runs; /* of the scene that it was placed for */
 };
 
 /* How many are asked for. */

@@ -89,6 +89,21 @@ static bool has_cutout(const struct gpu_scene *scene, enum primitive_sort sort)
     return sort == SORT_WITH_HOLES || (sort != SORT_WHOLE && scene->has_cutout);
 }
 
+/* What is drawn next of a sort; end 0: nothing of this span. */
+static struct raster_span span_of(const struct raster_view *view, const struct raster_view_target *target,
+                                  uint32_t *first_primitive)
+{
+    const enum primitive_sort sort = (enum primitive_sort)view->sort;
+    const bool is_part = target->spans && sort != SORT_DISCS;
+    struct raster_span span = {.instance = view->span};
+    if (is_part)
+        span = target->spans[view->span];
+    const uint32_t count = primitives_of(target->scene, sort, span.instance, first_primitive);
+    if (!is_part || span.end > count)
+        span.end = count;
+    return span;
+}
+
 /* Goes on with a sort where the last part ended; what is left of `budget` vertices comes back. */
 static bool draw_sort(struct raster_view *view, const struct raster_view_target *target, uint32_t *budget,
                       struct error *error)
@@ -96,20 +111,23 @@ static bool draw_sort(struct raster_view *view, const struct raster_view_target 
     const struct gpu_scene *scene = target->scene;
     enum primitive_sort sort = (enum primitive_sort)view->sort;
     enum primitive_kind kind = kind_of_sort[sort];
-    uint32_t end = sort == SORT_DISCS ? 1 : scene->instance_count;
+    uint32_t end = sort == SORT_DISCS ? 1 : target->spans ? target->span_count : scene->instance_count;
     const struct gpu_program *program = NULL;
-    for (; view->instance < end; view->instance++, view->primitive = 0) {
-        uint32_t first, count = primitives_of(scene, sort, view->instance, &first) - view->primitive;
-        if (count == 0 || (sort != SORT_DISCS && target->left_out && target->left_out[view->instance]))
+    for (; view->span < end; view->span++, view->primitive = 0) {
+        uint32_t first;
+        const struct raster_span span = span_of(view, target, &first);
+        if (span.first + view->primitive >= span.end)
             continue;
+        first += span.first + view->primitive;
+        const uint32_t count = span.end - span.first - view->primitive;
         if (!program &&
             !(program = get_program(target->device, kind, has_cutout(scene, sort), target->layers, error)))
             return false;
         uint32_t maximum = *budget / vertices_per_primitive[kind], part = count < maximum ? count : maximum;
         if (sort == SORT_SPHERES) /* the picture's y runs down, which turns every winding round */
-            glFrontFace(scene->instances[view->instance].flags & INSTANCE_MIRRORED ? GL_CCW : GL_CW);
-        gpu_uniform_uint(program, "instance_index", view->instance);
-        gpu_uniform_uint(program, "first_primitive", first + view->primitive);
+            glFrontFace(scene->instances[span.instance].flags & INSTANCE_MIRRORED ? GL_CCW : GL_CW);
+        gpu_uniform_uint(program, "instance_index", span.instance);
+        gpu_uniform_uint(program, "first_primitive", first);
         gpu_uniform_uint(program, "first_row", target->first_row);
         gpu_uniform_uint(program, "layer", target->sample);
         if (target->layers == 1)
@@ -124,7 +142,7 @@ static bool draw_sort(struct raster_view *view, const struct raster_view_target 
             return true;
         }
     }
-    view->instance = 0;
+    view->span = 0;
     view->sort++;
     return true;
 }
@@ -148,7 +166,7 @@ static bool draw_sorts(struct raster_view *view, const struct raster_view_target
 void raster_view_begin(struct raster_view *view)
 {
     view->sort = SORT_WHOLE;
-    view->instance = view->primitive = 0;
+    view->span = view->primitive = 0;
 }
 
 bool raster_view_draw(struct raster_view *view, const struct raster_view_target *target, bool *whole,

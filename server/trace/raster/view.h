@@ -26,10 +26,15 @@ void raster_camera_fill(struct frame_uniforms *uniforms, const struct raster_cam
 /* The near distance of a view, metres; where `near` is 0 one that cuts nothing off. */
 float raster_near(const struct gpu_scene *scene, float near, bool orthographic);
 
+/* Primitives of an instance, counted from its first. */
+struct raster_span {
+    uint32_t instance, first, end;
+};
+
 /* Where drawing goes on, and how large a part is. All-zero is valid; it keeps what it has learnt. */
 struct raster_view {
-    uint32_t sort, instance, primitive;
-    uint32_t part_vertices; /* that are drawn in one part on software GL; 0: not known yet */
+    uint32_t sort, span, primitive; /* span: an instance where there are no spans */
+    uint32_t part_vertices;         /* that are drawn in one part on software GL; 0: not known yet */
 };
 
 struct raster_view_target {
@@ -43,7 +48,8 @@ struct raster_view_target {
      * fetches_framebuffer. */
     uint32_t layers;
     bool has_before;
-    const bool *left_out; /* instances; NULL: none */
+    const struct raster_span *spans; /* that alone are drawn, besides discs; NULL: all instances, whole */
+    uint32_t span_count;
 };
 
 void raster_view_begin(struct raster_view *view);
