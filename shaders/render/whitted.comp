@@ -6,7 +6,8 @@
 //   shadow rays one to every light, with its unshadowed radiance
 //   children    straight on (alpha blending), mirrored, refracted
 //
-// Defines: those of common/material.glsl, common/light.glsl and common/environment.glsl.
+// Defines: those of common/material.glsl, common/light.glsl and common/environment.glsl; SENDS_NOTHING no surface is
+// see-through or smooth enough for a mirror ray: there are no children, whose code is a third of all.
 //
 // Lights beyond the first batch come in further passes with first_ray > 0, which make shadow rays alone.
 
@@ -95,14 +96,18 @@ vec3 shade(surface s, split parts, vec3 direction, vec3 weight, inout sent on)
     if (s.unlit)
         return weight * s.base;
     on.mirrored = mirror_direction(s, direction);
-    on.bent = bent_direction(s, index_ratio(s), direction, s.normal, s.normal);
-    // If it is totally reflected, or a tilted normal would send it back, it is mirrored.
-    bool through = dot(on.bent, s.geometric) < 0.0;
-    vec3 mirror = parts.mirror + (through ? vec3(0.0) : parts.refracted);
-    vec3 in_mirror = mirror * parts.mirror_ray;
+    vec3 mirror = parts.mirror;
 #ifdef HAS_CLEARCOAT
     float coat_ray = coat_ray_of(s, parts);
     on.coat = coat_mirror_direction(s, direction);
+#endif
+#ifndef SENDS_NOTHING
+    on.bent = bent_direction(s, index_ratio(s), direction, s.normal, s.normal);
+    // If it is totally reflected, or a tilted normal would send it back, it is mirrored.
+    bool through = dot(on.bent, s.geometric) < 0.0;
+    mirror += through ? vec3(0.0) : parts.refracted;
+    vec3 in_mirror = mirror * parts.mirror_ray;
+#ifdef HAS_CLEARCOAT
     on.coat_weight = weight * coat_ray;
     // One ray for both mirrors where they are one; over a refracted ray there is no room for two.
     if (through && max_component(parts.refracted) > 0.0 || dot(on.mirrored, on.coat) > 0.99999)
@@ -115,6 +120,7 @@ vec3 shade(surface s, split parts, vec3 direction, vec3 weight, inout sent on)
     on.bent_weight = weight * parts.refracted;
     if (through)
         on.which |= sends(SENDS_BENT, on.bent_weight);
+#endif
     vec3 ambient = (parts.scattered + parts.again + sheen_of(parts)) * environment_irradiance(s.normal) +
                    mirror * (1.0 - parts.mirror_ray) * environment_irradiance(on.mirrored);
     ambient += passed_of(parts) * environment_irradiance(-s.normal);
@@ -141,11 +147,15 @@ void main()
     if (first) {
         float seen = (p.flags & PATH_STRAIGHT) != 0u ? p.weight_r * s.alpha : 0.0;
         sent on;
+#ifndef SENDS_NOTHING
         on.straight = r.direction_t_max.xyz;
         on.straight_weight = weight * (1.0 - s.alpha);
         on.which = s.alpha < 1.0 ? sends(SENDS_STRAIGHT, on.straight_weight) : 0u;
+#endif
         radiance[k] = vec4(shade(s, parts, r.direction_t_max.xyz, weight * s.alpha, on), seen);
+#ifndef SENDS_NOTHING
         add_children(j, p, s, h.distance, on);
+#endif
     }
     uint shadows = 0u;
     if (s.unlit || s.alpha <= 0.0 || in_glass(s))

@@ -133,6 +133,16 @@ static void set_path(struct render_context *context, const struct gpu_program *p
     set_environment_choice(context, program);
 }
 
+/* Of scene_features.mirrors nothing is left out, but what a tracer stores is rounded, and a grain narrows a lobe. */
+static size_t whitted_defines(const struct render_context *context, struct gpu_define *defines)
+{
+    if (context->features.mirrors || context->features.anisotropy || context->sampled_hits ||
+        context->tracer->impl->sampled)
+        return 0;
+    defines[0] = (struct gpu_define){"SENDS_NOTHING", "1"};
+    return 1;
+}
+
 /* ---- the table ---- */
 
 static const struct integrator integrators[] = {
@@ -149,6 +159,7 @@ static const struct integrator integrators[] = {
             .shadow_waves = 1,
             .straight_waves = STRAIGHT_WAVES,
             .shadow_rays_a_hit = one_for_each_light,
+            .defines = whitted_defines,
         },
     /* Cook, Porter, Carpenter. Distributed Ray Tracing. 1984, one random choice of each kind a sample, as in
      * section 7 of the stackless sphere tree's paper: at each hit one shadow ray and at most one ray more. */
