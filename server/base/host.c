@@ -1,8 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 #include "base/host.h"
 
+#include <dirent.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
@@ -25,4 +27,43 @@ uint64_t host_memory_bytes(void)
 void host_thread_gives_way(void)
 {
     setpriority(PRIO_PROCESS, 0, NICENESS);
+}
+
+/* What the system tells of a thread in a line; false: nothing. */
+static bool read_thread(int thread, const char *what, char *line, size_t size)
+{
+    char path[64];
+    snprintf(path, sizeof(path), "/proc/self/task/%d/%s", thread, what);
+    FILE *file = fopen(path, "re");
+    const bool is_read = file && fgets(line, (int)size, file);
+    if (file)
+        fclose(file);
+    return is_read;
+}
+
+size_t host_threads_find(const char *name_part, int *threads, size_t max)
+{
+    char name[64];
+    size_t count = 0;
+    DIR *folder = opendir("/proc/self/task");
+    for (struct dirent *entry; folder && count < max && (entry = readdir(folder));) {
+        const int thread = atoi(entry->d_name); /* 0: the folder itself, and the one above */
+        if (thread && read_thread(thread, "comm", name, sizeof(name)) && strstr(name, name_part))
+            threads[count++] = thread;
+    }
+    if (folder)
+        closedir(folder);
+    return count;
+}
+
+bool host_threads_sleep(const int *threads, size_t count)
+{
+    for (size_t i = 0; i < count; i++) {
+        char line[256];
+        /* "number (name) S ..", and a name may hold anything. One that has ended has no work. */
+        const char *name_end = read_thread(threads[i], "stat", line, sizeof(line)) ? strrchr(line, ')') : NULL;
+        if (name_end && strncmp(name_end, ") S", 3) != 0)
+            return false;
+    }
+    return true;
 }

@@ -2,6 +2,7 @@
 #include "gpu/program_ahead.h"
 
 #include "base/clock.h"
+#include "base/host.h"
 #include "base/parallel.h"
 #include "gpu/egl.h"
 #include "gpu/program_rehearse.h"
@@ -16,9 +17,13 @@
 #define THREADS_MAX 2
 /* Of a driver that compiles several together. */
 #define TOGETHER_MAX 32
-/* Mesa writes what it has compiled in a thread of its own, which takes some milliseconds. */
+/* Mesa writes what it has compiled in threads of its own, which have the lowest priority: some milliseconds, and
+ * more on a busy machine. Until they sleep, and no longer than this; the second, where none is found. */
+#define WRITERS_NAME ":disk$"
+#define WRITERS_MAX 8
+#define WRITTEN_NS_MAX UINT64_C(100000000)
 #define WRITTEN_NS UINT64_C(8000000)
-#define NS_PER_S UINT64_C(1000000000)
+#define WRITTEN_STEP_NS 500000
 
 enum state { WAITING, BEGUN, DONE };
 
@@ -27,7 +32,6 @@ struct item {
     struct gpu_build build;
     struct gpu_binary binary;
     enum state state;
-    uint64_t rehearsed_ns; /* 0: it was not */
     char key[];            /* files and defines */
 };
 
@@ -60,6 +64,17 @@ static size_t begin_items(struct gpu_ahead *ahead, struct item **items)
     return count;
 }
 
+static void let_write(void)
+{
+    const struct timespec step = {.tv_nsec = WRITTEN_STEP_NS};
+    int writers[WRITERS_MAX];
+    const size_t count = host_threads_find(WRITERS_NAME, writers, WRITERS_MAX);
+    const uint64_t end_ns = clock_now_ns() + (count > 0 ? WRITTEN_NS_MAX : WRITTEN_NS);
+    do
+        (void)nanosleep(&step, NULL);
+    while (clock_now_ns() < end_ns && !(count > 0 && host_threads_sleep(writers, count)));
+}
+
 static void end_item(struct gpu_ahead *ahead, struct item *item, GLuint program)
 {
     struct gpu_binary binary = {0};
@@ -71,9 +86,10 @@ static void end_item(struct gpu_ahead *ahead, struct item *item, GLuint program)
     glDeleteProgram(program);
     if (good)
         gpu_binary_write(ahead->device->binaries, &item->build.key, &binary);
+    if (rehearses)
+        let_write();
     pthread_mutex_lock(&ahead->lock);
     item->binary = binary;
-    item->rehearsed_ns = rehearses ? clock_now_ns() : 0;
     item->state = DONE;
     pthread_cond_broadcast(&ahead->changed);
     pthread_mutex_unlock(&ahead->lock);
@@ -184,8 +200,10 @@ static size_t thread_count(const struct gpu_facts *facts)
 {
     if (facts->compiles_together)
         return 1;
-    /* Beside the device's thread, which compiles, too, where that happens at a dispatch. */
-    const size_t count = facts->compiles_at_dispatch ? parallel_processors() - 1 : THREADS_MAX;
+    /* The device's thread, which compiles, too, where that happens at a dispatch, often waits for memory or for one
+     * of them. */
+    const size_t processors = parallel_processors();
+    const size_t count = !facts->compiles_at_dispatch ? THREADS_MAX : processors > 1 ? processors : 0;
     return count < THREADS_MAX ? count : THREADS_MAX;
 }
 
@@ -219,15 +237,6 @@ size_t gpu_ahead_left(struct gpu_ahead *ahead)
     return count;
 }
 
-/* What was waited for is on the disk a little later; all else has been there for long. */
-static void let_write(const struct item *item)
-{
-    const uint64_t end_ns = item->rehearsed_ns + WRITTEN_NS;
-    const struct timespec end = {(time_t)(end_ns / NS_PER_S), (long)(end_ns % NS_PER_S)};
-    if (item->rehearsed_ns)
-        (void)clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &end, NULL);
-}
-
 bool gpu_ahead_take(struct gpu_ahead *ahead, const char *key, struct gpu_build *build, struct gpu_binary *binary)
 {
     pthread_mutex_lock(&ahead->lock);
@@ -242,7 +251,6 @@ bool gpu_ahead_take(struct gpu_ahead *ahead, const char *key, struct gpu_build *
     pthread_mutex_unlock(&ahead->lock);
     if (!item)
         return false;
-    let_write(item);
     *build = item->build;
     *binary = item->binary;
     free(item);

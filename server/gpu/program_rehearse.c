@@ -18,6 +18,17 @@ static GLenum format_of(const struct gpu_texel_formats *formats, GLenum type, GL
     return own && is_of_floats(own) == floats ? own : floats ? GL_RGBA32F : GL_RGBA32UI;
 }
 
+/* What is drawn to be read by a pass. Its size matters to llvmpipe only where it is a power of two, as few pictures
+ * are. */
+static GLuint bind_drawn(GLuint unit)
+{
+    GLuint texture = 0;
+    glCreateTextures(GL_TEXTURE_2D_ARRAY, 1, &texture);
+    glTextureStorage3D(texture, 1, GL_RG32UI, 3, 3, 1);
+    glBindImageTexture(unit, texture, 0, GL_TRUE, 0, GL_READ_ONLY, GL_RG32UI);
+    return texture;
+}
+
 void gpu_program_rehearse(const struct gpu_texel_formats *formats, unsigned program)
 {
     static const unsigned char zeros[GPU_EMPTY_BUFFER_BYTES];
@@ -35,6 +46,8 @@ void gpu_program_rehearse(const struct gpu_texel_formats *formats, unsigned prog
             continue;
         glGetUniformiv(program, answers[1], &unit);
         const GLenum type = (GLenum)answers[0], format = format_of(formats, type, unit);
+        if (type == GL_UNSIGNED_INT_IMAGE_2D_ARRAY)
+            textures[used++] = bind_drawn((GLuint)unit);
         if (!format)
             continue;
         glCreateTextures(GL_TEXTURE_BUFFER, 1, &textures[used]);

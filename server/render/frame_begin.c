@@ -263,21 +263,15 @@ static uint32_t rays_a_path(const struct frame_renderer *renderer)
     return once ? 1 : CHOICES_WAVE_PER_SLICE;
 }
 
-static bool reserve_frame(struct frame_renderer *renderer, struct error *error)
+/* What it needs is known before any of it is reserved. */
+static bool size_frame(struct frame_renderer *renderer, struct error *error)
 {
     struct render_context *context = &renderer->work->context;
-    if (!picture_begin(renderer->target, context, renderer->samples_before, error) ||
-        !denoise_sums_begin(&renderer->denoise, context, renderer->target, renderer->samples_before,
-                            &renderer->history, error))
+    if (!picture_begin(renderer->target, context, renderer->samples_before, error))
         return false;
-    renderer->picture.denoised = NULL;
-    context->tile_samples = renderer->target->noise.errors ? &renderer->target->noise.tile_samples : NULL;
     renderer->rasterise = !renderer->key_tracer && choices_rasterise(context);
     renderer->strip_rows = picture_strip_rows(renderer->target, STRIP_PIXELS_MAX);
     renderer->sample_shift_max = sample_shift_max(renderer);
-    if (renderer->rasterise && !primary_reserve(&renderer->work->primary, context, renderer->strip_rows,
-                                                1u << renderer->sample_shift_max, error))
-        return false;
     uint32_t rays = slice_rays(renderer);
     uint64_t all = (uint64_t)picture_slot_count(renderer->target) << renderer->sample_shift_max;
     rays = rays < all ? rays : (uint32_t)all;
@@ -286,11 +280,26 @@ static bool reserve_frame(struct frame_renderer *renderer, struct error *error)
     if (renderer->wanted_wave_rays)
         wave_rays = renderer->wanted_wave_rays;
     context->wave_capacity = at_least(wave_rays, rays);
-    if (!frame_reserve_waves(renderer, error))
-        return false;
     context->counts_on_host =
         !renderer->queues_ahead || context->request.compare || context->tracer->impl->traces_on_host;
     context->waves_queued = waves_queued(renderer);
+    layers_begin(&renderer->work->layers, &context->request);
+    return true;
+}
+
+static bool reserve_frame(struct frame_renderer *renderer, struct error *error)
+{
+    struct render_context *context = &renderer->work->context;
+    if (!picture_reserve(renderer->target, context, renderer->samples_before, error) ||
+        !denoise_sums_begin(&renderer->denoise, context, renderer->target, renderer->samples_before,
+                            &renderer->history, error))
+        return false;
+    renderer->picture.denoised = NULL;
+    if (renderer->rasterise && !primary_reserve(&renderer->work->primary, context, renderer->strip_rows,
+                                                1u << renderer->sample_shift_max, error))
+        return false;
+    if (!frame_reserve_waves(renderer, error))
+        return false;
     compact_go_on(context);
     return true;
 }
@@ -326,24 +335,24 @@ static const struct gpu_texel_formats texel_formats = {.of_unit = {[UNIT_TANGENT
                                                                    [UNIT_SHADE_ENVIRONMENT] = GL_R32F,
                                                                    [UNIT_RAY_TIMES] = GL_R32F}};
 
-/* Threads compile while this one goes on. */
+/* Threads compile while this one goes on, and while memory is prefaulted. */
 static void announce_programs(struct frame_renderer *renderer)
 {
     struct render_context *context = &renderer->work->context;
     struct wave_passes *passes = &renderer->work->passes;
     gpu_program_announce(renderer->device, &texel_formats);
-    /* What takes longest begins first; the rest is in the order of its use. Software GL compiles in this thread,
-     * too, where it uses a program: what it needs first is left to it. */
+    /* What takes longest begins first; the rest is in the order of its use. */
     if (frame_is_eyes_pass(renderer)) {
         frame_key_announce(renderer);
     } else {
-        wave_passes_announce_shadows(passes, context);
-        if (!renderer->device->facts.software || !renderer->rasterise)
-            primary_announce(context, renderer->rasterise);
+        context->sampled_hits = !renderer->rasterise && context->tracer->impl->sampled;
+        wave_passes_announce_long(passes, context);
+        primary_announce(context, renderer->rasterise);
         wave_passes_announce(passes, context);
     }
     picture_announce(renderer->target, context);
     gpu_program_announce(renderer->device, NULL);
+    renderer->announced = true;
 }
 
 /* Once its tracers are what the scene is. */
@@ -368,6 +377,10 @@ static bool get_ready(struct frame_renderer *renderer, struct error *error)
     fill_filter(context);
     context->uniforms.seed = (uint32_t)(request->seed ^ request->seed >> 32);
     const bool goes_on = renderer->samples_before > 0;
+    if (!size_frame(renderer, error))
+        return false;
+    if (request->samples && !renderer->announced)
+        announce_programs(renderer);
     if (!denoise_history_begin(&renderer->history, context, renderer->shared->showing, goes_on, error) ||
         !reserve_frame(renderer, error) || !gpu_check_reset(renderer->device, "beginning a frame", error))
         return false;
@@ -376,9 +389,8 @@ static bool get_ready(struct frame_renderer *renderer, struct error *error)
     renderer->copying = false;
     /* A picture that has all its samples is only output again. */
     renderer->phase = request->samples ? PHASE_SAMPLE : PHASE_DENOISE;
+    renderer->announced = false;
     denoise_begin(&renderer->work->denoise);
-    if (request->samples)
-        announce_programs(renderer);
     return request->samples || context_upload_uniforms(context, error);
 }
 
@@ -494,6 +506,7 @@ static bool begin(struct frame_renderer *renderer, const struct scene *scene, co
     context->layer_tracer = NULL;
     context->marked_key = NULL;
     renderer->pass = PASS_UNKNOWN;
+    renderer->announced = false;
     renderer->target = &renderer->picture;
     renderer->result = (struct frame_result){0};
     renderer->view = view_of(request);

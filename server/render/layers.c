@@ -22,11 +22,15 @@ bool layers_of_first_sample(enum layer layer)
     return layer == LAYER_DEPTH || layer == LAYER_POSITION || layer == LAYER_ID;
 }
 
+void layers_begin(struct layers *layers, const struct frame_request *request)
+{
+    layers->wanted = frame_request_planes(request) & ~LAYER_BIT_BEAUTY;
+}
+
 bool layers_reserve(struct layers *layers, struct render_context *context, uint32_t slice_samples,
                     struct error *error)
 {
     struct gpu_device *device = context->device;
-    layers->wanted = frame_request_planes(&context->request) & ~LAYER_BIT_BEAUTY;
     if (!layers->wanted) {
         layers_finish(layers, device);
         return true;

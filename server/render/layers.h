@@ -19,7 +19,9 @@ struct layers {
     uint32_t plane_samples; /* likewise: its samples, so many in each plane of the sums */
 };
 
-/* Reserves the requested layers, for slices of `samples` samples and waves of wave_capacity rays. */
+/* Of another pass: the layers that it wants. */
+void layers_begin(struct layers *layers, const struct frame_request *request);
+/* Reserves them, for slices of `samples` samples and waves of wave_capacity rays. */
 bool layers_reserve(struct layers *layers, struct render_context *context, uint32_t slice_samples,
                     struct error *error);
 /* The context has rays and hits of a new slice. */

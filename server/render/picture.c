@@ -169,6 +169,13 @@ bool picture_begin(struct picture *picture, struct render_context *context, uint
     }
     set_crop(picture, request);
     picture->samples = samples_before + request->samples;
+    context->tile_samples = request->noise > 0.0f ? &picture->noise.tile_samples : NULL;
+    return true;
+}
+
+bool picture_reserve(struct picture *picture, struct render_context *context, uint32_t samples_before,
+                     struct error *error)
+{
     return reserve_bands(picture, context->device, error) &&
            (samples_before > 0 || clear_bands(picture, context->device, error)) &&
            picture_noise_begin(picture, context, samples_before, error);

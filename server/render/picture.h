@@ -28,10 +28,13 @@ struct picture {
 
 /* Another frame: all of it is to be cleared. */
 void picture_restart(struct picture *picture);
-/* Reserves the request's picture and clears it; a picture of `samples_before` samples per pixel, to which the
- * request adds, is kept. */
+/* Gives it the request's size; a picture of `samples_before` samples per pixel, to which the request adds, is
+ * kept. */
 bool picture_begin(struct picture *picture, struct render_context *context, uint32_t samples_before,
                    struct error *error);
+/* Reserves and clears it, unless it is kept; may be put off (gpu_reserve_begin). */
+bool picture_reserve(struct picture *picture, struct render_context *context, uint32_t samples_before,
+                     struct error *error);
 bool picture_has_tile(const struct picture *picture, uint32_t tile); /* it gets samples */
 /* The end of the slots without a gap, from `slot` on, whose tiles get samples. */
 uint32_t picture_run_end(const struct picture *picture, uint32_t slot);

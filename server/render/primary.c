@@ -296,7 +296,8 @@ bool primary_find(const struct primary *primary, struct render_context *context,
 
 void primary_announce(struct render_context *context, bool rasterised)
 {
-    if (rasterised)
+    /* Software GL compiles most of what draws where it draws, and this thread needs it first. */
+    if (rasterised && !context->device->facts.software)
         raster_view_announce(context->device, context->scene);
     (void)rays_program(rasterised, context, NULL);
     context->sampled_hits = !rasterised && context->tracer->impl->sampled;

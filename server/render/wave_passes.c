@@ -299,12 +299,14 @@ enum wave_progress wave_passes_shade(struct wave_passes *passes, struct render_c
     return done ? finish_batch(passes, context, error) : WAVE_AGAIN;
 }
 
-void wave_passes_announce_shadows(struct wave_passes *passes, struct render_context *context)
+void wave_passes_announce_long(struct wave_passes *passes, struct render_context *context)
 {
     const struct wave shadows = {.kind = WAVE_ANY,
                                  .times = context->scene->has_motion ? &passes->shadow_times : NULL};
     if (ground_shadow_rays(context, passes->integrator) > 0)
         wave_announce(context, &shadows);
+    if (context->scene->instance_count > 0)
+        (void)shade_program(passes, context, NULL);
 }
 
 static void announce_bounces(struct wave_passes *passes, struct render_context *context)
@@ -326,10 +328,7 @@ bool wave_passes_expect_bounces(const struct wave_passes *passes, const struct r
 void wave_passes_announce(struct wave_passes *passes, struct render_context *context)
 {
     const struct integrator *integrator = passes->integrator;
-    const bool shows_something = context->scene->instance_count > 0;
     compact_announce_hits(context);
-    if (shows_something)
-        (void)shade_program(passes, context, NULL);
     (void)left_scene_program(passes, context, NULL);
     (void)gather_program(passes, context, NULL);
     compact_announce_children(context, integrator->scatters);

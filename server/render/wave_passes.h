@@ -36,7 +36,7 @@ bool wave_passes_expect_bounces(const struct wave_passes *passes, const struct r
 /* Announces the programs that every frame of the integrator needs (gpu_program_announce): those of its first wave,
  * and of its bounces where there will be some. */
 void wave_passes_announce(struct wave_passes *passes, struct render_context *context);
-/* Announces those that trace the shadow rays of its first hits, which take longest to compile. */
-void wave_passes_announce_shadows(struct wave_passes *passes, struct render_context *context);
+/* Announces those that shade its first hits and trace their shadow rays, which take longest to compile. */
+void wave_passes_announce_long(struct wave_passes *passes, struct render_context *context);
 
 #endif
