@@ -335,6 +335,17 @@ static const struct gpu_texel_formats texel_formats = {.of_unit = {[UNIT_TANGENT
                                                                    [UNIT_SHADE_ENVIRONMENT] = GL_R32F,
                                                                    [UNIT_RAY_TIMES] = GL_R32F}};
 
+/* Of a frame that is made in one pass: what depends on no structure. */
+static void announce_shading(struct frame_renderer *renderer)
+{
+    struct render_context *context = &renderer->work->context;
+    gpu_program_announce(renderer->device, &texel_formats);
+    context->sampled_hits = !renderer->rasterise && context->tracer->impl->sampled;
+    wave_passes_announce_shading(&renderer->work->passes, context);
+    picture_announce(renderer->target, context);
+    gpu_program_announce(renderer->device, NULL);
+}
+
 /* Threads compile while this one goes on, and while memory is prefaulted. */
 static void announce_programs(struct frame_renderer *renderer)
 {
@@ -355,13 +366,11 @@ static void announce_programs(struct frame_renderer *renderer)
     renderer->announced = true;
 }
 
-/* Once its tracers are what the scene is. */
-static bool get_ready(struct frame_renderer *renderer, struct error *error)
+/* What needs no memory of the device. */
+static bool set_up(struct frame_renderer *renderer, struct error *error)
 {
     struct render_context *context = &renderer->work->context;
     const struct frame_request *request = &context->request;
-    if (!begin_comparison(renderer, error) || (renderer->key_tracer && !frame_key_set_pass(renderer, error)))
-        return false;
     limit_samples(renderer, &context->request);
     camera_fill_uniforms(&context->uniforms, request, &renderer->shared->copy);
     frame_key_limit_rows(renderer, &context->request); /* the camera is that of all of them */
@@ -376,8 +385,17 @@ static bool get_ready(struct frame_renderer *renderer, struct error *error)
                         : 1.0f;
     fill_filter(context);
     context->uniforms.seed = (uint32_t)(request->seed ^ request->seed >> 32);
+    return size_frame(renderer, error);
+}
+
+/* Once its tracers are what the scene is. */
+static bool get_ready(struct frame_renderer *renderer, struct error *error)
+{
+    struct render_context *context = &renderer->work->context;
+    const struct frame_request *request = &context->request;
     const bool goes_on = renderer->samples_before > 0;
-    if (!size_frame(renderer, error))
+    if (!begin_comparison(renderer, error) || (renderer->key_tracer && !frame_key_set_pass(renderer, error)) ||
+        !set_up(renderer, error))
         return false;
     if (request->samples && !renderer->announced)
         announce_programs(renderer);
@@ -432,6 +450,21 @@ static bool get_ready_in_steps(struct frame_renderer *renderer, struct error *er
     return end_reserving(renderer, ready, &failed, error);
 }
 
+/* While its structure is built. */
+static bool announce_early(struct frame_renderer *renderer, struct error *error)
+{
+    struct error failed = {0};
+    bool lit = false;
+    if (renderer->announced_early || renderer->second || renderer->key_tracer)
+        return true;
+    gpu_reserve_begin(renderer->device, RESERVE_NS);
+    bool done = update_environment(renderer, &lit, &failed) && (!lit || set_up(renderer, &failed));
+    renderer->announced_early = done && lit;
+    if (renderer->announced_early && renderer->work->context.request.samples)
+        announce_shading(renderer);
+    return end_reserving(renderer, done, &failed, error);
+}
+
 bool frame_reserve_pixels(struct frame_renderer *renderer, struct error *error)
 {
     struct error failed = {0};
@@ -462,7 +495,7 @@ bool frame_build(struct frame_renderer *renderer, struct error *error)
     if (!renderer->built) {
         progress = bring(renderer, renderer->tracer, error);
         if (progress != TRACER_DONE)
-            return progress == TRACER_MORE;
+            return progress == TRACER_MORE && announce_early(renderer, error);
         renderer->built = true;
         renderer->result.uploaded_bytes += stats->uploaded_bytes;
         renderer->result.structure_bytes = stats->device_bytes;
@@ -506,7 +539,7 @@ static bool begin(struct frame_renderer *renderer, const struct scene *scene, co
     context->layer_tracer = NULL;
     context->marked_key = NULL;
     renderer->pass = PASS_UNKNOWN;
-    renderer->announced = false;
+    renderer->announced = renderer->announced_early = false;
     renderer->target = &renderer->picture;
     renderer->result = (struct frame_result){0};
     renderer->view = view_of(request);

@@ -309,6 +309,14 @@ void wave_passes_announce_long(struct wave_passes *passes, struct render_context
         (void)shade_program(passes, context, NULL);
 }
 
+void wave_passes_announce_shading(struct wave_passes *passes, struct render_context *context)
+{
+    if (context->scene->instance_count > 0)
+        (void)shade_program(passes, context, NULL);
+    (void)left_scene_program(passes, context, NULL);
+    (void)gather_program(passes, context, NULL);
+}
+
 static void announce_bounces(struct wave_passes *passes, struct render_context *context)
 {
     const struct wave bounces = {.kind = WAVE_CLOSEST, .times = context_ray_times(context)};
