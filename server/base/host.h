@@ -19,8 +19,8 @@ uint64_t host_memory_bytes(void);
  * each thread has a priority of its own. */
 void host_thread_gives_way(void);
 
-/* The threads of this process that have this in their names, at most `max`; 0: there is none, or the system does not
- * tell. */
+/* The threads of this process that have this in their names, at most `max`; 0: there is none, or the system does
+ * not tell. */
 size_t host_threads_find(const char *name_part, int *threads, size_t max);
 /* Whether each of them waits, and has no work. */
 bool host_threads_sleep(const int *threads, size_t count);

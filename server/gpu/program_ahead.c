@@ -32,7 +32,7 @@ struct item {
     struct gpu_build build;
     struct gpu_binary binary;
     enum state state;
-    char key[];            /* files and defines */
+    char key[]; /* files and defines */
 };
 
 struct worker {
@@ -119,6 +119,7 @@ static void *run(void *context)
     struct worker *worker = context;
     struct gpu_ahead *ahead = worker->ahead;
     struct gpu_egl beside;
+    host_thread_gives_way(); /* to what builds and prefaults; what waits for this one takes no time */
     const bool opened = gpu_egl_open_beside(&beside, ahead->device->egl);
     if (opened) {
         compile_items(ahead);
@@ -200,8 +201,8 @@ static size_t thread_count(const struct gpu_facts *facts)
 {
     if (facts->compiles_together)
         return 1;
-    /* The device's thread, which compiles, too, where that happens at a dispatch, often waits for memory or for one
-     * of them. */
+    /* The device's thread, which compiles, too, where that happens at a dispatch, often waits for memory or for
+     * one of them. */
     const size_t processors = parallel_processors();
     const size_t count = !facts->compiles_at_dispatch ? THREADS_MAX : processors > 1 ? processors : 0;
     return count < THREADS_MAX ? count : THREADS_MAX;

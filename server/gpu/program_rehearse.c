@@ -18,8 +18,8 @@ static GLenum format_of(const struct gpu_texel_formats *formats, GLenum type, GL
     return own && is_of_floats(own) == floats ? own : floats ? GL_RGBA32F : GL_RGBA32UI;
 }
 
-/* What is drawn to be read by a pass. Its size matters to llvmpipe only where it is a power of two, as few pictures
- * are. */
+/* What is drawn to be read by a pass. Its size matters to llvmpipe only where it is a power of two, as few
+ * pictures are. */
 static GLuint bind_drawn(GLuint unit)
 {
     GLuint texture = 0;

@@ -357,8 +357,11 @@ static void announce_programs(struct frame_renderer *renderer)
         frame_key_announce(renderer);
     } else {
         context->sampled_hits = !renderer->rasterise && context->tracer->impl->sampled;
+        if (!renderer->rasterise)
+            primary_announce(context, false);
         wave_passes_announce_long(passes, context);
-        primary_announce(context, renderer->rasterise);
+        if (renderer->rasterise)
+            primary_announce(context, true);
         wave_passes_announce(passes, context);
     }
     picture_announce(renderer->target, context);

@@ -299,12 +299,13 @@ void primary_announce(struct render_context *context, bool rasterised)
     /* Software GL compiles most of what draws where it draws, and this thread needs it first. */
     if (rasterised && !context->device->facts.software)
         raster_view_announce(context->device, context->scene);
-    (void)rays_program(rasterised, context, NULL);
     context->sampled_hits = !rasterised && context->tracer->impl->sampled;
     if (rasterised) {
+        (void)rays_program(true, context, NULL);
         (void)fill_program(context, NULL);
-    } else {
+    } else { /* the wave takes longest, while this thread makes what makes the rays */
         const struct wave wave = camera_wave(context);
         wave_announce(context, &wave);
+        (void)rays_program(false, context, NULL);
     }
 }

@@ -133,7 +133,8 @@ static void set_path(struct render_context *context, const struct gpu_program *p
     set_environment_choice(context, program);
 }
 
-/* Of scene_features.mirrors nothing is left out, but what a tracer stores is rounded, and a grain narrows a lobe. */
+/* Of scene_features.mirrors nothing is left out, but what a tracer stores is rounded, and a grain narrows a lobe.
+ */
 static size_t whitted_defines(const struct render_context *context, struct gpu_define *defines)
 {
     if (context->features.mirrors || context->features.anisotropy || context->sampled_hits ||
