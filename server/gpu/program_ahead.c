@@ -38,7 +38,8 @@ struct item {
 struct worker {
     struct gpu_ahead *ahead;
     pthread_t thread;
-    bool started; /* and not joined */
+    bool started;   /* and not joined */
+    bool stands_in; /* for the device's thread while that waits: it ends after one program */
     bool ended;
 };
 
@@ -95,11 +96,11 @@ static void end_item(struct gpu_ahead *ahead, struct item *item, GLuint program)
     pthread_mutex_unlock(&ahead->lock);
 }
 
-static void compile_items(struct gpu_ahead *ahead)
+static void compile_items(struct gpu_ahead *ahead, bool once)
 {
     struct item *items[TOGETHER_MAX];
     GLuint programs[TOGETHER_MAX];
-    for (;;) {
+    do {
         pthread_mutex_lock(&ahead->lock);
         const size_t count = begin_items(ahead, items);
         pthread_mutex_unlock(&ahead->lock);
@@ -111,7 +112,7 @@ static void compile_items(struct gpu_ahead *ahead)
         }
         for (size_t i = 0; i < count; i++)
             end_item(ahead, items[i], programs[i]);
-    }
+    } while (!once);
 }
 
 static void *run(void *context)
@@ -122,7 +123,7 @@ static void *run(void *context)
     host_thread_gives_way(); /* to what builds and prefaults; what waits for this one takes no time */
     const bool opened = gpu_egl_open_beside(&beside, ahead->device->egl);
     if (opened) {
-        compile_items(ahead);
+        compile_items(ahead, worker->stands_in);
         gpu_egl_close_beside(&beside);
     }
     pthread_mutex_lock(&ahead->lock);
@@ -201,10 +202,8 @@ static size_t thread_count(const struct gpu_facts *facts)
 {
     if (facts->compiles_together)
         return 1;
-    /* The device's thread, which compiles, too, where that happens at a dispatch, often waits for memory or for
-     * one of them. */
-    const size_t processors = parallel_processors();
-    const size_t count = !facts->compiles_at_dispatch ? THREADS_MAX : processors > 1 ? processors : 0;
+    /* Beside the device's thread, which compiles, too, where that happens at a dispatch. */
+    const size_t count = facts->compiles_at_dispatch ? parallel_processors() - 1 : THREADS_MAX;
     return count < THREADS_MAX ? count : THREADS_MAX;
 }
 
@@ -238,10 +237,31 @@ size_t gpu_ahead_left(struct gpu_ahead *ahead)
     return count;
 }
 
+static bool any_waiting(const struct gpu_ahead *ahead)
+{
+    const struct item *at = ahead->first;
+    while (at && at->state != WAITING)
+        at = at->next;
+    return at;
+}
+
+/* Locked. Of two processors none is idle while the device's thread waits for the one thread that compiles. */
+static void stand_in(struct gpu_ahead *ahead)
+{
+    struct worker *worker = &ahead->workers[1];
+    const struct gpu_facts *facts = &ahead->device->facts;
+    if (!facts->compiles_at_dispatch || thread_count(facts) != 1 || !any_waiting(ahead))
+        return;
+    worker->stands_in = true;
+    start(worker);
+}
+
 bool gpu_ahead_take(struct gpu_ahead *ahead, const char *key, struct gpu_build *build, struct gpu_binary *binary)
 {
     pthread_mutex_lock(&ahead->lock);
     struct item **place = find(ahead, key), *item = place ? *place : NULL;
+    if (item && item->state == BEGUN)
+        stand_in(ahead);
     while (item && item->state == BEGUN)
         pthread_cond_wait(&ahead->changed, &ahead->lock);
     if (item) { /* this thread alone changes the list */
