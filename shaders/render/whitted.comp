@@ -7,7 +7,7 @@
 //   children    straight on (alpha blending), mirrored, refracted
 //
 // Defines: those of common/material.glsl, common/light.glsl and common/environment.glsl; SENDS_NOTHING no surface is
-// see-through or smooth enough for a mirror ray: there are no children, whose code is a third of all.
+// see-through or smooth enough for a mirror ray: there are no children, whose code is a fifth of all.
 //
 // Lights beyond the first batch come in further passes with first_ray > 0, which make shadow rays alone.
 
