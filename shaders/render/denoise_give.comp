@@ -33,7 +33,7 @@ vec3 speck_of(vec3 left, vec3 mean, vec3 albedo, uint slot, float count)
     vec3 first = light_of_half(first_half[slot]) * albedo, second = (count * mean - first_count * first) / max(second_count, 1.0);
     vec3 lesser = luminance(first) < luminance(second) ? first : second;
     float shown = luminance(lesser) - luminance(mean - left), all = luminance(left);
-    return second_count > 0.0 && all > 0.0 ? left * (1.0 - clamp(shown / all, 0.0, 1.0)) : vec3(0.0);
+    return second_count > 0.0 && all > 0.0 ? left * (1.0 - clamp(2.0 * shown / all, 0.0, 1.0)) : vec3(0.0);
 }
 
 // 1: no pixel beside it is about as bright.
