@@ -5,7 +5,8 @@
 // itself (Rousselle et al. Adaptive Rendering with Non-Local Means Filtering. 2012). And by albedo, though light is divided by
 // it: what surfaces scatter is one light, what they mirror another, and albedo says how much of each there is.
 //
-// Also the parts of the risk of each pixel, see denoise_choose.comp.
+// Also the parts of the risk of each pixel, see denoise_choose.comp. Where a surface turns within few pixels the light turns
+// with it, and it does so within pixels, where halves of the samples differ by detail: what the cosine lets expect is no noise.
 
 #include "render/denoise.glsl"
 
@@ -44,6 +45,7 @@ void main()
     float scale = DENOISE_LIGHT_SCALE * (1.0 - DENOISE_MIRROR_EDGES * own.share), variance = square(0.25 * h.deviation);
     float sharpness = 1.0 / (scale * h.deviation + 1e-6);
     vec3 sum_a = 0.25 * h.a, sum_b = 0.25 * h.b;
+    float turns = 0.0;
     for (int i = 0; i < 8; i++) {
         ivec2 step_ = NEIGHBOURS[i], offset = step_ * spacing;
         ivec2 next = pixel + offset;
@@ -58,10 +60,12 @@ void main()
         sum_a += weight.x * e.a;
         sum_b += weight.y * e.b;
         weights += weight;
+        turns += weight.x * turn_of(own, other);
         variance += square(0.5 * (weight.x + weight.y) * e.deviation);
     }
     halves filtered = halves(sum_a / weights.x, sum_b / weights.y, sqrt(variance) / (0.5 * (weights.x + weights.y)));
     wider[place] = words_of_halves(filtered);
     bool there = own.nearness > 0.0; // what is not stays as it is, and says nothing of its neighbours
-    risks[place] = there ? risk_of(h, filtered, halves_of_words(texelFetch(first_light, place))) : vec2(0.0);
+    float detail = DENOISE_TURNED_LIGHT * turns / weights.x;
+    risks[place] = there ? risk_of(h, filtered, halves_of_words(texelFetch(first_light, place))) + vec2(0.0, detail) : vec2(0.0);
 }

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
 // From the strip to the sums of a band: the picture's, moved by as much as filtering has moved the light.
 //
-// What the filter has left out because it was much brighter than its surroundings stays as far as both halves of the
-// samples have it, or a pixel beside it is as bright: a highlight. What one half has alone is a speck, which is worth
-// next to nothing where it was found (DeCoro, Weyrich, Rusinkiewicz. Density-based Outlier Rejection in Monte Carlo
-// Rendering. 2010, by neighbours and halves in place of all samples).
+// What the filter has left out because it was much brighter than its surroundings stays where each half of the samples has
+// half of it, as the halves of few samples differ by as much, or a pixel beside it is as bright: a highlight. What one half
+// has alone is a speck, which is worth next to nothing where it was found (DeCoro, Weyrich, Rusinkiewicz. Density-based
+// Outlier Rejection in Monte Carlo Rendering. 2010, by neighbours and halves in place of all samples).
 //
 // Defines: HAS_REPROJECTED what pictures before have brought has moved it, too.
 
