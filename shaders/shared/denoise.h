@@ -62,8 +62,8 @@
 /* A step by this share of the light (root of the sum over colours) is about one of 8 bits in the middle of their
  * range: noise below it is more often an error of the estimate than one of the picture. */
 #define DENOISE_UNSEEN 0.02f
-/* The square of such a step that is expected of detail, of each square of the turn of a normal: the light of a surface
- * that is seen and lit from above turns by about as much, and what is even on both sides cancels. */
+/* The square of such a step that is expected of detail, of each square of the turn of a normal: the light of a
+ * surface that is seen and lit from above turns by about as much, and what is even on both sides cancels. */
 #define DENOISE_TURNED_LIGHT 0.2f
 /* An estimate that comes from one pixel says nothing, one from so many more all. */
 #define DENOISE_WITNESSES 3.0f
