@@ -90,11 +90,21 @@ static void tell_warnings(struct cli_loading *loading)
     fprintf(stderr, "farlight: %u more warnings ('farlight info' lists them)\n", loading->warnings - NOTES_SHOWN);
 }
 
+/* Of a shared scene, which has its name before the model that is loaded into it is there. */
+static bool check_loaded(const struct fl_scene *scene, struct fl_error *error)
+{
+    if (fl_scene_revision(scene) > 0)
+        return true;
+    fl_error_set(error, FL_ERROR_REFUSED, "--scene", "nothing is in it yet; try again once its model is loaded");
+    error->retryable = true;
+    return false;
+}
+
 bool cli_loading_end(struct cli_loading *loading, struct fl_error *error)
 {
     if (loading->job->scene) {
         loading->scene = fl_scene_attach(loading->connection, loading->job->scene, error);
-        return loading->scene != NULL;
+        return loading->scene && check_loaded(loading->scene, error);
     }
     loading->scene = fl_scene_load(loading->connection, &loading->load, error);
     loading->load.started = NULL; /* the load took it over */

@@ -179,6 +179,22 @@ class Serve(Case):
         self.assertNotEqual(read_exr(before), read_exr(after))  # a part of it is gone
         self.assertEqual(self.scenes()[0]["revision"], 3)
 
+    def test_a_scene_whose_model_is_not_there_yet_is_waited_for(self):
+        self.serve("--name", "pot")
+        other = Viewer(self.socket, "pot")
+        self.addCleanup(other.close)
+        other.send(SCENE_OPEN, 2, struct.pack("<II", 2, KEPT), text("mine"))
+        self.assertEqual(other.answer(2)[0], OK)
+        with subprocess.Popen([BIN / "farlight", "render", "--server", self.address, "--scene", "mine", "--size", "48x36", "-o",
+                               self.folder / "mine.exr", "--metadata", "full"], stderr=subprocess.PIPE, text=True) as early:
+            self.addCleanup(early.kill)
+            self.assertIn("try again once its model is loaded", early.stderr.readline())
+            other.scene = 2
+            kind, payload = other.edit(3, SET_NODE, set_node(1), named("all"))
+            self.assertEqual(kind, OK, error_text(payload))
+            self.assertEqual(early.wait(TIMEOUT_S), 0)
+        self.assertEqual(exr_attributes(self.folder / "mine.exr")["farlight/revision"], b"1")
+
     def test_an_animation_of_a_scene_that_is_up_leaves_it_as_it_was(self):
         self.serve()
         script = self.folder / "shot.json"
