@@ -49,7 +49,6 @@ struct layer_walk {
     float u_before;            // where it was last before the layer
     float u_since;             // since when it is behind it; NEVER: it is not
     float u_behind;            // where it came behind it for more than a texel
-    float u_last;              // where it was behind it last, or came before it
     float u_fill;              // where it was last before the first layer that it came behind: before the background
     uint fill_layer;           // that layer
     float u_beside;            // where it last met a plane at an edge, but none of the primitives there
@@ -223,7 +222,6 @@ void begin_layer(uint layer, float u, int level, inout layer_walk walk)
     walk.u = u;
     walk.cell = clamp(ivec2(floor(walk.s.from.xy + walk.s.along.xy * u)), ivec2(0), last) >> walk.level;
     walk.is_before = walk.is_behind = walk.was_close = false;
-    walk.u_last = 0.0;
     walk.u_before = walk.u_since = walk.u_behind = walk.u_beside = NEVER;
 }
 
@@ -283,7 +281,6 @@ void note_side(node_passage p, inout layer_walk walk)
     walk.is_before = p.gap_out <= 0.0;
     walk.is_behind = !walk.is_before;
     walk.was_close = abs(p.gap_out) <= p.reach;
-    walk.u_last = max(p.gap_in, p.gap_out) > 0.0 ? p.u_out : walk.u_last;
     if (walk.is_before) {
         walk.u_before = mix(walk.u, p.u_out, 0.99);
         walk.u_since = NEVER;
@@ -547,9 +544,6 @@ bool begin_next(trace_ray r, inout layer_walk walk, inout found_type found, inou
     if (walk.layer == 0u)
         seen.ends_behind = walk.is_behind;
     if (walk.u_behind < walk.u_end && walk.layer + 1u < quadtree.layers) {
-        // Before this layer it is before all that come behind it. Edges of these may be off by its own way.
-        float own_way = QUADTREE_OWN_WAY * min(abs(walk.inverse.x), abs(walk.inverse.y));
-        walk.u_end = min(walk.u_end, walk.u_last + own_way);
         begin_layer(walk.layer + 1u, walk.u_behind, LEVEL_AT_SURFACES, walk);
         seen.layers = max(seen.layers, walk.layer + 1u);
         return true;
