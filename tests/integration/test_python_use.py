@@ -392,12 +392,12 @@ class Ends(Case):
             client._link.process.kill()  # pylint: disable=protected-access
 
         scene, _ = triangle()
-        values = {"width": 640, "height": 480, "samples": 4096, "integrator": "path"}
         with farlight.connect() as client:
             client.send(scene)
             kill(client)
+            # Where its end is seen before the request is sent, another one is started, and killed after a frame.
             with self.assertRaises(farlight.ConnectionLost) as raised:
-                for _ in client.frames(scene, STRAIGHT, last_frame=100, **values):
+                for _ in client.frames(scene, STRAIGHT, width=8, height=8, last_frame=100000):
                     kill(client)
             self.assertTrue(raised.exception.retryable)
             self.assertEqual(client.render(scene, STRAIGHT, width=8, height=8).size, (8, 8))  # of another one
