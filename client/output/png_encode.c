@@ -54,7 +54,7 @@ static void set_header(png_structp writer, png_infop info, const struct png *png
 {
     png_set_compression_level(writer, COMPRESSION_LEVEL);
     png_set_compression_strategy(writer, Z_DEFAULT_STRATEGY);
-    /* A third less time than all five, for a hundredth more bytes or less. */
+    /* A third less time than all five; of four pictures from 6 % fewer bytes to 2 % more. */
     png_set_filter(writer, PNG_FILTER_TYPE_BASE, PNG_FILTER_SUB | PNG_FILTER_UP);
     png_set_IHDR(writer, info, png->width, png->height, 8,
                  png->channels == 4 ? PNG_COLOR_TYPE_RGB_ALPHA : PNG_COLOR_TYPE_RGB, PNG_INTERLACE_NONE,
