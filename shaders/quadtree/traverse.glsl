@@ -501,11 +501,19 @@ float next_face(inout view_walk seen, out uint face)
 // The first layer of the next face that the ray passes. False: there is none before its end.
 bool begin_face(trace_ray r, found_type found, inout layer_walk walk, inout view_walk seen)
 {
-    float t_end = min(seen.t_last, NEAREST(found, r)), begin = next_face(seen, walk.face);
-    vec3 from_eye = r.origin - quadtree.eye_world.xyz;
-    vec3 origin = face_vector(walk.face, from_eye), direction = face_vector(walk.face, r.direction);
-    vec2 t = clip_to_face(origin, direction, vec2(r.t_min, t_end));
-    clip_to_surfaces(nearest_w(walk.face), origin, direction, t);
+    float t_end = min(seen.t_last, NEAREST(found, r)), begin = FLOAT_MAX;
+    vec3 from_eye = r.origin - quadtree.eye_world.xyz, origin, direction;
+    vec2 t = vec2(1.0, 0.0);
+    // A GPU may round what begin_faces() found to be a ray's short way through a face to none: the next one follows.
+    for (uint i = 0u; i < FACES; i++) {
+        begin = next_face(seen, walk.face);
+        origin = face_vector(walk.face, from_eye);
+        direction = face_vector(walk.face, r.direction);
+        t = clip_to_face(origin, direction, vec2(r.t_min, t_end));
+        clip_to_surfaces(nearest_w(walk.face), origin, direction, t);
+        if (t.x < t.y || !(begin < t_end))
+            break;
+    }
     walk.s = segment_of(origin, direction, t);
     walk.origin = origin.z >= quadtree.depths.w ? face_place(origin, face_q(origin)) : vec3(-1.0);
     vec2 along = walk.s.along.xy;
