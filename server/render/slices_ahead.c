@@ -12,6 +12,7 @@
 #define SLICE_RAYS_MIN (1u << 12)
 #define SLICE_RAYS_MAX (1u << 30)
 #define SLICE_GROWTH 8u
+#define SLICE_GROWTH_SLOW 2u /* of a slice that took longer than a step */
 
 static struct slice_ahead *next_of(struct slices_ahead *ahead)
 {
@@ -79,32 +80,73 @@ static uint64_t time_of(unsigned query)
     return time_ns;
 }
 
-uint32_t slices_ahead_next_rays(uint32_t rays, uint64_t took_ns, uint64_t step_ns)
+uint64_t slices_ahead_fixed_ns(struct slice_cost one, struct slice_cost other)
 {
-    if (took_ns <= step_ns && took_ns >= step_ns / 4)
-        return rays;
-    const uint64_t fitting =
-        took_ns > step_ns ? (uint64_t)rays * step_ns / took_ns : (uint64_t)rays * (step_ns / 2) / (took_ns + 1);
-    uint64_t next = (uint64_t)rays * SLICE_GROWTH;
-    while (next > fitting && next > SLICE_RAYS_MIN)
+    const struct slice_cost fewer = one.rays < other.rays ? one : other,
+                            more = one.rays < other.rays ? other : one;
+    if (fewer.rays == more.rays || more.took_ns <= fewer.took_ns)
+        return fewer.took_ns < more.took_ns ? fewer.took_ns : more.took_ns;
+    const double a_ray_ns = (double)(more.took_ns - fewer.took_ns) / (double)(more.rays - fewer.rays);
+    const double fixed_ns = (double)fewer.took_ns - a_ray_ns * (double)fewer.rays;
+    return fixed_ns > 0 ? (uint64_t)fixed_ns : 0;
+}
+
+static uint64_t wanted_ns(uint64_t fixed_ns, uint64_t step_ns)
+{
+    return step_ns > 2 * fixed_ns ? step_ns : 2 * fixed_ns;
+}
+
+uint32_t slices_ahead_next_rays(struct slice_cost cost, uint64_t fixed_ns, uint64_t step_ns)
+{
+    const uint64_t wanted = wanted_ns(fixed_ns, step_ns) - fixed_ns;
+    const uint64_t took = cost.took_ns > fixed_ns ? cost.took_ns - fixed_ns : 0;
+    if (took <= wanted && took >= wanted / 4)
+        return cost.rays;
+    const double share = took > wanted ? (double)wanted / (double)took : (double)(wanted / 2) / (double)(took + 1);
+    uint64_t next = (uint64_t)cost.rays * (cost.took_ns > step_ns ? SLICE_GROWTH_SLOW : SLICE_GROWTH);
+    while ((double)next > (double)cost.rays * share && next > SLICE_RAYS_MIN)
         next /= 2;
     return (uint32_t)(next < SLICE_RAYS_MIN ? SLICE_RAYS_MIN : next < SLICE_RAYS_MAX ? next : SLICE_RAYS_MAX);
+}
+
+/* False: of one size alone. */
+static bool learn_fixed(struct slices_ahead *ahead, struct slice_cost cost)
+{
+    const struct slice_cost last = ahead->last;
+    if (last.rays && (cost.rays / 2 >= last.rays || last.rays / 2 >= cost.rays)) {
+        ahead->fixed_ns = slices_ahead_fixed_ns(last, cost);
+        ahead->knows_fixed = true;
+    }
+    if (ahead->fixed_ns > cost.took_ns)
+        ahead->fixed_ns = cost.took_ns;
+    ahead->last = cost;
+    return ahead->knows_fixed;
+}
+
+void slices_ahead_note(struct slices_ahead *ahead, struct slice_cost cost, bool is_rest, uint64_t step_ns)
+{
+    const bool knows_fixed = learn_fixed(ahead, cost);
+    if (is_rest && cost.took_ns <= wanted_ns(ahead->fixed_ns, step_ns))
+        return;
+    ahead->slice_rays = slices_ahead_next_rays(cost, ahead->fixed_ns, step_ns);
+    if (!knows_fixed && ahead->slice_rays == cost.rays)
+        ahead->slice_rays *= 2; /* another size says how much of the time is for rays */
 }
 
 void slices_ahead_learn(struct slices_ahead *ahead, const struct slice_ahead *slice, uint64_t step_ns)
 {
     const uint64_t begin_ns = time_of(slice->queries[0]), end_ns = time_of(slice->queries[1]);
-    const bool is_whole = slice->rays == slice->slices.slice_rays; /* no smaller rest of a band */
-    if (begin_ns == 0 || end_ns <= begin_ns)
-        return;
-    const uint32_t next = slices_ahead_next_rays(slice->rays, end_ns - begin_ns, step_ns);
-    if (is_whole || end_ns - begin_ns > step_ns)
-        ahead->slice_rays = next;
+    if (begin_ns > 0 && end_ns > begin_ns)
+        slices_ahead_note(ahead, (struct slice_cost){slice->rays, end_ns - begin_ns},
+                          slice->rays != slice->slices.slice_rays, step_ns);
 }
 
 void slices_ahead_forget(struct slices_ahead *ahead)
 {
     ahead->slice_rays = 0;
+    ahead->last = (struct slice_cost){0};
+    ahead->fixed_ns = 0;
+    ahead->knows_fixed = false;
 }
 
 void slices_ahead_drop(struct slices_ahead *ahead)

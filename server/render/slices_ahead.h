@@ -19,11 +19,19 @@ struct slice_ahead {
     unsigned queries[2];       /* GL time stamps: it begins, it ends */
 };
 
+struct slice_cost {
+    uint32_t rays;
+    uint64_t took_ns;
+};
+
 /* All-zero is the valid empty one. */
 struct slices_ahead {
     struct slice_ahead ring[SLICES_AHEAD_MAX];
     uint32_t oldest, count;
-    uint32_t slice_rays; /* of the slices that take as long as they should; 0: not known */
+    uint32_t slice_rays;    /* of the slices that take as long as they should; 0: not known */
+    struct slice_cost last; /* no rays: there was none */
+    uint64_t fixed_ns;      /* what a slice takes however few rays it has */
+    bool knows_fixed;       /* slices of two sizes were measured */
 };
 
 /* How many rays a slice of at most that many has. */
@@ -41,8 +49,16 @@ bool slices_ahead_take(struct slices_ahead *ahead, struct gpu_device *device, co
                        struct wave_state *state, struct error *error);
 /* From the slice just taken, how large those to come are to be for the device to work about `step_ns` on one. */
 void slices_ahead_learn(struct slices_ahead *ahead, const struct slice_ahead *slice, uint64_t step_ns);
-/* What it learns: how many rays the next slices have, after one of `rays` took so long. */
-uint32_t slices_ahead_next_rays(uint32_t rays, uint64_t took_ns, uint64_t step_ns);
+/* What it learns of a slice that took so long. is_rest: it has fewer rays than were asked for, as a band of the
+ * picture ended. */
+void slices_ahead_note(struct slices_ahead *ahead, struct slice_cost cost, bool is_rest, uint64_t step_ns);
+/* A slice has a wave after the other, each as long as its longest ray takes, however few there are: in
+ * waves of many bounces that can be more than a step. The fixed part of what two slices of different sizes took,
+ * on a line through both; 0 if there is none. */
+uint64_t slices_ahead_fixed_ns(struct slice_cost one, struct slice_cost other);
+/* How many rays the next slices have, after such a one: the device works about `step_ns` on each, or twice as long
+ * as it takes anyway if that is more, so that half of its time at least goes into rays. */
+uint32_t slices_ahead_next_rays(struct slice_cost cost, uint64_t fixed_ns, uint64_t step_ns);
 /* Other rays, or by another tracer: the next slice is a first one. */
 void slices_ahead_forget(struct slices_ahead *ahead);
 void slices_ahead_drop(struct slices_ahead *ahead); /* all of them */

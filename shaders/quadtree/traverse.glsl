@@ -540,7 +540,7 @@ void end_face(trace_ray r, layer_walk walk, inout found_type found, inout view_w
     seen.fill_texel = was_before ? ivec2(floor(walk.s.from.xy + walk.s.along.xy * walk.u_fill)) : ivec2(-1);
 }
 
-// The next layer where the ray is behind this one, or the next face. False: it has been through all.
+// The next layer where the ray is behind this one. False: it has been through all of the face.
 bool begin_next(trace_ray r, inout layer_walk walk, inout found_type found, inout view_walk seen)
 {
     // A ray that comes into the view behind what is seen has passed that beside the view.
@@ -557,7 +557,7 @@ bool begin_next(trace_ray r, inout layer_walk walk, inout found_type found, inou
         return true;
     }
     end_face(r, walk, found, seen);
-    return begin_face(r, found, walk, seen);
+    return false;
 }
 
 // What has no direction meets nothing.
@@ -597,8 +597,10 @@ bool walk_view(trace_ray r, inout view_walk seen, inout found_type found)
     layer_walk walk;
     walk.offered = vec2(-1.0);
     begin_faces(r, NEAREST(found, r), seen);
-    bool ends = false, has_layer = begin_face(r, found, walk, seen);
-    for (int i = 0; i < LAYERS_MAX && has_layer; i++) {
+    bool ends = false, has_layer = false;
+    for (int i = 0; i < LAYERS_MAX; i++) {
+        if (!has_layer && !begin_face(r, found, walk, seen))
+            break;
         ends = walk_layer(r, walk, found) || meet_beside(r, walk, found);
         if (ends)
             break;
