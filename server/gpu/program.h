@@ -7,8 +7,9 @@
  * the driver has binaries (gpu/binary_cache.h).
  *
  * `#include NAME` takes the path from the define of that name, whose value is then a path in double quotes; such
- * a define is not seen by GLSL. The define EXTENSION names an extension of GLSL that the program requires. A file
- * that is included again is skipped, so no `#include` may stand in a branch of #if that is sometimes off. */
+ * a define is not seen by GLSL. The define EXTENSION names an extension of GLSL that the program requires, and
+ * PRAGMA says something to the compilers that know it. A file that is included again is skipped, so no `#include`
+ * may stand in a branch of #if that is sometimes off. */
 #ifndef FARLIGHT_GPU_PROGRAM_H
 #define FARLIGHT_GPU_PROGRAM_H
 

@@ -183,6 +183,8 @@ bool gpu_source_expand(struct gpu_source_text *text, gpu_source_lookup lookup, c
         const char *value = define->value ? define->value : "1";
         if (strcmp(define->name, "EXTENSION") == 0)
             ok = append_format(text, error, "#extension %s : require\n", value);
+        else if (strcmp(define->name, "PRAGMA") == 0)
+            ok = append_format(text, error, "#pragma %s\n", value);
         else if (value[0] != '"')
             ok = append_format(text, error, "#define %s %s\n", define->name, value);
     }

@@ -116,6 +116,9 @@ static struct trace_program_source source_of(const struct tracer_options *option
         defines[n++] = (struct gpu_define){"QUADTREE_PLANES", "1"};
     if (options->quadtree.faces == QUADTREE_FACES_VIEW)
         defines[n++] = (struct gpu_define){"QUADTREE_VIEW", "1"};
+    else /* NVIDIA's compiler (driver 580) came to no end in minutes over the loops in one another, faces, layers,
+            nodes */
+        defines[n++] = (struct gpu_define){"PRAGMA", "optionNV(unroll none)"};
     if (options->quadtree.walk == QUADTREE_WALK_DDA)
         defines[n++] = (struct gpu_define){"QUADTREE_DDA", "1"};
     if (options->bench.quadtree_stack)

@@ -78,6 +78,13 @@ TEST(a_required_extension_stands_in_front)
                 "#line 1 0\nint a1;\n#line 1 1\n#ifndef C_H\n\nint c3;\n#endif\n#line 3 0\nint a3;\n");
 }
 
+TEST(a_pragma_stands_in_front)
+{
+    const struct gpu_define defines[] = {{"PRAGMA", "optionNV(unroll none)"}, {0}};
+    expect_text("circle.comp", defines,
+                GPU_SOURCE_HEAD "#pragma optionNV(unroll none)\n#line 1 0\n\n#line 2 0\nint once;\n");
+}
+
 TEST(a_file_that_includes_itself_is_expanded_once)
 {
     expect_text("circle.comp", NULL, GPU_SOURCE_HEAD "#line 1 0\n\n#line 2 0\nint once;\n");
