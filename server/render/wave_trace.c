@@ -63,7 +63,7 @@ void wave_announce(struct render_context *context, const struct wave *wave)
     struct wave own = *wave;
     own.ray_count = context->wave_capacity;
     if (!context->counts_on_host)
-        own.counts = &context->wave_state;
+        own.counts = own.stopped = &context->wave_state;
     if (!context->comparison)
         tracer_announce(context->tracer, context->scene, &own);
 }

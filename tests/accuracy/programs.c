@@ -67,3 +67,23 @@ TEST(a_second_frame_compiles_nothing_and_no_program_that_no_frame_needs_is_compi
         assert_int_equal(gpu_ahead_left(device->ahead), 0);
     }
 }
+
+/* What is announced there, and compiled by its driver's threads, is what its waves run: those whose counts it
+ * alone knows, and which stop a slice. */
+TEST(a_frame_on_a_gpu_compiles_no_program_that_it_does_not_need)
+{
+    struct fixture *fixture = *state;
+    const struct gpu_facts facts = device->facts;
+    fixture_mixture(fixture);
+    fixture->request.tracer = TRACER_BVH;
+    fixture->request.integrator = INTEGRATOR_WHITTED;
+    fixture->request.depth = 4;
+    device->facts.software = device->facts.compiles_at_dispatch = false;
+    frame_renderer_queue_ahead(fixture->renderer, true);
+    struct frame_result result = fixture_render(fixture);
+    frame_renderer_queue_ahead(fixture->renderer, !facts.software);
+    const size_t left = gpu_ahead_left(device->ahead);
+    device->facts = facts;
+    frame_result_finish(&result);
+    assert_int_equal(left, 0);
+}
