@@ -38,6 +38,7 @@ EXPECTED_SKIPS = (
     r"sanitizers (do not run within|have an allocator)",
     r"ptrace: ",  # forbidden in many containers
     r"this kernel does not name children",
+    r"a GPU refits nothing in order",
     r"no promtool",  # its package starts a server
     r"left to make test-long",  # which .ci/run calls
     r"programs on such a library need its compiler flags",  # of the sanitizers and of coverage

@@ -265,6 +265,10 @@ static uint32_t steps_in_order(const struct fixture *fixture)
 TEST(no_invocation_of_a_gpu_refits_one_element_after_the_other)
 {
     const bool software = device->facts.software;
+    if (!software) { /* whose invocations need not see what they have written to a texture's buffer */
+        printf("a GPU refits nothing in order, to compare with\n");
+        skip();
+    }
     struct fixture fixtures[2];
     size_t bytes[2];
     void *elements[2];
