@@ -50,6 +50,7 @@ struct wave {
     bool within_reach;             /* of a layer: without what is hidden from all eyes that it is for */
     bool bare;                     /* closest: intersections are enough, no surfaces are made of them */
     float origin_spread;           /* or all on a disc of this diameter, a lens: metres; 0: nothing is known */
+    uint64_t frame_samples;        /* of all pixels of the frame that it is of, at most; 0: nothing is known */
 };
 
 /* The rays of pinhole eyes, as a frame has them (shared/frame.h); its uniforms are bound. */

@@ -79,8 +79,12 @@ bundle bundle_of(object_ray o[PACKET_RAYS], uint alive, int leading, tree_grid g
         vec3 d = o[k].direction * grid.cells_per_unit;
         float smallest = 1e-12 * max_component(abs(d));
         scale[k] = 1.0 / mix(d, vec3(smallest), lessThan(abs(d), vec3(smallest)));
-        origin[k] = (o[k].origin - grid.lower) * grid.cells_per_unit;
-        slacks[k] = slack * (abs(o[k].origin) + abs(grid.lower)) * grid.cells_per_unit * abs(scale[k]);
+        vec3 origin_here = o[k].origin;
+#ifdef SHARED_ORIGIN
+        origin_here = o[0].origin;
+#endif
+        origin[k] = (origin_here - grid.lower) * grid.cells_per_unit;
+        slacks[k] = slack * (abs(origin_here) + abs(grid.lower)) * grid.cells_per_unit * abs(scale[k]);
         if (k == leading) {
             centre = origin[k];
             scale_leading = scale[k];
@@ -96,7 +100,11 @@ bundle bundle_of(object_ray o[PACKET_RAYS], uint alive, int leading, tree_grid g
 #else
     vec3 minimum = scale_leading, maximum = scale_leading, before = vec3(-NOWHERE), after = vec3(NOWHERE);
     for (int k = 0; k < PACKET_RAYS; k++) {
+#ifdef SHARED_ORIGIN
+        vec3 off = vec3(0.0);
+#else
         vec3 off = (origin[k] - centre) * scale[k];
+#endif
         // The products centre * scale round as the ray's own would: their part is in the slack.
         bool counts = (alive & 1u << k) != 0u;
         minimum = counts ? min(minimum, scale[k]) : minimum;

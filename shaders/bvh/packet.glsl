@@ -12,7 +12,11 @@ const float PACKET_SQUARED_COSINE = 0.998;  // of the maximum angle between them
 // Do two rays have similar directions? Others have no interval that would cull anything.
 bool form_packet(vec3 origin_a, vec3 direction_a, vec3 origin_b, vec3 direction_b)
 {
+#ifdef SHARED_ORIGIN
+    vec3 apart = vec3(0.0);
+#else
     vec3 apart = origin_b - origin_a;
+#endif
     float cosine = dot(direction_a, direction_b);
     return octant_of(direction_a) == octant_of(direction_b) &&
            cosine * cosine >=

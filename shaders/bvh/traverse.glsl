@@ -7,7 +7,8 @@
 //   BVH_PACKED   boxes are on a grid
 //   BVH_PLAIN    the paper's form, for comparison: elements in a storage buffer, one order for all directions
 //   BVH_ONE_INSTANCE  there is one instance: no top tree is traversed
-//   SHARED_ORIGIN     all rays of the wave begin at one point
+//   SHARED_ORIGIN     all rays of the wave begin at one point, and do so in each instance: what follows from it alone is
+//                     computed once for a packet
 //   BVH_DEFORMS       there are meshes that deform, whose trees may have several histories
 //   BVH_DEFORMS_IN_SHUTTER  and some do while the shutter is open
 //   BVH_BUDGET        a ray, or a packet, stops after as many elements as a dispatch may have of it, and says so
@@ -228,9 +229,14 @@ void enter_instance(uint instance_index, trace_ray r[PACKET_RAYS], int leading, 
 #ifdef BVH_DEFORMS_IN_SHUTTER
     inside.close_texels = texelFetch(bvh_transforms, texel + 3).w;
 #endif
+#if defined SHARED_ORIGIN && !defined HAS_MOTION
+    vec3 origin = affine_point(rows, r[0].origin);
+#endif
     for (int k = 0; k < PACKET_RAYS; k++) {
 #ifdef HAS_MOTION
         o[k] = object_from_world_ray(r[k], instance_index);
+#elif defined SHARED_ORIGIN
+        o[k] = object_ray(origin, affine_vector(rows, r[k].direction));
 #else
         o[k] = object_ray(affine_point(rows, r[k].origin), affine_vector(rows, r[k].direction));
 #endif
@@ -527,6 +533,9 @@ void TRACE_GROUP(trace_ray r[PACKET_RAYS], inout answer found[PACKET_RAYS])
                 leading = r[k];
         for (int k = 0; k < PACKET_RAYS; k++) {
             packet[k] = r[k];
+#ifdef SHARED_ORIGIN
+            packet[k].origin = leading.origin; // a dead ray has none
+#endif
             bool goes = k == first ||
                         form_packet(leading.origin, leading.direction, r[k].origin, r[k].direction);
             if (goes && (waiting >> k & 1u) != 0u)

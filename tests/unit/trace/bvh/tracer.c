@@ -375,6 +375,58 @@ TEST(coherent_neighbours_are_traced_as_packets_and_a_wave_keeps_its_packet_size)
     fixture_finish(&fixture);
 }
 
+static void trace_of_frame(struct fixture *fixture, struct wave wave, uint64_t samples, void *answers,
+                           size_t bytes)
+{
+    struct error error = {0};
+    wave.frame_samples = samples;
+    gpu_scene_bind(&fixture->gpu);
+    expect_ok(tracer_intersect(fixture->tracer, &fixture->gpu, &wave, &error), &error);
+    gpu_buffer_read(device, wave.kind == WAVE_ANY ? wave.visibility : wave.hits, 0, answers, bytes);
+}
+
+/* Its rays are traced by other programs, which are compiled sooner. */
+TEST(a_small_frame_has_the_answers_of_a_large_one)
+{
+    static const float spreads[] = {0.002f, 0.05f, 0.4f};
+    struct fixture fixture;
+    struct error error = {0};
+    struct gpu_buffer rays = {0}, hits = {0}, visibility = {0};
+    struct hit *found[2];
+    uint32_t seen[2][RAY_COUNT];
+    const size_t hit_bytes = RAY_COUNT * sizeof(struct hit);
+    fixture_init(&fixture, scene_of_instances(), NULL);
+    expect_ok(gpu_buffer_reserve(device, &hits, hit_bytes, &error) &&
+                  gpu_buffer_reserve(device, &visibility, sizeof(seen[0]), &error),
+              &error);
+    for (int i = 0; i < 2; i++)
+        found[i] = malloc(hit_bytes);
+    for (size_t i = 0; i < sizeof(spreads) / sizeof(spreads[0]); i++) {
+        uint32_t met = 0;
+        upload_rays(&rays, spreads[i]);
+        const struct wave closest = {.ray_count = RAY_COUNT, .rays = &rays, .hits = &hits, .shared_origin = true};
+        const struct wave any = {
+            .kind = WAVE_ANY, .ray_count = RAY_COUNT, .rays = &rays, .visibility = &visibility};
+        for (uint64_t large = 0; large < 2; large++) {
+            const uint64_t samples = large ? UINT32_MAX : 1;
+            gpu_buffer_clear(device, &hits, 0);
+            trace_of_frame(&fixture, closest, samples, found[large], hit_bytes);
+            trace_of_frame(&fixture, any, samples, seen[large], sizeof(seen[0]));
+        }
+        for (uint32_t k = 0; k < RAY_COUNT; k++)
+            met += seen[0][k] == 0;
+        assert_in_range(met, RAY_COUNT / 100, RAY_COUNT - RAY_COUNT / 100);
+        assert_memory_equal(found[0], found[1], hit_bytes);
+        assert_memory_equal(seen[0], seen[1], sizeof(seen[0]));
+    }
+    for (int i = 0; i < 2; i++)
+        free(found[i]);
+    gpu_buffer_finish(device, &rays);
+    gpu_buffer_finish(device, &hits);
+    gpu_buffer_finish(device, &visibility);
+    fixture_finish(&fixture);
+}
+
 /* The first of each eight goes nowhere; the others must neither wait for it nor be lost with it. */
 TEST(rays_beside_a_NaN_ray_hit_as_by_brute_force)
 {
