@@ -9,7 +9,7 @@
 #include <stdio.h>
 
 #define OWN_DEFINES_MAX 12
-#define SURFACE_DEFINES_MAX 5
+#define SURFACE_DEFINES_MAX (TRACE_SURFACE_DEFINES + 1)
 
 /* A multiple of all packets' sizes. */
 #define DISPATCH_RAYS_MIN 192u
@@ -155,6 +155,8 @@ size_t trace_surface_defines(const struct gpu_scene *scene, struct gpu_define *d
     size_t n = 0;
     if (scene->has_spheres)
         defines[n++] = (struct gpu_define){"HAS_SPHERES", "1"};
+    if (scene->disc_count == 0)
+        defines[n++] = (struct gpu_define){"NO_DISCS", "1"};
     if (!scene->has_texcoords)
         defines[n++] = (struct gpu_define){"NO_TEXCOORDS", "1"};
     if (!scene->has_colours)

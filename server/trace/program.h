@@ -48,7 +48,7 @@ void trace_program_run(const struct gpu_program *program, const struct gpu_scene
                        const struct ray_range *rays, const struct trace_program_source *source);
 
 /* A surface program in two steps: the tracer may bind its buffers and set its uniforms between them. `compute` is
- * "<tracer>/surface.comp"; `defines` ends with {0}, NULL: none; at most 5. */
+ * "<tracer>/surface.comp"; `defines` ends with {0}, NULL: none; at most TRACE_SURFACE_DEFINES and another. */
 const struct gpu_program *trace_surface_program_get(const struct gpu_scene *scene, const struct wave *wave,
                                                     const char *compute, const struct gpu_define *defines,
                                                     struct error *error);
@@ -57,7 +57,7 @@ void trace_surface_program_run(const struct gpu_program *program, const struct g
                                const struct ray_range *rays);
 /* What a program that includes common/surface.glsl may leave out of it: at most TRACE_SURFACE_DEFINES to
  * `defines`. Returns how many. */
-#define TRACE_SURFACE_DEFINES 4
+#define TRACE_SURFACE_DEFINES 5
 size_t trace_surface_defines(const struct gpu_scene *scene, struct gpu_define *defines);
 /* Both, for intersections that name a primitive of the scene. */
 bool trace_surfaces(const struct gpu_scene *scene, const struct ray_range *rays, struct error *error);

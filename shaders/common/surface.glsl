@@ -3,7 +3,7 @@
 // that all see one surface.
 //
 // Defines: those of common/attributes.glsl; NO_TANGENTS: no mesh has tangents, and no material asks for those that follow
-// from texture coordinates.
+// from texture coordinates; NO_DISCS: there are none.
 #include "common/attributes.glsl"
 #include "common/normals.glsl"
 
@@ -177,8 +177,10 @@ hit surface_of(candidate found, vec3 origin_world, vec3 direction_world, float t
 {
     if (found.primitive == HIT_NO_PRIMITIVE)
         return surface_miss();
+#ifndef NO_DISCS
     if (found.instance_index == HIT_NO_PRIMITIVE)
         return surface_disc(found.primitive, found.distance, origin_world, direction_world);
+#endif
 #ifdef HAS_SPHERES
     if (geometry_at(instance_at(found.instance_index).geometry).kind == GEOMETRY_SPHERES)
         return surface_sphere(found.instance_index, found.primitive, found.distance, origin_world,

@@ -27,13 +27,16 @@ void main()
     vec4 origin_t_min = texelFetch(rays, int(2u * k));
     vec3 origin = origin_t_min.xyz, direction = texelFetch(rays, int(2u * k + 1u)).xyz;
     candidate found;
+#ifndef NO_DISCS
     if (instance_index == HIT_NO_PRIMITIVE)
         found = candidate_disc(primitive, origin, direction);
-#ifdef HAS_SPHERES
-    else if (geometry_at(instance_at(instance_index).geometry).kind == GEOMETRY_SPHERES)
-        found = candidate_sphere(instance_index, primitive, origin, direction, origin_t_min.w);
-#endif
     else
+#endif
+#ifdef HAS_SPHERES
+    if (geometry_at(instance_at(instance_index).geometry).kind == GEOMETRY_SPHERES)
+        found = candidate_sphere(instance_index, primitive, origin, direction, origin_t_min.w);
+    else
+#endif
         found = candidate_triangle(instance_index, primitive, origin, direction, 0.0);
     // Two compilations of one test may round differently at a rim: a hit stays a hit.
     found.distance = max(found.distance, origin_t_min.w);
