@@ -45,7 +45,7 @@ struct option {
 /* clang-format off */
 static const struct option options[] = {
     {"server", "listen", START, OPTION_TEXT, AT(listen), "unix:" HOST_RUNTIME_FOLDER "/" SOCKET_NAME, 0, 0, "",
-     "Addresses to listen at, separated by blanks: unix:/PATH, tcp:HOST:PORT"},
+     "Addresses to listen at, separated by blanks: unix:/PATH, tcp:HOST:PORT. A path may have blanks"},
     {"server", "readers", ANYTIME, OPTION_TEXT, AT(readers), "", 0, 0, "",
      "Read-only users of the Unix socket: names or numbers, separated by blanks. They attach to shared scenes and "
      "render them, but change nothing. This does not apply to TCP on loopback, where users are not identified"},

@@ -26,6 +26,8 @@
 /* In which clients may take their goodbye when the daemon stops. */
 #define STOP_NS UINT64_C(400000000)
 
+#define BLANKS " \t"
+
 /* In the time in which the service manager wants to hear something. */
 #define WATCHDOG_LOOKS 4
 
@@ -62,12 +64,26 @@ static bool listen_at(struct daemon *daemon, const char *text, bool beyond_loopb
     return true;
 }
 
+/* Takes the first address off `*rest`; NULL: none is left. A path may have blanks, so an address ends where the
+ * next one begins: with "unix:", "tcp:" or another word and a colon. */
+static char *next_address(char **rest)
+{
+    char *address = *rest + strspn(*rest, BLANKS), *end = address, *next = address;
+    do {
+        end = next + strcspn(next, BLANKS);
+        next = end + strspn(end, BLANKS);
+    } while (*next && next[strcspn(next, "/:" BLANKS)] != ':');
+    *end = '\0';
+    *rest = next;
+    return address[0] ? address : NULL;
+}
+
 bool daemon_listen(struct daemon *daemon, const char *addresses, bool beyond_loopback, struct error *error)
 {
     char *copy = strdup(addresses), *rest = copy;
     bool ok = copy || error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory");
-    for (char *address; ok && (address = strsep(&rest, " \t"));)
-        ok = !address[0] || listen_at(daemon, address, beyond_loopback, error);
+    for (char *address; ok && (address = next_address(&rest));)
+        ok = listen_at(daemon, address, beyond_loopback, error);
     free(copy);
     return ok && (daemon->listener_count || error_set(error, ERROR_INVALID, "server.listen", "no address"));
 }

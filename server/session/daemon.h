@@ -37,7 +37,8 @@ struct daemon {
 void daemon_block_signals(void);
 /* Zeroes it. */
 void daemon_init(struct daemon *daemon);
-/* Reserves addresses, separated by blanks (at least one); clients wait until daemon_start(). */
+/* Reserves addresses, separated by blanks (at least one; their paths may have blanks); clients wait until
+ * daemon_start(). */
 bool daemon_listen(struct daemon *daemon, const char *addresses, bool beyond_loopback, struct error *error);
 /* The same with the sockets that the service manager has handed over; *count: how many these were, 0 if we were
  * started otherwise. */

@@ -75,8 +75,8 @@ class Daemon:
     def __init__(self, *arguments, listen=None, environment=None, launcher=(), pass_fds=(), program="farlightd"):
         self.program = program
         self.folder = pathlib.Path(tempfile.mkdtemp(prefix="farlight-daemon-"))
-        self.address = listen or f"unix:{self.folder}/farlight.sock"
-        self.arguments = list(map(str, arguments))
+        self.address = f"unix:{self.folder}/farlight.sock" if listen is None else listen
+        self.arguments = [*(["--listen", self.address] if self.address else []), *map(str, arguments)]
         self.environment = environment  # None: as it is here
         self.launcher = list(launcher)  # a command that becomes the daemon whose command line follows it
         self.pass_fds = pass_fds
@@ -85,7 +85,7 @@ class Daemon:
 
     def __enter__(self):
         self.log = open(self.folder / "log", "w+")
-        self.process = subprocess.Popen([*self.launcher, BIN / self.program, "--listen", self.address, *self.arguments],
+        self.process = subprocess.Popen([*self.launcher, BIN / self.program, *self.arguments],
                                         stdout=subprocess.PIPE, stderr=self.log, text=True, env=self.environment,
                                         pass_fds=self.pass_fds)
         for line in self.process.stdout:

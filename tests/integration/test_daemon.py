@@ -339,6 +339,25 @@ class Listening(Case):
         self.assertIn("mispelt", refused.stderr)
         self.assertEqual(list(self.folder.iterdir()), [])
 
+    def test_paths_with_blanks_stand_beside_other_addresses(self):
+        folder = self.folder / "a  folder"
+        folder.mkdir()
+        paths = [f"unix:{folder}/its socket", f"unix:{self.folder}/another one", "tcp:127.0.0.1:0"]
+
+        def check(daemon):
+            ready = [daemon.ready[-1], *(next(daemon.process.stdout).strip() for _ in paths[1:])]
+            self.assertEqual(ready[:-1], [f"READY {path}" for path in paths[:-1]])
+            self.assertIn("READY tcp:127.0.0.1:", ready[-1])
+            for path in paths[:-1]:
+                self.expect(farlight("stats", "--server", path), 0)
+
+        with Daemon("--listen", paths[1], "--listen", paths[2], listen=paths[0]) as daemon:
+            check(daemon)
+        config = self.folder / "farlightd.conf"
+        config.write_text(f"[server]\nlisten = {'  '.join(paths)}\n")
+        with Daemon("--config", config, listen=False) as daemon:
+            check(daemon)
+
     def test_the_socket_is_not_for_the_world(self):
         with Daemon() as daemon:
             mode = stat.S_IMODE(os.stat(daemon.path).st_mode)
