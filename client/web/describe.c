@@ -4,6 +4,7 @@
 
 #include <jansson.h>
 #include <stdlib.h>
+#include <string.h>
 
 #define NAMES_MAX 256u /* cameras or clips in a menu */
 #define STAGES_MAX 96u
@@ -129,5 +130,6 @@ char *web_describe_error(const struct fl_error *error, bool again)
 {
     char line[1200];
     fl_error_print(error, line, sizeof(line));
-    return print(json_pack("{s:{s:s,s:b}}", "error", "text", line, "again", again));
+    const bool is_of_clip = strncmp(error->field, "render.clips", strlen("render.clips")) == 0;
+    return print(json_pack("{s:{s:s,s:b,s:b}}", "error", "text", line, "again", again, "clip", is_of_clip));
 }

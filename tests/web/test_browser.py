@@ -244,6 +244,33 @@ class Page(unittest.TestCase):
             self.assertEqual(page.status(), "")
             self.assertEqual(page.faults, [])
 
+    def test_clip_that_is_gone_is_named_once_and_not_asked_for_again(self):
+        model = self.folder / "clips.glb"
+        model.write_bytes((bundled_scenes() / "carousel.glb").read_bytes())
+        with Gateway(model, "--watch") as gateway:
+            page, linked = self.open(link=gateway.link), self.open("#clip=4000000000", link=gateway.link)
+            linked.wait("document.getElementById('status').textContent.includes('clip is gone')")
+            page.call("Page.bringToFront")
+            page.value("""(() => {
+                window.asked = [], window.said = [];
+                const send = WebSocket.prototype.send, status = document.getElementById('status');
+                WebSocket.prototype.send = function (text) {
+                    const show = JSON.parse(text).show;
+                    if (show) asked.push(show.clip);
+                    return send.call(this, text);
+                };
+                new MutationObserver(() => said.push(status.textContent)).observe(status, {childList: true});
+            })()""")
+            page.value("document.getElementById('play').click()")
+            page.wait("asked.includes(1)")
+            model.write_bytes((bundled_scenes() / "teapot.glb").read_bytes())
+            page.wait(f"said.some((text) => text.includes('clip is gone')) && {DATASET}.revision === '2' && {DATASET}.moving === 'false'")
+            asked = page.value("asked")
+            self.assertEqual((asked.count(1), asked[-1]), (1, 0), "only when it was chosen")
+            self.assertEqual(page.value("said.filter((text) => text.includes('clip is gone')).length"), 1)
+            self.assertEqual(page.value("document.getElementById('play').textContent"), "Play")
+            self.assertEqual((page.faults, linked.faults), ([], []))
+
     @staticmethod
     def names(model):
         """Of the materials of a GLB file, with commas between them."""

@@ -22,7 +22,7 @@ let camera = null; // null: the view is the scene's own, or `node`'s
 let node = null; // null: not told yet
 let lastFrame = null;
 let isDirty = false, movedAt = 0, resting = 0, id = 0;
-let isPlaying = false, time = 0, tickAt = 0;
+let isPlaying = false, isClipGone = false, time = 0, tickAt = 0;
 let comparison = 0, isCompared = false; // the newest one, and whether the gateway has been asked for it
 const inputs = new Map(); // when the input of a camera came, by its number
 const link = new URLSearchParams(location.hash.slice(1));
@@ -87,9 +87,9 @@ function takeScene(told) {
   canvas.setAttribute("aria-label", `Picture of ${told.name}`);
   if (isNew) {
     editing.begin(told.edit);
-    say("");
+    say(isClipGone ? "the clip is gone: choose another one, if there is one" : "");
   }
-  isNew = false;
+  isNew = isClipGone = false;
   editing.list();
   const cameras = told.cameras.map((one) => [one.node, one.name || `camera ${one.node}`]);
   if (told.node === 0) cameras.unshift([0, "start"]); // no camera of the scene
@@ -97,7 +97,6 @@ function takeScene(told) {
   fill($("camera"), [...cameras, ["", "free"]], camera ? "" : node);
   fill($("clip"), [[0, "none"], ...told.clips.map((one) => [one.clip, one.name || `clip ${one.clip}`])], clip);
   $("clips").hidden = told.clips.length === 0;
-  if ($("clip").value !== clip) tellShow(); // it is gone
   fill($("tracer"), told.tracers.map((name) => [name, name]), $("tracer").value || told.tracer);
   fill($("integrator"), told.integrators.map((name) => [name, name]), $("integrator").value || told.integrator);
 }
@@ -176,6 +175,7 @@ function take(event) {
     if (message.error) {
       say(message.error.text, true);
       forgetLink();
+      if (message.error.clip) forgetClip();
     }
     return;
   }
@@ -192,6 +192,13 @@ function take(event) {
 // It may name what there is not, and is for the first view alone.
 function forgetLink() {
   for (const name of ["tracer", "integrator", "clip"]) link.delete(name);
+}
+
+// The next connection asks for none, and says so.
+function forgetClip() {
+  $("clip").value = "0";
+  isClipGone = true;
+  if (isPlaying) $("play").click();
 }
 
 function forgetConnection() {
