@@ -165,11 +165,7 @@ void add_clip(reader &r, unsigned index)
     if (from.mNumMeshChannels > 0)
         import_note(r.scene, PROTOCOL_SEVERITY_WARNING, b.where.c_str(), "whole meshes in turn are not played");
     if (b.clip != 0) {
-        float *floats = static_cast<float *>(malloc(b.floats.size() * sizeof(float)));
-        if (!floats)
-            throw std::bad_alloc();
-        memcpy(floats, b.floats.data(), b.floats.size() * sizeof(float));
-        import_add_clip(r.scene, b.clip, name.c_str(), floats, uint32_t(b.floats.size()));
+        import_add_clip(r.scene, b.clip, name.c_str(), reading::copy_of(b.floats), uint32_t(b.floats.size()));
         check(r);
     }
     import_list_clip(r.scene, b.clip, name.c_str(), b.played, b.end_s);

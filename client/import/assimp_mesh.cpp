@@ -31,23 +31,6 @@ struct builder {
     }
 };
 
-template <typename type> type *allocate(builder &b, uint64_t count)
-{
-    check_room(b.r, b.where, count, sizeof(type));
-    void *memory = calloc(std::max<size_t>(size_t(count), 1), sizeof(type));
-    if (!memory)
-        throw std::bad_alloc();
-    return static_cast<type *>(memory);
-}
-
-template <typename type> type *copy_of(builder &b, const std::vector<type> &from)
-{
-    type *copy = allocate<type>(b, from.size());
-    if (!from.empty())
-        memcpy(copy, from.data(), from.size() * sizeof(type));
-    return copy;
-}
-
 // ---- triangles
 
 void add_face(builder &b, const aiMesh &from, const aiFace &face, uint32_t first)
@@ -134,14 +117,15 @@ void read_vertices(builder &b, uint64_t count)
     size_t first = 0;
 
     mesh.vertex_count = uint32_t(count);
-    mesh.positions = allocate<float>(b, count * 3);
+    mesh.positions = reading::allocate<float>(b.r, b.where, count * 3);
     if (any(b, [](const aiMesh &from) { return from.mNormals != nullptr; }))
-        mesh.normals = allocate<float>(b, count * 3); // zeros are made good when the mesh is added
+        mesh.normals =
+            reading::allocate<float>(b.r, b.where, count * 3); // zeros are made good when the mesh is added
     for (size_t set = 0; set < (b.r.uses_second_texcoords ? 2 : 1); set++)
         if (any(b, [&](const aiMesh &from) { return from.mTextureCoords[set] != nullptr; }))
-            mesh.texcoords[set] = allocate<float>(b, count * 2);
+            mesh.texcoords[set] = reading::allocate<float>(b.r, b.where, count * 2);
     if (any(b, [](const aiMesh &from) { return from.mColors[0] != nullptr; }))
-        mesh.colours = allocate<uint8_t>(b, count * 4);
+        mesh.colours = reading::allocate<uint8_t>(b.r, b.where, count * 4);
     for (const aiMesh *from : b.sources) {
         read_vectors(from->mVertices, from->mNumVertices, mesh.positions + first * 3);
         if (mesh.normals)
@@ -179,9 +163,9 @@ void read_targets(builder &b, const aiMesh &from)
         has_normals = has_normals || (from.mNormals && from.mAnimMeshes[i]->mNormals);
     }
     b.mesh.target_count = count;
-    b.mesh.target_offsets[0] = allocate<float>(b, vectors * 3);
+    b.mesh.target_offsets[0] = reading::allocate<float>(b.r, b.where, vectors * 3);
     if (has_normals)
-        b.mesh.target_offsets[1] = allocate<float>(b, vectors * 3);
+        b.mesh.target_offsets[1] = reading::allocate<float>(b.r, b.where, vectors * 3);
     for (uint32_t i = 0; i < count; i++) {
         const aiAnimMesh &shape = *from.mAnimMeshes[i];
         const size_t first = size_t(i) * from.mNumVertices * 3;
@@ -221,9 +205,9 @@ shown_mesh build(builder &b, const std::vector<unsigned> &places)
     b.mesh.name = name.c_str();
     b.mesh.where = b.where.c_str();
     b.mesh.triangle_count = uint32_t(b.indices.size() / 3);
-    b.mesh.indices = copy_of(b, b.indices);
+    b.mesh.indices = reading::copy_of(b.indices);
     b.mesh.range_count = uint32_t(b.ranges.size());
-    b.mesh.ranges = copy_of(b, b.ranges);
+    b.mesh.ranges = reading::copy_of(b.ranges);
     shown.id = import_add_mesh(b.r.scene, &b.mesh);
     check(b.r);
     return shown;

@@ -95,12 +95,9 @@ uint32_t read_skin(reader &r, unsigned place, import_mesh &mesh, const std::stri
         limit(r, of_vertex, where);
         used = std::max(used, of_vertex.size());
     }
-    check_room(r, where, uint64_t(from.mNumVertices) * used, sizeof(uint16_t) + sizeof(float));
     mesh.influence_count = uint32_t(used);
-    mesh.joints = static_cast<uint16_t *>(calloc(from.mNumVertices * used, sizeof(uint16_t)));
-    mesh.joint_weights = static_cast<float *>(calloc(from.mNumVertices * used, sizeof(float)));
-    if (!mesh.joints || !mesh.joint_weights)
-        throw std::bad_alloc();
+    mesh.joints = reading::allocate<uint16_t>(r, where, from.mNumVertices * used);
+    mesh.joint_weights = reading::allocate<float>(r, where, from.mNumVertices * used);
     for (size_t v = 0; v < all.size(); v++)
         for (size_t i = 0; i < all[v].size(); i++) {
             mesh.joints[v * used + i] = all[v][i].joint;

@@ -276,11 +276,8 @@ void add_clip(reader &r, size_t index)
     for (const auto &node : b.nodes)
         add_constants(b, node.first, node.second);
     if (b.clip != 0) {
-        float *floats = static_cast<float *>(malloc(b.floats.size() * sizeof(float)));
-        if (!floats)
-            fail(r, b.where, "out of memory");
-        memcpy(floats, b.floats.data(), b.floats.size() * sizeof(float));
-        if (!import_add_clip(r.scene, b.clip, source.name.c_str(), floats, uint32_t(b.floats.size())))
+        if (!import_add_clip(r.scene, b.clip, source.name.c_str(), reading::copy_of(b.floats),
+                             uint32_t(b.floats.size())))
             throw reading::failed();
     } else {
         import_note(r.scene, PROTOCOL_SEVERITY_WARNING, b.where.c_str(),

@@ -44,15 +44,6 @@ struct builder {
     }
 };
 
-template <typename type> type *allocate(builder &b, uint64_t count)
-{
-    check_room(b.r, b.where, count, sizeof(type));
-    void *memory = calloc(count > 0 ? size_t(count) : 1, sizeof(type));
-    if (!memory)
-        fail(b.r, b.where, "out of memory");
-    return static_cast<type *>(memory);
-}
-
 vertex_attributes attributes_of(const tinygltf::Primitive &primitive)
 {
     vertex_attributes a;
@@ -182,20 +173,21 @@ void read_vertices(builder &b)
     const uint64_t count = uint64_t(b.lots.back().first) + b.lots.back().count;
 
     b.mesh.vertex_count = uint32_t(count);
-    b.mesh.positions = allocate<float>(b, count * 3);
+    b.mesh.positions = reading::allocate<float>(b.r, b.where, count * 3);
     if (any(b, &vertex_attributes::normal))
-        b.mesh.normals = allocate<float>(b, count * 3); // zeros are made good when the mesh is added
+        b.mesh.normals =
+            reading::allocate<float>(b.r, b.where, count * 3); // zeros are made good when the mesh is added
     if (b.mesh.normals && any(b, &vertex_attributes::tangent))
-        b.mesh.tangents = allocate<float>(b, count * 4);
+        b.mesh.tangents = reading::allocate<float>(b.r, b.where, count * 4);
     else
         for (vertex_lot &lot : b.lots)
             lot.attributes.tangent = -1; // glTF: without normals, tangents are to be ignored
     for (size_t set = 0; set < 2; set++)
         if (std::any_of(b.lots.begin(), b.lots.end(),
                         [&](const vertex_lot &lot) { return lot.attributes.texcoord[set] >= 0; }))
-            b.mesh.texcoords[set] = allocate<float>(b, count * 2);
+            b.mesh.texcoords[set] = reading::allocate<float>(b.r, b.where, count * 2);
     if (any(b, &vertex_attributes::colour))
-        b.mesh.colours = allocate<uint8_t>(b, count * 4);
+        b.mesh.colours = reading::allocate<uint8_t>(b.r, b.where, count * 4);
     for (const vertex_lot &lot : b.lots)
         read_lot(b, lot);
 }
@@ -219,8 +211,8 @@ void read_joints(builder &b)
         return;
     b.shown.has_joints = true;
     b.mesh.influence_count = uint32_t(used);
-    b.mesh.joints = allocate<uint16_t>(b, uint64_t(b.mesh.vertex_count) * used);
-    b.mesh.joint_weights = allocate<float>(b, uint64_t(b.mesh.vertex_count) * used);
+    b.mesh.joints = reading::allocate<uint16_t>(b.r, b.where, uint64_t(b.mesh.vertex_count) * used);
+    b.mesh.joint_weights = reading::allocate<float>(b.r, b.where, uint64_t(b.mesh.vertex_count) * used);
     for (size_t i = 0; i < b.lots.size(); i++) {
         const influences &from = of_lots[i];
         for (size_t v = 0; v < b.lots[i].count; v++) {
@@ -251,14 +243,6 @@ void read_morphs(builder &b)
     b.mesh.weight_count = uint32_t(b.weights.size());
 }
 
-template <typename type> type *copy_of(builder &b, const std::vector<type> &from)
-{
-    type *copy = allocate<type>(b, from.size());
-    if (!from.empty())
-        memcpy(copy, from.data(), from.size() * sizeof(type));
-    return copy;
-}
-
 void build(builder &b)
 {
     for (size_t i = 0; i < b.source.primitives.size(); i++)
@@ -272,9 +256,9 @@ void build(builder &b)
     b.mesh.name = b.source.name.c_str();
     b.mesh.where = b.where.c_str();
     b.mesh.triangle_count = uint32_t(b.indices.size() / 3);
-    b.mesh.indices = copy_of(b, b.indices);
+    b.mesh.indices = reading::copy_of(b.indices);
     b.mesh.range_count = uint32_t(b.ranges.size());
-    b.mesh.ranges = copy_of(b, b.ranges);
+    b.mesh.ranges = reading::copy_of(b.ranges);
     b.shown.id = import_add_mesh(b.r.scene, &b.mesh);
     check(b.r);
 }

@@ -57,10 +57,7 @@ size_t read_targets(reader &r, const std::vector<morph_lot> &lots, import_mesh &
         if (which > 0 && (!has_base || !any_has(lots, names[which])))
             continue;
         const uint64_t vectors = uint64_t(mesh.vertex_count) * mesh.target_count;
-        check_room(r, where, vectors, 12);
-        mesh.target_offsets[which] = static_cast<float *>(calloc(size_t(vectors), 12));
-        if (!mesh.target_offsets[which])
-            fail(r, where, "out of memory");
+        mesh.target_offsets[which] = reading::allocate<float>(r, where, vectors * 3);
         for (const morph_lot &lot : lots)
             read_lot(r, lot, which, mesh, where);
     }

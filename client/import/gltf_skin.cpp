@@ -99,25 +99,17 @@ void read_bind_matrices(reader &r, const tinygltf::Skin &skin, float *joint_from
     }
 }
 
-template <typename type> type *allocate(reader &r, size_t count, const std::string &where)
-{
-    void *memory = calloc(count, sizeof(type));
-    if (!memory)
-        fail(r, where, "out of memory");
-    return static_cast<type *>(memory);
-}
-
 void add_skin(reader &r, int index, uint32_t id)
 {
     const tinygltf::Skin &skin = r.model.skins[size_t(index)];
     const std::string where = place("skins", size_t(index));
     skin_arrays arrays;
 
-    arrays.joints = allocate<uint32_t>(r, skin.joints.size(), where);
+    arrays.joints = reading::allocate<uint32_t>(r, where, skin.joints.size());
     for (size_t j = 0; j < skin.joints.size(); j++)
         arrays.joints[j] = add_hidden_node(r, size_t(skin.joints[j]));
     if (skin.inverseBindMatrices >= 0) {
-        arrays.joint_from_mesh = allocate<float>(r, skin.joints.size() * 12, where);
+        arrays.joint_from_mesh = reading::allocate<float>(r, where, skin.joints.size() * 12);
         read_bind_matrices(r, skin, arrays.joint_from_mesh, where);
     }
     uint32_t *joints = arrays.joints;

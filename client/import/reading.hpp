@@ -53,7 +53,17 @@ inline void check_room(base &r, const std::string &where, uint64_t count, uint64
              static_cast<unsigned long long>(IMPORT_BYTES_MAX >> 30));
 }
 
-// For the C interface, which takes it over; NULL of nothing.
+// Zeros for the C interface, which takes them over.
+template <typename type> type *allocate(base &r, const std::string &where, uint64_t count)
+{
+    check_room(r, where, count, sizeof(type));
+    void *memory = calloc(count > 0 ? size_t(count) : 1, sizeof(type));
+    if (!memory)
+        throw std::bad_alloc();
+    return static_cast<type *>(memory);
+}
+
+// Likewise; NULL of nothing.
 template <typename type> type *copy_of(const std::vector<type> &from)
 {
     type *copy = from.empty() ? nullptr : static_cast<type *>(malloc(from.size() * sizeof(type)));
