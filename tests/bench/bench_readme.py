@@ -12,8 +12,9 @@ def markers(name):
 
 
 def section(name, title, measured, text):
-    """`measured`: where and when; `text`: tables of fixed width."""
+    """`measured`: where and when; `text`: tables of fixed width, of which those before the goals are left out."""
     begin, end = markers(name)
+    text = text.partition("What is wanted\n")[2] or text
     return f"{begin}\n### {title}\n\n{measured}\n\n```\n{text.strip()}\n```\n{end}"
 
 
