@@ -109,22 +109,22 @@ obj::texcoord_sets textures(reader &r, const aiMaterial &from, tinyobj::material
     obj::texcoord_sets sets = {};
 
     const uint32_t alpha = texture(r, from, {aiTextureType_OPACITY}, m.alpha_texname, m.alpha_texopt);
-    sets[MAP_BASE_COLOUR] =
+    sets[PROTOCOL_MATERIAL_BASE_COLOUR] =
         texture(r, from, {aiTextureType_BASE_COLOR, aiTextureType_DIFFUSE}, m.diffuse_texname, m.diffuse_texopt);
-    sets[MAP_NORMAL] =
+    sets[PROTOCOL_MATERIAL_NORMAL] =
         texture(r, from, {aiTextureType_NORMAL_CAMERA, aiTextureType_NORMALS}, m.normal_texname, m.normal_texopt);
-    sets[MAP_BUMP] = texture(r, from, {aiTextureType_HEIGHT}, m.bump_texname, m.bump_texopt);
-    sets[MAP_EMISSION] = texture(r, from, {aiTextureType_EMISSION_COLOR, aiTextureType_EMISSIVE},
-                                 m.emissive_texname, m.emissive_texopt);
+    sets[PROTOCOL_MATERIAL_BUMP] = texture(r, from, {aiTextureType_HEIGHT}, m.bump_texname, m.bump_texopt);
+    sets[PROTOCOL_MATERIAL_EMISSION] = texture(r, from, {aiTextureType_EMISSION_COLOR, aiTextureType_EMISSIVE},
+                                               m.emissive_texname, m.emissive_texopt);
     const uint32_t metal = texture(r, from, {aiTextureType_METALNESS}, m.metallic_texname, m.metallic_texopt);
     const uint32_t rough =
         texture(r, from, {aiTextureType_DIFFUSE_ROUGHNESS}, m.roughness_texname, m.roughness_texopt);
-    sets[MAP_METALLIC_ROUGHNESS] = m.roughness_texname.empty() ? metal : rough;
+    sets[PROTOCOL_MATERIAL_METALLIC_ROUGHNESS] = m.roughness_texname.empty() ? metal : rough;
     // One image for both colour and cutouts is said twice.
     if (m.alpha_texname == m.diffuse_texname)
         m.alpha_texname.clear();
     if (!m.alpha_texname.empty())
-        sets[MAP_BASE_COLOUR] = alpha;
+        sets[PROTOCOL_MATERIAL_BASE_COLOUR] = alpha;
     return sets;
 }
 

@@ -24,7 +24,7 @@ struct part {
             *channels[c] = limited(b.r, b.where, key, given[c], 0, maximum);
     }
 
-    void texture(const char *key, bool is_colour, material_map at) const
+    void texture(const char *key, bool is_colour, protocol_material_texture at) const
     {
         use_texture(b.r, b.all, source_of(object, key), is_colour, b.uses[at], b.where);
     }
@@ -34,18 +34,18 @@ void anisotropy(const part &p)
 {
     p.factor("anisotropyStrength", p.b.set.anisotropy, 0, 1);
     p.factor("anisotropyRotation", p.b.set.anisotropy_rotation, -1000, 1000);
-    p.texture("anisotropyTexture", false, MAP_ANISOTROPY);
+    p.texture("anisotropyTexture", false, PROTOCOL_MATERIAL_ANISOTROPY);
 }
 
 void clearcoat(const part &p)
 {
     p.factor("clearcoatFactor", p.b.set.clearcoat, 0, 1);
     p.factor("clearcoatRoughnessFactor", p.b.set.clearcoat_roughness, 0, 1);
-    p.texture("clearcoatTexture", false, MAP_CLEARCOAT);
-    p.texture("clearcoatRoughnessTexture", false, MAP_CLEARCOAT_ROUGHNESS);
+    p.texture("clearcoatTexture", false, PROTOCOL_MATERIAL_CLEARCOAT);
+    p.texture("clearcoatRoughnessTexture", false, PROTOCOL_MATERIAL_CLEARCOAT_ROUGHNESS);
     texture_source normal = source_of(p.object, "clearcoatNormalTexture");
     normal.strength = normal.value ? number(*normal.value, "scale", 1) : 1;
-    use_texture(p.b.r, p.b.all, normal, false, p.b.uses[MAP_CLEARCOAT_NORMAL], p.b.where);
+    use_texture(p.b.r, p.b.all, normal, false, p.b.uses[PROTOCOL_MATERIAL_CLEARCOAT_NORMAL], p.b.where);
 }
 
 void diffuse_transmission(const part &p)
@@ -54,8 +54,8 @@ void diffuse_transmission(const part &p)
     p.factor("diffuseTransmissionFactor", set.diffuse_transmission, 0, 1);
     p.colour("diffuseTransmissionColorFactor",
              {&set.diffuse_transmission_red, &set.diffuse_transmission_green, &set.diffuse_transmission_blue}, 1);
-    p.texture("diffuseTransmissionTexture", false, MAP_DIFFUSE_TRANSMISSION);
-    p.texture("diffuseTransmissionColorTexture", true, MAP_DIFFUSE_TRANSMISSION_COLOUR);
+    p.texture("diffuseTransmissionTexture", false, PROTOCOL_MATERIAL_DIFFUSE_TRANSMISSION);
+    p.texture("diffuseTransmissionColorTexture", true, PROTOCOL_MATERIAL_DIFFUSE_TRANSMISSION_COLOUR);
 }
 
 void dispersion(const part &p)
@@ -70,8 +70,8 @@ void iridescence(const part &p)
     p.factor("iridescenceIor", set.iridescence_ior, 1, 10);
     p.factor("iridescenceThicknessMinimum", set.iridescence_minimum_nm, 0, 1e6);
     p.factor("iridescenceThicknessMaximum", set.iridescence_maximum_nm, 0, 1e6);
-    p.texture("iridescenceTexture", false, MAP_IRIDESCENCE);
-    p.texture("iridescenceThicknessTexture", false, MAP_IRIDESCENCE_THICKNESS);
+    p.texture("iridescenceTexture", false, PROTOCOL_MATERIAL_IRIDESCENCE);
+    p.texture("iridescenceThicknessTexture", false, PROTOCOL_MATERIAL_IRIDESCENCE_THICKNESS);
 }
 
 void sheen(const part &p)
@@ -79,8 +79,8 @@ void sheen(const part &p)
     float(&colour)[3] = p.b.set.sheen;
     p.colour("sheenColorFactor", {&colour[0], &colour[1], &colour[2]}, 1);
     p.factor("sheenRoughnessFactor", p.b.set.sheen_roughness, 0, 1);
-    p.texture("sheenColorTexture", true, MAP_SHEEN);
-    p.texture("sheenRoughnessTexture", false, MAP_SHEEN_ROUGHNESS);
+    p.texture("sheenColorTexture", true, PROTOCOL_MATERIAL_SHEEN);
+    p.texture("sheenRoughnessTexture", false, PROTOCOL_MATERIAL_SHEEN_ROUGHNESS);
 }
 
 void specular(const part &p)
@@ -88,8 +88,8 @@ void specular(const part &p)
     message_set_material &set = p.b.set;
     p.factor("specularFactor", set.specular, 0, 1);
     p.colour("specularColorFactor", {&set.specular_red, &set.specular_green, &set.specular_blue}, 1000);
-    p.texture("specularTexture", false, MAP_SPECULAR);
-    p.texture("specularColorTexture", true, MAP_SPECULAR_COLOUR);
+    p.texture("specularTexture", false, PROTOCOL_MATERIAL_SPECULAR);
+    p.texture("specularColorTexture", true, PROTOCOL_MATERIAL_SPECULAR_COLOUR);
 }
 
 void volume(const part &p)

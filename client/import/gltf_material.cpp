@@ -21,17 +21,18 @@ void core(const building &b)
     b.set.metallic = limited(b.r, b.where, "metallicFactor", pbr.metallicFactor, 0, 1);
     b.set.roughness = limited(b.r, b.where, "roughnessFactor", pbr.roughnessFactor, 0, 1);
     if (!extension(b.source.extensions, "KHR_materials_pbrSpecularGlossiness")) { // which is in their place
-        use_texture(b.r, b.all, source_of(pbr.baseColorTexture), true, b.uses[MAP_BASE_COLOUR], b.where);
-        use_texture(b.r, b.all, source_of(pbr.metallicRoughnessTexture), false, b.uses[MAP_METALLIC_ROUGHNESS],
+        use_texture(b.r, b.all, source_of(pbr.baseColorTexture), true, b.uses[PROTOCOL_MATERIAL_BASE_COLOUR],
                     b.where);
+        use_texture(b.r, b.all, source_of(pbr.metallicRoughnessTexture), false,
+                    b.uses[PROTOCOL_MATERIAL_METALLIC_ROUGHNESS], b.where);
     }
     const tinygltf::NormalTextureInfo &normal = b.source.normalTexture;
     use_texture(b.r, b.all, {normal.index, normal.texCoord, normal.scale, &normal.extensions, nullptr}, false,
-                b.uses[MAP_NORMAL], b.where);
+                b.uses[PROTOCOL_MATERIAL_NORMAL], b.where);
     const tinygltf::OcclusionTextureInfo &occlusion = b.source.occlusionTexture;
     use_texture(b.r, b.all,
                 {occlusion.index, occlusion.texCoord, occlusion.strength, &occlusion.extensions, nullptr}, false,
-                b.uses[MAP_OCCLUSION], b.where);
+                b.uses[PROTOCOL_MATERIAL_OCCLUSION], b.where);
 }
 
 void emission(const building &b)
@@ -41,7 +42,8 @@ void emission(const building &b)
 
     for (size_t c = 0; c < 3 && c < b.source.emissiveFactor.size(); c++)
         b.set.emission[c] = limited(b.r, b.where, "the emission", b.source.emissiveFactor[c] * strength, 0, 1e6);
-    use_texture(b.r, b.all, source_of(b.source.emissiveTexture), true, b.uses[MAP_EMISSION], b.where);
+    use_texture(b.r, b.all, source_of(b.source.emissiveTexture), true, b.uses[PROTOCOL_MATERIAL_EMISSION],
+                b.where);
 }
 
 void alpha(const building &b)
@@ -69,8 +71,8 @@ void transmission(const building &b)
     if (const tinygltf::Value *glass = extension(b.source.extensions, "KHR_materials_transmission")) {
         b.set.transmission =
             limited(b.r, b.where, "transmissionFactor", number(*glass, "transmissionFactor", 0), 0, 1);
-        use_texture(b.r, b.all, source_of(*glass, "transmissionTexture"), false, b.uses[MAP_TRANSMISSION],
-                    b.where);
+        use_texture(b.r, b.all, source_of(*glass, "transmissionTexture"), false,
+                    b.uses[PROTOCOL_MATERIAL_TRANSMISSION], b.where);
     }
     b.set.unlit = extension(b.source.extensions, "KHR_materials_unlit") != nullptr;
 }
@@ -155,11 +157,13 @@ void use_converted(const building &b, const specular_gloss &factors, const gloss
     metal_texels(factors, from[0], from[1], to);
     const int texture = maps.sources[main].index;
     const std::string name = texture_name(b.r, texture, maps.images[main]);
-    b.uses[MAP_BASE_COLOUR] = b.uses[MAP_METALLIC_ROUGHNESS] = b.uses[MAP_SPECULAR_COLOUR] = maps.uses[main];
-    b.uses[MAP_BASE_COLOUR].texture = add_texture(b.r, texture, name, true, set, blobs[0]);
-    b.uses[MAP_METALLIC_ROUGHNESS].texture =
+    b.uses[PROTOCOL_MATERIAL_BASE_COLOUR] = b.uses[PROTOCOL_MATERIAL_METALLIC_ROUGHNESS] =
+        b.uses[PROTOCOL_MATERIAL_SPECULAR_COLOUR] = maps.uses[main];
+    b.uses[PROTOCOL_MATERIAL_BASE_COLOUR].texture = add_texture(b.r, texture, name, true, set, blobs[0]);
+    b.uses[PROTOCOL_MATERIAL_METALLIC_ROUGHNESS].texture =
         add_texture(b.r, texture, name + " metallic roughness", false, set, blobs[1]);
-    b.uses[MAP_SPECULAR_COLOUR].texture = add_texture(b.r, texture, name + " mirror", true, set, blobs[2]);
+    b.uses[PROTOCOL_MATERIAL_SPECULAR_COLOUR].texture =
+        add_texture(b.r, texture, name + " mirror", true, set, blobs[2]);
 }
 
 void specular_glossiness(const building &b)
@@ -198,7 +202,7 @@ void specular_glossiness(const building &b)
 uint32_t material(reader &r, images &all, int index)
 {
     const tinygltf::Material &source = r.model.materials[size_t(index)];
-    record_texture_use uses[MAP_COUNT] = {};
+    record_texture_use uses[PROTOCOL_MATERIAL_COUNT] = {};
     message_set_material set;
     import_material_default(&set);
     const building b = {r, all, source, place("materials", size_t(index)), set, uses};
@@ -213,7 +217,7 @@ uint32_t material(reader &r, images &all, int index)
     if (all.collecting)
         return 0;
     set.textures = uses;
-    set.textures_count = MAP_COUNT;
+    set.textures_count = PROTOCOL_MATERIAL_COUNT;
     set.name = source.name.c_str();
     return import_add_material(r.scene, &set);
 }

@@ -4,7 +4,6 @@
 #define FARLIGHT_IMPORT_GLTF_MATERIAL_HPP
 
 #include "gltf_texture.hpp"
-#include "material_map.h"
 
 namespace gltf
 {
@@ -14,7 +13,7 @@ struct building {
     const tinygltf::Material &source;
     std::string where;
     message_set_material &set;
-    record_texture_use *uses; // MAP_COUNT of them
+    record_texture_use *uses; // PROTOCOL_MATERIAL_COUNT of them
 };
 
 // What the extensions say that add layers to a material, or change its mirror or its body.

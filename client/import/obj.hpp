@@ -5,7 +5,6 @@
 
 #include "formats.h"
 #include "grouping.h"
-#include "material_map.h"
 
 #include <tiny_obj_loader.h>
 
@@ -74,7 +73,7 @@ class material_reader : public tinyobj::MaterialReader
 // Reads an image by the name that a material has for it, as files_read() does.
 using image_source = std::function<unsigned char *(const std::string &name, size_t *size_bytes, char *reason)>;
 // Which texture coordinates each map of a material uses.
-using texcoord_sets = std::array<uint32_t, MAP_COUNT>;
+using texcoord_sets = std::array<uint32_t, PROTOCOL_MATERIAL_COUNT>;
 // Also for readers that fill such materials from other formats. `sets`, by position, may be empty: MTL has one
 // set. Identifiers by position; 0 where there is none.
 std::vector<uint32_t> add_materials(import_scene *scene, const image_source &read_image,

@@ -96,41 +96,47 @@ void surface_maps(building &b, const tinyobj::material_t &m, const texcoord_sets
 {
     if (!m.alpha_texname.empty()) {
         bool cutout = false;
-        uses[MAP_BASE_COLOUR] = use_of(alpha_texture(b, m, cutout), m.alpha_texopt, sets[MAP_BASE_COLOUR]);
+        uses[PROTOCOL_MATERIAL_BASE_COLOUR] =
+            use_of(alpha_texture(b, m, cutout), m.alpha_texopt, sets[PROTOCOL_MATERIAL_BASE_COLOUR]);
         set.alpha_mode = cutout ? PROTOCOL_ALPHA_MASK : PROTOCOL_ALPHA_BLEND;
     } else if (!m.diffuse_texname.empty()) {
-        uses[MAP_BASE_COLOUR] = use_of(plain_texture(b, m.diffuse_texname, true, m.diffuse_texopt.clamp),
-                                       m.diffuse_texopt, sets[MAP_BASE_COLOUR]);
+        uses[PROTOCOL_MATERIAL_BASE_COLOUR] =
+            use_of(plain_texture(b, m.diffuse_texname, true, m.diffuse_texopt.clamp), m.diffuse_texopt,
+                   sets[PROTOCOL_MATERIAL_BASE_COLOUR]);
     }
     if (!m.emissive_texname.empty()) {
-        uses[MAP_EMISSION] = use_of(plain_texture(b, m.emissive_texname, true, m.emissive_texopt.clamp),
-                                    m.emissive_texopt, sets[MAP_EMISSION]);
+        uses[PROTOCOL_MATERIAL_EMISSION] =
+            use_of(plain_texture(b, m.emissive_texname, true, m.emissive_texopt.clamp), m.emissive_texopt,
+                   sets[PROTOCOL_MATERIAL_EMISSION]);
         if (max_component(m.emission) <= 0)
             set.emission[0] = set.emission[1] = set.emission[2] = 1;
     }
     if (!m.roughness_texname.empty() || !m.metallic_texname.empty())
-        uses[MAP_METALLIC_ROUGHNESS] =
-            use_of(roughness_texture(b, m), m.roughness_texopt, sets[MAP_METALLIC_ROUGHNESS]);
+        uses[PROTOCOL_MATERIAL_METALLIC_ROUGHNESS] =
+            use_of(roughness_texture(b, m), m.roughness_texopt, sets[PROTOCOL_MATERIAL_METALLIC_ROUGHNESS]);
     if (!m.sheen_texname.empty())
-        uses[MAP_SHEEN] = use_of(plain_texture(b, m.sheen_texname, false, m.sheen_texopt.clamp), m.sheen_texopt,
-                                 sets[MAP_SHEEN]);
+        uses[PROTOCOL_MATERIAL_SHEEN] = use_of(plain_texture(b, m.sheen_texname, false, m.sheen_texopt.clamp),
+                                               m.sheen_texopt, sets[PROTOCOL_MATERIAL_SHEEN]);
 }
 
 void relief_maps(building &b, const tinyobj::material_t &m, const texcoord_sets &sets, record_texture_use *uses)
 {
     if (!m.normal_texname.empty())
-        uses[MAP_NORMAL] = use_of(plain_texture(b, m.normal_texname, false, m.normal_texopt.clamp),
-                                  m.normal_texopt, sets[MAP_NORMAL]);
+        uses[PROTOCOL_MATERIAL_NORMAL] = use_of(plain_texture(b, m.normal_texname, false, m.normal_texopt.clamp),
+                                                m.normal_texopt, sets[PROTOCOL_MATERIAL_NORMAL]);
     if (m.bump_texname.empty())
         return;
-    const material_map at = looks_like_normals(b.images.at(m.bump_texname)) ? MAP_NORMAL : MAP_BUMP;
+    const protocol_material_texture at =
+        looks_like_normals(b.images.at(m.bump_texname)) ? PROTOCOL_MATERIAL_NORMAL : PROTOCOL_MATERIAL_BUMP;
     const double strength =
         std::isfinite(m.bump_texopt.bump_multiplier) ? double(m.bump_texopt.bump_multiplier) : 1;
-    if (at == MAP_NORMAL && uses[MAP_NORMAL].texture != 0)
+    if (at == PROTOCOL_MATERIAL_NORMAL && uses[PROTOCOL_MATERIAL_NORMAL].texture != 0)
         return;
-    uses[at] = use_of(plain_texture(b, m.bump_texname, false, m.bump_texopt.clamp), m.bump_texopt, sets[MAP_BUMP]);
-    uses[at].strength = float(std::min(std::max(strength, -1e3), 1e3) * (at == MAP_BUMP ? bump_height_m : 1));
-    if (at == MAP_NORMAL)
+    uses[at] = use_of(plain_texture(b, m.bump_texname, false, m.bump_texopt.clamp), m.bump_texopt,
+                      sets[PROTOCOL_MATERIAL_BUMP]);
+    uses[at].strength =
+        float(std::min(std::max(strength, -1e3), 1e3) * (at == PROTOCOL_MATERIAL_BUMP ? bump_height_m : 1));
+    if (at == PROTOCOL_MATERIAL_NORMAL)
         import_note(b.scene, PROTOCOL_SEVERITY_INFO, m.bump_texname.c_str(), "a bump map that holds normals");
 }
 
@@ -149,7 +155,7 @@ void note_unused(building &b, const tinyobj::material_t &m)
 
 uint32_t add_material(building &b, const tinyobj::material_t &m, const texcoord_sets &sets)
 {
-    record_texture_use uses[MAP_COUNT] = {};
+    record_texture_use uses[PROTOCOL_MATERIAL_COUNT] = {};
     message_set_material set;
 
     import_material_default(&set);
@@ -165,7 +171,7 @@ uint32_t add_material(building &b, const tinyobj::material_t &m, const texcoord_
     relief_maps(b, m, sets, uses);
     note_unused(b, m);
     set.textures = uses;
-    set.textures_count = MAP_COUNT;
+    set.textures_count = PROTOCOL_MATERIAL_COUNT;
     return import_add_material(b.scene, &set);
 }
 } // namespace

@@ -306,6 +306,30 @@ class AlphaMode(Word):
     BLEND = 2  # the ray continues with the share that alpha lets through
 
 
+class MaterialTexture(Word):
+    """place of a texture among those of a material; which channels are read"""
+
+    BASE_COLOUR = 0
+    NORMAL = 1
+    METALLIC_ROUGHNESS = 2  # blue: metallic; green: roughness
+    OCCLUSION = 3  # red
+    EMISSION = 4
+    TRANSMISSION = 5  # red
+    BUMP = 6  # red: height
+    SPECULAR = 7  # alpha
+    SPECULAR_COLOUR = 8
+    CLEARCOAT = 9  # red
+    CLEARCOAT_ROUGHNESS = 10  # green
+    CLEARCOAT_NORMAL = 11
+    SHEEN = 12
+    SHEEN_ROUGHNESS = 13  # alpha
+    IRIDESCENCE = 14  # red
+    IRIDESCENCE_THICKNESS = 15  # green: of its film
+    DIFFUSE_TRANSMISSION = 16  # alpha
+    DIFFUSE_TRANSMISSION_COLOUR = 17
+    ANISOTROPY = 18  # red and green: direction from the tangent, -1 to 1; blue: strength
+
+
 class TextureFormat(Word):
     """texture format"""
 
@@ -1625,11 +1649,7 @@ class SetMaterial(Message):
         KHR_materials_diffuse_transmission
     diffuse_transmission_red: colour of the light that does
     thin_walled: 1: the surface is a pane without a body, through which light goes straight on
-    textures: by position: 0 base colour, 1 normal, 2 metallic (blue) and roughness (green), 3 occlusion (red), 4
-        emission, 5 transmission (red), 6 bump height (red), 7 specular (alpha), 8 colour of specular, 9 clearcoat
-        (red), 10 its roughness (green), 11 its normal, 12 sheen, 13 its roughness (alpha), 14 iridescence (red), 15
-        thickness of its film (green), 16 diffuse transmission (alpha), 17 its colour, 18 anisotropy (red and green:
-        direction from the tangent, -1 to 1; blue: strength)
+    textures: by position, as material_texture says
     """
     TYPE: ClassVar[int] = 0x0134
     SENDER: ClassVar[str] = "both"

@@ -20,10 +20,7 @@ from .objects import ENVIRONMENT, SHOWN, Object, Objects, make
 
 __all__ = ["ENVIRONMENT", "Camera", "CameraOf", "Object", "Scene", "Sharing", "look_at"]
 
-# The order that set_material.textures of protocol/messages.def has in words: no table from which they could be generated has them.
-PLACES = ("base_colour", "normal", "metallic_roughness", "occlusion", "emission", "transmission", "bump", "specular",
-          "specular_colour", "clearcoat", "clearcoat_roughness", "clearcoat_normal", "sheen", "sheen_roughness", "iridescence",
-          "iridescence_thickness", "diffuse_transmission", "diffuse_transmission_colour", "anisotropy")
+PLACES = tuple(place.name.lower() for place in messages.MaterialTexture)
 RANGES_MAX = 4096  # of a mesh or of spheres
 Textures = Union[Object, Mapping[Union[int, str], Object], None]
 
