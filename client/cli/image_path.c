@@ -192,16 +192,6 @@ bool cli_check_error_picture(const char *picture, const char *const *inputs, siz
            cli_check_output(picture, folder, sizeof(folder), error) && cli_make_folder(folder, error);
 }
 
-bool cli_check_input(const char *path, struct fl_error *error)
-{
-    struct stat status;
-    if (stat(path, &status) < 0 || access(path, R_OK) < 0)
-        return fl_error_set(error, FL_ERROR_FILE, path, "cannot be read: %s", strerror(errno));
-    if (!S_ISREG(status.st_mode))
-        return fl_error_set(error, FL_ERROR_FILE, path, "is not a file");
-    return true;
-}
-
 bool cli_temporary_folder(char *folder, size_t folder_bytes, struct fl_error *error)
 {
     const char *parent = getenv("TMPDIR");

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* The models of a command line: several of them, their places, and one from standard input. */
 #include "cli/cli.h"
+#include "lib/importer.h"
 #include "lib/text.h"
 
 #include <errno.h>
@@ -88,11 +89,11 @@ bool cli_has_input(const struct cli_job *job)
 bool cli_check_models(const struct cli_job *job, struct fl_error *error)
 {
     for (size_t i = 0; i < job->model_count; i++)
-        if (!is_input(job->models[i].path) && !cli_check_input(job->models[i].path, error))
+        if (!is_input(job->models[i].path) && !fl_importer_check_file(job->models[i].path, error))
             return false;
-    if (job->model_count == 0 && job->model && !cli_check_input(job->model, error))
+    if (job->model_count == 0 && job->model && !fl_importer_check_file(job->model, error))
         return false;
-    return !job->environment || cli_check_input(job->environment, error);
+    return !job->environment || fl_importer_check_file(job->environment, error);
 }
 
 bool cli_check_watch(struct cli_job *job)

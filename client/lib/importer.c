@@ -16,8 +16,7 @@
 /* Likewise of files that a model names. */
 #define FILES_MAX 65536u
 
-/* Named here, before a program is started for it. */
-static bool check_file(const char *path, struct fl_error *error)
+bool fl_importer_check_file(const char *path, struct fl_error *error)
 {
     struct stat status;
     if (stat(path, &status) < 0 || access(path, R_OK) < 0)
@@ -128,7 +127,7 @@ static bool remember_file(struct fl_importer *importer, const char *folder_of, c
 static bool take_model(struct fl_importer *importer, const struct fl_model *model, struct fl_error *error)
 {
     return is_input(&importer->options, model->path) ||
-           (check_file(model->path, error) && remember_file(importer, NULL, model->path, error));
+           (fl_importer_check_file(model->path, error) && remember_file(importer, NULL, model->path, error));
 }
 
 /* One model is the only one of several. */
@@ -148,8 +147,8 @@ static bool take_models(struct fl_importer *importer, struct fl_error *error)
     for (size_t i = 0; i < options->model_count; i++)
         if (!take_model(importer, &options->models[i], error))
             return false;
-    return !options->environment ||
-           (check_file(options->environment, error) && remember_file(importer, NULL, options->environment, error));
+    return !options->environment || (fl_importer_check_file(options->environment, error) &&
+                                     remember_file(importer, NULL, options->environment, error));
 }
 
 static bool start(struct fl_importer *importer, struct fl_error *error)

@@ -33,6 +33,8 @@ struct fl_importer {
     struct fl_error complaint; /* of its last note of severity error */
 };
 
+/* Whether it is a file that can be read: a fault is named before a program is started for it. */
+bool fl_importer_check_file(const char *path, struct fl_error *error);
 /* Starts the program; it begins to read at once and waits only for the answers that it needs. */
 bool fl_importer_start(struct fl_importer *importer, const struct fl_load_options *options,
                        struct fl_error *error);

@@ -3,6 +3,7 @@
  * the other one is there. */
 #include "viewer/viewer_state.h"
 #include "cli/cli.h"
+#include "lib/importer.h"
 #include "protocol/common/clock.h"
 
 #include <stdio.h>
@@ -59,7 +60,7 @@ void viewer_open(struct viewer *viewer, const char *path)
         return;
     }
     viewer->next_model = strdup(path);
-    if (viewer->next_model && cli_check_input(path, &error))
+    if (viewer->next_model && fl_importer_check_file(path, &error))
         viewer->next = viewer_open_session(viewer, viewer->next_model, &error);
     if (viewer->next)
         return;

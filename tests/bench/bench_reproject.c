@@ -7,11 +7,10 @@
  * display values], "flicker": [of each frame but the first: the same of how errors differ from those of the frame
  * before at the same places], "cpu_ns": [of each frame]}]}. Exit status: 1 failed, 2 usage. */
 #include "tests/bench/bench.h"
+#include "tests/bench/bench_camera.h"
 #include "tests/bench/bench_options.h"
 #include "tests/bench/bench_scene.h"
 #include "tests/bench/bench_stats.h"
-
-#include "viewer/camera.h"
 
 #include <getopt.h>
 #include <jansson.h>
@@ -60,35 +59,6 @@ struct bench {
     float *errors[METHODS][2]; /* three a pixel, of the same */
     json_t *part, *error[METHODS], *flicker[METHODS], *cpu_ns[METHODS];
 };
-
-/* As bench_walk.c: orbits, moves aside, comes nearer and looks round. */
-static void move(struct viewer_camera *camera, uint32_t part, double speed)
-{
-    const double pixel = speed / 240;
-    if (part == 0)
-        camera_orbit(camera, 3.5 * pixel, -3.5 * 0.2 * pixel);
-    else if (part == 1)
-        camera_pan(camera, pixel, 0);
-    else if (part == 2)
-        camera_dolly(camera, pow(0.88, 0.15 * speed), 1e-4);
-    else
-        camera_turn(camera, 1.6 * 2 * pixel, 0);
-}
-
-static struct viewer_camera first_camera(const struct bench_scene *scene)
-{
-    const float *m = scene->camera.world_from_view;
-    struct viewer_camera camera = {.up = {0, 1, 0}, .fov_y = (double)scene->camera.fov_y};
-    double square = 0;
-    for (int i = 0; i < 3; i++) {
-        const double middle = 0.5 * ((double)scene->gpu.lower_world[i] + (double)scene->gpu.upper_world[i]);
-        camera.eye[i] = (double)m[4 * i + 3];
-        square += (middle - camera.eye[i]) * (middle - camera.eye[i]);
-    }
-    for (int i = 0; i < 3; i++)
-        camera.look_at[i] = camera.eye[i] - sqrt(square) * (double)m[4 * i + 2];
-    return camera;
-}
 
 static bool render(struct bench *bench, uint32_t renderer, const struct frame_request *request,
                    struct frame_result *result, struct error *error)
@@ -254,11 +224,11 @@ static bool run(struct bench *bench, struct error *error)
 {
     if (bench->plays && !find_clip(bench, error))
         return false;
-    bench->camera = first_camera(&bench->scene);
+    bench->camera = bench_camera_first(&bench->scene);
     for (uint32_t frame = 0; frame < bench->frames; frame++) {
         const uint32_t part = frame * PARTS / bench->frames;
         if (frame > 0 && !bench->plays)
-            move(&bench->camera, part, (double)bench->speed);
+            bench_camera_move(&bench->camera, part, (double)bench->speed);
         bench->cameras[0] = (struct frame_camera){.fov_y = (float)bench->camera.fov_y};
         camera_pose(&bench->camera, bench->cameras[0].world_from_view);
         json_array_append_new(bench->part, json_integer(part));

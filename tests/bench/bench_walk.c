@@ -9,6 +9,7 @@
  * number], "methods": [{"name", "layers", "psnr_db": [of each picture], "unseen": [a share of it], "cpu_ns": [of
  * making it], "build_ns": [of what serves all pictures of its key]}]}. Exit status: 1 failed, 2 usage. */
 #include "tests/bench/bench.h"
+#include "tests/bench/bench_camera.h"
 #include "tests/bench/bench_options.h"
 #include "tests/bench/bench_scene.h"
 #include "tests/bench/bench_stats.h"
@@ -66,36 +67,8 @@ static uint32_t steps_of(const struct bench *bench)
 
 /* ---- the walk ---- */
 
-/* What the hand of bench_warp.py does in a step, which is an event of the viewer (client/viewer/input.c): it
- * orbits, moves aside, comes nearer and looks round, each for a quarter of the time. */
-static void move(struct viewer_camera *camera, uint32_t part)
-{
-    static const double pixel = 1.0 / 720;
-    if (part == 0)
-        camera_orbit(camera, 3.5 * pixel, -3.5 * 0.2 * pixel);
-    else if (part == 1)
-        camera_pan(camera, pixel, 0);
-    else if (part == 2)
-        camera_dolly(camera, pow(0.88, 0.05), 1e-4);
-    else
-        camera_turn(camera, 1.6 * 2 * pixel, 0);
-}
-
-/* As the viewer takes over the daemon's camera: the target is the middle of the scene. */
-static struct viewer_camera first_camera(const struct bench_scene *scene)
-{
-    const float *m = scene->camera.world_from_view;
-    struct viewer_camera camera = {.up = {0, 1, 0}, .fov_y = (double)scene->camera.fov_y};
-    double square = 0;
-    for (int i = 0; i < 3; i++) {
-        const double middle = 0.5 * ((double)scene->gpu.lower_world[i] + (double)scene->gpu.upper_world[i]);
-        camera.eye[i] = (double)m[4 * i + 3];
-        square += (middle - camera.eye[i]) * (middle - camera.eye[i]);
-    }
-    for (int i = 0; i < 3; i++)
-        camera.look_at[i] = camera.eye[i] - sqrt(square) * (double)m[4 * i + 2];
-    return camera;
-}
+/* What the hand of bench_warp.py does in a step, which is an event of the viewer (client/viewer/input.c). */
+#define STEP_SPEED (1.0 / 3)
 
 static uint32_t part_of(const struct bench *bench, uint32_t step)
 {
@@ -106,11 +79,11 @@ static uint32_t part_of(const struct bench *bench, uint32_t step)
 static void walk(struct bench *bench)
 {
     struct plan_motion motion = {0};
-    struct viewer_camera camera = first_camera(&bench->scene);
+    struct viewer_camera camera = bench_camera_first(&bench->scene);
     for (uint32_t step = 0; step < steps_of(bench); step++) {
         const uint64_t now_ns = (step + 1) * NS_PER_STEP;
         if (step > 0)
-            move(&camera, part_of(bench, step));
+            bench_camera_move(&camera, part_of(bench, step), STEP_SPEED);
         bench->path[step] = camera;
         plan_motion_add(&motion, &camera, now_ns);
         struct viewer_camera *asked = &bench->asked[step * bench->keys / HERTZ];
