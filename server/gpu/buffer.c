@@ -217,6 +217,12 @@ void gpu_buffer_bind_storage(const struct gpu_buffer *buffer, unsigned binding)
     glBindBufferBase(GL_SHADER_STORAGE_BUFFER, binding, name_or_empty(buffer));
 }
 
+void gpu_buffer_bind_storage_part(struct gpu_buffer_place place, size_t size_bytes, unsigned binding)
+{
+    glBindBufferRange(GL_SHADER_STORAGE_BUFFER, binding, place.buffer->name, (GLintptr)place.offset_bytes,
+                      (GLsizeiptr)size_bytes);
+}
+
 void gpu_buffer_bind_uniform(const struct gpu_buffer *buffer, unsigned binding)
 {
     glBindBufferBase(GL_UNIFORM_BUFFER, binding, name_or_empty(buffer));

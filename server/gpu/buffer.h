@@ -10,6 +10,9 @@
 #include <stddef.h>
 #include <stdint.h>
 
+/* OpenGL allows no device to ask for more. */
+#define GPU_STORAGE_ALIGNMENT 256
+
 /* All-zero is the valid empty buffer. */
 struct gpu_buffer {
     unsigned name;         /* GL buffer, 0: none yet */
@@ -56,6 +59,8 @@ void gpu_buffer_finish(struct gpu_device *device, struct gpu_buffer *buffer); /*
 
 /* SSBO; an empty one is bound as a few zeros. */
 void gpu_buffer_bind_storage(const struct gpu_buffer *buffer, unsigned binding);
+/* A part of one that begins at a multiple of GPU_STORAGE_ALIGNMENT. */
+void gpu_buffer_bind_storage_part(struct gpu_buffer_place place, size_t size_bytes, unsigned binding);
 void gpu_buffer_bind_uniform(const struct gpu_buffer *buffer, unsigned binding); /* UBO */
 /* As a samplerBuffer / usamplerBuffer of `texel_format` (GL_RGBA32F, GL_RGBA32UI, GL_RG32UI, GL_R32UI,
  * GL_RGBA8 ..) on a texture unit. An empty buffer is bound as one of zeros. What a shader reads behind

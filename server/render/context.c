@@ -147,6 +147,12 @@ size_t context_surface_defines(const struct render_context *context, struct gpu_
     return n;
 }
 
+void context_bind_sums(const struct render_context *context)
+{
+    const size_t samples = (size_t)context->slice.slot_count << context->uniforms.sample_shift;
+    gpu_buffer_bind_storage_part(context->sums, samples * sizeof(vec4), BIND_SLICE_SUMS);
+}
+
 void context_bind_hits(struct render_context *context)
 {
     context_bind(context);

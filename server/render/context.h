@@ -65,7 +65,9 @@ struct render_context {
     struct gpu_buffer block_offsets;
     struct gpu_buffer wave_state;  /* struct wave_state, of the compaction */
     struct wave_state known_state; /* with counts_on_host: as it was last read */
-    struct gpu_buffer slice_sums;  /* vec4 per sample of the slice: radiance so far, coverage */
+    struct gpu_buffer slice_sums;  /* vec4 per sample of a slice: radiance so far, coverage */
+    struct gpu_buffer_place sums;  /* of the slice in hand: slice_sums, or its part of the picture */
+    bool sums_in_picture;          /* it has one sample, and no slice in it must be done again */
     uint64_t shadow_rays;          /* of the slice in hand, that are not counted in the state */
     uint32_t span_count;           /* since the timer was collected */
 };
@@ -80,6 +82,8 @@ void context_collect_done(
 void context_add_times(struct render_context *context, const struct stage_times *spans);
 /* What the host has done for a stage since then. */
 void context_add_cpu_time(struct render_context *context, enum stage stage, uint64_t start_ns);
+/* The sums of the slice in hand: BIND_SLICE_SUMS. */
+void context_bind_sums(const struct render_context *context);
 /* A compute program of shaders/render with no defines, in use. */
 const struct gpu_program *context_use(struct render_context *context, const char *compute, struct error *error);
 /* `defines` ends with {0}. */

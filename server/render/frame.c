@@ -252,6 +252,7 @@ static bool begin_slice(struct frame_renderer *renderer, struct error *error)
         return true;
     }
     layers_begin_slice(&renderer->work->layers, context);
+    context->sums = picture_sums_place(renderer->target, context);
     renderer->phase = PHASE_PRIMARY;
     const bool begun = frame_is_eyes_pass(renderer) ? frame_key_begin_slice(renderer, error)
                                                     : primary_begin_slice(rasterised(renderer), context, error);
@@ -306,7 +307,8 @@ static bool accumulate(struct frame_renderer *renderer, struct error *error)
     return (!context->comparison || comparison_keep_slice(context->comparison, error)) &&
            (!denoise_notes_samples(context) ||
             denoise_accumulate(&renderer->denoise, &renderer->work->denoise.notes, context, picture, error)) &&
-           (!has_beauty || picture_accumulate(picture, context, 0, &context->slice_sums, 0, error)) &&
+           (!has_beauty || context->sums.buffer != &context->slice_sums ||
+            picture_accumulate(picture, context, 0, &context->slice_sums, 0, error)) &&
            layers_accumulate(&renderer->work->layers, picture, context, error);
 }
 

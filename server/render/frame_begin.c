@@ -283,6 +283,9 @@ static bool size_frame(struct frame_renderer *renderer, struct error *error)
     context->counts_on_host =
         !renderer->queues_ahead || context->request.compare || context->tracer->impl->traces_on_host;
     context->waves_queued = waves_queued(renderer);
+    context->sums_in_picture = context->counts_on_host && renderer->target->samples == 1 &&
+                               renderer->target->layers & 1u << LAYER_BEAUTY && !context->comparison &&
+                               !renderer->key_tracer && !context->tile_samples && !denoise_is_wanted(context);
     layers_begin(&renderer->work->layers, &context->request);
     return true;
 }

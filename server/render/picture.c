@@ -213,6 +213,16 @@ bool picture_accumulate(struct picture *picture, struct render_context *context,
     return true;
 }
 
+struct gpu_buffer_place picture_sums_place(const struct picture *picture, const struct render_context *context)
+{
+    uint32_t first_slot = 0;
+    const struct gpu_buffer *band = picture_slice_band(picture, &context->slice, &first_slot);
+    const size_t offset_bytes = first_slot * sizeof(vec4);
+    return context->sums_in_picture && offset_bytes % GPU_STORAGE_ALIGNMENT == 0
+               ? (struct gpu_buffer_place){band, offset_bytes}
+               : (struct gpu_buffer_place){&context->slice_sums, 0};
+}
+
 uint32_t picture_band_slots(const struct picture *picture, uint32_t band, uint32_t *first)
 {
     *first = band * band_slots(picture);

@@ -149,7 +149,7 @@ static bool make_rays(const struct primary *primary, struct render_context *cont
     gpu_buffer_bind_storage(&context->rays, BIND_RAYS);
     gpu_buffer_bind_storage(&context->hits, BIND_HITS);
     gpu_buffer_bind_storage(&context->paths, BIND_PATHS);
-    gpu_buffer_bind_storage(&context->slice_sums, BIND_SLICE_SUMS);
+    context_bind_sums(context);
     if (context->scene->has_motion)
         gpu_buffer_bind_storage(&context->ray_times, BIND_RAY_TIMES);
     if (context->marked_key) {

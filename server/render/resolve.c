@@ -96,7 +96,8 @@ static bool is_ycbcr(const struct render_context *context, enum layer layer)
 
 void picture_announce(const struct picture *picture, struct render_context *context)
 {
-    (void)picture_accumulate_program(context, NULL);
+    if (!context->sums_in_picture || picture->plane_count > 1)
+        (void)picture_accumulate_program(context, NULL);
     if (context->tile_samples)
         (void)context_use(context, "render/tile_error.comp", NULL);
     for (uint32_t plane = 0; plane < picture->plane_count; plane++) {

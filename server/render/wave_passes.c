@@ -194,7 +194,7 @@ static bool gather(struct wave_passes *passes, struct render_context *context, b
     gpu_buffer_bind_storage(&passes->radiance, BIND_RADIANCE);
     gpu_buffer_bind_storage(&context->hit_places, BIND_HIT_PLACES);
     gpu_buffer_bind_storage(&passes->visibility, BIND_VISIBILITY);
-    gpu_buffer_bind_storage(&context->slice_sums, BIND_SLICE_SUMS);
+    context_bind_sums(context);
     context_span_begin(context, STAGE_SHADE);
     compact_dispatch(context, program, WAVE_RAYS);
     context_span_end(context);
