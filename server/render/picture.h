@@ -47,8 +47,8 @@ uint32_t picture_slot_count(const struct picture *picture);
 uint32_t picture_band_end(const struct picture *picture, uint32_t slot);
 /* That adds slices, in use. */
 const struct gpu_program *picture_accumulate_program(struct render_context *context, struct error *error);
-/* Where the current slice is summed up (context->sums): of a picture of one sample that is the picture, but for parts
- * of a slice that begin where no storage block may. */
+/* Where the current slice is summed up (context->sums): of a picture of one sample that is the picture, but for
+ * parts of a slice that begin where no storage block may. */
 struct gpu_buffer_place picture_sums_place(const struct picture *picture, const struct render_context *context);
 /* Adds the current slice to a plane: the slice's samples in `sums` from first_sum on. */
 bool picture_accumulate(struct picture *picture, struct render_context *context, uint32_t plane,

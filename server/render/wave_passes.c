@@ -115,45 +115,6 @@ static bool shade_hits(struct wave_passes *passes, struct render_context *contex
     return shaded;
 }
 
-static const struct gpu_program *left_scene_program(const struct wave_passes *passes,
-                                                    struct render_context *context, struct error *error)
-{
-    struct gpu_define defines[5] = {0};
-    size_t n = 0;
-    if (context->environment->kind == ENVIRONMENT_IMAGE)
-        defines[n++] = (struct gpu_define){"HAS_ENVIRONMENT_IMAGE", "1"};
-    if (passes->integrator->left_scene)
-        defines[n++] = (struct gpu_define){passes->integrator->left_scene, "1"};
-    if (passes->integrator->meets_lights && context->features.area_lights) {
-        defines[n++] = (struct gpu_define){"HAS_AREA_LIGHTS", "1"};
-        if (context_samples_emitters(context))
-            defines[n++] = (struct gpu_define){"HAS_EMITTERS", "1"};
-    }
-    return context_use_with(context, "render/left_scene.comp", defines, error);
-}
-
-/* What the paths that left the scene bring home. */
-static bool left_scene(struct wave_passes *passes, struct render_context *context, struct error *error)
-{
-    if (context->counts_on_host && context->hit_count == context->ray_count)
-        return true;
-    const struct gpu_program *program = left_scene_program(passes, context, error);
-    if (!program)
-        return false;
-    context_bind(context);
-    gpu_uniform_float(program, "radiance_limit", frame_request_radiance_limit(&context->request));
-    gpu_buffer_bind_texels(context->device, environment_lights(context->environment, context->scene),
-                           UNIT_SHADE_LIGHTS, GL_RGBA32F);
-    gpu_buffer_bind_texels(context->device, &context->rays, UNIT_RAYS, GL_RGBA32F);
-    gpu_buffer_bind_texels(context->device, &context->paths, UNIT_SHADE_PATHS, GL_RGBA32UI);
-    gpu_buffer_bind_storage(&context->hit_places, BIND_HIT_PLACES);
-    gpu_buffer_bind_storage(&passes->radiance, BIND_RADIANCE);
-    context_span_begin(context, STAGE_SHADE);
-    compact_dispatch(context, program, WAVE_RAYS);
-    context_span_end(context);
-    return true;
-}
-
 /* The shadow rays that were made, a part of them. */
 static bool trace_shadows(struct wave_passes *passes, struct render_context *context, bool *done,
                           struct error *error)
@@ -171,24 +132,39 @@ static bool trace_shadows(struct wave_passes *passes, struct render_context *con
 static const struct gpu_program *gather_program(const struct wave_passes *passes, struct render_context *context,
                                                 struct error *error)
 {
-    struct gpu_define defines[3] = {0};
+    const struct integrator *integrator = passes->integrator;
+    const bool meets_lights = integrator->meets_lights && context->features.area_lights;
+    const char *const names[] = {
+        integrator->gather,
+        ground_is_shown(context, integrator) ? "GROUND" : NULL,
+        context->environment->kind == ENVIRONMENT_IMAGE ? "HAS_ENVIRONMENT_IMAGE" : NULL,
+        integrator->left_scene,
+        meets_lights ? "HAS_AREA_LIGHTS" : NULL,
+        meets_lights && context_samples_emitters(context) ? "HAS_EMITTERS" : NULL,
+    };
+    struct gpu_define defines[sizeof(names) / sizeof(names[0]) + 1] = {0};
     size_t n = 0;
-    if (passes->integrator->gather)
-        defines[n++] = (struct gpu_define){passes->integrator->gather, "1"};
-    if (ground_is_shown(context, passes->integrator))
-        defines[n++] = (struct gpu_define){"GROUND", "1"};
+    for (size_t i = 0; i < sizeof(names) / sizeof(names[0]); i++)
+        if (names[i])
+            defines[n++] = (struct gpu_define){names[i], "1"};
     return context_use_with(context, "render/gather.comp", defines, error);
 }
 
-/* Adds the light that they let through to the wave's radiance, and after the last batch that to the samples. */
+/* Adds the light that they let through to the wave's radiance, and after the last batch that to the samples, with
+ * what the paths that left the scene bring home. */
 static bool gather(struct wave_passes *passes, struct render_context *context, bool last, uint32_t rays_a_hit,
                    struct error *error)
 {
     const struct gpu_program *program = gather_program(passes, context, error);
     if (!program)
         return false;
+    context_bind(context);
     gpu_uniform_uint(program, "batch_rays", rays_a_hit);
     gpu_uniform_uint(program, "last_batch", last);
+    gpu_uniform_float(program, "radiance_limit", frame_request_radiance_limit(&context->request));
+    gpu_buffer_bind_texels(context->device, environment_lights(context->environment, context->scene),
+                           UNIT_SHADE_LIGHTS, GL_RGBA32F);
+    gpu_buffer_bind_texels(context->device, &context->rays, UNIT_RAYS, GL_RGBA32F);
     gpu_buffer_bind_texels(context->device, &context->paths, UNIT_SHADE_PATHS, GL_RGBA32UI);
     gpu_buffer_bind_texels(context->device, &passes->light_samples, UNIT_PASS_0, GL_RGBA32F);
     gpu_buffer_bind_storage(&passes->radiance, BIND_RADIANCE);
@@ -267,8 +243,6 @@ static uint32_t batch_of(const struct wave_passes *passes, const struct render_c
 /* Shades, and makes a batch of shadow rays. */
 static bool shade_batch(struct wave_passes *passes, struct render_context *context, struct error *error)
 {
-    if (context->asked == 0 && !left_scene(passes, context, error))
-        return false;
     context->asking = batch_of(passes, context);
     return context->hit_count == 0 || shade_hits(passes, context, context->asked, context->asking, error);
 }
@@ -313,7 +287,6 @@ void wave_passes_announce_shading(struct wave_passes *passes, struct render_cont
 {
     if (context->scene->instance_count > 0)
         (void)shade_program(passes, context, NULL);
-    (void)left_scene_program(passes, context, NULL);
     (void)gather_program(passes, context, NULL);
 }
 
@@ -337,7 +310,6 @@ void wave_passes_announce(struct wave_passes *passes, struct render_context *con
 {
     const struct integrator *integrator = passes->integrator;
     compact_announce_hits(context);
-    (void)left_scene_program(passes, context, NULL);
     (void)gather_program(passes, context, NULL);
     compact_announce_children(context, integrator->scatters);
     if (wave_passes_expect_bounces(passes, context))

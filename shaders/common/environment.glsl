@@ -10,9 +10,8 @@
 // The default sky of a scene without any light; server/render/environment.c integrates the same.
 vec3 environment_sky(float up)
 {
-    if (up < 0.0)
-        return mix(vec3(SKY_HORIZON), vec3(SKY_GROUND), min(-up * SKY_GROUND_SLOPE, 1.0));
-    return mix(vec3(SKY_HORIZON), vec3(SKY_ZENITH), up);
+    bool below = up < 0.0;
+    return mix(vec3(SKY_HORIZON), below ? vec3(SKY_GROUND) : vec3(SKY_ZENITH), below ? min(-up * SKY_GROUND_SLOPE, 1.0) : up);
 }
 
 // The point of a direction on an equirectangular image, 0..1: rows from +y down, the middle column is -z; turned by w

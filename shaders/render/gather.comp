@@ -2,13 +2,14 @@
 // Adds a wave's radiance and the light that its shadow rays let through to the samples of the slice. The paths of a
 // sample lie side by side; the first of them adds for all, in their order, so no two invocations share a sample and the
 // sum is the same to the bit every time. Shadow rays come in batches: each batch is added to its path's radiance, and
-// the last to the samples, so their number does not matter.
+// the last to the samples, so their number does not matter. Paths that left the scene bring the environment home here.
 // Defines: GREY of what a shadow ray lets through, the mean of the channels counts; GROUND shadow rays change the pixel's
-// coverage, too (ground.comp).
+// coverage, too (ground.comp). Those of left_scene.glsl.
 
 #include "shared/path.h"
 #include "common/dispatch.glsl"
 #include "common/visibility.glsl"
+#include "render/left_scene.glsl"
 #include "render/wave.glsl"
 
 layout(local_size_x = 64) in;
@@ -16,8 +17,7 @@ layout(local_size_x = 64) in;
 uniform uint batch_rays;
 uniform uint last_batch;
 
-layout(binding = UNIT_SHADE_PATHS) uniform usamplerBuffer paths; // in texels: software GL fetches those faster
-layout(binding = UNIT_PASS_0) uniform samplerBuffer light_samples;
+layout(binding = UNIT_PASS_0) uniform samplerBuffer light_samples; // in texels: software GL fetches those faster
 layout(std430, binding = BIND_HIT_PLACES) readonly buffer place_block { uint hit_places[]; };
 layout(std430, binding = BIND_RADIANCE) buffer radiance_block { vec4 radiance[]; };
 layout(std430, binding = BIND_VISIBILITY) readonly buffer visibility_block { uint visibility[]; };
@@ -37,13 +37,10 @@ vec4 finite(vec4 v)
     return mix(clamp(v, vec4(0.0), vec4(RADIANCE_MAX)), vec4(0.0), isnan(v));
 }
 
-// With the light that the batch let through.
-vec4 radiance_of(uint k)
+// Of hit j, with the light that the batch let through.
+vec4 radiance_of_hit(uint k, uint j)
 {
     vec4 sum = radiance[k];
-    uint j = hit_places[k];
-    if (j == HIT_PLACE_NONE)
-        return sum;
     for (uint i = 0u; i < batch_rays; i++) {
         uint place = i * wave.hits.count + j;
         uint through = visibility[place];
@@ -74,7 +71,12 @@ void main()
     vec4 sum = slice_sums[slot];
     bool more = true;
     while (more) { // of which a batch that is not the last has one
-        vec4 arrived = radiance_of(k);
+        uint j = hit_places[k];
+        vec4 arrived = vec4(0.0);
+        if (j != HIT_PLACE_NONE)
+            arrived = radiance_of_hit(k, j);
+        else if (last)
+            arrived = radiance_beyond(k);
         if (last)
             sum += finite(arrived);
         else

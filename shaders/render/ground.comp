@@ -31,7 +31,7 @@ const vec4 COVERED = vec4(0.0, 0.0, 0.0, 1.0);
 // Cline, Egbert. Importance Resampling for Global Illumination. 2005). The more, the less the share is off.
 const uint CANDIDATES = 4u;
 
-// What a ray that goes on without the ground would bring: render/left_scene.comp.
+// What a ray that goes on without the ground would bring: render/left_scene.glsl.
 vec4 behind(vec3 direction)
 {
     if (environment_is_hidden())

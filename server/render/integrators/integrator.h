@@ -24,7 +24,7 @@ struct integrator {
     uint32_t (*shadow_rays_a_hit)(const struct render_context *context); /* of the current frame */
     /* The rest may be NULL: none. */
     const char *ground;     /* a define of render/ground.comp */
-    const char *left_scene; /* a define of render/left_scene.comp */
+    const char *left_scene; /* a define of render/left_scene.glsl */
     const char *gather;     /* a define of render/gather.comp */
     size_t (*defines)(const struct render_context *context, struct gpu_define *defines); /* of the shader */
     void (*set)(struct render_context *context, const struct gpu_program *program); /* uniforms and bindings */

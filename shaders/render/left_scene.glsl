@@ -6,19 +6,13 @@
 
 #include "shared/path.h"
 #include "shared/ray.h"
-#include "common/dispatch.glsl"
 #include "common/environment.glsl"
 #include "common/light.glsl"
 #include "render/fireflies.glsl"
 #include "render/path_texels.glsl"
-#include "render/wave.glsl"
-
-layout(local_size_x = 64) in;
 
 layout(binding = UNIT_RAYS) uniform samplerBuffer rays; // in texels: software GL fetches those faster
 layout(binding = UNIT_SHADE_PATHS) uniform usamplerBuffer paths;
-layout(std430, binding = BIND_HIT_PLACES) readonly buffer place_block { uint hit_places[]; };
-layout(std430, binding = BIND_RADIANCE) writeonly buffer radiance_block { vec4 radiance[]; };
 
 path path_at(uint k)
 {
@@ -26,17 +20,13 @@ path path_at(uint k)
     return path_of_texels(texelFetch(paths, texel), texelFetch(paths, texel + 1), texelFetch(paths, texel + 2));
 }
 
-void main()
+// Of the path of ray k.
+vec4 radiance_beyond(uint k)
 {
-    uint k = item_index();
-    if (k >= wave.rays.count || hit_places[k] != HIT_PLACE_NONE)
-        return;
     path p = path_at(k);
     bool straight = (p.flags & PATH_STRAIGHT) != 0u, seen = straight && frame.environment_kind != ENVIRONMENT_NONE;
-    if (straight && environment_is_hidden()) {
-        radiance[k] = vec4(0.0);
-        return;
-    }
+    if (straight && environment_is_hidden())
+        return vec4(0.0);
     vec3 arriving = vec3(1.0);
 #ifndef OPEN
     arriving = environment_radiance(texelFetch(rays, int(2u * k + 1u)).xyz);
@@ -56,5 +46,5 @@ void main()
 #ifdef SHARES
     brought = limited(p, 1u, brought);
 #endif
-    radiance[k] = vec4(brought, seen ? p.weight_r : 0.0);
+    return vec4(brought, seen ? p.weight_r : 0.0);
 }
