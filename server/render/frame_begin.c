@@ -338,6 +338,31 @@ static const struct gpu_texel_formats texel_formats = {.of_unit = {[UNIT_TANGENT
                                                                    [UNIT_SHADE_ENVIRONMENT] = GL_R32F,
                                                                    [UNIT_RAY_TIMES] = GL_R32F}};
 
+/* While the scene is brought to a device that has nothing of it: the program that depends on its materials alone,
+ * of what is to be met exactly. A guess that is wrong costs time, so where more decides nothing is announced. */
+static void announce_first(struct frame_renderer *renderer)
+{
+    struct render_context *context = &renderer->work->context;
+    const struct scene *scene = renderer->scene;
+    struct tracer kind = {.impl =
+                              frame_find_tracer(renderer, context->request.tracer, "tracer", &(struct error){0})};
+    const bool tells = !renderer->announced_first && kind.impl && !kind.impl->sampled &&
+                       !context->request.compare && !frame_is_from_layers(&renderer->request) &&
+                       !context->request.hidden_layer && !renderer->work->passes.integrator->lit_by_surfaces &&
+                       renderer->shared->copy.revision == 0 && !renderer->motion &&
+                       scene->objects[OBJECT_SPHERES].count == 0;
+    renderer->announced_first = true;
+    if (!tells || context->request.samples == 0)
+        return;
+    context->features = scene_features_of(scene);
+    context->sampled_hits = false;
+    context->tracer = &kind;
+    gpu_program_announce(renderer->device, &texel_formats);
+    wave_passes_announce_hits(&renderer->work->passes, context);
+    gpu_program_announce(renderer->device, NULL);
+    context->tracer = NULL;
+}
+
 /* Of a frame that is made in one pass: what depends on no structure. */
 static void announce_shading(struct frame_renderer *renderer)
 {
@@ -545,7 +570,7 @@ static bool begin(struct frame_renderer *renderer, const struct scene *scene, co
     context->layer_tracer = NULL;
     context->marked_key = NULL;
     renderer->pass = PASS_UNKNOWN;
-    renderer->announced = renderer->announced_early = false;
+    renderer->announced = renderer->announced_early = renderer->announced_first = false;
     renderer->target = &renderer->picture;
     renderer->result = (struct frame_result){0};
     renderer->view = view_of(request);
@@ -586,8 +611,10 @@ bool frame_update(struct frame_renderer *renderer, struct error *error)
     bool done = false;
     if (!bring_scene(renderer, &done, error))
         return false;
-    if (!done)
+    if (!done) {
+        announce_first(renderer);
         return true;
+    }
     if (!update_scene(renderer, renderer->scene, renderer->motion, error) || !take_tracers(renderer, error))
         return false;
     renderer->phase = PHASE_BUILD;

@@ -95,6 +95,7 @@ struct frame_renderer {
     size_t awaited_bytes;         /* of a reservation that was put off, see gpu_reserve_waits(); 0: of none */
     bool announced;               /* are the programs of the pass that is being reserved */
     bool announced_early;         /* and those that depend on no structure */
+    bool announced_first;         /* and what depends on materials alone */
     bool rasterise;
     uint32_t strip_rows; /* that are rasterised together */
     uint32_t sample_shift_max;

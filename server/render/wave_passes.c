@@ -273,6 +273,11 @@ enum wave_progress wave_passes_shade(struct wave_passes *passes, struct render_c
     return done ? finish_batch(passes, context, error) : WAVE_AGAIN;
 }
 
+void wave_passes_announce_hits(struct wave_passes *passes, struct render_context *context)
+{
+    (void)shade_program(passes, context, NULL);
+}
+
 void wave_passes_announce_long(struct wave_passes *passes, struct render_context *context)
 {
     const struct wave shadows = {.kind = WAVE_ANY,

@@ -38,6 +38,8 @@ bool wave_passes_expect_bounces(const struct wave_passes *passes, const struct r
 void wave_passes_announce(struct wave_passes *passes, struct render_context *context);
 /* Announces those that shade its first hits and trace their shadow rays, which take longest to compile. */
 void wave_passes_announce_long(struct wave_passes *passes, struct render_context *context);
+/* Announces the one that shades hits, which is the longest of many materials. */
+void wave_passes_announce_hits(struct wave_passes *passes, struct render_context *context);
 /* Announces those of the first wave that trace nothing. */
 void wave_passes_announce_shading(struct wave_passes *passes, struct render_context *context);
 
