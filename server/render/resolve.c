@@ -32,11 +32,16 @@ static const char *shows_display_values(const struct render_context *context, en
     return context->display_values && is_colour ? "DISPLAY_VALUES" : NULL;
 }
 
-/* The defines that all programs of display.glsl have. */
-static void display_defines(const struct render_context *context, enum layer layer, struct gpu_define defines[2])
+/* Of a program of display.glsl; with the curve where it makes display values. */
+#define DISPLAY_DEFINES 3
+static void display_defines(const struct render_context *context, enum layer layer, bool displays,
+                            struct gpu_define defines[DISPLAY_DEFINES])
 {
+    static const char *const numbers[] = {[TONE_NEUTRAL] = "0u", [TONE_ACES] = "1u", [TONE_NONE] = "2u"};
     const char *names[] = {shows_display_values(context, layer), counts_tiles(context, layer)};
     size_t n = 0;
+    if (displays && !names[0])
+        defines[n++] = (struct gpu_define){"TONE_MAP", numbers[context->request.tone_map]};
     for (size_t i = 0; i < sizeof(names) / sizeof(names[0]); i++)
         if (names[i])
             defines[n++] = (struct gpu_define){names[i], "1"};
@@ -49,8 +54,8 @@ static const struct gpu_program *use_pixels(struct render_context *context, enum
         [PIXEL_FORMAT_RGBA8] = "0",    [PIXEL_FORMAT_RGBA16F] = "1", [PIXEL_FORMAT_RGBA32F] = "2",
         [PIXEL_FORMAT_DEPTH32F] = "3", [PIXEL_FORMAT_NORMAL8] = "4", [PIXEL_FORMAT_SHARE8] = "5"};
     unsigned format = frame_request_plane_format(&context->request, layer);
-    struct gpu_define defines[4] = {{"FORMAT", numbers[format]}};
-    display_defines(context, layer, defines + 1);
+    struct gpu_define defines[DISPLAY_DEFINES + 2] = {{"FORMAT", numbers[format]}};
+    display_defines(context, layer, format == PIXEL_FORMAT_RGBA8, defines + 1);
     const struct gpu_program *program = context_use_with(context, "render/resolve.comp", defines, error);
     if (program)
         gpu_uniform_uint(program, "pixel_count", pixel_count);
@@ -59,8 +64,8 @@ static const struct gpu_program *use_pixels(struct render_context *context, enum
 
 static const struct gpu_program *use_ycbcr(struct render_context *context, uint32_t row_count, struct error *error)
 {
-    struct gpu_define defines[3] = {0};
-    display_defines(context, LAYER_BEAUTY, defines);
+    struct gpu_define defines[DISPLAY_DEFINES + 1] = {0};
+    display_defines(context, LAYER_BEAUTY, true, defines);
     const struct gpu_program *program = context_use_with(context, "render/resolve_ycbcr.comp", defines, error);
     if (program) {
         gpu_uniform_uint(program, "row_count", row_count);
@@ -129,7 +134,6 @@ bool picture_resolve_band(struct picture *picture, struct render_context *contex
         gpu_buffer_bind_storage(denoised ? &picture->denoised[band] : picture_band(picture, plane, band),
                                 BIND_ACCUMULATION);
         gpu_buffer_bind_storage(&picture->resolved, BIND_RESOLVED);
-        gpu_uniform_uint(program, "tone_map_kind", request->tone_map);
         gpu_uniform_float(program, "scale", scale_of(picture, request, layer));
         gpu_uniform_float(program, "coverage_scale", coverage_scale);
         set_background(program, request, layer);

@@ -3,15 +3,18 @@
 // Defines:
 //   HAS_TILE_SAMPLES tiles may have stopped, and have fewer samples (server/render/picture_noise.h)
 //   DISPLAY_VALUES   what is summed is display values of no curve
+//   TONE_MAP         the curve, a number of common/tonemap.glsl; else there is none
 #include "shared/path.h"
 #include "common/camera.glsl"
 #include "common/tonemap.glsl"
 
-uniform uint tone_map_kind;
 uniform float scale;          // exposure / samples
 uniform float coverage_scale; // 1 / samples
 uniform vec4 background;      // what lies behind the surfaces: linear; a: 1: a colour, 0: nothing
 
+#ifndef TONE_MAP
+#define TONE_MAP TONE_MAP_NONE
+#endif
 #ifdef DISPLAY_VALUES
 const bool display_values = true;
 #else
@@ -64,7 +67,7 @@ vec4 display_of_sum(vec4 colour)
         straight = clamp(straight, 0.0, 1.0);
         behind = srgb_from_linear(behind);
     } else {
-        straight = tone_map(straight, tone_map_kind);
+        straight = tone_map(straight, TONE_MAP);
     }
     vec4 shown = background.a > 0.0 ? vec4(mix(behind, straight, colour.a), 1.0) : vec4(straight, colour.a);
     return display_values ? shown : vec4(srgb_from_linear(shown.rgb), shown.a);

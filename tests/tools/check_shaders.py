@@ -51,6 +51,8 @@ CHOICES = {
     "render/gather_views.comp": [[{}, {"MARK": "1"}, {"KEPT": "1"}], [{}, {"EYES": "1"}],
                                  [{"KEY_LAYERS": number} for number in "123"]],
     "render/ground.comp": [[{way: "1"} for way in "EVERY_LIGHT ONE_LIGHT OPEN".split()]],
+    **{program: [[{}, {"TONE_MAP": "0u"}, {"TONE_MAP": "1u"}]] for program in
+       ("render/resolve.comp", "render/resolve_ycbcr.comp")},
     "quadtree/eyes.comp": [[{"QUADTREE_LAYERS": number} for number in "123"]],
     "raster/view.vert": [[{"PRIMITIVE_KIND": kind, "HAS_SPHERES": "1"} for kind in "012"],
                          [{}, {"HAS_LAYERS": "1"}, {"K_BUFFER": "2"}, {"K_BUFFER": "3"}]],
